@@ -1,0 +1,1 @@
+typedef int orb_api_placeholder;

@@ -1,0 +1,135 @@
+/* The context: error record, cancel flag, deadline, progress. Memory lies in memory.c, threads in parallel.c. */
+#include "base/context.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "base/check.h"
+
+enum { CONTEXT_MAGIC = 0x0eb3c07e, MAX_THREADS = 64 };
+static const int64_t DEFAULT_MAX_TRIANGLES = 5000000;
+
+_Noreturn void orb_assert_failed(const char *expression, const char *file, int line) {
+  fprintf(stderr, "orbmorph: broken invariant: %s (%s:%d)\n", expression, file, line);
+  abort();
+}
+
+double orb_clock(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+int64_t orb_clock_ms(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+static void error_reset(orb_error *error) {
+  memset(error, 0, sizeof *error);
+  error->line = error->offset = error->boundary_loops = error->genus = -1;
+  error->shape = -1;
+}
+
+static int default_threads(void) {
+  long online = sysconf(_SC_NPROCESSORS_ONLN);
+  return online < 1 ? 1 : online > MAX_THREADS ? MAX_THREADS : (int)online;
+}
+
+orb_status orb_context_create(const orb_context_options *options, orb_context **out) {
+  static const orb_context_options defaults = {0};
+  if (!options) {
+    options = &defaults;
+  }
+  orb_context *ctx = options->allocator.alloc ? options->allocator.alloc(options->allocator.user, sizeof *ctx)
+                                              : malloc(sizeof *ctx);
+  if (!ctx) {
+    return ORB_E_NO_MEMORY;
+  }
+  memset(ctx, 0, sizeof *ctx);
+  ctx->magic = CONTEXT_MAGIC;
+  ctx->options = *options;
+  if (ctx->options.max_triangles == 0) {
+    ctx->options.max_triangles = DEFAULT_MAX_TRIANGLES;
+  }
+  if (ctx->options.threads <= 0) {
+    ctx->options.threads = default_threads();
+  }
+  if (ctx->options.threads > MAX_THREADS) {
+    ctx->options.threads = MAX_THREADS;
+  }
+  error_reset(&ctx->error);
+  pthread_mutex_init(&ctx->error_lock, NULL);
+  pthread_mutex_init(&ctx->progress_lock, NULL);
+  *out = ctx;
+  return ORB_OK;
+}
+
+void orb_context_destroy(orb_context *ctx) {
+  if (!ctx) {
+    return;
+  }
+  ORB_ASSERT(ctx->magic == CONTEXT_MAGIC);
+  orb_pool_stop(ctx);
+  ORB_ASSERT(atomic_load(&ctx->memory_used) == 0);
+  pthread_mutex_destroy(&ctx->error_lock);
+  pthread_mutex_destroy(&ctx->progress_lock);
+  ctx->magic = 0;
+  if (ctx->options.allocator.free) {
+    ctx->options.allocator.free(ctx->options.allocator.user, ctx);
+  } else {
+    free(ctx);
+  }
+}
+
+void orb_context_cancel(orb_context *ctx) { atomic_store(&ctx->cancelled, 1); }
+
+orb_status orb_context_check(orb_context *ctx) {
+  if (atomic_load_explicit(&ctx->cancelled, memory_order_relaxed)) {
+    return orb_fail(ctx, ORB_E_CANCELLED, "The job was cancelled.");
+  }
+  if (ctx->options.deadline_ms && orb_clock_ms() > ctx->options.deadline_ms) {
+    return orb_fail(ctx, ORB_E_TIMEOUT, "The job ran out of its time; raise the limit or send a smaller mesh.");
+  }
+  return ORB_OK;
+}
+
+const orb_error *orb_context_error(const orb_context *ctx) { return &ctx->error; }
+orb_error *orb_context_error_edit(orb_context *ctx) { return &ctx->error; }
+
+void orb_error_clear(orb_context *ctx) {
+  pthread_mutex_lock(&ctx->error_lock);
+  error_reset(&ctx->error);
+  pthread_mutex_unlock(&ctx->error_lock);
+}
+
+orb_status orb_fail(orb_context *ctx, orb_status status, const char *format, ...) {
+  ORB_ASSERT(status != ORB_OK);
+  pthread_mutex_lock(&ctx->error_lock);
+  if (!ctx->in_loop || ctx->error.status == ORB_OK) {
+    error_reset(&ctx->error);
+    ctx->error.status = status;
+    va_list args;
+    va_start(args, format);
+    vsnprintf(ctx->error.detail, sizeof ctx->error.detail, format, args);
+    va_end(args);
+  }
+  pthread_mutex_unlock(&ctx->error_lock);
+  return status;
+}
+
+void orb_progress(orb_context *ctx, const char *stage, double fraction) {
+  if (!ctx->options.progress || pthread_mutex_trylock(&ctx->progress_lock) != 0) {
+    return;
+  }
+  ctx->options.progress(ctx->options.progress_user, stage, fraction < 0 ? 0 : fraction > 1 ? 1 : fraction);
+  pthread_mutex_unlock(&ctx->progress_lock);
+}
+
+int orb_threads(const orb_context *ctx) { return ctx->options.threads; }
+int64_t orb_context_max_triangles(const orb_context *ctx) { return ctx->options.max_triangles; }

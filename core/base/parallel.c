@@ -1,0 +1,153 @@
+/* Parallel loops on threads of the context's own.
+ *
+ * Contract. One loop runs at a time; the caller takes part as thread 0. The owner publishes a loop under the lock by
+ * raising `round`; workers that see a new round take chunks from the atomic counter until none is left, then report
+ * back by lowering `working`. The caller returns when the counter is spent and no worker is inside the loop. Workers
+ * sleep on a condition variable between loops after a short spin. Threads that cannot be started are done without:
+ * results do not depend on how many there are.
+ */
+#include <sched.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "base/context.h"
+
+enum { MAX_WORKERS = 63, SPINS = 2000 };
+
+struct orb_pool {
+  pthread_mutex_t lock;
+  pthread_cond_t wake, done;
+  int workers, working, stopping;
+  atomic_uint round;
+  atomic_int pending; /* workers that have not yet finished the present round */
+  orb_loop_fn body;
+  void *arg;
+  int64_t count, grain;
+  atomic_llong next;
+  struct worker {
+    orb_context *ctx;
+    pthread_t thread;
+    int index;
+  } worker[MAX_WORKERS];
+};
+
+static void take_chunks(orb_pool *pool, int thread) {
+  int64_t begin;
+  while ((begin = atomic_fetch_add_explicit(&pool->next, pool->grain, memory_order_relaxed)) < pool->count) {
+    int64_t end = begin + pool->grain < pool->count ? begin + pool->grain : pool->count;
+    pool->body(pool->arg, begin, end, thread);
+  }
+}
+
+static void pause_cpu(void) {
+#if defined(__x86_64__)
+  __builtin_ia32_pause();
+#elif defined(__aarch64__)
+  __asm__ volatile("yield");
+#endif
+}
+
+static void *worker_main(void *argument) {
+  struct worker *self = argument;
+  orb_pool *pool = self->ctx->pool;
+  unsigned seen = 0;
+  for (;;) {
+    for (int spin = 0; spin < SPINS && atomic_load_explicit(&pool->round, memory_order_acquire) == seen; spin++) {
+      pause_cpu();
+    }
+    pthread_mutex_lock(&pool->lock);
+    while (atomic_load_explicit(&pool->round, memory_order_acquire) == seen && !pool->stopping) {
+      pthread_cond_wait(&pool->wake, &pool->lock);
+    }
+    int stop = pool->stopping;
+    seen = atomic_load(&pool->round);
+    pthread_mutex_unlock(&pool->lock);
+    if (stop) {
+      return NULL;
+    }
+    take_chunks(pool, self->index);
+    if (atomic_fetch_sub_explicit(&pool->pending, 1, memory_order_acq_rel) == 1) {
+      pthread_mutex_lock(&pool->lock);
+      pthread_cond_signal(&pool->done);
+      pthread_mutex_unlock(&pool->lock);
+    }
+  }
+}
+
+static orb_pool *pool_start(orb_context *ctx) {
+  orb_pool *pool = orb_calloc(ctx, 1, sizeof *pool);
+  if (!pool) {
+    orb_error_clear(ctx); /* the loop runs in the caller alone */
+    return NULL;
+  }
+  pthread_mutex_init(&pool->lock, NULL);
+  pthread_cond_init(&pool->wake, NULL);
+  pthread_cond_init(&pool->done, NULL);
+  ctx->pool = pool;
+  for (int i = 0; i < ctx->options.threads - 1 && i < MAX_WORKERS; i++) {
+    pool->worker[i].ctx = ctx;
+    pool->worker[i].index = i + 1;
+    if (pthread_create(&pool->worker[i].thread, NULL, worker_main, &pool->worker[i]) != 0) {
+      break;
+    }
+    pool->workers++;
+  }
+  return pool;
+}
+
+void orb_pool_stop(orb_context *ctx) {
+  orb_pool *pool = ctx->pool;
+  if (!pool) {
+    return;
+  }
+  pthread_mutex_lock(&pool->lock);
+  pool->stopping = 1;
+  pthread_cond_broadcast(&pool->wake);
+  pthread_mutex_unlock(&pool->lock);
+  for (int i = 0; i < pool->workers; i++) {
+    pthread_join(pool->worker[i].thread, NULL);
+  }
+  pthread_mutex_destroy(&pool->lock);
+  pthread_cond_destroy(&pool->wake);
+  pthread_cond_destroy(&pool->done);
+  ctx->pool = NULL;
+  orb_free(ctx, pool);
+}
+
+static void run_alone(int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
+  for (int64_t begin = 0; begin < count; begin += grain) {
+    body(arg, begin, begin + grain < count ? begin + grain : count, 0);
+  }
+}
+
+void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
+  ORB_ASSERT(grain >= 1);
+  orb_pool *pool = ctx->pool;
+  if (count <= grain || ctx->options.threads == 1 || (!pool && !(pool = pool_start(ctx))) || pool->workers == 0) {
+    run_alone(count, grain, body, arg);
+    return;
+  }
+  ORB_ASSERT(!ctx->in_loop);
+  ctx->in_loop = 1;
+  pthread_mutex_lock(&pool->lock);
+  pool->body = body;
+  pool->arg = arg;
+  pool->count = count;
+  pool->grain = grain;
+  atomic_store(&pool->next, 0);
+  atomic_store(&pool->pending, pool->workers);
+  atomic_fetch_add_explicit(&pool->round, 1, memory_order_release);
+  pthread_cond_broadcast(&pool->wake);
+  pthread_mutex_unlock(&pool->lock);
+  take_chunks(pool, 0);
+  for (int spin = 0; spin < SPINS && atomic_load_explicit(&pool->pending, memory_order_acquire); spin++) {
+    pause_cpu();
+  }
+  pthread_mutex_lock(&pool->lock);
+  while (atomic_load_explicit(&pool->pending, memory_order_acquire)) {
+    pthread_cond_wait(&pool->done, &pool->lock);
+  }
+  pthread_mutex_unlock(&pool->lock);
+  ctx->in_loop = 0;
+}

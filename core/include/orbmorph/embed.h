@@ -1,0 +1,98 @@
+/* Spherical embeddings: every vertex of a mesh on the unit sphere, no triangle flipped, with an exact certificate. */
+#ifndef ORBMORPH_EMBED_H
+#define ORBMORPH_EMBED_H
+
+#include "orbmorph/mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Holds exactly for the stored doubles. valid = flipped 0, degenerate 0 and degree 1: every orientation
+ * orient(0,p,q,r) is exactly positive and the map covers the sphere once. */
+typedef struct orb_certificate {
+  int valid, exact;
+  int64_t flipped, degenerate; /* triangles of negative, of zero orientation */
+  int32_t degree;              /* of the map: solid angles / 4π; 0 where it cannot be told */
+  double min_determinant;      /* the smallest det(p,q,r), rounded */
+} orb_certificate;
+
+/* Certifies points (3 a vertex, unit up to rounding) of a closed triangle list. Source: orientation by a static
+ * filter, then expansions (Shewchuk 1997); degree by solid angles (Van Oosterom & Strackee 1983) with an error bound.
+ * Never fails but for memory and cancel; look at out->valid. */
+ORB_MUST_CHECK orb_status orb_certify(orb_context *ctx, const double *points, int32_t vertex_count,
+                                      const int32_t *triangles, int32_t triangle_count, orb_certificate *out);
+
+enum { ORB_HISTOGRAM_BINS = 64 };
+typedef struct orb_measure {
+  double mean, median, p99, max, std; /* weighted by source area */
+  int32_t bins;
+  double edges[ORB_HISTOGRAM_BINS + 1];
+  double counts[ORB_HISTOGRAM_BINS]; /* triangles in each bin */
+} orb_measure;
+
+/* How a map stretches: both areas scaled equal, the image of a triangle is its flat chord triangle, σ₁ ≥ σ₂ singular
+ * values. Source triangles of zero area have no weight. */
+typedef struct orb_distortion {
+  orb_measure symmetric_dirichlet; /* ¼(σ₁²+σ₁⁻²+σ₂²+σ₂⁻²), 1 = isometric */
+  orb_measure angle;               /* σ₁/σ₂ */
+  orb_measure area;                /* ln σ₁σ₂ */
+  orb_measure aspect;              /* circumradius / 2 inradius of the image triangle */
+  double stretch_efficiency;       /* 1 / mean(½(σ₁⁻²+σ₂⁻²)) */
+} orb_distortion;
+
+/* positions → images, both 3 a vertex, same triangles. For two aligned shapes also their composed map. */
+ORB_MUST_CHECK orb_status orb_distortion_measure(orb_context *ctx, const double *positions, const double *images,
+                                                 const int32_t *triangles, int32_t triangle_count,
+                                                 orb_distortion *out);
+
+typedef enum orb_embed_method { ORB_EMBED_NEWTON = 0, ORB_EMBED_KERNEL_SAMPLING } orb_embed_method;
+typedef enum orb_preset { ORB_PRESET_DEFAULT = 0, ORB_PRESET_FAST, ORB_PRESET_QUALITY } orb_preset;
+
+/* Options of both methods; start from orb_embed_defaults(). */
+typedef struct orb_embed_options {
+  orb_embed_method method;
+  /* newton */
+  orb_preset preset;
+  double energy_weight; /* w of E = Σ D (w + a²/d²): 1 symmetric Dirichlet (default), 0 Praun & Hoppe's L2 stretch */
+  /* kernel-sampling: Peng & Timalsena 2016, sections 4 to 6 */
+  double area_exponent;          /* ϱ of Eq. 3, 3.0 */
+  double aspect_exponent;        /* φ of Eq. 3, 12.0 */
+  double step;                   /* stepping of Eq. 2, 0.11 */
+  double displacement_threshold; /* of Algorithm 1, 1e-6 */
+  int32_t max_iterations;        /* of Algorithm 1 */
+  int32_t first_optimization;    /* vertices inserted before the first global optimisation, 25 */
+  double growth;                 /* of that number after each, 1.25 */
+  int32_t qem_until;             /* QEM down to this many vertices, then Eq. 1 (section 9.2) */
+} orb_embed_options;
+void orb_embed_defaults(orb_embed_options *options);
+
+typedef struct orb_embed_timings {
+  double check, simplify, embed, certify, total; /* seconds */
+} orb_embed_timings;
+
+typedef struct orb_embedding {
+  int32_t vertex_count;
+  double *points; /* 3 a vertex: |p| = 1 within 1e-12; what is certified */
+  orb_certificate certificate;
+  orb_distortion distortion;
+  orb_embed_timings timings;
+} orb_embedding;
+
+/* Embeds a mesh that orb_mesh_repair() accepted. The result is certified, or ORB_E_NOT_CERTIFIED is returned and no
+ * embedding. Same bytes for any number of threads. Stages: "simplify", "embed", "certify". Source: DESIGN in
+ * docs/method.md; O(n log n) time, at most 250 bytes a triangle beside the mesh. */
+ORB_MUST_CHECK orb_status orb_embed(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
+                                    orb_embedding *out);
+void orb_embedding_free(orb_context *ctx, orb_embedding *embedding);
+
+/* Stored form: header, points, certificate, distortion, timings, checksum. Decoding certifies again against the
+ * mesh; any truncation or change is ORB_E_CORRUPT. */
+ORB_MUST_CHECK orb_status orb_embedding_encode(orb_context *ctx, const orb_embedding *embedding, orb_buffer *out);
+ORB_MUST_CHECK orb_status orb_embedding_decode(orb_context *ctx, const unsigned char *bytes, size_t size,
+                                               const orb_mesh *mesh, orb_embedding *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

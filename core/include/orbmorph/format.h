@@ -1,0 +1,47 @@
+/* Mesh files: OBJ, OFF, PLY, STL and glTF/GLB from memory, and the binary sphere PLY out.
+ *
+ * All readers are linear in the file's size, take the format from the content and never from a name, never trust a
+ * count of a header before the bytes are there, and never allocate more than a small multiple of the file.
+ */
+#ifndef ORBMORPH_FORMAT_H
+#define ORBMORPH_FORMAT_H
+
+#include "orbmorph/mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum orb_format {
+  ORB_FORMAT_AUTO = 0,
+  ORB_FORMAT_OBJ,
+  ORB_FORMAT_OFF,
+  ORB_FORMAT_PLY,
+  ORB_FORMAT_STL,
+  ORB_FORMAT_GLTF,
+  ORB_FORMAT_GLB,
+} orb_format;
+
+const char *orb_format_name(orb_format format); /* "obj", … ; "auto" */
+
+/* "obj" → ORB_FORMAT_OBJ; ORB_FORMAT_AUTO for an unknown name. */
+orb_format orb_format_of_name(const char *name);
+
+/* What these bytes look like; ORB_FORMAT_AUTO if like nothing known. */
+orb_format orb_format_detect(const unsigned char *bytes, size_t size);
+
+/* Reads a mesh as it stands in the file: polygons made triangles, nothing else mended (see orb_mesh_repair()).
+ * format AUTO: detected; *format_out (may be NULL) says what it was. Errors: ORB_E_UNKNOWN_FORMAT,
+ * ORB_E_MALFORMED_MESH with line or offset, ORB_E_NOT_FINITE, ORB_E_TOO_LARGE, ORB_E_NO_MEMORY. */
+ORB_MUST_CHECK orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_format format,
+                                        orb_mesh *out, orb_format *format_out);
+
+/* Appends the binary little-endian PLY of a mesh and its sphere: per vertex double x,y,z, double px,py,pz, int source;
+ * per face uchar int list vertex_indices. points: 3 a vertex. */
+ORB_MUST_CHECK orb_status orb_sphere_ply_write(orb_context *ctx, const orb_mesh *mesh, const double *points,
+                                               orb_buffer *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,50 @@
+/* The whole way from embedded shapes to the asset and its report: align, remesh, transfer, write. */
+#ifndef ORBMORPH_MERGE_H
+#define ORBMORPH_MERGE_H
+
+#include "orbmorph/asset.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct orb_merge_options {
+  orb_align_options align;
+  orb_remesh_options remesh;
+  orb_asset_options asset;
+} orb_merge_options;
+void orb_merge_defaults(orb_merge_options *options);
+
+typedef struct orb_merge_timings {
+  double align, remesh, transfer, write, total; /* seconds */
+} orb_merge_timings;
+
+/* Distortion of the composed map from shape a to shape b, on the supermesh's triangles. */
+typedef struct orb_pair_report {
+  int32_t a, b;
+  orb_distortion distortion;
+  double inverted_fraction; /* triangles whose image turns against the surface's normal in space */
+} orb_pair_report;
+
+typedef struct orb_merge_result {
+  orb_alignment alignment;
+  orb_supermesh supermesh;
+  orb_shape_report *shapes;   /* shape_count */
+  double *landmark_residuals; /* landmark_count × shape_count, lengths in units of each shape's diagonal */
+  int32_t pair_count;
+  orb_pair_report *pairs;
+  orb_buffer asset;
+  orb_merge_timings timings;
+} orb_merge_result;
+
+/* Merges shape_count ≥ 2 embedded shapes. Stages: "align", "remesh", "transfer", "write". Landmark `at` arrays as for
+ * orb_align(). names: shape_count names for the morph targets. */
+ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
+                                    int32_t shape_count, const orb_landmark *landmarks, int32_t landmark_count,
+                                    const orb_merge_options *options, orb_merge_result *out);
+void orb_merge_result_free(orb_context *ctx, orb_merge_result *result);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,54 @@
+/* Supermeshes: one connectivity on the sphere that stands for all aligned shapes. */
+#ifndef ORBMORPH_REMESH_H
+#define ORBMORPH_REMESH_H
+
+#include "orbmorph/align.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum orb_remesh_method {
+  ORB_REMESH_ADAPTIVE = 0,
+  ORB_REMESH_OVERLAY,
+  ORB_REMESH_SUBDIVISION,
+  ORB_REMESH_CONVEX_HULL
+} orb_remesh_method;
+
+typedef struct orb_remesh_options {
+  orb_remesh_method method;
+  double tolerance;       /* adaptive: position error relative to each shape's diagonal, 0.001 */
+  int64_t max_triangles;  /* 0: none; wins over tolerance */
+} orb_remesh_options;
+void orb_remesh_defaults(orb_remesh_options *options);
+
+/* Always closed, manifold, genus zero: T = 2V − 4, and no flipped triangle on the sphere. */
+typedef struct orb_supermesh {
+  int32_t vertex_count, triangle_count, shape_count, landmark_count;
+  int32_t *triangles;         /* 3 a triangle, outward */
+  double *points;             /* 3 a vertex, unit */
+  orb_place *places;          /* shape-major: places[s · vertex_count + v] on the mesh of aligned shape s */
+  int32_t *landmark_vertices; /* landmark_count: each is one vertex (−1 if the method keeps none) */
+  double *error_bound;        /* shape_count: proved bound on the distance, in the shape's units; NaN: none proved */
+  int64_t flipped;            /* on the sphere: 0 */
+  int32_t degree;             /* 1 */
+} orb_supermesh;
+
+ORB_MUST_CHECK orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
+                                     int32_t landmark_count, const orb_remesh_options *options, orb_supermesh *out);
+void orb_supermesh_free(orb_context *ctx, orb_supermesh *supermesh);
+
+/* Point location on an embedded mesh by walking. The locator borrows its arrays; queries from any thread. */
+typedef struct orb_locator orb_locator;
+ORB_MUST_CHECK orb_status orb_locator_create(orb_context *ctx, const double *points, int32_t vertex_count,
+                                             const int32_t *triangles, int32_t triangle_count, const int32_t *twin,
+                                             orb_locator **out); /* twin may be NULL: made here */
+void orb_locator_destroy(orb_context *ctx, orb_locator *locator);
+/* The triangle that holds the direction p (unit), and p's central-projection barycentrics in it. hint: a triangle
+ * near, or −1 for a spatial guess. Always ends; exact predicates decide, so the answer is right even on edges. */
+void orb_locate(const orb_locator *locator, const double p[3], int32_t hint, orb_place *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

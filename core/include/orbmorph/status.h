@@ -1,0 +1,58 @@
+/* Status codes: the one checked result type of the library.
+ *
+ * Every function that can fail returns an orb_status, and the compiler warns where a caller drops it. ORB_OK is 0.
+ * What went wrong in plain words, and the facts (line, edges, genus, …), lie in the context: see orb_context_error().
+ */
+#ifndef ORBMORPH_STATUS_H
+#define ORBMORPH_STATUS_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(__GNUC__)
+#define ORB_MUST_CHECK __attribute__((warn_unused_result))
+#define ORB_PRINTF(fmt, args) __attribute__((format(printf, fmt, args)))
+#else
+#define ORB_MUST_CHECK
+#define ORB_PRINTF(fmt, args)
+#endif
+
+/* The engine's version; part of the identity of each derived object. */
+#define ORB_ENGINE "orbmorph 1.0.0"
+
+typedef enum orb_status {
+  ORB_OK = 0,
+  /* The bytes. */
+  ORB_E_UNKNOWN_FORMAT, /* no reader knows these bytes */
+  ORB_E_MALFORMED_MESH, /* a reader knows them but they are broken; error has line or offset */
+  ORB_E_TOO_LARGE,      /* beyond a limit of the context or of an index type */
+  /* The surface. */
+  ORB_E_NOT_FINITE,     /* NaN or infinite coordinate */
+  ORB_E_NOT_CLOSED,     /* boundary edges */
+  ORB_E_NOT_MANIFOLD,   /* an edge of three faces, a vertex of two fans */
+  ORB_E_NOT_ORIENTABLE, /* no consistent facing exists (or, without repairs, none is given) */
+  ORB_E_NOT_CONNECTED,  /* several pieces */
+  ORB_E_NOT_GENUS_ZERO, /* handles */
+  ORB_E_DEGENERATE,     /* fewer than four triangles left */
+  /* The request. */
+  ORB_E_BAD_LANDMARKS, /* contradictory, crossed, out of range; error names which */
+  ORB_E_BAD_OPTION,    /* an option outside its range */
+  ORB_E_UNSUPPORTED,   /* a method that this build does not have */
+  /* The run. */
+  ORB_E_NO_MEMORY,     /* the budget of the context, or the machine, is spent */
+  ORB_E_CANCELLED,     /* the cancel flag was set */
+  ORB_E_TIMEOUT,       /* the deadline of the context has passed */
+  ORB_E_NOT_CERTIFIED, /* a result was computed but its certificate does not hold: no result is returned */
+  ORB_E_CORRUPT,       /* stored bytes do not decode */
+  ORB_E_INTERNAL,      /* a fault of ours */
+  ORB_STATUS_COUNT
+} orb_status;
+
+/* The name of a status as the wire has it, for example "not-closed"; never NULL. */
+const char *orb_status_name(orb_status status);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

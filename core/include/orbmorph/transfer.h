@@ -1,0 +1,31 @@
+/* Transfer: attributes of every shape on the supermesh, and how far each reconstructed shape is from its input. */
+#ifndef ORBMORPH_TRANSFER_H
+#define ORBMORPH_TRANSFER_H
+
+#include "orbmorph/remesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* positions of shape s at every supermesh vertex: 3 a vertex. */
+ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const orb_aligned_shape *shape,
+                                                 const orb_place *places, int32_t count, double *out);
+
+/* How well shape s is reproduced; lengths in its own units. */
+typedef struct orb_shape_report {
+  double hausdorff;         /* proved bound both ways, NaN where none is proved */
+  double hausdorff_sampled; /* two-sided, vertices, edge midpoints and face samples */
+  double rms;
+  double normal_mean, normal_p99; /* degrees between the surfaces' normals at matching points */
+  double diagonal;
+  double min_area_ratio;
+} orb_shape_report;
+ORB_MUST_CHECK orb_status orb_shape_measure(orb_context *ctx, const orb_aligned_shape *shape,
+                                            const orb_supermesh *supermesh, int32_t shape_index,
+                                            orb_shape_report *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,50 @@
+/* Vectors of three doubles, as plain arrays. */
+#ifndef ORB_NUMERIC_VEC3_H
+#define ORB_NUMERIC_VEC3_H
+
+#include <math.h>
+
+static inline double orb_dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static inline void orb_cross(const double a[3], const double b[3], double out[3]) {
+  double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+  out[0] = x;
+  out[1] = y;
+  out[2] = z;
+}
+
+static inline void orb_sub(const double a[3], const double b[3], double out[3]) {
+  out[0] = a[0] - b[0];
+  out[1] = a[1] - b[1];
+  out[2] = a[2] - b[2];
+}
+
+static inline double orb_distance2(const double a[3], const double b[3]) {
+  double d[3];
+  orb_sub(a, b, d);
+  return orb_dot(d, d);
+}
+
+static inline double orb_length(const double a[3]) { return sqrt(orb_dot(a, a)); }
+
+/* Scales to unit length; returns the old length. A zero vector stays. */
+static inline double orb_normalize(double a[3]) {
+  double length = orb_length(a);
+  if (length > 0) {
+    a[0] /= length;
+    a[1] /= length;
+    a[2] /= length;
+  }
+  return length;
+}
+
+/* det(a, b, c), taken from differences to a so that close points lose nothing. */
+static inline double orb_det(const double a[3], const double b[3], const double c[3]) {
+  double u[3], w[3], n[3];
+  orb_sub(b, a, u);
+  orb_sub(c, a, w);
+  orb_cross(u, w, n);
+  return orb_dot(a, n);
+}
+
+#endif
