@@ -2,4 +2,6 @@
 
 #include "orbmorph/status.h"
 
-int main(void) { return puts(ORB_ENGINE) < 0; }
+int main(void) {
+  return puts(ORB_ENGINE) < 0;
+}

@@ -1,4 +1,5 @@
 #include <stdio.h>
 
-
-int main(void) { return puts("orbmorph 1.0.0") < 0; }
+int main(void) {
+  return puts("orbmorph 1.0.0") < 0;
+}

@@ -9,12 +9,12 @@ _Noreturn void orb_assert_failed(const char *expression, const char *file, int l
 #define ORB_ASSERT(expression) ((expression) ? (void)0 : orb_assert_failed(#expression, __FILE__, __LINE__))
 
 /* Leaves the function with the status of a failed call; only where nothing has to be freed. */
-#define ORB_TRY(call)                              \
-  do {                                             \
-    orb_status orb_try_status = (call);            \
-    if (orb_try_status != ORB_OK) {                \
-      return orb_try_status;                       \
-    }                                              \
+#define ORB_TRY(call)                   \
+  do {                                  \
+    orb_status orb_try_status = (call); \
+    if (orb_try_status != ORB_OK) {     \
+      return orb_try_status;            \
+    }                                   \
   } while (0)
 
 /* Runs a call and jumps to `label` (the one exit path) when it fails; `status` is the function's variable. */

@@ -46,8 +46,8 @@ orb_status orb_context_create(const orb_context_options *options, orb_context **
   if (!options) {
     options = &defaults;
   }
-  orb_context *ctx = options->allocator.alloc ? options->allocator.alloc(options->allocator.user, sizeof *ctx)
-                                              : malloc(sizeof *ctx);
+  orb_context *ctx =
+      options->allocator.alloc ? options->allocator.alloc(options->allocator.user, sizeof *ctx) : malloc(sizeof *ctx);
   if (!ctx) {
     return ORB_E_NO_MEMORY;
   }
@@ -87,7 +87,9 @@ void orb_context_destroy(orb_context *ctx) {
   }
 }
 
-void orb_context_cancel(orb_context *ctx) { atomic_store(&ctx->cancelled, 1); }
+void orb_context_cancel(orb_context *ctx) {
+  atomic_store(&ctx->cancelled, 1);
+}
 
 orb_status orb_context_check(orb_context *ctx) {
   if (atomic_load_explicit(&ctx->cancelled, memory_order_relaxed)) {
@@ -99,8 +101,12 @@ orb_status orb_context_check(orb_context *ctx) {
   return ORB_OK;
 }
 
-const orb_error *orb_context_error(const orb_context *ctx) { return &ctx->error; }
-orb_error *orb_context_error_edit(orb_context *ctx) { return &ctx->error; }
+const orb_error *orb_context_error(const orb_context *ctx) {
+  return &ctx->error;
+}
+orb_error *orb_context_error_edit(orb_context *ctx) {
+  return &ctx->error;
+}
 
 void orb_error_clear(orb_context *ctx) {
   pthread_mutex_lock(&ctx->error_lock);
@@ -131,5 +137,9 @@ void orb_progress(orb_context *ctx, const char *stage, double fraction) {
   pthread_mutex_unlock(&ctx->progress_lock);
 }
 
-int orb_threads(const orb_context *ctx) { return ctx->options.threads; }
-int64_t orb_context_max_triangles(const orb_context *ctx) { return ctx->options.max_triangles; }
+int orb_threads(const orb_context *ctx) {
+  return ctx->options.threads;
+}
+int64_t orb_context_max_triangles(const orb_context *ctx) {
+  return ctx->options.max_triangles;
+}

@@ -20,7 +20,9 @@ typedef struct block_header {
 
 _Static_assert(sizeof(block_header) <= ALIGNMENT, "the header fits before the block");
 
-static block_header *header_of(void *block) { return (block_header *)(void *)((char *)block - ALIGNMENT); }
+static block_header *header_of(void *block) {
+  return (block_header *)(void *)((char *)block - ALIGNMENT);
+}
 
 static void *out_of_memory(orb_context *ctx, size_t wanted, int budget) {
   if (budget) {
@@ -54,8 +56,8 @@ void *orb_alloc(orb_context *ctx, size_t count, size_t size) {
   if (!charge(ctx, total)) {
     return out_of_memory(ctx, total, 1);
   }
-  void *raw = ctx->options.allocator.alloc ? ctx->options.allocator.alloc(ctx->options.allocator.user, total)
-                                           : malloc(total);
+  void *raw =
+      ctx->options.allocator.alloc ? ctx->options.allocator.alloc(ctx->options.allocator.user, total) : malloc(total);
   if (!raw) {
     atomic_fetch_sub(&ctx->memory_used, total);
     return out_of_memory(ctx, total, 0);
@@ -100,8 +102,12 @@ void orb_free(orb_context *ctx, void *block) {
   }
 }
 
-size_t orb_memory_used(const orb_context *ctx) { return atomic_load(&ctx->memory_used); }
-size_t orb_memory_peak(const orb_context *ctx) { return atomic_load(&ctx->memory_peak); }
+size_t orb_memory_used(const orb_context *ctx) {
+  return atomic_load(&ctx->memory_used);
+}
+size_t orb_memory_peak(const orb_context *ctx) {
+  return atomic_load(&ctx->memory_peak);
+}
 
 static orb_status buffer_reserve(orb_context *ctx, orb_buffer *buffer, size_t more) {
   size_t max = buffer->max ? buffer->max : (size_t)UINT32_MAX;

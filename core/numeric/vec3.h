@@ -4,7 +4,9 @@
 
 #include <math.h>
 
-static inline double orb_dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static inline double orb_dot(const double a[3], const double b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 static inline void orb_cross(const double a[3], const double b[3], double out[3]) {
   double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
@@ -25,7 +27,9 @@ static inline double orb_distance2(const double a[3], const double b[3]) {
   return orb_dot(d, d);
 }
 
-static inline double orb_length(const double a[3]) { return sqrt(orb_dot(a, a)); }
+static inline double orb_length(const double a[3]) {
+  return sqrt(orb_dot(a, a));
+}
 
 /* Scales to unit length; returns the old length. A zero vector stays. */
 static inline double orb_normalize(double a[3]) {

@@ -21,10 +21,10 @@ typedef struct orb_landmark {
 
 typedef struct orb_align_options {
   orb_align_method method;
-  orb_preset preset;  /* fast: no composed map */
-  int32_t rbf_steps;  /* 10 */
-  int32_t one_way;    /* rbf: move the later shapes only (Fig. 9) */
-  double rbf_radius;  /* for all landmarks; 0: default */
+  orb_preset preset; /* fast: no composed map */
+  int32_t rbf_steps; /* 10 */
+  int32_t one_way;   /* rbf: move the later shapes only (Fig. 9) */
+  double rbf_radius; /* for all landmarks; 0: default */
   uint64_t seed;
 } orb_align_options;
 void orb_align_defaults(orb_align_options *options);
@@ -47,9 +47,9 @@ typedef struct orb_aligned_shape {
 typedef struct orb_alignment {
   int32_t shape_count, landmark_count;
   orb_aligned_shape *shapes;
-  orb_place *found;      /* auto: landmark_count × shape_count places that were found, on the given meshes */
-  double *confidence;    /* landmark_count */
-  double energy;         /* composed symmetric Dirichlet, capped, area-weighted; lower is better; NaN if not measured */
+  orb_place *found;   /* auto: landmark_count × shape_count places that were found, on the given meshes */
+  double *confidence; /* landmark_count */
+  double energy;      /* composed symmetric Dirichlet, capped, area-weighted; lower is better; NaN if not measured */
 } orb_alignment;
 
 /* Aligns. pin: landmark vertices have bit-equal points on all shapes. Errors: ORB_E_BAD_LANDMARKS names those that

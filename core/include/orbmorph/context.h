@@ -53,11 +53,11 @@ typedef struct orb_allocator {
 } orb_allocator;
 
 typedef struct orb_context_options {
-  size_t memory_limit;       /* bytes that live at once; 0: no limit */
-  int threads;               /* threads to use in all; 0: as many as the machine has (at most 64) */
-  int64_t deadline_ms;       /* orb_clock_ms() after which calls end with ORB_E_TIMEOUT; 0: none */
-  int64_t max_triangles;     /* refuse larger meshes; 0: 5 million */
-  orb_progress_fn progress;  /* NULL: none */
+  size_t memory_limit;      /* bytes that live at once; 0: no limit */
+  int threads;              /* threads to use in all; 0: as many as the machine has (at most 64) */
+  int64_t deadline_ms;      /* orb_clock_ms() after which calls end with ORB_E_TIMEOUT; 0: none */
+  int64_t max_triangles;    /* refuse larger meshes; 0: 5 million */
+  orb_progress_fn progress; /* NULL: none */
   void *progress_user;
   orb_allocator allocator;
 } orb_context_options;

@@ -43,8 +43,7 @@ typedef struct orb_distortion {
 
 /* positions → images, both 3 a vertex, same triangles. For two aligned shapes also their composed map. */
 ORB_MUST_CHECK orb_status orb_distortion_measure(orb_context *ctx, const double *positions, const double *images,
-                                                 const int32_t *triangles, int32_t triangle_count,
-                                                 orb_distortion *out);
+                                                 const int32_t *triangles, int32_t triangle_count, orb_distortion *out);
 
 typedef enum orb_embed_method { ORB_EMBED_NEWTON = 0, ORB_EMBED_KERNEL_SAMPLING } orb_embed_method;
 typedef enum orb_preset { ORB_PRESET_DEFAULT = 0, ORB_PRESET_FAST, ORB_PRESET_QUALITY } orb_preset;

@@ -32,7 +32,7 @@ typedef struct orb_material {
   char name[ORB_NAME_MAX];
   float base_color[4]; /* linear RGBA; 1,1,1,1 where the file says nothing */
   float metallic, roughness;
-  int32_t image; /* in images, −1: none */
+  int32_t image;                                  /* in images, −1: none */
   int32_t wrap_s, wrap_t, mag_filter, min_filter; /* glTF sampler enums, 0: not given */
 } orb_material;
 
@@ -63,8 +63,12 @@ typedef struct orb_mesh {
   orb_repair repairs[ORB_REPAIR_KINDS_MAX];
 } orb_mesh;
 
-static inline int32_t orb_next(int32_t h) { return h % 3 == 2 ? h - 2 : h + 1; }
-static inline int32_t orb_prev(int32_t h) { return h % 3 == 0 ? h + 2 : h - 1; }
+static inline int32_t orb_next(int32_t h) {
+  return h % 3 == 2 ? h - 2 : h + 1;
+}
+static inline int32_t orb_prev(int32_t h) {
+  return h % 3 == 0 ? h + 2 : h - 1;
+}
 
 /* Frees the arrays and zeroes the struct. */
 void orb_mesh_free(orb_context *ctx, orb_mesh *mesh);

@@ -22,8 +22,7 @@ typedef struct orb_shape_report {
   double min_area_ratio;
 } orb_shape_report;
 ORB_MUST_CHECK orb_status orb_shape_measure(orb_context *ctx, const orb_aligned_shape *shape,
-                                            const orb_supermesh *supermesh, int32_t shape_index,
-                                            orb_shape_report *out);
+                                            const orb_supermesh *supermesh, int32_t shape_index, orb_shape_report *out);
 
 #ifdef __cplusplus
 }
