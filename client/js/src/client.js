@@ -1,0 +1,283 @@
+/** The daemon's resources as methods. Everything that can take long accepts `signal` and `onProgress`. */
+import { CancelledError, ProblemError, UnreachableError, abortError, isAbort } from './errors.js';
+import { readEvents } from './events.js';
+import { openSource, parse, sendBody } from './upload.js';
+
+const ENDED = new Set(['succeeded', 'failed', 'cancelled']);
+const sleep = (ms, signal) =>
+  new Promise((resolve, reject) => {
+    if (signal?.aborted) return reject(abortError(signal));
+    const stop = () => (clearTimeout(timer), reject(abortError(signal)));
+    const timer = setTimeout(() => (signal?.removeEventListener('abort', stop), resolve()), ms);
+    signal?.addEventListener('abort', stop, { once: true });
+  });
+
+function defaultServer() {
+  if (typeof location !== 'undefined' && /^https?:$/.test(location.protocol)) return '';
+  const fromEnvironment = typeof process !== 'undefined' ? process.env?.ORBMORPH_SERVER : undefined;
+  return fromEnvironment || 'http://127.0.0.1:8080';
+}
+
+export class Orbmorph {
+  constructor({ server, token, fetch } = {}) {
+    this.server = String(server ?? defaultServer()).replace(/\/+$/, '');
+    this.token = token ?? (typeof process !== 'undefined' ? process.env?.ORBMORPH_TOKEN : undefined);
+    this.fetch = fetch ?? ((...args) => globalThis.fetch(...args));
+  }
+
+  /** The full address of a path of the daemon, for instance of `supermesh.asset`. */
+  url(path) {
+    return /^https?:/.test(path) ? path : this.server + path;
+  }
+
+  headers(more) {
+    return { ...(this.token ? { Authorization: `Bearer ${this.token}` } : {}), ...more };
+  }
+
+  /** One request; a refusal is thrown as ProblemError. -> Response */
+  async request(path, { method = 'GET', json, headers, signal } = {}) {
+    const init = { method, signal, headers: this.headers(headers) };
+    if (json !== undefined) {
+      init.body = JSON.stringify(json);
+      init.headers['Content-Type'] = 'application/json';
+    }
+    let response;
+    try {
+      response = await this.fetch(this.url(path), init);
+    } catch (error) {
+      if (signal?.aborted) throw abortError(signal);
+      throw new UnreachableError(this.url(path), error);
+    }
+    if (!response.ok) {
+      const problem = parse(await response.text().catch(() => ''));
+      throw new ProblemError(problem ?? { title: response.statusText, status: response.status }, response.status);
+    }
+    return response;
+  }
+
+  async json(path, options) {
+    const response = await this.request(path, options);
+    return response.status === 204 ? null : parse(await response.text());
+  }
+
+  // ---- meshes
+
+  /** Uploads one mesh. `source`: File, Blob, ArrayBuffer, typed array, or in Node a path. -> the mesh */
+  async uploadMesh(source, { name, format, repair, onProgress, signal } = {}) {
+    const file = await openSource(source, name);
+    const query = new URLSearchParams({ name: file.name });
+    if (format) query.set('format', format);
+    if (repair) query.set('repair', Array.isArray(repair) ? repair.join(',') : repair);
+    const { json } = await sendBody(this.url(`/v1/meshes?${query}`), file.body, file.size, {
+      headers: this.headers({ 'Content-Type': 'application/octet-stream' }),
+      onProgress,
+      signal,
+      fetch: this.fetch,
+    });
+    return json;
+  }
+
+  getMesh(id, options) {
+    return this.json(`/v1/meshes/${id}`, options);
+  }
+
+  /** The file as it was uploaded. -> ArrayBuffer */
+  async meshFile(id, options) {
+    return (await this.request(`/v1/meshes/${id}/file`, options)).arrayBuffer();
+  }
+
+  deleteMesh(id, options) {
+    return this.json(`/v1/meshes/${id}`, { ...options, method: 'DELETE' });
+  }
+
+  // ---- embeddings
+
+  getEmbedding(id, options) {
+    return this.json(`/v1/embeddings/${id}`, options);
+  }
+
+  /** Embeds a mesh and waits. -> the embedding */
+  embed(mesh, { method, options, ...watch } = {}) {
+    return this.make('/v1/embeddings', clean({ mesh, method, options }), watch);
+  }
+
+  /** The binary PLY of the embedding. -> ArrayBuffer */
+  async sphere(id, options) {
+    return (await this.request(`/v1/embeddings/${id}/sphere.ply`, options)).arrayBuffer();
+  }
+
+  deleteEmbedding(id, options) {
+    return this.json(`/v1/embeddings/${id}`, { ...options, method: 'DELETE' });
+  }
+
+  // ---- supermeshes
+
+  getSupermesh(id, options) {
+    return this.json(`/v1/supermeshes/${id}`, options);
+  }
+
+  /** Merges shapes that are on the daemon and waits. `request` is the body of POST /v1/supermeshes. -> the supermesh */
+  merge(request, watch = {}) {
+    return this.make('/v1/supermeshes', request, watch);
+  }
+
+  /** The GLB. -> ArrayBuffer */
+  async asset(id, options) {
+    return (await this.request(`/v1/supermeshes/${id}/asset.glb`, options)).arrayBuffer();
+  }
+
+  deleteSupermesh(id, options) {
+    return this.json(`/v1/supermeshes/${id}`, { ...options, method: 'DELETE' });
+  }
+
+  // ---- jobs
+
+  /** `wait`: seconds for which the answer may be held back until the job has ended. */
+  getJob(id, { wait, ...options } = {}) {
+    return this.json(`${jobPath(id)}${wait ? `?wait=${wait}` : ''}`, options);
+  }
+
+  cancelJob(id, options) {
+    return this.json(jobPath(id), { ...options, method: 'DELETE' });
+  }
+
+  /**
+   * Follows a job to its end, by events, or by long polling where events do not come through.
+   * `onProgress(job)`. -> the job as it ended. Aborting `signal` stops the watching only.
+   */
+  async watchJob(job, { onProgress, signal } = {}) {
+    const path = jobPath(job);
+    let current = typeof job === 'object' ? { ...job } : { id: job };
+    const tell = (news) => {
+      current = { ...current, ...news };
+      onProgress?.(current);
+    };
+    let lastId;
+    let pause = 250;
+    for (let events = true; ; ) {
+      try {
+        if (events) {
+          const headers = { Accept: 'text/event-stream', ...(lastId ? { 'Last-Event-ID': lastId } : {}) };
+          const response = await this.request(`${path}/events`, { headers, signal });
+          if (!response.body || !/event-stream/.test(response.headers.get('content-type') ?? '')) {
+            events = false;
+            continue;
+          }
+          for await (const event of readEvents(response.body)) {
+            lastId = event.id ?? lastId;
+            pause = 250;
+            const news = parse(event.data);
+            if (ENDED.has(event.event)) {
+              tell(await this.getJob(path, { signal }));
+              return current;
+            }
+            if (news && typeof news === 'object') tell(news);
+          }
+        }
+        tell(await this.getJob(path, { wait: events ? undefined : 20, signal }));
+        if (ENDED.has(current.state)) return current;
+      } catch (error) {
+        if (signal?.aborted) throw abortError(signal);
+        const passing = error instanceof UnreachableError || error instanceof TypeError || [429, 502, 503, 504].includes(error.status);
+        if (!passing) {
+          if (!events || !(error instanceof ProblemError) || error.status === 404) throw error;
+          events = false;
+        }
+        if (passing && pause > 8000) throw error;
+      }
+      await sleep(pause, signal);
+      pause *= 2;
+    }
+  }
+
+  /** Follows a job and fetches its result; a failed job is thrown as ProblemError. */
+  async result(job, watch = {}) {
+    const ended = ENDED.has(job?.state) ? job : await this.watchJob(job, watch);
+    if (ended.state === 'cancelled') throw new CancelledError(ended);
+    if (ended.state === 'failed') throw new ProblemError(ended.problem ?? { title: 'The job failed.' }, 422);
+    return this.json(ended.result, { signal: watch.signal });
+  }
+
+  /**
+   * POST, then wait for the job if there is one. `onJob(job)` is told the job once; aborting `signal` cancels it on the
+   * daemon too, unless `detach` is set.
+   */
+  async make(path, body, { onJob, onProgress, signal, detach } = {}) {
+    const response = await this.request(path, { method: 'POST', json: body, signal });
+    const answer = parse(await response.text());
+    if (response.status !== 202) return answer;
+    onJob?.(answer);
+    onProgress?.(answer);
+    try {
+      return await this.result(answer, { onProgress, signal });
+    } catch (error) {
+      if (isAbort(error) && !detach) await this.cancelJob(answer).catch(() => {});
+      throw error;
+    }
+  }
+
+  // ---- lists
+
+  /** One page: {items, next}. `kind`: meshes, embeddings, supermeshes or jobs. */
+  async page(kind, { limit, pageToken, state, signal } = {}) {
+    const query = new URLSearchParams();
+    if (limit) query.set('limit', limit);
+    if (pageToken) query.set('page_token', pageToken);
+    if (state) query.set('state', state);
+    const text = query.toString();
+    const body = await this.json(`/v1/${kind}${text ? `?${text}` : ''}`, { signal });
+    return { items: body[kind] ?? body.items ?? Object.values(body).find(Array.isArray) ?? [], next: body.next_page_token ?? null };
+  }
+
+  /** All of a kind, page by page: `for await (const mesh of client.list('meshes'))`. */
+  async *list(kind, options = {}) {
+    let pageToken;
+    do {
+      const page = await this.page(kind, { ...options, pageToken });
+      yield* page.items;
+      pageToken = page.next;
+    } while (pageToken);
+  }
+
+  // ---- the whole way
+
+  /**
+   * Uploads the files, merges them, waits. `options`: the members of POST /v1/supermeshes (`landmarks`, `align`,
+   * `remesh`, `asset`), `repair`, and `onProgress({step, file, job, progress})`, `signal`.
+   * -> the supermesh, with `meshes`, `assetUrl` and `glb()`.
+   */
+  async morph(sources, { landmarks, align, remesh, asset, repair, names, onProgress, signal } = {}) {
+    const meshes = [];
+    for (const [index, source] of sources.entries()) {
+      if (isMesh(source)) {
+        meshes.push(source);
+        continue;
+      }
+      const tell = onProgress && ((sent, total) => onProgress({ step: 'upload', file: index, progress: total ? sent / total : 1 }));
+      meshes.push(await this.uploadMesh(source, { name: names?.[index], repair, onProgress: tell, signal }));
+    }
+    const shapes = meshes.map((mesh) => clean({ mesh: mesh.id, name: mesh.name }));
+    const given = Array.isArray(landmarks) || typeof landmarks === 'string' ? landmarks : landmarks?.landmarks;
+    const supermesh = await this.merge(clean({ shapes, landmarks: given, align, remesh, asset }), {
+      onProgress: onProgress && ((job) => onProgress({ step: 'merge', job, progress: job.progress ?? 0 })),
+      signal,
+    });
+    return {
+      ...supermesh,
+      meshes,
+      assetUrl: this.url(supermesh.asset),
+      glb: (options) => this.asset(supermesh.id, options),
+    };
+  }
+}
+
+/** A mesh that the daemon has told of, rather than a file. */
+const isMesh = (value) => typeof value?.id === 'string' && /^[0-9a-f]{64}$/.test(value.id);
+
+/** -> "/v1/jobs/ID" of a job object, its address or its id. */
+const jobPath = (job) => {
+  const text = typeof job === 'object' ? job.url ?? job.id : job;
+  return text.startsWith('/') ? text : `/v1/jobs/${text}`;
+};
+
+const clean = (object) => Object.fromEntries(Object.entries(object).filter(([, value]) => value !== undefined));

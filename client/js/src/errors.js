@@ -1,0 +1,41 @@
+/**
+ * An error that the daemon answered (RFC 9457). `type` is the address of the kind of problem, `kind` its last part
+ * ("not-closed"), `problem` the whole object with the facts as members.
+ */
+export class ProblemError extends Error {
+  constructor(problem, status) {
+    super(problem.detail || problem.title || `The daemon answered ${status}.`);
+    this.name = 'ProblemError';
+    this.problem = problem;
+    this.type = problem.type || 'about:blank';
+    this.kind = this.type.slice(this.type.lastIndexOf('/') + 1);
+    this.title = problem.title || '';
+    this.detail = problem.detail || '';
+    this.status = problem.status || status || 0;
+  }
+}
+
+/** The daemon could not be reached, or the connection broke. */
+export class UnreachableError extends Error {
+  constructor(url, cause) {
+    super(`No answer from ${url || 'the daemon'}. Is orbmorphd running there?`, { cause });
+    this.name = 'UnreachableError';
+    this.url = url;
+  }
+}
+
+/** A job that ended as `cancelled` although this caller did not ask for it. */
+export class CancelledError extends Error {
+  constructor(job) {
+    super('The job was cancelled.');
+    this.name = 'CancelledError';
+    this.job = job;
+  }
+}
+
+export function abortError(signal) {
+  if (signal?.reason instanceof Error) return signal.reason;
+  return new DOMException('The operation was aborted.', 'AbortError');
+}
+
+export const isAbort = (error) => error?.name === 'AbortError' || error?.name === 'TimeoutError';

@@ -1,0 +1,22 @@
+/**
+ * orbmorph for JavaScript.
+ *
+ *   import orbmorph from 'orbmorph';
+ *   const morph = await orbmorph.morph([fileA, fileB], { landmarks });
+ *   const glb = await morph.glb();
+ *
+ * The functions of the default export talk to the daemon that served the page, or in Node to ORBMORPH_SERVER
+ * (http://127.0.0.1:8080); `new Orbmorph({server, token})` to any other.
+ */
+import { Orbmorph } from './client.js';
+
+export { Orbmorph } from './client.js';
+export { CancelledError, ProblemError, UnreachableError } from './errors.js';
+
+export const morph = (sources, { server, token, ...options } = {}) => new Orbmorph({ server, token }).morph(sources, options);
+
+export default {
+  Orbmorph,
+  morph,
+  connect: (server, options) => new Orbmorph({ server, ...options }),
+};
