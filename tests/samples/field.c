@@ -1,0 +1,116 @@
+/* Implicit surfaces: round cones and ellipsoids under a polynomial smooth union. */
+#include <math.h>
+
+#include "sample.h"
+
+static double dot(const double a[3], const double b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The exact distance to the hull of two balls, after Quilez. */
+static double cone(const orb_primitive *o, const double p[3]) {
+  double ba[3], pa[3];
+  for (int k = 0; k < 3; k++) {
+    ba[k] = o->b[k] - o->a[k];
+    pa[k] = p[k] - o->a[k];
+  }
+  double l2 = dot(ba, ba), rr = o->ra - o->rb, a2 = l2 - rr * rr, il2 = 1 / l2, y = dot(pa, ba), z = y - l2;
+  double x[3];
+  for (int k = 0; k < 3; k++)
+    x[k] = pa[k] * l2 - ba[k] * y;
+  double x2 = dot(x, x), y2 = y * y * l2, z2 = z * z * l2, k = (rr < 0 ? -1 : 1) * rr * rr * x2;
+  if ((z < 0 ? -1 : 1) * a2 * z2 > k)
+    return sqrt(x2 + z2) * il2 - o->rb;
+  if ((y < 0 ? -1 : 1) * a2 * y2 < k)
+    return sqrt(x2 + y2) * il2 - o->ra;
+  return (sqrt(x2 * a2 * il2) + y * rr) * il2 - o->ra;
+}
+
+/* A first-order distance to an ellipsoid. */
+static double ellipsoid(const orb_primitive *o, const double p[3]) {
+  double d[3], normal[3] = {0, 0, 0}, k0 = 0;
+  for (int k = 0; k < 3; k++)
+    d[k] = p[k] - o->a[k];
+  for (int i = 0; i < 3; i++) {
+    double u = dot(d, o->axis[i]) / dot(o->axis[i], o->axis[i]);
+    k0 += u * u;
+    for (int k = 0; k < 3; k++)
+      normal[k] += u * o->axis[i][k] / dot(o->axis[i], o->axis[i]);
+  }
+  k0 = sqrt(k0);
+  double k1 = sqrt(dot(normal, normal));
+  if (k1 < 1e-9)
+    return -sqrt(dot(o->axis[2], o->axis[2]));
+  return k0 * (k0 - 1) / k1;
+}
+
+static double smooth_union(double a, double b, double blend) {
+  double low = a < b ? a : b, gap = fabs(a - b);
+  if (gap >= blend)
+    return low;
+  double h = (blend - gap) / blend;
+  return low - h * h * blend / 4;
+}
+
+double sample_field(const orb_animal *animal, const double p[3]) {
+  double whole = 1e9, part = 1e9, part_blend = 0;
+  for (size_t i = 0; i < animal->primitive_count; i++) {
+    const orb_primitive *o = &animal->primitives[i];
+    double d = o->kind == SAMPLE_CONE ? cone(o, p) : ellipsoid(o, p);
+    if (o->begins_part) {
+      whole = smooth_union(whole, part, part_blend);
+      part = d;
+      part_blend = o->blend;
+    } else {
+      part = smooth_union(part, d, o->blend);
+    }
+  }
+  return smooth_union(whole, part, part_blend);
+}
+
+void sample_gradient(const orb_animal *animal, const double p[3], double out[3]) {
+  const double step = 1e-4;
+  for (int k = 0; k < 3; k++) {
+    double q[3] = {p[0], p[1], p[2]};
+    q[k] = p[k] + step;
+    double above = sample_field(animal, q);
+    q[k] = p[k] - step;
+    out[k] = (above - sample_field(animal, q)) / (2 * step);
+  }
+}
+
+void sample_project(const orb_animal *animal, double p[3]) {
+  for (int round = 0; round < 6; round++) {
+    double gradient[3], f = sample_field(animal, p);
+    sample_gradient(animal, p, gradient);
+    double g2 = dot(gradient, gradient);
+    if (g2 < 1e-4)
+      return;
+    for (int k = 0; k < 3; k++)
+      p[k] -= f * gradient[k] / g2;
+  }
+}
+
+int sample_feature_vertex(const orb_animal *animal, const orb_sample *mesh, const orb_feature *feature) {
+  double length = sqrt(dot(feature->direction, feature->direction)), leaves[3] = {0, 0, 0};
+  for (int i = 0, inside = 1; inside; i++) {
+    double p[3];
+    for (int k = 0; k < 3; k++)
+      p[k] = feature->from[k] + feature->direction[k] / length * 5e-4 * i;
+    inside = sample_field(animal, p) < 0;
+    for (int k = 0; k < 3; k++)
+      leaves[k] = p[k];
+  }
+  int best = 0;
+  double least = 1e18;
+  for (int v = 0; v < mesh->vertex_count; v++) {
+    double d[3];
+    for (int k = 0; k < 3; k++)
+      d[k] = mesh->positions[3 * v + k] - leaves[k];
+    if (dot(d, d) < least) {
+      least = dot(d, d);
+      best = v;
+    }
+  }
+  return best;
+}
