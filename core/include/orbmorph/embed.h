@@ -13,13 +13,14 @@ extern "C" {
 typedef struct orb_certificate {
   int valid, exact;
   int64_t flipped, degenerate; /* triangles of negative, of zero orientation */
-  int32_t degree;              /* of the map: solid angles / 4π; 0 where it cannot be told */
+  int32_t degree;              /* of the map: how often the sphere is covered, with sign */
   double min_determinant;      /* the smallest det(p,q,r), rounded */
 } orb_certificate;
 
-/* Certifies points (3 a vertex, unit up to rounding) of a closed triangle list. Source: orientation by a static
- * filter, then expansions (Shewchuk 1997); degree by solid angles (Van Oosterom & Strackee 1983) with an error bound.
- * Never fails but for memory and cancel; look at out->valid. */
+/* Certifies points (3 a vertex, unit up to rounding) of a closed triangle list. Orientation by a static filter, then
+ * exact integers; degree by counting, with signs, the triangles that cover a direction in general position, all decided
+ * by exact orientations. (The sum of solid angles / 4π is the same number, but only up to rounding.) Points that are
+ * not finite make every triangle at them degenerate. Never fails but for memory and cancel; look at out->valid. O(F). */
 ORB_MUST_CHECK orb_status orb_certify(orb_context *ctx, const double *points, int32_t vertex_count,
                                       const int32_t *triangles, int32_t triangle_count, orb_certificate *out);
 

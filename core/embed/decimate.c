@@ -1,0 +1,302 @@
+/* Decimation to a tetrahedron in rounds of independent collapses; no heap.
+ *
+ * Each round evaluates the vertices whose star has changed (in parallel), takes a threshold at a sampled quantile of
+ * the costs, and collapses, in order of vertex number, those below it whose ring is not locked; a collapse locks its
+ * ring for the round. So the stars of a round do not overlap, and their vertices can be placed side by side when the
+ * round is undone. A collapse keeps the link condition: its edge's ends have just two common neighbours. On a sphere of
+ * more than four vertices some vertex of valence at most five always has such an edge, so the end is always reached.
+ */
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/check.h"
+#include "embed/kernels.h"
+#include "embed/loops.h"
+#include "embed/multires.h"
+
+enum {
+  GRAIN = 1024,
+  SAMPLES = 2048,
+  SMALL = 1024,     /* below that many vertices the quantile is exact */
+  SINGLE_BELOW = 60 /* below that many vertices one collapse a round */
+};
+
+typedef struct ring {
+  int32_t *vertex;
+  int32_t count, capacity;
+} ring;
+
+typedef struct decimation {
+  orb_context *ctx;
+  orb_hierarchy *h;
+  const orb_kernels *kernels;
+  const unsigned char *keep; /* flags in surface numbers, or NULL */
+  int32_t keep_until;
+  float *cost;
+  int32_t *target;
+  unsigned char *dirty, *dead;
+  int32_t *mark, *lock; /* stamps */
+  int32_t stamp, round;
+  int32_t *live, live_count;
+  int fails; /* rounds in a row without a collapse */
+  ring ring;
+} decimation;
+
+static orb_status walk_ring(decimation *d, int32_t v) {
+  const orb_surface *s = &d->h->surface;
+  if (s->valence[v] > d->ring.capacity) {
+    int32_t capacity = s->valence[v] + 64;
+    int32_t *grown = ORB_NEW(d->ctx, int32_t, capacity);
+    if (!grown) {
+      return ORB_E_NO_MEMORY;
+    }
+    orb_free(d->ctx, d->ring.vertex);
+    d->ring.vertex = grown;
+    d->ring.capacity = capacity;
+  }
+  int32_t start = s->vertex_corner[v], c = start, k = 0;
+  do {
+    d->ring.vertex[k++] = s->corner[orb_corner_next(c)];
+    c = orb_corner_swing(s, c);
+  } while (c != start);
+  d->ring.count = k;
+  return ORB_OK;
+}
+
+static void mark_ring(decimation *d) {
+  d->stamp++;
+  for (int32_t i = 0; i < d->ring.count; i++) {
+    d->mark[d->ring.vertex[i]] = d->stamp;
+  }
+}
+
+/* Has u just two neighbours in the marked ring? */
+static int link_holds(const decimation *d, int32_t u) {
+  const orb_surface *s = &d->h->surface;
+  int32_t start = s->vertex_corner[u], c = start, common = 0;
+  do {
+    common += d->mark[s->corner[orb_corner_next(c)]] == d->stamp;
+    c = orb_corner_swing(s, c);
+  } while (c != start && common < 3);
+  return common == 2;
+}
+
+/* The cost's shape term for going into ring[j]; for targets that the kernel did not pick. */
+static float plain_cost(const decimation *d, int32_t j) {
+  const float *x = d->h->surface.position4;
+  int32_t k = d->ring.count;
+  const float *a = x + 4 * (int64_t)d->ring.vertex[j];
+  float sum = 0;
+  for (int32_t i = 1; i < k - 1; i++) {
+    const float *b = x + 4 * (int64_t)d->ring.vertex[(j + i) % k];
+    const float *c = x + 4 * (int64_t)d->ring.vertex[(j + i + 1) % k];
+    float u[3], w[3], edges = 0;
+    for (int q = 0; q < 3; q++) {
+      u[q] = b[q] - a[q];
+      w[q] = c[q] - a[q];
+      edges += u[q] * u[q] + w[q] * w[q] + (c[q] - b[q]) * (c[q] - b[q]);
+    }
+    float nx = u[1] * w[2] - u[2] * w[1], ny = u[2] * w[0] - u[0] * w[2], nz = u[0] * w[1] - u[1] * w[0];
+    float area = 0.5F * sqrtf(nx * nx + ny * ny + nz * nz);
+    sum += edges * edges / (fmaxf(area, 1e-3F * edges) + 1e-30F);
+  }
+  return sum;
+}
+
+/* The ring's cheapest vertex that keeps the link condition, −1 if none does. */
+static int32_t other_target(const decimation *d, float *cost) {
+  int32_t best = -1;
+  *cost = INFINITY;
+  int large = d->ring.count > ORB_COST_RING_MAX; /* then any will do: the cost would take O(k²) */
+  for (int32_t j = 0; j < d->ring.count; j++) {
+    if (link_holds(d, d->ring.vertex[j])) {
+      float c = large ? ORB_COST_LARGE : plain_cost(d, j);
+      if (best < 0 || c < *cost) {
+        *cost = c;
+        best = d->ring.vertex[j];
+      }
+      if (large) {
+        break;
+      }
+    }
+  }
+  return best;
+}
+
+static int is_kept(const decimation *d, int32_t v, int32_t live) {
+  return d->keep && d->keep[v] && live > d->keep_until && d->fails < 40;
+}
+
+static orb_status collapse_into(decimation *d, int32_t v, int32_t u) {
+  orb_hierarchy *h = d->h;
+  orb_surface *s = &h->surface;
+  int32_t valence = d->ring.count, c = s->vertex_corner[v];
+  ORB_TRY(orb_collapse_reserve(d->ctx, h, valence));
+  while (s->corner[orb_corner_next(c)] != u) {
+    c = orb_corner_swing(s, c);
+  }
+  for (int32_t i = 0; i < valence; i++) {
+    d->lock[d->ring.vertex[i]] = d->round;
+    d->dirty[d->ring.vertex[i]] = 1;
+  }
+  orb_collapse *log = &h->log[h->log_count++];
+  orb_collapse_apply(s, c, valence, log, h->area_log + h->area_count);
+  log->areas = h->area_count;
+  h->area_count += valence - 2;
+  d->dead[v] = 1;
+  return ORB_OK;
+}
+
+/* Collapses v if it may be; *done counts. */
+static orb_status try_collapse(decimation *d, int32_t v, float threshold, int32_t *done) {
+  if (d->cost[v] > threshold || d->lock[v] == d->round || is_kept(d, v, d->live_count - *done)) {
+    return ORB_OK;
+  }
+  ORB_TRY(walk_ring(d, v));
+  mark_ring(d);
+  int32_t u = d->target[v];
+  if (!link_holds(d, u)) {
+    float cost;
+    u = other_target(d, &cost);
+    if (u < 0 || (cost > 4 * threshold && d->fails < 2)) {
+      return ORB_OK;
+    }
+  }
+  ++*done;
+  return collapse_into(d, v, u);
+}
+
+static int compare_floats(const void *a, const void *b) {
+  float x = *(const float *)a, y = *(const float *)b;
+  return (x > y) - (x < y);
+}
+
+/* The cost below which vertices are collapsed in this round. */
+static float find_threshold(const decimation *d) {
+  int32_t n = d->live_count, count = n <= SMALL ? n : SAMPLES;
+  double share = n > 20000 ? 0.4 : n > 2000 ? 0.24 : n >= SINGLE_BELOW ? 0.05 : 0;
+  if (d->fails > 2) { /* stuck: raise it to everything */
+    share = share * (1 << (d->fails < 6 ? d->fails : 6)) + 0.02 * d->fails;
+  }
+  if (share > 0.9 || d->fails > 30) {
+    return INFINITY;
+  }
+  float sample[SAMPLES];
+  uint32_t seed = (uint32_t)d->round * 977;
+  for (int32_t i = 0; i < count; i++) {
+    seed = seed * 1664525U + 1013904223U;
+    int64_t at = count == n ? i : (int64_t)(((uint64_t)seed * (uint64_t)n) >> 32);
+    sample[i] = d->cost[d->live[at]];
+  }
+  qsort(sample, (size_t)count, sizeof sample[0], compare_floats);
+  int32_t at = (int32_t)(share * (count == n ? count : count - 1)) + (count == n ? d->fails : 0);
+  return sample[at < count ? at : count - 1];
+}
+
+static void evaluate(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  const decimation *d = arg;
+  orb_cost_job job = {
+      .surface = &d->h->surface, .vertex = d->live, .dirty = d->dirty, .cost = d->cost, .target = d->target};
+  d->kernels->costs(&job, begin, end);
+}
+
+static orb_status begin_round(decimation *d) {
+  orb_hierarchy *h = d->h;
+  d->round++;
+  if (h->round_count + 2 > h->round_capacity) {
+    int32_t capacity = 2 * h->round_capacity + 256;
+    int32_t *grown = orb_realloc(d->ctx, h->round_start, (size_t)capacity, sizeof(int32_t));
+    if (!grown) {
+      return ORB_E_NO_MEMORY;
+    }
+    h->round_start = grown;
+    h->round_capacity = capacity;
+  }
+  h->round_start[h->round_count] = h->log_count;
+  return orb_sliced_for(d->ctx, d->live_count, GRAIN, evaluate, d);
+}
+
+static orb_status run_round(decimation *d) {
+  ORB_TRY(begin_round(d));
+  float threshold = find_threshold(d);
+  int32_t done = 0, n = d->live_count;
+  for (int32_t i = 0; i < n && n - done > 4; i++) {
+    ORB_TRY(try_collapse(d, d->live[i], threshold, &done));
+    if (n < SINGLE_BELOW && done) {
+      break;
+    }
+    if ((i & 8191) == 8191) {
+      ORB_TRY(orb_context_check(d->ctx));
+    }
+  }
+  if (done == 0) {
+    if (++d->fails > 60) {
+      return orb_fail(d->ctx, ORB_E_NOT_GENUS_ZERO,
+                      "The surface cannot be reduced below %d vertices, so it is not a sphere; repair the mesh first.",
+                      n);
+    }
+    return ORB_OK;
+  }
+  d->fails = 0;
+  d->h->round_count++;
+  d->h->round_start[d->h->round_count] = d->h->log_count;
+  int32_t kept = 0;
+  for (int32_t i = 0; i < n; i++) {
+    if (!d->dead[d->live[i]]) {
+      d->live[kept++] = d->live[i];
+    }
+  }
+  d->live_count = kept;
+  return ORB_OK;
+}
+
+static orb_status allocate(decimation *d) {
+  orb_context *ctx = d->ctx;
+  int64_t n = d->h->surface.vertex_count;
+  d->cost = ORB_NEW(ctx, float, n);
+  d->target = ORB_NEW(ctx, int32_t, n);
+  d->dirty = ORB_NEW(ctx, unsigned char, n);
+  d->dead = ORB_NEW0(ctx, unsigned char, n);
+  d->mark = ORB_NEW0(ctx, int32_t, n);
+  d->lock = ORB_NEW0(ctx, int32_t, n);
+  d->live = ORB_NEW(ctx, int32_t, n);
+  d->h->log = ORB_NEW(ctx, orb_collapse, n);
+  d->h->area_capacity = 5 * n;
+  d->h->area_log = ORB_NEW(ctx, float, d->h->area_capacity);
+  if (!d->cost || !d->target || !d->dirty || !d->dead || !d->mark || !d->lock || !d->live || !d->h->log ||
+      !d->h->area_log) {
+    return ORB_E_NO_MEMORY;
+  }
+  memset(d->dirty, 1, (size_t)n);
+  for (int32_t i = 0; i < n; i++) {
+    d->live[i] = i;
+  }
+  d->live_count = (int32_t)n;
+  return ORB_OK;
+}
+
+orb_status orb_decimate(orb_context *ctx, orb_hierarchy *h, const unsigned char *keep, int32_t keep_until) {
+  decimation d = {.ctx = ctx, .h = h, .kernels = orb_kernels_best(), .keep = keep, .keep_until = keep_until};
+  double full = log((double)h->surface.vertex_count / 4) + 1e-9;
+  orb_status status;
+  ORB_GO(status, allocate(&d), done);
+  ORB_GO(status, begin_round(&d), done); /* round_start must exist even where there is nothing to do */
+  while (d.live_count > 4) {
+    ORB_GO(status, run_round(&d), done);
+    orb_progress(ctx, "simplify", 1 - log((double)d.live_count / 4) / full);
+  }
+  for (int i = 0; i < 4; i++) {
+    h->base[i] = d.live[i];
+  }
+done:
+  orb_free(ctx, d.cost);
+  orb_free(ctx, d.target);
+  orb_free(ctx, d.dirty);
+  orb_free(ctx, d.dead);
+  orb_free(ctx, d.mark);
+  orb_free(ctx, d.lock);
+  orb_free(ctx, d.live);
+  orb_free(ctx, d.ring.vertex);
+  return status;
+}

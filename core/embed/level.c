@@ -1,0 +1,240 @@
+#include "embed/level.h"
+
+#include "base/check.h"
+#include "embed/loops.h"
+#include "embed/star.h"
+
+enum { BINS = ORB_LEVEL_RING_MAX + 1, GRAIN = 1024, UNCOLOURED = -1, SET_ASIDE = -2 };
+
+typedef struct builder {
+  orb_context *ctx;
+  orb_level *level;
+  const orb_surface *s;
+  double blend;
+  unsigned char *valence;                     /* of level vertices, capped */
+  int32_t bin[ORB_LEVEL_COLOURS][BINS];       /* vertices of each colour and valence */
+  int32_t bin_batch[ORB_LEVEL_COLOURS][BINS]; /* first batch */
+  int32_t bin_filled[ORB_LEVEL_COLOURS][BINS];
+  int32_t batches;
+  int64_t entries;
+} builder;
+
+static void free_batches(orb_context *ctx, orb_level *level) {
+  orb_free(ctx, level->vertex);
+  orb_free(ctx, level->batch_vertex);
+  orb_free(ctx, level->batch_valence);
+  orb_free(ctx, level->batch_fill);
+  orb_free(ctx, level->batch_stiff);
+  orb_free(ctx, level->batch_offset);
+  orb_free(ctx, level->batch_energy);
+  orb_free(ctx, level->batch_fall);
+  orb_free(ctx, level->ring);
+  orb_free(ctx, level->shape);
+  orb_free(ctx, level->heavy);
+  float *triangle_shape = level->triangle_shape;
+  signed char *colour = level->colour;
+  const orb_kernels *kernels = level->kernels;
+  memset(level, 0, sizeof *level);
+  level->triangle_shape = triangle_shape;
+  level->colour = colour;
+  level->kernels = kernels;
+}
+
+void orb_level_free(orb_context *ctx, orb_level *level) {
+  free_batches(ctx, level);
+  orb_free(ctx, level->triangle_shape);
+  orb_free(ctx, level->colour);
+  memset(level, 0, sizeof *level);
+}
+
+/* Shapes of the triangles whose first corner is at one of the vertices. */
+static void shape_triangles(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  const builder *b = arg;
+  const orb_surface *s = b->s;
+  for (int64_t i = begin; i < end; i++) {
+    int32_t start = s->vertex_corner[b->level->vertex[i]], c = start;
+    do {
+      if ((c & 3) == 0) {
+        double half[3];
+        orb_shape_cotangents(s, s->corner[c], s->corner[c + 1], s->corner[c + 2], b->blend, half);
+        float *out = b->level->triangle_shape + c;
+        for (int k = 0; k < 3; k++) {
+          out[k] = (float)half[k];
+        }
+        out[3] = 2 * orb_corner_area(s, c);
+      }
+      c = orb_corner_swing(s, c);
+    } while (c != start);
+  }
+}
+
+/* Greedy colouring in vertex order; counts the bins. */
+static orb_status colour_vertices(builder *b) {
+  orb_level *level = b->level;
+  const orb_surface *s = b->s;
+  int32_t heavy = 0;
+  for (int32_t i = 0; i < level->count; i++) {
+    int32_t v = level->vertex[i], start = s->vertex_corner[v], c = start;
+    uint64_t used = 0;
+    do {
+      int q = level->colour[s->corner[orb_corner_next(c)]];
+      used |= q >= 0 ? UINT64_C(1) << q : 0;
+      c = orb_corner_swing(s, c);
+    } while (c != start);
+    if (s->valence[v] > ORB_LEVEL_RING_MAX || used == UINT64_MAX) {
+      level->colour[v] = SET_ASIDE;
+      level->heavy[heavy++] = v;
+      continue;
+    }
+    int q = __builtin_ctzll(~used);
+    level->colour[v] = (signed char)q;
+    level->colours = q + 1 > level->colours ? q + 1 : level->colours;
+    b->bin[q][s->valence[v]]++;
+    if ((i & 16383) == 16383) {
+      ORB_TRY(orb_context_check(b->ctx));
+    }
+  }
+  level->heavy_count = heavy;
+  return ORB_OK;
+}
+
+static orb_status lay_out(builder *b) {
+  orb_level *level = b->level;
+  orb_context *ctx = b->ctx;
+  int lanes = level->kernels->lanes;
+  b->batches = 0;
+  b->entries = 0;
+  for (int q = 0; q < level->colours; q++) {
+    level->batch_start[q] = b->batches;
+    for (int k = 0; k < BINS; k++) {
+      b->bin_batch[q][k] = b->batches;
+      int32_t more = (b->bin[q][k] + lanes - 1) / lanes;
+      b->batches += more;
+      b->entries += (int64_t)more * k;
+    }
+  }
+  level->batch_start[level->colours] = b->batches;
+  level->batch_vertex = ORB_NEW(ctx, int32_t, (int64_t)b->batches * lanes);
+  level->batch_valence = ORB_NEW(ctx, int32_t, b->batches);
+  level->batch_fill = ORB_NEW(ctx, unsigned char, b->batches);
+  level->batch_stiff = ORB_NEW0(ctx, unsigned char, b->batches);
+  level->batch_offset = ORB_NEW(ctx, int64_t, b->batches);
+  level->batch_energy = ORB_NEW(ctx, double, b->batches);
+  level->batch_fall = ORB_NEW(ctx, double, b->batches);
+  level->ring = ORB_NEW(ctx, int32_t, b->entries * lanes);
+  level->shape = ORB_NEW(ctx, float, 4 * b->entries * lanes);
+  return level->batch_vertex && level->batch_valence && level->batch_fill && level->batch_stiff &&
+                 level->batch_offset && level->batch_energy && level->batch_fall && level->ring && level->shape
+             ? ORB_OK
+             : ORB_E_NO_MEMORY;
+}
+
+static void assign_lanes(builder *b) {
+  orb_level *level = b->level;
+  int lanes = level->kernels->lanes;
+  int64_t offset = 0;
+  for (int q = 0; q < level->colours; q++) {
+    for (int k = 0; k < BINS; k++) {
+      int32_t count = b->bin[q][k];
+      for (int32_t i = 0; i * lanes < count; i++, offset += k) {
+        int32_t at = b->bin_batch[q][k] + i, left = count - i * lanes;
+        level->batch_valence[at] = k;
+        level->batch_offset[at] = offset;
+        level->batch_fill[at] = (unsigned char)(left < lanes ? left : lanes);
+      }
+    }
+  }
+  for (int32_t i = 0; i < level->count; i++) {
+    int32_t v = level->vertex[i], q = level->colour[v], k = b->s->valence[v];
+    if (q >= 0) {
+      int64_t at = (int64_t)b->bin_batch[q][k] * lanes + b->bin_filled[q][k]++;
+      level->batch_vertex[at] = v;
+    }
+  }
+}
+
+static void fill_batches(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  builder *b = arg;
+  orb_level *level = b->level;
+  const orb_surface *s = b->s;
+  int lanes = level->kernels->lanes;
+  for (int64_t at = begin; at < end; at++) {
+    int32_t *vertex = level->batch_vertex + at * lanes, k = level->batch_valence[at];
+    for (int l = level->batch_fill[at]; l < lanes; l++) {
+      vertex[l] = vertex[level->batch_fill[at] - 1];
+    }
+    int32_t *ring = level->ring + level->batch_offset[at] * lanes;
+    float *shape = level->shape + 4 * level->batch_offset[at] * lanes;
+    for (int l = 0; l < lanes; l++) {
+      int32_t c = s->vertex_corner[vertex[l]];
+      for (int32_t i = 0; i < k; i++) {
+        float *to = shape + 4 * (int64_t)i * lanes + l;
+        ring[i * lanes + l] = s->corner[orb_corner_next(c)];
+        to[0] = level->triangle_shape[orb_corner_prev(c)];
+        to[lanes] = level->triangle_shape[orb_corner_next(c)];
+        to[2 * lanes] = level->triangle_shape[c];
+        to[3 * lanes] = level->triangle_shape[c | 3];
+        c = orb_corner_swing(s, c);
+      }
+    }
+  }
+}
+
+static orb_status list_vertices(builder *b, const unsigned char *alive, const unsigned char *pinned, int32_t live) {
+  orb_level *level = b->level;
+  orb_context *ctx = b->ctx;
+  int64_t n = b->s->vertex_count;
+  if (!level->triangle_shape) {
+    level->triangle_shape = ORB_NEW(ctx, float, 4 * (int64_t)b->s->triangle_count);
+    level->colour = ORB_NEW(ctx, signed char, n);
+  }
+  level->vertex = ORB_NEW(ctx, int32_t, live);
+  level->heavy = ORB_NEW(ctx, int32_t, live);
+  if (!level->triangle_shape || !level->colour || !level->vertex || !level->heavy) {
+    return ORB_E_NO_MEMORY;
+  }
+  memset(level->colour, UNCOLOURED, (size_t)n);
+  for (int32_t v = 0; v < n; v++) {
+    if (alive[v]) {
+      level->vertex[level->count++] = v;
+    }
+  }
+  ORB_ASSERT(level->count == live);
+  ORB_TRY(orb_sliced_for(ctx, level->count, GRAIN, shape_triangles, b));
+  if (pinned) {
+    int32_t kept = 0;
+    for (int32_t i = 0; i < level->count; i++) {
+      if (!pinned[level->vertex[i]]) {
+        level->vertex[kept++] = level->vertex[i];
+      }
+    }
+    level->count = kept;
+  }
+  return ORB_OK;
+}
+
+orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_surface *surface, const unsigned char *alive,
+                           const unsigned char *pinned, int32_t live, double blend) {
+  free_batches(ctx, level);
+  level->kernels = orb_kernels_best();
+  builder *b = ORB_NEW0(ctx, builder, 1);
+  if (!b) {
+    return ORB_E_NO_MEMORY;
+  }
+  b->ctx = ctx;
+  b->level = level;
+  b->s = surface;
+  b->blend = blend;
+  orb_status status;
+  ORB_GO(status, list_vertices(b, alive, pinned, live), done);
+  ORB_GO(status, colour_vertices(b), done);
+  ORB_GO(status, lay_out(b), done);
+  assign_lanes(b);
+  ORB_GO(status, orb_sliced_for(ctx, b->batches, GRAIN / 8, fill_batches, b), done);
+  level->valid = 1;
+done:
+  orb_free(ctx, b);
+  return status;
+}

@@ -1,0 +1,12 @@
+/* Parallel loops that can be cancelled on the way. */
+#ifndef ORB_EMBED_LOOPS_H
+#define ORB_EMBED_LOOPS_H
+
+#include <stdatomic.h>
+
+#include "orbmorph/context.h"
+
+/* orb_parallel_for() in slices, with orb_context_check() between them. Chunks begin at multiples of grain. */
+ORB_MUST_CHECK orb_status orb_sliced_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg);
+
+#endif

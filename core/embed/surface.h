@@ -1,0 +1,50 @@
+/* The working surface of an embedding: a closed triangle mesh in space-filling order, normalised to area 4π, with
+ * corners that know their opposites. Decimation and its undoing rewrite it in place.
+ *
+ * Corners. Triangle t has the corners 4t, 4t + 1, 4t + 2; slot 4t + 3 of `corner` holds the bits of its target area, so
+ * that a walk round a vertex finds index and area in one cache line. opposite[c] is the corner across the edge that
+ * lies opposite to corner c. */
+#ifndef ORB_EMBED_SURFACE_H
+#define ORB_EMBED_SURFACE_H
+
+#include <string.h>
+
+#include "orbmorph/mesh.h"
+
+typedef struct orb_surface {
+  int32_t vertex_count, triangle_count;
+  int32_t *to_mesh, *from_mesh; /* vertex numbers: Morton order ↔ the mesh's own */
+  double *position;             /* 3 a vertex; centred, area 4π (but see orb_surface_create) */
+  float *position4;             /* the same, 4 a vertex, the last 0 */
+  int32_t *corner, *opposite;   /* 4 a triangle */
+  int32_t *vertex_corner;       /* a corner of each vertex */
+  int32_t *valence;             /* of each vertex */
+} orb_surface;
+
+static inline int32_t orb_corner_next(int32_t c) {
+  return (c & 3) == 2 ? c - 2 : c + 1;
+}
+static inline int32_t orb_corner_prev(int32_t c) {
+  return (c & 3) == 0 ? c + 2 : c - 1;
+}
+/* The next corner of the same vertex, counter-clockwise. */
+static inline int32_t orb_corner_swing(const orb_surface *s, int32_t c) {
+  return orb_corner_next(s->opposite[orb_corner_next(c)]);
+}
+/* Target area of the triangle of corner c. */
+static inline float orb_corner_area(const orb_surface *s, int32_t c) {
+  float area;
+  memcpy(&area, &s->corner[c | 3], sizeof area);
+  return area;
+}
+static inline void orb_corner_set_area(orb_surface *s, int32_t c, float area) {
+  memcpy(&s->corner[c | 3], &area, sizeof area);
+}
+
+/* Builds it. Areas are scaled to a sum of 4π with a floor for vanishing triangles; where the whole area vanishes all
+ * triangles count alike. Positions far thinner than they are long are scaled less, so that floats hold them.
+ * ORB_E_NOT_MANIFOLD and others where the mesh is not what orb_mesh_repair() leaves. O(n). */
+ORB_MUST_CHECK orb_status orb_surface_create(orb_context *ctx, const orb_mesh *mesh, orb_surface *out);
+void orb_surface_free(orb_context *ctx, orb_surface *surface);
+
+#endif
