@@ -1,0 +1,68 @@
+/* What readers fill while they go through a file, and the mesh that is made of it at the end.
+ *
+ * Faces may name vertices that come later in a file, so indices are checked and polygons are cut into triangles only
+ * in orb_build_finish(). All arrays grow with what was really read: a count in a header reserves nothing.
+ */
+#ifndef ORB_FORMAT_BUILD_H
+#define ORB_FORMAT_BUILD_H
+
+#include "orbmorph/format.h"
+
+enum { ORB_FACE_CORNERS_MAX = 1 << 24, ORB_MATERIALS_MAX = 65536 };
+
+/* One corner of a face, 0-based; −1: none. */
+typedef struct orb_corner {
+  int32_t vertex, texcoord, normal;
+} orb_corner;
+
+typedef struct orb_build {
+  orb_context *ctx;
+  int64_t max_triangles;
+  double *positions; /* 3 a vertex */
+  float *colors;     /* 4 a vertex, as in the file; NULL: none */
+  float *normals;    /* 3 each */
+  float *texcoords;  /* 2 each, v up */
+  int64_t vertices, vertex_room, color_room, normal_count, normal_room, texcoord_count, texcoord_room;
+  int by_vertex;           /* normals and texcoords are one a vertex */
+  int colors_are_srgb;     /* to be made linear */
+  int32_t *corner_vertex;  /* corners of all faces in turn */
+  orb_corner *corner_more; /* instead of corner_vertex where corners have texcoords or normals of their own */
+  int64_t corners, corner_room, more_room;
+  int32_t *face_size; /* NULL while all faces are triangles */
+  int32_t *face_material;
+  int64_t faces, size_room, material_room, triangles;
+  int32_t largest_face;
+  int32_t material; /* of faces to come; −1 before the first one is named */
+  orb_material *materials;
+  int32_t *material_slots;
+  int64_t material_count, materials_room;
+  int64_t highest_vertex, highest_texcoord, highest_normal; /* that a face names */
+  int64_t highest_vertex_where, highest_texcoord_where, highest_normal_where;
+} orb_build;
+
+void orb_build_init(orb_build *build, orb_context *ctx);
+void orb_build_free(orb_build *build);
+
+ORB_MUST_CHECK orb_status orb_build_vertex(orb_build *build, const double position[3]);
+/* The colour of the vertex last added; earlier vertices without one are white. */
+ORB_MUST_CHECK orb_status orb_build_color(orb_build *build, const double *rgba, int channels);
+ORB_MUST_CHECK orb_status orb_build_normal(orb_build *build, const double normal[3]);
+ORB_MUST_CHECK orb_status orb_build_texcoord(orb_build *build, const double texcoord[2]);
+
+/* One more corner of the face that is being read, then its end; where: line or offset, for messages. */
+ORB_MUST_CHECK orb_status orb_build_corner(orb_build *build, orb_corner corner, int64_t where);
+ORB_MUST_CHECK orb_status orb_build_face_end(orb_build *build, int64_t corners);
+
+/* Makes the named material that of the faces to come. */
+ORB_MUST_CHECK orb_status orb_build_use_material(orb_build *build, const unsigned char *name, size_t length);
+
+/* Fails with ORB_E_MALFORMED_MESH at a place: a line of a text (is_text) or an offset. */
+orb_status orb_build_malformed(orb_context *ctx, int is_text, int64_t where, const char *format, ...) ORB_PRINTF(4, 5);
+
+/* Checks indices, cuts polygons, fills `out`. end: the last line or the size, for a file without faces. */
+ORB_MUST_CHECK orb_status orb_build_finish(orb_build *build, int is_text, int64_t end, orb_mesh *out);
+
+/* Grows an array to hold `need` elements. */
+ORB_MUST_CHECK orb_status orb_build_grow(orb_context *ctx, void *array, int64_t *room, int64_t need, size_t element);
+
+#endif

@@ -1,0 +1,235 @@
+/* Filling holes.
+ *
+ * A loop of up to SMALL edges gets the triangulation of least area (dynamic programming, Barequet & Sharir 1995), a
+ * larger one is cut as a polygon. Either may use a diagonal that is an edge of the mesh already; where that happens the
+ * loops are closed by fans around a new vertex instead, which cannot clash. A new vertex stands for no vertex of the
+ * file: its source is the lowest of its loop. New faces have source_triangle −1; attributes come from the neighbours
+ * across the loop.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "mesh/edit.h"
+#include "mesh/polygon.h"
+#include "mesh/surface.h"
+#include "numeric/vec3.h"
+
+enum { SMALL = 48 };
+
+typedef struct fill {
+  orb_surface *s;
+  int32_t *loop;   /* open half-edges of the present loop, in the order of the new faces */
+  int32_t *vertex; /* their origins */
+  int32_t *cut;
+  orb_polygon polygon;
+  double best[SMALL][SMALL];
+  int split[SMALL][SMALL];
+} fill;
+
+static double area_of(const fill *f, int32_t a, int32_t b, int32_t c) {
+  const double *p = f->s->mesh->positions;
+  double u[3], w[3], n[3];
+  orb_sub(p + 3 * (size_t)f->vertex[b], p + 3 * (size_t)f->vertex[a], u);
+  orb_sub(p + 3 * (size_t)f->vertex[c], p + 3 * (size_t)f->vertex[a], w);
+  orb_cross(u, w, n);
+  return orb_length(n);
+}
+
+static void cut_small(fill *f, int32_t count) {
+  for (int32_t span = 1; span < count; span++) {
+    for (int32_t i = 0; i + span < count; i++) {
+      int32_t k = i + span;
+      f->best[i][k] = span == 1 ? 0 : INFINITY;
+      f->split[i][k] = i + 1;
+      for (int32_t j = i + 1; j < k; j++) {
+        double cost = f->best[i][j] + f->best[j][k] + area_of(f, i, j, k);
+        if (cost < f->best[i][k]) {
+          f->best[i][k] = cost;
+          f->split[i][k] = j;
+        }
+      }
+    }
+  }
+  int32_t stack[2 * SMALL][2], depth = 0;
+  int32_t *out = f->cut;
+  stack[depth][0] = 0;
+  stack[depth++][1] = count - 1;
+  while (depth > 0) {
+    depth--;
+    int32_t i = stack[depth][0], k = stack[depth][1];
+    if (k - i < 2) {
+      continue;
+    }
+    int32_t j = f->split[i][k];
+    *out++ = i;
+    *out++ = j;
+    *out++ = k;
+    stack[depth][0] = i;
+    stack[depth++][1] = j;
+    stack[depth][0] = j;
+    stack[depth++][1] = k;
+  }
+}
+
+/* Attributes of a new corner as those of corner `like`, of an old face. */
+static void copy_corner(orb_mesh *mesh, int32_t corner, int32_t like) {
+  size_t c = (size_t)corner, l = (size_t)like;
+  if (mesh->normals) {
+    memcpy(mesh->normals + 3 * c, mesh->normals + 3 * l, 3 * sizeof(float));
+  }
+  if (mesh->texcoords) {
+    memcpy(mesh->texcoords + 2 * c, mesh->texcoords + 2 * l, 2 * sizeof(float));
+  }
+  if (mesh->colors) {
+    memcpy(mesh->colors + 4 * c, mesh->colors + 4 * l, 4 * sizeof(float));
+  }
+}
+
+static void add_face(fill *f, const int32_t vertex[3], const int32_t like[3]) {
+  orb_mesh *mesh = f->s->mesh;
+  int32_t t = mesh->triangle_count++;
+  for (int k = 0; k < 3; k++) {
+    mesh->triangles[3 * t + k] = vertex[k];
+    copy_corner(mesh, 3 * t + k, like[k]);
+  }
+  mesh->source_triangle[t] = -1;
+  if (mesh->material) {
+    mesh->material[t] = mesh->material[like[0] / 3];
+  }
+}
+
+static void close_with_diagonals(fill *f, int32_t count) {
+  if (count <= SMALL) {
+    cut_small(f, count);
+  } else {
+    orb_polygon_cut(&f->polygon, f->s->mesh->positions, f->vertex, count, f->cut);
+  }
+  for (int32_t i = 0; i < count - 2; i++) {
+    const int32_t *c = f->cut + 3 * i;
+    add_face(f, (int32_t[3]){f->vertex[c[0]], f->vertex[c[1]], f->vertex[c[2]]},
+             (int32_t[3]){f->loop[c[0]], f->loop[c[1]], f->loop[c[2]]});
+  }
+}
+
+static void close_with_fan(fill *f, int32_t count) {
+  orb_mesh *mesh = f->s->mesh;
+  int32_t made = mesh->vertex_count++, lowest = f->vertex[0];
+  double *centre = mesh->positions + 3 * (size_t)made, total = 0, sum[3] = {0, 0, 0};
+  for (int32_t i = 0; i < count; i++) { /* the centre of the loop as a wire */
+    const double *p = mesh->positions + 3 * (size_t)f->vertex[i];
+    const double *q = mesh->positions + 3 * (size_t)f->vertex[i + 1 < count ? i + 1 : 0];
+    double length = sqrt(orb_distance2(p, q));
+    total += length;
+    for (int k = 0; k < 3; k++) {
+      sum[k] += length * (0.5 * p[k] + 0.5 * q[k]);
+    }
+    lowest = mesh->source[f->vertex[i]] < mesh->source[lowest] ? f->vertex[i] : lowest;
+  }
+  for (int k = 0; k < 3; k++) {
+    centre[k] = total > 0 ? sum[k] / total : mesh->positions[3 * (size_t)lowest + (size_t)k];
+  }
+  mesh->source[made] = mesh->source[lowest];
+  for (int32_t i = 0; i < count; i++) {
+    int32_t j = i + 1 < count ? i + 1 : 0;
+    add_face(f, (int32_t[3]){f->vertex[i], f->vertex[j], made}, (int32_t[3]){f->loop[i], f->loop[j], f->loop[i]});
+  }
+}
+
+/* Collects the loop of h, backwards: new faces run against the old ones. */
+static int32_t collect_loop(fill *f, int32_t h, unsigned char *seen) {
+  int32_t count = 0;
+  for (int32_t g = h; !seen[g]; g = orb_surface_next_open(f->s, g)) {
+    seen[g] = 1;
+    f->loop[count++] = g;
+  }
+  for (int32_t i = 0, j = count - 1; i < j; i++, j--) {
+    int32_t x = f->loop[i];
+    f->loop[i] = f->loop[j];
+    f->loop[j] = x;
+  }
+  for (int32_t i = 0; i < count; i++) {
+    f->vertex[i] = f->s->mesh->triangles[f->loop[i]];
+  }
+  return count;
+}
+
+/* Closes all loops in one way. */
+static orb_status close_all(fill *f, int fans, int64_t *loops) {
+  orb_surface *s = f->s;
+  int32_t half_edges = 3 * s->mesh->triangle_count; /* of the old faces */
+  *loops = 0;
+  unsigned char *seen = ORB_NEW0(s->ctx, unsigned char, half_edges);
+  orb_status status = seen ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int32_t h = 0; h < half_edges && status == ORB_OK; h++) {
+    if (s->twin[h] != ORB_OPEN || seen[h]) {
+      continue;
+    }
+    int32_t count = collect_loop(f, h, seen);
+    ORB_ASSERT(count >= 3);
+    if (fans) {
+      close_with_fan(f, count);
+    } else {
+      close_with_diagonals(f, count);
+    }
+    ++*loops;
+    status = orb_context_check(s->ctx);
+  }
+  orb_free(s->ctx, seen);
+  return status;
+}
+
+static orb_status grow_surface(orb_surface *s, int32_t faces) {
+  orb_free(s->ctx, s->twin);
+  orb_free(s->ctx, s->piece);
+  orb_free(s->ctx, s->turned);
+  s->twin = ORB_NEW(s->ctx, int32_t, 3 * (size_t)faces);
+  s->piece = ORB_NEW(s->ctx, int32_t, faces);
+  s->turned = ORB_NEW(s->ctx, unsigned char, faces);
+  return s->twin && s->piece && s->turned ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+static orb_status run(fill *f) {
+  orb_surface *s = f->s;
+  orb_mesh *mesh = s->mesh;
+  int64_t loops = 0, open = s->edges.open, before = s->edges.crowded;
+  int32_t faces = mesh->triangle_count;
+  ORB_TRY(orb_surface_loops(s, &loops));
+  if (3 * (faces + open) > INT32_MAX) {
+    return orb_fail(s->ctx, ORB_E_TOO_LARGE, "The mesh would be too large with its holes filled.");
+  }
+  f->loop = ORB_NEW(s->ctx, int32_t, open);
+  f->vertex = ORB_NEW(s->ctx, int32_t, open);
+  f->cut = ORB_NEW(s->ctx, int32_t, 3 * open);
+  if (!f->loop || !f->vertex || !f->cut) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(orb_polygon_reserve(s->ctx, &f->polygon, (int32_t)open));
+  ORB_TRY(orb_mesh_reserve(s->ctx, mesh, (int32_t)loops, (int32_t)open));
+  ORB_TRY(close_all(f, 0, &loops));
+  ORB_TRY(grow_surface(s, faces + (int32_t)open));
+  ORB_TRY(orb_surface_rematch(s));
+  if (s->edges.crowded > before || s->edges.open > 0) {
+    mesh->triangle_count = faces;
+    ORB_TRY(orb_surface_rematch(s));
+    ORB_TRY(close_all(f, 1, &loops));
+    ORB_TRY(orb_surface_rematch(s));
+  }
+  orb_mesh_note(mesh, "fill_holes", loops);
+  return ORB_OK;
+}
+
+orb_status orb_surface_fill(orb_surface *s) {
+  fill *f = orb_calloc(s->ctx, 1, sizeof *f);
+  if (!f) {
+    return ORB_E_NO_MEMORY;
+  }
+  f->s = s;
+  orb_status status = run(f);
+  orb_polygon_free(s->ctx, &f->polygon);
+  orb_free(s->ctx, f->loop);
+  orb_free(s->ctx, f->vertex);
+  orb_free(s->ctx, f->cut);
+  orb_free(s->ctx, f);
+  return status;
+}

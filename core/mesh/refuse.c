@@ -1,0 +1,191 @@
+/* See refuse.h. */
+#include "mesh/refuse.h"
+
+#include "base/check.h"
+#include "mesh/sort.h"
+
+static int32_t low_of(const orb_mesh *mesh, int32_t h) {
+  int32_t a = mesh->triangles[h], b = mesh->triangles[orb_next(h)];
+  return a < b ? a : b;
+}
+static int32_t high_of(const orb_mesh *mesh, int32_t h) {
+  int32_t a = mesh->triangles[h], b = mesh->triangles[orb_next(h)];
+  return a < b ? b : a;
+}
+
+static void add_edge(orb_error *error, const orb_mesh *mesh, int32_t h) {
+  if (error->edge_count < ORB_ERROR_ITEMS) {
+    error->edges[error->edge_count][0] = mesh->source[mesh->triangles[h]];
+    error->edges[error->edge_count++][1] = mesh->source[mesh->triangles[orb_next(h)]];
+  }
+}
+
+orb_status orb_refuse_sort_edges(const orb_surface *s, int32_t kind, uint64_t *entry, int32_t *start) {
+  if (!entry || !start) {
+    return ORB_E_NO_MEMORY;
+  }
+  const orb_mesh *mesh = s->mesh;
+  int32_t half_edges = 3 * mesh->triangle_count;
+  for (int32_t h = 0; h < half_edges; h++) {
+    if (s->twin[h] == kind) {
+      start[low_of(mesh, h) + 2]++;
+    }
+  }
+  for (int32_t v = 0; v < mesh->vertex_count; v++) {
+    start[v + 2] += start[v + 1];
+  }
+  for (int32_t h = 0; h < half_edges; h++) {
+    if (s->twin[h] == kind) {
+      entry[start[low_of(mesh, h) + 1]++] = (uint64_t)(uint32_t)high_of(mesh, h) << 32 | (uint32_t)h;
+    }
+  }
+  for (int32_t v = 0; v < mesh->vertex_count; v++) {
+    orb_sort_u64(entry + start[v], start[v + 1] - start[v]);
+  }
+  return ORB_OK;
+}
+
+orb_status orb_refuse_crowded(orb_surface *s) {
+  const orb_mesh *mesh = s->mesh;
+  int64_t count = 0;
+  for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
+    count += s->twin[h] == ORB_CROWDED;
+  }
+  uint64_t *entry = ORB_NEW(s->ctx, uint64_t, count);
+  int32_t *start = ORB_NEW0(s->ctx, int32_t, (size_t)mesh->vertex_count + 2);
+  orb_status status = orb_refuse_sort_edges(s, ORB_CROWDED, entry, start);
+  if (status == ORB_OK) {
+    status = orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
+                      "%lld edges belong to more than two faces (or run from a vertex to itself); a surface has two "
+                      "faces at each edge. Remove the faces that are too many.",
+                      (long long)s->edges.crowded);
+    orb_error *error = orb_context_error_edit(s->ctx);
+    error->edge_total = s->edges.crowded;
+    for (int64_t i = 0; i < count && error->edge_count < ORB_ERROR_ITEMS; i++) {
+      int32_t g = i > 0 ? (int32_t)(uint32_t)entry[i - 1] : -1, h = (int32_t)(uint32_t)entry[i];
+      if (g < 0 || low_of(mesh, g) != low_of(mesh, h) || high_of(mesh, g) != high_of(mesh, h)) {
+        add_edge(error, mesh, h);
+      }
+    }
+  }
+  orb_free(s->ctx, entry);
+  orb_free(s->ctx, start);
+  return status;
+}
+
+orb_status orb_refuse_facing(orb_surface *s) {
+  const orb_mesh *mesh = s->mesh;
+  orb_status status =
+      s->conflict >= 0
+          ? orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
+                     "The surface has one side only, like a Möbius strip: its faces cannot be turned to agree. "
+                     "Following neighbours from face to face comes back turned over at the edge given.")
+          : orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
+                     "Faces are turned against their neighbours at %lld edges; send the mesh with repair=safe, or turn "
+                     "them.",
+                     (long long)s->edges.same_way);
+  orb_error *error = orb_context_error_edit(s->ctx);
+  if (s->conflict >= 0) {
+    error->edge_total = 1;
+    add_edge(error, mesh, s->conflict);
+    return status;
+  }
+  error->edge_total = s->edges.same_way;
+  for (int32_t h = 0; h < 3 * mesh->triangle_count && error->edge_count < ORB_ERROR_ITEMS; h++) {
+    if (s->twin[h] > h && mesh->triangles[s->twin[h]] == mesh->triangles[h]) {
+      add_edge(error, mesh, h);
+    }
+  }
+  return status;
+}
+
+orb_status orb_refuse_open(orb_surface *s) {
+  int64_t loops = 0;
+  ORB_TRY(orb_surface_loops(s, &loops));
+  (void)orb_fail(s->ctx, ORB_E_NOT_CLOSED,
+                 "The surface is not closed: %lld edges in %lld boundary loops have a face on one side only. Close the "
+                 "holes, or send the mesh with repair=fill_holes.",
+                 (long long)s->edges.open, (long long)loops);
+  orb_error *error = orb_context_error_edit(s->ctx);
+  error->boundary_loops = loops;
+  error->edge_total = s->edges.open;
+  for (int32_t h = 0; h < 3 * s->mesh->triangle_count && error->edge_count < ORB_ERROR_ITEMS; h++) {
+    if (s->twin[h] == ORB_OPEN) {
+      add_edge(error, s->mesh, h);
+    }
+  }
+  return ORB_E_NOT_CLOSED;
+}
+
+/* The sizes of the pieces, largest first. */
+static orb_status add_pieces(orb_surface *s, uint64_t **sizes) {
+  *sizes = ORB_NEW0(s->ctx, uint64_t, s->piece_count);
+  if (!*sizes) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t t = 0; t < s->mesh->triangle_count; t++) {
+    (*sizes)[s->piece[t]]++;
+  }
+  orb_sort_u64(*sizes, s->piece_count);
+  return ORB_OK;
+}
+
+static void list_pieces(orb_surface *s, const uint64_t *sizes) {
+  orb_error *error = orb_context_error_edit(s->ctx);
+  error->component_total = s->piece_count;
+  for (int32_t i = 0; i < s->piece_count && i < ORB_ERROR_ITEMS; i++) {
+    error->components[error->component_count++] = (int64_t)sizes[s->piece_count - 1 - i];
+  }
+}
+
+orb_status orb_refuse_pinched(orb_surface *s, const orb_fans *fans) {
+  uint64_t *sizes = NULL;
+  ORB_TRY(add_pieces(s, &sizes));
+  if (s->piece_count > 1) {
+    (void)orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
+                   "%d bodies hang together only at %lld vertices, where the surface is not manifold. Join them "
+                   "properly, or send the mesh with repair=largest_component.",
+                   s->piece_count, (long long)fans->pinched);
+  } else {
+    (void)orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
+                   "At %lld vertices several fans of faces touch; send the mesh with repair=safe, or split them.",
+                   (long long)fans->pinched);
+  }
+  if (s->piece_count > 1) {
+    list_pieces(s, sizes);
+  }
+  orb_error *error = orb_context_error_edit(s->ctx);
+  error->vertex_total = fans->pinched;
+  for (int32_t i = 0; i < fans->pinched_count; i++) {
+    error->vertices[error->vertex_count++] = s->mesh->source[fans->pinched_vertices[i]];
+  }
+  orb_free(s->ctx, sizes);
+  return ORB_E_NOT_MANIFOLD;
+}
+
+orb_status orb_refuse_pieces(orb_surface *s) {
+  uint64_t *sizes = NULL;
+  ORB_TRY(add_pieces(s, &sizes));
+  (void)orb_fail(s->ctx, ORB_E_NOT_CONNECTED,
+                 "The mesh has %d pieces that do not touch; send one of them, or the mesh with "
+                 "repair=largest_component.",
+                 s->piece_count);
+  list_pieces(s, sizes);
+  orb_free(s->ctx, sizes);
+  return ORB_E_NOT_CONNECTED;
+}
+
+orb_status orb_refuse_handles(orb_surface *s, int64_t genus) {
+  (void)orb_fail(s->ctx, ORB_E_NOT_GENUS_ZERO,
+                 "The surface has %lld handles (like a torus or a cup's ear); only surfaces like a sphere can be "
+                 "morphed. Fill or cut the handles.",
+                 (long long)genus);
+  orb_context_error_edit(s->ctx)->genus = genus;
+  return ORB_E_NOT_GENUS_ZERO;
+}
+
+orb_status orb_refuse_few(orb_surface *s) {
+  return orb_fail(s->ctx, ORB_E_DEGENERATE,
+                  "%d triangles are left once repeated and degenerate faces are dropped; a closed surface needs four.",
+                  s->mesh->triangle_count);
+}
