@@ -1,0 +1,19 @@
+/* Closed meshes of genus zero for tests, made on the spot. Arrays are of the context: free with orb_mesh_free() or
+ * shape_free(). */
+#ifndef SUPPORT_SHAPES_H
+#define SUPPORT_SHAPES_H
+
+#include "orbmorph/mesh.h"
+
+orb_mesh shape_tetrahedron(orb_context *ctx);
+orb_mesh shape_octahedron(orb_context *ctx);
+orb_mesh shape_icosahedron(orb_context *ctx);
+/* Rings of `around` vertices between two poles, rows − 1 of them, on the unit sphere. */
+orb_mesh shape_globe(orb_context *ctx, int around, int rows);
+/* The same on a cylinder of radius 1 and the given length, flat caps. */
+orb_mesh shape_cylinder(orb_context *ctx, int around, int rows, double length);
+/* An octahedron split `levels` times four-way, on the unit sphere. */
+orb_mesh shape_ball(orb_context *ctx, int levels);
+void shape_free(orb_context *ctx, orb_mesh *mesh);
+
+#endif
