@@ -7,7 +7,8 @@ const isNode = typeof process !== 'undefined' && !!process.versions?.node;
 export async function openSource(source, name) {
   if (typeof source === 'string' || source instanceof URL) {
     if (!isNode) throw new TypeError('A path can be read in Node only; pass a File, a Blob or bytes.');
-    const { readFile } = await import(/* @vite-ignore */ 'node:fs/promises');
+    const module = 'node:fs/promises'; // a name that bundlers do not follow
+    const { readFile } = await import(/* @vite-ignore */ module);
     const bytes = await readFile(source);
     const file = String(source).split(/[\\/]/).pop();
     return { name: name ?? stem(file), size: bytes.byteLength, body: bytes };

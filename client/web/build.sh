@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# Builds the studio into client/web/dist; does nothing when that is newer than everything it is made of.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+stamp=dist/.built
+if [ -f "$stamp" ] && [ -z "$(find src public index.html package-lock.json vite.config.ts tsconfig.json ../js/src \
+    ../../tests/samples -newer "$stamp" -print -quit 2>/dev/null)" ]; then
+  exit 0
+fi
+command -v npm >/dev/null || { echo "The studio needs Node 18 and npm: apt-get install nodejs npm" >&2; exit 1; }
+if [ ! -f node_modules/.package-lock.json ] || [ package-lock.json -nt node_modules/.package-lock.json ]; then
+  npm ci --no-audit --no-fund --loglevel=error
+fi
+npx --no-install vite build --logLevel warn
+touch "$stamp"

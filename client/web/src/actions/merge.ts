@@ -1,0 +1,149 @@
+/** Morphing: the request, the job with its progress, the asset, and playing it. */
+import { CancelledError, ProblemError, type Job, type Landmark, type Supermesh, type SupermeshRequest } from 'orbmorph';
+import { client, readyShapes, set, state, tint, toast, wireLandmarks, type Result, type Running } from '../state';
+import { work } from '../mesh/work';
+import { morphModels } from '../view/models';
+import { player } from '../player';
+import { takeLandmarks } from './landmarks';
+
+export function buildRequest(find = false): SupermeshRequest {
+  const { options } = state;
+  const shapes = readyShapes();
+  const landmarks = wireLandmarks(shapes);
+  const request: SupermeshRequest = { shapes: shapes.map(({ mesh, name }) => ({ mesh: mesh!.id, name })) };
+  if (find) request.landmarks = 'auto';
+  else if (landmarks.length) request.landmarks = landmarks;
+  if (!find && options.align !== 'default') request.align = { method: options.align };
+  request.remesh = { method: options.remesh, tolerance: options.tolerance };
+  if (options.maxTriangles) request.remesh.max_triangles = options.maxTriangles;
+  request.asset = { fit: options.fit };
+  if (options.path !== 'linear') request.asset.path = options.path;
+  return request;
+}
+
+export async function startMerge(purpose: Running['purpose'] = 'morph') {
+  if (state.running || readyShapes().length < 2) return;
+  const running: Running = { purpose, job: null, abort: new AbortController() };
+  set({ running, problem: null });
+  const request = buildRequest(purpose === 'find');
+  await follow(running, () =>
+    client.merge(request, { signal: running.abort.signal, onJob: progress(running), onProgress: progress(running) }), request);
+}
+
+/** Goes on with a job that an earlier visit began. */
+export async function resumeJob(id: string) {
+  const running: Running = { purpose: 'morph', job: null, abort: new AbortController() };
+  set({ running });
+  const { signal } = running.abort;
+  await follow(running, async () => {
+    try {
+      return await client.result<Supermesh>(id, { signal, onProgress: progress(running) });
+    } catch (error) {
+      if (signal.aborted) await client.cancelJob(id).catch(() => {});
+      throw error;
+    }
+  }, null);
+}
+
+const progress = (running: Running) => (job: Job) => {
+  running.job = job;
+  set();
+};
+
+async function follow(running: Running, get: () => Promise<Supermesh>, request: SupermeshRequest | null) {
+  try {
+    const supermesh = await get();
+    if (running.purpose === 'find') await takeFound(supermesh);
+    else {
+      await openResult(supermesh, request);
+      set({ tab: 'morph', show: 'morph' });
+      player.play();
+    }
+  } catch (error) {
+    if (running.abort.signal.aborted || error instanceof CancelledError) toast('Cancelled.');
+    else set({ problem: tell(error) });
+  } finally {
+    if (state.running === running) set({ running: null });
+  }
+}
+
+function tell(error: unknown) {
+  if (error instanceof ProblemError) return { title: error.title || 'The daemon refused', detail: error.detail, facts: error.problem };
+  return { title: 'That did not work', detail: (error as Error).message, facts: null };
+}
+
+async function takeFound(supermesh: Supermesh) {
+  const found = (supermesh.landmarks ?? []).filter((l): l is Landmark => Array.isArray(l.at));
+  const taken = found.length ? await takeLandmarks(found) : 0;
+  if (taken) {
+    set({ tab: 'landmarks' });
+    toast(`${taken} landmarks found. Drag those that are off.`);
+  } else toast('The shapes were matched, but no single points stand out. “Morph” uses the match as it is.');
+}
+
+export function cancelMerge() {
+  state.running?.abort.abort();
+}
+
+export async function openResult(supermesh: Supermesh, request: SupermeshRequest | null) {
+  set({ loading: 'Fetching the morph' });
+  try {
+    const buffer = await client.asset(supermesh.id);
+    const data = await work('morph', supermesh.id, buffer);
+    clearResult();
+    const models = morphModels(data, supermesh.shapes.length + 1, tint(0));
+    const result: Result = {
+      supermesh, request, main: models[0], each: models.slice(1),
+      data: { times: data.times, weights: data.weights, shapes: data.shapes, names: data.names, vertices: data.vertices, triangles: data.triangles },
+    };
+    result.each.forEach((model, i) => {
+      model.weights(result.data.shapes[shapeTarget(result, i)] ?? []);
+      model.color(tint(i));
+    });
+    set({ result, mix: null });
+    player.load(result);
+  } finally {
+    set({ loading: null });
+  }
+}
+
+/** Which of the morph's states is shape `index`: in-between targets of a curved path lie between them. */
+export function shapeTarget({ data, supermesh }: Pick<Result, 'data' | 'supermesh'>, index: number): number {
+  const steps = (data.shapes.length - 1) / Math.max(supermesh.shapes.length - 1, 1);
+  return Math.round(index * steps);
+}
+
+/** `stale`: the landmarks have changed, so the result no longer is what "Morph" would give; it stays in view. */
+export function clearResult(stale = false) {
+  if (stale) return;
+  const { result } = state;
+  if (!result) return;
+  player.unload();
+  for (const model of [result.main, ...result.each]) model.dispose();
+  for (const shape of state.shapes) {
+    shape.error?.model.dispose();
+    shape.error = undefined;
+  }
+  set({ result: null, mix: null, playing: false, show: 'morph' });
+}
+
+/** The error of the supermesh on every shape, painted on the original. */
+export async function measureErrors() {
+  const { result } = state;
+  if (!result) return;
+  const shapes = readyShapes();
+  for (const [index, shape] of shapes.entries()) {
+    if (shape.error?.result === result.supermesh.id || shape.mesh?.id !== result.supermesh.shapes[index]?.mesh) continue;
+    set({ loading: `Measuring the error on ${shape.name}` });
+    try {
+      const found = await work('error', shape.key, result.supermesh.id, shapeTarget(result, index));
+      const model = shape.model!.twin();
+      model.attribute('value', found.values);
+      model.paint({ kind: 'value', ramp: 'heat', low: 0, high: Math.max(found.max, 1e-9) });
+      shape.error = { result: result.supermesh.id, model, ...found };
+    } catch (error) {
+      toast((error as Error).message, 'error');
+    }
+    set({ loading: null });
+  }
+}

@@ -1,0 +1,69 @@
+/** What is on the server: lists, opening and deleting. */
+import type { Mesh, Supermesh } from 'orbmorph';
+import { client, set, state, toast } from '../state';
+import { addFromServer, removeShape } from './shapes';
+import { openResult, resumeJob } from './merge';
+import { takeLandmarks } from './landmarks';
+import { player } from '../player';
+
+export async function loadServer() {
+  set({ server: { meshes: [], supermeshes: [], jobs: [], message: null, ...state.server, loading: true } });
+  try {
+    const [meshes, supermeshes, jobs] = await Promise.all([
+      client.page('meshes', { limit: 100 }),
+      client.page('supermeshes', { limit: 100 }),
+      client.page('jobs', { limit: 50 }),
+    ]);
+    set({ server: { meshes: meshes.items, supermeshes: supermeshes.items, jobs: jobs.items, message: null, loading: false } });
+  } catch (error) {
+    set({ server: { meshes: [], supermeshes: [], jobs: [], message: (error as Error).message, loading: false } });
+  }
+}
+
+export async function addMesh(mesh: Mesh) {
+  set({ drawer: null, tab: 'shapes' });
+  await addFromServer(mesh);
+}
+
+/** Opens a morph with its shapes. */
+export async function openSupermesh(id: string, play = true) {
+  set({ drawer: null });
+  try {
+    const supermesh = await client.getSupermesh(id);
+    await bringShapes(supermesh);
+    await openResult(supermesh, null);
+    set({ tab: 'morph', show: 'morph' });
+    if (play) player.play();
+  } catch (error) {
+    toast((error as Error).message, 'error');
+  }
+}
+
+async function bringShapes(supermesh: Supermesh) {
+  const wanted = supermesh.shapes.map((shape) => shape.mesh);
+  const present = state.shapes.map((shape) => shape.mesh?.id);
+  if (wanted.length === present.length && wanted.every((id, i) => id === present[i])) return;
+  for (const shape of [...state.shapes]) removeShape(shape.key);
+  for (const id of wanted) await addFromServer(await client.getMesh(id));
+  const placed = (supermesh.landmarks ?? []).flatMap((l) => (l.at ? [{ name: l.name, at: l.at }] : []));
+  if (placed.length) await takeLandmarks(placed, false);
+}
+
+export async function watchJob(id: string) {
+  set({ drawer: null });
+  await resumeJob(id);
+}
+
+export async function cancelJob(id: string) {
+  await client.cancelJob(id).catch((error: Error) => toast(error.message, 'error'));
+  await loadServer();
+}
+
+export async function remove(kind: 'mesh' | 'supermesh', item: Mesh | Supermesh) {
+  try {
+    await (kind === 'mesh' ? client.deleteMesh(item.id) : client.deleteSupermesh(item.id));
+  } catch (error) {
+    toast((error as Error).message, 'error');
+  }
+  await loadServer();
+}

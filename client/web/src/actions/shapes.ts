@@ -1,0 +1,151 @@
+/** Bringing shapes in: files, samples, meshes that are on the server; refusals and how to mend them. */
+import { ProblemError, type Mesh } from 'orbmorph';
+import samples from 'virtual:samples';
+import { client, patch, set, shapeOf, state, tint, toast, type Shape } from '../state';
+import { work } from '../mesh/work';
+import { shapeModel } from '../view/models';
+import { forgetShape } from './landmarks';
+import { clearResult } from './merge';
+
+export interface Sample {
+  name: string;
+  file: string;
+  bytes: number;
+  url: string;
+}
+export const sampleList: Sample[] = samples;
+
+let count = 0;
+
+function create(name: string): Shape {
+  const shape: Shape = { key: `s${++count}`, name, state: 'reading', progress: 0 };
+  if (state.result) clearResult();
+  set({ shapes: [...state.shapes, shape] });
+  return shape;
+}
+
+/** Parses in the worker and makes the model; a file that cannot be drawn leaves the view empty. */
+async function draw(shape: Shape, buffer: ArrayBuffer) {
+  try {
+    const display = await work('open', shape.key, buffer);
+    if (!shapeOf(shape.key)) return void work('close', shape.key);
+    const model = shapeModel(display, tint(state.shapes.indexOf(shape)));
+    patch(shape, { model, facts: { vertices: display.vertices, triangles: display.triangles, format: display.format } });
+  } catch (error) {
+    patch(shape, { message: (error as Error).message });
+  }
+}
+
+async function send(shape: Shape, repair = state.options.repair) {
+  patch(shape, { state: 'uploading', progress: 0, problem: undefined, message: undefined, faults: undefined });
+  shape.model?.faults(null);
+  try {
+    const mesh = await client.uploadMesh(shape.file!, {
+      name: shape.name,
+      repair,
+      onProgress: (sent, total) => patch(shape, { progress: total ? sent / total : 1 }),
+    });
+    patch(shape, { state: 'ready', mesh, progress: 1 });
+  } catch (error) {
+    if (!(error instanceof ProblemError)) return patch(shape, { state: 'failed', message: (error as Error).message });
+    patch(shape, { state: 'refused', problem: error.problem });
+    await drawn.get(shape.key);
+    await showFaults(shape, error);
+  }
+}
+
+const numbers = (value: unknown): number[] => (Array.isArray(value) ? value.flat(2).filter((x) => typeof x === 'number') : []);
+const pairs = (value: unknown): number[][] => (Array.isArray(value) ? value.filter((x) => Array.isArray(x) && x.length === 2) : []);
+
+async function showFaults(shape: Shape, error: ProblemError) {
+  const { problem } = error;
+  const edges = [...pairs(problem.boundary_edges), ...pairs(problem.nonmanifold_edges), ...pairs(problem.edges)];
+  const vertices = [...numbers(problem.nonmanifold_vertices), ...numbers(problem.vertices)];
+  const faults = await work('faults', shape.key, error.kind, edges, vertices);
+  shape.model?.faults(faults);
+  patch(shape, { faults: faults.found });
+}
+
+const drawn = new Map<string, Promise<void>>();
+
+export async function addFiles(files: Iterable<File>) {
+  const list = [...files];
+  if (!list.length) return;
+  set({ tab: 'shapes' });
+  await Promise.all(
+    list.map(async (file) => {
+      const shape = create(file.name.replace(/\.[A-Za-z0-9]{1,5}$/, ''));
+      shape.file = file;
+      drawn.set(shape.key, file.arrayBuffer().then((buffer) => draw(shape, buffer)));
+      await send(shape);
+    }),
+  );
+}
+
+export async function addSamples(list: Sample[]) {
+  await Promise.all(
+    list.map(async (sample) => {
+      try {
+        const response = await fetch(sample.url);
+        if (!response.ok) throw new Error(String(response.status));
+        await addFiles([new File([await response.blob()], sample.file)]);
+      } catch {
+        toast(`The sample ${sample.name} could not be read.`, 'error');
+      }
+    }),
+  );
+}
+
+/** The two that "Try with samples" opens: the first pair of the list. */
+export const samplePair = () => sampleList.slice(0, 2);
+
+export async function addFromServer(mesh: Mesh): Promise<Shape> {
+  const shape = create(mesh.name || mesh.id.slice(0, 8));
+  patch(shape, { mesh });
+  try {
+    await draw(shape, await client.meshFile(mesh.id));
+    patch(shape, { state: 'ready', progress: 1 });
+  } catch (error) {
+    patch(shape, { state: 'failed', message: (error as Error).message });
+  }
+  return shape;
+}
+
+export function removeShape(key: string) {
+  const shape = shapeOf(key);
+  if (!shape) return;
+  forgetShape(key);
+  shape.model?.dispose();
+  shape.sphere?.surface?.dispose();
+  shape.sphere?.ball?.dispose();
+  shape.error?.model.dispose();
+  void work('close', key);
+  drawn.delete(key);
+  if (state.result) clearResult();
+  set({ shapes: state.shapes.filter((other) => other !== shape) });
+  state.shapes.forEach((other, index) => other.model?.color(tint(index)));
+}
+
+export function moveShape(key: string, by: number) {
+  const shapes = [...state.shapes];
+  const from = shapes.findIndex((shape) => shape.key === key);
+  const to = from + by;
+  if (from < 0 || to < 0 || to >= shapes.length) return;
+  shapes.splice(to, 0, ...shapes.splice(from, 1));
+  if (state.result) clearResult();
+  set({ shapes });
+  shapes.forEach((other, index) => other.model?.color(tint(index)));
+}
+
+export function mend(key: string, repair: string) {
+  const shape = shapeOf(key);
+  if (shape?.file) void send(shape, repair);
+}
+
+/** The repairs that a refusal can be answered with. */
+export function remedies(problem: { type: string }): { repair: string; label: string }[] {
+  const kind = problem.type.split('/').pop();
+  if (kind === 'not-closed') return [{ repair: 'safe,fill_holes', label: 'Fill the holes' }];
+  if (kind === 'not-connected') return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }];
+  return [];
+}

@@ -1,0 +1,12 @@
+import { render } from 'preact';
+import './style.css';
+import { App } from './ui/app';
+import { keepUrl, restore } from './url';
+import { applyTheme } from './theme';
+import { stage } from './view/shared';
+import { toast } from './state';
+
+applyTheme();
+render(<App />, document.getElementById('app')!);
+if (!stage.works) toast('This browser shows no WebGL, so shapes cannot be drawn. Uploading and morphing work all the same.', 'error');
+void restore().finally(keepUrl);

@@ -1,0 +1,375 @@
+/// <reference lib="webworker" />
+/**
+ * Everything that takes long: parsing, geometry, picking, distortion, errors. Requests {id, op, args}; parsed meshes
+ * stay here under a key, so that picking and error maps need no second copy on the page's side.
+ */
+import { Bvh } from './bvh';
+import { decodeMorph, type MorphData } from './morph';
+import { decodeSphere } from './distortion';
+import { buildDisplay, faultyEdges, loosePieces, type Display, type Frame } from './geometry';
+import { parseMesh, type RawMesh } from './parse';
+import type { Place } from 'orbmorph';
+
+interface Held {
+  raw: RawMesh;
+  frame: Frame;
+  bvh?: Bvh;
+}
+
+const held = new Map<string, Held>();
+const morphs = new Map<string, MorphData>();
+
+export interface Spot {
+  /** where it is, in view coordinates, and the surface's normal there */
+  position: [number, number, number];
+  normal: [number, number, number];
+  place: Place;
+}
+
+function bvhOf(mesh: Held): Bvh {
+  return (mesh.bvh ??= new Bvh(mesh.raw.positions, mesh.raw.corners));
+}
+
+function faceNormal({ positions: p, corners }: RawMesh, t: number): [number, number, number] {
+  const [a, b, c] = [3 * corners[3 * t], 3 * corners[3 * t + 1], 3 * corners[3 * t + 2]];
+  const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
+  const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+  const n = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
+  const l = Math.hypot(n[0], n[1], n[2]) || 1;
+  return [n[0] / l, n[1] / l, n[2] / l];
+}
+
+function toView(frame: Frame, x: ArrayLike<number>, at = 0): [number, number, number] {
+  const { center, radius } = frame;
+  return [(x[at] - center[0]) / radius, (x[at + 1] - center[1]) / radius, (x[at + 2] - center[2]) / radius];
+}
+
+function pointOf({ positions: p, corners }: RawMesh, t: number, w: [number, number, number]): [number, number, number] {
+  const out: [number, number, number] = [0, 0, 0];
+  for (let c = 0; c < 3; c++) for (let k = 0; k < 3; k++) out[k] += w[c] * p[3 * corners[3 * t + c] + k];
+  return out;
+}
+
+/** The vertex where one is near (1 % of the diagonal), else the point itself. */
+function spotOn(mesh: Held, t: number, u: number, v: number): Spot {
+  const { raw, frame } = mesh;
+  const weights: [number, number, number] = [1 - u - v, u, v];
+  const point = pointOf(raw, t, weights);
+  const normal = faceNormal(raw, t);
+  const corner = weights.indexOf(Math.max(...weights));
+  const vertex = raw.corners[3 * t + corner];
+  const at = 3 * vertex;
+  const p = raw.positions;
+  const away = Math.hypot(p[at] - point[0], p[at + 1] - point[1], p[at + 2] - point[2]);
+  if (away <= 0.02 * frame.radius) return { position: toView(frame, p, at), normal, place: { vertex } };
+  return { position: toView(frame, point), normal, place: { point } };
+}
+
+/** A face at each vertex asked for, for its normal. */
+function facesAt(raw: RawMesh, wanted: Set<number>): Map<number, number> {
+  const found = new Map<number, number>();
+  if (!wanted.size) return found;
+  for (let c = 0; c < raw.corners.length; c++) {
+    const v = raw.corners[c];
+    if (wanted.has(v) && !found.has(v)) {
+      found.set(v, (c / 3) | 0);
+      if (found.size === wanted.size) break;
+    }
+  }
+  return found;
+}
+
+const ops = {
+  open(key: string, buffer: ArrayBuffer): Display {
+    const raw = parseMesh(buffer);
+    if (!raw.corners.length) throw new Error('There are no triangles to show in this file.');
+    const display = buildDisplay(raw);
+    held.set(key, { raw, frame: display.frame });
+    return display;
+  },
+
+  rename(from: string, to: string) {
+    const mesh = held.get(from);
+    if (mesh) held.set(to, mesh);
+    held.delete(from);
+  },
+
+  close(key: string) {
+    held.delete(key);
+    morphs.delete(key);
+  },
+
+  pick(key: string, origin: number[], direction: number[]): Spot | null {
+    const mesh = held.get(key);
+    if (!mesh) return null;
+    const { center, radius } = mesh.frame;
+    const o = origin.map((x, k) => x * radius + center[k]);
+    const d = direction.map((x) => x * radius);
+    const hit = bvhOf(mesh).ray(o[0], o[1], o[2], d[0], d[1], d[2]);
+    return hit && spotOn(mesh, hit.triangle, hit.u, hit.v);
+  },
+
+  locate(key: string, places: Place[]): (Spot | null)[] {
+    const mesh = held.get(key);
+    if (!mesh) return places.map(() => null);
+    const { raw, frame } = mesh;
+    const vertices = new Set(places.flatMap((place) => ('vertex' in place ? [place.vertex] : [])));
+    const faces = facesAt(raw, vertices);
+    return places.map((place) => {
+      if ('vertex' in place) {
+        const t = faces.get(place.vertex);
+        if (t === undefined) return null;
+        return { position: toView(frame, raw.positions, 3 * place.vertex), normal: faceNormal(raw, t), place };
+      }
+      if ('triangle' in place) {
+        if (3 * place.triangle >= raw.corners.length) return null;
+        const point = pointOf(raw, place.triangle, place.barycentric);
+        return { position: toView(frame, point), normal: faceNormal(raw, place.triangle), place };
+      }
+      const hit = bvhOf(mesh).closest(place.point[0], place.point[1], place.point[2]);
+      return hit && { position: toView(frame, place.point), normal: faceNormal(raw, hit.triangle), place };
+    });
+  },
+
+  /** Line segments and triangles to be drawn in red, in view coordinates. */
+  faults(key: string, kind: string, edges: number[][], vertices: number[]) {
+    const mesh = held.get(key);
+    if (!mesh) return { lines: new Float32Array(), triangles: new Float32Array(), points: new Float32Array(), found: 0 };
+    const { raw, frame } = mesh;
+    let pairs: ArrayLike<number> = edges.flat();
+    if (!pairs.length && (kind === 'not-closed' || kind === 'not-manifold')) {
+      pairs = faultyEdges(raw, false);
+      const welded = faultyEdges(raw, true);
+      if (welded.length && welded.length < pairs.length) pairs = welded;
+    }
+    const known = raw.positions.length / 3;
+    const segments = Array.from(pairs).filter((_, i) => pairs[i & ~1] < known && pairs[i | 1] < known);
+    const lines = new Float32Array(segments.length * 3);
+    segments.forEach((v, i) => lines.set(toView(frame, raw.positions, 3 * v), 3 * i));
+    const dots = vertices.filter((v) => v < known);
+    const points = new Float32Array(dots.length * 3);
+    dots.forEach((v, i) => points.set(toView(frame, raw.positions, 3 * v), 3 * i));
+    const flat: number[] = [];
+    let found = segments.length / 2 + dots.length;
+    if (kind === 'not-connected') {
+      const { loose, pieces } = loosePieces(raw);
+      found = pieces;
+      loose.forEach((is, t) => {
+        if (is) for (let c = 0; c < 3; c++) flat.push(...toView(frame, raw.positions, 3 * raw.corners[3 * t + c]));
+      });
+    }
+    return { lines, points, triangles: Float32Array.from(flat), found };
+  },
+
+  morph(key: string, buffer: ArrayBuffer): MorphData {
+    const data = decodeMorph(buffer);
+    morphs.clear();
+    morphs.set(key, { ...data, position: data.position.slice(), targets: data.targets.map((t) => ({ ...t, position: t.position.slice() })), index: data.index.slice() });
+    return data;
+  },
+
+  sphere: decodeSphere,
+
+  /**
+   * For each vertex drawn of a shape its distance from the supermesh, relative to the shape's diagonal. The asset may
+   * have moved and scaled the shape (asset.fit), so both are first brought together (see settle).
+   */
+  error(key: string, morphKey: string, shape: number): { values: Float32Array; max: number; rms: number } {
+    const mesh = held.get(key);
+    const morph = morphs.get(morphKey);
+    if (!mesh || !morph) throw new Error('The shape or the morph is not loaded.');
+    const { raw, frame } = mesh;
+    const moved = morph.position.slice();
+    morph.shapes[shape].forEach((w, k) => {
+      if (w) for (let i = 0; i < moved.length; i++) moved[i] += w * morph.targets[k].position[i];
+    });
+    const file = new Float64Array(moved.length);
+    for (let i = 0; i < moved.length; i++) file[i] = moved[i] * morph.frame.radius + morph.frame.center[i % 3];
+    const place = settle(raw, file, morph.index);
+    const bvh = new Bvh(place, morph.index);
+    const n = raw.positions.length / 3;
+    const distance = new Float32Array(n).fill(-1);
+    let last = Infinity;
+    let max = 0;
+    let sum = 0;
+    let count = 0;
+    for (let c = 0; c < raw.corners.length; c++) {
+      const v = raw.corners[c];
+      if (distance[v] >= 0) continue;
+      const [x, y, z] = [raw.positions[3 * v], raw.positions[3 * v + 1], raw.positions[3 * v + 2]];
+      let hit = bvh.closest(x, y, z, last);
+      if (!hit) hit = bvh.closest(x, y, z);
+      last = (hit?.t ?? 0) * 4 + 0.02 * frame.radius;
+      distance[v] = (hit?.t ?? 0) / (2 * frame.radius);
+      max = Math.max(max, distance[v]);
+      sum += distance[v] ** 2;
+      count++;
+    }
+    const display = buildDisplay(raw);
+    const values = new Float32Array(display.position.length / 3);
+    for (let c = 0; c < raw.corners.length; c++) values[display.index[c]] = distance[raw.corners[c]];
+    return { values, max, rms: Math.sqrt(sum / Math.max(count, 1)) };
+  },
+};
+
+export type Ops = typeof ops;
+
+/**
+ * Undoes a similarity that the asset may have applied to a shape: the least-squares similarity between the two
+ * surfaces, from the boxes' size first and then by a few rounds of nearest points. Where the boxes agree already
+ * nothing is moved.
+ */
+function settle(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64Array {
+  const a = moments(raw.positions, raw.corners);
+  const b = moments(place, index);
+  const offset = Math.hypot(a.center[0] - b.center[0], a.center[1] - b.center[1], a.center[2] - b.center[2]);
+  if (offset < 0.01 * a.spread && Math.abs(a.spread / b.spread - 1) < 0.01 && sameBox(raw, place)) return place;
+  const scale = a.spread / b.spread;
+  let best: Float64Array = place;
+  let least = Infinity;
+  const bvh = new Bvh(raw.positions, raw.corners);
+  const stride = Math.max(1, Math.floor(place.length / 3 / 1500));
+  for (const turn of rotations()) {
+    let moved = moved3(place, turn, scale, b.center, a.center);
+    let cost = Infinity;
+    for (let round = 0; round < 12; round++) {
+      const from: number[][] = [];
+      const to: number[][] = [];
+      let sum = 0;
+      for (let v = 0; v < place.length / 3; v += stride) {
+        const p = [moved[3 * v], moved[3 * v + 1], moved[3 * v + 2]];
+        const hit = bvh.closest(p[0], p[1], p[2]);
+        if (!hit) continue;
+        from.push(p);
+        to.push(pointOf(raw, hit.triangle, [1 - hit.u - hit.v, hit.u, hit.v]));
+        sum += hit.t * hit.t;
+      }
+      if (sum > 0.999 * cost && round > 2) break;
+      cost = sum;
+      if (round === 3 && sum > 4 * least) break;
+      moved = applyFit(moved, from, to);
+    }
+    if (cost < least) {
+      least = cost;
+      best = moved;
+    }
+  }
+  return best;
+}
+
+function sameBox(raw: RawMesh, place: Float64Array): boolean {
+  const box = (p: Float64Array, used?: Uint32Array) => {
+    const out = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
+    const n = used ? used.length : p.length / 3;
+    for (let i = 0; i < n; i++)
+      for (let k = 0; k < 3; k++) {
+        const x = p[3 * (used ? used[i] : i) + k];
+        out[k] = Math.min(out[k], x);
+        out[3 + k] = Math.max(out[3 + k], x);
+      }
+    return out;
+  };
+  const a = box(raw.positions, raw.corners);
+  const b = box(place);
+  const d = Math.hypot(a[3] - a[0], a[4] - a[1], a[5] - a[2]);
+  return a.every((x, k) => Math.abs(x - b[k]) < 0.02 * d);
+}
+
+/** Centre of area and root mean square radius. */
+function moments(p: ArrayLike<number>, corners: Uint32Array) {
+  const center = [0, 0, 0];
+  let area = 0;
+  let second = 0;
+  for (const pass of [0, 1])
+    for (let t = 0; t < corners.length; t += 3) {
+      const [a, b, c] = [3 * corners[t], 3 * corners[t + 1], 3 * corners[t + 2]];
+      const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
+      const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+      const w = Math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
+      const m = [0, 1, 2].map((k) => (p[a + k] + p[b + k] + p[c + k]) / 3);
+      if (pass === 0) {
+        area += w;
+        for (let k = 0; k < 3; k++) center[k] += w * m[k];
+      } else second += w * ((m[0] - center[0]) ** 2 + (m[1] - center[1]) ** 2 + (m[2] - center[2]) ** 2);
+      if (pass === 0 && t + 3 >= corners.length) for (let k = 0; k < 3; k++) center[k] /= area || 1;
+    }
+  return { center, spread: Math.sqrt(second / (area || 1)) || 1 };
+}
+
+/** The 24 rotations of the cube. */
+function* rotations(): Generator<number[]> {
+  const axes = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+  for (const [n, order] of axes.entries())
+    for (let s = 0; s < 8; s++) {
+      const signs = [s & 1 ? -1 : 1, s & 2 ? -1 : 1, s & 4 ? -1 : 1];
+      if (signs[0] * signs[1] * signs[2] * (n < 3 ? 1 : -1) < 0) continue;
+      const m = new Array<number>(9).fill(0);
+      order.forEach((column, row) => (m[3 * row + column] = signs[row]));
+      yield m;
+    }
+}
+
+function moved3(p: Float64Array, m: number[], scale: number, from: number[], to: number[]): Float64Array {
+  const out = new Float64Array(p.length);
+  for (let i = 0; i < p.length; i += 3) {
+    const x = p[i] - from[0], y = p[i + 1] - from[1], z = p[i + 2] - from[2];
+    for (let k = 0; k < 3; k++) out[i + k] = to[k] + scale * (m[3 * k] * x + m[3 * k + 1] * y + m[3 * k + 2] * z);
+  }
+  return out;
+}
+
+/** Horn's closed form (1987): the similarity that takes the points `from` nearest to `to`, applied to all. */
+function applyFit(all: Float64Array, from: number[][], to: number[][]): Float64Array {
+  const n = from.length;
+  const mean = (list: number[][]) => [0, 1, 2].map((k) => list.reduce((s, p) => s + p[k], 0) / n);
+  const a = mean(from);
+  const b = mean(to);
+  const S = new Array<number>(9).fill(0);
+  let spread = 0;
+  for (let i = 0; i < n; i++)
+    for (let r = 0; r < 3; r++) {
+      spread += (from[i][r] - a[r]) ** 2;
+      for (let c = 0; c < 3; c++) S[3 * r + c] += (from[i][r] - a[r]) * (to[i][c] - b[c]);
+    }
+  const [xx, xy, xz, yx, yy, yz, zx, zy, zz] = S;
+  const N = [
+    [xx + yy + zz, yz - zy, zx - xz, xy - yx],
+    [yz - zy, xx - yy - zz, xy + yx, zx + xz],
+    [zx - xz, xy + yx, -xx + yy - zz, yz + zy],
+    [xy - yx, zx + xz, yz + zy, -xx - yy + zz],
+  ];
+  // power iteration on the shifted matrix: its largest eigenvector is the rotation
+  const shift = Math.sqrt(N.flat().reduce((s, x) => s + x * x, 0));
+  let q = [1, 0, 0, 0];
+  for (let round = 0; round < 300; round++) {
+    const next = N.map((row, r) => row.reduce((s, x, c) => s + x * q[c], 0) + shift * q[r]);
+    const l = Math.hypot(...next) || 1;
+    q = next.map((x) => x / l);
+  }
+  const [w, x, y, z] = q;
+  const m = [
+    1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+    2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+    2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+  ];
+  let dot = 0;
+  for (let r = 0; r < 3; r++) for (let c = 0; c < 3; c++) dot += m[3 * c + r] * S[3 * r + c];
+  return moved3(all, m, spread > 0 ? dot / spread : 1, a, b);
+}
+
+/** The buffers inside an answer, to be handed over rather than copied. */
+function buffersIn(value: unknown, found = new Set<ArrayBuffer>(), depth = 0): Set<ArrayBuffer> {
+  if (ArrayBuffer.isView(value)) found.add(value.buffer as ArrayBuffer);
+  else if (value && typeof value === 'object' && depth < 4) for (const part of Object.values(value)) buffersIn(part, found, depth + 1);
+  return found;
+}
+
+self.onmessage = (event: MessageEvent<{ id: number; op: keyof Ops; args: unknown[] }>) => {
+  const { id, op, args } = event.data;
+  try {
+    const value = (ops[op] as (...args: unknown[]) => unknown)(...args);
+    self.postMessage({ id, value }, { transfer: [...buffersIn(value)] });
+  } catch (error) {
+    self.postMessage({ id, error: error instanceof Error ? error.message : String(error) });
+  }
+};

@@ -1,0 +1,129 @@
+/**
+ * The clock of the morph. It changes weights and asks for a drawing; the page is not rendered again for each frame:
+ * those who show the time (the slider) listen to it directly.
+ */
+import { Color } from 'three';
+import { set, state, tint, type Result } from './state';
+import { stage } from './view/shared';
+import { weightsAt } from './mesh/morph';
+
+const SECONDS_A_SHAPE = 2.2;
+const HOLD = 0.18;
+
+class Player {
+  /** 0..1 along the way through the shapes */
+  time = 0;
+  private phase = 0;
+  private last = 0;
+  private asked = 0;
+  private listeners = new Set<(time: number) => void>();
+
+  listen(tell: (time: number) => void): () => void {
+    this.listeners.add(tell);
+    tell(this.time);
+    return () => this.listeners.delete(tell);
+  }
+
+  load(result: Result) {
+    this.result = result;
+    this.seek(this.time);
+  }
+  unload() {
+    this.pause();
+    this.result = null;
+    this.time = 0;
+  }
+  private result: Result | null = null;
+
+  private get legs() {
+    return Math.max(1, (this.result?.supermesh.shapes.length ?? 2) - 1);
+  }
+
+  play() {
+    if (!this.result || this.asked) return;
+    if (matchMedia('(prefers-reduced-motion: reduce)').matches && !this.phase) this.phase = 0;
+    this.phase = this.phaseOf(this.time);
+    this.last = 0;
+    set({ playing: true, mix: null });
+    this.asked = requestAnimationFrame(this.tick);
+  }
+
+  pause() {
+    cancelAnimationFrame(this.asked);
+    this.asked = 0;
+    if (state.playing) set({ playing: false });
+  }
+
+  toggle() {
+    if (state.playing) this.pause();
+    else this.play();
+  }
+
+  seek(time: number) {
+    this.time = Math.max(0, Math.min(1, time));
+    const { result } = this;
+    if (result) {
+      this.weigh(weightsAt(result.data, this.time));
+      this.tintAt(this.time);
+    }
+    for (const tell of this.listeners) tell(this.time);
+  }
+
+  /** Shares of the shapes, summing to anything. */
+  mix(shares: number[]) {
+    const { result } = this;
+    if (!result) return;
+    this.pause();
+    const sum = shares.reduce((s, x) => s + x, 0);
+    const part = sum > 0 ? shares.map((x) => x / sum) : shares.map((_, i) => (i ? 0 : 1));
+    const steps = (result.data.shapes.length - 1) / this.legs;
+    const weights = new Array<number>(result.data.shapes.length - 1).fill(0);
+    part.forEach((x, i) => result.data.shapes[Math.round(i * steps)]?.forEach((w, k) => (weights[k] += x * w)));
+    this.weigh(weights);
+    const color = new Color(0);
+    part.forEach((x, i) => color.add(new Color(tint(i)).multiplyScalar(x)));
+    result.main.color(color);
+    set({ mix: shares });
+  }
+
+  private weigh(weights: ArrayLike<number>) {
+    this.result?.main.weights(weights);
+    stage.draw();
+  }
+
+  private tintAt(time: number) {
+    const at = time * this.legs;
+    const i = Math.min(Math.floor(at), this.legs - 1);
+    this.result?.main.color(new Color(tint(i)).lerp(new Color(tint(i + 1)), at - i));
+  }
+
+  /** There and back, resting a little at each shape. */
+  private timeOf(phase: number): number {
+    const there = phase % (2 * this.legs);
+    const at = there <= this.legs ? there : 2 * this.legs - there;
+    const leg = Math.min(Math.floor(at), this.legs - 1);
+    const s = Math.max(0, Math.min(1, (at - leg - HOLD / 2) / (1 - HOLD)));
+    return (leg + s * s * (3 - 2 * s)) / this.legs;
+  }
+
+  private phaseOf(time: number): number {
+    let low = 0;
+    let high = this.legs;
+    for (let i = 0; i < 30; i++) {
+      const mid = (low + high) / 2;
+      if (this.timeOf(mid) < time) low = mid;
+      else high = mid;
+    }
+    return low;
+  }
+
+  private tick = (now: number) => {
+    const passed = this.last ? Math.min((now - this.last) / 1000, 0.1) : 0;
+    this.last = now;
+    this.phase += passed / SECONDS_A_SHAPE;
+    this.seek(this.timeOf(this.phase));
+    this.asked = requestAnimationFrame(this.tick);
+  };
+}
+
+export const player = new Player();

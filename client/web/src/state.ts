@@ -1,0 +1,159 @@
+/** The state of the page, and who is told when it changes. Changes are made in actions/*.ts. */
+import type { Job, Landmark as WireLandmark, Mesh, Problem, Supermesh, SupermeshRequest, Embedding } from 'orbmorph';
+import { Orbmorph } from 'orbmorph';
+import type { MorphData } from './mesh/morph';
+import type { MeasureName, SphereData } from './mesh/distortion';
+import type { Spot } from './mesh/worker';
+import type { Model } from './view/models';
+
+export type Tab = 'shapes' | 'landmarks' | 'morph' | 'spheres';
+export const TABS: Tab[] = ['shapes', 'landmarks', 'morph', 'spheres'];
+
+export interface Shape {
+  key: string;
+  name: string;
+  state: 'reading' | 'uploading' | 'ready' | 'refused' | 'failed';
+  progress: number;
+  file?: Blob;
+  mesh?: Mesh;
+  model?: Model;
+  facts?: { vertices: number; triangles: number; format: string };
+  problem?: Problem;
+  message?: string;
+  faults?: number;
+  sphere?: SphereState;
+  error?: { result: string; values: Float32Array; max: number; rms: number; model: Model };
+}
+
+export interface SphereState {
+  state: 'working' | 'ready' | 'failed';
+  job?: Job;
+  message?: string;
+  embedding?: Embedding;
+  values?: SphereData['values'];
+  surface?: Model;
+  ball?: Model;
+  normals?: Float32Array;
+  places?: Float32Array;
+}
+
+export interface Landmark {
+  id: number;
+  name: string;
+  at: Record<string, Spot>;
+}
+
+export interface Options {
+  align: 'default' | 'pin' | 'rbf' | 'rotate' | 'auto';
+  remesh: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull';
+  tolerance: number;
+  maxTriangles: number | null;
+  path: 'linear' | 'rigid';
+  fit: 'none' | 'rigid' | 'similarity';
+  repair: string;
+}
+
+export const DEFAULTS: Options = {
+  align: 'default', remesh: 'adaptive', tolerance: 0.001, maxTriangles: null, path: 'linear', fit: 'similarity', repair: 'safe',
+};
+
+export interface Running {
+  purpose: 'morph' | 'find';
+  job: Job | null;
+  abort: AbortController;
+}
+
+export interface Result {
+  supermesh: Supermesh;
+  request: SupermeshRequest | null;
+  data: Pick<MorphData, 'times' | 'weights' | 'shapes' | 'names' | 'vertices' | 'triangles'>;
+  main: Model;
+  each: Model[];
+}
+
+export const PAINTS = ['direction', 'checker', 'symmetric_dirichlet', 'angle', 'area', 'aspect'] as const;
+export type SpherePaint = 'direction' | 'checker' | MeasureName;
+
+export interface State {
+  tab: Tab;
+  shapes: Shape[];
+  landmarks: Landmark[];
+  active: number | null;
+  past: Landmark[][];
+  future: Landmark[][];
+  options: Options;
+  running: Running | null;
+  problem: { title: string; detail: string; facts: Problem | null } | null;
+  loading: string | null;
+  result: Result | null;
+  playing: boolean;
+  mix: number[] | null;
+  show: 'morph' | 'each' | 'error';
+  wire: boolean;
+  linked: boolean;
+  paint: SpherePaint;
+  drawer: 'server' | 'share' | 'help' | null;
+  server: { meshes: Mesh[]; supermeshes: Supermesh[]; jobs: Job[]; message: string | null; loading: boolean } | null;
+  toasts: { id: number; text: string; kind: 'info' | 'error' }[];
+  dragging: boolean;
+}
+
+export const state: State = {
+  tab: 'shapes', shapes: [], landmarks: [], active: null, past: [], future: [], options: { ...DEFAULTS },
+  running: null, problem: null, loading: null, result: null, playing: false, mix: null, show: 'morph', wire: false, linked: true,
+  paint: 'direction', drawer: null, server: null, toasts: [], dragging: false,
+};
+
+export const client = new Orbmorph({ server: '' });
+
+const listeners = new Set<() => void>();
+let asked = false;
+
+/** Changes the state; those who watch are told once, soon. */
+export function set(change: Partial<State> = {}) {
+  Object.assign(state, change);
+  if (asked) return;
+  asked = true;
+  queueMicrotask(() => {
+    asked = false;
+    for (const tell of [...listeners]) tell();
+  });
+}
+
+export function watch(tell: () => void): () => void {
+  listeners.add(tell);
+  return () => listeners.delete(tell);
+}
+
+export function shapeOf(key: string): Shape | undefined {
+  return state.shapes.find((shape) => shape.key === key);
+}
+
+export function patch(shape: Shape, change: Partial<Shape>) {
+  Object.assign(shape, change);
+  set();
+}
+
+let toastCount = 0;
+export function toast(text: string, kind: 'info' | 'error' = 'info') {
+  const id = ++toastCount;
+  set({ toasts: [...state.toasts.slice(-3), { id, text, kind }] });
+  setTimeout(() => set({ toasts: state.toasts.filter((t) => t.id !== id) }), kind === 'error' ? 9000 : 4000);
+}
+
+/** Tints of the shapes, in their order. */
+const TINTS = ['#f0b79a', '#a8c3ee', '#b4d3a6', '#ecd08a', '#d9b3dc', '#93d0cb', '#e6a9b4', '#c2c6cc'];
+export const tint = (index: number) => TINTS[index % TINTS.length];
+
+/** Colours of the landmarks, told apart at a glance; the number says the same. */
+const HUES = ['#d6336c', '#1c7ed6', '#2b8a3e', '#e8590c', '#7048e8', '#0b7285', '#a61e4d', '#5c940d', '#364fc7', '#c92a2a', '#087f5b', '#862e9c'];
+export const hue = (index: number) => HUES[index % HUES.length];
+
+/** The landmarks that are set on every shape, as the daemon takes them. */
+export function wireLandmarks(shapes = readyShapes()): WireLandmark[] {
+  return state.landmarks
+    .filter((landmark) => shapes.length > 0 && shapes.every((shape) => landmark.at[shape.key]))
+    .map((landmark) => ({ name: landmark.name, at: shapes.map((shape) => landmark.at[shape.key].place) }));
+}
+
+export const readyShapes = () => state.shapes.filter((shape) => shape.state === 'ready' && shape.mesh);

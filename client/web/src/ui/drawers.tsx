@@ -1,0 +1,199 @@
+/** What slides in from the right: the server's content, ways to use a morph, help. */
+import { useEffect, useRef, useState } from 'preact/hooks';
+import type { Job } from 'orbmorph';
+import { client, set, state } from '../state';
+import { addMesh, cancelJob, loadServer, openSupermesh, remove, watchJob } from '../actions/server';
+import { buildRequest } from '../actions/merge';
+import { Bar, Button, count } from './parts';
+
+const TITLES = { server: 'On the server', share: 'Use this morph', help: 'Help' };
+
+export function Drawer() {
+  const dialog = useRef<HTMLDialogElement>(null);
+  const kind = state.drawer!;
+  useEffect(() => {
+    dialog.current!.showModal();
+  }, []);
+  return (
+    <dialog ref={dialog} class="drawer" aria-label={TITLES[kind]} onClose={() => set({ drawer: null })}
+      onClick={(event) => event.target === dialog.current && dialog.current!.close()}>
+      <div class="drawer-in">
+        <div class="row spread">
+          <h2>{TITLES[kind]}</h2>
+          <Button kind="quiet" icon="close" label="Close" onClick={() => dialog.current!.close()} />
+        </div>
+        {kind === 'server' && <Server />}
+        {kind === 'share' && <Share />}
+        {kind === 'help' && <Help />}
+      </div>
+    </dialog>
+  );
+}
+
+function when(text: string | undefined): string {
+  if (!text) return '';
+  const seconds = (Date.now() - Date.parse(text)) / 1000;
+  if (!Number.isFinite(seconds)) return '';
+  if (seconds < 60) return 'just now';
+  if (seconds < 3600) return `${Math.round(seconds / 60)} min ago`;
+  if (seconds < 86400) return `${Math.round(seconds / 3600)} h ago`;
+  return new Date(text).toLocaleDateString();
+}
+
+function Server() {
+  useEffect(() => {
+    void loadServer();
+    const timer = setInterval(() => state.server?.jobs.some((job) => job.state === 'running' || job.state === 'queued') && void loadServer(), 2000);
+    return () => clearInterval(timer);
+  }, []);
+  const list = state.server;
+  if (!list) return <p class="hint">Reading…</p>;
+  if (list.message) return <p class="red" role="alert">{list.message}</p>;
+  const jobs = list.jobs.filter((job) => job.state !== 'succeeded');
+  return (
+    <>
+      <h3>Morphs</h3>
+      {!list.supermeshes.length && <p class="hint">None yet.</p>}
+      <ul class="list">
+        {list.supermeshes.map((item) => {
+          const name = item.shapes?.map((s) => s.name).join(' → ') || item.id.slice(0, 8);
+          return (
+            <li key={item.id}>
+              <button type="button" class="item" onClick={() => void openSupermesh(item.id)}>
+                <strong>{name}</strong>
+                <span class="muted">{item.triangles !== undefined && `${count(item.triangles)} triangles`}</span>
+              </button>
+              <Button kind="quiet" icon="trash" label={`Delete the morph ${name}`} onClick={() => void remove('supermesh', item)} />
+            </li>
+          );
+        })}
+      </ul>
+      <h3>Shapes</h3>
+      {!list.meshes.length && <p class="hint">None yet.</p>}
+      <ul class="list">
+        {list.meshes.map((mesh) => (
+          <li key={mesh.id}>
+            <button type="button" class="item" onClick={() => void addMesh(mesh)} aria-label={`Add ${mesh.name}`}>
+              <strong>{mesh.name}</strong>
+              <span class="muted">{count(mesh.triangles)} triangles · {when(mesh.created)}</span>
+            </button>
+            <Button kind="quiet" icon="trash" label={`Delete the shape ${mesh.name}`} onClick={() => void remove('mesh', mesh)} />
+          </li>
+        ))}
+      </ul>
+      {jobs.length > 0 && <h3>Jobs</h3>}
+      <ul class="list">{jobs.map((job) => <JobRow key={job.id} job={job} />)}</ul>
+    </>
+  );
+}
+
+function JobRow({ job }: { job: Job }) {
+  const live = job.state === 'running' || job.state === 'queued';
+  return (
+    <li>
+      <div class="item">
+        <strong>{job.kind === 'supermesh' ? 'Morph' : 'Map to the sphere'}</strong>
+        <span class="muted">{job.state}{job.problem ? `: ${job.problem.detail}` : ''} · {when(job.created)}</span>
+        {live && <Bar label="Progress" value={job.progress ?? null} />}
+      </div>
+      {live && job.kind === 'supermesh' && <Button kind="quiet" onClick={() => void watchJob(job.id)}>Follow</Button>}
+      {live && <Button kind="quiet" icon="close" label="Cancel this job" onClick={() => void cancelJob(job.id)} />}
+    </li>
+  );
+}
+
+function Snippet({ title, text }: { title: string; text: string }) {
+  const [copied, setCopied] = useState(false);
+  const copy = async () => {
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      const range = document.createRange();
+      range.selectNodeContents(document.getElementById(`snippet-${title}`)!);
+      getSelection()!.removeAllRanges();
+      getSelection()!.addRange(range);
+      document.execCommand('copy');
+    }
+    setCopied(true);
+    setTimeout(() => setCopied(false), 1600);
+  };
+  return (
+    <section class="snippet" aria-label={title}>
+      <div class="row spread">
+        <h3>{title}</h3>
+        <Button kind="quiet" icon={copied ? 'check' : 'copy'} onClick={() => void copy()}>{copied ? 'Copied' : 'Copy'}</Button>
+      </div>
+      <pre id={`snippet-${title}`} tabIndex={0} role="region" aria-label={`${title}: code`}>{text}</pre>
+    </section>
+  );
+}
+
+/** Quoted for a POSIX shell. */
+const quoted = (text: string) => `'${text.replace(/'/g, "'\\''")}'`;
+
+function Share() {
+  const { result } = state;
+  if (!result) return null;
+  const origin = location.origin;
+  const asset = new URL(client.url(result.supermesh.asset), origin).href;
+  const request = result.request ?? buildRequest();
+  const names = result.supermesh.shapes.map((s) => s.name);
+  const curl = `curl -sS ${origin}/v1/supermeshes -H 'Content-Type: application/json' -H 'Prefer: wait=60' \\\n  -d ${quoted(JSON.stringify(request))}\ncurl -sS -o morph.glb ${asset}`;
+  const viewer = `<script type="module">import '@google/model-viewer';</script>\n<model-viewer src="${asset}" alt="${names.join(' to ').replace(/"/g, '&quot;')}"\n  autoplay camera-controls></model-viewer>`;
+  const three = `<script type="module">
+import * as THREE from 'three';
+import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+
+const renderer = new THREE.WebGLRenderer({ antialias: true });
+renderer.setSize(innerWidth, innerHeight);
+document.body.append(renderer.domElement);
+const scene = new THREE.Scene();
+scene.add(new THREE.HemisphereLight(0xffffff, 0x556070, 3));
+const camera = new THREE.PerspectiveCamera(32, innerWidth / innerHeight);
+
+const gltf = await new GLTFLoader().loadAsync('${asset}');
+scene.add(gltf.scene);
+const ball = new THREE.Box3().setFromObject(gltf.scene).getBoundingSphere(new THREE.Sphere());
+camera.near = ball.radius / 10;
+camera.far = ball.radius * 20;
+camera.updateProjectionMatrix();
+camera.position.copy(ball.center).add(new THREE.Vector3(1, 0.4, 1.6).multiplyScalar(ball.radius * 2));
+camera.lookAt(ball.center);
+
+let mesh;
+gltf.scene.traverse((object) => { if (object.morphTargetInfluences) mesh = object; });
+renderer.setAnimationLoop((now) => {
+  mesh.morphTargetInfluences[0] = 0.5 - 0.5 * Math.cos(now / 1500);   // ${names[0].replace(/[\r\n]/g, ' ')} … ${(names[1] ?? '').replace(/[\r\n]/g, ' ')}
+  renderer.render(scene, camera);
+});
+</script>`;
+  return (
+    <>
+      <p class="hint">The address of an asset never changes and can be cached for ever.</p>
+      <Snippet title="Asset" text={asset} />
+      <Snippet title="curl" text={curl} />
+      <Snippet title="model-viewer" text={viewer} />
+      <Snippet title="three.js" text={three} />
+    </>
+  );
+}
+
+const KEYS: [string, string][] = [
+  ['1 2 3 4', 'Shapes, Landmarks, Morph, Spheres'], ['Space', 'Play or pause'], ['W', 'Wireframe'],
+  ['Arrow keys', 'Turn the view that has the focus'], ['+ and −', 'Nearer and farther'], ['0', 'The view as it was at first'],
+  ['Enter', 'Landmark in the middle of the view'], ['Delete', 'Remove the chosen landmark'], ['Ctrl Z, Ctrl Shift Z', 'Undo, redo'], ['Esc', 'Close'],
+];
+
+function Help() {
+  return (
+    <>
+      <p>Add two or more closed meshes and press <strong>Morph</strong>. Where the result does not match as you would, set landmarks: the same feature on each shape.</p>
+      <p>Drag turns, the wheel or two fingers zoom, the right button or Shift moves. The address of the page holds all of its state; it can be kept and sent.</p>
+      <h3>Keys</h3>
+      <table class="report keys">
+        <tbody>{KEYS.map(([key, what]) => <tr key={key}><th scope="row"><kbd>{key}</kbd></th><td>{what}</td></tr>)}</tbody>
+      </table>
+      <p><a href="/openapi.json">The HTTP interface (OpenAPI)</a></p>
+    </>
+  );
+}

@@ -1,0 +1,200 @@
+/** The morph: played, scrubbed, mixed; its mesh on every shape; its error; what to take away. */
+import { useEffect, useRef } from 'preact/hooks';
+import { set, state, tint, type Result } from '../state';
+import { measureErrors } from '../actions/merge';
+import { player } from '../player';
+import { client } from '../state';
+import { RAMPS, rampCss } from '../view/materials';
+import { Button, count, Icon, relative, Segments, Switch } from './parts';
+import { Pane } from './pane';
+import { OptionsFold } from './shapes';
+
+export function MorphStage() {
+  const { result, show } = state;
+  if (!result) return <NoMorph />;
+  return (
+    <div class="morph">
+      <div class="grid" data-count={show === 'morph' ? 1 : result.supermesh.shapes.length}>
+        {show === 'morph' && <Pane key="main" label="Morph" model={result.main} wire={state.wire} />}
+        {show === 'each' && result.supermesh.shapes.map((shape, i) => (
+          <Pane key={`each${i}`} label={`The common mesh as ${shape.name}`} model={result.each[i]} wire>
+            <Name index={i} name={shape.name} note={`${count(result.supermesh.triangles)} triangles`} />
+          </Pane>
+        ))}
+        {show === 'error' && state.shapes.map((shape, i) => (
+          <Pane key={`error${shape.key}`} label={`Error on ${shape.name}`} model={shape.error?.model} wire={false}>
+            <Name index={i} name={shape.name} note={shape.error ? `largest ${relative(shape.error.max)}, rms ${relative(shape.error.rms)}` : 'measuring…'} />
+            {shape.error && <Legend ramp="heat" low="0" high={relative(shape.error.max)} label="distance from the common mesh, of the shape's size" />}
+          </Pane>
+        ))}
+      </div>
+      {show === 'morph' && <Transport result={result} />}
+    </div>
+  );
+}
+
+function NoMorph() {
+  return (
+    <div class="blank big">
+      <p>No morph yet. Add two shapes and press “Morph”.</p>
+      <Button onClick={() => set({ tab: 'shapes' })}>To the shapes</Button>
+    </div>
+  );
+}
+
+function Name({ index, name, note }: { index: number; name: string; note: string }) {
+  return (
+    <div class="caption">
+      <span class="dot" style={{ background: tint(index) }} aria-hidden="true" />
+      <strong>{name}</strong>
+      <span class="muted">{note}</span>
+    </div>
+  );
+}
+
+export function Legend({ ramp, low, high, label }: { ramp: keyof typeof RAMPS; low: string; high: string; label: string }) {
+  return (
+    <div class="legend">
+      <span class="ramp" style={{ background: rampCss(ramp) }} aria-hidden="true" />
+      <span class="row spread"><span>{low}</span><span>{high}</span></span>
+      <span class="muted">{label}</span>
+    </div>
+  );
+}
+
+function Transport({ result }: { result: Result }) {
+  const slider = useRef<HTMLInputElement>(null);
+  const names = result.supermesh.shapes.map((shape) => shape.name);
+  useEffect(() => player.listen((time) => {
+    const input = slider.current;
+    if (!input) return;
+    input.value = String(time);
+    input.style.setProperty('--at', `${time * 100}%`);
+  }), [result]);
+  const say = () => {
+    const at = player.time * (names.length - 1);
+    const i = Math.min(Math.floor(at), names.length - 2);
+    return `${Math.round((at - i) * 100)} % from ${names[i]} to ${names[i + 1]}`;
+  };
+  return (
+    <div class="transport">
+      <button type="button" class="play" aria-label={state.playing ? 'Pause' : 'Play'} onClick={() => player.toggle()}>
+        <Icon name={state.playing ? 'pause' : 'play'} />
+      </button>
+      <div class="scrub">
+        <input ref={slider} type="range" min={0} max={1} step={0.001} aria-label="Along the morph" aria-valuetext={say()}
+          onInput={(event) => {
+            const time = Number(event.currentTarget.value);
+            player.pause();
+            if (state.mix) set({ mix: null });
+            player.seek(time);
+            event.currentTarget.setAttribute('aria-valuetext', say());
+          }} />
+        <div class="stops">
+          {names.map((name, i) => (
+            <button type="button" key={i} class="stop" aria-label={`Show ${name}`} onClick={() => {
+              player.pause();
+              if (state.mix) set({ mix: null });
+              player.seek(i / Math.max(names.length - 1, 1));
+            }}>
+              <span class="dot" style={{ background: tint(i) }} aria-hidden="true" />
+              {name}
+            </button>
+          ))}
+        </div>
+      </div>
+    </div>
+  );
+}
+
+export function MorphInspector() {
+  const { result } = state;
+  if (!result) return <><h2>Morph</h2><OptionsFold /></>;
+  const { supermesh } = result;
+  const exact = supermesh.certificate?.landmarks_exact;
+  return (
+    <>
+      <h2>Morph</h2>
+      <Segments label="What is shown" value={state.show}
+        onChange={(show) => {
+          set({ show });
+          if (show !== 'morph') player.pause();
+        }}
+        items={[{ value: 'morph', label: 'Morph' }, { value: 'each', label: 'Each shape' }, { value: 'error', label: 'Error' }]} />
+      {state.show === 'error' && <ErrorLoader />}
+      {state.show === 'morph' && <Mix result={result} />}
+      <div class="row wrap gap-top">
+        <Switch label="Wireframe" on={state.wire} onChange={(wire) => set({ wire })} />
+      </div>
+      <div class="row wrap gap-top">
+        <a class="button primary" href={client.url(supermesh.asset)} download={`${supermesh.shapes.map((s) => s.name).join('-')}.glb`}>
+          <Icon name="download" /><span>Download GLB</span>
+        </a>
+        <Button icon="code" onClick={() => set({ drawer: 'share' })}>Use it</Button>
+      </div>
+      <h3>Report</h3>
+      <table class="report">
+        <tbody>
+          <tr><th scope="row">Common mesh</th><td>{count(supermesh.triangles)} triangles</td></tr>
+          <tr><th scope="row">Closed, genus</th><td>{supermesh.certificate?.closed ? 'yes' : 'no'}, {supermesh.certificate?.genus}</td></tr>
+          <tr><th scope="row">Flipped triangles</th><td>{(supermesh.certificate?.flipped ?? []).join(', ') || '–'}</td></tr>
+          {!!supermesh.landmarks?.length && <tr><th scope="row">Landmarks</th><td>{supermesh.landmarks.length}{exact ? ', exact' : ''}</td></tr>}
+          <tr><th scope="row">Time</th><td>{supermesh.timings_ms?.total !== undefined ? `${(supermesh.timings_ms.total / 1000).toPrecision(2)} s` : '–'}</td></tr>
+        </tbody>
+      </table>
+      <table class="report">
+        <thead><tr><th scope="col">Shape</th><th scope="col">Largest error</th><th scope="col">RMS</th><th scope="col">Normals</th></tr></thead>
+        <tbody>
+          {supermesh.shapes.map((shape, i) => (
+            <tr key={i}>
+              <th scope="row"><span class="dot" style={{ background: tint(i) }} aria-hidden="true" /> {shape.name}</th>
+              <td>{relative(shape.hausdorff_relative ?? shape.hausdorff_sampled_relative)}</td>
+              <td>{relative(shape.rms_relative)}</td>
+              <td>{shape.normal_deviation ? `${shape.normal_deviation.mean.toFixed(1)}°` : '–'}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+      <OptionsFold />
+    </>
+  );
+}
+
+function ErrorLoader() {
+  useEffect(() => void measureErrors(), [state.result]);
+  return <p class="hint">How far each shape's own vertices lie from the common mesh, measured in this browser.</p>;
+}
+
+function Mix({ result }: { result: Result }) {
+  const names = result.supermesh.shapes.map((shape) => shape.name);
+  const inputs = useRef<(HTMLInputElement | null)[]>([]);
+  useEffect(() => player.listen((time) => {
+    if (state.mix) return;
+    const at = time * (names.length - 1);
+    inputs.current.forEach((input, i) => {
+      if (input) input.value = String(Math.max(0, 1 - Math.abs(at - i)));
+    });
+  }), [result]);
+  const read = () => inputs.current.slice(0, names.length).map((input) => Number(input?.value ?? 0));
+  return (
+    <fieldset class="mix">
+      <legend>Mix</legend>
+      {names.map((name, i) => (
+        <label key={i} class="mix-row">
+          <span class="dot" style={{ background: tint(i) }} aria-hidden="true" />
+          <span class="clip">{name}</span>
+          <input ref={(el) => void (inputs.current[i] = el)} type="range" min={0} max={1} step={0.01} aria-label={`Share of ${name}`}
+            onInput={() => {
+              const values = read();
+              if (names.length === 2) {
+                values[1 - i] = 1 - values[i];
+                inputs.current[1 - i]!.value = String(values[1 - i]);
+              }
+              player.mix(values);
+            }} />
+        </label>
+      ))}
+    </fieldset>
+  );
+}
+

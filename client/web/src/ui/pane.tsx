@@ -1,0 +1,95 @@
+/** A view of the stage with its caption, and landmarks as numbered buttons on it. */
+import type { ComponentChildren } from 'preact';
+import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
+import { stage } from '../view/shared';
+import type { Marker, View } from '../view/stage';
+import type { Model } from '../view/models';
+import { hue, set, state, type Shape } from '../state';
+import { moveOn, pickOn, removeLandmark } from '../actions/landmarks';
+import { isDark } from '../theme';
+
+interface PaneProps {
+  label: string;
+  model: Model | null | undefined;
+  wire?: boolean;
+  pickable?: Shape;
+  markers?: Shape;
+  children?: ComponentChildren;
+}
+
+export function Pane({ label, model, wire = false, pickable, markers, children }: PaneProps) {
+  const element = useRef<HTMLDivElement>(null);
+  const view = useRef<View | null>(null);
+
+  useLayoutEffect(() => {
+    view.current = stage.add(element.current!);
+    return () => stage.remove(view.current!);
+  }, []);
+
+  useLayoutEffect(() => {
+    model?.wireframe(wire, isDark() ? '#05070a' : '#20242c');
+    view.current!.show(model?.group ?? null);
+    view.current!.onPick = pickable ? (ray) => void pickOn(pickable, ray.origin, ray.direction) : null;
+    stage.draw();
+  });
+
+  return (
+    <section class={`pane${pickable ? ' pickable' : ''}`} aria-label={label}>
+      <div class="pane-view" ref={element} tabIndex={0} role="application" aria-roledescription="3D view"
+        aria-label={`${label}. Arrow keys turn, plus and minus zoom, 0 resets${pickable ? ', Enter sets a landmark in the middle' : ''}.`}>
+        {markers && <Markers shape={markers} view={view} />}
+      </div>
+      {children}
+    </section>
+  );
+}
+
+function Markers({ shape, view }: { shape: Shape; view: { current: View | null } }) {
+  const box = useRef<HTMLDivElement>(null);
+  const here = state.landmarks.map((landmark, index) => ({ landmark, index })).filter(({ landmark }) => landmark.at[shape.key]);
+
+  useEffect(() => {
+    const buttons = [...box.current!.children] as HTMLElement[];
+    view.current!.markers = here.map(({ landmark }, i): Marker => ({ ...landmark.at[shape.key], element: buttons[i] }));
+    stage.draw();
+  });
+
+  const drag = (id: number) => (event: PointerEvent) => {
+    event.preventDefault();
+    event.stopPropagation();
+    set({ active: id });
+    const button = event.currentTarget as HTMLElement;
+    button.focus();
+    button.setPointerCapture(event.pointerId);
+    const from = { x: event.clientX, y: event.clientY };
+    const move = (to: PointerEvent) => {
+      button.style.translate = `${to.clientX - from.x}px ${to.clientY - from.y}px`;
+    };
+    const drop = (to: PointerEvent) => {
+      button.removeEventListener('pointermove', move);
+      button.removeEventListener('pointerup', drop);
+      button.style.translate = '';
+      if (Math.hypot(to.clientX - from.x, to.clientY - from.y) < 4) return;
+      const ray = view.current!.rayAt(to.clientX, to.clientY);
+      void moveOn(id, shape, ray.origin, ray.direction);
+    };
+    button.addEventListener('pointermove', move);
+    button.addEventListener('pointerup', drop);
+  };
+
+  return (
+    <div class="markers" ref={box}>
+      {here.map(({ landmark, index }) => (
+        <button type="button" key={landmark.id} class="marker" aria-pressed={landmark.id === state.active} style={{ '--hue': hue(index) }}
+          aria-label={`Landmark ${index + 1}${landmark.name ? `, ${landmark.name},` : ''} on ${shape.name}. Delete removes it.`}
+          onPointerDown={drag(landmark.id)}
+          onClick={() => set({ active: landmark.id })}
+          onKeyDown={(event) => {
+            if (event.key === 'Delete' || event.key === 'Backspace') removeLandmark(landmark.id);
+          }}>
+          {index + 1}
+        </button>
+      ))}
+    </div>
+  );
+}

@@ -1,0 +1,106 @@
+/** The maps to the sphere: surface beside sphere in the same colours, distortion as heat map and histogram. */
+import { useEffect } from 'preact/hooks';
+import type { Measure } from 'orbmorph';
+import { PAINTS, readyShapes, state, tint, type Shape, type SpherePaint } from '../state';
+import { isMeasure, loadSpheres, measureRange, setPaint } from '../actions/spheres';
+import { Bar, Segments } from './parts';
+import { Pane } from './pane';
+import { Legend } from './morph';
+
+const NAMES: Record<SpherePaint, string> = {
+  direction: 'Normals', checker: 'Checkerboard', symmetric_dirichlet: 'Stretch', angle: 'Angles', area: 'Areas', aspect: 'Triangle shape',
+};
+const MEANING: Record<SpherePaint, string> = {
+  direction: 'The direction of the surface as colour, carried to the sphere: parts can be recognised.',
+  checker: 'A regular checkerboard on the sphere, carried back to the surface: where its cells are large, the surface was squeezed.',
+  symmetric_dirichlet: 'Symmetric Dirichlet energy: 1 where the map keeps lengths, growing with stretch and with squeeze.',
+  angle: 'Ratio of the singular values: 1 where angles are kept.',
+  area: 'Logarithm of the area ratio: blue where the sphere has less room than the surface, red where it has more.',
+  aspect: 'Circumradius over twice the inradius of the triangles on the sphere: 1 for equilateral ones.',
+};
+
+export function SpheresStage() {
+  const shapes = readyShapes();
+  useEffect(() => void loadSpheres(), [shapes.map((s) => s.key).join()]);
+  return (
+    <div class="grid pairs" data-count={shapes.length * 2}>
+      {shapes.map((shape) => {
+        const { sphere } = shape;
+        const index = state.shapes.indexOf(shape);
+        return [
+          <Pane key={`${shape.key}a`} label={`${shape.name}, surface`} model={sphere?.surface} wire={state.wire}>
+            <div class="caption">
+              <span class="dot" style={{ background: tint(index) }} aria-hidden="true" />
+              <strong>{shape.name}</strong>
+            </div>
+            {sphere?.state === 'working' && <div class="centered"><Bar label={`Mapping ${shape.name} to the sphere`} value={sphere.job?.progress ?? null} /></div>}
+            {sphere?.state === 'failed' && <div class="centered"><p class="red">{sphere.message}</p></div>}
+          </Pane>,
+          <Pane key={`${shape.key}b`} label={`${shape.name}, sphere`} model={sphere?.ball} wire={state.wire}>
+            <div class="caption"><span class="muted">on the sphere</span></div>
+          </Pane>,
+        ];
+      })}
+    </div>
+  );
+}
+
+export function SpheresInspector() {
+  const { paint } = state;
+  const range = isMeasure(paint) ? measureRange(paint) : null;
+  return (
+    <>
+      <h2>Spheres</h2>
+      <Segments label="Colour" value={paint} onChange={setPaint} items={PAINTS.map((value) => ({ value, label: NAMES[value] }))} />
+      <p class="hint">{MEANING[paint]}</p>
+      {range && <Legend ramp={paint === 'area' ? 'diverging' : 'heat'} low={range.low.toFixed(2)} high={range.high.toFixed(2)} label={`${NAMES[paint]}${paint === 'area' ? '' : ', logarithmic'}`} />}
+      {readyShapes().map((shape) => <ShapeReport key={shape.key} shape={shape} />)}
+    </>
+  );
+}
+
+function ShapeReport({ shape }: { shape: Shape }) {
+  const embedding = shape.sphere?.embedding;
+  if (!embedding) return null;
+  const { paint } = state;
+  const measure = embedding.distortion?.[isMeasure(paint) ? paint : 'symmetric_dirichlet'];
+  const { certificate } = embedding;
+  return (
+    <section class="sphere-report" aria-label={`Distortion of ${shape.name}`}>
+      <h3><span class="dot" style={{ background: tint(state.shapes.indexOf(shape)) }} aria-hidden="true" /> {shape.name}</h3>
+      <p class={`facts ${certificate?.valid ? 'good' : 'red'}`}>
+        {certificate?.valid ? 'Certified one to one' : 'Not certified'}: {certificate?.flipped} flipped, degree {certificate?.degree}
+      </p>
+      {measure && (
+        <>
+          <Histogram measure={measure} label={`${NAMES[isMeasure(paint) ? paint : 'symmetric_dirichlet']} of ${shape.name}`} />
+          <dl class="numbers">
+            {(['mean', 'median', 'p99', 'max'] as const).map((key) => (
+              <div key={key}><dt>{key === 'p99' ? '99 %' : key}</dt><dd>{measure[key]?.toPrecision(3)}</dd></div>
+            ))}
+          </dl>
+        </>
+      )}
+    </section>
+  );
+}
+
+function Histogram({ measure, label }: { measure: Measure; label: string }) {
+  const { edges, counts } = measure.histogram ?? { edges: [], counts: [] };
+  if (!counts?.length) return null;
+  const most = Math.max(...counts, 1e-12);
+  const width = 300 / counts.length;
+  const middle = counts.reduce((best, c, i) => (c > counts[best] ? i : best), 0);
+  return (
+    <figure class="histogram">
+      <svg viewBox="0 0 300 84" role="img" preserveAspectRatio="none"
+        aria-label={`Histogram, ${label}: from ${edges[0]?.toPrecision(3)} to ${edges.at(-1)?.toPrecision(3)}, most around ${edges[middle]?.toPrecision(3)}`}>
+        {counts.map((c, i) => {
+          const h = (c / most) * 82;
+          return <rect key={i} x={i * width + 0.5} y={84 - h} width={Math.max(width - 1, 0.5)} height={h} rx="1" />;
+        })}
+      </svg>
+      <figcaption class="row spread"><span>{edges[0]?.toPrecision(3)}</span><span>{edges.at(-1)?.toPrecision(3)}</span></figcaption>
+    </figure>
+  );
+}

@@ -1,0 +1,143 @@
+/**
+ * The state of the page in the fragment of its address, so that a link or a reload brings it back:
+ *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
+ * m: meshes on the server, r: a supermesh, j: a job, l: landmarks (vertex, or x_y_z, one for each shape), cam: camera.
+ */
+import type { Place } from 'orbmorph';
+import { client, DEFAULTS, readyShapes, set, state, TABS, watch, type Options, type Tab } from './state';
+import { addFromServer } from './actions/shapes';
+import { takeLandmarks } from './actions/landmarks';
+import { openResult, resumeJob } from './actions/merge';
+import { setPaint } from './actions/spheres';
+import { openSupermesh } from './actions/server';
+import { player } from './player';
+import { stage } from './view/shared';
+import { PAINTS } from './state';
+
+let restoring = false;
+let written = '';
+
+const round = (x: number) => String(Number(x.toPrecision(7)));
+
+function encodePlace(place: Place | undefined): string {
+  if (!place) return '';
+  if ('vertex' in place) return String(place.vertex);
+  if ('point' in place) return place.point.map(round).join('_');
+  return `t${place.triangle}_${place.barycentric.map(round).join('_')}`;
+}
+
+function decodePlace(text: string): Place | undefined {
+  if (!text) return undefined;
+  const values = text.replace(/^t/, '').split('_').map(Number);
+  if (!values.every(Number.isFinite)) return undefined;
+  if (text.startsWith('t') && values.length === 4) return { triangle: values[0], barycentric: [values[1], values[2], values[3]] };
+  if (values.length === 3) return { point: [values[0], values[1], values[2]] };
+  return values.length === 1 ? { vertex: values[0] } : undefined;
+}
+
+function encodeOptions(o: Options): string {
+  return [o.remesh, o.tolerance, o.maxTriangles ?? '', o.path, o.fit, o.align].join(',');
+}
+
+function decodeOptions(text: string): Options {
+  const [remesh, tolerance, most, path, fit, align] = text.split(',');
+  const from = <T extends string>(value: string, allowed: readonly T[], otherwise: T): T =>
+    (allowed as readonly string[]).includes(value) ? (value as T) : otherwise;
+  return {
+    ...DEFAULTS,
+    remesh: from(remesh, ['adaptive', 'overlay', 'subdivision', 'convex-hull'], DEFAULTS.remesh),
+    tolerance: Number(tolerance) > 0 ? Number(tolerance) : DEFAULTS.tolerance,
+    maxTriangles: Number(most) >= 4 ? Number(most) : null,
+    path: from(path, ['linear', 'rigid'], DEFAULTS.path),
+    fit: from(fit, ['none', 'rigid', 'similarity'], DEFAULTS.fit),
+    align: from(align, ['default', 'pin', 'rbf', 'rotate', 'auto'], DEFAULTS.align),
+  };
+}
+
+function encode(): string {
+  const parts: string[] = [];
+  const put = (key: string, value: string) => value && parts.push(`${key}=${value}`);
+  const shapes = readyShapes();
+  put('m', shapes.map((shape) => shape.mesh!.id).join(','));
+  if (state.tab !== 'shapes') put('tab', state.tab);
+  put('r', state.result?.supermesh.id ?? '');
+  put('j', state.running?.job?.id ?? '');
+  if (state.result && !state.playing) put('t', player.time.toFixed(3));
+  put('l', state.landmarks
+    .map((l) => `${shapes.map((s) => encodePlace(l.at[s.key]?.place)).join(':')}${l.name ? `~${encodeURIComponent(l.name)}` : ''}`)
+    .join(';'));
+  if (encodeOptions(state.options) !== encodeOptions(DEFAULTS)) put('o', encodeOptions(state.options));
+  if (state.paint !== 'direction') put('paint', state.paint);
+  if (state.show !== 'morph') put('show', state.show);
+  if (state.wire) put('wire', '1');
+  put('cam', stage.orbit.toString());
+  return parts.join('&');
+}
+
+let timer = 0;
+function save() {
+  if (restoring || timer) return;
+  timer = window.setTimeout(() => {
+    timer = 0;
+    if (restoring) return;
+    const text = encode();
+    const bare = text.replace(/&?cam=[^&]*/, '');
+    const next = bare || state.shapes.length ? `#${text}` : '';
+    if (next === written) return;
+    written = next;
+    history.replaceState(null, '', next || location.pathname + location.search);
+  }, 250);
+}
+
+export async function restore() {
+  const query = new URLSearchParams(location.hash.slice(1).replace(/\+/g, '%2B'));
+  restoring = true;
+  try {
+    const camera = query.get('cam');
+    if (camera) stage.orbit.restore(camera);
+    const options = query.get('o');
+    if (options) set({ options: decodeOptions(options) });
+    const ids = (query.get('m') ?? '').split(',').filter((id) => /^[0-9a-f]{64}$/.test(id));
+    const result = query.get('r');
+    const tab = query.get('tab') as Tab;
+    if (ids.length) {
+      set({ loading: 'Opening the shapes' });
+      const meshes = await Promise.allSettled(ids.map((id) => client.getMesh(id)));
+      await Promise.all(meshes.flatMap((m) => (m.status === 'fulfilled' ? [addFromServer(m.value)] : [])));
+      set({ loading: null });
+      const lost = meshes.filter((m) => m.status === 'rejected').length;
+      if (lost) set({ problem: { title: 'Not on the server any more', detail: `${lost} of ${ids.length} shapes of this address are gone. Add the files again.`, facts: null } });
+    }
+    const landmarks = (query.get('l') ?? '').split(';').filter(Boolean).map((text) => {
+      const [places, name = ''] = text.split('~');
+      return { name, at: places.split(':').map(decodePlace) as Place[] };
+    });
+    if (landmarks.length) await takeLandmarks(landmarks, false);
+    const paint = PAINTS.find((name) => name === query.get('paint'));
+    if (paint) setPaint(paint);
+    if (query.get('wire')) set({ wire: true });
+    if (result && ids.length) {
+      const supermesh = await client.getSupermesh(result).catch(() => null);
+      if (supermesh) await openResult(supermesh, null);
+    } else if (result) await openSupermesh(result, false);
+    const time = Number(query.get('t'));
+    if (state.result && query.has('t') && Number.isFinite(time)) player.seek(time);
+    if (TABS.includes(tab)) set({ tab });
+    const show = query.get('show');
+    if (state.result && (show === 'each' || show === 'error')) set({ show });
+  } finally {
+    restoring = false;
+  }
+  const job = query.get('j');
+  if (job) void resumeJob(job);
+}
+
+/** Keeps the address true; a link to another state of this page, pasted into the address, is followed. */
+export function keepUrl() {
+  watch(save);
+  player.listen(save);
+  stage.onMoved = save;
+  window.addEventListener('hashchange', () => {
+    if (location.hash !== written) location.reload();
+  });
+}
