@@ -1,7 +1,29 @@
 #!/usr/bin/env bash
-# Sets up what the tests need, builds, runs every test, and ends with ctest's summary.
+# Sets up what the tests need, builds with warnings as errors, runs every test, and ends with ctest's summary.
+#
+# The units and scenarios run twice: in a build with AddressSanitizer and UndefinedBehaviorSanitizer, and in the
+# release build, where the conformance tests follow. What takes longer is in tests/long.sh.
 set -euo pipefail
-cd "$(dirname "$0")/.."
-cmake --preset release -DORB_WERROR=ON
+cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/.."
+
+source deploy/packages.sh
+orb_install_packages "${orb_build_packages[@]}" "${orb_test_packages[@]}"
+if command -v ccache >/dev/null; then
+  export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
+fi
+
+# The npm packages of tests/package-lock.json; skipped while they are there.
+if ! cmp -s tests/package-lock.json tests/node_modules/.installed-lock; then
+  (cd tests && npm ci --no-audit --no-fund --loglevel=error)
+  cp tests/package-lock.json tests/node_modules/.installed-lock
+fi
+
+cmake --preset release -DORB_WERROR=ON -DORB_TESTS=ON >/dev/null
 cmake --build build
-ctest --test-dir build --output-on-failure
+cmake --preset asan -DORB_TESTS=ON >/dev/null
+cmake --build build-asan
+
+echo "== with sanitizers =="
+ctest --test-dir build-asan --output-on-failure -R '^(unit|scenario)\.' -j "$(nproc)"
+echo "== release =="
+ctest --test-dir build --output-on-failure -j "$(nproc)"

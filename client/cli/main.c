@@ -1,5 +1,117 @@
-#include <stdio.h>
+/* orbmorph: the command line. It knows only HTTP; the daemon does the work. */
+#include <locale.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
-int main(void) {
-  return puts("orbmorph 1.0.0") < 0;
+#include "cli.h"
+
+#define MERGE_OPTIONS                                                                                        \
+  (CLI_COMMON | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_REPORT) | CLI_BIT(OPT_LANDMARKS) | CLI_BIT(OPT_ALIGN) |    \
+   CLI_BIT(OPT_REMESH) | CLI_BIT(OPT_TOLERANCE) | CLI_BIT(OPT_MAX_TRIANGLES) | CLI_BIT(OPT_NO_NORMALS) |     \
+   CLI_BIT(OPT_ANIMATION) | CLI_BIT(OPT_FIT) | CLI_BIT(OPT_PATH) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_NO_WAIT) | \
+   CLI_BIT(OPT_REPAIR))
+
+const cli_command cli_commands[] = {
+    {"morph", "FILE FILE…", "Upload meshes, merge them and download one GLB that morphs", 2, -1, MERGE_OPTIONS,
+     cli_run_morph},
+    {"upload", "FILE…", "Upload meshes", 1, -1,
+     CLI_COMMON | CLI_BIT(OPT_NAME) | CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_FORMAT), cli_run_upload},
+    {"embed", "MESH…", "Embed meshes, ids or files, on the sphere", 1, -1,
+     CLI_COMMON | CLI_BIT(OPT_METHOD) | CLI_BIT(OPT_PRESET) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_OUTPUT) |
+         CLI_BIT(OPT_NO_WAIT) | CLI_BIT(OPT_REPAIR),
+     cli_run_embed},
+    {"merge", "MESH MESH…", "Merge meshes, ids or files; with -o also download the GLB", 2, -1, MERGE_OPTIONS,
+     cli_run_merge},
+    {"job", "ID", "Show, wait for or cancel a job", 1, 1, CLI_COMMON | CLI_BIT(OPT_WAIT) | CLI_BIT(OPT_CANCEL),
+     cli_run_job},
+    {"ls", "[meshes|embeddings|supermeshes|jobs]", "List what the daemon holds", 0, 1,
+     CLI_COMMON | CLI_BIT(OPT_STATE) | CLI_BIT(OPT_LIMIT), cli_run_ls},
+    {"get", "ID|PATH", "Show a resource, or download a part of it", 1, 1,
+     CLI_COMMON | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_PART), cli_run_get},
+    {"rm", "ID|PATH…", "Delete resources", 1, -1, CLI_COMMON, cli_run_rm},
+    {"doctor", "FILE…", "Check meshes, and say how to mend them", 1, -1, CLI_COMMON, cli_run_doctor},
+    {"completions", "bash|zsh", "Print the completions of a shell", 1, 1, CLI_BIT(OPT_HELP), cli_run_completions},
+};
+const int cli_command_count = (int)(sizeof cli_commands / sizeof cli_commands[0]);
+
+static const cli_command *find_command(const char *name) {
+  for (int i = 0; i < cli_command_count; i++)
+    if (!strcmp(cli_commands[i].name, name))
+      return &cli_commands[i];
+  return NULL;
+}
+
+static const char *setting(const char *given, const char *variable, const char *otherwise) {
+  const char *value = given ? given : getenv(variable);
+  return value && *value ? value : otherwise;
+}
+
+static int run(const cli_command *command, cli *c) {
+  const char *term = getenv("TERM");
+  c->server = setting(c->args.value[OPT_SERVER], "ORBMORPH_SERVER", CLI_DEFAULT_SERVER);
+  c->token = setting(NULL, "ORBMORPH_TOKEN", NULL);
+  c->json = c->args.value[OPT_JSON] != NULL;
+  c->quiet = c->args.value[OPT_QUIET] != NULL;
+  c->bar = !c->quiet && isatty(STDERR_FILENO) && term && strcmp(term, "dumb") != 0;
+  if (curl_global_init(CURL_GLOBAL_DEFAULT) != 0 || !(c->curl = curl_easy_init())) {
+    fputs("orbmorph: libcurl does not start\n", stderr);
+    return CLI_UNREACHABLE;
+  }
+  int rc = command->run(c);
+  cli_bar_end(c);
+  curl_easy_cleanup(c->curl);
+  curl_global_cleanup();
+  if (fflush(stdout) != 0 && rc == CLI_DONE) {
+    perror("orbmorph: standard output");
+    rc = CLI_USAGE;
+  }
+  return rc;
+}
+
+/* --server and the like may stand before the command as well: they are moved behind it. */
+static char **command_first(int argc, char **argv, int *at) {
+  int i = 1;
+  while (i < argc && argv[i][0] == '-')
+    i += !strcmp(argv[i], "--server") || !strcmp(argv[i], "-s") ? 2 : 1;
+  char **line = cli_alloc((size_t)(argc + 1) * sizeof *line);
+  int fill = 0;
+  line[fill++] = argv[0];
+  if (i < argc)
+    line[fill++] = argv[i];
+  for (int k = 1; k < argc; k++)
+    if (k != i)
+      line[fill++] = argv[k];
+  *at = i < argc;
+  return line;
+}
+
+int main(int argc, char **argv) {
+  if (argc == 2 && (!strcmp(argv[1], "--version") || !strcmp(argv[1], "version"))) {
+    puts("orbmorph " CLI_VERSION);
+    return CLI_DONE;
+  }
+  if (argc >= 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h") || !strcmp(argv[1], "help"))) {
+    const cli_command *about = argc > 2 ? find_command(argv[2]) : NULL;
+    cli_help(stdout, about);
+    return CLI_DONE;
+  }
+  int given, rc;
+  char **line = command_first(argc, argv, &given);
+  const cli_command *command = given ? find_command(line[1]) : NULL;
+  cli c = {0};
+  if (!command) {
+    if (given)
+      fprintf(stderr, "orbmorph: there is no command '%s'\n", line[1]);
+    cli_help(stderr, NULL);
+    rc = CLI_USAGE;
+  } else if ((rc = cli_parse(command, argc, line, 2, &c.args)) == CLI_DONE) {
+    if (c.args.value[OPT_HELP])
+      cli_help(stdout, command);
+    else
+      rc = run(command, &c);
+  }
+  cli_args_free(&c.args);
+  free(line);
+  return rc;
 }

@@ -1,0 +1,255 @@
+/* embed, job, ls, get, rm. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli.h"
+#include "make.h"
+
+static int embed_one(cli *c, const char *operand) {
+  cli_mesh mesh;
+  cli_reply reply = {0};
+  int rc = cli_mesh_of(c, operand, &mesh);
+  if (rc != CLI_DONE)
+    return rc;
+  cJSON *request = cJSON_CreateObject();
+  cJSON_AddStringToObject(request, "mesh", mesh.id);
+  if (c->args.value[OPT_METHOD])
+    cJSON_AddStringToObject(request, "method", c->args.value[OPT_METHOD]);
+  if (c->args.value[OPT_PRESET])
+    cJSON_AddStringToObject(cJSON_AddObjectToObject(request, "options"), "preset", c->args.value[OPT_PRESET]);
+  rc = cli_apply_sets(c, request);
+  if (rc == CLI_DONE)
+    rc = cli_make(c, "/v1/embeddings", request, &reply);
+  if (rc == CLI_DONE && reply.json) {
+    if (c->json)
+      puts(reply.body);
+    else
+      cli_print_embedding(reply.json);
+    if (c->args.value[OPT_OUTPUT]) {
+      char *path = cli_text("%s/sphere.ply", cli_string(reply.json, "url", ""));
+      rc = cli_download(c, path, c->args.value[OPT_OUTPUT]);
+      free(path);
+    }
+  }
+  cli_reply_free(&reply);
+  cJSON_Delete(request);
+  cli_mesh_free(&mesh);
+  return rc;
+}
+
+int cli_run_embed(cli *c) {
+  int rc = CLI_DONE;
+  if (c->args.value[OPT_OUTPUT] && c->args.operand_count > 1) {
+    cli_error(c, "--output goes with one mesh only");
+    return CLI_USAGE;
+  }
+  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++)
+    rc = embed_one(c, c->args.operands[i]);
+  return rc;
+}
+
+static void print_job(const cJSON *job) {
+  double progress = cli_number(job, "progress");
+  const cJSON *problem = cJSON_GetObjectItemCaseSensitive(job, "problem");
+  printf("%s  %-10s %-9s %3.0f %%  %s\n", cli_string(job, "id", "?"), cli_string(job, "kind", "?"),
+         cli_string(job, "state", "?"), isfinite(progress) ? 100 * progress : 0,
+         cJSON_IsObject(problem) ? cli_problem_type(problem) : cli_string(job, "result", cli_string(job, "stage", "")));
+}
+
+/* "/v1/jobs/ID" for an id, or a path as it is; a whole URL loses its authority. */
+static char *path_of(const char *collection, const char *operand) {
+  const char *authority = strstr(operand, "://");
+  if (authority) {
+    const char *slash = strchr(authority + 3, '/');
+    return cli_text("%s", slash ? slash : "/");
+  }
+  return operand[0] == '/' ? cli_text("%s", operand) : cli_text("/v1/%s/%s", collection, operand);
+}
+
+int cli_run_job(cli *c) {
+  char *path = path_of("jobs", c->args.operands[0]), *result = NULL;
+  cli_reply reply = {0};
+  cli_request request = {.method = c->args.value[OPT_CANCEL] ? "DELETE" : "GET", .path = path};
+  int rc = cli_send(c, &request, &reply);
+  if (rc == CLI_DONE && !cli_ok(&reply))
+    rc = cli_refused(c, c->args.operands[0], &reply);
+  if (rc == CLI_DONE && c->args.value[OPT_WAIT] && reply.json) {
+    rc = cli_wait(c, reply.json, &result);
+    if (rc == CLI_DONE) {
+      cli_reply_free(&reply);
+      rc = cli_get(c, path, &reply);
+    }
+  }
+  if (rc == CLI_DONE && reply.body && c->json)
+    puts(reply.body);
+  else if (rc == CLI_DONE && reply.json)
+    print_job(reply.json);
+  free(result);
+  free(path);
+  cli_reply_free(&reply);
+  return rc;
+}
+
+static void print_row(const char *collection, const cJSON *item) {
+  char triangles[32];
+  cli_count(cli_number(item, "triangles"), triangles);
+  if (!strcmp(collection, "jobs")) {
+    print_job(item);
+  } else if (!strcmp(collection, "meshes")) {
+    printf("%s  %10s  %-5s %s\n", cli_string(item, "id", "?"), triangles, cli_string(item, "format", ""),
+           cli_string(item, "name", ""));
+  } else if (!strcmp(collection, "embeddings")) {
+    printf("%s  %-16s mesh %.12s\n", cli_string(item, "id", "?"), cli_string(item, "method", ""),
+           cli_string(item, "mesh", ""));
+  } else {
+    printf("%s  %10s ", cli_string(item, "id", "?"), triangles);
+    const cJSON *shape;
+    cJSON_ArrayForEach(shape, cJSON_GetObjectItemCaseSensitive(item, "shapes"))
+        printf(" %s", cli_string(shape, "name", "?"));
+    putchar('\n');
+  }
+}
+
+/* The list of a page: the member that is an array. */
+static const cJSON *page_items(const cJSON *page) {
+  for (const cJSON *item = page ? page->child : NULL; item; item = item->next)
+    if (cJSON_IsArray(item))
+      return item;
+  return NULL;
+}
+
+static int list(cli *c, const char *collection, long limit) {
+  char *token = NULL;
+  const char *state = c->args.value[OPT_STATE];
+  int rc = CLI_DONE;
+  do {
+    char *wanted = state ? cli_escape(state) : NULL, *from = token ? cli_escape(token) : NULL;
+    char *path = cli_text("/v1/%s?limit=%ld%s%s%s%s", collection, limit < 100 ? limit : 100, wanted ? "&state=" : "",
+                          wanted ? wanted : "", from ? "&page_token=" : "", from ? from : "");
+    cli_reply reply = {0};
+    rc = cli_get(c, path, &reply);
+    free(path);
+    free(wanted);
+    free(from);
+    free(token);
+    token = NULL;
+    if (rc == CLI_DONE && !cli_ok(&reply))
+      rc = cli_refused(c, NULL, &reply);
+    if (rc == CLI_DONE && c->json)
+      puts(reply.body);
+    const cJSON *item;
+    if (rc == CLI_DONE)
+      cJSON_ArrayForEach(item, page_items(reply.json)) {
+        if (!c->json)
+          print_row(collection, item);
+        limit--;
+      }
+    const char *next = cli_string(reply.json, "next_page_token", NULL);
+    if (rc == CLI_DONE && next && *next && limit > 0)
+      token = cli_text("%s", next);
+    cli_reply_free(&reply);
+  } while (token);
+  return rc;
+}
+
+int cli_run_ls(cli *c) {
+  static const char *const collections[] = {"meshes", "embeddings", "supermeshes", "jobs"};
+  const char *wanted = c->args.operand_count ? c->args.operands[0] : c->args.value[OPT_STATE] ? "jobs" : "meshes";
+  long limit = 1000000;
+  if (c->args.value[OPT_LIMIT] && !cli_whole_number(c->args.value[OPT_LIMIT], 1, 1000000, &limit)) {
+    cli_error(c, "--limit takes a whole number from 1 on");
+    return CLI_USAGE;
+  }
+  for (size_t i = 0; i < 4; i++)
+    if (!strcmp(wanted, collections[i]))
+      return list(c, wanted, limit);
+  cli_error(c, "there are meshes, embeddings, supermeshes and jobs, but no '%s'", wanted);
+  return CLI_USAGE;
+}
+
+/* Which collection holds this id: the first that answers. */
+static int find(cli *c, const char *operand, char **path, cli_reply *reply) {
+  static const char *const collections[] = {"supermeshes", "meshes", "embeddings", "jobs"};
+  int rc = CLI_DONE;
+  for (size_t i = 0; i < 4; i++) {
+    *path = path_of(collections[i], operand);
+    rc = cli_get(c, *path, reply);
+    if (rc != CLI_DONE || reply->status != 404 || i == 3 || operand[0] == '/')
+      break;
+    cli_reply_free(reply);
+    free(*path);
+  }
+  if (rc == CLI_DONE && !cli_ok(reply))
+    rc = cli_refused(c, operand, reply);
+  return rc;
+}
+
+static void print_any(const char *path, const cli_reply *reply) {
+  if (strstr(path, "/v1/meshes/"))
+    cli_print_mesh(reply->json);
+  else if (strstr(path, "/v1/embeddings/"))
+    cli_print_embedding(reply->json);
+  else if (strstr(path, "/v1/supermeshes/"))
+    cli_print_supermesh(reply->json);
+  else if (strstr(path, "/v1/jobs/"))
+    print_job(reply->json);
+}
+
+int cli_run_get(cli *c) {
+  const char *part = c->args.value[OPT_PART], *output = c->args.value[OPT_OUTPUT];
+  const char *tail = !part                     ? ""
+                     : !strcmp(part, "file")   ? "/file"
+                     : !strcmp(part, "asset")  ? "/asset.glb"
+                     : !strcmp(part, "sphere") ? "/sphere.ply"
+                                               : NULL;
+  const char *home = !part                    ? NULL
+                     : !strcmp(part, "file")  ? "meshes"
+                     : !strcmp(part, "asset") ? "supermeshes"
+                                              : "embeddings";
+  char *path = NULL;
+  cli_reply reply = {0};
+  int rc;
+  if (!tail) {
+    cli_error(c, "--part is file (of a mesh), asset (of a supermesh) or sphere (of an embedding)");
+    return CLI_USAGE;
+  }
+  if (part || output) {
+    char *base = part ? path_of(home, c->args.operands[0]) : NULL;
+    rc = CLI_DONE;
+    if (!part)
+      rc = find(c, c->args.operands[0], &base, &reply);
+    path = cli_text("%s%s", base ? base : "", tail);
+    if (rc == CLI_DONE)
+      rc = cli_download(c, path, output ? output : "-");
+    free(base);
+  } else {
+    rc = find(c, c->args.operands[0], &path, &reply);
+    if (rc == CLI_DONE && (c->json || !reply.json))
+      puts(reply.body ? reply.body : "");
+    else if (rc == CLI_DONE)
+      print_any(path, &reply);
+  }
+  cli_reply_free(&reply);
+  free(path);
+  return rc;
+}
+
+int cli_run_rm(cli *c) {
+  int rc = CLI_DONE;
+  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
+    char *path = NULL;
+    cli_reply reply = {0};
+    rc = find(c, c->args.operands[i], &path, &reply);
+    cli_reply_free(&reply);
+    if (rc == CLI_DONE) {
+      cli_request request = {.method = "DELETE", .path = path};
+      rc = cli_send(c, &request, &reply);
+      if (rc == CLI_DONE && !cli_ok(&reply))
+        rc = cli_refused(c, c->args.operands[i], &reply);
+      cli_reply_free(&reply);
+    }
+    free(path);
+  }
+  return rc;
+}

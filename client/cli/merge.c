@@ -1,0 +1,271 @@
+/* morph and merge: the request, the wait, the download. */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli.h"
+#include "make.h"
+
+/* A landmark file is an array, or an object with one as its member `landmarks`. A landmark may also be a plain array
+ * of vertex numbers, one a shape. */
+static cJSON *read_landmarks(const cli *c, const char *path) {
+  size_t size;
+  const char *end = NULL;
+  char *text = cli_read_file(path, &size);
+  if (!text)
+    return NULL;
+  cJSON *whole = cJSON_ParseWithLengthOpts(text, size + 1, &end, 1), *list = whole;
+  if (!whole) {
+    cli_error(c, "%s: not JSON at byte %zu", path, end ? (size_t)(end - text) : 0);
+  } else if (cJSON_IsObject(whole)) {
+    list = cJSON_DetachItemFromObjectCaseSensitive(whole, "landmarks");
+    cJSON_Delete(whole);
+  }
+  free(text);
+  if (whole && !cJSON_IsArray(list)) {
+    cli_error(c, "%s: a landmark file is an array, or an object with one as its member \"landmarks\"", path);
+    cJSON_Delete(list);
+    return NULL;
+  }
+  for (cJSON *item = list ? list->child : NULL, *next; item; item = next) {
+    next = item->next;
+    if (!cJSON_IsArray(item))
+      continue;
+    cJSON *landmark = cJSON_CreateObject(), *at = cJSON_AddArrayToObject(landmark, "at");
+    for (const cJSON *vertex = item->child; vertex; vertex = vertex->next) {
+      cJSON *place = cJSON_CreateObject();
+      cJSON_AddItemToObject(place, "vertex", cJSON_Duplicate(vertex, 0));
+      cJSON_AddItemToArray(at, place);
+    }
+    cJSON_ReplaceItemViaPointer(list, item, landmark);
+  }
+  return list;
+}
+
+/* The member at a dotted path, its parents made where they are missing. */
+static int set_member(cJSON *object, const char *path, cJSON *value) {
+  for (;;) {
+    const char *dot = strchr(path, '.');
+    char *name = cli_text("%.*s", (int)(dot ? dot - path : (long)strlen(path)), path);
+    if (!dot) {
+      int ok = *name && cJSON_IsObject(object);
+      if (ok) {
+        cJSON_DeleteItemFromObjectCaseSensitive(object, name);
+        cJSON_AddItemToObject(object, name, value);
+      } else {
+        cJSON_Delete(value);
+      }
+      free(name);
+      return ok;
+    }
+    cJSON *child = cJSON_GetObjectItemCaseSensitive(object, name);
+    if (!child)
+      child = cJSON_AddObjectToObject(object, name);
+    free(name);
+    if (!cJSON_IsObject(child)) {
+      cJSON_Delete(value);
+      return 0;
+    }
+    object = child;
+    path = dot + 1;
+  }
+}
+
+int cli_apply_sets(const cli *c, cJSON *request) {
+  for (int i = 0; i < c->args.set_count; i++) {
+    const char *text = c->args.sets[i], *equals = strchr(text, '=');
+    char *path = equals ? cli_text("%.*s", (int)(equals - text), text) : NULL;
+    cJSON *value = equals ? cJSON_ParseWithOpts(equals + 1, NULL, 1) : NULL;
+    if (equals && !value)
+      value = cJSON_CreateString(equals + 1);
+    int ok = equals && set_member(request, path, value);
+    free(path);
+    if (!ok) {
+      cli_error(c, "--set %s: it takes NAME=VALUE, with dots between the names of members", text);
+      return CLI_USAGE;
+    }
+  }
+  return CLI_DONE;
+}
+
+static void set_text(const cli *c, cJSON *request, cli_option_id option, const char *path) {
+  if (c->args.value[option])
+    set_member(request, path, cJSON_CreateString(c->args.value[option]));
+}
+
+static int add_options(const cli *c, cJSON *request) {
+  const char *tolerance = c->args.value[OPT_TOLERANCE], *triangles = c->args.value[OPT_MAX_TRIANGLES];
+  double x;
+  long n;
+  set_text(c, request, OPT_ALIGN, "align.method");
+  set_text(c, request, OPT_REMESH, "remesh.method");
+  set_text(c, request, OPT_ANIMATION, "asset.animation");
+  set_text(c, request, OPT_FIT, "asset.fit");
+  set_text(c, request, OPT_PATH, "asset.path");
+  if (tolerance) {
+    if (!cli_decimal(tolerance, &x) || x <= 0) {
+      cli_error(c, "--tolerance takes a number above 0, not '%s'", tolerance);
+      return CLI_USAGE;
+    }
+    set_member(request, "remesh.tolerance", cJSON_CreateNumber(x));
+  }
+  if (triangles) {
+    if (!cli_whole_number(triangles, 4, 100000000, &n)) {
+      cli_error(c, "--max-triangles takes a whole number from 4 on, not '%s'", triangles);
+      return CLI_USAGE;
+    }
+    set_member(request, "remesh.max_triangles", cJSON_CreateNumber((double)n));
+  }
+  if (c->args.value[OPT_NO_NORMALS])
+    set_member(request, "asset.normals", cJSON_CreateBool(0));
+  return cli_apply_sets(c, request);
+}
+
+/* Everything but the shapes; before any upload, so that a typing error costs nothing. */
+static int make_request(cli *c, cJSON **out) {
+  const char *landmarks = c->args.value[OPT_LANDMARKS];
+  cJSON *request = cJSON_CreateObject();
+  cJSON_AddArrayToObject(request, "shapes");
+  *out = request;
+  if (landmarks && !strcmp(landmarks, "auto")) {
+    cJSON_AddStringToObject(request, "landmarks", "auto");
+  } else if (landmarks) {
+    cJSON *list = read_landmarks(c, landmarks);
+    if (!list)
+      return CLI_USAGE;
+    cJSON_AddItemToObject(request, "landmarks", list);
+  }
+  return add_options(c, request);
+}
+
+static int add_shapes(cli *c, cJSON *request) {
+  cJSON *shapes = cJSON_GetObjectItemCaseSensitive(request, "shapes");
+  for (int i = 0; i < c->args.operand_count; i++) {
+    cli_mesh mesh;
+    int rc = cli_mesh_of(c, c->args.operands[i], &mesh);
+    if (rc != CLI_DONE)
+      return rc;
+    cJSON *shape = cJSON_CreateObject();
+    cJSON_AddStringToObject(shape, "mesh", mesh.id);
+    cJSON_AddStringToObject(shape, "name", mesh.name);
+    cJSON_AddItemToArray(shapes, shape);
+    cli_mesh_free(&mesh);
+  }
+  return CLI_DONE;
+}
+
+int cli_download(cli *c, const char *path, const char *file) {
+  int to_stdout = !strcmp(file, "-");
+  char *part = to_stdout ? NULL : cli_text("%s.part-%ld", file, (long)getpid());
+  FILE *out = to_stdout ? tmpfile() : fopen(part, "w+b");
+  cli_reply reply = {0};
+  if (!out) {
+    cli_error(c, "%s: %s", file, strerror(errno));
+    free(part);
+    return CLI_USAGE;
+  }
+  cli_request request = {.method = "GET", .path = path, .download = out, .label = "download", .patient = 1};
+  int rc = cli_send(c, &request, &reply);
+  cli_bar_end(c);
+  if (rc == CLI_DONE && !cli_ok(&reply))
+    rc = cli_refused(c, path, &reply);
+  if (rc == CLI_DONE && to_stdout) {
+    char block[1 << 16];
+    rewind(out);
+    for (size_t got; (got = fread(block, 1, sizeof block, out)) > 0;)
+      fwrite(block, 1, got, stdout);
+  }
+  int closed = fclose(out) == 0;
+  if (part && rc == CLI_DONE && (!closed || rename(part, file) != 0)) {
+    cli_error(c, "%s: %s", file, strerror(errno));
+    rc = CLI_USAGE;
+  }
+  if (part && rc != CLI_DONE)
+    unlink(part);
+  cli_reply_free(&reply);
+  free(part);
+  return rc;
+}
+
+int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource) {
+  char *text = cJSON_PrintUnformatted(body), *result = NULL;
+  cli_request request = {.method = "POST", .path = path, .json = text};
+  int rc = cli_send(c, &request, resource);
+  if (rc == CLI_DONE && !cli_ok(resource)) {
+    rc = cli_refused(c, NULL, resource);
+  } else if (rc == CLI_DONE && resource->status == 202 && c->args.value[OPT_NO_WAIT]) {
+    if (c->json)
+      puts(resource->body);
+    else
+      printf("%s\n", cli_string(resource->json, "url", "?"));
+    cli_reply_free(resource);
+  } else if (rc == CLI_DONE && resource->status == 202) {
+    rc = cli_wait(c, resource->json, &result);
+    cli_reply_free(resource);
+    if (rc == CLI_DONE) {
+      cli_request get = {.method = "GET", .path = result, .patient = 1};
+      rc = cli_send(c, &get, resource);
+      if (rc == CLI_DONE && !cli_ok(resource))
+        rc = cli_refused(c, NULL, resource);
+    }
+  }
+  free(result);
+  free(text);
+  return rc;
+}
+
+static int finish(cli *c, const cli_reply *supermesh, const char *output) {
+  const char *report = c->args.value[OPT_REPORT];
+  int rc = CLI_DONE;
+  if (output) {
+    char *asset = cli_text("%s", cli_string(supermesh->json, "asset", ""));
+    rc = cli_download(c, asset, output);
+    free(asset);
+  }
+  if (rc == CLI_DONE && report)
+    rc = cli_write_report(c, report, supermesh->json);
+  if (rc != CLI_DONE || (output && !strcmp(output, "-")))
+    return rc;
+  if (c->json) {
+    puts(supermesh->body);
+  } else {
+    if (output)
+      printf("%s\n", output);
+    cli_print_supermesh(supermesh->json);
+  }
+  return CLI_DONE;
+}
+
+static int merge(cli *c, const char *output) {
+  cJSON *request;
+  cli_reply supermesh = {0};
+  int rc = make_request(c, &request);
+  if (rc == CLI_DONE)
+    rc = add_shapes(c, request);
+  if (rc == CLI_DONE)
+    rc = cli_make(c, "/v1/supermeshes", request, &supermesh);
+  if (rc == CLI_DONE && supermesh.json)
+    rc = finish(c, &supermesh, output);
+  cli_reply_free(&supermesh);
+  cJSON_Delete(request);
+  return rc;
+}
+
+int cli_run_merge(cli *c) {
+  return merge(c, c->args.value[OPT_OUTPUT]);
+}
+
+int cli_run_morph(cli *c) {
+  const char *output = c->args.value[OPT_OUTPUT];
+  if (output)
+    return merge(c, output);
+  char *first = cli_base_name(c->args.operands[0]), *last = cli_base_name(c->args.operands[c->args.operand_count - 1]);
+  char *made = cli_text("%s-%s.glb", first, last);
+  int rc = merge(c, made);
+  free(first);
+  free(last);
+  free(made);
+  return rc;
+}

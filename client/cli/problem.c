@@ -1,0 +1,87 @@
+/* What went wrong, in words: the daemon's problems, and advice for the owners of meshes. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli.h"
+
+enum { FACT_LENGTH_MOST = 160 };
+
+const char *cli_problem_type(const cJSON *problem) {
+  const char *type = cli_string(problem, "type", "about:blank"), *slash = strrchr(type, '/');
+  return slash ? slash + 1 : type;
+}
+
+static int is_standard(const char *name) {
+  static const char *const names[] = {"type", "title", "status", "detail", "instance"};
+  for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
+    if (!strcmp(name, names[i]))
+      return 1;
+  return 0;
+}
+
+static void print_facts(const cJSON *problem) {
+  for (const cJSON *item = problem->child; item; item = item->next) {
+    if (!item->string || is_standard(item->string))
+      continue;
+    char *text = cJSON_PrintUnformatted(item);
+    if (!text)
+      continue;
+    if (strlen(text) > FACT_LENGTH_MOST)
+      strcpy(text + FACT_LENGTH_MOST - 4, " …");
+    fprintf(stderr, "  %s: %s\n", item->string, text);
+    free(text);
+  }
+}
+
+int cli_problem(cli *c, const char *subject, const cJSON *problem) {
+  cli_bar_end(c);
+  if (c->json) {
+    char *text = cJSON_Print(problem);
+    fprintf(stderr, "%s\n", text ? text : "{}");
+    free(text);
+    return CLI_REFUSED;
+  }
+  cli_error(c, "%s%s%s: %s", subject ? subject : "", subject ? ": " : "", cli_problem_type(problem),
+            cli_string(problem, "detail", cli_string(problem, "title", "refused")));
+  print_facts(problem);
+  return CLI_REFUSED;
+}
+
+int cli_refused(cli *c, const char *subject, const cli_reply *reply) {
+  cli_bar_end(c);
+  if (cJSON_IsObject(reply->json))
+    return cli_problem(c, subject, reply->json);
+  cli_error(c, "%s%sthe server answered with status %ld", subject ? subject : "", subject ? ": " : "", reply->status);
+  return CLI_REFUSED;
+}
+
+const char *cli_advice(const char *type) {
+  static const struct {
+    const char *type, *advice;
+  } list[] = {
+      {"not-closed",
+       "The surface has holes. Close them in the program that made it, or upload with "
+       "--repair fill_holes to have each closed by a patch."},
+      {"not-manifold",
+       "Some edges have more than two faces, or faces meet in a point only. Remove inner walls and "
+       "doubled faces; 'merge by distance' and 'select non-manifold' help in Blender."},
+      {"not-orientable",
+       "The faces cannot all point outwards: the surface is one-sided, or with --repair none turned "
+       "against itself. Recalculate the normals, or upload with --repair safe."},
+      {"not-connected",
+       "The file holds several pieces. Join them into one closed skin, upload them one by one, or keep "
+       "only the largest with --repair largest_component."},
+      {"not-genus-zero",
+       "The surface has handles, like a ring or a cup. Cut each handle and close both ends: only "
+       "surfaces like a ball can be laid on the sphere."},
+      {"degenerate", "Hardly any triangles are left after repair. Check that the right object was exported."},
+      {"not-finite", "Some coordinates are not numbers. Export again."},
+      {"malformed-mesh", "The file is damaged or cut short at the place named. Export or download it again."},
+      {"unknown-format", "Supported are OBJ, OFF, PLY, STL, glTF and GLB."},
+      {"too-large", "The mesh is larger than the daemon accepts. Decimate it first, or raise the daemon's limits."},
+  };
+  for (size_t i = 0; i < sizeof list / sizeof list[0]; i++)
+    if (!strcmp(list[i].type, type))
+      return list[i].advice;
+  return NULL;
+}

@@ -1,0 +1,87 @@
+/* Progress on a terminal, and waiting for jobs. */
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli.h"
+
+enum { BAR_WIDTH = 32, POLL_MICROSECONDS = 120 * 1000 };
+
+void cli_bar(cli *c, const char *label, double fraction) {
+  if (!c->bar)
+    return;
+  if (!(fraction >= 0 && fraction <= 1))
+    fraction = 0;
+  int full = (int)(fraction * BAR_WIDTH + 0.5);
+  char line[BAR_WIDTH + 1];
+  for (int i = 0; i < BAR_WIDTH; i++)
+    line[i] = i < full ? '#' : '.';
+  line[BAR_WIDTH] = 0;
+  fprintf(stderr, "\r\033[K%-24.24s [%s] %3.0f %%", label, line, 100 * fraction);
+  fflush(stderr);
+  c->bar_drawn = 1;
+}
+
+void cli_bar_end(cli *c) {
+  if (c->bar_drawn)
+    fputs("\r\033[K", stderr);
+  c->bar_drawn = 0;
+}
+
+/* The job again: on a terminal at once, to draw its progress; else when it has ended or 20 s have passed. */
+static int poll(cli *c, const char *url, cli_reply *reply) {
+  char *path = cli_text("%s%s", url, c->bar ? "" : "?wait=20");
+  cli_request request = {.method = "GET", .path = path, .patient = 1};
+  if (c->bar)
+    usleep(POLL_MICROSECONDS);
+  int rc = cli_send(c, &request, reply);
+  free(path);
+  return rc;
+}
+
+static int ended(const char *state) {
+  return !strcmp(state, "succeeded") || !strcmp(state, "failed") || !strcmp(state, "cancelled");
+}
+
+static int conclude(cli *c, const cJSON *job, char **result) {
+  const char *state = cli_string(job, "state", "");
+  const cJSON *problem = cJSON_GetObjectItemCaseSensitive(job, "problem");
+  cli_bar_end(c);
+  if (!strcmp(state, "succeeded")) {
+    *result = cli_text("%s", cli_string(job, "result", ""));
+    return CLI_DONE;
+  }
+  if (cJSON_IsObject(problem))
+    return cli_problem(c, NULL, problem);
+  cli_error(c, "job %s has %s", cli_string(job, "id", "?"), state);
+  return CLI_REFUSED;
+}
+
+int cli_wait(cli *c, const cJSON *job, char **result) {
+  char *url = cli_text("%s", cli_string(job, "url", ""));
+  cli_reply reply = {0};
+  int rc = CLI_DONE;
+  *result = NULL;
+  while (!ended(cli_string(job, "state", ""))) {
+    cli_reply next;
+    const char *stage = cli_string(job, "stage", cli_string(job, "state", ""));
+    cli_bar(c, *stage ? stage : cli_string(job, "state", ""), cli_number(job, "progress"));
+    if ((rc = poll(c, url, &next)) != CLI_DONE) {
+      cli_error(c, "the job goes on where the daemon does: orbmorph job --wait %s", url);
+      cli_reply_free(&next);
+      break;
+    }
+    cli_reply_free(&reply);
+    reply = next;
+    if (!cli_ok(&reply) || !reply.json) {
+      rc = cli_refused(c, url, &reply);
+      break;
+    }
+    job = reply.json;
+  }
+  if (rc == CLI_DONE)
+    rc = conclude(c, job, result);
+  cli_reply_free(&reply);
+  free(url);
+  return rc;
+}

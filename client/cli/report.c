@@ -1,0 +1,150 @@
+/* Resources in words: for the terminal, and as a report in Markdown. */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli.h"
+
+static const cJSON *member(const cJSON *object, const char *name) {
+  return cJSON_GetObjectItemCaseSensitive(object, name);
+}
+
+void cli_print_mesh(const cJSON *mesh) {
+  char vertices[32], triangles[32];
+  cli_count(cli_number(mesh, "vertices"), vertices);
+  cli_count(cli_number(mesh, "triangles"), triangles);
+  printf("%s  %s: %s vertices, %s triangles\n", cli_string(mesh, "id", "?"), cli_string(mesh, "name", ""), vertices,
+         triangles);
+  const cJSON *repair;
+  cJSON_ArrayForEach(repair, member(mesh, "repairs")) {
+    char count[32];
+    cli_count(cli_number(repair, "count"), count);
+    printf("  mended: %s (%s)\n", cli_string(repair, "kind", "?"), count);
+  }
+}
+
+void cli_print_embedding(const cJSON *embedding) {
+  const cJSON *certificate = member(embedding, "certificate"), *distortion = member(embedding, "distortion");
+  const cJSON *dirichlet = member(distortion, "symmetric_dirichlet");
+  printf("%s  %s\n", cli_string(embedding, "id", "?"), cli_string(embedding, "method", ""));
+  printf("  certificate: %s, %.0f flipped, degree %.0f\n",
+         cJSON_IsTrue(member(certificate, "valid")) ? "valid" : "not valid", cli_number(certificate, "flipped"),
+         cli_number(certificate, "degree"));
+  printf("  symmetric Dirichlet energy: mean %.3g, median %.3g, worst %.3g\n", cli_number(dirichlet, "mean"),
+         cli_number(dirichlet, "median"), cli_number(dirichlet, "max"));
+  printf("  stretch efficiency: %.3g\n", cli_number(distortion, "stretch_efficiency"));
+  printf("  time: %.3g s\n", cli_number(member(embedding, "timings_ms"), "total") / 1000);
+}
+
+/* "0.04 %", or "?" where it was not measured. */
+static void percent(double fraction, char out[32]) {
+  if (isfinite(fraction))
+    snprintf(out, 32, "%.3g %%", 100 * fraction);
+  else
+    snprintf(out, 32, "?");
+}
+
+/* The largest distance of any landmark from its place, as a fraction of the diagonal. */
+static double worst_residual(const cJSON *supermesh) {
+  double worst = 0;
+  const cJSON *landmark, *residual;
+  cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) cJSON_ArrayForEach(
+      residual, member(landmark, "residual_relative")) if (cJSON_IsNumber(residual) && residual->valuedouble > worst)
+      worst = residual->valuedouble;
+  return worst;
+}
+
+void cli_print_supermesh(const cJSON *supermesh) {
+  char vertices[32], triangles[32], error[32], rms[32];
+  const cJSON *shape, *certificate = member(supermesh, "certificate");
+  int landmarks = cJSON_GetArraySize(member(supermesh, "landmarks"));
+  cli_count(cli_number(supermesh, "vertices"), vertices);
+  cli_count(cli_number(supermesh, "triangles"), triangles);
+  printf("%s: %s vertices, %s triangles, %s, genus %.0f\n", cli_string(supermesh, "url", "?"), vertices, triangles,
+         cJSON_IsTrue(member(certificate, "closed")) ? "closed" : "not closed", cli_number(certificate, "genus"));
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    percent(cli_number(shape, "hausdorff_relative"), error);
+    percent(cli_number(shape, "rms_relative"), rms);
+    printf("  %-16s farthest from its input %s of the diagonal, on average %s\n", cli_string(shape, "name", "?"), error,
+           rms);
+  }
+  if (landmarks) {
+    percent(worst_residual(supermesh), error);
+    printf("  %d landmarks, %s (off by at most %s)\n", landmarks,
+           cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "exact" : "not exact", error);
+  }
+  printf("  time: %.3g s\n", cli_number(member(supermesh, "timings_ms"), "total") / 1000);
+}
+
+static void markdown_shapes(FILE *out, const cJSON *supermesh) {
+  const cJSON *shape;
+  fputs(
+      "| shape | farthest from its input | root mean square | normals off, mean | normals off, 99 of 100 |\n"
+      "|---|---|---|---|---|\n",
+      out);
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    char error[32], rms[32];
+    const cJSON *normals = member(shape, "normal_deviation");
+    percent(cli_number(shape, "hausdorff_relative"), error);
+    percent(cli_number(shape, "rms_relative"), rms);
+    fprintf(out, "| %s | %s | %s | %.3g° | %.3g° |\n", cli_string(shape, "name", "?"), error, rms,
+            cli_number(normals, "mean"), cli_number(normals, "p99"));
+  }
+  fputs("\nDistances are fractions of the diagonal of each shape's bounding box.\n", out);
+}
+
+static void markdown_numbers(FILE *out, const char *title, const cJSON *object, const char *unit) {
+  const cJSON *item;
+  fprintf(out, "\n%s:", title);
+  cJSON_ArrayForEach(item, object) if (cJSON_IsNumber(item))
+      fprintf(out, " %s %.4g%s%s", item->string, item->valuedouble, unit, item->next ? "," : ".");
+  fputc('\n', out);
+}
+
+static void markdown(FILE *out, const cJSON *supermesh) {
+  char vertices[32], triangles[32];
+  const cJSON *shape, *landmark, *certificate = member(supermesh, "certificate");
+  fputs("# Morph of ", out);
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes"))
+      fprintf(out, "%s%s", cli_string(shape, "name", "?"), shape->next ? ", " : "\n\n");
+  cli_count(cli_number(supermesh, "vertices"), vertices);
+  cli_count(cli_number(supermesh, "triangles"), triangles);
+  fprintf(out, "One surface of %s vertices and %s triangles, %s, genus %.0f. Resource `%s`, made by %s.\n\n", vertices,
+          triangles, cJSON_IsTrue(member(certificate, "closed")) ? "closed" : "not closed",
+          cli_number(certificate, "genus"), cli_string(supermesh, "url", "?"), cli_string(supermesh, "engine", "?"));
+  markdown_shapes(out, supermesh);
+  if (cJSON_GetArraySize(member(supermesh, "landmarks"))) {
+    fprintf(out, "\n## Landmarks\n\nThey coincide %s.\n\n| landmark | off by, one column a shape |\n|---|---|\n",
+            cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "exactly" : "only nearly");
+    cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
+      const cJSON *residual;
+      fprintf(out, "| %s |", cli_string(landmark, "name", ""));
+      cJSON_ArrayForEach(residual, member(landmark, "residual_relative")) {
+        char text[32];
+        percent(residual->valuedouble, text);
+        fprintf(out, " %s%s", text, residual->next ? "," : "");
+      }
+      fputs(" |\n", out);
+    }
+  }
+  fputs("\n## Time\n", out);
+  markdown_numbers(out, "Milliseconds", member(supermesh, "timings_ms"), "");
+}
+
+int cli_write_report(cli *c, const char *path, const cJSON *supermesh) {
+  size_t length = strlen(path);
+  FILE *out = fopen(path, "wb");
+  if (out && length > 3 && !strcmp(path + length - 3, ".md")) {
+    markdown(out, supermesh);
+  } else if (out) {
+    char *text = cJSON_Print(supermesh);
+    fprintf(out, "%s\n", text ? text : "{}");
+    free(text);
+  }
+  if (!out || fclose(out) != 0) {
+    cli_error(c, "%s: %s", path, strerror(errno));
+    return CLI_USAGE;
+  }
+  return CLI_DONE;
+}

@@ -1,0 +1,64 @@
+# Completions of orbmorph for bash. Made by 'orbmorph completions bash'.
+_orbmorph() {
+  local current="${COMP_WORDS[COMP_CWORD]}" previous="${COMP_WORDS[COMP_CWORD-1]}" words="" operands="" choices=""
+  if [ "$COMP_CWORD" -eq 1 ]; then
+    COMPREPLY=($(compgen -W "morph upload embed merge job ls get rm doctor completions --help --version" -- "$current"))
+    return
+  fi
+  case "$previous" in
+    --align) choices="pin rbf rotate auto" ;;
+    --remesh) choices="adaptive overlay subdivision convex-hull" ;;
+    --animation) choices="pingpong none" ;;
+    --fit) choices="none rigid similarity" ;;
+    --path) choices="linear rigid" ;;
+    --repair) choices="safe none fill_holes largest_component" ;;
+    --format) choices="obj off ply stl gltf glb" ;;
+    --method) choices="newton kernel-sampling" ;;
+    --preset) choices="fast default quality" ;;
+    --state) choices="queued running succeeded failed cancelled" ;;
+    --part) choices="file asset sphere" ;;
+  esac
+  if [ -n "$choices" ]; then
+    COMPREPLY=($(compgen -W "$choices" -- "$current"))
+    return
+  fi
+  case "${COMP_WORDS[1]}" in
+    morph)
+      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair "
+      ;;
+    upload)
+      words="--server --json --quiet --help --name --repair --format "
+      ;;
+    embed)
+      words="--server --json --quiet --help --output --set --no-wait --repair --method --preset "
+      ;;
+    merge)
+      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair "
+      ;;
+    job)
+      words="--server --json --quiet --help --wait --cancel "
+      ;;
+    ls)
+      words="--server --json --quiet --help --state --limit "
+      operands="meshes embeddings supermeshes jobs"
+      ;;
+    get)
+      words="--server --json --quiet --help --output --part "
+      ;;
+    rm)
+      words="--server --json --quiet --help "
+      ;;
+    doctor)
+      words="--server --json --quiet --help "
+      ;;
+    completions)
+      words="--help "
+      operands="bash zsh"
+      ;;
+  esac
+  case "$current" in
+    -*) COMPREPLY=($(compgen -W "$words" -- "$current")) ;;
+    *) COMPREPLY=($(compgen -W "$operands" -- "$current")) ;;
+  esac
+}
+complete -o bashdefault -o default -F _orbmorph orbmorph

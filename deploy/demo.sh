@@ -1,0 +1,131 @@
+#!/usr/bin/env bash
+# From a bare Debian 12 to a GLB that morphs: installs packages, builds, starts the daemon, merges two meshes over HTTP.
+#
+#   deploy/demo.sh [--serve] [--landmarks FILE] [MESH MESH…]
+#
+# Without meshes it takes the samples of this repository. --serve leaves the daemon running and prints its address.
+set -euo pipefail
+
+usage() {
+  sed -n '2,6s/^# \{0,1\}//p' "$0"
+}
+
+serve=no
+landmarks=
+meshes=()
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --serve) serve=yes ;;
+    --landmarks) landmarks=$(realpath -- "${2:?a file is missing after --landmarks}"); shift ;;
+    --help | -h) usage; exit 0 ;;
+    --) shift; break ;;
+    -*) echo "demo.sh: unknown option $1" >&2; usage >&2; exit 2 ;;
+    *) meshes+=("$1") ;;
+  esac
+  shift
+done
+meshes+=("$@")
+for i in "${!meshes[@]}"; do
+  if [ ! -f "${meshes[$i]}" ] || [ ! -r "${meshes[$i]}" ]; then
+    echo "demo.sh: cannot read ${meshes[$i]}" >&2
+    exit 2
+  fi
+  meshes[i]=$(realpath -- "${meshes[$i]}")
+done
+if [ ${#meshes[@]} -eq 1 ]; then
+  echo "demo.sh: two meshes or more are needed" >&2
+  exit 2
+fi
+
+root=$(cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/.." && pwd)
+if [ ${#meshes[@]} -eq 0 ]; then
+  meshes=("$root/tests/samples/dog.obj" "$root/tests/samples/giraffe.off")
+  landmarks=${landmarks:-$root/tests/samples/dog-giraffe.json}
+fi
+
+# shellcheck source=deploy/packages.sh
+source "$root/deploy/packages.sh"
+orb_install_packages "${orb_build_packages[@]}"
+
+# Where results stay: a folder without blanks in its name.
+pick_output() {
+  local folder
+  for folder in "$root/build/demo" "${HOME:-/}/orbmorph-demo" /var/tmp/orbmorph-demo; do
+    case "$folder" in *[[:space:]]*) continue ;; esac
+    if mkdir -p "$folder" 2>/dev/null && [ -w "$folder" ]; then
+      echo "$folder"
+      return
+    fi
+  done
+  echo "demo.sh: no folder to write to" >&2
+  return 1
+}
+output=$(pick_output)
+
+mkdir -p "$root/build"
+log=$root/build/demo-build.log
+echo "building in $root/build (log: demo-build.log)"
+build() {
+  [ -f "$root/build/build.ninja" ] || cmake -S "$root" --preset release -DORB_TESTS=OFF
+  cmake --build "$root/build" --target orbmorphd orbmorph
+}
+if ! (cd "$root" && build) >"$log" 2>&1; then
+  tail -n 40 "$log" >&2
+  echo "demo.sh: the build failed; all of its output is in $log" >&2
+  exit 1
+fi
+
+data=$(mktemp -d "${TMPDIR:-/tmp}/orbmorph-demo.XXXXXX")
+daemon=
+finish() {
+  if [ -n "$daemon" ]; then
+    kill "$daemon" 2>/dev/null || true
+    wait "$daemon" 2>/dev/null || true
+  fi
+  rm -rf "$data"
+}
+trap finish EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
+
+setsid "$root/build/bin/orbmorphd" --listen 127.0.0.1:0 --data "$data/store" >"$data/out" 2>"$data/log" </dev/null &
+daemon=$!
+address=
+for _ in $(seq 150); do
+  address=$(sed -n 's/^orbmorphd listening on //p' "$data/out")
+  [ -z "$address" ] || break
+  if ! kill -0 "$daemon" 2>/dev/null; then
+    break
+  fi
+  sleep 0.1
+done
+if [ -z "$address" ]; then
+  cat "$data/log" >&2
+  echo "demo.sh: the daemon did not start" >&2
+  exit 1
+fi
+
+# a.obj b.off → a-b; what may stand in a file's name without quoting
+stem=
+for mesh in "${meshes[@]}"; do
+  name=$(basename -- "$mesh")
+  stem+=${stem:+-}${name%.*}
+done
+stem=$(printf %s "$stem" | tr -c 'A-Za-z0-9._-' _ | cut -c1-100)
+
+export ORBMORPH_SERVER=$address
+options=(-o "$output/$stem.glb" --report "$output/$stem.md")
+if [ -n "$landmarks" ]; then
+  options+=(--landmarks "$landmarks")
+fi
+"$root/build/bin/orbmorph" morph --json "${options[@]}" -- "${meshes[@]}" >"$output/$stem.json"
+
+echo
+echo "GLB:    $output/$stem.glb"
+echo "Report: $output/$stem.md"
+echo "JSON:   $output/$stem.json"
+if [ "$serve" = yes ]; then
+  echo "Server: $address (its data in $data; stop it with: kill $daemon)"
+  daemon=
+  trap - EXIT
+fi

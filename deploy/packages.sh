@@ -1,0 +1,31 @@
+# Debian packages, and how to install those that are missing. To be sourced by bash.
+
+orb_build_packages=(
+  gcc g++ cmake ninja-build pkg-config
+  liblapacke-dev libopenblas-dev libqhull-dev libmeshoptimizer-dev libtinygltf-dev
+  libcjson-dev libsodium-dev libmicrohttpd-dev libsqlite3-dev libcurl4-openssl-dev
+)
+orb_test_packages=(libcmocka-dev nodejs npm curl man-db)
+orb_long_packages=(clang libclang-rt-dev valgrind)
+
+# Installs those of its arguments that are missing, as root or through sudo; never asks.
+orb_install_packages() {
+  local package missing=() as_root=()
+  for package in "$@"; do
+    if [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" != installed ]; then
+      missing+=("$package")
+    fi
+  done
+  [ ${#missing[@]} -gt 0 ] || return 0
+  if [ "$(id -u)" -ne 0 ]; then
+    if ! command -v sudo >/dev/null; then
+      echo "These packages are missing, and installing them takes root or sudo: ${missing[*]}" >&2
+      return 1
+    fi
+    as_root=(sudo)
+  fi
+  echo "installing ${missing[*]}"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq update </dev/null
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -y -o Dpkg::Use-Pty=0 --no-install-recommends \
+    install "${missing[@]}" </dev/null >/dev/null
+}
