@@ -18,8 +18,8 @@ enum {
   GRAIN = 256,
   QUEUE = 65536, /* room of the relaxation queue, a power of two */
   QUEUE_FULL = 60000,
-  RELAX_MOST = 60, /* relaxations round one crowded vertex */
-  ATTEMPTS = 16    /* at a kernel that doubles have no room for */
+  RELAX_MOST = 400, /* ring entries relaxed round one crowded vertex: about 60 stars, or one pole */
+  ATTEMPTS = 16     /* at a kernel that doubles have no room for */
 };
 
 static const double WELL_INSIDE = 0.02; /* least det over the squared edge that it stands on */
@@ -144,8 +144,9 @@ static orb_status relieve(orb_context *ctx, orb_refiner *r, int32_t v, double bl
   orb_status status = ORB_OK;
   enqueue_ring(&q, v);
   enqueue(&q, v);
-  for (int done = 0; q.head < q.tail && done < RELAX_MOST && status == ORB_OK; done++) {
+  for (int32_t done = 0; q.head < q.tail && done < RELAX_MOST && status == ORB_OK;) {
     int32_t u = dequeue(&q);
+    done += r->hierarchy->surface.valence[u];
     double gain, crowding;
     status = orb_refiner_relax(ctx, r, u, blend, &gain, &crowding);
     if (gain > 0.02 && crowding > 0.5 * r->settings.crowded) {

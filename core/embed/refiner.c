@@ -172,7 +172,8 @@ static orb_status relax_left_over(orb_context *ctx, orb_refiner *r, int32_t begi
   return ORB_OK;
 }
 
-/* One sweep; *energy before it (each triangle thrice), *fall by it. Sums are taken in the order of batches. */
+/* One sweep; *energy before it (the stars hold each triangle three times), *fall by it. Sums are taken in the order of
+ * batches. */
 static orb_status sweep_once(orb_context *ctx, orb_refiner *r, double relax, double *energy, double *fall) {
   orb_level *level = &r->level;
   double blend = blend_of(r);
@@ -200,6 +201,7 @@ static orb_status sweep_once(orb_context *ctx, orb_refiner *r, double relax, dou
       *fall += level->batch_fall[b];
     }
   }
+  *energy /= 3;
   for (int32_t i = 0; i < level->heavy_count; i++) {
     double gain;
     ORB_TRY(orb_refiner_relax(ctx, r, level->heavy[i], blend, &gain, NULL));
