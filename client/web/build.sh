@@ -9,8 +9,9 @@ if [ -f "$stamp" ] && [ -z "$(find src public index.html package-lock.json vite.
   exit 0
 fi
 command -v npm >/dev/null || { echo "The studio needs Node 18 and npm: apt-get install nodejs npm" >&2; exit 1; }
-if [ ! -f node_modules/.package-lock.json ] || [ package-lock.json -nt node_modules/.package-lock.json ]; then
+if [ ! -f node_modules/.installed ] || [ package-lock.json -nt node_modules/.installed ]; then
   npm ci --no-audit --no-fund --loglevel=error
+  touch node_modules/.installed
 fi
 npx --no-install vite build --logLevel warn
 touch "$stamp"

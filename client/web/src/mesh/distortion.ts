@@ -29,7 +29,7 @@ export function decodeSphere(buffer: ArrayBuffer): SphereData {
   }
   const values = vertexDistortion(x, image, corners);
   // one vertex drawn for each vertex of the mesh: no creases, so that the sphere stays closed
-  const surface = buildDisplay({ ...raw, properties: undefined }, 360);
+  const surface = buildDisplay({ ...raw, properties: undefined }, 180);
   const sphere = new Float32Array(surface.position.length);
   const spread = {} as Record<MeasureName, Float32Array>;
   for (const name of MEASURES) spread[name] = new Float32Array(surface.position.length / 3);

@@ -117,7 +117,7 @@ export function buildDisplay(raw: RawMesh, creaseDegrees = 48): Display {
       for (let g = start; g < n; g++) {
         const d = normal[3 * g] * face[3 * t] + normal[3 * g + 1] * face[3 * t + 1] + normal[3 * g + 2] * face[3 * t + 2];
         const gl = Math.hypot(normal[3 * g], normal[3 * g + 1], normal[3 * g + 2]);
-        if (d >= cosine * gl * l) {
+        if (creaseDegrees >= 180 || d >= cosine * gl * l) {
           group = g;
           break;
         }

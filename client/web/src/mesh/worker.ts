@@ -164,7 +164,13 @@ const ops = {
   morph(key: string, buffer: ArrayBuffer): MorphData {
     const data = decodeMorph(buffer);
     morphs.clear();
-    morphs.set(key, { ...data, position: data.position.slice(), targets: data.targets.map((t) => ({ ...t, position: t.position.slice() })), index: data.index.slice() });
+    morphs.set(key, {
+      ...data,
+      position: data.position.slice(),
+      index: data.index.slice(),
+      targets: data.targets.map((t) => ({ ...t, position: t.position.slice() })),
+      shapes: data.shapes.map((weights) => weights.slice()),
+    });
     return data;
   },
 

@@ -12,6 +12,7 @@ export function Action() {
   const ready = readyShapes().length;
   const { running, problem } = state;
   const busy = state.shapes.some((shape) => shape.state === 'reading' || shape.state === 'uploading');
+  const again = state.tab === 'morph' && !!state.result;
   const landmarks = wireLandmarks().length;
   return (
     <div class="action">
@@ -39,8 +40,8 @@ export function Action() {
         </div>
       ) : (
         <>
-          <Button kind="primary" class="button primary wide" disabled={ready < 2 || busy} onClick={() => startMerge()}>
-            {ready < 2 ? 'Morph' : `Morph ${ready} shapes`}
+          <Button class={`button wide ${again ? '' : 'primary'}`} disabled={ready < 2 || busy} onClick={() => startMerge()}>
+            {ready < 2 ? 'Morph' : again ? 'Morph again' : `Morph ${ready} shapes`}
           </Button>
           <p class="hint center">
             {ready < 2

@@ -91,14 +91,14 @@ const FRAGMENT: Record<Exclude<Paint['kind'], 'plain'>, string> = {
   direction: `diffuseColor.rgb = pow(clamp(0.5 + 0.5 * normalize(vTone), 0.0, 1.0), vec3(1.7));`,
   checker: `vec3 d = normalize(vTone);
     vec3 a = abs(d);
-    vec2 uv = a.x >= a.y && a.x >= a.z ? d.yz / a.x : (a.y >= a.z ? d.zx / a.y : d.xy / a.z);
-    vec2 cell = atan(uv) * (4.0 / 0.78539816);
-    vec2 width = max(fwidth(cell), vec2(1e-4));
+    vec2 st = a.x >= a.y && a.x >= a.z ? d.yz / a.x : (a.y >= a.z ? d.zx / a.y : d.xy / a.z);
+    vec2 cell = atan(st) * (4.0 / 0.78539816);
+    vec2 pixel = max(fwidth(cell), vec2(1e-4));
     vec2 wave = (abs(fract(cell * 0.5) - 0.5) - 0.25) * 2.0;
-    vec2 soft = clamp(wave / width + 0.5, 0.0, 1.0);
-    float dark = soft.x * (1.0 - soft.y) + soft.y * (1.0 - soft.x);
-    vec3 face = a.x >= a.y && a.x >= a.z ? vec3(0.86, 0.42, 0.33) : (a.y >= a.z ? vec3(0.27, 0.52, 0.60) : vec3(0.88, 0.68, 0.30));
-    diffuseColor.rgb = mix(vec3(0.93, 0.92, 0.89), face, dark);`,
+    vec2 edge = clamp(wave / pixel + 0.5, 0.0, 1.0);
+    float dark = edge.x * (1.0 - edge.y) + edge.y * (1.0 - edge.x);
+    vec3 side = a.x >= a.y && a.x >= a.z ? vec3(0.86, 0.42, 0.33) : (a.y >= a.z ? vec3(0.27, 0.52, 0.60) : vec3(0.88, 0.68, 0.30));
+    diffuseColor.rgb = mix(vec3(0.93, 0.92, 0.89), side, dark);`,
 };
 
 export function surfaceMaterial(paint: Paint): MeshMatcapMaterial {

@@ -139,8 +139,7 @@ export function morphModels(d: MorphData, count: number, color: string): Model[]
 export function sphereModels(d: SphereData): { surface: Model; ball: Model } {
   const white = { kind: 'plain', color: '#ffffff' } as const;
   const { surface, sphere } = d;
-  return {
-    surface: new Model(geometry(surface.position, surface.normal, surface.index), surface.edges, white),
-    ball: new Model(geometry(sphere, sphere, surface.index), surface.edges, white),
-  };
+  const ball = new Model(geometry(sphere, sphere, surface.index), surface.edges, white);
+  ball.group.scale.setScalar(0.72); // a ball fills its box more than a shape does
+  return { surface: new Model(geometry(surface.position, surface.normal, surface.index), surface.edges, white), ball };
 }

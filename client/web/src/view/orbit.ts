@@ -1,7 +1,7 @@
 /** A turntable camera as a value: several views may share one, which is what links them. */
 import { PerspectiveCamera, Vector3 } from 'three';
 
-const HOME = { yaw: 0.55, pitch: 0.22, distance: 3.6, panX: 0, panY: 0 };
+const HOME = { yaw: 0.55, pitch: 0.22, distance: 3.15, panX: 0, panY: 0 };
 
 export class Orbit {
   yaw = HOME.yaw;
