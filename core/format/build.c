@@ -351,7 +351,8 @@ static void fill_triangle(const orb_build *build, orb_mesh *mesh, int64_t t, int
     mesh->triangles[3 * t + k] = corner[k].vertex;
     if (mesh->texcoords && corner[k].texcoord >= 0) {
       mesh->texcoords[6 * t + 2 * k] = build->texcoords[2 * (size_t)corner[k].texcoord];
-      mesh->texcoords[6 * t + 2 * k + 1] = 1 - build->texcoords[2 * (size_t)corner[k].texcoord + 1];
+      float v = build->texcoords[2 * (size_t)corner[k].texcoord + 1];
+      mesh->texcoords[6 * t + 2 * k + 1] = build->texcoords_v_down ? v : 1 - v;
     }
     if (mesh->colors) {
       memcpy(mesh->colors + 12 * t + 4 * k, build->colors + 4 * (size_t)corner[k].vertex, 4 * sizeof(float));

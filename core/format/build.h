@@ -21,10 +21,11 @@ typedef struct orb_build {
   double *positions; /* 3 a vertex */
   float *colors;     /* 4 a vertex, as in the file; NULL: none */
   float *normals;    /* 3 each */
-  float *texcoords;  /* 2 each, v up */
+  float *texcoords;  /* 2 each, v up unless texcoords_v_down */
   int64_t vertices, vertex_room, color_room, normal_count, normal_room, texcoord_count, texcoord_room;
   int by_vertex;           /* normals and texcoords are one a vertex */
   int colors_are_srgb;     /* to be made linear */
+  int texcoords_v_down;    /* as they are to be */
   int32_t *corner_vertex;  /* corners of all faces in turn */
   orb_corner *corner_more; /* instead of corner_vertex where corners have texcoords or normals of their own */
   int64_t corners, corner_room, more_room;
