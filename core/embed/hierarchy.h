@@ -20,6 +20,12 @@ ORB_MUST_CHECK orb_status orb_refiner_create(orb_context *ctx, orb_hierarchy *hi
                                              const orb_embed_options *options, orb_refiner **out);
 void orb_refiner_destroy(orb_context *ctx, orb_refiner *refiner);
 
+/* A refiner at full resolution that starts from an embedding at hand (points: 3 a vertex, every triangle positive),
+ * with a hierarchy that holds no collapses: for sweeps with pins. Destroy the refiner, then the hierarchy. */
+ORB_MUST_CHECK orb_status orb_refiner_resume(orb_context *ctx, const orb_mesh *mesh, const double *points,
+                                             const orb_embed_options *options, orb_hierarchy **hierarchy,
+                                             orb_refiner **out);
+
 /* Undoes collapses until at least `vertices` live (or all), sweeping levels on the way as an embedding does. Pinned
  * vertices stay where they are, bit for bit. */
 ORB_MUST_CHECK orb_status orb_refiner_advance(orb_context *ctx, orb_refiner *refiner, int32_t vertices);

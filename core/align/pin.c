@@ -1,0 +1,95 @@
+/* Method `pin`: landmarks are constraints of the embeddings. The walk on a coarse level does nearly all; what it cannot
+ * do, because landmarks would have to pass through each other or a level has too little room, the traced patches can:
+ * any distinct points of a sphere can be carried to any others, by a piecewise linear map with enough triangles. */
+#include "align/pin.h"
+
+#include <string.h>
+
+#include "align/methods.h"
+#include "base/check.h"
+#include "embed/hierarchy.h"
+
+enum { COARSE = 300, COARSE_A_LANDMARK = 6 };
+
+orb_status orb_pin_relax(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count, orb_preset preset,
+                         int32_t sweeps) {
+  const orb_mesh *mesh = &sheet->shape.mesh;
+  orb_hierarchy *hierarchy = NULL;
+  orb_refiner *refiner = NULL;
+  orb_status status = ORB_OK;
+  double *points = ORB_NEW(ctx, double, 3 * (size_t)sheet->vertex_capacity);
+  orb_embed_options options;
+  orb_embed_defaults(&options);
+  options.preset = preset;
+  if (!points) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_GO(status, orb_refiner_resume(ctx, mesh, sheet->shape.points, &options, &hierarchy, &refiner), end);
+  for (int32_t k = 0; k < count; k++) {
+    orb_refiner_pin(refiner, sheet->shape.landmark_vertices[landmarks[k]], 1);
+  }
+  for (int32_t done = 0; done < sweeps; done += 5) {
+    double gain;
+    ORB_GO(status, orb_refiner_sweep(ctx, refiner, 5, &gain), end);
+    ORB_GO(status, orb_context_check(ctx), end);
+    if (gain < 1e-3) {
+      break;
+    }
+  }
+  orb_refiner_points(refiner, points);
+  orb_certificate certificate;
+  ORB_GO(status, orb_certify(ctx, points, mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate),
+         end);
+  if (certificate.valid) {
+    double *old = sheet->shape.points;
+    sheet->shape.points = points;
+    points = old;
+  }
+end:
+  orb_free(ctx, points);
+  orb_refiner_destroy(ctx, refiner);
+  orb_hierarchy_destroy(ctx, hierarchy);
+  return status;
+}
+
+static orb_status refuse(orb_context *ctx, int32_t shape, const int32_t *landmarks, int32_t count) {
+  orb_status status =
+      orb_fail(ctx, ORB_E_BAD_LANDMARKS,
+               "The landmarks could not be brought together on shape %d: drop or move some of them.", shape);
+  orb_error *error = orb_context_error_edit(ctx);
+  error->shape = shape;
+  error->landmark_count = count < ORB_ERROR_ITEMS ? count : ORB_ERROR_ITEMS;
+  memcpy(error->landmarks, landmarks, (size_t)error->landmark_count * sizeof *landmarks);
+  return status;
+}
+
+/* Shape 0 stays as it is embedded; the others are carried onto its landmarks. */
+static orb_status carry_onto_first(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
+                                   int32_t count, orb_preset preset) {
+  orb_status status = ORB_OK;
+  double *points = NULL;
+  ORB_GO(status, orb_rotate_by_landmarks(ctx, sheets, shape_count, landmarks, count), end);
+  ORB_GO(status, orb_landmark_points(ctx, sheets, shape_count, landmarks, count, &points), end);
+  for (int32_t s = 1; s < shape_count; s++) {
+    int held = 0;
+    ORB_GO(status, orb_pin_patches(ctx, &sheets[s], landmarks, count, points, preset, &held), end);
+    if (!held) {
+      status = refuse(ctx, s, landmarks, count);
+      goto end;
+    }
+  }
+end:
+  orb_free(ctx, points);
+  return status;
+}
+
+orb_status orb_align_pin(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
+                         int32_t count, const orb_align_options *options) {
+  int stuck = 1;
+  int32_t coarse = COARSE_A_LANDMARK * count > COARSE ? COARSE_A_LANDMARK * count : COARSE;
+  ORB_TRY(orb_pin_walk(ctx, sheets, shape_count, landmarks, count, options->preset, coarse, &stuck));
+  if (stuck) {
+    ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, options->preset));
+  }
+  return ORB_OK;
+}

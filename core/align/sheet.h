@@ -1,0 +1,53 @@
+/* A surface with its embedding that can be refined in place: edges and triangles are split on the surface and on the
+ * sphere at once, without a change of shape. */
+#ifndef ORB_ALIGN_SHEET_H
+#define ORB_ALIGN_SHEET_H
+
+#include "orbmorph/align.h"
+
+/* Owns the aligned shape that it grows, until orb_sheet_release(). Every triangle lies in triangle parent[t] of the
+ * mesh it was made from; new vertices have source −1. */
+typedef struct orb_sheet {
+  orb_aligned_shape shape;
+  int32_t *twin;   /* of each half-edge */
+  int32_t *corner; /* of each vertex: one half-edge that leaves it */
+  int32_t vertex_capacity, triangle_capacity;
+} orb_sheet;
+
+/* A deep copy of mesh and points, unsplit. */
+ORB_MUST_CHECK orb_status orb_sheet_create(orb_context *ctx, const orb_mesh *mesh, const double *points,
+                                           orb_sheet *out);
+void orb_sheet_free(orb_context *ctx, orb_sheet *sheet);
+
+/* A second, independent copy. */
+ORB_MUST_CHECK orb_status orb_sheet_copy(orb_context *ctx, const orb_sheet *sheet, orb_sheet *out);
+
+/* Hands the shape over (its certificate is not touched) and frees the rest. */
+void orb_sheet_release(orb_context *ctx, orb_sheet *sheet, orb_aligned_shape *out);
+
+/* Splits half-edge h at fraction t of its way (0 < t < 1) and its twin with it: one vertex and two triangles more.
+ * Triangle h/3 keeps the part at h's origin. The sphere point lies on the great circle arc, at the same fraction of
+ * the chord. O(1) amortised. */
+ORB_MUST_CHECK orb_status orb_sheet_split_edge(orb_context *ctx, orb_sheet *sheet, int32_t h, double t,
+                                               int32_t *vertex);
+
+/* Splits a triangle at barycentric coordinates (all > 0): one vertex and two triangles more. */
+ORB_MUST_CHECK orb_status orb_sheet_split_triangle(orb_context *ctx, orb_sheet *sheet, int32_t triangle,
+                                                   const double at[3], int32_t *vertex);
+
+/* The next half-edge that leaves the same vertex, counter-clockwise. */
+static inline int32_t orb_sheet_swing(const orb_sheet *sheet, int32_t h) {
+  return sheet->twin[orb_prev(h)];
+}
+
+/* The half-edge from vertex a to vertex b, −1 if they are no neighbours. O(valence). */
+int32_t orb_sheet_edge(const orb_sheet *sheet, int32_t a, int32_t b);
+
+/* Makes each landmark a vertex: splits the triangle or edge it lies in where it is no vertex yet. Places are on the
+ * mesh that the (unsplit) surface was made from; a coordinate below 2e-7 counts as zero. Fills landmark_vertices,
+ * which belongs to the shape afterwards. shape_index is for the error. ORB_E_BAD_LANDMARKS names places that are out
+ * of range. Afterwards every split triangle is exactly positive on the sphere, or ORB_E_NOT_CERTIFIED. */
+ORB_MUST_CHECK orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet *sheet, const orb_landmark *landmarks,
+                                                     int32_t landmark_count, int32_t shape_index);
+
+#endif
