@@ -46,6 +46,9 @@ fi
 # shellcheck source=deploy/packages.sh
 source "$root/deploy/packages.sh"
 orb_install_packages "${orb_build_packages[@]}"
+if [ "$serve" = yes ]; then
+  orb_install_node
+fi
 
 # Where results stay: a folder without blanks in its name.
 pick_output() {
@@ -66,6 +69,10 @@ mkdir -p "$root/build"
 log=$root/build/demo-build.log
 echo "building in $root/build (log: demo-build.log)"
 build() {
+  # the studio is compiled into the daemon
+  if [ "$serve" = yes ]; then
+    bash "$root/client/web/build.sh"
+  fi
   [ -f "$root/build/build.ninja" ] || cmake -S "$root" --preset release -DORB_TESTS=OFF
   cmake --build "$root/build" --target orbmorphd orbmorph
 }

@@ -5,7 +5,7 @@ orb_build_packages=(
   liblapacke-dev libopenblas-dev libqhull-dev libmeshoptimizer-dev libtinygltf-dev
   libcjson-dev libsodium-dev libmicrohttpd-dev libsqlite3-dev libcurl4-openssl-dev
 )
-orb_test_packages=(libcmocka-dev nodejs npm curl man-db)
+orb_test_packages=(libcmocka-dev curl man-db chromium)
 orb_long_packages=(clang libclang-rt-dev valgrind)
 
 # Installs those of its arguments that are missing, as root or through sudo; never asks.
@@ -28,4 +28,11 @@ orb_install_packages() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq update </dev/null
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -y -o Dpkg::Use-Pty=0 --no-install-recommends \
     install "${missing[@]}" </dev/null >/dev/null
+}
+
+# Node and npm, from wherever they are there already.
+orb_install_node() {
+  if ! command -v node >/dev/null || ! command -v npm >/dev/null; then
+    orb_install_packages nodejs npm
+  fi
 }

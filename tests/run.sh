@@ -8,6 +8,7 @@ cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/.."
 
 source deploy/packages.sh
 orb_install_packages "${orb_build_packages[@]}" "${orb_test_packages[@]}"
+orb_install_node
 if command -v ccache >/dev/null; then
   export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
 fi
@@ -17,6 +18,8 @@ if ! cmp -s tests/package-lock.json tests/node_modules/.installed-lock; then
   (cd tests && npm ci --no-audit --no-fund --loglevel=error)
   cp tests/package-lock.json tests/node_modules/.installed-lock
 fi
+
+bash client/web/build.sh
 
 cmake --preset release -DORB_WERROR=ON -DORB_TESTS=ON >/dev/null
 cmake --build build
