@@ -1,0 +1,295 @@
+/* Repairs and refusals on small solids whose topology is known, and the nearest point against a plain search. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "numeric/vec3.h"
+#include "orbmorph/format.h"
+
+static orb_context *ctx;
+
+static int set_up(void **state) {
+  (void)state;
+  orb_context_options options = {.threads = 1};
+  return orb_context_create(&options, &ctx) != ORB_OK;
+}
+static int tear_down(void **state) {
+  (void)state;
+  orb_context_destroy(ctx);
+  return 0;
+}
+
+static orb_status mend(const char *text, unsigned repair, orb_mesh *mesh) {
+  assert_int_equal(orb_mesh_read(ctx, (const unsigned char *)text, strlen(text), ORB_FORMAT_OBJ, mesh, NULL), ORB_OK);
+  orb_status status = orb_mesh_repair(ctx, mesh, repair);
+  if (status != ORB_OK) {
+    orb_mesh_free(ctx, mesh);
+  }
+  return status;
+}
+
+static int64_t repaired(const orb_mesh *mesh, const char *kind) {
+  for (int i = 0; i < mesh->repair_count; i++) {
+    if (strcmp(mesh->repairs[i].kind, kind) == 0) {
+      return mesh->repairs[i].count;
+    }
+  }
+  return 0;
+}
+
+#define TETRA_V "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+#define TETRA_F "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+static void test_safe(void **state) {
+  (void)state;
+  orb_mesh mesh;
+  orb_extent extent;
+  assert_int_equal(mend(TETRA_V TETRA_F, ORB_REPAIR_NONE, &mesh), ORB_OK);
+  assert_int_equal(mesh.repair_count, 0);
+  orb_mesh_free(ctx, &mesh);
+
+  /* inside out: turned, also by none */
+  assert_int_equal(mend(TETRA_V "f 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n", ORB_REPAIR_NONE, &mesh), ORB_OK);
+  assert_int_equal(repaired(&mesh, "turn-inside-out"), 4);
+  orb_mesh_extent(&mesh, &extent);
+  assert_true(fabs(extent.volume - 1.0 / 6) < 1e-15);
+  orb_mesh_free(ctx, &mesh);
+
+  /* one face turned, one repeated, one degenerate, one vertex unused (before the others: numbers move) */
+  const char *messy = "v 9 9 9\n" TETRA_V "f 2 4 3\nf 2 3 5\nf 2 4 5\nf 3 4 5\nf 5 4 3\nf 2 2 3\n";
+  assert_int_equal(mend(messy, ORB_REPAIR_NONE, &mesh), ORB_E_NOT_MANIFOLD);
+  assert_int_equal(mend(messy, ORB_REPAIR_SAFE, &mesh), ORB_OK);
+  assert_int_equal(repaired(&mesh, "reorient"), 1);
+  assert_int_equal(repaired(&mesh, "duplicate-faces"), 1);
+  assert_int_equal(repaired(&mesh, "degenerate-faces"), 1);
+  assert_int_equal(repaired(&mesh, "unused-vertices"), 1);
+  assert_int_equal(mesh.vertex_of_source[0], -1);
+  assert_int_equal(mesh.vertex_of_source[1], 0);
+  assert_int_equal(mesh.source[3], 4);
+  orb_mesh_extent(&mesh, &extent);
+  assert_true(fabs(extent.volume - 1.0 / 6) < 1e-15);
+  orb_mesh_free(ctx, &mesh);
+
+  /* a seam with −0 against 0 */
+  const char *seam = TETRA_V "v -0 0 -0\nv 1 -0 0\nf 5 3 6\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  assert_int_equal(mend(seam, ORB_REPAIR_SAFE, &mesh), ORB_OK);
+  assert_int_equal(repaired(&mesh, "weld"), 2);
+  assert_int_equal(mesh.vertex_count, 4);
+  assert_int_equal(mesh.vertex_of_source[4], 0);
+  assert_int_equal(mesh.vertex_of_source[5], 1);
+  orb_mesh_free(ctx, &mesh);
+}
+
+/* Eight corners, six quadrangles; with `loose` each face has corners of its own. */
+static void cube(char *out, size_t *length, double x, double y, int first, int loose) {
+  static const int face[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  char *p = out + *length;
+  for (int i = 0; i < (loose ? 24 : 8); i++) {
+    int c = loose ? face[i / 4][i % 4] : i;
+    p += sprintf(p, "v %g %g %d\n", x + (c & 1), y + (c >> 1 & 1), c >> 2);
+  }
+  for (int f = 0; f < 6; f++) {
+    p += sprintf(p, "f");
+    for (int k = 0; k < 4; k++) {
+      p += sprintf(p, " %d", first + (loose ? 4 * f + k : face[f][k]));
+    }
+    p += sprintf(p, "\n");
+  }
+  *length = (size_t)(p - out);
+}
+
+static void test_welding_of_cubes(void **state) {
+  (void)state;
+  char text[8192];
+  size_t length = 0;
+  orb_mesh mesh;
+  cube(text, &length, 0, 0, 1, 1);
+  assert_int_equal(mend(text, ORB_REPAIR_SAFE, &mesh), ORB_OK);
+  assert_int_equal(mesh.vertex_count, 8);
+  assert_int_equal(mesh.triangle_count, 12);
+  assert_int_equal(repaired(&mesh, "weld"), 16);
+  orb_mesh_free(ctx, &mesh);
+
+  /* two loose cubes that touch along an edge stay two cubes */
+  cube(text, &length, 1, 1, 25, 1);
+  assert_int_equal(mend(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CONNECTED);
+  assert_int_equal(orb_context_error(ctx)->component_total, 2);
+  assert_int_equal(orb_context_error(ctx)->components[0], 12);
+  assert_int_equal(mend(text, ORB_REPAIR_LARGEST_COMPONENT, &mesh), ORB_OK);
+  assert_int_equal(mesh.vertex_count, 8);
+  orb_mesh_free(ctx, &mesh);
+
+  /* closed ones that touch are not welded at all */
+  length = 0;
+  cube(text, &length, 0, 0, 1, 0);
+  cube(text, &length, 1, 0, 9, 0);
+  assert_int_equal(mend(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CONNECTED);
+}
+
+static void test_refusals(void **state) {
+  (void)state;
+  orb_mesh mesh;
+  const orb_error *error = orb_context_error(ctx);
+  assert_int_equal(mend("v 7 7 7\n" TETRA_V "f 2 4 3\nf 2 3 5\nf 2 5 4\n", ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CLOSED);
+  assert_int_equal(error->boundary_loops, 1);
+  assert_int_equal(error->edge_count, 3);
+  for (int i = 0; i < 3; i++) { /* the rim is 2 3 4, counted from 0 in the file */
+    assert_true(error->edges[i][0] >= 2 && error->edges[i][1] >= 2);
+  }
+  /* two faces back to back: one is left */
+  assert_int_equal(mend(TETRA_V "f 1 2 3\nf 1 3 2\n", ORB_REPAIR_SAFE, &mesh), ORB_E_DEGENERATE);
+  assert_int_equal(mend(TETRA_V "f 1 1 2\n", ORB_REPAIR_SAFE, &mesh), ORB_E_DEGENERATE);
+  assert_int_equal(mend(TETRA_V "f 1 3 2\nf 1 2 4\nf 1 3 4\nf 2 3 4\n", ORB_REPAIR_NONE, &mesh), ORB_E_NOT_ORIENTABLE);
+  /* an edge of three faces */
+  assert_int_equal(mend(TETRA_V "v 5 5 5\n" TETRA_F "f 1 2 5\n", ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_MANIFOLD);
+  assert_int_equal(error->edge_count, 1);
+  assert_true((error->edges[0][0] == 0 && error->edges[0][1] == 1) ||
+              (error->edges[0][0] == 1 && error->edges[0][1] == 0));
+  /* two tetrahedra that share vertex 0 only */
+  const char *pinched = TETRA_V "v -1 0 0\nv 0 -1 0\nv 0 0 -1\n" TETRA_F "f 1 5 6\nf 1 7 5\nf 1 6 7\nf 5 7 6\n";
+  assert_int_equal(mend(pinched, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_MANIFOLD);
+  assert_int_equal(error->vertices[0], 0);
+  assert_int_equal(error->component_total, 2);
+  assert_int_equal(mend(pinched, ORB_REPAIR_LARGEST_COMPONENT, &mesh), ORB_OK);
+  orb_mesh_free(ctx, &mesh);
+}
+
+/* A torus of n × n quadrangles: genus one. */
+static void test_torus(void **state) {
+  (void)state;
+  enum { N = 12 };
+  char text[65536], *p = text;
+  for (int i = 0; i < N * N; i++) {
+    double a = 2 * M_PI * (i / N) / N, b = 2 * M_PI * (i % N) / N;
+    p += sprintf(p, "v %.9f %.9f %.9f\n", (3 + cos(b)) * cos(a), (3 + cos(b)) * sin(a), sin(b));
+  }
+  for (int i = 0; i < N * N; i++) {
+    int r = i / N, c = i % N, d = (r + 1) % N, e = (c + 1) % N;
+    p += sprintf(p, "f %d %d %d %d\n", r * N + c + 1, d * N + c + 1, d * N + e + 1, r * N + e + 1);
+  }
+  orb_mesh mesh;
+  orb_topology topology;
+  assert_int_equal(orb_mesh_read(ctx, (unsigned char *)text, (size_t)(p - text), ORB_FORMAT_AUTO, &mesh, NULL), ORB_OK);
+  assert_int_equal(orb_mesh_topology(ctx, &mesh, &topology), ORB_OK);
+  assert_true(topology.genus == 1 && topology.components == 1 && topology.boundary_loops == 0);
+  assert_int_equal(orb_mesh_repair(ctx, &mesh, ORB_REPAIR_SAFE), ORB_E_NOT_GENUS_ZERO);
+  assert_int_equal(orb_context_error(ctx)->genus, 1);
+  orb_mesh_free(ctx, &mesh);
+}
+
+/* A sphere of rings without its caps: two loops; filled, its volume is that of the polyhedron with flat caps. */
+static void test_fill(void **state) {
+  (void)state;
+  for (int n = 5; n < 90; n += 40) { /* small loops and one that is cut as a polygon */
+    static char text[65536];
+    char *p = text;
+    for (int i = 0; i < 2 * n; i++) {
+      double a = 2 * M_PI * (i % n) / n;
+      p += sprintf(p, "v %.17g %.17g %d\n", cos(a), sin(a), i / n);
+    }
+    for (int i = 0; i < n; i++) {
+      int j = (i + 1) % n;
+      p += sprintf(p, "f %d %d %d %d\n", i + 1, j + 1, n + j + 1, n + i + 1);
+    }
+    orb_mesh mesh;
+    orb_extent extent;
+    assert_int_equal(mend(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CLOSED);
+    assert_int_equal(orb_context_error(ctx)->boundary_loops, 2);
+    assert_int_equal(mend(text, ORB_REPAIR_FILL_HOLES, &mesh), ORB_OK);
+    assert_int_equal(repaired(&mesh, "fill_holes"), 2);
+    assert_int_equal(mesh.triangle_count, 2 * n + 2 * (n - 2));
+    orb_mesh_extent(&mesh, &extent);
+    assert_true(fabs(extent.volume - 0.5 * n * sin(2 * M_PI / n)) < 1e-12); /* a prism of height 1 */
+    orb_mesh_free(ctx, &mesh);
+  }
+}
+
+/* A concave polygon: an L of area 3, extruded by nothing: the areas of its triangles must add up to its own. */
+static void test_concave_polygon(void **state) {
+  (void)state;
+  const char *text = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5 6\n";
+  orb_mesh mesh;
+  orb_extent extent;
+  assert_int_equal(orb_mesh_read(ctx, (const unsigned char *)text, strlen(text), ORB_FORMAT_AUTO, &mesh, NULL), ORB_OK);
+  assert_int_equal(mesh.triangle_count, 4);
+  orb_mesh_extent(&mesh, &extent);
+  assert_true(fabs(extent.area - 3) < 1e-15);
+  orb_mesh_free(ctx, &mesh);
+}
+
+static double uniform(uint64_t *seed) {
+  *seed = *seed * 6364136223846793005ull + 1442695040888963407ull;
+  return (double)(*seed >> 11) * 0x1p-53;
+}
+
+static void test_nearest(void **state) {
+  (void)state;
+  enum { COUNT = 500 };
+  static double positions[9 * COUNT];
+  static int32_t triangles[3 * COUNT];
+  uint64_t seed = 5;
+  for (int t = 0; t < COUNT; t++) {
+    double centre[3] = {uniform(&seed), uniform(&seed), uniform(&seed)};
+    for (int k = 0; k < 9; k++) {
+      positions[9 * t + k] = centre[k % 3] + 0.1 * uniform(&seed);
+    }
+    for (int k = 0; k < 3; k++) {
+      triangles[3 * t + k] = 3 * t + k;
+    }
+  }
+  orb_mesh mesh = {.positions = positions, .triangles = triangles, .vertex_count = 3 * COUNT, .triangle_count = COUNT};
+  orb_nearest *tree, *one;
+  assert_int_equal(orb_nearest_create(ctx, positions, triangles, COUNT, &tree), ORB_OK);
+  for (int q = 0; q < 300; q++) {
+    double p[3] = {3 * uniform(&seed) - 1, 3 * uniform(&seed) - 1, 3 * uniform(&seed) - 1}, at[3], best = INFINITY;
+    orb_place place, other;
+    double d2 = orb_nearest_query(tree, p, INFINITY, &place);
+    orb_place_position(&mesh, &place, at);
+    assert_true(fabs(orb_distance2(p, at) - d2) < 1e-12);
+    assert_true(fabs(place.at[0] + place.at[1] + place.at[2] - 1) < 1e-14);
+    for (int t = 0; t < COUNT; t++) { /* no point of a fine grid on any triangle is nearer */
+      for (int i = 0; i <= 8; i++) {
+        for (int j = 0; i + j <= 8; j++) {
+          orb_place grid = {t, {i / 8.0, j / 8.0, (8 - i - j) / 8.0}};
+          orb_place_position(&mesh, &grid, at);
+          best = fmin(best, orb_distance2(p, at));
+        }
+      }
+    }
+    assert_true(d2 <= best + 1e-12);
+    assert_true(orb_nearest_query(tree, p, d2 * 0.999, &other) == INFINITY && other.triangle == -1);
+    assert_int_equal(orb_nearest_create(ctx, positions, triangles + 3 * place.triangle, 1, &one), ORB_OK);
+    assert_true(fabs(orb_nearest_query(one, p, INFINITY, &other) - d2) < 1e-13);
+    orb_nearest_destroy(ctx, one);
+  }
+  orb_nearest_destroy(ctx, tree);
+}
+
+static void test_copy(void **state) {
+  (void)state;
+  orb_mesh mesh, copy;
+  assert_int_equal(mend(TETRA_V "vn 0 0 1\nvt 1 1\nusemtl a\nf 1/1/1 3/1/1 2/1/1\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+                        ORB_REPAIR_SAFE, &mesh),
+                   ORB_OK);
+  assert_int_equal(orb_mesh_copy(ctx, &mesh, &copy), ORB_OK);
+  assert_memory_equal(copy.positions, mesh.positions, 12 * sizeof(double));
+  assert_memory_equal(copy.normals, mesh.normals, 36 * sizeof(float));
+  assert_ptr_not_equal(copy.materials, mesh.materials);
+  orb_mesh_free(ctx, &mesh);
+  orb_mesh_free(ctx, &copy);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_safe),     cmocka_unit_test(test_welding_of_cubes),
+                                     cmocka_unit_test(test_refusals), cmocka_unit_test(test_torus),
+                                     cmocka_unit_test(test_fill),     cmocka_unit_test(test_concave_polygon),
+                                     cmocka_unit_test(test_nearest),  cmocka_unit_test(test_copy)};
+  return cmocka_run_group_tests(tests, set_up, tear_down);
+}
