@@ -34,9 +34,17 @@ typedef struct orb_supermesh {
   int32_t degree;             /* 1 */
 } orb_supermesh;
 
+/* Makes one supermesh for all aligned shapes; their meshes and points are certified, landmark vertices bit-equal where
+ * they are to be kept. Places are exact corners where a supermesh vertex is a vertex of the shape. Which methods keep
+ * all input vertices: overlay and subdivision; adaptive keeps the landmarks. options NULL: defaults. Errors:
+ * ORB_E_BAD_OPTION, ORB_E_UNSUPPORTED, ORB_E_TOO_LARGE, ORB_E_NOT_CERTIFIED. Stage "remesh". */
 ORB_MUST_CHECK orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
                                      int32_t landmark_count, const orb_remesh_options *options, orb_supermesh *out);
 void orb_supermesh_free(orb_context *ctx, orb_supermesh *supermesh);
+
+/* Certifies triangles and points, exactly: closed, manifold, connected, T = 2V − 4, every triangle positive, degree 1.
+ * Sets flipped and degree; ORB_E_NOT_CERTIFIED says what does not hold. orb_remesh() asks it of every result. O(T). */
+ORB_MUST_CHECK orb_status orb_supermesh_check(orb_context *ctx, orb_supermesh *supermesh);
 
 /* Point location on an embedded mesh by walking. The locator borrows its arrays; queries from any thread. */
 typedef struct orb_locator orb_locator;

@@ -1,0 +1,51 @@
+/* A net: a spherical triangulation that changes. Every operation keeps it closed, of genus zero, and each triangle
+ * strictly positive under the exact orientation; an operation that cannot is refused and changes nothing. */
+#ifndef ORB_REMESH_NET_H
+#define ORB_REMESH_NET_H
+
+#include "orbmorph/remesh.h"
+#include "remesh/walk.h"
+
+typedef struct orb_net {
+  int32_t vertex_count, vertex_capacity, triangle_count, triangle_capacity;
+  double *points;     /* 3 a vertex */
+  int32_t *triangles; /* 3 a triangle; first corner −1: dead */
+  int32_t *twin;      /* a half-edge */
+  int32_t *out;       /* a vertex: a half-edge that leaves it; −1: dead */
+} orb_net;
+
+/* Copies a certified triangulation, with room for vertex_capacity vertices. */
+ORB_MUST_CHECK orb_status orb_net_init(orb_context *ctx, orb_net *net, const double *points, int32_t vertex_count,
+                                       const int32_t *triangles, int32_t triangle_count, int64_t vertex_capacity);
+void orb_net_free(orb_context *ctx, orb_net *net);
+
+/* Makes room for `more` further vertices. */
+ORB_MUST_CHECK orb_status orb_net_reserve(orb_context *ctx, orb_net *net, int64_t more);
+
+orb_sphere_view orb_net_view(const orb_net *net);
+static inline const double *orb_net_point(const orb_net *net, int32_t v) {
+  return net->points + 3 * (int64_t)v;
+}
+
+/* Makes p a vertex: the existing one where p coincides, else by splitting the edge or triangle that holds it; the new
+ * vertex is then number vertex_count. Needs room for one vertex. *triangle: a walk's start in, a triangle at p out. */
+int32_t orb_net_insert(orb_net *net, const double p[3], int32_t *triangle);
+
+/* Whether half-edge h may be turned: the new edge exists nowhere else and both new triangles are positive. */
+int orb_net_can_flip(const orb_net *net, int32_t h);
+
+/* Turns the edge of h: of triangles (a,b,c) and (b,a,d) with h = a→b makes (c,d,b) and (d,c,a), in the same two
+ * slots; h is then c→d. Ask orb_net_can_flip() first. */
+void orb_net_flip(orb_net *net, int32_t h);
+
+/* Moves a vertex if every triangle around it stays positive; returns whether it did. */
+int orb_net_move(orb_net *net, int32_t v, const double p[3]);
+
+/* Turns edges until all are Delaunay (empty circles on the sphere) as far as rounding tells. */
+ORB_MUST_CHECK orb_status orb_net_delaunay(orb_context *ctx, orb_net *net);
+
+/* Hands the live part over as a supermesh's triangles and points (arrays of the caller), numbering kept where all
+ * live; map (vertex_count, may be NULL) gets the new numbers. */
+ORB_MUST_CHECK orb_status orb_net_export(orb_context *ctx, const orb_net *net, orb_supermesh *out, int32_t *map);
+
+#endif

@@ -1,0 +1,203 @@
+/* orb_remesh(): checks the request, prepares the shapes, hands over to the method, then finds the landmarks and
+ * certifies what came back. A result that fails its certificate is an error, never a result. */
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "remesh/methods.h"
+
+void orb_remesh_defaults(orb_remesh_options *options) {
+  *options = (orb_remesh_options){.method = ORB_REMESH_ADAPTIVE, .tolerance = 0.001, .max_triangles = 0};
+}
+
+void orb_supermesh_free(orb_context *ctx, orb_supermesh *supermesh) {
+  orb_free(ctx, supermesh->triangles);
+  orb_free(ctx, supermesh->points);
+  orb_free(ctx, supermesh->places);
+  orb_free(ctx, supermesh->landmark_vertices);
+  orb_free(ctx, supermesh->error_bound);
+  memset(supermesh, 0, sizeof *supermesh);
+}
+
+typedef struct places_loop {
+  const orb_remesh_job *job;
+  orb_supermesh *out;
+} places_loop;
+
+static void locate_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  places_loop *loop = arg;
+  for (int64_t i = begin; i < end; i++) {
+    int32_t s = (int32_t)(i / loop->out->vertex_count), v = (int32_t)(i % loop->out->vertex_count);
+    orb_locate(loop->job->locator[s], loop->out->points + 3 * (int64_t)v, -1, &loop->out->places[i]);
+  }
+}
+
+orb_status orb_remesh_places(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
+  int64_t count = (int64_t)job->shape_count * out->vertex_count;
+  out->places = ORB_NEW(ctx, orb_place, count);
+  if (!out->places) {
+    return ORB_E_NO_MEMORY;
+  }
+  places_loop loop = {job, out};
+  orb_parallel_for(ctx, count, 1024, locate_range, &loop);
+  return orb_context_check(ctx);
+}
+
+static orb_status check_request(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
+                                const orb_remesh_options *options) {
+  if (shape_count < 1) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION, "A supermesh needs at least one shape.");
+  }
+  if (!(options->tolerance > 0) || !isfinite(options->tolerance)) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION, "remesh.tolerance must be a positive number.");
+  }
+  if (options->max_triangles < 0 || (options->max_triangles > 0 && options->max_triangles < 4)) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION, "remesh.max_triangles must be at least 4, or 0 for no limit.");
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    const orb_mesh *mesh = &shapes[s].mesh;
+    if (mesh->triangle_count < 4 || mesh->triangle_count != 2 * (int64_t)mesh->vertex_count - 4) {
+      orb_status status =
+          orb_fail(ctx, ORB_E_NOT_GENUS_ZERO, "Shape %d is not a closed surface of genus zero in one piece.", s);
+      orb_context_error_edit(ctx)->shape = s;
+      return status;
+    }
+  }
+  return ORB_OK;
+}
+
+static orb_status prepare(orb_context *ctx, orb_remesh_job *job) {
+  job->twin = ORB_NEW0(ctx, int32_t *, job->shape_count);
+  job->locator = ORB_NEW0(ctx, orb_locator *, job->shape_count);
+  job->diagonal = ORB_NEW0(ctx, double, job->shape_count);
+  if (!job->twin || !job->locator || !job->diagonal) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t s = 0; s < job->shape_count; s++) {
+    const orb_aligned_shape *shape = &job->shapes[s];
+    const orb_mesh *mesh = &shape->mesh;
+    orb_extent extent;
+    orb_mesh_extent(mesh, &extent);
+    job->diagonal[s] = extent.diagonal;
+    job->twin[s] = ORB_NEW(ctx, int32_t, 3 * (int64_t)mesh->triangle_count);
+    if (!job->twin[s]) {
+      return ORB_E_NO_MEMORY;
+    }
+    ORB_TRY(orb_mesh_twins(ctx, mesh->triangles, mesh->triangle_count, mesh->vertex_count, job->twin[s]));
+    ORB_TRY(orb_locator_create(ctx, shape->points, mesh->vertex_count, mesh->triangles, mesh->triangle_count,
+                               job->twin[s], &job->locator[s]));
+    ORB_TRY(orb_context_check(ctx));
+  }
+  return ORB_OK;
+}
+
+static void release(orb_context *ctx, orb_remesh_job *job) {
+  for (int32_t s = 0; s < job->shape_count; s++) {
+    if (job->locator) {
+      orb_locator_destroy(ctx, job->locator[s]);
+    }
+    if (job->twin) {
+      orb_free(ctx, job->twin[s]);
+    }
+  }
+  orb_free(ctx, job->locator);
+  orb_free(ctx, job->twin);
+  orb_free(ctx, job->diagonal);
+}
+
+/* The supermesh vertex whose place on every shape is the landmark's vertex; −1 where there is none. */
+static int32_t landmark_vertex(const orb_remesh_job *job, const orb_supermesh *out, const orb_locator *locator,
+                               int32_t landmark) {
+  int32_t first = job->shapes[0].landmark_vertices ? job->shapes[0].landmark_vertices[landmark] : -1;
+  if (first < 0) {
+    return -1;
+  }
+  orb_place place;
+  orb_locate(locator, job->shapes[0].points + 3 * (int64_t)first, -1, &place);
+  int corner = place.at[0] == 1 ? 0 : place.at[1] == 1 ? 1 : place.at[2] == 1 ? 2 : -1;
+  if (corner < 0) {
+    return -1;
+  }
+  int32_t v = out->triangles[3 * place.triangle + corner];
+  for (int32_t s = 0; s < job->shape_count; s++) {
+    const int32_t *vertices = job->shapes[s].landmark_vertices;
+    const orb_place *at = &out->places[(int64_t)s * out->vertex_count + v];
+    int k = at->at[0] == 1 ? 0 : at->at[1] == 1 ? 1 : at->at[2] == 1 ? 2 : -1;
+    if (!vertices || k < 0 || job->shapes[s].mesh.triangles[3 * at->triangle + k] != vertices[landmark]) {
+      return -1;
+    }
+  }
+  return v;
+}
+
+static orb_status find_landmarks(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
+  out->landmark_count = job->landmark_count;
+  out->landmark_vertices = ORB_NEW(ctx, int32_t, job->landmark_count);
+  if (!out->landmark_vertices) {
+    return ORB_E_NO_MEMORY;
+  }
+  if (job->landmark_count == 0) {
+    return ORB_OK;
+  }
+  orb_locator *locator = NULL;
+  ORB_TRY(orb_locator_create(ctx, out->points, out->vertex_count, out->triangles, out->triangle_count, NULL, &locator));
+  for (int32_t i = 0; i < job->landmark_count; i++) {
+    out->landmark_vertices[i] = landmark_vertex(job, out, locator, i);
+  }
+  orb_locator_destroy(ctx, locator);
+  return ORB_OK;
+}
+
+static orb_status run_method(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
+  switch (job->options->method) {
+    case ORB_REMESH_SUBDIVISION:
+      return orb_remesh_subdivision(ctx, job, out);
+    case ORB_REMESH_ADAPTIVE:
+      return orb_fail(ctx, ORB_E_UNSUPPORTED, "The remesh method 'adaptive' is not built yet; use 'subdivision'.");
+    case ORB_REMESH_OVERLAY:
+      return orb_fail(ctx, ORB_E_UNSUPPORTED, "The remesh method 'overlay' is not built yet; use 'subdivision'.");
+    case ORB_REMESH_CONVEX_HULL:
+      return orb_fail(ctx, ORB_E_UNSUPPORTED, "The remesh method 'convex-hull' is not built yet; use 'subdivision'.");
+  }
+  return orb_fail(ctx, ORB_E_BAD_OPTION, "Unknown remesh method %d.", (int)job->options->method);
+}
+
+orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count, int32_t landmark_count,
+                      const orb_remesh_options *options, orb_supermesh *out) {
+  memset(out, 0, sizeof *out);
+  orb_remesh_options defaults;
+  if (!options) {
+    orb_remesh_defaults(&defaults);
+    options = &defaults;
+  }
+  ORB_TRY(check_request(ctx, shapes, shape_count, options));
+  orb_remesh_job job = {
+      .shapes = shapes, .shape_count = shape_count, .landmark_count = landmark_count, .options = options};
+  orb_progress(ctx, "remesh", 0);
+  out->shape_count = shape_count;
+  orb_status status = prepare(ctx, &job);
+  if (status == ORB_OK) {
+    out->error_bound = ORB_NEW(ctx, double, shape_count);
+    status = out->error_bound ? ORB_OK : ORB_E_NO_MEMORY;
+  }
+  for (int32_t s = 0; s < shape_count && status == ORB_OK; s++) {
+    out->error_bound[s] = NAN;
+  }
+  if (status == ORB_OK) {
+    status = run_method(ctx, &job, out);
+  }
+  if (status == ORB_OK) {
+    status = find_landmarks(ctx, &job, out);
+  }
+  if (status == ORB_OK) {
+    status = orb_supermesh_check(ctx, out);
+  }
+  release(ctx, &job);
+  if (status != ORB_OK) {
+    orb_supermesh_free(ctx, out);
+    return status;
+  }
+  orb_progress(ctx, "remesh", 1);
+  return ORB_OK;
+}
