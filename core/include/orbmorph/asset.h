@@ -22,11 +22,31 @@ typedef struct orb_asset_options {
 } orb_asset_options;
 void orb_asset_defaults(orb_asset_options *options);
 
-/* Appends the GLB. names: shape_count names. Every vertex that normals or seams split keeps bit-equal POSITION and
- * deltas. ORB_E_NOT_CERTIFIED where two different supermesh vertices would coincide in every shape after rounding. */
+/* What was written. */
+typedef struct orb_asset_facts {
+  int32_t vertex_count; /* after splits for normals, seams and materials */
+  int32_t triangle_count;
+  int32_t primitive_count;    /* one a material that is used */
+  int32_t target_count;       /* further shapes, then in-betweens */
+  int32_t morphed_attributes; /* of all targets together; a client need support only 8 at once */
+  int32_t nudged_vertices;    /* moved by units in the last place to keep them apart, see orb_asset_write() */
+} orb_asset_facts;
+
+/* Appends the GLB. names: shape_count names of the morph targets (the first names the mesh); equal names get a number.
+ * The base is the first shape; targets are the further shapes in their order, then in-betweens. facts may be NULL.
+ *
+ * Normals: the file's where it has them, its hard edges kept by splitting vertices; else angle-weighted vertex normals
+ * of the input surface, interpolated at each place. Every vertex that is split keeps bit-equal POSITION and deltas.
+ * Texture coordinates, materials and their images are those of the first shape.
+ *
+ * Two different supermesh vertices that would coincide in every shape after rounding to float32 are kept apart: the
+ * later one that is no landmark moves on the first shape by the fewest units in the last place of its largest
+ * coordinates (at most 16). ORB_E_NOT_CERTIFIED where that does not suffice.
+ *
+ * Errors: ORB_E_BAD_OPTION, ORB_E_TOO_LARGE (4 GiB), ORB_E_NO_MEMORY. Stage "write". O(V·N). */
 ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh,
                                           const orb_aligned_shape *shapes, const char *const *names,
-                                          const orb_asset_options *options, orb_buffer *out);
+                                          const orb_asset_options *options, orb_asset_facts *facts, orb_buffer *out);
 
 #ifdef __cplusplus
 }

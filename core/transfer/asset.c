@@ -1,0 +1,175 @@
+/* orb_asset_write(): the steps of draft.h in their order. */
+#include "orbmorph/asset.h"
+
+#include <string.h>
+
+#include "base/check.h"
+#include "transfer/distinct.h"
+#include "transfer/draft.h"
+#include "transfer/fit.h"
+
+void orb_asset_defaults(orb_asset_options *options) {
+  *options = (orb_asset_options){.normals = 1, .path_steps = 3};
+}
+
+static orb_status check_options(orb_context *ctx, const orb_supermesh *supermesh, const orb_asset_options *options) {
+  if (supermesh->shape_count < 2) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION, "An asset needs two shapes or more.");
+  }
+  if (options->path == ORB_PATH_RIGID && (options->path_steps < 1 || options->path_steps > 64)) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION, "path_steps is %d; give 1 to 64.", (int)options->path_steps);
+  }
+  return ORB_OK;
+}
+
+static void draft_free(orb_context *ctx, orb_draft *draft) {
+  for (int32_t f = 0; f < draft->frame_count; f++) {
+    if (draft->positions) {
+      orb_free(ctx, draft->positions[f]);
+    }
+    if (draft->deltas && f > 0) {
+      orb_free(ctx, draft->deltas[f - 1]);
+    }
+    if (draft->normals) {
+      orb_wedges_free(ctx, &draft->normals[f]);
+    }
+    if (draft->colors) {
+      orb_wedges_free(ctx, &draft->colors[f]);
+    }
+  }
+  for (int32_t p = 0; p < draft->part_count; p++) {
+    orb_free(ctx, draft->parts[p].indices);
+    orb_free(ctx, draft->parts[p].corners);
+  }
+  orb_wedges_free(ctx, &draft->texcoords);
+  orb_free(ctx, draft->positions);
+  orb_free(ctx, draft->base);
+  orb_free(ctx, draft->deltas);
+  orb_free(ctx, draft->normals);
+  orb_free(ctx, draft->colors);
+  orb_free(ctx, draft->home);
+  orb_free(ctx, draft->parts);
+}
+
+static orb_status draft_room(orb_context *ctx, orb_draft *draft) {
+  size_t frames = (size_t)draft->frame_count, size = 3 * (size_t)draft->supermesh->vertex_count;
+  draft->positions = ORB_NEW0(ctx, double *, frames);
+  draft->deltas = ORB_NEW0(ctx, float *, frames);
+  draft->base = ORB_NEW(ctx, float, size);
+  draft->colors = ORB_NEW0(ctx, orb_wedges, frames);
+  draft->normals = draft->options->normals ? ORB_NEW0(ctx, orb_wedges, frames) : NULL;
+  if (!draft->positions || !draft->deltas || !draft->base || !draft->colors ||
+      (draft->options->normals && !draft->normals)) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (size_t f = 0; f < frames; f++) {
+    draft->positions[f] = ORB_NEW(ctx, double, size);
+    if (!draft->positions[f] || (f > 0 && !(draft->deltas[f - 1] = ORB_NEW(ctx, float, size)))) {
+      return ORB_E_NO_MEMORY;
+    }
+  }
+  return ORB_OK;
+}
+
+/* Positions and normals of the shapes, the later ones moved onto the first. */
+static orb_status make_shapes(orb_context *ctx, orb_draft *draft) {
+  const orb_supermesh *supermesh = draft->supermesh;
+  for (int32_t s = 0; s < draft->shape_count; s++) {
+    const orb_place *places = supermesh->places + (int64_t)s * supermesh->vertex_count;
+    ORB_TRY(orb_transfer_positions(ctx, &draft->shapes[s], places, supermesh->vertex_count, draft->positions[s]));
+    if (draft->normals) {
+      ORB_TRY(orb_wedge_normals(ctx, supermesh, &draft->shapes[s], s, &draft->normals[s]));
+    }
+    if (s > 0 && draft->options->fit != ORB_FIT_NONE) {
+      orb_motion motion;
+      ORB_TRY(orb_fit_motion(ctx, supermesh, draft->positions[0], draft->positions[s], draft->options->fit, &motion));
+      orb_motion_apply(&motion, draft->positions[s], supermesh->vertex_count);
+      if (draft->normals) {
+        orb_motion_turn(&motion, draft->normals[s].values, draft->normals[s].value_count);
+      }
+    }
+    orb_progress(ctx, "write", 0.3 * (s + 1) / draft->shape_count);
+  }
+  return ORB_OK;
+}
+
+static orb_status white_colors(orb_context *ctx, const orb_supermesh *supermesh, orb_wedges *out) {
+  out->width = 4;
+  out->value_count = supermesh->vertex_count;
+  out->values = ORB_NEW(ctx, float, 4 * (int64_t)supermesh->vertex_count);
+  if (!out->values) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int64_t i = 0; i < 4 * (int64_t)supermesh->vertex_count; i++) {
+    out->values[i] = 1;
+  }
+  return ORB_OK;
+}
+
+static void clamp_colors(orb_wedges *colors) {
+  for (int64_t i = 0; i < (int64_t)colors->width * colors->value_count; i++) {
+    float value = colors->values[i];
+    colors->values[i] = value >= 0 && value <= 1 ? value : value > 1 ? 1 : 0;
+  }
+}
+
+/* Colours of the first shape where it has them; of all shapes where asked and any has them, white standing for none. */
+static orb_status make_colors(orb_context *ctx, orb_draft *draft) {
+  int any = draft->shapes[0].mesh.colors != NULL;
+  draft->color_count = any;
+  for (int32_t s = 1; draft->options->colors && s < draft->shape_count; s++) {
+    if (draft->shapes[s].mesh.colors) {
+      draft->color_count = draft->frame_count;
+    }
+  }
+  for (int32_t s = 0; s < draft->color_count && s < draft->shape_count; s++) {
+    if (draft->shapes[s].mesh.colors) {
+      ORB_TRY(orb_wedge_colors(ctx, draft->supermesh, &draft->shapes[s], s, &draft->colors[s]));
+    } else {
+      ORB_TRY(white_colors(ctx, draft->supermesh, &draft->colors[s]));
+    }
+    clamp_colors(&draft->colors[s]);
+  }
+  return ORB_OK;
+}
+
+static orb_status round_frames(orb_context *ctx, orb_draft *draft) {
+  const orb_supermesh *supermesh = draft->supermesh;
+  unsigned char *keep = ORB_NEW0(ctx, unsigned char, supermesh->vertex_count);
+  if (!keep) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < supermesh->landmark_count; i++) {
+    if (supermesh->landmark_vertices[i] >= 0) {
+      keep[supermesh->landmark_vertices[i]] = 1;
+    }
+  }
+  orb_status status = orb_round_distinct(ctx, draft->positions, draft->frame_count, draft->shape_count,
+                                         supermesh->vertex_count, keep, draft->base, draft->deltas, &draft->nudged);
+  orb_free(ctx, keep);
+  return status;
+}
+
+orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
+                           const char *const *names, const orb_asset_options *options, orb_asset_facts *facts,
+                           orb_buffer *out) {
+  ORB_TRY(check_options(ctx, supermesh, options));
+  orb_asset_facts unused;
+  orb_draft draft = {.supermesh = supermesh,
+                     .shapes = shapes,
+                     .options = options,
+                     .shape_count = supermesh->shape_count,
+                     .frame_count = supermesh->shape_count};
+  orb_status status;
+  orb_progress(ctx, "write", 0);
+  ORB_GO(status, draft_room(ctx, &draft), done);
+  ORB_GO(status, make_shapes(ctx, &draft), done);
+  ORB_GO(status, make_colors(ctx, &draft), done);
+  ORB_GO(status, round_frames(ctx, &draft), done);
+  ORB_GO(status, orb_draft_split(ctx, &draft), done);
+  ORB_GO(status, orb_draft_write(ctx, &draft, names, facts ? facts : &unused, out), done);
+  orb_progress(ctx, "write", 1);
+done:
+  draft_free(ctx, &draft);
+  return status;
+}

@@ -1,0 +1,188 @@
+/* Why: a caller who welds a GLB's split vertices by their bits must get the supermesh back. Shapes may hold distinct
+ * vertices at one place, and fine supermeshes vertices nearer than float32 can tell apart.
+ *
+ * Vertices go one by one into a hash table keyed by the float32 positions on every shape, those to keep first, then by
+ * number. One that finds its key taken tries base coordinates ±1, ±2, … units in the last place away, the coordinate of
+ * the largest magnitude first (a small one may be near zero, where a unit would be lost to flushed denormals).
+ */
+#include "transfer/distinct.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+
+enum { MAX_ULPS = 16, GRAIN = 16384 };
+
+typedef struct rounding {
+  double *const *positions;
+  float *base, *const *deltas;
+  int32_t frame_count, shapes, vertex_count;
+  int32_t *slots; /* the hash table: vertex numbers, −1 empty */
+  uint64_t mask;
+} rounding;
+
+/* Rounds vertex v's deltas against its base position. */
+static void round_deltas(const rounding *r, int64_t v) {
+  for (int32_t f = 1; f < r->frame_count; f++) {
+    for (int c = 0; c < 3; c++) {
+      r->deltas[f - 1][3 * v + c] = (float)(r->positions[f][3 * v + c] - (double)r->base[3 * v + c]) + 0.0f;
+    }
+  }
+}
+
+static void round_body(void *arg, int64_t begin, int64_t end, int thread) {
+  rounding *r = arg;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    for (int c = 0; c < 3; c++) {
+      r->base[3 * v + c] = (float)r->positions[0][3 * v + c] + 0.0f;
+    }
+    round_deltas(r, v);
+  }
+}
+
+/* Coordinate c of vertex v on shape f as a client computes it. */
+static float shown(const rounding *r, int64_t v, int32_t f, int c) {
+  float base = r->base[3 * v + c];
+  return f == 0 ? base : base + r->deltas[f - 1][3 * v + c] + 0.0f;
+}
+
+static uint64_t hash_of(const rounding *r, int64_t v) {
+  uint64_t hash = 0x9e3779b97f4a7c15u;
+  for (int32_t f = 0; f < r->shapes; f++) {
+    for (int c = 0; c < 3; c++) {
+      float value = shown(r, v, f, c);
+      uint32_t bits;
+      memcpy(&bits, &value, sizeof bits);
+      hash = (hash ^ bits) * 0xff51afd7ed558ccdu;
+      hash ^= hash >> 32;
+    }
+  }
+  return hash;
+}
+
+static int coincide(const rounding *r, int64_t a, int64_t b) {
+  for (int32_t f = 0; f < r->shapes; f++) {
+    for (int c = 0; c < 3; c++) {
+      if (shown(r, a, f, c) != shown(r, b, f, c)) {
+        return 0;
+      }
+    }
+  }
+  return 1;
+}
+
+/* Puts v into the table; 0 if its key is taken. */
+static int insert(rounding *r, int64_t v) {
+  uint64_t slot = hash_of(r, v) & r->mask;
+  while (r->slots[slot] >= 0) {
+    if (coincide(r, v, r->slots[slot])) {
+      return 0;
+    }
+    slot = (slot + 1) & r->mask;
+  }
+  r->slots[slot] = (int32_t)v;
+  return 1;
+}
+
+/* The coordinates in falling magnitude. */
+static void axis_order(const float p[3], int order[3]) {
+  order[0] = 0, order[1] = 1, order[2] = 2;
+  for (int i = 0; i < 2; i++) {
+    for (int j = 0; j < 2; j++) {
+      if (fabsf(p[order[j]]) < fabsf(p[order[j + 1]])) {
+        int t = order[j];
+        order[j] = order[j + 1];
+        order[j + 1] = t;
+      }
+    }
+  }
+}
+
+static int nudge(rounding *r, int64_t v) {
+  float *p = r->base + 3 * v, from[3] = {p[0], p[1], p[2]}, moved[2][3];
+  int order[3];
+  axis_order(from, order);
+  memcpy(moved[0], from, sizeof from);
+  memcpy(moved[1], from, sizeof from);
+  for (int step = 0; step < MAX_ULPS; step++) {
+    for (int side = 0; side < 2; side++) {
+      for (int i = 0; i < 3; i++) {
+        int c = order[i];
+        moved[side][c] = nextafterf(moved[side][c], side ? INFINITY : -INFINITY);
+        if (i > 0 && fabsf(moved[side][c]) < 1e-30f) {
+          continue;
+        }
+        memcpy(p, from, sizeof from);
+        p[c] = moved[side][c] + 0.0f;
+        round_deltas(r, v);
+        if (isfinite(p[c]) && insert(r, v)) {
+          return 1;
+        }
+      }
+    }
+  }
+  return 0;
+}
+
+static orb_status keep_apart(orb_context *ctx, rounding *r, const unsigned char *keep, int32_t *nudged) {
+  for (int pass = 1; pass >= 0; pass--) {
+    for (int32_t v = 0; v < r->vertex_count; v++) {
+      if ((keep[v] != 0) != pass) {
+        continue;
+      }
+      if (!insert(r, v)) {
+        if (!nudge(r, v)) {
+          return orb_fail(ctx, ORB_E_NOT_CERTIFIED,
+                          "Vertices of the supermesh coincide in every shape in 32-bit coordinates; move the shapes "
+                          "nearer to the origin or ask for fewer triangles.");
+        }
+        (*nudged)++;
+      }
+      if ((v & 0x3fff) == 0) {
+        ORB_TRY(orb_context_check(ctx));
+      }
+    }
+  }
+  return ORB_OK;
+}
+
+static orb_status check_range(orb_context *ctx, const rounding *r) {
+  for (int32_t f = 0; f < r->frame_count; f++) {
+    const float *values = f == 0 ? r->base : r->deltas[f - 1];
+    for (int64_t i = 0; i < 3 * (int64_t)r->vertex_count; i++) {
+      if (!isfinite(values[i])) {
+        orb_status status = orb_fail(ctx, ORB_E_NOT_CERTIFIED,
+                                     "Coordinates are too large for the 32-bit numbers of glTF; scale the shape down.");
+        orb_context_error_edit(ctx)->shape = f < r->shapes ? f : -1;
+        return status;
+      }
+    }
+  }
+  return ORB_OK;
+}
+
+orb_status orb_round_distinct(orb_context *ctx, double *const *positions, int32_t frame_count, int32_t shapes,
+                              int32_t vertex_count, const unsigned char *keep, float *base, float *const *deltas,
+                              int32_t *nudged) {
+  rounding r = {positions, base, deltas, frame_count, shapes, vertex_count, NULL, 0};
+  uint64_t size = 64;
+  while (size < 2 * (uint64_t)vertex_count) {
+    size *= 2;
+  }
+  r.mask = size - 1;
+  r.slots = ORB_NEW(ctx, int32_t, size);
+  if (!r.slots) {
+    return ORB_E_NO_MEMORY;
+  }
+  memset(r.slots, -1, size * sizeof *r.slots);
+  *nudged = 0;
+  orb_parallel_for(ctx, vertex_count, GRAIN, round_body, &r);
+  orb_status status = check_range(ctx, &r);
+  if (status == ORB_OK) {
+    status = keep_apart(ctx, &r, keep, nudged);
+  }
+  orb_free(ctx, r.slots);
+  return status;
+}

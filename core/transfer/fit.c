@@ -1,0 +1,152 @@
+#include "transfer/fit.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "numeric/vec3.h"
+#include "transfer/rotation.h"
+
+/* Weighted points of both shapes: index NULL is all vertices, weight NULL is 1. */
+typedef struct fit_points {
+  const double *fixed, *moved, *weight;
+  const int32_t *index;
+  int32_t count;
+} fit_points;
+
+static int32_t point_of(const fit_points *points, int32_t i) {
+  return points->index ? points->index[i] : i;
+}
+
+static void mean_of(const fit_points *points, const double *positions, double out[3]) {
+  double sum[3] = {0}, total = 0;
+  for (int32_t i = 0; i < points->count; i++) {
+    double w = points->weight ? points->weight[i] : 1;
+    const double *p = positions + 3 * (int64_t)point_of(points, i);
+    for (int c = 0; c < 3; c++) {
+      sum[c] += w * p[c];
+    }
+    total += w;
+  }
+  for (int c = 0; c < 3; c++) {
+    out[c] = total > 0 ? sum[c] / total : 0;
+  }
+}
+
+/* Whether the chosen points of a shape span more than a line: the largest triangle with the two farthest apart. */
+static int spans_plane(const fit_points *points, const double *positions) {
+  double longest = 0, widest = 0;
+  const double *a = positions + 3 * (int64_t)point_of(points, 0), *b = a;
+  for (int32_t i = 1; i < points->count; i++) {
+    const double *p = positions + 3 * (int64_t)point_of(points, i);
+    if (orb_distance2(a, p) > longest) {
+      longest = orb_distance2(a, p);
+      b = p;
+    }
+  }
+  for (int32_t i = 1; i < points->count; i++) {
+    double u[3], w[3], n[3];
+    orb_sub(b, a, u);
+    orb_sub(positions + 3 * (int64_t)point_of(points, i), a, w);
+    orb_cross(u, w, n);
+    widest = fmax(widest, orb_length(n));
+  }
+  return widest > 1e-3 * longest;
+}
+
+static void add_areas(const orb_supermesh *supermesh, const double *positions, double *weight) {
+  double total = 0;
+  for (int pass = 0; pass < 2; pass++) {
+    for (int32_t t = 0; t < supermesh->triangle_count; t++) {
+      const int32_t *corner = supermesh->triangles + 3 * (int64_t)t;
+      double u[3], w[3], n[3];
+      orb_sub(positions + 3 * (int64_t)corner[1], positions + 3 * (int64_t)corner[0], u);
+      orb_sub(positions + 3 * (int64_t)corner[2], positions + 3 * (int64_t)corner[0], w);
+      orb_cross(u, w, n);
+      double area = orb_length(n);
+      if (pass == 0) {
+        total += area;
+      } else if (total > 0) {
+        for (int k = 0; k < 3; k++) {
+          weight[corner[k]] += area / total;
+        }
+      }
+    }
+  }
+}
+
+static void solve(const fit_points *points, orb_fit fit, orb_motion *out) {
+  double fixed[3], moved[3], h[3][3] = {{0}}, spread_fixed = 0, spread_moved = 0, q[4];
+  mean_of(points, points->fixed, fixed);
+  mean_of(points, points->moved, moved);
+  for (int32_t i = 0; i < points->count; i++) {
+    double w = points->weight ? points->weight[i] : 1, a[3], b[3];
+    orb_sub(points->moved + 3 * (int64_t)point_of(points, i), moved, a);
+    orb_sub(points->fixed + 3 * (int64_t)point_of(points, i), fixed, b);
+    for (int r = 0; r < 3; r++) {
+      for (int c = 0; c < 3; c++) {
+        h[r][c] += w * a[r] * b[c];
+      }
+    }
+    spread_moved += w * orb_dot(a, a);
+    spread_fixed += w * orb_dot(b, b);
+  }
+  orb_rotation_fit(h, q);
+  orb_rotation_matrix(q, out->rotation);
+  out->scale =
+      fit == ORB_FIT_SIMILARITY && spread_moved > 0 && spread_fixed > 0 ? sqrt(spread_fixed / spread_moved) : 1;
+  for (int c = 0; c < 3; c++) {
+    out->shift[c] = fixed[c] - out->scale * orb_dot(out->rotation[c], moved);
+  }
+}
+
+orb_status orb_fit_motion(orb_context *ctx, const orb_supermesh *supermesh, const double *fixed, const double *moved,
+                          orb_fit fit, orb_motion *out) {
+  *out = (orb_motion){.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .scale = 1};
+  if (fit == ORB_FIT_NONE) {
+    return ORB_OK;
+  }
+  fit_points points = {fixed, moved, NULL, NULL, supermesh->vertex_count};
+  int32_t *index = ORB_NEW(ctx, int32_t, supermesh->landmark_count);
+  double *weight = ORB_NEW0(ctx, double, supermesh->vertex_count);
+  orb_status status = index && weight ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    int32_t count = 0;
+    for (int32_t i = 0; i < supermesh->landmark_count; i++) {
+      if (supermesh->landmark_vertices[i] >= 0) {
+        index[count++] = supermesh->landmark_vertices[i];
+      }
+    }
+    fit_points landmarks = {fixed, moved, NULL, index, count};
+    if (count >= 3 && spans_plane(&landmarks, fixed) && spans_plane(&landmarks, moved)) {
+      points = landmarks;
+    } else {
+      add_areas(supermesh, fixed, weight);
+      add_areas(supermesh, moved, weight);
+      points.weight = weight;
+    }
+    solve(&points, fit, out);
+  }
+  orb_free(ctx, index);
+  orb_free(ctx, weight);
+  return status;
+}
+
+void orb_motion_apply(const orb_motion *motion, double *positions, int32_t count) {
+  for (int32_t i = 0; i < count; i++) {
+    double *p = positions + 3 * (int64_t)i, from[3] = {p[0], p[1], p[2]};
+    for (int c = 0; c < 3; c++) {
+      p[c] = motion->scale * orb_dot(motion->rotation[c], from) + motion->shift[c];
+    }
+  }
+}
+
+void orb_motion_turn(const orb_motion *motion, float *vectors, int32_t count) {
+  for (int32_t i = 0; i < count; i++) {
+    float *v = vectors + 3 * (int64_t)i;
+    double from[3] = {(double)v[0], (double)v[1], (double)v[2]};
+    for (int c = 0; c < 3; c++) {
+      v[c] = (float)orb_dot(motion->rotation[c], from) + 0.0f;
+    }
+  }
+}

@@ -1,0 +1,23 @@
+/* Fitting: a later shape moved onto the first. */
+#ifndef ORB_TRANSFER_FIT_H
+#define ORB_TRANSFER_FIT_H
+
+#include "orbmorph/asset.h"
+
+/* x ↦ scale · R x + shift. */
+typedef struct orb_motion {
+  double rotation[3][3], scale, shift[3];
+} orb_motion;
+
+/* The motion that brings `moved` nearest to `fixed` in the least-squares sense (both 3 a supermesh vertex), over the
+ * landmarks where there are three or more that lie on no line on either shape, else over all vertices weighted by the
+ * area around them on both shapes. fit NONE gives the identity. Source: Horn 1987; the scale is the ratio of spreads,
+ * so that fitting back is the inverse. */
+ORB_MUST_CHECK orb_status orb_fit_motion(orb_context *ctx, const orb_supermesh *supermesh, const double *fixed,
+                                         const double *moved, orb_fit fit, orb_motion *out);
+
+void orb_motion_apply(const orb_motion *motion, double *positions, int32_t count);
+/* Rotates `count` unit vectors of float. */
+void orb_motion_turn(const orb_motion *motion, float *vectors, int32_t count);
+
+#endif

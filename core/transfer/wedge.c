@@ -1,0 +1,366 @@
+/* Attributes at the corners of a supermesh, for attributes that a triangle may blend: normals and colours.
+ *
+ * A place strictly inside an input triangle has one value. A place on an input edge or at an input vertex has one value
+ * for each side of the seams that run through it; a corner of a supermesh triangle takes the value of the input
+ * triangle that its own triangle points into, told by exact orientations on the sphere: on an edge, the side on which
+ * the triangle's centroid lies; at a vertex, the sector of the fan that holds the centroid's direction.
+ */
+#include "transfer/wedge.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "numeric/predicates.h"
+#include "numeric/vec3.h"
+
+enum { MAX_WIDTH = 4, GRAIN = 4096 };
+static const double ON_EDGE = 1e-9; /* a barycentric coordinate below this counts as zero */
+
+typedef struct wedge_job {
+  const orb_supermesh *supermesh;
+  const orb_aligned_shape *shape;
+  const orb_place *places;
+  const int32_t *twin;         /* NULL: the attribute has no seam anywhere */
+  const float *corner_values;  /* width a corner of the input, or NULL */
+  const double *vertex_values; /* width a vertex of the input, where corner_values is NULL or is zero */
+  int32_t width;
+  int unit;         /* a normal: to be scaled to unit length */
+  double tolerance; /* values closer than this are one */
+  orb_wedges *out;
+  unsigned char *seamed; /* a supermesh vertex: its corners may differ */
+} wedge_job;
+
+/* The attribute at corner h of the input. */
+static void input_value(const wedge_job *job, int64_t h, double out[MAX_WIDTH]) {
+  double sum = 0;
+  if (job->corner_values) {
+    for (int c = 0; c < job->width; c++) {
+      out[c] = (double)job->corner_values[job->width * h + c];
+      sum += out[c] * out[c];
+    }
+  }
+  if (!job->corner_values || (job->unit && !(sum > 0.25 && isfinite(sum)))) {
+    const double *value = job->vertex_values + job->width * (int64_t)job->shape->mesh.triangles[h];
+    memcpy(out, value, (size_t)job->width * sizeof *out);
+  }
+}
+
+static int same_value(const wedge_job *job, int64_t g, int64_t h) {
+  double a[MAX_WIDTH], b[MAX_WIDTH];
+  input_value(job, g, a);
+  input_value(job, h, b);
+  for (int c = 0; c < job->width; c++) {
+    if (!(fabs(a[c] - b[c]) <= job->tolerance)) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+static void face_normal(const orb_mesh *mesh, int32_t triangle, double out[3]) {
+  const int32_t *corner = mesh->triangles + 3 * (int64_t)triangle;
+  double u[3], w[3];
+  orb_sub(mesh->positions + 3 * (int64_t)corner[1], mesh->positions + 3 * (int64_t)corner[0], u);
+  orb_sub(mesh->positions + 3 * (int64_t)corner[2], mesh->positions + 3 * (int64_t)corner[0], w);
+  orb_cross(u, w, out);
+}
+
+static void store(const wedge_job *job, const double value[MAX_WIDTH], int32_t triangle, float *out) {
+  double v[MAX_WIDTH];
+  memcpy(v, value, sizeof v);
+  if (job->unit && !(orb_normalize(v) > 1e-6)) {
+    face_normal(&job->shape->mesh, triangle, v);
+    if (!(orb_normalize(v) > 0)) {
+      v[0] = v[1] = 0;
+      v[2] = 1;
+    }
+  }
+  for (int c = 0; c < job->width; c++) {
+    out[c] = (float)v[c] + 0.0f; /* no negative zeros */
+  }
+}
+
+static void interpolate(const wedge_job *job, const orb_place *place, float *out) {
+  double sum[MAX_WIDTH] = {0}, value[MAX_WIDTH] = {0};
+  for (int k = 0; k < 3; k++) {
+    if (place->at[k] > 0) {
+      input_value(job, 3 * (int64_t)place->triangle + k, value);
+      for (int c = 0; c < job->width; c++) {
+        sum[c] += place->at[k] * value[c];
+      }
+    }
+  }
+  store(job, sum, place->triangle, out);
+}
+
+/* The corner at which a place sits, −1 if it is at no vertex; *edge the half-edge that it lies on, −1 if on none. */
+static int place_kind(const orb_place *place, int32_t *edge) {
+  int zero[3], zeros = 0;
+  for (int k = 0; k < 3; k++) {
+    zero[k] = place->at[k] < ON_EDGE;
+    zeros += zero[k];
+  }
+  *edge = -1;
+  if (zeros == 2) {
+    return !zero[0] ? 0 : !zero[1] ? 1 : 2;
+  }
+  if (zeros == 1) {
+    int k = zero[0] ? 0 : zero[1] ? 1 : 2;
+    *edge = orb_next(3 * place->triangle + k);
+  }
+  return -1;
+}
+
+/* Whether the fan of corner h holds two values. */
+static int fan_differs(const wedge_job *job, int32_t h) {
+  int32_t g = job->twin[orb_prev(h)];
+  while (g != h) {
+    if (!same_value(job, h, g)) {
+      return 1;
+    }
+    g = job->twin[orb_prev(g)];
+  }
+  return 0;
+}
+
+static int has_seam(const wedge_job *job, const orb_place *place) {
+  int32_t edge;
+  int corner = place_kind(place, &edge);
+  if (corner >= 0) {
+    return fan_differs(job, 3 * place->triangle + corner);
+  }
+  if (edge < 0) {
+    return 0;
+  }
+  int32_t twin = job->twin[edge];
+  return !same_value(job, edge, orb_next(twin)) || !same_value(job, orb_next(edge), twin);
+}
+
+static void vertex_body(void *arg, int64_t begin, int64_t end, int thread) {
+  wedge_job *job = arg;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    interpolate(job, &job->places[v], job->out->values + job->width * v);
+    if (job->seamed) {
+      job->seamed[v] = (unsigned char)has_seam(job, &job->places[v]);
+    }
+  }
+}
+
+/* The corner of the fan of corner h whose sector holds the direction m. */
+static int32_t sector_of(const wedge_job *job, int32_t h, const double m[3]) {
+  const int32_t *triangles = job->shape->mesh.triangles;
+  const double *points = job->shape->points;
+  const double *p = points + 3 * (int64_t)triangles[h];
+  int32_t g = h;
+  do {
+    const double *a = points + 3 * (int64_t)triangles[orb_next(g)];
+    const double *b = points + 3 * (int64_t)triangles[orb_prev(g)];
+    if (orb_orient(p, a, m) >= 0 && orb_orient(p, b, m) < 0) {
+      return g;
+    }
+    g = job->twin[orb_prev(g)];
+  } while (g != h);
+  return h;
+}
+
+/* The value of the corner of a supermesh triangle whose centroid has direction m, at a place with a seam. */
+static void corner_value(const wedge_job *job, const orb_place *place, const double m[3], float *out) {
+  int32_t edge;
+  int corner = place_kind(place, &edge);
+  if (corner >= 0) {
+    double value[MAX_WIDTH] = {0};
+    int32_t g = sector_of(job, 3 * place->triangle + corner, m);
+    input_value(job, g, value);
+    store(job, value, g / 3, out);
+    return;
+  }
+  const int32_t *triangles = job->shape->mesh.triangles;
+  const double *a = job->shape->points + 3 * (int64_t)triangles[edge];
+  const double *b = job->shape->points + 3 * (int64_t)triangles[orb_next(edge)];
+  orb_place side = *place;
+  if (orb_orient(a, b, m) < 0) {
+    int32_t twin = job->twin[edge];
+    side.triangle = twin / 3;
+    side.at[twin % 3] = place->at[orb_next(edge) % 3];
+    side.at[orb_next(twin) % 3] = place->at[edge % 3];
+    side.at[orb_prev(twin) % 3] = 0;
+  }
+  interpolate(job, &side, out);
+}
+
+static void centroid(const orb_supermesh *supermesh, int64_t triangle, double out[3]) {
+  out[0] = out[1] = out[2] = 0;
+  for (int k = 0; k < 3; k++) {
+    const double *p = supermesh->points + 3 * (int64_t)supermesh->triangles[3 * triangle + k];
+    for (int c = 0; c < 3; c++) {
+      out[c] += p[c];
+    }
+  }
+  orb_normalize(out);
+}
+
+/* Gives a corner its value: that of its vertex, or a new one if it differs. A vertex's earlier values are searched
+ * along the chain `next` so that corners on one side of a seam share a value. */
+static orb_status add_corner(orb_context *ctx, wedge_job *job, int64_t corner, const float *value, int32_t *capacity,
+                             int32_t **next) {
+  orb_wedges *out = job->out;
+  int32_t v = job->supermesh->triangles[corner], last = v;
+  for (int32_t i = v; i >= 0; i = (*next)[i]) {
+    if (memcmp(out->values + (int64_t)job->width * i, value, (size_t)job->width * sizeof *value) == 0) {
+      out->of_corner[corner] = i;
+      return ORB_OK;
+    }
+    last = i;
+  }
+  if (out->value_count == *capacity) {
+    int64_t wanted = (int64_t)*capacity + *capacity / 2 + 64;
+    if (wanted > INT32_MAX) {
+      return orb_fail(ctx, ORB_E_TOO_LARGE, "The supermesh has too many corners; ask for fewer triangles.");
+    }
+    float *values = orb_realloc(ctx, out->values, (size_t)wanted, (size_t)job->width * sizeof *values);
+    if (!values) {
+      return ORB_E_NO_MEMORY;
+    }
+    out->values = values;
+    int32_t *grown = orb_realloc(ctx, *next, (size_t)wanted, sizeof *grown);
+    if (!grown) {
+      return ORB_E_NO_MEMORY;
+    }
+    *next = grown;
+    *capacity = (int32_t)wanted;
+  }
+  int32_t made = out->value_count++;
+  memcpy(out->values + (int64_t)job->width * made, value, (size_t)job->width * sizeof *value);
+  (*next)[made] = -1;
+  (*next)[last] = made;
+  out->of_corner[corner] = made;
+  return ORB_OK;
+}
+
+/* The corners, after the vertices: serial, in the order of corners, for only few vertices lie on seams. */
+static orb_status split_corners(orb_context *ctx, wedge_job *job) {
+  const orb_supermesh *supermesh = job->supermesh;
+  int32_t capacity = supermesh->vertex_count;
+  orb_status status = ORB_OK;
+  int32_t *next = ORB_NEW(ctx, int32_t, capacity);
+  job->out->of_corner = ORB_NEW(ctx, int32_t, 3 * (int64_t)supermesh->triangle_count);
+  if (!next || !job->out->of_corner) {
+    status = ORB_E_NO_MEMORY;
+    goto done;
+  }
+  memset(next, -1, (size_t)capacity * sizeof *next);
+  unsigned char *given = job->seamed; /* 1: seamed, 2: its first value has been set */
+  for (int64_t h = 0; h < 3 * (int64_t)supermesh->triangle_count; h++) {
+    int32_t v = supermesh->triangles[h];
+    if (!given[v]) {
+      job->out->of_corner[h] = v;
+      continue;
+    }
+    double m[3];
+    float value[MAX_WIDTH];
+    centroid(supermesh, h / 3, m);
+    corner_value(job, &job->places[v], m, value);
+    if (given[v] == 1) {
+      memcpy(job->out->values + (int64_t)job->width * v, value, (size_t)job->width * sizeof *value);
+      given[v] = 2;
+    }
+    ORB_GO(status, add_corner(ctx, job, h, value, &capacity, &next), done);
+    if (h % 65536 == 0) {
+      ORB_GO(status, orb_context_check(ctx), done);
+    }
+  }
+done:
+  orb_free(ctx, next);
+  return status;
+}
+
+static int any_byte(const unsigned char *bytes, int32_t count) {
+  return memchr(bytes, 1, (size_t)count) != NULL;
+}
+
+static orb_status make_wedges(orb_context *ctx, wedge_job *job) {
+  const orb_supermesh *supermesh = job->supermesh;
+  const orb_mesh *mesh = &job->shape->mesh;
+  orb_status status = ORB_OK;
+  int32_t *twin = NULL;
+  job->out->width = job->width;
+  job->out->value_count = supermesh->vertex_count;
+  job->out->values = ORB_NEW(ctx, float, (int64_t)job->width * supermesh->vertex_count);
+  job->seamed = NULL;
+  if (!job->out->values) {
+    status = ORB_E_NO_MEMORY;
+    goto done;
+  }
+  if (job->corner_values) {
+    twin = ORB_NEW(ctx, int32_t, 3 * (int64_t)mesh->triangle_count);
+    job->seamed = ORB_NEW0(ctx, unsigned char, supermesh->vertex_count);
+    if (!twin || !job->seamed) {
+      status = ORB_E_NO_MEMORY;
+      goto done;
+    }
+    ORB_GO(status, orb_mesh_twins(ctx, mesh->triangles, mesh->triangle_count, mesh->vertex_count, twin), done);
+    job->twin = twin;
+  }
+  orb_parallel_for(ctx, supermesh->vertex_count, GRAIN, vertex_body, job);
+  ORB_GO(status, orb_context_check(ctx), done);
+  if (job->seamed && any_byte(job->seamed, supermesh->vertex_count)) {
+    ORB_GO(status, split_corners(ctx, job), done);
+  }
+done:
+  orb_free(ctx, twin);
+  orb_free(ctx, job->seamed);
+  if (status != ORB_OK) {
+    orb_wedges_free(ctx, job->out);
+  }
+  return status;
+}
+
+static wedge_job job_of(const orb_supermesh *supermesh, const orb_aligned_shape *shape, int32_t s, orb_wedges *out) {
+  memset(out, 0, sizeof *out);
+  return (wedge_job){.supermesh = supermesh,
+                     .shape = shape,
+                     .places = supermesh->places + (int64_t)s * supermesh->vertex_count,
+                     .out = out};
+}
+
+orb_status orb_wedge_normals(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shape,
+                             int32_t s, orb_wedges *out) {
+  const orb_mesh *mesh = &shape->mesh;
+  wedge_job job = job_of(supermesh, shape, s, out);
+  double *smooth = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
+  if (!smooth) {
+    return ORB_E_NO_MEMORY;
+  }
+  orb_status status =
+      orb_smooth_normals(ctx, mesh->positions, mesh->vertex_count, mesh->triangles, mesh->triangle_count, smooth);
+  if (status == ORB_OK) {
+    job.corner_values = mesh->normals;
+    job.vertex_values = smooth;
+    job.width = 3;
+    job.unit = 1;
+    job.tolerance = 0.01; /* half a degree: what rounded normals of one smooth vertex differ by */
+    status = make_wedges(ctx, &job);
+  }
+  orb_free(ctx, smooth);
+  return status;
+}
+
+orb_status orb_wedge_colors(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shape, int32_t s,
+                            orb_wedges *out) {
+  wedge_job job = job_of(supermesh, shape, s, out);
+  if (!shape->mesh.colors) {
+    return ORB_OK;
+  }
+  job.corner_values = shape->mesh.colors;
+  job.width = 4;
+  job.tolerance = 1e-3;
+  return make_wedges(ctx, &job);
+}
+
+void orb_wedges_free(orb_context *ctx, orb_wedges *wedges) {
+  orb_free(ctx, wedges->values);
+  orb_free(ctx, wedges->of_corner);
+  memset(wedges, 0, sizeof *wedges);
+}

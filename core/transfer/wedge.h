@@ -1,0 +1,35 @@
+/* Wedges: an attribute of one shape at the corners of a supermesh.
+ *
+ * Where the attribute is smooth a supermesh vertex has one value; where the input has a seam or a hard edge through the
+ * vertex's place, the corners on either side have different values, and the asset must split the vertex. Most
+ * vertices have one value, so values are stored once and corners point at them.
+ */
+#ifndef ORB_TRANSFER_WEDGE_H
+#define ORB_TRANSFER_WEDGE_H
+
+#include "orbmorph/transfer.h"
+
+typedef struct orb_wedges {
+  int32_t width; /* floats a value */
+  int32_t value_count;
+  float *values;      /* the first vertex_count values are those of the vertices */
+  int32_t *of_corner; /* 3·triangle_count; NULL: corner h has the value of its vertex */
+} orb_wedges;
+
+static inline int32_t orb_wedge_of(const orb_wedges *wedges, const int32_t *triangles, int64_t corner) {
+  return wedges->of_corner ? wedges->of_corner[corner] : triangles[corner];
+}
+
+/* Unit normals (angle-weighted, Thürmer & Wüthrich 1998) of a closed surface; zero where there is none. */
+ORB_MUST_CHECK orb_status orb_smooth_normals(orb_context *ctx, const double *positions, int32_t vertex_count,
+                                             const int32_t *triangles, int32_t triangle_count, double *out);
+
+/* The attributes of shape s. Normals are unit; the file's where it has them, else smooth. Colours only where the mesh
+ * has them, texture coordinates only of shapes that have them (width 0, values NULL else). */
+ORB_MUST_CHECK orb_status orb_wedge_normals(orb_context *ctx, const orb_supermesh *supermesh,
+                                            const orb_aligned_shape *shape, int32_t s, orb_wedges *out);
+ORB_MUST_CHECK orb_status orb_wedge_colors(orb_context *ctx, const orb_supermesh *supermesh,
+                                           const orb_aligned_shape *shape, int32_t s, orb_wedges *out);
+void orb_wedges_free(orb_context *ctx, orb_wedges *wedges);
+
+#endif
