@@ -1,0 +1,328 @@
+/* The asset: positions at every shape, normals and their splits, the animation, names, nudges. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "support_supermesh.h"
+
+/* Ellipsoids: axis s is 1 + s. Their normals are known: p / axis², scaled. */
+static double axis_of(int32_t shape, int c) {
+  return c == shape ? 2.5 : 1;
+}
+static void ellipsoid(int32_t shape, const double p[3], double out[3]) {
+  for (int c = 0; c < 3; c++) {
+    out[c] = axis_of(shape, c) * p[c];
+  }
+}
+
+static int setup(void **state) {
+  return orb_context_create(NULL, (orb_context **)state) == ORB_OK ? 0 : -1;
+}
+static int teardown(void **state) {
+  orb_context_destroy(*state);
+  return 0;
+}
+
+static const char *const NAMES[] = {"one", "two", "two", "four", "five", "six", "seven", "eight"};
+
+static glb write_asset(orb_context *ctx, const synthetic *made, const orb_asset_options *options,
+                       orb_asset_facts *facts, orb_buffer *out) {
+  memset(out, 0, sizeof *out);
+  orb_status status = orb_asset_write(ctx, &made->supermesh, made->shapes, NAMES, options, facts, out);
+  if (status != ORB_OK) {
+    fail_msg("%s", orb_context_error(ctx)->detail);
+  }
+  return glb_open(out);
+}
+
+static const cJSON *mesh_of(const glb *file) {
+  const cJSON *meshes = cJSON_GetObjectItem(file->json, "meshes");
+  assert_int_equal(cJSON_GetArraySize(meshes), 1);
+  assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(file->json, "nodes")), 1);
+  return cJSON_GetArrayItem(meshes, 0);
+}
+
+static const cJSON *primitive_of(const glb *file, int index) {
+  return cJSON_GetArrayItem(cJSON_GetObjectItem(mesh_of(file), "primitives"), index);
+}
+
+/* Each triangle's three positions on each shape are those of a triangle of the supermesh, whatever the order. */
+static void check_positions(const glb *file, const synthetic *made, int shapes) {
+  const cJSON *primitive = primitive_of(file, 0);
+  const cJSON *targets = cJSON_GetObjectItem(primitive, "targets");
+  int base = glb_attribute(cJSON_GetObjectItem(primitive, "attributes"), "POSITION");
+  int indices = glb_attribute(primitive, "indices"), matched = 0;
+  assert_int_equal(glb_attribute(primitive, "mode"), 4);
+  assert_int_equal(glb_count(file, indices), 3 * made->supermesh.triangle_count);
+  for (int i = 0; i < glb_count(file, indices); i++) {
+    int v = (int)glb_value(file, indices, i, 0);
+    double p[3], length = 0;
+    for (int c = 0; c < 3; c++) { /* back to the ball */
+      p[c] = glb_value(file, base, v, c) / axis_of(0, c);
+      length += p[c] * p[c];
+    }
+    assert_true(fabs(length - 1) < 1e-6);
+    for (int s = 1; s < shapes; s++) {
+      int delta = glb_attribute(cJSON_GetArrayItem(targets, s - 1), "POSITION");
+      for (int c = 0; c < 3; c++) {
+        double shown = glb_value(file, base, v, c) + glb_value(file, delta, v, c);
+        assert_true(fabs(shown - axis_of(s, c) * p[c]) < 1e-6);
+        matched++;
+      }
+    }
+  }
+  assert_int_equal(matched, 9 * (shapes - 1) * made->supermesh.triangle_count);
+}
+
+static void check_normals(const glb *file, int shapes) {
+  const cJSON *primitive = primitive_of(file, 0);
+  const cJSON *attributes = cJSON_GetObjectItem(primitive, "attributes");
+  int base = glb_attribute(attributes, "POSITION"), normal = glb_attribute(attributes, "NORMAL");
+  for (int v = 0; v < glb_count(file, base); v++) {
+    for (int s = 0; s < shapes; s++) {
+      int delta = s ? glb_attribute(cJSON_GetArrayItem(cJSON_GetObjectItem(primitive, "targets"), s - 1), "NORMAL") : 0;
+      double dot = 0, length = 0, own = 0;
+      for (int c = 0; c < 3; c++) {
+        double p = glb_value(file, base, v, c) / axis_of(0, c), n = p / axis_of(s, c);
+        double shown = glb_value(file, normal, v, c) + (s ? glb_value(file, delta, v, c) : 0);
+        dot += n * shown;
+        length += n * n;
+        own += shown * shown;
+      }
+      assert_true(fabs(own - 1) < 1e-5);
+      assert_true(dot / sqrt(length) > cos(3 * M_PI / 180)); /* a ball of 2,048 triangles */
+    }
+  }
+}
+
+static void two_shapes_are_base_and_target(void **state) {
+  orb_context *ctx = *state;
+  synthetic made = synthetic_make(ctx, 4, 2, ellipsoid);
+  orb_asset_options options;
+  orb_asset_defaults(&options);
+  orb_buffer bytes;
+  orb_asset_facts facts;
+  glb file = write_asset(ctx, &made, &options, &facts, &bytes);
+  assert_int_equal(facts.vertex_count, made.supermesh.vertex_count);
+  assert_int_equal(facts.target_count, 1);
+  assert_int_equal(facts.morphed_attributes, 2);
+  assert_int_equal(facts.nudged_vertices, 0);
+  check_positions(&file, &made, 2);
+  check_normals(&file, 2);
+  const cJSON *asset = cJSON_GetObjectItem(file.json, "asset");
+  assert_string_equal(cJSON_GetObjectItem(asset, "generator")->valuestring, "orbmorph 1.0.0");
+  assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(file.json, "materials")), 1);
+  glb_close(&file);
+  orb_buffer_free(ctx, &bytes);
+  synthetic_free(ctx, &made);
+}
+
+/* Every shape, the first included, is shown alone by a key frame; all weights are tents between. */
+static void animation_shows_every_shape_alone(void **state) {
+  orb_context *ctx = *state;
+  synthetic made = synthetic_make(ctx, 1, 3, ellipsoid);
+  orb_asset_options options;
+  orb_asset_defaults(&options);
+  orb_buffer bytes;
+  glb file = write_asset(ctx, &made, &options, NULL, &bytes);
+  check_positions(&file, &made, 3);
+  const cJSON *animations = cJSON_GetObjectItem(file.json, "animations");
+  assert_int_equal(cJSON_GetArraySize(animations), 1);
+  const cJSON *sampler = cJSON_GetArrayItem(cJSON_GetObjectItem(cJSON_GetArrayItem(animations, 0), "samplers"), 0);
+  int input = glb_attribute(sampler, "input"), output = glb_attribute(sampler, "output");
+  assert_string_equal(cJSON_GetObjectItem(sampler, "interpolation")->valuestring, "LINEAR");
+  int keys = glb_count(&file, input), alone[3] = {0};
+  assert_int_equal(glb_count(&file, output), 2 * keys);
+  for (int k = 0; k < keys; k++) {
+    double a = glb_value(&file, output, 2 * k, 0), b = glb_value(&file, output, 2 * k + 1, 0);
+    alone[0] += a == 0 && b == 0;
+    alone[1] += a == 1 && b == 0;
+    alone[2] += a == 0 && b == 1;
+    assert_true(k == 0 || glb_value(&file, input, k, 0) > glb_value(&file, input, k - 1, 0));
+  }
+  assert_true(alone[0] >= 2 && alone[1] >= 2 && alone[2] >= 1);
+  assert_true(glb_value(&file, output, 0, 0) == 0 && glb_value(&file, output, 2 * keys - 2, 0) == 0);
+  /* Equal names are told apart. */
+  const cJSON *names = cJSON_GetObjectItem(cJSON_GetObjectItem(mesh_of(&file), "extras"), "targetNames");
+  assert_int_equal(cJSON_GetArraySize(names), 2);
+  assert_string_equal(cJSON_GetArrayItem(names, 0)->valuestring, "two");
+  assert_string_equal(cJSON_GetArrayItem(names, 1)->valuestring, "two (2)");
+  glb_close(&file);
+  orb_buffer_free(ctx, &bytes);
+  options.animation = ORB_ANIMATION_NONE;
+  options.normals = 0;
+  file = write_asset(ctx, &made, &options, NULL, &bytes);
+  assert_null(cJSON_GetObjectItem(file.json, "animations"));
+  assert_int_equal(glb_attribute(cJSON_GetObjectItem(primitive_of(&file, 0), "attributes"), "NORMAL"), -1);
+  glb_close(&file);
+  orb_buffer_free(ctx, &bytes);
+  synthetic_free(ctx, &made);
+}
+
+/* Octahedron with the file's normals flat on each face: each of its 6 vertices is 4 in the file, with the same bits. */
+static void hard_edges_split_vertices(void **state) {
+  orb_context *ctx = *state;
+  synthetic made = synthetic_make(ctx, 0, 2, ellipsoid);
+  orb_mesh *mesh = &made.shapes[1].mesh;
+  assert_int_equal(mesh->triangle_count, 8);
+  mesh->normals = ORB_NEW(ctx, float, 9 * 8);
+  for (int t = 0; t < 8; t++) {
+    double n[3] = {0};
+    for (int k = 0; k < 3; k++) {
+      for (int c = 0; c < 3; c++) {
+        n[c] += made.supermesh.points[3 * mesh->triangles[3 * t + k] + c] / sqrt(3); /* any unit vector of the face */
+      }
+    }
+    for (int k = 0; k < 9; k++) {
+      mesh->normals[9 * t + k] = (float)n[k % 3];
+    }
+  }
+  orb_asset_options options;
+  orb_asset_defaults(&options);
+  orb_buffer bytes;
+  orb_asset_facts facts;
+  glb file = write_asset(ctx, &made, &options, &facts, &bytes);
+  assert_int_equal(facts.vertex_count, 24);
+  check_positions(&file, &made, 2);
+  const cJSON *primitive = primitive_of(&file, 0);
+  const cJSON *attributes = cJSON_GetObjectItem(primitive, "attributes");
+  const cJSON *target = cJSON_GetArrayItem(cJSON_GetObjectItem(primitive, "targets"), 0);
+  int base = glb_attribute(attributes, "POSITION"), delta = glb_attribute(target, "POSITION");
+  int distinct = 0;
+  for (int v = 0; v < 24; v++) {
+    int earlier = 0;
+    for (int w = 0; w < v; w++) {
+      int same = 1;
+      for (int c = 0; c < 3; c++) {
+        same &= glb_value(&file, base, v, c) == glb_value(&file, base, w, c) &&
+                glb_value(&file, delta, v, c) == glb_value(&file, delta, w, c);
+      }
+      earlier |= same;
+    }
+    distinct += !earlier;
+  }
+  assert_int_equal(distinct, 6);
+  /* On shape 1 the three normals of each triangle are its own. */
+  int indices = glb_attribute(primitive, "indices");
+  for (int t = 0; t < 8; t++) {
+    double centre[3] = {0}, normal[3] = {0};
+    for (int k = 0; k < 3; k++) {
+      int v = (int)glb_value(&file, indices, 3 * t + k, 0);
+      for (int c = 0; c < 3; c++) {
+        centre[c] += glb_value(&file, base, v, c) / axis_of(0, c);
+        normal[c] += glb_value(&file, glb_attribute(attributes, "NORMAL"), v, c) +
+                     glb_value(&file, glb_attribute(target, "NORMAL"), v, c);
+      }
+    }
+    for (int c = 0; c < 3; c++) {
+      assert_true(fabs(normal[c] / 3 - centre[c] / sqrt(3)) < 1e-6);
+    }
+  }
+  glb_close(&file);
+  orb_buffer_free(ctx, &bytes);
+  synthetic_free(ctx, &made);
+}
+
+/* Two vertices at one place on both shapes are written one unit in the last place apart. */
+static void coinciding_vertices_are_kept_apart(void **state) {
+  orb_context *ctx = *state;
+  synthetic made = synthetic_make(ctx, 1, 2, ellipsoid);
+  for (int s = 0; s < 2; s++) {
+    double *p = made.shapes[s].mesh.positions;
+    memcpy(p + 3 * 7, p + 3 * 2, 3 * sizeof *p);
+    memcpy(p + 3 * 9, p + 3 * 2, 3 * sizeof *p);
+  }
+  orb_asset_options options;
+  orb_asset_defaults(&options);
+  orb_buffer bytes;
+  orb_asset_facts facts;
+  glb file = write_asset(ctx, &made, &options, &facts, &bytes);
+  assert_int_equal(facts.nudged_vertices, 2);
+  int base = glb_attribute(cJSON_GetObjectItem(primitive_of(&file, 0), "attributes"), "POSITION"), near = 0;
+  for (int v = 0; v < glb_count(&file, base); v++) {
+    for (int w = 0; w < v; w++) {
+      double largest = 0;
+      for (int c = 0; c < 3; c++) {
+        largest = fmax(largest, fabs(glb_value(&file, base, v, c) - glb_value(&file, base, w, c)));
+      }
+      assert_true(largest > 0);
+      near += largest < 1e-6;
+    }
+  }
+  assert_int_equal(near, 3);
+  glb_close(&file);
+  orb_buffer_free(ctx, &bytes);
+  synthetic_free(ctx, &made);
+}
+
+static void turned(int32_t shape, const double p[3], double out[3]) {
+  double q[3];
+  ellipsoid(0, p, q);
+  q[1] *= 1.5; /* no symmetry that a rotation could hide in */
+  q[0] += 0.3 * p[1] * p[1] + 0.2 * p[2];
+  double turn = 2.1 * shape, scale = 1 + 2 * shape;
+  out[0] = scale * (cos(turn) * q[0] - sin(turn) * q[1]) + 5 * shape;
+  out[1] = scale * (sin(turn) * q[0] + cos(turn) * q[1]) - 7 * shape;
+  out[2] = scale * q[2] + shape;
+}
+
+/* A shape and its copy, turned, scaled and shifted: a similarity brings it back, so all deltas vanish. */
+static void fit_undoes_a_similarity(void **state) {
+  orb_context *ctx = *state;
+  synthetic made = synthetic_make(ctx, 3, 2, turned);
+  orb_asset_options options;
+  orb_asset_defaults(&options);
+  options.fit = ORB_FIT_SIMILARITY;
+  orb_buffer bytes;
+  glb file = write_asset(ctx, &made, &options, NULL, &bytes);
+  const cJSON *target = cJSON_GetArrayItem(cJSON_GetObjectItem(primitive_of(&file, 0), "targets"), 0);
+  int position = glb_attribute(target, "POSITION"), normal = glb_attribute(target, "NORMAL");
+  for (int v = 0; v < glb_count(&file, position); v++) {
+    for (int c = 0; c < 3; c++) {
+      assert_true(fabs(glb_value(&file, position, v, c)) < 1e-6);
+      assert_true(fabs(glb_value(&file, normal, v, c)) < 1e-6);
+    }
+  }
+  glb_close(&file);
+  orb_buffer_free(ctx, &bytes);
+  synthetic_free(ctx, &made);
+}
+
+/* The same bytes for one thread and for four. */
+static void threads_do_not_matter(void **state) {
+  (void)state;
+  orb_buffer bytes[2];
+  orb_context *contexts[2];
+  for (int i = 0; i < 2; i++) {
+    orb_context_options with = {.threads = i ? 4 : 1};
+    assert_int_equal(orb_context_create(&with, &contexts[i]), ORB_OK);
+    synthetic made = synthetic_make(contexts[i], 5, 3, ellipsoid);
+    orb_asset_options options;
+    orb_asset_defaults(&options);
+    glb file = write_asset(contexts[i], &made, &options, NULL, &bytes[i]);
+    glb_close(&file);
+    synthetic_free(contexts[i], &made);
+  }
+  assert_int_equal(bytes[0].size, bytes[1].size);
+  assert_memory_equal(bytes[0].data, bytes[1].data, bytes[0].size);
+  for (int i = 0; i < 2; i++) {
+    orb_buffer_free(contexts[i], &bytes[i]);
+    orb_context_destroy(contexts[i]);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test_setup_teardown(two_shapes_are_base_and_target, setup, teardown),
+      cmocka_unit_test_setup_teardown(animation_shows_every_shape_alone, setup, teardown),
+      cmocka_unit_test_setup_teardown(hard_edges_split_vertices, setup, teardown),
+      cmocka_unit_test_setup_teardown(coinciding_vertices_are_kept_apart, setup, teardown),
+      cmocka_unit_test_setup_teardown(fit_undoes_a_similarity, setup, teardown),
+      cmocka_unit_test(threads_do_not_matter),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
