@@ -48,7 +48,7 @@ typedef struct orb_mesh {
   int32_t file_vertex_count, file_triangle_count;
   int32_t *source;           /* a vertex: the lowest-numbered vertex of the file that it stands for */
   int32_t *vertex_of_source; /* file_vertex_count: the vertex that stands for it, −1 if dropped */
-  int32_t *source_triangle;  /* a triangle: its number in the file */
+  int32_t *source_triangle;  /* a triangle: its number in the file, −1: made by fill_holes */
 
   /* Attributes, one a corner (corner h belongs to vertex triangles[h]). */
   float *normals;    /* 3 a corner, unit */
