@@ -86,9 +86,9 @@ void orb_collapse_apply(orb_surface *s, int32_t first, int32_t valence, orb_coll
   s->vertex_corner[u] = second;
   s->vertex_corner[left] = orb_corner_next(second);
   s->vertex_corner[right] = orb_corner_prev(before);
-  s->valence[left]--;
-  s->valence[right]--;
-  s->valence[u] += valence - 4;
+  orb_surface_set_valence(s, left, s->valence[left] - 1);
+  orb_surface_set_valence(s, right, s->valence[right] - 1);
+  orb_surface_set_valence(s, u, s->valence[u] + valence - 4);
   if (out) {
     *out = (orb_collapse){.vertex = v, .first = first, .last = last, .valence = valence};
   }
@@ -114,9 +114,10 @@ void orb_collapse_undo(orb_hierarchy *h, int32_t index) {
   }
   s->vertex_corner[v] = first;
   s->vertex_corner[u] = orb_corner_next(first);
-  s->valence[u] -= log->valence - 4;
-  s->valence[s->corner[orb_corner_prev(first)]]++;
-  s->valence[s->corner[orb_corner_next(last)]]++;
+  int32_t left = s->corner[orb_corner_prev(first)], right = s->corner[orb_corner_next(last)];
+  orb_surface_set_valence(s, left, s->valence[left] + 1);
+  orb_surface_set_valence(s, right, s->valence[right] + 1);
+  orb_surface_set_valence(s, u, s->valence[u] - (log->valence - 4));
 }
 
 void orb_collapse_redo(orb_hierarchy *h, int32_t index) {

@@ -31,7 +31,7 @@ static int cost_gather(const orb_surface *s, int32_t v, cost_ring *r) {
     r->x[k] = p[0];
     r->y[k] = p[1];
     r->z[k] = p[2];
-    r->valence[k] = (float)s->valence[u];
+    r->valence[k] = p[3];
     r->target_area += orb_corner_area(s, c);
     k++;
     c = orb_corner_swing(s, c);
@@ -130,9 +130,13 @@ static float cost_of_vertex(const orb_surface *s, int32_t v, int32_t *target) {
 }
 
 static void cost_range(const orb_cost_job *job, int64_t begin, int64_t end) {
+  enum { AHEAD = 6 };
   for (int64_t i = begin; i < end; i++) {
     int32_t v = job->vertex[i];
-    if (job->dirty[v]) {
+    if (i + AHEAD < end) {
+      __builtin_prefetch(job->surface->corner + job->surface->vertex_corner[job->vertex[i + AHEAD]]);
+    }
+    if (job->dirty[v] && job->cost[v] <= job->threshold) {
       job->cost[v] = cost_of_vertex(job->surface, v, &job->target[v]);
       job->dirty[v] = 0;
     }

@@ -1,7 +1,10 @@
 /* Decimation to a tetrahedron in rounds of independent collapses; no heap.
  *
- * Each round evaluates the vertices whose star has changed (in parallel), takes a threshold at a sampled quantile of
- * the costs, and collapses, in order of vertex number, those below it whose ring is not locked; a collapse locks its
+ * Each round takes a threshold at a sampled quantile of the costs, evaluates (in parallel) the vertices below it whose
+ * star has changed since they were last looked at, and collapses, in order of vertex number, those that are still below
+ * and whose ring is not locked; costs that were above are left stale, as they mostly grow. On coarse levels, where it
+ * costs nothing, all that have changed are evaluated before the threshold is taken.
+ * a collapse locks its
  * ring for the round. So the stars of a round do not overlap, and their vertices can be placed side by side when the
  * round is undone. A collapse keeps the link condition: its edge's ends have just two common neighbours. On a sphere of
  * more than four vertices some vertex of valence at most five always has such an edge, so the end is always reached.
@@ -15,6 +18,7 @@
 #include "embed/multires.h"
 
 enum {
+  LAZY_ABOVE = 4000, /* vertices */
   GRAIN = 1024,
   SAMPLES = 2048,
   SMALL = 1024,     /* below that many vertices the quantile is exact */
@@ -38,6 +42,7 @@ typedef struct decimation {
   int32_t *mark, *lock; /* stamps */
   int32_t stamp, round;
   int32_t *live, live_count;
+  float threshold;
   int fails; /* rounds in a row without a collapse */
   ring ring;
 } decimation;
@@ -196,8 +201,12 @@ static float find_threshold(const decimation *d) {
 static void evaluate(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   const decimation *d = arg;
-  orb_cost_job job = {
-      .surface = &d->h->surface, .vertex = d->live, .dirty = d->dirty, .cost = d->cost, .target = d->target};
+  orb_cost_job job = {.surface = &d->h->surface,
+                      .vertex = d->live,
+                      .dirty = d->dirty,
+                      .threshold = d->threshold,
+                      .cost = d->cost,
+                      .target = d->target};
   d->kernels->costs(&job, begin, end);
 }
 
@@ -214,15 +223,21 @@ static orb_status begin_round(decimation *d) {
     h->round_capacity = capacity;
   }
   h->round_start[h->round_count] = h->log_count;
+  if (d->round == 1 || d->live_count <= LAZY_ABOVE || d->fails > 0) {
+    d->threshold = INFINITY;
+    ORB_TRY(orb_sliced_for(d->ctx, d->live_count, GRAIN, evaluate, d));
+    d->threshold = find_threshold(d);
+    return ORB_OK;
+  }
+  d->threshold = find_threshold(d);
   return orb_sliced_for(d->ctx, d->live_count, GRAIN, evaluate, d);
 }
 
 static orb_status run_round(decimation *d) {
   ORB_TRY(begin_round(d));
-  float threshold = find_threshold(d);
   int32_t done = 0, n = d->live_count;
   for (int32_t i = 0; i < n && n - done > 4; i++) {
-    ORB_TRY(try_collapse(d, d->live[i], threshold, &done));
+    ORB_TRY(try_collapse(d, d->live[i], d->threshold, &done));
     if (n < SINGLE_BELOW && done) {
       break;
     }
@@ -269,6 +284,7 @@ static orb_status allocate(decimation *d) {
     return ORB_E_NO_MEMORY;
   }
   memset(d->dirty, 1, (size_t)n);
+  memset(d->cost, 0, sizeof(float) * (size_t)n);
   for (int32_t i = 0; i < n; i++) {
     d->live[i] = i;
   }

@@ -14,6 +14,7 @@ typedef struct orb_cost_job {
   const orb_surface *surface;
   const int32_t *vertex; /* the list [begin, end) is taken from */
   unsigned char *dirty;  /* only these are evaluated; cleared */
+  float threshold;       /* … and of these only such whose old cost is not above it */
   float *cost;
   int32_t *target;
 } orb_cost_job;

@@ -4,6 +4,11 @@
 #include "embed/loops.h"
 #include "embed/star.h"
 
+/* Where the shape of corner c's triangle lies: 4 a triangle. */
+static inline int64_t shape_at(int32_t c) {
+  return 4 * (int64_t)(c >> 3) + (c & 3);
+}
+
 enum { BINS = ORB_LEVEL_RING_MAX + 1, GRAIN = 1024, UNCOLOURED = -1, SET_ASIDE = -2 };
 
 typedef struct builder {
@@ -58,7 +63,7 @@ static void shape_triangles(void *arg, int64_t begin, int64_t end, int thread) {
       if ((c & 3) == 0) {
         double half[3];
         orb_shape_cotangents(s, s->corner[c], s->corner[c + 1], s->corner[c + 2], b->blend, half);
-        float *out = b->level->triangle_shape + c;
+        float *out = b->level->triangle_shape + shape_at(c);
         for (int k = 0; k < 3; k++) {
           out[k] = (float)half[k];
         }
@@ -172,10 +177,10 @@ static void fill_batches(void *arg, int64_t begin, int64_t end, int thread) {
       for (int32_t i = 0; i < k; i++) {
         float *to = shape + 4 * (int64_t)i * lanes + l;
         ring[i * lanes + l] = s->corner[orb_corner_next(c)];
-        to[0] = level->triangle_shape[orb_corner_prev(c)];
-        to[lanes] = level->triangle_shape[orb_corner_next(c)];
-        to[2 * lanes] = level->triangle_shape[c];
-        to[3 * lanes] = level->triangle_shape[c | 3];
+        to[0] = level->triangle_shape[shape_at(orb_corner_prev(c))];
+        to[lanes] = level->triangle_shape[shape_at(orb_corner_next(c))];
+        to[2 * lanes] = level->triangle_shape[shape_at(c)];
+        to[3 * lanes] = level->triangle_shape[shape_at(c | 3)];
         c = orb_corner_swing(s, c);
       }
     }

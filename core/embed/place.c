@@ -16,7 +16,8 @@
 
 enum {
   GRAIN = 256,
-  QUEUE = 65536, /* room of the relaxation queue, a power of two */
+  PLAIN_ABOVE = 4000, /* live vertices */
+  QUEUE = 65536,      /* room of the relaxation queue, a power of two */
   QUEUE_FULL = 60000,
   RELAX_MOST = 400, /* ring entries relaxed round one crowded vertex: about 60 stars, or one pole */
   ATTEMPTS = 16     /* at a kernel that doubles have no room for */
@@ -44,22 +45,33 @@ static int centroid_inside(const orb_star *star, double p[3]) {
   if (!(orb_normalize(p) > 1e-6)) {
     return 0;
   }
+  double radius2 = 0, least = INFINITY;
   for (int32_t i = 0; i < star->count; i++) {
     const double *a = star->ring[i], *b = star->ring[i + 1 < star->count ? i + 1 : 0];
-    if (!(orb_det(p, a, b) > WELL_INSIDE * orb_distance2(a, b))) {
+    double det = orb_det(p, a, b), reach2 = orb_distance2(p, a);
+    if (!(det > WELL_INSIDE * orb_distance2(a, b))) {
       return 0;
     }
+    radius2 = reach2 > radius2 ? reach2 : radius2;
+    least = det < least ? det : least;
   }
-  return orb_kernel_contains((const double(*)[3])star->ring, star->count, p);
+  /* orb_det() is off by less than 1e-15 times a sum of six products, each at most the square of the reach */
+  return least > 1e-14 * radius2 || orb_kernel_contains((const double(*)[3])star->ring, star->count, p);
 }
 
-/* Places one vertex whose collapse is undone; *found 0 where its kernel has no room. */
+/* Places one vertex whose collapse is undone; *found 0 where its kernel has no room. On fine levels one that lies well
+ * inside is left to the sweeps. */
 static orb_status place_vertex(orb_context *ctx, orb_refiner *r, int32_t v, double blend, int thread, int *found) {
   orb_star *star = &r->star[thread];
   const orb_surface *s = &r->hierarchy->surface;
   double p[3], before;
   ORB_TRY(orb_star_walk(ctx, star, s, v, r->point));
   *found = centroid_inside(star, p);
+  r->crowding[v] = 0;
+  if (*found && r->live > PLAIN_ABOVE) {
+    memcpy(r->point + 4 * (int64_t)v, p, sizeof p);
+    return ORB_OK;
+  }
   if (!*found) {
     ORB_TRY(orb_kernel_point(ctx, &r->room[thread], (const double(*)[3])star->ring, star->count, p, found));
   }

@@ -143,7 +143,8 @@ static orb_status order_triangles(setup *w) {
   int64_t n = s->vertex_count, faces = s->triangle_count;
   const int32_t *in = w->mesh->triangles;
   w->first = ORB_NEW0(w->ctx, int32_t, n + 1);
-  s->corner = ORB_NEW(w->ctx, int32_t, 4 * faces);
+  s->corner = ORB_NEW(w->ctx, int32_t, 8 * faces);
+  s->opposite = s->corner ? s->corner + 4 : NULL;
   if (!w->first || !s->corner) {
     return ORB_E_NO_MEMORY;
   }
@@ -158,7 +159,7 @@ static orb_status order_triangles(setup *w) {
       if (pass == 0) {
         w->first[least + 1]++;
       } else {
-        memcpy(s->corner + 4 * (int64_t)w->first[least]++, v, sizeof v);
+        memcpy(s->corner + orb_triangle_corner(w->first[least]++), v, sizeof v);
       }
     }
     for (int64_t i = 0; pass == 0 && i < n; i++) {
@@ -177,9 +178,9 @@ static orb_status list_incidences(setup *w) {
   if (!w->incident || !s->valence || !s->vertex_corner) {
     return ORB_E_NO_MEMORY;
   }
-  for (int64_t c = 0; c < 4 * faces; c++) {
-    if ((c & 3) != 3) {
-      s->valence[s->corner[c]]++;
+  for (int64_t t = 0; t < faces; t++) {
+    for (int k = 0; k < 3; k++) {
+      s->valence[s->corner[orb_triangle_corner(t) + k]]++;
     }
   }
   w->first[0] = 0;
@@ -187,9 +188,9 @@ static orb_status list_incidences(setup *w) {
     w->first[i + 1] = w->first[i] + s->valence[i];
     s->vertex_corner[i] = w->first[i];
   }
-  for (int64_t c = 0; c < 4 * faces; c++) {
-    if ((c & 3) != 3) {
-      w->incident[s->vertex_corner[s->corner[c]]++] = (int32_t)c;
+  for (int64_t t = 0; t < faces; t++) {
+    for (int32_t c = orb_triangle_corner(t), k = 0; k < 3; k++) {
+      w->incident[s->vertex_corner[s->corner[c + k]]++] = c + k;
     }
   }
   for (int64_t i = 0; i < n; i++) {
@@ -230,13 +231,13 @@ static void link_opposites(void *arg, int64_t begin, int64_t end, int thread) {
   setup *w = arg;
   for (int64_t t = begin; t < end; t++) {
     for (int k = 0; k < 3; k++) {
-      int32_t o = find_opposite(w, (int32_t)(4 * t + k));
-      w->s->opposite[4 * t + k] = o;
+      int32_t c = orb_triangle_corner(t) + k, o = find_opposite(w, c);
+      w->s->opposite[c] = o;
       if (o < 0) {
         atomic_store_explicit(&w->broken, 1, memory_order_relaxed);
       }
     }
-    w->s->opposite[4 * t + 3] = -1;
+    w->s->opposite[orb_triangle_corner(t) + 3] = -1;
   }
 }
 
@@ -259,10 +260,6 @@ static void check_fans(void *arg, int64_t begin, int64_t end, int thread) {
 
 static orb_status link_triangles(setup *w) {
   orb_context *ctx = w->ctx;
-  w->s->opposite = ORB_NEW(ctx, int32_t, 4 * (int64_t)w->s->triangle_count);
-  if (!w->s->opposite) {
-    return ORB_E_NO_MEMORY;
-  }
   ORB_TRY(orb_sliced_for(ctx, w->s->triangle_count, GRAIN, link_opposites, w));
   if (!atomic_load(&w->broken)) {
     ORB_TRY(orb_sliced_for(ctx, w->s->vertex_count, GRAIN, check_fans, w));
@@ -289,10 +286,10 @@ static void measure_areas(void *arg, int64_t begin, int64_t end, int thread) {
   const orb_surface *s = w->s;
   double sum = 0;
   for (int64_t t = begin; t < end; t++) {
-    const int32_t *v = s->corner + 4 * t;
+    const int32_t *v = s->corner + orb_triangle_corner(t);
     double area = triangle_area(s->position + 3 * (int64_t)v[0], s->position + 3 * (int64_t)v[1],
                                 s->position + 3 * (int64_t)v[2]);
-    orb_corner_set_area(w->s, (int32_t)(4 * t), (float)area);
+    orb_corner_set_area(w->s, orb_triangle_corner(t), (float)area);
     sum += area;
   }
   w->chunk[begin / GRAIN] = sum;
@@ -306,7 +303,7 @@ static void scale_vertices(void *arg, int64_t begin, int64_t end, int thread) {
       w->s->position[3 * i + k] *= w->scale;
       w->s->position4[4 * i + k] = (float)w->s->position[3 * i + k];
     }
-    w->s->position4[4 * i + 3] = 0;
+    w->s->position4[4 * i + 3] = (float)w->s->valence[i];
   }
 }
 
@@ -315,9 +312,9 @@ static void scale_areas(void *arg, int64_t begin, int64_t end, int thread) {
   setup *w = arg;
   float mean = (float)(4 * PI / w->s->triangle_count), least = (float)AREA_FLOOR * mean;
   for (int64_t t = begin; t < end; t++) {
-    float area = (float)(orb_corner_area(w->s, (int32_t)(4 * t)) * w->area_scale);
+    float area = (float)(orb_corner_area(w->s, orb_triangle_corner(t)) * w->area_scale);
     area = w->area_scale > 0 ? area : mean;
-    orb_corner_set_area(w->s, (int32_t)(4 * t), area > least ? area : least);
+    orb_corner_set_area(w->s, orb_triangle_corner(t), area > least ? area : least);
   }
 }
 
@@ -346,7 +343,7 @@ static orb_status check_counts(orb_context *ctx, const orb_mesh *mesh) {
                     "%d vertices and %d triangles do not make a closed surface of genus zero; repair the mesh first.",
                     mesh->vertex_count, mesh->triangle_count);
   }
-  if (mesh->triangle_count > INT32_MAX / 4 - 1) {
+  if (mesh->triangle_count > INT32_MAX / 8 - 1) {
     return orb_fail(ctx, ORB_E_TOO_LARGE, "The mesh has more triangles than corner numbers reach.");
   }
   for (int64_t i = 0; i < 3 * (int64_t)mesh->triangle_count; i++) {
@@ -389,7 +386,6 @@ void orb_surface_free(orb_context *ctx, orb_surface *s) {
   orb_free(ctx, s->position);
   orb_free(ctx, s->position4);
   orb_free(ctx, s->corner);
-  orb_free(ctx, s->opposite);
   orb_free(ctx, s->vertex_corner);
   orb_free(ctx, s->valence);
   memset(s, 0, sizeof *s);

@@ -1,9 +1,9 @@
 /* The working surface of an embedding: a closed triangle mesh in space-filling order, normalised to area 4π, with
  * corners that know their opposites. Decimation and its undoing rewrite it in place.
  *
- * Corners. Triangle t has the corners 4t, 4t + 1, 4t + 2; slot 4t + 3 of `corner` holds the bits of its target area, so
- * that a walk round a vertex finds index and area in one cache line. opposite[c] is the corner across the edge that
- * lies opposite to corner c. */
+ * Corners. Triangle t has the corners 8t, 8t + 1, 8t + 2. One block of 8 words a triangle holds their vertices, the
+ * bits of the target area, their opposites and a spare word, so that a step round a vertex costs one cache line:
+ * corner[c] is the vertex of corner c, opposite[c] the corner across the edge that lies opposite to it. */
 #ifndef ORB_EMBED_SURFACE_H
 #define ORB_EMBED_SURFACE_H
 
@@ -15,8 +15,8 @@ typedef struct orb_surface {
   int32_t vertex_count, triangle_count;
   int32_t *to_mesh, *from_mesh; /* vertex numbers: Morton order ↔ the mesh's own */
   double *position;             /* 3 a vertex; centred, area 4π (but see orb_surface_create) */
-  float *position4;             /* the same, 4 a vertex, the last 0 */
-  int32_t *corner, *opposite;   /* 4 a triangle */
+  float *position4;             /* the same, 4 a vertex; the last is the vertex's valence */
+  int32_t *corner, *opposite;   /* 8 a triangle; opposite = corner + 4 */
   int32_t *vertex_corner;       /* a corner of each vertex */
   int32_t *valence;             /* of each vertex */
 } orb_surface;
@@ -30,6 +30,13 @@ static inline int32_t orb_corner_prev(int32_t c) {
 /* The next corner of the same vertex, counter-clockwise. */
 static inline int32_t orb_corner_swing(const orb_surface *s, int32_t c) {
   return orb_corner_next(s->opposite[orb_corner_next(c)]);
+}
+static inline int32_t orb_triangle_corner(int64_t triangle) {
+  return (int32_t)(8 * triangle);
+}
+static inline void orb_surface_set_valence(orb_surface *s, int32_t v, int32_t valence) {
+  s->valence[v] = valence;
+  s->position4[4 * (int64_t)v + 3] = (float)valence;
 }
 /* Target area of the triangle of corner c. */
 static inline float orb_corner_area(const orb_surface *s, int32_t c) {

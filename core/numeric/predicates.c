@@ -125,18 +125,22 @@ static int exact_sign(const double a[3], const double b[3], const double c[3]) {
   return 0;
 }
 
-int orb_orient(const double a[3], const double b[3], const double c[3]) {
-  double u[3], w[3], largest = 0;
+/* Also 0 where a coordinate is not finite. */
+static int decide_exactly(const double a[3], const double b[3], const double c[3]) {
   for (int i = 0; i < 3; i++) {
-    u[i] = b[i] - a[i];
-    w[i] = c[i] - a[i];
-    largest = fmax(largest, fmax(fabs(a[i]), fmax(fabs(b[i]), fabs(c[i]))));
     if (!isfinite(a[i]) || !isfinite(b[i]) || !isfinite(c[i])) {
       return 0;
     }
   }
-  if (largest <= 1e100) {
-    double yz = u[1] * w[2], zy = u[2] * w[1], zx = u[2] * w[0], xz = u[0] * w[2], xy = u[0] * w[1], yx = u[1] * w[0];
+  return exact_sign(a, b, c);
+}
+
+int orb_orient(const double a[3], const double b[3], const double c[3]) {
+  double size = fabs(a[0]) + fabs(a[1]) + fabs(a[2]) + fabs(b[0]) + fabs(b[1]) + fabs(b[2]) + fabs(c[0]) + fabs(c[1]) +
+                fabs(c[2]);
+  if (size <= 1e100) { /* not where one is not a number */
+    double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2], wx = c[0] - a[0], wy = c[1] - a[1], wz = c[2] - a[2];
+    double yz = uy * wz, zy = uz * wy, zx = uz * wx, xz = ux * wz, xy = ux * wy, yx = uy * wx;
     double d = a[0] * (yz - zy) + a[1] * (zx - xz) + a[2] * (xy - yx);
     double permanent =
         fabs(a[0]) * (fabs(yz) + fabs(zy)) + fabs(a[1]) * (fabs(zx) + fabs(xz)) + fabs(a[2]) * (fabs(xy) + fabs(yx));
@@ -144,5 +148,5 @@ int orb_orient(const double a[3], const double b[3], const double c[3]) {
       return d > 0 ? 1 : -1;
     }
   }
-  return exact_sign(a, b, c);
+  return decide_exactly(a, b, c);
 }
