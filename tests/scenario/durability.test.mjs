@@ -1,0 +1,82 @@
+// What was promised is kept: through kill -9, through SIGTERM, through many restarts.
+import assert from 'node:assert/strict';
+import path from 'node:path';
+import test from 'node:test';
+import { daemon, samples, slow } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const wobble = (seed, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.2 * Math.sin(5 * y + seed)), 1.3 * y, z + 0.2 * Math.cos(4 * x + seed)]);
+
+async function kill(d) {
+  d.killed = true;
+  await d.stop('SIGKILL');
+  await d.start();
+  d.killed = false;
+}
+
+test('accepted jobs survive kill -9', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const jobs = [];
+  for (let i = 0; i < 5; i++) {
+    const { json: mesh } = await d.upload(shapes.binaryPly(wobble(i, slow ? 4 : 6)), { name: `m${i}` });
+    const reply = await d.post('/v1/embeddings', { mesh: mesh.id });
+    assert.equal(reply.status, 202, reply.bytes.toString());
+    jobs.push({ job: reply.json, mesh });
+  }
+  await kill(d);
+  assert.ok(d.start_ms < 10_000, `${d.start_ms} ms to start again`);
+  for (const { job, mesh } of jobs) {
+    assert.equal((await d.get(mesh.url)).status, 200);
+    const now = await d.get(job.url);
+    assert.equal(now.status, 200, 'the job is known');
+    const end = await d.ended(now.json);
+    assert.equal(end.state, 'succeeded', JSON.stringify(end.problem));
+    assert.equal((await d.get(end.result)).json.certificate.valid, true);
+  }
+});
+
+test('killed again and again, it comes back and goes on', async (t) => {
+  const d = await daemon(t);
+  const first = await d.mesh(path.join(samples, 'dog.obj'));
+  const kept = [];
+  for (let i = 0; i < (slow ? 3 : 6); i++) {
+    const { json: mesh } = await d.upload(shapes.obj(wobble(i, 3)), { name: `r${i}` });
+    const reply = await d.post('/v1/supermeshes', { shapes: [{ mesh: first.id }, { mesh: mesh.id }] });
+    assert.ok([200, 202].includes(reply.status), reply.bytes.toString());
+    kept.push(reply.json);
+    await kill(d);
+  }
+  for (const job of kept) {
+    const end = await d.ended((await d.get(job.url)).json);
+    assert.equal(end.state, 'succeeded', JSON.stringify(end));
+  }
+});
+
+test('results stay after an orderly end, and the second run finds them', async (t) => {
+  const d = await daemon(t);
+  const mesh = await d.mesh(path.join(samples, 'dog.obj'));
+  const embedding = await d.made('/v1/embeddings', { mesh: mesh.id });
+  const began = Date.now();
+  const { code } = await d.stop();
+  assert.equal(code, 0, d.log);
+  assert.ok(Date.now() - began < 15_000);
+  await d.start();
+  assert.deepEqual((await d.get(embedding.url)).json, embedding);
+  const again = await d.make('/v1/embeddings', { mesh: mesh.id });
+  assert.equal(again.status, 200);
+});
+
+test('SIGTERM ends it in time while a job runs, and the job is kept', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const { json: mesh } = await d.upload(shapes.binaryPly(wobble(1, slow ? 5 : 8)), { name: 'big' });
+  const { json: job } = await d.post('/v1/embeddings', { mesh: mesh.id });
+  const waiting = d.get(job.url, { query: { wait: 60 } }).catch((error) => ({ error }));
+  const began = Date.now();
+  const { code } = await d.stop();
+  assert.equal(code, 0, d.log);
+  assert.ok(Date.now() - began < 15_000, `${Date.now() - began} ms`);
+  await waiting;
+  await d.start();
+  const end = await d.ended((await d.get(job.url)).json, { seconds: 600 });
+  assert.equal(end.state, 'succeeded', JSON.stringify(end.problem));
+});

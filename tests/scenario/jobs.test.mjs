@@ -1,0 +1,95 @@
+// Jobs: waiting, events, cancelling, lists, and one flight a key.
+import assert from 'node:assert/strict';
+import path from 'node:path';
+import test from 'node:test';
+import { daemon, samples, assertProblem } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+/** A mesh that takes a while to embed, different for every seed. */
+async function heavy(d, seed = 1, levels = 6) {
+  const m = shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y + seed)), 1.5 * y + 0.4 * Math.sin(5 * x), z * (1 + 0.2 * Math.cos(9 * x))]);
+  const reply = await d.upload(shapes.binaryPly(m), { name: `heavy${seed}` });
+  assert.equal(reply.status, 201, reply.bytes.toString());
+  return reply.json;
+}
+
+test('a job can be waited for', async (t) => {
+  const d = await daemon(t);
+  const mesh = await d.mesh(path.join(samples, 'dog.obj'));
+  const accepted = await d.post('/v1/embeddings', { mesh: mesh.id });
+  assert.equal(accepted.status, 202);
+  assert.ok(accepted.headers.get('location').endsWith(accepted.json.url));
+  assert.ok(Number(accepted.headers.get('retry-after')) >= 0);
+  for (const field of ['id', 'url', 'kind', 'state', 'progress', 'created']) assert.ok(field in accepted.json, field);
+  const done = await d.get(accepted.json.url, { query: { wait: 30 } });
+  assert.equal(done.json.state, 'succeeded');
+  assert.equal(done.json.progress, 1);
+  assert.equal(done.json.problem, null);
+  assert.ok(Date.parse(done.json.finished) >= Date.parse(done.json.started));
+  assert.equal((await d.get(done.json.result)).status, 200);
+
+  const prefer = await d.post('/v1/embeddings', { mesh: (await d.mesh(path.join(samples, 'giraffe.off'))).id }, { headers: { prefer: 'wait=30' } });
+  assert.equal(prefer.status, 200, 'Prefer: wait on the request itself brings the result');
+  assert.equal(prefer.json.certificate.valid, true);
+  const header = await d.get(accepted.json.url, { headers: { prefer: 'wait=5' } });
+  assert.equal(header.json.state, 'succeeded');
+  assert.equal((await d.get(accepted.json.url, { query: { wait: 999999 } })).status, 200, 'wait is clamped, not refused');
+});
+
+test('events tell the progress and the end, and resume', async (t) => {
+  const d = await daemon(t);
+  const mesh = await heavy(d);
+  const { json: job } = await d.post('/v1/embeddings', { mesh: mesh.id });
+  const events = await d.get(`${job.url}/events`, { headers: { accept: 'text/event-stream' } });
+  assert.equal(events.status, 200);
+  assert.equal(events.type.split(';')[0], 'text/event-stream');
+  const list = events.bytes.toString().split('\n\n').filter((e) => /^event:/m.test(e));
+  const names = list.map((e) => /^event: ?(\w+)/m.exec(e)[1]);
+  assert.equal(names.at(-1), 'succeeded', names.join());
+  assert.ok(names.slice(0, -1).every((n) => n === 'progress'));
+  const last = JSON.parse(/^data: ?(.*)/m.exec(list.at(-1))[1]);
+  assert.equal(last.state ?? 'succeeded', 'succeeded');
+  const ids = list.map((e) => /^id: ?(.+)/m.exec(e)?.[1]);
+  assert.ok(ids.every(Boolean) && new Set(ids).size === ids.length, `ids: ${ids}`);
+  const resumed = await d.get(`${job.url}/events`, { headers: { 'last-event-id': ids.at(-2) ?? '0' } });
+  assert.match(resumed.bytes.toString(), /^event: ?succeeded/m);
+});
+
+test('a job is cancelled while it waits and while it runs', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const [first, second] = [await heavy(d, 1, 7), await heavy(d, 2, 7)];
+  const running = (await d.post('/v1/embeddings', { mesh: first.id })).json;
+  const queued = (await d.post('/v1/embeddings', { mesh: second.id })).json;
+  for (const job of [queued, running]) {
+    const reply = await d.delete(job.url);
+    assert.ok([200, 202, 204].includes(reply.status), reply.bytes.toString());
+    const end = await d.ended(job);
+    assert.equal(end.state, 'cancelled');
+    assert.ok(!end.result);
+  }
+  const again = await d.make('/v1/embeddings', { mesh: (await d.mesh(path.join(samples, 'dog.obj'))).id });
+  assert.ok(again.resource, 'the worker is free for the next job');
+  const anew = await d.make('/v1/embeddings', { mesh: first.id });
+  assert.ok(anew.resource, 'what was cancelled can be asked for again');
+});
+
+test('the same request while its job runs is that same job', async (t) => {
+  const d = await daemon(t);
+  const mesh = await heavy(d);
+  const replies = await Promise.all(Array.from({ length: 8 }, () => d.post('/v1/embeddings', { mesh: mesh.id })));
+  const jobs = new Set(replies.filter((r) => r.status === 202).map((r) => r.json.id));
+  assert.ok(jobs.size <= 1, `${jobs.size} jobs`);
+  const list = Object.values((await d.get('/v1/jobs')).json).find(Array.isArray);
+  assert.equal(list.length, 1);
+  await d.ended(list[0]);
+});
+
+test('jobs are listed by state', async (t) => {
+  const d = await daemon(t);
+  const mesh = await d.mesh(path.join(samples, 'dog.obj'));
+  await d.made('/v1/embeddings', { mesh: mesh.id });
+  const items = async (state) => Object.values((await d.get('/v1/jobs', { query: { state } })).json).find(Array.isArray);
+  assert.equal((await items('succeeded')).length, 1);
+  assert.equal((await items('failed')).length, 0);
+  assertProblem(await d.get('/v1/jobs/nothing'), 404, 'not-found');
+});

@@ -1,0 +1,172 @@
+// Meshes: what is accepted and mended, what is refused and why, and the resource itself.
+import assert from 'node:assert/strict';
+import { createHash } from 'node:crypto';
+import { readFile } from 'node:fs/promises';
+import path from 'node:path';
+import test from 'node:test';
+import { daemon, samples, assertProblem } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const { obj, ball } = shapes;
+
+test('a mesh is known by its content', async (t) => {
+  const d = await daemon(t);
+  const bytes = await readFile(path.join(samples, 'dog.obj'));
+  const first = await d.upload(bytes, { name: 'dog' });
+  assert.equal(first.status, 201, first.bytes.toString());
+  const mesh = first.json;
+  assert.match(mesh.id, /^[0-9a-f]{64}$/);
+  assert.equal(mesh.url, `/v1/meshes/${mesh.id}`);
+  assert.ok(first.headers.get('location').endsWith(mesh.url));
+  assert.equal(mesh.name, 'dog');
+  assert.equal(mesh.format, 'obj');
+  assert.equal(mesh.bytes, bytes.length);
+  assert.equal(mesh.triangles, 2 * mesh.vertices - 4);
+  assert.equal(mesh.triangles, 5600);
+  assert.deepEqual(mesh.topology, { ...mesh.topology, components: 1, genus: 0, boundary_loops: 0, nonmanifold_edges: 0, nonmanifold_vertices: 0 });
+  assert.deepEqual(mesh.repairs, []);
+  assert.ok(Math.abs(Date.parse(mesh.created) - Date.now()) < 600_000);
+
+  const again = await d.upload(bytes, { name: 'dog' });
+  assert.equal(again.status, 200);
+  assert.equal(again.json.id, mesh.id);
+  const other = await d.upload(bytes, { name: 'dog', repair: 'none' });
+  assert.notEqual(other.json.id, mesh.id, 'the repair options belong to the identity');
+
+  assert.deepEqual((await d.get(mesh.url)).json, mesh);
+  const file = await d.get(`${mesh.url}/file`);
+  assert.equal(createHash('sha256').update(file.bytes).digest('hex'), createHash('sha256').update(bytes).digest('hex'));
+});
+
+test('area, volume and bounds are those of the surface', async (t) => {
+  const d = await daemon(t);
+  const { json: cube } = await d.upload(shapes.cube.replaceAll('v 1', 'v 2'), { name: 'box' });
+  assert.equal(cube.vertices, 8);
+  assert.equal(cube.triangles, 12);
+  assert.ok(Math.abs(cube.area - 10) < 1e-12);
+  assert.ok(Math.abs(cube.volume - 2) < 1e-12);
+  assert.deepEqual(cube.bounds, { min: [0, 0, 0], max: [2, 1, 1] });
+});
+
+test('every format is told by its content', async (t) => {
+  const d = await daemon(t);
+  const m = ball(2);
+  const files = {
+    obj: obj(m),
+    off: shapes.off(m),
+    ply: shapes.binaryPly(m),
+    stl: shapes.binaryStl(m),
+  };
+  for (const [format, bytes] of Object.entries(files)) {
+    const reply = await d.upload(bytes, { name: 'misleading.xyz' });
+    assert.equal(reply.status, 201, `${format}: ${reply.bytes}`);
+    assert.equal(reply.json.format, format);
+    assert.equal(reply.json.vertices, m.positions.length, format);
+    assert.equal(reply.json.triangles, m.triangles.length, format);
+  }
+  const big = await d.upload(shapes.binaryPly(m, true));
+  assert.equal(big.status, 201, big.bytes.toString());
+});
+
+test('safe repairs mend what changes no shape, and say so', async (t) => {
+  const d = await daemon(t);
+  const m = ball(2);
+  const kinds = (reply) => Object.fromEntries(reply.json.repairs.map((r) => [r.kind, r.count]));
+  const mended = async (mesh, kind, what) => {
+    const reply = await d.upload(typeof mesh === 'string' ? mesh : obj(mesh));
+    assert.equal(reply.status, 201, `${what}: ${reply.bytes}`);
+    assert.ok(kinds(reply)[kind] > 0, `${what}: ${JSON.stringify(reply.json.repairs)}`);
+    assert.equal(reply.json.triangles, m.triangles.length, what);
+    assert.ok(reply.json.volume > 0, `${what}: the surface faces outwards`);
+  };
+  await mended(shapes.soup(m), 'weld', 'vertices at one place');
+  await mended(shapes.turned(m, (i) => i % 5 === 2), 'reorient', 'some faces turned');
+  await mended(shapes.turned(m), 'turn-inside-out', 'all faces turned');
+  await mended({ ...m, positions: [...m.positions, [9, 9, 9]] }, 'unused-vertices', 'a vertex without faces');
+  await mended({ ...m, triangles: [...m.triangles, m.triangles[3]] }, 'duplicate-faces', 'a face twice');
+  await mended(`${obj(m)}f 1 1 2\n`, 'degenerate-faces', 'a face over one vertex twice');
+  const cube = await d.upload(shapes.cube);
+  assert.equal(kinds(cube).triangulate, 6, 'polygons');
+});
+
+test('repairs that change the shape happen by name only', async (t) => {
+  const d = await daemon(t);
+  const open = obj(shapes.withoutFace(ball(2)));
+  assertProblem(await d.upload(open), 422, 'not-closed');
+  const filled = await d.upload(open, { repair: 'fill_holes' });
+  assert.equal(filled.status, 201, filled.bytes.toString());
+  assert.ok(filled.json.repairs.some((r) => r.kind === 'fill_holes' && r.count === 1));
+  const two = obj(shapes.apart(ball(2), ball(1)));
+  assertProblem(await d.upload(two), 422, 'not-connected');
+  const largest = await d.upload(two, { repair: 'largest_component' });
+  assert.equal(largest.status, 201, largest.bytes.toString());
+  assert.equal(largest.json.triangles, 128);
+  const unknown = await d.upload(open, { repair: 'magic' });
+  assert.equal(unknown.status, 400, unknown.bytes.toString());
+});
+
+test('bad meshes are refused with what is wrong and where', async (t) => {
+  const d = await daemon(t);
+  const m = ball(2);
+  const refused = async (body, status, type, query) => {
+    const reply = await d.upload(typeof body === 'object' && body.positions ? obj(body) : body, query);
+    assertProblem(reply, status, type, type);
+    return reply.json;
+  };
+  const open = await refused(shapes.withoutFace(m), 422, 'not-closed');
+  assert.equal(open.boundary_loops, 1);
+  assert.equal(open.boundary_edges.length, 3);
+  assert.deepEqual([...new Set(open.boundary_edges.flat())].sort((a, b) => a - b), [...m.triangles[0]].sort((a, b) => a - b));
+  assert.equal((await refused(shapes.torus(), 422, 'not-genus-zero')).genus, 1);
+  assert.deepEqual((await refused(shapes.apart(ball(2), ball(1)), 422, 'not-connected')).components, [128, 32]);
+  const wing = await refused({ positions: [...m.positions, [3, 3, 3]], triangles: [...m.triangles, [0, 2, m.positions.length]] }, 422, 'not-manifold');
+  assert.ok(Object.keys(wing).length > 4, 'facts are there');
+  await refused(shapes.turned(m, (i) => i === 5), 422, 'not-orientable', { repair: 'none' });
+  await refused(obj(m).replace('v 1 0 0', 'v nan 0 0'), 422, 'not-finite');
+  const line = await refused(obj(m).replace(/\nf (\d+)/, '\nf 99999'), 400, 'malformed-mesh');
+  assert.equal(line.line, m.positions.length + 1);
+  const cut = await refused(shapes.binaryPly(m).subarray(0, -20), 400, 'malformed-mesh');
+  assert.ok(cut.offset > 0 || cut.line > 0);
+  await refused('v 0 0 0\nv 1 0 0\nv 0 1 0\n', 400, 'malformed-mesh');
+  await refused(Buffer.from([0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10, 0, 1, 2, 3]), 415, 'unknown-format');
+  await refused('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n', 422, 'degenerate');
+  const list = await d.get('/v1/meshes');
+  assert.deepEqual(list.json.meshes ?? list.json.items, [], 'nothing that was refused is stored');
+});
+
+test('cut and scrambled files never do harm', async (t) => {
+  const d = await daemon(t);
+  const files = [Buffer.from(obj(ball(1))), Buffer.from(shapes.off(ball(1))), shapes.binaryPly(ball(1)), shapes.binaryStl(ball(1))];
+  let seed = 12345;
+  const random = (n) => ((seed = (Math.imul(seed, 1103515245) + 12345) >>> 0), seed % n);
+  for (const file of files)
+    for (let i = 0; i < 25; i++) {
+      const bytes = Buffer.from(file.subarray(0, 1 + random(file.length)));
+      for (let k = random(6); k > 0; k--) bytes[random(bytes.length)] = random(256);
+      const reply = await d.upload(bytes);
+      assert.ok([200, 201, 400, 413, 415, 422].includes(reply.status), `${reply.status} ${reply.bytes}`);
+    }
+  assert.equal((await d.get('/livez')).status, 200);
+});
+
+test('lists come in pages; what is deleted is gone', async (t) => {
+  const d = await daemon(t);
+  const ids = [];
+  for (let i = 0; i < 5; i++) ids.push((await d.upload(shapes.tetrahedron.replace('v 1 0 0', `v ${i + 1} 0 0`), { name: `t${i}` })).json.id);
+  const seen = [];
+  let token, pages = 0;
+  do {
+    const page = (await d.get('/v1/meshes', { query: { limit: 2, ...(token ? { page_token: token } : {}) } })).json;
+    const items = Object.values(page).find(Array.isArray);
+    assert.ok(items.length <= 2);
+    seen.push(...items.map((m) => m.id));
+    token = page.next_page_token;
+    pages++;
+  } while (token);
+  assert.equal(pages, 3);
+  assert.deepEqual([...seen].sort(), [...ids].sort());
+  const gone = await d.delete(`/v1/meshes/${ids[2]}`);
+  assert.ok([200, 204].includes(gone.status), gone.bytes.toString());
+  assertProblem(await d.get(`/v1/meshes/${ids[2]}`), 404, 'not-found');
+  assert.equal((await d.upload(shapes.tetrahedron.replace('v 1 0 0', 'v 3 0 0'))).status, 201, 'it can come back');
+});

@@ -1,0 +1,111 @@
+// Requests that are wrong in every way HTTP and JSON allow.
+import assert from 'node:assert/strict';
+import net from 'node:net';
+import path from 'node:path';
+import test from 'node:test';
+import { daemon, samples, assertProblem } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+/** Sends bytes as they are; resolves to all that comes back until the connection closes. */
+function raw(d, text, { wait = 10_000 } = {}) {
+  const { hostname, port } = new URL(d.url);
+  return new Promise((resolve, reject) => {
+    let out = '';
+    const socket = net.connect(Number(port), hostname, () => socket.write(text));
+    socket.setTimeout(wait, () => socket.destroy());
+    socket.on('data', (chunk) => (out += chunk.toString('latin1')));
+    socket.on('close', () => resolve(out));
+    socket.on('error', (error) => (out ? resolve(out) : reject(error)));
+  });
+}
+const statusOf = (text) => Number(/^HTTP\/1\.[01] (\d+)/.exec(text)?.[1]);
+
+test('unknown paths, unknown ids, wrong methods', async (t) => {
+  const d = await daemon(t);
+  for (const target of ['/nothing', '/v1', '/v1/', '/v1/meshes/', '/v1/mesh', '/v2/meshes', `/v1/meshes/${'0'.repeat(64)}`, '/v1/meshes/abc',
+    `/v1/embeddings/${'0'.repeat(64)}/sphere.ply`, '/v1/jobs/1', '/v1/jobs/1/events', '/%00', '/..%2f..%2fetc/passwd'])
+    assertProblem(await d.get(target), 404, 'not-found', target);
+  for (const [method, target, allowed] of [['PUT', '/v1/meshes', ['GET', 'POST']], ['PATCH', `/v1/meshes/${'0'.repeat(64)}`, ['GET', 'DELETE']],
+    ['DELETE', '/v1/embeddings', ['GET', 'POST']], ['POST', '/livez', ['GET']], ['DELETE', '/readyz', ['GET']]]) {
+    const reply = await d.request(method, target);
+    assertProblem(reply, 405, 'method-not-allowed', `${method} ${target}`);
+    const allow = (reply.headers.get('allow') ?? '').split(/, */);
+    for (const name of allowed) assert.ok(allow.includes(name), `${method} ${target}: Allow: ${allow}`);
+    assert.ok(!allow.includes(method));
+  }
+});
+
+test('health, metrics and the description', async (t) => {
+  const d = await daemon(t);
+  assert.equal((await d.get('/livez')).status, 200);
+  assert.equal((await d.get('/readyz')).status, 200);
+  const metrics = await d.get('/metrics');
+  if (metrics.status === 200) assert.match(metrics.bytes.toString(), /^# TYPE \w+ (counter|gauge|histogram)$/m);
+  const openapi = await d.get('/openapi.json');
+  if (openapi.status === 200) {
+    assert.match(openapi.json.openapi, /^3\.1/);
+    for (const p of ['/v1/meshes', '/v1/embeddings', '/v1/supermeshes', '/v1/jobs/{id}']) assert.ok(openapi.json.paths[p], p);
+  }
+});
+
+test('JSON that is none', async (t) => {
+  const d = await daemon(t);
+  const mesh = await d.mesh(path.join(samples, 'dog.obj'));
+  const body = JSON.stringify({ mesh: mesh.id });
+  const deep = '['.repeat(5000) + ']'.repeat(5000);
+  for (const text of ['', '{', '{"mesh":', `${body} x`, `${body}${body}`, '{"mesh":1e999}', '{"mesh":NaN}', "{'mesh':1}", '{"a":1,}', deep, '\ufeff' + '{']) {
+    const reply = await d.post('/v1/embeddings', text, { headers: { 'content-type': 'application/json' } });
+    assertProblem(reply, 400, 'malformed-json', text.slice(0, 40));
+  }
+  const invalid = Buffer.concat([Buffer.from('{"mesh":"'), Buffer.from([0xff, 0xfe]), Buffer.from('"}')]);
+  assertProblem(await d.post('/v1/embeddings', invalid, { headers: { 'content-type': 'application/json' } }), 400, 'malformed-json');
+  for (const text of ['[]', '3', 'null', '"x"', 'true']) {
+    const reply = await d.post('/v1/embeddings', text, { headers: { 'content-type': 'application/json' } });
+    assert.ok([400, 422].includes(reply.status), `${text}: ${reply.status}`);
+  }
+  const twice = await d.post('/v1/embeddings', `{"mesh":"${'0'.repeat(64)}","mesh":"${mesh.id}"}`);
+  assert.ok(twice.status >= 200 && twice.status < 500);
+  const large = await d.post('/v1/embeddings', `{"mesh":"${'x'.repeat(1_100_000)}"}`);
+  assert.equal(large.status, 413);
+});
+
+test('a body that is too large is refused before it is read', async (t) => {
+  const d = await daemon(t);
+  const { hostname, port } = new URL(d.url);
+  const began = Date.now();
+  const reply = await raw(d, `POST /v1/meshes?name=big HTTP/1.1\r\nHost: ${hostname}:${port}\r\nContent-Length: ${600 * 1024 * 1024}\r\nExpect: 100-continue\r\n\r\n`);
+  assert.equal(statusOf(reply), 413, reply.slice(0, 300));
+  assert.match(reply, /too-large/);
+  const sent = await raw(d, `POST /v1/meshes?name=big HTTP/1.1\r\nHost: ${hostname}:${port}\r\nContent-Length: ${600 * 1024 * 1024}\r\n\r\nv 0 0 0\n`);
+  assert.equal(statusOf(sent), 413, sent.slice(0, 300));
+  assert.ok(Date.now() - began < 15_000);
+});
+
+test('a body must say how long it is, or come in chunks', async (t) => {
+  const d = await daemon(t);
+  const { host } = new URL(d.url);
+  const none = await raw(d, `POST /v1/meshes HTTP/1.1\r\nHost: ${host}\r\nConnection: close\r\n\r\n`);
+  assert.equal(statusOf(none), 411, none.slice(0, 300));
+  const text = shapes.tetrahedron;
+  const chunks = text.match(/[^]{1,17}/g).map((c) => `${c.length.toString(16)}\r\n${c}\r\n`).join('');
+  const chunked = await raw(d, `POST /v1/meshes?name=t HTTP/1.1\r\nHost: ${host}\r\nTransfer-Encoding: chunked\r\nConnection: close\r\n\r\n${chunks}0\r\n\r\n`);
+  assert.equal(statusOf(chunked), 201, chunked.slice(0, 300));
+});
+
+test('requests that could mean two things are refused', async (t) => {
+  const d = await daemon(t);
+  const { host } = new URL(d.url);
+  const bad = {
+    'two lengths': `POST /v1/embeddings HTTP/1.1\r\nHost: ${host}\r\nContent-Length: 2\r\nContent-Length: 3\r\n\r\n{}`,
+    'length and chunks': `POST /v1/embeddings HTTP/1.1\r\nHost: ${host}\r\nContent-Length: 2\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n`,
+    'no host': 'GET /livez HTTP/1.1\r\n\r\n',
+    'two hosts': `GET /livez HTTP/1.1\r\nHost: ${host}\r\nHost: other\r\n\r\n`,
+    'an unknown coding': `POST /v1/embeddings HTTP/1.1\r\nHost: ${host}\r\nTransfer-Encoding: gzip, chunked\r\n\r\n0\r\n\r\n`,
+    'a body where none belongs': `GET /v1/meshes HTTP/1.1\r\nHost: ${host}\r\nContent-Length: 5\r\n\r\nhello`,
+  };
+  for (const [what, text] of Object.entries(bad)) {
+    const reply = await raw(d, text);
+    assert.ok([400, 413, 501].includes(statusOf(reply)), `${what}: ${reply.slice(0, 200)}`);
+  }
+  assert.equal((await d.get('/livez')).status, 200);
+});

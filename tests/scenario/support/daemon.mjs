@@ -1,0 +1,160 @@
+// Starts a real daemon on a free port with a data folder of its own, and talks to it.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { mkdtemp, rm, readFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+export const root = path.resolve(path.dirname(fileURLToPath(import.meta.url)), '../../..');
+export const samples = path.join(root, 'tests/samples');
+export const binaries = {
+  daemon: process.env.ORBMORPHD ?? path.join(root, 'build/bin/orbmorphd'),
+  client: process.env.ORBMORPH ?? path.join(root, 'build/bin/orbmorph'),
+};
+// A build with sanitizers is several times slower; tests that do much take less of it there.
+export const slow = process.env.ORB_SLOW === '1';
+
+const START_MS = 30_000;
+
+export class Daemon {
+  constructor(data, args, env) {
+    Object.assign(this, { data, args, env, log: '', out: '' });
+  }
+
+  async start() {
+    const began = Date.now();
+    this.out = '';
+    const child = spawn(binaries.daemon, ['--listen', '127.0.0.1:0', '--data', this.data, ...this.args], {
+      stdio: ['ignore', 'pipe', 'pipe'],
+      env: { ...process.env, ...this.env },
+    });
+    this.child = child;
+    this.exited = new Promise((resolve) => child.once('exit', (code, signal) => resolve({ code, signal })));
+    child.stderr.on('data', (chunk) => (this.log = (this.log + chunk).slice(-200_000)));
+    this.url = await new Promise((resolve, reject) => {
+      const fail = (why) => reject(new Error(`the daemon did not start: ${why}\n${this.log}`));
+      const timer = setTimeout(() => fail('no line in time'), START_MS);
+      child.once('error', (error) => fail(error.message));
+      child.once('exit', (code, signal) => fail(`exit ${code ?? signal}`));
+      child.stdout.on('data', (chunk) => {
+        this.out += chunk;
+        const line = /^orbmorphd listening on (http:\/\/\S+)\n/m.exec(this.out);
+        if (line) {
+          clearTimeout(timer);
+          resolve(line[1]);
+        }
+      });
+    });
+    this.start_ms = Date.now() - began;
+    return this;
+  }
+
+  /** Ends it with a signal; resolves to {code, signal}. */
+  async stop(signal = 'SIGTERM') {
+    if (this.child.exitCode === null && this.child.signalCode === null) this.child.kill(signal);
+    return this.exited;
+  }
+
+  async request(method, target, { body, headers, query, signal } = {}) {
+    const url = new URL(target, this.url);
+    for (const [name, value] of Object.entries(query ?? {})) url.searchParams.set(name, value);
+    const isJson = body !== undefined && !(body instanceof Uint8Array) && typeof body !== 'string';
+    const response = await fetch(url, {
+      method,
+      signal,
+      body: isJson ? JSON.stringify(body) : body,
+      headers: { ...(isJson ? { 'content-type': 'application/json' } : {}), ...headers },
+    });
+    const bytes = Buffer.from(await response.arrayBuffer());
+    const type = response.headers.get('content-type') ?? '';
+    const json = /json/.test(type) && bytes.length ? JSON.parse(bytes.toString()) : undefined;
+    return { status: response.status, headers: response.headers, type, bytes, json };
+  }
+
+  get(target, options) {
+    return this.request('GET', target, options);
+  }
+
+  post(target, body, options) {
+    return this.request('POST', target, { body, ...options });
+  }
+
+  delete(target, options) {
+    return this.request('DELETE', target, options);
+  }
+
+  upload(bytes, query = {}) {
+    return this.post('/v1/meshes', typeof bytes === 'string' ? Buffer.from(bytes) : bytes, { query });
+  }
+
+  async uploadFile(file, query = {}) {
+    return this.upload(await readFile(file), { name: path.parse(file).name, ...query });
+  }
+
+  /** Uploads a file that must be accepted; resolves to the mesh. */
+  async mesh(file, query) {
+    const reply = await this.uploadFile(file, query);
+    assert.ok([200, 201].includes(reply.status), `${file}: ${reply.status} ${reply.bytes}`);
+    return reply.json;
+  }
+
+  /** Waits for the end of a job. */
+  async ended(job, { seconds = 300 } = {}) {
+    const until = Date.now() + seconds * 1000;
+    while (!['succeeded', 'failed', 'cancelled'].includes(job.state)) {
+      assert.ok(Date.now() < until, `job ${job.id} has not ended: ${JSON.stringify(job)}`);
+      const reply = await this.get(job.url, { query: { wait: 20 } });
+      assert.equal(reply.status, 200, reply.bytes.toString());
+      job = reply.json;
+    }
+    return job;
+  }
+
+  /** Posts a request for a derived resource and waits; resolves to {status, resource, job}, or {status, problem}. */
+  async make(target, body) {
+    const reply = await this.post(target, body);
+    if (reply.status === 200) return { status: 200, resource: reply.json };
+    if (reply.status !== 202) return { status: reply.status, problem: reply.json };
+    const job = await this.ended(reply.json);
+    if (job.state !== 'succeeded') return { status: 202, job, problem: job.problem };
+    const made = await this.get(job.result);
+    assert.equal(made.status, 200, made.bytes.toString());
+    return { status: 202, job, resource: made.json };
+  }
+
+  async made(target, body) {
+    const result = await this.make(target, body);
+    assert.ok(result.resource, `refused: ${JSON.stringify(result.problem)}`);
+    return result.resource;
+  }
+}
+
+/** A daemon that ends, and loses its data, when the test does. */
+export async function daemon(t, { args = [], env = {} } = {}) {
+  const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
+  const made = new Daemon(data, args, env);
+  t.after(async () => {
+    if (made.child) {
+      const killer = setTimeout(() => made.child.kill('SIGKILL'), 20_000);
+      const { code, signal } = await made.stop();
+      clearTimeout(killer);
+      await rm(data, { recursive: true, force: true });
+      assert.ok(made.killed || code === 0, `the daemon ended with ${code ?? signal}\n${made.log}`);
+    }
+  });
+  return made.start();
+}
+
+/** A problem document of the given type and status. */
+export function assertProblem(reply, status, type, what = '') {
+  const text = `${what} ${reply.status} ${reply.bytes.toString().slice(0, 500)}`;
+  assert.equal(reply.status, status, text);
+  assert.equal(reply.type.split(';')[0], 'application/problem+json', text);
+  assert.equal(reply.json.type, `/problems/${type}`, text);
+  assert.equal(reply.json.status, status, text);
+  for (const member of ['title', 'detail']) {
+    assert.equal(typeof reply.json[member], 'string', text);
+    assert.ok(reply.json[member].length > 0, text);
+  }
+}

@@ -1,0 +1,131 @@
+// Small meshes made by hand, good and bad, as text of OBJ files.
+
+export const tetrahedron = 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n';
+
+export const cube =
+  'v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n' +
+  'f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n';
+
+export function obj({ positions, triangles }) {
+  return positions.map((p) => `v ${p.join(' ')}\n`).join('') + triangles.map((t) => `f ${t.map((v) => v + 1).join(' ')}\n`).join('');
+}
+
+/** A sphere of 8·4^levels triangles, its points moved by `shape`. */
+export function ball(levels = 3, shape = (p) => p) {
+  let triangles = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+  const points = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
+  for (let level = 0; level < levels; level++) {
+    const middles = new Map();
+    const middle = (a, b) => {
+      const key = a < b ? `${a},${b}` : `${b},${a}`;
+      if (!middles.has(key)) {
+        const sum = points[a].map((x, k) => x + points[b][k]);
+        const length = Math.hypot(...sum);
+        middles.set(key, points.push(sum.map((x) => x / length)) - 1);
+      }
+      return middles.get(key);
+    };
+    triangles = triangles.flatMap(([a, b, c]) => {
+      const [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+      return [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+    });
+  }
+  return { positions: points.map(shape), triangles, points };
+}
+
+export const egg = (levels = 3) => ball(levels, ([x, y, z]) => [1.4 * x + 0.2 * y * y, y, 0.8 * z]);
+export const bean = (levels = 3) => ball(levels, ([x, y, z]) => [x, 0.9 * y + 0.35 * x * x, 0.7 * z * (1 + 0.3 * x)]);
+
+export function torus(n = 12, m = 8) {
+  const positions = [], triangles = [];
+  for (let i = 0; i < n; i++)
+    for (let j = 0; j < m; j++) {
+      const u = (2 * Math.PI * i) / n, v = (2 * Math.PI * j) / m, r = 2 + Math.cos(v);
+      positions.push([r * Math.cos(u), r * Math.sin(u), Math.sin(v)]);
+      const at = (a, b) => (a % n) * m + (b % m);
+      triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+    }
+  return { positions, triangles };
+}
+
+export const withoutFace = ({ positions, triangles }) => ({ positions, triangles: triangles.slice(1) });
+
+export function apart(a, b, shift = 10) {
+  const n = a.positions.length;
+  return {
+    positions: [...a.positions, ...b.positions.map(([x, y, z]) => [x + shift, y, z])],
+    triangles: [...a.triangles, ...b.triangles.map((t) => t.map((v) => v + n))],
+  };
+}
+
+/** Every triangle with vertices of its own, as in an STL file. */
+export function soup({ positions, triangles }) {
+  return {
+    positions: triangles.flatMap((t) => t.map((v) => positions[v])),
+    triangles: triangles.map((_, i) => [3 * i, 3 * i + 1, 3 * i + 2]),
+  };
+}
+
+export const turned = ({ positions, triangles }, which = () => true) => ({
+  positions,
+  triangles: triangles.map((t, i) => (which(i) ? [t[0], t[2], t[1]] : t)),
+});
+
+export function binaryStl({ positions, triangles }) {
+  const bytes = Buffer.alloc(84 + 50 * triangles.length);
+  bytes.write('solid but binary');
+  bytes.writeUInt32LE(triangles.length, 80);
+  triangles.forEach((t, i) => t.forEach((v, c) => positions[v].forEach((x, k) => bytes.writeFloatLE(x, 84 + 50 * i + 12 + 12 * c + 4 * k))));
+  return bytes;
+}
+
+export function binaryPly({ positions, triangles }, big = false) {
+  const order = big ? 'big' : 'little';
+  const head = Buffer.from(
+    `ply\nformat binary_${order}_endian 1.0\ncomment made by hand\nelement vertex ${positions.length}\nproperty double x\n` +
+      `property double y\nproperty double z\nproperty uchar quality\nelement face ${triangles.length}\n` +
+      'property list uchar int vertex_indices\nend_header\n',
+  );
+  const body = Buffer.alloc(25 * positions.length + 13 * triangles.length);
+  let at = 0;
+  const real = (x) => (at = big ? body.writeDoubleBE(x, at) : body.writeDoubleLE(x, at));
+  const int = (x) => (at = big ? body.writeInt32BE(x, at) : body.writeInt32LE(x, at));
+  for (const p of positions) {
+    p.forEach(real);
+    at = body.writeUInt8(7, at);
+  }
+  for (const t of triangles) {
+    at = body.writeUInt8(3, at);
+    t.forEach(int);
+  }
+  return Buffer.concat([head, body]);
+}
+
+export function off({ positions, triangles }) {
+  return `OFF\n# by hand\n${positions.length} ${triangles.length} 0\n${positions.map((p) => p.join(' ')).join('\n')}\n${triangles.map((t) => `3 ${t.join(' ')}`).join('\n')}\n`;
+}
+
+/** Positions and triangles of an OBJ, OFF or ascii PLY file of triangles. */
+export function parse(text) {
+  const lines = text.split(/\r?\n/);
+  if (/^(OFF|ply)/.test(text)) {
+    const words = text.replace(/#.*$/gm, '').replace(/^ply[^]*?end_header\n/, '').trim().split(/\s+/);
+    const head = /element vertex (\d+)[^]*element face (\d+)/.exec(text);
+    let at = 0, n, m;
+    if (head) [n, m] = [Number(head[1]), Number(head[2])];
+    else {
+      at = 4;
+      [n, m] = [Number(words[1]), Number(words[2])];
+    }
+    const positions = Array.from({ length: n }, () => [Number(words[at++]), Number(words[at++]), Number(words[at++])]);
+    const triangles = Array.from({ length: m }, () => (at++, [Number(words[at++]), Number(words[at++]), Number(words[at++])]));
+    return { positions, triangles };
+  }
+  const positions = [], triangles = [];
+  for (const line of lines) {
+    const [kind, ...rest] = line.trim().split(/\s+/);
+    if (kind === 'v') positions.push(rest.slice(0, 3).map(Number));
+    if (kind === 'f') triangles.push(rest.map((x) => Number(x.split('/')[0]) - 1));
+  }
+  return { positions, triangles };
+}
