@@ -5,6 +5,7 @@ import test from 'node:test';
 import { daemon, samples, slow } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
+const kills = Number(process.env.ORB_CRASHES ?? (slow ? 3 : 6));
 const wobble = (seed, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.2 * Math.sin(5 * y + seed)), 1.3 * y, z + 0.2 * Math.cos(4 * x + seed)]);
 
 async function kill(d) {
@@ -39,7 +40,7 @@ test('killed again and again, it comes back and goes on', async (t) => {
   const d = await daemon(t);
   const first = await d.mesh(path.join(samples, 'dog.obj'));
   const kept = [];
-  for (let i = 0; i < (slow ? 3 : 6); i++) {
+  for (let i = 0; i < kills; i++) {
     const { json: mesh } = await d.upload(shapes.obj(wobble(i, 3)), { name: `r${i}` });
     const reply = await d.post('/v1/supermeshes', { shapes: [{ mesh: first.id }, { mesh: mesh.id }] });
     assert.ok([200, 202].includes(reply.status), reply.bytes.toString());

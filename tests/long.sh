@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
+#
+#   tests/long.sh [PART…]    parts: tsan valgrind fuzz crash; all of them without arguments
+#
+# ORB_MINUTES (5) is the time for each fuzz target, ORB_CRASHES (1000) the number of kills.
+set -euo pipefail
+cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/.."
+
+source deploy/packages.sh
+orb_install_packages "${orb_build_packages[@]}" "${orb_test_packages[@]}" "${orb_long_packages[@]}"
+orb_install_node
+if command -v ccache >/dev/null; then
+  export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
+fi
+
+part_tsan() {
+  cmake --preset tsan -DORB_TESTS=ON >/dev/null
+  cmake --build build-tsan
+  ctest --test-dir build-tsan --output-on-failure -R '^(unit|scenario)\.' --timeout 3600
+}
+
+part_valgrind() {
+  cmake --preset debug -DORB_TESTS=ON >/dev/null
+  cmake --build build-debug
+  local program
+  for program in build-debug/bin/test_*; do
+    echo "valgrind $program"
+    valgrind --quiet --error-exitcode=9 --leak-check=full "$program"
+  done
+}
+
+part_fuzz() {
+  cmake --preset fuzz -DORB_TESTS=ON >/dev/null
+  cmake --build build-fuzz
+  local target format work
+  for target in build-fuzz/bin/fuzz_*; do
+    format=${target##*/fuzz_}
+    work=$(mktemp -d)
+    echo "fuzz $format"
+    "$target" -max_total_time=$((60 * ${ORB_MINUTES:-5})) -rss_limit_mb=2048 -artifact_prefix="$work/" "$work" \
+      "tests/fuzz/corpus/$format"
+    rm -rf "$work"
+  done
+}
+
+part_crash() {
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build
+  ORB_CRASHES=${ORB_CRASHES:-1000} ORBMORPHD=build/bin/orbmorphd node --test tests/scenario/durability.test.mjs
+}
+
+if [ $# -eq 0 ]; then
+  set -- tsan valgrind fuzz crash
+fi
+for part in "$@"; do
+  echo "== $part =="
+  "part_$part"
+done

@@ -1,0 +1,187 @@
+// The command line against a real daemon: what it prints, what it writes, how it ends.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { mkdtemp, mkdir, readFile, rm, writeFile, readdir, copyFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+import test from 'node:test';
+import { binaries, daemon, root, samples } from './support/daemon.mjs';
+import { morphOf } from './support/glb.mjs';
+import * as shapes from './support/shapes.mjs';
+
+function run(args, { env = {}, cwd } = {}) {
+  return new Promise((resolve, reject) => {
+    const child = spawn(binaries.client, args, { cwd, env: { ...process.env, ORBMORPH_SERVER: '', ...env }, stdio: ['ignore', 'pipe', 'pipe'] });
+    const out = [], err = [];
+    child.stdout.on('data', (chunk) => out.push(chunk));
+    child.stderr.on('data', (chunk) => err.push(chunk));
+    child.on('error', reject);
+    child.on('close', (code, signal) => resolve({ code: code ?? signal, bytes: Buffer.concat(out), out: Buffer.concat(out).toString(), err: Buffer.concat(err).toString() }));
+  });
+}
+
+async function folder(t) {
+  const made = await mkdtemp(path.join(tmpdir(), 'orbmorph-cli-'));
+  t.after(() => rm(made, { recursive: true, force: true }));
+  return made;
+}
+
+const dog = path.join(samples, 'dog.obj'), giraffe = path.join(samples, 'giraffe.off');
+const landmarks = path.join(samples, 'dog-giraffe.json');
+
+test('wrong usage ends with 2 and says what is wrong', async () => {
+  for (const args of [[], ['fly'], ['morph', 'one'], ['morph', '--bend', 'a', 'b'], ['upload'], ['job'], ['morph', 'a', 'b', '--landmarks'],
+    ['morph', 'a', 'b', '--json=yes'], ['ls', 'shoes'], ['get', 'x', '--part', 'wing'], ['completions', 'fish'],
+    ['morph', dog, giraffe, '--tolerance', 'much'], ['morph', dog, giraffe, '--max-triangles', '1e4'], ['morph', dog, giraffe, '--set', 'x'],
+    ['upload', '/nowhere/mesh.obj'], ['morph', dog, giraffe, '--landmarks', '/nowhere.json'], ['upload', '--name', 'n', dog, giraffe]]) {
+    const { code, err, out } = await run(args, { env: { ORBMORPH_SERVER: 'http://127.0.0.1:9' } });
+    assert.equal(code, 2, `${args}: ${code} ${err}`);
+    assert.ok(err.length > 0 && out === '', `${args}`);
+  }
+  const help = await run(['--help']);
+  assert.equal(help.code, 0);
+  for (const name of ['morph', 'upload', 'embed', 'merge', 'job', 'ls', 'get', 'rm', 'doctor', 'view']) {
+    assert.match(help.out, new RegExp(`^  ${name} `, 'm'));
+    assert.equal((await run([name, '--help'])).code, 0);
+  }
+  assert.match((await run(['--version'])).out, /^orbmorph \d+\.\d+\.\d+\n$/);
+});
+
+test('a daemon that is not there ends with 3', async () => {
+  for (const args of [['ls'], ['upload', dog], ['morph', dog, giraffe]]) {
+    const { code, err } = await run(['--server', 'http://127.0.0.1:9', ...args]);
+    assert.equal(code, 3, err);
+    assert.match(err, /127\.0\.0\.1:9/);
+  }
+  assert.equal((await run(['ls'], { env: { ORBMORPH_SERVER: 'gopher://127.0.0.1' } })).code, 3);
+});
+
+test('morph does the whole job', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  const out = path.join(at, 'a morph.glb'), md = path.join(at, 'report.md'), json = path.join(at, 'report.json');
+  const done = await run(['morph', dog, giraffe, '--landmarks', landmarks, '-o', out, '--report', md], { env });
+  assert.equal(done.code, 0, done.err);
+  assert.match(done.out, /landmarks, exact/);
+  assert.equal(done.err.includes('\r'), false, 'no progress bar where there is no terminal');
+  const morph = morphOf(await readFile(out));
+  assert.deepEqual(morph.names, ['giraffe']);
+  const report = await readFile(md, 'utf8');
+  assert.match(report, /^# Morph of dog, giraffe/);
+  assert.match(report, /\| nose \|/);
+  assert.doesNotMatch(report, /nan|\?/i);
+
+  const again = await run(['morph', dog, giraffe, '-l', landmarks, '-o', out, '--report', json, '--json', '-q'], { env });
+  assert.equal(again.code, 0, again.err);
+  assert.equal(again.err, '', 'quiet is quiet');
+  assert.deepEqual(JSON.parse(again.out), JSON.parse(await readFile(json, 'utf8')));
+  assert.equal(JSON.parse(again.out).certificate.closed, true);
+  assert.deepEqual((await readdir(at)).sort(), ['a morph.glb', 'report.json', 'report.md'], 'no temporary files stay');
+
+  const piped = await run(['morph', dog, giraffe, '-l', landmarks, '-q', '-o', '-'], { env });
+  assert.ok(piped.bytes.equals(await readFile(out)), 'the asset on standard output');
+  const named = await run(['morph', dog, giraffe, '-l', landmarks, '-q'], { env, cwd: at });
+  assert.equal(named.code, 0, named.err);
+  assert.ok((await readdir(at)).includes('dog-giraffe.glb'));
+});
+
+test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  await mkdir(path.join(at, 'in'));
+  await copyFile(dog, path.join(at, 'in/dog.obj'));
+  await copyFile(giraffe, path.join(at, 'in/giraffe.off'));
+  const uploaded = await run(['upload', 'in/*', '--json'], { env, cwd: at });
+  assert.equal(uploaded.code, 0, uploaded.err);
+  const meshes = uploaded.out.trim().split('\n').map((line) => JSON.parse(line));
+  assert.deepEqual(meshes.map((m) => m.name), ['dog', 'giraffe'], 'a pattern in quotes is expanded');
+  const list = await run(['ls'], { env });
+  for (const m of meshes) assert.ok(list.out.includes(m.id));
+  const embedded = await run(['embed', meshes[0].id, '-o', path.join(at, 'sphere.ply')], { env });
+  assert.equal(embedded.code, 0, embedded.err);
+  assert.match(embedded.out, /valid, 0 flipped, degree 1/);
+  assert.match((await readFile(path.join(at, 'sphere.ply'))).toString('latin1', 0, 40), /^ply\nformat binary_little_endian/);
+  const sent = await run(['merge', meshes[0].id, meshes[1].id, '-l', landmarks, '--no-wait', '--json', '--set', 'asset.animation=none'], { env });
+  assert.equal(sent.code, 0, sent.err);
+  const job = JSON.parse(sent.out);
+  const waited = await run(['job', '--wait', job.id, '--json'], { env });
+  assert.equal(waited.code, 0, waited.err);
+  const ended = JSON.parse(waited.out);
+  assert.equal(ended.state, 'succeeded');
+  const id = ended.result.split('/').at(-1);
+  assert.match((await run(['get', id], { env })).out, /closed, genus 0/);
+  const asset = await run(['get', id, '--part', 'asset', '-o', path.join(at, 'x.glb')], { env });
+  assert.equal(asset.code, 0, asset.err);
+  assert.equal(morphOf(await readFile(path.join(at, 'x.glb'))).gltf.animations, undefined, '--set reached the daemon');
+  const file = await run(['get', meshes[0].id, '--part', 'file'], { env });
+  assert.ok(file.bytes.equals(await readFile(dog)));
+  assert.match((await run(['ls', 'jobs', '--state', 'succeeded'], { env })).out, /supermesh/);
+  assert.equal((await run(['rm', id], { env })).code, 0);
+  const gone = await run(['get', id], { env });
+  assert.equal(gone.code, 1);
+  assert.match(gone.err, /not-found/);
+});
+
+test('what the daemon refuses ends with 1 and the problem on standard error', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  const open = path.join(at, 'open.obj'), two = path.join(at, 'two.obj'), ring = path.join(at, 'ring.obj'), turned = path.join(at, 'turned.obj');
+  await writeFile(open, shapes.obj(shapes.withoutFace(shapes.ball(2))));
+  await writeFile(two, shapes.obj(shapes.apart(shapes.ball(2), shapes.ball(1))));
+  await writeFile(ring, shapes.obj(shapes.torus()));
+  await writeFile(turned, shapes.obj(shapes.turned(shapes.ball(2))));
+  const refused = await run(['upload', open], { env });
+  assert.equal(refused.code, 1);
+  assert.equal(refused.out, '');
+  assert.match(refused.err, /not-closed/);
+  assert.match(refused.err, /boundary_edges/);
+  const asJson = await run(['upload', open, '--json'], { env });
+  assert.equal(asJson.code, 1);
+  assert.equal(JSON.parse(asJson.err).type, '/problems/not-closed');
+  assert.equal((await run(['upload', open, '--repair', 'fill_holes'], { env })).code, 0);
+  const morph = await run(['morph', dog, ring, '-o', path.join(at, 'never.glb')], { env });
+  assert.equal(morph.code, 1);
+  assert.match(morph.err, /not-genus-zero/);
+  assert.ok(!(await readdir(at)).includes('never.glb'));
+  const pin = await run(['morph', dog, giraffe, '--align', 'pin', '-o', path.join(at, 'never.glb')], { env });
+  assert.equal(pin.code, 1);
+  assert.match(pin.err, /bad-landmarks/);
+
+  const healthy = await run(['doctor', dog], { env });
+  assert.equal(healthy.code, 0, healthy.err);
+  assert.match(healthy.out, /healthy/);
+  assert.equal((await run(['ls'], { env })).out.includes('dog'), true, 'what was there before stays');
+  const sick = await run(['doctor', open, two, ring, turned], { env });
+  assert.equal(sick.code, 1);
+  assert.match(sick.out, /--repair fill_holes/);
+  assert.match(sick.out, /--repair largest_component/);
+  assert.match(sick.out, /handles/);
+  assert.match(sick.out, /turn-inside-out/);
+  assert.equal((await run(['ls'], { env })).out.includes('turned'), false, 'the doctor leaves nothing behind');
+});
+
+test('a wait outlives the daemon', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const { port } = new URL(d.url);
+  const { json: mesh } = await d.upload(shapes.binaryPly(shapes.ball(6, ([x, y, z]) => [x, y * (1.2 + 0.2 * Math.sin(9 * x)), z])));
+  const waiting = run(['embed', mesh.id], { env: { ORBMORPH_SERVER: d.url } });
+  await new Promise((resolve) => setTimeout(resolve, 150));
+  d.killed = true;
+  await d.stop('SIGKILL');
+  d.args.push('--listen', `127.0.0.1:${port}`); // the last one counts
+  await d.start();
+  d.killed = false;
+  const { code, out, err } = await waiting;
+  assert.equal(code, 0, err);
+  assert.match(out, /0 flipped/);
+});
+
+test('shell completions are what the program prints', async () => {
+  for (const [shell, file] of [['bash', 'orbmorph.bash'], ['zsh', '_orbmorph']]) {
+    const { out } = await run(['completions', shell]);
+    assert.equal(out, await readFile(path.join(root, 'deploy/completions', file), 'utf8'), `deploy/completions/${file} is stale`);
+  }
+});
