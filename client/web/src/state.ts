@@ -146,7 +146,7 @@ const TINTS = ['#f0b79a', '#a8c3ee', '#b4d3a6', '#ecd08a', '#d9b3dc', '#93d0cb',
 export const tint = (index: number) => TINTS[index % TINTS.length];
 
 /** Colours of the landmarks, told apart at a glance; the number says the same. */
-const HUES = ['#d6336c', '#1c7ed6', '#2b8a3e', '#e8590c', '#7048e8', '#0b7285', '#a61e4d', '#5c940d', '#364fc7', '#c92a2a', '#087f5b', '#862e9c'];
+const HUES = ['#d6336c', '#1971c2', '#2b7a3a', '#c2410c', '#7048e8', '#0b7285', '#a61e4d', '#4d7c0f', '#364fc7', '#c92a2a', '#087057', '#862e9c'];
 export const hue = (index: number) => HUES[index % HUES.length];
 
 /** The landmarks that are set on every shape, as the daemon takes them. */

@@ -1,0 +1,142 @@
+// What holds on every page: nothing from outside, a strict policy, names on every control, keys, no work at rest.
+import { after, before, test } from 'node:test';
+import assert from 'node:assert/strict';
+import { createRequire } from 'node:module';
+import { readFile } from 'node:fs/promises';
+import { addFiles, button, difference, openPage, sample, startBrowser, startDaemon, until } from './support.mjs';
+
+let daemon;
+let browser;
+let axe;
+before(async () => {
+  axe = await readFile(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+  daemon = await startDaemon();
+  browser = await startBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await daemon?.stop();
+});
+
+/** Serious and critical findings of axe. `evaluate` is not held by the page's policy, so the policy stays as it is. */
+async function findings(page) {
+  await page.evaluate(axe);
+  const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
+  return violations
+    .filter((v) => v.impact === 'serious' || v.impact === 'critical')
+    .map((v) => `${v.id}: ${v.nodes.map((n) => `${n.html.slice(0, 120)} ${n.any[0]?.message ?? ''}`).slice(0, 3).join(' | ')}`);
+}
+
+test('the files have types, validators and a policy without unsafe-inline', async () => {
+  const page = await fetch(`${daemon.url}/`);
+  assert.equal(page.status, 200);
+  assert.match(page.headers.get('content-type'), /^text\/html/);
+  const policy = page.headers.get('content-security-policy');
+  assert.match(policy, /default-src 'self'/);
+  assert.doesNotMatch(policy, /unsafe-inline|unsafe-eval|https?:|\*/);
+  const html = await page.text();
+  assert.doesNotMatch(html, /<script(?![^>]*\bsrc=)|\son[a-z]+=|\sstyle=/, 'nothing inline');
+  for (const [, path] of html.matchAll(/(?:src|href)="\.?(\/[^"]+)"/g)) {
+    const file = await fetch(daemon.url + path);
+    assert.equal(file.status, 200, path);
+    const etag = file.headers.get('etag');
+    assert.match(etag, /^"[^"]+"$/, path);
+    const again = await fetch(daemon.url + path, { headers: { 'If-None-Match': etag } });
+    assert.equal(again.status, 304, path);
+    const type = file.headers.get('content-type');
+    if (path.endsWith('.js')) assert.match(type, /javascript/);
+    if (path.endsWith('.css')) assert.match(type, /css/);
+    if (path.startsWith('/assets/')) assert.match(file.headers.get('cache-control'), /immutable/);
+  }
+  assert.equal((await fetch(`${daemon.url}/assets/none.js`)).status, 404);
+  assert.equal((await fetch(`${daemon.url}/no/such/page`)).status, 404);
+});
+
+for (const colorScheme of ['light', 'dark'])
+  test(`axe finds nothing serious, ${colorScheme}`, async () => {
+    const { page, done } = await openPage(browser, daemon.url, { colorScheme });
+    const found = { empty: await findings(page) };
+    await button(page, 'Help and keys').click();
+    found.help = await findings(page);
+    await button(page, 'Close').click();
+    await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+    await page.getByText('Options', { exact: true }).click();
+    found.shapes = await findings(page);
+    await button(page, 'Landmarks').click();
+    await page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
+    await page.locator('.marks li').first().waitFor();
+    found.landmarks = await findings(page);
+    await button(page, /^Morph 2 shapes$/).click();
+    await until(() => button(page, 'Pause').count(), 'the morph plays', 240_000);
+    await button(page, 'Pause').click();
+    found.morph = await findings(page);
+    await button(page, 'Use it').click();
+    found.share = await findings(page);
+    await button(page, 'Close').click();
+    await button(page, 'On the server', { exact: true }).click();
+    await button(page, 'Add dog').first().waitFor();
+    found.server = await findings(page);
+    await button(page, 'Close').click();
+    await button(page, 'Spheres').click();
+    await until(() => page.getByText('Certified one to one').count().then((n) => n === 2), 'spheres');
+    found.spheres = await findings(page);
+    assert.deepEqual(found, Object.fromEntries(Object.keys(found).map((key) => [key, []])));
+    await done();
+  });
+
+test('every control has a name', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await page.getByText('Options', { exact: true }).click();
+  for (const tab of ['Shapes', 'Landmarks', 'Spheres']) {
+    await button(page, tab, { exact: true }).click();
+    const snapshot = await page.locator('body').ariaSnapshot();
+    const nameless = snapshot.split('\n').filter((line) => /^\s*- (button|link|slider|switch|checkbox|textbox|combobox|spinbutton|application)\s*:?\s*(\[[^\]]*\])?$/.test(line));
+    assert.deepEqual(nameless, [], `${tab}:\n${snapshot}`);
+  }
+  await done();
+});
+
+test('keys turn the view and change the page; at rest nothing is drawn', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await page.waitForTimeout(600);
+  const still = await page.locator('.stage-area').screenshot();
+  const frames = await page.evaluate(() => {
+    let count = 0;
+    const { drawElements } = WebGL2RenderingContext.prototype;
+    WebGL2RenderingContext.prototype.drawElements = function (...args) {
+      count++;
+      return drawElements.apply(this, args);
+    };
+    return new Promise((resolve) => setTimeout(() => resolve(count), 700));
+  });
+  assert.equal(frames, 0, 'no drawing while nothing changes');
+  await page.locator('.pane-view').first().focus();
+  for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowLeft');
+  await page.waitForTimeout(200);
+  const turned = await page.locator('.stage-area').screenshot();
+  assert.ok((await difference(browser, still, turned)) > 0.01, 'the view has turned');
+  await page.keyboard.press('0');
+  await page.waitForTimeout(200);
+  // the ring of the focus is there now, and little else may differ
+  assert.ok((await difference(browser, still, await page.locator('.stage-area').screenshot())) < 0.01, 'the view is as at first');
+  await page.keyboard.press('2');
+  await page.getByRole('heading', { name: 'Landmarks' }).waitFor();
+  await page.keyboard.press('1');
+  await page.getByRole('heading', { name: 'Shapes', exact: true }).waitFor();
+  await done();
+});
+
+test('a small screen holds everything without scrolling sideways', async () => {
+  const { page, done } = await openPage(browser, daemon.url, { viewport: { width: 360, height: 740 }, hasTouch: true, isMobile: true });
+  const fits = () => page.evaluate(() => document.documentElement.scrollWidth <= innerWidth);
+  assert.ok(await fits());
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  for (const tab of ['Shapes', 'Landmarks', 'Spheres']) {
+    await button(page, tab, { exact: true }).click();
+    assert.ok(await fits(), tab);
+    assert.ok(await button(page, /^Morph/).last().isVisible(), tab);
+  }
+  await done();
+});

@@ -1,0 +1,143 @@
+// A daemon on a free port with a fresh folder, Debian's Chromium, and a page that is watched: every console error,
+// every exception and every request that leaves the daemon is noted, and `done` fails the test for them.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { chromium } from 'playwright-core';
+
+export const root = fileURLToPath(new URL('../../', import.meta.url));
+export const sample = (name) => join(root, 'tests/samples', name);
+
+export async function startDaemon() {
+  if (process.env.ORB_STUDIO_URL) return { url: process.env.ORB_STUDIO_URL.replace(/\/$/, ''), stop: async () => {} };
+  const program = process.env.ORB_DAEMON ?? join(root, 'build/bin/orbmorphd');
+  const data = mkdtempSync(join(tmpdir(), 'orbmorph-studio-'));
+  const child = spawn(program, ['--listen', '127.0.0.1:0', '--data', data], { stdio: ['ignore', 'pipe', 'pipe'] });
+  let log = '';
+  child.stderr.on('data', (text) => (log += text));
+  const url = await new Promise((resolve, reject) => {
+    let out = '';
+    child.stdout.on('data', (text) => {
+      out += text;
+      const found = out.match(/listening on (http:\S+)/);
+      if (found) resolve(found[1]);
+    });
+    child.on('exit', (code) => reject(new Error(`orbmorphd ended with ${code}: ${log}`)));
+    setTimeout(() => reject(new Error(`orbmorphd does not listen: ${log}`)), 20_000).unref();
+  });
+  return {
+    url,
+    stop: () =>
+      new Promise((resolve) => {
+        child.removeAllListeners('exit');
+        child.on('exit', () => {
+          rmSync(data, { recursive: true, force: true });
+          resolve();
+        });
+        child.kill('SIGTERM');
+        setTimeout(() => child.kill('SIGKILL'), 15_000).unref();
+      }),
+  };
+}
+
+export const startBrowser = () =>
+  chromium.launch({
+    executablePath: process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
+    args: ['--no-sandbox', '--headless=new', '--disable-gpu', '--use-gl=angle', '--use-angle=swiftshader',
+      '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update', '--disable-sync',
+      '--no-first-run'],
+  });
+
+/** A page of its own context. `refusals`: how many answers of 4xx are expected, which Chromium reports as errors. */
+export async function openPage(browser, url, { hash = '', ...options } = {}) {
+  const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, acceptDownloads: true, ...options });
+  const page = await context.newPage();
+  const faults = [];
+  page.on('console', (message) => {
+    if (message.type() === 'error' && !/status of 4\d\d/.test(message.text())) faults.push(`console: ${message.text()}`);
+  });
+  page.on('pageerror', (error) => faults.push(`exception: ${error.stack}`));
+  page.on('request', (request) => {
+    const target = new URL(request.url());
+    if (/^(https?|wss?):$/.test(target.protocol) && target.origin !== new URL(url).origin) faults.push(`outside: ${request.url()}`);
+  });
+  await page.goto(`${url}/${hash}`);
+  page.setDefaultTimeout(30_000);
+  return {
+    page,
+    done: async () => {
+      await context.close();
+      assert.deepEqual(faults, []);
+    },
+  };
+}
+
+/** Until `check` gives something true. */
+export async function until(check, what, limit = 90_000) {
+  const end = Date.now() + limit;
+  for (;;) {
+    const value = await check();
+    if (value) return value;
+    if (Date.now() > end) throw new Error(`not within ${limit / 1000} s: ${what}`);
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+}
+
+export const button = (page, name, options) => page.getByRole('button', { name, ...options });
+
+/** Opens the studio with files of the samples and waits until they are taken. */
+export async function addFiles(page, ...files) {
+  await page.locator('input[type=file]').first().setInputFiles(files);
+  await until(() => page.locator('.card.ready').count().then((n) => n >= files.length), 'the shapes are uploaded');
+}
+
+/** The number of pixels of the stage that `test(r, g, b)` accepts, from a screenshot of it. */
+export async function countPixels(page, selector, test) {
+  const png = await page.locator(selector).first().screenshot();
+  return page.evaluate(async ({ data, source }) => {
+    const accept = new Function('r', 'g', 'b', `return (${source})(r, g, b)`);
+    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(data)], { type: 'image/png' }));
+    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+    const context = canvas.getContext('2d');
+    context.drawImage(bitmap, 0, 0);
+    const pixels = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+    let count = 0;
+    for (let i = 0; i < pixels.length; i += 4) if (accept(pixels[i], pixels[i + 1], pixels[i + 2])) count++;
+    return count;
+  }, { data: [...png], source: test.toString() });
+}
+
+/** How much two screenshots differ: the share of pixels that do by more than 24 of 255. */
+export async function difference(browser, a, b) {
+  const page = await browser.newPage();
+  try {
+    return await page.evaluate(async (both) => {
+      const read = async (data) => {
+        const bitmap = await createImageBitmap(new Blob([Uint8Array.from(data)], { type: 'image/png' }));
+        const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+        context.drawImage(bitmap, 0, 0);
+        return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+      };
+      const [x, y] = [await read(both[0]), await read(both[1])];
+      if (x.length !== y.length) return 1;
+      let count = 0;
+      for (let i = 0; i < x.length; i += 4)
+        if (Math.max(Math.abs(x[i] - y[i]), Math.abs(x[i + 1] - y[i + 1]), Math.abs(x[i + 2] - y[i + 2])) > 24) count++;
+      return count / (x.length / 4);
+    }, [[...a], [...b]]);
+  } finally {
+    await page.close();
+  }
+}
+
+/** Clicks into a view at a share of its width and height. */
+export async function clickView(page, index, x, y) {
+  const box = await page.locator('.pane-view').nth(index).boundingBox();
+  await page.mouse.click(box.x + box.width * x, box.y + box.height * y);
+}
+
+export const json = async (url, path, init) => (await fetch(url + path, init)).json();
+export const bytes = (path) => readFileSync(path);

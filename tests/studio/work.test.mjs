@@ -1,0 +1,295 @@
+// What a modeller does, from the empty page to the file on disk.
+import { after, before, test } from 'node:test';
+import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import { addFiles, button, clickView, countPixels, difference, json, openPage, sample, startBrowser, startDaemon, until } from './support.mjs';
+
+let daemon;
+let browser;
+before(async () => {
+  daemon = await startDaemon();
+  browser = await startBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await daemon?.stop();
+});
+
+const scrubber = (page) => page.getByRole('slider', { name: 'Along the morph' });
+const time = (page) => scrubber(page).evaluate((input) => Number(input.value));
+const landmarks = (page) => page.locator('.marks li');
+const seek = (page, value) => scrubber(page).evaluate((input, v) => {
+  input.value = String(v);
+  input.dispatchEvent(new Event('input', { bubbles: true }));
+}, value);
+const settled = (page) => page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+
+/** Three landmarks, each on both shapes, at places where both have surface. */
+async function pickThree(page) {
+  await button(page, 'Landmarks').click();
+  for (const [n, [x, y]] of [[0.5, 0.5], [0.4, 0.5], [0.45, 0.56]].entries()) {
+    await clickView(page, 0, x, y);
+    await until(() => landmarks(page).count().then((count) => count === n + 1), `landmark ${n + 1} on the first shape`);
+    await clickView(page, 1, x, y);
+    await until(() => page.locator('.badge.warn').count().then((count) => count === 0), `landmark ${n + 1} on the second shape`);
+  }
+}
+
+async function morph(page) {
+  await button(page, /^Morph \d shapes$/).click();
+  await until(() => button(page, 'Pause').count(), 'the morph plays', 240_000);
+}
+
+test('from the empty page to a playing morph in at most five clicks', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  let clicks = 0;
+  const click = async (name) => {
+    await button(page, name).click();
+    clicks++;
+  };
+  await click('Try with samples');
+  await until(() => page.locator('.card.ready').count().then((n) => n === 2), 'two samples are taken');
+  await click(/^Morph 2 shapes$/);
+  await until(() => button(page, 'Pause').count(), 'the morph plays', 240_000);
+  const seen = new Set();
+  await until(async () => seen.add(await time(page)).size > 5, 'time passes');
+  assert.ok(clicks <= 5, `${clicks} clicks`);
+  await done();
+});
+
+test('upload, pick, name, undo, redo, export, import', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > b + 40)) > 2000, 'the first shape is drawn');
+  await pickThree(page);
+  assert.equal(await page.locator('.marker:not(.still)').count(), 6);
+
+  await page.getByRole('textbox', { name: 'Name of landmark 2' }).fill('hip');
+  await page.getByRole('textbox', { name: 'Name of landmark 2' }).press('Tab');
+  await button(page, 'Undo').click();
+  assert.equal(await page.getByRole('textbox', { name: 'Name of landmark 2' }).inputValue(), '');
+  await button(page, 'Redo').click();
+  assert.equal(await page.getByRole('textbox', { name: 'Name of landmark 2' }).inputValue(), 'hip');
+  await button(page, 'Delete landmark 3').click();
+  assert.equal(await landmarks(page).count(), 2);
+  await page.keyboard.press('Control+z');
+  assert.equal(await landmarks(page).count(), 3);
+
+  const [download] = await Promise.all([page.waitForEvent('download'), button(page, 'Export').click()]);
+  const exported = JSON.parse(await readFile(await download.path(), 'utf8'));
+  assert.equal(exported.landmarks.length, 3);
+  assert.equal(exported.landmarks[1].name, 'hip');
+  for (const landmark of exported.landmarks) {
+    assert.equal(landmark.at.length, 2);
+    for (const place of landmark.at) assert.ok(Number.isInteger(place.vertex) || place.point.length === 3);
+  }
+
+  await button(page, 'Clear').click();
+  assert.equal(await landmarks(page).count(), 0);
+  await page.getByLabel('Landmark file').setInputFiles({ name: 'l.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(exported)) });
+  await until(() => landmarks(page).count().then((n) => n === 3), 'the landmarks are back');
+  const [again] = await Promise.all([page.waitForEvent('download'), button(page, 'Export').click()]);
+  assert.deepEqual(JSON.parse(await readFile(await again.path(), 'utf8')), exported);
+  await done();
+});
+
+test('a landmark is dragged to another place', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await button(page, 'Landmarks').click();
+  await clickView(page, 0, 0.5, 0.5);
+  const marker = page.locator('.marker:not(.still)').first();
+  await marker.waitFor();
+  await settled(page);
+  const from = await marker.boundingBox();
+  const center = { x: from.x + from.width / 2, y: from.y + from.height / 2 };
+  await page.mouse.move(center.x, center.y);
+  await page.mouse.down();
+  await page.mouse.move(center.x - 60, center.y + 4, { steps: 4 });
+  await page.mouse.up();
+  await until(async () => {
+    const to = await marker.boundingBox();
+    return Math.abs(to.x + to.width / 2 - (center.x - 60)) < 14;
+  }, 'the marker is at its new place');
+  await done();
+});
+
+test('morph with landmarks, scrub, mix, wireframe, download', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await button(page, 'Landmarks').click();
+  await page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
+  await until(() => landmarks(page).count(), 'the landmarks of the samples are read');
+  const count = await landmarks(page).count();
+  await morph(page);
+  await button(page, 'Pause').click();
+  const id = new URLSearchParams((await until(() => page.url().match(/r=[0-9a-f]{64}/), 'the address names the morph'))[0]).get('r');
+  const supermesh = await json(daemon.url, `/v1/supermeshes/${id}`);
+  assert.equal(supermesh.landmarks.length, count);
+  assert.equal(supermesh.certificate.landmarks_exact, true);
+
+  const shots = [];
+  for (const t of [0, 0.5, 1]) {
+    await seek(page, t);
+    await settled(page);
+    shots.push(await page.locator('.stage-area').screenshot());
+  }
+  assert.ok((await difference(browser, shots[0], shots[1])) > 0.005, 'half way differs from the first shape');
+  assert.ok((await difference(browser, shots[1], shots[2])) > 0.005, 'half way differs from the second shape');
+
+  await page.getByRole('slider', { name: 'Share of dog' }).evaluate((input) => {
+    input.value = '0.5';
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+  });
+  await settled(page);
+  assert.ok((await difference(browser, await page.locator('.pane').screenshot(), await page.locator('.pane').screenshot())) === 0);
+  assert.equal(await page.getByRole('slider', { name: 'Share of giraffe' }).inputValue(), '0.5');
+
+  const plain = await page.locator('.stage-area').screenshot();
+  await page.getByRole('switch', { name: 'Wireframe' }).click();
+  await settled(page);
+  assert.ok((await difference(browser, plain, await page.locator('.stage-area').screenshot())) > 0.005, 'the wireframe is drawn');
+
+  const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name: 'Download GLB' }).click()]);
+  assert.match(download.suggestedFilename(), /\.glb$/);
+  const glb = await readFile(await download.path());
+  assert.equal(glb.toString('latin1', 0, 4), 'glTF');
+  assert.deepEqual(glb, Buffer.from(await (await fetch(`${daemon.url}${supermesh.asset}`)).arrayBuffer()));
+  await done();
+});
+
+test('reload and the address alone bring the same state back', async () => {
+  const first = await openPage(browser, daemon.url);
+  await addFiles(first.page, sample('dog.obj'), sample('giraffe.off'));
+  await button(first.page, 'Landmarks').click();
+  await first.page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
+  await until(() => landmarks(first.page).count(), 'landmarks');
+  const count = await landmarks(first.page).count();
+  await morph(first.page);
+  await button(first.page, 'Pause').click();
+  await seek(first.page, 0.25);
+  await until(() => /t=0\.250/.test(first.page.url()), 'the address holds the time');
+  await until(() => first.page.locator('.toast').count().then((n) => n === 0), 'no message covers the view');
+  const before = await first.page.locator('.pane').screenshot();
+  await first.page.reload();
+  await until(() => button(first.page, 'Play').count(), 'the morph is back');
+  await settled(first.page);
+  await until(async () => (await difference(browser, before, await first.page.locator('.pane').screenshot())) < 0.002, 'it looks the same');
+  const address = first.page.url();
+  await first.done();
+
+  const second = await openPage(browser, daemon.url, { hash: new URL(address).hash });
+  await until(() => button(second.page, 'Play').count(), 'the morph is there');
+  assert.equal(await time(second.page), 0.25);
+  await button(second.page, 'Landmarks').click();
+  assert.equal(await landmarks(second.page).count(), count);
+  await second.done();
+});
+
+test('a refused mesh says why, shows the rim in red, and can be mended', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  // the dog without its first 40 faces
+  let left = 40;
+  const text = (await readFile(sample('dog.obj'), 'utf8')).split('\n').filter((line) => !(line.startsWith('f ') && left-- > 0)).join('\n');
+  await page.locator('input[type=file]').first().setInputFiles({ name: 'open.obj', mimeType: 'text/plain', buffer: Buffer.from(text) });
+  await page.locator('.card.refused').waitFor();
+  assert.match(await page.getByRole('alert').innerText(), /hole/);
+  await until(() => page.getByText('Shown in red on the model.').count(), 'the rim is found');
+  // turned about, the rim comes into view from some side; the lines are drawn over the surface anyway
+  await settled(page);
+  assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 180 && g < 110 && b < 110)) > 20, 'red is drawn');
+  await button(page, 'Fill the holes').click();
+  await until(() => page.locator('.card.ready').count(), 'it is mended');
+  assert.equal(await page.locator('.card.refused').count(), 0);
+  await settled(page);
+  assert.equal(await countPixels(page, '.stage-area', (r, g, b) => r > 180 && g < 110 && b < 110), 0, 'no red is left');
+  await done();
+});
+
+test('no mesh at all is refused in words', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await page.locator('input[type=file]').first().setInputFiles({ name: 'letter.obj', mimeType: 'text/plain', buffer: Buffer.from('Dear Sir or Madam\n') });
+  await page.locator('.card.refused, .card.failed').waitFor();
+  assert.ok((await page.getByRole('alert').first().innerText()).length > 20);
+  await done();
+});
+
+test('a morph is cancelled while it runs', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
+  await page.getByText('Options', { exact: true }).click();
+  await page.getByRole('slider', { name: /^Tolerance/ }).evaluate((input) => {
+    input.value = '-4';
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+  });
+  await button(page, /^Morph 2 shapes$/).click();
+  await button(page, 'Cancel').click();
+  await until(() => page.getByText('Cancelled.').count(), 'the page says so');
+  const { jobs } = await json(daemon.url, '/v1/jobs');
+  await until(async () => (await json(daemon.url, jobs[0].url)).state !== 'running', 'the job has stopped');
+  await button(page, /^Morph 2 shapes$/).waitFor();
+  await done();
+});
+
+test('landmarks are found', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
+  await button(page, 'Landmarks').click();
+  await button(page, 'Find them for me').click();
+  await until(() => page.locator('.toast').count(), 'an answer', 240_000);
+  const text = await page.locator('.toast').innerText();
+  const found = Number(text.match(/^(\d+) landmarks found/)?.[1] ?? 0);
+  assert.equal(await landmarks(page).count(), found);
+  assert.ok(found > 0 || /matched/.test(text), text);
+  await done();
+});
+
+test('a job goes on when the page is closed, and is found again', async () => {
+  const first = await openPage(browser, daemon.url);
+  await addFiles(first.page, sample('giraffe.off'), sample('elephant.ply'));
+  await button(first.page, /^Morph 2 shapes$/).click();
+  const address = await until(() => (/j=[^&]+/.test(first.page.url()) || /r=/.test(first.page.url())) && first.page.url(), 'the address names the job');
+  await first.done();
+  const second = await openPage(browser, daemon.url, { hash: new URL(address).hash });
+  await until(() => button(second.page, /^(Play|Pause)$/).count(), 'the morph is there', 240_000);
+  await second.done();
+});
+
+test('what is on the server is listed and opened', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await button(page, 'On the server', { exact: true }).click();
+  await button(page, 'Add dog').first().waitFor();
+  await page.locator('.list .item', { hasText: '→' }).first().click();
+  await until(() => button(page, /^(Play|Pause)$/).count(), 'the morph opens');
+  await done();
+});
+
+test('spheres: certified, painted, measured', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await button(page, 'Spheres').click();
+  await until(() => page.getByText('Certified one to one').count().then((n) => n === 2), 'both are embedded');
+  const shots = [];
+  for (const name of ['Normals', 'Checkerboard', 'Stretch', 'Areas']) {
+    await button(page, name).click();
+    await settled(page);
+    shots.push(await page.locator('.stage-area').screenshot());
+  }
+  for (let i = 1; i < shots.length; i++) assert.ok((await difference(browser, shots[i - 1], shots[i])) > 0.03, `paint ${i} differs from the one before`);
+  assert.equal(await page.getByRole('img', { name: /^Histogram/ }).count(), 2);
+  await done();
+});
+
+test('the error of the common mesh is measured and below the tolerance', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await morph(page);
+  await button(page, 'Error').click();
+  await until(() => page.locator('.pane .legend').count().then((n) => n === 2), 'both shapes are measured', 120_000);
+  const captions = await page.locator('.pane .caption').allInnerTexts();
+  for (const text of captions) {
+    const percent = Number(text.match(/largest ([\d.e+-]+) %/)[1]);
+    assert.ok(percent <= 0.1 * 1.05 + 1e-6, `${percent} % is within the tolerance of 0.1 %`);
+  }
+  await done();
+});
