@@ -10,6 +10,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
+enum { MAX_RELIEF = 12 };
 static const double SPHERE_AREA = 4 * M_PI;
 
 typedef struct ks_run {
@@ -19,12 +20,12 @@ typedef struct ks_run {
   ks_sampler sampler;
   double *x; /* positions, total area 4π */
   double *P; /* the result: 3 a vertex */
-  double area, area_floor;
+  double area;
   double *displacement; /* of each vertex in the present iteration, neighbours' sum of the last */
   int32_t *active, *next, active_count, next_count;
   int32_t *stamp, stamp_value;
   int32_t *recent, recent_count;
-  int64_t iterations_sum;
+  int64_t iterations_sum, kernel_points_sum;
   orb_ks_report report;
 } ks_run;
 
@@ -44,7 +45,6 @@ static orb_status normalize(ks_run *run, const orb_mesh *mesh) {
       run->x[3 * (size_t)v + (size_t)k] = (mesh->positions[3 * (size_t)v + (size_t)k] - centre) * scale;
     }
   }
-  run->area_floor = 1e-7 * SPHERE_AREA / mesh->triangle_count;
   return ORB_OK;
 }
 
@@ -108,55 +108,34 @@ static void place_base(ks_run *run) {
   }
 }
 
-static double area_scale(const ks_run *run) {
-  return SPHERE_AREA / (run->area > 1e-6 ? run->area : 1e-6);
+#ifndef FL
+#define FL 1e-2
+#endif
+static double area_floor(const ks_run *run) {
+  return FL * run->area / (2 * run->m.live - 4);
 }
 
-/* Inserts one vertex: section 5.1 and 5.2. */
-static orb_status insert_vertex(ks_run *run) {
-  ks_mesh *m = &run->m;
-  int32_t edge = m->log[m->log_count - 1].edge, parent = ks_head(m, edge);
-  run->area -= star_area(run, parent);
-  int32_t v = ks_split_last(m);
-  double around = star_area(run, v);
-  /* The old star of the parent is now its new star and the rest of the new vertex's. */
-  run->area += star_area(run, parent) + around;
-  for (int side = 0; side < 2; side++) { /* the two triangles that both stars hold */
-    int32_t h = side ? m->twin[m->out[v]] : m->out[v];
-    double u[3], w[3], n[3];
-    const double *p = m->x + 3 * (size_t)m->tri[h];
-    orb_sub(m->x + 3 * (size_t)ks_head(m, h), p, u);
-    orb_sub(m->x + 3 * (size_t)m->tri[orb_prev(h)], p, w);
-    orb_cross(u, w, n);
-    run->area -= 0.5 * orb_length(n);
-  }
-  ORB_TRY(ks_ring_load(run->ctx, &run->sampler, m, run->P, v, area_scale(run), run->area_floor));
-  double error, *p = run->P + 3 * (size_t)v;
-  const double *apex = run->P + 3 * (size_t)parent;
-  /* The ring begins with the parent; its fan fills the hole. */
-  if (!ks_best_sample(&run->sampler, apex, 1, run->sampler.ring.count - 1, INFINITY, p, &error)) {
-    run->report.clipped++;
-    if (!ks_kernel_centroid(&run->sampler, apex, p)) {
-      return orb_fail(
-          run->ctx, ORB_E_NOT_CERTIFIED,
-          "The kernel of a vertex is too narrow for double precision after %d of %d vertices; use the method "
-          "newton, or other exponents.",
-          m->live, m->vertex_count);
-    }
-  }
-  run->recent[run->recent_count++] = v;
-  return ORB_OK;
+static double area_scale(const ks_run *run) {
+  return SPHERE_AREA / (run->area > 1e-6 ? run->area : 1e-6);
 }
 
 /* Moves v to its best sample if that is better than where it is; returns by how far. */
 static orb_status reposition(ks_run *run, int32_t v, double *moved) {
   double *p = run->P + 3 * (size_t)v, best[3], error;
-  ORB_TRY(ks_ring_load(run->ctx, &run->sampler, &run->m, run->P, v, area_scale(run), run->area_floor));
+  ORB_TRY(ks_ring_load(run->ctx, &run->sampler, &run->m, run->P, v, area_scale(run), area_floor(run)));
   double present = ks_error_at(&run->sampler, p);
   *moved = 0;
-  if (ks_best_sample(&run->sampler, p, 0, run->sampler.ring.count, present, best, &error)) {
-    *moved = sqrt(orb_distance2(p, best));
-    memcpy(p, best, sizeof best);
+  /* Samples that all miss a narrow kernel are drawn in until some lie inside. */
+  double draw = 1;
+  for (int tries = 0; tries < 14; tries++, draw *= 0.125) {
+    if (ks_best_sample(&run->sampler, p, 0, run->sampler.ring.count, draw, present, best, &error)) {
+      *moved = sqrt(orb_distance2(p, best));
+      memcpy(p, best, sizeof best);
+      break;
+    }
+    if (run->sampler.kernel_points > 0) {
+      break;
+    }
   }
   return ORB_OK;
 }
@@ -257,6 +236,102 @@ static orb_status optimize(ks_run *run) {
   return ORB_OK;
 }
 
+/* The area of the triangle of half-edge h. */
+static double triangle_area(const ks_mesh *m, int32_t h) {
+  double u[3], w[3], n[3];
+  const double *p = m->x + 3 * (size_t)m->tri[h];
+  orb_sub(m->x + 3 * (size_t)ks_head(m, h), p, u);
+  orb_sub(m->x + 3 * (size_t)m->tri[orb_prev(h)], p, w);
+  orb_cross(u, w, n);
+  return 0.5 * orb_length(n);
+}
+
+/* Undoes the last collapse and keeps the area of M_i. */
+static int32_t split(ks_run *run, int32_t parent) {
+  ks_mesh *m = &run->m;
+  run->area -= star_area(run, parent);
+  int32_t v = ks_split_last(m);
+  /* The old star of the parent is now its new one and that of v; two triangles lie in both. */
+  run->area +=
+      star_area(run, parent) + star_area(run, v) - triangle_area(m, m->out[v]) - triangle_area(m, m->twin[m->out[v]]);
+  return v;
+}
+
+static void unsplit(ks_run *run, int32_t v, int32_t parent) {
+  ks_mesh *m = &run->m;
+  run->area -=
+      star_area(run, parent) + star_area(run, v) - triangle_area(m, m->out[v]) - triangle_area(m, m->twin[m->out[v]]);
+  ks_collapse_edge(m, m->out[v]);
+  run->area += star_area(run, parent);
+}
+
+/* Section 5.1 and 5.2: the best sample in the fan of the parent, or else the kernel's centroid. The ring begins with
+ * the parent. */
+static orb_status place(ks_run *run, int32_t v, int32_t parent, int *found) {
+  ks_sampler *s = &run->sampler;
+  ORB_TRY(ks_ring_load(run->ctx, s, &run->m, run->P, v, area_scale(run), area_floor(run)));
+  double error, *p = run->P + 3 * (size_t)v;
+  const double *apex = run->P + 3 * (size_t)parent;
+  *found = ks_best_sample(s, apex, 1, s->ring.count - 1, 1, INFINITY, p, &error);
+  if (!*found) {
+    *found = ks_kernel_centroid(s, apex, p);
+    run->report.clipped += *found;
+  }
+  return ORB_OK;
+}
+
+/* Opens a kernel that doubles cannot hold: the surroundings of the parent are optimised for area rather than shape. */
+static orb_status relieve(ks_run *run, int32_t parent, int32_t rings) {
+  double aspect_exponent = run->sampler.aspect_exponent;
+  run->sampler.aspect_exponent = aspect_exponent < 1 ? aspect_exponent : 1;
+  run->stamp_value++;
+  run->next_count = 0;
+  enlist(run, parent);
+  for (int32_t r = 0; r < rings; r++) {
+    for (int32_t i = 0, end = run->next_count; i < end; i++) {
+      enlist_star(run, run->next[i]);
+    }
+  }
+  orb_status status = ORB_OK;
+  for (int32_t sweep = 0; sweep < 10 && status == ORB_OK; sweep++) {
+    for (int32_t i = 0; i < run->next_count && status == ORB_OK; i++) {
+      double moved;
+      status = reposition(run, run->next[i], &moved);
+    }
+    if (status == ORB_OK) {
+      status = orb_context_check(run->ctx);
+    }
+  }
+  run->sampler.aspect_exponent = aspect_exponent;
+  run->report.relieved++;
+  return status;
+}
+
+static orb_status insert_vertex(ks_run *run) {
+  ks_mesh *m = &run->m;
+  int32_t parent = ks_head(m, m->log[m->log_count - 1].edge), v;
+  int found = 0;
+  for (int32_t tries = 0;; tries++) {
+    v = split(run, parent);
+    ORB_TRY(place(run, v, parent, &found));
+    if (found) {
+      break;
+    }
+    if (tries == MAX_RELIEF) {
+      return orb_fail(
+          run->ctx, ORB_E_NOT_CERTIFIED,
+          "The kernel of a vertex is too narrow for double precision after %d of %d vertices; use the method "
+          "newton, or other exponents.",
+          m->live, m->vertex_count);
+    }
+    unsplit(run, v, parent);
+    ORB_TRY(relieve(run, parent, 1 + tries));
+  }
+  run->kernel_points_sum += run->sampler.kernel_points;
+  run->recent[run->recent_count++] = v;
+  return ORB_OK;
+}
+
 static orb_status refine(ks_run *run) {
   ks_mesh *m = &run->m;
   double interval = run->options->first_optimization;
@@ -334,8 +409,8 @@ orb_status orb_kernel_sampling(orb_context *ctx, const orb_mesh *mesh, const orb
   run.report.simplify_seconds = orb_clock() - start;
   place_base(&run);
   ORB_GO(status, refine(&run), done);
-  if (run.sampler.kernel_points_calls) {
-    run.report.kernel_points = run.sampler.kernel_points_sum / (double)run.sampler.kernel_points_calls;
+  if (mesh->vertex_count > 4) {
+    run.report.kernel_points = (double)run.kernel_points_sum / (mesh->vertex_count - 4);
   }
   if (run.report.executions) {
     run.report.iterations = (double)run.iterations_sum / run.report.executions;

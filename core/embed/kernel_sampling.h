@@ -28,9 +28,10 @@
 /* What the paper's Table 1 and Fig. 13 report. */
 typedef struct orb_ks_report {
   double simplify_seconds, place_seconds, optimize_seconds;
-  double kernel_points;        /* average number inside the kernel, a placement */
-  double iterations;           /* average of Algorithm 1, an execution */
-  int32_t executions, clipped; /* of Algorithm 1; placements that no sample served */
+  double kernel_points;      /* average number inside the kernel, a placement */
+  double iterations;         /* average of Algorithm 1, an execution */
+  int32_t executions;        /* of Algorithm 1 */
+  int32_t clipped, relieved; /* placements that no sample served; that had to wait for room */
   /* Called after each execution of Algorithm 1 with the vertices inserted so far; may be NULL. */
   void (*trace)(void *user, int32_t inserted, double place_seconds, double optimize_seconds);
   void *trace_user;

@@ -17,6 +17,12 @@
 
 enum { MAX_PAIRS = 20000 };
 
+/* A ring of less than this share of its area is squeezed: see kernel_sampling.h. */
+#ifndef SQ
+#define SQ 1e-4
+#endif
+static const double SQUEEZED = SQ;
+
 orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options, ks_sampler *out) {
   ks_sampler s = {.area_exponent = options->area_exponent, .aspect_exponent = options->aspect_exponent};
   int32_t steps = (int32_t)floor(1 / options->step);
@@ -31,7 +37,6 @@ orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options,
         double *pair = s.pair[s.pair_count++];
         pair[0] = a;
         pair[1] = b;
-        pair[2] = 1 - a - b;
       }
     }
   }
@@ -95,6 +100,7 @@ orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const
     e = ks_rotate(m, e);
   } while (e != m->out[v]);
   const double *xp = m->x + 3 * (size_t)v;
+  double mesh_area = 0, fan_area = 0;
   for (int32_t i = 0; i < r->count; i++) {
     int32_t j = i + 1 < r->count ? i + 1 : 0;
     double d[3], u[3], w[3], n[3];
@@ -112,13 +118,23 @@ orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const
     r->angle_q[i] = (orb_dot(w, w) + area_floor) * half;
     r->angle_r[i] = (orb_dot(u, u) + area_floor) * half;
     r->inverse_area[i] = 1 / (floored * area_scale);
+    mesh_area += floored * area_scale;
+    double spoke[3], normal[3];
+    orb_sub(r->point[i], r->point[0], spoke);
+    orb_cross(spoke, d, normal);
+    fan_area += 0.5 * orb_length(normal);
   }
+  int squeezed = fan_area < SQUEEZED * mesh_area;
+  r->aspect_exponent = squeezed && s->aspect_exponent > 1 ? 1 : s->aspect_exponent;
   return ORB_OK;
 }
 
-/* x to the power e for each; whole and half powers by multiplication. */
-static inline void raise_each(double *x, int32_t count, double e) {
-  double doubled = 2 * e;
+enum { LANES = 64 };
+
+/* x to the power e for each; whole and half powers by multiplication. Bit by bit over all lanes, so that each pass is a
+ * plain vector loop. */
+static inline __attribute__((always_inline)) void raise_each(double *x, int32_t count, double e) {
+  double doubled = 2 * e, power[LANES];
   if (doubled != floor(doubled) || doubled < 0 || doubled > 128) {
     for (int32_t l = 0; l < count; l++) {
       x[l] = pow(x[l], e);
@@ -127,38 +143,88 @@ static inline void raise_each(double *x, int32_t count, double e) {
   }
   int bits = (int)doubled;
   for (int32_t l = 0; l < count; l++) {
-    double base = x[l], power = bits & 1 ? sqrt(base) : 1;
-    for (int b = bits >> 1; b; b >>= 1) {
-      power = b & 1 ? power * base : power;
-      base *= base;
+    power[l] = 1;
+  }
+  if (bits & 1) {
+    for (int32_t l = 0; l < count; l++) {
+      power[l] = sqrt(x[l]);
     }
-    x[l] = power;
+  }
+  for (int b = bits >> 1; b; b >>= 1) {
+    if (b & 1) {
+      for (int32_t l = 0; l < count; l++) {
+        power[l] *= x[l];
+      }
+    }
+    for (int32_t l = 0; l < count; l++) {
+      x[l] *= x[l];
+    }
+  }
+  memcpy(x, power, (size_t)count * sizeof *x);
+}
+
+/* The spokes from a batch of candidates to one neighbour: difference, length and its square. */
+typedef struct spokes {
+  double x[LANES], y[LANES], z[LANES], square[LANES], length[LANES];
+} spokes;
+
+static inline __attribute__((always_inline)) void measure_spokes(const double *q, const double *x, const double *y,
+                                                                 const double *z, int32_t count, spokes *out) {
+  for (int32_t l = 0; l < count; l++) {
+    double ux = q[0] - x[l], uy = q[1] - y[l], uz = q[2] - z[l], square = ux * ux + uy * uy + uz * uz;
+    out->x[l] = ux;
+    out->y[l] = uy;
+    out->z[l] = uz;
+    out->square[l] = square;
+    out->length[l] = sqrt(square);
   }
 }
 
-enum { LANES = 64 };
-
-/* Adds ring triangle i's term of Eq. 3 for `count` ≤ LANES candidates. */
-KS_VECTOR static void add_terms(const ks_ring *r, int32_t i, double area_exponent, double aspect_exponent,
-                                const double *x, const double *y, const double *z, int32_t count, double *error) {
-  int32_t j = i + 1 < r->count ? i + 1 : 0;
-  const double *q = r->point[i], *w = r->point[j];
+/* Adds the term of Eq. 3 of the ring triangle between spokes u and w; returns the least error so far. */
+static inline __attribute__((always_inline)) double add_term(const ks_ring *r, int32_t i, double area_exponent,
+                                                             double aspect_exponent, const spokes *u, const spokes *w,
+                                                             int32_t count, double *error) {
   double a = r->side[i], a2 = r->side2[i], mp = r->angle_p[i], mq = r->angle_q[i], mr = r->angle_r[i];
-  double inverse = r->inverse_area[i], angle[LANES], area[LANES], shape[LANES];
+  double inverse = 0.5 * r->inverse_area[i], least = INFINITY, angle[LANES], area[LANES], shape[LANES];
   for (int32_t l = 0; l < count; l++) {
-    double ux = q[0] - x[l], uy = q[1] - y[l], uz = q[2] - z[l];
-    double wx = w[0] - x[l], wy = w[1] - y[l], wz = w[2] - z[l];
-    double nx = uy * wz - uz * wy, ny = uz * wx - ux * wz, nz = ux * wy - uy * wx;
-    double c2 = ux * ux + uy * uy + uz * uz, b2 = wx * wx + wy * wy + wz * wz;
-    double n2 = nx * nx + ny * ny + nz * nz + 1e-300, doubled = sqrt(n2), b = sqrt(b2), c = sqrt(c2);
-    angle[l] = (mp * (b2 + c2 - a2) + mq * (a2 + c2 - b2) + mr * (a2 + b2 - c2)) / (2 * doubled);
-    area[l] = 0.5 * doubled * inverse + 1;
-    shape[l] = a * b * c * (a + b + c) / (4 * n2);
+    double nx = u->y[l] * w->z[l] - u->z[l] * w->y[l], ny = u->z[l] * w->x[l] - u->x[l] * w->z[l];
+    double nz = u->x[l] * w->y[l] - u->y[l] * w->x[l], n2 = nx * nx + ny * ny + nz * nz + 1e-300;
+    double c2 = u->square[l], b2 = w->square[l], b = w->length[l], c = u->length[l], inv = 1 / n2;
+    double doubled = sqrt(n2);
+    angle[l] = 0.5 * (mp * (b2 + c2 - a2) + mq * (a2 + c2 - b2) + mr * (a2 + b2 - c2)) * doubled * inv;
+    double ratio = doubled * inverse;
+    area[l] = ratio + 1 / ratio;
+    shape[l] = 0.25 * a * b * c * (a + b + c) * inv;
   }
   raise_each(area, count, area_exponent);
   raise_each(shape, count, aspect_exponent);
   for (int32_t l = 0; l < count; l++) {
     error[l] += angle[l] * area[l] * shape[l];
+  }
+  for (int32_t l = 0; l < count; l++) {
+    least = error[l] < least ? error[l] : least;
+  }
+  return least;
+}
+
+/* Eq. 3 for `count` ≤ LANES candidates. Its terms are positive: once all are above `bound` the sums are left as they
+ * are. */
+KS_VECTOR static void measure_batch(const ks_ring *r, double area_exponent, double aspect_exponent, const double *x,
+                                    const double *y, const double *z, int32_t count, double bound, double *error) {
+  spokes first, pair[2];
+  memset(error, 0, (size_t)count * sizeof *error);
+  measure_spokes(r->point[0], x, y, z, count, &first);
+  const spokes *u = &first;
+  for (int32_t i = 0; i < r->count; i++) {
+    const spokes *w = &first;
+    if (i + 1 < r->count) {
+      measure_spokes(r->point[i + 1], x, y, z, count, &pair[i & 1]);
+      w = &pair[i & 1];
+    }
+    if (add_term(r, i, area_exponent, aspect_exponent, u, w, count, error) >= bound) {
+      return;
+    }
+    u = w;
   }
 }
 
@@ -177,13 +243,15 @@ KS_VECTOR static void clip(const ks_ring *r, const double *x, const double *y, c
   }
 }
 
-/* Points of Eq. 2 in the triangle (apex, i, i+1), on the sphere. */
-KS_VECTOR static void spread(const double (*pair)[3], int32_t pairs, const double *apex, const double *q,
+/* Points of Eq. 2 in the triangle (apex, i, i+1), drawn in towards the apex, on the sphere. */
+KS_VECTOR static void spread(const double (*pair)[2], int32_t pairs, double draw, const double *apex, const double *q,
                              const double *w, double *x, double *y, double *z) {
+  double qx = draw * (q[0] - apex[0]), qy = draw * (q[1] - apex[1]), qz = draw * (q[2] - apex[2]);
+  double wx = draw * (w[0] - apex[0]), wy = draw * (w[1] - apex[1]), wz = draw * (w[2] - apex[2]);
   for (int32_t l = 0; l < pairs; l++) {
-    double s = pair[l][0], t = pair[l][1], o = pair[l][2];
-    double px = o * apex[0] + s * q[0] + t * w[0], py = o * apex[1] + s * q[1] + t * w[1];
-    double pz = o * apex[2] + s * q[2] + t * w[2], f = 1 / sqrt(px * px + py * py + pz * pz + 1e-300);
+    double s = pair[l][0], t = pair[l][1];
+    double px = apex[0] + s * qx + t * wx, py = apex[1] + s * qy + t * wy, pz = apex[2] + s * qz + t * wz;
+    double f = 1 / sqrt(px * px + py * py + pz * pz + 1e-300);
     x[l] = px * f;
     y[l] = py * f;
     z[l] = pz * f;
@@ -204,9 +272,7 @@ double ks_error_at(ks_sampler *s, const double p[3]) {
   if (!inside_exactly(&s->ring, p)) {
     return INFINITY;
   }
-  for (int32_t i = 0; i < s->ring.count; i++) {
-    add_terms(&s->ring, i, s->area_exponent, s->aspect_exponent, p, p + 1, p + 2, 1, &error);
-  }
+  measure_batch(&s->ring, s->area_exponent, s->ring.aspect_exponent, p, p + 1, p + 2, 1, INFINITY, &error);
   return error;
 }
 
@@ -227,22 +293,23 @@ static int32_t keep_inside(ks_sampler *s, double *x, double *y, double *z, int32
   return kept;
 }
 
-int ks_best_sample(ks_sampler *s, const double apex[3], int32_t first, int32_t last, double bound, double out[3],
-                   double *error) {
+int ks_best_sample(ks_sampler *s, const double apex[3], int32_t first, int32_t last, double draw, double bound,
+                   double out[3], double *error) {
   double *x = s->candidate, *y = x + s->room, *z = y + s->room, *e = z + s->room;
   int32_t count = 0;
+  double best_error = bound;
   for (int32_t i = first; i < last; i++, count += s->pair_count) {
-    spread((const double(*)[3])s->pair, s->pair_count, apex, s->ring.point[i],
+    spread((const double(*)[2])s->pair, s->pair_count, draw, apex, s->ring.point[i],
            s->ring.point[i + 1 < s->ring.count ? i + 1 : 0], x + count, y + count, z + count);
   }
   count = keep_inside(s, x, y, z, count);
-  s->kernel_points_sum += count;
-  s->kernel_points_calls++;
+  s->kernel_points = count;
   for (int32_t begin = 0; begin < count; begin += LANES) {
     int32_t n = count - begin < LANES ? count - begin : LANES;
-    memset(e + begin, 0, (size_t)n * sizeof *e);
-    for (int32_t i = 0; i < s->ring.count; i++) {
-      add_terms(&s->ring, i, s->area_exponent, s->aspect_exponent, x + begin, y + begin, z + begin, n, e + begin);
+    measure_batch(&s->ring, s->area_exponent, s->ring.aspect_exponent, x + begin, y + begin, z + begin, n, best_error,
+                  e + begin);
+    for (int32_t l = 0; l < n; l++) {
+      best_error = e[begin + l] < best_error ? e[begin + l] : best_error;
     }
   }
   /* The best whose signs hold exactly; rounding lets almost every best one pass at once. */
@@ -293,7 +360,12 @@ int ks_kernel_centroid(ks_sampler *s, const double apex[3], double out[3]) {
   const double e2[3] = {g, sign + apex[1] * apex[1] * f, -apex[1]};
   double(*polygon)[2] = (double(*)[2])(void *)r->scratch;
   double(*other)[2] = polygon + r->capacity + 8;
-  static const double far = 30; /* the chart reaches to 88 degrees */
+  /* The chart need only hold the ring: the smaller it is, the less rounding hurts. */
+  double reach2 = 0;
+  for (int32_t i = 0; i < r->count; i++) {
+    reach2 = fmax(reach2, orb_distance2(apex, r->point[i]));
+  }
+  double far = reach2 < 1 ? 2 * sqrt(reach2) / (1 - 0.5 * reach2) : 30; /* 88 degrees */
   const double square[4][2] = {{-far, -far}, {far, -far}, {far, far}, {-far, far}};
   memcpy(polygon, square, sizeof square);
   int32_t count = 4;

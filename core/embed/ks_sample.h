@@ -13,18 +13,18 @@ typedef struct ks_ring {
   double *angle_p, *angle_q, *angle_r; /* squared mesh edge opposite to the vertex, to i, to i+1, over 2·area */
   double *inverse_area;                /* of the mesh triangle, scaled to the sphere */
   int32_t *vertex;
-  double *scratch; /* 2·(capacity + 8) doubles twice, for clipping */
+  double aspect_exponent; /* of this ring */
+  double *scratch;        /* 2·(capacity + 8) doubles twice, for clipping */
 } ks_ring;
 
 typedef struct ks_sampler {
   double area_exponent, aspect_exponent;
   int32_t pair_count; /* of (s, t) in Eq. 2 */
-  double (*pair)[3];  /* s, t, 1 − s − t */
+  double (*pair)[2];  /* s, t */
   double *candidate;  /* room for the points of one ring: x, y, z, error in planes of `room` */
   int32_t room;
   ks_ring ring;
-  double kernel_points_sum;
-  int64_t kernel_points_calls;
+  int32_t kernel_points; /* how many the last call found inside */
 } ks_sampler;
 
 ORB_MUST_CHECK orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options, ks_sampler *out);
@@ -35,9 +35,10 @@ ORB_MUST_CHECK orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks
                                        double area_scale, double area_floor);
 
 /* Takes the best sample from the triangles (apex, i, i+1) for first ≤ i < last into `out`, if one lies in the kernel
- * and its error is below `bound`; returns whether. *error: its error. */
-int ks_best_sample(ks_sampler *s, const double apex[3], int32_t first, int32_t last, double bound, double out[3],
-                   double *error);
+ * and its error is below `bound`; returns whether. draw (≤ 1): the samples
+ * are drawn in towards the apex by this factor. *error: its error. */
+int ks_best_sample(ks_sampler *s, const double apex[3], int32_t first, int32_t last, double draw, double bound,
+                   double out[3], double *error);
 
 /* Eq. 3 at one point; INFINITY outside the kernel. */
 double ks_error_at(ks_sampler *s, const double p[3]);
