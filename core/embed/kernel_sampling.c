@@ -10,7 +10,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { MAX_RELIEF = 12 };
+enum { MAX_RELIEF = 8 };
 static const double SPHERE_AREA = 4 * M_PI;
 
 typedef struct ks_run {
@@ -293,7 +293,7 @@ static orb_status relieve(ks_run *run, int32_t parent, int32_t rings) {
     }
   }
   orb_status status = ORB_OK;
-  for (int32_t sweep = 0; sweep < 10 && status == ORB_OK; sweep++) {
+  for (int32_t sweep = 0; sweep < 20 && status == ORB_OK; sweep++) {
     for (int32_t i = 0; i < run->next_count && status == ORB_OK; i++) {
       double moved;
       status = reposition(run, run->next[i], &moved);
@@ -325,7 +325,7 @@ static orb_status insert_vertex(ks_run *run) {
           m->live, m->vertex_count);
     }
     unsplit(run, v, parent);
-    ORB_TRY(relieve(run, parent, 1 + tries));
+    ORB_TRY(relieve(run, parent, 2 << tries));
   }
   run->kernel_points_sum += run->sampler.kernel_points;
   run->recent[run->recent_count++] = v;
