@@ -45,7 +45,7 @@ typedef struct orb_newton_settings {
   int32_t coarse_until; /* levels of fewer vertices get coarse_sweeps */
   int32_t coarse_sweeps, level_sweeps, final_sweeps;
   int32_t most_sweeps; /* on one level, while a sweep lowers the energy by more than the share `converged` */
-  double converged;
+  double converged, converged_last;
   double settled, settled_last; /* a sweep that gains less than this share ends the level */
   double weight;                /* w of the energy */
   double blend;                 /* of coarse triangles' shapes towards equilateral */
@@ -72,6 +72,9 @@ struct orb_refiner {
 
 /* Frees a refiner whose hierarchy is not used again: does not go back to the tetrahedron. NULL is fine. */
 void orb_refiner_abandon(orb_context *ctx, orb_refiner *refiner);
+
+/* The w that holds at the present level. */
+double orb_refiner_weight(const orb_refiner *refiner);
 
 /* Undoes the collapses of one round (or all of it that is left) and places its vertices: place.c. */
 ORB_MUST_CHECK orb_status orb_refiner_undo_round(orb_context *ctx, orb_refiner *refiner, double blend);

@@ -145,6 +145,12 @@ static double blend_of(const orb_refiner *r) {
   return r->live == r->hierarchy->surface.vertex_count ? r->settings.finest : r->settings.blend;
 }
 
+/* Coarse levels do not follow a w below 1: without the symmetric term they grow some triangles without bound, and the
+ * fine ones cannot mend that. */
+double orb_refiner_weight(const orb_refiner *r) {
+  return r->live == r->hierarchy->surface.vertex_count ? r->settings.weight : fmax(r->settings.weight, 1);
+}
+
 typedef struct sweep_loop {
   const orb_level *level;
   orb_sweep_job job;
@@ -185,7 +191,7 @@ static orb_status sweep_once(orb_context *ctx, orb_refiner *r, double relax, dou
                              .offset = level->batch_offset,
                              .ring = level->ring,
                              .shape = level->shape,
-                             .weight = r->settings.weight,
+                             .weight = orb_refiner_weight(r),
                              .relax = relax,
                              .energy = level->batch_energy,
                              .fall = level->batch_fall,
@@ -247,7 +253,7 @@ static orb_status settle_level(orb_context *ctx, orb_refiner *r) {
     if (i > 1 && fall < (last ? set->settled_last : set->settled) * energy) {
       break;
     }
-    if (i == sweeps - 1 && fall > set->converged * energy && sweeps < set->most_sweeps) {
+    if (i == sweeps - 1 && fall > (last ? set->converged_last : set->converged) * energy && sweeps < set->most_sweeps) {
       sweeps++;
     }
   }
