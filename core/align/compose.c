@@ -12,6 +12,7 @@
 #include "align/compose.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "align/compose_level.h"
@@ -21,8 +22,8 @@
 #include "numeric/vec3.h"
 
 enum {
-  FIRST_LEVEL = 1000, /* vertices at which a start begins */
-  LAST_START = 6000,  /* and beyond which it gives up untangling */
+  FIRST_LEVEL = 8000, /* vertices at which a start begins */
+  LAST_START = 60000,  /* and beyond which it gives up untangling */
   SOFT_ROUNDS = 12,
   SOFT_SWEEPS = 20
 };
@@ -33,7 +34,7 @@ typedef struct effort {
 } effort;
 
 static effort effort_of(orb_preset preset) {
-  return preset == ORB_PRESET_QUALITY ? (effort){1.3, 150, 60, 25, 40} : (effort){1.6, 80, 30, 10, 14};
+  return preset == ORB_PRESET_QUALITY ? (effort){1.3, 300, 120, 80, 120} : (effort){1.5, 150, 60, 40, 60};
 }
 
 typedef struct composer {
@@ -44,6 +45,7 @@ typedef struct composer {
   double *x, *normal; /* moving shape, area 4π */
   double *goal;       /* spatial targets; NULL: none */
   double *goal_normal;
+  orb_place *goal_place; /* on the fixed shape, of every vertex of the moving one */
   unsigned char *keep;
   orb_hierarchy *hierarchy;
   double *position; /* x in the order of the surface */
@@ -61,6 +63,7 @@ static void composer_free(composer *c) {
   orb_free(ctx, c->normal);
   orb_free(ctx, c->goal);
   orb_free(ctx, c->goal_normal);
+  orb_free(ctx, c->goal_place);
   orb_free(ctx, c->keep);
   orb_hierarchy_destroy(ctx, c->hierarchy);
   orb_free(ctx, c->position);
@@ -105,6 +108,45 @@ static orb_status prepare(composer *c, const orb_aligned_shape *fixed) {
   return ORB_OK;
 }
 
+typedef struct goal_job {
+  composer *c;
+  orb_nearest *tree;
+} goal_job;
+
+/* The fixed shape's vertex nearest to a target in position and normal. */
+static orb_place nearest_with_normal(const composer *c, int32_t v) {
+  const cm_surface *b = &c->b;
+  int32_t best = 0, stride = 3 * (1 + b->triangle_count / 40000);
+  double least = INFINITY;
+  for (int32_t h = 0; h < 3 * b->triangle_count; h += stride) {
+    int32_t u = b->triangles[h];
+    double d = orb_distance2(b->x + 3 * (size_t)u, c->goal + 3 * (size_t)v) +
+               0.25 * orb_distance2(b->normal + 3 * (size_t)u, c->goal_normal + 3 * (size_t)v);
+    if (d < least) {
+      least = d;
+      best = h;
+    }
+  }
+  orb_place place = {.triangle = best / 3};
+  place.at[best % 3] = 1;
+  return place;
+}
+
+/* The nearest point, if the surface faces the right way there; else the best compromise. */
+static void find_goal_places(void *arg, int64_t begin, int64_t end, int thread) {
+  goal_job *job = arg;
+  composer *c = job->c;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    double n[3];
+    (void)orb_nearest_query(job->tree, c->goal + 3 * v, INFINITY, &c->goal_place[v]);
+    cm_surface_at(&c->b, &c->goal_place[v], NULL, NULL, n);
+    if (orb_dot(n, c->goal_normal + 3 * v) < 0.5) {
+      c->goal_place[v] = nearest_with_normal(c, (int32_t)v);
+    }
+  }
+}
+
 /* Spatial targets with the normals that the bent shape has. */
 static orb_status bend(composer *c, const orb_aligned_shape *fixed) {
   orb_context *ctx = c->ctx;
@@ -114,7 +156,8 @@ static orb_status bend(composer *c, const orb_aligned_shape *fixed) {
   orb_status status = ORB_E_NO_MEMORY;
   c->goal = ORB_NEW(ctx, double, 3 * (size_t)c->vertex_count);
   c->goal_normal = ORB_NEW(ctx, double, 3 * (size_t)c->vertex_count);
-  if (!pairs || !c->goal || !c->goal_normal) {
+  c->goal_place = ORB_NEW(ctx, orb_place, c->vertex_count);
+  if (!pairs || !c->goal || !c->goal_normal || !c->goal_place) {
     goto done;
   }
   for (int32_t i = 0; i < c->landmark_count; i++) {
@@ -125,25 +168,13 @@ static orb_status bend(composer *c, const orb_aligned_shape *fixed) {
   }
   ORB_GO(status, cm_spatial_targets(ctx, &c->b, c->x, c->normal, c->vertex_count, pairs, count, c->goal, &fit), done);
   cm_normals(c->goal, c->vertex_count, mesh->triangles, mesh->triangle_count, c->goal_normal);
+  goal_job job = {.c = c};
+  ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &job.tree), done);
+  orb_parallel_for(ctx, c->vertex_count, 64, find_goal_places, &job);
+  orb_nearest_destroy(ctx, job.tree);
 done:
   orb_free(ctx, pairs);
   return status;
-}
-
-/* The fixed shape's vertex nearest to a target in position and normal. */
-static int32_t nearest_to_goal(const composer *c, int32_t v) {
-  const cm_surface *b = &c->b;
-  int32_t best = 0, stride = 1 + b->vertex_count / 20000;
-  double least = INFINITY;
-  for (int32_t u = 0; u < b->vertex_count; u += stride) {
-    double d = orb_distance2(b->x + 3 * (size_t)u, c->goal + 3 * (size_t)v) +
-               0.25 * orb_distance2(b->normal + 3 * (size_t)u, c->goal_normal + 3 * (size_t)v);
-    if (d < least) {
-      least = d;
-      best = u;
-    }
-  }
-  return best;
 }
 
 typedef struct guess_job {
@@ -158,16 +189,14 @@ static void guess_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   for (int64_t i = begin; i < end; i++) {
     int32_t v = job->to_mesh[job->l->vertex[i]];
-    const double *x = job->c->moving->points + 3 * (size_t)v;
     if (job->spatial && !job->l->pinned[i]) {
-      x = job->c->b.s + 3 * (size_t)nearest_to_goal(job->c, v);
-    }
-    memcpy(job->l->x + 3 * i, x, sizeof(double[3]));
-    orb_normalize(job->l->x + 3 * i);
-    if (job->l->pinned[i]) {
+      job->l->place[i] = job->c->goal_place[v];
+      cm_surface_at(&job->c->b, &job->l->place[i], NULL, job->l->x + 3 * i, NULL);
+      cm_level_refresh(job->l, &job->c->b, (int32_t)i);
+    } else {
       memcpy(job->l->x + 3 * i, job->c->moving->points + 3 * (size_t)v, sizeof(double[3]));
+      cm_level_locate(job->l, &job->c->b, (int32_t)i, -1);
     }
-    cm_level_locate(job->l, &job->c->b, (int32_t)i, -1);
   }
 }
 
@@ -202,7 +231,7 @@ static void relocate(composer *c, cm_level *l) {
 
 static orb_status sweeps(composer *c, cm_level *l, const cm_rules *rules, int count) {
   double moved = INFINITY;
-  for (int i = 0; i < count && moved > 2e-5; i++) {
+  for (int i = 0; i < count && moved > 1e-7; i++) {
     ORB_TRY(cm_level_sweep(c->ctx, l, &c->b, rules, &moved));
   }
   return ORB_OK;
@@ -218,12 +247,12 @@ static void set_pull(const composer *c, cm_level *l, const int32_t *to_mesh, dou
 }
 
 /* Flips are driven out: sweeps against a growing barrier, then untangling of a copy, until that succeeds. */
-static orb_status clear_flips(composer *c, cm_level *l, int32_t *flips) {
+static orb_status clear_flips(composer *c, cm_level *l, int rounds, int32_t *flips) {
   cm_rules rules = {.soft = 1, .barrier = 1, .omega = 1};
   double *copy = ORB_NEW(c->ctx, double, 3 * (size_t)l->count);
   orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
   *flips = cm_level_flips(l);
-  for (int round = 0; round < SOFT_ROUNDS && *flips && status == ORB_OK; round++) {
+  for (int round = 0; round < rounds && *flips && status == ORB_OK; round++) {
     ORB_GO(status, sweeps(c, l, &rules, SOFT_SWEEPS), done);
     rules.barrier *= 1.3;
     *flips = cm_level_flips(l);
@@ -268,6 +297,53 @@ static orb_status load_level(composer *c, const orb_refiner *r, const unsigned c
   return ORB_OK;
 }
 
+/* What a level holds of its map, to go back to. */
+typedef struct snapshot {
+  orb_place *place;
+  double *y; /* y, n and x, as they lie in the level */
+} snapshot;
+
+static orb_status snapshot_take(composer *c, const cm_level *l, snapshot *s) {
+  s->place = ORB_NEW(c->ctx, orb_place, l->count);
+  s->y = ORB_NEW(c->ctx, double, 9 * (size_t)l->count);
+  if (!s->place || !s->y) {
+    return ORB_E_NO_MEMORY;
+  }
+  memcpy(s->place, l->place, (size_t)l->count * sizeof *s->place);
+  memcpy(s->y, l->y, 9 * (size_t)l->count * sizeof *s->y);
+  return ORB_OK;
+}
+
+static void snapshot_restore(const snapshot *s, cm_level *l) {
+  memcpy(l->place, s->place, (size_t)l->count * sizeof *s->place);
+  memcpy(l->y, s->y, 9 * (size_t)l->count * sizeof *s->y);
+}
+
+/* Vertices that barriers have locked in get free where flips are allowed for a while. What comes of it is kept if it
+ * can be untangled and is better. */
+static orb_status loosen(composer *c, cm_level *l, int soft_sweeps, int hard_sweeps) {
+  const cm_rules soft = {.soft = 1, .barrier = 1, .omega = 1}, hard = {.soft = 0, .barrier = 1, .omega = 1};
+  snapshot before = {0};
+  double energy = cm_level_energy(l);
+  int32_t flips;
+  orb_status status;
+  ORB_GO(status, snapshot_take(c, l, &before), done);
+  ORB_GO(status, sweeps(c, l, &soft, soft_sweeps), done);
+  ORB_GO(status, clear_flips(c, l, 3, &flips), done);
+  if (!flips) {
+    ORB_GO(status, sweeps(c, l, &hard, hard_sweeps), done);
+  }
+  int worse = flips || cm_level_flips(l) || cm_level_energy(l) >= energy;
+  fprintf(stderr, "    loosen n %d E %.4f -> %.4f flips %d\n", l->count, energy, cm_level_energy(l), flips);
+  if (worse) {
+    snapshot_restore(&before, l);
+  }
+done:
+  orb_free(c->ctx, before.place);
+  orb_free(c->ctx, before.y);
+  return status;
+}
+
 /* From a level without flips up to all vertices. */
 static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, int *failed) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
@@ -285,7 +361,9 @@ static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, 
                                  : c->effort.level_sweeps;
     first = 0;
     ORB_GO(status, sweeps(c, l, &hard, count), done);
+    ORB_GO(status, loosen(c, l, count, count), done);
     *failed = cm_level_flips(l) > 0;
+    fprintf(stderr, "  level %d E %.4f failed %d t %.2f\n", l->count, cm_level_energy(l), *failed, orb_clock());
     if (*failed) {
       break;
     }
@@ -302,6 +380,9 @@ static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, 
     cm_level_free(c->ctx, l);
     ORB_GO(status, load_level(c, r, known, l), done);
     for (int32_t v = 0; v < l->count; v++) {
+      if (pull > 0) {
+        (void)cm_level_try(l, &c->b, &hard, v, &c->goal_place[to_mesh[l->vertex[v]]]);
+      }
       for (int i = 0; i < 3 && !known[l->vertex[v]]; i++) {
         cm_level_step(l, &c->b, &hard, v);
       }
@@ -341,7 +422,10 @@ static orb_status run_start(composer *c, int spatial) {
       spread_out(c, &level);
       set_pull(c, &level, to_mesh, 1);
     }
-    ORB_GO(status, clear_flips(c, &level, &flips), done);
+    int32_t fdbg = cm_level_flips(&level);
+    ORB_GO(status, clear_flips(c, &level, SOFT_ROUNDS, &flips), done);
+    fprintf(stderr, "start spatial %d n %d flips %d -> %d E %.3f\n", spatial, level.count, fdbg, flips,
+            cm_level_energy(&level));
     if (flips && (r->live == c->vertex_count || r->live > LAST_START)) {
       goto done; /* this guess leads nowhere: not an error, the other one or the given alignment stays */
     }

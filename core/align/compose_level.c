@@ -1,4 +1,4 @@
-/* The level's life: gathering it from the surface, flips and untangling, its energy. */
+/* The level's life: gathering it from the surface, its flips, its energy. */
 #include "align/compose_level.h"
 
 #include <math.h>
@@ -8,7 +8,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { MAX_COLOURS = 64, UNTANGLE_ROUNDS = 40 };
+enum { MAX_COLOURS = 64 };
 static const double MOLLIFY = 1e-3; /* least slack of a triangle's longest edge, relative to its mean edge */
 static const double CAP = 20;
 
@@ -218,74 +218,13 @@ void cm_level_locate(cm_level *l, const cm_surface *b, int32_t v, int32_t hint) 
   cm_level_refresh(l, b, v);
 }
 
-static int turns_positively(const cm_level *l, int32_t t) {
-  const int32_t *v = l->triangle + 3 * (size_t)t;
-  return orb_orient(l->x + 3 * (size_t)v[0], l->x + 3 * (size_t)v[1], l->x + 3 * (size_t)v[2]) > 0;
-}
-
 int32_t cm_level_flips(const cm_level *l) {
   int32_t flips = 0;
   for (int32_t t = 0; t < l->triangle_count; t++) {
-    flips += !turns_positively(l, t);
+    const int32_t *v = l->triangle + 3 * (size_t)t;
+    flips += orb_orient(l->x + 3 * (size_t)v[0], l->x + 3 * (size_t)v[1], l->x + 3 * (size_t)v[2]) <= 0;
   }
   return flips;
-}
-
-static void grow_marks(const cm_level *l, unsigned char *mark, unsigned char *next) {
-  memcpy(next, mark, (size_t)l->count);
-  for (int32_t t = 0; t < l->triangle_count; t++) {
-    const int32_t *v = l->triangle + 3 * (size_t)t;
-    if (mark[v[0]] || mark[v[1]] || mark[v[2]]) {
-      next[v[0]] = next[v[1]] = next[v[2]] = 1;
-    }
-  }
-  memcpy(mark, next, (size_t)l->count);
-}
-
-static void average_marked(cm_level *l, const unsigned char *mark) {
-  for (int32_t v = 0; v < l->count; v++) {
-    if (!mark[v] || l->pinned[v]) {
-      continue;
-    }
-    double sum[3] = {0, 0, 0};
-    for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
-      for (int k = 0; k < 3; k++) {
-        sum[k] += l->x[3 * (size_t)l->spoke[i].q + (size_t)k];
-      }
-    }
-    if (orb_normalize(sum) > 1e-9) {
-      memcpy(l->x + 3 * (size_t)v, sum, sizeof sum);
-    }
-  }
-}
-
-orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left) {
-  unsigned char *mark = ORB_NEW(ctx, unsigned char, l->count), *next = ORB_NEW(ctx, unsigned char, l->count);
-  orb_status status = mark && next ? ORB_OK : ORB_E_NO_MEMORY;
-  for (int round = 0; status == ORB_OK; round++) {
-    memset(mark, 0, (size_t)l->count);
-    *left = 0;
-    for (int32_t t = 0; t < l->triangle_count; t++) {
-      if (!turns_positively(l, t)) {
-        const int32_t *v = l->triangle + 3 * (size_t)t;
-        mark[v[0]] = mark[v[1]] = mark[v[2]] = 1;
-        ++*left;
-      }
-    }
-    if (*left == 0 || round == UNTANGLE_ROUNDS) {
-      break;
-    }
-    for (int grow = 0; grow < round / 15; grow++) {
-      grow_marks(l, mark, next);
-    }
-    for (int pass = 0; pass < 10; pass++) {
-      average_marked(l, mark);
-    }
-    status = orb_context_check(ctx);
-  }
-  orb_free(ctx, mark);
-  orb_free(ctx, next);
-  return status;
 }
 
 double cm_level_energy(const cm_level *l) {

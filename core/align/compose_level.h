@@ -51,9 +51,13 @@ ORB_MUST_CHECK orb_status cm_level_sweep(orb_context *ctx, cm_level *level, cons
 /* The step of one vertex. */
 void cm_level_step(cm_level *level, const cm_surface *b, const cm_rules *rules, int32_t v);
 
+/* Moves a vertex to a place if that lowers the energy of its star and flips nothing; returns whether. */
+int cm_level_try(cm_level *level, const cm_surface *b, const cm_rules *rules, int32_t v, const orb_place *place);
+
 /* Triangles of the level whose points on the sphere do not turn positively. */
 int32_t cm_level_flips(const cm_level *level);
-/* Averages flipped neighbourhoods until none is left; returns how many are. Only x changes. */
+/* Optimises flipped neighbourhoods on the sphere until no flip is left (compose_untangle.c); *left: how many are. Only
+ * x changes, and only near flips. */
 ORB_MUST_CHECK orb_status cm_level_untangle(orb_context *ctx, cm_level *level, int32_t *left);
 
 /* Symmetric Dirichlet energy of the composed map, capped at 20, weighted by area; 1: isometric. */

@@ -47,12 +47,13 @@ static double barrier(double r, int soft, double *first, double *second) {
   return r0 - 1 - log(r0) + (1 - 1 / r0) * d + 0.5 * d * d * *second;
 }
 
-static double evaluate(const term *terms, int32_t count, const double y[3], const double x[3], const cm_rules *rules) {
+static double evaluate(const term *terms, int32_t count, const double y[3], const double x[3], const cm_rules *rules,
+                       double shrink) {
   double energy = 0;
   for (int32_t i = 0; i < count; i++) {
     const term *t = &terms[i];
     double det = orb_dot(t->plane, x), u[3], first, second;
-    if (!rules->soft && !(det > SHRINK * t->det)) {
+    if (!rules->soft && !(det > shrink * t->det)) {
       return INFINITY;
     }
     orb_sub(y, t->q, u);
@@ -230,7 +231,7 @@ static double step_vertex(cm_level *l, const cm_surface *b, const cm_rules *rule
     double ny[3], nx[3], nn[3];
     if (cm_surface_trace(b, &l->place[v], scaled, &place)) {
       cm_surface_at(b, &place, ny, nx, nn);
-      double energy = evaluate(terms, count, ny, nx, rules) + pull_energy(l, v, ny);
+      double energy = evaluate(terms, count, ny, nx, rules, SHRINK) + pull_energy(l, v, ny);
       if (energy <= n.energy + (t > 1 ? 0 : 1e-4 * t * slope)) {
         l->place[v] = place;
         memcpy(y, ny, sizeof ny);
@@ -247,6 +248,29 @@ static double step_vertex(cm_level *l, const cm_surface *b, const cm_rules *rule
 void cm_level_step(cm_level *l, const cm_surface *b, const cm_rules *rules, int32_t v) {
   term terms[RING_MAX];
   (void)step_vertex(l, b, rules, v, terms);
+}
+
+int cm_level_try(cm_level *l, const cm_surface *b, const cm_rules *rules, int32_t v, const orb_place *place) {
+  term terms[RING_MAX];
+  double y[3], x[3], n[3];
+  if (l->pinned[v] || l->start[v + 1] - l->start[v] > RING_MAX) {
+    return 0;
+  }
+  int32_t count = load_terms(l, b, v, terms);
+  newton present = {0};
+  for (int32_t i = 0; i < count; i++) { /* sets the terms' ε */
+    add_stretch(&terms[i], l->y + 3 * (size_t)v, b->frame, b->frame + 3, &present);
+  }
+  cm_surface_at(b, place, y, x, n);
+  double before = evaluate(terms, count, l->y + 3 * (size_t)v, l->x + 3 * (size_t)v, rules, 0);
+  if (!(evaluate(terms, count, y, x, rules, 0) < before)) {
+    return 0;
+  }
+  l->place[v] = *place;
+  memcpy(l->y + 3 * (size_t)v, y, sizeof y);
+  memcpy(l->x + 3 * (size_t)v, x, sizeof x);
+  memcpy(l->n + 3 * (size_t)v, n, sizeof n);
+  return 1;
 }
 
 typedef struct sweep_job {
