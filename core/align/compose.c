@@ -12,7 +12,6 @@
 #include "align/compose.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "align/compose_level.h"
@@ -23,7 +22,7 @@
 
 enum {
   FIRST_LEVEL = 8000, /* vertices at which a start begins */
-  LAST_START = 60000,  /* and beyond which it gives up untangling */
+  LAST_START = 60000, /* and beyond which it gives up untangling */
   SOFT_ROUNDS = 12,
   SOFT_SWEEPS = 20
 };
@@ -334,7 +333,6 @@ static orb_status loosen(composer *c, cm_level *l, int soft_sweeps, int hard_swe
     ORB_GO(status, sweeps(c, l, &hard, hard_sweeps), done);
   }
   int worse = flips || cm_level_flips(l) || cm_level_energy(l) >= energy;
-  fprintf(stderr, "    loosen n %d E %.4f -> %.4f flips %d\n", l->count, energy, cm_level_energy(l), flips);
   if (worse) {
     snapshot_restore(&before, l);
   }
@@ -363,7 +361,6 @@ static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, 
     ORB_GO(status, sweeps(c, l, &hard, count), done);
     ORB_GO(status, loosen(c, l, count, count), done);
     *failed = cm_level_flips(l) > 0;
-    fprintf(stderr, "  level %d E %.4f failed %d t %.2f\n", l->count, cm_level_energy(l), *failed, orb_clock());
     if (*failed) {
       break;
     }
@@ -422,10 +419,7 @@ static orb_status run_start(composer *c, int spatial) {
       spread_out(c, &level);
       set_pull(c, &level, to_mesh, 1);
     }
-    int32_t fdbg = cm_level_flips(&level);
     ORB_GO(status, clear_flips(c, &level, SOFT_ROUNDS, &flips), done);
-    fprintf(stderr, "start spatial %d n %d flips %d -> %d E %.3f\n", spatial, level.count, fdbg, flips,
-            cm_level_energy(&level));
     if (flips && (r->live == c->vertex_count || r->live > LAST_START)) {
       goto done; /* this guess leads nowhere: not an error, the other one or the given alignment stays */
     }
