@@ -27,6 +27,9 @@ enum {
   SOFT_SWEEPS = 20
 };
 
+static const double GOOD_ENERGY = 1.2; /* below it the shapes correspond: no further start is tried */
+static const double STILL = 1e-3; /* of a mean edge: less does not count as moving */
+
 typedef struct effort {
   double growth; /* of the vertices from level to level */
   int first_sweeps, coarse_sweeps, level_sweeps, final_sweeps;
@@ -228,10 +231,16 @@ static void relocate(composer *c, cm_level *l) {
   }
 }
 
-static orb_status sweeps(composer *c, cm_level *l, const cm_rules *rules, int count) {
-  double moved = INFINITY;
-  for (int i = 0; i < count && moved > 1e-7; i++) {
-    ORB_TRY(cm_level_sweep(c->ctx, l, &c->b, rules, &moved));
+/* Sweeps until hardly a vertex moves any more. All vertices take part in the first one. */
+static orb_status sweeps(composer *c, cm_level *l, cm_rules rules, int count) {
+  double moved;
+  int32_t stepped = l->count;
+  rules.still = STILL * sqrt(4 * M_PI / l->triangle_count);
+  for (int32_t v = 0; v < l->count; v++) {
+    l->moved[v] = INFINITY;
+  }
+  for (int i = 0; i < count && stepped > l->count / 500; i++) {
+    ORB_TRY(cm_level_sweep(c->ctx, l, &c->b, &rules, &moved, &stepped));
   }
   return ORB_OK;
 }
@@ -252,7 +261,7 @@ static orb_status clear_flips(composer *c, cm_level *l, int rounds, int32_t *fli
   orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
   *flips = cm_level_flips(l);
   for (int round = 0; round < rounds && *flips && status == ORB_OK; round++) {
-    ORB_GO(status, sweeps(c, l, &rules, SOFT_SWEEPS), done);
+    ORB_GO(status, sweeps(c, l, rules, SOFT_SWEEPS), done);
     rules.barrier *= 1.3;
     *flips = cm_level_flips(l);
     if (*flips) {
@@ -327,10 +336,10 @@ static orb_status loosen(composer *c, cm_level *l, int soft_sweeps, int hard_swe
   int32_t flips;
   orb_status status;
   ORB_GO(status, snapshot_take(c, l, &before), done);
-  ORB_GO(status, sweeps(c, l, &soft, soft_sweeps), done);
+  ORB_GO(status, sweeps(c, l, soft, soft_sweeps), done);
   ORB_GO(status, clear_flips(c, l, 3, &flips), done);
   if (!flips) {
-    ORB_GO(status, sweeps(c, l, &hard, hard_sweeps), done);
+    ORB_GO(status, sweeps(c, l, hard, hard_sweeps), done);
   }
   int worse = flips || cm_level_flips(l) || cm_level_energy(l) >= energy;
   if (worse) {
@@ -358,7 +367,7 @@ static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, 
                 : r->live < 3000 ? c->effort.coarse_sweeps
                                  : c->effort.level_sweeps;
     first = 0;
-    ORB_GO(status, sweeps(c, l, &hard, count), done);
+    ORB_GO(status, sweeps(c, l, hard, count), done);
     ORB_GO(status, loosen(c, l, count, count), done);
     *failed = cm_level_flips(l) > 0;
     if (*failed) {
@@ -483,7 +492,9 @@ orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_ali
   energy[1] = c.best_energy = energy[0];
   ORB_GO(status, bend(&c, fixed), done);
   ORB_GO(status, run_start(&c, 1), done);
-  ORB_GO(status, run_start(&c, 0), done);
+  if (preset == ORB_PRESET_QUALITY || c.best_energy > GOOD_ENERGY) {
+    ORB_GO(status, run_start(&c, 0), done);
+  }
   if (c.best_energy < energy[0]) {
     ORB_GO(status,
            orb_certify(ctx, c.best, moving->mesh.vertex_count, moving->mesh.triangles, moving->mesh.triangle_count,

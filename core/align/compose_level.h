@@ -21,6 +21,7 @@ typedef struct cm_level {
   orb_place *place;    /* on the fixed shape */
   double *y, *n, *x;   /* position and normal there, point on the sphere; 3 each */
   double *area;        /* a third of the star's */
+  double *moved;       /* by each vertex's last step; INFINITY: not yet stepped */
   double *goal, *pull; /* spatial target and the strength of its pull, 0: none */
   unsigned char *pinned;
   int32_t colours, *colour_start, *by_colour;
@@ -31,6 +32,7 @@ typedef struct cm_rules {
   int soft;       /* flips are allowed against a finite barrier */
   double barrier; /* strength of the hinge barrier on the sphere's determinants */
   double omega;   /* over-relaxation */
+  double still;   /* a vertex waits while it and its neighbours last moved by less than this */
 } cm_rules;
 
 /* Gathers the live vertices of a surface; position: 3 a vertex of the surface, area 4π at full resolution. local: an
@@ -45,9 +47,10 @@ void cm_level_refresh(cm_level *level, const cm_surface *b, int32_t v);
 /* Sets place, y and n from x. */
 void cm_level_locate(cm_level *level, const cm_surface *b, int32_t v, int32_t hint);
 
-/* One pass of damped Newton steps over all vertices that are not pinned, colour by colour. *moved: mean length. */
+/* One pass of damped Newton steps over all vertices that are not pinned, colour by colour. *moved: mean length;
+ * *stepped: how many vertices did not wait. */
 ORB_MUST_CHECK orb_status cm_level_sweep(orb_context *ctx, cm_level *level, const cm_surface *b, const cm_rules *rules,
-                                         double *moved);
+                                         double *moved, int32_t *stepped);
 /* The step of one vertex. */
 void cm_level_step(cm_level *level, const cm_surface *b, const cm_rules *rules, int32_t v);
 

@@ -270,7 +270,21 @@ int cm_level_try(cm_level *l, const cm_surface *b, const cm_rules *rules, int32_
   memcpy(l->y + 3 * (size_t)v, y, sizeof y);
   memcpy(l->x + 3 * (size_t)v, x, sizeof x);
   memcpy(l->n + 3 * (size_t)v, n, sizeof n);
+  l->moved[v] = INFINITY;
   return 1;
+}
+
+/* Whether anything around v has moved since it was last optimal. */
+static int is_stirred(const cm_level *l, int32_t v, double still) {
+  if (l->moved[v] > still) {
+    return 1;
+  }
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    if (l->moved[l->spoke[i].q] > still && !l->pinned[l->spoke[i].q]) {
+      return 1;
+    }
+  }
+  return 0;
 }
 
 typedef struct sweep_job {
@@ -279,32 +293,48 @@ typedef struct sweep_job {
   const cm_rules *rules;
   int32_t first;
   double *moved; /* of each chunk */
+  int32_t *stepped;
 } sweep_job;
 
 static void sweep_range(void *arg, int64_t begin, int64_t end, int thread) {
   const sweep_job *job = arg;
+  cm_level *l = job->level;
   term terms[RING_MAX];
   double sum = 0;
+  int32_t stepped = 0;
   (void)thread;
   for (int64_t i = begin; i < end; i++) {
-    sum += step_vertex(job->level, job->b, job->rules, job->level->by_colour[job->first + i], terms);
+    int32_t v = l->by_colour[job->first + i];
+    if (is_stirred(l, v, job->rules->still)) {
+      l->moved[v] = step_vertex(l, job->b, job->rules, v, terms);
+      sum += l->moved[v];
+      stepped++;
+    } else {
+      l->moved[v] = 0;
+    }
   }
   job->moved[begin / GRAIN] = sum;
+  job->stepped[begin / GRAIN] = stepped;
 }
 
-orb_status cm_level_sweep(orb_context *ctx, cm_level *l, const cm_surface *b, const cm_rules *rules, double *moved) {
+orb_status cm_level_sweep(orb_context *ctx, cm_level *l, const cm_surface *b, const cm_rules *rules, double *moved,
+                          int32_t *stepped) {
   double sum = 0, *part = ORB_NEW(ctx, double, l->count / GRAIN + 1);
-  orb_status status = part ? ORB_OK : ORB_E_NO_MEMORY;
+  int32_t total = 0, *steps = ORB_NEW(ctx, int32_t, l->count / GRAIN + 1);
+  orb_status status = part && steps ? ORB_OK : ORB_E_NO_MEMORY;
   for (int c = 0; c < l->colours && status == ORB_OK; c++) {
     int32_t first = l->colour_start[c], count = l->colour_start[c + 1] - first;
-    sweep_job job = {l, b, rules, first, part};
+    sweep_job job = {l, b, rules, first, part, steps};
     orb_parallel_for(ctx, count, GRAIN, sweep_range, &job);
     for (int32_t i = 0; i * GRAIN < count; i++) {
       sum += part[i];
+      total += steps[i];
     }
     status = orb_context_check(ctx);
   }
   orb_free(ctx, part);
+  orb_free(ctx, steps);
   *moved = l->count ? sum / l->count : 0;
+  *stepped = total;
   return status;
 }
