@@ -73,8 +73,9 @@ typedef struct cli_args {
 
 typedef struct cli {
   const char *server, *token;
-  int json, quiet, bar; /* bar: progress is drawn on a terminal */
-  int bar_drawn;
+  int json, quiet, bar;       /* bar: progress is drawn on a terminal */
+  int bar_drawn, bar_percent; /* what stands there now */
+  char bar_label[32];
   CURL *curl;
   cli_args args;
 } cli;
