@@ -45,6 +45,10 @@ typedef enum cli_option_id {
   OPT_PART,
   OPT_POSES,
   OPT_SIZE,
+  OPT_UP,
+  OPT_YAW,
+  OPT_PITCH,
+  OPT_WIRE,
   OPT_COUNT
 } cli_option_id;
 
@@ -181,6 +185,7 @@ int cli_run_ls(cli *c);
 int cli_run_get(cli *c);
 int cli_run_rm(cli *c);
 int cli_run_doctor(cli *c);
+int cli_run_view(cli *c);
 int cli_run_completions(cli *c);
 
 #endif
