@@ -86,7 +86,11 @@ static orb_status place_vertex(orb_context *ctx, orb_refiner *r, int32_t v, doub
 
 static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
   round_job *job = arg;
+  const orb_surface *s = &job->r->hierarchy->surface;
   for (int64_t i = begin; i < end; i++) {
+    if (i + 4 < end) {
+      __builtin_prefetch(s->corner + job->r->hierarchy->log[job->first + i + 4].first);
+    }
     int found = 0;
     orb_status status =
         place_vertex(job->ctx, job->r, job->r->hierarchy->log[job->first + i].vertex, job->blend, thread, &found);
