@@ -223,10 +223,10 @@ static orb_status list_vertices(builder *b, const unsigned char *alive, const un
   return ORB_OK;
 }
 
-orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_surface *surface, const unsigned char *alive,
-                           const unsigned char *pinned, int32_t live, double blend) {
+orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_kernels *kernels, const orb_surface *surface,
+                           const unsigned char *alive, const unsigned char *pinned, int32_t live, double blend) {
   free_batches(ctx, level);
-  level->kernels = orb_kernels_best();
+  level->kernels = kernels;
   builder *b = ORB_NEW0(ctx, builder, 1);
   if (!b) {
     return ORB_E_NO_MEMORY;

@@ -17,6 +17,7 @@ typedef struct orb_collapse {
 } orb_collapse;
 
 struct orb_hierarchy {
+  const orb_kernels *kernels;
   orb_surface surface;
   orb_collapse *log; /* in the order of decimation */
   int32_t log_count; /* vertex_count − 4 in all */
@@ -27,6 +28,11 @@ struct orb_hierarchy {
   int32_t round_count, round_capacity;
   int32_t base[4]; /* the tetrahedron */
 };
+
+/* orb_hierarchy_create() with kernels of the caller's choice: for tests and measurements. */
+ORB_MUST_CHECK orb_status orb_hierarchy_create_with(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep,
+                                                    int32_t keep_until, const orb_kernels *kernels,
+                                                    orb_hierarchy **out);
 
 /* Decimates a fresh hierarchy to its tetrahedron: decimate.c. */
 ORB_MUST_CHECK orb_status orb_decimate(orb_context *ctx, orb_hierarchy *hierarchy, const unsigned char *keep,

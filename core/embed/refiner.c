@@ -11,10 +11,16 @@ enum { SWEEP_GRAIN = 32, QUEUE = 65536 };
 
 orb_status orb_hierarchy_create(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep, int32_t keep_until,
                                 orb_hierarchy **out) {
+  return orb_hierarchy_create_with(ctx, mesh, keep, keep_until, orb_kernels_best(), out);
+}
+
+orb_status orb_hierarchy_create_with(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep,
+                                     int32_t keep_until, const orb_kernels *kernels, orb_hierarchy **out) {
   orb_hierarchy *h = ORB_NEW0(ctx, orb_hierarchy, 1);
   if (!h) {
     return ORB_E_NO_MEMORY;
   }
+  h->kernels = kernels;
   unsigned char *kept = NULL;
   orb_status status;
   ORB_GO(status, orb_surface_create(ctx, mesh, &h->surface), done);
@@ -219,7 +225,8 @@ static orb_status need_level(orb_context *ctx, orb_refiner *r) {
   if (r->level.valid) {
     return ORB_OK;
   }
-  return orb_level_build(ctx, &r->level, &r->hierarchy->surface, r->alive, r->pinned, r->live, blend_of(r));
+  return orb_level_build(ctx, &r->level, r->hierarchy->kernels, &r->hierarchy->surface, r->alive, r->pinned, r->live,
+                         blend_of(r));
 }
 
 static const double OVER_RELAXATION = 1.9;
