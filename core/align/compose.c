@@ -28,7 +28,7 @@ enum {
 };
 
 static const double GOOD_ENERGY = 1.2; /* below it the shapes correspond: no further start is tried */
-static const double STILL = 1e-3; /* of a mean edge: less does not count as moving */
+static const double STILL = 1e-3;      /* of a mean edge: less does not count as moving */
 
 typedef struct effort {
   double growth; /* of the vertices from level to level */

@@ -2,8 +2,9 @@
  *
  * Around the flipped triangles, and a growing number of rings about them, vertices take damped Newton steps of
  * Σ D / χ(d): D the Dirichlet energy of the triangle from an equilateral one, d = det(p, q, r), χ(d) = ½(d + √(d² +
- * ε²)) its regularised positive part. ε follows the worst determinant down, so that the energy stays finite while there
- * are flips and becomes a barrier as they go (Garanzha et al., Foldover-free maps in 50 lines of code, 2021).
+ * ε²)) its regularised positive part. ε follows the star's worst determinant down, so that the energy stays finite
+ * while there are flips and becomes a barrier as they go (Garanzha et al., Foldover-free maps in 50 lines of code,
+ * 2021).
  */
 #include <math.h>
 #include <string.h>
@@ -14,7 +15,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { ROUNDS = 60, PASSES = 6, RINGS_MOST = 5, TRIES = 6 };
+enum { FEW = 12, ROUNDS = 60, PASSES = 6, RINGS_MOST = 5, TRIES = 6 };
 
 static double chi(double d, double e) {
   double root = sqrt(d * d + e * e);
@@ -35,8 +36,20 @@ static double star_energy(const cm_level *l, int32_t v, const double p[3], doubl
   return energy;
 }
 
+/* ε for the star of v: small against its determinants, and against the worst of them. */
+static double star_epsilon(const cm_level *l, int32_t v) {
+  double sum = 0, worst = 0;
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    double det = orb_det(point(l, v), point(l, l->spoke[i].q), point(l, l->spoke[i].r));
+    sum += fabs(det);
+    worst = fmin(worst, det);
+  }
+  return 0.05 * sum / (l->start[v + 1] - l->start[v]) - 0.2 * worst + 1e-100;
+}
+
 /* One step of v; the point only changes where the energy falls. */
-static void step(cm_level *l, int32_t v, double epsilon) {
+static void step(cm_level *l, int32_t v, double least_epsilon) {
+  double epsilon = fmax(star_epsilon(l, v), least_epsilon);
   double *p = l->x + 3 * (size_t)v, e1[3], e2[3], g[2] = {0, 0}, h[3] = {0, 0, 0}, energy = 0, longest = 0;
   orb_tangent_frame(p, e1, e2);
   for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
@@ -121,7 +134,9 @@ orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left) {
     for (int i = 0; i < (rings < RINGS_MOST ? rings : RINGS_MOST); i++) {
       grow_marks(l, mark, next);
     }
-    double scale = 1.0 / l->triangle_count, epsilon = sqrt(1e-8 * scale * scale + 0.04 * worst * worst);
+    /* Many flips need one ε for all; the last few hide in stars far smaller than that. */
+    double scale = 1.0 / l->triangle_count;
+    double epsilon = *left > FEW && round % 3 ? sqrt(1e-8 * scale * scale + 0.04 * worst * worst) : 0;
     for (int pass = 0; pass < PASSES; pass++) {
       for (int32_t v = 0; v < l->count; v++) {
         if (mark[v] && !l->pinned[v]) {
