@@ -176,11 +176,15 @@ orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh, con
                      .shape_count = supermesh->shape_count,
                      .frame_count = supermesh->shape_count};
   orb_status status;
+  if (options->path == ORB_PATH_RIGID) {
+    draft.frame_count += options->path_steps * (supermesh->shape_count - 1);
+  }
   orb_progress(ctx, "write", 0);
   ORB_GO(status, draft_room(ctx, &draft), done);
   ORB_GO(status, make_shapes(ctx, &draft), done);
   ORB_GO(status, make_colors(ctx, &draft), done);
   ORB_GO(status, make_textures(ctx, &draft), done);
+  ORB_GO(status, orb_draft_path(ctx, &draft), done);
   ORB_GO(status, round_frames(ctx, &draft), done);
   ORB_GO(status, orb_draft_split(ctx, &draft), done);
   ORB_GO(status, orb_draft_write(ctx, &draft, names, facts ? facts : &unused, out), done);

@@ -47,6 +47,9 @@ ORB_MUST_CHECK orb_status orb_home_triangles(orb_context *ctx, const orb_superme
 ORB_MUST_CHECK orb_status orb_wedge_texcoords(orb_context *ctx, const orb_supermesh *supermesh,
                                               const orb_aligned_shape *shape, const int32_t *home, orb_wedges *out);
 
+/* Fills the frames after the shapes: positions, normals, colours. */
+ORB_MUST_CHECK orb_status orb_draft_path(orb_context *ctx, orb_draft *draft);
+
 /* Fills draft->parts. Triangles and vertices are put in an order that suits the graphics processor's caches. */
 ORB_MUST_CHECK orb_status orb_draft_split(orb_context *ctx, orb_draft *draft);
 

@@ -201,6 +201,8 @@ int main(int argc, char **argv) {
   make(argv[1], "dressed", 3, 1, &options);
   options.colors = 1;
   make(argv[1], "colours", 2, 1, &options);
+  options.path = ORB_PATH_RIGID;
+  make(argv[1], "rigid", 3, 1, &options);
   orb_asset_defaults(&options);
   options.normals = 0;
   options.animation = ORB_ANIMATION_NONE;
