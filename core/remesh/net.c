@@ -2,10 +2,12 @@
  * corner k+1. A split of a triangle adds two triangles, of an edge too: T = 2V − 4 holds throughout. */
 #include "remesh/net.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "numeric/predicates.h"
+#include "numeric/vec3.h"
 
 static int32_t origin(const orb_net *net, int32_t h) {
   return net->triangles[h];
@@ -152,6 +154,23 @@ int32_t orb_net_insert(orb_net *net, const double p[3], int32_t *triangle) {
   return edge >= 0 ? split_edge(net, edge, p) : split_triangle(net, hit.triangle, p);
 }
 
+int32_t orb_net_split_edge(orb_net *net, int32_t h, const double p[3]) {
+  for (int side = 0; side < 2; side++) {
+    int32_t e = side ? net->twin[h] : h;
+    const double *a = orb_net_point(net, origin(net, e)), *b = orb_net_point(net, origin(net, orb_next(e)));
+    const double *c = orb_net_point(net, origin(net, orb_prev(e)));
+    if (orb_orient(a, p, c) <= 0 || orb_orient(p, b, c) <= 0) {
+      return -1;
+    }
+  }
+  return split_edge(net, h, p);
+}
+
+int orb_net_sound(const orb_net *net, int32_t a, int32_t b, int32_t c) {
+  const double *p = orb_net_point(net, a), *q = orb_net_point(net, b), *r = orb_net_point(net, c);
+  return orb_det(p, q, r) > 1e-6 * fmax(orb_distance2(p, q), fmax(orb_distance2(q, r), orb_distance2(r, p)));
+}
+
 static int adjacent(const orb_net *net, int32_t a, int32_t b) {
   int32_t first = net->out[a], h = first;
   do {
@@ -166,7 +185,8 @@ static int adjacent(const orb_net *net, int32_t a, int32_t b) {
 int orb_net_can_flip(const orb_net *net, int32_t h) {
   int32_t g = net->twin[h];
   int32_t a = origin(net, h), b = origin(net, g), c = origin(net, orb_prev(h)), d = origin(net, orb_prev(g));
-  return c != d && positive(net, c, d, b) && positive(net, d, c, a) && !adjacent(net, c, d);
+  return c != d && positive(net, c, d, b) && positive(net, d, c, a) && orb_net_sound(net, c, d, b) &&
+         orb_net_sound(net, d, c, a) && !adjacent(net, c, d);
 }
 
 /* h = a→b of (a,b,c), twin in (b,a,d). The slots are refilled so that half-edge h stays the turned edge:

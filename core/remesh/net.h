@@ -31,7 +31,15 @@ static inline const double *orb_net_point(const orb_net *net, int32_t v) {
  * vertex is then number vertex_count. Needs room for one vertex. *triangle: a walk's start in, a triangle at p out. */
 int32_t orb_net_insert(orb_net *net, const double p[3], int32_t *triangle);
 
-/* Whether half-edge h may be turned: the new edge exists nowhere else and both new triangles are positive. */
+/* Splits the edge of h at p if all four new triangles are positive: the new vertex, or −1. The slots of the two
+ * triangles go on as two of the four. Needs room for one vertex. */
+int32_t orb_net_split_edge(orb_net *net, int32_t h, const double p[3]);
+
+/* Whether the triangle is not only positive but clearly so: its height is more than a millionth of its longest side.
+ * Points that lie on one arc up to rounding would otherwise let needles in that no later step can get rid of. */
+int orb_net_sound(const orb_net *net, int32_t a, int32_t b, int32_t c);
+
+/* Whether half-edge h may be turned: the new edge exists nowhere else and both new triangles are sound. */
 int orb_net_can_flip(const orb_net *net, int32_t h);
 
 /* Turns the edge of h: of triangles (a,b,c) and (b,a,d) with h = a→b makes (c,d,b) and (d,c,a), in the same two

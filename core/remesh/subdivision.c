@@ -2,11 +2,16 @@
  *
  * The quadtree gives a balanced, closed triangulation of the sphere whose leaves hold at most one vertex of each
  * shape. Then every vertex of every shape becomes a vertex of it: a corner of the leaf moves there where no triangle
- * turns over and none has moved before, else the triangle is split. Turns towards Delaunay even the triangles out. */
+ * turns over and none has moved before, else the triangle is split. Turns towards Delaunay even the triangles out, and
+ * edges that still stray from a shape are turned or split (see match.h). */
 #include "base/check.h"
 #include "numeric/vec3.h"
+#include "remesh/match.h"
 #include "remesh/methods.h"
 #include "remesh/quadtree.h"
+
+/* Reproduction is within half a percent of the diagonal: the proved bound is kept below. */
+static const double MOST_ERROR = 0.004;
 
 /* Moves the nearest corner of p's triangle that is free to p, if that leaves every triangle positive. */
 static int32_t snap(orb_net *net, const unsigned char *taken, int32_t grid_count, int32_t triangle, const double p[3]) {
@@ -69,12 +74,17 @@ orb_status orb_remesh_subdivision(orb_context *ctx, const orb_remesh_job *job, o
   if (status == ORB_OK) {
     status = orb_net_delaunay(ctx, &net);
   }
+  orb_match match = {0};
   if (status == ORB_OK) {
-    status = orb_net_export(ctx, &net, out, NULL);
-  }
-  if (status == ORB_OK) {
-    status = orb_remesh_places(ctx, job, out);
+    status = orb_match_create_on(ctx, job, &net, &match);
   }
   orb_net_free(ctx, &net);
+  if (status == ORB_OK) {
+    status = orb_match_refine(ctx, &match, MOST_ERROR * MOST_ERROR, NULL);
+  }
+  if (status == ORB_OK) {
+    status = orb_match_export(ctx, &match, out);
+  }
+  orb_match_free(ctx, &match);
   return status;
 }

@@ -1,0 +1,66 @@
+/* The adaptive method: as few triangles as keep every shape within the tolerance, the bound proved (see match.h).
+ *
+ * The start holds every vertex of every shape; edges that stray are turned or split until the bound holds; then edges
+ * are collapsed while it still holds, with turns for well-shaped triangles in between. Where max_triangles asks for
+ * fewer, the tolerance is raised step by step until they suffice. */
+#include "base/check.h"
+#include "remesh/match.h"
+
+enum { ROUNDS = 3, MENDS = 4 };
+
+static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, int64_t target, int strict) {
+  double limit2 = tolerance * tolerance;
+  for (int round = 0; round < ROUNDS; round++) {
+    int64_t before = orb_match_live(match);
+    ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict));
+    ORB_TRY(orb_match_turn_all(ctx, match, limit2));
+    int64_t after = orb_match_live(match);
+    if (after <= target || (before - after) * 50 < before) {
+      break;
+    }
+  }
+  return ORB_OK;
+}
+
+/* Edges that found no room to be split among needles find it once the needles are gone: refine and reduce in turn
+ * until the bound holds for every shape. */
+static orb_status settle_within(orb_context *ctx, orb_match *match, double tolerance) {
+  double limit2 = tolerance * tolerance;
+  for (int i = 0; i < MENDS; i++) {
+    int64_t strays = 0;
+    ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
+    if (strays == 0 && i > 0) {
+      break;
+    }
+    if (i == 0) {
+      ORB_TRY(orb_match_turn_all(ctx, match, limit2));
+    }
+    ORB_TRY(reduce(ctx, match, tolerance, 0, 1));
+    orb_progress(ctx, "remesh", 0.5 + 0.1 * i);
+  }
+  return ORB_OK;
+}
+
+orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
+  orb_match match;
+  ORB_TRY(orb_match_create(ctx, job, &match));
+  double tolerance = job->options->tolerance;
+  int64_t most = job->options->max_triangles;
+  orb_status status;
+  orb_progress(ctx, "remesh", 0.15);
+  ORB_GO(status, settle_within(ctx, &match, tolerance), end);
+  while (most > 0 && orb_match_live(&match) > most && tolerance < 4) {
+    tolerance *= 1.25;
+    ORB_GO(status, reduce(ctx, &match, tolerance, most, tolerance < 0.05), end);
+  }
+  if (most > 0 && orb_match_live(&match) > most) {
+    status = orb_fail(ctx, ORB_E_BAD_OPTION, "The shapes and landmarks need more than max_triangles = %lld; raise it.",
+                      (long long)most);
+    goto end;
+  }
+  orb_progress(ctx, "remesh", 0.9);
+  ORB_GO(status, orb_match_export(ctx, &match, out), end);
+end:
+  orb_match_free(ctx, &match);
+  return status;
+}

@@ -1,0 +1,275 @@
+/* Setting a match up: the union of all shapes' vertices on the sphere, their places, and the hand-over at the end. */
+#include "remesh/match.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "numeric/vec3.h"
+
+const double *orb_match_item_point(const orb_match *match, int32_t item) {
+  int32_t s = match->item_shape[item];
+  return match->view[s].points + 3 * (int64_t)(item - match->item_begin[s]);
+}
+
+const double *orb_match_item_position(const orb_match *match, int32_t item) {
+  int32_t s = match->item_shape[item];
+  return match->position[s] + 3 * (int64_t)(item - match->item_begin[s]);
+}
+
+void orb_match_free(orb_context *ctx, orb_match *match) {
+  for (int32_t s = 0; s < match->shape_count && match->position; s++) {
+    orb_free(ctx, match->position[s]);
+  }
+  orb_free(ctx, match->position);
+  orb_free(ctx, match->view);
+  orb_free(ctx, match->at);
+  orb_free(ctx, match->spot);
+  orb_free(ctx, match->fixed);
+  orb_free(ctx, match->item_begin);
+  orb_free(ctx, match->item_next);
+  orb_free(ctx, match->item_shape);
+  orb_free(ctx, match->vertex_items);
+  orb_free(ctx, match->triangle_items);
+  orb_net_free(ctx, &match->net);
+  memset(match, 0, sizeof *match);
+}
+
+static int grow(orb_context *ctx, void *block, size_t count, size_t size) {
+  void *old, *grown;
+  memcpy(&old, block, sizeof old);
+  grown = orb_realloc(ctx, old, count, size);
+  if (grown) {
+    memcpy(block, &grown, sizeof grown);
+  }
+  return grown != NULL;
+}
+
+orb_status orb_match_reserve(orb_context *ctx, orb_match *match, int64_t more) {
+  if (match->net.vertex_count + more <= match->capacity) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_net_reserve(ctx, &match->net, more));
+  size_t n = (size_t)match->net.vertex_capacity, cells = n * (size_t)match->shape_count;
+  if (!grow(ctx, &match->at, 3 * cells, sizeof(double)) || !grow(ctx, &match->spot, cells, sizeof(orb_spot)) ||
+      !grow(ctx, &match->fixed, n, 1) || !grow(ctx, &match->vertex_items, n, sizeof(int32_t)) ||
+      !grow(ctx, &match->triangle_items, 2 * n, sizeof(int32_t))) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (size_t i = (size_t)match->capacity; i < n; i++) {
+    match->fixed[i] = 0;
+    match->vertex_items[i] = -1;
+    match->triangle_items[2 * i] = match->triangle_items[2 * i + 1] = -1;
+  }
+  match->capacity = (int32_t)n;
+  return ORB_OK;
+}
+
+static orb_status take_shapes(orb_context *ctx, orb_match *match) {
+  const orb_remesh_job *job = match->job;
+  int32_t shapes = match->shape_count = job->shape_count;
+  match->position = ORB_NEW0(ctx, double *, shapes);
+  match->view = ORB_NEW(ctx, orb_sphere_view, shapes);
+  match->item_begin = ORB_NEW0(ctx, int32_t, shapes + 1);
+  if (!match->position || !match->view || !match->item_begin) {
+    return ORB_E_NO_MEMORY;
+  }
+  int64_t items = 0;
+  for (int32_t s = 0; s < shapes; s++) {
+    const orb_mesh *mesh = &job->shapes[s].mesh;
+    match->view[s] = (orb_sphere_view){job->shapes[s].points, mesh->triangles, job->twin[s], mesh->triangle_count};
+    items += mesh->vertex_count;
+    if (items > INT32_MAX / 8) {
+      return orb_fail(ctx, ORB_E_TOO_LARGE, "The shapes have too many vertices together.");
+    }
+    match->item_begin[s + 1] = (int32_t)items;
+    match->position[s] = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
+    if (!match->position[s]) {
+      return ORB_E_NO_MEMORY;
+    }
+    double scale = job->diagonal[s] > 0 ? 1 / job->diagonal[s] : 1;
+    for (int64_t i = 0; i < 3 * (int64_t)mesh->vertex_count; i++) {
+      match->position[s][i] = mesh->positions[i] * scale;
+    }
+  }
+  match->item_next = ORB_NEW(ctx, int32_t, items);
+  match->item_shape = ORB_NEW(ctx, int32_t, items);
+  if (!match->item_next || !match->item_shape) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t s = 0; s < shapes; s++) {
+    for (int32_t i = match->item_begin[s]; i < match->item_begin[s + 1]; i++) {
+      match->item_shape[i] = s;
+      match->item_next[i] = -1;
+    }
+  }
+  return ORB_OK;
+}
+
+static void put_item_at(orb_match *match, int32_t item, int32_t v) {
+  match->item_next[item] = match->vertex_items[v];
+  match->vertex_items[v] = item;
+}
+
+/* The spot of a known place; its zeros and ones are exact. */
+static orb_spot spot_of_place(const orb_sphere_view *view, const orb_place *place, const double p[3]) {
+  orb_hit hit = orb_walk(view, p, place->triangle);
+  return orb_spot_of(&hit);
+}
+
+/* Places net vertex v on shape s, starting at triangle `hint`. */
+static void settle(orb_match *match, int32_t v, int32_t s, int32_t hint) {
+  const double *p = orb_net_point(&match->net, v);
+  orb_place place;
+  orb_locate(match->job->locator[s], p, hint, &place);
+  int64_t cell = (int64_t)v * match->shape_count + s;
+  match->spot[cell] = spot_of_place(&match->view[s], &place, p);
+  double *at = match->at + 3 * cell;
+  at[0] = at[1] = at[2] = 0;
+  for (int k = 0; k < 3; k++) {
+    const double *q = match->position[s] + 3 * (int64_t)match->view[s].triangles[3 * place.triangle + k];
+    for (int j = 0; j < 3; j++) {
+      at[j] += place.at[k] * q[j];
+    }
+  }
+}
+
+static void settle_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  orb_match *match = arg;
+  for (int64_t v = begin; v < end; v++) {
+    for (int32_t s = 0; s < match->shape_count; s++) {
+      settle(match, (int32_t)v, s, -1);
+    }
+  }
+}
+
+static void fix_landmarks(orb_match *match) {
+  const orb_remesh_job *job = match->job;
+  for (int32_t v = 0; v < match->net.vertex_count; v++) {
+    for (int32_t i = match->vertex_items[v]; i >= 0 && !match->fixed[v]; i = match->item_next[i]) {
+      const int32_t *landmarks = job->shapes[match->item_shape[i]].landmark_vertices;
+      for (int32_t l = 0; landmarks && l < job->landmark_count; l++) {
+        match->fixed[v] |= landmarks[l] == i - match->item_begin[match->item_shape[i]];
+      }
+    }
+  }
+}
+
+orb_status orb_match_create(orb_context *ctx, const orb_remesh_job *job, orb_match *match) {
+  memset(match, 0, sizeof *match);
+  match->job = job;
+  orb_status status;
+  ORB_GO(status, take_shapes(ctx, match), fail);
+  int32_t base = 0;
+  for (int32_t s = 1; s < match->shape_count; s++) {
+    base = job->shapes[s].mesh.triangle_count > job->shapes[base].mesh.triangle_count ? s : base;
+  }
+  const orb_aligned_shape *shape = &job->shapes[base];
+  int64_t items = match->item_begin[match->shape_count];
+  ORB_GO(status,
+         orb_net_init(ctx, &match->net, shape->points, shape->mesh.vertex_count, shape->mesh.triangles,
+                      shape->mesh.triangle_count, items + items / 4),
+         fail);
+  ORB_GO(status, orb_match_reserve(ctx, match, items - match->net.vertex_count), fail);
+  for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
+    put_item_at(match, match->item_begin[base] + v, v);
+  }
+  for (int32_t s = 0; s < match->shape_count; s++) {
+    for (int32_t v = 0; v < job->shapes[s].mesh.vertex_count && s != base; v++) {
+      const double *p = job->shapes[s].points + 3 * (int64_t)v;
+      orb_place near;
+      orb_locate(job->locator[base], p, -1, &near);
+      put_item_at(match, match->item_begin[s] + v, orb_net_insert(&match->net, p, &near.triangle));
+      if ((v & 4095) == 0) {
+        ORB_GO(status, orb_context_check(ctx), fail);
+      }
+    }
+  }
+  fix_landmarks(match);
+  orb_parallel_for(ctx, match->net.vertex_count, 512, settle_range, match);
+  return orb_context_check(ctx);
+fail:
+  orb_match_free(ctx, match);
+  return status;
+}
+
+void orb_match_deal(orb_match *match, int32_t list, int32_t start) {
+  orb_sphere_view view = orb_net_view(&match->net);
+  while (list >= 0) {
+    int32_t item = list;
+    list = match->item_next[item];
+    orb_hit hit = orb_walk(&view, orb_match_item_point(match, item), start);
+    match->item_next[item] = match->triangle_items[hit.triangle];
+    match->triangle_items[hit.triangle] = item;
+  }
+}
+
+orb_status orb_match_create_on(orb_context *ctx, const orb_remesh_job *job, const orb_net *net, orb_match *match) {
+  memset(match, 0, sizeof *match);
+  match->job = job;
+  orb_status status;
+  ORB_GO(status, take_shapes(ctx, match), fail);
+  ORB_GO(status,
+         orb_net_init(ctx, &match->net, net->points, net->vertex_count, net->triangles, net->triangle_count,
+                      net->vertex_count),
+         fail);
+  ORB_GO(status, orb_match_reserve(ctx, match, 64), fail);
+  orb_locator *locator = NULL;
+  ORB_GO(status,
+         orb_locator_create(ctx, match->net.points, match->net.vertex_count, match->net.triangles,
+                            match->net.triangle_count, match->net.twin, &locator),
+         fail);
+  orb_sphere_view view = orb_net_view(&match->net);
+  for (int32_t i = 0; i < match->item_begin[match->shape_count]; i++) {
+    orb_place place;
+    orb_locate(locator, orb_match_item_point(match, i), -1, &place);
+    orb_hit hit = orb_walk(&view, orb_match_item_point(match, i), place.triangle);
+    int corner = orb_hit_corner(&hit);
+    if (corner >= 0) {
+      put_item_at(match, i, match->net.triangles[3 * hit.triangle + corner]);
+    } else {
+      match->item_next[i] = match->triangle_items[hit.triangle];
+      match->triangle_items[hit.triangle] = i;
+    }
+  }
+  orb_locator_destroy(ctx, locator);
+  fix_landmarks(match);
+  orb_parallel_for(ctx, match->net.vertex_count, 512, settle_range, match);
+  return orb_context_check(ctx);
+fail:
+  orb_match_free(ctx, match);
+  return status;
+}
+
+int32_t orb_match_split(orb_match *match, int32_t h, const double p[3]) {
+  int32_t g = match->net.twin[h];
+  int32_t lists[2] = {match->triangle_items[h / 3], match->triangle_items[g / 3]};
+  int32_t v = orb_net_split_edge(&match->net, h, p);
+  if (v < 0) {
+    return -1;
+  }
+  for (int32_t s = 0; s < match->shape_count; s++) {
+    int32_t near = match->spot[(int64_t)match->net.triangles[h] * match->shape_count + s].h / 3;
+    settle(match, v, s, near);
+  }
+  int32_t t = h / 3;
+  match->triangle_items[h / 3] = match->triangle_items[g / 3] = -1;
+  orb_match_deal(match, lists[0], t);
+  orb_match_deal(match, lists[1], t);
+  return v;
+}
+
+int64_t orb_match_live(const orb_match *match) {
+  int64_t live = 0;
+  for (int32_t t = 0; t < match->net.triangle_count; t++) {
+    live += match->net.triangles[3 * t] >= 0;
+  }
+  return live;
+}
+
+orb_status orb_match_export(orb_context *ctx, const orb_match *match, orb_supermesh *out) {
+  ORB_TRY(orb_net_export(ctx, &match->net, out, NULL));
+  ORB_TRY(orb_remesh_places(ctx, match->job, out));
+  return orb_match_bounds(ctx, match, out->error_bound);
+}

@@ -1,0 +1,364 @@
+/* Fewer triangles: half-edge collapses in order of quadric error, each one proved before it is made.
+ *
+ * The order: every net vertex has, for each shape, the quadric of the surface around it (Garland & Heckbert 1997,
+ * planes weighted by area, lengths relative to the diagonal); the cost of moving u onto v is the sum over the shapes of
+ * u's quadric at v. The proof: the new triangles are positive on the sphere, the new edges' crossings and the items
+ * that change triangles lie within the limit in every shape. A heap holds each vertex with its best target; a vertex
+ * that finds no allowed target waits until its surroundings change. */
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "numeric/predicates.h"
+#include "remesh/distance.h"
+#include "remesh/match.h"
+#include "remesh/quadric.h"
+
+enum { RING_MAX = 48, VALENCE_MAX = 14, TRIES = 4 };
+
+typedef struct collapser {
+  orb_context *ctx;
+  orb_match *match;
+  double limit2;
+  int strict;
+  orb_quadric *quadric; /* net vertex major, one a shape */
+  double *cost;         /* a vertex: of its best target */
+  int32_t *heap, *slot; /* slot −1: not in the heap */
+  int32_t heap_count;
+  int64_t live;
+} collapser;
+
+static void swap_heap(collapser *c, int32_t i, int32_t j) {
+  int32_t v = c->heap[i];
+  c->heap[i] = c->heap[j];
+  c->heap[j] = v;
+  c->slot[c->heap[i]] = i;
+  c->slot[c->heap[j]] = j;
+}
+
+static int before(const collapser *c, int32_t i, int32_t j) {
+  int32_t v = c->heap[i], w = c->heap[j];
+  return c->cost[v] < c->cost[w] || (c->cost[v] == c->cost[w] && v < w);
+}
+
+static void sift(collapser *c, int32_t i) {
+  while (i > 0 && before(c, i, (i - 1) / 2)) {
+    swap_heap(c, i, (i - 1) / 2);
+    i = (i - 1) / 2;
+  }
+  for (;;) {
+    int32_t least = i, left = 2 * i + 1;
+    for (int32_t k = left; k <= left + 1 && k < c->heap_count; k++) {
+      least = before(c, k, least) ? k : least;
+    }
+    if (least == i) {
+      return;
+    }
+    swap_heap(c, i, least);
+    i = least;
+  }
+}
+
+static void heap_remove(collapser *c, int32_t v) {
+  int32_t i = c->slot[v];
+  if (i < 0) {
+    return;
+  }
+  swap_heap(c, i, --c->heap_count);
+  c->slot[v] = -1;
+  if (i < c->heap_count) {
+    sift(c, i);
+  }
+}
+
+static void heap_put(collapser *c, int32_t v, double cost) {
+  c->cost[v] = cost;
+  if (!(cost < INFINITY)) {
+    heap_remove(c, v);
+    return;
+  }
+  if (c->slot[v] < 0) {
+    c->slot[v] = c->heap_count;
+    c->heap[c->heap_count++] = v;
+  }
+  sift(c, c->slot[v]);
+}
+
+/* The neighbours of u in counter-clockwise order; −1 when there are too many. */
+static int ring_of(const orb_net *net, int32_t u, int32_t ring[RING_MAX]) {
+  int n = 0;
+  int32_t first = net->out[u], h = first;
+  do {
+    if (n == RING_MAX) {
+      return -1;
+    }
+    ring[n++] = net->triangles[orb_next(h)];
+    h = net->twin[orb_prev(h)];
+  } while (h != first);
+  return n;
+}
+
+/* Cost of u moving onto v: quadrics, and a little of the distance, so that flat regions keep even triangles. */
+static double move_cost(const collapser *c, int32_t u, int32_t v) {
+  double cost = 0, length2 = 0;
+  for (int32_t s = 0; s < c->match->shape_count; s++) {
+    cost += orb_quadric_at(&c->quadric[(int64_t)u * c->match->shape_count + s], orb_match_at(c->match, v, s));
+    length2 += orb_distance2(orb_match_at(c->match, u, s), orb_match_at(c->match, v, s));
+  }
+  return (cost > 0 ? cost : 0) + 1e-5 * length2 * c->limit2;
+}
+
+static void rate(collapser *c, int32_t u) {
+  int32_t ring[RING_MAX];
+  int n = c->match->fixed[u] ? -1 : ring_of(&c->match->net, u, ring);
+  double best = INFINITY;
+  for (int i = 0; i < n; i++) {
+    best = fmin(best, move_cost(c, u, ring[i]));
+  }
+  heap_put(c, u, best);
+}
+
+static void normal_of(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c, double out[3]) {
+  double u[3], v[3];
+  orb_sub(orb_match_at(match, b, s), orb_match_at(match, a, s), u);
+  orb_sub(orb_match_at(match, c, s), orb_match_at(match, a, s), v);
+  orb_cross(u, v, out);
+}
+
+/* In space no kept triangle turns by more than about 75 degrees, and none becomes a worse sliver than the worst of the
+ * triangles that go, unless it is good enough. ring starts at v. */
+static int shape_allows(const orb_match *match, int32_t u, const int32_t *ring, int n) {
+  double worst_old = 1, worst_new = 1;
+  for (int i = 0; i < n; i++) {
+    worst_old = fmin(worst_old, orb_match_quality(match, u, ring[i], ring[(i + 1) % n]));
+  }
+  for (int i = 1; i + 1 < n; i++) {
+    worst_new = fmin(worst_new, orb_match_quality(match, ring[0], ring[i], ring[i + 1]));
+  }
+  if (worst_new < 0.12 && worst_new < worst_old) {
+    return 0;
+  }
+  for (int i = 1; i + 1 < n; i++) {
+    for (int32_t s = 0; s < match->shape_count; s++) {
+      double old[3], new[3];
+      normal_of(match, s, u, ring[i], ring[i + 1], old);
+      normal_of(match, s, ring[0], ring[i], ring[i + 1], new);
+      if (orb_dot(old, new) < 0.25 * orb_length(old) * orb_length(new)) {
+        return 0;
+      }
+    }
+  }
+  return 1;
+}
+
+/* The greatest distance of a listed item to the fan of ring[0] that replaces u's star; −1 where it lies in none. */
+static double items_in_fan2(const orb_match *match, int32_t list, const int32_t *ring, int n, double limit2) {
+  double greatest = 0;
+  const double *v = orb_net_point(&match->net, ring[0]);
+  for (int32_t item = list; item >= 0 && greatest <= limit2; item = match->item_next[item]) {
+    const double *x = orb_match_item_point(match, item);
+    int i = 1;
+    while (i + 2 < n && orb_orient(v, orb_net_point(&match->net, ring[i + 1]), x) > 0) {
+      i++;
+    }
+    greatest = fmax(greatest, orb_match_item2(match, item, ring[0], ring[i], ring[i + 1]));
+  }
+  return greatest;
+}
+
+static int is_allowed(const collapser *c, int32_t u, const int32_t *ring, int n) {
+  const orb_match *match = c->match;
+  const orb_net *net = &match->net;
+  int32_t other[RING_MAX];
+  int valence = ring_of(net, ring[0], other), shared = 0;
+  if (valence < 0 || valence + n - 4 > (valence > VALENCE_MAX ? valence : VALENCE_MAX)) {
+    return 0;
+  }
+  for (int i = 0; i < valence; i++) { /* the link condition */
+    for (int k = 1; k < n; k++) {
+      shared += other[i] == ring[k];
+    }
+  }
+  if (shared != 2) {
+    return 0;
+  }
+  const double *v = orb_net_point(net, ring[0]);
+  for (int i = 1; i + 1 < n; i++) {
+    if (orb_orient(v, orb_net_point(net, ring[i]), orb_net_point(net, ring[i + 1])) <= 0 ||
+        !orb_net_sound(net, ring[0], ring[i], ring[i + 1])) {
+      return 0;
+    }
+  }
+  if (c->strict && !shape_allows(match, u, ring, n)) {
+    return 0;
+  }
+  if (items_in_fan2(match, match->vertex_items[u], ring, n, c->limit2) > c->limit2) {
+    return 0;
+  }
+  int32_t first = net->out[u], h = first;
+  do {
+    if (items_in_fan2(match, match->triangle_items[h / 3], ring, n, c->limit2) > c->limit2) {
+      return 0;
+    }
+    h = net->twin[orb_prev(h)];
+  } while (h != first);
+  for (int i = 2; i + 1 < n; i++) {
+    if (orb_match_edge2(match, ring[0], ring[i], c->limit2, NULL) > c->limit2) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* Removes u by moving it onto the end of half-edge h = u→v, which is allowed. */
+static void collapse(collapser *c, int32_t h) {
+  orb_match *match = c->match;
+  orb_net *net = &match->net;
+  int32_t u = net->triangles[h], v = net->triangles[orb_next(h)], t = h / 3, g = net->twin[h], s = g / 3;
+  int32_t lists[RING_MAX + 1], triangles[RING_MAX];
+  int n = 0;
+  lists[RING_MAX] = match->vertex_items[u];
+  match->vertex_items[u] = -1;
+  int32_t e = h;
+  do {
+    triangles[n] = e / 3;
+    lists[n++] = match->triangle_items[e / 3];
+    match->triangle_items[e / 3] = -1;
+    e = net->twin[orb_prev(e)];
+  } while (e != h);
+  for (int i = 0; i < n; i++) {
+    for (int k = 0; k < 3; k++) {
+      if (net->triangles[3 * triangles[i] + k] == u) {
+        net->triangles[3 * triangles[i] + k] = v;
+      }
+    }
+  }
+  int32_t sides[2][2] = {{net->twin[orb_next(h)], net->twin[orb_prev(h)]},
+                         {net->twin[orb_next(g)], net->twin[orb_prev(g)]}};
+  int32_t apex[2] = {net->triangles[orb_prev(h)], net->triangles[orb_prev(g)]};
+  for (int i = 0; i < 2; i++) {
+    net->twin[sides[i][0]] = sides[i][1];
+    net->twin[sides[i][1]] = sides[i][0];
+    int32_t at_apex = net->triangles[sides[i][0]] == apex[i] ? sides[i][0] : sides[i][1];
+    net->out[apex[i]] = at_apex;
+    net->out[v] = net->twin[at_apex];
+  }
+  net->triangles[3 * t] = net->triangles[3 * s] = -1;
+  net->out[u] = -1;
+  c->live -= 2;
+  int32_t start = net->out[v] / 3;
+  orb_match_deal(match, lists[RING_MAX], start);
+  for (int i = 0; i < n; i++) {
+    orb_match_deal(match, lists[i], start);
+  }
+  for (int32_t k = 0; k < match->shape_count; k++) {
+    orb_quadric_add(&c->quadric[(int64_t)v * match->shape_count + k], &c->quadric[(int64_t)u * match->shape_count + k]);
+  }
+}
+
+/* The half-edge of u to the next best target after `above` in order of cost; −1: none. */
+static int32_t next_target(const collapser *c, int32_t u, double above, int32_t last, double *cost) {
+  const orb_net *net = &c->match->net;
+  int32_t best = -1, first = net->out[u], h = first;
+  double best_cost = INFINITY;
+  do {
+    double value = move_cost(c, u, net->triangles[orb_next(h)]);
+    int later = value > above || (value == above && h > last);
+    if (later && (value < best_cost || (value == best_cost && h < best))) {
+      best = h;
+      best_cost = value;
+    }
+    h = net->twin[orb_prev(h)];
+  } while (h != first);
+  *cost = best_cost;
+  return best;
+}
+
+static void try_vertex(collapser *c, int32_t u) {
+  const orb_net *net = &c->match->net;
+  int32_t ring[RING_MAX], turned[RING_MAX];
+  int n = ring_of(net, u, ring);
+  double cost = -1;
+  int32_t h = -1;
+  for (int attempt = 0; attempt < TRIES && n > 0; attempt++) {
+    h = next_target(c, u, cost, h, &cost);
+    if (h < 0) {
+      return;
+    }
+    int at = 0;
+    while (ring[at] != net->triangles[orb_next(h)]) {
+      at++;
+    }
+    for (int i = 0; i < n; i++) {
+      turned[i] = ring[(at + i) % n];
+    }
+    if (is_allowed(c, u, turned, n)) {
+      collapse(c, h);
+      for (int i = 0; i < n; i++) {
+        rate(c, turned[i]);
+      }
+      return;
+    }
+  }
+}
+
+/* The quadrics of the shapes' surfaces around each net vertex: of all triangles at a vertex of the shape, else of the
+ * triangle (or two) that it lies in, with a third of their area each. */
+static void surface_quadric(const orb_match *match, int32_t v, int32_t s, orb_quadric *out) {
+  const orb_sphere_view *view = &match->view[s];
+  orb_spot spot = match->spot[(int64_t)v * match->shape_count + s];
+  int32_t h = spot.h;
+  memset(out, 0, sizeof *out);
+  do {
+    const double *corner[3];
+    for (int k = 0; k < 3; k++) {
+      corner[k] = match->position[s] + 3 * (int64_t)view->triangles[h - h % 3 + k];
+    }
+    orb_quadric_add_plane(out, corner[0], corner[1], corner[2]);
+    h = spot.kind == ORB_SPOT_VERTEX ? view->twin[orb_prev(h)] : spot.kind == ORB_SPOT_EDGE ? view->twin[h] : h;
+  } while (h != spot.h);
+}
+
+static void quadric_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  collapser *c = arg;
+  for (int64_t v = begin; v < end; v++) {
+    for (int32_t s = 0; s < c->match->shape_count && c->match->net.out[v] >= 0; s++) {
+      surface_quadric(c->match, (int32_t)v, s, &c->quadric[v * c->match->shape_count + s]);
+    }
+  }
+}
+
+orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2, int64_t target, int strict) {
+  int32_t vertices = match->net.vertex_count;
+  collapser c = {.ctx = ctx, .match = match, .limit2 = limit2, .strict = strict, .live = orb_match_live(match)};
+  c.quadric = ORB_NEW(ctx, orb_quadric, (int64_t)vertices * match->shape_count);
+  c.cost = ORB_NEW(ctx, double, vertices);
+  c.heap = ORB_NEW(ctx, int32_t, vertices);
+  c.slot = ORB_NEW(ctx, int32_t, vertices);
+  orb_status status = c.quadric && c.cost && c.heap && c.slot ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    orb_parallel_for(ctx, vertices, 512, quadric_range, &c);
+    for (int32_t v = 0; v < vertices; v++) {
+      c.slot[v] = -1;
+    }
+    for (int32_t v = 0; v < vertices; v++) {
+      if (match->net.out[v] >= 0) {
+        rate(&c, v);
+      }
+    }
+  }
+  for (int64_t i = 0; status == ORB_OK && c.heap_count > 0 && c.live > target && c.live > 4; i++) {
+    int32_t u = c.heap[0];
+    heap_remove(&c, u);
+    try_vertex(&c, u);
+    if ((i & 511) == 0) {
+      status = orb_context_check(ctx);
+    }
+  }
+  orb_free(ctx, c.quadric);
+  orb_free(ctx, c.cost);
+  orb_free(ctx, c.heap);
+  orb_free(ctx, c.slot);
+  return status;
+}

@@ -1,0 +1,287 @@
+/* Making a match hold: edges that stray are turned where the other diagonal strays less, else split where they stray
+ * most, at the crossing itself. And turns for the sake of well-shaped triangles, which never leave the tolerance. */
+#include <math.h>
+
+#include "base/check.h"
+#include "numeric/predicates.h"
+#include "remesh/distance.h"
+#include "remesh/match.h"
+
+double orb_match_quality(const orb_match *match, int32_t a, int32_t b, int32_t c) {
+  double least = 1;
+  for (int32_t s = 0; s < match->shape_count; s++) {
+    double u[3], v[3], n[3];
+    const double *p = orb_match_at(match, a, s), *q = orb_match_at(match, b, s), *r = orb_match_at(match, c, s);
+    orb_sub(q, p, u);
+    orb_sub(r, p, v);
+    orb_cross(u, v, n);
+    double edges = orb_dot(u, u) + orb_dot(v, v) + orb_distance2(q, r);
+    double quality = edges > 0 ? 3.4641016151377544 * orb_length(n) / edges : 0;
+    least = quality < least ? quality : least;
+  }
+  return least;
+}
+
+static double items_of_turn2(const orb_match *match, int32_t list, int32_t c, int32_t d, int32_t b, int32_t a) {
+  double greatest = 0;
+  for (int32_t i = list; i >= 0; i = match->item_next[i]) {
+    int left =
+        orb_orient(orb_net_point(&match->net, c), orb_net_point(&match->net, d), orb_match_item_point(match, i)) >= 0;
+    double distance2 = left ? orb_match_item2(match, i, c, d, b) : orb_match_item2(match, i, d, c, a);
+    greatest = distance2 > greatest ? distance2 : greatest;
+  }
+  return greatest;
+}
+
+static void turn(orb_match *match, int32_t h) {
+  int32_t t = h / 3, g = match->net.twin[h] / 3;
+  int32_t lists[2] = {match->triangle_items[t], match->triangle_items[g]};
+  match->triangle_items[t] = match->triangle_items[g] = -1;
+  orb_net_flip(&match->net, h);
+  orb_match_deal(match, lists[0], t);
+  orb_match_deal(match, lists[1], t);
+}
+
+/* Neither new triangle turns against the surface that the two old ones formed. */
+static int turn_keeps_facing(const orb_match *match, int32_t a, int32_t b, int32_t c, int32_t d) {
+  const int32_t old[2][3] = {{a, b, c}, {b, a, d}}, new[2][3] = {{c, d, b}, {d, c, a}};
+  for (int32_t s = 0; s < match->shape_count; s++) {
+    double n[4][3];
+    for (int i = 0; i < 4; i++) {
+      const int32_t *t = i < 2 ? old[i] : new[i - 2];
+      double u[3], v[3];
+      orb_sub(orb_match_at(match, t[1], s), orb_match_at(match, t[0], s), u);
+      orb_sub(orb_match_at(match, t[2], s), orb_match_at(match, t[0], s), v);
+      orb_cross(u, v, n[i]);
+    }
+    for (int i = 2; i < 4; i++) {
+      double sum[3] = {n[0][0] + n[1][0], n[0][1] + n[1][1], n[0][2] + n[1][2]};
+      if (orb_dot(n[i], sum) < 0.3 * orb_length(n[i]) * orb_length(sum)) {
+        return 0;
+      }
+    }
+  }
+  return 1;
+}
+
+int orb_match_try_turn(orb_match *match, int32_t h, double limit2) {
+  const orb_net *net = &match->net;
+  int32_t g = net->twin[h];
+  int32_t a = net->triangles[h], b = net->triangles[g];
+  int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
+  double before = fmin(orb_match_quality(match, a, b, c), orb_match_quality(match, b, a, d));
+  double after = fmin(orb_match_quality(match, c, d, b), orb_match_quality(match, d, c, a));
+  if (!(after > before * 1.05 + 1e-9) || !orb_net_can_flip(net, h) || !turn_keeps_facing(match, a, b, c, d) ||
+      orb_match_edge2(match, c, d, limit2, NULL) > limit2 ||
+      items_of_turn2(match, match->triangle_items[h / 3], c, d, b, a) > limit2 ||
+      items_of_turn2(match, match->triangle_items[g / 3], c, d, b, a) > limit2) {
+    return 0;
+  }
+  turn(match, h);
+  return 1;
+}
+
+orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2) {
+  for (int pass = 0; pass < 4; pass++) {
+    int64_t turned = 0;
+    for (int32_t h = 0; h < 3 * match->net.triangle_count; h++) {
+      if (match->net.triangles[h - h % 3] >= 0 && h < match->net.twin[h]) {
+        turned += orb_match_try_turn(match, h, limit2);
+      }
+      if ((h & 4095) == 0) {
+        ORB_TRY(orb_context_check(ctx));
+      }
+    }
+    if (turned * 200 < match->net.triangle_count) {
+      break;
+    }
+  }
+  return ORB_OK;
+}
+
+/* The direction in which the net edge v w meets the crossing's edge (or vertex) of the shape. */
+static void crossing_point(const orb_match *match, int32_t v, int32_t w, const orb_stray *stray, double out[3]) {
+  const orb_sphere_view *view = &match->view[stray->shape];
+  const double *c = view->points + 3 * (int64_t)view->triangles[stray->h];
+  if (stray->at_vertex) {
+    out[0] = c[0];
+    out[1] = c[1];
+    out[2] = c[2];
+    return;
+  }
+  const double *d = view->points + 3 * (int64_t)view->triangles[orb_next(stray->h)];
+  const double *p = orb_net_point(&match->net, v), *q = orb_net_point(&match->net, w);
+  /* on c d, where the plane of p q cuts it: weights are the distances of c and d from that plane */
+  double wc = fabs(orb_det(p, q, c)), wd = fabs(orb_det(p, q, d)), sum = wc + wd;
+  double t = sum > 0 ? wc / sum : 0.5;
+  for (int k = 0; k < 3; k++) {
+    out[k] = (1 - t) * c[k] + t * d[k];
+  }
+  (void)orb_normalize(out);
+}
+
+typedef struct edge_queue {
+  int32_t (*ends)[2]; /* edges by their ends: half-edges change hands when triangles are split */
+  int64_t count, capacity;
+} edge_queue;
+
+static orb_status push(orb_context *ctx, edge_queue *queue, int32_t v, int32_t w) {
+  if (queue->count == queue->capacity) {
+    int64_t capacity = 2 * queue->capacity + 1024;
+    int32_t(*grown)[2] = orb_realloc(ctx, queue->ends, (size_t)capacity, sizeof *grown);
+    if (!grown) {
+      return ORB_E_NO_MEMORY;
+    }
+    queue->ends = grown;
+    queue->capacity = capacity;
+  }
+  queue->ends[queue->count][0] = v;
+  queue->ends[queue->count++][1] = w;
+  return ORB_OK;
+}
+
+static int32_t find_edge(const orb_net *net, int32_t v, int32_t w) {
+  int32_t first = net->out[v], h = first;
+  do {
+    if (net->triangles[orb_next(h)] == w) {
+      return h;
+    }
+    h = net->twin[orb_prev(h)];
+  } while (h != first);
+  return -1;
+}
+
+/* Turns the straying edge if the other diagonal is within the limit and no triangle turns over. */
+static int mend_by_turn(orb_match *match, int32_t h, double limit2) {
+  const orb_net *net = &match->net;
+  int32_t g = net->twin[h], v = net->triangles[h], w = net->triangles[g];
+  int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
+  if (!orb_net_can_flip(net, h) || !turn_keeps_facing(match, v, w, c, d) ||
+      orb_match_edge2(match, c, d, limit2, NULL) > limit2 ||
+      items_of_turn2(match, match->triangle_items[h / 3], c, d, w, v) > limit2 ||
+      items_of_turn2(match, match->triangle_items[g / 3], c, d, w, v) > limit2) {
+    return 0;
+  }
+  turn(match, h);
+  return 1;
+}
+
+/* The longest edge of the triangle of h, if that is a needle (flat to a thousandth) and the edge is not h; else −1. */
+static int32_t longest_of_needle(const orb_net *net, int32_t h) {
+  const double *p[3];
+  double length2[3];
+  int32_t edge[3] = {h, orb_next(h), orb_prev(h)};
+  int longest = 0;
+  for (int k = 0; k < 3; k++) {
+    p[k] = orb_net_point(net, net->triangles[edge[k]]);
+  }
+  for (int k = 0; k < 3; k++) {
+    length2[k] = orb_distance2(p[k], p[(k + 1) % 3]);
+    longest = length2[k] > length2[longest] ? k : longest;
+  }
+  return longest > 0 && orb_det(p[0], p[1], p[2]) < 1e-3 * length2[longest] ? edge[longest] : -1;
+}
+
+/* Splits edge h at the foot of p, well away from its ends. */
+static int32_t split_near(orb_match *match, int32_t h, const double p[3]) {
+  const double *a = orb_net_point(&match->net, match->net.triangles[h]);
+  const double *b = orb_net_point(&match->net, match->net.triangles[orb_next(h)]);
+  double ab[3], ap[3], x[3];
+  orb_sub(b, a, ab);
+  orb_sub(p, a, ap);
+  double t = fmin(0.9, fmax(0.1, orb_dot(ab, ap) / orb_dot(ab, ab)));
+  for (int k = 0; k < 3; k++) {
+    x[k] = a[k] + t * ab[k];
+  }
+  (void)orb_normalize(x);
+  return orb_match_split(match, h, x);
+}
+
+/* Splits the edge where it strays most. Beside a needle its longest edge is split first, and so on: else splits creep
+ * towards that edge in ever thinner triangles (as in Rivara's longest-edge bisection). */
+static int32_t split_at(orb_match *match, int32_t h, const orb_stray *worst) {
+  const orb_net *net = &match->net;
+  double p[3];
+  crossing_point(match, net->triangles[h], net->triangles[net->twin[h]], worst, p);
+  int32_t split = h;
+  for (int step = 0; step < 64; step++) {
+    int32_t longer = longest_of_needle(net, split);
+    if (longer < 0) {
+      longer = longest_of_needle(net, net->twin[split]);
+    }
+    if (longer < 0) {
+      break;
+    }
+    split = longer;
+  }
+  int32_t n = split == h ? orb_match_split(match, h, p) : split_near(match, split, p);
+  return n >= 0 ? n : split_near(match, h, p);
+}
+
+static orb_status mend_edge(orb_context *ctx, orb_match *match, int32_t v, int32_t w, double limit2,
+                            edge_queue *queue) {
+  int32_t h = find_edge(&match->net, v, w);
+  orb_stray worst = {0, -1, -1, 0};
+  if (h < 0 || orb_match_edge2(match, v, w, INFINITY, &worst) <= limit2 || mend_by_turn(match, h, limit2)) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_match_reserve(ctx, match, 1));
+  int32_t n = split_at(match, h, &worst);
+  if (n < 0) {
+    return ORB_OK;
+  }
+  int32_t first = match->net.out[n], e = first;
+  do {
+    ORB_TRY(push(ctx, queue, n, match->net.triangles[orb_next(e)]));
+    e = match->net.twin[orb_prev(e)];
+  } while (e != first);
+  return push(ctx, queue, v, w); /* still there if another edge was split */
+}
+
+typedef struct stray_loop {
+  const orb_match *match;
+  double limit2;
+  unsigned char *strays; /* a half-edge */
+} stray_loop;
+
+static void stray_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  stray_loop *loop = arg;
+  const orb_net *net = &loop->match->net;
+  for (int64_t h = begin; h < end; h++) {
+    loop->strays[h] = net->triangles[h - h % 3] >= 0 && h < net->twin[h] &&
+                      orb_match_edge2(loop->match, net->triangles[h], net->triangles[net->twin[h]], loop->limit2,
+                                      NULL) > loop->limit2;
+  }
+}
+
+orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, int64_t *strays) {
+  int64_t half_edges = 3 * (int64_t)match->net.triangle_count;
+  stray_loop loop = {match, limit2, ORB_NEW(ctx, unsigned char, half_edges)};
+  edge_queue queue = {0};
+  orb_status status = loop.strays ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    orb_parallel_for(ctx, half_edges, 1024, stray_range, &loop);
+    status = orb_context_check(ctx);
+  }
+  for (int64_t h = 0; h < half_edges && status == ORB_OK; h++) {
+    if (loop.strays[h]) {
+      status = push(ctx, &queue, match->net.triangles[h], match->net.triangles[match->net.twin[h]]);
+    }
+  }
+  if (strays) {
+    *strays = queue.count;
+  }
+  int64_t limit = 64 * half_edges; /* splits end by themselves; this only guards against rounding */
+  /* First in, first out: an old long edge is split before those that its neighbours' splits have made, which would
+   * else creep towards it in ever thinner triangles. */
+  for (int64_t i = 0; i < queue.count && i < limit && status == ORB_OK; i++) {
+    status = mend_edge(ctx, match, queue.ends[i][0], queue.ends[i][1], limit2, &queue);
+    if (status == ORB_OK && (i & 1023) == 0) {
+      status = orb_context_check(ctx);
+    }
+  }
+  orb_free(ctx, queue.ends);
+  orb_free(ctx, loop.strays);
+  return status;
+}

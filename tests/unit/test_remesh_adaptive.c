@@ -1,0 +1,285 @@
+/* The adaptive method: its proved bound against independent distances, landmarks, limits, memory and threads. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "support_sphere.h"
+
+static orb_context *make_context(int threads) {
+  orb_context *ctx;
+  orb_context_options options = {.threads = threads};
+  assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
+  return ctx;
+}
+
+static void run(orb_context *ctx, const orb_aligned_shape *shapes, int count, int landmarks, double tolerance,
+                int64_t most, orb_supermesh *out) {
+  orb_remesh_options options;
+  orb_remesh_defaults(&options);
+  assert_int_equal(options.method, ORB_REMESH_ADAPTIVE);
+  options.tolerance = tolerance;
+  options.max_triangles = most;
+  orb_status status = orb_remesh(ctx, shapes, count, landmarks, &options, out);
+  if (status != ORB_OK) {
+    print_message("%s: %s\n", orb_status_name(status), orb_context_error(ctx)->detail);
+  }
+  assert_int_equal(status, ORB_OK);
+}
+
+static double *positions_of(const orb_supermesh *m, const orb_aligned_shape *shape, int s) {
+  double *out = malloc(3 * (size_t)m->vertex_count * sizeof *out);
+  for (int32_t v = 0; v < m->vertex_count; v++) {
+    orb_place_position(&shape->mesh, &m->places[(size_t)s * (size_t)m->vertex_count + (size_t)v], out + 3 * v);
+  }
+  return out;
+}
+
+/* The farthest of many points of one surface from the other: corners, middles of edges and faces. */
+static double farthest(orb_context *ctx, const double *from, const int32_t *triangles, int32_t count, const double *to,
+                       const int32_t *to_triangles, int32_t to_count) {
+  static const double weight[7][3] = {
+      {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {.5, .5, 0}, {0, .5, .5}, {.5, 0, .5}, {1. / 3, 1. / 3, 1. / 3}};
+  orb_nearest *tree;
+  assert_int_equal(orb_nearest_create(ctx, to, to_triangles, to_count, &tree), ORB_OK);
+  double most = 0;
+  for (int32_t t = 0; t < count; t++) {
+    for (int i = 0; i < 7; i++) {
+      double p[3] = {0, 0, 0};
+      for (int k = 0; k < 3; k++) {
+        for (int j = 0; j < 3; j++) {
+          p[j] += weight[i][k] * from[3 * triangles[3 * t + k] + j];
+        }
+      }
+      orb_place place;
+      most = fmax(most, orb_nearest_query(tree, p, INFINITY, &place));
+    }
+  }
+  orb_nearest_destroy(ctx, tree);
+  return sqrt(most);
+}
+
+/* Sampled distances both ways never exceed the proved bound, nor the bound the tolerance. */
+static void assert_within(orb_context *ctx, const orb_supermesh *m, const orb_aligned_shape *shapes, int count,
+                          double tolerance) {
+  for (int s = 0; s < count; s++) {
+    const orb_mesh *mesh = &shapes[s].mesh;
+    double *p = positions_of(m, &shapes[s], s);
+    double there =
+        farthest(ctx, mesh->positions, mesh->triangles, mesh->triangle_count, p, m->triangles, m->triangle_count);
+    double back =
+        farthest(ctx, p, m->triangles, m->triangle_count, mesh->positions, mesh->triangles, mesh->triangle_count);
+    assert_true(there <= m->error_bound[s] && back <= m->error_bound[s]);
+    assert_true(m->error_bound[s] <= tolerance * sphere_diagonal(&shapes[s]) * (1 + 1e-9));
+    free(p);
+  }
+}
+
+static void check(const orb_aligned_shape *shapes, int count, orb_context *ctx, double tolerance) {
+  orb_supermesh m;
+  run(ctx, shapes, count, 0, tolerance, 0, &m);
+  sphere_assert_valid(&m, shapes, count);
+  assert_within(ctx, &m, shapes, count, tolerance);
+  orb_supermesh_free(ctx, &m);
+}
+
+static void check_pair(sphere_kind a, int a_size, unsigned a_seed, sphere_kind b, int b_size, unsigned b_seed,
+                       double jitter, double tolerance) {
+  orb_context *ctx = make_context(2);
+  orb_aligned_shape shapes[2];
+  sphere_shape(ctx, a, a_size, jitter, a_seed, &shapes[0]);
+  sphere_shape(ctx, b, b_size, jitter, b_seed, &shapes[1]);
+  check(shapes, 2, ctx, tolerance);
+  sphere_shape_free(ctx, &shapes[0]);
+  sphere_shape_free(ctx, &shapes[1]);
+  orb_context_destroy(ctx);
+}
+
+static void the_bound_holds(void **state) {
+  (void)state;
+  check_pair(SPHERE_ICO, 4, 1, SPHERE_OCTA, 4, 2, 0.2, 0.001);
+  check_pair(SPHERE_ICO, 3, 1, SPHERE_UV, 24, 2, 0, 0.003);
+  check_pair(SPHERE_TETRA, 0, 0, SPHERE_ICO, 3, 5, 0, 0.002);
+  check_pair(SPHERE_TETRA, 0, 0, SPHERE_TETRA, 0, 3, 0, 0.001);
+}
+
+static void coincidences_are_handled(void **state) {
+  (void)state;
+  check_pair(SPHERE_UV, 24, 0, SPHERE_UV, 24, 0, 0, 0.002);   /* the same mesh twice */
+  check_pair(SPHERE_OCTA, 2, 0, SPHERE_OCTA, 4, 0, 0, 0.002); /* every vertex of one on the other's edges */
+  check_pair(SPHERE_OCTA, 3, 0, SPHERE_UV, 16, 0, 0, 0.002);  /* poles and meridians in common */
+  check_pair(SPHERE_TETRA, 0, 0, SPHERE_TETRA, 0, 0, 0, 0.001);
+}
+
+/* The finer shape's detail survives beside a shape of 20 triangles. */
+static void unlike_densities(void **state) {
+  (void)state;
+  check_pair(SPHERE_ICO, 0, 0, SPHERE_ICO, 4, 3, 0.2, 0.001);
+}
+
+static void four_shapes(void **state) {
+  (void)state;
+  orb_context *ctx = make_context(2);
+  orb_aligned_shape shapes[4];
+  for (int s = 0; s < 4; s++) {
+    sphere_shape(ctx, s & 1 ? SPHERE_OCTA : SPHERE_ICO, 3, 0.2, (unsigned)s + 1, &shapes[s]);
+  }
+  check(shapes, 4, ctx, 0.004);
+  for (int s = 0; s < 4; s++) {
+    sphere_shape_free(ctx, &shapes[s]);
+  }
+  orb_context_destroy(ctx);
+}
+
+/* Gives both shapes the poles and the axes' ends as landmarks: common vertices of both triangulations. */
+static void axis_landmarks(orb_context *ctx, orb_aligned_shape *shape) {
+  static const double axis[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+  shape->landmark_vertices = ORB_NEW(ctx, int32_t, 6);
+  for (int i = 0; i < 6; i++) {
+    for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
+      if (memcmp(shape->points + 3 * v, axis[i], sizeof axis[i]) == 0) {
+        shape->landmark_vertices[i] = v;
+      }
+    }
+  }
+}
+
+static void landmarks_and_limits_are_kept(void **state) {
+  (void)state;
+  orb_context *ctx = make_context(1);
+  orb_aligned_shape shapes[2];
+  for (int s = 0; s < 2; s++) {
+    sphere_shape(ctx, SPHERE_OCTA, 4, 0, 0, &shapes[s]);
+    axis_landmarks(ctx, &shapes[s]);
+  }
+  for (int32_t v = 0; v < shapes[1].mesh.vertex_count; v++) {
+    shapes[1].mesh.positions[3 * v] *= 2;
+  }
+  const int64_t limits[3] = {0, 100, 20};
+  double error = 0;
+  for (int i = 0; i < 3; i++) {
+    orb_supermesh m;
+    run(ctx, shapes, 2, 6, 0.01, limits[i], &m);
+    sphere_assert_valid(&m, shapes, 2);
+    assert_true(limits[i] == 0 || m.triangle_count <= limits[i]);
+    assert_within(ctx, &m, shapes, 2, limits[i] ? 1 : 0.01);
+    assert_true(m.error_bound[0] >= error);
+    error = m.error_bound[0];
+    for (int k = 0; k < 6; k++) {
+      assert_true(m.landmark_vertices[k] >= 0);
+      for (int s = 0; s < 2; s++) {
+        double p[3];
+        orb_place_position(&shapes[s].mesh, &m.places[s * m.vertex_count + m.landmark_vertices[k]], p);
+        assert_memory_equal(p, shapes[s].mesh.positions + 3 * shapes[s].landmark_vertices[k], sizeof p);
+      }
+    }
+    orb_supermesh_free(ctx, &m);
+  }
+  sphere_shape_free(ctx, &shapes[0]);
+  sphere_shape_free(ctx, &shapes[1]);
+  orb_context_destroy(ctx);
+}
+
+static void bad_options_are_named(void **state) {
+  (void)state;
+  orb_context *ctx = make_context(1);
+  orb_aligned_shape shape;
+  sphere_shape(ctx, SPHERE_OCTA, 1, 0, 0, &shape);
+  orb_supermesh m;
+  orb_remesh_options options;
+  orb_remesh_defaults(&options);
+  options.tolerance = NAN;
+  assert_int_equal(orb_remesh(ctx, &shape, 1, 0, &options, &m), ORB_E_BAD_OPTION);
+  orb_remesh_defaults(&options);
+  options.max_triangles = 3;
+  assert_int_equal(orb_remesh(ctx, &shape, 1, 0, &options, &m), ORB_E_BAD_OPTION);
+  assert_int_equal(orb_remesh(ctx, &shape, 0, 0, NULL, &m), ORB_E_BAD_OPTION);
+  sphere_shape_free(ctx, &shape);
+  orb_context_destroy(ctx);
+}
+
+static void threads_do_not_matter(void **state) {
+  (void)state;
+  orb_supermesh m[2];
+  orb_context *ctx[2];
+  for (int i = 0; i < 2; i++) {
+    orb_aligned_shape shapes[2];
+    ctx[i] = make_context(i ? 4 : 1);
+    sphere_shape(ctx[i], SPHERE_ICO, 4, 0.2, 1, &shapes[0]);
+    sphere_shape(ctx[i], SPHERE_OCTA, 4, 0.2, 2, &shapes[1]);
+    run(ctx[i], shapes, 2, 0, 0.001, 0, &m[i]);
+    sphere_shape_free(ctx[i], &shapes[0]);
+    sphere_shape_free(ctx[i], &shapes[1]);
+  }
+  assert_int_equal(m[0].vertex_count, m[1].vertex_count);
+  assert_memory_equal(m[0].points, m[1].points, 3 * (size_t)m[0].vertex_count * sizeof(double));
+  assert_memory_equal(m[0].triangles, m[1].triangles, 3 * (size_t)m[0].triangle_count * sizeof(int32_t));
+  assert_memory_equal(m[0].error_bound, m[1].error_bound, 2 * sizeof(double));
+  for (int i = 0; i < 2; i++) {
+    orb_supermesh_free(ctx[i], &m[i]);
+    orb_context_destroy(ctx[i]);
+  }
+}
+
+typedef struct failing {
+  int64_t left;
+} failing;
+
+static void *failing_alloc(void *user, size_t size) {
+  failing *f = user;
+  return f->left-- > 0 ? malloc(size) : NULL;
+}
+
+static void failing_free(void *user, void *block) {
+  (void)user;
+  free(block);
+}
+
+/* Every allocation fails once; each time the call says so and leaves nothing behind (the context asserts it). */
+static void failing_allocations(void **state) {
+  (void)state;
+  orb_remesh_method methods[] = {ORB_REMESH_ADAPTIVE, ORB_REMESH_SUBDIVISION};
+  for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
+    int done = 0;
+    for (int64_t n = 0; !done; n++) {
+      assert_true(n < 2000);
+      failing f = {INT64_MAX};
+      orb_context_options options = {.threads = 1, .allocator = {failing_alloc, failing_free, &f}};
+      orb_context *ctx;
+      assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
+      orb_aligned_shape shapes[2];
+      sphere_shape(ctx, SPHERE_ICO, 1, 0, 1, &shapes[0]);
+      sphere_shape(ctx, SPHERE_OCTA, 1, 0, 2, &shapes[1]);
+      orb_remesh_options remesh;
+      orb_remesh_defaults(&remesh);
+      remesh.method = methods[i];
+      orb_supermesh m;
+      f.left = n;
+      orb_status status = orb_remesh(ctx, shapes, 2, 0, &remesh, &m);
+      assert_true(status == ORB_OK || status == ORB_E_NO_MEMORY);
+      done = status == ORB_OK;
+      orb_supermesh_free(ctx, &m);
+      sphere_shape_free(ctx, &shapes[0]);
+      sphere_shape_free(ctx, &shapes[1]);
+      orb_context_destroy(ctx);
+    }
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(the_bound_holds),
+      cmocka_unit_test(coincidences_are_handled),
+      cmocka_unit_test(unlike_densities),
+      cmocka_unit_test(four_shapes),
+      cmocka_unit_test(landmarks_and_limits_are_kept),
+      cmocka_unit_test(bad_options_are_named),
+      cmocka_unit_test(threads_do_not_matter),
+      cmocka_unit_test(failing_allocations),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
