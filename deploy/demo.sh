@@ -95,6 +95,7 @@ trap finish EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
+: >"$data/out"
 setsid "$root/build/bin/orbmorphd" --listen 127.0.0.1:0 --data "$data/store" >"$data/out" 2>"$data/log" </dev/null &
 daemon=$!
 address=

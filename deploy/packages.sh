@@ -3,7 +3,7 @@
 orb_build_packages=(
   gcc g++ cmake ninja-build pkg-config
   liblapacke-dev libopenblas-dev libqhull-dev libmeshoptimizer-dev libtinygltf-dev
-  libcjson-dev libsodium-dev libmicrohttpd-dev libsqlite3-dev libcurl4-openssl-dev
+  libcjson-dev libsodium-dev libmicrohttpd-dev libsqlite3-dev libcurl4-openssl-dev libpng-dev
 )
 orb_test_packages=(libcmocka-dev curl jq man-db chromium)
 orb_long_packages=(clang libclang-rt-dev valgrind)

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
-#   tests/long.sh [PART…]    parts: tsan valgrind fuzz crash; all of them without arguments
+#   tests/long.sh [PART…]    parts: tsan valgrind fuzz crash adversarial; all of them without arguments
 #
 # ORB_MINUTES (5) is the time for each fuzz target, ORB_CRASHES (1000) the number of kills.
 set -euo pipefail
@@ -50,8 +50,15 @@ part_crash() {
   ORB_CRASHES=${ORB_CRASHES:-1000} ORBMORPHD=build/bin/orbmorphd node --test tests/scenario/durability.test.mjs
 }
 
+# 1,000 seeded adversarial meshes through the embedding.
+part_adversarial() {
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build
+  ctest --test-dir build --output-on-failure -C long -L long
+}
+
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash
+  set -- tsan valgrind fuzz crash adversarial
 fi
 for part in "$@"; do
   echo "== $part =="

@@ -45,6 +45,10 @@ typedef enum cli_option_id {
   OPT_PART,
   OPT_POSES,
   OPT_SIZE,
+  OPT_UP,
+  OPT_YAW,
+  OPT_PITCH,
+  OPT_WIRE,
   OPT_COUNT
 } cli_option_id;
 
@@ -73,8 +77,9 @@ typedef struct cli_args {
 
 typedef struct cli {
   const char *server, *token;
-  int json, quiet, bar; /* bar: progress is drawn on a terminal */
-  int bar_drawn;
+  int json, quiet, bar;       /* bar: progress is drawn on a terminal */
+  int bar_drawn, bar_percent; /* what stands there now */
+  char bar_label[32];
   CURL *curl;
   cli_args args;
 } cli;
@@ -180,6 +185,7 @@ int cli_run_ls(cli *c);
 int cli_run_get(cli *c);
 int cli_run_rm(cli *c);
 int cli_run_doctor(cli *c);
+int cli_run_view(cli *c);
 int cli_run_completions(cli *c);
 
 #endif

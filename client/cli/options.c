@@ -34,8 +34,12 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_STATE] = {"state", 0, "STATE", "queued running succeeded failed cancelled", "only jobs in this state"},
     [OPT_LIMIT] = {"limit", 0, "N", NULL, "at most so many"},
     [OPT_PART] = {"part", 0, "PART", "file asset sphere", "the bytes of a mesh, a supermesh or an embedding"},
-    [OPT_POSES] = {"poses", 0, "N", NULL, "poses in the picture"},
-    [OPT_SIZE] = {"size", 0, "PIXELS", NULL, "width and height of one pose"},
+    [OPT_POSES] = {"poses", 0, "N", NULL, "poses in each row, 5"},
+    [OPT_SIZE] = {"size", 0, "PIXELS", NULL, "width and height of one pose, 320"},
+    [OPT_UP] = {"up", 0, "AXIS", "y z", "the axis that points up"},
+    [OPT_YAW] = {"yaw", 0, "DEGREES", NULL, "turn about that axis, 30"},
+    [OPT_PITCH] = {"pitch", 0, "DEGREES", NULL, "look from above, 15"},
+    [OPT_WIRE] = {"wire", 0, NULL, NULL, "draw the edges of triangles"},
 };
 
 static int find_long(const cli_command *command, const char *text, size_t length) {

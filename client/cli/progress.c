@@ -12,12 +12,16 @@ void cli_bar(cli *c, const char *label, double fraction) {
     return;
   if (!(fraction >= 0 && fraction <= 1))
     fraction = 0;
-  int full = (int)(fraction * BAR_WIDTH + 0.5);
+  int full = (int)(fraction * BAR_WIDTH + 0.5), percent = (int)(100 * fraction + 0.5);
+  if (c->bar_drawn && percent == c->bar_percent && !strncmp(label, c->bar_label, sizeof c->bar_label - 1))
+    return;
+  c->bar_percent = percent;
+  snprintf(c->bar_label, sizeof c->bar_label, "%s", label);
   char line[BAR_WIDTH + 1];
   for (int i = 0; i < BAR_WIDTH; i++)
     line[i] = i < full ? '#' : '.';
   line[BAR_WIDTH] = 0;
-  fprintf(stderr, "\r\033[K%-24.24s [%s] %3.0f %%", label, line, 100 * fraction);
+  fprintf(stderr, "\r\033[K%-24.24s [%s] %3d %%", label, line, percent);
   fflush(stderr);
   c->bar_drawn = 1;
 }

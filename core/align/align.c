@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/compose.h"
 #include "align/methods.h"
 #include "align/rotate.h"
 #include "base/check.h"
@@ -179,6 +180,20 @@ static orb_status certify_all(orb_context *ctx, orb_sheet *sheets, int32_t shape
   return ORB_OK;
 }
 
+/* Aligned landmarks are not yet a good morph: the maps from the first shape's surface to the others' are improved. */
+static orb_status compose_all(orb_context *ctx, orb_alignment *alignment, orb_preset preset) {
+  double sum = 0;
+  for (int32_t s = 1; s < alignment->shape_count; s++) {
+    double energy[2];
+    int improved;
+    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], alignment->landmark_count, preset, energy,
+                        &improved));
+    sum += energy[1];
+  }
+  alignment->energy = sum / (alignment->shape_count - 1);
+  return ORB_OK;
+}
+
 orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                      const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                      orb_alignment *out) {
@@ -202,6 +217,9 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
   ORB_GO(status, certify_all(ctx, sheets, shape_count), end);
   for (int32_t s = 0; s < shape_count; s++) {
     orb_sheet_release(ctx, &sheets[s], &out->shapes[s]);
+  }
+  if (options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO)) {
+    ORB_GO(status, compose_all(ctx, out, options->preset), end);
   }
   orb_progress(ctx, "align", 1);
 end:

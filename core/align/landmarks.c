@@ -232,6 +232,7 @@ orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet *sheet, const 
   }
   orb_free(ctx, sheet->shape.landmark_vertices);
   sheet->shape.landmark_vertices = vertices;
+  sheet->landmark_count = landmark_count;
   vertices = NULL;
 end:
   orb_free(ctx, vertices);

@@ -79,6 +79,12 @@ orb_status orb_sheet_copy(orb_context *ctx, const orb_sheet *sheet, orb_sheet *o
   out->twin = copy_block(ctx, sheet->twin, 3 * triangles, sizeof(int32_t));
   out->corner = copy_block(ctx, sheet->corner, vertices, sizeof(int32_t));
   int failed = !out->shape.points || !out->shape.parent || !out->twin || !out->corner;
+  if (sheet->shape.landmark_vertices && !failed) {
+    out->landmark_count = sheet->landmark_count;
+    out->shape.landmark_vertices =
+        copy_block(ctx, sheet->shape.landmark_vertices, (size_t)sheet->landmark_count, sizeof(int32_t));
+    failed = !out->shape.landmark_vertices;
+  }
   if (failed) {
     orb_sheet_free(ctx, out);
     return ORB_E_NO_MEMORY;

@@ -12,6 +12,7 @@ typedef struct orb_sheet {
   int32_t *twin;   /* of each half-edge */
   int32_t *corner; /* of each vertex: one half-edge that leaves it */
   int32_t vertex_capacity, triangle_capacity;
+  int32_t landmark_count; /* of shape.landmark_vertices */
 } orb_sheet;
 
 /* A deep copy of mesh and points, unsplit. */

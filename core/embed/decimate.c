@@ -293,7 +293,7 @@ static orb_status allocate(decimation *d) {
 }
 
 orb_status orb_decimate(orb_context *ctx, orb_hierarchy *h, const unsigned char *keep, int32_t keep_until) {
-  decimation d = {.ctx = ctx, .h = h, .kernels = orb_kernels_best(), .keep = keep, .keep_until = keep_until};
+  decimation d = {.ctx = ctx, .h = h, .kernels = h->kernels, .keep = keep, .keep_until = keep_until};
   double full = log((double)h->surface.vertex_count / 4) + 1e-9;
   orb_status status;
   ORB_GO(status, allocate(&d), done);

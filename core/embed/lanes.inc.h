@@ -1,4 +1,4 @@
-/* Short vectors for the kernels: ORB_LANES doubles (vd) and as many 64-bit masks (vm), twice ORB_LANES floats (wf).
+/* Short vectors for the kernels: ORB_LANES doubles (vd) and as many 64-bit masks (vm), up to 8 floats (wf).
  * Included once by each kernels_*.c, which sets ORB_LANES and is compiled for its instruction set. Plain arithmetic is
  * the compilers' vector extension; what that lacks (square root, choice) is an intrinsic or a loop. */
 #include <math.h>
@@ -9,12 +9,13 @@
 
 #include "embed/kernels.h"
 
-enum { LANES = ORB_LANES, WIDE = 2 * ORB_LANES };
+#define ORB_WIDE (ORB_LANES > 4 ? 8 : 2 * ORB_LANES) /* rings have six vertices or so: 16 floats would idle */
+enum { LANES = ORB_LANES, WIDE = ORB_WIDE };
 
 typedef double vd __attribute__((vector_size(8 * ORB_LANES)));
 typedef int64_t vm __attribute__((vector_size(8 * ORB_LANES)));
-typedef float wf __attribute__((vector_size(8 * ORB_LANES)));
-typedef int32_t wm __attribute__((vector_size(8 * ORB_LANES)));
+typedef float wf __attribute__((vector_size(4 * ORB_WIDE)));
+typedef int32_t wm __attribute__((vector_size(4 * ORB_WIDE)));
 typedef float vf __attribute__((vector_size(4 * ORB_LANES)));
 
 static inline vd vd_set(double x) {
@@ -64,12 +65,6 @@ static inline vd vd_max(vd x, vd y) {
 static inline vd vd_min(vd x, vd y) {
   return (vd)_mm512_min_pd((__m512d)x, (__m512d)y);
 }
-static inline wf wf_sqrt(wf x) {
-  return (wf)_mm512_sqrt_ps((__m512)x);
-}
-static inline wf wf_max(wf x, wf y) {
-  return (wf)_mm512_max_ps((__m512)x, (__m512)y);
-}
 #elif ORB_LANES == 4 && defined(__AVX__)
 static inline vd vd_sqrt(vd x) {
   return (vd)_mm256_sqrt_pd((__m256d)x);
@@ -79,12 +74,6 @@ static inline vd vd_max(vd x, vd y) {
 }
 static inline vd vd_min(vd x, vd y) {
   return (vd)_mm256_min_pd((__m256d)x, (__m256d)y);
-}
-static inline wf wf_sqrt(wf x) {
-  return (wf)_mm256_sqrt_ps((__m256)x);
-}
-static inline wf wf_max(wf x, wf y) {
-  return (wf)_mm256_max_ps((__m256)x, (__m256)y);
 }
 #else
 static inline vd vd_sqrt(vd x) {
@@ -99,6 +88,16 @@ static inline vd vd_max(vd x, vd y) {
 static inline vd vd_min(vd x, vd y) {
   return vd_choose(x < y, x, y);
 }
+#endif
+
+#if ORB_LANES >= 4 && defined(__AVX__)
+static inline wf wf_sqrt(wf x) {
+  return (wf)_mm256_sqrt_ps((__m256)x);
+}
+static inline wf wf_max(wf x, wf y) {
+  return (wf)_mm256_max_ps((__m256)x, (__m256)y);
+}
+#else
 static inline wf wf_sqrt(wf x) {
   for (int i = 0; i < WIDE; i++) {
     x[i] = sqrtf(x[i]);

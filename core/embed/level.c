@@ -9,7 +9,7 @@ static inline int64_t shape_at(int32_t c) {
   return 4 * (int64_t)(c >> 3) + (c & 3);
 }
 
-enum { BINS = ORB_LEVEL_RING_MAX + 1, GRAIN = 1024, UNCOLOURED = -1, SET_ASIDE = -2 };
+enum { BINS = ORB_LEVEL_RING_MAX + 1, MOST_LANES = 8, GRAIN = 1024, UNCOLOURED = -1, SET_ASIDE = -2 };
 
 typedef struct builder {
   orb_context *ctx;
@@ -172,16 +172,19 @@ static void fill_batches(void *arg, int64_t begin, int64_t end, int thread) {
     }
     int32_t *ring = level->ring + level->batch_offset[at] * lanes;
     float *shape = level->shape + 4 * level->batch_offset[at] * lanes;
+    int32_t c[MOST_LANES];
     for (int l = 0; l < lanes; l++) {
-      int32_t c = s->vertex_corner[vertex[l]];
-      for (int32_t i = 0; i < k; i++) {
-        float *to = shape + 4 * (int64_t)i * lanes + l;
-        ring[i * lanes + l] = s->corner[orb_corner_next(c)];
-        to[0] = level->triangle_shape[shape_at(orb_corner_prev(c))];
-        to[lanes] = level->triangle_shape[shape_at(orb_corner_next(c))];
-        to[2 * lanes] = level->triangle_shape[shape_at(c)];
-        to[3 * lanes] = level->triangle_shape[shape_at(c | 3)];
-        c = orb_corner_swing(s, c);
+      c[l] = s->vertex_corner[vertex[l]];
+    }
+    for (int32_t i = 0; i < k; i++) { /* all lanes walk in step, so that their cache misses overlap */
+      float *to = shape + 4 * (int64_t)i * lanes;
+      for (int l = 0; l < lanes; l++) {
+        ring[i * lanes + l] = s->corner[orb_corner_next(c[l])];
+        to[l] = level->triangle_shape[shape_at(orb_corner_prev(c[l]))];
+        to[lanes + l] = level->triangle_shape[shape_at(orb_corner_next(c[l]))];
+        to[2 * lanes + l] = level->triangle_shape[shape_at(c[l])];
+        to[3 * lanes + l] = level->triangle_shape[shape_at(c[l] | 3)];
+        c[l] = orb_corner_swing(s, c[l]);
       }
     }
   }
@@ -220,10 +223,10 @@ static orb_status list_vertices(builder *b, const unsigned char *alive, const un
   return ORB_OK;
 }
 
-orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_surface *surface, const unsigned char *alive,
-                           const unsigned char *pinned, int32_t live, double blend) {
+orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_kernels *kernels, const orb_surface *surface,
+                           const unsigned char *alive, const unsigned char *pinned, int32_t live, double blend) {
   free_batches(ctx, level);
-  level->kernels = orb_kernels_best();
+  level->kernels = kernels;
   builder *b = ORB_NEW0(ctx, builder, 1);
   if (!b) {
     return ORB_E_NO_MEMORY;

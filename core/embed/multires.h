@@ -17,6 +17,7 @@ typedef struct orb_collapse {
 } orb_collapse;
 
 struct orb_hierarchy {
+  const orb_kernels *kernels;
   orb_surface surface;
   orb_collapse *log; /* in the order of decimation */
   int32_t log_count; /* vertex_count − 4 in all */
@@ -27,6 +28,11 @@ struct orb_hierarchy {
   int32_t round_count, round_capacity;
   int32_t base[4]; /* the tetrahedron */
 };
+
+/* orb_hierarchy_create() with kernels of the caller's choice: for tests and measurements. */
+ORB_MUST_CHECK orb_status orb_hierarchy_create_with(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep,
+                                                    int32_t keep_until, const orb_kernels *kernels,
+                                                    orb_hierarchy **out);
 
 /* Decimates a fresh hierarchy to its tetrahedron: decimate.c. */
 ORB_MUST_CHECK orb_status orb_decimate(orb_context *ctx, orb_hierarchy *hierarchy, const unsigned char *keep,
@@ -45,7 +51,7 @@ typedef struct orb_newton_settings {
   int32_t coarse_until; /* levels of fewer vertices get coarse_sweeps */
   int32_t coarse_sweeps, level_sweeps, final_sweeps;
   int32_t most_sweeps; /* on one level, while a sweep lowers the energy by more than the share `converged` */
-  double converged;
+  double converged, converged_last;
   double settled, settled_last; /* a sweep that gains less than this share ends the level */
   double weight;                /* w of the energy */
   double blend;                 /* of coarse triangles' shapes towards equilateral */
@@ -72,6 +78,9 @@ struct orb_refiner {
 
 /* Frees a refiner whose hierarchy is not used again: does not go back to the tetrahedron. NULL is fine. */
 void orb_refiner_abandon(orb_context *ctx, orb_refiner *refiner);
+
+/* The w that holds at the present level. */
+double orb_refiner_weight(const orb_refiner *refiner);
 
 /* Undoes the collapses of one round (or all of it that is left) and places its vertices: place.c. */
 ORB_MUST_CHECK orb_status orb_refiner_undo_round(orb_context *ctx, orb_refiner *refiner, double blend);

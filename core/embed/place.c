@@ -77,7 +77,7 @@ static orb_status place_vertex(orb_context *ctx, orb_refiner *r, int32_t v, doub
   }
   if (*found) {
     orb_star_shape(star, s, v, blend);
-    double energy = orb_star_newton(star, r->settings.weight, p, &before);
+    double energy = orb_star_newton(star, orb_refiner_weight(r), p, &before);
     memcpy(r->point + 4 * (int64_t)v, p, sizeof p);
     r->crowding[v] = (float)(energy / (2 * star->area));
   }
@@ -86,7 +86,11 @@ static orb_status place_vertex(orb_context *ctx, orb_refiner *r, int32_t v, doub
 
 static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
   round_job *job = arg;
+  const orb_surface *s = &job->r->hierarchy->surface;
   for (int64_t i = begin; i < end; i++) {
+    if (i + 4 < end) {
+      __builtin_prefetch(s->corner + job->r->hierarchy->log[job->first + i + 4].first);
+    }
     int found = 0;
     orb_status status =
         place_vertex(job->ctx, job->r, job->r->hierarchy->log[job->first + i].vertex, job->blend, thread, &found);
@@ -113,7 +117,7 @@ orb_status orb_refiner_relax(orb_context *ctx, orb_refiner *r, int32_t v, double
   }
   ORB_TRY(orb_star_walk(ctx, star, &r->hierarchy->surface, v, r->point));
   orb_star_shape(star, &r->hierarchy->surface, v, blend);
-  double before, after = orb_star_newton(star, r->settings.weight, r->point + 4 * (int64_t)v, &before);
+  double before, after = orb_star_newton(star, orb_refiner_weight(r), r->point + 4 * (int64_t)v, &before);
   if (isfinite(before) && before > 0) {
     *gain = (before - after) / before;
     if (crowding) {

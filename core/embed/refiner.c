@@ -11,10 +11,16 @@ enum { SWEEP_GRAIN = 32, QUEUE = 65536 };
 
 orb_status orb_hierarchy_create(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep, int32_t keep_until,
                                 orb_hierarchy **out) {
+  return orb_hierarchy_create_with(ctx, mesh, keep, keep_until, orb_kernels_best(), out);
+}
+
+orb_status orb_hierarchy_create_with(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep,
+                                     int32_t keep_until, const orb_kernels *kernels, orb_hierarchy **out) {
   orb_hierarchy *h = ORB_NEW0(ctx, orb_hierarchy, 1);
   if (!h) {
     return ORB_E_NO_MEMORY;
   }
+  h->kernels = kernels;
   unsigned char *kept = NULL;
   orb_status status;
   ORB_GO(status, orb_surface_create(ctx, mesh, &h->surface), done);
@@ -145,6 +151,12 @@ static double blend_of(const orb_refiner *r) {
   return r->live == r->hierarchy->surface.vertex_count ? r->settings.finest : r->settings.blend;
 }
 
+/* Coarse levels do not follow a w below 1: without the symmetric term they grow some triangles without bound, and the
+ * fine ones cannot mend that. */
+double orb_refiner_weight(const orb_refiner *r) {
+  return r->live == r->hierarchy->surface.vertex_count ? r->settings.weight : fmax(r->settings.weight, 1);
+}
+
 typedef struct sweep_loop {
   const orb_level *level;
   orb_sweep_job job;
@@ -185,7 +197,7 @@ static orb_status sweep_once(orb_context *ctx, orb_refiner *r, double relax, dou
                              .offset = level->batch_offset,
                              .ring = level->ring,
                              .shape = level->shape,
-                             .weight = r->settings.weight,
+                             .weight = orb_refiner_weight(r),
                              .relax = relax,
                              .energy = level->batch_energy,
                              .fall = level->batch_fall,
@@ -213,7 +225,8 @@ static orb_status need_level(orb_context *ctx, orb_refiner *r) {
   if (r->level.valid) {
     return ORB_OK;
   }
-  return orb_level_build(ctx, &r->level, &r->hierarchy->surface, r->alive, r->pinned, r->live, blend_of(r));
+  return orb_level_build(ctx, &r->level, r->hierarchy->kernels, &r->hierarchy->surface, r->alive, r->pinned, r->live,
+                         blend_of(r));
 }
 
 static const double OVER_RELAXATION = 1.9;
@@ -247,7 +260,7 @@ static orb_status settle_level(orb_context *ctx, orb_refiner *r) {
     if (i > 1 && fall < (last ? set->settled_last : set->settled) * energy) {
       break;
     }
-    if (i == sweeps - 1 && fall > set->converged * energy && sweeps < set->most_sweeps) {
+    if (i == sweeps - 1 && fall > (last ? set->converged_last : set->converged) * energy && sweeps < set->most_sweeps) {
       sweeps++;
     }
   }

@@ -133,6 +133,21 @@ static orb_status make_colors(orb_context *ctx, orb_draft *draft) {
   return ORB_OK;
 }
 
+/* Texture coordinates and the materials' islands, where the first shape has such. */
+static orb_status make_textures(orb_context *ctx, orb_draft *draft) {
+  const orb_mesh *mesh = &draft->shapes[0].mesh;
+  if (!mesh->texcoords && !(mesh->material && mesh->material_count > 1)) {
+    return ORB_OK;
+  }
+  draft->home = ORB_NEW(ctx, int32_t, draft->supermesh->triangle_count);
+  if (!draft->home) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(orb_home_triangles(ctx, draft->supermesh, &draft->shapes[0], 0, draft->home));
+  return mesh->texcoords ? orb_wedge_texcoords(ctx, draft->supermesh, &draft->shapes[0], draft->home, &draft->texcoords)
+                         : ORB_OK;
+}
+
 static orb_status round_frames(orb_context *ctx, orb_draft *draft) {
   const orb_supermesh *supermesh = draft->supermesh;
   unsigned char *keep = ORB_NEW0(ctx, unsigned char, supermesh->vertex_count);
@@ -161,10 +176,15 @@ orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh, con
                      .shape_count = supermesh->shape_count,
                      .frame_count = supermesh->shape_count};
   orb_status status;
+  if (options->path == ORB_PATH_RIGID) {
+    draft.frame_count += options->path_steps * (supermesh->shape_count - 1);
+  }
   orb_progress(ctx, "write", 0);
   ORB_GO(status, draft_room(ctx, &draft), done);
   ORB_GO(status, make_shapes(ctx, &draft), done);
   ORB_GO(status, make_colors(ctx, &draft), done);
+  ORB_GO(status, make_textures(ctx, &draft), done);
+  ORB_GO(status, orb_draft_path(ctx, &draft), done);
   ORB_GO(status, round_frames(ctx, &draft), done);
   ORB_GO(status, orb_draft_split(ctx, &draft), done);
   ORB_GO(status, orb_draft_write(ctx, &draft, names, facts ? facts : &unused, out), done);

@@ -42,11 +42,13 @@ typedef struct orb_draft {
 ORB_MUST_CHECK orb_status orb_home_triangles(orb_context *ctx, const orb_supermesh *supermesh,
                                              const orb_aligned_shape *shape, int32_t s, int32_t *out);
 
-/* Texture coordinates of shape s. No supermesh triangle straddles a seam: a corner beyond one gets the coordinates of
+/* Texture coordinates of a shape. No supermesh triangle straddles a seam: a corner beyond one gets the coordinates of
  * the point where the straight way from the triangle's centre meets the seam. */
 ORB_MUST_CHECK orb_status orb_wedge_texcoords(orb_context *ctx, const orb_supermesh *supermesh,
-                                              const orb_aligned_shape *shape, int32_t s, const int32_t *home,
-                                              orb_wedges *out);
+                                              const orb_aligned_shape *shape, const int32_t *home, orb_wedges *out);
+
+/* Fills the frames after the shapes: positions, normals, colours. */
+ORB_MUST_CHECK orb_status orb_draft_path(orb_context *ctx, orb_draft *draft);
 
 /* Fills draft->parts. Triangles and vertices are put in an order that suits the graphics processor's caches. */
 ORB_MUST_CHECK orb_status orb_draft_split(orb_context *ctx, orb_draft *draft);

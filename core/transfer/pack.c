@@ -237,9 +237,12 @@ static orb_status add_materials(packer *pack, orb_gltf_scene *scene, orb_materia
 }
 
 /* What mesh.extras says beside targetNames. */
-static int32_t make_extras(const orb_asset_facts *facts, orb_gltf_extra extras[3]) {
+static int32_t make_extras(const orb_asset_facts *facts, const orb_draft *draft, orb_gltf_extra extras[4]) {
   int32_t count = 0;
   extras[count++] = (orb_gltf_extra){"morphedAttributes", NULL, facts->morphed_attributes};
+  if (draft->frame_count > draft->shape_count) {
+    extras[count++] = (orb_gltf_extra){"inBetweens", NULL, draft->options->path_steps};
+  }
   if (facts->nudged_vertices > 0) {
     extras[count++] = (orb_gltf_extra){"nudgedVertices", NULL, facts->nudged_vertices};
   }
@@ -274,8 +277,8 @@ static orb_status write_scene(packer *pack, orb_gltf_scene *scene, orb_gltf_prim
   }
   scene->accessors = pack->accessors;
   scene->accessor_count = pack->accessor_count;
-  orb_gltf_extra extras[3];
-  scene->extra_count = make_extras(facts, extras);
+  orb_gltf_extra extras[4];
+  scene->extra_count = make_extras(facts, draft, extras);
   scene->extras = extras;
   return orb_gltf_write(pack->ctx, scene, &pack->binary, out);
 }

@@ -21,17 +21,15 @@ static void add_stream(stream_list *list, const orb_wedges *wedges) {
 
 static orb_status collect_streams(orb_context *ctx, const orb_draft *draft, stream_list *list) {
   list->count = 0;
-  list->of_corner = ORB_NEW(ctx, const int32_t *, draft->frame_count + draft->shape_count + 1);
+  list->of_corner = ORB_NEW(ctx, const int32_t *, 2 * (int64_t)draft->frame_count + 1);
   if (!list->of_corner) {
     return ORB_E_NO_MEMORY;
   }
   for (int32_t f = 0; draft->normals && f < draft->frame_count; f++) {
     add_stream(list, &draft->normals[f]);
   }
-  for (int32_t s = 0; s < draft->shape_count; s++) {
-    if (s < draft->color_count) {
-      add_stream(list, &draft->colors[s]);
-    }
+  for (int32_t f = 0; f < draft->color_count; f++) {
+    add_stream(list, &draft->colors[f]);
   }
   add_stream(list, &draft->texcoords);
   return ORB_OK;

@@ -201,40 +201,70 @@ static void centroid(const orb_supermesh *supermesh, int64_t triangle, double ou
   orb_normalize(out);
 }
 
-/* Gives a corner its value: that of its vertex, or a new one if it differs. A vertex's earlier values are searched
- * along the chain `next` so that corners on one side of a seam share a value. */
-static orb_status add_corner(orb_context *ctx, wedge_job *job, int64_t corner, const float *value, int32_t *capacity,
-                             int32_t **next) {
-  orb_wedges *out = job->out;
-  int32_t v = job->supermesh->triangles[corner], last = v;
-  for (int32_t i = v; i >= 0; i = (*next)[i]) {
-    if (memcmp(out->values + (int64_t)job->width * i, value, (size_t)job->width * sizeof *value) == 0) {
+orb_status orb_wedge_chain_begin(orb_context *ctx, int32_t vertex_count, orb_wedge_chain *chain) {
+  chain->capacity = vertex_count;
+  chain->next = ORB_NEW(ctx, int32_t, vertex_count);
+  if (!chain->next) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t v = 0; v < vertex_count; v++) {
+    chain->next[v] = -2;
+  }
+  return ORB_OK;
+}
+
+static int close_values(const float *a, const float *b, int32_t width, float tolerance) {
+  for (int32_t c = 0; c < width; c++) {
+    if (!(fabsf(a[c] - b[c]) <= tolerance)) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+static orb_status grow_values(orb_context *ctx, orb_wedges *out, orb_wedge_chain *chain) {
+  int64_t wanted = (int64_t)chain->capacity + chain->capacity / 2 + 64;
+  if (wanted > INT32_MAX) {
+    return orb_fail(ctx, ORB_E_TOO_LARGE, "The supermesh has too many corners; ask for fewer triangles.");
+  }
+  float *values = orb_realloc(ctx, out->values, (size_t)wanted, (size_t)out->width * sizeof *values);
+  if (!values) {
+    return ORB_E_NO_MEMORY;
+  }
+  out->values = values;
+  int32_t *next = orb_realloc(ctx, chain->next, (size_t)wanted, sizeof *next);
+  if (!next) {
+    return ORB_E_NO_MEMORY;
+  }
+  chain->next = next;
+  chain->capacity = (int32_t)wanted;
+  return ORB_OK;
+}
+
+orb_status orb_wedges_set(orb_context *ctx, orb_wedges *out, int32_t vertex, int64_t corner, const float *value,
+                          float tolerance, orb_wedge_chain *chain) {
+  size_t size = (size_t)out->width * sizeof *value;
+  int32_t last = vertex;
+  if (chain->next[vertex] == -2) {
+    chain->next[vertex] = -1;
+    memcpy(out->values + (int64_t)out->width * vertex, value, size);
+    out->of_corner[corner] = vertex;
+    return ORB_OK;
+  }
+  for (int32_t i = vertex; i >= 0; i = chain->next[i]) {
+    if (close_values(out->values + (int64_t)out->width * i, value, out->width, tolerance)) {
       out->of_corner[corner] = i;
       return ORB_OK;
     }
     last = i;
   }
-  if (out->value_count == *capacity) {
-    int64_t wanted = (int64_t)*capacity + *capacity / 2 + 64;
-    if (wanted > INT32_MAX) {
-      return orb_fail(ctx, ORB_E_TOO_LARGE, "The supermesh has too many corners; ask for fewer triangles.");
-    }
-    float *values = orb_realloc(ctx, out->values, (size_t)wanted, (size_t)job->width * sizeof *values);
-    if (!values) {
-      return ORB_E_NO_MEMORY;
-    }
-    out->values = values;
-    int32_t *grown = orb_realloc(ctx, *next, (size_t)wanted, sizeof *grown);
-    if (!grown) {
-      return ORB_E_NO_MEMORY;
-    }
-    *next = grown;
-    *capacity = (int32_t)wanted;
+  if (out->value_count == chain->capacity) {
+    ORB_TRY(grow_values(ctx, out, chain));
   }
   int32_t made = out->value_count++;
-  memcpy(out->values + (int64_t)job->width * made, value, (size_t)job->width * sizeof *value);
-  (*next)[made] = -1;
-  (*next)[last] = made;
+  memcpy(out->values + (int64_t)out->width * made, value, size);
+  chain->next[made] = -1;
+  chain->next[last] = made;
   out->of_corner[corner] = made;
   return ORB_OK;
 }
@@ -242,19 +272,16 @@ static orb_status add_corner(orb_context *ctx, wedge_job *job, int64_t corner, c
 /* The corners, after the vertices: serial, in the order of corners, for only few vertices lie on seams. */
 static orb_status split_corners(orb_context *ctx, wedge_job *job) {
   const orb_supermesh *supermesh = job->supermesh;
-  int32_t capacity = supermesh->vertex_count;
-  orb_status status = ORB_OK;
-  int32_t *next = ORB_NEW(ctx, int32_t, capacity);
+  orb_wedge_chain chain = {0};
+  orb_status status;
   job->out->of_corner = ORB_NEW(ctx, int32_t, 3 * (int64_t)supermesh->triangle_count);
-  if (!next || !job->out->of_corner) {
-    status = ORB_E_NO_MEMORY;
-    goto done;
+  if (!job->out->of_corner) {
+    return ORB_E_NO_MEMORY;
   }
-  memset(next, -1, (size_t)capacity * sizeof *next);
-  unsigned char *given = job->seamed; /* 1: seamed, 2: its first value has been set */
+  ORB_GO(status, orb_wedge_chain_begin(ctx, supermesh->vertex_count, &chain), done);
   for (int64_t h = 0; h < 3 * (int64_t)supermesh->triangle_count; h++) {
     int32_t v = supermesh->triangles[h];
-    if (!given[v]) {
+    if (!job->seamed[v]) {
       job->out->of_corner[h] = v;
       continue;
     }
@@ -262,17 +289,13 @@ static orb_status split_corners(orb_context *ctx, wedge_job *job) {
     float value[MAX_WIDTH];
     centroid(supermesh, h / 3, m);
     corner_value(job, &job->places[v], m, value);
-    if (given[v] == 1) {
-      memcpy(job->out->values + (int64_t)job->width * v, value, (size_t)job->width * sizeof *value);
-      given[v] = 2;
-    }
-    ORB_GO(status, add_corner(ctx, job, h, value, &capacity, &next), done);
+    ORB_GO(status, orb_wedges_set(ctx, job->out, v, h, value, 1e-6f, &chain), done);
     if (h % 65536 == 0) {
       ORB_GO(status, orb_context_check(ctx), done);
     }
   }
 done:
-  orb_free(ctx, next);
+  orb_free(ctx, chain.next);
   return status;
 }
 

@@ -30,6 +30,16 @@ ORB_MUST_CHECK orb_status orb_wedge_normals(orb_context *ctx, const orb_supermes
                                             const orb_aligned_shape *shape, int32_t s, orb_wedges *out);
 ORB_MUST_CHECK orb_status orb_wedge_colors(orb_context *ctx, const orb_supermesh *supermesh,
                                            const orb_aligned_shape *shape, int32_t s, orb_wedges *out);
+/* Sets corners one after another: a corner gets the value of an earlier corner at its vertex that is within tolerance,
+ * else a new one. Zero-initialise `chain` and free its `next`; out->values has room for value_count = vertex_count. */
+typedef struct orb_wedge_chain {
+  int32_t capacity;
+  int32_t *next; /* a value: the next one of its vertex, −1 none; of a vertex without a value yet −2 */
+} orb_wedge_chain;
+ORB_MUST_CHECK orb_status orb_wedges_set(orb_context *ctx, orb_wedges *out, int32_t vertex, int64_t corner,
+                                         const float *value, float tolerance, orb_wedge_chain *chain);
+ORB_MUST_CHECK orb_status orb_wedge_chain_begin(orb_context *ctx, int32_t vertex_count, orb_wedge_chain *chain);
+
 void orb_wedges_free(orb_context *ctx, orb_wedges *wedges);
 
 #endif

@@ -2,7 +2,7 @@
 _orbmorph() {
   local current="${COMP_WORDS[COMP_CWORD]}" previous="${COMP_WORDS[COMP_CWORD-1]}" words="" operands="" choices=""
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "morph upload embed merge job ls get rm doctor completions --help --version" -- "$current"))
+    COMPREPLY=($(compgen -W "morph upload embed merge job ls get rm doctor view completions --help --version" -- "$current"))
     return
   fi
   case "$previous" in
@@ -17,6 +17,7 @@ _orbmorph() {
     --preset) choices="fast default quality" ;;
     --state) choices="queued running succeeded failed cancelled" ;;
     --part) choices="file asset sphere" ;;
+    --up) choices="y z" ;;
   esac
   if [ -n "$choices" ]; then
     COMPREPLY=($(compgen -W "$choices" -- "$current"))
@@ -50,6 +51,9 @@ _orbmorph() {
       ;;
     doctor)
       words="--server --json --quiet --help "
+      ;;
+    view)
+      words="--help --output --poses --size --up --yaw --pitch --wire "
       ;;
     completions)
       words="--help "

@@ -57,9 +57,9 @@ static const orb_primitive dog_primitives[] = {
     CONE(0.06, -0.54, 0.46, -0.17, 0.105, -0.74, 0.27, -0.17, 0.066),
     CONE(0.05, -0.74, 0.27, -0.17, 0.066, -0.72, 0.09, -0.17, 0.064),
     CONE(0.05, -0.71, 0.075, -0.17, 0.078, -0.61, 0.065, -0.17, 0.070),
-    PART(0.08, -0.66, 0.88, 0.00, 0.075, -0.88, 1.04, 0.02, 0.060), /* tail */
-    CONE(0.06, -0.88, 1.04, 0.02, 0.060, -0.98, 1.24, 0.05, 0.054),
-    CONE(0.06, -0.98, 1.24, 0.05, 0.054, -0.93, 1.42, 0.08, 0.038),
+    PART(0.08, -0.64, 0.86, 0.00, 0.080, -0.90, 0.95, 0.02, 0.062), /* tail */
+    CONE(0.06, -0.90, 0.95, 0.02, 0.062, -1.10, 1.05, 0.05, 0.054),
+    CONE(0.06, -1.10, 1.05, 0.05, 0.054, -1.22, 1.22, 0.08, 0.038),
 };
 
 static const orb_feature dog_features[] = {
@@ -81,7 +81,9 @@ static const orb_feature dog_features[] = {
     {"right hock", {-0.54, 0.25, 0.17}, {-1, 0, 0}},
     {"left hock", {-0.74, 0.27, -0.17}, {-1, 0, 0}},
     {"tail root", {-0.66, 0.84, 0}, {-1, -0.5, 0}},
-    {"tail tip", {-0.94, 1.38, 0.07}, {0.28, 1, 0.16}},
+    {"tail, above", {-0.90, 0.95, 0.02}, {-0.33, 1, 0}},
+    {"tail, below", {-0.90, 0.95, 0.02}, {0.33, -1, 0}},
+    {"tail tip", {-1.21, 1.205, 0.078}, {-0.7, 1, 0.17}},
 };
 
 static const orb_primitive giraffe_primitives[] = {
@@ -115,9 +117,9 @@ static const orb_primitive giraffe_primitives[] = {
     CONE(0.05, -0.24, 0.80, -0.15, 0.090, -0.34, 0.52, -0.15, 0.062),
     CONE(0.05, -0.34, 0.52, -0.15, 0.062, -0.28, 0.11, -0.15, 0.056),
     CONE(0.04, -0.27, 0.10, -0.15, 0.074, -0.22, 0.06, -0.15, 0.073),
-    PART(0.06, -0.60, 1.38, 0.00, 0.060, -0.76, 1.24, 0.01, 0.044), /* tail with a tuft */
-    CONE(0.05, -0.76, 1.24, 0.01, 0.044, -0.80, 0.94, 0.03, 0.038),
-    CONE(0.05, -0.80, 0.92, 0.03, 0.048, -0.81, 0.80, 0.04, 0.058),
+    PART(0.06, -0.58, 1.38, 0.00, 0.062, -0.78, 1.31, 0.01, 0.047), /* tail with a tuft */
+    CONE(0.05, -0.78, 1.31, 0.01, 0.047, -0.92, 1.04, 0.03, 0.040),
+    CONE(0.05, -0.925, 1.02, 0.03, 0.048, -0.96, 0.89, 0.04, 0.058),
 };
 
 static const orb_feature giraffe_features[] = {
@@ -139,7 +141,9 @@ static const orb_feature giraffe_features[] = {
     {"right hock", {-0.52, 0.52, 0.15}, {-1, 0, 0}},
     {"left hock", {-0.34, 0.52, -0.15}, {-1, 0, 0}},
     {"tail root", {-0.58, 1.32, 0}, {-1, -0.6, 0}},
-    {"tail tip", {-0.81, 0.82, 0.04}, {-0.05, -1, 0.05}},
+    {"tail, above", {-0.78, 1.31, 0.01}, {-0.55, 1, 0}},
+    {"tail, below", {-0.78, 1.31, 0.01}, {0.55, -0.8, 0}},
+    {"tail tip", {-0.957, 0.90, 0.04}, {-0.25, -1, 0.05}},
 };
 
 static const orb_primitive elephant_primitives[] = {
@@ -171,9 +175,9 @@ static const orb_primitive elephant_primitives[] = {
     PART(0.12, -0.56, 0.92, -0.22, 0.250, -0.48, 0.42, -0.25, 0.165), /* left hind leg, a step ahead */
     CONE(0.08, -0.48, 0.42, -0.25, 0.165, -0.46, 0.16, -0.25, 0.160),
     CONE(0.05, -0.44, 0.15, -0.25, 0.150, -0.40, 0.14, -0.25, 0.140),
-    PART(0.06, -0.90, 1.24, 0.00, 0.070, -1.06, 1.02, 0.02, 0.052), /* tail with a tuft */
-    CONE(0.05, -1.06, 1.02, 0.02, 0.052, -1.10, 0.74, 0.04, 0.044),
-    CONE(0.05, -1.10, 0.72, 0.04, 0.052, -1.11, 0.62, 0.04, 0.062),
+    PART(0.06, -0.88, 1.26, 0.00, 0.072, -1.10, 1.16, 0.02, 0.056), /* tail with a tuft */
+    CONE(0.05, -1.10, 1.16, 0.02, 0.056, -1.26, 0.90, 0.04, 0.047),
+    CONE(0.05, -1.265, 0.88, 0.04, 0.052, -1.29, 0.76, 0.04, 0.062),
 };
 
 static const orb_feature elephant_features[] = {
@@ -195,7 +199,9 @@ static const orb_feature elephant_features[] = {
     {"right hock", {-0.64, 0.36, 0.25}, {-1, 0, 0}},
     {"left hock", {-0.48, 0.36, -0.25}, {-1, 0, 0}},
     {"tail root", {-0.86, 1.18, 0}, {-1, -0.5, 0}},
-    {"tail tip", {-1.11, 0.64, 0.04}, {-0.05, -1, 0.02}},
+    {"tail, above", {-1.10, 1.16, 0.02}, {-0.55, 1, 0}},
+    {"tail, below", {-1.10, 1.16, 0.02}, {0.55, -0.8, 0}},
+    {"tail tip", {-1.288, 0.77, 0.04}, {-0.2, -1, 0.02}},
 };
 
 const orb_animal sample_dog = {"dog",
@@ -203,11 +209,11 @@ const orb_animal sample_dog = {"dog",
                                COUNT(dog_primitives),
                                dog_features,
                                COUNT(dog_features),
-                               {-1.15, -0.10, -0.45},
+                               {-1.40, -0.10, -0.45},
                                {1.35, 1.90, 0.45}};
 const orb_animal sample_giraffe = {"giraffe",         giraffe_primitives,      COUNT(giraffe_primitives),
-                                   giraffe_features,  COUNT(giraffe_features), {-0.95, -0.10, -0.45},
+                                   giraffe_features,  COUNT(giraffe_features), {-1.15, -0.10, -0.45},
                                    {1.45, 3.20, 0.45}};
 const orb_animal sample_elephant = {"elephant",        elephant_primitives,      COUNT(elephant_primitives),
-                                    elephant_features, COUNT(elephant_features), {-1.30, -0.10, -0.95},
+                                    elephant_features, COUNT(elephant_features), {-1.50, -0.10, -0.95},
                                     {2.00, 1.95, 0.95}};

@@ -139,6 +139,19 @@ static int faulty(const made *m) {
   return fault != NULL;
 }
 
+/* All files of the three animals: the dog, the giraffe, the elephant. */
+static int emit_all(const char *folder, int check, const made m[3]) {
+  made dog_elephant[2] = {m[0], m[2]};
+  int failed = 0;
+  failed |= emit(folder, "dog.obj", check, print_obj, &m[0], 1);
+  failed |= emit(folder, "giraffe.off", check, print_off, &m[1], 1);
+  failed |= emit(folder, "elephant.ply", check, print_ply, &m[2], 1);
+  failed |= emit(folder, "dog-giraffe.json", check, print_landmarks, m, 2);
+  failed |= emit(folder, "dog-elephant.json", check, print_landmarks, dog_elephant, 2);
+  failed |= emit(folder, "dog-giraffe-elephant.json", check, print_landmarks, m, 3);
+  return failed;
+}
+
 int main(int argc, char **argv) {
   int check = argc == 3 && !strcmp(argv[1], "--check");
   if (argc != 2 + check) {
@@ -151,7 +164,7 @@ int main(int argc, char **argv) {
   sample_smooth(m[0].animal, &m[0].mesh, 8);
   sample_decimate(m[0].animal, &m[0].mesh, 1, 5600);
   sample_smooth(m[0].animal, &m[0].mesh, 3);
-  sample_surface_nets(m[1].animal, 0.039, &m[1].mesh);
+  sample_surface_nets(m[1].animal, 0.0395, &m[1].mesh);
   sample_smooth(m[1].animal, &m[1].mesh, 2);
   sample_decimate(m[1].animal, &m[1].mesh, 3, 6000);
   sample_marching_tetrahedra(m[2].animal, 0.050, &m[2].mesh);
@@ -161,13 +174,8 @@ int main(int argc, char **argv) {
   int failed = 0;
   for (int i = 0; i < 3; i++)
     failed |= faulty(&m[i]);
-  made dog_elephant[2] = {m[0], m[2]};
-  failed |= emit(folder, "dog.obj", check, print_obj, &m[0], 1);
-  failed |= emit(folder, "giraffe.off", check, print_off, &m[1], 1);
-  failed |= emit(folder, "elephant.ply", check, print_ply, &m[2], 1);
-  failed |= emit(folder, "dog-giraffe.json", check, print_landmarks, m, 2);
-  failed |= emit(folder, "dog-elephant.json", check, print_landmarks, dog_elephant, 2);
-  failed |= emit(folder, "dog-giraffe-elephant.json", check, print_landmarks, m, 3);
+  if (!failed)
+    failed = emit_all(folder, check, m);
   for (int i = 0; i < 3; i++) {
     if (!check)
       printf("%s: %d vertices, %d triangles\n", m[i].animal->name, m[i].mesh.vertex_count, m[i].mesh.triangle_count);

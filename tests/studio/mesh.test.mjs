@@ -212,3 +212,11 @@ test('the way through the shapes follows the keyframes', () => {
   assert.deepEqual(mesh.weightsAt(path, 1), [0, 1]);
   assert.deepEqual(mesh.weightsAt({ times: Float32Array.of(0), weights: [new Float32Array(0)] }, 0.3), []);
 });
+
+test('in-betweens of a curved path are passed on the way, rests are not', () => {
+  const [zero, b, c, p, q] = [[0, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]].map((w) => Float32Array.from(w));
+  const path = mesh.pathOf([zero, zero, p, b, b, q, c, c, q, b], [zero, b, c]);
+  assert.deepEqual([...path.times], [0, 0.25, 0.5, 0.75, 1]);
+  assert.deepEqual(path.weights, [zero, p, b, q, c]);
+  assert.deepEqual([...mesh.pathOf([], [zero, b, c]).times], [0, 0.5, 1]);
+});

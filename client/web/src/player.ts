@@ -76,9 +76,8 @@ class Player {
     this.pause();
     const sum = shares.reduce((s, x) => s + x, 0);
     const part = sum > 0 ? shares.map((x) => x / sum) : shares.map((_, i) => (i ? 0 : 1));
-    const steps = (result.data.shapes.length - 1) / this.legs;
-    const weights = new Array<number>(result.data.shapes.length - 1).fill(0);
-    part.forEach((x, i) => result.data.shapes[Math.round(i * steps)]?.forEach((w, k) => (weights[k] += x * w)));
+    const weights = new Array<number>(result.data.names.length).fill(0);
+    part.forEach((x, i) => result.data.shapes[i]?.forEach((w, k) => (weights[k] += x * w)));
     this.weigh(weights);
     const color = new Color(0);
     part.forEach((x, i) => color.add(new Color(tint(i)).multiplyScalar(x)));

@@ -19,20 +19,27 @@ typedef struct orb_merge_timings {
   double align, remesh, transfer, write, total; /* seconds */
 } orb_merge_timings;
 
-/* Distortion of the composed map from shape a to shape b, on the supermesh's triangles. */
+/* Distortion of the composed map from shape a to shape b, on the supermesh's triangles: a < b, all pairs up to four
+ * shapes, else neighbours in their order. */
 typedef struct orb_pair_report {
   int32_t a, b;
   orb_distortion distortion;
-  double inverted_fraction; /* triangles whose image turns against the surface's normal in space */
+  /* Share of the triangles that are turned in space, at either end, against the input surface under them. Those of no
+   * area to speak of (1e-12 of the squared diagonal) do not count. */
+  double inverted_fraction;
 } orb_pair_report;
 
 typedef struct orb_merge_result {
   orb_alignment alignment;
   orb_supermesh supermesh;
-  orb_shape_report *shapes;   /* shape_count */
-  double *landmark_residuals; /* landmark_count × shape_count, lengths in units of each shape's diagonal */
+  orb_shape_report *shapes; /* shape_count */
+  /* landmark_count × shape_count: from the place asked for (or found, auto) to the landmark's supermesh vertex, in
+   * units of each shape's diagonal. A landmark without a vertex: to where the supermesh has the sphere's point. NaN
+   * where the method keeps no vertex. */
+  double *landmark_residuals;
   int32_t pair_count;
   orb_pair_report *pairs;
+  orb_asset_facts asset_facts;
   orb_buffer asset;
   orb_merge_timings timings;
 } orb_merge_result;

@@ -14,13 +14,15 @@ ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const orb_ali
 
 /* How well shape s is reproduced; lengths in its own units. */
 typedef struct orb_shape_report {
-  double hausdorff;         /* proved bound both ways, NaN where none is proved */
-  double hausdorff_sampled; /* two-sided, vertices, edge midpoints and face samples */
-  double rms;
+  double hausdorff;               /* proved bound both ways, NaN where none is proved */
+  double hausdorff_sampled;       /* two-sided, vertices, edge midpoints and face samples */
+  double rms;                     /* of the distance over both surfaces, each weighing the same */
   double normal_mean, normal_p99; /* degrees between the surfaces' normals at matching points */
   double diagonal;
-  double min_area_ratio;
+  double min_area_ratio; /* the smallest supermesh triangle on this shape over the mean one */
 } orb_shape_report;
+/* Sampled both ways, in parallel, the same result for any number of threads. hausdorff is the supermesh's error bound.
+ * O(F log F) for F triangles of both surfaces. */
 ORB_MUST_CHECK orb_status orb_shape_measure(orb_context *ctx, const orb_aligned_shape *shape,
                                             const orb_supermesh *supermesh, int32_t shape_index, orb_shape_report *out);
 

@@ -89,7 +89,7 @@ export async function openResult(supermesh: Supermesh, request: SupermeshRequest
   set({ loading: 'Fetching the morph' });
   try {
     const buffer = await client.asset(supermesh.id);
-    const data = await work('morph', supermesh.id, buffer);
+    const data = await work('morph', supermesh.id, buffer, supermesh.shapes.length);
     clearResult();
     const models = morphModels(data, supermesh.shapes.length + 1, tint(0));
     const result: Result = {
@@ -97,7 +97,7 @@ export async function openResult(supermesh: Supermesh, request: SupermeshRequest
       data: { times: data.times, weights: data.weights, shapes: data.shapes, names: data.names, vertices: data.vertices, triangles: data.triangles },
     };
     result.each.forEach((model, i) => {
-      model.weights(result.data.shapes[shapeTarget(result, i)] ?? []);
+      model.weights(result.data.shapes[i] ?? []);
       model.color(tint(i));
     });
     set({ result, mix: null });
@@ -105,12 +105,6 @@ export async function openResult(supermesh: Supermesh, request: SupermeshRequest
   } finally {
     set({ loading: null });
   }
-}
-
-/** Which of the morph's states is shape `index`: in-between targets of a curved path lie between them. */
-export function shapeTarget({ data, supermesh }: Pick<Result, 'data' | 'supermesh'>, index: number): number {
-  const steps = (data.shapes.length - 1) / Math.max(supermesh.shapes.length - 1, 1);
-  return Math.round(index * steps);
 }
 
 /** `stale`: the landmarks have changed, so the result no longer is what "Morph" would give; it stays in view. */
@@ -136,7 +130,7 @@ export async function measureErrors() {
     if (shape.error?.result === result.supermesh.id || shape.mesh?.id !== result.supermesh.shapes[index]?.mesh) continue;
     set({ loading: `Measuring the error on ${shape.name}` });
     try {
-      const found = await work('error', shape.key, result.supermesh.id, shapeTarget(result, index));
+      const found = await work('error', shape.key, result.supermesh.id, index);
       const model = shape.model!.twin();
       model.attribute('value', found.values);
       model.paint({ kind: 'value', ramp: 'heat', low: 0, high: Math.max(found.max, 1e-9) });

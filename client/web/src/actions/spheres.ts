@@ -3,6 +3,7 @@ import { client, readyShapes, set, state, type Shape, type SpherePaint } from '.
 import { work } from '../mesh/work';
 import { MEASURES, type MeasureName } from '../mesh/distortion';
 import { sphereModels } from '../view/models';
+import { stage } from '../view/shared';
 import type { Paint } from '../view/materials';
 
 export async function loadSpheres() {
@@ -53,6 +54,7 @@ function paintSphere(shape: Shape) {
     if (isMeasure(paint)) model.attribute('value', sphere.values![paint]);
     else model.attribute('tone', paint === 'direction' ? sphere.normals! : sphere.places!);
     model.paint(with_);
+    stage.prepare(model.group);
   }
 }
 

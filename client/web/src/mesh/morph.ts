@@ -12,7 +12,7 @@ export interface MorphData {
   index: Uint32Array;
   edges: Uint32Array;
   targets: { position: Float32Array; normal: Float32Array }[];
-  /** keyframes of the way there (not back): for each time in 0..1 the weights of the targets */
+  /** the way there (not back): for each time in 0..1 the weights of the targets */
   times: Float32Array;
   weights: Float32Array[];
   /** for each shape, the weights that show it alone */
@@ -33,8 +33,8 @@ function joined(arrays: Float32Array[]): Float32Array {
   return out;
 }
 
-/** `targetNames` of in-between targets of a curved path are told by the animation, which gives shapes whole times. */
-export function decodeMorph(buffer: ArrayBuffer): MorphData {
+/** Targets 0 … shapeCount − 2 are the further shapes; more of them are in-betweens of a curved path. */
+export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData {
   const gltf = readGlb(buffer);
   const parts = gltf.triangles().filter((part, _, all) => part.mesh === all[0].mesh);
   if (!parts.length) throw new Error('The asset has no triangles.');
@@ -63,8 +63,8 @@ export function decodeMorph(buffer: ArrayBuffer): MorphData {
     return { position: delta, normal: turned };
   });
 
-  const path = animationPath(gltf, targetCount);
-  const shapes = [new Float32Array(targetCount), ...path.alone];
+  const shapes = Array.from({ length: Math.min(shapeCount, targetCount + 1) }, (_, i) => single(i - 1, targetCount));
+  const path = animationPath(gltf, targetCount, shapes);
   const names = targetNames(gltf, parts[0].mesh, targetCount);
   const frame = fit(position, targets, shapes);
   for (let i = 0; i < position.length; i++) position[i] = (position[i] - frame.center[i % 3]) / frame.radius;
@@ -108,34 +108,51 @@ function fit(position: Float32Array, targets: MorphData['targets'], shapes: Floa
   return { center: [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2], radius: d / 2 || 1 };
 }
 
+const single = (k: number, count: number) => Float32Array.from({ length: count }, (_, i) => (i === k ? 1 : 0));
+const equal = (a: Float32Array, b: Float32Array) => a.every((x, i) => Math.abs(x - b[i]) < 1e-6);
+
 /**
- * The weights along the way from the first to the last shape. Taken from the animation up to the keyframe where the
- * last target stands alone; without an animation every target is a shape.
+ * The weights along the way from the first to the last shape, each shape at its even share of the time. In-betweens
+ * are taken from the animation's keyframes; where it rests at a shape is left out. Without an animation the way is
+ * straight.
  */
-function animationPath(gltf: ReturnType<typeof readGlb>, count: number) {
-  const unit = (k: number) => Float32Array.from({ length: count }, (_, i) => (i === k ? 1 : 0));
+export function pathOf(frames: Float32Array[], shapes: Float32Array[]): { times: Float32Array; weights: Float32Array[] } {
+  const legs = Math.max(shapes.length - 1, 1);
+  const straight = { times: Float32Array.from(shapes, (_, i) => i / legs), weights: shapes };
+  const times: number[] = [];
+  const weights: Float32Array[] = [];
+  let shape = 0;
+  let between: Float32Array[] = [];
+  for (const frame of frames) {
+    if (equal(frame, shapes[shape])) {
+      between.forEach((w, k) => {
+        times.push((shape - 1 + (k + 1) / (between.length + 1)) / legs);
+        weights.push(w);
+      });
+      between = [];
+      times.push(shape / legs);
+      weights.push(frame);
+      if (++shape === shapes.length) return { times: Float32Array.from(times), weights };
+    } else if (shape > 0 && !equal(frame, shapes[shape - 1])) between.push(frame);
+  }
+  return straight;
+}
+
+function animationPath(gltf: ReturnType<typeof readGlb>, count: number, shapes: Float32Array[]) {
   for (const animation of gltf.json.animations ?? []) {
     const channel = animation.channels.find((c) => c.target.path === 'weights');
     if (!channel || !count) continue;
     const sampler = animation.samplers[channel.sampler];
-    const input = gltf.floats(sampler.input);
     const output = gltf.floats(sampler.output);
     const step = sampler.interpolation === 'CUBICSPLINE' ? 3 : 1;
-    const frames = Array.from(input, (_, i) => {
+    const keys = Math.floor(output.length / (count * step));
+    const frames = Array.from({ length: keys }, (_, i) => {
       const from = (i * step + (step === 3 ? 1 : 0)) * count;
       return output.slice(from, from + count);
     });
-    const last = frames.findIndex((w) => w[count - 1] > 0.999);
-    if (last <= 0) continue;
-    const span = input[last] - input[0] || 1;
-    const times = input.slice(0, last + 1).map((t) => (t - input[0]) / span);
-    return { times, weights: frames.slice(0, last + 1), alone: Array.from({ length: count }, (_, k) => unit(k)) };
+    return pathOf(frames, shapes);
   }
-  return {
-    times: Float32Array.from({ length: count + 1 }, (_, i) => (count ? i / count : 0)),
-    weights: [new Float32Array(count), ...Array.from({ length: count }, (_, k) => unit(k))],
-    alone: Array.from({ length: count }, (_, k) => unit(k)),
-  };
+  return pathOf([], shapes);
 }
 
 /** The weights at a time in 0..1. */

@@ -161,8 +161,8 @@ const ops = {
     return { lines, points, triangles: Float32Array.from(flat), found };
   },
 
-  morph(key: string, buffer: ArrayBuffer): MorphData {
-    const data = decodeMorph(buffer);
+  morph(key: string, buffer: ArrayBuffer, shapeCount: number): MorphData {
+    const data = decodeMorph(buffer, shapeCount);
     morphs.clear();
     morphs.set(key, {
       ...data,

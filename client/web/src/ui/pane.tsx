@@ -27,7 +27,7 @@ export function Pane({ label, model, wire = false, pickable, markers, children }
   }, []);
 
   useLayoutEffect(() => {
-    model?.wireframe(wire, isDark() ? '#05070a' : '#20242c');
+    if (model?.wireframe(wire, isDark() ? '#05070a' : '#20242c')) stage.prepare(model.group);
     view.current!.show(model?.group ?? null);
     view.current!.onPick = pickable ? (ray) => void pickOn(pickable, ray.origin, ray.direction) : null;
     stage.draw();

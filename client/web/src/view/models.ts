@@ -61,9 +61,11 @@ export class Model {
       if (object?.morphTargetInfluences) for (let k = 0; k < weights.length; k++) object.morphTargetInfluences[k] = weights[k];
   }
 
-  wireframe(shown: boolean, color: string) {
-    if (!this.edges) return;
-    if (shown && !this.lines) {
+  /** -> whether something new was made for it */
+  wireframe(shown: boolean, color: string): boolean {
+    if (!this.edges) return false;
+    const fresh = shown && !this.lines;
+    if (fresh) {
       const wires = new BufferGeometry();
       wires.setAttribute('position', this.shape.getAttribute('position'));
       wires.setIndex(new BufferAttribute(this.edges, 1));
@@ -77,9 +79,11 @@ export class Model {
       this.group.add(this.lines);
       if (this.mesh.morphTargetInfluences) this.weights(this.mesh.morphTargetInfluences);
     }
-    if (!this.lines) return;
-    this.lines.visible = shown;
-    this.lines.material.color = new Color(color);
+    if (this.lines) {
+      this.lines.visible = shown;
+      this.lines.material.color.set(color);
+    }
+    return fresh;
   }
 
   /** Red edges, points and faces over the surface. */

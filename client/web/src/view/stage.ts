@@ -34,7 +34,10 @@ export class View {
     if (this.content === content) return;
     if (this.content) this.scene.remove(this.content);
     this.content = content;
-    if (content) this.scene.add(content);
+    if (content) {
+      this.scene.add(content);
+      this.stage.prepare(content);
+    }
     this.stage.draw();
   }
 
@@ -113,6 +116,18 @@ export class Stage {
     this.draw();
   }
 
+  /** Has the programs of an object compiled beside the page's work; nothing is drawn until they are there. */
+  prepare(object: Object3D) {
+    if (!this.renderer) return;
+    this.preparing++;
+    void this.renderer.compileAsync(object, this.camera).catch(() => {}).finally(() => {
+      this.preparing--;
+      this.draw();
+    });
+  }
+  private preparing = 0;
+  private readonly camera = new PerspectiveCamera();
+
   draw() {
     if (!this.asked) this.asked = requestAnimationFrame(() => this.paint());
   }
@@ -125,7 +140,7 @@ export class Stage {
   private paint() {
     this.asked = 0;
     const { renderer, canvas, host } = this;
-    if (!renderer) return;
+    if (!renderer || this.preparing) return;
     this.frames++;
     const whole = host.getBoundingClientRect();
     const ratio = renderer.getPixelRatio();

@@ -1,0 +1,54 @@
+/* view: the command; the drawing is in view.c. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli.h"
+#include "view.h"
+
+static int whole(const cli *c, cli_option_id id, long least, long most, int *out) {
+  const char *text = c->args.value[id];
+  long value;
+  if (!text)
+    return 1;
+  if (!cli_whole_number(text, least, most, &value)) {
+    cli_error(c, "--%s takes a whole number from %ld to %ld, not '%s'", cli_options[id].name, least, most, text);
+    return 0;
+  }
+  *out = (int)value;
+  return 1;
+}
+
+static int angle(const cli *c, cli_option_id id, double *out) {
+  const char *text = c->args.value[id];
+  if (!text || cli_decimal(text, out))
+    return 1;
+  cli_error(c, "--%s takes degrees, not '%s'", cli_options[id].name, text);
+  return 0;
+}
+
+int cli_run_view(cli *c) {
+  const char *glb = c->args.operands[0], *output = c->args.value[OPT_OUTPUT], *up = c->args.value[OPT_UP];
+  char error[512] = "";
+  orb_view_options options;
+  orb_view_defaults(&options);
+  if (up && strcmp(up, "y") != 0 && strcmp(up, "z") != 0) {
+    cli_error(c, "--up is y or z, not '%s'", up);
+    return CLI_USAGE;
+  }
+  if (!whole(c, OPT_POSES, 2, 100, &options.poses) || !whole(c, OPT_SIZE, 16, 4096, &options.size) ||
+      !angle(c, OPT_YAW, &options.yaw) || !angle(c, OPT_PITCH, &options.pitch))
+    return CLI_USAGE;
+  options.up = up ? up[0] : options.up;
+  options.wire = c->args.value[OPT_WIRE] != NULL;
+  char *base = cli_base_name(glb), *png = output ? cli_text("%s", output) : cli_text("%s.png", base);
+  int rc = CLI_DONE;
+  if (orbmorph_view(glb, png, &options, error, sizeof error) == 0) {
+    printf("%s\n", png);
+  } else {
+    cli_error(c, "%s", error);
+    rc = CLI_USAGE;
+  }
+  free(base);
+  free(png);
+  return rc;
+}

@@ -1,0 +1,52 @@
+/* The composed map: lowering the distortion of the map from one shape straight to another, rather than that of each
+ * shape's own embedding. See compose.c for the method. */
+#ifndef ORB_ALIGN_COMPOSE_H
+#define ORB_ALIGN_COMPOSE_H
+
+#include "orbmorph/align.h"
+#include "orbmorph/remesh.h"
+
+/* Improves the points of `moving` on the sphere so that the map moving → sphere → fixed is as isometric as can be. The
+ * landmarks (vertices of both, whose points are bit-equal already) stay. The result is certified and better than what
+ * was given, or else the points are left as they are and *improved is 0. energy[2]: composed symmetric Dirichlet,
+ * capped at 20 and weighted by area, before and after. Stage "align". */
+ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_aligned_shape *moving,
+                                      int32_t landmark_count, orb_preset preset, double energy[2], int *improved);
+
+/* ---- The inside, shared by the files compose*.c ---- */
+
+/* The fixed shape: a surface on which points move. Scaled to area 4π about its centre. */
+typedef struct cm_surface {
+  int32_t vertex_count, triangle_count;
+  double *x;       /* positions, 3 a vertex */
+  double *normal;  /* unit, angle-weighted, 3 a vertex */
+  const double *s; /* on the sphere, borrowed */
+  const int32_t *triangles;
+  int32_t *twin;
+  double *frame;   /* 6 a triangle: two orthonormal tangents */
+  double *density; /* a triangle: sphere determinant over twice its area */
+  double centre[3], scale;
+  orb_locator *locator;
+} cm_surface;
+
+ORB_MUST_CHECK orb_status cm_surface_create(orb_context *ctx, const orb_aligned_shape *shape, cm_surface *out);
+void cm_surface_free(orb_context *ctx, cm_surface *b);
+
+/* Position on the surface, on the sphere, and the interpolated normal of a place. Any output may be NULL. */
+void cm_surface_at(const cm_surface *b, const orb_place *place, double y[3], double x[3], double n[3]);
+
+/* Walks straight from a place by `step` (in the frame of its triangle), unfolding over edges. 0 if it does not end. */
+int cm_surface_trace(const cm_surface *b, const orb_place *from, const double step[2], orb_place *out);
+
+/* Angle-weighted unit vertex normals. */
+void cm_normals(const double *x, int32_t vertex_count, const int32_t *triangles, int32_t triangle_count, double *out);
+
+/* Spatial targets: where each vertex of the moving shape would lie if it were bent onto the fixed one in space: a
+ * thin-plate spline through the landmarks, then annealed non-rigid ICP. x, normal: of the moving shape, scaled like
+ * cm_surface; landmarks[2·i], [2·i+1]: vertices of the moving and of the fixed shape; out: 3 a vertex. Without
+ * landmarks rigid ICP from 24 rotations comes first. *fit: mean distance from the fixed shape in the end. */
+ORB_MUST_CHECK orb_status cm_spatial_targets(orb_context *ctx, const cm_surface *b, const double *x,
+                                             const double *normal, int32_t vertex_count, const int32_t *landmarks,
+                                             int32_t landmark_count, double *out, double *fit);
+
+#endif

@@ -1,0 +1,391 @@
+/* Spatial targets of a composed map: the moving shape bent onto the fixed one in space.
+ *
+ * A thin-plate spline in space (kernel |r|, affine part; Duchon 1977) carries the moving shape. It starts through the
+ * landmarks, or, where there are fewer than four, from the best of 24 rigid registrations (Besl & McKay 1992). Rounds
+ * of iterative closest points refine it: controls spread over the moving shape look for the nearest vertex of the fixed
+ * one in position and half-weighted normal; more controls and less stiffness from round to round. Landmarks keep their
+ * targets throughout. Lengths are those of shapes scaled to area 4π.
+ */
+#include <lapacke.h>
+#include <math.h>
+#include <string.h>
+
+#include "align/compose.h"
+#include "base/check.h"
+#include "numeric/vec3.h"
+
+enum {
+  ROUNDS = 20,
+  FIRST_CONTROLS = 30,
+  LAST_CONTROLS = 300,
+  RIGID_SAMPLES = 150,
+  RIGID_STEPS = 20,
+  FIXED_SEARCH = 50000
+};
+static const double NORMAL_WEIGHT = 0.25; /* of |n − n'|², against |x − x'|² */
+static const double FIRST_STIFFNESS = 1.0, LAST_STIFFNESS = 0.02, LANDMARK_STIFFNESS = 1e-6;
+
+typedef struct spline {
+  int32_t count;
+  double *centre; /* 3 each */
+  double *weight; /* 3 each, then 12 of the affine part: constant, x, y, z, each of 3 */
+} spline;
+
+typedef struct targets_run {
+  orb_context *ctx;
+  const cm_surface *b;
+  const double *x, *normal;
+  int32_t vertex_count;
+  const int32_t *landmarks;
+  int32_t landmark_count;
+  int32_t stride;   /* through the fixed shape's vertices */
+  int32_t *control; /* farthest points of the moving shape */
+  int32_t control_count;
+  double *goal;     /* 3 a control */
+  double *mapped;   /* 6 a control: position and normal under the spline */
+  double *distance; /* of each control to its goal, squared, with the normals' part; negative: left out */
+  spline s;
+  double *matrix;
+  lapack_int *pivot;
+} targets_run;
+
+/* The spline at p, and its Jacobian (row-major, NULL: not wanted). */
+static void spline_at(const spline *s, const double p[3], double y[3], double *jacobian) {
+  const double *affine = s->weight + 3 * (size_t)s->count;
+  for (int k = 0; k < 3; k++) {
+    y[k] = affine[k] + p[0] * affine[3 + k] + p[1] * affine[6 + k] + p[2] * affine[9 + k];
+    for (int j = 0; j < 3 && jacobian; j++) {
+      jacobian[3 * k + j] = affine[3 + 3 * j + k];
+    }
+  }
+  for (int32_t i = 0; i < s->count; i++) {
+    double d[3];
+    orb_sub(p, s->centre + 3 * (size_t)i, d);
+    double r = orb_length(d);
+    const double *w = s->weight + 3 * (size_t)i;
+    for (int k = 0; k < 3; k++) {
+      y[k] -= r * w[k];
+      for (int j = 0; j < 3 && jacobian && r > 0; j++) {
+        jacobian[3 * k + j] -= w[k] * d[j] / r;
+      }
+    }
+  }
+}
+
+/* A normal under the Jacobian: by its cofactors. */
+static void map_normal(const double j[9], const double n[3], double out[3]) {
+  double c0[3], c1[3], c2[3];
+  orb_cross(j + 3, j + 6, c0);
+  orb_cross(j + 6, j, c1);
+  orb_cross(j, j + 3, c2);
+  out[0] = orb_dot(c0, n);
+  out[1] = orb_dot(c1, n);
+  out[2] = orb_dot(c2, n);
+  orb_normalize(out);
+}
+
+/* Fits the spline to `count` centres (first the landmarks) and goals, with stiffness on the diagonal. */
+static orb_status spline_fit(targets_run *run, int32_t count, double stiffness) {
+  spline *s = &run->s;
+  size_t n = (size_t)count + 4;
+  memset(run->matrix, 0, n * n * sizeof *run->matrix);
+  for (int32_t i = 0; i < count; i++) {
+    const double *p = s->centre + 3 * (size_t)i;
+    for (int32_t j = 0; j < count; j++) {
+      run->matrix[(size_t)i * n + (size_t)j] = -sqrt(orb_distance2(p, s->centre + 3 * (size_t)j));
+    }
+    run->matrix[(size_t)i * n + (size_t)i] += i < run->landmark_count ? LANDMARK_STIFFNESS : stiffness;
+    for (size_t k = 0; k < 4; k++) {
+      double value = k ? p[k - 1] : 1;
+      run->matrix[(size_t)i * n + (size_t)count + k] = value;
+      run->matrix[((size_t)count + k) * n + (size_t)i] = value;
+    }
+    memcpy(s->weight + 3 * (size_t)i, run->goal + 3 * (size_t)i, 3 * sizeof(double));
+  }
+  memset(s->weight + 3 * (size_t)count, 0, 12 * sizeof(double));
+  lapack_int failed =
+      LAPACKE_dgesv(LAPACK_ROW_MAJOR, (lapack_int)n, 3, run->matrix, (lapack_int)n, run->pivot, s->weight, 3);
+  if (failed) {
+    return orb_fail(run->ctx, ORB_E_INTERNAL, "The spline through %d controls has no solution.", count);
+  }
+  s->count = count;
+  return ORB_OK;
+}
+
+/* Farthest-point order over the moving shape, from vertex 0's farthest. */
+static orb_status choose_controls(targets_run *run) {
+  double *far = ORB_NEW(run->ctx, double, run->vertex_count);
+  if (!far) {
+    return ORB_E_NO_MEMORY;
+  }
+  int32_t want = run->vertex_count < LAST_CONTROLS ? run->vertex_count : LAST_CONTROLS, last = 0;
+  for (int32_t v = 0; v < run->vertex_count; v++) {
+    far[v] = INFINITY;
+  }
+  for (int32_t i = 0; i < want; i++) {
+    int32_t best = 0;
+    for (int32_t v = 0; v < run->vertex_count; v++) {
+      double d = orb_distance2(run->x + 3 * (size_t)v, run->x + 3 * (size_t)last);
+      far[v] = d < far[v] ? d : far[v];
+      best = far[v] > far[best] ? v : best;
+    }
+    run->control[i] = last = best;
+  }
+  run->control_count = want;
+  orb_free(run->ctx, far);
+  return ORB_OK;
+}
+
+/* The vertex of the fixed shape nearest in position and normal; its score. */
+static int32_t nearest_vertex(const targets_run *run, const double y[3], const double n[3], double *score) {
+  const cm_surface *b = run->b;
+  int32_t best = 0;
+  double least = INFINITY;
+  for (int32_t v = 0; v < b->vertex_count; v += run->stride) {
+    const double *p = b->x + 3 * (size_t)v, *m = b->normal + 3 * (size_t)v;
+    double d = orb_distance2(p, y) + NORMAL_WEIGHT * orb_distance2(m, n);
+    if (d < least) {
+      least = d;
+      best = v;
+    }
+  }
+  *score = least;
+  return best;
+}
+
+static void find_goals(void *arg, int64_t begin, int64_t end, int thread) {
+  targets_run *run = arg;
+  (void)thread;
+  for (int64_t i = begin; i < end; i++) {
+    size_t c = (size_t)i + (size_t)run->landmark_count;
+    double jacobian[9], *to = run->mapped + 6 * i;
+    const int32_t v = run->control[i];
+    spline_at(&run->s, run->x + 3 * (size_t)v, to, jacobian);
+    map_normal(jacobian, run->normal + 3 * (size_t)v, to + 3);
+    int32_t hit = nearest_vertex(run, to, to + 3, &run->distance[i]);
+    /* Slide along the tangent plane there: closer than the vertex, no farther than the surface bends. */
+    const double *p = run->b->x + 3 * (size_t)hit, *n = run->b->normal + 3 * (size_t)hit;
+    double rel[3], *goal = run->goal + 3 * c;
+    orb_sub(to, p, rel);
+    double off = orb_dot(rel, n), slide = sqrt(fmax(0, orb_dot(rel, rel) - off * off)), most = 0.05;
+    for (int k = 0; k < 3; k++) {
+      goal[k] = p[k] + (rel[k] - off * n[k]) * (slide > most ? most / slide : 1);
+    }
+    if (orb_dot(to + 3, n) < 0.2) {
+      run->distance[i] = -1;
+    }
+  }
+}
+
+static void load_landmarks(targets_run *run) {
+  for (int32_t i = 0; i < run->landmark_count; i++) {
+    memcpy(run->s.centre + 3 * (size_t)i, run->x + 3 * (size_t)run->landmarks[2 * i], 3 * sizeof(double));
+    memcpy(run->goal + 3 * (size_t)i, run->b->x + 3 * (size_t)run->landmarks[2 * i + 1], 3 * sizeof(double));
+  }
+}
+
+/* One round with the first `controls` of the order; those that face away or lie far off are left out. */
+static orb_status icp_round(targets_run *run, int32_t controls, double stiffness, double *fit) {
+  orb_parallel_for(run->ctx, controls, 8, find_goals, run);
+  ORB_TRY(orb_context_check(run->ctx));
+  double sum = 0;
+  int32_t facing = 0, near = 0, kept = run->landmark_count;
+  for (int32_t i = 0; i < controls; i++) {
+    if (run->distance[i] >= 0) {
+      sum += sqrt(run->distance[i]);
+      facing++;
+    }
+  }
+  *fit = facing ? sum / facing : INFINITY;
+  for (int32_t i = 0; i < controls; i++) {
+    near += run->distance[i] >= 0 && sqrt(run->distance[i]) <= 3 * *fit;
+  }
+  if (near < 8) {
+    return ORB_OK; /* nothing to hold on to: the map stays as it is */
+  }
+  load_landmarks(run);
+  for (int32_t i = 0; i < controls; i++) {
+    if (run->distance[i] >= 0 && sqrt(run->distance[i]) <= 3 * *fit) {
+      memcpy(run->s.centre + 3 * (size_t)kept, run->x + 3 * (size_t)run->control[i], 3 * sizeof(double));
+      memmove(run->goal + 3 * (size_t)kept, run->goal + 3 * ((size_t)i + (size_t)run->landmark_count),
+              3 * sizeof(double));
+      kept++;
+    }
+  }
+  return spline_fit(run, kept, stiffness);
+}
+
+/* The rotation nearest to a 3×3 matrix (Kabsch; reflections turned back). */
+static int nearest_rotation(const double h[9], double r[9]) {
+  double a[9], u[9], vt[9], sv[3], super[2];
+  memcpy(a, h, sizeof a);
+  if (LAPACKE_dgesvd(LAPACK_ROW_MAJOR, 'A', 'A', 3, 3, a, 3, sv, u, 3, vt, 3, super)) {
+    return 0;
+  }
+  for (int pass = 0; pass < 2; pass++) {
+    for (int i = 0; i < 3; i++) {
+      for (int j = 0; j < 3; j++) {
+        r[3 * i + j] = u[3 * i] * vt[j] + u[3 * i + 1] * vt[3 + j] + u[3 * i + 2] * vt[6 + j];
+      }
+    }
+    double c[3];
+    orb_cross(r, r + 3, c);
+    if (orb_dot(c, r + 6) > 0) {
+      return 1;
+    }
+    for (int i = 0; i < 3; i++) {
+      u[3 * i + 2] = -u[3 * i + 2];
+    }
+  }
+  return 1;
+}
+
+/* The i-th of the 24 rotations that map the axes to each other. */
+static void axis_rotation(int i, double r[9]) {
+  static const int order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
+  const int *o = order[i / 4];
+  double parity = i / 4 < 3 ? 1 : -1;
+  double s0 = i & 1 ? -1 : 1, s1 = i & 2 ? -1 : 1, s2 = s0 * s1 * parity;
+  memset(r, 0, 9 * sizeof *r);
+  r[o[0]] = s0;
+  r[3 + o[1]] = s1;
+  r[6 + o[2]] = s2;
+}
+
+/* Sets the spline to y = R p + t. */
+static void set_rigid(spline *s, const double r[9], const double t[3]) {
+  s->count = 0;
+  for (int k = 0; k < 3; k++) {
+    s->weight[k] = t[k];
+    for (int j = 0; j < 3; j++) {
+      s->weight[3 + 3 * j + k] = r[3 * k + j];
+    }
+  }
+}
+
+/* Rigid ICP from one rotation over the first controls and the landmarks; leaves the spline there. */
+static orb_status rigid_icp(targets_run *run, const double start[9], double *score) {
+  double r[9], t[3] = {0, 0, 0};
+  memcpy(r, start, sizeof r);
+  int32_t samples = run->control_count < RIGID_SAMPLES ? run->control_count : RIGID_SAMPLES;
+  for (int step = 0; step < RIGID_STEPS; step++) {
+    set_rigid(&run->s, r, t);
+    orb_parallel_for(run->ctx, samples, 8, find_goals, run);
+    ORB_TRY(orb_context_check(run->ctx));
+    load_landmarks(run);
+    double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, h[9] = {0}, total = 0, weight_sum = 0;
+    for (int pass = 0; pass < 2; pass++) {
+      for (int32_t i = -run->landmark_count; i < samples; i++) {
+        const double *goal = run->goal + 3 * ((size_t)(i + run->landmark_count));
+        const double *p =
+            i < 0 ? run->s.centre + 3 * (size_t)(i + run->landmark_count) : run->x + 3 * (size_t)run->control[i];
+        double w = i < 0 ? (double)samples : 1;
+        for (int k = 0; k < 3; k++) {
+          if (pass == 0) {
+            from[k] += w * p[k];
+            to[k] += w * goal[k];
+          } else {
+            for (int j = 0; j < 3; j++) {
+              h[3 * k + j] += w * (goal[k] - to[k]) * (p[j] - from[j]);
+            }
+          }
+        }
+        weight_sum += pass == 0 ? w : 0;
+      }
+      for (int k = 0; k < 3 && pass == 0; k++) {
+        from[k] /= weight_sum;
+        to[k] /= weight_sum;
+      }
+    }
+    if (!nearest_rotation(h, r)) {
+      break;
+    }
+    for (int k = 0; k < 3; k++) {
+      t[k] = to[k] - orb_dot(r + 3 * k, from);
+    }
+    for (int32_t i = 0; i < samples; i++) {
+      total += fmin(run->distance[i] < 0 ? 4 : run->distance[i], 4);
+    }
+    for (int32_t i = 0; i < run->landmark_count; i++) {
+      double y[3];
+      spline_at(&run->s, run->s.centre + 3 * (size_t)i, y, NULL);
+      total += samples * fmin(orb_distance2(y, run->goal + 3 * (size_t)i), 4);
+    }
+    *score = total;
+  }
+  set_rigid(&run->s, r, t);
+  return ORB_OK;
+}
+
+static orb_status best_rigid(targets_run *run) {
+  double best = INFINITY, keep[12];
+  for (int i = 0; i < 24; i++) {
+    double start[9], score = INFINITY;
+    axis_rotation(i, start);
+    ORB_TRY(rigid_icp(run, start, &score));
+    if (score < best) {
+      best = score;
+      memcpy(keep, run->s.weight, sizeof keep);
+    }
+  }
+  run->s.count = 0;
+  memcpy(run->s.weight, keep, sizeof keep);
+  return ORB_OK;
+}
+
+static orb_status targets_compute(targets_run *run, double *out, double *fit) {
+  ORB_TRY(choose_controls(run));
+  if (run->landmark_count >= 4) {
+    load_landmarks(run);
+    ORB_TRY(spline_fit(run, run->landmark_count, LANDMARK_STIFFNESS));
+  } else {
+    ORB_TRY(best_rigid(run));
+  }
+  *fit = INFINITY;
+  for (int round = 0; round < ROUNDS; round++) {
+    double f = (double)round / (ROUNDS - 1);
+    int32_t controls = (int32_t)(FIRST_CONTROLS * pow((double)LAST_CONTROLS / FIRST_CONTROLS, f));
+    controls = controls < run->control_count ? controls : run->control_count;
+    ORB_TRY(icp_round(run, controls, FIRST_STIFFNESS * pow(LAST_STIFFNESS / FIRST_STIFFNESS, f), fit));
+  }
+  for (int32_t v = 0; v < run->vertex_count; v++) {
+    spline_at(&run->s, run->x + 3 * (size_t)v, out + 3 * (size_t)v, NULL);
+  }
+  return ORB_OK;
+}
+
+orb_status cm_spatial_targets(orb_context *ctx, const cm_surface *b, const double *x, const double *normal,
+                              int32_t vertex_count, const int32_t *landmarks, int32_t landmark_count, double *out,
+                              double *fit) {
+  size_t most = LAST_CONTROLS + (size_t)landmark_count;
+  targets_run run = {.ctx = ctx,
+                     .b = b,
+                     .x = x,
+                     .normal = normal,
+                     .vertex_count = vertex_count,
+                     .landmarks = landmarks,
+                     .landmark_count = landmark_count,
+                     .stride = 1 + b->vertex_count / FIXED_SEARCH};
+  orb_status status = ORB_E_NO_MEMORY;
+  run.control = ORB_NEW(ctx, int32_t, LAST_CONTROLS);
+  run.goal = ORB_NEW(ctx, double, 3 * most);
+  run.mapped = ORB_NEW(ctx, double, 6 * most);
+  run.distance = ORB_NEW(ctx, double, most);
+  run.s.centre = ORB_NEW(ctx, double, 3 * most);
+  run.s.weight = ORB_NEW(ctx, double, 3 * most + 12);
+  run.matrix = ORB_NEW(ctx, double, (most + 4) * (most + 4));
+  run.pivot = ORB_NEW(ctx, lapack_int, most + 4);
+  if (run.control && run.goal && run.mapped && run.distance && run.s.centre && run.s.weight && run.matrix &&
+      run.pivot) {
+    status = targets_compute(&run, out, fit);
+  }
+  orb_free(ctx, run.control);
+  orb_free(ctx, run.goal);
+  orb_free(ctx, run.mapped);
+  orb_free(ctx, run.distance);
+  orb_free(ctx, run.s.centre);
+  orb_free(ctx, run.s.weight);
+  orb_free(ctx, run.matrix);
+  orb_free(ctx, run.pivot);
+  return status;
+}

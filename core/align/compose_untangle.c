@@ -1,0 +1,152 @@
+/* Untangling on the sphere: flipped neighbourhoods are optimised until every triangle turns positively.
+ *
+ * Around the flipped triangles, and a growing number of rings about them, vertices take damped Newton steps of
+ * Σ D / χ(d): D the Dirichlet energy of the triangle from an equilateral one, d = det(p, q, r), χ(d) = ½(d + √(d² +
+ * ε²)) its regularised positive part. ε follows the star's worst determinant down, so that the energy stays finite
+ * while there are flips and becomes a barrier as they go (Garanzha et al., Foldover-free maps in 50 lines of code,
+ * 2021).
+ */
+#include <math.h>
+#include <string.h>
+
+#include "align/compose_level.h"
+#include "base/check.h"
+#include "embed/star.h"
+#include "numeric/predicates.h"
+#include "numeric/vec3.h"
+
+enum { FEW = 12, ROUNDS = 60, PASSES = 6, RINGS_MOST = 5, TRIES = 6 };
+
+static double chi(double d, double e) {
+  double root = sqrt(d * d + e * e);
+  return d >= 0 ? 0.5 * (d + root) : 0.5 * e * e / (root - d) + 1e-300;
+}
+
+static const double *point(const cm_level *l, int32_t v) {
+  return l->x + 3 * (size_t)v;
+}
+
+static double star_energy(const cm_level *l, int32_t v, const double p[3], double epsilon) {
+  double energy = 0;
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    const double *q = point(l, l->spoke[i].q), *r = point(l, l->spoke[i].r);
+    double d = orb_distance2(p, q) + orb_distance2(p, r) + orb_distance2(q, r);
+    energy += d / chi(orb_det(p, q, r), epsilon);
+  }
+  return energy;
+}
+
+/* ε for the star of v: small against its determinants, and against the worst of them. */
+static double star_epsilon(const cm_level *l, int32_t v) {
+  double sum = 0, worst = 0;
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    double det = orb_det(point(l, v), point(l, l->spoke[i].q), point(l, l->spoke[i].r));
+    sum += fabs(det);
+    worst = fmin(worst, det);
+  }
+  return 0.05 * sum / (l->start[v + 1] - l->start[v]) - 0.2 * worst + 1e-100;
+}
+
+/* One step of v; the point only changes where the energy falls. */
+static void step(cm_level *l, int32_t v, double least_epsilon) {
+  double epsilon = fmax(star_epsilon(l, v), least_epsilon);
+  double *p = l->x + 3 * (size_t)v, e1[3], e2[3], g[2] = {0, 0}, h[3] = {0, 0, 0}, energy = 0, longest = 0;
+  orb_tangent_frame(p, e1, e2);
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    const double *q = point(l, l->spoke[i].q), *r = point(l, l->spoke[i].r);
+    double side[3], plane[3], u[3], w[3];
+    orb_sub(r, q, side);
+    orb_cross(q, side, plane);
+    orb_sub(p, q, u);
+    orb_sub(p, r, w);
+    double d = orb_dot(u, u) + orb_dot(w, w) + orb_dot(side, side), det = orb_dot(plane, p);
+    double d1 = 2 * (orb_dot(u, e1) + orb_dot(w, e1)), d2 = 2 * (orb_dot(u, e2) + orb_dot(w, e2));
+    double s1 = orb_dot(plane, e1), s2 = orb_dot(plane, e2);
+    double root = sqrt(det * det + epsilon * epsilon), c = chi(det, epsilon), c1 = c / root;
+    double c2 = 0.5 * epsilon * epsilon / (root * root * root);
+    double f = 1 / c, fp = -c1 / (c * c), fpp = fmax(0, 2 * c1 * c1 / (c * c * c) - c2 / (c * c));
+    energy += d * f;
+    g[0] += f * d1 + d * fp * s1;
+    g[1] += f * d2 + d * fp * s2;
+    h[0] += 4 * f + 2 * fp * d1 * s1 + d * fpp * s1 * s1;
+    h[1] += fp * (d1 * s2 + d2 * s1) + d * fpp * s1 * s2;
+    h[2] += 4 * f + 2 * fp * d2 * s2 + d * fpp * s2 * s2;
+    longest = fmax(longest, orb_dot(u, u));
+  }
+  double mean = 0.5 * (h[0] + h[2]), spread = sqrt(0.25 * (h[0] - h[2]) * (h[0] - h[2]) + h[1] * h[1]);
+  double low = mean - spread, floor = 0.05 * fmax(fabs(mean + spread), fabs(low)), lift = low < floor ? floor - low : 0;
+  double a = h[0] + lift, b = h[1], c = h[2] + lift, det = a * c - b * b;
+  double s = -(c * g[0] - b * g[1]) / det, t = -(a * g[1] - b * g[0]) / det, length = sqrt(s * s + t * t);
+  if (!(det > 0) || !(length > 0)) {
+    return;
+  }
+  double most = fmin(0.5, sqrt(longest)), scale = length > most ? most / length : 1;
+  for (int tries = 0; tries < TRIES; tries++, scale *= 0.4) {
+    double moved[3];
+    for (int k = 0; k < 3; k++) {
+      moved[k] = p[k] + scale * (s * e1[k] + t * e2[k]);
+    }
+    orb_normalize(moved);
+    if (star_energy(l, v, moved, epsilon) < energy) {
+      memcpy(p, moved, sizeof moved);
+      return;
+    }
+  }
+}
+
+/* Marks the vertices of triangles that do not turn positively; how many such triangles, and the worst determinant. */
+static int32_t mark_flips(const cm_level *l, unsigned char *mark, double *worst) {
+  int32_t flips = 0;
+  memset(mark, 0, (size_t)l->count);
+  *worst = 0;
+  for (int32_t t = 0; t < l->triangle_count; t++) {
+    const int32_t *v = l->triangle + 3 * (size_t)t;
+    if (orb_orient(point(l, v[0]), point(l, v[1]), point(l, v[2])) <= 0) {
+      mark[v[0]] = mark[v[1]] = mark[v[2]] = 1;
+      *worst = fmin(*worst, orb_det(point(l, v[0]), point(l, v[1]), point(l, v[2])));
+      flips++;
+    }
+  }
+  return flips;
+}
+
+static void grow_marks(const cm_level *l, unsigned char *mark, unsigned char *next) {
+  memcpy(next, mark, (size_t)l->count);
+  for (int32_t t = 0; t < l->triangle_count; t++) {
+    const int32_t *v = l->triangle + 3 * (size_t)t;
+    if (mark[v[0]] || mark[v[1]] || mark[v[2]]) {
+      next[v[0]] = next[v[1]] = next[v[2]] = 1;
+    }
+  }
+  memcpy(mark, next, (size_t)l->count);
+}
+
+orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left) {
+  unsigned char *mark = ORB_NEW(ctx, unsigned char, l->count), *next = ORB_NEW(ctx, unsigned char, l->count);
+  orb_status status = mark && next ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int round = 0; status == ORB_OK; round++) {
+    double worst;
+    *left = mark_flips(l, mark, &worst);
+    if (*left == 0 || round == ROUNDS) {
+      break;
+    }
+    int rings = 1 + round / 4;
+    for (int i = 0; i < (rings < RINGS_MOST ? rings : RINGS_MOST); i++) {
+      grow_marks(l, mark, next);
+    }
+    /* Many flips need one ε for all; the last few hide in stars far smaller than that. */
+    double scale = 1.0 / l->triangle_count;
+    double epsilon = *left > FEW && round % 3 ? sqrt(1e-8 * scale * scale + 0.04 * worst * worst) : 0;
+    for (int pass = 0; pass < PASSES; pass++) {
+      for (int32_t v = 0; v < l->count; v++) {
+        if (mark[v] && !l->pinned[v]) {
+          step(l, v, epsilon);
+        }
+      }
+    }
+    status = orb_context_check(ctx);
+  }
+  orb_free(ctx, mark);
+  orb_free(ctx, next);
+  return status;
+}

@@ -1,0 +1,440 @@
+/* Base edges as paths on a sheet, by A*. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "align/base.h"
+#include "base/check.h"
+#include "numeric/vec3.h"
+
+/* A node is a vertex (2 v) or the middle of an edge (2 h + 1, h the lesser half-edge). */
+typedef struct queued {
+  double estimate;
+  int32_t node;
+} queued;
+
+typedef struct tracer {
+  orb_context *ctx;
+  orb_sheet *sheet;
+  const orb_sheet *base;
+  const int32_t *at;
+  orb_paths *paths;
+  int32_t *base_done; /* of each base half-edge */
+  double *cost;       /* of each node */
+  int32_t *from, *stamp, nodes, now;
+  unsigned char *gate; /* of each half-edge: 1: its triangle may be entered from its origin, 2: it may be walked */
+  queued *heap;
+  int32_t heap_count, heap_capacity;
+  int32_t *chain; /* nodes of the path found, back to front */
+  int32_t chain_count;
+} tracer;
+
+void orb_paths_free(orb_context *ctx, orb_paths *paths) {
+  orb_free(ctx, paths->path);
+  orb_free(ctx, paths->on);
+  memset(paths, 0, sizeof *paths);
+}
+
+/* Follows the sheet's capacity. */
+static orb_status paths_fit(orb_context *ctx, const orb_sheet *s, orb_paths *paths) {
+  if (paths->half_edges < 3 * s->triangle_capacity) {
+    int32_t capacity = 3 * s->triangle_capacity, *path = orb_realloc(ctx, paths->path, (size_t)capacity, sizeof *path);
+    if (!path) {
+      return ORB_E_NO_MEMORY;
+    }
+    for (int32_t h = paths->half_edges; h < capacity; h++) {
+      path[h] = -1;
+    }
+    paths->path = path;
+    paths->half_edges = capacity;
+  }
+  if (paths->vertices < s->vertex_capacity) {
+    unsigned char *on = orb_realloc(ctx, paths->on, (size_t)s->vertex_capacity, 1);
+    if (!on) {
+      return ORB_E_NO_MEMORY;
+    }
+    memset(on + paths->vertices, 0, (size_t)(s->vertex_capacity - paths->vertices));
+    paths->on = on;
+    paths->vertices = s->vertex_capacity;
+  }
+  return ORB_OK;
+}
+
+orb_status orb_paths_split(orb_context *ctx, orb_sheet *s, orb_paths *paths, int32_t h, int32_t *vertex) {
+  int32_t g = s->twin[h], side[2] = {orb_next(h), orb_next(g)}, held[2] = {paths->path[side[0]], paths->path[side[1]]};
+  ORB_ASSERT(paths->path[h] < 0);
+  ORB_TRY(orb_sheet_split_edge(ctx, s, h, 0.5, vertex));
+  ORB_TRY(paths_fit(ctx, s, paths));
+  int32_t moved[2] = {orb_next(s->twin[g]), orb_next(s->twin[h])};
+  for (int k = 0; k < 2; k++) {
+    paths->path[side[k]] = -1;
+    paths->path[moved[k]] = held[k];
+  }
+  return ORB_OK;
+}
+
+static const double *point_of(const orb_sheet *s, int32_t v) {
+  return s->shape.points + 3 * (size_t)v;
+}
+
+static void place_of(const tracer *t, int32_t node, double out[3]) {
+  const orb_sheet *s = t->sheet;
+  if (node & 1) {
+    const double *a = point_of(s, s->shape.mesh.triangles[node >> 1]),
+                 *b = point_of(s, s->shape.mesh.triangles[orb_next(node >> 1)]);
+    for (int k = 0; k < 3; k++) {
+      out[k] = 0.5 * (a[k] + b[k]);
+    }
+  } else {
+    memcpy(out, point_of(s, node >> 1), 3 * sizeof *out);
+  }
+}
+
+static orb_status tracer_fit(tracer *t) {
+  int32_t wanted = 6 * t->sheet->triangle_capacity + 2;
+  if (t->nodes >= wanted) {
+    return ORB_OK;
+  }
+  double *cost = orb_realloc(t->ctx, t->cost, (size_t)wanted, sizeof *cost);
+  t->cost = cost ? cost : t->cost;
+  int32_t *from = orb_realloc(t->ctx, t->from, (size_t)wanted, sizeof *from);
+  t->from = from ? from : t->from;
+  int32_t *stamp = orb_realloc(t->ctx, t->stamp, (size_t)wanted, sizeof *stamp);
+  t->stamp = stamp ? stamp : t->stamp;
+  int32_t *chain = orb_realloc(t->ctx, t->chain, (size_t)wanted, sizeof *chain);
+  t->chain = chain ? chain : t->chain;
+  unsigned char *gate = orb_realloc(t->ctx, t->gate, (size_t)wanted, 1);
+  t->gate = gate ? gate : t->gate;
+  if (!cost || !from || !stamp || !chain || !gate) {
+    return ORB_E_NO_MEMORY;
+  }
+  memset(stamp + t->nodes, 0, (size_t)(wanted - t->nodes) * sizeof *stamp);
+  memset(gate + t->nodes, 0, (size_t)(wanted - t->nodes));
+  t->nodes = wanted;
+  return ORB_OK;
+}
+
+/* A binary heap, ties by node number. */
+static int before(queued a, queued b) {
+  return a.estimate != b.estimate ? a.estimate < b.estimate : a.node < b.node;
+}
+
+static orb_status heap_push(tracer *t, queued item) {
+  if (t->heap_count == t->heap_capacity) {
+    int32_t capacity = t->heap_capacity + t->heap_capacity / 2 + 1024;
+    queued *heap = orb_realloc(t->ctx, t->heap, (size_t)capacity, sizeof *heap);
+    if (!heap) {
+      return ORB_E_NO_MEMORY;
+    }
+    t->heap = heap;
+    t->heap_capacity = capacity;
+  }
+  int32_t i = t->heap_count++;
+  while (i > 0 && before(item, t->heap[(i - 1) / 2])) {
+    t->heap[i] = t->heap[(i - 1) / 2];
+    i = (i - 1) / 2;
+  }
+  t->heap[i] = item;
+  return ORB_OK;
+}
+
+static queued heap_pop(tracer *t) {
+  queued top = t->heap[0], last = t->heap[--t->heap_count];
+  int32_t i = 0;
+  for (;;) {
+    int32_t child = 2 * i + 1;
+    if (child >= t->heap_count) {
+      break;
+    }
+    if (child + 1 < t->heap_count && before(t->heap[child + 1], t->heap[child])) {
+      child++;
+    }
+    if (!before(t->heap[child], last)) {
+      break;
+    }
+    t->heap[i] = t->heap[child];
+    i = child;
+  }
+  t->heap[i] = last;
+  return top;
+}
+
+static int32_t edge_name(const orb_sheet *s, int32_t h) {
+  return h < s->twin[h] ? h : s->twin[h];
+}
+
+/* The outgoing half-edge of v that lies on the path of base edge e. */
+static int32_t on_path(const tracer *t, int32_t v, int32_t e) {
+  int32_t start = t->sheet->corner[v], h = start;
+  do {
+    if (t->paths->path[h] == e) {
+      return h;
+    }
+    h = orb_sheet_swing(t->sheet, h);
+  } while (h != start);
+  return -1;
+}
+
+/* Opens (or closes again) the gates about the sheet vertex of base half-edge b's origin: the sector between the traced
+ * base edges before and after b. */
+static int set_gates(tracer *t, int32_t b, int open) {
+  const orb_sheet *base = t->base, *s = t->sheet;
+  int32_t v = t->at[base->shape.mesh.triangles[b]], after = orb_sheet_swing(base, b), before_b = -1;
+  while (after != b && !t->base_done[after]) {
+    after = orb_sheet_swing(base, after);
+  }
+  for (int32_t i = after; i != b; i = orb_sheet_swing(base, i)) {
+    before_b = t->base_done[i] ? i : before_b;
+  }
+  if (after == b) {
+    int32_t start = s->corner[v], h = start;
+    do {
+      t->gate[h] = open ? 3 : 0;
+      h = orb_sheet_swing(s, h);
+    } while (h != start);
+    return 1;
+  }
+  int32_t first = on_path(t, v, edge_name(base, before_b)), last = on_path(t, v, edge_name(base, after)), h = first;
+  if (first < 0 || last < 0) {
+    return 0;
+  }
+  do {
+    t->gate[h] = !open ? 0 : h == first ? 1 : 3;
+    h = orb_sheet_swing(s, h);
+  } while (h != last);
+  return 1;
+}
+
+typedef struct goal {
+  int32_t vertex;
+  double place[3];
+} goal;
+
+static orb_status reach(tracer *t, int32_t from, int32_t to, const goal *g) {
+  double a[3], b[3];
+  place_of(t, from, a);
+  place_of(t, to, b);
+  double cost = t->cost[from] + sqrt(orb_distance2(a, b));
+  if (t->stamp[to] == t->now && t->cost[to] <= cost) {
+    return ORB_OK;
+  }
+  t->stamp[to] = t->now;
+  t->cost[to] = cost;
+  t->from[to] = from;
+  return heap_push(t, (queued){cost + sqrt(orb_distance2(b, g->place)), to});
+}
+
+/* Along half-edge h, from its origin (node) to its end. */
+static orb_status along(tracer *t, int32_t node, int32_t h, const goal *g) {
+  const orb_sheet *s = t->sheet;
+  int32_t end = s->shape.mesh.triangles[orb_next(h)];
+  if (t->paths->path[h] >= 0) {
+    return ORB_OK;
+  }
+  if (end == g->vertex ? (t->gate[s->twin[h]] & 2) == 0 : t->paths->on[end]) {
+    return ORB_OK;
+  }
+  return reach(t, node, 2 * end, g);
+}
+
+static orb_status to_edge(tracer *t, int32_t node, int32_t h, const goal *g) {
+  return t->paths->path[h] >= 0 ? ORB_OK : reach(t, node, 2 * edge_name(t->sheet, h) + 1, g);
+}
+
+static orb_status expand_vertex(tracer *t, int32_t node, int is_start, const goal *g) {
+  const orb_sheet *s = t->sheet;
+  int32_t start = s->corner[node >> 1], h = start;
+  do {
+    if (!is_start || (t->gate[h] & 2)) {
+      ORB_TRY(along(t, node, h, g));
+    }
+    if (!is_start || (t->gate[h] & 1)) {
+      ORB_TRY(to_edge(t, node, orb_next(h), g));
+    }
+    h = orb_sheet_swing(s, h);
+  } while (h != start);
+  return ORB_OK;
+}
+
+static orb_status expand_edge(tracer *t, int32_t node, const goal *g) {
+  const orb_sheet *s = t->sheet;
+  int32_t sides[2] = {node >> 1, s->twin[node >> 1]};
+  for (int k = 0; k < 2; k++) {
+    int32_t h = sides[k], apex_h = orb_prev(h), apex = s->shape.mesh.triangles[apex_h];
+    ORB_TRY(to_edge(t, node, orb_next(h), g));
+    ORB_TRY(to_edge(t, node, apex_h, g));
+    if (apex == g->vertex ? (t->gate[apex_h] & 1) != 0 : !t->paths->on[apex]) {
+      ORB_TRY(reach(t, node, 2 * apex, g));
+    }
+  }
+  return ORB_OK;
+}
+
+/* The shortest path for base half-edge b; its nodes go to chain. *found 0: none. */
+static orb_status search_path(tracer *t, int32_t b, int *found) {
+  const int32_t *corners = t->base->shape.mesh.triangles;
+  int32_t start = 2 * t->at[corners[b]], twin = t->base->twin[b];
+  goal g = {.vertex = t->at[corners[twin]]};
+  place_of(t, 2 * g.vertex, g.place);
+  t->now++;
+  t->heap_count = 0;
+  t->cost[start] = 0;
+  t->stamp[start] = t->now;
+  t->from[start] = -1;
+  *found = 0;
+  ORB_TRY(heap_push(t, (queued){0, start}));
+  while (t->heap_count > 0) {
+    queued top = heap_pop(t);
+    int32_t node = top.node;
+    double place[3];
+    if (node == 2 * g.vertex) {
+      *found = 1;
+      break;
+    }
+    place_of(t, node, place);
+    if (top.estimate > t->cost[node] + sqrt(orb_distance2(place, g.place)) && node != start) {
+      continue; /* a shorter way was found since */
+    }
+    ORB_TRY(node & 1 ? expand_edge(t, node, &g) : expand_vertex(t, node, node == start, &g));
+  }
+  t->chain_count = 0;
+  for (int32_t node = 2 * g.vertex; *found && node >= 0; node = t->from[node]) {
+    t->chain[t->chain_count++] = node;
+  }
+  return ORB_OK;
+}
+
+/* Makes the chain a path of edges of the sheet. Edges are named by their ends, since splits renumber half-edges. */
+static orb_status lay_path(tracer *t, int32_t e, int *good) {
+  orb_sheet *s = t->sheet;
+  int32_t count = t->chain_count, last = -1;
+  orb_status status = ORB_OK;
+  int32_t *ends = ORB_NEW(t->ctx, int32_t, 2 * (size_t)count);
+  if (!ends) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < count; i++) {
+    int32_t node = t->chain[i];
+    ends[2 * i] = node & 1 ? s->shape.mesh.triangles[node >> 1] : node >> 1;
+    ends[2 * i + 1] = node & 1 ? s->shape.mesh.triangles[orb_next(node >> 1)] : -1;
+  }
+  for (int32_t i = 0; i < count; i++) {
+    int32_t v = ends[2 * i];
+    if (ends[2 * i + 1] >= 0) {
+      int32_t h = orb_sheet_edge(s, v, ends[2 * i + 1]);
+      if (h < 0) {
+        *good = 0;
+        break;
+      }
+      ORB_GO(status, orb_paths_split(t->ctx, s, t->paths, h, &v), end);
+    }
+    t->paths->on[v] = 1;
+    if (last >= 0) {
+      int32_t h = orb_sheet_edge(s, last, v);
+      if (h < 0 || t->paths->path[h] >= 0) {
+        *good = 0;
+        break;
+      }
+      t->paths->path[h] = t->paths->path[s->twin[h]] = e;
+    }
+    last = v;
+  }
+end:
+  orb_free(t->ctx, ends);
+  return status;
+}
+
+static orb_status trace_one(tracer *t, int32_t b, int *good) {
+  int32_t twin = t->base->twin[b];
+  ORB_TRY(tracer_fit(t));
+  ORB_TRY(orb_context_check(t->ctx));
+  if (!set_gates(t, b, 1) || !set_gates(t, twin, 1)) {
+    *good = 0;
+    return ORB_OK;
+  }
+  ORB_TRY(search_path(t, b, good));
+  (void)set_gates(t, b, 0);
+  (void)set_gates(t, twin, 0);
+  if (*good) {
+    ORB_TRY(lay_path(t, edge_name(t->base, b), good));
+    t->base_done[b] = t->base_done[twin] = 1;
+  }
+  return ORB_OK;
+}
+
+typedef struct candidate {
+  double length;
+  int32_t half_edge;
+} candidate;
+
+static int by_length(const void *a, const void *b) {
+  const candidate *x = a, *y = b;
+  return x->length < y->length   ? -1
+         : x->length > y->length ? 1
+                                 : (x->half_edge > y->half_edge) - (x->half_edge < y->half_edge);
+}
+
+static int32_t root_of(int32_t *parent, int32_t v) {
+  while (parent[v] != v) {
+    parent[v] = parent[parent[v]];
+    v = parent[v];
+  }
+  return v;
+}
+
+static orb_status trace_all(tracer *t, candidate *order, int32_t *parent, int *good) {
+  const orb_mesh *mesh = &t->base->shape.mesh;
+  int32_t edges = 0;
+  for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
+    if (h < t->base->twin[h]) {
+      const double *a = point_of(t->sheet, t->at[mesh->triangles[h]]),
+                   *b = point_of(t->sheet, t->at[mesh->triangles[orb_next(h)]]);
+      order[edges++] = (candidate){orb_distance2(a, b), h};
+    }
+  }
+  qsort(order, (size_t)edges, sizeof *order, by_length);
+  for (int32_t v = 0; v < mesh->vertex_count; v++) {
+    parent[v] = v;
+    t->paths->on[t->at[v]] = 1;
+  }
+  *good = 1;
+  for (int tree = 1; tree >= 0; tree--) {
+    for (int32_t i = 0; i < edges && *good; i++) {
+      int32_t b = order[i].half_edge, from = root_of(parent, mesh->triangles[b]),
+              to = root_of(parent, mesh->triangles[orb_next(b)]);
+      if (t->base_done[b] || (tree && from == to)) {
+        continue;
+      }
+      parent[from] = to;
+      ORB_TRY(trace_one(t, b, good));
+    }
+  }
+  return ORB_OK;
+}
+
+orb_status orb_base_trace(orb_context *ctx, orb_sheet *sheet, const orb_sheet *base, const int32_t *at,
+                          orb_paths *paths, int *good) {
+  const orb_mesh *mesh = &base->shape.mesh;
+  tracer t = {.ctx = ctx, .sheet = sheet, .base = base, .at = at, .paths = paths};
+  candidate *order = ORB_NEW(ctx, candidate, 3 * (size_t)mesh->triangle_count);
+  int32_t *parent = ORB_NEW(ctx, int32_t, mesh->vertex_count);
+  orb_status status = ORB_OK;
+  t.base_done = ORB_NEW0(ctx, int32_t, 3 * (size_t)mesh->triangle_count);
+  if (!order || !parent || !t.base_done) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  ORB_GO(status, paths_fit(ctx, sheet, paths), end);
+  ORB_GO(status, trace_all(&t, order, parent, good), end);
+end:
+  orb_free(ctx, order);
+  orb_free(ctx, parent);
+  orb_free(ctx, t.base_done);
+  orb_free(ctx, t.cost);
+  orb_free(ctx, t.from);
+  orb_free(ctx, t.stamp);
+  orb_free(ctx, t.chain);
+  orb_free(ctx, t.gate);
+  orb_free(ctx, t.heap);
+  return status;
+}

@@ -1,0 +1,47 @@
+/* The progressive mesh of `kernel-sampling`: half-edge collapses in place, undone last in, first out.
+ *
+ * Half-edge h = 3t + k runs from tri[h] to tri[orb_next(h)]. A collapse of v1 into v2 kills two triangles and turns the
+ * rest of v1's star to v2; the dead triangles keep their pointers, so (v1, half-edge v1→v2) is all that must be logged.
+ */
+#ifndef ORB_EMBED_KS_MESH_H
+#define ORB_EMBED_KS_MESH_H
+
+#include "orbmorph/embed.h"
+
+typedef struct ks_mesh {
+  int32_t vertex_count, triangle_count, live;
+  const double *x; /* positions on the mesh, total area 4π */
+  int32_t *tri, *twin;
+  int32_t *out;     /* a half-edge out of each live vertex */
+  int32_t *valence; /* of live vertices; 0: collapsed */
+  int32_t log_count;
+  struct ks_collapse {
+    int32_t vertex, edge; /* v1, and the half-edge v1→v2 */
+  } * log;
+} ks_mesh;
+
+/* The next half-edge out of the same vertex, counter-clockwise. */
+static inline int32_t ks_rotate(const ks_mesh *m, int32_t h) {
+  return m->twin[orb_prev(h)];
+}
+static inline int32_t ks_head(const ks_mesh *m, int32_t h) {
+  return m->tri[orb_next(h)];
+}
+
+/* x: positions scaled by the caller; borrowed. */
+ORB_MUST_CHECK orb_status ks_mesh_create(orb_context *ctx, const orb_mesh *mesh, const double *x, ks_mesh *out);
+void ks_mesh_free(orb_context *ctx, ks_mesh *m);
+
+/* Whether collapsing half-edge h = v1→v2 keeps a closed manifold: exactly two common neighbours (link condition), and
+ * more than four vertices. mark: vertex_count ints of the caller, stamp: a value not in it. */
+int ks_link_holds(const ks_mesh *m, int32_t h, int32_t *mark, int32_t stamp);
+
+void ks_collapse_edge(ks_mesh *m, int32_t h);
+
+/* Undoes the last collapse; returns the vertex that is back. */
+int32_t ks_split_last(ks_mesh *m);
+
+/* Eq. 1 down to a tetrahedron, QEM first while more than qem_until vertices live. */
+ORB_MUST_CHECK orb_status ks_simplify(orb_context *ctx, ks_mesh *m, int32_t qem_until);
+
+#endif

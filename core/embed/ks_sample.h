@@ -1,0 +1,50 @@
+/* Sample points of a one-ring, clipped by its kernel and measured by Eq. 3. */
+#ifndef ORB_EMBED_KS_SAMPLE_H
+#define ORB_EMBED_KS_SAMPLE_H
+
+#include "embed/ks_mesh.h"
+
+/* The ring of one vertex: neighbour i and its successor span ring triangle i. All arrays have `capacity` entries. */
+typedef struct ks_ring {
+  int32_t count, capacity;
+  double (*point)[3];                  /* the neighbours on the sphere */
+  double (*plane)[3];                  /* cross(point i, point i+1), from differences */
+  double *side, *side2;                /* chord length of ring edge i, and its square */
+  double *angle_p, *angle_q, *angle_r; /* squared mesh edge opposite to the vertex, to i, to i+1, over 2·area */
+  double *inverse_area;                /* of the mesh triangle, scaled to the sphere */
+  int32_t *vertex;
+  double aspect_exponent; /* of this ring */
+  double *scratch;        /* 2·(capacity + 8) doubles twice, for clipping */
+} ks_ring;
+
+typedef struct ks_sampler {
+  double area_exponent, aspect_exponent;
+  int32_t pair_count; /* of (s, t) in Eq. 2 */
+  double (*pair)[2];  /* s, t */
+  double *candidate;  /* room for the points of one ring: x, y, z, error in planes of `room` */
+  int32_t room;
+  ks_ring ring;
+  int32_t kernel_points; /* how many the last call found inside */
+} ks_sampler;
+
+ORB_MUST_CHECK orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options, ks_sampler *out);
+void ks_sampler_free(orb_context *ctx, ks_sampler *s);
+
+/* Loads the ring of v: sphere points P (3 a vertex), mesh positions m->x times area_scale in area. */
+ORB_MUST_CHECK orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const double *P, int32_t v,
+                                       double area_scale, double area_floor);
+
+/* Takes the best sample from the triangles (apex, i, i+1) for first ≤ i < last into `out`, if one lies in the kernel
+ * and its error is below `bound`; returns whether. draw (≤ 1): the samples
+ * are drawn in towards the apex by this factor. *error: its error. */
+int ks_best_sample(ks_sampler *s, const double apex[3], int32_t first, int32_t last, double draw, double bound,
+                   double out[3], double *error);
+
+/* Eq. 3 at one point; INFINITY outside the kernel. */
+double ks_error_at(ks_sampler *s, const double p[3]);
+
+/* The centroid of the kernel, clipped in the gnomonic chart around `apex`, a point of its closure; 0 if none is found.
+ */
+int ks_kernel_centroid(ks_sampler *s, const double apex[3], double out[3]);
+
+#endif

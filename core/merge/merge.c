@@ -1,0 +1,78 @@
+/* orb_merge(): align, remesh, transfer (the reports), write. */
+#include "orbmorph/merge.h"
+
+#include <string.h>
+
+#include "base/check.h"
+#include "merge/report.h"
+
+void orb_merge_defaults(orb_merge_options *options) {
+  memset(options, 0, sizeof *options);
+  orb_align_defaults(&options->align);
+  orb_remesh_defaults(&options->remesh);
+  orb_asset_defaults(&options->asset);
+}
+
+void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
+  orb_alignment_free(ctx, &result->alignment);
+  orb_supermesh_free(ctx, &result->supermesh);
+  orb_free(ctx, result->shapes);
+  orb_free(ctx, result->landmark_residuals);
+  orb_free(ctx, result->pairs);
+  orb_buffer_free(ctx, &result->asset);
+  memset(result, 0, sizeof *result);
+}
+
+static orb_status transfer_reports(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
+                                   orb_merge_result *out) {
+  int32_t shape_count = out->supermesh.shape_count;
+  out->shapes = ORB_NEW0(ctx, orb_shape_report, shape_count);
+  if (!out->shapes) {
+    return ORB_E_NO_MEMORY;
+  }
+  orb_progress(ctx, "transfer", 0);
+  for (int32_t s = 0; s < shape_count; s++) {
+    ORB_TRY(orb_shape_measure(ctx, &out->alignment.shapes[s], &out->supermesh, s, &out->shapes[s]));
+    orb_progress(ctx, "transfer", 0.8 * (s + 1) / shape_count);
+  }
+  ORB_TRY(orb_report_landmarks(ctx, shapes, landmarks, out));
+  ORB_TRY(orb_report_pairs(ctx, out));
+  orb_progress(ctx, "transfer", 1);
+  return ORB_OK;
+}
+
+orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names, int32_t shape_count,
+                     const orb_landmark *landmarks, int32_t landmark_count, const orb_merge_options *options,
+                     orb_merge_result *out) {
+  double start = orb_clock(), mark = start, now;
+  orb_status status;
+  memset(out, 0, sizeof *out);
+  if (shape_count < 2) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION, "A merge needs two shapes or more.");
+  }
+  orb_progress(ctx, "align", 0);
+  ORB_GO(status, orb_align(ctx, shapes, shape_count, landmarks, landmark_count, &options->align, &out->alignment),
+         fail);
+  out->timings.align = (now = orb_clock()) - mark;
+  mark = now;
+  orb_progress(ctx, "remesh", 0);
+  ORB_GO(status,
+         orb_remesh(ctx, out->alignment.shapes, shape_count, out->alignment.landmark_count, &options->remesh,
+                    &out->supermesh),
+         fail);
+  out->timings.remesh = (now = orb_clock()) - mark;
+  mark = now;
+  ORB_GO(status, transfer_reports(ctx, shapes, landmark_count > 0 ? landmarks : NULL, out), fail);
+  out->timings.transfer = (now = orb_clock()) - mark;
+  mark = now;
+  ORB_GO(status,
+         orb_asset_write(ctx, &out->supermesh, out->alignment.shapes, names, &options->asset, &out->asset_facts,
+                         &out->asset),
+         fail);
+  out->timings.write = (now = orb_clock()) - mark;
+  out->timings.total = now - start;
+  return ORB_OK;
+fail:
+  orb_merge_result_free(ctx, out);
+  return status;
+}

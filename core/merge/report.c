@@ -1,0 +1,213 @@
+#include "merge/report.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "numeric/vec3.h"
+
+enum { ALL_PAIRS_UP_TO = 4 };
+
+/* Landmarks that are no vertex (rotate, rbf inside triangles): where their common point of the sphere, the mean of the
+ * shapes' own, lies on each shape. */
+
+/* The sphere's point at a point of a shape's surface, through the nearest place of the aligned mesh: the same surface,
+ * perhaps with more vertices than the mesh of the request. */
+static void sphere_point(const orb_aligned_shape *shape, const orb_nearest *tree, const double at[3], double out[3]) {
+  orb_place place;
+  orb_nearest_query(tree, at, INFINITY, &place);
+  out[0] = out[1] = out[2] = 0;
+  for (int k = 0; place.triangle >= 0 && k < 3; k++) {
+    const double *p = shape->points + 3 * (int64_t)shape->mesh.triangles[3 * (int64_t)place.triangle + k];
+    for (int c = 0; c < 3; c++) {
+      out[c] += place.at[k] * p[c];
+    }
+  }
+  orb_normalize(out);
+}
+
+/* points: landmark_count × shape_count × 3 wanted positions. One shape at a time: adds its sphere points to `mean`. */
+static orb_status add_sphere_points(orb_context *ctx, const orb_merge_result *out, int32_t s, const double *wanted,
+                                    double *mean) {
+  const orb_aligned_shape *shape = &out->alignment.shapes[s];
+  orb_nearest *tree = NULL;
+  ORB_TRY(orb_nearest_create(ctx, shape->mesh.positions, shape->mesh.triangles, shape->mesh.triangle_count, &tree));
+  for (int32_t i = 0; i < out->alignment.landmark_count; i++) {
+    double point[3];
+    sphere_point(shape, tree, wanted + 3 * ((int64_t)i * out->alignment.shape_count + s), point);
+    for (int c = 0; c < 3; c++) {
+      mean[3 * (int64_t)i + c] += point[c];
+    }
+  }
+  orb_nearest_destroy(ctx, tree);
+  return ORB_OK;
+}
+
+static orb_status residuals_of_shape(orb_context *ctx, orb_merge_result *out, int32_t s, const double *wanted,
+                                     const double *mean) {
+  const orb_aligned_shape *shape = &out->alignment.shapes[s];
+  const orb_supermesh *supermesh = &out->supermesh;
+  int32_t shapes = out->alignment.shape_count;
+  orb_locator *locator = NULL;
+  for (int32_t i = 0; i < out->alignment.landmark_count; i++) {
+    orb_place place;
+    double at[3];
+    int32_t vertex = supermesh->landmark_vertices ? supermesh->landmark_vertices[i] : -1;
+    if (vertex >= 0) {
+      place = supermesh->places[(int64_t)s * supermesh->vertex_count + vertex];
+    } else {
+      if (!locator) {
+        ORB_TRY(orb_locator_create(ctx, shape->points, shape->mesh.vertex_count, shape->mesh.triangles,
+                                   shape->mesh.triangle_count, NULL, &locator));
+      }
+      orb_locate(locator, mean + 3 * (int64_t)i, -1, &place);
+    }
+    orb_place_position(&shape->mesh, &place, at);
+    out->landmark_residuals[(int64_t)i * shapes + s] =
+        sqrt(orb_distance2(at, wanted + 3 * ((int64_t)i * shapes + s))) / out->shapes[s].diagonal;
+  }
+  orb_locator_destroy(ctx, locator);
+  return ORB_OK;
+}
+
+static int all_are_vertices(const orb_supermesh *supermesh, int32_t count) {
+  for (int32_t i = 0; i < count; i++) {
+    if (!supermesh->landmark_vertices || supermesh->landmark_vertices[i] < 0) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+orb_status orb_report_landmarks(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
+                                orb_merge_result *out) {
+  int32_t count = out->alignment.landmark_count, shape_count = out->alignment.shape_count;
+  double *wanted = ORB_NEW(ctx, double, 3 * (int64_t)count * shape_count);
+  double *mean = ORB_NEW0(ctx, double, 3 * (int64_t)count);
+  out->landmark_residuals = ORB_NEW(ctx, double, (int64_t)count *shape_count);
+  orb_status status = wanted && mean && out->landmark_residuals ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status != ORB_OK || count == 0) {
+    goto done;
+  }
+  for (int32_t i = 0; i < count; i++) {
+    for (int32_t s = 0; s < shape_count; s++) {
+      const orb_place *at = landmarks ? &landmarks[i].at[s] : &out->alignment.found[(int64_t)i * shape_count + s];
+      orb_place_position(shapes[s].mesh, at, wanted + 3 * ((int64_t)i * shape_count + s));
+    }
+  }
+  for (int32_t s = 0; s < shape_count && !all_are_vertices(&out->supermesh, count); s++) {
+    ORB_GO(status, add_sphere_points(ctx, out, s, wanted, mean), done);
+  }
+  for (int32_t i = 0; i < count; i++) {
+    orb_normalize(mean + 3 * (int64_t)i);
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    ORB_GO(status, residuals_of_shape(ctx, out, s, wanted, mean), done);
+  }
+done:
+  orb_free(ctx, wanted);
+  orb_free(ctx, mean);
+  return status;
+}
+
+/* The flat normal of an input triangle, unit; zero where it has no area. */
+static void input_normal(const orb_mesh *mesh, int32_t triangle, double out[3]) {
+  const int32_t *corner = mesh->triangles + 3 * (int64_t)triangle;
+  double u[3], w[3];
+  orb_sub(mesh->positions + 3 * (int64_t)corner[1], mesh->positions + 3 * (int64_t)corner[0], u);
+  orb_sub(mesh->positions + 3 * (int64_t)corner[2], mesh->positions + 3 * (int64_t)corner[0], w);
+  orb_cross(u, w, out);
+  orb_normalize(out);
+}
+
+/* Marks the triangles of the supermesh that turn on shape s against the mean of the input's normals under their
+ * corners. */
+static void mark_inverted(const orb_merge_result *out, int32_t s, const double *positions, unsigned char *inverted) {
+  const orb_supermesh *supermesh = &out->supermesh;
+  const orb_place *places = supermesh->places + (int64_t)s * supermesh->vertex_count;
+  double floor = 1e-12 * out->shapes[s].diagonal * out->shapes[s].diagonal;
+  for (int64_t t = 0; t < supermesh->triangle_count; t++) {
+    const int32_t *corner = supermesh->triangles + 3 * t;
+    double u[3], w[3], normal[3], ground[3] = {0};
+    orb_sub(positions + 3 * (int64_t)corner[1], positions + 3 * (int64_t)corner[0], u);
+    orb_sub(positions + 3 * (int64_t)corner[2], positions + 3 * (int64_t)corner[0], w);
+    orb_cross(u, w, normal);
+    for (int k = 0; k < 3; k++) {
+      double one[3];
+      input_normal(&out->alignment.shapes[s].mesh, places[corner[k]].triangle, one);
+      for (int c = 0; c < 3; c++) {
+        ground[c] += one[c];
+      }
+    }
+    inverted[t] = orb_length(normal) > floor && orb_dot(normal, ground) < 0;
+  }
+}
+
+static int32_t list_pairs(int32_t shape_count, orb_pair_report *pairs) {
+  int32_t count = 0;
+  for (int32_t a = 0; a < shape_count; a++) {
+    int32_t last = shape_count <= ALL_PAIRS_UP_TO || a + 1 >= shape_count ? shape_count - 1 : a + 1;
+    for (int32_t b = a + 1; b <= last; b++) {
+      if (pairs) {
+        pairs[count].a = a;
+        pairs[count].b = b;
+      }
+      count++;
+    }
+  }
+  return count;
+}
+
+static orb_status measure_pair(orb_context *ctx, const orb_merge_result *out, double *const *positions,
+                               unsigned char *const *inverted, orb_pair_report *pair) {
+  const orb_supermesh *supermesh = &out->supermesh;
+  int64_t turned = 0;
+  ORB_TRY(orb_distortion_measure(ctx, positions[pair->a], positions[pair->b], supermesh->triangles,
+                                 supermesh->triangle_count, &pair->distortion));
+  for (int64_t t = 0; t < supermesh->triangle_count; t++) {
+    turned += inverted[pair->a][t] | inverted[pair->b][t];
+  }
+  pair->inverted_fraction = (double)turned / supermesh->triangle_count;
+  return ORB_OK;
+}
+
+orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out) {
+  const orb_supermesh *supermesh = &out->supermesh;
+  int32_t shape_count = supermesh->shape_count;
+  double **positions = ORB_NEW0(ctx, double *, shape_count);
+  unsigned char **inverted = ORB_NEW0(ctx, unsigned char *, shape_count);
+  out->pair_count = list_pairs(shape_count, NULL);
+  out->pairs = ORB_NEW0(ctx, orb_pair_report, out->pair_count);
+  orb_status status = positions && inverted && out->pairs ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int32_t s = 0; status == ORB_OK && s < shape_count; s++) {
+    positions[s] = ORB_NEW(ctx, double, 3 * (int64_t)supermesh->vertex_count);
+    inverted[s] = ORB_NEW(ctx, unsigned char, supermesh->triangle_count);
+    if (!positions[s] || !inverted[s]) {
+      status = ORB_E_NO_MEMORY;
+      break;
+    }
+    status =
+        orb_transfer_positions(ctx, &out->alignment.shapes[s], supermesh->places + (int64_t)s * supermesh->vertex_count,
+                               supermesh->vertex_count, positions[s]);
+    if (status == ORB_OK) {
+      mark_inverted(out, s, positions[s], inverted[s]);
+    }
+  }
+  if (status == ORB_OK) {
+    list_pairs(shape_count, out->pairs);
+  }
+  for (int32_t i = 0; status == ORB_OK && i < out->pair_count; i++) {
+    status = measure_pair(ctx, out, positions, inverted, &out->pairs[i]);
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    if (positions) {
+      orb_free(ctx, positions[s]);
+    }
+    if (inverted) {
+      orb_free(ctx, inverted[s]);
+    }
+  }
+  orb_free(ctx, positions);
+  orb_free(ctx, inverted);
+  return status;
+}

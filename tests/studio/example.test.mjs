@@ -1,0 +1,39 @@
+// The example page of the JavaScript client: two files in, a moving morph out.
+import { after, before, test } from 'node:test';
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { join } from 'node:path';
+import { difference, openPage, root, sample, startBrowser, startDaemon, until } from './support.mjs';
+
+let daemon;
+let browser;
+let server;
+let url;
+before(async () => {
+  daemon = await startDaemon();
+  browser = await startBrowser();
+  server = spawn(process.execPath, [join(root, 'client/js/example/serve.mjs')], {
+    env: { ...process.env, ORBMORPH_SERVER: daemon.url, PORT: '0' }, stdio: ['ignore', 'pipe', 'inherit'],
+  });
+  url = await new Promise((resolve) => server.stdout.on('data', (text) => resolve(String(text).match(/http:\S+/)[0])));
+});
+after(async () => {
+  server?.kill();
+  await browser?.close();
+  await daemon?.stop();
+});
+
+test('the example plays a morph of two files', async () => {
+  const { page, done } = await openPage(browser, url, { viewport: { width: 640, height: 480 } });
+  await page.locator('#files').setInputFiles([sample('dog.obj'), sample('giraffe.off')]);
+  await page.getByRole('button', { name: 'Morph' }).click();
+  await until(() => page.locator('#status').innerText().then((text) => /\d+ triangles for dog, giraffe/.test(text)), 'the morph is there', 240_000);
+  const first = await page.screenshot();
+  await until(async () => (await difference(browser, first, await page.screenshot())) > 0.005, 'it moves');
+  await done();
+});
+
+test('nothing outside the folders is served', async () => {
+  for (const path of ['/../package.json', '/three/../../../package.json', '/%2e%2e/package.json', '/serve.txt'])
+    assert.equal((await fetch(url + path)).status, 404);
+});
