@@ -76,7 +76,7 @@ static void add_areas(const orb_supermesh *supermesh, const double *positions, d
 }
 
 static void solve(const fit_points *points, orb_fit fit, orb_motion *out) {
-  double fixed[3], moved[3], h[3][3] = {{0}}, spread_fixed = 0, spread_moved = 0, q[4];
+  double fixed[3], moved[3], h[3][3] = {{0}}, spread_fixed = 0, spread_moved = 0, q[4], rotation[3][3];
   mean_of(points, points->fixed, fixed);
   mean_of(points, points->moved, moved);
   for (int32_t i = 0; i < points->count; i++) {
@@ -92,7 +92,8 @@ static void solve(const fit_points *points, orb_fit fit, orb_motion *out) {
     spread_fixed += w * orb_dot(b, b);
   }
   orb_rotation_fit(h, q);
-  orb_rotation_matrix(q, out->rotation);
+  orb_rotation_matrix(q, rotation);
+  memcpy(out->rotation, rotation, sizeof rotation);
   out->scale =
       fit == ORB_FIT_SIMILARITY && spread_moved > 0 && spread_fixed > 0 ? sqrt(spread_fixed / spread_moved) : 1;
   for (int c = 0; c < 3; c++) {
