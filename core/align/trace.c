@@ -27,6 +27,7 @@ typedef struct tracer {
   int32_t heap_count, heap_capacity;
   int32_t *chain; /* nodes of the path found, back to front */
   int32_t chain_count;
+  int32_t most_triangles; /* the sheet may not grow beyond */
 } tracer;
 
 void orb_paths_free(orb_context *ctx, orb_paths *paths) {
@@ -348,7 +349,7 @@ static orb_status trace_one(tracer *t, int32_t b, int *good) {
   int32_t twin = t->base->twin[b];
   ORB_TRY(tracer_fit(t));
   ORB_TRY(orb_context_check(t->ctx));
-  if (!set_gates(t, b, 1) || !set_gates(t, twin, 1)) {
+  if (t->sheet->shape.mesh.triangle_count > t->most_triangles || !set_gates(t, b, 1) || !set_gates(t, twin, 1)) {
     *good = 0;
     return ORB_OK;
   }
@@ -416,6 +417,8 @@ orb_status orb_base_trace(orb_context *ctx, orb_sheet *sheet, const orb_sheet *b
                           orb_paths *paths, int *good) {
   const orb_mesh *mesh = &base->shape.mesh;
   tracer t = {.ctx = ctx, .sheet = sheet, .base = base, .at = at, .paths = paths};
+  int64_t most = 400000 + 8 * (int64_t)sheet->shape.mesh.triangle_count;
+  t.most_triangles = (int32_t)(most < INT32_MAX / 8 ? most : INT32_MAX / 8);
   candidate *order = ORB_NEW(ctx, candidate, 3 * (size_t)mesh->triangle_count);
   int32_t *parent = ORB_NEW(ctx, int32_t, mesh->vertex_count);
   orb_status status = ORB_OK;

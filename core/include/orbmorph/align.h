@@ -35,13 +35,14 @@ typedef struct orb_align_shape {
 } orb_align_shape;
 
 /* A shape after alignment. Its mesh is the same surface, perhaps with more vertices (landmarks inside triangles or
- * on edges, edges split): every triangle lies in triangle parent[t] of the mesh that was given. */
+ * on edges, edges split): every triangle lies in triangle parent[t] of the mesh that was given. New vertices have
+ * mesh.source −1; attributes of corners are interpolated. */
 typedef struct orb_aligned_shape {
   orb_mesh mesh;
   int32_t *parent;
   double *points; /* certified on the aligned sphere */
   orb_certificate certificate;
-  int32_t *landmark_vertices; /* landmark_count: each landmark is this vertex (−1: inside a triangle, rotate/rbf) */
+  int32_t *landmark_vertices; /* landmark_count: each landmark is this vertex */
 } orb_aligned_shape;
 
 typedef struct orb_alignment {
@@ -52,8 +53,21 @@ typedef struct orb_alignment {
   double energy;      /* composed symmetric Dirichlet, capped, area-weighted; lower is better; NaN if not measured */
 } orb_alignment;
 
-/* Aligns. pin: landmark vertices have bit-equal points on all shapes. Errors: ORB_E_BAD_LANDMARKS names those that
- * contradict or cannot be met; ORB_E_BAD_OPTION for pin and rbf without landmarks. */
+/* Aligns shape_count ≥ 1 shapes; the first keeps its place unless the method says otherwise. Every result is certified.
+ *
+ * rotate: rotations only, by landmarks (generalised Procrustes; Peng & Timalsena 2016, section 7.1), or without any by
+ * a search over SO(3) for the rotation under which the map between the shapes is nearest to a rigid motion. rbf: the
+ * paper's warp (7.2) from there, in rbf_steps steps a pass, to the spherical means, or one_way to the first shape's
+ * points. A landmark's influence ends at its radius (0: rbf_radius; that 0: 1.0). A step that folds is untangled
+ * locally, else halved, else the sphere is relaxed before it; landmarks that cross on their way are carried over as pin
+ * would. pin: the shapes are embedded anew with the landmarks as constraints, meeting at their spherical means;
+ * landmarks that would have to pass through one another are met at the first shape's points, on surfaces with more
+ * edges. After pin and rbf a landmark's vertices have bit-equal points on all shapes. auto: pin where landmarks are
+ * given, else the rotation search; it does not find landmarks of its own.
+ *
+ * Landmarks at one and the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
+ * those that are out of range, share a place on some shapes only, or cannot be met; ORB_E_BAD_OPTION for pin and rbf
+ * without landmarks. About O(n log n) in triangles; random far-apart landmarks cost much more than like ones. */
 ORB_MUST_CHECK orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                     const orb_landmark *landmarks, int32_t landmark_count,
                                     const orb_align_options *options, orb_alignment *out);

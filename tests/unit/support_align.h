@@ -1,0 +1,16 @@
+/* Checks of an alignment that do not trust the library's own certificate. */
+#ifndef SUPPORT_ALIGN_H
+#define SUPPORT_ALIGN_H
+
+#include "orbmorph/align.h"
+
+/* Closed (T = 2V − 4), valid, positive by exact arithmetic on a sample, once round the sphere by solid angles, and
+ * landmark k at bit-equal points on all shapes. */
+void check_alignment(const orb_alignment *alignment, int landmarks_meet);
+
+/* Runs orb_align() and checks the result; prints the reason where it fails. Free `out` after. */
+void align_and_check(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                     const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                     orb_alignment *out);
+
+#endif
