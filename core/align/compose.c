@@ -23,12 +23,14 @@
 enum {
   FIRST_LEVEL = 8000, /* vertices at which a start begins */
   LAST_START = 60000, /* and beyond which it gives up untangling */
-  SOFT_ROUNDS = 12,
-  SOFT_SWEEPS = 20
+  SOFT_ROUNDS = 8,
+  SOFT_SWEEPS = 20,
+  SAMPLES = 150 /* of a map, from which the moving shape is bent anew */
 };
 
 static const double GOOD_ENERGY = 1.2; /* below it the shapes correspond: no further start is tried */
-static const double STILL = 1e-3;      /* of a mean edge: less does not count as moving */
+static const double EPSILON = 0.1;
+static const double STILL = 1e-3; /* of a mean edge: less does not count as moving */
 
 typedef struct effort {
   double growth; /* of the vertices from level to level */
@@ -55,6 +57,7 @@ typedef struct composer {
   orb_place *place; /* by vertex of the surface: where it was on the last level */
   double *best;     /* points of the best start, mesh order */
   double best_energy;
+  int passes; /* bends through samples of the best map */
   effort effort;
 } composer;
 
@@ -87,7 +90,11 @@ static orb_status prepare(composer *c, const orb_aligned_shape *fixed) {
   c->local = ORB_NEW(ctx, int32_t, n);
   c->place = ORB_NEW0(ctx, orb_place, n);
   c->best = ORB_NEW(ctx, double, 3 * n);
-  if (!c->x || !c->normal || !c->keep || !c->position || !c->local || !c->place || !c->best) {
+  c->goal = ORB_NEW(ctx, double, 3 * n);
+  c->goal_normal = ORB_NEW(ctx, double, 3 * n);
+  c->goal_place = ORB_NEW(ctx, orb_place, n);
+  if (!c->x || !c->normal || !c->keep || !c->position || !c->local || !c->place || !c->best || !c->goal ||
+      !c->goal_normal || !c->goal_place) {
     return ORB_E_NO_MEMORY;
   }
   orb_extent extent;
@@ -149,33 +156,56 @@ static void find_goal_places(void *arg, int64_t begin, int64_t end, int thread) 
   }
 }
 
-/* Spatial targets with the normals that the bent shape has. */
-static orb_status bend(composer *c, const orb_aligned_shape *fixed) {
-  orb_context *ctx = c->ctx;
-  const orb_mesh *mesh = &c->moving->mesh;
-  int32_t *pairs = ORB_NEW(ctx, int32_t, 2 * (size_t)c->landmark_count), count = 0;
-  double fit;
-  orb_status status = ORB_E_NO_MEMORY;
-  c->goal = ORB_NEW(ctx, double, 3 * (size_t)c->vertex_count);
-  c->goal_normal = ORB_NEW(ctx, double, 3 * (size_t)c->vertex_count);
-  c->goal_place = ORB_NEW(ctx, orb_place, c->vertex_count);
-  if (!pairs || !c->goal || !c->goal_normal || !c->goal_place) {
-    goto done;
-  }
+/* The landmarks as anchors, and, where a map is known already (c->best), samples of it. Arrays of the caller: room for
+ * landmark_count + SAMPLES. */
+static orb_status gather_anchors(composer *c, const orb_aligned_shape *fixed, int samples, int32_t *vertex,
+                                 double *goal, cm_anchors *out) {
+  *out = (cm_anchors){.vertex = vertex, .goal = goal};
   for (int32_t i = 0; i < c->landmark_count; i++) {
-    if (c->moving->landmark_vertices[i] >= 0 && fixed->landmark_vertices[i] >= 0) {
-      pairs[2 * count] = c->moving->landmark_vertices[i];
-      pairs[2 * count++ + 1] = fixed->landmark_vertices[i];
+    int32_t u = fixed->landmark_vertices[i];
+    if (c->moving->landmark_vertices[i] >= 0 && u >= 0) {
+      memcpy(goal + 3 * (size_t)out->count, c->b.x + 3 * (size_t)u, sizeof(double[3]));
+      vertex[out->count++] = c->moving->landmark_vertices[i];
     }
   }
-  ORB_GO(status, cm_spatial_targets(ctx, &c->b, c->x, c->normal, c->vertex_count, pairs, count, c->goal, &fit), done);
-  cm_normals(c->goal, c->vertex_count, mesh->triangles, mesh->triangle_count, c->goal_normal);
+  out->exact = out->count;
+  samples = samples < c->vertex_count / 2 ? samples : c->vertex_count / 2;
+  if (samples > 0) {
+    ORB_TRY(cm_spread(c->ctx, c->x, c->vertex_count, samples, vertex + out->count));
+  }
+  for (int i = 0; i < samples; i++) {
+    int32_t v = vertex[out->exact + i];
+    if (!c->keep[v]) { /* a landmark is an anchor already */
+      orb_place place;
+      orb_locate(c->b.locator, c->best + 3 * (size_t)v, -1, &place);
+      cm_surface_at(&c->b, &place, goal + 3 * (size_t)out->count, NULL, NULL);
+      vertex[out->count++] = v;
+    }
+  }
+  return ORB_OK;
+}
+
+/* Spatial targets, with the normals that the bent shape has, and the nearest places to them. */
+static orb_status bend(composer *c, const orb_aligned_shape *fixed, int samples) {
+  orb_context *ctx = c->ctx;
+  const orb_mesh *mesh = &c->moving->mesh;
+  cm_anchors anchors;
+  double fit, *goal = ORB_NEW(ctx, double, 3 * ((size_t)c->landmark_count + SAMPLES));
+  int32_t *vertex = ORB_NEW(ctx, int32_t, (size_t)c->landmark_count + SAMPLES);
   goal_job job = {.c = c};
+  orb_status status = ORB_E_NO_MEMORY;
+  if (!goal || !vertex) {
+    goto done;
+  }
+  ORB_GO(status, gather_anchors(c, fixed, samples, vertex, goal, &anchors), done);
+  ORB_GO(status, cm_spatial_targets(ctx, &c->b, c->x, c->normal, c->vertex_count, &anchors, c->goal, &fit), done);
+  cm_normals(c->goal, c->vertex_count, mesh->triangles, mesh->triangle_count, c->goal_normal);
   ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &job.tree), done);
   orb_parallel_for(ctx, c->vertex_count, 64, find_goal_places, &job);
   orb_nearest_destroy(ctx, job.tree);
 done:
-  orb_free(ctx, pairs);
+  orb_free(ctx, goal);
+  orb_free(ctx, vertex);
   return status;
 }
 
@@ -256,13 +286,13 @@ static void set_pull(const composer *c, cm_level *l, const int32_t *to_mesh, dou
 
 /* Flips are driven out: sweeps against a growing barrier, then untangling of a copy, until that succeeds. */
 static orb_status clear_flips(composer *c, cm_level *l, int rounds, int32_t *flips) {
-  cm_rules rules = {.soft = 1, .barrier = 1, .omega = 1};
+  cm_rules rules = {.soft = 1, .barrier = 1e-4, .epsilon = EPSILON, .omega = 1};
   double *copy = ORB_NEW(c->ctx, double, 3 * (size_t)l->count);
   orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
   *flips = cm_level_flips(l);
   for (int round = 0; round < rounds && *flips && status == ORB_OK; round++) {
     ORB_GO(status, sweeps(c, l, rules, SOFT_SWEEPS), done);
-    rules.barrier *= 1.3;
+    rules.barrier *= 3;
     *flips = cm_level_flips(l);
     if (*flips) {
       memcpy(copy, l->x, 3 * (size_t)l->count * sizeof *copy);
@@ -330,7 +360,8 @@ static void snapshot_restore(const snapshot *s, cm_level *l) {
 /* Vertices that barriers have locked in get free where flips are allowed for a while. What comes of it is kept if it
  * can be untangled and is better. */
 static orb_status loosen(composer *c, cm_level *l, int soft_sweeps, int hard_sweeps) {
-  const cm_rules soft = {.soft = 1, .barrier = 1, .omega = 1}, hard = {.soft = 0, .barrier = 1, .omega = 1};
+  const cm_rules soft = {.soft = 1, .barrier = 1, .epsilon = EPSILON, .omega = 1},
+                 hard = {.soft = 0, .barrier = 1, .epsilon = EPSILON, .omega = 1};
   snapshot before = {0};
   double energy = cm_level_energy(l);
   int32_t flips;
@@ -354,13 +385,13 @@ done:
 /* From a level without flips up to all vertices. */
 static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, int *failed) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
-  const cm_rules hard = {.soft = 0, .barrier = 1, .omega = 1};
+  const cm_rules hard = {.soft = 0, .barrier = 1, .epsilon = EPSILON, .omega = 1};
   unsigned char *known = ORB_NEW(c->ctx, unsigned char, c->vertex_count);
   orb_status status = known ? ORB_OK : ORB_E_NO_MEMORY;
   int first = 1;
   while (status == ORB_OK) {
     int last = r->live == c->vertex_count;
-    set_pull(c, l, to_mesh, last || !c->goal ? 0 : pull);
+    set_pull(c, l, to_mesh, last ? 0 : pull);
     pull *= 0.5;
     int count = last             ? c->effort.final_sweeps
                 : first          ? c->effort.first_sweeps
@@ -484,16 +515,23 @@ static orb_status given_energy(composer *c, double *energy) {
 orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_aligned_shape *moving,
                        int32_t landmark_count, orb_preset preset, double energy[2], int *improved) {
   composer c = {.ctx = ctx, .moving = moving, .landmark_count = landmark_count, .effort = effort_of(preset)};
+  c.passes = preset == ORB_PRESET_QUALITY ? 6 : 3;
   orb_certificate certificate;
   orb_status status;
   *improved = 0;
   ORB_GO(status, prepare(&c, fixed), done);
   ORB_GO(status, given_energy(&c, &energy[0]), done);
   energy[1] = c.best_energy = energy[0];
-  ORB_GO(status, bend(&c, fixed), done);
+  memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
+  ORB_GO(status, bend(&c, fixed, 0), done);
   ORB_GO(status, run_start(&c, 1), done);
   if (preset == ORB_PRESET_QUALITY || c.best_energy > GOOD_ENERGY) {
     ORB_GO(status, run_start(&c, 0), done);
+    for (double last = INFINITY; c.best_energy < 0.99 * last && c.passes-- > 0;) {
+      last = c.best_energy;
+      ORB_GO(status, bend(&c, fixed, SAMPLES), done);
+      ORB_GO(status, run_start(&c, 1), done);
+    }
   }
   if (c.best_energy < energy[0]) {
     ORB_GO(status,

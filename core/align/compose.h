@@ -41,12 +41,24 @@ int cm_surface_trace(const cm_surface *b, const orb_place *from, const double st
 /* Angle-weighted unit vertex normals. */
 void cm_normals(const double *x, int32_t vertex_count, const int32_t *triangles, int32_t triangle_count, double *out);
 
+/* What holds a spatial target: vertices of the moving shape and where they belong, 3 doubles each. The first `exact`
+ * are landmarks and hold exactly, the others are samples of a map that is known roughly. */
+typedef struct cm_anchors {
+  int32_t count, exact;
+  const int32_t *vertex;
+  const double *goal;
+} cm_anchors;
+
 /* Spatial targets: where each vertex of the moving shape would lie if it were bent onto the fixed one in space: a
- * thin-plate spline through the landmarks, then annealed non-rigid ICP. x, normal: of the moving shape, scaled like
- * cm_surface; landmarks[2·i], [2·i+1]: vertices of the moving and of the fixed shape; out: 3 a vertex. Without
- * landmarks rigid ICP from 24 rotations comes first. *fit: mean distance from the fixed shape in the end. */
+ * thin-plate spline through the anchors, then annealed non-rigid ICP. x, normal: of the moving shape, scaled like
+ * cm_surface; out: 3 a vertex. With fewer than four anchors rigid ICP from 24 rotations comes first. *fit: mean
+ * distance from the fixed shape in the end. */
 ORB_MUST_CHECK orb_status cm_spatial_targets(orb_context *ctx, const cm_surface *b, const double *x,
-                                             const double *normal, int32_t vertex_count, const int32_t *landmarks,
-                                             int32_t landmark_count, double *out, double *fit);
+                                             const double *normal, int32_t vertex_count, const cm_anchors *anchors,
+                                             double *out, double *fit);
+
+/* `count` vertices spread over a shape by farthest points; out: their numbers. */
+ORB_MUST_CHECK orb_status cm_spread(orb_context *ctx, const double *x, int32_t vertex_count, int32_t count,
+                                    int32_t *out);
 
 #endif

@@ -31,6 +31,7 @@ typedef struct cm_level {
 typedef struct cm_rules {
   int soft;       /* flips are allowed against a finite barrier */
   double barrier; /* strength of the hinge barrier on the sphere's determinants */
+  double epsilon; /* of the regularised area, over min(a, D/2): the larger, the more freely triangles turn over */
   double omega;   /* over-relaxation */
   double still;   /* a vertex waits while it and its neighbours last moved by less than this */
 } cm_rules;

@@ -15,7 +15,6 @@
 #include "numeric/vec3.h"
 
 enum { RING_MAX = 256, TRIES = 8, GRAIN = 32 };
-static const double EPSILON = 0.1;     /* ε over min(a, D/2) */
 static const double HINGE = 0.1;       /* where the sphere's barrier begins */
 static const double SHRINK = 0.2;      /* least ratio of a determinant in one move */
 static const double SOFT_BELOW = 0.05; /* below that the soft barrier goes on as a parabola */
@@ -101,7 +100,8 @@ static void sphere_jacobian(const cm_surface *b, const orb_place *place, const d
 }
 
 /* The in-plane area part of a term, added to the Newton system. */
-static void add_stretch(term *t, const double y[3], const double *e1, const double *e2, newton *n) {
+static void add_stretch(term *t, const cm_rules *rules, const double y[3], const double *e1, const double *e2,
+                        newton *n) {
   double u[3], z[3];
   orb_sub(y, t->q, u);
   orb_sub(y, t->r, z);
@@ -109,7 +109,7 @@ static void add_stretch(term *t, const double y[3], const double *e1, const doub
   double d = 0.5 * (t->cv * t->qr2 + t->cq * orb_dot(z, z) + t->cr * orb_dot(u, u));
   double d1 = t->cq * orb_dot(z, e1) + t->cr * orb_dot(u, e1), d2 = t->cq * orb_dot(z, e2) + t->cr * orb_dot(u, e2);
   double dd = t->cq + t->cr;
-  t->epsilon = EPSILON * (fmin(0.5 * d, t->area) + 1e-4 * t->area);
+  t->epsilon = rules->epsilon * (fmin(0.5 * d, t->area) + 1e-4 * t->area);
   double e = t->epsilon, root = sqrt(s * s + e * e), c = chi(s, e), c1 = c / root;
   double c2 = 0.5 * e * e / (root * root * root), h = t->area / c;
   h *= h;
@@ -207,7 +207,7 @@ static double step_vertex(cm_level *l, const cm_surface *b, const cm_rules *rule
   int32_t count = load_terms(l, b, v, terms);
   sphere_jacobian(b, &l->place[v], x, j1, j2);
   for (int32_t i = 0; i < count; i++) {
-    add_stretch(&terms[i], y, e1, e2, &n);
+    add_stretch(&terms[i], rules, y, e1, e2, &n);
     add_hinge(&terms[i], rules, j1, j2, &n);
     longest = fmax(longest, terms[i].qr2);
   }
@@ -259,7 +259,7 @@ int cm_level_try(cm_level *l, const cm_surface *b, const cm_rules *rules, int32_
   int32_t count = load_terms(l, b, v, terms);
   newton present = {0};
   for (int32_t i = 0; i < count; i++) { /* sets the terms' ε */
-    add_stretch(&terms[i], l->y + 3 * (size_t)v, b->frame, b->frame + 3, &present);
+    add_stretch(&terms[i], rules, l->y + 3 * (size_t)v, b->frame, b->frame + 3, &present);
   }
   cm_surface_at(b, place, y, x, n);
   double before = evaluate(terms, count, l->y + 3 * (size_t)v, l->x + 3 * (size_t)v, rules, 0);

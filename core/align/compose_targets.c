@@ -1,9 +1,9 @@
 /* Spatial targets of a composed map: the moving shape bent onto the fixed one in space.
  *
  * A thin-plate spline in space (kernel |r|, affine part; Duchon 1977) carries the moving shape. It starts through the
- * landmarks, or, where there are fewer than four, from the best of 24 rigid registrations (Besl & McKay 1992). Rounds
+ * anchors, or, where there are fewer than four, from the best of 24 rigid registrations (Besl & McKay 1992). Rounds
  * of iterative closest points refine it: controls spread over the moving shape look for the nearest vertex of the fixed
- * one in position and half-weighted normal; more controls and less stiffness from round to round. Landmarks keep their
+ * one in position and half-weighted normal; more controls and less stiffness from round to round. Anchors keep their
  * targets throughout. Lengths are those of shapes scaled to area 4π.
  */
 #include <lapacke.h>
@@ -23,7 +23,7 @@ enum {
   FIXED_SEARCH = 50000
 };
 static const double NORMAL_WEIGHT = 0.25; /* of |n − n'|², against |x − x'|² */
-static const double FIRST_STIFFNESS = 1.0, LAST_STIFFNESS = 0.02, LANDMARK_STIFFNESS = 1e-6;
+static const double FIRST_STIFFNESS = 1.0, LAST_STIFFNESS = 0.02, LANDMARK_STIFFNESS = 1e-6, SAMPLE_STIFFNESS = 0.1;
 
 typedef struct spline {
   int32_t count;
@@ -36,8 +36,7 @@ typedef struct targets_run {
   const cm_surface *b;
   const double *x, *normal;
   int32_t vertex_count;
-  const int32_t *landmarks;
-  int32_t landmark_count;
+  const cm_anchors *anchors;
   int32_t stride;   /* through the fixed shape's vertices */
   int32_t *control; /* farthest points of the moving shape */
   int32_t control_count;
@@ -84,7 +83,7 @@ static void map_normal(const double j[9], const double n[3], double out[3]) {
   orb_normalize(out);
 }
 
-/* Fits the spline to `count` centres (first the landmarks) and goals, with stiffness on the diagonal. */
+/* Fits the spline to `count` centres (first the anchors) and goals, with stiffness on the diagonal. */
 static orb_status spline_fit(targets_run *run, int32_t count, double stiffness) {
   spline *s = &run->s;
   size_t n = (size_t)count + 4;
@@ -94,7 +93,9 @@ static orb_status spline_fit(targets_run *run, int32_t count, double stiffness) 
     for (int32_t j = 0; j < count; j++) {
       run->matrix[(size_t)i * n + (size_t)j] = -sqrt(orb_distance2(p, s->centre + 3 * (size_t)j));
     }
-    run->matrix[(size_t)i * n + (size_t)i] += i < run->landmark_count ? LANDMARK_STIFFNESS : stiffness;
+    run->matrix[(size_t)i * n + (size_t)i] += i < run->anchors->exact   ? LANDMARK_STIFFNESS
+                                              : i < run->anchors->count ? SAMPLE_STIFFNESS
+                                                                        : stiffness;
     for (size_t k = 0; k < 4; k++) {
       double value = k ? p[k - 1] : 1;
       run->matrix[(size_t)i * n + (size_t)count + k] = value;
@@ -112,27 +113,24 @@ static orb_status spline_fit(targets_run *run, int32_t count, double stiffness) 
   return ORB_OK;
 }
 
-/* Farthest-point order over the moving shape, from vertex 0's farthest. */
-static orb_status choose_controls(targets_run *run) {
-  double *far = ORB_NEW(run->ctx, double, run->vertex_count);
+orb_status cm_spread(orb_context *ctx, const double *x, int32_t vertex_count, int32_t count, int32_t *out) {
+  double *far = ORB_NEW(ctx, double, vertex_count);
   if (!far) {
     return ORB_E_NO_MEMORY;
   }
-  int32_t want = run->vertex_count < LAST_CONTROLS ? run->vertex_count : LAST_CONTROLS, last = 0;
-  for (int32_t v = 0; v < run->vertex_count; v++) {
+  for (int32_t v = 0; v < vertex_count; v++) {
     far[v] = INFINITY;
   }
-  for (int32_t i = 0; i < want; i++) {
+  for (int32_t i = 0, last = 0; i < count; i++) {
     int32_t best = 0;
-    for (int32_t v = 0; v < run->vertex_count; v++) {
-      double d = orb_distance2(run->x + 3 * (size_t)v, run->x + 3 * (size_t)last);
+    for (int32_t v = 0; v < vertex_count; v++) {
+      double d = orb_distance2(x + 3 * (size_t)v, x + 3 * (size_t)last);
       far[v] = d < far[v] ? d : far[v];
       best = far[v] > far[best] ? v : best;
     }
-    run->control[i] = last = best;
+    out[i] = last = best;
   }
-  run->control_count = want;
-  orb_free(run->ctx, far);
+  orb_free(ctx, far);
   return ORB_OK;
 }
 
@@ -157,7 +155,7 @@ static void find_goals(void *arg, int64_t begin, int64_t end, int thread) {
   targets_run *run = arg;
   (void)thread;
   for (int64_t i = begin; i < end; i++) {
-    size_t c = (size_t)i + (size_t)run->landmark_count;
+    size_t c = (size_t)i + (size_t)run->anchors->count;
     double jacobian[9], *to = run->mapped + 6 * i;
     const int32_t v = run->control[i];
     spline_at(&run->s, run->x + 3 * (size_t)v, to, jacobian);
@@ -177,10 +175,10 @@ static void find_goals(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-static void load_landmarks(targets_run *run) {
-  for (int32_t i = 0; i < run->landmark_count; i++) {
-    memcpy(run->s.centre + 3 * (size_t)i, run->x + 3 * (size_t)run->landmarks[2 * i], 3 * sizeof(double));
-    memcpy(run->goal + 3 * (size_t)i, run->b->x + 3 * (size_t)run->landmarks[2 * i + 1], 3 * sizeof(double));
+static void load_anchors(targets_run *run) {
+  for (int32_t i = 0; i < run->anchors->count; i++) {
+    memcpy(run->s.centre + 3 * (size_t)i, run->x + 3 * (size_t)run->anchors->vertex[i], 3 * sizeof(double));
+    memcpy(run->goal + 3 * (size_t)i, run->anchors->goal + 3 * (size_t)i, 3 * sizeof(double));
   }
 }
 
@@ -189,7 +187,7 @@ static orb_status icp_round(targets_run *run, int32_t controls, double stiffness
   orb_parallel_for(run->ctx, controls, 8, find_goals, run);
   ORB_TRY(orb_context_check(run->ctx));
   double sum = 0;
-  int32_t facing = 0, near = 0, kept = run->landmark_count;
+  int32_t facing = 0, near = 0, kept = run->anchors->count;
   for (int32_t i = 0; i < controls; i++) {
     if (run->distance[i] >= 0) {
       sum += sqrt(run->distance[i]);
@@ -203,11 +201,11 @@ static orb_status icp_round(targets_run *run, int32_t controls, double stiffness
   if (near < 8) {
     return ORB_OK; /* nothing to hold on to: the map stays as it is */
   }
-  load_landmarks(run);
+  load_anchors(run);
   for (int32_t i = 0; i < controls; i++) {
     if (run->distance[i] >= 0 && sqrt(run->distance[i]) <= 3 * *fit) {
       memcpy(run->s.centre + 3 * (size_t)kept, run->x + 3 * (size_t)run->control[i], 3 * sizeof(double));
-      memmove(run->goal + 3 * (size_t)kept, run->goal + 3 * ((size_t)i + (size_t)run->landmark_count),
+      memmove(run->goal + 3 * (size_t)kept, run->goal + 3 * ((size_t)i + (size_t)run->anchors->count),
               3 * sizeof(double));
       kept++;
     }
@@ -272,13 +270,13 @@ static orb_status rigid_icp(targets_run *run, const double start[9], double *sco
     set_rigid(&run->s, r, t);
     orb_parallel_for(run->ctx, samples, 8, find_goals, run);
     ORB_TRY(orb_context_check(run->ctx));
-    load_landmarks(run);
+    load_anchors(run);
     double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, h[9] = {0}, total = 0, weight_sum = 0;
     for (int pass = 0; pass < 2; pass++) {
-      for (int32_t i = -run->landmark_count; i < samples; i++) {
-        const double *goal = run->goal + 3 * ((size_t)(i + run->landmark_count));
+      for (int32_t i = -run->anchors->count; i < samples; i++) {
+        const double *goal = run->goal + 3 * ((size_t)(i + run->anchors->count));
         const double *p =
-            i < 0 ? run->s.centre + 3 * (size_t)(i + run->landmark_count) : run->x + 3 * (size_t)run->control[i];
+            i < 0 ? run->s.centre + 3 * (size_t)(i + run->anchors->count) : run->x + 3 * (size_t)run->control[i];
         double w = i < 0 ? (double)samples : 1;
         for (int k = 0; k < 3; k++) {
           if (pass == 0) {
@@ -306,7 +304,7 @@ static orb_status rigid_icp(targets_run *run, const double start[9], double *sco
     for (int32_t i = 0; i < samples; i++) {
       total += fmin(run->distance[i] < 0 ? 4 : run->distance[i], 4);
     }
-    for (int32_t i = 0; i < run->landmark_count; i++) {
+    for (int32_t i = 0; i < run->anchors->count; i++) {
       double y[3];
       spline_at(&run->s, run->s.centre + 3 * (size_t)i, y, NULL);
       total += samples * fmin(orb_distance2(y, run->goal + 3 * (size_t)i), 4);
@@ -334,10 +332,11 @@ static orb_status best_rigid(targets_run *run) {
 }
 
 static orb_status targets_compute(targets_run *run, double *out, double *fit) {
-  ORB_TRY(choose_controls(run));
-  if (run->landmark_count >= 4) {
-    load_landmarks(run);
-    ORB_TRY(spline_fit(run, run->landmark_count, LANDMARK_STIFFNESS));
+  run->control_count = run->vertex_count < LAST_CONTROLS ? run->vertex_count : LAST_CONTROLS;
+  ORB_TRY(cm_spread(run->ctx, run->x, run->vertex_count, run->control_count, run->control));
+  if (run->anchors->count >= 4) {
+    load_anchors(run);
+    ORB_TRY(spline_fit(run, run->anchors->count, LANDMARK_STIFFNESS));
   } else {
     ORB_TRY(best_rigid(run));
   }
@@ -355,16 +354,14 @@ static orb_status targets_compute(targets_run *run, double *out, double *fit) {
 }
 
 orb_status cm_spatial_targets(orb_context *ctx, const cm_surface *b, const double *x, const double *normal,
-                              int32_t vertex_count, const int32_t *landmarks, int32_t landmark_count, double *out,
-                              double *fit) {
-  size_t most = LAST_CONTROLS + (size_t)landmark_count;
+                              int32_t vertex_count, const cm_anchors *anchors, double *out, double *fit) {
+  size_t most = LAST_CONTROLS + (size_t)anchors->count;
   targets_run run = {.ctx = ctx,
                      .b = b,
                      .x = x,
                      .normal = normal,
                      .vertex_count = vertex_count,
-                     .landmarks = landmarks,
-                     .landmark_count = landmark_count,
+                     .anchors = anchors,
                      .stride = 1 + b->vertex_count / FIXED_SEARCH};
   orb_status status = ORB_E_NO_MEMORY;
   run.control = ORB_NEW(ctx, int32_t, LAST_CONTROLS);
