@@ -1,10 +1,11 @@
 /* Parallel loops on threads of the context's own.
  *
- * Contract. One loop runs at a time; the caller takes part as thread 0. The owner publishes a loop under the lock by
- * raising `round`; workers that see a new round take chunks from the atomic counter until none is left, then report
- * back by lowering `working`. The caller returns when the counter is spent and no worker is inside the loop. Workers
- * sleep on a condition variable between loops after a short spin. Threads that cannot be started are done without:
- * results do not depend on how many there are.
+ * Contract. One loop runs at a time; the caller takes part as thread 0. The owner publishes a loop under the lock: it
+ * sets `open` and raises `round`. A worker that sees a new round enters under the lock, if the loop is still open, and
+ * counts itself in `inside`; it takes chunks from the atomic counter until none is left, and leaves under the lock. The
+ * caller, when the counter is spent, closes the loop and waits only for workers that are inside: one that was too late
+ * to enter (the machine is busy) holds nobody up. Workers spin for a short while between loops, then sleep on a
+ * condition variable. Threads that cannot be started are done without: results do not depend on how many there are.
  */
 #include <sched.h>
 #include <stdlib.h>
@@ -13,14 +14,15 @@
 #include "base/check.h"
 #include "base/context.h"
 
-enum { MAX_WORKERS = 63, SPINS = 2000 };
+enum { MAX_WORKERS = 63, SPINS = 1000 };
 
 struct orb_pool {
   pthread_mutex_t lock;
   pthread_cond_t wake, done;
-  int workers, working, stopping;
+  int workers, stopping;
+  int open;          /* a loop may be entered; under the lock, as `inside` is written */
+  atomic_int inside; /* workers in the present loop */
   atomic_uint round;
-  atomic_int pending; /* workers that have not yet finished the present round */
   orb_loop_fn body;
   void *arg;
   int64_t count, grain;
@@ -60,16 +62,21 @@ static void *worker_main(void *argument) {
     while (atomic_load_explicit(&pool->round, memory_order_acquire) == seen && !pool->stopping) {
       pthread_cond_wait(&pool->wake, &pool->lock);
     }
-    int stop = pool->stopping;
+    int stop = pool->stopping, enter = pool->open;
     seen = atomic_load(&pool->round);
+    if (enter) {
+      atomic_fetch_add(&pool->inside, 1);
+    }
     pthread_mutex_unlock(&pool->lock);
     if (stop) {
       return NULL;
     }
-    take_chunks(pool, self->index);
-    if (atomic_fetch_sub_explicit(&pool->pending, 1, memory_order_acq_rel) == 1) {
+    if (enter) {
+      take_chunks(pool, self->index);
       pthread_mutex_lock(&pool->lock);
-      pthread_cond_signal(&pool->done);
+      if (atomic_fetch_sub_explicit(&pool->inside, 1, memory_order_acq_rel) == 1) {
+        pthread_cond_signal(&pool->done);
+      }
       pthread_mutex_unlock(&pool->lock);
     }
   }
@@ -136,16 +143,19 @@ void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_f
   pool->count = count;
   pool->grain = grain;
   atomic_store(&pool->next, 0);
-  atomic_store(&pool->pending, pool->workers);
+  pool->open = 1;
   atomic_fetch_add_explicit(&pool->round, 1, memory_order_release);
   pthread_cond_broadcast(&pool->wake);
   pthread_mutex_unlock(&pool->lock);
   take_chunks(pool, 0);
-  for (int spin = 0; spin < SPINS && atomic_load_explicit(&pool->pending, memory_order_acquire); spin++) {
+  pthread_mutex_lock(&pool->lock);
+  pool->open = 0;
+  pthread_mutex_unlock(&pool->lock);
+  for (int spin = 0; spin < SPINS && atomic_load_explicit(&pool->inside, memory_order_acquire); spin++) {
     pause_cpu();
   }
   pthread_mutex_lock(&pool->lock);
-  while (atomic_load_explicit(&pool->pending, memory_order_acquire)) {
+  while (atomic_load_explicit(&pool->inside, memory_order_acquire)) {
     pthread_cond_wait(&pool->done, &pool->lock);
   }
   pthread_mutex_unlock(&pool->lock);
