@@ -3,6 +3,7 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -315,6 +316,146 @@ static void threads_do_not_matter(void **state) {
   }
 }
 
+/* A cylinder of coordinates round the z axis on shape 0's mesh, cut at x < 0, y = 0; two materials above and below. */
+static void paint(orb_context *ctx, orb_mesh *mesh, const double *points) {
+  mesh->texcoords = ORB_NEW0(ctx, float, 6 * mesh->triangle_count);
+  mesh->material = ORB_NEW0(ctx, int32_t, mesh->triangle_count);
+  mesh->materials = ORB_NEW0(ctx, orb_material, 2);
+  mesh->material_count = 2;
+  mesh->materials[0].image = mesh->materials[1].image = -1;
+  for (int32_t t = 0; t < mesh->triangle_count; t++) {
+    double x = 0, y = 0, z = 0;
+    for (int k = 0; k < 3; k++) {
+      const double *p = points + 3 * mesh->triangles[3 * t + k];
+      x += p[0];
+      y += p[1];
+      z += p[2];
+    }
+    mesh->material[t] = z > 0;
+    for (int k = 0; k < 3; k++) {
+      const double *p = points + 3 * mesh->triangles[3 * t + k];
+      double own = p[0] == 0 && p[1] == 0 ? atan2(y, x) : atan2(p[1], p[0]);
+      own += own - atan2(y, x) > M_PI ? -2 * M_PI : own - atan2(y, x) < -M_PI ? 2 * M_PI : 0;
+      mesh->texcoords[6 * t + 2 * k] = (float)(own / (2 * M_PI));
+      mesh->texcoords[6 * t + 2 * k + 1] = (float)p[2];
+    }
+  }
+}
+
+static void turned_ball(int32_t shape, const double p[3], double out[3]) {
+  double c = cos(0.4), s = sin(0.4), q[3] = {c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]};
+  (void)shape;
+  out[0] = c * q[0] - s * q[2]; /* oblique to the paint's seam and its equator */
+  out[1] = q[1];
+  out[2] = s * q[0] + c * q[2];
+}
+
+/* A supermesh whose triangles lie across the seam and across the materials' border: coordinates never run from one side
+ * of the seam to the other, and are right at every vertex whose triangles are away from it. */
+static void texture_seams_are_not_crossed(void **state) {
+  orb_context *ctx = *state;
+  synthetic fine = synthetic_make(ctx, 4, 2, ellipsoid), made = synthetic_make(ctx, 3, 2, turned_ball);
+  orb_aligned_shape shapes[2] = {fine.shapes[0], fine.shapes[1]};
+  orb_locator *locator;
+  paint(ctx, &shapes[0].mesh, fine.supermesh.points);
+  fine.shapes[0] = shapes[0]; /* to be freed with it */
+  orb_supermesh *supermesh = &made.supermesh;
+  assert_int_equal(orb_locator_create(ctx, shapes[0].points, shapes[0].mesh.vertex_count, shapes[0].mesh.triangles,
+                                      shapes[0].mesh.triangle_count, NULL, &locator),
+                   ORB_OK);
+  for (int32_t v = 0; v < supermesh->vertex_count; v++) {
+    memcpy(supermesh->points + 3 * v, made.shapes[0].mesh.positions + 3 * v, 3 * sizeof(double));
+    orb_locate(locator, supermesh->points + 3 * v, -1, &supermesh->places[v]);
+    supermesh->places[supermesh->vertex_count + v] = supermesh->places[v];
+  }
+  orb_locator_destroy(ctx, locator);
+  orb_asset_options options;
+  orb_asset_facts facts;
+  orb_buffer bytes = {0};
+  orb_asset_defaults(&options);
+  assert_int_equal(orb_asset_write(ctx, supermesh, shapes, NAMES, &options, &facts, &bytes), ORB_OK);
+  assert_int_equal(facts.primitive_count, 2);
+  assert_true(facts.vertex_count > supermesh->vertex_count);
+  glb file = glb_open(&bytes);
+  int checked = 0;
+  for (int m = 0; m < 2; m++) {
+    const cJSON *primitive = primitive_of(&file, m);
+    const cJSON *attributes = cJSON_GetObjectItem(primitive, "attributes");
+    int base = glb_attribute(attributes, "POSITION"), uv = glb_attribute(attributes, "TEXCOORD_0");
+    int indices = glb_attribute(primitive, "indices");
+    for (int i = 0; i < glb_count(&file, indices); i += 3) {
+      double low = INFINITY, high = -INFINITY, polar = 0;
+      for (int k = 0; k < 3; k++) {
+        int v = (int)glb_value(&file, indices, i + k, 0);
+        double x = glb_value(&file, base, v, 0) / axis_of(0, 0), y = glb_value(&file, base, v, 1);
+        double u = glb_value(&file, uv, v, 0), z = glb_value(&file, base, v, 2);
+        low = fmin(low, u);
+        high = fmax(high, u);
+        polar = fmax(polar, fabs(z));
+        double off = u - atan2(y, x) / (2 * M_PI);
+        off -= round(off);
+        /* Within a triangle of a border a corner may stand for the border's point: 1/8 of a right angle. */
+        assert_true(fabs(off) < (fabs(z) < 0.8 ? 0.05 : 1));
+        if (fabs(z) < 0.8 && fabs(z) > 0.3 && x > 0) {
+          assert_true(fabs(off) < 2e-3 && fabs(glb_value(&file, uv, v, 1) - z) < 0.02);
+          checked++;
+        }
+        assert_true(m == 1 ? z > -0.25 : z < 0.25);
+      }
+      assert_true(polar > 0.8 || high - low < 0.1);
+    }
+  }
+  assert_true(checked > 100);
+  glb_close(&file);
+  orb_buffer_free(ctx, &bytes);
+  synthetic_free(ctx, &made);
+  synthetic_free(ctx, &fine);
+}
+
+typedef struct failing {
+  int left;
+} failing;
+static void *failing_alloc(void *user, size_t size) {
+  failing *f = user;
+  return f->left-- > 0 ? malloc(size) : NULL;
+}
+static void failing_free(void *user, void *block) {
+  (void)user;
+  free(block);
+}
+
+/* However late memory runs out, the call says so and leaves nothing behind (the context's end asserts that). */
+static void running_out_of_memory_is_an_error(void **state) {
+  (void)state;
+  int failed = 0;
+  for (int n = 0;; n++) {
+    failing f = {1 << 20};
+    orb_context_options with = {.threads = 1, .allocator = {failing_alloc, failing_free, &f}};
+    orb_context *ctx;
+    assert_int_equal(orb_context_create(&with, &ctx), ORB_OK);
+    synthetic made = synthetic_make(ctx, 1, 3, ellipsoid);
+    paint(ctx, &made.shapes[0].mesh, made.supermesh.points);
+    orb_asset_options options;
+    orb_asset_defaults(&options);
+    options.path = ORB_PATH_RIGID;
+    options.path_steps = 1;
+    options.fit = ORB_FIT_RIGID;
+    orb_buffer bytes = {0};
+    f.left = n;
+    orb_status status = orb_asset_write(ctx, &made.supermesh, made.shapes, NAMES, &options, NULL, &bytes);
+    f.left = 1 << 20;
+    orb_buffer_free(ctx, &bytes);
+    synthetic_free(ctx, &made);
+    orb_context_destroy(ctx);
+    if (status == ORB_OK) {
+      break;
+    }
+    assert_int_equal(status, ORB_E_NO_MEMORY);
+    failed++;
+  }
+  assert_true(failed > 50);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(two_shapes_are_base_and_target, setup, teardown),
@@ -322,7 +463,9 @@ int main(void) {
       cmocka_unit_test_setup_teardown(hard_edges_split_vertices, setup, teardown),
       cmocka_unit_test_setup_teardown(coinciding_vertices_are_kept_apart, setup, teardown),
       cmocka_unit_test_setup_teardown(fit_undoes_a_similarity, setup, teardown),
+      cmocka_unit_test_setup_teardown(texture_seams_are_not_crossed, setup, teardown),
       cmocka_unit_test(threads_do_not_matter),
+      cmocka_unit_test(running_out_of_memory_is_an_error),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
