@@ -1,0 +1,165 @@
+// Written assets in three.js and in Babylon.js, drawn by headless Chromium, against a direct drawing of the shapes that
+// the facts give: the same camera, the same shading (flat normals as colours in three.js; silhouettes in Babylon.js).
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import fs from "node:fs";
+import http from "node:http";
+import os from "node:os";
+import path from "node:path";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+
+const modules = fileURLToPath(new URL("../node_modules/", import.meta.url));
+const executablePath = process.env.ORB_CHROMIUM ?? "/usr/bin/chromium";
+const needed = ["three", "babylonjs", "babylonjs-loaders", "playwright-core"].map((name) => path.join(modules, name));
+if (![...needed, executablePath].every((file) => fs.existsSync(file))) {
+  console.log("Chromium or the npm packages are missing: npm ci in tests/");
+  process.exit(0);
+}
+const { chromium } = await import("playwright-core");
+
+const SIZE = 256;
+const PAGE = `<!doctype html><title>asset</title>
+<script type="importmap">{"imports":{"three":"/npm/three/build/three.module.js","three/addons/":"/npm/three/examples/jsm/"}}</script>
+<script src="/npm/babylonjs/babylon.js"></script>
+<script src="/npm/babylonjs-loaders/babylon.glTF2FileLoader.min.js"></script>
+<script type="module">
+import * as THREE from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+const HALF = 2.5, EYE = [6, 8, 20], SIZE = ${SIZE};
+
+function drawThree(root) {
+  const renderer = new THREE.WebGLRenderer({ alpha: true, antialias: false, preserveDrawingBuffer: true });
+  renderer.setSize(SIZE, SIZE);
+  renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
+  const camera = new THREE.OrthographicCamera(-HALF, HALF, HALF, -HALF, 1, 60);
+  camera.position.set(...EYE);
+  camera.lookAt(0, 0, 0);
+  const scene = new THREE.Scene();
+  scene.add(root);
+  renderer.render(scene, camera);
+  const gl = renderer.getContext(), out = new Uint8Array(4 * SIZE * SIZE);
+  gl.readPixels(0, 0, SIZE, SIZE, gl.RGBA, gl.UNSIGNED_BYTE, out);
+  renderer.dispose();
+  renderer.forceContextLoss();
+  return [...out];
+}
+
+window.direct = async (name, shape) => {
+  const facts = await (await fetch("/asset/" + name + ".json")).json();
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(facts.shapes[shape], 3));
+  geometry.setIndex(facts.triangles.flat());
+  return drawThree(new THREE.Mesh(geometry, new THREE.MeshNormalMaterial({ flatShading: true })));
+};
+
+window.three = async (name, target) => {
+  const gltf = await new GLTFLoader().loadAsync("/asset/" + name + ".glb");
+  gltf.scene.traverse((object) => {
+    if (!object.isMesh) return;
+    object.material = new THREE.MeshNormalMaterial({ flatShading: true });
+    object.morphTargetInfluences.fill(0);
+    if (target >= 0) object.morphTargetInfluences[target] = 1;
+  });
+  return drawThree(gltf.scene);
+};
+
+window.babylon = async (name, target) => {
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = SIZE;
+  const engine = new BABYLON.Engine(canvas, false, { preserveDrawingBuffer: true });
+  const scene = new BABYLON.Scene(engine);
+  scene.useRightHandedSystem = true;
+  scene.clearColor = new BABYLON.Color4(0, 0, 0, 0);
+  await BABYLON.SceneLoader.AppendAsync("/asset/", name + ".glb", scene);
+  scene.animationGroups.forEach((group) => group.stop());
+  const white = new BABYLON.StandardMaterial("white", scene);
+  white.disableLighting = true;
+  white.backFaceCulling = true;
+  white.emissiveColor = BABYLON.Color3.White();
+  for (const mesh of scene.meshes) {
+    if (!mesh.morphTargetManager) continue;
+    mesh.material = white;
+    mesh.useVertexColors = false;
+    for (let i = 0; i < mesh.morphTargetManager.numTargets; i++) {
+      mesh.morphTargetManager.getTarget(i).influence = i === target ? 1 : 0;
+    }
+  }
+  const camera = new BABYLON.FreeCamera("eye", new BABYLON.Vector3(...EYE), scene);
+  camera.mode = BABYLON.Camera.ORTHOGRAPHIC_CAMERA;
+  Object.assign(camera, { orthoLeft: -HALF, orthoRight: HALF, orthoTop: HALF, orthoBottom: -HALF, minZ: 1, maxZ: 60 });
+  camera.setTarget(BABYLON.Vector3.Zero());
+  await scene.whenReadyAsync();
+  scene.render();
+  const pixels = await engine.readPixels(0, 0, SIZE, SIZE);
+  const out = [...new Uint8Array(pixels.buffer)];
+  engine.dispose();
+  return out;
+};
+window.ready = true;
+</script>`;
+
+let folder, server, browser, page;
+const faults = [];
+before(async () => {
+  folder = fs.mkdtempSync(path.join(os.tmpdir(), "orbmorph-browser-"));
+  execFileSync(process.env.ORB_ASSET_FIXTURE, [folder], { stdio: "inherit" });
+  const types = { ".js": "text/javascript", ".json": "application/json", ".glb": "model/gltf-binary" };
+  server = http.createServer((request, response) => {
+    const [, kind, ...rest] = decodeURIComponent(new URL(request.url, "http://x").pathname).split("/");
+    const root = kind === "npm" ? modules : folder;
+    const file = path.join(root, ...rest);
+    if (kind !== "npm" && kind !== "asset") return response.writeHead(200, { "Content-Type": "text/html" }).end(PAGE);
+    if (!file.startsWith(root) || !fs.existsSync(file)) return response.writeHead(404).end();
+    response.writeHead(200, { "Content-Type": types[path.extname(file)] ?? "application/octet-stream" });
+    fs.createReadStream(file).pipe(response);
+  });
+  await new Promise((done) => server.listen(0, "127.0.0.1", done));
+  browser = await chromium.launch({
+    executablePath,
+    args: ["--no-sandbox", "--headless=new", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+      "--disable-background-networking", "--disable-component-update", "--no-first-run"],
+  });
+  page = await browser.newPage();
+  page.on("pageerror", (error) => faults.push(String(error)));
+  await page.goto(`http://127.0.0.1:${server.address().port}/`);
+  await page.waitForFunction(() => window.ready, null, { timeout: 60_000 });
+});
+after(async () => {
+  await browser?.close();
+  server?.close();
+  fs.rmSync(folder, { recursive: true, force: true });
+});
+
+const draw = (how, ...args) => page.evaluate(([how, args]) => window[how](...args), [how, args]);
+const covered = (image) => Array.from({ length: SIZE * SIZE }, (_, i) => image[4 * i + 3] > 127);
+
+// Shares of pixels that differ, of those that either image covers.
+function difference(a, b, tolerance) {
+  let either = 0, differ = 0;
+  const inA = covered(a), inB = covered(b);
+  for (let i = 0; i < SIZE * SIZE; i++) {
+    if (!inA[i] && !inB[i]) continue;
+    either++;
+    const far = [0, 1, 2].some((c) => Math.abs(a[4 * i + c] - b[4 * i + c]) > tolerance);
+    if (inA[i] !== inB[i] || far) differ++;
+  }
+  assert.ok(either > 0.05 * SIZE * SIZE, "the picture is empty");
+  return differ / either;
+}
+
+for (const [name, shape] of [["two", 0], ["two", 1], ["dressed", 2], ["six", 1]]) {
+  test(`${name}, shape ${shape}: three.js draws it as it is, Babylon.js its outline`, async () => {
+    const wanted = await draw("direct", name, shape);
+    assert.ok(difference(wanted, await draw("three", name, shape - 1), 6) < 0.005);
+    assert.ok(difference(wanted, await draw("babylon", name, shape - 1), 256) < 0.01);
+  });
+}
+
+test("the shapes differ by far more than the tolerances", async () => {
+  const first = await draw("direct", "two", 0);
+  assert.ok(difference(first, await draw("direct", "two", 1), 256) > 0.1);
+  assert.ok(difference(first, await draw("three", "two", 0), 6) > 0.2);
+});
+
+test("the page had no exception", () => assert.deepEqual(faults, []));
