@@ -330,25 +330,13 @@ static void project(patcher *p) {
   }
 }
 
-static orb_status build(patcher *p, const orb_sheet *given, const int32_t *landmarks, int32_t count,
-                        const double *targets, int *held) {
+static orb_status embed(patcher *p, int *held) {
   const orb_mesh *mesh = &p->sheet.shape.mesh;
   orb_certificate certificate;
-  int good = 0;
   *held = 0;
-  ORB_TRY(orb_base_triangulate(p->ctx, targets, count, &p->base, &good));
-  if (!good) {
-    return ORB_OK;
-  }
-  ORB_TRY(orb_sheet_copy(p->ctx, given, &p->sheet));
-  ORB_TRY(locate_base(p, landmarks, count));
-  ORB_TRY(orb_base_trace(p->ctx, &p->sheet, &p->base, p->at, &p->paths, &good));
-  if (!good) {
-    return ORB_OK;
-  }
   ORB_TRY(split_chords(p));
-  ORB_TRY(set_border(p, &good));
-  if (!good) {
+  ORB_TRY(set_border(p, held));
+  if (!*held) {
     return ORB_OK;
   }
   ORB_TRY(solve(p));
@@ -359,10 +347,41 @@ static orb_status build(patcher *p, const orb_sheet *given, const int32_t *landm
   return ORB_OK;
 }
 
+orb_status orb_patch_embed(orb_context *ctx, orb_sheet *sheet, const orb_sheet *base, int32_t *at, orb_paths *paths,
+                           int *held) {
+  patcher p = {.ctx = ctx, .sheet = *sheet, .base = *base, .paths = *paths, .at = at};
+  orb_status status = embed(&p, held);
+  *sheet = p.sheet;
+  *paths = p.paths;
+  orb_free(ctx, p.flat);
+  orb_free(ctx, p.fixed);
+  orb_free(ctx, p.weight);
+  return status;
+}
+
+static orb_status build(patcher *p, const orb_sheet *given, const int32_t *landmarks, int32_t count,
+                        const double *targets, double growth, int *held) {
+  int good = 0;
+  *held = 0;
+  ORB_TRY(orb_base_triangulate(p->ctx, targets, count, &p->base, &good));
+  if (!good) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_sheet_copy(p->ctx, given, &p->sheet));
+  ORB_TRY(locate_base(p, landmarks, count));
+  ORB_TRY(orb_base_trace(p->ctx, &p->sheet, &p->base, p->at, &p->paths, orb_pin_limit(given, growth), &good));
+  return good ? embed(p, held) : ORB_OK;
+}
+
+int32_t orb_pin_limit(const orb_sheet *sheet, double growth) {
+  double most = growth * (20000 + sheet->shape.mesh.triangle_count);
+  return most < INT32_MAX / 16 ? (int32_t)most : INT32_MAX / 16;
+}
+
 orb_status orb_pin_patches(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count,
-                           const double *targets, orb_preset preset, int *held) {
+                           const double *targets, orb_preset preset, double growth, int *held) {
   patcher p = {.ctx = ctx};
-  orb_status status = build(&p, sheet, landmarks, count, targets, held);
+  orb_status status = build(&p, sheet, landmarks, count, targets, growth, held);
   if (status == ORB_OK && *held) {
     status = orb_pin_relax(ctx, &p.sheet, landmarks, count, preset, SWEEPS);
   }

@@ -10,6 +10,7 @@
 #include "embed/hierarchy.h"
 
 enum { COARSE = 300, COARSE_A_LANDMARK = 6 };
+static const double GROWTH_SMALL = 1.5, GROWTH_MAX = 16;
 
 orb_status orb_pin_relax(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count, orb_preset preset,
                          int32_t sweeps) {
@@ -63,19 +64,21 @@ static orb_status refuse(orb_context *ctx, int32_t shape, const int32_t *landmar
   return status;
 }
 
-/* Shape 0 stays as it is embedded; the others are carried onto its landmarks. */
+/* Shape 0 stays as it is embedded; the others are carried onto its landmarks. *stuck: the first that could not be, 0 if
+ * all were. */
 static orb_status carry_onto_first(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
-                                   int32_t count, orb_preset preset) {
+                                   int32_t count, orb_preset preset, double growth, int32_t *stuck) {
   orb_status status = ORB_OK;
   double *points = NULL;
+  *stuck = 0;
   ORB_GO(status, orb_rotate_by_landmarks(ctx, sheets, shape_count, landmarks, count), end);
   ORB_GO(status, orb_landmark_points(ctx, sheets, shape_count, landmarks, count, &points), end);
   for (int32_t s = 1; s < shape_count; s++) {
     int held = 0;
-    ORB_GO(status, orb_pin_patches(ctx, &sheets[s], landmarks, count, points, preset, &held), end);
+    ORB_GO(status, orb_pin_patches(ctx, &sheets[s], landmarks, count, points, preset, growth, &held), end);
     if (!held) {
-      status = refuse(ctx, s, landmarks, count);
-      goto end;
+      *stuck = s;
+      break;
     }
   }
 end:
@@ -85,11 +88,23 @@ end:
 
 orb_status orb_align_pin(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
                          int32_t count, const orb_align_options *options) {
-  int stuck = 1;
-  int32_t coarse = COARSE_A_LANDMARK * count > COARSE ? COARSE_A_LANDMARK * count : COARSE;
-  ORB_TRY(orb_pin_walk(ctx, sheets, shape_count, landmarks, count, options->preset, coarse, &stuck));
-  if (stuck) {
-    ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, options->preset));
+  orb_preset preset = options->preset;
+  int32_t coarse = COARSE_A_LANDMARK * count > COARSE ? COARSE_A_LANDMARK * count : COARSE, shape = 0;
+  int stuck = 1, held = 0;
+  ORB_TRY(orb_pin_walk(ctx, sheets, shape_count, landmarks, count, preset, coarse, &stuck));
+  if (!stuck) {
+    return ORB_OK;
+  }
+  ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, preset, GROWTH_SMALL, &shape));
+  if (shape == 0) {
+    return ORB_OK;
+  }
+  if (count >= 4) {
+    ORB_TRY(orb_pin_joint(ctx, sheets, shape_count, landmarks, count, preset, GROWTH_MAX, &held));
+  }
+  if (!held) {
+    ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, preset, GROWTH_MAX, &shape));
+    return shape == 0 ? ORB_OK : refuse(ctx, shape, landmarks, count);
   }
   return ORB_OK;
 }

@@ -13,9 +13,18 @@ ORB_MUST_CHECK orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int3
 
 /* Embeds one shape so that its landmarks lie at the targets (3 a landmark, distinct, unit): traces the edges of a
  * triangulation of the targets as paths on the shape's sphere, splitting edges as needed, embeds each patch in its
- * spherical triangle, and relaxes. *held: 0 where rounding broke it, and the sheet is unchanged. */
+ * spherical triangle, and relaxes. *held: 0 where rounding broke it or the sheet would grow beyond its limit, and the
+ * sheet is unchanged. */
 ORB_MUST_CHECK orb_status orb_pin_patches(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count,
-                                          const double *targets, orb_preset preset, int *held);
+                                          const double *targets, orb_preset preset, double growth, int *held);
+
+/* The same for all shapes at once, on a base that suits them all and with targets of its own; count ≥ 4. */
+ORB_MUST_CHECK orb_status orb_pin_joint(orb_context *ctx, orb_sheet *sheets, int32_t shape_count,
+                                        const int32_t *landmarks, int32_t count, orb_preset preset, double growth,
+                                        int *held);
+
+/* Most triangles of a sheet that may grow by this factor (and some more, for small ones). */
+int32_t orb_pin_limit(const orb_sheet *sheet, double growth);
 
 /* Sweeps at full resolution with the landmarks pinned, certified; where the sweeps do not lead to a certified
  * embedding the points stay as they were. */

@@ -20,7 +20,7 @@
 #include "numeric/vec3.h"
 
 enum { HALVINGS = 4, RELAXATIONS = 8, RELAX_SWEEPS = 20 };
-static const double DEFAULT_RADIUS = 1.0;
+static const double DEFAULT_RADIUS = 1.0, GROWTH_MAX = 16;
 
 typedef struct rbf_run {
   orb_context *ctx;
@@ -115,7 +115,7 @@ static orb_status warp_shape(rbf_run *r, int32_t steps) {
       ORB_TRY(orb_pin_relax(r->ctx, r->sheet, r->active, r->count, ORB_PRESET_FAST, RELAX_SWEEPS));
       relaxations++;
     } else {
-      ORB_TRY(orb_pin_patches(r->ctx, r->sheet, r->active, r->count, r->targets, ORB_PRESET_FAST, &good));
+      ORB_TRY(orb_pin_patches(r->ctx, r->sheet, r->active, r->count, r->targets, ORB_PRESET_FAST, GROWTH_MAX, &good));
       return good ? ORB_OK : refuse(r);
     }
   }

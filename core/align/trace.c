@@ -1,34 +1,10 @@
-/* Base edges as paths on a sheet, by A*. */
+/* Paths on a sheet by A*, laid as chains of edges. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "align/base.h"
+#include "align/trace.h"
 #include "base/check.h"
 #include "numeric/vec3.h"
-
-/* A node is a vertex (2 v) or the middle of an edge (2 h + 1, h the lesser half-edge). */
-typedef struct queued {
-  double estimate;
-  int32_t node;
-} queued;
-
-typedef struct tracer {
-  orb_context *ctx;
-  orb_sheet *sheet;
-  const orb_sheet *base;
-  const int32_t *at;
-  orb_paths *paths;
-  int32_t *base_done; /* of each base half-edge */
-  double *cost;       /* of each node */
-  int32_t *from, *stamp, nodes, now;
-  unsigned char *gate; /* of each half-edge: 1: its triangle may be entered from its origin, 2: it may be walked */
-  queued *heap;
-  int32_t heap_count, heap_capacity;
-  int32_t *chain; /* nodes of the path found, back to front */
-  int32_t chain_count;
-  int32_t most_triangles; /* the sheet may not grow beyond */
-} tracer;
 
 void orb_paths_free(orb_context *ctx, orb_paths *paths) {
   orb_free(ctx, paths->path);
@@ -37,7 +13,7 @@ void orb_paths_free(orb_context *ctx, orb_paths *paths) {
 }
 
 /* Follows the sheet's capacity. */
-static orb_status paths_fit(orb_context *ctx, const orb_sheet *s, orb_paths *paths) {
+orb_status orb_paths_fit(orb_context *ctx, const orb_sheet *s, orb_paths *paths) {
   if (paths->half_edges < 3 * s->triangle_capacity) {
     int32_t capacity = 3 * s->triangle_capacity, *path = orb_realloc(ctx, paths->path, (size_t)capacity, sizeof *path);
     if (!path) {
@@ -65,7 +41,7 @@ orb_status orb_paths_split(orb_context *ctx, orb_sheet *s, orb_paths *paths, int
   int32_t g = s->twin[h], side[2] = {orb_next(h), orb_next(g)}, held[2] = {paths->path[side[0]], paths->path[side[1]]};
   ORB_ASSERT(paths->path[h] < 0);
   ORB_TRY(orb_sheet_split_edge(ctx, s, h, 0.5, vertex));
-  ORB_TRY(paths_fit(ctx, s, paths));
+  ORB_TRY(orb_paths_fit(ctx, s, paths));
   int32_t moved[2] = {orb_next(s->twin[g]), orb_next(s->twin[h])};
   for (int k = 0; k < 2; k++) {
     paths->path[side[k]] = -1;
@@ -78,7 +54,7 @@ static const double *point_of(const orb_sheet *s, int32_t v) {
   return s->shape.points + 3 * (size_t)v;
 }
 
-static void place_of(const tracer *t, int32_t node, double out[3]) {
+static void place_of(const orb_tracer *t, int32_t node, double out[3]) {
   const orb_sheet *s = t->sheet;
   if (node & 1) {
     const double *a = point_of(s, s->shape.mesh.triangles[node >> 1]),
@@ -91,7 +67,7 @@ static void place_of(const tracer *t, int32_t node, double out[3]) {
   }
 }
 
-static orb_status tracer_fit(tracer *t) {
+orb_status orb_tracer_fit(orb_tracer *t) {
   int32_t wanted = 6 * t->sheet->triangle_capacity + 2;
   if (t->nodes >= wanted) {
     return ORB_OK;
@@ -116,14 +92,14 @@ static orb_status tracer_fit(tracer *t) {
 }
 
 /* A binary heap, ties by node number. */
-static int before(queued a, queued b) {
+static int before(orb_tracer_item a, orb_tracer_item b) {
   return a.estimate != b.estimate ? a.estimate < b.estimate : a.node < b.node;
 }
 
-static orb_status heap_push(tracer *t, queued item) {
+static orb_status heap_push(orb_tracer *t, orb_tracer_item item) {
   if (t->heap_count == t->heap_capacity) {
     int32_t capacity = t->heap_capacity + t->heap_capacity / 2 + 1024;
-    queued *heap = orb_realloc(t->ctx, t->heap, (size_t)capacity, sizeof *heap);
+    orb_tracer_item *heap = orb_realloc(t->ctx, t->heap, (size_t)capacity, sizeof *heap);
     if (!heap) {
       return ORB_E_NO_MEMORY;
     }
@@ -139,8 +115,8 @@ static orb_status heap_push(tracer *t, queued item) {
   return ORB_OK;
 }
 
-static queued heap_pop(tracer *t) {
-  queued top = t->heap[0], last = t->heap[--t->heap_count];
+static orb_tracer_item heap_pop(orb_tracer *t) {
+  orb_tracer_item top = t->heap[0], last = t->heap[--t->heap_count];
   int32_t i = 0;
   for (;;) {
     int32_t child = 2 * i + 1;
@@ -164,8 +140,7 @@ static int32_t edge_name(const orb_sheet *s, int32_t h) {
   return h < s->twin[h] ? h : s->twin[h];
 }
 
-/* The outgoing half-edge of v that lies on the path of base edge e. */
-static int32_t on_path(const tracer *t, int32_t v, int32_t e) {
+int32_t orb_tracer_outgoing(const orb_tracer *t, int32_t v, int32_t e) {
   int32_t start = t->sheet->corner[v], h = start;
   do {
     if (t->paths->path[h] == e) {
@@ -176,34 +151,14 @@ static int32_t on_path(const tracer *t, int32_t v, int32_t e) {
   return -1;
 }
 
-/* Opens (or closes again) the gates about the sheet vertex of base half-edge b's origin: the sector between the traced
- * base edges before and after b. */
-static int set_gates(tracer *t, int32_t b, int open) {
-  const orb_sheet *base = t->base, *s = t->sheet;
-  int32_t v = t->at[base->shape.mesh.triangles[b]], after = orb_sheet_swing(base, b), before_b = -1;
-  while (after != b && !t->base_done[after]) {
-    after = orb_sheet_swing(base, after);
-  }
-  for (int32_t i = after; i != b; i = orb_sheet_swing(base, i)) {
-    before_b = t->base_done[i] ? i : before_b;
-  }
-  if (after == b) {
-    int32_t start = s->corner[v], h = start;
-    do {
-      t->gate[h] = open ? 3 : 0;
-      h = orb_sheet_swing(s, h);
-    } while (h != start);
-    return 1;
-  }
-  int32_t first = on_path(t, v, edge_name(base, before_b)), last = on_path(t, v, edge_name(base, after)), h = first;
-  if (first < 0 || last < 0) {
-    return 0;
-  }
+/* Gates of the sector from half-edge `first` counter-clockwise to `last`; first −1: every sector. Both lie on paths. */
+void orb_tracer_gates(orb_tracer *t, int32_t v, int32_t first, int32_t last, int open) {
+  const orb_sheet *s = t->sheet;
+  int32_t start = first < 0 ? s->corner[v] : first, end = first < 0 ? start : last, h = start;
   do {
-    t->gate[h] = !open ? 0 : h == first ? 1 : 3;
+    t->gate[h] = !open ? 0 : t->paths->path[h] >= 0 ? 1 : 3;
     h = orb_sheet_swing(s, h);
-  } while (h != last);
-  return 1;
+  } while (h != end);
 }
 
 typedef struct goal {
@@ -211,7 +166,7 @@ typedef struct goal {
   double place[3];
 } goal;
 
-static orb_status reach(tracer *t, int32_t from, int32_t to, const goal *g) {
+static orb_status reach(orb_tracer *t, int32_t from, int32_t to, const goal *g) {
   double a[3], b[3];
   place_of(t, from, a);
   place_of(t, to, b);
@@ -222,11 +177,11 @@ static orb_status reach(tracer *t, int32_t from, int32_t to, const goal *g) {
   t->stamp[to] = t->now;
   t->cost[to] = cost;
   t->from[to] = from;
-  return heap_push(t, (queued){cost + sqrt(orb_distance2(b, g->place)), to});
+  return heap_push(t, (orb_tracer_item){cost + sqrt(orb_distance2(b, g->place)), to});
 }
 
 /* Along half-edge h, from its origin (node) to its end. */
-static orb_status along(tracer *t, int32_t node, int32_t h, const goal *g) {
+static orb_status along(orb_tracer *t, int32_t node, int32_t h, const goal *g) {
   const orb_sheet *s = t->sheet;
   int32_t end = s->shape.mesh.triangles[orb_next(h)];
   if (t->paths->path[h] >= 0) {
@@ -238,11 +193,11 @@ static orb_status along(tracer *t, int32_t node, int32_t h, const goal *g) {
   return reach(t, node, 2 * end, g);
 }
 
-static orb_status to_edge(tracer *t, int32_t node, int32_t h, const goal *g) {
+static orb_status to_edge(orb_tracer *t, int32_t node, int32_t h, const goal *g) {
   return t->paths->path[h] >= 0 ? ORB_OK : reach(t, node, 2 * edge_name(t->sheet, h) + 1, g);
 }
 
-static orb_status expand_vertex(tracer *t, int32_t node, int is_start, const goal *g) {
+static orb_status expand_vertex(orb_tracer *t, int32_t node, int is_start, const goal *g) {
   const orb_sheet *s = t->sheet;
   int32_t start = s->corner[node >> 1], h = start;
   do {
@@ -257,7 +212,7 @@ static orb_status expand_vertex(tracer *t, int32_t node, int is_start, const goa
   return ORB_OK;
 }
 
-static orb_status expand_edge(tracer *t, int32_t node, const goal *g) {
+static orb_status expand_edge(orb_tracer *t, int32_t node, const goal *g) {
   const orb_sheet *s = t->sheet;
   int32_t sides[2] = {node >> 1, s->twin[node >> 1]};
   for (int k = 0; k < 2; k++) {
@@ -271,11 +226,9 @@ static orb_status expand_edge(tracer *t, int32_t node, const goal *g) {
   return ORB_OK;
 }
 
-/* The shortest path for base half-edge b; its nodes go to chain. *found 0: none. */
-static orb_status search_path(tracer *t, int32_t b, int *found) {
-  const int32_t *corners = t->base->shape.mesh.triangles;
-  int32_t start = 2 * t->at[corners[b]], twin = t->base->twin[b];
-  goal g = {.vertex = t->at[corners[twin]]};
+orb_status orb_tracer_search(orb_tracer *t, int32_t from, int32_t to, int *found) {
+  int32_t start = 2 * from;
+  goal g = {.vertex = to};
   place_of(t, 2 * g.vertex, g.place);
   t->now++;
   t->heap_count = 0;
@@ -283,9 +236,9 @@ static orb_status search_path(tracer *t, int32_t b, int *found) {
   t->stamp[start] = t->now;
   t->from[start] = -1;
   *found = 0;
-  ORB_TRY(heap_push(t, (queued){0, start}));
+  ORB_TRY(heap_push(t, (orb_tracer_item){0, start}));
   while (t->heap_count > 0) {
-    queued top = heap_pop(t);
+    orb_tracer_item top = heap_pop(t);
     int32_t node = top.node;
     double place[3];
     if (node == 2 * g.vertex) {
@@ -305,8 +258,8 @@ static orb_status search_path(tracer *t, int32_t b, int *found) {
   return ORB_OK;
 }
 
-/* Makes the chain a path of edges of the sheet. Edges are named by their ends, since splits renumber half-edges. */
-static orb_status lay_path(tracer *t, int32_t e, int *good) {
+/* Edges are named by their ends, since splits renumber half-edges. */
+orb_status orb_tracer_lay(orb_tracer *t, int32_t e, int *good) {
   orb_sheet *s = t->sheet;
   int32_t count = t->chain_count, last = -1;
   orb_status status = ORB_OK;
@@ -345,99 +298,11 @@ end:
   return status;
 }
 
-static orb_status trace_one(tracer *t, int32_t b, int *good) {
-  int32_t twin = t->base->twin[b];
-  ORB_TRY(tracer_fit(t));
-  ORB_TRY(orb_context_check(t->ctx));
-  if (t->sheet->shape.mesh.triangle_count > t->most_triangles || !set_gates(t, b, 1) || !set_gates(t, twin, 1)) {
-    *good = 0;
-    return ORB_OK;
-  }
-  ORB_TRY(search_path(t, b, good));
-  (void)set_gates(t, b, 0);
-  (void)set_gates(t, twin, 0);
-  if (*good) {
-    ORB_TRY(lay_path(t, edge_name(t->base, b), good));
-    t->base_done[b] = t->base_done[twin] = 1;
-  }
-  return ORB_OK;
-}
-
-typedef struct candidate {
-  double length;
-  int32_t half_edge;
-} candidate;
-
-static int by_length(const void *a, const void *b) {
-  const candidate *x = a, *y = b;
-  return x->length < y->length   ? -1
-         : x->length > y->length ? 1
-                                 : (x->half_edge > y->half_edge) - (x->half_edge < y->half_edge);
-}
-
-static int32_t root_of(int32_t *parent, int32_t v) {
-  while (parent[v] != v) {
-    parent[v] = parent[parent[v]];
-    v = parent[v];
-  }
-  return v;
-}
-
-static orb_status trace_all(tracer *t, candidate *order, int32_t *parent, int *good) {
-  const orb_mesh *mesh = &t->base->shape.mesh;
-  int32_t edges = 0;
-  for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
-    if (h < t->base->twin[h]) {
-      const double *a = point_of(t->sheet, t->at[mesh->triangles[h]]),
-                   *b = point_of(t->sheet, t->at[mesh->triangles[orb_next(h)]]);
-      order[edges++] = (candidate){orb_distance2(a, b), h};
-    }
-  }
-  qsort(order, (size_t)edges, sizeof *order, by_length);
-  for (int32_t v = 0; v < mesh->vertex_count; v++) {
-    parent[v] = v;
-    t->paths->on[t->at[v]] = 1;
-  }
-  *good = 1;
-  for (int tree = 1; tree >= 0; tree--) {
-    for (int32_t i = 0; i < edges && *good; i++) {
-      int32_t b = order[i].half_edge, from = root_of(parent, mesh->triangles[b]),
-              to = root_of(parent, mesh->triangles[orb_next(b)]);
-      if (t->base_done[b] || (tree && from == to)) {
-        continue;
-      }
-      parent[from] = to;
-      ORB_TRY(trace_one(t, b, good));
-    }
-  }
-  return ORB_OK;
-}
-
-orb_status orb_base_trace(orb_context *ctx, orb_sheet *sheet, const orb_sheet *base, const int32_t *at,
-                          orb_paths *paths, int *good) {
-  const orb_mesh *mesh = &base->shape.mesh;
-  tracer t = {.ctx = ctx, .sheet = sheet, .base = base, .at = at, .paths = paths};
-  int64_t most = 400000 + 8 * (int64_t)sheet->shape.mesh.triangle_count;
-  t.most_triangles = (int32_t)(most < INT32_MAX / 8 ? most : INT32_MAX / 8);
-  candidate *order = ORB_NEW(ctx, candidate, 3 * (size_t)mesh->triangle_count);
-  int32_t *parent = ORB_NEW(ctx, int32_t, mesh->vertex_count);
-  orb_status status = ORB_OK;
-  t.base_done = ORB_NEW0(ctx, int32_t, 3 * (size_t)mesh->triangle_count);
-  if (!order || !parent || !t.base_done) {
-    status = ORB_E_NO_MEMORY;
-    goto end;
-  }
-  ORB_GO(status, paths_fit(ctx, sheet, paths), end);
-  ORB_GO(status, trace_all(&t, order, parent, good), end);
-end:
-  orb_free(ctx, order);
-  orb_free(ctx, parent);
-  orb_free(ctx, t.base_done);
-  orb_free(ctx, t.cost);
-  orb_free(ctx, t.from);
-  orb_free(ctx, t.stamp);
-  orb_free(ctx, t.chain);
-  orb_free(ctx, t.gate);
-  orb_free(ctx, t.heap);
-  return status;
+void orb_tracer_free(orb_tracer *t) {
+  orb_free(t->ctx, t->cost);
+  orb_free(t->ctx, t->from);
+  orb_free(t->ctx, t->stamp);
+  orb_free(t->ctx, t->chain);
+  orb_free(t->ctx, t->gate);
+  orb_free(t->ctx, t->heap);
 }

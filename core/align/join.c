@@ -1,0 +1,298 @@
+/* A base that all shapes share.
+ *
+ * Edges between landmarks are tried in the order of their length summed over the shapes: first those that join two
+ * trees, which can always be drawn, then all others. An edge is drawn on one shape (they take turns) by the shortest
+ * path whatever the sector it leaves and enters by, then on the others through the same sectors, so that the cyclic
+ * order about each landmark agrees everywhere. Two landmarks that are no neighbours yet and lie on one face can always
+ * be joined through it; when no such pair is left the graph is a maximal planar one, that is, a triangulation without
+ * double edges, and such a one has an embedding by great circle arcs (Steinitz), which the library's own embedding
+ * finds.
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "align/trace.h"
+#include "base/check.h"
+#include "numeric/vec3.h"
+
+typedef struct candidate {
+  double length;
+  int32_t a, b;
+} candidate;
+
+/* Abstract half-edges 2e and 2e + 1 of edge e, in cyclic order about their origins. */
+typedef struct joiner {
+  orb_context *ctx;
+  orb_tracer *tracers;
+  int32_t shapes, count;
+  const int32_t *at, *most_triangles;
+  int32_t *origin, *next, *prev; /* of each half-edge; next: counter-clockwise about the origin */
+  int32_t *first;                /* of each landmark: one half-edge that leaves it, −1 */
+  int32_t *face, faces;          /* of each half-edge: the face on its left */
+  int32_t *parent;               /* trees of the forest */
+  int32_t edges;
+} joiner;
+
+static int by_length(const void *a, const void *b) {
+  const candidate *x = a, *y = b;
+  if (x->length != y->length) {
+    return x->length < y->length ? -1 : 1;
+  }
+  return x->a != y->a ? (x->a > y->a) - (x->a < y->a) : (x->b > y->b) - (x->b < y->b);
+}
+
+static int32_t root_of(int32_t *parent, int32_t v) {
+  while (parent[v] != v) {
+    parent[v] = parent[parent[v]];
+    v = parent[v];
+  }
+  return v;
+}
+
+static int neighbours(const joiner *j, int32_t a, int32_t b) {
+  int32_t start = j->first[a], h = start;
+  if (h < 0) {
+    return 0;
+  }
+  do {
+    if (j->origin[h ^ 1] == b) {
+      return 1;
+    }
+    h = j->next[h];
+  } while (h != start);
+  return 0;
+}
+
+static void number_faces(joiner *j) {
+  j->faces = 0;
+  for (int32_t h = 0; h < 2 * j->edges; h++) {
+    j->face[h] = -1;
+  }
+  for (int32_t h = 0; h < 2 * j->edges; h++) {
+    if (j->face[h] < 0) {
+      for (int32_t g = h; j->face[g] < 0; g = j->prev[g ^ 1]) {
+        j->face[g] = j->faces;
+      }
+      j->faces++;
+    }
+  }
+}
+
+static int share_face(const joiner *j, int32_t a, int32_t b) {
+  int32_t h = j->first[a];
+  do {
+    int32_t g = j->first[b];
+    do {
+      if (j->face[g] == j->face[h]) {
+        return 1;
+      }
+      g = j->next[g];
+    } while (g != j->first[b]);
+    h = j->next[h];
+  } while (h != j->first[a]);
+  return 0;
+}
+
+/* The sector that a freshly laid path leaves v by, named by the half-edge before it; −1: v had none. */
+static int32_t sector_of(const joiner *j, const orb_tracer *t, int32_t landmark, int32_t v, int32_t name) {
+  int32_t h = orb_tracer_outgoing(t, v, name), start = j->first[landmark];
+  if (start < 0 || h < 0) {
+    return -1;
+  }
+  int32_t g = h;
+  do { /* clockwise: the twin's next */
+    g = orb_next(t->sheet->twin[g]);
+  } while (t->paths->path[g] < 0);
+  int32_t e = t->paths->path[g];
+  return j->origin[2 * e] == landmark ? 2 * e : 2 * e + 1;
+}
+
+/* Opens the gates of sector `sector` (−1: all) about a landmark on one shape. */
+static int set_gates(const joiner *j, orb_tracer *t, int32_t v, int32_t sector, int open) {
+  if (sector < 0) {
+    orb_tracer_gates(t, v, -1, -1, open);
+    return 1;
+  }
+  int32_t first = orb_tracer_outgoing(t, v, sector / 2), last = orb_tracer_outgoing(t, v, j->next[sector] / 2);
+  if (first < 0 || last < 0) {
+    return 0;
+  }
+  orb_tracer_gates(t, v, first, last, open);
+  return 1;
+}
+
+static orb_status draw(joiner *j, int32_t shape, int32_t a, int32_t b, const int32_t sector[2], int *good) {
+  orb_tracer *t = &j->tracers[shape];
+  int32_t from = j->at[(size_t)shape * (size_t)j->count + (size_t)a],
+          to = j->at[(size_t)shape * (size_t)j->count + (size_t)b];
+  ORB_TRY(orb_context_check(j->ctx));
+  ORB_TRY(orb_tracer_fit(t));
+  *good = t->sheet->shape.mesh.triangle_count <= j->most_triangles[shape] && set_gates(j, t, from, sector[0], 1) &&
+          set_gates(j, t, to, sector[1], 1);
+  if (*good) {
+    ORB_TRY(orb_tracer_search(t, from, to, good));
+    (void)set_gates(j, t, from, sector[0], 0);
+    (void)set_gates(j, t, to, sector[1], 0);
+  }
+  return *good ? orb_tracer_lay(t, j->edges, good) : ORB_OK;
+}
+
+static void link_after(joiner *j, int32_t h, int32_t landmark, int32_t sector) {
+  j->origin[h] = landmark;
+  if (sector < 0) {
+    j->next[h] = j->prev[h] = j->first[landmark] = h;
+    return;
+  }
+  int32_t after = j->next[sector];
+  j->next[sector] = h;
+  j->prev[h] = sector;
+  j->next[h] = after;
+  j->prev[after] = h;
+}
+
+/* Draws edge a–b on every shape and enters it into the order about both ends. */
+static orb_status add_edge(joiner *j, int32_t a, int32_t b, int *good) {
+  int32_t lead = j->edges % j->shapes, sector[2] = {-1, -1};
+  ORB_TRY(draw(j, lead, a, b, sector, good));
+  if (!*good) {
+    return ORB_OK;
+  }
+  const orb_tracer *t = &j->tracers[lead];
+  const int32_t *at = j->at + (size_t)lead * (size_t)j->count;
+  sector[0] = sector_of(j, t, a, at[a], j->edges);
+  sector[1] = sector_of(j, t, b, at[b], j->edges);
+  for (int32_t s = 0; s < j->shapes && *good; s++) {
+    if (s != lead) {
+      ORB_TRY(draw(j, s, a, b, sector, good));
+    }
+  }
+  link_after(j, 2 * j->edges, a, sector[0]);
+  link_after(j, 2 * j->edges + 1, b, sector[1]);
+  j->edges++;
+  number_faces(j);
+  return ORB_OK;
+}
+
+static orb_status join_all(joiner *j, candidate *order, int *good) {
+  int64_t pairs = 0;
+  for (int32_t a = 0; a < j->count; a++) {
+    for (int32_t b = 0; b < a; b++) {
+      double length = 0;
+      for (int32_t s = 0; s < j->shapes; s++) {
+        const double *p = j->tracers[s].sheet->shape.points;
+        const int32_t *at = j->at + (size_t)s * (size_t)j->count;
+        length += sqrt(orb_distance2(p + 3 * (size_t)at[a], p + 3 * (size_t)at[b]));
+      }
+      order[pairs++] = (candidate){length, b, a};
+    }
+  }
+  qsort(order, (size_t)pairs, sizeof *order, by_length);
+  *good = 1;
+  for (int tree = 1; tree >= 0; tree--) {
+    for (int64_t i = 0; i < pairs && *good && j->edges < 3 * j->count - 6; i++) {
+      int32_t a = order[i].a, b = order[i].b, from = root_of(j->parent, a), to = root_of(j->parent, b);
+      if (tree ? from == to : neighbours(j, a, b) || !share_face(j, a, b)) {
+        continue;
+      }
+      j->parent[from] = to;
+      ORB_TRY(add_edge(j, a, b, good));
+    }
+  }
+  *good = *good && j->edges == 3 * j->count - 6 && j->faces == 2 * j->count - 4;
+  return ORB_OK;
+}
+
+/* The base as a mesh, laid out by the library's embedding. All its triangles count alike: without positions every
+ * triangle is taken for equilateral. */
+static orb_status lay_out(joiner *j, orb_sheet *base) {
+  orb_context *ctx = j->ctx;
+  orb_status status = ORB_OK;
+  orb_embedding embedding = {0};
+  orb_mesh mesh = {.vertex_count = j->count, .triangle_count = j->faces};
+  unsigned char *seen = ORB_NEW0(ctx, unsigned char, j->faces);
+  mesh.positions = ORB_NEW0(ctx, double, 3 * (size_t)j->count);
+  mesh.triangles = ORB_NEW(ctx, int32_t, 3 * (size_t)j->faces);
+  if (!seen || !mesh.positions || !mesh.triangles) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  for (int32_t h = 0; h < 2 * j->edges; h++) {
+    int32_t f = j->face[h], g = h;
+    for (int k = 0; !seen[f] && k < 3; k++, g = j->prev[g ^ 1]) {
+      mesh.triangles[3 * f + k] = j->origin[g];
+    }
+    seen[f] = 1;
+  }
+  orb_embed_options options;
+  orb_embed_defaults(&options);
+  ORB_GO(status, orb_embed(ctx, &mesh, &options, &embedding), end);
+  ORB_GO(status, orb_sheet_create(ctx, &mesh, embedding.points, base), end);
+end:
+  orb_embedding_free(ctx, &embedding);
+  orb_free(ctx, mesh.positions);
+  orb_free(ctx, mesh.triangles);
+  orb_free(ctx, seen);
+  return status;
+}
+
+/* Paths get the names of the base's edges: the lesser half-edge. */
+static void rename_paths(const joiner *j, const orb_sheet *base, orb_paths *paths, int32_t half_edges) {
+  for (int32_t h = 0; h < half_edges; h++) {
+    int32_t e = paths->path[h];
+    if (e >= 0) {
+      int32_t b = orb_sheet_edge(base, j->origin[2 * e], j->origin[2 * e + 1]);
+      paths->path[h] = b < base->twin[b] ? b : base->twin[b];
+    }
+  }
+}
+
+orb_status orb_base_join(orb_context *ctx, orb_sheet *sheets, orb_paths *paths, int32_t shape_count, const int32_t *at,
+                         int32_t count, const int32_t *most_triangles, orb_sheet *base, int *good) {
+  orb_status status = ORB_OK;
+  ORB_ASSERT(count >= 4);
+  size_t half_edges = 6 * (size_t)count;
+  joiner j = {.ctx = ctx, .shapes = shape_count, .count = count, .at = at, .most_triangles = most_triangles};
+  candidate *order = ORB_NEW(ctx, candidate, (size_t)count * (size_t)(count - 1) / 2);
+  int32_t *block = ORB_NEW(ctx, int32_t, 4 * half_edges + 2 * (size_t)count);
+  j.tracers = ORB_NEW0(ctx, orb_tracer, shape_count);
+  *good = 0;
+  if (!order || !block || !j.tracers) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  j.origin = block;
+  j.next = block + half_edges;
+  j.prev = block + 2 * half_edges;
+  j.face = block + 3 * half_edges;
+  j.first = block + 4 * half_edges;
+  j.parent = j.first + count;
+  for (int32_t k = 0; k < count; k++) {
+    j.first[k] = -1;
+    j.parent[k] = k;
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    j.tracers[s] = (orb_tracer){.ctx = ctx, .sheet = &sheets[s], .paths = &paths[s]};
+    ORB_GO(status, orb_paths_fit(ctx, &sheets[s], &paths[s]), end);
+    for (int32_t k = 0; k < count; k++) {
+      paths[s].on[at[(size_t)s * (size_t)count + (size_t)k]] = 1;
+    }
+  }
+  ORB_GO(status, join_all(&j, order, good), end);
+  if (*good) {
+    ORB_GO(status, lay_out(&j, base), end);
+    for (int32_t s = 0; s < shape_count; s++) {
+      rename_paths(&j, base, &paths[s], 3 * sheets[s].shape.mesh.triangle_count);
+    }
+  }
+end:
+  for (int32_t s = 0; j.tracers && s < shape_count; s++) {
+    if (j.tracers[s].ctx) {
+      orb_tracer_free(&j.tracers[s]);
+    }
+  }
+  orb_free(ctx, j.tracers);
+  orb_free(ctx, order);
+  orb_free(ctx, block);
+  return status;
+}

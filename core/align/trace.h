@@ -1,0 +1,44 @@
+/* Paths between vertices of a sheet that do not cross one another. */
+#ifndef ORB_ALIGN_TRACE_H
+#define ORB_ALIGN_TRACE_H
+
+#include "align/base.h"
+
+/* A node is a vertex (2 v) or the middle of an edge (2 h + 1, h the lesser half-edge). */
+typedef struct orb_tracer_item {
+  double estimate;
+  int32_t node;
+} orb_tracer_item;
+
+typedef struct orb_tracer {
+  orb_context *ctx;
+  orb_sheet *sheet;
+  orb_paths *paths;
+  double *cost; /* of each node */
+  int32_t *from, *stamp, nodes, now;
+  unsigned char *gate; /* of each half-edge: 1: its triangle may be entered from its origin, 2: it may be walked */
+  orb_tracer_item *heap;
+  int32_t heap_count, heap_capacity;
+  int32_t *chain; /* nodes of the path found, back to front */
+  int32_t chain_count;
+} orb_tracer;
+
+/* Room for flags and nodes of the sheet as it has grown; before each search. */
+ORB_MUST_CHECK orb_status orb_paths_fit(orb_context *ctx, const orb_sheet *sheet, orb_paths *paths);
+ORB_MUST_CHECK orb_status orb_tracer_fit(orb_tracer *tracer);
+void orb_tracer_free(orb_tracer *tracer);
+
+/* The outgoing half-edge of v on path `name`, −1. */
+int32_t orb_tracer_outgoing(const orb_tracer *tracer, int32_t v, int32_t name);
+
+/* Opens or closes the gates about an end of a path to be: the sector from half-edge `first`, on a path,
+ * counter-clockwise to `last`; first −1: every sector. */
+void orb_tracer_gates(orb_tracer *tracer, int32_t v, int32_t first, int32_t last, int open);
+
+/* The shortest path through the gates of `from` and `to` that meets no other; *found 0: none. */
+ORB_MUST_CHECK orb_status orb_tracer_search(orb_tracer *tracer, int32_t from, int32_t to, int *found);
+
+/* Makes the path found a chain of edges of the sheet, under a name. *good 0 where it broke. */
+ORB_MUST_CHECK orb_status orb_tracer_lay(orb_tracer *tracer, int32_t name, int *good);
+
+#endif
