@@ -63,13 +63,13 @@ void orb_newton_settings_of(const orb_embed_options *options, orb_newton_setting
 struct orb_refiner {
   orb_hierarchy *hierarchy;
   orb_newton_settings settings;
-  double *point;         /* 4 a vertex, the last unused */
-  unsigned char *alive;  /* flags of vertices */
-  unsigned char *pinned; /* flags: these do not move */
-  unsigned char *queued; /* flags of the relaxation queue */
-  int32_t *queue, queue_capacity;
-  float *crowding; /* energy per area of each new star */
-  orb_star *star;  /* one a thread */
+  double *point;                  /* 4 a vertex, the last unused */
+  unsigned char *alive;           /* flags of vertices */
+  unsigned char *pinned;          /* flags: these do not move */
+  unsigned char *queued;          /* flags of the relaxation queue */
+  int32_t *queue, queue_capacity; /* a power of two */
+  float *crowding;                /* energy per area of each new star */
+  orb_star *star;                 /* one a thread */
   orb_kernel_room *room;
   int32_t star_count;
   int32_t live;

@@ -17,10 +17,9 @@
 enum {
   GRAIN = 256,
   PLAIN_ABOVE = 4000, /* live vertices */
-  QUEUE = 65536,      /* room of the relaxation queue, a power of two */
-  QUEUE_FULL = 60000,
-  RELAX_MOST = 400, /* ring entries relaxed round one crowded vertex: about 60 stars, or one pole */
-  ATTEMPTS = 16     /* at a kernel that doubles have no room for */
+  RELAX_MOST = 400,   /* ring entries relaxed round one crowded vertex: about 60 stars, or one pole */
+  HUB = 100,          /* valence of a pole, which the sweeps alone move */
+  ATTEMPTS = 16       /* at a kernel that doubles have no room for */
 };
 
 static const double WELL_INSIDE = 0.02; /* least det over the squared edge that it stands on */
@@ -133,9 +132,9 @@ typedef struct queue {
 } queue;
 
 static void enqueue(queue *q, int32_t v) {
-  if (!q->r->queued[v] && q->tail - q->head < QUEUE_FULL) {
+  if (!q->r->queued[v] && q->tail - q->head < q->r->queue_capacity) {
     q->r->queued[v] = 1;
-    q->r->queue[q->tail++ & (QUEUE - 1)] = v;
+    q->r->queue[q->tail++ & (q->r->queue_capacity - 1)] = v;
   }
 }
 
@@ -149,23 +148,27 @@ static void enqueue_ring(queue *q, int32_t v) {
 }
 
 static int32_t dequeue(queue *q) {
-  int32_t v = q->r->queue[q->head++ & (QUEUE - 1)];
+  int32_t v = q->r->queue[q->head++ & (q->r->queue_capacity - 1)];
   q->r->queued[v] = 0;
   return v;
 }
 
 /* Relaxes the neighbourhood of a vertex that landed where it is narrow, as long and as far as that pays. */
 static orb_status relieve(orb_context *ctx, orb_refiner *r, int32_t v, double blend) {
+  const orb_surface *s = &r->hierarchy->surface;
   queue q = {.r = r};
   orb_status status = ORB_OK;
   enqueue_ring(&q, v);
   enqueue(&q, v);
   for (int32_t done = 0; q.head < q.tail && done < RELAX_MOST && status == ORB_OK;) {
     int32_t u = dequeue(&q);
-    done += r->hierarchy->surface.valence[u];
+    if (s->valence[u] >= HUB && u != v) {
+      continue;
+    }
+    done += s->valence[u] < HUB ? s->valence[u] : HUB;
     double gain, crowding;
     status = orb_refiner_relax(ctx, r, u, blend, &gain, &crowding);
-    if (gain > 0.02 && crowding > 0.5 * r->settings.crowded) {
+    if (s->valence[u] < HUB && gain > 0.02 && crowding > 0.5 * r->settings.crowded) {
       enqueue_ring(&q, u);
       enqueue(&q, u);
     }
@@ -183,7 +186,7 @@ static orb_status open_up(orb_context *ctx, orb_refiner *r, int32_t v, double bl
     queue q = {.r = r};
     enqueue(&q, v);
     int64_t seen = 0;
-    for (; seen < q.tail && q.tail < most && q.tail < QUEUE_FULL; seen++) { /* flags stay set: each comes once */
+    for (; seen < q.tail && q.tail < most; seen++) { /* flags stay set: each comes once */
       enqueue_ring(&q, r->queue[seen]);
     }
     for (int64_t i = 0; i < q.tail && status == ORB_OK; i++) {

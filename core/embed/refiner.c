@@ -7,7 +7,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { SWEEP_GRAIN = 32, QUEUE = 65536 };
+enum { SWEEP_GRAIN = 32, QUEUE_MOST = 65536 };
 
 orb_status orb_hierarchy_create(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep, int32_t keep_until,
                                 orb_hierarchy **out) {
@@ -101,7 +101,11 @@ orb_status orb_refiner_create(orb_context *ctx, orb_hierarchy *h, const orb_embe
   r->alive = ORB_NEW0(ctx, unsigned char, n);
   r->pinned = ORB_NEW0(ctx, unsigned char, n);
   r->queued = ORB_NEW0(ctx, unsigned char, n);
-  r->queue = ORB_NEW(ctx, int32_t, QUEUE);
+  r->queue_capacity = 64;
+  while (r->queue_capacity < n && r->queue_capacity < QUEUE_MOST) {
+    r->queue_capacity *= 2;
+  }
+  r->queue = ORB_NEW(ctx, int32_t, r->queue_capacity);
   r->crowding = ORB_NEW0(ctx, float, n);
   r->star = ORB_NEW0(ctx, orb_star, r->star_count);
   r->room = ORB_NEW0(ctx, orb_kernel_room, r->star_count);
