@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "embed/kernel_sampling.h"
 #include "embed/newton.h"
 
 void orb_embed_defaults(orb_embed_options *options) {
@@ -13,10 +14,19 @@ void orb_embed_defaults(orb_embed_options *options) {
                                  .aspect_exponent = 12.0,
                                  .step = 0.11,
                                  .displacement_threshold = 1e-6,
-                                 .max_iterations = 0,
+                                 .max_iterations = 25,
                                  .first_optimization = 25,
                                  .growth = 1.25,
-                                 .qem_until = 0};
+                                 .qem_until = 6000};
+}
+
+static orb_status run_kernel_sampling(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
+                                      orb_embedding *out) {
+  orb_ks_report report = {0};
+  ORB_TRY(orb_kernel_sampling(ctx, mesh, options, out->points, &report));
+  out->timings.simplify = report.simplify_seconds;
+  out->timings.embed = report.place_seconds + report.optimize_seconds;
+  return ORB_OK;
 }
 
 static orb_status run_method(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
@@ -25,7 +35,7 @@ static orb_status run_method(orb_context *ctx, const orb_mesh *mesh, const orb_e
     case ORB_EMBED_NEWTON:
       return orb_newton_run(ctx, mesh, options, out->points, &out->timings);
     case ORB_EMBED_KERNEL_SAMPLING:
-      break;
+      return run_kernel_sampling(ctx, mesh, options, out);
   }
   return orb_fail(ctx, ORB_E_UNSUPPORTED, "This build has no such embedding method; ask for newton.");
 }

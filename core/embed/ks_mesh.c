@@ -1,8 +1,13 @@
 #include "embed/ks_mesh.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/check.h"
+#include "numeric/vec3.h"
+
+/* Share of the mean below which the area of a triangle does not fall: Eq. 3 divides by it. */
+static const double AREA_FLOOR = 1e-2;
 
 void ks_mesh_free(orb_context *ctx, ks_mesh *m) {
   orb_free(ctx, m->tri);
@@ -10,7 +15,18 @@ void ks_mesh_free(orb_context *ctx, ks_mesh *m) {
   orb_free(ctx, m->out);
   orb_free(ctx, m->valence);
   orb_free(ctx, m->log);
+  orb_free(ctx, m->area);
+  orb_free(ctx, m->saved);
   memset(m, 0, sizeof *m);
+}
+
+double ks_triangle_area(const ks_mesh *m, int32_t h) {
+  const double *p = m->x + 3 * (size_t)m->tri[h];
+  double u[3], w[3], n[3];
+  orb_sub(m->x + 3 * (size_t)ks_head(m, h), p, u);
+  orb_sub(m->x + 3 * (size_t)m->tri[orb_prev(h)], p, w);
+  orb_cross(u, w, n);
+  return 0.5 * orb_length(n);
 }
 
 orb_status ks_mesh_create(orb_context *ctx, const orb_mesh *mesh, const double *x, ks_mesh *out) {
@@ -23,7 +39,8 @@ orb_status ks_mesh_create(orb_context *ctx, const orb_mesh *mesh, const double *
   m.out = ORB_NEW(ctx, int32_t, m.vertex_count);
   m.valence = ORB_NEW0(ctx, int32_t, m.vertex_count);
   m.log = ORB_NEW(ctx, struct ks_collapse, m.vertex_count);
-  if (!m.tri || !m.twin || !m.out || !m.valence || !m.log) {
+  m.area = ORB_NEW(ctx, double, m.triangle_count);
+  if (!m.tri || !m.twin || !m.out || !m.valence || !m.log || !m.area) {
     goto fail;
   }
   memcpy(m.tri, mesh->triangles, corners * sizeof *m.tri);
@@ -31,6 +48,20 @@ orb_status ks_mesh_create(orb_context *ctx, const orb_mesh *mesh, const double *
   for (size_t h = 0; h < corners; h++) {
     m.out[m.tri[h]] = (int32_t)h;
     m.valence[m.tri[h]]++;
+  }
+  double total = 0;
+  for (int32_t t = 0; t < m.triangle_count; t++) {
+    m.area[t] = ks_triangle_area(&m, 3 * t);
+    total += m.area[t];
+  }
+  m.area_floor = AREA_FLOOR * (total > 0 ? total : 4 * M_PI) / m.triangle_count;
+  double floored = 0;
+  for (int32_t t = 0; t < m.triangle_count; t++) {
+    m.area[t] = m.area[t] > m.area_floor ? m.area[t] : m.area_floor;
+    floored += m.area[t];
+  }
+  for (int32_t t = 0; t < m.triangle_count; t++) {
+    m.area[t] *= 4 * M_PI / floored;
   }
   *out = m;
   return ORB_OK;
@@ -62,9 +93,57 @@ static void pair_up(ks_mesh *m, int32_t a, int32_t b) {
   m->twin[b] = a;
 }
 
+/* Puts by the areas of the star of h's origin; room grows by half. */
+static orb_status save_areas(orb_context *ctx, ks_mesh *m, int32_t h, double *total) {
+  size_t count = (size_t)m->valence[m->tri[h]];
+  if (m->saved_count + count > m->saved_capacity) {
+    size_t capacity = m->saved_capacity + m->saved_capacity / 2 + count + 1024;
+    double *grown = orb_realloc(ctx, m->saved, capacity, sizeof *grown);
+    if (!grown) {
+      return ORB_E_NO_MEMORY;
+    }
+    m->saved = grown;
+    m->saved_capacity = capacity;
+  }
+  *total = 0;
+  int32_t e = h;
+  for (size_t i = 0; i < count; i++) {
+    m->saved[m->saved_count++] = m->area[e / 3];
+    *total += m->area[e / 3];
+    e = ks_rotate(m, e);
+  }
+  return ORB_OK;
+}
+
+/* Gives `total` to the triangles of `count` half-edges from `first` on: half in proportion to their areas on the mesh,
+ * half in equal parts, so that none is left with next to nothing. */
+static void share_area(ks_mesh *m, int32_t first, int32_t count, double total) {
+  double sum = 0;
+  int32_t e = first;
+  for (int32_t i = 0; i < count; i++) {
+    m->area[e / 3] = ks_triangle_area(m, e) + m->area_floor;
+    sum += m->area[e / 3];
+    e = ks_rotate(m, e);
+  }
+  double even = sum / count;
+  sum = 0;
+  e = first;
+  for (int32_t i = 0; i < count; i++) {
+    m->area[e / 3] += even;
+    sum += m->area[e / 3];
+    e = ks_rotate(m, e);
+  }
+  for (e = first; count > 0; count--) {
+    m->area[e / 3] *= total / sum;
+    e = ks_rotate(m, e);
+  }
+}
+
 /* With the ring v2 = r₀, r₁, …, r₍k−1₎ of v1, the triangles (v1,v2,r₁) and (v1,r₍k−1₎,v2) die. */
-void ks_collapse_edge(ks_mesh *m, int32_t h) {
-  int32_t v1 = m->tri[h], v2 = ks_head(m, h);
+orb_status ks_collapse_edge(orb_context *ctx, ks_mesh *m, int32_t h) {
+  int32_t v1 = m->tri[h], v2 = ks_head(m, h), left = m->valence[v1] - 2;
+  double total;
+  ORB_TRY(save_areas(ctx, m, h, &total));
   int32_t first = ks_rotate(m, h);     /* v1→r₁ */
   int32_t last = orb_next(m->twin[h]); /* v1→r₍k−1₎ in the second dying triangle */
   int32_t before = m->twin[last];      /* r₍k−1₎→v1, stays */
@@ -85,6 +164,8 @@ void ks_collapse_edge(ks_mesh *m, int32_t h) {
   m->log[m->log_count].vertex = v1;
   m->log[m->log_count++].edge = h;
   m->live--;
+  share_area(m, first, left, total);
+  return ORB_OK;
 }
 
 int32_t ks_split_last(ks_mesh *m) {
@@ -111,5 +192,11 @@ int32_t ks_split_last(ks_mesh *m) {
   m->valence[r1]++;
   m->valence[rk]++;
   m->live++;
+  m->saved_count -= (size_t)k;
+  int32_t e = h;
+  for (int32_t i = 0; i < k; i++) {
+    m->area[e / 3] = m->saved[m->saved_count + (size_t)i];
+    e = ks_rotate(m, e);
+  }
   return v1;
 }

@@ -1,7 +1,8 @@
 /* The progressive mesh of `kernel-sampling`: half-edge collapses in place, undone last in, first out.
  *
  * Half-edge h = 3t + k runs from tri[h] to tri[orb_next(h)]. A collapse of v1 into v2 kills two triangles and turns the
- * rest of v1's star to v2; the dead triangles keep their pointers, so (v1, half-edge v1→v2) is all that must be logged.
+ * rest of v1's star to v2; the dead triangles keep their pointers, so (v1, half-edge v1→v2) is all that must be logged,
+ * and the areas that the star stood for.
  */
 #ifndef ORB_EMBED_KS_MESH_H
 #define ORB_EMBED_KS_MESH_H
@@ -10,7 +11,9 @@
 
 typedef struct ks_mesh {
   int32_t vertex_count, triangle_count, live;
-  const double *x; /* positions on the mesh, total area 4π */
+  const double *x;   /* positions on the mesh, total area 4π */
+  double area_floor; /* what Eq. 3 takes for a triangle that has less */
+  double *area;      /* of the part of the input that each live triangle stands for; 4π in all */
   int32_t *tri, *twin;
   int32_t *out;     /* a half-edge out of each live vertex */
   int32_t *valence; /* of live vertices; 0: collapsed */
@@ -18,6 +21,8 @@ typedef struct ks_mesh {
   struct ks_collapse {
     int32_t vertex, edge; /* v1, and the half-edge v1→v2 */
   } * log;
+  double *saved; /* the areas of each collapsed star, last in, first out */
+  size_t saved_count, saved_capacity;
 } ks_mesh;
 
 /* The next half-edge out of the same vertex, counter-clockwise. */
@@ -36,7 +41,11 @@ void ks_mesh_free(orb_context *ctx, ks_mesh *m);
  * more than four vertices. mark: vertex_count ints of the caller, stamp: a value not in it. */
 int ks_link_holds(const ks_mesh *m, int32_t h, int32_t *mark, int32_t stamp);
 
-void ks_collapse_edge(ks_mesh *m, int32_t h);
+/* The area of the triangle of half-edge h on the coarse mesh. */
+double ks_triangle_area(const ks_mesh *m, int32_t h);
+
+/* ORB_E_NO_MEMORY leaves the mesh as it was. */
+ORB_MUST_CHECK orb_status ks_collapse_edge(orb_context *ctx, ks_mesh *m, int32_t h);
 
 /* Undoes the last collapse; returns the vertex that is back. */
 int32_t ks_split_last(ks_mesh *m);

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "base/check.h"
-#include "numeric/predicates.h"
+#include "embed/ks_search.h"
 #include "numeric/vec3.h"
 
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)
@@ -18,10 +18,10 @@
 enum { MAX_PAIRS = 20000 };
 
 /* A ring of less than this share of its area is squeezed: see kernel_sampling.h. */
-#ifndef SQ
-#define SQ 1e-4
-#endif
-static const double SQUEEZED = SQ;
+static const double SQUEEZED = 1e-4;
+
+/* Share of the mean area below which a triangle's does not fall in the angle term, which divides by it. */
+static const double AREA_FLOOR = 1e-2;
 
 orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options, ks_sampler *out) {
   ks_sampler s = {.area_exponent = options->area_exponent, .aspect_exponent = options->aspect_exponent};
@@ -40,6 +40,17 @@ orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options,
       }
     }
   }
+  s.pair_s = ORB_NEW(ctx, float, 2 * (size_t)s.pair_count);
+  if (!s.pair_s) {
+    orb_free(ctx, s.pair);
+    return ORB_E_NO_MEMORY;
+  }
+  s.pair_t = s.pair_s + s.pair_count;
+  for (int32_t i = 0; i < s.pair_count; i++) {
+    s.pair_s[i] = (float)s.pair[i][0];
+    s.pair_t[i] = (float)s.pair[i][1];
+  }
+  s.width = ks_width_of_machine();
   *out = s;
   return ORB_OK;
 }
@@ -49,13 +60,15 @@ static void ring_free(orb_context *ctx, ks_ring *r) {
   orb_free(ctx, r->plane);
   orb_free(ctx, r->side);
   orb_free(ctx, r->vertex);
-  orb_free(ctx, r->scratch);
   memset(r, 0, sizeof *r);
 }
 
 void ks_sampler_free(orb_context *ctx, ks_sampler *s) {
   ring_free(ctx, &s->ring);
   orb_free(ctx, s->pair);
+  orb_free(ctx, s->pair_s);
+  orb_free(ctx, s->near_candidate);
+  orb_free(ctx, s->edge);
   orb_free(ctx, s->candidate);
   memset(s, 0, sizeof *s);
 }
@@ -68,14 +81,17 @@ static orb_status ring_reserve(orb_context *ctx, ks_sampler *s, int32_t count) {
   size_t capacity = (size_t)count + (size_t)count / 2 + 16;
   ring_free(ctx, r);
   orb_free(ctx, s->candidate);
+  orb_free(ctx, s->near_candidate);
+  orb_free(ctx, s->edge);
   s->room = (int32_t)capacity * s->pair_count + 1;
   s->candidate = orb_alloc(ctx, (size_t)s->room, 4 * sizeof(double));
+  s->near_candidate = orb_alloc(ctx, (size_t)s->room, 4 * sizeof(float));
+  s->edge = ORB_NEW(ctx, ks_edge, capacity);
   r->point = orb_alloc(ctx, capacity, sizeof *r->point);
   r->plane = orb_alloc(ctx, capacity, sizeof *r->plane);
   r->side = ORB_NEW(ctx, double, 6 * capacity);
   r->vertex = ORB_NEW(ctx, int32_t, capacity);
-  r->scratch = ORB_NEW(ctx, double, 4 * (capacity + 8));
-  if (!s->candidate || !r->point || !r->plane || !r->side || !r->vertex || !r->scratch) {
+  if (!s->candidate || !s->near_candidate || !s->edge || !r->point || !r->plane || !r->side || !r->vertex) {
     return ORB_E_NO_MEMORY;
   }
   r->side2 = r->side + capacity;
@@ -87,11 +103,11 @@ static orb_status ring_reserve(orb_context *ctx, ks_sampler *s, int32_t count) {
   return ORB_OK;
 }
 
-orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const double *P, int32_t v,
-                        double area_scale, double area_floor) {
+orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const double *P, int32_t v) {
   ORB_TRY(ring_reserve(ctx, s, m->valence[v]));
   ks_ring *r = &s->ring;
   r->count = 0;
+  double area_floor = AREA_FLOOR * 4 * M_PI / (2 * m->live - 4);
   int32_t e = m->out[v];
   do {
     int32_t w = ks_head(m, e);
@@ -101,30 +117,31 @@ orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const
   } while (e != m->out[v]);
   const double *xp = m->x + 3 * (size_t)v;
   double mesh_area = 0, fan_area = 0;
-  for (int32_t i = 0; i < r->count; i++) {
+  for (int32_t i = 0; i < r->count; i++, e = ks_rotate(m, e)) {
     int32_t j = i + 1 < r->count ? i + 1 : 0;
     double d[3], u[3], w[3], n[3];
     orb_sub(r->point[j], r->point[i], d);
     orb_cross(r->point[i], d, r->plane[i]);
     r->side2[i] = orb_dot(d, d);
     r->side[i] = sqrt(r->side2[i]);
-    const double *xq = m->x + 3 * (size_t)r->vertex[i], *xr = m->x + 3 * (size_t)r->vertex[j];
-    orb_sub(xq, xp, u);
-    orb_sub(xr, xp, w);
+    orb_sub(m->x + 3 * (size_t)r->vertex[i], xp, u);
+    orb_sub(m->x + 3 * (size_t)r->vertex[j], xp, w);
     orb_cross(u, w, n);
-    double area = 0.5 * orb_length(n), floored = area > area_floor ? area : area_floor;
-    double half = 0.5 / floored;
-    r->angle_p[i] = (orb_distance2(xq, xr) + area_floor) * half;
+    double area = 0.5 * orb_length(n), half = 0.5 / (area > area_floor ? area : area_floor);
+    orb_sub(w, u, n);
+    r->angle_p[i] = (orb_dot(n, n) + area_floor) * half;
     r->angle_q[i] = (orb_dot(w, w) + area_floor) * half;
     r->angle_r[i] = (orb_dot(u, u) + area_floor) * half;
-    r->inverse_area[i] = 1 / (floored * area_scale);
-    mesh_area += floored * area_scale;
+    double carried = m->area[e / 3];
+    r->inverse_area[i] = 1 / carried;
+    mesh_area += carried;
     double spoke[3], normal[3];
     orb_sub(r->point[i], r->point[0], spoke);
     orb_cross(spoke, d, normal);
     fan_area += 0.5 * orb_length(normal);
   }
-  int squeezed = fan_area < SQUEEZED * mesh_area;
+  r->fill = fan_area / mesh_area;
+  int squeezed = r->fill < SQUEEZED;
   r->aspect_exponent = squeezed && s->aspect_exponent > 1 ? 1 : s->aspect_exponent;
   return ORB_OK;
 }
@@ -258,21 +275,35 @@ KS_VECTOR static void spread(const double (*pair)[2], int32_t pairs, double draw
   }
 }
 
-static int inside_exactly(const ks_ring *r, const double p[3]) {
-  for (int32_t i = 0; i < r->count; i++) {
-    if (orb_orient(p, r->point[i], r->point[i + 1 < r->count ? i + 1 : 0]) <= 0) {
-      return 0;
-    }
+static double raise(double x, double e) {
+  if (e != floor(e) || e < 0 || e > 64) {
+    return pow(x, e);
   }
-  return 1;
+  double result = 1;
+  for (int bits = (int)e; bits; bits >>= 1, x *= x) {
+    result *= bits & 1 ? x : 1;
+  }
+  return result;
 }
 
-double ks_error_at(ks_sampler *s, const double p[3]) {
-  double error = 0;
-  if (!inside_exactly(&s->ring, p)) {
-    return INFINITY;
+double ks_error_at(const ks_sampler *s, const double p[3]) {
+  const ks_ring *r = &s->ring;
+  double error = 0, u[3], w[3], n[3];
+  orb_sub(r->point[0], p, u);
+  double c2 = orb_dot(u, u), c = sqrt(c2);
+  for (int32_t i = 0; i < r->count; i++) {
+    double a = r->side[i], a2 = r->side2[i], mp = r->angle_p[i], mq = r->angle_q[i], mr = r->angle_r[i];
+    orb_sub(r->point[i + 1 < r->count ? i + 1 : 0], p, w);
+    orb_cross(u, w, n);
+    double n2 = orb_dot(n, n) + 1e-300, doubled = sqrt(n2), b2 = orb_dot(w, w), b = sqrt(b2);
+    double angle = 0.5 * (mp * (b2 + c2 - a2) + mq * (a2 + c2 - b2) + mr * (a2 + b2 - c2)) / doubled;
+    double ratio = 0.5 * r->inverse_area[i] * doubled;
+    error += angle * raise(ratio + 1 / ratio, s->area_exponent) *
+             raise(0.25 * a * b * c * (a + b + c) / n2, r->aspect_exponent);
+    memcpy(u, w, sizeof u);
+    c2 = b2;
+    c = b;
   }
-  measure_batch(&s->ring, s->area_exponent, s->ring.aspect_exponent, p, p + 1, p + 2, 1, INFINITY, &error);
   return error;
 }
 
@@ -326,87 +357,11 @@ int ks_best_sample(ks_sampler *s, const double apex[3], int32_t first, int32_t l
       return 0;
     }
     const double p[3] = {x[best], y[best], z[best]};
-    if (inside_exactly(&s->ring, p)) {
+    if (orb_kernel_contains((const double(*)[3])s->ring.point, s->ring.count, p)) {
       memcpy(out, p, sizeof p);
       *error = least;
       return 1;
     }
     e[best] = INFINITY;
   }
-}
-
-/* Clips a polygon of `count` points by a·x + b·y + d ≥ 0; returns the new count. */
-static int32_t clip_polygon(const double (*from)[2], int32_t count, double a, double b, double d, double (*to)[2]) {
-  int32_t kept = 0;
-  for (int32_t i = 0; i < count; i++) {
-    const double *p = from[i], *q = from[i + 1 < count ? i + 1 : 0];
-    double f = a * p[0] + b * p[1] + d, g = a * q[0] + b * q[1] + d;
-    if (f >= 0) {
-      memcpy(to[kept++], p, sizeof to[0]);
-    }
-    if ((f > 0 && g < 0) || (f < 0 && g > 0)) {
-      double t = f / (f - g);
-      to[kept][0] = p[0] + t * (q[0] - p[0]);
-      to[kept++][1] = p[1] + t * (q[1] - p[1]);
-    }
-  }
-  return kept;
-}
-
-int ks_kernel_centroid(ks_sampler *s, const double apex[3], double out[3]) {
-  const ks_ring *r = &s->ring;
-  double sign = apex[2] >= 0 ? 1 : -1, f = -1 / (sign + apex[2]), g = apex[0] * apex[1] * f;
-  const double e1[3] = {1 + sign * apex[0] * apex[0] * f, sign * g, -sign * apex[0]};
-  const double e2[3] = {g, sign + apex[1] * apex[1] * f, -apex[1]};
-  double(*polygon)[2] = (double(*)[2])(void *)r->scratch;
-  double(*other)[2] = polygon + r->capacity + 8;
-  /* The chart need only hold the ring: the smaller it is, the less rounding hurts. */
-  double reach2 = 0;
-  for (int32_t i = 0; i < r->count; i++) {
-    reach2 = fmax(reach2, orb_distance2(apex, r->point[i]));
-  }
-  double far = reach2 < 1 ? 2 * sqrt(reach2) / (1 - 0.5 * reach2) : 30; /* 88 degrees */
-  const double square[4][2] = {{-far, -far}, {far, -far}, {far, far}, {-far, far}};
-  memcpy(polygon, square, sizeof square);
-  int32_t count = 4;
-  for (int32_t i = 0; i < r->count; i++) {
-    int32_t j = i + 1 < r->count ? i + 1 : 0;
-    const double *n = r->plane[i];
-    double norm = orb_length(n) + 1e-300, rel[3];
-    orb_sub(apex, r->point[i], rel);
-    int touches =
-        memcmp(r->point[i], apex, 3 * sizeof(double)) == 0 || memcmp(r->point[j], apex, 3 * sizeof(double)) == 0;
-    double d = touches ? 0 : orb_dot(n, rel) / norm;
-    count = clip_polygon((const double(*)[2])polygon, count, orb_dot(n, e1) / norm, orb_dot(n, e2) / norm, d, other);
-    if (count < 3) {
-      return 0;
-    }
-    double(*swap)[2] = polygon;
-    polygon = other;
-    other = swap;
-  }
-  double sum = 0, cx = 0, cy = 0;
-  for (int32_t i = 1; i + 1 < count; i++) {
-    double x1 = polygon[i][0] - polygon[0][0], y1 = polygon[i][1] - polygon[0][1];
-    double x2 = polygon[i + 1][0] - polygon[0][0], y2 = polygon[i + 1][1] - polygon[0][1], w = x1 * y2 - x2 * y1;
-    sum += w;
-    cx += w * (x1 + x2) / 3;
-    cy += w * (y1 + y2) / 3;
-  }
-  if (!(sum > 0)) {
-    return 0;
-  }
-  cx = polygon[0][0] + cx / sum;
-  cy = polygon[0][1] + cy / sum;
-  /* A kernel that is far from its apex is drawn in until rounding no longer spoils it. */
-  for (int tries = 0; tries < 40; tries++, cx *= 0.5, cy *= 0.5) {
-    for (int k = 0; k < 3; k++) {
-      out[k] = apex[k] + cx * e1[k] + cy * e2[k];
-    }
-    orb_normalize(out);
-    if (inside_exactly(r, out)) {
-      return 1;
-    }
-  }
-  return 0;
 }

@@ -2,6 +2,7 @@
 #ifndef ORB_EMBED_KS_SAMPLE_H
 #define ORB_EMBED_KS_SAMPLE_H
 
+#include "embed/kernel.h"
 #include "embed/ks_mesh.h"
 
 /* The ring of one vertex: neighbour i and its successor span ring triangle i. All arrays have `capacity` entries. */
@@ -11,11 +12,20 @@ typedef struct ks_ring {
   double (*plane)[3];                  /* cross(point i, point i+1), from differences */
   double *side, *side2;                /* chord length of ring edge i, and its square */
   double *angle_p, *angle_q, *angle_r; /* squared mesh edge opposite to the vertex, to i, to i+1, over 2·area */
-  double *inverse_area;                /* of the mesh triangle, scaled to the sphere */
+  double *inverse_area;                /* that the triangle stands for */
   int32_t *vertex;
   double aspect_exponent; /* of this ring */
-  double *scratch;        /* 2·(capacity + 8) doubles twice, for clipping */
+  double fill;            /* area of its fan on the sphere over the area that it stands for */
 } ks_ring;
+
+/* One ring triangle as floats, for ks_search.c. */
+typedef struct ks_edge {
+  float q[3], w[3];       /* its ends */
+  float normal[3], at;    /* of the plane through the edge and the centre */
+  float a;                /* its length */
+  float k0, kb, kc;       /* angle term: (k0 + kb·b² + kc·c²) / doubled area */
+  float kappa, inv_kappa; /* ratio of areas = kappa · doubled area */
+} ks_edge;
 
 typedef struct ks_sampler {
   double area_exponent, aspect_exponent;
@@ -23,6 +33,10 @@ typedef struct ks_sampler {
   double (*pair)[2];  /* s, t */
   double *candidate;  /* room for the points of one ring: x, y, z, error in planes of `room` */
   int32_t room;
+  float *pair_s, *pair_t; /* the same pairs */
+  float *near_candidate;  /* as candidate */
+  ks_edge *edge;          /* as many as the ring's capacity */
+  int width;              /* a ks_width */
   ks_ring ring;
   int32_t kernel_points; /* how many the last call found inside */
 } ks_sampler;
@@ -30,9 +44,8 @@ typedef struct ks_sampler {
 ORB_MUST_CHECK orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options, ks_sampler *out);
 void ks_sampler_free(orb_context *ctx, ks_sampler *s);
 
-/* Loads the ring of v: sphere points P (3 a vertex), mesh positions m->x times area_scale in area. */
-ORB_MUST_CHECK orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const double *P, int32_t v,
-                                       double area_scale, double area_floor);
+/* Loads the ring of v: sphere points P (3 a vertex). */
+ORB_MUST_CHECK orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const double *P, int32_t v);
 
 /* Takes the best sample from the triangles (apex, i, i+1) for first ≤ i < last into `out`, if one lies in the kernel
  * and its error is below `bound`; returns whether. draw (≤ 1): the samples
@@ -40,11 +53,7 @@ ORB_MUST_CHECK orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks
 int ks_best_sample(ks_sampler *s, const double apex[3], int32_t first, int32_t last, double draw, double bound,
                    double out[3], double *error);
 
-/* Eq. 3 at one point; INFINITY outside the kernel. */
-double ks_error_at(ks_sampler *s, const double p[3]);
-
-/* The centroid of the kernel, clipped in the gnomonic chart around `apex`, a point of its closure; 0 if none is found.
- */
-int ks_kernel_centroid(ks_sampler *s, const double apex[3], double out[3]);
+/* Eq. 3 at one point of the kernel. */
+double ks_error_at(const ks_sampler *s, const double p[3]);
 
 #endif

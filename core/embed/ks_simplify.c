@@ -279,7 +279,7 @@ static orb_status collapse_until(simplifier *s, int32_t until) {
       }
     }
     heap_remove(s, v);
-    ks_collapse_edge(m, s->target[v]);
+    ORB_TRY(ks_collapse_edge(s->ctx, m, s->target[v]));
     refresh_around(s, v2);
     if ((m->log_count & 255) == 0) {
       ORB_TRY(orb_context_check(s->ctx));
@@ -308,7 +308,7 @@ orb_status ks_simplify(orb_context *ctx, ks_mesh *m, int32_t qem_until) {
       goto done;
     }
     build_quadrics(&s);
-    ORB_GO(status, collapse_until(&s, qem_until), done);
+    ORB_GO(status, collapse_until(&s, qem_until > 4 ? qem_until : 4), done);
     orb_free(ctx, s.quadric);
     s.quadric = NULL;
   }

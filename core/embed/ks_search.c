@@ -1,0 +1,260 @@
+/* Eq. 2, the clipping of section 5.1 and Eq. 3 in single precision, many candidates at a time.
+ *
+ * This is where the time of `kernel-sampling` goes. Three things make it fast. Coordinates are relative to the vertex
+ * and divided by the ring's radius, so that floats hold them as well for small rings as for large ones. All terms of
+ * Eq. 3 are positive, so a candidate is dropped as soon as its sum reaches the present error: high exponents drop
+ * most of them after one or two triangles. And the sum is scaled so that the present error is 1: what overflows is
+ * worse than the present place and what underflows does not count.
+ *
+ * The winner is measured again in double precision, and its signs are decided exactly. Loops run over candidates; the
+ * same source is compiled for several vector widths, without contraction, so that all give the same bits.
+ */
+#include "embed/ks_search.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "numeric/vec3.h"
+
+#define KS_INLINE static inline __attribute__((always_inline))
+
+ks_width ks_width_of_machine(void) {
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512bw")) {
+    return KS_AVX512;
+  }
+  if (__builtin_cpu_supports("avx2")) {
+    return KS_AVX2;
+  }
+#endif
+  return KS_PLAIN;
+}
+
+/* Where the scale of the sum goes: the factor of Eq. 3 that has an exponent to take its root by. */
+typedef struct scaling {
+  float angle, area, shape;
+} scaling;
+
+static scaling scale_to(double bound, double area_exponent, double aspect_exponent) {
+  scaling c = {1, 1, 1};
+  if (aspect_exponent >= 1) {
+    c.shape = (float)fmax(1e-30, pow(bound, -1 / aspect_exponent));
+  } else if (area_exponent >= 1) {
+    c.area = (float)fmax(1e-30, pow(bound, -1 / area_exponent));
+  } else {
+    c.angle = (float)fmax(1e-30, 1 / bound);
+  }
+  return c;
+}
+
+static ks_edge edge_of(const ks_ring *r, int32_t i, const double apex[3], double inv_radius, scaling c) {
+  int32_t j = i + 1 < r->count ? i + 1 : 0;
+  double q[3], w[3], length = orb_length(r->plane[i]) + 1e-300;
+  orb_sub(r->point[i], apex, q);
+  orb_sub(r->point[j], apex, w);
+  ks_edge e;
+  for (int k = 0; k < 3; k++) {
+    e.q[k] = (float)(q[k] * inv_radius);
+    e.w[k] = (float)(w[k] * inv_radius);
+    e.normal[k] = (float)(r->plane[i][k] / length);
+  }
+  e.at = (float)(-orb_dot(r->plane[i], q) / length * inv_radius);
+  e.a = (float)(r->side[i] * inv_radius);
+  double mp = r->angle_p[i], mq = r->angle_q[i], mr = r->angle_r[i];
+  e.k0 = (float)(0.5 * r->side2[i] * inv_radius * inv_radius * (mq + mr - mp)) * c.angle;
+  e.kb = (float)(0.5 * (mp - mq + mr)) * c.angle;
+  e.kc = (float)(0.5 * (mp + mq - mr)) * c.angle;
+  double kappa = 0.5 * r->inverse_area[i] / (inv_radius * inv_radius);
+  e.kappa = (float)(kappa)*c.area;
+  e.inv_kappa = (float)(1 / kappa) * c.area;
+  return e;
+}
+
+KS_INLINE void spread(const float *s, const float *t, int32_t pairs, float draw, float radius, const float *apex,
+                      const ks_edge *e, float *x, float *y, float *z) {
+  float qx = draw * e->q[0], qy = draw * e->q[1], qz = draw * e->q[2];
+  float wx = draw * e->w[0], wy = draw * e->w[1], wz = draw * e->w[2], ax = apex[0], ay = apex[1], az = apex[2];
+  for (int32_t l = 0; l < pairs; l++) {
+    float dx = s[l] * qx + t[l] * wx, dy = s[l] * qy + t[l] * wy, dz = s[l] * qz + t[l] * wz;
+    /* |apex + radius·d|² = 1 + radius·rise; back on the sphere without cancellation. */
+    float rise = 2 * (ax * dx + ay * dy + az * dz) + radius * (dx * dx + dy * dy + dz * dz);
+    float norm = sqrtf(fabsf(1 + radius * rise) + 1e-30f), f = 1 / norm, sink = rise * f / (1 + norm);
+    x[l] = dx * f - ax * sink;
+    y[l] = dy * f - ay * sink;
+    z[l] = dz * f - az * sink;
+  }
+}
+
+/* Keeps the candidates above the plane of each edge. */
+KS_INLINE int32_t keep_inside(const ks_edge *edge, int32_t edges, float *x, float *y, float *z, float *least,
+                              int32_t count) {
+  for (int32_t l = 0; l < count; l++) {
+    least[l] = INFINITY;
+  }
+  for (int32_t i = 0; i < edges; i++) {
+    float nx = edge[i].normal[0], ny = edge[i].normal[1], nz = edge[i].normal[2], at = edge[i].at;
+    for (int32_t l = 0; l < count; l++) {
+      float d = nx * x[l] + ny * y[l] + nz * z[l] + at;
+      least[l] = d < least[l] ? d : least[l];
+    }
+  }
+  int32_t kept = 0;
+  for (int32_t l = 0; l < count; l++) {
+    x[kept] = x[l];
+    y[kept] = y[l];
+    z[kept] = z[l];
+    kept += least[l] > 0;
+  }
+  return kept;
+}
+
+/* x to the power e, where kind is e if straight code is known for it and 0 if not. */
+KS_INLINE float power(float x, int kind, float e) {
+  float x3 = x * x * x, x6 = x3 * x3;
+  return kind == 1 ? x : kind == 3 ? x3 : kind == 12 ? x6 * x6 : powf(x, e);
+}
+
+/* Adds the term of Eq. 3 of one ring triangle. */
+KS_INLINE void add_term(const ks_edge *e, int area_kind, int shape_kind, float area_exponent, float aspect_exponent,
+                        float shape_scale, const float *restrict x, const float *restrict y, const float *restrict z,
+                        int32_t count, float *restrict error) {
+  float qx = e->q[0], qy = e->q[1], qz = e->q[2], wx = e->w[0], wy = e->w[1], wz = e->w[2], a = e->a;
+  float k0 = e->k0, kb = e->kb, kc = e->kc, kappa = e->kappa, inv_kappa = e->inv_kappa, quarter = 0.25f * shape_scale;
+  for (int32_t l = 0; l < count; l++) {
+    float ux = qx - x[l], uy = qy - y[l], uz = qz - z[l], vx = wx - x[l], vy = wy - y[l], vz = wz - z[l];
+    float c2 = ux * ux + uy * uy + uz * uz, b2 = vx * vx + vy * vy + vz * vz;
+    float nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
+    float n2 = nx * nx + ny * ny + nz * nz + 1e-36f, inv = 1 / sqrtf(n2), doubled = n2 * inv;
+    float b = sqrtf(b2), c = sqrtf(c2);
+    float area = doubled * kappa + inv * inv_kappa;
+    float shape = quarter * a * b * c * (a + b + c) * inv * inv;
+    float angle = (k0 + kb * b2 + kc * c2) * inv;
+    error[l] += angle * power(area, area_kind, area_exponent) * power(shape, shape_kind, aspect_exponent);
+  }
+}
+
+KS_INLINE int32_t keep_better(float *x, float *y, float *z, float *error, int32_t count) {
+  int32_t kept = 0;
+  for (int32_t l = 0; l < count; l++) {
+    float e = error[l];
+    x[kept] = x[l];
+    y[kept] = y[l];
+    z[kept] = z[l];
+    error[kept] = e;
+    kept += e < 1; /* not where it is no number */
+  }
+  return kept;
+}
+
+typedef struct search {
+  const ks_edge *edge;
+  int32_t edges, pairs;
+  const float *s, *t;
+  float draw, radius, apex[3], area_exponent, aspect_exponent, shape_scale;
+  float *x, *y, *z, *error;
+  int32_t inside, best;
+} search;
+
+KS_INLINE void run(search *q) {
+  int32_t count = 0;
+  for (int32_t i = 0; i < q->edges; i++, count += q->pairs) {
+    spread(q->s, q->t, q->pairs, q->draw, q->radius, q->apex, &q->edge[i], q->x + count, q->y + count, q->z + count);
+  }
+  count = q->inside = keep_inside(q->edge, q->edges, q->x, q->y, q->z, q->error, count);
+  memset(q->error, 0, (size_t)count * sizeof *q->error);
+  for (int32_t i = 0; i < q->edges && count > 0; i++) {
+    if (q->area_exponent == 3 && q->aspect_exponent == 12) {
+      add_term(&q->edge[i], 3, 12, 3, 12, q->shape_scale, q->x, q->y, q->z, count, q->error);
+    } else if (q->area_exponent == 3 && q->aspect_exponent == 1) {
+      add_term(&q->edge[i], 3, 1, 3, 1, q->shape_scale, q->x, q->y, q->z, count, q->error);
+    } else {
+      add_term(&q->edge[i], 0, 0, q->area_exponent, q->aspect_exponent, q->shape_scale, q->x, q->y, q->z, count,
+               q->error);
+    }
+    count = keep_better(q->x, q->y, q->z, q->error, count);
+  }
+  float least = 1;
+  q->best = -1;
+  for (int32_t l = 0; l < count; l++) {
+    if (q->error[l] < least) {
+      least = q->error[l];
+      q->best = l;
+    }
+  }
+}
+
+static void run_plain(search *q) {
+  run(q);
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) static void run_avx2(search *q) {
+  run(q);
+}
+#if defined(__clang__)
+#define KS_TARGET_512 "avx512f,avx512vl,avx512dq,avx512bw"
+#else
+#define KS_TARGET_512 "avx512f,avx512vl,avx512dq,avx512bw,prefer-vector-width=512"
+#endif
+__attribute__((target(KS_TARGET_512))) static void run_avx512(search *q) {
+  run(q);
+}
+#endif
+
+static void run_widest(const ks_sampler *s, search *q) {
+#if defined(__x86_64__)
+  if (s->width == KS_AVX512) {
+    run_avx512(q);
+    return;
+  }
+  if (s->width == KS_AVX2) {
+    run_avx2(q);
+    return;
+  }
+#endif
+  (void)s;
+  run_plain(q);
+}
+
+int ks_search(ks_sampler *s, const double apex[3], double draw, double bound, double out[3], double *error) {
+  const ks_ring *r = &s->ring;
+  double radius2 = 1e-300;
+  for (int32_t i = 0; i < r->count; i++) {
+    double d2 = orb_distance2(r->point[i], apex);
+    radius2 = d2 > radius2 ? d2 : radius2;
+  }
+  double radius = sqrt(radius2);
+  scaling c = scale_to(bound, s->area_exponent, r->aspect_exponent);
+  for (int32_t i = 0; i < r->count; i++) {
+    s->edge[i] = edge_of(r, i, apex, 1 / radius, c);
+  }
+  float *x = s->near_candidate;
+  search q = {.edge = s->edge,
+              .edges = r->count,
+              .pairs = s->pair_count,
+              .s = s->pair_s,
+              .t = s->pair_t,
+              .draw = (float)draw,
+              .radius = (float)radius,
+              .apex = {(float)apex[0], (float)apex[1], (float)apex[2]},
+              .area_exponent = (float)s->area_exponent,
+              .aspect_exponent = (float)r->aspect_exponent,
+              .shape_scale = c.shape,
+              .x = x,
+              .y = x + s->room,
+              .z = x + 2 * (size_t)s->room,
+              .error = x + 3 * (size_t)s->room};
+  run_widest(s, &q);
+  s->kernel_points = q.inside;
+  if (q.best < 0) {
+    return 0;
+  }
+  out[0] = apex[0] + radius * (double)q.x[q.best];
+  out[1] = apex[1] + radius * (double)q.y[q.best];
+  out[2] = apex[2] + radius * (double)q.z[q.best];
+  orb_normalize(out);
+  *error = ks_error_at(s, out);
+  return *error < bound && orb_kernel_contains((const double(*)[3])r->point, r->count, out);
+}

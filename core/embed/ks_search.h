@@ -1,0 +1,17 @@
+/* The search for a better place among the samples of a whole ring, in single precision: see ks_search.c. */
+#ifndef ORB_EMBED_KS_SEARCH_H
+#define ORB_EMBED_KS_SEARCH_H
+
+#include "embed/ks_sample.h"
+
+/* Instruction sets that the search is compiled for. */
+typedef enum ks_width { KS_PLAIN = 0, KS_AVX2, KS_AVX512 } ks_width;
+
+ks_width ks_width_of_machine(void);
+
+/* Finds the sample (all ring triangles with `apex`, drawn in towards it by `draw`) of least error below `bound`.
+ * Returns 1 and the point, with its error in double precision; 0 where no sample is better or the kernel holds none.
+ * The point lies exactly in the kernel. s->kernel_points is set. */
+int ks_search(ks_sampler *s, const double apex[3], double draw, double bound, double out[3], double *error);
+
+#endif
