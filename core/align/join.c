@@ -1,20 +1,21 @@
 /* A base that all shapes share.
  *
- * Edges between landmarks are tried in the order of their length summed over the shapes: first those that join two
- * trees, which can always be drawn, then all others. An edge is drawn on one shape (they take turns) by the shortest
- * path whatever the sector it leaves and enters by, then on the others through the same sectors, so that the cyclic
- * order about each landmark agrees everywhere. Two landmarks that are no neighbours yet and lie on one face can always
- * be joined through it; when no such pair is left the graph is a maximal planar one, that is, a triangulation without
- * double edges, and such a one has an embedding by great circle arcs (Steinitz), which the library's own embedding
- * finds.
+ * Edges between landmarks are tried in the order of their length, past the paths there are, summed over the shapes:
+ * first those that join two trees, which can always be drawn, then all others. An edge is drawn on one shape (they take
+ * turns) by the shortest path whatever the sector it leaves and enters by, then on the others through the same sectors,
+ * so that the cyclic order about each landmark agrees everywhere. Two landmarks that are no neighbours yet and lie on
+ * one face can always be joined through it; when no such pair is left the graph is a maximal planar one, that is, a
+ * triangulation without double edges, and such a one has an embedding by great circle arcs (Steinitz), which the
+ * library's own embedding finds.
  */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "align/trace.h"
 #include "base/check.h"
 #include "numeric/vec3.h"
+
+static const double SLACK = 1.2, LONGEST = 200;
 
 typedef struct candidate {
   double length;
@@ -34,12 +35,48 @@ typedef struct joiner {
   int32_t edges;
 } joiner;
 
-static int by_length(const void *a, const void *b) {
-  const candidate *x = a, *y = b;
-  if (x->length != y->length) {
-    return x->length < y->length ? -1 : 1;
+/* A heap of pairs by length, ties by number. */
+typedef struct queue {
+  candidate *pair; /* all of them; lengths only grow */
+  int64_t *heap, count;
+} queue;
+
+static int shorter(const queue *q, int64_t x, int64_t y) {
+  return q->pair[x].length != q->pair[y].length ? q->pair[x].length < q->pair[y].length : x < y;
+}
+
+static void sift(queue *q, int64_t i) {
+  int64_t item = q->heap[i];
+  for (;;) {
+    int64_t child = 2 * i + 1;
+    if (child >= q->count) {
+      break;
+    }
+    child += child + 1 < q->count && shorter(q, q->heap[child + 1], q->heap[child]);
+    if (!shorter(q, q->heap[child], item)) {
+      break;
+    }
+    q->heap[i] = q->heap[child];
+    i = child;
   }
-  return x->a != y->a ? (x->a > y->a) - (x->a < y->a) : (x->b > y->b) - (x->b < y->b);
+  q->heap[i] = item;
+}
+
+static void queue_fill(queue *q, int64_t count) {
+  q->count = count;
+  for (int64_t i = 0; i < count; i++) {
+    q->heap[i] = i;
+  }
+  for (int64_t i = count / 2; i-- > 0;) {
+    sift(q, i);
+  }
+}
+
+static void queue_pop(queue *q) {
+  q->heap[0] = q->heap[--q->count];
+  if (q->count > 0) {
+    sift(q, 0);
+  }
 }
 
 static int32_t root_of(int32_t *parent, int32_t v) {
@@ -174,30 +211,86 @@ static orb_status add_edge(joiner *j, int32_t a, int32_t b, int *good) {
   return ORB_OK;
 }
 
-static orb_status join_all(joiner *j, candidate *order, int *good) {
+static double straight(const joiner *j, int32_t s, int32_t a, int32_t b) {
+  const double *p = j->tracers[s].sheet->shape.points;
+  const int32_t *at = j->at + (size_t)s * (size_t)j->count;
+  return sqrt(orb_distance2(p + 3 * (size_t)at[a], p + 3 * (size_t)at[b]));
+}
+
+/* Is the way from a to b, past all paths laid so far and summed over the shapes, at most `most` long? */
+static orb_status short_enough(joiner *j, int32_t a, int32_t b, double most, int *yes) {
+  double rest = most;
+  for (int32_t s = 0; s < j->shapes; s++) {
+    rest -= straight(j, s, a, b);
+  }
+  *yes = rest >= 0;
+  for (int32_t s = 0; s < j->shapes && *yes; s++) {
+    orb_tracer *t = &j->tracers[s];
+    const int32_t *at = j->at + (size_t)s * (size_t)j->count;
+    double line = straight(j, s, a, b);
+    ORB_TRY(orb_tracer_fit(t));
+    ORB_TRY(orb_context_check(j->ctx));
+    orb_tracer_gates(t, at[a], -1, -1, 1);
+    orb_tracer_gates(t, at[b], -1, -1, 1);
+    t->bound = rest + line;
+    orb_status status = orb_tracer_search(t, at[a], at[b], yes);
+    t->bound = 0;
+    orb_tracer_gates(t, at[a], -1, -1, 0);
+    orb_tracer_gates(t, at[b], -1, -1, 0);
+    ORB_TRY(status);
+    rest -= *yes ? t->length - line : 0;
+  }
+  return ORB_OK;
+}
+
+static int is_open(joiner *j, int tree, int32_t a, int32_t b) {
+  return tree ? root_of(j->parent, a) != root_of(j->parent, b) : !neighbours(j, a, b) && share_face(j, a, b);
+}
+
+/* Adds edges in the order of their true lengths, which grow while paths are laid in their way: a pair whose way has
+ * become longer than that of the next one goes back into the queue. */
+static orb_status join_pass(joiner *j, queue *q, int tree, int *good) {
+  while (q->count > 0 && *good && j->edges < 3 * j->count - 6) {
+    candidate *pair = &q->pair[q->heap[0]];
+    int32_t a = pair->a, b = pair->b;
+    int taken = 1;
+    if (!is_open(j, tree, a, b)) {
+      queue_pop(q);
+      continue;
+    }
+    int64_t second = q->count > 2 && shorter(q, q->heap[2], q->heap[1]) ? 2 : 1;
+    if (q->count > 1 && pair->length < LONGEST) {
+      double most = SLACK * q->pair[q->heap[second]].length;
+      ORB_TRY(short_enough(j, a, b, most, &taken));
+      if (!taken) {
+        pair->length = most;
+        sift(q, 0);
+      }
+    }
+    if (taken) {
+      queue_pop(q);
+      j->parent[root_of(j->parent, a)] = root_of(j->parent, b);
+      ORB_TRY(add_edge(j, a, b, good));
+    }
+  }
+  return ORB_OK;
+}
+
+static orb_status join_all(joiner *j, queue *q, int *good) {
   int64_t pairs = 0;
   for (int32_t a = 0; a < j->count; a++) {
     for (int32_t b = 0; b < a; b++) {
       double length = 0;
       for (int32_t s = 0; s < j->shapes; s++) {
-        const double *p = j->tracers[s].sheet->shape.points;
-        const int32_t *at = j->at + (size_t)s * (size_t)j->count;
-        length += sqrt(orb_distance2(p + 3 * (size_t)at[a], p + 3 * (size_t)at[b]));
+        length += straight(j, s, a, b);
       }
-      order[pairs++] = (candidate){length, b, a};
+      q->pair[pairs++] = (candidate){length, b, a};
     }
   }
-  qsort(order, (size_t)pairs, sizeof *order, by_length);
   *good = 1;
   for (int tree = 1; tree >= 0; tree--) {
-    for (int64_t i = 0; i < pairs && *good && j->edges < 3 * j->count - 6; i++) {
-      int32_t a = order[i].a, b = order[i].b, from = root_of(j->parent, a), to = root_of(j->parent, b);
-      if (tree ? from == to : neighbours(j, a, b) || !share_face(j, a, b)) {
-        continue;
-      }
-      j->parent[from] = to;
-      ORB_TRY(add_edge(j, a, b, good));
-    }
+    queue_fill(q, pairs);
+    ORB_TRY(join_pass(j, q, tree, good));
   }
   *good = *good && j->edges == 3 * j->count - 6 && j->faces == 2 * j->count - 4;
   return ORB_OK;
@@ -253,11 +346,12 @@ orb_status orb_base_join(orb_context *ctx, orb_sheet *sheets, orb_paths *paths, 
   ORB_ASSERT(count >= 4);
   size_t half_edges = 6 * (size_t)count;
   joiner j = {.ctx = ctx, .shapes = shape_count, .count = count, .at = at, .most_triangles = most_triangles};
-  candidate *order = ORB_NEW(ctx, candidate, (size_t)count * (size_t)(count - 1) / 2);
+  size_t pairs = (size_t)count * (size_t)(count - 1) / 2;
+  queue q = {.pair = ORB_NEW(ctx, candidate, pairs), .heap = ORB_NEW(ctx, int64_t, pairs)};
   int32_t *block = ORB_NEW(ctx, int32_t, 4 * half_edges + 2 * (size_t)count);
   j.tracers = ORB_NEW0(ctx, orb_tracer, shape_count);
   *good = 0;
-  if (!order || !block || !j.tracers) {
+  if (!q.pair || !q.heap || !block || !j.tracers) {
     status = ORB_E_NO_MEMORY;
     goto end;
   }
@@ -278,7 +372,7 @@ orb_status orb_base_join(orb_context *ctx, orb_sheet *sheets, orb_paths *paths, 
       paths[s].on[at[(size_t)s * (size_t)count + (size_t)k]] = 1;
     }
   }
-  ORB_GO(status, join_all(&j, order, good), end);
+  ORB_GO(status, join_all(&j, &q, good), end);
   if (*good) {
     ORB_GO(status, lay_out(&j, base), end);
     for (int32_t s = 0; s < shape_count; s++) {
@@ -292,7 +386,8 @@ end:
     }
   }
   orb_free(ctx, j.tracers);
-  orb_free(ctx, order);
+  orb_free(ctx, q.pair);
+  orb_free(ctx, q.heap);
   orb_free(ctx, block);
   return status;
 }

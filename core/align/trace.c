@@ -241,8 +241,12 @@ orb_status orb_tracer_search(orb_tracer *t, int32_t from, int32_t to, int *found
     orb_tracer_item top = heap_pop(t);
     int32_t node = top.node;
     double place[3];
+    if (t->bound > 0 && top.estimate > t->bound) {
+      break;
+    }
     if (node == 2 * g.vertex) {
       *found = 1;
+      t->length = t->cost[node];
       break;
     }
     place_of(t, node, place);

@@ -21,6 +21,7 @@ typedef struct orb_tracer {
   int32_t heap_count, heap_capacity;
   int32_t *chain; /* nodes of the path found, back to front */
   int32_t chain_count;
+  double bound, length; /* paths longer than bound (0: none) are not looked for; the length of the one found */
 } orb_tracer;
 
 /* Room for flags and nodes of the sheet as it has grown; before each search. */
