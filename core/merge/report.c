@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "numeric/vec3.h"
+#include "transfer/wedge.h"
 
 enum { ALL_PAIRS_UP_TO = 4 };
 
@@ -110,37 +111,48 @@ done:
   return status;
 }
 
-/* The flat normal of an input triangle, unit; zero where it has no area. */
-static void input_normal(const orb_mesh *mesh, int32_t triangle, double out[3]) {
-  const int32_t *corner = mesh->triangles + 3 * (int64_t)triangle;
-  double u[3], w[3];
-  orb_sub(mesh->positions + 3 * (int64_t)corner[1], mesh->positions + 3 * (int64_t)corner[0], u);
-  orb_sub(mesh->positions + 3 * (int64_t)corner[2], mesh->positions + 3 * (int64_t)corner[0], w);
-  orb_cross(u, w, out);
-  orb_normalize(out);
+/* Adds the input's smooth normal at a place. */
+static void add_normal(const orb_mesh *mesh, const double *normals, const orb_place *place, double sum[3]) {
+  double normal[3] = {0};
+  for (int k = 0; k < 3; k++) {
+    const double *n = normals + 3 * (int64_t)mesh->triangles[3 * (int64_t)place->triangle + k];
+    for (int c = 0; c < 3; c++) {
+      normal[c] += place->at[k] * n[c];
+    }
+  }
+  orb_normalize(normal);
+  for (int c = 0; c < 3; c++) {
+    sum[c] += normal[c];
+  }
 }
 
-/* Marks the triangles of the supermesh that turn on shape s against the mean of the input's normals under their
+/* Marks the triangles of the supermesh that turn on shape s against the mean of the input's smooth normals at their
  * corners. */
-static void mark_inverted(const orb_merge_result *out, int32_t s, const double *positions, unsigned char *inverted) {
+static orb_status mark_inverted(orb_context *ctx, const orb_merge_result *out, int32_t s, const double *positions,
+                                unsigned char *inverted) {
   const orb_supermesh *supermesh = &out->supermesh;
+  const orb_mesh *mesh = &out->alignment.shapes[s].mesh;
   const orb_place *places = supermesh->places + (int64_t)s * supermesh->vertex_count;
   double floor = 1e-12 * out->shapes[s].diagonal * out->shapes[s].diagonal;
-  for (int64_t t = 0; t < supermesh->triangle_count; t++) {
+  double *normals = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
+  if (!normals) {
+    return ORB_E_NO_MEMORY;
+  }
+  orb_status status =
+      orb_smooth_normals(ctx, mesh->positions, mesh->vertex_count, mesh->triangles, mesh->triangle_count, normals);
+  for (int64_t t = 0; status == ORB_OK && t < supermesh->triangle_count; t++) {
     const int32_t *corner = supermesh->triangles + 3 * t;
     double u[3], w[3], normal[3], ground[3] = {0};
     orb_sub(positions + 3 * (int64_t)corner[1], positions + 3 * (int64_t)corner[0], u);
     orb_sub(positions + 3 * (int64_t)corner[2], positions + 3 * (int64_t)corner[0], w);
     orb_cross(u, w, normal);
     for (int k = 0; k < 3; k++) {
-      double one[3];
-      input_normal(&out->alignment.shapes[s].mesh, places[corner[k]].triangle, one);
-      for (int c = 0; c < 3; c++) {
-        ground[c] += one[c];
-      }
+      add_normal(mesh, normals, &places[corner[k]], ground);
     }
     inverted[t] = orb_length(normal) > floor && orb_dot(normal, ground) < 0;
   }
+  orb_free(ctx, normals);
+  return status;
 }
 
 static int32_t list_pairs(int32_t shape_count, orb_pair_report *pairs) {
@@ -190,7 +202,7 @@ orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out) {
         orb_transfer_positions(ctx, &out->alignment.shapes[s], supermesh->places + (int64_t)s * supermesh->vertex_count,
                                supermesh->vertex_count, positions[s]);
     if (status == ORB_OK) {
-      mark_inverted(out, s, positions[s], inverted[s]);
+      status = mark_inverted(ctx, out, s, positions[s], inverted[s]);
     }
   }
   if (status == ORB_OK) {

@@ -24,8 +24,8 @@ typedef struct orb_merge_timings {
 typedef struct orb_pair_report {
   int32_t a, b;
   orb_distortion distortion;
-  /* Share of the triangles that are turned in space, at either end, against the input surface under them. Those of no
-   * area to speak of (1e-12 of the squared diagonal) do not count. */
+  /* Share of the triangles that are turned in space, at either end, against the input surface (its smooth normals at
+   * their corners). Those of no area to speak of (1e-12 of the squared diagonal) do not count. */
   double inverted_fraction;
 } orb_pair_report;
 
