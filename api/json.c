@@ -1,0 +1,336 @@
+/* The scanner keeps a bit a level (object or array) instead of recursing; what it lets through is a subset of what
+ * cJSON reads, so cJSON can only fail for want of memory. */
+#include "api/json.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct scanner {
+  const unsigned char *at, *end, *begin;
+  const char *why;
+} scanner;
+
+static int refuse(scanner *s, const char *why) {
+  if (!s->why) {
+    s->why = why;
+  }
+  return 0;
+}
+
+/* Length of the well-formed UTF-8 sequence at p, 0 if it is none (RFC 3629). */
+static size_t sequence(const unsigned char *p, const unsigned char *end) {
+  unsigned char c = *p;
+  size_t n = c < 0x80 ? 1 : c < 0xc2 ? 0 : c < 0xe0 ? 2 : c < 0xf0 ? 3 : c < 0xf5 ? 4 : 0;
+  if (n == 0 || (size_t)(end - p) < n) {
+    return 0;
+  }
+  for (size_t i = 1; i < n; i++) {
+    if ((p[i] & 0xc0) != 0x80) {
+      return 0;
+    }
+  }
+  if ((c == 0xe0 && p[1] < 0xa0) || (c == 0xed && p[1] > 0x9f) || (c == 0xf0 && p[1] < 0x90) ||
+      (c == 0xf4 && p[1] > 0x8f)) {
+    return 0;
+  }
+  return n;
+}
+
+int orb_utf8_valid(const char *bytes, size_t size) {
+  const unsigned char *p = (const unsigned char *)bytes, *end = p + size;
+  while (p < end) {
+    size_t n = sequence(p, end);
+    if (n == 0 || *p == 0) {
+      return 0;
+    }
+    p += n;
+  }
+  return 1;
+}
+
+static void blanks(scanner *s) {
+  while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\n' || *s->at == '\r')) {
+    s->at++;
+  }
+}
+
+static int hex4(scanner *s, unsigned *out) {
+  unsigned value = 0;
+  for (int i = 0; i < 4; i++, s->at++) {
+    if (s->at >= s->end) {
+      return refuse(s, "a string does not end");
+    }
+    unsigned char c = *s->at;
+    unsigned digit = c >= '0' && c <= '9'   ? (unsigned)c - '0'
+                     : c >= 'a' && c <= 'f' ? (unsigned)c - 'a' + 10
+                     : c >= 'A' && c <= 'F' ? (unsigned)c - 'A' + 10
+                                            : 16;
+    if (digit > 15) {
+      return refuse(s, "\\u needs four hexadecimal digits");
+    }
+    value = value * 16 + digit;
+  }
+  *out = value;
+  return 1;
+}
+
+static int escape(scanner *s) {
+  unsigned unit, low;
+  if (s->at >= s->end) {
+    return refuse(s, "a string does not end");
+  }
+  unsigned char c = *s->at++;
+  if (c != 'u') {
+    return strchr("\"\\/bfnrt", c) && c ? 1 : refuse(s, "a backslash is followed by none of \"\\/bfnrtu");
+  }
+  if (!hex4(s, &unit)) {
+    return 0;
+  }
+  if (unit == 0) {
+    return refuse(s, "a string holds the character NUL");
+  }
+  if (unit >= 0xdc00 && unit <= 0xdfff) {
+    return refuse(s, "a surrogate stands alone");
+  }
+  if (unit >= 0xd800 && unit <= 0xdbff) {
+    if (s->end - s->at < 6 || s->at[0] != '\\' || s->at[1] != 'u') {
+      return refuse(s, "a surrogate stands alone");
+    }
+    s->at += 2;
+    if (!hex4(s, &low)) {
+      return 0;
+    }
+    if (low < 0xdc00 || low > 0xdfff) {
+      return refuse(s, "a surrogate stands alone");
+    }
+  }
+  return 1;
+}
+
+static int string(scanner *s) {
+  for (s->at++; s->at < s->end;) {
+    unsigned char c = *s->at;
+    if (c == '"') {
+      s->at++;
+      return 1;
+    }
+    if (c < 0x20) {
+      return refuse(s, "a string holds a control character");
+    }
+    if (c == '\\') {
+      s->at++;
+      if (!escape(s)) {
+        return 0;
+      }
+      continue;
+    }
+    size_t n = sequence(s->at, s->end);
+    if (n == 0) {
+      return refuse(s, "a string is not valid UTF-8");
+    }
+    s->at += n;
+  }
+  return refuse(s, "a string does not end");
+}
+
+static size_t digits(scanner *s) {
+  size_t n = 0;
+  while (s->at < s->end && *s->at >= '0' && *s->at <= '9') {
+    s->at++;
+    n++;
+  }
+  return n;
+}
+
+static int number(scanner *s) {
+  const unsigned char *begin = s->at;
+  if (*s->at == '-') {
+    s->at++;
+  }
+  const unsigned char *whole = s->at;
+  size_t n = digits(s);
+  if (n == 0 || (n > 1 && *whole == '0')) {
+    return refuse(s, "a number is malformed");
+  }
+  if (s->at < s->end && *s->at == '.') {
+    s->at++;
+    if (digits(s) == 0) {
+      return refuse(s, "a number is malformed");
+    }
+  }
+  if (s->at < s->end && (*s->at == 'e' || *s->at == 'E')) {
+    s->at++;
+    if (s->at < s->end && (*s->at == '+' || *s->at == '-')) {
+      s->at++;
+    }
+    if (digits(s) == 0) {
+      return refuse(s, "a number is malformed");
+    }
+  }
+  /* cJSON copies at most 63 characters of a number: longer ones would be cut. */
+  char copy[64];
+  size_t length = (size_t)(s->at - begin);
+  if (length >= sizeof copy) {
+    return refuse(s, "a number has more than 63 characters");
+  }
+  memcpy(copy, begin, length);
+  copy[length] = 0;
+  return isfinite(strtod(copy, NULL)) ? 1 : refuse(s, "a number is too large to be finite");
+}
+
+static int literal(scanner *s, const char *word) {
+  size_t n = strlen(word);
+  if ((size_t)(s->end - s->at) < n || memcmp(s->at, word, n) != 0) {
+    return refuse(s, "a value is expected");
+  }
+  s->at += n;
+  return 1;
+}
+
+static int scalar(scanner *s) {
+  switch (*s->at) {
+    case '"':
+      return string(s);
+    case 't':
+      return literal(s, "true");
+    case 'f':
+      return literal(s, "false");
+    case 'n':
+      return literal(s, "null");
+    default:
+      break;
+  }
+  return *s->at == '-' || (*s->at >= '0' && *s->at <= '9') ? number(s) : refuse(s, "a value is expected");
+}
+
+/* A member's name and colon. */
+static int name(scanner *s) {
+  blanks(s);
+  if (s->at >= s->end || *s->at != '"') {
+    return refuse(s, "a member's name in quotes is expected");
+  }
+  if (!string(s)) {
+    return 0;
+  }
+  blanks(s);
+  if (s->at >= s->end || *s->at != ':') {
+    return refuse(s, "a colon is expected");
+  }
+  s->at++;
+  return 1;
+}
+
+/* After a value: closes what is complete. Returns 1 when another value must follow, 2 at the end of all, 0 refused. */
+static int after_value(scanner *s, const char *stack, int *depth) {
+  while (*depth > 0) {
+    blanks(s);
+    if (s->at >= s->end) {
+      return refuse(s, "the text ends too early");
+    }
+    char open = stack[*depth - 1];
+    if (*s->at == ',') {
+      s->at++;
+      return open == '[' || name(s);
+    }
+    if (*s->at != (open == '{' ? '}' : ']')) {
+      return refuse(s, open == '{' ? "a comma or } is expected" : "a comma or ] is expected");
+    }
+    s->at++;
+    --*depth;
+  }
+  return 2;
+}
+
+static int scan(scanner *s) {
+  char stack[ORB_JSON_DEPTH];
+  int depth = 0, more = 1;
+  while (more == 1) {
+    blanks(s);
+    if (s->at >= s->end) {
+      return refuse(s, s->begin == s->end ? "the body is empty" : "the text ends too early");
+    }
+    unsigned char c = *s->at;
+    if (c == '{' || c == '[') {
+      if (depth == ORB_JSON_DEPTH) {
+        return refuse(s, "it is nested deeper than 32 levels");
+      }
+      stack[depth++] = (char)c;
+      s->at++;
+      blanks(s);
+      if (s->at < s->end && *s->at == (c == '{' ? '}' : ']')) {
+        s->at++;
+        depth--;
+      } else if (c == '[') {
+        continue;
+      } else if (name(s)) {
+        continue;
+      } else {
+        return 0;
+      }
+    } else if (!scalar(s)) {
+      return 0;
+    }
+    more = after_value(s, stack, &depth);
+  }
+  if (!more) {
+    return 0;
+  }
+  blanks(s);
+  return s->at == s->end ? 1 : refuse(s, "something follows after the value");
+}
+
+static int by_name(const void *a, const void *b) {
+  return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+/* 1 if an object of the tree has a name twice, 0 if none, −1 out of memory. Depth is bounded by the scanner. */
+static int has_duplicates(const cJSON *value) {
+  if (cJSON_IsObject(value)) {
+    size_t n = (size_t)cJSON_GetArraySize(value), i = 0;
+    const char **names = malloc((n ? n : 1) * sizeof *names);
+    if (!names) {
+      return -1;
+    }
+    for (const cJSON *m = value->child; m; m = m->next) {
+      names[i++] = m->string;
+    }
+    qsort(names, n, sizeof *names, by_name);
+    int twice = 0;
+    for (i = 1; i < n; i++) {
+      twice |= strcmp(names[i - 1], names[i]) == 0;
+    }
+    free(names);
+    if (twice) {
+      return 1;
+    }
+  }
+  if (cJSON_IsObject(value) || cJSON_IsArray(value)) {
+    for (const cJSON *m = value->child; m; m = m->next) {
+      int found = has_duplicates(m);
+      if (found) {
+        return found;
+      }
+    }
+  }
+  return 0;
+}
+
+cJSON *orb_json_parse(const char *bytes, size_t size, orb_json_error *error) {
+  const unsigned char *begin = (const unsigned char *)bytes;
+  scanner s = {.at = begin, .begin = begin, .end = begin + size};
+  if (!scan(&s)) {
+    error->why = s.why;
+    error->offset = (size_t)(s.at - s.begin);
+    return NULL;
+  }
+  *error = (orb_json_error){NULL, 0};
+  cJSON *value = cJSON_ParseWithLength(bytes, size);
+  int twice = value ? has_duplicates(value) : -1;
+  if (twice) {
+    cJSON_Delete(value);
+    error->why = twice > 0 ? "an object has the same name twice" : NULL;
+    return NULL;
+  }
+  return value;
+}

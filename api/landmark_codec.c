@@ -1,0 +1,179 @@
+/* Landmarks of a request or of a landmark file. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/options.h"
+#include "api/supermesh_codec.h"
+
+static int refuse(orb_problem *problem, int32_t landmark, int32_t shape, const char *why) {
+  orb_refuse(problem, "bad-landmarks", "Landmark %d, shape %d: %s.", landmark, shape, why);
+  orb_json_key(&problem->facts, "landmarks");
+  orb_json_open(&problem->facts, '[');
+  orb_json_integer(&problem->facts, landmark);
+  orb_json_close(&problem->facts, ']');
+  if (shape >= 0) {
+    orb_json_member_integer(&problem->facts, "shape", shape);
+  }
+  return 0;
+}
+
+static int read_triple(const cJSON *value, double out[3]) {
+  if (!cJSON_IsArray(value) || cJSON_GetArraySize(value) != 3) {
+    return 0;
+  }
+  const cJSON *item = value->child;
+  for (int k = 0; k < 3; k++, item = item->next) {
+    if (!cJSON_IsNumber(item)) {
+      return 0;
+    }
+    out[k] = item->valuedouble == 0 ? 0 : item->valuedouble;
+  }
+  return 1;
+}
+
+static int read_index(const cJSON *value, int32_t *out) {
+  double x = value->valuedouble;
+  if (!cJSON_IsNumber(value) || x < 0 || x > INT32_MAX || x != floor(x)) {
+    return 0;
+  }
+  *out = (int32_t)x;
+  return 1;
+}
+
+/* Barycentric coordinates as given need only be near a sum of one; they are kept scaled to it. */
+static const char *read_barycentric(const cJSON *value, double out[3]) {
+  if (!read_triple(value, out)) {
+    return "\"barycentric\" must be three numbers";
+  }
+  double sum = out[0] + out[1] + out[2];
+  if (out[0] < 0 || out[1] < 0 || out[2] < 0 || !(fabs(sum - 1) <= 1e-6)) {
+    return "barycentric coordinates must not be negative and must add up to 1";
+  }
+  for (int k = 0; k < 3; k++) {
+    out[k] /= sum;
+  }
+  return NULL;
+}
+
+/* NULL where fine, else why not. */
+static const char *read_spot(const cJSON *value, orb_spot *out) {
+  const cJSON *vertex = cJSON_GetObjectItemCaseSensitive(value, "vertex");
+  const cJSON *point = cJSON_GetObjectItemCaseSensitive(value, "point");
+  const cJSON *triangle = cJSON_GetObjectItemCaseSensitive(value, "triangle");
+  if (!cJSON_IsObject(value) || !!vertex + !!point + !!triangle != 1) {
+    return "a place is one of {\"vertex\":i}, {\"point\":[x,y,z]}, {\"triangle\":t,\"barycentric\":[a,b,c]}";
+  }
+  if (vertex) {
+    out->kind = ORB_SPOT_VERTEX;
+    return read_index(vertex, &out->index) ? NULL : "\"vertex\" must be a whole number from 0, as in the file";
+  }
+  if (point) {
+    out->kind = ORB_SPOT_POINT;
+    return read_triple(point, out->at) ? NULL : "\"point\" must be three numbers";
+  }
+  out->kind = ORB_SPOT_TRIANGLE;
+  if (!read_index(triangle, &out->index)) {
+    return "\"triangle\" must be a whole number from 0, in the order of the file";
+  }
+  return read_barycentric(cJSON_GetObjectItemCaseSensitive(value, "barycentric"), out->at);
+}
+
+static int read_places(const cJSON *at, int32_t landmark, orb_landmark_list *list, orb_problem *problem) {
+  static const char *const known[] = {"vertex", "point", "triangle", "barycentric", NULL};
+  if (!cJSON_IsArray(at) || cJSON_GetArraySize(at) != list->shape_count) {
+    char why[100];
+    snprintf(why, sizeof why, "\"at\" must list one place for each of the %d shapes", list->shape_count);
+    return refuse(problem, landmark, -1, why);
+  }
+  int32_t shape = 0;
+  for (const cJSON *place = at->child; place; place = place->next, shape++) {
+    if (cJSON_IsObject(place) && !orb_members_known(place, "a landmark's place", known, problem)) {
+      return 0;
+    }
+    const char *why = read_spot(place, &list->spots[(size_t)landmark * (size_t)list->shape_count + (size_t)shape]);
+    if (why) {
+      return refuse(problem, landmark, shape, why);
+    }
+  }
+  return 1;
+}
+
+#define AT(field) offsetof(orb_landmark_spec, field)
+static const orb_option numbers[] = {{"pass", ORB_OPTION_INT32, AT(pass), 0, 100, NULL},
+                                     {"radius", ORB_OPTION_NUMBER, AT(radius), 0, 2, NULL},
+                                     {"confidence", ORB_OPTION_NUMBER, AT(confidence), 0, 1, NULL}};
+
+static int read_landmark(const cJSON *value, int32_t index, orb_landmark_list *list, orb_problem *problem) {
+  static const char *const known[] = {"name", "at", "pass", "radius", "confidence", NULL};
+  orb_landmark_spec *spec = &list->items[index];
+  spec->confidence = 1;
+  snprintf(spec->name, sizeof spec->name, "landmark %d", index);
+  if (!cJSON_IsObject(value)) {
+    return refuse(problem, index, -1, "a landmark is an object with \"name\" and \"at\"");
+  }
+  if (!orb_members_known(value, "a landmark", known, problem)) {
+    return 0;
+  }
+  const cJSON *name = cJSON_GetObjectItemCaseSensitive(value, "name");
+  if (name && (!cJSON_IsString(name) || strlen(name->valuestring) >= ORB_NAME_MAX)) {
+    return refuse(problem, index, -1, "\"name\" must be a string of at most 127 bytes");
+  }
+  if (name) {
+    snprintf(spec->name, sizeof spec->name, "%s", name->valuestring);
+  }
+  for (size_t k = 0; k < 3; k++) {
+    cJSON *given = cJSON_GetObjectItemCaseSensitive(value, numbers[k].name);
+    if (given) {
+      cJSON one = *given, only = {.child = &one, .type = cJSON_Object};
+      one.next = NULL;
+      if (!orb_options_read(&only, "a landmark", numbers, 3, spec, problem)) {
+        return 0;
+      }
+    }
+  }
+  return read_places(cJSON_GetObjectItemCaseSensitive(value, "at"), index, list, problem);
+}
+
+int orb_landmarks_read(const cJSON *value, int32_t shape_count, orb_landmark_list *out, orb_problem *problem) {
+  memset(out, 0, sizeof *out);
+  if (cJSON_IsObject(value)) {
+    value = cJSON_GetObjectItemCaseSensitive(value, "landmarks");
+  }
+  if (cJSON_IsString(value) && strcmp(value->valuestring, "auto") == 0) {
+    return 1;
+  }
+  if (!cJSON_IsArray(value)) {
+    return orb_refuse(problem, "bad-landmarks", "\"landmarks\" must be an array, or \"auto\".");
+  }
+  int count = cJSON_GetArraySize(value);
+  if (count > ORB_LANDMARKS_MAX) {
+    return orb_refuse(problem, "bad-landmarks", "There are %d landmarks; at most %d are allowed.", count,
+                      ORB_LANDMARKS_MAX);
+  }
+  if (shape_count == 0 && count > 0) {
+    shape_count = cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(value->child, "at"));
+  }
+  out->shape_count = shape_count;
+  if (count == 0) {
+    return 1;
+  }
+  out->items = calloc((size_t)count, sizeof *out->items);
+  out->spots = calloc((size_t)count * (size_t)(shape_count > 0 ? shape_count : 1), sizeof *out->spots);
+  if (!out->items || !out->spots) {
+    return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  }
+  for (const cJSON *item = value->child; item; item = item->next, out->count++) {
+    if (!read_landmark(item, out->count, out, problem)) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+void orb_landmarks_free(orb_landmark_list *list) {
+  free(list->items);
+  free(list->spots);
+  memset(list, 0, sizeof *list);
+}

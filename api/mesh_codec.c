@@ -1,0 +1,139 @@
+#include "api/mesh_codec.h"
+
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <string.h>
+
+static const struct {
+  const char *name;
+  unsigned flag;
+} kinds[] = {{"none", ORB_REPAIR_NONE},
+             {"safe", ORB_REPAIR_SAFE},
+             {"fill_holes", ORB_REPAIR_FILL_HOLES},
+             {"largest_component", ORB_REPAIR_LARGEST_COMPONENT}};
+enum { KINDS = sizeof kinds / sizeof kinds[0] };
+
+int orb_repair_parse(const char *list, unsigned *flags, char canonical[ORB_REPAIR_TEXT], orb_problem *problem) {
+  unsigned all = 0;
+  int none = 0;
+  for (const char *at = list;; at++) {
+    size_t n = strcspn(at, ","), k = 0;
+    while (k < KINDS && !(strlen(kinds[k].name) == n && strncmp(kinds[k].name, at, n) == 0)) {
+      k++;
+    }
+    if (k == KINDS) {
+      return orb_refuse(problem, "bad-query",
+                        "There is no repair \"%.*s\"; use none, safe, fill_holes, largest_component.",
+                        (int)(n < 60 ? n : 60), at);
+    }
+    none |= k == 0;
+    all |= kinds[k].flag;
+    at += n;
+    if (!*at) {
+      break;
+    }
+  }
+  if (none && all) {
+    return orb_refuse(problem, "bad-query", "The repair \"none\" stands alone or not at all.");
+  }
+  all |= all ? ORB_REPAIR_SAFE : 0;
+  *flags = all;
+  snprintf(canonical, ORB_REPAIR_TEXT, "%s%s%s", all ? "safe" : "none",
+           all & ORB_REPAIR_FILL_HOLES ? ",fill_holes" : "",
+           all & ORB_REPAIR_LARGEST_COMPONENT ? ",largest_component" : "");
+  return 1;
+}
+
+static void write_vector(orb_text *out, const char *name, const double v[3]) {
+  orb_json_key(out, name);
+  orb_json_open(out, '[');
+  for (int k = 0; k < 3; k++) {
+    orb_json_number(out, v[k]);
+  }
+  orb_json_close(out, ']');
+}
+
+static void write_topology(const orb_topology *topology, orb_text *out) {
+  orb_json_key(out, "topology");
+  orb_json_open(out, '{');
+  orb_json_member_integer(out, "components", topology->components);
+  orb_json_member_number(out, "genus", topology->genus);
+  orb_json_member_integer(out, "boundary_loops", topology->boundary_loops);
+  orb_json_member_integer(out, "nonmanifold_edges", topology->nonmanifold_edges);
+  orb_json_member_integer(out, "nonmanifold_vertices", topology->nonmanifold_vertices);
+  orb_json_close(out, '}');
+}
+
+static void write_lists(const orb_mesh *mesh, orb_text *out) {
+  orb_json_key(out, "repairs");
+  orb_json_open(out, '[');
+  for (int32_t i = 0; i < mesh->repair_count; i++) {
+    orb_json_open(out, '{');
+    orb_json_member_string(out, "kind", mesh->repairs[i].kind);
+    orb_json_member_integer(out, "count", mesh->repairs[i].count);
+    orb_json_close(out, '}');
+  }
+  orb_json_close(out, ']');
+  orb_json_key(out, "attributes");
+  orb_json_open(out, '[');
+  if (mesh->normals) {
+    orb_json_string(out, "normal");
+  }
+  if (mesh->texcoords) {
+    orb_json_string(out, "texcoord");
+  }
+  if (mesh->colors) {
+    orb_json_string(out, "color");
+  }
+  orb_json_close(out, ']');
+}
+
+void orb_mesh_write(const orb_mesh_facts *facts, orb_text *out) {
+  const orb_mesh *mesh = facts->mesh;
+  orb_json_open(out, '{');
+  orb_json_member_string(out, "id", facts->id);
+  orb_json_key(out, "url");
+  orb_text_printf(out, "\"/v1/meshes/%s\"", facts->id);
+  orb_json_member_string(out, "name", facts->name);
+  orb_json_member_string(out, "format", facts->format);
+  orb_json_member_integer(out, "bytes", facts->bytes);
+  orb_json_member_integer(out, "vertices", mesh->vertex_count);
+  orb_json_member_integer(out, "triangles", mesh->triangle_count);
+  orb_json_member_integer(out, "file_vertices", mesh->file_vertex_count);
+  orb_json_member_integer(out, "file_triangles", mesh->file_triangle_count);
+  write_topology(&facts->topology, out);
+  orb_json_member_number(out, "area", facts->extent.area);
+  orb_json_member_number(out, "volume", facts->extent.volume);
+  orb_json_key(out, "bounds");
+  orb_json_open(out, '{');
+  write_vector(out, "min", facts->extent.min);
+  write_vector(out, "max", facts->extent.max);
+  orb_json_close(out, '}');
+  orb_json_member_string(out, "repair", facts->repair);
+  write_lists(mesh, out);
+  orb_json_member_instant(out, "created", facts->created);
+  orb_json_close(out, '}');
+}
+
+static int get_text(const cJSON *object, const char *name, char *out, size_t size) {
+  const cJSON *value = cJSON_GetObjectItemCaseSensitive(object, name);
+  return cJSON_IsString(value) && snprintf(out, size, "%s", value->valuestring) < (int)size;
+}
+
+static int get_count(const cJSON *object, const char *name, int64_t *out) {
+  const cJSON *value = cJSON_GetObjectItemCaseSensitive(object, name);
+  *out = cJSON_IsNumber(value) ? (int64_t)value->valuedouble : -1;
+  return *out >= 0;
+}
+
+int orb_mesh_summarise(const char *json, orb_mesh_summary *out) {
+  cJSON *object = cJSON_Parse(json);
+  int fine = get_text(object, "name", out->name, sizeof out->name) &&
+             get_text(object, "format", out->format, sizeof out->format) &&
+             get_text(object, "repair", out->repair, sizeof out->repair) &&
+             get_count(object, "vertices", &out->vertices) && get_count(object, "triangles", &out->triangles) &&
+             get_count(object, "file_vertices", &out->file_vertices) &&
+             get_count(object, "file_triangles", &out->file_triangles);
+  cJSON_Delete(object);
+  return fine;
+}

@@ -1,1 +1,0 @@
-typedef int orb_api_placeholder;

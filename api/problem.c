@@ -1,0 +1,169 @@
+#include "api/problem.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+static const struct entry {
+  const char *name;
+  int status;
+  const char *title;
+} table[] = {
+    {"bad-request", 400, "The request is malformed"},
+    {"bad-query", 400, "A query parameter is not valid"},
+    {"bad-header", 400, "A header is not valid"},
+    {"malformed-json", 400, "The body is not valid JSON"},
+    {"malformed-mesh", 400, "The mesh file is broken"},
+    {"unauthorized", 401, "A token is needed"},
+    {"forbidden", 403, "The token does not allow this"},
+    {"not-found", 404, "There is no such thing here"},
+    {"method-not-allowed", 405, "This path does not answer to that method"},
+    {"in-use", 409, "Unfinished jobs need it"},
+    {"job-ended", 409, "The job has ended already"},
+    {"length-required", 411, "The length of the body is needed"},
+    {"too-large", 413, "It is too large"},
+    {"unknown-format", 415, "The bytes are of no known mesh format"},
+    {"unsupported-encoding", 415, "The content encoding is not known"},
+    {"range-not-satisfiable", 416, "The range lies outside"},
+    {"not-closed", 422, "The mesh is not closed"},
+    {"not-manifold", 422, "The mesh is not manifold"},
+    {"not-orientable", 422, "The mesh cannot be oriented"},
+    {"not-connected", 422, "The mesh is in several pieces"},
+    {"not-genus-zero", 422, "The mesh has handles"},
+    {"degenerate", 422, "Too few triangles are left"},
+    {"not-finite", 422, "A coordinate is not finite"},
+    {"bad-landmarks", 422, "The landmarks cannot be met"},
+    {"bad-option", 422, "An option is not valid"},
+    {"unknown-member", 422, "A member is not known"},
+    {"invalid-request", 422, "The request is not valid"},
+    {"unsupported-method", 422, "The method is not available"},
+    {"cancelled", 409, "The job was cancelled"},
+    {"too-many-requests", 429, "Too many requests"},
+    {"queue-full", 429, "The queue is full"},
+    {"quota-exceeded", 429, "The quota is used up"},
+    {"internal", 500, "A fault of the server"},
+    {"not-certified", 500, "The result could not be certified"},
+    {"corrupt", 500, "Stored data do not decode"},
+    {"crashed", 500, "The job ended the process repeatedly"},
+    {"timeout", 503, "The job ran out of time"},
+    {"no-memory", 503, "The job ran out of memory"},
+    {"unavailable", 503, "The service is not available now"},
+    {"storage-full", 507, "The storage is full"},
+};
+enum { COUNT = sizeof table / sizeof table[0] };
+
+static const struct entry *find(const char *name) {
+  for (size_t i = 0; i < COUNT; i++) {
+    if (strcmp(table[i].name, name) == 0) {
+      return &table[i];
+    }
+  }
+  return find("internal");
+}
+
+int orb_problem_status(const char *name) {
+  return find(name)->status;
+}
+const char *orb_problem_title(const char *name) {
+  return find(name)->title;
+}
+const char *orb_problem_name_at(size_t index) {
+  return index < COUNT ? table[index].name : NULL;
+}
+
+void orb_problem_free(orb_problem *problem) {
+  orb_text_free(&problem->facts);
+  memset(problem, 0, sizeof *problem);
+}
+
+int orb_refuse(orb_problem *problem, const char *name, const char *format, ...) {
+  orb_problem_free(problem);
+  problem->name = find(name)->name;
+  va_list args;
+  va_start(args, format);
+  vsnprintf(problem->detail, sizeof problem->detail, format, args);
+  va_end(args);
+  return 0;
+}
+
+static void pairs(orb_text *out, const char *name, const orb_error *error) {
+  orb_json_key(out, name);
+  orb_json_open(out, '[');
+  for (int32_t i = 0; i < error->edge_count; i++) {
+    orb_json_open(out, '[');
+    orb_json_integer(out, error->edges[i][0]);
+    orb_json_integer(out, error->edges[i][1]);
+    orb_json_close(out, ']');
+  }
+  orb_json_close(out, ']');
+}
+
+static void integers(orb_text *out, const char *name, const int32_t *values, int32_t count) {
+  orb_json_key(out, name);
+  orb_json_open(out, '[');
+  for (int32_t i = 0; i < count; i++) {
+    orb_json_integer(out, values[i]);
+  }
+  orb_json_close(out, ']');
+}
+
+static void topology_facts(const orb_error *error, orb_text *out) {
+  int open = error->status == ORB_E_NOT_CLOSED;
+  if (error->boundary_loops >= 0) {
+    orb_json_member_integer(out, "boundary_loops", error->boundary_loops);
+  }
+  if (error->genus >= 0) {
+    orb_json_member_integer(out, "genus", error->genus);
+  }
+  if (error->edge_total > 0 || open) {
+    orb_json_member_integer(out, open ? "boundary_edge_count" : "edge_count", error->edge_total);
+    pairs(out, open ? "boundary_edges" : "edges", error);
+  }
+  if (error->vertex_total > 0) {
+    orb_json_member_integer(out, "vertex_count", error->vertex_total);
+    integers(out, "vertices", error->vertices, error->vertex_count);
+  }
+  if (error->component_total > 0) {
+    orb_json_member_integer(out, "component_count", error->component_total);
+    orb_json_key(out, "components");
+    orb_json_open(out, '[');
+    for (int32_t i = 0; i < error->component_count; i++) {
+      orb_json_integer(out, error->components[i]);
+    }
+    orb_json_close(out, ']');
+  }
+}
+
+void orb_problem_of_error(const orb_error *error, orb_problem *problem) {
+  orb_refuse(problem, orb_status_name(error->status), "%s", error->detail);
+  orb_text *out = &problem->facts;
+  if (error->line >= 0) {
+    orb_json_member_integer(out, "line", error->line);
+  }
+  if (error->offset >= 0) {
+    orb_json_member_integer(out, "offset", error->offset);
+  }
+  topology_facts(error, out);
+  if (error->landmark_count > 0) {
+    integers(out, "landmarks", error->landmarks, error->landmark_count);
+  }
+  if (error->shape >= 0) {
+    orb_json_member_integer(out, "shape", error->shape);
+  }
+}
+
+void orb_problem_write(const orb_problem *problem, orb_text *out) {
+  const struct entry *entry = find(problem->name);
+  orb_json_open(out, '{');
+  orb_json_key(out, "type");
+  orb_text_printf(out, "\"/problems/%s\"", entry->name);
+  orb_json_member_string(out, "title", entry->title);
+  orb_json_member_integer(out, "status", entry->status);
+  orb_json_member_string(out, "detail", problem->detail);
+  if (problem->facts.size) {
+    orb_text_append(out, ",", 1);
+    orb_text_append(out, problem->facts.data, problem->facts.size);
+  }
+  out->failed |= problem->facts.failed;
+  orb_json_close(out, '}');
+}

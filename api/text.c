@@ -1,0 +1,187 @@
+#include "api/text.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+void orb_text_free(orb_text *text) {
+  free(text->data);
+  memset(text, 0, sizeof *text);
+}
+
+static int reserve(orb_text *text, size_t more) {
+  if (text->failed || more > SIZE_MAX / 4 || text->size > SIZE_MAX / 4) {
+    text->failed = 1;
+    return 0;
+  }
+  size_t need = text->size + more + 1;
+  if (need <= text->capacity) {
+    return 1;
+  }
+  size_t capacity = text->capacity < 256 ? 256 : text->capacity * 2;
+  if (capacity < need) {
+    capacity = need;
+  }
+  char *data = realloc(text->data, capacity);
+  if (!data) {
+    text->failed = 1;
+    return 0;
+  }
+  text->data = data;
+  text->capacity = capacity;
+  return 1;
+}
+
+void orb_text_append(orb_text *text, const char *bytes, size_t size) {
+  if (reserve(text, size)) {
+    if (size) {
+      memcpy(text->data + text->size, bytes, size);
+    }
+    text->size += size;
+    text->data[text->size] = 0;
+  }
+}
+
+void orb_text_add(orb_text *text, const char *string) {
+  orb_text_append(text, string, strlen(string));
+}
+
+void orb_text_printf(orb_text *text, const char *format, ...) {
+  va_list args, again;
+  va_start(args, format);
+  va_copy(again, args);
+  int length = vsnprintf(NULL, 0, format, args);
+  va_end(args);
+  if (length < 0) {
+    text->failed = 1;
+  } else if (reserve(text, (size_t)length)) {
+    vsnprintf(text->data + text->size, (size_t)length + 1, format, again);
+    text->size += (size_t)length;
+  }
+  va_end(again);
+}
+
+/* A comma belongs before a value or key unless the text is empty or something was just opened. */
+static void separate(orb_text *text) {
+  char last = text->size ? text->data[text->size - 1] : '{';
+  if (last != '{' && last != '[' && last != ':') {
+    orb_text_append(text, ",", 1);
+  }
+}
+
+void orb_json_open(orb_text *text, char open) {
+  separate(text);
+  orb_text_append(text, &open, 1);
+}
+
+void orb_json_close(orb_text *text, char close) {
+  orb_text_append(text, &close, 1);
+}
+
+static void quoted(orb_text *text, const char *s) {
+  orb_text_append(text, "\"", 1);
+  const char *run = s;
+  for (; *s; s++) {
+    unsigned char c = (unsigned char)*s;
+    if (c >= 0x20 && c != '"' && c != '\\') {
+      continue;
+    }
+    orb_text_append(text, run, (size_t)(s - run));
+    run = s + 1;
+    if (c == '"' || c == '\\') {
+      orb_text_printf(text, "\\%c", c);
+    } else if (c == '\n') {
+      orb_text_add(text, "\\n");
+    } else {
+      orb_text_printf(text, "\\u%04x", c);
+    }
+  }
+  orb_text_append(text, run, (size_t)(s - run));
+  orb_text_append(text, "\"", 1);
+}
+
+void orb_json_key(orb_text *text, const char *name) {
+  separate(text);
+  quoted(text, name);
+  orb_text_append(text, ":", 1);
+}
+
+void orb_json_string(orb_text *text, const char *utf8) {
+  separate(text);
+  quoted(text, utf8);
+}
+
+void orb_json_number(orb_text *text, double value) {
+  separate(text);
+  if (!isfinite(value)) {
+    orb_text_add(text, "null");
+    return;
+  }
+  char digits[40];
+  for (int precision = 15; precision <= 17; precision++) {
+    snprintf(digits, sizeof digits, "%.*g", precision, value);
+    if (strtod(digits, NULL) == value) {
+      break;
+    }
+  }
+  orb_text_add(text, digits);
+}
+
+void orb_json_integer(orb_text *text, int64_t value) {
+  separate(text);
+  orb_text_printf(text, "%lld", (long long)value);
+}
+
+void orb_json_bool(orb_text *text, int value) {
+  separate(text);
+  orb_text_add(text, value ? "true" : "false");
+}
+
+void orb_json_null(orb_text *text) {
+  separate(text);
+  orb_text_add(text, "null");
+}
+
+void orb_json_raw(orb_text *text, const char *json) {
+  separate(text);
+  orb_text_add(text, json ? json : "null");
+}
+
+void orb_json_member_string(orb_text *text, const char *name, const char *utf8) {
+  orb_json_key(text, name);
+  orb_json_string(text, utf8);
+}
+void orb_json_member_number(orb_text *text, const char *name, double value) {
+  orb_json_key(text, name);
+  orb_json_number(text, value);
+}
+void orb_json_member_integer(orb_text *text, const char *name, int64_t value) {
+  orb_json_key(text, name);
+  orb_json_integer(text, value);
+}
+void orb_json_member_bool(orb_text *text, const char *name, int value) {
+  orb_json_key(text, name);
+  orb_json_bool(text, value);
+}
+void orb_json_member_raw(orb_text *text, const char *name, const char *json) {
+  orb_json_key(text, name);
+  orb_json_raw(text, json);
+}
+
+void orb_json_member_instant(orb_text *text, const char *name, int64_t unix_ms) {
+  orb_json_key(text, name);
+  if (unix_ms <= 0) {
+    orb_json_null(text);
+    return;
+  }
+  time_t seconds = (time_t)(unix_ms / 1000);
+  struct tm utc;
+  char stamp[48];
+  gmtime_r(&seconds, &utc);
+  size_t n = strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", &utc);
+  snprintf(stamp + n, sizeof stamp - n, ".%03dZ", (int)(unix_ms % 1000));
+  orb_json_string(text, stamp);
+}
