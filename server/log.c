@@ -1,0 +1,49 @@
+#include "log.h"
+
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "api/text.h"
+
+static atomic_int least_level = LOG_INFO, as_json = 1;
+static const char *const names[] = {"debug", "info", "warn", "error"};
+
+void log_setup(log_level least, int json) {
+  atomic_store(&least_level, (int)least);
+  atomic_store(&as_json, json);
+}
+
+void log_write(log_level level, const char *fields, const char *format, ...) {
+  if ((int)level < atomic_load(&least_level)) {
+    return;
+  }
+  char message[1024];
+  va_list args;
+  va_start(args, format);
+  vsnprintf(message, sizeof message, format, args);
+  va_end(args);
+  struct timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  orb_text line = {0};
+  if (atomic_load(&as_json)) {
+    orb_json_open(&line, '{');
+    orb_json_member_instant(&line, "time", (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000);
+    orb_json_member_string(&line, "level", names[level]);
+    orb_json_member_string(&line, "message", message);
+    if (fields && fields[0]) {
+      orb_text_printf(&line, ",%s", fields);
+    }
+    orb_json_close(&line, '}');
+  } else {
+    orb_text_printf(&line, "%s: %s%s%s", names[level], message, fields && fields[0] ? " " : "", fields ? fields : "");
+  }
+  orb_text_add(&line, "\n");
+  if (!line.failed) {
+    ssize_t ignored = write(STDERR_FILENO, line.data, line.size);
+    (void)ignored;
+  }
+  orb_text_free(&line);
+}

@@ -1,0 +1,213 @@
+/* The writer's thread with group commit, and the pool of readers. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "faults.h"
+#include "log.h"
+#include "store/database.h"
+
+/* A write that waits. Those of catalogue_write() lie on the caller's stack. */
+typedef struct pending {
+  struct pending *next;
+  write_fn fn;
+  void *arg;
+  int later; /* nobody waits: free after */
+  int done, code;
+} pending;
+
+struct catalogue {
+  pthread_mutex_t lock;
+  pthread_cond_t wake, committed, reader_free;
+  pending *first, **last;
+  int stopping, started;
+  pthread_t thread;
+  database writer;
+  database readers[DATABASE_READERS];
+  int busy[DATABASE_READERS];
+};
+
+static store_result result_of(int code) {
+  switch (code & 0xff) {
+    case SQLITE_OK:
+      return STORE_OK;
+    case SQLITE_CONSTRAINT:
+      return STORE_CONFLICT;
+    case SQLITE_NOTFOUND:
+      return STORE_NOT_FOUND;
+    case SQLITE_FULL:
+      return STORE_FULL;
+    default:
+      return STORE_ERROR;
+  }
+}
+
+/* Runs a batch in one transaction. A write that fails is rolled back alone; a commit that fails fails all. */
+static void run_batch(catalogue *cat, pending *batch) {
+  database *db = &cat->writer;
+  int code = database_execute(db, "BEGIN IMMEDIATE");
+  for (pending *p = batch; p && code == SQLITE_OK; p = p->next) {
+    if (database_execute(db, "SAVEPOINT one") != SQLITE_OK) {
+      code = SQLITE_IOERR;
+      break;
+    }
+    p->code = p->fn(db, p->arg);
+    if (p->code != SQLITE_OK) {
+      database_execute(db, "ROLLBACK TO one");
+    }
+    /* A full disk or an input/output error may have rolled back everything already. */
+    if (sqlite3_get_autocommit(db->handle)) {
+      code = p->code;
+    } else if (database_execute(db, "RELEASE one") != SQLITE_OK) {
+      code = SQLITE_IOERR;
+    }
+  }
+  FAULT_POINT("before-commit");
+  if (code == SQLITE_OK) {
+    code = database_execute(db, "COMMIT");
+  }
+  FAULT_POINT("after-commit");
+  if (code != SQLITE_OK) {
+    if (!sqlite3_get_autocommit(db->handle)) {
+      database_execute(db, "ROLLBACK");
+    }
+    for (pending *p = batch; p; p = p->next) {
+      p->code = code;
+    }
+  }
+}
+
+static void *writer_main(void *argument) {
+  catalogue *cat = argument;
+  pthread_mutex_lock(&cat->lock);
+  for (;;) {
+    while (!cat->first && !cat->stopping) {
+      pthread_cond_wait(&cat->wake, &cat->lock);
+    }
+    pending *batch = cat->first;
+    if (!batch) {
+      break;
+    }
+    cat->first = NULL;
+    cat->last = &cat->first;
+    pthread_mutex_unlock(&cat->lock);
+    run_batch(cat, batch);
+    pthread_mutex_lock(&cat->lock);
+    for (pending *p = batch, *next; p; p = next) {
+      next = p->next;
+      if (p->later) {
+        free(p->arg);
+        free(p);
+      } else {
+        p->done = 1; /* from here its owner may go */
+      }
+    }
+    pthread_cond_broadcast(&cat->committed);
+  }
+  pthread_mutex_unlock(&cat->lock);
+  return NULL;
+}
+
+static void enqueue(catalogue *cat, pending *p) {
+  *cat->last = p;
+  cat->last = &p->next;
+  pthread_cond_signal(&cat->wake);
+}
+
+store_result catalogue_write(catalogue *cat, write_fn fn, void *arg) {
+  pending p = {.fn = fn, .arg = arg};
+  pthread_mutex_lock(&cat->lock);
+  enqueue(cat, &p);
+  while (!p.done) {
+    pthread_cond_wait(&cat->committed, &cat->lock);
+  }
+  pthread_mutex_unlock(&cat->lock);
+  return result_of(p.code);
+}
+
+void catalogue_write_later(catalogue *cat, write_fn fn, void *arg) {
+  pending *p = calloc(1, sizeof *p);
+  if (!p) {
+    free(arg);
+    return;
+  }
+  *p = (pending){.fn = fn, .arg = arg, .later = 1};
+  pthread_mutex_lock(&cat->lock);
+  enqueue(cat, p);
+  pthread_mutex_unlock(&cat->lock);
+}
+
+database *catalogue_reader(catalogue *cat) {
+  pthread_mutex_lock(&cat->lock);
+  for (;;) {
+    for (int i = 0; i < DATABASE_READERS; i++) {
+      if (!cat->busy[i]) {
+        cat->busy[i] = 1;
+        pthread_mutex_unlock(&cat->lock);
+        return &cat->readers[i];
+      }
+    }
+    pthread_cond_wait(&cat->reader_free, &cat->lock);
+  }
+}
+
+void catalogue_reader_done(catalogue *cat, database *db) {
+  pthread_mutex_lock(&cat->lock);
+  cat->busy[db - cat->readers] = 0;
+  pthread_cond_signal(&cat->reader_free);
+  pthread_mutex_unlock(&cat->lock);
+}
+
+static int open_all(catalogue *cat, const char *path) {
+  int code = database_open(path, 1, &cat->writer);
+  if (code == SQLITE_OK) {
+    code = database_migrate(&cat->writer);
+  }
+  for (int i = 0; i < DATABASE_READERS && code == SQLITE_OK; i++) {
+    code = database_open(path, 0, &cat->readers[i]);
+  }
+  return code;
+}
+
+store_result catalogue_open(const char *data, catalogue **out) {
+  char path[PATH_MAX];
+  catalogue *cat = calloc(1, sizeof *cat);
+  if (!cat) {
+    return STORE_ERROR;
+  }
+  cat->last = &cat->first;
+  pthread_mutex_init(&cat->lock, NULL);
+  pthread_cond_init(&cat->wake, NULL);
+  pthread_cond_init(&cat->committed, NULL);
+  pthread_cond_init(&cat->reader_free, NULL);
+  snprintf(path, sizeof path, "%s/catalogue.sqlite", data);
+  int code = open_all(cat, path);
+  if (code == SQLITE_OK && !FAULT("thread") && pthread_create(&cat->thread, NULL, writer_main, cat) == 0) {
+    cat->started = 1;
+    *out = cat;
+    return STORE_OK;
+  }
+  log_error("the catalogue %s cannot be opened: %s", path, sqlite3_errstr(code));
+  catalogue_close(cat);
+  return code == SQLITE_FULL ? STORE_FULL : STORE_ERROR;
+}
+
+void catalogue_close(catalogue *cat) {
+  if (!cat) {
+    return;
+  }
+  if (cat->started) {
+    pthread_mutex_lock(&cat->lock);
+    cat->stopping = 1;
+    pthread_cond_signal(&cat->wake);
+    pthread_mutex_unlock(&cat->lock);
+    pthread_join(cat->thread, NULL);
+  }
+  for (int i = 0; i < DATABASE_READERS; i++) {
+    database_close(&cat->readers[i]);
+  }
+  database_close(&cat->writer);
+  free(cat);
+}

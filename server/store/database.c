@@ -1,0 +1,119 @@
+#include "store/database.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "faults.h"
+#include "log.h"
+
+/* Each entry brings the schema from version i to i + 1. */
+static const char *const migrations[] = {
+    "CREATE TABLE resource(seq INTEGER PRIMARY KEY AUTOINCREMENT, kind INTEGER NOT NULL, id TEXT NOT NULL,"
+    " sha TEXT NOT NULL, json TEXT NOT NULL, bytes INTEGER NOT NULL, created INTEGER NOT NULL, used INTEGER NOT NULL,"
+    " UNIQUE(kind, id));"
+    "CREATE INDEX resource_used ON resource(used);"
+    "CREATE TABLE job(seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, key TEXT NOT NULL,"
+    " kind INTEGER NOT NULL, state INTEGER NOT NULL, attempt INTEGER NOT NULL, crashes INTEGER NOT NULL DEFAULT 0,"
+    " suspect INTEGER NOT NULL DEFAULT 0, alone INTEGER NOT NULL DEFAULT 0, listed INTEGER NOT NULL,"
+    " priority INTEGER NOT NULL, cost INTEGER NOT NULL, owner TEXT NOT NULL, request TEXT NOT NULL, problem TEXT,"
+    " created INTEGER NOT NULL, started INTEGER NOT NULL DEFAULT 0, finished INTEGER NOT NULL DEFAULT 0);"
+    "CREATE INDEX job_state ON job(state, seq);"
+    "CREATE TABLE event(job TEXT NOT NULL, number INTEGER NOT NULL, type TEXT NOT NULL, json TEXT NOT NULL,"
+    " PRIMARY KEY(job, number)) WITHOUT ROWID;"
+    "CREATE TABLE token(hash TEXT PRIMARY KEY, name TEXT NOT NULL UNIQUE, scopes INTEGER NOT NULL,"
+    " quota_bytes INTEGER NOT NULL, quota_jobs INTEGER NOT NULL, created INTEGER NOT NULL);",
+};
+enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
+
+int database_execute(database *db, const char *sql) {
+  char *message = NULL;
+  int code = FAULT("sqlite") ? SQLITE_IOERR : sqlite3_exec(db->handle, sql, NULL, NULL, &message);
+  if (code != SQLITE_OK) {
+    log_error("catalogue: %.60s: %s", sql, message ? message : sqlite3_errstr(code));
+  }
+  sqlite3_free(message);
+  return code;
+}
+
+int database_open(const char *path, int writer, database *out) {
+  memset(out, 0, sizeof *out);
+  int flags = SQLITE_OPEN_NOMUTEX | (writer ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY);
+  int code = sqlite3_open_v2(path, &out->handle, flags, NULL);
+  if (code == SQLITE_OK) {
+    sqlite3_busy_timeout(out->handle, 5000);
+    sqlite3_db_config(out->handle, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, writer ? 0 : 1, NULL);
+    code = database_execute(out, writer ? "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;"
+                                          "PRAGMA wal_autocheckpoint=1000; PRAGMA journal_size_limit=67108864;"
+                                        : "PRAGMA query_only=ON; PRAGMA wal_autocheckpoint=0;");
+  }
+  if (code != SQLITE_OK) {
+    database_close(out);
+  }
+  return code;
+}
+
+void database_close(database *db) {
+  for (int i = 0; i < DATABASE_STATEMENTS; i++) {
+    sqlite3_finalize(db->cached[i].statement);
+  }
+  sqlite3_close(db->handle);
+  memset(db, 0, sizeof *db);
+}
+
+sqlite3_stmt *database_statement(database *db, const char *sql) {
+  int i = 0;
+  while (i < DATABASE_STATEMENTS - 1 && db->cached[i].sql && db->cached[i].sql != sql) {
+    i++;
+  }
+  if (db->cached[i].sql != sql) {
+    sqlite3_finalize(db->cached[i].statement);
+    db->cached[i].sql = NULL;
+    int code = sqlite3_prepare_v3(db->handle, sql, -1, SQLITE_PREPARE_PERSISTENT, &db->cached[i].statement, NULL);
+    if (code != SQLITE_OK) {
+      log_error("catalogue: %s: %s", sql, sqlite3_errmsg(db->handle));
+      db->cached[i].statement = NULL;
+      return NULL;
+    }
+    db->cached[i].sql = sql;
+  }
+  sqlite3_reset(db->cached[i].statement);
+  sqlite3_clear_bindings(db->cached[i].statement);
+  return db->cached[i].statement;
+}
+
+int database_run(database *db, sqlite3_stmt *statement) {
+  if (!statement) {
+    return SQLITE_ERROR;
+  }
+  int code = FAULT("sqlite") ? SQLITE_IOERR : sqlite3_step(statement);
+  sqlite3_reset(statement);
+  if (code == SQLITE_DONE || code == SQLITE_ROW) {
+    return SQLITE_OK;
+  }
+  log_error("catalogue: %s", sqlite3_errmsg(db->handle));
+  return code;
+}
+
+int database_migrate(database *db) {
+  sqlite3_stmt *statement = database_statement(db, "PRAGMA user_version");
+  if (!statement || sqlite3_step(statement) != SQLITE_ROW) {
+    return SQLITE_ERROR;
+  }
+  int version = sqlite3_column_int(statement, 0);
+  sqlite3_reset(statement);
+  if (version > SCHEMA) {
+    log_error("the catalogue has schema %d, this program knows %d: use a newer program", version, (int)SCHEMA);
+    return SQLITE_SCHEMA;
+  }
+  for (; version < SCHEMA; version++) {
+    char mark[64];
+    sqlite3_snprintf(sizeof mark, mark, "PRAGMA user_version=%d", version + 1);
+    if (database_execute(db, "BEGIN IMMEDIATE") != SQLITE_OK ||
+        database_execute(db, migrations[version]) != SQLITE_OK || database_execute(db, mark) != SQLITE_OK ||
+        database_execute(db, "COMMIT") != SQLITE_OK) {
+      database_execute(db, "ROLLBACK");
+      return SQLITE_ERROR;
+    }
+  }
+  return SQLITE_OK;
+}

@@ -1,0 +1,300 @@
+/* Rows of jobs and events. */
+#include <stdlib.h>
+
+#include "store/rows.h"
+
+#define COLUMNS                                                                                                   \
+  "seq, id, key, kind, state, attempt, crashes, suspect, alone, listed, priority, cost, owner, request, problem," \
+  " created, started, finished"
+
+void job_row_free(job_row *row) {
+  free(row->request);
+  free(row->problem);
+  row->request = row->problem = NULL;
+}
+
+static int insert(database *db, void *arg) {
+  job_row *r = arg;
+  sqlite3_stmt *st = database_statement(
+      db,
+      "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created)"
+      " VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9)");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, r->id, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 2, r->key, -1, SQLITE_STATIC);
+  sqlite3_bind_int(st, 3, (int)r->kind);
+  sqlite3_bind_int(st, 4, r->listed);
+  sqlite3_bind_int(st, 5, r->priority);
+  sqlite3_bind_int64(st, 6, r->cost);
+  sqlite3_bind_text(st, 7, r->owner, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 8, r->request, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 9, r->created);
+  int code = database_run(db, st);
+  r->seq = sqlite3_last_insert_rowid(db->handle);
+  return code;
+}
+
+store_result catalogue_job_insert(catalogue *cat, job_row *row) {
+  return catalogue_write(cat, insert, row);
+}
+
+typedef struct change {
+  const char *id, *problem, *event_json;
+  int attempt, alone, state;
+  int64_t now, event;
+  const resource *result;
+} change;
+
+/* Runs an update that must touch one row. */
+static int must_change(database *db, sqlite3_stmt *st) {
+  int code = database_run(db, st);
+  return code == SQLITE_OK && sqlite3_changes(db->handle) != 1 ? SQLITE_CONSTRAINT : code;
+}
+
+static int list_it(database *db, void *arg) {
+  sqlite3_stmt *st = database_statement(db, "UPDATE job SET listed=1 WHERE id=?1");
+  if (st) {
+    sqlite3_bind_text(st, 1, arg, -1, SQLITE_STATIC);
+  }
+  return must_change(db, st);
+}
+
+store_result catalogue_job_list_it(catalogue *cat, const char *id) {
+  return catalogue_write(cat, list_it, (void *)(uintptr_t)id);
+}
+
+static int claim(database *db, void *arg) {
+  const change *c = arg;
+  sqlite3_stmt *st = database_statement(db,
+                                        "UPDATE job SET state=1, attempt=?2, alone=?3,"
+                                        " started=CASE started WHEN 0 THEN ?4 ELSE started END"
+                                        " WHERE id=?1 AND state=0 AND attempt=?2-1");
+  if (st) {
+    sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
+    sqlite3_bind_int(st, 2, c->attempt);
+    sqlite3_bind_int(st, 3, c->alone);
+    sqlite3_bind_int64(st, 4, c->now);
+  }
+  return must_change(db, st);
+}
+
+store_result catalogue_job_claim(catalogue *cat, const char *id, int attempt, int alone, int64_t now) {
+  change c = {.id = id, .attempt = attempt, .alone = alone, .now = now};
+  return catalogue_write(cat, claim, &c);
+}
+
+static int release(database *db, void *arg) {
+  const change *c = arg;
+  sqlite3_stmt *st =
+      database_statement(db, "UPDATE job SET state=0, attempt=?2-1, alone=0 WHERE id=?1 AND state=1 AND attempt=?2");
+  if (st) {
+    sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
+    sqlite3_bind_int(st, 2, c->attempt);
+  }
+  return must_change(db, st);
+}
+
+store_result catalogue_job_release(catalogue *cat, const char *id, int attempt) {
+  change c = {.id = id, .attempt = attempt};
+  return catalogue_write(cat, release, &c);
+}
+
+static int write_event(database *db, const char *job, int64_t number, const char *type, const char *json) {
+  sqlite3_stmt *st =
+      database_statement(db, "INSERT OR REPLACE INTO event(job, number, type, json) VALUES(?1,?2,?3,?4)");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 2, number);
+  sqlite3_bind_text(st, 3, type, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 4, json, -1, SQLITE_STATIC);
+  return database_run(db, st);
+}
+
+static int finish(database *db, void *arg) {
+  const change *c = arg;
+  sqlite3_stmt *st = database_statement(db,
+                                        "UPDATE job SET state=?3, problem=?4, finished=?5, suspect=0, alone=0"
+                                        " WHERE id=?1 AND attempt=?2 AND state<2");
+  if (st) {
+    sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
+    sqlite3_bind_int(st, 2, c->attempt);
+    sqlite3_bind_int(st, 3, c->state);
+    sqlite3_bind_text(st, 4, c->problem, -1, SQLITE_STATIC);
+    sqlite3_bind_int64(st, 5, c->now);
+  }
+  int code = must_change(db, st);
+  if (code == SQLITE_OK && c->result) {
+    code = resource_insert(db, c->result);
+  }
+  if (code == SQLITE_OK && c->event_json) {
+    code = write_event(db, c->id, c->event, orb_job_state_name((orb_job_state)c->state), c->event_json);
+  }
+  return code;
+}
+
+store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, orb_job_state state, const char *problem,
+                                  int64_t now, const resource *result, int64_t event, const char *event_json) {
+  change c = {.id = id,
+              .attempt = attempt,
+              .state = (int)state,
+              .problem = problem,
+              .now = now,
+              .result = result,
+              .event = event,
+              .event_json = event_json};
+  return catalogue_write(cat, finish, &c);
+}
+
+static int read_row(sqlite3_stmt *st, job_row *out) {
+  memset(out, 0, sizeof *out);
+  out->seq = sqlite3_column_int64(st, 0);
+  row_text(st, 1, out->id, sizeof out->id);
+  row_text(st, 2, out->key, sizeof out->key);
+  out->kind = (orb_job_kind)sqlite3_column_int(st, 3);
+  out->state = (orb_job_state)sqlite3_column_int(st, 4);
+  out->attempt = sqlite3_column_int(st, 5);
+  out->crashes = sqlite3_column_int(st, 6);
+  out->suspect = sqlite3_column_int(st, 7);
+  out->alone = sqlite3_column_int(st, 8);
+  out->listed = sqlite3_column_int(st, 9);
+  out->priority = sqlite3_column_int(st, 10);
+  out->cost = sqlite3_column_int64(st, 11);
+  row_text(st, 12, out->owner, sizeof out->owner);
+  out->request = row_copy(st, 13);
+  out->problem = row_copy(st, 14);
+  out->created = sqlite3_column_int64(st, 15);
+  out->started = sqlite3_column_int64(st, 16);
+  out->finished = sqlite3_column_int64(st, 17);
+  return out->request != NULL;
+}
+
+store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
+  database *db = catalogue_reader(cat);
+  store_result result = STORE_ERROR;
+  sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS " FROM job WHERE id=?1");
+  if (st) {
+    sqlite3_bind_text(st, 1, id, -1, SQLITE_STATIC);
+    int code = sqlite3_step(st);
+    result = code == SQLITE_ROW    ? (read_row(st, out) ? STORE_OK : STORE_ERROR)
+             : code == SQLITE_DONE ? STORE_NOT_FOUND
+                                   : STORE_ERROR;
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return result;
+}
+
+static int read_rows(catalogue *cat, database *db, sqlite3_stmt *st, int limit, job_row *out) {
+  int count = 0;
+  while (st && count < limit && sqlite3_step(st) == SQLITE_ROW && read_row(st, &out[count])) {
+    count++;
+  }
+  if (st) {
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return count;
+}
+
+int catalogue_job_list(catalogue *cat, int state, int64_t before, int limit, job_row *out) {
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS
+                                            " FROM job WHERE listed=1 AND (?1<0 OR state=?1) AND seq<?2"
+                                            " ORDER BY seq DESC LIMIT ?3");
+  if (st) {
+    sqlite3_bind_int(st, 1, state);
+    sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);
+    sqlite3_bind_int(st, 3, limit);
+  }
+  return read_rows(cat, db, st, limit, out);
+}
+
+int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out) {
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st =
+      database_statement(db, "SELECT " COLUMNS " FROM job WHERE state<2 AND seq>?1 ORDER BY seq LIMIT ?2");
+  if (st) {
+    sqlite3_bind_int64(st, 1, after);
+    sqlite3_bind_int(st, 2, limit);
+  }
+  return read_rows(cat, db, st, limit, out);
+}
+
+/* What was running when the process died is queued again as a suspect. A crash counts against a job that ran alone:
+ * by order, or because nothing else was running. */
+static int recover(database *db, void *arg) {
+  const change *c = arg;
+  sqlite3_stmt *st = database_statement(db,
+                                        "UPDATE job SET crashes=crashes+1 WHERE state=1 AND"
+                                        " (alone=1 OR (SELECT count(*) FROM job WHERE state=1)=1)");
+  int code = database_run(db, st);
+  if (code == SQLITE_OK) {
+    code = database_run(db, database_statement(db, "UPDATE job SET state=0, suspect=1, alone=0 WHERE state=1"));
+  }
+  st = code == SQLITE_OK
+           ? database_statement(db, "UPDATE job SET state=3, problem=?1, finished=?2 WHERE state=0 AND crashes>=?3")
+           : NULL;
+  if (st) {
+    sqlite3_bind_text(st, 1, c->problem, -1, SQLITE_STATIC);
+    sqlite3_bind_int64(st, 2, c->now);
+    sqlite3_bind_int(st, 3, c->attempt);
+    code = database_run(db, st);
+  }
+  return code;
+}
+
+store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem) {
+  change c = {.attempt = most_crashes, .now = now, .problem = crash_problem};
+  return catalogue_write(cat, recover, &c);
+}
+
+typedef struct event_arg {
+  char job[ORB_JOB_ID_SIZE], type[16];
+  int64_t number;
+  char json[];
+} event_arg;
+
+static int put_event(database *db, void *arg) {
+  const event_arg *e = arg;
+  return write_event(db, e->job, e->number, e->type, e->json);
+}
+
+void catalogue_event(catalogue *cat, const char *job, int64_t number, const char *type, const char *json) {
+  size_t size = strlen(json) + 1;
+  event_arg *e = calloc(1, sizeof *e + size);
+  if (e) {
+    snprintf(e->job, sizeof e->job, "%s", job);
+    snprintf(e->type, sizeof e->type, "%s", type);
+    e->number = number;
+    memcpy(e->json, json, size);
+    catalogue_write_later(cat, put_event, e);
+  }
+}
+
+int catalogue_events(catalogue *cat, const char *job, int64_t after, int limit, event_row *out) {
+  database *db = catalogue_reader(cat);
+  int count = 0;
+  sqlite3_stmt *st = database_statement(
+      db, "SELECT number, type, json FROM event WHERE job=?1 AND number>?2 ORDER BY number LIMIT ?3");
+  if (st) {
+    sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
+    sqlite3_bind_int64(st, 2, after);
+    sqlite3_bind_int(st, 3, limit);
+    while (count < limit && sqlite3_step(st) == SQLITE_ROW) {
+      out[count].number = sqlite3_column_int64(st, 0);
+      row_text(st, 1, out[count].type, sizeof out[count].type);
+      out[count].json = row_copy(st, 2);
+      if (!out[count].json) {
+        break;
+      }
+      count++;
+    }
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return count;
+}

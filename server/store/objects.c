@@ -1,0 +1,248 @@
+#include "store/objects.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include "faults.h"
+#include "log.h"
+
+static const char *const folders[OBJECT_KINDS] = {"mesh", "sphere", "asset", "places"};
+
+struct objects {
+  char root[PATH_MAX - 256];
+};
+
+static store_result failed(const char *what, const char *path) {
+  int code = errno;
+  log_error("%s %s: %s", what, path, strerror(code));
+  return code == ENOSPC || code == EDQUOT || code == EFBIG ? STORE_FULL : STORE_ERROR;
+}
+
+static void path_of(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]) {
+  snprintf(out, PATH_MAX, "%s/objects/%s/%.2s/%s", store->root, folders[kind], id, id);
+}
+
+static store_result sync_folder(const char *path) {
+  int fd = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) {
+    return failed("open", path);
+  }
+  int result = FAULT("fsync") ? (errno = EIO, -1) : fsync(fd);
+  store_result status = result == 0 ? STORE_OK : failed("fsync", path);
+  close(fd);
+  return status;
+}
+
+static store_result make_folder(const char *path) {
+  return mkdir(path, 0700) == 0 || errno == EEXIST ? STORE_OK : failed("mkdir", path);
+}
+
+static void sweep(const char *folder) {
+  DIR *dir = opendir(folder);
+  if (!dir) {
+    return;
+  }
+  int swept = 0;
+  for (struct dirent *entry; (entry = readdir(dir));) {
+    if (entry->d_name[0] != '.') {
+      swept += unlinkat(dirfd(dir), entry->d_name, 0) == 0;
+    }
+  }
+  closedir(dir);
+  if (swept) {
+    log_info("swept %d temporary files", swept);
+  }
+}
+
+static store_result make_folders(const objects *store) {
+  char path[PATH_MAX];
+  store_result status = STORE_OK;
+  static const char *const top[] = {"", "/tmp", "/objects"};
+  for (size_t i = 0; i < 3 && status == STORE_OK; i++) {
+    snprintf(path, sizeof path, "%s%s", store->root, top[i]);
+    status = make_folder(path);
+  }
+  for (int kind = 0; kind < OBJECT_KINDS && status == STORE_OK; kind++) {
+    snprintf(path, sizeof path, "%s/objects/%s", store->root, folders[kind]);
+    status = make_folder(path);
+    for (int shard = 0; shard < 256 && status == STORE_OK; shard++) {
+      char inner[PATH_MAX];
+      snprintf(inner, sizeof inner, "%s/objects/%s/%02x", store->root, folders[kind], (unsigned)shard);
+      status = make_folder(inner);
+    }
+    status = status == STORE_OK ? sync_folder(path) : status;
+  }
+  snprintf(path, sizeof path, "%s/objects", store->root);
+  status = status == STORE_OK ? sync_folder(path) : status;
+  return status == STORE_OK ? sync_folder(store->root) : status;
+}
+
+store_result objects_open(const char *data, objects **out) {
+  objects *store = calloc(1, sizeof *store);
+  if (!store || snprintf(store->root, sizeof store->root, "%s", data) >= (int)sizeof store->root) {
+    free(store);
+    return STORE_ERROR;
+  }
+  store_result status = make_folders(store);
+  if (status != STORE_OK) {
+    free(store);
+    return status;
+  }
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/tmp", store->root);
+  sweep(path);
+  *out = store;
+  return STORE_OK;
+}
+
+void objects_close(objects *store) {
+  free(store);
+}
+
+store_result objects_begin(objects *store, object_temp *temp) {
+  snprintf(temp->path, sizeof temp->path, "%s/tmp/put-XXXXXX", store->root);
+  temp->fd = mkostemp(temp->path, O_CLOEXEC);
+  return temp->fd >= 0 ? STORE_OK : failed("create", temp->path);
+}
+
+store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
+  const char *at = bytes;
+  while (size) {
+    ssize_t n = FAULT("write") ? (errno = ENOSPC, -1) : write(temp->fd, at, size);
+    if (n < 0 && errno == EINTR) {
+      continue;
+    }
+    if (n <= 0) {
+      return failed("write", temp->path);
+    }
+    at += n;
+    size -= (size_t)n;
+  }
+  return STORE_OK;
+}
+
+void objects_abandon(object_temp *temp) {
+  if (temp->fd >= 0) {
+    close(temp->fd);
+    unlink(temp->path);
+    temp->fd = -1;
+  }
+}
+
+store_result objects_publish(objects *store, object_temp *temp, object_kind kind, const char *id) {
+  char path[PATH_MAX];
+  path_of(store, kind, id, path);
+  if (FAULT("fsync") ? (errno = EIO, 1) : fsync(temp->fd) != 0) {
+    store_result status = failed("fsync", temp->path);
+    objects_abandon(temp);
+    return status;
+  }
+  FAULT_POINT("publish-synced");
+  if (FAULT("rename") ? (errno = EIO, 1) : rename(temp->path, path) != 0) {
+    store_result status = failed("rename to", path);
+    objects_abandon(temp);
+    return status;
+  }
+  close(temp->fd);
+  temp->fd = -1;
+  FAULT_POINT("publish-renamed");
+  *strrchr(path, '/') = 0;
+  return sync_folder(path);
+}
+
+store_result objects_put(objects *store, object_kind kind, const char *id, const void *bytes, size_t size) {
+  object_temp temp;
+  store_result status = objects_begin(store, &temp);
+  if (status == STORE_OK) {
+    status = objects_append(&temp, bytes, size);
+    if (status == STORE_OK) {
+      status = objects_publish(store, &temp, kind, id);
+    }
+    objects_abandon(&temp);
+  }
+  return status;
+}
+
+store_result objects_read(const objects *store, object_kind kind, const char *id, int *fd, uint64_t *size) {
+  char path[PATH_MAX];
+  struct stat info;
+  path_of(store, kind, id, path);
+  *fd = open(path, O_RDONLY | O_CLOEXEC);
+  if (*fd < 0) {
+    return errno == ENOENT ? STORE_NOT_FOUND : failed("open", path);
+  }
+  if (fstat(*fd, &info) != 0) {
+    store_result status = failed("stat", path);
+    close(*fd);
+    return status;
+  }
+  *size = (uint64_t)info.st_size;
+  return STORE_OK;
+}
+
+store_result objects_load(const objects *store, object_kind kind, const char *id, unsigned char **bytes, size_t *size) {
+  int fd;
+  uint64_t length;
+  store_result status = objects_read(store, kind, id, &fd, &length);
+  if (status != STORE_OK) {
+    return status;
+  }
+  unsigned char *data = malloc(length ? length : 1);
+  size_t done = 0;
+  while (data && done < length) {
+    ssize_t n = read(fd, data + done, length - done);
+    if (n < 0 && errno == EINTR) {
+      continue;
+    }
+    if (n <= 0) {
+      break;
+    }
+    done += (size_t)n;
+  }
+  close(fd);
+  if (!data || done < length) {
+    free(data);
+    return STORE_ERROR;
+  }
+  *bytes = data;
+  *size = length;
+  return STORE_OK;
+}
+
+store_result objects_delete(const objects *store, object_kind kind, const char *id) {
+  char path[PATH_MAX];
+  path_of(store, kind, id, path);
+  return unlink(path) == 0 || errno == ENOENT ? STORE_OK : failed("unlink", path);
+}
+
+uint64_t objects_free_bytes(const objects *store) {
+  struct statvfs info;
+  return statvfs(store->root, &info) == 0 ? (uint64_t)info.f_bavail * info.f_frsize : UINT64_MAX;
+}
+
+void objects_each(const objects *store, void (*each)(void *user, object_kind kind, const char *id, uint64_t size),
+                  void *user) {
+  for (int kind = 0; kind < OBJECT_KINDS; kind++) {
+    for (int shard = 0; shard < 256; shard++) {
+      char path[PATH_MAX];
+      snprintf(path, sizeof path, "%s/objects/%s/%02x", store->root, folders[kind], (unsigned)shard);
+      DIR *dir = opendir(path);
+      for (struct dirent *entry; dir && (entry = readdir(dir));) {
+        struct stat info;
+        if (entry->d_name[0] != '.' && fstatat(dirfd(dir), entry->d_name, &info, 0) == 0) {
+          each(user, (object_kind)kind, entry->d_name, (uint64_t)info.st_size);
+        }
+      }
+      if (dir) {
+        closedir(dir);
+      }
+    }
+  }
+}

@@ -1,0 +1,175 @@
+/* Rows of meshes, embeddings and supermeshes. */
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "store/rows.h"
+
+#define COLUMNS "seq, kind, id, sha, json, bytes, created"
+
+void resource_free(resource *r) {
+  free(r->json);
+  r->json = NULL;
+}
+
+int resource_insert(database *db, const resource *r) {
+  sqlite3_stmt *st = database_statement(db,
+                                        "INSERT INTO resource(kind, id, sha, json, bytes, created, used)"
+                                        " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?6) ON CONFLICT(kind, id) DO NOTHING");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_int(st, 1, (int)r->kind);
+  sqlite3_bind_text(st, 2, r->id, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 3, r->sha, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 4, r->json, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 5, r->bytes);
+  sqlite3_bind_int64(st, 6, r->created);
+  return database_run(db, st);
+}
+
+static int put(database *db, void *arg) {
+  return resource_insert(db, arg);
+}
+
+store_result catalogue_put(catalogue *cat, const resource *r) {
+  return catalogue_write(cat, put, (void *)(uintptr_t)r);
+}
+
+static int read_row(sqlite3_stmt *st, resource *out) {
+  memset(out, 0, sizeof *out);
+  out->seq = sqlite3_column_int64(st, 0);
+  out->kind = (resource_kind)sqlite3_column_int(st, 1);
+  row_text(st, 2, out->id, sizeof out->id);
+  row_text(st, 3, out->sha, sizeof out->sha);
+  out->json = row_copy(st, 4);
+  out->bytes = sqlite3_column_int64(st, 5);
+  out->created = sqlite3_column_int64(st, 6);
+  return out->json != NULL;
+}
+
+store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out) {
+  database *db = catalogue_reader(cat);
+  store_result result = STORE_ERROR;
+  sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS " FROM resource WHERE kind=?1 AND id=?2");
+  if (st) {
+    sqlite3_bind_int(st, 1, (int)kind);
+    sqlite3_bind_text(st, 2, id, -1, SQLITE_STATIC);
+    int code = sqlite3_step(st);
+    result = code == SQLITE_ROW    ? (read_row(st, out) ? STORE_OK : STORE_ERROR)
+             : code == SQLITE_DONE ? STORE_NOT_FOUND
+                                   : STORE_ERROR;
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return result;
+}
+
+static int read_list(catalogue *cat, database *db, sqlite3_stmt *st, int limit, resource *out) {
+  int count = 0;
+  while (st && count < limit && sqlite3_step(st) == SQLITE_ROW) {
+    if (!read_row(st, &out[count])) {
+      break;
+    }
+    count++;
+  }
+  if (st) {
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return count;
+}
+
+int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out) {
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st =
+      database_statement(db, "SELECT " COLUMNS " FROM resource WHERE kind=?1 AND seq<?2 ORDER BY seq DESC LIMIT ?3");
+  if (st) {
+    sqlite3_bind_int(st, 1, (int)kind);
+    sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);
+    sqlite3_bind_int(st, 3, limit);
+  }
+  return read_list(cat, db, st, limit, out);
+}
+
+int catalogue_oldest(catalogue *cat, int limit, resource *out) {
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st =
+      database_statement(db, "SELECT " COLUMNS " FROM resource WHERE kind>0 ORDER BY used, seq LIMIT ?1");
+  if (st) {
+    sqlite3_bind_int(st, 1, limit);
+  }
+  return read_list(cat, db, st, limit, out);
+}
+
+typedef struct key_arg {
+  int kind;
+  char id[ORB_ID_SIZE];
+  int64_t now;
+} key_arg;
+
+static int delete_row(database *db, void *arg) {
+  key_arg *key = arg;
+  sqlite3_stmt *st = database_statement(db, "DELETE FROM resource WHERE kind=?1 AND id=?2");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_int(st, 1, key->kind);
+  sqlite3_bind_text(st, 2, key->id, -1, SQLITE_STATIC);
+  int code = database_run(db, st);
+  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+}
+
+store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id) {
+  key_arg key = {.kind = (int)kind};
+  memcpy(key.id, id, sizeof key.id);
+  return catalogue_write(cat, delete_row, &key);
+}
+
+static int touch_row(database *db, void *arg) {
+  key_arg *key = arg;
+  sqlite3_stmt *st = database_statement(db, "UPDATE resource SET used=?3 WHERE kind=?1 AND id=?2");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_int(st, 1, key->kind);
+  sqlite3_bind_text(st, 2, key->id, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 3, key->now);
+  return database_run(db, st);
+}
+
+void catalogue_touch(catalogue *cat, resource_kind kind, const char *id) {
+  key_arg *key = calloc(1, sizeof *key);
+  if (key) {
+    key->kind = (int)kind;
+    memcpy(key->id, id, sizeof key->id);
+    key->now = (int64_t)time(NULL) * 1000;
+    catalogue_write_later(cat, touch_row, key);
+  }
+}
+
+int64_t catalogue_bytes(catalogue *cat, int derived_only) {
+  database *db = catalogue_reader(cat);
+  int64_t total = 0;
+  sqlite3_stmt *st = database_statement(db, "SELECT coalesce(sum(bytes), 0) FROM resource WHERE kind>=?1");
+  if (st) {
+    sqlite3_bind_int(st, 1, derived_only ? 1 : 0);
+    if (sqlite3_step(st) == SQLITE_ROW) {
+      total = sqlite3_column_int64(st, 0);
+    }
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return total;
+}
+
+int catalogue_integrity(catalogue *cat) {
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st = database_statement(db, "PRAGMA integrity_check");
+  int fine = st && sqlite3_step(st) == SQLITE_ROW && strcmp((const char *)sqlite3_column_text(st, 0), "ok") == 0;
+  if (st) {
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return fine;
+}
