@@ -1,7 +1,230 @@
+/* orbmorphd: start, signals, stop. */
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/signalfd.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
 
-#include "orbmorph/status.h"
+#include "http/http.h"
+#include "log.h"
+#include "maintain.h"
+#include "worker/pool.h"
 
-int main(void) {
-  return puts(ORB_ENGINE) < 0;
+enum { CACHE_BYTES = 64 << 20 };
+
+static void raise_descriptor_limit(void) {
+  struct rlimit limit;
+  if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
+    limit.rlim_cur = limit.rlim_max;
+    if (setrlimit(RLIMIT_NOFILE, &limit) != 0) {
+      log_warn("the limit of open files stays at what it was");
+    }
+  }
+}
+
+/* Tells systemd, where there is one, over its datagram socket. */
+static void notify(const char *text) {
+  const char *path = getenv("NOTIFY_SOCKET");
+  struct sockaddr_un address = {.sun_family = AF_UNIX};
+  if (!path || strlen(path) >= sizeof address.sun_path) {
+    return;
+  }
+  strcpy(address.sun_path, path);
+  if (path[0] == '@') {
+    address.sun_path[0] = 0;
+  }
+  int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  socklen_t size = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + strlen(path));
+  if (fd >= 0) {
+    if (sendto(fd, text, strlen(text), MSG_NOSIGNAL, (struct sockaddr *)&address, size) < 0) {
+      log_warn("systemd could not be notified: %s", strerror(errno));
+    }
+    close(fd);
+  }
+}
+
+/* One process a data folder; the lock goes with the process, however it ends. */
+static int lock_data(const char *data) {
+  char path[PATH_MAX];
+  if (mkdir(data, 0700) != 0 && errno != EEXIST) {
+    log_error("the folder %s cannot be made: %s", data, strerror(errno));
+    return -1;
+  }
+  snprintf(path, sizeof path, "%s/lock", data);
+  int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  for (int tries = 0; fd >= 0 && tries < 50; tries++) { /* one that is being killed may hold it a moment longer */
+    if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
+      return fd;
+    }
+    usleep(100000);
+  }
+  log_error("the data folder %s is in use by another process, or cannot be locked", data);
+  if (fd >= 0) {
+    close(fd);
+  }
+  return -1;
+}
+
+static int is_loopback(const char *listen) {
+  return strncmp(listen, "127.", 4) == 0 || strncmp(listen, "[::1]:", 6) == 0 ||
+         strncmp(listen, "localhost:", 10) == 0 || strncmp(listen, "unix:", 5) == 0;
+}
+
+static void announce(const server *srv) {
+  const char *listen = srv->options->listen;
+  if (strncmp(listen, "unix:", 5) == 0) {
+    printf("orbmorphd listening on %s\n", listen);
+  } else {
+    int host = (int)(strrchr(listen, ':') - listen);
+    printf("orbmorphd listening on http://%.*s:%u\n", host, listen, (unsigned)http_port(srv));
+  }
+  fflush(stdout);
+  notify("READY=1\n");
+}
+
+/* Waits for a signal to stop; a second one, or the end of the time for draining, stops at once. */
+static void wait_for_stop(server *srv, int signals) {
+  struct signalfd_siginfo info;
+  for (;;) {
+    if (read(signals, &info, sizeof info) != (ssize_t)sizeof info) {
+      continue;
+    }
+    if (info.ssi_signo == SIGHUP) {
+      log_info("SIGHUP: the configuration is read at start only; restart to change it");
+      continue;
+    }
+    break;
+  }
+  log_info("stopping: running jobs have %lld s", (long long)srv->options->drain_seconds);
+  notify("STOPPING=1\n");
+  __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
+  queue_stop(srv->q, 0);
+  int64_t until = orb_clock_ms() + 1000 * srv->options->drain_seconds;
+  struct pollfd wait = {.fd = signals, .events = POLLIN};
+  while (queue_running(srv->q) > 0 && orb_clock_ms() < until) {
+    if (poll(&wait, 1, 50) > 0) {
+      break;
+    }
+  }
+  queue_stop(srv->q, 1);
+}
+
+static int serve(server *srv, int signals) {
+  const config *o = srv->options;
+  long cores = sysconf(_SC_NPROCESSORS_ONLN);
+  queue_options queued = {.workers = (int)o->workers,
+                          .cores = cores > 0 ? (int)cores : 1,
+                          .limit = (int)o->queue_limit,
+                          .memory = 2 * o->job_memory};
+  worker_options limits = {.workers = (int)o->workers,
+                           .job_memory = o->job_memory,
+                           .job_ms = 1000 * o->job_seconds,
+                           .max_triangles = o->max_triangles};
+  worker_pool *workers = NULL;
+  int result = 1;
+  if (queued.cores < queued.workers) {
+    queued.cores = queued.workers;
+  }
+  if (objects_open(o->data, &srv->store) != STORE_OK || catalogue_open(o->data, &srv->cat) != STORE_OK ||
+      !(srv->q = queue_create(&queued, srv->cat)) || queue_recover(srv->q) != STORE_OK ||
+      !(srv->descriptions = cache_create(CACHE_BYTES)) || !(srv->io = tasks_start((int)o->io_threads)) ||
+      !(srv->checks = tasks_start((int)o->workers)) ||
+      !(workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) || !http_start(srv)) {
+    log_error("the service could not be started");
+  } else {
+    __atomic_store_n(&srv->ready, 1, __ATOMIC_RELEASE);
+    announce(srv);
+    wait_for_stop(srv, signals);
+    result = 0;
+  }
+  __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
+  if (srv->q) {
+    queue_stop(srv->q, 1);
+    worker_pool_join(workers);
+    queue_wake_all(srv->q);
+  }
+  if (srv->daemon) {
+    MHD_quiesce_daemon(srv->daemon);
+  }
+  tasks_stop(srv->checks); /* resumes what they had */
+  tasks_stop(srv->io);
+  http_stop(srv);
+  queue_destroy(srv->q);
+  catalogue_close(srv->cat);
+  objects_close(srv->store);
+  cache_destroy(srv->descriptions);
+  return result;
+}
+
+static int run(const config *options) {
+  server srv = {.options = options};
+  sigset_t set;
+  struct timespec now;
+  sigemptyset(&set);
+  sigaddset(&set, SIGTERM);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGHUP);
+  pthread_sigmask(SIG_BLOCK, &set, NULL);
+  signal(SIGPIPE, SIG_IGN);
+  int signals = signalfd(-1, &set, SFD_CLOEXEC);
+  clock_gettime(CLOCK_REALTIME, &now);
+  srv.started = now.tv_sec;
+  pthread_mutex_init(&srv.mesh_lock, NULL);
+  raise_descriptor_limit();
+  int lock = signals < 0 ? -1 : lock_data(options->data);
+  int result = lock < 0 ? 1 : serve(&srv, signals);
+  if (lock >= 0) {
+    close(lock);
+  }
+  return result;
+}
+
+int main(int argc, char **argv) {
+  static config options;
+  int token_arguments = 0;
+  config_action action = config_read(&options, argc, argv, &token_arguments);
+  static const char *const levels[] = {"debug", "info", "warn", "error"};
+  int level = 0;
+  while (level < 3 && strcmp(levels[level], options.log_level) != 0) {
+    level++;
+  }
+  log_setup((log_level)level, strcmp(options.log_format, "text") != 0);
+  if (sodium_init() < 0) {
+    fputs("orbmorphd: libsodium cannot be initialised\n", stderr);
+    return 1;
+  }
+  switch (action) {
+    case CONFIG_PRINTED:
+      return 0;
+    case CONFIG_BAD:
+      return 2;
+    case CONFIG_CHECKED:
+      puts("the configuration is valid");
+      return 0;
+    case CONFIG_RUN:
+      if (!is_loopback(options.listen) && strcmp(options.auth, "off") != 0) {
+        fputs("orbmorphd: only loopback is served without tokens; put a front end before it, or say --auth off\n",
+              stderr);
+        return 2;
+      }
+      return run(&options);
+    default:
+      break;
+  }
+  int lock = lock_data(options.data);
+  if (lock < 0) {
+    return 1;
+  }
+  int result = action == CONFIG_CHECK_DATA ? maintain_check(&options) : action == CONFIG_GC ? maintain_gc(&options) : 2;
+  close(lock);
+  return result;
 }

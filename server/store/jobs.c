@@ -70,7 +70,7 @@ static int claim(database *db, void *arg) {
   sqlite3_stmt *st = database_statement(db,
                                         "UPDATE job SET state=1, attempt=?2, alone=?3,"
                                         " started=CASE started WHEN 0 THEN ?4 ELSE started END"
-                                        " WHERE id=?1 AND state=0 AND attempt=?2-1");
+                                        " WHERE id=?1 AND state<2 AND attempt=?2-1");
   if (st) {
     sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
     sqlite3_bind_int(st, 2, c->attempt);

@@ -1,0 +1,144 @@
+#include "cache.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BUCKETS = 4096 };
+
+typedef struct item {
+  cached entry; /* first: pointers to it are pointers to the item */
+  struct item *next_hash, *newer, *older;
+  int refs, linked;
+} item;
+
+struct cache {
+  pthread_mutex_t lock;
+  size_t max_bytes, bytes;
+  item *buckets[BUCKETS], *newest, *oldest;
+};
+
+cache *cache_create(size_t max_bytes) {
+  cache *c = calloc(1, sizeof *c);
+  if (c) {
+    pthread_mutex_init(&c->lock, NULL);
+    c->max_bytes = max_bytes;
+  }
+  return c;
+}
+
+static item **bucket(cache *c, resource_kind kind, const char *id) {
+  unsigned hash = (unsigned)kind + 1;
+  for (int i = 0; i < 16 && id[i]; i++) {
+    hash = hash * 31 + (unsigned char)id[i];
+  }
+  return &c->buckets[hash % BUCKETS];
+}
+
+static void unref(item *it) {
+  if (--it->refs == 0) {
+    free(it->entry.row.json);
+    free(it);
+  }
+}
+
+static void unlink_order(cache *c, item *it) {
+  *(it->newer ? &it->newer->older : &c->newest) = it->older;
+  *(it->older ? &it->older->newer : &c->oldest) = it->newer;
+}
+
+static void link_newest(cache *c, item *it) {
+  it->newer = NULL;
+  it->older = c->newest;
+  *(c->newest ? &c->newest->newer : &c->oldest) = it;
+  c->newest = it;
+}
+
+static void drop(cache *c, item *it) {
+  for (item **at = bucket(c, it->entry.row.kind, it->entry.row.id); *at; at = &(*at)->next_hash) {
+    if (*at == it) {
+      *at = it->next_hash;
+      break;
+    }
+  }
+  unlink_order(c, it);
+  c->bytes -= it->entry.json_size;
+  it->linked = 0;
+  unref(it);
+}
+
+static item *find(cache *c, resource_kind kind, const char *id) {
+  item *it = *bucket(c, kind, id);
+  while (it && (it->entry.row.kind != kind || strcmp(it->entry.row.id, id) != 0)) {
+    it = it->next_hash;
+  }
+  return it;
+}
+
+const cached *cache_find(cache *c, resource_kind kind, const char *id) {
+  pthread_mutex_lock(&c->lock);
+  item *it = find(c, kind, id);
+  if (it) {
+    it->refs++;
+    unlink_order(c, it);
+    link_newest(c, it);
+  }
+  pthread_mutex_unlock(&c->lock);
+  return it ? &it->entry : NULL;
+}
+
+const cached *cache_add(cache *c, resource *row) {
+  item *it = calloc(1, sizeof *it);
+  if (!it) {
+    resource_free(row);
+    return NULL;
+  }
+  char hash[ORB_ID_SIZE];
+  it->entry.row = *row;
+  row->json = NULL;
+  it->entry.json_size = strlen(it->entry.row.json);
+  orb_id_of_text(it->entry.row.json, it->entry.json_size, hash);
+  snprintf(it->entry.etag, sizeof it->entry.etag, "\"%.32s\"", hash);
+  it->refs = 2;
+  it->linked = 1;
+  pthread_mutex_lock(&c->lock);
+  item *there = find(c, row->kind, row->id);
+  if (there) {
+    drop(c, there);
+  }
+  item **at = bucket(c, row->kind, row->id);
+  it->next_hash = *at;
+  *at = it;
+  link_newest(c, it);
+  c->bytes += it->entry.json_size;
+  while (c->bytes > c->max_bytes && c->oldest != it) {
+    drop(c, c->oldest);
+  }
+  pthread_mutex_unlock(&c->lock);
+  return &it->entry;
+}
+
+void cache_release(cache *c, const cached *entry) {
+  if (entry) {
+    pthread_mutex_lock(&c->lock);
+    unref((item *)(uintptr_t)entry);
+    pthread_mutex_unlock(&c->lock);
+  }
+}
+
+void cache_drop(cache *c, resource_kind kind, const char *id) {
+  pthread_mutex_lock(&c->lock);
+  item *it = find(c, kind, id);
+  if (it) {
+    drop(c, it);
+  }
+  pthread_mutex_unlock(&c->lock);
+}
+
+void cache_destroy(cache *c) {
+  while (c && c->oldest) {
+    drop(c, c->oldest);
+  }
+  free(c);
+}

@@ -1,0 +1,24 @@
+/* Descriptions of meshes, embeddings and supermeshes that were asked for lately, so that handlers answer from memory.
+ * Any thread. Entries are immutable and counted; the least recently used leave first. */
+#ifndef ORB_CACHE_H
+#define ORB_CACHE_H
+
+#include "store/catalogue.h"
+
+typedef struct cache cache;
+typedef struct cached {
+  resource row;
+  size_t json_size;
+  char etag[40]; /* of the description, with quotes */
+} cached;
+
+cache *cache_create(size_t max_bytes);
+void cache_destroy(cache *c);
+/* Referenced; NULL if not there. */
+const cached *cache_find(cache *c, resource_kind kind, const char *id);
+/* Takes row->json over; referenced. NULL out of memory (json freed). */
+const cached *cache_add(cache *c, resource *row);
+void cache_release(cache *c, const cached *entry);
+void cache_drop(cache *c, resource_kind kind, const char *id);
+
+#endif

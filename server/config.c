@@ -1,0 +1,275 @@
+#include "config.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "orbmorph/status.h"
+
+typedef struct entry {
+  const char *name;
+  size_t offset, size; /* size 0: a number */
+  int64_t least, most;
+  const char *standard; /* the default */
+  const char *help;
+} entry;
+
+#define TEXT(field) offsetof(config, field), sizeof((config *)0)->field, 0, 0
+#define NUMBER(field, least, most) offsetof(config, field), 0, least, most
+
+/* Numbers may end in K, M or G (powers of 1024). */
+static const entry table[] = {
+    {"listen", TEXT(listen), "127.0.0.1:8080", "ADDR:PORT, [V6]:PORT or unix:PATH; port 0 picks a free one"},
+    {"data", TEXT(data), "orbmorph-data", "the folder of everything that is kept"},
+    {"config", TEXT(file), "", "a file of lines NAME = VALUE with these same names"},
+    {"workers", NUMBER(workers, 1, 256), "0", "jobs that run side by side; 0: one a core"},
+    {"io-threads", NUMBER(io_threads, 1, 64), "6", "threads for queries and commits"},
+    {"http-threads", NUMBER(http_threads, 2, 64), "2", "threads that serve connections"},
+    {"max-connections", NUMBER(max_connections, 16, 1000000), "16384", "connections at once"},
+    {"connections-per-address", NUMBER(connections_per_address, 0, 1000000), "0", "0: no limit"},
+    {"idle-seconds", NUMBER(idle_seconds, 1, 3600), "30", "a connection that is silent for so long is closed"},
+    {"max-body", NUMBER(max_body, 1024, INT64_C(1) << 40), "512M", "bytes of an upload"},
+    {"max-json", NUMBER(max_json, 1024, 1 << 26), "1M", "bytes of a JSON body"},
+    {"max-triangles", NUMBER(max_triangles, 4, 500000000), "5000000", "triangles of a mesh"},
+    {"queue-limit", NUMBER(queue_limit, 1, 1000000), "10000", "unfinished jobs"},
+    {"job-memory", NUMBER(job_memory, 1 << 20, INT64_C(1) << 46), "0", "bytes of one job; 0: half of the memory"},
+    {"job-seconds", NUMBER(job_seconds, 1, 864000), "3600", "seconds of one job"},
+    {"disk-reserve", NUMBER(disk_reserve, 0, INT64_C(1) << 46), "64M", "bytes that are left free on the disk"},
+    {"drain-seconds", NUMBER(drain_seconds, 0, 3600), "8", "on SIGTERM, time for running jobs to end"},
+    {"derived-bytes", NUMBER(derived_bytes, 1 << 20, INT64_C(1) << 50), "0",
+     "bytes of embeddings and supermeshes, the least used leave first; 0: no limit"},
+    {"cors", TEXT(cors), "", "origins that browsers may call from, comma-separated, or *"},
+    {"studio", TEXT(studio), "", "a folder of files to serve at / instead of those built in"},
+    {"log-level", TEXT(log_level), "info", "debug, info, warn, error"},
+    {"log-format", TEXT(log_format), "json", "json or text"},
+    {"tls-certificate", TEXT(tls_certificate), "", "PEM file; with tls-key the service speaks https"},
+    {"tls-key", TEXT(tls_key), "", "PEM file"},
+    {"auth", TEXT(auth), "auto", "auto: tokens are required except on loopback; required; off"},
+};
+enum { ENTRIES = sizeof table / sizeof table[0] };
+
+static const entry *find(const char *name, size_t length) {
+  for (size_t i = 0; i < ENTRIES; i++) {
+    if (strlen(table[i].name) == length && strncmp(table[i].name, name, length) == 0) {
+      return &table[i];
+    }
+  }
+  return NULL;
+}
+
+static int parse_number(const char *text, int64_t *out) {
+  char *end;
+  errno = 0;
+  long long value = strtoll(text, &end, 10);
+  if (end == text || errno || value < 0) {
+    return 0;
+  }
+  const char *units = "KMG";
+  const char *unit = *end ? strchr(units, toupper((unsigned char)*end)) : NULL;
+  if (unit && *end) {
+    for (long i = 0; i <= unit - units; i++) {
+      if (__builtin_mul_overflow(value, 1024, &value)) {
+        return 0;
+      }
+    }
+    end++;
+  }
+  *out = value;
+  return *end == 0;
+}
+
+static int set(config *out, const entry *e, const char *value, const char *from) {
+  char *at = (char *)out + e->offset;
+  if (e->size) {
+    if (strlen(value) >= e->size) {
+      fprintf(stderr, "orbmorphd: %s: %s is too long\n", from, e->name);
+      return 0;
+    }
+    strcpy(at, value);
+    return 1;
+  }
+  int64_t number;
+  int is_default = strcmp(value, e->standard) == 0; /* 0 may mean "by the machine" */
+  if (!parse_number(value, &number) || (!is_default && (number < e->least || number > e->most))) {
+    fprintf(stderr, "orbmorphd: %s: %s must be a number from %lld to %lld, not \"%s\"\n", from, e->name,
+            (long long)e->least, (long long)e->most, value);
+    return 0;
+  }
+  memcpy(at, &number, sizeof number);
+  return 1;
+}
+
+static char *trim(char *s) {
+  while (isspace((unsigned char)*s)) {
+    s++;
+  }
+  size_t n = strlen(s);
+  while (n && isspace((unsigned char)s[n - 1])) {
+    s[--n] = 0;
+  }
+  if (n >= 2 && s[0] == '"' && s[n - 1] == '"') {
+    s[n - 1] = 0;
+    s++;
+  }
+  return s;
+}
+
+static int read_file(config *out, const char *path) {
+  FILE *file = fopen(path, "r");
+  char line[4096];
+  int number = 0, fine = 1;
+  if (!file) {
+    fprintf(stderr, "orbmorphd: the config file %s cannot be read: %s\n", path, strerror(errno));
+    return 0;
+  }
+  while (fine && fgets(line, sizeof line, file)) {
+    number++;
+    char *at = trim(line), *equals = strchr(at, '=');
+    if (*at == 0 || *at == '#') {
+      continue;
+    }
+    char from[64];
+    snprintf(from, sizeof from, "config file, line %d", number);
+    if (equals) {
+      *equals = 0;
+    }
+    char *name = trim(at);
+    for (char *c = name; *c; c++) {
+      *c = *c == '_' ? '-' : *c;
+    }
+    const entry *e = equals ? find(name, strlen(name)) : NULL;
+    if (!e) {
+      fprintf(stderr, "orbmorphd: %s: \"%s\" is none of the names that --help lists\n", from, name);
+      fine = 0;
+    } else {
+      fine = set(out, e, trim(equals + 1), from);
+    }
+  }
+  fclose(file);
+  return fine;
+}
+
+static int read_environment(config *out) {
+  for (size_t i = 0; i < ENTRIES; i++) {
+    char name[64] = "ORBMORPH_";
+    size_t n = strlen(name);
+    for (const char *c = table[i].name; *c; c++) {
+      name[n++] = *c == '-' ? '_' : (char)toupper((unsigned char)*c);
+    }
+    name[n] = 0;
+    const char *value = getenv(name);
+    if (value && !set(out, &table[i], value, name)) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+static void print_help(void) {
+  puts(
+      "orbmorphd: meshes in over HTTP, one certified morphing GLB out\n\n"
+      "  orbmorphd [--NAME VALUE]…      run the service\n"
+      "  orbmorphd --check-config       read the configuration and say whether it is valid\n"
+      "  orbmorphd --check-data         verify every object and row of the data folder\n"
+      "  orbmorphd --gc                 remove derived objects beyond derived-bytes, and objects without a row\n"
+      "  orbmorphd token add NAME --scope read,write,admin [--quota BYTES]\n"
+      "  orbmorphd token list | token remove NAME\n"
+      "  orbmorphd --version, --help\n\n"
+      "Each NAME is also an environment variable (ORBMORPH_NAME) and a line of the config file; a flag wins over the\n"
+      "environment, that over the file, that over the default.\n");
+  for (size_t i = 0; i < ENTRIES; i++) {
+    printf("  --%-24s %s [%s]\n", table[i].name, table[i].help, table[i].standard);
+  }
+}
+
+/* Flags in two passes: the first only looks for the config file. */
+static config_action read_flags(config *out, int argc, char **argv, int only_file, int *token_arguments) {
+  config_action action = CONFIG_RUN;
+  for (int i = 1; i < argc; i++) {
+    const char *flag = argv[i];
+    if (strcmp(flag, "token") == 0) {
+      *token_arguments = i + 1;
+      return CONFIG_TOKEN;
+    }
+    static const struct {
+      const char *flag;
+      config_action action;
+    } actions[] = {{"--check-config", CONFIG_CHECKED}, {"--check-data", CONFIG_CHECK_DATA}, {"--gc", CONFIG_GC}};
+    size_t k = 0;
+    while (k < 3 && strcmp(flag, actions[k].flag) != 0) {
+      k++;
+    }
+    if (k < 3) {
+      action = actions[k].action;
+      continue;
+    }
+    if (strcmp(flag, "--version") == 0) {
+      puts(ORB_ENGINE);
+      return CONFIG_PRINTED;
+    }
+    if (strcmp(flag, "--help") == 0 || strcmp(flag, "-h") == 0) {
+      print_help();
+      return CONFIG_PRINTED;
+    }
+    const char *equals = strchr(flag, '=');
+    size_t length = equals ? (size_t)(equals - flag) : strlen(flag);
+    const entry *e = length > 2 && strncmp(flag, "--", 2) == 0 ? find(flag + 2, length - 2) : NULL;
+    const char *value = equals ? equals + 1 : i + 1 < argc ? argv[++i] : NULL;
+    if (!e || !value) {
+      fprintf(stderr, e ? "orbmorphd: %s needs a value\n" : "orbmorphd: %s is not an option; see --help\n", flag);
+      return CONFIG_BAD;
+    }
+    if ((!only_file || strcmp(e->name, "config") == 0) && !set(out, e, value, flag)) {
+      return CONFIG_BAD;
+    }
+  }
+  return action;
+}
+
+static int consistent(config *out) {
+  long cores = sysconf(_SC_NPROCESSORS_ONLN);
+  if (out->workers == 0) {
+    out->workers = cores > 0 ? (cores < 256 ? cores : 256) : 1;
+  }
+  if (out->job_memory == 0) {
+    out->job_memory = (int64_t)sysconf(_SC_PHYS_PAGES) / 2 * sysconf(_SC_PAGESIZE);
+  }
+  if ((out->tls_certificate[0] == 0) != (out->tls_key[0] == 0)) {
+    fprintf(stderr, "orbmorphd: tls-certificate and tls-key belong together\n");
+    return 0;
+  }
+  if (strcmp(out->auth, "auto") != 0 && strcmp(out->auth, "required") != 0 && strcmp(out->auth, "off") != 0) {
+    fprintf(stderr, "orbmorphd: auth must be auto, required or off\n");
+    return 0;
+  }
+  return 1;
+}
+
+config_action config_read(config *out, int argc, char **argv, int *token_arguments) {
+  memset(out, 0, sizeof *out);
+  for (size_t i = 0; i < ENTRIES; i++) {
+    if (!set(out, &table[i], table[i].standard, "default")) {
+      return CONFIG_BAD;
+    }
+  }
+  config_action action = read_flags(out, argc, argv, 1, token_arguments);
+  if (action == CONFIG_BAD || action == CONFIG_PRINTED) {
+    return action;
+  }
+  const char *from_environment = getenv("ORBMORPH_CONFIG");
+  if (!out->file[0] && from_environment && !set(out, find("config", 6), from_environment, "ORBMORPH_CONFIG")) {
+    return CONFIG_BAD;
+  }
+  if (out->file[0] && !read_file(out, out->file)) {
+    return CONFIG_BAD;
+  }
+  if (!read_environment(out)) {
+    return CONFIG_BAD;
+  }
+  action = read_flags(out, argc, argv, 0, token_arguments);
+  return action == CONFIG_BAD || !consistent(out) ? CONFIG_BAD : action;
+}

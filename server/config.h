@@ -1,0 +1,34 @@
+/* The configuration: flag > environment (ORBMORPH_NAME) > config file > default. */
+#ifndef ORB_CONFIG_H
+#define ORB_CONFIG_H
+
+#include <limits.h>
+#include <stdint.h>
+
+typedef struct config {
+  char listen[256]; /* ADDR:PORT or unix:PATH */
+  char data[PATH_MAX / 2];
+  char file[PATH_MAX / 2];
+  char cors[512]; /* origins, comma-separated, or * */
+  char log_level[16], log_format[16];
+  char studio[PATH_MAX / 2];
+  char tls_certificate[PATH_MAX / 2], tls_key[PATH_MAX / 2];
+  char auth[16]; /* auto, required, off */
+  int64_t workers, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;
+  int64_t max_body, max_json, max_triangles, queue_limit;
+  int64_t job_memory, job_seconds, disk_reserve, drain_seconds, derived_bytes;
+} config;
+
+typedef enum config_action {
+  CONFIG_RUN,
+  CONFIG_PRINTED, /* --help, --version: nothing more to do */
+  CONFIG_BAD,     /* said why on standard error */
+  CONFIG_CHECKED, /* --check-config */
+  CONFIG_CHECK_DATA,
+  CONFIG_GC,
+  CONFIG_TOKEN, /* token … : arguments from token_arguments on */
+} config_action;
+
+config_action config_read(config *out, int argc, char **argv, int *token_arguments);
+
+#endif

@@ -1,0 +1,153 @@
+/* Requests for embeddings and supermeshes: known ones are answered, others become jobs. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/json.h"
+#include "api/supermesh_codec.h"
+#include "http/http.h"
+
+/* A request that was read and checked. */
+typedef struct wanted {
+  resource_kind kind;
+  char id[ORB_ID_SIZE];
+  orb_text canonical;
+  int64_t cost;
+} wanted;
+
+static int summary_of(server *srv, const char *mesh, orb_mesh_summary *out, orb_problem *problem) {
+  store_result result;
+  const cached *entry = find_description(srv, RESOURCE_MESH, mesh, &result);
+  if (!entry && result == STORE_NOT_FOUND) {
+    orb_refuse(problem, "not-found", "There is no mesh %s: upload it first.", mesh);
+    orb_json_member_string(&problem->facts, "mesh", mesh);
+    return 0;
+  }
+  int fine = entry && orb_mesh_summarise(entry->row.json, out);
+  cache_release(srv->descriptions, entry);
+  return fine || orb_refuse(problem, "internal", "The description of the mesh %s cannot be read.", mesh);
+}
+
+static int no_memory(orb_problem *problem) {
+  return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+}
+
+static int read_embedding(server *srv, const cJSON *body, wanted *out, orb_problem *problem) {
+  orb_embedding_request wish;
+  orb_mesh_summary mesh;
+  if (!orb_embedding_request_read(body, &wish, problem) || !summary_of(srv, wish.mesh, &mesh, problem)) {
+    return 0;
+  }
+  out->kind = RESOURCE_EMBEDDING;
+  out->cost = mesh.triangles;
+  orb_embedding_request_write(&wish, &out->canonical);
+  return (orb_embedding_request_id(&wish, out->id) && !out->canonical.failed) || no_memory(problem);
+}
+
+static int read_supermesh(server *srv, const cJSON *body, wanted *out, orb_problem *problem) {
+  orb_supermesh_request wish;
+  orb_mesh_summary meshes[ORB_SHAPES_MAX];
+  int fine = orb_supermesh_request_read(body, &wish, problem);
+  out->kind = RESOURCE_SUPERMESH;
+  for (int32_t s = 0; fine && s < wish.shape_count; s++) {
+    fine = summary_of(srv, wish.shapes[s].mesh, &meshes[s], problem);
+    out->cost += fine ? meshes[s].triangles : 0;
+  }
+  fine = fine && orb_supermesh_request_resolve(&wish, meshes, problem);
+  if (fine) {
+    orb_supermesh_request_write(&wish, &out->canonical);
+    fine = (orb_supermesh_request_id(&wish, out->id) && !out->canonical.failed) || no_memory(problem);
+  }
+  orb_supermesh_request_free(&wish);
+  return fine;
+}
+
+static int read_wish(request *r, wanted *out, orb_problem *problem) {
+  orb_json_error error;
+  cJSON *body = orb_json_parse(r->body.data ? r->body.data : "", r->body.size, &error);
+  if (!body) {
+    if (!error.why) {
+      return no_memory(problem);
+    }
+    orb_refuse(problem, "malformed-json", "The body is not valid JSON: %s (at byte %zu).", error.why, error.offset);
+    orb_json_member_integer(&problem->facts, "offset", (int64_t)error.offset);
+    return 0;
+  }
+  int fine = r->route->id == ROUTE_EMBEDDING_CREATE ? read_embedding(r->srv, body, out, problem)
+                                                    : read_supermesh(r->srv, body, out, problem);
+  cJSON_Delete(body);
+  return fine;
+}
+
+static void reply_accepted(request *r, job *j) {
+  orb_text json = {0};
+  char location[64];
+  queue_job_write(r->srv->q, j, &json);
+  snprintf(location, sizeof location, "/v1/jobs/%s", job_id(j));
+  reply_json(r, 202, &json);
+  reply_header(r, "Location", location);
+  reply_header(r, "Retry-After", "1");
+}
+
+static void submit(request *r, const wanted *wish) {
+  queue_request wanted_job = {.kind = wish->kind == RESOURCE_EMBEDDING ? ORB_JOB_EMBEDDING : ORB_JOB_SUPERMESH,
+                              .key = wish->id,
+                              .request = wish->canonical.data,
+                              .owner = "",
+                              .cost = wish->cost,
+                              .listed = 1};
+  job *j = NULL;
+  queue_result result = queue_submit(r->srv->q, &wanted_job, &j, NULL);
+  switch (result) {
+    case QUEUE_OK:
+      break;
+    case QUEUE_FULL:
+      reply_refuse(r, "queue-full", "There are too many unfinished jobs; try again when some have ended.");
+      break;
+    case QUEUE_STOPPING:
+      reply_refuse(r, "unavailable", "The service is stopping; try again soon.");
+      break;
+    default:
+      reply_store(r, result == QUEUE_STORE_FULL ? STORE_FULL : STORE_ERROR);
+  }
+  if (result != QUEUE_OK) {
+    queue_release(r->srv->q, j);
+    return;
+  }
+  if (r->wait_until > orb_clock_ms()) {
+    r->waits_for = j;
+    r->wait_for_result = 1;
+    r->phase = PHASE_WAIT;
+    return;
+  }
+  reply_accepted(r, j);
+  queue_release(r->srv->q, j);
+}
+
+static void create_away(request *r) {
+  wanted wish = {0};
+  orb_problem problem = {0};
+  store_result result;
+  if (!read_wish(r, &wish, &problem)) {
+    reply_problem(r, &problem);
+  } else {
+    const cached *known = find_description(r->srv, wish.kind, wish.id, &result);
+    if (known) {
+      reply_cached(r, 200, known);
+    } else if (result != STORE_NOT_FOUND) {
+      reply_store(r, result);
+    } else {
+      submit(r, &wish);
+    }
+  }
+  orb_text_free(&wish.canonical);
+}
+
+enum MHD_Result handle_create(request *r) {
+  int64_t wait = read_wait_ms(r);
+  if (wait < 0) {
+    return MHD_YES;
+  }
+  r->wait_until = wait ? orb_clock_ms() + wait : 0;
+  return request_go_away(r, r->srv->io, create_away);
+}

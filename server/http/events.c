@@ -1,0 +1,142 @@
+/* Server-sent events. A stream is a response that is read bit by bit: with nothing to send, its reader suspends the
+ * connection and lists it with the queue; each event of the job resumes it. A comment every 15 s finds out whether the
+ * client is still there. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "http/http.h"
+
+enum { PING_MS = 15000, BLOCK = 2048, ROWS = 64 };
+
+typedef struct stream {
+  waiter waiter;
+  server *srv;
+  struct MHD_Connection *connection;
+  job *of;
+  orb_text pending;
+  size_t sent;
+  int64_t after, last_ms;
+  int ended;
+} stream;
+
+static void suspend(waiter *w) {
+  MHD_suspend_connection(((stream *)(void *)w)->connection);
+}
+static void resume(waiter *w) {
+  MHD_resume_connection(((stream *)(void *)w)->connection);
+}
+
+/* Fills `pending`; 0 when there is nothing yet. */
+static int fill(stream *s) {
+  int ended;
+  s->pending.size = s->sent = 0;
+  s->after = queue_events_write(s->srv->q, s->of, s->after, &s->pending, &ended);
+  s->ended = ended;
+  if (s->pending.size == 0 && !ended && orb_clock_ms() - s->last_ms >= PING_MS - 500) {
+    orb_text_add(&s->pending, ": still there\n\n");
+  }
+  return s->pending.size > 0;
+}
+
+static ssize_t read_stream(void *user, uint64_t position, char *out, size_t room) {
+  stream *s = user;
+  (void)position;
+  while (s->sent == s->pending.size) {
+    if (s->ended || s->pending.failed || __atomic_load_n(&s->srv->stopping, __ATOMIC_ACQUIRE)) {
+      return MHD_CONTENT_READER_END_OF_STREAM;
+    }
+    if (fill(s)) {
+      break;
+    }
+    if (!s->ended) {
+      s->waiter.wake = resume;
+      s->waiter.events = 1;
+      s->waiter.deadline = s->last_ms + PING_MS;
+      if (queue_wait(s->srv->q, s->of, &s->waiter, s->after, suspend)) {
+        return 0;
+      }
+    }
+  }
+  size_t n = s->pending.size - s->sent < room ? s->pending.size - s->sent : room;
+  memcpy(out, s->pending.data + s->sent, n);
+  s->sent += n;
+  s->last_ms = orb_clock_ms();
+  return (ssize_t)n;
+}
+
+static void free_stream(void *user) {
+  stream *s = user;
+  queue_release(s->srv->q, s->of);
+  orb_text_free(&s->pending);
+  free(s);
+}
+
+static int64_t last_seen(const request *r) {
+  const char *text = header_of(r, "Last-Event-ID");
+  if (!text) {
+    text = query_of(r, "last_event_id");
+  }
+  long long number = text ? strtoll(text, NULL, 10) : 0;
+  return number > 0 ? number : 0;
+}
+
+static void add_headers(request *r) {
+  reply_header(r, "Content-Type", "text/event-stream");
+  reply_header(r, "Cache-Control", "no-store");
+  reply_header(r, "X-Accel-Buffering", "no");
+}
+
+/* A job that is not in memory has ended: all that is left of its events, at once. */
+static void ended_away(request *r) {
+  job_row row;
+  store_result result = catalogue_job_get(r->srv->cat, r->id, &row);
+  if (result != STORE_OK) {
+    reply_store(r, result);
+    return;
+  }
+  job_row_free(&row);
+  orb_text text = {0};
+  event_row events[ROWS];
+  int64_t after = last_seen(r);
+  for (int n = ROWS; n == ROWS;) {
+    n = catalogue_events(r->srv->cat, r->id, after, ROWS, events);
+    for (int i = 0; i < n; i++) {
+      event_write(&text, events[i].number, events[i].type, events[i].json);
+      after = events[i].number;
+      free(events[i].json);
+    }
+  }
+  if (text.size == 0 && !text.failed) {
+    reply_empty(r, 204); /* all was seen: tells an EventSource not to come again */
+    return;
+  }
+  reply_text(r, 200, "text/event-stream", &text);
+  reply_header(r, "Cache-Control", "no-store");
+}
+
+enum MHD_Result handle_job_events(request *r) {
+  job *j = queue_find(r->srv->q, r->id);
+  if (!j) {
+    return request_go_away(r, r->srv->io, ended_away);
+  }
+  stream *s = calloc(1, sizeof *s);
+  struct MHD_Response *response =
+      s ? MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, BLOCK, read_stream, s, free_stream) : NULL;
+  if (!response) {
+    free(s);
+    queue_release(r->srv->q, j);
+    return MHD_NO;
+  }
+  s->srv = r->srv;
+  s->connection = r->connection;
+  s->of = j;
+  s->after = last_seen(r);
+  s->last_ms = orb_clock_ms();
+  orb_text_add(&s->pending, "retry: 2000\n\n");
+  r->response = response;
+  r->status = 200;
+  r->phase = PHASE_SEND;
+  add_headers(r);
+  return MHD_YES;
+}

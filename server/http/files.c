@@ -1,0 +1,151 @@
+/* Objects as files: conditions, ranges, sendfile. Several ranges at once are answered with the whole file, as RFC 9110
+ * section 14.2 allows. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "http/http.h"
+
+/* −1: outside the file; 0: not a range to be used; 1: [*first, *first + *length). */
+static int read_range(const char *text, uint64_t size, uint64_t *first, uint64_t *length) {
+  if (!text || strncmp(text, "bytes=", 6) != 0) {
+    return 0;
+  }
+  text += 6;
+  size_t digits = strspn(text, "0123456789"), after;
+  if (digits > 18 || text[digits] != '-') {
+    return 0;
+  }
+  const char *second = text + digits + 1;
+  after = strspn(second, "0123456789");
+  if (after > 18 || second[after] != 0 || (digits == 0 && after == 0)) {
+    return 0;
+  }
+  uint64_t a = strtoull(text, NULL, 10), b = after ? strtoull(second, NULL, 10) : UINT64_MAX;
+  if (digits == 0) { /* the last b bytes */
+    if (b == 0 || size == 0) {
+      return -1;
+    }
+    *length = b < size ? b : size;
+    *first = size - *length;
+    return 1;
+  }
+  if (b < a) {
+    return 0;
+  }
+  if (a >= size) {
+    return -1;
+  }
+  *first = a;
+  *length = (b < size - 1 ? b : size - 1) - a + 1;
+  return 1;
+}
+
+static void add_headers(request *r, const char *etag, const char *mime, const char *name) {
+  char disposition[160];
+  reply_header(r, "ETag", etag);
+  reply_header(r, "Cache-Control", "public, max-age=31536000, immutable");
+  reply_header(r, "Accept-Ranges", "bytes");
+  if (r->status != 304) {
+    reply_header(r, "Content-Type", mime);
+    snprintf(disposition, sizeof disposition, "inline; filename=\"%s\"", name);
+    reply_header(r, "Content-Disposition", disposition);
+  }
+}
+
+void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name) {
+  char etag[40], content_range[80];
+  int fd;
+  uint64_t size, first = 0, length;
+  snprintf(etag, sizeof etag, "\"%.32s\"", sha);
+  const char *none_match = header_of(r, "If-None-Match"), *match = header_of(r, "If-Match");
+  if (match && !etag_matches(match, etag)) {
+    reply_empty(r, 412);
+    return;
+  }
+  if (none_match && etag_matches(none_match, etag)) {
+    reply_empty(r, 304);
+    add_headers(r, etag, mime, name);
+    return;
+  }
+  store_result found = objects_read(r->srv->store, kind, id, &fd, &size);
+  if (found != STORE_OK) {
+    reply_store(r, found);
+    return;
+  }
+  length = size;
+  const char *if_range = header_of(r, "If-Range");
+  int usable = !r->head && (!if_range || strcmp(if_range, etag) == 0);
+  int ranged = usable ? read_range(header_of(r, "Range"), size, &first, &length) : 0;
+  if (ranged < 0) {
+    close(fd);
+    reply_refuse(r, "range-not-satisfiable", "The file has %llu bytes.", (unsigned long long)size);
+    snprintf(content_range, sizeof content_range, "bytes */%llu", (unsigned long long)size);
+    reply_header(r, "Content-Range", content_range);
+    return;
+  }
+  struct MHD_Response *response = MHD_create_response_from_fd_at_offset64(length, fd, first);
+  if (!response) {
+    close(fd);
+  }
+  r->response = response;
+  r->status = ranged ? 206 : 200;
+  r->phase = PHASE_SEND;
+  if (ranged) {
+    snprintf(content_range, sizeof content_range, "bytes %llu-%llu/%llu", (unsigned long long)first,
+             (unsigned long long)(first + length - 1), (unsigned long long)size);
+    reply_header(r, "Content-Range", content_range);
+  }
+  add_headers(r, etag, mime, name);
+}
+
+static void file_of(request *r, const cached *entry) {
+  char name[100], format[8] = "bin";
+  switch (r->route->id) {
+    case ROUTE_MESH_FILE: {
+      const char *at = strstr(entry->row.json, "\"format\":\"");
+      if (at) {
+        sscanf(at, "\"format\":\"%7[a-z]", format);
+      }
+      snprintf(name, sizeof name, "%.16s.%s", r->id, format);
+      reply_object(r, OBJECT_MESH, r->id, r->id,
+                   strcmp(format, "glb") == 0 ? "model/gltf-binary" : "application/octet-stream", name);
+      break;
+    }
+    case ROUTE_EMBEDDING_SPHERE:
+      reply_object(r, OBJECT_SPHERE, r->id, entry->row.sha, "application/octet-stream", "sphere.ply");
+      break;
+    case ROUTE_SUPERMESH_PLACES:
+      reply_object(r, OBJECT_PLACES, r->id, r->id, "application/octet-stream", "places.bin");
+      break;
+    default:
+      reply_object(r, OBJECT_ASSET, r->id, entry->row.sha, "model/gltf-binary", "asset.glb");
+  }
+  cache_release(r->srv->descriptions, entry);
+}
+
+static resource_kind kind_of(const request *r) {
+  return r->route->id == ROUTE_MESH_FILE          ? RESOURCE_MESH
+         : r->route->id == ROUTE_EMBEDDING_SPHERE ? RESOURCE_EMBEDDING
+                                                  : RESOURCE_SUPERMESH;
+}
+
+static void file_away(request *r) {
+  store_result result;
+  const cached *entry = find_description(r->srv, kind_of(r), r->id, &result);
+  if (entry) {
+    file_of(r, entry);
+  } else {
+    reply_store(r, result);
+  }
+}
+
+enum MHD_Result handle_file(request *r) {
+  const cached *entry = cache_find(r->srv->descriptions, kind_of(r), r->id);
+  if (!entry) {
+    return request_go_away(r, r->srv->io, file_away);
+  }
+  file_of(r, entry);
+  return MHD_YES;
+}

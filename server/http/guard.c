@@ -1,0 +1,88 @@
+/* Forms of requests that two readers could understand in different ways are refused before anything is done. */
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "http/http.h"
+
+typedef struct seen {
+  int hosts, lengths, encodings, bad_name, bad_length, bad_encoding;
+  const char *length;
+} seen;
+
+static enum MHD_Result look(void *user, enum MHD_ValueKind kind, const char *name, const char *value) {
+  seen *s = user;
+  (void)kind;
+  for (const unsigned char *c = (const unsigned char *)name; *c; c++) {
+    s->bad_name |= *c <= ' ' || *c == 0x7f;
+  }
+  if (strcasecmp(name, "Host") == 0) {
+    s->hosts++;
+  } else if (strcasecmp(name, "Content-Length") == 0) {
+    s->lengths++;
+    s->length = value;
+    s->bad_length |= !value || !*value || value[strspn(value, "0123456789")] != 0 || strlen(value) > 18;
+  } else if (strcasecmp(name, "Transfer-Encoding") == 0) {
+    s->encodings++;
+    s->bad_encoding |= !value || strcasecmp(value, "chunked") != 0;
+  }
+  return MHD_YES;
+}
+
+static int bad(orb_problem *problem, const char *why) {
+  return orb_refuse(problem, "bad-request", "%s", why);
+}
+
+static int check_length(request *r, const seen *s, orb_problem *problem) {
+  const config *options = r->srv->options;
+  route_body kind = r->route ? r->route->body : ROUTE_NO_BODY;
+  int64_t length = s->lengths ? strtoll(s->length, NULL, 10) : 0;
+  if (kind == ROUTE_NO_BODY) {
+    return r->has_body && r->route ? bad(problem, "This route takes no body.") : 1;
+  }
+  if (!s->lengths && !s->encodings) {
+    return orb_refuse(problem, "length-required", "Send a Content-Length, or the body in chunks.");
+  }
+  int64_t most = kind == ROUTE_JSON_BODY ? options->max_json : options->max_body;
+  if (length > most) {
+    orb_refuse(problem, "too-large", "The body has %lld bytes; at most %lld are taken here.", (long long)length,
+               (long long)most);
+    orb_json_member_integer(&problem->facts, "limit", most);
+    return 0;
+  }
+  const char *coding = header_of(r, "Content-Encoding");
+  if (coding && strcasecmp(coding, "identity") != 0) {
+    return orb_refuse(problem, "unsupported-encoding", "Send the body without a content encoding.");
+  }
+  return 1;
+}
+
+int guard_headers(request *r, const char *version, orb_problem *problem) {
+  seen s = {0};
+  MHD_get_connection_values(r->connection, MHD_HEADER_KIND, look, &s);
+  r->has_body = s.encodings || (s.lengths && !s.bad_length && strtoll(s.length, NULL, 10) > 0);
+  if (s.bad_name) {
+    return bad(problem, "A header's name holds a space or control character.");
+  }
+  if (s.hosts > 1 || (s.hosts == 0 && strcmp(version, "HTTP/1.0") != 0)) {
+    return bad(problem, "A request needs exactly one Host header.");
+  }
+  if (s.bad_length || s.lengths > 1) {
+    r->has_body = 1;
+    return bad(problem, "Content-Length must be given once, in digits.");
+  }
+  if (s.bad_encoding || s.encodings > 1) {
+    return bad(problem, "Transfer-Encoding must be chunked, given once.");
+  }
+  if (s.lengths && s.encodings) {
+    return bad(problem, "Content-Length and Transfer-Encoding exclude each other.");
+  }
+  return check_length(r, &s, problem);
+}
+
+const char *header_of(const request *r, const char *name) {
+  return MHD_lookup_connection_value(r->connection, MHD_HEADER_KIND, name);
+}
+const char *query_of(const request *r, const char *name) {
+  return MHD_lookup_connection_value(r->connection, MHD_GET_ARGUMENT_KIND, name);
+}

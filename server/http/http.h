@@ -1,0 +1,120 @@
+/* Serving requests over libmicrohttpd: the request, its phases, and what handlers share.
+ *
+ * Contract. A handler runs on a thread that serves many connections, so it only parses, looks into memory, and makes
+ * a response. What needs a query, a commit, a file to be checked, or a hash over much goes away: the connection is
+ * suspended, a task runs on another thread, makes the response, and resumes the connection; then the handler is called
+ * again and sends it. Waiting for a job is the same with the queue in place of the task. A request belongs to exactly
+ * one thread at any time, which is why it needs no lock: handler → task or queue → handler.
+ */
+#ifndef ORB_HTTP_H
+#define ORB_HTTP_H
+
+#include <microhttpd.h>
+#include <pthread.h>
+
+#include "api/problem.h"
+#include "api/routes.h"
+#include "cache.h"
+#include "config.h"
+#include "queue/queue.h"
+#include "tasks.h"
+
+typedef struct server {
+  const config *options;
+  catalogue *cat;
+  objects *store;
+  queue *q;
+  cache *descriptions;
+  tasks *io, *checks;
+  pthread_mutex_t mesh_lock; /* so that a mesh's file and row come and go together; never taken by a handler */
+  struct MHD_Daemon *daemon;
+  int ready, stopping; /* written under __atomic */
+  int64_t started;
+} server;
+
+typedef enum request_phase { PHASE_BODY, PHASE_AWAY, PHASE_WAIT, PHASE_SEND } request_phase;
+
+typedef struct request request;
+struct request {
+  task away_task; /* first: a task is the request */
+  void (*away)(request *r);
+  server *srv;
+  struct MHD_Connection *connection;
+  const route *route;
+  const char *method;
+  char id[ORB_ID_SIZE];
+  char number[24]; /* of the request, for the log and X-Request-Id */
+  int has_body, head;
+  request_phase phase;
+  int64_t began; /* µs */
+
+  orb_text body; /* JSON */
+  int64_t received;
+  object_temp temp; /* upload */
+  orb_hash hash;
+  orb_problem upload_problem;
+
+  waiter waiter;
+  job *waits_for;
+  int64_t wait_until;
+  int wait_for_result; /* the answer is the result where there is one in time */
+  int cancels;
+
+  unsigned status;
+  struct MHD_Response *response;
+};
+
+/* server.c */
+int http_start(server *srv);
+void http_stop(server *srv);
+uint16_t http_port(const server *srv);
+/* Suspends and runs fn on a thread of the pool; fn must leave a response or PHASE_WAIT. */
+enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r));
+
+/* guard.c: 1, or 0 with the problem. */
+int guard_headers(request *r, const char *version, orb_problem *problem);
+const char *header_of(const request *r, const char *name);
+const char *query_of(const request *r, const char *name);
+
+/* reply.c: each leaves a response. */
+void reply_json(request *r, unsigned status, orb_text *json); /* takes json */
+void reply_problem(request *r, orb_problem *problem);         /* frees problem */
+void reply_refuse(request *r, const char *name, const char *format, ...) ORB_PRINTF(3, 4);
+void reply_store(request *r, store_result result);
+void reply_empty(request *r, unsigned status);
+void reply_bytes(request *r, unsigned status, const char *mime, const void *bytes, size_t size); /* static bytes */
+void reply_text(request *r, unsigned status, const char *mime, orb_text *text);                  /* takes text */
+/* The description, with ETag and 304; takes the reference. */
+void reply_cached(request *r, unsigned status, const cached *entry);
+void reply_header(request *r, const char *name, const char *value);
+enum MHD_Result reply_send(request *r);
+int etag_matches(const char *list, const char *etag);
+/* files.c: an object with ranges and conditions. */
+void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name);
+
+/* Handlers; called when the whole body is there. */
+void handle_mesh_begin(request *r); /* before the first byte of an upload */
+void handle_mesh_bytes(request *r, const char *bytes, size_t size);
+enum MHD_Result handle_mesh_upload(request *r);
+enum MHD_Result handle_list(request *r);
+enum MHD_Result handle_get(request *r);
+enum MHD_Result handle_delete(request *r);
+enum MHD_Result handle_file(request *r);
+enum MHD_Result handle_create(request *r);
+enum MHD_Result handle_job_list(request *r);
+enum MHD_Result handle_job_get(request *r);
+enum MHD_Result handle_job_cancel(request *r);
+enum MHD_Result handle_job_events(request *r);
+enum MHD_Result handle_system(request *r);
+/* In PHASE_WAIT: waits on, or leaves the response. */
+enum MHD_Result handle_wait(request *r);
+
+/* Reads limit and page_token. 1, or 0 with a response. */
+int read_page(request *r, int *limit, int64_t *before);
+/* Seconds to wait by ?wait= or Prefer: wait=, clamped to 60; 0: not. −1: bad, with a response. */
+int64_t read_wait_ms(request *r);
+/* From the cache or the catalogue; blocks. NULL with *result. */
+const cached *find_description(server *srv, resource_kind kind, const char *id, store_result *result);
+int64_t clock_us(void);
+
+#endif

@@ -1,0 +1,250 @@
+/* Jobs: their state, waiting for their end, cancelling. */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/socket.h>
+
+#include "http/http.h"
+
+enum { WAIT_MOST_MS = 60000, LOOK_MS = 15000, CANCEL_WAIT_MS = 2000 };
+
+/* "wait=N" in a Prefer header, among other preferences. */
+static const char *prefer_wait(const char *prefer) {
+  for (const char *at = prefer; at && *at; at += strcspn(at, ",;"), at += *at != 0) {
+    at += strspn(at, " \t");
+    if (strncasecmp(at, "wait=", 5) == 0) {
+      return at + 5;
+    }
+  }
+  return NULL;
+}
+
+int64_t read_wait_ms(request *r) {
+  const char *text = query_of(r, "wait"), *prefer = prefer_wait(header_of(r, "Prefer"));
+  char *end;
+  if (text) {
+    double seconds = strtod(text, &end);
+    if (end == text || *end || !(seconds >= 0)) {
+      reply_refuse(r, "bad-query", "\"wait\" must be a number of seconds; more than 60 count as 60.");
+      return -1;
+    }
+    return seconds < 60 ? (int64_t)(1000 * seconds) : WAIT_MOST_MS;
+  }
+  if (prefer) { /* a preference that is not understood is ignored */
+    double seconds = strtod(prefer, &end);
+    return end != prefer && seconds > 0 ? (seconds < 60 ? (int64_t)(1000 * seconds) : WAIT_MOST_MS) : 0;
+  }
+  return 0;
+}
+
+static void reply_job(request *r, job *j) {
+  orb_text json = {0};
+  orb_job_state state = queue_job_write(r->srv->q, j, &json);
+  reply_json(r, 200, &json);
+  if (!orb_job_ended(state)) {
+    reply_header(r, "Retry-After", "1");
+  }
+}
+
+static void suspend(waiter *w) {
+  request *r = (request *)(void *)((char *)w - offsetof(request, waiter));
+  MHD_suspend_connection(r->connection);
+}
+static void resume(waiter *w) {
+  request *r = (request *)(void *)((char *)w - offsetof(request, waiter));
+  MHD_resume_connection(r->connection);
+}
+
+static int peer_is_gone(const request *r) {
+  const union MHD_ConnectionInfo *info = MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+  char byte;
+  if (!info) {
+    return 0;
+  }
+  ssize_t n = recv(info->connect_fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+  return n == 0 || (n < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR);
+}
+
+static void result_away(request *r) {
+  store_result result;
+  job *j = r->waits_for;
+  resource_kind kind = job_kind(j) == ORB_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
+  const cached *entry = find_description(r->srv, kind, job_key(j), &result);
+  if (entry) {
+    reply_cached(r, 200, entry);
+  } else {
+    reply_store(r, result);
+  }
+}
+
+static enum MHD_Result waited_enough(request *r) {
+  job *j = r->waits_for;
+  if (!r->wait_for_result) {
+    reply_job(r, j);
+    return MHD_YES;
+  }
+  orb_text json = {0};
+  if (queue_job_write(r->srv->q, j, &json) == ORB_JOB_SUCCEEDED) {
+    orb_text_free(&json);
+    return request_go_away(r, r->srv->io, result_away);
+  }
+  char location[64];
+  snprintf(location, sizeof location, "/v1/jobs/%s", job_id(j));
+  reply_json(r, 202, &json);
+  reply_header(r, "Location", location);
+  reply_header(r, "Retry-After", "1");
+  return MHD_YES;
+}
+
+enum MHD_Result handle_wait(request *r) {
+  int64_t now = orb_clock_ms();
+  if (now < r->wait_until) {
+    if (peer_is_gone(r)) {
+      return MHD_NO;
+    }
+    r->waiter.wake = resume;
+    r->waiter.events = 0;
+    r->waiter.deadline = r->wait_until < now + LOOK_MS ? r->wait_until : now + LOOK_MS;
+    if (queue_wait(r->srv->q, r->waits_for, &r->waiter, 0, suspend)) {
+      return MHD_YES;
+    }
+  }
+  return waited_enough(r);
+}
+
+static void write_row(const job_row *row, orb_text *out) {
+  orb_job_view view = {.id = row->id,
+                       .key = row->key,
+                       .stage = NULL,
+                       .problem = row->problem,
+                       .kind = row->kind,
+                       .state = row->state,
+                       .progress = row->state == ORB_JOB_SUCCEEDED ? 1 : 0,
+                       .attempt = row->attempt,
+                       .created = row->created,
+                       .started = row->started,
+                       .finished = row->finished};
+  orb_job_write(&view, out);
+}
+
+static void get_away(request *r) {
+  job_row row;
+  store_result result = catalogue_job_get(r->srv->cat, r->id, &row);
+  if (result != STORE_OK) {
+    reply_store(r, result);
+    return;
+  }
+  orb_text json = {0};
+  write_row(&row, &json);
+  job_row_free(&row);
+  reply_json(r, 200, &json);
+}
+
+enum MHD_Result handle_job_get(request *r) {
+  int64_t wait = read_wait_ms(r);
+  if (wait < 0) {
+    return MHD_YES;
+  }
+  job *j = queue_find(r->srv->q, r->id);
+  if (!j) {
+    return request_go_away(r, r->srv->io, get_away);
+  }
+  if (wait == 0) {
+    reply_job(r, j);
+    queue_release(r->srv->q, j);
+    return MHD_YES;
+  }
+  r->waits_for = j;
+  r->wait_until = orb_clock_ms() + wait;
+  r->phase = PHASE_WAIT;
+  return handle_wait(r);
+}
+
+static void cancel_away(request *r) {
+  server *srv = r->srv;
+  job *j = queue_find(srv->q, r->id);
+  if (!j) { /* not in memory: it ended long ago, or never was */
+    job_row row;
+    store_result result = catalogue_job_get(srv->cat, r->id, &row);
+    if (result != STORE_OK) {
+      reply_store(r, result);
+      return;
+    }
+    orb_job_state state = row.state;
+    job_row_free(&row);
+    reply_refuse(r, "job-ended", "The job is %s already; there is nothing to cancel.", orb_job_state_name(state));
+    return;
+  }
+  orb_text json = {0};
+  orb_job_state state = queue_job_write(srv->q, j, &json);
+  orb_text_free(&json);
+  if (state == ORB_JOB_SUCCEEDED || state == ORB_JOB_FAILED) {
+    reply_refuse(r, "job-ended", "The job has %s already; there is nothing to cancel.", orb_job_state_name(state));
+    queue_release(srv->q, j);
+    return;
+  }
+  store_result result = queue_cancel(srv->q, j);
+  if (result != STORE_OK) {
+    reply_store(r, result);
+    queue_release(srv->q, j);
+    return;
+  }
+  r->waits_for = j;
+  r->wait_until = orb_clock_ms() + CANCEL_WAIT_MS;
+  r->phase = PHASE_WAIT;
+}
+
+enum MHD_Result handle_job_cancel(request *r) {
+  return request_go_away(r, r->srv->io, cancel_away);
+}
+
+static void list_away(request *r) {
+  int limit, state = -1;
+  int64_t before;
+  const char *state_text = query_of(r, "state");
+  if (!read_page(r, &limit, &before)) {
+    return;
+  }
+  if (state_text && (state = orb_job_state_of_name(state_text)) < 0) {
+    reply_refuse(r, "bad-query", "\"state\" must be queued, running, succeeded, failed or cancelled.");
+    return;
+  }
+  job_row *rows = calloc((size_t)limit + 1, sizeof *rows);
+  if (!rows) {
+    reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
+    return;
+  }
+  int count = catalogue_job_list(r->srv->cat, state, before, limit + 1, rows);
+  orb_text json = {0};
+  orb_json_open(&json, '{');
+  orb_json_key(&json, "jobs");
+  orb_json_open(&json, '[');
+  for (int i = 0; i < count && i < limit; i++) {
+    job *live = orb_job_ended(rows[i].state) ? NULL : queue_find(r->srv->q, rows[i].id);
+    if (live) {
+      queue_job_write(r->srv->q, live, &json);
+      queue_release(r->srv->q, live);
+    } else {
+      write_row(&rows[i], &json);
+    }
+  }
+  orb_json_close(&json, ']');
+  orb_json_key(&json, "next_page_token");
+  if (count > limit) {
+    orb_text_printf(&json, "\"%llx\"", (unsigned long long)rows[limit - 1].seq);
+  } else {
+    orb_json_null(&json);
+  }
+  orb_json_close(&json, '}');
+  for (int i = 0; i < count; i++) {
+    job_row_free(&rows[i]);
+  }
+  free(rows);
+  reply_json(r, 200, &json);
+}
+
+enum MHD_Result handle_job_list(request *r) {
+  return request_go_away(r, r->srv->io, list_away);
+}

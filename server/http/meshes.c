@@ -1,0 +1,191 @@
+/* Uploads: the body streams into a temporary file and a hash; then, on a thread for checks, the mesh is read, repaired
+ * and, where it can be embedded, stored. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <time.h>
+
+#include "api/json.h"
+#include "api/mesh_codec.h"
+#include "http/http.h"
+#include "metrics.h"
+
+void handle_mesh_begin(request *r) {
+  server *srv = r->srv;
+  const char *length = header_of(r, "Content-Length");
+  uint64_t expected = length ? strtoull(length, NULL, 10) : 0;
+  if (expected + (uint64_t)srv->options->disk_reserve > objects_free_bytes(srv->store)) {
+    reply_refuse(r, "storage-full", "The disk of the server has no room for this file.");
+    return;
+  }
+  store_result begun = objects_begin(srv->store, &r->temp);
+  if (begun != STORE_OK) {
+    reply_store(r, begun);
+    return;
+  }
+  orb_hash_begin(&r->hash);
+}
+
+void handle_mesh_bytes(request *r, const char *bytes, size_t size) {
+  const config *options = r->srv->options;
+  r->received += (int64_t)size;
+  if (r->upload_problem.name || r->temp.fd < 0) {
+    return;
+  }
+  if (r->received > options->max_body) {
+    orb_refuse(&r->upload_problem, "too-large", "The body has more than %lld bytes.", (long long)options->max_body);
+    objects_abandon(&r->temp);
+    return;
+  }
+  store_result stored = objects_append(&r->temp, bytes, size);
+  if (stored != STORE_OK) {
+    orb_refuse(&r->upload_problem, stored == STORE_FULL ? "storage-full" : "internal",
+               "The upload could not be written to the server's disk.");
+    objects_abandon(&r->temp);
+    return;
+  }
+  orb_hash_add(&r->hash, bytes, size);
+}
+
+/* What the query says. */
+typedef struct upload_query {
+  char name[ORB_NAME_MAX], repair[ORB_REPAIR_TEXT];
+  unsigned flags;
+  orb_format hint;
+} upload_query;
+
+static int read_query(const request *r, upload_query *out, orb_problem *problem) {
+  const char *name = query_of(r, "name"), *repair = query_of(r, "repair"), *format = query_of(r, "format");
+  memset(out, 0, sizeof *out);
+  if (name && (!*name || strlen(name) >= sizeof out->name || !orb_utf8_valid(name, strlen(name)))) {
+    return orb_refuse(problem, "bad-query", "\"name\" must be UTF-8 of 1 to 127 bytes.");
+  }
+  snprintf(out->name, sizeof out->name, "%s", name ? name : "mesh");
+  for (const unsigned char *c = (const unsigned char *)out->name; *c; c++) {
+    if (*c < 0x20 || *c == 0x7f) {
+      return orb_refuse(problem, "bad-query", "\"name\" must not hold control characters.");
+    }
+  }
+  if (format) {
+    out->hint = orb_format_of_name(format);
+    if (out->hint == ORB_FORMAT_AUTO) {
+      return orb_refuse(problem, "bad-query", "\"format\" must be obj, off, ply, stl, gltf or glb, or left out.");
+    }
+  }
+  return orb_repair_parse(repair ? repair : "safe", &out->flags, out->repair, problem);
+}
+
+/* The upload's bytes in memory; unmapped by the caller. */
+static const unsigned char *map_upload(const request *r) {
+  if (r->received == 0) {
+    return (const unsigned char *)"";
+  }
+  void *at = mmap(NULL, (size_t)r->received, PROT_READ, MAP_PRIVATE, r->temp.fd, 0);
+  return at == MAP_FAILED ? NULL : at;
+}
+
+static void unmap_upload(const request *r, const unsigned char *bytes) {
+  if (bytes && r->received > 0) {
+    munmap((void *)(uintptr_t)bytes, (size_t)r->received);
+  }
+}
+
+/* Reads and repairs; on success the description is in *json. */
+static int check_mesh(request *r, const upload_query *query, const unsigned char *bytes, orb_format format,
+                      const char *id, int64_t created, orb_text *json, orb_problem *problem) {
+  const config *options = r->srv->options;
+  orb_context_options limits = {.memory_limit = (size_t)options->job_memory,
+                                .threads = 1,
+                                .deadline_ms = orb_clock_ms() + 1000 * options->job_seconds,
+                                .max_triangles = options->max_triangles};
+  orb_context *ctx = NULL;
+  orb_mesh mesh;
+  orb_mesh_facts facts = {
+      .id = id, .name = query->name, .repair = query->repair, .bytes = r->received, .created = created, .mesh = &mesh};
+  memset(&mesh, 0, sizeof mesh);
+  if (orb_context_create(&limits, &ctx) != ORB_OK) {
+    return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  }
+  orb_format found = format;
+  int fine = orb_mesh_read(ctx, bytes, (size_t)r->received, format, &mesh, &found) == ORB_OK &&
+             orb_mesh_repair(ctx, &mesh, query->flags) == ORB_OK &&
+             orb_mesh_topology(ctx, &mesh, &facts.topology) == ORB_OK;
+  if (fine) {
+    orb_mesh_extent(&mesh, &facts.extent);
+    facts.format = orb_format_name(found);
+    orb_mesh_write(&facts, json);
+    fine = !json->failed || orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  } else {
+    orb_problem_of_error(orb_context_error(ctx), problem);
+  }
+  orb_mesh_free(ctx, &mesh);
+  orb_context_destroy(ctx);
+  return fine;
+}
+
+static void store_mesh(request *r, const upload_query *query, const unsigned char *bytes, orb_format format,
+                       const char *id) {
+  server *srv = r->srv;
+  orb_text json = {0};
+  orb_problem problem = {0};
+  resource row = {.kind = RESOURCE_MESH, .bytes = r->received, .created = (int64_t)time(NULL) * 1000};
+  if (!check_mesh(r, query, bytes, format, id, row.created, &json, &problem)) {
+    orb_text_free(&json);
+    reply_problem(r, &problem);
+    return;
+  }
+  memcpy(row.id, id, sizeof row.id);
+  orb_hash_end(&r->hash, row.sha);
+  row.json = json.data;
+  pthread_mutex_lock(&srv->mesh_lock);
+  store_result stored = objects_publish(srv->store, &r->temp, OBJECT_MESH, id);
+  if (stored == STORE_OK) {
+    stored = catalogue_put(srv->cat, &row);
+  }
+  pthread_mutex_unlock(&srv->mesh_lock);
+  resource_free(&row);
+  /* Of two that sent the same at once, both get the row that was first. */
+  const cached *entry = stored == STORE_OK ? find_description(srv, RESOURCE_MESH, id, &stored) : NULL;
+  if (entry) {
+    reply_cached(r, 201, entry);
+  } else {
+    reply_store(r, stored);
+  }
+}
+
+static void upload_away(request *r) {
+  upload_query query;
+  orb_problem problem = {0};
+  char id[ORB_ID_SIZE];
+  if (!read_query(r, &query, &problem)) {
+    reply_problem(r, &problem);
+    return;
+  }
+  const unsigned char *bytes = map_upload(r);
+  if (!bytes) {
+    reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
+    return;
+  }
+  orb_format found = orb_format_detect(bytes, (size_t)r->received);
+  int forced = found == ORB_FORMAT_AUTO && query.hint != ORB_FORMAT_AUTO;
+  orb_mesh_id(&r->hash, query.repair, forced ? orb_format_name(query.hint) : NULL, id);
+  store_result result;
+  const cached *known = find_description(r->srv, RESOURCE_MESH, id, &result);
+  if (known) {
+    reply_cached(r, 200, known);
+  } else {
+    store_mesh(r, &query, bytes, forced ? query.hint : found, id);
+  }
+  unmap_upload(r, bytes);
+  objects_abandon(&r->temp);
+}
+
+enum MHD_Result handle_mesh_upload(request *r) {
+  metrics_bytes(r->received, 0);
+  if (r->upload_problem.name) {
+    reply_problem(r, &r->upload_problem);
+    return MHD_YES;
+  }
+  return request_go_away(r, r->srv->checks, upload_away);
+}

@@ -1,0 +1,178 @@
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "http/http.h"
+#include "log.h"
+#include "metrics.h"
+
+static void take(request *r, unsigned status, struct MHD_Response *response) {
+  if (r->response) {
+    MHD_destroy_response(r->response);
+  }
+  r->response = response;
+  r->status = status;
+  r->phase = PHASE_SEND;
+}
+
+void reply_header(request *r, const char *name, const char *value) {
+  if (r->response) {
+    MHD_add_response_header(r->response, name, value);
+  }
+}
+
+void reply_text(request *r, unsigned status, const char *mime, orb_text *text) {
+  struct MHD_Response *response = NULL;
+  if (!text->failed) {
+    response = text->data ? MHD_create_response_from_buffer(text->size, text->data, MHD_RESPMEM_MUST_FREE)
+                          : MHD_create_response_from_buffer(0, (void *)(uintptr_t) "", MHD_RESPMEM_PERSISTENT);
+  }
+  if (response) {
+    *text = (orb_text){0};
+  } else {
+    orb_text_free(text);
+  }
+  take(r, status, response);
+  reply_header(r, "Content-Type", mime);
+}
+
+void reply_json(request *r, unsigned status, orb_text *json) {
+  reply_text(r, status, "application/json", json);
+  reply_header(r, "Cache-Control", "no-store");
+}
+
+void reply_problem(request *r, orb_problem *problem) {
+  orb_text text = {0};
+  orb_problem_write(problem, &text);
+  unsigned status = (unsigned)orb_problem_status(problem->name);
+  reply_text(r, status, "application/problem+json", &text);
+  reply_header(r, "Cache-Control", "no-store");
+  if (status == 429 || status == 503) {
+    reply_header(r, "Retry-After", "2");
+  }
+  if (status == 401) {
+    reply_header(r, "WWW-Authenticate", "Bearer");
+  }
+  orb_problem_free(problem);
+}
+
+void reply_refuse(request *r, const char *name, const char *format, ...) {
+  char detail[512];
+  orb_problem problem = {0};
+  va_list args;
+  va_start(args, format);
+  vsnprintf(detail, sizeof detail, format, args);
+  va_end(args);
+  orb_refuse(&problem, name, "%s", detail);
+  reply_problem(r, &problem);
+}
+
+void reply_store(request *r, store_result result) {
+  if (result == STORE_NOT_FOUND) {
+    reply_refuse(r, "not-found", "There is nothing with this id; it may have been deleted.");
+  } else if (result == STORE_FULL) {
+    reply_refuse(r, "storage-full", "The disk of the server is full; nothing was stored. Make room and try again.");
+  } else {
+    reply_refuse(r, "internal", "The store could not be read or written; the log of the server says why.");
+  }
+}
+
+void reply_empty(request *r, unsigned status) {
+  take(r, status, MHD_create_response_from_buffer(0, (void *)(uintptr_t) "", MHD_RESPMEM_PERSISTENT));
+}
+
+void reply_bytes(request *r, unsigned status, const char *mime, const void *bytes, size_t size) {
+  take(r, status, MHD_create_response_from_buffer(size, (void *)(uintptr_t)bytes, MHD_RESPMEM_PERSISTENT));
+  reply_header(r, "Content-Type", mime);
+}
+
+int etag_matches(const char *list, const char *etag) {
+  for (const char *at = list; at && *at;) {
+    at += strspn(at, " \t,");
+    if (*at == '*') {
+      return 1;
+    }
+    if (strncmp(at, "W/", 2) == 0) {
+      at += 2;
+    }
+    size_t n = strcspn(at, ",");
+    while (n && (at[n - 1] == ' ' || at[n - 1] == '\t')) {
+      n--;
+    }
+    if (n == strlen(etag) && strncmp(at, etag, n) == 0) {
+      return 1;
+    }
+    at += strcspn(at, ",");
+  }
+  return 0;
+}
+
+typedef struct held {
+  cache *from;
+  const cached *entry;
+} held;
+
+void reply_cached(request *r, unsigned status, const cached *entry) {
+  static const char *const paths[RESOURCE_KINDS] = {"meshes", "embeddings", "supermeshes"};
+  char location[128];
+  const char *none_match = header_of(r, "If-None-Match");
+  snprintf(location, sizeof location, "/v1/%s/%s", paths[entry->row.kind], entry->row.id);
+  if (none_match && r->route->method[0] == 'G' && etag_matches(none_match, entry->etag)) {
+    reply_empty(r, 304);
+  } else {
+    take(r, status, MHD_create_response_from_buffer(entry->json_size, entry->row.json, MHD_RESPMEM_MUST_COPY));
+    reply_header(r, "Content-Type", "application/json");
+  }
+  reply_header(r, "ETag", entry->etag);
+  reply_header(r, "Cache-Control", "no-cache");
+  if (r->route->method[0] == 'P') {
+    reply_header(r, "Location", location);
+    reply_header(r, "Content-Location", location);
+  }
+  cache_release(r->srv->descriptions, entry);
+}
+
+/* Whether the browser's origin may call. */
+static void add_cors(request *r) {
+  const char *allowed = r->srv->options->cors, *origin = header_of(r, "Origin");
+  if (!allowed[0] || !origin) {
+    return;
+  }
+  int any = strcmp(allowed, "*") == 0, found = any;
+  size_t n = strlen(origin);
+  for (const char *at = allowed; *at && !found;) {
+    size_t length = strcspn(at, ",");
+    found = length == n && strncmp(at, origin, n) == 0;
+    at += length + (at[length] == ',');
+  }
+  if (!found) {
+    return;
+  }
+  reply_header(r, "Access-Control-Allow-Origin", any ? "*" : origin);
+  reply_header(r, "Vary", "Origin");
+  reply_header(r, "Access-Control-Expose-Headers",
+               "Location, Content-Location, Retry-After, ETag, Content-Range, X-Request-Id, RateLimit");
+  if (strcmp(r->method, "OPTIONS") == 0) {
+    reply_header(r, "Access-Control-Allow-Methods", "GET, HEAD, POST, DELETE");
+    reply_header(r, "Access-Control-Allow-Headers",
+                 "Authorization, Content-Type, Prefer, If-None-Match, Range, Last-Event-ID, traceparent");
+    reply_header(r, "Access-Control-Max-Age", "600");
+  }
+}
+
+enum MHD_Result reply_send(request *r) {
+  if (!r->response) {
+    return MHD_NO; /* no memory even for an answer: the connection closes */
+  }
+  if (r->status >= 400 && r->has_body) {
+    reply_header(r, "Connection", "close");
+  }
+  reply_header(r, "X-Content-Type-Options", "nosniff");
+  reply_header(r, "X-Request-Id", r->number);
+  add_cors(r);
+  enum MHD_Result result = MHD_queue_response(r->connection, r->status, r->response);
+  MHD_destroy_response(r->response);
+  r->response = NULL;
+  return result;
+}

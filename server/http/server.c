@@ -1,0 +1,299 @@
+/* The life of a request, and of the daemon that serves them. */
+#include <arpa/inet.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "http/http.h"
+#include "log.h"
+#include "metrics.h"
+
+enum { CONNECTION_MEMORY = 16 * 1024, SLOW_US = 1000000 };
+
+int is_page(const char *path);
+void handle_page(request *r, const char *path);
+
+int64_t clock_us(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+static void run_away(task *t) {
+  request *r = (request *)(void *)t;
+  r->away(r);
+  if (r->phase == PHASE_AWAY) {
+    r->phase = PHASE_SEND; /* no response could be made: the connection closes */
+  }
+  MHD_resume_connection(r->connection);
+}
+
+enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r)) {
+  r->away = fn;
+  r->away_task.run = run_away;
+  r->phase = PHASE_AWAY;
+  MHD_suspend_connection(r->connection);
+  tasks_add(pool, &r->away_task);
+  return MHD_YES;
+}
+
+static enum MHD_Result dispatch(request *r) {
+  switch (r->route->id) {
+    case ROUTE_MESH_UPLOAD:
+      return handle_mesh_upload(r);
+    case ROUTE_MESH_LIST:
+    case ROUTE_EMBEDDING_LIST:
+    case ROUTE_SUPERMESH_LIST:
+      return handle_list(r);
+    case ROUTE_MESH_GET:
+    case ROUTE_EMBEDDING_GET:
+    case ROUTE_SUPERMESH_GET:
+      return handle_get(r);
+    case ROUTE_MESH_DELETE:
+    case ROUTE_EMBEDDING_DELETE:
+    case ROUTE_SUPERMESH_DELETE:
+      return handle_delete(r);
+    case ROUTE_MESH_FILE:
+    case ROUTE_EMBEDDING_SPHERE:
+    case ROUTE_SUPERMESH_ASSET:
+    case ROUTE_SUPERMESH_PLACES:
+      return handle_file(r);
+    case ROUTE_EMBEDDING_CREATE:
+    case ROUTE_SUPERMESH_CREATE:
+      return handle_create(r);
+    case ROUTE_JOB_LIST:
+      return handle_job_list(r);
+    case ROUTE_JOB_GET:
+      return handle_job_get(r);
+    case ROUTE_JOB_CANCEL:
+      return handle_job_cancel(r);
+    case ROUTE_JOB_EVENTS:
+      return handle_job_events(r);
+    default:
+      return handle_system(r);
+  }
+}
+
+/* No route: a page, OPTIONS, 405 or 404. */
+static void answer_unrouted(request *r, const char *path, const char *allow) {
+  char methods[80];
+  snprintf(methods, sizeof methods, "%s, OPTIONS", allow[0] ? allow : "GET, HEAD");
+  int page = !allow[0] && is_page(path), get = strcmp(r->method, "GET") == 0 || r->head;
+  if (page && get) {
+    handle_page(r, path);
+  } else if (!allow[0] && !page) {
+    reply_refuse(r, "not-found", "There is nothing at this path; /openapi.json lists what there is.");
+  } else if (strcmp(r->method, "OPTIONS") == 0) {
+    reply_empty(r, 204);
+    reply_header(r, "Allow", methods);
+  } else {
+    reply_refuse(r, "method-not-allowed", "This path answers to: %s.", methods);
+    reply_header(r, "Allow", methods);
+  }
+}
+
+static request *request_create(server *srv, struct MHD_Connection *connection, const char *method) {
+  static unsigned long long numbers;
+  request *r = calloc(1, sizeof *r);
+  if (r) {
+    r->srv = srv;
+    r->connection = connection;
+    r->method = method;
+    r->head = strcmp(method, "HEAD") == 0;
+    r->temp.fd = -1;
+    r->began = clock_us();
+    snprintf(r->number, sizeof r->number, "%llx-%llx", (unsigned long long)srv->started & 0xffffff,
+             __atomic_add_fetch(&numbers, 1, __ATOMIC_RELAXED));
+  }
+  return r;
+}
+
+/* The first call of a request: everything that the headers decide. Leaves a response where the answer is clear. */
+static void request_begin(request *r, const char *path, const char *version) {
+  char allow[64];
+  orb_problem problem = {0};
+  r->route = route_find(r->method, path, r->id, allow);
+  if (!guard_headers(r, version, &problem)) {
+    reply_problem(r, &problem);
+  } else if (!r->route) {
+    answer_unrouted(r, path, allow);
+  } else if (r->route->id == ROUTE_MESH_UPLOAD) {
+    handle_mesh_begin(r);
+  }
+}
+
+static void take_bytes(request *r, const char *bytes, size_t size) {
+  if (r->response) {
+    return; /* refused already; the rest is dropped */
+  }
+  if (r->route->body == ROUTE_MESH_BODY) {
+    handle_mesh_bytes(r, bytes, size);
+  } else if (r->body.size + size > (size_t)r->srv->options->max_json) {
+    reply_refuse(r, "too-large", "A JSON body has at most %lld bytes.", (long long)r->srv->options->max_json);
+  } else {
+    orb_text_append(&r->body, bytes, size);
+  }
+}
+
+static enum MHD_Result answer(void *user, struct MHD_Connection *connection, const char *url, const char *method,
+                              const char *version, const char *upload, size_t *upload_size, void **state) {
+  request *r = *state;
+  if (!r) {
+    r = *state = request_create(user, connection, method);
+    if (!r) {
+      return MHD_NO;
+    }
+    request_begin(r, url, version);
+    return r->phase == PHASE_SEND && r->has_body ? reply_send(r) : MHD_YES;
+  }
+  if (*upload_size) {
+    take_bytes(r, upload, *upload_size);
+    *upload_size = 0;
+    return MHD_YES;
+  }
+  enum MHD_Result result = MHD_YES;
+  if (r->phase == PHASE_BODY) {
+    result = dispatch(r);
+  } else if (r->phase == PHASE_WAIT) {
+    result = handle_wait(r);
+  }
+  return result == MHD_YES && r->phase == PHASE_SEND ? reply_send(r) : result;
+}
+
+static void completed(void *user, struct MHD_Connection *connection, void **state,
+                      enum MHD_RequestTerminationCode code) {
+  request *r = *state;
+  (void)user;
+  (void)connection;
+  (void)code;
+  if (!r) {
+    return;
+  }
+  int64_t took = clock_us() - r->began;
+  int waited = r->waits_for != NULL || (r->route && r->route->id == ROUTE_JOB_EVENTS);
+  metrics_request((int)r->status, waited ? 0 : 1e-6 * (double)took);
+  if (took > SLOW_US && !waited) {
+    char fields[200];
+    snprintf(fields, sizeof fields, "\"request\":\"%s\",\"route\":\"%s\",\"status\":%u,\"ms\":%lld", r->number,
+             r->route ? r->route->path : "", r->status, (long long)(took / 1000));
+    log_write(LOG_WARN, fields, "slow request");
+  }
+  queue_release(r->srv->q, r->waits_for);
+  objects_abandon(&r->temp);
+  orb_problem_free(&r->upload_problem);
+  orb_text_free(&r->body);
+  if (r->response) {
+    MHD_destroy_response(r->response);
+  }
+  free(r);
+  *state = NULL;
+}
+
+static void on_connection(void *user, struct MHD_Connection *connection, void **state,
+                          enum MHD_ConnectionNotificationCode code) {
+  (void)user;
+  (void)connection;
+  (void)state;
+  metrics_connection(code == MHD_CONNECTION_NOTIFY_STARTED ? 1 : -1);
+}
+
+static void on_mhd_log(void *user, const char *format, va_list args) {
+  char text[512];
+  (void)user;
+  vsnprintf(text, sizeof text, format, args);
+  text[strcspn(text, "\n")] = 0;
+  log_write(LOG_DEBUG, NULL, "http: %s", text);
+}
+
+/* A listening socket for ADDR:PORT or unix:PATH, or the one that systemd passed; −1 with the reason logged. */
+static int listen_on(const char *where) {
+  const char *count = getenv("LISTEN_FDS"), *pid = getenv("LISTEN_PID");
+  if (count && pid && atoi(count) == 1 && atol(pid) == (long)getpid()) {
+    return 3;
+  }
+  int fd = -1;
+  if (strncmp(where, "unix:", 5) == 0) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    if (strlen(where + 5) >= sizeof address.sun_path) {
+      return -1;
+    }
+    strcpy(address.sun_path, where + 5);
+    unlink(address.sun_path);
+    fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (fd >= 0 && (bind(fd, (struct sockaddr *)&address, sizeof address) != 0 || listen(fd, SOMAXCONN) != 0)) {
+      close(fd);
+      fd = -1;
+    }
+    return fd;
+  }
+  char host[200];
+  const char *colon = strrchr(where, ':');
+  if (!colon || (size_t)(colon - where) >= sizeof host) {
+    return -1;
+  }
+  const char *begin = where[0] == '[' ? where + 1 : where;
+  snprintf(host, sizeof host, "%.*s", (int)(colon - begin - (where[0] == '[')), begin);
+  struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *found = NULL;
+  if (getaddrinfo(host[0] ? host : NULL, colon + 1, &hints, &found) != 0) {
+    return -1;
+  }
+  fd = socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &(int){1}, sizeof(int));
+  if (fd >= 0 && (bind(fd, found->ai_addr, found->ai_addrlen) != 0 || listen(fd, SOMAXCONN) != 0)) {
+    close(fd);
+    fd = -1;
+  }
+  freeaddrinfo(found);
+  return fd;
+}
+
+int http_start(server *srv) {
+  const config *o = srv->options;
+  int fd = listen_on(o->listen);
+  if (fd < 0) {
+    log_error("cannot listen on %s", o->listen);
+    return 0;
+  }
+  unsigned flags =
+      MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ITC | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG | MHD_USE_TURBO;
+  struct MHD_OptionItem options[] = {{MHD_OPTION_THREAD_POOL_SIZE, (intptr_t)o->http_threads, NULL},
+                                     {MHD_OPTION_LISTEN_SOCKET, fd, NULL},
+                                     {MHD_OPTION_CONNECTION_MEMORY_LIMIT, CONNECTION_MEMORY, NULL},
+                                     {MHD_OPTION_CONNECTION_LIMIT, (intptr_t)o->max_connections, NULL},
+                                     {MHD_OPTION_CONNECTION_TIMEOUT, (intptr_t)o->idle_seconds, NULL},
+                                     {MHD_OPTION_PER_IP_CONNECTION_LIMIT, (intptr_t)o->connections_per_address, NULL},
+                                     {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)completed, srv},
+                                     {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, srv},
+                                     {MHD_OPTION_END, 0, NULL}};
+  srv->daemon = MHD_start_daemon(flags, 0, NULL, NULL, answer, srv, MHD_OPTION_EXTERNAL_LOGGER, on_mhd_log, NULL,
+                                 MHD_OPTION_ARRAY, options, MHD_OPTION_END);
+  if (!srv->daemon) {
+    close(fd);
+    log_error("the HTTP service cannot be started on %s", o->listen);
+  }
+  return srv->daemon != NULL;
+}
+
+uint16_t http_port(const server *srv) {
+  const union MHD_DaemonInfo *info = MHD_get_daemon_info(srv->daemon, MHD_DAEMON_INFO_LISTEN_FD);
+  struct sockaddr_storage address;
+  socklen_t size = sizeof address;
+  if (!info || getsockname(info->listen_fd, (struct sockaddr *)&address, &size) != 0) {
+    return 0;
+  }
+  return ntohs(address.ss_family == AF_INET6 ? ((struct sockaddr_in6 *)(void *)&address)->sin6_port
+                                             : ((struct sockaddr_in *)(void *)&address)->sin_port);
+}
+
+void http_stop(server *srv) {
+  if (srv->daemon) {
+    MHD_stop_daemon(srv->daemon);
+    srv->daemon = NULL;
+  }
+}

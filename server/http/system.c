@@ -1,0 +1,127 @@
+/* Health, metrics, the API's document, and the pages. */
+#include <stdio.h>
+#include <string.h>
+
+#include "http/http.h"
+#include "metrics.h"
+#include "pages.h"
+#include "studio/studio.h"
+
+static void gauge(orb_text *out, const char *name, double value) {
+  orb_text_printf(out, "# TYPE %s gauge\n%s %.17g\n", name, name, value);
+}
+
+static void metrics_away(request *r) {
+  server *srv = r->srv;
+  orb_text text = {0};
+  queue_numbers n;
+  queue_count(srv->q, &n);
+  metrics_write(&text);
+  orb_text_add(&text, "# TYPE orbmorph_jobs gauge\n");
+  orb_text_printf(&text, "orbmorph_jobs{state=\"queued\"} %d\norbmorph_jobs{state=\"waiting\"} %d\n", n.queued,
+                  n.waiting);
+  orb_text_printf(&text, "orbmorph_jobs{state=\"running\"} %d\n", n.running);
+  orb_text_add(&text, "# TYPE orbmorph_jobs_ended_total counter\n");
+  for (int s = ORB_JOB_SUCCEEDED; s <= ORB_JOB_CANCELLED; s++) {
+    orb_text_printf(&text, "orbmorph_jobs_ended_total{state=\"%s\"} %lld\n", orb_job_state_name((orb_job_state)s),
+                    (long long)n.ended[s]);
+  }
+  gauge(&text, "orbmorph_queue_oldest_seconds", 1e-3 * (double)n.oldest_ms);
+  gauge(&text, "orbmorph_waiting_connections", n.waiters);
+  gauge(&text, "orbmorph_stored_bytes", (double)catalogue_bytes(srv->cat, 0));
+  gauge(&text, "orbmorph_disk_free_bytes", (double)objects_free_bytes(srv->store));
+  long pages = 0;
+  FILE *statm = fopen("/proc/self/statm", "r");
+  if (statm) {
+    if (fscanf(statm, "%*d %ld", &pages) != 1) {
+      pages = 0;
+    }
+    fclose(statm);
+  }
+  gauge(&text, "process_resident_memory_bytes", 4096.0 * (double)pages);
+  reply_text(r, 200, "text/plain; version=0.0.4; charset=utf-8", &text);
+}
+
+static enum MHD_Result ready(request *r) {
+  server *srv = r->srv;
+  int up = __atomic_load_n(&srv->ready, __ATOMIC_ACQUIRE) && !__atomic_load_n(&srv->stopping, __ATOMIC_ACQUIRE);
+  if (!up) {
+    reply_refuse(r, "unavailable", "The service is starting or stopping.");
+    return MHD_YES;
+  }
+  queue_numbers n;
+  queue_count(srv->q, &n);
+  orb_text json = {0};
+  orb_json_open(&json, '{');
+  orb_json_member_string(&json, "status", "ready");
+  if (query_of(r, "verbose")) {
+    orb_json_member_integer(&json, "queued", n.queued);
+    orb_json_member_integer(&json, "running", n.running);
+    orb_json_member_integer(&json, "workers", srv->options->workers);
+    orb_json_member_integer(&json, "connections", metrics_connections());
+    orb_json_member_string(&json, "engine", ORB_ENGINE);
+  }
+  orb_json_close(&json, '}');
+  reply_json(r, 200, &json);
+  return MHD_YES;
+}
+
+static const page *find_page(const char *path) {
+  for (const page *p = pages; p->path; p++) {
+    if (strcmp(p->path, path) == 0) {
+      return p;
+    }
+  }
+  return NULL;
+}
+
+int is_page(const char *path) {
+  return orb_studio_find(path) || find_page(path);
+}
+
+void handle_page(request *r, const char *path) {
+  const orb_studio_file *file = orb_studio_find(path);
+  const page *own = file ? NULL : find_page(path);
+  const char *none_match = header_of(r, "If-None-Match");
+  if (file && none_match && etag_matches(none_match, file->etag)) {
+    reply_empty(r, 304);
+  } else if (file) {
+    reply_bytes(r, 200, file->type, file->data, file->size);
+  } else if (own) {
+    reply_bytes(r, 200, own->mime, own->bytes, own->size);
+  } else {
+    reply_refuse(r, "not-found", "There is nothing at this path; /openapi.json lists what there is.");
+    return;
+  }
+  if (file) {
+    reply_header(r, "ETag", file->etag);
+  }
+  reply_header(r, "Content-Security-Policy", ORB_STUDIO_CSP);
+  reply_header(r, "Cache-Control", file ? file->cache_control : "no-cache");
+}
+
+enum MHD_Result handle_system(request *r) {
+  switch (r->route->id) {
+    case ROUTE_LIVEZ: {
+      orb_text json = {0};
+      orb_json_open(&json, '{');
+      orb_json_member_string(&json, "status", "alive");
+      orb_json_close(&json, '}');
+      reply_json(r, 200, &json);
+      return MHD_YES;
+    }
+    case ROUTE_READYZ:
+      return ready(r);
+    case ROUTE_METRICS:
+      return request_go_away(r, r->srv->io, metrics_away);
+    case ROUTE_OPENAPI:
+      handle_page(r, "/openapi.json");
+      return MHD_YES;
+    case ROUTE_DOCS:
+      handle_page(r, "/docs");
+      return MHD_YES;
+    default:
+      handle_page(r, "/");
+      return MHD_YES;
+  }
+}

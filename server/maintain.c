@@ -1,0 +1,129 @@
+#include "maintain.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "store/catalogue.h"
+
+enum { PAGE = 64 };
+
+typedef struct tally {
+  catalogue *cat;
+  objects *store;
+  long objects, rows, wrong, orphans;
+  int remove_orphans;
+} tally;
+
+static const object_kind object_of[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET};
+static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh"};
+
+static void verify(tally *t, const resource *row) {
+  unsigned char *bytes = NULL;
+  size_t size = 0;
+  char sha[ORB_ID_SIZE] = "";
+  t->rows++;
+  if (objects_load(t->store, object_of[row->kind], row->id, &bytes, &size) != STORE_OK) {
+    printf("%s %s: its object cannot be read\n", names[row->kind], row->id);
+    t->wrong++;
+    return;
+  }
+  orb_id_of_text((const char *)bytes, size, sha);
+  if (strcmp(sha, row->sha) != 0) {
+    printf("%s %s: its object has %zu bytes that do not match their hash\n", names[row->kind], row->id, size);
+    t->wrong++;
+  }
+  free(bytes);
+}
+
+static void each_row(tally *t, resource_kind kind) {
+  resource rows[PAGE];
+  int64_t before = 0;
+  for (int n = PAGE; n == PAGE;) {
+    n = catalogue_list(t->cat, kind, before, PAGE, rows);
+    for (int i = 0; i < n; i++) {
+      before = rows[i].seq;
+      verify(t, &rows[i]);
+      resource_free(&rows[i]);
+    }
+  }
+}
+
+/* An object without a row is no harm: a crash between publishing and commit leaves one. */
+static void each_object(void *user, object_kind kind, const char *id, uint64_t size) {
+  tally *t = user;
+  resource row = {0};
+  resource_kind owner = kind == OBJECT_MESH     ? RESOURCE_MESH
+                        : kind == OBJECT_SPHERE ? RESOURCE_EMBEDDING
+                                                : RESOURCE_SUPERMESH;
+  t->objects++;
+  if (catalogue_get(t->cat, owner, id, &row) == STORE_NOT_FOUND) {
+    t->orphans++;
+    if (t->remove_orphans && objects_delete(t->store, kind, id) == STORE_OK) {
+      printf("removed an object of %llu bytes without a row: %s\n", (unsigned long long)size, id);
+    }
+  }
+  resource_free(&row);
+}
+
+static int open_both(const config *options, tally *t) {
+  return objects_open(options->data, &t->store) == STORE_OK && catalogue_open(options->data, &t->cat) == STORE_OK;
+}
+
+static void close_both(tally *t) {
+  catalogue_close(t->cat);
+  objects_close(t->store);
+}
+
+int maintain_check(const config *options) {
+  tally t = {0};
+  if (!open_both(options, &t)) {
+    close_both(&t);
+    return 1;
+  }
+  if (!catalogue_integrity(t.cat)) {
+    puts("the catalogue fails SQLite's integrity check");
+    t.wrong++;
+  }
+  for (int kind = 0; kind < RESOURCE_KINDS; kind++) {
+    each_row(&t, (resource_kind)kind);
+  }
+  objects_each(t.store, each_object, &t);
+  printf("%ld rows and %ld objects checked: %ld wrong, %ld objects without a row (harmless; --gc removes them)\n",
+         t.rows, t.objects, t.wrong, t.orphans);
+  close_both(&t);
+  return t.wrong != 0;
+}
+
+static void evict(tally *t, int64_t budget) {
+  resource rows[PAGE];
+  int64_t total = catalogue_bytes(t->cat, 1);
+  while (total > budget) {
+    int n = catalogue_oldest(t->cat, PAGE, rows), gone = 0;
+    for (int i = 0; i < n; i++) {
+      if (total > budget && catalogue_delete(t->cat, rows[i].kind, rows[i].id) == STORE_OK &&
+          objects_delete(t->store, object_of[rows[i].kind], rows[i].id) == STORE_OK) {
+        printf("evicted %s %s, %lld bytes\n", names[rows[i].kind], rows[i].id, (long long)rows[i].bytes);
+        total -= rows[i].bytes;
+        gone++;
+      }
+      resource_free(&rows[i]);
+    }
+    if (gone == 0) {
+      return;
+    }
+  }
+}
+
+int maintain_gc(const config *options) {
+  tally t = {.remove_orphans = 1};
+  int fine = open_both(options, &t);
+  if (fine) {
+    objects_each(t.store, each_object, &t);
+    if (options->derived_bytes > 0) {
+      evict(&t, options->derived_bytes);
+    }
+  }
+  close_both(&t);
+  return fine ? 0 : 1;
+}

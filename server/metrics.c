@@ -1,0 +1,89 @@
+#include "metrics.h"
+
+#include <stdatomic.h>
+#include <stdio.h>
+
+enum { BOUNDS = 9 };
+static const double bounds[BOUNDS] = {0.005, 0.02, 0.1, 0.5, 1, 5, 20, 60, 300};
+
+typedef struct histogram {
+  atomic_llong counts[BOUNDS + 1], micros;
+} histogram;
+
+static histogram jobs[2], requests;
+static atomic_llong job_failed[2], cache[2], flips, statuses[6], received_bytes, sent_bytes, connections;
+
+static void observe(histogram *h, double seconds) {
+  int i = 0;
+  while (i < BOUNDS && seconds > bounds[i]) {
+    i++;
+  }
+  atomic_fetch_add(&h->counts[i], 1);
+  atomic_fetch_add(&h->micros, (long long)(seconds * 1e6));
+}
+
+void metrics_job(int embedding, int succeeded, double seconds) {
+  observe(&jobs[embedding ? 0 : 1], seconds);
+  if (!succeeded) {
+    atomic_fetch_add(&job_failed[embedding ? 0 : 1], 1);
+  }
+}
+void metrics_cache(int hit) {
+  atomic_fetch_add(&cache[hit ? 1 : 0], 1);
+}
+void metrics_flips(int64_t n) {
+  atomic_fetch_add(&flips, n);
+}
+void metrics_request(int status, double seconds) {
+  atomic_fetch_add(&statuses[status / 100 < 6 ? status / 100 : 0], 1);
+  observe(&requests, seconds);
+}
+void metrics_bytes(int64_t received, int64_t sent) {
+  atomic_fetch_add(&received_bytes, received);
+  atomic_fetch_add(&sent_bytes, sent);
+}
+void metrics_connection(int change) {
+  atomic_fetch_add(&connections, change);
+}
+int64_t metrics_connections(void) {
+  return atomic_load(&connections);
+}
+
+static void write_histogram(orb_text *out, const char *name, const char *label, histogram *h) {
+  long long sum = 0;
+  const char *comma = label[0] ? "," : "";
+  for (int i = 0; i <= BOUNDS; i++) {
+    sum += atomic_load(&h->counts[i]);
+    if (i < BOUNDS) {
+      orb_text_printf(out, "%s_bucket{%s%sle=\"%g\"} %lld\n", name, label, comma, bounds[i], sum);
+    }
+  }
+  orb_text_printf(out, "%s_bucket{%s%sle=\"+Inf\"} %lld\n", name, label, comma, sum);
+  orb_text_printf(out, "%s_sum%s%s%s %.6f\n", name, label[0] ? "{" : "", label, label[0] ? "}" : "",
+                  1e-6 * (double)atomic_load(&h->micros));
+  orb_text_printf(out, "%s_count%s%s%s %lld\n", name, label[0] ? "{" : "", label, label[0] ? "}" : "", sum);
+}
+
+void metrics_write(orb_text *out) {
+  orb_text_add(out, "# TYPE orbmorph_job_seconds histogram\n");
+  write_histogram(out, "orbmorph_job_seconds", "kind=\"embedding\"", &jobs[0]);
+  write_histogram(out, "orbmorph_job_seconds", "kind=\"supermesh\"", &jobs[1]);
+  orb_text_add(out, "# TYPE orbmorph_job_failures_total counter\n");
+  orb_text_printf(out, "orbmorph_job_failures_total{kind=\"embedding\"} %lld\n", atomic_load(&job_failed[0]));
+  orb_text_printf(out, "orbmorph_job_failures_total{kind=\"supermesh\"} %lld\n", atomic_load(&job_failed[1]));
+  orb_text_add(out, "# TYPE orbmorph_http_request_seconds histogram\n");
+  write_histogram(out, "orbmorph_http_request_seconds", "", &requests);
+  orb_text_add(out, "# TYPE orbmorph_http_responses_total counter\n");
+  for (int i = 1; i < 6; i++) {
+    orb_text_printf(out, "orbmorph_http_responses_total{class=\"%dxx\"} %lld\n", i, atomic_load(&statuses[i]));
+  }
+  orb_text_printf(out,
+                  "# TYPE orbmorph_cache_hits_total counter\norbmorph_cache_hits_total %lld\n"
+                  "# TYPE orbmorph_cache_misses_total counter\norbmorph_cache_misses_total %lld\n"
+                  "# TYPE orbmorph_flips_total counter\norbmorph_flips_total %lld\n"
+                  "# TYPE orbmorph_received_bytes_total counter\norbmorph_received_bytes_total %lld\n"
+                  "# TYPE orbmorph_sent_bytes_total counter\norbmorph_sent_bytes_total %lld\n"
+                  "# TYPE orbmorph_connections gauge\norbmorph_connections %lld\n",
+                  atomic_load(&cache[1]), atomic_load(&cache[0]), atomic_load(&flips), atomic_load(&received_bytes),
+                  atomic_load(&sent_bytes), atomic_load(&connections));
+}

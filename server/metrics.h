@@ -1,0 +1,19 @@
+/* Counters for /metrics; any thread. */
+#ifndef ORB_METRICS_H
+#define ORB_METRICS_H
+
+#include <stdint.h>
+
+#include "api/text.h"
+
+void metrics_job(int embedding, int succeeded, double seconds);
+void metrics_cache(int hit);
+void metrics_flips(int64_t flips);
+void metrics_request(int status, double seconds);
+void metrics_bytes(int64_t received, int64_t sent);
+void metrics_connection(int change);
+int64_t metrics_connections(void);
+/* Appends them as Prometheus text. */
+void metrics_write(orb_text *out);
+
+#endif

@@ -1,0 +1,15 @@
+/* The API's document and its reader, compiled in by server/pages.cmake. */
+#ifndef ORB_PAGES_H
+#define ORB_PAGES_H
+
+#include <stddef.h>
+
+typedef struct page {
+  const char *path, *mime;
+  const unsigned char *bytes;
+  size_t size;
+} page;
+
+extern const page pages[]; /* ends with a NULL path */
+
+#endif

@@ -1,0 +1,206 @@
+/* Events of jobs, and the connections that wait for them. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "queue/internal.h"
+
+static void unlist(queue *q, waiter *w) {
+  *(w->previous ? &w->previous->next : &w->of->waiters) = w->next;
+  if (w->next) {
+    w->next->previous = w->previous;
+  }
+  *(w->all_previous ? &w->all_previous->all_next : &q->waiters) = w->all_next;
+  if (w->all_next) {
+    w->all_next->all_previous = w->all_previous;
+  }
+  w->of = NULL;
+  q->waiter_count--;
+}
+
+static void wake(queue *q, waiter *w) {
+  unlist(q, w);
+  w->wake(w);
+}
+
+void wake_job(queue *q, job *j, int ended) {
+  for (waiter *w = j->waiters, *next; w; w = next) {
+    next = w->next;
+    if (ended || w->events) {
+      wake(q, w);
+    }
+  }
+}
+
+void queue_wake_all(queue *q) {
+  pthread_mutex_lock(&q->lock);
+  q->waking = 1;
+  while (q->waiters) {
+    wake(q, q->waiters);
+  }
+  pthread_mutex_unlock(&q->lock);
+}
+
+int queue_wait(queue *q, job *j, waiter *w, int64_t after, void (*suspend)(waiter *)) {
+  pthread_mutex_lock(&q->lock);
+  int ready = orb_job_ended(j->row.state) || q->waking || (w->events && j->last_event > after);
+  if (!ready) {
+    suspend(w);
+    w->of = j;
+    w->previous = NULL;
+    w->next = j->waiters;
+    if (w->next) {
+      w->next->previous = w;
+    }
+    j->waiters = w;
+    w->all_previous = NULL;
+    w->all_next = q->waiters;
+    if (w->all_next) {
+      w->all_next->all_previous = w;
+    }
+    q->waiters = w;
+    q->waiter_count++;
+  }
+  pthread_mutex_unlock(&q->lock);
+  return !ready;
+}
+
+void *timer_main(void *argument) {
+  queue *q = argument;
+  pthread_mutex_lock(&q->lock);
+  while (!q->timer_stop) {
+    struct timespec until;
+    clock_gettime(CLOCK_REALTIME, &until);
+    until.tv_nsec += 100000000;
+    if (until.tv_nsec >= 1000000000) {
+      until.tv_nsec -= 1000000000;
+      until.tv_sec++;
+    }
+    pthread_cond_timedwait(&q->timer_wake, &q->lock, &until);
+    int64_t now = orb_clock_ms();
+    for (waiter *w = q->waiters, *next; w; w = next) {
+      next = w->all_next;
+      if (w->deadline <= now) {
+        wake(q, w);
+      }
+    }
+    pthread_cond_broadcast(&q->work); /* jobs that were put off may be due */
+  }
+  pthread_mutex_unlock(&q->lock);
+  return NULL;
+}
+
+int64_t prepare_event(job *j, orb_text *json) {
+  orb_job_view view;
+  job_view(j, &view);
+  orb_job_write(&view, json);
+  int64_t least = (int64_t)j->row.attempt * EVENT_STRIDE;
+  return (j->last_event > least ? j->last_event : least) + 1;
+}
+
+void keep_event(job *j, int64_t number, const char *type, const char *json) {
+  char *copy = strdup(json);
+  if (!copy) {
+    return;
+  }
+  if (j->event_count == EVENTS_KEPT) {
+    free(j->events[0].json);
+    memmove(j->events, j->events + 1, (EVENTS_KEPT - 1) * sizeof *j->events);
+    j->event_count--;
+  }
+  job_event *event = &j->events[j->event_count++];
+  event->number = number;
+  event->json = copy;
+  strncpy(event->type, type, sizeof event->type - 1);
+  event->type[sizeof event->type - 1] = 0;
+  j->last_event = number;
+}
+
+void add_event(queue *q, job *j, const char *type, int store) {
+  orb_text json = {0};
+  int64_t number = prepare_event(j, &json);
+  if (!json.failed) {
+    keep_event(j, number, type, json.data);
+    if (store) {
+      catalogue_event(q->cat, j->row.id, number, type, json.data);
+    }
+  }
+  j->last_event_ms = orb_clock_ms();
+  orb_text_free(&json);
+  wake_job(q, j, 0);
+}
+
+void event_write(orb_text *out, int64_t number, const char *type, const char *json) {
+  orb_text_printf(out, "id: %lld\nevent: %s\ndata: ", (long long)number, type);
+  orb_text_add(out, json);
+  orb_text_add(out, "\n\n");
+}
+
+int64_t queue_events_write(queue *q, job *j, int64_t after, orb_text *out, int *ended) {
+  pthread_mutex_lock(&q->lock);
+  *ended = orb_job_ended(j->row.state);
+  for (int i = 0; i < j->event_count; i++) {
+    if (j->events[i].number > after) {
+      event_write(out, j->events[i].number, j->events[i].type, j->events[i].json);
+      after = j->events[i].number;
+    }
+  }
+  pthread_mutex_unlock(&q->lock);
+  return after;
+}
+
+/* A job that waits shows the progress of what it waits for, as the first part of its own. */
+static void show_to_dependents(queue *q, const job *of, const char *stage, double fraction) {
+  for (job *j = q->first; j; j = j->next) {
+    for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
+      if (strcmp(j->dependencies[d], of->row.key) == 0) {
+        j->row.state = ORB_JOB_RUNNING;
+        if (!j->row.started) {
+          j->row.started = unix_ms();
+        }
+        double base = (double)(j->dependency_count - j->waits_for);
+        double shown = 0.6 * (base + fraction) / (double)j->dependency_count;
+        int stage_changed = strcmp(j->stage, stage) != 0;
+        j->progress = shown > j->progress ? shown : j->progress;
+        strncpy(j->stage, stage, sizeof j->stage - 1);
+        if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
+          add_event(q, j, "progress", stage_changed);
+        }
+      }
+    }
+  }
+}
+
+/* Where each stage lies in the progress of its kind of job. */
+static double overall(const job *j, const char *stage, double fraction) {
+  static const struct {
+    orb_job_kind kind;
+    const char *stage;
+    double from, to;
+  } spans[] = {{ORB_JOB_EMBEDDING, "read", 0, 0.05},      {ORB_JOB_EMBEDDING, "check", 0.05, 0.1},
+               {ORB_JOB_EMBEDDING, "simplify", 0.1, 0.3}, {ORB_JOB_EMBEDDING, "embed", 0.3, 0.9},
+               {ORB_JOB_EMBEDDING, "certify", 0.9, 0.97}, {ORB_JOB_EMBEDDING, "store", 0.97, 1},
+               {ORB_JOB_SUPERMESH, "read", 0.6, 0.62},    {ORB_JOB_SUPERMESH, "align", 0.62, 0.75},
+               {ORB_JOB_SUPERMESH, "remesh", 0.75, 0.9},  {ORB_JOB_SUPERMESH, "transfer", 0.9, 0.94},
+               {ORB_JOB_SUPERMESH, "write", 0.94, 0.98},  {ORB_JOB_SUPERMESH, "store", 0.98, 1}};
+  for (size_t i = 0; i < sizeof spans / sizeof spans[0]; i++) {
+    if (spans[i].kind == j->row.kind && strcmp(spans[i].stage, stage) == 0) {
+      return spans[i].from + fraction * (spans[i].to - spans[i].from);
+    }
+  }
+  return j->progress;
+}
+
+void queue_progress(queue *q, job *j, const char *stage, double fraction) {
+  pthread_mutex_lock(&q->lock);
+  double shown = overall(j, stage, fraction);
+  int stage_changed = strncmp(j->stage, stage, sizeof j->stage - 1) != 0;
+  j->progress = shown > j->progress ? shown : j->progress; /* never backwards */
+  strncpy(j->stage, stage, sizeof j->stage - 1);
+  if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
+    add_event(q, j, "progress", stage_changed);
+    if (j->row.kind == ORB_JOB_EMBEDDING) {
+      show_to_dependents(q, j, j->stage, j->progress);
+    }
+  }
+  pthread_mutex_unlock(&q->lock);
+}

@@ -1,0 +1,82 @@
+/* The inside of the queue, shared by its files. Everything is guarded by queue.lock unless said. */
+#ifndef ORB_QUEUE_INTERNAL_H
+#define ORB_QUEUE_INTERNAL_H
+
+#include <pthread.h>
+
+#include "queue/queue.h"
+
+enum { BUCKETS = 8192, KEEP_ENDED = 2048, EVENTS_KEPT = 64, OWNERS = 64, DEPENDENCIES = 16 };
+static const int64_t LARGE = 300000;          /* triangles from which a job is large */
+static const int64_t BYTES_A_TRIANGLE = 1024; /* estimate of a running job's memory */
+static const int64_t EVENT_STRIDE = 1000000;  /* event numbers of an attempt start at attempt times this */
+
+typedef struct job_event {
+  int64_t number;
+  char type[16];
+  char *json;
+} job_event;
+
+struct job {
+  job_row row;
+  char stage[24];
+  double progress, embed_ms;
+  int committed; /* its row is in the catalogue */
+  int dead;      /* the row could not be written */
+  int taken;     /* by a worker, or by one who ends it */
+  int running;   /* claimed */
+  int cancel;
+  int waits_for; /* unfinished jobs that it needs */
+  char dependencies[DEPENDENCIES][ORB_ID_SIZE];
+  int dependency_count;
+  char *dependency_problem;
+  int64_t retry_at; /* not before, orb_clock_ms() */
+  orb_context *ctx;
+  int64_t last_event, last_event_ms;
+  job_event events[EVENTS_KEPT];
+  int event_count;
+  waiter *waiters;
+  int refs;
+  job *next_id, *next_key; /* buckets */
+  job *previous, *next;    /* of the unfinished, oldest first */
+  job *newer_ended;        /* of the ended, oldest first */
+};
+
+struct queue {
+  pthread_mutex_t lock;
+  pthread_cond_t work, committed, timer_wake;
+  queue_options options;
+  catalogue *cat;
+  job *by_id[BUCKETS], *by_key[BUCKETS];
+  job *first, *last;
+  job *oldest_ended, *newest_ended;
+  int ended_count, unfinished;
+  int running, running_large, exclusive;
+  int64_t running_cost;
+  int stopping, waking;
+  struct {
+    char name[64];
+    double service; /* triangles worked for this owner, decayed */
+  } owners[OWNERS];
+  int owner_count;
+  waiter *waiters;
+  int waiter_count;
+  pthread_t timer;
+  int timer_started, timer_stop;
+  int64_t ended[ORB_JOB_CANCELLED + 1];
+};
+
+int64_t unix_ms(void);
+void table_add(queue *q, job *j);
+void table_drop_key(queue *q, job *j); /* when it ends */
+void table_ended(queue *q, job *j);
+void job_unref(job *j);
+void job_view(const job *j, orb_job_view *view);
+void wake_job(queue *q, job *j, int ended);
+/* Makes an event of the job's present state. Not for final ones, which the catalogue writes with the end. */
+void add_event(queue *q, job *j, const char *type, int store);
+int64_t prepare_event(job *j, orb_text *json);
+void keep_event(job *j, int64_t number, const char *type, const char *json);
+void *timer_main(void *argument);
+
+#endif

@@ -1,0 +1,121 @@
+/* Start, recovery, stop. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/problem.h"
+#include "faults.h"
+#include "log.h"
+#include "queue/internal.h"
+
+enum { MOST_CRASHES = 3, BATCH = 64 };
+
+queue *queue_create(const queue_options *options, catalogue *cat) {
+  queue *q = calloc(1, sizeof *q);
+  if (!q) {
+    return NULL;
+  }
+  q->options = *options;
+  q->cat = cat;
+  pthread_mutex_init(&q->lock, NULL);
+  pthread_cond_init(&q->work, NULL);
+  pthread_cond_init(&q->committed, NULL);
+  pthread_cond_init(&q->timer_wake, NULL);
+  q->timer_started = !FAULT("thread") && pthread_create(&q->timer, NULL, timer_main, q) == 0;
+  if (!q->timer_started) {
+    queue_destroy(q);
+    return NULL;
+  }
+  return q;
+}
+
+void queue_destroy(queue *q) {
+  if (!q) {
+    return;
+  }
+  if (q->timer_started) {
+    pthread_mutex_lock(&q->lock);
+    q->timer_stop = 1;
+    pthread_cond_signal(&q->timer_wake);
+    pthread_mutex_unlock(&q->lock);
+    pthread_join(q->timer, NULL);
+  }
+  for (job *j = q->first, *next; j; j = next) {
+    next = j->next;
+    job_unref(j);
+  }
+  for (job *j = q->oldest_ended, *next; j; j = next) {
+    next = j->newer_ended;
+    job_unref(j);
+  }
+  free(q);
+}
+
+static int load(queue *q, job_row *row) {
+  job *j = calloc(1, sizeof *j);
+  if (!j) {
+    job_row_free(row);
+    return 0;
+  }
+  j->row = *row;
+  j->refs = 1;
+  j->committed = 1;
+  /* Numbers go on after those of the log. */
+  event_row events[BATCH];
+  int64_t after = 0;
+  for (int n = BATCH; n == BATCH;) {
+    n = catalogue_events(q->cat, j->row.id, after, BATCH, events);
+    for (int i = 0; i < n; i++) {
+      after = events[i].number;
+      keep_event(j, events[i].number, events[i].type, events[i].json);
+      free(events[i].json);
+    }
+  }
+  pthread_mutex_lock(&q->lock);
+  table_add(q, j);
+  pthread_mutex_unlock(&q->lock);
+  return 1;
+}
+
+store_result queue_recover(queue *q) {
+  orb_problem problem = {0};
+  orb_text text = {0};
+  orb_refuse(&problem, "crashed", "The service died %d times while this job ran alone; it is not tried again.",
+             MOST_CRASHES);
+  orb_problem_write(&problem, &text);
+  store_result result = text.failed ? STORE_ERROR : catalogue_recover(q->cat, MOST_CRASHES, unix_ms(), text.data);
+  orb_text_free(&text);
+  orb_problem_free(&problem);
+  int64_t after = 0;
+  int loaded = 0;
+  for (int n = BATCH; n == BATCH && result == STORE_OK;) {
+    job_row rows[BATCH];
+    n = catalogue_unfinished(q->cat, after, BATCH, rows);
+    for (int i = 0; i < n; i++) {
+      after = rows[i].seq;
+      loaded += load(q, &rows[i]);
+    }
+  }
+  if (loaded) {
+    log_info("%d unfinished jobs go on", loaded);
+  }
+  return result;
+}
+
+void queue_stop(queue *q, int now) {
+  pthread_mutex_lock(&q->lock);
+  q->stopping = 1;
+  for (job *j = q->first; j && now; j = j->next) {
+    if (j->ctx) {
+      orb_context_cancel(j->ctx);
+    }
+  }
+  pthread_cond_broadcast(&q->work);
+  pthread_mutex_unlock(&q->lock);
+}
+
+int queue_running(queue *q) {
+  pthread_mutex_lock(&q->lock);
+  int running = q->running;
+  pthread_mutex_unlock(&q->lock);
+  return running;
+}

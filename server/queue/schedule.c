@@ -1,0 +1,419 @@
+/* Submitting, choosing, ending. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "log.h"
+#include "queue/internal.h"
+
+static queue_result submit_locked(queue *q, const queue_request *request, job **out, int *fresh) {
+  job *j;
+  for (j = q->first; j && (j->cancel || strcmp(j->row.key, request->key) != 0); j = j->next) {
+  }
+  if (j) {
+    j->refs++;
+    while (!j->committed && !j->dead) {
+      pthread_cond_wait(&q->committed, &q->lock);
+    }
+    *out = j;
+    return j->dead ? QUEUE_ERROR : QUEUE_OK;
+  }
+  if (q->stopping) {
+    return QUEUE_STOPPING;
+  }
+  if (request->listed && q->unfinished >= q->options.limit) {
+    return QUEUE_FULL;
+  }
+  j = calloc(1, sizeof *j);
+  char *text = strdup(request->request);
+  if (!j || !text) {
+    free(j);
+    free(text);
+    return QUEUE_ERROR;
+  }
+  j->refs = 2; /* the table's and the caller's */
+  j->row.request = text;
+  j->row.kind = request->kind;
+  j->row.cost = request->cost;
+  j->row.priority = request->priority;
+  j->row.listed = request->listed;
+  j->row.created = unix_ms();
+  orb_random_id(j->row.id);
+  strncpy(j->row.key, request->key, sizeof j->row.key - 1);
+  strncpy(j->row.owner, request->owner, sizeof j->row.owner - 1);
+  table_add(q, j);
+  *out = j;
+  *fresh = 1;
+  return QUEUE_OK;
+}
+
+queue_result queue_submit(queue *q, const queue_request *request, job **out, int *fresh) {
+  int is_fresh = 0, make_listed = 0;
+  pthread_mutex_lock(&q->lock);
+  queue_result result = submit_locked(q, request, out, &is_fresh);
+  if (result == QUEUE_OK && !is_fresh && request->listed && !(*out)->row.listed) {
+    (*out)->row.listed = make_listed = 1;
+  }
+  pthread_mutex_unlock(&q->lock);
+  if (fresh) {
+    *fresh = is_fresh;
+  }
+  if (make_listed && catalogue_job_list_it(q->cat, (*out)->row.id) == STORE_FULL) {
+    result = QUEUE_STORE_FULL;
+  }
+  if (!is_fresh) {
+    return result;
+  }
+  job *j = *out;
+  store_result stored = catalogue_job_insert(q->cat, &j->row);
+  pthread_mutex_lock(&q->lock);
+  if (stored == STORE_OK) {
+    j->committed = 1;
+    pthread_cond_signal(&q->work);
+  } else {
+    j->dead = 1;
+    j->row.state = ORB_JOB_FAILED;
+    table_drop_key(q, j);
+    j->committed = 0;
+    table_ended(q, j);
+    job_unref(j);
+    *out = NULL;
+    result = stored == STORE_FULL ? QUEUE_STORE_FULL : QUEUE_ERROR;
+  }
+  pthread_cond_broadcast(&q->committed);
+  pthread_mutex_unlock(&q->lock);
+  return result;
+}
+
+static double *service_of(queue *q, const char *owner) {
+  int i = 0;
+  while (i < q->owner_count && strcmp(q->owners[i].name, owner) != 0) {
+    i++;
+  }
+  if (i == q->owner_count) {
+    i = i < OWNERS ? q->owner_count++ : OWNERS - 1;
+    strncpy(q->owners[i].name, owner, sizeof q->owners[i].name - 1);
+    double least = 0; /* a newcomer starts level with the one who had least */
+    for (int k = 0; k < i; k++) {
+      least = k == 0 || q->owners[k].service < least ? q->owners[k].service : least;
+    }
+    q->owners[i].service = least;
+  }
+  return &q->owners[i].service;
+}
+
+static int runnable(const job *j, int64_t now) {
+  return j->committed && !j->taken && j->waits_for == 0 && j->retry_at <= now;
+}
+
+/* The next job for a worker, or NULL. */
+static job *choose(queue *q, int small_only) {
+  int64_t now = orb_clock_ms();
+  int most_large = q->options.workers > 1 ? q->options.workers - 1 : 1;
+  job *best = NULL;
+  double best_service = 0;
+  if (q->exclusive || (small_only && q->running_large < most_large)) {
+    return NULL;
+  }
+  for (job *j = q->first; j; j = j->next) {
+    if (!runnable(j, now)) {
+      continue;
+    }
+    if (j->row.suspect) {
+      return q->running == 0 ? j : NULL;
+    }
+    int large = j->row.cost > LARGE;
+    int64_t memory = (q->running_cost + j->row.cost) * BYTES_A_TRIANGLE;
+    if ((large && (small_only || q->running_large >= most_large)) || (q->running && memory > q->options.memory)) {
+      continue;
+    }
+    double service = *service_of(q, j->row.owner);
+    if (!best || j->row.priority > best->row.priority ||
+        (j->row.priority == best->row.priority && service < best_service)) {
+      best = j;
+      best_service = service;
+    }
+  }
+  return best;
+}
+
+int queue_take(queue *q, int small_only, job **out, int *threads) {
+  pthread_mutex_lock(&q->lock);
+  job *j = NULL;
+  while (!q->stopping && !(j = choose(q, small_only))) {
+    pthread_cond_wait(&q->work, &q->lock);
+  }
+  if (j && !q->stopping) {
+    int beside = 0;
+    int64_t now = orb_clock_ms();
+    for (job *other = q->first; other; other = other->next) {
+      beside += other != j && runnable(other, now);
+    }
+    int wanted = q->running + 1 + beside;
+    int share = wanted < q->options.workers ? wanted : q->options.workers;
+    *threads = q->options.cores / share > 0 ? q->options.cores / share : 1;
+    j->taken = 1;
+    j->refs++;
+    q->running++;
+    q->running_large += j->row.cost > LARGE;
+    q->running_cost += j->row.cost;
+    q->exclusive = j->row.suspect;
+    *service_of(q, j->row.owner) += (double)j->row.cost + 1000;
+    *out = j;
+  } else {
+    j = NULL;
+  }
+  pthread_mutex_unlock(&q->lock);
+  return j != NULL;
+}
+
+/* Undoes what queue_take() counted. */
+static void leave(queue *q, job *j) {
+  q->running--;
+  q->running_large -= j->row.cost > LARGE;
+  q->running_cost -= j->row.cost;
+  q->exclusive = 0;
+  j->taken = 0;
+  j->running = 0;
+  j->ctx = NULL;
+  pthread_cond_broadcast(&q->work);
+}
+
+queue_result queue_wait_for(queue *q, job *j, char (*keys)[ORB_ID_SIZE], const char *const *requests,
+                            const int64_t *costs, int count) {
+  queue_result result = QUEUE_OK;
+  pthread_mutex_lock(&q->lock);
+  memcpy(j->dependencies, keys, (size_t)count * sizeof *keys);
+  j->dependency_count = count;
+  j->waits_for = 1; /* so that it does not run before all are there */
+  pthread_mutex_unlock(&q->lock);
+  for (int i = 0; i < count && result == QUEUE_OK; i++) {
+    job *needed = NULL;
+    queue_request request = {.kind = ORB_JOB_EMBEDDING,
+                             .key = keys[i],
+                             .request = requests[i],
+                             .owner = j->row.owner,
+                             .cost = costs[i],
+                             .priority = j->row.priority};
+    result = queue_submit(q, &request, &needed, NULL);
+    queue_release(q, needed);
+  }
+  pthread_mutex_lock(&q->lock);
+  j->waits_for = 0;
+  for (int i = 0; i < count && result == QUEUE_OK; i++) {
+    for (job *other = q->first; other; other = other->next) {
+      j->waits_for += strcmp(other->row.key, keys[i]) == 0;
+    }
+  }
+  if (result != QUEUE_OK) {
+    j->retry_at = orb_clock_ms() + 1000;
+  }
+  if (j->cancel) {
+    j->waits_for = 0; /* the next worker ends it */
+  }
+  leave(q, j);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
+  return result;
+}
+
+char *queue_dependency_problem(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  char *problem = j->dependency_problem;
+  j->dependency_problem = NULL;
+  pthread_mutex_unlock(&q->lock);
+  return problem;
+}
+
+store_result queue_claim(queue *q, job *j) {
+  int64_t now = unix_ms();
+  store_result result = catalogue_job_claim(q->cat, j->row.id, j->row.attempt + 1, j->row.suspect, now);
+  pthread_mutex_lock(&q->lock);
+  if (result == STORE_OK) {
+    j->row.attempt++;
+    j->row.state = ORB_JOB_RUNNING;
+    j->row.started = j->row.started ? j->row.started : now;
+    j->running = 1;
+  }
+  pthread_mutex_unlock(&q->lock);
+  return result;
+}
+
+void queue_set_context(queue *q, job *j, orb_context *ctx) {
+  pthread_mutex_lock(&q->lock);
+  j->ctx = ctx;
+  if (ctx && j->cancel) {
+    orb_context_cancel(ctx);
+  }
+  pthread_mutex_unlock(&q->lock);
+}
+
+int queue_cancel_wanted(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  int wanted = j->cancel;
+  pthread_mutex_unlock(&q->lock);
+  return wanted;
+}
+
+void queue_add_embed_ms(queue *q, job *j, double ms) {
+  pthread_mutex_lock(&q->lock);
+  for (job *other = q->first; other; other = other->next) {
+    for (int d = 0; other->waits_for && d < other->dependency_count; d++) {
+      if (strcmp(other->dependencies[d], j->row.key) == 0) {
+        other->embed_ms += ms;
+      }
+    }
+  }
+  pthread_mutex_unlock(&q->lock);
+}
+
+double queue_embed_ms(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  double ms = j->embed_ms;
+  pthread_mutex_unlock(&q->lock);
+  return ms;
+}
+
+static void release_dependents(queue *q, job *ended) {
+  for (job *j = q->first; j; j = j->next) {
+    for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
+      if (strcmp(j->dependencies[d], ended->row.key) == 0) {
+        j->waits_for--;
+        if (ended->row.state == ORB_JOB_FAILED && ended->row.problem && !j->dependency_problem) {
+          j->dependency_problem = strdup(ended->row.problem);
+        }
+      }
+    }
+  }
+}
+
+/* The end of a job in memory, after its row was committed. */
+static void ended_locked(queue *q, job *j, orb_job_state state, const char *problem, int64_t now) {
+  j->row.state = state;
+  j->row.finished = now;
+  j->row.problem = problem ? strdup(problem) : NULL;
+  if (state == ORB_JOB_SUCCEEDED) {
+    j->progress = 1;
+  }
+  table_drop_key(q, j);
+  q->ended[state]++;
+}
+
+static void publish_end(queue *q, job *j, int64_t number, const char *json) {
+  keep_event(j, number, orb_job_state_name(j->row.state), json);
+  release_dependents(q, j);
+  wake_job(q, j, 1);
+  table_ended(q, j);
+  pthread_cond_broadcast(&q->work);
+}
+
+/* Writes the end and shows it; the caller has taken the job. */
+static store_result end_job(queue *q, job *j, orb_job_state state, const char *problem, const resource *result) {
+  int64_t now = unix_ms();
+  pthread_mutex_lock(&q->lock);
+  job shown = *j;
+  shown.row.state = state;
+  shown.row.finished = now;
+  shown.row.problem = (char *)(uintptr_t)problem;
+  shown.progress = state == ORB_JOB_SUCCEEDED ? 1 : j->progress;
+  orb_text json = {0};
+  int64_t number = prepare_event(&shown, &json) + 1000; /* beyond events that are still on their way */
+  pthread_mutex_unlock(&q->lock);
+  store_result stored = json.failed ? STORE_ERROR
+                                    : catalogue_job_finish(q->cat, j->row.id, j->row.attempt, state, problem, now,
+                                                           result, number, json.data);
+  if (stored == STORE_OK) {
+    pthread_mutex_lock(&q->lock);
+    ended_locked(q, j, state, problem, now);
+    publish_end(q, j, number, json.data);
+    pthread_mutex_unlock(&q->lock);
+  }
+  orb_text_free(&json);
+  return stored;
+}
+
+void queue_finish(queue *q, job *j, orb_job_state state, const char *problem, const resource *result) {
+  store_result stored = end_job(q, j, state, problem, result);
+  if (stored != STORE_OK) {
+    log_error("the end of job %s could not be stored; it will be run again", j->row.id);
+    pthread_mutex_lock(&q->lock);
+    j->retry_at = orb_clock_ms() + 5000;
+    pthread_mutex_unlock(&q->lock);
+    queue_give_back(q, j);
+    return;
+  }
+  pthread_mutex_lock(&q->lock);
+  leave(q, j);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
+}
+
+void queue_give_back(queue *q, job *j) {
+  int claimed = j->running;
+  store_result stored = claimed ? catalogue_job_release(q->cat, j->row.id, j->row.attempt) : STORE_OK;
+  pthread_mutex_lock(&q->lock);
+  if (claimed) {
+    j->row.state = ORB_JOB_QUEUED;
+    j->row.attempt -= stored == STORE_OK;
+    j->stage[0] = 0;
+    if (stored != STORE_OK) { /* try again to make the row what it should be before it runs */
+      j->retry_at = orb_clock_ms() + 5000;
+    }
+  }
+  leave(q, j);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
+}
+
+void queue_put_off(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  j->retry_at = orb_clock_ms() + 1000;
+  leave(q, j);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
+}
+
+/* Ends the sub-jobs that only this job wanted. */
+static void cancel_needless(queue *q, job *of) {
+  for (int d = 0; d < of->dependency_count; d++) {
+    job *needed = queue_find_key(q, of->dependencies[d]);
+    if (!needed) {
+      continue;
+    }
+    int wanted = needed->row.listed;
+    pthread_mutex_lock(&q->lock);
+    for (job *j = q->first; j && !wanted; j = j->next) {
+      for (int k = 0; j != of && k < j->dependency_count; k++) {
+        wanted |= strcmp(j->dependencies[k], needed->row.key) == 0;
+      }
+    }
+    pthread_mutex_unlock(&q->lock);
+    if (!wanted && queue_cancel(q, needed) != STORE_OK) {
+      log_warn("job %s could not be cancelled", needed->row.id);
+    }
+    queue_release(q, needed);
+  }
+}
+
+store_result queue_cancel(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  int ended = orb_job_ended(j->row.state);
+  j->cancel = 1;
+  if (j->ctx) {
+    orb_context_cancel(j->ctx);
+  }
+  int mine = !ended && !j->taken;
+  j->taken |= mine;
+  pthread_mutex_unlock(&q->lock);
+  if (!mine) {
+    return STORE_OK; /* the worker that has it sees the wish */
+  }
+  store_result stored = end_job(q, j, ORB_JOB_CANCELLED, NULL, NULL);
+  if (stored != STORE_OK) {
+    pthread_mutex_lock(&q->lock);
+    j->taken = 0;
+    pthread_mutex_unlock(&q->lock);
+    return stored;
+  }
+  cancel_needless(q, j);
+  return STORE_OK;
+}

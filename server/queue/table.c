@@ -1,0 +1,189 @@
+/* Jobs by id and by key, references, and the ended ones that are kept. */
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "log.h"
+#include "queue/internal.h"
+
+int64_t unix_ms(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+static unsigned bucket(const char *hex) {
+  unsigned hash = 2166136261u;
+  for (; *hex; hex++) {
+    hash = (hash ^ (unsigned char)*hex) * 16777619u;
+  }
+  return hash % BUCKETS;
+}
+
+void table_add(queue *q, job *j) {
+  unsigned at = bucket(j->row.id);
+  j->next_id = q->by_id[at];
+  q->by_id[at] = j;
+  at = bucket(j->row.key);
+  j->next_key = q->by_key[at];
+  q->by_key[at] = j;
+  j->previous = q->last;
+  *(q->last ? &q->last->next : &q->first) = j;
+  q->last = j;
+  q->unfinished++;
+}
+
+void table_drop_key(queue *q, job *j) {
+  for (job **at = &q->by_key[bucket(j->row.key)]; *at; at = &(*at)->next_key) {
+    if (*at == j) {
+      *at = j->next_key;
+      break;
+    }
+  }
+  *(j->previous ? &j->previous->next : &q->first) = j->next;
+  *(j->next ? &j->next->previous : &q->last) = j->previous;
+  q->unfinished--;
+}
+
+static void drop_id(queue *q, job *j) {
+  for (job **at = &q->by_id[bucket(j->row.id)]; *at; at = &(*at)->next_id) {
+    if (*at == j) {
+      *at = j->next_id;
+      return;
+    }
+  }
+}
+
+/* The table's own reference passes to the list of the ended. */
+void table_ended(queue *q, job *j) {
+  *(q->newest_ended ? &q->newest_ended->newer_ended : &q->oldest_ended) = j;
+  q->newest_ended = j;
+  j->newer_ended = NULL;
+  if (++q->ended_count > KEEP_ENDED || j->dead) {
+    job *old = q->oldest_ended;
+    q->oldest_ended = old->newer_ended;
+    if (!q->oldest_ended) {
+      q->newest_ended = NULL;
+    }
+    q->ended_count--;
+    drop_id(q, old);
+    job_unref(old);
+  }
+}
+
+void job_unref(job *j) {
+  if (--j->refs > 0) {
+    return;
+  }
+  for (int i = 0; i < j->event_count; i++) {
+    free(j->events[i].json);
+  }
+  free(j->dependency_problem);
+  job_row_free(&j->row);
+  free(j);
+}
+
+job *queue_find(queue *q, const char *id) {
+  pthread_mutex_lock(&q->lock);
+  job *j = q->by_id[bucket(id)];
+  while (j && (strcmp(j->row.id, id) != 0 || !j->committed)) {
+    j = j->next_id;
+  }
+  if (j) {
+    j->refs++;
+  }
+  pthread_mutex_unlock(&q->lock);
+  return j;
+}
+
+/* Under the lock or not: see the callers. */
+static job *find_key(queue *q, const char *key) {
+  job *j = q->by_key[bucket(key)];
+  while (j && strcmp(j->row.key, key) != 0) {
+    j = j->next_key;
+  }
+  return j;
+}
+
+job *queue_find_key(queue *q, const char *key) {
+  pthread_mutex_lock(&q->lock);
+  job *j = find_key(q, key);
+  if (j) {
+    j->refs++;
+  }
+  pthread_mutex_unlock(&q->lock);
+  return j;
+}
+
+void queue_release(queue *q, job *j) {
+  if (j) {
+    pthread_mutex_lock(&q->lock);
+    job_unref(j);
+    pthread_mutex_unlock(&q->lock);
+  }
+}
+
+const char *job_id(const job *j) {
+  return j->row.id;
+}
+const char *job_key(const job *j) {
+  return j->row.key;
+}
+orb_job_kind job_kind(const job *j) {
+  return j->row.kind;
+}
+const char *job_request(const job *j) {
+  return j->row.request;
+}
+
+void job_view(const job *j, orb_job_view *view) {
+  *view = (orb_job_view){.id = j->row.id,
+                         .key = j->row.key,
+                         .stage = j->stage,
+                         .problem = j->row.problem,
+                         .kind = j->row.kind,
+                         .state = j->row.state,
+                         .progress = j->progress,
+                         .attempt = j->row.attempt,
+                         .created = j->row.created,
+                         .started = j->row.started,
+                         .finished = j->row.finished};
+}
+
+orb_job_state queue_job_write(queue *q, job *j, orb_text *out) {
+  orb_job_view view;
+  pthread_mutex_lock(&q->lock);
+  job_view(j, &view);
+  orb_job_write(&view, out);
+  orb_job_state state = j->row.state;
+  pthread_mutex_unlock(&q->lock);
+  return state;
+}
+
+int queue_needs_mesh(queue *q, const char *mesh) {
+  int needed = 0;
+  pthread_mutex_lock(&q->lock);
+  for (job *j = q->first; j && !needed; j = j->next) {
+    needed = strstr(j->row.request, mesh) != NULL;
+  }
+  pthread_mutex_unlock(&q->lock);
+  return needed;
+}
+
+void queue_count(queue *q, queue_numbers *out) {
+  memset(out, 0, sizeof *out);
+  pthread_mutex_lock(&q->lock);
+  int64_t now = unix_ms();
+  for (job *j = q->first; j; j = j->next) {
+    int queued = !j->running && j->waits_for == 0;
+    out->queued += queued;
+    out->waiting += j->waits_for > 0;
+    if (queued && now - j->row.created > out->oldest_ms) {
+      out->oldest_ms = now - j->row.created;
+    }
+  }
+  out->running = q->running;
+  out->waiters = q->waiter_count;
+  memcpy(out->ended, q->ended, sizeof out->ended);
+  pthread_mutex_unlock(&q->lock);
+}

@@ -1,0 +1,137 @@
+/* Inputs of a job: meshes as they were uploaded, spheres as they were stored, landmarks as places. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "worker/run.h"
+
+void run_problem_of_store(store_result result, orb_problem *problem) {
+  if (result == STORE_FULL) {
+    orb_refuse(problem, "storage-full", "The disk of the server is full; make room and try again.");
+  } else {
+    orb_refuse(problem, "internal", "The store could not be read or written; the log of the server says why.");
+  }
+}
+
+static void note_triangles(const orb_mesh *raw, file_triangle *noted, int32_t count) {
+  for (int32_t i = 0; i < count; i++) {
+    int32_t t = noted[i].index;
+    noted[i].corners[0] = -1;
+    if (t < 0) {
+      continue;
+    }
+    if (t >= raw->triangle_count || raw->source_triangle[t] != t) {
+      for (t = 0; t < raw->triangle_count && raw->source_triangle[t] != noted[i].index; t++) {
+      }
+    }
+    for (int k = 0; k < 3 && t < raw->triangle_count; k++) {
+      noted[i].corners[k] = raw->source[raw->triangles[3 * (size_t)t + (size_t)k]];
+    }
+  }
+}
+
+int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh *mesh, file_triangle *noted,
+                  int32_t noted_count, orb_problem *problem) {
+  resource row = {0};
+  orb_mesh_summary summary;
+  unsigned repair;
+  char canonical[ORB_REPAIR_TEXT];
+  unsigned char *bytes = NULL;
+  size_t size;
+  memset(mesh, 0, sizeof *mesh);
+  store_result found = catalogue_get(env->cat, RESOURCE_MESH, id, &row);
+  if (found == STORE_NOT_FOUND) {
+    return orb_refuse(problem, "not-found", "The mesh %s was deleted before the job could use it.", id);
+  }
+  int fine = found == STORE_OK && orb_mesh_summarise(row.json, &summary) &&
+             orb_repair_parse(summary.repair, &repair, canonical, problem);
+  resource_free(&row);
+  if (!fine || objects_load(env->store, OBJECT_MESH, id, &bytes, &size) != STORE_OK) {
+    return orb_refuse(problem, "corrupt", "The stored mesh %s cannot be read.", id);
+  }
+  orb_status status = orb_mesh_read(ctx, bytes, size, orb_format_of_name(summary.format), mesh, NULL);
+  free(bytes);
+  if (status == ORB_OK) {
+    note_triangles(mesh, noted, noted_count);
+    status = orb_mesh_repair(ctx, mesh, repair);
+  }
+  return status == ORB_OK;
+}
+
+/* The stored sphere is the sphere.ply that callers get; its layout is ours, so only the numbers need a check. */
+enum { PLY_VERTEX_BYTES = 52, PLY_POINT_OFFSET = 24 };
+
+int run_load_points(const run_env *env, orb_context *ctx, const char *embedding, const orb_mesh *mesh, double **points,
+                    orb_problem *problem) {
+  unsigned char *bytes = NULL;
+  size_t size = 0;
+  *points = NULL;
+  store_result found = objects_load(env->store, OBJECT_SPHERE, embedding, &bytes, &size);
+  static const char mark[] = "end_header\n";
+  const unsigned char *end = found == STORE_OK ? memmem(bytes, size < 4096 ? size : 4096, mark, sizeof mark - 1) : NULL;
+  size_t count = (size_t)mesh->vertex_count;
+  size_t head = end ? (size_t)(end - bytes) + sizeof mark - 1 : 0;
+  if (!end || size != head + count * PLY_VERTEX_BYTES + (size_t)mesh->triangle_count * 13) {
+    free(bytes);
+    return orb_refuse(problem, "corrupt", "The stored embedding %s does not belong to its mesh.", embedding);
+  }
+  *points = ORB_NEW(ctx, double, 3 * count);
+  for (size_t v = 0; *points && v < count; v++) {
+    memcpy(*points + 3 * v, bytes + head + v * PLY_VERTEX_BYTES + PLY_POINT_OFFSET, 3 * sizeof(double));
+  }
+  free(bytes);
+  return *points != NULL;
+}
+
+static int place_triangle(const orb_mesh *mesh, const orb_spot *spot, const file_triangle *noted, orb_place *out,
+                          const char **why) {
+  int32_t t = 0;
+  while (t < mesh->triangle_count && mesh->source_triangle[t] != spot->index) {
+    t++;
+  }
+  if (t == mesh->triangle_count || noted->corners[0] < 0) {
+    *why = "this triangle of the file was dropped, because it was degenerate or there twice";
+    return 0;
+  }
+  /* Repairs may have turned the triangle, so corners are matched by the vertices that they stand for. */
+  out->triangle = t;
+  int used[3] = {0, 0, 0};
+  for (int k = 0; k < 3; k++) {
+    int32_t vertex = mesh->vertex_of_source[noted->corners[k]];
+    int corner = 0;
+    while (corner < 3 && (used[corner] || vertex < 0 ||
+                          mesh->source[mesh->triangles[3 * (size_t)t + (size_t)corner]] != mesh->source[vertex])) {
+      corner++;
+    }
+    if (corner == 3) {
+      *why = "this triangle of the file was changed by the repair";
+      return 0;
+    }
+    used[corner] = 1;
+    out->at[corner] = spot->at[k];
+  }
+  return 1;
+}
+
+int run_place(orb_context *ctx, const orb_mesh *mesh, const orb_spot *spot, const file_triangle *noted,
+              orb_nearest **tree, orb_place *out, const char **why) {
+  *why = NULL;
+  if (spot->kind == ORB_SPOT_TRIANGLE) {
+    return place_triangle(mesh, spot, noted, out, why);
+  }
+  if (spot->kind == ORB_SPOT_POINT) {
+    if (!*tree && orb_nearest_create(ctx, mesh->positions, mesh->triangles, mesh->triangle_count, tree) != ORB_OK) {
+      return 0;
+    }
+    orb_nearest_query(*tree, spot->at, INFINITY, out);
+    return 1;
+  }
+  int32_t vertex = spot->index < mesh->file_vertex_count ? mesh->vertex_of_source[spot->index] : -1;
+  if (vertex < 0) {
+    *why = spot->index < mesh->file_vertex_count
+               ? "this vertex of the file was dropped, because no triangle uses it or the repair removed it"
+               : "it is out of range: the file has fewer vertices";
+    return 0;
+  }
+  return orb_place_of_vertex(ctx, mesh, vertex, out) == ORB_OK;
+}

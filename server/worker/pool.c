@@ -1,0 +1,227 @@
+#include "worker/pool.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/json.h"
+#include "faults.h"
+#include "log.h"
+#include "metrics.h"
+#include "worker/run.h"
+
+typedef struct worker {
+  worker_pool *pool;
+  pthread_t thread;
+  int small_only, started;
+} worker;
+
+struct worker_pool {
+  worker_options options;
+  run_env env;
+  int count;
+  worker workers[];
+};
+
+typedef struct progress_of {
+  queue *q;
+  job *j;
+} progress_of;
+
+static void on_progress(void *user, const char *stage, double fraction) {
+  progress_of *p = user;
+  queue_progress(p->q, p->j, stage, fraction);
+}
+
+/* 1: the job was made to wait for embeddings. 0: all are there, or nothing is needed. −1: cannot be told now. */
+static int plan(const run_env *env, job *j) {
+  char keys[ORB_SHAPES_MAX][ORB_ID_SIZE];
+  orb_text texts[ORB_SHAPES_MAX];
+  const char *requests[ORB_SHAPES_MAX];
+  int64_t costs[ORB_SHAPES_MAX];
+  int count = 0, result = 0;
+  orb_problem problem = {0};
+  orb_supermesh_request request;
+  orb_json_error error;
+  memset(texts, 0, sizeof texts);
+  memset(&request, 0, sizeof request);
+  cJSON *body = orb_json_parse(job_request(j), strlen(job_request(j)), &error);
+  if (!body || !orb_supermesh_request_read(body, &request, &problem)) {
+    goto done; /* the run itself reports it */
+  }
+  for (int32_t s = 0; s < request.shape_count; s++) {
+    orb_embedding_request wanted = {.options = request.embedding};
+    resource known = {0};
+    memcpy(wanted.mesh, request.shapes[s].mesh, sizeof wanted.mesh);
+    if (!orb_embedding_request_id(&wanted, keys[count])) {
+      result = -1;
+      goto done;
+    }
+    int twice = 0;
+    for (int k = 0; k < count; k++) {
+      twice |= strcmp(keys[k], keys[count]) == 0;
+    }
+    store_result found = twice ? STORE_OK : catalogue_get(env->cat, RESOURCE_EMBEDDING, keys[count], &known);
+    resource_free(&known);
+    if (found == STORE_ERROR) {
+      result = -1;
+      goto done;
+    }
+    if (found == STORE_OK) {
+      continue;
+    }
+    orb_mesh_summary summary = {0};
+    costs[count] = 0;
+    if (catalogue_get(env->cat, RESOURCE_MESH, wanted.mesh, &known) == STORE_OK) {
+      costs[count] = orb_mesh_summarise(known.json, &summary) ? summary.triangles : 0;
+      resource_free(&known);
+    }
+    orb_embedding_request_write(&wanted, &texts[count]);
+    if (texts[count].failed) {
+      result = -1;
+      goto done;
+    }
+    requests[count] = texts[count].data;
+    count++;
+  }
+  if (count > 0) {
+    result = 1;
+    if (queue_wait_for(env->q, j, keys, requests, costs, count) != QUEUE_OK) {
+      log_warn("the embeddings that a job needs could not be queued; it is tried again");
+    }
+  }
+done:
+  for (int i = 0; i < ORB_SHAPES_MAX; i++) {
+    orb_text_free(&texts[i]);
+  }
+  orb_supermesh_request_free(&request);
+  orb_problem_free(&problem);
+  cJSON_Delete(body);
+  return result;
+}
+
+/* Ends a job whose run failed. */
+static void finish_failed(const run_env *env, job *j, orb_context *ctx, orb_problem *problem) {
+  if (!problem->name) {
+    const orb_error *error = orb_context_error(ctx);
+    if (error->status == ORB_E_CANCELLED) {
+      if (queue_cancel_wanted(env->q, j)) {
+        queue_finish(env->q, j, ORB_JOB_CANCELLED, NULL, NULL);
+      } else {
+        queue_give_back(env->q, j); /* the service stops */
+      }
+      return;
+    }
+    orb_problem_of_error(error, problem);
+  }
+  orb_text text = {0};
+  orb_problem_write(problem, &text);
+  queue_finish(env->q, j, ORB_JOB_FAILED, text.failed ? NULL : text.data, NULL);
+  orb_text_free(&text);
+}
+
+static void run_claimed(worker_pool *pool, job *j, int threads) {
+  const run_env *env = &pool->env;
+  progress_of progress = {env->q, j};
+  orb_context_options options = {.memory_limit = (size_t)pool->options.job_memory,
+                                 .threads = threads,
+                                 .deadline_ms = orb_clock_ms() + pool->options.job_ms,
+                                 .max_triangles = pool->options.max_triangles,
+                                 .progress = on_progress,
+                                 .progress_user = &progress};
+  orb_context *ctx = NULL;
+  orb_problem problem = {0};
+  resource result = {0};
+  int64_t began = orb_clock_ms();
+  if (FAULT("alloc") || orb_context_create(&options, &ctx) != ORB_OK) {
+    orb_refuse(&problem, "no-memory", "The server has no memory left; try again later.");
+    finish_failed(env, j, NULL, &problem);
+    orb_problem_free(&problem);
+    return;
+  }
+  queue_set_context(env->q, j, ctx);
+  int embedding = job_kind(j) == ORB_JOB_EMBEDDING;
+  int fine = embedding ? run_embedding(env, ctx, j, &result, &problem) : run_supermesh(env, ctx, j, &result, &problem);
+  queue_set_context(env->q, j, NULL);
+  double seconds = 1e-3 * (double)(orb_clock_ms() - began);
+  metrics_job(embedding, fine, seconds);
+  char fields[128];
+  snprintf(fields, sizeof fields, "\"job\":\"%s\",\"seconds\":%.3f", job_id(j), seconds);
+  log_write(LOG_INFO, fields, "%s job %s", orb_job_kind_name(job_kind(j)), fine ? "done" : "did not succeed");
+  if (fine) {
+    if (embedding) {
+      queue_add_embed_ms(env->q, j, 1e3 * seconds);
+    }
+    queue_finish(env->q, j, ORB_JOB_SUCCEEDED, NULL, result.json ? &result : NULL);
+  } else {
+    finish_failed(env, j, ctx, &problem);
+  }
+  resource_free(&result);
+  orb_problem_free(&problem);
+  orb_context_destroy(ctx);
+}
+
+static void run_one(worker_pool *pool, job *j, int threads) {
+  const run_env *env = &pool->env;
+  if (queue_cancel_wanted(env->q, j)) {
+    queue_finish(env->q, j, ORB_JOB_CANCELLED, NULL, NULL);
+    return;
+  }
+  char *reason = queue_dependency_problem(env->q, j);
+  if (reason) {
+    queue_finish(env->q, j, ORB_JOB_FAILED, reason, NULL);
+    free(reason);
+    return;
+  }
+  int waits = job_kind(j) == ORB_JOB_SUPERMESH ? plan(env, j) : 0;
+  if (waits > 0) {
+    return;
+  }
+  if (waits < 0 || queue_claim(env->q, j) != STORE_OK) {
+    queue_put_off(env->q, j);
+    return;
+  }
+  run_claimed(pool, j, threads);
+}
+
+static void *worker_main(void *argument) {
+  worker *self = argument;
+  job *j;
+  int threads;
+  while (queue_take(self->pool->env.q, self->small_only, &j, &threads)) {
+    run_one(self->pool, j, threads);
+  }
+  return NULL;
+}
+
+worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogue *cat, objects *store) {
+  int lanes = options->workers + (options->workers == 1); /* one more for small jobs */
+  worker_pool *pool = calloc(1, sizeof *pool + (size_t)lanes * sizeof(worker));
+  if (!pool) {
+    return NULL;
+  }
+  pool->options = *options;
+  pool->env = (run_env){q, cat, store};
+  pool->count = lanes;
+  for (int i = 0; i < lanes; i++) {
+    worker *w = &pool->workers[i];
+    w->pool = pool;
+    w->small_only = i >= options->workers;
+    w->started = !FAULT("thread") && pthread_create(&w->thread, NULL, worker_main, w) == 0;
+    if (!w->started && i == 0) {
+      free(pool);
+      return NULL;
+    }
+  }
+  return pool;
+}
+
+void worker_pool_join(worker_pool *pool) {
+  for (int i = 0; pool && i < pool->count; i++) {
+    if (pool->workers[i].started) {
+      pthread_join(pool->workers[i].thread, NULL);
+    }
+  }
+  free(pool);
+}

@@ -1,0 +1,78 @@
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "api/json.h"
+#include "metrics.h"
+#include "worker/run.h"
+
+static int read_request(const job *j, orb_embedding_request *request, orb_problem *problem) {
+  orb_json_error error;
+  cJSON *body = orb_json_parse(job_request(j), strlen(job_request(j)), &error);
+  int fine = body ? orb_embedding_request_read(body, request, problem)
+                  : orb_refuse(problem, "corrupt", "The stored request of the job does not decode.");
+  cJSON_Delete(body);
+  return fine;
+}
+
+static int store_sphere(const run_env *env, orb_context *ctx, const char *key, const orb_mesh *mesh,
+                        const orb_embedding *embedding, resource *result, orb_problem *problem) {
+  orb_buffer ply = {0};
+  int fine = orb_sphere_ply_write(ctx, mesh, embedding->points, &ply) == ORB_OK;
+  if (fine) {
+    orb_id_of_text((const char *)ply.data, ply.size, result->sha);
+    result->bytes = (int64_t)ply.size;
+    store_result stored = objects_put(env->store, OBJECT_SPHERE, key, ply.data, ply.size);
+    if (stored != STORE_OK) {
+      run_problem_of_store(stored, problem);
+      fine = 0;
+    }
+  }
+  orb_buffer_free(ctx, &ply);
+  return fine;
+}
+
+int run_embedding(const run_env *env, orb_context *ctx, job *j, resource *result, orb_problem *problem) {
+  orb_embedding_request request;
+  orb_mesh mesh = {0};
+  orb_embedding embedding = {0};
+  resource known = {0};
+  int fine = 0;
+  if (!read_request(j, &request, problem)) {
+    return 0;
+  }
+  if (catalogue_get(env->cat, RESOURCE_EMBEDDING, job_key(j), &known) == STORE_OK) {
+    resource_free(&known); /* an earlier attempt got so far */
+    return 1;
+  }
+  orb_progress(ctx, "read", 0);
+  double began = orb_clock();
+  if (!run_load_mesh(env, ctx, request.mesh, &mesh, NULL, 0, problem)) {
+    goto done;
+  }
+  double checked = orb_clock() - began;
+  if (orb_embed(ctx, &mesh, &request.options, &embedding) != ORB_OK) {
+    goto done;
+  }
+  metrics_flips(embedding.certificate.flipped);
+  embedding.timings.check += checked;
+  embedding.timings.total += checked;
+  orb_progress(ctx, "store", 0);
+  if (!store_sphere(env, ctx, job_key(j), &mesh, &embedding, result, problem)) {
+    goto done;
+  }
+  orb_text json = {0};
+  result->kind = RESOURCE_EMBEDDING;
+  result->created = (int64_t)time(NULL) * 1000;
+  memcpy(result->id, job_key(j), sizeof result->id);
+  orb_embedding_write(result->id, &request, &embedding, result->created, &json);
+  result->json = json.data;
+  fine = !json.failed;
+  if (!fine) {
+    orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  }
+done:
+  orb_embedding_free(ctx, &embedding);
+  orb_mesh_free(ctx, &mesh);
+  return fine;
+}

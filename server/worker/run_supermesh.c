@@ -1,0 +1,168 @@
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "api/json.h"
+#include "metrics.h"
+#include "worker/run.h"
+
+/* Everything that a merge needs; of the context. */
+typedef struct merge_input {
+  orb_supermesh_request request;
+  orb_mesh meshes[ORB_SHAPES_MAX];
+  double *points[ORB_SHAPES_MAX];
+  orb_align_shape shapes[ORB_SHAPES_MAX];
+  const char *names[ORB_SHAPES_MAX];
+  orb_landmark *landmarks;
+  orb_place *places;
+  file_triangle *noted; /* landmark-major, as the spots */
+} merge_input;
+
+static void free_input(orb_context *ctx, merge_input *in) {
+  for (int32_t s = 0; s < in->request.shape_count; s++) {
+    orb_mesh_free(ctx, &in->meshes[s]);
+    orb_free(ctx, in->points[s]);
+  }
+  orb_free(ctx, in->landmarks);
+  orb_free(ctx, in->places);
+  orb_free(ctx, in->noted);
+  orb_supermesh_request_free(&in->request);
+}
+
+static int read_request(const job *j, orb_supermesh_request *request, orb_problem *problem) {
+  orb_json_error error;
+  cJSON *body = orb_json_parse(job_request(j), strlen(job_request(j)), &error);
+  int fine = body ? orb_supermesh_request_read(body, request, problem)
+                  : orb_refuse(problem, "corrupt", "The stored request of the job does not decode.");
+  cJSON_Delete(body);
+  return fine;
+}
+
+static int refuse_landmark(const merge_input *in, int32_t l, int32_t s, const char *why, orb_problem *problem) {
+  const orb_spot *spot = &in->request.landmarks.spots[(size_t)l * (size_t)in->request.shape_count + (size_t)s];
+  orb_refuse(problem, "bad-landmarks", "Landmark %d (\"%.60s\"), shape %d (\"%.60s\"), %s %d: %s.", l,
+             in->request.landmarks.items[l].name, s, in->names[s],
+             spot->kind == ORB_SPOT_TRIANGLE ? "triangle" : "vertex", spot->index, why);
+  orb_text_printf(&problem->facts, "\"landmarks\":[%d],\"shape\":%d,\"reason\":\"dropped\"", l, s);
+  return 0;
+}
+
+/* Places of all landmarks on one shape. */
+static int place_all(orb_context *ctx, merge_input *in, int32_t s, orb_problem *problem) {
+  const orb_landmark_list *list = &in->request.landmarks;
+  orb_nearest *tree = NULL;
+  int fine = 1;
+  for (int32_t l = 0; l < list->count && fine; l++) {
+    size_t at = (size_t)l * (size_t)list->shape_count + (size_t)s;
+    const char *why = NULL;
+    fine = run_place(ctx, &in->meshes[s], &list->spots[at], &in->noted[at], &tree, &in->places[at], &why);
+    if (!fine && why) {
+      refuse_landmark(in, l, s, why, problem);
+    }
+  }
+  orb_nearest_destroy(ctx, tree);
+  return fine;
+}
+
+static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int32_t s, orb_problem *problem) {
+  const orb_landmark_list *list = &in->request.landmarks;
+  orb_embedding_request wanted = {.options = in->request.embedding};
+  char embedding[ORB_ID_SIZE];
+  memcpy(wanted.mesh, in->request.shapes[s].mesh, sizeof wanted.mesh);
+  if (!orb_embedding_request_id(&wanted, embedding)) {
+    return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  }
+  file_triangle *noted = ORB_NEW(ctx, file_triangle, list->count);
+  if (!noted) {
+    return 0;
+  }
+  for (int32_t l = 0; l < list->count; l++) {
+    const orb_spot *spot = &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s];
+    noted[l].index = spot->kind == ORB_SPOT_TRIANGLE ? spot->index : -1;
+  }
+  int fine = run_load_mesh(env, ctx, wanted.mesh, &in->meshes[s], noted, list->count, problem);
+  for (int32_t l = 0; fine && l < list->count; l++) {
+    in->noted[(size_t)l * (size_t)list->shape_count + (size_t)s] = noted[l];
+  }
+  orb_free(ctx, noted);
+  fine = fine && run_load_points(env, ctx, embedding, &in->meshes[s], &in->points[s], problem);
+  in->shapes[s] = (orb_align_shape){.mesh = &in->meshes[s], .points = in->points[s]};
+  return fine && place_all(ctx, in, s, problem);
+}
+
+static int load_input(const run_env *env, orb_context *ctx, merge_input *in, orb_problem *problem) {
+  const orb_landmark_list *list = &in->request.landmarks;
+  size_t places = (size_t)list->count * (size_t)in->request.shape_count;
+  in->landmarks = ORB_NEW0(ctx, orb_landmark, list->count);
+  in->places = ORB_NEW0(ctx, orb_place, places);
+  in->noted = ORB_NEW0(ctx, file_triangle, places);
+  if (!in->landmarks || !in->places || !in->noted) {
+    return 0;
+  }
+  for (int32_t s = 0; s < in->request.shape_count; s++) {
+    in->names[s] = in->request.shapes[s].name;
+    orb_progress(ctx, "read", (double)s / (double)in->request.shape_count);
+    if (!load_shape(env, ctx, in, s, problem)) {
+      return 0;
+    }
+  }
+  for (int32_t l = 0; l < list->count; l++) {
+    memcpy(in->landmarks[l].name, list->items[l].name, ORB_NAME_MAX);
+    in->landmarks[l].at = in->places + (size_t)l * (size_t)list->shape_count;
+    in->landmarks[l].pass = list->items[l].pass;
+    in->landmarks[l].radius = list->items[l].radius;
+    in->landmarks[l].confidence = list->items[l].confidence;
+  }
+  return 1;
+}
+
+static int store_result_of(const run_env *env, orb_context *ctx, job *j, const merge_input *in,
+                           const orb_merge_result *merged, resource *result, orb_problem *problem) {
+  orb_text json = {0};
+  orb_progress(ctx, "store", 0);
+  orb_id_of_text((const char *)merged->asset.data, merged->asset.size, result->sha);
+  result->kind = RESOURCE_SUPERMESH;
+  result->bytes = (int64_t)merged->asset.size;
+  result->created = (int64_t)time(NULL) * 1000;
+  memcpy(result->id, job_key(j), sizeof result->id);
+  store_result stored = objects_put(env->store, OBJECT_ASSET, result->id, merged->asset.data, merged->asset.size);
+  if (stored != STORE_OK) {
+    run_problem_of_store(stored, problem);
+    return 0;
+  }
+  orb_supermesh_write(result->id, &in->request, merged, queue_embed_ms(env->q, j), result->created, &json);
+  if (json.failed) {
+    orb_text_free(&json);
+    return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  }
+  result->json = json.data;
+  return 1;
+}
+
+int run_supermesh(const run_env *env, orb_context *ctx, job *j, resource *result, orb_problem *problem) {
+  resource known = {0};
+  orb_merge_result merged;
+  if (catalogue_get(env->cat, RESOURCE_SUPERMESH, job_key(j), &known) == STORE_OK) {
+    resource_free(&known); /* an earlier attempt got so far */
+    return 1;
+  }
+  merge_input *in = calloc(1, sizeof *in);
+  if (!in) {
+    return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  }
+  memset(&merged, 0, sizeof merged);
+  int fine = read_request(j, &in->request, problem) && load_input(env, ctx, in, problem) &&
+             orb_merge(ctx, in->shapes, in->names, in->request.shape_count, in->landmarks, in->request.landmarks.count,
+                       &in->request.merge, &merged) == ORB_OK;
+  if (fine) {
+    for (int32_t s = 0; s < in->request.shape_count; s++) {
+      metrics_flips(merged.alignment.shapes[s].certificate.flipped);
+    }
+    fine = store_result_of(env, ctx, j, in, &merged, result, problem);
+  }
+  orb_merge_result_free(ctx, &merged);
+  free_input(ctx, in);
+  free(in);
+  return fine;
+}
