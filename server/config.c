@@ -43,7 +43,6 @@ static const entry table[] = {
     {"derived-bytes", NUMBER(derived_bytes, 1 << 20, INT64_C(1) << 50), "0",
      "bytes of embeddings and supermeshes, the least used leave first; 0: no limit"},
     {"cors", TEXT(cors), "", "origins that browsers may call from, comma-separated, or *"},
-    {"studio", TEXT(studio), "", "a folder of files to serve at / instead of those built in"},
     {"log-level", TEXT(log_level), "info", "debug, info, warn, error"},
     {"log-format", TEXT(log_format), "json", "json or text"},
     {"tls-certificate", TEXT(tls_certificate), "", "PEM file; with tls-key the service speaks https"},

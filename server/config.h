@@ -11,7 +11,6 @@ typedef struct config {
   char file[PATH_MAX / 2];
   char cors[512]; /* origins, comma-separated, or * */
   char log_level[16], log_format[16];
-  char studio[PATH_MAX / 2];
   char tls_certificate[PATH_MAX / 2], tls_key[PATH_MAX / 2];
   char auth[16]; /* auto, required, off */
   int64_t workers, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;

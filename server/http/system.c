@@ -30,15 +30,15 @@ static void metrics_away(request *r) {
   gauge(&text, "orbmorph_waiting_connections", n.waiters);
   gauge(&text, "orbmorph_stored_bytes", (double)catalogue_bytes(srv->cat, 0));
   gauge(&text, "orbmorph_disk_free_bytes", (double)objects_free_bytes(srv->store));
-  long pages = 0;
+  long resident = 0;
   FILE *statm = fopen("/proc/self/statm", "r");
   if (statm) {
-    if (fscanf(statm, "%*d %ld", &pages) != 1) {
-      pages = 0;
+    if (fscanf(statm, "%*d %ld", &resident) != 1) {
+      resident = 0;
     }
     fclose(statm);
   }
-  gauge(&text, "process_resident_memory_bytes", 4096.0 * (double)pages);
+  gauge(&text, "process_resident_memory_bytes", 4096.0 * (double)resident);
   reply_text(r, 200, "text/plain; version=0.0.4; charset=utf-8", &text);
 }
 

@@ -110,7 +110,7 @@ void keep_event(job *j, int64_t number, const char *type, const char *json) {
   job_event *event = &j->events[j->event_count++];
   event->number = number;
   event->json = copy;
-  strncpy(event->type, type, sizeof event->type - 1);
+  copy_text(event->type, sizeof event->type, type);
   event->type[sizeof event->type - 1] = 0;
   j->last_event = number;
 }
@@ -161,7 +161,7 @@ static void show_to_dependents(queue *q, const job *of, const char *stage, doubl
         double shown = 0.6 * (base + fraction) / (double)j->dependency_count;
         int stage_changed = strcmp(j->stage, stage) != 0;
         j->progress = shown > j->progress ? shown : j->progress;
-        strncpy(j->stage, stage, sizeof j->stage - 1);
+        copy_text(j->stage, sizeof j->stage, stage);
         if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
           add_event(q, j, "progress", stage_changed);
         }
@@ -195,7 +195,7 @@ void queue_progress(queue *q, job *j, const char *stage, double fraction) {
   double shown = overall(j, stage, fraction);
   int stage_changed = strncmp(j->stage, stage, sizeof j->stage - 1) != 0;
   j->progress = shown > j->progress ? shown : j->progress; /* never backwards */
-  strncpy(j->stage, stage, sizeof j->stage - 1);
+  copy_text(j->stage, sizeof j->stage, stage);
   if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
     add_event(q, j, "progress", stage_changed);
     if (j->row.kind == ORB_JOB_EMBEDDING) {

@@ -4,6 +4,8 @@
 
 #include <pthread.h>
 
+#include <string.h>
+
 #include "queue/queue.h"
 
 enum { BUCKETS = 8192, KEEP_ENDED = 2048, EVENTS_KEPT = 64, OWNERS = 64, DEPENDENCIES = 16 };
@@ -78,5 +80,12 @@ void add_event(queue *q, job *j, const char *type, int store);
 int64_t prepare_event(job *j, orb_text *json);
 void keep_event(job *j, int64_t number, const char *type, const char *json);
 void *timer_main(void *argument);
+
+/* Copies a text, cut to the room there is. */
+static inline void copy_text(char *to, size_t room, const char *from) {
+  size_t length = strnlen(from, room - 1);
+  memcpy(to, from, length);
+  to[length] = 0;
+}
 
 #endif

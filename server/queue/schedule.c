@@ -38,8 +38,8 @@ static queue_result submit_locked(queue *q, const queue_request *request, job **
   j->row.listed = request->listed;
   j->row.created = unix_ms();
   orb_random_id(j->row.id);
-  strncpy(j->row.key, request->key, sizeof j->row.key - 1);
-  strncpy(j->row.owner, request->owner, sizeof j->row.owner - 1);
+  copy_text(j->row.key, sizeof j->row.key, request->key);
+  copy_text(j->row.owner, sizeof j->row.owner, request->owner);
   table_add(q, j);
   *out = j;
   *fresh = 1;
@@ -91,7 +91,7 @@ static double *service_of(queue *q, const char *owner) {
   }
   if (i == q->owner_count) {
     i = i < OWNERS ? q->owner_count++ : OWNERS - 1;
-    strncpy(q->owners[i].name, owner, sizeof q->owners[i].name - 1);
+    copy_text(q->owners[i].name, sizeof q->owners[i].name, owner);
     double least = 0; /* a newcomer starts level with the one who had least */
     for (int k = 0; k < i; k++) {
       least = k == 0 || q->owners[k].service < least ? q->owners[k].service : least;
