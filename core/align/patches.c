@@ -374,7 +374,8 @@ static orb_status build(patcher *p, const orb_sheet *given, const int32_t *landm
 }
 
 int32_t orb_pin_limit(const orb_sheet *sheet, double growth) {
-  double most = growth * (20000 + sheet->shape.mesh.triangle_count);
+  double own = sheet->shape.mesh.triangle_count, more = growth * (own > 2000 ? own : 2000);
+  double most = own + (more < 800000 ? more : 800000);
   return most < INT32_MAX / 16 ? (int32_t)most : INT32_MAX / 16;
 }
 

@@ -10,7 +10,8 @@
 #include "embed/hierarchy.h"
 
 enum { COARSE = 300, COARSE_A_LANDMARK = 6 };
-static const double GROWTH_SMALL = 1.5, GROWTH_MAX = 16;
+/* How far a sheet may grow: a little for landmarks that merely cross, much for those in quite another order. */
+static const double GROWTH_SMALL = 0.35, GROWTH_MAX = 64;
 
 orb_status orb_pin_relax(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count, orb_preset preset,
                          int32_t sweeps) {

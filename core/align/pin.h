@@ -23,7 +23,7 @@ ORB_MUST_CHECK orb_status orb_pin_joint(orb_context *ctx, orb_sheet *sheets, int
                                         const int32_t *landmarks, int32_t count, orb_preset preset, double growth,
                                         int *held);
 
-/* Most triangles of a sheet that may grow by this factor (and some more, for small ones). */
+/* Most triangles of a sheet that may grow by this share of its own number; small ones by more. */
 int32_t orb_pin_limit(const orb_sheet *sheet, double growth);
 
 /* Sweeps at full resolution with the landmarks pinned, certified; where the sweeps do not lead to a certified

@@ -20,7 +20,7 @@
 #include "numeric/vec3.h"
 
 enum { HALVINGS = 4, RELAXATIONS = 8, RELAX_SWEEPS = 20 };
-static const double DEFAULT_RADIUS = 1.0, GROWTH_MAX = 16;
+static const double DEFAULT_RADIUS = 1.0, GROWTH_MAX = 64;
 
 typedef struct rbf_run {
   orb_context *ctx;
