@@ -20,7 +20,8 @@ typedef struct orb_certificate {
 /* Certifies points (3 a vertex, unit up to rounding) of a closed triangle list. Orientation by a static filter, then
  * exact integers; degree by counting, with signs, the triangles that cover a direction in general position, all decided
  * by exact orientations. (The sum of solid angles / 4π is the same number, but only up to rounding.) Points that are
- * not finite make every triangle at them degenerate. Never fails but for memory and cancel; look at out->valid. O(F). */
+ * not finite make every triangle at them degenerate. Never fails but for memory and cancel; look at out->valid. O(F).
+ */
 ORB_MUST_CHECK orb_status orb_certify(orb_context *ctx, const double *points, int32_t vertex_count,
                                       const int32_t *triangles, int32_t triangle_count, orb_certificate *out);
 
@@ -33,7 +34,8 @@ typedef struct orb_measure {
 } orb_measure;
 
 /* How a map stretches: both areas scaled equal, the image of a triangle is its flat chord triangle, σ₁ ≥ σ₂ singular
- * values. Source triangles of zero area have no weight. */
+ * values. Source triangles of zero area (to rounding: |U×W| ≤ 1e-13 (U² + W²)) have no weight; where all are such,
+ * every number is 0. */
 typedef struct orb_distortion {
   orb_measure symmetric_dirichlet; /* ¼(σ₁²+σ₁⁻²+σ₂²+σ₂⁻²), 1 = isometric */
   orb_measure angle;               /* σ₁/σ₂ */
@@ -68,7 +70,7 @@ typedef struct orb_embed_options {
 void orb_embed_defaults(orb_embed_options *options);
 
 typedef struct orb_embed_timings {
-  double check, simplify, embed, certify, total; /* seconds */
+  double check, simplify, embed, certify, total; /* seconds; check is 0 here: it is the caller's orb_mesh_repair() */
 } orb_embed_timings;
 
 typedef struct orb_embedding {
@@ -80,8 +82,9 @@ typedef struct orb_embedding {
 } orb_embedding;
 
 /* Embeds a mesh that orb_mesh_repair() accepted. The result is certified, or ORB_E_NOT_CERTIFIED is returned and no
- * embedding. Same bytes for any number of threads. Stages: "simplify", "embed", "certify". Source: DESIGN in
- * docs/method.md; O(n log n) time, at most 250 bytes a triangle beside the mesh. */
+ * embedding. Same bytes for any number of threads on one machine; between
+ * instruction sets (AVX-512, AVX2, none: chosen at run time) the last bits may differ. Stages: "simplify", "embed",
+ * "certify". Source: DESIGN in docs/method.md; O(n log n) time, at most 250 bytes a triangle beside the mesh. */
 ORB_MUST_CHECK orb_status orb_embed(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
                                     orb_embedding *out);
 void orb_embedding_free(orb_context *ctx, orb_embedding *embedding);
