@@ -19,6 +19,7 @@
 
 #include "base/check.h"
 #include "numeric/vec3.h"
+#include "transfer/coarse.h"
 #include "transfer/rotation.h"
 
 enum { GRAIN = 2048, SMOOTHING = 2, MAX_ITERATIONS = 3000 };
@@ -33,7 +34,8 @@ struct orb_arap {
   double *weight;            /* of each neighbour entry; symmetric */
   double *diagonal;          /* a vertex: the sum of its weights */
   double *turn;              /* a vertex: its rotation vector */
-  double whole[3];           /* rotation vector of b as a whole */
+  orb_coarse coarse;
+  double whole[3]; /* rotation vector of b as a whole */
   double middle_a[3], middle_b[3];
 };
 
@@ -68,6 +70,7 @@ void orb_arap_destroy(orb_context *ctx, orb_arap *path) {
     orb_free(ctx, path->weight);
     orb_free(ctx, path->diagonal);
     orb_free(ctx, path->turn);
+    orb_coarse_free(ctx, &path->coarse);
     orb_free(ctx, path);
   }
 }
@@ -298,6 +301,9 @@ orb_status orb_arap_create(orb_context *ctx, const double *a, const double *b, i
   if (status == ORB_OK) {
     status = make_turns(ctx, path);
   }
+  if (status == ORB_OK) {
+    status = orb_coarse_create(ctx, path->first, path->neighbor, path->weight, vertex_count, &path->coarse);
+  }
   if (status != ORB_OK) {
     orb_arap_destroy(ctx, path);
     return status;
@@ -311,12 +317,13 @@ typedef struct solver {
   const orb_arap *path;
   double t;
   double *x, *r, *p, *q;
+  orb_coarse *coarse; /* its sums: the correction of the present r */
   double (*sums)[6];
   double step[3];
   double beta[3];
 } solver;
 
-/* r = Σ w d − L x, the right-hand side less what x already gives; p = r / diagonal; sums of r·r / diagonal. */
+/* r = Σ w d − L x, the right-hand side less what x already gives; p = 0; sums of w d². */
 static void begin_body(void *arg, int64_t begin, int64_t end, int thread) {
   solver *s = arg;
   const orb_arap *path = s->path;
@@ -337,13 +344,12 @@ static void begin_body(void *arg, int64_t begin, int64_t end, int thread) {
       for (int c = 0; c < 3; c++) {
         double wanted = (1 - s->t) * forth[c] + s->t * back[c];
         r[c] += path->weight[i] * (wanted - (s->x[3 * v + c] - s->x[3 * u + c]));
-        sum[3 + c] += path->weight[i] * wanted * wanted;
+        sum[c] += path->weight[i] * wanted * wanted;
       }
     }
     for (int c = 0; c < 3; c++) {
       s->r[3 * v + c] = r[c];
-      s->p[3 * v + c] = r[c] / path->diagonal[v];
-      sum[c] += r[c] * r[c] / path->diagonal[v];
+      s->p[3 * v + c] = 0;
     }
   }
   memcpy(s->sums[begin / GRAIN], sum, sizeof sum);
@@ -374,28 +380,40 @@ static void multiply_body(void *arg, int64_t begin, int64_t end, int thread) {
   memcpy(s->sums[begin / GRAIN], sum, sizeof sum);
 }
 
-/* x += step p, r −= step q, and the sums of r·r / diagonal. */
+/* x += step p, r −= step q. */
 static void step_body(void *arg, int64_t begin, int64_t end, int thread) {
   solver *s = arg;
-  double sum[6] = {0};
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
     for (int c = 0; c < 3; c++) {
       s->x[3 * v + c] += s->step[c] * s->p[3 * v + c];
       s->r[3 * v + c] -= s->step[c] * s->q[3 * v + c];
-      sum[c] += s->r[3 * v + c] * s->r[3 * v + c] / s->path->diagonal[v];
+    }
+  }
+}
+
+/* q = the preconditioned r: by the diagonal, and the groups' correction; the sums of r·q. */
+static void precondition_body(void *arg, int64_t begin, int64_t end, int thread) {
+  solver *s = arg;
+  double sum[6] = {0};
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    const double *shift = s->coarse->sums + 3 * (int64_t)s->coarse->group[v];
+    for (int c = 0; c < 3; c++) {
+      s->q[3 * v + c] = s->r[3 * v + c] / s->path->diagonal[v] + shift[c];
+      sum[c] += s->q[3 * v + c] * s->r[3 * v + c];
     }
   }
   memcpy(s->sums[begin / GRAIN], sum, sizeof sum);
 }
 
-/* p = r / diagonal + beta p. */
+/* p = q + beta p. */
 static void direction_body(void *arg, int64_t begin, int64_t end, int thread) {
   solver *s = arg;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
     for (int c = 0; c < 3; c++) {
-      s->p[3 * v + c] = s->r[3 * v + c] / s->path->diagonal[v] + s->beta[c] * s->p[3 * v + c];
+      s->p[3 * v + c] = s->q[3 * v + c] + s->beta[c] * s->p[3 * v + c];
     }
   }
 }
@@ -412,26 +430,26 @@ static void run(orb_context *ctx, solver *s, orb_loop_fn body, double sums[6]) {
 }
 
 static orb_status solve(orb_context *ctx, solver *s) {
-  double rho[6], now[6], limit[3];
-  run(ctx, s, begin_body, rho);
-  for (int c = 0; c < 3; c++) {
-    limit[c] = TOLERANCE * TOLERANCE * (rho[3] + rho[4] + rho[5]);
-  }
+  double rho[6] = {0}, now[6];
+  run(ctx, s, begin_body, now);
+  double limit = TOLERANCE * TOLERANCE * (now[0] + now[1] + now[2]);
   for (int iteration = 0; iteration < MAX_ITERATIONS; iteration++) {
-    if (rho[0] <= limit[0] && rho[1] <= limit[1] && rho[2] <= limit[2]) {
-      break;
-    }
     ORB_TRY(orb_context_check(ctx));
-    run(ctx, s, multiply_body, now);
-    for (int c = 0; c < 3; c++) {
-      s->step[c] = rho[c] > limit[c] && now[c] > 0 ? rho[c] / now[c] : 0;
-    }
-    run(ctx, s, step_body, now);
+    orb_coarse_solve(s->coarse, s->r);
+    run(ctx, s, precondition_body, now);
     for (int c = 0; c < 3; c++) {
       s->beta[c] = rho[c] > 0 ? now[c] / rho[c] : 0;
       rho[c] = now[c];
     }
+    if (rho[0] <= limit && rho[1] <= limit && rho[2] <= limit) {
+      break;
+    }
     run(ctx, s, direction_body, NULL);
+    run(ctx, s, multiply_body, now);
+    for (int c = 0; c < 3; c++) {
+      s->step[c] = rho[c] > 0 && now[c] > 0 ? rho[c] / now[c] : 0;
+    }
+    run(ctx, s, step_body, NULL);
   }
   return ORB_OK;
 }
@@ -453,9 +471,9 @@ static void place_whole(const orb_arap *path, double t, double *x, const double 
   }
 }
 
-orb_status orb_arap_at(orb_context *ctx, const orb_arap *path, double t, double *out) {
+orb_status orb_arap_at(orb_context *ctx, orb_arap *path, double t, double *out) {
   int64_t n = 3 * (int64_t)path->vertex_count, chunks = ((int64_t)path->vertex_count + GRAIN - 1) / GRAIN;
-  solver s = {.path = path, .t = t, .x = out};
+  solver s = {.path = path, .t = t, .x = out, .coarse = &path->coarse};
   double *start = ORB_NEW(ctx, double, n);
   s.r = ORB_NEW(ctx, double, n);
   s.p = ORB_NEW(ctx, double, n);

@@ -1,0 +1,24 @@
+/* A coarse correction for conjugate gradients on a graph Laplacian: vertices lumped into a few hundred groups, whose
+ * small system is solved exactly. It carries over long ways what a diagonal preconditioner hands from vertex to vertex
+ * (two-level additive Schwarz without overlap). */
+#ifndef ORB_TRANSFER_COARSE_H
+#define ORB_TRANSFER_COARSE_H
+
+#include "orbmorph/context.h"
+
+typedef struct orb_coarse {
+  int32_t vertex_count, group_count;
+  int32_t *group; /* a vertex */
+  double *factor; /* Cholesky factor, group_count², row-major, lower */
+  double *sums;   /* 3·group_count, scratch */
+} orb_coarse;
+
+/* Neighbours of v are neighbor[first[v]] …, with symmetric positive weights. */
+ORB_MUST_CHECK orb_status orb_coarse_create(orb_context *ctx, const int32_t *first, const int32_t *neighbor,
+                                            const double *weight, int32_t vertex_count, orb_coarse *out);
+void orb_coarse_free(orb_context *ctx, orb_coarse *coarse);
+
+/* Solves the groups' system for r (3 a vertex), into coarse->sums: the correction of group g is sums[3g] … */
+void orb_coarse_solve(orb_coarse *coarse, const double *r);
+
+#endif
