@@ -37,7 +37,7 @@ async function pickThree(page) {
 
 async function morph(page) {
   await button(page, /^Morph \d shapes$/).click();
-  await until(() => button(page, 'Pause').count(), 'the morph plays', 240_000);
+  await until(() => button(page, 'Pause').count(), 'the morph plays', 90_000);
 }
 
 test('from the empty page to a playing morph in at most five clicks', async () => {
@@ -50,7 +50,7 @@ test('from the empty page to a playing morph in at most five clicks', async () =
   await click('Try with samples');
   await until(() => page.locator('.card.ready').count().then((n) => n === 2), 'two samples are taken');
   await click(/^Morph 2 shapes$/);
-  await until(() => button(page, 'Pause').count(), 'the morph plays', 240_000);
+  await until(() => button(page, 'Pause').count(), 'the morph plays', 90_000);
   const seen = new Set();
   await until(async () => seen.add(await time(page)).size > 5, 'time passes');
   assert.ok(clicks <= 5, `${clicks} clicks`);
@@ -236,7 +236,7 @@ test('landmarks are found', async () => {
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await button(page, 'Landmarks').click();
   await button(page, 'Find them for me').click();
-  await until(() => page.locator('.toast').count(), 'an answer', 240_000);
+  await until(() => page.locator('.toast').count(), 'an answer', 90_000);
   const text = await page.locator('.toast').innerText();
   const found = Number(text.match(/^(\d+) landmarks found/)?.[1] ?? 0);
   assert.equal(await landmarks(page).count(), found);
@@ -251,7 +251,7 @@ test('a job goes on when the page is closed, and is found again', async () => {
   const address = await until(() => (/j=[^&]+/.test(first.page.url()) || /r=/.test(first.page.url())) && first.page.url(), 'the address names the job');
   await first.done();
   const second = await openPage(browser, daemon.url, { hash: new URL(address).hash });
-  await until(() => button(second.page, /^(Play|Pause)$/).count(), 'the morph is there', 240_000);
+  await until(() => button(second.page, /^(Play|Pause)$/).count(), 'the morph is there', 90_000);
   await second.done();
 });
 
@@ -283,6 +283,8 @@ test('spheres: certified, painted, measured', async () => {
 test('the error of the common mesh is measured and below the tolerance', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await page.getByText('Options', { exact: true }).click();
+  await button(page, 'As in the files').click();
   await morph(page);
   await button(page, 'Error').click();
   await until(() => page.locator('.pane .legend').count().then((n) => n === 2), 'both shapes are measured', 120_000);

@@ -99,7 +99,9 @@ export interface Supermesh {
   }[];
   landmarks: (Partial<Landmark> & { name?: string; residual_relative?: number[] })[];
   certificate: { closed: boolean; genus: number; flipped: number[]; degree: number[]; landmarks_exact: boolean };
-  pairs?: unknown[];
+  pairs?: { a: number; b: number; distortion: Distortion; inverted_fraction: number }[];
+  /** The request that it answers, with every default written out. */
+  request?: SupermeshRequest;
   timings_ms: Record<string, number>;
   engine: string;
 }

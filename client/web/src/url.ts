@@ -112,13 +112,13 @@ export async function restore() {
       const [places, name = ''] = text.split('~');
       return { name, at: places.split(':').map(decodePlace) as Place[] };
     });
-    if (landmarks.length) await takeLandmarks(landmarks, false);
+    if (landmarks.length) await takeLandmarks(landmarks, { undoable: false });
     const paint = PAINTS.find((name) => name === query.get('paint'));
     if (paint) setPaint(paint);
     if (query.get('wire')) set({ wire: true });
     if (result && ids.length) {
       const supermesh = await client.getSupermesh(result).catch(() => null);
-      if (supermesh) await openResult(supermesh, null);
+      if (supermesh) await openResult(supermesh, supermesh.request ?? null);
     } else if (result) await openSupermesh(result, false);
     const time = Number(query.get('t'));
     if (state.result && query.has('t') && Number.isFinite(time)) player.seek(time);

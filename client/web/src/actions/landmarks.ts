@@ -67,13 +67,13 @@ export function forgetShape(key: string) {
 }
 
 /** Replaces the landmarks by those of a file or of an answer. -> how many were taken */
-export async function takeLandmarks(list: Pick<WireLandmark, 'name' | 'at'>[], undoable = true): Promise<number> {
+export async function takeLandmarks(list: Pick<WireLandmark, 'name' | 'at'>[], { undoable = true, snap = false } = {}): Promise<number> {
   const shapes = readyShapes();
   const made: Landmark[] = list.map((l) => ({ id: ++count, name: l.name ?? '', at: {} }));
   await Promise.all(
     shapes.map(async (shape, index) => {
       const wanted = list.map((l, row) => ({ row, place: l.at?.[index] })).filter((w) => w.place);
-      const spots = await work('locate', shape.key, wanted.map((w) => w.place as Place));
+      const spots = await work('locate', shape.key, wanted.map((w) => w.place as Place), snap);
       wanted.forEach((w, i) => {
         if (spots[i]) made[w.row].at[shape.key] = spots[i]!;
       });

@@ -16,7 +16,7 @@ export function buildRequest(find = false): SupermeshRequest {
   if (!find && options.align !== 'default') request.align = { method: options.align };
   request.remesh = { method: options.remesh, tolerance: options.tolerance };
   if (options.maxTriangles) request.remesh.max_triangles = options.maxTriangles;
-  request.asset = { fit: options.fit };
+  request.asset = { fit: find ? 'none' : options.fit };
   if (options.path !== 'linear') request.asset.path = options.path;
   return request;
 }
@@ -55,7 +55,7 @@ async function follow(running: Running, get: () => Promise<Supermesh>, request: 
     const supermesh = await get();
     if (running.purpose === 'find') await takeFound(supermesh);
     else {
-      await openResult(supermesh, request);
+      await openResult(supermesh, request ?? supermesh.request ?? null);
       set({ tab: 'morph', show: 'morph' });
       player.play();
     }
@@ -72,13 +72,16 @@ function tell(error: unknown) {
   return { title: 'That did not work', detail: (error as Error).message, facts: null };
 }
 
+const PROPOSALS = 12;
+
+/** The landmarks that the answer names, or else well-spread places of the correspondence it stands for. */
 async function takeFound(supermesh: Supermesh) {
-  const found = (supermesh.landmarks ?? []).filter((l): l is Landmark => Array.isArray(l.at));
-  const taken = found.length ? await takeLandmarks(found) : 0;
-  if (taken) {
-    set({ tab: 'landmarks' });
-    toast(`${taken} landmarks found. Drag those that are off.`);
-  } else toast('The shapes were matched, but no single points stand out. “Morph” uses the match as it is.');
+  const named = (supermesh.landmarks ?? []).filter((l): l is Landmark => Array.isArray(l.at));
+  const points = named.length ? [] : await work('propose', await client.asset(supermesh.id), supermesh.shapes.length, PROPOSALS);
+  const found = named.length ? named : points.map((at) => ({ name: '', at: at.map((point) => ({ point })) }));
+  const taken = await takeLandmarks(found, { snap: true });
+  set({ tab: 'landmarks' });
+  toast(`${taken} landmarks found. Drag those that are off.`);
 }
 
 export function cancelMerge() {
@@ -126,11 +129,12 @@ export async function measureErrors() {
   const { result } = state;
   if (!result) return;
   const shapes = readyShapes();
+  const fit = (result.supermesh.request ?? result.request)?.asset?.fit ?? 'none';
   for (const [index, shape] of shapes.entries()) {
     if (shape.error?.result === result.supermesh.id || shape.mesh?.id !== result.supermesh.shapes[index]?.mesh) continue;
     set({ loading: `Measuring the error on ${shape.name}` });
     try {
-      const found = await work('error', shape.key, result.supermesh.id, index);
+      const found = await work('error', shape.key, result.supermesh.id, index, index > 0 && fit !== 'none');
       const model = shape.model!.twin();
       model.attribute('value', found.values);
       model.paint({ kind: 'value', ramp: 'heat', low: 0, high: Math.max(found.max, 1e-9) });

@@ -31,7 +31,7 @@ export async function openSupermesh(id: string, play = true) {
   try {
     const supermesh = await client.getSupermesh(id);
     await bringShapes(supermesh);
-    await openResult(supermesh, null);
+    await openResult(supermesh, supermesh.request ?? null);
     set({ tab: 'morph', show: 'morph' });
     if (play) player.play();
   } catch (error) {
@@ -45,8 +45,9 @@ async function bringShapes(supermesh: Supermesh) {
   if (wanted.length === present.length && wanted.every((id, i) => id === present[i])) return;
   for (const shape of [...state.shapes]) removeShape(shape.key);
   for (const id of wanted) await addFromServer(await client.getMesh(id));
-  const placed = (supermesh.landmarks ?? []).flatMap((l) => (l.at ? [{ name: l.name, at: l.at }] : []));
-  if (placed.length) await takeLandmarks(placed, false);
+  const given = supermesh.request?.landmarks;
+  const placed = Array.isArray(given) ? given : [];
+  if (placed.length) await takeLandmarks(placed, { undoable: false });
 }
 
 export async function watchJob(id: string) {

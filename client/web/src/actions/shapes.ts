@@ -1,5 +1,5 @@
 /** Bringing shapes in: files, samples, meshes that are on the server; refusals and how to mend them. */
-import { ProblemError, type Mesh } from 'orbmorph';
+import { ProblemError, type Mesh, type Problem } from 'orbmorph';
 import samples from 'virtual:samples';
 import { client, patch, set, shapeOf, state, tint, toast, type Shape } from '../state';
 import { work } from '../mesh/work';
@@ -143,9 +143,9 @@ export function mend(key: string, repair: string) {
 }
 
 /** The repairs that a refusal can be answered with. */
-export function remedies(problem: { type: string }): { repair: string; label: string }[] {
+export function remedies(problem: Problem): { repair: string; label: string }[] {
   const kind = problem.type.split('/').pop();
   if (kind === 'not-closed') return [{ repair: 'safe,fill_holes', label: 'Fill the holes' }];
-  if (kind === 'not-connected') return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }];
+  if (kind === 'not-connected' || (kind === 'not-manifold' && problem.components)) return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }];
   return [];
 }

@@ -8,6 +8,7 @@ import { decodeMorph, type MorphData } from './morph';
 import { decodeSphere } from './distortion';
 import { buildDisplay, faultyEdges, loosePieces, type Display, type Frame } from './geometry';
 import { parseMesh, type RawMesh } from './parse';
+import { proposeLandmarks } from './propose';
 import type { Place } from 'orbmorph';
 
 interface Held {
@@ -109,7 +110,8 @@ const ops = {
     return hit && spotOn(mesh, hit.triangle, hit.u, hit.v);
   },
 
-  locate(key: string, places: Place[]): (Spot | null)[] {
+  /** With `snap`, points become the vertex that is near. */
+  locate(key: string, places: Place[], snap = false): (Spot | null)[] {
     const mesh = held.get(key);
     if (!mesh) return places.map(() => null);
     const { raw, frame } = mesh;
@@ -127,6 +129,7 @@ const ops = {
         return { position: toView(frame, point), normal: faceNormal(raw, place.triangle), place };
       }
       const hit = bvhOf(mesh).closest(place.point[0], place.point[1], place.point[2]);
+      if (hit && snap) return spotOn(mesh, hit.triangle, hit.u, hit.v);
       return hit && { position: toView(frame, place.point), normal: faceNormal(raw, hit.triangle), place };
     });
   },
@@ -174,13 +177,18 @@ const ops = {
     return data;
   },
 
+  /** From an asset with `fit` none: for each proposal a point on every shape, in the coordinates of its file. */
+  propose(buffer: ArrayBuffer, shapeCount: number, count: number): [number, number, number][][] {
+    return proposeLandmarks(decodeMorph(buffer, shapeCount), count);
+  },
+
   sphere: decodeSphere,
 
   /**
-   * For each vertex drawn of a shape its distance from the supermesh, relative to the shape's diagonal. The asset may
-   * have moved and scaled the shape (asset.fit), so both are first brought together (see settle).
+   * For each vertex drawn of a shape its distance from the supermesh, relative to the shape's diagonal. Where the asset
+   * has moved and scaled the shape (asset.fit), both are first brought together (see settle).
    */
-  error(key: string, morphKey: string, shape: number): { values: Float32Array; max: number; rms: number } {
+  error(key: string, morphKey: string, shape: number, fitted: boolean): { values: Float32Array; max: number; rms: number } {
     const mesh = held.get(key);
     const morph = morphs.get(morphKey);
     if (!mesh || !morph) throw new Error('The shape or the morph is not loaded.');
@@ -191,7 +199,7 @@ const ops = {
     });
     const file = new Float64Array(moved.length);
     for (let i = 0; i < moved.length; i++) file[i] = moved[i] * morph.frame.radius + morph.frame.center[i % 3];
-    const place = settle(raw, file, morph.index);
+    const place = fitted ? settle(raw, file, morph.index) : file;
     const bvh = new Bvh(place, morph.index);
     const n = raw.positions.length / 3;
     const distance = new Float32Array(n).fill(-1);
@@ -199,18 +207,33 @@ const ops = {
     let max = 0;
     let sum = 0;
     let count = 0;
+    const p = raw.positions;
+    const away = (x: number, y: number, z: number) => {
+      const hit = bvh.closest(x, y, z, last) ?? bvh.closest(x, y, z);
+      last = (hit?.t ?? 0) * 4 + 0.02 * frame.radius;
+      const d = (hit?.t ?? 0) / (2 * frame.radius);
+      max = Math.max(max, d);
+      sum += d * d;
+      count++;
+      return d;
+    };
+    // at vertices, and between them: a triangle's largest error shows at its corners
     for (let c = 0; c < raw.corners.length; c++) {
       const v = raw.corners[c];
-      if (distance[v] >= 0) continue;
-      const [x, y, z] = [raw.positions[3 * v], raw.positions[3 * v + 1], raw.positions[3 * v + 2]];
-      let hit = bvh.closest(x, y, z, last);
-      if (!hit) hit = bvh.closest(x, y, z);
-      last = (hit?.t ?? 0) * 4 + 0.02 * frame.radius;
-      distance[v] = (hit?.t ?? 0) / (2 * frame.radius);
-      max = Math.max(max, distance[v]);
-      sum += distance[v] ** 2;
-      count++;
+      if (distance[v] < 0) distance[v] = away(p[3 * v], p[3 * v + 1], p[3 * v + 2]);
     }
+    const middle = [0, 0, 0];
+    for (let t = 0; t < raw.corners.length; t += 3)
+      for (let k = 0; k < 4; k++) {
+        const used = k === 3 ? [0, 1, 2] : [k, (k + 1) % 3];
+        if (k < 3 && raw.corners[t + k] > raw.corners[t + used[1]]) continue; // each edge once
+        for (let i = 0; i < 3; i++) middle[i] = used.reduce((total, corner) => total + p[3 * raw.corners[t + corner] + i], 0) / used.length;
+        const d = away(middle[0], middle[1], middle[2]);
+        for (const corner of used) {
+          const v = raw.corners[t + corner];
+          if (d > distance[v]) distance[v] = d;
+        }
+      }
     const display = buildDisplay(raw);
     const values = new Float32Array(display.position.length / 3);
     for (let c = 0; c < raw.corners.length; c++) values[display.index[c]] = distance[raw.corners[c]];
@@ -221,24 +244,20 @@ const ops = {
 export type Ops = typeof ops;
 
 /**
- * Undoes a similarity that the asset may have applied to a shape: the least-squares similarity between the two
- * surfaces, from the boxes' size first and then by a few rounds of nearest points. Where the boxes agree already
- * nothing is moved.
+ * Undoes the similarity that the asset has applied to a shape: the least-squares similarity between the two
+ * surfaces, from 24 rotations by nearest points, then by tangent planes.
  */
 function settle(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64Array {
   const a = moments(raw.positions, raw.corners);
   const b = moments(place, index);
-  const offset = Math.hypot(a.center[0] - b.center[0], a.center[1] - b.center[1], a.center[2] - b.center[2]);
-  if (offset < 0.01 * a.spread && Math.abs(a.spread / b.spread - 1) < 0.01 && sameBox(raw, place)) return place;
   const scale = a.spread / b.spread;
   let best: Float64Array = place;
   let least = Infinity;
   const bvh = new Bvh(raw.positions, raw.corners);
   const stride = Math.max(1, Math.floor(place.length / 3 / 1500));
-  for (const turn of rotations()) {
-    let moved = moved3(place, turn, scale, b.center, a.center);
+  const nearer = (moved: Float64Array, rounds: number, gain: number): [Float64Array, number] => {
     let cost = Infinity;
-    for (let round = 0; round < 12; round++) {
+    for (let round = 0; round < rounds; round++) {
       const from: number[][] = [];
       const to: number[][] = [];
       let sum = 0;
@@ -250,35 +269,78 @@ function settle(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64A
         to.push(pointOf(raw, hit.triangle, [1 - hit.u - hit.v, hit.u, hit.v]));
         sum += hit.t * hit.t;
       }
-      if (sum > 0.999 * cost && round > 2) break;
+      if (sum > gain * cost) break;
       cost = sum;
       if (round === 3 && sum > 4 * least) break;
       moved = applyFit(moved, from, to);
     }
+    return [moved, cost];
+  };
+  for (const turn of rotations()) {
+    const [moved, cost] = nearer(moved3(place, turn, scale, b.center, a.center), 12, 0.98);
     if (cost < least) {
       least = cost;
       best = moved;
     }
   }
+  for (let round = 0; round < 25; round++) {
+    const next = towardsPlanes(raw, bvh, best, stride);
+    if (!next) break;
+    best = next;
+  }
   return best;
 }
 
-function sameBox(raw: RawMesh, place: Float64Array): boolean {
-  const box = (p: Float64Array, used?: Uint32Array) => {
-    const out = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
-    const n = used ? used.length : p.length / 3;
-    for (let i = 0; i < n; i++)
-      for (let k = 0; k < 3; k++) {
-        const x = p[3 * (used ? used[i] : i) + k];
-        out[k] = Math.min(out[k], x);
-        out[3 + k] = Math.max(out[3 + k], x);
-      }
-    return out;
-  };
-  const a = box(raw.positions, raw.corners);
-  const b = box(place);
-  const d = Math.hypot(a[3] - a[0], a[4] - a[1], a[5] - a[2]);
-  return a.every((x, k) => Math.abs(x - b[k]) < 0.02 * d);
+/**
+ * One step of a similarity towards the tangent planes of the nearest points, which converges far faster than nearest
+ * points do: least squares in turn (3), shift (3) and scale (1) about the centre. -> null where it changes nothing.
+ */
+function towardsPlanes(raw: RawMesh, bvh: Bvh, all: Float64Array, stride: number): Float64Array | null {
+  const c = [0, 1, 2].map((k) => {
+    let sum = 0;
+    for (let i = k; i < all.length; i += 3) sum += all[i];
+    return (sum * 3) / all.length;
+  });
+  const A = Array.from({ length: 7 }, () => new Array<number>(8).fill(0));
+  let size = 0;
+  for (let i = 0; i < all.length; i += 3 * stride) {
+    const hit = bvh.closest(all[i], all[i + 1], all[i + 2]);
+    if (!hit) continue;
+    const q = pointOf(raw, hit.triangle, [1 - hit.u - hit.v, hit.u, hit.v]);
+    const n = faceNormal(raw, hit.triangle);
+    const d = [all[i] - c[0], all[i + 1] - c[1], all[i + 2] - c[2]];
+    size = Math.max(size, Math.hypot(d[0], d[1], d[2]));
+    const row = [
+      d[1] * n[2] - d[2] * n[1], d[2] * n[0] - d[0] * n[2], d[0] * n[1] - d[1] * n[0],
+      n[0], n[1], n[2], n[0] * d[0] + n[1] * d[1] + n[2] * d[2],
+      n[0] * (q[0] - all[i]) + n[1] * (q[1] - all[i + 1]) + n[2] * (q[2] - all[i + 2]),
+    ];
+    for (let r = 0; r < 7; r++) for (let k = 0; k < 8; k++) A[r][k] += row[r] * row[k];
+  }
+  for (let r = 0; r < 7; r++) A[r][r] *= 1 + 1e-9;
+  for (let r = 0; r < 7; r++) {
+    let pivot = r;
+    for (let k = r + 1; k < 7; k++) if (Math.abs(A[k][r]) > Math.abs(A[pivot][r])) pivot = k;
+    [A[r], A[pivot]] = [A[pivot], A[r]];
+    if (Math.abs(A[r][r]) < 1e-300) return null;
+    for (let k = 0; k < 7; k++) {
+      if (k === r) continue;
+      const f = A[k][r] / A[r][r];
+      for (let j = r; j < 8; j++) A[k][j] -= f * A[r][j];
+    }
+  }
+  const x = A.map((row, r) => row[7] / row[r]);
+  const angle = Math.hypot(x[0], x[1], x[2]);
+  if (angle + Math.hypot(x[3], x[4], x[5]) / size + Math.abs(x[6]) < 1e-10) return null;
+  const [ux, uy, uz] = angle > 0 ? [x[0] / angle, x[1] / angle, x[2] / angle] : [1, 0, 0];
+  const s = Math.sin(angle);
+  const h = 1 - Math.cos(angle);
+  const m = [
+    1 - h * (uy * uy + uz * uz), h * ux * uy - s * uz, h * ux * uz + s * uy,
+    h * ux * uy + s * uz, 1 - h * (ux * ux + uz * uz), h * uy * uz - s * ux,
+    h * ux * uz - s * uy, h * uy * uz + s * ux, 1 - h * (ux * ux + uy * uy),
+  ];
+  return moved3(all, m, Math.exp(x[6]), c, [c[0] + x[3], c[1] + x[4], c[2] + x[5]]);
 }
 
 /** Centre of area and root mean square radius. */

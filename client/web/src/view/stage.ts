@@ -118,7 +118,7 @@ export class Stage {
 
   /** Has the programs of an object compiled beside the page's work; nothing is drawn until they are there. */
   prepare(object: Object3D) {
-    if (!this.renderer) return;
+    if (!this.renderer?.extensions.has('KHR_parallel_shader_compile')) return;
     this.preparing++;
     void this.renderer.compileAsync(object, this.camera).catch(() => {}).finally(() => {
       this.preparing--;
