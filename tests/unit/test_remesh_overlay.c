@@ -1,0 +1,229 @@
+/* The overlay: the exact common refinement, against brute evaluation of the shapes. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "numeric/vec3.h"
+#include "support_sphere.h"
+
+static orb_context *make_context(int threads) {
+  orb_context *ctx;
+  orb_context_options options = {.threads = threads};
+  assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
+  return ctx;
+}
+
+static orb_status overlay(orb_context *ctx, const orb_aligned_shape *shapes, int count, orb_supermesh *out) {
+  orb_remesh_options options;
+  orb_remesh_defaults(&options);
+  options.method = ORB_REMESH_OVERLAY;
+  orb_status status = orb_remesh(ctx, shapes, count, 0, &options, out);
+  if (status != ORB_OK && status != ORB_E_NO_MEMORY) {
+    print_message("%s: %s\n", orb_status_name(status), orb_context_error(ctx)->detail);
+  }
+  return status;
+}
+
+/* Flat pieces: inside every supermesh triangle each shape is linear, so that the shape in the direction of a mixture of
+ * the corners is the mixture of their positions, up to the projective weights of the two flat triangles. Compared by
+ * distance to the plane and by the shape's own brute evaluation at three inner directions. */
+static void assert_exact(const orb_supermesh *m, const orb_aligned_shape *shapes, int count, int every) {
+  static const double weight[3][3] = {{.4, .3, .3}, {.8, .1, .1}, {.1, .2, .7}};
+  for (int s = 0; s < count; s++) {
+    const orb_mesh *mesh = &shapes[s].mesh;
+    double diagonal = sphere_diagonal(&shapes[s]);
+    for (int32_t t = 0; t < m->triangle_count; t += every) {
+      double corner[3][3], direction[3], p[3], u[3], v[3], n[3], d[3];
+      for (int k = 0; k < 3; k++) {
+        int32_t c = m->triangles[3 * t + k];
+        orb_place_position(mesh, &m->places[(size_t)s * (size_t)m->vertex_count + (size_t)c], corner[k]);
+      }
+      orb_sub(corner[1], corner[0], u);
+      orb_sub(corner[2], corner[0], v);
+      orb_cross(u, v, n);
+      if (orb_length(n) < 1e-9 * diagonal * diagonal) {
+        continue; /* too small for its plane to mean anything in doubles */
+      }
+      (void)orb_normalize(n);
+      for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+          direction[j] = 0;
+          for (int k = 0; k < 3; k++) {
+            direction[j] += weight[i][k] * m->points[3 * m->triangles[3 * t + k] + j];
+          }
+        }
+        (void)orb_normalize(direction);
+        sphere_evaluate(&shapes[s], direction, p);
+        orb_sub(p, corner[0], d);
+        assert_true(fabs(orb_dot(n, d)) < 1e-6 * diagonal);
+      }
+    }
+  }
+}
+
+/* Every input vertex is one supermesh vertex, and every input edge a chain of supermesh edges: its length in space is
+ * made up by those supermesh edges that lie on it. */
+static void assert_edges_present(const orb_supermesh *m, const orb_aligned_shape *shape, int s) {
+  const orb_mesh *mesh = &shape->mesh;
+  double along = 0, length = 0;
+  for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
+    const double *a = mesh->positions + 3 * mesh->triangles[h], *b = mesh->positions + 3 * mesh->triangles[orb_next(h)];
+    length += sqrt(orb_distance2(a, b));
+  }
+  for (int32_t h = 0; h < 3 * m->triangle_count; h++) {
+    const orb_place *p = &m->places[s * m->vertex_count + m->triangles[h]];
+    const orb_place *q = &m->places[s * m->vertex_count + m->triangles[orb_next(h)]];
+    int32_t support[4];
+    int n = 0;
+    for (int e = 0; e < 2; e++) {
+      const orb_place *place = e ? q : p;
+      for (int k = 0; k < 3; k++) {
+        int32_t v = mesh->triangles[3 * place->triangle + k];
+        if (place->at[k] > 0 && (n < 1 || support[0] != v) && (n < 2 || support[1] != v) && n < 3) {
+          support[n++] = v;
+        }
+      }
+    }
+    if (n == 2) {
+      double a[3], b[3];
+      orb_place_position(mesh, p, a);
+      orb_place_position(mesh, q, b);
+      along += sqrt(orb_distance2(a, b));
+    }
+  }
+  assert_true(fabs(along - length) < 1e-9 * length);
+}
+
+static void check(const orb_aligned_shape *shapes, int count, orb_context *ctx, int every, double least, double most) {
+  orb_supermesh m;
+  assert_int_equal(overlay(ctx, shapes, count, &m), ORB_OK);
+  sphere_assert_valid(&m, shapes, count);
+  assert_exact(&m, shapes, count, every);
+  int64_t inputs = 0;
+  for (int s = 0; s < count; s++) {
+    assert_edges_present(&m, &shapes[s], s);
+    assert_true(m.error_bound[s] < 1e-9 * sphere_diagonal(&shapes[s]));
+    inputs += shapes[s].mesh.triangle_count;
+  }
+  assert_true(m.triangle_count >= least * (double)inputs && m.triangle_count <= most * (double)inputs);
+  orb_supermesh_free(ctx, &m);
+}
+
+static void check_pair(sphere_kind a, int a_size, unsigned a_seed, sphere_kind b, int b_size, unsigned b_seed,
+                       double jitter, double least, double most) {
+  orb_context *ctx = make_context(2);
+  orb_aligned_shape shapes[2];
+  sphere_shape(ctx, a, a_size, jitter, a_seed, &shapes[0]);
+  sphere_shape(ctx, b, b_size, jitter, b_seed, &shapes[1]);
+  check(shapes, 2, ctx, 1 + shapes[0].mesh.triangle_count / 300, least, most);
+  sphere_shape_free(ctx, &shapes[0]);
+  sphere_shape_free(ctx, &shapes[1]);
+  orb_context_destroy(ctx);
+}
+
+static void general_position(void **state) {
+  (void)state;
+  check_pair(SPHERE_ICO, 3, 1, SPHERE_OCTA, 3, 2, 0.2, 3, 7);
+  check_pair(SPHERE_UV, 20, 3, SPHERE_ICO, 3, 2, 0.1, 2, 7);
+  check_pair(SPHERE_TETRA, 0, 0, SPHERE_ICO, 3, 5, 0, 1, 7);
+  check_pair(SPHERE_TETRA, 0, 1, SPHERE_TETRA, 0, 3, 0, 1, 7);
+}
+
+/* Identical meshes overlay to themselves; a mesh over its own four-way split to the split: no sliver anywhere. */
+static void coincidences_add_nothing(void **state) {
+  (void)state;
+  check_pair(SPHERE_UV, 16, 0, SPHERE_UV, 16, 0, 0, 0.5, 0.5);
+  check_pair(SPHERE_ICO, 3, 4, SPHERE_ICO, 3, 4, 0.2, 0.5, 0.5);
+  check_pair(SPHERE_TETRA, 0, 0, SPHERE_TETRA, 0, 0, 0, 0.5, 0.5);
+  check_pair(SPHERE_OCTA, 0, 0, SPHERE_OCTA, 1, 0, 0, 32. / 40, 32. / 40);
+}
+
+static void many_shapes(void **state) {
+  (void)state;
+  orb_context *ctx = make_context(2);
+  orb_aligned_shape shapes[4];
+  sphere_shape(ctx, SPHERE_ICO, 2, 0.2, 1, &shapes[0]);
+  sphere_shape(ctx, SPHERE_OCTA, 2, 0.2, 2, &shapes[1]);
+  sphere_shape(ctx, SPHERE_UV, 10, 0, 3, &shapes[2]);
+  sphere_shape(ctx, SPHERE_TETRA, 0, 0, 0, &shapes[3]);
+  check(shapes, 3, ctx, 7, 3, 14);
+  check(shapes, 4, ctx, 7, 3, 14);
+  for (int s = 0; s < 4; s++) {
+    sphere_shape_free(ctx, &shapes[s]);
+  }
+  orb_context_destroy(ctx);
+}
+
+static void threads_do_not_matter(void **state) {
+  (void)state;
+  orb_supermesh m[2];
+  orb_context *ctx[2];
+  for (int i = 0; i < 2; i++) {
+    orb_aligned_shape shapes[2];
+    ctx[i] = make_context(i ? 4 : 1);
+    sphere_shape(ctx[i], SPHERE_ICO, 4, 0.2, 1, &shapes[0]);
+    sphere_shape(ctx[i], SPHERE_OCTA, 4, 0.2, 2, &shapes[1]);
+    assert_int_equal(overlay(ctx[i], shapes, 2, &m[i]), ORB_OK);
+    sphere_shape_free(ctx[i], &shapes[0]);
+    sphere_shape_free(ctx[i], &shapes[1]);
+  }
+  assert_int_equal(m[0].vertex_count, m[1].vertex_count);
+  assert_memory_equal(m[0].points, m[1].points, 3 * (size_t)m[0].vertex_count * sizeof(double));
+  assert_memory_equal(m[0].triangles, m[1].triangles, 3 * (size_t)m[0].triangle_count * sizeof(int32_t));
+  for (int i = 0; i < 2; i++) {
+    orb_supermesh_free(ctx[i], &m[i]);
+    orb_context_destroy(ctx[i]);
+  }
+}
+
+static int64_t allocations_left;
+
+static void *failing_alloc(void *user, size_t size) {
+  (void)user;
+  return allocations_left-- > 0 ? malloc(size) : NULL;
+}
+
+static void failing_free(void *user, void *block) {
+  (void)user;
+  free(block);
+}
+
+static void failing_allocations(void **state) {
+  (void)state;
+  int done = 0;
+  for (int64_t n = 0; !done; n++) {
+    assert_true(n < 2000);
+    allocations_left = INT64_MAX;
+    orb_context_options options = {.threads = 1, .allocator = {failing_alloc, failing_free, NULL}};
+    orb_context *ctx;
+    assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
+    orb_aligned_shape shapes[3];
+    for (int s = 0; s < 3; s++) {
+      sphere_shape(ctx, SPHERE_OCTA, s == 2 ? 0 : 1, 0, (unsigned)s + 1, &shapes[s]);
+    }
+    allocations_left = n;
+    orb_supermesh m;
+    orb_status status = overlay(ctx, shapes, 3, &m);
+    assert_true(status == ORB_OK || status == ORB_E_NO_MEMORY);
+    done = status == ORB_OK;
+    orb_supermesh_free(ctx, &m);
+    for (int s = 0; s < 3; s++) {
+      sphere_shape_free(ctx, &shapes[s]);
+    }
+    orb_context_destroy(ctx);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(general_position),    cmocka_unit_test(coincidences_add_nothing),
+      cmocka_unit_test(many_shapes),         cmocka_unit_test(threads_do_not_matter),
+      cmocka_unit_test(failing_allocations),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
