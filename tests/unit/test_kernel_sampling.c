@@ -56,7 +56,7 @@ static void test_valid(void **unused) {
   (void)unused;
   orb_context *ctx = open_context(1);
   orb_embed_options options = sampling();
-  orb_mesh list[] = {shape_tetrahedron(ctx),          shape_octahedron(ctx), shape_icosahedron(ctx),  limbed(ctx, 4),
+  orb_mesh list[] = {shape_tetrahedron(ctx),          shape_octahedron(ctx), shape_icosahedron(ctx), limbed(ctx, 4),
                      shape_cylinder(ctx, 12, 60, 40), shape_ball(ctx, 3),    shape_globe(ctx, 24, 6)};
   for (size_t i = 0; i < sizeof list / sizeof list[0]; i++) {
     orb_embedding e = embed(ctx, &list[i], &options);
