@@ -1,0 +1,225 @@
+/* The command line. */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/embedding_codec.h"
+#include "api/json.h"
+#include "bench.h"
+
+static const char usage_text[] =
+    "usage: orbmorph-bench embed [options] FILE...\n"
+    "       orbmorph-bench merge [options] A B [C...]\n"
+    "\n"
+    "Measures the library in-process; one JSON object a line for every repeat.\n"
+    "  --method M        newton (default) or kernel-sampling\n"
+    "  --preset P        default, fast or quality\n"
+    "  --options JSON    options of the embedding, as in a request: '{\"energy_weight\":0}'\n"
+    "  --threads N       threads in all (default: those of the machine)\n"
+    "  --repeat N        runs of every file (1)\n"
+    "  --out DIR         embed: write DIR/NAME.sphere.ply\n"
+    "  --out FILE.glb    merge: write the asset\n"
+    "  --align M         pin (default with landmarks), rbf, rotate or auto (default without)\n"
+    "  --remesh M        adaptive (default), overlay, subdivision or convex-hull\n"
+    "  --tolerance X     adaptive: relative to the diagonal (0.001)\n"
+    "  --max-triangles N\n"
+    "  --landmarks FILE  a landmarks array, alone or as the member \"landmarks\"\n"
+    "  --version, --help\n"
+    "Exit status 0 done, 1 refused (the reason on standard error), 2 wrong usage.\n";
+
+static int wrong(const char *message, const char *what) {
+  fprintf(stderr, "orbmorph-bench: %s%s\nTry orbmorph-bench --help.\n", message, what);
+  return 0;
+}
+
+static int read_integer(const char *name, const char *text, long least, long most, long *out) {
+  char *end;
+  errno = 0;
+  long value = strtol(text, &end, 10);
+  if (errno || end == text || *end || value < least || value > most) {
+    fprintf(stderr, "orbmorph-bench: %s must be from %ld to %ld, not '%s'\n", name, least, most, text);
+    return 0;
+  }
+  *out = value;
+  return 1;
+}
+
+static int read_word(const char *name, const char *text, const char *const *words, int *out) {
+  for (int i = 0; words[i]; i++) {
+    if (strcmp(text, words[i]) == 0) {
+      *out = i;
+      return 1;
+    }
+  }
+  fprintf(stderr, "orbmorph-bench: %s cannot be '%s'; it is one of", name, text);
+  for (int i = 0; words[i]; i++) {
+    fprintf(stderr, " %s", words[i]);
+  }
+  fputc('\n', stderr);
+  return 0;
+}
+
+/* The table of the wire's embedding options reads them, so that names and ranges are the same. */
+static int read_options(const char *text, orb_embed_options *options) {
+  orb_text request = {0};
+  orb_problem problem = {0};
+  orb_json_error error;
+  orb_embed_method method = options->method;
+  orb_text_printf(&request, "{\"options\":%s}", text);
+  cJSON *body = request.failed ? NULL : orb_json_parse(request.data, request.size, &error);
+  int fine = body ? orb_embedding_options_read(body, "--options", 0, options, &problem)
+                  : wrong("--options must be a JSON object, not ", text);
+  if (body && !fine) {
+    fprintf(stderr, "orbmorph-bench: %s\n", problem.detail);
+  }
+  options->method = method;
+  orb_problem_free(&problem);
+  cJSON_Delete(body);
+  orb_text_free(&request);
+  return fine;
+}
+
+typedef struct texts {
+  const char *method, *preset, *options, *threads, *repeat, *align, *remesh, *tolerance, *max_triangles;
+} texts;
+
+static int interpret(const texts *t, bench_options *o) {
+  static const char *const methods[] = {"newton", "kernel-sampling", NULL};
+  static const char *const presets[] = {"default", "fast", "quality", NULL};
+  static const char *const aligns[] = {"pin", "rbf", "rotate", "auto", NULL};
+  static const char *const remeshes[] = {"adaptive", "overlay", "subdivision", "convex-hull", NULL};
+  int word = 0;
+  long number = 0;
+  if (t->options && !read_options(t->options, &o->embed)) {
+    return 0;
+  }
+  if (t->method) {
+    if (!read_word("--method", t->method, methods, &word)) {
+      return 0;
+    }
+    o->embed.method = (orb_embed_method)word;
+  }
+  if (t->preset) {
+    if (!read_word("--preset", t->preset, presets, &word)) {
+      return 0;
+    }
+    o->embed.preset = (orb_preset)word;
+  }
+  if (t->align) {
+    if (!read_word("--align", t->align, aligns, &word)) {
+      return 0;
+    }
+    o->merge.align.method = (orb_align_method)word;
+    o->align_given = 1;
+  }
+  if (t->remesh) {
+    if (!read_word("--remesh", t->remesh, remeshes, &word)) {
+      return 0;
+    }
+    o->merge.remesh.method = (orb_remesh_method)word;
+  }
+  if (t->threads) {
+    if (!read_integer("--threads", t->threads, 1, 64, &number)) {
+      return 0;
+    }
+    o->threads = (int)number;
+  }
+  if (t->repeat) {
+    if (!read_integer("--repeat", t->repeat, 1, 1000000, &number)) {
+      return 0;
+    }
+    o->repeat = (int)number;
+  }
+  if (t->max_triangles) {
+    if (!read_integer("--max-triangles", t->max_triangles, 4, 1000000000, &number)) {
+      return 0;
+    }
+    o->merge.remesh.max_triangles = number;
+  }
+  if (t->tolerance) {
+    char *end;
+    double value = strtod(t->tolerance, &end);
+    if (end == t->tolerance || *end || !(value > 0 && value <= 1)) {
+      return wrong("--tolerance must be above 0 and at most 1, not ", t->tolerance);
+    }
+    o->merge.remesh.tolerance = value;
+  }
+  return 1;
+}
+
+static int parse(int argc, char **argv, int merge, bench_options *o) {
+  texts t = {0};
+  const struct {
+    const char *name;
+    const char **place;
+    int commands; /* 1: embed, 2: merge, 3: both */
+  } table[] = {{"--method", &t.method, 3},
+               {"--preset", &t.preset, 3},
+               {"--options", &t.options, 3},
+               {"--threads", &t.threads, 3},
+               {"--repeat", &t.repeat, 3},
+               {"--out", &o->out, 3},
+               {"--align", &t.align, 2},
+               {"--remesh", &t.remesh, 2},
+               {"--landmarks", &o->landmarks, 2},
+               {"--tolerance", &t.tolerance, 2},
+               {"--max-triangles", &t.max_triangles, 2}};
+  int plain = 0;
+  for (int i = 2; i < argc; i++) {
+    if (plain || argv[i][0] != '-' || !argv[i][1]) {
+      o->files[o->file_count++] = argv[i];
+      continue;
+    }
+    if (strcmp(argv[i], "--") == 0) {
+      plain = 1;
+      continue;
+    }
+    const char *value = strchr(argv[i], '=');
+    size_t length = value ? (size_t)(value - argv[i]) : strlen(argv[i]), k = 0;
+    while (k < sizeof table / sizeof table[0] &&
+           (strlen(table[k].name) != length || strncmp(table[k].name, argv[i], length) != 0 ||
+            !(table[k].commands & (merge ? 2 : 1)))) {
+      k++;
+    }
+    if (k == sizeof table / sizeof table[0]) {
+      return wrong("unknown option ", argv[i]);
+    }
+    if (!value && i + 1 == argc) {
+      return wrong("a value is missing after ", argv[i]);
+    }
+    *table[k].place = value ? value + 1 : argv[++i];
+  }
+  if (o->file_count < (merge ? 2 : 1)) {
+    return wrong(merge ? "merge needs two files or more" : "embed needs a file", "");
+  }
+  if (merge && o->file_count > ORB_SHAPES_MAX) {
+    return wrong("merge takes 16 files at most", "");
+  }
+  return interpret(&t, o);
+}
+
+int main(int argc, char **argv) {
+  if (argc >= 2 && strcmp(argv[1], "--help") == 0) {
+    fputs(usage_text, stdout);
+    return BENCH_DONE;
+  }
+  if (argc >= 2 && strcmp(argv[1], "--version") == 0) {
+    puts(ORB_ENGINE);
+    return BENCH_DONE;
+  }
+  int merge = argc >= 2 && strcmp(argv[1], "merge") == 0;
+  if (argc < 2 || (!merge && strcmp(argv[1], "embed") != 0)) {
+    fputs(usage_text, stderr);
+    return BENCH_USAGE;
+  }
+  bench_options options = {.repeat = 1, .files = calloc((size_t)argc, sizeof *options.files)};
+  orb_embed_defaults(&options.embed);
+  orb_merge_defaults(&options.merge);
+  int status = BENCH_USAGE;
+  if (options.files && parse(argc, argv, merge, &options)) {
+    status = merge ? bench_merge(&options) : bench_embed(&options);
+  }
+  free(options.files);
+  return status;
+}

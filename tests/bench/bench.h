@@ -1,0 +1,64 @@
+/* orbmorph-bench: measures the library in-process and prints one JSON object a line. */
+#ifndef ORB_TESTS_BENCH_H
+#define ORB_TESTS_BENCH_H
+
+#include "api/supermesh_codec.h"
+#include "api/text.h"
+#include "orbmorph/merge.h"
+
+/* Exit statuses. */
+enum { BENCH_DONE = 0, BENCH_REFUSED = 1, BENCH_USAGE = 2 };
+
+typedef struct bench_options {
+  int threads, repeat;
+  const char *out, *landmarks;
+  orb_embed_options embed;
+  orb_merge_options merge;
+  int align_given;
+  char **files;
+  int file_count;
+} bench_options;
+
+int bench_embed(const bench_options *options);
+int bench_merge(const bench_options *options);
+
+/* A file in memory, of malloc(); 0 with a message on standard error. */
+int bench_slurp(const char *path, unsigned char **bytes, size_t *size);
+/* Writes a buffer; 0 with a message. */
+int bench_spill(const char *path, const unsigned char *bytes, size_t size);
+
+/* "dir/cow.obj" → "cow". */
+void bench_name_of(const char *path, char name[ORB_NAME_MAX]);
+
+/* A context with so many threads; ends the program when there is no memory. Whatever the environment says, the
+ * libraries below use one thread of their own, so that results do not depend on it. */
+orb_context *bench_open(int threads);
+
+/* Peak of the resident set since the last reset. Where the kernel cannot reset it: since the program began. */
+void bench_reset_peak(void);
+int64_t bench_peak(void);
+/* Processor time of all threads so far, in seconds. */
+double bench_cpu(void);
+
+/* Prints why on standard error, `path: detail`. */
+void bench_complain(const char *path, const orb_context *ctx);
+
+/* Ends a line: prints the text and frees it. 0 out of memory. */
+int bench_print(orb_text *line);
+
+/* A mesh as the daemon takes it: read, then repaired. */
+typedef struct bench_mesh {
+  char name[ORB_NAME_MAX];
+  orb_mesh mesh;
+  int32_t raw_triangle_count;
+  int32_t *raw_corners; /* 3 a triangle of the file: its vertices in the file */
+  double read_seconds, check_seconds;
+} bench_mesh;
+int bench_load(orb_context *ctx, const char *path, int keep_corners, bench_mesh *out);
+void bench_unload(orb_context *ctx, bench_mesh *mesh);
+
+/* The place that a caller names; 0 and why (a literal). */
+int bench_place(orb_context *ctx, const bench_mesh *mesh, const orb_spot *spot, orb_nearest **tree, orb_place *out,
+                const char **why);
+
+#endif

@@ -1,0 +1,90 @@
+// orbmorph-bench keeps the contract: fields, arithmetic, exit statuses. Run by ctest with ORB_BIN and ORB_SAMPLES.
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { test } from 'node:test';
+
+const { ORB_BIN: bin, ORB_SAMPLES: samples } = process.env;
+const bench = (args, env = {}) => {
+  const r = spawnSync(join(bin, 'orbmorph-bench'), args, { encoding: 'utf8', env: { ...process.env, ...env } });
+  return { status: r.status, error: r.stderr, lines: r.stdout.split('\n').filter(Boolean).map((l) => JSON.parse(l)) };
+};
+const dog = join(samples, 'dog.obj'), giraffe = join(samples, 'giraffe.off');
+
+test('embed prints one line a repeat of every file', () => {
+  const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));
+  const r = bench(['embed', '--threads', '2', '--repeat', '2', '--out', dir, dog, giraffe], { OPENBLAS_NUM_THREADS: '7' });
+  assert.equal(r.status, 0, r.error);
+  assert.deepEqual(r.lines.map((l) => l.mesh), ['dog', 'dog', 'giraffe', 'giraffe']);
+  for (const l of r.lines) {
+    const s = l.seconds;
+    assert.ok(s.read > 0 && s.total >= s.read + s.check + s.simplify + s.embed + s.certify - 1e-9);
+    assert.ok(Math.abs(l.triangles_per_minute / (60 * l.triangles / (s.total - s.read)) - 1) < 1e-9);
+    assert.ok(l.peak_rss_bytes > 1e6);
+    assert.equal(l.threads, 2);
+    assert.deepEqual([l.certificate.valid, l.certificate.flipped, l.certificate.degree], [true, 0, 1]);
+    assert.ok(l.distortion.symmetric_dirichlet.mean >= 1 && l.distortion.stretch_efficiency > 0);
+  }
+  const ply = readFileSync(join(dir, 'dog.sphere.ply'));
+  assert.equal(ply.subarray(0, 3).toString(), 'ply');
+  assert.ok(ply.length > 52 * r.lines[0].vertices + 13 * r.lines[0].triangles);
+  rmSync(dir, { recursive: true });
+});
+
+test('both methods, options of a request, and the same sphere for any number of threads', () => {
+  const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));
+  const spheres = [1, 3].map((n) => {
+    const r = bench(['embed', '--threads', `${n}`, `--out=${dir}`, '--options', '{"energy_weight":0}', dog]);
+    assert.equal(r.status, 0, r.error);
+    assert.equal(r.lines[0].options.energy_weight, 0);
+    return readFileSync(join(dir, 'dog.sphere.ply'));
+  });
+  assert.ok(spheres[0].equals(spheres[1]));
+  rmSync(dir, { recursive: true });
+  const paper = bench(['embed', '--method', 'kernel-sampling', dog]);
+  assert.equal(paper.status, 0, paper.error);
+  assert.equal(paper.lines[0].method, 'kernel-sampling');
+  assert.ok(paper.lines[0].certificate.valid);
+});
+
+test('merge writes the asset and its report', () => {
+  const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));
+  const out = join(dir, 'out.glb');
+  const r = bench(['merge', '--align', 'rotate', '--landmarks', join(samples, 'dog-giraffe.json'), '--out', out, dog, giraffe]);
+  assert.equal(r.status, 0, r.error);
+  const [l] = r.lines;
+  assert.equal(l.triangles, 2 * l.vertices - 4);
+  assert.equal(l.shapes.length, 2);
+  for (const name of ['read', 'embed', 'align', 'remesh', 'transfer', 'write', 'total']) {
+    assert.ok(l.seconds[name] >= 0, name);
+  }
+  assert.ok(l.certificate.closed);
+  assert.equal(readFileSync(out).subarray(0, 4).toString(), 'glTF');
+  rmSync(dir, { recursive: true });
+});
+
+test('exit statuses: 1 refused with the reason, 2 wrong usage', () => {
+  const cases = [
+    [1, ['embed', '/nowhere/mesh.obj'], /nowhere/],
+    [1, ['embed', join(samples, 'dog-giraffe.json')], /unknown-format|malformed/],
+    [1, ['merge', '--align', 'pin', dog, giraffe], /landmark/i],
+    [2, [], /usage/],
+    [2, ['transmogrify'], /usage/],
+    [2, ['embed'], /file/],
+    [2, ['merge', dog], /two/],
+    [2, ['embed', '--threads', 'many', dog], /--threads/],
+    [2, ['embed', '--method', 'magic', dog], /magic/],
+    [2, ['embed', '--options', '{"radius":1}', dog], /radius/],
+    [2, ['embed', '--landmarks', 'x', dog], /unknown option/],
+  ];
+  for (const [status, args, message] of cases) {
+    const r = bench(args);
+    assert.equal(r.status, status, `${args.join(' ')}: ${r.error}`);
+    assert.match(r.error, message);
+    assert.equal(r.lines.length, 0);
+  }
+  assert.match(spawnSync(join(bin, 'orbmorph-bench'), ['--version'], { encoding: 'utf8' }).stdout, /^orbmorph \d/);
+  assert.equal(bench(['embed', join('/nowhere', 'x'), dog]).lines.length, 1); // the others are still done
+});

@@ -1,0 +1,102 @@
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "api/embedding_codec.h"
+#include "api/report_codec.h"
+#include "bench.h"
+
+typedef struct embed_times {
+  double total, cpu;
+  int64_t peak;
+} embed_times;
+
+static int print_line(const bench_options *options, const bench_mesh *m, const orb_embedding *e, const embed_times *t,
+                      int repeat, int threads) {
+  orb_text line = {0};
+  orb_json_open(&line, '{');
+  orb_json_member_string(&line, "mesh", m->name);
+  orb_json_member_integer(&line, "vertices", m->mesh.vertex_count);
+  orb_json_member_integer(&line, "triangles", m->mesh.triangle_count);
+  orb_embedding_options_members(&options->embed, &line);
+  orb_json_member_integer(&line, "threads", threads);
+  orb_json_member_integer(&line, "repeat", repeat);
+  orb_json_key(&line, "seconds");
+  orb_json_open(&line, '{');
+  orb_json_member_number(&line, "read", m->read_seconds);
+  orb_json_member_number(&line, "check", m->check_seconds);
+  orb_json_member_number(&line, "simplify", e->timings.simplify);
+  orb_json_member_number(&line, "embed", e->timings.embed);
+  orb_json_member_number(&line, "certify", e->timings.certify);
+  orb_json_member_number(&line, "total", t->total);
+  orb_json_close(&line, '}');
+  orb_json_member_number(&line, "cpu_seconds", t->cpu);
+  orb_json_member_number(&line, "triangles_per_minute", 60.0 * m->mesh.triangle_count / (t->total - m->read_seconds));
+  orb_json_member_integer(&line, "peak_rss_bytes", t->peak);
+  orb_json_key(&line, "certificate");
+  orb_certificate_write(&line, &e->certificate);
+  orb_json_key(&line, "distortion");
+  orb_distortion_write(&line, &e->distortion);
+  orb_json_member_string(&line, "engine", ORB_ENGINE);
+  orb_json_close(&line, '}');
+  return bench_print(&line);
+}
+
+static int write_sphere(orb_context *ctx, const char *folder, const bench_mesh *m, const orb_embedding *e) {
+  char path[4096];
+  orb_buffer ply = {0};
+  if (mkdir(folder, 0777) != 0 && errno != EEXIST) {
+    perror(folder);
+    return 0;
+  }
+  if (snprintf(path, sizeof path, "%s/%s.sphere.ply", folder, m->name) >= (int)sizeof path) {
+    fprintf(stderr, "%s: the path is too long\n", folder);
+    return 0;
+  }
+  int fine = orb_sphere_ply_write(ctx, &m->mesh, e->points, &ply) == ORB_OK;
+  if (!fine) {
+    bench_complain(path, ctx);
+  }
+  fine = fine && bench_spill(path, ply.data, ply.size);
+  orb_buffer_free(ctx, &ply);
+  return fine;
+}
+
+/* One run in a context of its own: nothing is kept warm but the file in the page cache. */
+static int run_once(const bench_options *options, const char *path, int repeat) {
+  bench_mesh m;
+  orb_embedding e;
+  bench_reset_peak();
+  orb_context *ctx = bench_open(options->threads);
+  double start = orb_clock(), cpu = bench_cpu();
+  int fine = bench_load(ctx, path, 0, &m);
+  if (fine) {
+    fine = orb_embed(ctx, &m.mesh, &options->embed, &e) == ORB_OK;
+    if (fine) {
+      embed_times t = {.total = orb_clock() - start, .cpu = bench_cpu() - cpu, .peak = bench_peak()};
+      fine = print_line(options, &m, &e, &t, repeat, orb_threads(ctx));
+      fine = fine && (!options->out || write_sphere(ctx, options->out, &m, &e));
+      orb_embedding_free(ctx, &e);
+    } else {
+      bench_complain(path, ctx);
+    }
+    bench_unload(ctx, &m);
+  }
+  orb_context_destroy(ctx);
+  return fine;
+}
+
+int bench_embed(const bench_options *options) {
+  int refused = 0;
+  for (int i = 0; i < options->file_count; i++) {
+    for (int repeat = 0; repeat < options->repeat; repeat++) {
+      if (!run_once(options, options->files[i], repeat)) {
+        refused = 1;
+        break;
+      }
+    }
+  }
+  return refused ? BENCH_REFUSED : BENCH_DONE;
+}

@@ -1,0 +1,219 @@
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/json.h"
+#include "api/report_codec.h"
+#include "bench.h"
+
+/* The shapes of one merge, embedded. */
+typedef struct bench_set {
+  int32_t count;
+  bench_mesh mesh[ORB_SHAPES_MAX];
+  orb_embedding embedding[ORB_SHAPES_MAX];
+  orb_align_shape shape[ORB_SHAPES_MAX];
+  const char *name[ORB_SHAPES_MAX];
+  orb_landmark_list list;
+  orb_landmark *landmarks;
+  orb_place *places;
+  double read, embed;
+} bench_set;
+
+static int read_landmarks(const char *path, bench_set *set) {
+  unsigned char *bytes;
+  size_t size;
+  orb_json_error where;
+  orb_problem problem = {0};
+  if (!bench_slurp(path, &bytes, &size)) {
+    return 0;
+  }
+  cJSON *value = orb_json_parse((const char *)bytes, size, &where);
+  free(bytes);
+  if (!value) {
+    fprintf(stderr, "%s: malformed-json: %s at byte %zu\n", path, where.why ? where.why : "out of memory",
+            where.offset);
+    return 0;
+  }
+  int fine = orb_landmarks_read(value, set->count, &set->list, &problem);
+  if (!fine) {
+    fprintf(stderr, "%s: %s: %s\n", path, problem.name, problem.detail);
+  }
+  orb_problem_free(&problem);
+  cJSON_Delete(value);
+  return fine;
+}
+
+static int place_landmarks(orb_context *ctx, bench_set *set) {
+  size_t shapes = (size_t)set->count;
+  set->landmarks = ORB_NEW0(ctx, orb_landmark, set->list.count);
+  set->places = ORB_NEW0(ctx, orb_place, (size_t)set->list.count * shapes);
+  if (!set->landmarks || !set->places) {
+    return 0;
+  }
+  for (int32_t s = 0; s < set->count; s++) {
+    orb_nearest *tree = NULL;
+    for (int32_t l = 0; l < set->list.count; l++) {
+      const char *why;
+      size_t at = (size_t)l * shapes + (size_t)s;
+      if (!bench_place(ctx, &set->mesh[s], &set->list.spots[at], &tree, &set->places[at], &why)) {
+        fprintf(stderr, "%s: bad-landmarks: landmark %d (\"%s\"): %s\n", set->name[s], l, set->list.items[l].name, why);
+        orb_nearest_destroy(ctx, tree);
+        return 0;
+      }
+    }
+    orb_nearest_destroy(ctx, tree);
+  }
+  for (int32_t l = 0; l < set->list.count; l++) {
+    const orb_landmark_spec *spec = &set->list.items[l];
+    orb_landmark *mark = &set->landmarks[l];
+    snprintf(mark->name, sizeof mark->name, "%s", spec->name);
+    mark->at = set->places + (size_t)l * shapes;
+    mark->pass = spec->pass;
+    mark->radius = spec->radius;
+    mark->confidence = spec->confidence;
+  }
+  return 1;
+}
+
+static int load_set(orb_context *ctx, const bench_options *options, bench_set *set) {
+  if (options->landmarks && !read_landmarks(options->landmarks, set)) {
+    return 0;
+  }
+  for (int32_t s = 0; s < set->count; s++) {
+    const char *path = options->files[s];
+    if (!bench_load(ctx, path, 1, &set->mesh[s])) {
+      return 0;
+    }
+    set->name[s] = set->mesh[s].name;
+    set->read += set->mesh[s].read_seconds + set->mesh[s].check_seconds;
+    double start = orb_clock();
+    if (orb_embed(ctx, &set->mesh[s].mesh, &options->embed, &set->embedding[s]) != ORB_OK) {
+      bench_complain(path, ctx);
+      return 0;
+    }
+    set->embed += orb_clock() - start;
+    set->shape[s] = (orb_align_shape){.mesh = &set->mesh[s].mesh, .points = set->embedding[s].points};
+  }
+  return !options->landmarks || place_landmarks(ctx, set);
+}
+
+static void free_set(orb_context *ctx, bench_set *set) {
+  for (int32_t s = 0; s < set->count; s++) {
+    orb_embedding_free(ctx, &set->embedding[s]);
+    bench_unload(ctx, &set->mesh[s]);
+  }
+  orb_free(ctx, set->landmarks);
+  orb_free(ctx, set->places);
+  orb_landmarks_free(&set->list);
+}
+
+static void write_members(orb_text *line, const bench_set *set, const orb_merge_result *r) {
+  orb_json_key(line, "shapes");
+  orb_json_open(line, '[');
+  for (int32_t s = 0; s < set->count; s++) {
+    orb_json_open(line, '{');
+    orb_json_member_string(line, "name", set->name[s]);
+    orb_json_member_integer(line, "triangles", set->mesh[s].mesh.triangle_count);
+    orb_shape_report_members(line, &r->shapes[s]);
+    orb_json_close(line, '}');
+  }
+  orb_json_close(line, ']');
+  orb_json_key(line, "landmarks");
+  orb_json_open(line, '[');
+  for (int32_t l = 0; l < r->alignment.landmark_count; l++) {
+    orb_json_open(line, '{');
+    orb_json_member_string(line, "name", l < set->list.count ? set->list.items[l].name : "");
+    orb_json_key(line, "residual_relative");
+    orb_json_open(line, '[');
+    for (int32_t s = 0; s < set->count; s++) {
+      orb_json_number(line, r->landmark_residuals[(size_t)l * (size_t)set->count + (size_t)s]);
+    }
+    orb_json_close(line, ']');
+    orb_json_close(line, '}');
+  }
+  orb_json_close(line, ']');
+  orb_json_key(line, "certificate");
+  orb_merge_certificate_write(r, line);
+  if (r->pair_count > 0) {
+    orb_json_key(line, "distortion");
+    orb_distortion_write(line, &r->pairs[0].distortion);
+  }
+  orb_json_key(line, "pairs");
+  orb_pairs_write(r, line);
+}
+
+static int print_line(const bench_set *set, const orb_merge_result *r, double cpu, int64_t peak, int repeat,
+                      int threads) {
+  orb_text line = {0}, name = {0};
+  int64_t input = 0;
+  for (int32_t s = 0; s < set->count; s++) {
+    orb_text_add(&name, s ? "+" : "");
+    orb_text_add(&name, set->name[s]);
+    input += set->mesh[s].mesh.triangle_count;
+  }
+  orb_json_open(&line, '{');
+  orb_json_member_string(&line, "mesh", name.data ? name.data : "");
+  orb_text_free(&name);
+  orb_json_member_integer(&line, "vertices", r->supermesh.vertex_count);
+  orb_json_member_integer(&line, "triangles", r->supermesh.triangle_count);
+  orb_json_member_integer(&line, "input_triangles", input);
+  orb_json_member_integer(&line, "asset_bytes", (int64_t)r->asset.size);
+  orb_json_member_integer(&line, "threads", threads);
+  orb_json_member_integer(&line, "repeat", repeat);
+  orb_json_key(&line, "seconds");
+  orb_json_open(&line, '{');
+  orb_json_member_number(&line, "read", set->read);
+  orb_json_member_number(&line, "embed", set->embed);
+  orb_json_member_number(&line, "align", r->timings.align);
+  orb_json_member_number(&line, "remesh", r->timings.remesh);
+  orb_json_member_number(&line, "transfer", r->timings.transfer);
+  orb_json_member_number(&line, "write", r->timings.write);
+  orb_json_member_number(&line, "total", r->timings.total);
+  orb_json_close(&line, '}');
+  orb_json_member_number(&line, "cpu_seconds", cpu);
+  orb_json_member_number(&line, "triangles_per_minute", 60.0 * r->supermesh.triangle_count / r->timings.total);
+  orb_json_member_integer(&line, "peak_rss_bytes", peak);
+  orb_json_member_number(&line, "energy", r->alignment.energy);
+  write_members(&line, set, r);
+  orb_json_member_string(&line, "engine", ORB_ENGINE);
+  orb_json_close(&line, '}');
+  return bench_print(&line);
+}
+
+static int run_once(const bench_options *options, bench_set *set, int repeat) {
+  orb_merge_result result;
+  bench_reset_peak();
+  orb_context *ctx = bench_open(options->threads);
+  double cpu = bench_cpu();
+  memset(set, 0, sizeof *set);
+  set->count = options->file_count;
+  int fine = load_set(ctx, options, set);
+  orb_merge_options merge = options->merge;
+  if (!options->align_given) {
+    merge.align.method = set->list.count > 0 ? ORB_ALIGN_PIN : ORB_ALIGN_AUTO;
+  }
+  if (fine) {
+    fine =
+        orb_merge(ctx, set->shape, set->name, set->count, set->landmarks, set->list.count, &merge, &result) == ORB_OK;
+    if (fine) {
+      fine = print_line(set, &result, bench_cpu() - cpu, bench_peak(), repeat, orb_threads(ctx));
+      fine = fine && (!options->out || bench_spill(options->out, result.asset.data, result.asset.size));
+      orb_merge_result_free(ctx, &result);
+    } else {
+      bench_complain("merge", ctx);
+    }
+  }
+  free_set(ctx, set);
+  orb_context_destroy(ctx);
+  return fine;
+}
+
+int bench_merge(const bench_options *options) {
+  bench_set *set = malloc(sizeof *set);
+  int fine = set != NULL;
+  for (int repeat = 0; fine && repeat < options->repeat; repeat++) {
+    fine = run_once(options, set, repeat);
+  }
+  free(set);
+  return fine ? BENCH_DONE : BENCH_REFUSED;
+}
