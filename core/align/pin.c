@@ -9,7 +9,7 @@
 #include "base/check.h"
 #include "embed/hierarchy.h"
 
-enum { COARSE = 300, COARSE_A_LANDMARK = 6 };
+enum { COARSE = 300, COARSE_A_LANDMARK = 6, WALKS = 2 };
 /* How far a sheet may grow: a little for landmarks that merely cross, much for those in quite another order. */
 static const double GROWTH_SMALL = 0.35, GROWTH_MAX = 64;
 
@@ -92,7 +92,9 @@ orb_status orb_align_pin(orb_context *ctx, orb_sheet *sheets, int32_t shape_coun
   orb_preset preset = options->preset;
   int32_t coarse = COARSE_A_LANDMARK * count > COARSE ? COARSE_A_LANDMARK * count : COARSE, shape = 0;
   int stuck = 1, held = 0;
-  ORB_TRY(orb_pin_walk(ctx, sheets, shape_count, landmarks, count, preset, coarse, &stuck));
+  for (int attempt = 0; attempt < WALKS && stuck; attempt++, coarse *= 2) {
+    ORB_TRY(orb_pin_walk(ctx, sheets, shape_count, landmarks, count, preset, coarse, &stuck));
+  }
   if (!stuck) {
     return ORB_OK;
   }
