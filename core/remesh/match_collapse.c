@@ -214,37 +214,18 @@ static int is_allowed(const collapser *c, int32_t u, const int32_t *ring, int n)
 static void collapse(collapser *c, int32_t h) {
   orb_match *match = c->match;
   orb_net *net = &match->net;
-  int32_t u = net->triangles[h], v = net->triangles[orb_next(h)], t = h / 3, g = net->twin[h], s = g / 3;
-  int32_t lists[RING_MAX + 1], triangles[RING_MAX];
+  int32_t u = net->triangles[h], v = net->triangles[orb_next(h)];
+  int32_t lists[RING_MAX + 1];
   int n = 0;
   lists[RING_MAX] = match->vertex_items[u];
   match->vertex_items[u] = -1;
   int32_t e = h;
   do {
-    triangles[n] = e / 3;
     lists[n++] = match->triangle_items[e / 3];
     match->triangle_items[e / 3] = -1;
     e = net->twin[orb_prev(e)];
   } while (e != h);
-  for (int i = 0; i < n; i++) {
-    for (int k = 0; k < 3; k++) {
-      if (net->triangles[3 * triangles[i] + k] == u) {
-        net->triangles[3 * triangles[i] + k] = v;
-      }
-    }
-  }
-  int32_t sides[2][2] = {{net->twin[orb_next(h)], net->twin[orb_prev(h)]},
-                         {net->twin[orb_next(g)], net->twin[orb_prev(g)]}};
-  int32_t apex[2] = {net->triangles[orb_prev(h)], net->triangles[orb_prev(g)]};
-  for (int i = 0; i < 2; i++) {
-    net->twin[sides[i][0]] = sides[i][1];
-    net->twin[sides[i][1]] = sides[i][0];
-    int32_t at_apex = net->triangles[sides[i][0]] == apex[i] ? sides[i][0] : sides[i][1];
-    net->out[apex[i]] = at_apex;
-    net->out[v] = net->twin[at_apex];
-  }
-  net->triangles[3 * t] = net->triangles[3 * s] = -1;
-  net->out[u] = -1;
+  orb_net_collapse(net, h);
   c->live -= 2;
   int32_t start = net->out[v] / 3;
   orb_match_deal(match, lists[RING_MAX], start);

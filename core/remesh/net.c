@@ -213,6 +213,36 @@ void orb_net_flip(orb_net *net, int32_t h) {
   net->out[d] = g;
 }
 
+int orb_net_can_collapse(const orb_net *net, int32_t h) {
+  int32_t v = origin(net, orb_next(h)), first = h, e = h, shared = 0;
+  do {
+    shared += adjacent(net, v, origin(net, orb_next(e)));
+    e = net->twin[orb_prev(e)];
+  } while (e != first);
+  return shared == 2 && net->triangle_count > 4;
+}
+
+void orb_net_collapse(orb_net *net, int32_t h) {
+  int32_t u = origin(net, h), v = origin(net, orb_next(h)), g = net->twin[h], e = h;
+  int32_t apex[2] = {origin(net, orb_prev(h)), origin(net, orb_prev(g))};
+  int32_t sides[2][2] = {{net->twin[orb_next(h)], net->twin[orb_prev(h)]},
+                         {net->twin[orb_next(g)], net->twin[orb_prev(g)]}};
+  do {
+    net->triangles[e] = v;
+    e = net->twin[orb_prev(e)];
+  } while (e != h);
+  for (int i = 0; i < 2; i++) {
+    join(net, sides[i][0], sides[i][1]);
+    int32_t at_apex = origin(net, sides[i][0]) == apex[i] ? sides[i][0] : sides[i][1];
+    net->out[apex[i]] = at_apex;
+    net->out[v] = net->twin[at_apex];
+  }
+  for (int k = 0; k < 3; k++) {
+    net->triangles[h - h % 3 + k] = net->triangles[g - g % 3 + k] = -1;
+  }
+  net->out[u] = -1;
+}
+
 int orb_net_move(orb_net *net, int32_t v, const double p[3]) {
   int32_t first = net->out[v], h = first;
   do {

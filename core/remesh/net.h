@@ -46,6 +46,12 @@ int orb_net_can_flip(const orb_net *net, int32_t h);
  * slots; h is then c→d. Ask orb_net_can_flip() first. */
 void orb_net_flip(orb_net *net, int32_t h);
 
+/* Whether the ends of h have just two neighbours in common, so that collapsing it keeps a simple closed surface. */
+int orb_net_can_collapse(const orb_net *net, int32_t h);
+
+/* Moves u onto v, h = u→v, and drops the two triangles between: topology only, positive or not is for the caller. */
+void orb_net_collapse(orb_net *net, int32_t h);
+
 /* Moves a vertex if every triangle around it stays positive; returns whether it did. */
 int orb_net_move(orb_net *net, int32_t v, const double p[3]);
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "numeric/vec3.h"
 #include "remesh/overlay.h"
 
 /* What is known of the shapes so far: one triangulation, places and parents on each of its shapes. */
@@ -14,6 +15,7 @@ typedef struct pile {
   double *points;
   int32_t *triangles, *parent; /* parent: triangle major, a shape */
   orb_place **places;          /* a shape */
+  double *moved;               /* a shape: how far mended rounding may have moved it */
 } pile;
 
 static void pile_free(orb_context *ctx, pile *p) {
@@ -24,6 +26,7 @@ static void pile_free(orb_context *ctx, pile *p) {
   orb_free(ctx, p->triangles);
   orb_free(ctx, p->parent);
   orb_free(ctx, p->places);
+  orb_free(ctx, p->moved);
   memset(p, 0, sizeof *p);
 }
 
@@ -80,10 +83,11 @@ static orb_status pile_start(orb_context *ctx, const orb_remesh_job *job, pile *
   out->triangles = ORB_NEW(ctx, int32_t, 3 * triangles);
   out->parent = ORB_NEW(ctx, int32_t, triangles);
   out->places = ORB_NEW0(ctx, orb_place *, 1);
+  out->moved = ORB_NEW0(ctx, double, 1);
   if (out->places) {
     out->places[0] = ORB_NEW(ctx, orb_place, vertices);
   }
-  if (!out->points || !out->triangles || !out->parent || !out->places || !out->places[0]) {
+  if (!out->points || !out->triangles || !out->parent || !out->places || !out->moved || !out->places[0]) {
     return ORB_E_NO_MEMORY;
   }
   memcpy(out->points, shape->points, 3 * vertices * sizeof(double));
@@ -97,6 +101,32 @@ static orb_status pile_start(orb_context *ctx, const orb_remesh_job *job, pile *
   return ORB_OK;
 }
 
+/* Closes up the numbers of vertices that were merged away. */
+static orb_status drop_unused(orb_context *ctx, pile *p) {
+  int32_t *number = ORB_NEW0(ctx, int32_t, p->vertex_count), n = 0;
+  if (!number) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int64_t h = 0; h < 3 * (int64_t)p->triangle_count; h++) {
+    number[p->triangles[h]] = 1;
+  }
+  for (int32_t v = 0; v < p->vertex_count; v++) {
+    if (number[v]) {
+      memmove(p->points + 3 * (int64_t)n, p->points + 3 * (int64_t)v, 3 * sizeof(double));
+      for (int32_t s = 0; s < p->shapes; s++) {
+        p->places[s][n] = p->places[s][v];
+      }
+      number[v] = n++;
+    }
+  }
+  for (int64_t h = 0; h < 3 * (int64_t)p->triangle_count; h++) {
+    p->triangles[h] = number[p->triangles[h]];
+  }
+  p->vertex_count = n;
+  orb_free(ctx, number);
+  return ORB_OK;
+}
+
 /* The pile with the overlay's vertices: places on the shapes below through the pile, on the new shape as they are. */
 static orb_status pile_add(orb_context *ctx, const orb_remesh_job *job, const pile *below, orb_overlay *overlay,
                            pile *out) {
@@ -106,7 +136,8 @@ static orb_status pile_add(orb_context *ctx, const orb_remesh_job *job, const pi
   out->triangle_count = overlay->triangle_count;
   out->places = ORB_NEW0(ctx, orb_place *, shapes);
   out->parent = ORB_NEW(ctx, int32_t, (int64_t)overlay->triangle_count * shapes);
-  if (!out->places || !out->parent) {
+  out->moved = ORB_NEW0(ctx, double, shapes);
+  if (!out->places || !out->parent || !out->moved) {
     return ORB_E_NO_MEMORY;
   }
   for (int32_t s = 0; s < shapes; s++) {
@@ -132,7 +163,16 @@ static orb_status pile_add(orb_context *ctx, const orb_remesh_job *job, const pi
   out->triangles = overlay->triangles;
   overlay->points = NULL;
   overlay->triangles = NULL;
-  return ORB_OK;
+  for (int32_t s = 0; s < shapes; s++) {
+    out->moved[s] = s < below->shapes ? below->moved[s] : 0;
+    for (int32_t i = 0; i < overlay->merged_count; i++) {
+      double gone[3], kept[3];
+      orb_place_position(&job->shapes[s].mesh, &out->places[s][overlay->merged[2 * i]], gone);
+      orb_place_position(&job->shapes[s].mesh, &out->places[s][overlay->merged[2 * i + 1]], kept);
+      out->moved[s] += sqrt(orb_distance2(gone, kept));
+    }
+  }
+  return overlay->merged_count ? drop_unused(ctx, out) : ORB_OK;
 }
 
 static orb_status lay_over(orb_context *ctx, const orb_remesh_job *job, int32_t s, pile *below, pile *out) {
@@ -157,10 +197,7 @@ static orb_status lay_over(orb_context *ctx, const orb_remesh_job *job, int32_t 
   overlay.layer[1].vertex_count = shape->mesh.vertex_count;
   overlay.layer[1].locator = job->locator[s];
   ORB_GO(status, orb_overlay_build(ctx, &overlay), end);
-  ORB_GO(status,
-         orb_untangle(ctx, overlay.points, overlay.vertex_count, overlay.triangles, overlay.triangle_count,
-                      below->vertex_count + overlay.lone_count),
-         end);
+  ORB_GO(status, orb_overlay_mend(ctx, &overlay), end);
   ORB_GO(status, pile_add(ctx, job, below, &overlay, out), end);
 end:
   orb_overlay_free(ctx, &overlay);
@@ -197,7 +234,7 @@ orb_status orb_remesh_overlay(orb_context *ctx, const orb_remesh_job *job, orb_s
     memcpy(out->places + (int64_t)s * now.vertex_count, now.places[s], (size_t)now.vertex_count * sizeof(orb_place));
     /* Every triangle lies in one triangle of the shape; only places and their positions are rounded, a few units in
      * the last place for each shape that was laid over. */
-    out->error_bound[s] = 64 * 2.3e-16 * job->shape_count * largest_coordinate(&job->shapes[s].mesh);
+    out->error_bound[s] = now.moved[s] + 64 * 2.3e-16 * job->shape_count * largest_coordinate(&job->shapes[s].mesh);
   }
   out->vertex_count = now.vertex_count;
   out->triangle_count = now.triangle_count;

@@ -31,10 +31,12 @@ typedef struct orb_overlay {
   double *points;    /* 3 a vertex, rounded */
   orb_place *places; /* layer major: places[l · vertex_count + v] */
   int32_t *triangles, *parent;
+  int32_t *merged; /* pairs (gone, kept) of vertices that rounding made one; the gone ones have no triangles */
+  int32_t merged_count;
 } orb_overlay;
 
 /* Overlays layers whose view, vertex_count and locator are given. Triangles are those of the exact arrangement;
- * rounding of the crossings may have turned some over: see orb_untangle(). */
+ * rounding of the crossings may have turned some over: see orb_overlay_untangle(). */
 ORB_MUST_CHECK orb_status orb_overlay_build(orb_context *ctx, orb_overlay *overlay);
 void orb_overlay_free(orb_context *ctx, orb_overlay *overlay);
 
@@ -44,7 +46,11 @@ ORB_MUST_CHECK orb_status orb_overlay_faces(orb_context *ctx, orb_overlay *overl
 
 /* Moves vertices numbered `first_free` and above until every triangle is positive; ORB_E_NOT_CERTIFIED if some stays
  * turned. Points move by about the rounding that turned them. */
-ORB_MUST_CHECK orb_status orb_untangle(orb_context *ctx, double *points, int32_t vertex_count, const int32_t *triangles,
-                                       int32_t triangle_count, int32_t first_free);
+ORB_MUST_CHECK orb_status orb_overlay_untangle(orb_context *ctx, double *points, int32_t vertex_count,
+                                               const int32_t *triangles, int32_t triangle_count, int32_t first_free);
+
+/* Makes all triangles of a built overlay positive: by untangling, and where vertices lie too close together for that,
+ * by merging them. */
+ORB_MUST_CHECK orb_status orb_overlay_mend(orb_context *ctx, orb_overlay *overlay);
 
 #endif

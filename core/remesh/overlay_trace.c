@@ -261,6 +261,7 @@ void orb_overlay_free(orb_context *ctx, orb_overlay *overlay) {
   orb_free(ctx, overlay->places);
   orb_free(ctx, overlay->triangles);
   orb_free(ctx, overlay->parent);
+  orb_free(ctx, overlay->merged);
   memset(overlay, 0, sizeof *overlay);
 }
 

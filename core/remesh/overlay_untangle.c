@@ -8,7 +8,7 @@
 #include "numeric/vec3.h"
 #include "remesh/overlay.h"
 
-enum { ROUNDS = 400, STEPS = 46 };
+enum { ROUNDS = 80, STEPS = 46 };
 
 typedef struct knots {
   double *points;
@@ -118,8 +118,8 @@ static int64_t relax_bad(knots *k, int32_t *bad, int64_t count, int wide) {
   return left;
 }
 
-orb_status orb_untangle(orb_context *ctx, double *points, int32_t vertex_count, const int32_t *triangles,
-                        int32_t triangle_count, int32_t first_free) {
+orb_status orb_overlay_untangle(orb_context *ctx, double *points, int32_t vertex_count, const int32_t *triangles,
+                                int32_t triangle_count, int32_t first_free) {
   knots k = {.points = points, .triangles = triangles, .triangle_count = triangle_count, .first_free = first_free};
   int32_t *bad = ORB_NEW(ctx, int32_t, triangle_count);
   orb_status status = bad ? ORB_OK : ORB_E_NO_MEMORY;
