@@ -5,7 +5,7 @@ orb_build_packages=(
   liblapacke-dev libopenblas-dev libqhull-dev libmeshoptimizer-dev libtinygltf-dev
   libcjson-dev libsodium-dev libmicrohttpd-dev libsqlite3-dev libcurl4-openssl-dev libpng-dev
 )
-orb_test_packages=(libcmocka-dev curl jq man-db chromium)
+orb_test_packages=(libcmocka-dev curl jq man-db bsdutils chromium)
 orb_long_packages=(clang libclang-rt-dev valgrind)
 
 # Installs those of its arguments that are missing, as root or through sudo; never asks.

@@ -179,6 +179,31 @@ test('a wait outlives the daemon', async (t) => {
   assert.match(out, /0 flipped/);
 });
 
+test('progress is drawn on a terminal', async (t) => {
+  const d = await daemon(t);
+  const at = await folder(t);
+  const line = [binaries.client, 'morph', dog, giraffe, '-l', landmarks, '-o', path.join(at, 'o.glb')].join(' ');
+  const child = spawn('script', ['-qec', line, '/dev/null'], { env: { ...process.env, ORBMORPH_SERVER: d.url, TERM: 'xterm' }, stdio: ['ignore', 'pipe', 'inherit'] });
+  let out = '';
+  child.stdout.on('data', (chunk) => (out += chunk));
+  const code = await new Promise((resolve) => child.on('close', resolve));
+  assert.equal(code, 0, out);
+  assert.match(out, /upload dog +\[#+\.*\] +\d+ %/);
+  assert.match(out, /download +\[#/);
+});
+
+test('view draws a picture of a morph', async (t) => {
+  const d = await daemon(t);
+  const at = await folder(t);
+  await run(['morph', dog, giraffe, '-l', landmarks, '-o', 'o.glb', '-q'], { env: { ORBMORPH_SERVER: d.url }, cwd: at });
+  const { code, err } = await run(['view', 'o.glb', '-o', 'o.png', '--poses', '3', '--size', '64'], { cwd: at });
+  assert.equal(code, 0, err);
+  const png = await readFile(path.join(at, 'o.png'));
+  assert.equal(png.toString('latin1', 1, 4), 'PNG');
+  assert.deepEqual([png.readUInt32BE(16), png.readUInt32BE(20)], [192, 64]);
+  assert.equal((await run(['view', dog], { cwd: at })).code, 2);
+});
+
 test('shell completions are what the program prints', async () => {
   for (const [shell, file] of [['bash', 'orbmorph.bash'], ['zsh', '_orbmorph']]) {
     const { out } = await run(['completions', shell]);

@@ -1,0 +1,66 @@
+// deploy/demo.sh as a stranger calls it: from another folder, with names that have blanks.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { copyFile, mkdir, mkdtemp, readFile, readdir, rm, stat, symlink } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+import test from 'node:test';
+import validator from 'gltf-validator';
+import { binaries, root, samples } from './support/daemon.mjs';
+
+const skip = path.resolve(binaries.daemon) === path.join(root, 'build/bin/orbmorphd') ? false : 'it builds the release only';
+
+function demo(args, { cwd, script = path.join(root, 'deploy/demo.sh') }) {
+  return new Promise((resolve) => {
+    const child = spawn('bash', [script, ...args], { cwd, stdio: ['ignore', 'pipe', 'pipe'] });
+    let out = '', err = '';
+    child.stdout.on('data', (chunk) => (out += chunk));
+    child.stderr.on('data', (chunk) => (err += chunk));
+    child.on('close', (code) => resolve({ code, out, err }));
+  });
+}
+
+const found = (out, name) => new RegExp(`^${name}: +(\\S+)$`, 'm').exec(out)?.[1];
+
+async function clean(file) {
+  const report = await validator.validateBytes(new Uint8Array(await readFile(file)));
+  assert.equal(report.issues.numErrors + report.issues.numWarnings, 0, JSON.stringify(report.issues.messages.slice(0, 3)));
+}
+
+test('the demo morphs the samples', { skip }, async () => {
+  const { code, out, err } = await demo([], { cwd: '/' });
+  assert.equal(code, 0, err);
+  await clean(found(out, 'GLB'));
+  assert.match(await readFile(found(out, 'Report'), 'utf8'), /^# Morph of dog, giraffe/);
+  assert.equal(JSON.parse(await readFile(found(out, 'JSON'), 'utf8')).certificate.landmarks_exact, true);
+});
+
+test('the demo takes the files of its caller', { skip }, async (t) => {
+  const cwd = await mkdtemp(path.join(tmpdir(), 'orbmorph demo '));
+  t.after(() => rm(cwd, { recursive: true, force: true }));
+  await mkdir(path.join(cwd, 'sub dir'));
+  await copyFile(path.join(samples, 'dog.obj'), path.join(cwd, 'my dog.obj'));
+  await copyFile(path.join(samples, 'elephant.ply'), path.join(cwd, 'sub dir/élé phant.ply'));
+  await symlink(path.join(root, 'deploy/demo.sh'), path.join(cwd, 'demo link'));
+  const before = (await readdir(tmpdir())).filter((f) => f.startsWith('orbmorph-demo.')).length;
+  const { code, out, err } = await demo(['my dog.obj', 'sub dir/élé phant.ply'], { cwd, script: 'demo link' });
+  assert.equal(code, 0, err);
+  await clean(found(out, 'GLB'));
+  assert.ok((await stat(found(out, 'Report'))).size > 0);
+  assert.equal((await readdir(tmpdir())).filter((f) => f.startsWith('orbmorph-demo.')).length, before, 'no temporary folder stays');
+  const bad = await demo(['my dog.obj', 'nowhere.obj'], { cwd });
+  assert.equal(bad.code, 2);
+  assert.match(bad.err, /nowhere\.obj/);
+});
+
+test('the demo can leave the daemon running', { skip }, async () => {
+  const { code, out, err } = await demo(['--serve'], { cwd: tmpdir() });
+  assert.equal(code, 0, err);
+  const [, url, data, pid] = /^Server: (http\S+) \(its data in (\S+); stop it with: kill (\d+)\)$/m.exec(out);
+  try {
+    assert.equal((await fetch(new URL('/readyz', url))).status, 200);
+  } finally {
+    process.kill(Number(pid));
+    await rm(data, { recursive: true, force: true });
+  }
+});
