@@ -170,7 +170,7 @@ void cli_print_mesh(const cJSON *mesh);
 void cli_print_embedding(const cJSON *embedding);
 void cli_print_supermesh(const cJSON *supermesh);
 /* Markdown where the path ends in .md, else the daemon's JSON. CLI_DONE or CLI_USAGE, having said why. */
-int cli_write_report(cli *c, const char *path, const cJSON *supermesh);
+int cli_write_report(cli *c, const char *path, const cli_reply *supermesh);
 
 /* Streams a resource into a file ("-": standard output), by way of a temporary one beside it. */
 int cli_download(cli *c, const char *path, const char *file);

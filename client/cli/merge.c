@@ -225,7 +225,7 @@ static int finish(cli *c, const cli_reply *supermesh, const char *output) {
     free(asset);
   }
   if (rc == CLI_DONE && report)
-    rc = cli_write_report(c, report, supermesh->json);
+    rc = cli_write_report(c, report, supermesh);
   if (rc != CLI_DONE || (output && !strcmp(output, "-")))
     return rc;
   if (c->json) {

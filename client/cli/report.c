@@ -132,15 +132,13 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   markdown_numbers(out, "Milliseconds", member(supermesh, "timings_ms"), "");
 }
 
-int cli_write_report(cli *c, const char *path, const cJSON *supermesh) {
+int cli_write_report(cli *c, const char *path, const cli_reply *supermesh) {
   size_t length = strlen(path);
   FILE *out = fopen(path, "wb");
   if (out && length > 3 && !strcmp(path + length - 3, ".md")) {
-    markdown(out, supermesh);
+    markdown(out, supermesh->json);
   } else if (out) {
-    char *text = cJSON_Print(supermesh);
-    fprintf(out, "%s\n", text ? text : "{}");
-    free(text);
+    fprintf(out, "%s\n", supermesh->body);
   }
   if (!out || fclose(out) != 0) {
     cli_error(c, "%s: %s", path, strerror(errno));

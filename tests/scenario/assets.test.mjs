@@ -6,35 +6,13 @@ import test from 'node:test';
 import validator from 'gltf-validator';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { daemon, samples, assertProblem } from './support/daemon.mjs';
+import { farthest } from './support/distance.mjs';
 import * as shapes from './support/shapes.mjs';
 
 async function makeAsset(d) {
   const landmarks = JSON.parse(await readFile(path.join(samples, 'dog-giraffe.json'), 'utf8')).landmarks;
   const [dog, giraffe] = [await d.mesh(path.join(samples, 'dog.obj')), await d.mesh(path.join(samples, 'giraffe.off'))];
   return d.made('/v1/supermeshes', { shapes: [{ mesh: dog.id, name: 'dog' }, { mesh: giraffe.id, name: 'giraffe' }], landmarks });
-}
-
-/** The largest distance of any vertex of `mesh` from the nearest of the points, with a grid. */
-function farthest(points, mesh) {
-  const cell = 0.2;
-  const grid = new Map();
-  const key = (x, y, z) => `${Math.floor(x / cell)},${Math.floor(y / cell)},${Math.floor(z / cell)}`;
-  for (let i = 0; i < points.length; i += 3) {
-    const k = key(points[i], points[i + 1], points[i + 2]);
-    if (!grid.has(k)) grid.set(k, []);
-    grid.get(k).push(i);
-  }
-  let worst = 0;
-  for (const [x, y, z] of mesh.positions) {
-    let least = Infinity;
-    for (let a = -1; a <= 1; a++)
-      for (let b = -1; b <= 1; b++)
-        for (let c = -1; c <= 1; c++)
-          for (const i of grid.get(key(x + a * cell, y + b * cell, z + c * cell)) ?? [])
-            least = Math.min(least, Math.hypot(points[i] - x, points[i + 1] - y, points[i + 2] - z));
-    worst = Math.max(worst, least);
-  }
-  return worst;
 }
 
 test('an asset is immutable, comes in ranges, passes the validator and loads in three.js', async (t) => {
@@ -86,11 +64,15 @@ test('an asset is immutable, comes in ranges, passes the validator and loads in 
   const { position } = mesh.geometry.attributes;
   const [target] = mesh.geometry.morphAttributes.position;
   assert.equal(mesh.geometry.morphTargetsRelative, true);
-  const sizes = { dog: 2.6, giraffe: 3.4 };
   const at = (weight) => Array.from(position.array, (x, i) => x + weight * target.array[i]);
-  for (const [weight, file, name] of [[0, 'dog.obj', 'dog'], [1, 'giraffe.off', 'giraffe']]) {
+  const triangles = Array.from(mesh.geometry.index.array);
+  for (const [weight, file] of [[0, 'dog.obj'], [1, 'giraffe.off']]) {
     const source = shapes.parse(await readFile(path.join(samples, file), 'utf8'));
-    assert.ok(farthest(at(weight), source) < 0.03 * sizes[name], `${name} at weight ${weight}`);
+    const diagonal = Math.hypot(...[0, 1, 2].map((k) => Math.max(...source.positions.map((p) => p[k])) - Math.min(...source.positions.map((p) => p[k]))));
+    const off = farthest(source.positions, at(weight), triangles) / diagonal;
+    assert.ok(off < 0.0011, `${file} at weight ${weight}: ${off} of the diagonal`);
+    const report = supermesh.shapes[weight].hausdorff_relative;
+    assert.ok(off <= report * 1.0001 + 1e-6, `${file}: ${off} where the report says ${report}`);
   }
 });
 

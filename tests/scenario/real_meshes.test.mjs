@@ -5,7 +5,7 @@ import { daemon, slow, assertProblem } from './support/daemon.mjs';
 import * as real from './support/real.mjs';
 
 const skip = real.there ? false : 'no real meshes';
-const large = 60_000; // triangles that a build with sanitizers is spared
+const large = 20_000; // triangles that a build with sanitizers is spared
 
 async function embeds(d, mesh, what) {
   const { certificate, distortion } = await d.made('/v1/embeddings', { mesh: mesh.id });

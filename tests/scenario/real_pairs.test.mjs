@@ -9,11 +9,12 @@ import * as real from './support/real.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const skip = real.there ? false : 'no real meshes';
+const few = ['cow-spot', 'shrec397-shrec398', 'human_man-penguin']; // what a build with sanitizers is given
 
 test('every pair merges', { skip }, async (t) => {
   const d = await daemon(t);
   for (const pair of real.pairs()) {
-    if (slow && /100k|86k/.test(pair.name)) continue;
+    if (slow && !few.includes(pair.name)) continue;
     await t.test(pair.name, async (u) => {
       const meshes = [];
       for (const file of pair.files) meshes.push(await d.mesh(file));
