@@ -8,7 +8,6 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/resource.h>
-#include <sys/signalfd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -91,14 +90,44 @@ static void announce(const server *srv) {
   notify("READY=1\n");
 }
 
+/* Signals come through a pipe: threads that libraries start before main() do not have them blocked, so a signalfd
+ * would miss what is delivered to those. */
+static int signal_pipe[2] = {-1, -1};
+
+static void on_signal(int number) {
+  int saved = errno;
+  unsigned char byte = (unsigned char)number;
+  ssize_t written = write(signal_pipe[1], &byte, 1);
+  (void)written; /* full: more than enough are waiting */
+  errno = saved;
+}
+
+/* Blocks them for the threads to come; where on_signal() is read, or −1. */
+static int take_signals(sigset_t *set) {
+  struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
+  static const int numbers[] = {SIGTERM, SIGINT, SIGHUP};
+  if (pipe2(signal_pipe, O_CLOEXEC | O_NONBLOCK) != 0) {
+    return -1;
+  }
+  sigemptyset(set);
+  for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+    sigaddset(set, numbers[i]);
+    sigaction(numbers[i], &action, NULL);
+  }
+  pthread_sigmask(SIG_BLOCK, set, NULL);
+  signal(SIGPIPE, SIG_IGN);
+  return signal_pipe[0];
+}
+
 /* Waits for a signal to stop; a second one, or the end of the time for draining, stops at once. */
 static void wait_for_stop(server *srv, int signals) {
-  struct signalfd_siginfo info;
+  struct pollfd wait = {.fd = signals, .events = POLLIN};
   for (;;) {
-    if (read(signals, &info, sizeof info) != (ssize_t)sizeof info) {
+    unsigned char number;
+    if (poll(&wait, 1, -1) < 0 || read(signals, &number, 1) != 1) {
       continue;
     }
-    if (info.ssi_signo == SIGHUP) {
+    if (number == SIGHUP) {
       log_info("SIGHUP: the configuration is read at start only; restart to change it");
       continue;
     }
@@ -109,7 +138,6 @@ static void wait_for_stop(server *srv, int signals) {
   __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
   queue_stop(srv->q, 0);
   int64_t until = orb_clock_ms() + 1000 * srv->options->drain_seconds;
-  struct pollfd wait = {.fd = signals, .events = POLLIN};
   while (queue_running(srv->q) > 0 && orb_clock_ms() < until) {
     if (poll(&wait, 1, 50) > 0) {
       break;
@@ -118,7 +146,7 @@ static void wait_for_stop(server *srv, int signals) {
   queue_stop(srv->q, 1);
 }
 
-static int serve(server *srv, int signals) {
+static int serve(server *srv, int signals, const sigset_t *set) {
   const config *o = srv->options;
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
   queue_options queued = {.workers = (int)o->workers,
@@ -143,6 +171,7 @@ static int serve(server *srv, int signals) {
   } else {
     __atomic_store_n(&srv->ready, 1, __ATOMIC_RELEASE);
     announce(srv);
+    pthread_sigmask(SIG_UNBLOCK, set, NULL); /* in this thread, which alone waits for them */
     wait_for_stop(srv, signals);
     result = 0;
   }
@@ -169,19 +198,13 @@ static int run(const config *options) {
   server srv = {.options = options};
   sigset_t set;
   struct timespec now;
-  sigemptyset(&set);
-  sigaddset(&set, SIGTERM);
-  sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGHUP);
-  pthread_sigmask(SIG_BLOCK, &set, NULL);
-  signal(SIGPIPE, SIG_IGN);
-  int signals = signalfd(-1, &set, SFD_CLOEXEC);
+  int signals = take_signals(&set);
   clock_gettime(CLOCK_REALTIME, &now);
   srv.started = now.tv_sec;
   pthread_mutex_init(&srv.mesh_lock, NULL);
   raise_descriptor_limit();
   int lock = signals < 0 ? -1 : lock_data(options->data);
-  int result = lock < 0 ? 1 : serve(&srv, signals);
+  int result = lock < 0 ? 1 : serve(&srv, signals, &set);
   if (lock >= 0) {
     close(lock);
   }

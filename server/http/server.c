@@ -141,6 +141,13 @@ static void take_bytes(request *r, const char *bytes, size_t size) {
   }
 }
 
+/* %00 stays as it is: unescaped it would end the text, and "/%00" would be "/". */
+static size_t unescape(void *user, struct MHD_Connection *connection, char *text) {
+  (void)user;
+  (void)connection;
+  return strstr(text, "%00") ? strlen(text) : MHD_http_unescape(text);
+}
+
 static enum MHD_Result answer(void *user, struct MHD_Connection *connection, const char *url, const char *method,
                               const char *version, const char *upload, size_t *upload_size, void **state) {
   request *r = *state;
@@ -271,8 +278,9 @@ int http_start(server *srv) {
                                      {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)completed, srv},
                                      {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, srv},
                                      {MHD_OPTION_END, 0, NULL}};
-  srv->daemon = MHD_start_daemon(flags, 0, NULL, NULL, answer, srv, MHD_OPTION_EXTERNAL_LOGGER, on_mhd_log, NULL,
-                                 MHD_OPTION_ARRAY, options, MHD_OPTION_END);
+  srv->daemon =
+      MHD_start_daemon(flags, 0, NULL, NULL, answer, srv, MHD_OPTION_EXTERNAL_LOGGER, on_mhd_log, NULL,
+                       MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL, MHD_OPTION_ARRAY, options, MHD_OPTION_END);
   if (!srv->daemon) {
     close(fd);
     log_error("the HTTP service cannot be started on %s", o->listen);
