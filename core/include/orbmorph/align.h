@@ -55,15 +55,16 @@ typedef struct orb_alignment {
 
 /* Aligns shape_count ≥ 1 shapes; the first keeps its place unless the method says otherwise. Every result is certified.
  *
- * rotate: rotations only, by landmarks (generalised Procrustes; Peng & Timalsena 2016, section 7.1), or without any by
- * a search over SO(3) for the rotation under which the map between the shapes is nearest to a rigid motion. rbf: the
- * paper's warp (7.2) from there, in rbf_steps steps a pass, to the spherical means, or one_way to the first shape's
- * points. A landmark's influence ends at its radius (0: rbf_radius; that 0: 1.0). A step that folds is untangled
- * locally, else halved, else the sphere is relaxed before it; landmarks that cross on their way are carried over as pin
- * would. pin: the shapes are embedded anew with the landmarks as constraints, meeting at their spherical means;
- * landmarks that would have to pass through one another are met at the first shape's points, on surfaces with more
- * edges. After pin and rbf a landmark's vertices have bit-equal points on all shapes. auto: pin where landmarks are
- * given, else the rotation search; it does not find landmarks of its own.
+ * - rotate: rotations only, by landmarks (generalised Procrustes; Peng & Timalsena 2016, section 7.1), or without any
+ *   by a search over SO(3) for the rotation under which the map between the shapes is nearest to a rigid motion.
+ * - rbf: the paper's warp (7.2) from there, in rbf_steps steps a pass, to the spherical means, or one_way to the first
+ *   shape's points. A landmark's influence ends at its radius (0: rbf_radius; that 0: 1.0). A step that folds is
+ *   untangled locally, else halved, else the sphere is relaxed before it; landmarks that cross on their way are carried
+ *   over as pin would.
+ * - pin: the shapes are embedded anew with the landmarks as constraints, meeting at their spherical means; landmarks
+ *   that would have to pass through one another meet on surfaces with more edges, at the first shape's points or at
+ *   new ones. After pin and rbf a landmark's vertices have bit-equal points on all shapes.
+ * - auto: pin where landmarks are given, else the rotation search; it does not find landmarks of its own.
  *
  * Landmarks at one and the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
  * those that are out of range, share a place on some shapes only, or cannot be met; ORB_E_BAD_OPTION for pin and rbf
