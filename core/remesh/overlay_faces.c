@@ -234,11 +234,46 @@ static void cut_face(orb_overlay *overlay, int32_t *corner, int n, const int32_t
   emit(overlay, corner[0], corner[1], corner[2], parent);
 }
 
-/* A face without an edge of layer l lies inside one triangle of it, and so do all its corners. */
-static int32_t parent_of_corner(const orb_overlay *overlay, int l, int32_t id) {
-  const orb_layer *other = &overlay->layer[1 - l];
-  int32_t v = l == 1 ? id : overlay->lone[id - overlay->layer[0].vertex_count];
-  return other->spot[v].h / 3;
+/* Where a corner that is a vertex of the other layer lies in layer l. */
+static orb_spot corner_spot(const orb_overlay *overlay, int l, int32_t id) {
+  if (l == 1) {
+    return overlay->layer[0].spot[id];
+  }
+  if (id >= overlay->layer[0].vertex_count) {
+    return overlay->layer[1].spot[overlay->lone[id - overlay->layer[0].vertex_count]];
+  }
+  const orb_place *place = &overlay->places[id]; /* a vertex of both layers */
+  return (orb_spot){3 * place->triangle + (place->at[1] == 1 ? 1 : place->at[2] == 1 ? 2 : 0), ORB_SPOT_VERTEX};
+}
+
+static int holds(const orb_overlay *overlay, int l, int32_t t, const int32_t *corner, int n) {
+  const orb_layer *layer = &overlay->layer[l];
+  for (int i = 0; i < n; i++) {
+    for (int k = 0; k < 3; k++) {
+      const double *a = layer->view.points + 3 * (int64_t)layer->view.triangles[3 * t + k];
+      const double *b = layer->view.points + 3 * (int64_t)layer->view.triangles[3 * t + (k + 1) % 3];
+      if (orb_orient(a, b, overlay->points + 3 * (int64_t)corner[i]) < 0) {
+        return 0;
+      }
+    }
+  }
+  return 1;
+}
+
+/* A face with no side of layer l lies in one triangle of it, perhaps touching its border at corners. All corners are
+ * vertices of the other layer: their points are exact. */
+static int32_t parent_of_corners(const orb_overlay *overlay, int l, const int32_t *corner, int n) {
+  orb_spot spot = corner_spot(overlay, l, corner[0]);
+  for (int i = 1; i < n && spot.kind != ORB_SPOT_FACE; i++) {
+    spot = corner_spot(overlay, l, corner[i]);
+  }
+  const int32_t *twin = overlay->layer[l].view.twin;
+  int32_t h = spot.h;
+  while (spot.kind != ORB_SPOT_FACE && !holds(overlay, l, h / 3, corner, n)) {
+    h = spot.kind == ORB_SPOT_EDGE ? twin[h] : twin[orb_prev(h)];
+    ORB_ASSERT(h != spot.h);
+  }
+  return h / 3;
 }
 
 enum { MAX_CORNERS = 6 };
@@ -266,7 +301,7 @@ static orb_status follow_faces(orb_context *ctx, graph *g) {
       }
     }
     for (int l = 0; l < 2; l++) {
-      parent[l] = parent[l] >= 0 ? parent[l] : parent_of_corner(overlay, l, corner[0]);
+      parent[l] = parent[l] >= 0 ? parent[l] : parent_of_corners(overlay, l, corner, n);
     }
     ORB_ASSERT(n >= 3 && overlay->triangle_count + n - 2 <= most);
     cut_face(overlay, corner, n, parent);

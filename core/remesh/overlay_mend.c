@@ -8,7 +8,7 @@
 #include "numeric/vec3.h"
 #include "remesh/overlay.h"
 
-enum { ROUNDS = 24 };
+enum { ROUNDS = 11 };
 
 static int32_t shortest_edge(const orb_net *net, int32_t t) {
   int32_t best = 3 * t;
@@ -24,7 +24,7 @@ static int32_t shortest_edge(const orb_net *net, int32_t t) {
   return net->triangles[best] > net->triangles[orb_next(best)] ? best : net->twin[best]; /* the older vertex stays */
 }
 
-static orb_status merge_turned(orb_context *ctx, orb_overlay *overlay) {
+static orb_status merge_turned(orb_context *ctx, orb_overlay *overlay, double longest2) {
   orb_net net;
   ORB_TRY(orb_net_init(ctx, &net, overlay->points, overlay->vertex_count, overlay->triangles, overlay->triangle_count,
                        overlay->vertex_count));
@@ -35,7 +35,9 @@ static orb_status merge_turned(orb_context *ctx, orb_overlay *overlay) {
       continue;
     }
     int32_t h = shortest_edge(&net, t);
-    if (!orb_net_can_collapse(&net, h)) {
+    if (orb_distance2(orb_net_point(&net, net.triangles[h]), orb_net_point(&net, net.triangles[orb_next(h)])) >
+            longest2 ||
+        !orb_net_can_collapse(&net, h)) {
       continue;
     }
     int32_t *merged = orb_realloc(ctx, overlay->merged, 2 * (size_t)(overlay->merged_count + 1), sizeof *merged);
@@ -63,19 +65,24 @@ static orb_status merge_turned(orb_context *ctx, orb_overlay *overlay) {
 
 orb_status orb_overlay_mend(orb_context *ctx, orb_overlay *overlay) {
   int32_t first_free = overlay->layer[0].vertex_count + overlay->lone_count;
-  orb_status status = ORB_OK;
-  for (int round = 0; round < ROUNDS; round++) {
-    int32_t merged = overlay->merged_count;
+  size_t size = 3 * (size_t)overlay->vertex_count * sizeof(double);
+  double *rounded = ORB_NEW(ctx, double, 3 * (int64_t)overlay->vertex_count), close = 1e-15;
+  orb_status status = rounded ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status != ORB_OK) {
+    return status;
+  }
+  memcpy(rounded, overlay->points, size);
+  for (int round = 0; round < ROUNDS; round++, close *= 4) { /* to at most about 1e-9 */
     status = orb_overlay_untangle(ctx, overlay->points, overlay->vertex_count, overlay->triangles,
                                   overlay->triangle_count, first_free);
-    if (status != ORB_E_NOT_CERTIFIED) {
-      return status;
-    }
-    ORB_TRY(merge_turned(ctx, overlay));
-    if (overlay->merged_count == merged) {
-      return ORB_E_NOT_CERTIFIED;
+    if (status != ORB_E_NOT_CERTIFIED || round == ROUNDS - 1) {
+      break;
     }
     orb_error_clear(ctx);
+    memcpy(overlay->points, rounded, size); /* lengths are to be those of the rounded points */
+    ORB_GO(status, merge_turned(ctx, overlay, close * close), end);
   }
+end:
+  orb_free(ctx, rounded);
   return status;
 }

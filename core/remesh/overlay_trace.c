@@ -169,6 +169,22 @@ static double cut(const orb_layer *layer, int32_t e, const orb_layer *other, int
   return sum > 0 ? from / sum : 0.5;
 }
 
+/* How far along edge e of `layer` the point p lies, which is on it up to rounding, by central projection. Of nearly
+ * parallel edges the cut is ill-defined, but a point of one edge still has its one place on the other. */
+static double foot(const orb_layer *layer, int32_t e, const double p[3]) {
+  double weight[2];
+  for (int k = 0; k < 2; k++) {
+    const double *end =
+        layer->view.points + 3 * (int64_t)layer->view.triangles[k ? orb_next(layer->half[e]) : layer->half[e]];
+    double d[3], n[3];
+    orb_sub(p, end, d);
+    orb_cross(end, d, n);
+    weight[k] = orb_length(n);
+  }
+  double sum = weight[0] + weight[1];
+  return sum > 0 ? weight[0] / sum : 0.5;
+}
+
 static void place_crossing(orb_overlay *overlay, int32_t i) {
   const orb_layer *a = &overlay->layer[0], *b = &overlay->layer[1];
   int32_t ea = overlay->cross[2 * i], eb = overlay->cross[2 * i + 1];
@@ -181,7 +197,7 @@ static void place_crossing(orb_overlay *overlay, int32_t i) {
   }
   (void)orb_normalize(p);
   place_on_edge(a, ea, t, &overlay->places[v]);
-  place_on_edge(b, eb, cut(b, eb, a, ea), &overlay->places[overlay->vertex_count + v]);
+  place_on_edge(b, eb, foot(b, eb, p), &overlay->places[overlay->vertex_count + v]);
 }
 
 static orb_status place_vertices(orb_context *ctx, orb_overlay *overlay, orb_place *const on_other[2]) {

@@ -143,6 +143,32 @@ static void coincidences_add_nothing(void **state) {
   check_pair(SPHERE_OCTA, 0, 0, SPHERE_OCTA, 1, 0, 0, 32. / 40, 32. / 40);
 }
 
+/* Poles, meridians and edges in common up to rounding, which is the worst case for it: certified all the same, each
+ * shape moved by no more than rounding. */
+static void partial_coincidences(void **state) {
+  (void)state;
+  static const struct {
+    sphere_kind a, b;
+    int a_size, b_size;
+  } pair[] = {{SPHERE_OCTA, SPHERE_UV, 3, 16}, {SPHERE_OCTA, SPHERE_OCTA, 2, 4}, {SPHERE_UV, SPHERE_UV, 8, 24}};
+  for (size_t i = 0; i < sizeof pair / sizeof *pair; i++) {
+    orb_context *ctx = make_context(1);
+    orb_aligned_shape shapes[2];
+    sphere_shape(ctx, pair[i].a, pair[i].a_size, 0, 0, &shapes[0]);
+    sphere_shape(ctx, pair[i].b, pair[i].b_size, 0, 0, &shapes[1]);
+    orb_supermesh m;
+    assert_int_equal(overlay(ctx, shapes, 2, &m), ORB_OK);
+    sphere_assert_valid(&m, shapes, 2);
+    for (int s = 0; s < 2; s++) {
+      assert_true(m.error_bound[s] < 1e-6 * sphere_diagonal(&shapes[s]));
+    }
+    orb_supermesh_free(ctx, &m);
+    sphere_shape_free(ctx, &shapes[0]);
+    sphere_shape_free(ctx, &shapes[1]);
+    orb_context_destroy(ctx);
+  }
+}
+
 static void many_shapes(void **state) {
   (void)state;
   orb_context *ctx = make_context(2);
@@ -221,9 +247,9 @@ static void failing_allocations(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(general_position),    cmocka_unit_test(coincidences_add_nothing),
-      cmocka_unit_test(many_shapes),         cmocka_unit_test(threads_do_not_matter),
-      cmocka_unit_test(failing_allocations),
+      cmocka_unit_test(general_position),      cmocka_unit_test(coincidences_add_nothing),
+      cmocka_unit_test(partial_coincidences),  cmocka_unit_test(many_shapes),
+      cmocka_unit_test(threads_do_not_matter), cmocka_unit_test(failing_allocations),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
