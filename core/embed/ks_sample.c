@@ -40,15 +40,16 @@ orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options,
       }
     }
   }
-  s.pair_s = ORB_NEW(ctx, float, 2 * (size_t)s.pair_count);
+  s.padded_count = (s.pair_count + KS_LANES - 1) / KS_LANES * KS_LANES;
+  s.pair_s = ORB_NEW(ctx, float, 2 * (size_t)s.padded_count);
   if (!s.pair_s) {
     orb_free(ctx, s.pair);
     return ORB_E_NO_MEMORY;
   }
-  s.pair_t = s.pair_s + s.pair_count;
-  for (int32_t i = 0; i < s.pair_count; i++) {
-    s.pair_s[i] = (float)s.pair[i][0];
-    s.pair_t[i] = (float)s.pair[i][1];
+  s.pair_t = s.pair_s + s.padded_count;
+  for (int32_t i = 0; i < s.padded_count; i++) {
+    s.pair_s[i] = i < s.pair_count ? (float)s.pair[i][0] : 1;
+    s.pair_t[i] = i < s.pair_count ? (float)s.pair[i][1] : 1;
   }
   s.width = ks_width_of_machine();
   *out = s;
@@ -83,7 +84,7 @@ static orb_status ring_reserve(orb_context *ctx, ks_sampler *s, int32_t count) {
   orb_free(ctx, s->candidate);
   orb_free(ctx, s->near_candidate);
   orb_free(ctx, s->edge);
-  s->room = (int32_t)capacity * s->pair_count + 1;
+  s->room = (int32_t)capacity * s->padded_count + KS_LANES;
   s->candidate = orb_alloc(ctx, (size_t)s->room, 4 * sizeof(double));
   s->near_candidate = orb_alloc(ctx, (size_t)s->room, 4 * sizeof(float));
   s->edge = ORB_NEW(ctx, ks_edge, capacity);

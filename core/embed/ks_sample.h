@@ -18,6 +18,8 @@ typedef struct ks_ring {
   double fill;            /* area of its fan on the sphere over the area that it stands for */
 } ks_ring;
 
+enum { KS_LANES = 16 };
+
 /* One ring triangle as floats, for ks_search.c. */
 typedef struct ks_edge {
   float q[3], w[3];       /* its ends */
@@ -33,7 +35,8 @@ typedef struct ks_sampler {
   double (*pair)[2];  /* s, t */
   double *candidate;  /* room for the points of one ring: x, y, z, error in planes of `room` */
   int32_t room;
-  float *pair_s, *pair_t; /* the same pairs */
+  int32_t padded_count;   /* pair_count in whole vectors */
+  float *pair_s, *pair_t; /* the same pairs; behind them (1, 1), which lies outside of any kernel */
   float *near_candidate;  /* as candidate */
   ks_edge *edge;          /* as many as the ring's capacity */
   int width;              /* a ks_width */

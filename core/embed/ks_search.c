@@ -16,6 +16,12 @@
 
 #include "numeric/vec3.h"
 
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+enum { LANES = KS_LANES };
+
 #define KS_INLINE static inline __attribute__((always_inline))
 
 ks_width ks_width_of_machine(void) {
@@ -87,27 +93,68 @@ KS_INLINE void spread(const float *s, const float *t, int32_t pairs, float draw,
   }
 }
 
-/* Keeps the candidates above the plane of each edge. */
-KS_INLINE int32_t keep_inside(const ks_edge *edge, int32_t edges, float *x, float *y, float *z, float *least,
-                              int32_t count) {
+/* Keeps the candidates whose key is below the limit, in their order; returns how many. */
+static int32_t keep_below_plain(float limit, float *x, float *y, float *z, float *key, int32_t count) {
+  int32_t kept = 0;
   for (int32_t l = 0; l < count; l++) {
-    least[l] = INFINITY;
+    float e = key[l];
+    x[kept] = x[l];
+    y[kept] = y[l];
+    z[kept] = z[l];
+    key[kept] = e;
+    kept += e < limit; /* not where it is no number */
+  }
+  return kept;
+}
+
+#if defined(__x86_64__)
+#if defined(__clang__)
+#define KS_TARGET_512 "avx512f,avx512vl,avx512dq,avx512bw"
+#else
+#define KS_TARGET_512 "avx512f,avx512vl,avx512dq,avx512bw,prefer-vector-width=512"
+#endif
+__attribute__((target(KS_TARGET_512))) static int32_t keep_below_512(float limit, float *x, float *y, float *z,
+                                                                     float *key, int32_t count) {
+  int32_t kept = 0;
+  __m512 bound = _mm512_set1_ps(limit);
+  for (int32_t l = 0; l < count; l += LANES) {
+    __mmask16 present = count - l < LANES ? (__mmask16)((1u << (count - l)) - 1) : (__mmask16)0xffff;
+    __m512 e = _mm512_loadu_ps(key + l);
+    __mmask16 keep = _mm512_mask_cmp_ps_mask(present, e, bound, _CMP_LT_OQ);
+    __m512 px = _mm512_loadu_ps(x + l), py = _mm512_loadu_ps(y + l), pz = _mm512_loadu_ps(z + l);
+    _mm512_storeu_ps(x + kept, _mm512_maskz_compress_ps(keep, px));
+    _mm512_storeu_ps(y + kept, _mm512_maskz_compress_ps(keep, py));
+    _mm512_storeu_ps(z + kept, _mm512_maskz_compress_ps(keep, pz));
+    _mm512_storeu_ps(key + kept, _mm512_maskz_compress_ps(keep, e));
+    kept += __builtin_popcount(keep);
+  }
+  return kept;
+}
+#endif
+
+KS_INLINE int32_t keep_below(ks_width width, float limit, float *x, float *y, float *z, float *key, int32_t count) {
+#if defined(__x86_64__)
+  if (width == KS_AVX512) {
+    return keep_below_512(limit, x, y, z, key, count);
+  }
+#endif
+  (void)width;
+  return keep_below_plain(limit, x, y, z, key, count);
+}
+
+/* Measures how far each candidate lies beyond the nearest plane of an edge: negative inside. */
+KS_INLINE void measure_depth(const ks_edge *edge, int32_t edges, const float *restrict x, const float *restrict y,
+                             const float *restrict z, float *restrict beyond, int32_t count) {
+  for (int32_t l = 0; l < count; l++) {
+    beyond[l] = -INFINITY;
   }
   for (int32_t i = 0; i < edges; i++) {
     float nx = edge[i].normal[0], ny = edge[i].normal[1], nz = edge[i].normal[2], at = edge[i].at;
     for (int32_t l = 0; l < count; l++) {
-      float d = nx * x[l] + ny * y[l] + nz * z[l] + at;
-      least[l] = d < least[l] ? d : least[l];
+      float d = -(nx * x[l] + ny * y[l] + nz * z[l] + at);
+      beyond[l] = d > beyond[l] ? d : beyond[l];
     }
   }
-  int32_t kept = 0;
-  for (int32_t l = 0; l < count; l++) {
-    x[kept] = x[l];
-    y[kept] = y[l];
-    z[kept] = z[l];
-    kept += least[l] > 0;
-  }
-  return kept;
 }
 
 /* x to the power e, where kind is e if straight code is known for it and 0 if not. */
@@ -135,19 +182,6 @@ KS_INLINE void add_term(const ks_edge *e, int area_kind, int shape_kind, float a
   }
 }
 
-KS_INLINE int32_t keep_better(float *x, float *y, float *z, float *error, int32_t count) {
-  int32_t kept = 0;
-  for (int32_t l = 0; l < count; l++) {
-    float e = error[l];
-    x[kept] = x[l];
-    y[kept] = y[l];
-    z[kept] = z[l];
-    error[kept] = e;
-    kept += e < 1; /* not where it is no number */
-  }
-  return kept;
-}
-
 typedef struct search {
   const ks_edge *edge;
   int32_t edges, pairs;
@@ -157,49 +191,50 @@ typedef struct search {
   int32_t inside, best;
 } search;
 
-KS_INLINE void run(search *q) {
+/* Loops run over whole vectors; what lies behind the last candidate is computed and not looked at. */
+KS_INLINE int32_t padded(int32_t count) {
+  return (count + LANES - 1) / LANES * LANES;
+}
+
+KS_INLINE void run(search *q, ks_width width) {
+  float *x = q->x, *y = q->y, *z = q->z, *error = q->error;
   int32_t count = 0;
   for (int32_t i = 0; i < q->edges; i++, count += q->pairs) {
-    spread(q->s, q->t, q->pairs, q->draw, q->radius, q->apex, &q->edge[i], q->x + count, q->y + count, q->z + count);
+    spread(q->s, q->t, q->pairs, q->draw, q->radius, q->apex, &q->edge[i], x + count, y + count, z + count);
   }
-  count = q->inside = keep_inside(q->edge, q->edges, q->x, q->y, q->z, q->error, count);
-  memset(q->error, 0, (size_t)count * sizeof *q->error);
+  measure_depth(q->edge, q->edges, x, y, z, error, count);
+  count = q->inside = keep_below(width, 0, x, y, z, error, count);
+  memset(error, 0, (size_t)padded(count) * sizeof *error);
   for (int32_t i = 0; i < q->edges && count > 0; i++) {
     if (q->area_exponent == 3 && q->aspect_exponent == 12) {
-      add_term(&q->edge[i], 3, 12, 3, 12, q->shape_scale, q->x, q->y, q->z, count, q->error);
+      add_term(&q->edge[i], 3, 12, 3, 12, q->shape_scale, x, y, z, padded(count), error);
     } else if (q->area_exponent == 3 && q->aspect_exponent == 1) {
-      add_term(&q->edge[i], 3, 1, 3, 1, q->shape_scale, q->x, q->y, q->z, count, q->error);
+      add_term(&q->edge[i], 3, 1, 3, 1, q->shape_scale, x, y, z, padded(count), error);
     } else {
-      add_term(&q->edge[i], 0, 0, q->area_exponent, q->aspect_exponent, q->shape_scale, q->x, q->y, q->z, count,
-               q->error);
+      add_term(&q->edge[i], 0, 0, q->area_exponent, q->aspect_exponent, q->shape_scale, x, y, z, count, error);
     }
-    count = keep_better(q->x, q->y, q->z, q->error, count);
+    count = keep_below(width, 1, x, y, z, error, count);
   }
   float least = 1;
   q->best = -1;
   for (int32_t l = 0; l < count; l++) {
-    if (q->error[l] < least) {
-      least = q->error[l];
+    if (error[l] < least) {
+      least = error[l];
       q->best = l;
     }
   }
 }
 
 static void run_plain(search *q) {
-  run(q);
+  run(q, KS_PLAIN);
 }
 
 #if defined(__x86_64__)
 __attribute__((target("avx2"))) static void run_avx2(search *q) {
-  run(q);
+  run(q, KS_AVX2);
 }
-#if defined(__clang__)
-#define KS_TARGET_512 "avx512f,avx512vl,avx512dq,avx512bw"
-#else
-#define KS_TARGET_512 "avx512f,avx512vl,avx512dq,avx512bw,prefer-vector-width=512"
-#endif
 __attribute__((target(KS_TARGET_512))) static void run_avx512(search *q) {
-  run(q);
+  run(q, KS_AVX512);
 }
 #endif
 
@@ -233,7 +268,7 @@ int ks_search(ks_sampler *s, const double apex[3], double draw, double bound, do
   float *x = s->near_candidate;
   search q = {.edge = s->edge,
               .edges = r->count,
-              .pairs = s->pair_count,
+              .pairs = s->padded_count,
               .s = s->pair_s,
               .t = s->pair_t,
               .draw = (float)draw,
