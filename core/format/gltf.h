@@ -1,4 +1,4 @@
-/* The C face of the one C++ file: glTF and GLB through tinygltf. No exception leaves it. */
+/* The C face of the glTF and GLB reader. No exception leaves it. */
 #ifndef ORB_FORMAT_GLTF_H
 #define ORB_FORMAT_GLTF_H
 
