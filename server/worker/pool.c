@@ -9,6 +9,7 @@
 #include "faults.h"
 #include "log.h"
 #include "metrics.h"
+#include "worker/blas.h"
 #include "worker/run.h"
 
 typedef struct worker {
@@ -201,6 +202,7 @@ worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogu
   if (!pool) {
     return NULL;
   }
+  blas_use_one_thread();
   pool->options = *options;
   pool->env = (run_env){q, cat, store};
   pool->count = lanes;
