@@ -47,7 +47,8 @@ static const entry table[] = {
     {"log-format", TEXT(log_format), "json", "json or text"},
     {"tls-certificate", TEXT(tls_certificate), "", "PEM file; with tls-key the service speaks https"},
     {"tls-key", TEXT(tls_key), "", "PEM file"},
-    {"auth", TEXT(auth), "auto", "auto: tokens are required except on loopback; required; off"},
+    {"auth", TEXT(auth), "loopback",
+     "loopback: refuse to listen elsewhere; off: listen anywhere, a front end guards it"},
 };
 enum { ENTRIES = sizeof table / sizeof table[0] };
 
@@ -186,14 +187,10 @@ static void print_help(void) {
 }
 
 /* Flags in two passes: the first only looks for the config file. */
-static config_action read_flags(config *out, int argc, char **argv, int only_file, int *token_arguments) {
+static config_action read_flags(config *out, int argc, char **argv, int only_file) {
   config_action action = CONFIG_RUN;
   for (int i = 1; i < argc; i++) {
     const char *flag = argv[i];
-    if (strcmp(flag, "token") == 0) {
-      *token_arguments = i + 1;
-      return CONFIG_TOKEN;
-    }
     static const struct {
       const char *flag;
       config_action action;
@@ -241,21 +238,21 @@ static int consistent(config *out) {
     fprintf(stderr, "orbmorphd: tls-certificate and tls-key belong together\n");
     return 0;
   }
-  if (strcmp(out->auth, "auto") != 0 && strcmp(out->auth, "required") != 0 && strcmp(out->auth, "off") != 0) {
-    fprintf(stderr, "orbmorphd: auth must be auto, required or off\n");
+  if (strcmp(out->auth, "loopback") != 0 && strcmp(out->auth, "off") != 0) {
+    fprintf(stderr, "orbmorphd: auth must be loopback or off\n");
     return 0;
   }
   return 1;
 }
 
-config_action config_read(config *out, int argc, char **argv, int *token_arguments) {
+config_action config_read(config *out, int argc, char **argv) {
   memset(out, 0, sizeof *out);
   for (size_t i = 0; i < ENTRIES; i++) {
     if (!set(out, &table[i], table[i].standard, "default")) {
       return CONFIG_BAD;
     }
   }
-  config_action action = read_flags(out, argc, argv, 1, token_arguments);
+  config_action action = read_flags(out, argc, argv, 1);
   if (action == CONFIG_BAD || action == CONFIG_PRINTED) {
     return action;
   }
@@ -269,6 +266,6 @@ config_action config_read(config *out, int argc, char **argv, int *token_argumen
   if (!read_environment(out)) {
     return CONFIG_BAD;
   }
-  action = read_flags(out, argc, argv, 0, token_arguments);
+  action = read_flags(out, argc, argv, 0);
   return action == CONFIG_BAD || !consistent(out) ? CONFIG_BAD : action;
 }

@@ -12,7 +12,7 @@ typedef struct config {
   char cors[512]; /* origins, comma-separated, or * */
   char log_level[16], log_format[16];
   char tls_certificate[PATH_MAX / 2], tls_key[PATH_MAX / 2];
-  char auth[16]; /* auto, required, off */
+  char auth[16]; /* loopback, off */
   int64_t workers, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;
   int64_t max_body, max_json, max_triangles, queue_limit;
   int64_t job_memory, job_seconds, disk_reserve, drain_seconds, derived_bytes;
@@ -25,9 +25,8 @@ typedef enum config_action {
   CONFIG_CHECKED, /* --check-config */
   CONFIG_CHECK_DATA,
   CONFIG_GC,
-  CONFIG_TOKEN, /* token … : arguments from token_arguments on */
 } config_action;
 
-config_action config_read(config *out, int argc, char **argv, int *token_arguments);
+config_action config_read(config *out, int argc, char **argv);
 
 #endif

@@ -84,7 +84,8 @@ static void announce(const server *srv) {
     printf("orbmorphd listening on %s\n", listen);
   } else {
     int host = (int)(strrchr(listen, ':') - listen);
-    printf("orbmorphd listening on http://%.*s:%u\n", host, listen, (unsigned)http_port(srv));
+    printf("orbmorphd listening on http%s://%.*s:%u\n", srv->options->tls_key[0] ? "s" : "", host, listen,
+           (unsigned)http_port(srv));
   }
   fflush(stdout);
   notify("READY=1\n");
@@ -213,8 +214,7 @@ static int run(const config *options) {
 
 int main(int argc, char **argv) {
   static config options;
-  int token_arguments = 0;
-  config_action action = config_read(&options, argc, argv, &token_arguments);
+  config_action action = config_read(&options, argc, argv);
   static const char *const levels[] = {"debug", "info", "warn", "error"};
   int level = 0;
   while (level < 3 && strcmp(levels[level], options.log_level) != 0) {
@@ -235,8 +235,10 @@ int main(int argc, char **argv) {
       return 0;
     case CONFIG_RUN:
       if (!is_loopback(options.listen) && strcmp(options.auth, "off") != 0) {
-        fputs("orbmorphd: only loopback is served without tokens; put a front end before it, or say --auth off\n",
-              stderr);
+        fputs(
+            "orbmorphd: it has no access control of its own: listen on loopback behind a front end, or say --auth "
+            "off\n",
+            stderr);
         return 2;
       }
       return run(&options);

@@ -86,3 +86,19 @@ const char *header_of(const request *r, const char *name) {
 const char *query_of(const request *r, const char *name) {
   return MHD_lookup_connection_value(r->connection, MHD_GET_ARGUMENT_KIND, name);
 }
+
+static enum MHD_Result compare_name(void *user, enum MHD_ValueKind kind, const char *name, const char *value) {
+  const char **wanted = user;
+  (void)kind;
+  (void)value;
+  if (strcmp(name, *wanted) == 0) {
+    *wanted = NULL;
+    return MHD_NO;
+  }
+  return MHD_YES;
+}
+
+int query_has(const request *r, const char *name) {
+  MHD_get_connection_values(r->connection, MHD_GET_ARGUMENT_KIND, compare_name, &name);
+  return name == NULL;
+}

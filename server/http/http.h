@@ -45,6 +45,7 @@ struct request {
   char id[ORB_ID_SIZE];
   char number[24]; /* of the request, for the log and X-Request-Id */
   int has_body, head;
+  int closes; /* the connection ends with this answer */
   request_phase phase;
   int64_t began; /* µs */
 
@@ -75,6 +76,7 @@ enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r))
 int guard_headers(request *r, const char *version, orb_problem *problem);
 const char *header_of(const request *r, const char *name);
 const char *query_of(const request *r, const char *name);
+int query_has(const request *r, const char *name); /* also without a value */
 
 /* reply.c: each leaves a response. */
 void reply_json(request *r, unsigned status, orb_text *json); /* takes json */

@@ -165,7 +165,7 @@ enum MHD_Result reply_send(request *r) {
   if (!r->response) {
     return MHD_NO; /* no memory even for an answer: the connection closes */
   }
-  if (r->status >= 400 && r->has_body) {
+  if (r->closes || (r->status >= 400 && r->has_body)) {
     reply_header(r, "Connection", "close");
   }
   reply_header(r, "X-Content-Type-Options", "nosniff");

@@ -62,7 +62,6 @@ static enum MHD_Result dispatch(request *r) {
     case ROUTE_MESH_FILE:
     case ROUTE_EMBEDDING_SPHERE:
     case ROUTE_SUPERMESH_ASSET:
-    case ROUTE_SUPERMESH_PLACES:
       return handle_file(r);
     case ROUTE_EMBEDDING_CREATE:
     case ROUTE_SUPERMESH_CREATE:
@@ -120,6 +119,7 @@ static void request_begin(request *r, const char *path, const char *version) {
   orb_problem problem = {0};
   r->route = route_find(r->method, path, r->id, allow);
   if (!guard_headers(r, version, &problem)) {
+    r->closes = 1;
     reply_problem(r, &problem);
   } else if (!r->route) {
     answer_unrouted(r, path, allow);
@@ -260,15 +260,39 @@ static int listen_on(const char *where) {
   return fd;
 }
 
+/* A small text file, in memory of malloc(); NULL with the reason logged. */
+static char *read_text(const char *path) {
+  enum { MOST = 1 << 20 };
+  FILE *file = fopen(path, "rb");
+  char *text = file ? malloc(MOST) : NULL;
+  size_t size = text ? fread(text, 1, MOST - 1, file) : 0;
+  if (text) {
+    text[size] = 0;
+  }
+  if (file) {
+    fclose(file);
+  }
+  if (!text || size == 0) {
+    log_error("%s cannot be read", path);
+    free(text);
+    return NULL;
+  }
+  return text;
+}
+
 int http_start(server *srv) {
   const config *o = srv->options;
-  int fd = listen_on(o->listen);
+  int tls = o->tls_key[0] != 0;
+  char *certificate = tls ? read_text(o->tls_certificate) : NULL, *key = tls ? read_text(o->tls_key) : NULL;
+  int fd = tls && (!certificate || !key) ? -1 : listen_on(o->listen);
   if (fd < 0) {
     log_error("cannot listen on %s", o->listen);
+    free(certificate);
+    free(key);
     return 0;
   }
-  unsigned flags =
-      MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ITC | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG | MHD_USE_TURBO;
+  unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ITC | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG |
+                   (unsigned)(tls ? MHD_USE_TLS : MHD_USE_TURBO);
   struct MHD_OptionItem options[] = {{MHD_OPTION_THREAD_POOL_SIZE, (intptr_t)o->http_threads, NULL},
                                      {MHD_OPTION_LISTEN_SOCKET, fd, NULL},
                                      {MHD_OPTION_CONNECTION_MEMORY_LIMIT, CONNECTION_MEMORY, NULL},
@@ -277,10 +301,14 @@ int http_start(server *srv) {
                                      {MHD_OPTION_PER_IP_CONNECTION_LIMIT, (intptr_t)o->connections_per_address, NULL},
                                      {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)completed, srv},
                                      {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, srv},
+                                     {tls ? MHD_OPTION_HTTPS_MEM_CERT : MHD_OPTION_END, 0, certificate},
+                                     {MHD_OPTION_HTTPS_MEM_KEY, 0, key},
                                      {MHD_OPTION_END, 0, NULL}};
   srv->daemon =
       MHD_start_daemon(flags, 0, NULL, NULL, answer, srv, MHD_OPTION_EXTERNAL_LOGGER, on_mhd_log, NULL,
                        MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL, MHD_OPTION_ARRAY, options, MHD_OPTION_END);
+  free(certificate); /* parsed at the start */
+  free(key);
   if (!srv->daemon) {
     close(fd);
     log_error("the HTTP service cannot be started on %s", o->listen);

@@ -54,7 +54,7 @@ static enum MHD_Result ready(request *r) {
   orb_text json = {0};
   orb_json_open(&json, '{');
   orb_json_member_string(&json, "status", "ready");
-  if (query_of(r, "verbose")) {
+  if (query_has(r, "verbose")) {
     orb_json_member_integer(&json, "queued", n.queued);
     orb_json_member_integer(&json, "running", n.running);
     orb_json_member_integer(&json, "workers", srv->options->workers);

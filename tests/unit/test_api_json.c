@@ -1,0 +1,205 @@
+/* The strict JSON reader, problems and ids, against RFC 8259, RFC 3629 and known hashes. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "api/ids.h"
+#include "api/json.h"
+#include "api/mesh_codec.h"
+#include "api/routes.h"
+#include "api/supermesh_codec.h"
+
+static int accepts(const char *text, size_t size) {
+  orb_json_error error;
+  cJSON *value = orb_json_parse(text, size, &error);
+  if (!value) {
+    assert_non_null(error.why);
+    assert_true(error.offset <= size);
+  }
+  cJSON_Delete(value);
+  return value != NULL;
+}
+
+static void test_grammar(void **state) {
+  (void)state;
+  static const char *const good[] = {"{}", " [1, -0.5e3, \"\\u00e9\\ud83d\\ude00\", true, null] ", "{\"a\":{\"a\":1}}",
+                                     "0"};
+  static const char *const bad[] = {"",
+                                    " ",
+                                    "{",
+                                    "{\"a\"}",
+                                    "[1,]",
+                                    "{\"a\":1,}",
+                                    "01",
+                                    "1.",
+                                    "+1",
+                                    "1e999",
+                                    "-1e999",
+                                    "NaN",
+                                    "Infinity",
+                                    "{} x",
+                                    "'a'",
+                                    "\"\\x\"",
+                                    "\"\\ud800\"",
+                                    "\"a\nb\"",
+                                    "\"\\u0000\"",
+                                    "{\"a\":1,\"a\":2}",
+                                    "[1][2]",
+                                    "tru",
+                                    "\"open",
+                                    "[\"\\udc00\"]",
+                                    "{1:2}",
+                                    ",",
+                                    "[1 2]"};
+  for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+    assert_true(accepts(good[i], strlen(good[i])));
+  }
+  for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    assert_false(accepts(bad[i], strlen(bad[i])));
+  }
+}
+
+static void test_utf8(void **state) {
+  (void)state;
+  assert_true(accepts("\"\xc3\xa9\xf0\x9f\x98\x80\"", 8));
+  assert_false(accepts("\"\xff\"", 3));
+  assert_false(accepts("\"\xc0\xaf\"", 4));         /* overlong */
+  assert_false(accepts("\"\xed\xa0\x80\"", 5));     /* surrogate */
+  assert_false(accepts("\"\xf4\x90\x80\x80\"", 6)); /* beyond U+10FFFF */
+  assert_false(accepts("\"a\0b\"", 5));
+}
+
+static void test_depth(void **state) {
+  (void)state;
+  char text[80];
+  memset(text, '[', 40);
+  memset(text + 32, ']', 32);
+  assert_true(accepts(text, 64));
+  memset(text, '[', 33);
+  memset(text + 33, ']', 33);
+  assert_false(accepts(text, 66));
+}
+
+static void test_numbers_read_back(void **state) {
+  (void)state;
+  static const double values[] = {0, 1, -1, 0.1, 1.0 / 3, 5e-324, 1.7976931348623157e308, 123456789.25};
+  for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
+    orb_text text = {0};
+    orb_json_error error;
+    orb_json_number(&text, values[i]);
+    cJSON *value = orb_json_parse(text.data, text.size, &error);
+    assert_non_null(value);
+    assert_memory_equal(&value->valuedouble, &values[i], sizeof(double));
+    cJSON_Delete(value);
+    orb_text_free(&text);
+  }
+}
+
+static void test_ids(void **state) {
+  (void)state;
+  char id[ORB_ID_SIZE];
+  orb_id_of_text("abc", 3, id); /* FIPS 180-4, appendix B.1 */
+  assert_string_equal(id, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  assert_true(orb_id_valid(id, 64));
+  id[0] = 'B';
+  assert_false(orb_id_valid(id, 64));
+}
+
+static void test_repairs(void **state) {
+  (void)state;
+  unsigned flags;
+  char text[ORB_REPAIR_TEXT];
+  orb_problem problem = {0};
+  assert_true(orb_repair_parse("largest_component,fill_holes", &flags, text, &problem));
+  assert_int_equal(flags, ORB_REPAIR_SAFE | ORB_REPAIR_FILL_HOLES | ORB_REPAIR_LARGEST_COMPONENT);
+  assert_string_equal(text, "safe,fill_holes,largest_component");
+  assert_false(orb_repair_parse("none,safe", &flags, text, &problem));
+  assert_false(orb_repair_parse("", &flags, text, &problem));
+  assert_false(orb_repair_parse("safe,", &flags, text, &problem));
+  orb_problem_free(&problem);
+}
+
+#define MESH "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+
+/* The name of the problem, "" where the request is fine; its id. */
+static const char *supermesh(const char *json, char id[ORB_ID_SIZE]) {
+  orb_supermesh_request request;
+  orb_problem problem = {0};
+  orb_json_error error;
+  orb_mesh_summary meshes[2] = {{.name = "a", .file_vertices = 10, .file_triangles = 16},
+                                {.name = "b", .file_vertices = 10, .file_triangles = 16}};
+  cJSON *body = orb_json_parse(json, strlen(json), &error);
+  assert_non_null(body);
+  int fine =
+      orb_supermesh_request_read(body, &request, &problem) && orb_supermesh_request_resolve(&request, meshes, &problem);
+  if (fine) {
+    orb_text text = {0};
+    orb_supermesh_request again;
+    char twice[ORB_ID_SIZE];
+    assert_true(orb_supermesh_request_id(&request, id));
+    orb_supermesh_request_write(&request, &text); /* the canonical text reads back as the same request */
+    cJSON *canonical = orb_json_parse(text.data, text.size, &error);
+    assert_true(orb_supermesh_request_read(canonical, &again, &problem));
+    assert_true(orb_supermesh_request_id(&again, twice));
+    assert_string_equal(id, twice);
+    orb_supermesh_request_free(&again);
+    cJSON_Delete(canonical);
+    orb_text_free(&text);
+  }
+  orb_supermesh_request_free(&request);
+  cJSON_Delete(body);
+  const char *name = fine ? "" : problem.name;
+  orb_problem_free(&problem);
+  return name;
+}
+
+#define SHAPES "\"shapes\":[{\"mesh\":\"" MESH "\"},{\"mesh\":\"" MESH "\"}]"
+
+static void test_supermesh_requests(void **state) {
+  (void)state;
+  char a[ORB_ID_SIZE], b[ORB_ID_SIZE];
+  assert_string_equal(supermesh("{" SHAPES "}", a), "");
+  assert_string_equal(supermesh("{\"landmarks\":\"auto\"," SHAPES ",\"remesh\":{\"tolerance\":1e-3}}", b), "");
+  assert_string_equal(a, b); /* what is default need not be said, order does not matter */
+  assert_string_equal(supermesh("{" SHAPES ",\"remesh\":{\"tolerance\":0.002}}", b), "");
+  assert_string_not_equal(a, b);
+  assert_string_equal(supermesh("{" SHAPES ",\"zap\":1}", b), "unknown-member");
+  assert_string_equal(supermesh("{" SHAPES ",\"align\":{\"method\":\"pin\"}}", b), "bad-landmarks");
+  assert_string_equal(supermesh("{" SHAPES ",\"remesh\":{\"method\":\"magic\"}}", b), "bad-option");
+  assert_string_equal(supermesh("{" SHAPES ",\"landmarks\":[{\"at\":[{\"vertex\":1}]}]}", b), "bad-landmarks");
+  assert_string_equal(supermesh("{" SHAPES ",\"landmarks\":[{\"at\":[{\"vertex\":1},{\"vertex\":10}]}]}", b),
+                      "bad-landmarks");
+  assert_string_equal(supermesh("{" SHAPES ",\"landmarks\":[{\"at\":[{\"vertex\":1},{\"vertex\":9}]}]}", b), "");
+  assert_string_equal(
+      supermesh("{" SHAPES ",\"landmarks\":[{\"at\":[{\"vertex\":1},{\"triangle\":2,\"barycentric\":[1,1,0]}]}]}", b),
+      "bad-landmarks");
+}
+
+static void test_routes(void **state) {
+  (void)state;
+  char id[ORB_ID_SIZE], allow[64];
+  assert_int_equal(route_find("HEAD", "/v1/meshes/" MESH, id, allow)->id, ROUTE_MESH_GET);
+  assert_string_equal(id, MESH);
+  assert_null(route_find("PUT", "/v1/meshes", id, allow));
+  assert_string_equal(allow, "POST, GET, HEAD");
+  assert_null(route_find("GET", "/v1/meshes/", id, allow));
+  assert_string_equal(allow, "");
+  assert_null(route_find("GET", "/v1/meshes/../x", id, allow));
+  assert_null(route_find("GET", "/v1/jobs/" MESH, id, allow));
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_grammar),
+                                     cmocka_unit_test(test_utf8),
+                                     cmocka_unit_test(test_depth),
+                                     cmocka_unit_test(test_numbers_read_back),
+                                     cmocka_unit_test(test_ids),
+                                     cmocka_unit_test(test_repairs),
+                                     cmocka_unit_test(test_supermesh_requests),
+                                     cmocka_unit_test(test_routes)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
