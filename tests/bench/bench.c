@@ -16,6 +16,7 @@ static const char usage_text[] =
     "  --method M        newton (default) or kernel-sampling\n"
     "  --preset P        default, fast or quality\n"
     "  --options JSON    options of the embedding, as in a request: '{\"energy_weight\":0}'\n"
+    "  --repair LIST     safe (default), none, fill_holes, largest_component, as at an upload\n"
     "  --threads N       threads in all (default: those of the machine)\n"
     "  --repeat N        runs of every file (1)\n"
     "  --out DIR         embed: write DIR/NAME.sphere.ply\n"
@@ -81,7 +82,7 @@ static int read_options(const char *text, orb_embed_options *options) {
 }
 
 typedef struct texts {
-  const char *method, *preset, *options, *threads, *repeat, *align, *remesh, *tolerance, *max_triangles;
+  const char *method, *preset, *options, *repair, *threads, *repeat, *align, *remesh, *tolerance, *max_triangles;
 } texts;
 
 static int interpret(const texts *t, bench_options *o) {
@@ -93,6 +94,15 @@ static int interpret(const texts *t, bench_options *o) {
   long number = 0;
   if (t->options && !read_options(t->options, &o->embed)) {
     return 0;
+  }
+  if (t->repair) {
+    orb_problem problem = {0};
+    char canonical[ORB_REPAIR_TEXT];
+    int fine = orb_repair_parse(t->repair, &o->repair, canonical, &problem) || wrong("--repair: ", problem.detail);
+    orb_problem_free(&problem);
+    if (!fine) {
+      return 0;
+    }
   }
   if (t->method) {
     if (!read_word("--method", t->method, methods, &word)) {
@@ -157,6 +167,7 @@ static int parse(int argc, char **argv, int merge, bench_options *o) {
   } table[] = {{"--method", &t.method, 3},
                {"--preset", &t.preset, 3},
                {"--options", &t.options, 3},
+               {"--repair", &t.repair, 3},
                {"--threads", &t.threads, 3},
                {"--repeat", &t.repeat, 3},
                {"--out", &o->out, 3},
@@ -213,7 +224,8 @@ int main(int argc, char **argv) {
     fputs(usage_text, stderr);
     return BENCH_USAGE;
   }
-  bench_options options = {.repeat = 1, .files = calloc((size_t)argc, sizeof *options.files)};
+  bench_options options = {
+      .repeat = 1, .repair = ORB_REPAIR_SAFE, .files = calloc((size_t)argc, sizeof *options.files)};
   orb_embed_defaults(&options.embed);
   orb_merge_defaults(&options.merge);
   int status = BENCH_USAGE;

@@ -11,6 +11,7 @@ enum { BENCH_DONE = 0, BENCH_REFUSED = 1, BENCH_USAGE = 2 };
 
 typedef struct bench_options {
   int threads, repeat;
+  unsigned repair;
   const char *out, *landmarks;
   orb_embed_options embed;
   orb_merge_options merge;
@@ -54,7 +55,7 @@ typedef struct bench_mesh {
   int32_t *raw_corners; /* 3 a triangle of the file: its vertices in the file */
   double read_seconds, check_seconds;
 } bench_mesh;
-int bench_load(orb_context *ctx, const char *path, int keep_corners, bench_mesh *out);
+int bench_load(orb_context *ctx, const char *path, unsigned repair, int keep_corners, bench_mesh *out);
 void bench_unload(orb_context *ctx, bench_mesh *mesh);
 
 /* The place that a caller names; 0 and why (a literal). */

@@ -71,7 +71,7 @@ static int run_once(const bench_options *options, const char *path, int repeat) 
   bench_reset_peak();
   orb_context *ctx = bench_open(options->threads);
   double start = orb_clock(), cpu = bench_cpu();
-  int fine = bench_load(ctx, path, 0, &m);
+  int fine = bench_load(ctx, path, options->repair, 0, &m);
   if (fine) {
     fine = orb_embed(ctx, &m.mesh, &options->embed, &e) == ORB_OK;
     if (fine) {

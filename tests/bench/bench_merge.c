@@ -81,7 +81,7 @@ static int load_set(orb_context *ctx, const bench_options *options, bench_set *s
   }
   for (int32_t s = 0; s < set->count; s++) {
     const char *path = options->files[s];
-    if (!bench_load(ctx, path, 1, &set->mesh[s])) {
+    if (!bench_load(ctx, path, options->repair, 1, &set->mesh[s])) {
       return 0;
     }
     set->name[s] = set->mesh[s].name;

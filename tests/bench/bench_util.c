@@ -147,7 +147,7 @@ static orb_status note_corners(orb_context *ctx, bench_mesh *out) {
   return ORB_OK;
 }
 
-int bench_load(orb_context *ctx, const char *path, int keep_corners, bench_mesh *out) {
+int bench_load(orb_context *ctx, const char *path, unsigned repair, int keep_corners, bench_mesh *out) {
   memset(out, 0, sizeof *out);
   bench_name_of(path, out->name);
   unsigned char *bytes;
@@ -164,7 +164,7 @@ int bench_load(orb_context *ctx, const char *path, int keep_corners, bench_mesh 
   }
   start = orb_clock();
   if (status == ORB_OK) {
-    status = orb_mesh_repair(ctx, &out->mesh, ORB_REPAIR_SAFE);
+    status = orb_mesh_repair(ctx, &out->mesh, repair);
   }
   out->check_seconds = orb_clock() - start;
   if (status != ORB_OK) {
