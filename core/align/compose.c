@@ -25,6 +25,8 @@ enum {
   LAST_START = 60000, /* and beyond which it gives up untangling */
   SOFT_ROUNDS = 8,
   SOFT_SWEEPS = 20,
+  ROUGH_SWEEPS = 40,
+  WORK = 600,   /* vertex steps a vertex, see composer.work */
   SAMPLES = 150 /* of a map, from which the moving shape is bent anew */
 };
 
@@ -57,7 +59,9 @@ typedef struct composer {
   orb_place *place; /* by vertex of the surface: where it was on the last level */
   double *best;     /* points of the best start, mesh order */
   double best_energy;
-  int passes; /* bends through samples of the best map */
+  int rough;    /* the alignment as given is only refined to be sampled */
+  int passes;   /* bends through samples of the best map */
+  int64_t work; /* vertex steps that may still be spent on clearing flips and further starts */
   effort effort;
 } composer;
 
@@ -271,6 +275,7 @@ static orb_status sweeps(composer *c, cm_level *l, cm_rules rules, int count) {
   }
   for (int i = 0; i < count && stepped > l->count / 500; i++) {
     ORB_TRY(cm_level_sweep(c->ctx, l, &c->b, &rules, &moved, &stepped));
+    c->work -= stepped;
   }
   return ORB_OK;
 }
@@ -290,13 +295,13 @@ static orb_status clear_flips(composer *c, cm_level *l, int rounds, int32_t *fli
   double *copy = ORB_NEW(c->ctx, double, 3 * (size_t)l->count);
   orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
   *flips = cm_level_flips(l);
-  for (int round = 0; round < rounds && *flips && status == ORB_OK; round++) {
+  for (int round = 0; round < rounds && *flips && c->work > 0 && status == ORB_OK; round++) {
     ORB_GO(status, sweeps(c, l, rules, SOFT_SWEEPS), done);
     rules.barrier *= 3;
     *flips = cm_level_flips(l);
     if (*flips) {
       memcpy(copy, l->x, 3 * (size_t)l->count * sizeof *copy);
-      ORB_GO(status, cm_level_untangle(c->ctx, l, flips), done);
+      ORB_GO(status, cm_level_untangle(c->ctx, l, flips, &c->work), done);
       if (*flips) {
         memcpy(l->x, copy, 3 * (size_t)l->count * sizeof *copy);
       } else {
@@ -382,8 +387,8 @@ done:
   return status;
 }
 
-/* From a level without flips up to all vertices. */
-static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, int *failed) {
+/* From a level without flips up to all vertices. rough: only so far that samples of the map are of use. */
+static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, int rough, int *failed) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
   const cm_rules hard = {.soft = 0, .barrier = 1, .epsilon = EPSILON, .omega = 1};
   unsigned char *known = ORB_NEW(c->ctx, unsigned char, c->vertex_count);
@@ -398,8 +403,12 @@ static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, 
                 : r->live < 3000 ? c->effort.coarse_sweeps
                                  : c->effort.level_sweeps;
     first = 0;
-    ORB_GO(status, sweeps(c, l, hard, count), done);
-    ORB_GO(status, loosen(c, l, count, count), done);
+    if (rough) {
+      ORB_GO(status, sweeps(c, l, hard, count < ROUGH_SWEEPS ? count : ROUGH_SWEEPS), done);
+    } else {
+      ORB_GO(status, sweeps(c, l, hard, count), done);
+      ORB_GO(status, loosen(c, l, count / 2, count / 2), done);
+    }
     *failed = cm_level_flips(l) > 0;
     if (*failed) {
       break;
@@ -469,7 +478,7 @@ static orb_status run_start(composer *c, int spatial) {
     want = r->live * 2;
   }
   store_level(c, &level, r);
-  ORB_GO(status, refine(c, r, &level, spatial ? 0.5 : 0, &failed), done);
+  ORB_GO(status, refine(c, r, &level, spatial ? 0.5 : 0, !spatial && c->rough, &failed), done);
   if (!failed) {
     double energy = cm_level_energy(&level);
     if (energy < c->best_energy) {
@@ -516,6 +525,8 @@ orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_ali
                        int32_t landmark_count, orb_preset preset, double energy[2], int *improved) {
   composer c = {.ctx = ctx, .moving = moving, .landmark_count = landmark_count, .effort = effort_of(preset)};
   c.passes = preset == ORB_PRESET_QUALITY ? 6 : 3;
+  c.rough = preset != ORB_PRESET_QUALITY;
+  c.work = (preset == ORB_PRESET_QUALITY ? 5000 : WORK) * (int64_t)moving->mesh.vertex_count;
   orb_certificate certificate;
   orb_status status;
   *improved = 0;
@@ -527,10 +538,15 @@ orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_ali
   ORB_GO(status, run_start(&c, 1), done);
   if (preset == ORB_PRESET_QUALITY || c.best_energy > GOOD_ENERGY) {
     ORB_GO(status, run_start(&c, 0), done);
-    for (double last = INFINITY; c.best_energy < 0.99 * last && c.passes-- > 0;) {
+    double rough = c.best_energy;
+    for (double last = INFINITY; c.best_energy < 0.99 * last && c.passes-- > 0 && c.work > 0;) {
       last = c.best_energy;
       ORB_GO(status, bend(&c, fixed, SAMPLES), done);
       ORB_GO(status, run_start(&c, 1), done);
+    }
+    if (c.rough && c.best_energy == rough) { /* nothing came of the samples */
+      c.rough = 0;
+      ORB_GO(status, run_start(&c, 0), done);
     }
   }
   if (c.best_energy < energy[0]) {

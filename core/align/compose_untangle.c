@@ -15,7 +15,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { FEW = 12, ROUNDS = 60, PASSES = 6, RINGS_MOST = 5, TRIES = 6 };
+enum { FEW = 12, ROUNDS = 60, STALE = 12, PASSES = 6, RINGS_MOST = 5, TRIES = 6 };
 
 static double chi(double d, double e) {
   double root = sqrt(d * d + e * e);
@@ -121,13 +121,17 @@ static void grow_marks(const cm_level *l, unsigned char *mark, unsigned char *ne
   memcpy(mark, next, (size_t)l->count);
 }
 
-orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left) {
+orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left, int64_t *work) {
   unsigned char *mark = ORB_NEW(ctx, unsigned char, l->count), *next = ORB_NEW(ctx, unsigned char, l->count);
   orb_status status = mark && next ? ORB_OK : ORB_E_NO_MEMORY;
+  int32_t fewest = INT32_MAX;
+  int stale = 0; /* rounds since there were fewest flips */
   for (int round = 0; status == ORB_OK; round++) {
     double worst;
     *left = mark_flips(l, mark, &worst);
-    if (*left == 0 || round == ROUNDS) {
+    stale = *left < fewest ? 0 : stale + 1;
+    fewest = *left < fewest ? *left : fewest;
+    if (*left == 0 || round == ROUNDS || stale > STALE) {
       break;
     }
     int rings = 1 + round / 4;
@@ -141,6 +145,7 @@ orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left) {
       for (int32_t v = 0; v < l->count; v++) {
         if (mark[v] && !l->pinned[v]) {
           step(l, v, epsilon);
+          --*work;
         }
       }
     }
