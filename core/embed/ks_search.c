@@ -118,7 +118,7 @@ __attribute__((target(KS_TARGET_512))) static int32_t keep_below_512(float limit
   int32_t kept = 0;
   __m512 bound = _mm512_set1_ps(limit);
   for (int32_t l = 0; l < count; l += LANES) {
-    __mmask16 present = count - l < LANES ? (__mmask16)((1u << (count - l)) - 1) : (__mmask16)0xffff;
+    __mmask16 present = (__mmask16)(count - l < LANES ? (1u << (count - l)) - 1 : 0xffffu);
     __m512 e = _mm512_loadu_ps(key + l);
     __mmask16 keep = _mm512_mask_cmp_ps_mask(present, e, bound, _CMP_LT_OQ);
     __m512 px = _mm512_loadu_ps(x + l), py = _mm512_loadu_ps(y + l), pz = _mm512_loadu_ps(z + l);
