@@ -116,6 +116,9 @@ static void file_of(request *r, const cached *entry) {
     case ROUTE_EMBEDDING_SPHERE:
       reply_object(r, OBJECT_SPHERE, r->id, entry->row.sha, "application/octet-stream", "sphere.ply");
       break;
+    case ROUTE_SUPERMESH_PLACES:
+      reply_object(r, OBJECT_PLACES, r->id, r->id, "application/octet-stream", "places.bin");
+      break;
     default:
       reply_object(r, OBJECT_ASSET, r->id, entry->row.sha, "model/gltf-binary", "asset.glb");
   }

@@ -62,6 +62,7 @@ static enum MHD_Result dispatch(request *r) {
     case ROUTE_MESH_FILE:
     case ROUTE_EMBEDDING_SPHERE:
     case ROUTE_SUPERMESH_ASSET:
+    case ROUTE_SUPERMESH_PLACES:
       return handle_file(r);
     case ROUTE_EMBEDDING_CREATE:
     case ROUTE_SUPERMESH_CREATE:

@@ -30,8 +30,17 @@ static void note_triangles(const orb_mesh *raw, file_triangle *noted, int32_t co
   }
 }
 
+/* A mesh as read has its triangles in the file's order and its vertices by the file's numbers in `source`. */
+static int32_t *copy_corners(orb_context *ctx, const orb_mesh *raw) {
+  int32_t *corners = ORB_NEW(ctx, int32_t, 3 * (size_t)raw->triangle_count);
+  for (size_t h = 0; corners && h < 3 * (size_t)raw->triangle_count; h++) {
+    corners[h] = raw->source[raw->triangles[h]];
+  }
+  return corners;
+}
+
 int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh *mesh, file_triangle *noted,
-                  int32_t noted_count, orb_problem *problem) {
+                  int32_t noted_count, int32_t **corners, orb_problem *problem) {
   resource row = {0};
   orb_mesh_summary summary;
   unsigned repair;
@@ -53,6 +62,9 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
   free(bytes);
   if (status == ORB_OK) {
     note_triangles(mesh, noted, noted_count);
+    if (corners && !(*corners = copy_corners(ctx, mesh))) {
+      return 0;
+    }
     status = orb_mesh_repair(ctx, mesh, repair);
   }
   return status == ORB_OK;

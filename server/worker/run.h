@@ -23,9 +23,10 @@ typedef struct file_triangle {
   int32_t index, corners[3]; /* −1: not found */
 } file_triangle;
 
-/* Reads an uploaded mesh again and repairs it as at upload. noted may be NULL. */
+/* Reads an uploaded mesh again and repairs it as at upload. noted may be NULL. corners (may be NULL): 3 a triangle of
+ * the file, its vertices in the file; of the context. */
 int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh *mesh, file_triangle *noted,
-                  int32_t noted_count, orb_problem *problem);
+                  int32_t noted_count, int32_t **corners, orb_problem *problem);
 /* The points of a stored sphere: 3 a vertex, of the context. */
 int run_load_points(const run_env *env, orb_context *ctx, const char *embedding, const orb_mesh *mesh, double **points,
                     orb_problem *problem);

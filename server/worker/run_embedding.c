@@ -47,7 +47,7 @@ int run_embedding(const run_env *env, orb_context *ctx, job *j, resource *result
   }
   orb_progress(ctx, "read", 0);
   double began = orb_clock();
-  if (!run_load_mesh(env, ctx, request.mesh, &mesh, NULL, 0, problem)) {
+  if (!run_load_mesh(env, ctx, request.mesh, &mesh, NULL, 0, NULL, problem)) {
     goto done;
   }
   double checked = orb_clock() - began;

@@ -5,12 +5,14 @@
 
 #include "api/json.h"
 #include "metrics.h"
+#include "worker/places.h"
 #include "worker/run.h"
 
 /* Everything that a merge needs; of the context. */
 typedef struct merge_input {
   orb_supermesh_request request;
   orb_mesh meshes[ORB_SHAPES_MAX];
+  int32_t *corners[ORB_SHAPES_MAX]; /* of each file's triangles */
   double *points[ORB_SHAPES_MAX];
   orb_align_shape shapes[ORB_SHAPES_MAX];
   const char *names[ORB_SHAPES_MAX];
@@ -22,6 +24,7 @@ typedef struct merge_input {
 static void free_input(orb_context *ctx, merge_input *in) {
   for (int32_t s = 0; s < in->request.shape_count; s++) {
     orb_mesh_free(ctx, &in->meshes[s]);
+    orb_free(ctx, in->corners[s]);
     orb_free(ctx, in->points[s]);
   }
   orb_free(ctx, in->landmarks);
@@ -81,7 +84,7 @@ static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int
     const orb_spot *spot = &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s];
     noted[l].index = spot->kind == ORB_SPOT_TRIANGLE ? spot->index : -1;
   }
-  int fine = run_load_mesh(env, ctx, wanted.mesh, &in->meshes[s], noted, list->count, problem);
+  int fine = run_load_mesh(env, ctx, wanted.mesh, &in->meshes[s], noted, list->count, &in->corners[s], problem);
   for (int32_t l = 0; fine && l < list->count; l++) {
     in->noted[(size_t)l * (size_t)list->shape_count + (size_t)s] = noted[l];
   }
@@ -117,6 +120,23 @@ static int load_input(const run_env *env, orb_context *ctx, merge_input *in, orb
   return 1;
 }
 
+/* Before the row, as the asset: a supermesh that is there has both. */
+static int store_places(const run_env *env, orb_context *ctx, const merge_input *in, const orb_merge_result *merged,
+                        resource *result, orb_problem *problem) {
+  orb_buffer places = {0};
+  int fine = places_write(ctx, in->meshes, in->corners, merged, &places) == ORB_OK;
+  if (fine) {
+    store_result stored = objects_put(env->store, OBJECT_PLACES, result->id, places.data, places.size);
+    result->bytes += (int64_t)places.size;
+    fine = stored == STORE_OK;
+    if (!fine) {
+      run_problem_of_store(stored, problem);
+    }
+  }
+  orb_buffer_free(ctx, &places);
+  return fine;
+}
+
 static int store_result_of(const run_env *env, orb_context *ctx, job *j, const merge_input *in,
                            const orb_merge_result *merged, resource *result, orb_problem *problem) {
   orb_text json = {0};
@@ -129,6 +149,9 @@ static int store_result_of(const run_env *env, orb_context *ctx, job *j, const m
   store_result stored = objects_put(env->store, OBJECT_ASSET, result->id, merged->asset.data, merged->asset.size);
   if (stored != STORE_OK) {
     run_problem_of_store(stored, problem);
+    return 0;
+  }
+  if (!store_places(env, ctx, in, merged, result, problem)) {
     return 0;
   }
   orb_supermesh_write(result->id, &in->request, merged, queue_embed_ms(env->q, j), result->created, &json);

@@ -1,0 +1,168 @@
+#include "worker/places.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { VERSION = 1, BATCH = 1024, ENTRY_BYTES = 28 };
+
+static unsigned char *put32(unsigned char *at, uint32_t value) {
+  for (int i = 0; i < 4; i++) {
+    *at++ = (unsigned char)(value >> (8 * i));
+  }
+  return at;
+}
+
+static unsigned char *put_double(unsigned char *at, double value) {
+  uint64_t bits;
+  memcpy(&bits, &value, sizeof bits);
+  at = put32(at, (uint32_t)bits);
+  return put32(at, (uint32_t)(bits >> 32));
+}
+
+static double dot(const double a[3], const double b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Barycentrics of a point that lies in the triangle up to rounding. A triangle without area is taken as its longest
+ * edge, a point as its first corner. */
+static void barycentric(const double *const corner[3], const double p[3], double out[3]) {
+  double e[3][3], d[3], length[3];
+  for (int k = 0; k < 3; k++) { /* e[k] is opposite to corner k */
+    for (int i = 0; i < 3; i++) {
+      e[k][i] = corner[(k + 2) % 3][i] - corner[(k + 1) % 3][i];
+    }
+    length[k] = dot(e[k], e[k]);
+  }
+  int longest = length[1] > length[0] ? 1 : 0;
+  longest = length[2] > length[longest] ? 2 : longest;
+  int a = longest, b = (longest + 1) % 3, c = (longest + 2) % 3; /* a: the corner opposite to the longest edge b–c */
+  double up[3];
+  for (int i = 0; i < 3; i++) {
+    d[i] = p[i] - corner[b][i];
+    up[i] = corner[a][i] - corner[b][i];
+  }
+  memset(out, 0, 3 * sizeof *out);
+  if (!(length[a] > 0)) {
+    out[b] = 1;
+    return;
+  }
+  double foot = dot(up, e[a]) / length[a], along = dot(d, e[a]) / length[a], height = 0, over = 0;
+  for (int i = 0; i < 3; i++) {
+    double h = up[i] - foot * e[a][i];
+    height += h * h;
+    over += h * (d[i] - along * e[a][i]);
+  }
+  out[a] = height > 1e-30 * length[a] ? over / height : 0;
+  out[c] = along - out[a] * foot;
+  out[b] = 1 - out[a] - out[c];
+}
+
+static void make_proper(double at[3]) {
+  double sum = 0;
+  for (int k = 0; k < 3; k++) {
+    at[k] = at[k] > 0 ? at[k] : 0;
+    sum += at[k];
+  }
+  if (sum > 0 && sum != 1) {
+    for (int k = 0; k < 3; k++) {
+      at[k] /= sum;
+    }
+  }
+}
+
+/* From the aligned shape's triangle to the one of the mesh before alignment that holds it. Corners that both have are
+ * carried over exactly; others were put in by the alignment, and are told by where they lie. */
+static void to_parent(const orb_mesh *mesh, const orb_aligned_shape *shape, const orb_place *from, orb_place *out) {
+  const double *corner[3];
+  size_t parent = (size_t)shape->parent[from->triangle];
+  const int32_t *old = mesh->triangles + 3 * parent;
+  const int32_t *fresh = shape->mesh.triangles + 3 * (size_t)from->triangle;
+  for (int k = 0; k < 3; k++) {
+    corner[k] = mesh->positions + 3 * (size_t)old[k];
+  }
+  *out = (orb_place){.triangle = (int32_t)parent};
+  for (int k = 0; k < 3; k++) {
+    const double *p = shape->mesh.positions + 3 * (size_t)fresh[k];
+    double at[3];
+    int same = 0;
+    while (same < 3 &&
+           (mesh->source[old[same]] != shape->mesh.source[fresh[k]] || memcmp(corner[same], p, 3 * sizeof *p) != 0)) {
+      same++;
+    }
+    if (same < 3) {
+      out->at[same] += from->at[k];
+      continue;
+    }
+    barycentric(corner, p, at);
+    for (int i = 0; i < 3; i++) {
+      out->at[i] += from->at[k] * at[i];
+    }
+  }
+  make_proper(out->at);
+}
+
+/* From the repaired mesh's triangle to the file's: repairs may have turned it, so corners are matched by the vertices
+ * that they stand for. */
+static void to_file(const orb_mesh *mesh, const int32_t *corners, const orb_place *from, orb_place *out) {
+  int used[3] = {0, 0, 0};
+  int32_t number = mesh->source_triangle[from->triangle];
+  *out = (orb_place){.triangle = -1};
+  if (number < 0) {
+    return;
+  }
+  orb_place found = {.triangle = number};
+  for (int k = 0; k < 3; k++) {
+    int32_t vertex = mesh->vertex_of_source[corners[3 * (size_t)number + (size_t)k]];
+    int corner = 0;
+    while (corner < 3 &&
+           (used[corner] || vertex < 0 ||
+            mesh->source[mesh->triangles[3 * (size_t)from->triangle + (size_t)corner]] != mesh->source[vertex])) {
+      corner++;
+    }
+    if (corner == 3) {
+      return;
+    }
+    used[corner] = 1;
+    found.at[k] = from->at[corner];
+  }
+  *out = found;
+}
+
+static orb_status write_shape(orb_context *ctx, const orb_mesh *mesh, const int32_t *corners,
+                              const orb_merge_result *merged, int32_t s, orb_buffer *out) {
+  const orb_supermesh *supermesh = &merged->supermesh;
+  const orb_place *places = supermesh->places + (size_t)s * (size_t)supermesh->vertex_count;
+  unsigned char bytes[BATCH * ENTRY_BYTES], *at = bytes;
+  for (int32_t v = 0; v < supermesh->vertex_count; v++) {
+    orb_place repaired, file;
+    to_parent(mesh, &merged->alignment.shapes[s], &places[v], &repaired);
+    to_file(mesh, corners, &repaired, &file);
+    at = put32(at, (uint32_t)file.triangle);
+    for (int k = 0; k < 3; k++) {
+      at = put_double(at, file.at[k]);
+    }
+    if (at == bytes + sizeof bytes || v + 1 == supermesh->vertex_count) {
+      orb_status status = orb_context_check(ctx);
+      status = status == ORB_OK ? orb_buffer_append(ctx, out, bytes, (size_t)(at - bytes)) : status;
+      if (status != ORB_OK) {
+        return status;
+      }
+      at = bytes;
+    }
+  }
+  return ORB_OK;
+}
+
+orb_status places_write(orb_context *ctx, const orb_mesh *meshes, int32_t *const *corners,
+                        const orb_merge_result *merged, orb_buffer *out) {
+  unsigned char head[20], *at = head + 8;
+  memcpy(head, "ORBPLACE", 8);
+  at = put32(at, VERSION);
+  at = put32(at, (uint32_t)merged->supermesh.shape_count);
+  put32(at, (uint32_t)merged->supermesh.vertex_count);
+  orb_status status = orb_buffer_append(ctx, out, head, sizeof head);
+  for (int32_t s = 0; s < merged->supermesh.shape_count && status == ORB_OK; s++) {
+    status = write_shape(ctx, &meshes[s], corners[s], merged, s, out);
+  }
+  return status;
+}
