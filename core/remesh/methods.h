@@ -22,5 +22,6 @@ ORB_MUST_CHECK orb_status orb_remesh_places(orb_context *ctx, const orb_remesh_j
 ORB_MUST_CHECK orb_status orb_remesh_subdivision(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
 ORB_MUST_CHECK orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
 ORB_MUST_CHECK orb_status orb_remesh_overlay(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
+ORB_MUST_CHECK orb_status orb_remesh_hull(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
 
 #endif

@@ -158,7 +158,7 @@ static orb_status run_method(orb_context *ctx, const orb_remesh_job *job, orb_su
     case ORB_REMESH_OVERLAY:
       return orb_remesh_overlay(ctx, job, out);
     case ORB_REMESH_CONVEX_HULL:
-      return orb_fail(ctx, ORB_E_UNSUPPORTED, "The remesh method 'convex-hull' is not built yet; use 'adaptive'.");
+      return orb_remesh_hull(ctx, job, out);
   }
   return orb_fail(ctx, ORB_E_BAD_OPTION, "Unknown remesh method %d.", (int)job->options->method);
 }

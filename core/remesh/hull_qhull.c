@@ -1,0 +1,143 @@
+/* Qhull (Barber, Dobkin & Huhdanpaa 1996) behind orb_hull().
+ *
+ * Option Qt triangulates facets that were merged because their points are coplanar up to rounding; points are never
+ * joggled. Qhull leaves its calls by longjmp() on errors, but qh_new_qhull() itself catches that and returns a code.
+ * Its messages go to a stream that drops them; as it reports every few hundred facets (TF), the same stream is where
+ * cancellation is noticed: Qhull is then told to add no further points. */
+#include <stdio.h>
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wstrict-prototypes"
+#endif
+#include <libqhull_r/qhull_ra.h>
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
+
+#include "base/check.h"
+#include "numeric/predicates.h"
+#include "remesh/hull.h"
+
+enum { BYTES_A_POINT = 1024 };
+
+typedef struct listener {
+  orb_context *ctx;
+  qhT *qh;
+  orb_status status;
+} listener;
+
+static ssize_t listen_in(void *cookie, const char *text, size_t size) {
+  listener *l = cookie;
+  (void)text;
+  if (l->status == ORB_OK) {
+    l->status = orb_context_check(l->ctx);
+  }
+  if (l->status != ORB_OK) {
+    l->qh->STOPadd = 1;
+  }
+  return (ssize_t)size;
+}
+
+/* Outward as a whole: if most triangles are negative, Qhull's sense of orientation is the other one. */
+static void turn_outward(const double *points, int32_t *triangles, int32_t count) {
+  int64_t sum = 0;
+  for (int32_t t = 0; t < count; t++) {
+    const int32_t *c = triangles + 3 * (int64_t)t;
+    sum += orb_orient(points + 3 * (int64_t)c[0], points + 3 * (int64_t)c[1], points + 3 * (int64_t)c[2]);
+  }
+  for (int32_t t = 0; t < count && sum < 0; t++) {
+    int32_t *c = triangles + 3 * (int64_t)t, swap = c[1];
+    c[1] = c[2];
+    c[2] = swap;
+  }
+}
+
+static orb_status take_facets(orb_context *ctx, qhT *qh, const double *points, int32_t **triangles,
+                              int32_t *triangle_count) {
+  int32_t count = 0;
+  facetT *facet;
+  vertexT *vertex, **vertexp;
+  *triangles = ORB_NEW(ctx, int32_t, 3 * (int64_t)qh->num_facets);
+  if (!*triangles) {
+    return ORB_E_NO_MEMORY;
+  }
+  FORALLfacets {
+    int32_t corner[3] = {0};
+    int n = 0;
+    FOREACHvertex_(facet->vertices) {
+      if (n < 3) {
+        corner[n] = (int32_t)((vertex->point - points) / 3);
+      }
+      n++;
+    }
+    if (n != 3 || count >= qh->num_facets) {
+      return orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The convex hull has a facet that is no triangle; use 'adaptive'.");
+    }
+    int32_t *c = *triangles + 3 * (int64_t)count++;
+    c[0] = corner[0];
+    c[1] = corner[facet->toporient ? 1 : 2];
+    c[2] = corner[facet->toporient ? 2 : 1];
+  }
+  turn_outward(points, *triangles, count);
+  *triangle_count = count;
+  return ORB_OK;
+}
+
+static orb_status run(orb_context *ctx, qhT *qh, double *points, int32_t count, int32_t **triangles,
+                      int32_t *triangle_count) {
+  char command[] = "qhull Qt Q12 Pp TF500";
+  listener l = {.ctx = ctx, .qh = qh};
+  FILE *messages = fopencookie(&l, "w", (cookie_io_functions_t){.write = listen_in});
+  if (!messages) {
+    return orb_fail(ctx, ORB_E_NO_MEMORY, "No memory for the convex hull.");
+  }
+  (void)setvbuf(messages, NULL, _IONBF, 0);
+  qh_zero(qh, messages);
+  int code = qh_new_qhull(qh, 3, count, points, False, command, NULL, messages);
+  orb_status status = l.status;
+  if (status == ORB_OK && code == qh_ERRmem) {
+    status = orb_fail(ctx, ORB_E_NO_MEMORY, "No memory for the convex hull of %d points.", count);
+  } else if (status == ORB_OK && code != 0) {
+    status =
+        orb_fail(ctx, ORB_E_NOT_CERTIFIED,
+                 "The convex hull of the %d points could not be made (Qhull's code %d); use 'adaptive'.", count, code);
+  }
+  if (status == ORB_OK) {
+    status = take_facets(ctx, qh, points, triangles, triangle_count);
+  }
+  int long_blocks, long_bytes;
+  qh_freeqhull(qh, !qh_ALL);
+  qh_memfreeshort(qh, &long_blocks, &long_bytes);
+  (void)fclose(messages);
+  return status;
+}
+
+orb_status orb_hull(orb_context *ctx, const double *points, int32_t count, int32_t **triangles,
+                    int32_t *triangle_count) {
+  *triangles = NULL;
+  *triangle_count = 0;
+  if (count > ORB_HULL_POINTS_MAX) {
+    return orb_fail(ctx, ORB_E_TOO_LARGE, "A convex hull takes at most %d points, these are %d; use 'adaptive'.",
+                    ORB_HULL_POINTS_MAX, count);
+  }
+  /* Qhull takes its points by a pointer that is not const; they are copied so that the caller's stay untouched. */
+  double *copy = ORB_NEW(ctx, double, 3 * (int64_t)count);
+  char *reserve = ORB_NEW(ctx, char, BYTES_A_POINT *(int64_t)count);
+  qhT *qh = ORB_NEW0(ctx, qhT, 1);
+  orb_status status = ORB_E_NO_MEMORY;
+  if (copy && reserve && qh) {
+    for (int64_t i = 0; i < 3 * (int64_t)count; i++) {
+      copy[i] = points[i];
+    }
+    status = run(ctx, qh, copy, count, triangles, triangle_count);
+  }
+  orb_free(ctx, qh);
+  orb_free(ctx, reserve);
+  orb_free(ctx, copy);
+  if (status != ORB_OK) {
+    orb_free(ctx, *triangles);
+    *triangles = NULL;
+  }
+  return status;
+}
