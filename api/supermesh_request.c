@@ -110,6 +110,16 @@ static int read_align(cJSON *align, orb_supermesh_request *out, orb_problem *pro
   return 1;
 }
 
+static int check_built(const orb_supermesh_request *request, orb_problem *problem) {
+  if (orb_remesh_available(request->merge.remesh.method)) {
+    return 1;
+  }
+  const char *name = remeshes[request->merge.remesh.method];
+  orb_refuse(problem, "unsupported-method", "The remesh method \"%s\" is not built yet; use adaptive.", name);
+  orb_json_member_string(&problem->facts, "method", name);
+  return 0;
+}
+
 int orb_supermesh_request_read(const cJSON *body, orb_supermesh_request *out, orb_problem *problem) {
   static const char *const known[] = {"shapes", "landmarks", "embedding", "align", "remesh", "asset", NULL};
   memset(out, 0, sizeof *out);
@@ -136,6 +146,7 @@ int orb_supermesh_request_read(const cJSON *body, orb_supermesh_request *out, or
          read_align(cJSON_GetObjectItemCaseSensitive(body, "align"), out, problem) &&
          (!remesh ||
           orb_options_read(remesh, "\"remesh\"", remesh_table, COUNT(remesh_table), &out->merge.remesh, problem)) &&
+         check_built(out, problem) &&
          (!asset || orb_options_read(asset, "\"asset\"", asset_table, COUNT(asset_table), &out->merge.asset, problem));
 }
 

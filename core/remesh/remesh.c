@@ -149,18 +149,29 @@ static orb_status find_landmarks(orb_context *ctx, const orb_remesh_job *job, or
   return ORB_OK;
 }
 
+/* What this build has, by method; NULL: not built. */
+typedef orb_status (*method_fn)(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
+static const method_fn methods[] = {
+    [ORB_REMESH_ADAPTIVE] = orb_remesh_adaptive,
+    [ORB_REMESH_OVERLAY] = orb_remesh_overlay,
+    [ORB_REMESH_SUBDIVISION] = orb_remesh_subdivision,
+    [ORB_REMESH_CONVEX_HULL] = orb_remesh_hull,
+};
+enum { METHODS = sizeof methods / sizeof methods[0] };
+
+int orb_remesh_available(orb_remesh_method method) {
+  return (unsigned)method < METHODS && methods[method] != NULL;
+}
+
 static orb_status run_method(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
-  switch (job->options->method) {
-    case ORB_REMESH_SUBDIVISION:
-      return orb_remesh_subdivision(ctx, job, out);
-    case ORB_REMESH_ADAPTIVE:
-      return orb_remesh_adaptive(ctx, job, out);
-    case ORB_REMESH_OVERLAY:
-      return orb_remesh_overlay(ctx, job, out);
-    case ORB_REMESH_CONVEX_HULL:
-      return orb_remesh_hull(ctx, job, out);
+  orb_remesh_method method = job->options->method;
+  if ((unsigned)method >= METHODS) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION, "Unknown remesh method %d.", (int)method);
   }
-  return orb_fail(ctx, ORB_E_BAD_OPTION, "Unknown remesh method %d.", (int)job->options->method);
+  if (!methods[method]) {
+    return orb_fail(ctx, ORB_E_UNSUPPORTED, "The remesh method %d is not in this build; use adaptive.", (int)method);
+  }
+  return methods[method](ctx, job, out);
 }
 
 orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count, int32_t landmark_count,

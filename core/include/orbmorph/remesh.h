@@ -21,6 +21,8 @@ typedef struct orb_remesh_options {
   int64_t max_triangles; /* 0: none; wins over tolerance */
 } orb_remesh_options;
 void orb_remesh_defaults(orb_remesh_options *options);
+/* Whether this build has the method; orb_remesh() answers ORB_E_UNSUPPORTED for one that it has not. */
+int orb_remesh_available(orb_remesh_method method);
 
 /* Always closed, manifold, genus zero: T = 2V − 4, and no flipped triangle on the sphere. */
 typedef struct orb_supermesh {
