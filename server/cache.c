@@ -11,6 +11,7 @@ typedef struct item {
   cached entry; /* first: pointers to it are pointers to the item */
   struct item *next_hash, *newer, *older;
   int refs, linked;
+  int64_t used; /* as told to the catalogue */
 } item;
 
 struct cache {
@@ -117,6 +118,17 @@ const cached *cache_add(cache *c, resource *row) {
   }
   pthread_mutex_unlock(&c->lock);
   return &it->entry;
+}
+
+int cache_note_use(cache *c, const cached *entry, int64_t now) {
+  item *it = (item *)(uintptr_t)entry;
+  pthread_mutex_lock(&c->lock);
+  int due = it->used == 0 || now - it->used >= 1000;
+  if (due) {
+    it->used = now;
+  }
+  pthread_mutex_unlock(&c->lock);
+  return due;
 }
 
 void cache_release(cache *c, const cached *entry) {

@@ -18,6 +18,8 @@ void cache_destroy(cache *c);
 const cached *cache_find(cache *c, resource_kind kind, const char *id);
 /* Takes row->json over; referenced. NULL out of memory (json freed). */
 const cached *cache_add(cache *c, resource *row);
+/* 1 where the last use that was noted is a second ago or more; then this one is noted. now: orb_clock_ms(). */
+int cache_note_use(cache *c, const cached *entry, int64_t now);
 void cache_release(cache *c, const cached *entry);
 void cache_drop(cache *c, resource_kind kind, const char *id);
 

@@ -13,6 +13,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "evict.h"
 #include "http/http.h"
 #include "log.h"
 #include "maintain.h"
@@ -120,12 +121,37 @@ static int take_signals(sigset_t *set) {
   return signal_pipe[0];
 }
 
+enum { EVICT_EVERY_MS = 1000, EVICT_GRACE_MS = 5000 };
+
+/* Keeps derived objects within their budget, when a job has made more or some could not leave yet: what was just made
+ * or used stays for a while, so that who waits for it can have it. */
+static void keep_budget(const server *srv, int64_t *seen, int *over) {
+  const int64_t budget = srv->options->derived_bytes;
+  queue_numbers n;
+  if (budget <= 0) {
+    return;
+  }
+  queue_count(srv->q, &n);
+  if (n.ended[ORB_JOB_SUCCEEDED] != *seen || *over) {
+    const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    *seen = n.ended[ORB_JOB_SUCCEEDED];
+    *over = evict_derived(&env, budget, (int64_t)now.tv_sec * 1000 - EVICT_GRACE_MS) > budget;
+  }
+}
+
 /* Waits for a signal to stop; a second one, or the end of the time for draining, stops at once. */
 static void wait_for_stop(server *srv, int signals) {
   struct pollfd wait = {.fd = signals, .events = POLLIN};
-  for (;;) {
+  int64_t seen = -1;
+  for (int over = 0;;) {
     unsigned char number;
-    if (poll(&wait, 1, -1) < 0 || read(signals, &number, 1) != 1) {
+    int ready = poll(&wait, 1, EVICT_EVERY_MS);
+    if (ready == 0) {
+      keep_budget(srv, &seen, &over);
+    }
+    if (ready <= 0 || read(signals, &number, 1) != 1) {
       continue;
     }
     if (number == SIGHUP) {

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "store/catalogue.h"
+#include "evict.h"
 
 enum { PAGE = 64 };
 
@@ -95,33 +95,14 @@ int maintain_check(const config *options) {
   return t.wrong != 0;
 }
 
-static void evict(tally *t, int64_t budget) {
-  resource rows[PAGE];
-  int64_t total = catalogue_bytes(t->cat, 1);
-  while (total > budget) {
-    int n = catalogue_oldest(t->cat, PAGE, rows), gone = 0;
-    for (int i = 0; i < n; i++) {
-      if (total > budget && catalogue_delete(t->cat, rows[i].kind, rows[i].id) == STORE_OK &&
-          objects_delete(t->store, object_of[rows[i].kind], rows[i].id) == STORE_OK) {
-        printf("evicted %s %s, %lld bytes\n", names[rows[i].kind], rows[i].id, (long long)rows[i].bytes);
-        total -= rows[i].bytes;
-        gone++;
-      }
-      resource_free(&rows[i]);
-    }
-    if (gone == 0) {
-      return;
-    }
-  }
-}
-
 int maintain_gc(const config *options) {
   tally t = {.remove_orphans = 1};
   int fine = open_both(options, &t);
   if (fine) {
     objects_each(t.store, each_object, &t);
     if (options->derived_bytes > 0) {
-      evict(&t, options->derived_bytes);
+      const evict_env env = {.cat = t.cat, .store = t.store};
+      evict_derived(&env, options->derived_bytes, INT64_MAX);
     }
   }
   close_both(&t);

@@ -146,6 +146,7 @@ enum MHD_Result handle_file(request *r) {
   if (!entry) {
     return request_go_away(r, r->srv->io, file_away);
   }
+  note_use(r->srv, entry);
   file_of(r, entry);
   return MHD_YES;
 }

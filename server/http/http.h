@@ -117,6 +117,8 @@ int read_page(request *r, int *limit, int64_t *before);
 int64_t read_wait_ms(request *r);
 /* From the cache or the catalogue; blocks. NULL with *result. */
 const cached *find_description(server *srv, resource_kind kind, const char *id, store_result *result);
+/* Of a description that the cache had: says so to the catalogue, for eviction. Does not wait. */
+void note_use(server *srv, const cached *entry);
 int64_t clock_us(void);
 
 #endif

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "evict.h"
 #include "http/http.h"
 #include "metrics.h"
 
@@ -14,12 +15,20 @@ static resource_kind kind_of(const request *r) {
                                                               : RESOURCE_SUPERMESH;
 }
 
+void note_use(server *srv, const cached *entry) {
+  if (srv->options->derived_bytes > 0 && entry->row.kind != RESOURCE_MESH &&
+      cache_note_use(srv->descriptions, entry, orb_clock_ms())) {
+    catalogue_touch(srv->cat, entry->row.kind, entry->row.id);
+  }
+}
+
 const cached *find_description(server *srv, resource_kind kind, const char *id, store_result *result) {
   resource row;
   const cached *entry = cache_find(srv->descriptions, kind, id);
   *result = STORE_OK;
   metrics_cache(entry != NULL);
   if (entry) {
+    note_use(srv, entry);
     return entry;
   }
   *result = catalogue_get(srv->cat, kind, id, &row);
@@ -50,6 +59,7 @@ enum MHD_Result handle_get(request *r) {
     return request_go_away(r, r->srv->io, get_away);
   }
   metrics_cache(1);
+  note_use(r->srv, entry);
   reply_cached(r, 200, entry);
   return MHD_YES;
 }
@@ -127,15 +137,8 @@ static void delete_away(request *r) {
     return;
   }
   pthread_mutex_lock(&srv->mesh_lock);
-  store_result result = catalogue_delete(srv->cat, kind, r->id);
-  cache_drop(srv->descriptions, kind, r->id);
-  if (result == STORE_OK) {
-    static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET};
-    result = objects_delete(srv->store, kinds[kind], r->id);
-    if (kind == RESOURCE_SUPERMESH && result == STORE_OK) {
-      result = objects_delete(srv->store, OBJECT_PLACES, r->id);
-    }
-  }
+  const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions};
+  store_result result = evict_one(&env, kind, r->id);
   pthread_mutex_unlock(&srv->mesh_lock);
   if (result == STORE_OK) {
     reply_empty(r, 204);

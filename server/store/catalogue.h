@@ -39,8 +39,8 @@ store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, r
 store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id);
 /* The newest first, those before sequence number `before` (0: all); returns the number filled. */
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out);
-/* Least recently used derived ones first; for eviction. */
-int catalogue_oldest(catalogue *cat, int limit, resource *out);
+/* Least recently used derived ones first, of those last used before a unix time in ms; for eviction. */
+int catalogue_oldest(catalogue *cat, int64_t before, int limit, resource *out);
 void catalogue_touch(catalogue *cat, resource_kind kind, const char *id); /* does not wait */
 int64_t catalogue_bytes(catalogue *cat, int derived_only);
 

@@ -92,12 +92,13 @@ int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit
   return read_list(cat, db, st, limit, out);
 }
 
-int catalogue_oldest(catalogue *cat, int limit, resource *out) {
+int catalogue_oldest(catalogue *cat, int64_t before, int limit, resource *out) {
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st =
-      database_statement(db, "SELECT " COLUMNS " FROM resource WHERE kind>0 ORDER BY used, seq LIMIT ?1");
+      database_statement(db, "SELECT " COLUMNS " FROM resource WHERE kind>0 AND used<?2 ORDER BY used, seq LIMIT ?1");
   if (st) {
     sqlite3_bind_int(st, 1, limit);
+    sqlite3_bind_int64(st, 2, before);
   }
   return read_list(cat, db, st, limit, out);
 }

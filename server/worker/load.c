@@ -92,6 +92,7 @@ int run_load_points(const run_env *env, orb_context *ctx, const char *embedding,
     memcpy(*points + 3 * v, bytes + head + v * PLY_VERTEX_BYTES + PLY_POINT_OFFSET, 3 * sizeof(double));
   }
   free(bytes);
+  catalogue_touch(env->cat, RESOURCE_EMBEDDING, embedding);
   return *points != NULL;
 }
 

@@ -1,0 +1,56 @@
+#include "evict.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "log.h"
+
+enum { PAGE = 64 };
+
+/* The row goes first: what is left by a crash in between is an object without a row, which --gc removes. */
+store_result evict_one(const evict_env *env, resource_kind kind, const char *id) {
+  static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET};
+  store_result result = catalogue_delete(env->cat, kind, id);
+  if (env->descriptions) {
+    cache_drop(env->descriptions, kind, id);
+  }
+  if (result == STORE_OK) {
+    result = objects_delete(env->store, kinds[kind], id);
+  }
+  if (result == STORE_OK && kind == RESOURCE_SUPERMESH) {
+    result = objects_delete(env->store, OBJECT_PLACES, id);
+  }
+  return result;
+}
+
+static int is_needed(const evict_env *env, const resource *row) {
+  static const char member[] = "\"mesh\":\"";
+  const char *at = row->kind == RESOURCE_EMBEDDING && env->q ? strstr(row->json, member) : NULL;
+  char mesh[ORB_ID_SIZE];
+  if (!at) {
+    return 0;
+  }
+  snprintf(mesh, sizeof mesh, "%s", at + sizeof member - 1);
+  return queue_needs_mesh(env->q, mesh);
+}
+
+int64_t evict_derived(const evict_env *env, int64_t budget, int64_t before) {
+  static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh"};
+  resource rows[PAGE];
+  int64_t total = catalogue_bytes(env->cat, 1);
+  for (int gone = 1; total > budget && gone > 0;) {
+    int n = catalogue_oldest(env->cat, before, PAGE, rows);
+    gone = 0;
+    for (int i = 0; i < n; i++) {
+      if (total > budget && !is_needed(env, &rows[i]) && evict_one(env, rows[i].kind, rows[i].id) == STORE_OK) {
+        char fields[160];
+        snprintf(fields, sizeof fields, "\"id\":\"%s\",\"bytes\":%lld", rows[i].id, (long long)rows[i].bytes);
+        log_write(LOG_INFO, fields, "evicted a derived %s", names[rows[i].kind]);
+        total -= rows[i].bytes;
+        gone++;
+      }
+      resource_free(&rows[i]);
+    }
+  }
+  return total;
+}
