@@ -74,28 +74,48 @@ static void write_shapes(const orb_supermesh_request *request, const orb_merge_r
   orb_json_close(out, ']');
 }
 
-static void write_landmarks(const orb_supermesh_request *request, const orb_merge_result *result, orb_text *out) {
+static void write_numbers(const char *name, const double *numbers, int32_t count, orb_text *out) {
+  orb_json_key(out, name);
+  orb_json_open(out, '[');
+  for (int32_t i = 0; i < count; i++) {
+    orb_json_number(out, numbers[i]);
+  }
+  orb_json_close(out, ']');
+}
+
+static void write_found(const orb_merge_result *result, const orb_spot *found, orb_text *out) {
+  size_t shapes = (size_t)result->supermesh.shape_count;
+  for (int32_t l = 0; l < result->alignment.found_count; l++) {
+    char name[32];
+    snprintf(name, sizeof name, "auto %d", l + 1);
+    orb_json_open(out, '{');
+    orb_json_member_string(out, "name", name);
+    orb_json_key(out, "at");
+    orb_json_open(out, '[');
+    for (size_t s = 0; s < shapes; s++) {
+      orb_spot_write(out, &found[(size_t)l * shapes + s]);
+    }
+    orb_json_close(out, ']');
+    write_numbers("residual_relative", result->found_residuals + (size_t)l * shapes, (int32_t)shapes, out);
+    orb_json_member_number(out, "confidence", result->alignment.confidence[l]);
+    orb_json_close(out, '}');
+  }
+}
+
+/* The landmarks of the request, or else those that were found. */
+static void write_landmarks(const orb_supermesh_request *request, const orb_merge_result *result, const orb_spot *found,
+                            orb_text *out) {
   int32_t shapes = request->shape_count;
   orb_json_key(out, "landmarks");
   orb_json_open(out, '[');
   for (int32_t l = 0; l < result->alignment.landmark_count; l++) {
-    char found[32];
-    int given = l < request->landmarks.count;
-    snprintf(found, sizeof found, "found %d", l);
     orb_json_open(out, '{');
-    orb_json_member_string(out, "name", given ? request->landmarks.items[l].name : found);
+    orb_json_member_string(out, "name", request->landmarks.items[l].name);
     orb_json_member_integer(out, "vertex", result->supermesh.landmark_vertices[l]);
-    orb_json_key(out, "residual_relative");
-    orb_json_open(out, '[');
-    for (int32_t s = 0; s < shapes; s++) {
-      orb_json_number(out, result->landmark_residuals[(size_t)l * (size_t)shapes + (size_t)s]);
-    }
-    orb_json_close(out, ']');
-    if (result->alignment.confidence) {
-      orb_json_member_number(out, "confidence", result->alignment.confidence[l]);
-    }
+    write_numbers("residual_relative", result->landmark_residuals + (size_t)l * (size_t)shapes, shapes, out);
     orb_json_close(out, '}');
   }
+  write_found(result, found, out);
   orb_json_close(out, ']');
 }
 
@@ -112,7 +132,7 @@ static void write_timings(const orb_merge_timings *t, double embed_ms, orb_text 
 }
 
 void orb_supermesh_write(const char *id, const orb_supermesh_request *request, const orb_merge_result *result,
-                         double embed_ms, int64_t created, orb_text *out) {
+                         const orb_spot *found, double embed_ms, int64_t created, orb_text *out) {
   orb_text canonical = {0};
   orb_supermesh_request_write(request, &canonical);
   out->failed |= canonical.failed;
@@ -126,7 +146,7 @@ void orb_supermesh_write(const char *id, const orb_supermesh_request *request, c
   orb_json_member_integer(out, "vertices", result->supermesh.vertex_count);
   orb_json_member_integer(out, "triangles", result->supermesh.triangle_count);
   write_shapes(request, result, out);
-  write_landmarks(request, result, out);
+  write_landmarks(request, result, found, out);
   orb_json_key(out, "certificate");
   orb_merge_certificate_write(result, out);
   orb_json_key(out, "pairs");

@@ -56,9 +56,13 @@ int orb_supermesh_request_resolve(orb_supermesh_request *request, const orb_mesh
 void orb_supermesh_request_write(const orb_supermesh_request *request, orb_text *out);
 int orb_supermesh_request_id(const orb_supermesh_request *request, char id[ORB_ID_SIZE]);
 
-/* embed_ms: what the embeddings of this job took; 0 where all were known. */
+/* {"vertex":i}, {"point":[…]} or {"triangle":t,"barycentric":[…]}. */
+void orb_spot_write(orb_text *out, const orb_spot *spot);
+
+/* embed_ms: what the embeddings of this job took; 0 where all were known. found: the places that the alignment found,
+ * as a request would name them: found_count × shape_count. */
 void orb_supermesh_write(const char *id, const orb_supermesh_request *request, const orb_merge_result *result,
-                         double embed_ms, int64_t created, orb_text *out);
+                         const orb_spot *found, double embed_ms, int64_t created, orb_text *out);
 /* The values of "certificate" and "pairs", for the bench as well. */
 void orb_merge_certificate_write(const orb_merge_result *result, orb_text *out);
 void orb_pairs_write(const orb_merge_result *result, orb_text *out);

@@ -187,7 +187,7 @@ static void write_triple(orb_text *out, const char *name, const double v[3]) {
   orb_json_close(out, ']');
 }
 
-static void write_spot(orb_text *out, const orb_spot *spot) {
+void orb_spot_write(orb_text *out, const orb_spot *spot) {
   orb_json_open(out, '{');
   if (spot->kind == ORB_SPOT_POINT) {
     write_triple(out, "point", spot->at);
@@ -214,7 +214,7 @@ static void write_landmarks(orb_text *out, const orb_landmark_list *list) {
     orb_json_key(out, "at");
     orb_json_open(out, '[');
     for (int32_t s = 0; s < list->shape_count; s++) {
-      write_spot(out, &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s]);
+      orb_spot_write(out, &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s]);
     }
     orb_json_close(out, ']');
     orb_json_member_integer(out, "pass", spec->pass);

@@ -115,8 +115,11 @@ static void markdown(FILE *out, const cJSON *supermesh) {
           cli_number(certificate, "genus"), cli_string(supermesh, "url", "?"), cli_string(supermesh, "engine", "?"));
   markdown_shapes(out, supermesh);
   if (cJSON_GetArraySize(member(supermesh, "landmarks"))) {
-    fprintf(out, "\n## Landmarks\n\nThey coincide %s.\n\n| landmark | off by, one column a shape |\n|---|---|\n",
-            cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "exactly" : "only nearly");
+    const char *exact =
+        cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "They coincide exactly." : "They coincide only nearly.";
+    int given = member(cJSON_GetArrayItem(member(supermesh, "landmarks"), 0), "vertex") != NULL;
+    fprintf(out, "\n## Landmarks\n\n%s\n\n| landmark | off by, one column a shape |\n|---|---|\n",
+            given ? exact : "None were given; these were found. Look at them before you rely on the result.");
     cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
       const cJSON *residual;
       fprintf(out, "| %s |", cli_string(landmark, "name", ""));

@@ -28,6 +28,7 @@ void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
   orb_free(ctx, alignment->shapes);
   orb_free(ctx, alignment->found);
   orb_free(ctx, alignment->confidence);
+  orb_free(ctx, alignment->found_points);
   memset(alignment, 0, sizeof *alignment);
 }
 
@@ -220,6 +221,9 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
   }
   if (options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO)) {
     ORB_GO(status, compose_all(ctx, out, options->preset), end);
+  }
+  if (options->method == ORB_ALIGN_AUTO && landmark_count == 0 && shape_count > 1) {
+    ORB_GO(status, orb_align_find(ctx, out), end);
   }
   orb_progress(ctx, "align", 1);
 end:

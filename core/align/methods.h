@@ -27,4 +27,8 @@ ORB_MUST_CHECK orb_status orb_align_rbf(orb_context *ctx, orb_sheet *sheets, int
                                         const orb_landmark *given, const int32_t *landmarks, int32_t count,
                                         const orb_align_options *options);
 
+/* Fills found, found_points and confidence of an alignment made without landmarks: its meshes are those given, unsplit.
+ * See found.c. */
+ORB_MUST_CHECK orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment);
+
 #endif

@@ -18,6 +18,7 @@ void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
   orb_supermesh_free(ctx, &result->supermesh);
   orb_free(ctx, result->shapes);
   orb_free(ctx, result->landmark_residuals);
+  orb_free(ctx, result->found_residuals);
   orb_free(ctx, result->pairs);
   orb_buffer_free(ctx, &result->asset);
   memset(result, 0, sizeof *result);
@@ -36,6 +37,7 @@ static orb_status transfer_reports(orb_context *ctx, const orb_align_shape *shap
     orb_progress(ctx, "transfer", 0.8 * (s + 1) / shape_count);
   }
   ORB_TRY(orb_report_landmarks(ctx, shapes, landmarks, out));
+  ORB_TRY(orb_report_found(ctx, shapes, out));
   ORB_TRY(orb_report_pairs(ctx, out));
   orb_progress(ctx, "transfer", 1);
   return ORB_OK;
@@ -62,7 +64,7 @@ orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char
          fail);
   out->timings.remesh = (now = orb_clock()) - mark;
   mark = now;
-  ORB_GO(status, transfer_reports(ctx, shapes, landmark_count > 0 ? landmarks : NULL, out), fail);
+  ORB_GO(status, transfer_reports(ctx, shapes, landmarks, out), fail);
   out->timings.transfer = (now = orb_clock()) - mark;
   mark = now;
   ORB_GO(status,

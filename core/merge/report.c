@@ -92,8 +92,7 @@ orb_status orb_report_landmarks(orb_context *ctx, const orb_align_shape *shapes,
   }
   for (int32_t i = 0; i < count; i++) {
     for (int32_t s = 0; s < shape_count; s++) {
-      const orb_place *at = landmarks ? &landmarks[i].at[s] : &out->alignment.found[(int64_t)i * shape_count + s];
-      orb_place_position(shapes[s].mesh, at, wanted + 3 * ((int64_t)i * shape_count + s));
+      orb_place_position(shapes[s].mesh, &landmarks[i].at[s], wanted + 3 * ((int64_t)i * shape_count + s));
     }
   }
   for (int32_t s = 0; s < shape_count && !all_are_vertices(&out->supermesh, count); s++) {
@@ -109,6 +108,50 @@ done:
   orb_free(ctx, wanted);
   orb_free(ctx, mean);
   return status;
+}
+
+/* Where the supermesh has a place of its own surface on shape s. */
+static void supermesh_position(const orb_merge_result *out, int32_t s, const orb_place *on, double position[3]) {
+  const orb_supermesh *supermesh = &out->supermesh;
+  position[0] = position[1] = position[2] = 0;
+  for (int k = 0; k < 3; k++) {
+    int32_t v = supermesh->triangles[3 * (int64_t)on->triangle + k];
+    double corner[3];
+    orb_place_position(&out->alignment.shapes[s].mesh, &supermesh->places[(int64_t)s * supermesh->vertex_count + v],
+                       corner);
+    for (int c = 0; c < 3; c++) {
+      position[c] += on->at[k] * corner[c];
+    }
+  }
+}
+
+orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb_merge_result *out) {
+  const orb_alignment *alignment = &out->alignment;
+  const orb_supermesh *supermesh = &out->supermesh;
+  int32_t shape_count = alignment->shape_count;
+  orb_locator *locator = NULL;
+  if (alignment->found_count == 0) {
+    return ORB_OK;
+  }
+  out->found_residuals = ORB_NEW(ctx, double, (int64_t)alignment->found_count *shape_count);
+  if (!out->found_residuals) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(orb_locator_create(ctx, supermesh->points, supermesh->vertex_count, supermesh->triangles,
+                             supermesh->triangle_count, NULL, &locator));
+  for (int32_t i = 0; i < alignment->found_count; i++) {
+    orb_place on;
+    orb_locate(locator, alignment->found_points + 3 * (int64_t)i, -1, &on);
+    for (int32_t s = 0; s < shape_count; s++) {
+      int64_t cell = (int64_t)i * shape_count + s;
+      double wanted[3], there[3];
+      orb_place_position(shapes[s].mesh, &alignment->found[cell], wanted);
+      supermesh_position(out, s, &on, there);
+      out->found_residuals[cell] = sqrt(orb_distance2(wanted, there)) / out->shapes[s].diagonal;
+    }
+  }
+  orb_locator_destroy(ctx, locator);
+  return ORB_OK;
 }
 
 /* Adds the input's smooth normal at a place. */

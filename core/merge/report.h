@@ -4,9 +4,12 @@
 
 #include "orbmorph/merge.h"
 
-/* Fills out->landmark_residuals. landmarks NULL: those that the alignment found. Needs alignment, supermesh, shapes. */
+/* Fills out->landmark_residuals. Needs alignment, supermesh, shapes. */
 ORB_MUST_CHECK orb_status orb_report_landmarks(orb_context *ctx, const orb_align_shape *shapes,
                                                const orb_landmark *landmarks, orb_merge_result *out);
+
+/* Fills out->found_residuals. Needs alignment, supermesh, shapes. */
+ORB_MUST_CHECK orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb_merge_result *out);
 
 /* Fills out->pairs. */
 ORB_MUST_CHECK orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out);

@@ -101,9 +101,8 @@ static void to_parent(const orb_mesh *mesh, const orb_aligned_shape *shape, cons
   make_proper(out->at);
 }
 
-/* From the repaired mesh's triangle to the file's: repairs may have turned it, so corners are matched by the vertices
- * that they stand for. */
-static void to_file(const orb_mesh *mesh, const int32_t *corners, const orb_place *from, orb_place *out) {
+/* Repairs may have turned a triangle, so corners are matched by the vertices that they stand for. */
+void places_to_file(const orb_mesh *mesh, const int32_t *corners, const orb_place *from, orb_place *out) {
   int used[3] = {0, 0, 0};
   int32_t number = mesh->source_triangle[from->triangle];
   *out = (orb_place){.triangle = -1};
@@ -136,7 +135,7 @@ static orb_status write_shape(orb_context *ctx, const orb_mesh *mesh, const int3
   for (int32_t v = 0; v < supermesh->vertex_count; v++) {
     orb_place repaired, file;
     to_parent(mesh, &merged->alignment.shapes[s], &places[v], &repaired);
-    to_file(mesh, corners, &repaired, &file);
+    places_to_file(mesh, corners, &repaired, &file);
     at = put32(at, (uint32_t)file.triangle);
     for (int k = 0; k < 3; k++) {
       at = put_double(at, file.at[k]);

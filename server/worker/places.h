@@ -22,4 +22,7 @@
 ORB_MUST_CHECK orb_status places_write(orb_context *ctx, const orb_mesh *meshes, int32_t *const *corners,
                                        const orb_merge_result *merged, orb_buffer *out);
 
+/* From a place on the repaired mesh to the same in the file's numbers; triangle −1 where the file has none. */
+void places_to_file(const orb_mesh *mesh, const int32_t *corners, const orb_place *from, orb_place *out);
+
 #endif

@@ -137,6 +137,26 @@ static int store_places(const run_env *env, orb_context *ctx, const merge_input 
   return fine;
 }
 
+/* The places that the alignment found, as a request would name them: by the file's triangle, or as a point where a
+ * repair made the triangle. NULL if memory is out. */
+static orb_spot *found_spots(orb_context *ctx, const merge_input *in, const orb_merge_result *merged) {
+  size_t shapes = (size_t)in->request.shape_count, count = (size_t)merged->alignment.found_count * shapes;
+  orb_spot *spots = ORB_NEW(ctx, orb_spot, count);
+  for (size_t i = 0; spots && i < count; i++) {
+    const orb_mesh *mesh = &in->meshes[i % shapes];
+    const orb_place *found = &merged->alignment.found[i];
+    orb_place file;
+    places_to_file(mesh, in->corners[i % shapes], found, &file);
+    spots[i].kind = file.triangle >= 0 ? ORB_SPOT_TRIANGLE : ORB_SPOT_POINT;
+    spots[i].index = file.triangle;
+    memcpy(spots[i].at, file.at, sizeof file.at);
+    if (file.triangle < 0) {
+      orb_place_position(mesh, found, spots[i].at);
+    }
+  }
+  return spots;
+}
+
 static int store_result_of(const run_env *env, orb_context *ctx, job *j, const merge_input *in,
                            const orb_merge_result *merged, resource *result, orb_problem *problem) {
   orb_text json = {0};
@@ -154,7 +174,12 @@ static int store_result_of(const run_env *env, orb_context *ctx, job *j, const m
   if (!store_places(env, ctx, in, merged, result, problem)) {
     return 0;
   }
-  orb_supermesh_write(result->id, &in->request, merged, queue_embed_ms(env->q, j), result->created, &json);
+  orb_spot *found = found_spots(ctx, in, merged);
+  if (!found) {
+    return 0;
+  }
+  orb_supermesh_write(result->id, &in->request, merged, found, queue_embed_ms(env->q, j), result->created, &json);
+  orb_free(ctx, found);
   if (json.failed) {
     orb_text_free(&json);
     return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");

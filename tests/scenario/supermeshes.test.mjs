@@ -99,6 +99,21 @@ test('correspondence without landmarks', async (t) => {
   const absent = await d.make('/v1/supermeshes', { shapes: pair });
   assert.ok(absent.resource, JSON.stringify(absent.problem));
   await check(d, absent.resource, sources);
+  const found = absent.resource.landmarks;
+  assert.equal(found.length, 12);
+  found.forEach((l, i) => {
+    assert.equal(l.name, `auto ${i + 1}`);
+    assert.equal(l.at.length, 2);
+    assert.ok(l.confidence >= 0 && l.confidence <= 1, `${l.name}: ${l.confidence}`);
+    for (const [s, place] of l.at.entries()) {
+      assert.ok(place.triangle < sources[s].triangles.length / 3);
+      assert.ok(Math.abs(place.barycentric.reduce((a, b) => a + b) - 1) < 1e-9);
+      assert.ok(l.residual_relative[s] < 0.005, `${l.name}: ${l.residual_relative}`);
+    }
+  });
+  const again = await d.make('/v1/supermeshes', { shapes: pair, landmarks: found.map(({ name, at }) => ({ name, at })) });
+  assert.ok(again.resource, JSON.stringify(again.problem));
+  assert.equal(again.resource.certificate.landmarks_exact, true);
   const named = await d.make('/v1/supermeshes', { shapes: pair, landmarks: 'auto' });
   assert.ok(named.resource, JSON.stringify(named.problem));
 });

@@ -45,12 +45,19 @@ typedef struct orb_aligned_shape {
   int32_t *landmark_vertices; /* landmark_count: each landmark is this vertex */
 } orb_aligned_shape;
 
+enum { ORB_FOUND_MAX = 12 };
+
 typedef struct orb_alignment {
   int32_t shape_count, landmark_count;
   orb_aligned_shape *shapes;
-  orb_place *found;   /* auto: landmark_count × shape_count places that were found, on the given meshes */
-  double *confidence; /* landmark_count */
-  double energy;      /* composed symmetric Dirichlet, capped, area-weighted; lower is better; NaN if not measured */
+  /* auto without landmarks: at most ORB_FOUND_MAX pairs of places that show the correspondence, far from each other on
+   * the first shape. They are for a reader to correct and to send as landmarks; they are not vertices. */
+  int32_t found_count;
+  orb_place *found;     /* found_count × shape_count places, on the given meshes */
+  double *found_points; /* found_count × 3: their common points on the aligned sphere */
+  double *confidence;   /* found_count, 0 to 1: 1 where the map nearby is rigid up to one scale for all, less the more
+                           it stretches; it does not say whether the right things were matched */
+  double energy;        /* composed symmetric Dirichlet, capped, area-weighted; lower is better; NaN if not measured */
 } orb_alignment;
 
 /* Aligns shape_count ≥ 1 shapes; the first keeps its place unless the method says otherwise. Every result is certified.
@@ -64,7 +71,7 @@ typedef struct orb_alignment {
  * - pin: the shapes are embedded anew with the landmarks as constraints, meeting at their spherical means; landmarks
  *   that would have to pass through one another meet on surfaces with more edges, at the first shape's points or at
  *   new ones. After pin and rbf a landmark's vertices have bit-equal points on all shapes.
- * - auto: pin where landmarks are given, else the rotation search; it does not find landmarks of its own.
+ * - auto: pin where landmarks are given, else the rotation search; `found` then says what it matched.
  *
  * Landmarks at one and the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
  * those that are out of range, share a place on some shapes only, or cannot be met; ORB_E_BAD_OPTION for pin and rbf

@@ -33,10 +33,13 @@ typedef struct orb_merge_result {
   orb_alignment alignment;
   orb_supermesh supermesh;
   orb_shape_report *shapes; /* shape_count */
-  /* landmark_count × shape_count: from the place asked for (or found, auto) to the landmark's supermesh vertex, in
+  /* landmark_count × shape_count: from the place asked for to the landmark's supermesh vertex, in
    * units of each shape's diagonal. A landmark without a vertex: to where the supermesh has the sphere's point. NaN
    * where the method keeps no vertex. */
   double *landmark_residuals;
+  /* found_count × shape_count: from each place that an alignment without landmarks found to where the supermesh has it,
+   * likewise. */
+  double *found_residuals;
   int32_t pair_count;
   orb_pair_report *pairs;
   orb_asset_facts asset_facts;
