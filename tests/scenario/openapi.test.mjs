@@ -1,0 +1,273 @@
+// The document of the interface is held to what the daemon answers: every status, header and member must be in it.
+import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import http from 'node:http';
+import path from 'node:path';
+import test from 'node:test';
+import Ajv2020 from 'ajv/dist/2020.js';
+import { daemon, root, samples } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const document = JSON.parse(await readFile(path.join(root, 'api/openapi.json'), 'utf8'));
+const VERBS = ['get', 'post', 'put', 'patch', 'delete'];
+
+/** Validators of the document's schemas. */
+function validators() {
+  const ajv = new Ajv2020.default({ strict: true, allowUnionTypes: true, strictRequired: false, strictTypes: false, allErrors: true,
+    formats: { 'date-time': true, 'uri-reference': true } });
+  const moved = (value) => JSON.parse(JSON.stringify(value).replaceAll('#/components/schemas/', 'document#/$defs/'));
+  ajv.addSchema({ $id: 'document', $defs: moved(document.components.schemas) });
+  const made = new Map();
+  return (schema, value, what) => {
+    const key = JSON.stringify(schema);
+    if (!made.has(key)) made.set(key, ajv.compile(moved(schema)));
+    const check = made.get(key);
+    const fine = check(value);
+    // Of the alternatives of problems, what the one that is meant says.
+    const meant = /^\/problems\//.test(value?.type) ? `/Problem${value.type.slice(10).replace(/(^|-)(.)/g, (_, __, c) => c.toUpperCase())}/` : '';
+    const errors = (check.errors ?? []).filter((e) => e.schemaPath.includes(meant)).slice(0, 6);
+    assert.ok(fine, `${what}\n${JSON.stringify(errors)}\n${JSON.stringify(value).slice(0, 1500)}`);
+  };
+}
+const validate = validators();
+const resolve = (o) => (o.$ref ? o.$ref.split('/').slice(1).reduce((at, name) => at[name], document) : o);
+
+// Headers that HTTP itself brings.
+const PLAIN = ['content-type', 'content-length', 'date', 'connection', 'keep-alive', 'transfer-encoding', 'x-content-type-options'];
+
+/** Holds an answer to what the document says of this operation; what was seen is noted. */
+function hold(reply, method, target, seen) {
+  const what = `${method} ${target}: ${reply.status} ${reply.type}`;
+  const described = document.paths[target][method.toLowerCase()].responses[reply.status];
+  assert.ok(described, `${what} is not in the document: ${reply.bytes.toString().slice(0, 300)}`);
+  const names = Object.keys(described.headers ?? {}).map((name) => name.toLowerCase());
+  for (const [name] of reply.headers) assert.ok(PLAIN.includes(name) || names.includes(name), `${what}: the header ${name} is not in the document`);
+  for (const [name, header] of Object.entries(described.headers ?? {})) {
+    const value = reply.headers.get(name);
+    const { schema } = resolve(header);
+    if (value !== null) validate(schema, schema.type === 'integer' ? Number(value) : value, `${what}: ${name}`);
+  }
+  if (!described.content) {
+    assert.equal(reply.bytes.length, 0, what);
+  } else {
+    const media = described.content[reply.type.split(';')[0]];
+    assert.ok(media, `${what}: this type is not in the document`);
+    if (reply.json !== undefined) validate(media.schema, reply.json, what);
+  }
+  seen?.add(`${method} ${target} ${reply.status}`);
+  if (reply.json?.type) seen?.add(reply.json.type);
+  return reply;
+}
+
+/** A daemon whose every answer is held to the document. */
+function held(d, seen) {
+  const ask = async (method, target, { id, body, query, headers } = {}) =>
+    hold(await d.request(method, target.replace(/\{\w+\}/, id), { body, query, headers }), method, target, seen);
+  const upload = (bytes, query) => ask('POST', '/v1/meshes', { body: Buffer.from(bytes), query });
+  return { ask, upload };
+}
+
+/** A request that fetch cannot make: no Content-Length on POST, or a body on GET. */
+function bare(d, method, target, headers, body) {
+  return new Promise((done, reject) => {
+    const r = http.request(new URL(target, d.url), { method, headers }, (answer) => {
+      const parts = [];
+      answer.on('data', (part) => parts.push(part));
+      answer.on('end', () => {
+        const bytes = Buffer.concat(parts);
+        done({ status: answer.statusCode, type: answer.headers['content-type'] ?? '', bytes, headers: new Headers(Object.entries(answer.headers)), json: JSON.parse(bytes) });
+      });
+    });
+    r.useChunkedEncodingByDefault = false;
+    r.on('error', reject);
+    r.end(body);
+  });
+}
+
+test('the document is sound, and its examples are of its schemas', () => {
+  assert.match(document.openapi, /^3\.1\./);
+  for (const [name, schema] of Object.entries(document.components.schemas))
+    for (const example of schema.examples ?? []) validate({ $ref: `#/components/schemas/${name}` }, example, `example of ${name}`);
+  const ids = new Set();
+  for (const [target, item] of Object.entries(document.paths))
+    for (const verb of VERBS.filter((v) => item[v])) {
+      const operation = item[verb];
+      assert.ok(operation.summary && !ids.has(operation.operationId), `${verb} ${target}`);
+      ids.add(operation.operationId);
+      const parameters = [...(item.parameters ?? []), ...(operation.parameters ?? [])].map(resolve);
+      const inPath = parameters.filter((p) => p.in === 'path').map((p) => p.name);
+      assert.deepEqual(inPath, [...target.matchAll(/\{(\w+)\}/g)].map((m) => m[1]), target);
+      for (const p of parameters) validate(p.schema, p.example, `${verb} ${target}: ${p.name}`);
+      for (const content of [operation.requestBody, ...Object.values(operation.responses)].map((r) => r?.content ?? {}))
+        for (const media of Object.values(content)) {
+          const examples = media.examples ? Object.values(media.examples).map((e) => e.value) : [media.example];
+          for (const example of examples) {
+            assert.notEqual(example, undefined, `${verb} ${target} has no example`);
+            validate(media.schema, example, `${verb} ${target}`);
+          }
+        }
+    }
+});
+
+test('the document and the daemon know the same paths and methods', async (t) => {
+  const d = await daemon(t);
+  const table = await readFile(path.join(root, 'api/routes.c'), 'utf8');
+  const routes = [...table.matchAll(/\{ROUTE_\w+, "(\w+)", "([^"]+)"/g)].map((m) => `${m[1]} ${m[2]}`).sort();
+  const described = Object.entries(document.paths).flatMap(([target, item]) => VERBS.filter((v) => item[v]).map((v) => `${v.toUpperCase()} ${target}`)).sort();
+  assert.ok(routes.length > 20);
+  assert.deepEqual(described, routes);
+  for (const [target, item] of Object.entries(document.paths)) {
+    const at = target.replace('{id}', '0'.repeat(64)).replace('{job}', '0'.repeat(32));
+    const wanted = VERBS.filter((v) => item[v]).flatMap((v) => (v === 'get' ? ['GET', 'HEAD'] : [v.toUpperCase()]));
+    const options = await d.request('OPTIONS', at);
+    assert.equal(options.status, 204, target);
+    assert.deepEqual(options.headers.get('allow').split(', ').sort(), [...wanted, 'OPTIONS'].sort(), target);
+    for (const method of ['POST', 'PUT', 'PATCH', 'DELETE'].filter((m) => !wanted.includes(m))) {
+      const reply = await d.request(method, at);
+      assert.equal(reply.status, 405, `${method} ${target}`);
+      validate({ $ref: '#/components/schemas/ProblemMethodNotAllowed' }, reply.json, `${method} ${target}`);
+    }
+  }
+  validate({ $ref: '#/components/schemas/ProblemNotFound' }, (await d.get('/nothing')).json, '/nothing');
+});
+
+test('answers about meshes', async (t) => {
+  const d = await daemon(t), seen = new Set();
+  const { ask, upload } = held(d, seen);
+  const { obj, ball } = shapes, m = ball(2);
+  for (const file of ['dog.obj', 'giraffe.off', 'elephant.ply']) {
+    const bytes = await readFile(path.join(samples, file));
+    const first = await upload(bytes, { name: file });
+    assert.equal(first.status, 201);
+    assert.equal(first.headers.get('location'), first.json.url);
+    assert.equal((await upload(bytes, { name: file })).status, 200);
+    const id = first.json.id;
+    const etag = (await ask('GET', '/v1/meshes/{id}', { id })).headers.get('etag');
+    assert.equal((await ask('GET', '/v1/meshes/{id}', { id, headers: { 'if-none-match': etag } })).status, 304);
+    const whole = await ask('GET', '/v1/meshes/{id}/file', { id });
+    assert.ok(whole.bytes.equals(bytes));
+    for (const [headers, status] of [[{ range: 'bytes=0-9' }, 206], [{ range: `bytes=${bytes.length}-` }, 416],
+      [{ 'if-match': '"other"' }, 412], [{ 'if-none-match': whole.headers.get('etag') }, 304]])
+      assert.equal((await ask('GET', '/v1/meshes/{id}/file', { id, headers })).status, status);
+  }
+  const page = await ask('GET', '/v1/meshes', { query: { limit: 1 } });
+  assert.equal((await ask('GET', '/v1/meshes', { query: { limit: 1, page_token: page.json.next_page_token } })).json.meshes.length, 1);
+  await ask('GET', '/v1/meshes', { query: { limit: 'x' } });
+
+  const two = obj(shapes.apart(ball(1), m)), hole = obj(shapes.withoutFace(m));
+  const along = obj({ positions: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]], triangles: [[0, 1, 2], [1, 0, 3], [0, 1, 4]] });
+  const edits = [[obj(shapes.soup(m))], [shapes.cube], [hole, { repair: 'fill_holes' }], [two, { repair: 'largest_component' }],
+    [obj(shapes.turned(m, (i) => i % 3 === 0))], [obj(shapes.turned(m))], [`${obj(m)}v 9 9 9\nf 1 1 2\n`]];
+  for (const [text, query] of edits) {
+    const reply = await upload(text, query);
+    assert.equal(reply.status, 201, reply.bytes.toString());
+  }
+  const refusals = [['not-closed', hole], ['not-connected', two], ['not-genus-zero', obj(shapes.torus())], ['not-manifold', along],
+    ['not-orientable', obj(shapes.turned(m, (i) => i === 5)), { repair: 'none' }], ['not-finite', obj(m).replace('v 1 0 0', 'v nan 0 0')],
+    ['degenerate', 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n'], ['malformed-mesh', 'OFF\n4 4 0\n0 0 0\n'],
+    ['malformed-mesh', shapes.binaryPly(m).subarray(0, 400)], ['unknown-format', Buffer.from([0, 1, 2, 3, 255, 254, 7, 9])],
+    ['bad-query', obj(m), { repair: 'magic' }]];
+  for (const [name, bytes, query] of refusals) assert.equal((await upload(bytes, query)).json.type, `/problems/${name}`);
+  const encoded = await ask('POST', '/v1/meshes', { body: Buffer.from(obj(m)), headers: { 'content-encoding': 'gzip' } });
+  assert.equal(encoded.status, 415);
+  assert.equal(hold(await bare(d, 'POST', '/v1/meshes', {}), 'POST', '/v1/meshes', seen).status, 411);
+  const { id } = (await upload(shapes.tetrahedron)).json;
+  assert.equal((await ask('DELETE', '/v1/meshes/{id}', { id })).status, 204);
+  for (const [method, target] of [['DELETE', '/v1/meshes/{id}'], ['GET', '/v1/meshes/{id}'], ['GET', '/v1/meshes/{id}/file']])
+    assert.equal((await ask(method, target, { id })).status, 404);
+});
+
+test('answers about embeddings, supermeshes and jobs', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] }), seen = new Set();
+  const { ask } = held(d, seen);
+  const meshes = [];
+  for (const file of ['dog.obj', 'giraffe.off', 'elephant.ply']) meshes.push(await d.mesh(path.join(samples, file)));
+  const small = [];
+  for (const make of [shapes.egg, shapes.bean]) small.push((await d.upload(shapes.obj(make(2)))).json);
+  const landmarks = JSON.parse(await readFile(path.join(samples, 'dog-giraffe.json'), 'utf8')).landmarks;
+  const of = (...list) => list.map((mesh) => ({ mesh: mesh.id }));
+  const create = (kind, body, more) => ask('POST', `/v1/${kind}`, { body, ...more });
+  const end = async (reply) => {
+    let job = reply.json;
+    while (job.finished === null) job = (await ask('GET', '/v1/jobs/{job}', { id: job.id, query: { wait: 20 } })).json;
+    return job;
+  };
+  const pair = of(...small), three = [0, 1, 2].map((k) => ({ at: [{ point: [1 - k, k, 0] }, { vertex: k }] }));
+
+  const wanted = [
+    ['embeddings', { mesh: meshes[0].id }], ['embeddings', { mesh: small[0].id, method: 'kernel-sampling', options: { growth: 1.5 } }],
+    ['embeddings', { mesh: meshes[1].id, options: { preset: 'quality', energy_weight: 0.5 } }],
+    ['supermeshes', { shapes: of(meshes[0], meshes[1]), landmarks, remesh: { max_triangles: 8000 }, asset: { fit: 'similarity' } }],
+    ['supermeshes', { shapes: pair }], ['supermeshes', { shapes: pair, align: { method: 'rotate' }, embedding: { options: { preset: 'fast' } } }],
+    ['supermeshes', { shapes: pair, remesh: { method: 'overlay' }, asset: { animation: 'none', normals: false, path: 'rigid' } }],
+    ['supermeshes', { shapes: pair, remesh: { method: 'subdivision', tolerance: 0.01 } }], ['supermeshes', { shapes: pair, remesh: { method: 'convex-hull' } }],
+    ['supermeshes', { shapes: pair, landmarks: three, align: { method: 'rbf', options: { steps: 5, one_way: true, radius: 0.5, seed: 3, preset: 'fast' } } }]];
+  for (const [kind, body] of wanted) {
+    const sent = await create(kind, body);
+    if (sent.json.type === '/problems/unsupported-method') continue; // of a build without it
+    assert.equal(sent.status, 202, sent.bytes.toString());
+    assert.equal(sent.headers.get('location'), sent.json.url);
+    assert.ok(sent.headers.get('retry-after'));
+    const job = await end(sent), what = JSON.stringify(body).slice(0, 300);
+    const events = await ask('GET', '/v1/jobs/{job}/events', { id: job.id });
+    for (const [, data] of events.bytes.toString().matchAll(/^data: (.*)$/gm)) validate({ $ref: '#/components/schemas/Job' }, JSON.parse(data), `event of ${what}`);
+    if (!body.align?.options) assert.equal(job.state, 'succeeded', `${what} ${JSON.stringify(job.problem)}`);
+    if (job.state !== 'succeeded') continue;
+    const made = await create(kind, body, { query: { wait: 1 } });
+    assert.equal(made.status, 200);
+    const { id } = made.json;
+    await ask('GET', `/v1/${kind}/{id}`, { id });
+    const files = kind === 'embeddings' ? ['sphere.ply'] : ['asset.glb', 'places'];
+    for (const file of files.map((name) => `/v1/${kind}/{id}/${name}`)) for (const [headers, status] of [[{}, 200], [{ range: 'bytes=0-9' }, 206], [{ range: 'bytes=999999999-' }, 416], [{ 'if-match': '"x"' }, 412], [{ 'if-none-match': '*' }, 304]])
+      assert.equal((await ask('GET', file, { id, headers })).status, status);
+    if (kind === 'supermeshes') assert.equal((await create(kind, made.json.request)).json.id, id, 'the request of the answer names the same');
+  }
+
+  const [kept] = wanted[0].slice(1), none = '0'.repeat(64);
+  const refusals = [['embeddings', 'not-found', { mesh: none }], ['embeddings', 'bad-option', { ...kept, options: { growth: 0 } }],
+    ['embeddings', 'unknown-member', { ...kept, colour: 1 }], ['embeddings', 'invalid-request', []], ['embeddings', 'malformed-json', Buffer.from('{')],
+    ['embeddings', 'too-large', Buffer.from(`{"mesh":"${'x'.repeat(1_100_000)}"}`)], ['supermeshes', 'invalid-request', { shapes: [] }],
+    ['supermeshes', 'not-found', { shapes: of(small[0], { id: none }) }], ['supermeshes', 'bad-landmarks', { shapes: pair, align: { method: 'pin' } }],
+    ['supermeshes', 'bad-landmarks', { shapes: pair, landmarks: [{ at: [{ vertex: 0 }, { vertex: 999999 }] }] }],
+    ['supermeshes', 'bad-landmarks', { shapes: pair, landmarks: [{ at: [{ vertex: 0 }, { vertex: 0.5 }] }] }],
+    ['supermeshes', 'unknown-member', { shapes: pair, remesh: { tolerence: 1 } }], ['supermeshes', 'malformed-json', Buffer.from('')]];
+  for (const [kind, name, body] of refusals) assert.equal((await create(kind, body)).json.type, `/problems/${name}`, JSON.stringify(body).slice(0, 200));
+  assert.equal((await create('embeddings', kept, { query: { wait: 'long' } })).status, 400);
+  const clash = await create('supermeshes', { shapes: pair, landmarks: [{ at: [{ vertex: 0 }, { vertex: 0 }] }, { at: [{ vertex: 0 }, { vertex: 1 }] }] });
+  const failed = clash.status === 202 ? await end(clash) : { problem: clash.json };
+  assert.equal(failed.problem.type, '/problems/bad-landmarks');
+
+  // One worker: the second waits, and holds its mesh, until it is cancelled.
+  const long = await create('supermeshes', { shapes: of(...meshes), asset: { colors: true } });
+  const queued = await create('embeddings', { mesh: meshes[2].id, method: 'kernel-sampling' });
+  assert.equal((await ask('DELETE', '/v1/meshes/{id}', { id: meshes[2].id })).status, 409);
+  assert.equal((await ask('GET', '/v1/jobs', { query: { limit: 2 } })).json.jobs.length, 2);
+  for (const { json } of [queued, long]) assert.equal((await ask('DELETE', '/v1/jobs/{job}', { id: json.id })).status, 200);
+  assert.equal((await ask('GET', '/v1/jobs', { query: { state: 'cancelled' } })).status, 200);
+  assert.equal((await ask('GET', '/v1/jobs', { query: { state: 'lost' } })).status, 400);
+  const done = (await ask('GET', '/v1/jobs', { query: { state: 'succeeded' } })).json.jobs[0];
+  assert.equal((await ask('DELETE', '/v1/jobs/{job}', { id: done.id })).status, 409);
+  for (const [method, target] of [['GET', '/v1/jobs/{job}'], ['DELETE', '/v1/jobs/{job}'], ['GET', '/v1/jobs/{job}/events']])
+    assert.equal((await ask(method, target, { id: '0'.repeat(32) })).status, 404);
+  for (const kind of ['embeddings', 'supermeshes']) {
+    const { json } = await ask('GET', `/v1/${kind}`, { query: { limit: 2 } });
+    assert.equal(json[kind].length, 2);
+    assert.equal((await ask('DELETE', `/v1/${kind}/{id}`, { id: json[kind][0].id })).status, 204);
+    for (const method of ['GET', 'DELETE']) assert.equal((await ask(method, `/v1/${kind}/{id}`, { id: json[kind][0].id })).status, 404);
+  }
+});
+
+test('answers about the daemon itself', async (t) => {
+  const d = await daemon(t), seen = new Set();
+  const { ask } = held(d, seen);
+  for (const target of ['/livez', '/readyz', '/metrics', '/docs', '/']) assert.equal((await ask('GET', target)).status, 200);
+  assert.deepEqual((await ask('GET', '/openapi.json')).json, document);
+  assert.ok('workers' in (await ask('GET', '/readyz', { query: { verbose: '' } })).json);
+  const refused = hold(await bare(d, 'GET', '/livez', { 'content-length': 2 }, 'ab'), 'GET', '/livez', seen);
+  assert.equal(refused.json.type, '/problems/bad-request');
+});
+
+test('a full disk is answered as described', async (t) => {
+  const d = await daemon(t, { args: ['--disk-reserve', '65536G'] });
+  assert.equal((await held(d).upload(shapes.tetrahedron)).status, 507);
+});
