@@ -26,7 +26,7 @@ static const route table[ROUTE_COUNT] = {
     {ROUTE_JOB_EVENTS, "GET", "/v1/jobs/{job}/events", ROUTE_NO_BODY, SCOPE_READ},
     {ROUTE_LIVEZ, "GET", "/livez", ROUTE_NO_BODY, SCOPE_NONE},
     {ROUTE_READYZ, "GET", "/readyz", ROUTE_NO_BODY, SCOPE_NONE},
-    {ROUTE_METRICS, "GET", "/metrics", ROUTE_NO_BODY, SCOPE_READ},
+    {ROUTE_METRICS, "GET", "/metrics", ROUTE_NO_BODY, SCOPE_ADMIN},
     {ROUTE_OPENAPI, "GET", "/openapi.json", ROUTE_NO_BODY, SCOPE_NONE},
     {ROUTE_DOCS, "GET", "/docs", ROUTE_NO_BODY, SCOPE_NONE},
     {ROUTE_ROOT, "GET", "/", ROUTE_NO_BODY, SCOPE_NONE},

@@ -48,7 +48,7 @@ static const entry table[] = {
     {"tls-certificate", TEXT(tls_certificate), "", "PEM file; with tls-key the service speaks https"},
     {"tls-key", TEXT(tls_key), "", "PEM file"},
     {"auth", TEXT(auth), "loopback",
-     "loopback: refuse to listen elsewhere; off: listen anywhere, a front end guards it"},
+     "loopback: tokens are needed unless it listens on loopback; on: always; off: never, a front end guards it"},
 };
 enum { ENTRIES = sizeof table / sizeof table[0] };
 
@@ -61,7 +61,7 @@ static const entry *find(const char *name, size_t length) {
   return NULL;
 }
 
-static int parse_number(const char *text, int64_t *out) {
+int config_number(const char *text, int64_t *out) {
   char *end;
   errno = 0;
   long long value = strtoll(text, &end, 10);
@@ -94,7 +94,7 @@ static int set(config *out, const entry *e, const char *value, const char *from)
   }
   int64_t number;
   int is_default = strcmp(value, e->standard) == 0; /* 0 may mean "by the machine" */
-  if (!parse_number(value, &number) || (!is_default && (number < e->least || number > e->most))) {
+  if (!config_number(value, &number) || (!is_default && (number < e->least || number > e->most))) {
     fprintf(stderr, "orbmorphd: %s: %s must be a number from %lld to %lld, not \"%s\"\n", from, e->name,
             (long long)e->least, (long long)e->most, value);
     return 0;
@@ -178,6 +178,8 @@ static void print_help(void) {
       "  orbmorphd --gc                 remove derived objects beyond derived-bytes, and objects without a row\n"
       "  orbmorphd token add NAME --scope read,write,admin [--quota BYTES]\n"
       "  orbmorphd token list | token remove NAME\n"
+      "                                 while the service is stopped; --quota: of uploads in all; with --data as "
+      "above\n"
       "  orbmorphd --version, --help\n\n"
       "Each NAME is also an environment variable (ORBMORPH_NAME) and a line of the config file; a flag wins over the\n"
       "environment, that over the file, that over the default.\n");
@@ -238,8 +240,8 @@ static int consistent(config *out) {
     fprintf(stderr, "orbmorphd: tls-certificate and tls-key belong together\n");
     return 0;
   }
-  if (strcmp(out->auth, "loopback") != 0 && strcmp(out->auth, "off") != 0) {
-    fprintf(stderr, "orbmorphd: auth must be loopback or off\n");
+  if (strcmp(out->auth, "loopback") != 0 && strcmp(out->auth, "on") != 0 && strcmp(out->auth, "off") != 0) {
+    fprintf(stderr, "orbmorphd: auth must be loopback, on or off\n");
     return 0;
   }
   return 1;

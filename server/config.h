@@ -12,7 +12,7 @@ typedef struct config {
   char cors[512]; /* origins, comma-separated, or * */
   char log_level[16], log_format[16];
   char tls_certificate[PATH_MAX / 2], tls_key[PATH_MAX / 2];
-  char auth[16]; /* loopback, off */
+  char auth[16]; /* loopback, on, off */
   int64_t workers, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;
   int64_t max_body, max_json, max_triangles, queue_limit;
   int64_t job_memory, job_seconds, disk_reserve, drain_seconds, derived_bytes;
@@ -27,6 +27,8 @@ typedef enum config_action {
   CONFIG_GC,
 } config_action;
 
+/* A number as options take it, perhaps with K, M or G. 0 if it is none. */
+int config_number(const char *text, int64_t *out);
 config_action config_read(config *out, int argc, char **argv);
 
 #endif

@@ -17,6 +17,7 @@
 #include "http/http.h"
 #include "log.h"
 #include "maintain.h"
+#include "token_command.h"
 #include "worker/pool.h"
 
 enum { CACHE_BYTES = 64 << 20 };
@@ -175,6 +176,7 @@ static void wait_for_stop(server *srv, int signals) {
 
 static int serve(server *srv, int signals, const sigset_t *set) {
   const config *o = srv->options;
+  srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !is_loopback(o->listen));
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
   queue_options queued = {.workers = (int)o->workers,
                           .cores = cores > 0 ? (int)cores : 1,
@@ -190,13 +192,16 @@ static int serve(server *srv, int signals, const sigset_t *set) {
     queued.cores = queued.workers;
   }
   if (objects_open(o->data, &srv->store) != STORE_OK || catalogue_open(o->data, &srv->cat) != STORE_OK ||
-      !(srv->q = queue_create(&queued, srv->cat)) || queue_recover(srv->q) != STORE_OK ||
-      !(srv->descriptions = cache_create(CACHE_BYTES)) || !(srv->io = tasks_start((int)o->io_threads)) ||
-      !(srv->checks = tasks_start((int)o->workers)) ||
+      !(srv->tokens = catalogue_tokens(srv->cat, &srv->token_count)) || !(srv->q = queue_create(&queued, srv->cat)) ||
+      queue_recover(srv->q) != STORE_OK || !(srv->descriptions = cache_create(CACHE_BYTES)) ||
+      !(srv->io = tasks_start((int)o->io_threads)) || !(srv->checks = tasks_start((int)o->workers)) ||
       !(workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) || !http_start(srv)) {
     log_error("the service could not be started");
   } else {
     __atomic_store_n(&srv->ready, 1, __ATOMIC_RELEASE);
+    if (srv->needs_token && srv->token_count == 0) {
+      log_warn("tokens are needed and there are none: make one with orbmorphd token add");
+    }
     announce(srv);
     pthread_sigmask(SIG_UNBLOCK, set, NULL); /* in this thread, which alone waits for them */
     wait_for_stop(srv, signals);
@@ -218,6 +223,7 @@ static int serve(server *srv, int signals, const sigset_t *set) {
   catalogue_close(srv->cat);
   objects_close(srv->store);
   cache_destroy(srv->descriptions);
+  free(srv->tokens);
   return result;
 }
 
@@ -240,6 +246,11 @@ static int run(const config *options) {
 
 int main(int argc, char **argv) {
   static config options;
+  static token_command tokens;
+  int is_token = argc > 1 && strcmp(argv[1], "token") == 0;
+  if (is_token && !token_command_read(&tokens, &argc, argv)) {
+    return 2;
+  }
   config_action action = config_read(&options, argc, argv);
   static const char *const levels[] = {"debug", "info", "warn", "error"};
   int level = 0;
@@ -260,14 +271,10 @@ int main(int argc, char **argv) {
       puts("the configuration is valid");
       return 0;
     case CONFIG_RUN:
-      if (!is_loopback(options.listen) && strcmp(options.auth, "off") != 0) {
-        fputs(
-            "orbmorphd: it has no access control of its own: listen on loopback behind a front end, or say --auth "
-            "off\n",
-            stderr);
-        return 2;
+      if (!is_token) {
+        return run(&options);
       }
-      return run(&options);
+      break;
     default:
       break;
   }
@@ -275,7 +282,10 @@ int main(int argc, char **argv) {
   if (lock < 0) {
     return 1;
   }
-  int result = action == CONFIG_CHECK_DATA ? maintain_check(&options) : action == CONFIG_GC ? maintain_gc(&options) : 2;
+  int result = is_token                      ? token_command_run(&tokens, &options)
+               : action == CONFIG_CHECK_DATA ? maintain_check(&options)
+               : action == CONFIG_GC         ? maintain_gc(&options)
+                                             : 2;
   close(lock);
   return result;
 }

@@ -93,7 +93,7 @@ static void submit(request *r, const wanted *wish) {
   queue_request wanted_job = {.kind = wish->kind == RESOURCE_EMBEDDING ? ORB_JOB_EMBEDDING : ORB_JOB_SUPERMESH,
                               .key = wish->id,
                               .request = wish->canonical.data,
-                              .owner = "",
+                              .owner = r->token ? r->token->name : "",
                               .cost = wish->cost,
                               .listed = 1};
   job *j = NULL;

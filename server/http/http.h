@@ -17,6 +17,7 @@
 #include "cache.h"
 #include "config.h"
 #include "queue/queue.h"
+#include "store/tokens.h"
 #include "tasks.h"
 
 typedef struct server {
@@ -30,6 +31,9 @@ typedef struct server {
   struct MHD_Daemon *daemon;
   int ready, stopping; /* written under __atomic */
   int64_t started;
+  int needs_token;
+  token_row *tokens; /* `used` under __atomic */
+  int token_count;
 } server;
 
 typedef enum request_phase { PHASE_BODY, PHASE_AWAY, PHASE_WAIT, PHASE_SEND } request_phase;
@@ -44,6 +48,7 @@ struct request {
   const char *method;
   char id[ORB_ID_SIZE];
   char number[24]; /* of the request, for the log and X-Request-Id */
+  token_row *token; /* of the caller; NULL where none is needed */
   int has_body, head;
   int closes; /* the connection ends with this answer */
   request_phase phase;
@@ -77,6 +82,12 @@ int guard_headers(request *r, const char *version, orb_problem *problem);
 const char *header_of(const request *r, const char *name);
 const char *query_of(const request *r, const char *name);
 int query_has(const request *r, const char *name); /* also without a value */
+
+/* access.c: 1, or 0 with the problem. */
+int access_check(request *r, const char *path, orb_problem *problem);
+/* Takes bytes of an upload from the token's quota; then says whether they were stored as something new. */
+int access_take_quota(request *r, int64_t bytes, orb_problem *problem);
+void access_quota_stored(request *r, int64_t bytes, int stored);
 
 /* reply.c: each leaves a response. */
 void reply_json(request *r, unsigned status, orb_text *json); /* takes json */

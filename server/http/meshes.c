@@ -175,7 +175,12 @@ static void upload_away(request *r) {
   if (known) {
     reply_cached(r, 200, known);
   } else {
-    store_mesh(r, &query, bytes, forced ? query.hint : found, id);
+    if (access_take_quota(r, r->received, &problem)) {
+      store_mesh(r, &query, bytes, forced ? query.hint : found, id);
+      access_quota_stored(r, r->received, r->status == 201);
+    } else {
+      reply_problem(r, &problem);
+    }
   }
   unmap_upload(r, bytes);
   objects_abandon(&r->temp);

@@ -122,6 +122,8 @@ static void request_begin(request *r, const char *path, const char *version) {
   if (!guard_headers(r, version, &problem)) {
     r->closes = 1;
     reply_problem(r, &problem);
+  } else if (!access_check(r, path, &problem)) {
+    reply_problem(r, &problem);
   } else if (!r->route) {
     answer_unrouted(r, path, allow);
   } else if (r->route->id == ROUTE_MESH_UPLOAD) {

@@ -22,6 +22,7 @@ static const char *const migrations[] = {
     " PRIMARY KEY(job, number)) WITHOUT ROWID;"
     "CREATE TABLE token(hash TEXT PRIMARY KEY, name TEXT NOT NULL UNIQUE, scopes INTEGER NOT NULL,"
     " quota_bytes INTEGER NOT NULL, quota_jobs INTEGER NOT NULL, created INTEGER NOT NULL);",
+    "ALTER TABLE token ADD COLUMN used_bytes INTEGER NOT NULL DEFAULT 0;",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

@@ -1,0 +1,112 @@
+#include "store/tokens.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "store/rows.h"
+
+int token_hash(const char *text, unsigned char hash[TOKEN_BYTES]) {
+  unsigned char token[TOKEN_BYTES];
+  size_t size = 0;
+  if (strlen(text) != TOKEN_TEXT - 1 ||
+      sodium_hex2bin(token, sizeof token, text, TOKEN_TEXT - 1, NULL, &size, NULL) != 0 || size != sizeof token) {
+    return 0;
+  }
+  crypto_hash_sha256(hash, token, sizeof token);
+  sodium_memzero(token, sizeof token);
+  return 1;
+}
+
+static int add_row(database *db, void *arg) {
+  const token_row *row = arg;
+  char hash[TOKEN_TEXT];
+  sqlite3_stmt *st = database_statement(db,
+                                        "INSERT INTO token(hash, name, scopes, quota_bytes, quota_jobs, created)"
+                                        " VALUES(?1, ?2, ?3, ?4, 0, ?5) ON CONFLICT DO NOTHING");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sodium_bin2hex(hash, sizeof hash, row->hash, sizeof row->hash);
+  sqlite3_bind_text(st, 1, hash, -1, SQLITE_TRANSIENT);
+  sqlite3_bind_text(st, 2, row->name, -1, SQLITE_STATIC);
+  sqlite3_bind_int(st, 3, row->scopes);
+  sqlite3_bind_int64(st, 4, row->quota);
+  sqlite3_bind_int64(st, 5, row->created);
+  int code = database_run(db, st);
+  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_CONSTRAINT : code;
+}
+
+store_result catalogue_token_add(catalogue *cat, const token_row *row) {
+  return catalogue_write(cat, add_row, (void *)(uintptr_t)row);
+}
+
+static int remove_row(database *db, void *arg) {
+  sqlite3_stmt *st = database_statement(db, "DELETE FROM token WHERE name=?1");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, arg, -1, SQLITE_STATIC);
+  int code = database_run(db, st);
+  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+}
+
+store_result catalogue_token_remove(catalogue *cat, const char *name) {
+  return catalogue_write(cat, remove_row, (void *)(uintptr_t)name);
+}
+
+token_row *catalogue_tokens(catalogue *cat, int *count) {
+  token_row *rows = calloc(TOKENS_MOST, sizeof *rows);
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st = rows ? database_statement(db,
+                                               "SELECT hash, name, scopes, quota_bytes, used_bytes, created FROM token"
+                                               " ORDER BY name")
+                          : NULL;
+  int code = SQLITE_ERROR;
+  *count = 0;
+  while (st && *count < TOKENS_MOST && (code = sqlite3_step(st)) == SQLITE_ROW) {
+    token_row *row = &rows[(*count)++];
+    char hash[TOKEN_TEXT];
+    row_text(st, 0, hash, sizeof hash);
+    sodium_hex2bin(row->hash, sizeof row->hash, hash, strlen(hash), NULL, NULL, NULL);
+    row_text(st, 1, row->name, sizeof row->name);
+    row->scopes = sqlite3_column_int(st, 2);
+    row->quota = sqlite3_column_int64(st, 3);
+    row->used = sqlite3_column_int64(st, 4);
+    row->created = sqlite3_column_int64(st, 5);
+  }
+  if (st) {
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  if (code != SQLITE_DONE && code != SQLITE_ROW) {
+    free(rows);
+    *count = -1;
+    return NULL;
+  }
+  return rows;
+}
+
+typedef struct use_arg {
+  char name[64];
+  int64_t bytes;
+} use_arg;
+
+static int use_row(database *db, void *arg) {
+  use_arg *use = arg;
+  sqlite3_stmt *st = database_statement(db, "UPDATE token SET used_bytes=used_bytes+?2 WHERE name=?1");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, use->name, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 2, use->bytes);
+  return database_run(db, st);
+}
+
+void catalogue_token_use(catalogue *cat, const char *name, int64_t bytes) {
+  use_arg *use = calloc(1, sizeof *use);
+  if (use) {
+    snprintf(use->name, sizeof use->name, "%s", name);
+    use->bytes = bytes;
+    catalogue_write_later(cat, use_row, use);
+  }
+}

@@ -1,0 +1,26 @@
+/* Tokens: who may call. Of a token only the SHA-256 of its 32 random bytes is kept. */
+#ifndef ORB_STORE_TOKENS_H
+#define ORB_STORE_TOKENS_H
+
+#include "store/catalogue.h"
+
+enum { TOKEN_BYTES = 32, TOKEN_TEXT = 2 * TOKEN_BYTES + 1, TOKENS_MOST = 1024 };
+
+typedef struct token_row {
+  unsigned char hash[TOKEN_BYTES];
+  char name[64];
+  int scopes;          /* route_scope, or-ed */
+  int64_t quota, used; /* bytes of uploads that were stored; quota 0: no limit */
+  int64_t created;
+} token_row;
+
+/* The hash of a token as callers send it: 64 hexadecimal digits. 0 if it is none. */
+int token_hash(const char *text, unsigned char hash[TOKEN_BYTES]);
+
+store_result catalogue_token_add(catalogue *cat, const token_row *row); /* STORE_CONFLICT: the name is taken */
+store_result catalogue_token_remove(catalogue *cat, const char *name);
+/* By name; at most TOKENS_MOST. In memory of malloc(); NULL with *count −1 on error. */
+token_row *catalogue_tokens(catalogue *cat, int *count);
+void catalogue_token_use(catalogue *cat, const char *name, int64_t bytes); /* adds; does not wait */
+
+#endif
