@@ -271,3 +271,30 @@ config_action config_read(config *out, int argc, char **argv) {
   action = read_flags(out, argc, argv, 0);
   return action == CONFIG_BAD || !consistent(out) ? CONFIG_BAD : action;
 }
+
+static int can_change(const char *name) {
+  return strcmp(name, "log-level") == 0 || strcmp(name, "queue-limit") == 0 || strcmp(name, "derived-bytes") == 0;
+}
+
+int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken)) {
+  static config fresh; /* large; one thread alone handles signals */
+  if (config_read(&fresh, argc, argv) != CONFIG_RUN) {
+    return 0;
+  }
+  for (size_t i = 0; i < ENTRIES; i++) {
+    const entry *e = &table[i];
+    char *to = (char *)live + e->offset;
+    const char *from = (const char *)&fresh + e->offset;
+    if (e->size ? strcmp(to, from) == 0 : memcmp(to, from, sizeof(int64_t)) == 0) {
+      continue;
+    }
+    int taken = can_change(e->name);
+    if (taken && e->size) {
+      memcpy(to, from, e->size);
+    } else if (taken) {
+      __atomic_store_n((int64_t *)(void *)to, *(const int64_t *)(const void *)from, __ATOMIC_RELAXED);
+    }
+    changed(e->name, taken);
+  }
+  return 1;
+}

@@ -16,6 +16,10 @@ void log_setup(log_level least, int json) {
   atomic_store(&as_json, json);
 }
 
+int log_wants(log_level level) {
+  return (int)level >= atomic_load(&least_level);
+}
+
 void log_write(log_level level, const char *fields, const char *format, ...) {
   if ((int)level < atomic_load(&least_level)) {
     return;

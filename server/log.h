@@ -7,6 +7,7 @@
 typedef enum log_level { LOG_DEBUG, LOG_INFO, LOG_WARN, LOG_ERROR } log_level;
 
 void log_setup(log_level least, int json);
+int log_wants(log_level level);
 /* fields: further JSON members without braces ("\"job\":\"…\""), or NULL. */
 void log_write(log_level level, const char *fields, const char *format, ...) ORB_PRINTF(3, 4);
 

@@ -142,8 +142,42 @@ static void keep_budget(const server *srv, int64_t *seen, int *over) {
   }
 }
 
+/* For reading the configuration again. */
+typedef struct command_line {
+  int argc;
+  char **argv;
+  config *options;
+} command_line;
+
+static void set_log(const config *options) {
+  static const char *const levels[] = {"debug", "info", "warn", "error"};
+  int level = 0;
+  while (level < 3 && strcmp(levels[level], options->log_level) != 0) {
+    level++;
+  }
+  log_setup((log_level)level, strcmp(options->log_format, "text") != 0);
+}
+
+static void on_change(const char *name, int taken) {
+  if (taken) {
+    log_warn("SIGHUP: %s is changed", name);
+  } else {
+    log_warn("SIGHUP: %s is not what it was; it needs a restart", name);
+  }
+}
+
+static void reload(server *srv, const command_line *line) {
+  if (!config_reload(line->options, line->argc, line->argv, on_change)) {
+    log_error("SIGHUP: the configuration is not valid and stays as it was");
+    return;
+  }
+  set_log(line->options);
+  queue_set_limit(srv->q, (int)line->options->queue_limit);
+  log_info("SIGHUP: the configuration was read again");
+}
+
 /* Waits for a signal to stop; a second one, or the end of the time for draining, stops at once. */
-static void wait_for_stop(server *srv, int signals) {
+static void wait_for_stop(server *srv, const command_line *line, int signals) {
   struct pollfd wait = {.fd = signals, .events = POLLIN};
   int64_t seen = -1;
   for (int over = 0;;) {
@@ -156,7 +190,7 @@ static void wait_for_stop(server *srv, int signals) {
       continue;
     }
     if (number == SIGHUP) {
-      log_info("SIGHUP: the configuration is read at start only; restart to change it");
+      reload(srv, line);
       continue;
     }
     break;
@@ -174,7 +208,7 @@ static void wait_for_stop(server *srv, int signals) {
   queue_stop(srv->q, 1);
 }
 
-static int serve(server *srv, int signals, const sigset_t *set) {
+static int serve(server *srv, const command_line *line, int signals, const sigset_t *set) {
   const config *o = srv->options;
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !is_loopback(o->listen));
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
@@ -204,7 +238,7 @@ static int serve(server *srv, int signals, const sigset_t *set) {
     }
     announce(srv);
     pthread_sigmask(SIG_UNBLOCK, set, NULL); /* in this thread, which alone waits for them */
-    wait_for_stop(srv, signals);
+    wait_for_stop(srv, line, signals);
     result = 0;
   }
   __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
@@ -227,7 +261,8 @@ static int serve(server *srv, int signals, const sigset_t *set) {
   return result;
 }
 
-static int run(const config *options) {
+static int run(const command_line *line) {
+  const config *options = line->options;
   server srv = {.options = options};
   sigset_t set;
   struct timespec now;
@@ -237,7 +272,7 @@ static int run(const config *options) {
   pthread_mutex_init(&srv.mesh_lock, NULL);
   raise_descriptor_limit();
   int lock = signals < 0 ? -1 : lock_data(options->data);
-  int result = lock < 0 ? 1 : serve(&srv, signals, &set);
+  int result = lock < 0 ? 1 : serve(&srv, line, signals, &set);
   if (lock >= 0) {
     close(lock);
   }
@@ -252,12 +287,7 @@ int main(int argc, char **argv) {
     return 2;
   }
   config_action action = config_read(&options, argc, argv);
-  static const char *const levels[] = {"debug", "info", "warn", "error"};
-  int level = 0;
-  while (level < 3 && strcmp(levels[level], options.log_level) != 0) {
-    level++;
-  }
-  log_setup((log_level)level, strcmp(options.log_format, "text") != 0);
+  set_log(&options);
   if (sodium_init() < 0) {
     fputs("orbmorphd: libsodium cannot be initialised\n", stderr);
     return 1;
@@ -272,7 +302,7 @@ int main(int argc, char **argv) {
       return 0;
     case CONFIG_RUN:
       if (!is_token) {
-        return run(&options);
+        return run(&(command_line){argc, argv, &options});
       }
       break;
     default:

@@ -6,6 +6,7 @@
 #include "api/json.h"
 #include "api/supermesh_codec.h"
 #include "http/http.h"
+#include "log.h"
 
 /* A request that was read and checked. */
 typedef struct wanted {
@@ -97,7 +98,15 @@ static void submit(request *r, const wanted *wish) {
                               .cost = wish->cost,
                               .listed = 1};
   job *j = NULL;
-  queue_result result = queue_submit(r->srv->q, &wanted_job, &j, NULL);
+  int fresh = 0;
+  queue_result result = queue_submit(r->srv->q, &wanted_job, &j, &fresh);
+  if (result == QUEUE_OK) {
+    char fields[REQUEST_FIELDS + 80];
+    request_fields(r, fields);
+    size_t n = strlen(fields);
+    snprintf(fields + n, sizeof fields - n, ",\"job\":\"%s\"", job_id(j));
+    log_write(LOG_INFO, fields, fresh ? "job accepted" : "job known");
+  }
   switch (result) {
     case QUEUE_OK:
       break;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "http/http.h"
+#include "metrics.h"
 
 enum { PING_MS = 15000, BLOCK = 2048, ROWS = 64 };
 
@@ -61,6 +62,7 @@ static ssize_t read_stream(void *user, uint64_t position, char *out, size_t room
   size_t n = s->pending.size - s->sent < room ? s->pending.size - s->sent : room;
   memcpy(out, s->pending.data + s->sent, n);
   s->sent += n;
+  metrics_bytes(0, (int64_t)n);
   s->last_ms = orb_clock_ms();
   return (ssize_t)n;
 }

@@ -91,6 +91,7 @@ void reply_object(request *r, object_kind kind, const char *id, const char *sha,
   }
   r->response = response;
   r->status = ranged ? 206 : 200;
+  r->sends = (int64_t)length;
   r->phase = PHASE_SEND;
   if (ranged) {
     snprintf(content_range, sizeof content_range, "bytes %llu-%llu/%llu", (unsigned long long)first,

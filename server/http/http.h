@@ -47,7 +47,7 @@ struct request {
   const route *route;
   const char *method;
   char id[ORB_ID_SIZE];
-  char number[24]; /* of the request, for the log and X-Request-Id */
+  char number[24];  /* of the request, for the log and X-Request-Id */
   token_row *token; /* of the caller; NULL where none is needed */
   int has_body, head;
   int closes; /* the connection ends with this answer */
@@ -67,6 +67,8 @@ struct request {
   int cancels;
 
   unsigned status;
+  int64_t sends;  /* bytes of the response's body; streams count theirs as they go */
+  char trace[56]; /* traceparent, where the caller sent a well-formed one */
   struct MHD_Response *response;
 };
 
@@ -130,6 +132,9 @@ int64_t read_wait_ms(request *r);
 const cached *find_description(server *srv, resource_kind kind, const char *id, store_result *result);
 /* Of a description that the cache had: says so to the catalogue, for eviction. Does not wait. */
 void note_use(server *srv, const cached *entry);
+/* Members for the log: the request's number, its trace and route. */
+enum { REQUEST_FIELDS = 256 };
+void request_fields(const request *r, char out[REQUEST_FIELDS]);
 int64_t clock_us(void);
 
 #endif

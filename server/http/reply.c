@@ -7,12 +7,13 @@
 #include "log.h"
 #include "metrics.h"
 
-static void take(request *r, unsigned status, struct MHD_Response *response) {
+static void take(request *r, unsigned status, struct MHD_Response *response, size_t size) {
   if (r->response) {
     MHD_destroy_response(r->response);
   }
   r->response = response;
   r->status = status;
+  r->sends = (int64_t)size;
   r->phase = PHASE_SEND;
 }
 
@@ -24,6 +25,7 @@ void reply_header(request *r, const char *name, const char *value) {
 
 void reply_text(request *r, unsigned status, const char *mime, orb_text *text) {
   struct MHD_Response *response = NULL;
+  size_t size = text->size;
   if (!text->failed) {
     response = text->data ? MHD_create_response_from_buffer(text->size, text->data, MHD_RESPMEM_MUST_FREE)
                           : MHD_create_response_from_buffer(0, (void *)(uintptr_t) "", MHD_RESPMEM_PERSISTENT);
@@ -33,7 +35,7 @@ void reply_text(request *r, unsigned status, const char *mime, orb_text *text) {
   } else {
     orb_text_free(text);
   }
-  take(r, status, response);
+  take(r, status, response, size);
   reply_header(r, "Content-Type", mime);
 }
 
@@ -79,11 +81,11 @@ void reply_store(request *r, store_result result) {
 }
 
 void reply_empty(request *r, unsigned status) {
-  take(r, status, MHD_create_response_from_buffer(0, (void *)(uintptr_t) "", MHD_RESPMEM_PERSISTENT));
+  take(r, status, MHD_create_response_from_buffer(0, (void *)(uintptr_t) "", MHD_RESPMEM_PERSISTENT), 0);
 }
 
 void reply_bytes(request *r, unsigned status, const char *mime, const void *bytes, size_t size) {
-  take(r, status, MHD_create_response_from_buffer(size, (void *)(uintptr_t)bytes, MHD_RESPMEM_PERSISTENT));
+  take(r, status, MHD_create_response_from_buffer(size, (void *)(uintptr_t)bytes, MHD_RESPMEM_PERSISTENT), size);
   reply_header(r, "Content-Type", mime);
 }
 
@@ -121,7 +123,8 @@ void reply_cached(request *r, unsigned status, const cached *entry) {
   if (none_match && r->route->method[0] == 'G' && etag_matches(none_match, entry->etag)) {
     reply_empty(r, 304);
   } else {
-    take(r, status, MHD_create_response_from_buffer(entry->json_size, entry->row.json, MHD_RESPMEM_MUST_COPY));
+    take(r, status, MHD_create_response_from_buffer(entry->json_size, entry->row.json, MHD_RESPMEM_MUST_COPY),
+         entry->json_size);
     reply_header(r, "Content-Type", "application/json");
   }
   reply_header(r, "ETag", entry->etag);

@@ -16,7 +16,7 @@ static resource_kind kind_of(const request *r) {
 }
 
 void note_use(server *srv, const cached *entry) {
-  if (srv->options->derived_bytes > 0 && entry->row.kind != RESOURCE_MESH &&
+  if (__atomic_load_n(&srv->options->derived_bytes, __ATOMIC_RELAXED) > 0 && entry->row.kind != RESOURCE_MESH &&
       cache_note_use(srv->descriptions, entry, orb_clock_ms())) {
     catalogue_touch(srv->cat, entry->row.kind, entry->row.id);
   }

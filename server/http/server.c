@@ -114,11 +114,33 @@ static request *request_create(server *srv, struct MHD_Connection *connection, c
   return r;
 }
 
+/* W3C Trace Context, version 00: 00-TRACE-SPAN-FLAGS. Others are passed over. */
+static void note_trace(request *r) {
+  static const char form[] = "00-xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx-xxxxxxxxxxxxxxxx-xx";
+  const char *text = header_of(r, "traceparent");
+  if (!text || strlen(text) != sizeof form - 1) {
+    return;
+  }
+  for (size_t i = 0; form[i]; i++) {
+    if (form[i] == 'x' ? !strchr("0123456789abcdef", text[i]) : text[i] != form[i]) {
+      return;
+    }
+  }
+  memcpy(r->trace, text, sizeof form);
+}
+
+void request_fields(const request *r, char out[REQUEST_FIELDS]) {
+  snprintf(out, REQUEST_FIELDS, "\"request\":\"%s\"%s%s%s,\"method\":\"%.8s\",\"route\":\"%s\"", r->number,
+           r->trace[0] ? ",\"traceparent\":\"" : "", r->trace, r->trace[0] ? "\"" : "",
+           r->route ? r->route->method : "", r->route ? r->route->path : "");
+}
+
 /* The first call of a request: everything that the headers decide. Leaves a response where the answer is clear. */
 static void request_begin(request *r, const char *path, const char *version) {
   char allow[64];
   orb_problem problem = {0};
   r->route = route_find(r->method, path, r->id, allow);
+  note_trace(r);
   if (!guard_headers(r, version, &problem)) {
     r->closes = 1;
     reply_problem(r, &problem);
@@ -181,18 +203,22 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
   request *r = *state;
   (void)user;
   (void)connection;
-  (void)code;
   if (!r) {
     return;
   }
   int64_t took = clock_us() - r->began;
   int waited = r->waits_for != NULL || (r->route && r->route->id == ROUTE_JOB_EVENTS);
   metrics_request((int)r->status, waited ? 0 : 1e-6 * (double)took);
-  if (took > SLOW_US && !waited) {
-    char fields[200];
-    snprintf(fields, sizeof fields, "\"request\":\"%s\",\"route\":\"%s\",\"status\":%u,\"ms\":%lld", r->number,
-             r->route ? r->route->path : "", r->status, (long long)(took / 1000));
-    log_write(LOG_WARN, fields, "slow request");
+  if (code == MHD_REQUEST_TERMINATED_COMPLETED_OK && !r->head) {
+    metrics_bytes(0, r->sends);
+  }
+  int slow = took > SLOW_US && !waited;
+  if (slow || r->status >= 500 || log_wants(LOG_DEBUG)) {
+    char fields[REQUEST_FIELDS + 80];
+    request_fields(r, fields);
+    size_t n = strlen(fields);
+    snprintf(fields + n, sizeof fields - n, ",\"status\":%u,\"ms\":%lld", r->status, (long long)(took / 1000));
+    log_write(slow || r->status >= 500 ? LOG_WARN : LOG_DEBUG, fields, "%s", slow ? "slow request" : "request");
   }
   queue_release(r->srv->q, r->waits_for);
   objects_abandon(&r->temp);

@@ -37,6 +37,7 @@ typedef struct queue_options {
 
 queue *queue_create(const queue_options *options, catalogue *cat);
 void queue_destroy(queue *q);
+void queue_set_limit(queue *q, int limit);
 /* Loads what is unfinished. */
 store_result queue_recover(queue *q);
 /* No more jobs are taken; wakes the workers. With `now`, running ones are cancelled to be queued again. */

@@ -417,3 +417,9 @@ store_result queue_cancel(queue *q, job *j) {
   cancel_needless(q, j);
   return STORE_OK;
 }
+
+void queue_set_limit(queue *q, int limit) {
+  pthread_mutex_lock(&q->lock);
+  q->options.limit = limit;
+  pthread_mutex_unlock(&q->lock);
+}
