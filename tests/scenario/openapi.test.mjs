@@ -1,11 +1,13 @@
 // The document of the interface is held to what the daemon answers: every status, header and member must be in it.
 import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
 import { readFile } from 'node:fs/promises';
 import http from 'node:http';
 import path from 'node:path';
 import test from 'node:test';
+import { promisify } from 'node:util';
 import Ajv2020 from 'ajv/dist/2020.js';
-import { daemon, root, samples } from './support/daemon.mjs';
+import { binaries, daemon, root, samples } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const document = JSON.parse(await readFile(path.join(root, 'api/openapi.json'), 'utf8'));
@@ -276,6 +278,30 @@ test('answers about the daemon itself', async (t) => {
 test('a full disk is answered as described', async (t) => {
   const d = await daemon(t, { args: ['--disk-reserve', '65536G'] });
   assert.equal((await held(d).upload(shapes.tetrahedron)).status, 507);
+});
+
+test('answers to callers without the right token', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on'] });
+  await d.stop();
+  const make = async (name, scope, ...more) => {
+    const { stdout } = await promisify(execFile)(binaries.daemon, ['token', 'add', name, '--scope', scope, ...more, '--data', d.data]);
+    return { authorization: `Bearer ${stdout.trim()}` };
+  };
+  const read = await make('read', 'read'), write = await make('write', 'write', '--quota', '9');
+  await d.start();
+  const { ask } = held(d);
+  for (const [target, item] of Object.entries(document.paths))
+    for (const verb of VERBS.filter((v) => item[v])) {
+      const id = target.includes('{job}') ? '0'.repeat(32) : '0'.repeat(64), body = verb === 'post' ? Buffer.from('{}') : undefined;
+      const guarded = Boolean(item[verb].security), scope = /scope (\w+)/.exec(item[verb].description)?.[1];
+      assert.equal((await ask(verb.toUpperCase(), target, { id, body })).status === 401, guarded, `${verb} ${target}`);
+      for (const [name, headers] of [['read', read], ['write', write]]) {
+        const reply = await ask(verb.toUpperCase(), target, { id, body, headers });
+        assert.equal(reply.status === 403, guarded && scope !== undefined && scope !== name, `${verb} ${target} ${name}`);
+      }
+    }
+  const over = await ask('POST', '/v1/meshes', { body: Buffer.from(shapes.tetrahedron), headers: write });
+  assert.equal(over.json.type, '/problems/quota-exceeded');
 });
 
 test('every answer but faults was seen above', () => {
