@@ -39,8 +39,8 @@ typedef struct orb_supermesh {
 /* Makes one supermesh for all aligned shapes; their meshes and points are certified, landmark vertices bit-equal where
  * they are to be kept. Places are exact corners where a supermesh vertex is a vertex of the shape. Which methods keep
  * all input vertices: overlay, subdivision and convex-hull (the paper's Fig. 11 baseline: the Delaunay triangulation of
- * all vertices, of at most 4 million, whose error is proved but not controlled); adaptive keeps the landmarks. options NULL: defaults. Errors:
- * ORB_E_BAD_OPTION, ORB_E_UNSUPPORTED, ORB_E_TOO_LARGE, ORB_E_NOT_CERTIFIED. Stage "remesh". */
+ * all vertices, of at most 4 million, whose error is proved but not controlled); adaptive keeps the landmarks. options
+ * NULL: defaults. Errors: ORB_E_BAD_OPTION, ORB_E_UNSUPPORTED, ORB_E_TOO_LARGE, ORB_E_NOT_CERTIFIED. Stage "remesh". */
 ORB_MUST_CHECK orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
                                      int32_t landmark_count, const orb_remesh_options *options, orb_supermesh *out);
 void orb_supermesh_free(orb_context *ctx, orb_supermesh *supermesh);
