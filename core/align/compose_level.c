@@ -72,7 +72,7 @@ static void shape_of(const double length[3], double slack, double cot[3], double
 }
 
 /* Areas are those of the level's own triangles; the sum stays what it is without the mollification. */
-static void fill_triangles(cm_level *l, const orb_surface *s, const double *position, double *shape) {
+static void fill_triangles(cm_level *l, const double *position, double *shape) {
   double mean = 0, raw = 0, total = 0;
   for (int pass = 0; pass < 2; pass++) {
     for (int32_t t = 0; t < l->triangle_count; t++) {
@@ -98,7 +98,6 @@ static void fill_triangles(cm_level *l, const orb_surface *s, const double *posi
       }
     }
   }
-  (void)s;
   for (int32_t t = 0; t < l->triangle_count; t++) {
     shape[4 * (size_t)t + 3] *= total > 0 ? raw / total : 1;
   }
@@ -200,7 +199,7 @@ orb_status cm_level_create(orb_context *ctx, const orb_surface *s, const unsigne
     } while (c != first);
   }
   ORB_ASSERT(t == l.triangle_count);
-  fill_triangles(&l, s, position, shape);
+  fill_triangles(&l, position, shape);
   fill_spokes(&l, shape);
   status = fill_colours(ctx, &l);
 done:
