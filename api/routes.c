@@ -20,6 +20,7 @@ static const route table[ROUTE_COUNT] = {
     {ROUTE_SUPERMESH_DELETE, "DELETE", "/v1/supermeshes/{id}", ROUTE_NO_BODY, SCOPE_WRITE},
     {ROUTE_SUPERMESH_ASSET, "GET", "/v1/supermeshes/{id}/asset.glb", ROUTE_NO_BODY, SCOPE_READ},
     {ROUTE_SUPERMESH_PLACES, "GET", "/v1/supermeshes/{id}/places", ROUTE_NO_BODY, SCOPE_READ},
+    {ROUTE_SUPERMESH_SPHERE, "GET", "/v1/supermeshes/{id}/spheres/{k}.ply", ROUTE_NO_BODY, SCOPE_READ},
     {ROUTE_JOB_LIST, "GET", "/v1/jobs", ROUTE_NO_BODY, SCOPE_READ},
     {ROUTE_JOB_GET, "GET", "/v1/jobs/{job}", ROUTE_NO_BODY, SCOPE_READ},
     {ROUTE_JOB_CANCEL, "DELETE", "/v1/jobs/{job}", ROUTE_NO_BODY, SCOPE_WRITE},
@@ -36,7 +37,26 @@ const route *route_table(void) {
   return table;
 }
 
-/* Matches a path against a pattern with at most one {…}. */
+/* The number in front of the rest of a path: one or two digits, none needless; −1: not that. */
+static int number_before(const char *path, const char *rest) {
+  size_t digits = strspn(path, "0123456789");
+  if (digits < 1 || digits > 2 || (digits == 2 && path[0] == '0') || strcmp(path + digits, rest) != 0) {
+    return -1;
+  }
+  return digits == 1 ? path[0] - '0' : 10 * (path[0] - '0') + path[1] - '0';
+}
+
+/* What follows an id: as it stands, or with {k}. */
+static int ends_as(const char *pattern, const char *path) {
+  const char *brace = strstr(pattern, "{k}");
+  if (!brace) {
+    return strcmp(pattern, path) == 0;
+  }
+  size_t head = (size_t)(brace - pattern);
+  return strncmp(pattern, path, head) == 0 && number_before(path + head, brace + 3) >= 0;
+}
+
+/* Matches a path against a pattern. */
 static int matches(const char *pattern, const char *path, char id[ORB_ID_SIZE]) {
   const char *brace = strchr(pattern, '{');
   if (!brace) {
@@ -48,7 +68,7 @@ static int matches(const char *pattern, const char *path, char id[ORB_ID_SIZE]) 
   }
   size_t length = strcspn(path + head, "/");
   int fine = strncmp(brace, "{id}", 4) == 0 ? orb_id_valid(path + head, length) : orb_job_id_valid(path + head, length);
-  if (!fine || strcmp(strchr(brace, '}') + 1, path + head + length) != 0) {
+  if (!fine || !ends_as(strchr(brace, '}') + 1, path + head + length)) {
     return 0;
   }
   memcpy(id, path + head, length);
@@ -71,4 +91,17 @@ const route *route_find(const char *method, const char *path, char id[ORB_ID_SIZ
     }
   }
   return NULL;
+}
+
+int route_number(const route *found, const char *path) {
+  const char *brace = strstr(found->path, "{k}");
+  size_t rest = brace ? strlen(brace + 3) : 0, length = strlen(path);
+  if (!brace || length < rest) {
+    return -1;
+  }
+  const char *at = path + length - rest;
+  while (at > path && at[-1] != '/') {
+    at--;
+  }
+  return number_before(at, brace + 3);
 }

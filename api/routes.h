@@ -21,6 +21,7 @@ typedef enum route_id {
   ROUTE_SUPERMESH_DELETE,
   ROUTE_SUPERMESH_ASSET,
   ROUTE_SUPERMESH_PLACES,
+  ROUTE_SUPERMESH_SPHERE,
   ROUTE_JOB_LIST,
   ROUTE_JOB_GET,
   ROUTE_JOB_CANCEL,
@@ -40,7 +41,7 @@ typedef enum route_scope { SCOPE_NONE = 0, SCOPE_READ = 1, SCOPE_WRITE = 2, SCOP
 typedef struct route {
   route_id id;
   const char *method;
-  const char *path; /* with {id} for 64 hex digits, {job} for a job's id */
+  const char *path; /* with {id} for 64 hex digits, {job} for a job's id; after either, {k} for a small number */
   route_body body;
   route_scope scope;
 } route;
@@ -50,5 +51,7 @@ const route *route_table(void); /* ROUTE_COUNT entries */
 /* Finds the route; NULL with *allow empty: no such path; NULL with *allow filled ("GET, HEAD"): not that method.
  * HEAD goes to GET. id: filled where the path has one. */
 const route *route_find(const char *method, const char *path, char id[ORB_ID_SIZE], char allow[64]);
+/* The number that stands for {k} in a path that route_find() took; −1: the route has none. */
+int route_number(const route *found, const char *path);
 
 #endif

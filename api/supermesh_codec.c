@@ -61,13 +61,16 @@ void orb_pairs_write(const orb_merge_result *result, orb_text *out) {
   orb_json_close(out, ']');
 }
 
-static void write_shapes(const orb_supermesh_request *request, const orb_merge_result *result, orb_text *out) {
+static void write_shapes(const char *id, const orb_supermesh_request *request, const orb_merge_result *result,
+                         orb_text *out) {
   orb_json_key(out, "shapes");
   orb_json_open(out, '[');
   for (int32_t s = 0; s < request->shape_count; s++) {
     orb_json_open(out, '{');
     orb_json_member_string(out, "mesh", request->shapes[s].mesh);
     orb_json_member_string(out, "name", request->shapes[s].name);
+    orb_json_key(out, "sphere");
+    orb_text_printf(out, "\"/v1/supermeshes/%s/spheres/%d.ply\"", id, s);
     orb_shape_report_members(out, &result->shapes[s]);
     orb_json_close(out, '}');
   }
@@ -145,7 +148,7 @@ void orb_supermesh_write(const char *id, const orb_supermesh_request *request, c
   orb_json_member_integer(out, "asset_bytes", (int64_t)result->asset.size);
   orb_json_member_integer(out, "vertices", result->supermesh.vertex_count);
   orb_json_member_integer(out, "triangles", result->supermesh.triangle_count);
-  write_shapes(request, result, out);
+  write_shapes(id, request, result, out);
   write_landmarks(request, result, found, out);
   orb_json_key(out, "certificate");
   orb_merge_certificate_write(result, out);

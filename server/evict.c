@@ -20,6 +20,9 @@ store_result evict_one(const evict_env *env, resource_kind kind, const char *id)
   if (result == STORE_OK && kind == RESOURCE_SUPERMESH) {
     result = objects_delete(env->store, OBJECT_PLACES, id);
   }
+  if (result == STORE_OK && kind == RESOURCE_SUPERMESH) {
+    result = objects_delete(env->store, OBJECT_SPHERES, id);
+  }
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "http/http.h"
+#include "worker/spheres.h"
 
 /* −1: outside the file; 0: not a range to be used; 1: [*first, *first + *length). */
 static int read_range(const char *text, uint64_t size, uint64_t *first, uint64_t *length) {
@@ -54,7 +55,13 @@ static void add_headers(request *r, const char *etag, const char *mime, const ch
   }
 }
 
-void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name) {
+/* A part of an object, as if it were a file of its own; length 0: the whole object. */
+typedef struct object_part {
+  uint64_t start, length;
+} object_part;
+
+static void reply_part(request *r, object_kind kind, const char *id, object_part part, const char *sha,
+                       const char *mime, const char *name) {
   char etag[40], content_range[80];
   int fd;
   uint64_t size, first = 0, length;
@@ -74,6 +81,7 @@ void reply_object(request *r, object_kind kind, const char *id, const char *sha,
     reply_store(r, found);
     return;
   }
+  size = part.length ? part.length : size;
   length = size;
   const char *if_range = header_of(r, "If-Range");
   int usable = !r->head && (!if_range || strcmp(if_range, etag) == 0);
@@ -85,7 +93,7 @@ void reply_object(request *r, object_kind kind, const char *id, const char *sha,
     reply_header(r, "Content-Range", content_range);
     return;
   }
-  struct MHD_Response *response = MHD_create_response_from_fd_at_offset64(length, fd, first);
+  struct MHD_Response *response = MHD_create_response_from_fd_at_offset64(length, fd, part.start + first);
   if (!response) {
     close(fd);
   }
@@ -99,6 +107,23 @@ void reply_object(request *r, object_kind kind, const char *id, const char *sha,
     reply_header(r, "Content-Range", content_range);
   }
   add_headers(r, etag, mime, name);
+}
+
+void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name) {
+  reply_part(r, kind, id, (object_part){0}, sha, mime, name);
+}
+
+/* Blocks: it looks into the object. */
+static void reply_sphere(request *r) {
+  object_part part;
+  char name[32];
+  store_result found = spheres_find(r->srv->store, r->id, r->shape, &part.start, &part.length);
+  if (found != STORE_OK) {
+    reply_store(r, found);
+    return;
+  }
+  snprintf(name, sizeof name, "sphere-%d.ply", r->shape);
+  reply_part(r, OBJECT_SPHERES, r->id, part, r->id, "application/octet-stream", name);
 }
 
 static void file_of(request *r, const cached *entry) {
@@ -119,6 +144,9 @@ static void file_of(request *r, const cached *entry) {
       break;
     case ROUTE_SUPERMESH_PLACES:
       reply_object(r, OBJECT_PLACES, r->id, r->id, "application/octet-stream", "places.bin");
+      break;
+    case ROUTE_SUPERMESH_SPHERE:
+      reply_sphere(r);
       break;
     default:
       reply_object(r, OBJECT_ASSET, r->id, entry->row.sha, "model/gltf-binary", "asset.glb");
@@ -144,7 +172,10 @@ static void file_away(request *r) {
 
 enum MHD_Result handle_file(request *r) {
   const cached *entry = cache_find(r->srv->descriptions, kind_of(r), r->id);
-  if (!entry) {
+  if (!entry || r->route->id == ROUTE_SUPERMESH_SPHERE) {
+    if (entry) {
+      cache_release(r->srv->descriptions, entry);
+    }
     return request_go_away(r, r->srv->io, file_away);
   }
   note_use(r->srv, entry);

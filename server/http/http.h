@@ -47,6 +47,7 @@ struct request {
   const route *route;
   const char *method;
   char id[ORB_ID_SIZE];
+  int shape; /* {k} of the path; −1: none */
   char number[24];  /* of the request, for the log and X-Request-Id */
   token_row *token; /* of the caller; NULL where none is needed */
   int has_body, head;

@@ -63,6 +63,7 @@ static enum MHD_Result dispatch(request *r) {
     case ROUTE_EMBEDDING_SPHERE:
     case ROUTE_SUPERMESH_ASSET:
     case ROUTE_SUPERMESH_PLACES:
+    case ROUTE_SUPERMESH_SPHERE:
       return handle_file(r);
     case ROUTE_EMBEDDING_CREATE:
     case ROUTE_SUPERMESH_CREATE:
@@ -140,6 +141,7 @@ static void request_begin(request *r, const char *path, const char *version) {
   char allow[64];
   orb_problem problem = {0};
   r->route = route_find(r->method, path, r->id, allow);
+  r->shape = r->route ? route_number(r->route, path) : -1;
   note_trace(r);
   if (!guard_headers(r, version, &problem)) {
     r->closes = 1;

@@ -13,7 +13,7 @@
 #include "faults.h"
 #include "log.h"
 
-static const char *const folders[OBJECT_KINDS] = {"mesh", "sphere", "asset", "places"};
+static const char *const folders[OBJECT_KINDS] = {"mesh", "sphere", "asset", "places", "spheres"};
 
 struct objects {
   char root[PATH_MAX - 256];

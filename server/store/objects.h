@@ -12,7 +12,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
-typedef enum object_kind { OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_PLACES, OBJECT_KINDS } object_kind;
+typedef enum object_kind {
+  OBJECT_MESH,
+  OBJECT_SPHERE,
+  OBJECT_ASSET,
+  OBJECT_PLACES,
+  OBJECT_SPHERES, /* of a supermesh: see worker/spheres.h */
+  OBJECT_KINDS
+} object_kind;
 
 /* What the store can say of a call. */
 typedef enum store_result {

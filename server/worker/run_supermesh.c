@@ -7,6 +7,7 @@
 #include "metrics.h"
 #include "worker/places.h"
 #include "worker/run.h"
+#include "worker/spheres.h"
 
 /* Everything that a merge needs; of the context. */
 typedef struct merge_input {
@@ -120,7 +121,7 @@ static int load_input(const run_env *env, orb_context *ctx, merge_input *in, orb
   return 1;
 }
 
-/* Before the row, as the asset: a supermesh that is there has both. */
+/* Before the row, as the asset: a supermesh that is there has all of them. */
 static int store_places(const run_env *env, orb_context *ctx, const merge_input *in, const orb_merge_result *merged,
                         resource *result, orb_problem *problem) {
   orb_buffer places = {0};
@@ -135,6 +136,18 @@ static int store_places(const run_env *env, orb_context *ctx, const merge_input 
   }
   orb_buffer_free(ctx, &places);
   return fine;
+}
+
+static int store_spheres(const run_env *env, orb_context *ctx, const orb_merge_result *merged, resource *result,
+                         orb_problem *problem) {
+  int64_t bytes = 0;
+  orb_status status;
+  store_result stored = spheres_put(env->store, ctx, result->id, &merged->alignment, &bytes, &status);
+  result->bytes += bytes;
+  if (stored != STORE_OK && status == ORB_OK) {
+    run_problem_of_store(stored, problem);
+  }
+  return stored == STORE_OK;
 }
 
 /* The places that the alignment found, as a request would name them: by the file's triangle, or as a point where a
@@ -171,7 +184,7 @@ static int store_result_of(const run_env *env, orb_context *ctx, job *j, const m
     run_problem_of_store(stored, problem);
     return 0;
   }
-  if (!store_places(env, ctx, in, merged, result, problem)) {
+  if (!store_places(env, ctx, in, merged, result, problem) || !store_spheres(env, ctx, merged, result, problem)) {
     return 0;
   }
   orb_spot *found = found_spots(ctx, in, merged);

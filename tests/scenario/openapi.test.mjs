@@ -66,7 +66,7 @@ function hold(reply, method, target) {
 /** A daemon whose every answer is held to the document. */
 function held(d) {
   const ask = async (method, target, { id, body, query, headers } = {}) =>
-    hold(await d.request(method, target.replace(/\{\w+\}/, id), { body, query, headers }), method, target);
+    hold(await d.request(method, target.replace(/\{k\}/, 0).replace(/\{\w+\}/, id), { body, query, headers }), method, target);
   const upload = (bytes, query) => ask('POST', '/v1/meshes', { body: Buffer.from(bytes), query });
   return { ask, upload };
 }
@@ -121,7 +121,7 @@ test('the document and the daemon know the same paths and methods', async (t) =>
   assert.ok(routes.length > 20);
   assert.deepEqual(described, routes);
   for (const [target, item] of Object.entries(document.paths)) {
-    const at = target.replace('{id}', '0'.repeat(64)).replace('{job}', '0'.repeat(32));
+    const at = target.replace('{id}', '0'.repeat(64)).replace('{job}', '0'.repeat(32)).replace('{k}', '0');
     const wanted = VERBS.filter((v) => item[v]).flatMap((v) => (v === 'get' ? ['GET', 'HEAD'] : [v.toUpperCase()]));
     const options = await d.request('OPTIONS', at);
     assert.equal(options.status, 204, target);
@@ -222,7 +222,7 @@ test('answers about embeddings, supermeshes and jobs', async (t) => {
     const { id } = made.json;
     assert.equal((await ask('GET', `/v1/${kind}/{id}`, { id })).status, 200);
     assert.equal((await ask('GET', `/v1/${kind}/{id}`, { id, headers: { 'if-none-match': '*' } })).status, 304);
-    const files = kind === 'embeddings' ? ['sphere.ply'] : ['asset.glb', 'places'];
+    const files = kind === 'embeddings' ? ['sphere.ply'] : ['asset.glb', 'places', 'spheres/{k}.ply'];
     for (const file of files.map((name) => `/v1/${kind}/{id}/${name}`)) for (const [headers, status] of [[{}, 200], [{ range: 'bytes=0-9' }, 206], [{ range: 'bytes=999999999-' }, 416], [{ 'if-match': '"x"' }, 412], [{ 'if-none-match': '*' }, 304]])
       assert.equal((await ask('GET', file, { id, headers })).status, status);
     if (kind === 'supermeshes') assert.equal((await create(kind, made.json.request)).json.id, id, 'the request of the answer names the same');

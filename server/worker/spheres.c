@@ -1,0 +1,131 @@
+#include "worker/spheres.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "api/ids.h"
+#include "orbmorph/format.h"
+
+enum { HASH_BYTES = 32, TAIL_BYTES = HASH_BYTES + 4 + 8, SHAPES_MOST = 16 };
+static const char mark[] = "ORBSPHER";
+
+static void put(unsigned char *at, uint64_t value, int bytes) {
+  for (int i = 0; i < bytes; i++) {
+    at[i] = (unsigned char)(value >> (8 * i));
+  }
+}
+
+static uint64_t get(const unsigned char *at, int bytes) {
+  uint64_t value = 0;
+  for (int i = 0; i < bytes; i++) {
+    value |= (uint64_t)at[i] << (8 * i);
+  }
+  return value;
+}
+
+typedef struct sink {
+  object_temp temp;
+  crypto_hash_sha256_state hash;
+  uint64_t size;
+} sink;
+
+static store_result pour(sink *to, const void *bytes, size_t size) {
+  crypto_hash_sha256_update(&to->hash, bytes, size);
+  to->size += size;
+  return objects_append(&to->temp, bytes, size);
+}
+
+static store_result pour_sphere(sink *to, orb_context *ctx, const orb_aligned_shape *shape, orb_status *status) {
+  orb_buffer ply = {0};
+  *status = orb_sphere_ply_write(ctx, &shape->mesh, shape->points, &ply);
+  store_result result = *status == ORB_OK ? pour(to, ply.data, ply.size) : STORE_ERROR;
+  orb_buffer_free(ctx, &ply);
+  return result;
+}
+
+static store_result pour_tail(sink *to, const uint64_t *starts, int32_t shapes) {
+  unsigned char table[8 * (SHAPES_MOST + 1)], tail[TAIL_BYTES];
+  for (int32_t s = 0; s <= shapes; s++) {
+    put(table + 8 * s, starts[s], 8);
+  }
+  store_result result = pour(to, table, 8 * (size_t)(shapes + 1));
+  if (result != STORE_OK) {
+    return result;
+  }
+  crypto_hash_sha256_final(&to->hash, tail);
+  put(tail + HASH_BYTES, (uint64_t)shapes, 4);
+  memcpy(tail + HASH_BYTES + 4, mark, 8);
+  to->size += sizeof tail;
+  return objects_append(&to->temp, tail, sizeof tail);
+}
+
+store_result spheres_put(objects *store, orb_context *ctx, const char *id, const orb_alignment *alignment,
+                         int64_t *bytes, orb_status *status) {
+  sink to = {.size = 0};
+  uint64_t starts[SHAPES_MOST + 1] = {0};
+  *status = ORB_OK;
+  if (alignment->shape_count > SHAPES_MOST) {
+    return STORE_ERROR;
+  }
+  store_result result = objects_begin(store, &to.temp);
+  if (result != STORE_OK) {
+    return result;
+  }
+  crypto_hash_sha256_init(&to.hash);
+  for (int32_t s = 0; s < alignment->shape_count && result == STORE_OK; s++) {
+    result = pour_sphere(&to, ctx, &alignment->shapes[s], status);
+    starts[s + 1] = to.size;
+  }
+  result = result == STORE_OK ? pour_tail(&to, starts, alignment->shape_count) : result;
+  result = result == STORE_OK ? objects_publish(store, &to.temp, OBJECT_SPHERES, id) : result;
+  objects_abandon(&to.temp);
+  *bytes = (int64_t)to.size;
+  return result;
+}
+
+static int read_at(int fd, void *out, size_t size, uint64_t at) {
+  ssize_t n = pread(fd, out, size, (off_t)at);
+  return n == (ssize_t)size;
+}
+
+store_result spheres_find(const objects *store, const char *id, int shape, uint64_t *start, uint64_t *length) {
+  int fd;
+  uint64_t size;
+  unsigned char tail[TAIL_BYTES], entry[16];
+  store_result result = objects_read(store, OBJECT_SPHERES, id, &fd, &size);
+  if (result != STORE_OK) {
+    return result;
+  }
+  result = STORE_ERROR;
+  if (size > TAIL_BYTES && read_at(fd, tail, sizeof tail, size - TAIL_BYTES) &&
+      memcmp(tail + HASH_BYTES + 4, mark, 8) == 0) {
+    uint64_t shapes = get(tail + HASH_BYTES, 4), table = size - TAIL_BYTES - 8 * (shapes + 1);
+    if (shape < 0 || (uint64_t)shape >= shapes) {
+      result = STORE_NOT_FOUND;
+    } else if (shapes <= SHAPES_MOST && table < size && read_at(fd, entry, 16, table + 8 * (uint64_t)shape)) {
+      uint64_t end = get(entry + 8, 8);
+      *start = get(entry, 8);
+      *length = end - *start;
+      result = *start < end && end <= table ? STORE_OK : STORE_ERROR;
+    }
+  }
+  close(fd);
+  return result;
+}
+
+store_result spheres_check(const objects *store, const char *id) {
+  unsigned char *bytes = NULL, hash[HASH_BYTES];
+  size_t size;
+  store_result result = objects_load(store, OBJECT_SPHERES, id, &bytes, &size);
+  if (result != STORE_OK) {
+    return result;
+  }
+  int fine = size > TAIL_BYTES && memcmp(bytes + size - 8, mark, 8) == 0;
+  if (fine) {
+    crypto_hash_sha256(hash, bytes, size - TAIL_BYTES);
+    fine = memcmp(hash, bytes + size - TAIL_BYTES, HASH_BYTES) == 0;
+  }
+  free(bytes);
+  return fine ? STORE_OK : STORE_ERROR;
+}
