@@ -11,6 +11,8 @@
 static const char usage_text[] =
     "usage: orbmorph-bench embed [options] FILE...\n"
     "       orbmorph-bench merge [options] A B [C...]\n"
+    "       orbmorph-bench landmarks [options] A B [C...]\n"
+    "       orbmorph-bench pairs [options] A B [C...]\n"
     "\n"
     "Measures the library in-process; one JSON object a line for every repeat.\n"
     "  --method M        newton (default) or kernel-sampling\n"
@@ -22,10 +24,18 @@ static const char usage_text[] =
     "  --out DIR         embed: write DIR/NAME.sphere.ply\n"
     "  --out FILE.glb    merge: write the asset\n"
     "  --align M         pin (default with landmarks), rbf, rotate or auto (default without)\n"
+    "  --align-preset P  default, fast (default of landmarks) or quality\n"
     "  --remesh M        adaptive (default), overlay, subdivision or convex-hull\n"
     "  --tolerance X     adaptive: relative to the diagonal (0.001)\n"
     "  --max-triangles N\n"
     "  --landmarks FILE  a landmarks array, alone or as the member \"landmarks\"\n"
+    "landmarks pins sets of random landmarks on pairs of the files, pairs merges every pair of them:\n"
+    "  --sets N          sets of landmarks (100)\n"
+    "  --first N         number of the first set; each set depends on seed and number only (0)\n"
+    "  --seed N          (1)\n"
+    "  --sizes LIST      landmarks in a set, by turns (3,10,30,60)\n"
+    "  --merge-every N   every N-th set is remeshed too (0: none)\n"
+    "  --seconds N       give a set or pair up after so long (0: never)\n"
     "  --version, --help\n"
     "Exit status 0 done, 1 refused (the reason on standard error), 2 wrong usage.\n";
 
@@ -82,7 +92,8 @@ static int read_options(const char *text, orb_embed_options *options) {
 }
 
 typedef struct texts {
-  const char *method, *preset, *options, *repair, *threads, *repeat, *align, *remesh, *tolerance, *max_triangles;
+  const char *method, *preset, *options, *repair, *threads, *repeat, *align, *remesh, *tolerance, *max_triangles, *sets,
+      *align_preset, *first, *seed, *merge_every, *seconds;
 } texts;
 
 static int interpret(const texts *t, bench_options *o) {
@@ -115,6 +126,12 @@ static int interpret(const texts *t, bench_options *o) {
       return 0;
     }
     o->embed.preset = (orb_preset)word;
+  }
+  if (t->align_preset) {
+    if (!read_word("--align-preset", t->align_preset, presets, &word)) {
+      return 0;
+    }
+    o->merge.align.preset = (orb_preset)word;
   }
   if (t->align) {
     if (!read_word("--align", t->align, aligns, &word)) {
@@ -158,24 +175,53 @@ static int interpret(const texts *t, bench_options *o) {
   return 1;
 }
 
-static int parse(int argc, char **argv, int merge, bench_options *o) {
+static int interpret_numbers(const texts *t, bench_options *o) {
+  long seed = (long)o->seed;
+  const struct {
+    const char *name, *text;
+    long least, most, *out;
+  } table[] = {{"--sets", t->sets, 1, 1000000, &o->sets},
+               {"--first", t->first, 0, 1000000000, &o->first},
+               {"--seed", t->seed, 0, 1000000000, &seed},
+               {"--merge-every", t->merge_every, 0, 1000000, &o->merge_every},
+               {"--seconds", t->seconds, 0, 1000000, &o->seconds}};
+  for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {
+    if (table[i].text && !read_integer(table[i].name, table[i].text, table[i].least, table[i].most, table[i].out)) {
+      return 0;
+    }
+  }
+  o->seed = (uint64_t)seed;
+  return 1;
+}
+
+/* Commands as bits, for the table of options. */
+enum { EMBED = 1, MERGE = 2, LANDMARKS = 4, PAIRS = 8, ALL = 15 };
+
+static int parse(int argc, char **argv, int command, bench_options *o) {
   texts t = {0};
   const struct {
     const char *name;
     const char **place;
-    int commands; /* 1: embed, 2: merge, 3: both */
-  } table[] = {{"--method", &t.method, 3},
-               {"--preset", &t.preset, 3},
-               {"--options", &t.options, 3},
-               {"--repair", &t.repair, 3},
-               {"--threads", &t.threads, 3},
-               {"--repeat", &t.repeat, 3},
-               {"--out", &o->out, 3},
-               {"--align", &t.align, 2},
-               {"--remesh", &t.remesh, 2},
-               {"--landmarks", &o->landmarks, 2},
-               {"--tolerance", &t.tolerance, 2},
-               {"--max-triangles", &t.max_triangles, 2}};
+    int commands;
+  } table[] = {{"--method", &t.method, ALL},
+               {"--preset", &t.preset, ALL},
+               {"--options", &t.options, ALL},
+               {"--repair", &t.repair, ALL},
+               {"--threads", &t.threads, ALL},
+               {"--repeat", &t.repeat, EMBED | MERGE},
+               {"--out", &o->out, EMBED | MERGE},
+               {"--align", &t.align, MERGE | LANDMARKS | PAIRS},
+               {"--align-preset", &t.align_preset, MERGE | LANDMARKS | PAIRS},
+               {"--remesh", &t.remesh, MERGE | LANDMARKS | PAIRS},
+               {"--landmarks", &o->landmarks, MERGE},
+               {"--tolerance", &t.tolerance, MERGE | LANDMARKS | PAIRS},
+               {"--max-triangles", &t.max_triangles, MERGE | LANDMARKS | PAIRS},
+               {"--sets", &t.sets, LANDMARKS},
+               {"--first", &t.first, LANDMARKS},
+               {"--seed", &t.seed, LANDMARKS},
+               {"--sizes", &o->sizes, LANDMARKS},
+               {"--merge-every", &t.merge_every, LANDMARKS},
+               {"--seconds", &t.seconds, LANDMARKS | PAIRS}};
   int plain = 0;
   for (int i = 2; i < argc; i++) {
     if (plain || argv[i][0] != '-' || !argv[i][1]) {
@@ -190,7 +236,7 @@ static int parse(int argc, char **argv, int merge, bench_options *o) {
     size_t length = value ? (size_t)(value - argv[i]) : strlen(argv[i]), k = 0;
     while (k < sizeof table / sizeof table[0] &&
            (strlen(table[k].name) != length || strncmp(table[k].name, argv[i], length) != 0 ||
-            !(table[k].commands & (merge ? 2 : 1)))) {
+            !(table[k].commands & command))) {
       k++;
     }
     if (k == sizeof table / sizeof table[0]) {
@@ -201,13 +247,13 @@ static int parse(int argc, char **argv, int merge, bench_options *o) {
     }
     *table[k].place = value ? value + 1 : argv[++i];
   }
-  if (o->file_count < (merge ? 2 : 1)) {
-    return wrong(merge ? "merge needs two files or more" : "embed needs a file", "");
+  if (o->file_count < (command == EMBED ? 1 : 2)) {
+    return wrong(command == EMBED ? "embed needs a file" : "two files or more are needed", "");
   }
-  if (merge && o->file_count > ORB_SHAPES_MAX) {
+  if (command == MERGE && o->file_count > ORB_SHAPES_MAX) {
     return wrong("merge takes 16 files at most", "");
   }
-  return interpret(&t, o);
+  return interpret(&t, o) && interpret_numbers(&t, o);
 }
 
 int main(int argc, char **argv) {
@@ -219,18 +265,28 @@ int main(int argc, char **argv) {
     puts(ORB_ENGINE);
     return BENCH_DONE;
   }
-  int merge = argc >= 2 && strcmp(argv[1], "merge") == 0;
-  if (argc < 2 || (!merge && strcmp(argv[1], "embed") != 0)) {
+  static int (*const run[])(const bench_options *) = {bench_embed, bench_merge, bench_landmarks, bench_pairs};
+  static const char *const commands[] = {"embed", "merge", "landmarks", "pairs", NULL};
+  int command = 0;
+  while (argc >= 2 && commands[command] && strcmp(argv[1], commands[command]) != 0) {
+    command++;
+  }
+  if (argc < 2 || !commands[command]) {
     fputs(usage_text, stderr);
     return BENCH_USAGE;
   }
-  bench_options options = {
-      .repeat = 1, .repair = ORB_REPAIR_SAFE, .files = calloc((size_t)argc, sizeof *options.files)};
+  bench_options options = {.repeat = 1,
+                           .repair = ORB_REPAIR_SAFE,
+                           .sizes = "3,10,30,60",
+                           .sets = 100,
+                           .seed = 1,
+                           .files = calloc((size_t)argc, sizeof *options.files)};
   orb_embed_defaults(&options.embed);
   orb_merge_defaults(&options.merge);
+  options.merge.align.preset = 1 << command == LANDMARKS ? ORB_PRESET_FAST : ORB_PRESET_DEFAULT;
   int status = BENCH_USAGE;
-  if (options.files && parse(argc, argv, merge, &options)) {
-    status = merge ? bench_merge(&options) : bench_embed(&options);
+  if (options.files && parse(argc, argv, 1 << command, &options)) {
+    status = run[command](&options);
   }
   free(options.files);
   return status;

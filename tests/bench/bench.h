@@ -16,12 +16,17 @@ typedef struct bench_options {
   orb_embed_options embed;
   orb_merge_options merge;
   int align_given;
+  const char *sizes; /* landmarks: how many in a set, by turns */
+  long sets, first, merge_every, seconds;
+  uint64_t seed;
   char **files;
   int file_count;
 } bench_options;
 
 int bench_embed(const bench_options *options);
 int bench_merge(const bench_options *options);
+int bench_landmarks(const bench_options *options);
+int bench_pairs(const bench_options *options);
 
 /* A file in memory, of malloc(); 0 with a message on standard error. */
 int bench_slurp(const char *path, unsigned char **bytes, size_t *size);
@@ -57,6 +62,18 @@ typedef struct bench_mesh {
 } bench_mesh;
 int bench_load(orb_context *ctx, const char *path, unsigned repair, int keep_corners, bench_mesh *out);
 void bench_unload(orb_context *ctx, bench_mesh *mesh);
+
+/* Many meshes, each read and embedded once. */
+typedef struct bench_fleet {
+  orb_context *ctx;
+  int count;
+  bench_mesh *mesh;
+  orb_embedding *embedding;
+} bench_fleet;
+int bench_fleet_load(const bench_options *options, bench_fleet *out);
+void bench_fleet_free(bench_fleet *fleet);
+/* A context that gives up after options->seconds (0: never). */
+orb_context *bench_open_limited(const bench_options *options);
 
 /* The place that a caller names; 0 and why (a literal). */
 int bench_place(orb_context *ctx, const bench_mesh *mesh, const orb_spot *spot, orb_nearest **tree, orb_place *out,

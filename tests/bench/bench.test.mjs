@@ -65,6 +65,37 @@ test('merge writes the asset and its report', () => {
   rmSync(dir, { recursive: true });
 });
 
+test('landmarks: a set depends on the seed and its number only, and is right', () => {
+  const elephant = join(samples, 'elephant.ply');
+  const run = (...more) => {
+    const r = bench(['landmarks', '--sizes', '3,12', ...more, dog, giraffe, elephant]);
+    assert.equal(r.status, 0, r.error);
+    return r.lines;
+  };
+  const all = run('--sets', '4', '--seed', '9', '--merge-every', '3');
+  assert.deepEqual(all.map((l) => [l.set, l.landmarks]), [[0, 3], [1, 12], [2, 3], [3, 12]]);
+  for (const l of all) {
+    assert.equal(l.status, 'ok', l.detail);
+    assert.equal(l.right, true);
+    assert.notEqual(l.shapes[0], l.shapes[1]);
+    assert.ok(Math.min(...l.growth) >= 1);
+    assert.equal('triangles' in l, l.set % 3 === 0);
+  }
+  const [third] = run('--sets', '1', '--first', '2', '--seed', '9');
+  assert.deepEqual([third.shapes, third.growth], [all[2].shapes, all[2].growth]);
+});
+
+test('pairs: every pair once, certified', () => {
+  const r = bench(['pairs', '--align-preset', 'fast', dog, giraffe, join(samples, 'elephant.ply')]);
+  assert.equal(r.status, 0, r.error);
+  assert.deepEqual(r.lines.map((l) => l.shapes.join()), ['dog,giraffe', 'dog,elephant', 'giraffe,elephant']);
+  for (const l of r.lines) {
+    assert.equal(l.status, 'ok', l.detail);
+    assert.equal(l.certificate.closed, true);
+    assert.ok(l.bound_relative <= 0.001);
+  }
+});
+
 test('exit statuses: 1 refused with the reason, 2 wrong usage', () => {
   const cases = [
     [1, ['embed', '/nowhere/mesh.obj'], /nowhere/],
@@ -74,6 +105,10 @@ test('exit statuses: 1 refused with the reason, 2 wrong usage', () => {
     [2, ['transmogrify'], /usage/],
     [2, ['embed'], /file/],
     [2, ['merge', dog], /two/],
+    [2, ['pairs', dog], /two/],
+    [2, ['landmarks', '--sizes', '3,x', dog, giraffe], /--sizes/],
+    [2, ['landmarks', '--sets', '0', dog, giraffe], /--sets/],
+    [2, ['pairs', '--sets', '5', dog, giraffe], /unknown option/],
     [2, ['embed', '--threads', 'many', dog], /--threads/],
     [2, ['embed', '--method', 'magic', dog], /magic/],
     [2, ['embed', '--options', '{"radius":1}', dog], /radius/],
