@@ -6,7 +6,8 @@ orb_build_packages=(
   libcjson-dev libsodium-dev libmicrohttpd-dev libsqlite3-dev libcurl4-openssl-dev libpng-dev
 )
 orb_test_packages=(libcmocka-dev curl jq man-db bsdutils chromium)
-orb_long_packages=(clang libclang-rt-dev valgrind)
+orb_fuzz_packages=(clang libclang-rt-dev)
+orb_long_packages=(valgrind wrk nginx)
 
 # Installs those of its arguments that are missing, as root or through sudo; never asks.
 orb_install_packages() {

@@ -8,7 +8,8 @@ set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/.."
 
 source deploy/packages.sh
-orb_install_packages "${orb_build_packages[@]}" "${orb_test_packages[@]}" "${orb_long_packages[@]}"
+orb_install_packages "${orb_build_packages[@]}" "${orb_test_packages[@]}" "${orb_fuzz_packages[@]}" \
+  "${orb_long_packages[@]}"
 orb_install_node
 if command -v ccache >/dev/null; then
   export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
@@ -31,17 +32,7 @@ part_valgrind() {
 }
 
 part_fuzz() {
-  cmake --preset fuzz -DORB_TESTS=ON >/dev/null
-  cmake --build build-fuzz
-  local target format work
-  for target in build-fuzz/bin/fuzz_*; do
-    format=${target##*/fuzz_}
-    work=$(mktemp -d)
-    echo "fuzz $format"
-    "$target" -max_total_time=$((60 * ${ORB_MINUTES:-5})) -rss_limit_mb=2048 -artifact_prefix="$work/" "$work" \
-      "tests/fuzz/corpus/$format"
-    rm -rf "$work"
-  done
+  tests/fuzz/run.sh $((60 * ${ORB_MINUTES:-5}))
 }
 
 part_crash() {

@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/.."
 
 source deploy/packages.sh
-orb_install_packages "${orb_build_packages[@]}" "${orb_test_packages[@]}"
+orb_install_packages "${orb_build_packages[@]}" "${orb_test_packages[@]}" "${orb_fuzz_packages[@]}"
 orb_install_node
 if command -v ccache >/dev/null; then
   export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
@@ -28,5 +28,7 @@ cmake --build build-asan
 
 echo "== with sanitizers =="
 ctest --test-dir build-asan --output-on-failure -R '^(unit|scenario)\.' -j "$(nproc)"
+echo "== fuzzing, 10 s a target =="
+tests/fuzz/run.sh 10
 echo "== release =="
 ctest --test-dir build --output-on-failure -j "$(nproc)"

@@ -8,41 +8,6 @@
 #include "http/http.h"
 #include "worker/spheres.h"
 
-/* −1: outside the file; 0: not a range to be used; 1: [*first, *first + *length). */
-static int read_range(const char *text, uint64_t size, uint64_t *first, uint64_t *length) {
-  if (!text || strncmp(text, "bytes=", 6) != 0) {
-    return 0;
-  }
-  text += 6;
-  size_t digits = strspn(text, "0123456789"), after;
-  if (digits > 18 || text[digits] != '-') {
-    return 0;
-  }
-  const char *second = text + digits + 1;
-  after = strspn(second, "0123456789");
-  if (after > 18 || second[after] != 0 || (digits == 0 && after == 0)) {
-    return 0;
-  }
-  uint64_t a = strtoull(text, NULL, 10), b = after ? strtoull(second, NULL, 10) : UINT64_MAX;
-  if (digits == 0) { /* the last b bytes */
-    if (b == 0 || size == 0) {
-      return -1;
-    }
-    *length = b < size ? b : size;
-    *first = size - *length;
-    return 1;
-  }
-  if (b < a) {
-    return 0;
-  }
-  if (a >= size) {
-    return -1;
-  }
-  *first = a;
-  *length = (b < size - 1 ? b : size - 1) - a + 1;
-  return 1;
-}
-
 static void add_headers(request *r, const char *etag, const char *mime, const char *name) {
   char disposition[160];
   reply_header(r, "ETag", etag);
@@ -67,11 +32,11 @@ static void reply_part(request *r, object_kind kind, const char *id, object_part
   uint64_t size, first = 0, length;
   snprintf(etag, sizeof etag, "\"%.32s\"", sha);
   const char *none_match = header_of(r, "If-None-Match"), *match = header_of(r, "If-Match");
-  if (match && !etag_matches(match, etag)) {
+  if (match && !parse_tag_matches(match, etag)) {
     reply_empty(r, 412);
     return;
   }
-  if (none_match && etag_matches(none_match, etag)) {
+  if (none_match && parse_tag_matches(none_match, etag)) {
     reply_empty(r, 304);
     add_headers(r, etag, mime, name);
     return;
@@ -85,7 +50,7 @@ static void reply_part(request *r, object_kind kind, const char *id, object_part
   length = size;
   const char *if_range = header_of(r, "If-Range");
   int usable = !r->head && (!if_range || strcmp(if_range, etag) == 0);
-  int ranged = usable ? read_range(header_of(r, "Range"), size, &first, &length) : 0;
+  int ranged = usable ? parse_range(header_of(r, "Range"), size, &first, &length) : 0;
   if (ranged < 0) {
     close(fd);
     reply_refuse(r, "range-not-satisfiable", "The file has %llu bytes.", (unsigned long long)size);

@@ -16,6 +16,7 @@
 #include "api/routes.h"
 #include "cache.h"
 #include "config.h"
+#include "http/parse.h"
 #include "queue/queue.h"
 #include "store/tokens.h"
 #include "tasks.h"
@@ -68,8 +69,8 @@ struct request {
   int cancels;
 
   unsigned status;
-  int64_t sends;  /* bytes of the response's body; streams count theirs as they go */
-  char trace[56]; /* traceparent, where the caller sent a well-formed one */
+  int64_t sends;          /* bytes of the response's body; streams count theirs as they go */
+  char trace[TRACE_SIZE]; /* traceparent, where the caller sent a well-formed one */
   struct MHD_Response *response;
 };
 
@@ -104,7 +105,6 @@ void reply_text(request *r, unsigned status, const char *mime, orb_text *text); 
 void reply_cached(request *r, unsigned status, const cached *entry);
 void reply_header(request *r, const char *name, const char *value);
 enum MHD_Result reply_send(request *r);
-int etag_matches(const char *list, const char *etag);
 /* files.c: an object with ranges and conditions. */
 void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name);
 

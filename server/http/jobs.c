@@ -8,35 +8,14 @@
 
 #include "http/http.h"
 
-enum { WAIT_MOST_MS = 60000, LOOK_MS = 15000, CANCEL_WAIT_MS = 2000 };
-
-/* "wait=N" in a Prefer header, among other preferences. */
-static const char *prefer_wait(const char *prefer) {
-  for (const char *at = prefer; at && *at; at += strcspn(at, ",;"), at += *at != 0) {
-    at += strspn(at, " \t");
-    if (strncasecmp(at, "wait=", 5) == 0) {
-      return at + 5;
-    }
-  }
-  return NULL;
-}
+enum { LOOK_MS = 15000, CANCEL_WAIT_MS = 2000 };
 
 int64_t read_wait_ms(request *r) {
-  const char *text = query_of(r, "wait"), *prefer = prefer_wait(header_of(r, "Prefer"));
-  char *end;
-  if (text) {
-    double seconds = strtod(text, &end);
-    if (end == text || *end || !(seconds >= 0)) {
-      reply_refuse(r, "bad-query", "\"wait\" must be a number of seconds; more than 60 count as 60.");
-      return -1;
-    }
-    return seconds < 60 ? (int64_t)(1000 * seconds) : WAIT_MOST_MS;
+  int64_t wait = parse_wait_ms(query_of(r, "wait"), header_of(r, "Prefer"));
+  if (wait < 0) {
+    reply_refuse(r, "bad-query", "\"wait\" must be a number of seconds; more than 60 count as 60.");
   }
-  if (prefer) { /* a preference that is not understood is ignored */
-    double seconds = strtod(prefer, &end);
-    return end != prefer && seconds > 0 ? (seconds < 60 ? (int64_t)(1000 * seconds) : WAIT_MOST_MS) : 0;
-  }
-  return 0;
+  return wait;
 }
 
 static void reply_job(request *r, job *j) {

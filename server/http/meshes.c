@@ -48,34 +48,6 @@ void handle_mesh_bytes(request *r, const char *bytes, size_t size) {
   orb_hash_add(&r->hash, bytes, size);
 }
 
-/* What the query says. */
-typedef struct upload_query {
-  char name[ORB_NAME_MAX], repair[ORB_REPAIR_TEXT];
-  unsigned flags;
-  orb_format hint;
-} upload_query;
-
-static int read_query(const request *r, upload_query *out, orb_problem *problem) {
-  const char *name = query_of(r, "name"), *repair = query_of(r, "repair"), *format = query_of(r, "format");
-  memset(out, 0, sizeof *out);
-  if (name && (!*name || strlen(name) >= sizeof out->name || !orb_utf8_valid(name, strlen(name)))) {
-    return orb_refuse(problem, "bad-query", "\"name\" must be UTF-8 of 1 to 127 bytes.");
-  }
-  snprintf(out->name, sizeof out->name, "%s", name ? name : "mesh");
-  for (const unsigned char *c = (const unsigned char *)out->name; *c; c++) {
-    if (*c < 0x20 || *c == 0x7f) {
-      return orb_refuse(problem, "bad-query", "\"name\" must not hold control characters.");
-    }
-  }
-  if (format) {
-    out->hint = orb_format_of_name(format);
-    if (out->hint == ORB_FORMAT_AUTO) {
-      return orb_refuse(problem, "bad-query", "\"format\" must be obj, off, ply, stl, gltf or glb, or left out.");
-    }
-  }
-  return orb_repair_parse(repair ? repair : "safe", &out->flags, out->repair, problem);
-}
-
 /* The upload's bytes in memory; unmapped by the caller. */
 static const unsigned char *map_upload(const request *r) {
   if (r->received == 0) {
@@ -158,7 +130,7 @@ static void upload_away(request *r) {
   upload_query query;
   orb_problem problem = {0};
   char id[ORB_ID_SIZE];
-  if (!read_query(r, &query, &problem)) {
+  if (!parse_upload(query_of(r, "name"), query_of(r, "repair"), query_of(r, "format"), &query, &problem)) {
     reply_problem(r, &problem);
     return;
   }

@@ -89,27 +89,6 @@ void reply_bytes(request *r, unsigned status, const char *mime, const void *byte
   reply_header(r, "Content-Type", mime);
 }
 
-int etag_matches(const char *list, const char *etag) {
-  for (const char *at = list; at && *at;) {
-    at += strspn(at, " \t,");
-    if (*at == '*') {
-      return 1;
-    }
-    if (strncmp(at, "W/", 2) == 0) {
-      at += 2;
-    }
-    size_t n = strcspn(at, ",");
-    while (n && (at[n - 1] == ' ' || at[n - 1] == '\t')) {
-      n--;
-    }
-    if (n == strlen(etag) && strncmp(at, etag, n) == 0) {
-      return 1;
-    }
-    at += strcspn(at, ",");
-  }
-  return 0;
-}
-
 typedef struct held {
   cache *from;
   const cached *entry;
@@ -120,7 +99,7 @@ void reply_cached(request *r, unsigned status, const cached *entry) {
   char location[128];
   const char *none_match = header_of(r, "If-None-Match");
   snprintf(location, sizeof location, "/v1/%s/%s", paths[entry->row.kind], entry->row.id);
-  if (none_match && r->route->method[0] == 'G' && etag_matches(none_match, entry->etag)) {
+  if (none_match && r->route->method[0] == 'G' && parse_tag_matches(none_match, entry->etag)) {
     reply_empty(r, 304);
   } else {
     take(r, status, MHD_create_response_from_buffer(entry->json_size, entry->row.json, MHD_RESPMEM_MUST_COPY),

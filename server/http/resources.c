@@ -7,8 +7,6 @@
 #include "http/http.h"
 #include "metrics.h"
 
-enum { PAGE_MOST = 1000, PAGE_STANDARD = 100 };
-
 static resource_kind kind_of(const request *r) {
   return strncmp(r->route->path, "/v1/meshes", 10) == 0       ? RESOURCE_MESH
          : strncmp(r->route->path, "/v1/embeddings", 14) == 0 ? RESOURCE_EMBEDDING
@@ -65,27 +63,12 @@ enum MHD_Result handle_get(request *r) {
 }
 
 int read_page(request *r, int *limit, int64_t *before) {
-  const char *limit_text = query_of(r, "limit"), *token = query_of(r, "page_token");
-  char *end;
-  *limit = PAGE_STANDARD;
-  *before = 0;
-  if (limit_text) {
-    long value = strtol(limit_text, &end, 10);
-    if (*end || end == limit_text || value < 1) {
-      reply_refuse(r, "bad-query", "\"limit\" must be a whole number from 1; more than %d count as that.", PAGE_MOST);
-      return 0;
-    }
-    *limit = value < PAGE_MOST ? (int)value : PAGE_MOST;
+  const char *why;
+  int fine = parse_page(query_of(r, "limit"), query_of(r, "page_token"), limit, before, &why);
+  if (!fine) {
+    reply_refuse(r, "bad-query", "%s", why);
   }
-  if (token) {
-    long long value = strtoll(token, &end, 16);
-    if (*end || end == token || value < 1 || strlen(token) > 15 || *token == '-' || *token == '+') {
-      reply_refuse(r, "bad-query", "\"page_token\" must be the \"next_page_token\" of the page before.");
-      return 0;
-    }
-    *before = value;
-  }
-  return 1;
+  return fine;
 }
 
 static void list_away(request *r) {

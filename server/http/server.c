@@ -115,21 +115,6 @@ static request *request_create(server *srv, struct MHD_Connection *connection, c
   return r;
 }
 
-/* W3C Trace Context, version 00: 00-TRACE-SPAN-FLAGS. Others are passed over. */
-static void note_trace(request *r) {
-  static const char form[] = "00-xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx-xxxxxxxxxxxxxxxx-xx";
-  const char *text = header_of(r, "traceparent");
-  if (!text || strlen(text) != sizeof form - 1) {
-    return;
-  }
-  for (size_t i = 0; form[i]; i++) {
-    if (form[i] == 'x' ? !strchr("0123456789abcdef", text[i]) : text[i] != form[i]) {
-      return;
-    }
-  }
-  memcpy(r->trace, text, sizeof form);
-}
-
 void request_fields(const request *r, char out[REQUEST_FIELDS]) {
   snprintf(out, REQUEST_FIELDS, "\"request\":\"%s\"%s%s%s,\"method\":\"%.8s\",\"route\":\"%s\"", r->number,
            r->trace[0] ? ",\"traceparent\":\"" : "", r->trace, r->trace[0] ? "\"" : "",
@@ -142,7 +127,7 @@ static void request_begin(request *r, const char *path, const char *version) {
   orb_problem problem = {0};
   r->route = route_find(r->method, path, r->id, allow);
   r->shape = r->route ? route_number(r->route, path) : -1;
-  note_trace(r);
+  parse_trace(header_of(r, "traceparent"), r->trace);
   if (!guard_headers(r, version, &problem)) {
     r->closes = 1;
     reply_problem(r, &problem);

@@ -83,7 +83,7 @@ void handle_page(request *r, const char *path) {
   const orb_studio_file *file = orb_studio_find(path);
   const page *own = file ? NULL : find_page(path);
   const char *none_match = header_of(r, "If-None-Match");
-  if (file && none_match && etag_matches(none_match, file->etag)) {
+  if (file && none_match && parse_tag_matches(none_match, file->etag)) {
     reply_empty(r, 304);
   } else if (file) {
     reply_bytes(r, 200, file->type, file->data, file->size);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "worker/run.h"
+#include "worker/sphere.h"
 
 void run_problem_of_store(store_result result, orb_problem *problem) {
   if (result == STORE_FULL) {
@@ -70,26 +71,23 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
   return status == ORB_OK;
 }
 
-/* The stored sphere is the sphere.ply that callers get; its layout is ours, so only the numbers need a check. */
-enum { PLY_VERTEX_BYTES = 52, PLY_POINT_OFFSET = 24 };
-
 int run_load_points(const run_env *env, orb_context *ctx, const char *embedding, const orb_mesh *mesh, double **points,
                     orb_problem *problem) {
   unsigned char *bytes = NULL;
   size_t size = 0;
   *points = NULL;
   store_result found = objects_load(env->store, OBJECT_SPHERE, embedding, &bytes, &size);
-  static const char mark[] = "end_header\n";
-  const unsigned char *end = found == STORE_OK ? memmem(bytes, size < 4096 ? size : 4096, mark, sizeof mark - 1) : NULL;
   size_t count = (size_t)mesh->vertex_count;
-  size_t head = end ? (size_t)(end - bytes) + sizeof mark - 1 : 0;
-  if (!end || size != head + count * PLY_VERTEX_BYTES + (size_t)mesh->triangle_count * 13) {
+  const unsigned char *first =
+      found == STORE_OK ? sphere_points(bytes, size, mesh->vertex_count, mesh->triangle_count) : NULL;
+  if (!first) {
     free(bytes);
-    return orb_refuse(problem, "corrupt", "The stored embedding %s does not belong to its mesh.", embedding);
+    return orb_refuse(problem, "corrupt", "The stored embedding %s cannot be read, or does not belong to its mesh.",
+                      embedding);
   }
   *points = ORB_NEW(ctx, double, 3 * count);
   for (size_t v = 0; *points && v < count; v++) {
-    memcpy(*points + 3 * v, bytes + head + v * PLY_VERTEX_BYTES + PLY_POINT_OFFSET, 3 * sizeof(double));
+    memcpy(*points + 3 * v, first + v * SPHERE_STRIDE, 3 * sizeof(double));
   }
   free(bytes);
   catalogue_touch(env->cat, RESOURCE_EMBEDDING, embedding);

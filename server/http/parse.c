@@ -1,0 +1,148 @@
+#include "http/parse.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "api/json.h"
+
+int parse_range(const char *text, uint64_t size, uint64_t *first, uint64_t *length) {
+  if (!text || strncmp(text, "bytes=", 6) != 0) {
+    return 0;
+  }
+  text += 6;
+  size_t digits = strspn(text, "0123456789"), after;
+  if (digits > 18 || text[digits] != '-') {
+    return 0;
+  }
+  const char *second = text + digits + 1;
+  after = strspn(second, "0123456789");
+  if (after > 18 || second[after] != 0 || (digits == 0 && after == 0)) {
+    return 0;
+  }
+  uint64_t a = strtoull(text, NULL, 10), b = after ? strtoull(second, NULL, 10) : UINT64_MAX;
+  if (digits == 0) { /* the last b bytes */
+    if (b == 0 || size == 0) {
+      return -1;
+    }
+    *length = b < size ? b : size;
+    *first = size - *length;
+    return 1;
+  }
+  if (b < a) {
+    return 0;
+  }
+  if (a >= size) {
+    return -1;
+  }
+  *first = a;
+  *length = (b < size - 1 ? b : size - 1) - a + 1;
+  return 1;
+}
+
+int parse_tag_matches(const char *list, const char *tag) {
+  for (const char *at = list; at && *at;) {
+    at += strspn(at, " \t,");
+    if (*at == '*') {
+      return 1;
+    }
+    if (strncmp(at, "W/", 2) == 0) {
+      at += 2;
+    }
+    size_t n = strcspn(at, ",");
+    while (n && (at[n - 1] == ' ' || at[n - 1] == '\t')) {
+      n--;
+    }
+    if (n == strlen(tag) && strncmp(at, tag, n) == 0) {
+      return 1;
+    }
+    at += strcspn(at, ",");
+  }
+  return 0;
+}
+
+enum { WAIT_MOST_S = 60 };
+
+static int64_t clamped_ms(double seconds) {
+  return seconds < WAIT_MOST_S ? (int64_t)(1000 * seconds) : 1000 * WAIT_MOST_S;
+}
+
+/* "wait=N" in a Prefer header, among other preferences. */
+static const char *prefer_wait(const char *prefer) {
+  for (const char *at = prefer; at && *at; at += strcspn(at, ",;"), at += *at != 0) {
+    at += strspn(at, " \t");
+    if (strncasecmp(at, "wait=", 5) == 0) {
+      return at + 5;
+    }
+  }
+  return NULL;
+}
+
+int64_t parse_wait_ms(const char *query, const char *prefer) {
+  char *end;
+  if (query) {
+    double seconds = strtod(query, &end);
+    return end == query || *end || !(seconds >= 0) ? -1 : clamped_ms(seconds);
+  }
+  const char *preferred = prefer_wait(prefer);
+  double seconds = preferred ? strtod(preferred, &end) : 0;
+  return seconds > 0 ? clamped_ms(seconds) : 0;
+}
+
+int parse_page(const char *limit_text, const char *token, int *limit, int64_t *before, const char **why) {
+  char *end;
+  *limit = PAGE_STANDARD;
+  *before = 0;
+  if (limit_text) {
+    long value = strtol(limit_text, &end, 10);
+    if (*end || end == limit_text || value < 1) {
+      *why = "\"limit\" must be a whole number from 1; more than 1000 count as that.";
+      return 0;
+    }
+    *limit = value < PAGE_MOST ? (int)value : PAGE_MOST;
+  }
+  if (token) {
+    long long value = strtoll(token, &end, 16);
+    if (*end || end == token || value < 1 || strlen(token) > 15 || *token == '-' || *token == '+') {
+      *why = "\"page_token\" must be the \"next_page_token\" of the page before.";
+      return 0;
+    }
+    *before = value;
+  }
+  return 1;
+}
+
+int parse_upload(const char *name, const char *repair, const char *format, upload_query *out, orb_problem *problem) {
+  memset(out, 0, sizeof *out);
+  if (name && (!*name || strlen(name) >= sizeof out->name || !orb_utf8_valid(name, strlen(name)))) {
+    return orb_refuse(problem, "bad-query", "\"name\" must be UTF-8 of 1 to 127 bytes.");
+  }
+  snprintf(out->name, sizeof out->name, "%s", name ? name : "mesh");
+  for (const unsigned char *c = (const unsigned char *)out->name; *c; c++) {
+    if (*c < 0x20 || *c == 0x7f) {
+      return orb_refuse(problem, "bad-query", "\"name\" must not hold control characters.");
+    }
+  }
+  if (format) {
+    out->hint = orb_format_of_name(format);
+    if (out->hint == ORB_FORMAT_AUTO) {
+      return orb_refuse(problem, "bad-query", "\"format\" must be obj, off, ply, stl, gltf or glb, or left out.");
+    }
+  }
+  return orb_repair_parse(repair ? repair : "safe", &out->flags, out->repair, problem);
+}
+
+int parse_trace(const char *text, char out[TRACE_SIZE]) {
+  static const char form[TRACE_SIZE] = "00-xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx-xxxxxxxxxxxxxxxx-xx";
+  if (!text || strlen(text) != TRACE_SIZE - 1) {
+    return 0;
+  }
+  for (size_t i = 0; form[i]; i++) {
+    if (form[i] == 'x' ? !strchr("0123456789abcdef", text[i]) : text[i] != form[i]) {
+      return 0;
+    }
+  }
+  memcpy(out, text, TRACE_SIZE);
+  return 1;
+}

@@ -1,0 +1,39 @@
+/* What the texts of a request say: ranges, waits, pages, tags, the query of an upload. None of it needs a connection,
+ * so tests can feed it anything. Texts may be NULL where the request has none.
+ */
+#ifndef ORB_HTTP_PARSE_H
+#define ORB_HTTP_PARSE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "api/mesh_codec.h"
+
+/* A Range header for a file of `size` bytes. −1: outside the file; 0: not a range to be used, the whole file is the
+ * answer (RFC 9110, section 14.2); 1: [*first, *first + *length). */
+int parse_range(const char *text, uint64_t size, uint64_t *first, uint64_t *length);
+
+/* Whether a list of entity tags (If-Match, If-None-Match) names this one. Weak tags match as strong ones do. */
+int parse_tag_matches(const char *list, const char *tag);
+
+/* ?wait=SECONDS, else wait=SECONDS among the preferences of a Prefer header, in ms, at most a minute; 0: not to wait;
+ * −1: the query's is no number. A preference that is not understood is passed over. */
+int64_t parse_wait_ms(const char *query, const char *prefer);
+
+/* limit and page_token of a list. 1, or 0 with *why, a sentence. */
+enum { PAGE_MOST = 1000, PAGE_STANDARD = 100 };
+int parse_page(const char *limit_text, const char *token, int *limit, int64_t *before, const char **why);
+
+/* The query of an upload. 1, or 0 with the problem. */
+typedef struct upload_query {
+  char name[ORB_NAME_MAX], repair[ORB_REPAIR_TEXT];
+  unsigned flags;
+  orb_format hint;
+} upload_query;
+int parse_upload(const char *name, const char *repair, const char *format, upload_query *out, orb_problem *problem);
+
+/* W3C Trace Context, version 00. Others are passed over. */
+enum { TRACE_SIZE = 56 };
+int parse_trace(const char *text, char out[TRACE_SIZE]);
+
+#endif

@@ -1,0 +1,96 @@
+/* A JSON body: parsed, read as each request of the API and as a landmark file. What is accepted must write itself
+ * canonically, and its canonical text must read back to the same text. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/json.h"
+#include "api/supermesh_codec.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void free_problem(orb_problem *problem, int fine) {
+  if (!fine && !problem->name) {
+    abort(); /* refused without a reason */
+  }
+  orb_text text = {0};
+  if (problem->name) {
+    orb_problem_write(problem, &text);
+    orb_json_error error;
+    cJSON *again = orb_json_parse(text.data, text.size, &error);
+    if (!again) {
+      abort(); /* a problem that is no JSON */
+    }
+    cJSON_Delete(again);
+  }
+  orb_text_free(&text);
+  orb_problem_free(problem);
+}
+
+static int write_embedding(const char *bytes, size_t size, orb_text *out) {
+  orb_json_error error;
+  orb_problem problem = {0};
+  orb_embedding_request request;
+  cJSON *body = orb_json_parse(bytes, size, &error);
+  int fine = body && orb_embedding_request_read(body, &request, &problem);
+  if (fine) {
+    orb_embedding_request_write(&request, out);
+  }
+  if (body) {
+    free_problem(&problem, fine);
+  }
+  cJSON_Delete(body);
+  return fine;
+}
+
+static int write_supermesh(const char *bytes, size_t size, orb_text *out) {
+  orb_json_error error;
+  orb_problem problem = {0};
+  orb_supermesh_request request = {0};
+  cJSON *body = orb_json_parse(bytes, size, &error);
+  int fine = body && orb_supermesh_request_read(body, &request, &problem);
+  if (fine) {
+    orb_supermesh_request_write(&request, out);
+  }
+  if (body) {
+    free_problem(&problem, fine);
+    orb_supermesh_request_free(&request);
+  }
+  cJSON_Delete(body);
+  return fine;
+}
+
+static void round_trip(int (*write)(const char *, size_t, orb_text *), const char *bytes, size_t size) {
+  orb_text first = {0}, second = {0};
+  if (write(bytes, size, &first) && (!write(first.data, first.size, &second) || first.size != second.size ||
+                                     memcmp(first.data, second.data, first.size) != 0)) {
+    abort();
+  }
+  orb_text_free(&first);
+  orb_text_free(&second);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+  orb_json_error error = {0};
+  cJSON *body = orb_json_parse((const char *)data, size, &error);
+  if (!body) {
+    if (!error.why || error.offset > size) {
+      abort();
+    }
+    return 0;
+  }
+  orb_landmark_list list = {0};
+  orb_problem problem = {0};
+  int fine = orb_landmarks_read(body, 0, &list, &problem);
+  free_problem(&problem, fine);
+  orb_landmarks_free(&list);
+  cJSON_Delete(body);
+  round_trip(write_embedding, (const char *)data, size);
+  round_trip(write_supermesh, (const char *)data, size);
+  char *text = strndup((const char *)data, size);
+  orb_mesh_summary summary;
+  if (text) {
+    (void)orb_mesh_summarise(text, &summary); /* a stored description */
+  }
+  free(text);
+  return 0;
+}

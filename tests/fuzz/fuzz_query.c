@@ -1,0 +1,87 @@
+/* A request line and its fields: lines of METHOD, path, query (NAME=VALUE&…, percent-encoded), then Prefer, trace and
+ * tags. Numbers that come out must lie in their bounds. */
+#include <microhttpd.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/routes.h"
+#include "http/parse.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static char *next_line(char **at) {
+  char *line = *at ? strsep(at, "\n") : NULL;
+  return line;
+}
+
+/* The value of a name of the query, unescaped in place as the HTTP library does it. */
+static char *value_of(char *query, const char *name) {
+  size_t n = strlen(name);
+  for (char *at = query; at; at = strchr(at, '&') ? strchr(at, '&') + 1 : NULL) {
+    if (strncmp(at, name, n) == 0 && at[n] == '=') {
+      char *value = strndup(at + n + 1, strcspn(at + n + 1, "&"));
+      if (value && !strstr(value, "%00")) {
+        MHD_http_unescape(value);
+      }
+      return value;
+    }
+  }
+  return NULL;
+}
+
+static void read_query(char *query, const char *prefer) {
+  char *limit = value_of(query, "limit"), *token = value_of(query, "page_token"), *wait = value_of(query, "wait");
+  char *name = value_of(query, "name"), *repair = value_of(query, "repair"), *format = value_of(query, "format");
+  int most;
+  int64_t before;
+  const char *why = NULL;
+  if (parse_page(limit, token, &most, &before, &why) ? most < 1 || most > PAGE_MOST || before < 0 : !why) {
+    abort();
+  }
+  int64_t ms = parse_wait_ms(wait, prefer);
+  if (ms < -1 || ms > 60000) {
+    abort();
+  }
+  upload_query upload;
+  orb_problem problem = {0};
+  if (parse_upload(name, repair, format, &upload, &problem)) {
+    char again[ORB_REPAIR_TEXT];
+    unsigned flags;
+    if (!orb_repair_parse(upload.repair, &flags, again, &problem) || flags != upload.flags ||
+        strcmp(again, upload.repair) != 0) {
+      abort(); /* the canonical list of repairs does not read back */
+    }
+  } else if (!problem.name) {
+    abort();
+  }
+  orb_problem_free(&problem);
+  free(limit);
+  free(token);
+  free(wait);
+  free(name);
+  free(repair);
+  free(format);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+  char *text = strndup((const char *)data, size), *at = text;
+  if (!text) {
+    return 0;
+  }
+  char *method = next_line(&at), *path = next_line(&at), *query = next_line(&at), *prefer = next_line(&at);
+  char *trace = next_line(&at), *tags = next_line(&at);
+  char id[ORB_ID_SIZE] = "", allow[64], kept[TRACE_SIZE];
+  const route *found = path ? route_find(method, path, id, allow) : NULL;
+  if ((found && found->id >= ROUTE_COUNT) || memchr(id, 0, sizeof id) == NULL) {
+    abort();
+  }
+  if (parse_trace(trace, kept) && strlen(kept) != TRACE_SIZE - 1) {
+    abort();
+  }
+  (void)parse_tag_matches(tags, "\"0123456789abcdef0123456789abcdef\"");
+  if (query) {
+    read_query(query, prefer);
+  }
+  free(text);
+  return 0;
+}
