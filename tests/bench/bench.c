@@ -13,6 +13,7 @@ static const char usage_text[] =
     "       orbmorph-bench merge [options] A B [C...]\n"
     "       orbmorph-bench landmarks [options] A B [C...]\n"
     "       orbmorph-bench pairs [options] A B [C...]\n"
+    "       orbmorph-bench truth [options] --landmarks FILE A B\n"
     "\n"
     "Measures the library in-process; one JSON object a line for every repeat.\n"
     "  --method M        newton (default) or kernel-sampling\n"
@@ -36,6 +37,9 @@ static const char usage_text[] =
     "  --sizes LIST      landmarks in a set, by turns (3,10,30,60)\n"
     "  --merge-every N   every N-th set is remeshed too (0: none)\n"
     "  --seconds N       give a set or pair up after so long (0: never)\n"
+    "truth measures how true the map from A to B is:\n"
+    "  --given N         align by the first N landmarks only and measure at the rest (all)\n"
+    "  --methods LIST    of rotate, rbf, fast, default, quality, auto (all of them)\n"
     "  --version, --help\n"
     "Exit status 0 done, 1 refused (the reason on standard error), 2 wrong usage.\n";
 
@@ -93,7 +97,7 @@ static int read_options(const char *text, orb_embed_options *options) {
 
 typedef struct texts {
   const char *method, *preset, *options, *repair, *threads, *repeat, *align, *remesh, *tolerance, *max_triangles, *sets,
-      *align_preset, *first, *seed, *merge_every, *seconds;
+      *align_preset, *first, *seed, *merge_every, *seconds, *given;
 } texts;
 
 static int interpret(const texts *t, bench_options *o) {
@@ -184,7 +188,8 @@ static int interpret_numbers(const texts *t, bench_options *o) {
                {"--first", t->first, 0, 1000000000, &o->first},
                {"--seed", t->seed, 0, 1000000000, &seed},
                {"--merge-every", t->merge_every, 0, 1000000, &o->merge_every},
-               {"--seconds", t->seconds, 0, 1000000, &o->seconds}};
+               {"--seconds", t->seconds, 0, 1000000, &o->seconds},
+               {"--given", t->given, 0, 1000000, &o->given}};
   for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {
     if (table[i].text && !read_integer(table[i].name, table[i].text, table[i].least, table[i].most, table[i].out)) {
       return 0;
@@ -195,7 +200,7 @@ static int interpret_numbers(const texts *t, bench_options *o) {
 }
 
 /* Commands as bits, for the table of options. */
-enum { EMBED = 1, MERGE = 2, LANDMARKS = 4, PAIRS = 8, ALL = 15 };
+enum { EMBED = 1, MERGE = 2, LANDMARKS = 4, PAIRS = 8, TRUTH = 16, ALL = 31 };
 
 static int parse(int argc, char **argv, int command, bench_options *o) {
   texts t = {0};
@@ -212,16 +217,18 @@ static int parse(int argc, char **argv, int command, bench_options *o) {
                {"--out", &o->out, EMBED | MERGE},
                {"--align", &t.align, MERGE | LANDMARKS | PAIRS},
                {"--align-preset", &t.align_preset, MERGE | LANDMARKS | PAIRS},
-               {"--remesh", &t.remesh, MERGE | LANDMARKS | PAIRS},
-               {"--landmarks", &o->landmarks, MERGE},
-               {"--tolerance", &t.tolerance, MERGE | LANDMARKS | PAIRS},
-               {"--max-triangles", &t.max_triangles, MERGE | LANDMARKS | PAIRS},
+               {"--remesh", &t.remesh, ALL & ~EMBED},
+               {"--landmarks", &o->landmarks, MERGE | TRUTH},
+               {"--tolerance", &t.tolerance, ALL & ~EMBED},
+               {"--max-triangles", &t.max_triangles, ALL & ~EMBED},
                {"--sets", &t.sets, LANDMARKS},
                {"--first", &t.first, LANDMARKS},
                {"--seed", &t.seed, LANDMARKS},
                {"--sizes", &o->sizes, LANDMARKS},
                {"--merge-every", &t.merge_every, LANDMARKS},
-               {"--seconds", &t.seconds, LANDMARKS | PAIRS}};
+               {"--seconds", &t.seconds, LANDMARKS | PAIRS},
+               {"--given", &t.given, TRUTH},
+               {"--methods", &o->methods, TRUTH}};
   int plain = 0;
   for (int i = 2; i < argc; i++) {
     if (plain || argv[i][0] != '-' || !argv[i][1]) {
@@ -253,6 +260,9 @@ static int parse(int argc, char **argv, int command, bench_options *o) {
   if (command == MERGE && o->file_count > ORB_SHAPES_MAX) {
     return wrong("merge takes 16 files at most", "");
   }
+  if (command == TRUTH && (o->file_count > 2 || !o->landmarks)) {
+    return wrong(o->landmarks ? "truth takes two files" : "truth needs --landmarks", "");
+  }
   return interpret(&t, o) && interpret_numbers(&t, o);
 }
 
@@ -265,8 +275,9 @@ int main(int argc, char **argv) {
     puts(ORB_ENGINE);
     return BENCH_DONE;
   }
-  static int (*const run[])(const bench_options *) = {bench_embed, bench_merge, bench_landmarks, bench_pairs};
-  static const char *const commands[] = {"embed", "merge", "landmarks", "pairs", NULL};
+  static int (*const run[])(const bench_options *) = {bench_embed, bench_merge, bench_landmarks, bench_pairs,
+                                                      bench_truth};
+  static const char *const commands[] = {"embed", "merge", "landmarks", "pairs", "truth", NULL};
   int command = 0;
   while (argc >= 2 && commands[command] && strcmp(argv[1], commands[command]) != 0) {
     command++;
@@ -280,6 +291,7 @@ int main(int argc, char **argv) {
                            .sizes = "3,10,30,60",
                            .sets = 100,
                            .seed = 1,
+                           .given = -1,
                            .files = calloc((size_t)argc, sizeof *options.files)};
   orb_embed_defaults(&options.embed);
   orb_merge_defaults(&options.merge);

@@ -19,6 +19,8 @@ typedef struct bench_options {
   const char *sizes; /* landmarks: how many in a set, by turns */
   long sets, first, merge_every, seconds;
   uint64_t seed;
+  const char *methods; /* truth: a list with commas; NULL: all */
+  long given;          /* truth: landmarks that the alignment gets; −1: all */
   char **files;
   int file_count;
 } bench_options;
@@ -27,6 +29,7 @@ int bench_embed(const bench_options *options);
 int bench_merge(const bench_options *options);
 int bench_landmarks(const bench_options *options);
 int bench_pairs(const bench_options *options);
+int bench_truth(const bench_options *options);
 
 /* A file in memory, of malloc(); 0 with a message on standard error. */
 int bench_slurp(const char *path, unsigned char **bytes, size_t *size);
@@ -78,5 +81,22 @@ orb_context *bench_open_limited(const bench_options *options);
 /* The place that a caller names; 0 and why (a literal). */
 int bench_place(orb_context *ctx, const bench_mesh *mesh, const orb_spot *spot, orb_nearest **tree, orb_place *out,
                 const char **why);
+
+/* The shapes of one merge, embedded. */
+typedef struct bench_set {
+  int32_t count;
+  bench_mesh mesh[ORB_SHAPES_MAX];
+  orb_embedding embedding[ORB_SHAPES_MAX];
+  orb_align_shape shape[ORB_SHAPES_MAX];
+  const char *name[ORB_SHAPES_MAX];
+  orb_landmark_list list;
+  orb_landmark *landmarks;
+  orb_place *places;
+  double read, embed;
+} bench_set;
+
+/* Reads and embeds options->files; 0 with a message. count is set by the caller. */
+int bench_set_load(orb_context *ctx, const bench_options *options, bench_set *set);
+void bench_set_free(orb_context *ctx, bench_set *set);
 
 #endif

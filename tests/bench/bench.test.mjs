@@ -1,7 +1,7 @@
 // orbmorph-bench keeps the contract: fields, arithmetic, exit statuses. Run by ctest with ORB_BIN and ORB_SAMPLES.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
@@ -96,6 +96,28 @@ test('pairs: every pair once, certified', () => {
   }
 });
 
+test('truth: a shape mapped to itself is where it was; landmarks not given are measured', () => {
+  const marks = JSON.parse(readFileSync(join(samples, 'dog-giraffe.json'))).landmarks;
+  const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));
+  const same = join(dir, 'same.json');
+  writeFileSync(same, JSON.stringify({ landmarks: marks.map((m) => ({ ...m, at: [m.at[0], m.at[0]] })) }));
+  const r = bench(['truth', '--landmarks', same, '--given', '5', '--methods', 'rotate,default,auto', dog, dog]);
+  assert.equal(r.status, 0, r.error);
+  assert.deepEqual(r.lines.map((l) => [l.method, l.given]), [['rotate', 5], ['default', 5], ['auto', 0]]);
+  for (const l of r.lines) {
+    assert.equal(l.flipped, 0);
+    assert.ok(l.dense_percent.mean < 0.5, `${l.method}: ${l.dense_percent.mean}`);
+    assert.equal(l.held_out.length, marks.length - l.given);
+    assert.ok(l.held_out_percent.max < 2, `${l.method}: ${l.held_out_percent.max}`);
+    assert.ok(l.inverted_fraction.map < 0.001);
+  }
+  const other = bench(['truth', '--landmarks', join(samples, 'dog-giraffe.json'), '--given', '5', '--methods', 'fast', dog, giraffe]);
+  assert.equal(other.status, 0, other.error);
+  assert.equal(other.lines[0].dense_percent, null);
+  assert.ok(other.lines[0].held_out_percent.mean > 0.1 && other.lines[0].held_out_percent.mean < 30);
+  rmSync(dir, { recursive: true });
+});
+
 test('exit statuses: 1 refused with the reason, 2 wrong usage', () => {
   const cases = [
     [1, ['embed', '/nowhere/mesh.obj'], /nowhere/],
@@ -113,6 +135,8 @@ test('exit statuses: 1 refused with the reason, 2 wrong usage', () => {
     [2, ['embed', '--method', 'magic', dog], /magic/],
     [2, ['embed', '--options', '{"radius":1}', dog], /radius/],
     [2, ['embed', '--landmarks', 'x', dog], /unknown option/],
+    [2, ['truth', dog, giraffe], /--landmarks/],
+    [2, ['truth', '--landmarks', 'x', '--methods', 'fast,magic', dog, giraffe], /magic/],
   ];
   for (const [status, args, message] of cases) {
     const r = bench(args);

@@ -6,107 +6,6 @@
 #include "api/report_codec.h"
 #include "bench.h"
 
-/* The shapes of one merge, embedded. */
-typedef struct bench_set {
-  int32_t count;
-  bench_mesh mesh[ORB_SHAPES_MAX];
-  orb_embedding embedding[ORB_SHAPES_MAX];
-  orb_align_shape shape[ORB_SHAPES_MAX];
-  const char *name[ORB_SHAPES_MAX];
-  orb_landmark_list list;
-  orb_landmark *landmarks;
-  orb_place *places;
-  double read, embed;
-} bench_set;
-
-static int read_landmarks(const char *path, bench_set *set) {
-  unsigned char *bytes;
-  size_t size;
-  orb_json_error where;
-  orb_problem problem = {0};
-  if (!bench_slurp(path, &bytes, &size)) {
-    return 0;
-  }
-  cJSON *value = orb_json_parse((const char *)bytes, size, &where);
-  free(bytes);
-  if (!value) {
-    fprintf(stderr, "%s: malformed-json: %s at byte %zu\n", path, where.why ? where.why : "out of memory",
-            where.offset);
-    return 0;
-  }
-  int fine = orb_landmarks_read(value, set->count, &set->list, &problem);
-  if (!fine) {
-    fprintf(stderr, "%s: %s: %s\n", path, problem.name, problem.detail);
-  }
-  orb_problem_free(&problem);
-  cJSON_Delete(value);
-  return fine;
-}
-
-static int place_landmarks(orb_context *ctx, bench_set *set) {
-  size_t shapes = (size_t)set->count;
-  set->landmarks = ORB_NEW0(ctx, orb_landmark, set->list.count);
-  set->places = ORB_NEW0(ctx, orb_place, (size_t)set->list.count * shapes);
-  if (!set->landmarks || !set->places) {
-    return 0;
-  }
-  for (int32_t s = 0; s < set->count; s++) {
-    orb_nearest *tree = NULL;
-    for (int32_t l = 0; l < set->list.count; l++) {
-      const char *why;
-      size_t at = (size_t)l * shapes + (size_t)s;
-      if (!bench_place(ctx, &set->mesh[s], &set->list.spots[at], &tree, &set->places[at], &why)) {
-        fprintf(stderr, "%s: bad-landmarks: landmark %d (\"%s\"): %s\n", set->name[s], l, set->list.items[l].name, why);
-        orb_nearest_destroy(ctx, tree);
-        return 0;
-      }
-    }
-    orb_nearest_destroy(ctx, tree);
-  }
-  for (int32_t l = 0; l < set->list.count; l++) {
-    const orb_landmark_spec *spec = &set->list.items[l];
-    orb_landmark *mark = &set->landmarks[l];
-    snprintf(mark->name, sizeof mark->name, "%s", spec->name);
-    mark->at = set->places + (size_t)l * shapes;
-    mark->pass = spec->pass;
-    mark->radius = spec->radius;
-    mark->confidence = spec->confidence;
-  }
-  return 1;
-}
-
-static int load_set(orb_context *ctx, const bench_options *options, bench_set *set) {
-  if (options->landmarks && !read_landmarks(options->landmarks, set)) {
-    return 0;
-  }
-  for (int32_t s = 0; s < set->count; s++) {
-    const char *path = options->files[s];
-    if (!bench_load(ctx, path, options->repair, 1, &set->mesh[s])) {
-      return 0;
-    }
-    set->name[s] = set->mesh[s].name;
-    set->read += set->mesh[s].read_seconds + set->mesh[s].check_seconds;
-    double start = orb_clock();
-    if (orb_embed(ctx, &set->mesh[s].mesh, &options->embed, &set->embedding[s]) != ORB_OK) {
-      bench_complain(path, ctx);
-      return 0;
-    }
-    set->embed += orb_clock() - start;
-    set->shape[s] = (orb_align_shape){.mesh = &set->mesh[s].mesh, .points = set->embedding[s].points};
-  }
-  return !options->landmarks || place_landmarks(ctx, set);
-}
-
-static void free_set(orb_context *ctx, bench_set *set) {
-  for (int32_t s = 0; s < set->count; s++) {
-    orb_embedding_free(ctx, &set->embedding[s]);
-    bench_unload(ctx, &set->mesh[s]);
-  }
-  orb_free(ctx, set->landmarks);
-  orb_free(ctx, set->places);
-  orb_landmarks_free(&set->list);
-}
-
 static void write_members(orb_text *line, const bench_set *set, const orb_merge_result *r) {
   orb_json_key(line, "shapes");
   orb_json_open(line, '[');
@@ -187,7 +86,7 @@ static int run_once(const bench_options *options, bench_set *set, int repeat) {
   double cpu = bench_cpu();
   memset(set, 0, sizeof *set);
   set->count = options->file_count;
-  int fine = load_set(ctx, options, set);
+  int fine = bench_set_load(ctx, options, set);
   orb_merge_options merge = options->merge;
   if (!options->align_given) {
     merge.align.method = set->list.count > 0 ? ORB_ALIGN_PIN : ORB_ALIGN_AUTO;
@@ -203,7 +102,7 @@ static int run_once(const bench_options *options, bench_set *set, int repeat) {
       bench_complain("merge", ctx);
     }
   }
-  free_set(ctx, set);
+  bench_set_free(ctx, set);
   orb_context_destroy(ctx);
   return fine;
 }

@@ -1,0 +1,358 @@
+/* How true the map from one shape to the other is, for each method of alignment.
+ *
+ * - dense: where both meshes have the same triangles, vertex i of one belongs to vertex i of the other. The error of a
+ *   vertex is the distance from where the map takes it, in % of the second shape's diagonal.
+ * - held out: landmarks that the alignment was not given, likewise.
+ * - inverted: triangles turned over in space. Of the map: those of either shape whose image on the other turns against
+ *   that surface's normal at its centre. Of the supermesh: those that turn against either surface's normal there.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench.h"
+
+typedef struct method {
+  const char *name;
+  orb_align_method method;
+  orb_preset preset;
+  int needs_landmarks;
+} method;
+
+static const method methods[] = {
+    {"rotate", ORB_ALIGN_ROTATE, ORB_PRESET_DEFAULT, 0}, {"rbf", ORB_ALIGN_RBF, ORB_PRESET_DEFAULT, 1},
+    {"fast", ORB_ALIGN_PIN, ORB_PRESET_FAST, 1},         {"default", ORB_ALIGN_PIN, ORB_PRESET_DEFAULT, 1},
+    {"quality", ORB_ALIGN_PIN, ORB_PRESET_QUALITY, 1},   {"auto", ORB_ALIGN_AUTO, ORB_PRESET_DEFAULT, 0}};
+enum { METHODS = sizeof methods / sizeof methods[0] };
+
+typedef struct truth_run {
+  orb_context *ctx;
+  const bench_set *set;
+  int32_t given;
+  const orb_merge_result *result;
+  orb_locator *locator[2];
+  double *normal[2]; /* of each vertex: the area-weighted sum of its triangles' */
+  double diagonal;   /* of the second shape */
+} truth_run;
+
+static int in_list(const char *list, const char *name) {
+  size_t length = strlen(name);
+  for (const char *at = list; at; at = strchr(at, ',')) {
+    at += *at == ',';
+    if (strncmp(at, name, length) == 0 && (at[length] == ',' || !at[length])) {
+      return 1;
+    }
+  }
+  return !list;
+}
+
+static int list_is_known(const char *list) {
+  for (const char *at = list; at && *at;) {
+    size_t length = strcspn(at, ","), k = 0;
+    while (k < METHODS && (strlen(methods[k].name) != length || strncmp(at, methods[k].name, length) != 0)) {
+      k++;
+    }
+    if (k == METHODS) {
+      fprintf(stderr, "orbmorph-bench: --methods: there is no '%.*s'\n", (int)length, at);
+      return 0;
+    }
+    at += length + (at[length] == ',');
+  }
+  return 1;
+}
+
+static void subtract(const double a[3], const double b[3], double out[3]) {
+  for (int k = 0; k < 3; k++) {
+    out[k] = a[k] - b[k];
+  }
+}
+
+static double dot(const double a[3], const double b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void triangle_normal(const double *p, const double *q, const double *r, double out[3]) {
+  double u[3], w[3];
+  subtract(q, p, u);
+  subtract(r, p, w);
+  for (int k = 0; k < 3; k++) {
+    out[k] = u[(k + 1) % 3] * w[(k + 2) % 3] - u[(k + 2) % 3] * w[(k + 1) % 3];
+  }
+}
+
+static void sphere_point(const orb_aligned_shape *shape, const orb_place *place, double out[3]) {
+  const int32_t *corner = shape->mesh.triangles + 3 * (size_t)place->triangle;
+  for (int k = 0; k < 3; k++) {
+    out[k] = 0;
+    for (int i = 0; i < 3; i++) {
+      out[k] += place->at[i] * shape->points[3 * (size_t)corner[i] + (size_t)k];
+    }
+  }
+  double length = sqrt(dot(out, out));
+  for (int k = 0; k < 3; k++) {
+    out[k] /= length;
+  }
+}
+
+/* Where shape s has a direction of the common sphere; normal may be NULL. */
+static void surface_at(const truth_run *run, int s, const double p[3], double position[3], double *normal) {
+  const orb_mesh *mesh = &run->result->alignment.shapes[s].mesh;
+  orb_place place;
+  orb_locate(run->locator[s], p, -1, &place);
+  orb_place_position(mesh, &place, position);
+  for (int k = 0; k < 3 && normal; k++) {
+    normal[k] = 0;
+    for (int i = 0; i < 3; i++) {
+      normal[k] += place.at[i] * run->normal[s][3 * mesh->triangles[3 * place.triangle + i] + k];
+    }
+  }
+}
+
+static int fill_normals(truth_run *run, int s) {
+  const orb_mesh *mesh = &run->result->alignment.shapes[s].mesh;
+  run->normal[s] = ORB_NEW0(run->ctx, double, 3 * (size_t)mesh->vertex_count);
+  for (int32_t t = 0; t < mesh->triangle_count && run->normal[s]; t++) {
+    double n[3];
+    const int32_t *v = mesh->triangles + 3 * t;
+    triangle_normal(mesh->positions + 3 * v[0], mesh->positions + 3 * v[1], mesh->positions + 3 * v[2], n);
+    for (int i = 0; i < 9; i++) {
+      run->normal[s][3 * v[i / 3] + i % 3] += n[i % 3];
+    }
+  }
+  return run->normal[s] != NULL;
+}
+
+static int by_value(const void *a, const void *b) {
+  double x, y;
+  memcpy(&x, a, sizeof x);
+  memcpy(&y, b, sizeof y);
+  return (x > y) - (x < y);
+}
+
+static void write_errors(orb_text *line, const char *name, double *error, int32_t count) {
+  double sum = 0;
+  orb_json_key(line, name);
+  if (count == 0) {
+    orb_text_add(line, "null");
+    return;
+  }
+  qsort(error, (size_t)count, sizeof *error, by_value);
+  for (int32_t i = 0; i < count; i++) {
+    sum += error[i];
+  }
+  orb_json_open(line, '{');
+  orb_json_member_integer(line, "count", count);
+  orb_json_member_number(line, "mean", sum / count);
+  orb_json_member_number(line, "median", error[count / 2]);
+  orb_json_member_number(line, "p95", error[(int64_t)count * 95 / 100]);
+  orb_json_member_number(line, "max", error[count - 1]);
+  orb_json_close(line, '}');
+}
+
+static int same_connectivity(const bench_set *set) {
+  const orb_mesh *a = &set->mesh[0].mesh, *b = &set->mesh[1].mesh;
+  return a->vertex_count == b->vertex_count && a->triangle_count == b->triangle_count &&
+         memcmp(a->triangles, b->triangles, 3 * (size_t)a->triangle_count * sizeof *a->triangles) == 0;
+}
+
+/* Vertices of the given mesh keep their numbers in the aligned one. */
+static int write_dense(truth_run *run, orb_text *line) {
+  const orb_mesh *target = &run->set->mesh[1].mesh;
+  int32_t count = same_connectivity(run->set) ? target->vertex_count : 0;
+  double *error = ORB_NEW(run->ctx, double, (size_t)count + 1);
+  for (int32_t v = 0; v < count && error; v++) {
+    double at[3], d[3];
+    surface_at(run, 1, run->result->alignment.shapes[0].points + 3 * v, at, NULL);
+    subtract(at, target->positions + 3 * v, d);
+    error[v] = 100 * sqrt(dot(d, d)) / run->diagonal;
+  }
+  if (error) {
+    write_errors(line, "dense_percent", error, count);
+  }
+  orb_free(run->ctx, error);
+  return error != NULL;
+}
+
+/* A place on a given mesh, on the sphere: through the nearest place of the aligned mesh, which is the same surface. */
+static int write_held_out(truth_run *run, orb_text *line) {
+  const bench_set *set = run->set;
+  int32_t count = set->list.count - run->given;
+  double *error = ORB_NEW(run->ctx, double, (size_t)count + 1);
+  orb_nearest *tree = NULL;
+  const orb_aligned_shape *source = &run->result->alignment.shapes[0];
+  if (!error || orb_nearest_create(run->ctx, source->mesh.positions, source->mesh.triangles,
+                                   source->mesh.triangle_count, &tree) != ORB_OK) {
+    orb_free(run->ctx, error);
+    return 0;
+  }
+  for (int32_t l = 0; l < count; l++) {
+    const orb_place *at = set->landmarks[run->given + l].at;
+    double from[3], p[3], to[3], wanted[3], d[3];
+    orb_place place;
+    orb_place_position(&set->mesh[0].mesh, &at[0], from);
+    orb_place_position(&set->mesh[1].mesh, &at[1], wanted);
+    (void)orb_nearest_query(tree, from, INFINITY, &place);
+    sphere_point(source, &place, p);
+    surface_at(run, 1, p, to, NULL);
+    subtract(to, wanted, d);
+    error[l] = 100 * sqrt(dot(d, d)) / run->diagonal;
+  }
+  orb_json_key(line, "held_out");
+  orb_json_open(line, '[');
+  for (int32_t l = 0; l < count; l++) {
+    orb_json_number(line, error[l]);
+  }
+  orb_json_close(line, ']');
+  write_errors(line, "held_out_percent", error, count);
+  orb_nearest_destroy(run->ctx, tree);
+  orb_free(run->ctx, error);
+  return 1;
+}
+
+/* Triangles with corners p on the sphere and x in space that turn against the normal of shape s at their centre. */
+static int turned(const truth_run *run, int s, const double *p[3], const double *x[3]) {
+  double centre[3], n[3], at[3], normal[3];
+  for (int k = 0; k < 3; k++) {
+    centre[k] = p[0][k] + p[1][k] + p[2][k];
+  }
+  double length = sqrt(dot(centre, centre));
+  for (int k = 0; k < 3; k++) {
+    centre[k] /= length;
+  }
+  triangle_normal(x[0], x[1], x[2], n);
+  surface_at(run, s, centre, at, normal);
+  return dot(n, normal) < 0 && sqrt(dot(n, n)) > 1e-12 * run->diagonal * run->diagonal;
+}
+
+static double map_inverted(const truth_run *run, int from) {
+  const orb_aligned_shape *shape = &run->result->alignment.shapes[from];
+  int32_t count = 0;
+  for (int32_t t = 0; t < shape->mesh.triangle_count; t++) {
+    const double *p[3], *x[3];
+    double image[9];
+    for (int k = 0; k < 3; k++) {
+      p[k] = shape->points + 3 * shape->mesh.triangles[3 * t + k];
+      x[k] = image + 3 * k;
+      surface_at(run, 1 - from, p[k], image + 3 * k, NULL);
+    }
+    count += turned(run, 1 - from, p, x);
+  }
+  return (double)count / shape->mesh.triangle_count;
+}
+
+static double supermesh_inverted(const truth_run *run, int s) {
+  const orb_supermesh *m = &run->result->supermesh;
+  const orb_mesh *mesh = &run->result->alignment.shapes[s].mesh;
+  int32_t count = 0;
+  for (int32_t t = 0; t < m->triangle_count; t++) {
+    const double *p[3], *x[3];
+    double corner[9];
+    for (int k = 0; k < 3; k++) {
+      int32_t v = m->triangles[3 * t + k];
+      p[k] = m->points + 3 * v;
+      x[k] = corner + 3 * k;
+      orb_place_position(mesh, &m->places[(int64_t)s * m->vertex_count + v], corner + 3 * k);
+    }
+    count += turned(run, s, p, x);
+  }
+  return (double)count / m->triangle_count;
+}
+
+static void write_inverted(const truth_run *run, orb_text *line) {
+  orb_json_key(line, "inverted_fraction");
+  orb_json_open(line, '{');
+  orb_json_member_number(line, "map", map_inverted(run, 0));
+  orb_json_member_number(line, "map_back", map_inverted(run, 1));
+  orb_json_member_number(line, "supermesh_first", supermesh_inverted(run, 0));
+  orb_json_member_number(line, "supermesh_second", supermesh_inverted(run, 1));
+  orb_json_member_number(line, "report", run->result->pairs[0].inverted_fraction);
+  orb_json_close(line, '}');
+}
+
+static int write_measures(truth_run *run, orb_text *line) {
+  const orb_alignment *alignment = &run->result->alignment;
+  int fine = 1;
+  for (int s = 0; s < 2 && fine; s++) {
+    const orb_aligned_shape *shape = &alignment->shapes[s];
+    fine = orb_locator_create(run->ctx, shape->points, shape->mesh.vertex_count, shape->mesh.triangles,
+                              shape->mesh.triangle_count, NULL, &run->locator[s]) == ORB_OK &&
+           fill_normals(run, s);
+  }
+  if (fine) {
+    orb_json_member_integer(line, "flipped",
+                            alignment->shapes[0].certificate.flipped + alignment->shapes[1].certificate.flipped +
+                                run->result->supermesh.flipped);
+    orb_json_member_number(line, "energy", alignment->energy);
+    orb_json_member_number(line, "distortion_median", run->result->pairs[0].distortion.symmetric_dirichlet.median);
+    write_inverted(run, line);
+    fine = write_dense(run, line) && write_held_out(run, line);
+  }
+  for (int s = 0; s < 2; s++) {
+    orb_locator_destroy(run->ctx, run->locator[s]);
+    orb_free(run->ctx, run->normal[s]);
+  }
+  return fine;
+}
+
+static int run_method(const bench_options *options, orb_context *ctx, const bench_set *set, const method *m) {
+  int32_t given = options->given < 0 || options->given > set->list.count ? set->list.count : (int32_t)options->given;
+  if (m->method == ORB_ALIGN_AUTO) {
+    given = 0;
+  }
+  if (m->needs_landmarks && given == 0) {
+    return 1;
+  }
+  orb_merge_options merge = options->merge;
+  merge.align.method = m->method;
+  merge.align.preset = m->preset;
+  orb_merge_result result;
+  double cpu = bench_cpu();
+  if (orb_merge(ctx, set->shape, set->name, 2, set->landmarks, given, &merge, &result) != ORB_OK) {
+    bench_complain(m->name, ctx);
+    return 0;
+  }
+  cpu = bench_cpu() - cpu;
+  orb_extent extent;
+  orb_mesh_extent(&set->mesh[1].mesh, &extent);
+  double across[3];
+  subtract(extent.max, extent.min, across);
+  truth_run run = {.ctx = ctx, .set = set, .given = given, .result = &result, .diagonal = sqrt(dot(across, across))};
+  orb_text line = {0};
+  orb_json_open(&line, '{');
+  orb_json_member_string(&line, "first", set->name[0]);
+  orb_json_member_string(&line, "second", set->name[1]);
+  orb_json_member_string(&line, "method", m->name);
+  orb_json_member_integer(&line, "given", given);
+  orb_json_member_integer(&line, "triangles", result.supermesh.triangle_count);
+  orb_json_member_number(&line, "align_seconds", result.timings.align);
+  orb_json_member_number(&line, "total_seconds", result.timings.total);
+  orb_json_member_number(&line, "cpu_seconds", cpu);
+  int fine = write_measures(&run, &line);
+  orb_json_close(&line, '}');
+  fine = bench_print(&line) && fine;
+  orb_merge_result_free(ctx, &result);
+  return fine;
+}
+
+int bench_truth(const bench_options *options) {
+  if (!list_is_known(options->methods)) {
+    return BENCH_USAGE;
+  }
+  bench_set *set = calloc(1, sizeof *set);
+  if (!set) {
+    return BENCH_REFUSED;
+  }
+  orb_context *ctx = bench_open(options->threads);
+  set->count = options->file_count;
+  int loaded = bench_set_load(ctx, options, set), fine = loaded;
+  for (int m = 0; m < METHODS && loaded; m++) {
+    if (in_list(options->methods, methods[m].name)) {
+      fine &= run_method(options, ctx, set, &methods[m]);
+    }
+  }
+  bench_set_free(ctx, set);
+  orb_context_destroy(ctx);
+  free(set);
+  return fine ? BENCH_DONE : BENCH_REFUSED;
+}
