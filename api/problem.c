@@ -14,6 +14,7 @@ static const struct entry {
     {"bad-header", 400, "A header is not valid"},
     {"malformed-json", 400, "The body is not valid JSON"},
     {"malformed-mesh", 400, "The mesh file is broken"},
+    {"malformed-encoding", 400, "The compressed body is broken"},
     {"unauthorized", 401, "A token is needed"},
     {"forbidden", 403, "The token does not allow this"},
     {"not-found", 404, "There is no such thing here"},

@@ -34,6 +34,8 @@ static const entry table[] = {
     {"idle-seconds", NUMBER(idle_seconds, 1, 3600), "30", "a connection that is silent for so long is closed"},
     {"max-body", NUMBER(max_body, 1024, INT64_C(1) << 40), "512M", "bytes of an upload"},
     {"max-json", NUMBER(max_json, 1024, 1 << 26), "1M", "bytes of a JSON body"},
+    {"max-ratio", NUMBER(max_ratio, 2, 1000000), "200", "times by which a compressed body may grow beyond its first 1M"},
+    {"decode-memory", NUMBER(decode_memory, 1 << 20, INT64_C(1) << 40), "256M", "bytes that unpack bodies at once"},
     {"max-triangles", NUMBER(max_triangles, 4, 500000000), "5000000", "triangles of a mesh"},
     {"queue-limit", NUMBER(queue_limit, 1, 1000000), "10000", "unfinished jobs"},
     {"job-memory", NUMBER(job_memory, 1 << 20, INT64_C(1) << 46), "0", "bytes of one job; 0: half of the memory"},

@@ -50,9 +50,8 @@ static int check_length(request *r, const seen *s, orb_problem *problem) {
     orb_json_member_integer(&problem->facts, "limit", most);
     return 0;
   }
-  const char *coding = header_of(r, "Content-Encoding");
-  if (coding && strcasecmp(coding, "identity") != 0) {
-    return orb_refuse(problem, "unsupported-encoding", "Send the body without a content encoding.");
+  if (coding_of(header_of(r, "Content-Encoding")) == CODING_UNKNOWN) {
+    return orb_refuse(problem, "unsupported-encoding", "Send the body as it is, or with gzip or zstd, once.");
   }
   return 1;
 }

@@ -16,6 +16,7 @@
 #include "api/routes.h"
 #include "cache.h"
 #include "config.h"
+#include "http/decode.h"
 #include "http/parse.h"
 #include "queue/queue.h"
 #include "store/tokens.h"
@@ -31,6 +32,7 @@ typedef struct server {
   pthread_mutex_t mesh_lock; /* so that a mesh's file and row come and go together; never taken by a handler */
   struct MHD_Daemon *daemon;
   int ready, stopping; /* written under __atomic */
+  int64_t decoding;    /* bytes that decoders of bodies hold; __atomic */
   int64_t started;
   int needs_token;
   token_row *tokens; /* `used` under __atomic */
@@ -56,11 +58,14 @@ struct request {
   request_phase phase;
   int64_t began; /* µs */
 
-  orb_text body; /* JSON */
-  int64_t received;
-  object_temp temp; /* upload */
+  decoder *decoder;                /* NULL: the body is plain */
+  int64_t decoder_bytes;           /* as counted in server.decoding */
+  int64_t wire, received, dropped; /* bytes of the body: as they came, decoded, after a refusal */
+  int body_done;                   /* all of it came */
+  orb_text body;                   /* JSON */
+  orb_text refusal;                /* the text of a refusal that was made while the body came */
+  object_temp temp;                /* upload */
   orb_hash hash;
-  orb_problem upload_problem;
 
   waiter waiter;
   job *waits_for;

@@ -9,7 +9,6 @@
 #include "api/json.h"
 #include "api/mesh_codec.h"
 #include "http/http.h"
-#include "metrics.h"
 
 void handle_mesh_begin(request *r) {
   server *srv = r->srv;
@@ -28,24 +27,12 @@ void handle_mesh_begin(request *r) {
 }
 
 void handle_mesh_bytes(request *r, const char *bytes, size_t size) {
-  const config *options = r->srv->options;
-  r->received += (int64_t)size;
-  if (r->upload_problem.name || r->temp.fd < 0) {
-    return;
-  }
-  if (r->received > options->max_body) {
-    orb_refuse(&r->upload_problem, "too-large", "The body has more than %lld bytes.", (long long)options->max_body);
-    objects_abandon(&r->temp);
-    return;
-  }
   store_result stored = objects_append(&r->temp, bytes, size);
-  if (stored != STORE_OK) {
-    orb_refuse(&r->upload_problem, stored == STORE_FULL ? "storage-full" : "internal",
-               "The upload could not be written to the server's disk.");
-    objects_abandon(&r->temp);
-    return;
+  if (stored == STORE_OK) {
+    orb_hash_add(&r->hash, bytes, size);
+  } else {
+    reply_store(r, stored);
   }
-  orb_hash_add(&r->hash, bytes, size);
 }
 
 /* The upload's bytes in memory; unmapped by the caller. */
@@ -159,10 +146,5 @@ static void upload_away(request *r) {
 }
 
 enum MHD_Result handle_mesh_upload(request *r) {
-  metrics_bytes(r->received, 0);
-  if (r->upload_problem.name) {
-    reply_problem(r, &r->upload_problem);
-    return MHD_YES;
-  }
   return request_go_away(r, r->srv->checks, upload_away);
 }

@@ -48,10 +48,16 @@ void reply_problem(request *r, orb_problem *problem) {
   orb_text text = {0};
   orb_problem_write(problem, &text);
   unsigned status = (unsigned)orb_problem_status(problem->name);
+  if (r->wire > 0 && !r->body_done) {
+    orb_text_append(&r->refusal, text.data ? text.data : "", text.size);
+  }
   reply_text(r, status, "application/problem+json", &text);
   reply_header(r, "Cache-Control", "no-store");
   if (status == 429 || status == 503) {
     reply_header(r, "Retry-After", "2");
+  }
+  if (strcmp(problem->name, "unsupported-encoding") == 0) {
+    reply_header(r, "Accept-Encoding", "gzip, zstd");
   }
   if (status == 401) {
     reply_header(r, "WWW-Authenticate", "Bearer");
@@ -137,8 +143,9 @@ static void add_cors(request *r) {
                "Location, Content-Location, Retry-After, ETag, Content-Range, X-Request-Id, RateLimit");
   if (strcmp(r->method, "OPTIONS") == 0) {
     reply_header(r, "Access-Control-Allow-Methods", "GET, HEAD, POST, DELETE");
-    reply_header(r, "Access-Control-Allow-Headers",
-                 "Authorization, Content-Type, Prefer, If-None-Match, Range, Last-Event-ID, traceparent");
+    reply_header(
+        r, "Access-Control-Allow-Headers",
+        "Authorization, Content-Type, Content-Encoding, Prefer, If-None-Match, Range, Last-Event-ID, traceparent");
     reply_header(r, "Access-Control-Max-Age", "600");
   }
 }

@@ -10,6 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "http/body.h"
 #include "http/http.h"
 #include "log.h"
 #include "metrics.h"
@@ -135,21 +136,8 @@ static void request_begin(request *r, const char *path, const char *version) {
     reply_problem(r, &problem);
   } else if (!r->route) {
     answer_unrouted(r, path, allow);
-  } else if (r->route->id == ROUTE_MESH_UPLOAD) {
-    handle_mesh_begin(r);
-  }
-}
-
-static void take_bytes(request *r, const char *bytes, size_t size) {
-  if (r->response) {
-    return; /* refused already; the rest is dropped */
-  }
-  if (r->route->body == ROUTE_MESH_BODY) {
-    handle_mesh_bytes(r, bytes, size);
-  } else if (r->body.size + size > (size_t)r->srv->options->max_json) {
-    reply_refuse(r, "too-large", "A JSON body has at most %lld bytes.", (long long)r->srv->options->max_json);
-  } else {
-    orb_text_append(&r->body, bytes, size);
+  } else if (r->route->body != ROUTE_NO_BODY) {
+    body_begin(r);
   }
 }
 
@@ -172,11 +160,15 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
     return r->phase == PHASE_SEND && r->has_body ? reply_send(r) : MHD_YES;
   }
   if (*upload_size) {
-    take_bytes(r, upload, *upload_size);
+    size_t size = *upload_size;
     *upload_size = 0;
-    return MHD_YES;
+    return body_take(r, upload, size) ? MHD_YES : MHD_NO;
   }
   enum MHD_Result result = MHD_YES;
+  if (r->has_body && !r->body_done) {
+    r->body_done = 1;
+    body_end(r);
+  }
   if (r->phase == PHASE_BODY) {
     result = dispatch(r);
   } else if (r->phase == PHASE_WAIT) {
@@ -209,8 +201,8 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
   }
   queue_release(r->srv->q, r->waits_for);
   objects_abandon(&r->temp);
-  orb_problem_free(&r->upload_problem);
-  orb_text_free(&r->body);
+  body_free(r);
+  orb_text_free(&r->refusal);
   if (r->response) {
     MHD_destroy_response(r->response);
   }

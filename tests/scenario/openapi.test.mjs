@@ -6,6 +6,7 @@ import http from 'node:http';
 import path from 'node:path';
 import test from 'node:test';
 import { promisify } from 'node:util';
+import { gzipSync } from 'node:zlib';
 import Ajv2020 from 'ajv/dist/2020.js';
 import { binaries, daemon, root, samples } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
@@ -172,8 +173,12 @@ test('answers about meshes', async (t) => {
     ['malformed-mesh', shapes.binaryPly(m).subarray(0, 400)], ['unknown-format', Buffer.from([0, 1, 2, 3, 255, 254, 7, 9])],
     ['bad-query', obj(m), { repair: 'magic' }]];
   for (const [name, bytes, query] of refusals) assert.equal((await upload(bytes, query)).json.type, `/problems/${name}`);
-  const encoded = hold(await bare(d, 'POST', '/v1/meshes', { 'content-encoding': 'gzip', 'content-length': 10 }), 'POST', '/v1/meshes');
+  const encoded = hold(await bare(d, 'POST', '/v1/meshes', { 'content-encoding': 'br', 'content-length': 10 }), 'POST', '/v1/meshes');
   assert.equal(encoded.status, 415);
+  const coded = (body) => ask('POST', '/v1/meshes', { body, headers: { 'content-encoding': 'gzip' } });
+  assert.equal((await coded(gzipSync(shapes.tetrahedron))).status, 201);
+  assert.equal((await coded(Buffer.from('plain'))).json.type, '/problems/malformed-encoding');
+  assert.equal((await coded(gzipSync(Buffer.alloc(3_000_000)))).json.type, '/problems/too-large');
   assert.equal(hold(await bare(d, 'POST', '/v1/meshes', {}), 'POST', '/v1/meshes').status, 411);
   const { id } = (await upload(shapes.tetrahedron)).json;
   assert.equal((await ask('DELETE', '/v1/meshes/{id}', { id })).status, 204);

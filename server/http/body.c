@@ -1,0 +1,167 @@
+/* Limits. The decoded size counts against the limit of the route, and so does the size on the wire. Beyond the first
+ * MEBIBYTE the decoded size may be max-ratio times what came, so that a bomb ends early. Windows of all decoders
+ * together are held under decode-memory: a body that would go beyond is told to come again later.
+ *
+ * libmicrohttpd takes an answer only before the first byte of a body or after its last one. So what is left of a
+ * refused body is read and dropped; of an endless one up to DROP_MOST, and then the refusal is written to the socket
+ * past the library, and the connection ends. Over TLS it then ends without one.
+ */
+#include "http/body.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+
+#include "metrics.h"
+
+enum { MEBIBYTE = 1 << 20, DROP_MOST = 64 << 20 };
+
+static int64_t limit_of(const request *r) {
+  const config *options = r->srv->options;
+  return r->route->body == ROUTE_JSON_BODY ? options->max_json : options->max_body;
+}
+
+static void refuse_size(request *r) {
+  orb_problem problem = {0};
+  long long most = (long long)limit_of(r);
+  orb_refuse(&problem, "too-large", "The body%s has more than the %lld bytes that are taken here.",
+             r->decoder ? ", unpacked," : "", most);
+  orb_json_member_integer(&problem.facts, "limit", most);
+  reply_problem(r, &problem);
+}
+
+/* Accounts for what the decoder holds; 0 with a refusal when all together hold too much. */
+static int account(request *r) {
+  int64_t now = r->decoder ? (int64_t)decoder_memory(r->decoder) : 0, more = now - r->decoder_bytes;
+  int64_t all = __atomic_add_fetch(&r->srv->decoding, more, __ATOMIC_RELAXED);
+  r->decoder_bytes = now;
+  if (more > 0 && all > r->srv->options->decode_memory) {
+    reply_refuse(r, "unavailable", "Too many compressed bodies are being unpacked; try again soon, or send it plain.");
+    return 0;
+  }
+  return 1;
+}
+
+void body_begin(request *r) {
+  coding which = coding_of(header_of(r, "Content-Encoding"));
+  if (which != CODING_NONE) {
+    r->decoder = decoder_create(which);
+    if (!r->decoder) {
+      reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
+      return;
+    }
+    if (!account(r)) {
+      return;
+    }
+  }
+  if (r->route->id == ROUTE_MESH_UPLOAD) {
+    handle_mesh_begin(r);
+  }
+}
+
+/* Decoded bytes; 0 where they were refused. */
+static int take_plain(void *user, const char *bytes, size_t size) {
+  request *r = user;
+  r->received += (int64_t)size;
+  if (r->received > limit_of(r)) {
+    refuse_size(r);
+  } else if (r->decoder && r->received > MEBIBYTE && r->received / r->srv->options->max_ratio >= r->wire) {
+    orb_problem problem = {0};
+    orb_refuse(&problem, "too-large", "The body unpacks to more than %lld times its size; send it plain.",
+               (long long)r->srv->options->max_ratio);
+    orb_json_member_integer(&problem.facts, "ratio_limit", r->srv->options->max_ratio);
+    reply_problem(r, &problem);
+  } else if (r->route->body == ROUTE_MESH_BODY) {
+    handle_mesh_bytes(r, bytes, size);
+  } else {
+    orb_text_append(&r->body, bytes, size);
+  }
+  return r->response == NULL;
+}
+
+static void refuse_coding(request *r, const char *why) {
+  orb_problem problem = {0};
+  orb_refuse(&problem, "malformed-encoding", "The body cannot be unpacked: %s.", why);
+  orb_json_member_integer(&problem.facts, "offset", r->wire);
+  reply_problem(r, &problem);
+}
+
+static void unpack(request *r, const char *bytes, size_t size) {
+  switch (decoder_feed(r->decoder, bytes, size, take_plain, r)) {
+    case DECODE_BROKEN:
+      refuse_coding(r, "it is not what its Content-Encoding says, or was damaged on the way");
+      break;
+    case DECODE_WINDOW:
+      refuse_coding(r, "it needs a window of more than 8 MB (zstd without --long or --ultra keeps below)");
+      break;
+    case DECODE_NO_MEMORY:
+      reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
+      break;
+    default:
+      if (!r->response) {
+        account(r);
+      }
+  }
+}
+
+/* The refusal past the library, for a client that would never stop sending. */
+static void write_refusal(request *r) {
+  const union MHD_ConnectionInfo *fd = MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+  char head[256];
+  if (!fd || r->srv->options->tls_key[0] || !r->refusal.data) {
+    return;
+  }
+  int n = snprintf(head, sizeof head,
+                   "HTTP/1.1 %u Refused\r\nContent-Type: application/problem+json\r\nCache-Control: no-store\r\n"
+                   "X-Request-Id: %s\r\nConnection: close\r\nContent-Length: %zu\r\n\r\n",
+                   r->status, r->number, r->refusal.size);
+  struct iovec parts[2] = {{head, (size_t)n}, {r->refusal.data, r->refusal.size}};
+  struct msghdr message = {.msg_iov = parts, .msg_iovlen = 2};
+  r->closes = sendmsg(fd->connect_fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL) > 0; /* some hundred bytes: all or none */
+}
+
+int body_take(request *r, const char *bytes, size_t size) {
+  r->wire += (int64_t)size;
+  if (!r->response) {
+    if (r->decoder && r->wire > limit_of(r)) {
+      refuse_size(r); /* a stream that gives no output would never end */
+    } else if (r->decoder) {
+      unpack(r, bytes, size);
+    } else {
+      take_plain(r, bytes, size);
+    }
+    if (r->response) {
+      objects_abandon(&r->temp);
+      body_free(r);
+    }
+    return 1;
+  }
+  r->dropped += (int64_t)size;
+  if (r->dropped > DROP_MOST) {
+    write_refusal(r);
+    return 0;
+  }
+  return 1;
+}
+
+int body_end(request *r) {
+  metrics_bytes(r->wire, 0);
+  if (r->decoder && !r->response && !decoder_complete(r->decoder)) {
+    refuse_coding(r, "its end is missing");
+  }
+  if (r->decoder) {
+    decoder_free(r->decoder); /* its window is not needed while the request waits */
+    r->decoder = NULL;
+    account(r);
+  }
+  return r->response == NULL;
+}
+
+void body_free(request *r) {
+  if (r->decoder) {
+    decoder_free(r->decoder);
+    r->decoder = NULL;
+    account(r);
+  }
+  orb_text_free(&r->body);
+}
