@@ -20,6 +20,10 @@ ORB_MUST_CHECK orb_status orb_refiner_create(orb_context *ctx, orb_hierarchy *hi
                                              const orb_embed_options *options, orb_refiner **out);
 void orb_refiner_destroy(orb_context *ctx, orb_refiner *refiner);
 
+/* Says that this refiner runs to full resolution and its hierarchy is not used again: what only collapses need is freed
+ * as soon as all are undone. End it with orb_refiner_abandon(). */
+void orb_refiner_one_way(orb_refiner *refiner);
+
 /* A refiner at full resolution that starts from an embedding at hand (points: 3 a vertex, every triangle positive),
  * with a hierarchy that holds no collapses: for sweeps with pins. Destroy the refiner, then the hierarchy. */
 ORB_MUST_CHECK orb_status orb_refiner_resume(orb_context *ctx, const orb_mesh *mesh, const double *points,

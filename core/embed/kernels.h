@@ -33,10 +33,23 @@ typedef struct orb_sweep_job {
   unsigned char *stiff;      /* of each batch: 1 where a lane was too thin to be moved in plain doubles */
 } orb_sweep_job;
 
+/* Fills batches that have their vertices: rings and shapes. */
+typedef struct orb_fill_job {
+  const orb_surface *surface;
+  double blend;    /* of shapes towards equilateral */
+  int32_t *vertex; /* as in orb_sweep_job; lanes that do not count are given the last one that does */
+  const unsigned char *fill;
+  const int32_t *valence;
+  const int64_t *offset;
+  int32_t *ring;
+  float *shape;
+} orb_fill_job;
+
 typedef struct orb_kernels {
   const char *name;
   int lanes; /* doubles a batch */
   void (*costs)(const orb_cost_job *job, int64_t begin, int64_t end);
+  void (*fill)(const orb_fill_job *job, int64_t begin, int64_t end);
   void (*sweep)(const orb_sweep_job *job, int64_t begin, int64_t end);
 } orb_kernels;
 

@@ -34,6 +34,10 @@ static inline vd vd_load_floats(const float *p) {
   memcpy(&out, p, sizeof out);
   return __builtin_convertvector(out, vd);
 }
+static inline void vd_store_floats(float *p, vd x) {
+  vf out = __builtin_convertvector(x, vf);
+  memcpy(p, &out, sizeof out);
+}
 static inline vd vd_choose(vm mask, vd yes, vd no) {
   return (vd)((mask & (vm)yes) | (~mask & (vm)no));
 }

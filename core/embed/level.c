@@ -2,14 +2,8 @@
 
 #include "base/check.h"
 #include "embed/loops.h"
-#include "embed/star.h"
 
-/* Where the shape of corner c's triangle lies: 4 a triangle. */
-static inline int64_t shape_at(int32_t c) {
-  return 4 * (int64_t)(c >> 3) + (c & 3);
-}
-
-enum { BINS = ORB_LEVEL_RING_MAX + 1, MOST_LANES = 8, GRAIN = 1024, UNCOLOURED = -1, SET_ASIDE = -2 };
+enum { BINS = ORB_LEVEL_RING_MAX + 1, GRAIN = 1024, UNCOLOURED = -1, SET_ASIDE = -2 };
 
 typedef struct builder {
   orb_context *ctx;
@@ -36,42 +30,17 @@ static void free_batches(orb_context *ctx, orb_level *level) {
   orb_free(ctx, level->ring);
   orb_free(ctx, level->shape);
   orb_free(ctx, level->heavy);
-  float *triangle_shape = level->triangle_shape;
   signed char *colour = level->colour;
   const orb_kernels *kernels = level->kernels;
   memset(level, 0, sizeof *level);
-  level->triangle_shape = triangle_shape;
   level->colour = colour;
   level->kernels = kernels;
 }
 
 void orb_level_free(orb_context *ctx, orb_level *level) {
   free_batches(ctx, level);
-  orb_free(ctx, level->triangle_shape);
   orb_free(ctx, level->colour);
   memset(level, 0, sizeof *level);
-}
-
-/* Shapes of the triangles whose first corner is at one of the vertices. */
-static void shape_triangles(void *arg, int64_t begin, int64_t end, int thread) {
-  (void)thread;
-  const builder *b = arg;
-  const orb_surface *s = b->s;
-  for (int64_t i = begin; i < end; i++) {
-    int32_t start = s->vertex_corner[b->level->vertex[i]], c = start;
-    do {
-      if ((c & 3) == 0) {
-        double half[3];
-        orb_shape_cotangents(s, s->corner[c], s->corner[c + 1], s->corner[c + 2], b->blend, half);
-        float *out = b->level->triangle_shape + shape_at(c);
-        for (int k = 0; k < 3; k++) {
-          out[k] = (float)half[k];
-        }
-        out[3] = 2 * orb_corner_area(s, c);
-      }
-      c = orb_corner_swing(s, c);
-    } while (c != start);
-  }
 }
 
 /* Greedy colouring in vertex order; counts the bins. */
@@ -161,65 +130,40 @@ static void assign_lanes(builder *b) {
 
 static void fill_batches(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
-  builder *b = arg;
-  orb_level *level = b->level;
-  const orb_surface *s = b->s;
-  int lanes = level->kernels->lanes;
-  for (int64_t at = begin; at < end; at++) {
-    int32_t *vertex = level->batch_vertex + at * lanes, k = level->batch_valence[at];
-    for (int l = level->batch_fill[at]; l < lanes; l++) {
-      vertex[l] = vertex[level->batch_fill[at] - 1];
-    }
-    int32_t *ring = level->ring + level->batch_offset[at] * lanes;
-    float *shape = level->shape + 4 * level->batch_offset[at] * lanes;
-    int32_t c[MOST_LANES];
-    for (int l = 0; l < lanes; l++) {
-      c[l] = s->vertex_corner[vertex[l]];
-    }
-    for (int32_t i = 0; i < k; i++) { /* all lanes walk in step, so that their cache misses overlap */
-      float *to = shape + 4 * (int64_t)i * lanes;
-      for (int l = 0; l < lanes; l++) {
-        ring[i * lanes + l] = s->corner[orb_corner_next(c[l])];
-        to[l] = level->triangle_shape[shape_at(orb_corner_prev(c[l]))];
-        to[lanes + l] = level->triangle_shape[shape_at(orb_corner_next(c[l]))];
-        to[2 * lanes + l] = level->triangle_shape[shape_at(c[l])];
-        to[3 * lanes + l] = level->triangle_shape[shape_at(c[l] | 3)];
-        c[l] = orb_corner_swing(s, c[l]);
-      }
-    }
-  }
+  const builder *b = arg;
+  const orb_level *level = b->level;
+  orb_fill_job job = {.surface = b->s,
+                      .blend = b->blend,
+                      .vertex = level->batch_vertex,
+                      .fill = level->batch_fill,
+                      .valence = level->batch_valence,
+                      .offset = level->batch_offset,
+                      .ring = level->ring,
+                      .shape = level->shape};
+  level->kernels->fill(&job, begin, end);
 }
 
 static orb_status list_vertices(builder *b, const unsigned char *alive, const unsigned char *pinned, int32_t live) {
   orb_level *level = b->level;
   orb_context *ctx = b->ctx;
   int64_t n = b->s->vertex_count;
-  if (!level->triangle_shape) {
-    level->triangle_shape = ORB_NEW(ctx, float, 4 * (int64_t)b->s->triangle_count);
+  if (!level->colour) {
     level->colour = ORB_NEW(ctx, signed char, n);
   }
   level->vertex = ORB_NEW(ctx, int32_t, live);
   level->heavy = ORB_NEW(ctx, int32_t, live);
-  if (!level->triangle_shape || !level->colour || !level->vertex || !level->heavy) {
+  if (!level->colour || !level->vertex || !level->heavy) {
     return ORB_E_NO_MEMORY;
   }
   memset(level->colour, UNCOLOURED, (size_t)n);
+  int32_t found = 0;
   for (int32_t v = 0; v < n; v++) {
-    if (alive[v]) {
+    found += alive[v];
+    if (alive[v] && !(pinned && pinned[v])) {
       level->vertex[level->count++] = v;
     }
   }
-  ORB_ASSERT(level->count == live);
-  ORB_TRY(orb_sliced_for(ctx, level->count, GRAIN, shape_triangles, b));
-  if (pinned) {
-    int32_t kept = 0;
-    for (int32_t i = 0; i < level->count; i++) {
-      if (!pinned[level->vertex[i]]) {
-        level->vertex[kept++] = level->vertex[i];
-      }
-    }
-    level->count = kept;
-  }
+  ORB_ASSERT(found == live);
   return ORB_OK;
 }
 

@@ -20,9 +20,8 @@ typedef struct orb_level {
   double *batch_energy, *batch_fall;
   int32_t *ring;
   float *shape;
-  float *triangle_shape; /* 4 a triangle of the surface: half cotangents, doubled area; live ones are set */
-  signed char *colour;   /* of each vertex of the surface */
-  int32_t *heavy;        /* vertices beyond ORB_LEVEL_RING_MAX or the colours: relaxed one by one */
+  signed char *colour; /* of each vertex of the surface */
+  int32_t *heavy;      /* vertices beyond ORB_LEVEL_RING_MAX or the colours: relaxed one by one */
   int32_t heavy_count;
 } orb_level;
 

@@ -73,6 +73,7 @@ struct orb_refiner {
   orb_kernel_room *room;
   int32_t star_count;
   int32_t live;
+  int one_way;
   orb_level level; /* batches of the present level; level.valid */
 };
 

@@ -56,10 +56,12 @@ orb_status orb_newton_run(orb_context *ctx, const orb_mesh *mesh, const orb_embe
   double between = orb_clock();
   timings->simplify = between - start;
   ORB_GO(status, orb_refiner_create(ctx, hierarchy, options, &refiner), done);
+  orb_refiner_one_way(refiner);
   ORB_GO(status, orb_refiner_advance(ctx, refiner, mesh->vertex_count), done);
   if (mesh->vertex_count == 4) {
     ORB_GO(status, orb_refiner_sweep(ctx, refiner, 50, NULL), done);
   }
+  orb_level_free(ctx, &refiner->level); /* first, so that the points take no more memory than there was */
   orb_refiner_points(refiner, points);
   timings->embed = orb_clock() - between;
 done:

@@ -271,6 +271,21 @@ static orb_status settle_level(orb_context *ctx, orb_refiner *r) {
   return ORB_OK;
 }
 
+void orb_refiner_one_way(orb_refiner *r) {
+  r->one_way = 1;
+}
+
+/* All collapses are undone for good. */
+static void drop_collapses(orb_context *ctx, orb_refiner *r) {
+  orb_hierarchy *h = r->hierarchy;
+  orb_free(ctx, h->log);
+  orb_free(ctx, h->area_log);
+  orb_free(ctx, h->surface.position4);
+  orb_free(ctx, r->crowding);
+  h->log = NULL;
+  h->area_log = h->surface.position4 = r->crowding = NULL;
+}
+
 orb_status orb_refiner_advance(orb_context *ctx, orb_refiner *r, int32_t vertices) {
   int32_t n = r->hierarchy->surface.vertex_count;
   vertices = vertices < n ? vertices : n;
@@ -283,6 +298,9 @@ orb_status orb_refiner_advance(orb_context *ctx, orb_refiner *r, int32_t vertice
     while (r->live < stop) {
       ORB_TRY(orb_refiner_undo_round(ctx, r, blend));
       orb_progress(ctx, "embed", 0.6 * r->live / n);
+    }
+    if (r->one_way && r->live == n) {
+      drop_collapses(ctx, r);
     }
     ORB_TRY(settle_level(ctx, r));
   }
