@@ -154,6 +154,9 @@ orb_status orb_base_triangulate(orb_context *ctx, const double *targets, int32_t
   memcpy(triangles, OCTAHEDRON, sizeof triangles);
   orb_mesh mesh = {.vertex_count = 6, .triangle_count = 8, .positions = corner[0], .triangles = triangles};
   orb_status status = orb_sheet_create(ctx, &mesh, corner[0], out);
+  orb_free(ctx, out->origin); /* flips leave no triangle in its parent */
+  out->origin = NULL;
+  out->given = NULL;
   *good = 1;
   for (int32_t i = 0; status == ORB_OK && *good && i < count; i++) {
     status = insert(ctx, out, targets + 3 * (size_t)i, good);

@@ -321,6 +321,7 @@ static orb_status lay_out(joiner *j, orb_sheet *base) {
   orb_embed_defaults(&options);
   ORB_GO(status, orb_embed(ctx, &mesh, &options, &embedding), end);
   ORB_GO(status, orb_sheet_create(ctx, &mesh, embedding.points, base), end);
+  base->given = NULL; /* its mesh ends here */
 end:
   orb_embedding_free(ctx, &embedding);
   orb_free(ctx, mesh.positions);

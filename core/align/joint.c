@@ -5,8 +5,6 @@
 #include "align/pin.h"
 #include "base/check.h"
 
-enum { SWEEPS = 60 };
-
 typedef struct joint {
   orb_sheet *sheets; /* copies that are refined */
   orb_paths *paths;
@@ -27,7 +25,7 @@ static orb_status run(orb_context *ctx, joint *j, const orb_sheet *given, int32_
   for (int32_t s = 0; s < shape_count && *held; s++) {
     ORB_TRY(orb_patch_embed(ctx, &j->sheets[s], &j->base, j->at + (size_t)s * (size_t)count, &j->paths[s], held));
     if (*held) {
-      ORB_TRY(orb_pin_relax(ctx, &j->sheets[s], landmarks, count, preset, SWEEPS));
+      ORB_TRY(orb_pin_slim(ctx, &j->sheets[s], landmarks, count, preset));
     }
   }
   return ORB_OK;

@@ -16,7 +16,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { SWEEPS = 60, ITERATIONS = 4000 };
+enum { ITERATIONS = 4000 };
 
 typedef struct patcher {
   orb_context *ctx;
@@ -384,7 +384,7 @@ orb_status orb_pin_patches(orb_context *ctx, orb_sheet *sheet, const int32_t *la
   patcher p = {.ctx = ctx};
   orb_status status = build(&p, sheet, landmarks, count, targets, growth, held);
   if (status == ORB_OK && *held) {
-    status = orb_pin_relax(ctx, &p.sheet, landmarks, count, preset, SWEEPS);
+    status = orb_pin_slim(ctx, &p.sheet, landmarks, count, preset);
   }
   if (status == ORB_OK && *held) {
     orb_sheet_free(ctx, sheet);

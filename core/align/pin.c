@@ -9,7 +9,8 @@
 #include "base/check.h"
 #include "embed/hierarchy.h"
 
-enum { COARSE = 300, COARSE_A_LANDMARK = 6, WALKS = 2 };
+enum { COARSE = 300, COARSE_A_LANDMARK = 6, WALKS = 2, ROUNDS = 24, ROUND_SWEEPS = 5, SWEEPS = 60 };
+static const double LITTLE = 0.02; /* of the new vertices: not worth another round */
 /* How far a sheet may grow: a little for landmarks that merely cross, much for those in quite another order. */
 static const double GROWTH_SMALL = 0.35, GROWTH_MAX = 64;
 
@@ -52,6 +53,20 @@ end:
   orb_refiner_destroy(ctx, refiner);
   orb_hierarchy_destroy(ctx, hierarchy);
   return status;
+}
+
+orb_status orb_pin_slim(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count,
+                        orb_preset preset) {
+  for (int round = 0; round < ROUNDS; round++) {
+    int32_t removed, more;
+    ORB_TRY(orb_sheet_thin(ctx, sheet, &removed));
+    more = sheet->shape.mesh.vertex_count - sheet->given_vertices;
+    if (removed == 0 || removed < LITTLE * more) {
+      break;
+    }
+    ORB_TRY(orb_pin_relax(ctx, sheet, landmarks, count, ORB_PRESET_FAST, ROUND_SWEEPS));
+  }
+  return orb_pin_relax(ctx, sheet, landmarks, count, preset, SWEEPS);
 }
 
 static orb_status refuse(orb_context *ctx, int32_t shape, const int32_t *landmarks, int32_t count) {

@@ -31,4 +31,8 @@ int32_t orb_pin_limit(const orb_sheet *sheet, double growth);
 ORB_MUST_CHECK orb_status orb_pin_relax(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count,
                                         orb_preset preset, int32_t sweeps);
 
+/* Sweeps as above, and removes what splits made and the landmarks no longer need, by turns. */
+ORB_MUST_CHECK orb_status orb_pin_slim(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count,
+                                       orb_preset preset);
+
 #endif

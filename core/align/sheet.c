@@ -14,13 +14,16 @@ orb_status orb_sheet_create(orb_context *ctx, const orb_mesh *mesh, const double
     return status;
   }
   int32_t vertices = mesh->vertex_count, triangles = mesh->triangle_count;
+  out->given_vertices = vertices;
+  out->given = mesh->triangles;
   out->vertex_capacity = vertices;
   out->triangle_capacity = triangles;
   out->shape.points = ORB_NEW(ctx, double, 3 * (size_t)vertices);
   out->shape.parent = ORB_NEW(ctx, int32_t, triangles);
   out->twin = ORB_NEW(ctx, int32_t, 3 * (size_t)triangles);
   out->corner = ORB_NEW(ctx, int32_t, vertices);
-  if (!out->shape.points || !out->shape.parent || !out->twin || !out->corner) {
+  out->origin = ORB_NEW(ctx, orb_origin, 0);
+  if (!out->shape.points || !out->shape.parent || !out->twin || !out->corner || !out->origin) {
     status = ORB_E_NO_MEMORY;
     goto end;
   }
@@ -46,6 +49,7 @@ void orb_sheet_free(orb_context *ctx, orb_sheet *sheet) {
   orb_free(ctx, sheet->shape.landmark_vertices);
   orb_free(ctx, sheet->twin);
   orb_free(ctx, sheet->corner);
+  orb_free(ctx, sheet->origin);
   memset(sheet, 0, sizeof *sheet);
 }
 
@@ -53,6 +57,7 @@ void orb_sheet_release(orb_context *ctx, orb_sheet *sheet, orb_aligned_shape *ou
   *out = sheet->shape;
   orb_free(ctx, sheet->twin);
   orb_free(ctx, sheet->corner);
+  orb_free(ctx, sheet->origin);
   memset(sheet, 0, sizeof *sheet);
 }
 
@@ -72,6 +77,8 @@ orb_status orb_sheet_copy(orb_context *ctx, const orb_sheet *sheet, orb_sheet *o
     return status;
   }
   size_t vertices = (size_t)mesh->vertex_count, triangles = (size_t)mesh->triangle_count;
+  out->given_vertices = sheet->given_vertices;
+  out->given = sheet->given;
   out->vertex_capacity = mesh->vertex_count;
   out->triangle_capacity = mesh->triangle_count;
   out->shape.points = copy_block(ctx, sheet->shape.points, 3 * vertices, sizeof(double));
@@ -79,6 +86,10 @@ orb_status orb_sheet_copy(orb_context *ctx, const orb_sheet *sheet, orb_sheet *o
   out->twin = copy_block(ctx, sheet->twin, 3 * triangles, sizeof(int32_t));
   out->corner = copy_block(ctx, sheet->corner, vertices, sizeof(int32_t));
   int failed = !out->shape.points || !out->shape.parent || !out->twin || !out->corner;
+  if (sheet->origin) {
+    out->origin = copy_block(ctx, sheet->origin, vertices - (size_t)sheet->given_vertices, sizeof(orb_origin));
+    failed |= !out->origin;
+  }
   if (sheet->shape.landmark_vertices && !failed) {
     out->landmark_count = sheet->landmark_count;
     out->shape.landmark_vertices =
@@ -122,6 +133,7 @@ static orb_status make_room(orb_context *ctx, orb_sheet *s) {
     if (!grow(ctx, &mesh->positions, 3 * (size_t)capacity, sizeof(double)) ||
         !grow(ctx, &mesh->source, (size_t)capacity, sizeof(int32_t)) ||
         !grow(ctx, &s->shape.points, 3 * (size_t)capacity, sizeof(double)) ||
+        !grow(ctx, &s->origin, (size_t)(capacity - s->given_vertices), sizeof(orb_origin)) ||
         !grow(ctx, &s->corner, (size_t)capacity, sizeof(int32_t))) {
       return ORB_E_NO_MEMORY;
     }
@@ -200,10 +212,41 @@ static void corner_blend(const orb_mesh *mesh, const corner_values v[3], const d
   }
 }
 
+static void origin_add(orb_origin *o, int32_t vertex, double weight) {
+  int k = 0;
+  while (k < 2 && o->vertex[k] >= 0 && o->vertex[k] != vertex) {
+    k++;
+  }
+  ORB_ASSERT(o->vertex[k] < 0 || o->vertex[k] == vertex);
+  o->vertex[k] = vertex;
+  o->weight[k] += weight;
+}
+
+/* The mix of three vertices of one triangle, over the corners of that triangle's parent. */
+static void origin_mix(const orb_sheet *s, const int32_t v[3], const double w[3], orb_origin *out) {
+  *out = (orb_origin){{-1, -1, -1}, {0, 0, 0}};
+  for (int i = 0; i < 3; i++) {
+    if (w[i] == 0) {
+      continue;
+    }
+    if (v[i] < s->given_vertices) {
+      origin_add(out, v[i], w[i]);
+      continue;
+    }
+    const orb_origin *from = &s->origin[v[i] - s->given_vertices];
+    for (int k = 0; k < 3 && from->vertex[k] >= 0; k++) {
+      origin_add(out, from->vertex[k], w[i] * from->weight[k]);
+    }
+  }
+}
+
 /* A new vertex at a barycentric mix of three old ones. */
 static int32_t add_vertex(orb_sheet *s, const int32_t v[3], const double w[3]) {
   orb_mesh *mesh = &s->shape.mesh;
   int32_t m = mesh->vertex_count++;
+  if (s->origin) {
+    origin_mix(s, v, w, &s->origin[m - s->given_vertices]);
+  }
   double *x = mesh->positions + 3 * (size_t)m, *p = s->shape.points + 3 * (size_t)m;
   for (int k = 0; k < 3; k++) {
     x[k] = p[k] = 0;

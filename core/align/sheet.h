@@ -5,6 +5,12 @@
 
 #include "orbmorph/align.h"
 
+/* Where a new vertex lies: coordinates (sum 1) over three vertices of the given mesh, all of one of its triangles. */
+typedef struct orb_origin {
+  int32_t vertex[3]; /* −1: none, weight 0 */
+  double weight[3];
+} orb_origin;
+
 /* Owns the aligned shape that it grows, until orb_sheet_release(). Every triangle lies in triangle parent[t] of the
  * mesh it was made from; new vertices have source −1. */
 typedef struct orb_sheet {
@@ -13,9 +19,14 @@ typedef struct orb_sheet {
   int32_t *corner; /* of each vertex: one half-edge that leaves it */
   int32_t vertex_capacity, triangle_capacity;
   int32_t landmark_count; /* of shape.landmark_vertices */
+  int32_t given_vertices;
+  /* Corners of the triangles of the given mesh, borrowed, and of each new vertex, from given_vertices on, where it lies
+   * (room for vertex_capacity − given_vertices): for orb_sheet_thin(). Both NULL where triangles were flipped. */
+  const int32_t *given;
+  orb_origin *origin;
 } orb_sheet;
 
-/* A deep copy of mesh and points, unsplit. */
+/* A deep copy of mesh and points, unsplit; the mesh's triangles are borrowed too. */
 ORB_MUST_CHECK orb_status orb_sheet_create(orb_context *ctx, const orb_mesh *mesh, const double *points,
                                            orb_sheet *out);
 void orb_sheet_free(orb_context *ctx, orb_sheet *sheet);
@@ -43,6 +54,11 @@ static inline int32_t orb_sheet_swing(const orb_sheet *sheet, int32_t h) {
 
 /* The half-edge from vertex a to vertex b, −1 if they are no neighbours. O(valence). */
 int32_t orb_sheet_edge(const orb_sheet *sheet, int32_t a, int32_t b);
+
+/* Removes vertices that splits made, other than landmarks, where the flat surface about them and the sphere allow: an
+ * edge collapse that keeps every triangle in its parent and exactly positive both there and on the sphere. Vertices of
+ * the given mesh keep their numbers; others and triangles are renumbered. *removed: how many vertices went. */
+ORB_MUST_CHECK orb_status orb_sheet_thin(orb_context *ctx, orb_sheet *sheet, int32_t *removed);
 
 /* Makes each landmark a vertex: splits the triangle or edge it lies in where it is no vertex yet. Places are on the
  * mesh that the (unsplit) surface was made from; a coordinate below 2e-7 counts as zero. Fills landmark_vertices,

@@ -156,6 +156,55 @@ static void random_landmarks_meet(void **state) {
   close_bodies(&b);
 }
 
+/* What splits and thinning leave of a corner's attributes is what the given triangle has there: here texture
+ * coordinates and colours that are linear in space. */
+static void attributes_stay_linear(void **state) {
+  (void)state;
+  bodies b;
+  open_bodies(&b, NULL);
+  random_landmarks(&b, 30, 5);
+  for (int s = 0; s < 2; s++) {
+    orb_mesh *mesh = &b.mesh[s];
+    size_t corners = 3 * (size_t)mesh->triangle_count;
+    mesh->texcoords = ORB_NEW(b.ctx, float, 2 * corners);
+    mesh->colors = ORB_NEW(b.ctx, float, 4 * corners);
+    assert_true(mesh->texcoords && mesh->colors);
+    for (size_t h = 0; h < corners; h++) {
+      const double *x = mesh->positions + 3 * (size_t)mesh->triangles[h];
+      for (int k = 0; k < 3; k++) {
+        mesh->colors[4 * h + (size_t)k] = (float)x[k];
+      }
+      mesh->colors[4 * h + 3] = 1;
+      mesh->texcoords[2 * h] = (float)(x[0] - x[1]);
+      mesh->texcoords[2 * h + 1] = (float)(x[2] + 0.5 * x[1]);
+    }
+  }
+  orb_align_options options = options_of(ORB_ALIGN_PIN);
+  orb_alignment out;
+  align_and_check(b.ctx, b.shape, 2, b.landmark, 30, &options, &out);
+  int32_t grown = 0;
+  for (int s = 0; s < 2; s++) {
+    const orb_mesh *mesh = &out.shapes[s].mesh;
+    grown += mesh->triangle_count - b.mesh[s].triangle_count;
+    assert_true(mesh->triangle_count < 8 * b.mesh[s].triangle_count);
+    for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
+      const double *x = mesh->positions + 3 * (size_t)mesh->triangles[h];
+      for (int k = 0; k < 3; k++) {
+        assert_true(fabs((double)mesh->colors[4 * h + k] - x[k]) < 1e-5);
+      }
+      assert_true(fabs((double)mesh->texcoords[2 * h] - (x[0] - x[1])) < 1e-5);
+      assert_true(fabs((double)mesh->texcoords[2 * h + 1] - (x[2] + 0.5 * x[1])) < 1e-5);
+    }
+  }
+  assert_true(grown > 0);
+  orb_alignment_free(b.ctx, &out);
+  for (int s = 0; s < 2; s++) {
+    orb_free(b.ctx, b.mesh[s].texcoords);
+    orb_free(b.ctx, b.mesh[s].colors);
+  }
+  close_bodies(&b);
+}
+
 /* Neighbours on one shape, spread on the other; places inside a triangle and on edges. */
 static void awkward_places_meet(void **state) {
   (void)state;
@@ -366,15 +415,11 @@ static void warp_interpolates(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(like_landmarks_meet),
-      cmocka_unit_test(random_landmarks_meet),
-      cmocka_unit_test(awkward_places_meet),
-      cmocka_unit_test(tetrahedra_in_all_orders),
-      cmocka_unit_test(twins_merge_and_contradictions_are_named),
-      cmocka_unit_test(same_bytes_for_any_threads),
-      cmocka_unit_test(cancel_ends_it),
-      cmocka_unit_test(lack_of_memory_is_an_error),
-      cmocka_unit_test(warp_interpolates),
+      cmocka_unit_test(like_landmarks_meet),        cmocka_unit_test(random_landmarks_meet),
+      cmocka_unit_test(attributes_stay_linear),     cmocka_unit_test(awkward_places_meet),
+      cmocka_unit_test(tetrahedra_in_all_orders),   cmocka_unit_test(twins_merge_and_contradictions_are_named),
+      cmocka_unit_test(same_bytes_for_any_threads), cmocka_unit_test(cancel_ends_it),
+      cmocka_unit_test(lack_of_memory_is_an_error), cmocka_unit_test(warp_interpolates),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
