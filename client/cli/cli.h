@@ -49,6 +49,8 @@ typedef enum cli_option_id {
   OPT_YAW,
   OPT_PITCH,
   OPT_WIRE,
+  OPT_INSIDE,
+  OPT_FRAMES,
   OPT_COUNT
 } cli_option_id;
 

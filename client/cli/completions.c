@@ -6,7 +6,7 @@
 /* What a command takes besides options, where that is a fixed list. */
 static const char *operand_words(const cli_command *command) {
   return !strcmp(command->name, "ls")            ? "meshes embeddings supermeshes jobs"
-         : !strcmp(command->name, "completions") ? "bash zsh"
+         : !strcmp(command->name, "completions") ? "bash zsh fish"
                                                  : NULL;
 }
 
@@ -72,8 +72,10 @@ static void zsh_command(const cli_command *command) {
     printf(" \\\n        '%s--%s[", id == OPT_SET ? "*" : "", o->name);
     zsh_text(o->help);
     putchar(']');
-    if (o->value)
-      printf(":%s:%s%s%s", o->value, o->choices ? "(" : "_files", o->choices ? o->choices : "", o->choices ? ")" : "");
+    if (o->choices)
+      printf(":%s:(%s)", o->value, o->choices);
+    else if (o->value)
+      printf(":%s:%s", o->value, strcmp(o->value, "FILE") ? "" : "_files");
     putchar('\'');
   }
   if (operand_words(command))
@@ -100,15 +102,57 @@ static void zsh(void) {
   puts("  esac\n}\n_orbmorph \"$@\"");
 }
 
-int cli_run_completions(cli *c) {
-  const char *shell = c->args.operands[0];
-  if (!strcmp(shell, "bash")) {
-    bash();
-  } else if (!strcmp(shell, "zsh")) {
-    zsh();
-  } else {
-    cli_error(c, "there are completions for bash and zsh");
-    return CLI_USAGE;
+/* Text within single quotes of fish. */
+static void fish_text(const char *text) {
+  for (; *text; text++) {
+    if (*text == '\'' || *text == '\\')
+      putchar('\\');
+    putchar(*text);
   }
-  return CLI_DONE;
+}
+
+static void fish_command(const cli_command *command) {
+  printf("complete -c orbmorph -n __fish_use_subcommand -f -a %s -d '", command->name);
+  fish_text(command->summary);
+  puts("'");
+  if (operand_words(command))
+    printf("complete -c orbmorph -n '__fish_seen_subcommand_from %s' -f -a '%s'\n", command->name,
+           operand_words(command));
+  for (int id = 0; id < OPT_COUNT; id++) {
+    const cli_option *o = &cli_options[id];
+    if (!(command->options & CLI_BIT(id)))
+      continue;
+    printf("complete -c orbmorph -n '__fish_seen_subcommand_from %s' -l %s", command->name, o->name);
+    if (o->letter)
+      printf(" -s %c", o->letter);
+    if (o->choices)
+      printf(" -x -a '%s'", o->choices);
+    else if (o->value)
+      fputs(" -r", stdout);
+    fputs(" -d '", stdout);
+    fish_text(o->help);
+    puts("'");
+  }
+}
+
+static void fish(void) {
+  puts("# Completions of orbmorph for fish. Made by 'orbmorph completions fish'.");
+  puts("complete -c orbmorph -n __fish_use_subcommand -l help -d 'this help'");
+  puts("complete -c orbmorph -n __fish_use_subcommand -l version -d 'the version'");
+  for (int i = 0; i < cli_command_count; i++)
+    fish_command(&cli_commands[i]);
+}
+
+int cli_run_completions(cli *c) {
+  static const struct {
+    const char *name;
+    void (*print)(void);
+  } shells[] = {{"bash", bash}, {"zsh", zsh}, {"fish", fish}};
+  for (size_t i = 0; i < sizeof shells / sizeof shells[0]; i++)
+    if (!strcmp(c->args.operands[0], shells[i].name)) {
+      shells[i].print();
+      return CLI_DONE;
+    }
+  cli_error(c, "there are completions for bash, zsh and fish, but not for '%s'", c->args.operands[0]);
+  return CLI_USAGE;
 }

@@ -33,9 +33,9 @@ const cli_command cli_commands[] = {
     {"doctor", "FILE…", "Check meshes, and say how to mend them", 1, -1, CLI_COMMON, cli_run_doctor},
     {"view", "FILE.glb", "Draw the poses of a morph into a PNG file, in software", 1, 1,
      CLI_BIT(OPT_HELP) | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_POSES) | CLI_BIT(OPT_SIZE) | CLI_BIT(OPT_UP) |
-         CLI_BIT(OPT_YAW) | CLI_BIT(OPT_PITCH) | CLI_BIT(OPT_WIRE),
+         CLI_BIT(OPT_YAW) | CLI_BIT(OPT_PITCH) | CLI_BIT(OPT_WIRE) | CLI_BIT(OPT_INSIDE) | CLI_BIT(OPT_FRAMES),
      cli_run_view},
-    {"completions", "bash|zsh", "Print the completions of a shell", 1, 1, CLI_BIT(OPT_HELP), cli_run_completions},
+    {"completions", "bash|zsh|fish", "Print the completions of a shell", 1, 1, CLI_BIT(OPT_HELP), cli_run_completions},
 };
 const int cli_command_count = (int)(sizeof cli_commands / sizeof cli_commands[0]);
 

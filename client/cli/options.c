@@ -40,6 +40,8 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_YAW] = {"yaw", 0, "DEGREES", NULL, "turn about that axis, 30"},
     [OPT_PITCH] = {"pitch", 0, "DEGREES", NULL, "look from above, 15"},
     [OPT_WIRE] = {"wire", 0, NULL, NULL, "draw the edges of triangles"},
+    [OPT_INSIDE] = {"inside", 0, NULL, NULL, "paint red what is seen from within"},
+    [OPT_FRAMES] = {"frames", 0, "N", NULL, "an animated PNG of so many frames, 20 a second, instead of a sheet"},
 };
 
 static int find_long(const cli_command *command, const char *text, size_t length) {

@@ -1,4 +1,5 @@
 /* Progress on a terminal, and waiting for jobs. */
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -61,11 +62,30 @@ static int conclude(cli *c, const cJSON *job, char **result) {
   return CLI_REFUSED;
 }
 
+/* What is said when the user ends the wait, made beforehand: a signal handler may not do it. */
+static char farewell[256];
+
+static void on_interrupt(int signal_number) {
+  if (write(STDERR_FILENO, farewell, strlen(farewell)) >= 0)
+    signal(signal_number, SIG_DFL);
+  raise(signal_number);
+}
+
+static void say_farewell(const cli *c, const char *url) {
+  snprintf(farewell, sizeof farewell,
+           "%sorbmorph: the job goes on without you. To wait again: orbmorph job --wait %s\n"
+           "The same command again waits for it too; to stop it: orbmorph job --cancel %s\n",
+           c->bar ? "\r\033[K" : "", url, url);
+  struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = SA_NODEFER};
+  sigaction(SIGINT, &action, NULL);
+}
+
 int cli_wait(cli *c, const cJSON *job, char **result) {
   char *url = cli_text("%s", cli_string(job, "url", ""));
   cli_reply reply = {0};
   int rc = CLI_DONE;
   *result = NULL;
+  say_farewell(c, url);
   while (!ended(cli_string(job, "state", ""))) {
     cli_reply next;
     const char *stage = cli_string(job, "stage", cli_string(job, "state", ""));
@@ -83,6 +103,7 @@ int cli_wait(cli *c, const cJSON *job, char **result) {
     }
     job = reply.json;
   }
+  signal(SIGINT, SIG_DFL);
   if (rc == CLI_DONE)
     rc = conclude(c, job, result);
   cli_reply_free(&reply);

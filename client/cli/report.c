@@ -55,6 +55,11 @@ static double worst_residual(const cJSON *supermesh) {
   return worst;
 }
 
+/* Whether landmarks were found by the daemon, not given. */
+static int were_found(const cJSON *supermesh) {
+  return member(cJSON_GetArrayItem(member(supermesh, "landmarks"), 0), "vertex") == NULL;
+}
+
 void cli_print_supermesh(const cJSON *supermesh) {
   char vertices[32], triangles[32], error[32], rms[32];
   const cJSON *shape, *certificate = member(supermesh, "certificate");
@@ -69,7 +74,9 @@ void cli_print_supermesh(const cJSON *supermesh) {
     printf("  %-16s farthest from its input %s of the diagonal, on average %s\n", cli_string(shape, "name", "?"), error,
            rms);
   }
-  if (landmarks) {
+  if (landmarks && were_found(supermesh)) {
+    printf("  %d landmarks were found; see 'orbmorph get %s --json'\n", landmarks, cli_string(supermesh, "url", "?"));
+  } else if (landmarks) {
     percent(worst_residual(supermesh), error);
     printf("  %d landmarks, %s (off by at most %s)\n", landmarks,
            cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "exact" : "not exact", error);
@@ -94,11 +101,11 @@ static void markdown_shapes(FILE *out, const cJSON *supermesh) {
   fputs("\nDistances are fractions of the diagonal of each shape's bounding box.\n", out);
 }
 
-static void markdown_numbers(FILE *out, const char *title, const cJSON *object, const char *unit) {
+static void markdown_numbers(FILE *out, const char *title, const cJSON *object) {
   const cJSON *item;
   fprintf(out, "\n%s:", title);
-  cJSON_ArrayForEach(item, object) if (cJSON_IsNumber(item))
-      fprintf(out, " %s %.4g%s%s", item->string, item->valuedouble, unit, item->next ? "," : ".");
+  cJSON_ArrayForEach(item, object) if (cJSON_IsNumber(item)) fprintf(
+      out, " %s %.*f%s", item->string, item->valuedouble < 100 ? 1 : 0, item->valuedouble, item->next ? "," : ".");
   fputc('\n', out);
 }
 
@@ -117,9 +124,9 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   if (cJSON_GetArraySize(member(supermesh, "landmarks"))) {
     const char *exact =
         cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "They coincide exactly." : "They coincide only nearly.";
-    int given = member(cJSON_GetArrayItem(member(supermesh, "landmarks"), 0), "vertex") != NULL;
     fprintf(out, "\n## Landmarks\n\n%s\n\n| landmark | off by, one column a shape |\n|---|---|\n",
-            given ? exact : "None were given; these were found. Look at them before you rely on the result.");
+            were_found(supermesh) ? "None were given; these were found. Look at them before you rely on the result."
+                                  : exact);
     cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
       const cJSON *residual;
       fprintf(out, "| %s |", cli_string(landmark, "name", ""));
@@ -132,7 +139,7 @@ static void markdown(FILE *out, const cJSON *supermesh) {
     }
   }
   fputs("\n## Time\n", out);
-  markdown_numbers(out, "Milliseconds", member(supermesh, "timings_ms"), "");
+  markdown_numbers(out, "Milliseconds", member(supermesh, "timings_ms"));
 }
 
 int cli_write_report(cli *c, const char *path, const cli_reply *supermesh) {

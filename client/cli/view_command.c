@@ -36,10 +36,12 @@ int cli_run_view(cli *c) {
     return CLI_USAGE;
   }
   if (!whole(c, OPT_POSES, 2, 100, &options.poses) || !whole(c, OPT_SIZE, 16, 4096, &options.size) ||
-      !angle(c, OPT_YAW, &options.yaw) || !angle(c, OPT_PITCH, &options.pitch))
+      !whole(c, OPT_FRAMES, 2, 10000, &options.frames) || !angle(c, OPT_YAW, &options.yaw) ||
+      !angle(c, OPT_PITCH, &options.pitch))
     return CLI_USAGE;
   options.up = up ? up[0] : options.up;
   options.wire = c->args.value[OPT_WIRE] != NULL;
+  options.inside = c->args.value[OPT_INSIDE] != NULL;
   char *base = cli_base_name(glb), *png = output ? cli_text("%s", output) : cli_text("%s.png", base);
   int rc = CLI_DONE;
   if (orbmorph_view(glb, png, &options, error, sizeof error) == 0) {

@@ -15,7 +15,7 @@ static unsigned char srgb(float linear) {
   return (unsigned char)(v * 255 + 0.5f);
 }
 
-static void make_row(const view_canvas *canvas, int y, unsigned char *row) {
+void view_canvas_row(const view_canvas *canvas, int y, unsigned char *row) {
   for (int x = 0; x < canvas->width / 2; x++) {
     for (int c = 0; c < 3; c++) {
       float sum = 0;
@@ -37,7 +37,7 @@ static int write_rows(png_structp png, png_infop info, FILE *file, const view_ca
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);
   for (int y = 0; y < canvas->height / 2; y++) {
-    make_row(canvas, y, row);
+    view_canvas_row(canvas, y, row);
     png_write_row(png, row);
   }
   png_write_end(png, info);

@@ -53,11 +53,11 @@ _orbmorph() {
       words="--server --json --quiet --help "
       ;;
     view)
-      words="--help --output --poses --size --up --yaw --pitch --wire "
+      words="--help --output --poses --size --up --yaw --pitch --wire --inside --frames "
       ;;
     completions)
       words="--help "
-      operands="bash zsh"
+      operands="bash zsh fish"
       ;;
   esac
   case "$current" in

@@ -267,7 +267,7 @@ static int parse(int argc, char **argv, int command, bench_options *o) {
 }
 
 int main(int argc, char **argv) {
-  if (argc >= 2 && strcmp(argv[1], "--help") == 0) {
+  if ((argc >= 2 && strcmp(argv[1], "--help") == 0) || (argc == 3 && strcmp(argv[2], "--help") == 0)) {
     fputs(usage_text, stdout);
     return BENCH_DONE;
   }

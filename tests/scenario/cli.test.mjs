@@ -1,37 +1,20 @@
 // The command line against a real daemon: what it prints, what it writes, how it ends.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { mkdtemp, mkdir, readFile, rm, writeFile, readdir, copyFile } from 'node:fs/promises';
-import { tmpdir } from 'node:os';
+import { mkdir, readFile, writeFile, readdir, copyFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
-import { binaries, daemon, root, samples } from './support/daemon.mjs';
+import { folder, run } from './support/cli.mjs';
+import { binaries, daemon, samples } from './support/daemon.mjs';
 import { morphOf } from './support/glb.mjs';
 import * as shapes from './support/shapes.mjs';
-
-function run(args, { env = {}, cwd } = {}) {
-  return new Promise((resolve, reject) => {
-    const child = spawn(binaries.client, args, { cwd, env: { ...process.env, ORBMORPH_SERVER: '', ...env }, stdio: ['ignore', 'pipe', 'pipe'] });
-    const out = [], err = [];
-    child.stdout.on('data', (chunk) => out.push(chunk));
-    child.stderr.on('data', (chunk) => err.push(chunk));
-    child.on('error', reject);
-    child.on('close', (code, signal) => resolve({ code: code ?? signal, bytes: Buffer.concat(out), out: Buffer.concat(out).toString(), err: Buffer.concat(err).toString() }));
-  });
-}
-
-async function folder(t) {
-  const made = await mkdtemp(path.join(tmpdir(), 'orbmorph-cli-'));
-  t.after(() => rm(made, { recursive: true, force: true }));
-  return made;
-}
 
 const dog = path.join(samples, 'dog.obj'), giraffe = path.join(samples, 'giraffe.off');
 const landmarks = path.join(samples, 'dog-giraffe.json');
 
 test('wrong usage ends with 2 and says what is wrong', async () => {
   for (const args of [[], ['fly'], ['morph', 'one'], ['morph', '--bend', 'a', 'b'], ['upload'], ['job'], ['morph', 'a', 'b', '--landmarks'],
-    ['morph', 'a', 'b', '--json=yes'], ['ls', 'shoes'], ['get', 'x', '--part', 'wing'], ['completions', 'fish'],
+    ['morph', 'a', 'b', '--json=yes'], ['ls', 'shoes'], ['get', 'x', '--part', 'wing'], ['completions', 'tcsh'],
     ['morph', dog, giraffe, '--tolerance', 'much'], ['morph', dog, giraffe, '--max-triangles', '1e4'], ['morph', dog, giraffe, '--set', 'x'],
     ['upload', '/nowhere/mesh.obj'], ['morph', dog, giraffe, '--landmarks', '/nowhere.json'], ['upload', '--name', 'n', dog, giraffe]]) {
     const { code, err, out } = await run(args, { env: { ORBMORPH_SERVER: 'http://127.0.0.1:9' } });
@@ -202,11 +185,4 @@ test('view draws a picture of a morph', async (t) => {
   assert.equal(png.toString('latin1', 1, 4), 'PNG');
   assert.deepEqual([png.readUInt32BE(16), png.readUInt32BE(20)], [192, 64]);
   assert.equal((await run(['view', dog], { cwd: at })).code, 2);
-});
-
-test('shell completions are what the program prints', async () => {
-  for (const [shell, file] of [['bash', 'orbmorph.bash'], ['zsh', '_orbmorph']]) {
-    const { out } = await run(['completions', shell]);
-    assert.equal(out, await readFile(path.join(root, 'deploy/completions', file), 'utf8'), `deploy/completions/${file} is stale`);
-  }
 });

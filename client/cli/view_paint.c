@@ -1,0 +1,54 @@
+/* Base colours and their textures, as far as the view draws them. */
+#include <stdlib.h>
+
+#include "view_glb.h"
+
+/* How a texture goes on beyond its edge; glTF's default is to repeat. */
+static void read_wrap(const glb *r, const cJSON *texture, int wrap[2]) {
+  const cJSON *sampler = glb_entry(r, "samplers", glb_number(texture, "sampler", -1));
+  wrap[0] = (int)glb_number(sampler, "wrapS", VIEW_REPEAT);
+  wrap[1] = (int)glb_number(sampler, "wrapT", VIEW_REPEAT);
+}
+
+static int read_texture(glb *r, const cJSON *texture, view_texture *out) {
+  const cJSON *image = glb_entry(r, "images", glb_number(texture, "source", -1));
+  size_t size = 0;
+  const unsigned char *bytes = glb_view(r, glb_number(image, "bufferView", -1), &size);
+  if (!bytes || view_texture_decode(bytes, size, out) != 0) {
+    return glb_refuse(r, "a texture is not a PNG or JPEG image within the file, or is damaged");
+  }
+  read_wrap(r, texture, out->wrap);
+  return 0;
+}
+
+static void read_factor(const cJSON *surface, float factor[3]) {
+  const cJSON *list = cJSON_GetObjectItemCaseSensitive(surface, "baseColorFactor");
+  for (int c = 0; c < 3; c++) {
+    const cJSON *item = cJSON_GetArrayItem(list, c);
+    factor[c] = cJSON_IsNumber(item) ? (float)item->valuedouble : 1;
+  }
+}
+
+int view_materials_read(glb *r, view_mesh *out) {
+  const cJSON *materials = cJSON_GetObjectItemCaseSensitive(r->json, "materials"), *material;
+  const cJSON *textures = cJSON_GetObjectItemCaseSensitive(r->json, "textures"), *texture;
+  out->materials = calloc((size_t)cJSON_GetArraySize(materials) + 1, sizeof *out->materials);
+  out->textures = calloc((size_t)cJSON_GetArraySize(textures) + 1, sizeof *out->textures);
+  if (!out->materials || !out->textures) {
+    return glb_refuse(r, "there is not enough memory");
+  }
+  cJSON_ArrayForEach(texture, textures) {
+    if (read_texture(r, texture, &out->textures[out->texture_count++]) != 0) {
+      return -1;
+    }
+  }
+  cJSON_ArrayForEach(material, materials) {
+    const cJSON *surface = cJSON_GetObjectItemCaseSensitive(material, "pbrMetallicRoughness");
+    view_material *paint = &out->materials[out->material_count++];
+    double index = glb_number(cJSON_GetObjectItemCaseSensitive(surface, "baseColorTexture"), "index", -1);
+    paint->texture = index < out->texture_count ? (int32_t)index : -1;
+    read_factor(surface, paint->factor);
+  }
+  out->materials[out->material_count++] = (view_material){{1, 1, 1}, -1};
+  return 0;
+}

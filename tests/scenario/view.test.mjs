@@ -1,0 +1,117 @@
+// view: what the pictures show, from files made here by hand.
+import assert from 'node:assert/strict';
+import { readFile, writeFile } from 'node:fs/promises';
+import path from 'node:path';
+import test from 'node:test';
+import { folder, run } from './support/cli.mjs';
+import { readPng, writePng } from './support/png.mjs';
+import { samples } from './support/daemon.mjs';
+
+/** A GLB of one square in the plane z = 0, from (−1,−1) to (1,1), that a target moves. */
+function square({ colors, uv, image, factor, wrap = 10497, move = [0, 0, 0] }) {
+  const parts = [], views = [], accessors = [];
+  const push = (bytes) => {
+    const offset = parts.reduce((n, p) => n + p.length, 0);
+    views.push({ buffer: 0, byteOffset: offset, byteLength: bytes.length });
+    parts.push(bytes, Buffer.alloc((4 - (bytes.length % 4)) % 4));
+    return views.length - 1;
+  };
+  const floats = (values, width, extra) => accessors.push({ bufferView: push(Buffer.from(new Float32Array(values.flat()).buffer)), componentType: 5126, count: values.length, type: `VEC${width}`, ...extra }) - 1;
+  const corners = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]];
+  const attributes = { POSITION: floats(corners, 3, { min: [-1, -1, 0], max: [1, 1, 0] }), NORMAL: floats(corners.map(() => [0, 0, 1]), 3) };
+  if (colors) attributes.COLOR_0 = floats(colors, 3);
+  if (uv) attributes.TEXCOORD_0 = floats(uv, 2);
+  const targets = [{ POSITION: floats(corners.map(() => move), 3, { min: move, max: move }), NORMAL: floats(corners.map(() => [0, 0, 0]), 3) }];
+  accessors.push({ bufferView: push(Buffer.from(new Uint16Array([0, 1, 2, 0, 2, 3]).buffer)), componentType: 5123, count: 6, type: 'SCALAR' });
+  const indices = accessors.length - 1, surface = { baseColorFactor: factor ?? [1, 1, 1, 1] };
+  const gltf = { asset: { version: '2.0' }, meshes: [{ primitives: [{ attributes, targets, indices, material: 0 }] }], materials: [{ pbrMetallicRoughness: surface }] };
+  if (image) {
+    surface.baseColorTexture = { index: 0 };
+    Object.assign(gltf, { textures: [{ source: 0, sampler: 0 }], samplers: [{ wrapS: wrap, wrapT: wrap }], images: [{ bufferView: push(image), mimeType: 'image/png' }] });
+  }
+  const bin = Buffer.concat(parts);
+  Object.assign(gltf, { accessors, bufferViews: views, buffers: [{ byteLength: bin.length }] });
+  let json = Buffer.from(JSON.stringify(gltf));
+  json = Buffer.concat([json, Buffer.alloc((4 - (json.length % 4)) % 4, ' ')]);
+  const head = Buffer.alloc(20), second = Buffer.alloc(8);
+  head.write('glTF');
+  [2, 28 + json.length + bin.length, json.length].forEach((n, i) => head.writeUInt32LE(n, 4 + 4 * i));
+  head.write('JSON', 16);
+  second.writeUInt32LE(bin.length, 0);
+  second.write('BIN\0', 4, 'latin1');
+  return Buffer.concat([head, json, second, bin]);
+}
+
+async function draw(t, glb, ...options) {
+  const at = await folder(t);
+  await writeFile(path.join(at, 'in.glb'), glb);
+  const { code, err } = await run(['view', 'in.glb', '-o', 'out.png', '--yaw', '0', '--pitch', '0', ...options], { cwd: at });
+  assert.equal(code, 0, err);
+  return readPng(await readFile(path.join(at, 'out.png')));
+}
+
+/** The pixel at a share of the width and height of a frame. */
+const at = (png, x, y, frame = 0) => [...png.frames[frame].subarray(3 * (Math.floor(y * png.height) * png.width + Math.floor(x * png.width))).subarray(0, 3)];
+const mainly = (rgb) => { const k = rgb.indexOf(Math.max(...rgb)); return rgb.every((v, i) => i === k || v < 0.5 * rgb[k]) ? 'rgb'[k] : rgb.join(); };
+
+const corners = [[0, 1], [1, 1], [1, 0], [0, 0]]; // glTF counts down from the top of the image
+const quarters = writePng(16, 16, (x, y) => (y < 8 ? (x < 8 ? [230, 0, 0] : [0, 230, 0]) : x < 8 ? [0, 0, 230] : [230, 230, 230]));
+
+test('a texture is drawn where its coordinates say', async (t) => {
+  const png = await draw(t, square({ uv: corners, image: quarters }), '--poses', '2', '--size', '64');
+  assert.deepEqual([png.width, png.height], [128, 64]);
+  // the left cell's quarters, seen from the front
+  assert.equal(mainly(at(png, 0.12, 0.25)), 'r');
+  assert.equal(mainly(at(png, 0.38, 0.25)), 'g');
+  assert.equal(mainly(at(png, 0.12, 0.75)), 'b');
+  const [r, g, b] = at(png, 0.38, 0.75);
+  assert.ok(Math.abs(r - g) < 3 && Math.abs(g - b) < 3 && r > 100, `${r} ${g} ${b}`);
+});
+
+test('textures repeat or stop as their sampler says, and are smoothed where they are small', async (t) => {
+  const twice = corners.map(([u, v]) => [2 * u, 2 * v]);
+  const repeat = await draw(t, square({ uv: twice, image: quarters }), '--poses', '2', '--size', '64');
+  assert.equal(mainly(at(repeat, 0.32, 0.12)), 'r', 'the first quarter again');
+  const clamp = await draw(t, square({ uv: twice, image: quarters, wrap: 33071 }), '--poses', '2', '--size', '64');
+  assert.equal(mainly(at(clamp, 0.38, 0.12)), 'g', 'the edge goes on');
+  const stripes = writePng(256, 256, (x) => (x % 2 ? [255, 255, 255] : [0, 0, 0]));
+  const fine = await draw(t, square({ uv: corners.map(([u, v]) => [4 * u, 4 * v]), image: stripes }), '--poses', '2', '--size', '32');
+  const tones = [];
+  for (let x = 0.06; x < 0.44; x += 1 / 64) tones.push(at(fine, x, 0.5)[0]);
+  assert.ok(Math.max(...tones) - Math.min(...tones) < 12, `${tones}`);
+});
+
+test('colours of vertices and of the material are drawn', async (t) => {
+  const red = await draw(t, square({ colors: [[1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]] }), '--poses', '2', '--size', '32');
+  assert.equal(mainly(at(red, 0.25, 0.5)), 'r');
+  const blue = await draw(t, square({ factor: [0, 0, 1, 1] }), '--poses', '2', '--size', '32');
+  assert.equal(mainly(at(blue, 0.25, 0.5)), 'b');
+});
+
+test('what is seen from within is red on demand', async (t) => {
+  const glb = square({ factor: [0, 1, 0, 1] });
+  assert.equal(mainly(at(await draw(t, glb, '--poses', '2', '--size', '32', '--yaw', '180'), 0.25, 0.5)), 'g');
+  assert.equal(mainly(at(await draw(t, glb, '--poses', '2', '--size', '32', '--yaw', '180', '--inside'), 0.25, 0.5)), 'r');
+});
+
+test('an animation goes there and back', async (t) => {
+  const png = await draw(t, square({ factor: [1, 0, 0, 1], move: [4, 0, 0] }), '--frames', '8', '--size', '60');
+  assert.equal(png.frames.length, 8);
+  assert.equal(png.milliseconds, 50);
+  const left = [...Array(8).keys()].map((k) => mainly(at(png, 0.2, 0.5, k)) === 'r');
+  const right = [...Array(8).keys()].map((k) => mainly(at(png, 0.8, 0.5, k)) === 'r');
+  assert.deepEqual([left[0], right[0]], [true, false]);
+  assert.deepEqual([left[4], right[4]], [false, true]);
+  for (let k = 1; k < 4; k++) assert.ok(png.frames[k].equals(png.frames[8 - k]), `frame ${k} comes again`);
+});
+
+test('what cannot be drawn is said', async (t) => {
+  const where = await folder(t), broken = square({ uv: corners, image: Buffer.from('no image at all') });
+  await writeFile(path.join(where, 'cut.glb'), square({}).subarray(0, 200));
+  await writeFile(path.join(where, 'image.glb'), broken);
+  for (const [file, why] of [['cut.glb', /cut off|damaged/], ['image.glb', /texture/], ['none.glb', /No such file/], [path.join(samples, 'dog.obj'), /not a GLB/]]) {
+    const { code, err } = await run(['view', file, '-o', 'o.png'], { cwd: where });
+    assert.equal(code, 2, err);
+    assert.match(err, why);
+  }
+});
