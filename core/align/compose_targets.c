@@ -6,12 +6,12 @@
  * one in position and half-weighted normal; more controls and less stiffness from round to round. Anchors keep their
  * targets throughout. Lengths are those of shapes scaled to area 4π.
  */
-#include <lapacke.h>
 #include <math.h>
 #include <string.h>
 
 #include "align/compose.h"
 #include "base/check.h"
+#include "numeric/dense.h"
 #include "numeric/vec3.h"
 
 enum {
@@ -45,7 +45,6 @@ typedef struct targets_run {
   double *distance; /* of each control to its goal, squared, with the normals' part; negative: left out */
   spline s;
   double *matrix;
-  lapack_int *pivot;
 } targets_run;
 
 /* The spline at p, and its Jacobian (row-major, NULL: not wanted). */
@@ -104,9 +103,7 @@ static orb_status spline_fit(targets_run *run, int32_t count, double stiffness) 
     memcpy(s->weight + 3 * (size_t)i, run->goal + 3 * (size_t)i, 3 * sizeof(double));
   }
   memset(s->weight + 3 * (size_t)count, 0, 12 * sizeof(double));
-  lapack_int failed =
-      LAPACKE_dgesv(LAPACK_ROW_MAJOR, (lapack_int)n, 3, run->matrix, (lapack_int)n, run->pivot, s->weight, 3);
-  if (failed) {
+  if (orb_dense_solve((int32_t)n, run->matrix, 3, s->weight) != 0) {
     return orb_fail(run->ctx, ORB_E_INTERNAL, "The spline through %d controls has no solution.", count);
   }
   s->count = count;
@@ -215,15 +212,17 @@ static orb_status icp_round(targets_run *run, int32_t controls, double stiffness
 
 /* The rotation nearest to a 3×3 matrix (Kabsch; reflections turned back). */
 static int nearest_rotation(const double h[9], double r[9]) {
-  double a[9], u[9], vt[9], sv[3], super[2];
-  memcpy(a, h, sizeof a);
-  if (LAPACKE_dgesvd(LAPACK_ROW_MAJOR, 'A', 'A', 3, 3, a, 3, sv, u, 3, vt, 3, super)) {
-    return 0;
+  double u[9], v[9], sv[3];
+  for (int i = 0; i < 9; i++) {
+    if (!isfinite(h[i])) {
+      return 0;
+    }
   }
+  orb_svd3(h, u, sv, v);
   for (int pass = 0; pass < 2; pass++) {
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {
-        r[3 * i + j] = u[3 * i] * vt[j] + u[3 * i + 1] * vt[3 + j] + u[3 * i + 2] * vt[6 + j];
+        r[3 * i + j] = u[3 * i] * v[3 * j] + u[3 * i + 1] * v[3 * j + 1] + u[3 * i + 2] * v[3 * j + 2];
       }
     }
     double c[3];
@@ -371,9 +370,7 @@ orb_status cm_spatial_targets(orb_context *ctx, const cm_surface *b, const doubl
   run.s.centre = ORB_NEW(ctx, double, 3 * most);
   run.s.weight = ORB_NEW(ctx, double, 3 * most + 12);
   run.matrix = ORB_NEW(ctx, double, (most + 4) * (most + 4));
-  run.pivot = ORB_NEW(ctx, lapack_int, most + 4);
-  if (run.control && run.goal && run.mapped && run.distance && run.s.centre && run.s.weight && run.matrix &&
-      run.pivot) {
+  if (run.control && run.goal && run.mapped && run.distance && run.s.centre && run.s.weight && run.matrix) {
     status = targets_compute(&run, out, fit);
   }
   orb_free(ctx, run.control);
@@ -383,6 +380,5 @@ orb_status cm_spatial_targets(orb_context *ctx, const cm_surface *b, const doubl
   orb_free(ctx, run.s.centre);
   orb_free(ctx, run.s.weight);
   orb_free(ctx, run.matrix);
-  orb_free(ctx, run.pivot);
   return status;
 }

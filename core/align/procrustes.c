@@ -1,10 +1,11 @@
 /* Orthogonal Procrustes by SVD, for two point sets and, by alternation with the spherical means, for many (Gower 1975).
- * LAPACK gets its workspace from here, so that nothing is allocated behind the context. */
-#include <lapacke.h>
+ */
+#include <math.h>
 #include <string.h>
 
 #include "align/rotate.h"
 #include "base/check.h"
+#include "numeric/dense.h"
 #include "numeric/vec3.h"
 
 static double determinant(const double m[9]) {
@@ -13,17 +14,19 @@ static double determinant(const double m[9]) {
 
 orb_status orb_procrustes_covariance(orb_context *ctx, const double covariance[9], double rotation[9],
                                      double singular[3]) {
-  /* Column major for LAPACK: what it sees is Cᵀ = Σ to fromᵀ = U S Vᵀ, and R = U D Vᵀ. */
-  double a[9], u[9], vt[9], s[3], work[64];
-  memcpy(a, covariance, sizeof a);
-  lapack_int info = LAPACKE_dgesvd_work(LAPACK_COL_MAJOR, 'A', 'A', 3, 3, a, 3, s, u, 3, vt, 3, work, 64);
-  if (info != 0) {
-    return orb_fail(ctx, ORB_E_INTERNAL, "The singular value decomposition of the landmarks did not converge.");
+  /* Cᵀ = Σ to fromᵀ = U S Vᵀ, and R = U D Vᵀ. */
+  double a[9], u[9], v[9], s[3];
+  for (int i = 0; i < 9; i++) {
+    a[i] = covariance[3 * (i % 3) + i / 3];
+    if (!isfinite(a[i])) {
+      return orb_fail(ctx, ORB_E_INTERNAL, "The covariance of the landmarks is not finite.");
+    }
   }
-  double sign = determinant(u) * determinant(vt) < 0 ? -1 : 1;
+  orb_svd3(a, u, s, v);
+  double sign = determinant(u) * determinant(v) < 0 ? -1 : 1;
   for (int i = 0; i < 3; i++) {
     for (int j = 0; j < 3; j++) {
-      rotation[3 * i + j] = u[i] * vt[3 * j] + u[3 + i] * vt[3 * j + 1] + sign * u[6 + i] * vt[3 * j + 2];
+      rotation[3 * i + j] = u[3 * i] * v[3 * j] + u[3 * i + 1] * v[3 * j + 1] + sign * u[3 * i + 2] * v[3 * j + 2];
     }
   }
   if (singular) {

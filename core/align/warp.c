@@ -1,10 +1,10 @@
 #include "align/warp.h"
 
-#include <lapacke.h>
 #include <math.h>
 #include <string.h>
 
 #include "base/check.h"
+#include "numeric/dense.h"
 #include "numeric/vec3.h"
 
 enum { GRAIN = 512 };
@@ -49,7 +49,7 @@ static int spans(const double *centres, int32_t count) {
   return 1;
 }
 
-/* The matrix [Φ P; Pᵀ 0] (column major) and its right-hand sides. */
+/* The matrix [Φ P; Pᵀ 0] and its right-hand sides, row by row. */
 static void assemble(const orb_warp *w, const double *moves, int32_t rows, double *matrix, double *right) {
   size_t n = (size_t)rows, count = (size_t)w->count;
   memset(matrix, 0, n * n * sizeof *matrix);
@@ -57,14 +57,14 @@ static void assemble(const orb_warp *w, const double *moves, int32_t rows, doubl
   for (size_t i = 0; i < count; i++) {
     for (size_t k = 0; k < count; k++) {
       double r = sqrt(orb_distance2(w->centres + 3 * i, w->centres + 3 * k));
-      matrix[i + k * n] = orb_warp_phi(r / w->radii[k]);
+      matrix[i * n + k] = orb_warp_phi(r / w->radii[k]);
     }
     for (size_t j = 0; n > count && j < 4; j++) {
       double value = j == 0 ? 1 : w->centres[3 * i + j - 1];
-      matrix[i + (count + j) * n] = matrix[count + j + i * n] = value;
+      matrix[i * n + count + j] = matrix[(count + j) * n + i] = value;
     }
     for (size_t c = 0; c < 3; c++) {
-      right[i + c * n] = moves[3 * i + c];
+      right[3 * i + c] = moves[3 * i + c];
     }
   }
 }
@@ -79,30 +79,28 @@ orb_status orb_warp_create(orb_context *ctx, const double *centres, const double
   out->coefficients = ORB_NEW(ctx, double, 3 * (size_t)count);
   out->radii = ORB_NEW(ctx, double, count);
   double *matrix = ORB_NEW(ctx, double, n *n), *right = ORB_NEW(ctx, double, 3 * n);
-  lapack_int *pivots = ORB_NEW(ctx, lapack_int, rows);
-  if (!out->centres || !out->coefficients || !out->radii || !matrix || !right || !pivots) {
+  if (!out->centres || !out->coefficients || !out->radii || !matrix || !right) {
     status = ORB_E_NO_MEMORY;
     goto end;
   }
   memcpy(out->centres, centres, 3 * (size_t)count * sizeof *centres);
   memcpy(out->radii, radii, (size_t)count * sizeof *radii);
   assemble(out, moves, rows, matrix, right);
-  if (LAPACKE_dgesv_work(LAPACK_COL_MAJOR, rows, 3, matrix, rows, pivots, right, rows) != 0) {
+  if (orb_dense_solve(rows, matrix, 3, right) != 0) {
     status = orb_fail(ctx, ORB_E_BAD_LANDMARKS, "Two landmarks are too close for a warp to tell them apart.");
     goto end;
   }
   for (size_t c = 0; c < 3; c++) {
     for (size_t k = 0; k < (size_t)count; k++) {
-      out->coefficients[3 * k + c] = right[k + c * n];
+      out->coefficients[3 * k + c] = right[3 * k + c];
     }
     for (size_t j = 0; rows > count && j < 4; j++) {
-      out->linear[j][c] = right[(size_t)count + j + c * n];
+      out->linear[j][c] = right[3 * ((size_t)count + j) + c];
     }
   }
 end:
   orb_free(ctx, matrix);
   orb_free(ctx, right);
-  orb_free(ctx, pivots);
   if (status != ORB_OK) {
     orb_warp_free(ctx, out);
   }

@@ -17,7 +17,7 @@ typedef struct orb_warp {
   double linear[4][3];                    /* P(v) = linear[0] + Σ v_i linear[i + 1] */
 } orb_warp;
 
-/* Solves by LAPACK, O(count³). ORB_E_BAD_LANDMARKS where the centres are too close to tell apart. */
+/* O(count³). ORB_E_BAD_LANDMARKS where the centres are too close to tell apart. */
 ORB_MUST_CHECK orb_status orb_warp_create(orb_context *ctx, const double *centres, const double *moves,
                                           const double *radii, int32_t count, orb_warp *out);
 void orb_warp_free(orb_context *ctx, orb_warp *warp);

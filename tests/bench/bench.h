@@ -39,8 +39,7 @@ int bench_spill(const char *path, const unsigned char *bytes, size_t size);
 /* "dir/cow.obj" → "cow". */
 void bench_name_of(const char *path, char name[ORB_NAME_MAX]);
 
-/* A context with so many threads; ends the program when there is no memory. Whatever the environment says, the
- * libraries below use one thread of their own, so that results do not depend on it. */
+/* A context with so many threads; ends the program when there is no memory. */
 orb_context *bench_open(int threads);
 
 /* Peak of the resident set since the last reset. Where the kernel cannot reset it: since the program began. */

@@ -1,4 +1,3 @@
-#include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -53,21 +52,9 @@ void bench_name_of(const char *path, char name[ORB_NAME_MAX]) {
   }
 }
 
-/* Found at run time: which library serves LAPACK is the machine's choice. */
-static void set_threads_of(const char *symbol) {
-  void (*set)(int);
-  void *found = dlsym(RTLD_DEFAULT, symbol);
-  if (found) {
-    memcpy(&set, &found, sizeof set);
-    set(1);
-  }
-}
-
 orb_context *bench_open(int threads) {
   orb_context *ctx;
   orb_context_options options = {.threads = threads, .max_triangles = 50000000};
-  set_threads_of("openblas_set_num_threads");
-  set_threads_of("omp_set_num_threads");
   if (orb_context_create(&options, &ctx) != ORB_OK) {
     fprintf(stderr, "orbmorph-bench: out of memory\n");
     exit(BENCH_REFUSED);

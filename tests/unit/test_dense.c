@@ -1,0 +1,116 @@
+/* The linear solver and the 3 × 3 singular values, against their definitions. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "numeric/dense.h"
+
+static uint64_t state = 88172645463325252ULL;
+static double uniform(void) { /* −1 … 1 */
+  state ^= state << 13;
+  state ^= state >> 7;
+  state ^= state << 17;
+  return (double)(int64_t)state / 9.3e18;
+}
+
+/* A · X is put together from a known X; sizes on both sides of the block, and a zero on the first diagonal entry. */
+static void test_solve(void **unused) {
+  (void)unused;
+  static const int32_t sizes[] = {1, 2, 3, 31, 32, 33, 64, 65, 150, 300};
+  for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
+    int32_t n = sizes[k];
+    size_t m = (size_t)n;
+    double *a = malloc(m * m * sizeof *a), *x = malloc(3 * m * sizeof *x), *b = calloc(3 * m, sizeof *b);
+    for (size_t i = 0; i < m * m; i++) {
+      a[i] = uniform();
+    }
+    if (n > 1) {
+      a[0] = 0;
+    }
+    for (size_t i = 0; i < 3 * m; i++) {
+      x[i] = uniform();
+    }
+    for (size_t i = 0; i < m; i++) {
+      for (size_t j = 0; j < m; j++) {
+        for (size_t c = 0; c < 3; c++) {
+          b[3 * i + c] += a[i * m + j] * x[3 * j + c];
+        }
+      }
+    }
+    assert_int_equal(orb_dense_solve(n, a, 3, b), 0);
+    for (size_t i = 0; i < 3 * m; i++) {
+      assert_true(fabs(b[i] - x[i]) < 1e-9);
+    }
+    free(a);
+    free(x);
+    free(b);
+  }
+}
+
+static void test_singular(void **unused) {
+  (void)unused;
+  double a[9] = {1, 2, 3, 2, 4, 6, 0, 1, 5}, b[3] = {1, 2, 3}; /* the second row is twice the first */
+  assert_int_equal(orb_dense_solve(3, a, 1, b), -1);
+  double c[4] = {INFINITY, 1, 1, 1}, d[2] = {1, 1};
+  assert_int_equal(orb_dense_solve(2, c, 1, d), -1);
+}
+
+static void check_svd(const double a[9]) {
+  double u[9], s[3], v[9], scale = 0;
+  orb_svd3(a, u, s, v);
+  assert_true(s[0] >= s[1] && s[1] >= s[2] && s[2] >= 0);
+  for (int i = 0; i < 9; i++) {
+    scale = fmax(scale, fabs(a[i]));
+  }
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) {
+      double product = 0, uu = 0, vv = 0;
+      for (int k = 0; k < 3; k++) {
+        product += u[3 * i + k] * s[k] * v[3 * j + k];
+        uu += u[3 * k + i] * u[3 * k + j];
+        vv += v[3 * k + i] * v[3 * k + j];
+      }
+      assert_true(fabs(product - a[3 * i + j]) <= 1e-14 * scale);
+      assert_true(fabs(uu - (i == j)) < 1e-14);
+      assert_true(fabs(vv - (i == j)) < 1e-14);
+    }
+  }
+}
+
+static void test_svd(void **unused) {
+  (void)unused;
+  static const double special[][9] = {{0, 0, 0, 0, 0, 0, 0, 0, 0},
+                                      {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                                      {0, 1, 0, 0, 0, 1, 1, 0, 0},
+                                      {1, 2, 3, 2, 4, 6, 3, 6, 9},
+                                      {1, 0, 0, 0, 0, 0, 0, 0, 0},
+                                      {-2, 0, 0, 0, 3, 0, 0, 0, -1},
+                                      {1e200, 0, 1e199, 0, 1e198, 0, 0, 0, 1},
+                                      {1e-200, 2e-200, 0, 0, 3e-201, 0, 1e-201, 0, 1e-200},
+                                      {1, 1, 1, 1, 1, 1 + 1e-15, 1, 1 - 1e-15, 1}};
+  for (size_t i = 0; i < sizeof special / sizeof *special; i++) {
+    check_svd(special[i]);
+  }
+  for (int i = 0; i < 10000; i++) {
+    double a[9];
+    for (int k = 0; k < 9; k++) {
+      a[k] = uniform() * pow(10, 6 * uniform());
+    }
+    check_svd(a);
+  }
+  double u[9], s[3], v[9]; /* singular values that are known: 3, 2, 1 */
+  orb_svd3((const double[9]){0, -2, 0, 0, 0, 1, 3, 0, 0}, u, s, v);
+  assert_true(fabs(s[0] - 3) < 1e-15 && fabs(s[1] - 2) < 1e-15 && fabs(s[2] - 1) < 1e-15);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_solve), cmocka_unit_test(test_singular),
+                                     cmocka_unit_test(test_svd)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
