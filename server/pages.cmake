@@ -1,7 +1,8 @@
-# cmake -DOUT=pages.c -DPAGES=dir -DOPENAPI=file -P pages.cmake
+# cmake -DOUT=pages.c -DPAGES=dir -DOPENAPI=file -DTROUBLESHOOTING=file -P pages.cmake
 set(paths "/docs" "/docs.js" "/docs.css" "/openapi.json")
 set(files "${PAGES}/docs.html" "${PAGES}/docs.js" "${PAGES}/docs.css" "${OPENAPI}")
 set(mimes "text/html" "text/javascript" "text/css" "application/json")
+include(${CMAKE_CURRENT_LIST_DIR}/problems.cmake)
 set(text "#include \"pages.h\"\n")
 set(rows "")
 set(index 0)

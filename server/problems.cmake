@@ -1,0 +1,37 @@
+# A page for each problem type, made of the sections of docs/troubleshooting.md, so that the `type` of a problem leads
+# somewhere. Appends to the lists of pages.cmake: OUT (a folder), TROUBLESHOOTING (the file).
+
+# Markdown to HTML, as far as those sections need it: paragraphs, `code`, *words*, links (their text alone).
+function(orb_html markdown result)
+  string(STRIP "${markdown}" text)
+  string(REPLACE "&" "&amp;" text "${text}")
+  string(REPLACE "<" "&lt;" text "${text}")
+  string(REPLACE ">" "&gt;" text "${text}")
+  string(REGEX REPLACE "`([^`]+)`" "<code>\\1</code>" text "${text}")
+  string(REGEX REPLACE "\\[([^]]+)\\]\\([^)]+\\)" "\\1" text "${text}")
+  string(REGEX REPLACE "\\*([A-Z][^*]+)\\*" "<em>\\1</em>" text "${text}")
+  string(REGEX REPLACE "\n\n+" "</p>\n<p>" text "${text}")
+  set(${result} "<p>${text}</p>" PARENT_SCOPE)
+endfunction()
+
+file(READ "${TROUBLESHOOTING}" rest)
+string(FIND "${rest}" "\n## " at)
+while(NOT at EQUAL -1)
+  math(EXPR at "${at} + 4")
+  string(SUBSTRING "${rest}" ${at} -1 rest)
+  string(FIND "${rest}" "\n" line)
+  string(SUBSTRING "${rest}" 0 ${line} name)
+  string(SUBSTRING "${rest}" ${line} -1 rest)
+  # The section goes as far as the next heading of any kind.
+  string(FIND "${rest}" "\n#" end)
+  string(SUBSTRING "${rest}" 0 ${end} section)
+  orb_html("${section}" body)
+  file(WRITE "${OUT}.${name}.html"
+    "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n"
+    "<title>orbmorph: ${name}</title>\n<link rel=\"stylesheet\" href=\"/docs.css\">\n<h1>${name}</h1>\n${body}\n"
+    "<p><a href=\"/docs\">The interface</a></p>\n</html>\n")
+  list(APPEND paths "/problems/${name}")
+  list(APPEND files "${OUT}.${name}.html")
+  list(APPEND mimes "text/html")
+  string(FIND "${rest}" "\n## " at)
+endwhile()
