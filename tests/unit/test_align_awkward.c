@@ -1,0 +1,253 @@
+/* Landmarks at awkward places: next to each other, on edges, several in one triangle, the same place said in two ways,
+ * sixty of them, and such as contradict each other, which are named. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "numeric/vec3.h"
+#include "orbmorph/format.h"
+#include "support_align.h"
+#include "support_bodies.h"
+
+/* The k-th neighbour of vertex v, in the order of the triangles. */
+static int32_t neighbour(const orb_mesh *mesh, int32_t v, int k) {
+  for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
+    if (mesh->triangles[h] == v && k-- == 0) {
+      return mesh->triangles[orb_next(h)];
+    }
+  }
+  fail();
+  return -1;
+}
+
+static void put_vertex(bodies *b, int landmark, int shape, int32_t v) {
+  assert_int_equal(orb_place_of_vertex(b->ctx, &b->mesh[shape], v, &b->at[landmark][shape]), ORB_OK);
+}
+
+static void meet(bodies *b, int shapes, int count) {
+  orb_align_options options = bodies_options(ORB_ALIGN_PIN);
+  orb_alignment out;
+  align_and_check(b->ctx, b->shape, shapes, b->landmark, count, &options, &out);
+  orb_alignment_free(b->ctx, &out);
+}
+
+/* A vertex and four of its neighbours on one shape; five far from each other on the others; and adjacent on all, in the
+ * same order about the vertex and in the opposite one. */
+static void adjacent_vertices(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  for (int kind = 0; kind < 3; kind++) {
+    bodies_like(&b, 9);
+    for (int s = 0; s < BODIES; s++) {
+      int32_t v = 100 + 11 * s;
+      for (int k = 0; (kind > 0 || s == 0) && k < 4; k++) {
+        put_vertex(&b, k + 1, s, neighbour(&b.mesh[s], v, kind == 2 && s == 1 ? 3 - k : k));
+      }
+      if (kind > 0 || s == 0) {
+        put_vertex(&b, 0, s, v);
+      }
+    }
+    meet(&b, BODIES, 9);
+  }
+  bodies_close(&b);
+}
+
+/* Both triangles of an edge may name a place on it; it is one place. */
+static void one_place_on_an_edge(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  bodies_like(&b, 8);
+  for (int s = 0; s < 2; s++) {
+    const int32_t *tri = b.mesh[s].triangles;
+    int32_t h = 3 * 50, g = 0;
+    while (tri[g] != tri[orb_next(h)] || tri[orb_next(g)] != tri[h]) {
+      g++;
+    }
+    for (int side = 0; side < 2; side++) {
+      orb_place *place = &b.at[6 + side][s];
+      int32_t from = side ? g : h;
+      *place = (orb_place){from / 3, {0, 0, 0}};
+      place->at[from % 3] = side ? 0.25 : 0.75;
+      place->at[orb_next(from) % 3] = side ? 0.75 : 0.25;
+    }
+  }
+  orb_align_options options = bodies_options(ORB_ALIGN_PIN);
+  orb_alignment out;
+  align_and_check(b.ctx, b.shape, 2, b.landmark, 8, &options, &out);
+  for (int s = 0; s < 2; s++) {
+    assert_int_equal(out.shapes[s].landmark_vertices[6], out.shapes[s].landmark_vertices[7]);
+    assert_true(out.shapes[s].landmark_vertices[6] >= b.mesh[s].vertex_count);
+  }
+  orb_alignment_free(b.ctx, &out);
+  bodies_close(&b);
+}
+
+/* Six in one triangle of every shape: its corners, and three inside it, in opposite order on one shape. */
+static void six_in_one_triangle(void **state) {
+  (void)state;
+  static const double inside[3][3] = {{0.5, 0.25, 0.25}, {0.25, 0.5, 0.25}, {0.25, 0.25, 0.5}};
+  bodies b;
+  bodies_open(&b, NULL);
+  for (int mirrored = 0; mirrored < 2; mirrored++) {
+    bodies_like(&b, 10);
+    for (int s = 0; s < BODIES; s++) {
+      for (int k = 0; k < 3; k++) {
+        b.at[k][s] = (orb_place){40 + s, {k == 0, k == 1, k == 2}};
+        b.at[3 + k][s] = (orb_place){40 + s, {0, 0, 0}};
+        memcpy(b.at[3 + k][s].at, inside[mirrored && s == 1 ? 2 - k : k], sizeof inside[0]);
+      }
+    }
+    meet(&b, BODIES, 10);
+  }
+  bodies_close(&b);
+}
+
+/* The same vertex twice on all shapes, said by different triangles: one landmark, twice named. */
+static void duplicates_share_a_vertex(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  bodies_like(&b, 7);
+  for (int s = 0; s < BODIES; s++) {
+    int32_t v = bodies_vertex_at(&b.mesh[s], &b.at[2][s]), h = 3 * b.mesh[s].triangle_count - 1;
+    while (b.mesh[s].triangles[h] != v) {
+      h--;
+    }
+    assert_int_not_equal(h / 3, b.at[2][s].triangle);
+    b.at[6][s] = (orb_place){h / 3, {h % 3 == 0, h % 3 == 1, h % 3 == 2}};
+  }
+  for (int m = 0; m < 2; m++) {
+    orb_align_options options = bodies_options(m ? ORB_ALIGN_RBF : ORB_ALIGN_PIN);
+    orb_alignment out;
+    align_and_check(b.ctx, b.shape, BODIES, b.landmark, 7, &options, &out);
+    for (int s = 0; s < BODIES; s++) {
+      assert_int_equal(out.shapes[s].landmark_vertices[6], out.shapes[s].landmark_vertices[2]);
+    }
+    orb_alignment_free(b.ctx, &out);
+  }
+  bodies_close(&b);
+}
+
+static void refused(bodies *b, int shapes, int count, const int *named, int named_count) {
+  for (int m = 0; m < 2; m++) {
+    orb_align_options options = bodies_options(m ? ORB_ALIGN_RBF : ORB_ALIGN_PIN);
+    orb_alignment out;
+    assert_int_equal(orb_align(b->ctx, b->shape, shapes, b->landmark, count, &options, &out), ORB_E_BAD_LANDMARKS);
+    const orb_error *error = orb_context_error(b->ctx);
+    assert_int_equal(error->landmark_count, named_count);
+    for (int k = 0; k < named_count; k++) {
+      assert_int_equal(error->landmarks[k], named[k]);
+    }
+    assert_null(out.shapes);
+  }
+}
+
+/* Landmarks that share a place on some shapes only: exactly those are named, whatever else is there. */
+static void contradictions_are_named(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  bodies_like(&b, 10);
+  b.at[7][1] = b.at[3][1];
+  refused(&b, 2, 10, (const int[]){3, 7}, 2);
+  refused(&b, 3, 10, (const int[]){3, 7}, 2);
+  b.at[9][2] = b.at[0][2];
+  refused(&b, 2, 10, (const int[]){3, 7}, 2);
+  refused(&b, 3, 10, (const int[]){0, 3, 7, 9}, 4);
+  assert_int_equal(orb_context_error(b.ctx)->shape, 1);
+  bodies_like(&b, 10);
+  b.at[4][0].triangle = b.mesh[0].triangle_count;
+  refused(&b, 2, 10, (const int[]){4}, 1);
+  bodies_like(&b, 10);
+  b.at[5][1].at[0] = NAN;
+  refused(&b, 2, 10, (const int[]){5}, 1);
+  bodies_close(&b);
+}
+
+static void sixty(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  bodies_like(&b, 60);
+  meet(&b, BODIES, 60);
+  bodies_random(&b, 60, 3);
+  meet(&b, 2, 60);
+  bodies_close(&b);
+}
+
+static int load(orb_context *ctx, const char *name, orb_mesh *mesh, orb_embedding *embedding) {
+  char path[1024];
+  snprintf(path, sizeof path, "%s/good/%s", ORB_SHARED_MESHES, name);
+  FILE *file = fopen(path, "rb");
+  if (!file) {
+    return 0;
+  }
+  static unsigned char bytes[1 << 20];
+  size_t size = fread(bytes, 1, sizeof bytes, file);
+  fclose(file);
+  assert_int_equal(orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, mesh, NULL), ORB_OK);
+  assert_int_equal(orb_mesh_repair(ctx, mesh, ORB_REPAIR_SAFE), ORB_OK);
+  orb_embed_options options;
+  orb_embed_defaults(&options);
+  assert_int_equal(orb_embed(ctx, mesh, &options, embedding), ORB_OK);
+  return 1;
+}
+
+/* Points of the same number, that is, anywhere: twelve on a cow and a man. */
+static void cow_to_human(void **state) {
+  (void)state;
+  orb_context *ctx;
+  orb_mesh mesh[2];
+  orb_embedding embedding[2];
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  int found = load(ctx, "cow.off", &mesh[0], &embedding[0]) && load(ctx, "human_man.obj", &mesh[1], &embedding[1]);
+  if (found) {
+    enum { COUNT = 12 };
+    orb_align_shape shapes[2];
+    orb_place at[COUNT][2];
+    orb_landmark landmarks[COUNT];
+    memset(landmarks, 0, sizeof landmarks);
+    for (int k = 0; k < COUNT; k++) {
+      for (int s = 0; s < 2; s++) {
+        shapes[s] = (orb_align_shape){&mesh[s], embedding[s].points};
+        int32_t v = (int32_t)(((int64_t)(k + 1) * 7919 * (s + 3)) % mesh[s].vertex_count);
+        assert_int_equal(orb_place_of_vertex(ctx, &mesh[s], v, &at[k][s]), ORB_OK);
+      }
+      landmarks[k].at = at[k];
+    }
+    orb_align_options options = bodies_options(ORB_ALIGN_PIN);
+    orb_alignment out;
+    align_and_check(ctx, shapes, 2, landmarks, COUNT, &options, &out);
+    orb_alignment_free(ctx, &out);
+    for (int s = 0; s < 2; s++) {
+      orb_mesh_free(ctx, &mesh[s]);
+      orb_embedding_free(ctx, &embedding[s]);
+    }
+  }
+  orb_context_destroy(ctx);
+  if (!found) {
+    print_message("The folder of real meshes is not there.\n");
+    skip();
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(adjacent_vertices),
+      cmocka_unit_test(one_place_on_an_edge),
+      cmocka_unit_test(six_in_one_triangle),
+      cmocka_unit_test(duplicates_share_a_vertex),
+      cmocka_unit_test(contradictions_are_named),
+      cmocka_unit_test(sixty),
+      cmocka_unit_test(cow_to_human),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
