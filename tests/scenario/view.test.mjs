@@ -4,42 +4,14 @@ import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
 import { folder, run } from './support/cli.mjs';
+import { writeGlb } from './support/glb_write.mjs';
 import { readPng, writePng } from './support/png.mjs';
 import { samples } from './support/daemon.mjs';
 
 /** A GLB of one square in the plane z = 0, from (−1,−1) to (1,1), that a target moves. */
-function square({ colors, uv, image, factor, wrap = 10497, move = [0, 0, 0] }) {
-  const parts = [], views = [], accessors = [];
-  const push = (bytes) => {
-    const offset = parts.reduce((n, p) => n + p.length, 0);
-    views.push({ buffer: 0, byteOffset: offset, byteLength: bytes.length });
-    parts.push(bytes, Buffer.alloc((4 - (bytes.length % 4)) % 4));
-    return views.length - 1;
-  };
-  const floats = (values, width, extra) => accessors.push({ bufferView: push(Buffer.from(new Float32Array(values.flat()).buffer)), componentType: 5126, count: values.length, type: `VEC${width}`, ...extra }) - 1;
-  const corners = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]];
-  const attributes = { POSITION: floats(corners, 3, { min: [-1, -1, 0], max: [1, 1, 0] }), NORMAL: floats(corners.map(() => [0, 0, 1]), 3) };
-  if (colors) attributes.COLOR_0 = floats(colors, 3);
-  if (uv) attributes.TEXCOORD_0 = floats(uv, 2);
-  const targets = [{ POSITION: floats(corners.map(() => move), 3, { min: move, max: move }), NORMAL: floats(corners.map(() => [0, 0, 0]), 3) }];
-  accessors.push({ bufferView: push(Buffer.from(new Uint16Array([0, 1, 2, 0, 2, 3]).buffer)), componentType: 5123, count: 6, type: 'SCALAR' });
-  const indices = accessors.length - 1, surface = { baseColorFactor: factor ?? [1, 1, 1, 1] };
-  const gltf = { asset: { version: '2.0' }, meshes: [{ primitives: [{ attributes, targets, indices, material: 0 }] }], materials: [{ pbrMetallicRoughness: surface }] };
-  if (image) {
-    surface.baseColorTexture = { index: 0 };
-    Object.assign(gltf, { textures: [{ source: 0, sampler: 0 }], samplers: [{ wrapS: wrap, wrapT: wrap }], images: [{ bufferView: push(image), mimeType: 'image/png' }] });
-  }
-  const bin = Buffer.concat(parts);
-  Object.assign(gltf, { accessors, bufferViews: views, buffers: [{ byteLength: bin.length }] });
-  let json = Buffer.from(JSON.stringify(gltf));
-  json = Buffer.concat([json, Buffer.alloc((4 - (json.length % 4)) % 4, ' ')]);
-  const head = Buffer.alloc(20), second = Buffer.alloc(8);
-  head.write('glTF');
-  [2, 28 + json.length + bin.length, json.length].forEach((n, i) => head.writeUInt32LE(n, 4 + 4 * i));
-  head.write('JSON', 16);
-  second.writeUInt32LE(bin.length, 0);
-  second.write('BIN\0', 4, 'latin1');
-  return Buffer.concat([head, json, second, bin]);
+function square({ move = [0, 0, 0], ...rest }) {
+  const positions = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]];
+  return writeGlb({ positions, normals: positions.map(() => [0, 0, 1]), triangles: [[0, 1, 2], [0, 2, 3]], moves: positions.map(() => move), ...rest });
 }
 
 async function draw(t, glb, ...options) {
