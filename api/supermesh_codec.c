@@ -61,6 +61,15 @@ void orb_pairs_write(const orb_merge_result *result, orb_text *out) {
   orb_json_close(out, ']');
 }
 
+static void write_numbers(const char *name, const double *numbers, int32_t count, orb_text *out) {
+  orb_json_key(out, name);
+  orb_json_open(out, '[');
+  for (int32_t i = 0; i < count; i++) {
+    orb_json_number(out, numbers[i]);
+  }
+  orb_json_close(out, ']');
+}
+
 static void write_shapes(const char *id, const orb_supermesh_request *request, const orb_merge_result *result,
                          orb_text *out) {
   orb_json_key(out, "shapes");
@@ -72,16 +81,8 @@ static void write_shapes(const char *id, const orb_supermesh_request *request, c
     orb_json_key(out, "sphere");
     orb_text_printf(out, "\"/v1/supermeshes/%s/spheres/%d.ply\"", id, s);
     orb_shape_report_members(out, &result->shapes[s]);
+    write_numbers("transform", result->transforms + 16 * (size_t)s, 16, out);
     orb_json_close(out, '}');
-  }
-  orb_json_close(out, ']');
-}
-
-static void write_numbers(const char *name, const double *numbers, int32_t count, orb_text *out) {
-  orb_json_key(out, name);
-  orb_json_open(out, '[');
-  for (int32_t i = 0; i < count; i++) {
-    orb_json_number(out, numbers[i]);
   }
   orb_json_close(out, ']');
 }

@@ -20,6 +20,7 @@ void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
   orb_free(ctx, result->landmark_residuals);
   orb_free(ctx, result->found_residuals);
   orb_free(ctx, result->pairs);
+  orb_free(ctx, result->transforms);
   orb_buffer_free(ctx, &result->asset);
   memset(result, 0, sizeof *result);
 }
@@ -70,6 +71,13 @@ orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char
   ORB_GO(status,
          orb_asset_write(ctx, &out->supermesh, out->alignment.shapes, names, &options->asset, &out->asset_facts,
                          &out->asset),
+         fail);
+  out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
+  if (!out->transforms) {
+    status = ORB_E_NO_MEMORY;
+    goto fail;
+  }
+  ORB_GO(status, orb_asset_transforms(ctx, &out->supermesh, out->alignment.shapes, options->asset.fit, out->transforms),
          fail);
   out->timings.write = (now = orb_clock()) - mark;
   out->timings.total = now - start;

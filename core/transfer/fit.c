@@ -151,3 +151,36 @@ void orb_motion_turn(const orb_motion *motion, float *vectors, int32_t count) {
     }
   }
 }
+
+static void motion_matrix(const orb_motion *motion, double out[16]) {
+  for (int c = 0; c < 3; c++) {
+    for (int r = 0; r < 3; r++) {
+      out[4 * c + r] = motion->scale * motion->rotation[r][c];
+    }
+    out[4 * c + 3] = 0;
+    out[12 + c] = motion->shift[c];
+  }
+  out[15] = 1;
+}
+
+orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
+                                orb_fit fit, double *out) {
+  int32_t vertices = supermesh->vertex_count;
+  double *fixed = ORB_NEW(ctx, double, 3 * (int64_t)vertices), *moved = ORB_NEW(ctx, double, 3 * (int64_t)vertices);
+  orb_status status = fixed && moved ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int32_t s = 0; status == ORB_OK && s < supermesh->shape_count; s++) {
+    orb_motion motion = {.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .scale = 1};
+    if (fit != ORB_FIT_NONE) {
+      const orb_place *places = supermesh->places + (int64_t)s * vertices;
+      ORB_GO(status, orb_transfer_positions(ctx, &shapes[s], places, vertices, s ? moved : fixed), end);
+      if (s > 0) {
+        ORB_GO(status, orb_fit_motion(ctx, supermesh, fixed, moved, fit, &motion), end);
+      }
+    }
+    motion_matrix(&motion, out + 16 * (int64_t)s);
+  }
+end:
+  orb_free(ctx, fixed);
+  orb_free(ctx, moved);
+  return status;
+}

@@ -293,6 +293,40 @@ static void fit_undoes_a_similarity(void **state) {
   synthetic_free(ctx, &made);
 }
 
+/* The matrix said of that copy is the inverse of what was done to it; the first shape, and all without a fit, stay. */
+static void the_transform_is_the_inverse(void **state) {
+  orb_context *ctx = *state;
+  synthetic made = synthetic_make(ctx, 3, 2, turned);
+  double m[32];
+  static const double stay[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_NONE, m), ORB_OK);
+  for (int i = 0; i < 32; i++) {
+    assert_true(m[i] == stay[i % 16]);
+  }
+  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_SIMILARITY, m), ORB_OK);
+  double c = cos(2.1) / 3, d = sin(2.1) / 3, shift[3] = {5, -7, 1};
+  double turn[3][3] = {{c, d, 0}, {-d, c, 0}, {0, 0, 1.0 / 3}};
+  for (int i = 0; i < 16; i++) {
+    assert_true(m[i] == stay[i]);
+  }
+  for (int row = 0; row < 3; row++) {
+    double moved = 0;
+    for (int column = 0; column < 3; column++) {
+      assert_true(fabs(m[16 + 4 * column + row] - turn[row][column]) < 1e-9);
+      moved -= turn[row][column] * shift[column];
+    }
+    assert_true(fabs(m[28 + row] - moved) < 1e-8);
+    assert_true(m[16 + 4 * row + 3] == 0);
+  }
+  assert_true(m[31] == 1);
+  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_RIGID, m), ORB_OK);
+  for (int column = 0; column < 3; column++) {
+    const double *a = m + 16 + 4 * column;
+    assert_true(fabs(a[0] * a[0] + a[1] * a[1] + a[2] * a[2] - 1) < 1e-12);
+  }
+  synthetic_free(ctx, &made);
+}
+
 /* The same bytes for one thread and for four. */
 static void threads_do_not_matter(void **state) {
   (void)state;
@@ -463,6 +497,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(hard_edges_split_vertices, setup, teardown),
       cmocka_unit_test_setup_teardown(coinciding_vertices_are_kept_apart, setup, teardown),
       cmocka_unit_test_setup_teardown(fit_undoes_a_similarity, setup, teardown),
+      cmocka_unit_test_setup_teardown(the_transform_is_the_inverse, setup, teardown),
       cmocka_unit_test_setup_teardown(texture_seams_are_not_crossed, setup, teardown),
       cmocka_unit_test(threads_do_not_matter),
       cmocka_unit_test(running_out_of_memory_is_an_error),

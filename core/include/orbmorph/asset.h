@@ -48,6 +48,12 @@ ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_supermesh 
                                           const orb_aligned_shape *shapes, const char *const *names,
                                           const orb_asset_options *options, orb_asset_facts *facts, orb_buffer *out);
 
+/* Where each shape was moved, as orb_asset_write() does: 16 doubles a shape, column-major as in glTF, that take the
+ * shape's own coordinates to those of the asset. The identity for the first shape, and for all with ORB_FIT_NONE; else
+ * a rotation, a shift and, with ORB_FIT_SIMILARITY, one scale. O(V·N). */
+ORB_MUST_CHECK orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh,
+                                               const orb_aligned_shape *shapes, orb_fit fit, double *out);
+
 #ifdef __cplusplus
 }
 #endif

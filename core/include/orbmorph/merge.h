@@ -43,6 +43,7 @@ typedef struct orb_merge_result {
   int32_t pair_count;
   orb_pair_report *pairs;
   orb_asset_facts asset_facts;
+  double *transforms; /* shape_count × 16, see orb_asset_transforms() */
   orb_buffer asset;
   orb_merge_timings timings;
 } orb_merge_result;
