@@ -24,6 +24,7 @@ typedef struct entry {
 /* Numbers may end in K, M or G (powers of 1024). */
 static const entry table[] = {
     {"listen", TEXT(listen), "127.0.0.1:8080", "ADDR:PORT, [V6]:PORT or unix:PATH; port 0 picks a free one"},
+    {"socket-mode", TEXT(socket_mode), "0660", "permissions of a Unix socket, in octal"},
     {"data", TEXT(data), "orbmorph-data", "the folder of everything that is kept"},
     {"config", TEXT(file), "", "a file of lines NAME = VALUE with these same names"},
     {"workers", NUMBER(workers, 1, 256), "0", "jobs that run side by side; 0: one a core"},
@@ -34,7 +35,8 @@ static const entry table[] = {
     {"idle-seconds", NUMBER(idle_seconds, 1, 3600), "30", "a connection that is silent for so long is closed"},
     {"max-body", NUMBER(max_body, 1024, INT64_C(1) << 40), "512M", "bytes of an upload"},
     {"max-json", NUMBER(max_json, 1024, 1 << 26), "1M", "bytes of a JSON body"},
-    {"max-ratio", NUMBER(max_ratio, 2, 1000000), "200", "times by which a compressed body may grow beyond its first 1M"},
+    {"max-ratio", NUMBER(max_ratio, 2, 1000000), "200",
+     "times by which a compressed body may grow beyond its first 1M"},
     {"decode-memory", NUMBER(decode_memory, 1 << 20, INT64_C(1) << 40), "256M", "bytes that unpack bodies at once"},
     {"max-triangles", NUMBER(max_triangles, 4, 500000000), "5000000", "triangles of a mesh"},
     {"queue-limit", NUMBER(queue_limit, 1, 1000000), "10000", "unfinished jobs"},
@@ -240,6 +242,12 @@ static int consistent(config *out) {
   }
   if ((out->tls_certificate[0] == 0) != (out->tls_key[0] == 0)) {
     fprintf(stderr, "orbmorphd: tls-certificate and tls-key belong together\n");
+    return 0;
+  }
+  char *end;
+  long mode = strtol(out->socket_mode, &end, 8);
+  if (end == out->socket_mode || *end || mode < 0 || mode > 0777) {
+    fprintf(stderr, "orbmorphd: socket-mode must be an octal number from 0 to 777\n");
     return 0;
   }
   if (strcmp(out->auth, "loopback") != 0 && strcmp(out->auth, "on") != 0 && strcmp(out->auth, "off") != 0) {

@@ -8,15 +8,14 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "evict.h"
 #include "http/http.h"
 #include "log.h"
 #include "maintain.h"
+#include "systemd.h"
 #include "token_command.h"
 #include "worker/pool.h"
 
@@ -29,27 +28,6 @@ static void raise_descriptor_limit(void) {
     if (setrlimit(RLIMIT_NOFILE, &limit) != 0) {
       log_warn("the limit of open files stays at what it was");
     }
-  }
-}
-
-/* Tells systemd, where there is one, over its datagram socket. */
-static void notify(const char *text) {
-  const char *path = getenv("NOTIFY_SOCKET");
-  struct sockaddr_un address = {.sun_family = AF_UNIX};
-  if (!path || strlen(path) >= sizeof address.sun_path) {
-    return;
-  }
-  strcpy(address.sun_path, path);
-  if (path[0] == '@') {
-    address.sun_path[0] = 0;
-  }
-  int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  socklen_t size = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + strlen(path));
-  if (fd >= 0) {
-    if (sendto(fd, text, strlen(text), MSG_NOSIGNAL, (struct sockaddr *)&address, size) < 0) {
-      log_warn("systemd could not be notified: %s", strerror(errno));
-    }
-    close(fd);
   }
 }
 
@@ -75,22 +53,15 @@ static int lock_data(const char *data) {
   return -1;
 }
 
-static int is_loopback(const char *listen) {
-  return strncmp(listen, "127.", 4) == 0 || strncmp(listen, "[::1]:", 6) == 0 ||
-         strncmp(listen, "localhost:", 10) == 0 || strncmp(listen, "unix:", 5) == 0;
-}
-
 static void announce(const server *srv) {
-  const char *listen = srv->options->listen;
-  if (strncmp(listen, "unix:", 5) == 0) {
-    printf("orbmorphd listening on %s\n", listen);
+  const char *text = srv->at.text;
+  if (strncmp(text, "unix:", 5) == 0) {
+    printf("orbmorphd listening on %s\n", text);
   } else {
-    int host = (int)(strrchr(listen, ':') - listen);
-    printf("orbmorphd listening on http%s://%.*s:%u\n", srv->options->tls_key[0] ? "s" : "", host, listen,
-           (unsigned)http_port(srv));
+    printf("orbmorphd listening on http%s://%s\n", srv->options->tls_key[0] ? "s" : "", text);
   }
   fflush(stdout);
-  notify("READY=1\n");
+  systemd_notify("READY=1\nSTATUS=serving\n");
 }
 
 /* Signals come through a pipe: threads that libraries start before main() do not have them blocked, so a signalfd
@@ -122,7 +93,7 @@ static int take_signals(sigset_t *set) {
   return signal_pipe[0];
 }
 
-enum { EVICT_EVERY_MS = 1000, EVICT_GRACE_MS = 5000 };
+enum { TICK_MS = 1000, EVICT_GRACE_MS = 5000 };
 
 /* Keeps derived objects within their budget, when a job has made more or some could not leave yet: what was just made
  * or used stays for a while, so that who waits for it can have it. */
@@ -167,23 +138,50 @@ static void on_change(const char *name, int taken) {
 }
 
 static void reload(server *srv, const command_line *line) {
-  if (!config_reload(line->options, line->argc, line->argv, on_change)) {
+  systemd_reloading();
+  if (config_reload(line->options, line->argc, line->argv, on_change)) {
+    set_log(line->options);
+    queue_set_limit(srv->q, (int)line->options->queue_limit);
+    log_info("SIGHUP: the configuration was read again");
+  } else {
     log_error("SIGHUP: the configuration is not valid and stays as it was");
-    return;
   }
-  set_log(line->options);
-  queue_set_limit(srv->q, (int)line->options->queue_limit);
-  log_info("SIGHUP: the configuration was read again");
+  systemd_notify("READY=1\n");
+}
+
+/* The watchdog is told only while a thread that serves requests still takes a task. */
+typedef struct probe {
+  task task; /* first */
+  int idle;  /* under __atomic */
+} probe;
+
+static void probe_run(task *t) {
+  __atomic_store_n(&((probe *)(void *)t)->idle, 1, __ATOMIC_RELEASE);
+}
+
+static void feed_watchdog(server *srv, probe *p) {
+  if (__atomic_exchange_n(&p->idle, 0, __ATOMIC_ACQ_REL)) {
+    systemd_notify("WATCHDOG=1\n");
+    tasks_add(srv->io, &p->task);
+  }
 }
 
 /* Waits for a signal to stop; a second one, or the end of the time for draining, stops at once. */
 static void wait_for_stop(server *srv, const command_line *line, int signals) {
+  static probe probed = {.task = {.run = probe_run}, .idle = 1}; /* outlives this function in the pool's list */
   struct pollfd wait = {.fd = signals, .events = POLLIN};
-  int64_t seen = -1;
+  int64_t seen = -1, every = systemd_watchdog_ms(), fed = 0, kept = 0;
+  int tick = every > 0 && every < TICK_MS ? (int)every : TICK_MS;
   for (int over = 0;;) {
     unsigned char number;
-    int ready = poll(&wait, 1, EVICT_EVERY_MS);
-    if (ready == 0) {
+    int ready = poll(&wait, 1, tick);
+    int64_t now = orb_clock_ms();
+    if (every > 0 && now - fed >= every) {
+      fed = now;
+      feed_watchdog(srv, &probed);
+    }
+    if (now - kept >= TICK_MS) {
+      kept = now;
       keep_budget(srv, &seen, &over);
     }
     if (ready <= 0 || read(signals, &number, 1) != 1) {
@@ -196,7 +194,7 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
     break;
   }
   log_info("stopping: running jobs have %lld s", (long long)srv->options->drain_seconds);
-  notify("STOPPING=1\n");
+  systemd_notify("STOPPING=1\nSTATUS=running jobs end\n");
   __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
   queue_stop(srv->q, 0);
   int64_t until = orb_clock_ms() + 1000 * srv->options->drain_seconds;
@@ -210,7 +208,6 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
 
 static int serve(server *srv, const command_line *line, int signals, const sigset_t *set) {
   const config *o = srv->options;
-  srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !is_loopback(o->listen));
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
   queue_options queued = {.workers = (int)o->workers,
                           .cores = cores > 0 ? (int)cores : 1,
@@ -225,7 +222,9 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
   if (queued.cores < queued.workers) {
     queued.cores = queued.workers;
   }
-  if (objects_open(o->data, &srv->store) != STORE_OK || catalogue_open(o->data, &srv->cat) != STORE_OK ||
+  int listens = listen_open(o, &srv->at);
+  srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
+  if (!listens || objects_open(o->data, &srv->store) != STORE_OK || catalogue_open(o->data, &srv->cat) != STORE_OK ||
       !(srv->tokens = catalogue_tokens(srv->cat, &srv->token_count)) || !(srv->q = queue_create(&queued, srv->cat)) ||
       queue_recover(srv->q) != STORE_OK || !(srv->descriptions = cache_create(CACHE_BYTES)) ||
       !(srv->io = tasks_start((int)o->io_threads)) || !(srv->checks = tasks_start((int)o->workers)) ||
@@ -253,6 +252,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
   tasks_stop(srv->checks); /* resumes what they had */
   tasks_stop(srv->io);
   http_stop(srv);
+  listen_remove(&srv->at);
   queue_destroy(srv->q);
   catalogue_close(srv->cat);
   objects_close(srv->store);

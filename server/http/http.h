@@ -17,6 +17,7 @@
 #include "cache.h"
 #include "config.h"
 #include "http/decode.h"
+#include "http/listen.h"
 #include "http/parse.h"
 #include "queue/queue.h"
 #include "store/tokens.h"
@@ -30,6 +31,7 @@ typedef struct server {
   cache *descriptions;
   tasks *io, *checks;
   pthread_mutex_t mesh_lock; /* so that a mesh's file and row come and go together; never taken by a handler */
+  listener at;
   struct MHD_Daemon *daemon;
   int ready, stopping; /* written under __atomic */
   int64_t decoding;    /* bytes that decoders of bodies hold; __atomic */
@@ -50,7 +52,7 @@ struct request {
   const route *route;
   const char *method;
   char id[ORB_ID_SIZE];
-  int shape; /* {k} of the path; −1: none */
+  int shape;        /* {k} of the path; −1: none */
   char number[24];  /* of the request, for the log and X-Request-Id */
   token_row *token; /* of the caller; NULL where none is needed */
   int has_body, head;
@@ -82,7 +84,6 @@ struct request {
 /* server.c */
 int http_start(server *srv);
 void http_stop(server *srv);
-uint16_t http_port(const server *srv);
 /* Suspends and runs fn on a thread of the pool; fn must leave a response or PHASE_WAIT. */
 enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r));
 

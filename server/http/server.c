@@ -1,14 +1,8 @@
 /* The life of a request, and of the daemon that serves them. */
-#include <arpa/inet.h>
-#include <netdb.h>
-#include <netinet/in.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <time.h>
-#include <unistd.h>
 
 #include "http/body.h"
 #include "http/http.h"
@@ -226,48 +220,6 @@ static void on_mhd_log(void *user, const char *format, va_list args) {
   log_write(LOG_DEBUG, NULL, "http: %s", text);
 }
 
-/* A listening socket for ADDR:PORT or unix:PATH, or the one that systemd passed; −1 with the reason logged. */
-static int listen_on(const char *where) {
-  const char *count = getenv("LISTEN_FDS"), *pid = getenv("LISTEN_PID");
-  if (count && pid && atoi(count) == 1 && atol(pid) == (long)getpid()) {
-    return 3;
-  }
-  int fd = -1;
-  if (strncmp(where, "unix:", 5) == 0) {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    if (strlen(where + 5) >= sizeof address.sun_path) {
-      return -1;
-    }
-    strcpy(address.sun_path, where + 5);
-    unlink(address.sun_path);
-    fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (fd >= 0 && (bind(fd, (struct sockaddr *)&address, sizeof address) != 0 || listen(fd, SOMAXCONN) != 0)) {
-      close(fd);
-      fd = -1;
-    }
-    return fd;
-  }
-  char host[200];
-  const char *colon = strrchr(where, ':');
-  if (!colon || (size_t)(colon - where) >= sizeof host) {
-    return -1;
-  }
-  const char *begin = where[0] == '[' ? where + 1 : where;
-  snprintf(host, sizeof host, "%.*s", (int)(colon - begin - (where[0] == '[')), begin);
-  struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *found = NULL;
-  if (getaddrinfo(host[0] ? host : NULL, colon + 1, &hints, &found) != 0) {
-    return -1;
-  }
-  fd = socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &(int){1}, sizeof(int));
-  if (fd >= 0 && (bind(fd, found->ai_addr, found->ai_addrlen) != 0 || listen(fd, SOMAXCONN) != 0)) {
-    close(fd);
-    fd = -1;
-  }
-  freeaddrinfo(found);
-  return fd;
-}
-
 /* A small text file, in memory of malloc(); NULL with the reason logged. */
 static char *read_text(const char *path) {
   enum { MOST = 1 << 20 };
@@ -292,9 +244,7 @@ int http_start(server *srv) {
   const config *o = srv->options;
   int tls = o->tls_key[0] != 0;
   char *certificate = tls ? read_text(o->tls_certificate) : NULL, *key = tls ? read_text(o->tls_key) : NULL;
-  int fd = tls && (!certificate || !key) ? -1 : listen_on(o->listen);
-  if (fd < 0) {
-    log_error("cannot listen on %s", o->listen);
+  if (tls && (!certificate || !key)) {
     free(certificate);
     free(key);
     return 0;
@@ -302,7 +252,7 @@ int http_start(server *srv) {
   unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ITC | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG |
                    (unsigned)(tls ? MHD_USE_TLS : MHD_USE_TURBO);
   struct MHD_OptionItem options[] = {{MHD_OPTION_THREAD_POOL_SIZE, (intptr_t)o->http_threads, NULL},
-                                     {MHD_OPTION_LISTEN_SOCKET, fd, NULL},
+                                     {MHD_OPTION_LISTEN_SOCKET, srv->at.fd, NULL},
                                      {MHD_OPTION_CONNECTION_MEMORY_LIMIT, CONNECTION_MEMORY, NULL},
                                      {MHD_OPTION_CONNECTION_LIMIT, (intptr_t)o->max_connections, NULL},
                                      {MHD_OPTION_CONNECTION_TIMEOUT, (intptr_t)o->idle_seconds, NULL},
@@ -318,21 +268,9 @@ int http_start(server *srv) {
   free(certificate); /* parsed at the start */
   free(key);
   if (!srv->daemon) {
-    close(fd);
-    log_error("the HTTP service cannot be started on %s", o->listen);
+    log_error("the HTTP service cannot be started on %s", srv->at.text);
   }
   return srv->daemon != NULL;
-}
-
-uint16_t http_port(const server *srv) {
-  const union MHD_DaemonInfo *info = MHD_get_daemon_info(srv->daemon, MHD_DAEMON_INFO_LISTEN_FD);
-  struct sockaddr_storage address;
-  socklen_t size = sizeof address;
-  if (!info || getsockname(info->listen_fd, (struct sockaddr *)&address, &size) != 0) {
-    return 0;
-  }
-  return ntohs(address.ss_family == AF_INET6 ? ((struct sockaddr_in6 *)(void *)&address)->sin6_port
-                                             : ((struct sockaddr_in *)(void *)&address)->sin_port);
 }
 
 void http_stop(server *srv) {
