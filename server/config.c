@@ -31,8 +31,18 @@ static const entry table[] = {
     {"io-threads", NUMBER(io_threads, 1, 64), "6", "threads for queries and commits"},
     {"http-threads", NUMBER(http_threads, 2, 64), "2", "threads that serve connections"},
     {"max-connections", NUMBER(max_connections, 16, 1000000), "16384", "connections at once"},
-    {"connections-per-address", NUMBER(connections_per_address, 0, 1000000), "0", "0: no limit"},
+    {"connections-per-address", NUMBER(connections_per_address, 0, 1000000), "256",
+     "connections of one address, where limits hold; 0: no limit"},
+    {"requests-per-second", NUMBER(requests_per_second, 0, 1000000), "100",
+     "of one address, where limits hold, over 10 s; 0: no limit"},
+    {"limits", TEXT(limits), "remote",
+     "whom the two limits above hold for; remote: other machines, where tokens are needed; all; off"},
     {"idle-seconds", NUMBER(idle_seconds, 1, 3600), "30", "a connection that is silent for so long is closed"},
+    {"header-seconds", NUMBER(header_seconds, 1, 3600), "15", "the headers of a request must be there after so long"},
+    {"slow-seconds", NUMBER(slow_seconds, 1, 3600), "10", "time over which min-rate is measured"},
+    {"min-rate", NUMBER(min_rate, 0, 1 << 30), "256",
+     "bytes a second by which a body must come and an answer be taken; 0: any"},
+    {"slow-ms", NUMBER(slow_ms, 1, 3600000), "1000", "a request that takes longer is logged as slow"},
     {"max-body", NUMBER(max_body, 1024, INT64_C(1) << 40), "512M", "bytes of an upload"},
     {"max-json", NUMBER(max_json, 1024, 1 << 26), "1M", "bytes of a JSON body"},
     {"max-ratio", NUMBER(max_ratio, 2, 1000000), "200",
@@ -242,6 +252,10 @@ static int consistent(config *out) {
   }
   if ((out->tls_certificate[0] == 0) != (out->tls_key[0] == 0)) {
     fprintf(stderr, "orbmorphd: tls-certificate and tls-key belong together\n");
+    return 0;
+  }
+  if (strcmp(out->limits, "remote") != 0 && strcmp(out->limits, "all") != 0 && strcmp(out->limits, "off") != 0) {
+    fprintf(stderr, "orbmorphd: limits must be remote, all or off\n");
     return 0;
   }
   char *end;

@@ -1,4 +1,5 @@
 /* Who may call. Tokens are read at the start; the command that changes them needs the data folder for itself. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -19,8 +20,44 @@ static const token_row *find_token(const server *srv, const char *header) {
   return found;
 }
 
+/* Health is for everybody, always. */
+static int is_open(const char *path) {
+  return strcmp(path, "/livez") == 0 || strcmp(path, "/readyz") == 0;
+}
+
+int access_within_limits(request *r, const char *path) {
+  if (is_open(path)) {
+    return 1;
+  }
+  watched_take_request(r->watched, &r->allowance);
+  if (!r->allowance.refused) {
+    return 1;
+  }
+  if (r->allowance.refused == 2) {
+    r->closes = 1;
+    reply_refuse(r, "too-many-requests", "This address has more than %lld connections open; close some.",
+                 (long long)r->srv->options->connections_per_address);
+  } else {
+    reply_refuse(r, "too-many-requests", "This address may make %lld requests a second; wait a little.",
+                 (long long)r->srv->options->requests_per_second);
+  }
+  return 0;
+}
+
+void access_headers(request *r) {
+  const allowance *a = &r->allowance;
+  char text[160];
+  if (!a->limited) {
+    return;
+  }
+  snprintf(text, sizeof text, "\"requests\";q=%lld;w=%lld", (long long)a->quota, (long long)a->window);
+  reply_header(r, "RateLimit-Policy", text);
+  snprintf(text, sizeof text, "\"requests\";r=%lld;t=%lld", (long long)a->left, (long long)a->reset);
+  reply_header(r, "RateLimit", text);
+}
+
 int access_check(request *r, const char *path, orb_problem *problem) {
-  int open = strcmp(path, "/livez") == 0 || strcmp(path, "/readyz") == 0;
+  int open = is_open(path);
   /* Browsers ask for permission to call without the token; the answer tells nothing but methods. */
   if (!r->srv->needs_token || open || strcmp(r->method, "OPTIONS") == 0) {
     return 1;

@@ -19,6 +19,7 @@
 #include "http/decode.h"
 #include "http/listen.h"
 #include "http/parse.h"
+#include "http/watch.h"
 #include "queue/queue.h"
 #include "store/tokens.h"
 #include "tasks.h"
@@ -32,6 +33,7 @@ typedef struct server {
   tasks *io, *checks;
   pthread_mutex_t mesh_lock; /* so that a mesh's file and row come and go together; never taken by a handler */
   listener at;
+  watch *connections;
   struct MHD_Daemon *daemon;
   int ready, stopping; /* written under __atomic */
   int64_t decoding;    /* bytes that decoders of bodies hold; __atomic */
@@ -49,6 +51,8 @@ struct request {
   void (*away)(request *r);
   server *srv;
   struct MHD_Connection *connection;
+  watched *watched; /* the connection; may be NULL */
+  allowance allowance;
   const route *route;
   const char *method;
   char id[ORB_ID_SIZE];
@@ -93,7 +97,11 @@ const char *header_of(const request *r, const char *name);
 const char *query_of(const request *r, const char *name);
 int query_has(const request *r, const char *name); /* also without a value */
 
-/* access.c: 1, or 0 with the problem. */
+/* access.c: 1, or 0 with a response. */
+int access_within_limits(request *r, const char *path);
+/* RateLimit and RateLimit-Policy (draft-ietf-httpapi-ratelimit-headers) of what holds for the caller. */
+void access_headers(request *r);
+/* 1, or 0 with the problem. */
 int access_check(request *r, const char *path, orb_problem *problem);
 /* Takes bytes of an upload from the token's quota; then says whether they were stored as something new. */
 int access_take_quota(request *r, int64_t bytes, orb_problem *problem);

@@ -139,8 +139,10 @@ static void add_cors(request *r) {
   }
   reply_header(r, "Access-Control-Allow-Origin", any ? "*" : origin);
   reply_header(r, "Vary", "Origin");
-  reply_header(r, "Access-Control-Expose-Headers",
-               "Location, Content-Location, Retry-After, ETag, Content-Range, X-Request-Id, RateLimit");
+  reply_header(
+      r, "Access-Control-Expose-Headers",
+      "Location, Content-Location, Retry-After, ETag, Content-Range, X-Request-Id, RateLimit, RateLimit-Policy, "
+      "Preference-Applied");
   if (strcmp(r->method, "OPTIONS") == 0) {
     reply_header(r, "Access-Control-Allow-Methods", "GET, HEAD, POST, DELETE");
     reply_header(
@@ -157,9 +159,11 @@ enum MHD_Result reply_send(request *r) {
   if (r->closes || (r->status >= 400 && r->has_body)) {
     reply_header(r, "Connection", "close");
   }
+  access_headers(r);
   reply_header(r, "X-Content-Type-Options", "nosniff");
   reply_header(r, "X-Request-Id", r->number);
   add_cors(r);
+  watched_answer(r->watched);
   enum MHD_Result result = MHD_queue_response(r->connection, r->status, r->response);
   MHD_destroy_response(r->response);
   r->response = NULL;

@@ -9,7 +9,7 @@
 #include "log.h"
 #include "metrics.h"
 
-enum { CONNECTION_MEMORY = 16 * 1024, SLOW_US = 1000000 };
+enum { CONNECTION_MEMORY = 16 * 1024 };
 
 int is_page(const char *path);
 void handle_page(request *r, const char *path);
@@ -102,6 +102,8 @@ static request *request_create(server *srv, struct MHD_Connection *connection, c
     r->connection = connection;
     r->method = method;
     r->head = strcmp(method, "HEAD") == 0;
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    r->watched = info ? info->socket_context : NULL;
     r->temp.fd = -1;
     r->began = clock_us();
     snprintf(r->number, sizeof r->number, "%llx-%llx", (unsigned long long)srv->started & 0xffffff,
@@ -121,11 +123,14 @@ static void request_begin(request *r, const char *path, const char *version) {
   char allow[64];
   orb_problem problem = {0};
   r->route = route_find(r->method, path, r->id, allow);
+  watched_headers(r->watched);
   r->shape = r->route ? route_number(r->route, path) : -1;
   parse_trace(header_of(r, "traceparent"), r->trace);
   if (!guard_headers(r, version, &problem)) {
     r->closes = 1;
     reply_problem(r, &problem);
+  } else if (!access_within_limits(r, path)) {
+    return;
   } else if (!access_check(r, path, &problem)) {
     reply_problem(r, &problem);
   } else if (!r->route) {
@@ -151,16 +156,21 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
       return MHD_NO;
     }
     request_begin(r, url, version);
+    if (!r->has_body) {
+      watched_work(r->watched);
+    }
     return r->phase == PHASE_SEND && r->has_body ? reply_send(r) : MHD_YES;
   }
   if (*upload_size) {
     size_t size = *upload_size;
     *upload_size = 0;
+    watched_body(r->watched, (int64_t)size);
     return body_take(r, upload, size) ? MHD_YES : MHD_NO;
   }
   enum MHD_Result result = MHD_YES;
   if (r->has_body && !r->body_done) {
     r->body_done = 1;
+    watched_work(r->watched);
     body_end(r);
   }
   if (r->phase == PHASE_BODY) {
@@ -185,7 +195,7 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
   if (code == MHD_REQUEST_TERMINATED_COMPLETED_OK && !r->head) {
     metrics_bytes(0, r->sends);
   }
-  int slow = took > SLOW_US && !waited;
+  int slow = took > 1000 * r->srv->options->slow_ms && !waited;
   if (slow || r->status >= 500 || log_wants(LOG_DEBUG)) {
     char fields[REQUEST_FIELDS + 80];
     request_fields(r, fields);
@@ -193,6 +203,10 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
     snprintf(fields + n, sizeof fields - n, ",\"status\":%u,\"ms\":%lld", r->status, (long long)(took / 1000));
     log_write(slow || r->status >= 500 ? LOG_WARN : LOG_DEBUG, fields, "%s", slow ? "slow request" : "request");
   }
+  if (r->has_body && !r->body_done && (r->closes || r->status >= 400)) {
+    watched_linger(r->watched);
+  }
+  watched_done(r->watched);
   queue_release(r->srv->q, r->waits_for);
   objects_abandon(&r->temp);
   body_free(r);
@@ -206,10 +220,16 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
 
 static void on_connection(void *user, struct MHD_Connection *connection, void **state,
                           enum MHD_ConnectionNotificationCode code) {
-  (void)user;
-  (void)connection;
-  (void)state;
-  metrics_connection(code == MHD_CONNECTION_NOTIFY_STARTED ? 1 : -1);
+  server *srv = user;
+  int started = code == MHD_CONNECTION_NOTIFY_STARTED;
+  metrics_connection(started ? 1 : -1);
+  if (!started) {
+    watch_close(srv->connections, *state);
+    return;
+  }
+  const union MHD_ConnectionInfo *fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+  const union MHD_ConnectionInfo *from = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+  *state = fd ? watch_open(srv->connections, fd->connect_fd, from ? from->client_addr : NULL) : NULL;
 }
 
 static void on_mhd_log(void *user, const char *format, va_list args) {
@@ -249,6 +269,13 @@ int http_start(server *srv) {
     free(key);
     return 0;
   }
+  srv->connections = watch_start(o, srv->needs_token);
+  if (!srv->connections) {
+    log_error("the connections cannot be watched: no memory or threads");
+    free(certificate);
+    free(key);
+    return 0;
+  }
   unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ITC | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG |
                    (unsigned)(tls ? MHD_USE_TLS : MHD_USE_TURBO);
   struct MHD_OptionItem options[] = {{MHD_OPTION_THREAD_POOL_SIZE, (intptr_t)o->http_threads, NULL},
@@ -256,7 +283,6 @@ int http_start(server *srv) {
                                      {MHD_OPTION_CONNECTION_MEMORY_LIMIT, CONNECTION_MEMORY, NULL},
                                      {MHD_OPTION_CONNECTION_LIMIT, (intptr_t)o->max_connections, NULL},
                                      {MHD_OPTION_CONNECTION_TIMEOUT, (intptr_t)o->idle_seconds, NULL},
-                                     {MHD_OPTION_PER_IP_CONNECTION_LIMIT, (intptr_t)o->connections_per_address, NULL},
                                      {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)completed, srv},
                                      {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, srv},
                                      {tls ? MHD_OPTION_HTTPS_MEM_CERT : MHD_OPTION_END, 0, certificate},
@@ -278,4 +304,6 @@ void http_stop(server *srv) {
     MHD_stop_daemon(srv->daemon);
     srv->daemon = NULL;
   }
+  watch_stop(srv->connections);
+  srv->connections = NULL;
 }
