@@ -137,6 +137,25 @@ void orb_progress(orb_context *ctx, const char *stage, double fraction) {
   pthread_mutex_unlock(&ctx->progress_lock);
 }
 
+static orb_cpu widest_of_machine(void) {
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
+      __builtin_cpu_supports("avx512bw")) {
+    return ORB_CPU_AVX512;
+  }
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+    return ORB_CPU_AVX2;
+  }
+#endif
+  return ORB_CPU_PLAIN;
+}
+
+orb_cpu orb_context_cpu(const orb_context *ctx) {
+  orb_cpu widest = widest_of_machine();
+  return ctx->options.cpu == ORB_CPU_AUTO || ctx->options.cpu > widest ? widest : ctx->options.cpu;
+}
+
 int orb_threads(const orb_context *ctx) {
   return ctx->options.threads;
 }

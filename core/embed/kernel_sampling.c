@@ -10,7 +10,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { MAX_RELIEF = 8, LOOSEN_RINGS = 2, MAX_ATTEMPTS = 3 };
+enum { MAX_RELIEF = 8, LOOSEN_RINGS = 2, MAX_ATTEMPTS = 3, POLE = 100 };
 /* A new vertex whose ring has less than the share `tight` of the area that it stands for has its surroundings loosened
  * by so many sweeps. The first effort serves but for meshes made to break it. */
 static const struct effort {
@@ -124,6 +124,11 @@ static void enlist(ks_run *run, int32_t v) {
   }
 }
 
+/* A pole's ring is not followed outwards: it would be most of the mesh, for each vertex at it. */
+static int is_pole(const ks_run *run, int32_t v) {
+  return run->m.valence[v] >= POLE;
+}
+
 static void enlist_star(ks_run *run, int32_t v) {
   enlist(run, v);
   int32_t e = run->m.out[v];
@@ -227,7 +232,9 @@ static orb_status relieve(ks_run *run, int32_t parent, int32_t rings) {
   enlist(run, parent);
   for (int32_t r = 0; r < rings; r++) {
     for (int32_t i = 0, end = run->next_count; i < end; i++) {
-      enlist_star(run, run->next[i]);
+      if (!is_pole(run, run->next[i]) || i == 0) {
+        enlist_star(run, run->next[i]);
+      }
     }
   }
   orb_status status = ORB_OK;
@@ -254,7 +261,9 @@ static orb_status loosen(ks_run *run, int32_t v) {
   enlist(run, v);
   for (int32_t r = 0; r < LOOSEN_RINGS; r++) {
     for (int32_t i = 0, end = run->next_count; i < end; i++) {
-      enlist_star(run, run->next[i]);
+      if (!is_pole(run, run->next[i]) || i == 0) {
+        enlist_star(run, run->next[i]);
+      }
     }
   }
   for (int32_t sweep = 0; sweep < run->effort.sweeps; sweep++) {

@@ -53,10 +53,8 @@ typedef struct orb_kernels {
   void (*sweep)(const orb_sweep_job *job, int64_t begin, int64_t end);
 } orb_kernels;
 
-/* The widest that this machine runs. */
-const orb_kernels *orb_kernels_best(void);
-/* All that this machine runs, best first; for tests. */
-int orb_kernels_list(const orb_kernels *out[4]);
+/* Those that orb_context_cpu() names. */
+const orb_kernels *orb_kernels_of(orb_cpu cpu);
 
 extern const orb_kernels orb_kernels_plain;
 #if defined(__x86_64__)

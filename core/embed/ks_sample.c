@@ -51,7 +51,7 @@ orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options,
     s.pair_s[i] = i < s.pair_count ? (float)s.pair[i][0] : 1;
     s.pair_t[i] = i < s.pair_count ? (float)s.pair[i][1] : 1;
   }
-  s.width = (int)ks_width_of_machine();
+  s.cpu = orb_context_cpu(ctx);
   *out = s;
   return ORB_OK;
 }

@@ -39,7 +39,7 @@ typedef struct ks_sampler {
   float *pair_s, *pair_t; /* the same pairs; behind them (1, 1), which lies outside of any kernel */
   float *near_candidate;  /* as candidate */
   ks_edge *edge;          /* as many as the ring's capacity */
-  int width;              /* a ks_width */
+  orb_cpu cpu;
   ks_ring ring;
   int32_t kernel_points; /* how many the last call found inside */
 } ks_sampler;

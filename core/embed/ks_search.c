@@ -24,20 +24,6 @@ enum { LANES = KS_LANES };
 
 #define KS_INLINE static inline __attribute__((always_inline))
 
-ks_width ks_width_of_machine(void) {
-#if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512bw")) {
-    return KS_AVX512;
-  }
-  if (__builtin_cpu_supports("avx2")) {
-    return KS_AVX2;
-  }
-#endif
-  return KS_PLAIN;
-}
-
 /* Where the scale of the sum goes: the factor of Eq. 3 that has an exponent to take its root by. */
 typedef struct scaling {
   float angle, area, shape;
@@ -132,13 +118,13 @@ __attribute__((target(KS_TARGET_512))) static int32_t keep_below_512(float limit
 }
 #endif
 
-KS_INLINE int32_t keep_below(ks_width width, float limit, float *x, float *y, float *z, float *key, int32_t count) {
+KS_INLINE int32_t keep_below(orb_cpu cpu, float limit, float *x, float *y, float *z, float *key, int32_t count) {
 #if defined(__x86_64__)
-  if (width == KS_AVX512) {
+  if (cpu == ORB_CPU_AVX512) {
     return keep_below_512(limit, x, y, z, key, count);
   }
 #endif
-  (void)width;
+  (void)cpu;
   return keep_below_plain(limit, x, y, z, key, count);
 }
 
@@ -157,28 +143,80 @@ KS_INLINE void measure_depth(const ks_edge *edge, int32_t edges, const float *re
   }
 }
 
-/* x to the power e, where kind is e if straight code is known for it and 0 if not. */
-KS_INLINE float power(float x, int kind, float e) {
+/* x to the power e, where kind is e if straight code is known for it. */
+KS_INLINE float power(float x, int kind) {
   float x3 = x * x * x, x6 = x3 * x3;
-  return kind == 1 ? x : kind == 3 ? x3 : kind == 12 ? x6 * x6 : powf(x, e);
+  return kind == 1 ? x : kind == 3 ? x3 : x6 * x6;
 }
 
-/* Adds the term of Eq. 3 of one ring triangle. */
-KS_INLINE void add_term(const ks_edge *e, int area_kind, int shape_kind, float area_exponent, float aspect_exponent,
-                        float shape_scale, const float *restrict x, const float *restrict y, const float *restrict z,
-                        int32_t count, float *restrict error) {
-  float qx = e->q[0], qy = e->q[1], qz = e->q[2], wx = e->w[0], wy = e->w[1], wz = e->w[2], a = e->a;
-  float k0 = e->k0, kb = e->kb, kc = e->kc, kappa = e->kappa, inv_kappa = e->inv_kappa, quarter = 0.25f * shape_scale;
+/* x to the power e for each; whole and half powers up to 64 by multiplication, bit by bit over all lanes. */
+KS_INLINE void raise_each(float *restrict x, float e) {
+  float doubled = 2 * e, power[LANES];
+  if (doubled != floorf(doubled) || doubled < 0 || doubled > 128) {
+    for (int32_t l = 0; l < LANES; l++) {
+      x[l] = powf(x[l], e);
+    }
+    return;
+  }
+  int bits = (int)doubled;
+  for (int32_t l = 0; l < LANES; l++) {
+    power[l] = bits & 1 ? sqrtf(x[l]) : 1;
+  }
+  for (int b = bits >> 1; b; b >>= 1) {
+    if (b & 1) {
+      for (int32_t l = 0; l < LANES; l++) {
+        power[l] *= x[l];
+      }
+    }
+    for (int32_t l = 0; l < LANES; l++) {
+      x[l] *= x[l];
+    }
+  }
+  for (int32_t l = 0; l < LANES; l++) {
+    x[l] = power[l];
+  }
+}
+
+/* The factors of Eq. 3 of one ring triangle at a candidate, before their exponents. */
+KS_INLINE void measure(const ks_edge *e, float quarter, float x, float y, float z, float *angle, float *area,
+                       float *shape) {
+  float ux = e->q[0] - x, uy = e->q[1] - y, uz = e->q[2] - z, vx = e->w[0] - x, vy = e->w[1] - y, vz = e->w[2] - z;
+  float c2 = ux * ux + uy * uy + uz * uz, b2 = vx * vx + vy * vy + vz * vz;
+  float nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
+  float n2 = nx * nx + ny * ny + nz * nz + 1e-36f, inv = 1 / sqrtf(n2), doubled = n2 * inv;
+  float b = sqrtf(b2), c = sqrtf(c2);
+  *area = doubled * e->kappa + inv * e->inv_kappa;
+  *shape = quarter * e->a * b * c * (e->a + b + c) * inv * inv;
+  *angle = (e->k0 + e->kb * b2 + e->kc * c2) * inv;
+}
+
+/* Adds the term of one ring triangle, the exponents being 1, 3 or 12. */
+KS_INLINE void add_term(const ks_edge *edge, int area_kind, int shape_kind, float shape_scale, const float *restrict x,
+                        const float *restrict y, const float *restrict z, int32_t count, float *restrict error) {
+  const ks_edge e = *edge;
+  float quarter = 0.25f * shape_scale;
   for (int32_t l = 0; l < count; l++) {
-    float ux = qx - x[l], uy = qy - y[l], uz = qz - z[l], vx = wx - x[l], vy = wy - y[l], vz = wz - z[l];
-    float c2 = ux * ux + uy * uy + uz * uz, b2 = vx * vx + vy * vy + vz * vz;
-    float nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
-    float n2 = nx * nx + ny * ny + nz * nz + 1e-36f, inv = 1 / sqrtf(n2), doubled = n2 * inv;
-    float b = sqrtf(b2), c = sqrtf(c2);
-    float area = doubled * kappa + inv * inv_kappa;
-    float shape = quarter * a * b * c * (a + b + c) * inv * inv;
-    float angle = (k0 + kb * b2 + kc * c2) * inv;
-    error[l] += angle * power(area, area_kind, area_exponent) * power(shape, shape_kind, aspect_exponent);
+    float angle, area, shape;
+    measure(&e, quarter, x[l], y[l], z[l], &angle, &area, &shape);
+    error[l] += angle * power(area, area_kind) * power(shape, shape_kind);
+  }
+}
+
+/* The same for any exponents. */
+KS_INLINE void add_any_term(const ks_edge *edge, float area_exponent, float aspect_exponent, float shape_scale,
+                            const float *restrict x, const float *restrict y, const float *restrict z, int32_t count,
+                            float *restrict error) {
+  const ks_edge e = *edge;
+  float quarter = 0.25f * shape_scale, angle[LANES], area[LANES], shape[LANES];
+  for (int32_t begin = 0; begin < count; begin += LANES) {
+    for (int32_t l = 0; l < LANES; l++) {
+      measure(&e, quarter, x[begin + l], y[begin + l], z[begin + l], &angle[l], &area[l], &shape[l]);
+    }
+    raise_each(area, area_exponent);
+    raise_each(shape, aspect_exponent);
+    for (int32_t l = 0; l < LANES; l++) {
+      error[begin + l] += angle[l] * area[l] * shape[l];
+    }
   }
 }
 
@@ -196,24 +234,24 @@ KS_INLINE int32_t padded(int32_t count) {
   return (count + LANES - 1) / LANES * LANES;
 }
 
-KS_INLINE void run(search *q, ks_width width) {
+KS_INLINE void run(search *q, orb_cpu cpu) {
   float *x = q->x, *y = q->y, *z = q->z, *error = q->error;
   int32_t count = 0;
   for (int32_t i = 0; i < q->edges; i++, count += q->pairs) {
     spread(q->s, q->t, q->pairs, q->draw, q->radius, q->apex, &q->edge[i], x + count, y + count, z + count);
   }
   measure_depth(q->edge, q->edges, x, y, z, error, count);
-  count = q->inside = keep_below(width, 0, x, y, z, error, count);
+  count = q->inside = keep_below(cpu, 0, x, y, z, error, count);
   memset(error, 0, (size_t)padded(count) * sizeof *error);
   for (int32_t i = 0; i < q->edges && count > 0; i++) {
     if (q->area_exponent == 3 && q->aspect_exponent == 12) {
-      add_term(&q->edge[i], 3, 12, 3, 12, q->shape_scale, x, y, z, padded(count), error);
+      add_term(&q->edge[i], 3, 12, q->shape_scale, x, y, z, padded(count), error);
     } else if (q->area_exponent == 3 && q->aspect_exponent == 1) {
-      add_term(&q->edge[i], 3, 1, 3, 1, q->shape_scale, x, y, z, padded(count), error);
+      add_term(&q->edge[i], 3, 1, q->shape_scale, x, y, z, padded(count), error);
     } else {
-      add_term(&q->edge[i], 0, 0, q->area_exponent, q->aspect_exponent, q->shape_scale, x, y, z, count, error);
+      add_any_term(&q->edge[i], q->area_exponent, q->aspect_exponent, q->shape_scale, x, y, z, padded(count), error);
     }
-    count = keep_below(width, 1, x, y, z, error, count);
+    count = keep_below(cpu, 1, x, y, z, error, count);
   }
   float least = 1;
   q->best = -1;
@@ -226,25 +264,25 @@ KS_INLINE void run(search *q, ks_width width) {
 }
 
 static void run_plain(search *q) {
-  run(q, KS_PLAIN);
+  run(q, ORB_CPU_PLAIN);
 }
 
 #if defined(__x86_64__)
 __attribute__((target("avx2"))) static void run_avx2(search *q) {
-  run(q, KS_AVX2);
+  run(q, ORB_CPU_AVX2);
 }
 __attribute__((target(KS_TARGET_512))) static void run_avx512(search *q) {
-  run(q, KS_AVX512);
+  run(q, ORB_CPU_AVX512);
 }
 #endif
 
 static void run_widest(const ks_sampler *s, search *q) {
 #if defined(__x86_64__)
-  if (s->width == KS_AVX512) {
+  if (s->cpu == ORB_CPU_AVX512) {
     run_avx512(q);
     return;
   }
-  if (s->width == KS_AVX2) {
+  if (s->cpu == ORB_CPU_AVX2) {
     run_avx2(q);
     return;
   }

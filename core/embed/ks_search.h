@@ -4,11 +4,6 @@
 
 #include "embed/ks_sample.h"
 
-/* Instruction sets that the search is compiled for. */
-typedef enum ks_width { KS_PLAIN = 0, KS_AVX2, KS_AVX512 } ks_width;
-
-ks_width ks_width_of_machine(void);
-
 /* Finds the sample (all ring triangles with `apex`, drawn in towards it by `draw`) of least error below `bound`.
  * Returns 1 and the point, with its error in double precision; 0 where no sample is better or the kernel holds none.
  * The point lies exactly in the kernel. s->kernel_points is set. */

@@ -29,11 +29,6 @@ struct orb_hierarchy {
   int32_t base[4]; /* the tetrahedron */
 };
 
-/* orb_hierarchy_create() with kernels of the caller's choice: for tests and measurements. */
-ORB_MUST_CHECK orb_status orb_hierarchy_create_with(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep,
-                                                    int32_t keep_until, const orb_kernels *kernels,
-                                                    orb_hierarchy **out);
-
 /* Decimates a fresh hierarchy to its tetrahedron: decimate.c. */
 ORB_MUST_CHECK orb_status orb_decimate(orb_context *ctx, orb_hierarchy *hierarchy, const unsigned char *keep,
                                        int32_t keep_until);

@@ -11,16 +11,11 @@ enum { SWEEP_GRAIN = 32, QUEUE_MOST = 65536 };
 
 orb_status orb_hierarchy_create(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep, int32_t keep_until,
                                 orb_hierarchy **out) {
-  return orb_hierarchy_create_with(ctx, mesh, keep, keep_until, orb_kernels_best(), out);
-}
-
-orb_status orb_hierarchy_create_with(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep,
-                                     int32_t keep_until, const orb_kernels *kernels, orb_hierarchy **out) {
   orb_hierarchy *h = ORB_NEW0(ctx, orb_hierarchy, 1);
   if (!h) {
     return ORB_E_NO_MEMORY;
   }
-  h->kernels = kernels;
+  h->kernels = orb_kernels_of(orb_context_cpu(ctx));
   unsigned char *kept = NULL;
   orb_status status;
   ORB_GO(status, orb_surface_create(ctx, mesh, &h->surface), done);

@@ -9,7 +9,7 @@ orb_status orb_refiner_resume(orb_context *ctx, const orb_mesh *mesh, const doub
   if (!h) {
     return ORB_E_NO_MEMORY;
   }
-  h->kernels = orb_kernels_best();
+  h->kernels = orb_kernels_of(orb_context_cpu(ctx));
   orb_status status;
   ORB_GO(status, orb_surface_create(ctx, mesh, &h->surface), done);
   const orb_surface *s = &h->surface;

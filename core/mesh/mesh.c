@@ -5,13 +5,24 @@
 #include "numeric/vec3.h"
 #include "orbmorph/mesh.h"
 
-void orb_mesh_free(orb_context *ctx, orb_mesh *mesh) {
-  void *blocks[] = {mesh->positions, mesh->triangles, mesh->source, mesh->vertex_of_source, mesh->source_triangle,
-                    mesh->normals,   mesh->texcoords, mesh->colors, mesh->material,         mesh->materials};
+void orb_mesh_drop_attributes(orb_context *ctx, orb_mesh *mesh) {
   for (int32_t i = 0; mesh->images && i < mesh->image_count; i++) {
     orb_free(ctx, mesh->images[i].bytes);
   }
-  orb_free(ctx, mesh->images);
+  void *blocks[] = {mesh->normals, mesh->texcoords, mesh->colors, mesh->material, mesh->materials, mesh->images};
+  for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
+    orb_free(ctx, blocks[i]);
+  }
+  mesh->normals = mesh->texcoords = mesh->colors = NULL;
+  mesh->material = NULL;
+  mesh->materials = NULL;
+  mesh->images = NULL;
+  mesh->material_count = mesh->image_count = 0;
+}
+
+void orb_mesh_free(orb_context *ctx, orb_mesh *mesh) {
+  void *blocks[] = {mesh->positions, mesh->triangles, mesh->source, mesh->vertex_of_source, mesh->source_triangle};
+  orb_mesh_drop_attributes(ctx, mesh);
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
     orb_free(ctx, blocks[i]);
   }

@@ -50,6 +50,7 @@ int run_embedding(const run_env *env, orb_context *ctx, job *j, resource *result
   if (!run_load_mesh(env, ctx, request.mesh, &mesh, NULL, 0, NULL, problem)) {
     goto done;
   }
+  orb_mesh_drop_attributes(ctx, &mesh);
   double checked = orb_clock() - began;
   if (orb_embed(ctx, &mesh, &request.options, &embedding) != ORB_OK) {
     goto done;

@@ -21,6 +21,7 @@ static const char usage_text[] =
     "  --options JSON    options of the embedding, as in a request: '{\"energy_weight\":0}'\n"
     "  --repair LIST     safe (default), none, fill_holes, largest_component, as at an upload\n"
     "  --threads N       threads in all (default: those of the machine)\n"
+    "  --cpu C           auto (default), avx512, avx2 or plain: the widest vector instructions to use\n"
     "  --repeat N        runs of every file (1)\n"
     "  --out DIR         embed: write DIR/NAME.sphere.ply\n"
     "  --out FILE.glb    merge: write the asset\n"
@@ -96,13 +97,14 @@ static int read_options(const char *text, orb_embed_options *options) {
 }
 
 typedef struct texts {
-  const char *method, *preset, *options, *repair, *threads, *repeat, *align, *remesh, *tolerance, *max_triangles, *sets,
-      *align_preset, *first, *seed, *merge_every, *seconds, *given;
+  const char *method, *preset, *options, *repair, *threads, *repeat, *cpu, *align, *remesh, *tolerance, *max_triangles,
+      *sets, *align_preset, *first, *seed, *merge_every, *seconds, *given;
 } texts;
 
 static int interpret(const texts *t, bench_options *o) {
   static const char *const methods[] = {"newton", "kernel-sampling", NULL};
   static const char *const presets[] = {"default", "fast", "quality", NULL};
+  static const char *const cpus[] = {"auto", "plain", "avx2", "avx512", NULL};
   static const char *const aligns[] = {"pin", "rbf", "rotate", "auto", NULL};
   static const char *const remeshes[] = {"adaptive", "overlay", "subdivision", "convex-hull", NULL};
   int word = 0;
@@ -136,6 +138,12 @@ static int interpret(const texts *t, bench_options *o) {
       return 0;
     }
     o->merge.align.preset = (orb_preset)word;
+  }
+  if (t->cpu) {
+    if (!read_word("--cpu", t->cpu, cpus, &word)) {
+      return 0;
+    }
+    o->cpu = (orb_cpu)word;
   }
   if (t->align) {
     if (!read_word("--align", t->align, aligns, &word)) {
@@ -214,6 +222,7 @@ static int parse(int argc, char **argv, int command, bench_options *o) {
                {"--repair", &t.repair, ALL},
                {"--threads", &t.threads, ALL},
                {"--repeat", &t.repeat, EMBED | MERGE},
+               {"--cpu", &t.cpu, EMBED | MERGE},
                {"--out", &o->out, EMBED | MERGE},
                {"--align", &t.align, MERGE | LANDMARKS | PAIRS},
                {"--align-preset", &t.align_preset, MERGE | LANDMARKS | PAIRS},

@@ -11,6 +11,7 @@ enum { BENCH_DONE = 0, BENCH_REFUSED = 1, BENCH_USAGE = 2 };
 
 typedef struct bench_options {
   int threads, repeat;
+  orb_cpu cpu;
   unsigned repair;
   const char *out, *landmarks;
   orb_embed_options embed;
@@ -40,7 +41,7 @@ int bench_spill(const char *path, const unsigned char *bytes, size_t size);
 void bench_name_of(const char *path, char name[ORB_NAME_MAX]);
 
 /* A context with so many threads; ends the program when there is no memory. */
-orb_context *bench_open(int threads);
+orb_context *bench_open(int threads, orb_cpu cpu);
 
 /* Peak of the resident set since the last reset. Where the kernel cannot reset it: since the program began. */
 void bench_reset_peak(void);

@@ -14,14 +14,16 @@ typedef struct embed_times {
 } embed_times;
 
 static int print_line(const bench_options *options, const bench_mesh *m, const orb_embedding *e, const embed_times *t,
-                      int repeat, int threads) {
+                      int repeat, const orb_context *ctx) {
+  static const char *const cpus[] = {"auto", "plain", "avx2", "avx512"};
   orb_text line = {0};
   orb_json_open(&line, '{');
   orb_json_member_string(&line, "mesh", m->name);
   orb_json_member_integer(&line, "vertices", m->mesh.vertex_count);
   orb_json_member_integer(&line, "triangles", m->mesh.triangle_count);
   orb_embedding_options_members(&options->embed, &line);
-  orb_json_member_integer(&line, "threads", threads);
+  orb_json_member_integer(&line, "threads", orb_threads(ctx));
+  orb_json_member_string(&line, "cpu", cpus[orb_context_cpu(ctx)]);
   orb_json_member_integer(&line, "repeat", repeat);
   orb_json_key(&line, "seconds");
   orb_json_open(&line, '{');
@@ -69,14 +71,15 @@ static int run_once(const bench_options *options, const char *path, int repeat) 
   bench_mesh m;
   orb_embedding e;
   bench_reset_peak();
-  orb_context *ctx = bench_open(options->threads);
+  orb_context *ctx = bench_open(options->threads, options->cpu);
   double start = orb_clock(), cpu = bench_cpu();
   int fine = bench_load(ctx, path, options->repair, 0, &m);
   if (fine) {
+    orb_mesh_drop_attributes(ctx, &m.mesh);
     fine = orb_embed(ctx, &m.mesh, &options->embed, &e) == ORB_OK;
     if (fine) {
       embed_times t = {.total = orb_clock() - start, .cpu = bench_cpu() - cpu, .peak = bench_peak()};
-      fine = print_line(options, &m, &e, &t, repeat, orb_threads(ctx));
+      fine = print_line(options, &m, &e, &t, repeat, ctx);
       fine = fine && (!options->out || write_sphere(ctx, options->out, &m, &e));
       orb_embedding_free(ctx, &e);
     } else {

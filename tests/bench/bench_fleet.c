@@ -4,7 +4,7 @@
 #include "bench.h"
 
 int bench_fleet_load(const bench_options *options, bench_fleet *out) {
-  *out = (bench_fleet){.ctx = bench_open(options->threads)};
+  *out = (bench_fleet){.ctx = bench_open(options->threads, options->cpu)};
   out->mesh = calloc((size_t)options->file_count, sizeof *out->mesh);
   out->embedding = calloc((size_t)options->file_count, sizeof *out->embedding);
   int fine = out->mesh && out->embedding;

@@ -82,7 +82,7 @@ static int print_line(const bench_set *set, const orb_merge_result *r, double cp
 static int run_once(const bench_options *options, bench_set *set, int repeat) {
   orb_merge_result result;
   bench_reset_peak();
-  orb_context *ctx = bench_open(options->threads);
+  orb_context *ctx = bench_open(options->threads, options->cpu);
   double cpu = bench_cpu();
   memset(set, 0, sizeof *set);
   set->count = options->file_count;

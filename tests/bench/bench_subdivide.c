@@ -67,7 +67,7 @@ int main(int argc, char **argv) {
     fprintf(stderr, "usage: bench-subdivide FILE TRIANGLES OUT.ply\n");
     return BENCH_USAGE;
   }
-  orb_context *ctx = bench_open(1);
+  orb_context *ctx = bench_open(1, ORB_CPU_AUTO);
   int fine = bench_load(ctx, argv[1], ORB_REPAIR_SAFE, 0, &m);
   if (fine) {
     int32_t vertices = m.mesh.vertex_count, triangles = m.mesh.triangle_count;

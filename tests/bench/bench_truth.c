@@ -343,7 +343,7 @@ int bench_truth(const bench_options *options) {
   if (!set) {
     return BENCH_REFUSED;
   }
-  orb_context *ctx = bench_open(options->threads);
+  orb_context *ctx = bench_open(options->threads, options->cpu);
   set->count = options->file_count;
   int loaded = bench_set_load(ctx, options, set), fine = loaded;
   for (int m = 0; m < METHODS && loaded; m++) {

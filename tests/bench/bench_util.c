@@ -52,9 +52,9 @@ void bench_name_of(const char *path, char name[ORB_NAME_MAX]) {
   }
 }
 
-orb_context *bench_open(int threads) {
+orb_context *bench_open(int threads, orb_cpu cpu) {
   orb_context *ctx;
-  orb_context_options options = {.threads = threads, .max_triangles = 50000000};
+  orb_context_options options = {.threads = threads, .cpu = cpu, .max_triangles = 50000000};
   if (orb_context_create(&options, &ctx) != ORB_OK) {
     fprintf(stderr, "orbmorph-bench: out of memory\n");
     exit(BENCH_REFUSED);

@@ -153,13 +153,13 @@ static void test_error(void **unused) {
                                           exponents[i][0], exponents[i][1]);
     /* An angle term without a floor on the mesh's area is what the definition has; the floor changes it by 1 %. */
     assert_true(fabs(present / expected - 1) < 0.02);
-    for (int width = KS_PLAIN; width <= (int)ks_width_of_machine(); width++) {
+    for (orb_cpu cpu = ORB_CPU_PLAIN; cpu <= orb_context_cpu(ctx); cpu++) {
       double out[3], e;
-      s.width = width;
+      s.cpu = cpu;
       int better = ks_search(&s, p, 1, present, out, &e);
       assert_true(better && e < present);
       assert_true(fabs(e - ks_error_at(&s, out)) <= 1e-12 * e);
-      if (width > KS_PLAIN) { /* the same bits for every width */
+      if (cpu > ORB_CPU_PLAIN) { /* the same bits for every width */
         assert_memory_equal(out, found, sizeof out);
         assert_true(e == error);
       }

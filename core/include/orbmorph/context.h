@@ -52,6 +52,9 @@ typedef struct orb_allocator {
   void *user;
 } orb_allocator;
 
+/* The widest vector instructions that the loops which have several versions may use; at most what the machine has. */
+typedef enum orb_cpu { ORB_CPU_AUTO = 0, ORB_CPU_PLAIN, ORB_CPU_AVX2, ORB_CPU_AVX512 } orb_cpu;
+
 typedef struct orb_context_options {
   size_t memory_limit;      /* bytes that live at once; 0: no limit */
   int threads;              /* threads to use in all; 0: as many as the machine has (at most 64) */
@@ -60,6 +63,7 @@ typedef struct orb_context_options {
   orb_progress_fn progress; /* NULL: none */
   void *progress_user;
   orb_allocator allocator;
+  orb_cpu cpu; /* for measurements and tests; results may differ in the last bits */
 } orb_context_options;
 
 /* Makes a context; options NULL: all defaults. Threads start with the first parallel loop. ORB_E_NO_MEMORY. */
@@ -104,6 +108,9 @@ size_t orb_memory_peak(const orb_context *ctx);
 
 /* Threads. */
 int orb_threads(const orb_context *ctx);
+
+/* The version that is used: never ORB_CPU_AUTO. */
+orb_cpu orb_context_cpu(const orb_context *ctx);
 
 /* The body of a parallel loop: work on [begin, end) as thread number `thread` (0 ≤ thread < orb_threads()). */
 typedef void (*orb_loop_fn)(void *arg, int64_t begin, int64_t end, int thread);

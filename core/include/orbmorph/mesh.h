@@ -73,6 +73,9 @@ static inline int32_t orb_prev(int32_t h) {
 /* Frees the arrays and zeroes the struct. */
 void orb_mesh_free(orb_context *ctx, orb_mesh *mesh);
 
+/* Frees normals, texture coordinates, colours, materials and images: an embedding needs none of them. */
+void orb_mesh_drop_attributes(orb_context *ctx, orb_mesh *mesh);
+
 /* A deep copy. */
 ORB_MUST_CHECK orb_status orb_mesh_copy(orb_context *ctx, const orb_mesh *mesh, orb_mesh *out);
 
