@@ -140,12 +140,16 @@ orb_status orb_rotate_by_landmarks(orb_context *ctx, orb_sheet *sheets, int32_t 
   orb_status status = ORB_OK;
   double *points = NULL, *rotations = ORB_NEW(ctx, double, 9 * (size_t)shape_count),
          *means = ORB_NEW(ctx, double, 3 * (size_t)count);
-  if (!rotations || !means) {
+  const orb_aligned_shape **shapes = ORB_NEW(ctx, const orb_aligned_shape *, shape_count);
+  if (!rotations || !means || !shapes) {
     status = ORB_E_NO_MEMORY;
     goto end;
   }
   ORB_GO(status, orb_landmark_points(ctx, sheets, shape_count, landmarks, count, &points), end);
-  ORB_GO(status, orb_procrustes_all(ctx, points, shape_count, count, rotations, means), end);
+  for (int32_t s = 0; s < shape_count; s++) {
+    shapes[s] = &sheets[s].shape;
+  }
+  ORB_GO(status, orb_rotations_find(ctx, shapes, points, shape_count, count, rotations, means), end);
   for (int32_t s = 0; s < shape_count; s++) {
     ORB_GO(status, orb_sheet_rotate(ctx, &sheets[s], rotations + 9 * (size_t)s), end);
   }
@@ -153,6 +157,7 @@ end:
   orb_free(ctx, points);
   orb_free(ctx, rotations);
   orb_free(ctx, means);
+  orb_free(ctx, shapes);
   return status;
 }
 

@@ -113,7 +113,20 @@ static void field_make(field *f, const orb_aligned_shape *shape) {
 typedef struct search {
   const field *a, *b;
   orb_context *ctx;
+  const double *from, *to; /* landmarks that should meet */
+  int32_t marks;
 } search;
+
+/* The mean squared distance that a rotation leaves between the landmarks. */
+static double misfit(const search *s, const double r[9]) {
+  double sum = 0;
+  for (int32_t k = 0; k < s->marks; k++) {
+    double p[3];
+    orb_rotate_point(r, s->from + 3 * (size_t)k, p);
+    sum += orb_distance2(p, s->to + 3 * (size_t)k);
+  }
+  return s->marks > 0 ? sum / s->marks : 0;
+}
 
 /* Correlation of a with b turned by the rotation: of the common frame, and of the best frame in space. */
 static orb_status score_of(const search *s, const double r[9], double *upright, double *best) {
@@ -133,8 +146,9 @@ static orb_status score_of(const search *s, const double r[9], double *upright, 
   }
   double turn[9], singular[3];
   ORB_TRY(orb_procrustes_covariance(s->ctx, m, turn, singular));
-  *upright = (m[0] + m[4] + m[8]) / 1.3;
-  *best = (singular[0] + singular[1] + singular[2]) / 1.3;
+  double lost = misfit(s, r);
+  *upright = (m[0] + m[4] + m[8]) / 1.3 - lost;
+  *best = (singular[0] + singular[1] + singular[2]) / 1.3 - lost;
   return ORB_OK;
 }
 
@@ -213,8 +227,9 @@ static orb_status descend(const search *s, start *from, int use_upright) {
   return orb_context_check(s->ctx);
 }
 
-orb_status orb_rotation_search(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
-                               double rotation[9], double *score) {
+orb_status orb_rotation_search_near(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
+                                    const double *from, const double *to, int32_t count, double rotation[9],
+                                    double *score) {
   orb_status status = ORB_OK;
   field *fa = ORB_NEW(ctx, field, 1), *fb = ORB_NEW(ctx, field, 1);
   if (!fa || !fb) {
@@ -223,7 +238,7 @@ orb_status orb_rotation_search(orb_context *ctx, const orb_aligned_shape *a, con
   }
   field_make(fa, a);
   field_make(fb, b);
-  search s = {.a = fa, .b = fb, .ctx = ctx};
+  search s = {.a = fa, .b = fb, .ctx = ctx, .from = from, .to = to, .marks = count};
   start upright[STARTS], best[STARTS], *chosen;
   ORB_GO(status, coarse(&s, upright, best), end);
   for (int i = 0; i < STARTS; i++) {
@@ -235,7 +250,7 @@ orb_status orb_rotation_search(orb_context *ctx, const orb_aligned_shape *a, con
     top_upright = upright[i].score > top_upright->score ? &upright[i] : top_upright;
     top_best = best[i].score > top_best->score ? &best[i] : top_best;
   }
-  chosen = top_upright->score > 0.85 * top_best->score ? top_upright : top_best;
+  chosen = top_upright->score > top_best->score - 0.15 * fabs(top_best->score) ? top_upright : top_best;
   from_quaternion(chosen->q, rotation);
   if (score) {
     *score = chosen->score;
@@ -244,4 +259,9 @@ end:
   orb_free(ctx, fa);
   orb_free(ctx, fb);
   return status;
+}
+
+orb_status orb_rotation_search(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
+                               double rotation[9], double *score) {
+  return orb_rotation_search_near(ctx, a, b, NULL, NULL, 0, rotation, score);
 }

@@ -8,6 +8,8 @@
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 
+static const double SPREAD = 0.03; /* second singular value of directions that span a plane: 10° to either side */
+
 static double determinant(const double m[9]) {
   return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
 }
@@ -95,6 +97,42 @@ orb_status orb_procrustes_all(orb_context *ctx, const double *points, int32_t sh
       break;
     }
     spread = now;
+  }
+  return ORB_OK;
+}
+
+void orb_procrustes_means(const double *points, int32_t shape_count, int32_t landmark_count, const double *rotations,
+                          double *means) {
+  (void)gather(points, shape_count, landmark_count, rotations, means);
+}
+
+/* Do the landmarks of a shape, as directions, say how it is turned about any of them? */
+static orb_status spans(orb_context *ctx, const double *points, int32_t count, int *yes) {
+  double covariance[9] = {0}, rotation[9], singular[3];
+  for (int32_t k = 0; k < count; k++) {
+    for (int i = 0; i < 9; i++) {
+      covariance[i] += points[3 * (size_t)k + (size_t)i / 3] * points[3 * (size_t)k + (size_t)i % 3] / count;
+    }
+  }
+  ORB_TRY(orb_procrustes_covariance(ctx, covariance, rotation, singular));
+  *yes = count > 2 && singular[1] > SPREAD;
+  return ORB_OK;
+}
+
+orb_status orb_rotations_find(orb_context *ctx, const orb_aligned_shape *const *shapes, const double *points,
+                              int32_t shape_count, int32_t landmark_count, double *rotations, double *means) {
+  size_t stride = 3 * (size_t)landmark_count;
+  int determined = 1;
+  for (int32_t s = 0; determined && s < shape_count; s++) {
+    ORB_TRY(spans(ctx, points + (size_t)s * stride, landmark_count, &determined));
+  }
+  ORB_TRY(orb_procrustes_all(ctx, points, shape_count, landmark_count, rotations, means));
+  for (int32_t s = 1; !determined && s < shape_count; s++) {
+    ORB_TRY(orb_rotation_search_near(ctx, shapes[0], shapes[s], points + (size_t)s * stride, points, landmark_count,
+                                     rotations + 9 * (size_t)s, NULL));
+  }
+  if (!determined) {
+    orb_procrustes_means(points, shape_count, landmark_count, rotations, means);
   }
   return ORB_OK;
 }

@@ -39,6 +39,23 @@ ORB_MUST_CHECK orb_status orb_procrustes_all(orb_context *ctx, const double *poi
 ORB_MUST_CHECK orb_status orb_rotation_search(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
                                               double rotation[9], double *score);
 
+/* The same where few landmarks are known: `from` (on b) and `to` (on a), 3 each. A rotation loses by the mean of the
+ * squared distances between them, so that one landmark leaves a turn about it to the shapes, and two that are nearly
+ * opposite likewise. */
+ORB_MUST_CHECK orb_status orb_rotation_search_near(orb_context *ctx, const orb_aligned_shape *a,
+                                                   const orb_aligned_shape *b, const double *from, const double *to,
+                                                   int32_t count, double rotation[9], double *score);
+
+/* The spherical means of landmarks (as for orb_procrustes_all()) under rotations at hand. */
+void orb_procrustes_means(const double *points, int32_t shape_count, int32_t landmark_count, const double *rotations,
+                          double *means);
+
+/* orb_procrustes_all() where the landmarks determine the rotations; where they do not (one, two, or all in nearly one
+ * direction and its opposite), each later shape is turned by orb_rotation_search_near(). */
+ORB_MUST_CHECK orb_status orb_rotations_find(orb_context *ctx, const orb_aligned_shape *const *shapes,
+                                             const double *points, int32_t shape_count, int32_t landmark_count,
+                                             double *rotations, double *means);
+
 /* Rotates the sphere points of a surface and certifies the rounded result, with nudged rotations where rounding broke
  * a triangle; ORB_E_NOT_CERTIFIED if none holds. The identity changes nothing. */
 ORB_MUST_CHECK orb_status orb_sheet_rotate(orb_context *ctx, orb_sheet *sheet, const double rotation[9]);

@@ -211,6 +211,43 @@ static orb_status walk(walker *w, const double *targets, int32_t *left) {
   }
 }
 
+/* A level as a shape of its own: positions and triangles are borrowed, points are made. */
+static orb_status level_shape(const walker *w, orb_aligned_shape *out) {
+  const orb_mesh *mesh = &w->sheet->shape.mesh;
+  *out = (orb_aligned_shape){.mesh = {.vertex_count = mesh->vertex_count,
+                                      .triangle_count = w->triangle_count,
+                                      .positions = mesh->positions,
+                                      .triangles = w->triangles}};
+  out->points = ORB_NEW0(w->ctx, double, 3 * (size_t)mesh->vertex_count);
+  for (int32_t i = 0; out->points && i < w->vertex_count; i++) {
+    orb_refiner_point(w->refiner, w->vertices[i], out->points + 3 * (size_t)w->vertices[i]);
+  }
+  return out->points ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+static orb_status find_rotations(orb_context *ctx, const walker *walkers, const double *points, int32_t shape_count,
+                                 int32_t count, double *rotations, double *targets) {
+  orb_status status = ORB_OK;
+  orb_aligned_shape *levels = ORB_NEW0(ctx, orb_aligned_shape, shape_count);
+  const orb_aligned_shape **list = ORB_NEW(ctx, const orb_aligned_shape *, shape_count);
+  if (!levels || !list) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    list[s] = &levels[s];
+    ORB_GO(status, level_shape(&walkers[s], &levels[s]), end);
+  }
+  status = orb_rotations_find(ctx, list, points, shape_count, count, rotations, targets);
+end:
+  for (int32_t s = 0; levels && s < shape_count; s++) {
+    orb_free(ctx, levels[s].points);
+  }
+  orb_free(ctx, levels);
+  orb_free(ctx, list);
+  return status;
+}
+
 /* Gathers the shapes' levels by rotation; fills the common targets. */
 static orb_status gather(orb_context *ctx, walker *walkers, int32_t shape_count, int32_t count, double *targets) {
   orb_status status = ORB_OK;
@@ -226,7 +263,7 @@ static orb_status gather(orb_context *ctx, walker *walkers, int32_t shape_count,
                         points + 3 * ((size_t)s * (size_t)count + (size_t)k));
     }
   }
-  ORB_GO(status, orb_procrustes_all(ctx, points, shape_count, count, rotations, targets), end);
+  ORB_GO(status, find_rotations(ctx, walkers, points, shape_count, count, rotations, targets), end);
   for (int32_t s = 1; s < shape_count; s++) {
     rotate_level(&walkers[s], rotations + 9 * (size_t)s);
   }

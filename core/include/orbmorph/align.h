@@ -63,7 +63,8 @@ typedef struct orb_alignment {
 /* Aligns shape_count ≥ 1 shapes; the first keeps its place unless the method says otherwise. Every result is certified.
  *
  * - rotate: rotations only, by landmarks (generalised Procrustes; Peng & Timalsena 2016, section 7.1), or without any
- *   by a search over SO(3) for the rotation under which the map between the shapes is nearest to a rigid motion.
+ *   by a search over SO(3) for the rotation under which the map between the shapes is nearest to a rigid motion. Where
+ *   landmarks leave a turn open (one, two, or all about one axis) the search finds it; so too in pin and rbf.
  * - rbf: the paper's warp (7.2) from there, in rbf_steps steps a pass, to the spherical means, or one_way to the first
  *   shape's points. A landmark's influence ends at its radius (0: rbf_radius; that 0: 1.0). A step that folds is
  *   untangled locally, else halved, else the sphere is relaxed before it; landmarks that cross on their way are carried

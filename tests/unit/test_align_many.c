@@ -1,0 +1,163 @@
+/* Few landmarks and many shapes: what one or two landmarks leave open is found by the shapes; three, five and sixteen
+ * shapes meet at their landmarks, or turn to each other without any. All bodies are one surface, triangulated in other
+ * ways and embedded by the ball that it was made from, so that the true counterpart of every point is known. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "numeric/vec3.h"
+#include "support_align.h"
+#include "support_bodies.h"
+#include "support_shapes.h"
+
+enum { MANY = 16, MARKS = 8 };
+
+typedef struct crowd {
+  orb_context *ctx;
+  int count;
+  orb_mesh mesh[MANY];
+  double *ball[MANY], *points[MANY];
+  orb_align_shape shape[MANY];
+  orb_place at[MARKS][MANY];
+  orb_landmark landmark[MARKS];
+} crowd;
+
+/* Where the surface has the direction p of the ball: lopsided, without any symmetry. */
+static void surface(const double p[3], double out[3]) {
+  double r = 1 + 0.4 * p[0] + 0.3 * p[1] * p[2] + 0.2 * p[1];
+  out[0] = 2 * r * p[0];
+  out[1] = r * p[1];
+  out[2] = 0.7 * r * p[2];
+}
+
+/* Turns about an axis that is another for every shape. */
+static void turn(int s, const double p[3], double out[3]) {
+  double axis[3] = {sin(1.3 * s), cos(2.1 * s), sin(0.7 * s + 1)}, angle = 1.9 * s, a[3];
+  orb_normalize(axis);
+  orb_cross(axis, p, a);
+  double along = orb_dot(axis, p) * (1 - cos(angle));
+  for (int k = 0; k < 3; k++) {
+    out[k] = cos(angle) * p[k] + sin(angle) * a[k] + along * axis[k];
+  }
+  orb_normalize(out);
+}
+
+static void crowd_open(crowd *c, int count) {
+  memset(c, 0, sizeof *c);
+  c->count = count;
+  assert_int_equal(orb_context_create(NULL, &c->ctx), ORB_OK);
+  for (int s = 0; s < count; s++) {
+    c->mesh[s] = shape_globe(c->ctx, 18 + s % 5 * 2, 14 + s % 7);
+    size_t size = 3 * (size_t)c->mesh[s].vertex_count;
+    c->ball[s] = ORB_NEW(c->ctx, double, size);
+    c->points[s] = ORB_NEW(c->ctx, double, size);
+    assert_true(c->ball[s] && c->points[s]);
+    for (int32_t v = 0; v < c->mesh[s].vertex_count; v++) {
+      double *x = c->mesh[s].positions + 3 * v;
+      memcpy(c->ball[s] + 3 * v, x, 3 * sizeof *x);
+      orb_normalize(c->ball[s] + 3 * v);
+      turn(s, c->ball[s] + 3 * v, c->points[s] + 3 * v);
+      surface(c->ball[s] + 3 * v, x);
+    }
+    c->shape[s] = (orb_align_shape){&c->mesh[s], c->points[s]};
+  }
+}
+
+static void crowd_close(crowd *c) {
+  for (int s = 0; s < c->count; s++) {
+    orb_free(c->ctx, c->ball[s]);
+    orb_free(c->ctx, c->points[s]);
+    shape_free(c->ctx, &c->mesh[s]);
+  }
+  orb_context_destroy(c->ctx);
+}
+
+/* Landmark k at the vertex of each shape nearest to a direction of the ball. */
+static void mark(crowd *c, int k, const double direction[3]) {
+  for (int s = 0; s < c->count; s++) {
+    int32_t best = 0;
+    for (int32_t v = 0; v < c->mesh[s].vertex_count; v++) {
+      if (orb_distance2(c->ball[s] + 3 * v, direction) < orb_distance2(c->ball[s] + 3 * best, direction)) {
+        best = v;
+      }
+    }
+    assert_int_equal(orb_place_of_vertex(c->ctx, &c->mesh[s], best, &c->at[k][s]), ORB_OK);
+  }
+  c->landmark[k].at = c->at[k];
+}
+
+/* The root mean square, over the vertices of later shapes, of the angle between where the first shape has the direction
+ * that a vertex was made from and where the vertex is: the first shape's nearest vertex stands for it. */
+static double mistake(const crowd *c, const orb_alignment *out) {
+  double sum = 0;
+  int32_t count = 0;
+  for (int s = 1; s < c->count; s++) {
+    for (int32_t v = 0; v < c->mesh[s].vertex_count; v++) {
+      const double *d = c->ball[s] + 3 * v;
+      int32_t best = 0;
+      for (int32_t u = 0; u < c->mesh[0].vertex_count; u++) {
+        if (orb_distance2(c->ball[0] + 3 * u, d) < orb_distance2(c->ball[0] + 3 * best, d)) {
+          best = u;
+        }
+      }
+      sum += orb_distance2(out->shapes[0].points + 3 * best, out->shapes[s].points + 3 * v);
+      count++;
+    }
+  }
+  return sqrt(sum / count);
+}
+
+static double align(crowd *c, orb_align_method method, int marks) {
+  orb_align_options options = bodies_options(method);
+  orb_alignment out;
+  align_and_check(c->ctx, c->shape, c->count, c->landmark, marks, &options, &out);
+  double wrong = mistake(c, &out);
+  orb_alignment_free(c->ctx, &out);
+  return wrong;
+}
+
+/* A turn left open would be wrong by about 1 on average. */
+static void few_landmarks(void **state) {
+  (void)state;
+  static const double axis[2][3] = {{0.6, 0.64, 0.48}, {-0.6, -0.64, -0.48}};
+  crowd c;
+  crowd_open(&c, 3);
+  for (int marks = 1; marks <= 2; marks++) {
+    for (int k = 0; k < marks; k++) {
+      mark(&c, k, axis[k]);
+    }
+    assert_true(align(&c, ORB_ALIGN_ROTATE, marks) < 0.25);
+    assert_true(align(&c, ORB_ALIGN_PIN, marks) < 0.4);
+    assert_true(align(&c, ORB_ALIGN_RBF, marks) < 0.3);
+  }
+  crowd_close(&c);
+}
+
+/* The landmarks are the same directions of the same surface, so the maps are nearly the identity. */
+static void many_shapes(void **state) {
+  (void)state;
+  static const int counts[] = {3, 5, MANY};
+  for (int i = 0; i < 3; i++) {
+    crowd c;
+    crowd_open(&c, counts[i]);
+    for (int k = 0; k < MARKS; k++) {
+      double z = 1 - (2 * k + 1.0) / MARKS, r = sqrt(1 - z * z);
+      mark(&c, k, (const double[3]){r * cos(2.4 * k), r * sin(2.4 * k), z});
+    }
+    assert_true(align(&c, ORB_ALIGN_ROTATE, MARKS) < 0.25);
+    assert_true(align(&c, ORB_ALIGN_PIN, MARKS) < 0.3);
+    assert_true(align(&c, ORB_ALIGN_RBF, MARKS) < 0.3);
+    assert_true(align(&c, ORB_ALIGN_AUTO, 0) < 0.25);
+    crowd_close(&c);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(few_landmarks), cmocka_unit_test(many_shapes)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
