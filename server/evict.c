@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "faults.h"
 #include "log.h"
 
 enum { PAGE = 64 };
@@ -10,10 +11,12 @@ enum { PAGE = 64 };
 /* The row goes first: what is left by a crash in between is an object without a row, which --gc removes. */
 store_result evict_one(const evict_env *env, resource_kind kind, const char *id) {
   static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET};
+  FAULT_POINT("evict");
   store_result result = catalogue_delete(env->cat, kind, id);
   if (env->descriptions) {
     cache_drop(env->descriptions, kind, id);
   }
+  FAULT_POINT("evict-row-gone");
   if (result == STORE_OK) {
     result = objects_delete(env->store, kinds[kind], id);
   }

@@ -3,8 +3,6 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-#include "faults.h"
-
 struct tasks {
   pthread_mutex_t lock;
   pthread_cond_t wake;
@@ -45,7 +43,7 @@ tasks *tasks_start(int threads) {
   pthread_mutex_init(&pool->lock, NULL);
   pthread_cond_init(&pool->wake, NULL);
   for (int i = 0; i < threads; i++) {
-    if (FAULT("thread") || pthread_create(&pool->threads[i], NULL, thread_main, pool) != 0) {
+    if (pthread_create(&pool->threads[i], NULL, thread_main, pool) != 0) {
       break;
     }
     pool->count++;

@@ -8,6 +8,7 @@
 
 #include "api/json.h"
 #include "api/mesh_codec.h"
+#include "faults.h"
 #include "http/http.h"
 
 void handle_mesh_begin(request *r) {
@@ -99,6 +100,7 @@ static void store_mesh(request *r, const upload_query *query, const unsigned cha
   row.json = json.data;
   pthread_mutex_lock(&srv->mesh_lock);
   store_result stored = objects_publish(srv->store, &r->temp, OBJECT_MESH, id);
+  FAULT_POINT("mesh-published");
   if (stored == STORE_OK) {
     stored = catalogue_put(srv->cat, &row);
   }

@@ -4,6 +4,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "faults.h"
 #include "http/body.h"
 #include "http/http.h"
 #include "log.h"
@@ -23,6 +24,7 @@ int64_t clock_us(void) {
 static void run_away(task *t) {
   request *r = (request *)(void *)t;
   r->away(r);
+  FAULT_POINT("before-reply");
   if (r->phase == PHASE_AWAY) {
     r->phase = PHASE_SEND; /* no response could be made: the connection closes */
   }

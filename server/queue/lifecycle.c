@@ -20,7 +20,7 @@ queue *queue_create(const queue_options *options, catalogue *cat) {
   pthread_cond_init(&q->work, NULL);
   pthread_cond_init(&q->committed, NULL);
   pthread_cond_init(&q->timer_wake, NULL);
-  q->timer_started = !FAULT("thread") && pthread_create(&q->timer, NULL, timer_main, q) == 0;
+  q->timer_started = pthread_create(&q->timer, NULL, timer_main, q) == 0;
   if (!q->timer_started) {
     queue_destroy(q);
     return NULL;
@@ -85,6 +85,7 @@ store_result queue_recover(queue *q) {
   store_result result = text.failed ? STORE_ERROR : catalogue_recover(q->cat, MOST_CRASHES, unix_ms(), text.data);
   orb_text_free(&text);
   orb_problem_free(&problem);
+  FAULT_POINT("recovered");
   int64_t after = 0;
   int loaded = 0;
   for (int n = BATCH; n == BATCH && result == STORE_OK;) {

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "faults.h"
 #include "log.h"
 #include "queue/internal.h"
 
@@ -64,7 +65,9 @@ queue_result queue_submit(queue *q, const queue_request *request, job **out, int
     return result;
   }
   job *j = *out;
+  FAULT_POINT("before-accept");
   store_result stored = catalogue_job_insert(q->cat, &j->row);
+  FAULT_POINT("after-accept");
   pthread_mutex_lock(&q->lock);
   if (stored == STORE_OK) {
     j->committed = 1;
@@ -226,7 +229,9 @@ char *queue_dependency_problem(queue *q, job *j) {
 
 store_result queue_claim(queue *q, job *j) {
   int64_t now = unix_ms();
+  FAULT_POINT("before-claim");
   store_result result = catalogue_job_claim(q->cat, j->row.id, j->row.attempt + 1, j->row.suspect, now);
+  FAULT_POINT("after-claim");
   pthread_mutex_lock(&q->lock);
   if (result == STORE_OK) {
     j->row.attempt++;
@@ -318,9 +323,11 @@ static store_result end_job(queue *q, job *j, orb_job_state state, const char *p
   orb_text json = {0};
   int64_t number = prepare_event(&shown, &json) + 1000; /* beyond events that are still on their way */
   pthread_mutex_unlock(&q->lock);
+  FAULT_POINT("before-finish");
   store_result stored = json.failed ? STORE_ERROR
                                     : catalogue_job_finish(q->cat, j->row.id, j->row.attempt, state, problem, now,
                                                            result, number, json.data);
+  FAULT_POINT("after-finish");
   if (stored == STORE_OK) {
     pthread_mutex_lock(&q->lock);
     ended_locked(q, j, state, problem, now);

@@ -28,7 +28,7 @@ enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 
 int database_execute(database *db, const char *sql) {
   char *message = NULL;
-  int code = FAULT("sqlite") ? SQLITE_IOERR : sqlite3_exec(db->handle, sql, NULL, NULL, &message);
+  int code = sqlite3_exec(db->handle, sql, NULL, NULL, &message);
   if (code != SQLITE_OK) {
     log_error("catalogue: %.60s: %s", sql, message ? message : sqlite3_errstr(code));
   }
@@ -86,7 +86,7 @@ int database_run(database *db, sqlite3_stmt *statement) {
   if (!statement) {
     return SQLITE_ERROR;
   }
-  int code = FAULT("sqlite") ? SQLITE_IOERR : sqlite3_step(statement);
+  int code = sqlite3_step(statement);
   sqlite3_reset(statement);
   if (code == SQLITE_DONE || code == SQLITE_ROW) {
     return SQLITE_OK;
@@ -108,6 +108,7 @@ int database_migrate(database *db) {
   }
   for (; version < SCHEMA; version++) {
     char mark[64];
+    FAULT_POINT("migrate");
     sqlite3_snprintf(sizeof mark, mark, "PRAGMA user_version=%d", version + 1);
     if (database_execute(db, "BEGIN IMMEDIATE") != SQLITE_OK ||
         database_execute(db, migrations[version]) != SQLITE_OK || database_execute(db, mark) != SQLITE_OK ||

@@ -224,6 +224,42 @@ int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out)
   return read_rows(cat, db, st, limit, out);
 }
 
+/* Fails one that died alone too often, with its last event, so that who follows it learns of the end. */
+static int give_up(database *db, job_row *row, const change *c) {
+  orb_text json = {0};
+  int64_t number = 0;
+  row->state = ORB_JOB_FAILED;
+  orb_job_write(&(orb_job_view){.id = row->id,
+                                .key = row->key,
+                                .problem = c->problem,
+                                .kind = row->kind,
+                                .state = row->state,
+                                .attempt = row->attempt,
+                                .created = row->created,
+                                .started = row->started,
+                                .finished = c->now},
+                &json);
+  sqlite3_stmt *st = database_statement(db, "SELECT coalesce(max(number), 0) + 1 FROM event WHERE job=?1");
+  if (!st || json.failed) {
+    orb_text_free(&json);
+    return SQLITE_NOMEM;
+  }
+  sqlite3_bind_text(st, 1, row->id, -1, SQLITE_STATIC);
+  int code = sqlite3_step(st);
+  number = code == SQLITE_ROW ? sqlite3_column_int64(st, 0) : 0;
+  sqlite3_reset(st);
+  code = code == SQLITE_ROW ? write_event(db, row->id, number, orb_job_state_name(row->state), json.data) : code;
+  orb_text_free(&json);
+  st = code == SQLITE_OK ? database_statement(db, "UPDATE job SET state=3, problem=?1, finished=?2 WHERE id=?3") : NULL;
+  if (st) {
+    sqlite3_bind_text(st, 1, c->problem, -1, SQLITE_STATIC);
+    sqlite3_bind_int64(st, 2, c->now);
+    sqlite3_bind_text(st, 3, row->id, -1, SQLITE_STATIC);
+    code = database_run(db, st);
+  }
+  return code;
+}
+
 /* What was running when the process died is queued again as a suspect. A crash counts against a job that ran alone:
  * by order, or because nothing else was running. */
 static int recover(database *db, void *arg) {
@@ -235,14 +271,24 @@ static int recover(database *db, void *arg) {
   if (code == SQLITE_OK) {
     code = database_run(db, database_statement(db, "UPDATE job SET state=0, suspect=1, alone=0 WHERE state=1"));
   }
-  st = code == SQLITE_OK
-           ? database_statement(db, "UPDATE job SET state=3, problem=?1, finished=?2 WHERE state=0 AND crashes>=?3")
-           : NULL;
-  if (st) {
-    sqlite3_bind_text(st, 1, c->problem, -1, SQLITE_STATIC);
-    sqlite3_bind_int64(st, 2, c->now);
-    sqlite3_bind_int(st, 3, c->attempt);
-    code = database_run(db, st);
+  while (code == SQLITE_OK) { /* there is rarely more than one */
+    job_row row;
+    st = database_statement(db, "SELECT " COLUMNS " FROM job WHERE state=0 AND crashes>=?1 ORDER BY seq LIMIT 1");
+    if (!st) {
+      return SQLITE_ERROR;
+    }
+    sqlite3_bind_int(st, 1, c->attempt);
+    code = sqlite3_step(st);
+    if (code == SQLITE_DONE) {
+      sqlite3_reset(st);
+      return SQLITE_OK;
+    }
+    code = code == SQLITE_ROW ? (read_row(st, &row) ? SQLITE_OK : SQLITE_NOMEM) : code;
+    sqlite3_reset(st);
+    if (code == SQLITE_OK) {
+      code = give_up(db, &row, c);
+      job_row_free(&row);
+    }
   }
   return code;
 }

@@ -34,7 +34,7 @@ static store_result sync_folder(const char *path) {
   if (fd < 0) {
     return failed("open", path);
   }
-  int result = FAULT("fsync") ? (errno = EIO, -1) : fsync(fd);
+  int result = fsync(fd);
   store_result status = result == 0 ? STORE_OK : failed("fsync", path);
   close(fd);
   return status;
@@ -109,13 +109,14 @@ void objects_close(objects *store) {
 store_result objects_begin(objects *store, object_temp *temp) {
   snprintf(temp->path, sizeof temp->path, "%s/tmp/put-XXXXXX", store->root);
   temp->fd = mkostemp(temp->path, O_CLOEXEC);
+  FAULT_POINT("temp-begun");
   return temp->fd >= 0 ? STORE_OK : failed("create", temp->path);
 }
 
 store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
   const char *at = bytes;
   while (size) {
-    ssize_t n = FAULT("write") ? (errno = ENOSPC, -1) : write(temp->fd, at, size);
+    ssize_t n = write(temp->fd, at, size);
     if (n < 0 && errno == EINTR) {
       continue;
     }
@@ -124,6 +125,7 @@ store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
     }
     at += n;
     size -= (size_t)n;
+    FAULT_POINT("temp-written");
   }
   return STORE_OK;
 }
@@ -139,13 +141,14 @@ void objects_abandon(object_temp *temp) {
 store_result objects_publish(objects *store, object_temp *temp, object_kind kind, const char *id) {
   char path[PATH_MAX];
   path_of(store, kind, id, path);
-  if (FAULT("fsync") ? (errno = EIO, 1) : fsync(temp->fd) != 0) {
+  FAULT_POINT("publish-written");
+  if (fsync(temp->fd) != 0) {
     store_result status = failed("fsync", temp->path);
     objects_abandon(temp);
     return status;
   }
   FAULT_POINT("publish-synced");
-  if (FAULT("rename") ? (errno = EIO, 1) : rename(temp->path, path) != 0) {
+  if (rename(temp->path, path) != 0) {
     store_result status = failed("rename to", path);
     objects_abandon(temp);
     return status;
@@ -154,7 +157,9 @@ store_result objects_publish(objects *store, object_temp *temp, object_kind kind
   temp->fd = -1;
   FAULT_POINT("publish-renamed");
   *strrchr(path, '/') = 0;
-  return sync_folder(path);
+  store_result synced = sync_folder(path);
+  FAULT_POINT("publish-done");
+  return synced;
 }
 
 store_result objects_put(objects *store, object_kind kind, const char *id, const void *bytes, size_t size) {
@@ -219,6 +224,7 @@ store_result objects_load(const objects *store, object_kind kind, const char *id
 store_result objects_delete(const objects *store, object_kind kind, const char *id) {
   char path[PATH_MAX];
   path_of(store, kind, id, path);
+  FAULT_POINT("before-unlink");
   return unlink(path) == 0 || errno == ENOENT ? STORE_OK : failed("unlink", path);
 }
 

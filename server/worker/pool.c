@@ -135,16 +135,19 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
   orb_problem problem = {0};
   resource result = {0};
   int64_t began = orb_clock_ms();
-  if (FAULT("alloc") || orb_context_create(&options, &ctx) != ORB_OK) {
+  if (orb_context_create(&options, &ctx) != ORB_OK) {
     orb_refuse(&problem, "no-memory", "The server has no memory left; try again later.");
     finish_failed(env, j, NULL, &problem);
     orb_problem_free(&problem);
     return;
   }
   queue_set_context(env->q, j, ctx);
+  FAULT_POINT("run-begun");
+  FAULT_POINT(job_key(j));
   int embedding = job_kind(j) == ORB_JOB_EMBEDDING;
   int fine = embedding ? run_embedding(env, ctx, j, &result, &problem) : run_supermesh(env, ctx, j, &result, &problem);
   queue_set_context(env->q, j, NULL);
+  FAULT_POINT("run-done");
   double seconds = 1e-3 * (double)(orb_clock_ms() - began);
   metrics_job(embedding, fine, seconds);
   char fields[128];
@@ -210,7 +213,7 @@ worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogu
     worker *w = &pool->workers[i];
     w->pool = pool;
     w->small_only = i >= options->workers;
-    w->started = !FAULT("thread") && pthread_create(&w->thread, NULL, worker_main, w) == 0;
+    w->started = pthread_create(&w->thread, NULL, worker_main, w) == 0;
     if (!w->started && i == 0) {
       free(pool);
       return NULL;
