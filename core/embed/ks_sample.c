@@ -9,7 +9,15 @@
 #include "embed/ks_search.h"
 #include "numeric/vec3.h"
 
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)
+/* Clones are chosen while the program is loaded, before a sanitizer's runtime is up. */
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#define KS_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer) || __has_feature(address_sanitizer)
+#define KS_SANITIZED 1
+#endif
+#endif
+#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(KS_SANITIZED)
 #define KS_VECTOR __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define KS_VECTOR
