@@ -88,7 +88,9 @@ struct request {
 /* server.c */
 int http_start(server *srv);
 void http_stop(server *srv);
-/* Suspends and runs fn on a thread of the pool; fn must leave a response or PHASE_WAIT. */
+/* Suspends and runs fn on a thread of the pool; fn must leave a response or PHASE_WAIT. Returns REQUEST_AWAY, which a
+ * handler passes on: from here the request belongs to the task and must not be looked at. */
+#define REQUEST_AWAY ((enum MHD_Result)2)
 enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r));
 
 /* guard.c: 1, or 0 with the problem. */

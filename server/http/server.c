@@ -37,7 +37,7 @@ enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r))
   r->phase = PHASE_AWAY;
   MHD_suspend_connection(r->connection);
   tasks_add(pool, &r->away_task);
-  return MHD_YES;
+  return REQUEST_AWAY;
 }
 
 static enum MHD_Result dispatch(request *r) {
@@ -179,6 +179,9 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
     result = dispatch(r);
   } else if (r->phase == PHASE_WAIT) {
     result = handle_wait(r);
+  }
+  if (result == REQUEST_AWAY) {
+    return MHD_YES;
   }
   return result == MHD_YES && r->phase == PHASE_SEND ? reply_send(r) : result;
 }
