@@ -182,7 +182,7 @@ test(`${kills} kills under load lose nothing`, async (t) => {
       slowest = Math.max(slowest, d.start_ms);
       if (i % 2 === 0) await ledger.settle(d);
       const load = Promise.all([ledger.call(d), ledger.call(d)]);
-      const byPoint = await dies(d, point ? 1500 : random() * (slow ? 400 : 250));
+      const byPoint = await dies(d, point ? 1500 : random() * (slow ? 600 : 400));
       await load;
       if (byPoint && point) hit.set(point, hit.get(point) + 1);
       else random_kills++;
