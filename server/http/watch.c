@@ -11,7 +11,6 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "faults.h"
 #include "http/addresses.h"
 #include "orbmorph/context.h"
 
@@ -172,7 +171,7 @@ watch *watch_start(const config *options, int tokens) {
   w->from = addresses_create(options->requests_per_second);
   pthread_mutex_init(&w->lock, NULL);
   pthread_cond_init(&w->wake, NULL);
-  if (!w->from || FAULT("thread") || pthread_create(&w->thread, NULL, watch_main, w) != 0) {
+  if (!w->from || pthread_create(&w->thread, NULL, watch_main, w) != 0) {
     addresses_destroy(w->from);
     free(w);
     return NULL;
