@@ -169,14 +169,13 @@ static void add_normal(const orb_mesh *mesh, const double *normals, const orb_pl
   }
 }
 
-/* Marks the triangles of the supermesh that turn on shape s against the mean of the input's smooth normals at their
- * corners. */
-static orb_status mark_inverted(orb_context *ctx, const orb_merge_result *out, int32_t s, const double *positions,
-                                unsigned char *inverted) {
-  const orb_supermesh *supermesh = &out->supermesh;
-  const orb_mesh *mesh = &out->alignment.shapes[s].mesh;
+orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shape,
+                             int32_t s, const double *positions, unsigned char *inverted) {
+  const orb_mesh *mesh = &shape->mesh;
+  orb_extent extent;
+  orb_mesh_extent(mesh, &extent);
   const orb_place *places = supermesh->places + (int64_t)s * supermesh->vertex_count;
-  double floor = 1e-12 * out->shapes[s].diagonal * out->shapes[s].diagonal;
+  double floor = 1e-12 * extent.diagonal * extent.diagonal;
   double *normals = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
   if (!normals) {
     return ORB_E_NO_MEMORY;
@@ -245,7 +244,7 @@ orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out) {
         orb_transfer_positions(ctx, &out->alignment.shapes[s], supermesh->places + (int64_t)s * supermesh->vertex_count,
                                supermesh->vertex_count, positions[s]);
     if (status == ORB_OK) {
-      status = mark_inverted(ctx, out, s, positions[s], inverted[s]);
+      status = orb_mark_inverted(ctx, supermesh, &out->alignment.shapes[s], s, positions[s], inverted[s]);
     }
   }
   if (status == ORB_OK) {

@@ -14,6 +14,7 @@ static const char usage_text[] =
     "       orbmorph-bench landmarks [options] A B [C...]\n"
     "       orbmorph-bench pairs [options] A B [C...]\n"
     "       orbmorph-bench truth [options] --landmarks FILE A B\n"
+    "       orbmorph-bench remesh [options] (--bodies N,N... | [--keep FILE] A B [C...])\n"
     "\n"
     "Measures the library in-process; one JSON object a line for every repeat.\n"
     "  --method M        newton (default) or kernel-sampling\n"
@@ -41,6 +42,8 @@ static const char usage_text[] =
     "truth measures how true the map from A to B is:\n"
     "  --given N         align by the first N landmarks only and measure at the rest (all)\n"
     "  --methods LIST    of rotate, rbf, fast, default, quality, auto (all of them)\n"
+    "  --bodies N,N,...  remesh: bodies made on the spot, of so many triangles\n"
+    "  --keep FILE       remesh: keeps the alignment there, and takes it from there the next time\n"
     "  --version, --help\n"
     "Exit status 0 done, 1 refused (the reason on standard error), 2 wrong usage.\n";
 
@@ -208,7 +211,7 @@ static int interpret_numbers(const texts *t, bench_options *o) {
 }
 
 /* Commands as bits, for the table of options. */
-enum { EMBED = 1, MERGE = 2, LANDMARKS = 4, PAIRS = 8, TRUTH = 16, ALL = 31 };
+enum { EMBED = 1, MERGE = 2, LANDMARKS = 4, PAIRS = 8, TRUTH = 16, REMESH = 32, ALL = 63 };
 
 static int parse(int argc, char **argv, int command, bench_options *o) {
   texts t = {0};
@@ -221,13 +224,13 @@ static int parse(int argc, char **argv, int command, bench_options *o) {
                {"--options", &t.options, ALL},
                {"--repair", &t.repair, ALL},
                {"--threads", &t.threads, ALL},
-               {"--repeat", &t.repeat, EMBED | MERGE},
-               {"--cpu", &t.cpu, EMBED | MERGE},
-               {"--out", &o->out, EMBED | MERGE},
-               {"--align", &t.align, MERGE | LANDMARKS | PAIRS},
-               {"--align-preset", &t.align_preset, MERGE | LANDMARKS | PAIRS},
+               {"--repeat", &t.repeat, EMBED | MERGE | REMESH},
+               {"--cpu", &t.cpu, EMBED | MERGE | REMESH},
+               {"--out", &o->out, EMBED | MERGE | REMESH},
+               {"--align", &t.align, MERGE | LANDMARKS | PAIRS | REMESH},
+               {"--align-preset", &t.align_preset, MERGE | LANDMARKS | PAIRS | REMESH},
                {"--remesh", &t.remesh, ALL & ~EMBED},
-               {"--landmarks", &o->landmarks, MERGE | TRUTH},
+               {"--landmarks", &o->landmarks, MERGE | TRUTH | REMESH},
                {"--tolerance", &t.tolerance, ALL & ~EMBED},
                {"--max-triangles", &t.max_triangles, ALL & ~EMBED},
                {"--sets", &t.sets, LANDMARKS},
@@ -237,7 +240,9 @@ static int parse(int argc, char **argv, int command, bench_options *o) {
                {"--merge-every", &t.merge_every, LANDMARKS},
                {"--seconds", &t.seconds, LANDMARKS | PAIRS},
                {"--given", &t.given, TRUTH},
-               {"--methods", &o->methods, TRUTH}};
+               {"--methods", &o->methods, TRUTH},
+               {"--bodies", &o->bodies, REMESH},
+               {"--keep", &o->keep, REMESH}};
   int plain = 0;
   for (int i = 2; i < argc; i++) {
     if (plain || argv[i][0] != '-' || !argv[i][1]) {
@@ -263,10 +268,10 @@ static int parse(int argc, char **argv, int command, bench_options *o) {
     }
     *table[k].place = value ? value + 1 : argv[++i];
   }
-  if (o->file_count < (command == EMBED ? 1 : 2)) {
+  if (o->file_count < (command == EMBED ? 1 : 2) && !o->bodies && !o->keep) {
     return wrong(command == EMBED ? "embed needs a file" : "two files or more are needed", "");
   }
-  if (command == MERGE && o->file_count > ORB_SHAPES_MAX) {
+  if ((command == MERGE || command == REMESH) && o->file_count > ORB_SHAPES_MAX) {
     return wrong("merge takes 16 files at most", "");
   }
   if (command == TRUTH && (o->file_count > 2 || !o->landmarks)) {
@@ -284,9 +289,9 @@ int main(int argc, char **argv) {
     puts(ORB_ENGINE);
     return BENCH_DONE;
   }
-  static int (*const run[])(const bench_options *) = {bench_embed, bench_merge, bench_landmarks, bench_pairs,
-                                                      bench_truth};
-  static const char *const commands[] = {"embed", "merge", "landmarks", "pairs", "truth", NULL};
+  static int (*const run[])(const bench_options *) = {bench_embed, bench_merge, bench_landmarks,
+                                                      bench_pairs, bench_truth, bench_remesh};
+  static const char *const commands[] = {"embed", "merge", "landmarks", "pairs", "truth", "remesh", NULL};
   int command = 0;
   while (argc >= 2 && commands[command] && strcmp(argv[1], commands[command]) != 0) {
     command++;

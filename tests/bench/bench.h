@@ -22,6 +22,8 @@ typedef struct bench_options {
   uint64_t seed;
   const char *methods; /* truth: a list with commas; NULL: all */
   long given;          /* truth: landmarks that the alignment gets; −1: all */
+  const char *bodies;  /* remesh: sizes of generated bodies, with commas */
+  const char *keep;    /* remesh: a file for the alignment */
   char **files;
   int file_count;
 } bench_options;
@@ -31,6 +33,7 @@ int bench_merge(const bench_options *options);
 int bench_landmarks(const bench_options *options);
 int bench_pairs(const bench_options *options);
 int bench_truth(const bench_options *options);
+int bench_remesh(const bench_options *options);
 
 /* A file in memory, of malloc(); 0 with a message on standard error. */
 int bench_slurp(const char *path, unsigned char **bytes, size_t *size);
@@ -98,5 +101,8 @@ typedef struct bench_set {
 /* Reads and embeds options->files; 0 with a message. count is set by the caller. */
 int bench_set_load(orb_context *ctx, const bench_options *options, bench_set *set);
 void bench_set_free(orb_context *ctx, bench_set *set);
+
+/* A body with limbs, of at least so many triangles, with a certified embedding; 0 on failure. */
+int bench_body(orb_context *ctx, int32_t triangles, uint64_t seed, orb_aligned_shape *out);
 
 #endif

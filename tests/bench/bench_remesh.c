@@ -1,0 +1,228 @@
+/* What follows the alignment, measured by itself: remeshing and the asset, on generated bodies or on files whose
+ * alignment is kept from run to run (without attributes). */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench.h"
+#include "merge/report.h"
+
+typedef struct remesh_run {
+  const bench_options *options;
+  int32_t count, landmark_count;
+  orb_aligned_shape shape[ORB_SHAPES_MAX];
+} remesh_run;
+
+static int bytes_io(FILE *file, void *bytes, size_t size, int write) {
+  return size == 0 || (write ? fwrite(bytes, size, 1, file) : fread(bytes, size, 1, file)) == 1;
+}
+
+/* One array of a kept shape, to or from the file. */
+static int array_io(orb_context *ctx, FILE *file, void *array, size_t count, size_t size, int write) {
+  void *block;
+  memcpy(&block, array, sizeof block);
+  if (!write) {
+    block = orb_alloc(ctx, count, size);
+    memcpy(array, &block, sizeof block);
+  }
+  return block && bytes_io(file, block, count * size, write);
+}
+
+static int shape_io(orb_context *ctx, FILE *file, orb_aligned_shape *shape, int32_t landmarks, int write) {
+  orb_mesh *mesh = &shape->mesh;
+  int32_t sizes[2] = {mesh->vertex_count, mesh->triangle_count};
+  int fine = bytes_io(file, sizes, sizeof sizes, write);
+  mesh->vertex_count = sizes[0];
+  mesh->triangle_count = sizes[1];
+  size_t vertices = (size_t)sizes[0], triangles = (size_t)sizes[1];
+  return fine && array_io(ctx, file, &mesh->positions, 3 * vertices, sizeof(double), write) &&
+         array_io(ctx, file, &mesh->triangles, 3 * triangles, sizeof(int32_t), write) &&
+         array_io(ctx, file, &shape->points, 3 * vertices, sizeof(double), write) &&
+         array_io(ctx, file, &shape->landmark_vertices, (size_t)landmarks, sizeof(int32_t), write);
+}
+
+static int keep_io(orb_context *ctx, remesh_run *run, int write) {
+  FILE *file = fopen(run->options->keep, write ? "wb" : "rb");
+  if (!file) {
+    return 0;
+  }
+  int32_t sizes[2] = {run->count, run->landmark_count};
+  int fine = bytes_io(file, sizes, sizeof sizes, write) && sizes[0] <= ORB_SHAPES_MAX;
+  run->count = fine ? sizes[0] : 0;
+  run->landmark_count = sizes[1];
+  for (int32_t s = 0; s < run->count && fine; s++) {
+    fine = shape_io(ctx, file, &run->shape[s], run->landmark_count, write);
+  }
+  fine = fclose(file) == 0 && fine;
+  if (!fine) {
+    fprintf(stderr, "%s: cannot be %s\n", run->options->keep, write ? "written" : "read");
+  }
+  return fine;
+}
+
+static int make_bodies(orb_context *ctx, remesh_run *run) {
+  for (const char *at = run->options->bodies; *at; run->count++) {
+    char *end;
+    long triangles = strtol(at, &end, 10);
+    if (end == at || triangles < 8 || triangles > 20000000 || run->count == ORB_SHAPES_MAX ||
+        !bench_body(ctx, (int32_t)triangles, (uint64_t)run->count + 1, &run->shape[run->count])) {
+      fprintf(stderr, "orbmorph-bench: no bodies of %s triangles\n", run->options->bodies);
+      return 0;
+    }
+    at = *end == ',' ? end + 1 : end;
+  }
+  return 1;
+}
+
+static int align_files(orb_context *ctx, remesh_run *run) {
+  bench_set *set = calloc(1, sizeof *set);
+  orb_alignment alignment = {0};
+  int fine = set != NULL;
+  if (fine) {
+    set->count = run->options->file_count;
+    fine = bench_set_load(ctx, run->options, set);
+  }
+  orb_align_options align = run->options->merge.align;
+  if (fine && !run->options->align_given) {
+    align.method = set->list.count > 0 ? ORB_ALIGN_PIN : ORB_ALIGN_AUTO;
+  }
+  if (fine && orb_align(ctx, set->shape, set->count, set->landmarks, set->list.count, &align, &alignment) != ORB_OK) {
+    bench_complain("align", ctx);
+    fine = 0;
+  }
+  for (int32_t s = 0; fine && s < alignment.shape_count; s++) {
+    run->shape[s] = alignment.shapes[s];
+    memset(&alignment.shapes[s], 0, sizeof alignment.shapes[s]);
+  }
+  run->count = fine ? alignment.shape_count : 0;
+  run->landmark_count = alignment.landmark_count;
+  orb_alignment_free(ctx, &alignment);
+  if (set) {
+    bench_set_free(ctx, set);
+  }
+  free(set);
+  return fine && (!run->options->keep || keep_io(ctx, run, 1));
+}
+
+/* Triangles of no shape to speak of (quality below a hundredth: height a ninetieth of the longest side) on shape s. */
+static int64_t count_slivers(const orb_supermesh *mesh, const double *p) {
+  int64_t count = 0;
+  for (int64_t t = 0; t < mesh->triangle_count; t++) {
+    const double *c[3];
+    double edges = 0, n[3], e[3][3];
+    for (int k = 0; k < 3; k++) {
+      c[k] = p + 3 * (int64_t)mesh->triangles[3 * t + k];
+    }
+    for (int k = 0; k < 3; k++) {
+      for (int j = 0; j < 3; j++) {
+        e[k][j] = c[(k + 1) % 3][j] - c[k][j];
+        edges += e[k][j] * e[k][j];
+      }
+    }
+    for (int k = 0; k < 3; k++) {
+      n[k] = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
+    }
+    count += 3.4641016 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) < 0.02 * edges;
+  }
+  return count;
+}
+
+static int write_shape(orb_context *ctx, orb_text *line, const remesh_run *run, const orb_supermesh *mesh, int32_t s) {
+  double *positions = ORB_NEW(ctx, double, 3 * (size_t)mesh->vertex_count);
+  unsigned char *inverted = ORB_NEW(ctx, unsigned char, mesh->triangle_count);
+  int fine = positions && inverted &&
+             orb_transfer_positions(ctx, &run->shape[s], mesh->places + (int64_t)s * mesh->vertex_count,
+                                    mesh->vertex_count, positions) == ORB_OK &&
+             orb_mark_inverted(ctx, mesh, &run->shape[s], s, positions, inverted) == ORB_OK;
+  int64_t turned = 0;
+  for (int64_t t = 0; fine && t < mesh->triangle_count; t++) {
+    turned += inverted[t];
+  }
+  orb_extent extent;
+  orb_mesh_extent(&run->shape[s].mesh, &extent);
+  orb_json_open(line, '{');
+  orb_json_member_integer(line, "triangles", run->shape[s].mesh.triangle_count);
+  orb_json_member_number(line, "hausdorff_relative", mesh->error_bound[s] / extent.diagonal);
+  orb_json_member_integer(line, "inverted", turned);
+  orb_json_member_integer(line, "slivers", fine ? count_slivers(mesh, positions) : 0);
+  orb_json_close(line, '}');
+  orb_free(ctx, positions);
+  orb_free(ctx, inverted);
+  return fine;
+}
+
+static int run_once(orb_context *ctx, const remesh_run *run, int repeat) {
+  orb_supermesh mesh = {0};
+  orb_buffer asset = {0};
+  orb_text line = {0};
+  const char *names[ORB_SHAPES_MAX];
+  static const char *const methods[] = {"adaptive", "overlay", "subdivision", "convex-hull"};
+  int64_t input = 0, largest = 0;
+  for (int32_t s = 0; s < run->count; s++) {
+    int32_t triangles = run->shape[s].mesh.triangle_count;
+    names[s] = "body";
+    input += triangles;
+    largest = triangles > largest ? triangles : largest;
+  }
+  double start = orb_clock(), cpu = bench_cpu();
+  int fine = orb_remesh(ctx, run->shape, run->count, run->landmark_count, &run->options->merge.remesh, &mesh) == ORB_OK;
+  double remeshed = orb_clock(), remesh_cpu = bench_cpu();
+  fine = fine && orb_asset_write(ctx, &mesh, run->shape, names, &run->options->merge.asset, NULL, &asset) == ORB_OK;
+  double written = orb_clock();
+  orb_json_open(&line, '{');
+  orb_json_member_string(&line, "remesh", methods[run->options->merge.remesh.method]);
+  orb_json_member_integer(&line, "vertices", mesh.vertex_count);
+  orb_json_member_integer(&line, "triangles", mesh.triangle_count);
+  orb_json_member_integer(&line, "input_triangles", input);
+  orb_json_member_integer(&line, "largest_input", largest);
+  orb_json_member_number(&line, "by_largest", (double)mesh.triangle_count / (double)largest);
+  orb_json_member_integer(&line, "threads", orb_threads(ctx));
+  orb_json_member_integer(&line, "repeat", repeat);
+  orb_json_key(&line, "seconds");
+  orb_json_open(&line, '{');
+  orb_json_member_number(&line, "remesh", remeshed - start);
+  orb_json_member_number(&line, "remesh_cpu", remesh_cpu - cpu);
+  orb_json_member_number(&line, "write", written - remeshed);
+  orb_json_close(&line, '}');
+  orb_json_member_integer(&line, "peak_rss_bytes", bench_peak());
+  orb_json_key(&line, "shapes");
+  orb_json_open(&line, '[');
+  for (int32_t s = 0; fine && s < run->count; s++) {
+    fine = write_shape(ctx, &line, run, &mesh, s);
+  }
+  orb_json_close(&line, ']');
+  orb_json_close(&line, '}');
+  if (fine) {
+    fine = bench_print(&line) && (!run->options->out || bench_spill(run->options->out, asset.data, asset.size));
+  } else {
+    bench_complain("remesh", ctx);
+    orb_text_free(&line);
+  }
+  orb_buffer_free(ctx, &asset);
+  orb_supermesh_free(ctx, &mesh);
+  return fine;
+}
+
+int bench_remesh(const bench_options *options) {
+  remesh_run *run = calloc(1, sizeof *run);
+  if (!run) {
+    return BENCH_REFUSED;
+  }
+  run->options = options;
+  orb_context *ctx = bench_open(options->threads);
+  int fine = options->bodies ? make_bodies(ctx, run) : (options->keep && keep_io(ctx, run, 0)) || align_files(ctx, run);
+  for (int repeat = 0; fine && repeat < options->repeat; repeat++) {
+    bench_reset_peak();
+    fine = run_once(ctx, run, repeat);
+  }
+  for (int32_t s = 0; s < ORB_SHAPES_MAX; s++) {
+    orb_mesh_free(ctx, &run->shape[s].mesh);
+    orb_free(ctx, run->shape[s].points);
+    orb_free(ctx, run->shape[s].parent);
+    orb_free(ctx, run->shape[s].landmark_vertices);
+  }
+  orb_context_destroy(ctx);
+  free(run);
+  return fine ? BENCH_DONE : BENCH_REFUSED;
+}
