@@ -135,7 +135,7 @@ static int decide_exactly(const double a[3], const double b[3], const double c[3
   return exact_sign(a, b, c);
 }
 
-int orb_orient(const double a[3], const double b[3], const double c[3]) {
+int orb_orient_careful(const double a[3], const double b[3], const double c[3]) {
   double size = fabs(a[0]) + fabs(a[1]) + fabs(a[2]) + fabs(b[0]) + fabs(b[1]) + fabs(b[2]) + fabs(c[0]) + fabs(c[1]) +
                 fabs(c[2]);
   if (size <= 1e100) { /* not where one is not a number */

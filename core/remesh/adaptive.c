@@ -1,44 +1,61 @@
 /* The adaptive method: as few triangles as keep every shape within the tolerance, the bound proved (see match.h).
  *
- * The start holds every vertex of every shape; edges that stray are turned or split until the bound holds; then edges
- * are collapsed while it still holds, with turns for well-shaped triangles in between. Where max_triangles asks for
- * fewer, the tolerance is raised step by step until they suffice. */
+ * The start holds every vertex of every shape; edges that stray are turned or split until the bound holds. Then, in
+ * rounds: edges are collapsed and holes filled anew while the bound still holds, edges turned for well-shaped
+ * triangles, and vertices moved to where the edges stray less, which makes room for the next round. Triangles that come
+ * out turned in space are mended by smaller ones. Where max_triangles asks for fewer, the tolerance is raised step by
+ * step until they suffice. */
+#include <math.h>
+
 #include "base/check.h"
 #include "remesh/match.h"
 
-enum { ROUNDS = 3, MENDS = 4 };
+enum { MENDS = 4 };
+
+/* Later rounds gain a few per cent each. Large meshes do without: their triangles are small against the tolerance, and
+ * time counts. */
+static int rounds_for(int64_t triangles) {
+  return triangles < 25000 ? 10 : triangles < 60000 ? 4 : 2;
+}
 
 static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, int64_t target, int strict) {
   double limit2 = tolerance * tolerance;
-  for (int round = 0; round < ROUNDS; round++) {
-    int64_t before = orb_match_live(match);
-    ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict));
-    ORB_TRY(orb_match_turn_all(ctx, match, limit2));
+  int64_t before = orb_match_live(match);
+  int rounds = rounds_for(before);
+  for (int round = 0; round < rounds; round++) {
+    if (round > 0) {
+      ORB_TRY(orb_match_move_all(ctx, match, limit2, 0));
+    }
+    ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, round > 0));
+    ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
     int64_t after = orb_match_live(match);
-    if (after <= target || (before - after) * 50 < before) {
+    if (after <= target || (round > 0 && (before - after) * 250 < before)) {
       break;
     }
+    before = after;
   }
   return ORB_OK;
 }
 
-/* Edges that found no room to be split among needles find it once the needles are gone: refine and reduce in turn
- * until the bound holds for every shape. */
+/* Edges that found no room to be split among needles find it once the needles are gone, and what mends a turned
+ * triangle may stray: refine, mend and reduce in turn until the bound holds for every shape. */
 static orb_status settle_within(orb_context *ctx, orb_match *match, double tolerance) {
   double limit2 = tolerance * tolerance;
+  int64_t strays = 0, turned = 0;
   for (int i = 0; i < MENDS; i++) {
-    int64_t strays = 0;
     ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
-    if (strays == 0 && i > 0) {
-      break;
-    }
     if (i == 0) {
-      ORB_TRY(orb_match_turn_all(ctx, match, limit2));
+      ORB_TRY(orb_match_turn_all(ctx, match, limit2, 1));
+    } else {
+      ORB_TRY(orb_match_mend(ctx, match, limit2, &turned));
+      if (strays == 0 && turned == 0) {
+        return ORB_OK;
+      }
     }
     ORB_TRY(reduce(ctx, match, tolerance, 0, 1));
     orb_progress(ctx, "remesh", 0.5 + 0.1 * i);
   }
-  return ORB_OK;
+  return orb_match_refine(ctx, match, limit2, NULL);
 }
 
 orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
@@ -48,6 +65,7 @@ orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_
   int64_t most = job->options->max_triangles;
   orb_status status;
   orb_progress(ctx, "remesh", 0.15);
+  ORB_GO(status, orb_match_turn_all(ctx, &match, INFINITY, 1), end);
   ORB_GO(status, settle_within(ctx, &match, tolerance), end);
   while (most > 0 && orb_match_live(&match) > most && tolerance < 4) {
     tolerance *= 1.25;

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "mesh/normals.h"
 #include "numeric/vec3.h"
 
 const double *orb_match_item_point(const orb_match *match, int32_t item) {
@@ -21,9 +22,14 @@ void orb_match_free(orb_context *ctx, orb_match *match) {
   for (int32_t s = 0; s < match->shape_count && match->position; s++) {
     orb_free(ctx, match->position[s]);
   }
+  for (int32_t s = 0; s < match->shape_count && match->vertex_normal; s++) {
+    orb_free(ctx, match->vertex_normal[s]);
+  }
   orb_free(ctx, match->position);
+  orb_free(ctx, match->vertex_normal);
   orb_free(ctx, match->view);
   orb_free(ctx, match->at);
+  orb_free(ctx, match->normal);
   orb_free(ctx, match->spot);
   orb_free(ctx, match->fixed);
   orb_free(ctx, match->item_begin);
@@ -51,8 +57,9 @@ orb_status orb_match_reserve(orb_context *ctx, orb_match *match, int64_t more) {
   }
   ORB_TRY(orb_net_reserve(ctx, &match->net, more));
   size_t n = (size_t)match->net.vertex_capacity, cells = n * (size_t)match->shape_count;
-  if (!grow(ctx, &match->at, 3 * cells, sizeof(double)) || !grow(ctx, &match->spot, cells, sizeof(orb_spot)) ||
-      !grow(ctx, &match->fixed, n, 1) || !grow(ctx, &match->vertex_items, n, sizeof(int32_t)) ||
+  if (!grow(ctx, &match->at, 3 * cells, sizeof(double)) || !grow(ctx, &match->normal, 3 * cells, sizeof(double)) ||
+      !grow(ctx, &match->spot, cells, sizeof(orb_spot)) || !grow(ctx, &match->fixed, n, 1) ||
+      !grow(ctx, &match->vertex_items, n, sizeof(int32_t)) ||
       !grow(ctx, &match->triangle_items, 2 * n, sizeof(int32_t))) {
     return ORB_E_NO_MEMORY;
   }
@@ -69,9 +76,10 @@ static orb_status take_shapes(orb_context *ctx, orb_match *match) {
   const orb_remesh_job *job = match->job;
   int32_t shapes = match->shape_count = job->shape_count;
   match->position = ORB_NEW0(ctx, double *, shapes);
+  match->vertex_normal = ORB_NEW0(ctx, double *, shapes);
   match->view = ORB_NEW(ctx, orb_sphere_view, shapes);
   match->item_begin = ORB_NEW0(ctx, int32_t, shapes + 1);
-  if (!match->position || !match->view || !match->item_begin) {
+  if (!match->position || !match->vertex_normal || !match->view || !match->item_begin) {
     return ORB_E_NO_MEMORY;
   }
   int64_t items = 0;
@@ -84,9 +92,12 @@ static orb_status take_shapes(orb_context *ctx, orb_match *match) {
     }
     match->item_begin[s + 1] = (int32_t)items;
     match->position[s] = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
-    if (!match->position[s]) {
+    match->vertex_normal[s] = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
+    if (!match->position[s] || !match->vertex_normal[s]) {
       return ORB_E_NO_MEMORY;
     }
+    ORB_TRY(orb_smooth_normals(ctx, mesh->positions, mesh->vertex_count, mesh->triangles, mesh->triangle_count,
+                               match->vertex_normal[s]));
     double scale = job->diagonal[s] > 0 ? 1 / job->diagonal[s] : 1;
     for (int64_t i = 0; i < 3 * (int64_t)mesh->vertex_count; i++) {
       match->position[s][i] = mesh->positions[i] * scale;
@@ -124,13 +135,22 @@ static void settle(orb_match *match, int32_t v, int32_t s, int32_t hint) {
   orb_locate(match->job->locator[s], p, hint, &place);
   int64_t cell = (int64_t)v * match->shape_count + s;
   match->spot[cell] = spot_of_place(&match->view[s], &place, p);
-  double *at = match->at + 3 * cell;
-  at[0] = at[1] = at[2] = 0;
+  double *at = match->at + 3 * cell, *normal = match->normal + 3 * cell;
+  at[0] = at[1] = at[2] = normal[0] = normal[1] = normal[2] = 0;
   for (int k = 0; k < 3; k++) {
-    const double *q = match->position[s] + 3 * (int64_t)match->view[s].triangles[3 * place.triangle + k];
+    int64_t corner = match->view[s].triangles[3 * place.triangle + k];
     for (int j = 0; j < 3; j++) {
-      at[j] += place.at[k] * q[j];
+      at[j] += place.at[k] * match->position[s][3 * corner + j];
+      normal[j] += place.at[k] * match->vertex_normal[s][3 * corner + j];
     }
+  }
+  (void)orb_normalize(normal);
+}
+
+void orb_match_place(orb_match *match, int32_t v, const double p[3]) {
+  memcpy(match->net.points + 3 * (int64_t)v, p, 3 * sizeof(double));
+  for (int32_t s = 0; s < match->shape_count; s++) {
+    settle(match, v, s, match->spot[(int64_t)v * match->shape_count + s].h / 3);
   }
 }
 
@@ -257,6 +277,28 @@ int32_t orb_match_split(orb_match *match, int32_t h, const double p[3]) {
   match->triangle_items[h / 3] = match->triangle_items[g / 3] = -1;
   orb_match_deal(match, lists[0], t);
   orb_match_deal(match, lists[1], t);
+  return v;
+}
+
+int32_t orb_match_insert(orb_match *match, int32_t t, const double p[3]) {
+  orb_net *net = &match->net;
+  orb_sphere_view view = orb_net_view(net);
+  orb_hit hit = orb_walk(&view, p, t);
+  int32_t edge = orb_hit_edge(&hit), other = edge >= 0 ? net->twin[edge] / 3 : -1;
+  int32_t lists[2] = {match->triangle_items[hit.triangle], other >= 0 ? match->triangle_items[other] : -1};
+  int32_t near = hit.triangle, before = net->vertex_count, v = orb_net_insert(net, p, &near);
+  if (v < before) { /* there is one: what lies here is its item from now on */
+    return v;
+  }
+  for (int32_t s = 0; s < match->shape_count; s++) {
+    settle(match, v, s, match->spot[(int64_t)net->triangles[3 * (int64_t)near] * match->shape_count + s].h / 3);
+  }
+  match->triangle_items[hit.triangle] = -1;
+  if (other >= 0) {
+    match->triangle_items[other] = -1;
+  }
+  orb_match_deal(match, lists[0], hit.triangle);
+  orb_match_deal(match, lists[1], hit.triangle);
   return v;
 }
 

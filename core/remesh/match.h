@@ -20,7 +20,9 @@ typedef struct orb_match {
   int32_t shape_count, capacity; /* capacity in net vertices of the arrays below */
   orb_sphere_view *view;         /* a shape */
   double **position;             /* a shape: its vertices, divided by its diagonal */
+  double **vertex_normal;        /* a shape: smooth unit normals of its vertices */
   double *at;                    /* net vertex major: 3 for each shape, its positions, likewise scaled */
+  double *normal;                /* net vertex major: 3 for each shape, its smooth normals there, unit */
   orb_spot *spot;                /* net vertex major: one for each shape */
   unsigned char *fixed;          /* a net vertex: a landmark, not to be removed */
   /* Items: the vertices of all shapes, shape after shape. Each is in the list of a net vertex or of a triangle. */
@@ -39,6 +41,10 @@ void orb_match_free(orb_context *ctx, orb_match *match);
 
 static inline const double *orb_match_at(const orb_match *match, int32_t v, int32_t s) {
   return match->at + 3 * ((int64_t)v * match->shape_count + s);
+}
+
+static inline const double *orb_match_normal(const orb_match *match, int32_t v, int32_t s) {
+  return match->normal + 3 * ((int64_t)v * match->shape_count + s);
 }
 
 /* Position of an item on the sphere and, scaled, in space. */
@@ -71,24 +77,64 @@ ORB_MUST_CHECK orb_status orb_match_reserve(orb_context *ctx, orb_match *match, 
  * two triangles are handed on. */
 int32_t orb_match_split(orb_match *match, int32_t h, const double p[3]);
 
+/* Makes p, which lies in triangle t, a vertex (or finds the one there): the vertex. Needs room for one. */
+int32_t orb_match_insert(orb_match *match, int32_t t, const double p[3]);
+
 /* Puts the items of a list into the triangles that hold them, by walks from triangle `start`. */
 void orb_match_deal(orb_match *match, int32_t list, int32_t start);
 
-/* Splits, or turns, every edge that strays farther than the tolerance (relative, squared), until none does; *strays
- * (may be NULL) counts the edges that strayed at first. */
+/* Splits, or turns, every edge that strays farther than the tolerance (relative, squared), and takes items that do in
+ * as vertices, until none does; *strays (may be NULL) counts the edges that had to be looked at. */
 ORB_MUST_CHECK orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, int64_t *strays);
 
 /* Turns an edge if that keeps the bound and helps the shape of the triangles; whether it did. */
 int orb_match_try_turn(orb_match *match, int32_t h, double limit2);
-ORB_MUST_CHECK orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2);
+/* All edges in turn, or those at triangles that are turned in space or slivers. */
+ORB_MUST_CHECK orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2, int only_bad);
 
-/* Quality of a triangle in space, 0 degenerate to 1 equilateral, the least over all shapes. */
-double orb_match_quality(const orb_match *match, int32_t a, int32_t b, int32_t c);
+/* How triangles lie in space, the worst over all shapes. */
+typedef struct orb_form {
+  double quality; /* the least: 0 degenerate to 1 equilateral */
+  double facing;  /* the least, cosine-like, against the shape's smooth normals at the corners; below 0 inverted */
+  int32_t slivers, turned; /* how many triangles are not fine in one or the other */
+} orb_form;
+static const orb_form ORB_FORM_BEST = {1, 1, 0, 0};
+orb_form orb_match_form(const orb_match *match, int32_t a, int32_t b, int32_t c);
+/* Of two sets of triangles together. */
+static inline orb_form orb_form_join(orb_form f, orb_form g) {
+  return (orb_form){f.quality < g.quality ? f.quality : g.quality, f.facing < g.facing ? f.facing : g.facing,
+                    f.slivers + g.slivers, f.turned + g.turned};
+}
+/* Whether triangles such as `after` may replace some such as `before`: fewer are turned, or none worse than before and
+ * the same holds of slivers; measures that are fine count as equal. */
+int orb_form_allows(orb_form before, orb_form after);
+/* A triangle's form as a cost: turned counts most, then slivers, then shape. */
+static inline double orb_form_cost(orb_form f) {
+  return (1 - f.quality) * (1 - f.quality) + 8 * f.slivers + 64 * f.turned;
+}
+
+/* Moves v on the sphere if that makes the triangles around it better, or its edges stray less, within the limit;
+ * whether it did. Then all vertices in turn, or those at triangles that are not fine. */
+int orb_match_try_move(orb_match *match, int32_t v, double limit2);
+ORB_MUST_CHECK orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2, int only_bad);
+/* Mends triangles that are turned in space, by splits in the end; edges that splits made may stray. *left: how many
+ * were still turned when last looked at. */
+ORB_MUST_CHECK orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2, int64_t *left);
+/* Puts vertex v at p: point, spots, positions and normals; triangles and items are the caller's care. */
+void orb_match_place(orb_match *match, int32_t v, const double p[3]);
+
+/* Plans to take u away and to triangulate its hole anew, within the limit (relative, squared): ring are its n
+ * neighbours counter-clockwise, triangles n − 2 triples of numbers in the ring. strict as below. 0: there is no way. */
+int orb_match_plan_fill(const orb_match *match, int32_t u, const int32_t *ring, int n, double limit2, int strict,
+                        int (*triangles)[3]);
+/* Does it. */
+void orb_match_fill(orb_match *match, int32_t u, const int32_t *ring, int n, int (*triangles)[3]);
 
 /* Collapses edges while every matched distance stays within the limit (relative, squared) and more than
- * `target` triangles live. strict: also keep triangles from turning over and from becoming slivers in space. */
+ * `target` triangles live. strict: also keep triangles from turning over and from becoming slivers in space.
+ * thorough: where no edge can be collapsed, try all ways to fill the hole that the vertex leaves. */
 ORB_MUST_CHECK orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2, int64_t target,
-                                             int strict);
+                                             int strict, int thorough);
 int64_t orb_match_live(const orb_match *match);
 
 /* Places, points, triangles and bounds of the live net. */

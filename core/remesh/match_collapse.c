@@ -20,7 +20,7 @@ typedef struct collapser {
   orb_context *ctx;
   orb_match *match;
   double limit2;
-  int strict;
+  int strict, thorough;
   orb_quadric *quadric; /* net vertex major, one a shape */
   double *cost;         /* a vertex: of its best target */
   int32_t *heap, *slot; /* slot −1: not in the heap */
@@ -118,37 +118,17 @@ static void rate(collapser *c, int32_t u) {
   heap_put(c, u, best);
 }
 
-static void normal_of(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c, double out[3]) {
-  double u[3], v[3];
-  orb_sub(orb_match_at(match, b, s), orb_match_at(match, a, s), u);
-  orb_sub(orb_match_at(match, c, s), orb_match_at(match, a, s), v);
-  orb_cross(u, v, out);
-}
-
-/* In space no kept triangle turns by more than about 75 degrees, and none becomes a worse sliver than the worst of the
- * triangles that go, unless it is good enough. ring starts at v. */
+/* In space no new triangle is a worse sliver, or turned worse against the surface, than the worst of those that go,
+ * unless it is good enough. ring starts at v. */
 static int shape_allows(const orb_match *match, int32_t u, const int32_t *ring, int n) {
-  double worst_old = 1, worst_new = 1;
+  orb_form before = ORB_FORM_BEST, after = ORB_FORM_BEST;
   for (int i = 0; i < n; i++) {
-    worst_old = fmin(worst_old, orb_match_quality(match, u, ring[i], ring[(i + 1) % n]));
+    before = orb_form_join(before, orb_match_form(match, u, ring[i], ring[(i + 1) % n]));
   }
   for (int i = 1; i + 1 < n; i++) {
-    worst_new = fmin(worst_new, orb_match_quality(match, ring[0], ring[i], ring[i + 1]));
+    after = orb_form_join(after, orb_match_form(match, ring[0], ring[i], ring[i + 1]));
   }
-  if (worst_new < 0.12 && worst_new < worst_old) {
-    return 0;
-  }
-  for (int i = 1; i + 1 < n; i++) {
-    for (int32_t s = 0; s < match->shape_count; s++) {
-      double old[3], new[3];
-      normal_of(match, s, u, ring[i], ring[i + 1], old);
-      normal_of(match, s, ring[0], ring[i], ring[i + 1], new);
-      if (orb_dot(old, new) < 0.25 * orb_length(old) * orb_length(new)) {
-        return 0;
-      }
-    }
-  }
-  return 1;
+  return orb_form_allows(before, after);
 }
 
 /* The greatest distance of a listed item to the fan of ring[0] that replaces u's star; −1 where it lies in none. */
@@ -255,17 +235,35 @@ static int32_t next_target(const collapser *c, int32_t u, double above, int32_t 
   return best;
 }
 
+/* Takes u away in the best way that there is, if there is one. */
+static void try_fill(collapser *c, int32_t u, const int32_t *ring, int n, int32_t heir) {
+  int triangles[ORB_FILL_MOST][3];
+  int32_t shapes = c->match->shape_count;
+  if (!orb_match_plan_fill(c->match, u, ring, n, c->limit2, c->strict, triangles)) {
+    return;
+  }
+  orb_match_fill(c->match, u, ring, n, triangles);
+  c->live -= 2;
+  for (int32_t k = 0; k < shapes; k++) {
+    orb_quadric_add(&c->quadric[(int64_t)heir * shapes + k], &c->quadric[(int64_t)u * shapes + k]);
+  }
+  for (int i = 0; i < n; i++) {
+    rate(c, ring[i]);
+  }
+}
+
 static void try_vertex(collapser *c, int32_t u) {
   const orb_net *net = &c->match->net;
   int32_t ring[RING_MAX], turned[RING_MAX];
   int n = ring_of(net, u, ring);
   double cost = -1;
-  int32_t h = -1;
+  int32_t h = -1, heir = -1;
   for (int attempt = 0; attempt < TRIES && n > 0; attempt++) {
     h = next_target(c, u, cost, h, &cost);
     if (h < 0) {
-      return;
+      break;
     }
+    heir = attempt == 0 ? net->triangles[orb_next(h)] : heir;
     int at = 0;
     while (ring[at] != net->triangles[orb_next(h)]) {
       at++;
@@ -280,6 +278,9 @@ static void try_vertex(collapser *c, int32_t u) {
       }
       return;
     }
+  }
+  if (c->thorough && n > 2 && n <= ORB_FILL_MOST) {
+    try_fill(c, u, ring, n, heir);
   }
 }
 
@@ -310,9 +311,15 @@ static void quadric_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2, int64_t target, int strict) {
+orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2, int64_t target, int strict,
+                              int thorough) {
   int32_t vertices = match->net.vertex_count;
-  collapser c = {.ctx = ctx, .match = match, .limit2 = limit2, .strict = strict, .live = orb_match_live(match)};
+  collapser c = {.ctx = ctx,
+                 .match = match,
+                 .limit2 = limit2,
+                 .strict = strict,
+                 .thorough = thorough,
+                 .live = orb_match_live(match)};
   c.quadric = ORB_NEW(ctx, orb_quadric, (int64_t)vertices * match->shape_count);
   c.cost = ORB_NEW(ctx, double, vertices);
   c.heap = ORB_NEW(ctx, int32_t, vertices);

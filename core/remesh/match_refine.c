@@ -7,21 +7,6 @@
 #include "remesh/distance.h"
 #include "remesh/match.h"
 
-double orb_match_quality(const orb_match *match, int32_t a, int32_t b, int32_t c) {
-  double least = 1;
-  for (int32_t s = 0; s < match->shape_count; s++) {
-    double u[3], v[3], n[3];
-    const double *p = orb_match_at(match, a, s), *q = orb_match_at(match, b, s), *r = orb_match_at(match, c, s);
-    orb_sub(q, p, u);
-    orb_sub(r, p, v);
-    orb_cross(u, v, n);
-    double edges = orb_dot(u, u) + orb_dot(v, v) + orb_distance2(q, r);
-    double quality = edges > 0 ? 3.4641016151377544 * orb_length(n) / edges : 0;
-    least = quality < least ? quality : least;
-  }
-  return least;
-}
-
 static double items_of_turn2(const orb_match *match, int32_t list, int32_t c, int32_t d, int32_t b, int32_t a) {
   double greatest = 0;
   for (int32_t i = list; i >= 0; i = match->item_next[i]) {
@@ -42,36 +27,25 @@ static void turn(orb_match *match, int32_t h) {
   orb_match_deal(match, lists[1], t);
 }
 
-/* Neither new triangle turns against the surface that the two old ones formed. */
-static int turn_keeps_facing(const orb_match *match, int32_t a, int32_t b, int32_t c, int32_t d) {
-  const int32_t old[2][3] = {{a, b, c}, {b, a, d}}, new[2][3] = {{c, d, b}, {d, c, a}};
-  for (int32_t s = 0; s < match->shape_count; s++) {
-    double n[4][3];
-    for (int i = 0; i < 4; i++) {
-      const int32_t *t = i < 2 ? old[i] : new[i - 2];
-      double u[3], v[3];
-      orb_sub(orb_match_at(match, t[1], s), orb_match_at(match, t[0], s), u);
-      orb_sub(orb_match_at(match, t[2], s), orb_match_at(match, t[0], s), v);
-      orb_cross(u, v, n[i]);
-    }
-    for (int i = 2; i < 4; i++) {
-      double sum[3] = {n[0][0] + n[1][0], n[0][1] + n[1][1], n[0][2] + n[1][2]};
-      if (orb_dot(n[i], sum) < 0.3 * orb_length(n[i]) * orb_length(sum)) {
-        return 0;
-      }
-    }
-  }
-  return 1;
+/* The forms of the two triangles on either side of edge a b, and of those on either side of c d instead. */
+static void forms_of_turn(const orb_match *match, int32_t a, int32_t b, int32_t c, int32_t d, orb_form *before,
+                          orb_form *after) {
+  *before = orb_form_join(orb_match_form(match, a, b, c), orb_match_form(match, b, a, d));
+  *after = orb_form_join(orb_match_form(match, c, d, b), orb_match_form(match, d, c, a));
 }
 
-int orb_match_try_turn(orb_match *match, int32_t h, double limit2) {
+static int try_turn(orb_match *match, int32_t h, double limit2, int only_bad) {
   const orb_net *net = &match->net;
   int32_t g = net->twin[h];
   int32_t a = net->triangles[h], b = net->triangles[g];
   int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
-  double before = fmin(orb_match_quality(match, a, b, c), orb_match_quality(match, b, a, d));
-  double after = fmin(orb_match_quality(match, c, d, b), orb_match_quality(match, d, c, a));
-  if (!(after > before * 1.05 + 1e-9) || !orb_net_can_flip(net, h) || !turn_keeps_facing(match, a, b, c, d) ||
+  orb_form before, after;
+  forms_of_turn(match, a, b, c, d, &before, &after);
+  if (only_bad && !before.turned && !before.slivers) {
+    return 0;
+  }
+  int better = after.quality > before.quality * 1.05 + 1e-9 || (before.facing <= 0 && after.facing > 0);
+  if (!better || !orb_form_allows(before, after) || !orb_net_can_flip(net, h) ||
       orb_match_edge2(match, c, d, limit2, NULL) > limit2 ||
       items_of_turn2(match, match->triangle_items[h / 3], c, d, b, a) > limit2 ||
       items_of_turn2(match, match->triangle_items[g / 3], c, d, b, a) > limit2) {
@@ -81,12 +55,16 @@ int orb_match_try_turn(orb_match *match, int32_t h, double limit2) {
   return 1;
 }
 
-orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2) {
+int orb_match_try_turn(orb_match *match, int32_t h, double limit2) {
+  return try_turn(match, h, limit2, 0);
+}
+
+orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2, int only_bad) {
   for (int pass = 0; pass < 4; pass++) {
     int64_t turned = 0;
     for (int32_t h = 0; h < 3 * match->net.triangle_count; h++) {
       if (match->net.triangles[h - h % 3] >= 0 && h < match->net.twin[h]) {
-        turned += orb_match_try_turn(match, h, limit2);
+        turned += try_turn(match, h, limit2, only_bad);
       }
       if ((h & 4095) == 0) {
         ORB_TRY(orb_context_check(ctx));
@@ -156,7 +134,9 @@ static int mend_by_turn(orb_match *match, int32_t h, double limit2) {
   const orb_net *net = &match->net;
   int32_t g = net->twin[h], v = net->triangles[h], w = net->triangles[g];
   int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
-  if (!orb_net_can_flip(net, h) || !turn_keeps_facing(match, v, w, c, d) ||
+  orb_form before, after;
+  forms_of_turn(match, v, w, c, d, &before, &after);
+  if (!orb_net_can_flip(net, h) || !orb_form_allows(before, after) ||
       orb_match_edge2(match, c, d, limit2, NULL) > limit2 ||
       items_of_turn2(match, match->triangle_items[h / 3], c, d, w, v) > limit2 ||
       items_of_turn2(match, match->triangle_items[g / 3], c, d, w, v) > limit2) {
@@ -255,6 +235,38 @@ static void stray_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
+/* The item of triangle t that is farthest from it, if that is beyond the limit; else −1. */
+static int32_t farthest_item(const orb_match *match, int32_t t, double limit2) {
+  const int32_t *c = match->net.triangles + 3 * (int64_t)t;
+  int32_t farthest = -1;
+  for (int32_t i = match->triangle_items[t]; i >= 0; i = match->item_next[i]) {
+    double distance2 = orb_match_item2(match, i, c[0], c[1], c[2]);
+    if (distance2 > limit2) {
+      limit2 = distance2;
+      farthest = i;
+    }
+  }
+  return farthest;
+}
+
+/* Makes vertices of the items that stray from their triangles, the farthest of each triangle first. */
+static orb_status take_items_in(orb_context *ctx, orb_match *match, double limit2, edge_queue *queue) {
+  for (int32_t t = 0; t < match->net.triangle_count; t++) { /* new triangles come at the end and are looked at, too */
+    int32_t item = match->net.triangles[3 * (int64_t)t] < 0 ? -1 : farthest_item(match, t, limit2);
+    if (item < 0) {
+      continue;
+    }
+    ORB_TRY(orb_match_reserve(ctx, match, 1));
+    int32_t v = orb_match_insert(match, t, orb_match_item_point(match, item)), first = match->net.out[v], h = first;
+    do {
+      ORB_TRY(push(ctx, queue, v, match->net.triangles[orb_next(h)]));
+      h = match->net.twin[orb_prev(h)];
+    } while (h != first);
+    t -= farthest_item(match, t, limit2) >= 0; /* others may still stray from what is left of it */
+  }
+  return ORB_OK;
+}
+
 orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, int64_t *strays) {
   int64_t half_edges = 3 * (int64_t)match->net.triangle_count;
   stray_loop loop = {match, limit2, ORB_NEW(ctx, unsigned char, half_edges)};
@@ -268,6 +280,9 @@ orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, i
     if (loop.strays[h]) {
       status = push(ctx, &queue, match->net.triangles[h], match->net.triangles[match->net.twin[h]]);
     }
+  }
+  if (status == ORB_OK) {
+    status = take_items_in(ctx, match, limit2, &queue);
   }
   if (strays) {
     *strays = queue.count;

@@ -171,7 +171,7 @@ int orb_net_sound(const orb_net *net, int32_t a, int32_t b, int32_t c) {
   return orb_det(p, q, r) > 1e-6 * fmax(orb_distance2(p, q), fmax(orb_distance2(q, r), orb_distance2(r, p)));
 }
 
-static int adjacent(const orb_net *net, int32_t a, int32_t b) {
+int orb_net_adjacent(const orb_net *net, int32_t a, int32_t b) {
   int32_t first = net->out[a], h = first;
   do {
     if (origin(net, orb_next(h)) == b) {
@@ -186,7 +186,7 @@ int orb_net_can_flip(const orb_net *net, int32_t h) {
   int32_t g = net->twin[h];
   int32_t a = origin(net, h), b = origin(net, g), c = origin(net, orb_prev(h)), d = origin(net, orb_prev(g));
   return c != d && positive(net, c, d, b) && positive(net, d, c, a) && orb_net_sound(net, c, d, b) &&
-         orb_net_sound(net, d, c, a) && !adjacent(net, c, d);
+         orb_net_sound(net, d, c, a) && !orb_net_adjacent(net, c, d);
 }
 
 /* h = a→b of (a,b,c), twin in (b,a,d). The slots are refilled so that half-edge h stays the turned edge:
@@ -216,7 +216,7 @@ void orb_net_flip(orb_net *net, int32_t h) {
 int orb_net_can_collapse(const orb_net *net, int32_t h) {
   int32_t v = origin(net, orb_next(h)), first = h, e = h, shared = 0;
   do {
-    shared += adjacent(net, v, origin(net, orb_next(e)));
+    shared += orb_net_adjacent(net, v, origin(net, orb_next(e)));
     e = net->twin[orb_prev(e)];
   } while (e != first);
   return shared == 2 && net->triangle_count > 4;
@@ -241,6 +241,37 @@ void orb_net_collapse(orb_net *net, int32_t h) {
     net->triangles[h - h % 3 + k] = net->triangles[g - g % 3 + k] = -1;
   }
   net->out[u] = -1;
+}
+
+int32_t orb_net_fill(orb_net *net, int32_t h, int n, int (*triangles)[3]) {
+  int32_t slot[ORB_FILL_MOST], outer[ORB_FILL_MOST], ring[ORB_FILL_MOST], inner[ORB_FILL_MOST][ORB_FILL_MOST];
+  int32_t u = origin(net, h);
+  for (int i = 0; i < n; i++) {
+    slot[i] = h / 3;
+    outer[i] = net->twin[orb_next(h)];
+    ring[i] = origin(net, orb_next(h));
+    h = net->twin[orb_prev(h)];
+  }
+  for (int t = 0; t < n - 2; t++) {
+    const int *c = triangles[t];
+    set_triangle(net, slot[t], ring[c[0]], ring[c[1]], ring[c[2]]);
+    for (int k = 0; k < 3; k++) {
+      inner[c[k]][c[(k + 1) % 3]] = 3 * slot[t] + k;
+    }
+  }
+  for (int t = 0; t < n - 2; t++) {
+    for (int k = 0; k < 3; k++) {
+      int a = triangles[t][k], b = triangles[t][(k + 1) % 3];
+      join(net, inner[a][b], b == (a + 1) % n ? outer[a] : inner[b][a]);
+    }
+  }
+  for (int t = n - 2; t < n; t++) {
+    for (int k = 0; k < 3; k++) {
+      net->triangles[3 * slot[t] + k] = -1;
+    }
+  }
+  net->out[u] = -1;
+  return slot[0];
 }
 
 int orb_net_move(orb_net *net, int32_t v, const double p[3]) {

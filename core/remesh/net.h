@@ -52,6 +52,13 @@ int orb_net_can_collapse(const orb_net *net, int32_t h);
 /* Moves u onto v, h = u→v, and drops the two triangles between: topology only, positive or not is for the caller. */
 void orb_net_collapse(orb_net *net, int32_t h);
 
+int orb_net_adjacent(const orb_net *net, int32_t a, int32_t b);
+
+enum { ORB_FILL_MOST = 12 };
+/* Takes away the origin of h, which has n ≤ ORB_FILL_MOST neighbours, and fills the hole with n − 2 triangles over its
+ * ring: corner i is the i-th neighbour counter-clockwise from the end of h. One of the new triangles. */
+int32_t orb_net_fill(orb_net *net, int32_t h, int n, int (*triangles)[3]);
+
 /* Moves a vertex if every triangle around it stays positive; returns whether it did. */
 int orb_net_move(orb_net *net, int32_t v, const double p[3]);
 

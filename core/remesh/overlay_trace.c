@@ -36,8 +36,8 @@ static void trace_range(void *arg, int64_t begin, int64_t end, int thread) {
     int32_t h = own->half[e], v = own->view.triangles[h], w = own->view.triangles[orb_next(h)], n = 0;
     orb_tracer tracer;
     orb_crossing crossing;
-    orb_trace_start(&tracer, &other->view, own->spot[v], own->view.points + 3 * (int64_t)v,
-                    own->view.points + 3 * (int64_t)w);
+    orb_trace_between(&tracer, &other->view, own->spot[v], own->view.points + 3 * (int64_t)v, own->spot[w],
+                      own->view.points + 3 * (int64_t)w);
     while (orb_trace_next(&tracer, &crossing)) {
       if (loop->fill) {
         own->event[own->begin[e] + n] = crossing;

@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "numeric/predicates.h"
+#include "numeric/vec3.h"
 #include "orbmorph/mesh.h"
 
 enum { ENDED = 0, ENTERED, AT_VERTEX, IN_FACE, ON_EDGE };
@@ -26,8 +27,15 @@ static const double *corner(const orb_tracer *t, int32_t h) {
   return t->mesh->points + 3 * (int64_t)t->mesh->triangles[h];
 }
 
+/* The sign of orient(p, q, origin of h): the filter of orb_orient() with the part of p and q done once. */
 static int side(const orb_tracer *t, int32_t h) {
-  return orb_orient(t->p, t->q, corner(t, h));
+  const double *c = corner(t, h);
+  double x = c[0] - t->p[0], y = c[1] - t->p[1], z = c[2] - t->p[2];
+  double d = t->normal[0] * x + t->normal[1] * y + t->normal[2] * z;
+  if (fabs(d) > 1e-15 * t->size * (fabs(x) + fabs(y) + fabs(z)) + 1e-220) {
+    return d > 0 ? 1 : -1;
+  }
+  return orb_orient(t->p, t->q, c);
 }
 
 /* The sign of q against the edge h: negative, q lies beyond it. */
@@ -37,8 +45,32 @@ static int within(const orb_tracer *t, int32_t h) {
 
 void orb_trace_start(orb_tracer *tracer, const orb_sphere_view *mesh, orb_spot from, const double p[3],
                      const double q[3]) {
-  *tracer = (orb_tracer){.mesh = mesh, .p = p, .q = q, .h = from.h};
+  double u[3];
+  *tracer = (orb_tracer){.mesh = mesh, .p = p, .q = q, .target = {-1, -1}, .vertex = -1, .h = from.h};
+  orb_sub(q, p, u);
+  orb_cross(p, u, tracer->normal);
+  tracer->size = (fabs(p[0]) + fabs(p[1]) + fabs(p[2])) * (fabs(u[0]) + fabs(u[1]) + fabs(u[2]));
   tracer->state = from.kind == ORB_SPOT_VERTEX ? AT_VERTEX : from.kind == ORB_SPOT_EDGE ? ON_EDGE : IN_FACE;
+}
+
+void orb_trace_between(orb_tracer *tracer, const orb_sphere_view *mesh, orb_spot from, const double p[3], orb_spot to,
+                       const double q[3]) {
+  orb_trace_start(tracer, mesh, from, p, q);
+  tracer->end = to;
+  if (to.kind == ORB_SPOT_VERTEX) {
+    tracer->vertex = mesh->triangles[to.h];
+  } else {
+    tracer->target[0] = to.h / 3;
+    tracer->target[1] = to.kind == ORB_SPOT_EDGE ? mesh->twin[to.h] / 3 : to.h / 3;
+  }
+}
+
+/* Whether the arc, which has just entered the triangle of h, ends in it: known because q is known to lie there. */
+static int is_reached(const orb_tracer *t) {
+  int32_t triangle = t->h / 3;
+  const int32_t *c = t->mesh->triangles + 3 * (int64_t)triangle;
+  return triangle == t->target[0] || triangle == t->target[1] ||
+         (t->vertex >= 0 && (c[0] == t->vertex || c[1] == t->vertex || c[2] == t->vertex));
 }
 
 static int end_at(orb_tracer *t, int32_t h, orb_spot_kind kind) {
@@ -49,7 +81,8 @@ static int end_at(orb_tracer *t, int32_t h, orb_spot_kind kind) {
 
 /* Over edge h, unless q lies on this side of it. */
 static int leave_over(orb_tracer *t, int32_t h, orb_crossing *out) {
-  int sign = within(t, h);
+  int known = t->state == ENTERED && (t->vertex >= 0 || t->target[0] >= 0);
+  int sign = known ? -1 : within(t, h);
   if (sign >= 0) {
     return end_at(t, h, sign == 0 ? ORB_SPOT_EDGE : ORB_SPOT_FACE);
   }
@@ -84,6 +117,10 @@ static int run_along(orb_tracer *t, int32_t edge, int32_t to, int32_t gate, orb_
 }
 
 static int from_entered(orb_tracer *t, orb_crossing *out) {
+  if (is_reached(t)) {
+    t->state = ENDED;
+    return 0;
+  }
   int32_t apex = orb_prev(t->h);
   int s = side(t, apex);
   if (s > 0) {

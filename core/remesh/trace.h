@@ -25,6 +25,8 @@ typedef struct orb_crossing {
 typedef struct orb_tracer {
   const orb_sphere_view *mesh;
   const double *p, *q;
+  double normal[3], size;    /* p × (q − p), and the product of their 1-norms: for the filter of side tests */
+  int32_t target[2], vertex; /* where it is known on what q lies: the triangles (or the vertex) to end at; −1 */
   int state; /* 0 ended, 1 in a face entered by h, 2 at the origin of h, 3 in the face of h from the start, 4 on h */
   int32_t h;
   orb_spot end; /* once ended: the feature that q lies on */
@@ -33,6 +35,10 @@ typedef struct orb_tracer {
 /* Starts from p, which lies at `from` in the mesh, towards q: less than half a turn, not the same direction. */
 void orb_trace_start(orb_tracer *tracer, const orb_sphere_view *mesh, orb_spot from, const double p[3],
                      const double q[3]);
+
+/* The same where it is known that q lies at `to`: steps cost half as much. */
+void orb_trace_between(orb_tracer *tracer, const orb_sphere_view *mesh, orb_spot from, const double p[3], orb_spot to,
+                       const double q[3]);
 
 /* The next thing met; 0 once q is reached. */
 int orb_trace_next(orb_tracer *tracer, orb_crossing *out);

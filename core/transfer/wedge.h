@@ -7,6 +7,7 @@
 #ifndef ORB_TRANSFER_WEDGE_H
 #define ORB_TRANSFER_WEDGE_H
 
+#include "mesh/normals.h"
 #include "orbmorph/transfer.h"
 
 typedef struct orb_wedges {
@@ -19,10 +20,6 @@ typedef struct orb_wedges {
 static inline int32_t orb_wedge_of(const orb_wedges *wedges, const int32_t *triangles, int64_t corner) {
   return wedges->of_corner ? wedges->of_corner[corner] : triangles[corner];
 }
-
-/* Unit normals (angle-weighted, Thürmer & Wüthrich 1998) of a closed surface; zero where there is none. */
-ORB_MUST_CHECK orb_status orb_smooth_normals(orb_context *ctx, const double *positions, int32_t vertex_count,
-                                             const int32_t *triangles, int32_t triangle_count, double *out);
 
 /* The attributes of shape s. Normals are unit; the file's where it has them, else smooth. Colours only where the mesh
  * has them, texture coordinates only of shapes that have them (width 0, values NULL else). */

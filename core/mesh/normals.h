@@ -1,0 +1,11 @@
+/* Smooth normals of a surface. */
+#ifndef ORB_MESH_NORMALS_H
+#define ORB_MESH_NORMALS_H
+
+#include "orbmorph/mesh.h"
+
+/* Unit normals (angle-weighted, Thürmer & Wüthrich 1998) of a closed surface; zero where there is none. */
+ORB_MUST_CHECK orb_status orb_smooth_normals(orb_context *ctx, const double *positions, int32_t vertex_count,
+                                             const int32_t *triangles, int32_t triangle_count, double *out);
+
+#endif
