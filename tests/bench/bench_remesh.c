@@ -259,7 +259,7 @@ int bench_remesh(const bench_options *options) {
     return BENCH_REFUSED;
   }
   run->options = options;
-  orb_context *ctx = bench_open(options->threads);
+  orb_context *ctx = bench_open(options->threads, options->cpu);
   int fine = options->bodies ? make_bodies(ctx, run) : (options->keep && keep_io(ctx, run, 0)) || align_files(ctx, run);
   for (int repeat = 0; fine && repeat < options->repeat; repeat++) {
     bench_reset_peak();
