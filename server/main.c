@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "control.h"
 #include "evict.h"
 #include "http/http.h"
 #include "log.h"
@@ -46,11 +47,14 @@ static int lock_data(const char *data) {
     }
     usleep(100000);
   }
-  log_error("the data folder %s is in use by another process, or cannot be locked", data);
   if (fd >= 0) {
     close(fd);
   }
   return -1;
+}
+
+static void say_locked(const char *data) {
+  log_error("the data folder %s is in use by another process, or cannot be locked", data);
 }
 
 static void announce(const server *srv) {
@@ -137,11 +141,35 @@ static void on_change(const char *name, int taken) {
   }
 }
 
+static int reload_callers(server *srv) {
+  int fine = callers_reload(srv->callers);
+  if (fine) {
+    queue_wake_once(srv->q); /* what is open with a token that is gone ends */
+  } else {
+    log_error("the tokens could not be read again and stay as they were");
+  }
+  return fine;
+}
+
+/* A command from outside, through the control socket. */
+static int on_command(void *user, const char *line, orb_text *reply) {
+  server *srv = user;
+  int status = token_command_apply(srv->cat, line, reply);
+  if (status == 0 && strncmp(line, "token list ", 11) != 0) {
+    char name[64] = "", verb[8] = "";
+    status = !reload_callers(srv);
+    sscanf(line, "token %7s %63s", verb, name);
+    log_info("token %s: %s", verb, name);
+  }
+  return status;
+}
+
 static void reload(server *srv, const command_line *line) {
   systemd_reloading();
   if (config_reload(line->options, line->argc, line->argv, on_change)) {
     set_log(line->options);
     queue_set_limit(srv->q, (int)line->options->queue_limit);
+    reload_callers(srv);
     log_info("SIGHUP: the configuration was read again");
   } else {
     log_error("SIGHUP: the configuration is not valid and stays as it was");
@@ -169,12 +197,12 @@ static void feed_watchdog(server *srv, probe *p) {
 /* Waits for a signal to stop; a second one, or the end of the time for draining, stops at once. */
 static void wait_for_stop(server *srv, const command_line *line, int signals) {
   static probe probed = {.task = {.run = probe_run}, .idle = 1}; /* outlives this function in the pool's list */
-  struct pollfd wait = {.fd = signals, .events = POLLIN};
+  struct pollfd wait[2] = {{.fd = signals, .events = POLLIN}, {.fd = srv->control, .events = POLLIN}};
   int64_t seen = -1, every = systemd_watchdog_ms(), fed = 0, kept = 0;
   int tick = every > 0 && every < TICK_MS ? (int)every : TICK_MS;
   for (int over = 0;;) {
     unsigned char number;
-    int ready = poll(&wait, 1, tick);
+    int ready = poll(wait, 2, tick);
     int64_t now = orb_clock_ms();
     if (every > 0 && now - fed >= every) {
       fed = now;
@@ -184,7 +212,10 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
       kept = now;
       keep_budget(srv, &seen, &over);
     }
-    if (ready <= 0 || read(signals, &number, 1) != 1) {
+    if (ready > 0 && wait[1].revents) {
+      control_serve(srv->control, on_command, srv);
+    }
+    if (ready <= 0 || !wait[0].revents || read(signals, &number, 1) != 1) {
       continue;
     }
     if (number == SIGHUP) {
@@ -199,7 +230,7 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
   queue_stop(srv->q, 0);
   int64_t until = orb_clock_ms() + 1000 * srv->options->drain_seconds;
   while (queue_running(srv->q) > 0 && orb_clock_ms() < until) {
-    if (poll(&wait, 1, 50) > 0) {
+    if (poll(wait, 1, 50) > 0) {
       break;
     }
   }
@@ -225,19 +256,21 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
   int listens = listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
   if (!listens || objects_open(o->data, &srv->store) != STORE_OK || catalogue_open(o->data, &srv->cat) != STORE_OK ||
-      !(srv->tokens = catalogue_tokens(srv->cat, &srv->token_count)) || !(srv->q = queue_create(&queued, srv->cat)) ||
+      !(srv->callers = callers_open(srv->cat)) || !(srv->q = queue_create(&queued, srv->cat)) ||
       queue_recover(srv->q) != STORE_OK || !(srv->descriptions = cache_create(CACHE_BYTES)) ||
       !(srv->io = tasks_start((int)o->io_threads)) || !(srv->checks = tasks_start((int)o->workers)) ||
       !(workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) || !http_start(srv)) {
     log_error("the service could not be started");
   } else {
     __atomic_store_n(&srv->ready, 1, __ATOMIC_RELEASE);
-    if (srv->needs_token && srv->token_count == 0) {
+    if (srv->needs_token && callers_count(srv->callers) == 0) {
       log_warn("tokens are needed and there are none: make one with orbmorphd token add");
     }
+    srv->control = control_listen(o->data);
     announce(srv);
     pthread_sigmask(SIG_UNBLOCK, set, NULL); /* in this thread, which alone waits for them */
     wait_for_stop(srv, line, signals);
+    control_close(o->data, srv->control);
     result = 0;
   }
   __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
@@ -257,7 +290,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
   catalogue_close(srv->cat);
   objects_close(srv->store);
   cache_destroy(srv->descriptions);
-  free(srv->tokens);
+  callers_close(srv->callers);
   return result;
 }
 
@@ -272,6 +305,9 @@ static int run(const command_line *line) {
   pthread_mutex_init(&srv.mesh_lock, NULL);
   raise_descriptor_limit();
   int lock = signals < 0 ? -1 : lock_data(options->data);
+  if (signals >= 0 && lock < 0) {
+    say_locked(options->data);
+  }
   int result = lock < 0 ? 1 : serve(&srv, line, signals, &set);
   if (lock >= 0) {
     close(lock);
@@ -308,9 +344,17 @@ int main(int argc, char **argv) {
     default:
       break;
   }
-  int lock = lock_data(options.data);
-  if (lock < 0) {
-    return 1;
+  int asked = is_token ? token_command_ask(&tokens, &options) : -1;
+  int lock = asked < 0 ? lock_data(options.data) : -1;
+  if (lock < 0 && asked < 0) { /* perhaps a daemon that was just starting */
+    asked = is_token ? token_command_ask(&tokens, &options) : -1;
+    if (asked < 0) {
+      say_locked(options.data);
+      return 1;
+    }
+  }
+  if (asked >= 0) {
+    return asked;
   }
   int result = is_token                      ? token_command_run(&tokens, &options)
                : action == CONFIG_CHECK_DATA ? maintain_check(&options)

@@ -6,13 +6,14 @@
 #include <time.h>
 
 #include "api/routes.h"
+#include "control.h"
 #include "store/tokens.h"
 
 static const struct {
   const char *name;
   int scope;
 } scopes[] = {{"read", SCOPE_READ}, {"write", SCOPE_WRITE}, {"admin", SCOPE_ADMIN}};
-enum { SCOPES = sizeof scopes / sizeof scopes[0] };
+enum { TOKEN_LINE = 320, SCOPES = sizeof scopes / sizeof scopes[0] };
 
 static int read_scopes(const char *text, int *out) {
   *out = 0;
@@ -33,7 +34,8 @@ static int read_scopes(const char *text, int *out) {
 static int wrong(const char *why) {
   fprintf(stderr,
           "orbmorphd token: %s\n"
-          "  orbmorphd token add NAME --scope read,write,admin [--quota BYTES]\n"
+          "  orbmorphd token add NAME --scope read,write,admin [--quota BYTES] [--quota-jobs N] [--priority 0..9]\n"
+          "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-jobs …] [--priority …]\n"
           "  orbmorphd token list | token remove NAME\n",
           why);
   return 0;
@@ -45,15 +47,39 @@ static int good_name(const char *name) {
   return name && *name && *name != '-' && strlen(name) < 64 && name[strspn(name, letters)] == 0;
 }
 
-int token_command_read(token_command *out, int *argc, char **argv) {
-  const char *verb = *argc > 2 ? argv[2] : "";
-  int from = 3, kept = 1;
-  memset(out, 0, sizeof *out);
-  out->verb = strcmp(verb, "add") == 0 ? TOKEN_ADD : strcmp(verb, "remove") == 0 ? TOKEN_REMOVE : TOKEN_LIST;
-  if (out->verb == TOKEN_LIST && strcmp(verb, "list") != 0) {
-    return wrong("say add, list or remove");
+/* Takes one of the command's own flags with its value at argv[i]: 1; 0: it is none of them; −1: a bad value. */
+static int read_flag(token_command *out, const char *flag, const char *value) {
+  int64_t number;
+  if (strcmp(flag, "--scope") == 0) {
+    return value && read_scopes(value, &out->scopes) ? 1 : -1;
   }
-  if (out->verb != TOKEN_LIST) {
+  int64_t *to = strcmp(flag, "--quota") == 0        ? &out->quota
+                : strcmp(flag, "--quota-jobs") == 0 ? &out->jobs
+                : strcmp(flag, "--priority") == 0   ? &out->priority
+                                                    : NULL;
+  if (!to) {
+    return 0;
+  }
+  if (!value || !config_number(value, &number) || (to == &out->priority && number > 9)) {
+    return -1;
+  }
+  *to = number;
+  return 1;
+}
+
+int token_command_read(token_command *out, int *argc, char **argv) {
+  static const char *const verbs[] = {"add", "set", "remove", "list"};
+  const char *verb = *argc > 2 ? argv[2] : "";
+  int from = 3, kept = 1, which = 0;
+  while (which < 4 && strcmp(verb, verbs[which]) != 0) {
+    which++;
+  }
+  if (which == 4) {
+    return wrong("say add, set, list or remove");
+  }
+  *out = (token_command){.verb = verbs[which], .name = "-", .scopes = -1, .quota = -1, .jobs = -1, .priority = -1};
+  int adds = which == 0, sets = which == 1;
+  if (which < 3) {
     out->name = *argc > 3 ? argv[3] : NULL;
     from = 4;
     if (!good_name(out->name)) {
@@ -61,39 +87,24 @@ int token_command_read(token_command *out, int *argc, char **argv) {
     }
   }
   for (int i = from; i < *argc; i++) {
-    int scope = strcmp(argv[i], "--scope") == 0, quota = strcmp(argv[i], "--quota") == 0;
-    if (out->verb != TOKEN_ADD || (!scope && !quota)) {
+    int taken = adds || sets ? read_flag(out, argv[i], i + 1 < *argc ? argv[i + 1] : NULL) : 0;
+    if (taken < 0) {
+      return wrong("--scope takes read, write and admin, comma-separated; the others take a number");
+    }
+    if (taken) {
+      i++;
+    } else {
       argv[kept++] = argv[i];
-    } else if (++i == *argc || (scope && !read_scopes(argv[i], &out->scopes)) ||
-               (quota && !config_number(argv[i], &out->quota))) {
-      return wrong(scope ? "--scope takes read, write and admin, comma-separated" : "--quota takes a number of bytes");
     }
   }
-  if (out->verb == TOKEN_ADD && !out->scopes) {
+  if (adds && out->scopes < 0) {
     return wrong("--scope is needed");
   }
   *argc = kept;
   return 1;
 }
 
-static int add(const token_command *command, catalogue *cat) {
-  unsigned char token[TOKEN_BYTES];
-  char text[TOKEN_TEXT];
-  token_row row = {.scopes = command->scopes, .quota = command->quota, .created = (int64_t)time(NULL) * 1000};
-  snprintf(row.name, sizeof row.name, "%s", command->name);
-  randombytes_buf(token, sizeof token);
-  crypto_hash_sha256(row.hash, token, sizeof token);
-  sodium_bin2hex(text, sizeof text, token, sizeof token);
-  store_result result = catalogue_token_add(cat, &row);
-  if (result == STORE_OK) {
-    puts(text); /* shown this once */
-  } else if (result == STORE_CONFLICT) {
-    fprintf(stderr, "orbmorphd: there is a token \"%s\" already; remove it first\n", row.name);
-  }
-  return result == STORE_OK ? 0 : 1;
-}
-
-static int list(catalogue *cat) {
+static int list(catalogue *cat, orb_text *reply) {
   int count;
   token_row *rows = catalogue_tokens(cat, &count);
   for (int i = 0; i < count; i++) {
@@ -104,28 +115,96 @@ static int list(catalogue *cat) {
         snprintf(names + n, sizeof names - n, "%s%s", n ? "," : "", scopes[k].name);
       }
     }
-    printf("%s %s uploaded=%lld quota=%lld\n", rows[i].name, names, (long long)rows[i].used, (long long)rows[i].quota);
+    orb_text_printf(reply, "%s %s uploaded=%lld quota=%lld quota-jobs=%lld priority=%d\n", rows[i].name, names,
+                    (long long)rows[i].used, (long long)rows[i].quota, (long long)rows[i].jobs, rows[i].priority);
   }
   free(rows);
   return count < 0;
 }
 
+int token_command_apply(catalogue *cat, const char *line, orb_text *reply) {
+  char verb[8], hash[TOKEN_TEXT];
+  long long quota, jobs;
+  token_row row = {.created = (int64_t)time(NULL) * 1000};
+  if (sscanf(line, "token %7s %63s %d %lld %lld %d %64s", verb, row.name, &row.scopes, &quota, &jobs, &row.priority,
+             hash) != 7) {
+    orb_text_add(reply, "the command is not understood\n");
+    return 2;
+  }
+  row.quota = quota;
+  row.jobs = jobs;
+  if (strcmp(verb, "list") == 0) {
+    return list(cat, reply);
+  }
+  store_result result = STORE_ERROR;
+  if (strcmp(verb, "add") == 0) {
+    row.quota = quota > 0 ? quota : 0;
+    row.jobs = jobs > 0 ? jobs : 0;
+    row.priority = row.priority > 0 ? row.priority : 0;
+    if (sodium_hex2bin(row.hash, sizeof row.hash, hash, strlen(hash), NULL, NULL, NULL) == 0) {
+      result = catalogue_token_add(cat, &row);
+    }
+  } else if (strcmp(verb, "set") == 0) {
+    result = catalogue_token_set(cat, &row);
+  } else if (strcmp(verb, "remove") == 0) {
+    result = catalogue_token_remove(cat, row.name);
+  }
+  if (result == STORE_CONFLICT) {
+    orb_text_printf(reply, "there is a token \"%s\" already; set or remove it\n", row.name);
+  } else if (result == STORE_NOT_FOUND) {
+    orb_text_printf(reply, "there is no token \"%s\"\n", row.name);
+  } else if (result != STORE_OK) {
+    orb_text_add(reply, "the catalogue could not be written\n");
+  }
+  return result != STORE_OK;
+}
+
+/* Of a new token only the hash leaves this process. */
+static void write_line(const token_command *command, char line[TOKEN_LINE], char text[TOKEN_TEXT]) {
+  unsigned char token[TOKEN_BYTES], hashed[TOKEN_BYTES];
+  char hash[TOKEN_TEXT];
+  randombytes_buf(token, sizeof token);
+  crypto_hash_sha256(hashed, token, sizeof token);
+  sodium_bin2hex(text, TOKEN_TEXT, token, sizeof token);
+  sodium_bin2hex(hash, sizeof hash, hashed, sizeof hashed);
+  sodium_memzero(token, sizeof token);
+  snprintf(line, TOKEN_LINE, "token %s %s %d %lld %lld %d %s", command->verb, command->name, command->scopes,
+           (long long)command->quota, (long long)command->jobs, (int)command->priority, hash);
+}
+
+static int show(const token_command *command, int status, const orb_text *reply, const char *text) {
+  if (status != 0) {
+    fprintf(stderr, "orbmorphd: %s", reply->data ? reply->data : "that did not work; the log says why\n");
+  } else if (strcmp(command->verb, "add") == 0) {
+    puts(text); /* shown this once */
+  } else {
+    fputs(reply->data ? reply->data : "", stdout);
+  }
+  return status;
+}
+
+int token_command_ask(const token_command *command, const config *options) {
+  char line[TOKEN_LINE], text[TOKEN_TEXT];
+  orb_text reply = {0};
+  write_line(command, line, text);
+  int status = control_ask(options->data, line, &reply);
+  if (status >= 0) {
+    show(command, status, &reply, text);
+  }
+  orb_text_free(&reply);
+  return status;
+}
+
 int token_command_run(const token_command *command, const config *options) {
+  char line[TOKEN_LINE], text[TOKEN_TEXT];
   catalogue *cat = NULL;
+  orb_text reply = {0};
   if (catalogue_open(options->data, &cat) != STORE_OK) {
     return 1;
   }
-  int result = 1;
-  if (command->verb == TOKEN_ADD) {
-    result = add(command, cat);
-  } else if (command->verb == TOKEN_LIST) {
-    result = list(cat);
-  } else {
-    result = catalogue_token_remove(cat, command->name) != STORE_OK;
-    if (result) {
-      fprintf(stderr, "orbmorphd: there is no token \"%s\"\n", command->name);
-    }
-  }
+  write_line(command, line, text);
+  int status = show(command, token_command_apply(cat, line, &reply), &reply, text);
+  orb_text_free(&reply);
   catalogue_close(cat);
-  return result;
+  return status;
 }

@@ -1,4 +1,4 @@
-/* Who may call. Tokens are read at the start; the command that changes them needs the data folder for itself. */
+/* Who may call, and how often. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,18 +6,14 @@
 
 #include "http/http.h"
 
-static const token_row *find_token(const server *srv, const char *header) {
+int is_page(const char *path);
+
+static caller *find_caller(const server *srv, const char *header) {
   unsigned char hash[TOKEN_BYTES];
-  const token_row *found = NULL;
   if (!header || strncasecmp(header, "Bearer ", 7) != 0 || !token_hash(header + 7 + strspn(header + 7, " "), hash)) {
     return NULL;
   }
-  for (int i = 0; i < srv->token_count; i++) { /* all of them, so that time tells nothing */
-    if (sodium_memcmp(hash, srv->tokens[i].hash, sizeof hash) == 0) {
-      found = &srv->tokens[i];
-    }
-  }
-  return found;
+  return callers_find(srv->callers, hash);
 }
 
 /* Health is for everybody, always. */
@@ -46,24 +42,39 @@ int access_within_limits(request *r, const char *path) {
 
 void access_headers(request *r) {
   const allowance *a = &r->allowance;
-  char text[160];
-  if (!a->limited) {
-    return;
+  const token_row *token = r->caller ? &r->caller->row : NULL;
+  int64_t quota = token ? __atomic_load_n(&token->quota, __ATOMIC_RELAXED) : 0;
+  char policy[160] = "", left[160] = "";
+  if (a->limited) {
+    snprintf(policy, sizeof policy, "\"requests\";q=%lld;w=%lld", (long long)a->quota, (long long)a->window);
+    snprintf(left, sizeof left, "\"requests\";r=%lld;t=%lld", (long long)a->left, (long long)a->reset);
   }
-  snprintf(text, sizeof text, "\"requests\";q=%lld;w=%lld", (long long)a->quota, (long long)a->window);
-  reply_header(r, "RateLimit-Policy", text);
-  snprintf(text, sizeof text, "\"requests\";r=%lld;t=%lld", (long long)a->left, (long long)a->reset);
-  reply_header(r, "RateLimit", text);
+  if (quota > 0) {
+    int64_t used = __atomic_load_n(&token->used, __ATOMIC_RELAXED);
+    size_t n = strlen(policy), m = strlen(left);
+    snprintf(policy + n, sizeof policy - n, "%s\"upload\";q=%lld;qu=\"content-bytes\"", n ? ", " : "",
+             (long long)quota);
+    snprintf(left + m, sizeof left - m, "%s\"upload\";r=%lld", m ? ", " : "",
+             (long long)(used < quota ? quota - used : 0));
+  }
+  if (policy[0]) {
+    reply_header(r, "RateLimit-Policy", policy);
+    reply_header(r, "RateLimit", left);
+  }
+}
+
+/* The pages and the document hold nothing of anybody; the studio's page asks its user for a token. */
+static int is_public(const request *r, const char *path) {
+  return is_open(path) || (r->route ? r->route->scope == SCOPE_NONE : is_page(path));
 }
 
 int access_check(request *r, const char *path, orb_problem *problem) {
-  int open = is_open(path);
   /* Browsers ask for permission to call without the token; the answer tells nothing but methods. */
-  if (!r->srv->needs_token || open || strcmp(r->method, "OPTIONS") == 0) {
+  if (!r->srv->needs_token || is_public(r, path) || strcmp(r->method, "OPTIONS") == 0) {
     return 1;
   }
-  r->token = (token_row *)(uintptr_t)find_token(r->srv, header_of(r, "Authorization"));
-  if (!r->token) {
+  r->caller = find_caller(r->srv, header_of(r, "Authorization"));
+  if (!r->caller) {
     return orb_refuse(problem, "unauthorized",
                       "Send a token that is known here: Authorization: Bearer TOKEN. The operator makes one with "
                       "orbmorphd token add.");
@@ -73,39 +84,45 @@ int access_check(request *r, const char *path, orb_problem *problem) {
     const char *name;
   } names[] = {{SCOPE_READ, "read"}, {SCOPE_WRITE, "write"}, {SCOPE_ADMIN, "admin"}};
   int wanted = r->route ? (int)r->route->scope : SCOPE_NONE;
-  if (wanted == SCOPE_NONE || (r->token->scopes & (wanted | SCOPE_ADMIN))) {
+  if (wanted == SCOPE_NONE || (__atomic_load_n(&r->caller->row.scopes, __ATOMIC_RELAXED) & (wanted | SCOPE_ADMIN))) {
     return 1;
   }
   size_t i = 0;
   while (names[i].scope != wanted) {
     i++;
   }
-  orb_refuse(problem, "forbidden", "The token \"%s\" has not the scope \"%s\", which this needs.", r->token->name,
+  orb_refuse(problem, "forbidden", "The token \"%s\" has not the scope \"%s\", which this needs.", r->caller->row.name,
              names[i].name);
   orb_json_member_string(&problem->facts, "scope", names[i].name);
   return 0;
 }
 
 int access_take_quota(request *r, int64_t bytes, orb_problem *problem) {
-  token_row *token = r->token;
-  if (!token) {
+  if (!r->caller) {
     return 1;
   }
+  token_row *token = &r->caller->row;
   int64_t used = __atomic_add_fetch(&token->used, bytes, __ATOMIC_RELAXED);
-  if (token->quota == 0 || used <= token->quota) {
+  int64_t quota = __atomic_load_n(&token->quota, __ATOMIC_RELAXED);
+  if (quota == 0 || used <= quota) {
     return 1;
   }
   __atomic_sub_fetch(&token->used, bytes, __ATOMIC_RELAXED);
   orb_refuse(problem, "quota-exceeded", "The token \"%s\" may upload %lld bytes in all, and has used %lld.",
-             token->name, (long long)token->quota, (long long)(used - bytes));
-  orb_json_member_integer(&problem->facts, "quota", token->quota);
+             token->name, (long long)quota, (long long)(used - bytes));
+  orb_json_member_integer(&problem->facts, "quota", quota);
   return 0;
 }
 
 void access_quota_stored(request *r, int64_t bytes, int stored) {
-  if (r->token && stored) {
-    catalogue_token_use(r->srv->cat, r->token->name, bytes);
-  } else if (r->token) {
-    __atomic_sub_fetch(&r->token->used, bytes, __ATOMIC_RELAXED);
+  if (r->caller && stored) {
+    catalogue_token_use(r->srv->cat, r->caller->row.name, bytes);
+  } else if (r->caller) {
+    __atomic_sub_fetch(&r->caller->row.used, bytes, __ATOMIC_RELAXED);
   }
+}
+
+int access_priority(const request *r) {
+  int class = r->caller ? __atomic_load_n(&r->caller->row.priority, __ATOMIC_RELAXED) : 0;
+  return QUEUE_URGENCIES * class + QUEUE_URGENCIES - 1 - parse_urgency(header_of(r, "Priority"));
 }

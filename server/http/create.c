@@ -94,7 +94,9 @@ static void submit(request *r, const wanted *wish) {
   queue_request wanted_job = {.kind = wish->kind == RESOURCE_EMBEDDING ? ORB_JOB_EMBEDDING : ORB_JOB_SUPERMESH,
                               .key = wish->id,
                               .request = wish->canonical.data,
-                              .owner = r->token ? r->token->name : "",
+                              .owner = r->caller ? r->caller->row.name : "",
+                              .owner_limit = r->caller ? __atomic_load_n(&r->caller->row.jobs, __ATOMIC_RELAXED) : 0,
+                              .priority = access_priority(r),
                               .cost = wish->cost,
                               .listed = 1};
   job *j = NULL;
@@ -113,6 +115,14 @@ static void submit(request *r, const wanted *wish) {
     case QUEUE_FULL:
       reply_refuse(r, "queue-full", "There are too many unfinished jobs; try again when some have ended.");
       break;
+    case QUEUE_QUOTA: {
+      orb_problem problem = {0};
+      orb_refuse(&problem, "quota-exceeded", "The token \"%s\" may have %lld unfinished jobs; wait for one to end.",
+                 r->caller->row.name, (long long)wanted_job.owner_limit);
+      orb_json_member_integer(&problem.facts, "quota", wanted_job.owner_limit);
+      reply_problem(r, &problem);
+      break;
+    }
     case QUEUE_STOPPING:
       reply_refuse(r, "unavailable", "The service is stopping; try again soon.");
       break;

@@ -15,6 +15,7 @@ typedef struct stream {
   server *srv;
   struct MHD_Connection *connection;
   job *of;
+  caller *caller;
   orb_text pending;
   size_t sent;
   int64_t after, last_ms;
@@ -44,7 +45,8 @@ static ssize_t read_stream(void *user, uint64_t position, char *out, size_t room
   stream *s = user;
   (void)position;
   while (s->sent == s->pending.size) {
-    if (s->ended || s->pending.failed || __atomic_load_n(&s->srv->stopping, __ATOMIC_ACQUIRE)) {
+    if (s->ended || s->pending.failed || caller_revoked(s->caller) ||
+        __atomic_load_n(&s->srv->stopping, __ATOMIC_ACQUIRE)) {
       return MHD_CONTENT_READER_END_OF_STREAM;
     }
     if (fill(s)) {
@@ -70,6 +72,7 @@ static ssize_t read_stream(void *user, uint64_t position, char *out, size_t room
 static void free_stream(void *user) {
   stream *s = user;
   queue_release(s->srv->q, s->of);
+  caller_release(s->caller);
   orb_text_free(&s->pending);
   free(s);
 }
@@ -133,6 +136,8 @@ enum MHD_Result handle_job_events(request *r) {
   s->srv = r->srv;
   s->connection = r->connection;
   s->of = j;
+  s->caller = r->caller;
+  r->caller = NULL; /* the stream has it now */
   s->after = last_seen(r);
   s->last_ms = orb_clock_ms();
   orb_text_add(&s->pending, "retry: 2000\n\n");

@@ -16,12 +16,12 @@
 #include "api/routes.h"
 #include "cache.h"
 #include "config.h"
+#include "http/callers.h"
 #include "http/decode.h"
 #include "http/listen.h"
 #include "http/parse.h"
 #include "http/watch.h"
 #include "queue/queue.h"
-#include "store/tokens.h"
 #include "tasks.h"
 
 typedef struct server {
@@ -39,8 +39,8 @@ typedef struct server {
   int64_t decoding;    /* bytes that decoders of bodies hold; __atomic */
   int64_t started;
   int needs_token;
-  token_row *tokens; /* `used` under __atomic */
-  int token_count;
+  callers *callers;
+  int control; /* the descriptor of the control socket */
 } server;
 
 typedef enum request_phase { PHASE_BODY, PHASE_AWAY, PHASE_WAIT, PHASE_SEND } request_phase;
@@ -56,9 +56,9 @@ struct request {
   const route *route;
   const char *method;
   char id[ORB_ID_SIZE];
-  int shape;        /* {k} of the path; −1: none */
-  char number[24];  /* of the request, for the log and X-Request-Id */
-  token_row *token; /* of the caller; NULL where none is needed */
+  int shape;       /* {k} of the path; −1: none */
+  char number[24]; /* of the request, for the log and X-Request-Id */
+  caller *caller;  /* referenced; NULL where no token is needed */
   int has_body, head;
   int closes; /* the connection ends with this answer */
   request_phase phase;
@@ -76,6 +76,7 @@ struct request {
   waiter waiter;
   job *waits_for;
   int64_t wait_until;
+  int64_t preferred_ms; /* by a Prefer header */
   int wait_for_result; /* the answer is the result where there is one in time */
   int cancels;
 
@@ -105,6 +106,8 @@ int access_within_limits(request *r, const char *path);
 void access_headers(request *r);
 /* 1, or 0 with the problem. */
 int access_check(request *r, const char *path, orb_problem *problem);
+/* Its priority in the queue: the token's, then what the Priority header says (RFC 9218, u=0 to 7). */
+int access_priority(const request *r);
 /* Takes bytes of an upload from the token's quota; then says whether they were stored as something new. */
 int access_take_quota(request *r, int64_t bytes, orb_problem *problem);
 void access_quota_stored(request *r, int64_t bytes, int stored);

@@ -15,6 +15,7 @@ int64_t read_wait_ms(request *r) {
   if (wait < 0) {
     reply_refuse(r, "bad-query", "\"wait\" must be a number of seconds; more than 60 count as 60.");
   }
+  r->preferred_ms = wait > 0 && !query_of(r, "wait") ? wait : 0;
   return wait;
 }
 
@@ -80,7 +81,7 @@ static enum MHD_Result waited_enough(request *r) {
 enum MHD_Result handle_wait(request *r) {
   int64_t now = orb_clock_ms();
   if (now < r->wait_until) {
-    if (peer_is_gone(r)) {
+    if (peer_is_gone(r) || caller_revoked(r->caller)) {
       return MHD_NO;
     }
     r->waiter.wake = resume;

@@ -90,6 +90,16 @@ int64_t parse_wait_ms(const char *query, const char *prefer) {
   return seconds > 0 ? clamped_ms(seconds) : 0;
 }
 
+int parse_urgency(const char *text) {
+  for (const char *at = text; at && *at; at += strcspn(at, ","), at += *at == ',') {
+    at += strspn(at, " \t");
+    if (at[0] == 'u' && at[1] == '=' && at[2] >= '0' && at[2] <= '7' && (!at[3] || strchr(" \t,;", at[3]))) {
+      return at[2] - '0';
+    }
+  }
+  return 3;
+}
+
 int parse_page(const char *limit_text, const char *token, int *limit, int64_t *before, const char **why) {
   char *end;
   *limit = PAGE_STANDARD;

@@ -20,6 +20,9 @@ int parse_tag_matches(const char *list, const char *tag);
  * −1: the query's is no number. A preference that is not understood is passed over. */
 int64_t parse_wait_ms(const char *query, const char *prefer);
 
+/* The urgency that a Priority header asks for (RFC 9218): 0, the most urgent, to 7; 3 where it says nothing. */
+int parse_urgency(const char *text);
+
 /* limit and page_token of a list. 1, or 0 with *why, a sentence. */
 enum { PAGE_MOST = 1000, PAGE_STANDARD = 100 };
 int parse_page(const char *limit_text, const char *token, int *limit, int64_t *before, const char **why);

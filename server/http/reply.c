@@ -147,7 +147,7 @@ static void add_cors(request *r) {
     reply_header(r, "Access-Control-Allow-Methods", "GET, HEAD, POST, DELETE");
     reply_header(
         r, "Access-Control-Allow-Headers",
-        "Authorization, Content-Type, Content-Encoding, Prefer, If-None-Match, Range, Last-Event-ID, traceparent");
+        "Authorization, Content-Type, Content-Encoding, Prefer, Priority, If-None-Match, Range, Last-Event-ID, traceparent");
     reply_header(r, "Access-Control-Max-Age", "600");
   }
 }
@@ -160,6 +160,11 @@ enum MHD_Result reply_send(request *r) {
     reply_header(r, "Connection", "close");
   }
   access_headers(r);
+  if (r->preferred_ms > 0 && r->status < 300) {
+    char applied[32];
+    snprintf(applied, sizeof applied, "wait=%lld", (long long)((r->preferred_ms + 999) / 1000));
+    reply_header(r, "Preference-Applied", applied);
+  }
   reply_header(r, "X-Content-Type-Options", "nosniff");
   reply_header(r, "X-Request-Id", r->number);
   add_cors(r);

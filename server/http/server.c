@@ -219,6 +219,7 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
   if (r->response) {
     MHD_destroy_response(r->response);
   }
+  caller_release(r->caller);
   free(r);
   *state = NULL;
 }

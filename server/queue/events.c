@@ -40,6 +40,15 @@ void queue_wake_all(queue *q) {
   pthread_mutex_unlock(&q->lock);
 }
 
+void queue_wake_once(queue *q) {
+  pthread_mutex_lock(&q->lock);
+  for (waiter *w = q->waiters, *next; w; w = next) {
+    next = w->all_next;
+    wake(q, w);
+  }
+  pthread_mutex_unlock(&q->lock);
+}
+
 int queue_wait(queue *q, job *j, waiter *w, int64_t after, void (*suspend)(waiter *)) {
   pthread_mutex_lock(&q->lock);
   int ready = orb_job_ended(j->row.state) || q->waking || (w->events && j->last_event > after);

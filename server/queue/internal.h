@@ -8,7 +8,7 @@
 
 #include "queue/queue.h"
 
-enum { BUCKETS = 8192, KEEP_ENDED = 2048, EVENTS_KEPT = 64, OWNERS = 64, DEPENDENCIES = 16 };
+enum { BUCKETS = 8192, KEEP_ENDED = 2048, EVENTS_KEPT = 64, OWNERS = 1100, DEPENDENCIES = 16 };
 static const int64_t LARGE = 300000;          /* triangles from which a job is large */
 static const int64_t BYTES_A_TRIANGLE = 1024; /* estimate of a running job's memory */
 static const int64_t EVENT_STRIDE = 1000000;  /* event numbers of an attempt start at attempt times this */
@@ -39,6 +39,7 @@ struct job {
   int event_count;
   waiter *waiters;
   int refs;
+  int owner;               /* in queue.owners, while unfinished */
   job *next_id, *next_key; /* buckets */
   job *previous, *next;    /* of the unfinished, oldest first */
   job *newer_ended;        /* of the ended, oldest first */
@@ -58,7 +59,8 @@ struct queue {
   int stopping, waking;
   struct {
     char name[64];
-    double service; /* triangles worked for this owner, decayed */
+    double service; /* triangles worked for this owner */
+    int unfinished;
   } owners[OWNERS];
   int owner_count;
   waiter *waiters;
@@ -69,6 +71,9 @@ struct queue {
 };
 
 int64_t unix_ms(void);
+/* Counts the job with its owner. */
+void owner_enter(queue *q, job *j);
+void owner_leave(queue *q, const job *j);
 void table_add(queue *q, job *j);
 void table_drop_key(queue *q, job *j); /* when it ends */
 void table_ended(queue *q, job *j);

@@ -8,15 +8,20 @@
  * Waiters are suspended connections. They are listed and woken under the lock; `wake` must not call back into the
  * queue. Every waiter is woken by its deadline at the latest.
  *
- * Fairness. Among runnable jobs the highest priority goes first, then the owner who has had the least work so far,
- * then the oldest. Large jobs never take all workers: one stays for small ones. A suspect (it was running when the
- * process died) runs with nothing beside it.
+ * Fairness. Among runnable jobs the highest class goes first, then the owner who has had the least work so far (one
+ * who comes back after a pause starts level with those who are there), then that owner's most urgent, then the oldest.
+ * Large jobs never take all workers: one stays for small ones. A suspect (it was running when the process died) runs
+ * with nothing beside it.
  */
 #ifndef ORB_QUEUE_H
 #define ORB_QUEUE_H
 
 #include "orbmorph/context.h"
 #include "store/catalogue.h"
+
+/* A priority is QUEUE_URGENCIES · class + urgency: classes (of tokens) go before everything, urgencies order the jobs
+ * of one owner. */
+enum { QUEUE_URGENCIES = 8 };
 
 typedef struct queue queue;
 typedef struct job job;
@@ -45,6 +50,8 @@ void queue_stop(queue *q, int now);
 int queue_running(queue *q);
 /* Wakes every waiter, at once and from now on. */
 void queue_wake_all(queue *q);
+/* Wakes every waiter to look again. */
+void queue_wake_once(queue *q);
 
 /* Submitting. Blocks for the commit. owner and request are copied. */
 typedef struct queue_request {
@@ -52,8 +59,16 @@ typedef struct queue_request {
   const char *key, *request, *owner;
   int64_t cost;
   int priority, listed;
+  int64_t owner_limit; /* of the owner's unfinished jobs that are listed; 0: none */
 } queue_request;
-typedef enum queue_result { QUEUE_OK, QUEUE_FULL, QUEUE_STOPPING, QUEUE_STORE_FULL, QUEUE_ERROR } queue_result;
+typedef enum queue_result {
+  QUEUE_OK,
+  QUEUE_FULL,
+  QUEUE_QUOTA,
+  QUEUE_STOPPING,
+  QUEUE_STORE_FULL,
+  QUEUE_ERROR
+} queue_result;
 /* *out is referenced. *fresh (may be NULL): 0 where the job was there. */
 queue_result queue_submit(queue *q, const queue_request *request, job **out, int *fresh);
 

@@ -8,9 +8,12 @@
 
 static queue_result submit_locked(queue *q, const queue_request *request, job **out, int *fresh) {
   job *j;
+  int64_t mine = 0;
   for (j = q->first; j && (j->cancel || strcmp(j->row.key, request->key) != 0); j = j->next) {
+    mine += request->owner_limit > 0 && j->row.listed && strcmp(j->row.owner, request->owner) == 0;
   }
   if (j) {
+    j->row.priority = request->priority > j->row.priority ? request->priority : j->row.priority;
     j->refs++;
     while (!j->committed && !j->dead) {
       pthread_cond_wait(&q->committed, &q->lock);
@@ -23,6 +26,9 @@ static queue_result submit_locked(queue *q, const queue_request *request, job **
   }
   if (request->listed && q->unfinished >= q->options.limit) {
     return QUEUE_FULL;
+  }
+  if (request->owner_limit > 0 && mine >= request->owner_limit) {
+    return QUEUE_QUOTA;
   }
   j = calloc(1, sizeof *j);
   char *text = strdup(request->request);
@@ -87,21 +93,57 @@ queue_result queue_submit(queue *q, const queue_request *request, job **out, int
   return result;
 }
 
-static double *service_of(queue *q, const char *owner) {
-  int i = 0;
-  while (i < q->owner_count && strcmp(q->owners[i].name, owner) != 0) {
-    i++;
-  }
-  if (i == q->owner_count) {
-    i = i < OWNERS ? q->owner_count++ : OWNERS - 1;
-    copy_text(q->owners[i].name, sizeof q->owners[i].name, owner);
-    double least = 0; /* a newcomer starts level with the one who had least */
-    for (int k = 0; k < i; k++) {
-      least = k == 0 || q->owners[k].service < least ? q->owners[k].service : least;
+/* An entry for a name; one that has nothing unfinished makes room where all are taken. */
+static int owner_at(queue *q, const char *name) {
+  int at = 0, free_at = OWNERS - 1;
+  while (at < q->owner_count && strcmp(q->owners[at].name, name) != 0) {
+    if (q->owners[at].unfinished == 0) {
+      free_at = at;
     }
-    q->owners[i].service = least;
+    at++;
   }
-  return &q->owners[i].service;
+  if (at < q->owner_count) {
+    return at;
+  }
+  if (q->owner_count < OWNERS) {
+    q->owner_count++;
+  } else {
+    at = free_at;
+  }
+  copy_text(q->owners[at].name, sizeof q->owners[at].name, name);
+  q->owners[at].service = 0;
+  return at;
+}
+
+/* Who had nothing to do saves nothing up: it starts level with the least of those who have. */
+void owner_enter(queue *q, job *j) {
+  j->owner = owner_at(q, j->row.owner);
+  if (q->owners[j->owner].unfinished++ > 0) {
+    return;
+  }
+  double least = -1, *mine = &q->owners[j->owner].service;
+  for (int i = 0; i < q->owner_count; i++) {
+    if (i != j->owner && q->owners[i].unfinished > 0 && (least < 0 || q->owners[i].service < least)) {
+      least = q->owners[i].service;
+    }
+  }
+  *mine = *mine > least ? *mine : least;
+}
+
+void owner_leave(queue *q, const job *j) {
+  q->owners[j->owner].unfinished--;
+}
+
+/* Whether a goes before b, which is older. */
+static int goes_before(const queue *q, const job *a, const job *b) {
+  int class_a = a->row.priority / QUEUE_URGENCIES, class_b = b->row.priority / QUEUE_URGENCIES;
+  if (class_a != class_b) {
+    return class_a > class_b;
+  }
+  if (a->owner != b->owner) {
+    return q->owners[a->owner].service < q->owners[b->owner].service;
+  }
+  return a->row.priority > b->row.priority;
 }
 
 static int runnable(const job *j, int64_t now) {
@@ -113,7 +155,6 @@ static job *choose(queue *q, int small_only) {
   int64_t now = orb_clock_ms();
   int most_large = q->options.workers > 1 ? q->options.workers - 1 : 1;
   job *best = NULL;
-  double best_service = 0;
   if (q->exclusive || (small_only && q->running_large < most_large)) {
     return NULL;
   }
@@ -129,11 +170,8 @@ static job *choose(queue *q, int small_only) {
     if ((large && (small_only || q->running_large >= most_large)) || (q->running && memory > q->options.memory)) {
       continue;
     }
-    double service = *service_of(q, j->row.owner);
-    if (!best || j->row.priority > best->row.priority ||
-        (j->row.priority == best->row.priority && service < best_service)) {
+    if (!best || goes_before(q, j, best)) {
       best = j;
-      best_service = service;
     }
   }
   return best;
@@ -160,7 +198,7 @@ int queue_take(queue *q, int small_only, job **out, int *threads) {
     q->running_large += j->row.cost > LARGE;
     q->running_cost += j->row.cost;
     q->exclusive = j->row.suspect;
-    *service_of(q, j->row.owner) += (double)j->row.cost + 1000;
+    q->owners[j->owner].service += (double)j->row.cost + 1000;
     *out = j;
   } else {
     j = NULL;

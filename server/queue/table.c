@@ -31,6 +31,7 @@ void table_add(queue *q, job *j) {
   *(q->last ? &q->last->next : &q->first) = j;
   q->last = j;
   q->unfinished++;
+  owner_enter(q, j);
 }
 
 void table_drop_key(queue *q, job *j) {
@@ -43,6 +44,7 @@ void table_drop_key(queue *q, job *j) {
   *(j->previous ? &j->previous->next : &q->first) = j->next;
   *(j->next ? &j->next->previous : &q->last) = j->previous;
   q->unfinished--;
+  owner_leave(q, j);
 }
 
 static void drop_id(queue *q, job *j) {

@@ -23,6 +23,7 @@ static const char *const migrations[] = {
     "CREATE TABLE token(hash TEXT PRIMARY KEY, name TEXT NOT NULL UNIQUE, scopes INTEGER NOT NULL,"
     " quota_bytes INTEGER NOT NULL, quota_jobs INTEGER NOT NULL, created INTEGER NOT NULL);",
     "ALTER TABLE token ADD COLUMN used_bytes INTEGER NOT NULL DEFAULT 0;",
+    "ALTER TABLE token ADD COLUMN priority INTEGER NOT NULL DEFAULT 0;",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

@@ -20,9 +20,10 @@ int token_hash(const char *text, unsigned char hash[TOKEN_BYTES]) {
 static int add_row(database *db, void *arg) {
   const token_row *row = arg;
   char hash[TOKEN_TEXT];
-  sqlite3_stmt *st = database_statement(db,
-                                        "INSERT INTO token(hash, name, scopes, quota_bytes, quota_jobs, created)"
-                                        " VALUES(?1, ?2, ?3, ?4, 0, ?5) ON CONFLICT DO NOTHING");
+  sqlite3_stmt *st =
+      database_statement(db,
+                         "INSERT INTO token(hash, name, scopes, quota_bytes, quota_jobs, created, priority)"
+                         " VALUES(?1, ?2, ?3, ?4, ?6, ?5, ?7) ON CONFLICT DO NOTHING");
   if (!st) {
     return SQLITE_ERROR;
   }
@@ -32,12 +33,36 @@ static int add_row(database *db, void *arg) {
   sqlite3_bind_int(st, 3, row->scopes);
   sqlite3_bind_int64(st, 4, row->quota);
   sqlite3_bind_int64(st, 5, row->created);
+  sqlite3_bind_int64(st, 6, row->jobs);
+  sqlite3_bind_int(st, 7, row->priority);
   int code = database_run(db, st);
   return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_CONSTRAINT : code;
 }
 
 store_result catalogue_token_add(catalogue *cat, const token_row *row) {
   return catalogue_write(cat, add_row, (void *)(uintptr_t)row);
+}
+
+static int set_row(database *db, void *arg) {
+  const token_row *row = arg;
+  sqlite3_stmt *st = database_statement(db,
+                                        "UPDATE token SET scopes=iif(?2<0, scopes, ?2),"
+                                        " quota_bytes=iif(?3<0, quota_bytes, ?3), quota_jobs=iif(?4<0, quota_jobs, ?4),"
+                                        " priority=iif(?5<0, priority, ?5) WHERE name=?1");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, row->name, -1, SQLITE_STATIC);
+  sqlite3_bind_int(st, 2, row->scopes);
+  sqlite3_bind_int64(st, 3, row->quota);
+  sqlite3_bind_int64(st, 4, row->jobs);
+  sqlite3_bind_int(st, 5, row->priority);
+  int code = database_run(db, st);
+  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+}
+
+store_result catalogue_token_set(catalogue *cat, const token_row *row) {
+  return catalogue_write(cat, set_row, (void *)(uintptr_t)row);
 }
 
 static int remove_row(database *db, void *arg) {
@@ -57,10 +82,12 @@ store_result catalogue_token_remove(catalogue *cat, const char *name) {
 token_row *catalogue_tokens(catalogue *cat, int *count) {
   token_row *rows = calloc(TOKENS_MOST, sizeof *rows);
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = rows ? database_statement(db,
-                                               "SELECT hash, name, scopes, quota_bytes, used_bytes, created FROM token"
-                                               " ORDER BY name")
-                          : NULL;
+  sqlite3_stmt *st = rows
+                         ? database_statement(db,
+                                              "SELECT hash, name, scopes, quota_bytes, used_bytes, created, quota_jobs,"
+                                              " priority FROM token"
+                                              " ORDER BY name")
+                         : NULL;
   int code = SQLITE_ERROR;
   *count = 0;
   while (st && *count < TOKENS_MOST && (code = sqlite3_step(st)) == SQLITE_ROW) {
@@ -73,6 +100,8 @@ token_row *catalogue_tokens(catalogue *cat, int *count) {
     row->quota = sqlite3_column_int64(st, 3);
     row->used = sqlite3_column_int64(st, 4);
     row->created = sqlite3_column_int64(st, 5);
+    row->jobs = sqlite3_column_int64(st, 6);
+    row->priority = sqlite3_column_int(st, 7);
   }
   if (st) {
     sqlite3_reset(st);

@@ -11,6 +11,8 @@ typedef struct token_row {
   char name[64];
   int scopes;          /* route_scope, or-ed */
   int64_t quota, used; /* bytes of uploads that were stored; quota 0: no limit */
+  int64_t jobs;        /* unfinished at once; 0: no limit */
+  int priority;        /* 0 to 9: jobs of a higher one go first */
   int64_t created;
 } token_row;
 
@@ -18,6 +20,8 @@ typedef struct token_row {
 int token_hash(const char *text, unsigned char hash[TOKEN_BYTES]);
 
 store_result catalogue_token_add(catalogue *cat, const token_row *row); /* STORE_CONFLICT: the name is taken */
+/* Changes scopes, quota, jobs and priority, each where it is not −1. */
+store_result catalogue_token_set(catalogue *cat, const token_row *row);
 store_result catalogue_token_remove(catalogue *cat, const char *name);
 /* By name; at most TOKENS_MOST. In memory of malloc(); NULL with *count −1 on error. */
 token_row *catalogue_tokens(catalogue *cat, int *count);

@@ -44,12 +44,13 @@ test('tokens open what their scopes say', async (t) => {
   const upload = (who, body = text) => d.post('/v1/meshes', Buffer.from(body), bearer(token[who]));
   for (const headers of [{}, { authorization: 'Bearer ' }, { authorization: `Basic ${token.read}` },
     { authorization: `Bearer ${token.gone}` }, { authorization: `Bearer ${token.read.replace(/^./, (c) => (c === '0' ? '1' : '0'))}` }]) {
-    for (const target of ['/v1/meshes', '/metrics', '/', '/openapi.json', '/nowhere']) {
+    for (const target of ['/v1/meshes', '/metrics', '/nowhere', '/v1']) {
       const reply = await d.get(target, { headers });
       assertProblem(reply, 401, 'unauthorized', target);
       assert.equal(reply.headers.get('www-authenticate'), 'Bearer');
     }
     assertProblem(await d.post('/v1/meshes', Buffer.from(text), { headers }), 401, 'unauthorized');
+    for (const open of ['/', '/docs', '/openapi.json']) assert.equal((await d.get(open, { headers })).status, 200, open);
   }
   assertProblem(await upload('read'), 403, 'forbidden');
   const made = await upload('write');
@@ -72,4 +73,54 @@ test('tokens open what their scopes say', async (t) => {
   await d.start();
   assertProblem(await upload('small', `${text}# 3\n`), 429, 'quota-exceeded');
   assert.equal((await upload('write', `${text}# 3\n`)).status, 201);
+});
+
+test('tokens change while the daemon runs', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on', '--workers', '1'] });
+  const text = shapes.obj(shapes.egg(2));
+  const add = async (name, ...more) => (await run(d, 'add', name, ...more)).stdout.trim();
+  const web = await add('web', '--scope', 'read,write', '--quota', '1M', '--quota-jobs', '2', '--priority', '3');
+  const made = await d.post('/v1/meshes', Buffer.from(text), bearer(web));
+  assert.equal(made.status, 201, 'it opens at once');
+  assert.equal(made.headers.get('ratelimit-policy'), `"upload";q=1048576;qu="content-bytes"`);
+  assert.equal(made.headers.get('ratelimit'), `"upload";r=${1048576 - text.length}`);
+  assert.match((await run(d, 'list')).stdout, /^web read,write uploaded=\d+ quota=1048576 quota-jobs=2 priority=3\n$/);
+  await assert.rejects(run(d, 'add', 'web', '--scope', 'read'), { code: 1, stderr: /already/ });
+  await assert.rejects(run(d, 'set', 'nobody', '--quota', '1'), { code: 1, stderr: /no token/ });
+
+  // Unfinished jobs are counted, ended ones are not.
+  const meshes = [];
+  for (let i = 0; i < 3; i++) meshes.push((await d.post('/v1/meshes', shapes.binaryPly(shapes.ball(7, ([x, y, z]) => [x, y * (1 + i / 9), z + 0.2 * Math.sin(6 * x)])), bearer(await add(`m${i}`, '--scope', 'write')))).json);
+  const jobs = [];
+  for (const mesh of meshes.slice(0, 2)) jobs.push((await d.post('/v1/embeddings', { mesh: mesh.id, method: 'kernel-sampling' }, bearer(web))).json);
+  const third = () => d.post('/v1/embeddings', { mesh: meshes[2].id, method: 'kernel-sampling' }, bearer(web));
+  assertProblem(await third(), 429, 'quota-exceeded');
+  assert.equal((await d.delete(jobs[1].url, bearer(web))).status, 200);
+  const again = await third();
+  assert.equal(again.status, 202);
+
+  await run(d, 'set', 'web', '--quota', '10', '--scope', 'read,write');
+  assertProblem(await d.post('/v1/meshes', Buffer.from(`${text}# more\n`), bearer(web)), 429, 'quota-exceeded');
+  await run(d, 'set', 'web', '--scope', 'read');
+  assertProblem(await d.delete(again.json.url, bearer(web)), 403, 'forbidden');
+
+  // A stream and a poll that are open with a token end when it is taken back.
+  const began = Date.now();
+  const stream = d.get(`${again.json.url}/events`, bearer(web)), poll = d.get(again.json.url, { ...bearer(web), query: { wait: 60 } }).catch((error) => error);
+  await new Promise((done) => setTimeout(done, 300));
+  await run(d, 'remove', 'web');
+  assertProblem(await d.get('/v1/meshes', bearer(web)), 401, 'unauthorized');
+  await Promise.all([stream, poll]);
+  assert.ok(Date.now() - began < 10_000);
+  const admin = bearer(await add('root', '--scope', 'admin'));
+  for (const job of [jobs[0], again.json]) await d.delete(job.url, admin);
+
+  // SIGHUP reads them again as well; and a stopped daemon is no hindrance.
+  d.child.kill('SIGHUP');
+  assert.equal((await d.get('/metrics', admin)).status, 200);
+  await d.stop();
+  const late = await add('late', '--scope', 'read', '--quota-jobs', '1');
+  await d.start();
+  assert.equal((await d.get('/v1/meshes', bearer(late))).status, 200);
+  assert.match((await run(d, 'list')).stdout, /^late read uploaded=0 quota=0 quota-jobs=1 priority=0$/m);
 });

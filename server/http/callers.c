@@ -1,0 +1,128 @@
+#include "http/callers.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct callers {
+  pthread_rwlock_t lock;
+  catalogue *cat;
+  caller **all;
+  int count;
+};
+
+void caller_release(caller *who) {
+  if (who && __atomic_sub_fetch(&who->refs, 1, __ATOMIC_ACQ_REL) == 0) {
+    free(who);
+  }
+}
+
+int caller_revoked(const caller *who) {
+  return who && __atomic_load_n(&who->revoked, __ATOMIC_ACQUIRE);
+}
+
+static caller *take_known(callers *c, const unsigned char hash[TOKEN_BYTES]) {
+  for (int i = 0; i < c->count; i++) {
+    caller *who = c->all[i];
+    if (who && memcmp(who->row.hash, hash, TOKEN_BYTES) == 0) {
+      c->all[i] = NULL;
+      return who;
+    }
+  }
+  return NULL;
+}
+
+static caller *make(const token_row *row) {
+  caller *who = calloc(1, sizeof *who);
+  if (who) {
+    who->row = *row;
+    who->refs = 1;
+  }
+  return who;
+}
+
+/* What can change of a token; what was used is what this process counted. */
+static void update(caller *who, const token_row *row) {
+  __atomic_store_n(&who->row.scopes, row->scopes, __ATOMIC_RELAXED);
+  __atomic_store_n(&who->row.quota, row->quota, __ATOMIC_RELAXED);
+  __atomic_store_n(&who->row.jobs, row->jobs, __ATOMIC_RELAXED);
+  __atomic_store_n(&who->row.priority, row->priority, __ATOMIC_RELAXED);
+}
+
+int callers_reload(callers *c) {
+  int count;
+  token_row *rows = catalogue_tokens(c->cat, &count);
+  caller **all = rows ? calloc((size_t)count + 1, sizeof(caller *)) : NULL;
+  if (!all) {
+    free(rows);
+    return 0;
+  }
+  pthread_rwlock_wrlock(&c->lock);
+  for (int i = 0; i < count; i++) {
+    all[i] = take_known(c, rows[i].hash);
+    if (all[i]) {
+      update(all[i], &rows[i]);
+    } else {
+      all[i] = make(&rows[i]); /* NULL without memory: refused until the next time */
+    }
+  }
+  for (int i = 0; i < c->count; i++) {
+    if (c->all[i]) {
+      __atomic_store_n(&c->all[i]->revoked, 1, __ATOMIC_RELEASE);
+      caller_release(c->all[i]);
+    }
+  }
+  free(c->all);
+  c->all = all;
+  c->count = count;
+  pthread_rwlock_unlock(&c->lock);
+  free(rows);
+  return 1;
+}
+
+callers *callers_open(catalogue *cat) {
+  callers *c = calloc(1, sizeof *c);
+  if (!c) {
+    return NULL;
+  }
+  c->cat = cat;
+  pthread_rwlock_init(&c->lock, NULL);
+  if (!callers_reload(c)) {
+    free(c);
+    return NULL;
+  }
+  return c;
+}
+
+void callers_close(callers *c) {
+  for (int i = 0; c && i < c->count; i++) {
+    caller_release(c->all[i]);
+  }
+  if (c) {
+    free(c->all);
+    pthread_rwlock_destroy(&c->lock);
+  }
+  free(c);
+}
+
+int callers_count(callers *c) {
+  pthread_rwlock_rdlock(&c->lock);
+  int count = c->count;
+  pthread_rwlock_unlock(&c->lock);
+  return count;
+}
+
+caller *callers_find(callers *c, const unsigned char hash[TOKEN_BYTES]) {
+  caller *found = NULL;
+  pthread_rwlock_rdlock(&c->lock);
+  for (int i = 0; i < c->count; i++) { /* all of them, so that time tells nothing */
+    if (c->all[i] && sodium_memcmp(hash, c->all[i]->row.hash, TOKEN_BYTES) == 0) {
+      found = c->all[i];
+    }
+  }
+  if (found) {
+    __atomic_add_fetch(&found->refs, 1, __ATOMIC_RELAXED);
+  }
+  pthread_rwlock_unlock(&c->lock);
+  return found;
+}

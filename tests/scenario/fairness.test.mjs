@@ -1,0 +1,98 @@
+// Who goes next: callers share the workers, small jobs pass large ones, and the urgent go first.
+import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
+import test from 'node:test';
+import { promisify } from 'node:util';
+import { binaries, daemon, slow } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const wobble = (seed, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.2 * Math.sin(5 * y + seed)), y * (1.2 + seed / 100), z + 0.2 * Math.cos(4 * x + seed)]);
+const bearer = async (d, name, ...more) => {
+  const { stdout } = await promisify(execFile)(binaries.daemon, ['token', 'add', name, '--scope', 'admin', ...more, '--data', d.data]);
+  return { headers: { authorization: `Bearer ${stdout.trim()}` } };
+};
+/** Uploads the mesh and asks for its embedding; the job. */
+async function submit(d, seed, levels, options = {}, more = {}) {
+  const mesh = await d.post('/v1/meshes', shapes.binaryPly(wobble(seed, levels)), options);
+  assert.equal(mesh.status, 201, mesh.bytes.toString());
+  const reply = await d.post('/v1/embeddings', { mesh: mesh.json.id, ...more.body }, { headers: { ...options.headers, ...more.headers } });
+  assert.equal(reply.status, 202, reply.bytes.toString());
+  return reply.json;
+}
+const started = async (d, job, options) => {
+  let now;
+  do now = (await d.get(job.url, { ...options, query: { wait: 20 } })).json;
+  while (!now.finished);
+  assert.equal(now.state, 'succeeded', JSON.stringify(now.problem));
+  return Date.parse(now.started);
+};
+
+test('callers take turns', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on', '--workers', '1'] });
+  const [many, few, first] = [await bearer(d, 'many'), await bearer(d, 'few'), await bearer(d, 'first', '--priority', '5')];
+  const blocker = await submit(d, 99, slow ? 5 : 7, many);
+  const crowd = [];
+  for (let i = 0; i < 8; i++) crowd.push(await submit(d, i, 4, many));
+  const guests = [await submit(d, 20, 4, few), await submit(d, 21, 4, few)], vip = await submit(d, 30, 4, first);
+  assert.notEqual((await d.get(vip.url, first)).json.state, 'succeeded');
+  const times = [];
+  for (const job of crowd) times.push(await started(d, job, many));
+  const of = [await started(d, guests[0], few), await started(d, guests[1], few)];
+  const before = (at) => times.filter((time) => time < at).length;
+  assert.ok(before(of[0]) <= 1, `the other caller waited for ${before(of[0])} of 8`);
+  assert.ok(before(of[1]) <= 3, `and then for ${before(of[1])}`);
+  const soonest = Math.min(...times, ...of);
+  assert.ok((await started(d, vip, first)) <= soonest, 'a class goes before everything');
+  await started(d, blocker, many);
+});
+
+test('the urgent jobs of a caller go first', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const blocker = await submit(d, 99, slow ? 5 : 7);
+  const jobs = [];
+  for (const [seed, priority] of [[1, 'u=7'], [2, undefined], [3, 'i, u=0'], [4, 'u=9'], [5, 'u=1']])
+    jobs.push(await submit(d, seed, 3, {}, { headers: priority ? { priority } : {} }));
+  const times = [];
+  for (const job of jobs) times.push(await started(d, job));
+  const order = times.map((_, i) => i).sort((a, b) => times[a] - times[b]);
+  assert.deepEqual(order, [2, 4, 1, 3, 0], times.join());
+  await started(d, blocker);
+});
+
+test('large jobs leave room for small ones', async (t) => {
+  for (const workers of slow ? ['2'] : ['1', '2']) {
+    const d = await daemon(t, { args: ['--workers', workers] });
+    const large = [];
+    // Above 300,000 triangles a job is large.
+    for (let i = 0; i < Number(workers); i++) large.push(await submit(d, i, 8, {}, { body: { method: 'kernel-sampling' } }));
+    for (let i = 0; i < 3; i++) await started(d, await submit(d, 10 + i, 3));
+    const states = await Promise.all(large.map(async (job) => (await d.get(job.url)).json.state));
+    assert.ok(!states.includes('succeeded'), `${workers}: the small ones passed: ${states}`);
+    for (const job of large) await d.delete(job.url);
+  }
+});
+
+test('time, memory and cancelling', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1', '--job-seconds', '2', '--job-memory', '64M'] });
+  const long = await submit(d, 1, slow ? 5 : 6, {}, { body: { method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } } });
+  const late = await d.ended(long);
+  assert.deepEqual([late.state, late.problem?.type], ['failed', '/problems/timeout'], JSON.stringify(late));
+  const wide = await daemon(t, { args: ['--job-memory', '2M'] });
+  const mesh = await wide.post('/v1/meshes', shapes.binaryPly(wobble(2, 6)));
+  const reply = mesh.status === 201 ? (await wide.make('/v1/embeddings', { mesh: mesh.json.id })).problem : mesh.json;
+  assert.equal(reply?.type, '/problems/no-memory', JSON.stringify(reply));
+
+  const other = await daemon(t, { args: ['--workers', '1'] });
+  const times = [];
+  for (let i = 0; i < 5; i++) {
+    const job = await submit(other, i, slow ? 6 : 7);
+    while ((await other.get(job.url)).json.state === 'queued') await new Promise((done) => setTimeout(done, 5));
+    await new Promise((done) => setTimeout(done, 40 * i));
+    const began = performance.now(), answer = await other.delete(job.url);
+    times.push(performance.now() - began);
+    if (answer.status === 409) continue; // it was faster
+    assert.equal(answer.json.state, 'cancelled', 'the answer comes when it has ended');
+  }
+  t.diagnostic(`cancelled within ${times.map((ms) => ms.toFixed(0)).join(', ')} ms`);
+  assert.ok(Math.max(...times) < (slow ? 5000 : 1500), times.join());
+});
