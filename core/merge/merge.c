@@ -21,6 +21,7 @@ void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
   orb_free(ctx, result->found_residuals);
   orb_free(ctx, result->pairs);
   orb_free(ctx, result->transforms);
+  orb_free(ctx, result->asset_vertices);
   orb_buffer_free(ctx, &result->asset);
   memset(result, 0, sizeof *result);
 }
@@ -69,8 +70,8 @@ orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char
   out->timings.transfer = (now = orb_clock()) - mark;
   mark = now;
   ORB_GO(status,
-         orb_asset_write(ctx, &out->supermesh, out->alignment.shapes, names, &options->asset, &out->asset_facts,
-                         &out->asset),
+         orb_asset_write_mapped(ctx, &out->supermesh, out->alignment.shapes, names, &options->asset, &out->asset_facts,
+                                &out->asset, &out->asset_vertices),
          fail);
   out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
   if (!out->transforms) {

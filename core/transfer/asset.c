@@ -165,9 +165,33 @@ static orb_status round_frames(orb_context *ctx, orb_draft *draft) {
   return status;
 }
 
+/* A part's vertex has the values of a supermesh corner, and so that corner's vertex. */
+static orb_status list_vertices(orb_context *ctx, const orb_draft *draft, int32_t **out) {
+  int64_t count = 0;
+  for (int32_t p = 0; p < draft->part_count; p++) {
+    count += draft->parts[p].vertex_count;
+  }
+  int32_t *next = *out = ORB_NEW(ctx, int32_t, count);
+  if (!next) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t p = 0; p < draft->part_count; p++) {
+    for (int32_t v = 0; v < draft->parts[p].vertex_count; v++) {
+      *next++ = draft->supermesh->triangles[draft->parts[p].corners[v]];
+    }
+  }
+  return ORB_OK;
+}
+
 orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
                            const char *const *names, const orb_asset_options *options, orb_asset_facts *facts,
                            orb_buffer *out) {
+  return orb_asset_write_mapped(ctx, supermesh, shapes, names, options, facts, out, NULL);
+}
+
+orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
+                                  const char *const *names, const orb_asset_options *options, orb_asset_facts *facts,
+                                  orb_buffer *out, int32_t **vertices) {
   ORB_TRY(check_options(ctx, supermesh, options));
   orb_asset_facts unused;
   orb_draft draft = {.supermesh = supermesh,
@@ -188,6 +212,9 @@ orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh, con
   ORB_GO(status, round_frames(ctx, &draft), done);
   ORB_GO(status, orb_draft_split(ctx, &draft), done);
   ORB_GO(status, orb_draft_write(ctx, &draft, names, facts ? facts : &unused, out), done);
+  if (vertices) {
+    ORB_GO(status, list_vertices(ctx, &draft, vertices), done);
+  }
   orb_progress(ctx, "write", 1);
 done:
   draft_free(ctx, &draft);

@@ -152,6 +152,25 @@ static orb_status write_shape(orb_context *ctx, const orb_mesh *mesh, const int3
   return ORB_OK;
 }
 
+/* Which supermesh vertex each vertex of the asset stands for. */
+static orb_status write_asset_map(orb_context *ctx, const orb_merge_result *merged, orb_buffer *out) {
+  unsigned char bytes[4 * BATCH], *at = bytes + 12;
+  int32_t count = merged->asset_facts.vertex_count;
+  memcpy(bytes, "GLBVERTS", 8);
+  put32(bytes + 8, (uint32_t)count);
+  for (int32_t v = 0; v < count; v++) {
+    if (at == bytes + sizeof bytes) {
+      orb_status status = orb_buffer_append(ctx, out, bytes, sizeof bytes);
+      if (status != ORB_OK) {
+        return status;
+      }
+      at = bytes;
+    }
+    at = put32(at, (uint32_t)merged->asset_vertices[v]);
+  }
+  return orb_buffer_append(ctx, out, bytes, (size_t)(at - bytes));
+}
+
 orb_status places_write(orb_context *ctx, const orb_mesh *meshes, int32_t *const *corners,
                         const orb_merge_result *merged, orb_buffer *out) {
   unsigned char head[20], *at = head + 8;
@@ -163,5 +182,5 @@ orb_status places_write(orb_context *ctx, const orb_mesh *meshes, int32_t *const
   for (int32_t s = 0; s < merged->supermesh.shape_count && status == ORB_OK; s++) {
     status = write_shape(ctx, &meshes[s], corners[s], merged, s, out);
   }
-  return status;
+  return status == ORB_OK ? write_asset_map(ctx, merged, out) : status;
 }

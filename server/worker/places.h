@@ -9,8 +9,10 @@
  *     float64[3]           barycentric coordinates (≥ 0, sum 1 up to rounding) of that triangle's corners as they
  *                          stand in the file; 0, 0, 0 where triangle is −1
  *
- * So 20 + 28 · shapes · vertices bytes. The vertices of the GLB are split and ordered anew for normals, seams and
- * materials; which supermesh vertex each stands for is not in here. docs/places.md says how to tell.
+ *   then char[8] "GLBVERTS", uint32 vertices of the asset, and for each of them, the vertices of its primitives one
+ *   after another, uint32: the supermesh vertex that it stands for.
+ *
+ * So 20 + 28 · shapes · vertices + 12 + 4 · vertices of the asset bytes.
  */
 #ifndef ORB_WORKER_PLACES_H
 #define ORB_WORKER_PLACES_H

@@ -9,12 +9,16 @@ function read(bytes) {
   assert.equal(bytes.toString('latin1', 0, 8), 'ORBPLACE');
   const [version, count, vertices] = [8, 12, 16].map((at) => bytes.readUInt32LE(at));
   assert.equal(version, 1);
-  assert.equal(bytes.length, 20 + 28 * count * vertices);
+  const map = 20 + 28 * count * vertices;
+  assert.equal(bytes.toString('latin1', map, map + 8), 'GLBVERTS');
+  const asset = Array.from({ length: bytes.readUInt32LE(map + 8) }, (_, g) => bytes.readUInt32LE(map + 12 + 4 * g));
+  assert.equal(bytes.length, map + 12 + 4 * asset.length);
+  assert.ok(asset.every((v) => v < vertices));
   const at = (s, v) => {
     const from = 20 + 28 * (s * vertices + v);
     return { triangle: bytes.readInt32LE(from), weights: [4, 12, 20].map((o) => bytes.readDoubleLE(from + o)) };
   };
-  return { count, vertices, at };
+  return { count, vertices, at, asset };
 }
 
 const position = (m, { triangle, weights }) => {
@@ -92,4 +96,32 @@ test('places of a supermesh name triangles of the files', async (t) => {
     assert.equal((await d.delete(supermesh.url)).status, 204);
     assertProblem(await d.get(`${supermesh.url}/places`), 404, 'not-found');
   }
+});
+
+// A label of the second file, one a vertex, that no position tells: carried to the GLB, also where the GLB splits vertices.
+test('an attribute is carried to the asset by the places', async (t) => {
+  const d = await daemon(t);
+  // Every triangle of the first file has three texture coordinates of its own: the asset splits every vertex.
+  const first = shapes.egg(3), second = shapes.bean(3);
+  const seams = [
+    ...first.positions.map((p) => `v ${p.join(' ')}`),
+    ...first.triangles.flatMap((_, i) => [0, 1, 2].map((k) => `vt ${((i % 37) + 0.3 * k) / 40} ${((i % 29) + 0.2 * k * k) / 40}`)),
+    ...first.triangles.map((c, i) => `f ${c.map((v, k) => `${v + 1}/${3 * i + k + 1}`).join(' ')}`),
+  ].join('\n');
+  const pair = [];
+  for (const text of [seams, shapes.obj(second)]) pair.push({ mesh: (await d.upload(text)).json.id });
+  const supermesh = await d.made('/v1/supermeshes', { shapes: pair, align: { method: 'rotate' }, remesh: { method: 'adaptive' } });
+  const places = read((await d.get(`${supermesh.url}/places`)).bytes);
+  const morph = morphOf((await d.get(supermesh.asset)).bytes);
+  assert.equal(places.asset.length, morph.shapes[0].length / 3);
+  assert.ok(places.asset.length > places.vertices, 'seams split vertices');
+  assert.equal(new Set(places.asset).size, places.vertices);
+  // The attribute is a linear function of the position, so that its value on the asset is known.
+  const label = second.positions.map((p) => 3 * p[0] - 2 * p[1] + p[2] + 5);
+  places.asset.forEach((v, g) => {
+    const { triangle, weights } = places.at(1, v);
+    const value = second.triangles[triangle].reduce((sum, corner, k) => sum + weights[k] * label[corner], 0);
+    const [x, y, z] = morph.shapes[1].slice(3 * g, 3 * g + 3);
+    assert.ok(Math.abs(value - (3 * x - 2 * y + z + 5)) < 2e-5, `vertex ${g}: ${value}`);
+  });
 });

@@ -54,6 +54,13 @@ ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_supermesh 
 ORB_MUST_CHECK orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh,
                                                const orb_aligned_shape *shapes, orb_fit fit, double *out);
 
+/* The same, and which vertex of the supermesh each vertex of the file stands for: *vertices (of the context, the
+ * caller's to free) has facts->vertex_count numbers, the vertices of the primitives one after another. */
+ORB_MUST_CHECK orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *supermesh,
+                                                 const orb_aligned_shape *shapes, const char *const *names,
+                                                 const orb_asset_options *options, orb_asset_facts *facts,
+                                                 orb_buffer *out, int32_t **vertices);
+
 #ifdef __cplusplus
 }
 #endif

@@ -43,7 +43,8 @@ typedef struct orb_merge_result {
   int32_t pair_count;
   orb_pair_report *pairs;
   orb_asset_facts asset_facts;
-  double *transforms; /* shape_count × 16, see orb_asset_transforms() */
+  int32_t *asset_vertices; /* asset_facts.vertex_count: the supermesh vertex that each vertex of the asset stands for */
+  double *transforms;      /* shape_count × 16, see orb_asset_transforms() */
   orb_buffer asset;
   orb_merge_timings timings;
 } orb_merge_result;
