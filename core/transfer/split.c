@@ -1,11 +1,11 @@
 /* From corners to the vertices of the file: a vertex is a supermesh vertex, a material and one value of each wedged
  * attribute. Corners that agree in all share a vertex, so a smooth mesh of one material keeps the supermesh's vertices.
  */
-#include <meshoptimizer.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "transfer/draft.h"
+#include "transfer/order.h"
 
 /* The attributes that can split a vertex. */
 typedef struct stream_list {
@@ -105,8 +105,10 @@ static orb_status order_part(orb_context *ctx, orb_draft_part *part) {
     status = ORB_E_NO_MEMORY;
     goto done;
   }
-  meshopt_optimizeVertexCache(part->indices, part->indices, index_count, vertex_count);
-  meshopt_optimizeVertexFetchRemap(remap, part->indices, index_count, vertex_count);
+  status = orb_order_for_cache(ctx, part->indices, index_count, vertex_count, remap);
+  if (status != ORB_OK) {
+    goto done;
+  }
   for (size_t v = 0; v < vertex_count; v++) {
     ORB_ASSERT(remap[v] < vertex_count);
     corners[remap[v]] = part->corners[v];
