@@ -42,8 +42,9 @@ static orb_status check_request(orb_context *ctx, const orb_align_shape *shapes,
                     "This alignment needs landmarks; give some, or use the method rotate or auto.");
   }
   if (options->method < ORB_ALIGN_PIN || options->method > ORB_ALIGN_AUTO || options->rbf_steps < 1 ||
-      options->rbf_steps > 10000 || !(options->rbf_radius >= 0)) {
-    return orb_fail(ctx, ORB_E_BAD_OPTION, "An alignment option is out of range: 1 to 10000 steps, radius ≥ 0.");
+      options->rbf_steps > 10000 || !(options->rbf_radius >= 0) || !(options->max_growth >= 0)) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION,
+                    "An alignment option is out of range: 1 to 10000 steps, radius ≥ 0, growth ≥ 0.");
   }
   for (int32_t s = 0; s < shape_count; s++) {
     if (!shapes[s].mesh || !shapes[s].points || shapes[s].mesh->triangle_count < 4) {

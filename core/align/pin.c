@@ -69,17 +69,6 @@ orb_status orb_pin_slim(orb_context *ctx, orb_sheet *sheet, const int32_t *landm
   return orb_pin_relax(ctx, sheet, landmarks, count, preset, SWEEPS);
 }
 
-static orb_status refuse(orb_context *ctx, int32_t shape, const int32_t *landmarks, int32_t count) {
-  orb_status status =
-      orb_fail(ctx, ORB_E_BAD_LANDMARKS,
-               "The landmarks could not be brought together on shape %d: drop or move some of them.", shape);
-  orb_error *error = orb_context_error_edit(ctx);
-  error->shape = shape;
-  error->landmark_count = count < ORB_ERROR_ITEMS ? count : ORB_ERROR_ITEMS;
-  memcpy(error->landmarks, landmarks, (size_t)error->landmark_count * sizeof *landmarks);
-  return status;
-}
-
 /* Shape 0 stays as it is embedded; the others are carried onto its landmarks. *stuck: the first that could not be, 0 if
  * all were. */
 static orb_status carry_onto_first(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
@@ -102,27 +91,84 @@ end:
   return status;
 }
 
-orb_status orb_align_pin(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
-                         int32_t count, const orb_align_options *options) {
+/* The cascade. *held 0: it failed on shape *shape, and sheets may have been turned or refined. */
+static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
+                       int32_t count, const orb_align_options *options, int *held, int32_t *shape) {
   orb_preset preset = options->preset;
-  int32_t coarse = COARSE_A_LANDMARK * count > COARSE ? COARSE_A_LANDMARK * count : COARSE, shape = 0;
-  int stuck = 1, held = 0;
+  int32_t coarse = COARSE_A_LANDMARK * count > COARSE ? COARSE_A_LANDMARK * count : COARSE;
+  double most = options->max_growth > 0 ? options->max_growth : GROWTH_MAX;
+  int stuck = 1;
+  *held = 1;
+  *shape = 0;
   for (int attempt = 0; attempt < WALKS && stuck; attempt++, coarse *= 2) {
     ORB_TRY(orb_pin_walk(ctx, sheets, shape_count, landmarks, count, preset, coarse, &stuck));
   }
   if (!stuck) {
     return ORB_OK;
   }
-  ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, preset, GROWTH_SMALL, &shape));
-  if (shape == 0) {
+  ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, preset,
+                           most < GROWTH_SMALL ? most : GROWTH_SMALL, shape));
+  if (*shape == 0) {
     return ORB_OK;
   }
+  *held = 0;
   if (count >= 4) {
-    ORB_TRY(orb_pin_joint(ctx, sheets, shape_count, landmarks, count, preset, GROWTH_MAX, &held));
+    ORB_TRY(orb_pin_joint(ctx, sheets, shape_count, landmarks, count, preset, most, held));
   }
-  if (!held) {
-    ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, preset, GROWTH_MAX, &shape));
-    return shape == 0 ? ORB_OK : refuse(ctx, shape, landmarks, count);
+  if (!*held) {
+    ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, preset, most, shape));
+    *held = *shape == 0;
   }
   return ORB_OK;
+}
+
+/* The same on copies that are thrown away. */
+static orb_status could_meet(orb_context *ctx, const orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
+                             int32_t count, const orb_align_options *options, int *held) {
+  orb_status status = ORB_OK;
+  int32_t shape;
+  orb_sheet *copies = ORB_NEW0(ctx, orb_sheet, shape_count);
+  if (!copies) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    ORB_GO(status, orb_sheet_copy(ctx, &sheets[s], &copies[s]), end);
+  }
+  status = meet(ctx, copies, shape_count, landmarks, count, options, held, &shape);
+end:
+  for (int32_t s = 0; s < shape_count; s++) {
+    orb_sheet_free(ctx, &copies[s]);
+  }
+  orb_free(ctx, copies);
+  return status;
+}
+
+/* Names the first landmark that cannot be met together with those before it. */
+static orb_status refuse(orb_context *ctx, const orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
+                         int32_t count, const orb_align_options *options, int32_t shape) {
+  int32_t fine = 0, most = count;
+  while (most - fine > 1) {
+    int32_t middle = fine + (most - fine) / 2;
+    int held;
+    ORB_TRY(could_meet(ctx, sheets, shape_count, landmarks, middle, options, &held));
+    fine = held ? middle : fine;
+    most = held ? most : middle;
+  }
+  orb_status status = orb_fail(ctx, ORB_E_BAD_LANDMARKS,
+                               "Landmark %d cannot be met on shape %d together with the ones before it: the surface "
+                               "would have to be wound too tightly. Drop or move it.",
+                               landmarks[most - 1], shape);
+  orb_error *error = orb_context_error_edit(ctx);
+  error->shape = shape;
+  error->landmark_count = 1;
+  error->landmarks[0] = landmarks[most - 1];
+  return status;
+}
+
+orb_status orb_align_pin(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
+                         int32_t count, const orb_align_options *options) {
+  int held;
+  int32_t shape;
+  ORB_TRY(meet(ctx, sheets, shape_count, landmarks, count, options, &held, &shape));
+  return held ? ORB_OK : refuse(ctx, sheets, shape_count, landmarks, count, options, shape);
 }

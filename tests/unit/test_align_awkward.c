@@ -172,6 +172,33 @@ static void contradictions_are_named(void **state) {
   bodies_close(&b);
 }
 
+/* Where the surfaces may hardly grow, tangled landmarks are refused: one is named, those before it can be met, and with
+ * it they cannot. */
+static void the_first_that_cannot_be_met_is_named(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  int named = 0;
+  for (uint64_t seed = 1; seed <= 3; seed++) {
+    bodies_random(&b, 24, seed);
+    orb_align_options options = bodies_options(ORB_ALIGN_PIN);
+    options.max_growth = 0.2;
+    orb_alignment out;
+    orb_status status = orb_align(b.ctx, b.shape, 2, b.landmark, 24, &options, &out);
+    assert_int_equal(status, ORB_E_BAD_LANDMARKS);
+    const orb_error *error = orb_context_error(b.ctx);
+    assert_int_equal(error->landmark_count, 1);
+    assert_true(error->shape >= 0 && error->shape < 2);
+    named = error->landmarks[0];
+    assert_true(named >= 3 && named < 24);
+    align_and_check(b.ctx, b.shape, 2, b.landmark, named, &options, &out);
+    orb_alignment_free(b.ctx, &out);
+    assert_int_equal(orb_align(b.ctx, b.shape, 2, b.landmark, named + 1, &options, &out), ORB_E_BAD_LANDMARKS);
+    assert_int_equal(orb_context_error(b.ctx)->landmarks[0], named);
+  }
+  bodies_close(&b);
+}
+
 static void sixty(void **state) {
   (void)state;
   bodies b;
@@ -246,6 +273,7 @@ int main(void) {
       cmocka_unit_test(six_in_one_triangle),
       cmocka_unit_test(duplicates_share_a_vertex),
       cmocka_unit_test(contradictions_are_named),
+      cmocka_unit_test(the_first_that_cannot_be_met_is_named),
       cmocka_unit_test(sixty),
       cmocka_unit_test(cow_to_human),
   };

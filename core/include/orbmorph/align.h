@@ -25,6 +25,8 @@ typedef struct orb_align_options {
   int32_t rbf_steps; /* 10 */
   int32_t one_way;   /* rbf: move the later shapes only (Fig. 9) */
   double rbf_radius; /* for all landmarks; 0: default */
+  double max_growth; /* pin: a mesh may get so many times its triangles (or 2000 if it has fewer) more, at most 800000,
+                        before landmarks are refused; 0: 64 */
   uint64_t seed;
 } orb_align_options;
 void orb_align_defaults(orb_align_options *options);
@@ -75,7 +77,8 @@ typedef struct orb_alignment {
  * - auto: pin where landmarks are given, else the rotation search; `found` then says what it matched.
  *
  * Landmarks at one and the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
- * those that are out of range, share a place on some shapes only, or cannot be met; ORB_E_BAD_OPTION for pin and rbf
+ * those that are out of range or share a place on some shapes only; of a set
+ * that cannot be met, the first that cannot be met together with those before it; ORB_E_BAD_OPTION for pin and rbf
  * without landmarks. About O(n log n) in triangles; random far-apart landmarks cost much more than like ones. */
 ORB_MUST_CHECK orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                     const orb_landmark *landmarks, int32_t landmark_count,
