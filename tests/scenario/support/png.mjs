@@ -76,6 +76,7 @@ export function readPng(bytes) {
     if (name === 'IHDR') {
       [width, height] = [data.readUInt32BE(0), data.readUInt32BE(4)];
       assert.equal(data[8], 8);
+      assert.ok(data[9] === 2 || data[9] === 3, 'RGB or a palette');
       channels = data[9] === 3 ? 1 : 3;
     } else if (name === 'PLTE') palette = data;
     else if (name === 'acTL') count = data.readUInt32BE(0);

@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# Makes the pictures of the documents anew, from the samples, with the programs of build/bin:
+#   docs/morph.png                     the animation of the README
+#   docs/tutorial.png, tutorial-sheet  the tutorial's page in Chromium and its sheet (they need tests/node_modules)
+set -euo pipefail
+cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
+bin=$PWD/build/bin
+work=$(mktemp -d)
+daemon=
+trap '[ -z "$daemon" ] || kill "$daemon"; rm -rf "$work"' EXIT
+
+"$bin/orbmorphd" --listen 127.0.0.1:0 --data "$work/data" >"$work/out" 2>"$work/log" &
+daemon=$!
+until grep -q listening "$work/out"; do
+  kill -0 "$daemon" || { cat "$work/log" >&2; exit 1; }
+  sleep 0.1
+done
+ORBMORPH_SERVER=$(sed -n 's/^orbmorphd listening on //p' "$work/out")
+export ORBMORPH_SERVER
+
+samples=tests/samples
+"$bin/orbmorph" morph "$samples/dog.obj" "$samples/giraffe.off" "$samples/elephant.ply" \
+  --landmarks "$samples/dog-giraffe-elephant.json" -o "$work/morph.glb"
+"$bin/orbmorph" view "$work/morph.glb" --frames 60 --size 360 --yaw 35 -o docs/morph.png
+ORB_PICTURES=1 node --test tests/conformance/tutorial.test.mjs
