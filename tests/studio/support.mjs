@@ -43,11 +43,15 @@ export async function startDaemon() {
   };
 }
 
-export const startBrowser = () =>
+/**
+ * Debian's Chromium with software GL. `compositing`: "software", the most robust, reads every drawn canvas back on the
+ * page's main thread; "gpu" puts pages together with the same GL, as browsers with a GPU do.
+ */
+export const startBrowser = ({ compositing = 'software' } = {}) =>
   chromium.launch({
     executablePath: process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
-    args: ['--no-sandbox', '--headless=new', '--disable-gpu', '--use-gl=angle', '--use-angle=swiftshader',
-      '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update', '--disable-sync',
+    args: ['--no-sandbox', '--headless=new', ...(compositing === 'software' ? ['--disable-gpu'] : ['--ignore-gpu-blocklist']), '--use-gl=angle',
+      '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update', '--disable-sync',
       '--no-first-run'],
   });
 

@@ -8,5 +8,5 @@ import { toast } from './state';
 
 applyTheme();
 render(<App />, document.getElementById('app')!);
-if (!stage.works) toast('This browser shows no WebGL, so shapes cannot be drawn. Uploading and morphing work all the same.', 'error');
+stage.onFailed = () => toast('This browser shows no WebGL, so shapes cannot be drawn. Uploading and morphing work all the same.', 'error');
 void restore().finally(keepUrl);

@@ -2,10 +2,10 @@
  * The clock of the morph. It changes weights and asks for a drawing; the page is not rendered again for each frame:
  * those who show the time (the slider) listen to it directly.
  */
-import { Color } from 'three';
 import { set, state, tint, type Result } from './state';
 import { stage } from './view/shared';
 import { weightsAt } from './mesh/morph';
+import { mixed } from './view/colors';
 
 const SECONDS_A_SHAPE = 2.2;
 const HOLD = 0.18;
@@ -79,9 +79,7 @@ class Player {
     const weights = new Array<number>(result.data.names.length).fill(0);
     part.forEach((x, i) => result.data.shapes[i]?.forEach((w, k) => (weights[k] += x * w)));
     this.weigh(weights);
-    const color = new Color(0);
-    part.forEach((x, i) => color.add(new Color(tint(i)).multiplyScalar(x)));
-    result.main.color(color);
+    result.main.color(mixed(part.map((_, i) => tint(i)), part));
     set({ mix: shares });
   }
 
@@ -93,7 +91,7 @@ class Player {
   private tintAt(time: number) {
     const at = time * this.legs;
     const i = Math.min(Math.floor(at), this.legs - 1);
-    this.result?.main.color(new Color(tint(i)).lerp(new Color(tint(i + 1)), at - i));
+    this.result?.main.color(mixed([tint(i), tint(i + 1)], [1 - at + i, at - i]));
   }
 
   /** There and back, resting a little at each shape. */

@@ -4,7 +4,7 @@ import { work } from '../mesh/work';
 import { MEASURES, type MeasureName } from '../mesh/distortion';
 import { sphereModels } from '../view/models';
 import { stage } from '../view/shared';
-import type { Paint } from '../view/materials';
+import type { Paint } from '../view/colors';
 
 export async function loadSpheres() {
   await Promise.all(readyShapes().map((shape) => (shape.sphere && shape.sphere.state !== 'failed' ? null : load(shape))));
@@ -54,8 +54,8 @@ function paintSphere(shape: Shape) {
     if (isMeasure(paint)) model.attribute('value', sphere.values![paint]);
     else model.attribute('tone', paint === 'direction' ? sphere.normals! : sphere.places!);
     model.paint(with_);
-    stage.prepare(model.group);
   }
+  stage.draw();
 }
 
 export function setPaint(paint: SpherePaint) {

@@ -4,7 +4,7 @@ import { set, state, tint, type Result } from '../state';
 import { measureErrors } from '../actions/merge';
 import { player } from '../player';
 import { client } from '../state';
-import { RAMPS, rampCss } from '../view/materials';
+import { RAMPS, rampCss } from '../view/colors';
 import { Button, count, Icon, relative, Segments, Switch } from './parts';
 import { Pane } from './pane';
 import { OptionsFold } from './shapes';

@@ -27,8 +27,8 @@ export function Pane({ label, model, wire = false, pickable, markers, children }
   }, []);
 
   useLayoutEffect(() => {
-    if (model?.wireframe(wire, isDark() ? '#05070a' : '#20242c')) stage.prepare(model.group);
-    view.current!.show(model?.group ?? null);
+    model?.wireframe(wire, isDark() ? '#05070a' : '#20242c');
+    view.current!.show(model ?? null);
     view.current!.onPick = pickable ? (ray) => void pickOn(pickable, ray.origin, ray.direction) : null;
     stage.draw();
   });

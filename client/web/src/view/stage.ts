@@ -1,9 +1,12 @@
 /**
- * One canvas under all views. Each view is a rectangle of the page with its own scene; the canvas is drawn only when
- * something has changed. Views that share an Orbit are linked.
+ * One canvas under all views. Each view is a rectangle of the page with a model in it; the canvas belongs to a worker,
+ * so that neither uploads nor slow GPUs hold up the page. It is drawn only when something has changed, and never again
+ * before the last drawing is done. Views that share an Orbit are linked.
  */
-import { PerspectiveCamera, Scene, Vector3, WebGLRenderer, type Object3D } from 'three';
-import { Orbit } from './orbit';
+import { Orbit, project, rayThrough, type Look } from './camera';
+import { onReport, order } from './link';
+import type { Frame } from './messages';
+import type { Model } from './models';
 
 export interface Marker {
   position: [number, number, number];
@@ -17,9 +20,7 @@ export interface Ray {
 }
 
 export class View {
-  readonly scene = new Scene();
-  readonly camera = new PerspectiveCamera(32, 1, 0.1, 100);
-  content: Object3D | null = null;
+  content: Model | null = null;
   markers: Marker[] = [];
   onPick: ((ray: Ray) => void) | null = null;
   own = new Orbit();
@@ -30,38 +31,23 @@ export class View {
     return this.stage.linked ? this.stage.orbit : this.own;
   }
 
-  show(content: Object3D | null) {
+  show(content: Model | null) {
     if (this.content === content) return;
-    if (this.content) this.scene.remove(this.content);
     this.content = content;
-    if (content) {
-      this.scene.add(content);
-      this.stage.prepare(content);
-    }
     this.stage.draw();
   }
 
   rayAt(clientX: number, clientY: number): Ray {
     const box = this.element.getBoundingClientRect();
-    this.orbit.apply(this.camera, box.width / Math.max(box.height, 1));
-    const x = ((clientX - box.left) / box.width) * 2 - 1;
-    const y = 1 - ((clientY - box.top) / box.height) * 2;
-    const far = new Vector3(x, y, 0.5).unproject(this.camera);
-    const direction = far.sub(this.camera.position).normalize();
-    return { origin: this.camera.position.toArray(), direction: direction.toArray() };
+    const look = this.orbit.look(box.width / Math.max(box.height, 1));
+    return rayThrough(look, (clientX - box.left) / box.width, (clientY - box.top) / box.height);
   }
 
-  placeMarkers(width: number, height: number) {
-    const point = new Vector3();
-    const normal = new Vector3();
+  placeMarkers(look: Look, width: number, height: number) {
     for (const marker of this.markers) {
-      point.fromArray(marker.position);
-      const facing = normal.fromArray(marker.normal).dot(this.camera.position.clone().sub(point).normalize());
-      point.project(this.camera);
-      const x = ((point.x + 1) / 2) * width;
-      const y = ((1 - point.y) / 2) * height;
+      const { x, y, facing } = project(look, marker.position, marker.normal);
       const { style } = marker.element;
-      style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+      style.transform = `translate(${(x * width).toFixed(1)}px, ${(y * height).toFixed(1)}px)`;
       style.opacity = facing > -0.05 ? '1' : '0.28';
       style.zIndex = facing > -0.05 ? '2' : '1';
     }
@@ -73,31 +59,35 @@ export class Stage {
   readonly orbit = new Orbit();
   readonly views = new Set<View>();
   linked = true;
-  onDrawn: (() => void) | null = null;
   onMoved: (() => void) | null = null;
-  private renderer: WebGLRenderer | null = null;
-  private asked = 0;
-  private observer = new ResizeObserver(() => this.draw());
-  /** frames drawn since the page was opened; a page at rest draws none */
-  frames = 0;
+  onFailed: (() => void) | null = null;
+  private asked = false;
+  private drawing = false;
+  private again = false;
+  private readonly observer = new ResizeObserver(() => this.draw());
+  private readonly soon = new MessageChannel();
 
   constructor(readonly host: HTMLElement) {
     this.canvas.setAttribute('aria-hidden', 'true');
     host.prepend(this.canvas);
+    this.soon.port1.onmessage = () => this.paint();
+    onReport((report) => {
+      if (report.op === 'started' && !report.works) this.fail();
+      else if (report.op === 'restored') this.draw();
+      else if (report.op === 'drawn') this.drawn();
+    });
     try {
-      this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
-      this.renderer.debug.checkShaderErrors = import.meta.env.DEV;
-      this.renderer.setScissorTest(true);
-      this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+      const canvas = this.canvas.transferControlToOffscreen();
+      order({ op: 'start', canvas, ratio: Math.min(devicePixelRatio, 2) }, [canvas]);
     } catch {
-      host.dataset.failed = 'webgl';
+      queueMicrotask(() => this.fail());
     }
     this.observer.observe(host);
-    this.canvas.addEventListener('webglcontextrestored', () => this.draw());
   }
 
-  get works(): boolean {
-    return this.renderer !== null;
+  private fail() {
+    this.host.dataset.failed = 'webgl';
+    this.onFailed?.();
   }
 
   add(element: HTMLElement): View {
@@ -116,20 +106,12 @@ export class Stage {
     this.draw();
   }
 
-  /** Has the programs of an object compiled beside the page's work; nothing is drawn until they are there. */
-  prepare(object: Object3D) {
-    if (!this.renderer?.extensions.has('KHR_parallel_shader_compile')) return;
-    this.preparing++;
-    void this.renderer.compileAsync(object, this.camera).catch(() => {}).finally(() => {
-      this.preparing--;
-      this.draw();
-    });
-  }
-  private preparing = 0;
-  private readonly camera = new PerspectiveCamera();
-
   draw() {
-    if (!this.asked) this.asked = requestAnimationFrame(() => this.paint());
+    if (this.drawing) this.again = true;
+    else if (!this.asked) {
+      this.asked = true;
+      this.soon.port2.postMessage(null);
+    }
   }
 
   moved() {
@@ -138,30 +120,28 @@ export class Stage {
   }
 
   private paint() {
-    this.asked = 0;
-    const { renderer, canvas, host } = this;
-    if (!renderer || this.preparing) return;
-    this.frames++;
-    const whole = host.getBoundingClientRect();
-    const ratio = renderer.getPixelRatio();
-    if (canvas.width !== Math.floor(whole.width * ratio) || canvas.height !== Math.floor(whole.height * ratio))
-      renderer.setSize(whole.width, whole.height);
-    renderer.setClearColor(0, 0);
-    renderer.setScissor(0, 0, whole.width, whole.height);
-    renderer.setViewport(0, 0, whole.width, whole.height);
-    renderer.clear();
+    this.asked = false;
+    const whole = this.host.getBoundingClientRect();
+    if (this.host.dataset.failed || whole.width < 2 || whole.height < 2) return;
+    const frames: Frame[] = [];
     for (const view of this.views) {
       const box = view.element.getBoundingClientRect();
       if (box.width < 2 || box.height < 2) continue;
-      const left = box.left - whole.left;
-      const bottom = whole.bottom - box.bottom;
-      renderer.setViewport(left, bottom, box.width, box.height);
-      renderer.setScissor(left, bottom, box.width, box.height);
-      view.orbit.apply(view.camera, box.width / box.height);
-      if (view.content) renderer.render(view.scene, view.camera);
-      view.placeMarkers(box.width, box.height);
+      const look = view.orbit.look(box.width / box.height);
+      view.placeMarkers(look, box.width, box.height);
+      if (view.content) frames.push({ model: view.content.id, left: box.left - whole.left, top: box.top - whole.top, width: box.width, height: box.height, look });
     }
-    this.onDrawn?.();
+    this.drawing = true;
+    order({ op: 'draw', width: whole.width, height: whole.height, frames });
+  }
+
+  /** The event is for those who measure; nothing else depends on it. */
+  private drawn() {
+    this.drawing = false;
+    this.host.dispatchEvent(new Event('drawn'));
+    if (!this.again) return;
+    this.again = false;
+    this.draw();
   }
 }
 

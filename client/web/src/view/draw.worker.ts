@@ -1,0 +1,216 @@
+/// <reference lib="webworker" />
+/** Draws: holds the canvas, the scene objects and their buffers. See messages.ts for what it is told. */
+import {
+  BufferAttribute, BufferGeometry, Color, Group, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, PerspectiveCamera, Points,
+  PointsMaterial, Scene, ShaderMaterial, Sphere, Vector3, WebGLRenderer, type Material, type Object3D,
+} from 'three';
+import { FIELD, type Look } from './camera';
+import type { Paint, Rgb } from './colors';
+import type { Faults, Frame, Order, Report, Surface } from './messages';
+import { DENSE, SLOTS, surfaceMaterial, wireMaterial } from './surface';
+
+const BALL = new Sphere(new Vector3(), 4);
+const tell = (report: Report) => self.postMessage(report);
+
+function dispose(object: Object3D) {
+  object.traverse((part) => {
+    const { geometry, material } = part as Partial<Mesh>;
+    geometry?.dispose();
+    (material as Material | undefined)?.dispose();
+  });
+}
+
+/** The buffers of a surface; several models may draw them. */
+class Buffers {
+  readonly position: BufferAttribute;
+  readonly normal: BufferAttribute;
+  readonly index: BufferAttribute;
+  readonly edges: BufferAttribute;
+  readonly targets: { move: BufferAttribute; turn: BufferAttribute }[];
+  readonly slots: number;
+  readonly dense: boolean;
+
+  constructor({ position, normal, index, edges, targets = [] }: Surface) {
+    this.position = new BufferAttribute(position, 3);
+    this.normal = normal === position ? this.position : new BufferAttribute(normal, 3);
+    this.index = new BufferAttribute(index, 1);
+    this.edges = new BufferAttribute(edges, 1);
+    this.targets = targets.map((t) => ({ move: new BufferAttribute(t.position, 3), turn: new BufferAttribute(t.normal, 3) }));
+    this.slots = Math.min(targets.length, SLOTS);
+    this.dense = index.length >= 3 * DENSE;
+  }
+
+  geometry(index: BufferAttribute, normals: boolean): BufferGeometry {
+    const made = new BufferGeometry();
+    made.setAttribute('position', this.position);
+    if (normals) made.setAttribute('normal', this.normal);
+    made.setIndex(index);
+    made.boundingSphere = BALL;
+    return made;
+  }
+}
+
+class Model {
+  readonly group = new Group();
+  private readonly mesh: Mesh<BufferGeometry, ShaderMaterial>;
+  private lines: LineSegments<BufferGeometry, ShaderMaterial> | null = null;
+  private extra: Group | null = null;
+  private current: number[] = [];
+
+  constructor(readonly buffers: Buffers, paint: Paint, scale = 1) {
+    this.mesh = new Mesh(buffers.geometry(buffers.index, true), surfaceMaterial(paint, buffers.slots, buffers.dense));
+    this.mesh.frustumCulled = false;
+    this.group.scale.setScalar(scale);
+    this.group.add(this.mesh);
+    this.weights(buffers.targets.map(() => 0));
+  }
+
+  paint(paint: Paint) {
+    const old = this.mesh.material;
+    this.mesh.material = surfaceMaterial(paint, this.buffers.slots, this.buffers.dense);
+    old.dispose();
+    this.weights(this.current);
+  }
+
+  color(color: Rgb) {
+    this.mesh.material.uniforms.base.value = color;
+  }
+
+  attribute(name: string, data: Float32Array) {
+    this.mesh.geometry.setAttribute(name, new BufferAttribute(data, name === 'value' ? 1 : 3));
+  }
+
+  /** The targets with the largest weights take the slots. */
+  weights(weights: number[]) {
+    this.current = weights;
+    const { slots, targets } = this.buffers;
+    if (!slots) return;
+    const taken = [...weights.keys()].sort((a, b) => Math.abs(weights[b]) - Math.abs(weights[a])).slice(0, slots).sort((a, b) => a - b);
+    for (const object of [this.mesh, this.lines]) {
+      if (!object) continue;
+      taken.forEach((k, slot) => {
+        object.geometry.setAttribute(`move${slot}`, targets[k].move);
+        if (object === this.mesh) object.geometry.setAttribute(`turn${slot}`, targets[k].turn);
+      });
+      object.material.uniforms.weight.value = taken.map((k) => weights[k]);
+    }
+  }
+
+  wireframe(shown: boolean, color: Rgb) {
+    if (shown && !this.lines) {
+      this.lines = new LineSegments(this.buffers.geometry(this.buffers.edges, false), wireMaterial(this.buffers.slots));
+      this.lines.frustumCulled = false;
+      this.group.add(this.lines);
+      this.weights(this.current);
+    }
+    if (!this.lines) return;
+    this.lines.visible = shown;
+    this.lines.material.uniforms.base.value = color;
+    this.lines.material.uniforms.strength.value = this.buffers.dense ? 0.2 : 0.42;
+  }
+
+  faults(faults: Faults | null) {
+    if (this.extra) {
+      this.group.remove(this.extra);
+      dispose(this.extra);
+    }
+    this.extra = null;
+    if (!faults) return;
+    const red = new Color('#e5383b');
+    const extra = (this.extra = new Group());
+    const add = (data: Float32Array, make: (g: BufferGeometry) => Mesh | LineSegments | Points) => {
+      if (!data.length) return;
+      const shape = new BufferGeometry();
+      shape.setAttribute('position', new BufferAttribute(data, 3));
+      shape.boundingSphere = BALL;
+      const object = make(shape);
+      object.frustumCulled = false;
+      extra.add(object);
+    };
+    add(faults.triangles, (g) => new Mesh(g, new MeshBasicMaterial({ color: red, transparent: true, opacity: 0.75 })));
+    add(faults.lines, (g) => new LineSegments(g, new LineBasicMaterial({ color: red, depthTest: false })));
+    add(faults.lines, (g) => new Points(g, new PointsMaterial({ color: red, size: 5, sizeAttenuation: false, depthTest: false })));
+    add(faults.points, (g) => new Points(g, new PointsMaterial({ color: red, size: 10, sizeAttenuation: false, depthTest: false })));
+    this.group.add(extra);
+  }
+}
+
+const models = new Map<number, Model>();
+const scene = new Scene();
+scene.matrixWorldAutoUpdate = true;
+const camera = new PerspectiveCamera(FIELD, 1);
+camera.matrixAutoUpdate = false;
+let renderer: WebGLRenderer | null = null;
+
+function start(canvas: OffscreenCanvas, ratio: number) {
+  try {
+    renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
+    renderer.debug.checkShaderErrors = import.meta.env.DEV;
+    renderer.setScissorTest(true);
+    renderer.setPixelRatio(ratio);
+    canvas.addEventListener('webglcontextrestored', () => tell({ op: 'restored' }));
+  } catch {
+    // told below
+  }
+  tell({ op: 'started', works: renderer !== null });
+}
+
+function stand({ eye, right, up, back, near, far, aspect }: Look) {
+  camera.matrix.copy(new Matrix4().makeBasis(new Vector3(...right), new Vector3(...up), new Vector3(...back)).setPosition(...eye));
+  camera.near = near;
+  camera.far = far;
+  camera.aspect = aspect;
+  camera.updateProjectionMatrix();
+  camera.updateMatrixWorld(true);
+}
+
+function draw(width: number, height: number, frames: Frame[]) {
+  if (!renderer) return;
+  const ratio = renderer.getPixelRatio();
+  const { domElement: canvas } = renderer;
+  if (canvas.width !== Math.floor(width * ratio) || canvas.height !== Math.floor(height * ratio)) renderer.setSize(width, height, false);
+  renderer.setClearColor(0, 0);
+  renderer.setScissor(0, 0, width, height);
+  renderer.setViewport(0, 0, width, height);
+  renderer.clear();
+  for (const frame of frames) {
+    const model = models.get(frame.model);
+    if (!model) continue;
+    const bottom = height - frame.top - frame.height;
+    renderer.setViewport(frame.left, bottom, frame.width, frame.height);
+    renderer.setScissor(frame.left, bottom, frame.width, frame.height);
+    stand(frame.look);
+    scene.add(model.group);
+    renderer.render(scene, camera);
+    scene.remove(model.group);
+  }
+}
+
+function carryOut(order: Order) {
+  if (order.op === 'start') return start(order.canvas, order.ratio);
+  if (order.op === 'draw')
+    return void requestAnimationFrame(() => {
+      draw(order.width, order.height, order.frames);
+      tell({ op: 'drawn' });
+    });
+  if (order.op === 'model') {
+    const buffers = order.surface ? new Buffers(order.surface) : models.get(order.same!)?.buffers;
+    if (buffers) models.set(order.model, new Model(buffers, order.paint, order.scale));
+    return;
+  }
+  const model = models.get(order.model);
+  if (!model) return;
+  switch (order.op) {
+    case 'paint': return model.paint(order.paint);
+    case 'color': return model.color(order.color);
+    case 'attribute': return model.attribute(order.name, order.data);
+    case 'weights': return model.weights(order.weights);
+    case 'wireframe': return model.wireframe(order.shown, order.color);
+    case 'faults': return model.faults(order.faults);
+    case 'dispose':
+      dispose(model.group);
+      models.delete(order.model);
+  }
+}
+
+self.onmessage = ({ data }: MessageEvent<Order>) => carryOut(data);

@@ -1,0 +1,42 @@
+/** What the page tells the drawing worker, and hears from it. Models are known by number. */
+import type { Look } from './camera';
+import type { Paint, Rgb } from './colors';
+
+export interface Surface {
+  position: Float32Array;
+  normal: Float32Array;
+  index: Uint32Array;
+  edges: Uint32Array;
+  targets?: { position: Float32Array; normal: Float32Array }[];
+}
+
+export interface Faults {
+  lines: Float32Array;
+  points: Float32Array;
+  triangles: Float32Array;
+}
+
+/** One view to be drawn: pixels of the page from the left and the top of the canvas. */
+export interface Frame {
+  model: number;
+  left: number;
+  top: number;
+  width: number;
+  height: number;
+  look: Look;
+}
+
+export type Order =
+  | { op: 'start'; canvas: OffscreenCanvas; ratio: number }
+  | { op: 'draw'; width: number; height: number; frames: Frame[] }
+  /** `same`: the number of a model whose buffers it shares */
+  | { op: 'model'; model: number; surface?: Surface; same?: number; scale?: number; paint: Paint }
+  | { op: 'paint'; model: number; paint: Paint }
+  | { op: 'color'; model: number; color: Rgb }
+  | { op: 'attribute'; model: number; name: 'value' | 'tone'; data: Float32Array }
+  | { op: 'weights'; model: number; weights: number[] }
+  | { op: 'wireframe'; model: number; shown: boolean; color: Rgb }
+  | { op: 'faults'; model: number; faults: Faults | null }
+  | { op: 'dispose'; model: number };
+
+export type Report = { op: 'started'; works: boolean } | { op: 'drawn' } | { op: 'restored' };
