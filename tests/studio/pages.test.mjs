@@ -3,7 +3,7 @@ import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { readFile } from 'node:fs/promises';
-import { addFiles, button, difference, openPage, sample, startBrowser, startDaemon, until } from './support.mjs';
+import { addFiles, button, difference, openPage, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
 
 let daemon;
 let browser;
@@ -100,7 +100,7 @@ test('every control has a name', async () => {
 test('keys turn the view and change the page; at rest nothing is drawn', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
-  await page.waitForTimeout(600);
+  await settled(page);
   const still = await page.locator('.stage-area').screenshot();
   const frames = await page.evaluate(() => {
     let count = 0;
@@ -110,11 +110,11 @@ test('keys turn the view and change the page; at rest nothing is drawn', async (
   assert.equal(frames, 0, 'no drawing while nothing changes');
   await page.locator('.pane-view').first().focus();
   for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowLeft');
-  await page.waitForTimeout(200);
+  await settled(page);
   const turned = await page.locator('.stage-area').screenshot();
   assert.ok((await difference(browser, still, turned)) > 0.01, 'the view has turned');
   await page.keyboard.press('0');
-  await page.waitForTimeout(200);
+  await settled(page);
   // the ring of the focus is there now, and little else may differ
   assert.ok((await difference(browser, still, await page.locator('.stage-area').screenshot())) < 0.01, 'the view is as at first');
   await page.keyboard.press('2');

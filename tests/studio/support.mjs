@@ -145,3 +145,10 @@ export async function clickView(page, index, x, y) {
 
 export const json = async (url, path, init) => (await fetch(url + path, init)).json();
 export const bytes = (path) => readFileSync(path);
+
+/** Until the stage has nothing left to draw, and the browser has shown it. */
+export async function settled(page) {
+  await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 50)));
+  await until(() => page.evaluate(() => document.querySelector('.stage')?.dataset.busy === undefined), 'the stage has drawn');
+  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+}

@@ -2,7 +2,7 @@
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
-import { addFiles, button, clickView, countPixels, difference, json, openPage, sample, startBrowser, startDaemon, until } from './support.mjs';
+import { addFiles, button, clickView, countPixels, difference, json, openPage, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
 
 let daemon;
 let browser;
@@ -22,7 +22,6 @@ const seek = (page, value) => scrubber(page).evaluate((input, v) => {
   input.value = String(v);
   input.dispatchEvent(new Event('input', { bubbles: true }));
 }, value);
-const settled = (page) => page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 
 /** Three landmarks, each on both shapes, at places where both have surface. */
 async function pickThree(page) {

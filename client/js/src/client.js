@@ -126,6 +126,16 @@ export class Orbmorph {
     return (await this.request(`/v1/supermeshes/${id}/asset.glb`, options)).arrayBuffer();
   }
 
+  /** The binary PLY of shape `k` on the sphere that all shapes share. -> ArrayBuffer */
+  async alignedSphere(id, k, options) {
+    return (await this.request(`/v1/supermeshes/${id}/spheres/${k}.ply`, options)).arrayBuffer();
+  }
+
+  /** Where every vertex lies in the uploaded files, as bytes (docs/places.md). -> ArrayBuffer */
+  async places(id, options) {
+    return (await this.request(`/v1/supermeshes/${id}/places`, options)).arrayBuffer();
+  }
+
   deleteSupermesh(id, options) {
     return this.json(`/v1/supermeshes/${id}`, { ...options, method: 'DELETE' });
   }

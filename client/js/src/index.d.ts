@@ -92,6 +92,7 @@ export interface Supermesh {
   shapes: {
     mesh: string;
     name: string;
+    sphere?: string;
     hausdorff_relative: number;
     hausdorff_sampled_relative?: number;
     rms_relative: number;
@@ -200,6 +201,8 @@ export class Orbmorph {
   merge(request: SupermeshRequest, options?: WatchOptions): Promise<Supermesh>;
   getSupermesh(id: string, options?: RequestOptions): Promise<Supermesh>;
   asset(id: string, options?: RequestOptions): Promise<ArrayBuffer>;
+  alignedSphere(id: string, k: number, options?: RequestOptions): Promise<ArrayBuffer>;
+  places(id: string, options?: RequestOptions): Promise<ArrayBuffer>;
   deleteSupermesh(id: string, options?: RequestOptions): Promise<void>;
   getJob(job: string | Job, options?: RequestOptions & { wait?: number }): Promise<Job>;
   cancelJob(job: string | Job, options?: RequestOptions): Promise<Job | null>;

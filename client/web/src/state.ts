@@ -21,7 +21,9 @@ export interface Shape {
   problem?: Problem;
   message?: string;
   faults?: number;
+  /** the embedding, and the sphere after the alignment of the result that is named */
   sphere?: SphereState;
+  aligned?: SphereState & { result: string };
   error?: { result: string; values: Float32Array; max: number; rms: number; model: Model };
 }
 
@@ -35,6 +37,8 @@ export interface SphereState {
   ball?: Model;
   normals?: Float32Array;
   places?: Float32Array;
+  /** of the landmarks, by their ids */
+  spots?: Map<number, [number, number, number]>;
 }
 
 export interface Landmark {
@@ -92,6 +96,7 @@ export interface State {
   wire: boolean;
   linked: boolean;
   paint: SpherePaint;
+  side: 'before' | 'after';
   drawer: 'server' | 'share' | 'help' | null;
   server: { meshes: Mesh[]; supermeshes: Supermesh[]; jobs: Job[]; message: string | null; loading: boolean } | null;
   toasts: { id: number; text: string; kind: 'info' | 'error' }[];
@@ -101,7 +106,7 @@ export interface State {
 export const state: State = {
   tab: 'shapes', shapes: [], landmarks: [], active: null, past: [], future: [], options: { ...DEFAULTS },
   running: null, problem: null, loading: null, result: null, playing: false, mix: null, show: 'morph', wire: false, linked: true,
-  paint: 'direction', drawer: null, server: null, toasts: [], dragging: false,
+  paint: 'direction', side: 'before', drawer: null, server: null, toasts: [], dragging: false,
 };
 
 export const client = new Orbmorph({ server: '' });

@@ -68,6 +68,7 @@ function encode(): string {
     .join(';'));
   if (encodeOptions(state.options) !== encodeOptions(DEFAULTS)) put('o', encodeOptions(state.options));
   if (state.paint !== 'direction') put('paint', state.paint);
+  if (state.side !== 'before') put('side', state.side);
   if (state.show !== 'morph') put('show', state.show);
   if (state.wire) put('wire', '1');
   put('cam', stage.orbit.toString());
@@ -122,6 +123,7 @@ export async function restore() {
     } else if (result) await openSupermesh(result, false);
     const time = Number(query.get('t'));
     if (state.result && query.has('t') && Number.isFinite(time)) player.seek(time);
+    if (state.result && query.get('side') === 'after') set({ side: 'after' });
     if (TABS.includes(tab)) set({ tab });
     const show = query.get('show');
     if (state.result && (show === 'each' || show === 'error')) set({ show });

@@ -121,7 +121,7 @@ export function clearResult(stale = false) {
     shape.error?.model.dispose();
     shape.error = undefined;
   }
-  set({ result: null, mix: null, playing: false, show: 'morph' });
+  set({ result: null, mix: null, playing: false, show: 'morph', side: 'before' });
 }
 
 /** The error of the supermesh on every shape, painted on the original. */

@@ -6,6 +6,7 @@ import { work } from '../mesh/work';
 import { shapeModel } from '../view/models';
 import { forgetShape } from './landmarks';
 import { clearResult } from './merge';
+import { forgetSpheres } from './spheres';
 
 export interface Sample {
   name: string;
@@ -116,8 +117,7 @@ export function removeShape(key: string) {
   if (!shape) return;
   forgetShape(key);
   shape.model?.dispose();
-  shape.sphere?.surface?.dispose();
-  shape.sphere?.ball?.dispose();
+  forgetSpheres(shape);
   shape.error?.model.dispose();
   void work('close', key);
   drawn.delete(key);

@@ -1,48 +1,110 @@
-/** The embeddings of the shapes: asked for when the tab is opened, painted on the surface and on the sphere. */
-import { client, readyShapes, set, state, type Shape, type SpherePaint } from '../state';
+/**
+ * The shapes as spheres, before the alignment (their embeddings) and after it (as the morph has them), painted on the
+ * surface and on the sphere. Asked for when they come into view.
+ */
+import type { Embedding } from 'orbmorph';
+import { client, readyShapes, set, state, type Shape, type SpherePaint, type SphereState } from '../state';
 import { work } from '../mesh/work';
 import { MEASURES, type MeasureName } from '../mesh/distortion';
 import { sphereModels } from '../view/models';
 import { stage } from '../view/shared';
 import type { Paint } from '../view/colors';
 
-export async function loadSpheres() {
-  await Promise.all(readyShapes().map((shape) => (shape.sphere && shape.sphere.state !== 'failed' ? null : load(shape))));
+/** The sphere that is shown of a shape. */
+export const sphereOf = (shape: Shape): SphereState | undefined => (state.side === 'after' ? shape.aligned : shape.sphere);
+
+/** Whether the morph is of these shapes and says where its spheres are. */
+export const canAlign = () => !!state.result && readyShapes().every((shape, i) => {
+  const of = state.result!.supermesh.shapes[i];
+  return of?.mesh === shape.mesh!.id && !!of.sphere;
+});
+
+export function showSide(side: 'before' | 'after') {
+  set({ side });
+  void loadSpheres();
 }
 
-async function load(shape: Shape) {
-  const sphere = (shape.sphere = { state: 'working' } as NonNullable<Shape['sphere']>);
-  set();
-  try {
+export async function loadSpheres() {
+  const { result, side } = state;
+  if (side === 'after' && !canAlign()) return set({ side: 'before' });
+  await Promise.all(readyShapes().map((shape, i) => {
+    const known = sphereOf(shape);
+    const stale = side === 'after' && shape.aligned?.result !== result!.supermesh.id;
+    if (known && known.state !== 'failed' && !stale) return placeLandmarks(shape, side);
+    dropSphere(shape, side);
+    return side === 'after' ? loadAligned(shape, i) : loadEmbedded(shape);
+  }));
+}
+
+function dropSphere(shape: Shape, side: 'before' | 'after') {
+  const old = side === 'after' ? shape.aligned : shape.sphere;
+  old?.surface?.dispose();
+  old?.ball?.dispose();
+}
+
+export function forgetSpheres(shape: Shape) {
+  for (const side of ['before', 'after'] as const) {
+    dropSphere(shape, side);
+    void work('close', `${shape.key} ${side}`);
+  }
+}
+
+async function loadEmbedded(shape: Shape) {
+  const sphere: SphereState = (shape.sphere = { state: 'working' });
+  await load(shape, 'before', sphere, async () => {
     sphere.embedding = await client.embed(shape.mesh!.id, {
       onProgress: (job) => {
         sphere.job = job;
         set();
       },
     });
-    const data = await work('sphere', await client.sphere(sphere.embedding.id));
+    return client.sphere(sphere.embedding.id);
+  });
+}
+
+async function loadAligned(shape: Shape, index: number) {
+  const { supermesh } = state.result!;
+  const sphere = (shape.aligned = { state: 'working', result: supermesh.id } as NonNullable<Shape['aligned']>);
+  await load(shape, 'after', sphere, () => client.alignedSphere(supermesh.id, index));
+}
+
+async function load(shape: Shape, side: 'before' | 'after', sphere: SphereState, fetch: () => Promise<ArrayBuffer>) {
+  set();
+  try {
+    const data = await work('sphere', `${shape.key} ${side}`, await fetch());
     const models = sphereModels(data);
     Object.assign(sphere, { ...models, values: data.values, normals: data.surface.normal, places: data.sphere, state: 'ready' });
-    paintSphere(shape);
+    paintSphere(sphere);
+    await placeLandmarks(shape, side);
   } catch (error) {
     Object.assign(sphere, { state: 'failed', message: (error as Error).message });
   }
   set();
 }
 
+/** Landmarks as they lie on the sphere. */
+async function placeLandmarks(shape: Shape, side: 'before' | 'after') {
+  const sphere = side === 'after' ? shape.aligned : shape.sphere;
+  const here = state.landmarks.filter((landmark) => landmark.at[shape.key]);
+  if (sphere?.state !== 'ready') return;
+  const spots = await work('sphereSpots', `${shape.key} ${side}`, here.map((landmark) => landmark.at[shape.key].position));
+  sphere.spots = new Map(here.map((landmark, i) => [landmark.id, spots[i]]));
+  set();
+}
+
 export const isMeasure = (paint: SpherePaint): paint is MeasureName => (MEASURES as readonly string[]).includes(paint);
+
+const embeddings = (): Embedding[] => state.shapes.flatMap((shape) => shape.sphere?.embedding ?? []);
 
 /** The range over which a measure is painted: the same for every shape, so that they compare. */
 export function measureRange(name: MeasureName): { low: number; high: number } {
-  const p99 = state.shapes.map((shape) => shape.sphere?.embedding?.distortion?.[name]?.p99 ?? 0);
-  const most = Math.max(...p99, 1e-6);
+  const most = Math.max(...embeddings().map((e) => e.distortion?.[name]?.p99 ?? 0), 1e-6);
   if (name !== 'area') return { low: 1, high: Math.max(most, 1.05) };
-  const std = Math.max(...state.shapes.map((s) => s.sphere?.embedding?.distortion?.area?.std ?? 0), 0.05);
+  const std = Math.max(...embeddings().map((e) => e.distortion?.area?.std ?? 0), 0.05);
   return { low: -2.5 * std, high: 2.5 * std };
 }
 
-function paintSphere(shape: Shape) {
-  const { sphere } = shape;
+function paintSphere(sphere: SphereState | undefined) {
   if (!sphere?.surface || !sphere.ball) return;
   const { paint } = state;
   let with_: Paint;
@@ -60,5 +122,8 @@ function paintSphere(shape: Shape) {
 
 export function setPaint(paint: SpherePaint) {
   set({ paint });
-  for (const shape of state.shapes) paintSphere(shape);
+  for (const shape of state.shapes) {
+    paintSphere(shape.sphere);
+    paintSphere(shape.aligned);
+  }
 }

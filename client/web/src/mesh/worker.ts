@@ -5,7 +5,7 @@
  */
 import { Bvh } from './bvh';
 import { decodeMorph, type MorphData } from './morph';
-import { decodeSphere } from './distortion';
+import { decodeSphere, type SphereData } from './distortion';
 import { buildDisplay, faultyEdges, loosePieces, type Display, type Frame } from './geometry';
 import { parseMesh, type RawMesh } from './parse';
 import { proposeLandmarks } from './propose';
@@ -19,6 +19,7 @@ interface Held {
 
 const held = new Map<string, Held>();
 const morphs = new Map<string, MorphData>();
+const spheres = new Map<string, { surface: Float32Array; index: Uint32Array; place: Float32Array; bvh?: Bvh }>();
 
 export interface Spot {
   /** where it is, in view coordinates, and the surface's normal there */
@@ -98,6 +99,7 @@ const ops = {
   close(key: string) {
     held.delete(key);
     morphs.delete(key);
+    spheres.delete(key);
   },
 
   pick(key: string, origin: number[], direction: number[]): Spot | null {
@@ -182,7 +184,27 @@ const ops = {
     return proposeLandmarks(decodeMorph(buffer, shapeCount), count);
   },
 
-  sphere: decodeSphere,
+  /** The surface and the sphere of a PLY of the daemon; kept under `key` for sphereSpots(). */
+  sphere(key: string, buffer: ArrayBuffer): SphereData {
+    const data = decodeSphere(buffer);
+    spheres.set(key, { surface: data.surface.position.slice(), index: data.surface.index.slice(), place: data.sphere.slice() });
+    return data;
+  },
+
+  /** Where points of a surface (in view coordinates) are on its sphere. */
+  sphereSpots(key: string, points: number[][]): [number, number, number][] {
+    const sphere = spheres.get(key);
+    if (!sphere) return [];
+    const { index, place } = sphere;
+    const bvh = (sphere.bvh ??= new Bvh(sphere.surface, index));
+    return points.map(([x, y, z]) => {
+      const hit = bvh.closest(x, y, z)!;
+      const weights = [1 - hit.u - hit.v, hit.u, hit.v];
+      const p = [0, 1, 2].map((k) => weights.reduce((sum, w, c) => sum + w * place[3 * index[3 * hit.triangle + c] + k], 0));
+      const l = Math.hypot(p[0], p[1], p[2]) || 1;
+      return [p[0] / l, p[1] / l, p[2] / l];
+    });
+  },
 
   /**
    * For each vertex drawn of a shape its distance from the supermesh, relative to the shape's diagonal. Where the asset

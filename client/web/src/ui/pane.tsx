@@ -3,8 +3,8 @@ import type { ComponentChildren } from 'preact';
 import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import { stage } from '../view/shared';
 import type { Marker, View } from '../view/stage';
-import type { Model } from '../view/models';
-import { hue, set, state, type Shape } from '../state';
+import { BALL_SCALE, type Model } from '../view/models';
+import { hue, set, state, type Shape, type SphereState } from '../state';
 import { moveOn, pickOn, removeLandmark } from '../actions/landmarks';
 import { isDark } from '../theme';
 
@@ -14,10 +14,12 @@ interface PaneProps {
   wire?: boolean;
   pickable?: Shape;
   markers?: Shape;
+  /** landmarks as they lie on a ball */
+  spots?: SphereState;
   children?: ComponentChildren;
 }
 
-export function Pane({ label, model, wire = false, pickable, markers, children }: PaneProps) {
+export function Pane({ label, model, wire = false, pickable, markers, spots, children }: PaneProps) {
   const element = useRef<HTMLDivElement>(null);
   const view = useRef<View | null>(null);
 
@@ -38,6 +40,7 @@ export function Pane({ label, model, wire = false, pickable, markers, children }
       <div class="pane-view" ref={element} tabIndex={0} role="application" aria-roledescription="3D view"
         aria-label={`${label}. Arrow keys turn, plus and minus zoom, 0 resets${pickable ? ', Enter sets a landmark in the middle' : ''}.`}>
         {markers && <Markers shape={markers} view={view} />}
+        {spots?.spots && spots.spots.size > 0 && <Spots spots={spots.spots} view={view} />}
       </div>
       {children}
     </section>
@@ -90,6 +93,26 @@ function Markers({ shape, view }: { shape: Shape; view: { current: View | null }
           {index + 1}
         </button>
       ))}
+    </div>
+  );
+}
+
+/** Landmarks on a ball: numbers to be seen, not to be moved. */
+function Spots({ spots, view }: { spots: Map<number, [number, number, number]>; view: { current: View | null } }) {
+  const box = useRef<HTMLDivElement>(null);
+  const here = state.landmarks.map((landmark, index) => ({ landmark, index })).filter(({ landmark }) => spots.has(landmark.id));
+  useEffect(() => {
+    const marks = [...box.current!.children] as HTMLElement[];
+    view.current!.markers = here.map(({ landmark }, i): Marker => {
+      const normal = spots.get(landmark.id)!;
+      return { position: normal.map((x) => x * BALL_SCALE) as [number, number, number], normal, element: marks[i] };
+    });
+    stage.draw();
+    return () => void (view.current && (view.current.markers = []));
+  });
+  return (
+    <div class="markers" ref={box} aria-hidden="true">
+      {here.map(({ landmark, index }) => <span key={landmark.id} class="marker small" style={{ '--hue': hue(index) }}>{index + 1}</span>)}
     </div>
   );
 }

@@ -66,12 +66,12 @@ export function Switch({ label, on, onChange }: { label: string; on: boolean; on
 }
 
 export function Segments<T extends string>({ label, value, items, onChange }: {
-  label: string; value: T; items: { value: T; label: string; hint?: string }[]; onChange: (value: T) => void;
+  label: string; value: T; items: { value: T; label: string; hint?: string; off?: boolean }[]; onChange: (value: T) => void;
 }) {
   return (
     <div class="segments" role="group" aria-label={label}>
       {items.map((item) => (
-        <button type="button" key={item.value} aria-pressed={item.value === value} title={item.hint} onClick={() => onChange(item.value)}>
+        <button type="button" key={item.value} aria-pressed={item.value === value} title={item.hint} disabled={item.off} onClick={() => onChange(item.value)}>
           {item.label}
         </button>
       ))}

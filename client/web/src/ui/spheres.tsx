@@ -2,7 +2,7 @@
 import { useEffect } from 'preact/hooks';
 import type { Measure } from 'orbmorph';
 import { PAINTS, readyShapes, state, tint, type Shape, type SpherePaint } from '../state';
-import { isMeasure, loadSpheres, measureRange, setPaint } from '../actions/spheres';
+import { canAlign, isMeasure, loadSpheres, measureRange, setPaint, showSide, sphereOf } from '../actions/spheres';
 import { Bar, Segments } from './parts';
 import { Pane } from './pane';
 import { Legend } from './morph';
@@ -21,11 +21,11 @@ const MEANING: Record<SpherePaint, string> = {
 
 export function SpheresStage() {
   const shapes = readyShapes();
-  useEffect(() => void loadSpheres(), [shapes.map((s) => s.key).join()]);
+  useEffect(() => void loadSpheres(), [shapes.map((s) => s.key).join(), state.result, state.side]);
   return (
     <div class="grid pairs" data-count={shapes.length * 2}>
       {shapes.map((shape) => {
-        const { sphere } = shape;
+        const sphere = sphereOf(shape);
         const index = state.shapes.indexOf(shape);
         return [
           <Pane key={`${shape.key}a`} label={`${shape.name}, surface`} model={sphere?.surface} wire={state.wire}>
@@ -36,8 +36,8 @@ export function SpheresStage() {
             {sphere?.state === 'working' && <div class="centered"><Bar label={`Mapping ${shape.name} to the sphere`} value={sphere.job?.progress ?? null} /></div>}
             {sphere?.state === 'failed' && <div class="centered"><p class="red">{sphere.message}</p></div>}
           </Pane>,
-          <Pane key={`${shape.key}b`} label={`${shape.name}, sphere`} model={sphere?.ball} wire={state.wire}>
-            <div class="caption"><span class="muted">on the sphere</span></div>
+          <Pane key={`${shape.key}b`} label={`${shape.name}, sphere ${state.side} the alignment`} model={sphere?.ball} wire={state.wire} spots={sphere}>
+            <div class="caption"><span class="muted">{state.side === 'after' ? 'on the common sphere' : 'on its own sphere'}</span></div>
           </Pane>,
         ];
       })}
@@ -51,6 +51,12 @@ export function SpheresInspector() {
   return (
     <>
       <h2>Spheres</h2>
+      <Segments label="Alignment" value={state.side} onChange={showSide}
+        items={[{ value: 'before', label: 'Before alignment' }, { value: 'after', label: 'After', off: !canAlign(), hint: canAlign() ? undefined : 'Morph the shapes first' }]} />
+      <p class="hint">
+        {state.side === 'after' ? 'Every shape on the one sphere that all share: what lies at the same place corresponds.'
+          : canAlign() ? 'Each shape mapped to a sphere by itself.' : 'Each shape mapped to a sphere by itself. Morph them to see the spheres brought into line.'}
+      </p>
       <Segments label="Colour" value={paint} onChange={setPaint} items={PAINTS.map((value) => ({ value, label: NAMES[value] }))} />
       <p class="hint">{MEANING[paint]}</p>
       {range && <Legend ramp={paint === 'area' ? 'diverging' : 'heat'} low={range.low.toFixed(2)} high={range.high.toFixed(2)} label={`${NAMES[paint]}${paint === 'area' ? '' : ', logarithmic'}`} />}

@@ -76,10 +76,11 @@ export function morphModels(d: MorphData, count: number, color: string): Model[]
 
 const WHITE: Paint = { kind: 'plain', color: '#ffffff' };
 
-/** A ball over the triangles of a surface. `place`: of each vertex, on the unit sphere. */
-export const ballModel = (surface: Surface, place: Float32Array) =>
-  // a ball fills its box more than a shape does
-  new Model({ surface: { position: place, normal: place, index: surface.index, edges: surface.edges }, scale: 0.72 }, WHITE);
+/** A ball fills its box more than a shape does. */
+export const BALL_SCALE = 0.72;
 
 /** The surface and the sphere of an embedding. */
-export const sphereModels = ({ surface, sphere }: SphereData) => ({ ball: ballModel(surface, sphere), surface: new Model({ surface }, WHITE) });
+export const sphereModels = ({ surface, sphere }: SphereData) => ({
+  surface: new Model({ surface }, WHITE),
+  ball: new Model({ surface: { position: sphere, normal: sphere, index: surface.index, edges: surface.edges }, scale: BALL_SCALE }, WHITE),
+});

@@ -107,6 +107,7 @@ export class Stage {
   }
 
   draw() {
+    this.host.dataset.busy = '';
     if (this.drawing) this.again = true;
     else if (!this.asked) {
       this.asked = true;
@@ -122,7 +123,7 @@ export class Stage {
   private paint() {
     this.asked = false;
     const whole = this.host.getBoundingClientRect();
-    if (this.host.dataset.failed || whole.width < 2 || whole.height < 2) return;
+    if (this.host.dataset.failed || whole.width < 2 || whole.height < 2) return void delete this.host.dataset.busy;
     const frames: Frame[] = [];
     for (const view of this.views) {
       const box = view.element.getBoundingClientRect();
@@ -135,11 +136,11 @@ export class Stage {
     order({ op: 'draw', width: whole.width, height: whole.height, frames });
   }
 
-  /** The event is for those who measure; nothing else depends on it. */
+  /** The event and the mark are for those who measure and take pictures; nothing else depends on them. */
   private drawn() {
     this.drawing = false;
     this.host.dispatchEvent(new Event('drawn'));
-    if (!this.again) return;
+    if (!this.again) return void delete this.host.dataset.busy;
     this.again = false;
     this.draw();
   }
