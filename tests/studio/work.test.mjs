@@ -1,8 +1,12 @@
 // What a modeller does, from the empty page to the file on disk.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
-import { readFile } from 'node:fs/promises';
-import { addFiles, button, clickView, countPixels, difference, json, openPage, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
+import { execFile } from 'node:child_process';
+import { mkdtemp, readFile, rm } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { promisify } from 'node:util';
+import { addFiles, button, clickView, countPixels, difference, json, openPage, root, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
 
 let daemon;
 let browser;
@@ -263,11 +267,16 @@ test('what is on the server is listed and opened', async () => {
   await done();
 });
 
-test('spheres: certified, painted, measured', async () => {
+test('spheres before and after the alignment: certified, painted, measured', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await button(page, 'Landmarks').click();
+  await page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
+  await until(() => landmarks(page).count(), 'landmarks');
+  const count = await landmarks(page).count();
   await button(page, 'Spheres').click();
   await until(() => page.getByText('Certified one to one').count().then((n) => n === 2), 'both are embedded');
+  assert.ok(await button(page, 'After', { exact: true }).isDisabled(), 'there is no morph yet');
   const shots = [];
   for (const name of ['Normals', 'Checkerboard', 'Stretch', 'Areas']) {
     await button(page, name).click();
@@ -276,6 +285,74 @@ test('spheres: certified, painted, measured', async () => {
   }
   for (let i = 1; i < shots.length; i++) assert.ok((await difference(browser, shots[i - 1], shots[i])) > 0.03, `paint ${i} differs from the one before`);
   assert.equal(await page.getByRole('img', { name: /^Histogram/ }).count(), 2);
+
+  // Where each landmark is on the two balls, in pixels of its own view.
+  const spots = () => page.evaluate(() => [...document.querySelectorAll('.pane-view:has(.marker.small)')].map((view) => {
+    const box = view.getBoundingClientRect();
+    return [...view.querySelectorAll('.marker.small')].map((mark) => {
+      const m = mark.getBoundingClientRect();
+      return [m.x + m.width / 2 - box.x, m.y + m.height / 2 - box.y];
+    });
+  }));
+  const gap = ([a, b]) => Math.max(...a.map((p, i) => Math.hypot(p[0] - b[i][0], p[1] - b[i][1])));
+  const before = await spots();
+  assert.deepEqual(before.map((list) => list.length), [count, count]);
+  assert.ok(gap(before) > 20, 'by themselves the spheres do not correspond');
+  await morph(page);
+  await button(page, 'Pause').click();
+  await button(page, 'Spheres').click();
+  await button(page, 'After', { exact: true }).click();
+  await until(() => page.getByText('on the common sphere').count().then((n) => n === 2), 'the aligned spheres');
+  await until(() => page.locator('.marker.small').count().then((n) => n === 2 * count), 'with their landmarks');
+  await settled(page);
+  assert.ok(gap(await spots()) < 1, 'after the alignment landmarks coincide');
+  await until(() => /side=after/.test(page.url()), 'the address says so');
+  const shown = await page.locator('.pane').nth(1).screenshot();
+  await page.reload();
+  await until(() => page.getByText('on the common sphere').count().then((n) => n === 2), 'also after a reload');
+  await until(() => page.locator('.marker.small').count().then((n) => n === 2 * count), 'with their landmarks');
+  await settled(page);
+  await until(async () => (await difference(browser, shown, await page.locator('.pane').nth(1).screenshot())) < 0.01, 'it looks the same');
+  await done();
+});
+
+test('the lines and pages that are offered show this very morph', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await button(page, 'Landmarks').click();
+  await page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
+  await until(() => landmarks(page).count(), 'landmarks');
+  await morph(page);
+  await button(page, 'Pause').click();
+  await button(page, 'Use it').click();
+  const text = (title) => page.getByRole('region', { name: `${title}: code` }).textContent();
+  const asset = Buffer.from(await (await fetch(await text('Asset'))).arrayBuffer());
+
+  const folder = await mkdtemp(join(tmpdir(), 'orbmorph-curl-'));
+  const { stdout } = await promisify(execFile)('bash', ['-e', '-c', await text('curl')], { cwd: folder });
+  assert.deepEqual(await readFile(join(folder, 'morph.glb')), asset, 'curl brings the same bytes');
+  assert.equal(`${daemon.url}${JSON.parse(stdout).asset}`, await text('Asset'), 'the request names the same morph');
+  await rm(folder, { recursive: true });
+
+  // The page as it would stand on another site; what it loads from a content network comes from the packages here.
+  const html = await text('three.js');
+  const context = await browser.newContext({ viewport: { width: 400, height: 300 } });
+  const other = await context.newPage();
+  const faults = [];
+  other.on('pageerror', (error) => faults.push(error.stack));
+  const site = `${daemon.url}/page-of-somebody`;
+  await context.route('https://cdn.jsdelivr.net/npm/three@*/**', (route) =>
+    route.fulfill({ path: join(root, 'client/web/node_modules/three', new URL(route.request().url()).pathname.replace(/^\/npm\/three@[^/]+\//, '')) }));
+  await context.route(site, (route) => route.fulfill({ contentType: 'text/html', body: html }));
+  await other.goto(site);
+  await other.locator('canvas').waitFor();
+  const ground = (r, g, b) => Math.abs(r - 0xf3) + Math.abs(g - 0xf1) + Math.abs(b - 0xec) > 60 && r + g + b > 60;
+  await until(async () => (await countPixels(other, 'canvas', ground)) > 2000, 'the morph appears');
+  const first = await other.screenshot();
+  await until(async () => (await difference(browser, first, await other.screenshot())) > 0.01, 'and moves');
+  assert.deepEqual(faults, []);
+  await context.close();
+  assert.match(await text('model-viewer'), new RegExp(`<model-viewer src="${await text('Asset')}"`));
   await done();
 });
 

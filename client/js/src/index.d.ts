@@ -188,6 +188,8 @@ export interface ListOptions extends RequestOptions {
 export class Orbmorph {
   constructor(options?: ConnectOptions);
   readonly server: string;
+  /** Sent with every request; may be set at any time. */
+  token: string | undefined;
   url(path: string): string;
   request(path: string, options?: RequestOptions & { method?: string; json?: unknown; headers?: Record<string, string> }): Promise<Response>;
   uploadMesh(source: Source, options?: UploadOptions): Promise<Mesh>;

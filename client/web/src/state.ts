@@ -97,6 +97,9 @@ export interface State {
   linked: boolean;
   paint: SpherePaint;
   side: 'before' | 'after';
+  /** a token is in use; what is said when one is asked for */
+  token: 'none' | 'kept';
+  asking: { reason: string | null } | null;
   drawer: 'server' | 'share' | 'help' | null;
   server: { meshes: Mesh[]; supermeshes: Supermesh[]; jobs: Job[]; message: string | null; loading: boolean } | null;
   toasts: { id: number; text: string; kind: 'info' | 'error' }[];
@@ -106,7 +109,7 @@ export interface State {
 export const state: State = {
   tab: 'shapes', shapes: [], landmarks: [], active: null, past: [], future: [], options: { ...DEFAULTS },
   running: null, problem: null, loading: null, result: null, playing: false, mix: null, show: 'morph', wire: false, linked: true,
-  paint: 'direction', side: 'before', drawer: null, server: null, toasts: [], dragging: false,
+  paint: 'direction', side: 'before', token: 'none', asking: null, drawer: null, server: null, toasts: [], dragging: false,
 };
 
 export const client = new Orbmorph({ server: '' });

@@ -5,6 +5,7 @@ import { work } from '../mesh/work';
 import { morphModels } from '../view/models';
 import { player } from '../player';
 import { takeLandmarks } from './landmarks';
+import { explain } from './token';
 
 export function buildRequest(find = false): SupermeshRequest {
   const { options } = state;
@@ -68,6 +69,8 @@ async function follow(running: Running, get: () => Promise<Supermesh>, request: 
 }
 
 function tell(error: unknown) {
+  if (error instanceof ProblemError && (error.status === 401 || error.status === 403))
+    return { title: 'Not with this token', detail: explain(error), facts: null };
   if (error instanceof ProblemError) return { title: error.title || 'The daemon refused', detail: error.detail, facts: error.problem };
   return { title: 'That did not work', detail: (error as Error).message, facts: null };
 }

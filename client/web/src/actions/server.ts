@@ -5,6 +5,7 @@ import { addFromServer, removeShape } from './shapes';
 import { openResult, resumeJob } from './merge';
 import { takeLandmarks } from './landmarks';
 import { player } from '../player';
+import { explain } from './token';
 
 export async function loadServer() {
   set({ server: { meshes: [], supermeshes: [], jobs: [], message: null, ...state.server, loading: true } });
@@ -16,7 +17,7 @@ export async function loadServer() {
     ]);
     set({ server: { meshes: meshes.items, supermeshes: supermeshes.items, jobs: jobs.items, message: null, loading: false } });
   } catch (error) {
-    set({ server: { meshes: [], supermeshes: [], jobs: [], message: (error as Error).message, loading: false } });
+    set({ server: { meshes: [], supermeshes: [], jobs: [], message: explain(error), loading: false } });
   }
 }
 
@@ -35,7 +36,7 @@ export async function openSupermesh(id: string, play = true) {
     set({ tab: 'morph', show: 'morph' });
     if (play) player.play();
   } catch (error) {
-    toast((error as Error).message, 'error');
+    toast(explain(error), 'error');
   }
 }
 
@@ -56,7 +57,7 @@ export async function watchJob(id: string) {
 }
 
 export async function cancelJob(id: string) {
-  await client.cancelJob(id).catch((error: Error) => toast(error.message, 'error'));
+  await client.cancelJob(id).catch((error) => toast(explain(error), 'error'));
   await loadServer();
 }
 
@@ -64,7 +65,7 @@ export async function remove(kind: 'mesh' | 'supermesh', item: Mesh | Supermesh)
   try {
     await (kind === 'mesh' ? client.deleteMesh(item.id) : client.deleteSupermesh(item.id));
   } catch (error) {
-    toast((error as Error).message, 'error');
+    toast(explain(error), 'error');
   }
   await loadServer();
 }

@@ -7,6 +7,7 @@ import { shapeModel } from '../view/models';
 import { forgetShape } from './landmarks';
 import { clearResult } from './merge';
 import { forgetSpheres } from './spheres';
+import { explain } from './token';
 
 export interface Sample {
   name: string;
@@ -48,7 +49,8 @@ async function send(shape: Shape, repair = state.options.repair) {
     });
     patch(shape, { state: 'ready', mesh, progress: 1 });
   } catch (error) {
-    if (!(error instanceof ProblemError)) return patch(shape, { state: 'failed', message: (error as Error).message });
+    if (!(error instanceof ProblemError) || error.status === 401 || error.status === 403)
+      return patch(shape, { state: 'failed', message: explain(error) });
     patch(shape, { state: 'refused', problem: error.problem });
     await drawn.get(shape.key);
     await showFaults(shape, error);
@@ -107,7 +109,7 @@ export async function addFromServer(mesh: Mesh): Promise<Shape> {
     await draw(shape, await client.meshFile(mesh.id));
     patch(shape, { state: 'ready', progress: 1 });
   } catch (error) {
-    patch(shape, { state: 'failed', message: (error as Error).message });
+    patch(shape, { state: 'failed', message: explain(error) });
   }
   return shape;
 }

@@ -6,6 +6,7 @@ import type { Embedding } from 'orbmorph';
 import { client, readyShapes, set, state, type Shape, type SpherePaint, type SphereState } from '../state';
 import { work } from '../mesh/work';
 import { MEASURES, type MeasureName } from '../mesh/distortion';
+import { explain } from './token';
 import { sphereModels } from '../view/models';
 import { stage } from '../view/shared';
 import type { Paint } from '../view/colors';
@@ -27,13 +28,23 @@ export function showSide(side: 'before' | 'after') {
 export async function loadSpheres() {
   const { result, side } = state;
   if (side === 'after' && !canAlign()) return set({ side: 'before' });
-  await Promise.all(readyShapes().map((shape, i) => {
-    const known = sphereOf(shape);
-    const stale = side === 'after' && shape.aligned?.result !== result!.supermesh.id;
-    if (known && known.state !== 'failed' && !stale) return placeLandmarks(shape, side);
-    dropSphere(shape, side);
-    return side === 'after' ? loadAligned(shape, i) : loadEmbedded(shape);
+  // the embeddings first: their measures give the ranges of the colours and the histograms, on both sides
+  await Promise.all(readyShapes().map((shape) => bring(shape, 'before', () => loadEmbedded(shape))));
+  if (side === 'after') await Promise.all(readyShapes().map((shape, i) => {
+    if (shape.aligned?.result !== result!.supermesh.id) {
+      dropSphere(shape, side);
+      shape.aligned = undefined;
+    }
+    return bring(shape, side, () => loadAligned(shape, i));
   }));
+  for (const shape of state.shapes) for (const sphere of [shape.sphere, shape.aligned]) paintSphere(sphere);
+}
+
+async function bring(shape: Shape, side: 'before' | 'after', make: () => Promise<void>) {
+  const known = side === 'after' ? shape.aligned : shape.sphere;
+  if (known && known.state !== 'failed') return placeLandmarks(shape, side);
+  dropSphere(shape, side);
+  await make();
 }
 
 function dropSphere(shape: Shape, side: 'before' | 'after') {
@@ -77,7 +88,7 @@ async function load(shape: Shape, side: 'before' | 'after', sphere: SphereState,
     paintSphere(sphere);
     await placeLandmarks(shape, side);
   } catch (error) {
-    Object.assign(sphere, { state: 'failed', message: (error as Error).message });
+    Object.assign(sphere, { state: 'failed', message: explain(error) });
   }
   set();
 }

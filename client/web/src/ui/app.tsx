@@ -13,6 +13,8 @@ import { MorphInspector, MorphStage } from './morph';
 import { SpheresInspector, SpheresStage } from './spheres';
 import { Drawer } from './drawers';
 import { Action } from './action';
+import { TokenDialog } from './token';
+import { ask } from '../actions/token';
 
 const TITLES: Record<Tab, string> = { shapes: 'Shapes', landmarks: 'Landmarks', morph: 'Morph', spheres: 'Spheres' };
 
@@ -36,6 +38,7 @@ export function App() {
         )}
       </main>
       {state.drawer && <Drawer />}
+      {state.asking && <TokenDialog />}
       <div class="toasts" role="status" aria-live="polite">
         {state.toasts.map((t) => (
           <div class={`toast ${t.kind}`} key={t.id}>
@@ -71,6 +74,7 @@ function Header() {
         </nav>
       )}
       <div class="tools">
+        {state.token === 'kept' && <Button kind="quiet" icon="key" label="Token" onClick={() => ask()} />}
         <Button kind="quiet" icon="server" label="On the server" onClick={() => set({ drawer: 'server' })} />
         <Button kind="quiet" icon="theme" label={`Colours: ${now === 'auto' ? 'as the system' : now}`}
           onClick={() => {

@@ -131,16 +131,27 @@ function Snippet({ title, text }: { title: string; text: string }) {
 /** Quoted for a POSIX shell. */
 const quoted = (text: string) => `'${text.replace(/'/g, "'\\''")}'`;
 
-function Share() {
-  const { result } = state;
-  if (!result) return null;
-  const origin = location.origin;
-  const asset = new URL(client.url(result.supermesh.asset), origin).href;
-  const request = result.request ?? buildRequest();
-  const names = result.supermesh.shapes.map((s) => s.name);
-  const curl = `curl -sS ${origin}/v1/supermeshes -H 'Content-Type: application/json' -H 'Prefer: wait=60' \\\n  -d ${quoted(JSON.stringify(request))}\ncurl -sS -o morph.glb ${asset}`;
-  const viewer = `<script type="module">import '@google/model-viewer';</script>\n<model-viewer src="${asset}" alt="${names.join(' to ').replace(/"/g, '&quot;')}"\n  autoplay camera-controls></model-viewer>`;
-  const three = `<script type="module">
+/** Text that stands in HTML. */
+const escaped = (text: string) => text.replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]!);
+
+const viewerPage = (asset: string, names: string[]) => `<!doctype html>
+<meta charset="utf-8">
+<title>${escaped(names.join(' to '))}</title>
+<style>html, body { margin: 0; height: 100% } model-viewer { width: 100%; height: 100% }</style>
+<script type="module" src="https://cdn.jsdelivr.net/npm/@google/model-viewer@4.1.0/dist/model-viewer.min.js"></script>
+<model-viewer src="${asset}" alt="${escaped(names.join(' to '))}" autoplay camera-controls></model-viewer>
+`;
+
+/** The asset carries an animation through all shapes, so the page plays that. */
+const threePage = (asset: string, names: string[]) => `<!doctype html>
+<meta charset="utf-8">
+<title>${escaped(names.join(' to '))}</title>
+<style>html, body { margin: 0; height: 100%; overflow: hidden }</style>
+<script type="importmap">
+{ "imports": { "three": "https://cdn.jsdelivr.net/npm/three@0.180.0/build/three.module.js",
+               "three/addons/": "https://cdn.jsdelivr.net/npm/three@0.180.0/examples/jsm/" } }
+</script>
+<script type="module">
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
@@ -148,32 +159,45 @@ const renderer = new THREE.WebGLRenderer({ antialias: true });
 renderer.setSize(innerWidth, innerHeight);
 document.body.append(renderer.domElement);
 const scene = new THREE.Scene();
+scene.background = new THREE.Color(0xf3f1ec);
 scene.add(new THREE.HemisphereLight(0xffffff, 0x556070, 3));
-const camera = new THREE.PerspectiveCamera(32, innerWidth / innerHeight);
 
 const gltf = await new GLTFLoader().loadAsync('${asset}');
 scene.add(gltf.scene);
 const ball = new THREE.Box3().setFromObject(gltf.scene).getBoundingSphere(new THREE.Sphere());
-camera.near = ball.radius / 10;
-camera.far = ball.radius * 20;
-camera.updateProjectionMatrix();
+const camera = new THREE.PerspectiveCamera(32, innerWidth / innerHeight, ball.radius / 10, ball.radius * 20);
 camera.position.copy(ball.center).add(new THREE.Vector3(1, 0.4, 1.6).multiplyScalar(ball.radius * 2));
 camera.lookAt(ball.center);
 
-let mesh;
-gltf.scene.traverse((object) => { if (object.morphTargetInfluences) mesh = object; });
-renderer.setAnimationLoop((now) => {
-  mesh.morphTargetInfluences[0] = 0.5 - 0.5 * Math.cos(now / 1500);   // ${names[0].replace(/[\r\n]/g, ' ')} … ${(names[1] ?? '').replace(/[\r\n]/g, ' ')}
+const mixer = new THREE.AnimationMixer(gltf.scene);
+for (const clip of gltf.animations) mixer.clipAction(clip).play();
+const clock = new THREE.Clock();
+renderer.setAnimationLoop(() => {
+  mixer.update(clock.getDelta());
   renderer.render(scene, camera);
 });
-</script>`;
+</script>
+`;
+
+function Share() {
+  const { result } = state;
+  if (!result) return null;
+  const origin = location.origin;
+  const asset = new URL(client.url(result.supermesh.asset), origin).href;
+  const request = result.request ?? buildRequest();
+  const names = result.supermesh.shapes.map((s) => s.name);
+  const secret = client.token ? ` -H "Authorization: Bearer $ORBMORPH_TOKEN"` : '';
+  const curl = `curl -sS${secret} ${origin}/v1/supermeshes -H 'Content-Type: application/json' -H 'Prefer: wait=60' \\\n  -d ${quoted(JSON.stringify(request))}\ncurl -sS${secret} -o morph.glb ${asset}`;
+  // a page cannot carry the token: it shows the file that the curl line above brings
+  const shown = client.token ? 'morph.glb' : asset;
   return (
     <>
       <p class="hint">The address of an asset never changes and can be cached for ever.</p>
       <Snippet title="Asset" text={asset} />
       <Snippet title="curl" text={curl} />
-      <Snippet title="model-viewer" text={viewer} />
-      <Snippet title="three.js" text={three} />
+      {client.token && <p class="hint">The pages below show <code>morph.glb</code>, which the second line above brings: put it beside them.</p>}
+      <Snippet title="three.js" text={threePage(shown, names)} />
+      <Snippet title="model-viewer" text={viewerPage(shown, names)} />
     </>
   );
 }

@@ -1,6 +1,8 @@
 /** The morph: played, scrubbed, mixed; its mesh on every shape; its error; what to take away. */
 import { useEffect, useRef } from 'preact/hooks';
-import { set, state, tint, type Result } from '../state';
+import { set, state, tint, toast, type Result } from '../state';
+import { save } from '../actions/landmarks';
+import { explain } from '../actions/token';
 import { measureErrors } from '../actions/merge';
 import { player } from '../player';
 import { client } from '../state';
@@ -107,6 +109,8 @@ function Transport({ result }: { result: Result }) {
   );
 }
 
+const assetName = ({ supermesh }: Result) => `${supermesh.shapes.map((s) => s.name).join('-')}.glb`;
+
 export function MorphInspector() {
   const { result } = state;
   if (!result) return <><h2>Morph</h2><OptionsFold /></>;
@@ -127,7 +131,12 @@ export function MorphInspector() {
         <Switch label="Wireframe" on={state.wire} onChange={(wire) => set({ wire })} />
       </div>
       <div class="row wrap gap-top">
-        <a class="button primary" href={client.url(supermesh.asset)} download={`${supermesh.shapes.map((s) => s.name).join('-')}.glb`}>
+        <a class="button primary" href={client.url(supermesh.asset)} download={assetName(result)}
+          onClick={(event) => {
+            if (!client.token) return;
+            event.preventDefault(); // a link cannot send the token
+            void client.asset(supermesh.id).then((glb) => save(new Blob([glb], { type: 'model/gltf-binary' }), assetName(result)), (error) => toast(explain(error), 'error'));
+          }}>
           <Icon name="download" /><span>Download GLB</span>
         </a>
         <Button icon="code" onClick={() => set({ drawer: 'share' })}>Use it</Button>

@@ -31,6 +31,7 @@ const PATHS: Record<string, string> = {
   check: 'M5 12.500l4.500 4.500L19 7',
   alert: 'M12 8v5M12 16.500h.01M10.300 4L2.500 18a2 2 0 0 0 1.700 3h15.600a2 2 0 0 0 1.700-3L13.700 4a2 2 0 0 0-3.400 0z',
   copy: 'M9 9h11v11H9zM15 9V4H4v11h5',
+  key: 'M14 10l6-6M17 7l2.500 2.500M15 14.500a5 5 0 1 1-3.500-8.500 5 5 0 0 1 3.500 8.500z',
 };
 
 export function Icon({ name }: { name: string }) {

@@ -192,6 +192,8 @@ function carryOut(order: Order) {
     return void requestAnimationFrame(() => {
       draw(order.width, order.height, order.frames);
       tell({ op: 'drawn' });
+      // the next animation frame comes when this one was taken
+      requestAnimationFrame(() => tell({ op: 'shown' }));
     });
   if (order.op === 'model') {
     const buffers = order.surface ? new Buffers(order.surface) : models.get(order.same!)?.buffers;

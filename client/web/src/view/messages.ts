@@ -39,4 +39,4 @@ export type Order =
   | { op: 'faults'; model: number; faults: Faults | null }
   | { op: 'dispose'; model: number };
 
-export type Report = { op: 'started'; works: boolean } | { op: 'drawn' } | { op: 'restored' };
+export type Report = { op: 'started'; works: boolean } | { op: 'drawn' } | { op: 'shown' } | { op: 'restored' };

@@ -75,6 +75,7 @@ export class Stage {
       if (report.op === 'started' && !report.works) this.fail();
       else if (report.op === 'restored') this.draw();
       else if (report.op === 'drawn') this.drawn();
+      else if (report.op === 'shown' && !this.drawing && !this.asked) delete this.host.dataset.busy;
     });
     try {
       const canvas = this.canvas.transferControlToOffscreen();
@@ -140,7 +141,7 @@ export class Stage {
   private drawn() {
     this.drawing = false;
     this.host.dispatchEvent(new Event('drawn'));
-    if (!this.again) return void delete this.host.dataset.busy;
+    if (!this.again) return;
     this.again = false;
     this.draw();
   }
