@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
-#   tests/long.sh [PART…]    parts: tsan valgrind fuzz crash adversarial; all of them without arguments
+#   tests/long.sh [PART…]    parts: tsan valgrind fuzz crash adversarial arm; all of them without arguments
 #
 # ORB_MINUTES (5) is the time for each fuzz target, ORB_KILLS (1000) the number of kills.
 set -euo pipefail
@@ -51,8 +51,16 @@ part_adversarial() {
   ctest --test-dir build --output-on-failure -C long -L long
 }
 
+# The embedding on Arm, emulated.
+part_arm() {
+  orb_install_packages gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build --target embed-digest
+  tests/tools/arm.sh build/bin/embed-digest
+}
+
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash adversarial
+  set -- tsan valgrind fuzz crash adversarial arm
 fi
 for part in "$@"; do
   echo "== $part =="

@@ -124,7 +124,8 @@ static void enlist(ks_run *run, int32_t v) {
   }
 }
 
-/* A pole's ring is not followed outwards: it would be most of the mesh, for each vertex at it. */
+/* Around a new vertex a pole's ring is not followed outwards, as it would be most of the mesh for each vertex at it,
+ * and the pole itself is left to the global optimisation, as its own ring costs most of all. */
 static int is_pole(const ks_run *run, int32_t v) {
   return run->m.valence[v] >= POLE;
 }
@@ -186,7 +187,7 @@ static orb_status optimize(ks_run *run) {
     ORB_TRY(rank_next(run, iteration == 0));
     for (int32_t i = 0; i < run->active_count; i++) {
       ORB_TRY(reposition(run, run->active[i], &run->displacement[run->active[i]]));
-      if ((i & 255) == 0) {
+      if ((i & 255) == 0 || is_pole(run, run->active[i])) {
         ORB_TRY(orb_context_check(run->ctx));
       }
     }
@@ -223,6 +224,23 @@ static orb_status place(ks_run *run, int32_t v, int32_t parent, int *found) {
   return ORB_OK;
 }
 
+/* Adds so many rings around the one vertex that is enlisted, and takes out the poles among them or leaves them in. */
+static void enlist_rings(ks_run *run, int32_t rings, int poles) {
+  for (int32_t r = 0; r < rings; r++) {
+    for (int32_t i = 0, end = run->next_count; i < end; i++) {
+      if (i == 0 || !is_pole(run, run->next[i])) {
+        enlist_star(run, run->next[i]);
+      }
+    }
+  }
+  int32_t kept = 1;
+  for (int32_t i = 1; i < run->next_count; i++) {
+    run->next[kept] = run->next[i];
+    kept += poles || !is_pole(run, run->next[i]);
+  }
+  run->next_count = kept;
+}
+
 /* Opens a kernel that doubles cannot hold: the surroundings of the parent are optimised for area rather than shape. */
 static orb_status relieve(ks_run *run, int32_t parent, int32_t rings) {
   double aspect_exponent = run->sampler.aspect_exponent;
@@ -230,21 +248,15 @@ static orb_status relieve(ks_run *run, int32_t parent, int32_t rings) {
   run->stamp_value++;
   run->next_count = 0;
   enlist(run, parent);
-  for (int32_t r = 0; r < rings; r++) {
-    for (int32_t i = 0, end = run->next_count; i < end; i++) {
-      if (!is_pole(run, run->next[i]) || i == 0) {
-        enlist_star(run, run->next[i]);
-      }
-    }
-  }
+  enlist_rings(run, rings, 1);
   orb_status status = ORB_OK;
   for (int32_t sweep = 0; sweep < 20 && status == ORB_OK; sweep++) {
     for (int32_t i = 0; i < run->next_count && status == ORB_OK; i++) {
       double moved;
       status = reposition(run, run->next[i], &moved);
-    }
-    if (status == ORB_OK) {
-      status = orb_context_check(run->ctx);
+      if (status == ORB_OK && (i & 255) == 0) {
+        status = orb_context_check(run->ctx);
+      }
     }
   }
   run->sampler.aspect_exponent = aspect_exponent;
@@ -259,17 +271,14 @@ static orb_status loosen(ks_run *run, int32_t v) {
   run->stamp_value++;
   run->next_count = 0;
   enlist(run, v);
-  for (int32_t r = 0; r < LOOSEN_RINGS; r++) {
-    for (int32_t i = 0, end = run->next_count; i < end; i++) {
-      if (!is_pole(run, run->next[i]) || i == 0) {
-        enlist_star(run, run->next[i]);
-      }
-    }
-  }
+  enlist_rings(run, LOOSEN_RINGS, 0);
   for (int32_t sweep = 0; sweep < run->effort.sweeps; sweep++) {
     for (int32_t i = 0; i < run->next_count; i++) {
       double moved;
       ORB_TRY(reposition(run, run->next[i], &moved));
+      if ((i & 255) == 255) {
+        ORB_TRY(orb_context_check(run->ctx));
+      }
     }
   }
   run->report.loosened++;

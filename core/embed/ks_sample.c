@@ -92,7 +92,7 @@ static orb_status ring_reserve(orb_context *ctx, ks_sampler *s, int32_t count) {
   orb_free(ctx, s->candidate);
   orb_free(ctx, s->near_candidate);
   orb_free(ctx, s->edge);
-  s->room = (int32_t)capacity * s->padded_count + KS_LANES;
+  s->room = (int32_t)(capacity < KS_WHOLE_RING ? capacity : KS_WHOLE_RING) * s->padded_count + KS_LANES;
   s->candidate = orb_alloc(ctx, (size_t)s->room, 4 * sizeof(double));
   s->near_candidate = orb_alloc(ctx, (size_t)s->room, 4 * sizeof(float));
   s->edge = ORB_NEW(ctx, ks_edge, capacity);
@@ -110,6 +110,12 @@ static orb_status ring_reserve(orb_context *ctx, ks_sampler *s, int32_t count) {
   r->inverse_area = r->side + 5 * capacity;
   r->capacity = (int32_t)capacity;
   return ORB_OK;
+}
+
+int32_t ks_stride(const ks_sampler *s, int32_t ring_count) {
+  int64_t most = KS_WORK / ((int64_t)s->padded_count * ring_count); /* triangles to be sampled */
+  most = most < 8 ? 8 : most > KS_WHOLE_RING ? KS_WHOLE_RING : most;
+  return ring_count <= KS_WHOLE_RING ? 1 : (int32_t)((ring_count + most - 1) / most);
 }
 
 orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const double *P, int32_t v) {
@@ -338,7 +344,8 @@ int ks_best_sample(ks_sampler *s, const double apex[3], int32_t first, int32_t l
   double *x = s->candidate, *y = x + s->room, *z = y + s->room, *e = z + s->room;
   int32_t count = 0;
   double best_error = bound;
-  for (int32_t i = first; i < last; i++, count += s->pair_count) {
+  int32_t stride = ks_stride(s, s->ring.count);
+  for (int32_t i = first; i < last; i += stride, count += s->pair_count) {
     spread((const double(*)[2])s->pair, s->pair_count, draw, apex, s->ring.point[i],
            s->ring.point[i + 1 < s->ring.count ? i + 1 : 0], x + count, y + count, z + count);
   }

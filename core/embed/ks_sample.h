@@ -47,6 +47,11 @@ typedef struct ks_sampler {
 ORB_MUST_CHECK orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options, ks_sampler *out);
 void ks_sampler_free(orb_context *ctx, ks_sampler *s);
 
+/* Samples times planes that one search may take. A ring of up to KS_WHOLE_RING triangles is sampled in all of them, a
+ * larger one (a pole's) in every n-th, so that no step takes longer than some milliseconds. */
+enum { KS_WORK = 1 << 26, KS_WHOLE_RING = 1024 };
+int32_t ks_stride(const ks_sampler *s, int32_t ring_count);
+
 /* Loads the ring of v: sphere points P (3 a vertex). */
 ORB_MUST_CHECK orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const double *P, int32_t v);
 

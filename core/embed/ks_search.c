@@ -222,7 +222,7 @@ KS_INLINE void add_any_term(const ks_edge *edge, float area_exponent, float aspe
 
 typedef struct search {
   const ks_edge *edge;
-  int32_t edges, pairs;
+  int32_t edges, stride, pairs;
   const float *s, *t;
   float draw, radius, apex[3], area_exponent, aspect_exponent, shape_scale;
   float *x, *y, *z, *error;
@@ -237,7 +237,7 @@ KS_INLINE int32_t padded(int32_t count) {
 KS_INLINE void run(search *q, orb_cpu cpu) {
   float *x = q->x, *y = q->y, *z = q->z, *error = q->error;
   int32_t count = 0;
-  for (int32_t i = 0; i < q->edges; i++, count += q->pairs) {
+  for (int32_t i = 0; i < q->edges; i += q->stride, count += q->pairs) {
     spread(q->s, q->t, q->pairs, q->draw, q->radius, q->apex, &q->edge[i], x + count, y + count, z + count);
   }
   measure_depth(q->edge, q->edges, x, y, z, error, count);
@@ -306,6 +306,7 @@ int ks_search(ks_sampler *s, const double apex[3], double draw, double bound, do
   float *x = s->near_candidate;
   search q = {.edge = s->edge,
               .edges = r->count,
+              .stride = ks_stride(s, r->count),
               .pairs = s->padded_count,
               .s = s->pair_s,
               .t = s->pair_t,

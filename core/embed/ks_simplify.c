@@ -20,6 +20,9 @@
 
 static const double MAX_ASPECT = 1e12;
 
+enum { POLE = 100 }; /* valence of one */
+static const double POLE_COST = 1e300;
+
 typedef struct simplifier {
   orb_context *ctx;
   ks_mesh *m;
@@ -153,20 +156,26 @@ static double quadric_cost(const simplifier *s, int32_t h) {
   return fmax(error, 0) + 1e-6 * (4 * M_PI / s->m->vertex_count) * orb_distance2(at(s, v1), p);
 }
 
+/* A pole, whose every cost would take O(valence²): it goes last, or when it is one no more. */
+static int is_pole(const simplifier *s, int32_t v) {
+  return s->m->valence[v] > POLE;
+}
+
 /* Finds v's cheapest collapse. With `linked`, only among those that keep the link condition. */
 static void evaluate(simplifier *s, int32_t v, int linked) {
-  double factor = s->quadric ? 1 : curvature_factor(s, v), best = INFINITY;
+  int pole = is_pole(s, v);
+  double factor = s->quadric || pole ? 1 : curvature_factor(s, v), best = INFINITY;
   int32_t target = -1, e = s->m->out[v];
   do {
     if (!linked || ks_link_holds(s->m, e, s->mark, ++s->stamp)) {
-      double cost = s->quadric ? quadric_cost(s, e) : factor * aspect_after(s, e);
+      double cost = pole ? POLE_COST : s->quadric ? quadric_cost(s, e) : factor * aspect_after(s, e);
       if (cost < best) {
         best = cost;
         target = e;
       }
     }
     e = ks_rotate(s->m, e);
-  } while (e != s->m->out[v]);
+  } while (e != s->m->out[v] && !(pole && target >= 0));
   s->cost[v] = best;
   s->target[v] = target;
 }
@@ -177,7 +186,8 @@ static void reevaluate(simplifier *s, int32_t v) {
   sift_down(s, s->slot[v]);
 }
 
-/* After a collapse into v: quadric costs change on v's ring; those of Eq. 1 one ring further. */
+/* After a collapse into v: quadric costs change on v's ring; those of Eq. 1 one ring further, but not beyond a pole,
+ * whose whole ring would be looked at for every collapse in it. */
 static void refresh_around(simplifier *s, int32_t v) {
   const ks_mesh *m = s->m;
   if (!s->quadric) {
@@ -203,7 +213,7 @@ static void refresh_around(simplifier *s, int32_t v) {
       s->mark[w] = seen;
       reevaluate(s, w);
     }
-    for (int32_t f = m->out[w], start = f; !s->quadric;) {
+    for (int32_t f = m->out[w], start = f; !s->quadric && !is_pole(s, w);) {
       if (s->mark[ks_head(m, f)] != seen) {
         s->mark[ks_head(m, f)] = seen;
         reevaluate(s, ks_head(m, f));
@@ -281,7 +291,7 @@ static orb_status collapse_until(simplifier *s, int32_t until) {
     heap_remove(s, v);
     ORB_TRY(ks_collapse_edge(s->ctx, m, s->target[v]));
     refresh_around(s, v2);
-    if ((m->log_count & 255) == 0) {
+    if ((m->log_count & 255) == 0 || is_pole(s, v2)) {
       ORB_TRY(orb_context_check(s->ctx));
       orb_progress(s->ctx, "simplify", (double)m->log_count / total);
     }
