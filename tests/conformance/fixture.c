@@ -18,6 +18,8 @@ static const unsigned char PIXEL[] = {
     0x0c, 0x49, 0x44, 0x41, 0x54, 0x78, 0x9c, 0x63, 0xf8, 0xcf, 0xc0, 0x00, 0x00, 0x03, 0x01, 0x01, 0x00, 0xc9,
     0xfe, 0x92, 0xef, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
 
+enum { IMAGE = 64, ROW = 3 * IMAGE + 1, STORED = ROW * IMAGE };
+
 static void *made(void *block) {
   if (!block) {
     fputs("fixture: no memory\n", stderr);
@@ -105,6 +107,77 @@ static void dress(orb_context *ctx, orb_mesh *mesh, const double *points) {
   }
 }
 
+static unsigned char *put32(unsigned char *at, uint32_t value) { /* big-endian */
+  for (int shift = 24; shift >= 0; shift -= 8) {
+    *at++ = (unsigned char)(value >> shift);
+  }
+  return at;
+}
+
+static unsigned char *put_chunk(unsigned char *at, const char *type, const unsigned char *bytes, uint32_t size) {
+  unsigned char *from = put32(at, size);
+  memcpy(from, type, 4);
+  memcpy(from + 4, bytes, size);
+  uint32_t crc = UINT32_MAX;
+  for (uint32_t i = 0; i < size + 4; i++) {
+    crc ^= from[i];
+    for (int bit = 0; bit < 8; bit++) {
+      crc = crc >> 1 ^ (crc & 1 ? 0xedb88320u : 0);
+    }
+  }
+  return put32(from + 4 + size, ~crc);
+}
+
+/* A PNG of coloured tiles, each unlike its neighbours, stored without compression. */
+static size_t paint(unsigned char *png) {
+  static const unsigned char mark[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  unsigned char head[13] = {0}, data[STORED + 11], *at = data + 7;
+  head[3] = head[7] = IMAGE;
+  head[8] = 8;
+  head[9] = 2;
+  data[0] = 0x78;
+  data[1] = 1;
+  data[2] = 1; /* one stored block, the last */
+  data[3] = STORED & 255;
+  data[4] = STORED >> 8;
+  data[5] = (unsigned char)~data[3];
+  data[6] = (unsigned char)~data[4];
+  uint32_t a = 1, b = 0;
+  for (int y = 0; y < IMAGE; y++) {
+    *at++ = 0;
+    for (int x = 0; x < IMAGE; x++) {
+      *at++ = (unsigned char)(x / 8 * 36);
+      *at++ = (unsigned char)(y / 8 * 36);
+      *at++ = (x / 8 + y / 8) % 2 ? 255 : 0;
+    }
+  }
+  for (unsigned char *c = data + 7; c < at; c++) {
+    a = (a + *c) % 65521;
+    b = (b + a) % 65521;
+  }
+  put32(at, b << 16 | a);
+  memcpy(png, mark, sizeof mark);
+  unsigned char *end = put_chunk(png + sizeof mark, "IHDR", head, sizeof head);
+  end = put_chunk(end, "IDAT", data, sizeof data);
+  return (size_t)(put_chunk(end, "IEND", head, 0) - png);
+}
+
+/* Turn and depth on the sphere as coordinates of a texture, with a seam where the turn ends. */
+static void unwrap(const double *points, const int32_t *corner, float out[6]) {
+  double middle[3] = {0};
+  for (int k = 0; k < 9; k++) {
+    middle[k % 3] += points[3 * corner[k / 3] + k % 3] / 3;
+  }
+  double turn = atan2(middle[1], middle[0]);
+  for (int k = 0; k < 3; k++) {
+    const double *p = points + 3 * corner[k];
+    double own = p[0] * p[0] + p[1] * p[1] < 1e-12 ? turn : atan2(p[1], p[0]);
+    own += own - turn > M_PI ? -2 * M_PI : own - turn < -M_PI ? 2 * M_PI : 0;
+    out[2 * k] = (float)(own / (2 * M_PI) + 0.5);
+    out[2 * k + 1] = (float)(acos(fmax(-1, fmin(1, p[2]))) / M_PI);
+  }
+}
+
 static void write_file(const char *folder, const char *name, const char *ending, const void *bytes, size_t size) {
   char path[4096];
   snprintf(path, sizeof path, "%s/%s%s", folder, name, ending);
@@ -189,6 +262,82 @@ static void make(const char *folder, const char *name, int shape_count, int dres
   orb_context_destroy(ctx);
 }
 
+/* Three shapes, each with vertices at places of its own, remeshed; the first has a texture. */
+static void make_painted(const char *folder, const char *name, orb_remesh_method method) {
+  enum { SHAPES = 3 };
+  static const char *const names[SHAPES] = {"first", "second", "third"};
+  static unsigned char png[STORED + 200];
+  orb_context *ctx;
+  if (orb_context_create(NULL, &ctx) != ORB_OK) {
+    exit(1);
+  }
+  orb_aligned_shape shapes[SHAPES] = {0};
+  orb_buffer text = {0}, glb = {0};
+  orb_status status = orb_buffer_printf(ctx, &text, "{\"shapes\":[");
+  for (int s = 0; s < SHAPES; s++) {
+    orb_mesh *mesh = &shapes[s].mesh;
+    mesh->vertex_count = VERTICES;
+    mesh->triangle_count = TRIANGLES;
+    mesh->positions = made(ORB_NEW(ctx, double, 3 * VERTICES));
+    mesh->triangles = made(ORB_NEW(ctx, int32_t, 3 * TRIANGLES));
+    mesh->texcoords = made(ORB_NEW(ctx, float, 6 * TRIANGLES));
+    shapes[s].points = made(ORB_NEW(ctx, double, 3 * VERTICES));
+    globe(shapes[s].points, mesh->triangles);
+    for (int v = 0; v < VERTICES; v++) {
+      double *p = shapes[s].points + 3 * v, c = cos(0.7 * s), d = sin(0.7 * s);
+      double q[3] = {c * p[0] - d * p[2], p[1], d * p[0] + c * p[2]};
+      p[0] = c * q[0] - d * q[1];
+      p[1] = d * q[0] + c * q[1];
+      p[2] = q[2];
+      shape_formula(s, p, mesh->positions + 3 * v);
+    }
+    status = status == ORB_OK ? orb_buffer_printf(ctx, &text, s ? ",{\"corners\":[" : "{\"corners\":[") : status;
+    for (int t = 0; t < TRIANGLES && status == ORB_OK; t++) {
+      unwrap(shapes[s].points, mesh->triangles + 3 * t, mesh->texcoords + 6 * t);
+      for (int k = 0; k < 3 && status == ORB_OK; k++) {
+        const double *p = mesh->positions + 3 * mesh->triangles[3 * t + k];
+        status = orb_buffer_printf(ctx, &text, "%s%.9g,%.9g,%.9g,%.9g,%.9g", t + k ? "," : "", p[0], p[1], p[2],
+                                   (double)mesh->texcoords[6 * t + 2 * k], (double)mesh->texcoords[6 * t + 2 * k + 1]);
+      }
+    }
+    status = status == ORB_OK ? orb_buffer_printf(ctx, &text, "]}") : status;
+  }
+  size_t size = paint(png);
+  orb_mesh *first = &shapes[0].mesh;
+  first->materials = made(ORB_NEW0(ctx, orb_material, 1));
+  first->images = made(ORB_NEW0(ctx, orb_image, 1));
+  first->material_count = first->image_count = 1;
+  first->materials[0] = (orb_material){
+      .name = "tiles", .base_color = {1, 1, 1, 1}, .roughness = 1, .mag_filter = 9728, .min_filter = 9728};
+  first->images[0].bytes = made(ORB_NEW(ctx, unsigned char, size));
+  memcpy(first->images[0].bytes, png, size);
+  first->images[0].size = size;
+  snprintf(first->images[0].mime, sizeof first->images[0].mime, "image/png");
+  orb_supermesh supermesh = {0};
+  orb_remesh_options remesh;
+  orb_asset_options options;
+  orb_remesh_defaults(&remesh);
+  orb_asset_defaults(&options);
+  remesh.method = method;
+  if (status != ORB_OK || orb_buffer_printf(ctx, &text, "]}") != ORB_OK ||
+      orb_remesh(ctx, shapes, SHAPES, 0, &remesh, &supermesh) != ORB_OK ||
+      orb_asset_write(ctx, &supermesh, shapes, names, &options, NULL, &glb) != ORB_OK) {
+    fprintf(stderr, "fixture: %s: %s\n", name, orb_context_error(ctx)->detail);
+    exit(1);
+  }
+  write_file(folder, name, ".glb", glb.data, glb.size);
+  write_file(folder, name, ".json", text.data, text.size);
+  write_file(folder, name, ".png", png, size);
+  orb_buffer_free(ctx, &glb);
+  orb_buffer_free(ctx, &text);
+  orb_supermesh_free(ctx, &supermesh);
+  for (int s = 0; s < SHAPES; s++) {
+    orb_mesh_free(ctx, &shapes[s].mesh);
+    orb_free(ctx, shapes[s].points);
+  }
+  orb_context_destroy(ctx);
+}
+
 int main(int argc, char **argv) {
   if (argc != 2) {
     fputs("usage: asset_fixture FOLDER\n", stderr);
@@ -199,6 +348,8 @@ int main(int argc, char **argv) {
   make(argv[1], "two", 2, 0, &options);
   make(argv[1], "six", 6, 0, &options);
   make(argv[1], "dressed", 3, 1, &options);
+  make_painted(argv[1], "painted", ORB_REMESH_OVERLAY);
+  make_painted(argv[1], "painted-adaptive", ORB_REMESH_ADAPTIVE);
   options.colors = 1;
   make(argv[1], "colours", 2, 1, &options);
   options.path = ORB_PATH_RIGID;
