@@ -17,6 +17,7 @@ typedef struct item {
 struct cache {
   pthread_mutex_t lock;
   size_t max_bytes, bytes;
+  unsigned long long drops;
   item *buckets[BUCKETS], *newest, *oldest;
 };
 
@@ -89,7 +90,14 @@ const cached *cache_find(cache *c, resource_kind kind, const char *id) {
   return it ? &it->entry : NULL;
 }
 
-const cached *cache_add(cache *c, resource *row) {
+unsigned long long cache_drops(cache *c) {
+  pthread_mutex_lock(&c->lock);
+  unsigned long long drops = c->drops;
+  pthread_mutex_unlock(&c->lock);
+  return drops;
+}
+
+const cached *cache_add(cache *c, resource *row, unsigned long long since) {
   item *it = calloc(1, sizeof *it);
   if (!it) {
     resource_free(row);
@@ -101,9 +109,14 @@ const cached *cache_add(cache *c, resource *row) {
   it->entry.json_size = strlen(it->entry.row.json);
   orb_id_of_text(it->entry.row.json, it->entry.json_size, hash);
   snprintf(it->entry.etag, sizeof it->entry.etag, "\"%.32s\"", hash);
+  it->refs = 1;
+  pthread_mutex_lock(&c->lock);
+  if (c->drops != since) {
+    pthread_mutex_unlock(&c->lock);
+    return &it->entry;
+  }
   it->refs = 2;
   it->linked = 1;
-  pthread_mutex_lock(&c->lock);
   item *there = find(c, row->kind, row->id);
   if (there) {
     drop(c, there);
@@ -142,6 +155,7 @@ void cache_release(cache *c, const cached *entry) {
 void cache_drop(cache *c, resource_kind kind, const char *id) {
   pthread_mutex_lock(&c->lock);
   item *it = find(c, kind, id);
+  c->drops++;
   if (it) {
     drop(c, it);
   }

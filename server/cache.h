@@ -16,8 +16,11 @@ cache *cache_create(size_t max_bytes);
 void cache_destroy(cache *c);
 /* Referenced; NULL if not there. */
 const cached *cache_find(cache *c, resource_kind kind, const char *id);
-/* Takes row->json over; referenced. NULL out of memory (json freed). */
-const cached *cache_add(cache *c, resource *row);
+/* How many were dropped so far. A row that was read before a drop may be of what is gone since. */
+unsigned long long cache_drops(cache *c);
+/* Takes row->json over; referenced. Kept only if nothing was dropped since the row was read: `since` is what
+ * cache_drops() was before. NULL out of memory (json freed). */
+const cached *cache_add(cache *c, resource *row, unsigned long long since);
 /* 1 where the last use that was noted is a second ago or more; then this one is noted. now: orb_clock_ms(). */
 int cache_note_use(cache *c, const cached *entry, int64_t now);
 void cache_release(cache *c, const cached *entry);

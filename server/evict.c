@@ -12,6 +12,7 @@ enum { PAGE = 64 };
 store_result evict_one(const evict_env *env, resource_kind kind, const char *id) {
   static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET};
   FAULT_POINT("evict");
+  objects_exclude(env->store);
   store_result result = catalogue_delete(env->cat, kind, id);
   if (env->descriptions) {
     cache_drop(env->descriptions, kind, id);
@@ -26,6 +27,7 @@ store_result evict_one(const evict_env *env, resource_kind kind, const char *id)
   if (result == STORE_OK && kind == RESOURCE_SUPERMESH) {
     result = objects_delete(env->store, OBJECT_SPHERES, id);
   }
+  objects_let_go(env->store);
   return result;
 }
 

@@ -302,7 +302,6 @@ static int run(const command_line *line) {
   int signals = take_signals(&set);
   clock_gettime(CLOCK_REALTIME, &now);
   srv.started = now.tv_sec;
-  pthread_mutex_init(&srv.mesh_lock, NULL);
   raise_descriptor_limit();
   int lock = signals < 0 ? -1 : lock_data(options->data);
   if (signals >= 0 && lock < 0) {

@@ -2,6 +2,7 @@
 
 #include <stdatomic.h>
 #include <stdio.h>
+#include <string.h>
 
 enum { BOUNDS = 9 };
 static const double bounds[BOUNDS] = {0.005, 0.02, 0.1, 0.5, 1, 5, 20, 60, 300};
@@ -10,7 +11,13 @@ typedef struct histogram {
   atomic_llong counts[BOUNDS + 1], micros;
 } histogram;
 
-static histogram jobs[2], requests;
+/* The stages that jobs report, as progress shows them. */
+static const char *const stages[] = {"read",  "check",  "simplify", "embed", "certify",
+                                     "align", "remesh", "transfer", "write", "store"};
+enum { STAGES = sizeof stages / sizeof stages[0] };
+
+static histogram jobs[2], requests, staged[2][STAGES];
+static const char *const kinds[2] = {"embedding", "supermesh"};
 static atomic_llong job_failed[2], cache[2], flips, statuses[6], received_bytes, sent_bytes, connections;
 
 static void observe(histogram *h, double seconds) {
@@ -26,6 +33,13 @@ void metrics_job(int embedding, int succeeded, double seconds) {
   observe(&jobs[embedding ? 0 : 1], seconds);
   if (!succeeded) {
     atomic_fetch_add(&job_failed[embedding ? 0 : 1], 1);
+  }
+}
+void metrics_stage(int embedding, const char *stage, double seconds) {
+  for (int i = 0; i < STAGES; i++) {
+    if (strcmp(stages[i], stage) == 0) {
+      observe(&staged[embedding ? 0 : 1][i], seconds);
+    }
   }
 }
 void metrics_cache(int hit) {
@@ -49,6 +63,14 @@ int64_t metrics_connections(void) {
   return atomic_load(&connections);
 }
 
+static int seen(histogram *h) {
+  long long sum = 0;
+  for (int i = 0; i <= BOUNDS; i++) {
+    sum += atomic_load(&h->counts[i]);
+  }
+  return sum > 0;
+}
+
 static void write_histogram(orb_text *out, const char *name, const char *label, histogram *h) {
   long long sum = 0;
   const char *comma = label[0] ? "," : "";
@@ -68,6 +90,16 @@ void metrics_write(orb_text *out) {
   orb_text_add(out, "# TYPE orbmorph_job_seconds histogram\n");
   write_histogram(out, "orbmorph_job_seconds", "kind=\"embedding\"", &jobs[0]);
   write_histogram(out, "orbmorph_job_seconds", "kind=\"supermesh\"", &jobs[1]);
+  orb_text_add(out, "# TYPE orbmorph_stage_seconds histogram\n");
+  for (int kind = 0; kind < 2; kind++) {
+    for (int i = 0; i < STAGES; i++) {
+      char labels[64];
+      snprintf(labels, sizeof labels, "kind=\"%s\",stage=\"%s\"", kinds[kind], stages[i]);
+      if (seen(&staged[kind][i])) {
+        write_histogram(out, "orbmorph_stage_seconds", labels, &staged[kind][i]);
+      }
+    }
+  }
   orb_text_add(out, "# TYPE orbmorph_job_failures_total counter\n");
   orb_text_printf(out, "orbmorph_job_failures_total{kind=\"embedding\"} %lld\n", atomic_load(&job_failed[0]));
   orb_text_printf(out, "orbmorph_job_failures_total{kind=\"supermesh\"} %lld\n", atomic_load(&job_failed[1]));

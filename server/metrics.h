@@ -7,6 +7,7 @@
 #include "api/text.h"
 
 void metrics_job(int embedding, int succeeded, double seconds);
+void metrics_stage(int embedding, const char *stage, double seconds); /* one that is over */
 void metrics_cache(int hit);
 void metrics_flips(int64_t flips);
 void metrics_request(int status, double seconds);

@@ -31,7 +31,6 @@ typedef struct server {
   queue *q;
   cache *descriptions;
   tasks *io, *checks;
-  pthread_mutex_t mesh_lock; /* so that a mesh's file and row come and go together; never taken by a handler */
   listener at;
   watch *connections;
   struct MHD_Daemon *daemon;
@@ -77,7 +76,7 @@ struct request {
   job *waits_for;
   int64_t wait_until;
   int64_t preferred_ms; /* by a Prefer header */
-  int wait_for_result; /* the answer is the result where there is one in time */
+  int wait_for_result;  /* the answer is the result where there is one in time */
   int cancels;
 
   unsigned status;

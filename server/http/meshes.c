@@ -98,13 +98,13 @@ static void store_mesh(request *r, const upload_query *query, const unsigned cha
   memcpy(row.id, id, sizeof row.id);
   orb_hash_end(&r->hash, row.sha);
   row.json = json.data;
-  pthread_mutex_lock(&srv->mesh_lock);
+  objects_hold(srv->store);
   store_result stored = objects_publish(srv->store, &r->temp, OBJECT_MESH, id);
   FAULT_POINT("mesh-published");
   if (stored == STORE_OK) {
     stored = catalogue_put(srv->cat, &row);
   }
-  pthread_mutex_unlock(&srv->mesh_lock);
+  objects_let_go(srv->store);
   resource_free(&row);
   /* Of two that sent the same at once, both get the row that was first. */
   const cached *entry = stored == STORE_OK ? find_description(srv, RESOURCE_MESH, id, &stored) : NULL;

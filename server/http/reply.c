@@ -145,9 +145,9 @@ static void add_cors(request *r) {
       "Preference-Applied");
   if (strcmp(r->method, "OPTIONS") == 0) {
     reply_header(r, "Access-Control-Allow-Methods", "GET, HEAD, POST, DELETE");
-    reply_header(
-        r, "Access-Control-Allow-Headers",
-        "Authorization, Content-Type, Content-Encoding, Prefer, Priority, If-None-Match, Range, Last-Event-ID, traceparent");
+    reply_header(r, "Access-Control-Allow-Headers",
+                 "Authorization, Content-Type, Content-Encoding, Prefer, Priority, If-None-Match, Range, "
+                 "Last-Event-ID, traceparent");
     reply_header(r, "Access-Control-Max-Age", "600");
   }
 }

@@ -29,6 +29,7 @@ const cached *find_description(server *srv, resource_kind kind, const char *id, 
     note_use(srv, entry);
     return entry;
   }
+  unsigned long long since = cache_drops(srv->descriptions);
   *result = catalogue_get(srv->cat, kind, id, &row);
   if (*result != STORE_OK) {
     return NULL;
@@ -36,7 +37,7 @@ const cached *find_description(server *srv, resource_kind kind, const char *id, 
   if (kind != RESOURCE_MESH) {
     catalogue_touch(srv->cat, kind, id);
   }
-  entry = cache_add(srv->descriptions, &row);
+  entry = cache_add(srv->descriptions, &row, since);
   *result = entry ? STORE_OK : STORE_ERROR;
   return entry;
 }
@@ -119,10 +120,8 @@ static void delete_away(request *r) {
     reply_refuse(r, "in-use", "Unfinished jobs need this mesh: wait for them, or cancel them.");
     return;
   }
-  pthread_mutex_lock(&srv->mesh_lock);
   const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions};
   store_result result = evict_one(&env, kind, r->id);
-  pthread_mutex_unlock(&srv->mesh_lock);
   if (result == STORE_OK) {
     reply_empty(r, 204);
   } else {

@@ -1,6 +1,8 @@
 /* Health, metrics, the API's document, and the pages. */
+#include <dirent.h>
 #include <stdio.h>
 #include <string.h>
+#include <time.h>
 
 #include "http/http.h"
 #include "metrics.h"
@@ -9,6 +11,18 @@
 
 static void gauge(orb_text *out, const char *name, double value) {
   orb_text_printf(out, "# TYPE %s gauge\n%s %.17g\n", name, name, value);
+}
+
+static double count_entries(const char *folder) {
+  DIR *dir = opendir(folder);
+  double count = 0;
+  for (struct dirent *entry; dir && (entry = readdir(dir));) {
+    count += entry->d_name[0] != '.';
+  }
+  if (dir) {
+    closedir(dir);
+  }
+  return count;
 }
 
 static void metrics_away(request *r) {
@@ -21,6 +35,10 @@ static void metrics_away(request *r) {
   orb_text_printf(&text, "orbmorph_jobs{state=\"queued\"} %d\norbmorph_jobs{state=\"waiting\"} %d\n", n.queued,
                   n.waiting);
   orb_text_printf(&text, "orbmorph_jobs{state=\"running\"} %d\n", n.running);
+  orb_text_add(&text, "# TYPE orbmorph_jobs_running gauge\n");
+  for (size_t i = 0; i < sizeof n.stages / sizeof n.stages[0] && n.stages[i].jobs > 0; i++) {
+    orb_text_printf(&text, "orbmorph_jobs_running{stage=\"%s\"} %d\n", n.stages[i].name, n.stages[i].jobs);
+  }
   orb_text_add(&text, "# TYPE orbmorph_jobs_ended_total counter\n");
   for (int s = ORB_JOB_SUCCEEDED; s <= ORB_JOB_CANCELLED; s++) {
     orb_text_printf(&text, "orbmorph_jobs_ended_total{state=\"%s\"} %lld\n", orb_job_state_name((orb_job_state)s),
@@ -30,6 +48,10 @@ static void metrics_away(request *r) {
   gauge(&text, "orbmorph_waiting_connections", n.waiters);
   gauge(&text, "orbmorph_stored_bytes", (double)catalogue_bytes(srv->cat, 0));
   gauge(&text, "orbmorph_disk_free_bytes", (double)objects_free_bytes(srv->store));
+  gauge(&text, "orbmorph_queue_limit", (double)srv->options->queue_limit);
+  gauge(&text, "orbmorph_decoding_bytes", (double)__atomic_load_n(&srv->decoding, __ATOMIC_RELAXED));
+  gauge(&text, "process_open_fds", count_entries("/proc/self/fd"));
+  gauge(&text, "process_threads", count_entries("/proc/self/task"));
   long resident = 0;
   FILE *statm = fopen("/proc/self/statm", "r");
   if (statm) {
@@ -56,9 +78,16 @@ static enum MHD_Result ready(request *r) {
   orb_json_member_string(&json, "status", "ready");
   if (query_has(r, "verbose")) {
     orb_json_member_integer(&json, "queued", n.queued);
+    orb_json_member_integer(&json, "waiting", n.waiting);
     orb_json_member_integer(&json, "running", n.running);
+    orb_json_member_integer(&json, "queue_limit", srv->options->queue_limit);
+    orb_json_member_integer(&json, "oldest_ms", n.oldest_ms);
     orb_json_member_integer(&json, "workers", srv->options->workers);
     orb_json_member_integer(&json, "connections", metrics_connections());
+    orb_json_member_integer(&json, "max_connections", srv->options->max_connections);
+    orb_json_member_integer(&json, "waiting_connections", n.waiters);
+    orb_json_member_integer(&json, "disk_free_bytes", (int64_t)objects_free_bytes(srv->store));
+    orb_json_member_integer(&json, "uptime_seconds", (int64_t)time(NULL) - srv->started);
     orb_json_member_string(&json, "engine", ORB_ENGINE);
   }
   orb_json_close(&json, '}');

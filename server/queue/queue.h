@@ -120,6 +120,10 @@ void queue_give_back(queue *q, job *j);
 /* Numbers for /metrics. */
 typedef struct queue_numbers {
   int queued, waiting, running, waiters;
+  struct {
+    char name[24];
+    int jobs;
+  } stages[16]; /* of the running; the rest is empty */
   int64_t oldest_ms;
   int64_t ended[ORB_JOB_CANCELLED + 1]; /* by state, since the start */
 } queue_numbers;

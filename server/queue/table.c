@@ -172,6 +172,16 @@ int queue_needs_mesh(queue *q, const char *mesh) {
   return needed;
 }
 
+static void count_stage(queue_numbers *out, const char *stage) {
+  enum { MOST = sizeof out->stages / sizeof out->stages[0] };
+  int i = 0;
+  while (i < MOST - 1 && out->stages[i].jobs > 0 && strcmp(out->stages[i].name, stage) != 0) {
+    i++;
+  }
+  copy_text(out->stages[i].name, sizeof out->stages[i].name, stage);
+  out->stages[i].jobs++;
+}
+
 void queue_count(queue *q, queue_numbers *out) {
   memset(out, 0, sizeof *out);
   pthread_mutex_lock(&q->lock);
@@ -179,6 +189,9 @@ void queue_count(queue *q, queue_numbers *out) {
   for (job *j = q->first; j; j = j->next) {
     int queued = !j->running && j->waits_for == 0;
     out->queued += queued;
+    if (j->running) {
+      count_stage(out, j->stage[0] ? j->stage : "start");
+    }
     out->waiting += j->waits_for > 0;
     if (queued && now - j->row.created > out->oldest_ms) {
       out->oldest_ms = now - j->row.created;

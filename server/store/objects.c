@@ -3,6 +3,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,6 +17,7 @@
 static const char *const folders[OBJECT_KINDS] = {"mesh", "sphere", "asset", "places", "spheres"};
 
 struct objects {
+  pthread_rwlock_t publishing;
   char root[PATH_MAX - 256];
 };
 
@@ -95,6 +97,11 @@ store_result objects_open(const char *data, objects **out) {
     free(store);
     return status;
   }
+  pthread_rwlockattr_t attributes;
+  pthread_rwlockattr_init(&attributes);
+  pthread_rwlockattr_setkind_np(&attributes, PTHREAD_RWLOCK_PREFER_WRITER_NONRECURSIVE_NP);
+  pthread_rwlock_init(&store->publishing, &attributes);
+  pthread_rwlockattr_destroy(&attributes);
   char path[PATH_MAX];
   snprintf(path, sizeof path, "%s/tmp", store->root);
   sweep(path);
@@ -103,7 +110,20 @@ store_result objects_open(const char *data, objects **out) {
 }
 
 void objects_close(objects *store) {
+  if (store) {
+    pthread_rwlock_destroy(&store->publishing);
+  }
   free(store);
+}
+
+void objects_hold(objects *store) {
+  pthread_rwlock_rdlock(&store->publishing);
+}
+void objects_exclude(objects *store) {
+  pthread_rwlock_wrlock(&store->publishing);
+}
+void objects_let_go(objects *store) {
+  pthread_rwlock_unlock(&store->publishing);
 }
 
 store_result objects_begin(objects *store, object_temp *temp) {

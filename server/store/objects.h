@@ -51,6 +51,13 @@ void objects_abandon(object_temp *temp);
 /* All at once. */
 store_result objects_put(objects *store, object_kind kind, const char *id, const void *bytes, size_t size);
 
+/* An object without a row is harmless, a row without its object is not. So who publishes objects and then commits
+ * their row holds meanwhile, any number side by side; who removes a row and then its objects excludes all of them. Both
+ * let go, on the thread that began. */
+void objects_hold(objects *store);
+void objects_exclude(objects *store);
+void objects_let_go(objects *store);
+
 /* A descriptor to read it, and its size. */
 store_result objects_read(const objects *store, object_kind kind, const char *id, int *fd, uint64_t *size);
 /* Its bytes, in memory of malloc(). */

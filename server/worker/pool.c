@@ -28,10 +28,26 @@ struct worker_pool {
 typedef struct progress_of {
   queue *q;
   job *j;
+  char stage[24];
+  double began;
 } progress_of;
+
+/* The stage that was running is over; the next begins. */
+static void enter_stage(progress_of *p, const char *stage) {
+  if (strncmp(p->stage, stage, sizeof p->stage - 1) == 0) {
+    return;
+  }
+  double now = orb_clock();
+  if (p->stage[0]) {
+    metrics_stage(job_kind(p->j) == ORB_JOB_EMBEDDING, p->stage, now - p->began);
+  }
+  snprintf(p->stage, sizeof p->stage, "%s", stage);
+  p->began = now;
+}
 
 static void on_progress(void *user, const char *stage, double fraction) {
   progress_of *p = user;
+  enter_stage(p, stage);
   queue_progress(p->q, p->j, stage, fraction);
 }
 
@@ -124,7 +140,7 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, orb_prob
 
 static void run_claimed(worker_pool *pool, job *j, int threads) {
   const run_env *env = &pool->env;
-  progress_of progress = {env->q, j};
+  progress_of progress = {.q = env->q, .j = j};
   orb_context_options options = {.memory_limit = (size_t)pool->options.job_memory,
                                  .threads = threads,
                                  .deadline_ms = orb_clock_ms() + pool->options.job_ms,
@@ -133,7 +149,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
                                  .progress_user = &progress};
   orb_context *ctx = NULL;
   orb_problem problem = {0};
-  resource result = {0};
+  run_output out = {0};
   int64_t began = orb_clock_ms();
   if (orb_context_create(&options, &ctx) != ORB_OK) {
     orb_refuse(&problem, "no-memory", "The server has no memory left; try again later.");
@@ -145,8 +161,9 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
   FAULT_POINT("run-begun");
   FAULT_POINT(job_key(j));
   int embedding = job_kind(j) == ORB_JOB_EMBEDDING;
-  int fine = embedding ? run_embedding(env, ctx, j, &result, &problem) : run_supermesh(env, ctx, j, &result, &problem);
+  int fine = embedding ? run_embedding(env, ctx, j, &out, &problem) : run_supermesh(env, ctx, j, &out, &problem);
   queue_set_context(env->q, j, NULL);
+  enter_stage(&progress, "");
   FAULT_POINT("run-done");
   double seconds = 1e-3 * (double)(orb_clock_ms() - began);
   metrics_job(embedding, fine, seconds);
@@ -157,11 +174,16 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
     if (embedding) {
       queue_add_embed_ms(env->q, j, 1e3 * seconds);
     }
-    queue_finish(env->q, j, ORB_JOB_SUCCEEDED, NULL, result.json ? &result : NULL);
+    queue_finish(env->q, j, ORB_JOB_SUCCEEDED, NULL, out.row.json ? &out.row : NULL);
+  } else if (out.gone) {
+    queue_give_back(env->q, j); /* to be planned again */
   } else {
     finish_failed(env, j, ctx, &problem);
   }
-  resource_free(&result);
+  if (out.holds) {
+    objects_let_go(env->store);
+  }
+  resource_free(&out.row);
   orb_problem_free(&problem);
   orb_context_destroy(ctx);
 }

@@ -13,10 +13,16 @@ typedef struct run_env {
   objects *store;
 } run_env;
 
-/* Each runs a claimed job: 1 with *result filled (json of malloc()), or 0 with the problem. A problem without a name
- * means that the context holds the error. */
-int run_embedding(const run_env *env, orb_context *ctx, job *j, resource *result, orb_problem *problem);
-int run_supermesh(const run_env *env, orb_context *ctx, job *j, resource *result, orb_problem *problem);
+typedef struct run_output {
+  resource row; /* json of malloc() */
+  int holds;    /* objects_hold() was called, for what was published; until the row is committed */
+  int gone;     /* an embedding that the job needs was removed after it was planned */
+} run_output;
+
+/* Each runs a claimed job: 1 with *out filled, or 0 with the problem. A problem without a name means that the context
+ * holds the error. */
+int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out, orb_problem *problem);
+int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out, orb_problem *problem);
 
 /* A file's triangle as its corners' vertices in the file, noted before the repair. */
 typedef struct file_triangle {

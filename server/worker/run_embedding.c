@@ -32,7 +32,8 @@ static int store_sphere(const run_env *env, orb_context *ctx, const char *key, c
   return fine;
 }
 
-int run_embedding(const run_env *env, orb_context *ctx, job *j, resource *result, orb_problem *problem) {
+int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out, orb_problem *problem) {
+  resource *result = &out->row;
   orb_embedding_request request;
   orb_mesh mesh = {0};
   orb_embedding embedding = {0};
@@ -59,6 +60,8 @@ int run_embedding(const run_env *env, orb_context *ctx, job *j, resource *result
   embedding.timings.check += checked;
   embedding.timings.total += checked;
   orb_progress(ctx, "store", 0);
+  objects_hold(env->store);
+  out->holds = 1;
   if (!store_sphere(env, ctx, job_key(j), &mesh, &embedding, result, problem)) {
     goto done;
   }

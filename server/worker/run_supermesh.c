@@ -20,6 +20,7 @@ typedef struct merge_input {
   orb_landmark *landmarks;
   orb_place *places;
   file_triangle *noted; /* landmark-major, as the spots */
+  int gone;             /* an embedding is there no more */
 } merge_input;
 
 static void free_input(orb_context *ctx, merge_input *in) {
@@ -90,7 +91,12 @@ static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int
     in->noted[(size_t)l * (size_t)list->shape_count + (size_t)s] = noted[l];
   }
   orb_free(ctx, noted);
-  fine = fine && run_load_points(env, ctx, embedding, &in->meshes[s], &in->points[s], problem);
+  if (fine && !run_load_points(env, ctx, embedding, &in->meshes[s], &in->points[s], problem)) {
+    resource known = {0};
+    in->gone = catalogue_get(env->cat, RESOURCE_EMBEDDING, embedding, &known) == STORE_NOT_FOUND;
+    resource_free(&known);
+    fine = 0;
+  }
   in->shapes[s] = (orb_align_shape){.mesh = &in->meshes[s], .points = in->points[s]};
   return fine && place_all(ctx, in, s, problem);
 }
@@ -173,7 +179,6 @@ static orb_spot *found_spots(orb_context *ctx, const merge_input *in, const orb_
 static int store_result_of(const run_env *env, orb_context *ctx, job *j, const merge_input *in,
                            const orb_merge_result *merged, resource *result, orb_problem *problem) {
   orb_text json = {0};
-  orb_progress(ctx, "store", 0);
   orb_id_of_text((const char *)merged->asset.data, merged->asset.size, result->sha);
   result->kind = RESOURCE_SUPERMESH;
   result->bytes = (int64_t)merged->asset.size;
@@ -201,7 +206,7 @@ static int store_result_of(const run_env *env, orb_context *ctx, job *j, const m
   return 1;
 }
 
-int run_supermesh(const run_env *env, orb_context *ctx, job *j, resource *result, orb_problem *problem) {
+int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out, orb_problem *problem) {
   resource known = {0};
   orb_merge_result merged;
   if (catalogue_get(env->cat, RESOURCE_SUPERMESH, job_key(j), &known) == STORE_OK) {
@@ -220,8 +225,12 @@ int run_supermesh(const run_env *env, orb_context *ctx, job *j, resource *result
     for (int32_t s = 0; s < in->request.shape_count; s++) {
       metrics_flips(merged.alignment.shapes[s].certificate.flipped);
     }
-    fine = store_result_of(env, ctx, j, in, &merged, result, problem);
+    orb_progress(ctx, "store", 0);
+    objects_hold(env->store);
+    out->holds = 1;
+    fine = store_result_of(env, ctx, j, in, &merged, &out->row, problem);
   }
+  out->gone = in->gone;
   orb_merge_result_free(ctx, &merged);
   free_input(ctx, in);
   free(in);

@@ -79,3 +79,30 @@ test('SIGTERM ends it in time while a job runs, and the job is kept', async (t) 
   const end = await d.ended((await d.get(job.url)).json, { seconds: 600 });
   assert.equal(end.state, 'succeeded', JSON.stringify(end.problem));
 });
+
+test('a job that ends the process three times fails, and the queue goes on', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const { json: mesh } = await d.upload(shapes.binaryPly(wobble(1, slow ? 5 : 7)), { name: 'poison' });
+  const { json: small } = await d.upload(shapes.obj(wobble(2, 2)), { name: 'small' });
+  const poison = (await d.post('/v1/embeddings', { mesh: mesh.id, method: 'kernel-sampling' })).json;
+  const behind = (await d.post('/v1/embeddings', { mesh: small.id })).json;
+  for (let crash = 1; crash <= 3; crash++) {
+    let now;
+    do now = (await d.get(poison.url)).json;
+    while (now.state === 'queued' || now.stage === null);
+    assert.equal(now.state, 'running', JSON.stringify(now));
+    assert.equal(now.attempt, crash);
+    await kill(d);
+  }
+  const end = (await d.get(poison.url)).json;
+  assert.equal(end.state, 'failed');
+  assert.equal(end.problem.type, '/problems/crashed');
+  assert.match(end.problem.detail, /died 3 times/);
+  const events = await d.get(`${poison.url}/events`);
+  assert.match(events.bytes.toString(), /^event: progress$/m);
+  assert.equal((await d.ended((await d.get(behind.url)).json)).state, 'succeeded');
+  const again = await d.post('/v1/embeddings', { mesh: mesh.id, method: 'kernel-sampling' });
+  assert.equal(again.status, 202, 'who asks for it again gets another try');
+  assert.notEqual(again.json.id, poison.id);
+  await d.delete(again.json.url);
+});

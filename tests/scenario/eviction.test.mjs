@@ -1,8 +1,10 @@
 // Derived objects beyond derived-bytes leave while the daemon runs, by their last use; uploads stay.
 import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
-import { daemon } from './support/daemon.mjs';
+import { promisify } from 'node:util';
+import { binaries, daemon } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const statuses = async (d, urls) => Promise.all(urls.map(async (url) => (await d.request('HEAD', url)).status));
@@ -44,4 +46,33 @@ test('the least used embeddings leave, uploads never', async (t) => {
   // What left can be made again.
   const mesh = meshes[2].split('/').at(-1);
   assert.equal((await d.made('/v1/embeddings', { mesh })).url, embeddings[2]);
+});
+
+test('what is removed while it is needed is made again', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '2', '--derived-bytes', '1M'] });
+  const meshes = [];
+  for (let i = 0; i < 6; i++) meshes.push((await d.upload(shapes.obj(shapes.ball(3, ([x, y, z]) => [x, y * (1 + i / 7), z])))).json.id);
+  let going = true, removed = 0;
+  const remover = (async () => {
+    while (going) {
+      for (const kind of ['embeddings', 'supermeshes'])
+        for (const { url } of await stored(d, kind)) removed += (await d.delete(url)).status === 204;
+      await sleep(20);
+    }
+  })();
+  for (let round = 0; round < 3; round++) {
+    const wanted = meshes.map((mesh, i) => ({ shapes: [{ mesh }, { mesh: meshes[(i + 1 + round) % meshes.length] }], align: { method: 'rotate' }, remesh: { method: 'overlay' } }));
+    const ends = await Promise.all(wanted.map((body) => d.post('/v1/supermeshes', body).then((r) => (r.status === 202 ? d.ended(r.json) : { state: 'succeeded' }))));
+    for (const end of ends) assert.equal(end.state, 'succeeded', JSON.stringify(end.problem));
+  }
+  going = false;
+  await remover;
+  assert.ok(removed > 20, `${removed} removed`);
+  // What the lists name is there, whole.
+  for (const [kind, file] of [['embeddings', 'sphere.ply'], ['supermeshes', 'asset.glb']])
+    for (const { url } of await stored(d, kind)) assert.equal((await d.get(`${url}/${file}`)).status, 200);
+  await d.stop();
+  const { stdout } = await promisify(execFile)(binaries.daemon, ['--check-data', '--data', d.data]);
+  assert.match(stdout, /: 0 wrong/, stdout);
+  await d.start();
 });

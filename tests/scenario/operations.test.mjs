@@ -71,3 +71,28 @@ test('SIGHUP reads the configuration again', async (t) => {
   assertProblem(await d.get('/v1/nothing'), 404, 'not-found');
   await logged(d, (l) => l.level === 'debug');
 });
+
+test('the counters tell of jobs, stages and the process', async (t) => {
+  const d = await daemon(t);
+  const { id } = (await d.upload(shapes.obj(shapes.egg(4)))).json;
+  await d.made('/v1/embeddings', { mesh: id });
+  const text = (await d.get('/metrics')).bytes.toString();
+  const value = (name) => Number(new RegExp(`^${name.replace(/[{}"]/g, '\\$&')} (\\S+)$`, 'm').exec(text)?.[1] ?? NaN);
+  for (const name of ['orbmorph_jobs{state="queued"}', 'orbmorph_jobs{state="running"}', 'orbmorph_queue_oldest_seconds', 'orbmorph_flips_total']) assert.equal(value(name), 0, name);
+  assert.equal(value('orbmorph_jobs_ended_total{state="succeeded"}'), 1);
+  for (const stage of ['read', 'embed', 'certify', 'store']) assert.equal(value(`orbmorph_stage_seconds_count{kind="embedding",stage="${stage}"}`), 1, `${stage}\n${text}`);
+  assert.equal(value('orbmorph_job_seconds_count{kind="embedding"}'), 1);
+  for (const name of ['orbmorph_cache_hits_total', 'orbmorph_connections', 'orbmorph_received_bytes_total', 'orbmorph_stored_bytes', 'process_resident_memory_bytes', 'process_open_fds', 'process_threads'])
+    assert.ok(value(name) > 0, name);
+  const ready = (await d.get('/readyz', { query: { verbose: '' } })).json;
+  assert.deepEqual([ready.queued, ready.waiting, ready.running, ready.queue_limit, ready.oldest_ms], [0, 0, 0, 10000, 0]);
+  assert.deepEqual((await d.get('/readyz')).json, { status: 'ready' });
+});
+
+test('slow requests are in the log', async (t) => {
+  const d = await daemon(t, { args: ['--slow-ms', '1'] });
+  const { headers } = await d.upload(shapes.binaryPly(shapes.ball(6)));
+  const line = await logged(d, (l) => l.message === 'slow request');
+  assert.deepEqual([line.level, line.request, line.route, line.status], ['warn', headers.get('x-request-id'), '/v1/meshes', 201]);
+  assert.ok(line.ms >= 1);
+});
