@@ -14,58 +14,27 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/compose_level.h"
+#include "align/compose_run.h"
 #include "base/check.h"
-#include "embed/multires.h"
-#include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
 enum {
-  FIRST_LEVEL = 8000, /* vertices at which a start begins */
-  LAST_START = 60000, /* and beyond which it gives up untangling */
+  FIRST_LEVEL = 8000,  /* vertices at which a start begins */
+  DRAWN_LEVEL = 16000, /* and one from a map without flips, which a coarser level would fold */
+  LAST_START = 60000,  /* and beyond which it gives up untangling */
+  HOPELESS = 9,        /* one flip in so many triangles: they will not be cleared */
   SOFT_ROUNDS = 8,
-  SOFT_SWEEPS = 20,
   ROUGH_SWEEPS = 40,
-  WORK = 600,   /* vertex steps a vertex, see composer.work */
-  SAMPLES = 150 /* of a map, from which the moving shape is bent anew */
+  WORK = 1000 /* vertex steps a vertex, see cm_run.work */
 };
 
 static const double GOOD_ENERGY = 1.2; /* below it the shapes correspond: no further start is tried */
-static const double EPSILON = 0.1;
-static const double STILL = 1e-3; /* of a mean edge: less does not count as moving */
 
-typedef struct effort {
-  double growth; /* of the vertices from level to level */
-  int first_sweeps, coarse_sweeps, level_sweeps, final_sweeps;
-} effort;
-
-static effort effort_of(orb_preset preset) {
-  return preset == ORB_PRESET_QUALITY ? (effort){1.3, 300, 120, 80, 120} : (effort){1.5, 150, 60, 40, 60};
+static cm_effort effort_of(orb_preset preset) {
+  return preset == ORB_PRESET_QUALITY ? (cm_effort){1.3, 300, 120, 80, 120} : (cm_effort){1.5, 150, 60, 40, 60};
 }
 
-typedef struct composer {
-  orb_context *ctx;
-  cm_surface b;
-  orb_aligned_shape *moving;
-  int32_t vertex_count, landmark_count;
-  double *x, *normal; /* moving shape, area 4π */
-  double *goal;       /* spatial targets; NULL: none */
-  double *goal_normal;
-  orb_place *goal_place; /* on the fixed shape, of every vertex of the moving one */
-  unsigned char *keep;
-  orb_hierarchy *hierarchy;
-  double *position; /* x in the order of the surface */
-  int32_t *local;
-  orb_place *place; /* by vertex of the surface: where it was on the last level */
-  double *best;     /* points of the best start, mesh order */
-  double best_energy;
-  int rough;    /* the alignment as given is only refined to be sampled */
-  int passes;   /* bends through samples of the best map */
-  int64_t work; /* vertex steps that may still be spent on clearing flips and further starts */
-  effort effort;
-} composer;
-
-static void composer_free(composer *c) {
+static void cm_run_free(cm_run *c) {
   orb_context *ctx = c->ctx;
   cm_surface_free(ctx, &c->b);
   orb_free(ctx, c->x);
@@ -81,7 +50,7 @@ static void composer_free(composer *c) {
   orb_free(ctx, c->best);
 }
 
-static orb_status prepare(composer *c, const orb_aligned_shape *fixed) {
+static orb_status prepare(cm_run *c, const orb_aligned_shape *fixed) {
   orb_context *ctx = c->ctx;
   const orb_mesh *mesh = &c->moving->mesh;
   size_t n = (size_t)mesh->vertex_count;
@@ -121,201 +90,8 @@ static orb_status prepare(composer *c, const orb_aligned_shape *fixed) {
   return ORB_OK;
 }
 
-typedef struct goal_job {
-  composer *c;
-  orb_nearest *tree;
-} goal_job;
-
-/* The fixed shape's vertex nearest to a target in position and normal. */
-static orb_place nearest_with_normal(const composer *c, int32_t v) {
-  const cm_surface *b = &c->b;
-  int32_t best = 0, stride = 3 * (1 + b->triangle_count / 40000);
-  double least = INFINITY;
-  for (int32_t h = 0; h < 3 * b->triangle_count; h += stride) {
-    int32_t u = b->triangles[h];
-    double d = orb_distance2(b->x + 3 * (size_t)u, c->goal + 3 * (size_t)v) +
-               0.25 * orb_distance2(b->normal + 3 * (size_t)u, c->goal_normal + 3 * (size_t)v);
-    if (d < least) {
-      least = d;
-      best = h;
-    }
-  }
-  orb_place place = {.triangle = best / 3};
-  place.at[best % 3] = 1;
-  return place;
-}
-
-/* The nearest point, if the surface faces the right way there; else the best compromise. */
-static void find_goal_places(void *arg, int64_t begin, int64_t end, int thread) {
-  goal_job *job = arg;
-  composer *c = job->c;
-  (void)thread;
-  for (int64_t v = begin; v < end; v++) {
-    double n[3];
-    (void)orb_nearest_query(job->tree, c->goal + 3 * v, INFINITY, &c->goal_place[v]);
-    cm_surface_at(&c->b, &c->goal_place[v], NULL, NULL, n);
-    if (orb_dot(n, c->goal_normal + 3 * v) < 0.5) {
-      c->goal_place[v] = nearest_with_normal(c, (int32_t)v);
-    }
-  }
-}
-
-/* The landmarks as anchors, and, where a map is known already (c->best), samples of it. Arrays of the caller: room for
- * landmark_count + SAMPLES. */
-static orb_status gather_anchors(composer *c, const orb_aligned_shape *fixed, int samples, int32_t *vertex,
-                                 double *goal, cm_anchors *out) {
-  *out = (cm_anchors){.vertex = vertex, .goal = goal};
-  for (int32_t i = 0; i < c->landmark_count; i++) {
-    int32_t u = fixed->landmark_vertices[i];
-    if (c->moving->landmark_vertices[i] >= 0 && u >= 0) {
-      memcpy(goal + 3 * (size_t)out->count, c->b.x + 3 * (size_t)u, sizeof(double[3]));
-      vertex[out->count++] = c->moving->landmark_vertices[i];
-    }
-  }
-  out->exact = out->count;
-  samples = samples < c->vertex_count / 2 ? samples : c->vertex_count / 2;
-  if (samples > 0) {
-    ORB_TRY(cm_spread(c->ctx, c->x, c->vertex_count, samples, vertex + out->count));
-  }
-  for (int i = 0; i < samples; i++) {
-    int32_t v = vertex[out->exact + i];
-    if (!c->keep[v]) { /* a landmark is an anchor already */
-      orb_place place;
-      orb_locate(c->b.locator, c->best + 3 * (size_t)v, -1, &place);
-      cm_surface_at(&c->b, &place, goal + 3 * (size_t)out->count, NULL, NULL);
-      vertex[out->count++] = v;
-    }
-  }
-  return ORB_OK;
-}
-
-/* Spatial targets, with the normals that the bent shape has, and the nearest places to them. */
-static orb_status bend(composer *c, const orb_aligned_shape *fixed, int samples) {
-  orb_context *ctx = c->ctx;
-  const orb_mesh *mesh = &c->moving->mesh;
-  cm_anchors anchors;
-  double fit, *goal = ORB_NEW(ctx, double, 3 * ((size_t)c->landmark_count + SAMPLES));
-  int32_t *vertex = ORB_NEW(ctx, int32_t, (size_t)c->landmark_count + SAMPLES);
-  goal_job job = {.c = c};
-  orb_status status = ORB_E_NO_MEMORY;
-  if (!goal || !vertex) {
-    goto done;
-  }
-  ORB_GO(status, gather_anchors(c, fixed, samples, vertex, goal, &anchors), done);
-  ORB_GO(status, cm_spatial_targets(ctx, &c->b, c->x, c->normal, c->vertex_count, &anchors, c->goal, &fit), done);
-  cm_normals(c->goal, c->vertex_count, mesh->triangles, mesh->triangle_count, c->goal_normal);
-  ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &job.tree), done);
-  orb_parallel_for(ctx, c->vertex_count, 64, find_goal_places, &job);
-  orb_nearest_destroy(ctx, job.tree);
-done:
-  orb_free(ctx, goal);
-  orb_free(ctx, vertex);
-  return status;
-}
-
-typedef struct guess_job {
-  composer *c;
-  cm_level *l;
-  const int32_t *to_mesh;
-  int spatial;
-} guess_job;
-
-static void guess_range(void *arg, int64_t begin, int64_t end, int thread) {
-  guess_job *job = arg;
-  (void)thread;
-  for (int64_t i = begin; i < end; i++) {
-    int32_t v = job->to_mesh[job->l->vertex[i]];
-    if (job->spatial && !job->l->pinned[i]) {
-      job->l->place[i] = job->c->goal_place[v];
-      cm_surface_at(&job->c->b, &job->l->place[i], NULL, job->l->x + 3 * i, NULL);
-      cm_level_refresh(job->l, &job->c->b, (int32_t)i);
-    } else {
-      memcpy(job->l->x + 3 * i, job->c->moving->points + 3 * (size_t)v, sizeof(double[3]));
-      cm_level_locate(job->l, &job->c->b, (int32_t)i, -1);
-    }
-  }
-}
-
-/* Vertices that share a point cannot be told apart by an untangling: spread them a little inside their places. */
-static void spread_out(composer *c, cm_level *l) {
-  uint64_t state = 0x9e3779b97f4a7c15u;
-  for (int32_t v = 0; v < l->count; v++) {
-    if (l->pinned[v]) {
-      continue;
-    }
-    double w[3], sum = 0;
-    for (int k = 0; k < 3; k++) {
-      state = state * 6364136223846793005u + 1442695040888963407u;
-      w[k] = l->place[v].at[k] + 0.3 * (double)(state >> 40) * 0x1p-24;
-      sum += w[k];
-    }
-    for (int k = 0; k < 3; k++) {
-      l->place[v].at[k] = w[k] / sum;
-    }
-    cm_surface_at(&c->b, &l->place[v], NULL, l->x + 3 * (size_t)v, NULL);
-    cm_level_refresh(l, &c->b, v);
-  }
-}
-
-static void relocate(composer *c, cm_level *l) {
-  for (int32_t v = 0; v < l->count; v++) {
-    if (!l->pinned[v]) {
-      cm_level_locate(l, &c->b, v, l->place[v].triangle);
-    }
-  }
-}
-
-/* Sweeps until hardly a vertex moves any more. All vertices take part in the first one. */
-static orb_status sweeps(composer *c, cm_level *l, cm_rules rules, int count) {
-  double moved;
-  int32_t stepped = l->count;
-  rules.still = STILL * sqrt(4 * M_PI / l->triangle_count);
-  for (int32_t v = 0; v < l->count; v++) {
-    l->moved[v] = INFINITY;
-  }
-  for (int i = 0; i < count && stepped > l->count / 500; i++) {
-    ORB_TRY(cm_level_sweep(c->ctx, l, &c->b, &rules, &moved, &stepped));
-    c->work -= stepped;
-  }
-  return ORB_OK;
-}
-
-static void set_pull(const composer *c, cm_level *l, const int32_t *to_mesh, double strength) {
-  for (int32_t v = 0; v < l->count; v++) {
-    l->pull[v] = strength * l->area[v];
-    if (strength > 0) {
-      memcpy(l->goal + 3 * (size_t)v, c->goal + 3 * (size_t)to_mesh[l->vertex[v]], sizeof(double[3]));
-    }
-  }
-}
-
-/* Flips are driven out: sweeps against a growing barrier, then untangling of a copy, until that succeeds. */
-static orb_status clear_flips(composer *c, cm_level *l, int rounds, int32_t *flips) {
-  cm_rules rules = {.soft = 1, .barrier = 1e-4, .epsilon = EPSILON, .omega = 1};
-  double *copy = ORB_NEW(c->ctx, double, 3 * (size_t)l->count);
-  orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
-  *flips = cm_level_flips(l);
-  for (int round = 0; round < rounds && *flips && c->work > 0 && status == ORB_OK; round++) {
-    ORB_GO(status, sweeps(c, l, rules, SOFT_SWEEPS), done);
-    rules.barrier *= 3;
-    *flips = cm_level_flips(l);
-    if (*flips) {
-      memcpy(copy, l->x, 3 * (size_t)l->count * sizeof *copy);
-      ORB_GO(status, cm_level_untangle(c->ctx, l, flips, &c->work), done);
-      if (*flips) {
-        memcpy(l->x, copy, 3 * (size_t)l->count * sizeof *copy);
-      } else {
-        relocate(c, l);
-      }
-    }
-  }
-done:
-  orb_free(c->ctx, copy);
-  return status;
-}
-
 /* Writes a level back into the refiner and the places of its vertices. */
-static void store_level(composer *c, const cm_level *l, orb_refiner *r) {
+static void store_level(cm_run *c, const cm_level *l, orb_refiner *r) {
   for (int32_t v = 0; v < l->count; v++) {
     memcpy(r->point + 4 * (size_t)l->vertex[v], l->x + 3 * (size_t)v, sizeof(double[3]));
     c->place[l->vertex[v]] = l->place[v];
@@ -323,7 +99,7 @@ static void store_level(composer *c, const cm_level *l, orb_refiner *r) {
 }
 
 /* A level of the vertices that live now, with the places of those that lived before; new ones are located. */
-static orb_status load_level(composer *c, const orb_refiner *r, const unsigned char *known, cm_level *l) {
+static orb_status load_level(cm_run *c, const orb_refiner *r, const unsigned char *known, cm_level *l) {
   ORB_TRY(cm_level_create(c->ctx, &c->hierarchy->surface, r->alive, r->pinned, c->position, r->live, c->local, l));
   int32_t hint = -1;
   for (int32_t v = 0; v < l->count; v++) {
@@ -340,63 +116,16 @@ static orb_status load_level(composer *c, const orb_refiner *r, const unsigned c
   return ORB_OK;
 }
 
-/* What a level holds of its map, to go back to. */
-typedef struct snapshot {
-  orb_place *place;
-  double *y; /* y, n and x, as they lie in the level */
-} snapshot;
-
-static orb_status snapshot_take(composer *c, const cm_level *l, snapshot *s) {
-  s->place = ORB_NEW(c->ctx, orb_place, l->count);
-  s->y = ORB_NEW(c->ctx, double, 9 * (size_t)l->count);
-  if (!s->place || !s->y) {
-    return ORB_E_NO_MEMORY;
-  }
-  memcpy(s->place, l->place, (size_t)l->count * sizeof *s->place);
-  memcpy(s->y, l->y, 9 * (size_t)l->count * sizeof *s->y);
-  return ORB_OK;
-}
-
-static void snapshot_restore(const snapshot *s, cm_level *l) {
-  memcpy(l->place, s->place, (size_t)l->count * sizeof *s->place);
-  memcpy(l->y, s->y, 9 * (size_t)l->count * sizeof *s->y);
-}
-
-/* Vertices that barriers have locked in get free where flips are allowed for a while. What comes of it is kept if it
- * can be untangled and is better. */
-static orb_status loosen(composer *c, cm_level *l, int soft_sweeps, int hard_sweeps) {
-  const cm_rules soft = {.soft = 1, .barrier = 1, .epsilon = EPSILON, .omega = 1},
-                 hard = {.soft = 0, .barrier = 1, .epsilon = EPSILON, .omega = 1};
-  snapshot before = {0};
-  double energy = cm_level_energy(l);
-  int32_t flips;
-  orb_status status;
-  ORB_GO(status, snapshot_take(c, l, &before), done);
-  ORB_GO(status, sweeps(c, l, soft, soft_sweeps), done);
-  ORB_GO(status, clear_flips(c, l, 3, &flips), done);
-  if (!flips) {
-    ORB_GO(status, sweeps(c, l, hard, hard_sweeps), done);
-  }
-  int worse = flips || cm_level_flips(l) || cm_level_energy(l) >= energy;
-  if (worse) {
-    snapshot_restore(&before, l);
-  }
-done:
-  orb_free(c->ctx, before.place);
-  orb_free(c->ctx, before.y);
-  return status;
-}
-
 /* From a level without flips up to all vertices. rough: only so far that samples of the map are of use. */
-static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, int rough, int *failed) {
+static orb_status refine(cm_run *c, orb_refiner *r, cm_level *l, double pull, int rough, int *failed) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
-  const cm_rules hard = {.soft = 0, .barrier = 1, .epsilon = EPSILON, .omega = 1};
+  const cm_rules hard = cm_hard();
   unsigned char *known = ORB_NEW(c->ctx, unsigned char, c->vertex_count);
   orb_status status = known ? ORB_OK : ORB_E_NO_MEMORY;
   int first = 1;
   while (status == ORB_OK) {
     int last = r->live == c->vertex_count;
-    set_pull(c, l, to_mesh, last ? 0 : pull);
+    cm_set_pull(c, l, to_mesh, last ? 0 : pull);
     pull *= 0.5;
     int count = last             ? c->effort.final_sweeps
                 : first          ? c->effort.first_sweeps
@@ -404,10 +133,10 @@ static orb_status refine(composer *c, orb_refiner *r, cm_level *l, double pull, 
                                  : c->effort.level_sweeps;
     first = 0;
     if (rough) {
-      ORB_GO(status, sweeps(c, l, hard, count < ROUGH_SWEEPS ? count : ROUGH_SWEEPS), done);
+      ORB_GO(status, cm_sweeps(c, l, hard, count < ROUGH_SWEEPS ? count : ROUGH_SWEEPS), done);
     } else {
-      ORB_GO(status, sweeps(c, l, hard, count), done);
-      ORB_GO(status, loosen(c, l, count / 2, count / 2), done);
+      ORB_GO(status, cm_sweeps(c, l, hard, count), done);
+      ORB_GO(status, cm_loosen(c, l, count / 2, count / 2), done);
     }
     *failed = cm_level_flips(l) > 0;
     if (*failed) {
@@ -441,7 +170,7 @@ done:
 }
 
 /* Runs one start; keeps its points if they are the best so far. */
-static orb_status run_start(composer *c, int spatial) {
+static orb_status run_start(cm_run *c, cm_start start) {
   orb_context *ctx = c->ctx;
   orb_embed_options options;
   orb_embed_defaults(&options);
@@ -453,7 +182,7 @@ static orb_status run_start(composer *c, int spatial) {
   ORB_GO(status, orb_refiner_create(ctx, c->hierarchy, &options, &r), done);
   r->settings.crowded = INFINITY;
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
-  for (int32_t want = FIRST_LEVEL; flips;) {
+  for (int32_t want = start == CM_DRAWN ? DRAWN_LEVEL : FIRST_LEVEL; flips;) {
     ORB_GO(status, orb_refiner_advance(ctx, r, want < c->vertex_count ? want : c->vertex_count), done);
     for (int32_t v = 0; v < c->vertex_count; v++) {
       r->pinned[v] = c->keep[to_mesh[v]];
@@ -462,23 +191,25 @@ static orb_status run_start(composer *c, int spatial) {
     ORB_GO(status,
            cm_level_create(ctx, &c->hierarchy->surface, r->alive, r->pinned, c->position, r->live, c->local, &level),
            done);
-    guess_job job = {c, &level, to_mesh, spatial};
-    orb_parallel_for(ctx, level.count, 16, guess_range, &job);
-    if (spatial) {
-      spread_out(c, &level);
-      set_pull(c, &level, to_mesh, 1);
+    cm_guess(c, &level, to_mesh, start);
+    cm_set_pull(c, &level, to_mesh, start == CM_SPATIAL ? 1 : 0);
+    flips = cm_level_flips(&level);
+    if (flips <= level.triangle_count / HOPELESS) {
+      ORB_GO(status, cm_clear_flips(c, &level, SOFT_ROUNDS, &flips), done);
     }
-    ORB_GO(status, clear_flips(c, &level, SOFT_ROUNDS, &flips), done);
-    if (flips && (r->live == c->vertex_count || r->live > LAST_START)) {
-      goto done; /* this guess leads nowhere: not an error, the other one or the given alignment stays */
+    if (flips && (r->live == c->vertex_count || r->live > LAST_START || flips > level.triangle_count / HOPELESS)) {
+      goto done; /* this guess leads nowhere: not an error, another one or the given alignment stays */
     }
     for (int32_t v = 0; v < c->vertex_count && flips; v++) {
       r->pinned[v] = 0;
     }
     want = r->live * 2;
   }
+  if (start == CM_DRAWN) {
+    ORB_GO(status, cm_draw(c, &level, to_mesh), done);
+  }
   store_level(c, &level, r);
-  ORB_GO(status, refine(c, r, &level, spatial ? 0.5 : 0, !spatial && c->rough, &failed), done);
+  ORB_GO(status, refine(c, r, &level, start == CM_GIVEN ? 0 : 0.5, start == CM_GIVEN && c->rough, &failed), done);
   if (!failed) {
     double energy = cm_level_energy(&level);
     if (energy < c->best_energy) {
@@ -493,7 +224,7 @@ done:
 }
 
 /* The composed energy of the alignment as it was given. */
-static orb_status given_energy(composer *c, double *energy) {
+static orb_status given_energy(cm_run *c, double *energy) {
   orb_embed_options options;
   orb_embed_defaults(&options);
   const orb_mesh *mesh = &c->moving->mesh;
@@ -521,9 +252,32 @@ static orb_status given_energy(composer *c, double *energy) {
   return status;
 }
 
+/* The starts, until nothing comes of them any more. */
+static orb_status run_starts(cm_run *c, const orb_aligned_shape *fixed, orb_preset preset) {
+  ORB_TRY(cm_bend(c, fixed, 0));
+  ORB_TRY(run_start(c, CM_SPATIAL));
+  if (preset != ORB_PRESET_QUALITY && c->best_energy <= GOOD_ENERGY) {
+    return ORB_OK;
+  }
+  if (preset == ORB_PRESET_QUALITY) {
+    ORB_TRY(run_start(c, CM_GIVEN));
+  }
+  ORB_TRY(run_start(c, CM_DRAWN));
+  double last = INFINITY;
+  while (c->best_energy < 0.99 * last && c->passes-- > 0 && c->work > 0) {
+    last = c->best_energy;
+    ORB_TRY(cm_bend(c, fixed, CM_SAMPLES));
+    ORB_TRY(run_start(c, CM_SPATIAL));
+    if (!(c->best_energy < last)) {
+      ORB_TRY(run_start(c, CM_DRAWN));
+    }
+  }
+  return ORB_OK;
+}
+
 orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_aligned_shape *moving,
                        int32_t landmark_count, orb_preset preset, double energy[2], int *improved) {
-  composer c = {.ctx = ctx, .moving = moving, .landmark_count = landmark_count, .effort = effort_of(preset)};
+  cm_run c = {.ctx = ctx, .moving = moving, .landmark_count = landmark_count, .effort = effort_of(preset)};
   c.passes = preset == ORB_PRESET_QUALITY ? 6 : 3;
   c.rough = preset != ORB_PRESET_QUALITY;
   c.work = (preset == ORB_PRESET_QUALITY ? 5000 : WORK) * (int64_t)moving->mesh.vertex_count;
@@ -534,21 +288,7 @@ orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_ali
   ORB_GO(status, given_energy(&c, &energy[0]), done);
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
-  ORB_GO(status, bend(&c, fixed, 0), done);
-  ORB_GO(status, run_start(&c, 1), done);
-  if (preset == ORB_PRESET_QUALITY || c.best_energy > GOOD_ENERGY) {
-    ORB_GO(status, run_start(&c, 0), done);
-    double rough = c.best_energy;
-    for (double last = INFINITY; c.best_energy < 0.99 * last && c.passes-- > 0 && c.work > 0;) {
-      last = c.best_energy;
-      ORB_GO(status, bend(&c, fixed, SAMPLES), done);
-      ORB_GO(status, run_start(&c, 1), done);
-    }
-    if (c.rough && c.best_energy == rough) { /* nothing came of the samples */
-      c.rough = 0;
-      ORB_GO(status, run_start(&c, 0), done);
-    }
-  }
+  ORB_GO(status, run_starts(&c, fixed, preset), done);
   if (c.best_energy < energy[0]) {
     ORB_GO(status,
            orb_certify(ctx, c.best, moving->mesh.vertex_count, moving->mesh.triangles, moving->mesh.triangle_count,
@@ -562,6 +302,6 @@ orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_ali
     }
   }
 done:
-  composer_free(&c);
+  cm_run_free(&c);
   return status;
 }

@@ -1,10 +1,10 @@
 /* Spatial targets of a composed map: the moving shape bent onto the fixed one in space.
  *
- * A thin-plate spline in space (kernel |r|, affine part; Duchon 1977) carries the moving shape. It starts through the
- * anchors, or, where there are fewer than four, from the best of 24 rigid registrations (Besl & McKay 1992). Rounds
- * of iterative closest points refine it: controls spread over the moving shape look for the nearest vertex of the fixed
- * one in position and half-weighted normal; more controls and less stiffness from round to round. Anchors keep their
- * targets throughout. Lengths are those of shapes scaled to area 4π.
+ * A spline in space (kernel |r|; Duchon 1977) carries the moving shape away from a similarity. It starts through the
+ * anchors, from their similarity, or, where there are fewer than four, from the best of 24 rigid registrations (Besl &
+ * McKay 1992). Rounds of iterative closest points refine it: controls spread over the moving shape look for the nearest
+ * vertex of the fixed one in position and half-weighted normal; more controls and less stiffness from round to round.
+ * Anchors keep their targets throughout. Lengths are those of shapes scaled to area 4π.
  */
 #include <math.h>
 #include <string.h>
@@ -44,6 +44,7 @@ typedef struct targets_run {
   double *mapped;   /* 6 a control: position and normal under the spline */
   double *distance; /* of each control to its goal, squared, with the normals' part; negative: left out */
   spline s;
+  double base[12]; /* the similarity that the spline departs from, laid out like its affine part */
   double *matrix;
 } targets_run;
 
@@ -82,10 +83,11 @@ static void map_normal(const double j[9], const double n[3], double out[3]) {
   orb_normalize(out);
 }
 
-/* Fits the spline to `count` centres (first the anchors) and goals, with stiffness on the diagonal. */
+/* Fits the spline to `count` centres (first the anchors) and goals, with stiffness on the diagonal. Its affine part is
+ * the base but for a shift: a free one would be carried far off by anchors that lie on one side of the shape. */
 static orb_status spline_fit(targets_run *run, int32_t count, double stiffness) {
   spline *s = &run->s;
-  size_t n = (size_t)count + 4;
+  size_t n = (size_t)count + 1;
   memset(run->matrix, 0, n * n * sizeof *run->matrix);
   for (int32_t i = 0; i < count; i++) {
     const double *p = s->centre + 3 * (size_t)i;
@@ -95,16 +97,20 @@ static orb_status spline_fit(targets_run *run, int32_t count, double stiffness) 
     run->matrix[(size_t)i * n + (size_t)i] += i < run->anchors->exact   ? LANDMARK_STIFFNESS
                                               : i < run->anchors->count ? SAMPLE_STIFFNESS
                                                                         : stiffness;
-    for (size_t k = 0; k < 4; k++) {
-      double value = k ? p[k - 1] : 1;
-      run->matrix[(size_t)i * n + (size_t)count + k] = value;
-      run->matrix[((size_t)count + k) * n + (size_t)i] = value;
+    run->matrix[(size_t)i * n + (size_t)count] = run->matrix[(size_t)count * n + (size_t)i] = 1;
+    for (int k = 0; k < 3; k++) {
+      const double *base = run->base;
+      s->weight[3 * (size_t)i + (size_t)k] =
+          run->goal[3 * (size_t)i + (size_t)k] - base[k] - p[0] * base[3 + k] - p[1] * base[6 + k] - p[2] * base[9 + k];
     }
-    memcpy(s->weight + 3 * (size_t)i, run->goal + 3 * (size_t)i, 3 * sizeof(double));
   }
-  memset(s->weight + 3 * (size_t)count, 0, 12 * sizeof(double));
+  double *affine = s->weight + 3 * (size_t)count;
+  memset(affine, 0, sizeof(double[3]));
   if (orb_dense_solve((int32_t)n, run->matrix, 3, s->weight) != 0) {
     return orb_fail(run->ctx, ORB_E_INTERNAL, "The spline through %d controls has no solution.", count);
+  }
+  for (int k = 0; k < 12; k++) {
+    affine[k] = run->base[k] + (k < 3 ? affine[k] : 0);
   }
   s->count = count;
   return ORB_OK;
@@ -249,7 +255,7 @@ static void axis_rotation(int i, double r[9]) {
   r[6 + o[2]] = s2;
 }
 
-/* Sets the spline to y = R p + t. */
+/* Sets the spline to y = R p + t; R may be scaled. */
 static void set_rigid(spline *s, const double r[9], const double t[3]) {
   s->count = 0;
   for (int k = 0; k < 3; k++) {
@@ -330,14 +336,47 @@ static orb_status best_rigid(targets_run *run) {
   return ORB_OK;
 }
 
+/* The similarity nearest to the anchors (Umeyama 1991). */
+static void base_of_anchors(targets_run *run) {
+  int32_t count = run->anchors->count;
+  double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, h[9] = {0}, r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, t[3], spread = 0,
+         turned = 0;
+  for (int32_t i = 0; i < 3 * count; i++) {
+    from[i % 3] += run->s.centre[i] / count;
+    to[i % 3] += run->goal[i] / count;
+  }
+  for (int32_t i = 0; i < count; i++) {
+    const double *p = run->s.centre + 3 * (size_t)i, *q = run->goal + 3 * (size_t)i;
+    for (int k = 0; k < 9; k++) {
+      h[k] += (q[k / 3] - to[k / 3]) * (p[k % 3] - from[k % 3]);
+    }
+    spread += orb_distance2(p, from);
+  }
+  (void)nearest_rotation(h, r);
+  for (int k = 0; k < 9; k++) {
+    turned += r[k] * h[k];
+  }
+  double scale = spread > 0 && turned > 0 ? turned / spread : 1;
+  for (int k = 0; k < 9; k++) {
+    r[k] *= scale;
+  }
+  for (int k = 0; k < 3; k++) {
+    t[k] = to[k] - orb_dot(r + 3 * k, from);
+  }
+  set_rigid(&run->s, r, t);
+  memcpy(run->base, run->s.weight, sizeof run->base);
+}
+
 static orb_status targets_compute(targets_run *run, double *out, double *fit) {
   run->control_count = run->vertex_count < LAST_CONTROLS ? run->vertex_count : LAST_CONTROLS;
   ORB_TRY(cm_spread(run->ctx, run->x, run->vertex_count, run->control_count, run->control));
   if (run->anchors->count >= 4) {
     load_anchors(run);
+    base_of_anchors(run);
     ORB_TRY(spline_fit(run, run->anchors->count, LANDMARK_STIFFNESS));
   } else {
     ORB_TRY(best_rigid(run));
+    memcpy(run->base, run->s.weight, sizeof run->base);
   }
   *fit = INFINITY;
   for (int round = 0; round < ROUNDS; round++) {

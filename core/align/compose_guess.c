@@ -1,0 +1,152 @@
+/* Guesses of a composed map: where each vertex of the moving shape would lie on the fixed one. */
+#include <math.h>
+#include <string.h>
+
+#include "align/compose_run.h"
+#include "base/check.h"
+#include "numeric/vec3.h"
+
+typedef struct goal_job {
+  cm_run *c;
+  orb_nearest *tree;
+} goal_job;
+
+/* The fixed shape's vertex nearest to a target in position and normal. */
+static orb_place nearest_with_normal(const cm_run *c, int32_t v) {
+  const cm_surface *b = &c->b;
+  int32_t best = 0, stride = 3 * (1 + b->triangle_count / 40000);
+  double least = INFINITY;
+  for (int32_t h = 0; h < 3 * b->triangle_count; h += stride) {
+    int32_t u = b->triangles[h];
+    double d = orb_distance2(b->x + 3 * (size_t)u, c->goal + 3 * (size_t)v) +
+               0.25 * orb_distance2(b->normal + 3 * (size_t)u, c->goal_normal + 3 * (size_t)v);
+    if (d < least) {
+      least = d;
+      best = h;
+    }
+  }
+  orb_place place = {.triangle = best / 3};
+  place.at[best % 3] = 1;
+  return place;
+}
+
+/* The nearest point, if the surface faces the right way there; else the best compromise. */
+static void find_goal_places(void *arg, int64_t begin, int64_t end, int thread) {
+  goal_job *job = arg;
+  cm_run *c = job->c;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    double n[3];
+    (void)orb_nearest_query(job->tree, c->goal + 3 * v, INFINITY, &c->goal_place[v]);
+    cm_surface_at(&c->b, &c->goal_place[v], NULL, NULL, n);
+    if (orb_dot(n, c->goal_normal + 3 * v) < 0.5) {
+      c->goal_place[v] = nearest_with_normal(c, (int32_t)v);
+    }
+  }
+}
+
+/* The landmarks as anchors, and, where a map is known already (c->best), samples of it. Arrays of the caller: room for
+ * landmark_count + CM_SAMPLES. */
+static orb_status gather_anchors(cm_run *c, const orb_aligned_shape *fixed, int samples, int32_t *vertex, double *goal,
+                                 cm_anchors *out) {
+  *out = (cm_anchors){.vertex = vertex, .goal = goal};
+  for (int32_t i = 0; i < c->landmark_count; i++) {
+    int32_t u = fixed->landmark_vertices[i];
+    if (c->moving->landmark_vertices[i] >= 0 && u >= 0) {
+      memcpy(goal + 3 * (size_t)out->count, c->b.x + 3 * (size_t)u, sizeof(double[3]));
+      vertex[out->count++] = c->moving->landmark_vertices[i];
+    }
+  }
+  out->exact = out->count;
+  samples = samples < c->vertex_count / 2 ? samples : c->vertex_count / 2;
+  if (samples > 0) {
+    ORB_TRY(cm_spread(c->ctx, c->x, c->vertex_count, samples, vertex + out->count));
+  }
+  for (int i = 0; i < samples; i++) {
+    int32_t v = vertex[out->exact + i];
+    if (!c->keep[v]) { /* a landmark is an anchor already */
+      orb_place place;
+      orb_locate(c->b.locator, c->best + 3 * (size_t)v, -1, &place);
+      cm_surface_at(&c->b, &place, goal + 3 * (size_t)out->count, NULL, NULL);
+      vertex[out->count++] = v;
+    }
+  }
+  return ORB_OK;
+}
+
+orb_status cm_bend(cm_run *c, const orb_aligned_shape *fixed, int samples) {
+  orb_context *ctx = c->ctx;
+  const orb_mesh *mesh = &c->moving->mesh;
+  cm_anchors anchors;
+  double fit, *goal = ORB_NEW(ctx, double, 3 * ((size_t)c->landmark_count + CM_SAMPLES));
+  int32_t *vertex = ORB_NEW(ctx, int32_t, (size_t)c->landmark_count + CM_SAMPLES);
+  goal_job job = {.c = c};
+  orb_status status = ORB_E_NO_MEMORY;
+  if (!goal || !vertex) {
+    goto done;
+  }
+  ORB_GO(status, gather_anchors(c, fixed, samples, vertex, goal, &anchors), done);
+  ORB_GO(status, cm_spatial_targets(ctx, &c->b, c->x, c->normal, c->vertex_count, &anchors, c->goal, &fit), done);
+  cm_normals(c->goal, c->vertex_count, mesh->triangles, mesh->triangle_count, c->goal_normal);
+  ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &job.tree), done);
+  orb_parallel_for(ctx, c->vertex_count, 64, find_goal_places, &job);
+  orb_nearest_destroy(ctx, job.tree);
+done:
+  orb_free(ctx, goal);
+  orb_free(ctx, vertex);
+  return status;
+}
+
+typedef struct guess_job {
+  cm_run *c;
+  cm_level *l;
+  const int32_t *to_mesh;
+  const double *points; /* NULL: spatial */
+} guess_job;
+
+static void guess_range(void *arg, int64_t begin, int64_t end, int thread) {
+  guess_job *job = arg;
+  (void)thread;
+  for (int64_t i = begin; i < end; i++) {
+    int32_t v = job->to_mesh[job->l->vertex[i]];
+    if (!job->points && !job->l->pinned[i]) {
+      job->l->place[i] = job->c->goal_place[v];
+      cm_surface_at(&job->c->b, &job->l->place[i], NULL, job->l->x + 3 * i, NULL);
+      cm_level_refresh(job->l, &job->c->b, (int32_t)i);
+    } else {
+      const double *points = job->points ? job->points : job->c->moving->points;
+      memcpy(job->l->x + 3 * i, points + 3 * (size_t)v, sizeof(double[3]));
+      cm_level_locate(job->l, &job->c->b, (int32_t)i, -1);
+    }
+  }
+}
+
+/* Vertices that share a point cannot be told apart by an untangling: spread them a little inside their places. */
+static void spread_out(cm_run *c, cm_level *l) {
+  uint64_t state = 0x9e3779b97f4a7c15u;
+  for (int32_t v = 0; v < l->count; v++) {
+    if (l->pinned[v]) {
+      continue;
+    }
+    double w[3], sum = 0;
+    for (int k = 0; k < 3; k++) {
+      state = state * 6364136223846793005u + 1442695040888963407u;
+      w[k] = l->place[v].at[k] + 0.3 * (double)(state >> 40) * 0x1p-24;
+      sum += w[k];
+    }
+    for (int k = 0; k < 3; k++) {
+      l->place[v].at[k] = w[k] / sum;
+    }
+    cm_surface_at(&c->b, &l->place[v], NULL, l->x + 3 * (size_t)v, NULL);
+    cm_level_refresh(l, &c->b, v);
+  }
+}
+
+void cm_guess(cm_run *c, cm_level *level, const int32_t *to_mesh, cm_start start) {
+  const double *points = start == CM_SPATIAL ? NULL : start == CM_DRAWN ? c->best : c->moving->points;
+  guess_job job = {c, level, to_mesh, points};
+  orb_parallel_for(c->ctx, level->count, 16, guess_range, &job);
+  if (start == CM_SPATIAL) {
+    spread_out(c, level);
+  }
+}

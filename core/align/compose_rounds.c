@@ -1,0 +1,162 @@
+/* Rounds of sweeps on one level: with and without flips, drawn to targets, and back to none. */
+#include <math.h>
+#include <string.h>
+
+#include "align/compose_run.h"
+#include "base/check.h"
+#include "numeric/vec3.h"
+
+enum { SOFT_SWEEPS = 20, DRAW_ROUNDS = 5, DRAW_SWEEPS = 40, CLEARINGS = 8 };
+static const double EPSILON = 0.1;
+static const double FIRST_BARRIER = 1e-4;
+static const double STILL = 1e-3; /* of a mean edge: less does not count as moving */
+static const double GROWING = 1.05;
+static const double DRAW = 20, DRAW_FALL = 0.8;
+
+cm_rules cm_soft(double barrier) {
+  return (cm_rules){.soft = 1, .barrier = barrier, .epsilon = EPSILON, .omega = 1};
+}
+
+cm_rules cm_hard(void) {
+  return (cm_rules){.soft = 0, .barrier = 1, .epsilon = EPSILON, .omega = 1};
+}
+
+static void relocate(cm_run *c, cm_level *l) {
+  for (int32_t v = 0; v < l->count; v++) {
+    if (!l->pinned[v]) {
+      cm_level_locate(l, &c->b, v, l->place[v].triangle);
+    }
+  }
+}
+
+/* All vertices take part in the first one. */
+orb_status cm_sweeps(cm_run *c, cm_level *l, cm_rules rules, int count) {
+  double moved;
+  int32_t stepped = l->count;
+  rules.still = STILL * sqrt(4 * M_PI / l->triangle_count);
+  for (int32_t v = 0; v < l->count; v++) {
+    l->moved[v] = INFINITY;
+  }
+  for (int i = 0; i < count && stepped > l->count / 500; i++) {
+    ORB_TRY(cm_level_sweep(c->ctx, l, &c->b, &rules, &moved, &stepped));
+    c->work -= stepped;
+  }
+  return ORB_OK;
+}
+
+void cm_set_pull(const cm_run *c, cm_level *l, const int32_t *to_mesh, double strength) {
+  for (int32_t v = 0; v < l->count; v++) {
+    l->pull[v] = strength * l->area[v];
+    if (strength > 0) {
+      memcpy(l->goal + 3 * (size_t)v, c->goal + 3 * (size_t)to_mesh[l->vertex[v]], sizeof(double[3]));
+    }
+  }
+}
+
+orb_status cm_clear_flips(cm_run *c, cm_level *l, int rounds, int32_t *flips) {
+  cm_rules rules = cm_soft(FIRST_BARRIER);
+  double *copy = ORB_NEW(c->ctx, double, 3 * (size_t)l->count);
+  orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
+  int32_t at_first = *flips = cm_level_flips(l);
+  for (int round = 0; round < rounds && *flips && c->work > 0 && status == ORB_OK; round++) {
+    ORB_GO(status, cm_sweeps(c, l, rules, SOFT_SWEEPS), done);
+    rules.barrier *= 3;
+    *flips = cm_level_flips(l);
+    at_first = round == 0 ? *flips : at_first;
+    if (round > 1 && *flips > GROWING * at_first) {
+      break; /* the stronger the barrier the more flips: large parts are folded */
+    }
+    if (*flips) {
+      memcpy(copy, l->x, 3 * (size_t)l->count * sizeof *copy);
+      ORB_GO(status, cm_level_untangle(c->ctx, l, flips, &c->work), done);
+      if (*flips) {
+        memcpy(l->x, copy, 3 * (size_t)l->count * sizeof *copy);
+      } else {
+        relocate(c, l);
+      }
+    }
+  }
+done:
+  orb_free(c->ctx, copy);
+  return status;
+}
+
+/* What a level holds of its map, to go back to. */
+typedef struct snapshot {
+  orb_place *place;
+  double *y; /* y, n and x, as they lie in the level */
+} snapshot;
+
+static orb_status snapshot_take(cm_run *c, const cm_level *l, snapshot *s) {
+  s->place = ORB_NEW(c->ctx, orb_place, l->count);
+  s->y = ORB_NEW(c->ctx, double, 9 * (size_t)l->count);
+  if (!s->place || !s->y) {
+    return ORB_E_NO_MEMORY;
+  }
+  memcpy(s->place, l->place, (size_t)l->count * sizeof *s->place);
+  memcpy(s->y, l->y, 9 * (size_t)l->count * sizeof *s->y);
+  return ORB_OK;
+}
+
+static void snapshot_restore(const snapshot *s, cm_level *l) {
+  memcpy(l->place, s->place, (size_t)l->count * sizeof *s->place);
+  memcpy(l->y, s->y, 9 * (size_t)l->count * sizeof *s->y);
+}
+
+static void snapshot_free(cm_run *c, snapshot *s) {
+  orb_free(c->ctx, s->place);
+  orb_free(c->ctx, s->y);
+}
+
+/* The energy with that of the pull, as the sweeps lower it. */
+static double pulled_energy(const cm_level *l) {
+  double pull = 0, area = 0;
+  for (int32_t v = 0; v < l->count; v++) {
+    pull += l->pull[v] > 0 ? l->pull[v] * orb_distance2(l->y + 3 * (size_t)v, l->goal + 3 * (size_t)v) : 0;
+    area += l->area[v];
+  }
+  return cm_level_energy(l) + (area > 0 ? pull / (4 * area) : 0);
+}
+
+orb_status cm_loosen(cm_run *c, cm_level *l, int soft_sweeps, int hard_sweeps) {
+  snapshot before = {0};
+  double energy = pulled_energy(l);
+  int32_t flips;
+  orb_status status;
+  ORB_GO(status, snapshot_take(c, l, &before), done);
+  ORB_GO(status, cm_sweeps(c, l, cm_soft(1), soft_sweeps), done);
+  ORB_GO(status, cm_clear_flips(c, l, 3, &flips), done);
+  if (!flips) {
+    ORB_GO(status, cm_sweeps(c, l, cm_hard(), hard_sweeps), done);
+  }
+  int worse = flips || cm_level_flips(l) || pulled_energy(l) >= energy;
+  if (worse) {
+    snapshot_restore(&before, l);
+  }
+done:
+  snapshot_free(c, &before);
+  return status;
+}
+
+/* A round lets flips come while the pull is on, drives them out and settles. A round that cannot be untangled is taken
+ * back and ends it. */
+orb_status cm_draw(cm_run *c, cm_level *l, const int32_t *to_mesh) {
+  double pull = DRAW;
+  orb_status status = ORB_OK;
+  for (int round = 0; round < DRAW_ROUNDS && status == ORB_OK && c->work > 0; round++, pull *= DRAW_FALL) {
+    snapshot before = {0};
+    int32_t flips;
+    cm_set_pull(c, l, to_mesh, pull);
+    ORB_GO(status, snapshot_take(c, l, &before), next);
+    ORB_GO(status, cm_sweeps(c, l, cm_soft(FIRST_BARRIER), DRAW_SWEEPS), next);
+    ORB_GO(status, cm_clear_flips(c, l, CLEARINGS, &flips), next);
+    if (flips) {
+      snapshot_restore(&before, l);
+      round = DRAW_ROUNDS;
+    }
+    ORB_GO(status, cm_sweeps(c, l, cm_hard(), DRAW_SWEEPS), next);
+  next:
+    snapshot_free(c, &before);
+  }
+  return status;
+}

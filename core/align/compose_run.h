@@ -1,0 +1,64 @@
+/* What one run of orb_compose() holds, shared by compose.c, compose_guess.c and compose_rounds.c. */
+#ifndef ORB_ALIGN_COMPOSE_RUN_H
+#define ORB_ALIGN_COMPOSE_RUN_H
+
+#include "align/compose_level.h"
+#include "embed/multires.h"
+
+enum { CM_SAMPLES = 150 /* of a map, from which the moving shape is bent anew */ };
+
+/* Where a start puts the vertices of its first level. */
+typedef enum cm_start {
+  CM_GIVEN,   /* where the alignment has them */
+  CM_SPATIAL, /* at their spatial targets */
+  CM_DRAWN    /* where the best map has them; they are then drawn to their targets */
+} cm_start;
+
+typedef struct cm_effort {
+  double growth; /* of the vertices from level to level */
+  int first_sweeps, coarse_sweeps, level_sweeps, final_sweeps;
+} cm_effort;
+
+typedef struct cm_run {
+  orb_context *ctx;
+  cm_surface b;
+  orb_aligned_shape *moving;
+  int32_t vertex_count, landmark_count;
+  double *x, *normal; /* moving shape, area 4π */
+  double *goal;       /* spatial targets; NULL: none */
+  double *goal_normal;
+  orb_place *goal_place; /* on the fixed shape, of every vertex of the moving one */
+  unsigned char *keep;
+  orb_hierarchy *hierarchy;
+  double *position; /* x in the order of the surface */
+  int32_t *local;
+  orb_place *place; /* by vertex of the surface: where it was on the last level */
+  double *best;     /* points of the best start, mesh order; at first the alignment as given */
+  double best_energy;
+  int rough;    /* the alignment as given is only refined to be sampled */
+  int passes;   /* bends through samples of the best map */
+  int64_t work; /* vertex steps that may still be spent on clearing flips and further starts */
+  cm_effort effort;
+} cm_run;
+
+/* compose_guess.c: spatial targets from the landmarks and so many samples of the best map, with the normals that the
+ * bent shape has, and the nearest places to them. */
+ORB_MUST_CHECK orb_status cm_bend(cm_run *run, const orb_aligned_shape *fixed, int samples);
+/* Puts the vertices of a level where the start has them. to_mesh: of the surface's vertices. */
+void cm_guess(cm_run *run, cm_level *level, const int32_t *to_mesh, cm_start start);
+
+/* compose_rounds.c. Sweeps until hardly a vertex moves any more, `count` at most. */
+ORB_MUST_CHECK orb_status cm_sweeps(cm_run *run, cm_level *level, cm_rules rules, int count);
+/* Rules of sweeps: flips allowed against a barrier of that strength, or none. */
+cm_rules cm_soft(double barrier);
+cm_rules cm_hard(void);
+void cm_set_pull(const cm_run *run, cm_level *level, const int32_t *to_mesh, double strength);
+/* Flips are driven out: sweeps against a growing barrier, then untangling of a copy, until that succeeds. */
+ORB_MUST_CHECK orb_status cm_clear_flips(cm_run *run, cm_level *level, int rounds, int32_t *flips);
+/* Vertices that barriers have locked in get free where flips are allowed for a while. What comes of it is kept if it
+ * can be untangled and is better. */
+ORB_MUST_CHECK orb_status cm_loosen(cm_run *run, cm_level *level, int soft_sweeps, int hard_sweeps);
+/* Draws a level without flips to its spatial targets, round by round less strongly. */
+ORB_MUST_CHECK orb_status cm_draw(cm_run *run, cm_level *level, const int32_t *to_mesh);
+
+#endif
