@@ -66,7 +66,7 @@ const pages = ['orbmorph.1', 'orbmorph-bench.1', 'orbmorphd.8'];
 test('the manual pages render without a warning', async () => {
   for (const page of pages) {
     const file = path.join(root, 'deploy/man', page);
-    const lint = await runProgram('mandoc', ['-T', 'lint', file]);
+    const lint = await runProgram('mandoc', ['-T', 'lint', '-W', 'warning', file]);
     assert.equal(lint.out + lint.err, '', page);
     const shown = await runProgram('man', ['--warnings', '-l', file], { env: { LC_ALL: 'C.UTF-8', MANWIDTH: '80', MANPAGER: 'cat' } });
     assert.equal(shown.code, 0, shown.err);
