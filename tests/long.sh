@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
-#   tests/long.sh [PART…]    parts: tsan valgrind fuzz crash adversarial arm; all of them without arguments
+#   tests/long.sh [PART…]    parts: tsan valgrind fuzz crash adversarial arm robust; all of them without arguments
 #
 # ORB_MINUTES (5) is the time for each fuzz target, ORB_KILLS (1000) the number of kills.
 set -euo pipefail
@@ -59,8 +59,20 @@ part_arm() {
   tests/tools/arm.sh build/bin/embed-digest
 }
 
+# Random landmarks on real meshes and every pair of them, where their folder is there: ORB_MESHES.
+part_robust() {
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build
+  local meshes=${ORB_MESHES:-../shared/meshes}
+  if [ -d "$meshes/good" ]; then
+    tests/bench/robust.py --meshes "$meshes" --merge-every 100
+  else
+    echo "no meshes at $meshes"
+  fi
+}
+
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash adversarial arm
+  set -- tsan valgrind fuzz crash adversarial arm robust
 fi
 for part in "$@"; do
   echo "== $part =="

@@ -33,8 +33,8 @@ static const char usage_text[] =
     "  --max-triangles N\n"
     "  --landmarks FILE  a landmarks array, alone or as the member \"landmarks\"\n"
     "landmarks pins sets of random landmarks on pairs of the files, pairs merges every pair of them:\n"
-    "  --sets N          sets of landmarks (100)\n"
-    "  --first N         number of the first set; each set depends on seed and number only (0)\n"
+    "  --sets N          sets of landmarks (100), or pairs (all)\n"
+    "  --first N         number of the first set or pair (0); a set depends on seed and number only\n"
     "  --seed N          (1)\n"
     "  --sizes LIST      landmarks in a set, by turns (3,10,30,60)\n"
     "  --merge-every N   every N-th set is remeshed too (0: none)\n"
@@ -233,8 +233,8 @@ static int parse(int argc, char **argv, int command, bench_options *o) {
                {"--landmarks", &o->landmarks, MERGE | TRUTH | REMESH},
                {"--tolerance", &t.tolerance, ALL & ~EMBED},
                {"--max-triangles", &t.max_triangles, ALL & ~EMBED},
-               {"--sets", &t.sets, LANDMARKS},
-               {"--first", &t.first, LANDMARKS},
+               {"--sets", &t.sets, LANDMARKS | PAIRS},
+               {"--first", &t.first, LANDMARKS | PAIRS},
                {"--seed", &t.seed, LANDMARKS},
                {"--sizes", &o->sizes, LANDMARKS},
                {"--merge-every", &t.merge_every, LANDMARKS},
@@ -303,7 +303,7 @@ int main(int argc, char **argv) {
   bench_options options = {.repeat = 1,
                            .repair = ORB_REPAIR_SAFE,
                            .sizes = "3,10,30,60",
-                           .sets = 100,
+                           .sets = 1 << command == PAIRS ? 1000000 : 100,
                            .seed = 1,
                            .given = -1,
                            .files = calloc((size_t)argc, sizeof *options.files)};

@@ -94,6 +94,8 @@ test('pairs: every pair once, certified', () => {
     assert.equal(l.certificate.closed, true);
     assert.ok(l.bound_relative <= 0.001);
   }
+  const one = bench(['pairs', '--align-preset', 'fast', '--first', '1', '--sets', '1', dog, giraffe, join(samples, 'elephant.ply')]);
+  assert.deepEqual(one.lines.map((l) => l.shapes.join()), ['dog,elephant']);
 });
 
 test('truth: a shape mapped to itself is where it was; landmarks not given are measured', () => {
@@ -130,7 +132,7 @@ test('exit statuses: 1 refused with the reason, 2 wrong usage', () => {
     [2, ['pairs', dog], /two/],
     [2, ['landmarks', '--sizes', '3,x', dog, giraffe], /--sizes/],
     [2, ['landmarks', '--sets', '0', dog, giraffe], /--sets/],
-    [2, ['pairs', '--sets', '5', dog, giraffe], /unknown option/],
+    [2, ['pairs', '--seed', '5', dog, giraffe], /unknown option/],
     [2, ['embed', '--threads', 'many', dog], /--threads/],
     [2, ['embed', '--method', 'magic', dog], /magic/],
     [2, ['embed', '--options', '{"radius":1}', dog], /radius/],

@@ -68,9 +68,12 @@ static int run_pair(const bench_options *options, const bench_fleet *fleet, int 
 int bench_pairs(const bench_options *options) {
   bench_fleet fleet;
   int fine = bench_fleet_load(options, &fleet);
+  long number = 0;
   for (int a = 0; fine && a < fleet.count; a++) {
-    for (int b = a + 1; fine && b < fleet.count; b++) {
-      fine = run_pair(options, &fleet, a, b);
+    for (int b = a + 1; fine && b < fleet.count; b++, number++) {
+      if (number >= options->first && number - options->first < options->sets) {
+        fine = run_pair(options, &fleet, a, b);
+      }
     }
   }
   bench_fleet_free(&fleet);

@@ -1,0 +1,142 @@
+/* The options of the warp: radii for all landmarks or for each, passes, steps, to the midpoints and one way, on two and
+ * three shapes. Landmarks meet bit for bit, nothing folds, and what should not move does not. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "numeric/vec3.h"
+#include "support_align.h"
+#include "support_bodies.h"
+
+enum { COUNT = 14 };
+
+/* Landmarks of a lattice, those of later shapes at the vertex nearest to a direction `shift` away. */
+static void shifted(bodies *b, double shift) {
+  bodies_like(b, COUNT);
+  for (int s = 1; s < BODIES; s++) {
+    for (int k = 0; k < COUNT; k++) {
+      const double *from = b->points[s] + 3 * bodies_vertex_at(&b->mesh[s], &b->at[k][s]);
+      double goal[3] = {from[0] + shift * sin(2.0 * k + s), from[1] + shift * cos(3.0 * k), from[2]};
+      int32_t best = 0;
+      orb_normalize(goal);
+      for (int32_t v = 0; v < b->mesh[s].vertex_count; v++) {
+        int taken = 0;
+        for (int j = 0; j < k; j++) {
+          taken |= bodies_vertex_at(&b->mesh[s], &b->at[j][s]) == v;
+        }
+        if (!taken && orb_distance2(b->points[s] + 3 * v, goal) < orb_distance2(b->points[s] + 3 * best, goal)) {
+          best = v;
+        }
+      }
+      assert_int_equal(orb_place_of_vertex(b->ctx, &b->mesh[s], best, &b->at[k][s]), ORB_OK);
+    }
+  }
+}
+
+static void every_option_meets(void **state) {
+  (void)state;
+  static const double radii[] = {0, 0.3, 2.5};
+  static const int32_t steps[] = {1, 3, 40};
+  bodies b;
+  bodies_open(&b, NULL);
+  shifted(&b, 0.35);
+  for (int i = 0; i < 24; i++) {
+    orb_align_options options = bodies_options(ORB_ALIGN_RBF);
+    options.rbf_radius = radii[i % 3];
+    options.rbf_steps = steps[i / 3 % 3];
+    options.one_way = i % 2;
+    for (int k = 0; k < COUNT; k++) {
+      b.landmark[k].radius = i % 4 == 3 ? 0.2 + 0.1 * k : 0;
+      b.landmark[k].pass = i % 5 == 4 ? (k * 7 % 3) * 10 - 10 : 0;
+    }
+    orb_alignment out;
+    align_and_check(b.ctx, b.shape, 2 + i % 2, b.landmark, COUNT, &options, &out);
+    orb_alignment_free(b.ctx, &out);
+  }
+  bodies_close(&b);
+}
+
+/* One way, the first shape stays where it is, bit for bit; to the midpoints it moves. */
+static void one_way_moves_the_later_shapes_only(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  shifted(&b, 0.25);
+  size_t size = 3 * (size_t)b.mesh[0].vertex_count * sizeof(double);
+  for (int one_way = 0; one_way < 2; one_way++) {
+    orb_align_options options = bodies_options(ORB_ALIGN_RBF);
+    orb_alignment out;
+    options.one_way = one_way;
+    align_and_check(b.ctx, b.shape, BODIES, b.landmark, COUNT, &options, &out);
+    assert_int_equal(memcmp(out.shapes[0].points, b.points[0], size) == 0, one_way);
+    orb_alignment_free(b.ctx, &out);
+  }
+  bodies_close(&b);
+}
+
+/* With small radii and landmarks that agree already but for one, what lies beyond that one's radius stays, up to the
+ * affine part of the warp, which is next to nothing when all others hold it; with a large radius far points move. */
+static void a_radius_bounds_the_influence(void **state) {
+  (void)state;
+  bodies b;
+  double moved[2] = {0, 0};
+  bodies_open(&b, NULL);
+  orb_align_shape shapes[2] = {b.shape[1], b.shape[1]};
+  for (int wide = 0; wide < 2; wide++) {
+    bodies_like(&b, 40);
+    for (int k = 0; k < 40; k++) {
+      b.at[k][0] = b.at[k][1];
+    }
+    int32_t v = bodies_vertex_at(&b.mesh[1], &b.at[20][1]), h = 0;
+    while (b.mesh[1].triangles[h] != v) {
+      h++;
+    }
+    assert_int_equal(orb_place_of_vertex(b.ctx, &b.mesh[1], b.mesh[1].triangles[orb_next(h)], &b.at[20][1]), ORB_OK);
+    orb_align_options options = bodies_options(ORB_ALIGN_RBF);
+    orb_alignment out;
+    options.rbf_radius = wide ? 1.5 : 0.2;
+    options.one_way = 1;
+    align_and_check(b.ctx, shapes, 2, b.landmark, 40, &options, &out);
+    const double *centre = out.shapes[0].points + 3 * v;
+    for (int32_t u = 0; u < b.mesh[1].vertex_count; u++) {
+      if (orb_distance2(b.points[1] + 3 * u, centre) > 0.5 * 0.5) {
+        double d = sqrt(orb_distance2(out.shapes[1].points + 3 * u, out.shapes[0].points + 3 * u));
+        moved[wide] = d > moved[wide] ? d : moved[wide];
+      }
+    }
+    orb_alignment_free(b.ctx, &out);
+  }
+  assert_true(moved[0] < 0.02);
+  assert_true(moved[1] > moved[0]);
+  bodies_close(&b);
+}
+
+/* Landmarks that cross: still met, by the patches of pin. */
+static void crossed_landmarks_meet(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  for (uint64_t seed = 1; seed <= 3; seed++) {
+    bodies_random(&b, 10, seed);
+    orb_align_options options = bodies_options(ORB_ALIGN_RBF);
+    orb_alignment out;
+    align_and_check(b.ctx, b.shape, 3, b.landmark, 10, &options, &out);
+    orb_alignment_free(b.ctx, &out);
+  }
+  bodies_close(&b);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(every_option_meets),
+      cmocka_unit_test(one_way_moves_the_later_shapes_only),
+      cmocka_unit_test(a_radius_bounds_the_influence),
+      cmocka_unit_test(crossed_landmarks_meet),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
