@@ -127,10 +127,13 @@ void objects_let_go(objects *store) {
 }
 
 store_result objects_begin(objects *store, object_temp *temp) {
-  snprintf(temp->path, sizeof temp->path, "%s/tmp/put-XXXXXX", store->root);
-  temp->fd = mkostemp(temp->path, O_CLOEXEC);
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/tmp/put-XXXXXX", store->root);
+  temp->fd = mkostemp(path, O_CLOEXEC);
+  temp->store = store;
+  snprintf(temp->name, sizeof temp->name, "%s", strrchr(path, '/') + 1);
   FAULT_POINT("temp-begun");
-  return temp->fd >= 0 ? STORE_OK : failed("create", temp->path);
+  return temp->fd >= 0 ? STORE_OK : failed("create", path);
 }
 
 store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
@@ -141,7 +144,7 @@ store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
       continue;
     }
     if (n <= 0) {
-      return failed("write", temp->path);
+      return failed("write", temp->name);
     }
     at += n;
     size -= (size_t)n;
@@ -150,25 +153,32 @@ store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
   return STORE_OK;
 }
 
+static void temp_path(const object_temp *temp, char out[PATH_MAX]) {
+  snprintf(out, PATH_MAX, "%s/tmp/%s", temp->store->root, temp->name);
+}
+
 void objects_abandon(object_temp *temp) {
+  char path[PATH_MAX];
   if (temp->fd >= 0) {
     close(temp->fd);
-    unlink(temp->path);
+    temp_path(temp, path);
+    unlink(path);
     temp->fd = -1;
   }
 }
 
 store_result objects_publish(objects *store, object_temp *temp, object_kind kind, const char *id) {
-  char path[PATH_MAX];
+  char path[PATH_MAX], from[PATH_MAX];
   path_of(store, kind, id, path);
   FAULT_POINT("publish-written");
   if (fsync(temp->fd) != 0) {
-    store_result status = failed("fsync", temp->path);
+    store_result status = failed("fsync", temp->name);
     objects_abandon(temp);
     return status;
   }
   FAULT_POINT("publish-synced");
-  if (rename(temp->path, path) != 0) {
+  temp_path(temp, from);
+  if (rename(from, path) != 0) {
     store_result status = failed("rename to", path);
     objects_abandon(temp);
     return status;

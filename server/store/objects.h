@@ -38,7 +38,8 @@ void objects_close(objects *store);
 
 typedef struct object_temp {
   int fd; /* −1: none */
-  char path[PATH_MAX];
+  char name[16];
+  const objects *store; /* small: each request holds one of these */
 } object_temp;
 
 store_result objects_begin(objects *store, object_temp *temp);

@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include "api/json.h"
 #include "faults.h"
@@ -11,6 +13,8 @@
 #include "metrics.h"
 #include "worker/blas.h"
 #include "worker/run.h"
+
+enum { WORKER_NICE = 15 };
 
 typedef struct worker {
   worker_pool *pool;
@@ -215,6 +219,8 @@ static void *worker_main(void *argument) {
   worker *self = argument;
   job *j;
   int threads;
+  /* Requests come first; the threads that a job starts inherit this. Where it is not allowed, they compete. */
+  (void)setpriority(PRIO_PROCESS, (id_t)gettid(), WORKER_NICE);
   while (queue_take(self->pool->env.q, self->small_only, &j, &threads)) {
     run_one(self->pool, j, threads);
   }
