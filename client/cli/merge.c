@@ -238,10 +238,27 @@ static int finish(cli *c, const cli_reply *supermesh, const char *output) {
   return CLI_DONE;
 }
 
+/* Whether a file can be made there, before any work is done for it. */
+static int can_write(const cli *c, const char *file) {
+  if (!file || !strcmp(file, "-"))
+    return CLI_DONE;
+  const char *slash = strrchr(file, '/');
+  char *folder = slash ? cli_text("%.*s", (int)(slash - file + 1), file) : cli_text(".");
+  int fine = access(folder, W_OK | X_OK) == 0;
+  if (!fine)
+    cli_error(c, "%s cannot be written: the folder %s: %s", file, folder, strerror(errno));
+  free(folder);
+  return fine ? CLI_DONE : CLI_USAGE;
+}
+
 static int merge(cli *c, const char *output) {
-  cJSON *request;
+  cJSON *request = NULL;
   cli_reply supermesh = {0};
-  int rc = make_request(c, &request);
+  int rc = can_write(c, output);
+  if (rc == CLI_DONE)
+    rc = can_write(c, c->args.value[OPT_REPORT]);
+  if (rc == CLI_DONE)
+    rc = make_request(c, &request);
   if (rc == CLI_DONE)
     rc = add_shapes(c, request);
   if (rc == CLI_DONE)

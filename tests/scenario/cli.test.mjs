@@ -16,6 +16,7 @@ test('wrong usage ends with 2 and says what is wrong', async () => {
   for (const args of [[], ['fly'], ['morph', 'one'], ['morph', '--bend', 'a', 'b'], ['upload'], ['job'], ['morph', 'a', 'b', '--landmarks'],
     ['morph', 'a', 'b', '--json=yes'], ['ls', 'shoes'], ['get', 'x', '--part', 'wing'], ['completions', 'tcsh'],
     ['morph', dog, giraffe, '--tolerance', 'much'], ['morph', dog, giraffe, '--max-triangles', '1e4'], ['morph', dog, giraffe, '--set', 'x'],
+    ['morph', dog, giraffe, '-o', '/nowhere/out.glb'], ['morph', dog, giraffe, '--report', '/nowhere/report.md'],
     ['upload', '/nowhere/mesh.obj'], ['morph', dog, giraffe, '--landmarks', '/nowhere.json'], ['upload', '--name', 'n', dog, giraffe]]) {
     const { code, err, out } = await run(args, { env: { ORBMORPH_SERVER: 'http://127.0.0.1:9' } });
     assert.equal(code, 2, `${args}: ${code} ${err}`);
@@ -160,6 +161,24 @@ test('a wait outlives the daemon', async (t) => {
   const { code, out, err } = await waiting;
   assert.equal(code, 0, err);
   assert.match(out, /0 flipped/);
+});
+
+test('a wait that is broken off says how to go on', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const { json: mesh } = await d.upload(shapes.binaryPly(shapes.ball(6, ([x, y, z]) => [x, y * (1.2 + 0.2 * Math.sin(9 * x)), z])));
+  const child = spawn(binaries.client, ['embed', mesh.id, '--method', 'kernel-sampling'], { env: { ...process.env, ORBMORPH_SERVER: d.url }, stdio: ['ignore', 'pipe', 'pipe'] });
+  let err = '';
+  child.stderr.on('data', (chunk) => (err += chunk));
+  const ended = new Promise((resolve) => child.on('exit', (code, signal) => resolve(signal ?? code)));
+  let job;
+  while (!(job = (await d.get('/v1/jobs')).json.jobs[0])) await new Promise((resolve) => setTimeout(resolve, 20));
+  await new Promise((resolve) => setTimeout(resolve, 300));
+  child.kill('SIGINT');
+  assert.equal(await ended, 'SIGINT');
+  const [, url] = err.match(/orbmorph job --wait (\/v1\/jobs\/\w+)/);
+  assert.equal(url, job.url);
+  const cancelled = await run(['job', '--cancel', url], { env: { ORBMORPH_SERVER: d.url } });
+  assert.equal(cancelled.code, 0, cancelled.err);
 });
 
 test('progress is drawn on a terminal', async (t) => {
