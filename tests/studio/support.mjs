@@ -11,11 +11,11 @@ import { chromium } from 'playwright-core';
 export const root = fileURLToPath(new URL('../../', import.meta.url));
 export const sample = (name) => join(root, 'tests/samples', name);
 
-export async function startDaemon() {
-  if (process.env.ORB_STUDIO_URL) return { url: process.env.ORB_STUDIO_URL.replace(/\/$/, ''), stop: async () => {} };
+/** `keep`: the folder stays, for a daemon that is started on it later with `data`. */
+export async function startDaemon({ args = [], data = mkdtempSync(join(tmpdir(), 'orbmorph-studio-')), keep = false } = {}) {
+  if (process.env.ORB_STUDIO_URL && !args.length) return { url: process.env.ORB_STUDIO_URL.replace(/\/$/, ''), stop: async () => {} };
   const program = process.env.ORB_DAEMON ?? join(root, 'build/bin/orbmorphd');
-  const data = mkdtempSync(join(tmpdir(), 'orbmorph-studio-'));
-  const child = spawn(program, ['--listen', '127.0.0.1:0', '--data', data], { stdio: ['ignore', 'pipe', 'pipe'] });
+  const child = spawn(program, ['--listen', '127.0.0.1:0', '--data', data, ...args], { stdio: ['ignore', 'pipe', 'pipe'] });
   let log = '';
   child.stderr.on('data', (text) => (log += text));
   const url = await new Promise((resolve, reject) => {
@@ -30,11 +30,13 @@ export async function startDaemon() {
   });
   return {
     url,
+    data,
+    program,
     stop: () =>
       new Promise((resolve) => {
         child.removeAllListeners('exit');
         child.on('exit', () => {
-          rmSync(data, { recursive: true, force: true });
+          if (!keep) rmSync(data, { recursive: true, force: true });
           resolve();
         });
         child.kill('SIGTERM');

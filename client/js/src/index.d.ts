@@ -1,133 +1,20 @@
-/** The types of the daemon's API (see /openapi.json) and of this client. */
+/** The types of this client; those of the daemon's answers are in api.d.ts, made from its OpenAPI document. */
+import type { Embedding, Job, Landmark, Mesh, Supermesh, SupermeshRequest } from './api.js';
 
 export type Repair = 'none' | 'safe' | 'fill_holes' | 'largest_component';
 export type Source = Blob | ArrayBuffer | ArrayBufferView | string | URL | { source: Blob | ArrayBuffer | ArrayBufferView | string; name?: string };
 
-export interface Topology {
-  components: number;
-  genus: number;
-  boundary_loops: number;
-  nonmanifold_edges: number;
-  nonmanifold_vertices: number;
-}
+export type { Distortion, Embedding, Job, Landmark, Measure, Mesh, Place, Supermesh, SupermeshRequest } from './api.js';
+/** What the daemon refuses, kind by kind: `type` tells which. */
+export type { Problem as KnownProblem } from './api.js';
 
-export interface Mesh {
-  id: string;
-  url: string;
-  name: string;
-  format: 'obj' | 'off' | 'ply' | 'stl' | 'gltf' | 'glb';
-  bytes: number;
-  vertices: number;
-  triangles: number;
-  topology: Topology;
-  area: number;
-  volume: number;
-  bounds: { min: [number, number, number]; max: [number, number, number] };
-  repairs: { kind: string; count: number }[];
-  attributes: string[];
-  created: string;
-}
-
-export interface Histogram {
-  edges: number[];
-  counts: number[];
-}
-
-export interface Measure {
-  mean: number;
-  median: number;
-  p99: number;
-  max: number;
-  std?: number;
-  histogram: Histogram;
-}
-
-export interface Distortion {
-  symmetric_dirichlet: Measure;
-  angle: Measure;
-  area: Measure;
-  aspect: Measure;
-  stretch_efficiency: number;
-}
-
-export interface Embedding {
-  id: string;
-  url: string;
-  mesh: string;
-  method: 'newton' | 'kernel-sampling';
-  options: Record<string, unknown>;
-  certificate: { valid: boolean; flipped: number; degenerate: number; degree: number; exact: boolean; min_determinant?: number };
-  distortion: Distortion;
-  timings_ms: Record<string, number>;
-  engine: string;
-}
-
-export type Place =
-  | { vertex: number }
-  | { point: [number, number, number] }
-  | { triangle: number; barycentric: [number, number, number] };
-
-export interface Landmark {
-  name?: string;
-  at: Place[];
-  pass?: number;
-  radius?: number;
-  confidence?: number;
-}
-
-export interface SupermeshRequest {
-  shapes: { mesh: string; name?: string }[];
-  landmarks?: Landmark[] | 'auto';
-  align?: { method?: 'pin' | 'rbf' | 'rotate' | 'auto'; options?: Record<string, unknown> };
-  remesh?: { method?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull'; tolerance?: number; max_triangles?: number };
-  asset?: { normals?: boolean; animation?: 'pingpong' | 'none'; fit?: 'none' | 'rigid' | 'similarity'; path?: 'linear' | 'rigid' };
-}
-
-export interface Supermesh {
-  id: string;
-  url: string;
-  asset: string;
-  vertices: number;
-  triangles: number;
-  shapes: {
-    mesh: string;
-    name: string;
-    sphere?: string;
-    hausdorff_relative: number;
-    hausdorff_sampled_relative?: number;
-    rms_relative: number;
-    normal_deviation: { mean: number; p99: number };
-  }[];
-  landmarks: (Partial<Landmark> & { name?: string; residual_relative?: number[] })[];
-  certificate: { closed: boolean; genus: number; flipped: number[]; degree: number[]; landmarks_exact: boolean };
-  pairs?: { a: number; b: number; distortion: Distortion; inverted_fraction: number }[];
-  /** The request that it answers, with every default written out. */
-  request?: SupermeshRequest;
-  timings_ms: Record<string, number>;
-  engine: string;
-}
-
+/** A problem of any kind, with its facts as members. */
 export interface Problem {
   type: string;
   title: string;
   status: number;
   detail: string;
   [fact: string]: unknown;
-}
-
-export interface Job {
-  id: string;
-  url: string;
-  kind: 'embedding' | 'supermesh';
-  state: 'queued' | 'running' | 'succeeded' | 'failed' | 'cancelled';
-  stage?: string;
-  progress?: number;
-  result?: string | null;
-  problem?: Problem | null;
-  attempt: number;
-  created: string;
-  started?: string | null;
-  finished?: string | null;
 }
 
 export interface RequestOptions {

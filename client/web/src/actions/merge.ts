@@ -1,5 +1,5 @@
 /** Morphing: the request, the job with its progress, the asset, and playing it. */
-import { CancelledError, ProblemError, type Job, type Landmark, type Supermesh, type SupermeshRequest } from 'orbmorph';
+import { CancelledError, ProblemError, type Job, type Supermesh, type SupermeshRequest } from 'orbmorph';
 import { client, readyShapes, set, state, tint, toast, wireLandmarks, type Result, type Running } from '../state';
 import { work } from '../mesh/work';
 import { morphModels } from '../view/models';
@@ -79,7 +79,7 @@ const PROPOSALS = 12;
 
 /** The landmarks that the answer names, or else well-spread places of the correspondence it stands for. */
 async function takeFound(supermesh: Supermesh) {
-  const named = (supermesh.landmarks ?? []).filter((l): l is Landmark => Array.isArray(l.at));
+  const named = (supermesh.landmarks ?? []).filter((l) => 'at' in l);
   const points = named.length ? [] : await work('propose', await client.asset(supermesh.id), supermesh.shapes.length, PROPOSALS);
   const found = named.length ? named : points.map((at) => ({ name: '', at: at.map((point) => ({ point })) }));
   const taken = await takeLandmarks(found, { snap: true });

@@ -159,7 +159,7 @@ export function MorphInspector() {
               <th scope="row"><span class="dot" style={{ background: tint(i) }} aria-hidden="true" /> {shape.name}</th>
               <td>{relative(shape.hausdorff_relative ?? shape.hausdorff_sampled_relative)}</td>
               <td>{relative(shape.rms_relative)}</td>
-              <td>{shape.normal_deviation ? `${shape.normal_deviation.mean.toFixed(1)}°` : '–'}</td>
+              <td>{shape.normal_deviation?.mean != null ? `${shape.normal_deviation.mean.toFixed(1)}°` : '–'}</td>
             </tr>
           ))}
         </tbody>

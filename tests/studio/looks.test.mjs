@@ -1,0 +1,41 @@
+// How the studio looks, beside stored pictures: node tests/studio/looks.mjs takes them anew (then look at them).
+import { after, before, test } from 'node:test';
+import assert from 'node:assert/strict';
+import { existsSync } from 'node:fs';
+import { mkdir, readFile, writeFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { apart, folder, look, SCENES } from './looks.mjs';
+import { startBrowser, startDaemon } from './support.mjs';
+
+let daemon;
+let browser;
+before(async () => {
+  daemon = await startDaemon();
+  browser = await startBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await daemon?.stop();
+});
+
+for (const name of Object.keys(SCENES))
+  test(name, async () => {
+    const stored = join(folder, `${name}.png`);
+    assert.ok(existsSync(stored), `there is no ${stored}: node tests/studio/looks.mjs ${name}`);
+    const now = await look(browser, daemon.url, name);
+    const { share, mean, size } = await apart(browser, now, await readFile(stored));
+    const kept = join(tmpdir(), 'orbmorph-looks', `${name}.png`);
+    const fine = share < 0.03 && mean < 4;
+    if (!fine) {
+      await mkdir(join(tmpdir(), 'orbmorph-looks'), { recursive: true });
+      await writeFile(kept, now);
+    }
+    assert.ok(fine, `${(100 * share).toFixed(1)} % of it looks otherwise (mean ${mean.toFixed(1)}${size ? `, sizes ${size}` : ''}); now: ${kept}`);
+  });
+
+test('a picture of something else is told apart', async () => {
+  const [a, b] = await Promise.all(['shapes', 'landmarks'].map((name) => readFile(join(folder, `${name}.png`))));
+  assert.ok((await apart(browser, a, b)).share > 0.03);
+  assert.deepEqual(await apart(browser, a, a), { share: 0, mean: 0 });
+});

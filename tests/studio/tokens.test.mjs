@@ -1,0 +1,80 @@
+// A daemon that wants tokens: the studio asks, keeps the token for the tab, and says what a token does not allow.
+import { after, before, test } from 'node:test';
+import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
+import { readFile } from 'node:fs/promises';
+import { promisify } from 'node:util';
+import { addFiles, button, openPage, sample, startBrowser, startDaemon, until } from './support.mjs';
+
+let daemon;
+let browser;
+const token = {};
+before(async () => {
+  daemon = await startDaemon({ args: ['--auth', 'on'], keep: true });
+  await daemon.stop();
+  for (const scope of ['read', 'read,write']) {
+    const { stdout } = await promisify(execFile)(daemon.program, ['token', 'add', scope.replace(',', '-'), '--scope', scope, '--data', daemon.data]);
+    token[scope] = stdout.trim();
+  }
+  daemon = await startDaemon({ args: ['--auth', 'on'], data: daemon.data });
+  browser = await startBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await daemon?.stop();
+});
+
+const give = async (page, secret) => {
+  await page.getByLabel('Token', { exact: true }).fill(secret);
+  await button(page, 'Continue').click();
+};
+
+test('without a token the page asks for one, and says when it is not known', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await page.getByRole('dialog', { name: 'This daemon wants a token' }).waitFor();
+  await give(page, 'f'.repeat(64));
+  await page.getByText('This token is not known here.').waitFor();
+  await page.keyboard.press('Escape');
+  assert.ok(await page.getByRole('dialog').isVisible(), 'there is no way around it');
+  await done();
+});
+
+test('with a token the whole way works; it stays in the tab and out of addresses', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const addresses = [];
+  page.on('request', (request) => addresses.push(request.url()));
+  await give(page, token['read,write']);
+  await until(() => page.getByRole('dialog').count().then((n) => n === 0), 'the dialog is gone');
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await button(page, /^Morph 2 shapes$/).click();
+  await until(() => button(page, 'Pause').count(), 'the morph plays', 120_000);
+  await button(page, 'Pause').click();
+  const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name: 'Download GLB' }).click()]);
+  assert.equal((await readFile(await download.path())).toString('latin1', 0, 4), 'glTF');
+  await button(page, 'Use it').click();
+  assert.match(await page.getByRole('region', { name: 'curl: code' }).textContent(), /Authorization: Bearer \$ORBMORPH_TOKEN/);
+  await page.reload();
+  await until(() => button(page, 'Play').count(), 'after a reload it goes on without asking', 60_000);
+  assert.equal(await page.getByRole('dialog').count(), 0);
+  assert.ok(addresses.every((url) => !url.includes(token['read,write'])));
+  assert.ok(!page.url().includes(token['read,write']));
+  await done();
+
+  const other = await openPage(browser, daemon.url);
+  await other.page.getByRole('dialog', { name: 'This daemon wants a token' }).waitFor();
+  await other.done();
+});
+
+test('a token that may only read is told so in words', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await give(page, token.read);
+  await until(() => page.getByRole('dialog').count().then((n) => n === 0), 'the dialog is gone');
+  await page.locator('input[type=file]').first().setInputFiles([sample('dog.obj')]);
+  await page.getByText('The token lacks the scope “write”').waitFor();
+  await button(page, 'Token', { exact: true }).click();
+  await give(page, token['read,write']);
+  await until(() => page.getByRole('dialog').count().then((n) => n === 0), 'another token is taken');
+  await button(page, 'Try again').click();
+  await page.locator('.card.ready').waitFor();
+  await done();
+});
