@@ -421,6 +421,20 @@ export type Ready = {
   running?: number;
   workers?: number;
   connections?: number;
+  /** Jobs that wait for embeddings. */
+  waiting?: number;
+  /** Unfinished jobs that are taken. */
+  queue_limit?: number;
+  /** The age of the oldest queued job. */
+  oldest_ms?: number;
+  /** Connections that are taken. */
+  max_connections?: number;
+  /** Suspended: they wait for a job. */
+  waiting_connections?: number;
+  /** Of the data folder's disk. */
+  disk_free_bytes?: number;
+  /** Since the start. */
+  uptime_seconds?: number;
   /** Name and version. */
   engine?: string;
 };
