@@ -94,10 +94,11 @@ export async function until(check, what, limit = 90_000) {
 
 export const button = (page, name, options) => page.getByRole('button', { name, ...options });
 
-/** Opens the studio with files of the samples and waits until they are taken. */
+/** Adds files of the samples and waits until they are taken and shown. */
 export async function addFiles(page, ...files) {
   await page.locator('input[type=file]').first().setInputFiles(files);
   await until(() => page.locator('.card.ready').count().then((n) => n >= files.length), 'the shapes are uploaded');
+  await until(() => page.getByText('reading…').count().then((n) => n === 0), 'the shapes are drawn');
 }
 
 /** The number of pixels of the stage that `test(r, g, b)` accepts, from a screenshot of it. */
