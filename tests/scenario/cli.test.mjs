@@ -108,6 +108,27 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
   assert.match(gone.err, /not-found/);
 });
 
+test('landmark files: an array, an object with one, and plain numbers of vertices', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url }, at = await folder(t), file = path.join(at, 'l.json');
+  const places = JSON.parse(await readFile(landmarks, 'utf8')).landmarks.slice(0, 4).map((l) => ({ at: l.at }));
+  const jobs = new Set();
+  for (const list of [places, { landmarks: places }, places.map((l) => l.at.map((p) => p.vertex))]) {
+    await writeFile(file, JSON.stringify(list));
+    const sent = await run(['merge', dog, giraffe, '-l', file, '--no-wait', '--json', '-q'], { env });
+    assert.equal(sent.code, 0, sent.err);
+    jobs.add(JSON.parse(sent.out).id);
+  }
+  assert.equal(jobs.size, 1, 'all three say the same');
+  await run(['job', '--cancel', [...jobs][0]], { env });
+  for (const wrong of ['{"landmarks": 3}', '7', '[{"at": ', '']) {
+    await writeFile(file, wrong);
+    const { code, err } = await run(['merge', dog, giraffe, '-l', file], { env });
+    assert.equal(code, 2, err);
+    assert.match(err, /l\.json/);
+  }
+});
+
 test('what the daemon refuses ends with 1 and the problem on standard error', async (t) => {
   const d = await daemon(t);
   const env = { ORBMORPH_SERVER: d.url };
