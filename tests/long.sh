@@ -65,7 +65,7 @@ part_robust() {
   cmake --build build
   local meshes=${ORB_MESHES:-../shared/meshes}
   if [ -d "$meshes/good" ]; then
-    tests/bench/robust.py --meshes "$meshes" --merge-every 100
+    tests/bench/robust.py --meshes "$meshes" --merge-every 99
   else
     echo "no meshes at $meshes"
   fi

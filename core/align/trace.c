@@ -237,7 +237,10 @@ orb_status orb_tracer_search(orb_tracer *t, int32_t from, int32_t to, int *found
   t->from[start] = -1;
   *found = 0;
   ORB_TRY(heap_push(t, (orb_tracer_item){0, start}));
-  while (t->heap_count > 0) {
+  for (int32_t popped = 0; t->heap_count > 0; popped++) {
+    if (popped % 8192 == 8191) {
+      ORB_TRY(orb_context_check(t->ctx));
+    }
     orb_tracer_item top = heap_pop(t);
     int32_t node = top.node;
     double place[3];
