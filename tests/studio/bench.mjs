@@ -70,7 +70,7 @@ const url = `http://127.0.0.1:${server.address().port}`;
 const browser = await startBrowser({ compositing });
 
 /**
- * Gives a new value as soon as the last one is drawn, 36 times, and -> the median time between drawings. The studio says
+ * Gives a new value as soon as the last one is drawn, 22 times, and -> the median time between drawings. The studio says
  * so by an event of its stage, for it draws in a worker; the bare page draws in its animation frames.
  */
 const frames = (page, step) => page.evaluate(async (source) => {
@@ -84,7 +84,7 @@ const frames = (page, step) => page.evaluate(async (source) => {
     const tick = (now) => {
       if (n > 5) times.push(now - last);
       last = now;
-      if (n++ > 30) return resolve();
+      if (n++ > 20) return resolve();
       next(tick);
       step(0.5 - 0.5 * Math.cos(n / 9));
     };
