@@ -12,7 +12,6 @@ is written but the lines on standard output. Standard library only.
 import argparse
 import concurrent.futures
 import json
-import os
 import pathlib
 import subprocess
 import sys
@@ -56,7 +55,7 @@ def number(value, digits):
     return "–" if value is None else f"{value:.{digits}f}"
 
 
-def row(line):
+def row(line, seconds=True):
     dense, held, inverted = line["dense_percent"], line["held_out_percent"], line["inverted_fraction"]
     cells = [line["pair"].replace("-", " – "), line["method"], f"{line['given']} of {line['all']}",
              f"{held['mean']:.2f}" if held else "–", f"{dense['mean']:.2f} / {dense['p95']:.2f}" if dense else "–",
@@ -64,6 +63,7 @@ def row(line):
              f"{100 * inverted['supermesh_first']:.2f} / {100 * inverted['supermesh_second']:.2f}",
              f"{100 * inverted['map']:.2f}", number(line["energy"], 2), f"{line['triangles']:,}",
              f"{line['align_seconds']:.1f}"]
+    cells = cells if seconds else cells[:-1]
     return "| " + " | ".join(cells) + " |"
 
 
@@ -102,11 +102,9 @@ def main():
         print("refused:", error)
     if options.out:
         text = [HEAD, "| pair | method | given | held out % | dense % | flipped | inverted % | inverted map % | energy | "
-                "triangles | align s |", "|---|---|---|---|---|---|---|---|---|---|---|"]
-        text += [row(line) for line in table]
+                "triangles |", "|---|---|---|---|---|---|---|---|---|---|"]
+        text += [row(line, seconds=False) for line in table]
         text += ["", "Refused:", ""] + [f"- {error}" for error in refused] if refused else []
-        text += ["", f"Seconds are wall time with {options.threads} threads on {os.cpu_count()} cores that others may "
-                 "have used too."]
         (pathlib.Path(options.out) / "bench-truth.md").write_text("\n".join(text) + "\n")
 
 
