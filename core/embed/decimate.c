@@ -10,7 +10,6 @@
  * more than four vertices some vertex of valence at most five always has such an edge, so the end is always reached.
  */
 #include <math.h>
-#include <stdlib.h>
 
 #include "base/check.h"
 #include "embed/kernels.h"
@@ -20,6 +19,7 @@
 enum {
   LAZY_ABOVE = 4000, /* vertices */
   GRAIN = 1024,
+  AHEAD = 12,
   SAMPLES = 2048,
   SMALL = 1024,     /* below that many vertices the quantile is exact */
   SINGLE_BELOW = 60 /* below that many vertices one collapse a round */
@@ -171,9 +171,34 @@ static orb_status try_collapse(decimation *d, int32_t v, float threshold, int32_
   return collapse_into(d, v, u);
 }
 
-static int compare_floats(const void *a, const void *b) {
-  float x = *(const float *)a, y = *(const float *)b;
-  return (x > y) - (x < y);
+/* The value that would stand at `at` if x were sorted (Hoare's selection); rearranges x. */
+static float select_float(float *x, int32_t count, int32_t at) {
+  int32_t low = 0, high = count - 1;
+  while (low < high) {
+    float pivot = x[low + (high - low) / 2];
+    int32_t i = low, j = high;
+    while (i <= j) {
+      while (x[i] < pivot) {
+        i++;
+      }
+      while (x[j] > pivot) {
+        j--;
+      }
+      if (i <= j) {
+        float t = x[i];
+        x[i++] = x[j];
+        x[j--] = t;
+      }
+    }
+    if (at <= j) {
+      high = j;
+    } else if (at >= i) {
+      low = i;
+    } else {
+      break;
+    }
+  }
+  return x[at];
 }
 
 /* The cost below which vertices are collapsed in this round. */
@@ -193,9 +218,8 @@ static float find_threshold(const decimation *d) {
     int64_t at = count == n ? i : (int64_t)(((uint64_t)seed * (uint64_t)n) >> 32);
     sample[i] = d->cost[d->live[at]];
   }
-  qsort(sample, (size_t)count, sizeof sample[0], compare_floats);
   int32_t at = (int32_t)(share * (count == n ? count : count - 1)) + (count == n ? d->fails : 0);
-  return sample[at < count ? at : count - 1];
+  return select_float(sample, count, at < count ? at : count - 1);
 }
 
 static void evaluate(void *arg, int64_t begin, int64_t end, int thread) {
@@ -236,7 +260,11 @@ static orb_status begin_round(decimation *d) {
 static orb_status run_round(decimation *d) {
   ORB_TRY(begin_round(d));
   int32_t done = 0, n = d->live_count;
+  const orb_surface *s = &d->h->surface;
   for (int32_t i = 0; i < n && n - done > 4; i++) {
+    if (i + AHEAD < n && d->cost[d->live[i + AHEAD]] <= d->threshold) {
+      __builtin_prefetch(s->corner + s->vertex_corner[d->live[i + AHEAD]]);
+    }
     ORB_TRY(try_collapse(d, d->live[i], d->threshold, &done));
     if (n < SINGLE_BELOW && done) {
       break;

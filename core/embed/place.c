@@ -16,6 +16,7 @@
 
 enum {
   GRAIN = 256,
+  AHEAD = 8,
   PLAIN_ABOVE = 4000, /* live vertices */
   RELAX_MOST = 400,   /* ring entries relaxed round one crowded vertex: about 60 stars, or one pole */
   HUB = 100,          /* valence of a pole, which the sweeps alone move */
@@ -272,6 +273,10 @@ orb_status orb_refiner_undo_round(orb_context *ctx, orb_refiner *r, double blend
   }
   r->level.valid = 0;
   for (int32_t i = end - 1; i >= first; i--) {
+    if (i - AHEAD >= first) {
+      __builtin_prefetch(h->surface.corner + h->log[i - AHEAD].first, 1);
+      __builtin_prefetch(h->surface.corner + h->log[i - AHEAD].last, 1);
+    }
     orb_collapse_undo(h, i);
   }
   h->undone += count;

@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include <cmocka.h>
 
@@ -195,6 +196,57 @@ static void test_cancel(void **unused) {
   orb_context_destroy(ctx); /* asserts that nothing leaked */
 }
 
+typedef struct cancelling {
+  orb_context *ctx;
+  int left; /* calls of progress before it cancels */
+  double cpu;
+} cancelling;
+
+static double cpu_seconds(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static void cancel_now(void *user, const char *stage, double fraction) {
+  (void)stage;
+  (void)fraction;
+  cancelling *c = user;
+  if (c->left-- == 0) {
+    orb_context_cancel(c->ctx);
+    c->cpu = cpu_seconds();
+  }
+}
+
+/* Two poles of valence 20,000: cancelled at every seventh step that is reported, in all stages. What is still done is
+ * bounded by processor time, so that a busy machine changes nothing; 100 ms is the promise, a second the bound here,
+ * for the sanitizers. */
+static void test_cancel_everywhere(void **unused) {
+  (void)unused;
+  orb_context *plain = open_context(1);
+  orb_mesh mesh = shape_globe(plain, 20000, 2);
+  int cancelled = 0, done = 0;
+  for (int n = 0; !done; n += 7) {
+    cancelling c = {.left = n};
+    orb_context_options options = {.threads = 1, .progress = cancel_now, .progress_user = &c};
+    assert_int_equal(orb_context_create(&options, &c.ctx), ORB_OK);
+    orb_embedding e;
+    orb_status status = orb_embed(c.ctx, &mesh, NULL, &e);
+    if (status == ORB_OK) {
+      done = c.left >= 0 || cancelled > 0;
+      orb_embedding_free(c.ctx, &e);
+    } else {
+      assert_int_equal(status, ORB_E_CANCELLED);
+      assert_true(cpu_seconds() - c.cpu < 1);
+      cancelled++;
+    }
+    orb_context_destroy(c.ctx);
+  }
+  assert_true(cancelled >= 5);
+  shape_free(plain, &mesh);
+  orb_context_destroy(plain);
+}
+
 typedef struct failing {
   int left, failed;
 } failing;
@@ -316,11 +368,16 @@ static void test_codec(void **unused) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_platonic),         cmocka_unit_test(test_ball),
-      cmocka_unit_test(test_long_and_poles),   cmocka_unit_test(test_degenerate_positions),
-      cmocka_unit_test(test_same_bytes),       cmocka_unit_test(test_cancel),
-      cmocka_unit_test(test_every_allocation), cmocka_unit_test(test_budget),
-      cmocka_unit_test(test_bad_requests),     cmocka_unit_test(test_codec)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_platonic),
+                                     cmocka_unit_test(test_ball),
+                                     cmocka_unit_test(test_long_and_poles),
+                                     cmocka_unit_test(test_degenerate_positions),
+                                     cmocka_unit_test(test_same_bytes),
+                                     cmocka_unit_test(test_cancel),
+                                     cmocka_unit_test(test_cancel_everywhere),
+                                     cmocka_unit_test(test_every_allocation),
+                                     cmocka_unit_test(test_budget),
+                                     cmocka_unit_test(test_bad_requests),
+                                     cmocka_unit_test(test_codec)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
