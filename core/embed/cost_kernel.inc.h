@@ -129,15 +129,29 @@ static float cost_of_vertex(const orb_surface *s, int32_t v, int32_t *target) {
   return best < 1e29F ? best : 1e29F;
 }
 
+static inline int cost_is_due(const orb_cost_job *job, int32_t v) {
+  return job->dirty[v] && job->cost[v] <= job->threshold;
+}
+
+/* Fetches early: first the block of a vertex, then, when that is there, what it leads to. */
 static void cost_range(const orb_cost_job *job, int64_t begin, int64_t end) {
-  enum { AHEAD = 6 };
+  enum { NEAR = 4, FAR = 10 };
+  const orb_surface *s = job->surface;
   for (int64_t i = begin; i < end; i++) {
     int32_t v = job->vertex[i];
-    if (i + AHEAD < end) {
-      __builtin_prefetch(job->surface->corner + job->surface->vertex_corner[job->vertex[i + AHEAD]]);
+    if (i + FAR < end && cost_is_due(job, job->vertex[i + FAR])) {
+      __builtin_prefetch(s->corner + s->vertex_corner[job->vertex[i + FAR]]);
+      __builtin_prefetch(s->position4 + 4 * (int64_t)job->vertex[i + FAR]);
     }
-    if (job->dirty[v] && job->cost[v] <= job->threshold) {
-      job->cost[v] = cost_of_vertex(job->surface, v, &job->target[v]);
+    if (i + NEAR < end && cost_is_due(job, job->vertex[i + NEAR])) {
+      int32_t c = s->vertex_corner[job->vertex[i + NEAR]];
+      __builtin_prefetch(s->corner + s->opposite[orb_corner_next(c)]);
+      __builtin_prefetch(s->corner + s->opposite[orb_corner_prev(c)]);
+      __builtin_prefetch(s->position4 + 4 * (int64_t)s->corner[orb_corner_next(c)]);
+      __builtin_prefetch(s->position4 + 4 * (int64_t)s->corner[orb_corner_prev(c)]);
+    }
+    if (cost_is_due(job, v)) {
+      job->cost[v] = cost_of_vertex(s, v, &job->target[v]);
       job->dirty[v] = 0;
     }
   }

@@ -88,8 +88,15 @@ static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
   round_job *job = arg;
   const orb_surface *s = &job->r->hierarchy->surface;
   for (int64_t i = begin; i < end; i++) {
-    if (i + 4 < end) {
-      __builtin_prefetch(s->corner + job->r->hierarchy->log[job->first + i + 4].first);
+    if (i + AHEAD < end) {
+      __builtin_prefetch(s->corner + job->r->hierarchy->log[job->first + i + AHEAD].first);
+      __builtin_prefetch(s->corner + job->r->hierarchy->log[job->first + i + AHEAD].last);
+    }
+    if (i + AHEAD / 2 < end) { /* what those blocks lead to */
+      int32_t c = job->r->hierarchy->log[job->first + i + AHEAD / 2].first;
+      __builtin_prefetch(s->corner + s->opposite[orb_corner_next(c)]);
+      __builtin_prefetch(job->r->point + 4 * (int64_t)s->corner[orb_corner_next(c)]);
+      __builtin_prefetch(job->r->point + 4 * (int64_t)s->corner[orb_corner_prev(c)]);
     }
     int found = 0;
     orb_status status =
