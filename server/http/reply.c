@@ -18,8 +18,9 @@ static void take(request *r, unsigned status, struct MHD_Response *response, siz
 }
 
 void reply_header(request *r, const char *name, const char *value) {
-  if (r->response) {
-    MHD_add_response_header(r->response, name, value);
+  if (r->response && MHD_add_response_header(r->response, name, value) != MHD_YES) {
+    MHD_destroy_response(r->response); /* no memory: none is better than one without its type or its place */
+    r->response = NULL;
   }
 }
 

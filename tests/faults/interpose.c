@@ -3,9 +3,9 @@
  *
  * A call is known by its site: the kind and the chain of the innermost callers, which is the same in every run, other
  * than its number among the calls of several threads. The environment says what to do:
- *   ORB_FAIL_RECORD=FILE     writes a line "KIND SITE" when a site is first passed
- *   ORB_FAIL=KIND:SITE       the first call at that site fails; KIND:SITE+ that and all later calls of the kind
- *   ORB_FAIL=KIND:#N         the N-th call of the kind fails; KIND:#N+ that and all later ones
+ *   ORB_FAIL_RECORD=FILE     writes a line "KIND SITE" when a site is first passed, and "tinygltf" where that library
+ * is among the callers ORB_FAIL=KIND:SITE       the first call at that site fails; KIND:SITE+ that and all later calls
+ * of the kind ORB_FAIL=KIND:#N         the N-th call of the kind fails; KIND:#N+ that and all later ones
  *   ORB_FAIL_MARK=FILE       is made when something failed, so that a test knows that its plan was met
  * Kinds: alloc (NULL, ENOMEM), write (ENOSPC, to files only), fsync (EIO), rename (EIO), open (EMFILE), thread
  * (EAGAIN), sqlite (SQLITE_IOERR from sqlite3_step or sqlite3_exec).
@@ -41,7 +41,10 @@ static atomic_int failing;
 static __thread int inside __attribute__((tls_model("initial-exec")));
 
 static void *next_of(const char *name) {
-  return dlsym(RTLD_NEXT, name);
+  inside++; /* it allocates */
+  void *found = dlsym(RTLD_NEXT, name);
+  inside--;
+  return found;
 }
 
 static int raw_open(const char *path, int flags) {
@@ -73,13 +76,15 @@ __attribute__((constructor)) static void begin(void) {
 }
 
 /* The chain of callers, with addresses as offsets in their modules. */
-static uint64_t site_of(enum kind kind) {
+static uint64_t site_of(enum kind kind, int *tinygltf) {
   void *frames[DEPTH + 3];
   int count = backtrace(frames, DEPTH + 3);
   uint64_t hash = 14695981039346656037u + (uint64_t)kind;
   for (int i = 3; i < count; i++) {
     Dl_info info;
-    uint64_t at = dladdr(frames[i], &info) ? (uint64_t)((char *)frames[i] - (char *)info.dli_fbase) : 0;
+    int known = dladdr(frames[i], &info);
+    uint64_t at = known ? (uint64_t)((char *)frames[i] - (char *)info.dli_fbase) : 0;
+    *tinygltf |= known && strstr(info.dli_fname, "tinygltf") != NULL;
     hash = (hash ^ at) * 1099511628211u;
     hash ^= hash >> 29;
   }
@@ -106,9 +111,12 @@ static void note(int fd, const char *text, size_t size) {
 /* Not inlined, nor any of its callers into theirs: site_of() counts the frames. */
 __attribute__((noinline)) static int look(enum kind kind) {
   char line[64];
-  uint64_t site = by_number && record < 0 ? 0 : site_of(kind);
+  int tinygltf = 0;
+  uint64_t site = by_number && record < 0 ? 0 : site_of(kind, &tinygltf);
   if (record >= 0 && is_new(site)) {
-    note(record, line, (size_t)snprintf(line, sizeof line, "%s %016llx\n", names[kind], (unsigned long long)site));
+    note(record, line,
+         (size_t)snprintf(line, sizeof line, "%s %016llx%s\n", names[kind], (unsigned long long)site,
+                          tinygltf ? " tinygltf" : ""));
   }
   if (fails != (int)kind) {
     return 0;

@@ -20,7 +20,7 @@ const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? 2);
 const patience = 40_000;
 const run = promisify(execFile);
 
-let made = 0;
+let made = 0, left_out = 0;
 const newMesh = () => shapes.obj(shapes.ball(1, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(++made)), y, z + 1e-3 * made]));
 
 /** A caller that notes what was promised. In `calm` every answer must be the good one. */
@@ -62,8 +62,12 @@ class Caller {
     if (!reply) return null;
     if (reply.status === 200) return reply.json.url;
     this.jobs.push(reply.json.url);
-    const job = await this.ask(calm, 'GET', reply.json.url, { query: { wait: calm ? 30 : 3 } });
-    if (calm) assert.equal(job.json.state, 'succeeded', JSON.stringify(job.json));
+    if (calm) {
+      const end = await this.d.ended(reply.json);
+      assert.equal(end.state, 'succeeded', JSON.stringify(end));
+      return end.result;
+    }
+    const job = await this.ask(calm, 'GET', reply.json.url, { query: { wait: 3 } });
     await this.ask(calm, 'GET', `${reply.json.url}/events`, job && ['succeeded', 'failed'].includes(job.json.state) ? {} : { signal: AbortSignal.timeout(300) }).catch(() => {});
     return job?.json.result;
   }
@@ -158,7 +162,11 @@ async function record() {
   await d.start();
   await new Caller(d).sequence(true);
   await d.stop();
-  const sites = readFileSync(file, 'utf8').trim().split('\n').map((line) => line.replace(' ', ':'));
+  // tinygltf asserts and terminates when its JSON finds no memory; what it takes is held in the job's budget, which
+  // refuses the job first, and its own allocations are left out here.
+  const lines = readFileSync(file, 'utf8').trim().split('\n');
+  const sites = lines.filter((line) => !line.endsWith('tinygltf')).map((line) => line.replace(' ', ':'));
+  left_out = lines.length - sites.length;
   await rm(data, { recursive: true, force: true });
   return sites.sort();
 }
@@ -194,7 +202,7 @@ test('calls that fail are answered, not died of', { skip }, async (t) => {
     }
   }
   await Promise.all(Array.from({ length: side_by_side }, worker));
-  t.diagnostic(`${sites.length} sites; ${total} lives, the fault was met in ${met}, ${failed.length} failed`);
+  t.diagnostic(`${sites.length} sites, and ${left_out} within tinygltf that are left out; ${total} lives, the fault was met in ${met}, ${failed.length} failed`);
   assert.deepEqual(failed.map((message) => message.split('\n')[0]), []);
   assert.ok(met > 0.6 * total, `only ${met} of ${total} faults were met`);
 });
