@@ -1,0 +1,338 @@
+/* The store by itself, in a folder of its own: objects, rows, attempts of jobs, events, and schemas of older versions.
+ * What is expected follows from the contracts in server/store. */
+#include <fcntl.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "store/database.h"
+#include "store/objects.h"
+#include "store/tokens.h"
+
+typedef struct stored {
+  char data[64];
+  objects *store;
+  catalogue *cat;
+} stored;
+
+static void reopen(stored *s) {
+  catalogue_close(s->cat);
+  objects_close(s->store);
+  assert_int_equal(objects_open(s->data, &s->store), STORE_OK);
+  assert_int_equal(catalogue_open(s->data, &s->cat), STORE_OK);
+}
+
+static int setup(void **state) {
+  stored *s = calloc(1, sizeof *s);
+  strcpy(s->data, "/tmp/orbmorph-store-XXXXXX");
+  if (!mkdtemp(s->data) || objects_open(s->data, &s->store) != STORE_OK ||
+      catalogue_open(s->data, &s->cat) != STORE_OK) {
+    return -1;
+  }
+  *state = s;
+  return 0;
+}
+
+static int teardown(void **state) {
+  stored *s = *state;
+  char command[128];
+  catalogue_close(s->cat);
+  objects_close(s->store);
+  snprintf(command, sizeof command, "rm -rf %s", s->data);
+  int failed = system(command);
+  free(s);
+  return failed;
+}
+
+static void make_id(char id[ORB_ID_SIZE], char digit) {
+  memset(id, digit, ORB_ID_SIZE - 1);
+  id[ORB_ID_SIZE - 1] = 0;
+}
+
+static int files_in(const stored *s, const char *folder) {
+  char command[160];
+  int count = -1;
+  snprintf(command, sizeof command, "find %s/%s -type f | wc -l", s->data, folder);
+  FILE *out = popen(command, "r");
+  if (!out || fscanf(out, "%d", &count) != 1) {
+    count = -1;
+  }
+  pclose(out);
+  return count;
+}
+
+static void test_objects(void **state) {
+  stored *s = *state;
+  char id[ORB_ID_SIZE], other[ORB_ID_SIZE], part[8] = {0};
+  unsigned char *bytes = NULL;
+  size_t size = 0;
+  uint64_t length = 0;
+  int fd = -1;
+  make_id(id, 'a');
+  make_id(other, 'b');
+  assert_int_equal(objects_read(s->store, OBJECT_MESH, id, &fd, &length), STORE_NOT_FOUND);
+  assert_int_equal(objects_put(s->store, OBJECT_MESH, id, "0123456789", 10), STORE_OK);
+  assert_int_equal(objects_put(s->store, OBJECT_MESH, id, "0123456789", 10), STORE_OK); /* equal ids, equal bytes */
+  assert_int_equal(objects_read(s->store, OBJECT_SPHERE, id, &fd, &length), STORE_NOT_FOUND); /* kinds are apart */
+  assert_int_equal(objects_read(s->store, OBJECT_MESH, id, &fd, &length), STORE_OK);
+  assert_int_equal(length, 10);
+  assert_int_equal(pread(fd, part, 4, 3), 4); /* a range of it */
+  assert_string_equal(part, "3456");
+  assert_int_equal(objects_delete(s->store, OBJECT_MESH, id), STORE_OK);
+  assert_int_equal(pread(fd, part, 4, 6), 4); /* who reads it still can */
+  assert_string_equal(part, "6789");
+  close(fd);
+  assert_int_equal(objects_delete(s->store, OBJECT_MESH, id), STORE_OK); /* gone is gone */
+  assert_int_equal(objects_load(s->store, OBJECT_MESH, id, &bytes, &size), STORE_NOT_FOUND);
+  assert_int_equal(objects_put(s->store, OBJECT_MESH, other, "", 0), STORE_OK);
+  assert_int_equal(objects_load(s->store, OBJECT_MESH, other, &bytes, &size), STORE_OK);
+  assert_int_equal(size, 0);
+  free(bytes);
+}
+
+static void test_temporaries(void **state) {
+  stored *s = *state;
+  object_temp temp, abandoned;
+  char id[ORB_ID_SIZE];
+  unsigned char *bytes = NULL;
+  size_t size = 0;
+  make_id(id, 'c');
+  assert_int_equal(objects_begin(s->store, &temp), STORE_OK);
+  assert_int_equal(objects_begin(s->store, &abandoned), STORE_OK);
+  assert_int_equal(objects_append(&temp, "whole ", 6), STORE_OK);
+  assert_int_equal(objects_load(s->store, OBJECT_ASSET, id, &bytes, &size),
+                   STORE_NOT_FOUND); /* nothing before the end */
+  assert_int_equal(objects_append(&temp, "object", 6), STORE_OK);
+  assert_int_equal(files_in(s, "tmp"), 2);
+  assert_int_equal(objects_publish(s->store, &temp, OBJECT_ASSET, id), STORE_OK);
+  assert_int_equal(temp.fd, -1);
+  objects_abandon(&temp); /* does nothing now */
+  assert_int_equal(files_in(s, "tmp"), 1);
+  reopen(s); /* as after a death: what was begun is swept, what was published stays */
+  assert_int_equal(files_in(s, "tmp"), 0);
+  close(abandoned.fd);
+  assert_int_equal(objects_load(s->store, OBJECT_ASSET, id, &bytes, &size), STORE_OK);
+  assert_int_equal(size, 12);
+  assert_memory_equal(bytes, "whole object", 12);
+  free(bytes);
+}
+
+static void test_resources(void **state) {
+  stored *s = *state;
+  resource row = {.kind = RESOURCE_EMBEDDING, .json = (char *)(uintptr_t) "{\"n\":1}", .bytes = 5, .created = 1000};
+  resource got = {0}, page[3];
+  make_id(row.id, 'd');
+  make_id(row.sha, 'e');
+  assert_int_equal(catalogue_put(s->cat, &row), STORE_OK);
+  row.json = (char *)(uintptr_t) "{\"n\":2}";
+  assert_int_equal(catalogue_put(s->cat, &row), STORE_OK); /* put if absent: the first stays */
+  assert_int_equal(catalogue_get(s->cat, RESOURCE_EMBEDDING, row.id, &got), STORE_OK);
+  assert_string_equal(got.json, "{\"n\":1}");
+  assert_int_equal(got.created, 1000);
+  resource_free(&got);
+  assert_int_equal(catalogue_get(s->cat, RESOURCE_SUPERMESH, row.id, &got), STORE_NOT_FOUND);
+  for (char digit = '1'; digit <= '4'; digit++) {
+    make_id(row.id, digit);
+    assert_int_equal(catalogue_put(s->cat, &row), STORE_OK);
+  }
+  assert_int_equal(catalogue_bytes(s->cat, 1), 25);
+  assert_int_equal(catalogue_list(s->cat, RESOURCE_EMBEDDING, 0, 3, page), 3); /* newest first, page by page */
+  assert_int_equal(page[0].id[0], '4');
+  int64_t before = page[2].seq;
+  for (int i = 0; i < 3; i++) {
+    resource_free(&page[i]);
+  }
+  assert_int_equal(catalogue_list(s->cat, RESOURCE_EMBEDDING, before, 3, page), 2);
+  assert_int_equal(page[0].id[0], '1');
+  assert_int_equal(page[1].id[0], 'd');
+  resource_free(&page[0]);
+  resource_free(&page[1]);
+  assert_int_equal(catalogue_delete(s->cat, RESOURCE_EMBEDDING, row.id), STORE_OK);
+  assert_int_equal(catalogue_delete(s->cat, RESOURCE_EMBEDDING, row.id), STORE_NOT_FOUND);
+  assert_int_equal(catalogue_bytes(s->cat, 1), 20);
+}
+
+static job_row new_job(char digit) {
+  job_row row = {
+      .kind = ORB_JOB_EMBEDDING, .listed = 1, .cost = 100, .request = (char *)(uintptr_t) "{}", .created = 1};
+  memset(row.id, digit, sizeof row.id - 1);
+  make_id(row.key, digit);
+  return row;
+}
+
+static job_row read_job(stored *s, const char *id) {
+  job_row row;
+  assert_int_equal(catalogue_job_get(s->cat, id, &row), STORE_OK);
+  job_row_free(&row);
+  return row;
+}
+
+/* Each step holds on (job, attempt): of two workers that believe to have a job, one is told that it has not. */
+static void test_attempts(void **state) {
+  stored *s = *state;
+  job_row job = new_job('1');
+  resource result = {.kind = RESOURCE_EMBEDDING, .json = (char *)(uintptr_t) "{}", .bytes = 1, .created = 1}, got = {0};
+  event_row events[4];
+  memcpy(result.id, job.key, sizeof result.id);
+  make_id(result.sha, 'f');
+  assert_int_equal(catalogue_job_insert(s->cat, &job), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &job), STORE_CONFLICT); /* an id is there once */
+  assert_int_equal(catalogue_job_claim(s->cat, job.id, 2, 0, 10), STORE_CONFLICT);
+  assert_int_equal(catalogue_job_claim(s->cat, job.id, 1, 0, 10), STORE_OK);
+  assert_int_equal(catalogue_job_claim(s->cat, job.id, 1, 0, 11), STORE_CONFLICT);
+  assert_int_equal(catalogue_job_release(s->cat, job.id, 2), STORE_CONFLICT);
+  assert_int_equal(catalogue_job_release(s->cat, job.id, 1), STORE_OK); /* does not count */
+  assert_int_equal(read_job(s, job.id).attempt, 0);
+  assert_int_equal(catalogue_job_claim(s->cat, job.id, 1, 0, 20), STORE_OK);
+  assert_int_equal(read_job(s, job.id).started, 10);
+  assert_int_equal(catalogue_job_claim(s->cat, job.id, 2, 0, 30), STORE_OK); /* taken over */
+  assert_int_equal(catalogue_job_finish(s->cat, job.id, 1, ORB_JOB_SUCCEEDED, NULL, 40, &result, 5, "{}"),
+                   STORE_CONFLICT);
+  assert_int_equal(catalogue_get(s->cat, RESOURCE_EMBEDDING, result.id, &got), STORE_NOT_FOUND); /* nor its result */
+  assert_int_equal(catalogue_events(s->cat, job.id, 0, 4, events), 0);
+  assert_int_equal(catalogue_job_finish(s->cat, job.id, 2, ORB_JOB_SUCCEEDED, NULL, 50, &result, 6, "{}"), STORE_OK);
+  assert_int_equal(catalogue_job_finish(s->cat, job.id, 2, ORB_JOB_FAILED, "{}", 60, NULL, 7, "{}"), STORE_CONFLICT);
+  assert_int_equal(catalogue_job_claim(s->cat, job.id, 3, 0, 70), STORE_CONFLICT);
+  assert_int_equal(read_job(s, job.id).state, ORB_JOB_SUCCEEDED);
+  assert_int_equal(catalogue_get(s->cat, RESOURCE_EMBEDDING, result.id, &got), STORE_OK);
+  resource_free(&got);
+  assert_int_equal(catalogue_events(s->cat, job.id, 0, 4, events), 1);
+  assert_int_equal(events[0].number, 6);
+  assert_string_equal(events[0].type, "succeeded");
+  free(events[0].json);
+}
+
+/* Deaths: what ran is queued again, first as a suspect; who ran alone in three of them is failed, with its last event.
+ */
+static void test_recovery(void **state) {
+  stored *s = *state;
+  job_row a = new_job('a'), b = new_job('b'), waiting = new_job('c'), rows[4];
+  event_row events[4];
+  assert_int_equal(catalogue_job_insert(s->cat, &a), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &b), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &waiting), STORE_OK);
+  assert_int_equal(catalogue_job_claim(s->cat, a.id, 1, 0, 10), STORE_OK);
+  assert_int_equal(catalogue_job_claim(s->cat, b.id, 1, 0, 10), STORE_OK);
+  catalogue_event(s->cat, a.id, 3, "progress", "{}");
+  reopen(s);
+  assert_int_equal(catalogue_recover(s->cat, 3, 20, "{\"why\":1}"), STORE_OK);
+  assert_int_equal(read_job(s, a.id).state, ORB_JOB_QUEUED);
+  assert_int_equal(read_job(s, a.id).suspect, 1);
+  assert_int_equal(read_job(s, a.id).crashes, 0); /* it was not alone */
+  assert_int_equal(read_job(s, waiting.id).suspect, 0);
+  for (int death = 1; death <= 3; death++) {
+    assert_int_equal(catalogue_job_claim(s->cat, a.id, 1 + death, 1, 30), STORE_OK);
+    reopen(s);
+    assert_int_equal(catalogue_recover(s->cat, 3, 40, "{\"why\":1}"), STORE_OK);
+    assert_int_equal(read_job(s, a.id).crashes, death);
+    assert_int_equal(read_job(s, a.id).state, death < 3 ? ORB_JOB_QUEUED : ORB_JOB_FAILED);
+  }
+  assert_int_equal(catalogue_job_claim(s->cat, a.id, 5, 1, 50), STORE_CONFLICT);
+  assert_int_equal(catalogue_events(s->cat, a.id, 3, 4, events), 1);
+  assert_string_equal(events[0].type, "failed");
+  assert_non_null(strstr(events[0].json, "\"why\":1"));
+  free(events[0].json);
+  assert_int_equal(catalogue_unfinished(s->cat, 0, 4, rows), 2); /* b and the one that waited, oldest first */
+  assert_memory_equal(rows[0].id, b.id, sizeof b.id);
+  assert_memory_equal(rows[1].id, waiting.id, sizeof b.id);
+  job_row_free(&rows[0]);
+  job_row_free(&rows[1]);
+}
+
+static int version_of(sqlite3 *db) {
+  sqlite3_stmt *st = NULL;
+  int version = -1;
+  if (sqlite3_prepare_v2(db, "PRAGMA user_version", -1, &st, NULL) == SQLITE_OK && sqlite3_step(st) == SQLITE_ROW) {
+    version = sqlite3_column_int(st, 0);
+  }
+  sqlite3_finalize(st);
+  return version;
+}
+
+/* A catalogue as version 1 of the schema left it, with a mesh and a job, is brought up to date and keeps both; one from
+ * a later version than this program knows is not touched. */
+static void test_migrations(void **state) {
+  stored *s = *state;
+  static const char first[] =
+      "CREATE TABLE resource(seq INTEGER PRIMARY KEY AUTOINCREMENT, kind INTEGER NOT NULL, id TEXT NOT NULL,"
+      " sha TEXT NOT NULL, json TEXT NOT NULL, bytes INTEGER NOT NULL, created INTEGER NOT NULL, used INTEGER NOT NULL,"
+      " UNIQUE(kind, id));"
+      "CREATE INDEX resource_used ON resource(used);"
+      "CREATE TABLE job(seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, key TEXT NOT NULL,"
+      " kind INTEGER NOT NULL, state INTEGER NOT NULL, attempt INTEGER NOT NULL, crashes INTEGER NOT NULL DEFAULT 0,"
+      " suspect INTEGER NOT NULL DEFAULT 0, alone INTEGER NOT NULL DEFAULT 0, listed INTEGER NOT NULL,"
+      " priority INTEGER NOT NULL, cost INTEGER NOT NULL, owner TEXT NOT NULL, request TEXT NOT NULL, problem TEXT,"
+      " created INTEGER NOT NULL, started INTEGER NOT NULL DEFAULT 0, finished INTEGER NOT NULL DEFAULT 0);"
+      "CREATE INDEX job_state ON job(state, seq);"
+      "CREATE TABLE event(job TEXT NOT NULL, number INTEGER NOT NULL, type TEXT NOT NULL, json TEXT NOT NULL,"
+      " PRIMARY KEY(job, number)) WITHOUT ROWID;"
+      "CREATE TABLE token(hash TEXT PRIMARY KEY, name TEXT NOT NULL UNIQUE, scopes INTEGER NOT NULL,"
+      " quota_bytes INTEGER NOT NULL, quota_jobs INTEGER NOT NULL, created INTEGER NOT NULL);"
+      "INSERT INTO resource(kind, id, sha, json, bytes, created, used) VALUES(0, 'old', 'sha', '{}', 7, 1, 1);"
+      "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created)"
+      " VALUES('oldjob', 'key', 0, 1, 1, 1, 0, 10, '', '{}', 1);"
+      "INSERT INTO token VALUES('00', 'old', 1, 100, 0, 1);"
+      "PRAGMA user_version=1;";
+  char path[96];
+  sqlite3 *db = NULL;
+  resource got = {0};
+  int count = 0;
+  snprintf(path, sizeof path, "%s/catalogue.sqlite", s->data);
+  assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+  int newest = version_of(db);
+  sqlite3_close(db);
+  catalogue_close(s->cat);
+  s->cat = NULL;
+  assert_true(newest >= 2);
+  unlink(path);
+  strcat(path, "-wal");
+  unlink(path);
+  snprintf(path, sizeof path, "%s/catalogue.sqlite-shm", s->data);
+  unlink(path);
+  snprintf(path, sizeof path, "%s/catalogue.sqlite", s->data);
+  assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+  assert_int_equal(sqlite3_exec(db, first, NULL, NULL, NULL), SQLITE_OK);
+  sqlite3_close(db);
+
+  assert_int_equal(catalogue_open(s->data, &s->cat), STORE_OK);
+  assert_int_equal(catalogue_get(s->cat, RESOURCE_MESH, "old", &got), STORE_OK);
+  assert_int_equal(got.bytes, 7);
+  resource_free(&got);
+  assert_int_equal(catalogue_recover(s->cat, 3, 20, "{}"), STORE_OK);
+  assert_int_equal(read_job(s, "oldjob").state, ORB_JOB_QUEUED);
+  token_row *tokens = catalogue_tokens(s->cat, &count);
+  assert_int_equal(count, 1);
+  assert_string_equal(tokens[0].name, "old");
+  assert_int_equal(tokens[0].used, 0);
+  free(tokens);
+  assert_true(catalogue_integrity(s->cat));
+  catalogue_close(s->cat);
+  s->cat = NULL;
+
+  assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+  assert_int_equal(version_of(db), newest);
+  assert_int_equal(sqlite3_exec(db, "PRAGMA user_version=9999", NULL, NULL, NULL), SQLITE_OK);
+  sqlite3_close(db);
+  assert_int_not_equal(catalogue_open(s->data, &s->cat), STORE_OK);
+  s->cat = NULL;
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test_setup_teardown(test_objects, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_temporaries, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_resources, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_attempts, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_recovery, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_migrations, setup, teardown),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
