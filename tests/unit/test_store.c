@@ -32,7 +32,7 @@ static void reopen(stored *s) {
 
 static int setup(void **state) {
   stored *s = calloc(1, sizeof *s);
-  strcpy(s->data, "/tmp/orbmorph-store-XXXXXX");
+  strcpy(s->data, access("/dev/shm", W_OK) == 0 ? "/dev/shm/orbmorph-store-XXXXXX" : "/tmp/orbmorph-store-XXXXXX");
   if (!mkdtemp(s->data) || objects_open(s->data, &s->store) != STORE_OK ||
       catalogue_open(s->data, &s->cat) != STORE_OK) {
     return -1;
