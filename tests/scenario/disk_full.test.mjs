@@ -1,0 +1,68 @@
+// A full disk: 507, reads go on, and with space again it works again. On a small file system in memory, mounted here;
+// where mounting is not allowed the test says so and is skipped.
+import assert from 'node:assert/strict';
+import { execFileSync, spawnSync } from 'node:child_process';
+import { closeSync, mkdtempSync, openSync, rmSync, unlinkSync, writeSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+import test from 'node:test';
+import { Daemon, assertProblem } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+/** Fills the file system to the last block; what is left is less than one. */
+function fill(file) {
+  const fd = openSync(file, 'w');
+  for (let size = 1 << 20; size >= 1; size = size >> 1)
+    try {
+      for (;;) writeSync(fd, Buffer.alloc(size));
+    } catch (error) {
+      assert.equal(error.code, 'ENOSPC');
+    }
+  closeSync(fd);
+}
+
+for (const [reserve, what] of [['0', 'found when it is written'], ['4M', 'foreseen by the reserve']]) {
+  test(`a full disk, ${what}`, async (t) => {
+    const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-full-'));
+    const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=24m', 'tmpfs', mount]);
+    if (mounted.status !== 0) {
+      rmSync(mount, { recursive: true });
+      return t.skip(`mounting is not allowed here: ${mounted.stderr ?? mounted.error}`.trim());
+    }
+    const d = new Daemon(path.join(mount, 'data'), ['--disk-reserve', reserve], {});
+    t.after(async () => {
+      if (d.child) await d.stop();
+      execFileSync('umount', ['-l', mount]);
+      rmSync(mount, { recursive: true });
+    });
+    await d.start();
+    const mesh = (n) => shapes.obj(shapes.ball(3, ([x, y, z]) => [x * (1 + n / 100), y, z]));
+    const kept = await d.upload(mesh(0), { name: 'kept' });
+    assert.equal(kept.status, 201);
+    const made = await d.made('/v1/embeddings', { mesh: kept.json.id });
+
+    fill(path.join(mount, 'ballast'));
+    for (let n = 1; n <= 3; n++) assertProblem(await d.upload(mesh(n), { name: 'm' }), 507, 'storage-full');
+    assert.equal((await d.get(`${kept.json.url}/file`)).bytes.toString(), mesh(0));
+    assert.deepEqual((await d.get(made.url)).json, made);
+    assert.equal((await d.get(`${made.url}/sphere.ply`)).status, 200);
+    assert.equal((await d.get('/v1/jobs')).status, 200);
+    assert.equal((await d.get('/readyz')).status, 200);
+    // A job may still be taken while the catalogue has room in its log; then it ends, well or with the reason.
+    const job = await d.post('/v1/embeddings', { mesh: kept.json.id, method: 'kernel-sampling' });
+    assert.ok([202, 507].includes(job.status), `${job.status} ${job.bytes}`);
+    await new Promise((resolve) => setTimeout(resolve, 500));
+
+    unlinkSync(path.join(mount, 'ballast'));
+    assert.equal((await d.upload(mesh(4), { name: 'm' })).status, 201);
+    if (job.status === 202) {
+      const end = await d.ended((await d.get(job.json.url)).json);
+      assert.ok(end.state === 'succeeded' || end.problem.type === '/problems/storage-full', JSON.stringify(end));
+    }
+    await d.made('/v1/embeddings', { mesh: kept.json.id, method: 'kernel-sampling' });
+    const { code } = await d.stop();
+    assert.equal(code, 0, d.log);
+    const { stdout } = spawnSync('sh', ['-c', `"${process.env.ORBMORPHD ?? 'build/bin/orbmorphd'}" --check-data --data ${d.data}`], { encoding: 'utf8' });
+    assert.match(stdout, / 0 wrong/);
+  });
+}
