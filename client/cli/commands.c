@@ -67,13 +67,21 @@ static char *path_of(const char *collection, const char *operand) {
   return operand[0] == '/' ? cli_text("%s", operand) : cli_text("/v1/%s/%s", collection, operand);
 }
 
+/* What the daemon answers for an id that nothing has speaks of paths; here it is said of ids. */
+static int no_such(cli *c, const char *what, const char *operand, const cli_reply *reply) {
+  if (reply->status != 404 || c->json || operand[0] == '/')
+    return cli_refused(c, operand, reply);
+  cli_error(c, "%s: not-found: no %s has this id; 'orbmorph ls' lists what there is", operand, what);
+  return CLI_REFUSED;
+}
+
 int cli_run_job(cli *c) {
   char *path = path_of("jobs", c->args.operands[0]), *result = NULL;
   cli_reply reply = {0};
   cli_request request = {.method = c->args.value[OPT_CANCEL] ? "DELETE" : "GET", .path = path};
   int rc = cli_send(c, &request, &reply);
   if (rc == CLI_DONE && !cli_ok(&reply))
-    rc = cli_refused(c, c->args.operands[0], &reply);
+    rc = no_such(c, "job", c->args.operands[0], &reply);
   if (rc == CLI_DONE && c->args.value[OPT_WAIT] && reply.json) {
     rc = cli_wait(c, reply.json, &result);
     if (rc == CLI_DONE) {
@@ -181,7 +189,7 @@ static int find(cli *c, const char *operand, char **path, cli_reply *reply) {
     free(*path);
   }
   if (rc == CLI_DONE && !cli_ok(reply))
-    rc = cli_refused(c, operand, reply);
+    rc = no_such(c, "mesh, embedding, supermesh or job", operand, reply);
   return rc;
 }
 

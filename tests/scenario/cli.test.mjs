@@ -106,6 +106,12 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
   const gone = await run(['get', id], { env });
   assert.equal(gone.code, 1);
   assert.match(gone.err, /not-found/);
+  for (const args of [['get', '0000'], ['rm', '0'.repeat(64)], ['job', 'nonsense']]) {
+    const { code, err } = await run(args, { env });
+    assert.equal(code, 1, err);
+    assert.match(err, /has this id/);
+  }
+  assert.equal(JSON.parse((await run(['get', id, '--json'], { env })).err).type, '/problems/not-found');
 });
 
 test('landmark files: an array, an object with one, and plain numbers of vertices', async (t) => {
