@@ -268,7 +268,9 @@ orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2,
       }
     }
     move_loop loop = {match, limit2, vertices};
-    orb_parallel_for(ctx, count, 32, move_range, &loop);
+    if (count > 0) {
+      orb_parallel_for(ctx, count, 256, move_range, &loop);
+    }
     status = orb_context_check(ctx);
   }
   orb_free(ctx, colours);

@@ -11,6 +11,7 @@
 typedef struct remesh_run {
   const bench_options *options;
   int32_t count, landmark_count;
+  double align; /* seconds; 0: it was kept */
   orb_aligned_shape shape[ORB_SHAPES_MAX];
 } remesh_run;
 
@@ -87,10 +88,12 @@ static int align_files(orb_context *ctx, remesh_run *run) {
   if (fine && !run->options->align_given) {
     align.method = set->list.count > 0 ? ORB_ALIGN_PIN : ORB_ALIGN_AUTO;
   }
+  double start = orb_clock();
   if (fine && orb_align(ctx, set->shape, set->count, set->landmarks, set->list.count, &align, &alignment) != ORB_OK) {
     bench_complain("align", ctx);
     fine = 0;
   }
+  run->align = orb_clock() - start;
   for (int32_t s = 0; fine && s < alignment.shape_count; s++) {
     run->shape[s] = alignment.shapes[s];
     memset(&alignment.shapes[s], 0, sizeof alignment.shapes[s]);
@@ -174,7 +177,8 @@ static int64_t count_against_centre(orb_context *ctx, const orb_supermesh *mesh,
   return count;
 }
 
-static int write_shape(orb_context *ctx, orb_text *line, const remesh_run *run, const orb_supermesh *mesh, int32_t s) {
+static int write_shape(orb_context *ctx, orb_text *line, const remesh_run *run, const orb_supermesh *mesh, int32_t s,
+                       const orb_shape_report *report) {
   double *positions = ORB_NEW(ctx, double, 3 * (size_t)mesh->vertex_count);
   unsigned char *inverted = ORB_NEW(ctx, unsigned char, mesh->triangle_count);
   int fine = positions && inverted &&
@@ -190,6 +194,8 @@ static int write_shape(orb_context *ctx, orb_text *line, const remesh_run *run, 
   orb_json_open(line, '{');
   orb_json_member_integer(line, "triangles", run->shape[s].mesh.triangle_count);
   orb_json_member_number(line, "hausdorff_relative", mesh->error_bound[s] / extent.diagonal);
+  orb_json_member_number(line, "hausdorff_sampled_relative", report->hausdorff_sampled / extent.diagonal);
+  orb_json_member_number(line, "rms_relative", report->rms / extent.diagonal);
   orb_json_member_integer(line, "inverted", turned);
   orb_json_member_integer(line, "against_centre",
                           fine ? count_against_centre(ctx, mesh, &run->shape[s], positions) : -1);
@@ -219,6 +225,11 @@ static int run_once(orb_context *ctx, const remesh_run *run, int repeat) {
   fine = fine && (run->count < 2 ||
                   orb_asset_write(ctx, &mesh, run->shape, names, &run->options->merge.asset, NULL, &asset) == ORB_OK);
   double written = orb_clock();
+  orb_shape_report report[ORB_SHAPES_MAX];
+  for (int32_t s = 0; fine && s < run->count; s++) {
+    fine = orb_shape_measure(ctx, &run->shape[s], &mesh, s, &report[s]) == ORB_OK;
+  }
+  double measured = orb_clock();
   orb_json_open(&line, '{');
   orb_json_member_string(&line, "remesh", methods[run->options->merge.remesh.method]);
   orb_json_member_integer(&line, "vertices", mesh.vertex_count);
@@ -230,15 +241,17 @@ static int run_once(orb_context *ctx, const remesh_run *run, int repeat) {
   orb_json_member_integer(&line, "repeat", repeat);
   orb_json_key(&line, "seconds");
   orb_json_open(&line, '{');
+  orb_json_member_number(&line, "align", run->align);
   orb_json_member_number(&line, "remesh", remeshed - start);
   orb_json_member_number(&line, "remesh_cpu", remesh_cpu - cpu);
+  orb_json_member_number(&line, "transfer", measured - written);
   orb_json_member_number(&line, "write", written - remeshed);
   orb_json_close(&line, '}');
   orb_json_member_integer(&line, "peak_rss_bytes", bench_peak());
   orb_json_key(&line, "shapes");
   orb_json_open(&line, '[');
   for (int32_t s = 0; fine && s < run->count; s++) {
-    fine = write_shape(ctx, &line, run, &mesh, s);
+    fine = write_shape(ctx, &line, run, &mesh, s, &report[s]);
   }
   orb_json_close(&line, ']');
   orb_json_close(&line, '}');

@@ -8,14 +8,8 @@
 
 #include <cmocka.h>
 
-#include "support_sphere.h"
-
-static orb_context *make_context(int threads) {
-  orb_context *ctx;
-  orb_context_options options = {.threads = threads};
-  assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
-  return ctx;
-}
+#include "numeric/vec3.h"
+#include "support_remesh.h"
 
 static void run(orb_context *ctx, const orb_aligned_shape *shapes, int count, int landmarks, double tolerance,
                 int64_t most, orb_supermesh *out) {
@@ -89,7 +83,7 @@ static void check(const orb_aligned_shape *shapes, int count, orb_context *ctx, 
 
 static void check_pair(sphere_kind a, int a_size, unsigned a_seed, sphere_kind b, int b_size, unsigned b_seed,
                        double jitter, double tolerance) {
-  orb_context *ctx = make_context(2);
+  orb_context *ctx = remesh_context(2);
   orb_aligned_shape shapes[2];
   sphere_shape(ctx, a, a_size, jitter, a_seed, &shapes[0]);
   sphere_shape(ctx, b, b_size, jitter, b_seed, &shapes[1]);
@@ -121,9 +115,95 @@ static void unlike_densities(void **state) {
   check_pair(SPHERE_ICO, 0, 0, SPHERE_ICO, 4, 3, 0.2, 0.001);
 }
 
+/* A thousand triangles against forty thousand: the coarse shape keeps its bound, and so does the fine one. */
+static void far_unlike_densities(void **state) {
+  (void)state;
+  orb_context *ctx = remesh_context(2);
+  orb_aligned_shape shapes[2];
+  sphere_shape(ctx, SPHERE_ICO, 3, 0.2, 1, &shapes[0]);
+  sphere_shape(ctx, SPHERE_UV, 100, 0, 2, &shapes[1]);
+  assert_in_range(shapes[0].mesh.triangle_count, 1000, 1500);
+  assert_in_range(shapes[1].mesh.triangle_count, 35000, 45000);
+  check(shapes, 2, ctx, 0.001);
+  sphere_shape_free(ctx, &shapes[0]);
+  sphere_shape_free(ctx, &shapes[1]);
+  orb_context_destroy(ctx);
+}
+
+/* Normals of the vertices of a mesh: the sums of the cross products around them. */
+static double *normals_of(const orb_mesh *mesh) {
+  double *out = calloc(3 * (size_t)mesh->vertex_count, sizeof *out);
+  for (int32_t t = 0; t < mesh->triangle_count; t++) {
+    const int32_t *c = mesh->triangles + 3 * t;
+    double u[3], v[3], n[3];
+    orb_sub(mesh->positions + 3 * c[1], mesh->positions + 3 * c[0], u);
+    orb_sub(mesh->positions + 3 * c[2], mesh->positions + 3 * c[0], v);
+    orb_cross(u, v, n);
+    for (int k = 0; k < 9; k++) {
+      out[3 * c[k / 3] + k % 3] += n[k % 3];
+    }
+  }
+  for (int32_t v = 0; v < mesh->vertex_count; v++) {
+    (void)orb_normalize(out + 3 * v);
+  }
+  return out;
+}
+
+/* How many triangles of the supermesh face away from the shape's normals at their corners. */
+static int turned_on(const orb_supermesh *m, const orb_aligned_shape *shape, int s) {
+  double *positions = positions_of(m, shape, s), *normals = normals_of(&shape->mesh);
+  int turned = 0;
+  for (int32_t t = 0; t < m->triangle_count; t++) {
+    const int32_t *c = m->triangles + 3 * t;
+    double u[3], v[3], n[3], ground[3] = {0, 0, 0};
+    orb_sub(positions + 3 * c[1], positions + 3 * c[0], u);
+    orb_sub(positions + 3 * c[2], positions + 3 * c[0], v);
+    orb_cross(u, v, n);
+    for (int k = 0; k < 3; k++) {
+      const orb_place *place = &m->places[s * m->vertex_count + c[k]];
+      for (int i = 0; i < 9; i++) {
+        ground[i % 3] += place->at[i / 3] * normals[3 * shape->mesh.triangles[3 * place->triangle + i / 3] + i % 3];
+      }
+    }
+    turned += orb_dot(n, ground) <= 0;
+  }
+  free(positions);
+  free(normals);
+  return turned;
+}
+
+/* Two balls between which the map shears: what is turned about the axis on one, the more the higher, is not on the
+ * other. No triangle of the supermesh may come out turned in space. */
+static void sheared_maps_turn_no_triangle(void **state) {
+  (void)state;
+  orb_context *ctx = remesh_context(2);
+  orb_aligned_shape shapes[2];
+  sphere_shape(ctx, SPHERE_ICO, 4, 0.2, 1, &shapes[0]);
+  sphere_shape(ctx, SPHERE_OCTA, 4, 0.2, 2, &shapes[1]);
+  for (int32_t v = 0; v < shapes[1].mesh.vertex_count; v++) {
+    const double *at = shapes[1].points + 3 * v;
+    double turn = 2.5 * at[2], *p = shapes[1].mesh.positions + 3 * v;
+    double size = sqrt(orb_dot(p, p)), x = at[0], y = at[1];
+    p[0] = size * (cos(turn) * x - sin(turn) * y);
+    p[1] = size * (sin(turn) * x + cos(turn) * y);
+    p[2] = size * at[2];
+  }
+  orb_supermesh m;
+  run(ctx, shapes, 2, 0, 0.002, 0, &m);
+  sphere_assert_valid(&m, shapes, 2);
+  assert_within(ctx, &m, shapes, 2, 0.002);
+  for (int s = 0; s < 2; s++) {
+    assert_int_equal(turned_on(&m, &shapes[s], s), 0);
+  }
+  orb_supermesh_free(ctx, &m);
+  sphere_shape_free(ctx, &shapes[0]);
+  sphere_shape_free(ctx, &shapes[1]);
+  orb_context_destroy(ctx);
+}
+
 static void four_shapes(void **state) {
   (void)state;
-  orb_context *ctx = make_context(2);
+  orb_context *ctx = remesh_context(2);
   orb_aligned_shape shapes[4];
   for (int s = 0; s < 4; s++) {
     sphere_shape(ctx, s & 1 ? SPHERE_OCTA : SPHERE_ICO, 3, 0.2, (unsigned)s + 1, &shapes[s]);
@@ -150,7 +230,7 @@ static void axis_landmarks(orb_context *ctx, orb_aligned_shape *shape) {
 
 static void landmarks_and_limits_are_kept(void **state) {
   (void)state;
-  orb_context *ctx = make_context(1);
+  orb_context *ctx = remesh_context(1);
   orb_aligned_shape shapes[2];
   for (int s = 0; s < 2; s++) {
     sphere_shape(ctx, SPHERE_OCTA, 4, 0, 0, &shapes[s]);
@@ -186,7 +266,7 @@ static void landmarks_and_limits_are_kept(void **state) {
 
 static void bad_options_are_named(void **state) {
   (void)state;
-  orb_context *ctx = make_context(1);
+  orb_context *ctx = remesh_context(1);
   orb_aligned_shape shape;
   sphere_shape(ctx, SPHERE_OCTA, 1, 0, 0, &shape);
   orb_supermesh m;
@@ -204,70 +284,13 @@ static void bad_options_are_named(void **state) {
 
 static void threads_do_not_matter(void **state) {
   (void)state;
-  orb_supermesh m[2];
-  orb_context *ctx[2];
-  for (int i = 0; i < 2; i++) {
-    orb_aligned_shape shapes[2];
-    ctx[i] = make_context(i ? 4 : 1);
-    sphere_shape(ctx[i], SPHERE_ICO, 4, 0.2, 1, &shapes[0]);
-    sphere_shape(ctx[i], SPHERE_OCTA, 4, 0.2, 2, &shapes[1]);
-    run(ctx[i], shapes, 2, 0, 0.001, 0, &m[i]);
-    sphere_shape_free(ctx[i], &shapes[0]);
-    sphere_shape_free(ctx[i], &shapes[1]);
-  }
-  assert_int_equal(m[0].vertex_count, m[1].vertex_count);
-  assert_memory_equal(m[0].points, m[1].points, 3 * (size_t)m[0].vertex_count * sizeof(double));
-  assert_memory_equal(m[0].triangles, m[1].triangles, 3 * (size_t)m[0].triangle_count * sizeof(int32_t));
-  assert_memory_equal(m[0].error_bound, m[1].error_bound, 2 * sizeof(double));
-  for (int i = 0; i < 2; i++) {
-    orb_supermesh_free(ctx[i], &m[i]);
-    orb_context_destroy(ctx[i]);
-  }
+  remesh_assert_threads_do_not_matter(ORB_REMESH_ADAPTIVE);
 }
 
-typedef struct failing {
-  int64_t left;
-} failing;
-
-static void *failing_alloc(void *user, size_t size) {
-  failing *f = user;
-  return f->left-- > 0 ? malloc(size) : NULL;
-}
-
-static void failing_free(void *user, void *block) {
-  (void)user;
-  free(block);
-}
-
-/* Every allocation fails once; each time the call says so and leaves nothing behind (the context asserts it). */
 static void failing_allocations(void **state) {
   (void)state;
-  orb_remesh_method methods[] = {ORB_REMESH_ADAPTIVE, ORB_REMESH_SUBDIVISION};
-  for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-    int done = 0;
-    for (int64_t n = 0; !done; n++) {
-      assert_true(n < 2000);
-      failing f = {INT64_MAX};
-      orb_context_options options = {.threads = 1, .allocator = {failing_alloc, failing_free, &f}};
-      orb_context *ctx;
-      assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
-      orb_aligned_shape shapes[2];
-      sphere_shape(ctx, SPHERE_ICO, 1, 0, 1, &shapes[0]);
-      sphere_shape(ctx, SPHERE_OCTA, 1, 0, 2, &shapes[1]);
-      orb_remesh_options remesh;
-      orb_remesh_defaults(&remesh);
-      remesh.method = methods[i];
-      orb_supermesh m;
-      f.left = n;
-      orb_status status = orb_remesh(ctx, shapes, 2, 0, &remesh, &m);
-      assert_true(status == ORB_OK || status == ORB_E_NO_MEMORY);
-      done = status == ORB_OK;
-      orb_supermesh_free(ctx, &m);
-      sphere_shape_free(ctx, &shapes[0]);
-      sphere_shape_free(ctx, &shapes[1]);
-      orb_context_destroy(ctx);
-    }
-  }
+  remesh_assert_fails_cleanly(ORB_REMESH_ADAPTIVE);
+  remesh_assert_fails_cleanly(ORB_REMESH_SUBDIVISION);
 }
 
 int main(void) {
@@ -275,6 +298,8 @@ int main(void) {
       cmocka_unit_test(the_bound_holds),
       cmocka_unit_test(coincidences_are_handled),
       cmocka_unit_test(unlike_densities),
+      cmocka_unit_test(far_unlike_densities),
+      cmocka_unit_test(sheared_maps_turn_no_triangle),
       cmocka_unit_test(four_shapes),
       cmocka_unit_test(landmarks_and_limits_are_kept),
       cmocka_unit_test(bad_options_are_named),

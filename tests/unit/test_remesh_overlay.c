@@ -9,14 +9,7 @@
 #include <cmocka.h>
 
 #include "numeric/vec3.h"
-#include "support_sphere.h"
-
-static orb_context *make_context(int threads) {
-  orb_context *ctx;
-  orb_context_options options = {.threads = threads};
-  assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
-  return ctx;
-}
+#include "support_remesh.h"
 
 static orb_status overlay(orb_context *ctx, const orb_aligned_shape *shapes, int count, orb_supermesh *out) {
   orb_remesh_options options;
@@ -116,7 +109,7 @@ static void check(const orb_aligned_shape *shapes, int count, orb_context *ctx, 
 
 static void check_pair(sphere_kind a, int a_size, unsigned a_seed, sphere_kind b, int b_size, unsigned b_seed,
                        double jitter, double least, double most) {
-  orb_context *ctx = make_context(2);
+  orb_context *ctx = remesh_context(2);
   orb_aligned_shape shapes[2];
   sphere_shape(ctx, a, a_size, jitter, a_seed, &shapes[0]);
   sphere_shape(ctx, b, b_size, jitter, b_seed, &shapes[1]);
@@ -152,7 +145,7 @@ static void partial_coincidences(void **state) {
     int a_size, b_size;
   } pair[] = {{SPHERE_OCTA, SPHERE_UV, 3, 16}, {SPHERE_OCTA, SPHERE_OCTA, 2, 4}, {SPHERE_UV, SPHERE_UV, 8, 24}};
   for (size_t i = 0; i < sizeof pair / sizeof *pair; i++) {
-    orb_context *ctx = make_context(1);
+    orb_context *ctx = remesh_context(1);
     orb_aligned_shape shapes[2];
     sphere_shape(ctx, pair[i].a, pair[i].a_size, 0, 0, &shapes[0]);
     sphere_shape(ctx, pair[i].b, pair[i].b_size, 0, 0, &shapes[1]);
@@ -171,7 +164,7 @@ static void partial_coincidences(void **state) {
 
 static void many_shapes(void **state) {
   (void)state;
-  orb_context *ctx = make_context(2);
+  orb_context *ctx = remesh_context(2);
   orb_aligned_shape shapes[4];
   sphere_shape(ctx, SPHERE_ICO, 2, 0.2, 1, &shapes[0]);
   sphere_shape(ctx, SPHERE_OCTA, 2, 0.2, 2, &shapes[1]);
@@ -187,62 +180,12 @@ static void many_shapes(void **state) {
 
 static void threads_do_not_matter(void **state) {
   (void)state;
-  orb_supermesh m[2];
-  orb_context *ctx[2];
-  for (int i = 0; i < 2; i++) {
-    orb_aligned_shape shapes[2];
-    ctx[i] = make_context(i ? 4 : 1);
-    sphere_shape(ctx[i], SPHERE_ICO, 4, 0.2, 1, &shapes[0]);
-    sphere_shape(ctx[i], SPHERE_OCTA, 4, 0.2, 2, &shapes[1]);
-    assert_int_equal(overlay(ctx[i], shapes, 2, &m[i]), ORB_OK);
-    sphere_shape_free(ctx[i], &shapes[0]);
-    sphere_shape_free(ctx[i], &shapes[1]);
-  }
-  assert_int_equal(m[0].vertex_count, m[1].vertex_count);
-  assert_memory_equal(m[0].points, m[1].points, 3 * (size_t)m[0].vertex_count * sizeof(double));
-  assert_memory_equal(m[0].triangles, m[1].triangles, 3 * (size_t)m[0].triangle_count * sizeof(int32_t));
-  for (int i = 0; i < 2; i++) {
-    orb_supermesh_free(ctx[i], &m[i]);
-    orb_context_destroy(ctx[i]);
-  }
-}
-
-static int64_t allocations_left;
-
-static void *failing_alloc(void *user, size_t size) {
-  (void)user;
-  return allocations_left-- > 0 ? malloc(size) : NULL;
-}
-
-static void failing_free(void *user, void *block) {
-  (void)user;
-  free(block);
+  remesh_assert_threads_do_not_matter(ORB_REMESH_OVERLAY);
 }
 
 static void failing_allocations(void **state) {
   (void)state;
-  int done = 0;
-  for (int64_t n = 0; !done; n++) {
-    assert_true(n < 2000);
-    allocations_left = INT64_MAX;
-    orb_context_options options = {.threads = 1, .allocator = {failing_alloc, failing_free, NULL}};
-    orb_context *ctx;
-    assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
-    orb_aligned_shape shapes[3];
-    for (int s = 0; s < 3; s++) {
-      sphere_shape(ctx, SPHERE_OCTA, s == 2 ? 0 : 1, 0, (unsigned)s + 1, &shapes[s]);
-    }
-    allocations_left = n;
-    orb_supermesh m;
-    orb_status status = overlay(ctx, shapes, 3, &m);
-    assert_true(status == ORB_OK || status == ORB_E_NO_MEMORY);
-    done = status == ORB_OK;
-    orb_supermesh_free(ctx, &m);
-    for (int s = 0; s < 3; s++) {
-      sphere_shape_free(ctx, &shapes[s]);
-    }
-    orb_context_destroy(ctx);
-  }
+  remesh_assert_fails_cleanly(ORB_REMESH_OVERLAY);
 }
 
 int main(void) {

@@ -8,14 +8,7 @@
 #include <cmocka.h>
 
 #include "numeric/vec3.h"
-#include "support_sphere.h"
-
-static orb_context *make_context(int threads) {
-  orb_context *ctx;
-  orb_context_options options = {.threads = threads};
-  assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
-  return ctx;
-}
+#include "support_remesh.h"
 
 static void run(orb_context *ctx, const orb_aligned_shape *shapes, int count, int landmarks, orb_supermesh *out) {
   orb_remesh_options options;
@@ -48,7 +41,7 @@ static void assert_vertices_present(const orb_supermesh *m, const orb_aligned_sh
 }
 
 static void check_pair(sphere_kind a, int a_size, sphere_kind b, int b_size, double jitter, unsigned seed_b) {
-  orb_context *ctx = make_context(2);
+  orb_context *ctx = remesh_context(2);
   orb_aligned_shape shapes[2];
   sphere_shape(ctx, a, a_size, jitter, jitter > 0 ? 1 : 0, &shapes[0]);
   sphere_shape(ctx, b, b_size, jitter, seed_b, &shapes[1]);
@@ -74,7 +67,7 @@ static void holds_every_vertex(void **state) {
 
 static void coincident_landmarks_are_one_vertex(void **state) {
   (void)state;
-  orb_context *ctx = make_context(1);
+  orb_context *ctx = remesh_context(1);
   orb_aligned_shape shapes[3];
   sphere_shape(ctx, SPHERE_OCTA, 3, 0, 0, &shapes[0]);
   sphere_shape(ctx, SPHERE_UV, 16, 0, 0, &shapes[1]);
@@ -104,34 +97,12 @@ static void coincident_landmarks_are_one_vertex(void **state) {
 
 static void threads_do_not_matter(void **state) {
   (void)state;
-  orb_supermesh m[2];
-  orb_context *ctx[2];
-  for (int i = 0; i < 2; i++) {
-    orb_aligned_shape shapes[2];
-    ctx[i] = make_context(i ? 4 : 1);
-    sphere_shape(ctx[i], SPHERE_ICO, 4, 0.2, 1, &shapes[0]);
-    sphere_shape(ctx[i], SPHERE_OCTA, 4, 0.2, 2, &shapes[1]);
-    run(ctx[i], shapes, 2, 0, &m[i]);
-    sphere_shape_free(ctx[i], &shapes[0]);
-    sphere_shape_free(ctx[i], &shapes[1]);
-  }
-  assert_int_equal(m[0].vertex_count, m[1].vertex_count);
-  size_t vertices = (size_t)m[0].vertex_count;
-  assert_memory_equal(m[0].points, m[1].points, 3 * vertices * sizeof(double));
-  assert_memory_equal(m[0].triangles, m[1].triangles, 3 * (size_t)m[0].triangle_count * sizeof(int32_t));
-  for (size_t i = 0; i < 2 * vertices; i++) {
-    assert_int_equal(m[0].places[i].triangle, m[1].places[i].triangle);
-    assert_memory_equal(m[0].places[i].at, m[1].places[i].at, sizeof m[0].places[i].at);
-  }
-  for (int i = 0; i < 2; i++) {
-    orb_supermesh_free(ctx[i], &m[i]);
-    orb_context_destroy(ctx[i]);
-  }
+  remesh_assert_threads_do_not_matter(ORB_REMESH_SUBDIVISION);
 }
 
 static void cancelling_ends_it(void **state) {
   (void)state;
-  orb_context *ctx = make_context(1);
+  orb_context *ctx = remesh_context(1);
   orb_aligned_shape shapes[2];
   sphere_shape(ctx, SPHERE_ICO, 3, 0, 0, &shapes[0]);
   sphere_shape(ctx, SPHERE_ICO, 3, 0, 1, &shapes[1]);
