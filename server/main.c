@@ -259,6 +259,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
       !(srv->callers = callers_open(srv->cat)) || !(srv->q = queue_create(&queued, srv->cat)) ||
       queue_recover(srv->q) != STORE_OK || !(srv->descriptions = cache_create(CACHE_BYTES)) ||
       !(srv->io = tasks_start((int)o->io_threads)) || !(srv->checks = tasks_start((int)o->workers)) ||
+      !(srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) ||
       !(workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) || !http_start(srv)) {
     log_error("the service could not be started");
   } else {
@@ -283,6 +284,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
     MHD_quiesce_daemon(srv->daemon);
   }
   tasks_stop(srv->checks); /* resumes what they had */
+  tasks_stop(srv->large_checks);
   tasks_stop(srv->io);
   http_stop(srv);
   listen_remove(&srv->at);

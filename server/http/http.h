@@ -30,7 +30,7 @@ typedef struct server {
   objects *store;
   queue *q;
   cache *descriptions;
-  tasks *io, *checks;
+  tasks *io, *checks, *large_checks; /* large uploads do not stand before small ones */
   listener at;
   watch *connections;
   struct MHD_Daemon *daemon;
@@ -145,6 +145,16 @@ enum MHD_Result handle_wait(request *r);
 
 /* Reads limit and page_token. 1, or 0 with a response. */
 int read_page(request *r, int *limit, int64_t *before);
+/* A page of a list: room for limit + 1 rows, and the JSON so far. */
+typedef struct list_page {
+  int limit;
+  int64_t before;
+  void *rows; /* of malloc() */
+  orb_text json;
+} list_page;
+int list_begin(request *r, const char *name, size_t row_size, list_page *page); /* 0 with a response */
+/* Takes the page; last: the sequence number of its last row; more: there are others after it. */
+void list_end(request *r, list_page *page, int64_t last, int more);
 /* Seconds to wait by ?wait= or Prefer: wait=, clamped to 60; 0: not. −1: bad, with a response. */
 int64_t read_wait_ms(request *r);
 /* From the cache or the catalogue; blocks. NULL with *result. */

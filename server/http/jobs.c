@@ -180,49 +180,38 @@ enum MHD_Result handle_job_cancel(request *r) {
   return request_go_away(r, r->srv->io, cancel_away);
 }
 
-static void list_away(request *r) {
-  int limit, state = -1;
-  int64_t before;
-  const char *state_text = query_of(r, "state");
-  if (!read_page(r, &limit, &before)) {
-    return;
+static void write_live(request *r, const job_row *row, orb_text *out) {
+  job *live = orb_job_ended(row->state) ? NULL : queue_find(r->srv->q, row->id);
+  if (live) {
+    queue_job_write(r->srv->q, live, out);
+    queue_release(r->srv->q, live);
+  } else {
+    write_row(row, out);
   }
+}
+
+static void list_away(request *r) {
+  int state = -1;
+  const char *state_text = query_of(r, "state");
+  list_page page;
+  int64_t last = 0;
   if (state_text && (state = orb_job_state_of_name(state_text)) < 0) {
     reply_refuse(r, "bad-query", "\"state\" must be queued, running, succeeded, failed or cancelled.");
     return;
   }
-  job_row *rows = calloc((size_t)limit + 1, sizeof *rows);
-  if (!rows) {
-    reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
+  if (!list_begin(r, "jobs", sizeof(job_row), &page)) {
     return;
   }
-  int count = catalogue_job_list(r->srv->cat, state, before, limit + 1, rows);
-  orb_text json = {0};
-  orb_json_open(&json, '{');
-  orb_json_key(&json, "jobs");
-  orb_json_open(&json, '[');
-  for (int i = 0; i < count && i < limit; i++) {
-    job *live = orb_job_ended(rows[i].state) ? NULL : queue_find(r->srv->q, rows[i].id);
-    if (live) {
-      queue_job_write(r->srv->q, live, &json);
-      queue_release(r->srv->q, live);
-    } else {
-      write_row(&rows[i], &json);
-    }
-  }
-  orb_json_close(&json, ']');
-  orb_json_key(&json, "next_page_token");
-  if (count > limit) {
-    orb_text_printf(&json, "\"%llx\"", (unsigned long long)rows[limit - 1].seq);
-  } else {
-    orb_json_null(&json);
-  }
-  orb_json_close(&json, '}');
+  job_row *rows = page.rows;
+  int count = catalogue_job_list(r->srv->cat, state, page.before, page.limit + 1, rows);
   for (int i = 0; i < count; i++) {
+    if (i < page.limit) {
+      write_live(r, &rows[i], &page.json);
+      last = rows[i].seq;
+    }
     job_row_free(&rows[i]);
   }
-  free(rows);
-  reply_json(r, 200, &json);
+  list_end(r, &page, last, count > page.limit);
 }
 
 enum MHD_Result handle_job_list(request *r) {

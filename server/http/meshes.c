@@ -11,6 +11,8 @@
 #include "faults.h"
 #include "http/http.h"
 
+enum { LARGE_UPLOAD = 16 << 20 };
+
 void handle_mesh_begin(request *r) {
   server *srv = r->srv;
   const char *length = header_of(r, "Content-Length");
@@ -148,5 +150,5 @@ static void upload_away(request *r) {
 }
 
 enum MHD_Result handle_mesh_upload(request *r) {
-  return request_go_away(r, r->srv->checks, upload_away);
+  return request_go_away(r, r->received > LARGE_UPLOAD ? r->srv->large_checks : r->srv->checks, upload_away);
 }

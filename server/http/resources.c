@@ -72,40 +72,53 @@ int read_page(request *r, int *limit, int64_t *before) {
   return fine;
 }
 
+int list_begin(request *r, const char *name, size_t row_size, list_page *page) {
+  memset(page, 0, sizeof *page);
+  if (!read_page(r, &page->limit, &page->before)) {
+    return 0;
+  }
+  page->rows = calloc((size_t)page->limit + 1, row_size);
+  if (!page->rows) {
+    reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
+    return 0;
+  }
+  orb_json_open(&page->json, '{');
+  orb_json_key(&page->json, name);
+  orb_json_open(&page->json, '[');
+  return 1;
+}
+
+void list_end(request *r, list_page *page, int64_t last, int more) {
+  orb_json_close(&page->json, ']');
+  orb_json_key(&page->json, "next_page_token");
+  if (more) {
+    orb_text_printf(&page->json, "\"%llx\"", (unsigned long long)last);
+  } else {
+    orb_json_null(&page->json);
+  }
+  orb_json_close(&page->json, '}');
+  free(page->rows);
+  reply_json(r, 200, &page->json);
+}
+
 static void list_away(request *r) {
   static const char *const names[RESOURCE_KINDS] = {"meshes", "embeddings", "supermeshes"};
-  int limit;
-  int64_t before;
-  if (!read_page(r, &limit, &before)) {
-    return;
-  }
-  resource *rows = calloc((size_t)limit + 1, sizeof *rows);
-  if (!rows) {
-    reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
-    return;
-  }
   resource_kind kind = kind_of(r);
-  int count = catalogue_list(r->srv->cat, kind, before, limit + 1, rows);
-  orb_text json = {0};
-  orb_json_open(&json, '{');
-  orb_json_key(&json, names[kind]);
-  orb_json_open(&json, '[');
-  for (int i = 0; i < count && i < limit; i++) {
-    orb_json_raw(&json, rows[i].json);
+  list_page page;
+  int64_t last = 0;
+  if (!list_begin(r, names[kind], sizeof(resource), &page)) {
+    return;
   }
-  orb_json_close(&json, ']');
-  orb_json_key(&json, "next_page_token");
-  if (count > limit) {
-    orb_text_printf(&json, "\"%llx\"", (unsigned long long)rows[limit - 1].seq);
-  } else {
-    orb_json_null(&json);
-  }
-  orb_json_close(&json, '}');
+  resource *rows = page.rows;
+  int count = catalogue_list(r->srv->cat, kind, page.before, page.limit + 1, rows);
   for (int i = 0; i < count; i++) {
+    if (i < page.limit) {
+      orb_json_raw(&page.json, rows[i].json);
+      last = rows[i].seq;
+    }
     resource_free(&rows[i]);
   }
-  free(rows);
-  reply_json(r, 200, &json);
+  list_end(r, &page, last, count > page.limit);
 }
 
 enum MHD_Result handle_list(request *r) {

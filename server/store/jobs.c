@@ -149,7 +149,8 @@ store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, o
   return catalogue_write(cat, finish, &c);
 }
 
-static int read_row(sqlite3_stmt *st, job_row *out) {
+static int read_row(sqlite3_stmt *st, void *to) {
+  job_row *out = to;
   memset(out, 0, sizeof *out);
   out->seq = sqlite3_column_int64(st, 0);
   row_text(st, 1, out->id, sizeof out->id);
@@ -174,30 +175,11 @@ static int read_row(sqlite3_stmt *st, job_row *out) {
 
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
   database *db = catalogue_reader(cat);
-  store_result result = STORE_ERROR;
   sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS " FROM job WHERE id=?1");
   if (st) {
     sqlite3_bind_text(st, 1, id, -1, SQLITE_STATIC);
-    int code = sqlite3_step(st);
-    result = code == SQLITE_ROW    ? (read_row(st, out) ? STORE_OK : STORE_ERROR)
-             : code == SQLITE_DONE ? STORE_NOT_FOUND
-                                   : STORE_ERROR;
-    sqlite3_reset(st);
   }
-  catalogue_reader_done(cat, db);
-  return result;
-}
-
-static int read_rows(catalogue *cat, database *db, sqlite3_stmt *st, int limit, job_row *out) {
-  int count = 0;
-  while (st && count < limit && sqlite3_step(st) == SQLITE_ROW && read_row(st, &out[count])) {
-    count++;
-  }
-  if (st) {
-    sqlite3_reset(st);
-  }
-  catalogue_reader_done(cat, db);
-  return count;
+  return rows_one(cat, db, st, read_row, out);
 }
 
 int catalogue_job_list(catalogue *cat, int state, int64_t before, int limit, job_row *out) {
@@ -210,7 +192,7 @@ int catalogue_job_list(catalogue *cat, int state, int64_t before, int limit, job
     sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);
     sqlite3_bind_int(st, 3, limit);
   }
-  return read_rows(cat, db, st, limit, out);
+  return rows_many(cat, db, st, read_row, out, sizeof *out, limit);
 }
 
 int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out) {
@@ -221,7 +203,7 @@ int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out)
     sqlite3_bind_int64(st, 1, after);
     sqlite3_bind_int(st, 2, limit);
   }
-  return read_rows(cat, db, st, limit, out);
+  return rows_many(cat, db, st, read_row, out, sizeof *out, limit);
 }
 
 /* Fails one that died alone too often, with its last event, so that who follows it learns of the end. */
@@ -321,26 +303,22 @@ void catalogue_event(catalogue *cat, const char *job, int64_t number, const char
   }
 }
 
+static int read_event(sqlite3_stmt *st, void *to) {
+  event_row *out = to;
+  out->number = sqlite3_column_int64(st, 0);
+  row_text(st, 1, out->type, sizeof out->type);
+  out->json = row_copy(st, 2);
+  return out->json != NULL;
+}
+
 int catalogue_events(catalogue *cat, const char *job, int64_t after, int limit, event_row *out) {
   database *db = catalogue_reader(cat);
-  int count = 0;
   sqlite3_stmt *st = database_statement(
       db, "SELECT number, type, json FROM event WHERE job=?1 AND number>?2 ORDER BY number LIMIT ?3");
   if (st) {
     sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
     sqlite3_bind_int64(st, 2, after);
     sqlite3_bind_int(st, 3, limit);
-    while (count < limit && sqlite3_step(st) == SQLITE_ROW) {
-      out[count].number = sqlite3_column_int64(st, 0);
-      row_text(st, 1, out[count].type, sizeof out[count].type);
-      out[count].json = row_copy(st, 2);
-      if (!out[count].json) {
-        break;
-      }
-      count++;
-    }
-    sqlite3_reset(st);
   }
-  catalogue_reader_done(cat, db);
-  return count;
+  return rows_many(cat, db, st, read_event, out, sizeof *out, limit);
 }

@@ -36,7 +36,8 @@ store_result catalogue_put(catalogue *cat, const resource *r) {
   return catalogue_write(cat, put, (void *)(uintptr_t)r);
 }
 
-static int read_row(sqlite3_stmt *st, resource *out) {
+static int read_row(sqlite3_stmt *st, void *to) {
+  resource *out = to;
   memset(out, 0, sizeof *out);
   out->seq = sqlite3_column_int64(st, 0);
   out->kind = (resource_kind)sqlite3_column_int(st, 1);
@@ -50,34 +51,12 @@ static int read_row(sqlite3_stmt *st, resource *out) {
 
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out) {
   database *db = catalogue_reader(cat);
-  store_result result = STORE_ERROR;
   sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS " FROM resource WHERE kind=?1 AND id=?2");
   if (st) {
     sqlite3_bind_int(st, 1, (int)kind);
     sqlite3_bind_text(st, 2, id, -1, SQLITE_STATIC);
-    int code = sqlite3_step(st);
-    result = code == SQLITE_ROW    ? (read_row(st, out) ? STORE_OK : STORE_ERROR)
-             : code == SQLITE_DONE ? STORE_NOT_FOUND
-                                   : STORE_ERROR;
-    sqlite3_reset(st);
   }
-  catalogue_reader_done(cat, db);
-  return result;
-}
-
-static int read_list(catalogue *cat, database *db, sqlite3_stmt *st, int limit, resource *out) {
-  int count = 0;
-  while (st && count < limit && sqlite3_step(st) == SQLITE_ROW) {
-    if (!read_row(st, &out[count])) {
-      break;
-    }
-    count++;
-  }
-  if (st) {
-    sqlite3_reset(st);
-  }
-  catalogue_reader_done(cat, db);
-  return count;
+  return rows_one(cat, db, st, read_row, out);
 }
 
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out) {
@@ -89,7 +68,7 @@ int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit
     sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);
     sqlite3_bind_int(st, 3, limit);
   }
-  return read_list(cat, db, st, limit, out);
+  return rows_many(cat, db, st, read_row, out, sizeof *out, limit);
 }
 
 int catalogue_oldest(catalogue *cat, int64_t before, int limit, resource *out) {
@@ -100,7 +79,7 @@ int catalogue_oldest(catalogue *cat, int64_t before, int limit, resource *out) {
     sqlite3_bind_int(st, 1, limit);
     sqlite3_bind_int64(st, 2, before);
   }
-  return read_list(cat, db, st, limit, out);
+  return rows_many(cat, db, st, read_row, out, sizeof *out, limit);
 }
 
 typedef struct key_arg {

@@ -11,7 +11,6 @@
 #include "faults.h"
 #include "log.h"
 #include "metrics.h"
-#include "worker/blas.h"
 #include "worker/run.h"
 
 enum { WORKER_NICE = 15 };
@@ -233,7 +232,6 @@ worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogu
   if (!pool) {
     return NULL;
   }
-  blas_use_one_thread();
   pool->options = *options;
   pool->env = (run_env){q, cat, store};
   pool->count = lanes;
