@@ -262,8 +262,12 @@ static orb_status run_starts(cm_run *c, const orb_aligned_shape *fixed, orb_pres
   if (preset == ORB_PRESET_QUALITY) {
     ORB_TRY(run_start(c, CM_GIVEN));
   }
+  double last = c->best_energy;
   ORB_TRY(run_start(c, CM_DRAWN));
-  double last = INFINITY;
+  if (preset != ORB_PRESET_QUALITY && !(c->best_energy < last)) {
+    ORB_TRY(run_start(c, CM_GIVEN));
+  }
+  last = INFINITY;
   while (c->best_energy < 0.99 * last && c->passes-- > 0 && c->work > 0) {
     last = c->best_energy;
     ORB_TRY(cm_bend(c, fixed, CM_SAMPLES));

@@ -27,8 +27,8 @@ triangles. `rbf` is the method of Peng & Timalsena 2016, section 7; `fast`, `def
 `pin`; `auto` gets no landmarks. *Flipped* counts triangles on the sphere, of both shapes and of the supermesh.
 *Inverted* is the share of the supermesh's triangles, in %, that turn against the surface's normal at their centre, on
 the first and on the second shape, *inverted map* of the first shape's triangles whose image on the second does.
-*Energy*: symmetric Dirichlet of the map, capped at 20, 1 where isometric. Landmarks set by hand differ among
-themselves by 1 to 2 % of the diagonal, so an error of that size is as good as truth.
+*Energy*: symmetric Dirichlet of the map, capped at 20, 1 where isometric. The landmarks
+themselves are set by hand: those of the cow are stated to be right to 0.8 % in the mean, 2.2 % at worst.
 """
 
 
