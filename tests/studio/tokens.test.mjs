@@ -25,7 +25,7 @@ after(async () => {
 });
 
 const give = async (page, secret) => {
-  await page.getByLabel('Token', { exact: true }).fill(secret);
+  await page.locator('dialog input[name=token]').fill(secret);
   await button(page, 'Continue').click();
 };
 
