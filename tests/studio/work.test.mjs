@@ -209,6 +209,51 @@ test('a refused mesh says why, shows the rim in red, and can be mended', async (
   await done();
 });
 
+test('loose pieces are shown in red, and the largest can be kept', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const text = await readFile(sample('dog.obj'), 'utf8');
+  const known = text.split('\n').filter((line) => line.startsWith('v '));
+  const [x, y, z] = [0, 1, 2].map((k) => Math.max(...known.map((line) => Number(line.split(/\s+/)[k + 1]))));
+  const size = 0.2 * y;
+  const corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map((c) => `v ${[x, y, z].map((at, k) => at + size * (c[k] - 0.5)).join(' ')}`);
+  const faces = [[1, 3, 2], [1, 2, 4], [2, 3, 4], [1, 4, 3]].map((f) => `f ${f.map((v) => v + known.length).join(' ')}`);
+  const both = [...known, ...corners, ...text.split('\n').filter((line) => line.startsWith('f ')), ...faces].join('\n');
+  await page.locator('input[type=file]').first().setInputFiles({ name: 'two.obj', mimeType: 'text/plain', buffer: Buffer.from(`${both}\n`) });
+  await page.locator('.card.refused').waitFor();
+  await until(() => page.getByText('Shown in red on the model.').count(), 'the loose piece is found');
+  await settled(page);
+  assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 150 && g < 110 && b < 110)) > 50, 'red is drawn');
+  await button(page, 'Keep the largest piece').click();
+  await until(() => page.locator('.card.ready').count(), 'it is mended');
+  await done();
+});
+
+test('linked cameras turn together, others alone', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  const views = async () => {
+    await settled(page);
+    return [await page.locator('.pane').nth(0).screenshot(), await page.locator('.pane').nth(1).screenshot()];
+  };
+  const turn = async () => {
+    await page.locator('.pane-view').first().focus();
+    for (let i = 0; i < 5; i++) await page.keyboard.press('ArrowLeft');
+  };
+  await page.locator('.pane-view').first().focus();
+  const first = await views();
+  await turn();
+  const second = await views();
+  for (const k of [0, 1]) assert.ok((await difference(browser, first[k], second[k])) > 0.01, `view ${k} has turned`);
+  await page.getByRole('switch', { name: 'Link the cameras' }).click();
+  await page.locator('.pane-view').first().focus();
+  const third = await views();
+  await turn();
+  const fourth = await views();
+  assert.ok((await difference(browser, third[0], fourth[0])) > 0.01, 'the view that has the focus has turned');
+  assert.ok((await difference(browser, third[1], fourth[1])) < 0.002, 'the other has not');
+  await done();
+});
+
 test('no mesh at all is refused in words', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await page.locator('input[type=file]').first().setInputFiles({ name: 'letter.obj', mimeType: 'text/plain', buffer: Buffer.from('Dear Sir or Madam\n') });
