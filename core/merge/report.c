@@ -8,6 +8,7 @@
 #include "transfer/wedge.h"
 
 enum { ALL_PAIRS_UP_TO = 4 };
+static const double SLIVER = 0.02; /* of quality() */
 
 /* Landmarks that are no vertex (rotate, rbf inside triangles): where their common point of the sphere, the mean of the
  * shapes' own, lies on each shape. */
@@ -212,12 +213,50 @@ static int32_t list_pairs(int32_t shape_count, orb_pair_report *pairs) {
   return count;
 }
 
+/* 4√3 area / Σ edge²: 0 for a degenerate triangle, 1 for an equilateral one. */
+static double quality(const double *positions, const int32_t *corner) {
+  const double *p = positions + 3 * (int64_t)corner[0], *q = positions + 3 * (int64_t)corner[1];
+  const double *r = positions + 3 * (int64_t)corner[2];
+  double u[3], w[3], normal[3];
+  orb_sub(q, p, u);
+  orb_sub(r, p, w);
+  orb_cross(u, w, normal);
+  double edges = orb_dot(u, u) + orb_dot(w, w) + orb_distance2(q, r);
+  return edges > 0 ? 3.4641016151377544 * orb_length(normal) / edges : 0;
+}
+
+/* The triangles that are no slivers on either shape: a sliver's stretch is that of its rounding, and one can outweigh
+ * all the others in a mean. All triangles where hardly any is left. */
+static int32_t keep_shapely(const orb_supermesh *supermesh, const double *a, const double *b, int32_t *out) {
+  int32_t count = 0;
+  for (int64_t t = 0; t < supermesh->triangle_count; t++) {
+    const int32_t *corner = supermesh->triangles + 3 * t;
+    if (quality(a, corner) >= SLIVER && quality(b, corner) >= SLIVER) {
+      memcpy(out + 3 * (int64_t)count++, corner, 3 * sizeof *corner);
+    }
+  }
+  if (count < supermesh->triangle_count / 10) {
+    count = supermesh->triangle_count;
+    memcpy(out, supermesh->triangles, 3 * (size_t)count * sizeof *out);
+  }
+  return count;
+}
+
 static orb_status measure_pair(orb_context *ctx, const orb_merge_result *out, double *const *positions,
                                unsigned char *const *inverted, orb_pair_report *pair) {
   const orb_supermesh *supermesh = &out->supermesh;
   int64_t turned = 0;
-  ORB_TRY(orb_distortion_measure(ctx, positions[pair->a], positions[pair->b], supermesh->triangles,
-                                 supermesh->triangle_count, &pair->distortion));
+  int32_t *shapely = ORB_NEW(ctx, int32_t, 3 * (int64_t)supermesh->triangle_count);
+  if (!shapely) {
+    return ORB_E_NO_MEMORY;
+  }
+  int32_t count = keep_shapely(supermesh, positions[pair->a], positions[pair->b], shapely);
+  orb_status status =
+      orb_distortion_measure(ctx, positions[pair->a], positions[pair->b], shapely, count, &pair->distortion);
+  orb_free(ctx, shapely);
+  if (status != ORB_OK) {
+    return status;
+  }
   for (int64_t t = 0; t < supermesh->triangle_count; t++) {
     turned += inverted[pair->a][t] | inverted[pair->b][t];
   }

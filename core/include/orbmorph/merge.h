@@ -19,12 +19,13 @@ typedef struct orb_merge_timings {
   double align, remesh, transfer, write, total; /* seconds */
 } orb_merge_timings;
 
-/* Distortion of the composed map from shape a to shape b, on the supermesh's triangles: a < b, all pairs up to four
- * shapes, else neighbours in their order. */
+/* Distortion of the composed map from shape a to shape b, on the supermesh's triangles that are no slivers on either (a
+ * height above a ninetieth or so of the longest side): a < b, all pairs up to four shapes, else neighbours in their
+ * order. */
 typedef struct orb_pair_report {
   int32_t a, b;
-  /* Its means have no bound: one triangle that collapses at one end only can carry them off. median and p99 do not care,
-   * and orb_alignment.energy is the mean with each triangle's value capped. */
+  /* Its means have no bound: one triangle that collapses at one end only can carry them off. median and p99 do not
+   * care, and orb_alignment.energy is the mean with each triangle's value capped. */
   orb_distortion distortion;
   /* Share of the triangles that are turned in space, at either end, against the input surface (its smooth normals at
    * their corners). Those of no area to speak of (1e-12 of the squared diagonal) do not count. */

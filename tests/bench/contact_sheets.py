@@ -1,0 +1,47 @@
+#!/usr/bin/env python3
+"""Draws the contact sheet of every pair with landmarks: OUT/A-B.png, five poses each.
+
+    tests/bench/contact_sheets.py [--bin build/bin] [--meshes ../shared/meshes] [--out docs/pairs] [PAIR...]
+
+Merges by the defaults, with the pair's landmarks. One JSON line a pair on standard output, that of orbmorph-bench.
+Standard library only.
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bin", type=pathlib.Path, default="build/bin")
+    parser.add_argument("--meshes", type=pathlib.Path, default="../shared/meshes")
+    parser.add_argument("--out", type=pathlib.Path, default="docs/pairs")
+    parser.add_argument("pairs", nargs="*", help="such as cow-spot; all where none is named")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    refused = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for file in sorted((options.meshes / "pairs").glob("*.json")):
+            if options.pairs and file.stem not in options.pairs:
+                continue
+            pair, marks, glb = json.loads(file.read_text()), pathlib.Path(folder, "marks.json"), pathlib.Path(folder, "morph.glb")
+            base = pair.get("index_base", 0)
+            marks.write_text(json.dumps([{"name": f"l{i}", "at": [{"vertex": v - base} for v in at]}
+                                         for i, at in enumerate(pair["landmarks"])]))
+            merged = subprocess.run([options.bin / "orbmorph-bench", "merge", "--landmarks", marks, "--out", glb,
+                                     *(options.meshes / "good" / mesh for mesh in pair["meshes"])],
+                                    stdout=subprocess.PIPE, text=True)
+            if merged.returncode:
+                refused += 1
+                continue
+            print(merged.stdout.strip(), flush=True)
+            subprocess.run([options.bin / "orbmorph", "view", glb, "-o", options.out / f"{file.stem}.png"], check=True,
+                           stdout=sys.stderr)
+    sys.exit(1 if refused else 0)
+
+
+if __name__ == "__main__":
+    main()
