@@ -27,7 +27,7 @@ test('the example plays a morph of two files', async () => {
   const { page, done } = await openPage(browser, url, { viewport: { width: 640, height: 480 } });
   await page.locator('#files').setInputFiles([sample('dog.obj'), sample('giraffe.off')]);
   await page.getByRole('button', { name: 'Morph' }).click();
-  await until(() => page.locator('#status').innerText().then((text) => /\d+ triangles for dog, giraffe/.test(text)), 'the morph is there', 90_000);
+  await until(() => page.locator('#status').innerText().then((text) => /\d+ triangles for dog, giraffe/.test(text)), 'the morph is there');
   const first = await page.screenshot();
   await until(async () => (await difference(browser, first, await page.screenshot())) > 0.005, 'it moves');
   await done();

@@ -26,7 +26,7 @@ async function landmarked(page) {
 async function morphed(page) {
   await landmarked(page);
   await button(page, /^Morph 2 shapes$/).click();
-  await until(() => button(page, 'Pause').count(), 'the morph plays', 120_000);
+  await until(() => button(page, 'Pause').count(), 'the morph plays');
   await button(page, 'Pause').click();
 }
 const slide = (page, name, value) => page.getByRole('slider', { name }).evaluate((input, v) => {
@@ -77,7 +77,7 @@ export const SCENES = {
   error: [async (page) => {
     await morphed(page);
     await button(page, 'Error').click();
-    await until(() => page.locator('.pane .legend').count().then((n) => n === 2), 'both are measured', 120_000);
+    await until(() => page.locator('.pane .legend').count().then((n) => n === 2), 'both are measured');
   }],
   'use-it': [async (page) => {
     await morphed(page);

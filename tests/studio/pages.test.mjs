@@ -67,7 +67,7 @@ for (const colorScheme of ['light', 'dark'])
     await page.locator('.marks li').first().waitFor();
     found.landmarks = await findings(page);
     await button(page, /^Morph 2 shapes$/).click();
-    await until(() => button(page, 'Pause').count(), 'the morph plays', 90_000);
+    await until(() => button(page, 'Pause').count(), 'the morph plays');
     await button(page, 'Pause').click();
     found.morph = await findings(page);
     await button(page, 'Use it').click();

@@ -82,7 +82,7 @@ export async function openPage(browser, url, { hash = '', ...options } = {}) {
 }
 
 /** Until `check` gives something true. */
-export async function until(check, what, limit = 90_000) {
+export async function until(check, what, limit = 300_000) {
   const end = Date.now() + limit;
   for (;;) {
     const value = await check();
@@ -98,7 +98,8 @@ export const button = (page, name, options) => page.getByRole('button', { name, 
 export async function addFiles(page, ...files) {
   await page.locator('input[type=file]').first().setInputFiles(files);
   await until(() => page.locator('.card.ready').count().then((n) => n >= files.length), 'the shapes are uploaded');
-  await until(() => page.getByText('reading…').count().then((n) => n === 0), 'the shapes are drawn');
+  await until(() => page.getByText('reading…').count().then((n) => n === 0), 'the shapes are read');
+  await settled(page);
 }
 
 /** The number of pixels of the stage that `test(r, g, b)` accepts, from a screenshot of it. */

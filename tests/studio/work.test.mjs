@@ -40,7 +40,7 @@ async function pickThree(page) {
 
 async function morph(page) {
   await button(page, /^Morph \d shapes$/).click();
-  await until(() => button(page, 'Pause').count(), 'the morph plays', 90_000);
+  await until(() => button(page, 'Pause').count(), 'the morph plays');
 }
 
 test('from the empty page to a playing morph in at most five clicks', async () => {
@@ -53,7 +53,7 @@ test('from the empty page to a playing morph in at most five clicks', async () =
   await click('Try with samples');
   await until(() => page.locator('.card.ready').count().then((n) => n === 2), 'two samples are taken');
   await click(/^Morph 2 shapes$/);
-  await until(() => button(page, 'Pause').count(), 'the morph plays', 90_000);
+  await until(() => button(page, 'Pause').count(), 'the morph plays');
   const seen = new Set();
   await until(async () => seen.add(await time(page)).size > 5, 'time passes');
   assert.ok(clicks <= 5, `${clicks} clicks`);
@@ -254,6 +254,29 @@ test('linked cameras turn together, others alone', async () => {
   await done();
 });
 
+test('an upload shows how far it is', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const session = await page.context().newCDPSession(page);
+  await session.send('Network.enable');
+  await session.send('Network.emulateNetworkConditions', { offline: false, latency: 0, downloadThroughput: -1, uploadThroughput: 400_000 });
+  await page.evaluate(() => {
+    globalThis.seen = [];
+    new MutationObserver(() => {
+      const bar = document.querySelector('[role=progressbar][aria-label^=Uploading]');
+      const now = Number(bar?.getAttribute('aria-valuenow') ?? NaN);
+      if (now > 0 && now !== globalThis.seen.at(-1)) globalThis.seen.push(now);
+    }).observe(document.body, { subtree: true, childList: true, attributes: true });
+  });
+  const dog = await readFile(sample('dog.obj'), 'utf8');
+  const long = Buffer.from(`${dog}\n${`# ${'x'.repeat(98)}\n`.repeat(12_000)}`);
+  await page.locator('input[type=file]').first().setInputFiles({ name: 'dog.obj', mimeType: 'text/plain', buffer: long });
+  await page.locator('.card.ready').waitFor({ timeout: 60_000 });
+  const seen = await page.evaluate(() => globalThis.seen);
+  assert.ok(seen.length >= 3, `shares seen: ${seen}`);
+  assert.deepEqual(seen, [...seen].sort((a, b) => a - b));
+  await done();
+});
+
 test('no mesh at all is refused in words', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await page.locator('input[type=file]').first().setInputFiles({ name: 'letter.obj', mimeType: 'text/plain', buffer: Buffer.from('Dear Sir or Madam\n') });
@@ -284,7 +307,7 @@ test('landmarks are found', async () => {
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await button(page, 'Landmarks').click();
   await button(page, 'Find them for me').click();
-  await until(() => page.locator('.toast').count(), 'an answer', 90_000);
+  await until(() => page.locator('.toast').count(), 'an answer');
   const text = await page.locator('.toast').innerText();
   const found = Number(text.match(/^(\d+) landmarks found/)?.[1] ?? 0);
   assert.equal(await landmarks(page).count(), found);
@@ -299,7 +322,7 @@ test('a job goes on when the page is closed, and is found again', async () => {
   const address = await until(() => (/j=[^&]+/.test(first.page.url()) || /r=/.test(first.page.url())) && first.page.url(), 'the address names the job');
   await first.done();
   const second = await openPage(browser, daemon.url, { hash: new URL(address).hash });
-  await until(() => button(second.page, /^(Play|Pause)$/).count(), 'the morph is there', 90_000);
+  await until(() => button(second.page, /^(Play|Pause)$/).count(), 'the morph is there');
   await second.done();
 });
 
@@ -408,7 +431,7 @@ test('the error of the common mesh is measured and below the tolerance', async (
   await button(page, 'As in the files').click();
   await morph(page);
   await button(page, 'Error').click();
-  await until(() => page.locator('.pane .legend').count().then((n) => n === 2), 'both shapes are measured', 120_000);
+  await until(() => page.locator('.pane .legend').count().then((n) => n === 2), 'both shapes are measured');
   const captions = await page.locator('.pane .caption').allInnerTexts();
   for (const text of captions) {
     const percent = Number(text.match(/largest ([\d.e+-]+) %/)[1]);
