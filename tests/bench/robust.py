@@ -19,7 +19,26 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-CHUNK = 25  # sets or pairs a process
+CHUNK = 50  # sets or pairs a process
+HEAD = """# Landmarks at random, and every pair
+
+Written by `tests/bench/robust.py` on the real meshes of 2,000 to 50,000 triangles. CPU seconds are of one thread, the
+library's own; the machine had other work.
+"""
+LANDMARKS = """## Random landmarks
+
+Each set takes two meshes and as many places on each, at random vertices, inside triangles and on edges, and matches
+them in random order: far harder than what anyone would mark, since the surfaces must be wound about each other. `pin`
+with the preset `fast`. Met: certified in exact arithmetic, closed, landmarks at bit-equal points on both spheres.
+Growth is how many times its triangles the mesh that grew more has afterwards; a set of 60 on a mesh of a few hundred
+triangles needs most.
+"""
+PAIRS = """## Every pair
+
+No landmarks, `auto`, `adaptive` at the tolerance 0.1 %. Certified: closed, of genus zero, nothing flipped on the
+sphere. *Bound* is the proved distance from either input, in % of its diagonal; *energy* that of the composed map
+(1: isometric), *inverted* the share of triangles turned in space.
+"""
 
 
 def meshes_of(folder):
@@ -96,7 +115,7 @@ def pairs_table(lines):
         energy = "" if line["energy"] is None else f"{line['energy']:.2f}"
         text.append(f"| {name} | {line['triangles']:,} | {line['triangles'] / line['largest_input']:.2f} | "
                     f"{100 * line['bound_relative']:.3f} | {100 * line['rms_relative']:.3f} | {energy} | "
-                    f"{100 * line['inverted']:.2f} | {line['cpu_seconds']:.1f} |")
+                    f"{100 * (line['inverted'] or 0):.2f} | {line['cpu_seconds']:.1f} |")
     return text, failed
 
 
@@ -114,20 +133,21 @@ def main():
     parser.add_argument("--keep", default=pathlib.Path(tempfile.gettempdir()) / "orbmorph-robust")
     parser.add_argument("--out", help="the Markdown file; else the tables are printed")
     options = parser.parse_args()
-    meshes, text, bad = meshes_of(pathlib.Path(options.meshes)), [], 0
+    meshes, text, bad = meshes_of(pathlib.Path(options.meshes)), [HEAD], 0
     if options.what in ("landmarks", "all"):
         arguments = ["--seed", str(options.seed), "--merge-every", str(options.merge_every)]
         lines = run(options, "landmarks", options.sets, arguments, meshes)
         table, failed = landmarks_table(lines)
-        text += ["## Random landmarks", "", f"{len(lines)} sets, {len(lines) - len(failed)} met "
+        text += [LANDMARKS, f"{len(lines)} sets, {len(lines) - len(failed)} met "
                  f"({100 * (1 - len(failed) / len(lines)):.2f} %).", "", *table, ""]
         bad |= len(failed) > 0.01 * len(lines) or any(line["status"] != "ok" and not line["named"] for line in failed)
     if options.what in ("pairs", "all"):
         total = len(meshes) * (len(meshes) - 1) // 2
         lines = run(options, "pairs", total, ["--align-preset", options.preset], meshes)
         table, failed = pairs_table(lines)
-        text += ["## Every pair", "", f"{len(lines)} pairs, {len(lines) - len(failed)} certified; preset "
-                 f"`{options.preset}`.", "", *table, ""]
+        over = sum(line["status"] == "ok" and line["bound_relative"] > 0.001 for line in lines)
+        text += [PAIRS, f"{len(lines)} pairs, {len(lines) - len(failed)} certified, {over} of them with a bound above the "
+                 f"tolerance; preset `{options.preset}`.", "", *table, ""]
         bad |= bool(failed)
     if options.out:
         pathlib.Path(options.out).write_text("\n".join(text), encoding="utf-8")
