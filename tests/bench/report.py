@@ -387,8 +387,8 @@ def cancels(bench, report, folder):
     runs += [("kernel-sampling", p) for p in (bench.find("shrec393.off"), bench.find("spheretext.obj")) if p]
     rows = []
     for method, path in runs:
-        rows += bench.lines_of("bench-cancel", "--method", method, "--threads", 1, "--cancels", 12, path)
-    report.add("## Cancelling", "Embeddings cancelled at 12 moments spread over their time, one thread; `bench-cancel`.")
+        rows += bench.lines_of("bench-cancel", "--method", method, "--threads", 1, "--cancels", 8, path)
+    report.add("## Cancelling", "Embeddings cancelled at 8 moments spread over their time, one thread; `bench-cancel`.")
     report.table(["mesh", "triangles", "method", "whole run, s", "mean delay, ms", "longest, ms", "longest, processor ms"],
                  [(m["mesh"], m["triangles"], m["method"], m["seconds"], m["mean_ms"], m["longest_ms"],
                    m["longest_cpu_ms"]) for m in rows])
