@@ -8,7 +8,7 @@
 
 #include "queue/queue.h"
 
-enum { BUCKETS = 8192, KEEP_ENDED = 2048, EVENTS_KEPT = 64, OWNERS = 1100, DEPENDENCIES = 16 };
+enum { BUCKETS = 8192, KEEP_ENDED = 512, EVENTS_KEPT = 64, OWNERS = 1100, DEPENDENCIES = 16 };
 static const int64_t LARGE = 300000;          /* triangles from which a job is large */
 static const int64_t BYTES_A_TRIANGLE = 1024; /* estimate of a running job's memory */
 static const int64_t EVENT_STRIDE = 1000000;  /* event numbers of an attempt start at attempt times this */

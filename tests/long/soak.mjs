@@ -1,6 +1,7 @@
 // Mixed work for ORB_SOAK_SECONDS (600), and whether memory, descriptors and threads stay flat.
 //
-// The first fifth warms up: caches fill, the allocator finds its size. After it the line of least squares through the
+// Before the clock, 700 small jobs fill what the service keeps of ended ones. The first fifth warms up: caches fill, the
+// allocator finds its size. After it the line of least squares through the
 // samples of a second may not rise by more than a tenth of the level over the rest, and what is open at the end, when
 // all callers are gone, may not be more than at the beginning. Exit status 1 otherwise.
 import { mkdtempSync, readdirSync, readFileSync, rmSync } from 'node:fs';
@@ -60,6 +61,15 @@ async function caller() {
 }
 
 const first = sample(), samples = [];
+let warm = 700;
+await Promise.all(Array.from({ length: 8 }, async () => {
+  for (; warm > 0; warm--) {
+    const small = shapes.obj(shapes.ball(1, ([x, y, z]) => [x, y, z + 1e-4 * ++number]));
+    const { json } = await d.upload(small, { name: 'w' });
+    await d.made('/v1/embeddings', { mesh: json.id });
+    await d.delete(json.url);
+  }
+}));
 const callers = Array.from({ length: 4 }, caller);
 for (const began = Date.now(); Date.now() - began < seconds * 1000; ) {
   await sleep(1000);
