@@ -44,6 +44,27 @@ part_crash() {
     node --test --test-reporter=spec tests/scenario/crash.test.mjs
 }
 
+# Each call of the daemon that may fail is made to fail, once and for ever.
+part_faults() {
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build --target orbmorphd orbmorph_interpose
+  ORB_FAULT_RUNS=${ORB_FAULT_RUNS:-all} ORB_INTERPOSE=build/bin/liborbmorph_interpose.so \
+    node --test --test-reporter=spec tests/scenario/faults.test.mjs
+}
+
+# Mixed work for ORB_SOAK_SECONDS (600): memory, descriptors and threads stay flat.
+part_soak() {
+  cmake --preset release >/dev/null
+  cmake --build build --target orbmorphd
+  node tests/long/soak.mjs
+}
+
+part_load() {
+  cmake --preset release >/dev/null
+  cmake --build build --target orbmorphd
+  node tests/bench/load.mjs
+}
+
 # 1,000 seeded adversarial meshes through the embedding; tests/bench/report.py shows what this leaves.
 part_adversarial() {
   cmake --preset release -DORB_TESTS=ON >/dev/null
@@ -72,7 +93,7 @@ part_robust() {
 }
 
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash adversarial arm robust
+  set -- tsan valgrind fuzz crash faults soak load adversarial arm robust
 fi
 for part in "$@"; do
   echo "== $part =="

@@ -78,8 +78,8 @@ const mesh = async (d, levels, n) => (await d.upload(shapes.binaryPly(shapes.bal
 
 async function asset() {
   const d = await start();
-  const [a, b] = [await mesh(d, 5, 1), await mesh(d, 5, 2)];
-  const made = await d.made('/v1/supermeshes', { shapes: [{ mesh: a.id }, { mesh: b.id }], align: { method: 'rotate' }, remesh: { method: 'overlay', max_triangles: 9000 } });
+  const [a, b] = [await mesh(d, 5, 1), await mesh(d, 4, 2)];
+  const made = await d.made('/v1/supermeshes', { shapes: [{ mesh: a.id }, { mesh: b.id }], align: { method: 'rotate' }, remesh: { method: 'overlay' } });
   const file = await d.get(made.asset);
   mkdirSync(`${scratch}/www`, { recursive: true });
   writeFileSync(`${scratch}/www/asset.glb`, file.bytes);
