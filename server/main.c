@@ -230,7 +230,8 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
   queue_stop(srv->q, 0);
   int64_t until = orb_clock_ms() + 1000 * srv->options->drain_seconds;
   while (queue_running(srv->q) > 0 && orb_clock_ms() < until) {
-    if (poll(wait, 1, 50) > 0) {
+    unsigned char number;
+    if (poll(wait, 1, 50) > 0 && read(signals, &number, 1) == 1 && number != SIGHUP) {
       break;
     }
   }

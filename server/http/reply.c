@@ -122,33 +122,43 @@ void reply_cached(request *r, unsigned status, const cached *entry) {
   cache_release(r->srv->descriptions, entry);
 }
 
-/* Whether the browser's origin may call. */
+/* Whether the list, comma-separated and perhaps with spaces, names the origin. */
+static int is_listed(const char *list, const char *origin) {
+  size_t n = strlen(origin);
+  for (const char *at = list; *at;) {
+    at += strspn(at, ", ");
+    size_t length = strcspn(at, ", ");
+    if (length == n && n > 0 && strncmp(at, origin, n) == 0) {
+      return 1;
+    }
+    at += length;
+  }
+  return 0;
+}
+
+/* Whether the browser's origin may call. Where that depends on the origin every answer says so, also to those who may
+ * not or did not name one, or a cache would hand them each other's (Fetch, "CORS protocol and HTTP caches"). */
 static void add_cors(request *r) {
   const char *allowed = r->srv->options->cors, *origin = header_of(r, "Origin");
-  if (!allowed[0] || !origin) {
+  if (!allowed[0]) {
     return;
   }
-  int any = strcmp(allowed, "*") == 0, found = any;
-  size_t n = strlen(origin);
-  for (const char *at = allowed; *at && !found;) {
-    size_t length = strcspn(at, ",");
-    found = length == n && strncmp(at, origin, n) == 0;
-    at += length + (at[length] == ',');
+  int any = strcmp(allowed, "*") == 0;
+  if (!any) {
+    reply_header(r, "Vary", "Origin");
   }
-  if (!found) {
+  if (!origin || (!any && !is_listed(allowed, origin))) {
     return;
   }
   reply_header(r, "Access-Control-Allow-Origin", any ? "*" : origin);
-  reply_header(r, "Vary", "Origin");
-  reply_header(
-      r, "Access-Control-Expose-Headers",
-      "Location, Content-Location, Retry-After, ETag, Content-Range, X-Request-Id, RateLimit, RateLimit-Policy, "
-      "Preference-Applied");
+  reply_header(r, "Access-Control-Expose-Headers",
+               "Location, Content-Location, Retry-After, ETag, Accept-Ranges, Content-Range, Content-Disposition, "
+               "Accept-Encoding, WWW-Authenticate, X-Request-Id, RateLimit, RateLimit-Policy, Preference-Applied");
   if (strcmp(r->method, "OPTIONS") == 0) {
     reply_header(r, "Access-Control-Allow-Methods", "GET, HEAD, POST, DELETE");
     reply_header(r, "Access-Control-Allow-Headers",
-                 "Authorization, Content-Type, Content-Encoding, Prefer, Priority, If-None-Match, Range, "
-                 "Last-Event-ID, traceparent");
+                 "Authorization, Content-Type, Content-Encoding, Prefer, Priority, If-Match, If-None-Match, If-Range, "
+                 "Range, Last-Event-ID, traceparent");
     reply_header(r, "Access-Control-Max-Age", "600");
   }
 }

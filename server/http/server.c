@@ -266,6 +266,9 @@ static char *read_text(const char *path) {
   return text;
 }
 
+/* GnuTLS itself would still speak 1.0 and 1.1, which RFC 8996 forbids. */
+static const char TLS_VERSIONS[] = "NORMAL:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2";
+
 int http_start(server *srv) {
   const config *o = srv->options;
   int tls = o->tls_key[0] != 0;
@@ -293,6 +296,7 @@ int http_start(server *srv) {
                                      {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, srv},
                                      {tls ? MHD_OPTION_HTTPS_MEM_CERT : MHD_OPTION_END, 0, certificate},
                                      {MHD_OPTION_HTTPS_MEM_KEY, 0, key},
+                                     {MHD_OPTION_HTTPS_PRIORITIES, 0, (void *)(uintptr_t)TLS_VERSIONS},
                                      {MHD_OPTION_END, 0, NULL}};
   srv->daemon =
       MHD_start_daemon(flags, 0, NULL, NULL, answer, srv, MHD_OPTION_EXTERNAL_LOGGER, on_mhd_log, NULL,

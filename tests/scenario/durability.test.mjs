@@ -2,7 +2,8 @@
 import assert from 'node:assert/strict';
 import path from 'node:path';
 import test from 'node:test';
-import { daemon, samples, slow } from './support/daemon.mjs';
+import { setTimeout as sleep } from 'node:timers/promises';
+import { assertProblem, daemon, samples, slow } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const kills = Number(process.env.ORB_CRASHES ?? (slow ? 3 : 6));
@@ -78,6 +79,36 @@ test('SIGTERM ends it in time while a job runs, and the job is kept', async (t) 
   await d.start();
   const end = await d.ended((await d.get(job.url)).json, { seconds: 600 });
   assert.equal(end.state, 'succeeded', JSON.stringify(end.problem));
+});
+
+test('a second SIGTERM ends it at once while it drains, and the job is kept', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1', '--drain-seconds', '3600'] });
+  const { json: mesh } = await d.upload(shapes.binaryPly(wobble(1, 6)));
+  const body = { mesh: mesh.id, method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } };
+  const { json: job } = await d.post('/v1/embeddings', body);
+  while ((await d.get(job.url)).json.state !== 'running') await sleep(20);
+  d.child.kill('SIGTERM');
+  let reply;
+  do reply = await d.get('/readyz');
+  while (reply.status === 200);
+  assertProblem(reply, 503, 'unavailable');
+  // It drains: what is there can be read, what is new is refused, and a reload is no reason to stop.
+  d.child.kill('SIGHUP');
+  assert.equal((await d.get('/livez')).status, 200);
+  const { json: other } = await d.upload(shapes.tetrahedron);
+  assertProblem(await d.post('/v1/embeddings', { mesh: (other.id ? other : mesh).id, method: 'kernel-sampling' }), 503, 'unavailable');
+  await sleep(1500);
+  assert.deepEqual([d.child.exitCode, d.child.signalCode], [null, null], 'it gives the job its time');
+  assert.equal((await d.get(job.url)).json.state, 'running');
+  const began = Date.now();
+  const { code } = await d.stop('SIGTERM');
+  assert.equal(code, 0, d.log);
+  assert.ok(Date.now() - began < 60_000, `${Date.now() - began} ms of an hour`);
+  await d.start();
+  const now = (await d.get(job.url)).json;
+  assert.ok(['queued', 'running'].includes(now.state), JSON.stringify(now));
+  assert.equal((await d.delete(job.url)).status, 200);
+  assert.equal((await d.ended(now)).state, 'cancelled');
 });
 
 test('a job that ends the process three times fails, and the queue goes on', async (t) => {

@@ -31,8 +31,11 @@ test('a job can be waited for', async (t) => {
   const prefer = await d.post('/v1/embeddings', { mesh: (await d.mesh(path.join(samples, 'giraffe.off'))).id }, { headers: { prefer: 'wait=30' } });
   assert.equal(prefer.status, 200, 'Prefer: wait on the request itself brings the result');
   assert.equal(prefer.json.certificate.valid, true);
-  const header = await d.get(accepted.json.url, { headers: { prefer: 'wait=5' } });
+  assert.equal(prefer.headers.get('preference-applied'), 'wait=30');
+  const header = await d.get(accepted.json.url, { headers: { prefer: 'respond-async, wait=5' } });
   assert.equal(header.json.state, 'succeeded');
+  assert.equal(header.headers.get('preference-applied'), 'wait=5');
+  for (const reply of [accepted, done]) assert.equal(reply.headers.get('preference-applied'), null, 'none was sent');
   assert.equal((await d.get(accepted.json.url, { query: { wait: 999999 } })).status, 200, 'wait is clamped, not refused');
 });
 
@@ -92,4 +95,53 @@ test('jobs are listed by state', async (t) => {
   assert.equal((await items('succeeded')).length, 1);
   assert.equal((await items('failed')).length, 0);
   assertProblem(await d.get('/v1/jobs/nothing'), 404, 'not-found');
+});
+
+// Nothing converges as far as that: it runs until it is stopped.
+const endless = (mesh) => ({ mesh: mesh.id, method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } });
+
+test('a preference that is not met in time brings the job', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const mesh = await heavy(d);
+  const reply = await d.post('/v1/embeddings', endless(mesh), { headers: { prefer: 'wait=1' } });
+  assert.equal(reply.status, 202);
+  assert.equal(reply.headers.get('preference-applied'), 'wait=1');
+  const polled = await d.get(reply.json.url, { headers: { prefer: 'wait=1' } });
+  assert.deepEqual([polled.json.state, polled.headers.get('preference-applied')], ['running', 'wait=1']);
+  for (const prefer of ['respond-async', 'wait=soon', 'wait', 'waiting=3']) {
+    const plain = await d.get(reply.json.url, { headers: { prefer } });
+    assert.deepEqual([plain.status, plain.headers.get('preference-applied')], [200, null], prefer);
+  }
+  const refused = await d.post('/v1/embeddings', { mesh: 'none' }, { headers: { prefer: 'wait=1' } });
+  assertProblem(refused, 404, 'not-found');
+  assert.equal(refused.headers.get('preference-applied'), null);
+  await d.delete(reply.json.url);
+});
+
+test('a full queue refuses new jobs and nothing else', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1', '--queue-limit', '2'] });
+  const meshes = [await heavy(d, 1), await heavy(d, 2), await heavy(d, 3)];
+  const jobs = [];
+  for (const mesh of meshes.slice(0, 2)) {
+    const reply = await d.post('/v1/embeddings', endless(mesh));
+    assert.equal(reply.status, 202, reply.bytes.toString());
+    jobs.push(reply.json);
+  }
+  for (let i = 0; i < 3; i++) {
+    const refused = await d.post('/v1/embeddings', endless(meshes[2]));
+    assertProblem(refused, 429, 'queue-full');
+    assert.match(refused.headers.get('retry-after'), /^[1-9]\d*$/);
+  }
+  const waiting = await d.post('/v1/embeddings', endless(meshes[2]), { headers: { prefer: 'wait=30' } });
+  assertProblem(waiting, 429, 'queue-full');
+  assert.equal((await d.get('/v1/jobs')).json.jobs.length, 2, 'no trace of what was refused');
+  // What is queued already is still answered, as are uploads and reads.
+  assert.equal((await d.post('/v1/embeddings', endless(meshes[1]))).json.id, jobs[1].id);
+  assert.equal((await d.upload(shapes.tetrahedron)).status, 201);
+  assert.equal((await d.get(meshes[2].url)).status, 200);
+  assert.equal((await d.delete(jobs[1].url)).status, 200);
+  await d.ended(jobs[1]);
+  const third = await d.post('/v1/embeddings', endless(meshes[2]));
+  assert.equal(third.status, 202, third.bytes.toString());
+  for (const job of [jobs[0], third.json]) await d.delete(job.url);
 });
