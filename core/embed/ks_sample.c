@@ -115,7 +115,7 @@ static orb_status ring_reserve(orb_context *ctx, ks_sampler *s, int32_t count) {
 int32_t ks_stride(const ks_sampler *s, int32_t ring_count) {
   int64_t most = KS_WORK / ((int64_t)s->padded_count * ring_count); /* triangles to be sampled */
   most = most < 8 ? 8 : most > KS_WHOLE_RING ? KS_WHOLE_RING : most;
-  return ring_count <= KS_WHOLE_RING ? 1 : (int32_t)((ring_count + most - 1) / most);
+  return (int32_t)((ring_count + most - 1) / most);
 }
 
 orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const double *P, int32_t v) {

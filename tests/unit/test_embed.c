@@ -13,6 +13,7 @@
 
 #include "orbmorph/embed.h"
 #include "support_exact.h"
+#include "support_failing.h"
 #include "support_shapes.h"
 
 static orb_context *open_context(int threads) {
@@ -247,45 +248,12 @@ static void test_cancel_everywhere(void **unused) {
   orb_context_destroy(plain);
 }
 
-typedef struct failing {
-  int left, failed;
-} failing;
-static void *alloc_or_fail(void *user, size_t size) {
-  failing *f = user;
-  if (f->left-- == 0) {
-    f->failed = 1;
-    return NULL;
-  }
-  return malloc(size);
-}
-static void free_it(void *user, void *block) {
-  (void)user;
-  free(block);
-}
-
 /* Fail the first, second, third … allocation: an error each time, no leak, no crash. */
 static void test_every_allocation(void **unused) {
   (void)unused;
   orb_context *plain = open_context(1);
   orb_mesh mesh = shape_globe(plain, 70, 6);
-  int failures = 0, done = 0;
-  for (int n = 1; !done; n++) {
-    failing f = {.left = n};
-    orb_context_options options = {.threads = 1, .allocator = {.alloc = alloc_or_fail, .free = free_it, .user = &f}};
-    orb_context *ctx;
-    assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
-    orb_embedding e;
-    orb_status status = orb_embed(ctx, &mesh, NULL, &e);
-    if (status == ORB_OK) {
-      done = !f.failed;
-      orb_embedding_free(ctx, &e);
-    } else {
-      assert_int_equal(status, ORB_E_NO_MEMORY);
-      failures++;
-    }
-    orb_context_destroy(ctx);
-  }
-  assert_true(failures > 30);
+  assert_true(failing_embeds(&mesh, NULL) > 30);
   shape_free(plain, &mesh);
   orb_context_destroy(plain);
 }

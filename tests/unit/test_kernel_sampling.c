@@ -13,6 +13,7 @@
 #include "embed/kernel_sampling.h"
 #include "embed/ks_search.h"
 #include "support_exact.h"
+#include "support_failing.h"
 #include "support_shapes.h"
 
 static orb_context *open_context(int threads) {
@@ -311,6 +312,76 @@ static void test_memory(void **unused) {
   }
 }
 
+/* Each allocation fails in turn: both phases of the simplification, rings that outgrow their room, sweeps. */
+static void test_every_allocation(void **unused) {
+  (void)unused;
+  orb_context *plain = open_context(1);
+  orb_mesh mesh = shape_globe(plain, 40, 3); /* ring sizes from 3 to 40 */
+  orb_embed_options options = sampling();
+  options.qem_until = 30;
+  options.step = 0.2;
+  options.max_iterations = 4;
+  int failures = failing_embeds(&mesh, &options);
+  print_message("%d allocations failed\n", failures);
+  assert_true(failures > 40);
+  shape_free(plain, &mesh);
+  orb_context_destroy(plain);
+}
+
+/* One search takes at most KS_WORK samples times planes for any step and ring, or 8 triangles' samples. */
+static void test_search_is_bounded(void **unused) {
+  (void)unused;
+  static const double steps[] = {0.01, 0.03, 0.11, 0.33};
+  orb_context *ctx = open_context(1);
+  for (int i = 0; i < 4; i++) {
+    orb_embed_options options = sampling();
+    options.step = steps[i];
+    ks_sampler s;
+    assert_int_equal(ks_sampler_create(ctx, &options, &s), ORB_OK);
+    for (int32_t ring = 3; ring < 1000000; ring += 1 + ring / 3) {
+      int64_t stride = ks_stride(&s, ring), sampled = (ring + stride - 1) / stride;
+      assert_true(sampled >= 1 && sampled <= KS_WHOLE_RING);
+      assert_true(sampled <= 8 || sampled * s.padded_count * ring <= KS_WORK);
+    }
+    ks_sampler_free(ctx, &s);
+  }
+  orb_context_destroy(ctx);
+}
+
+/* Poles: an embedding or a refusal that says what to do, in at most three attempts of bounded optimisation. */
+static void test_poles(void **unused) {
+  (void)unused;
+  static const int around[] = {200, 200, 2000, 2000}, rows[] = {2, 6, 2, 6};
+  orb_context *ctx = open_context(1);
+  orb_embed_options options = sampling();
+  for (int i = 0; i < 4; i++) {
+    orb_mesh mesh = shape_globe(ctx, around[i], rows[i]);
+    size_t n = (size_t)mesh.vertex_count;
+    double *points = test_malloc(3 * n * sizeof *points);
+    orb_ks_report report = {0};
+    orb_status status = orb_kernel_sampling(ctx, &mesh, &options, points, &report);
+    /* Intervals grow by 1.25 from 25: so many executions insert all. */
+    int executions = 1 + (int)(log(1 + (double)n / 25) / log(1.25)) + 3;
+    assert_in_range(report.attempts, 1, 3);
+    assert_true(report.executions <= report.attempts * executions);
+    assert_true(report.iterations <= options.max_iterations);
+    if (status == ORB_OK) {
+      orb_certificate certificate;
+      assert_int_equal(orb_certify(ctx, points, mesh.vertex_count, mesh.triangles, mesh.triangle_count, &certificate),
+                       ORB_OK);
+      assert_true(certificate.valid);
+    } else {
+      assert_int_equal(status, ORB_E_NOT_CERTIFIED);
+      assert_non_null(strstr(orb_context_error(ctx)->detail, "use the method newton"));
+    }
+    assert_true(i > 0 || status == ORB_OK); /* two poles of valence 200 with one ring between them */
+    print_message("valence %d, %zu vertices: %s\n", around[i], n, status == ORB_OK ? "valid" : "refused");
+    test_free(points);
+    shape_free(ctx, &mesh);
+  }
+  orb_context_destroy(ctx);
+}
+
 static void test_options(void **unused) {
   (void)unused;
   orb_context *ctx = open_context(1);
@@ -331,9 +402,18 @@ static void test_options(void **unused) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_valid),     cmocka_unit_test(test_degenerate), cmocka_unit_test(test_error),
-      cmocka_unit_test(test_mesh_undo), cmocka_unit_test(test_exponents),  cmocka_unit_test(test_same_bytes),
-      cmocka_unit_test(test_cancel),    cmocka_unit_test(test_memory),     cmocka_unit_test(test_options),
+      cmocka_unit_test(test_valid),
+      cmocka_unit_test(test_degenerate),
+      cmocka_unit_test(test_error),
+      cmocka_unit_test(test_mesh_undo),
+      cmocka_unit_test(test_exponents),
+      cmocka_unit_test(test_same_bytes),
+      cmocka_unit_test(test_cancel),
+      cmocka_unit_test(test_memory),
+      cmocka_unit_test(test_options),
+      cmocka_unit_test(test_every_allocation),
+      cmocka_unit_test(test_search_is_bounded),
+      cmocka_unit_test(test_poles),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

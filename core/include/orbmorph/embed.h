@@ -82,9 +82,13 @@ typedef struct orb_embedding {
 } orb_embedding;
 
 /* Embeds a mesh that orb_mesh_repair() accepted. The result is certified, or ORB_E_NOT_CERTIFIED is returned and no
- * embedding. Same bytes for any number of threads on one machine; between
- * instruction sets (AVX-512, AVX2, none: chosen at run time) the last bits may differ. Stages: "simplify", "embed",
- * "certify". Source: DESIGN in docs/method.md; O(n log n) time, at most 250 bytes a triangle beside the mesh. */
+ * embedding. newton takes any valence. kernel-sampling has no limit on it either, but around poles of some hundreds of
+ * triangles a kernel may get too narrow for doubles: after three bounded attempts it then refuses with
+ * ORB_E_NOT_CERTIFIED and names newton (two poles of valence 200 with one ring between them embed, with five rings
+ * between them, or of valence 2,000, they are refused, within seconds). Same bytes for any number of threads on one
+ * machine; between instruction sets (AVX-512, AVX2, none: chosen at run time) the last bits may differ. Stages:
+ * "simplify", "embed", "certify". Source: DESIGN in docs/method.md; O(n log n) time, at most 250 bytes a triangle
+ * beside the mesh. */
 ORB_MUST_CHECK orb_status orb_embed(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
                                     orb_embedding *out);
 void orb_embedding_free(orb_context *ctx, orb_embedding *embedding);
