@@ -83,7 +83,7 @@ test('SIGTERM ends it in time while a job runs, and the job is kept', async (t) 
 
 test('a second SIGTERM ends it at once while it drains, and the job is kept', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1', '--drain-seconds', '3600'] });
-  const { json: mesh } = await d.upload(shapes.binaryPly(wobble(1, 6)));
+  const { json: mesh } = await d.upload(shapes.binaryPly(wobble(1, slow ? 6 : 8)));
   const body = { mesh: mesh.id, method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } };
   const { json: job } = await d.post('/v1/embeddings', body);
   while ((await d.get(job.url)).json.state !== 'running') await sleep(20);

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import path from 'node:path';
 import test from 'node:test';
-import { daemon, samples, assertProblem } from './support/daemon.mjs';
+import { daemon, samples, slow, assertProblem } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 /** A mesh that takes a while to embed, different for every seed. */
@@ -97,13 +97,13 @@ test('jobs are listed by state', async (t) => {
   assertProblem(await d.get('/v1/jobs/nothing'), 404, 'not-found');
 });
 
-// Nothing converges as far as that: it runs until it is stopped.
-const endless = (mesh) => ({ mesh: mesh.id, method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } });
+// So many triangles and so fine a threshold keep a worker for long, until it is stopped.
+const long = (mesh) => ({ mesh: mesh.id, method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } });
 
 test('a preference that is not met in time brings the job', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
-  const mesh = await heavy(d);
-  const reply = await d.post('/v1/embeddings', endless(mesh), { headers: { prefer: 'wait=1' } });
+  const mesh = await heavy(d, 1, slow ? 6 : 7);
+  const reply = await d.post('/v1/embeddings', long(mesh), { headers: { prefer: 'wait=1' } });
   assert.equal(reply.status, 202);
   assert.equal(reply.headers.get('preference-applied'), 'wait=1');
   const polled = await d.get(reply.json.url, { headers: { prefer: 'wait=1' } });
@@ -120,28 +120,28 @@ test('a preference that is not met in time brings the job', async (t) => {
 
 test('a full queue refuses new jobs and nothing else', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1', '--queue-limit', '2'] });
-  const meshes = [await heavy(d, 1), await heavy(d, 2), await heavy(d, 3)];
+  const meshes = [await heavy(d, 1, slow ? 6 : 7), await heavy(d, 2, 3), await heavy(d, 3, 3)];
   const jobs = [];
   for (const mesh of meshes.slice(0, 2)) {
-    const reply = await d.post('/v1/embeddings', endless(mesh));
+    const reply = await d.post('/v1/embeddings', long(mesh));
     assert.equal(reply.status, 202, reply.bytes.toString());
     jobs.push(reply.json);
   }
   for (let i = 0; i < 3; i++) {
-    const refused = await d.post('/v1/embeddings', endless(meshes[2]));
+    const refused = await d.post('/v1/embeddings', long(meshes[2]));
     assertProblem(refused, 429, 'queue-full');
     assert.match(refused.headers.get('retry-after'), /^[1-9]\d*$/);
   }
-  const waiting = await d.post('/v1/embeddings', endless(meshes[2]), { headers: { prefer: 'wait=30' } });
+  const waiting = await d.post('/v1/embeddings', long(meshes[2]), { headers: { prefer: 'wait=30' } });
   assertProblem(waiting, 429, 'queue-full');
   assert.equal((await d.get('/v1/jobs')).json.jobs.length, 2, 'no trace of what was refused');
   // What is queued already is still answered, as are uploads and reads.
-  assert.equal((await d.post('/v1/embeddings', endless(meshes[1]))).json.id, jobs[1].id);
+  assert.equal((await d.post('/v1/embeddings', long(meshes[1]))).json.id, jobs[1].id);
   assert.equal((await d.upload(shapes.tetrahedron)).status, 201);
   assert.equal((await d.get(meshes[2].url)).status, 200);
   assert.equal((await d.delete(jobs[1].url)).status, 200);
   await d.ended(jobs[1]);
-  const third = await d.post('/v1/embeddings', endless(meshes[2]));
+  const third = await d.post('/v1/embeddings', long(meshes[2]));
   assert.equal(third.status, 202, third.bytes.toString());
   for (const job of [jobs[0], third.json]) await d.delete(job.url);
 });
