@@ -1,11 +1,13 @@
 // What an operator sees and changes while the daemon runs: counters, the log, SIGHUP.
 import assert from 'node:assert/strict';
-import { writeFile, mkdtemp, rm } from 'node:fs/promises';
+import { execFile } from 'node:child_process';
+import { readFile, writeFile, mkdtemp, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
-import { assertProblem, daemon } from './support/daemon.mjs';
+import { promisify } from 'node:util';
+import { assertProblem, binaries, daemon, root, slow } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const lines = (d) => d.log.split('\n').filter((l) => l.startsWith('{')).map((l) => JSON.parse(l));
@@ -72,6 +74,46 @@ test('SIGHUP reads the configuration again', async (t) => {
   await logged(d, (l) => l.level === 'debug');
 });
 
+test('SIGHUP reads limits and quotas that take effect', async (t) => {
+  const folder = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
+  t.after(() => rm(folder, { recursive: true, force: true }));
+  const file = path.join(folder, 'conf');
+  await writeFile(file, 'queue-limit = 1\n');
+  const d = await daemon(t, { args: ['--config', file, '--auth', 'on', '--workers', '1'] });
+  const run = promisify(execFile);
+  const { stdout } = await run(binaries.daemon, ['token', 'add', 'web', '--scope', 'admin', '--quota', '50M', '--data', d.data]);
+  const web = { headers: { authorization: `Bearer ${stdout.trim()}` } };
+  const hup = async () => {
+    d.log = '';
+    d.child.kill('SIGHUP');
+    await logged(d, (l) => l.message === 'SIGHUP: the configuration was read again');
+  };
+  const upload = (text) => d.post('/v1/meshes', text, web);
+  const wave = (levels, k) => shapes.binaryPly(shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y + k)), 1.5 * y, z]));
+  const large = (await upload(wave(slow ? 6 : 7, 1))).json, small = (await upload(wave(3, 2))).json;
+  const job = (mesh) => d.post('/v1/embeddings', { mesh: mesh.id, method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } }, web);
+  const first = await job(large);
+  assert.equal(first.status, 202);
+  assertProblem(await job(small), 429, 'queue-full');
+  await writeFile(file, 'queue-limit = 2\n');
+  await hup();
+  const second = await job(small);
+  assert.equal(second.status, 202, second.bytes.toString());
+  for (const { json } of [first, second]) await d.delete(json.url, web);
+
+  // The catalogue may be changed by other means than the command, as a restored copy would.
+  const set = (quota) => run('sqlite3', ['-cmd', '.timeout 10000', path.join(d.data, 'catalogue.sqlite'), `UPDATE token SET quota_bytes = ${quota} WHERE name = 'web'`]);
+  await set(1000);
+  assert.equal((await upload(shapes.tetrahedron)).status, 201, 'before it is told, the old quota holds');
+  await hup();
+  assertProblem(await upload(`${shapes.tetrahedron}# 2\n`), 429, 'quota-exceeded');
+  await set(100_000_000);
+  await hup();
+  const reply = await upload(`${shapes.tetrahedron}# 2\n`);
+  assert.equal(reply.status, 201, reply.bytes.toString());
+  assert.match(reply.headers.get('ratelimit-policy'), /"upload";q=100000000;/);
+});
+
 test('the counters tell of jobs, stages and the process', async (t) => {
   const d = await daemon(t);
   const { id } = (await d.upload(shapes.obj(shapes.egg(4)))).json;
@@ -87,6 +129,40 @@ test('the counters tell of jobs, stages and the process', async (t) => {
   const ready = (await d.get('/readyz', { query: { verbose: '' } })).json;
   assert.deepEqual([ready.queued, ready.waiting, ready.running, ready.queue_limit, ready.oldest_ms], [0, 0, 0, 10000, 0]);
   assert.deepEqual((await d.get('/readyz')).json, { status: 'ready' });
+});
+
+test('the dashboard shows every family of metrics, and none that is not there', async (t) => {
+  const d = await daemon(t);
+  const { id } = (await d.upload(shapes.obj(shapes.egg(2)))).json;
+  await d.made('/v1/embeddings', { mesh: id });
+  const text = (await d.get('/metrics')).bytes.toString();
+  const families = new Map([...text.matchAll(/^# TYPE (\S+) (\S+)$/gm)].map(([, name, type]) => [name, type]));
+  const series = new Set(), labels = new Map();
+  for (const [, name, list = ''] of text.matchAll(/^([a-z_]+)(?:\{(.*)\})? \S+$/gm)) {
+    series.add(name);
+    labels.set(name, new Set([...(labels.get(name) ?? []), ...[...list.matchAll(/(\w+)=/g)].map((m) => m[1])]));
+  }
+  const familyOf = (name) => (families.has(name) ? name : name.replace(/_(bucket|sum|count)$/, ''));
+  for (const name of series) assert.ok(families.has(familyOf(name)), `${name} has a type`);
+  const { panels } = JSON.parse(await readFile(path.join(root, 'deploy/grafana/orbmorph.json'), 'utf8'));
+  const shown = new Set();
+  for (const { title, targets } of panels)
+    for (const { expr, legendFormat } of targets) {
+      const names = [...expr.matchAll(/\b(?:orbmorph|process)_[a-z_]+/g)].map((m) => m[0]);
+      assert.ok(names.length > 0, `${title}: ${expr}`);
+      for (const name of names) {
+        const family = familyOf(name), type = families.get(family);
+        assert.ok(type && (series.has(name) || name === 'orbmorph_jobs_running'), `${title}: ${name} is exported`); // by stage: only while one runs
+        assert.equal(type === 'histogram', name !== family, `${title}: ${name}`);
+        if (type === 'gauge') assert.ok(!expr.includes('rate('), `${title}: no rate of a gauge`);
+        for (const [, label] of legendFormat.matchAll(/\{\{(\w+)\}\}/g)) assert.ok(labels.get(name)?.has(label) || name === 'orbmorph_jobs_running', `${title}: ${name} has ${label}`);
+        shown.add(family);
+      }
+    }
+  assert.deepEqual([...families.keys()].filter((name) => !shown.has(name)), [], 'families without a panel');
+  assert.equal(new Set(panels.map((p) => p.id)).size, panels.length);
+  const places = panels.map(({ gridPos }) => `${gridPos.x},${gridPos.y}`);
+  assert.equal(new Set(places).size, panels.length, 'none lies on another');
 });
 
 test('slow requests are in the log', async (t) => {
