@@ -214,7 +214,7 @@ static double on_segment(const double a[3], const double b[3], const double p[3]
 
 /* Nearest point of a triangle, after Ericson, Real-Time Collision Detection, 5.1.5; a triangle without area by its
  * edges. Returns the squared distance. */
-static double triangle_distance2(const double *c, const double p[3], double at[3]) {
+double orb_triangle_nearest(const double *c, const double p[3], double at[3]) {
   double ab[3], ac[3], ap[3], bp[3], cp[3];
   orb_sub(c + 3, c, ab);
   orb_sub(c + 6, c, ac);
@@ -254,10 +254,9 @@ static double triangle_distance2(const double *c, const double p[3], double at[3
   return best;
 }
 
-double orb_nearest_query(const orb_nearest *tree, const double p[3], double max_distance2, orb_place *out) {
-  *out = (orb_place){.triangle = -1};
-  double best = max_distance2;
-  int32_t found = -1;
+/* Goes on from what *out holds: a place at the squared distance best, or none and best as the bound. */
+static double search(const orb_nearest *tree, const double p[3], double best, orb_place *out) {
+  int32_t found = out->triangle;
   struct {
     int32_t node;
     double distance2;
@@ -286,7 +285,7 @@ double orb_nearest_query(const orb_nearest *tree, const double p[3], double max_
     }
     for (int32_t i = 0; worth && i < n->count; i++) {
       int32_t entry = -1 - n->right + i, t = tree->triangle[entry];
-      double place[3], d2 = triangle_distance2(tree->corners + 9 * (size_t)entry, p, place);
+      double place[3], d2 = orb_triangle_nearest(tree->corners + 9 * (size_t)entry, p, place);
       if (d2 < best || (d2 == best && found >= 0 && t < found)) {
         best = d2;
         found = t;
@@ -298,4 +297,15 @@ double orb_nearest_query(const orb_nearest *tree, const double p[3], double max_
   }
   out->triangle = found;
   return found >= 0 ? best : INFINITY;
+}
+
+double orb_nearest_query(const orb_nearest *tree, const double p[3], double max_distance2, orb_place *out) {
+  *out = (orb_place){.triangle = -1};
+  return search(tree, p, max_distance2, out);
+}
+
+double orb_nearest_query_from(const orb_nearest *tree, const double p[3], const orb_place *known,
+                              double known_distance2, orb_place *out) {
+  *out = *known;
+  return search(tree, p, known->triangle >= 0 ? known_distance2 : INFINITY, out);
 }

@@ -5,6 +5,12 @@
  * rule of seven points that is exact for cubics (1/20 a corner, 2/15 a midpoint, 9/20 the centre), each surface
  * weighing the same. Supermesh vertices lie on the input by construction and are not looked up. Normals are those of
  * the flat triangles, compared at the face centres and their nearest points.
+ *
+ * Most samples are settled without a search. A supermesh triangle whose corners have their places in one triangle of
+ * the input lies on it, and so do its samples, by the mean of the corners' coordinates; the other way, a sample of an
+ * input triangle is looked for on the supermesh triangles that lie in it. What is found no farther than SETTLED, which
+ * is rounding, counts as it is. Only what remains asks the tree of the other surface, starting from the nearest place
+ * known; the tree is made when the first sample needs it, so never for an exact overlay.
  */
 #include <math.h>
 #include <string.h>
@@ -12,9 +18,12 @@
 #include "base/check.h"
 #include "numeric/vec3.h"
 #include "orbmorph/transfer.h"
+#include "transfer/inside.h"
 
 enum { GRAIN = 256, BINS = 18000 };
 static const double DEGREE = 180 / 3.14159265358979323846;
+static const double SETTLED = 1e-13; /* of the diagonal */
+static const double EXACT = 1e-6;    /* of the square of that: no use in looking for a nearer one */
 
 typedef struct surface {
   const double *positions;
@@ -26,16 +35,26 @@ typedef struct surface {
   int32_t *first;    /* a vertex: its lowest half-edge, whose triangle samples it */
   orb_nearest *tree;
   double total;
+  const orb_place *places;  /* of the supermesh's vertices on the input; NULL: this is the input */
+  const orb_inside *inside; /* which triangles of the one lie in which of the other */
 } surface;
 
 typedef struct chunk_sum {
   double worst2, sum2; /* greatest squared distance; ∫ d² */
+  int unsettled;       /* a sample needs the tree, and there is none yet */
 } chunk_sum;
+
+/* A point of triangle `triangle` with its coordinates there. */
+typedef struct sample {
+  double p[3], at[3];
+  int32_t triangle;
+} sample;
 
 typedef struct sample_job {
   orb_context *ctx;
   const surface *from, *to;
   int vertices;    /* sample those, too */
+  double settled2; /* a squared distance that is rounding */
   chunk_sum *sums; /* a chunk */
   float *angle;    /* a triangle of `from`: degrees between the normals; −1: none */
 } sample_job;
@@ -69,7 +88,6 @@ static orb_status surface_prepare(orb_context *ctx, surface *s) {
     return ORB_E_NO_MEMORY;
   }
   ORB_TRY(orb_mesh_twins(ctx, s->triangles, s->triangle_count, s->vertex_count, s->twin));
-  ORB_TRY(orb_nearest_create(ctx, s->positions, s->triangles, s->triangle_count, &s->tree));
   for (int64_t t = 0; t < s->triangle_count; t++) {
     double normal[3];
     s->area[t] = triangle_normal(s, t, normal);
@@ -84,38 +102,99 @@ static orb_status surface_prepare(orb_context *ctx, surface *s) {
   return orb_context_check(ctx);
 }
 
-static orb_place add_sample(const sample_job *job, const double p[3], double weight, chunk_sum *sum) {
-  orb_place place;
-  double distance2 = orb_nearest_query(job->to->tree, p, INFINITY, &place);
+static double distance2_to(const surface *to, int32_t t, const double p[3], double at[3]) {
+  double corners[9];
+  for (int k = 0; k < 3; k++) {
+    memcpy(corners + 3 * k, corner_of(to, 3 * (int64_t)t + k), 3 * sizeof(double));
+  }
+  return orb_triangle_nearest(corners, p, at);
+}
+
+/* The distance to where the places of its triangle's corners put the sample. */
+static double known_on_input(const sample_job *job, const sample *s, orb_place *known) {
+  const surface *from = job->from, *to = job->to;
+  int32_t own = from->inside->of[s->triangle];
+  if (own < 0) {
+    return INFINITY;
+  }
+  double d[3] = {s->p[0], s->p[1], s->p[2]};
+  for (int i = 0; i < 3; i++) {
+    double at[3];
+    const orb_place *place = &from->places[from->triangles[3 * (int64_t)s->triangle + i]];
+    ORB_ASSERT(orb_place_in(to->triangles, place, own, at));
+    for (int k = 0; s->at[i] != 0 && k < 3; k++) {
+      const double *corner = corner_of(to, 3 * (int64_t)own + k);
+      for (int c = 0; c < 3; c++) {
+        d[c] -= s->at[i] * at[k] * corner[c];
+      }
+    }
+  }
+  known->triangle = own;
+  return orb_dot(d, d);
+}
+
+/* The nearest of the supermesh's triangles that lie in the sample's own. */
+static double known_on_made(const sample_job *job, const sample *s, orb_place *known) {
+  const orb_inside *inside = job->from->inside;
+  double best = INFINITY;
+  for (int32_t i = inside->first[s->triangle]; i < inside->first[s->triangle + 1] && best > EXACT * job->settled2;
+       i++) {
+    double at[3], distance2 = distance2_to(job->to, inside->held[i], s->p, at);
+    if (distance2 < best) {
+      best = distance2;
+      known->triangle = inside->held[i];
+      memcpy(known->at, at, sizeof at);
+    }
+  }
+  return best;
+}
+
+/* Adds a sample; *near: the place that the last one found, then that of this one. */
+static void add_sample(const sample_job *job, const sample *s, double weight, orb_place *near, chunk_sum *sum) {
+  orb_place known = {.triangle = -1};
+  double distance2 = job->from->places ? known_on_input(job, s, &known) : known_on_made(job, s, &known);
+  if (!(distance2 <= job->settled2)) {
+    if (!job->to->tree) {
+      sum->unsettled = 1;
+      return;
+    }
+    known.triangle = known.triangle >= 0 ? known.triangle : near->triangle;
+    if (known.triangle >= 0) {
+      distance2 = distance2_to(job->to, known.triangle, s->p, known.at);
+    }
+    distance2 = orb_nearest_query_from(job->to->tree, s->p, &known, distance2, &known);
+  }
+  *near = known;
   sum->worst2 = distance2 > sum->worst2 ? distance2 : sum->worst2;
   sum->sum2 += weight * distance2;
-  return place;
 }
 
 /* The centre of triangle t, the midpoints of its edges and the corners that are its to sample. */
-static void sample_triangle(sample_job *job, int64_t t, chunk_sum *sum) {
+static void sample_triangle(sample_job *job, int32_t t, orb_place *near, chunk_sum *sum) {
   const surface *from = job->from;
-  double centre[3] = {0};
-  for (int64_t h = 3 * t; h < 3 * t + 3; h++) {
-    const double *a = corner_of(from, h), *b = corner_of(from, orb_next((int32_t)h));
-    double middle[3];
+  sample centre = {.at = {1.0 / 3, 1.0 / 3, 1.0 / 3}, .triangle = t};
+  for (int32_t k = 0, h = 3 * t; k < 3; k++, h++) {
+    const double *a = corner_of(from, h), *b = corner_of(from, orb_next(h));
+    sample middle = {.triangle = t}, corner = {.p = {a[0], a[1], a[2]}, .triangle = t};
+    middle.at[k] = middle.at[(k + 1) % 3] = 0.5;
+    corner.at[k] = 1;
     for (int c = 0; c < 3; c++) {
-      centre[c] += a[c] / 3;
-      middle[c] = 0.5 * (a[c] + b[c]);
+      centre.p[c] += a[c] / 3;
+      middle.p[c] = 0.5 * (a[c] + b[c]);
     }
     int32_t vertex = from->triangles[h], twin = from->twin[h];
     if (h < twin) {
-      add_sample(job, middle, 2.0 / 15 * (from->area[t] + from->area[twin / 3]), sum);
+      add_sample(job, &middle, 2.0 / 15 * (from->area[t] + from->area[twin / 3]), near, sum);
     }
     if (job->vertices && from->first[vertex] == h) {
-      add_sample(job, a, 1.0 / 20 * from->ring_area[vertex], sum);
+      add_sample(job, &corner, 1.0 / 20 * from->ring_area[vertex], near, sum);
     }
   }
-  orb_place place = add_sample(job, centre, 9.0 / 20 * from->area[t], sum);
+  add_sample(job, &centre, 9.0 / 20 * from->area[t], near, sum);
   double here[3], there[3], cross[3];
   job->angle[t] = -1;
-  if (place.triangle >= 0 && triangle_normal(from, t, here) > 0 &&
-      triangle_normal(job->to, place.triangle, there) > 0) {
+  if (near->triangle >= 0 && triangle_normal(from, t, here) > 0 &&
+      triangle_normal(job->to, near->triangle, there) > 0) {
     orb_cross(here, there, cross);
     job->angle[t] = (float)(atan2(orb_length(cross), orb_dot(here, there)) * DEGREE);
   }
@@ -126,8 +205,9 @@ static void sample_body(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   chunk_sum sum = {0};
   if (orb_context_check(job->ctx) == ORB_OK) {
-    for (int64_t t = begin; t < end; t++) {
-      sample_triangle(job, t, &sum);
+    orb_place near = {.triangle = -1};
+    for (int64_t t = begin; t < end && !sum.unsettled; t++) {
+      sample_triangle(job, (int32_t)t, &near, &sum);
     }
   }
   job->sums[begin / GRAIN] = sum;
@@ -140,14 +220,34 @@ typedef struct totals {
   double *bins; /* BINS of a hundredth of a degree */
 } totals;
 
-static orb_status one_way(orb_context *ctx, const surface *from, const surface *to, int vertices, totals *all) {
+/* All samples; where some need the tree, it is made and all are taken again. */
+static orb_status take_samples(sample_job *job, surface *to, int64_t chunks) {
+  orb_context *ctx = job->ctx;
+  int32_t count = job->from->triangle_count;
+  orb_parallel_for(ctx, count, GRAIN, sample_body, job);
+  int unsettled = 0;
+  for (int64_t i = 0; i < chunks; i++) {
+    unsettled |= job->sums[i].unsettled;
+  }
+  if (unsettled && orb_context_check(ctx) == ORB_OK) {
+    ORB_TRY(orb_nearest_create(ctx, to->positions, to->triangles, to->triangle_count, &to->tree));
+    orb_parallel_for(ctx, count, GRAIN, sample_body, job);
+  }
+  return orb_context_check(ctx);
+}
+
+static orb_status one_way(orb_context *ctx, const surface *from, surface *to, double diagonal, totals *all) {
   int64_t chunks = ((int64_t)from->triangle_count + GRAIN - 1) / GRAIN;
-  sample_job job = {
-      ctx, from, to, vertices, ORB_NEW(ctx, chunk_sum, chunks), ORB_NEW(ctx, float, from->triangle_count)};
+  sample_job job = {ctx,
+                    from,
+                    to,
+                    !from->places,
+                    SETTLED * SETTLED * diagonal * diagonal,
+                    ORB_NEW(ctx, chunk_sum, chunks),
+                    ORB_NEW(ctx, float, from->triangle_count)};
   orb_status status = job.sums && job.angle ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
-    orb_parallel_for(ctx, from->triangle_count, GRAIN, sample_body, &job);
-    status = orb_context_check(ctx);
+    status = take_samples(&job, to, chunks);
   }
   if (status == ORB_OK && from->total > 0) {
     double sum2 = 0;
@@ -212,7 +312,9 @@ orb_status orb_shape_measure(orb_context *ctx, const orb_aligned_shape *shape, c
   surface made = {.positions = positions,
                   .triangles = supermesh->triangles,
                   .triangle_count = supermesh->triangle_count,
-                  .vertex_count = supermesh->vertex_count};
+                  .vertex_count = supermesh->vertex_count,
+                  .places = places};
+  orb_inside inside = {0};
   orb_status status = positions && all.bins ? ORB_OK : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
     goto done;
@@ -220,10 +322,15 @@ orb_status orb_shape_measure(orb_context *ctx, const orb_aligned_shape *shape, c
   ORB_GO(status, orb_transfer_positions(ctx, shape, places, supermesh->vertex_count, positions), done);
   ORB_GO(status, surface_prepare(ctx, &input), done);
   ORB_GO(status, surface_prepare(ctx, &made), done);
-  ORB_GO(status, one_way(ctx, &made, &input, 0, &all), done);
-  ORB_GO(status, one_way(ctx, &input, &made, 1, &all), done);
+  ORB_GO(status,
+         orb_inside_make(ctx, mesh, input.twin, supermesh->triangles, supermesh->triangle_count, places, &inside),
+         done);
+  made.inside = input.inside = &inside;
+  ORB_GO(status, one_way(ctx, &made, &input, extent.diagonal, &all), done);
+  ORB_GO(status, one_way(ctx, &input, &made, extent.diagonal, &all), done);
   fill_report(&made, &all, out);
 done:
+  orb_inside_free(ctx, &inside);
   surface_free(ctx, &input);
   surface_free(ctx, &made);
   orb_free(ctx, positions);
