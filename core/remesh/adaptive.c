@@ -10,7 +10,7 @@
 #include "base/check.h"
 #include "remesh/match.h"
 
-enum { MENDS = 4 };
+enum { MENDS = 4, HOLDS = 32 };
 
 /* Later rounds gain a few per cent each. Large meshes do without: their triangles are small against the tolerance, and
  * time counts. */
@@ -37,6 +37,15 @@ static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, i
   return ORB_OK;
 }
 
+/* Refines until nothing strays: splits of edges may leave items of the triangles beside them too far away. */
+static orb_status hold(orb_context *ctx, orb_match *match, double limit2) {
+  int64_t strays = 1;
+  for (int i = 0; i < HOLDS && strays > 0; i++) {
+    ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
+  }
+  return ORB_OK;
+}
+
 /* Edges that found no room to be split among needles find it once the needles are gone, and what mends a turned
  * triangle may stray: refine, mend and reduce in turn until the bound holds for every shape. */
 static orb_status settle_within(orb_context *ctx, orb_match *match, double tolerance) {
@@ -48,20 +57,23 @@ static orb_status settle_within(orb_context *ctx, orb_match *match, double toler
       ORB_TRY(orb_match_turn_all(ctx, match, limit2, 1));
     } else {
       ORB_TRY(orb_match_mend(ctx, match, limit2, &turned));
-      if (strays == 0 && turned == 0) {
-        return ORB_OK;
+      if (strays == 0 && turned == 0) { /* the splits that mended may stray themselves */
+        ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
+        if (strays == 0) {
+          return ORB_OK;
+        }
       }
     }
     ORB_TRY(reduce(ctx, match, tolerance, 0, 1));
     orb_progress(ctx, "remesh", 0.5 + 0.1 * i);
   }
-  return orb_match_refine(ctx, match, limit2, NULL);
+  return hold(ctx, match, limit2);
 }
 
 orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
   orb_match match;
   ORB_TRY(orb_match_create(ctx, job, &match));
-  double tolerance = job->options->tolerance;
+  double tolerance = job->options->tolerance * (1 - 1e-9) - 1e-12; /* so that rounding of the bound finds room */
   int64_t most = job->options->max_triangles;
   orb_status status;
   orb_progress(ctx, "remesh", 0.15);

@@ -118,6 +118,17 @@ static orb_status push(orb_context *ctx, edge_queue *queue, int32_t v, int32_t w
   return ORB_OK;
 }
 
+/* All edges at v. */
+static orb_status push_star(orb_context *ctx, const orb_match *match, int32_t v, edge_queue *queue) {
+  const orb_net *net = &match->net;
+  int32_t first = net->out[v], h = first;
+  do {
+    ORB_TRY(push(ctx, queue, v, net->triangles[orb_next(h)]));
+    h = net->twin[orb_prev(h)];
+  } while (h != first);
+  return ORB_OK;
+}
+
 static int32_t find_edge(const orb_net *net, int32_t v, int32_t w) {
   int32_t first = net->out[v], h = first;
   do {
@@ -127,6 +138,20 @@ static int32_t find_edge(const orb_net *net, int32_t v, int32_t w) {
     h = net->twin[orb_prev(h)];
   } while (h != first);
   return -1;
+}
+
+/* Turns the edge whatever it does to the form, if all stays positive on the sphere. */
+static int force_turn(orb_match *match, int32_t h) {
+  const orb_net *net = &match->net;
+  int32_t g = net->twin[h], a = net->triangles[h], b = net->triangles[g];
+  int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
+  const double *p = orb_net_point(net, a), *q = orb_net_point(net, b);
+  const double *r = orb_net_point(net, c), *s = orb_net_point(net, d);
+  if (c == d || orb_net_adjacent(net, c, d) || orb_orient(r, s, q) <= 0 || orb_orient(s, r, p) <= 0) {
+    return 0;
+  }
+  turn(match, h);
+  return 1;
 }
 
 /* Turns the straying edge if the other diagonal is within the limit and no triangle turns over. */
@@ -198,6 +223,24 @@ static int32_t split_at(orb_match *match, int32_t h, const orb_stray *worst) {
   return n >= 0 ? n : split_near(match, h, p);
 }
 
+/* An edge between needles so thin that no rounded point lies within it: the crossing becomes a vertex wherever it lies,
+ * and the edge is turned, which makes the needles' other edges its successors. */
+static orb_status give_room(orb_context *ctx, orb_match *match, int32_t h, const orb_stray *worst, edge_queue *queue) {
+  const orb_net *net = &match->net;
+  int32_t v = net->triangles[h], w = net->triangles[net->twin[h]], before = net->vertex_count;
+  double p[3];
+  crossing_point(match, v, w, worst, p);
+  int32_t n = orb_match_insert(match, h / 3, p);
+  if (n >= before) {
+    ORB_TRY(push_star(ctx, match, n, queue));
+  }
+  h = find_edge(net, v, w);
+  if (h < 0 || !force_turn(match, h)) {
+    return ORB_OK;
+  }
+  return push(ctx, queue, net->triangles[h], net->triangles[net->twin[h]]);
+}
+
 static orb_status mend_edge(orb_context *ctx, orb_match *match, int32_t v, int32_t w, double limit2,
                             edge_queue *queue) {
   int32_t h = find_edge(&match->net, v, w);
@@ -208,13 +251,9 @@ static orb_status mend_edge(orb_context *ctx, orb_match *match, int32_t v, int32
   ORB_TRY(orb_match_reserve(ctx, match, 1));
   int32_t n = split_at(match, h, &worst);
   if (n < 0) {
-    return ORB_OK;
+    return give_room(ctx, match, h, &worst, queue);
   }
-  int32_t first = match->net.out[n], e = first;
-  do {
-    ORB_TRY(push(ctx, queue, n, match->net.triangles[orb_next(e)]));
-    e = match->net.twin[orb_prev(e)];
-  } while (e != first);
+  ORB_TRY(push_star(ctx, match, n, queue));
   return push(ctx, queue, v, w); /* still there if another edge was split */
 }
 
@@ -257,11 +296,7 @@ static orb_status take_items_in(orb_context *ctx, orb_match *match, double limit
       continue;
     }
     ORB_TRY(orb_match_reserve(ctx, match, 1));
-    int32_t v = orb_match_insert(match, t, orb_match_item_point(match, item)), first = match->net.out[v], h = first;
-    do {
-      ORB_TRY(push(ctx, queue, v, match->net.triangles[orb_next(h)]));
-      h = match->net.twin[orb_prev(h)];
-    } while (h != first);
+    ORB_TRY(push_star(ctx, match, orb_match_insert(match, t, orb_match_item_point(match, item)), queue));
     t -= farthest_item(match, t, limit2) >= 0; /* others may still stray from what is left of it */
   }
   return ORB_OK;
