@@ -28,6 +28,7 @@ static const entry table[] = {
     {"data", TEXT(data), "orbmorph-data", "the folder of everything that is kept"},
     {"config", TEXT(file), "", "a file of lines NAME = VALUE with these same names"},
     {"workers", NUMBER(workers, 1, 256), "0", "jobs that run side by side; 0: one a core"},
+    {"worker-nice", NUMBER(worker_nice, 0, 19), "5", "by how much jobs give way to requests and to other programs"},
     {"io-threads", NUMBER(io_threads, 1, 64), "6", "threads for queries and commits"},
     {"http-threads", NUMBER(http_threads, 2, 64), "2", "threads that serve connections"},
     {"max-connections", NUMBER(max_connections, 16, 1000000), "16384", "connections at once"},

@@ -246,6 +246,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
                           .limit = (int)o->queue_limit,
                           .memory = 2 * o->job_memory};
   worker_options limits = {.workers = (int)o->workers,
+                           .nice = (int)o->worker_nice,
                            .job_memory = o->job_memory,
                            .job_ms = 1000 * o->job_seconds,
                            .max_triangles = o->max_triangles};

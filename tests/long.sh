@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
-#   tests/long.sh [PART…]    parts: tsan valgrind fuzz crash adversarial arm robust; all of them without arguments
+#   tests/long.sh [PART…]    all of them without arguments:
+#   tsan valgrind fuzz crash faults soak load adversarial arm robust
 #
 # ORB_MINUTES (5) is the time for each fuzz target, ORB_KILLS (1000) the number of kills.
 set -euo pipefail
@@ -44,7 +45,7 @@ part_crash() {
     node --test --test-reporter=spec tests/scenario/crash.test.mjs
 }
 
-# Each call of the daemon that may fail is made to fail, once and for ever.
+# Each call of the daemon that may fail is made to fail, once and for ever: ORB_FAULT_RUNS=few leaves out allocations.
 part_faults() {
   cmake --preset release -DORB_TESTS=ON >/dev/null
   cmake --build build --target orbmorphd orbmorph_interpose

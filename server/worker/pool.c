@@ -13,8 +13,6 @@
 #include "metrics.h"
 #include "worker/run.h"
 
-enum { WORKER_NICE = 15 };
-
 typedef struct worker {
   worker_pool *pool;
   pthread_t thread;
@@ -219,7 +217,7 @@ static void *worker_main(void *argument) {
   job *j;
   int threads;
   /* Requests come first; the threads that a job starts inherit this. Where it is not allowed, they compete. */
-  (void)setpriority(PRIO_PROCESS, (id_t)gettid(), WORKER_NICE);
+  (void)setpriority(PRIO_PROCESS, (id_t)gettid(), self->pool->options.nice);
   while (queue_take(self->pool->env.q, self->small_only, &j, &threads)) {
     run_one(self->pool, j, threads);
   }

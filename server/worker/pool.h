@@ -11,6 +11,7 @@
 
 typedef struct worker_options {
   int workers;
+  int nice;                                  /* of the workers and of the threads that their jobs start; 0 to 19 */
   int64_t job_memory, job_ms, max_triangles; /* limits of one job */
 } worker_options;
 

@@ -1,12 +1,13 @@
 /* Makes calls of a program fail from outside: a library for LD_PRELOAD that stands before malloc, write, fsync, rename,
  * the steps of SQLite and the starts of threads, whoever calls them: the program, SQLite, the HTTP library, libc.
  *
- * A call is known by its site: the kind and the chain of the innermost callers, which is the same in every run, other
- * than its number among the calls of several threads. The environment says what to do:
- *   ORB_FAIL_RECORD=FILE     writes a line "KIND SITE" when a site is first passed, and "tinygltf" where that library
- * is among the callers ORB_FAIL=KIND:SITE       the first call at that site fails; KIND:SITE+ that and all later calls
- * of the kind ORB_FAIL=KIND:#N         the N-th call of the kind fails; KIND:#N+ that and all later ones
+ * The calls of a kind are counted from the start of the program. The environment says what to do:
+ *   ORB_FAIL=KIND:#N         the N-th call of the kind fails; KIND:#N+ that and all later ones
  *   ORB_FAIL_MARK=FILE       is made when something failed, so that a test knows that its plan was met
+ *   ORB_FAIL_RECORD=FILE     writes a line "KIND SITE N" when a site, the chain of the innermost callers, is first
+ *                            passed, by call N; and at the end "total KIND N" for each kind
+ * Calls below tinygltf never fail, they are only counted: "KIND SITE N tinygltf". A plan that falls on one
+ * takes the next.
  * Kinds: alloc (NULL, ENOMEM), write (ENOSPC, to files only), fsync (EIO), rename (EIO), open (EMFILE), thread
  * (EAGAIN), sqlite (SQLITE_IOERR from sqlite3_step or sqlite3_exec).
  */
@@ -29,14 +30,14 @@
 enum kind { ALLOC, WRITE, FSYNC, RENAME, OPEN, THREAD, SQLITE, KINDS };
 static const char *const names[KINDS] = {"alloc", "write", "fsync", "rename", "open", "thread", "sqlite"};
 
-enum { DEPTH = 7, SITES = 1 << 16 };
+enum { DEPTH = 7, DEEP = 48, SITES = 1 << 16 };
 
 static atomic_int state; /* 0: not begun, 1: beginning, 2: ready */
-static int record = -1, fails = -1, for_ever, by_number;
-static uint64_t wanted;
+static int record = -1, fails = -1, for_ever;
+static unsigned long wanted;
 static const char *mark;
 static atomic_uint_fast64_t sites[SITES];
-static atomic_ulong passes;
+static atomic_ulong passes[KINDS];
 static atomic_int failing;
 static __thread int inside __attribute__((tls_model("initial-exec")));
 
@@ -62,10 +63,9 @@ __attribute__((constructor)) static void begin(void) {
   }
   for (int kind = 0; plan && kind < KINDS; kind++) {
     size_t n = strlen(names[kind]);
-    if (strncmp(plan, names[kind], n) == 0 && plan[n] == ':') {
-      by_number = plan[n + 1] == '#';
+    if (strncmp(plan, names[kind], n) == 0 && strncmp(plan + n, ":#", 2) == 0) {
       char *end;
-      wanted = strtoull(plan + n + 1 + by_number, &end, by_number ? 10 : 16);
+      wanted = strtoul(plan + n + 2, &end, 10);
       for_ever = *end == '+';
       fails = kind;
     }
@@ -75,20 +75,29 @@ __attribute__((constructor)) static void begin(void) {
   atomic_store(&state, 2);
 }
 
-/* The chain of callers, with addresses as offsets in their modules. */
-static uint64_t site_of(enum kind kind, int *tinygltf) {
+/* The chain of callers, with addresses as offsets in their modules. Not inlined, nor any of its callers into theirs: it
+ * counts the frames. */
+__attribute__((noinline)) static uint64_t site_of(enum kind kind) {
   void *frames[DEPTH + 3];
   int count = backtrace(frames, DEPTH + 3);
   uint64_t hash = 14695981039346656037u + (uint64_t)kind;
   for (int i = 3; i < count; i++) {
     Dl_info info;
-    int known = dladdr(frames[i], &info);
-    uint64_t at = known ? (uint64_t)((char *)frames[i] - (char *)info.dli_fbase) : 0;
-    *tinygltf |= known && strstr(info.dli_fname, "tinygltf") != NULL;
+    uint64_t at = dladdr(frames[i], &info) ? (uint64_t)((char *)frames[i] - (char *)info.dli_fbase) : 0;
     hash = (hash ^ at) * 1099511628211u;
     hash ^= hash >> 29;
   }
   return hash ? hash : 1;
+}
+
+static int below_tinygltf(void) {
+  void *frames[DEEP];
+  Dl_info info;
+  int count = backtrace(frames, DEEP), found = 0;
+  for (int i = 0; i < count && !found; i++) {
+    found = dladdr(frames[i], &info) && strstr(info.dli_fname, "tinygltf") != NULL;
+  }
+  return found;
 }
 
 static int is_new(uint64_t site) {
@@ -108,28 +117,32 @@ static void note(int fd, const char *text, size_t size) {
   (void)done;
 }
 
-/* Not inlined, nor any of its callers into theirs: site_of() counts the frames. */
 __attribute__((noinline)) static int look(enum kind kind) {
-  char line[64];
-  int tinygltf = 0;
-  uint64_t site = by_number && record < 0 ? 0 : site_of(kind, &tinygltf);
+  char line[80];
+  unsigned long number = atomic_fetch_add(&passes[kind], 1) + 1;
+  uint64_t site = record >= 0 ? site_of(kind) : 0;
   if (record >= 0 && is_new(site)) {
     note(record, line,
-         (size_t)snprintf(line, sizeof line, "%s %016llx%s\n", names[kind], (unsigned long long)site,
-                          tinygltf ? " tinygltf" : ""));
+         (size_t)snprintf(line, sizeof line, "%s %016llx %lu%s\n", names[kind], (unsigned long long)site, number,
+                          below_tinygltf() ? " tinygltf" : ""));
   }
-  if (fails != (int)kind) {
+  if (fails != (int)kind || number < wanted || (!for_ever && atomic_load(&failing)) || below_tinygltf()) {
     return 0;
   }
-  int hit = by_number ? atomic_fetch_add(&passes, 1) + 1 == wanted : site == wanted;
-  if (hit && (for_ever || atomic_load(&failing) == 0)) {
-    if (atomic_exchange(&failing, 1) == 0 && mark) {
-      int fd = raw_open(mark, O_WRONLY | O_CREAT | O_CLOEXEC);
-      syscall(SYS_close, fd);
-    }
-    return 1;
+  if (atomic_exchange(&failing, 1)) {
+    return for_ever;
   }
-  return for_ever && atomic_load(&failing);
+  if (mark) {
+    syscall(SYS_close, raw_open(mark, O_WRONLY | O_CREAT | O_CLOEXEC));
+  }
+  return 1;
+}
+
+__attribute__((destructor)) static void end(void) {
+  char line[80];
+  for (int kind = 0; record >= 0 && kind < KINDS; kind++) {
+    note(record, line, (size_t)snprintf(line, sizeof line, "total %s %lu\n", names[kind], atomic_load(&passes[kind])));
+  }
 }
 
 __attribute__((noinline)) static int fail(enum kind kind) {

@@ -1,8 +1,10 @@
-// Every allocation, write, fsync, rename, open, SQLite step and thread start of the daemon is made to fail in turn, once
-// and from then on for ever, while it answers a fixed sequence of requests. Each time: an answer, an error answer, or a
-// clean stop; never a crash, never a hang; and afterwards nothing that was accepted is lost.
+// The N-th allocation, write, fsync, rename, open, SQLite step or thread start of the daemon is made to fail, once or
+// from then on for ever, while it answers a fixed sequence of requests with one worker. Each time: an answer, an error
+// answer, or a clean stop; never a crash, never a hang; and afterwards nothing that was accepted is lost.
 //
-// ORB_FAULT_RUNS (24) of them are chosen, "all" takes each site both ways. tests/faults/interpose.c says what a site is.
+// ORB_FAULT_RUNS (24) is the number of lives. "all" takes each N of the kinds that are called a few times, and the N of
+// the first call at each site that allocates or asks SQLite, both ways. "few" leaves out the allocations. ORB_FAULT_KINDS
+// (all of them) chooses kinds, comma-separated; ORB_FAULT_SEED (1) the sample. tests/faults/interpose.c makes them fail.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { existsSync, readFileSync } from 'node:fs';
@@ -18,15 +20,16 @@ const library = process.env.ORB_INTERPOSE;
 const wanted = process.env.ORB_FAULT_RUNS ?? '24';
 const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? 2);
 const patience = 40_000;
+const kinds = (process.env.ORB_FAULT_KINDS ?? 'thread,rename,fsync,write,open,sqlite,alloc').split(',');
+const seed = Number(process.env.ORB_FAULT_SEED ?? 1);
+const arguments_ = ['--workers', '1', '--io-threads', '1', '--drain-seconds', '2'];
 const run = promisify(execFile);
-
-let made = 0, left_out = 0;
-const newMesh = () => shapes.obj(shapes.ball(1, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(++made)), y, z + 1e-3 * made]));
 
 /** A caller that notes what was promised. In `calm` every answer must be the good one. */
 class Caller {
   meshes = [];
   jobs = [];
+  made = 0;
   constructor(d) {
     this.d = d;
   }
@@ -50,8 +53,13 @@ class Caller {
     return reply;
   }
 
+  newMesh() {
+    const k = ++this.made;
+    return shapes.obj(shapes.ball(1, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(k)), y, z + 1e-3 * k]));
+  }
+
   async upload(calm) {
-    const reply = await this.ask(calm, 'POST', '/v1/meshes', { body: Buffer.from(newMesh()), query: { name: 'm' } });
+    const reply = await this.ask(calm, 'POST', '/v1/meshes', { body: Buffer.from(this.newMesh()), query: { name: 'm' } });
     if (reply) this.meshes.push(reply.json.url);
     return reply?.json;
   }
@@ -117,7 +125,7 @@ async function stops(d, how) {
 async function life(plan) {
   const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-fault-'));
   const mark = path.join(data, 'mark');
-  const d = new Daemon(data, ['--workers', '2', '--drain-seconds', '2'], { LD_PRELOAD: library, ORB_FAIL: plan, ORB_FAIL_MARK: mark });
+  const d = new Daemon(data, arguments_, { LD_PRELOAD: library, ORB_FAIL: plan, ORB_FAIL_MARK: mark });
   const caller = new Caller(d);
   const once = !plan.endsWith('+');
   try {
@@ -155,55 +163,65 @@ async function life(plan) {
   }
 }
 
+const many = ['alloc', 'sqlite'];
+/** How often each kind is called, and by which call each site is first passed. */
 async function record() {
   const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-fault-'));
   const file = path.join(data, 'record');
-  const d = new Daemon(data, ['--workers', '2'], { LD_PRELOAD: library, ORB_FAIL_RECORD: file });
+  const d = new Daemon(data, arguments_, { LD_PRELOAD: library, ORB_FAIL_RECORD: file });
   await d.start();
   await new Caller(d).sequence(true);
   await d.stop();
-  // tinygltf asserts and terminates when its JSON finds no memory; what it takes is held in the job's budget, which
-  // refuses the job first, and its own allocations are left out here.
-  const lines = readFileSync(file, 'utf8').trim().split('\n');
-  const sites = lines.filter((line) => !line.endsWith('tinygltf')).map((line) => line.replace(' ', ':'));
-  left_out = lines.length - sites.length;
+  const lines = readFileSync(file, 'utf8').trim().split('\n').map((line) => line.split(' '));
   await rm(data, { recursive: true, force: true });
-  return sites.sort();
+  const totals = Object.fromEntries(lines.filter(([kind]) => kind === 'total').map(([, kind, n]) => [kind, Number(n)]));
+  const firsts = Object.fromEntries(kinds.map((kind) => [kind, []]));
+  for (const [kind, , n, below] of lines) if (!below) firsts[kind]?.push(Number(n));
+  return { totals, firsts };
 }
 
-/** All, or so many that each kind has its share, with both ways in turn. */
-function choose(sites) {
-  const both = sites.flatMap((site) => [site, `${site}+`]);
-  if (wanted === 'all') return both;
-  const kinds = new Map();
-  for (const site of sites) kinds.set(site.split(':')[0], [...(kinds.get(site.split(':')[0]) ?? []), site]);
-  const plans = [], most = Number(wanted);
-  for (let i = 0; plans.length < most && i < sites.length; i++)
-    for (const list of kinds.values())
-      if (i < list.length && plans.length < most) plans.push(list[(i * 7919 + 13) % list.length] + (i % 2 ? '+' : ''));
-  return [...new Set(plans)];
+/** The numbers of the calls of each kind that are tried. tinygltf asserts and terminates when its JSON finds no memory; what
+ * it takes is held in the job's budget, which refuses the job first, and its own allocations do not fail here. */
+function numbers({ totals, firsts }) {
+  const of = (kind) => (many.includes(kind) ? firsts[kind].sort((a, b) => a - b) : Array.from({ length: totals[kind] }, (_, i) => i + 1));
+  return new Map(kinds.filter((kind) => totals[kind] > 0 && !(wanted === 'few' && kind === 'alloc')).map((kind) => [kind, of(kind)]));
+}
+
+/** All, or as many of each kind, by a stride with a seeded start, both ways in turn. */
+function choose(lists) {
+  const plan = (kind, n, way) => `${kind}:#${n}${way ? '+' : ''}`;
+  if (!(Number(wanted) > 0)) return [...lists].flatMap(([kind, list]) => list.flatMap((n) => [plan(kind, n, 0), plan(kind, n, 1)]));
+  const plans = new Set();
+  for (let left = [...lists]; left.length; left.shift()) {
+    const [kind, list] = left[0];
+    const share = Math.min(Math.ceil((Number(wanted) - plans.size) / left.length), list.length);
+    const start = (seed * 0.6180339887498949) % 1;
+    for (let i = 0; i < share; i++) plans.add(plan(kind, list[Math.floor(((i + start) * list.length) / share)], (i + seed) % 2));
+  }
+  return [...plans];
 }
 
 const skip = !library ? 'ORB_INTERPOSE names no library' : slow ? 'not with sanitizers, which have an allocator of their own' : false;
 test('calls that fail are answered, not died of', { skip }, async (t) => {
-  const sites = await record();
-  const plans = choose(sites);
-  const total = plans.length, failed = [];
-  let met = 0;
+  const lists = numbers(await record());
+  const plans = choose(lists);
+  const total = plans.length, failed = [], missed = [];
   async function worker() {
     for (let plan; (plan = plans.shift()); ) {
       try {
-        met += await life(plan);
+        if (!(await life(plan))) missed.push(plan);
       } catch (error) {
         failed.push(error.message);
         console.error(error.message);
       }
-      if (wanted === 'all' && plans.length % 50 === 0) console.error(`${plans.length} to go, ${failed.length} failed`);
+      if (!(Number(wanted) > 0) && plans.length % 50 === 0) console.error(`${plans.length} to go, ${failed.length} failed`);
     }
   }
   await Promise.all(Array.from({ length: side_by_side }, worker));
-  t.diagnostic(`${sites.length} sites, and ${left_out} within tinygltf that are left out; ${total} lives, the fault was met in ${met}, ${failed.length} failed`);
+  const met = total - missed.length;
+  t.diagnostic(`calls: ${[...lists].map(([kind, list]) => `${list.length} ${kind}`).join(', ')}; ${total} lives, the fault was met in ${met}, ${failed.length} failed`);
+  if (missed.length) t.diagnostic(`not met: ${missed.join(' ')}`);
   assert.deepEqual(failed.map((message) => message.split('\n')[0]), []);
-  // Not each is met again: what allocates first, and through whom, differs from run to run with the threads.
-  assert.ok(met >= Math.max(1, 0.15 * total), `only ${met} of ${total} faults were met`);
+  // The last calls of a run may not come again: how often a thread waits or a page is written differs a little.
+  assert.ok(total > 0 && met >= 0.8 * total, `only ${met} of ${total} faults were met`);
 });

@@ -1,7 +1,7 @@
 // What an operator sees and changes while the daemon runs: counters, the log, SIGHUP.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
-import { readFile, writeFile, mkdtemp, rm } from 'node:fs/promises';
+import { readFile, readdir, writeFile, mkdtemp, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
@@ -112,6 +112,34 @@ test('SIGHUP reads limits and quotas that take effect', async (t) => {
   const reply = await upload(`${shapes.tetrahedron}# 2\n`);
   assert.equal(reply.status, 201, reply.bytes.toString());
   assert.match(reply.headers.get('ratelimit-policy'), /"upload";q=100000000;/);
+});
+
+test('workers, and the threads of their jobs, give way by worker-nice', async (t) => {
+  const levels = async (d) => {
+    const found = {};
+    for (const thread of await readdir(`/proc/${d.child.pid}/task`)) {
+      const text = await readFile(`/proc/${d.child.pid}/task/${thread}/stat`, 'latin1').catch(() => null);
+      const level = text?.slice(text.lastIndexOf(')') + 2).split(' ')[16]; // field 19; the name may hold spaces
+      if (level !== undefined) found[level] = (found[level] ?? 0) + 1;
+    }
+    return found;
+  };
+  const own = Number((await readFile('/proc/self/stat', 'latin1')).split(') ')[1].split(' ')[16]);
+  for (const [more, level] of [[{}, 5], [{ args: ['--worker-nice', '12'] }, 12], [{ env: { ORBMORPH_WORKER_NICE: '9' } }, 9]]) {
+    if (level <= own) continue; // these tests themselves run at a level that cannot be left
+    const d = await daemon(t, { ...more, args: ['--workers', '2', ...(more.args ?? [])] });
+    const { json } = await d.upload(shapes.obj(shapes.ball(5, ([x, y, z]) => [x, 1.2 * y, z])));
+    const job = (await d.post('/v1/embeddings', { mesh: json.id })).json;
+    let most = 0;
+    for (let state = 'queued'; !['succeeded', 'failed'].includes(state); ) {
+      const found = await levels(d);
+      assert.deepEqual(Object.keys(found).sort(), [String(own), String(level)].sort(), 'every thread is at one of the two levels');
+      most = Math.max(most, found[level]);
+      ({ state } = (await d.get(job.url)).json);
+    }
+    assert.ok(most >= 2, `${most} threads at ${level}`);
+  }
+  await assert.rejects(promisify(execFile)(binaries.daemon, ['--check-config', '--worker-nice', '20']), { stderr: /from 0 to 19/ });
 });
 
 test('the counters tell of jobs, stages and the process', async (t) => {
