@@ -171,3 +171,27 @@ test('lists come in pages; what is deleted is gone', async (t) => {
   assertProblem(await d.get(`/v1/meshes/${ids[2]}`), 404, 'not-found');
   assert.equal((await d.upload(shapes.tetrahedron.replace('v 1 0 0', 'v 3 0 0'))).status, 201, 'it can come back');
 });
+
+test('uploads of many megabytes are checked beside the small ones', async (t) => {
+  // One worker: one thread checks what has more than 16 MB, another the rest.
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const shape = shapes.ball(8, ([x, y, z]) => [x, 1.5 * y, z * (1 + 0.2 * x)]), text = shapes.obj(shape);
+  assert.ok(text.length > 20 << 20, `${text.length} bytes`);
+  let ended = 0;
+  const large = [0, 1].map((i) => d.upload(`# ${i}\n${text}`).finally(() => ended++));
+  // Once the first large one is in, it is being checked and the other waits; each small one is answered all the same.
+  const received = async () => Number(/^orbmorph_received_bytes_total (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
+  while (ended === 0 && (await received()) < text.length) await new Promise((done) => setTimeout(done, 20));
+  let between = 0;
+  for (let i = 0; ended < 2; i++) {
+    const reply = await d.upload(`${shapes.tetrahedron}# ${i}\n`);
+    assert.equal(reply.status, 201, reply.bytes.toString());
+    between += ended < 2;
+  }
+  assert.ok(between > 0, 'small ones passed');
+  for (const [i, reply] of (await Promise.all(large)).entries()) {
+    assert.equal(reply.status, 201, reply.bytes.toString());
+    assert.equal(reply.json.triangles, shape.triangles.length);
+    assert.equal((await d.get(`${reply.json.url}/file`)).bytes.length, text.length + `# ${i}\n`.length);
+  }
+});
