@@ -1,6 +1,8 @@
 // Derived objects beyond derived-bytes leave while the daemon runs, by their last use; uploads stay.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
+import { readdir, writeFile } from 'node:fs/promises';
+import path from 'node:path';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
@@ -75,4 +77,56 @@ test('what is removed while it is needed is made again', async (t) => {
   const { stdout } = await promisify(execFile)(binaries.daemon, ['--check-data', '--data', d.data]);
   assert.match(stdout, /: 0 wrong/, stdout);
   await d.start();
+});
+
+test('--gc removes derived objects beyond the budget and what no row names, and nothing else', async (t) => {
+  // Each use is noted where there is a budget, far off as it may be.
+  const d = await daemon(t, { args: ['--derived-bytes', '1G'] });
+  const gc = (...args) => promisify(execFile)(binaries.daemon, ['--gc', '--data', d.data, ...args]);
+  const check = async () => (await promisify(execFile)(binaries.daemon, ['--check-data', '--data', d.data])).stdout;
+  await assert.rejects(gc(), { code: 1 }, 'not while the daemon has the folder');
+  const meshes = [], made = [];
+  for (let i = 0; i < 18; i++) {
+    const mesh = (await d.upload(shapes.obj(shapes.ball(4, ([x, y, z]) => [x, y, z * (1 + i / 50)])))).json;
+    meshes.push(mesh.url);
+    made.push((await d.made('/v1/embeddings', { mesh: mesh.id })).url);
+  }
+  const pair = [];
+  for (const shape of [shapes.egg(2), shapes.bean(2)]) {
+    const mesh = (await d.upload(shapes.obj(shape))).json;
+    meshes.push(mesh.url);
+    pair.push({ mesh: mesh.id });
+  }
+  const merged = (await d.made('/v1/supermeshes', { shapes: pair, align: { method: 'rotate' }, remesh: { method: 'overlay' } })).url;
+  await d.stop();
+
+  // Without a budget all that has a row stays.
+  await gc();
+  assert.match(await check(), / 0 wrong, 0 objects without a row/);
+  await d.start();
+  assert.deepEqual(new Set(await statuses(d, [...meshes, ...made, merged])), new Set([200]));
+  await sleep(2100); // instants of use are stored in whole seconds
+  for (const url of [`${made[0]}/sphere.ply`, made[1], merged]) assert.equal((await d.get(url)).status, 200);
+  await d.stop();
+
+  // An object that a crash left between publishing and commit: of a kind of its own, beside one that is there.
+  const files = (await readdir(path.join(d.data, 'objects'), { recursive: true, withFileTypes: true })).filter((f) => f.isFile());
+  const example = files.find((f) => /[0-9a-f]{60,}/.test(f.name));
+  assert.ok(example, files.map((f) => f.name).join());
+  const twin = path.join(example.path, example.name.replace(/[0-9a-f]{8}(?=[^0-9a-f]|$)/, (c) => (c === '00000000' ? '11111111' : '00000000')));
+  await writeFile(twin, 'left behind');
+  assert.match(await check(), / 0 wrong, 1 objects without a row/);
+  const { stdout } = await gc('--derived-bytes', '1M');
+  assert.match(stdout, /^removed an object of 11 bytes without a row/m);
+  assert.match(await check(), / 0 wrong, 0 objects without a row/);
+
+  await d.start();
+  assert.deepEqual(new Set(await statuses(d, meshes)), new Set([200]), 'uploads stay');
+  const left = await statuses(d, made), kept = left.filter((status) => status === 200).length;
+  assert.ok(kept >= 2 && kept < 16, `${kept} of 18 are left`);
+  assert.deepEqual([left[0], left[1], (await statuses(d, [merged]))[0]], [200, 200, 200], 'what was used last stays');
+  assert.deepEqual(new Set(left.slice(2, 4)), new Set([404]), 'what was not used for longest is gone');
+  const bytes = Number(/^orbmorph_stored_bytes (\S+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
+  const uploads = (await Promise.all(meshes.map(async (url) => (await d.get(`${url}/file`)).bytes.length))).reduce((a, b) => a + b);
+  assert.ok(bytes - uploads <= 1 << 20, `${bytes - uploads} bytes are derived`);
 });
