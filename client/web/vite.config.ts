@@ -8,7 +8,7 @@ const isMesh = (name: string) => /\.(obj|off|ply|stl|glb)$/i.test(name);
 
 /**
  * The repository's sample meshes become assets of the studio; `virtual:samples` lists them as {name, file, bytes, url}.
- * A file samples.json beside them may give `pair`: the two that "Try with samples" opens.
+ * "Try with samples" opens the first two.
  */
 function samples(): Plugin {
   const folder = here('../../tests/samples');
@@ -33,9 +33,24 @@ function samples(): Plugin {
   };
 }
 
+/** licenses.txt: the licences of what is bundled, which is what package.json calls `dependencies`. They ask for it. */
+function licenses(): Plugin {
+  const read = (path: string) => readFileSync(here(path), 'utf8').trim();
+  return {
+    name: 'orbmorph-licenses',
+    apply: 'build',
+    generateBundle() {
+      const { dependencies } = JSON.parse(read('package.json')) as { dependencies: Record<string, string> };
+      const parts = Object.entries(dependencies).map(([name, version]) => `${name} ${version}\n\n${read(`node_modules/${name}/LICENSE`)}\n`);
+      const source = [`orbmorph\n\n${read('../../LICENSE')}\n`, ...parts].join(`\n${'-'.repeat(80)}\n\n`);
+      this.emitFile({ type: 'asset', fileName: 'licenses.txt', source });
+    },
+  };
+}
+
 export default defineConfig({
   base: './',
-  plugins: [samples()],
+  plugins: [samples(), licenses()],
   resolve: { alias: { orbmorph: here('../js/src/index.js') } },
   esbuild: { jsx: 'automatic', jsxImportSource: 'preact' },
   worker: { format: 'es' },

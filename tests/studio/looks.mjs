@@ -1,5 +1,6 @@
 // The scenes of the studio whose looks are kept: how to come there, and comparing by pictures.
-//   node tests/studio/looks.mjs [SCENE…]     takes the reference pictures anew (tests/studio/looks/SCENE.png)
+//   node tests/studio/looks.mjs [SCENE…]               takes the reference pictures anew (tests/studio/looks/SCENE.png)
+//   ORB_PICTURE=FILE.png node tests/studio/looks.mjs SCENE   one picture as it is, for the documents
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -105,8 +106,8 @@ export const SCENES = {
 /** What differs from run to run: times, and how long things took. */
 const STEADY = '[data-varies] { visibility: hidden !important; } * { caret-color: transparent !important; }';
 
-/** A picture of a scene, half size, as PNG. */
-export async function look(browser, url, name) {
+/** A picture of a scene as PNG: half size, or as it is. */
+export async function look(browser, url, name, whole = false) {
   const [come, options] = SCENES[name];
   const { page, done } = await openPage(browser, url, { colorScheme: 'light', ...options });
   await page.evaluate(() => document.fonts.ready);
@@ -120,7 +121,8 @@ export async function look(browser, url, name) {
   await page.evaluate(() => document.activeElement?.blur());
   await until(() => page.locator('.toast').count().then((n) => n === 0), 'no message covers the view');
   await settled(page);
-  const png = await halved(page, await page.screenshot({ animations: 'disabled' }));
+  const full = await page.screenshot({ animations: 'disabled' });
+  const png = whole ? full : await halved(page, full);
   await done();
   return png;
 }
@@ -195,7 +197,9 @@ if (process.argv[1] === fileURLToPath(import.meta.url)) {
   const daemon = await startDaemon();
   const browser = await startBrowser();
   try {
-    for (const name of process.argv.length > 2 ? process.argv.slice(2) : Object.keys(SCENES)) {
+    const picture = process.env.ORB_PICTURE;
+    if (picture) writeFileSync(picture, await look(browser, daemon.url, process.argv[2], true));
+    else for (const name of process.argv.length > 2 ? process.argv.slice(2) : Object.keys(SCENES)) {
       const png = await look(browser, daemon.url, name);
       writeFileSync(join(folder, `${name}.png`), png);
       console.log(`${name}.png ${png.length} bytes`);

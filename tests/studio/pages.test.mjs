@@ -52,6 +52,14 @@ test('the files have types, validators and a policy without unsafe-inline', asyn
   assert.equal((await fetch(`${daemon.url}/no/such/page`)).status, 404);
 });
 
+test('the licences of what is bundled come with it', async () => {
+  const file = await fetch(`${daemon.url}/licenses.txt`);
+  assert.equal(file.status, 200);
+  assert.match(file.headers.get('content-type'), /^text\/plain/);
+  const text = await file.text();
+  for (const words of ['The orbmorph authors', 'three.js authors', 'Jason Miller', 'Inter Project Authors', 'SIL OPEN FONT LICENSE']) assert.ok(text.includes(words), words);
+});
+
 for (const colorScheme of ['light', 'dark'])
   test(`axe finds nothing serious, ${colorScheme}`, async () => {
     const { page, done } = await openPage(browser, daemon.url, { colorScheme });
@@ -134,5 +142,10 @@ test('a small screen holds everything without scrolling sideways', async () => {
     assert.ok(await fits(), tab);
     assert.ok(await button(page, /^Morph/).last().isVisible(), tab);
   }
+  await page.setViewportSize({ width: 740, height: 360 });
+  await button(page, 'Shapes', { exact: true }).click();
+  assert.ok(await fits(), 'on its side');
+  const settings = await page.locator('.inspector .scroll').boundingBox();
+  assert.ok(settings.height > 120 && settings.y + settings.height <= 360, `settings can be read on its side: ${JSON.stringify(settings)}`);
   await done();
 });

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Makes the pictures of the documents anew, from the samples, with the programs of build/bin:
 #   docs/morph.png                     the animation of the README
+#   docs/studio.png                    the studio, in Chromium
 #   docs/tutorial.png, tutorial-sheet  the tutorial's page in Chromium and its sheet (they need tests/node_modules)
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
@@ -22,4 +23,5 @@ samples=tests/samples
 "$bin/orbmorph" morph "$samples/dog.obj" "$samples/giraffe.off" "$samples/elephant.ply" \
   --landmarks "$samples/dog-giraffe-elephant.json" -o "$work/morph.glb"
 "$bin/orbmorph" view "$work/morph.glb" --frames 60 --size 360 --yaw 35 -o docs/morph.png
+ORB_PICTURE=docs/studio.png node tests/studio/looks.mjs landmarks
 ORB_PICTURES=1 node --test tests/conformance/tutorial.test.mjs

@@ -217,7 +217,7 @@ function Help() {
       <table class="report keys">
         <tbody>{KEYS.map(([key, what]) => <tr key={key}><th scope="row"><kbd>{key}</kbd></th><td>{what}</td></tr>)}</tbody>
       </table>
-      <p><a href="/openapi.json">The HTTP interface (OpenAPI)</a></p>
+      <p><a href="/docs">The HTTP interface</a> · <a href="/licenses.txt">Licences</a></p>
     </>
   );
 }

@@ -181,9 +181,9 @@ export function OptionsFold() {
   return (
     <details class="fold">
       <summary>Options</summary>
-      <Field label="Matching" hint="How the shapes are brought into correspondence.">
+      <Field label="Matching" hint="How the shapes are brought into correspondence. Automatic: pinned where there are landmarks, else found.">
         <select value={options.align} onChange={(event) => change({ align: event.currentTarget.value as Options['align'] })}>
-          <option value="default">Automatic (pinned where there are landmarks)</option>
+          <option value="default">Automatic</option>
           <option value="pin">Pinned landmarks</option>
           <option value="auto">Found from the shapes</option>
           <option value="rbf">Radial functions</option>
@@ -192,7 +192,7 @@ export function OptionsFold() {
       </Field>
       <Field label="Common mesh">
         <select value={options.remesh} onChange={(event) => change({ remesh: event.currentTarget.value as Options['remesh'] })}>
-          <option value="adaptive">Adaptive: as few triangles as the tolerance allows</option>
+          <option value="adaptive">Adaptive: as few triangles as will do</option>
           <option value="overlay">Overlay: exact, many triangles</option>
           <option value="subdivision">Subdivision</option>
           <option value="convex-hull">Convex hull</option>
