@@ -10,26 +10,28 @@
 #include "base/check.h"
 #include "remesh/match.h"
 
-enum { MENDS = 4, HOLDS = 32 };
+enum { MENDS = 4, HOLDS = 32, ROUNDS = 10 };
 
-/* Later rounds gain a few per cent each. Large meshes do without: their triangles are small against the tolerance, and
- * time counts. */
-static int rounds_for(int64_t triangles) {
-  return triangles < 25000 ? 10 : triangles < 60000 ? 4 : 2;
+/* Later rounds gain a few per cent each. Large meshes, or many shapes, do without: their triangles are small against
+ * the tolerance, and time counts. */
+static int rounds_for(int64_t triangles, int32_t shapes) {
+  int64_t work = triangles * shapes / 2;
+  return work < 25000 ? 10 : work < 60000 ? 4 : 2;
 }
 
-static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, int64_t target, int strict) {
+static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, int64_t target, int strict,
+                         int most_rounds) {
   double limit2 = tolerance * tolerance;
   int64_t before = orb_match_live(match);
-  int rounds = rounds_for(before);
-  for (int round = 0; round < rounds; round++) {
+  int rounds = rounds_for(before, match->shape_count);
+  for (int round = 0; round < rounds && round < most_rounds; round++) {
     if (round > 0) {
       ORB_TRY(orb_match_move_all(ctx, match, limit2, 0));
     }
     ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, round > 0));
     ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
     int64_t after = orb_match_live(match);
-    if (after <= target || (round > 0 && (before - after) * 250 < before)) {
+    if (after <= target || (round > 0 && (before - after) * 100 < before)) {
       break;
     }
     before = after;
@@ -64,7 +66,7 @@ static orb_status settle_within(orb_context *ctx, orb_match *match, double toler
         }
       }
     }
-    ORB_TRY(reduce(ctx, match, tolerance, 0, 1));
+    ORB_TRY(reduce(ctx, match, tolerance, 0, 1, i < 2 ? ROUNDS : 1));
     orb_progress(ctx, "remesh", 0.5 + 0.1 * i);
   }
   return hold(ctx, match, limit2);
@@ -81,7 +83,7 @@ orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_
   ORB_GO(status, settle_within(ctx, &match, tolerance), end);
   while (most > 0 && orb_match_live(&match) > most && tolerance < 4) {
     tolerance *= 1.25;
-    ORB_GO(status, reduce(ctx, &match, tolerance, most, tolerance < 0.05), end);
+    ORB_GO(status, reduce(ctx, &match, tolerance, most, tolerance < 0.05, ROUNDS), end);
   }
   if (most > 0 && orb_match_live(&match) > most) {
     status = orb_fail(ctx, ORB_E_BAD_OPTION, "The shapes and landmarks need more than max_triangles = %lld; raise it.",

@@ -25,6 +25,7 @@ typedef struct orb_match {
   double *normal;                /* net vertex major: 3 for each shape, its smooth normals there, unit */
   orb_spot *spot;                /* net vertex major: one for each shape */
   unsigned char *fixed;          /* a net vertex: a landmark, not to be removed */
+  uint64_t *stayed;              /* a net vertex: mark of the star in which no move was found, 0: none */
   /* Items: the vertices of all shapes, shape after shape. Each is in the list of a net vertex or of a triangle. */
   int32_t *item_begin; /* shape_count + 1 */
   int32_t *item_next;

@@ -13,6 +13,8 @@
 
 enum { RING_MAX = 16, SHAPES_KEPT = 16, COLOURS = 64 };
 
+static const double LEAST_GAIN = 0.01; /* of the cost: many moves that gain less do not make room for collapses */
+
 typedef struct star {
   orb_match *match;
   int32_t v, ring[RING_MAX], slot[RING_MAX];
@@ -114,7 +116,7 @@ static void stand_copy(orb_match *match, int32_t v, stand *s, int back) {
   }
 }
 
-/* Moves v to p if that costs less than *cost, and sets that; whether it did. The items stay in their lists. */
+/* Moves v to p if that costs clearly less than *cost, and sets that; whether it did. The items stay in their lists. */
 static int try_point(const star *s, const double p[3], orb_form before, double *cost) {
   stand old;
   orb_form after;
@@ -126,7 +128,7 @@ static int try_point(const star *s, const double p[3], orb_form before, double *
   double now = form_cost(s, &after);
   if (now < *cost && orb_form_allows(before, after)) {
     now += edges_cost(s, *cost - now);
-    if (now < *cost * (1 - 1e-3) && items_allow(s)) {
+    if (now < *cost * (1 - LEAST_GAIN) && items_allow(s)) {
       *cost = now;
       return 1;
     }
@@ -168,10 +170,40 @@ static void deal_anew(const star *s) {
   }
 }
 
+static uint64_t mixed(uint64_t mark, const void *part, size_t size) {
+  uint64_t word;
+  for (const unsigned char *p = part, *end = p + size; p < end; p += sizeof word) {
+    memcpy(&word, p, sizeof word);
+    mark = (mark ^ word) * UINT64_C(0x9E3779B97F4A7C15);
+    mark ^= mark >> 29;
+  }
+  return mark;
+}
+
+/* A mark of all that a search for a move depends on: where the vertex and its neighbours are, and the limit. The same
+ * search again finds the same: nothing, where it found nothing before. */
+static uint64_t mark_of(const star *s) {
+  const orb_net *net = &s->match->net;
+  uint64_t mark = mixed(1, &s->limit2, sizeof s->limit2);
+  mark = mixed(mark, orb_net_point(net, s->v), 3 * sizeof(double));
+  int first = 0; /* the ring may be listed from any neighbour on */
+  for (int i = 1; i < s->n; i++) {
+    first = s->ring[i] < s->ring[first] ? i : first;
+  }
+  for (int i = 0; i < s->n; i++) {
+    mark = mixed(mark, orb_net_point(net, s->ring[(first + i) % s->n]), 3 * sizeof(double));
+  }
+  return mark ? mark : 1;
+}
+
 int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
   static const double way[] = {0.5, 0.25, 0.1};
   star s;
   if (match->shape_count > SHAPES_KEPT || match->fixed[v] || !star_of(match, v, limit2, &s)) {
+    return 0;
+  }
+  uint64_t mark = mark_of(&s);
+  if (match->stayed[v] == mark) {
     return 0;
   }
   double from[3], middle[3] = {0, 0, 0};
@@ -196,6 +228,7 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
       moved |= try_point(&s, p, before, &cost);
     }
   }
+  match->stayed[v] = moved ? 0 : mark;
   if (moved) {
     deal_anew(&s);
   }
