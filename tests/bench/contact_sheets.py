@@ -3,7 +3,8 @@
 
     tests/bench/contact_sheets.py [--bin build/bin] [--meshes ../shared/meshes] [--out docs/pairs] [PAIR...]
 
-Merges by the defaults, with the pair's landmarks. One JSON line a pair on standard output, that of orbmorph-bench.
+Merges by the defaults, with the pair's landmarks; a pair that is refused or given up is passed over, and the exit
+status is 1 then. One JSON line a pair on standard output, that of orbmorph-bench.
 Standard library only.
 """
 import argparse
@@ -19,6 +20,7 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, default="build/bin")
     parser.add_argument("--meshes", type=pathlib.Path, default="../shared/meshes")
     parser.add_argument("--out", type=pathlib.Path, default="docs/pairs")
+    parser.add_argument("--limit", type=float, default=60, help="seconds after which a merge is given up")
     parser.add_argument("pairs", nargs="*", help="such as cow-spot; all where none is named")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -31,15 +33,19 @@ def main():
             base = pair.get("index_base", 0)
             marks.write_text(json.dumps([{"name": f"l{i}", "at": [{"vertex": v - base} for v in at]}
                                          for i, at in enumerate(pair["landmarks"])]))
-            merged = subprocess.run([options.bin / "orbmorph-bench", "merge", "--landmarks", marks, "--out", glb,
-                                     *(options.meshes / "good" / mesh for mesh in pair["meshes"])],
-                                    stdout=subprocess.PIPE, text=True)
-            if merged.returncode:
+            command = [options.bin / "orbmorph-bench", "merge", "--landmarks", marks, "--out", glb,
+                       *(options.meshes / "good" / mesh for mesh in pair["meshes"])]
+            try:
+                merged = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=options.limit)
+            except subprocess.TimeoutExpired:
+                merged = None
+                print(f"{file.stem}: given up after {options.limit:.0f} s", file=sys.stderr)
+            if not merged or merged.returncode:
                 refused += 1
                 continue
             print(merged.stdout.strip(), flush=True)
-            subprocess.run([options.bin / "orbmorph", "view", glb, "-o", options.out / f"{file.stem}.png"], check=True,
-                           stdout=sys.stderr)
+            subprocess.run([options.bin / "orbmorph", "view", glb, "--size", "240", "-o",
+                            options.out / f"{file.stem}.png"], check=True, stdout=sys.stderr)
     sys.exit(1 if refused else 0)
 
 

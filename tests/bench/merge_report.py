@@ -5,7 +5,8 @@
 
 Repeats Table 2 and Fig. 19 of Peng & Timalsena 2016 on real pairs of like sizes, with its remeshing and its convex hull
 beside ours, and measures speed and growth on generated bodies. Best of the repeats is taken. With --keep alignments are
-kept there from run to run. Standard library only.
+kept there from run to run. The page is written after every part, so that a run that is cut short leaves what it has.
+--only growth measures that alone, and puts it in its place on the page that there is. Standard library only.
 """
 import argparse
 import json
@@ -32,11 +33,17 @@ class Bench:
     def __init__(self, options, folder):
         self.bin, self.meshes = pathlib.Path(options.bin), pathlib.Path(options.meshes)
         self.keep = pathlib.Path(options.keep) if options.keep else folder
-        self.folder, self.notes = folder, []
+        self.folder, self.limit, self.notes = folder, options.limit, []
 
     def remesh(self, *arguments, repeat=1):
-        run = subprocess.run([str(self.bin / "orbmorph-bench"), "remesh", "--threads", "2", "--repeat", str(repeat),
-                              *map(str, arguments)], capture_output=True, text=True)
+        command = [str(self.bin / "orbmorph-bench"), "remesh", "--threads", "2", "--repeat", str(repeat),
+                   *map(str, arguments)]
+        try:
+            run = subprocess.run(command, capture_output=True, text=True, timeout=self.limit)
+        except subprocess.TimeoutExpired:
+            self.notes.append(f"given up after {self.limit:.0f} s: " +
+                              " ".join(pathlib.Path(word).name for word in command[6:]))
+            return None
         if run.returncode:
             self.notes.append(run.stderr.strip())
             return None
@@ -61,7 +68,7 @@ class Bench:
     def poses(self, glb):
         """The picture of both shapes, side by side."""
         target = glb.with_suffix(".png")
-        subprocess.run([str(self.bin / "orbmorph"), "view", str(glb), "--poses", "2", "--size", "360", "-o",
+        subprocess.run([str(self.bin / "orbmorph"), "view", str(glb), "--poses", "2", "--size", "240", "-o",
                         str(target)], check=True, capture_output=True)
         return png.read(target)
 
@@ -81,6 +88,8 @@ def table2(bench, names):
         by_method, marks, align = {}, 0, None
         for method in METHODS:
             result, marks, align = bench.pair(name, method)
+            if not result and align is None:
+                break  # no alignment: the other methods would only wait for it again
             if not result:
                 continue
             by_method[method] = result
@@ -113,11 +122,17 @@ def scale(t):
 
 def figure19(bench, name, out):
     """Rows: the input, then for each method its picture and its difference from the input's, 0 to 64 of 255."""
-    width, height, channels, wanted = bench_picture(bench, name, "overlay")
+    picture = bench_picture(bench, name, "overlay")
+    if not picture:
+        return []
+    width, height, channels, wanted = picture
     shown, rows = [], [rgb(line, channels) for line in wanted]
     background = rows[0][:3]
     for method in ("adaptive", "subdivision", "convex-hull"):
-        _, _, _, got = bench_picture(bench, name, method)
+        picture = bench_picture(bench, name, method)
+        if not picture:
+            continue
+        got = picture[3]
         total, high, covered = 0, 0, 0
         for mine, theirs in zip((rgb(line, channels) for line in got), (rgb(line, channels) for line in wanted)):
             row = bytearray()
@@ -141,8 +156,8 @@ def rgb(line, channels):
 
 def bench_picture(bench, name, method):
     glb = bench.folder / f"{name}-{method}.glb"
-    bench.pair(name, method, glb)
-    return bench.poses(glb)
+    result, _, _ = bench.pair(name, method, glb)
+    return bench.poses(glb) if result else None
 
 
 def growth(bench, sizes):
@@ -165,19 +180,49 @@ def main():
     parser.add_argument("--meshes", default="../shared/meshes")
     parser.add_argument("--out", default="docs")
     parser.add_argument("--keep")
+    parser.add_argument("--limit", type=float, default=60, help="seconds after which a run is given up, and noted")
+    parser.add_argument("--only", choices=["growth"])
     parser.add_argument("--quick", action="store_true", help="two pairs and small bodies only")
     options = parser.parse_args()
     out = pathlib.Path(options.out)
     (out / "bench").mkdir(parents=True, exist_ok=True)
+    sizes = [8000, 32000] if options.quick else [8000, 32000, 125000, 500000]
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(options, pathlib.Path(folder))
-        quick = options.quick
-        rows, details = table2(bench, PAIRS[:2] if quick else PAIRS)
-        pictures = {name: figure19(bench, name, out) for name in (FIG19[1:] if quick else FIG19)}
-        speed = {m: bench.remesh("--bodies", "68000,48000", "--remesh", m, repeat=1 if quick else 2) for m in METHODS}
-        five = bench.remesh("--bodies", "20000,20000,20000,20000,20000", repeat=1 if quick else 2)
-        grown = growth(bench, [8000, 32000] if quick else [8000, 32000, 125000, 500000])
-    write(out, rows, details, pictures, speed, five, grown, bench.notes)
+        if options.only == "growth":
+            replace_part(out / "bench-merging.md", "## Growth", growth_part(growth(bench, sizes)))
+            return
+        names, drawn = (PAIRS[:2], FIG19[1:]) if options.quick else (PAIRS, FIG19)
+        page = {"rows": [], "details": [], "pictures": {}, "speed": {}, "five": None, "grown": [], "notes": bench.notes}
+        for name in drawn:
+            page["pictures"][name] = figure19(bench, name, out)
+            write(out, **page)
+        for name in names:
+            rows, details = table2(bench, [name])
+            page["rows"] += rows
+            page["details"] += details
+            write(out, **page)
+        page["speed"] = {m: bench.remesh("--bodies", "68000,48000", "--remesh", m) for m in METHODS}
+        page["five"] = bench.remesh("--bodies", "20000,20000,20000,20000,20000")
+        for size in sizes:
+            page["grown"] += growth(bench, [size])
+            write(out, **page)
+
+
+def growth_part(grown):
+    return ["## Growth", "", "Two bodies of so many triangles each.", "",
+            "| triangles a shape | overlay s | processor s | µs a triangle | MB | adaptive s | processor s | µs a triangle | MB |",
+            "|---|---|---|---|---|---|---|---|---|"] + grown
+
+
+def replace_part(page, heading, part):
+    """The part under this heading, or a new one at the end of the page."""
+    lines = page.read_text().rstrip().split("\n")
+    begin = lines.index(heading) if heading in lines else len(lines)
+    end = next((i for i in range(begin + 1, len(lines)) if lines[i].startswith("## ")), len(lines))
+    before, after = lines[:begin], lines[end:]
+    page.write_text("\n".join(before + ([""] if before and before[-1] else []) + part + ([""] + after if after else [])) +
+                    "\n")
 
 
 def write(out, rows, details, pictures, speed, five, grown, notes):
@@ -205,18 +250,16 @@ def write(out, rows, details, pictures, speed, five, grown, notes):
         s = five["seconds"]
         text += ["", f"Five such bodies of 10,000 vertices, `adaptive`: remeshing {s['remesh']:.2f} s, transfer "
                      f"{s['transfer']:.2f} s, writing {s['write']:.2f} s;", f"{five['triangles']:,} triangles."]
-    text += ["", "## Growth", "", "Two bodies of so many triangles each.", "",
-             "| triangles a shape | overlay s | processor s | µs a triangle | MB | adaptive s | processor s | µs a triangle | MB |",
-             "|---|---|---|---|---|---|---|---|---|"] + grown
+    text += [""] + growth_part(grown)
     text += ["", "## Visual error (Fig. 19 of the paper)", "",
              "Rendered by `orbmorph view`: the two inputs, then the difference of each method's picture from theirs, dark blue none,",
              "bright red a quarter of the range or more: `adaptive` (0.1 %), `subdivision` (the paper's), `convex-hull` (its",
              "Fig. 11).", "", "| pair | method | mean difference % | pixels above an eighth of the range % |", "|---|---|---|---|"]
     for name, shown in pictures.items():
         text += [f"| {name.replace('-', ' – ')} | {m} | {mean:.2f} | {high:.2f} |" for m, mean, high in shown]
-    for name in pictures:
+    for name in (name for name, shown in pictures.items() if shown):
         text += ["", f"![Visual error, {name.replace('-', ' and ')}](bench/visual-error-{name}.png)"]
-    text += [f"\nRefused: {note}" for note in notes]
+    text += [f"\nRefused or given up: {note}" for note in notes]
     (out / "bench-merging.md").write_text("\n".join(text) + "\n")
 
 
