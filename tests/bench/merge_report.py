@@ -6,7 +6,7 @@
 Repeats Table 2 and Fig. 19 of Peng & Timalsena 2016 on real pairs of like sizes, with its remeshing and its convex hull
 beside ours, and measures speed and growth on generated bodies. Best of the repeats is taken. With --keep alignments are
 kept there from run to run. The page is written after every part, so that a run that is cut short leaves what it has.
---only growth measures that alone, and puts it in its place on the page that there is. Standard library only.
+--only growth or visual measures that alone, and puts it in its place on the page that there is. Standard library only.
 """
 import argparse
 import json
@@ -127,7 +127,6 @@ def figure19(bench, name, out):
         return []
     width, height, channels, wanted = picture
     shown, rows = [], [rgb(line, channels) for line in wanted]
-    background = rows[0][:3]
     for method in ("adaptive", "subdivision", "convex-hull"):
         picture = bench_picture(bench, name, method)
         if not picture:
@@ -135,7 +134,7 @@ def figure19(bench, name, out):
         got = picture[3]
         total, high, covered = 0, 0, 0
         for mine, theirs in zip((rgb(line, channels) for line in got), (rgb(line, channels) for line in wanted)):
-            row = bytearray()
+            row, background = bytearray(), theirs[:3]  # a colour a row: it is shaded from top to bottom
             for x in range(0, len(mine), 3):
                 a, b = mine[x:x + 3], theirs[x:x + 3]
                 if a == background and b == background:
@@ -181,7 +180,7 @@ def main():
     parser.add_argument("--out", default="docs")
     parser.add_argument("--keep")
     parser.add_argument("--limit", type=float, default=60, help="seconds after which a run is given up, and noted")
-    parser.add_argument("--only", choices=["growth"])
+    parser.add_argument("--only", choices=["growth", "visual"])
     parser.add_argument("--quick", action="store_true", help="two pairs and small bodies only")
     options = parser.parse_args()
     out = pathlib.Path(options.out)
@@ -190,9 +189,12 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(options, pathlib.Path(folder))
         if options.only == "growth":
-            replace_part(out / "bench-merging.md", "## Growth", growth_part(growth(bench, sizes)))
+            replace_part(out / "bench-merging.md", growth_part(growth(bench, sizes)))
             return
         names, drawn = (PAIRS[:2], FIG19[1:]) if options.quick else (PAIRS, FIG19)
+        if options.only == "visual":
+            replace_part(out / "bench-merging.md", visual_part({name: figure19(bench, name, out) for name in drawn}))
+            return
         page = {"rows": [], "details": [], "pictures": {}, "speed": {}, "five": None, "grown": [], "notes": bench.notes}
         for name in drawn:
             page["pictures"][name] = figure19(bench, name, out)
@@ -215,8 +217,21 @@ def growth_part(grown):
             "|---|---|---|---|---|---|---|---|---|"] + grown
 
 
-def replace_part(page, heading, part):
-    """The part under this heading, or a new one at the end of the page."""
+def visual_part(pictures):
+    text = ["## Visual error (Fig. 19 of the paper)", "",
+             "Rendered by `orbmorph view`: the two inputs, then the difference of each method's picture from theirs, dark blue none,",
+             "bright red a quarter of the range or more: `adaptive` (0.1 %), `subdivision` (the paper's), `convex-hull` (its",
+             "Fig. 11).", "", "| pair | method | mean difference % | pixels above an eighth of the range % |", "|---|---|---|---|"]
+    for name, shown in pictures.items():
+        text += [f"| {name.replace('-', ' – ')} | {m} | {mean:.2f} | {high:.2f} |" for m, mean, high in shown]
+    for name in (name for name, shown in pictures.items() if shown):
+        text += ["", f"![Visual error, {name.replace('-', ' and ')}](bench/visual-error-{name}.png)"]
+    return text
+
+
+def replace_part(page, part):
+    """Puts the part where the page has one of its heading, or else at the end."""
+    heading = part[0]
     lines = page.read_text().rstrip().split("\n")
     begin = lines.index(heading) if heading in lines else len(lines)
     end = next((i for i in range(begin + 1, len(lines)) if lines[i].startswith("## ")), len(lines))
@@ -251,14 +266,7 @@ def write(out, rows, details, pictures, speed, five, grown, notes):
         text += ["", f"Five such bodies of 10,000 vertices, `adaptive`: remeshing {s['remesh']:.2f} s, transfer "
                      f"{s['transfer']:.2f} s, writing {s['write']:.2f} s;", f"{five['triangles']:,} triangles."]
     text += [""] + growth_part(grown)
-    text += ["", "## Visual error (Fig. 19 of the paper)", "",
-             "Rendered by `orbmorph view`: the two inputs, then the difference of each method's picture from theirs, dark blue none,",
-             "bright red a quarter of the range or more: `adaptive` (0.1 %), `subdivision` (the paper's), `convex-hull` (its",
-             "Fig. 11).", "", "| pair | method | mean difference % | pixels above an eighth of the range % |", "|---|---|---|---|"]
-    for name, shown in pictures.items():
-        text += [f"| {name.replace('-', ' – ')} | {m} | {mean:.2f} | {high:.2f} |" for m, mean, high in shown]
-    for name in (name for name, shown in pictures.items() if shown):
-        text += ["", f"![Visual error, {name.replace('-', ' and ')}](bench/visual-error-{name}.png)"]
+    text += [""] + visual_part(pictures)
     text += [f"\nRefused or given up: {note}" for note in notes]
     (out / "bench-merging.md").write_text("\n".join(text) + "\n")
 
