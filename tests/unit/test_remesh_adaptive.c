@@ -172,22 +172,27 @@ static int turned_on(const orb_supermesh *m, const orb_aligned_shape *shape, int
   return turned;
 }
 
-/* Two balls between which the map shears: what is turned about the axis on one, the more the higher, is not on the
- * other. No triangle of the supermesh may come out turned in space. */
+/* Turns a ball about the axis in space, by `most` at the pole and the more the higher, and leaves the sphere's points:
+ * a map to another ball then shears. */
+static void shear(const orb_aligned_shape *shape, double most) {
+  for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
+    const double *at = shape->points + 3 * v;
+    double turn = most * at[2], *p = shape->mesh.positions + 3 * v;
+    double size = sqrt(orb_dot(p, p)), x = at[0], y = at[1];
+    p[0] = size * (cos(turn) * x - sin(turn) * y);
+    p[1] = size * (sin(turn) * x + cos(turn) * y);
+    p[2] = size * at[2];
+  }
+}
+
+/* No triangle of the supermesh may come out turned in space. */
 static void sheared_maps_turn_no_triangle(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(2);
   orb_aligned_shape shapes[2];
   sphere_shape(ctx, SPHERE_ICO, 4, 0.2, 1, &shapes[0]);
   sphere_shape(ctx, SPHERE_OCTA, 4, 0.2, 2, &shapes[1]);
-  for (int32_t v = 0; v < shapes[1].mesh.vertex_count; v++) {
-    const double *at = shapes[1].points + 3 * v;
-    double turn = 2.5 * at[2], *p = shapes[1].mesh.positions + 3 * v;
-    double size = sqrt(orb_dot(p, p)), x = at[0], y = at[1];
-    p[0] = size * (cos(turn) * x - sin(turn) * y);
-    p[1] = size * (sin(turn) * x + cos(turn) * y);
-    p[2] = size * at[2];
-  }
+  shear(&shapes[1], 2.5);
   orb_supermesh m;
   run(ctx, shapes, 2, 0, 0.002, 0, &m);
   sphere_assert_valid(&m, shapes, 2);
@@ -199,6 +204,33 @@ static void sheared_maps_turn_no_triangle(void **state) {
   sphere_shape_free(ctx, &shapes[0]);
   sphere_shape_free(ctx, &shapes[1]);
   orb_context_destroy(ctx);
+}
+
+/* Rough shapes under a map that shears: triangles turn wherever they are not small. What mends these may not cost the
+ * tolerance. */
+static void sheared_maps_keep_the_tolerance(void **state) {
+  (void)state;
+  for (unsigned seed = 1; seed <= 6; seed++) {
+    orb_context *ctx = remesh_context(2);
+    orb_aligned_shape shapes[2];
+    sphere_shape(ctx, SPHERE_ICO, 3, 0.2, seed, &shapes[0]);
+    sphere_shape(ctx, SPHERE_OCTA, 3, 0.2, seed + 10, &shapes[1]);
+    shear(&shapes[1], 4);
+    unsigned random = seed;
+    for (int s = 0; s < 2; s++) {
+      for (int32_t i = 0; i < 3 * shapes[s].mesh.vertex_count; i += 3) {
+        random = random * 1664525u + 1013904223u;
+        double size = 0.8 + 0.4 * (random >> 16) / 65536.0;
+        for (int k = 0; k < 3; k++) {
+          shapes[s].mesh.positions[i + k] *= size;
+        }
+      }
+    }
+    check(shapes, 2, ctx, 0.01);
+    sphere_shape_free(ctx, &shapes[0]);
+    sphere_shape_free(ctx, &shapes[1]);
+    orb_context_destroy(ctx);
+  }
 }
 
 static void four_shapes(void **state) {
@@ -300,6 +332,7 @@ int main(void) {
       cmocka_unit_test(unlike_densities),
       cmocka_unit_test(far_unlike_densities),
       cmocka_unit_test(sheared_maps_turn_no_triangle),
+      cmocka_unit_test(sheared_maps_keep_the_tolerance),
       cmocka_unit_test(four_shapes),
       cmocka_unit_test(landmarks_and_limits_are_kept),
       cmocka_unit_test(bad_options_are_named),
