@@ -3,8 +3,9 @@
  * The start holds every vertex of every shape; edges that stray are turned or split until the bound holds. Then, in
  * rounds: edges are collapsed and holes filled anew while the bound still holds, edges turned for well-shaped
  * triangles, and vertices moved to where the edges stray less, which makes room for the next round. Triangles that come
- * out turned in space are mended by smaller ones. Where max_triangles asks for fewer, the tolerance is raised step by
- * step until they suffice. */
+ * out turned in space are mended by smaller ones. Where splits creep without end, the overlay of all shapes is the
+ * start instead: it holds the bound as it is, and is only reduced. Where max_triangles asks for fewer, the tolerance is
+ * raised step by step until they suffice. */
 #include <math.h>
 
 #include "base/check.h"
@@ -42,7 +43,7 @@ static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, i
 /* Refines until nothing strays: splits of edges may leave items of the triangles beside them too far away. */
 static orb_status hold(orb_context *ctx, orb_match *match, double limit2) {
   int64_t strays = 1;
-  for (int i = 0; i < HOLDS && strays > 0; i++) {
+  for (int i = 0; i < HOLDS && strays > 0 && !match->crept; i++) {
     ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
   }
   return ORB_OK;
@@ -55,6 +56,9 @@ static orb_status settle_within(orb_context *ctx, orb_match *match, double toler
   int64_t strays = 0, turned = 0;
   for (int i = 0; i < MENDS; i++) {
     ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
+    if (match->crept) {
+      return ORB_OK;
+    }
     if (i == 0) {
       ORB_TRY(orb_match_turn_all(ctx, match, limit2, 1));
     } else {
@@ -72,6 +76,29 @@ static orb_status settle_within(orb_context *ctx, orb_match *match, double toler
   return hold(ctx, match, limit2);
 }
 
+/* Starts anew from the overlay, and settles by what never leaves the limit. */
+static orb_status settle_overlay(orb_context *ctx, const orb_remesh_job *job, orb_match *match, double tolerance) {
+  orb_supermesh overlay = {.error_bound = ORB_NEW(ctx, double, job->shape_count)};
+  orb_net net = {0};
+  orb_match_free(ctx, match);
+  orb_status status = overlay.error_bound ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    status = orb_remesh_overlay(ctx, job, &overlay);
+  }
+  if (status == ORB_OK) {
+    status = orb_net_init(ctx, &net, overlay.points, overlay.vertex_count, overlay.triangles, overlay.triangle_count,
+                          overlay.vertex_count);
+  }
+  if (status == ORB_OK) {
+    status = orb_match_create_on(ctx, job, &net, match);
+  }
+  orb_net_free(ctx, &net);
+  orb_supermesh_free(ctx, &overlay);
+  ORB_TRY(status);
+  ORB_TRY(orb_match_turn_all(ctx, match, tolerance * tolerance, 1));
+  return reduce(ctx, match, tolerance, 0, 1);
+}
+
 orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
   orb_match match;
   ORB_TRY(orb_match_create(ctx, job, &match));
@@ -81,6 +108,9 @@ orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_
   orb_progress(ctx, "remesh", 0.15);
   ORB_GO(status, orb_match_turn_all(ctx, &match, INFINITY, 1), end);
   ORB_GO(status, settle_within(ctx, &match, tolerance), end);
+  if (match.crept) {
+    ORB_GO(status, settle_overlay(ctx, job, &match, tolerance), end);
+  }
   while (most > 0 && orb_match_live(&match) > most && tolerance < 4) {
     tolerance *= 1.25;
     ORB_GO(status, reduce(ctx, &match, tolerance, most, tolerance < 0.05, ROUNDS), end);

@@ -31,6 +31,7 @@ typedef struct orb_match {
   int32_t *item_next;
   int32_t *item_shape;
   int32_t *vertex_items, *triangle_items; /* heads, −1: none */
+  int crept;                              /* refinement was given up: see orb_match_refine() */
 } orb_match;
 
 /* Starts from the shape with the most triangles and makes every other shape's vertices vertices too. */
@@ -85,7 +86,9 @@ int32_t orb_match_insert(orb_match *match, int32_t t, const double p[3]);
 void orb_match_deal(orb_match *match, int32_t list, int32_t start);
 
 /* Splits, or turns, every edge that strays farther than the tolerance (relative, squared), and takes items that do in
- * as vertices, until none does; *strays (may be NULL) counts the edges that had to be looked at. */
+ * as vertices, until none does; *strays (may be NULL) counts the edges that had to be looked at. Where the map flattens
+ * a large triangle of a shape to almost nothing on the sphere, splits can creep along it without end: after far more
+ * splits than the overlay of all shapes would need, `crept` is set and the rest left straying. */
 ORB_MUST_CHECK orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, int64_t *strays);
 
 /* Turns an edge if that keeps the bound and helps the shape of the triangles; whether it did. */

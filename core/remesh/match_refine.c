@@ -322,7 +322,7 @@ orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, i
   if (strays) {
     *strays = queue.count;
   }
-  int64_t limit = 64 * half_edges; /* splits end by themselves; this only guards against rounding */
+  int64_t limit = 2 * half_edges + 20000;
   /* First in, first out: an old long edge is split before those that its neighbours' splits have made, which would
    * else creep towards it in ever thinner triangles. */
   for (int64_t i = 0; i < queue.count && i < limit && status == ORB_OK; i++) {
@@ -331,6 +331,7 @@ orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, i
       status = orb_context_check(ctx);
     }
   }
+  match->crept |= queue.count > limit;
   orb_free(ctx, queue.ends);
   orb_free(ctx, loop.strays);
   return status;
