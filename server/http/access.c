@@ -97,6 +97,19 @@ int access_check(request *r, const char *path, orb_problem *problem) {
   return 0;
 }
 
+int access_owns(request *r, const char *owner) {
+  if (!r->caller || strcmp(r->caller->row.name, owner) == 0 ||
+      (__atomic_load_n(&r->caller->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN)) {
+    return 1;
+  }
+  orb_problem problem = {0};
+  orb_refuse(&problem, "forbidden",
+             "Another caller asked for this job first; only that token or one with the scope \"admin\" may cancel it.");
+  orb_json_member_string(&problem.facts, "scope", "admin");
+  reply_problem(r, &problem);
+  return 0;
+}
+
 int access_take_quota(request *r, int64_t bytes, orb_problem *problem) {
   if (!r->caller) {
     return 1;

@@ -107,6 +107,9 @@ void access_headers(request *r);
 int access_check(request *r, const char *path, orb_problem *problem);
 /* Its priority in the queue: the token's, then what the Priority header says (RFC 9218, u=0 to 7). */
 int access_priority(const request *r);
+/* Whether the caller may change what `owner` (the name of a token) asked for: its own, or all with the scope admin, or
+ * where no token is needed. Refuses it if not. */
+int access_owns(request *r, const char *owner);
 /* Takes bytes of an upload from the token's quota; then says whether they were stored as something new. */
 int access_take_quota(request *r, int64_t bytes, orb_problem *problem);
 void access_quota_stored(request *r, int64_t bytes, int stored);

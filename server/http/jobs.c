@@ -157,6 +157,10 @@ static void cancel_away(request *r) {
     reply_refuse(r, "job-ended", "The job is %s already; there is nothing to cancel.", orb_job_state_name(state));
     return;
   }
+  if (!access_owns(r, job_owner(j))) {
+    queue_release(srv->q, j);
+    return;
+  }
   orb_text json = {0};
   orb_job_state state = queue_job_write(srv->q, j, &json);
   orb_text_free(&json);

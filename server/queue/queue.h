@@ -81,6 +81,7 @@ const char *job_id(const job *j);
 const char *job_key(const job *j);
 orb_job_kind job_kind(const job *j);
 const char *job_request(const job *j);
+const char *job_owner(const job *j); /* the name of the token that asked first; "" where none was needed */
 /* Appends the job as JSON; returns its state. */
 orb_job_state queue_job_write(queue *q, job *j, orb_text *out);
 

@@ -134,6 +134,9 @@ const char *job_key(const job *j) {
 orb_job_kind job_kind(const job *j) {
   return j->row.kind;
 }
+const char *job_owner(const job *j) {
+  return j->row.owner;
+}
 const char *job_request(const job *j) {
   return j->row.request;
 }
