@@ -96,7 +96,7 @@ static orb_status settle_overlay(orb_context *ctx, const orb_remesh_job *job, or
   orb_supermesh_free(ctx, &overlay);
   ORB_TRY(status);
   ORB_TRY(orb_match_turn_all(ctx, match, tolerance * tolerance, 1));
-  return reduce(ctx, match, tolerance, 0, 1);
+  return reduce(ctx, match, tolerance, 0, 1, ROUNDS);
 }
 
 orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
