@@ -233,6 +233,43 @@ static void sheared_maps_keep_the_tolerance(void **state) {
   }
 }
 
+/* The first ring north of the equator comes to lie at height `flat`, the others spread over the rest. */
+static void flatten_belt(orb_aligned_shape *shape, double flat) {
+  double ring = 1;
+  for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
+    double z = shape->points[3 * v + 2];
+    ring = z > 1e-9 && z < ring ? z : ring;
+  }
+  for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
+    double *p = shape->points + 3 * v, z = p[2], round = hypot(p[0], p[1]);
+    if (z > 1e-9 && round > 1e-9) {
+      double to = z < ring * (1 + 1e-9) ? flat : flat + (1 - flat) * (z - ring) / (1 - ring);
+      double scale = sqrt(1 - to * to) / round;
+      p[0] *= scale;
+      p[1] *= scale;
+      p[2] = to;
+    }
+  }
+}
+
+/* A map that flattens a belt of large triangles to almost nothing on the sphere: edges that are split where they cross
+ * it would creep along it without end. */
+static void flattened_belts_do_not_creep(void **state) {
+  (void)state;
+  static const double flat[] = {1e-3, 1e-5, 1e-7, 1e-9};
+  for (int i = 0; i < 4; i++) {
+    orb_context *ctx = remesh_context(2);
+    orb_aligned_shape shapes[2];
+    sphere_shape(ctx, SPHERE_ICO, 4, 0.2, 1, &shapes[0]);
+    sphere_shape(ctx, SPHERE_UV, 24, 0, 2, &shapes[1]);
+    flatten_belt(&shapes[1], flat[i]);
+    check(shapes, 2, ctx, 0.001);
+    sphere_shape_free(ctx, &shapes[0]);
+    sphere_shape_free(ctx, &shapes[1]);
+    orb_context_destroy(ctx);
+  }
+}
+
 static void four_shapes(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(2);
@@ -333,6 +370,7 @@ int main(void) {
       cmocka_unit_test(far_unlike_densities),
       cmocka_unit_test(sheared_maps_turn_no_triangle),
       cmocka_unit_test(sheared_maps_keep_the_tolerance),
+      cmocka_unit_test(flattened_belts_do_not_creep),
       cmocka_unit_test(four_shapes),
       cmocka_unit_test(landmarks_and_limits_are_kept),
       cmocka_unit_test(bad_options_are_named),
