@@ -2,7 +2,7 @@
 // from then on for ever, while it answers a fixed sequence of requests with one worker. Each time: an answer, an error
 // answer, or a clean stop; never a crash, never a hang; and afterwards nothing that was accepted is lost.
 //
-// ORB_FAULT_RUNS (24) is the number of lives. "all" takes each N of the kinds that are called a few times, and the N of
+// ORB_FAULT_RUNS (21) is the number of lives. "all" takes each N of the kinds that are called a few times, and the N of
 // the first call at each site that allocates or asks SQLite, both ways. "few" leaves out the allocations. ORB_FAULT_KINDS
 // (all of them) chooses kinds, comma-separated; ORB_FAULT_SEED (1) the sample. tests/faults/interpose.c makes them fail.
 import assert from 'node:assert/strict';
@@ -17,7 +17,7 @@ import { binaries, Daemon, slow } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const library = process.env.ORB_INTERPOSE;
-const wanted = process.env.ORB_FAULT_RUNS ?? '24';
+const wanted = process.env.ORB_FAULT_RUNS ?? '21';
 const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? 2);
 const patience = 40_000;
 const kinds = (process.env.ORB_FAULT_KINDS ?? 'thread,rename,fsync,write,open,sqlite,alloc').split(',');
