@@ -25,7 +25,7 @@ enum {
   HOPELESS = 9,        /* one flip in so many triangles: they will not be cleared */
   SOFT_ROUNDS = 8,
   ROUGH_SWEEPS = 40,
-  WORK = 1000 /* vertex steps a vertex, see cm_run.work */
+  WORK = 800 /* vertex steps a vertex, see cm_run.work */
 };
 
 static const double GOOD_ENERGY = 1.2; /* below it the shapes correspond: no further start is tried */
