@@ -1,12 +1,8 @@
-/* A binary glTF out, through tinygltf: the description is plain C, made by core/transfer; this writes it down. */
+/* A binary glTF out: the description is made by core/transfer; this writes it down. */
 #ifndef ORB_FORMAT_GLTF_WRITE_H
 #define ORB_FORMAT_GLTF_WRITE_H
 
 #include "orbmorph/mesh.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* glTF's numbers. */
 enum {
@@ -66,8 +62,4 @@ typedef struct orb_gltf_scene {
 /* Appends the GLB. Texts that are no UTF-8 have their bad bytes replaced. ORB_E_TOO_LARGE, ORB_E_NO_MEMORY. */
 ORB_MUST_CHECK orb_status orb_gltf_write(orb_context *ctx, const orb_gltf_scene *scene, const orb_buffer *binary,
                                          orb_buffer *out);
-
-#ifdef __cplusplus
-}
-#endif
 #endif
