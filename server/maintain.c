@@ -48,6 +48,10 @@ static void each_row(tally *t, resource_kind kind) {
   int64_t before = 0;
   for (int n = PAGE; n == PAGE;) {
     n = catalogue_list(t->cat, kind, before, PAGE, rows);
+    if (n < 0) {
+      puts("the catalogue's rows cannot be read");
+      t->wrong++;
+    }
     for (int i = 0; i < n; i++) {
       before = rows[i].seq;
       verify(t, &rows[i]);
@@ -95,7 +99,10 @@ int maintain_check(const config *options) {
   for (int kind = 0; kind < RESOURCE_KINDS; kind++) {
     each_row(&t, (resource_kind)kind);
   }
-  objects_each(t.store, each_object, &t);
+  if (objects_each(t.store, each_object, &t) != STORE_OK) {
+    puts("not every folder of objects can be read");
+    t.wrong++;
+  }
   printf("%ld rows and %ld objects checked: %ld wrong, %ld objects without a row (harmless; --gc removes them)\n",
          t.rows, t.objects, t.wrong, t.orphans);
   close_both(&t);
@@ -106,7 +113,7 @@ int maintain_gc(const config *options) {
   tally t = {.remove_orphans = 1};
   int fine = open_both(options, &t);
   if (fine) {
-    objects_each(t.store, each_object, &t);
+    fine = objects_each(t.store, each_object, &t) == STORE_OK;
     if (options->derived_bytes > 0) {
       const evict_env env = {.cat = t.cat, .store = t.store};
       evict_derived(&env, options->derived_bytes, INT64_MAX);

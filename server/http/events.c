@@ -106,6 +106,11 @@ static void ended_away(request *r) {
   int64_t after = last_seen(r);
   for (int n = ROWS; n == ROWS;) {
     n = catalogue_events(r->srv->cat, r->id, after, ROWS, events);
+    if (n < 0) {
+      orb_text_free(&text);
+      reply_store(r, STORE_ERROR);
+      return;
+    }
     for (int i = 0; i < n; i++) {
       event_write(&text, events[i].number, events[i].type, events[i].json);
       after = events[i].number;

@@ -156,8 +156,8 @@ typedef struct list_page {
   orb_text json;
 } list_page;
 int list_begin(request *r, const char *name, size_t row_size, list_page *page); /* 0 with a response */
-/* Takes the page; last: the sequence number of its last row; more: there are others after it. */
-void list_end(request *r, list_page *page, int64_t last, int more);
+/* Takes the page; last: the sequence number of its last row; count: of the rows found, −1 where they cannot be read. */
+void list_end(request *r, list_page *page, int64_t last, int count);
 /* Seconds to wait by ?wait= or Prefer: wait=, clamped to 60; 0: not. −1: bad, with a response. */
 int64_t read_wait_ms(request *r);
 /* From the cache or the catalogue; blocks. NULL with *result. */

@@ -215,7 +215,7 @@ static void list_away(request *r) {
     }
     job_row_free(&rows[i]);
   }
-  list_end(r, &page, last, count > page.limit);
+  list_end(r, &page, last, count);
 }
 
 enum MHD_Result handle_job_list(request *r) {

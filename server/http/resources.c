@@ -88,10 +88,16 @@ int list_begin(request *r, const char *name, size_t row_size, list_page *page) {
   return 1;
 }
 
-void list_end(request *r, list_page *page, int64_t last, int more) {
+void list_end(request *r, list_page *page, int64_t last, int count) {
+  if (count < 0) {
+    orb_text_free(&page->json);
+    free(page->rows);
+    reply_store(r, STORE_ERROR);
+    return;
+  }
   orb_json_close(&page->json, ']');
   orb_json_key(&page->json, "next_page_token");
-  if (more) {
+  if (count > page->limit) {
     orb_text_printf(&page->json, "\"%llx\"", (unsigned long long)last);
   } else {
     orb_json_null(&page->json);
@@ -118,7 +124,7 @@ static void list_away(request *r) {
     }
     resource_free(&rows[i]);
   }
-  list_end(r, &page, last, count > page.limit);
+  list_end(r, &page, last, count);
 }
 
 enum MHD_Result handle_list(request *r) {

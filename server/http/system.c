@@ -46,7 +46,10 @@ static void metrics_away(request *r) {
   }
   gauge(&text, "orbmorph_queue_oldest_seconds", 1e-3 * (double)n.oldest_ms);
   gauge(&text, "orbmorph_waiting_connections", n.waiters);
-  gauge(&text, "orbmorph_stored_bytes", (double)catalogue_bytes(srv->cat, 0));
+  int64_t stored = catalogue_bytes(srv->cat, 0);
+  if (stored >= 0) {
+    gauge(&text, "orbmorph_stored_bytes", (double)stored);
+  }
   gauge(&text, "orbmorph_disk_free_bytes", (double)objects_free_bytes(srv->store));
   gauge(&text, "orbmorph_queue_limit", (double)srv->options->queue_limit);
   gauge(&text, "orbmorph_decoding_bytes", (double)__atomic_load_n(&srv->decoding, __ATOMIC_RELAXED));

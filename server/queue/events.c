@@ -108,6 +108,7 @@ int64_t prepare_event(job *j, orb_text *json) {
 
 void keep_event(job *j, int64_t number, const char *type, const char *json) {
   char *copy = strdup(json);
+  j->last_event = number; /* taken, even if there is no memory to keep what it says */
   if (!copy) {
     return;
   }
@@ -121,7 +122,6 @@ void keep_event(job *j, int64_t number, const char *type, const char *json) {
   event->json = copy;
   copy_text(event->type, sizeof event->type, type);
   event->type[sizeof event->type - 1] = 0;
-  j->last_event = number;
 }
 
 void add_event(queue *q, job *j, const char *type, int store) {
@@ -153,6 +153,7 @@ int64_t queue_events_write(queue *q, job *j, int64_t after, orb_text *out, int *
       after = j->events[i].number;
     }
   }
+  after = j->last_event > after ? j->last_event : after; /* one that found no memory is not waited for */
   pthread_mutex_unlock(&q->lock);
   return after;
 }

@@ -50,11 +50,12 @@ void queue_destroy(queue *q) {
   free(q);
 }
 
-static int load(queue *q, job_row *row) {
+/* Takes the row. */
+static store_result load(queue *q, job_row *row) {
   job *j = calloc(1, sizeof *j);
   if (!j) {
     job_row_free(row);
-    return 0;
+    return STORE_ERROR;
   }
   j->row = *row;
   j->refs = 1;
@@ -64,6 +65,10 @@ static int load(queue *q, job_row *row) {
   int64_t after = 0;
   for (int n = BATCH; n == BATCH;) {
     n = catalogue_events(q->cat, j->row.id, after, BATCH, events);
+    if (n < 0) {
+      job_unref(j);
+      return STORE_ERROR;
+    }
     for (int i = 0; i < n; i++) {
       after = events[i].number;
       keep_event(j, events[i].number, events[i].type, events[i].json);
@@ -73,7 +78,7 @@ static int load(queue *q, job_row *row) {
   pthread_mutex_lock(&q->lock);
   table_add(q, j);
   pthread_mutex_unlock(&q->lock);
-  return 1;
+  return STORE_OK;
 }
 
 store_result queue_recover(queue *q) {
@@ -91,10 +96,20 @@ store_result queue_recover(queue *q) {
   for (int n = BATCH; n == BATCH && result == STORE_OK;) {
     job_row rows[BATCH];
     n = catalogue_unfinished(q->cat, after, BATCH, rows);
+    result = n < 0 ? STORE_ERROR : STORE_OK;
     for (int i = 0; i < n; i++) {
       after = rows[i].seq;
-      loaded += load(q, &rows[i]);
+      if (result == STORE_OK) {
+        result = load(q, &rows[i]);
+        loaded++;
+      } else {
+        job_row_free(&rows[i]);
+      }
     }
+  }
+  if (result != STORE_OK) { /* a job that is not loaded would wait for the next start */
+    log_error("the unfinished jobs cannot be read");
+    return result;
   }
   if (loaded) {
     log_info("%d unfinished jobs go on", loaded);

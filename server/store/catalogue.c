@@ -48,7 +48,9 @@ static store_result result_of(int code) {
 static void run_batch(catalogue *cat, pending *batch) {
   database *db = &cat->writer;
   FAULT_POINT("before-begin");
-  int code = database_execute(db, "BEGIN IMMEDIATE");
+  /* A transaction whose rollback failed too is still open. */
+  int code = sqlite3_get_autocommit(db->handle) ? SQLITE_OK : database_execute(db, "ROLLBACK");
+  code = code == SQLITE_OK ? database_execute(db, "BEGIN IMMEDIATE") : code;
   for (pending *p = batch; p && code == SQLITE_OK; p = p->next) {
     if (database_execute(db, "SAVEPOINT one") != SQLITE_OK) {
       code = SQLITE_IOERR;

@@ -37,12 +37,13 @@ void resource_free(resource *r);
 store_result catalogue_put(catalogue *cat, const resource *r); /* keeps one that is there */
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out);
 store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id);
-/* The newest first, those before sequence number `before` (0: all); returns the number filled. */
+/* The functions that list return the number filled, −1 where the rows cannot be read: nothing is filled then. */
+/* The newest first, those before sequence number `before` (0: all). */
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out);
 /* Least recently used derived ones first, of those last used before a unix time in ms; for eviction. */
 int catalogue_oldest(catalogue *cat, int64_t before, int limit, resource *out);
 void catalogue_touch(catalogue *cat, resource_kind kind, const char *id); /* does not wait */
-int64_t catalogue_bytes(catalogue *cat, int derived_only);
+int64_t catalogue_bytes(catalogue *cat, int derived_only);                /* −1: cannot be read */
 
 /* A row of a job. request and problem are of malloc(). */
 typedef struct job_row {

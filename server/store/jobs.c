@@ -170,8 +170,12 @@ static int read_row(sqlite3_stmt *st, void *to) {
   out->created = sqlite3_column_int64(st, 15);
   out->started = sqlite3_column_int64(st, 16);
   out->finished = sqlite3_column_int64(st, 17);
-  return out->request != NULL;
+  return out->request != NULL && !row_lacks(st, 14, out->problem);
 }
+static void release_row(void *row) {
+  job_row_free(row);
+}
+static const row_kind job_rows = {read_row, release_row, sizeof(job_row)};
 
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
   database *db = catalogue_reader(cat);
@@ -179,7 +183,7 @@ store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
   if (st) {
     sqlite3_bind_text(st, 1, id, -1, SQLITE_STATIC);
   }
-  return rows_one(cat, db, st, read_row, out);
+  return rows_one(cat, db, st, &job_rows, out);
 }
 
 int catalogue_job_list(catalogue *cat, int state, int64_t before, int limit, job_row *out) {
@@ -192,7 +196,7 @@ int catalogue_job_list(catalogue *cat, int state, int64_t before, int limit, job
     sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);
     sqlite3_bind_int(st, 3, limit);
   }
-  return rows_many(cat, db, st, read_row, out, sizeof *out, limit);
+  return rows_many(cat, db, st, &job_rows, out, limit);
 }
 
 int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out) {
@@ -203,7 +207,7 @@ int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out)
     sqlite3_bind_int64(st, 1, after);
     sqlite3_bind_int(st, 2, limit);
   }
-  return rows_many(cat, db, st, read_row, out, sizeof *out, limit);
+  return rows_many(cat, db, st, &job_rows, out, limit);
 }
 
 /* Fails one that died alone too often, with its last event, so that who follows it learns of the end. */
@@ -232,8 +236,11 @@ static int give_up(database *db, job_row *row, const change *c) {
   sqlite3_reset(st);
   code = code == SQLITE_ROW ? write_event(db, row->id, number, orb_job_state_name(row->state), json.data) : code;
   orb_text_free(&json);
-  st = code == SQLITE_OK ? database_statement(db, "UPDATE job SET state=3, problem=?1, finished=?2 WHERE id=?3") : NULL;
-  if (st) {
+  if (code == SQLITE_OK) {
+    st = database_statement(db, "UPDATE job SET state=3, problem=?1, finished=?2 WHERE id=?3");
+    if (!st) {
+      return SQLITE_ERROR;
+    }
     sqlite3_bind_text(st, 1, c->problem, -1, SQLITE_STATIC);
     sqlite3_bind_int64(st, 2, c->now);
     sqlite3_bind_text(st, 3, row->id, -1, SQLITE_STATIC);
@@ -265,7 +272,12 @@ static int recover(database *db, void *arg) {
       sqlite3_reset(st);
       return SQLITE_OK;
     }
-    code = code == SQLITE_ROW ? (read_row(st, &row) ? SQLITE_OK : SQLITE_NOMEM) : code;
+    if (code == SQLITE_ROW) {
+      code = read_row(st, &row) ? SQLITE_OK : SQLITE_NOMEM;
+      if (code != SQLITE_OK) {
+        job_row_free(&row);
+      }
+    }
     sqlite3_reset(st);
     if (code == SQLITE_OK) {
       code = give_up(db, &row, c);
@@ -310,6 +322,10 @@ static int read_event(sqlite3_stmt *st, void *to) {
   out->json = row_copy(st, 2);
   return out->json != NULL;
 }
+static void release_event(void *row) {
+  free(((event_row *)row)->json);
+}
+static const row_kind event_rows = {read_event, release_event, sizeof(event_row)};
 
 int catalogue_events(catalogue *cat, const char *job, int64_t after, int limit, event_row *out) {
   database *db = catalogue_reader(cat);
@@ -320,5 +336,5 @@ int catalogue_events(catalogue *cat, const char *job, int64_t after, int limit, 
     sqlite3_bind_int64(st, 2, after);
     sqlite3_bind_int(st, 3, limit);
   }
-  return rows_many(cat, db, st, read_event, out, sizeof *out, limit);
+  return rows_many(cat, db, st, &event_rows, out, limit);
 }

@@ -263,8 +263,9 @@ uint64_t objects_free_bytes(const objects *store) {
   return statvfs(store->root, &info) == 0 ? (uint64_t)info.f_bavail * info.f_frsize : UINT64_MAX;
 }
 
-void objects_each(const objects *store, void (*each)(void *user, object_kind kind, const char *id, uint64_t size),
-                  void *user) {
+store_result objects_each(const objects *store,
+                          void (*each)(void *user, object_kind kind, const char *id, uint64_t size), void *user) {
+  store_result result = STORE_OK;
   for (int kind = 0; kind < OBJECT_KINDS; kind++) {
     for (int shard = 0; shard < 256; shard++) {
       char path[PATH_MAX];
@@ -278,7 +279,10 @@ void objects_each(const objects *store, void (*each)(void *user, object_kind kin
       }
       if (dir) {
         closedir(dir);
+      } else {
+        result = failed("open", path);
       }
     }
   }
+  return result;
 }

@@ -68,8 +68,8 @@ store_result objects_delete(const objects *store, object_kind kind, const char *
 /* Free bytes of the file system; for the reserve. */
 uint64_t objects_free_bytes(const objects *store);
 
-/* Calls back for every object that lies there. */
-void objects_each(const objects *store, void (*each)(void *user, object_kind kind, const char *id, uint64_t size),
-                  void *user);
+/* Calls back for every object that lies there. STORE_ERROR where a folder could not be read; the others were. */
+store_result objects_each(const objects *store,
+                          void (*each)(void *user, object_kind kind, const char *id, uint64_t size), void *user);
 
 #endif

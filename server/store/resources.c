@@ -48,6 +48,10 @@ static int read_row(sqlite3_stmt *st, void *to) {
   out->created = sqlite3_column_int64(st, 6);
   return out->json != NULL;
 }
+static void release_row(void *row) {
+  resource_free(row);
+}
+static const row_kind resource_rows = {read_row, release_row, sizeof(resource)};
 
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out) {
   database *db = catalogue_reader(cat);
@@ -56,7 +60,7 @@ store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, r
     sqlite3_bind_int(st, 1, (int)kind);
     sqlite3_bind_text(st, 2, id, -1, SQLITE_STATIC);
   }
-  return rows_one(cat, db, st, read_row, out);
+  return rows_one(cat, db, st, &resource_rows, out);
 }
 
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out) {
@@ -68,7 +72,7 @@ int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit
     sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);
     sqlite3_bind_int(st, 3, limit);
   }
-  return rows_many(cat, db, st, read_row, out, sizeof *out, limit);
+  return rows_many(cat, db, st, &resource_rows, out, limit);
 }
 
 int catalogue_oldest(catalogue *cat, int64_t before, int limit, resource *out) {
@@ -79,7 +83,7 @@ int catalogue_oldest(catalogue *cat, int64_t before, int limit, resource *out) {
     sqlite3_bind_int(st, 1, limit);
     sqlite3_bind_int64(st, 2, before);
   }
-  return rows_many(cat, db, st, read_row, out, sizeof *out, limit);
+  return rows_many(cat, db, st, &resource_rows, out, limit);
 }
 
 typedef struct key_arg {
@@ -130,7 +134,7 @@ void catalogue_touch(catalogue *cat, resource_kind kind, const char *id) {
 
 int64_t catalogue_bytes(catalogue *cat, int derived_only) {
   database *db = catalogue_reader(cat);
-  int64_t total = 0;
+  int64_t total = -1;
   sqlite3_stmt *st = database_statement(db, "SELECT coalesce(sum(bytes), 0) FROM resource WHERE kind>=?1");
   if (st) {
     sqlite3_bind_int(st, 1, derived_only ? 1 : 0);

@@ -1,10 +1,20 @@
 #include "store/rows.h"
 
-store_result rows_one(catalogue *cat, database *db, sqlite3_stmt *st, row_reader read, void *out) {
+/* SQLite gives NULL for a text that it has no memory to copy, and only its error code tells that from a true one. */
+static int fill(database *db, sqlite3_stmt *st, const row_kind *kind, void *out) {
+  if (kind->read(st, out) && (sqlite3_errcode(db->handle) & 0xff) != SQLITE_NOMEM) {
+    return 1;
+  }
+  log_error("catalogue: no memory for a row");
+  kind->release(out);
+  return 0;
+}
+
+store_result rows_one(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out) {
   store_result result = STORE_ERROR;
   if (st) {
     int code = sqlite3_step(st);
-    result = code == SQLITE_ROW    ? (read(st, out) ? STORE_OK : STORE_ERROR)
+    result = code == SQLITE_ROW    ? (fill(db, st, kind, out) ? STORE_OK : STORE_ERROR)
              : code == SQLITE_DONE ? STORE_NOT_FOUND
                                    : STORE_ERROR;
     sqlite3_reset(st);
@@ -13,14 +23,25 @@ store_result rows_one(catalogue *cat, database *db, sqlite3_stmt *st, row_reader
   return result;
 }
 
-int rows_many(catalogue *cat, database *db, sqlite3_stmt *st, row_reader read, void *out, size_t size, int limit) {
-  int count = 0;
-  while (st && count < limit && sqlite3_step(st) == SQLITE_ROW && read(st, (char *)out + (size_t)count * size)) {
-    count++;
+int rows_many(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out, int limit) {
+  int count = 0, code = st ? SQLITE_ROW : SQLITE_ERROR;
+  while (count < limit && code == SQLITE_ROW && (code = sqlite3_step(st)) == SQLITE_ROW) {
+    if (fill(db, st, kind, (char *)out + (size_t)count * kind->size)) {
+      count++;
+    } else {
+      code = SQLITE_NOMEM;
+    }
   }
   if (st) {
     sqlite3_reset(st);
   }
   catalogue_reader_done(cat, db);
-  return count;
+  if (code == SQLITE_ROW || code == SQLITE_DONE) {
+    return count;
+  }
+  log_error("catalogue: rows cannot be read: %s", sqlite3_errstr(code));
+  while (count > 0) {
+    kind->release((char *)out + (size_t)--count * kind->size);
+  }
+  return -1;
 }

@@ -1,16 +1,13 @@
 /* Makes calls of a program fail from outside: a library for LD_PRELOAD that stands before malloc, write, fsync, rename,
- * the steps of SQLite and the starts of threads, whoever calls them: the program, SQLite, the HTTP library, libc.
+ * open, the calls of SQLite and the starts of threads, whoever calls them: the program, SQLite, the HTTP library, libc.
  *
- * The calls of a kind are counted from the start of the program. The environment says what to do:
- *   ORB_FAIL=KIND:#N         the N-th call of the kind fails; KIND:#N+ that and all later ones
- *   ORB_FAIL_MARK=FILE       is made when something failed, so that a test knows that its plan was met
- *   ORB_FAIL_RECORD=FILE     writes a line "KIND SITE N" when a site, the chain of the innermost callers, is first
- *                            passed, by call N; and at the end "total KIND N" for each kind
- * Calls below tinygltf never fail, they are only counted: "KIND SITE N tinygltf". A plan that falls on one
- * takes the next.
- * Kinds: alloc (NULL, ENOMEM), write (ENOSPC, to files only), fsync (EIO), rename (EIO), open (EMFILE), thread
- * (EAGAIN), sqlite (SQLITE_IOERR from sqlite3_step or sqlite3_exec).
+ * ORB_FAIL_BOARD names a file of the size of struct board, which the test shares with the program by mapping: the test
+ * writes there what is to fail, and reads what did. It may do so while the program runs, and again and again. Kinds:
+ * alloc (NULL, ENOMEM), write (ENOSPC, to files only), fsync (EIO), rename (EIO), folder (EIO from mkdir and unlink),
+ * open (EMFILE, of files and folders), thread (EAGAIN), sqlite (SQLITE_IOERR from a step, an exec, a prepare). Where a
+ * call failed is told on stderr.
  */
+#include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
 #include <execinfo.h>
@@ -21,24 +18,29 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/uio.h>
 #include <unistd.h>
 
-enum kind { ALLOC, WRITE, FSYNC, RENAME, OPEN, THREAD, SQLITE, KINDS };
-static const char *const names[KINDS] = {"alloc", "write", "fsync", "rename", "open", "thread", "sqlite"};
+enum kind { ALLOC, WRITE, FSYNC, RENAME, FOLDER, OPEN, THREAD, SQLITE };
+enum { DEPTH = 7, SHOWN = 16, SITES = 1 << 16 };
+enum mode { OFF, ONCE, FOR_EVER };
 
-enum { DEPTH = 7, DEEP = 48, SITES = 1 << 16 };
+/* What the test and the program share. A site is the chain of the innermost callers, as places in their modules, so
+ * that it is the same in each life. */
+struct board {
+  atomic_uint mode; /* written last */
+  uint32_t kind;
+  uint32_t wanted;    /* the call that fails, counted from 1; 0: the first one at a site not in the list */
+  atomic_uint met;    /* the call has failed; for ever: all later ones of the kind do */
+  atomic_uint passed; /* calls of the kind since the test set this to 0 */
+  uint32_t reserved;
+  atomic_uint_fast64_t sites[SITES]; /* where a call has failed, open addressing; 0: free */
+};
 
-static atomic_int state; /* 0: not begun, 1: beginning, 2: ready */
-static int record = -1, fails = -1, for_ever;
-static unsigned long wanted;
-static const char *mark;
-static atomic_uint_fast64_t sites[SITES];
-static atomic_ulong passes[KINDS];
-static atomic_int failing;
+static struct board *board;
 static __thread int inside __attribute__((tls_model("initial-exec")));
 
 static void *next_of(const char *name) {
@@ -48,110 +50,85 @@ static void *next_of(const char *name) {
   return found;
 }
 
-static int raw_open(const char *path, int flags) {
-  return (int)syscall(SYS_openat, AT_FDCWD, path, flags, 0600);
-}
-
 __attribute__((constructor)) static void begin(void) {
   void *frames[4];
-  const char *plan = getenv("ORB_FAIL"), *to = getenv("ORB_FAIL_RECORD");
+  const char *file = getenv("ORB_FAIL_BOARD");
   inside++;
-  backtrace(frames, 4); /* loads what it needs now */
-  mark = getenv("ORB_FAIL_MARK");
-  if (to) {
-    record = raw_open(to, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC);
-  }
-  for (int kind = 0; plan && kind < KINDS; kind++) {
-    size_t n = strlen(names[kind]);
-    if (strncmp(plan, names[kind], n) == 0 && strncmp(plan + n, ":#", 2) == 0) {
-      char *end;
-      wanted = strtoul(plan + n + 2, &end, 10);
-      for_ever = *end == '+';
-      fails = kind;
-    }
-  }
+  backtrace(frames, 4);   /* loads what it needs now */
   unsetenv("LD_PRELOAD"); /* children are none of our business */
+  long fd = file ? syscall(SYS_openat, AT_FDCWD, file, O_RDWR | O_CLOEXEC, 0) : -1;
+  if (fd >= 0) {
+    long at = syscall(SYS_mmap, NULL, sizeof *board, PROT_READ | PROT_WRITE, MAP_SHARED, (int)fd, 0);
+    syscall(SYS_close, (int)fd);
+    board = at == -1 ? NULL : (struct board *)at;
+  }
   inside--;
-  atomic_store(&state, 2);
 }
 
-/* The chain of callers, with addresses as offsets in their modules. Not inlined, nor any of its callers into theirs: it
- * counts the frames. */
-__attribute__((noinline)) static uint64_t site_of(enum kind kind) {
+/* Not inlined, nor any of its callers into theirs: it counts the frames. */
+__attribute__((noinline)) static uint64_t site_of(void) {
   void *frames[DEPTH + 3];
   int count = backtrace(frames, DEPTH + 3);
-  uint64_t hash = 14695981039346656037u + (uint64_t)kind;
+  uint64_t hash = 14695981039346656037u;
   for (int i = 3; i < count; i++) {
-    Dl_info info;
-    uint64_t at = dladdr(frames[i], &info) ? (uint64_t)((char *)frames[i] - (char *)info.dli_fbase) : 0;
+    struct dl_find_object module;
+    int known = _dl_find_object(frames[i], &module) == 0;
+    uint64_t at = known ? (uint64_t)((char *)frames[i] - (char *)module.dlfo_map_start) : 0;
     hash = (hash ^ at) * 1099511628211u;
     hash ^= hash >> 29;
   }
   return hash ? hash : 1;
 }
 
-static int below_tinygltf(void) {
-  void *frames[DEEP];
-  Dl_info info;
-  int count = backtrace(frames, DEEP), found = 0;
-  for (int i = 0; i < count && !found; i++) {
-    found = dladdr(frames[i], &info) && strstr(info.dli_fname, "tinygltf") != NULL;
-  }
-  return found;
-}
-
-static int is_new(uint64_t site) {
+/* The site's place in the list, or the free one where it belongs. */
+static atomic_uint_fast64_t *place_of(uint64_t site) {
   for (uint64_t i = site;; i++) {
-    uint_fast64_t there = 0;
-    if (atomic_compare_exchange_strong(&sites[i % SITES], &there, site)) {
-      return 1;
-    }
-    if (there == site) {
-      return 0;
+    uint_fast64_t there = atomic_load(&board->sites[i % SITES]);
+    if (there == 0 || there == site) {
+      return &board->sites[i % SITES];
     }
   }
 }
 
-static void note(int fd, const char *text, size_t size) {
-  long done = syscall(SYS_write, fd, text, size);
+static void tell(void) {
+  static const char text[] = "a call fails, called from:\n";
+  void *frames[SHOWN];
+  long done = syscall(SYS_write, 2, text, sizeof text - 1);
   (void)done;
+  backtrace_symbols_fd(frames, backtrace(frames, SHOWN), 2);
 }
 
-__attribute__((noinline)) static int look(enum kind kind) {
-  char line[80];
-  unsigned long number = atomic_fetch_add(&passes[kind], 1) + 1;
-  uint64_t site = record >= 0 ? site_of(kind) : 0;
-  if (record >= 0 && is_new(site)) {
-    note(record, line,
-         (size_t)snprintf(line, sizeof line, "%s %016llx %lu%s\n", names[kind], (unsigned long long)site, number,
-                          below_tinygltf() ? " tinygltf" : ""));
+__attribute__((noinline)) static int look(enum mode mode) {
+  unsigned number = atomic_fetch_add(&board->passed, 1) + 1;
+  if (atomic_load(&board->met)) {
+    return mode == FOR_EVER;
   }
-  if (fails != (int)kind || number < wanted || (!for_ever && atomic_load(&failing)) || below_tinygltf()) {
+  uint64_t site = board->wanted ? 0 : site_of();
+  atomic_uint_fast64_t *place = site ? place_of(site) : NULL;
+  if (site ? atomic_load(place) == site : number < board->wanted) {
     return 0;
   }
-  if (atomic_exchange(&failing, 1)) {
-    return for_ever;
+  if (atomic_exchange(&board->met, 1)) {
+    return mode == FOR_EVER;
   }
-  if (mark) {
-    syscall(SYS_close, raw_open(mark, O_WRONLY | O_CREAT | O_CLOEXEC));
+  if (site) {
+    atomic_store(place, site);
   }
+  tell();
   return 1;
 }
 
-__attribute__((destructor)) static void end(void) {
-  char line[80];
-  for (int kind = 0; record >= 0 && kind < KINDS; kind++) {
-    note(record, line, (size_t)snprintf(line, sizeof line, "total %s %lu\n", names[kind], atomic_load(&passes[kind])));
-  }
-}
-
 __attribute__((noinline)) static int fail(enum kind kind) {
-  if (atomic_load(&state) != 2 || inside || (record < 0 && fails != (int)kind)) {
+  if (!board || inside) {
+    return 0;
+  }
+  enum mode mode = atomic_load(&board->mode);
+  if (mode == OFF || board->kind != kind) {
     return 0;
   }
   int saved = errno;
   inside++;
-  int hit = look(kind);
+  int hit = look(mode);
   inside--;
   errno = saved;
   return hit;
@@ -213,15 +190,33 @@ void *aligned_alloc(size_t alignment, size_t size) {
   return fail(ALLOC) ? (errno = ENOMEM, NULL) : next(alignment, size);
 }
 
+#define NEXT(type, name, ...)       \
+  static type (*next)(__VA_ARGS__); \
+  next = next ? next : (type(*)(__VA_ARGS__))next_of(name)
+
+/* Large blocks of the core. */
+void *mmap(void *at, size_t size, int protection, int flags, int fd, off_t offset) {
+  NEXT(void *, "mmap", void *, size_t, int, int, int, off_t);
+  return (flags & MAP_ANONYMOUS) && fail(ALLOC) ? (errno = ENOMEM, MAP_FAILED)
+                                                : next(at, size, protection, flags, fd, offset);
+}
+
+void *mmap64(void *at, size_t size, int protection, int flags, int fd, off64_t offset) {
+  NEXT(void *, "mmap64", void *, size_t, int, int, int, off64_t);
+  return (flags & MAP_ANONYMOUS) && fail(ALLOC) ? (errno = ENOMEM, MAP_FAILED)
+                                                : next(at, size, protection, flags, fd, offset);
+}
+
+void *mremap(void *at, size_t old, size_t size, int flags, ...) {
+  NEXT(void *, "mremap", void *, size_t, size_t, int, ...);
+  return fail(ALLOC) ? (errno = ENOMEM, MAP_FAILED) : next(at, old, size, flags);
+}
+
 /* Only files: a socket or pipe has no disk to fill. */
 static int is_file(int fd) {
   struct stat info;
   return fstat(fd, &info) == 0 && S_ISREG(info.st_mode);
 }
-
-#define NEXT(type, name, ...)       \
-  static type (*next)(__VA_ARGS__); \
-  next = next ? next : (type(*)(__VA_ARGS__))next_of(name)
 
 ssize_t write(int fd, const void *bytes, size_t size) {
   NEXT(ssize_t, "write", int, const void *, size_t);
@@ -281,6 +276,36 @@ int open64(const char *path, int flags, ...) {
   return fail(OPEN) ? (errno = EMFILE, -1) : next(path, flags, mode);
 }
 
+int mkostemp64(char *path, int flags) {
+  NEXT(int, "mkostemp64", char *, int);
+  return fail(OPEN) ? (errno = EMFILE, -1) : next(path, flags);
+}
+
+FILE *fopen64(const char *path, const char *mode) {
+  NEXT(FILE *, "fopen64", const char *, const char *);
+  return fail(OPEN) ? (errno = EMFILE, NULL) : next(path, mode);
+}
+
+DIR *opendir(const char *path) {
+  NEXT(DIR *, "opendir", const char *);
+  return fail(OPEN) ? (errno = EMFILE, NULL) : next(path);
+}
+
+int mkdir(const char *path, mode_t mode) {
+  NEXT(int, "mkdir", const char *, mode_t);
+  return fail(FOLDER) ? (errno = EIO, -1) : next(path, mode);
+}
+
+int unlink(const char *path) {
+  NEXT(int, "unlink", const char *);
+  return fail(FOLDER) ? (errno = EIO, -1) : next(path);
+}
+
+int unlinkat(int folder, const char *path, int flags) {
+  NEXT(int, "unlinkat", int, const char *, int);
+  return fail(FOLDER) ? (errno = EIO, -1) : next(folder, path, flags);
+}
+
 int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *), void *user) {
   NEXT(int, "pthread_create", pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
   return fail(THREAD) ? EAGAIN : next(thread, attributes, run, user);
@@ -288,12 +313,32 @@ int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*
 
 enum { SQLITE_ERROR_IO = 10 };
 
+/* SQLite's calls of itself do not count: sqlite3_exec() takes its result from the statement, which knows of no fault.
+ */
+static int is_own(void *caller, void *function) {
+  struct dl_find_object from, to;
+  return _dl_find_object(caller, &from) == 0 && _dl_find_object(function, &to) == 0 &&
+         from.dlfo_map_start == to.dlfo_map_start;
+}
+
+#define SQLITE_FAILS() (!is_own(__builtin_return_address(0), (void *)next) && fail(SQLITE))
+
 int sqlite3_step(void *statement) {
   NEXT(int, "sqlite3_step", void *);
-  return fail(SQLITE) ? SQLITE_ERROR_IO : next(statement);
+  return SQLITE_FAILS() ? SQLITE_ERROR_IO : next(statement);
 }
 
 int sqlite3_exec(void *db, const char *sql, int (*row)(void *, int, char **, char **), void *user, char **error) {
   NEXT(int, "sqlite3_exec", void *, const char *, int (*)(void *, int, char **, char **), void *, char **);
-  return fail(SQLITE) ? SQLITE_ERROR_IO : next(db, sql, row, user, error);
+  return SQLITE_FAILS() ? SQLITE_ERROR_IO : next(db, sql, row, user, error);
+}
+
+int sqlite3_prepare_v2(void *db, const char *sql, int size, void **statement, const char **rest) {
+  NEXT(int, "sqlite3_prepare_v2", void *, const char *, int, void **, const char **);
+  return SQLITE_FAILS() ? (*statement = NULL, SQLITE_ERROR_IO) : next(db, sql, size, statement, rest);
+}
+
+int sqlite3_prepare_v3(void *db, const char *sql, int size, unsigned flags, void **statement, const char **rest) {
+  NEXT(int, "sqlite3_prepare_v3", void *, const char *, int, unsigned, void **, const char **);
+  return SQLITE_FAILS() ? (*statement = NULL, SQLITE_ERROR_IO) : next(db, sql, size, flags, statement, rest);
 }

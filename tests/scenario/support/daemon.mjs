@@ -33,7 +33,10 @@ export class Daemon {
     this.exited = new Promise((resolve) => child.once('exit', (code, signal) => resolve({ code, signal })));
     child.stderr.on('data', (chunk) => (this.log = (this.log + chunk).slice(-200_000)));
     this.url = await new Promise((resolve, reject) => {
-      const fail = (why) => reject(new Error(`the daemon did not start: ${why}\n${this.log}`));
+      const fail = (why) => {
+        clearTimeout(timer);
+        reject(new Error(`the daemon did not start: ${why}\n${this.log}`));
+      };
       const timer = setTimeout(() => fail('no line in time'), START_MS);
       child.once('error', (error) => fail(error.message));
       child.once('exit', (code, signal) => fail(`exit ${code ?? signal}`));
