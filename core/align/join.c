@@ -33,6 +33,10 @@ typedef struct joiner {
   int32_t *face, faces;          /* of each half-edge: the face on its left */
   int32_t *parent;               /* trees of the forest */
   int32_t edges;
+  double *least;       /* shape-major, count × count: lower bounds of the lengths of paths */
+  double *ball_radius; /* shape-major: how far about a landmark they are exact, as of so many edges */
+  int32_t *ball_edges;
+  int32_t **mark, *marked; /* of each shape: the landmark that a vertex is, −1; of so many vertices */
 } joiner;
 
 /* A heap of pairs by length, ties by number. */
@@ -217,28 +221,38 @@ static double straight(const joiner *j, int32_t s, int32_t a, int32_t b) {
   return sqrt(orb_distance2(p + 3 * (size_t)at[a], p + 3 * (size_t)at[b]));
 }
 
-/* Is the way from a to b, past all paths laid so far and summed over the shapes, at most `most` long? */
-static orb_status short_enough(joiner *j, int32_t a, int32_t b, double most, int *yes) {
-  double rest = most;
+static double *least_from(const joiner *j, int32_t s, int32_t a) {
+  return j->least + ((size_t)s * (size_t)j->count + (size_t)a) * (size_t)j->count;
+}
+
+/* The length that a path from a to b has at least, summed over the shapes. */
+static double least_length(const joiner *j, int32_t a, int32_t b) {
+  double sum = 0;
   for (int32_t s = 0; s < j->shapes; s++) {
-    rest -= straight(j, s, a, b);
+    sum += least_from(j, s, a)[b];
   }
-  *yes = rest >= 0;
+  return sum;
+}
+
+/* Is the way from a to b, past all paths laid so far and summed over the shapes, at most `most` long? A search looks at
+ * all ways from a at once; what it learns of them holds for ever, since paths only get in the way. */
+static orb_status short_enough(joiner *j, int32_t a, int32_t b, double most, int *yes) {
+  *yes = least_length(j, a, b) < most;
   for (int32_t s = 0; s < j->shapes && *yes; s++) {
-    orb_tracer *t = &j->tracers[s];
-    const int32_t *at = j->at + (size_t)s * (size_t)j->count;
-    double line = straight(j, s, a, b);
-    ORB_TRY(orb_tracer_fit(t));
-    ORB_TRY(orb_context_check(j->ctx));
-    orb_tracer_gates(t, at[a], -1, -1, 1);
-    orb_tracer_gates(t, at[b], -1, -1, 1);
-    t->bound = rest + line;
-    orb_status status = orb_tracer_search(t, at[a], at[b], yes);
-    t->bound = 0;
-    orb_tracer_gates(t, at[a], -1, -1, 0);
-    orb_tracer_gates(t, at[b], -1, -1, 0);
-    ORB_TRY(status);
-    rest -= *yes ? t->length - line : 0;
+    size_t ball = (size_t)s * (size_t)j->count + (size_t)a;
+    double *least = least_from(j, s, a);
+    if (j->ball_edges[ball] != j->edges || j->ball_radius[ball] < most) {
+      ORB_TRY(orb_tracer_fit(&j->tracers[s]));
+      ORB_TRY(orb_context_check(j->ctx));
+      ORB_TRY(orb_tracer_ball(&j->tracers[s], j->at[ball], most, j->mark[s], j->marked[s], least, j->count));
+      j->ball_edges[ball] = j->edges;
+      j->ball_radius[ball] = most;
+    }
+    for (int32_t c = 0; c < j->count; c++) {
+      double *other = &least_from(j, s, c)[a];
+      *other = least[c] > *other ? least[c] : *other;
+    }
+    *yes = least_length(j, a, b) < most;
   }
   return ORB_OK;
 }
@@ -263,7 +277,7 @@ static orb_status join_pass(joiner *j, queue *q, int tree, int *good) {
       double most = SLACK * q->pair[q->heap[second]].length;
       ORB_TRY(short_enough(j, a, b, most, &taken));
       if (!taken) {
-        pair->length = most;
+        pair->length = fmax(most, least_length(j, a, b));
         sift(q, 0);
       }
     }
@@ -282,7 +296,7 @@ static orb_status join_all(joiner *j, queue *q, int *good) {
     for (int32_t b = 0; b < a; b++) {
       double length = 0;
       for (int32_t s = 0; s < j->shapes; s++) {
-        length += straight(j, s, a, b);
+        length += least_from(j, s, a)[b] = least_from(j, s, b)[a] = straight(j, s, a, b);
       }
       q->pair[pairs++] = (candidate){length, b, a};
     }
@@ -341,38 +355,76 @@ static void rename_paths(const joiner *j, const orb_sheet *base, orb_paths *path
   }
 }
 
+static void joiner_free(joiner *j) {
+  for (int32_t s = 0; s < j->shapes; s++) {
+    if (j->tracers && j->tracers[s].ctx) {
+      orb_tracer_free(&j->tracers[s]);
+    }
+    if (j->mark) {
+      orb_free(j->ctx, j->mark[s]);
+    }
+  }
+  orb_free(j->ctx, j->tracers);
+  orb_free(j->ctx, j->mark);
+  orb_free(j->ctx, j->marked);
+  orb_free(j->ctx, j->least);
+  orb_free(j->ctx, j->ball_radius);
+  orb_free(j->ctx, j->ball_edges);
+  orb_free(j->ctx, j->origin);
+}
+
+static orb_status joiner_create(joiner *j, orb_sheet *sheets, orb_paths *paths) {
+  size_t half_edges = 6 * (size_t)j->count, ends = (size_t)j->shapes * (size_t)j->count;
+  int32_t *block = j->origin = ORB_NEW(j->ctx, int32_t, 4 * half_edges + 2 * (size_t)j->count);
+  j->tracers = ORB_NEW0(j->ctx, orb_tracer, j->shapes);
+  j->mark = ORB_NEW0(j->ctx, int32_t *, j->shapes);
+  j->marked = ORB_NEW(j->ctx, int32_t, j->shapes);
+  j->least = ORB_NEW0(j->ctx, double, ends *(size_t)j->count);
+  j->ball_radius = ORB_NEW0(j->ctx, double, ends);
+  j->ball_edges = ORB_NEW0(j->ctx, int32_t, ends);
+  if (!block || !j->tracers || !j->mark || !j->marked || !j->least || !j->ball_radius || !j->ball_edges) {
+    return ORB_E_NO_MEMORY;
+  }
+  j->next = block + half_edges;
+  j->prev = block + 2 * half_edges;
+  j->face = block + 3 * half_edges;
+  j->first = block + 4 * half_edges;
+  j->parent = j->first + j->count;
+  for (int32_t k = 0; k < j->count; k++) {
+    j->first[k] = -1;
+    j->parent[k] = k;
+  }
+  for (int32_t s = 0; s < j->shapes; s++) {
+    j->tracers[s] = (orb_tracer){.ctx = j->ctx, .sheet = &sheets[s], .paths = &paths[s]};
+    ORB_TRY(orb_paths_fit(j->ctx, &sheets[s], &paths[s]));
+    j->marked[s] = sheets[s].shape.mesh.vertex_count;
+    j->mark[s] = ORB_NEW(j->ctx, int32_t, j->marked[s]);
+    if (!j->mark[s]) {
+      return ORB_E_NO_MEMORY;
+    }
+    memset(j->mark[s], -1, (size_t)j->marked[s] * sizeof *j->mark[s]);
+    for (int32_t k = 0; k < j->count; k++) {
+      int32_t v = j->at[(size_t)s * (size_t)j->count + (size_t)k];
+      paths[s].on[v] = 1;
+      j->mark[s][v] = k;
+    }
+  }
+  return ORB_OK;
+}
+
 orb_status orb_base_join(orb_context *ctx, orb_sheet *sheets, orb_paths *paths, int32_t shape_count, const int32_t *at,
                          int32_t count, const int32_t *most_triangles, orb_sheet *base, int *good) {
-  orb_status status = ORB_OK;
+  orb_status status;
   ORB_ASSERT(count >= 4);
-  size_t half_edges = 6 * (size_t)count;
   joiner j = {.ctx = ctx, .shapes = shape_count, .count = count, .at = at, .most_triangles = most_triangles};
   size_t pairs = (size_t)count * (size_t)(count - 1) / 2;
   queue q = {.pair = ORB_NEW(ctx, candidate, pairs), .heap = ORB_NEW(ctx, int64_t, pairs)};
-  int32_t *block = ORB_NEW(ctx, int32_t, 4 * half_edges + 2 * (size_t)count);
-  j.tracers = ORB_NEW0(ctx, orb_tracer, shape_count);
   *good = 0;
-  if (!q.pair || !q.heap || !block || !j.tracers) {
+  if (!q.pair || !q.heap) {
     status = ORB_E_NO_MEMORY;
     goto end;
   }
-  j.origin = block;
-  j.next = block + half_edges;
-  j.prev = block + 2 * half_edges;
-  j.face = block + 3 * half_edges;
-  j.first = block + 4 * half_edges;
-  j.parent = j.first + count;
-  for (int32_t k = 0; k < count; k++) {
-    j.first[k] = -1;
-    j.parent[k] = k;
-  }
-  for (int32_t s = 0; s < shape_count; s++) {
-    j.tracers[s] = (orb_tracer){.ctx = ctx, .sheet = &sheets[s], .paths = &paths[s]};
-    ORB_GO(status, orb_paths_fit(ctx, &sheets[s], &paths[s]), end);
-    for (int32_t k = 0; k < count; k++) {
-      paths[s].on[at[(size_t)s * (size_t)count + (size_t)k]] = 1;
-    }
-  }
+  ORB_GO(status, joiner_create(&j, sheets, paths), end);
   ORB_GO(status, join_all(&j, &q, good), end);
   if (*good) {
     status = lay_out(&j, base);
@@ -386,14 +438,8 @@ orb_status orb_base_join(orb_context *ctx, orb_sheet *sheets, orb_paths *paths, 
     }
   }
 end:
-  for (int32_t s = 0; j.tracers && s < shape_count; s++) {
-    if (j.tracers[s].ctx) {
-      orb_tracer_free(&j.tracers[s]);
-    }
-  }
-  orb_free(ctx, j.tracers);
+  joiner_free(&j);
   orb_free(ctx, q.pair);
   orb_free(ctx, q.heap);
-  orb_free(ctx, block);
   return status;
 }

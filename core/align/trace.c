@@ -161,23 +161,39 @@ void orb_tracer_gates(orb_tracer *t, int32_t v, int32_t first, int32_t last, int
   } while (h != end);
 }
 
+/* The end of the search (of a ball: all ends, and their distances), and the node whose neighbours are reached. */
 typedef struct goal {
   int32_t vertex;
-  double place[3];
+  double place[3], from[3];
+  const int32_t *mark;
+  int32_t mark_count;
+  double *distance, radius;
 } goal;
 
+/* A ball came upon a vertex of a path. */
+static void arrive(const orb_tracer *t, int32_t from, int32_t vertex, const goal *g) {
+  if (vertex < g->mark_count && g->mark[vertex] >= 0) {
+    double *least = &g->distance[g->mark[vertex]],
+           cost = t->cost[from] + sqrt(orb_distance2(g->from, point_of(t->sheet, vertex)));
+    *least = cost < *least ? cost : *least;
+  }
+}
+
 static orb_status reach(orb_tracer *t, int32_t from, int32_t to, const goal *g) {
-  double a[3], b[3];
-  place_of(t, from, a);
+  double b[3];
   place_of(t, to, b);
-  double cost = t->cost[from] + sqrt(orb_distance2(a, b));
+  double cost = t->cost[from] + sqrt(orb_distance2(g->from, b));
   if (t->stamp[to] == t->now && t->cost[to] <= cost) {
+    return ORB_OK;
+  }
+  double estimate = g->mark ? cost : cost + sqrt(orb_distance2(b, g->place));
+  if (g->mark && cost > g->radius) {
     return ORB_OK;
   }
   t->stamp[to] = t->now;
   t->cost[to] = cost;
   t->from[to] = from;
-  return heap_push(t, (orb_tracer_item){cost + sqrt(orb_distance2(b, g->place)), to});
+  return heap_push(t, (orb_tracer_item){estimate, cost, to});
 }
 
 /* Along half-edge h, from its origin (node) to its end. */
@@ -185,6 +201,10 @@ static orb_status along(orb_tracer *t, int32_t node, int32_t h, const goal *g) {
   const orb_sheet *s = t->sheet;
   int32_t end = s->shape.mesh.triangles[orb_next(h)];
   if (t->paths->path[h] >= 0) {
+    return ORB_OK;
+  }
+  if (g->mark && t->paths->on[end]) {
+    arrive(t, node, end, g);
     return ORB_OK;
   }
   if (end == g->vertex ? (t->gate[s->twin[h]] & 2) == 0 : t->paths->on[end]) {
@@ -219,56 +239,89 @@ static orb_status expand_edge(orb_tracer *t, int32_t node, const goal *g) {
     int32_t h = sides[k], apex_h = orb_prev(h), apex = s->shape.mesh.triangles[apex_h];
     ORB_TRY(to_edge(t, node, orb_next(h), g));
     ORB_TRY(to_edge(t, node, apex_h, g));
-    if (apex == g->vertex ? (t->gate[apex_h] & 1) != 0 : !t->paths->on[apex]) {
+    if (g->mark && t->paths->on[apex]) {
+      arrive(t, node, apex, g);
+    } else if (apex == g->vertex ? (t->gate[apex_h] & 1) != 0 : !t->paths->on[apex]) {
       ORB_TRY(reach(t, node, 2 * apex, g));
     }
   }
   return ORB_OK;
 }
 
-orb_status orb_tracer_search(orb_tracer *t, int32_t from, int32_t to, int *found) {
+static orb_status begin(orb_tracer *t, int32_t from) {
   int32_t start = 2 * from;
-  goal g = {.vertex = to};
-  place_of(t, 2 * g.vertex, g.place);
   t->now++;
   t->heap_count = 0;
   t->cost[start] = 0;
   t->stamp[start] = t->now;
   t->from[start] = -1;
-  *found = 0;
-  ORB_TRY(heap_push(t, (orb_tracer_item){0, start}));
+  return heap_push(t, (orb_tracer_item){0, 0, start});
+}
+
+/* Expands nodes in their order until the search is at its end; *last: that node, −1: there is no way. */
+static orb_status expand_all(orb_tracer *t, int32_t start, goal *g, int32_t *last) {
+  *last = -1;
   for (int32_t popped = 0; t->heap_count > 0; popped++) {
     if (popped % 8192 == 8191) {
       ORB_TRY(orb_context_check(t->ctx));
     }
     orb_tracer_item top = heap_pop(t);
     int32_t node = top.node;
-    double place[3];
-    if (t->bound > 0 && top.estimate > t->bound) {
+    if (node == 2 * g->vertex) {
+      *last = node;
       break;
     }
-    if (node == 2 * g.vertex) {
-      *found = 1;
-      t->length = t->cost[node];
-      break;
-    }
-    place_of(t, node, place);
-    if (top.estimate > t->cost[node] + sqrt(orb_distance2(place, g.place)) && node != start) {
+    if (top.cost > t->cost[node]) {
       continue; /* a shorter way was found since */
     }
-    ORB_TRY(node & 1 ? expand_edge(t, node, &g) : expand_vertex(t, node, node == start, &g));
+    place_of(t, node, g->from);
+    ORB_TRY(node & 1 ? expand_edge(t, node, g) : expand_vertex(t, node, node == start, g));
   }
+  return ORB_OK;
+}
+
+orb_status orb_tracer_search(orb_tracer *t, int32_t from, int32_t to, int *found) {
+  goal g = {.vertex = to};
+  int32_t last;
+  place_of(t, 2 * to, g.place);
+  ORB_TRY(begin(t, from));
+  ORB_TRY(expand_all(t, 2 * from, &g, &last));
+  *found = last >= 0;
   t->chain_count = 0;
-  for (int32_t node = 2 * g.vertex; *found && node >= 0; node = t->from[node]) {
+  for (int32_t node = last; node >= 0; node = t->from[node]) {
     t->chain[t->chain_count++] = node;
   }
   return ORB_OK;
 }
 
+orb_status orb_tracer_ball(orb_tracer *t, int32_t from, double radius, const int32_t *mark, int32_t mark_count,
+                           double *distance, int32_t distance_count) {
+  int32_t last;
+  orb_status status;
+  double *found = ORB_NEW(t->ctx, double, distance_count);
+  if (!found) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t k = 0; k < distance_count; k++) {
+    found[k] = radius;
+  }
+  goal g = {.vertex = -1, .mark = mark, .mark_count = mark_count, .distance = found, .radius = radius};
+  orb_tracer_gates(t, from, -1, -1, 1);
+  ORB_GO(status, begin(t, from), end);
+  status = expand_all(t, 2 * from, &g, &last);
+end:
+  orb_tracer_gates(t, from, -1, -1, 0);
+  for (int32_t k = 0; status == ORB_OK && k < distance_count; k++) {
+    distance[k] = found[k] > distance[k] ? found[k] : distance[k];
+  }
+  orb_free(t->ctx, found);
+  return status;
+}
+
 /* Edges are named by their ends, since splits renumber half-edges. */
 orb_status orb_tracer_lay(orb_tracer *t, int32_t e, int *good) {
   orb_sheet *s = t->sheet;
-  int32_t count = t->chain_count, last = -1;
+  int32_t count = t->chain_count, first = s->shape.mesh.vertex_count, last = -1;
   orb_status status = ORB_OK;
   int32_t *ends = ORB_NEW(t->ctx, int32_t, 2 * (size_t)count);
   if (!ends) {
@@ -299,6 +352,9 @@ orb_status orb_tracer_lay(orb_tracer *t, int32_t e, int *good) {
       t->paths->path[h] = t->paths->path[s->twin[h]] = e;
     }
     last = v;
+  }
+  if (*good) {
+    orb_paths_straighten(s, t->paths, first);
   }
 end:
   orb_free(t->ctx, ends);

@@ -6,7 +6,7 @@
 
 /* A node is a vertex (2 v) or the middle of an edge (2 h + 1, h the lesser half-edge). */
 typedef struct orb_tracer_item {
-  double estimate;
+  double estimate, cost; /* of the whole path, and of the way to the node */
   int32_t node;
 } orb_tracer_item;
 
@@ -21,7 +21,6 @@ typedef struct orb_tracer {
   int32_t heap_count, heap_capacity;
   int32_t *chain; /* nodes of the path found, back to front */
   int32_t chain_count;
-  double bound, length; /* paths longer than bound (0: none) are not looked for; the length of the one found */
 } orb_tracer;
 
 /* Room for flags and nodes of the sheet as it has grown; before each search. */
@@ -39,7 +38,17 @@ void orb_tracer_gates(orb_tracer *tracer, int32_t v, int32_t first, int32_t last
 /* The shortest path through the gates of `from` and `to` that meets no other; *found 0: none. */
 ORB_MUST_CHECK orb_status orb_tracer_search(orb_tracer *tracer, int32_t from, int32_t to, int *found);
 
-/* Makes the path found a chain of edges of the sheet, under a name. *good 0 where it broke. */
+/* Lower bounds of the lengths of paths from one end, through whatever gates, to all others: of end k, which is the
+ * vertex v with mark[v] = k (other vertices −1; those from mark_count on are none), distance[k] rises to its true
+ * length, or to the radius where that is less. */
+ORB_MUST_CHECK orb_status orb_tracer_ball(orb_tracer *tracer, int32_t from, double radius, const int32_t *mark,
+                                          int32_t mark_count, double *distance, int32_t distance_count);
+
+/* Takes vertices of a path that was just laid, from vertex `first` on, out of it again where that changes no shape; the
+ * vertices and triangles behind them are renumbered. */
+void orb_paths_straighten(orb_sheet *sheet, orb_paths *paths, int32_t first);
+
+/* Makes the path found a chain of edges of the sheet, under a name, and straightens it. *good 0 where it broke. */
 ORB_MUST_CHECK orb_status orb_tracer_lay(orb_tracer *tracer, int32_t name, int *good);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include "orbmorph/align.h"
 
-enum { BODIES = 3, BODIES_LANDMARKS_MAX = 60 };
+enum { BODIES = 3, BODIES_LANDMARKS_MAX = 150 };
 
 /* Three star-shaped bodies of different triangulation; the central projection of the ball they were made from is their
  * embedding. */

@@ -210,6 +210,17 @@ static void sixty(void **state) {
   bodies_close(&b);
 }
 
+/* So many in random order wind about each other in hundreds of strands, side by side: what they cost may not grow from
+ * one strand to the next, else the surfaces outgrow their limit. */
+static void a_hundred_and_fifty(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  bodies_random(&b, 150, 7);
+  meet(&b, 2, 150);
+  bodies_close(&b);
+}
+
 static int load(orb_context *ctx, const char *name, orb_mesh *mesh, orb_embedding *embedding) {
   char path[1024];
   snprintf(path, sizeof path, "%s/good/%s", ORB_SHARED_MESHES, name);
@@ -275,6 +286,7 @@ int main(void) {
       cmocka_unit_test(contradictions_are_named),
       cmocka_unit_test(the_first_that_cannot_be_met_is_named),
       cmocka_unit_test(sixty),
+      cmocka_unit_test(a_hundred_and_fifty),
       cmocka_unit_test(cow_to_human),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
