@@ -11,7 +11,7 @@
 #include "base/check.h"
 #include "remesh/match.h"
 
-enum { MENDS = 4, HOLDS = 32, ROUNDS = 10 };
+enum { HOLDS = 32, ROUNDS = 10 };
 
 /* Later rounds gain a few per cent each. Large meshes, or many shapes, do without: their triangles are small against
  * the tolerance, and time counts. */
@@ -31,6 +31,10 @@ static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, i
     }
     ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, round > 0));
     ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
+    if (round == 0 && strict) { /* while there are vertices left to do it with */
+      int64_t turned;
+      ORB_TRY(orb_match_mend(ctx, match, limit2, &turned));
+    }
     int64_t after = orb_match_live(match);
     if (after <= target || (round > 0 && (before - after) * 100 < before)) {
       break;
@@ -40,44 +44,29 @@ static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, i
   return ORB_OK;
 }
 
-/* Refines until nothing strays: splits of edges may leave items of the triangles beside them too far away. */
+/* Refines until nothing strays: splits of edges may leave items of the triangles beside them too far away. Where that
+ * does not come to an end the overlay is the start instead. */
 static orb_status hold(orb_context *ctx, orb_match *match, double limit2) {
   int64_t strays = 1;
   for (int i = 0; i < HOLDS && strays > 0 && !match->crept; i++) {
     ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
   }
+  match->crept |= strays > 0;
   return ORB_OK;
 }
 
-/* Edges that found no room to be split among needles find it once the needles are gone, and what mends a turned
- * triangle may stray: refine, mend and reduce in turn until the bound holds for every shape. */
-static orb_status settle_within(orb_context *ctx, orb_match *match, double tolerance) {
-  double limit2 = tolerance * tolerance;
-  int64_t strays = 0, turned = 0;
-  for (int i = 0; i < MENDS; i++) {
-    ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
-    if (match->crept) {
-      return ORB_OK;
-    }
-    if (i == 0) {
-      ORB_TRY(orb_match_turn_all(ctx, match, limit2, 1));
-    } else {
-      ORB_TRY(orb_match_mend(ctx, match, limit2, &turned));
-      if (strays == 0 && turned == 0) { /* the splits that mended may stray themselves */
-        ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
-        if (strays == 0) {
-          return ORB_OK;
-        }
-      }
-    }
-    ORB_TRY(reduce(ctx, match, tolerance, 0, 1, i < 2 ? ROUNDS : 1));
-    orb_progress(ctx, "remesh", 0.5 + 0.1 * i);
-  }
-  return hold(ctx, match, limit2);
+/* From a start within the tolerance, by steps none of which leaves it. */
+static orb_status settle(orb_context *ctx, orb_match *match, double tolerance) {
+  int64_t turned = 0;
+  ORB_TRY(orb_match_turn_all(ctx, match, tolerance * tolerance, 1));
+  ORB_TRY(reduce(ctx, match, tolerance, 0, 1, ROUNDS));
+  orb_progress(ctx, "remesh", 0.7);
+  ORB_TRY(orb_match_mend(ctx, match, tolerance * tolerance, &turned));
+  return reduce(ctx, match, tolerance, 0, 1, 1);
 }
 
-/* Starts anew from the overlay, and settles by what never leaves the limit. */
-static orb_status settle_overlay(orb_context *ctx, const orb_remesh_job *job, orb_match *match, double tolerance) {
+/* Starts anew from the overlay, which is exact. */
+static orb_status start_from_overlay(orb_context *ctx, const orb_remesh_job *job, orb_match *match) {
   orb_supermesh overlay = {.error_bound = ORB_NEW(ctx, double, job->shape_count)};
   orb_net net = {0};
   orb_match_free(ctx, match);
@@ -94,9 +83,7 @@ static orb_status settle_overlay(orb_context *ctx, const orb_remesh_job *job, or
   }
   orb_net_free(ctx, &net);
   orb_supermesh_free(ctx, &overlay);
-  ORB_TRY(status);
-  ORB_TRY(orb_match_turn_all(ctx, match, tolerance * tolerance, 1));
-  return reduce(ctx, match, tolerance, 0, 1, ROUNDS);
+  return status;
 }
 
 orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
@@ -107,10 +94,11 @@ orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_
   orb_status status;
   orb_progress(ctx, "remesh", 0.15);
   ORB_GO(status, orb_match_turn_all(ctx, &match, INFINITY, 1), end);
-  ORB_GO(status, settle_within(ctx, &match, tolerance), end);
+  ORB_GO(status, hold(ctx, &match, tolerance * tolerance), end);
   if (match.crept) {
-    ORB_GO(status, settle_overlay(ctx, job, &match, tolerance), end);
+    ORB_GO(status, start_from_overlay(ctx, job, &match), end);
   }
+  ORB_GO(status, settle(ctx, &match, tolerance), end);
   while (most > 0 && orb_match_live(&match) > most && tolerance < 4) {
     tolerance *= 1.25;
     ORB_GO(status, reduce(ctx, &match, tolerance, most, tolerance < 0.05, ROUNDS), end);

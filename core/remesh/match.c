@@ -156,6 +156,14 @@ void orb_match_place(orb_match *match, int32_t v, const double p[3]) {
   }
 }
 
+void orb_match_copy_vertex(orb_match *match, int32_t to, int32_t from) {
+  int64_t shapes = match->shape_count;
+  memcpy(match->net.points + 3 * (int64_t)to, match->net.points + 3 * (int64_t)from, 3 * sizeof(double));
+  memcpy(match->at + 3 * to * shapes, match->at + 3 * from * shapes, 3 * (size_t)shapes * sizeof(double));
+  memcpy(match->normal + 3 * to * shapes, match->normal + 3 * from * shapes, 3 * (size_t)shapes * sizeof(double));
+  memcpy(match->spot + to * shapes, match->spot + from * shapes, (size_t)shapes * sizeof(orb_spot));
+}
+
 static void settle_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   orb_match *match = arg;

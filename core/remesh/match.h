@@ -66,6 +66,9 @@ double orb_match_edge2(const orb_match *match, int32_t v, int32_t w, double limi
 double orb_match_edge_of_shape2(const orb_match *match, int32_t s, int32_t v, int32_t w, double limit2,
                                 orb_stray *worst);
 
+/* The direction in which the net edge v w meets the crossing's edge (or vertex) of the shape. */
+void orb_match_crossing_point(const orb_match *match, int32_t v, int32_t w, const orb_stray *stray, double out[3]);
+
 /* Squared distance of an item to the net triangle a b c. */
 double orb_match_item2(const orb_match *match, int32_t item, int32_t a, int32_t b, int32_t c);
 
@@ -117,15 +120,34 @@ static inline double orb_form_cost(orb_form f) {
   return (1 - f.quality) * (1 - f.quality) + 8 * f.slivers + 64 * f.turned;
 }
 
+/* Whether the triangle is turned in space, or nearly so, on any shape: against the normals at its corners, or against
+ * those at its centre on the sphere, smooth or flat. The second is dear; the first is asked first. */
+int orb_match_is_turned(const orb_match *match, int32_t a, int32_t b, int32_t c);
+/* The summed squares of its edges over the shapes on which it is; 0: none. */
+double orb_match_turned_extent(const orb_match *match, int32_t a, int32_t b, int32_t c);
+/* How many triangles of v and two successive ones of the n others are; `closed`: of the last and the first, too. */
+int orb_match_turned_in_fan(const orb_match *match, int32_t v, const int32_t *ring, int n, int closed);
+
 /* Moves v on the sphere if that makes the triangles around it better, or its edges stray less, within the limit;
  * whether it did. Then all vertices in turn, or those at triangles that are not fine. */
 int orb_match_try_move(orb_match *match, int32_t v, double limit2);
 ORB_MUST_CHECK orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2, int only_bad);
-/* Mends triangles that are turned in space, by splits in the end; edges that splits made may stray. *left: how many
- * were still turned when last looked at. */
+/* Mends triangles that are turned in space, within the limit; *left: how many it could not. */
 ORB_MUST_CHECK orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2, int64_t *left);
 /* Puts vertex v at p: point, spots, positions and normals; triangles and items are the caller's care. */
 void orb_match_place(orb_match *match, int32_t v, const double p[3]);
+
+/* Copies what is known of a vertex, its point and places, over that of another (or of the one after the last). */
+void orb_match_copy_vertex(orb_match *match, int32_t to, int32_t from);
+
+/* What a star is to do about triangles that are turned in space: leave no more of them, leave fewer, or leave no more
+ * and much smaller ones. */
+typedef enum orb_star_goal { ORB_STAR_NOT_WORSE, ORB_STAR_FEWER, ORB_STAR_SMALLER } orb_star_goal;
+/* Replaces the given triangles, a disc that holds p, and those beyond its edges as far as it takes, by triangles from
+ * p: within the limit (relative, squared) and by the goal. How many vertices the disc must have inside is told: the
+ * count of triangles changes by two less twice that. Whether it did. Needs room for one vertex. */
+int orb_match_star(orb_match *match, const int32_t *triangles, int count, const double p[3], double limit2,
+                   int least_inner, int most_inner, orb_star_goal goal);
 
 /* Plans to take u away and to triangulate its hole anew, within the limit (relative, squared): ring are its n
  * neighbours counter-clockwise, triangles n − 2 triples of numbers in the ring. strict as below. 0: there is no way. */

@@ -4,33 +4,95 @@
 #include "numeric/vec3.h"
 #include "remesh/match.h"
 
-static const double FINE_QUALITY = 0.12, FINE_FACING = 0.05;
+static const double FINE_QUALITY = 0.12, FINE_FACING = 0.05, LEAST_QUALITY = 0.02;
+
+/* How well shaped the triangle is on shape s, and how it faces the shape's smooth normals at its corners. */
+static void measure(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c, double *quality,
+                    double *facing) {
+  double u[3], v[3], n[3], ground[3];
+  const double *p = orb_match_at(match, a, s), *q = orb_match_at(match, b, s), *r = orb_match_at(match, c, s);
+  orb_sub(q, p, u);
+  orb_sub(r, p, v);
+  orb_cross(u, v, n);
+  double edges = orb_dot(u, u) + orb_dot(v, v) + orb_distance2(q, r), area2 = orb_length(n);
+  for (int k = 0; k < 3; k++) {
+    ground[k] = orb_match_normal(match, a, s)[k] + orb_match_normal(match, b, s)[k] + orb_match_normal(match, c, s)[k];
+  }
+  *quality = edges > 0 ? 3.4641016151377544 * area2 / edges : 0;
+  *facing = area2 > 0 ? orb_dot(n, ground) / (3 * area2) : 0;
+}
 
 orb_form orb_match_form(const orb_match *match, int32_t a, int32_t b, int32_t c) {
   orb_form worst = ORB_FORM_BEST;
   for (int32_t s = 0; s < match->shape_count; s++) {
-    double u[3], v[3], n[3], ground[3];
-    const double *p = orb_match_at(match, a, s), *q = orb_match_at(match, b, s), *r = orb_match_at(match, c, s);
-    orb_sub(q, p, u);
-    orb_sub(r, p, v);
-    orb_cross(u, v, n);
-    double edges = orb_dot(u, u) + orb_dot(v, v) + orb_distance2(q, r), area2 = orb_length(n);
-    for (int k = 0; k < 3; k++) {
-      ground[k] =
-          orb_match_normal(match, a, s)[k] + orb_match_normal(match, b, s)[k] + orb_match_normal(match, c, s)[k];
-    }
-    worst.quality = fmin(worst.quality, edges > 0 ? 3.4641016151377544 * area2 / edges : 0);
-    worst.facing = fmin(worst.facing, area2 > 0 ? orb_dot(n, ground) / (3 * area2) : 0);
+    double quality, facing;
+    measure(match, s, a, b, c, &quality, &facing);
+    worst.quality = fmin(worst.quality, quality);
+    worst.facing = fmin(worst.facing, facing);
   }
   worst.slivers = worst.quality < FINE_QUALITY;
   worst.turned = worst.facing < FINE_FACING;
   return worst;
 }
 
-int orb_form_allows(orb_form before, orb_form after) {
-  if (after.turned < before.turned) {
-    return 1;
+/* Against the shape's flat and smooth normals where the centre of the triangle on the sphere lies on it. */
+static int is_turned_at_centre(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c) {
+  const int32_t corner[3] = {a, b, c};
+  double centre[3] = {0, 0, 0}, u[3], v[3], n[3], flat[3], smooth[3] = {0, 0, 0};
+  for (int i = 0; i < 9; i++) {
+    centre[i % 3] += orb_net_point(&match->net, corner[i / 3])[i % 3];
   }
-  return (after.slivers < before.slivers || after.quality >= fmin(before.quality, FINE_QUALITY)) &&
-         after.facing >= fmin(before.facing, FINE_FACING);
+  (void)orb_normalize(centre);
+  orb_place place;
+  orb_locate(match->job->locator[s], centre, match->spot[(int64_t)a * match->shape_count + s].h / 3, &place);
+  const int32_t *on = match->view[s].triangles + 3 * (int64_t)place.triangle;
+  for (int i = 0; i < 9; i++) {
+    smooth[i % 3] += place.at[i / 3] * match->vertex_normal[s][3 * (int64_t)on[i / 3] + i % 3];
+  }
+  const double *p = orb_match_at(match, a, s), *q = match->position[s] + 3 * (int64_t)on[0];
+  orb_sub(match->position[s] + 3 * (int64_t)on[1], q, u);
+  orb_sub(match->position[s] + 3 * (int64_t)on[2], q, v);
+  orb_cross(u, v, flat);
+  orb_sub(orb_match_at(match, b, s), p, u);
+  orb_sub(orb_match_at(match, c, s), p, v);
+  orb_cross(u, v, n);
+  return orb_dot(n, smooth) <= 0 || orb_dot(n, flat) < 0;
+}
+
+/* On shape s: facing away from the normals at the corners, or from those at the centre. */
+static int is_turned_on(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c) {
+  double facing, quality;
+  measure(match, s, a, b, c, &quality, &facing);
+  return facing < FINE_FACING || is_turned_at_centre(match, s, a, b, c);
+}
+
+int orb_match_is_turned(const orb_match *match, int32_t a, int32_t b, int32_t c) {
+  int turned = orb_match_form(match, a, b, c).turned > 0;
+  for (int32_t s = 0; s < match->shape_count && !turned; s++) {
+    turned = is_turned_at_centre(match, s, a, b, c);
+  }
+  return turned;
+}
+
+double orb_match_turned_extent(const orb_match *match, int32_t a, int32_t b, int32_t c) {
+  double extent = 0;
+  for (int32_t s = 0; s < match->shape_count; s++) {
+    if (is_turned_on(match, s, a, b, c)) {
+      const double *p = orb_match_at(match, a, s), *q = orb_match_at(match, b, s), *r = orb_match_at(match, c, s);
+      extent += orb_distance2(p, q) + orb_distance2(q, r) + orb_distance2(r, p) + 1e-200;
+    }
+  }
+  return extent;
+}
+
+int orb_match_turned_in_fan(const orb_match *match, int32_t v, const int32_t *ring, int n, int closed) {
+  int turned = 0;
+  for (int i = 0; i + 1 < n + closed; i++) {
+    turned += orb_match_is_turned(match, v, ring[i], ring[(i + 1) % n]);
+  }
+  return turned;
+}
+
+int orb_form_allows(orb_form before, orb_form after) {
+  return after.turned <= before.turned && after.quality >= fmin(before.quality, LEAST_QUALITY);
 }

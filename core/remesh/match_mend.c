@@ -1,92 +1,171 @@
 /* Triangles that are turned in space against a shape, though none is turned on the sphere: the shape bends, or the map
- * to it shears, within the triangle. Turned edges or moved corners mend most; else an edge is split, for small enough
- * triangles follow the surface. */
+ * to it shears, within the triangle. In order of price: an edge is turned; a corner is moved, with as many turned edges
+ * as it takes; a vertex is added, where the shape bends most along an edge or at a vertex of a shape. Nothing leaves
+ * the limit, and no triangle that was fine comes out turned. */
 #include <math.h>
 
 #include "base/check.h"
 #include "numeric/vec3.h"
 #include "remesh/match.h"
 
-enum { ROUNDS = 6 };
+enum { STAR_MAX = 24, ITEMS = 12 };
+
+typedef struct mender {
+  orb_context *ctx;
+  orb_match *match;
+  double limit2;
+  orb_star_goal goal;
+} mender;
 
 static int is_turned(const orb_match *match, int32_t t) {
   const int32_t *c = match->net.triangles + 3 * (int64_t)t;
-  return c[0] >= 0 && orb_match_form(match, c[0], c[1], c[2]).facing <= 0;
+  return c[0] >= 0 && orb_match_is_turned(match, c[0], c[1], c[2]);
 }
 
-/* The half-edge of t that is longest on the shapes, each in units of its diagonal. */
-static int32_t longest_edge(const orb_match *match, int32_t t) {
-  int32_t longest = 3 * t;
-  double most = -1;
-  for (int32_t h = 3 * t; h < 3 * t + 3; h++) {
-    double length2 = 0;
-    for (int32_t s = 0; s < match->shape_count; s++) {
-      length2 += orb_distance2(orb_match_at(match, match->net.triangles[h], s),
-                               orb_match_at(match, match->net.triangles[orb_next(h)], s));
+static int star_of(const orb_net *net, int32_t v, int32_t triangles[STAR_MAX]) {
+  int n = 0;
+  int32_t first = net->out[v], h = first;
+  do {
+    if (n == STAR_MAX) {
+      return 0;
     }
-    if (length2 > most) {
-      most = length2;
-      longest = h;
-    }
-  }
-  return longest;
+    triangles[n++] = h / 3;
+    h = net->twin[orb_prev(h)];
+  } while (h != first);
+  return n;
 }
 
-static void tidy_around(orb_match *match, int32_t v, double limit2) {
-  int32_t first = match->net.out[v], h = first, count = 0;
-  do { /* a turn changes the ring: a few tries only */
-    (void)orb_match_try_turn(match, orb_next(h), limit2);
-    h = match->net.twin[orb_prev(h)];
-  } while (h != first && ++count < 8);
-  (void)orb_match_try_move(match, v, limit2);
-}
-
-static int mend_gently(orb_match *match, int32_t t, double limit2) {
-  for (int k = 0; k < 3 && is_turned(match, t); k++) {
-    (void)orb_match_try_turn(match, 3 * t + k, limit2);
-  }
-  for (int k = 0; k < 3 && is_turned(match, t); k++) {
-    (void)orb_match_try_move(match, match->net.triangles[3 * (int64_t)t + k], limit2);
-  }
-  return !is_turned(match, t);
-}
-
-static orb_status mend_by_split(orb_context *ctx, orb_match *match, int32_t t, double limit2) {
-  int32_t h = longest_edge(match, t);
-  double middle[3];
-  ORB_TRY(orb_match_reserve(ctx, match, 1));
-  const double *a = orb_net_point(&match->net, match->net.triangles[h]);
-  const double *b = orb_net_point(&match->net, match->net.triangles[orb_next(h)]);
+static void middle_of(const orb_match *match, int32_t a, int32_t b, int32_t c, double out[3]) {
   for (int k = 0; k < 3; k++) {
-    middle[k] = a[k] + b[k];
+    out[k] = orb_net_point(&match->net, a)[k] + orb_net_point(&match->net, b)[k];
+    out[k] += c >= 0 ? orb_net_point(&match->net, c)[k] : 0;
   }
-  (void)orb_normalize(middle);
-  int32_t v = orb_match_split(match, h, middle);
-  if (v >= 0) {
-    tidy_around(match, v, limit2);
+  (void)orb_normalize(out);
+}
+
+/* Tries the vertices of shapes that lie in the triangles as the middle of the star that replaces them. */
+static int try_items(const mender *m, const int32_t *triangles, int count, int most_inner) {
+  int tried = 0;
+  for (int i = 0; i < count; i++) {
+    int32_t item = m->match->triangle_items[triangles[i]];
+    for (; item >= 0 && tried < ITEMS; item = m->match->item_next[item], tried++) {
+      const double *p = orb_match_item_point(m->match, item);
+      if (orb_match_star(m->match, triangles, count, p, m->limit2, 0, most_inner, m->goal)) {
+        return 1;
+      }
+    }
+  }
+  return 0;
+}
+
+static int try_corner(const mender *m, int32_t v) {
+  orb_match *match = m->match;
+  int32_t star[STAR_MAX];
+  int n = star_of(&match->net, v, star);
+  double p[3];
+  if (n == 0 || match->fixed[v]) {
+    return 0;
+  }
+  for (int k = 0; k < 3; k++) {
+    p[k] = orb_net_point(&match->net, v)[k];
+  }
+  if (orb_match_star(match, star, n, p, m->limit2, 1, 3, m->goal)) {
+    return 1;
+  }
+  for (int i = 0; i < n; i++) {
+    const int32_t *c = match->net.triangles + 3 * (int64_t)star[i];
+    int k = c[0] == v ? 0 : c[1] == v ? 1 : 2;
+    middle_of(match, v, c[(k + 1) % 3], -1, p);
+    if (orb_match_star(match, star, n, p, m->limit2, 1, 3, m->goal)) {
+      return 1;
+    }
+    middle_of(match, v, c[(k + 1) % 3], c[(k + 2) % 3], p);
+    if (orb_match_star(match, star, n, p, m->limit2, 1, 3, m->goal)) {
+      return 1;
+    }
+  }
+  return try_items(m, star, n, 3);
+}
+
+static int try_split(const mender *m, int32_t h) {
+  orb_match *match = m->match;
+  int32_t pair[2] = {h / 3, match->net.twin[h] / 3};
+  int32_t a = match->net.triangles[h], b = match->net.triangles[orb_next(h)];
+  orb_stray worst = {0, -1, -1, 0};
+  double p[3];
+  if (orb_match_edge2(match, a, b, INFINITY, &worst) > 0 && worst.shape >= 0) {
+    orb_match_crossing_point(match, a, b, &worst, p);
+    if (orb_match_star(match, pair, 2, p, m->limit2, 0, 3, m->goal)) {
+      return 1;
+    }
+  }
+  middle_of(match, a, b, -1, p);
+  return orb_match_star(match, pair, 2, p, m->limit2, 0, 3, m->goal) || try_items(m, pair, 2, 3);
+}
+
+static int turn_or_move(const mender *m, int32_t t) {
+  orb_match *match = m->match;
+  for (int k = 0; k < 3; k++) {
+    if (orb_match_try_turn(match, 3 * t + k, m->limit2) && !is_turned(match, t)) {
+      return 1;
+    }
+  }
+  for (int k = 0; k < 3; k++) {
+    if (orb_match_try_move(match, match->net.triangles[3 * (int64_t)t + k], m->limit2) && !is_turned(match, t)) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
+static orb_status mend(const mender *m, int32_t t, int *mended) {
+  orb_match *match = m->match;
+  ORB_TRY(orb_match_reserve(m->ctx, match, 1));
+  *mended = turn_or_move(m, t);
+  const int32_t *c = match->net.triangles + 3 * (int64_t)t;
+  for (int k = 0; k < 3 && !*mended; k++) {
+    *mended = try_corner(m, c[k]);
+  }
+  for (int k = 0; k < 3 && !*mended; k++) {
+    *mended = try_split(m, 3 * t + k);
+  }
+  if (!*mended) {
+    double p[3];
+    middle_of(match, c[0], c[1], c[2], p);
+    *mended = orb_match_star(match, &t, 1, p, m->limit2, 0, 3, m->goal);
+  }
+  return ORB_OK;
+}
+
+/* Tries to mend every turned triangle; those made on the way wait for the next pass. */
+static orb_status pass(const mender *m, int64_t *seen, int64_t *left) {
+  orb_match *match = m->match;
+  int32_t count = match->net.triangle_count;
+  *seen = *left = 0;
+  for (int32_t t = 0; t < count; t++) {
+    int mended = 0;
+    if (is_turned(match, t)) {
+      ++*seen;
+      ORB_TRY(mend(m, t, &mended));
+      *left += !mended;
+    }
+    if ((t & 255) == 0) {
+      ORB_TRY(orb_context_check(m->ctx));
+    }
   }
   return ORB_OK;
 }
 
 orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2, int64_t *left) {
-  for (int round = 0; round < ROUNDS; round++) {
-    int64_t turned = 0;
-    int32_t count = match->net.triangle_count; /* those made on the way wait for the next round */
-    for (int32_t t = 0; t < count; t++) {
-      if (is_turned(match, t) && !mend_gently(match, t, limit2)) {
-        turned++;
-        if (round > 0) {
-          ORB_TRY(mend_by_split(ctx, match, t, limit2));
-        }
-      }
-      if ((t & 1023) == 0) {
-        ORB_TRY(orb_context_check(ctx));
-      }
+  static const orb_star_goal goal[] = {ORB_STAR_FEWER, ORB_STAR_FEWER, ORB_STAR_SMALLER, ORB_STAR_FEWER};
+  int64_t seen = 1, before = -1;
+  for (size_t i = 0; i < sizeof goal / sizeof *goal && seen > 0; i++) {
+    mender m = {ctx, match, limit2, goal[i]};
+    if (i > 0 && goal[i] == goal[i - 1] && before == *left) {
+      continue; /* nothing has changed */
     }
-    *left = turned;
-    if (turned == 0) {
-      break;
-    }
+    ORB_TRY(pass(&m, &seen, left));
+    before = seen;
   }
   return ORB_OK;
 }

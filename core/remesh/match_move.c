@@ -117,7 +117,7 @@ static void stand_copy(orb_match *match, int32_t v, stand *s, int back) {
 }
 
 /* Moves v to p if that costs clearly less than *cost, and sets that; whether it did. The items stay in their lists. */
-static int try_point(const star *s, const double p[3], orb_form before, double *cost) {
+static int try_point(const star *s, const double p[3], orb_form before, double *cost, int *most_turned) {
   stand old;
   orb_form after;
   if (!positive_at(s, p)) {
@@ -129,8 +129,12 @@ static int try_point(const star *s, const double p[3], orb_form before, double *
   if (now < *cost && orb_form_allows(before, after)) {
     now += edges_cost(s, *cost - now);
     if (now < *cost * (1 - LEAST_GAIN) && items_allow(s)) {
-      *cost = now;
-      return 1;
+      int turned = orb_match_turned_in_fan(s->match, s->v, s->ring, s->n, 1);
+      if (turned <= *most_turned) {
+        *cost = now;
+        *most_turned = turned;
+        return 1;
+      }
     }
   }
   stand_copy(s->match, s->v, &old, 1);
@@ -216,7 +220,7 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
   orb_form before;
   double cost = form_cost(&s, &before);
   cost += edges_cost(&s, INFINITY);
-  int moved = 0;
+  int moved = 0, turned = orb_match_turned_in_fan(match, v, s.ring, s.n, 1);
   for (int i = 0; i <= s.n; i++) {
     const double *to = i < s.n ? orb_net_point(&match->net, s.ring[i]) : middle;
     for (size_t j = 0; j < sizeof way / sizeof way[0]; j++) {
@@ -225,7 +229,7 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
         p[k] = from[k] + way[j] * (to[k] - from[k]);
       }
       (void)orb_normalize(p);
-      moved |= try_point(&s, p, before, &cost);
+      moved |= try_point(&s, p, before, &cost, &turned);
     }
   }
   match->stayed[v] = moved ? 0 : mark;

@@ -34,6 +34,12 @@ static void forms_of_turn(const orb_match *match, int32_t a, int32_t b, int32_t 
   *after = orb_form_join(orb_match_form(match, c, d, b), orb_match_form(match, d, c, a));
 }
 
+/* Whether more triangles are turned in space after a turn of edge a b than before. */
+static int turn_turns(const orb_match *match, int32_t a, int32_t b, int32_t c, int32_t d) {
+  int after = orb_match_is_turned(match, c, d, b) + orb_match_is_turned(match, d, c, a);
+  return after > 0 && after > orb_match_is_turned(match, a, b, c) + orb_match_is_turned(match, b, a, d);
+}
+
 static int try_turn(orb_match *match, int32_t h, double limit2, int only_bad) {
   const orb_net *net = &match->net;
   int32_t g = net->twin[h];
@@ -48,7 +54,7 @@ static int try_turn(orb_match *match, int32_t h, double limit2, int only_bad) {
   if (!better || !orb_form_allows(before, after) || !orb_net_can_flip(net, h) ||
       orb_match_edge2(match, c, d, limit2, NULL) > limit2 ||
       items_of_turn2(match, match->triangle_items[h / 3], c, d, b, a) > limit2 ||
-      items_of_turn2(match, match->triangle_items[g / 3], c, d, b, a) > limit2) {
+      items_of_turn2(match, match->triangle_items[g / 3], c, d, b, a) > limit2 || turn_turns(match, a, b, c, d)) {
     return 0;
   }
   turn(match, h);
@@ -77,8 +83,7 @@ orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2,
   return ORB_OK;
 }
 
-/* The direction in which the net edge v w meets the crossing's edge (or vertex) of the shape. */
-static void crossing_point(const orb_match *match, int32_t v, int32_t w, const orb_stray *stray, double out[3]) {
+void orb_match_crossing_point(const orb_match *match, int32_t v, int32_t w, const orb_stray *stray, double out[3]) {
   const orb_sphere_view *view = &match->view[stray->shape];
   const double *c = view->points + 3 * (int64_t)view->triangles[stray->h];
   if (stray->at_vertex) {
@@ -207,7 +212,7 @@ static int32_t split_near(orb_match *match, int32_t h, const double p[3]) {
 static int32_t split_at(orb_match *match, int32_t h, const orb_stray *worst) {
   const orb_net *net = &match->net;
   double p[3];
-  crossing_point(match, net->triangles[h], net->triangles[net->twin[h]], worst, p);
+  orb_match_crossing_point(match, net->triangles[h], net->triangles[net->twin[h]], worst, p);
   int32_t split = h;
   for (int step = 0; step < 64; step++) {
     int32_t longer = longest_of_needle(net, split);
@@ -229,7 +234,7 @@ static orb_status give_room(orb_context *ctx, orb_match *match, int32_t h, const
   const orb_net *net = &match->net;
   int32_t v = net->triangles[h], w = net->triangles[net->twin[h]], before = net->vertex_count;
   double p[3];
-  crossing_point(match, v, w, worst, p);
+  orb_match_crossing_point(match, v, w, worst, p);
   int32_t n = orb_match_insert(match, h / 3, p);
   if (n >= before) {
     ORB_TRY(push_star(ctx, match, n, queue));

@@ -274,6 +274,33 @@ int32_t orb_net_fill(orb_net *net, int32_t h, int n, int (*triangles)[3]) {
   return slot[0];
 }
 
+int32_t orb_net_star(orb_net *net, const int32_t *triangles, int count, const int32_t *edges, int n,
+                     const int32_t *inner, int inner_count, int32_t p) {
+  int32_t ring[ORB_STAR_MOST], outer[ORB_STAR_MOST], slot[ORB_STAR_MOST];
+  for (int i = 0; i < n; i++) {
+    ring[i] = origin(net, edges[i]);
+    outer[i] = net->twin[edges[i]];
+    slot[i] = i < count ? triangles[i] : net->triangle_count++;
+  }
+  for (int i = 0; i < inner_count; i++) {
+    net->out[inner[i]] = -1;
+  }
+  for (int i = n; i < count; i++) {
+    for (int k = 0; k < 3; k++) {
+      net->triangles[3 * triangles[i] + k] = -1;
+    }
+  }
+  net->vertex_count += p == net->vertex_count;
+  for (int i = 0; i < n; i++) {
+    set_triangle(net, slot[i], p, ring[i], ring[(i + 1) % n]);
+    join(net, 3 * slot[i] + 1, outer[i]);
+  }
+  for (int i = 0; i < n; i++) {
+    join(net, 3 * slot[i] + 2, 3 * slot[(i + 1) % n]);
+  }
+  return slot[0];
+}
+
 int orb_net_move(orb_net *net, int32_t v, const double p[3]) {
   int32_t first = net->out[v], h = first;
   do {

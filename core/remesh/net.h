@@ -54,10 +54,17 @@ void orb_net_collapse(orb_net *net, int32_t h);
 
 int orb_net_adjacent(const orb_net *net, int32_t a, int32_t b);
 
-enum { ORB_FILL_MOST = 12 };
+enum { ORB_FILL_MOST = 12, ORB_STAR_MOST = 20 };
 /* Takes away the origin of h, which has n ≤ ORB_FILL_MOST neighbours, and fills the hole with n − 2 triangles over its
  * ring: corner i is the i-th neighbour counter-clockwise from the end of h. One of the new triangles. */
 int32_t orb_net_fill(orb_net *net, int32_t h, int n, int (*triangles)[3]);
+
+/* Replaces a disc of `count` triangles by the star of vertex p over its boundary: `edges` are the n half-edges of the
+ * disc's triangles along it, counter-clockwise; `inner` the vertices inside, n = count + 2 − 2 · inner_count. p is a
+ * vertex inside or a new one, number vertex_count, for which there must be room; the other inner ones die. Topology
+ * only, positive or not is for the caller. One of the new triangles. */
+int32_t orb_net_star(orb_net *net, const int32_t *triangles, int count, const int32_t *edges, int n,
+                     const int32_t *inner, int inner_count, int32_t p);
 
 /* Moves a vertex if every triangle around it stays positive; returns whether it did. */
 int orb_net_move(orb_net *net, int32_t v, const double p[3]);
