@@ -1,11 +1,11 @@
 /* The adaptive method: as few triangles as keep every shape within the tolerance, the bound proved (see match.h).
  *
- * The start holds every vertex of every shape; edges that stray are turned or split until the bound holds. Then, in
- * rounds: edges are collapsed and holes filled anew while the bound still holds, edges turned for well-shaped
- * triangles, and vertices moved to where the edges stray less, which makes room for the next round. Triangles that come
- * out turned in space are mended by smaller ones. Where splits creep without end, the overlay of all shapes is the
- * start instead: it holds the bound as it is, and is only reduced. Where max_triangles asks for fewer, the tolerance is
- * raised step by step until they suffice. */
+ * The start holds every vertex of every shape; edges that stray are turned or split until the bound holds. Where that
+ * comes to no end, the overlay of all shapes, which is exact, is the start instead. From then on no step leaves the
+ * tolerance. In rounds: edges are collapsed, holes filled anew and neighbours merged, edges turned for well-shaped
+ * triangles, and vertices moved to where the edges stray less, which makes room for the next round. Nor does any step
+ * leave more triangles turned in space than it found; what the start had of them is mended between the rounds. Where
+ * max_triangles asks for fewer triangles, the tolerance is raised step by step until they suffice. */
 #include <math.h>
 
 #include "base/check.h"
@@ -30,6 +30,9 @@ static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, i
       ORB_TRY(orb_match_move_all(ctx, match, limit2, 0));
     }
     ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, round > 0));
+    if (round > 0) {
+      ORB_TRY(orb_match_merge_all(ctx, match, limit2, target));
+    }
     ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
     if (round == 0 && strict) { /* while there are vertices left to do it with */
       int64_t turned;

@@ -33,6 +33,7 @@ void orb_match_free(orb_context *ctx, orb_match *match) {
   orb_free(ctx, match->spot);
   orb_free(ctx, match->fixed);
   orb_free(ctx, match->stayed);
+  orb_free(ctx, match->alone);
   orb_free(ctx, match->item_begin);
   orb_free(ctx, match->item_next);
   orb_free(ctx, match->item_shape);
@@ -60,13 +61,14 @@ orb_status orb_match_reserve(orb_context *ctx, orb_match *match, int64_t more) {
   size_t n = (size_t)match->net.vertex_capacity, cells = n * (size_t)match->shape_count;
   if (!grow(ctx, &match->at, 3 * cells, sizeof(double)) || !grow(ctx, &match->normal, 3 * cells, sizeof(double)) ||
       !grow(ctx, &match->spot, cells, sizeof(orb_spot)) || !grow(ctx, &match->fixed, n, 1) ||
-      !grow(ctx, &match->stayed, n, sizeof(uint64_t)) || !grow(ctx, &match->vertex_items, n, sizeof(int32_t)) ||
+      !grow(ctx, &match->stayed, n, sizeof(uint64_t)) || !grow(ctx, &match->alone, n, sizeof(uint64_t)) ||
+      !grow(ctx, &match->vertex_items, n, sizeof(int32_t)) ||
       !grow(ctx, &match->triangle_items, 2 * n, sizeof(int32_t))) {
     return ORB_E_NO_MEMORY;
   }
   for (size_t i = (size_t)match->capacity; i < n; i++) {
     match->fixed[i] = 0;
-    match->stayed[i] = 0;
+    match->stayed[i] = match->alone[i] = 0;
     match->vertex_items[i] = -1;
     match->triangle_items[2 * i] = match->triangle_items[2 * i + 1] = -1;
   }

@@ -11,6 +11,8 @@
 #ifndef ORB_REMESH_MATCH_H
 #define ORB_REMESH_MATCH_H
 
+#include <string.h>
+
 #include "remesh/methods.h"
 #include "remesh/trace.h"
 
@@ -26,6 +28,7 @@ typedef struct orb_match {
   orb_spot *spot;                /* net vertex major: one for each shape */
   unsigned char *fixed;          /* a net vertex: a landmark, not to be removed */
   uint64_t *stayed;              /* a net vertex: mark of the star in which no move was found, 0: none */
+  uint64_t *alone;               /* a net vertex: mark of its surroundings in which it found none to merge with */
   /* Items: the vertices of all shapes, shape after shape. Each is in the list of a net vertex or of a triangle. */
   int32_t *item_begin; /* shape_count + 1 */
   int32_t *item_next;
@@ -128,6 +131,17 @@ double orb_match_turned_extent(const orb_match *match, int32_t a, int32_t b, int
 /* How many triangles of v and two successive ones of the n others are; `closed`: of the last and the first, too. */
 int orb_match_turned_in_fan(const orb_match *match, int32_t v, const int32_t *ring, int n, int closed);
 
+/* Folds words into a mark of them all. */
+static inline uint64_t orb_mixed(uint64_t mark, const void *part, size_t size) {
+  uint64_t word;
+  for (const unsigned char *p = part, *end = p + size; p < end; p += sizeof word) {
+    memcpy(&word, p, sizeof word);
+    mark = (mark ^ word) * UINT64_C(0x9E3779B97F4A7C15);
+    mark ^= mark >> 29;
+  }
+  return mark;
+}
+
 /* Moves v on the sphere if that makes the triangles around it better, or its edges stray less, within the limit;
  * whether it did. Then all vertices in turn, or those at triangles that are not fine. */
 int orb_match_try_move(orb_match *match, int32_t v, double limit2);
@@ -143,11 +157,20 @@ void orb_match_copy_vertex(orb_match *match, int32_t to, int32_t from);
 /* What a star is to do about triangles that are turned in space: leave no more of them, leave fewer, or leave no more
  * and much smaller ones. */
 typedef enum orb_star_goal { ORB_STAR_NOT_WORSE, ORB_STAR_FEWER, ORB_STAR_SMALLER } orb_star_goal;
+typedef struct orb_star_wish {
+  double limit2;               /* relative, squared */
+  int least_inner, most_inner; /* vertices inside the disc: the count of triangles changes by two less twice that */
+  orb_star_goal goal;
+} orb_star_wish;
 /* Replaces the given triangles, a disc that holds p, and those beyond its edges as far as it takes, by triangles from
- * p: within the limit (relative, squared) and by the goal. How many vertices the disc must have inside is told: the
- * count of triangles changes by two less twice that. Whether it did. Needs room for one vertex. */
-int orb_match_star(orb_match *match, const int32_t *triangles, int count, const double p[3], double limit2,
-                   int least_inner, int most_inner, orb_star_goal goal);
+ * p: within the limit and by the goal. Whether it did. Needs room for one vertex. */
+int orb_match_star(orb_match *match, const int32_t *triangles, int count, const double p[3], const orb_star_wish *wish);
+/* Whether it would. Any thread; needs room for as many vertices as there are threads. */
+int orb_match_can_star(orb_match *match, const int32_t *triangles, int count, const double p[3],
+                       const orb_star_wish *wish, int thread);
+
+/* Merges neighbours to one vertex wherever the limit lets it, while more than `target` triangles live. */
+ORB_MUST_CHECK orb_status orb_match_merge_all(orb_context *ctx, orb_match *match, double limit2, int64_t target);
 
 /* Plans to take u away and to triangulate its hole anew, within the limit (relative, squared): ring are its n
  * neighbours counter-clockwise, triangles n − 2 triples of numbers in the ring. strict as below. 0: there is no way. */

@@ -50,7 +50,7 @@ static int try_items(const mender *m, const int32_t *triangles, int count, int m
     int32_t item = m->match->triangle_items[triangles[i]];
     for (; item >= 0 && tried < ITEMS; item = m->match->item_next[item], tried++) {
       const double *p = orb_match_item_point(m->match, item);
-      if (orb_match_star(m->match, triangles, count, p, m->limit2, 0, most_inner, m->goal)) {
+      if (orb_match_star(m->match, triangles, count, p, &(orb_star_wish){m->limit2, 0, most_inner, m->goal})) {
         return 1;
       }
     }
@@ -69,18 +69,18 @@ static int try_corner(const mender *m, int32_t v) {
   for (int k = 0; k < 3; k++) {
     p[k] = orb_net_point(&match->net, v)[k];
   }
-  if (orb_match_star(match, star, n, p, m->limit2, 1, 3, m->goal)) {
+  if (orb_match_star(match, star, n, p, &(orb_star_wish){m->limit2, 1, 3, m->goal})) {
     return 1;
   }
   for (int i = 0; i < n; i++) {
     const int32_t *c = match->net.triangles + 3 * (int64_t)star[i];
     int k = c[0] == v ? 0 : c[1] == v ? 1 : 2;
     middle_of(match, v, c[(k + 1) % 3], -1, p);
-    if (orb_match_star(match, star, n, p, m->limit2, 1, 3, m->goal)) {
+    if (orb_match_star(match, star, n, p, &(orb_star_wish){m->limit2, 1, 3, m->goal})) {
       return 1;
     }
     middle_of(match, v, c[(k + 1) % 3], c[(k + 2) % 3], p);
-    if (orb_match_star(match, star, n, p, m->limit2, 1, 3, m->goal)) {
+    if (orb_match_star(match, star, n, p, &(orb_star_wish){m->limit2, 1, 3, m->goal})) {
       return 1;
     }
   }
@@ -95,12 +95,12 @@ static int try_split(const mender *m, int32_t h) {
   double p[3];
   if (orb_match_edge2(match, a, b, INFINITY, &worst) > 0 && worst.shape >= 0) {
     orb_match_crossing_point(match, a, b, &worst, p);
-    if (orb_match_star(match, pair, 2, p, m->limit2, 0, 3, m->goal)) {
+    if (orb_match_star(match, pair, 2, p, &(orb_star_wish){m->limit2, 0, 3, m->goal})) {
       return 1;
     }
   }
   middle_of(match, a, b, -1, p);
-  return orb_match_star(match, pair, 2, p, m->limit2, 0, 3, m->goal) || try_items(m, pair, 2, 3);
+  return orb_match_star(match, pair, 2, p, &(orb_star_wish){m->limit2, 0, 3, m->goal}) || try_items(m, pair, 2, 3);
 }
 
 static int turn_or_move(const mender *m, int32_t t) {
@@ -132,7 +132,7 @@ static orb_status mend(const mender *m, int32_t t, int *mended) {
   if (!*mended) {
     double p[3];
     middle_of(match, c[0], c[1], c[2], p);
-    *mended = orb_match_star(match, &t, 1, p, m->limit2, 0, 3, m->goal);
+    *mended = orb_match_star(match, &t, 1, p, &(orb_star_wish){m->limit2, 0, 3, m->goal});
   }
   return ORB_OK;
 }

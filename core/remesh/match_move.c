@@ -174,28 +174,18 @@ static void deal_anew(const star *s) {
   }
 }
 
-static uint64_t mixed(uint64_t mark, const void *part, size_t size) {
-  uint64_t word;
-  for (const unsigned char *p = part, *end = p + size; p < end; p += sizeof word) {
-    memcpy(&word, p, sizeof word);
-    mark = (mark ^ word) * UINT64_C(0x9E3779B97F4A7C15);
-    mark ^= mark >> 29;
-  }
-  return mark;
-}
-
 /* A mark of all that a search for a move depends on: where the vertex and its neighbours are, and the limit. The same
  * search again finds the same: nothing, where it found nothing before. */
 static uint64_t mark_of(const star *s) {
   const orb_net *net = &s->match->net;
-  uint64_t mark = mixed(1, &s->limit2, sizeof s->limit2);
-  mark = mixed(mark, orb_net_point(net, s->v), 3 * sizeof(double));
+  uint64_t mark = orb_mixed(1, &s->limit2, sizeof s->limit2);
+  mark = orb_mixed(mark, orb_net_point(net, s->v), 3 * sizeof(double));
   int first = 0; /* the ring may be listed from any neighbour on */
   for (int i = 1; i < s->n; i++) {
     first = s->ring[i] < s->ring[first] ? i : first;
   }
   for (int i = 0; i < s->n; i++) {
-    mark = mixed(mark, orb_net_point(net, s->ring[(first + i) % s->n]), 3 * sizeof(double));
+    mark = orb_mixed(mark, orb_net_point(net, s->ring[(first + i) % s->n]), 3 * sizeof(double));
   }
   return mark ? mark : 1;
 }

@@ -13,11 +13,11 @@
 enum { MOST = ORB_STAR_MOST, DISC = 48, GROWTH = 12, KNOWN = 96 };
 
 typedef struct disc {
-  const orb_match *match;
-  int32_t p; /* the vertex of the star: the number after the last */
+  orb_match *match;
+  int32_t p; /* the vertex of the star: a number after the last */
   int32_t triangle[DISC], edge[MOST], inner[DISC];
   int count, n, inner_count;
-  double own[DISC]; /* how far each of its triangles is turned now */
+  double own[DISC];     /* how far each of its triangles is turned now */
   int32_t known[KNOWN]; /* edges whose triangle of the star has been judged */
   double extent[KNOWN]; /* turned; negative: impossible */
   int known_count;
@@ -227,32 +227,48 @@ static int is_better(const disc *d, tally star, orb_star_goal goal) {
   }
 }
 
-int orb_match_star(orb_match *match, const int32_t *triangles, int count, const double p[3], double limit2,
-                   int least_inner, int most_inner, orb_star_goal goal) {
-  disc d = {.match = match, .p = match->net.vertex_count};
-  ORB_ASSERT(d.p < match->capacity);
+/* Finds a star; 0: there is none. */
+static int plan(disc *d, const int32_t *triangles, int count, const double p[3], const orb_star_wish *wish) {
+  orb_match *match = d->match;
+  ORB_ASSERT(d->p < match->capacity);
   if (count > DISC) {
     return 0;
   }
   for (int i = 0; i < count; i++) {
-    add_triangle(&d, triangles[i]);
+    add_triangle(d, triangles[i]);
   }
-  orb_match_copy_vertex(match, d.p, match->net.triangles[3 * (int64_t)triangles[0]]); /* hints for its places */
-  orb_match_place(match, d.p, p);
+  orb_match_copy_vertex(match, d->p, match->net.triangles[3 * (int64_t)triangles[0]]); /* hints for its places */
+  orb_match_place(match, d->p, p);
   for (;;) {
     tally star;
     int possible;
-    if (!outline(&d) || d.inner_count > most_inner || has_fixed(&d)) {
+    if (!outline(d) || d->inner_count > wish->most_inner || has_fixed(d)) {
       return 0;
     }
-    int32_t next = beyond(&d, &star, &possible);
-    if (possible && d.inner_count >= least_inner && is_better(&d, star, goal) && is_within(&d, limit2)) {
-      commit(match, &d);
+    int32_t next = beyond(d, &star, &possible);
+    if (possible && d->inner_count >= wish->least_inner && is_better(d, star, wish->goal) &&
+        is_within(d, wish->limit2)) {
       return 1;
     }
-    if (next < 0 || d.count == (count + GROWTH < DISC ? count + GROWTH : DISC)) {
+    if (next < 0 || d->count == (count + GROWTH < DISC ? count + GROWTH : DISC)) {
       return 0;
     }
-    add_triangle(&d, next);
+    add_triangle(d, next);
   }
+}
+
+int orb_match_can_star(orb_match *match, const int32_t *triangles, int count, const double p[3],
+                       const orb_star_wish *wish, int thread) {
+  disc d = {.match = match, .p = match->net.vertex_count + thread};
+  return plan(&d, triangles, count, p, wish);
+}
+
+int orb_match_star(orb_match *match, const int32_t *triangles, int count, const double p[3],
+                   const orb_star_wish *wish) {
+  disc d = {.match = match, .p = match->net.vertex_count};
+  if (!plan(&d, triangles, count, p, wish)) {
+    return 0;
+  }
+  commit(match, &d);
+  return 1;
 }
