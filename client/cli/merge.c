@@ -8,91 +8,9 @@
 #include "cli.h"
 #include "make.h"
 
-/* A landmark file is an array, or an object with one as its member `landmarks`. A landmark may also be a plain array
- * of vertex numbers, one a shape. */
-static cJSON *read_landmarks(const cli *c, const char *path) {
-  size_t size;
-  const char *end = NULL;
-  char *text = cli_read_file(path, &size);
-  if (!text)
-    return NULL;
-  cJSON *whole = cJSON_ParseWithLengthOpts(text, size + 1, &end, 1), *list = whole;
-  if (!whole) {
-    cli_error(c, "%s: not JSON at byte %zu", path, end ? (size_t)(end - text) : 0);
-  } else if (cJSON_IsObject(whole)) {
-    list = cJSON_DetachItemFromObjectCaseSensitive(whole, "landmarks");
-    cJSON_Delete(whole);
-  }
-  free(text);
-  if (whole && !cJSON_IsArray(list)) {
-    cli_error(c, "%s: a landmark file is an array, or an object with one as its member \"landmarks\"", path);
-    cJSON_Delete(list);
-    return NULL;
-  }
-  for (cJSON *item = list ? list->child : NULL, *next; item; item = next) {
-    next = item->next;
-    if (!cJSON_IsArray(item))
-      continue;
-    cJSON *landmark = cJSON_CreateObject(), *at = cJSON_AddArrayToObject(landmark, "at");
-    for (const cJSON *vertex = item->child; vertex; vertex = vertex->next) {
-      cJSON *place = cJSON_CreateObject();
-      cJSON_AddItemToObject(place, "vertex", cJSON_Duplicate(vertex, 0));
-      cJSON_AddItemToArray(at, place);
-    }
-    cJSON_ReplaceItemViaPointer(list, item, landmark);
-  }
-  return list;
-}
-
-/* The member at a dotted path, its parents made where they are missing. */
-static int set_member(cJSON *object, const char *path, cJSON *value) {
-  for (;;) {
-    const char *dot = strchr(path, '.');
-    char *name = cli_text("%.*s", (int)(dot ? dot - path : (long)strlen(path)), path);
-    if (!dot) {
-      int ok = *name && cJSON_IsObject(object);
-      if (ok) {
-        cJSON_DeleteItemFromObjectCaseSensitive(object, name);
-        cJSON_AddItemToObject(object, name, value);
-      } else {
-        cJSON_Delete(value);
-      }
-      free(name);
-      return ok;
-    }
-    cJSON *child = cJSON_GetObjectItemCaseSensitive(object, name);
-    if (!child)
-      child = cJSON_AddObjectToObject(object, name);
-    free(name);
-    if (!cJSON_IsObject(child)) {
-      cJSON_Delete(value);
-      return 0;
-    }
-    object = child;
-    path = dot + 1;
-  }
-}
-
-int cli_apply_sets(const cli *c, cJSON *request) {
-  for (int i = 0; i < c->args.set_count; i++) {
-    const char *text = c->args.sets[i], *equals = strchr(text, '=');
-    char *path = equals ? cli_text("%.*s", (int)(equals - text), text) : NULL;
-    cJSON *value = equals ? cJSON_ParseWithOpts(equals + 1, NULL, 1) : NULL;
-    if (equals && !value)
-      value = cJSON_CreateString(equals + 1);
-    int ok = equals && set_member(request, path, value);
-    free(path);
-    if (!ok) {
-      cli_error(c, "--set %s: it takes NAME=VALUE, with dots between the names of members", text);
-      return CLI_USAGE;
-    }
-  }
-  return CLI_DONE;
-}
-
 static void set_text(const cli *c, cJSON *request, cli_option_id option, const char *path) {
   if (c->args.value[option])
-    set_member(request, path, cJSON_CreateString(c->args.value[option]));
+    cli_set_member(request, path, cJSON_CreateString(c->args.value[option]));
 }
 
 static int add_options(const cli *c, cJSON *request) {
@@ -109,17 +27,17 @@ static int add_options(const cli *c, cJSON *request) {
       cli_error(c, "--tolerance takes a number above 0, not '%s'", tolerance);
       return CLI_USAGE;
     }
-    set_member(request, "remesh.tolerance", cJSON_CreateNumber(x));
+    cli_set_member(request, "remesh.tolerance", cJSON_CreateNumber(x));
   }
   if (triangles) {
     if (!cli_whole_number(triangles, 4, 100000000, &n)) {
       cli_error(c, "--max-triangles takes a whole number from 4 on, not '%s'", triangles);
       return CLI_USAGE;
     }
-    set_member(request, "remesh.max_triangles", cJSON_CreateNumber((double)n));
+    cli_set_member(request, "remesh.max_triangles", cJSON_CreateNumber((double)n));
   }
   if (c->args.value[OPT_NO_NORMALS])
-    set_member(request, "asset.normals", cJSON_CreateBool(0));
+    cli_set_member(request, "asset.normals", cJSON_CreateBool(0));
   return cli_apply_sets(c, request);
 }
 
@@ -132,7 +50,7 @@ static int make_request(cli *c, cJSON **out) {
   if (landmarks && !strcmp(landmarks, "auto")) {
     cJSON_AddStringToObject(request, "landmarks", "auto");
   } else if (landmarks) {
-    cJSON *list = read_landmarks(c, landmarks);
+    cJSON *list = cli_read_landmarks(c, landmarks);
     if (!list)
       return CLI_USAGE;
     cJSON_AddItemToObject(request, "landmarks", list);

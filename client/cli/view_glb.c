@@ -2,6 +2,7 @@
 #include "view_glb.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -60,8 +61,13 @@ double glb_number(const cJSON *object, const char *name, double otherwise) {
                                                                                             : otherwise;
 }
 
+int glb_code(const cJSON *object, const char *name, int otherwise) {
+  double value = glb_number(object, name, otherwise);
+  return value <= INT_MAX ? (int)value : otherwise;
+}
+
 const cJSON *glb_entry(const glb *r, const char *list, double index) {
-  return index >= 0 ? cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(r->json, list), (int)index) : NULL;
+  return index >= 0 && index <= INT_MAX ? cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(r->json, list), (int)index) : NULL;
 }
 
 const unsigned char *glb_view(const glb *r, double index, size_t *size) {
@@ -84,7 +90,7 @@ int glb_open(const glb *r, double index, glb_span *out) {
   out->components = type->valuestring[0] == 'S'            ? 1
                     : strncmp(type->valuestring, "VEC", 3) ? 0
                                                            : type->valuestring[3] - '0';
-  out->kind = (int)glb_number(accessor, "componentType", 0);
+  out->kind = glb_code(accessor, "componentType", 0);
   out->count = (uint32_t)glb_number(accessor, "count", 0);
   size_t size = out->kind == GLB_UBYTE                            ? 1
                 : out->kind == GLB_USHORT                         ? 2
@@ -95,6 +101,9 @@ int glb_open(const glb *r, double index, glb_span *out) {
   }
   size_t element = size * (size_t)out->components;
   out->stride = (size_t)glb_number(view, "byteStride", (double)element);
+  if (out->stride < element) { /* elements would lie in each other, more of them than the file has bytes */
+    return -1;
+  }
   double at = glb_number(view, "byteOffset", 0) + glb_number(accessor, "byteOffset", 0);
   if (at + (double)out->stride * (out->count - 1) + (double)element > (double)r->binary_size) {
     return -1;

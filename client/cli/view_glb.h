@@ -25,6 +25,7 @@ int glb_refuse(glb *r, const char *format, ...) __attribute__((format(printf, 2,
 
 /* A member that is a number from 0 on, or `otherwise`; the entry of a list at such a number, or NULL. */
 double glb_number(const cJSON *object, const char *name, double otherwise);
+int glb_code(const cJSON *object, const char *name, int otherwise); /* of those that fit an int */
 const cJSON *glb_entry(const glb *r, const char *list, double index);
 /* The bytes of a buffer view; NULL where they do not lie in the file. */
 const unsigned char *glb_view(const glb *r, double index, size_t *size);

@@ -6,8 +6,8 @@
 /* How a texture goes on beyond its edge; glTF's default is to repeat. */
 static void read_wrap(const glb *r, const cJSON *texture, int wrap[2]) {
   const cJSON *sampler = glb_entry(r, "samplers", glb_number(texture, "sampler", -1));
-  wrap[0] = (int)glb_number(sampler, "wrapS", VIEW_REPEAT);
-  wrap[1] = (int)glb_number(sampler, "wrapT", VIEW_REPEAT);
+  wrap[0] = glb_code(sampler, "wrapS", VIEW_REPEAT);
+  wrap[1] = glb_code(sampler, "wrapT", VIEW_REPEAT);
 }
 
 static int read_texture(glb *r, const cJSON *texture, view_texture *out) {

@@ -159,7 +159,7 @@ static int wrapped(int at, int size, int wrap) {
 }
 
 void view_texture_sample(const view_texture *t, float u, float v, float span, float out[3]) {
-  int level = span > 1 ? (int)(log2f(span) + 0.5f) : 0;
+  int level = span > 1 ? (int)(log2f(fminf(span, 1 << VIEW_LEVELS)) + 0.5f) : 0;
   level = level < t->levels ? level : t->levels - 1;
   float x = u * (float)t->width[level] - 0.5f, y = v * (float)t->height[level] - 0.5f;
   out[0] = out[1] = out[2] = 0;

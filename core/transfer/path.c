@@ -62,7 +62,7 @@ static orb_status fill_gap(orb_context *ctx, orb_draft *draft, int32_t gap) {
   const orb_supermesh *supermesh = draft->supermesh;
   int32_t steps = draft->options->path_steps, pairs = draft->shape_count - 1;
   orb_arap *path = NULL;
-  orb_status status;
+  orb_status status = ORB_OK;
   ORB_TRY(orb_arap_create(ctx, draft->positions[gap], draft->positions[gap + 1], supermesh->vertex_count,
                           supermesh->triangles, supermesh->triangle_count, &path));
   for (int32_t k = 0; k < steps; k++) {

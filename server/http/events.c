@@ -82,8 +82,7 @@ static int64_t last_seen(const request *r) {
   if (!text) {
     text = query_of(r, "last_event_id");
   }
-  long long number = text ? strtoll(text, NULL, 10) : 0;
-  return number > 0 ? number : 0;
+  return parse_event_number(text);
 }
 
 static void add_headers(request *r) {

@@ -100,6 +100,11 @@ int parse_urgency(const char *text) {
   return 3;
 }
 
+int64_t parse_event_number(const char *text) {
+  long long number = text ? strtoll(text, NULL, 10) : 0;
+  return number > 0 ? number : 0;
+}
+
 int parse_page(const char *limit_text, const char *token, int *limit, int64_t *before, const char **why) {
   char *end;
   *limit = PAGE_STANDARD;

@@ -23,6 +23,9 @@ int64_t parse_wait_ms(const char *query, const char *prefer);
 /* The urgency that a Priority header asks for (RFC 9218): 0, the most urgent, to 7; 3 where it says nothing. */
 int parse_urgency(const char *text);
 
+/* The number of the last event that a caller has seen (Last-Event-ID); 0: none. */
+int64_t parse_event_number(const char *text);
+
 /* limit and page_token of a list. 1, or 0 with *why, a sentence. */
 enum { PAGE_MOST = 1000, PAGE_STANDARD = 100 };
 int parse_page(const char *limit_text, const char *token, int *limit, int64_t *before, const char **why);

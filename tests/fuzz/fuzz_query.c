@@ -1,10 +1,11 @@
-/* A request line and its fields: lines of METHOD, path, query (NAME=VALUE&…, percent-encoded), then Prefer, trace and
- * tags. Numbers that come out must lie in their bounds. */
+/* A request line and its fields: lines of METHOD, path, query (NAME=VALUE&…, percent-encoded), then Prefer, trace,
+ * tags, Priority, the number of an event, and the coding of a body. Numbers that come out must lie in their bounds. */
 #include <microhttpd.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "api/routes.h"
+#include "http/decode.h"
 #include "http/parse.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -70,12 +71,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   }
   char *method = next_line(&at), *path = next_line(&at), *query = next_line(&at), *prefer = next_line(&at);
   char *trace = next_line(&at), *tags = next_line(&at);
+  char *urgency = next_line(&at), *event = next_line(&at), *body = next_line(&at);
   char id[ORB_ID_SIZE] = "", allow[64], kept[TRACE_SIZE];
   const route *found = path ? route_find(method, path, id, allow) : NULL;
   if ((found && found->id >= ROUTE_COUNT) || memchr(id, 0, sizeof id) == NULL) {
     abort();
   }
   if (parse_trace(trace, kept) && strlen(kept) != TRACE_SIZE - 1) {
+    abort();
+  }
+  int urgent = parse_urgency(urgency);
+  coding coded = coding_of(body);
+  if (urgent < 0 || urgent > 7 || parse_event_number(event) < 0 || coded < CODING_UNKNOWN || coded > CODING_ZSTD) {
     abort();
   }
   (void)parse_tag_matches(tags, "\"0123456789abcdef0123456789abcdef\"");

@@ -10,7 +10,7 @@
 # build-fuzz/sums/TARGET.
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
-all=(obj off ply stl gltf glb json query range config sphere)
+all=(obj off ply stl gltf glb json query range config sphere embedding decode http token view client)
 
 sums() {
   local name
@@ -96,6 +96,9 @@ if [ ${#targets[@]} -eq 0 ]; then
 fi
 cmake --build build-fuzz --target "${targets[@]/#/fuzz_}"
 mkdir -p build-fuzz/found build-fuzz/corpus build-fuzz/sums
+TMPDIR=$(mktemp -d)
+export TMPDIR
+trap 'rm -rf "$TMPDIR"' EXIT
 if [ $unit = keep ]; then
   for name in "${targets[@]}"; do
     keep "$name" "$amount"

@@ -1,0 +1,85 @@
+/* What the user gives for a request: a landmark file, and members by --set. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli.h"
+#include "make.h"
+
+cJSON *cli_read_landmarks(const cli *c, const char *path) {
+  size_t size;
+  const char *end = NULL;
+  char *text = cli_read_file(path, &size);
+  if (!text)
+    return NULL;
+  cJSON *whole = cJSON_ParseWithLengthOpts(text, size + 1, &end, 1), *list = whole;
+  if (!whole) {
+    cli_error(c, "%s: not JSON at byte %zu", path, end ? (size_t)(end - text) : 0);
+  } else if (cJSON_IsObject(whole)) {
+    list = cJSON_DetachItemFromObjectCaseSensitive(whole, "landmarks");
+    cJSON_Delete(whole);
+  }
+  free(text);
+  if (whole && !cJSON_IsArray(list)) {
+    cli_error(c, "%s: a landmark file is an array, or an object with one as its member \"landmarks\"", path);
+    cJSON_Delete(list);
+    return NULL;
+  }
+  for (cJSON *item = list ? list->child : NULL, *next; item; item = next) {
+    next = item->next;
+    if (!cJSON_IsArray(item))
+      continue;
+    cJSON *landmark = cJSON_CreateObject(), *at = cJSON_AddArrayToObject(landmark, "at");
+    for (const cJSON *vertex = item->child; vertex; vertex = vertex->next) {
+      cJSON *place = cJSON_CreateObject();
+      cJSON_AddItemToObject(place, "vertex", cJSON_Duplicate(vertex, 0));
+      cJSON_AddItemToArray(at, place);
+    }
+    cJSON_ReplaceItemViaPointer(list, item, landmark);
+  }
+  return list;
+}
+
+int cli_set_member(cJSON *object, const char *path, cJSON *value) {
+  for (;;) {
+    const char *dot = strchr(path, '.');
+    char *name = cli_text("%.*s", (int)(dot ? dot - path : (long)strlen(path)), path);
+    if (!dot) {
+      int ok = *name && cJSON_IsObject(object);
+      if (ok) {
+        cJSON_DeleteItemFromObjectCaseSensitive(object, name);
+        cJSON_AddItemToObject(object, name, value);
+      } else {
+        cJSON_Delete(value);
+      }
+      free(name);
+      return ok;
+    }
+    cJSON *child = cJSON_GetObjectItemCaseSensitive(object, name);
+    if (!child)
+      child = cJSON_AddObjectToObject(object, name);
+    free(name);
+    if (!cJSON_IsObject(child)) {
+      cJSON_Delete(value);
+      return 0;
+    }
+    object = child;
+    path = dot + 1;
+  }
+}
+
+int cli_apply_sets(const cli *c, cJSON *request) {
+  for (int i = 0; i < c->args.set_count; i++) {
+    const char *text = c->args.sets[i], *equals = strchr(text, '=');
+    char *path = equals ? cli_text("%.*s", (int)(equals - text), text) : NULL;
+    cJSON *value = equals ? cJSON_ParseWithOpts(equals + 1, NULL, 1) : NULL;
+    if (equals && !value)
+      value = cJSON_CreateString(equals + 1);
+    int ok = equals && cli_set_member(request, path, value);
+    free(path);
+    if (!ok) {
+      cli_error(c, "--set %s: it takes NAME=VALUE, with dots between the names of members", text);
+      return CLI_USAGE;
+    }
+  }
+  return CLI_DONE;
+}

@@ -1,0 +1,52 @@
+/* A GLB file as the command line's view reads it, its textures included; small ones are also drawn. Numbers that the
+ * mesh holds must lie within it. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "view.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+enum { DRAWN_MOST = 300 };
+
+static void check(const view_mesh *mesh) {
+  for (uint32_t i = 0; i < mesh->index_count; i++) {
+    if (mesh->indices[i] >= mesh->vertex_count || mesh->painted[i / 3] < 0 ||
+        mesh->painted[i / 3] >= mesh->material_count) {
+      abort();
+    }
+  }
+  for (int32_t m = 0; m < mesh->material_count; m++) {
+    if (mesh->materials[m].texture < -1 || mesh->materials[m].texture >= mesh->texture_count) {
+      abort();
+    }
+  }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+  char path[64], error[200] = "";
+  int fd = memfd_create("glb", MFD_CLOEXEC);
+  if (fd < 0 || write(fd, data, size) != (ssize_t)size) {
+    abort();
+  }
+  snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
+  view_mesh mesh;
+  if (view_mesh_read(path, &mesh, error, sizeof error) == 0) {
+    check(&mesh);
+    int drawn = mesh.index_count <= DRAWN_MOST && mesh.target_count <= 4;
+    view_mesh_free(&mesh);
+    orb_view_options options;
+    orb_view_defaults(&options);
+    options.poses = 2;
+    options.size = 16;
+    if (drawn && orbmorph_view(path, "/dev/null", &options, error, sizeof error) != 0 && !error[0]) {
+      abort(); /* refused without a reason */
+    }
+  } else if (!error[0]) {
+    abort();
+  }
+  close(fd);
+  return 0;
+}
