@@ -23,14 +23,37 @@ part_tsan() {
   setarch -R ctest --test-dir build-tsan --output-on-failure -R '^(unit|scenario)\.' --timeout 3600
 }
 
+# The units, and the scenarios with daemon and command line under memcheck. Left out: what is about time (crowd,
+# fairness, slow), what measures or needs the release build (bench, report, readme, demo), what preloads a library of
+# its own (faults), what ends the daemon before it can tell of leaks (crash), and large meshes (real_meshes, real_pairs).
+valgrind_scenarios=(abuse assets cli cors disk_full durability embeddings encodings eviction jobs meshes openapi
+  operations places problems requests shell spheres supermeshes systemd tls tokens view)
 part_valgrind() {
   cmake --preset debug -DORB_TESTS=ON >/dev/null
   cmake --build build-debug
-  local program
-  for program in build-debug/bin/test_*; do
-    echo "valgrind $program"
-    valgrind --quiet --error-exitcode=9 --leak-check=full "$program"
+  local name program folder=$PWD/build-debug/valgrind failed=0
+  rm -rf "$folder"
+  mkdir -p "$folder/reports"
+  ln -s ../bin/orbmorph-bench "$folder/"
+  for name in orbmorphd orbmorph; do
+    cat >"$folder/$name" <<END
+#!/bin/sh
+exec valgrind --quiet --fair-sched=try --error-exitcode=9 --leak-check=full --show-leak-kinds=definite,indirect \\
+  --errors-for-leak-kinds=definite --log-file=$folder/reports/$name.%p "$PWD/build-debug/bin/$name" "\$@"
+END
+    chmod +x "$folder/$name"
   done
+  for program in ${ORB_VALGRIND_UNITS-build-debug/bin/test_*}; do
+    echo "valgrind $program"
+    valgrind --quiet --error-exitcode=9 --leak-check=full "$program" || failed=1
+  done
+  for name in ${ORB_VALGRIND_SCENARIOS:-${valgrind_scenarios[@]}}; do
+    echo "valgrind scenario $name"
+    ORB_SLOW=1 ORBMORPHD=$folder/orbmorphd ORBMORPH=$folder/orbmorph \
+      node --test --test-reporter=spec "tests/scenario/$name.test.mjs" || failed=1
+  done
+  find "$folder/reports" -type f -size +0 -exec cat {} + | tee "$folder/found"
+  [ ! -s "$folder/found" ] && [ $failed -eq 0 ]
 }
 
 part_fuzz() {

@@ -15,7 +15,7 @@ export const binaries = {
 // A build with sanitizers is several times slower; tests that do much take less of it there.
 export const slow = process.env.ORB_SLOW === '1';
 
-const START_MS = 30_000;
+const START_MS = slow ? 120_000 : 30_000, STOP_MS = slow ? 120_000 : 20_000;
 
 export class Daemon {
   constructor(data, args, env) {
@@ -139,7 +139,7 @@ export async function daemon(t, { args = [], env = {} } = {}) {
   const made = new Daemon(data, args, env);
   t.after(async () => {
     if (made.child) {
-      const killer = setTimeout(() => made.child.kill('SIGKILL'), 20_000);
+      const killer = setTimeout(() => made.child.kill('SIGKILL'), STOP_MS);
       const { code, signal } = await made.stop();
       clearTimeout(killer);
       await rm(data, { recursive: true, force: true });
