@@ -18,9 +18,15 @@ fi
 
 # Without address randomisation: clang 14's runtime cannot place its shadow memory where a kernel randomises much.
 part_tsan() {
+  local failed=0
   cmake --preset tsan -DORB_TESTS=ON >/dev/null
   cmake --build build-tsan
-  setarch -R ctest --test-dir build-tsan --output-on-failure -R '^(unit|scenario)\.' --timeout 3600
+  rm -rf build-tsan/reports
+  mkdir -p build-tsan/reports
+  TSAN_OPTIONS="log_path=$PWD/build-tsan/reports/report" \
+    setarch -R ctest --test-dir build-tsan --output-on-failure -R '^(unit|scenario)\.' --timeout 3600 || failed=1
+  cat build-tsan/reports/* 2>/dev/null && failed=1
+  return $failed
 }
 
 # The units, and the scenarios with daemon and command line under memcheck. Left out: what is about time (crowd,
