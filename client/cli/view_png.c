@@ -10,7 +10,7 @@
 #include "view.h"
 
 static unsigned char srgb(float linear) {
-  float v = linear <= 0 ? 0 : linear >= 1 ? 1 : linear;
+  float v = !(linear > 0) ? 0 : linear >= 1 ? 1 : linear; /* colours of a file may be anything: no number is black */
   v = v <= 0.0031308f ? 12.92f * v : 1.055f * powf(v, 1 / 2.4f) - 0.055f;
   return (unsigned char)(v * 255 + 0.5f);
 }
