@@ -77,8 +77,13 @@ part_crash() {
 # Each call of the daemon that may fail is made to fail, once and for ever: ORB_FAULT_RUNS=few leaves out allocations.
 part_faults() {
   cmake --preset release -DORB_TESTS=ON >/dev/null
-  cmake --build build --target orbmorphd orbmorph_interpose
-  ORB_FAULT_RUNS=${ORB_FAULT_RUNS:-all} ORB_INTERPOSE=build/bin/liborbmorph_interpose.so \
+  cmake --build build --target orbmorphd orbmorph_interpose test_torture_core test_torture_api test_torture_store
+  local program
+  for program in core api store; do
+    ORB_TORTURE_ALL=1 "build/bin/test_torture_$program"
+  done
+  TMPDIR=${ORB_FAULT_FOLDER:-/dev/shm} ORB_FAULT_RUNS=${ORB_FAULT_RUNS:-all} \
+    ORB_INTERPOSE=build/bin/liborbmorph_interpose.so \
     node --test --test-reporter=spec tests/scenario/faults.test.mjs
 }
 

@@ -1,19 +1,17 @@
 /* Reading glTF and GLB.
  *
- * The document is parsed by cJSON. tinygltf's own loader is not asked: it copies every buffer (each of many buffers of
- * a GLB the whole binary chunk), goes down into extras as deep as they nest, and trusts the members of sparse
- * accessors. Here accessors are decoded from the bytes where they lie, after every offset was checked against them.
+ * The document is parsed by cJSON, which copies no buffer and nests no deeper than it allows. Accessors are decoded
+ * from the bytes where they lie, after every offset was checked against them.
  *
  * Vertices are numbered over the triangle primitives of all meshes in file order, whether the scene shows them or not;
- * a mesh that is shown more than once gets further numbers after all of these. Inside, faults are exceptions; all of
- * them end in orb_gltf_read().
+ * a mesh that is shown more than once gets further numbers after all of these. Faults inside are exceptions; all end in
+ * orb_gltf_read().
  */
 #include "format/gltf.h"
 
 #include <cjson/cJSON.h>
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
 #include <cstring>
 #include <memory>
 #include <new>
@@ -23,6 +21,7 @@
 extern "C" {
 #include "format/build.h"
 #include "format/bytes.h"
+#include "format/json_check.h"
 }
 
 #include "format/gltf_values.hh"
@@ -561,6 +560,9 @@ void read_document(orb_context *ctx, const unsigned char *bytes, size_t size, bo
   const char *end = nullptr;
   std::unique_ptr<cJSON, void (*)(cJSON *)> doc(
       cJSON_ParseWithLengthOpts(reinterpret_cast<const char *>(text.at), text.size, &end, 0), cJSON_Delete);
+  if (!doc && orb_json_begins(reinterpret_cast<const char *>(text.at), text.size)) {
+    throw std::bad_alloc();
+  }
   if (!doc) {
     int64_t at = end ? reinterpret_cast<const unsigned char *>(end) - bytes : static_cast<int64_t>(size);
     (void)orb_build_malformed(ctx, 0, at, "The JSON of the glTF file is broken.");
@@ -574,8 +576,7 @@ void read_document(orb_context *ctx, const unsigned char *bytes, size_t size, bo
 
 extern "C" orb_status orb_gltf_read(orb_context *ctx, const unsigned char *bytes, size_t size, int binary,
                                     orb_mesh *out) {
-  /* The parser's memory is not of the context; a block of about its size keeps the budget honest (and is not touched).
-   */
+  /* The parser's memory is not of the context; a block of about its size keeps the budget honest, untouched. */
   void *reserve = orb_alloc(ctx, size, binary ? 1 : 4);
   if (!reserve) {
     return ORB_E_NO_MEMORY;

@@ -76,7 +76,7 @@ class Place {
     this.fresh();
   }
 
-  /** What failed is given up; the next begins anew. */
+  /** Given up as it is; the next begins anew. */
   async abandon() {
     this.board.disarm();
     if (this.alive) {
@@ -128,7 +128,7 @@ const phases = {
   },
 };
 const beginnings = {
-  first: async (place) => place.alive && (await place.finish()),
+  first: (place) => place.abandon(),
   again: async (place) => {
     if (!place.alive) await place.revive();
     if (!place.caller.jobs.length) await place.caller.sequence(true);

@@ -1,0 +1,26 @@
+/* Torture: the first, second, third … call of a kind fails, each in a run of its own, until a run meets no failure.
+ *
+ * Programs named test_…torture… are linked so that their calls, and those of the project's libraries in them, pass
+ * through torture.c; SQLite's allocations do, too, without its per-connection reserve. */
+#ifndef TORTURE_H
+#define TORTURE_H
+
+typedef enum torture_kind {
+  TORTURE_ALLOC,  /* malloc, calloc, realloc, strdup, mmap, mremap, operator new, cJSON's and SQLite's */
+  TORTURE_SQLITE, /* sqlite3_step, sqlite3_exec, sqlite3_prepare_v3: SQLITE_IOERR */
+  TORTURE_FILE,   /* open, mkostemp, opendir, mkdir, write, fsync, rename, unlink: EIO */
+  TORTURE_THREAD, /* pthread_create: EAGAIN */
+} torture_kind;
+
+/* Before anything else, once: SQLite takes its allocator only then. */
+void torture_begin(void);
+
+/* A run does its work between torture_arm() and torture_disarm(), and checks what came of it. */
+void torture_arm(torture_kind kind, long number, int for_ever);
+int torture_disarm(void); /* whether a call failed */
+
+/* run(user, kind, number, for_ever) returns what torture_disarm() said. Returns how many runs met a failure. */
+typedef int (*torture_run)(void *user, torture_kind kind, long number, int for_ever);
+long torture(torture_run run, void *user, torture_kind kind, int for_ever, int step); /* step: of the numbers */
+
+#endif
