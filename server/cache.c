@@ -70,17 +70,19 @@ static void drop(cache *c, item *it) {
   unref(it);
 }
 
-static item *find(cache *c, resource_kind kind, const char *id) {
+/* tenant NULL: any. */
+static item *find(cache *c, resource_kind kind, const char *id, const char *tenant) {
   item *it = *bucket(c, kind, id);
-  while (it && (it->entry.row.kind != kind || strcmp(it->entry.row.id, id) != 0)) {
+  while (it && (it->entry.row.kind != kind || strcmp(it->entry.row.id, id) != 0 ||
+                (tenant && strcmp(it->entry.tenant, tenant) != 0))) {
     it = it->next_hash;
   }
   return it;
 }
 
-const cached *cache_find(cache *c, resource_kind kind, const char *id) {
+const cached *cache_find(cache *c, resource_kind kind, const char *id, const char *tenant) {
   pthread_mutex_lock(&c->lock);
-  item *it = find(c, kind, id);
+  item *it = find(c, kind, id, tenant);
   if (it) {
     it->refs++;
     unlink_order(c, it);
@@ -97,7 +99,7 @@ unsigned long long cache_drops(cache *c) {
   return drops;
 }
 
-const cached *cache_add(cache *c, resource *row, unsigned long long since) {
+const cached *cache_add(cache *c, resource *row, const char *tenant, unsigned long long since) {
   item *it = calloc(1, sizeof *it);
   if (!it) {
     resource_free(row);
@@ -105,6 +107,7 @@ const cached *cache_add(cache *c, resource *row, unsigned long long since) {
   }
   char hash[ORB_ID_SIZE];
   it->entry.row = *row;
+  snprintf(it->entry.tenant, sizeof it->entry.tenant, "%s", tenant);
   row->json = NULL;
   it->entry.json_size = strlen(it->entry.row.json);
   orb_id_of_text(it->entry.row.json, it->entry.json_size, hash);
@@ -117,7 +120,7 @@ const cached *cache_add(cache *c, resource *row, unsigned long long since) {
   }
   it->refs = 2;
   it->linked = 1;
-  item *there = find(c, row->kind, row->id);
+  item *there = find(c, row->kind, row->id, tenant);
   if (there) {
     drop(c, there);
   }
@@ -154,9 +157,9 @@ void cache_release(cache *c, const cached *entry) {
 
 void cache_drop(cache *c, resource_kind kind, const char *id) {
   pthread_mutex_lock(&c->lock);
-  item *it = find(c, kind, id);
+  item *it;
   c->drops++;
-  if (it) {
+  while ((it = find(c, kind, id, NULL))) {
     drop(c, it);
   }
   pthread_mutex_unlock(&c->lock);

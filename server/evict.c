@@ -5,30 +5,41 @@
 
 #include "faults.h"
 #include "log.h"
+#include "store/owners.h"
 
 enum { PAGE = 64 };
 
 /* The row goes first: what is left by a crash in between is an object without a row, which --gc removes. */
-store_result evict_one(const evict_env *env, resource_kind kind, const char *id) {
+static store_result evict(const evict_env *env, resource_kind kind, const char *id, const char *tenant) {
   static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET};
   FAULT_POINT("evict");
   objects_exclude(env->store);
-  store_result result = catalogue_delete(env->cat, kind, id);
+  int gone = 1;
+  store_result result =
+      tenant ? catalogue_disown(env->cat, kind, id, tenant, &gone) : catalogue_delete(env->cat, kind, id);
   if (env->descriptions) {
     cache_drop(env->descriptions, kind, id);
   }
   FAULT_POINT("evict-row-gone");
-  if (result == STORE_OK) {
+  if (result == STORE_OK && gone) {
     result = objects_delete(env->store, kinds[kind], id);
   }
-  if (result == STORE_OK && kind == RESOURCE_SUPERMESH) {
+  if (result == STORE_OK && gone && kind == RESOURCE_SUPERMESH) {
     result = objects_delete(env->store, OBJECT_PLACES, id);
   }
-  if (result == STORE_OK && kind == RESOURCE_SUPERMESH) {
+  if (result == STORE_OK && gone && kind == RESOURCE_SUPERMESH) {
     result = objects_delete(env->store, OBJECT_SPHERES, id);
   }
   objects_let_go(env->store);
   return result;
+}
+
+store_result evict_one(const evict_env *env, resource_kind kind, const char *id) {
+  return evict(env, kind, id, NULL);
+}
+
+store_result evict_owned(const evict_env *env, resource_kind kind, const char *id, const char *tenant) {
+  return evict(env, kind, id, tenant);
 }
 
 static int is_needed(const evict_env *env, const resource *row) {
@@ -39,7 +50,7 @@ static int is_needed(const evict_env *env, const resource *row) {
     return 0;
   }
   snprintf(mesh, sizeof mesh, "%s", at + sizeof member - 1);
-  return queue_needs_mesh(env->q, mesh);
+  return queue_needs_mesh(env->q, mesh, NULL);
 }
 
 int64_t evict_derived(const evict_env *env, int64_t budget, int64_t before) {

@@ -18,5 +18,7 @@ int64_t evict_derived(const evict_env *env, int64_t budget, int64_t before);
 
 /* Row, description and objects. */
 store_result evict_one(const evict_env *env, resource_kind kind, const char *id);
+/* What the tenant has of it; all of it where nobody else owns it. STORE_NOT_FOUND: the tenant does not own it. */
+store_result evict_owned(const evict_env *env, resource_kind kind, const char *id, const char *tenant);
 
 #endif

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "evict.h"
+#include "store/owners.h"
 #include "worker/spheres.h"
 
 enum { PAGE = 64 };
@@ -94,6 +95,11 @@ int maintain_check(const config *options) {
   }
   if (!catalogue_integrity(t.cat)) {
     puts("the catalogue fails SQLite's integrity check");
+    t.wrong++;
+  }
+  int64_t ownerless = catalogue_ownerless(t.cat);
+  if (ownerless != 0) {
+    puts("the catalogue's owners do not match what it holds");
     t.wrong++;
   }
   for (int kind = 0; kind < RESOURCE_KINDS; kind++) {

@@ -13,7 +13,7 @@ static const struct {
   const char *name;
   int scope;
 } scopes[] = {{"read", SCOPE_READ}, {"write", SCOPE_WRITE}, {"admin", SCOPE_ADMIN}};
-enum { TOKEN_LINE = 320, SCOPES = sizeof scopes / sizeof scopes[0] };
+enum { TOKEN_LINE = 384, SCOPES = sizeof scopes / sizeof scopes[0] };
 
 static int read_scopes(const char *text, int *out) {
   *out = 0;
@@ -34,7 +34,8 @@ static int read_scopes(const char *text, int *out) {
 static int wrong(const char *why) {
   fprintf(stderr,
           "orbmorphd token: %s\n"
-          "  orbmorphd token add NAME --scope read,write,admin [--quota BYTES] [--quota-jobs N] [--priority 0..9]\n"
+          "  orbmorphd token add NAME --scope read,write,admin [--tenant NAME] [--quota BYTES]"
+          " [--quota-jobs N] [--priority 0..9]\n"
           "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-jobs …] [--priority …]\n"
           "  orbmorphd token list | token remove NAME\n",
           why);
@@ -52,6 +53,10 @@ static int read_flag(token_command *out, const char *flag, const char *value) {
   int64_t number;
   if (strcmp(flag, "--scope") == 0) {
     return value && read_scopes(value, &out->scopes) ? 1 : -1;
+  }
+  if (strcmp(flag, "--tenant") == 0 && strcmp(out->verb, "add") == 0) {
+    out->tenant = value;
+    return good_name(value) ? 1 : -1;
   }
   int64_t *to = strcmp(flag, "--quota") == 0        ? &out->quota
                 : strcmp(flag, "--quota-jobs") == 0 ? &out->jobs
@@ -89,7 +94,7 @@ int token_command_read(token_command *out, int *argc, char **argv) {
   for (int i = from; i < *argc; i++) {
     int taken = adds || sets ? read_flag(out, argv[i], i + 1 < *argc ? argv[i + 1] : NULL) : 0;
     if (taken < 0) {
-      return wrong("--scope takes read, write and admin, comma-separated; the others take a number");
+      return wrong("--scope takes read, write and admin, comma-separated; --tenant a name; the others a number");
     }
     if (taken) {
       i++;
@@ -115,8 +120,10 @@ static int list(catalogue *cat, orb_text *reply) {
         snprintf(names + n, sizeof names - n, "%s%s", n ? "," : "", scopes[k].name);
       }
     }
-    orb_text_printf(reply, "%s %s uploaded=%lld quota=%lld quota-jobs=%lld priority=%d\n", rows[i].name, names,
-                    (long long)rows[i].used, (long long)rows[i].quota, (long long)rows[i].jobs, rows[i].priority);
+    int other = strcmp(rows[i].tenant, rows[i].name) != 0;
+    orb_text_printf(reply, "%s %s uploaded=%lld quota=%lld quota-jobs=%lld priority=%d%s%s\n", rows[i].name, names,
+                    (long long)rows[i].used, (long long)rows[i].quota, (long long)rows[i].jobs, rows[i].priority,
+                    other ? " tenant=" : "", other ? rows[i].tenant : "");
   }
   free(rows);
   return count < 0;
@@ -126,13 +133,16 @@ int token_command_apply(catalogue *cat, const char *line, orb_text *reply) {
   char verb[8], hash[TOKEN_TEXT];
   long long quota, jobs;
   token_row row = {.created = (int64_t)time(NULL) * 1000};
-  if (sscanf(line, "token %7s %63s %d %lld %lld %d %64s", verb, row.name, &row.scopes, &quota, &jobs, &row.priority,
-             hash) != 7) {
+  if (sscanf(line, "token %7s %63s %d %lld %lld %d %63s %64s", verb, row.name, &row.scopes, &quota, &jobs,
+             &row.priority, row.tenant, hash) != 8) {
     orb_text_add(reply, "the command is not understood\n");
     return 2;
   }
   row.quota = quota;
   row.jobs = jobs;
+  if (strcmp(row.tenant, "-") == 0) {
+    memcpy(row.tenant, row.name, sizeof row.tenant);
+  }
   if (strcmp(verb, "list") == 0) {
     return list(cat, reply);
   }
@@ -168,8 +178,9 @@ static void write_line(const token_command *command, char line[TOKEN_LINE], char
   sodium_bin2hex(text, TOKEN_TEXT, token, sizeof token);
   sodium_bin2hex(hash, sizeof hash, hashed, sizeof hashed);
   sodium_memzero(token, sizeof token);
-  snprintf(line, TOKEN_LINE, "token %s %s %d %lld %lld %d %s", command->verb, command->name, command->scopes,
-           (long long)command->quota, (long long)command->jobs, (int)command->priority, hash);
+  snprintf(line, TOKEN_LINE, "token %s %s %d %lld %lld %d %s %s", command->verb, command->name, command->scopes,
+           (long long)command->quota, (long long)command->jobs, (int)command->priority,
+           command->tenant ? command->tenant : "-", hash);
 }
 
 static int show(const token_command *command, int status, const orb_text *reply, const char *text) {

@@ -10,8 +10,8 @@
 #include "store/tokens.h"
 
 typedef struct token_command {
-  const char *verb, *name;
-  int scopes; /* these are −1 where they are not given */
+  const char *verb, *name, *tenant; /* tenant: NULL where it is not given */
+  int scopes;                       /* these are −1 where they are not given */
   int64_t quota, jobs, priority;
 } token_command;
 

@@ -97,42 +97,32 @@ int access_check(request *r, const char *path, orb_problem *problem) {
   return 0;
 }
 
-int access_owns(request *r, const char *owner) {
-  if (!r->caller || strcmp(r->caller->row.name, owner) == 0 ||
-      (__atomic_load_n(&r->caller->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN)) {
-    return 1;
-  }
-  orb_problem problem = {0};
-  orb_refuse(&problem, "forbidden",
-             "Another caller asked for this job first; only that token or one with the scope \"admin\" may cancel it.");
-  orb_json_member_string(&problem.facts, "scope", "admin");
-  reply_problem(r, &problem);
-  return 0;
+const char *access_tenant(const request *r) {
+  return r->caller ? r->caller->row.tenant : "";
 }
 
-int access_take_quota(request *r, int64_t bytes, orb_problem *problem) {
-  if (!r->caller) {
+const char *access_view(const request *r) {
+  int all = !r->caller || (__atomic_load_n(&r->caller->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN);
+  return all ? "" : r->caller->row.tenant;
+}
+
+int access_sees(const request *r, const char *owner) {
+  const char *view = access_view(r);
+  return !view[0] || strcmp(view, owner) == 0;
+}
+
+int access_has_room(const request *r, int64_t bytes, orb_problem *problem) {
+  const token_row *token = r->caller ? &r->caller->row : NULL;
+  int64_t used = token ? __atomic_load_n(&token->used, __ATOMIC_RELAXED) : 0;
+  int64_t quota = token ? __atomic_load_n(&token->quota, __ATOMIC_RELAXED) : 0;
+  if (quota == 0 || used + bytes <= quota) {
     return 1;
   }
-  token_row *token = &r->caller->row;
-  int64_t used = __atomic_add_fetch(&token->used, bytes, __ATOMIC_RELAXED);
-  int64_t quota = __atomic_load_n(&token->quota, __ATOMIC_RELAXED);
-  if (quota == 0 || used <= quota) {
-    return 1;
-  }
-  __atomic_sub_fetch(&token->used, bytes, __ATOMIC_RELAXED);
-  orb_refuse(problem, "quota-exceeded", "The token \"%s\" may upload %lld bytes in all, and has used %lld.",
-             token->name, (long long)quota, (long long)(used - bytes));
+  orb_refuse(problem, "quota-exceeded",
+             "The meshes of the token \"%s\" may have %lld bytes in all, and have %lld: delete some, or ask for more.",
+             token->name, (long long)quota, (long long)used);
   orb_json_member_integer(&problem->facts, "quota", quota);
   return 0;
-}
-
-void access_quota_stored(request *r, int64_t bytes, int stored) {
-  if (r->caller && stored) {
-    catalogue_token_use(r->srv->cat, r->caller->row.name, bytes);
-  } else if (r->caller) {
-    __atomic_sub_fetch(&r->caller->row.used, bytes, __ATOMIC_RELAXED);
-  }
 }
 
 int access_priority(const request *r) {

@@ -4,8 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "store/owners.h"
+
 struct callers {
   pthread_rwlock_t lock;
+  pthread_mutex_t reading; /* of the catalogue: what was read later is taken later */
   catalogue *cat;
   caller **all;
   int count;
@@ -41,15 +44,16 @@ static caller *make(const token_row *row) {
   return who;
 }
 
-/* What can change of a token; what was used is what this process counted. */
+/* What can change of a token. */
 static void update(caller *who, const token_row *row) {
   __atomic_store_n(&who->row.scopes, row->scopes, __ATOMIC_RELAXED);
+  __atomic_store_n(&who->row.used, row->used, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.quota, row->quota, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.jobs, row->jobs, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.priority, row->priority, __ATOMIC_RELAXED);
 }
 
-int callers_reload(callers *c) {
+static int reload(callers *c) {
   int count;
   token_row *rows = catalogue_tokens(c->cat, &count);
   caller **all = rows ? calloc((size_t)count + 1, sizeof(caller *)) : NULL;
@@ -80,6 +84,26 @@ int callers_reload(callers *c) {
   return 1;
 }
 
+int callers_reload(callers *c) {
+  pthread_mutex_lock(&c->reading);
+  int fine = reload(c);
+  pthread_mutex_unlock(&c->reading);
+  return fine;
+}
+
+void callers_recount(callers *c, const char *tenant) {
+  pthread_mutex_lock(&c->reading);
+  int64_t used = catalogue_tenant_bytes(c->cat, tenant);
+  pthread_rwlock_rdlock(&c->lock);
+  for (int i = 0; used >= 0 && i < c->count; i++) {
+    if (c->all[i] && strcmp(c->all[i]->row.tenant, tenant) == 0) {
+      __atomic_store_n(&c->all[i]->row.used, used, __ATOMIC_RELAXED);
+    }
+  }
+  pthread_rwlock_unlock(&c->lock);
+  pthread_mutex_unlock(&c->reading);
+}
+
 callers *callers_open(catalogue *cat) {
   callers *c = calloc(1, sizeof *c);
   if (!c) {
@@ -87,6 +111,7 @@ callers *callers_open(catalogue *cat) {
   }
   c->cat = cat;
   pthread_rwlock_init(&c->lock, NULL);
+  pthread_mutex_init(&c->reading, NULL);
   if (!callers_reload(c)) {
     free(c);
     return NULL;
@@ -101,6 +126,7 @@ void callers_close(callers *c) {
   if (c) {
     free(c->all);
     pthread_rwlock_destroy(&c->lock);
+    pthread_mutex_destroy(&c->reading);
   }
   free(c);
 }

@@ -8,15 +8,17 @@
 #include "store/tokens.h"
 
 typedef struct caller {
-  token_row row; /* hash, name and created never change; the rest, and `revoked`, under __atomic */
+  token_row row; /* hash, name, tenant and created never change; the rest, and `revoked`, under __atomic */
   int revoked, refs;
 } caller;
 
 typedef struct callers callers;
 callers *callers_open(catalogue *cat); /* NULL where they cannot be read */
 void callers_close(callers *c);
-/* Reads them again; 0 where that fails: they stay as they are. Bytes that were used are counted on. */
+/* Reads them again; 0 where that fails: they stay as they are. */
 int callers_reload(callers *c);
+/* After the meshes of a tenant changed: the bytes that its tokens have used. Blocks. */
+void callers_recount(callers *c, const char *tenant);
 int callers_count(callers *c);
 /* By the hash of the token, compared in constant time; referenced. NULL: none. */
 caller *callers_find(callers *c, const unsigned char hash[TOKEN_BYTES]);

@@ -16,9 +16,10 @@ typedef struct wanted {
   int64_t cost;
 } wanted;
 
-static int summary_of(server *srv, const char *mesh, orb_mesh_summary *out, orb_problem *problem) {
+static int summary_of(request *r, const char *mesh, orb_mesh_summary *out, orb_problem *problem) {
+  server *srv = r->srv;
   store_result result;
-  const cached *entry = find_description(srv, RESOURCE_MESH, mesh, &result);
+  const cached *entry = find_description(srv, RESOURCE_MESH, mesh, access_view(r), &result);
   if (!entry && result == STORE_NOT_FOUND) {
     orb_refuse(problem, "not-found", "There is no mesh %s: upload it first.", mesh);
     orb_json_member_string(&problem->facts, "mesh", mesh);
@@ -33,10 +34,10 @@ static int no_memory(orb_problem *problem) {
   return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
 }
 
-static int read_embedding(server *srv, const cJSON *body, wanted *out, orb_problem *problem) {
+static int read_embedding(request *r, const cJSON *body, wanted *out, orb_problem *problem) {
   orb_embedding_request wish;
   orb_mesh_summary mesh;
-  if (!orb_embedding_request_read(body, &wish, problem) || !summary_of(srv, wish.mesh, &mesh, problem)) {
+  if (!orb_embedding_request_read(body, &wish, problem) || !summary_of(r, wish.mesh, &mesh, problem)) {
     return 0;
   }
   out->kind = RESOURCE_EMBEDDING;
@@ -45,13 +46,13 @@ static int read_embedding(server *srv, const cJSON *body, wanted *out, orb_probl
   return (orb_embedding_request_id(&wish, out->id) && !out->canonical.failed) || no_memory(problem);
 }
 
-static int read_supermesh(server *srv, const cJSON *body, wanted *out, orb_problem *problem) {
+static int read_supermesh(request *r, const cJSON *body, wanted *out, orb_problem *problem) {
   orb_supermesh_request wish;
   orb_mesh_summary meshes[ORB_SHAPES_MAX];
   int fine = orb_supermesh_request_read(body, &wish, problem);
   out->kind = RESOURCE_SUPERMESH;
   for (int32_t s = 0; fine && s < wish.shape_count; s++) {
-    fine = summary_of(srv, wish.shapes[s].mesh, &meshes[s], problem);
+    fine = summary_of(r, wish.shapes[s].mesh, &meshes[s], problem);
     out->cost += fine ? meshes[s].triangles : 0;
   }
   fine = fine && orb_supermesh_request_resolve(&wish, meshes, problem);
@@ -74,8 +75,8 @@ static int read_wish(request *r, wanted *out, orb_problem *problem) {
     orb_json_member_integer(&problem->facts, "offset", (int64_t)error.offset);
     return 0;
   }
-  int fine = r->route->id == ROUTE_EMBEDDING_CREATE ? read_embedding(r->srv, body, out, problem)
-                                                    : read_supermesh(r->srv, body, out, problem);
+  int fine = r->route->id == ROUTE_EMBEDDING_CREATE ? read_embedding(r, body, out, problem)
+                                                    : read_supermesh(r, body, out, problem);
   cJSON_Delete(body);
   return fine;
 }
@@ -94,7 +95,7 @@ static void submit(request *r, const wanted *wish) {
   queue_request wanted_job = {.kind = wish->kind == RESOURCE_EMBEDDING ? ORB_JOB_EMBEDDING : ORB_JOB_SUPERMESH,
                               .key = wish->id,
                               .request = wish->canonical.data,
-                              .owner = r->caller ? r->caller->row.name : "",
+                              .owner = access_tenant(r),
                               .owner_limit = r->caller ? __atomic_load_n(&r->caller->row.jobs, __ATOMIC_RELAXED) : 0,
                               .priority = access_priority(r),
                               .cost = wish->cost,
@@ -150,7 +151,7 @@ static void create_away(request *r) {
   if (!read_wish(r, &wish, &problem)) {
     reply_problem(r, &problem);
   } else {
-    const cached *known = find_description(r->srv, wish.kind, wish.id, &result);
+    const cached *known = find_description(r->srv, wish.kind, wish.id, access_tenant(r), &result);
     if (known) {
       reply_cached(r, 200, known);
     } else if (result != STORE_NOT_FOUND) {

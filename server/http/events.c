@@ -99,7 +99,12 @@ static void ended_away(request *r) {
     reply_store(r, result);
     return;
   }
+  int seen = access_sees(r, row.owner);
   job_row_free(&row);
+  if (!seen) {
+    reply_store(r, STORE_NOT_FOUND);
+    return;
+  }
   orb_text text = {0};
   event_row events[ROWS];
   int64_t after = last_seen(r);
@@ -128,6 +133,11 @@ enum MHD_Result handle_job_events(request *r) {
   job *j = queue_find(r->srv->q, r->id);
   if (!j) {
     return request_go_away(r, r->srv->io, ended_away);
+  }
+  if (!access_sees(r, job_owner(j))) {
+    queue_release(r->srv->q, j);
+    reply_store(r, STORE_NOT_FOUND);
+    return MHD_YES;
   }
   stream *s = calloc(1, sizeof *s);
   struct MHD_Response *response =

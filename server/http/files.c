@@ -11,7 +11,9 @@
 static void add_headers(request *r, const char *etag, const char *mime, const char *name) {
   char disposition[160];
   reply_header(r, "ETag", etag);
-  reply_header(r, "Cache-Control", "public, max-age=31536000, immutable");
+  /* What one token may see is not for a cache that others share. */
+  reply_header(r, "Cache-Control",
+               r->caller ? "private, max-age=31536000, immutable" : "public, max-age=31536000, immutable");
   reply_header(r, "Accept-Ranges", "bytes");
   if (r->status != 304) {
     reply_header(r, "Content-Type", mime);
@@ -127,7 +129,7 @@ static resource_kind kind_of(const request *r) {
 
 static void file_away(request *r) {
   store_result result;
-  const cached *entry = find_description(r->srv, kind_of(r), r->id, &result);
+  const cached *entry = find_description(r->srv, kind_of(r), r->id, access_view(r), &result);
   if (entry) {
     file_of(r, entry);
   } else {
@@ -136,7 +138,7 @@ static void file_away(request *r) {
 }
 
 enum MHD_Result handle_file(request *r) {
-  const cached *entry = cache_find(r->srv->descriptions, kind_of(r), r->id);
+  const cached *entry = cache_find(r->srv->descriptions, kind_of(r), r->id, access_view(r));
   if (!entry || r->route->id == ROUTE_SUPERMESH_SPHERE) {
     if (entry) {
       cache_release(r->srv->descriptions, entry);

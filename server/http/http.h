@@ -107,12 +107,15 @@ void access_headers(request *r);
 int access_check(request *r, const char *path, orb_problem *problem);
 /* Its priority in the queue: the token's, then what the Priority header says (RFC 9218, u=0 to 7). */
 int access_priority(const request *r);
-/* Whether the caller may change what `owner` (the name of a token) asked for: its own, or all with the scope admin, or
- * where no token is needed. Refuses it if not. */
-int access_owns(request *r, const char *owner);
-/* Takes bytes of an upload from the token's quota; then says whether they were stored as something new. */
-int access_take_quota(request *r, int64_t bytes, orb_problem *problem);
-void access_quota_stored(request *r, int64_t bytes, int stored);
+/* Tenants. Whose the caller's requests are; "" where no token is needed. */
+const char *access_tenant(const request *r);
+/* Through whose eyes it sees: its tenant's, or "" for all there is, with the scope admin or where no token is needed.
+ */
+const char *access_view(const request *r);
+/* Whether it sees what a tenant asked for. What it does not see is not there for it. */
+int access_sees(const request *r, const char *owner);
+/* Room for an upload in the token's quota; 0 with the problem. */
+int access_has_room(const request *r, int64_t bytes, orb_problem *problem);
 
 /* reply.c: each leaves a response. */
 void reply_json(request *r, unsigned status, orb_text *json); /* takes json */
@@ -160,8 +163,8 @@ int list_begin(request *r, const char *name, size_t row_size, list_page *page); 
 void list_end(request *r, list_page *page, int64_t last, int count);
 /* Seconds to wait by ?wait= or Prefer: wait=, clamped to 60; 0: not. −1: bad, with a response. */
 int64_t read_wait_ms(request *r);
-/* From the cache or the catalogue; blocks. NULL with *result. */
-const cached *find_description(server *srv, resource_kind kind, const char *id, store_result *result);
+/* As a tenant sees it ("": everything), from the cache or the catalogue; blocks. NULL with *result. */
+const cached *find_description(server *srv, resource_kind kind, const char *id, const char *view, store_result *result);
 /* Of a description that the cache had: says so to the catalogue, for eviction. Does not wait. */
 void note_use(server *srv, const cached *entry);
 /* Members for the log: the request's number, its trace and route. */

@@ -51,7 +51,7 @@ static void result_away(request *r) {
   store_result result;
   job *j = r->waits_for;
   resource_kind kind = job_kind(j) == ORB_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
-  const cached *entry = find_description(r->srv, kind, job_key(j), &result);
+  const cached *entry = find_description(r->srv, kind, job_key(j), access_tenant(r), &result);
   if (entry) {
     reply_cached(r, 200, entry);
   } else {
@@ -116,10 +116,14 @@ static void get_away(request *r) {
     reply_store(r, result);
     return;
   }
-  orb_text json = {0};
-  write_row(&row, &json);
+  if (access_sees(r, row.owner)) {
+    orb_text json = {0};
+    write_row(&row, &json);
+    reply_json(r, 200, &json);
+  } else {
+    reply_store(r, STORE_NOT_FOUND);
+  }
   job_row_free(&row);
-  reply_json(r, 200, &json);
 }
 
 enum MHD_Result handle_job_get(request *r) {
@@ -131,8 +135,12 @@ enum MHD_Result handle_job_get(request *r) {
   if (!j) {
     return request_go_away(r, r->srv->io, get_away);
   }
-  if (wait == 0) {
-    reply_job(r, j);
+  if (wait == 0 || !access_sees(r, job_owner(j))) {
+    if (access_sees(r, job_owner(j))) {
+      reply_job(r, j);
+    } else {
+      reply_store(r, STORE_NOT_FOUND);
+    }
     queue_release(r->srv->q, j);
     return MHD_YES;
   }
@@ -153,11 +161,17 @@ static void cancel_away(request *r) {
       return;
     }
     orb_job_state state = row.state;
+    int seen = access_sees(r, row.owner);
     job_row_free(&row);
+    if (!seen) {
+      reply_store(r, STORE_NOT_FOUND);
+      return;
+    }
     reply_refuse(r, "job-ended", "The job is %s already; there is nothing to cancel.", orb_job_state_name(state));
     return;
   }
-  if (!access_owns(r, job_owner(j))) {
+  if (!access_sees(r, job_owner(j))) {
+    reply_store(r, STORE_NOT_FOUND);
     queue_release(srv->q, j);
     return;
   }
@@ -207,7 +221,8 @@ static void list_away(request *r) {
     return;
   }
   job_row *rows = page.rows;
-  int count = catalogue_job_list(r->srv->cat, state, page.before, page.limit + 1, rows);
+  const char *view = access_view(r);
+  int count = catalogue_job_list(r->srv->cat, view[0] ? view : NULL, state, page.before, page.limit + 1, rows);
   for (int i = 0; i < count; i++) {
     if (i < page.limit) {
       write_live(r, &rows[i], &page.json);

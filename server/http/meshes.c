@@ -10,6 +10,7 @@
 #include "api/mesh_codec.h"
 #include "faults.h"
 #include "http/http.h"
+#include "store/owners.h"
 
 enum { LARGE_UPLOAD = 16 << 20 };
 
@@ -86,9 +87,23 @@ static int check_mesh(request *r, const upload_query *query, const unsigned char
   return fine;
 }
 
+/* Takes back an object that got no row. */
+static void drop_unused(server *srv, const char *id) {
+  resource row = {0};
+  objects_exclude(srv->store);
+  if (catalogue_get(srv->cat, RESOURCE_MESH, id, &row) == STORE_NOT_FOUND) {
+    objects_delete(srv->store, OBJECT_MESH, id);
+  }
+  objects_let_go(srv->store);
+  resource_free(&row);
+}
+
+/* Also where others have the same mesh: the caller is not to see that, neither by the answer nor by its time. */
 static void store_mesh(request *r, const upload_query *query, const unsigned char *bytes, orb_format format,
                        const char *id) {
   server *srv = r->srv;
+  const char *tenant = access_tenant(r);
+  int fresh = 0;
   orb_text json = {0};
   orb_problem problem = {0};
   resource row = {.kind = RESOURCE_MESH, .bytes = r->received, .created = (int64_t)time(NULL) * 1000};
@@ -104,12 +119,26 @@ static void store_mesh(request *r, const upload_query *query, const unsigned cha
   store_result stored = objects_publish(srv->store, &r->temp, OBJECT_MESH, id);
   FAULT_POINT("mesh-published");
   if (stored == STORE_OK) {
-    stored = catalogue_put(srv->cat, &row);
+    stored = catalogue_put_for(srv->cat, &row, tenant,
+                               r->caller ? __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED) : 0, &fresh);
   }
   objects_let_go(srv->store);
   resource_free(&row);
+  if (fresh && r->caller) {
+    callers_recount(srv->callers, tenant);
+  }
+  if (stored == STORE_CONFLICT) { /* others of this tenant took the room meanwhile */
+    drop_unused(srv, id);
+    callers_recount(srv->callers, tenant);
+    if (access_has_room(r, r->received, &problem)) {
+      orb_refuse(&problem, "quota-exceeded", "There was no room for this mesh in the quota of the token; try again.");
+      orb_json_member_integer(&problem.facts, "quota", __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED));
+    }
+    reply_problem(r, &problem);
+    return;
+  }
   /* Of two that sent the same at once, both get the row that was first. */
-  const cached *entry = stored == STORE_OK ? find_description(srv, RESOURCE_MESH, id, &stored) : NULL;
+  const cached *entry = stored == STORE_OK ? find_description(srv, RESOURCE_MESH, id, tenant, &stored) : NULL;
   if (entry) {
     reply_cached(r, 201, entry);
   } else {
@@ -134,13 +163,12 @@ static void upload_away(request *r) {
   int forced = found == ORB_FORMAT_AUTO && query.hint != ORB_FORMAT_AUTO;
   orb_mesh_id(&r->hash, query.repair, forced ? orb_format_name(query.hint) : NULL, id);
   store_result result;
-  const cached *known = find_description(r->srv, RESOURCE_MESH, id, &result);
+  const cached *known = find_description(r->srv, RESOURCE_MESH, id, access_tenant(r), &result);
   if (known) {
     reply_cached(r, 200, known);
   } else {
-    if (access_take_quota(r, r->received, &problem)) {
+    if (access_has_room(r, r->received, &problem)) {
       store_mesh(r, &query, bytes, forced ? query.hint : found, id);
-      access_quota_stored(r, r->received, r->status == 201);
     } else {
       reply_problem(r, &problem);
     }

@@ -6,6 +6,7 @@
 #include "evict.h"
 #include "http/http.h"
 #include "metrics.h"
+#include "store/owners.h"
 
 static resource_kind kind_of(const request *r) {
   return strncmp(r->route->path, "/v1/meshes", 10) == 0       ? RESOURCE_MESH
@@ -20,9 +21,10 @@ void note_use(server *srv, const cached *entry) {
   }
 }
 
-const cached *find_description(server *srv, resource_kind kind, const char *id, store_result *result) {
+const cached *find_description(server *srv, resource_kind kind, const char *id, const char *view,
+                               store_result *result) {
   resource row;
-  const cached *entry = cache_find(srv->descriptions, kind, id);
+  const cached *entry = cache_find(srv->descriptions, kind, id, view);
   *result = STORE_OK;
   metrics_cache(entry != NULL);
   if (entry) {
@@ -30,21 +32,21 @@ const cached *find_description(server *srv, resource_kind kind, const char *id, 
     return entry;
   }
   unsigned long long since = cache_drops(srv->descriptions);
-  *result = catalogue_get(srv->cat, kind, id, &row);
+  *result = view[0] ? catalogue_get_of(srv->cat, kind, id, view, &row) : catalogue_get(srv->cat, kind, id, &row);
   if (*result != STORE_OK) {
     return NULL;
   }
   if (kind != RESOURCE_MESH) {
     catalogue_touch(srv->cat, kind, id);
   }
-  entry = cache_add(srv->descriptions, &row, since);
+  entry = cache_add(srv->descriptions, &row, view, since);
   *result = entry ? STORE_OK : STORE_ERROR;
   return entry;
 }
 
 static void get_away(request *r) {
   store_result result;
-  const cached *entry = find_description(r->srv, kind_of(r), r->id, &result);
+  const cached *entry = find_description(r->srv, kind_of(r), r->id, access_view(r), &result);
   if (entry) {
     reply_cached(r, 200, entry);
   } else {
@@ -53,7 +55,7 @@ static void get_away(request *r) {
 }
 
 enum MHD_Result handle_get(request *r) {
-  const cached *entry = cache_find(r->srv->descriptions, kind_of(r), r->id);
+  const cached *entry = cache_find(r->srv->descriptions, kind_of(r), r->id, access_view(r));
   if (!entry) {
     return request_go_away(r, r->srv->io, get_away);
   }
@@ -116,7 +118,9 @@ static void list_away(request *r) {
     return;
   }
   resource *rows = page.rows;
-  int count = catalogue_list(r->srv->cat, kind, page.before, page.limit + 1, rows);
+  const char *view = access_view(r);
+  int count = view[0] ? catalogue_list_of(r->srv->cat, kind, view, page.before, page.limit + 1, rows)
+                      : catalogue_list(r->srv->cat, kind, page.before, page.limit + 1, rows);
   for (int i = 0; i < count; i++) {
     if (i < page.limit) {
       orb_json_raw(&page.json, rows[i].json);
@@ -131,17 +135,24 @@ enum MHD_Result handle_list(request *r) {
   return request_go_away(r, r->srv->io, list_away);
 }
 
-/* Deleting a mesh leaves what was derived from it; only unfinished jobs that need it stand in the way. */
+/* Deleting a mesh leaves what was derived from it; only unfinished jobs that need it stand in the way. A tenant gives
+ * up what it has of it, which others may have as well. */
 static void delete_away(request *r) {
   server *srv = r->srv;
   resource_kind kind = kind_of(r);
-  if (kind == RESOURCE_MESH && queue_needs_mesh(srv->q, r->id)) {
+  const char *view = access_view(r);
+  if (kind == RESOURCE_MESH && queue_needs_mesh(srv->q, r->id, view[0] ? view : NULL)) {
     reply_refuse(r, "in-use", "Unfinished jobs need this mesh: wait for them, or cancel them.");
     return;
   }
   const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions};
-  store_result result = evict_one(&env, kind, r->id);
+  store_result result = view[0] ? evict_owned(&env, kind, r->id, view) : evict_one(&env, kind, r->id);
   if (result == STORE_OK) {
+    if (kind == RESOURCE_MESH && view[0]) {
+      callers_recount(srv->callers, view);
+    } else if (kind == RESOURCE_MESH && r->caller) {
+      callers_reload(srv->callers); /* the bytes of all who owned it */
+    }
     reply_empty(r, 204);
   } else {
     reply_store(r, result);

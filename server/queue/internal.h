@@ -77,6 +77,8 @@ void owner_leave(queue *q, const job *j);
 void table_add(queue *q, job *j);
 void table_drop_key(queue *q, job *j); /* when it ends */
 void table_ended(queue *q, job *j);
+job *table_find(queue *q, const char *key, const char *owner); /* an unfinished one */
+int table_key_taken(const queue *q, const job *by_other);      /* another job for the same result is being worked on */
 void job_unref(job *j);
 void job_view(const job *j, orb_job_view *view);
 void wake_job(queue *q, job *j, int ended);

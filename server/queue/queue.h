@@ -2,8 +2,10 @@
  *
  * Contract. One lock guards all of it; it is held for short steps only, never over input or output. The catalogue is
  * the truth: a job is taken, shown as accepted, or shown as ended only after the row was committed, so what a caller
- * was told survives the process. A key (the id of the result) has at most one unfinished job: a second request gets
- * the first one's job. Ended jobs stay in memory for a while, least recently ended leave first.
+ * was told survives the process. A key (the id of the result) has at most one unfinished job for each owner: a second
+ * request of the owner gets the first one's job, and those of different owners run one after another, so that the work
+ * is done once and nobody can tell, or cancel, the other's. Ended jobs stay in memory for a while, least recently ended
+ * leave first.
  *
  * Waiters are suspended connections. They are listed and woken under the lock; `wake` must not call back into the
  * queue. Every waiter is woken by its deadline at the latest.
@@ -73,15 +75,14 @@ typedef enum queue_result {
 queue_result queue_submit(queue *q, const queue_request *request, job **out, int *fresh);
 
 /* References. */
-job *queue_find(queue *q, const char *id);      /* NULL: not in memory */
-job *queue_find_key(queue *q, const char *key); /* an unfinished one */
+job *queue_find(queue *q, const char *id); /* NULL: not in memory */
 void queue_release(queue *q, job *j);
 
 const char *job_id(const job *j);
 const char *job_key(const job *j);
 orb_job_kind job_kind(const job *j);
 const char *job_request(const job *j);
-const char *job_owner(const job *j); /* the name of the token that asked first; "" where none was needed */
+const char *job_owner(const job *j); /* the tenant that asked; "" where no token was needed */
 /* Appends the job as JSON; returns its state. */
 orb_job_state queue_job_write(queue *q, job *j, orb_text *out);
 
@@ -94,8 +95,8 @@ void event_write(orb_text *out, int64_t number, const char *type, const char *js
 
 /* Asks a job to end. Blocks for the commit where it was not running. */
 store_result queue_cancel(queue *q, job *j);
-/* True if an unfinished job names the mesh. */
-int queue_needs_mesh(queue *q, const char *mesh);
+/* True if an unfinished job names the mesh; one of `owner`, where that is not NULL. */
+int queue_needs_mesh(queue *q, const char *mesh, const char *owner);
 
 /* For the workers. */
 /* Waits for a job; 0 when the queue stops. small_only: for the lane that large jobs cannot block. */

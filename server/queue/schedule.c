@@ -6,10 +6,14 @@
 #include "log.h"
 #include "queue/internal.h"
 
+static int is_for(const job *j, const char *key, const char *owner) {
+  return strcmp(j->row.key, key) == 0 && strcmp(j->row.owner, owner) == 0;
+}
+
 static queue_result submit_locked(queue *q, const queue_request *request, job **out, int *fresh) {
   job *j;
   int64_t mine = 0;
-  for (j = q->first; j && (j->cancel || strcmp(j->row.key, request->key) != 0); j = j->next) {
+  for (j = q->first; j && (j->cancel || !is_for(j, request->key, request->owner)); j = j->next) {
     mine += request->owner_limit > 0 && j->row.listed && strcmp(j->row.owner, request->owner) == 0;
   }
   if (j) {
@@ -146,8 +150,8 @@ static int goes_before(const queue *q, const job *a, const job *b) {
   return a->row.priority > b->row.priority;
 }
 
-static int runnable(const job *j, int64_t now) {
-  return j->committed && !j->taken && j->waits_for == 0 && j->retry_at <= now;
+static int runnable(const queue *q, const job *j, int64_t now) {
+  return j->committed && !j->taken && j->waits_for == 0 && j->retry_at <= now && !table_key_taken(q, j);
 }
 
 /* The next job for a worker, or NULL. */
@@ -159,7 +163,7 @@ static job *choose(queue *q, int small_only) {
     return NULL;
   }
   for (job *j = q->first; j; j = j->next) {
-    if (!runnable(j, now)) {
+    if (!runnable(q, j, now)) {
       continue;
     }
     if (j->row.suspect) {
@@ -187,7 +191,7 @@ int queue_take(queue *q, int small_only, job **out, int *threads) {
     int beside = 0;
     int64_t now = orb_clock_ms();
     for (job *other = q->first; other; other = other->next) {
-      beside += other != j && runnable(other, now);
+      beside += other != j && runnable(q, other, now);
     }
     int wanted = q->running + 1 + beside;
     int share = wanted < q->options.workers ? wanted : q->options.workers;
@@ -242,7 +246,7 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[ORB_ID_SIZE], const c
   j->waits_for = 0;
   for (int i = 0; i < count && result == QUEUE_OK; i++) {
     for (job *other = q->first; other; other = other->next) {
-      j->waits_for += strcmp(other->row.key, keys[i]) == 0;
+      j->waits_for += is_for(other, keys[i], j->row.owner);
     }
   }
   if (result != QUEUE_OK) {
@@ -301,7 +305,7 @@ void queue_add_embed_ms(queue *q, job *j, double ms) {
   pthread_mutex_lock(&q->lock);
   for (job *other = q->first; other; other = other->next) {
     for (int d = 0; other->waits_for && d < other->dependency_count; d++) {
-      if (strcmp(other->dependencies[d], j->row.key) == 0) {
+      if (is_for(j, other->dependencies[d], other->row.owner)) {
         other->embed_ms += ms;
       }
     }
@@ -319,7 +323,7 @@ double queue_embed_ms(queue *q, job *j) {
 static void release_dependents(queue *q, job *ended) {
   for (job *j = q->first; j; j = j->next) {
     for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
-      if (strcmp(j->dependencies[d], ended->row.key) == 0) {
+      if (is_for(ended, j->dependencies[d], j->row.owner)) {
         j->waits_for--;
         if (ended->row.state == ORB_JOB_FAILED && ended->row.problem && !j->dependency_problem) {
           j->dependency_problem = strdup(ended->row.problem);
@@ -420,15 +424,17 @@ void queue_put_off(queue *q, job *j) {
 /* Ends the sub-jobs that only this job wanted. */
 static void cancel_needless(queue *q, job *of) {
   for (int d = 0; d < of->dependency_count; d++) {
-    job *needed = queue_find_key(q, of->dependencies[d]);
+    pthread_mutex_lock(&q->lock);
+    job *needed = table_find(q, of->dependencies[d], of->row.owner);
     if (!needed) {
+      pthread_mutex_unlock(&q->lock);
       continue;
     }
+    needed->refs++;
     int wanted = needed->row.listed;
-    pthread_mutex_lock(&q->lock);
     for (job *j = q->first; j && !wanted; j = j->next) {
       for (int k = 0; j != of && k < j->dependency_count; k++) {
-        wanted |= strcmp(j->dependencies[k], needed->row.key) == 0;
+        wanted |= is_for(needed, j->dependencies[k], j->row.owner);
       }
     }
     pthread_mutex_unlock(&q->lock);

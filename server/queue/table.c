@@ -98,23 +98,20 @@ job *queue_find(queue *q, const char *id) {
   return j;
 }
 
-/* Under the lock or not: see the callers. */
-static job *find_key(queue *q, const char *key) {
+job *table_find(queue *q, const char *key, const char *owner) {
   job *j = q->by_key[bucket(key)];
-  while (j && strcmp(j->row.key, key) != 0) {
+  while (j && (strcmp(j->row.key, key) != 0 || strcmp(j->row.owner, owner) != 0)) {
     j = j->next_key;
   }
   return j;
 }
 
-job *queue_find_key(queue *q, const char *key) {
-  pthread_mutex_lock(&q->lock);
-  job *j = find_key(q, key);
-  if (j) {
-    j->refs++;
+int table_key_taken(const queue *q, const job *by_other) {
+  const job *j = q->by_key[bucket(by_other->row.key)];
+  while (j && (j == by_other || !j->taken || strcmp(j->row.key, by_other->row.key) != 0)) {
+    j = j->next_key;
   }
-  pthread_mutex_unlock(&q->lock);
-  return j;
+  return j != NULL;
 }
 
 void queue_release(queue *q, job *j) {
@@ -165,11 +162,11 @@ orb_job_state queue_job_write(queue *q, job *j, orb_text *out) {
   return state;
 }
 
-int queue_needs_mesh(queue *q, const char *mesh) {
+int queue_needs_mesh(queue *q, const char *mesh, const char *owner) {
   int needed = 0;
   pthread_mutex_lock(&q->lock);
   for (job *j = q->first; j && !needed; j = j->next) {
-    needed = strstr(j->row.request, mesh) != NULL;
+    needed = (!owner || strcmp(j->row.owner, owner) == 0) && strstr(j->row.request, mesh) != NULL;
   }
   pthread_mutex_unlock(&q->lock);
   return needed;

@@ -34,7 +34,8 @@ typedef struct resource {
 } resource;
 void resource_free(resource *r);
 
-store_result catalogue_put(catalogue *cat, const resource *r); /* keeps one that is there */
+/* Keeps one that is there; owned by "". See store/owners.h for those who own. */
+store_result catalogue_put(catalogue *cat, const resource *r);
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out);
 store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id);
 /* The functions that list return the number filled, −1 where the rows cannot be read: nothing is filled then. */
@@ -58,8 +59,8 @@ typedef struct job_row {
   int alone;   /* the present attempt runs alone */
   int listed;  /* asked for by a caller, not only needed by another job */
   int priority;
-  int64_t cost; /* triangles */
-  char owner[64];
+  int64_t cost;   /* triangles */
+  char owner[64]; /* the tenant who asked */
   char *request, *problem;
   int64_t created, started, finished;
 } job_row;
@@ -75,8 +76,8 @@ store_result catalogue_job_release(catalogue *cat, const char *id, int attempt);
 store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, orb_job_state state, const char *problem,
                                   int64_t now, const resource *result, int64_t event, const char *event_json);
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out);
-/* state −1: any. */
-int catalogue_job_list(catalogue *cat, int state, int64_t before, int limit, job_row *out);
+/* owner NULL, state −1: any. */
+int catalogue_job_list(catalogue *cat, const char *owner, int state, int64_t before, int limit, job_row *out);
 /* After a start: marks what was running, fails what died alone for the last time; then all unfinished, oldest first. */
 store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem);
 int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out);

@@ -24,6 +24,33 @@ static const char *const migrations[] = {
     " quota_bytes INTEGER NOT NULL, quota_jobs INTEGER NOT NULL, created INTEGER NOT NULL);",
     "ALTER TABLE token ADD COLUMN used_bytes INTEGER NOT NULL DEFAULT 0;",
     "ALTER TABLE token ADD COLUMN priority INTEGER NOT NULL DEFAULT 0;",
+    /* Owners. What was there belongs to those whose jobs made or named it, the rest to "". */
+    "CREATE TABLE owner(seq INTEGER PRIMARY KEY AUTOINCREMENT, kind INTEGER NOT NULL, id TEXT NOT NULL,"
+    " tenant TEXT NOT NULL, json TEXT, bytes INTEGER NOT NULL, created INTEGER NOT NULL, UNIQUE(kind, id, tenant),"
+    " FOREIGN KEY(kind, id) REFERENCES resource(kind, id) ON DELETE CASCADE);"
+    "CREATE INDEX owner_tenant ON owner(tenant, kind, seq);"
+    "CREATE TABLE tenant(name TEXT PRIMARY KEY, bytes INTEGER NOT NULL DEFAULT 0) WITHOUT ROWID;"
+    "CREATE TRIGGER owner_added AFTER INSERT ON owner BEGIN"
+    " INSERT INTO tenant(name) SELECT NEW.tenant WHERE NOT EXISTS(SELECT 1 FROM tenant WHERE name=NEW.tenant);"
+    " UPDATE tenant SET bytes=bytes+NEW.bytes WHERE name=NEW.tenant; END;"
+    "CREATE TRIGGER owner_removed AFTER DELETE ON owner BEGIN"
+    " UPDATE tenant SET bytes=bytes-OLD.bytes WHERE name=OLD.tenant; END;"
+    "CREATE INDEX job_owner ON job(owner, seq);"
+    "ALTER TABLE token ADD COLUMN tenant TEXT NOT NULL DEFAULT '';"
+    "UPDATE token SET tenant=name;"
+    "ALTER TABLE token DROP COLUMN used_bytes;"
+    "CREATE TEMP TABLE claim AS"
+    " SELECT kind+1 AS kind, key AS id, owner AS tenant FROM job WHERE state=2 UNION"
+    " SELECT 0, json_extract(request, '$.mesh'), owner FROM job WHERE kind=0 AND json_valid(request) UNION"
+    " SELECT 0, json_extract(shape.value, '$.mesh'), owner FROM job,"
+    "  json_each(iif(json_valid(request), request, '{}'), '$.shapes') AS shape WHERE job.kind=1;"
+    "INSERT INTO owner(kind, id, tenant, bytes, created)"
+    " SELECT r.kind, r.id, c.tenant, iif(r.kind=0, r.bytes, 0), r.created"
+    " FROM resource r JOIN temp.claim c ON c.kind=r.kind AND c.id=r.id ORDER BY r.seq, c.tenant;"
+    "INSERT INTO owner(kind, id, tenant, bytes, created)"
+    " SELECT kind, id, '', iif(kind=0, bytes, 0), created FROM resource r"
+    " WHERE NOT EXISTS(SELECT 1 FROM owner o WHERE o.kind=r.kind AND o.id=r.id) ORDER BY seq;"
+    "DROP TABLE temp.claim;",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

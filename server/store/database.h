@@ -6,7 +6,7 @@
 
 #include "store/catalogue.h"
 
-enum { DATABASE_STATEMENTS = 48, DATABASE_READERS = 6 };
+enum { DATABASE_STATEMENTS = 64, DATABASE_READERS = 6 };
 
 /* A connection; statements are cached by the address of their text. One thread at a time. */
 typedef struct database {

@@ -1,6 +1,7 @@
 /* Rows of jobs and events. */
 #include <stdlib.h>
 
+#include "store/owners.h"
 #include "store/rows.h"
 
 #define COLUMNS                                                                                                   \
@@ -130,6 +131,9 @@ static int finish(database *db, void *arg) {
   if (code == SQLITE_OK && c->result) {
     code = resource_insert(db, c->result);
   }
+  if (code == SQLITE_OK && c->state == ORB_JOB_SUCCEEDED) {
+    code = owner_of_job(db, c->id, c->now);
+  }
   if (code == SQLITE_OK && c->event_json) {
     code = write_event(db, c->id, c->event, orb_job_state_name((orb_job_state)c->state), c->event_json);
   }
@@ -186,11 +190,18 @@ store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
   return rows_one(cat, db, st, &job_rows, out);
 }
 
-int catalogue_job_list(catalogue *cat, int state, int64_t before, int limit, job_row *out) {
+int catalogue_job_list(catalogue *cat, const char *owner, int state, int64_t before, int limit, job_row *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS
-                                            " FROM job WHERE listed=1 AND (?1<0 OR state=?1) AND seq<?2"
-                                            " ORDER BY seq DESC LIMIT ?3");
+  sqlite3_stmt *st =
+      owner ? database_statement(db, "SELECT " COLUMNS
+                                     " FROM job WHERE listed=1 AND (?1<0 OR state=?1) AND seq<?2 AND owner=?4"
+                                     " ORDER BY seq DESC LIMIT ?3")
+            : database_statement(db, "SELECT " COLUMNS
+                                     " FROM job WHERE listed=1 AND (?1<0 OR state=?1) AND seq<?2"
+                                     " ORDER BY seq DESC LIMIT ?3");
+  if (st && owner) {
+    sqlite3_bind_text(st, 4, owner, -1, SQLITE_STATIC);
+  }
   if (st) {
     sqlite3_bind_int(st, 1, state);
     sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);

@@ -3,6 +3,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "store/owners.h"
 #include "store/rows.h"
 
 #define COLUMNS "seq, kind, id, sha, json, bytes, created"
@@ -28,8 +29,10 @@ int resource_insert(database *db, const resource *r) {
   return database_run(db, st);
 }
 
+/* Of nobody: what is put without an owner belongs to "". */
 static int put(database *db, void *arg) {
-  return resource_insert(db, arg);
+  int code = resource_insert(db, arg);
+  return code == SQLITE_OK ? owner_insert(db, arg, "", NULL) : code;
 }
 
 store_result catalogue_put(catalogue *cat, const resource *r) {
@@ -51,7 +54,7 @@ static int read_row(sqlite3_stmt *st, void *to) {
 static void release_row(void *row) {
   resource_free(row);
 }
-static const row_kind resource_rows = {read_row, release_row, sizeof(resource)};
+const row_kind resource_rows = {read_row, release_row, sizeof(resource)};
 
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out) {
   database *db = catalogue_reader(cat);
@@ -92,16 +95,20 @@ typedef struct key_arg {
   int64_t now;
 } key_arg;
 
-static int delete_row(database *db, void *arg) {
-  key_arg *key = arg;
+int resource_remove(database *db, resource_kind kind, const char *id) {
   sqlite3_stmt *st = database_statement(db, "DELETE FROM resource WHERE kind=?1 AND id=?2");
   if (!st) {
     return SQLITE_ERROR;
   }
-  sqlite3_bind_int(st, 1, key->kind);
-  sqlite3_bind_text(st, 2, key->id, -1, SQLITE_STATIC);
+  sqlite3_bind_int(st, 1, (int)kind);
+  sqlite3_bind_text(st, 2, id, -1, SQLITE_STATIC);
   int code = database_run(db, st);
   return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+}
+
+static int delete_row(database *db, void *arg) {
+  const key_arg *key = arg;
+  return resource_remove(db, (resource_kind)key->kind, key->id);
 }
 
 store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id) {

@@ -10,6 +10,7 @@
 
 /* Inside a transaction; keeps a row that is there. */
 int resource_insert(database *db, const resource *r);
+int resource_remove(database *db, resource_kind kind, const char *id); /* SQLITE_NOTFOUND: it was not there */
 
 /* read fills one row and says 0 where memory is out; release frees what it filled, all of it or a part. */
 typedef struct row_kind {
@@ -17,6 +18,7 @@ typedef struct row_kind {
   void (*release)(void *row);
   size_t size;
 } row_kind;
+extern const row_kind resource_rows; /* of seq, kind, id, sha, json, bytes, created */
 
 /* Runs a bound query of a reader that catalogue_reader() gave (st NULL: it could not be prepared) and gives the reader
  * back. */

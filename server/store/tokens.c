@@ -22,8 +22,8 @@ static int add_row(database *db, void *arg) {
   char hash[TOKEN_TEXT];
   sqlite3_stmt *st =
       database_statement(db,
-                         "INSERT INTO token(hash, name, scopes, quota_bytes, quota_jobs, created, priority)"
-                         " VALUES(?1, ?2, ?3, ?4, ?6, ?5, ?7) ON CONFLICT DO NOTHING");
+                         "INSERT INTO token(hash, name, scopes, quota_bytes, quota_jobs, created, priority, tenant)"
+                         " VALUES(?1, ?2, ?3, ?4, ?6, ?5, ?7, ?8) ON CONFLICT DO NOTHING");
   if (!st) {
     return SQLITE_ERROR;
   }
@@ -35,6 +35,7 @@ static int add_row(database *db, void *arg) {
   sqlite3_bind_int64(st, 5, row->created);
   sqlite3_bind_int64(st, 6, row->jobs);
   sqlite3_bind_int(st, 7, row->priority);
+  sqlite3_bind_text(st, 8, row->tenant, -1, SQLITE_STATIC);
   int code = database_run(db, st);
   return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_CONSTRAINT : code;
 }
@@ -82,12 +83,12 @@ store_result catalogue_token_remove(catalogue *cat, const char *name) {
 token_row *catalogue_tokens(catalogue *cat, int *count) {
   token_row *rows = calloc(TOKENS_MOST, sizeof *rows);
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = rows
-                         ? database_statement(db,
-                                              "SELECT hash, name, scopes, quota_bytes, used_bytes, created, quota_jobs,"
-                                              " priority FROM token"
-                                              " ORDER BY name")
-                         : NULL;
+  sqlite3_stmt *st =
+      rows ? database_statement(db,
+                                "SELECT hash, token.name, scopes, quota_bytes, coalesce(bytes, 0), created,"
+                                " quota_jobs, priority, tenant FROM token"
+                                " LEFT JOIN tenant ON tenant.name=token.tenant ORDER BY token.name")
+           : NULL;
   int code = SQLITE_ERROR;
   *count = 0;
   while (st && *count < TOKENS_MOST && (code = sqlite3_step(st)) == SQLITE_ROW) {
@@ -102,6 +103,7 @@ token_row *catalogue_tokens(catalogue *cat, int *count) {
     row->created = sqlite3_column_int64(st, 5);
     row->jobs = sqlite3_column_int64(st, 6);
     row->priority = sqlite3_column_int(st, 7);
+    row_text(st, 8, row->tenant, sizeof row->tenant);
   }
   if (st) {
     sqlite3_reset(st);
@@ -113,29 +115,4 @@ token_row *catalogue_tokens(catalogue *cat, int *count) {
     return NULL;
   }
   return rows;
-}
-
-typedef struct use_arg {
-  char name[64];
-  int64_t bytes;
-} use_arg;
-
-static int use_row(database *db, void *arg) {
-  use_arg *use = arg;
-  sqlite3_stmt *st = database_statement(db, "UPDATE token SET used_bytes=used_bytes+?2 WHERE name=?1");
-  if (!st) {
-    return SQLITE_ERROR;
-  }
-  sqlite3_bind_text(st, 1, use->name, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 2, use->bytes);
-  return database_run(db, st);
-}
-
-void catalogue_token_use(catalogue *cat, const char *name, int64_t bytes) {
-  use_arg *use = calloc(1, sizeof *use);
-  if (use) {
-    snprintf(use->name, sizeof use->name, "%s", name);
-    use->bytes = bytes;
-    catalogue_write_later(cat, use_row, use);
-  }
 }

@@ -9,8 +9,9 @@ enum { TOKEN_BYTES = 32, TOKEN_TEXT = 2 * TOKEN_BYTES + 1, TOKENS_MOST = 1024 };
 typedef struct token_row {
   unsigned char hash[TOKEN_BYTES];
   char name[64];
+  char tenant[64];     /* whose meshes and jobs it works with */
   int scopes;          /* route_scope, or-ed */
-  int64_t quota, used; /* bytes of uploads that were stored; quota 0: no limit */
+  int64_t quota, used; /* bytes of the meshes that the tenant owns; quota 0: no limit */
   int64_t jobs;        /* unfinished at once; 0: no limit */
   int priority;        /* 0 to 9: jobs of a higher one go first */
   int64_t created;
@@ -25,6 +26,5 @@ store_result catalogue_token_set(catalogue *cat, const token_row *row);
 store_result catalogue_token_remove(catalogue *cat, const char *name);
 /* By name; at most TOKENS_MOST. In memory of malloc(); NULL with *count −1 on error. */
 token_row *catalogue_tokens(catalogue *cat, int *count);
-void catalogue_token_use(catalogue *cat, const char *name, int64_t bytes); /* adds; does not wait */
 
 #endif

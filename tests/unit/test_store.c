@@ -15,6 +15,7 @@
 
 #include "store/database.h"
 #include "store/objects.h"
+#include "store/owners.h"
 #include "store/tokens.h"
 
 typedef struct stored {
@@ -257,25 +258,50 @@ static int version_of(sqlite3 *db) {
   return version;
 }
 
+/* The first version of the schema. */
+static const char first_schema[] =
+    "CREATE TABLE resource(seq INTEGER PRIMARY KEY AUTOINCREMENT, kind INTEGER NOT NULL, id TEXT NOT NULL,"
+    " sha TEXT NOT NULL, json TEXT NOT NULL, bytes INTEGER NOT NULL, created INTEGER NOT NULL, used INTEGER NOT NULL,"
+    " UNIQUE(kind, id));"
+    "CREATE INDEX resource_used ON resource(used);"
+    "CREATE TABLE job(seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, key TEXT NOT NULL,"
+    " kind INTEGER NOT NULL, state INTEGER NOT NULL, attempt INTEGER NOT NULL, crashes INTEGER NOT NULL DEFAULT 0,"
+    " suspect INTEGER NOT NULL DEFAULT 0, alone INTEGER NOT NULL DEFAULT 0, listed INTEGER NOT NULL,"
+    " priority INTEGER NOT NULL, cost INTEGER NOT NULL, owner TEXT NOT NULL, request TEXT NOT NULL, problem TEXT,"
+    " created INTEGER NOT NULL, started INTEGER NOT NULL DEFAULT 0, finished INTEGER NOT NULL DEFAULT 0);"
+    "CREATE INDEX job_state ON job(state, seq);"
+    "CREATE TABLE event(job TEXT NOT NULL, number INTEGER NOT NULL, type TEXT NOT NULL, json TEXT NOT NULL,"
+    " PRIMARY KEY(job, number)) WITHOUT ROWID;"
+    "CREATE TABLE token(hash TEXT PRIMARY KEY, name TEXT NOT NULL UNIQUE, scopes INTEGER NOT NULL,"
+    " quota_bytes INTEGER NOT NULL, quota_jobs INTEGER NOT NULL, created INTEGER NOT NULL);";
+
+/* In place of the catalogue, one of the first schema with more done to it; returns the newest version. */
+static int replace_catalogue(stored *s, const char *more, char path[96]) {
+  static const char *const suffixes[] = {"", "-wal", "-shm"};
+  sqlite3 *db = NULL;
+  snprintf(path, 96, "%s/catalogue.sqlite", s->data);
+  assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+  int newest = version_of(db);
+  sqlite3_close(db);
+  catalogue_close(s->cat);
+  s->cat = NULL;
+  for (int i = 0; i < 3; i++) {
+    snprintf(path, 96, "%s/catalogue.sqlite%s", s->data, suffixes[i]);
+    unlink(path);
+  }
+  snprintf(path, 96, "%s/catalogue.sqlite", s->data);
+  assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+  assert_int_equal(sqlite3_exec(db, first_schema, NULL, NULL, NULL), SQLITE_OK);
+  assert_int_equal(sqlite3_exec(db, more, NULL, NULL, NULL), SQLITE_OK);
+  sqlite3_close(db);
+  return newest;
+}
+
 /* A catalogue as version 1 of the schema left it, with a mesh and a job, is brought up to date and keeps both; one from
  * a later version than this program knows is not touched. */
 static void test_migrations(void **state) {
   stored *s = *state;
   static const char first[] =
-      "CREATE TABLE resource(seq INTEGER PRIMARY KEY AUTOINCREMENT, kind INTEGER NOT NULL, id TEXT NOT NULL,"
-      " sha TEXT NOT NULL, json TEXT NOT NULL, bytes INTEGER NOT NULL, created INTEGER NOT NULL, used INTEGER NOT NULL,"
-      " UNIQUE(kind, id));"
-      "CREATE INDEX resource_used ON resource(used);"
-      "CREATE TABLE job(seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, key TEXT NOT NULL,"
-      " kind INTEGER NOT NULL, state INTEGER NOT NULL, attempt INTEGER NOT NULL, crashes INTEGER NOT NULL DEFAULT 0,"
-      " suspect INTEGER NOT NULL DEFAULT 0, alone INTEGER NOT NULL DEFAULT 0, listed INTEGER NOT NULL,"
-      " priority INTEGER NOT NULL, cost INTEGER NOT NULL, owner TEXT NOT NULL, request TEXT NOT NULL, problem TEXT,"
-      " created INTEGER NOT NULL, started INTEGER NOT NULL DEFAULT 0, finished INTEGER NOT NULL DEFAULT 0);"
-      "CREATE INDEX job_state ON job(state, seq);"
-      "CREATE TABLE event(job TEXT NOT NULL, number INTEGER NOT NULL, type TEXT NOT NULL, json TEXT NOT NULL,"
-      " PRIMARY KEY(job, number)) WITHOUT ROWID;"
-      "CREATE TABLE token(hash TEXT PRIMARY KEY, name TEXT NOT NULL UNIQUE, scopes INTEGER NOT NULL,"
-      " quota_bytes INTEGER NOT NULL, quota_jobs INTEGER NOT NULL, created INTEGER NOT NULL);"
       "INSERT INTO resource(kind, id, sha, json, bytes, created, used) VALUES(0, 'old', 'sha', '{}', 7, 1, 1);"
       "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created)"
       " VALUES('oldjob', 'key', 0, 1, 1, 1, 0, 10, '', '{}', 1);"
@@ -285,22 +311,8 @@ static void test_migrations(void **state) {
   sqlite3 *db = NULL;
   resource got = {0};
   int count = 0;
-  snprintf(path, sizeof path, "%s/catalogue.sqlite", s->data);
-  assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
-  int newest = version_of(db);
-  sqlite3_close(db);
-  catalogue_close(s->cat);
-  s->cat = NULL;
-  assert_true(newest >= 2);
-  unlink(path);
-  strcat(path, "-wal");
-  unlink(path);
-  snprintf(path, sizeof path, "%s/catalogue.sqlite-shm", s->data);
-  unlink(path);
-  snprintf(path, sizeof path, "%s/catalogue.sqlite", s->data);
-  assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
-  assert_int_equal(sqlite3_exec(db, first, NULL, NULL, NULL), SQLITE_OK);
-  sqlite3_close(db);
+  int newest = replace_catalogue(s, first, path);
+  assert_true(newest >= 4);
 
   assert_int_equal(catalogue_open(s->data, &s->cat), STORE_OK);
   assert_int_equal(catalogue_get(s->cat, RESOURCE_MESH, "old", &got), STORE_OK);
@@ -325,6 +337,154 @@ static void test_migrations(void **state) {
   s->cat = NULL;
 }
 
+static int owns(stored *s, resource_kind kind, const char *id, const char *tenant) {
+  resource got = {0};
+  store_result result = catalogue_get_of(s->cat, kind, id, tenant, &got);
+  resource_free(&got);
+  assert_true(result == STORE_OK || result == STORE_NOT_FOUND);
+  return result == STORE_OK;
+}
+
+/* A catalogue from before owners were noted (version 3): results belong to those whose jobs made them, meshes to those
+ * whose jobs named them, and what no job tells of to nobody but the operator. Tokens are tenants of their own names. */
+static void test_migration_to_owners(void **state) {
+  stored *s = *state;
+  static const char third[] =
+      "ALTER TABLE token ADD COLUMN used_bytes INTEGER NOT NULL DEFAULT 0;"
+      "ALTER TABLE token ADD COLUMN priority INTEGER NOT NULL DEFAULT 0;"
+      "INSERT INTO resource(kind, id, sha, json, bytes, created, used) VALUES"
+      " (0, 'cow', 's', '{}', 100, 1, 1), (0, 'dog', 's', '{}', 30, 2, 2), (0, 'unused', 's', '{}', 7, 3, 3),"
+      " (1, 'cow-sphere', 's', '{}', 5, 4, 4), (1, 'dog-sphere', 's', '{}', 5, 5, 5), (2, 'both', 's', '{}', 9, 6, 6);"
+      "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created) VALUES"
+      " ('j1', 'cow-sphere', 0, 2, 1, 1, 0, 10, 'ann', '{\"mesh\":\"cow\",\"options\":{}}', 1),"
+      " ('j2', 'both', 1, 2, 1, 1, 0, 10, 'bob', '{\"shapes\":[{\"mesh\":\"cow\"},{\"mesh\":\"dog\"}]}', 2),"
+      " ('j3', 'dog-sphere', 0, 2, 1, 0, 0, 10, 'bob', '{\"mesh\":\"dog\"}', 3),"
+      " ('j4', 'dog-sphere', 0, 3, 1, 1, 0, 10, 'eve', '{\"mesh\":\"gone\"}', 4),"
+      " ('j5', 'key', 1, 4, 1, 1, 0, 10, 'eve', 'not JSON', 5);"
+      "INSERT INTO token VALUES('00', 'ann', 3, 100, 0, 1, 12345, 0), ('01', 'bob', 3, 0, 2, 1, 0, 5),"
+      " ('02', 'eve', 1, 0, 0, 1, 0, 0);"
+      "PRAGMA user_version=3;";
+  char path[96];
+  int count = 0;
+  resource page[4];
+  replace_catalogue(s, third, path);
+  assert_int_equal(catalogue_open(s->data, &s->cat), STORE_OK);
+  static const struct {
+    resource_kind kind;
+    const char *id, *owners;
+  } rows[] = {{RESOURCE_MESH, "cow", "ann,bob"},
+              {RESOURCE_MESH, "dog", "bob"},
+              {RESOURCE_MESH, "unused", ""},
+              {RESOURCE_EMBEDDING, "cow-sphere", "ann"},
+              {RESOURCE_EMBEDDING, "dog-sphere", "bob"},
+              {RESOURCE_SUPERMESH, "both", "bob"}};
+  static const char *const tenants[] = {"ann", "bob", "eve"};
+  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+    for (int t = 0; t < 3; t++) {
+      assert_int_equal(owns(s, rows[i].kind, rows[i].id, tenants[t]), strstr(rows[i].owners, tenants[t]) != NULL);
+    }
+    assert_int_equal(owns(s, rows[i].kind, rows[i].id, ""), rows[i].owners[0] == 0);
+  }
+  assert_int_equal(catalogue_list_of(s->cat, RESOURCE_MESH, "bob", 0, 4, page), 2); /* the newest first, as before */
+  assert_string_equal(page[0].id, "dog");
+  assert_string_equal(page[1].id, "cow");
+  resource_free(&page[0]);
+  resource_free(&page[1]);
+  token_row *tokens = catalogue_tokens(s->cat, &count);
+  assert_int_equal(count, 3);
+  assert_string_equal(tokens[0].tenant, "ann");
+  assert_int_equal(tokens[0].used, 100); /* what it owns, not what it ever uploaded */
+  assert_int_equal(tokens[0].quota, 100);
+  assert_int_equal(tokens[1].used, 130);
+  assert_int_equal(tokens[1].priority, 5);
+  assert_int_equal(tokens[2].used, 0);
+  free(tokens);
+  assert_int_equal(catalogue_ownerless(s->cat), 0);
+  assert_true(catalogue_integrity(s->cat));
+}
+
+/* Owners come and go; the last one takes the resource with it, and bytes are counted for each. */
+static void test_owners(void **state) {
+  stored *s = *state;
+  resource row = {.kind = RESOURCE_MESH, .json = (char *)(uintptr_t) "{\"of\":\"ann\"}", .bytes = 60, .created = 1000};
+  resource got = {0};
+  int fresh = 0, gone = 0;
+  make_id(row.id, 'a');
+  make_id(row.sha, 'b');
+  assert_int_equal(catalogue_put_for(s->cat, &row, "ann", 100, &fresh), STORE_OK);
+  assert_true(fresh);
+  assert_int_equal(catalogue_put_for(s->cat, &row, "ann", 100, &fresh), STORE_OK);
+  assert_false(fresh);
+  assert_int_equal(catalogue_tenant_bytes(s->cat, "ann"), 60); /* once */
+  row.json = (char *)(uintptr_t) "{\"of\":\"bob\"}";
+  row.created = 2000;
+  assert_int_equal(catalogue_put_for(s->cat, &row, "bob", 59, &fresh), STORE_CONFLICT);
+  assert_int_equal(catalogue_get_of(s->cat, RESOURCE_MESH, row.id, "bob", &got), STORE_NOT_FOUND);
+  assert_int_equal(catalogue_put_for(s->cat, &row, "bob", 60, &fresh), STORE_OK);
+  assert_true(fresh);
+  assert_int_equal(catalogue_get_of(s->cat, RESOURCE_MESH, row.id, "bob", &got), STORE_OK);
+  assert_string_equal(got.json, "{\"of\":\"bob\"}");
+  assert_int_equal(got.created, 2000);
+  resource_free(&got);
+  assert_int_equal(catalogue_get_of(s->cat, RESOURCE_MESH, row.id, "ann", &got), STORE_OK);
+  assert_string_equal(got.json, "{\"of\":\"ann\"}");
+  resource_free(&got);
+  assert_int_equal(catalogue_bytes(s->cat, 0), 60); /* stored once */
+
+  assert_int_equal(catalogue_disown(s->cat, RESOURCE_MESH, row.id, "eve", &gone), STORE_NOT_FOUND);
+  assert_int_equal(catalogue_disown(s->cat, RESOURCE_MESH, row.id, "ann", &gone), STORE_OK);
+  assert_false(gone);
+  assert_int_equal(catalogue_tenant_bytes(s->cat, "ann"), 0);
+  assert_int_equal(catalogue_get_of(s->cat, RESOURCE_MESH, row.id, "ann", &got), STORE_NOT_FOUND);
+  assert_int_equal(catalogue_disown(s->cat, RESOURCE_MESH, row.id, "bob", &gone), STORE_OK);
+  assert_true(gone);
+  assert_int_equal(catalogue_get(s->cat, RESOURCE_MESH, row.id, &got), STORE_NOT_FOUND);
+
+  /* Deleted by the operator, it is gone for all, and so are the bytes. */
+  assert_int_equal(catalogue_put_for(s->cat, &row, "ann", 0, &fresh), STORE_OK);
+  assert_int_equal(catalogue_put_for(s->cat, &row, "bob", 0, &fresh), STORE_OK);
+  assert_int_equal(catalogue_delete(s->cat, RESOURCE_MESH, row.id), STORE_OK);
+  assert_int_equal(catalogue_tenant_bytes(s->cat, "ann"), 0);
+  assert_int_equal(catalogue_tenant_bytes(s->cat, "bob"), 0);
+  assert_int_equal(catalogue_ownerless(s->cat), 0);
+}
+
+/* Who asked for a result owns it: the first with its description as it is, others with the time of their own job. A
+ * result that is gone before the job has ended is no success. */
+static void test_owners_of_results(void **state) {
+  stored *s = *state;
+  job_row ann = new_job('1'), bob = new_job('2'), eve = new_job('3');
+  resource result = {.kind = RESOURCE_EMBEDDING,
+                     .json = (char *)(uintptr_t) "{\"w\":1.50,\"created\":\"1970-01-01T00:00:00.050Z\"}",
+                     .bytes = 1,
+                     .created = 50};
+  resource got = {0};
+  memcpy(bob.key, ann.key, sizeof bob.key);
+  memcpy(eve.key, ann.key, sizeof eve.key);
+  memcpy(result.id, ann.key, sizeof result.id);
+  make_id(result.sha, 'f');
+  strcpy(ann.owner, "ann");
+  strcpy(bob.owner, "bob");
+  strcpy(eve.owner, "eve");
+  job_row *jobs[] = {&ann, &bob, &eve};
+  for (int i = 0; i < 3; i++) {
+    assert_int_equal(catalogue_job_insert(s->cat, jobs[i]), STORE_OK);
+    assert_int_equal(catalogue_job_claim(s->cat, jobs[i]->id, 1, 0, 10), STORE_OK);
+  }
+  assert_int_equal(catalogue_job_finish(s->cat, ann.id, 1, ORB_JOB_SUCCEEDED, NULL, 50, &result, 5, "{}"), STORE_OK);
+  assert_false(owns(s, RESOURCE_EMBEDDING, result.id, "bob"));
+  assert_int_equal(catalogue_job_finish(s->cat, bob.id, 1, ORB_JOB_SUCCEEDED, NULL, 86400123, NULL, 5, "{}"), STORE_OK);
+  assert_int_equal(catalogue_get_of(s->cat, RESOURCE_EMBEDDING, result.id, "ann", &got), STORE_OK);
+  assert_string_equal(got.json, result.json);
+  resource_free(&got);
+  assert_int_equal(catalogue_get_of(s->cat, RESOURCE_EMBEDDING, result.id, "bob", &got), STORE_OK);
+  assert_string_equal(got.json, "{\"w\":1.50,\"created\":\"1970-01-02T00:00:00.123Z\"}");
+  resource_free(&got);
+  assert_int_equal(catalogue_delete(s->cat, RESOURCE_EMBEDDING, result.id), STORE_OK);
+  assert_int_equal(catalogue_job_finish(s->cat, eve.id, 1, ORB_JOB_SUCCEEDED, NULL, 70, NULL, 5, "{}"), STORE_CONFLICT);
+  assert_int_equal(read_job(s, eve.id).state, ORB_JOB_RUNNING);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_objects, setup, teardown),
@@ -333,6 +493,9 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_attempts, setup, teardown),
       cmocka_unit_test_setup_teardown(test_recovery, setup, teardown),
       cmocka_unit_test_setup_teardown(test_migrations, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_migration_to_owners, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_owners, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_owners_of_results, setup, teardown),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,203 @@
+#include "store/owners.h"
+
+#include <string.h>
+
+#include "store/rows.h"
+
+int owner_insert(database *db, const resource *r, const char *tenant, const char *json) {
+  sqlite3_stmt *st = database_statement(db,
+                                        "INSERT INTO owner(kind, id, tenant, json, bytes, created)"
+                                        " VALUES(?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_int(st, 1, (int)r->kind);
+  sqlite3_bind_text(st, 2, r->id, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 3, tenant, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 4, json, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 5, r->kind == RESOURCE_MESH ? r->bytes : 0);
+  sqlite3_bind_int64(st, 6, r->created);
+  return database_run(db, st);
+}
+
+/* Whether a query with the three keys bound gives a row. */
+static int exists(database *db, const char *sql, int kind, const char *id, const char *text, int *code) {
+  sqlite3_stmt *st = database_statement(db, sql);
+  if (!st) {
+    *code = SQLITE_ERROR;
+    return 0;
+  }
+  sqlite3_bind_int(st, 1, kind);
+  sqlite3_bind_text(st, 2, id, -1, SQLITE_STATIC);
+  if (text) {
+    sqlite3_bind_text(st, 3, text, -1, SQLITE_STATIC);
+  }
+  int found = sqlite3_step(st);
+  sqlite3_reset(st);
+  *code = found == SQLITE_ROW || found == SQLITE_DONE ? SQLITE_OK : found;
+  return found == SQLITE_ROW;
+}
+
+/* A result that was there already is described with the time of this job, not with that of the first one. */
+int owner_of_job(database *db, const char *job, int64_t now) {
+  sqlite3_stmt *st = database_statement(
+      db,
+      "INSERT INTO owner(kind, id, tenant, json, bytes, created)"
+      " SELECT r.kind, r.id, j.owner,"
+      "  iif(NOT EXISTS(SELECT 1 FROM owner o WHERE o.kind=r.kind AND o.id=r.id) OR NOT json_valid(r.json), NULL,"
+      "   json_set(r.json, '$.created', strftime('%Y-%m-%dT%H:%M:%S', ?2/1000, 'unixepoch') ||"
+      "    printf('.%03dZ', ?2%1000))), 0, ?2"
+      " FROM job j JOIN resource r ON r.kind=j.kind+1 AND r.id=j.key WHERE j.id=?1 ON CONFLICT DO NOTHING");
+  int code = SQLITE_ERROR;
+  if (st) {
+    sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
+    sqlite3_bind_int64(st, 2, now);
+    code = database_run(db, st);
+  }
+  if (code != SQLITE_OK || sqlite3_changes(db->handle) > 0) {
+    return code;
+  }
+  int there = exists(db, "SELECT 1 FROM job j JOIN resource r ON r.kind=j.kind+1 AND r.id=j.key WHERE ?1=0 AND j.id=?2",
+                     0, job, NULL, &code);
+  return code == SQLITE_OK && !there ? SQLITE_CONSTRAINT : code;
+}
+
+static const char owner_exists[] = "SELECT 1 FROM owner WHERE kind=?1 AND id=?2 AND tenant=?3";
+
+typedef struct put_arg {
+  const resource *row;
+  const char *tenant;
+  int64_t quota;
+  int fresh;
+} put_arg;
+
+static int bytes_of(database *db, const char *tenant, int64_t *bytes) {
+  sqlite3_stmt *st = database_statement(db, "SELECT bytes FROM tenant WHERE name=?1");
+  *bytes = 0;
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, tenant, -1, SQLITE_STATIC);
+  int code = sqlite3_step(st);
+  if (code == SQLITE_ROW) {
+    *bytes = sqlite3_column_int64(st, 0);
+  }
+  sqlite3_reset(st);
+  return code == SQLITE_ROW || code == SQLITE_DONE ? SQLITE_OK : code;
+}
+
+static int put(database *db, void *arg) {
+  put_arg *p = arg;
+  int code;
+  int64_t bytes = 0;
+  p->fresh = 0;
+  if (exists(db, owner_exists, (int)p->row->kind, p->row->id, p->tenant, &code) || code != SQLITE_OK) {
+    return code;
+  }
+  if (p->quota > 0 && (code = bytes_of(db, p->tenant, &bytes)) != SQLITE_OK) {
+    return code;
+  }
+  if (p->quota > 0 && bytes + p->row->bytes > p->quota) {
+    return SQLITE_CONSTRAINT;
+  }
+  code = resource_insert(db, p->row);
+  int first = sqlite3_changes(db->handle) > 0;
+  if (code == SQLITE_OK) {
+    code = owner_insert(db, p->row, p->tenant, first ? NULL : p->row->json);
+  }
+  p->fresh = code == SQLITE_OK;
+  return code;
+}
+
+store_result catalogue_put_for(catalogue *cat, const resource *r, const char *tenant, int64_t quota, int *fresh) {
+  put_arg arg = {.row = r, .tenant = tenant, .quota = quota};
+  store_result result = catalogue_write(cat, put, &arg);
+  *fresh = result == STORE_OK && arg.fresh;
+  return result;
+}
+
+#define COLUMNS "o.seq, r.kind, r.id, r.sha, coalesce(o.json, r.json), r.bytes, o.created"
+#define OWNED " FROM owner o JOIN resource r ON r.kind=o.kind AND r.id=o.id"
+
+store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id, const char *tenant, resource *out) {
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS OWNED " WHERE o.kind=?1 AND o.id=?2 AND o.tenant=?3");
+  if (st) {
+    sqlite3_bind_int(st, 1, (int)kind);
+    sqlite3_bind_text(st, 2, id, -1, SQLITE_STATIC);
+    sqlite3_bind_text(st, 3, tenant, -1, SQLITE_STATIC);
+  }
+  return rows_one(cat, db, st, &resource_rows, out);
+}
+
+int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, int64_t before, int limit,
+                      resource *out) {
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS OWNED
+                                            " WHERE o.tenant=?1 AND o.kind=?2 AND o.seq<?3"
+                                            " ORDER BY o.seq DESC LIMIT ?4");
+  if (st) {
+    sqlite3_bind_text(st, 1, tenant, -1, SQLITE_STATIC);
+    sqlite3_bind_int(st, 2, (int)kind);
+    sqlite3_bind_int64(st, 3, before > 0 ? before : INT64_MAX);
+    sqlite3_bind_int(st, 4, limit);
+  }
+  return rows_many(cat, db, st, &resource_rows, out, limit);
+}
+
+typedef struct disown_arg {
+  int kind, gone;
+  const char *id, *tenant;
+} disown_arg;
+
+static int disown(database *db, void *arg) {
+  disown_arg *d = arg;
+  sqlite3_stmt *st = database_statement(db, "DELETE FROM owner WHERE kind=?1 AND id=?2 AND tenant=?3");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_int(st, 1, d->kind);
+  sqlite3_bind_text(st, 2, d->id, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 3, d->tenant, -1, SQLITE_STATIC);
+  int code = database_run(db, st);
+  if (code != SQLITE_OK || sqlite3_changes(db->handle) == 0) {
+    return code == SQLITE_OK ? SQLITE_NOTFOUND : code;
+  }
+  d->gone = !exists(db, "SELECT 1 FROM owner WHERE kind=?1 AND id=?2", d->kind, d->id, NULL, &code);
+  return code == SQLITE_OK && d->gone ? resource_remove(db, (resource_kind)d->kind, d->id) : code;
+}
+
+store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id, const char *tenant, int *gone) {
+  disown_arg arg = {.kind = (int)kind, .id = id, .tenant = tenant};
+  store_result result = catalogue_write(cat, disown, &arg);
+  *gone = result == STORE_OK && arg.gone;
+  return result;
+}
+
+int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant) {
+  int64_t bytes = 0;
+  database *db = catalogue_reader(cat);
+  int code = bytes_of(db, tenant, &bytes);
+  catalogue_reader_done(cat, db);
+  return code == SQLITE_OK ? bytes : -1;
+}
+
+int64_t catalogue_ownerless(catalogue *cat) {
+  int64_t count = -1;
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st = database_statement(db,
+                                        "SELECT (SELECT count(*) FROM resource r WHERE NOT EXISTS"
+                                        "  (SELECT 1 FROM owner o WHERE o.kind=r.kind AND o.id=r.id))"
+                                        " + (SELECT count(*) FROM owner o WHERE NOT EXISTS"
+                                        "  (SELECT 1 FROM resource r WHERE r.kind=o.kind AND r.id=o.id))"
+                                        " + (SELECT count(*) FROM tenant t WHERE t.bytes !="
+                                        "  (SELECT coalesce(sum(o.bytes), 0) FROM owner o WHERE o.tenant=t.name))");
+  if (st && sqlite3_step(st) == SQLITE_ROW) {
+    count = sqlite3_column_int64(st, 0);
+  }
+  if (st) {
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return count;
+}

@@ -1,0 +1,242 @@
+// Tenants: what one token may see of another's and do to it, though equal bytes and equal requests are stored once.
+import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
+import { readdir } from 'node:fs/promises';
+import path from 'node:path';
+import test from 'node:test';
+import { promisify } from 'node:util';
+import { assertProblem, binaries, daemon } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const hold = { method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } };
+const wave = (levels, k = 1) => shapes.binaryPly(shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y + k)), 1.5 * y, z]));
+const large = wave(5), small = wave(3, 2), other = wave(3, 3);
+
+async function tenants(t, ...args) {
+  const d = await daemon(t, { args: ['--auth', 'on', '--workers', '1', ...args] });
+  const token = (...words) => promisify(execFile)(binaries.daemon, ['token', ...words, '--data', d.data]).then(({ stdout }) => stdout.trim());
+  const add = async (name, scope, ...more) => ({ headers: { authorization: `Bearer ${await token('add', name, '--scope', scope, ...more)}` } });
+  const upload = (who, bytes, query = {}) => d.post('/v1/meshes', bytes, { ...who, query });
+  const list = async (who, what) => (await d.get(`/v1/${what}`, who)).json[what].map(({ id }) => id);
+  const end = async (who, job) => {
+    const reply = await d.get(job.url, { ...who, query: { wait: 60 } });
+    assert.equal(reply.json.state, 'succeeded', reply.bytes.toString());
+    return reply.json;
+  };
+  return { d, token, add, upload, list, end };
+}
+
+/** Two answers that cannot be told apart, but for what differs between any two requests. */
+function assertSame(a, b, hide, what) {
+  const plain = (reply) => hide.reduce((text, word) => text.replaceAll(word, '*'), reply.bytes.toString());
+  assert.equal(a.status, b.status, what);
+  assert.equal(plain(a), plain(b), what);
+  for (const [name, value] of a.headers)
+    if (!['date', 'x-request-id'].includes(name)) assert.equal(b.headers.get(name), value, `${what}: ${name}`);
+  assert.deepEqual([...a.headers.keys()], [...b.headers.keys()], what);
+}
+
+test("another tenant's things are not there", async (t) => {
+  const { d, add, upload, list, end } = await tenants(t);
+  const [ann, bob, reader, admin] = [await add('ann', 'read,write'), await add('bob', 'read,write'), await add('reader', 'read'), await add('root', 'admin')];
+  const viewer = await add('viewer', 'read', '--tenant', 'ann');
+  const [a, b] = [(await upload(ann, small, { name: 'secret' })).json, (await upload(ann, other)).json];
+  const super_ = (await d.post('/v1/supermeshes', { shapes: [{ mesh: a.id }, { mesh: b.id }] }, ann)).json;
+  const ended = await end(ann, super_);
+  const [embedding] = await list(ann, 'embeddings');
+  const running = (await d.post('/v1/embeddings', { mesh: (await upload(ann, large)).json.id, ...hold }, ann)).json;
+  const queued = (await d.post('/v1/embeddings', { mesh: a.id, ...hold }, ann)).json;
+
+  const things = [a.url, `${a.url}/file`, `/v1/embeddings/${embedding}`, `/v1/embeddings/${embedding}/sphere.ply`, ended.result,
+    `${ended.result}/asset.glb`, `${ended.result}/places`, `${ended.result}/spheres/0.ply`];
+  const jobs = [super_.url, running.url, queued.url];
+  for (const url of [...things, ...jobs]) {
+    for (const who of [ann, viewer, admin]) {
+      const reply = await d.get(url, who);
+      assert.equal(reply.status, 200, url);
+      if (/\.(glb|ply)$|places$|file$/.test(url)) assert.match(reply.headers.get('cache-control'), /^private/, 'no shared cache keeps it');
+    }
+    const id = /[0-9a-f]{32,64}/.exec(url)[0], nothing = url.replace(id, '0'.repeat(id.length));
+    for (const who of [bob, reader]) {
+      assertSame(await d.get(url, who), await d.get(nothing, who), [id, '0'.repeat(id.length)], url);
+      assert.equal((await d.get(url, who)).status, 404, url);
+      assert.equal((await d.request('HEAD', url, who)).status, 404, url);
+    }
+  }
+  for (const job of jobs) {
+    assertProblem(await d.get(`${job}/events`, bob), 404, 'not-found');
+    assertProblem(await d.get(job, { ...bob, query: { wait: 5 } }), 404, 'not-found', 'at once');
+    assertProblem(await d.delete(job, bob), 404, 'not-found');
+    assertProblem(await d.delete(job, viewer), 403, 'forbidden');
+  }
+  for (const thing of [a.url, `/v1/embeddings/${embedding}`, ended.result]) {
+    assertProblem(await d.delete(thing, bob), 404, 'not-found');
+    assertProblem(await d.delete(thing, viewer), 403, 'forbidden');
+    assert.equal((await d.get(thing, ann)).status, 200);
+  }
+  // By its id alone nothing can be made of a mesh.
+  const nobodys = { mesh: '0'.repeat(64) };
+  assertSame(await d.post('/v1/embeddings', { mesh: a.id }, bob), await d.post('/v1/embeddings', nobodys, bob), [a.id, nobodys.mesh], 'embedding');
+  const merge = (mesh) => d.post('/v1/supermeshes', { shapes: [{ mesh }, { mesh }] }, bob);
+  assertSame(await merge(a.id), await merge(nobodys.mesh), [a.id, nobodys.mesh], 'supermesh');
+
+  for (const what of ['meshes', 'embeddings', 'supermeshes', 'jobs']) {
+    assert.deepEqual(await list(bob, what), [], what);
+    const own = await list(ann, what);
+    assert.equal(own.length, { meshes: 3, embeddings: 2, supermeshes: 1, jobs: 3 }[what], what);
+    assert.deepEqual(await list(viewer, what), own);
+    assert.deepEqual(await list(admin, what), own);
+  }
+  assert.deepEqual((await d.get('/v1/jobs', { ...bob, query: { state: 'running' } })).json.jobs, []);
+  const before = await list(admin, 'jobs');
+  const [queued_end, running_end] = [await d.delete(queued.url, ann), await d.delete(running.url, admin)];
+  assert.deepEqual([queued_end.status, running_end.status], [200, 200], 'its own, and all with admin');
+  assert.equal(before.length, 3);
+});
+
+test('an upload does not tell that others have the same', async (t) => {
+  const { d, add, upload } = await tenants(t);
+  const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')];
+  const first = await upload(ann, small, { name: 'secret' });
+  await new Promise((done) => setTimeout(done, 1100)); // times of uploads are whole seconds
+  const second = await upload(bob, small, { name: 'mine' });
+  assert.deepEqual([first.status, second.status], [201, 201]);
+  assert.equal(second.json.id, first.json.id);
+  assert.equal(second.json.name, 'mine');
+  assert.ok(Date.parse(second.json.created) > Date.parse(first.json.created), 'with its own time');
+  assert.deepEqual({ ...second.json, name: 'secret', created: first.json.created }, first.json, 'all else follows from the bytes');
+  assert.deepEqual((await d.get(second.json.url, bob)).json, second.json);
+  assert.deepEqual((await d.get(first.json.url, ann)).json, first.json);
+  assert.deepEqual((await d.get('/v1/meshes', bob)).json.meshes, [second.json]);
+  const again = await upload(bob, small, { name: 'other' });
+  assert.equal(again.status, 200, 'known to this tenant');
+  assert.deepEqual(again.json, second.json);
+  // What cannot be taken is refused to both alike.
+  const twice = await Promise.all([ann, bob].map((who) => upload(who, Buffer.from('o nothing\n'))));
+  assertSame(twice[0], twice[1], [], 'a bad file');
+});
+
+test('equal requests of two tenants: one result, two jobs', async (t) => {
+  const { d, add, upload, list, end } = await tenants(t);
+  const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')];
+  const { id } = (await upload(ann, large)).json;
+  assert.equal((await upload(bob, large)).status, 201);
+  const ask = (who, more) => d.post('/v1/embeddings', { mesh: id, ...more }, who);
+
+  // Bob's job is his own: Ann's ends by her cancel, his goes on.
+  const [his, hers] = [(await ask(ann, hold)).json, (await ask(bob, hold)).json];
+  assert.notEqual(his.id, hers.id);
+  assert.equal((await ask(bob, hold)).json.id, hers.id, 'of one tenant it is the same job');
+  assert.equal((await d.get(hers.url, bob)).json.state, 'queued', 'the work is not done twice at once');
+  assertProblem(await d.delete(hers.url, ann), 404, 'not-found');
+  assert.equal((await d.delete(his.url, ann)).status, 200);
+  const until = Date.now() + 60_000;
+  while ((await d.get(hers.url, bob)).json.state !== 'running') assert.ok(Date.now() < until);
+  assert.equal((await d.delete(hers.url, bob)).status, 200);
+
+  // What Ann has is made for Bob anew as far as he can see, but for the time it takes.
+  const one = await end(ann, (await ask(ann)).json);
+  const began = Date.now(), reply = await ask(bob);
+  assert.equal(reply.status, 202);
+  assert.deepEqual(await list(bob, 'embeddings'), []);
+  const two = await end(bob, reply.json);
+  assert.equal(two.result, one.result);
+  const [a, b] = [(await d.get(one.result, ann)).json, (await d.get(two.result, bob)).json];
+  assert.ok(Date.parse(b.created) >= began && Date.parse(a.created) < began);
+  assert.deepEqual({ ...b, created: a.created }, a, 'the very same result');
+  assert.equal((await ask(bob)).status, 200);
+  assert.equal((await readdir(path.join(d.data, 'objects'), { recursive: true })).filter((f) => f.endsWith(a.id) || f.includes(a.id)).length, 1, 'stored once');
+
+  // A merge of Bob's shows him the embeddings that it needed, though Ann's were there.
+  const third = (await upload(ann, other)).json;
+  await end(ann, (await d.post('/v1/embeddings', { mesh: third.id }, ann)).json);
+  await upload(bob, other);
+  await end(bob, (await d.post('/v1/supermeshes', { shapes: [{ mesh: id }, { mesh: third.id }] }, bob)).json);
+  assert.equal((await list(bob, 'embeddings')).length, 2);
+  assert.deepEqual(await list(ann, 'supermeshes'), []);
+});
+
+test('who deletes gives up its own', async (t) => {
+  const { d, token, add, upload, list, end } = await tenants(t);
+  const quota = ['--quota', String(small.length + other.length)];
+  const [ann, bob, admin] = [await add('ann', 'read,write', ...quota), await add('bob', 'read,write', ...quota), await add('root', 'admin')];
+  const left = async (who) => Number(/"upload";r=(\d+)/.exec((await d.get('/v1/meshes', who)).headers.get('ratelimit'))[1]);
+  const { id, url } = (await upload(ann, small)).json;
+  await upload(bob, small);
+  assert.deepEqual([await left(ann), await left(bob)], [other.length, other.length], 'each has it, each pays for it');
+  const made = await Promise.all([ann, bob].map(async (who) => (await end(who, (await d.post('/v1/embeddings', { mesh: id }, who)).json)).result));
+  assert.equal(made[0], made[1]);
+
+  for (const thing of [url, made[0]]) {
+    assert.equal((await d.delete(thing, ann)).status, 204);
+    assertProblem(await d.get(thing, ann), 404, 'not-found');
+    assertProblem(await d.delete(thing, ann), 404, 'not-found');
+    assert.equal((await d.get(thing, bob)).status, 200, 'the other has it still');
+  }
+  assert.equal((await d.get(`${url}/file`, bob)).bytes.length, small.length);
+  assert.deepEqual([await left(ann), await left(bob)], [small.length + other.length, other.length], 'what is given up is free again');
+  assert.equal((await upload(ann, small)).status, 201, 'and may come back');
+  assert.equal((await upload(ann, other)).status, 201);
+  assertProblem(await upload(ann, wave(3, 4)), 429, 'quota-exceeded');
+  assert.equal((await d.delete(url, ann)).status, 204);
+
+  // The last owner takes it away, for all.
+  const files = async () => (await readdir(path.join(d.data, 'objects'), { recursive: true })).filter((f) => f.includes(id)).length;
+  assert.equal(await files(), 1);
+  assert.equal((await d.delete(url, bob)).status, 204);
+  assert.equal(await files(), 0);
+  assertProblem(await d.get(url, admin), 404, 'not-found');
+  assert.equal((await d.get(made[1], bob)).status, 200, 'what was derived stays');
+
+  // A job that needs it stands in the way, but only to the one whose job it is.
+  await upload(ann, large);
+  await token('set', 'bob', '--quota', '0');
+  const { url: big, id: mesh } = (await upload(bob, large)).json;
+  await token('set', 'ann', '--quota', '0');
+  const hers = (await upload(ann, large)).json;
+  assert.equal(hers.id, mesh);
+  const job = (await d.post('/v1/embeddings', { mesh, ...hold }, bob)).json;
+  assertProblem(await d.delete(big, bob), 409, 'in-use');
+  assert.equal((await d.delete(big, ann)).status, 204);
+  assert.equal((await d.delete(job.url, bob)).status, 200);
+
+  // The operator deletes for everybody, and sees what is nobody's. A token that comes back by its name finds its own.
+  await upload(ann, small);
+  await upload(bob, small);
+  assert.equal((await d.delete(url, admin)).status, 204);
+  for (const who of [ann, bob]) assertProblem(await d.get(url, who), 404, 'not-found');
+  await token('remove', 'bob');
+  const [kept] = await list(admin, 'meshes');
+  assert.ok((await list(admin, 'meshes')).includes(mesh) && kept);
+  const back = await add('bob', 'read,write');
+  assert.ok((await list(back, 'meshes')).includes(mesh));
+
+  await d.stop();
+  const { stdout } = await promisify(execFile)(binaries.daemon, ['--check-data', '--data', d.data]);
+  assert.match(stdout, /: 0 wrong, 0 objects without a row/);
+});
+
+test('what was made without tokens is the operator\'s', async (t) => {
+  const d = await daemon(t, {});
+  const { id, url } = (await d.upload(small)).json;
+  const { resource } = await d.make('/v1/embeddings', { mesh: id });
+  await d.stop();
+  d.args = ['--auth', 'on'];
+  await d.start();
+  const add = async (name, scope) => ({ headers: { authorization: `Bearer ${(await promisify(execFile)(binaries.daemon, ['token', 'add', name, '--scope', scope, '--data', d.data])).stdout.trim()}` } });
+  const [ann, admin] = [await add('ann', 'read,write'), await add('root', 'admin')];
+  for (const thing of [url, resource.url]) {
+    assertProblem(await d.get(thing, ann), 404, 'not-found');
+    assert.equal((await d.get(thing, admin)).status, 200);
+  }
+  assert.equal((await d.post('/v1/meshes', small, ann)).status, 201);
+  assert.equal((await d.delete(url, ann)).status, 204);
+  assert.equal((await d.get(url, admin)).status, 200, 'a tenant gives up its own only');
+  await d.stop();
+  d.args = [];
+  await d.start();
+  assert.equal((await d.get(url)).status, 200);
+  assert.equal((await d.upload(small)).status, 200);
+  assert.equal((await d.delete(url)).status, 204, 'without tokens everybody is the operator');
+  assert.equal((await d.get(url)).status, 404);
+});
