@@ -201,25 +201,24 @@ static orb_status certify_all(orb_context *ctx, orb_sheet *sheets, int32_t shape
 }
 
 /* Aligned landmarks are not yet a good morph: the maps from the first shape's surface to the others' are improved. */
-static orb_status compose_all(orb_context *ctx, orb_alignment *alignment, orb_preset preset) {
+orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, int from_given, orb_preset preset) {
   double sum = 0;
   for (int32_t s = 1; s < alignment->shape_count; s++) {
     double energy[2];
     int improved;
-    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], alignment->landmark_count, preset, energy,
-                        &improved));
+    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], alignment->landmark_count, from_given,
+                        preset, energy, &improved));
     sum += energy[1];
   }
   alignment->energy = sum / (alignment->shape_count - 1);
   return ORB_OK;
 }
 
-orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                     const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
-                     orb_alignment *out) {
-  memset(out, 0, sizeof *out);
-  ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
+orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                           const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                           orb_alignment *out) {
   orb_status status = ORB_OK;
+  memset(out, 0, sizeof *out);
   orb_sheet *sheets = ORB_NEW0(ctx, orb_sheet, shape_count);
   out->shapes = ORB_NEW0(ctx, orb_aligned_shape, shape_count);
   out->shape_count = shape_count;
@@ -239,12 +238,8 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
     orb_sheet_release(ctx, &sheets[s], &out->shapes[s]);
   }
   if (options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO)) {
-    ORB_GO(status, compose_all(ctx, out, options->preset), end);
+    ORB_GO(status, orb_compose_all(ctx, out, 0, options->preset), end);
   }
-  if (options->method == ORB_ALIGN_AUTO && landmark_count == 0 && shape_count > 1) {
-    ORB_GO(status, orb_align_find(ctx, out), end);
-  }
-  orb_progress(ctx, "align", 1);
 end:
   for (int32_t s = 0; sheets && s < shape_count; s++) {
     orb_sheet_free(ctx, &sheets[s]);
@@ -254,4 +249,18 @@ end:
     orb_alignment_free(ctx, out);
   }
   return status;
+}
+
+orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                     const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                     orb_alignment *out) {
+  memset(out, 0, sizeof *out);
+  ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
+  if (options->method == ORB_ALIGN_AUTO && landmark_count == 0 && shape_count > 1) {
+    ORB_TRY(orb_align_auto(ctx, shapes, shape_count, options, out));
+  } else {
+    ORB_TRY(orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out));
+  }
+  orb_progress(ctx, "align", 1);
+  return ORB_OK;
 }

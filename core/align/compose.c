@@ -254,7 +254,7 @@ static orb_status given_energy(cm_run *c, double *energy) {
 
 /* The starts, until nothing comes of them any more. */
 static orb_status run_starts(cm_run *c, const orb_aligned_shape *fixed, orb_preset preset) {
-  ORB_TRY(cm_bend(c, fixed, 0));
+  ORB_TRY(cm_bend(c, fixed, c->from_given ? CM_SAMPLES : 0));
   ORB_TRY(run_start(c, CM_SPATIAL));
   if (preset != ORB_PRESET_QUALITY && c->best_energy <= GOOD_ENERGY) {
     return ORB_OK;
@@ -280,9 +280,10 @@ static orb_status run_starts(cm_run *c, const orb_aligned_shape *fixed, orb_pres
 }
 
 orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_aligned_shape *moving,
-                       int32_t landmark_count, orb_preset preset, double energy[2], int *improved) {
+                       int32_t landmark_count, int from_given, orb_preset preset, double energy[2], int *improved) {
   cm_run c = {.ctx = ctx, .moving = moving, .landmark_count = landmark_count, .effort = effort_of(preset)};
   c.passes = preset == ORB_PRESET_QUALITY ? 6 : 3;
+  c.from_given = from_given;
   c.rough = preset != ORB_PRESET_QUALITY;
   c.work = (preset == ORB_PRESET_QUALITY ? 5000 : WORK) * (int64_t)moving->mesh.vertex_count;
   orb_certificate certificate;

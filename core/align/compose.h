@@ -9,9 +9,11 @@
 /* Improves the points of `moving` on the sphere so that the map moving → sphere → fixed is as isometric as can be. The
  * landmarks (vertices of both, whose points are bit-equal already) stay. The result is certified and better than what
  * was given, or else the points are left as they are and *improved is 0. energy[2]: composed symmetric Dirichlet,
- * capped at 20 and weighted by area, before and after. Stage "align". */
+ * capped at 20 and weighted by area, before and after. from_given: the map as given is roughly right, and the first
+ * spatial targets follow it rather than what fits best in space. Stage "align". */
 ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_aligned_shape *moving,
-                                      int32_t landmark_count, orb_preset preset, double energy[2], int *improved);
+                                      int32_t landmark_count, int from_given, orb_preset preset, double energy[2],
+                                      int *improved);
 
 /* ---- The inside, shared by the files compose*.c ---- */
 

@@ -35,9 +35,10 @@ typedef struct cm_run {
   orb_place *place; /* by vertex of the surface: where it was on the last level */
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
-  int rough;    /* the alignment as given is only refined to be sampled */
-  int passes;   /* bends through samples of the best map */
-  int64_t work; /* vertex steps that may still be spent on clearing flips and further starts */
+  int from_given; /* the alignment as given is sampled for the first bend */
+  int rough;      /* the alignment as given is only refined to be sampled */
+  int passes;     /* bends through samples of the best map */
+  int64_t work;   /* vertex steps that may still be spent on clearing flips and further starts */
   cm_effort effort;
 } cm_run;
 

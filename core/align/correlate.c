@@ -14,6 +14,7 @@
 #include "numeric/vec3.h"
 
 enum { SIDE = 12, CELLS = 6 * SIDE * SIDE, FIELD = 6, AXES = 200, TURNS = 24, STARTS = 12, DEPTH_MAX = 12 };
+static const double APART = 0.8; /* radians between rotations that count as two */
 
 /* Mean position (centred, unit variance) and half-weighted normal of each cell of the cube map. */
 typedef struct field {
@@ -115,6 +116,7 @@ typedef struct search {
   orb_context *ctx;
   const double *from, *to; /* landmarks that should meet */
   int32_t marks;
+  int spaced; /* starts that are far from each other are wanted */
 } search;
 
 /* The mean squared distance that a rotation leaves between the landmarks. */
@@ -171,8 +173,26 @@ typedef struct start {
   double q[4], score;
 } start;
 
-static void keep_start(start *list, const double q[4], double score) {
-  int at = STARTS;
+static int is_near(const double a[4], const double b[4]) {
+  return fabs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]) > cos(APART / 2);
+}
+
+/* Into the list, in order. spaced: among those that are near each other only the best one stays. */
+static void keep_start(start *list, const double q[4], double score, int spaced) {
+  int at = STARTS, left = 0;
+  for (int i = 0; spaced && i < STARTS; i++) {
+    if (list[i].score >= score && is_near(list[i].q, q)) {
+      return;
+    }
+  }
+  for (int i = 0; spaced && i < STARTS; i++) {
+    if (list[i].score > -INFINITY && !is_near(list[i].q, q)) {
+      list[left++] = list[i];
+    }
+  }
+  for (; spaced && left < STARTS; left++) {
+    list[left].score = -INFINITY;
+  }
   while (at > 0 && list[at - 1].score < score) {
     at--;
   }
@@ -197,8 +217,8 @@ static orb_status coarse(const search *s, start *upright, start *best) {
       quaternion_product(tilt, turn, q);
       from_quaternion(q, r);
       ORB_TRY(score_of(s, r, &up, &any));
-      keep_start(upright, q, up);
-      keep_start(best, q, any);
+      keep_start(upright, q, up, s->spaced);
+      keep_start(best, q, any, s->spaced);
     }
     ORB_TRY(orb_context_check(s->ctx));
   }
@@ -227,9 +247,10 @@ static orb_status descend(const search *s, start *from, int use_upright) {
   return orb_context_check(s->ctx);
 }
 
-orb_status orb_rotation_search_near(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
-                                    const double *from, const double *to, int32_t count, double rotation[9],
-                                    double *score) {
+/* Both lists of local maxima, descended to the end. */
+static orb_status find_starts(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
+                              const double *from, const double *to, int32_t count, int spaced, start *upright,
+                              start *best) {
   orb_status status = ORB_OK;
   field *fa = ORB_NEW(ctx, field, 1), *fb = ORB_NEW(ctx, field, 1);
   if (!fa || !fb) {
@@ -238,27 +259,67 @@ orb_status orb_rotation_search_near(orb_context *ctx, const orb_aligned_shape *a
   }
   field_make(fa, a);
   field_make(fb, b);
-  search s = {.a = fa, .b = fb, .ctx = ctx, .from = from, .to = to, .marks = count};
-  start upright[STARTS], best[STARTS], *chosen;
+  search s = {.a = fa, .b = fb, .ctx = ctx, .from = from, .to = to, .marks = count, .spaced = spaced};
   ORB_GO(status, coarse(&s, upright, best), end);
   for (int i = 0; i < STARTS; i++) {
-    ORB_GO(status, descend(&s, &upright[i], 1), end);
-    ORB_GO(status, descend(&s, &best[i], 0), end);
-  }
-  start *top_upright = upright, *top_best = best;
-  for (int i = 1; i < STARTS; i++) {
-    top_upright = upright[i].score > top_upright->score ? &upright[i] : top_upright;
-    top_best = best[i].score > top_best->score ? &best[i] : top_best;
-  }
-  chosen = top_upright->score > top_best->score - 0.15 * fabs(top_best->score) ? top_upright : top_best;
-  from_quaternion(chosen->q, rotation);
-  if (score) {
-    *score = chosen->score;
+    if (upright[i].score > -INFINITY) {
+      ORB_GO(status, descend(&s, &upright[i], 1), end);
+    }
+    if (best[i].score > -INFINITY) {
+      ORB_GO(status, descend(&s, &best[i], 0), end);
+    }
   }
 end:
   orb_free(ctx, fa);
   orb_free(ctx, fb);
   return status;
+}
+
+/* The best in a common upright frame, unless one in another frame explains much more. */
+static const start *choose(const start *upright, const start *best) {
+  const start *top_upright = upright, *top_best = best;
+  for (int i = 1; i < STARTS; i++) {
+    top_upright = upright[i].score > top_upright->score ? &upright[i] : top_upright;
+    top_best = best[i].score > top_best->score ? &best[i] : top_best;
+  }
+  return top_upright->score > top_best->score - 0.15 * fabs(top_best->score) ? top_upright : top_best;
+}
+
+orb_status orb_rotation_search_near(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
+                                    const double *from, const double *to, int32_t count, double rotation[9],
+                                    double *score) {
+  start upright[STARTS], best[STARTS];
+  ORB_TRY(find_starts(ctx, a, b, from, to, count, 0, upright, best));
+  const start *chosen = choose(upright, best);
+  from_quaternion(chosen->q, rotation);
+  if (score) {
+    *score = chosen->score;
+  }
+  return ORB_OK;
+}
+
+orb_status orb_rotation_candidates(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
+                                   int32_t most, double *rotations, int32_t *count) {
+  start list[2 * STARTS], taken[2 * STARTS];
+  ORB_TRY(find_starts(ctx, a, b, NULL, NULL, 0, 0, list, list + STARTS));
+  taken[0] = *choose(list, list + STARTS);
+  ORB_TRY(find_starts(ctx, a, b, NULL, NULL, 0, 1, list, list + STARTS));
+  for (*count = 0; *count < most && *count < 2 * STARTS; ++*count) {
+    const start *top = *count ? NULL : taken;
+    for (int i = 0; *count && i < 2 * STARTS; i++) {
+      int known = 0;
+      for (int k = 0; k < *count; k++) {
+        known |= is_near(list[i].q, taken[k].q);
+      }
+      top = !known && list[i].score > -INFINITY && (!top || list[i].score > top->score) ? &list[i] : top;
+    }
+    if (!top) {
+      break;
+    }
+    taken[*count] = *top;
+    from_quaternion(top->q, rotations + 9 * *count);
+  }
+  return ORB_OK;
 }
 
 orb_status orb_rotation_search(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,

@@ -5,7 +5,7 @@
  * The confidence looks at a patch of triangles about the point and at its image on each other shape, both shapes scaled
  * to equal area. Each triangle has the symmetric Dirichlet energy E = (|J|² + |J⁻¹|²)/4 of the linear map J to its
  * image: 1 for a rigid motion, more for any other. The mean of 1/E by area is the confidence on that shape, the least
- * of all shapes that of the landmark. */
+ * of all shapes that of the landmark. All of them fall where another correspondence is nearly as good. */
 #include <math.h>
 #include <string.h>
 
@@ -15,6 +15,7 @@
 #include "orbmorph/remesh.h"
 
 enum { PATCH = 64 };
+static const double CLEAR = 0.5; /* a correspondence that is so far ahead of all others takes nothing off */
 
 typedef struct finder {
   const orb_alignment *alignment;
@@ -23,8 +24,8 @@ typedef struct finder {
   double *area;          /* a shape */
 } finder;
 
-/* 1/E of the map from triangle p to triangle q: |J|² is Σ cot(angle) |opposite edge's image|² over twice the area. */
-static double likeness(double p[3][3], double q[3][3], double *area) {
+/* |J|² is Σ cot(angle) |opposite edge's image|² over twice the area. */
+double orb_triangle_likeness(double p[3][3], double q[3][3], double *area) {
   double u[3], v[3], n[3], sum = 0;
   orb_sub(p[1], p[0], u);
   orb_sub(p[2], p[0], v);
@@ -77,7 +78,7 @@ static double confidence_on(const finder *f, int32_t s, const int32_t *patch, in
         q[k][c] /= sqrt(f->area[s]);
       }
     }
-    double like = likeness(p, q, &area);
+    double like = orb_triangle_likeness(p, q, &area);
     sum += like * area;
     total += area;
   }
@@ -150,7 +151,7 @@ static orb_status spread(orb_context *ctx, const orb_mesh *mesh, int32_t out[ORB
   return orb_context_check(ctx);
 }
 
-orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment) {
+orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment, double clear) {
   finder f = {.alignment = alignment};
   int32_t vertices[ORB_FOUND_MAX], count = 0;
   orb_status status;
@@ -164,6 +165,7 @@ orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment) {
   ORB_GO(status, spread(ctx, &alignment->shapes[0].mesh, vertices, &count), end);
   for (int32_t i = 0; i < count; i++) {
     ORB_GO(status, fill(ctx, &f, vertices[i], i, alignment), end);
+    alignment->confidence[i] *= fmin(1, clear / CLEAR);
     alignment->found_count++;
   }
 end:

@@ -28,7 +28,24 @@ ORB_MUST_CHECK orb_status orb_align_rbf(orb_context *ctx, orb_sheet *sheets, int
                                         const orb_align_options *options);
 
 /* Fills found, found_points and confidence of an alignment made without landmarks: its meshes are those given, unsplit.
- * See found.c. */
-ORB_MUST_CHECK orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment);
+ * clear, 0 to 1: how far behind other correspondences are (guess.h). See found.c. */
+ORB_MUST_CHECK orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment, double clear);
+
+/* 1/E of the linear map from triangle p to triangle q, E = (|J|² + |J⁻¹|²)/4: 1 for a rigid motion, 0 where it is
+ * degenerate. *area: of p. */
+double orb_triangle_likeness(double p[3][3], double q[3][3], double *area);
+
+/* orb_align() without what `auto` does beyond it: the rotation search, and what was found. */
+ORB_MUST_CHECK orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                          const orb_landmark *landmarks, int32_t landmark_count,
+                                          const orb_align_options *options, orb_alignment *out);
+
+/* Improves the maps from the first shape to the others, see orb_compose(), and fills alignment->energy. */
+ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, int from_given,
+                                          orb_preset preset);
+
+/* Method `auto` without landmarks, see auto.c. */
+ORB_MUST_CHECK orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                         const orb_align_options *options, orb_alignment *out);
 
 #endif

@@ -39,6 +39,12 @@ ORB_MUST_CHECK orb_status orb_procrustes_all(orb_context *ctx, const double *poi
 ORB_MUST_CHECK orb_status orb_rotation_search(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
                                               double rotation[9], double *score);
 
+/* Rotations of that kind that differ, best first, at most `most` (9 doubles each): the first is the one of
+ * orb_rotation_search(), the others are what symmetric shapes could be matched by as well. */
+ORB_MUST_CHECK orb_status orb_rotation_candidates(orb_context *ctx, const orb_aligned_shape *a,
+                                                  const orb_aligned_shape *b, int32_t most, double *rotations,
+                                                  int32_t *count);
+
 /* The same where few landmarks are known: `from` (on b) and `to` (on a), 3 each. A rotation loses by the mean of the
  * squared distances between them, so that one landmark leaves a turn about it to the shapes, and two that are nearly
  * opposite likewise. */

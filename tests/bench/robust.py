@@ -2,11 +2,12 @@
 """Random landmarks on real meshes, and every pair of them without any; writes docs/robustness.md.
 
     tests/bench/robust.py [landmarks|pairs|all] [--bin build/bin] [--meshes ../shared/meshes] [--jobs 2] [--sets 1000]
-                          [--preset default|fast|quality] [--keep DIR] [--out docs/robustness.md]
+                          [--presets fast,default] [--keep DIR] [--out docs/robustness.md] [--kept]
 
-The meshes are those that index.csv calls good and that have 2,000 to 50,000 triangles. Lines that a run before left in
---keep are taken over, so that a long run can be interrupted. Exit status 1: fewer than 99 % of the sets could be met, a
-refusal named no landmark, or a pair failed. Standard library only.
+The meshes are those that index.csv calls good and that have 2,000 to 50,000 triangles. Every set and pair that a run
+before left in --keep is taken over, so that a long run can be interrupted at any time; --kept runs nothing more and
+writes what is there. Exit status 1: fewer than 99 % of the sets could be met, a refusal named no landmark, a pair
+failed, or something is still to be run. Standard library only.
 """
 import argparse
 import concurrent.futures
@@ -19,25 +20,28 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-CHUNK = 50  # sets or pairs a process
+CHUNK = 25  # sets or pairs a process
 HEAD = """# Landmarks at random, and every pair
 
-Written by `tests/bench/robust.py` on the real meshes of 2,000 to 50,000 triangles. CPU seconds are of one thread, the
-library's own; the machine had other work.
-"""
-LANDMARKS = """## Random landmarks
+Written by `tests/bench/robust.py` on the real meshes of 2,000 to 50,000 triangles.
 
-Each set takes two meshes and as many places on each, at random vertices, inside triangles and on edges, and matches
-them in random order: far harder than what anyone would mark, since the surfaces must be wound about each other. `pin`
-with the preset `fast`. Met: certified in exact arithmetic, closed, landmarks at bit-equal points on both spheres.
-Growth is how many times its triangles the mesh that grew more has afterwards; a set of 60 on a mesh of a few hundred
-triangles needs most.
+| what | run | certified | failed |
+|---|---|---|---|
 """
-PAIRS = """## Every pair
+LANDMARKS = """
+## Random landmarks
+
+A set takes two meshes and as many places on each, at random vertices, inside triangles and on edges, and matches them
+in random order: the surfaces must be wound about each other. `pin` with the preset `fast`. Met: certified in exact
+arithmetic, closed, landmarks at bit-equal points on both spheres. *Growth*: how many times its triangles the mesh that
+grew more has afterwards. CPU seconds are of one thread; the machine had other work.
+"""
+PAIRS = """
+## Every pair
 
 No landmarks, `auto`, `adaptive` at the tolerance 0.1 %. Certified: closed, of genus zero, nothing flipped on the
-sphere. *Bound* is the proved distance from either input, in % of its diagonal; *energy* that of the composed map
-(1: isometric), *inverted* the share of triangles turned in space.
+sphere. *Triangles* of the supermesh; *energy* of the composed map (1: isometric); *inverted*: the share of triangles
+turned in space, in %; CPU seconds. A dash: not run yet.
 """
 
 
@@ -55,20 +59,22 @@ def lines_of(path):
         return []
 
 
-def run(options, name, total, arguments, meshes):
+def run(options, name, command, total, arguments, meshes):
     """All lines of one command: what is kept, and the rest run in chunks."""
     keep = pathlib.Path(options.keep)
     keep.mkdir(parents=True, exist_ok=True)
 
     def one(first):
         path = keep / f"{name}-{first}.jsonl"
-        count = min(CHUNK, total - first)
-        if len(lines_of(path)) < count:
-            with open(path, "w", encoding="utf-8") as file:
-                command = [str(pathlib.Path(options.bin) / "orbmorph-bench"), name, "--threads", "1", "--first", str(first),
-                           "--sets", str(count), "--seconds", str(options.seconds), *arguments, *meshes]
-                subprocess.run(command, stdout=file, check=True, preexec_fn=lambda: os.nice(19))
-        print(f"{name} {first + count} of {total}", file=sys.stderr)
+        lines, count = lines_of(path), min(CHUNK, total - first)
+        if len(lines) < count and not options.kept:
+            path.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+            with open(path, "a", encoding="utf-8") as file:
+                call = [str(pathlib.Path(options.bin) / "orbmorph-bench"), command, "--threads", "1", "--first",
+                        str(first + len(lines)), "--sets", str(count - len(lines)), "--seconds", str(options.seconds),
+                        *arguments, *meshes]
+                subprocess.run(call, stdout=file, check=True, preexec_fn=lambda: os.nice(19))
+            print(f"{name} {first + count} of {total}", file=sys.stderr)
         return lines_of(path)
 
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
@@ -102,21 +108,37 @@ def landmarks_table(lines):
     return text, failed
 
 
-def pairs_table(lines):
-    text = ["| pair | triangles | of the larger input | bound % | rms % | energy | inverted % | CPU s |",
-            "|---|---|---|---|---|---|---|---|"]
-    failed = []
-    for line in lines:
-        name = " – ".join(line["shapes"])
-        if line["status"] != "ok" or not line["certificate"]["closed"] or any(line["certificate"]["flipped"]):
-            failed.append(line)
-            text.append(f"| {name} | {line['status']}: {line['detail']} | | | | | | {line['cpu_seconds']:.1f} |")
-            continue
-        energy = "" if line["energy"] is None else f"{line['energy']:.2f}"
-        text.append(f"| {name} | {line['triangles']:,} | {line['triangles'] / line['largest_input']:.2f} | "
-                    f"{100 * line['bound_relative']:.3f} | {100 * line['rms_relative']:.3f} | {energy} | "
-                    f"{100 * (line['inverted'] or 0):.2f} | {line['cpu_seconds']:.1f} |")
-    return text, failed
+def is_certified(line):
+    return line["status"] == "ok" and line["certificate"]["closed"] and not any(line["certificate"]["flipped"])
+
+
+def pair_cells(line):
+    if line is None:
+        return "– | | | "
+    if not is_certified(line):
+        return f"{line['status']}: {line['detail']} | | | {line['cpu_seconds']:.1f}"
+    energy = "" if line["energy"] is None else f"{line['energy']:.2f}"
+    return f"{line['triangles']:,} | {energy} | {100 * (line['inverted'] or 0):.2f} | {line['cpu_seconds']:.1f}"
+
+
+def pairs_table(runs):
+    """runs: preset -> lines."""
+    by_name = {preset: {tuple(line["shapes"]): line for line in lines} for preset, lines in runs.items()}
+    names = list(dict.fromkeys(tuple(line["shapes"]) for lines in runs.values() for line in lines))
+    text = ["| pair |" + "".join(f" {p}: triangles | energy | inverted % | CPU s |" for p in runs),
+            "|---|" + "---|---|---|---|" * len(runs)]
+    for name in names:
+        text.append(f"| {' – '.join(name)} | " + " | ".join(pair_cells(by_name[p].get(name)) for p in runs) + " |")
+    return text
+
+
+def pairs_summary(preset, lines):
+    met = [line for line in lines if is_certified(line)]
+    over = sum(line["bound_relative"] > 0.001 for line in met)
+    bound = f", {over} of them with a bound above the tolerance" if over else ", the proved bound within the tolerance"
+    seconds = [line["cpu_seconds"] for line in lines]
+    return (f"| pairs, `{preset}`; CPU s {quantile(seconds, 0.5):.1f} in the median, {quantile(seconds, 1):.1f} at most "
+            f"| {len(lines)} | {len(met)}{bound} | {len(lines) - len(met)} |")
 
 
 def main():
@@ -129,30 +151,35 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--merge-every", type=int, default=0)
     parser.add_argument("--seconds", type=int, default=3600, help="after which a set or pair counts as failed")
-    parser.add_argument("--preset", default="default", help="of the alignment of pairs")
+    parser.add_argument("--presets", default="fast,default", help="of the alignment of pairs")
     parser.add_argument("--keep", default=pathlib.Path(tempfile.gettempdir()) / "orbmorph-robust")
+    parser.add_argument("--kept", action="store_true", help="run nothing, write what is kept")
     parser.add_argument("--out", help="the Markdown file; else the tables are printed")
     options = parser.parse_args()
-    meshes, text, bad = meshes_of(pathlib.Path(options.meshes)), [HEAD], 0
+    meshes, summary, text, bad = meshes_of(pathlib.Path(options.meshes)), [], [], False
     if options.what in ("landmarks", "all"):
         arguments = ["--seed", str(options.seed), "--merge-every", str(options.merge_every)]
-        lines = run(options, "landmarks", options.sets, arguments, meshes)
+        lines = run(options, f"landmarks-{options.seed}", "landmarks", options.sets, arguments, meshes)
         table, failed = landmarks_table(lines)
-        text += [LANDMARKS, f"{len(lines)} sets, {len(lines) - len(failed)} met "
-                 f"({100 * (1 - len(failed) / len(lines)):.2f} %).", "", *table, ""]
+        share = f" ({100 * (1 - len(failed) / len(lines)):.2f} %)" if lines else ""
+        summary.append(f"| sets of random landmarks, seed {options.seed} | {len(lines)} | {len(lines) - len(failed)}{share} "
+                       f"| {len(failed)} |")
+        text += [LANDMARKS, *table]
         bad |= len(failed) > 0.01 * len(lines) or any(line["status"] != "ok" and not line["named"] for line in failed)
+        bad |= len(lines) < options.sets
     if options.what in ("pairs", "all"):
-        total = len(meshes) * (len(meshes) - 1) // 2
-        lines = run(options, "pairs", total, ["--align-preset", options.preset], meshes)
-        table, failed = pairs_table(lines)
-        over = sum(line["status"] == "ok" and line["bound_relative"] > 0.001 for line in lines)
-        text += [PAIRS, f"{len(lines)} pairs, {len(lines) - len(failed)} certified, {over} of them with a bound above the "
-                 f"tolerance; preset `{options.preset}`.", "", *table, ""]
-        bad |= bool(failed)
+        total, runs = len(meshes) * (len(meshes) - 1) // 2, {}
+        for preset in options.presets.split(","):
+            runs[preset] = run(options, f"pairs-{preset}", "pairs", total, ["--align-preset", preset], meshes)
+            if runs[preset]:
+                summary.append(pairs_summary(preset, runs[preset]))
+            bad |= len(runs[preset]) < total or not all(map(is_certified, runs[preset]))
+        text += [PAIRS, *pairs_table(runs)]
+    page = HEAD + "\n".join(summary + text) + "\n"
     if options.out:
-        pathlib.Path(options.out).write_text("\n".join(text), encoding="utf-8")
+        pathlib.Path(options.out).write_text(page, encoding="utf-8")
     else:
-        print("\n".join(text))
+        print(page)
     return 1 if bad else 0
 
 

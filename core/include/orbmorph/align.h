@@ -58,7 +58,8 @@ typedef struct orb_alignment {
   orb_place *found;     /* found_count × shape_count places, on the given meshes */
   double *found_points; /* found_count × 3: their common points on the aligned sphere */
   double *confidence;   /* found_count, 0 to 1: 1 where the map nearby is rigid up to one scale for all, less the more
-                           it stretches; it does not say whether the right things were matched */
+                           it stretches, and less for all where another correspondence that was tried is nearly as
+                           good, see auto; it does not say whether the right things were matched */
   double energy;        /* composed symmetric Dirichlet, capped, area-weighted; lower is better; NaN if not measured */
 } orb_alignment;
 
@@ -74,7 +75,9 @@ typedef struct orb_alignment {
  * - pin: the shapes are embedded anew with the landmarks as constraints, meeting at their spherical means; landmarks
  *   that would have to pass through one another meet on surfaces with more edges, at the first shape's points or at
  *   new ones. After pin and rbf a landmark's vertices have bit-equal points on all shapes.
- * - auto: pin where landmarks are given, else the rotation search; `found` then says what it matched.
+ * - auto: pin where landmarks are given, else the rotation search. Where the energy of the composed map stays above
+ *   1.2, other correspondences are tried on coarse copies, by further rotations and by tips of limbs, and the best one
+ *   is taken if it lowers the energy (not with the preset fast). `found` then says what was matched.
  *
  * Landmarks at one and the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
  * those that are out of range or share a place on some shapes only; of a set

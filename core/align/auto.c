@@ -1,0 +1,153 @@
+/* Alignment without landmarks.
+ *
+ * The rotation search and the composed map that starts from it are right for shapes in like poses, and its energy says
+ * so. Where the energy stays high, other correspondences are tried on coarse copies (guess.c). What the best of them
+ * matches are landmarks of an alignment by pin, whose composed map is then composed once more, free of them. The
+ * alignment of less energy is returned.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "align/guess.h"
+#include "align/methods.h"
+#include "base/check.h"
+
+static const double GOOD_ENERGY = 1.2; /* below it no other correspondence is looked for */
+
+typedef struct guesses {
+  orb_guess *of;   /* each later shape's, from 1 on */
+  int32_t count;   /* vertices that all of them match */
+  int32_t *vertex; /* ORB_GUESS_MAX a shape */
+  double clear;
+} guesses;
+
+/* Vertices of the first shape that every guess matches, and their partners. */
+static void gather(guesses *g, int32_t shape_count) {
+  for (int32_t i = 0; shape_count > 1 && i < g->of[1].count; i++) {
+    int32_t found = 1;
+    g->vertex[g->count] = g->of[1].first[i];
+    for (int32_t s = 1; s < shape_count; s++) {
+      for (int32_t k = 0; k < g->of[s].count; k++) {
+        if (g->of[s].first[k] == g->of[1].first[i]) {
+          g->vertex[(size_t)s * ORB_GUESS_MAX + (size_t)g->count] = g->of[s].second[k];
+          found++;
+        }
+      }
+    }
+    g->count += found == shape_count;
+  }
+}
+
+static orb_status guess_all(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, guesses *g) {
+  g->clear = 1;
+  g->of = ORB_NEW0(ctx, orb_guess, shape_count);
+  g->vertex = ORB_NEW(ctx, int32_t, ORB_GUESS_MAX * (size_t)shape_count);
+  if (!g->of || !g->vertex) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t s = 1; s < shape_count; s++) {
+    ORB_TRY(orb_guess_find(ctx, shapes[0].mesh, shapes[s].mesh, &g->of[s]));
+    g->clear = fmin(g->clear, g->of[s].clear);
+  }
+  gather(g, shape_count);
+  return ORB_OK;
+}
+
+/* Did splits leave every mesh as it was? */
+static int is_unsplit(const orb_align_shape *shapes, const orb_alignment *a) {
+  for (int32_t s = 0; s < a->shape_count; s++) {
+    if (a->shapes[s].mesh.vertex_count != shapes[s].mesh->vertex_count) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* Pinned at the guesses and composed with them held, then composed again without. *held 0: they could not be met as
+ * the meshes are, and `out` is empty. */
+static orb_status align_guessed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, const guesses *g,
+                                const orb_align_options *options, orb_alignment *out, int *held) {
+  orb_status status = ORB_E_NO_MEMORY;
+  orb_align_options pin = *options;
+  orb_place *at = ORB_NEW(ctx, orb_place, (size_t)g->count * (size_t)shape_count);
+  orb_landmark landmarks[ORB_GUESS_MAX];
+  pin.method = ORB_ALIGN_PIN;
+  pin.max_growth = 1e-9;
+  memset(out, 0, sizeof *out);
+  memset(landmarks, 0, sizeof landmarks);
+  *held = 0;
+  if (!at) {
+    goto end;
+  }
+  for (int32_t k = 0; k < g->count; k++) {
+    landmarks[k].at = at + (size_t)k * (size_t)shape_count;
+    for (int32_t s = 0; s < shape_count; s++) {
+      ORB_GO(status,
+             orb_place_of_vertex(ctx, shapes[s].mesh, g->vertex[(size_t)s * ORB_GUESS_MAX + (size_t)k],
+                                 &at[(size_t)k * (size_t)shape_count + (size_t)s]),
+             end);
+    }
+  }
+  status = orb_align_given(ctx, shapes, shape_count, landmarks, g->count, &pin, out);
+  if (status == ORB_E_BAD_LANDMARKS) {
+    orb_error_clear(ctx);
+    status = ORB_OK;
+    goto end;
+  }
+  if (status != ORB_OK || !is_unsplit(shapes, out)) {
+    goto end;
+  }
+  out->landmark_count = 0;
+  for (int32_t s = 0; s < shape_count; s++) {
+    orb_free(ctx, out->shapes[s].landmark_vertices);
+    out->shapes[s].landmark_vertices = NULL;
+  }
+  ORB_GO(status, orb_compose_all(ctx, out, 1, options->preset), end);
+  *held = 1;
+end:
+  orb_free(ctx, at);
+  if (!*held) {
+    orb_alignment_free(ctx, out);
+  }
+  return status;
+}
+
+/* Looks for a better alignment than the one at hand, and takes its place. */
+static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                          const orb_align_options *options, orb_alignment *alignment, double *clear) {
+  guesses g = {0};
+  orb_alignment other;
+  int held = 0;
+  orb_status status;
+  ORB_GO(status, guess_all(ctx, shapes, shape_count, &g), end);
+  *clear = g.clear;
+  if (g.count >= 3) {
+    ORB_GO(status, align_guessed(ctx, shapes, shape_count, &g, options, &other, &held), end);
+  }
+  if (held) {
+    int better = other.energy < alignment->energy;
+    orb_alignment_free(ctx, better ? alignment : &other);
+    if (better) {
+      *alignment = other;
+    }
+  }
+end:
+  orb_free(ctx, g.of);
+  orb_free(ctx, g.vertex);
+  return status;
+}
+
+orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                          const orb_align_options *options, orb_alignment *out) {
+  orb_status status;
+  double clear = 1;
+  ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, options, out));
+  if (options->preset != ORB_PRESET_FAST && out->energy > GOOD_ENERGY) {
+    ORB_GO(status, improve(ctx, shapes, shape_count, options, out, &clear), failed);
+  }
+  ORB_GO(status, orb_align_find(ctx, out, clear), failed);
+  return ORB_OK;
+failed:
+  orb_alignment_free(ctx, out);
+  return status;
+}

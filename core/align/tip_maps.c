@@ -1,0 +1,121 @@
+/* How the tips of two shapes may belong together: all injective partial maps are tried, depth first; with eight tips
+ * each that are 1.4 million. */
+#include <math.h>
+#include <string.h>
+
+#include "align/tips.h"
+
+enum { LEAST = 3 };
+static const double PAIR_SPREAD = 0.35, FAR_SPREAD = 0.25, WORST = -2; /* of logarithms of quotients */
+
+typedef struct matcher {
+  const orb_tips *a, *b;
+  double pair[ORB_TIPS_MAX][ORB_TIPS_MAX][ORB_TIPS_MAX][ORB_TIPS_MAX]; /* i, j of a to k, l of b */
+  double single[ORB_TIPS_MAX][ORB_TIPS_MAX];
+  orb_tip_map *list;
+  int32_t count;
+} matcher;
+
+static double agreement(double x, double y, double spread) {
+  double r = log(x / y) / spread, value = 1 - r * r;
+  return value > WORST ? value : WORST;
+}
+
+/* Is one a part of the other? */
+static int consistent(const orb_tip_map *x, const orb_tip_map *y, int32_t count) {
+  int x_in_y = 1, y_in_x = 1;
+  for (int32_t i = 0; i < count; i++) {
+    x_in_y = x_in_y && (x->to[i] < 0 || x->to[i] == y->to[i]);
+    y_in_x = y_in_x && (y->to[i] < 0 || y->to[i] == x->to[i]);
+  }
+  return x_in_y || y_in_x;
+}
+
+/* Into the list, in order, where it is good enough; parts of it leave. */
+static void keep(matcher *m, const orb_tip_map *map) {
+  if (m->count == ORB_TIP_MAPS_MAX && map->score <= m->list[m->count - 1].score) {
+    return;
+  }
+  int32_t left = 0;
+  for (int32_t i = 0; i < m->count; i++) {
+    if (consistent(map, &m->list[i], m->a->count) && m->list[i].score >= map->score) {
+      return;
+    }
+  }
+  for (int32_t i = 0; i < m->count; i++) {
+    if (!consistent(map, &m->list[i], m->a->count)) {
+      m->list[left++] = m->list[i];
+    }
+  }
+  m->count = left < ORB_TIP_MAPS_MAX ? left + 1 : left;
+  int32_t at = m->count - 1;
+  for (; at > 0 && m->list[at - 1].score < map->score; at--) {
+    m->list[at] = m->list[at - 1];
+  }
+  m->list[at] = *map;
+}
+
+static double gain(const matcher *m, const orb_tip_map *map, int32_t i, int32_t k) {
+  double sum = m->single[i][k];
+  for (int32_t j = 0; j < i; j++) {
+    if (map->to[j] >= 0) {
+      sum += m->pair[j][i][map->to[j]][k];
+    }
+  }
+  return sum;
+}
+
+/* Depth first; the choice of each tip counts up from −1. */
+static void try_all(matcher *m) {
+  int32_t n = m->a->count, depth = 0;
+  orb_tip_map at[ORB_TIPS_MAX + 1] = {{0}};
+  int32_t choice[ORB_TIPS_MAX + 1] = {-2};
+  for (int32_t i = 0; i < ORB_TIPS_MAX; i++) {
+    at[0].to[i] = -1;
+  }
+  while (depth >= 0) {
+    if (depth == n) {
+      if (at[n].count >= LEAST) {
+        keep(m, &at[n]);
+      }
+      depth--;
+      continue;
+    }
+    int32_t k = choice[depth] == -2 ? -1 : choice[depth] + 1;
+    for (int32_t j = 0; k >= 0 && j < depth && k < m->b->count; j++) {
+      if (at[depth].to[j] == k) {
+        k++;
+        j = -1;
+      }
+    }
+    if (k >= m->b->count) {
+      depth--;
+      continue;
+    }
+    choice[depth] = k;
+    at[depth + 1] = at[depth];
+    if (k >= 0) {
+      at[depth + 1].score += gain(m, &at[depth], depth, k);
+      at[depth + 1].to[depth] = k;
+      at[depth + 1].count++;
+    }
+    depth++;
+    choice[depth] = -2;
+  }
+}
+
+void orb_tip_maps(const orb_tips *a, const orb_tips *b, orb_tip_map out[ORB_TIP_MAPS_MAX], int32_t *count) {
+  matcher m = {.a = a, .b = b, .list = out};
+  for (int32_t i = 0; i < a->count; i++) {
+    for (int32_t k = 0; k < b->count; k++) {
+      m.single[i][k] = agreement(a->far[i], b->far[k], FAR_SPREAD);
+      for (int32_t j = 0; j < a->count; j++) {
+        for (int32_t l = 0; l < b->count; l++) {
+          m.pair[i][j][k][l] = i != j && k != l ? agreement(a->distance[i][j], b->distance[k][l], PAIR_SPREAD) : 0;
+        }
+      }
+    }
+  }
+  try_all(&m);
+  *count = m.count;
+}

@@ -1,0 +1,30 @@
+/* Tips of limbs, and how those of two shapes may belong together. */
+#ifndef ORB_ALIGN_TIPS_H
+#define ORB_ALIGN_TIPS_H
+
+#include "orbmorph/mesh.h"
+
+enum { ORB_TIPS_MAX = 8, ORB_TIP_MAPS_MAX = 24 };
+
+/* Vertices that are farther from the rest of the surface than all about them, farthest first. Distances go along the
+ * surface, in units of the mean distance between any two points of it. */
+typedef struct orb_tips {
+  int32_t count, vertex[ORB_TIPS_MAX];
+  double far[ORB_TIPS_MAX]; /* from the rest, in the mean */
+  double distance[ORB_TIPS_MAX][ORB_TIPS_MAX];
+} orb_tips;
+
+/* O(sources · n log n): for meshes of a few thousand vertices. */
+ORB_MUST_CHECK orb_status orb_tips_find(orb_context *ctx, const orb_mesh *mesh, orb_tips *out);
+
+/* Tip i of the first shape is tip to[i] of the second, −1: none. */
+typedef struct orb_tip_map {
+  int32_t count, to[ORB_TIPS_MAX];
+  double score; /* how well distances agree, summed over pairs of tips */
+} orb_tip_map;
+
+/* The maps of at least three tips whose distances agree best, best first; none is a part of another. Which way round
+ * they turn is not looked at: mirror images are among them. */
+void orb_tip_maps(const orb_tips *a, const orb_tips *b, orb_tip_map out[ORB_TIP_MAPS_MAX], int32_t *count);
+
+#endif

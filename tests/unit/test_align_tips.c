@@ -1,0 +1,180 @@
+/* Tips of limbs, how those of two shapes belong together, and whether the trials on real shapes find what is known. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "align/guess.h"
+#include "align/tips.h"
+#include "orbmorph/format.h"
+#include "support_shapes.h"
+
+enum { LIMBS = 5 };
+
+/* Five directions without any symmetry, and how far the limbs reach. */
+static const double limb[LIMBS][3] = {{1, 0, 0}, {-0.6, 0.8, 0}, {0, -0.8, 0.6}, {-0.48, -0.6, -0.64}, {0, 0.28, 0.96}};
+static const double reach[LIMBS] = {4, 3.4, 2.9, 2.5, 2.2};
+
+/* A ball with limbs, turned by thirds about (1, 1, 1) as often as is said. */
+static orb_mesh creature(orb_context *ctx, int levels, int turns) {
+  orb_mesh mesh = shape_ball(ctx, levels);
+  for (int32_t v = 0; v < mesh.vertex_count; v++) {
+    double *p = mesh.positions + 3 * (size_t)v, r = 1, q[3];
+    for (int i = 0; i < LIMBS; i++) {
+      double c = p[0] * limb[i][0] + p[1] * limb[i][1] + p[2] * limb[i][2];
+      r += (reach[i] - 1) * exp(-20 * (1 - c));
+    }
+    memcpy(q, p, sizeof q);
+    for (int k = 0; k < 3; k++) {
+      p[(k + turns) % 3] = r * q[k];
+    }
+  }
+  return mesh;
+}
+
+/* Which limb a vertex of the creature is the tip of, −1: none. */
+static int limb_at(const orb_mesh *mesh, int32_t v, int turns) {
+  double p[3], length = 0;
+  for (int k = 0; k < 3; k++) {
+    p[k] = mesh->positions[3 * (size_t)v + (size_t)((k + turns) % 3)];
+    length += p[k] * p[k];
+  }
+  for (int i = 0; i < LIMBS; i++) {
+    if (p[0] * limb[i][0] + p[1] * limb[i][1] + p[2] * limb[i][2] > cos(0.12) * sqrt(length)) {
+      return i;
+    }
+  }
+  return -1;
+}
+
+static void tips_are_where_limbs_end(void **state) {
+  (void)state;
+  orb_context *ctx;
+  orb_tips tips;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh mesh = creature(ctx, 4, 0);
+  assert_int_equal(orb_tips_find(ctx, &mesh, &tips), ORB_OK);
+  assert_int_equal(tips.count, LIMBS);
+  int seen[LIMBS] = {0};
+  for (int i = 0; i < tips.count; i++) {
+    int at = limb_at(&mesh, tips.vertex[i], 0);
+    assert_true(at >= 0 && !seen[at]);
+    seen[at] = 1;
+    assert_true(tips.distance[i][i] == 0);
+    for (int j = 0; j < i; j++) { /* no way is shorter than the straight one; all of one unit */
+      assert_true(tips.distance[i][j] > 0.3 && tips.distance[i][j] == tips.distance[j][i]);
+    }
+  }
+  shape_free(ctx, &mesh);
+  orb_context_destroy(ctx);
+}
+
+/* On a ball all points are alike: nothing sticks out. */
+static void a_ball_has_none(void **state) {
+  (void)state;
+  orb_context *ctx;
+  orb_tips tips;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh ball = shape_ball(ctx, 4);
+  assert_int_equal(orb_tips_find(ctx, &ball, &tips), ORB_OK);
+  assert_int_equal(tips.count, 0);
+  shape_free(ctx, &ball);
+  orb_context_destroy(ctx);
+}
+
+/* The same creature, turned and more finely meshed: limb goes to limb. */
+static void limbs_go_to_limbs(void **state) {
+  (void)state;
+  orb_context *ctx;
+  orb_tips a, b;
+  orb_tip_map maps[ORB_TIP_MAPS_MAX];
+  int32_t count;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh first = creature(ctx, 4, 0), second = creature(ctx, 5, 1);
+  assert_int_equal(orb_tips_find(ctx, &first, &a), ORB_OK);
+  assert_int_equal(orb_tips_find(ctx, &second, &b), ORB_OK);
+  orb_tip_maps(&a, &b, maps, &count);
+  assert_true(count >= 1);
+  assert_int_equal(maps[0].count, LIMBS);
+  for (int i = 0; i < a.count; i++) {
+    assert_int_equal(limb_at(&second, b.vertex[maps[0].to[i]], 1), limb_at(&first, a.vertex[i], 0));
+  }
+  for (int32_t k = 1; k < count; k++) {
+    assert_true(maps[k].score <= maps[k - 1].score && maps[k].count >= 3);
+  }
+  shape_free(ctx, &first);
+  shape_free(ctx, &second);
+  orb_context_destroy(ctx);
+}
+
+static int load(orb_context *ctx, const char *name, orb_mesh *mesh) {
+  char path[1024];
+  snprintf(path, sizeof path, "%s/good/%s", ORB_SHARED_MESHES, name);
+  FILE *file = fopen(path, "rb");
+  if (!file) {
+    return 0;
+  }
+  static unsigned char bytes[1 << 22];
+  size_t size = fread(bytes, 1, sizeof bytes, file);
+  fclose(file);
+  assert_int_equal(orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, mesh, NULL), ORB_OK);
+  assert_int_equal(orb_mesh_repair(ctx, mesh, ORB_REPAIR_SAFE), ORB_OK);
+  return 1;
+}
+
+/* The landmark of a list of vertices that is nearest in space. */
+static int nearest_of(const orb_mesh *mesh, const int32_t *list, int count, int32_t v) {
+  int best = 0;
+  double least = INFINITY;
+  for (int i = 0; i < count; i++) {
+    double d = 0;
+    for (int k = 0; k < 3; k++) {
+      double e = mesh->positions[3 * (size_t)list[i] + (size_t)k] - mesh->positions[3 * (size_t)v + (size_t)k];
+      d += e * e;
+    }
+    if (d < least) {
+      least = d;
+      best = i;
+    }
+  }
+  return best;
+}
+
+/* Feet, hands and nose of a man and an armadillo, set by hand. Both stand upright and face one way, so that left goes
+ * to left, though the map that turns the man about has nearly the same energy. */
+static void man_to_armadillo(void **state) {
+  (void)state;
+  enum { MARKS = 5 };
+  static const int32_t mark[2][MARKS] = {{6615, 3218, 5906, 2445, 331}, {10077, 9912, 14583, 14523, 13173}};
+  orb_context *ctx;
+  orb_mesh mesh[2];
+  orb_guess guess;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  int found = load(ctx, "human_man.obj", &mesh[0]) && load(ctx, "armadillo_29k.obj", &mesh[1]);
+  if (found) {
+    assert_int_equal(orb_guess_find(ctx, &mesh[0], &mesh[1], &guess), ORB_OK);
+    assert_true(guess.count >= 3);
+    for (int k = 0; k < guess.count; k++) {
+      assert_int_equal(nearest_of(&mesh[0], mark[0], MARKS, guess.first[k]),
+                       nearest_of(&mesh[1], mark[1], MARKS, guess.second[k]));
+    }
+    assert_true(guess.clear >= 0 && guess.clear < 0.5); /* the man turned about is nearly as good */
+    orb_mesh_free(ctx, &mesh[0]);
+    orb_mesh_free(ctx, &mesh[1]);
+  }
+  orb_context_destroy(ctx);
+  if (!found) {
+    print_message("The folder of real meshes is not there.\n");
+    skip();
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(tips_are_where_limbs_end), cmocka_unit_test(a_ball_has_none),
+                                     cmocka_unit_test(limbs_go_to_limbs), cmocka_unit_test(man_to_armadillo)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
