@@ -164,6 +164,10 @@ static int read_file(config *out, const char *path) {
       fine = set(out, e, trim(equals + 1), from);
     }
   }
+  if (fine && ferror(file)) {
+    fprintf(stderr, "orbmorphd: the config file %s cannot be read: %s\n", path, strerror(errno));
+    fine = 0;
+  }
   fclose(file);
   return fine;
 }

@@ -82,8 +82,7 @@ part_faults() {
   for program in core api store; do
     ORB_TORTURE_ALL=1 "build/bin/test_torture_$program"
   done
-  TMPDIR=${ORB_FAULT_FOLDER:-/dev/shm} ORB_FAULT_RUNS=${ORB_FAULT_RUNS:-all} \
-    ORB_INTERPOSE=build/bin/liborbmorph_interpose.so \
+  ORB_FAULT_RUNS=${ORB_FAULT_RUNS:-all} ORB_INTERPOSE=build/bin/liborbmorph_interpose.so \
     node --test --test-reporter=spec tests/scenario/faults.test.mjs
 }
 

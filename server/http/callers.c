@@ -54,7 +54,7 @@ static void update(caller *who, const token_row *row) {
 }
 
 static int reload(callers *c) {
-  int count;
+  int count, fine = 1;
   token_row *rows = catalogue_tokens(c->cat, &count);
   caller **all = rows ? calloc((size_t)count + 1, sizeof(caller *)) : NULL;
   if (!all) {
@@ -67,7 +67,8 @@ static int reload(callers *c) {
     if (all[i]) {
       update(all[i], &rows[i]);
     } else {
-      all[i] = make(&rows[i]); /* NULL without memory: refused until the next time */
+      all[i] = make(&rows[i]); /* NULL without memory: refused until the next time, and said */
+      fine &= all[i] != NULL;
     }
   }
   for (int i = 0; i < c->count; i++) {
@@ -81,7 +82,7 @@ static int reload(callers *c) {
   c->count = count;
   pthread_rwlock_unlock(&c->lock);
   free(rows);
-  return 1;
+  return fine;
 }
 
 int callers_reload(callers *c) {
@@ -113,7 +114,7 @@ callers *callers_open(catalogue *cat) {
   pthread_rwlock_init(&c->lock, NULL);
   pthread_mutex_init(&c->reading, NULL);
   if (!callers_reload(c)) {
-    free(c);
+    callers_close(c);
     return NULL;
   }
   return c;

@@ -15,7 +15,7 @@ typedef struct caller {
 typedef struct callers callers;
 callers *callers_open(catalogue *cat); /* NULL where they cannot be read */
 void callers_close(callers *c);
-/* Reads them again; 0 where that fails: they stay as they are. */
+/* Reads them again; 0 where that fails: they stay as they are, but a new one may be refused until the next time. */
 int callers_reload(callers *c);
 /* After the meshes of a tenant changed: the bytes that its tokens have used. Blocks. */
 void callers_recount(callers *c, const char *tenant);

@@ -2,7 +2,8 @@
  * open, the calls of SQLite and the starts of threads, whoever calls them: the program, SQLite, the HTTP library, libc.
  *
  * ORB_FAIL_BOARD names a file of the size of struct board, which the test shares with the program by mapping: the test
- * writes there what is to fail, and reads what did. It may do so while the program runs, and again and again. Kinds:
+ * writes there what is to fail, and reads what did. It may do so while the program runs, and again and again.
+ * ORB_FAIL_SITES names the list of sites, of 8 SITES bytes, which several programs may share. Kinds:
  * alloc (NULL, ENOMEM), write (ENOSPC, to files only), fsync (EIO), rename (EIO), folder (EIO from mkdir and unlink),
  * open (EMFILE, of files and folders), thread (EAGAIN), sqlite (SQLITE_IOERR from a step, an exec, a prepare). Where a
  * call failed is told on stderr.
@@ -36,11 +37,10 @@ struct board {
   uint32_t wanted;    /* the call that fails, counted from 1; 0: the first one at a site not in the list */
   atomic_uint met;    /* the call has failed; for ever: all later ones of the kind do */
   atomic_uint passed; /* calls of the kind since the test set this to 0 */
-  uint32_t reserved;
-  atomic_uint_fast64_t sites[SITES]; /* where a call has failed, open addressing; 0: free */
 };
 
 static struct board *board;
+static atomic_uint_fast64_t *sites; /* where a call has failed, open addressing; 0: free */
 static __thread int inside __attribute__((tls_model("initial-exec")));
 
 static void *next_of(const char *name) {
@@ -50,18 +50,22 @@ static void *next_of(const char *name) {
   return found;
 }
 
+static void *map_file(const char *file, size_t size) {
+  long fd = file ? syscall(SYS_openat, AT_FDCWD, file, O_RDWR | O_CLOEXEC, 0) : -1;
+  long at = fd < 0 ? -1 : syscall(SYS_mmap, NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED, (int)fd, 0);
+  if (fd >= 0) {
+    syscall(SYS_close, (int)fd);
+  }
+  return at == -1 ? NULL : (void *)at;
+}
+
 __attribute__((constructor)) static void begin(void) {
   void *frames[4];
-  const char *file = getenv("ORB_FAIL_BOARD");
   inside++;
   backtrace(frames, 4);   /* loads what it needs now */
   unsetenv("LD_PRELOAD"); /* children are none of our business */
-  long fd = file ? syscall(SYS_openat, AT_FDCWD, file, O_RDWR | O_CLOEXEC, 0) : -1;
-  if (fd >= 0) {
-    long at = syscall(SYS_mmap, NULL, sizeof *board, PROT_READ | PROT_WRITE, MAP_SHARED, (int)fd, 0);
-    syscall(SYS_close, (int)fd);
-    board = at == -1 ? NULL : (struct board *)at;
-  }
+  sites = map_file(getenv("ORB_FAIL_SITES"), SITES * sizeof *sites);
+  board = sites ? map_file(getenv("ORB_FAIL_BOARD"), sizeof *board) : NULL;
   inside--;
 }
 
@@ -83,9 +87,9 @@ __attribute__((noinline)) static uint64_t site_of(void) {
 /* The site's place in the list, or the free one where it belongs. */
 static atomic_uint_fast64_t *place_of(uint64_t site) {
   for (uint64_t i = site;; i++) {
-    uint_fast64_t there = atomic_load(&board->sites[i % SITES]);
+    uint_fast64_t there = atomic_load(&sites[i % SITES]);
     if (there == 0 || there == site) {
-      return &board->sites[i % SITES];
+      return &sites[i % SITES];
     }
   }
 }

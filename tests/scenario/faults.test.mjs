@@ -6,10 +6,11 @@
 // ORB_FAULT_RUNS is the number of faults (48), a sample; "all" goes on, for each kind, once and for ever, until a run in
 // which nothing failed any more: calls are taken by their number, 1, 2, 3 …, and where there are thousands of them by
 // the site that makes them, the chain of the seven innermost callers. "few" leaves out the allocations. ORB_FAULT_KINDS
-// (all of them) chooses kinds, comma-separated; ORB_FAULT_SEED (1) the sample; ORB_FAULT_PARALLEL (2) how many run side
-// by side. TMPDIR in memory (/dev/shm) saves the time of real fsyncs.
+// (all of them) chooses kinds, comma-separated; ORB_FAULT_SEED (1) the sample; ORB_FAULT_PARALLEL how many run side
+// by side. The data lies in memory where TMPDIR does not say otherwise: it saves the time of real fsyncs.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
+import { existsSync, mkdirSync } from 'node:fs';
 import { mkdtemp, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
@@ -21,24 +22,27 @@ import * as faults from './support/faults.mjs';
 const library = process.env.ORB_INTERPOSE;
 const wanted = process.env.ORB_FAULT_RUNS ?? '48';
 const all = !(Number(wanted) > 0);
-const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? 2);
+const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? (all ? 6 : 3)); // they wait more than they compute
 const patience = 40_000;
 const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(',')).split(',').filter((kind) => wanted !== 'few' || kind !== 'alloc');
 const seed = Number(process.env.ORB_FAULT_SEED ?? 1);
 const arguments_ = ['--workers', '1', '--io-threads', '1', '--drain-seconds', '2', '--max-connections', '64'];
+const base = !process.env.TMPDIR && existsSync('/dev/shm') ? '/dev/shm' : tmpdir();
 const run = promisify(execFile);
 
 /** A data folder, its daemon with the interposer, and a board. */
 class Place {
-  constructor(folder) {
+  constructor(folder, sites) {
+    mkdirSync(folder);
+    this.sites = sites;
     this.board = new faults.Board(folder);
     this.folder = folder;
-    this.lives = 0;
+    this.lives = this.stops = 0;
     this.fresh();
   }
   fresh() {
     this.data = path.join(this.folder, `data-${++this.lives}`);
-    this.d = new Daemon(this.data, arguments_, { LD_PRELOAD: library, ORB_FAIL_BOARD: this.board.file });
+    this.d = new Daemon(this.data, arguments_, { LD_PRELOAD: library, ORB_FAIL_BOARD: this.board.file, ORB_FAIL_SITES: this.sites });
     this.caller = new faults.Caller(this.d, patience);
   }
   get alive() {
@@ -74,6 +78,11 @@ class Place {
     assert.match(stdout, / 0 wrong/);
     await rm(this.data, { recursive: true, force: true });
     this.fresh();
+  }
+
+  async close() {
+    await this.abandon();
+    this.board.close();
   }
 
   /** Given up as it is; the next begins anew. */
@@ -113,6 +122,7 @@ const phases = {
     const met = place.board.disarm();
     if (!place.alive) {
       await place.stopped('while it ran');
+      place.stops++;
       await place.revive();
     }
     await place.caller.audit(false);
@@ -158,8 +168,9 @@ class Runner {
       if (met) {
         this.faults++;
         this.told[`${kind} ${when}`] = (this.told[`${kind} ${when}`] ?? 0) + 1;
-        // It is well again; a start that failed and was repeated needs less to show it.
-        await (when === 'first' || when === 'again' ? place.caller.upload(true, place.caller.newMesh()) : place.caller.sequence(true));
+        // It is well again; a start that failed and was repeated needs less to show it, and each of many.
+        const brief = when !== 'work' || (faults.by_site.includes(kind) && this.faults % 10 !== 0);
+        await (brief ? place.caller.glance() : place.caller.sequence(true));
         if (this.faults % 100 === 0 && all) console.error(`${this.faults} faults, ${this.failed.length} failed; at ${what}`);
       }
       return met;
@@ -171,16 +182,22 @@ class Runner {
     }
   }
 
-  async exhaust(place, kind, mode) {
+  /** Until nothing new fails, with all places side by side. */
+  async exhaust(places, kind, mode) {
     const sites = faults.by_site.includes(kind);
     for (const when of Object.keys(phase_of)) {
-      // A site may be passed only now and then: twice nothing new.
-      for (let n = 1, clean = 0; clean < (sites && when !== 'first' ? 2 : 1); n++) {
-        clean = (await this.one(place, when, kind, mode, sites ? 0 : n)) ? 0 : clean + 1;
-        if (n % 40 === 0) await this.end(place, `${kind} ${mode} (${when})`);
-      }
+      const needed = sites && when !== 'first' ? 2 * places.length : 1; // a site may be passed only now and then
+      let next = 1, clean = 0;
+      const work = async (place) => {
+        while (clean < needed) {
+          const n = next++;
+          clean = (await this.one(place, when, kind, mode, sites ? 0 : n)) ? 0 : clean + 1;
+          if (n % 40 === 0) await this.end(place, `${kind} ${mode} (${when})`);
+        }
+        await this.end(place, `${kind} ${mode} (${when})`);
+      };
+      await Promise.all(places.map(work));
     }
-    await this.end(place, `${kind} ${mode}`);
   }
 
   /** `count` faults over the phases, by a stride with a seeded start, both ways in turn. */
@@ -210,25 +227,25 @@ class Runner {
 const skip = !library ? 'ORB_INTERPOSE names no library' : slow ? 'not with sanitizers, which have an allocator of their own' : false;
 test('calls that fail are answered, not died of', { skip }, async (t) => {
   const runner = new Runner();
-  // The allocations take longest: first.
-  const order = [...kinds].sort((a, b) => (b === 'alloc') - (a === 'alloc') || (b === 'sqlite') - (a === 'sqlite'));
-  const tasks = order.flatMap((kind) =>
-    all ? ['once', 'ever'].map((mode) => (place) => runner.exhaust(place, kind, mode)) : [(place) => runner.sample(place, kind, Math.ceil(Number(wanted) / kinds.length))]);
-  async function worker() {
-    for (let task; (task = tasks.shift()); ) {
-      const folder = await mkdtemp(path.join(tmpdir(), 'orbmorph-fault-'));
-      const place = new Place(folder);
-      try {
-        await task(place);
-      } finally {
-        await place.abandon();
-        place.board.close();
-        await rm(folder, { recursive: true, force: true });
-      }
+  const folder = await mkdtemp(path.join(base, 'orbmorph-fault-'));
+  const places = Array.from({ length: side_by_side }, (_, i) => new Place(path.join(folder, `${i}`), path.join(folder, 'sites')));
+  const tasks = kinds.flatMap((kind) => (all ? ['once', 'ever'] : ['']).map((mode) => [kind, mode]));
+  try {
+    for (const [kind, mode] of all ? tasks : []) {
+      faults.makeSites(path.join(folder, 'sites'));
+      await runner.exhaust(places, kind, mode);
     }
+    faults.makeSites(path.join(folder, 'sites'));
+    const sample = async (place) => {
+      for (let task; !all && (task = tasks.shift()); ) await runner.sample(place, task[0], Math.ceil(Number(wanted) / kinds.length));
+    };
+    await Promise.all(places.map(sample));
+  } finally {
+    for (const place of places) await place.close();
+    await rm(folder, { recursive: true, force: true });
   }
-  await Promise.all(Array.from({ length: side_by_side }, worker));
-  t.diagnostic(`${runner.faults} faults, ${runner.failed.length} failed`);
+  const stops = places.reduce((sum, place) => sum + place.stops, 0);
+  t.diagnostic(`${runner.faults} faults, ${runner.failed.length} failed; the daemon stopped by itself ${stops} times while it ran`);
   for (const kind of kinds)
     t.diagnostic(`${kind}: ${Object.keys(phase_of).map((when) => `${runner.told[`${kind} ${when}`] ?? 0} ${when}`).join(', ')}`);
   assert.deepEqual(runner.failed.map((message) => message.split('\n')[0]), []);

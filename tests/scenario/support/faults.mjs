@@ -1,7 +1,7 @@
 // What the scenario "faults" is made of: the board on which it says what is to fail (tests/faults/interpose.c), and a
 // caller that goes through a fixed sequence of requests and notes what was promised.
 import assert from 'node:assert/strict';
-import { closeSync, openSync, readSync, writeSync } from 'node:fs';
+import { closeSync, openSync, readSync, writeFileSync, writeSync } from 'node:fs';
 import path from 'node:path';
 import { gzipSync } from 'node:zlib';
 import * as shapes from './shapes.mjs';
@@ -11,14 +11,20 @@ export const kinds = ['alloc', 'write', 'fsync', 'rename', 'folder', 'open', 'th
 export const by_site = ['alloc', 'folder', 'sqlite'];
 const modes = { once: 1, ever: 2 };
 const at = { mode: 0, kind: 4, wanted: 8, met: 12, passed: 16 };
-const size = 24 + 8 * 65536;
+const sizes = { board: 20, sites: 8 * 65536 };
+
+/** The list of sites that have failed, shared by daemons that work side by side. */
+export function makeSites(file) {
+  writeFileSync(file, Buffer.alloc(sizes.sites));
+  return file;
+}
 
 /** struct board: a file that daemons map, one after the other. */
 export class Board {
   constructor(folder) {
     this.file = path.join(folder, 'board');
     this.fd = openSync(this.file, 'w+');
-    writeSync(this.fd, Buffer.alloc(size), 0, size, 0);
+    writeSync(this.fd, Buffer.alloc(sizes.board), 0, sizes.board, 0);
   }
   set(field, value) {
     const bytes = Buffer.alloc(4);
@@ -127,6 +133,13 @@ export class Caller {
     await this.ask(calm, 'GET', '/v1/jobs');
     await this.ask(calm, 'GET', '/metrics');
     if (embedding) await this.ask(calm, 'DELETE', embedding);
+  }
+
+  /** Well: it takes a mesh, does a job, and lists them. */
+  async glance() {
+    const mesh = await this.upload(true, this.newMesh());
+    await this.make(true, '/v1/embeddings', { mesh: mesh.id });
+    await this.ask(true, 'GET', '/v1/meshes', { query: { limit: 2 } });
   }
 
   /** Without faults again: what was promised is there. Of what has ended before, only the meshes where `all` is asked. */
