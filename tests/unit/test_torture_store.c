@@ -13,6 +13,7 @@
 
 #include "log.h"
 #include "store/objects.h"
+#include "store/owners.h"
 #include "store/tokens.h"
 #include "torture/torture.h"
 
@@ -66,12 +67,12 @@ static job_row new_job(int64_t number) {
 
 /* What a run was told. */
 typedef struct told {
-  store_result object, mesh, job, claim, finish, token;
+  store_result object, mesh, job, claim, finish, token, gone;
 } told;
 
 static void check_resource(stored *s, const resource *wanted) {
   resource got = {0};
-  assert_int_equal(catalogue_get(s->cat, wanted->kind, wanted->id, &got), STORE_OK);
+  assert_int_equal(catalogue_get_of(s->cat, wanted->kind, wanted->id, "me", &got), STORE_OK);
   assert_string_equal(got.sha, wanted->sha);
   assert_string_equal(got.json, wanted->json);
   resource_free(&got);
@@ -98,7 +99,12 @@ static void check(stored *s, const told *t, int64_t number) {
   }
   if (t->finish == STORE_OK) {
     event_row event;
-    check_resource(s, &result);
+    if (t->gone == STORE_OK) {
+      resource none;
+      assert_int_equal(catalogue_get(s->cat, result.kind, result.id, &none), STORE_NOT_FOUND);
+    } else {
+      check_resource(s, &result);
+    }
     assert_int_equal(catalogue_events(s->cat, job.id, 3, 1, &event), 1);
     assert_int_equal(event.number, 4);
     free(event.json);
@@ -111,14 +117,14 @@ static void read_lists(stored *s, const told *t) {
   job_row jobs[8];
   event_row events[8];
   int count;
-  int n = catalogue_list(s->cat, RESOURCE_MESH, 0, 8, rows);
+  int n = catalogue_list_of(s->cat, RESOURCE_MESH, "me", 0, 8, rows);
   assert_true(n < 0 || t->mesh != STORE_OK || n > 0);
   for (int i = 0; i < n; i++) {
     assert_string_equal(rows[i].json, "{\"a\":1}");
     assert_int_equal(strlen(rows[i].id), ORB_ID_SIZE - 1);
     resource_free(&rows[i]);
   }
-  n = catalogue_job_list(s->cat, -1, 0, 8, jobs);
+  n = catalogue_job_list(s->cat, "me", -1, 0, 8, jobs);
   assert_true(n < 0 || t->job != STORE_OK || n > 0);
   for (int i = 0; i < n; i++) {
     assert_string_equal(jobs[i].request, "{\"r\":1}");
@@ -139,13 +145,14 @@ static void read_lists(stored *s, const told *t) {
 
 static told work(stored *s, int64_t number) {
   told t;
+  int fresh, gone;
   resource mesh = new_resource(RESOURCE_MESH, 'a', number), result = new_resource(RESOURCE_EMBEDDING, 'e', number);
   job_row job = new_job(number);
   token_row token = {.scopes = 1, .created = 1};
   snprintf(token.name, sizeof token.name, "t%lld", (long long)number);
   memcpy(token.hash, &number, sizeof number);
   t.object = objects_put(s->store, OBJECT_MESH, mesh.id, "hello", 5);
-  t.mesh = catalogue_put(s->cat, &mesh);
+  t.mesh = catalogue_put_for(s->cat, &mesh, "me", 1000000000, &fresh);
   t.job = catalogue_job_insert(s->cat, &job);
   t.claim = catalogue_job_claim(s->cat, job.id, 1, 0, 10);
   catalogue_event(s->cat, job.id, 3, "progress", "{}");
@@ -153,6 +160,8 @@ static told work(stored *s, int64_t number) {
       catalogue_job_finish(s->cat, job.id, 1, ORB_JOB_SUCCEEDED, NULL, 20, &result, 4, "{\"state\":\"succeeded\"}");
   t.token = catalogue_token_add(s->cat, &token);
   read_lists(s, &t);
+  t.gone = catalogue_disown(s->cat, RESOURCE_EMBEDDING, result.id, "me", &gone);
+  assert_int_equal(gone, t.gone == STORE_OK);
   return t;
 }
 
@@ -173,7 +182,8 @@ static int one_work(void *user, torture_kind kind, long number, int for_ever) {
   tidy(s, s->number);
   if (!met) {
     assert_true(t.object == STORE_OK && t.mesh == STORE_OK && t.job == STORE_OK && t.claim == STORE_OK &&
-                t.finish == STORE_OK && t.token == STORE_OK);
+                t.finish == STORE_OK && t.token == STORE_OK && t.gone == STORE_OK);
+    assert_int_equal(catalogue_ownerless(s->cat), 0);
   }
   s->number++;
   told well = work(s, s->number);
