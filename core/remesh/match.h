@@ -128,8 +128,21 @@ static inline double orb_form_cost(orb_form f) {
 int orb_match_is_turned(const orb_match *match, int32_t a, int32_t b, int32_t c);
 /* The summed squares of its edges over the shapes on which it is; 0: none. */
 double orb_match_turned_extent(const orb_match *match, int32_t a, int32_t b, int32_t c);
-/* How many triangles of v and two successive ones of the n others are; `closed`: of the last and the first, too. */
-int orb_match_turned_in_fan(const orb_match *match, int32_t v, const int32_t *ring, int n, int closed);
+/* The turned triangles of a set: how many, and their extents together. */
+typedef struct orb_tally {
+  int turned;
+  double extent;
+} orb_tally;
+static inline void orb_tally_add(orb_tally *sum, double extent) {
+  sum->turned += extent > 0;
+  sum->extent += extent;
+}
+/* Whether triangles that tally so are worse than some that tallied as `before`. */
+static inline int orb_tally_is_worse(orb_tally now, orb_tally before) {
+  return now.turned > before.turned || (now.turned > 0 && now.extent > before.extent * (1 + 1e-9));
+}
+/* Of v and two successive ones of the n others; `closed`: of the last and the first, too. */
+orb_tally orb_match_tally_fan(const orb_match *match, int32_t v, const int32_t *ring, int n, int closed);
 
 /* Folds words into a mark of them all. */
 static inline uint64_t orb_mixed(uint64_t mark, const void *part, size_t size) {

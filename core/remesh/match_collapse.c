@@ -187,8 +187,11 @@ static int is_allowed(const collapser *c, int32_t u, const int32_t *ring, int n)
       return 0;
     }
   }
-  int turned = c->strict ? orb_match_turned_in_fan(match, ring[0], ring + 1, n - 1, 0) : 0;
-  return turned == 0 || turned <= orb_match_turned_in_fan(match, u, ring, n, 1);
+  if (!c->strict) {
+    return 1;
+  }
+  orb_tally after = orb_match_tally_fan(match, ring[0], ring + 1, n - 1, 0);
+  return after.turned == 0 || !orb_tally_is_worse(after, orb_match_tally_fan(match, u, ring, n, 1));
 }
 
 /* Removes u by moving it onto the end of half-edge h = u→v, which is allowed. */

@@ -161,12 +161,12 @@ int orb_match_plan_fill(const orb_match *match, int32_t u, const int32_t *ring, 
   if (strict && !orb_form_allows(before, after)) {
     return 0;
   }
-  int turned = 0;
+  orb_tally tally = {0, 0};
   for (int t = 0; strict && t < n - 2; t++) {
     const int *c = triangles[t];
-    turned += orb_match_is_turned(match, ring[c[0]], ring[c[1]], ring[c[2]]);
+    orb_tally_add(&tally, orb_match_turned_extent(match, ring[c[0]], ring[c[1]], ring[c[2]]));
   }
-  return turned == 0 || turned <= orb_match_turned_in_fan(match, u, ring, n, 1);
+  return tally.turned == 0 || !orb_tally_is_worse(tally, orb_match_tally_fan(match, u, ring, n, 1));
 }
 
 void orb_match_fill(orb_match *match, int32_t u, const int32_t *ring, int n, int (*triangles)[3]) {

@@ -85,12 +85,12 @@ double orb_match_turned_extent(const orb_match *match, int32_t a, int32_t b, int
   return extent;
 }
 
-int orb_match_turned_in_fan(const orb_match *match, int32_t v, const int32_t *ring, int n, int closed) {
-  int turned = 0;
+orb_tally orb_match_tally_fan(const orb_match *match, int32_t v, const int32_t *ring, int n, int closed) {
+  orb_tally sum = {0, 0};
   for (int i = 0; i + 1 < n + closed; i++) {
-    turned += orb_match_is_turned(match, v, ring[i], ring[(i + 1) % n]);
+    orb_tally_add(&sum, orb_match_turned_extent(match, v, ring[i], ring[(i + 1) % n]));
   }
-  return turned;
+  return sum;
 }
 
 int orb_form_allows(orb_form before, orb_form after) {

@@ -117,7 +117,7 @@ static void stand_copy(orb_match *match, int32_t v, stand *s, int back) {
 }
 
 /* Moves v to p if that costs clearly less than *cost, and sets that; whether it did. The items stay in their lists. */
-static int try_point(const star *s, const double p[3], orb_form before, double *cost, int *most_turned) {
+static int try_point(const star *s, const double p[3], orb_form before, double *cost, orb_tally *turned) {
   stand old;
   orb_form after;
   if (!positive_at(s, p)) {
@@ -129,10 +129,10 @@ static int try_point(const star *s, const double p[3], orb_form before, double *
   if (now < *cost && orb_form_allows(before, after)) {
     now += edges_cost(s, *cost - now);
     if (now < *cost * (1 - LEAST_GAIN) && items_allow(s)) {
-      int turned = orb_match_turned_in_fan(s->match, s->v, s->ring, s->n, 1);
-      if (turned <= *most_turned) {
+      orb_tally tally = orb_match_tally_fan(s->match, s->v, s->ring, s->n, 1);
+      if (!orb_tally_is_worse(tally, *turned)) {
         *cost = now;
-        *most_turned = turned;
+        *turned = tally;
         return 1;
       }
     }
@@ -210,7 +210,8 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
   orb_form before;
   double cost = form_cost(&s, &before);
   cost += edges_cost(&s, INFINITY);
-  int moved = 0, turned = orb_match_turned_in_fan(match, v, s.ring, s.n, 1);
+  int moved = 0;
+  orb_tally turned = orb_match_tally_fan(match, v, s.ring, s.n, 1);
   for (int i = 0; i <= s.n; i++) {
     const double *to = i < s.n ? orb_net_point(&match->net, s.ring[i]) : middle;
     for (size_t j = 0; j < sizeof way / sizeof way[0]; j++) {

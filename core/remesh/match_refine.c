@@ -36,8 +36,15 @@ static void forms_of_turn(const orb_match *match, int32_t a, int32_t b, int32_t 
 
 /* Whether more triangles are turned in space after a turn of edge a b than before. */
 static int turn_turns(const orb_match *match, int32_t a, int32_t b, int32_t c, int32_t d) {
-  int after = orb_match_is_turned(match, c, d, b) + orb_match_is_turned(match, d, c, a);
-  return after > 0 && after > orb_match_is_turned(match, a, b, c) + orb_match_is_turned(match, b, a, d);
+  orb_tally before = {0, 0}, after = {0, 0};
+  orb_tally_add(&after, orb_match_turned_extent(match, c, d, b));
+  orb_tally_add(&after, orb_match_turned_extent(match, d, c, a));
+  if (after.turned == 0) {
+    return 0;
+  }
+  orb_tally_add(&before, orb_match_turned_extent(match, a, b, c));
+  orb_tally_add(&before, orb_match_turned_extent(match, b, a, d));
+  return orb_tally_is_worse(after, before);
 }
 
 static int try_turn(orb_match *match, int32_t h, double limit2, int only_bad) {

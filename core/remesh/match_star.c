@@ -111,23 +111,12 @@ static int has_fixed(const disc *d) {
   return 0;
 }
 
-/* The turned triangles of a set: how many, and how large. */
-typedef struct tally {
-  int turned;
-  double extent;
-} tally;
-
-static void count_in(tally *sum, double extent) {
-  sum->turned += extent > 0;
-  sum->extent += extent;
-}
-
 /* The next triangle to grow over, beyond an edge whose triangle of the star is impossible (*possible is 0 then), else
  * turned; −1: none. */
-static int32_t beyond(disc *d, tally *star, int *possible) {
+static int32_t beyond(disc *d, orb_tally *star, int *possible) {
   const orb_net *net = &d->match->net;
   int32_t next = -1;
-  *star = (tally){0, 0};
+  *star = (orb_tally){0, 0};
   *possible = 1;
   for (int i = 0; i < d->n; i++) {
     double extent = judge(d, d->edge[i]);
@@ -136,7 +125,7 @@ static int32_t beyond(disc *d, tally *star, int *possible) {
       return net->twin[d->edge[i]] / 3;
     }
     next = extent > 0 && next < 0 ? net->twin[d->edge[i]] / 3 : next;
-    count_in(star, extent);
+    orb_tally_add(star, extent);
   }
   return next;
 }
@@ -201,10 +190,10 @@ static void commit(orb_match *match, const disc *d) {
   }
 }
 
-static tally turned_in(const disc *d) {
-  tally sum = {0, 0};
+static orb_tally turned_in(const disc *d) {
+  orb_tally sum = {0, 0};
   for (int i = 0; i < d->count; i++) {
-    count_in(&sum, d->own[i]);
+    orb_tally_add(&sum, d->own[i]);
   }
   return sum;
 }
@@ -215,11 +204,11 @@ static void add_triangle(disc *d, int32_t t) {
   d->triangle[d->count++] = t;
 }
 
-static int is_better(const disc *d, tally star, orb_star_goal goal) {
-  tally now = turned_in(d);
+static int is_better(const disc *d, orb_tally star, orb_star_goal goal) {
+  orb_tally now = turned_in(d);
   switch (goal) {
     case ORB_STAR_NOT_WORSE:
-      return star.turned <= now.turned;
+      return !orb_tally_is_worse(star, now);
     case ORB_STAR_FEWER:
       return star.turned < now.turned;
     default:
@@ -240,7 +229,7 @@ static int plan(disc *d, const int32_t *triangles, int count, const double p[3],
   orb_match_copy_vertex(match, d->p, match->net.triangles[3 * (int64_t)triangles[0]]); /* hints for its places */
   orb_match_place(match, d->p, p);
   for (;;) {
-    tally star;
+    orb_tally star;
     int possible;
     if (!outline(d) || d->inner_count > wish->most_inner || has_fixed(d)) {
       return 0;
