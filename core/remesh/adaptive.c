@@ -12,6 +12,8 @@
 #include "remesh/match.h"
 
 enum { HOLDS = 32, ROUNDS = 10 };
+/* Of how many triangles one may be turned; one of how many is many; the most work for a second start. */
+enum { FEW = 2000, MANY = 300, OVERLAY_MOST = 120000 };
 
 /* Later rounds gain a few per cent each. Large meshes, or many shapes, do without: their triangles are small against
  * the tolerance, and time counts. */
@@ -89,6 +91,39 @@ static orb_status start_from_overlay(orb_context *ctx, const orb_remesh_job *job
   return status;
 }
 
+/* Where too many triangles are still turned: anew from the overlay, if there are many and it is not too large, and the
+ * better of the two stays; else from the overlay around them only. */
+static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_match *match, double tolerance,
+                             int was_overlay) {
+  int64_t turned = orb_match_turned(match), live = orb_match_live(match), inputs = 0;
+  for (int32_t s = 0; s < job->shape_count; s++) {
+    inputs += job->shapes[s].mesh.triangle_count;
+  }
+  if (turned * FEW <= live) {
+    return ORB_OK;
+  }
+  if (turned * MANY <= live || was_overlay || inputs * job->shape_count > OVERLAY_MOST) {
+    ORB_TRY(orb_match_resolve(ctx, match, tolerance * tolerance));
+    ORB_TRY(hold(ctx, match, tolerance * tolerance));
+    if (match->crept) {
+      ORB_TRY(start_from_overlay(ctx, job, match));
+    }
+    return settle(ctx, match, tolerance);
+  }
+  orb_match other = {0};
+  orb_status status = start_from_overlay(ctx, job, &other);
+  if (status == ORB_OK) {
+    status = settle(ctx, &other, tolerance);
+  }
+  if (status == ORB_OK && orb_match_turned(&other) < turned) {
+    orb_match_free(ctx, match);
+    *match = other;
+  } else {
+    orb_match_free(ctx, &other);
+  }
+  return status;
+}
+
 orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
   orb_match match;
   ORB_TRY(orb_match_create(ctx, job, &match));
@@ -98,10 +133,12 @@ orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_
   orb_progress(ctx, "remesh", 0.15);
   ORB_GO(status, orb_match_turn_all(ctx, &match, INFINITY, 1), end);
   ORB_GO(status, hold(ctx, &match, tolerance * tolerance), end);
-  if (match.crept) {
+  int overlay = match.crept;
+  if (overlay) {
     ORB_GO(status, start_from_overlay(ctx, job, &match), end);
   }
   ORB_GO(status, settle(ctx, &match, tolerance), end);
+  ORB_GO(status, straighten(ctx, job, &match, tolerance, overlay), end);
   while (most > 0 && orb_match_live(&match) > most && tolerance < 4) {
     tolerance *= 1.25;
     ORB_GO(status, reduce(ctx, &match, tolerance, most, tolerance < 0.05, ROUNDS), end);

@@ -161,6 +161,10 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2);
 ORB_MUST_CHECK orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2, int only_bad);
 /* Mends triangles that are turned in space, within the limit; *left: how many it could not. */
 ORB_MUST_CHECK orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2, int64_t *left);
+/* How many triangles are turned in space. */
+int64_t orb_match_turned(const orb_match *match);
+/* Refines them and those around them as far as the overlay of the shapes; edges outside may stray. */
+ORB_MUST_CHECK orb_status orb_match_resolve(orb_context *ctx, orb_match *match, double limit2);
 /* Puts vertex v at p: point, spots, positions and normals; triangles and items are the caller's care. */
 void orb_match_place(orb_match *match, int32_t v, const double p[3]);
 
