@@ -128,6 +128,8 @@ static inline double orb_form_cost(orb_form f) {
 int orb_match_is_turned(const orb_match *match, int32_t a, int32_t b, int32_t c);
 /* The summed squares of its edges over the shapes on which it is; 0: none. */
 double orb_match_turned_extent(const orb_match *match, int32_t a, int32_t b, int32_t c);
+/* The same by the corners only: a lower bound, and cheap. */
+double orb_match_turned_by_corners(const orb_match *match, int32_t a, int32_t b, int32_t c);
 /* The turned triangles of a set: how many, and their extents together. */
 typedef struct orb_tally {
   int turned;
@@ -179,12 +181,14 @@ typedef struct orb_star_wish {
   int least_inner, most_inner; /* vertices inside the disc: the count of triangles changes by two less twice that */
   orb_star_goal goal;
 } orb_star_wish;
-/* Replaces the given triangles, a disc that holds p, and those beyond its edges as far as it takes, by triangles from
- * p: within the limit and by the goal. Whether it did. Needs room for one vertex. */
-int orb_match_star(orb_match *match, const int32_t *triangles, int count, const double p[3], const orb_star_wish *wish);
+/* Replaces the given triangles, a disc that holds the points, and those beyond its edges as far as it takes, by
+ * triangles from the first of the points for which that stays within the limit and meets the goal. Whether there is
+ * one. Needs room for one vertex. */
+int orb_match_star(orb_match *match, const int32_t *triangles, int count, const double (*points)[3], int point_count,
+                   const orb_star_wish *wish);
 /* Whether it would. Any thread; needs room for as many vertices as there are threads. */
-int orb_match_can_star(orb_match *match, const int32_t *triangles, int count, const double p[3],
-                       const orb_star_wish *wish, int thread);
+int orb_match_can_star(orb_match *match, const int32_t *triangles, int count, const double (*points)[3],
+                       int point_count, const orb_star_wish *wish, int thread);
 
 /* Merges neighbours to one vertex wherever the limit lets it, while more than `target` triangles live. */
 ORB_MUST_CHECK orb_status orb_match_merge_all(orb_context *ctx, orb_match *match, double limit2, int64_t target);

@@ -59,13 +59,6 @@ static int is_turned_at_centre(const orb_match *match, int32_t s, int32_t a, int
   return orb_dot(n, smooth) <= 0 || orb_dot(n, flat) < 0;
 }
 
-/* On shape s: facing away from the normals at the corners, or from those at the centre. */
-static int is_turned_on(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c) {
-  double facing, quality;
-  measure(match, s, a, b, c, &quality, &facing);
-  return facing < FINE_FACING || is_turned_at_centre(match, s, a, b, c);
-}
-
 int orb_match_is_turned(const orb_match *match, int32_t a, int32_t b, int32_t c) {
   int turned = orb_match_form(match, a, b, c).turned > 0;
   for (int32_t s = 0; s < match->shape_count && !turned; s++) {
@@ -74,15 +67,25 @@ int orb_match_is_turned(const orb_match *match, int32_t a, int32_t b, int32_t c)
   return turned;
 }
 
-double orb_match_turned_extent(const orb_match *match, int32_t a, int32_t b, int32_t c) {
+static double turned_extent(const orb_match *match, int32_t a, int32_t b, int32_t c, int by_centre) {
   double extent = 0;
   for (int32_t s = 0; s < match->shape_count; s++) {
-    if (is_turned_on(match, s, a, b, c)) {
+    double facing, quality;
+    measure(match, s, a, b, c, &quality, &facing);
+    if (facing < FINE_FACING || (by_centre && is_turned_at_centre(match, s, a, b, c))) {
       const double *p = orb_match_at(match, a, s), *q = orb_match_at(match, b, s), *r = orb_match_at(match, c, s);
       extent += orb_distance2(p, q) + orb_distance2(q, r) + orb_distance2(r, p) + 1e-200;
     }
   }
   return extent;
+}
+
+double orb_match_turned_extent(const orb_match *match, int32_t a, int32_t b, int32_t c) {
+  return turned_extent(match, a, b, c, 1);
+}
+
+double orb_match_turned_by_corners(const orb_match *match, int32_t a, int32_t b, int32_t c) {
+  return turned_extent(match, a, b, c, 0);
 }
 
 orb_tally orb_match_tally_fan(const orb_match *match, int32_t v, const int32_t *ring, int n, int closed) {

@@ -3,6 +3,7 @@
  * as it takes; a vertex is added, where the shape bends most along an edge or at a vertex of a shape. Nothing leaves
  * the limit, and no triangle that was fine comes out turned. */
 #include <math.h>
+#include <string.h>
 
 #include "base/check.h"
 #include "numeric/vec3.h"
@@ -35,7 +36,19 @@ static int star_of(const orb_net *net, int32_t v, int32_t triangles[STAR_MAX]) {
   return n;
 }
 
-static void middle_of(const orb_match *match, int32_t a, int32_t b, int32_t c, double out[3]) {
+/* Points to try as the middle of a star. */
+typedef struct trials {
+  double point[2 * STAR_MAX + ITEMS + 3][3];
+  int count;
+} trials;
+
+static void add(trials *list, const double p[3]) {
+  memcpy(list->point[list->count++], p, 3 * sizeof(double));
+}
+
+/* Adds the middle of two vertices, or of three. */
+static void add_middle(trials *list, const orb_match *match, int32_t a, int32_t b, int32_t c) {
+  double *out = list->point[list->count++];
   for (int k = 0; k < 3; k++) {
     out[k] = orb_net_point(&match->net, a)[k] + orb_net_point(&match->net, b)[k];
     out[k] += c >= 0 ? orb_net_point(&match->net, c)[k] : 0;
@@ -43,48 +56,39 @@ static void middle_of(const orb_match *match, int32_t a, int32_t b, int32_t c, d
   (void)orb_normalize(out);
 }
 
-/* Tries the vertices of shapes that lie in the triangles as the middle of the star that replaces them. */
-static int try_items(const mender *m, const int32_t *triangles, int count, int most_inner) {
-  int tried = 0;
+/* Adds vertices of shapes that lie in the triangles. */
+static void add_items(trials *list, const orb_match *match, const int32_t *triangles, int count) {
+  int most = list->count + ITEMS;
   for (int i = 0; i < count; i++) {
-    int32_t item = m->match->triangle_items[triangles[i]];
-    for (; item >= 0 && tried < ITEMS; item = m->match->item_next[item], tried++) {
-      const double *p = orb_match_item_point(m->match, item);
-      if (orb_match_star(m->match, triangles, count, p, &(orb_star_wish){m->limit2, 0, most_inner, m->goal})) {
-        return 1;
-      }
+    int32_t item = match->triangle_items[triangles[i]];
+    for (; item >= 0 && list->count < most; item = match->item_next[item]) {
+      add(list, orb_match_item_point(match, item));
     }
   }
-  return 0;
+}
+
+static int try_star(const mender *m, const int32_t *triangles, int count, const trials *list, int least_inner) {
+  const orb_star_wish wish = {m->limit2, least_inner, 3, m->goal};
+  return orb_match_star(m->match, triangles, count, (const double(*)[3])list->point, list->count, &wish);
 }
 
 static int try_corner(const mender *m, int32_t v) {
   orb_match *match = m->match;
   int32_t star[STAR_MAX];
   int n = star_of(&match->net, v, star);
-  double p[3];
+  trials list = {.count = 0};
   if (n == 0 || match->fixed[v]) {
     return 0;
   }
-  for (int k = 0; k < 3; k++) {
-    p[k] = orb_net_point(&match->net, v)[k];
-  }
-  if (orb_match_star(match, star, n, p, &(orb_star_wish){m->limit2, 1, 3, m->goal})) {
-    return 1;
-  }
+  add(&list, orb_net_point(&match->net, v));
   for (int i = 0; i < n; i++) {
     const int32_t *c = match->net.triangles + 3 * (int64_t)star[i];
     int k = c[0] == v ? 0 : c[1] == v ? 1 : 2;
-    middle_of(match, v, c[(k + 1) % 3], -1, p);
-    if (orb_match_star(match, star, n, p, &(orb_star_wish){m->limit2, 1, 3, m->goal})) {
-      return 1;
-    }
-    middle_of(match, v, c[(k + 1) % 3], c[(k + 2) % 3], p);
-    if (orb_match_star(match, star, n, p, &(orb_star_wish){m->limit2, 1, 3, m->goal})) {
-      return 1;
-    }
+    add_middle(&list, match, v, c[(k + 1) % 3], -1);
+    add_middle(&list, match, v, c[(k + 1) % 3], c[(k + 2) % 3]);
   }
-  return try_items(m, star, n, 3);
+  add_items(&list, match, star, n);
+  return try_star(m, star, n, &list, 1);
 }
 
 static int try_split(const mender *m, int32_t h) {
@@ -92,15 +96,13 @@ static int try_split(const mender *m, int32_t h) {
   int32_t pair[2] = {h / 3, match->net.twin[h] / 3};
   int32_t a = match->net.triangles[h], b = match->net.triangles[orb_next(h)];
   orb_stray worst = {0, -1, -1, 0};
-  double p[3];
+  trials list = {.count = 0};
   if (orb_match_edge2(match, a, b, INFINITY, &worst) > 0 && worst.shape >= 0) {
-    orb_match_crossing_point(match, a, b, &worst, p);
-    if (orb_match_star(match, pair, 2, p, &(orb_star_wish){m->limit2, 0, 3, m->goal})) {
-      return 1;
-    }
+    orb_match_crossing_point(match, a, b, &worst, list.point[list.count++]);
   }
-  middle_of(match, a, b, -1, p);
-  return orb_match_star(match, pair, 2, p, &(orb_star_wish){m->limit2, 0, 3, m->goal}) || try_items(m, pair, 2, 3);
+  add_middle(&list, match, a, b, -1);
+  add_items(&list, match, pair, 2);
+  return try_star(m, pair, 2, &list, 0);
 }
 
 static int turn_or_move(const mender *m, int32_t t) {
@@ -130,9 +132,9 @@ static orb_status mend(const mender *m, int32_t t, int *mended) {
     *mended = try_split(m, 3 * t + k);
   }
   if (!*mended) {
-    double p[3];
-    middle_of(match, c[0], c[1], c[2], p);
-    *mended = orb_match_star(match, &t, 1, p, &(orb_star_wish){m->limit2, 0, 3, m->goal});
+    trials list = {.count = 0};
+    add_middle(&list, match, c[0], c[1], c[2]);
+    *mended = try_star(m, &t, 1, &list, 0);
   }
   return ORB_OK;
 }

@@ -32,23 +32,21 @@ static int stars_of(const orb_net *net, int32_t u, int32_t v, int32_t triangles[
 /* Merges u and v, or with thread ≥ 0 only tells whether they can be. */
 static int try_merge(orb_match *match, int32_t u, int32_t v, double limit2, int thread) {
   static const double way[] = {0.5, 0.25, 0.75, 0, 1};
+  enum { POINTS = sizeof way / sizeof *way };
   const orb_star_wish wish = {limit2, 2, 4, ORB_STAR_NOT_WORSE};
+  const double *a = orb_net_point(&match->net, u), *b = orb_net_point(&match->net, v);
   int32_t triangles[2 * STAR_MAX];
-  int n = stars_of(&match->net, u, v, triangles);
-  double a[3], b[3], p[3];
-  memcpy(a, orb_net_point(&match->net, u), sizeof a);
-  memcpy(b, orb_net_point(&match->net, v), sizeof b);
-  for (size_t i = 0; n > 0 && i < sizeof way / sizeof *way; i++) {
+  double points[POINTS][3];
+  for (int i = 0; i < POINTS; i++) {
     for (int k = 0; k < 3; k++) {
-      p[k] = a[k] + way[i] * (b[k] - a[k]);
+      points[i][k] = a[k] + way[i] * (b[k] - a[k]);
     }
-    (void)orb_normalize(p);
-    if (thread < 0 ? orb_match_star(match, triangles, n, p, &wish)
-                   : orb_match_can_star(match, triangles, n, p, &wish, thread)) {
-      return 1;
-    }
+    (void)orb_normalize(points[i]);
   }
-  return 0;
+  int n = stars_of(&match->net, u, v, triangles);
+  const double(*all)[3] = (const double(*)[3])points;
+  return n > 0 && (thread < 0 ? orb_match_star(match, triangles, n, all, POINTS, &wish)
+                              : orb_match_can_star(match, triangles, n, all, POINTS, &wish, thread));
 }
 
 static int merge_one(orb_match *match, int32_t u, double limit2, int thread) {

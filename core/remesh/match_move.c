@@ -116,8 +116,18 @@ static void stand_copy(orb_match *match, int32_t v, stand *s, int back) {
   }
 }
 
+/* The turned triangles of the star with its vertex where it was; it is left where it is. */
+static orb_tally tally_at(const star *s, stand *old) {
+  stand now;
+  stand_copy(s->match, s->v, &now, 0);
+  stand_copy(s->match, s->v, old, 1);
+  orb_tally tally = orb_match_tally_fan(s->match, s->v, s->ring, s->n, 1);
+  stand_copy(s->match, s->v, &now, 1);
+  return tally;
+}
+
 /* Moves v to p if that costs clearly less than *cost, and sets that; whether it did. The items stay in their lists. */
-static int try_point(const star *s, const double p[3], orb_form before, double *cost, orb_tally *turned) {
+static int try_point(const star *s, const double p[3], orb_form before, double *cost) {
   stand old;
   orb_form after;
   if (!positive_at(s, p)) {
@@ -130,9 +140,8 @@ static int try_point(const star *s, const double p[3], orb_form before, double *
     now += edges_cost(s, *cost - now);
     if (now < *cost * (1 - LEAST_GAIN) && items_allow(s)) {
       orb_tally tally = orb_match_tally_fan(s->match, s->v, s->ring, s->n, 1);
-      if (!orb_tally_is_worse(tally, *turned)) {
+      if (tally.turned == 0 || !orb_tally_is_worse(tally, tally_at(s, &old))) {
         *cost = now;
-        *turned = tally;
         return 1;
       }
     }
@@ -211,7 +220,6 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
   double cost = form_cost(&s, &before);
   cost += edges_cost(&s, INFINITY);
   int moved = 0;
-  orb_tally turned = orb_match_tally_fan(match, v, s.ring, s.n, 1);
   for (int i = 0; i <= s.n; i++) {
     const double *to = i < s.n ? orb_net_point(&match->net, s.ring[i]) : middle;
     for (size_t j = 0; j < sizeof way / sizeof way[0]; j++) {
@@ -220,7 +228,7 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
         p[k] = from[k] + way[j] * (to[k] - from[k]);
       }
       (void)orb_normalize(p);
-      moved |= try_point(&s, p, before, &cost, &turned);
+      moved |= try_point(&s, p, before, &cost);
     }
   }
   match->stayed[v] = moved ? 0 : mark;

@@ -17,7 +17,8 @@ typedef struct disc {
   int32_t p; /* the vertex of the star: a number after the last */
   int32_t triangle[DISC], edge[MOST], inner[DISC];
   int count, n, inner_count;
-  double own[DISC];     /* how far each of its triangles is turned now */
+  int rough;            /* triangles are judged by their corners only, until all else is found to be fine */
+  double own[DISC];     /* how far each of its triangles is turned now; −1: not known yet */
   int32_t known[KNOWN]; /* edges whose triangle of the star has been judged */
   double extent[KNOWN]; /* turned; negative: impossible */
   int known_count;
@@ -93,7 +94,8 @@ static double judge(disc *d, int32_t h) {
   double extent = -1;
   if (orb_orient(orb_net_point(net, d->p), orb_net_point(net, a), orb_net_point(net, b)) > 0 &&
       orb_net_sound(net, d->p, a, b)) {
-    extent = orb_match_turned_extent(d->match, d->p, a, b);
+    extent =
+        d->rough ? orb_match_turned_by_corners(d->match, d->p, a, b) : orb_match_turned_extent(d->match, d->p, a, b);
   }
   if (d->known_count < KNOWN) {
     d->known[d->known_count] = h;
@@ -190,21 +192,25 @@ static void commit(orb_match *match, const disc *d) {
   }
 }
 
-static orb_tally turned_in(const disc *d) {
+static orb_tally turned_in(disc *d) {
   orb_tally sum = {0, 0};
   for (int i = 0; i < d->count; i++) {
+    const int32_t *c = d->match->net.triangles + 3 * (int64_t)d->triangle[i];
+    d->own[i] = d->own[i] >= 0 ? d->own[i] : orb_match_turned_extent(d->match, c[0], c[1], c[2]);
     orb_tally_add(&sum, d->own[i]);
   }
   return sum;
 }
 
 static void add_triangle(disc *d, int32_t t) {
-  const int32_t *c = d->match->net.triangles + 3 * (int64_t)t;
-  d->own[d->count] = orb_match_turned_extent(d->match, c[0], c[1], c[2]);
+  d->own[d->count] = -1;
   d->triangle[d->count++] = t;
 }
 
-static int is_better(const disc *d, orb_tally star, orb_star_goal goal) {
+static int is_better(disc *d, orb_tally star, orb_star_goal goal) {
+  if (goal == ORB_STAR_NOT_WORSE && star.turned == 0) {
+    return 1;
+  }
   orb_tally now = turned_in(d);
   switch (goal) {
     case ORB_STAR_NOT_WORSE:
@@ -216,46 +222,69 @@ static int is_better(const disc *d, orb_tally star, orb_star_goal goal) {
   }
 }
 
-/* Finds a star; 0: there is none. */
-static int plan(disc *d, const int32_t *triangles, int count, const double p[3], const orb_star_wish *wish) {
-  orb_match *match = d->match;
-  ORB_ASSERT(d->p < match->capacity);
-  if (count > DISC) {
-    return 0;
+/* The same once more, by the centres of its triangles too. */
+static int is_better_at_centres(disc *d, orb_star_goal goal) {
+  orb_tally star = {0, 0};
+  for (int i = 0; i < d->n; i++) {
+    int32_t a = d->match->net.triangles[d->edge[i]], b = d->match->net.triangles[orb_next(d->edge[i])];
+    orb_tally_add(&star, orb_match_turned_extent(d->match, d->p, a, b));
   }
-  for (int i = 0; i < count; i++) {
-    add_triangle(d, triangles[i]);
-  }
-  orb_match_copy_vertex(match, d->p, match->net.triangles[3 * (int64_t)triangles[0]]); /* hints for its places */
-  orb_match_place(match, d->p, p);
+  return is_better(d, star, goal);
+}
+
+/* Finds a star of p, from the outline of what is given on; 0: there is none. */
+static int plan(disc *d, const double p[3], const orb_star_wish *wish) {
+  int most = d->count + GROWTH < DISC ? d->count + GROWTH : DISC;
+  orb_match_place(d->match, d->p, p);
   for (;;) {
     orb_tally star;
     int possible;
-    if (!outline(d) || d->inner_count > wish->most_inner || has_fixed(d)) {
-      return 0;
-    }
     int32_t next = beyond(d, &star, &possible);
     if (possible && d->inner_count >= wish->least_inner && is_better(d, star, wish->goal) &&
-        is_within(d, wish->limit2)) {
+        is_within(d, wish->limit2) && (!d->rough || is_better_at_centres(d, wish->goal))) {
       return 1;
     }
-    if (next < 0 || d->count == (count + GROWTH < DISC ? count + GROWTH : DISC)) {
+    if (next < 0 || d->count == most) {
       return 0;
     }
     add_triangle(d, next);
+    if (!outline(d) || d->inner_count > wish->most_inner || has_fixed(d)) {
+      return 0;
+    }
   }
 }
 
-int orb_match_can_star(orb_match *match, const int32_t *triangles, int count, const double p[3],
-                       const orb_star_wish *wish, int thread) {
-  disc d = {.match = match, .p = match->net.vertex_count + thread};
-  return plan(&d, triangles, count, p, wish);
+/* The first of the points that has a star, planned in *d; 0: none. */
+static int plan_first(disc *d, orb_match *match, int32_t vertex, const int32_t *triangles, int count,
+                      const double (*points)[3], int point_count, const orb_star_wish *wish) {
+  disc start = {.match = match, .p = vertex, .rough = wish->goal == ORB_STAR_NOT_WORSE};
+  ORB_ASSERT(vertex < match->capacity);
+  for (int i = 0; i < count && count <= DISC; i++) {
+    add_triangle(&start, triangles[i]);
+  }
+  if (count > DISC || !outline(&start) || start.inner_count > wish->most_inner || has_fixed(&start)) {
+    return 0;
+  }
+  orb_match_copy_vertex(match, vertex, match->net.triangles[3 * (int64_t)triangles[0]]); /* hints for its places */
+  for (int i = 0; i < point_count; i++) {
+    *d = start;
+    if (plan(d, points[i], wish)) {
+      return 1;
+    }
+  }
+  return 0;
 }
 
-int orb_match_star(orb_match *match, const int32_t *triangles, int count, const double p[3],
+int orb_match_can_star(orb_match *match, const int32_t *triangles, int count, const double (*points)[3],
+                       int point_count, const orb_star_wish *wish, int thread) {
+  disc d;
+  return plan_first(&d, match, match->net.vertex_count + thread, triangles, count, points, point_count, wish);
+}
+
+int orb_match_star(orb_match *match, const int32_t *triangles, int count, const double (*points)[3], int point_count,
                    const orb_star_wish *wish) {
-  disc d = {.match = match, .p = match->net.vertex_count};
-  if (!plan(&d, triangles, count, p, wish)) {
+  disc d;
+  if (!plan_first(&d, match, match->net.vertex_count, triangles, count, points, point_count, wish)) {
     return 0;
   }
   commit(match, &d);
