@@ -115,9 +115,9 @@ static orb_status trace_all(base_tracer *t, candidate *order, int32_t *parent, i
 }
 
 orb_status orb_base_trace(orb_context *ctx, orb_sheet *sheet, const orb_sheet *base, const int32_t *at,
-                          orb_paths *paths, int32_t most_triangles, int *good) {
+                          orb_paths *paths, int32_t most_triangles, int64_t *work, int *good) {
   const orb_mesh *mesh = &base->shape.mesh;
-  base_tracer t = {.on = {.ctx = ctx, .sheet = sheet, .paths = paths}, .base = base, .at = at};
+  base_tracer t = {.on = {.ctx = ctx, .sheet = sheet, .paths = paths, .work = work}, .base = base, .at = at};
   t.most_triangles = most_triangles;
   candidate *order = ORB_NEW(ctx, candidate, 3 * (size_t)mesh->triangle_count);
   int32_t *parent = ORB_NEW(ctx, int32_t, mesh->vertex_count);

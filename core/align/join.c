@@ -33,6 +33,7 @@ typedef struct joiner {
   int32_t *face, faces;          /* of each half-edge: the face on its left */
   int32_t *parent;               /* trees of the forest */
   int32_t edges;
+  int64_t *work;
   double *least;       /* shape-major, count × count: lower bounds of the lengths of paths */
   double *ball_radius; /* shape-major: how far about a landmark they are exact, as of so many edges */
   int32_t *ball_edges;
@@ -264,7 +265,7 @@ static int is_open(joiner *j, int tree, int32_t a, int32_t b) {
 /* Adds edges in the order of their true lengths, which grow while paths are laid in their way: a pair whose way has
  * become longer than that of the next one goes back into the queue. */
 static orb_status join_pass(joiner *j, queue *q, int tree, int *good) {
-  while (q->count > 0 && *good && j->edges < 3 * j->count - 6) {
+  while (q->count > 0 && *good && *j->work > 0 && j->edges < 3 * j->count - 6) {
     candidate *pair = &q->pair[q->heap[0]];
     int32_t a = pair->a, b = pair->b;
     int taken = 1;
@@ -395,7 +396,7 @@ static orb_status joiner_create(joiner *j, orb_sheet *sheets, orb_paths *paths) 
     j->parent[k] = k;
   }
   for (int32_t s = 0; s < j->shapes; s++) {
-    j->tracers[s] = (orb_tracer){.ctx = j->ctx, .sheet = &sheets[s], .paths = &paths[s]};
+    j->tracers[s] = (orb_tracer){.ctx = j->ctx, .sheet = &sheets[s], .paths = &paths[s], .work = j->work};
     ORB_TRY(orb_paths_fit(j->ctx, &sheets[s], &paths[s]));
     j->marked[s] = sheets[s].shape.mesh.vertex_count;
     j->mark[s] = ORB_NEW(j->ctx, int32_t, j->marked[s]);
@@ -413,10 +414,11 @@ static orb_status joiner_create(joiner *j, orb_sheet *sheets, orb_paths *paths) 
 }
 
 orb_status orb_base_join(orb_context *ctx, orb_sheet *sheets, orb_paths *paths, int32_t shape_count, const int32_t *at,
-                         int32_t count, const int32_t *most_triangles, orb_sheet *base, int *good) {
+                         int32_t count, const int32_t *most_triangles, int64_t *work, orb_sheet *base, int *good) {
   orb_status status;
   ORB_ASSERT(count >= 4);
-  joiner j = {.ctx = ctx, .shapes = shape_count, .count = count, .at = at, .most_triangles = most_triangles};
+  joiner j = {
+      .ctx = ctx, .shapes = shape_count, .count = count, .at = at, .most_triangles = most_triangles, .work = work};
   size_t pairs = (size_t)count * (size_t)(count - 1) / 2;
   queue q = {.pair = ORB_NEW(ctx, candidate, pairs), .heap = ORB_NEW(ctx, int64_t, pairs)};
   *good = 0;

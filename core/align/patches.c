@@ -27,6 +27,7 @@ typedef struct patcher {
   double *flat; /* 3 a sheet vertex: in the chord plane of its patch */
   unsigned char *fixed;
   double *weight; /* of each half-edge */
+  int64_t *work;
 } patcher;
 
 static void patcher_free(patcher *p) {
@@ -268,7 +269,7 @@ static double dot(const double *a, const double *b, size_t n) {
 
 /* Conjugate gradients with the diagonal as preconditioner; the three columns share the steps, which costs a few
  * iterations and saves three walks of the mesh. */
-static orb_status solve(patcher *p) {
+static orb_status solve(patcher *p, int *good) {
   orb_context *ctx = p->ctx;
   size_t vertices = (size_t)p->sheet.shape.mesh.vertex_count, n = 3 * vertices;
   double *block = ORB_NEW0(ctx, double, 5 * n + vertices);
@@ -282,7 +283,9 @@ static orb_status solve(patcher *p) {
   diagonal_of(p, diagonal);
   orb_parallel_for(ctx, (int64_t)vertices, 2048, apply, &l);
   double first = 0, rho = 0;
-  for (int i = 0; i < ITERATIONS; i++) {
+  for (int i = 0; i < ITERATIONS && *good; i++) {
+    *p->work -= (int64_t)vertices;
+    *good = *p->work > 0;
     for (size_t k = 0; k < n; k++) {
       z[k] = r[k] / diagonal[k / 3];
     }
@@ -339,7 +342,10 @@ static orb_status embed(patcher *p, int *held) {
   if (!*held) {
     return ORB_OK;
   }
-  ORB_TRY(solve(p));
+  ORB_TRY(solve(p, held));
+  if (!*held) {
+    return ORB_OK;
+  }
   project(p);
   ORB_TRY(orb_certify(p->ctx, p->sheet.shape.points, mesh->vertex_count, mesh->triangles, mesh->triangle_count,
                       &certificate));
@@ -348,8 +354,8 @@ static orb_status embed(patcher *p, int *held) {
 }
 
 orb_status orb_patch_embed(orb_context *ctx, orb_sheet *sheet, const orb_sheet *base, int32_t *at, orb_paths *paths,
-                           int *held) {
-  patcher p = {.ctx = ctx, .sheet = *sheet, .base = *base, .paths = *paths, .at = at};
+                           int64_t *work, int *held) {
+  patcher p = {.ctx = ctx, .sheet = *sheet, .base = *base, .paths = *paths, .at = at, .work = work};
   orb_status status = embed(&p, held);
   *sheet = p.sheet;
   *paths = p.paths;
@@ -369,7 +375,7 @@ static orb_status build(patcher *p, const orb_sheet *given, const int32_t *landm
   }
   ORB_TRY(orb_sheet_copy(p->ctx, given, &p->sheet));
   ORB_TRY(locate_base(p, landmarks, count));
-  ORB_TRY(orb_base_trace(p->ctx, &p->sheet, &p->base, p->at, &p->paths, orb_pin_limit(given, growth), &good));
+  ORB_TRY(orb_base_trace(p->ctx, &p->sheet, &p->base, p->at, &p->paths, orb_pin_limit(given, growth), p->work, &good));
   return good ? embed(p, held) : ORB_OK;
 }
 
@@ -380,11 +386,11 @@ int32_t orb_pin_limit(const orb_sheet *sheet, double growth) {
 }
 
 orb_status orb_pin_patches(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count,
-                           const double *targets, orb_preset preset, double growth, int *held) {
-  patcher p = {.ctx = ctx};
-  orb_status status = build(&p, sheet, landmarks, count, targets, growth, held);
+                           const double *targets, orb_preset preset, orb_pin_room *room, int *held) {
+  patcher p = {.ctx = ctx, .work = &room->work};
+  orb_status status = build(&p, sheet, landmarks, count, targets, room->growth, held);
   if (status == ORB_OK && *held) {
-    status = orb_pin_slim(ctx, &p.sheet, landmarks, count, preset);
+    status = orb_pin_slim(ctx, &p.sheet, landmarks, count, preset, &room->work);
   }
   if (status == ORB_OK && *held) {
     orb_sheet_free(ctx, sheet);

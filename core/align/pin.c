@@ -13,6 +13,9 @@ enum { COARSE = 300, COARSE_A_LANDMARK = 6, WALKS = 2, ROUNDS = 24, ROUND_SWEEPS
 static const double LITTLE = 0.02; /* of the new vertices: not worth another round */
 /* How far a sheet may grow: a little for landmarks that merely cross, much for those in quite another order. */
 static const double GROWTH_SMALL = 0.35, GROWTH_MAX = 64;
+/* Visits of nodes and vertices, see orb_pin_room: a minute of them, of which each trial that looks for the landmark to
+ * name has a share. A hundred and fifty random landmarks take a few seconds. */
+static const int64_t WORK = 500000000, WORK_OF_TRIAL = 80000000;
 
 orb_status orb_pin_relax(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count, orb_preset preset,
                          int32_t sweeps) {
@@ -55,9 +58,9 @@ end:
   return status;
 }
 
-orb_status orb_pin_slim(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count,
-                        orb_preset preset) {
-  for (int round = 0; round < ROUNDS; round++) {
+orb_status orb_pin_slim(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count, orb_preset preset,
+                        int64_t *work) {
+  for (int round = 0; round<ROUNDS && * work> 0; round++) {
     int32_t removed, more;
     ORB_TRY(orb_sheet_thin(ctx, sheet, &removed));
     more = sheet->shape.mesh.vertex_count - sheet->given_vertices;
@@ -65,6 +68,7 @@ orb_status orb_pin_slim(orb_context *ctx, orb_sheet *sheet, const int32_t *landm
       break;
     }
     ORB_TRY(orb_pin_relax(ctx, sheet, landmarks, count, ORB_PRESET_FAST, ROUND_SWEEPS));
+    *work -= ROUND_SWEEPS * (int64_t)sheet->shape.mesh.vertex_count;
   }
   return orb_pin_relax(ctx, sheet, landmarks, count, preset, SWEEPS);
 }
@@ -72,7 +76,7 @@ orb_status orb_pin_slim(orb_context *ctx, orb_sheet *sheet, const int32_t *landm
 /* Shape 0 stays as it is embedded; the others are carried onto its landmarks. *stuck: the first that could not be, 0 if
  * all were. */
 static orb_status carry_onto_first(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
-                                   int32_t count, orb_preset preset, double growth, int32_t *stuck) {
+                                   int32_t count, orb_preset preset, orb_pin_room *room, int32_t *stuck) {
   orb_status status = ORB_OK;
   double *points = NULL;
   *stuck = 0;
@@ -80,7 +84,7 @@ static orb_status carry_onto_first(orb_context *ctx, orb_sheet *sheets, int32_t 
   ORB_GO(status, orb_landmark_points(ctx, sheets, shape_count, landmarks, count, &points), end);
   for (int32_t s = 1; s < shape_count; s++) {
     int held = 0;
-    ORB_GO(status, orb_pin_patches(ctx, &sheets[s], landmarks, count, points, preset, growth, &held), end);
+    ORB_GO(status, orb_pin_patches(ctx, &sheets[s], landmarks, count, points, preset, room, &held), end);
     if (!held) {
       *stuck = s;
       break;
@@ -93,10 +97,11 @@ end:
 
 /* The cascade. *held 0: it failed on shape *shape, and sheets may have been turned or refined. */
 static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
-                       int32_t count, const orb_align_options *options, int *held, int32_t *shape) {
+                       int32_t count, const orb_align_options *options, int64_t work, int *held, int32_t *shape) {
   orb_preset preset = options->preset;
   int32_t coarse = COARSE_A_LANDMARK * count > COARSE ? COARSE_A_LANDMARK * count : COARSE;
   double most = options->max_growth > 0 ? options->max_growth : GROWTH_MAX;
+  orb_pin_room room = {most < GROWTH_SMALL ? most : GROWTH_SMALL, work};
   int stuck = 1;
   *held = 1;
   *shape = 0;
@@ -106,17 +111,17 @@ static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count,
   if (!stuck) {
     return ORB_OK;
   }
-  ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, preset,
-                           most < GROWTH_SMALL ? most : GROWTH_SMALL, shape));
+  ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, preset, &room, shape));
   if (*shape == 0) {
     return ORB_OK;
   }
   *held = 0;
+  room.growth = most;
   if (count >= 4) {
-    ORB_TRY(orb_pin_joint(ctx, sheets, shape_count, landmarks, count, preset, most, held));
+    ORB_TRY(orb_pin_joint(ctx, sheets, shape_count, landmarks, count, preset, &room, held));
   }
   if (!*held) {
-    ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, preset, most, shape));
+    ORB_TRY(carry_onto_first(ctx, sheets, shape_count, landmarks, count, preset, &room, shape));
     *held = *shape == 0;
   }
   return ORB_OK;
@@ -134,7 +139,7 @@ static orb_status could_meet(orb_context *ctx, const orb_sheet *sheets, int32_t 
   for (int32_t s = 0; s < shape_count; s++) {
     ORB_GO(status, orb_sheet_copy(ctx, &sheets[s], &copies[s]), end);
   }
-  status = meet(ctx, copies, shape_count, landmarks, count, options, held, &shape);
+  status = meet(ctx, copies, shape_count, landmarks, count, options, WORK_OF_TRIAL, held, &shape);
 end:
   for (int32_t s = 0; s < shape_count; s++) {
     orb_sheet_free(ctx, &copies[s]);
@@ -169,6 +174,6 @@ orb_status orb_align_pin(orb_context *ctx, orb_sheet *sheets, int32_t shape_coun
                          int32_t count, const orb_align_options *options) {
   int held;
   int32_t shape;
-  ORB_TRY(meet(ctx, sheets, shape_count, landmarks, count, options, &held, &shape));
+  ORB_TRY(meet(ctx, sheets, shape_count, landmarks, count, options, WORK, &held, &shape));
   return held ? ORB_OK : refuse(ctx, sheets, shape_count, landmarks, count, options, shape);
 }

@@ -21,6 +21,7 @@
 
 enum { HALVINGS = 4, RELAXATIONS = 8, RELAX_SWEEPS = 20 };
 static const double DEFAULT_RADIUS = 1.0, GROWTH_MAX = 64;
+static const int64_t WORK = 500000000;
 
 typedef struct rbf_run {
   orb_context *ctx;
@@ -115,7 +116,8 @@ static orb_status warp_shape(rbf_run *r, int32_t steps) {
       ORB_TRY(orb_pin_relax(r->ctx, r->sheet, r->active, r->count, ORB_PRESET_FAST, RELAX_SWEEPS));
       relaxations++;
     } else {
-      ORB_TRY(orb_pin_patches(r->ctx, r->sheet, r->active, r->count, r->targets, ORB_PRESET_FAST, GROWTH_MAX, &good));
+      orb_pin_room room = {GROWTH_MAX, WORK};
+      ORB_TRY(orb_pin_patches(r->ctx, r->sheet, r->active, r->count, r->targets, ORB_PRESET_FAST, &room, &good));
       return good ? ORB_OK : refuse(r);
     }
   }

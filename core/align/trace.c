@@ -265,6 +265,9 @@ static orb_status expand_all(orb_tracer *t, int32_t start, goal *g, int32_t *las
     if (popped % 8192 == 8191) {
       ORB_TRY(orb_context_check(t->ctx));
     }
+    if (--*t->work < 0) {
+      break;
+    }
     orb_tracer_item top = heap_pop(t);
     int32_t node = top.node;
     if (node == 2 * g->vertex) {

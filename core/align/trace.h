@@ -19,6 +19,7 @@ typedef struct orb_tracer {
   unsigned char *gate; /* of each half-edge: 1: its triangle may be entered from its origin, 2: it may be walked */
   orb_tracer_item *heap;
   int32_t heap_count, heap_capacity;
+  int64_t *work;  /* visits of nodes that are left: a search that uses it up ends without a find */
   int32_t *chain; /* nodes of the path found, back to front */
   int32_t chain_count;
 } orb_tracer;

@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "align/pin.h"
 #include "numeric/vec3.h"
 #include "orbmorph/format.h"
 #include "support_align.h"
@@ -221,6 +222,39 @@ static void a_hundred_and_fifty(void **state) {
   bodies_close(&b);
 }
 
+/* Tangled landmarks may take so much work and no more: where it is used up they count as not met, and the shapes are as
+ * they were. */
+static void work_is_bounded(void **state) {
+  (void)state;
+  enum { COUNT = 30 };
+  bodies b;
+  int32_t numbers[COUNT];
+  orb_sheet sheets[2];
+  bodies_open(&b, NULL);
+  bodies_random(&b, COUNT, 5);
+  for (int32_t s = 0; s < 2; s++) {
+    assert_int_equal(orb_sheet_create(b.ctx, b.shape[s].mesh, b.shape[s].points, &sheets[s]), ORB_OK);
+    assert_int_equal(orb_sheet_insert_landmarks(b.ctx, &sheets[s], b.landmark, COUNT, s), ORB_OK);
+  }
+  for (int32_t k = 0; k < COUNT; k++) {
+    numbers[k] = k;
+  }
+  int held;
+  int32_t vertices = sheets[0].shape.mesh.vertex_count;
+  orb_pin_room little = {64, 20000}, much = {64, 500000000};
+  assert_int_equal(orb_pin_joint(b.ctx, sheets, 2, numbers, COUNT, ORB_PRESET_FAST, &little, &held), ORB_OK);
+  assert_int_equal(held, 0);
+  assert_true(little.work <= 0 && little.work > -20000);
+  assert_int_equal(sheets[0].shape.mesh.vertex_count, vertices);
+  assert_int_equal(orb_pin_joint(b.ctx, sheets, 2, numbers, COUNT, ORB_PRESET_FAST, &much, &held), ORB_OK);
+  assert_int_equal(held, 1);
+  assert_true(much.work > 0 && much.work < 500000000);
+  for (int s = 0; s < 2; s++) {
+    orb_sheet_free(b.ctx, &sheets[s]);
+  }
+  bodies_close(&b);
+}
+
 static int load(orb_context *ctx, const char *name, orb_mesh *mesh, orb_embedding *embedding) {
   char path[1024];
   snprintf(path, sizeof path, "%s/good/%s", ORB_SHARED_MESHES, name);
@@ -287,6 +321,7 @@ int main(void) {
       cmocka_unit_test(the_first_that_cannot_be_met_is_named),
       cmocka_unit_test(sixty),
       cmocka_unit_test(a_hundred_and_fifty),
+      cmocka_unit_test(work_is_bounded),
       cmocka_unit_test(cow_to_human),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -82,7 +82,8 @@ typedef struct orb_alignment {
  * Landmarks at one and the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
  * those that are out of range or share a place on some shapes only; of a set
  * that cannot be met, the first that cannot be met together with those before it; ORB_E_BAD_OPTION for pin and rbf
- * without landmarks. About O(n log n) in triangles; random far-apart landmarks cost much more than like ones. */
+ * without landmarks. About O(n log n) in triangles; random far-apart landmarks cost much more than like ones, but no
+ * more than a bound: what needs more work than about a minute's is refused as such that cannot be met. */
 ORB_MUST_CHECK orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                     const orb_landmark *landmarks, int32_t landmark_count,
                                     const orb_align_options *options, orb_alignment *out);
