@@ -17,11 +17,11 @@ static queue_result submit_locked(queue *q, const queue_request *request, job **
     mine += request->owner_limit > 0 && j->row.listed && strcmp(j->row.owner, request->owner) == 0;
   }
   if (j) {
-    j->row.priority = request->priority > j->row.priority ? request->priority : j->row.priority;
     j->refs++;
-    while (!j->committed && !j->dead) {
+    while (!j->committed && !j->dead) { /* until then the row is read by who writes it, without the lock */
       pthread_cond_wait(&q->committed, &q->lock);
     }
+    j->row.priority = request->priority > j->row.priority ? request->priority : j->row.priority;
     *out = j;
     return j->dead ? QUEUE_ERROR : QUEUE_OK;
   }
