@@ -277,12 +277,13 @@ fail:
 int32_t orb_match_split(orb_match *match, int32_t h, const double p[3]) {
   int32_t g = match->net.twin[h];
   int32_t lists[2] = {match->triangle_items[h / 3], match->triangle_items[g / 3]};
+  int32_t beside = match->net.triangles[h]; /* of before: the split may put the new vertex here */
   int32_t v = orb_net_split_edge(&match->net, h, p);
   if (v < 0) {
     return -1;
   }
   for (int32_t s = 0; s < match->shape_count; s++) {
-    int32_t near = match->spot[(int64_t)match->net.triangles[h] * match->shape_count + s].h / 3;
+    int32_t near = match->spot[(int64_t)beside * match->shape_count + s].h / 3;
     settle(match, v, s, near);
   }
   int32_t t = h / 3;
