@@ -1,0 +1,86 @@
+#!/usr/bin/env bash
+# The Debian package from nothing: built by cpack, looked at by lintian, installed by apt into a fresh Debian 12, run
+# there as its own user for one merge, removed, and purged. Needs root, debootstrap and the Debian mirror.
+#   tests/long/package.sh [FOLDER]     FOLDER (/tmp/orbmorph-package) keeps the build and the bare Debian
+set -euo pipefail
+cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
+at=$(realpath -m "${1:-/tmp/orbmorph-package}")
+mirror=${ORB_DEBIAN_MIRROR:-http://deb.debian.org/debian}
+debian=$at/debian
+mkdir -p "$at"
+
+bash client/web/build.sh
+cmake -S . -B "$at/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DORB_TESTS=OFF >/dev/null
+cmake --build "$at/build"
+(cd "$at/build" && cpack -G DEB)
+package=$(ls -t "$at"/build/orbmorph_*.deb | head -1)
+if command -v lintian >/dev/null; then
+  lintian --allow-root --fail-on error "$package"
+fi
+
+if [ ! -f "$at/base/.whole" ]; then
+  rm -rf "$at/base"
+  debootstrap --variant=minbase bookworm "$at/base" "$mirror"
+  touch "$at/base/.whole"
+fi
+unmount() {
+  [ -z "${daemon:-}" ] || kill "$daemon" 2>/dev/null || true
+  umount -q "$debian/proc" "$debian/dev/null" "$debian/dev/urandom" 2>/dev/null || true
+}
+trap unmount EXIT
+unmount
+rm -rf "$debian"
+cp -a "$at/base" "$debian"
+cp /etc/resolv.conf "$debian/etc/"
+mount -t proc proc "$debian/proc"
+for node in null urandom; do
+  [ -e "$debian/dev/$node" ] || touch "$debian/dev/$node"
+  mount --bind "/dev/$node" "$debian/dev/$node"
+done
+cp "$package" "$debian/root/orbmorph.deb"
+cp tests/samples/dog.obj tests/samples/giraffe.off "$debian/root/"
+inside() { DEBIAN_FRONTEND=noninteractive LC_ALL=C chroot "$debian" "$@"; }
+inside apt-get update -qq
+# What the package does not ask for is not there: only it and curl are installed.
+inside apt-get install -qq -y --no-install-recommends /root/orbmorph.deb curl >"$at/install.log" 2>&1 || { cat "$at/install.log"; exit 1; }
+
+inside orbmorphd --version
+inside sh -c 'ldd /usr/bin/orbmorphd /usr/bin/orbmorph /usr/bin/orbmorph-bench | grep "not found"' && exit 1
+[ "$(inside stat -c %U:%G:%a /var/lib/orbmorph)" = orbmorph:orbmorph:750 ]
+inside orbmorphd --check-config --config /etc/orbmorph/orbmorphd.conf
+for file in /lib/systemd/system/orbmorphd.service /lib/systemd/system/orbmorphd.socket /usr/share/man/man1/orbmorph.1.gz \
+  /usr/share/man/man1/orbmorph-bench.1.gz /usr/share/man/man8/orbmorphd.8.gz; do
+  [ -s "$debian$file" ]
+done
+grep -o '](\(docs\|client\|CONTRIBUTING\)[^)#]*' "$debian/usr/share/doc/orbmorph/README.md" | cut -c3- | while read -r link; do
+  [ -e "$debian/usr/share/doc/orbmorph/$link" ] || { echo "the installed README's link $link leads nowhere"; exit 1; }
+done
+
+# As the unit starts it: the installed configuration, the package's user. --listen: another port than one in use here.
+inside su -s /bin/sh orbmorph -c 'exec orbmorphd --config /etc/orbmorph/orbmorphd.conf --listen 127.0.0.1:0' >"$at/daemon.out" 2>"$at/daemon.log" &
+daemon=$!
+for _ in $(seq 100); do
+  url=$(sed -n 's/^orbmorphd listening on //p' "$at/daemon.out")
+  [ -z "$url" ] || break
+  sleep 0.1
+done
+upload() { inside curl -fsS --data-binary "@/root/$1" "$url/v1/meshes?name=${1%.*}" | sed 's/.*"id":"\([0-9a-f]*\)".*/\1/'; }
+a=$(upload dog.obj) b=$(upload giraffe.off)
+inside curl -fsS -H 'Content-Type: application/json' -H 'Prefer: wait=60' \
+  -d "{\"shapes\":[{\"mesh\":\"$a\"},{\"mesh\":\"$b\"}]}" "$url/v1/supermeshes" >"$at/supermesh.json"
+asset=$(sed 's/.*"asset":"\([^"]*\)".*/\1/' "$at/supermesh.json")
+inside curl -fsS "$url$asset" >"$at/asset.glb"
+[ "$(head -c 4 "$at/asset.glb")" = glTF ]
+inside orbmorph --server "$url" ls
+kill "$daemon" $(pgrep -P "$daemon") 2>/dev/null || true
+wait "$daemon" || true
+daemon=
+inside su -s /bin/sh orbmorph -c 'orbmorphd --check-data --data /var/lib/orbmorph'
+
+inside apt-get remove -qq -y orbmorph >"$at/remove.log" 2>&1
+[ ! -e "$debian/usr/bin/orbmorphd" ] && [ -e "$debian/etc/orbmorph/orbmorphd.conf" ] && [ -e "$debian/var/lib/orbmorph/catalogue.sqlite" ]
+inside apt-get purge -qq -y orbmorph >>"$at/remove.log" 2>&1
+left=$(find "$debian" -xdev -name '*orbmorph*' -not -path '*/root/*' -not -path '*/var/log/*')
+[ -z "$left" ] || { echo "a purge leaves: $left"; exit 1; }
+! grep -q orbmorph "$debian/etc/passwd" "$debian/etc/group"
+echo "the package installs, runs, and leaves nothing"
