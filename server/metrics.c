@@ -86,11 +86,15 @@ static void write_histogram(orb_text *out, const char *name, const char *label, 
   orb_text_printf(out, "%s_count%s%s%s %lld\n", name, label[0] ? "{" : "", label, label[0] ? "}" : "", sum);
 }
 
+void metrics_family(orb_text *out, const char *name, const char *type, const char *help) {
+  orb_text_printf(out, "# HELP %s %s\n# TYPE %s %s\n", name, help, name, type);
+}
+
 void metrics_write(orb_text *out) {
-  orb_text_add(out, "# TYPE orbmorph_job_seconds histogram\n");
+  metrics_family(out, "orbmorph_job_seconds", "histogram", "Time of attempts of jobs, by kind.");
   write_histogram(out, "orbmorph_job_seconds", "kind=\"embedding\"", &jobs[0]);
   write_histogram(out, "orbmorph_job_seconds", "kind=\"supermesh\"", &jobs[1]);
-  orb_text_add(out, "# TYPE orbmorph_stage_seconds histogram\n");
+  metrics_family(out, "orbmorph_stage_seconds", "histogram", "Time of the stages of jobs.");
   for (int kind = 0; kind < 2; kind++) {
     for (int i = 0; i < STAGES; i++) {
       char labels[64];
@@ -100,22 +104,29 @@ void metrics_write(orb_text *out) {
       }
     }
   }
-  orb_text_add(out, "# TYPE orbmorph_job_failures_total counter\n");
+  metrics_family(out, "orbmorph_job_failures_total", "counter", "Attempts that did not succeed.");
   orb_text_printf(out, "orbmorph_job_failures_total{kind=\"embedding\"} %lld\n", atomic_load(&job_failed[0]));
   orb_text_printf(out, "orbmorph_job_failures_total{kind=\"supermesh\"} %lld\n", atomic_load(&job_failed[1]));
-  orb_text_add(out, "# TYPE orbmorph_http_request_seconds histogram\n");
+  metrics_family(out, "orbmorph_http_request_seconds", "histogram",
+                 "Time of requests, without those that wait for a job.");
   write_histogram(out, "orbmorph_http_request_seconds", "", &requests);
-  orb_text_add(out, "# TYPE orbmorph_http_responses_total counter\n");
+  metrics_family(out, "orbmorph_http_responses_total", "counter", "Answers by class of status.");
   for (int i = 1; i < 6; i++) {
     orb_text_printf(out, "orbmorph_http_responses_total{class=\"%dxx\"} %lld\n", i, atomic_load(&statuses[i]));
   }
-  orb_text_printf(out,
-                  "# TYPE orbmorph_cache_hits_total counter\norbmorph_cache_hits_total %lld\n"
-                  "# TYPE orbmorph_cache_misses_total counter\norbmorph_cache_misses_total %lld\n"
-                  "# TYPE orbmorph_flips_total counter\norbmorph_flips_total %lld\n"
-                  "# TYPE orbmorph_received_bytes_total counter\norbmorph_received_bytes_total %lld\n"
-                  "# TYPE orbmorph_sent_bytes_total counter\norbmorph_sent_bytes_total %lld\n"
-                  "# TYPE orbmorph_connections gauge\norbmorph_connections %lld\n",
-                  atomic_load(&cache[1]), atomic_load(&cache[0]), atomic_load(&flips), atomic_load(&received_bytes),
-                  atomic_load(&sent_bytes), atomic_load(&connections));
+  const struct {
+    const char *name, *type, *help;
+    long long value;
+  } single[] = {
+      {"orbmorph_cache_hits_total", "counter", "Descriptions answered from memory.", atomic_load(&cache[1])},
+      {"orbmorph_cache_misses_total", "counter", "Descriptions read from the catalogue.", atomic_load(&cache[0])},
+      {"orbmorph_flips_total", "counter", "Flipped triangles found in results; always 0.", atomic_load(&flips)},
+      {"orbmorph_received_bytes_total", "counter", "Bytes of bodies received.", atomic_load(&received_bytes)},
+      {"orbmorph_sent_bytes_total", "counter", "Bytes of bodies sent.", atomic_load(&sent_bytes)},
+      {"orbmorph_connections", "gauge", "Open connections.", atomic_load(&connections)},
+  };
+  for (size_t i = 0; i < sizeof single / sizeof single[0]; i++) {
+    metrics_family(out, single[i].name, single[i].type, single[i].help);
+    orb_text_printf(out, "%s %lld\n", single[i].name, single[i].value);
+  }
 }

@@ -16,5 +16,7 @@ void metrics_connection(int change);
 int64_t metrics_connections(void);
 /* Appends them as Prometheus text. */
 void metrics_write(orb_text *out);
+/* The two lines before the values of a family. */
+void metrics_family(orb_text *out, const char *name, const char *type, const char *help);
 
 #endif

@@ -2,7 +2,7 @@
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
 #   tests/long.sh [PART…]    all of them without arguments:
-#   tsan valgrind fuzz crash faults soak load adversarial arm robust
+#   tsan valgrind fuzz crash faults soak load adversarial arm robust deploy
 #
 # ORB_MINUTES (5) is the time for each fuzz target, ORB_KILLS (1000) the number of kills.
 set -euo pipefail
@@ -126,8 +126,17 @@ part_robust() {
   fi
 }
 
+# Behind nginx and Caddy, the unit's score, the dashboard's queries; as root also the package and the container.
+part_deploy() {
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build --target orbmorphd orbmorph
+  node --test --test-reporter=spec tests/scenario/proxy.test.mjs tests/scenario/deploy.test.mjs
+  tests/long/package.sh
+  tests/long/container.sh
+}
+
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash faults soak load adversarial arm robust
+  set -- tsan valgrind fuzz crash faults soak load adversarial arm robust deploy
 fi
 for part in "$@"; do
   echo "== $part =="

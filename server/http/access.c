@@ -97,6 +97,13 @@ int access_check(request *r, const char *path, orb_problem *problem) {
   return 0;
 }
 
+int access_is_operator(const request *r) {
+  caller *who = r->srv->needs_token ? find_caller(r->srv, header_of(r, "Authorization")) : NULL;
+  int admin = who && (__atomic_load_n(&who->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN);
+  caller_release(who);
+  return !r->srv->needs_token || admin;
+}
+
 const char *access_tenant(const request *r) {
   return r->caller ? r->caller->row.tenant : "";
 }

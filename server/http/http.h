@@ -107,6 +107,8 @@ void access_headers(request *r);
 int access_check(request *r, const char *path, orb_problem *problem);
 /* Its priority in the queue: the token's, then what the Priority header says (RFC 9218, u=0 to 7). */
 int access_priority(const request *r);
+/* Whether it may look behind the scenes: with the scope admin, or where no token is needed. */
+int access_is_operator(const request *r);
 /* Tenants. Whose the caller's requests are; "" where no token is needed. */
 const char *access_tenant(const request *r);
 /* Through whose eyes it sees: its tenant's, or "" for all there is, with the scope admin or where no token is needed.

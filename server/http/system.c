@@ -9,8 +9,9 @@
 #include "pages.h"
 #include "studio/studio.h"
 
-static void gauge(orb_text *out, const char *name, double value) {
-  orb_text_printf(out, "# TYPE %s gauge\n%s %.17g\n", name, name, value);
+static void gauge(orb_text *out, const char *name, const char *help, double value) {
+  metrics_family(out, name, "gauge", help);
+  orb_text_printf(out, "%s %.17g\n", name, value);
 }
 
 static double count_entries(const char *folder) {
@@ -31,30 +32,33 @@ static void metrics_away(request *r) {
   queue_numbers n;
   queue_count(srv->q, &n);
   metrics_write(&text);
-  orb_text_add(&text, "# TYPE orbmorph_jobs gauge\n");
+  metrics_family(&text, "orbmorph_jobs", "gauge", "Unfinished jobs; waiting: for the embeddings that they need.");
   orb_text_printf(&text, "orbmorph_jobs{state=\"queued\"} %d\norbmorph_jobs{state=\"waiting\"} %d\n", n.queued,
                   n.waiting);
   orb_text_printf(&text, "orbmorph_jobs{state=\"running\"} %d\n", n.running);
-  orb_text_add(&text, "# TYPE orbmorph_jobs_running gauge\n");
+  metrics_family(&text, "orbmorph_jobs_running", "gauge", "Running jobs by stage.");
   for (size_t i = 0; i < sizeof n.stages / sizeof n.stages[0] && n.stages[i].jobs > 0; i++) {
     orb_text_printf(&text, "orbmorph_jobs_running{stage=\"%s\"} %d\n", n.stages[i].name, n.stages[i].jobs);
   }
-  orb_text_add(&text, "# TYPE orbmorph_jobs_ended_total counter\n");
+  metrics_family(&text, "orbmorph_jobs_ended_total", "counter", "Jobs that ended since the start.");
   for (int s = ORB_JOB_SUCCEEDED; s <= ORB_JOB_CANCELLED; s++) {
     orb_text_printf(&text, "orbmorph_jobs_ended_total{state=\"%s\"} %lld\n", orb_job_state_name((orb_job_state)s),
                     (long long)n.ended[s]);
   }
-  gauge(&text, "orbmorph_queue_oldest_seconds", 1e-3 * (double)n.oldest_ms);
-  gauge(&text, "orbmorph_waiting_connections", n.waiters);
+  gauge(&text, "orbmorph_queue_oldest_seconds", "Age of the oldest job that nothing but a worker is missing for.",
+        1e-3 * (double)n.oldest_ms);
+  gauge(&text, "orbmorph_waiting_connections", "Connections that wait for a job.", n.waiters);
   int64_t stored = catalogue_bytes(srv->cat, 0);
   if (stored >= 0) {
-    gauge(&text, "orbmorph_stored_bytes", (double)stored);
+    gauge(&text, "orbmorph_stored_bytes", "Bytes of stored objects.", (double)stored);
   }
-  gauge(&text, "orbmorph_disk_free_bytes", (double)objects_free_bytes(srv->store));
-  gauge(&text, "orbmorph_queue_limit", (double)srv->options->queue_limit);
-  gauge(&text, "orbmorph_decoding_bytes", (double)__atomic_load_n(&srv->decoding, __ATOMIC_RELAXED));
-  gauge(&text, "process_open_fds", count_entries("/proc/self/fd"));
-  gauge(&text, "process_threads", count_entries("/proc/self/task"));
+  gauge(&text, "orbmorph_disk_free_bytes", "Free bytes of the file system of the data.",
+        (double)objects_free_bytes(srv->store));
+  gauge(&text, "orbmorph_queue_limit", "Unfinished jobs that are accepted at most.", (double)srv->options->queue_limit);
+  gauge(&text, "orbmorph_decoding_bytes", "Memory of the decoders of compressed bodies.",
+        (double)__atomic_load_n(&srv->decoding, __ATOMIC_RELAXED));
+  gauge(&text, "process_open_fds", "Open file descriptors.", count_entries("/proc/self/fd"));
+  gauge(&text, "process_threads", "Threads.", count_entries("/proc/self/task"));
   long resident = 0;
   FILE *statm = fopen("/proc/self/statm", "r");
   if (statm) {
@@ -63,7 +67,7 @@ static void metrics_away(request *r) {
     }
     fclose(statm);
   }
-  gauge(&text, "process_resident_memory_bytes", 4096.0 * (double)resident);
+  gauge(&text, "process_resident_memory_bytes", "Resident memory.", 4096.0 * (double)resident);
   reply_text(r, 200, "text/plain; version=0.0.4; charset=utf-8", &text);
 }
 
@@ -79,7 +83,7 @@ static enum MHD_Result ready(request *r) {
   orb_text json = {0};
   orb_json_open(&json, '{');
   orb_json_member_string(&json, "status", "ready");
-  if (query_has(r, "verbose")) {
+  if (query_has(r, "verbose") && access_is_operator(r)) {
     orb_json_member_integer(&json, "queued", n.queued);
     orb_json_member_integer(&json, "waiting", n.waiting);
     orb_json_member_integer(&json, "running", n.running);

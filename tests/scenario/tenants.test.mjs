@@ -88,6 +88,9 @@ test("another tenant's things are not there", async (t) => {
     assert.deepEqual(await list(admin, what), own);
   }
   assert.deepEqual((await d.get('/v1/jobs', { ...bob, query: { state: 'running' } })).json.jobs, []);
+  // How much there is to do is the operator's business.
+  assert.equal((await d.get('/readyz?verbose', admin)).json.running, 1);
+  for (const who of [ann, reader, {}]) assert.deepEqual((await d.get('/readyz?verbose', who)).json, { status: 'ready' });
   const before = await list(admin, 'jobs');
   const [queued_end, running_end] = [await d.delete(queued.url, ann), await d.delete(running.url, admin)];
   assert.deepEqual([queued_end.status, running_end.status], [200, 200], 'its own, and all with admin');

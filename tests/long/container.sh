@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# The container from nothing, without an image registry: the base is a bare Debian under the name that the Dockerfile
+# asks for. Built by buildah, run by podman for one merge with a token, and stopped. Needs root and the Debian mirror.
+#   tests/long/container.sh [FOLDER]     FOLDER (/tmp/orbmorph-package) keeps the bare Debian
+set -euo pipefail
+cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
+at=$(realpath -m "${1:-/tmp/orbmorph-package}")
+mirror=${ORB_DEBIAN_MIRROR:-http://deb.debian.org/debian}
+mkdir -p "$at"
+own=(--root "$at/images" --runroot "$at/images-run" --storage-driver vfs)
+
+if [ ! -f "$at/base/.whole" ]; then
+  rm -rf "$at/base"
+  debootstrap --variant=minbase bookworm "$at/base" "$mirror"
+  touch "$at/base/.whole"
+fi
+if ! podman "${own[@]}" image exists docker.io/library/debian:12-slim; then
+  tar -C "$at/base" -c . | podman "${own[@]}" import --quiet - docker.io/library/debian:12-slim
+fi
+# Chroots instead of containers for the steps: that works inside of other containers, too.
+buildah "${own[@]}" bud --isolation=chroot --pull-never -f deploy/Dockerfile -t orbmorph .
+
+run=(podman "${own[@]}" --cgroup-manager cgroupfs --events-backend file)
+place=(--network host --cgroups disabled -v "$at/volume:/var/lib/orbmorph")
+rm -rf "$at/volume"
+mkdir -p "$at/volume"
+user=$("${run[@]}" image inspect --format '{{.Config.User}}' orbmorph)
+[ "$user" = orbmorph ] || { echo "it runs as '$user'"; exit 1; }
+"${run[@]}" image inspect --format '{{json .HealthCheck}}' orbmorph | grep -q /livez || echo "the image has no health check: OCI images have none, build with --format docker"
+"${run[@]}" run --rm "${place[@]}" --entrypoint id orbmorph
+owner=$("${run[@]}" run --rm "${place[@]}" --entrypoint id orbmorph -u)
+chown "$owner" "$at/volume"
+token=$("${run[@]}" run --rm "${place[@]}" orbmorph token add web --scope read,write --data /var/lib/orbmorph)
+port=$((20000 + RANDOM % 20000))
+name=orbmorph-check-$$
+"${run[@]}" run -d --name "$name" "${place[@]}" orbmorph --listen "0.0.0.0:$port" --data /var/lib/orbmorph >/dev/null
+trap '"${run[@]}" rm -f "$name" >/dev/null 2>&1 || true' EXIT
+for _ in $(seq 100); do
+  curl -fs "http://127.0.0.1:$port/readyz" >/dev/null && break
+  sleep 0.1
+done
+ask() { curl -fsS -H "Authorization: Bearer $token" "$@"; }
+[ "$(curl -s -o /dev/null -w '%{http_code}' "http://127.0.0.1:$port/v1/meshes")" = 401 ]
+upload() { ask --data-binary "@tests/samples/$1" "http://127.0.0.1:$port/v1/meshes?name=${1%.*}" | sed 's/.*"id":"\([0-9a-f]*\)".*/\1/'; }
+a=$(upload dog.obj) b=$(upload giraffe.off)
+asset=$(ask -H 'Content-Type: application/json' -H 'Prefer: wait=60' -d "{\"shapes\":[{\"mesh\":\"$a\"},{\"mesh\":\"$b\"}]}" \
+  "http://127.0.0.1:$port/v1/supermeshes" | sed 's/.*"asset":"\([^"]*\)".*/\1/')
+ask "http://127.0.0.1:$port$asset" >"$at/asset.glb"
+[ "$(head -c 4 "$at/asset.glb")" = glTF ]
+"${run[@]}" exec "$name" curl -fsS "http://127.0.0.1:$port/livez" >/dev/null
+"${run[@]}" stop -t 20 "$name" >/dev/null
+[ "$("${run[@]}" inspect --format '{{.State.ExitCode}}' "$name")" = 0 ]
+echo "the container is built, runs as its user, and ends when it is told to"

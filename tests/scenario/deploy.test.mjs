@@ -1,0 +1,41 @@
+// What lies in deploy/, by the tools of those who read it: systemd's score of the unit, Prometheus' view of the metrics.
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { readFile, writeFile } from 'node:fs/promises';
+import path from 'node:path';
+import test from 'node:test';
+import { folder } from './support/cli.mjs';
+import { daemon, root } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const lacks = (program) => spawnSync(program, ['--version']).error !== undefined && `${program} is not installed`;
+const run = (program, args, input) => {
+  const { status, stdout, stderr } = spawnSync(program, args, { input, encoding: 'utf8' });
+  return { status, text: stdout + stderr };
+};
+
+test('the unit is closed tightly', { skip: lacks('systemd-analyze') }, () => {
+  const unit = path.join(root, 'deploy/orbmorphd.service');
+  const { text } = run('systemd-analyze', ['security', '--offline=true', '--no-pager', unit]);
+  const score = Number(/Overall exposure level for orbmorphd\.service: (\d+\.\d+)/.exec(text)?.[1]);
+  assert.ok(score < 2, text);
+  // 20: worse than that would be refused.
+  assert.equal(run('systemd-analyze', ['security', '--offline=true', '--no-pager', '--threshold=20', unit]).status, 0);
+  const verified = run('systemd-analyze', ['verify', unit, path.join(root, 'deploy/orbmorphd.socket')]).text;
+  assert.doesNotMatch(verified, /Unknown|Failed to parse|Invalid|ignoring/i);
+});
+
+test('Prometheus takes the metrics, and the queries of the dashboard', { skip: lacks('promtool') }, async (t) => {
+  const d = await daemon(t);
+  await d.made('/v1/embeddings', { mesh: (await d.upload(shapes.obj(shapes.egg(2)))).json.id });
+  const metrics = run('promtool', ['check', 'metrics'], (await d.get('/metrics')).bytes.toString());
+  assert.equal(metrics.status, 0, metrics.text);
+  const { panels } = JSON.parse(await readFile(path.join(root, 'deploy/grafana/orbmorph.json'), 'utf8'));
+  const queries = panels.flatMap(({ targets }) => targets.map(({ expr }) => expr.replaceAll('$__rate_interval', '5m')));
+  assert.ok(queries.length > 10);
+  const file = path.join(await folder(t), 'rules.yml');
+  await writeFile(file, JSON.stringify({ groups: [{ name: 'dashboard', rules: queries.map((expr, i) => ({ record: `query:${i}`, expr })) }] }));
+  const rules = run('promtool', ['check', 'rules', file]);
+  assert.equal(rules.status, 0, rules.text);
+  assert.match(rules.text, new RegExp(`${queries.length} rules`));
+});
