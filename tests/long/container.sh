@@ -18,7 +18,7 @@ if ! podman "${own[@]}" image exists docker.io/library/debian:12-slim; then
   tar -C "$at/base" -c . | podman "${own[@]}" import --quiet - docker.io/library/debian:12-slim
 fi
 # Chroots instead of containers for the steps: that works inside of other containers, too.
-buildah "${own[@]}" bud --isolation=chroot --pull-never -f deploy/Dockerfile -t orbmorph .
+buildah "${own[@]}" bud --layers --isolation=chroot --pull-never --format docker -f deploy/Dockerfile -t orbmorph .
 
 run=(podman "${own[@]}" --cgroup-manager cgroupfs --events-backend file)
 place=(--network host --cgroups disabled -v "$at/volume:/var/lib/orbmorph")
