@@ -62,12 +62,12 @@ one() {
   return $status
 }
 
-# Smallest inputs first, those that cover what the kept ones do not.
+# Smallest inputs first, those that reach edges that the kept ones do not.
 keep() {
   local name=$1 most=$2 small
   small=$(mktemp -d)
   find "build-fuzz/corpus/$name" -type f -size -"$((most + 1))"c -exec cp -t "$small" {} +
-  build-fuzz/bin/fuzz_"$name" -close_fd_mask=2 -merge=1 -timeout=1200 "tests/fuzz/corpus/$name" "$small" 2>&1 |
+  build-fuzz/bin/fuzz_"$name" -close_fd_mask=2 -merge=1 -use_counters=0 -timeout=1200 "tests/fuzz/corpus/$name" "$small" 2>&1 |
     grep -E 'new files|new features' | tail -1
   rm -r "$small"
 }
