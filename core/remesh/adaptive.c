@@ -49,12 +49,18 @@ static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, i
   return ORB_OK;
 }
 
-/* Refines until nothing strays: splits of edges may leave items of the triangles beside them too far away. Where that
- * does not come to an end the overlay is the start instead. */
-static orb_status hold(orb_context *ctx, orb_match *match, double limit2) {
+/* Refines until nothing strays: splits of edges may leave items of the triangles beside them too far away, and edges
+ * that found no room to be split among needles find it once the needles are gone. Where that does not come to an end
+ * the overlay is to be the start instead: `crept`. */
+static orb_status hold(orb_context *ctx, orb_match *match, double tolerance) {
+  double limit2 = tolerance * tolerance;
   int64_t strays = 1;
   for (int i = 0; i < HOLDS && strays > 0 && !match->crept; i++) {
     ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
+    if (strays > 0 && i % 4 == 3 && !match->crept) {
+      ORB_TRY(orb_match_turn_all(ctx, match, limit2, 1));
+      ORB_TRY(reduce(ctx, match, tolerance, 0, 1, 1));
+    }
   }
   match->crept |= strays > 0;
   return ORB_OK;
@@ -104,7 +110,7 @@ static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_ma
   }
   if (turned * MANY <= live || was_overlay || inputs * job->shape_count > OVERLAY_MOST) {
     ORB_TRY(orb_match_resolve(ctx, match, tolerance * tolerance));
-    ORB_TRY(hold(ctx, match, tolerance * tolerance));
+    ORB_TRY(hold(ctx, match, tolerance));
     if (match->crept) {
       ORB_TRY(start_from_overlay(ctx, job, match));
     }
@@ -132,7 +138,7 @@ orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_
   orb_status status;
   orb_progress(ctx, "remesh", 0.15);
   ORB_GO(status, orb_match_turn_all(ctx, &match, INFINITY, 1), end);
-  ORB_GO(status, hold(ctx, &match, tolerance * tolerance), end);
+  ORB_GO(status, hold(ctx, &match, tolerance), end);
   int overlay = match.crept;
   if (overlay) {
     ORB_GO(status, start_from_overlay(ctx, job, &match), end);

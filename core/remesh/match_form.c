@@ -97,5 +97,6 @@ orb_tally orb_match_tally_fan(const orb_match *match, int32_t v, const int32_t *
 }
 
 int orb_form_allows(orb_form before, orb_form after) {
-  return after.turned <= before.turned && after.quality >= fmin(before.quality, LEAST_QUALITY);
+  return after.turned <= before.turned &&
+         (after.slivers < before.slivers || after.quality >= fmin(before.quality, LEAST_QUALITY));
 }
