@@ -206,7 +206,8 @@ orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, int from_
   for (int32_t s = 1; s < alignment->shape_count; s++) {
     double energy[2];
     int improved;
-    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], alignment->landmark_count, from_given,
+    int both = alignment->shape_count == 2 && alignment->landmark_count > 0;
+    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, from_given,
                         preset, energy, &improved));
     sum += energy[1];
   }

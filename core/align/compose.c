@@ -3,11 +3,15 @@
  * Embeddings that are each optimal by themselves do not correspond: what decides how a morph looks is the map from one
  * shape straight to the other. So the fixed shape's embedding is kept, and the moving one is decimated (its landmarks
  * stay) and refined anew, with every vertex holding a place on the fixed shape and moving there by Newton steps of the
- * composed symmetric Dirichlet energy (compose_step.c). At the first level of a thousand vertices or so all vertices
- * are put where a guess says; flips on the sphere are then allowed against a growing barrier until local untangling
- * clears them all, and from there on none is allowed again. There are two guesses: the shape bent onto the other in
- * space (compose_targets.c), which is good within a class, and the alignment as it was given, which always works. The
- * start of least energy wins, if it is better than the alignment as given.
+ * composed symmetric Dirichlet energy (compose_step.c). Of two shapes the one moves whose triangles follow the other.
+ *
+ * The landmarks are joined by guesses: their mirror images, where both shapes are symmetric (compose_mirror.c); these
+ * hold likewise. There are three kinds of starts. The shape bent onto the other in space (compose_targets.c) is good
+ * where it folds little; flips on the sphere are then allowed against a growing barrier until local untangling clears
+ * them all. A map walked to on the sphere by the landmarks, the guesses and some samples of the bent shape
+ * (compose_walk.c) has no flips to begin with. The best map so far, drawn to the targets. From a start on the level is
+ * refined up to all vertices, and no flip is allowed again. The map of least energy wins, if it is better than the
+ * alignment as given.
  */
 #include "align/compose.h"
 
@@ -28,7 +32,8 @@ enum {
   WORK = 800 /* vertex steps a vertex, see cm_run.work */
 };
 
-static const double GOOD_ENERGY = 1.2; /* below it the shapes correspond: no further start is tried */
+static const double WORSE = 2, FOLLOWS = 1e-3; /* of the triangles turned over, either way: reason to swap the shapes */
+static const double GOOD_ENERGY = 1.2;         /* below it the shapes correspond: no further start is tried */
 
 static cm_effort effort_of(orb_preset preset) {
   return preset == ORB_PRESET_QUALITY ? (cm_effort){1.3, 300, 120, 80, 120} : (cm_effort){1.5, 150, 60, 40, 60};
@@ -47,26 +52,33 @@ static void cm_run_free(cm_run *c) {
   orb_free(ctx, c->position);
   orb_free(ctx, c->local);
   orb_free(ctx, c->place);
+  orb_free(ctx, c->start);
   orb_free(ctx, c->best);
+  orb_free(ctx, c->fixed_points);
+  orb_free(ctx, c->kept.points);
+  orb_free(ctx, c->kept.fixed);
+  orb_free(ctx, c->pairs.moving);
+  orb_free(ctx, c->pairs.fixed);
 }
 
-static orb_status prepare(cm_run *c, const orb_aligned_shape *fixed) {
+static orb_status prepare(cm_run *c) {
   orb_context *ctx = c->ctx;
   const orb_mesh *mesh = &c->moving->mesh;
   size_t n = (size_t)mesh->vertex_count;
   c->vertex_count = mesh->vertex_count;
-  ORB_TRY(cm_surface_create(ctx, fixed, &c->b));
+  ORB_TRY(cm_surface_create(ctx, c->fixed, &c->b));
   c->x = ORB_NEW(ctx, double, 3 * n);
   c->normal = ORB_NEW(ctx, double, 3 * n);
   c->keep = ORB_NEW0(ctx, unsigned char, n);
   c->position = ORB_NEW(ctx, double, 3 * n);
   c->local = ORB_NEW(ctx, int32_t, n);
   c->place = ORB_NEW0(ctx, orb_place, n);
+  c->start = ORB_NEW(ctx, double, 3 * n);
   c->best = ORB_NEW(ctx, double, 3 * n);
   c->goal = ORB_NEW(ctx, double, 3 * n);
   c->goal_normal = ORB_NEW(ctx, double, 3 * n);
   c->goal_place = ORB_NEW(ctx, orb_place, n);
-  if (!c->x || !c->normal || !c->keep || !c->position || !c->local || !c->place || !c->best || !c->goal ||
+  if (!c->x || !c->normal || !c->keep || !c->position || !c->local || !c->place || !c->start || !c->best || !c->goal ||
       !c->goal_normal || !c->goal_place) {
     return ORB_E_NO_MEMORY;
   }
@@ -77,15 +89,24 @@ static orb_status prepare(cm_run *c, const orb_aligned_shape *fixed) {
     c->x[i] = (mesh->positions[i] - 0.5 * extent.min[i % 3] - 0.5 * extent.max[i % 3]) * scale;
   }
   cm_normals(c->x, mesh->vertex_count, mesh->triangles, mesh->triangle_count, c->normal);
-  for (int32_t i = 0; i < c->landmark_count; i++) {
-    if (c->moving->landmark_vertices[i] >= 0) {
-      c->keep[c->moving->landmark_vertices[i]] = 1;
-    }
+  memcpy(c->start, c->moving->points, 3 * n * sizeof *c->start);
+  return ORB_OK;
+}
+
+/* The levels, in which the vertices of all pairs stay, with the pairs meeting in c->start. */
+static orb_status prepare_levels(cm_run *c) {
+  memset(c->keep, 0, (size_t)c->vertex_count);
+  for (int32_t i = 0; i < c->pairs.count; i++) {
+    int32_t v = c->pairs.moving[i];
+    c->keep[v] = 1;
+    memcpy(c->start + 3 * (size_t)v, c->b.s + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
   }
-  int32_t keep_until = c->landmark_count ? (4 * c->landmark_count > 300 ? 4 * c->landmark_count : 300) : 4;
-  ORB_TRY(orb_hierarchy_create(ctx, mesh, c->keep, keep_until, &c->hierarchy));
-  for (size_t v = 0; v < n; v++) {
-    memcpy(c->position + 3 * v, c->x + 3 * (size_t)c->hierarchy->surface.to_mesh[v], sizeof(double[3]));
+  int32_t keep_until = c->pairs.count ? (4 * c->pairs.count > 300 ? 4 * c->pairs.count : 300) : 4;
+  orb_hierarchy_destroy(c->ctx, c->hierarchy);
+  c->hierarchy = NULL;
+  ORB_TRY(orb_hierarchy_create(c->ctx, &c->moving->mesh, c->keep, keep_until, &c->hierarchy));
+  for (int32_t v = 0; v < c->vertex_count; v++) {
+    memcpy(c->position + 3 * (size_t)v, c->x + 3 * (size_t)c->hierarchy->surface.to_mesh[v], sizeof(double[3]));
   }
   return ORB_OK;
 }
@@ -223,54 +244,74 @@ done:
   return status;
 }
 
+/* All vertices at these points, the landmarks pinned; s: their order, of the caller. */
+static orb_status full_level(cm_run *c, const double *points, const orb_surface *s, cm_level *level) {
+  orb_context *ctx = c->ctx;
+  size_t n = (size_t)c->vertex_count;
+  unsigned char *flags = ORB_NEW0(ctx, unsigned char, 3 * n); /* alive; pinned; pinned in the mesh's order */
+  if (!flags) {
+    return ORB_E_NO_MEMORY;
+  }
+  memset(flags, 1, n);
+  for (int32_t i = 0; i < c->pairs.landmarks; i++) {
+    flags[2 * n + (size_t)c->pairs.moving[i]] = 1;
+  }
+  for (size_t v = 0; v < n; v++) {
+    flags[n + v] = flags[2 * n + (size_t)s->to_mesh[v]];
+    memcpy(c->position + 3 * v, c->x + 3 * (size_t)s->to_mesh[v], sizeof(double[3]));
+  }
+  orb_status status = cm_level_create(ctx, s, flags, flags + n, c->position, c->vertex_count, c->local, level);
+  for (int32_t v = 0, hint = -1; status == ORB_OK && v < level->count; v++) {
+    memcpy(level->x + 3 * (size_t)v, points + 3 * (size_t)s->to_mesh[level->vertex[v]], sizeof(double[3]));
+    cm_level_locate(level, &c->b, v, hint);
+    hint = level->place[v].triangle;
+  }
+  orb_free(ctx, flags);
+  return status;
+}
+
 /* The composed energy of the alignment as it was given. */
 static orb_status given_energy(cm_run *c, double *energy) {
-  orb_embed_options options;
-  orb_embed_defaults(&options);
-  const orb_mesh *mesh = &c->moving->mesh;
   orb_surface s;
   cm_level level = {0};
-  ORB_TRY(orb_surface_create(c->ctx, mesh, &s));
-  unsigned char *all = ORB_NEW(c->ctx, unsigned char, mesh->vertex_count);
-  orb_status status = all ? ORB_OK : ORB_E_NO_MEMORY;
+  ORB_TRY(orb_surface_create(c->ctx, &c->moving->mesh, &s));
+  orb_status status = full_level(c, c->moving->points, &s, &level);
   if (status == ORB_OK) {
-    memset(all, 1, (size_t)mesh->vertex_count);
-    status = cm_level_create(c->ctx, &s, all, all, c->position, mesh->vertex_count, c->local, &level);
-  }
-  if (status == ORB_OK) {
-    int32_t hint = -1;
-    for (int32_t v = 0; v < level.count; v++) {
-      memcpy(level.x + 3 * (size_t)v, c->moving->points + 3 * (size_t)s.to_mesh[level.vertex[v]], sizeof(double[3]));
-      cm_level_locate(&level, &c->b, v, hint);
-      hint = level.place[v].triangle;
-    }
     *energy = cm_level_energy(&level);
   }
   cm_level_free(c->ctx, &level);
-  orb_free(c->ctx, all);
   orb_surface_free(c->ctx, &s);
   return status;
 }
 
+/* Before the starts that need a map in which all pairs meet: one is walked to, or the guesses are given up. */
+static orb_status meet_pairs(cm_run *c) {
+  int stuck = 1;
+  if (c->pairs.count > 0) {
+    ORB_TRY(cm_walk(c, CM_STEPS, &stuck));
+  }
+  if (stuck && c->pairs.count > c->pairs.landmarks) {
+    c->pairs.count = c->pairs.landmarks;
+    memcpy(c->start, c->moving->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
+    ORB_TRY(cm_bend(c, 0));
+    ORB_TRY(prepare_levels(c));
+  }
+  return ORB_OK;
+}
+
 /* The starts, until nothing comes of them any more. */
-static orb_status run_starts(cm_run *c, const orb_aligned_shape *fixed, orb_preset preset) {
-  ORB_TRY(cm_bend(c, fixed, c->from_given ? CM_SAMPLES : 0));
+static orb_status run_starts(cm_run *c, orb_preset preset) {
   ORB_TRY(run_start(c, CM_SPATIAL));
   if (preset != ORB_PRESET_QUALITY && c->best_energy <= GOOD_ENERGY) {
     return ORB_OK;
   }
-  if (preset == ORB_PRESET_QUALITY) {
-    ORB_TRY(run_start(c, CM_GIVEN));
-  }
-  double last = c->best_energy;
+  ORB_TRY(meet_pairs(c));
+  ORB_TRY(run_start(c, CM_GIVEN)); /* without flips and cheap, and the better it is the further the others get */
   ORB_TRY(run_start(c, CM_DRAWN));
-  if (preset != ORB_PRESET_QUALITY && !(c->best_energy < last)) {
-    ORB_TRY(run_start(c, CM_GIVEN));
-  }
-  last = INFINITY;
+  double last = INFINITY;
   while (c->best_energy < 0.99 * last && c->passes-- > 0 && c->work > 0) {
     last = c->best_energy;
-    ORB_TRY(cm_bend(c, fixed, CM_SAMPLES));
+    ORB_TRY(cm_bend(c, CM_SAMPLES));
     ORB_TRY(run_start(c, CM_SPATIAL));
     if (!(c->best_energy < last)) {
       ORB_TRY(run_start(c, CM_DRAWN));
@@ -279,33 +320,106 @@ static orb_status run_starts(cm_run *c, const orb_aligned_shape *fixed, orb_pres
   return ORB_OK;
 }
 
-orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_aligned_shape *moving,
+/* Writes the best map back if it is better than what was given and certified. */
+static orb_status take_best(cm_run *c, orb_aligned_shape *fixed, double energy[2], int *improved) {
+  orb_aligned_shape *shapes[2] = {c->moving, fixed};
+  cm_map best = {c->best, c->fixed_points, c->best_energy};
+  orb_certificate certificate[2] = {{.valid = 1}, {.valid = 1}};
+  best = c->kept.points && c->kept.energy <= best.energy ? c->kept : best;
+  const double *points[2] = {best.points, best.fixed};
+  if (!(best.energy < energy[0])) {
+    return ORB_OK;
+  }
+  for (int s = 0; s < 2; s++) {
+    const orb_mesh *mesh = &shapes[s]->mesh;
+    if (points[s]) {
+      ORB_TRY(
+          orb_certify(c->ctx, points[s], mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate[s]));
+    }
+  }
+  *improved = certificate[0].valid && certificate[1].valid;
+  for (int s = 0; s < 2 && *improved; s++) {
+    if (points[s]) {
+      memcpy(shapes[s]->points, points[s], 3 * (size_t)shapes[s]->mesh.vertex_count * sizeof *points[s]);
+      shapes[s]->certificate = certificate[s];
+      energy[1] = best.energy;
+    }
+  }
+  return ORB_OK;
+}
+
+/* The share of a shape's triangles whose images on another turn against its normals. */
+static orb_status turned_share(orb_context *ctx, const orb_aligned_shape *from, const orb_aligned_shape *to,
+                               double *share) {
+  const orb_mesh *mesh = &from->mesh;
+  cm_surface b;
+  int32_t turned = 0;
+  ORB_TRY(cm_surface_create(ctx, to, &b));
+  double *image = ORB_NEW(ctx, double, 6 * (size_t)mesh->vertex_count);
+  orb_place place = {.triangle = -1};
+  for (int32_t v = 0; image && v < mesh->vertex_count; v++) {
+    double *y = image + 6 * (size_t)v;
+    orb_locate(b.locator, from->points + 3 * (size_t)v, place.triangle, &place);
+    cm_surface_at(&b, &place, y, NULL, y + 3);
+  }
+  for (int32_t t = 0; image && t < mesh->triangle_count; t++) {
+    const int32_t *v = mesh->triangles + 3 * (size_t)t;
+    const double *p = image + 6 * (size_t)v[0], *q = image + 6 * (size_t)v[1], *r = image + 6 * (size_t)v[2];
+    double u[3], w[3], n[3];
+    orb_sub(q, p, u);
+    orb_sub(r, p, w);
+    orb_cross(u, w, n);
+    turned += orb_dot(n, p + 3) + orb_dot(n, q + 3) + orb_dot(n, r + 3) < 0;
+  }
+  *share = (double)turned / mesh->triangle_count;
+  orb_status status = image ? orb_context_check(ctx) : ORB_E_NO_MEMORY;
+  orb_free(ctx, image);
+  cm_surface_free(ctx, &b);
+  return status;
+}
+
+/* Whether the shapes should change places: triangles that are to move must be able to follow the other surface. Where
+ * it has a limb that the moving shape has hardly a triangle for, their images turn over. */
+static orb_status should_swap(orb_context *ctx, const orb_aligned_shape *fixed, const orb_aligned_shape *moving,
+                              int *swap) {
+  double here, there;
+  ORB_TRY(turned_share(ctx, moving, fixed, &here));
+  ORB_TRY(turned_share(ctx, fixed, moving, &there));
+  *swap = here > FOLLOWS + WORSE * there;
+  return ORB_OK;
+}
+
+orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
                        int32_t landmark_count, int from_given, orb_preset preset, double energy[2], int *improved) {
-  cm_run c = {.ctx = ctx, .moving = moving, .landmark_count = landmark_count, .effort = effort_of(preset)};
+  int swap = 0;
+  *improved = 0;
+  if (both) {
+    ORB_TRY(should_swap(ctx, fixed, moving, &swap));
+  }
+  if (swap) {
+    orb_aligned_shape *other = fixed;
+    fixed = moving;
+    moving = other;
+  }
+  cm_run c = {.ctx = ctx,
+              .fixed = fixed,
+              .moving = moving,
+              .both = both,
+              .landmark_count = landmark_count,
+              .effort = effort_of(preset)};
   c.passes = preset == ORB_PRESET_QUALITY ? 6 : 3;
-  c.from_given = from_given;
   c.rough = preset != ORB_PRESET_QUALITY;
   c.work = (preset == ORB_PRESET_QUALITY ? 5000 : WORK) * (int64_t)moving->mesh.vertex_count;
-  orb_certificate certificate;
   orb_status status;
-  *improved = 0;
-  ORB_GO(status, prepare(&c, fixed), done);
+  ORB_GO(status, prepare(&c), done);
   ORB_GO(status, given_energy(&c, &energy[0]), done);
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
-  ORB_GO(status, run_starts(&c, fixed, preset), done);
-  if (c.best_energy < energy[0]) {
-    ORB_GO(status,
-           orb_certify(ctx, c.best, moving->mesh.vertex_count, moving->mesh.triangles, moving->mesh.triangle_count,
-                       &certificate),
-           done);
-    if (certificate.valid) {
-      memcpy(moving->points, c.best, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
-      moving->certificate = certificate;
-      energy[1] = c.best_energy;
-      *improved = 1;
-    }
-  }
+  ORB_GO(status, cm_pairs_create(&c), done);
+  ORB_GO(status, cm_bend(&c, from_given ? CM_SAMPLES : 0), done);
+  ORB_GO(status, prepare_levels(&c), done);
+  ORB_GO(status, run_starts(&c, preset), done);
+  status = take_best(&c, fixed, energy, improved);
 done:
   cm_run_free(&c);
   return status;

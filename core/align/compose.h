@@ -7,11 +7,12 @@
 #include "orbmorph/remesh.h"
 
 /* Improves the points of `moving` on the sphere so that the map moving → sphere → fixed is as isometric as can be. The
- * landmarks (vertices of both, whose points are bit-equal already) stay. The result is certified and better than what
- * was given, or else the points are left as they are and *improved is 0. energy[2]: composed symmetric Dirichlet,
- * capped at 20 and weighted by area, before and after. from_given: the map as given is roughly right, and the first
- * spatial targets follow it rather than what fits best in space. Stage "align". */
-ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, const orb_aligned_shape *fixed, orb_aligned_shape *moving,
+ * landmarks (vertices of both, whose points are bit-equal already) stay together. both: the fixed shape's points may
+ * change too, which leaves more room, and the shapes may change places; else they stay, for further shapes. The result
+ * is certified and better than what was given, or else all points are left as they are and *improved is 0. energy[2]:
+ * composed symmetric Dirichlet, capped at 20 and weighted by area, before and after. from_given: the map as given is
+ * roughly right, and the first spatial targets follow it rather than what fits best in space. Stage "align". */
+ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
                                       int32_t landmark_count, int from_given, orb_preset preset, double energy[2],
                                       int *improved);
 
@@ -42,6 +43,13 @@ int cm_surface_trace(const cm_surface *b, const orb_place *from, const double st
 
 /* Angle-weighted unit vertex normals. */
 void cm_normals(const double *x, int32_t vertex_count, const int32_t *triangles, int32_t triangle_count, double *out);
+
+/* Further landmarks, guessed: mirror images of the given ones where both shapes are nearly their own mirror images
+ * (compose_mirror.c). landmarks: vertices of either shape, `count` each; guesses: likewise, room for `count` each;
+ * *guess_count: how many were found. */
+ORB_MUST_CHECK orb_status cm_mirror_landmarks(orb_context *ctx, const orb_mesh *const meshes[2],
+                                              const int32_t *const landmarks[2], int32_t count,
+                                              int32_t *const guesses[2], int32_t *guess_count);
 
 /* What holds a spatial target: vertices of the moving shape and where they belong, 3 doubles each. The first `exact`
  * are landmarks and hold exactly, the others are samples of a map that is known roughly. */

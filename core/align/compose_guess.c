@@ -45,26 +45,25 @@ static void find_goal_places(void *arg, int64_t begin, int64_t end, int thread) 
   }
 }
 
-/* The landmarks as anchors, and, where a map is known already (c->best), samples of it. Arrays of the caller: room for
- * landmark_count + CM_SAMPLES. */
-static orb_status gather_anchors(cm_run *c, const orb_aligned_shape *fixed, int samples, int32_t *vertex, double *goal,
-                                 cm_anchors *out) {
+/* The pairs as anchors, and, where a map is known already (c->best), samples of it. Arrays of the caller: room for all
+ * pairs and CM_SAMPLES. */
+static orb_status gather_anchors(cm_run *c, int samples, int32_t *vertex, double *goal, cm_anchors *out) {
   *out = (cm_anchors){.vertex = vertex, .goal = goal};
-  for (int32_t i = 0; i < c->landmark_count; i++) {
-    int32_t u = fixed->landmark_vertices[i];
-    if (c->moving->landmark_vertices[i] >= 0 && u >= 0) {
-      memcpy(goal + 3 * (size_t)out->count, c->b.x + 3 * (size_t)u, sizeof(double[3]));
-      vertex[out->count++] = c->moving->landmark_vertices[i];
-    }
+  for (int32_t i = 0; i < c->pairs.count; i++) {
+    memcpy(goal + 3 * (size_t)i, c->b.x + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
+    vertex[i] = c->pairs.moving[i];
   }
-  out->exact = out->count;
+  out->count = out->exact = c->pairs.count;
   samples = samples < c->vertex_count / 2 ? samples : c->vertex_count / 2;
   if (samples > 0) {
     ORB_TRY(cm_spread(c->ctx, c->x, c->vertex_count, samples, vertex + out->count));
   }
   for (int i = 0; i < samples; i++) {
-    int32_t v = vertex[out->exact + i];
-    if (!c->keep[v]) { /* a landmark is an anchor already */
+    int32_t v = vertex[out->exact + i], paired = 0;
+    for (int32_t k = 0; k < c->pairs.count; k++) {
+      paired |= c->pairs.moving[k] == v;
+    }
+    if (!paired) {
       orb_place place;
       orb_locate(c->b.locator, c->best + 3 * (size_t)v, -1, &place);
       cm_surface_at(&c->b, &place, goal + 3 * (size_t)out->count, NULL, NULL);
@@ -74,18 +73,18 @@ static orb_status gather_anchors(cm_run *c, const orb_aligned_shape *fixed, int 
   return ORB_OK;
 }
 
-orb_status cm_bend(cm_run *c, const orb_aligned_shape *fixed, int samples) {
+orb_status cm_bend(cm_run *c, int samples) {
   orb_context *ctx = c->ctx;
   const orb_mesh *mesh = &c->moving->mesh;
   cm_anchors anchors;
-  double fit, *goal = ORB_NEW(ctx, double, 3 * ((size_t)c->landmark_count + CM_SAMPLES));
-  int32_t *vertex = ORB_NEW(ctx, int32_t, (size_t)c->landmark_count + CM_SAMPLES);
+  double fit, *goal = ORB_NEW(ctx, double, 3 * ((size_t)c->pairs.count + CM_SAMPLES));
+  int32_t *vertex = ORB_NEW(ctx, int32_t, (size_t)c->pairs.count + CM_SAMPLES);
   goal_job job = {.c = c};
   orb_status status = ORB_E_NO_MEMORY;
   if (!goal || !vertex) {
     goto done;
   }
-  ORB_GO(status, gather_anchors(c, fixed, samples, vertex, goal, &anchors), done);
+  ORB_GO(status, gather_anchors(c, samples, vertex, goal, &anchors), done);
   ORB_GO(status, cm_spatial_targets(ctx, &c->b, c->x, c->normal, c->vertex_count, &anchors, c->goal, &fit), done);
   cm_normals(c->goal, c->vertex_count, mesh->triangles, mesh->triangle_count, c->goal_normal);
   ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &job.tree), done);
@@ -114,7 +113,7 @@ static void guess_range(void *arg, int64_t begin, int64_t end, int thread) {
       cm_surface_at(&job->c->b, &job->l->place[i], NULL, job->l->x + 3 * i, NULL);
       cm_level_refresh(job->l, &job->c->b, (int32_t)i);
     } else {
-      const double *points = job->points ? job->points : job->c->moving->points;
+      const double *points = job->points ? job->points : job->c->start;
       memcpy(job->l->x + 3 * i, points + 3 * (size_t)v, sizeof(double[3]));
       cm_level_locate(job->l, &job->c->b, (int32_t)i, -1);
     }
@@ -143,7 +142,7 @@ static void spread_out(cm_run *c, cm_level *l) {
 }
 
 void cm_guess(cm_run *c, cm_level *level, const int32_t *to_mesh, cm_start start) {
-  const double *points = start == CM_SPATIAL ? NULL : start == CM_DRAWN ? c->best : c->moving->points;
+  const double *points = start == CM_SPATIAL ? NULL : start == CM_DRAWN ? c->best : c->start;
   guess_job job = {c, level, to_mesh, points};
   orb_parallel_for(c->ctx, level->count, 16, guess_range, &job);
   if (start == CM_SPATIAL) {

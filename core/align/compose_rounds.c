@@ -10,6 +10,7 @@ enum { SOFT_SWEEPS = 20, DRAW_ROUNDS = 5, DRAW_SWEEPS = 40, CLEARINGS = 8 };
 static const double EPSILON = 0.1;
 static const double FIRST_BARRIER = 1e-4;
 static const double STILL = 1e-3; /* of a mean edge: less does not count as moving */
+static const double OVER = 1.5;   /* over-relaxation, where no flips are allowed */
 static const double GROWING = 1.05;
 static const double DRAW = 20, DRAW_FALL = 0.8;
 
@@ -18,7 +19,7 @@ cm_rules cm_soft(double barrier) {
 }
 
 cm_rules cm_hard(void) {
-  return (cm_rules){.soft = 0, .barrier = 1, .epsilon = EPSILON, .omega = 1};
+  return (cm_rules){.soft = 0, .barrier = 1, .epsilon = EPSILON, .omega = OVER};
 }
 
 static void relocate(cm_run *c, cm_level *l) {

@@ -1,11 +1,14 @@
-/* What one run of orb_compose() holds, shared by compose.c, compose_guess.c and compose_rounds.c. */
+/* What one run of orb_compose() holds, shared by compose.c and compose_guess, _rounds, _walk. */
 #ifndef ORB_ALIGN_COMPOSE_RUN_H
 #define ORB_ALIGN_COMPOSE_RUN_H
 
 #include "align/compose_level.h"
 #include "embed/multires.h"
 
-enum { CM_SAMPLES = 150 /* of a map, from which the moving shape is bent anew */ };
+enum {
+  CM_SAMPLES = 150, /* of a map, from which the moving shape is bent anew */
+  CM_STEPS = 25     /* most samples of the spatial targets that a walk goes by */
+};
 
 /* Where a start puts the vertices of its first level. */
 typedef enum cm_start {
@@ -13,6 +16,19 @@ typedef enum cm_start {
   CM_SPATIAL, /* at their spatial targets */
   CM_DRAWN    /* where the best map has them; they are then drawn to their targets */
 } cm_start;
+
+/* Vertices of the two shapes that belong together: first the landmarks, each once, then guesses of more. */
+typedef struct cm_pairs {
+  int32_t count, landmarks, capacity;
+  int32_t *moving, *fixed;
+} cm_pairs;
+
+/* A map that the starts have come to. */
+typedef struct cm_map {
+  double *points; /* of the moving shape, mesh order; NULL: none */
+  double *fixed;  /* the fixed shape's; NULL: as given */
+  double energy;
+} cm_map;
 
 typedef struct cm_effort {
   double growth; /* of the vertices from level to level */
@@ -22,10 +38,15 @@ typedef struct cm_effort {
 typedef struct cm_run {
   orb_context *ctx;
   cm_surface b;
+  const orb_aligned_shape *fixed;
   orb_aligned_shape *moving;
   int32_t vertex_count, landmark_count;
-  double *x, *normal; /* moving shape, area 4π */
-  double *goal;       /* spatial targets; NULL: none */
+  cm_pairs pairs;
+  int both;             /* the fixed shape's points on the sphere may change too */
+  double *fixed_points; /* what they are now; NULL: as given */
+  cm_map kept;          /* the best map from before they changed */
+  double *x, *normal;   /* moving shape, area 4π */
+  double *goal;         /* spatial targets; NULL: none */
   double *goal_normal;
   orb_place *goal_place; /* on the fixed shape, of every vertex of the moving one */
   unsigned char *keep;
@@ -33,20 +54,27 @@ typedef struct cm_run {
   double *position; /* x in the order of the surface */
   int32_t *local;
   orb_place *place; /* by vertex of the surface: where it was on the last level */
+  double *start;    /* points of a map in which all pairs meet, mesh order: as given, later as walked */
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
-  int from_given; /* the alignment as given is sampled for the first bend */
-  int rough;      /* the alignment as given is only refined to be sampled */
-  int passes;     /* bends through samples of the best map */
-  int64_t work;   /* vertex steps that may still be spent on clearing flips and further starts */
+  int rough;    /* the alignment as given is only refined to be sampled */
+  int passes;   /* bends through samples of the best map */
+  int64_t work; /* vertex steps that may still be spent on clearing flips and further starts */
   cm_effort effort;
 } cm_run;
 
 /* compose_guess.c: spatial targets from the landmarks and so many samples of the best map, with the normals that the
  * bent shape has, and the nearest places to them. */
-ORB_MUST_CHECK orb_status cm_bend(cm_run *run, const orb_aligned_shape *fixed, int samples);
+ORB_MUST_CHECK orb_status cm_bend(cm_run *run, int samples);
 /* Puts the vertices of a level where the start has them. to_mesh: of the surface's vertices. */
 void cm_guess(cm_run *run, cm_level *level, const int32_t *to_mesh, cm_start start);
+
+/* compose_walk.c. The landmarks, and guesses from them. */
+ORB_MUST_CHECK orb_status cm_pairs_create(cm_run *run);
+/* Embeds both shapes anew so that all pairs meet, together with as many samples of the spatial targets as can be met
+ * with them. run->start is what comes of it, and if run->both is set the fixed shape's sphere is replaced, else the map
+ * is carried to it. *stuck: nothing came of it, and all is as it was. */
+ORB_MUST_CHECK orb_status cm_walk(cm_run *run, int32_t samples, int *stuck);
 
 /* compose_rounds.c. Sweeps until hardly a vertex moves any more, `count` at most. */
 ORB_MUST_CHECK orb_status cm_sweeps(cm_run *run, cm_level *level, cm_rules rules, int count);

@@ -215,7 +215,8 @@ static orb_status run_trial(trials *t, trial *one, int compose) {
   if (!compose) {
     status = sample_images(t, sheets, one);
   } else {
-    ORB_GO(status, orb_compose(t->ctx, &sheets[0].shape, &sheets[1].shape, 0, 1, ORB_PRESET_DEFAULT, energy, &improved),
+    ORB_GO(status,
+           orb_compose(t->ctx, &sheets[0].shape, &sheets[1].shape, 0, 0, 1, ORB_PRESET_DEFAULT, energy, &improved),
            end);
     one->energy = energy[1];
     ORB_GO(status, sample_images(t, sheets, one), end);
