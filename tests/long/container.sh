@@ -14,6 +14,9 @@ if [ ! -f "$at/base/.whole" ]; then
   debootstrap --variant=minbase bookworm "$at/base" "$mirror"
   touch "$at/base/.whole"
 fi
+# Certificates that were added to this machine hold for the build, too: a proxy may ask for them.
+mkdir -p "$at/base/usr/local/share/ca-certificates"
+cp /usr/local/share/ca-certificates/*.crt "$at/base/usr/local/share/ca-certificates/" 2>/dev/null || true
 if ! podman "${own[@]}" image exists docker.io/library/debian:12-slim; then
   tar -C "$at/base" -c . | podman "${own[@]}" import --quiet - docker.io/library/debian:12-slim
 fi

@@ -152,6 +152,18 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
   await page.getByRole('switch', { name: 'Wireframe' }).click();
   await settled(page);
   assert.ok((await difference(browser, plain, await page.locator('.stage-area').screenshot())) > 0.005, 'the wireframe is drawn');
+  // The common mesh on each shape is shown with its triangles, which the same switch takes away; the error without.
+  for (const view of ['Each shape', 'Error']) {
+    await page.getByRole('group', { name: 'What is shown' }).getByRole('button', { name: view }).click();
+    if (view === 'Error') await until(() => page.getByText(/largest/).count().then((n) => n > 0), 'the errors are measured');
+    assert.ok(await page.getByRole('switch', { name: 'Wireframe' }).isChecked(), view);
+    await settled(page);
+    const drawn = await page.locator('.stage-area').screenshot();
+    await page.getByRole('switch', { name: 'Wireframe' }).click();
+    await settled(page);
+    assert.ok((await difference(browser, drawn, await page.locator('.stage-area').screenshot())) > 0.005, `${view}: the wireframe is gone`);
+  }
+  await page.getByRole('group', { name: 'What is shown' }).getByRole('button', { name: 'Morph' }).click();
 
   const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name: 'Download GLB' }).click()]);
   assert.match(download.suggestedFilename(), /\.glb$/);

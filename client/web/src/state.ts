@@ -94,6 +94,8 @@ export interface State {
   mix: number[] | null;
   show: 'morph' | 'each' | 'error';
   wire: boolean;
+  /** of the common mesh on each shape, which is shown for its triangles */
+  meshWire: boolean;
   linked: boolean;
   paint: SpherePaint;
   side: 'before' | 'after';
@@ -108,7 +110,7 @@ export interface State {
 
 export const state: State = {
   tab: 'shapes', shapes: [], landmarks: [], active: null, past: [], future: [], options: { ...DEFAULTS },
-  running: null, problem: null, loading: null, result: null, playing: false, mix: null, show: 'morph', wire: false, linked: true,
+  running: null, problem: null, loading: null, result: null, playing: false, mix: null, show: 'morph', wire: false, meshWire: true, linked: true,
   paint: 'direction', side: 'before', token: 'none', asking: null, drawer: null, server: null, toasts: [], dragging: false,
 };
 

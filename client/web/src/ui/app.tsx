@@ -9,7 +9,7 @@ import { applyTheme, theme, type Theme } from '../theme';
 import { Button, Icon, useStateOfPage } from './parts';
 import { ShapesInspector, ShapesStage } from './shapes';
 import { LandmarksInspector, LandmarksStage } from './landmarks';
-import { MorphInspector, MorphStage } from './morph';
+import { MorphInspector, MorphStage, switchWire } from './morph';
 import { SpheresInspector, SpheresStage } from './spheres';
 import { Drawer } from './drawers';
 import { Action } from './action';
@@ -161,7 +161,7 @@ function useShortcuts() {
       else if (key === ' ' && state.result && !target.closest('button, summary, a')) {
         event.preventDefault();
         player.toggle();
-      } else if (key === 'w' && state.result) set({ wire: !state.wire });
+      } else if (key === 'w' && state.result) switchWire();
       else if ((key === 'delete' || key === 'backspace') && state.tab === 'landmarks' && state.active !== null && !target.closest('button')) removeLandmark(state.active);
       else if (/^[1-4]$/.test(key) && state.shapes.length) {
         const tab = (Object.keys(TITLES) as Tab[])[Number(key) - 1];

@@ -19,12 +19,12 @@ export function MorphStage() {
       <div class="grid" data-count={show === 'morph' ? 1 : result.supermesh.shapes.length}>
         {show === 'morph' && <Pane key="main" label="Morph" model={result.main} wire={state.wire} />}
         {show === 'each' && result.supermesh.shapes.map((shape, i) => (
-          <Pane key={`each${i}`} label={`The common mesh as ${shape.name}`} model={result.each[i]} wire>
+          <Pane key={`each${i}`} label={`The common mesh as ${shape.name}`} model={result.each[i]} wire={state.meshWire}>
             <Name index={i} name={shape.name} note={`${count(result.supermesh.triangles)} triangles`} />
           </Pane>
         ))}
         {show === 'error' && state.shapes.map((shape, i) => (
-          <Pane key={`error${shape.key}`} label={`Error on ${shape.name}`} model={shape.error?.model} wire={false}>
+          <Pane key={`error${shape.key}`} label={`Error on ${shape.name}`} model={shape.error?.model} wire={state.wire}>
             <Name index={i} name={shape.name} note={shape.error ? `largest ${relative(shape.error.max)}, rms ${relative(shape.error.rms)}` : 'measuring…'} />
             {shape.error && <Legend ramp="heat" low="0" high={relative(shape.error.max)} label="distance from the common mesh, of the shape's size" />}
           </Pane>
@@ -109,6 +109,9 @@ function Transport({ result }: { result: Result }) {
   );
 }
 
+/** The one that is seen: on “Each shape” it is another than elsewhere. */
+export const switchWire = () => set(state.tab === 'morph' && state.show === 'each' ? { meshWire: !state.meshWire } : { wire: !state.wire });
+
 const assetName = ({ supermesh }: Result) => `${supermesh.shapes.map((s) => s.name).join('-')}.glb`;
 
 export function MorphInspector() {
@@ -128,7 +131,7 @@ export function MorphInspector() {
       {state.show === 'error' && <ErrorLoader />}
       {state.show === 'morph' && <Mix result={result} />}
       <div class="row wrap gap-top">
-        <Switch label="Wireframe" on={state.wire} onChange={(wire) => set({ wire })} />
+        <Switch label="Wireframe" on={state.show === 'each' ? state.meshWire : state.wire} onChange={switchWire} />
       </div>
       <div class="row wrap gap-top">
         <a class="button primary" href={client.url(supermesh.asset)} download={assetName(result)}
