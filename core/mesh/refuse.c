@@ -4,6 +4,10 @@
 #include "base/check.h"
 #include "mesh/sort.h"
 
+static const char *of(int64_t count, const char *one, const char *many) {
+  return count == 1 ? one : many;
+}
+
 static int32_t low_of(const orb_mesh *mesh, int32_t h) {
   int32_t a = mesh->triangles[h], b = mesh->triangles[orb_next(h)];
   return a < b ? a : b;
@@ -56,9 +60,10 @@ orb_status orb_refuse_crowded(orb_surface *s) {
   orb_status status = orb_refuse_sort_edges(s, ORB_CROWDED, entry, start);
   if (status == ORB_OK) {
     status = orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
-                      "%lld edges belong to more than two faces (or run from a vertex to itself); a surface has two "
+                      "%lld %s to more than two faces (or %s from a vertex to itself); a surface has two "
                       "faces at each edge. Remove the faces that are too many.",
-                      (long long)s->edges.crowded);
+                      (long long)s->edges.crowded, of(s->edges.crowded, "edge belongs", "edges belong"),
+                      of(s->edges.crowded, "runs", "run"));
     orb_error *error = orb_context_error_edit(s->ctx);
     error->edge_total = s->edges.crowded;
     for (int64_t i = 0; i < count && error->edge_count < ORB_ERROR_ITEMS; i++) {
@@ -81,9 +86,9 @@ orb_status orb_refuse_facing(orb_surface *s) {
                      "The surface has one side only, like a Möbius strip: its faces cannot be turned to agree. "
                      "Following neighbours from face to face comes back turned over at the edge given.")
           : orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
-                     "Faces are turned against their neighbours at %lld edges; send the mesh with repair=safe, or turn "
+                     "Faces are turned against their neighbours at %lld %s; send the mesh with repair=safe, or turn "
                      "them.",
-                     (long long)s->edges.same_way);
+                     (long long)s->edges.same_way, of(s->edges.same_way, "edge", "edges"));
   orb_error *error = orb_context_error_edit(s->ctx);
   if (s->conflict >= 0) {
     error->edge_total = 1;
@@ -102,10 +107,12 @@ orb_status orb_refuse_facing(orb_surface *s) {
 orb_status orb_refuse_open(orb_surface *s) {
   int64_t loops = 0;
   ORB_TRY(orb_surface_loops(s, &loops));
-  (void)orb_fail(s->ctx, ORB_E_NOT_CLOSED,
-                 "The surface is not closed: %lld edges in %lld boundary loops have a face on one side only. Close the "
-                 "holes, or send the mesh with repair=fill_holes.",
-                 (long long)s->edges.open, (long long)loops);
+  (void)orb_fail(
+      s->ctx, ORB_E_NOT_CLOSED,
+      "The surface is not closed: %lld %s in %lld boundary %s %s a face on one side only. Close %s, or send the "
+      "mesh with repair=fill_holes.",
+      (long long)s->edges.open, of(s->edges.open, "edge", "edges"), (long long)loops, of(loops, "loop", "loops"),
+      of(s->edges.open, "has", "have"), of(loops, "the hole", "the holes"));
   orb_error *error = orb_context_error_edit(s->ctx);
   error->boundary_loops = loops;
   error->edge_total = s->edges.open;
@@ -143,13 +150,13 @@ orb_status orb_refuse_pinched(orb_surface *s, const orb_fans *fans) {
   ORB_TRY(add_pieces(s, &sizes));
   if (s->piece_count > 1) {
     (void)orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
-                   "%d bodies hang together only at %lld vertices, where the surface is not manifold. Join them "
+                   "%d bodies hang together only at %lld %s, where the surface is not manifold. Join them "
                    "properly, or send the mesh with repair=largest_component.",
-                   s->piece_count, (long long)fans->pinched);
+                   s->piece_count, (long long)fans->pinched, of(fans->pinched, "vertex", "vertices"));
   } else {
     (void)orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
-                   "At %lld vertices several fans of faces touch; send the mesh with repair=safe, or split them.",
-                   (long long)fans->pinched);
+                   "At %lld %s several fans of faces touch; send the mesh with repair=safe, or split them.",
+                   (long long)fans->pinched, of(fans->pinched, "vertex", "vertices"));
   }
   if (s->piece_count > 1) {
     list_pieces(s, sizes);
@@ -177,15 +184,15 @@ orb_status orb_refuse_pieces(orb_surface *s) {
 
 orb_status orb_refuse_handles(orb_surface *s, int64_t genus) {
   (void)orb_fail(s->ctx, ORB_E_NOT_GENUS_ZERO,
-                 "The surface has %lld handles (like a torus or a cup's ear); only surfaces like a sphere can be "
-                 "morphed. Fill or cut the handles.",
-                 (long long)genus);
+                 "The surface has %lld %s (like a torus or a cup's ear); only surfaces like a sphere can be "
+                 "morphed. Fill or cut %s.",
+                 (long long)genus, of(genus, "handle", "handles"), of(genus, "it", "them"));
   orb_context_error_edit(s->ctx)->genus = genus;
   return ORB_E_NOT_GENUS_ZERO;
 }
 
 orb_status orb_refuse_few(orb_surface *s) {
   return orb_fail(s->ctx, ORB_E_DEGENERATE,
-                  "%d triangles are left once repeated and degenerate faces are dropped; a closed surface needs four.",
-                  s->mesh->triangle_count);
+                  "%d %s left once repeated and degenerate faces are dropped; a closed surface needs four.",
+                  s->mesh->triangle_count, of(s->mesh->triangle_count, "triangle is", "triangles are"));
 }

@@ -114,6 +114,7 @@ test('bad meshes are refused with what is wrong and where', async (t) => {
     return reply.json;
   };
   const open = await refused(shapes.withoutFace(m), 422, 'not-closed');
+  assert.match(open.detail, /3 edges in 1 boundary loop have a face on one side only\. Close the hole,/);
   assert.equal(open.boundary_loops, 1);
   assert.equal(open.boundary_edges.length, 3);
   assert.deepEqual([...new Set(open.boundary_edges.flat())].sort((a, b) => a - b), [...m.triangles[0]].sort((a, b) => a - b));
