@@ -270,6 +270,36 @@ static void flattened_belts_do_not_creep(void **state) {
   }
 }
 
+/* Turns a ball about an axis in space, the more the farther along it; the sphere's points stay. */
+static void wind(const orb_aligned_shape *shape, int axis, double most) {
+  int x = (axis + 1) % 3, y = (axis + 2) % 3;
+  for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
+    double *p = shape->mesh.positions + 3 * v, turn = most * p[axis] / sqrt(orb_dot(p, p)), px = p[x], py = p[y];
+    p[x] = cos(turn) * px - sin(turn) * py;
+    p[y] = sin(turn) * px + cos(turn) * py;
+  }
+}
+
+/* A map that winds one surface about the other, as landmarks in random order do: nearly every triangle is a needle on
+ * one of them. The tolerance holds all the same. */
+static void wound_maps_keep_the_tolerance(void **state) {
+  (void)state;
+  static const double tolerance[] = {0.02, 0.002};
+  for (int i = 0; i < 2; i++) {
+    orb_context *ctx = remesh_context(2);
+    orb_aligned_shape shapes[2];
+    sphere_shape(ctx, SPHERE_ICO, 3, 0.2, 1, &shapes[0]);
+    sphere_shape(ctx, SPHERE_OCTA, 3, 0.2, 2, &shapes[1]);
+    for (int axis = 0; axis < 3; axis++) {
+      wind(&shapes[1], axis, 5);
+    }
+    check(shapes, 2, ctx, tolerance[i]);
+    sphere_shape_free(ctx, &shapes[0]);
+    sphere_shape_free(ctx, &shapes[1]);
+    orb_context_destroy(ctx);
+  }
+}
+
 static void four_shapes(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(2);
@@ -371,6 +401,7 @@ int main(void) {
       cmocka_unit_test(sheared_maps_turn_no_triangle),
       cmocka_unit_test(sheared_maps_keep_the_tolerance),
       cmocka_unit_test(flattened_belts_do_not_creep),
+      cmocka_unit_test(wound_maps_keep_the_tolerance),
       cmocka_unit_test(four_shapes),
       cmocka_unit_test(landmarks_and_limits_are_kept),
       cmocka_unit_test(bad_options_are_named),

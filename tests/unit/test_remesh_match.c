@@ -1,0 +1,207 @@
+/* The steps of the adaptive method one by one: none leaves the limit, whatever the map does. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "numeric/vec3.h"
+#include "remesh/match.h"
+#include "support_remesh.h"
+
+typedef struct bench {
+  orb_context *ctx;
+  orb_aligned_shape shape[2];
+  int32_t *twin[2];
+  orb_locator *locator[2];
+  double diagonal[2];
+  orb_remesh_options options;
+  orb_remesh_job job;
+  orb_match match;
+} bench;
+
+static const double LIMIT = 0.01;
+
+/* Turns a ball about an axis in space, the more the farther along it, and leaves the sphere's points. */
+static void shear(const orb_aligned_shape *shape, int axis, double most) {
+  int x = (axis + 1) % 3, y = (axis + 2) % 3;
+  for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
+    double *p = shape->mesh.positions + 3 * v, turn = most * p[axis] / sqrt(orb_dot(p, p));
+    double px = p[x], py = p[y];
+    p[x] = cos(turn) * px - sin(turn) * py;
+    p[y] = sin(turn) * px + cos(turn) * py;
+  }
+}
+
+/* Two rough balls; the second wound up, so that large triangles turn in space. */
+static void set_up(bench *b, unsigned seed, double wind) {
+  memset(b, 0, sizeof *b);
+  b->ctx = remesh_context(2);
+  sphere_shape(b->ctx, SPHERE_ICO, 3, 0.2, seed, &b->shape[0]);
+  sphere_shape(b->ctx, SPHERE_OCTA, 3, 0.2, seed + 10, &b->shape[1]);
+  shear(&b->shape[1], 2, wind);
+  shear(&b->shape[1], 0, wind);
+  unsigned random = seed;
+  for (int s = 0; s < 2; s++) {
+    orb_mesh *mesh = &b->shape[s].mesh;
+    for (int32_t i = 0; i < 3 * mesh->vertex_count; i += 3) {
+      random = random * 1664525u + 1013904223u;
+      for (int k = 0; k < 3; k++) {
+        mesh->positions[i + k] *= 0.85 + 0.3 * (random >> 16) / 65536.0;
+      }
+    }
+    b->twin[s] = malloc(3 * (size_t)mesh->triangle_count * sizeof(int32_t));
+    assert_int_equal(orb_mesh_twins(b->ctx, mesh->triangles, mesh->triangle_count, mesh->vertex_count, b->twin[s]),
+                     ORB_OK);
+    assert_int_equal(orb_locator_create(b->ctx, b->shape[s].points, mesh->vertex_count, mesh->triangles,
+                                        mesh->triangle_count, b->twin[s], &b->locator[s]),
+                     ORB_OK);
+    b->diagonal[s] = sphere_diagonal(&b->shape[s]);
+  }
+  orb_remesh_defaults(&b->options);
+  b->job = (orb_remesh_job){.shapes = b->shape,
+                            .shape_count = 2,
+                            .options = &b->options,
+                            .twin = b->twin,
+                            .locator = b->locator,
+                            .diagonal = b->diagonal};
+  assert_int_equal(orb_match_create(b->ctx, &b->job, &b->match), ORB_OK);
+}
+
+static void tear_down(bench *b) {
+  orb_match_free(b->ctx, &b->match);
+  for (int s = 0; s < 2; s++) {
+    orb_locator_destroy(b->ctx, b->locator[s]);
+    free(b->twin[s]);
+    sphere_shape_free(b->ctx, &b->shape[s]);
+  }
+  orb_context_destroy(b->ctx);
+}
+
+static void refine(bench *b) {
+  int64_t strays = 1;
+  for (int i = 0; i < 32 && strays > 0; i++) {
+    assert_int_equal(orb_match_refine(b->ctx, &b->match, LIMIT * LIMIT, &strays), ORB_OK);
+  }
+  assert_int_equal(strays, 0);
+}
+
+static void assert_within(bench *b) {
+  double bound[2];
+  assert_int_equal(orb_match_bounds(b->ctx, &b->match, bound), ORB_OK);
+  for (int s = 0; s < 2; s++) {
+    assert_true(bound[s] <= LIMIT * b->diagonal[s] * (1 + 1e-9));
+  }
+}
+
+/* T = 2V − 4 and every triangle positive, by the certificate; every vertex of a shape in a live triangle or vertex. */
+static void assert_sound(bench *b) {
+  const orb_match *match = &b->match;
+  orb_supermesh out = {.shape_count = 2};
+  assert_int_equal(orb_net_export(b->ctx, &match->net, &out, NULL), ORB_OK);
+  assert_int_equal(orb_supermesh_check(b->ctx, &out), ORB_OK);
+  orb_supermesh_free(b->ctx, &out);
+  int64_t items = 0;
+  for (int32_t v = 0; v < match->net.vertex_count; v++) {
+    for (int32_t i = match->vertex_items[v]; i >= 0; i = match->item_next[i]) {
+      assert_true(match->net.out[v] >= 0);
+      items++;
+    }
+  }
+  for (int32_t t = 0; t < match->net.triangle_count; t++) {
+    for (int32_t i = match->triangle_items[t]; i >= 0; i = match->item_next[i]) {
+      assert_true(match->net.triangles[3 * t] >= 0);
+      items++;
+    }
+  }
+  assert_int_equal(items, match->item_begin[2]);
+}
+
+/* What mends turned triangles leaves no edge and no vertex of a shape beyond the limit. */
+static void mending_leaves_no_stray(void **state) {
+  (void)state;
+  for (unsigned seed = 1; seed <= 4; seed++) {
+    bench b;
+    set_up(&b, seed, 2);
+    refine(&b);
+    assert_within(&b);
+    int64_t before = orb_match_turned(&b.match), left = 0;
+    assert_true(before > 0);
+    assert_int_equal(orb_match_mend(b.ctx, &b.match, LIMIT * LIMIT, &left), ORB_OK);
+    assert_true(orb_match_turned(&b.match) < before);
+    assert_within(&b);
+    assert_sound(&b);
+    tear_down(&b);
+  }
+}
+
+/* Collapses, merges, turns and moves keep the limit, and turn no triangle. */
+static void reducing_keeps_the_limit(void **state) {
+  (void)state;
+  bench b;
+  set_up(&b, 3, 1);
+  refine(&b);
+  int64_t turned = orb_match_turned(&b.match), live = orb_match_live(&b.match);
+  for (int i = 0; i < 2; i++) {
+    assert_int_equal(orb_match_collapse(b.ctx, &b.match, LIMIT * LIMIT, 0, 1, i), ORB_OK);
+    assert_within(&b);
+    int64_t collapsed = orb_match_live(&b.match);
+    assert_true(collapsed < live);
+    assert_int_equal(orb_match_merge_all(b.ctx, &b.match, LIMIT * LIMIT, 0), ORB_OK);
+    live = orb_match_live(&b.match);
+    assert_true(live < collapsed);
+    assert_within(&b);
+    assert_int_equal(orb_match_turn_all(b.ctx, &b.match, LIMIT * LIMIT, 0), ORB_OK);
+    assert_within(&b);
+    assert_int_equal(orb_match_move_all(b.ctx, &b.match, LIMIT * LIMIT, 0), ORB_OK);
+    assert_within(&b);
+    assert_sound(&b);
+    assert_true(orb_match_turned(&b.match) <= turned);
+    turned = orb_match_turned(&b.match);
+  }
+  tear_down(&b);
+}
+
+/* A triangle budget of merges is kept. */
+static void merges_stop_at_the_target(void **state) {
+  (void)state;
+  bench b;
+  set_up(&b, 5, 0);
+  refine(&b);
+  assert_int_equal(orb_match_collapse(b.ctx, &b.match, LIMIT * LIMIT, 0, 1, 0), ORB_OK);
+  int64_t target = orb_match_live(&b.match) - 10;
+  assert_int_equal(orb_match_merge_all(b.ctx, &b.match, LIMIT * LIMIT, target), ORB_OK);
+  assert_true(orb_match_live(&b.match) <= target && orb_match_live(&b.match) > target - 8);
+  tear_down(&b);
+}
+
+/* Around turned triangles the overlay is made: nothing strays there, and what the rest needs refinement gives. */
+static void resolving_can_be_held(void **state) {
+  (void)state;
+  bench b;
+  set_up(&b, 2, 2);
+  refine(&b);
+  assert_int_equal(orb_match_collapse(b.ctx, &b.match, LIMIT * LIMIT, 0, 1, 0), ORB_OK);
+  int64_t live = orb_match_live(&b.match);
+  assert_true(orb_match_turned(&b.match) > 0);
+  assert_int_equal(orb_match_resolve(b.ctx, &b.match, LIMIT * LIMIT), ORB_OK);
+  assert_true(orb_match_live(&b.match) > live);
+  assert_sound(&b);
+  refine(&b);
+  assert_within(&b);
+  assert_sound(&b);
+  tear_down(&b);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(mending_leaves_no_stray),
+      cmocka_unit_test(reducing_keeps_the_limit),
+      cmocka_unit_test(merges_stop_at_the_target),
+      cmocka_unit_test(resolving_can_be_held),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
