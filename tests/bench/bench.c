@@ -36,7 +36,7 @@ static const char usage_text[] =
     "  --sets N          sets of landmarks (100), or pairs (all)\n"
     "  --first N         number of the first set or pair (0); a set depends on seed and number only\n"
     "  --seed N          (1)\n"
-    "  --sizes LIST      landmarks in a set, by turns (3,10,30,60)\n"
+    "  --sizes LIST      landmarks in a set, by turns (3,10,30,60), or 'awkward'\n"
     "  --merge-every N   every N-th set is remeshed too (0: none)\n"
     "  --seconds N       give a set or pair up after so long (0: never)\n"
     "truth measures how true the map from A to B is:\n"

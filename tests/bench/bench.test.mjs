@@ -98,6 +98,13 @@ test('pairs: every pair once, certified', () => {
   assert.deepEqual(one.lines.map((l) => l.shapes.join()), ['dog,elephant']);
 });
 
+test('landmarks: awkward sets meet, and contradictions are refused with both named', () => {
+  const r = bench(['landmarks', '--sizes', 'awkward', '--sets', '8', dog, giraffe, join(samples, 'elephant.ply')]);
+  assert.equal(r.status, 0, r.error);
+  assert.deepEqual(r.lines.map((l) => l.status), [0, 1].flatMap(() => ['ok', 'ok', 'ok', 'bad-landmarks']));
+  assert.ok(r.lines.every((l) => l.right));
+});
+
 test('truth: a shape mapped to itself is where it was; landmarks not given are measured', () => {
   const marks = JSON.parse(readFileSync(join(samples, 'dog-giraffe.json'))).landmarks;
   const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));

@@ -1,6 +1,9 @@
 /* Random landmarks: set number i takes two of the meshes and as many places on each, at random vertices, inside
  * triangles and on edges, in random order, and pins them. A set depends on the seed and its number alone. What comes
- * back is checked here: certificate, T = 2V − 4, landmarks at bit-equal points; a refusal must name its landmarks. */
+ * back is checked here: certificate, T = 2V − 4, landmarks at bit-equal points; a refusal must name its landmarks.
+ * Awkward sets are eight landmarks of which the first are, by turns: on adjacent vertices of one shape; of both; three
+ * inside a triangle of the one and on an edge of the other; in contradiction, two at one place of one shape only, which
+ * is right if it is refused and both are named. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,11 +12,11 @@
 #include "api/json.h"
 #include "bench.h"
 
-enum { SIZES_MAX = 16, LANDMARKS_MAX = 1024 };
+enum { SIZES_MAX = 16, LANDMARKS_MAX = 1024, AWKWARD = 8, CONTRADICTION = 3 };
 
 typedef struct landmark_set {
   long number;
-  int pair[2], count;
+  int pair[2], count, contradicts;
   orb_place places[LANDMARKS_MAX][2];
   orb_landmark landmarks[LANDMARKS_MAX];
 } landmark_set;
@@ -76,7 +79,38 @@ static void make_place(const orb_mesh *mesh, landmark_set *set, int s, uint64_t 
   }
 }
 
-static void make_set(const bench_fleet *fleet, uint64_t seed, const int *sizes, int size_count, landmark_set *set) {
+static void put_vertex(orb_place *place, int32_t triangle, int corner) {
+  *place = (orb_place){triangle, {0, 0, 0}};
+  place->at[corner] = 1;
+}
+
+static void make_awkward(const bench_fleet *fleet, landmark_set *set, uint64_t *state) {
+  int32_t triangle[2];
+  for (int s = 0; s < 2; s++) {
+    triangle[s] = random_below(state, fleet->mesh[set->pair[s]].mesh.triangle_count);
+  }
+  int kind = (int)(set->number % 4);
+  set->contradicts = kind == CONTRADICTION;
+  for (int k = 0; k < 3; k++) {
+    orb_place *at = set->places[k];
+    double t = 0.25 * (k + 1), corner = 0.2 + 0.2 * k;
+    if (kind == 2) {
+      at[0] = (orb_place){triangle[0], {corner, 0.7 - corner, 0.3}};
+      at[1] = (orb_place){triangle[1], {1 - t, t, 0}};
+    } else if (kind < 2 && k < 2) {
+      put_vertex(&at[0], triangle[0], k);
+      if (kind == 1) {
+        put_vertex(&at[1], triangle[1], k);
+      }
+    }
+  }
+  if (set->contradicts) {
+    set->places[1][0] = set->places[0][0];
+  }
+}
+
+static void make_set(const bench_fleet *fleet, uint64_t seed, const int *sizes, int size_count, int awkward,
+                     landmark_set *set) {
   uint64_t state = seed * 0x2545f4914f6cdd1du + (uint64_t)set->number;
   set->count = sizes[set->number % size_count];
   set->pair[0] = random_below(&state, fleet->count);
@@ -88,6 +122,10 @@ static void make_set(const bench_fleet *fleet, uint64_t seed, const int *sizes, 
   }
   for (int s = 0; s < 2; s++) {
     make_place(&fleet->mesh[set->pair[s]].mesh, set, s, &state);
+  }
+  set->contradicts = 0;
+  if (awkward) {
+    make_awkward(fleet, set, &state);
   }
   for (int k = 0; k < set->count; k++) {
     set->landmarks[k].at = set->places[k];
@@ -167,6 +205,8 @@ static void run_set(const bench_options *options, const bench_fleet *fleet, cons
     orb_alignment_free(ctx, &alignment);
   } else {
     note_failure(ctx, status, out);
+    const int32_t *named = orb_context_error(ctx)->landmarks;
+    out->right = set->contradicts && out->named == 2 && named[0] == 0 && named[1] == 1;
   }
   orb_context_destroy(ctx);
 }
@@ -182,6 +222,7 @@ static int print_line(const bench_fleet *fleet, const landmark_set *set, const o
   }
   orb_json_close(&line, ']');
   orb_json_member_integer(&line, "landmarks", set->count);
+  orb_json_member_bool(&line, "contradicts", set->contradicts);
   orb_json_member_string(&line, "status", orb_status_name(o->status));
   orb_json_member_string(&line, "detail", o->detail);
   orb_json_member_integer(&line, "named", o->named);
@@ -217,10 +258,11 @@ static int read_sizes(const char *text, int sizes[SIZES_MAX]) {
 }
 
 int bench_landmarks(const bench_options *options) {
-  int sizes[SIZES_MAX], size_count = read_sizes(options->sizes, sizes);
+  int sizes[SIZES_MAX] = {AWKWARD}, awkward = strcmp(options->sizes, "awkward") == 0;
+  int size_count = awkward ? 1 : read_sizes(options->sizes, sizes);
   if (size_count == 0) {
-    fprintf(stderr, "orbmorph-bench: --sizes must be a list of numbers from 1 to %d, not '%s'\n", LANDMARKS_MAX,
-            options->sizes);
+    fprintf(stderr, "orbmorph-bench: --sizes must be 'awkward' or a list of numbers from 1 to %d, not '%s'\n",
+            LANDMARKS_MAX, options->sizes);
     return BENCH_USAGE;
   }
   bench_fleet fleet;
@@ -229,7 +271,7 @@ int bench_landmarks(const bench_options *options) {
   for (long i = 0; fine && i < options->sets; i++) {
     outcome o;
     set->number = options->first + i;
-    make_set(&fleet, options->seed, sizes, size_count, set);
+    make_set(&fleet, options->seed, sizes, size_count, awkward, set);
     run_set(options, &fleet, set, &o);
     fine = print_line(&fleet, set, &o);
   }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Random landmarks on real meshes, and every pair of them without any; writes docs/robustness.md.
 
-    tests/bench/robust.py [landmarks|pairs|all] [--bin build/bin] [--meshes ../shared/meshes] [--jobs 2] [--sets 1000]
+    tests/bench/robust.py [landmarks|awkward|pairs|all] [--bin build/bin] [--meshes ../shared/meshes] [--jobs 2] [--sets 1000]
                           [--presets fast,default] [--keep DIR] [--out docs/robustness.md] [--kept]
 
 The meshes are those that index.csv calls good and that have 2,000 to 50,000 triangles. Every set and pair that a run
@@ -35,6 +35,13 @@ A set takes two meshes and as many places on each, at random vertices, inside tr
 in random order: the surfaces must be wound about each other. `pin` with the preset `fast`. Met: certified in exact
 arithmetic, closed, landmarks at bit-equal points on both spheres. *Growth*: how many times its triangles the mesh that
 grew more has afterwards. CPU seconds are of one thread; the machine had other work.
+"""
+AWKWARD = """
+## Awkward landmarks
+
+Eight landmarks on two of the meshes, of which the first are, by turns: on adjacent vertices of one mesh; of both; three
+inside one triangle of the one and on one edge of the other; two at one place of one mesh only, a contradiction that
+must be refused with both named.
 """
 PAIRS = """
 ## Every pair
@@ -143,11 +150,12 @@ def pairs_summary(preset, lines):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", nargs="?", default="all", choices=["landmarks", "pairs", "all"])
+    parser.add_argument("what", nargs="?", default="all", choices=["landmarks", "awkward", "pairs", "all"])
     parser.add_argument("--bin", default=ROOT / "build/bin")
     parser.add_argument("--meshes", default=ROOT.parent / "shared/meshes")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--sets", type=int, default=1000)
+    parser.add_argument("--awkward", type=int, default=100, help="sets of awkward landmarks")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--merge-every", type=int, default=0)
     parser.add_argument("--seconds", type=int, default=3600, help="after which a set or pair counts as failed")
@@ -167,6 +175,15 @@ def main():
         text += [LANDMARKS, *table]
         bad |= len(failed) > 0.01 * len(lines) or any(line["status"] != "ok" and not line["named"] for line in failed)
         bad |= len(lines) < options.sets
+    if options.what in ("awkward", "all"):
+        lines = run(options, "awkward", "landmarks", options.awkward, ["--sizes", "awkward"], meshes)
+        met = [line for line in lines if line["right"] and (line["status"] == "ok") != line.get("contradicts", False)]
+        named = sum(line["contradicts"] for line in met)
+        text += [AWKWARD] + [f"\nSet {line['set']} ({' – '.join(line['shapes'])}): {line['detail']}"
+                             for line in lines if line not in met]
+        summary.append(f"| awkward sets | {len(lines)} | {len(met) - named}, and {named} contradictory ones refused, both "
+                       f"landmarks named | {len(lines) - len(met)} |")
+        bad |= len(met) < options.awkward
     if options.what in ("pairs", "all"):
         total, runs = len(meshes) * (len(meshes) - 1) // 2, {}
         for preset in options.presets.split(","):
