@@ -179,7 +179,6 @@ static int one_work(void *user, torture_kind kind, long number, int for_ever) {
   told t = work(s, s->number);
   int met = torture_disarm();
   check(s, &t, s->number);
-  tidy(s, s->number);
   if (!met) {
     assert_true(t.object == STORE_OK && t.mesh == STORE_OK && t.job == STORE_OK && t.claim == STORE_OK &&
                 t.finish == STORE_OK && t.token == STORE_OK && t.gone == STORE_OK);
@@ -188,6 +187,7 @@ static int one_work(void *user, torture_kind kind, long number, int for_ever) {
   s->number++;
   told well = work(s, s->number);
   assert_true(well.object == STORE_OK && well.mesh == STORE_OK && well.finish == STORE_OK && well.token == STORE_OK);
+  tidy(s, s->number - 1);
   tidy(s, s->number);
   return met;
 }
