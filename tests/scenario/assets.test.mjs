@@ -37,6 +37,14 @@ test('an asset is immutable, comes in ranges, passes the validator and loads in 
   const beyond = await d.get(supermesh.asset, headers(`bytes=${n}-`));
   assert.equal(beyond.status, 416);
   assert.equal(beyond.headers.get('content-range'), `bytes */${n}`);
+  // Several ranges, and what is no range of bytes, are answered with all of it, as RFC 9110 allows.
+  for (const range of ['bytes=0-1,3-4', 'bytes=5-2', 'bytes=', 'bytes=-', 'bytes=a-b', 'lines=0-1', `bytes=${'9'.repeat(30)}-`]) {
+    const all = await d.get(supermesh.asset, headers(range));
+    assert.equal(all.status, 200, range);
+    assert.ok(all.bytes.equals(whole.bytes), range);
+    assert.equal(all.headers.get('content-range'), null);
+  }
+  assert.equal((await d.get(supermesh.asset, headers('bytes=-0'))).status, 416);
   assert.equal((await d.get(supermesh.asset, headers('bytes=0-9', { 'if-range': '"other"' }))).status, 200, 'If-Range that does not match');
   assert.equal((await d.get(supermesh.asset, headers('bytes=0-9', { 'if-range': etag }))).status, 206);
   for (const match of [etag, `"x", ${etag}`, '*']) {
