@@ -16,6 +16,7 @@
 #include "numeric/vec3.h"
 
 static const double SLACK = 2, LONGEST = 200;
+enum { MANY = 45 }; /* landmarks from which on one search for all ways from one of them pays */
 
 typedef struct candidate {
   double length;
@@ -235,23 +236,54 @@ static double least_length(const joiner *j, int32_t a, int32_t b) {
   return sum;
 }
 
-/* Is the way from a to b, past all paths laid so far and summed over the shapes, at most `most` long? A search looks at
- * all ways from a at once; what it learns of them holds for ever, since paths only get in the way. */
+/* Raises the lower bound of the one way from a to b, as far as the radius. */
+static orb_status measure_one(joiner *j, int32_t s, int32_t a, int32_t b, double radius) {
+  orb_tracer *t = &j->tracers[s];
+  const int32_t *at = j->at + (size_t)s * (size_t)j->count;
+  double *least = least_from(j, s, a);
+  int found;
+  orb_tracer_gates(t, at[a], -1, -1, 1);
+  orb_tracer_gates(t, at[b], -1, -1, 1);
+  t->bound = radius;
+  orb_status status = orb_tracer_search(t, at[a], at[b], &found);
+  t->bound = 0;
+  orb_tracer_gates(t, at[a], -1, -1, 0);
+  orb_tracer_gates(t, at[b], -1, -1, 0);
+  if (status == ORB_OK) {
+    least[b] = fmax(least[b], found ? fmin(t->length, radius) : radius);
+    least_from(j, s, b)[a] = least[b];
+  }
+  return status;
+}
+
+/* Those of all ways from a. */
+static orb_status measure_all(joiner *j, int32_t s, int32_t a, double radius) {
+  size_t ball = (size_t)s * (size_t)j->count + (size_t)a;
+  double *least = least_from(j, s, a);
+  if (j->ball_edges[ball] == j->edges && j->ball_radius[ball] >= radius) {
+    return ORB_OK;
+  }
+  ORB_TRY(orb_tracer_ball(&j->tracers[s], j->at[ball], radius, j->mark[s], j->marked[s], least, j->count));
+  j->ball_edges[ball] = j->edges;
+  j->ball_radius[ball] = radius;
+  for (int32_t c = 0; c < j->count; c++) {
+    double *other = &least_from(j, s, c)[a];
+    *other = least[c] > *other ? least[c] : *other;
+  }
+  return ORB_OK;
+}
+
+/* Is the way from a to b, past all paths laid so far and summed over the shapes, at most `most` long? What searches
+ * learn of lengths holds for ever, since paths only get in the way. */
 static orb_status short_enough(joiner *j, int32_t a, int32_t b, double most, int *yes) {
   *yes = least_length(j, a, b) < most;
   for (int32_t s = 0; s < j->shapes && *yes; s++) {
-    size_t ball = (size_t)s * (size_t)j->count + (size_t)a;
-    double *least = least_from(j, s, a);
-    if (j->ball_edges[ball] != j->edges || j->ball_radius[ball] < most) {
-      ORB_TRY(orb_tracer_fit(&j->tracers[s]));
-      ORB_TRY(orb_context_check(j->ctx));
-      ORB_TRY(orb_tracer_ball(&j->tracers[s], j->at[ball], most, j->mark[s], j->marked[s], least, j->count));
-      j->ball_edges[ball] = j->edges;
-      j->ball_radius[ball] = most;
-    }
-    for (int32_t c = 0; c < j->count; c++) {
-      double *other = &least_from(j, s, c)[a];
-      *other = least[c] > *other ? least[c] : *other;
+    ORB_TRY(orb_tracer_fit(&j->tracers[s]));
+    ORB_TRY(orb_context_check(j->ctx));
+    if (j->count < MANY) {
+      ORB_TRY(measure_one(j, s, a, b, most - least_length(j, a, b) + least_from(j, s, a)[b]));
+    } else {
+      ORB_TRY(measure_all(j, s, a, most));
     }
     *yes = least_length(j, a, b) < most;
   }

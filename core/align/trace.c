@@ -270,7 +270,11 @@ static orb_status expand_all(orb_tracer *t, int32_t start, goal *g, int32_t *las
     }
     orb_tracer_item top = heap_pop(t);
     int32_t node = top.node;
+    if (t->bound > 0 && !g->mark && top.estimate > t->bound) {
+      break;
+    }
     if (node == 2 * g->vertex) {
+      t->length = top.cost;
       *last = node;
       break;
     }

@@ -22,6 +22,7 @@ typedef struct orb_tracer {
   int64_t *work;  /* visits of nodes that are left: a search that uses it up ends without a find */
   int32_t *chain; /* nodes of the path found, back to front */
   int32_t chain_count;
+  double bound, length; /* paths longer than bound (0: none) are not looked for; the length of the one found */
 } orb_tracer;
 
 /* Room for flags and nodes of the sheet as it has grown; before each search. */
