@@ -5,6 +5,7 @@
 #include "remesh/match.h"
 
 static const double FINE_QUALITY = 0.12, FINE_FACING = 0.05, LEAST_QUALITY = 0.02;
+static const double SURE_FACING = 0.9; /* the centre need not be asked */
 
 /* How well shaped the triangle is on shape s, and how it faces the shape's smooth normals at its corners. */
 static void measure(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c, double *quality,
@@ -59,20 +60,12 @@ static int is_turned_at_centre(const orb_match *match, int32_t s, int32_t a, int
   return orb_dot(n, smooth) <= 0 || orb_dot(n, flat) < 0;
 }
 
-int orb_match_is_turned(const orb_match *match, int32_t a, int32_t b, int32_t c) {
-  int turned = orb_match_form(match, a, b, c).turned > 0;
-  for (int32_t s = 0; s < match->shape_count && !turned; s++) {
-    turned = is_turned_at_centre(match, s, a, b, c);
-  }
-  return turned;
-}
-
 static double turned_extent(const orb_match *match, int32_t a, int32_t b, int32_t c, int by_centre) {
   double extent = 0;
   for (int32_t s = 0; s < match->shape_count; s++) {
     double facing, quality;
     measure(match, s, a, b, c, &quality, &facing);
-    if (facing < FINE_FACING || (by_centre && is_turned_at_centre(match, s, a, b, c))) {
+    if (facing < FINE_FACING || (by_centre && facing < SURE_FACING && is_turned_at_centre(match, s, a, b, c))) {
       const double *p = orb_match_at(match, a, s), *q = orb_match_at(match, b, s), *r = orb_match_at(match, c, s);
       extent += orb_distance2(p, q) + orb_distance2(q, r) + orb_distance2(r, p) + 1e-200;
     }
@@ -82,6 +75,10 @@ static double turned_extent(const orb_match *match, int32_t a, int32_t b, int32_
 
 double orb_match_turned_extent(const orb_match *match, int32_t a, int32_t b, int32_t c) {
   return turned_extent(match, a, b, c, 1);
+}
+
+int orb_match_is_turned(const orb_match *match, int32_t a, int32_t b, int32_t c) {
+  return turned_extent(match, a, b, c, 1) > 0;
 }
 
 double orb_match_turned_by_corners(const orb_match *match, int32_t a, int32_t b, int32_t c) {
