@@ -25,9 +25,9 @@
 #include "orbmorph/remesh.h"
 
 enum { COARSE = 1000, WALK = 300, ROTATIONS = 3, WALKED = 2, SAMPLES = 48 };
-static const double TURN = 1;         /* a half turn in space costs so many times the energy beyond 1 */
-static const double DIFFERENT = 0.15; /* of the diagonal: maps that differ by more are others */
-static const double CAP = 20;
+static const double TURN = 1;                /* a half turn in space costs so many times the energy beyond 1 */
+static const double DIFFERENT = 0.15;        /* of the diagonal: maps that differ by more are others */
+static const double CAP = 20, BETTER = 0.95; /* than the rotation search, or it is not worth the work */
 
 /* A decimated copy: compact, with an embedding of its own. */
 typedef struct coarse {
@@ -341,7 +341,7 @@ static orb_status run_trials(trials *t, const orb_mesh *b, orb_guess *out) {
     }
   }
   out->clear = next < INFINITY ? fmax(0, 1 - winner->judge / next) : 1;
-  return best ? write_guess(t, winner, b, out) : ORB_OK;
+  return winner->judge < BETTER * t->list[0].judge ? write_guess(t, winner, b, out) : ORB_OK;
 }
 
 orb_status orb_guess_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_guess *out) {
