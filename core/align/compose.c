@@ -29,7 +29,7 @@ enum {
   HOPELESS = 9,        /* one flip in so many triangles: they will not be cleared */
   SOFT_ROUNDS = 8,
   ROUGH_SWEEPS = 40,
-  WORK = 500 /* vertex steps a vertex, see cm_run.work */
+  WORK = 550 /* vertex steps a vertex, see cm_run.work */
 };
 
 static const double WORSE = 2, FOLLOWS = 1e-3; /* of the triangles turned over, either way: reason to swap the shapes */
