@@ -4,7 +4,7 @@
 #   tests/long.sh [PART…]    all of them without arguments:
 #   tsan valgrind fuzz crash faults soak load adversarial arm robust deploy
 #
-# ORB_MINUTES (5) is the time for each fuzz target, ORB_KILLS (1000) the number of kills.
+# ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills.
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/.."
 
@@ -29,7 +29,8 @@ part_tsan() {
   return $failed
 }
 
-# The units, and the scenarios with daemon and command line under memcheck. Left out: what is about time (crowd,
+# The units; then daemon and command line under memcheck: a walk through every route, and the scenarios.
+# ORB_VALGRIND_UNITS and ORB_VALGRIND_SCENARIOS name fewer of them, or none. Left out: what is about time (crowd,
 # fairness, slow), what measures or needs the release build (bench, report, readme, demo), what preloads a library of
 # its own (faults), what ends the daemon before it can tell of leaks (crash), and large meshes (real_meshes, real_pairs).
 valgrind_scenarios=(abuse assets cli cors disk_full durability embeddings encodings eviction jobs meshes openapi
@@ -53,7 +54,9 @@ END
     echo "valgrind $program"
     valgrind --quiet --error-exitcode=9 --leak-check=full "$program" || failed=1
   done
-  for name in ${ORB_VALGRIND_SCENARIOS:-${valgrind_scenarios[@]}}; do
+  echo "valgrind every route"
+  ORB_SLOW=1 ORBMORPHD=$folder/orbmorphd ORBMORPH=$folder/orbmorph node tests/long/walk.mjs || failed=1
+  for name in ${ORB_VALGRIND_SCENARIOS-${valgrind_scenarios[*]}}; do
     echo "valgrind scenario $name"
     ORB_SLOW=1 ORBMORPHD=$folder/orbmorphd ORBMORPH=$folder/orbmorph \
       node --test --test-reporter=spec "tests/scenario/$name.test.mjs" || failed=1
@@ -63,7 +66,7 @@ END
 }
 
 part_fuzz() {
-  tests/fuzz/run.sh $((60 * ${ORB_MINUTES:-5}))
+  tests/fuzz/run.sh --cpu $((60 * ${ORB_MINUTES:-5}))
 }
 
 # kill -9 at random instants and at every named point of the code.
