@@ -67,7 +67,9 @@ int glb_code(const cJSON *object, const char *name, int otherwise) {
 }
 
 const cJSON *glb_entry(const glb *r, const char *list, double index) {
-  return index >= 0 && index <= INT_MAX ? cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(r->json, list), (int)index) : NULL;
+  return index >= 0 && index <= INT_MAX
+             ? cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(r->json, list), (int)index)
+             : NULL;
 }
 
 const unsigned char *glb_view(const glb *r, double index, size_t *size) {
