@@ -8,7 +8,7 @@ orb_build_packages=(
 )
 orb_test_packages=(libcmocka-dev openssl sqlite3 zstd curl jq python3 binutils man-db mandoc zsh fish bsdutils chromium)
 orb_fuzz_packages=(clang libclang-rt-dev)
-orb_long_packages=(valgrind wrk nginx caddy debootstrap lintian buildah podman crun prometheus systemd)
+orb_long_packages=(valgrind wrk nginx caddy debootstrap lintian buildah podman runc prometheus systemd)
 
 # Installs those of its arguments that are missing, as root or through sudo; never asks.
 orb_install_packages() {

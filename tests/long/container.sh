@@ -23,13 +23,14 @@ fi
 # Chroots instead of containers for the steps: that works inside of other containers, too.
 buildah "${own[@]}" bud --layers --isolation=chroot --pull-never --format docker -f deploy/Dockerfile -t orbmorph .
 
-run=(podman "${own[@]}" --cgroup-manager cgroupfs --events-backend file)
-place=(--network host --cgroups disabled -v "$at/volume:/var/lib/orbmorph")
+# Without systemd, which podman would ask for cgroups and timers; limits that need no privilege.
+run=(podman "${own[@]}" --cgroup-manager cgroupfs --events-backend file --runtime runc)
+place=(--network host --no-healthcheck --ulimit nofile=4096:4096 --ulimit nproc=4096:4096 -v "$at/volume:/var/lib/orbmorph")
 rm -rf "$at/volume"
 mkdir -p "$at/volume"
 user=$("${run[@]}" image inspect --format '{{.Config.User}}' orbmorph)
 [ "$user" = orbmorph ] || { echo "it runs as '$user'"; exit 1; }
-"${run[@]}" image inspect --format '{{json .HealthCheck}}' orbmorph | grep -q /livez || echo "the image has no health check: OCI images have none, build with --format docker"
+"${run[@]}" image inspect --format '{{json .HealthCheck}}' orbmorph | grep -q /livez
 "${run[@]}" run --rm "${place[@]}" --entrypoint id orbmorph
 owner=$("${run[@]}" run --rm "${place[@]}" --entrypoint id orbmorph -u)
 chown "$owner" "$at/volume"
