@@ -163,6 +163,7 @@ def main():
     parser.add_argument("--keep", default=pathlib.Path(tempfile.gettempdir()) / "orbmorph-robust")
     parser.add_argument("--kept", action="store_true", help="run nothing, write what is kept")
     parser.add_argument("--row", action="append", default=[], help="a further row of the summary: what|run|met|failed")
+    parser.add_argument("--note", default="", help="a sentence below the summary")
     parser.add_argument("--out", help="the Markdown file; else the tables are printed")
     options = parser.parse_args()
     meshes, summary, text, bad = meshes_of(pathlib.Path(options.meshes)), [], [], False
@@ -194,6 +195,7 @@ def main():
             bad |= len(runs[preset]) < total or not all(map(is_certified, runs[preset]))
         text += [PAIRS, *pairs_table(runs)]
     summary += [f"| {' | '.join(row.split('|'))} |" for row in options.row]
+    summary += ["", options.note] if options.note else []
     page = HEAD + "\n".join(summary + text) + "\n"
     if options.out:
         pathlib.Path(options.out).write_text(page, encoding="utf-8")
