@@ -46,7 +46,8 @@ part_valgrind() {
     cat >"$folder/$name" <<END
 #!/bin/sh
 exec valgrind --quiet --fair-sched=try --error-exitcode=9 --leak-check=full --show-leak-kinds=definite,indirect \\
-  --errors-for-leak-kinds=definite --log-file=$folder/reports/$name.%p "$PWD/build-debug/bin/$name" "\$@"
+  --errors-for-leak-kinds=definite --suppressions=$PWD/tests/long/valgrind.supp \\
+  --log-file=$folder/reports/$name.%p "$PWD/build-debug/bin/$name" "\$@"
 END
     chmod +x "$folder/$name"
   done
