@@ -116,7 +116,7 @@ static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count,
     return ORB_OK;
   }
   *held = 0;
-  room.growth = most;
+  room = (orb_pin_room){most, room.work > work / 2 ? room.work : work / 2}; /* the next stage is to have a chance */
   if (count >= 4) {
     ORB_TRY(orb_pin_joint(ctx, sheets, shape_count, landmarks, count, preset, &room, held));
   }

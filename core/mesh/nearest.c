@@ -301,7 +301,12 @@ static double search(const orb_nearest *tree, const double p[3], double best, or
 
 double orb_nearest_query(const orb_nearest *tree, const double p[3], double max_distance2, orb_place *out) {
   *out = (orb_place){.triangle = -1};
-  return search(tree, p, max_distance2, out);
+  double distance2 = search(tree, p, max_distance2, out);
+  if (out->triangle < 0 && max_distance2 == INFINITY) { /* no distance is a number: any place is as near */
+    *out = (orb_place){.triangle = 0, .at = {1, 0, 0}};
+    return INFINITY;
+  }
+  return distance2;
 }
 
 double orb_nearest_query_from(const orb_nearest *tree, const double p[3], const orb_place *known,

@@ -3,6 +3,8 @@
 #ifndef ORB_REMESH_DISTANCE_H
 #define ORB_REMESH_DISTANCE_H
 
+#include <math.h>
+
 #include "numeric/vec3.h"
 
 static inline double orb_clamp01(double x) {
@@ -45,17 +47,22 @@ static inline double orb_point_triangle2(const double p[3], const double a[3], c
   orb_sub(p, a, w);
   double uu = orb_dot(u, u), uv = orb_dot(u, v), vv = orb_dot(v, v), wu = orb_dot(w, u), wv = orb_dot(w, v);
   double det = uu * vv - uv * uv, s = (vv * wu - uv * wv) / det, t = (uu * wv - uv * wu) / det;
+  double inside = INFINITY;
   if (s >= 0 && t >= 0 && s + t <= 1) {
     double d[3];
     for (int k = 0; k < 3; k++) {
       d[k] = w[k] - s * u[k] - t * v[k];
     }
-    return orb_dot(d, d);
+    inside = orb_dot(d, d);
+    if (det > 1e-8 * uu * vv) {
+      return inside;
+    } /* else s and t are mostly rounding: the sides may be nearer */
   }
   double best = orb_point_segment2(p, a, b), other = orb_point_segment2(p, b, c);
   best = other < best ? other : best;
   other = orb_point_segment2(p, c, a);
-  return other < best ? other : best;
+  best = other < best ? other : best;
+  return inside < best ? inside : best;
 }
 
 #endif

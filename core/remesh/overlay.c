@@ -233,8 +233,9 @@ orb_status orb_remesh_overlay(orb_context *ctx, const orb_remesh_job *job, orb_s
   for (int32_t s = 0; s < job->shape_count; s++) {
     memcpy(out->places + (int64_t)s * now.vertex_count, now.places[s], (size_t)now.vertex_count * sizeof(orb_place));
     /* Every triangle lies in one triangle of the shape; only places and their positions are rounded, a few units in
-     * the last place for each shape that was laid over. */
-    out->error_bound[s] = now.moved[s] + 64 * 2.3e-16 * job->shape_count * largest_coordinate(&job->shapes[s].mesh);
+     * the last place for each shape that was laid over. The diagonal's share is for whoever measures it. */
+    out->error_bound[s] = now.moved[s] + 64 * 2.3e-16 * job->shape_count * largest_coordinate(&job->shapes[s].mesh) +
+                          1e-13 * job->diagonal[s];
   }
   out->vertex_count = now.vertex_count;
   out->triangle_count = now.triangle_count;

@@ -4,7 +4,7 @@
  *   vertex is the distance from where the map takes it, in % of the second shape's diagonal.
  * - held out: landmarks that the alignment was not given, likewise.
  * - inverted: triangles turned over in space. Of the map: those of either shape whose image on the other turns against
- *   that surface's normal at its centre. Of the supermesh: those that turn against either surface's normal there.
+ *   that surface at its centre. Of the supermesh: those that turn against either surface there.
  */
 #include <math.h>
 #include <stdio.h>
@@ -32,8 +32,7 @@ typedef struct truth_run {
   int32_t given;
   const orb_merge_result *result;
   orb_locator *locator[2];
-  double *normal[2]; /* of each vertex: the area-weighted sum of its triangles' */
-  double diagonal;   /* of the second shape */
+  double diagonal; /* of the second shape */
 } truth_run;
 
 static int in_list(const char *list, const char *name) {
@@ -95,32 +94,17 @@ static void sphere_point(const orb_aligned_shape *shape, const orb_place *place,
   }
 }
 
-/* Where shape s has a direction of the common sphere; normal may be NULL. */
+/* Where shape s has a direction of the common sphere; normal may be NULL. The normal is that of the triangle there: one
+ * smoothed over the vertices is against the shape's own triangles where it is folded flat. */
 static void surface_at(const truth_run *run, int s, const double p[3], double position[3], double *normal) {
   const orb_mesh *mesh = &run->result->alignment.shapes[s].mesh;
   orb_place place;
   orb_locate(run->locator[s], p, -1, &place);
   orb_place_position(mesh, &place, position);
-  for (int k = 0; k < 3 && normal; k++) {
-    normal[k] = 0;
-    for (int i = 0; i < 3; i++) {
-      normal[k] += place.at[i] * run->normal[s][3 * mesh->triangles[3 * place.triangle + i] + k];
-    }
+  if (normal) {
+    const int32_t *v = mesh->triangles + 3 * place.triangle;
+    triangle_normal(mesh->positions + 3 * v[0], mesh->positions + 3 * v[1], mesh->positions + 3 * v[2], normal);
   }
-}
-
-static int fill_normals(truth_run *run, int s) {
-  const orb_mesh *mesh = &run->result->alignment.shapes[s].mesh;
-  run->normal[s] = ORB_NEW0(run->ctx, double, 3 * (size_t)mesh->vertex_count);
-  for (int32_t t = 0; t < mesh->triangle_count && run->normal[s]; t++) {
-    double n[3];
-    const int32_t *v = mesh->triangles + 3 * t;
-    triangle_normal(mesh->positions + 3 * v[0], mesh->positions + 3 * v[1], mesh->positions + 3 * v[2], n);
-    for (int i = 0; i < 9; i++) {
-      run->normal[s][3 * v[i / 3] + i % 3] += n[i % 3];
-    }
-  }
-  return run->normal[s] != NULL;
 }
 
 static int by_value(const void *a, const void *b) {
@@ -276,8 +260,7 @@ static int write_measures(truth_run *run, orb_text *line) {
   for (int s = 0; s < 2 && fine; s++) {
     const orb_aligned_shape *shape = &alignment->shapes[s];
     fine = orb_locator_create(run->ctx, shape->points, shape->mesh.vertex_count, shape->mesh.triangles,
-                              shape->mesh.triangle_count, NULL, &run->locator[s]) == ORB_OK &&
-           fill_normals(run, s);
+                              shape->mesh.triangle_count, NULL, &run->locator[s]) == ORB_OK;
   }
   if (fine) {
     orb_json_member_integer(line, "flipped",
@@ -290,7 +273,6 @@ static int write_measures(truth_run *run, orb_text *line) {
   }
   for (int s = 0; s < 2; s++) {
     orb_locator_destroy(run->ctx, run->locator[s]);
-    orb_free(run->ctx, run->normal[s]);
   }
   return fine;
 }

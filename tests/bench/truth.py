@@ -25,8 +25,9 @@ others from the first shape to the second, and *held out* is their mean distance
 second shape's diagonal. *Dense* is the same at every vertex, mean / 95th percentile, where both meshes share their
 triangles. `rbf` is the method of Peng & Timalsena 2016, section 7; `fast`, `default` and `quality` are presets of
 `pin`; `auto` gets no landmarks. *Flipped* counts triangles on the sphere, of both shapes and of the supermesh.
-*Inverted* is the share of the supermesh's triangles, in %, that turn against the surface's normal at their centre, on
-the first and on the second shape, *inverted map* of the first shape's triangles whose image on the second does.
+*Inverted* is the share of the supermesh's triangles, in %, that turn against the surface at their centre (the
+triangle of the input that is there), on the first and on the second shape, *inverted map* of the first shape's
+triangles whose image on the second does.
 *Energy*: symmetric Dirichlet of the map, capped at 20, 1 where isometric. The landmarks
 themselves are set by hand: those of the cow are stated to be right to 0.8 % in the mean, 2.2 % at worst.
 """

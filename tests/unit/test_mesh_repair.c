@@ -269,6 +269,14 @@ static void test_nearest(void **state) {
     assert_true(fabs(orb_nearest_query(one, p, INFINITY, &other) - d2) < 1e-13);
     orb_nearest_destroy(ctx, one);
   }
+  for (int k = 0; k < 9 * COUNT; k++) { /* squared distances beyond all numbers: some place all the same */
+    positions[k] *= 1e300;
+  }
+  orb_nearest_destroy(ctx, tree);
+  assert_int_equal(orb_nearest_create(ctx, positions, triangles, COUNT, &tree), ORB_OK);
+  orb_place far;
+  assert_true(orb_nearest_query(tree, (double[3]){-1e300, 0, 1e300}, INFINITY, &far) == INFINITY);
+  assert_true(far.triangle >= 0 && far.triangle < COUNT);
   orb_nearest_destroy(ctx, tree);
 }
 

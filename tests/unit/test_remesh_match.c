@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "numeric/vec3.h"
+#include "remesh/distance.h"
 #include "remesh/match.h"
 #include "support_remesh.h"
 
@@ -196,12 +197,45 @@ static void resolving_can_be_held(void **state) {
   tear_down(&b);
 }
 
+/* Triangles without an inside: their distance is that of their sides, whichever corner is named first. */
+static void flat_triangles_are_as_near_as_their_sides(void **state) {
+  (void)state;
+  unsigned random = 7;
+  double x[12];
+  for (int i = 0; i < 1000; i++) {
+    for (int k = 0; k < 12; k++) {
+      random = random * 1664525u + 1013904223u;
+      x[k] = (random >> 8) / 16777216.0;
+    }
+    const double *a = x, *b = x + 3, *p = x + 9;
+    double c[3], along = 3 * x[6] - 1, least = INFINITY;
+    for (int k = 0; k < 3; k++) {
+      c[k] = a[k] + along * (b[k] - a[k]) + (i % 2 ? 1e-10 * x[6 + k] : 0);
+    }
+    const double *corner[3] = {a, b, c};
+    for (int side = 0; side < 3; side++) {
+      for (int step = 0; step <= 1000; step++) {
+        double q[3];
+        for (int k = 0; k < 3; k++) {
+          q[k] = corner[side][k] + step / 1000.0 * (corner[(side + 1) % 3][k] - corner[side][k]);
+        }
+        least = fmin(least, orb_distance2(p, q));
+      }
+    }
+    for (int turn = 0; turn < 3; turn++) {
+      double d = orb_point_triangle2(p, corner[turn], corner[(turn + 1) % 3], corner[(turn + 2) % 3]);
+      assert_true(d < least + 1e-9 && d > least - 1e-4);
+    }
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(mending_leaves_no_stray),
       cmocka_unit_test(reducing_keeps_the_limit),
       cmocka_unit_test(merges_stop_at_the_target),
       cmocka_unit_test(resolving_can_be_held),
+      cmocka_unit_test(flat_triangles_are_as_near_as_their_sides),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
