@@ -22,6 +22,7 @@ extern "C" {
 #include "format/build.h"
 #include "format/bytes.h"
 #include "format/json_check.h"
+#include "format/texture.h"
 }
 
 #include "format/gltf_values.hh"
@@ -345,7 +346,7 @@ struct Reader {
     return static_cast<int64_t>(value->valuedouble);
   }
 
-  /* The image in the result for an image of the file, −1 where its bytes are not in the file. */
+  /* The image in the result for an image of the file, −1 where its bytes are not in the file or are no picture. */
   int32_t use_image(int64_t index) {
     const cJSON *image = element(image_list, index, "image");
     if (image_number[static_cast<size_t>(index)] != -2) {
@@ -361,11 +362,9 @@ struct Reader {
     } else if (member(image, "bufferView")) {
       bytes = view(whole(image, "bufferView", NONE));
     }
-    static const unsigned char png[] = {0x89, 'P', 'N', 'G'}, jpeg[] = {0xff, 0xd8, 0xff};
-    bool is_png = bytes.size > 8 && std::memcmp(bytes.at, png, sizeof png) == 0;
-    bool is_jpeg = bytes.size > 8 && std::memcmp(bytes.at, jpeg, sizeof jpeg) == 0;
+    const char *type = orb_image_type(bytes.at, bytes.size);
     image_bytes += bytes.size;
-    if ((!is_png && !is_jpeg) || image_bytes > 2 * file_size) {
+    if (!type || image_bytes > 2 * file_size) {
       return -1;
     }
     orb_image kept = {};
@@ -375,7 +374,7 @@ struct Reader {
     }
     std::memcpy(kept.bytes, bytes.at, bytes.size);
     kept.size = bytes.size;
-    std::strcpy(kept.mime, is_png ? "image/png" : "image/jpeg");
+    std::strcpy(kept.mime, type);
     images.push_back(kept);
     return image_number[static_cast<size_t>(index)] = static_cast<int32_t>(images.size() - 1);
   }
@@ -391,10 +390,10 @@ struct Reader {
     out->image = source == NONE ? -1 : use_image(source);
     if (sampler != NONE) {
       const cJSON *s = element(samplers, sampler, "sampler");
-      out->wrap_s = static_cast<int32_t>(whole(s, "wrapS", 0) & 0xffff);
-      out->wrap_t = static_cast<int32_t>(whole(s, "wrapT", 0) & 0xffff);
-      out->mag_filter = static_cast<int32_t>(whole(s, "magFilter", 0) & 0xffff);
-      out->min_filter = static_cast<int32_t>(whole(s, "minFilter", 0) & 0xffff);
+      out->wrap_s = orb_sampler_wrap(whole(s, "wrapS", 0));
+      out->wrap_t = orb_sampler_wrap(whole(s, "wrapT", 0));
+      out->mag_filter = orb_sampler_magnify(whole(s, "magFilter", 0));
+      out->min_filter = orb_sampler_minify(whole(s, "minFilter", 0));
     }
   }
 

@@ -1,0 +1,130 @@
+/* See texture.h.
+ *
+ * Pixels are not decoded here. An image is taken when its headers are whole up to the place where pixels begin: a
+ * viewer of the asset, and a validator, then know its size and kind. Sources: PNG (W3C, 3rd edition) 5.3, 11.2; JPEG
+ * (ITU-T T.81) B.1, B.2.2. Of JPEG only what viewers of glTF show: baseline, extended or progressive, grey or of three
+ * components (four would be inks).
+ */
+#include "format/texture.h"
+
+#include <string.h>
+
+#include "format/bytes.h"
+
+enum { PNG_HEADER = 13, PNG_AROUND = 12, PNG_SIZE_MAX = 0x7fffffff };
+
+/* The chunk IHDR, behind its length and type. */
+static int is_png_header(const unsigned char *p) {
+  uint32_t width = orb_read_u32(p, 1), height = orb_read_u32(p + 4, 1);
+  static const unsigned depths[] = {
+      1 | 2 | 4 | 8 | 16, 0, 8 | 16, 1 | 2 | 4 | 8, 8 | 16, 0, 8 | 16}; /* by colour type */
+  unsigned depth = p[8], type = p[9];
+  return width - 1 < PNG_SIZE_MAX && height - 1 < PNG_SIZE_MAX && type < sizeof depths / sizeof *depths &&
+         (depth & (depth - 1)) == 0 && (depth & depths[type]) != 0 && p[10] == 0 && p[11] == 0 && p[12] <= 1;
+}
+
+/* Whether a chunk that PNG gives one length, and that programs read without asking, has it. */
+static int has_its_length(const unsigned char *type, size_t length) {
+  static const struct {
+    char type[5];
+    size_t length;
+  } fixed[] = {{"cHRM", 32}, {"gAMA", 4}, {"pHYs", 9}, {"sRGB", 1}};
+  for (size_t i = 0; i < sizeof fixed / sizeof *fixed; i++) {
+    if (memcmp(type, fixed[i].type, 4) == 0) {
+      return length == fixed[i].length;
+    }
+  }
+  return memcmp(type, "IHDR", 4) != 0; /* a second one */
+}
+
+static int is_png(const unsigned char *bytes, size_t size) {
+  static const unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  int has_palette = 0;
+  size_t at = sizeof signature;
+  if (size < at + PNG_AROUND + PNG_HEADER || memcmp(bytes, signature, sizeof signature) != 0 ||
+      orb_read_u32(bytes + at, 1) != PNG_HEADER || memcmp(bytes + at + 4, "IHDR", 4) != 0 ||
+      !is_png_header(bytes + at + 8)) {
+    return 0;
+  }
+  int wants_palette = bytes[at + 8 + 9] == 3;
+  while (size - at >= PNG_AROUND) {
+    size_t length = orb_read_u32(bytes + at, 1);
+    const unsigned char *type = bytes + at + 4;
+    if (length > size - at - PNG_AROUND) {
+      return 0;
+    }
+    if (memcmp(type, "IDAT", 4) == 0) {
+      return has_palette || !wants_palette;
+    }
+    if (at > sizeof signature && !has_its_length(type, length)) {
+      return 0;
+    }
+    has_palette |= memcmp(type, "PLTE", 4) == 0 && length >= 3;
+    at += PNG_AROUND + length;
+  }
+  return 0;
+}
+
+/* The segment of a frame header, from its length on. */
+static int is_jpeg_frame(const unsigned char *p, size_t length) {
+  if (length < 8) {
+    return 0;
+  }
+  size_t components = p[7];
+  return p[2] == 8 && orb_read_u16(p + 3, 1) > 0 && orb_read_u16(p + 5, 1) > 0 &&
+         (components == 1 || components == 3) && length == 8 + 3 * components;
+}
+
+static int is_jpeg(const unsigned char *bytes, size_t size) {
+  enum { SOF0 = 0xc0, SOF2 = 0xc2, SOF15 = 0xcf, DHT = 0xc4, DAC = 0xcc };
+  enum { SOI = 0xd8, EOI = 0xd9, SOS = 0xda, DNL = 0xde, RST_FIRST = 0xd0, TEM = 0x01 };
+  int has_frame = 0;
+  if (size < 4 || bytes[0] != 0xff || bytes[1] != SOI) {
+    return 0;
+  }
+  for (size_t at = 2; size - at >= 4;) {
+    if (bytes[at] != 0xff) {
+      return 0;
+    }
+    unsigned marker = bytes[at + 1];
+    if (marker == 0xff) { /* fill */
+      at++;
+      continue;
+    }
+    size_t length = orb_read_u16(bytes + at + 2, 1);
+    int is_bare = marker <= TEM || (marker >= RST_FIRST && marker <= EOI);
+    if (is_bare || length < 2 || length > size - at - 2) {
+      return 0;
+    }
+    if (marker == SOS) {
+      return has_frame;
+    }
+    if (marker == DNL || (marker >= SOF0 && marker <= SOF15 && marker != DHT && marker != DAC)) {
+      if (has_frame || marker == DNL || marker > SOF2 || !is_jpeg_frame(bytes + at + 2, length)) {
+        return 0;
+      }
+      has_frame = 1;
+    }
+    at += 2 + length;
+  }
+  return 0;
+}
+
+const char *orb_image_type(const unsigned char *bytes, size_t size) {
+  return is_png(bytes, size) ? "image/png" : is_jpeg(bytes, size) ? "image/jpeg" : NULL;
+}
+
+/* CLAMP_TO_EDGE, MIRRORED_REPEAT, REPEAT */
+int32_t orb_sampler_wrap(int64_t value) {
+  return value == 33071 || value == 33648 || value == 10497 ? (int32_t)value : 0;
+}
+
+/* NEAREST, LINEAR */
+int32_t orb_sampler_magnify(int64_t value) {
+  return value == 9728 || value == 9729 ? (int32_t)value : 0;
+}
+
+/* NEAREST, LINEAR, and the four with mipmaps */
+int32_t orb_sampler_minify(int64_t value) {
+  return orb_sampler_magnify(value) || (value >= 9984 && value <= 9987) ? (int32_t)value : 0;
+}
