@@ -50,7 +50,9 @@ void metrics_flips(int64_t n) {
 }
 void metrics_request(int status, double seconds) {
   atomic_fetch_add(&statuses[status / 100 < 6 ? status / 100 : 0], 1);
-  observe(&requests, seconds);
+  if (seconds >= 0) {
+    observe(&requests, seconds);
+  }
 }
 void metrics_bytes(int64_t received, int64_t sent) {
   atomic_fetch_add(&received_bytes, received);

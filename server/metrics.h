@@ -10,7 +10,7 @@ void metrics_job(int embedding, int succeeded, double seconds);
 void metrics_stage(int embedding, const char *stage, double seconds); /* one that is over */
 void metrics_cache(int hit);
 void metrics_flips(int64_t flips);
-void metrics_request(int status, double seconds);
+void metrics_request(int status, double seconds); /* seconds < 0: it waited for a job, its time says nothing */
 void metrics_bytes(int64_t received, int64_t sent);
 void metrics_connection(int change);
 int64_t metrics_connections(void);

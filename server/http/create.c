@@ -103,6 +103,9 @@ static void submit(request *r, const wanted *wish) {
   job *j = NULL;
   int fresh = 0;
   queue_result result = queue_submit(r->srv->q, &wanted_job, &j, &fresh);
+  if (fresh && result == QUEUE_OK && r->caller && !access_view(r)[0]) {
+    callers_recount(r->srv->callers, access_tenant(r)); /* meshes of others may be its own now */
+  }
   if (result == QUEUE_OK) {
     char fields[REQUEST_FIELDS + 80];
     request_fields(r, fields);
@@ -126,6 +129,9 @@ static void submit(request *r, const wanted *wish) {
     }
     case QUEUE_STOPPING:
       reply_refuse(r, "unavailable", "The service is stopping; try again soon.");
+      break;
+    case QUEUE_MESH_GONE:
+      reply_refuse(r, "not-found", "A mesh of this request was deleted meanwhile: upload it again.");
       break;
     default:
       reply_store(r, result == QUEUE_STORE_FULL ? STORE_FULL : STORE_ERROR);

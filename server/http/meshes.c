@@ -127,7 +127,7 @@ static void store_mesh(request *r, const upload_query *query, const unsigned cha
   if (fresh && r->caller) {
     callers_recount(srv->callers, tenant);
   }
-  if (stored == STORE_CONFLICT) { /* others of this tenant took the room meanwhile */
+  if (stored == STORE_CONFLICT && r->caller) { /* others of this tenant took the room meanwhile */
     drop_unused(srv, id);
     callers_recount(srv->callers, tenant);
     if (access_has_room(r, r->received, &problem)) {

@@ -196,7 +196,7 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
   }
   int64_t took = clock_us() - r->began;
   int waited = r->waits_for != NULL || (r->route && r->route->id == ROUTE_JOB_EVENTS);
-  metrics_request((int)r->status, waited ? 0 : 1e-6 * (double)took);
+  metrics_request((int)r->status, waited ? -1 : 1e-6 * (double)took);
   if (code == MHD_REQUEST_TERMINATED_COMPLETED_OK && !r->head) {
     metrics_bytes(0, r->sends);
   }

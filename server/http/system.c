@@ -78,12 +78,12 @@ static enum MHD_Result ready(request *r) {
     reply_refuse(r, "unavailable", "The service is starting or stopping.");
     return MHD_YES;
   }
-  queue_numbers n;
-  queue_count(srv->q, &n);
   orb_text json = {0};
   orb_json_open(&json, '{');
   orb_json_member_string(&json, "status", "ready");
   if (query_has(r, "verbose") && access_is_operator(r)) {
+    queue_numbers n; /* a walk under the queue's lock: not for everybody */
+    queue_count(srv->q, &n);
     orb_json_member_integer(&json, "queued", n.queued);
     orb_json_member_integer(&json, "waiting", n.waiting);
     orb_json_member_integer(&json, "running", n.running);

@@ -162,7 +162,7 @@ int64_t queue_events_write(queue *q, job *j, int64_t after, orb_text *out, int *
 static void show_to_dependents(queue *q, const job *of, const char *stage, double fraction) {
   for (job *j = q->first; j; j = j->next) {
     for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
-      if (strcmp(j->dependencies[d], of->row.key) == 0) {
+      if (is_for(of, j->dependencies[d], j->row.owner)) {
         j->row.state = ORB_JOB_RUNNING;
         if (!j->row.started) {
           j->row.started = unix_ms();

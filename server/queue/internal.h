@@ -28,6 +28,7 @@ struct job {
   int taken;     /* by a worker, or by one who ends it */
   int running;   /* claimed */
   int cancel;
+  int adopters;  /* requests that are making it listed */
   int waits_for; /* unfinished jobs that it needs */
   char dependencies[DEPENDENCIES][ORB_ID_SIZE];
   int dependency_count;
@@ -71,6 +72,10 @@ struct queue {
 };
 
 int64_t unix_ms(void);
+/* Whether the job makes what an owner wants under this key. */
+static inline int is_for(const job *j, const char *key, const char *owner) {
+  return strcmp(j->row.key, key) == 0 && strcmp(j->row.owner, owner) == 0;
+}
 /* Counts the job with its owner. */
 void owner_enter(queue *q, job *j);
 void owner_leave(queue *q, const job *j);

@@ -69,6 +69,7 @@ typedef enum queue_result {
   QUEUE_QUOTA,
   QUEUE_STOPPING,
   QUEUE_STORE_FULL,
+  QUEUE_MESH_GONE, /* one that the request names was deleted meanwhile */
   QUEUE_ERROR
 } queue_result;
 /* *out is referenced. *fresh (may be NULL): 0 where the job was there. */

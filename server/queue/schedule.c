@@ -6,21 +6,33 @@
 #include "log.h"
 #include "queue/internal.h"
 
-static int is_for(const job *j, const char *key, const char *owner) {
-  return strcmp(j->row.key, key) == 0 && strcmp(j->row.owner, owner) == 0;
-}
-
-static queue_result submit_locked(queue *q, const queue_request *request, job **out, int *fresh) {
-  job *j;
-  int64_t mine = 0;
-  for (j = q->first; j && (j->cancel || !is_for(j, request->key, request->owner)); j = j->next) {
-    mine += request->owner_limit > 0 && j->row.listed && strcmp(j->row.owner, request->owner) == 0;
-  }
-  if (j) {
+/* The owner's job for the same, referenced; NULL with the number of the owner's listed jobs. One that was cancelled
+ * while it was waited for is none. */
+static job *adopt_locked(queue *q, const queue_request *request, int64_t *mine) {
+  for (;;) {
+    job *j;
+    *mine = 0;
+    for (j = q->first; j && (j->cancel || !is_for(j, request->key, request->owner)); j = j->next) {
+      *mine += request->owner_limit > 0 && j->row.listed && strcmp(j->row.owner, request->owner) == 0;
+    }
+    if (!j) {
+      return NULL;
+    }
     j->refs++;
     while (!j->committed && !j->dead) { /* until then the row is read by who writes it, without the lock */
       pthread_cond_wait(&q->committed, &q->lock);
     }
+    if (!j->cancel || j->dead) {
+      return j;
+    }
+    job_unref(j);
+  }
+}
+
+static queue_result submit_locked(queue *q, const queue_request *request, job **out, int *fresh) {
+  int64_t mine = 0;
+  job *j = adopt_locked(q, request, &mine);
+  if (j) {
     j->row.priority = request->priority > j->row.priority ? request->priority : j->row.priority;
     *out = j;
     return j->dead ? QUEUE_ERROR : QUEUE_OK;
@@ -62,14 +74,20 @@ queue_result queue_submit(queue *q, const queue_request *request, job **out, int
   pthread_mutex_lock(&q->lock);
   queue_result result = submit_locked(q, request, out, &is_fresh);
   if (result == QUEUE_OK && !is_fresh && request->listed && !(*out)->row.listed) {
-    (*out)->row.listed = make_listed = 1;
+    make_listed = 1;
+    (*out)->adopters++; /* from here nobody cancels it as needless */
   }
   pthread_mutex_unlock(&q->lock);
   if (fresh) {
     *fresh = is_fresh;
   }
-  if (make_listed && catalogue_job_list_it(q->cat, (*out)->row.id) == STORE_FULL) {
-    result = QUEUE_STORE_FULL;
+  if (make_listed) {
+    store_result stored = catalogue_job_list_it(q->cat, (*out)->row.id);
+    pthread_mutex_lock(&q->lock);
+    (*out)->adopters--;
+    (*out)->row.listed |= stored == STORE_OK;
+    pthread_mutex_unlock(&q->lock);
+    result = stored == STORE_OK ? QUEUE_OK : stored == STORE_FULL ? QUEUE_STORE_FULL : QUEUE_ERROR;
   }
   if (!is_fresh) {
     return result;
@@ -90,7 +108,7 @@ queue_result queue_submit(queue *q, const queue_request *request, job **out, int
     table_ended(q, j);
     job_unref(j);
     *out = NULL;
-    result = stored == STORE_FULL ? QUEUE_STORE_FULL : QUEUE_ERROR;
+    result = stored == STORE_FULL ? QUEUE_STORE_FULL : stored == STORE_NOT_FOUND ? QUEUE_MESH_GONE : QUEUE_ERROR;
   }
   pthread_cond_broadcast(&q->committed);
   pthread_mutex_unlock(&q->lock);
@@ -421,24 +439,50 @@ void queue_put_off(queue *q, job *j) {
   pthread_mutex_unlock(&q->lock);
 }
 
-/* Ends the sub-jobs that only this job wanted. */
+/* Notes the wish; 1 where the job is the caller's to end, because no worker has it. */
+static int cancel_locked(job *j) {
+  int mine = !orb_job_ended(j->row.state) && !j->taken;
+  j->cancel = 1;
+  if (j->ctx) {
+    orb_context_cancel(j->ctx);
+  }
+  j->taken |= mine;
+  return mine;
+}
+
+static store_result end_cancelled(queue *q, job *j) {
+  store_result stored = end_job(q, j, ORB_JOB_CANCELLED, NULL, NULL);
+  if (stored != STORE_OK) {
+    pthread_mutex_lock(&q->lock);
+    j->taken = 0;
+    pthread_mutex_unlock(&q->lock);
+  }
+  return stored;
+}
+
+static int is_wanted(const queue *q, const job *needed, const job *besides) {
+  int wanted = needed->row.listed || needed->adopters > 0 || !needed->committed;
+  for (const job *j = q->first; j && !wanted; j = j->next) {
+    for (int k = 0; j != besides && k < j->dependency_count; k++) {
+      wanted |= is_for(needed, j->dependencies[k], j->row.owner);
+    }
+  }
+  return wanted;
+}
+
+/* Ends the sub-jobs that only this job wanted. Looked at and marked under one lock: who comes later gets another. */
 static void cancel_needless(queue *q, job *of) {
   for (int d = 0; d < of->dependency_count; d++) {
     pthread_mutex_lock(&q->lock);
     job *needed = table_find(q, of->dependencies[d], of->row.owner);
-    if (!needed) {
+    if (!needed || is_wanted(q, needed, of)) {
       pthread_mutex_unlock(&q->lock);
       continue;
     }
     needed->refs++;
-    int wanted = needed->row.listed;
-    for (job *j = q->first; j && !wanted; j = j->next) {
-      for (int k = 0; j != of && k < j->dependency_count; k++) {
-        wanted |= is_for(needed, j->dependencies[k], j->row.owner);
-      }
-    }
+    int mine = cancel_locked(needed);
     pthread_mutex_unlock(&q->lock);
-    if (!wanted && queue_cancel(q, needed) != STORE_OK) {
+    if (mine && end_cancelled(q, needed) != STORE_OK) {
       log_warn("job %s could not be cancelled", needed->row.id);
     }
     queue_release(q, needed);
@@ -447,26 +491,16 @@ static void cancel_needless(queue *q, job *of) {
 
 store_result queue_cancel(queue *q, job *j) {
   pthread_mutex_lock(&q->lock);
-  int ended = orb_job_ended(j->row.state);
-  j->cancel = 1;
-  if (j->ctx) {
-    orb_context_cancel(j->ctx);
-  }
-  int mine = !ended && !j->taken;
-  j->taken |= mine;
+  int mine = cancel_locked(j);
   pthread_mutex_unlock(&q->lock);
   if (!mine) {
     return STORE_OK; /* the worker that has it sees the wish */
   }
-  store_result stored = end_job(q, j, ORB_JOB_CANCELLED, NULL, NULL);
-  if (stored != STORE_OK) {
-    pthread_mutex_lock(&q->lock);
-    j->taken = 0;
-    pthread_mutex_unlock(&q->lock);
-    return stored;
+  store_result stored = end_cancelled(q, j);
+  if (stored == STORE_OK) {
+    cancel_needless(q, j);
   }
-  cancel_needless(q, j);
-  return STORE_OK;
+  return stored;
 }
 
 void queue_set_limit(queue *q, int limit) {

@@ -66,7 +66,9 @@ typedef struct job_row {
 } job_row;
 void job_row_free(job_row *row);
 
-store_result catalogue_job_insert(catalogue *cat, job_row *row); /* fills seq */
+/* Fills seq. Its owner owns the meshes that the request names from then on; STORE_NOT_FOUND where the job is listed and
+ * one of them is gone. */
+store_result catalogue_job_insert(catalogue *cat, job_row *row);
 store_result catalogue_job_list_it(catalogue *cat, const char *id);
 /* queued → running with the next attempt. */
 store_result catalogue_job_claim(catalogue *cat, const char *id, int attempt, int alone, int64_t now);

@@ -34,7 +34,7 @@ static int insert(database *db, void *arg) {
   sqlite3_bind_int64(st, 9, r->created);
   int code = database_run(db, st);
   r->seq = sqlite3_last_insert_rowid(db->handle);
-  return code;
+  return code == SQLITE_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
 }
 
 store_result catalogue_job_insert(catalogue *cat, job_row *row) {

@@ -62,6 +62,43 @@ int owner_of_job(database *db, const char *job, int64_t now) {
   return code == SQLITE_OK && !there ? SQLITE_CONSTRAINT : code;
 }
 
+#define NAMED                                                              \
+  "WITH given(request) AS (SELECT iif(json_valid(?1), ?1, '{}')),"         \
+  " named(id) AS (SELECT json_extract(request, '$.mesh') FROM given UNION" \
+  "  SELECT json_extract(shape.value, '$.mesh') FROM given, json_each(request, '$.shapes') AS shape)"
+
+/* Mostly they are the caller's own already; an operator works with those of others. Then the description is without
+ * what the first owner said. */
+int owner_of_meshes(database *db, const char *request, const char *tenant, int64_t now, int all) {
+  sqlite3_stmt *st =
+      database_statement(db, NAMED
+                         "INSERT INTO owner(kind, id, tenant, json, bytes, created)"
+                         " SELECT 0, r.id, ?2, iif(json_valid(r.json), json_set(r.json, '$.name', '', '$.created',"
+                         "  strftime('%Y-%m-%dT%H:%M:%S', ?3/1000, 'unixepoch') || printf('.%03dZ', ?3%1000)), NULL),"
+                         "  r.bytes, ?3 FROM named n JOIN resource r ON r.kind=0 AND r.id=n.id"
+                         " WHERE NOT EXISTS(SELECT 1 FROM owner o WHERE o.kind=0 AND o.id=r.id AND o.tenant=?2)");
+  int code = SQLITE_ERROR;
+  if (st) {
+    sqlite3_bind_text(st, 1, request, -1, SQLITE_STATIC);
+    sqlite3_bind_text(st, 2, tenant, -1, SQLITE_STATIC);
+    sqlite3_bind_int64(st, 3, now);
+    code = database_run(db, st);
+  }
+  if (code != SQLITE_OK || !all) {
+    return code;
+  }
+  st = database_statement(db, NAMED
+                          "SELECT 1 FROM named n WHERE n.id IS NOT NULL AND NOT EXISTS"
+                          " (SELECT 1 FROM resource r WHERE r.kind=0 AND r.id=n.id)");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, request, -1, SQLITE_STATIC);
+  code = sqlite3_step(st);
+  sqlite3_reset(st);
+  return code == SQLITE_DONE ? SQLITE_OK : code == SQLITE_ROW ? SQLITE_NOTFOUND : code;
+}
+
 static const char owner_exists[] = "SELECT 1 FROM owner WHERE kind=?1 AND id=?2 AND tenant=?3";
 
 typedef struct put_arg {

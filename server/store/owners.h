@@ -16,6 +16,9 @@
 int owner_insert(database *db, const resource *r, const char *tenant, const char *json);
 /* Inside a transaction: the owner of a job that succeeded owns its result. SQLITE_CONSTRAINT where that is gone. */
 int owner_of_job(database *db, const char *job, int64_t now);
+/* Inside a transaction: who asks for a job owns the meshes that it names from then on, so that no other owner's delete
+ * takes them away. SQLITE_NOTFOUND where one is gone and `all` is wanted. */
+int owner_of_meshes(database *db, const char *request, const char *tenant, int64_t now, int all);
 
 /* Puts a mesh if it is absent, and makes the tenant its owner. STORE_CONFLICT: with it the tenant would have more bytes
  * than quota (0: no limit); nothing is changed then. *fresh: the tenant did not own it before. */

@@ -80,8 +80,23 @@ store_result catalogue_token_remove(catalogue *cat, const char *name) {
   return catalogue_write(cat, remove_row, (void *)(uintptr_t)name);
 }
 
+static void read_row(sqlite3_stmt *st, token_row *row) {
+  char hash[TOKEN_TEXT];
+  row_text(st, 0, hash, sizeof hash);
+  sodium_hex2bin(row->hash, sizeof row->hash, hash, strlen(hash), NULL, NULL, NULL);
+  row_text(st, 1, row->name, sizeof row->name);
+  row->scopes = sqlite3_column_int(st, 2);
+  row->quota = sqlite3_column_int64(st, 3);
+  row->used = sqlite3_column_int64(st, 4);
+  row->created = sqlite3_column_int64(st, 5);
+  row->jobs = sqlite3_column_int64(st, 6);
+  row->priority = sqlite3_column_int(st, 7);
+  row_text(st, 8, row->tenant, sizeof row->tenant);
+}
+
 token_row *catalogue_tokens(catalogue *cat, int *count) {
-  token_row *rows = calloc(TOKENS_MOST, sizeof *rows);
+  size_t room = 64, found = 0;
+  token_row *rows = calloc(room, sizeof *rows);
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st =
       rows ? database_statement(db,
@@ -90,26 +105,24 @@ token_row *catalogue_tokens(catalogue *cat, int *count) {
                                 " LEFT JOIN tenant ON tenant.name=token.tenant ORDER BY token.name")
            : NULL;
   int code = SQLITE_ERROR;
-  *count = 0;
-  while (st && *count < TOKENS_MOST && (code = sqlite3_step(st)) == SQLITE_ROW) {
-    token_row *row = &rows[(*count)++];
-    char hash[TOKEN_TEXT];
-    row_text(st, 0, hash, sizeof hash);
-    sodium_hex2bin(row->hash, sizeof row->hash, hash, strlen(hash), NULL, NULL, NULL);
-    row_text(st, 1, row->name, sizeof row->name);
-    row->scopes = sqlite3_column_int(st, 2);
-    row->quota = sqlite3_column_int64(st, 3);
-    row->used = sqlite3_column_int64(st, 4);
-    row->created = sqlite3_column_int64(st, 5);
-    row->jobs = sqlite3_column_int64(st, 6);
-    row->priority = sqlite3_column_int(st, 7);
-    row_text(st, 8, row->tenant, sizeof row->tenant);
+  while (st && (code = sqlite3_step(st)) == SQLITE_ROW) {
+    if (found == room) {
+      token_row *more = found < INT32_MAX / 2 ? reallocarray(rows, 2 * room, sizeof *rows) : NULL;
+      if (!more) {
+        break;
+      }
+      rows = more;
+      room *= 2;
+    }
+    memset(&rows[found], 0, sizeof *rows);
+    read_row(st, &rows[found++]);
   }
   if (st) {
     sqlite3_reset(st);
   }
   catalogue_reader_done(cat, db);
-  if (code != SQLITE_DONE && code != SQLITE_ROW) {
+  *count = (int)found;
+  if (code != SQLITE_DONE) {
     free(rows);
     *count = -1;
     return NULL;

@@ -4,7 +4,7 @@
 
 #include "store/catalogue.h"
 
-enum { TOKEN_BYTES = 32, TOKEN_TEXT = 2 * TOKEN_BYTES + 1, TOKENS_MOST = 1024 };
+enum { TOKEN_BYTES = 32, TOKEN_TEXT = 2 * TOKEN_BYTES + 1 };
 
 typedef struct token_row {
   unsigned char hash[TOKEN_BYTES];
@@ -24,7 +24,7 @@ store_result catalogue_token_add(catalogue *cat, const token_row *row); /* STORE
 /* Changes scopes, quota, jobs and priority, each where it is not −1. */
 store_result catalogue_token_set(catalogue *cat, const token_row *row);
 store_result catalogue_token_remove(catalogue *cat, const char *name);
-/* By name; at most TOKENS_MOST. In memory of malloc(); NULL with *count −1 on error. */
+/* All, by name. In memory of malloc(); NULL with *count −1 on error. */
 token_row *catalogue_tokens(catalogue *cat, int *count);
 
 #endif

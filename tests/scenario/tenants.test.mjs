@@ -243,3 +243,37 @@ test('what was made without tokens is the operator\'s', async (t) => {
   assert.equal((await d.delete(url)).status, 204, 'without tokens everybody is the operator');
   assert.equal((await d.get(url)).status, 404);
 });
+
+test("an operator's job on another's mesh outlives its delete", async (t) => {
+  const { d, add, upload, end } = await tenants(t);
+  const [ann, bob, root] = [await add('ann', 'read,write'), await add('bob', 'read,write'), await add('root', 'read,write,admin')];
+  const mesh = (await upload(ann, small, { name: 'secret' })).json;
+  await upload(ann, large);
+  const blocker = (await d.post('/v1/embeddings', { mesh: (await upload(bob, large)).json.id, ...hold }, bob)).json;
+  const job = (await d.post('/v1/embeddings', { mesh: mesh.id }, root)).json;
+  assert.equal((await d.delete(mesh.url, ann)).status, 204);
+  assertProblem(await d.get(mesh.url, ann), 404, 'not-found');
+  assertProblem(await d.delete(mesh.url, root), 409, 'in-use');
+  assert.equal((await d.delete(blocker.url, bob)).status, 200);
+  await end(root, job);
+  assert.equal((await d.delete(mesh.url, root)).status, 204);
+});
+
+test("what waits shows nothing of another's job", async (t) => {
+  const { d, add, upload } = await tenants(t);
+  const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')];
+  const slow = (await upload(ann, large)).json;
+  await upload(bob, large);
+  const hers = (await d.post('/v1/embeddings', { mesh: slow.id, ...hold }, ann)).json;
+  const until = Date.now() + 60_000;
+  while ((await d.get(hers.url, ann)).json.stage !== 'embed') assert.ok(Date.now() < until);
+  const his = (await d.post('/v1/supermeshes', { shapes: [{ mesh: slow.id }, { mesh: slow.id }], embedding: hold }, bob));
+  assert.equal(his.status, 202, his.bytes.toString());
+  for (const until = Date.now() + 1000; Date.now() < until; await new Promise((done) => setTimeout(done, 20))) {
+    const shown = (await d.get(his.json.url, bob)).json;
+    if ((await d.get(hers.url, ann)).json.state !== 'running') break;
+    assert.equal(shown.state, 'queued', 'while hers is being worked on');
+  }
+  await d.delete(hers.url, ann);
+  await d.delete(his.json.url, bob);
+});

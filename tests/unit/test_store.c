@@ -485,6 +485,59 @@ static void test_owners_of_results(void **state) {
   assert_int_equal(read_job(s, eve.id).state, ORB_JOB_RUNNING);
 }
 
+/* Who asks for a job owns the meshes that it names, so that the first owner can give them up. One that is gone refuses
+ * the job where a caller waits for the answer. */
+static void test_owners_of_meshes(void **state) {
+  stored *s = *state;
+  resource mesh = {.kind = RESOURCE_MESH,
+                   .json = (char *)(uintptr_t) "{\"name\":\"secret\",\"created\":\"\"}",
+                   .bytes = 60,
+                   .created = 1000};
+  resource got = {0};
+  int fresh, gone;
+  make_id(mesh.id, 'a');
+  make_id(mesh.sha, 'b');
+  assert_int_equal(catalogue_put_for(s->cat, &mesh, "ann", 0, &fresh), STORE_OK);
+  char request[256];
+  snprintf(request, sizeof request, "{\"shapes\":[{\"mesh\":\"%s\"},{\"mesh\":\"%s\"}]}", mesh.id, mesh.id);
+  job_row job = new_job('1'), second = new_job('2');
+  job.request = second.request = request;
+  job.listed = second.listed = 1;
+  job.created = 86400123;
+  strcpy(job.owner, "root");
+  assert_int_equal(catalogue_job_insert(s->cat, &job), STORE_OK);
+  assert_int_equal(catalogue_get_of(s->cat, RESOURCE_MESH, mesh.id, "root", &got), STORE_OK);
+  assert_string_equal(got.json, "{\"name\":\"\",\"created\":\"1970-01-02T00:00:00.123Z\"}");
+  resource_free(&got);
+  assert_int_equal(catalogue_tenant_bytes(s->cat, "root"), 60);
+  assert_int_equal(catalogue_disown(s->cat, RESOURCE_MESH, mesh.id, "ann", &gone), STORE_OK);
+  assert_false(gone);
+  assert_int_equal(catalogue_disown(s->cat, RESOURCE_MESH, mesh.id, "root", &gone), STORE_OK);
+  assert_true(gone);
+  assert_int_equal(catalogue_job_insert(s->cat, &second), STORE_NOT_FOUND);
+  job_row absent;
+  assert_int_equal(catalogue_job_get(s->cat, second.id, &absent), STORE_NOT_FOUND);
+  assert_int_equal(catalogue_ownerless(s->cat), 0);
+}
+
+/* There may be any number of tokens; all are read, by name. */
+static void test_many_tokens(void **state) {
+  stored *s = *state;
+  enum { MANY = 1100 };
+  int count;
+  for (int i = 0; i < MANY; i++) {
+    token_row row = {.scopes = 1};
+    snprintf(row.name, sizeof row.name, "t%05d", MANY - i);
+    memcpy(row.hash, &i, sizeof i);
+    assert_int_equal(catalogue_token_add(s->cat, &row), STORE_OK);
+  }
+  token_row *rows = catalogue_tokens(s->cat, &count);
+  assert_int_equal(count, MANY);
+  assert_string_equal(rows[0].name, "t00001");
+  assert_string_equal(rows[MANY - 1].name, "t01100");
+  free(rows);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_objects, setup, teardown),
@@ -496,6 +549,8 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_migration_to_owners, setup, teardown),
       cmocka_unit_test_setup_teardown(test_owners, setup, teardown),
       cmocka_unit_test_setup_teardown(test_owners_of_results, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_owners_of_meshes, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_many_tokens, setup, teardown),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
