@@ -74,8 +74,10 @@ const char *cli_advice(const char *type) {
       {"not-genus-zero",
        "The surface has handles, like a ring or a cup. Cut each handle and close both ends: only "
        "surfaces like a ball can be laid on the sphere."},
-      {"degenerate", "Hardly any triangles are left after repair. Check that the right object was exported."},
-      {"not-finite", "Some coordinates are not numbers. Export again."},
+      {"degenerate",
+       "Hardly any triangles are left after repair, or the mesh is tiny or far from the origin. Check that the right "
+       "object was exported; scale it or move it to the origin."},
+      {"not-finite", "Some coordinates are not numbers, or beyond 1e30. Export again, or scale the mesh down."},
       {"malformed-mesh", "The file is damaged or cut short at the place named. Export or download it again."},
       {"unknown-format", "Supported are OBJ, OFF, PLY, STL, glTF and GLB."},
       {"too-large", "The mesh is larger than the daemon accepts. Decimate it first, or raise the daemon's limits."},

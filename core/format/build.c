@@ -247,11 +247,16 @@ static orb_status check_indices(orb_build *build, int is_text, int64_t end) {
   return ORB_OK;
 }
 
-static orb_status check_finite(orb_build *build, const orb_mesh *mesh) {
+/* NaN is not. */
+static int is_usable(double x) {
+  return fabs(x) <= ORB_COORDINATE_MAX;
+}
+
+static orb_status check_coordinates(orb_build *build, const orb_mesh *mesh) {
   const double *p = build->positions;
   int64_t bad = 0;
   for (int64_t i = 0; i < 3 * build->vertices; i++) {
-    bad += !isfinite(p[i]);
+    bad += !is_usable(p[i]);
   }
   if (bad == 0) {
     return ORB_OK;
@@ -263,14 +268,17 @@ static orb_status check_finite(orb_build *build, const orb_mesh *mesh) {
   }
   for (int64_t h = 0; h < 3 * (int64_t)mesh->triangle_count; h++) {
     int32_t v = mesh->triangles[h];
-    if (seen[v] || (isfinite(p[3 * (size_t)v]) && isfinite(p[3 * (size_t)v + 1]) && isfinite(p[3 * (size_t)v + 2]))) {
+    const double *at = p + 3 * (size_t)v;
+    if (seen[v] || (is_usable(at[0]) && is_usable(at[1]) && is_usable(at[2]))) {
       continue;
     }
     seen[v] = 1;
     if (!error) {
+      int finite = isfinite(at[0]) && isfinite(at[1]) && isfinite(at[2]);
       (void)orb_fail(build->ctx, ORB_E_NOT_FINITE,
-                     "Vertex %d (counted from 0) has a coordinate that is not a finite number; mend it or remove its "
-                     "faces.",
+                     finite ? "Vertex %d (counted from 0) has a coordinate beyond 1e30; scale the mesh down."
+                            : "Vertex %d (counted from 0) has a coordinate that is not a finite number; mend it or "
+                              "remove its faces.",
                      v);
       error = orb_context_error_edit(build->ctx);
     }
@@ -470,7 +478,7 @@ orb_status orb_build_finish(orb_build *build, int is_text, int64_t end, orb_mesh
   }
   ORB_GO(status, fill_triangles(build, &mesh), done);
   build->positions = mesh.positions;
-  status = check_finite(build, &mesh);
+  status = check_coordinates(build, &mesh);
   build->positions = NULL;
   if (status == ORB_OK) {
     status = move_materials(build, &mesh);

@@ -1,6 +1,8 @@
 /* See refuse.h. */
 #include "mesh/refuse.h"
 
+#include <math.h>
+
 #include "base/check.h"
 #include "mesh/sort.h"
 
@@ -189,6 +191,28 @@ orb_status orb_refuse_handles(orb_surface *s, int64_t genus) {
                  (long long)genus, of(genus, "handle", "handles"), of(genus, "it", "them"));
   orb_context_error_edit(s->ctx)->genus = genus;
   return ORB_E_NOT_GENUS_ZERO;
+}
+
+orb_status orb_refuse_size(orb_context *ctx, const orb_mesh *mesh) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, most = 0;
+  for (size_t i = 0; i < 3 * (size_t)mesh->vertex_count; i++) {
+    double x = mesh->positions[i];
+    low[i % 3] = fmin(low[i % 3], x);
+    high[i % 3] = fmax(high[i % 3], x);
+    most = fmax(most, fabs(x));
+  }
+  double diagonal = hypot(hypot(high[0] - low[0], high[1] - low[1]), high[2] - low[2]);
+  if (!(diagonal >= ORB_DIAGONAL_MIN)) {
+    return orb_fail(ctx, ORB_E_DEGENERATE, "The mesh is only %.3g across; scale it up, to 1e-30 at least.", diagonal);
+  }
+  if (!(diagonal >= ORB_DIAGONAL_SHARE * most)) {
+    return orb_fail(
+        ctx, ORB_E_DEGENERATE,
+        "The mesh is %.3g across but %.3g away from the origin, where the 32-bit numbers of glTF cannot tell "
+        "its vertices apart; move it to the origin.",
+        diagonal, most);
+  }
+  return ORB_OK;
 }
 
 orb_status orb_refuse_few(orb_surface *s) {

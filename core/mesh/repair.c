@@ -251,6 +251,9 @@ orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair) {
     status = mend(&surface, repair, &turned, &old);
   }
   if (status == ORB_OK) {
+    status = orb_refuse_size(ctx, mesh);
+  }
+  if (status == ORB_OK) {
     face_outward(mesh, turned, old);
   }
   orb_free(ctx, turned);

@@ -125,6 +125,14 @@ test('bad meshes are refused with what is wrong and where', async (t) => {
   assert.deepEqual((await refused(along, 422, 'not-manifold')).edges.map((e) => [...e].sort()), [[0, 1]]);
   await refused(shapes.turned(m, (i) => i === 5), 422, 'not-orientable', { repair: 'none' });
   await refused(obj(m).replace('v 1 0 0', 'v nan 0 0'), 422, 'not-finite');
+  const grown = (scale, shift = 0) => ({ ...m, positions: m.positions.map((p) => p.map((x) => x * scale + shift)) });
+  for (const scale of [1.1e30, 1e100, 1e150, 1e200, 1e308]) {
+    const far = await refused(grown(scale), 422, 'not-finite');
+    assert.match(far.detail, /scale the mesh down/);
+    assert.ok(far.vertex_count > 0);
+  }
+  for (const scale of [1e-31, 1e-40, 1e-200]) assert.match((await refused(grown(scale), 422, 'degenerate')).detail, /scale it up/);
+  assert.match((await refused(grown(1, 1e9), 422, 'degenerate')).detail, /move it to the origin/);
   const line = await refused(obj(m).replace(/\nf (\d+)/, '\nf 99999'), 400, 'malformed-mesh');
   assert.equal(line.line, m.positions.length + 1);
   const cut = await refused(shapes.binaryPly(m).subarray(0, -20), 400, 'malformed-mesh');

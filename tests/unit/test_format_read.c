@@ -299,6 +299,9 @@ static void test_errors(void **state) {
   expect_error("v 0 0 0\nf 1 0 1\n", ORB_E_MALFORMED_MESH, 2);
   expect_error("v 0 0 0\nv 1 0 0\nv 0 1 0\n", ORB_E_MALFORMED_MESH, 4); /* no faces: the end of the file */
   expect_error("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", ORB_E_NOT_FINITE, -1);
+  expect_error("v 0 0 0\nv 1.001e30 0 0\nv 0 1 0\nf 1 2 3\n", ORB_E_NOT_FINITE, -1);
+  assert_int_equal(orb_context_error(ctx)->vertices[0], 1);
+  assert_non_null(strstr(orb_context_error(ctx)->detail, "scale the mesh down"));
   expect_error("4OFF\n1 1 1\n", ORB_E_MALFORMED_MESH, 1);
   expect_error("OFF\n4 4 6\n0 0 0\n1 0 0", ORB_E_MALFORMED_MESH, 4);
   expect_error("nonsense bytes", ORB_E_UNKNOWN_FORMAT, -1);
@@ -308,6 +311,36 @@ static void test_errors(void **state) {
   const char *far = "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":4,\"uri\":\"x.bin\"}]}";
   assert_int_equal(read_bytes(far, strlen(far), &mesh), ORB_E_MALFORMED_MESH);
   assert_non_null(strstr(orb_context_error(ctx)->detail, "another file"));
+}
+
+/* The tetrahedron of legs `scale` with its right angle at (far, far, far). */
+static orb_status repair_tetrahedron(double scale, double far) {
+  static const double at[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  char text[1024];
+  int length = 0;
+  for (int v = 0; v < 4; v++) {
+    length += sprintf(text + length, "v %.17g %.17g %.17g\n", far + scale * at[v][0], far + scale * at[v][1],
+                      far + scale * at[v][2]);
+  }
+  length += sprintf(text + length, "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  orb_mesh mesh;
+  assert_int_equal(read_bytes(text, (size_t)length, &mesh), ORB_OK);
+  orb_status status = orb_mesh_repair(ctx, &mesh, ORB_REPAIR_SAFE);
+  orb_mesh_free(ctx, &mesh);
+  return status;
+}
+
+/* The diagonal is sqrt(3) times the leg. */
+static void test_range(void **state) {
+  (void)state;
+  assert_int_equal(repair_tetrahedron(1e30, 0), ORB_OK);
+  assert_int_equal(repair_tetrahedron(1e-30, 0), ORB_OK);
+  assert_int_equal(repair_tetrahedron(1, 1e6), ORB_OK);
+  assert_int_equal(repair_tetrahedron(0.5e-30, 0), ORB_E_DEGENERATE);
+  assert_int_equal(repair_tetrahedron(1e-200, 0), ORB_E_DEGENERATE);
+  assert_non_null(strstr(orb_context_error(ctx)->detail, "scale it up"));
+  assert_int_equal(repair_tetrahedron(1, -2e6), ORB_E_DEGENERATE);
+  assert_non_null(strstr(orb_context_error(ctx)->detail, "move it to the origin"));
 }
 
 /* strtod() is an independent judge of correct rounding. */
@@ -366,8 +399,8 @@ static void test_attributes(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_texts),     cmocka_unit_test(test_binaries),
-                                     cmocka_unit_test(test_errors),    cmocka_unit_test(test_numbers),
-                                     cmocka_unit_test(test_prefixes),  cmocka_unit_test(test_mutations),
-                                     cmocka_unit_test(test_attributes)};
+                                     cmocka_unit_test(test_errors),    cmocka_unit_test(test_range),
+                                     cmocka_unit_test(test_numbers),   cmocka_unit_test(test_prefixes),
+                                     cmocka_unit_test(test_mutations), cmocka_unit_test(test_attributes)};
   return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -666,7 +666,7 @@ export type ProblemNotGenusZero = {
 
 export type ProblemDegenerate = {
   type: '/problems/degenerate';
-  title: 'Too few triangles are left';
+  title: 'The surface is degenerate';
   status: 422;
   /** What is wrong and what to do, in plain words. */
   detail: string;
@@ -674,7 +674,7 @@ export type ProblemDegenerate = {
 
 export type ProblemNotFinite = {
   type: '/problems/not-finite';
-  title: 'A coordinate is not finite';
+  title: 'A coordinate is not finite or too large';
   status: 422;
   /** What is wrong and what to do, in plain words. */
   detail: string;

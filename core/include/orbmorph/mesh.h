@@ -90,6 +90,13 @@ typedef struct orb_topology {
 /* Measures any index list. O(V + F) expected. */
 ORB_MUST_CHECK orb_status orb_mesh_topology(orb_context *ctx, const orb_mesh *mesh, orb_topology *out);
 
+/* The coordinates that are taken: none of larger magnitude, a diagonal of the bounding box of at least this, and of at
+ * least this share of the largest coordinate. Assets hold float32, with some 8 steps over such a share; areas, volumes
+ * and their products stay well within doubles. */
+#define ORB_COORDINATE_MAX 1e30
+#define ORB_DIAGONAL_MIN 1e-30
+#define ORB_DIAGONAL_SHARE 1e-6
+
 enum {
   ORB_REPAIR_NONE = 0,
   ORB_REPAIR_SAFE = 1,              /* what changes no shape, and only what is needed; each act is counted */
@@ -98,7 +105,8 @@ enum {
 };
 
 /* Makes a mesh as read fit to embed, in place, or says why it cannot be: afterwards it is closed, manifold, oriented
- * outward, connected, of genus zero, with four triangles or more. With ORB_REPAIR_NONE only a mesh that is wholly
+ * outward, connected, of genus zero, with four triangles or more, and of a size and place that float32 can hold
+ * (ORB_E_DEGENERATE, see ORB_DIAGONAL_MIN). With ORB_REPAIR_NONE only a mesh that is wholly
  * inside-out is turned. On failure the mesh is unspecified but valid to free, and the error carries the facts
  * (edges and vertices in the file's numbers). O(V + F) expected. */
 ORB_MUST_CHECK orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair);

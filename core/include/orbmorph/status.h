@@ -28,13 +28,13 @@ typedef enum orb_status {
   ORB_E_MALFORMED_MESH, /* a reader knows them but they are broken; error has line or offset */
   ORB_E_TOO_LARGE,      /* beyond a limit of the context or of an index type */
   /* The surface. */
-  ORB_E_NOT_FINITE,     /* NaN or infinite coordinate */
+  ORB_E_NOT_FINITE,     /* NaN or infinite coordinate, or one too large */
   ORB_E_NOT_CLOSED,     /* boundary edges */
   ORB_E_NOT_MANIFOLD,   /* an edge of three faces, a vertex of two fans */
   ORB_E_NOT_ORIENTABLE, /* no consistent facing exists (or, without repairs, none is given) */
   ORB_E_NOT_CONNECTED,  /* several pieces */
   ORB_E_NOT_GENUS_ZERO, /* handles */
-  ORB_E_DEGENERATE,     /* fewer than four triangles left */
+  ORB_E_DEGENERATE,     /* fewer than four triangles left, or no size that float32 could show */
   /* The request. */
   ORB_E_BAD_LANDMARKS, /* contradictory, crossed, out of range; error names which */
   ORB_E_BAD_OPTION,    /* an option outside its range */
