@@ -57,6 +57,8 @@ static const entry table[] = {
     {"drain-seconds", NUMBER(drain_seconds, 0, 3600), "8", "on SIGTERM, time for running jobs to end"},
     {"derived-bytes", NUMBER(derived_bytes, 1 << 20, INT64_C(1) << 50), "0",
      "bytes of embeddings and supermeshes, the least used leave first; 0: no limit"},
+    {"keep-jobs", NUMBER(keep_jobs, 0, INT64_C(1) << 40), "100000",
+     "ended jobs that stay in the catalogue, the newest; 0: all"},
     {"cors", TEXT(cors), "", "origins that browsers may call from, comma-separated, or *"},
     {"log-level", TEXT(log_level), "info", "debug, info, warn, error"},
     {"log-format", TEXT(log_format), "json", "json or text"},
@@ -194,7 +196,8 @@ static void print_help(void) {
       "  orbmorphd [--NAME VALUE]…      run the service\n"
       "  orbmorphd --check-config       read the configuration and say whether it is valid\n"
       "  orbmorphd --check-data         verify every object and row of the data folder\n"
-      "  orbmorphd --gc                 remove derived objects beyond derived-bytes, and objects without a row\n"
+      "  orbmorphd --gc                 remove derived objects beyond derived-bytes, ended jobs beyond\n"
+      "                                 keep-jobs, and objects without a row\n"
       "  orbmorphd token add NAME --scope read,write,admin [--tenant NAME] [--quota BYTES] [--quota-jobs N]\n"
       "                                 [--priority 0..9]\n"
       "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-jobs …] [--priority …]\n"
@@ -306,7 +309,8 @@ config_action config_read(config *out, int argc, char **argv) {
 }
 
 static int can_change(const char *name) {
-  return strcmp(name, "log-level") == 0 || strcmp(name, "queue-limit") == 0 || strcmp(name, "derived-bytes") == 0;
+  return strcmp(name, "log-level") == 0 || strcmp(name, "queue-limit") == 0 || strcmp(name, "derived-bytes") == 0 ||
+         strcmp(name, "keep-jobs") == 0;
 }
 
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken)) {

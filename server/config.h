@@ -18,7 +18,7 @@ typedef struct config {
   int64_t workers, worker_nice, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;
   int64_t requests_per_second, header_seconds, slow_seconds, min_rate, slow_ms;
   int64_t max_body, max_json, max_ratio, decode_memory, max_triangles, queue_limit;
-  int64_t job_memory, job_seconds, disk_reserve, drain_seconds, derived_bytes;
+  int64_t job_memory, job_seconds, disk_reserve, drain_seconds, derived_bytes, keep_jobs;
 } config;
 
 typedef enum config_action {
@@ -32,7 +32,7 @@ typedef enum config_action {
 
 /* A number as options take it, perhaps with K, M or G. 0 if it is none. */
 int config_number(const char *text, int64_t *out);
-/* Reads it all again and takes over what can change while the service runs (log-level, queue-limit, derived-bytes);
+/* Reads it all again and takes over what can change while the service runs (log-level, queue-limit, derived-bytes, keep-jobs);
  * calls back for each option that differs, with whether it was taken. 0 where it is not valid: nothing changes then,
  * and the reason is on standard error. Readers of derived_bytes on other threads load it atomically. */
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken));

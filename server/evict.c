@@ -57,16 +57,17 @@ int64_t evict_derived(const evict_env *env, int64_t budget, int64_t before) {
   static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh"};
   resource rows[PAGE];
   int64_t total = catalogue_bytes(env->cat, 1);
-  for (int gone = 1; total > budget && gone > 0;) {
-    int n = catalogue_oldest(env->cat, before, PAGE, rows);
-    gone = 0;
+  int kept = 0; /* of the oldest, because jobs need them */
+  for (int n = PAGE; total > budget && n == PAGE;) {
+    n = catalogue_oldest(env->cat, before, kept, PAGE, rows);
     for (int i = 0; i < n; i++) {
       if (total > budget && !is_needed(env, &rows[i]) && evict_one(env, rows[i].kind, rows[i].id) == STORE_OK) {
         char fields[160];
         snprintf(fields, sizeof fields, "\"id\":\"%s\",\"bytes\":%lld", rows[i].id, (long long)rows[i].bytes);
         log_write(LOG_INFO, fields, "evicted a derived %s", names[rows[i].kind]);
         total -= rows[i].bytes;
-        gone++;
+      } else {
+        kept++;
       }
       resource_free(&rows[i]);
     }

@@ -103,17 +103,50 @@ enum { TICK_MS = 1000, EVICT_GRACE_MS = 5000 };
  * or used stays for a while, so that who waits for it can have it. */
 static void keep_budget(const server *srv, int64_t *seen, int *over) {
   const int64_t budget = srv->options->derived_bytes;
-  queue_numbers n;
   if (budget <= 0) {
     return;
   }
-  queue_count(srv->q, &n);
-  if (n.ended[ORB_JOB_SUCCEEDED] != *seen || *over) {
+  int64_t succeeded = queue_ended(srv->q, ORB_JOB_SUCCEEDED);
+  if (succeeded != *seen || *over) {
     const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
-    *seen = n.ended[ORB_JOB_SUCCEEDED];
+    *seen = succeeded;
     *over = evict_derived(&env, budget, (int64_t)now.tv_sec * 1000 - EVICT_GRACE_MS) > budget;
+  }
+}
+
+enum { FORGET_BATCH = 256, FORGET_ROUNDS = 4 };
+
+/* The ended jobs of the catalogue: those before this process began, less what it forgot. */
+typedef struct ended_jobs {
+  int counted;
+  int64_t before;
+} ended_jobs;
+
+/* Forgets the oldest ended jobs beyond keep-jobs, a few at a time, so that other writes get their turn. They are
+ * counted in the catalogue once, from then on by those that end. */
+static void keep_jobs(const server *srv, ended_jobs *jobs) {
+  const int64_t keep = srv->options->keep_jobs;
+  int64_t since = 0;
+  if (keep <= 0) {
+    return;
+  }
+  int64_t stored = jobs->counted ? 0 : catalogue_jobs_ended(srv->cat);
+  for (int s = ORB_JOB_SUCCEEDED; s <= ORB_JOB_CANCELLED; s++) {
+    since += queue_ended(srv->q, (orb_job_state)s);
+  }
+  if (!jobs->counted && stored >= 0) {
+    *jobs = (ended_jobs){1, stored - since};
+  }
+  for (int round = 0; round < FORGET_ROUNDS && jobs->counted && jobs->before + since > keep; round++) {
+    int64_t many = jobs->before + since - keep;
+    many = many < FORGET_BATCH ? many : FORGET_BATCH;
+    if (catalogue_jobs_forget(srv->cat, (int)many) != STORE_OK) {
+      log_warn("ended jobs could not be removed from the catalogue");
+      return;
+    }
+    jobs->before -= many;
   }
 }
 
@@ -200,6 +233,7 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
   struct pollfd wait[2] = {{.fd = signals, .events = POLLIN}, {.fd = srv->control, .events = POLLIN}};
   int64_t seen = -1, every = systemd_watchdog_ms(), fed = 0, kept = 0;
   int tick = every > 0 && every < TICK_MS ? (int)every : TICK_MS;
+  ended_jobs jobs = {0};
   for (int over = 0;;) {
     unsigned char number;
     int ready = poll(wait, 2, tick);
@@ -211,6 +245,7 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
     if (now - kept >= TICK_MS) {
       kept = now;
       keep_budget(srv, &seen, &over);
+      keep_jobs(srv, &jobs);
     }
     if (ready > 0 && wait[1].revents) {
       control_serve(srv->control, on_command, srv);

@@ -115,11 +115,24 @@ int maintain_check(const config *options) {
   return t.wrong != 0;
 }
 
+static int forget_jobs(catalogue *cat, int64_t keep) {
+  enum { BATCH = 1000 };
+  int64_t many = catalogue_jobs_ended(cat) - keep;
+  store_result result = STORE_OK;
+  if (keep > 0 && many > 0) {
+    printf("removed %lld ended jobs beyond keep-jobs\n", (long long)many);
+  }
+  for (; keep > 0 && many > 0 && result == STORE_OK; many -= BATCH) {
+    result = catalogue_jobs_forget(cat, many < BATCH ? (int)many : BATCH);
+  }
+  return result == STORE_OK;
+}
+
 int maintain_gc(const config *options) {
   tally t = {.remove_orphans = 1};
   int fine = open_both(options, &t);
   if (fine) {
-    fine = objects_each(t.store, each_object, &t) == STORE_OK;
+    fine = objects_each(t.store, each_object, &t) == STORE_OK && forget_jobs(t.cat, options->keep_jobs);
     if (options->derived_bytes > 0) {
       const evict_env env = {.cat = t.cat, .store = t.store};
       evict_derived(&env, options->derived_bytes, INT64_MAX);

@@ -34,7 +34,7 @@ static void reply_part(request *r, object_kind kind, const char *id, object_part
   uint64_t size, first = 0, length;
   snprintf(etag, sizeof etag, "\"%.32s\"", sha);
   const char *none_match = header_of(r, "If-None-Match"), *match = header_of(r, "If-Match");
-  if (match && !parse_tag_matches(match, etag)) {
+  if (match && !parse_tag_matches_strong(match, etag)) {
     reply_empty(r, 412);
     return;
   }

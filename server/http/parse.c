@@ -41,13 +41,13 @@ int parse_range(const char *text, uint64_t size, uint64_t *first, uint64_t *leng
   return 1;
 }
 
-int parse_tag_matches(const char *list, const char *tag) {
+static int tag_matches(const char *list, const char *tag, int strong) {
   for (const char *at = list; at && *at;) {
     at += strspn(at, " \t,");
     if (*at == '*') {
       return 1;
     }
-    if (strncmp(at, "W/", 2) == 0) {
+    if (!strong && strncmp(at, "W/", 2) == 0) {
       at += 2;
     }
     size_t n = strcspn(at, ",");
@@ -60,6 +60,20 @@ int parse_tag_matches(const char *list, const char *tag) {
     at += strcspn(at, ",");
   }
   return 0;
+}
+
+int parse_tag_matches(const char *list, const char *tag) {
+  return tag_matches(list, tag, 0);
+}
+
+int parse_tag_matches_strong(const char *list, const char *tag) {
+  return tag_matches(list, tag, 1);
+}
+
+const char *parse_target(const char *url) {
+  size_t scheme = strncasecmp(url, "http://", 7) == 0 ? 7 : strncasecmp(url, "https://", 8) == 0 ? 8 : 0;
+  const char *path = strchr(url + scheme, '/');
+  return scheme == 0 ? url : path ? path : "/";
 }
 
 enum { WAIT_MOST_S = 60 };

@@ -15,6 +15,10 @@ int parse_range(const char *text, uint64_t size, uint64_t *first, uint64_t *leng
 
 /* Whether a list of entity tags (If-Match, If-None-Match) names this one. Weak tags match as strong ones do. */
 int parse_tag_matches(const char *list, const char *tag);
+/* Likewise for If-Match, where a weak tag matches nothing (RFC 9110 section 13.1.1). */
+int parse_tag_matches_strong(const char *list, const char *tag);
+/* The path of a request's target, which may be in absolute form (RFC 9112 section 3.2.2). */
+const char *parse_target(const char *url);
 
 /* ?wait=SECONDS, else wait=SECONDS among the preferences of a Prefer header, in ms, at most a minute; 0: not to wait;
  * −1: the query's is no number. A preference that is not understood is passed over. */

@@ -157,7 +157,7 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
     if (!r) {
       return MHD_NO;
     }
-    request_begin(r, url, version);
+    request_begin(r, parse_target(url), version);
     if (!r->has_body) {
       watched_work(r->watched);
     }

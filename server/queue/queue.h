@@ -130,6 +130,8 @@ typedef struct queue_numbers {
   int64_t oldest_ms;
   int64_t ended[ORB_JOB_CANCELLED + 1]; /* by state, since the start */
 } queue_numbers;
-void queue_count(queue *q, queue_numbers *out);
+void queue_count(queue *q, queue_numbers *out); /* walks all unfinished jobs */
+/* Jobs that ended since the start, in this state. */
+int64_t queue_ended(queue *q, orb_job_state state);
 
 #endif

@@ -202,3 +202,10 @@ void queue_count(queue *q, queue_numbers *out) {
   memcpy(out->ended, q->ended, sizeof out->ended);
   pthread_mutex_unlock(&q->lock);
 }
+
+int64_t queue_ended(queue *q, orb_job_state state) {
+  pthread_mutex_lock(&q->lock);
+  int64_t ended = q->ended[state];
+  pthread_mutex_unlock(&q->lock);
+  return ended;
+}

@@ -41,8 +41,9 @@ store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id
 /* The functions that list return the number filled, −1 where the rows cannot be read: nothing is filled then. */
 /* The newest first, those before sequence number `before` (0: all). */
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out);
-/* Least recently used derived ones first, of those last used before a unix time in ms; for eviction. */
-int catalogue_oldest(catalogue *cat, int64_t before, int limit, resource *out);
+/* Least recently used derived ones first, of those last used before a unix time in ms, without the first `skip`; for
+ * eviction. */
+int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resource *out);
 void catalogue_touch(catalogue *cat, resource_kind kind, const char *id); /* does not wait */
 int64_t catalogue_bytes(catalogue *cat, int derived_only);                /* −1: cannot be read */
 
@@ -83,6 +84,11 @@ int catalogue_job_list(catalogue *cat, const char *owner, int state, int64_t bef
 /* After a start: marks what was running, fails what died alone for the last time; then all unfinished, oldest first. */
 store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem);
 int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out);
+
+/* Ended jobs; −1: they cannot be counted. Walks an index over all of them. */
+int64_t catalogue_jobs_ended(catalogue *cat);
+/* Deletes the oldest ended jobs, at most `count`, with their events, in one transaction. */
+store_result catalogue_jobs_forget(catalogue *cat, int count);
 
 /* Events of a job, in order of number. */
 void catalogue_event(catalogue *cat, const char *job, int64_t number, const char *type, const char *json);

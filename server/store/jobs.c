@@ -303,6 +303,41 @@ store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, co
   return catalogue_write(cat, recover, &c);
 }
 
+int64_t catalogue_jobs_ended(catalogue *cat) {
+  int64_t count = -1;
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st = database_statement(db, "SELECT count(*) FROM job WHERE state>=2");
+  if (st && sqlite3_step(st) == SQLITE_ROW) {
+    count = sqlite3_column_int64(st, 0);
+  }
+  if (st) {
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return count;
+}
+
+/* By the rows' own order: the oldest are nearly all ended, and so found without a sort. */
+#define OLDEST_ENDED " FROM job NOT INDEXED WHERE state>=2 ORDER BY seq LIMIT ?1)"
+
+static int forget(database *db, void *arg) {
+  static const char *const steps[] = {"DELETE FROM event WHERE job IN (SELECT id" OLDEST_ENDED,
+                                      "DELETE FROM job WHERE seq IN (SELECT seq" OLDEST_ENDED};
+  int code = SQLITE_OK;
+  for (int i = 0; i < 2 && code == SQLITE_OK; i++) {
+    sqlite3_stmt *st = database_statement(db, steps[i]);
+    if (st) {
+      sqlite3_bind_int(st, 1, *(const int *)arg);
+    }
+    code = database_run(db, st);
+  }
+  return code;
+}
+
+store_result catalogue_jobs_forget(catalogue *cat, int count) {
+  return catalogue_write(cat, forget, &count);
+}
+
 typedef struct event_arg {
   char job[ORB_JOB_ID_SIZE], type[16];
   int64_t number;

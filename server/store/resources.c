@@ -78,11 +78,12 @@ int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit
   return rows_many(cat, db, st, &resource_rows, out, limit);
 }
 
-int catalogue_oldest(catalogue *cat, int64_t before, int limit, resource *out) {
+int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resource *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st =
-      database_statement(db, "SELECT " COLUMNS " FROM resource WHERE kind>0 AND used<?2 ORDER BY used, seq LIMIT ?1");
+  sqlite3_stmt *st = database_statement(
+      db, "SELECT " COLUMNS " FROM resource WHERE kind>0 AND used<?2 ORDER BY used, seq LIMIT ?1 OFFSET ?3");
   if (st) {
+    sqlite3_bind_int(st, 3, skip);
     sqlite3_bind_int(st, 1, limit);
     sqlite3_bind_int64(st, 2, before);
   }

@@ -130,3 +130,24 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
   const uploads = (await Promise.all(meshes.map(async (url) => (await d.get(`${url}/file`)).bytes.length))).reduce((a, b) => a + b);
   assert.ok(bytes - uploads <= 1 << 20, `${bytes - uploads} bytes are derived`);
 });
+
+test('ended jobs beyond keep-jobs are forgotten, what is unfinished and what they made stays', async (t) => {
+  const d = await daemon(t, { args: ['--keep-jobs', '3', '--workers', '1'] });
+  const hold = { method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } };
+  const jobs = async () => (await d.get('/v1/jobs')).json.jobs.map(({ state }) => state);
+  const mesh = async (level, i) => (await d.upload(shapes.obj(shapes.ball(level, ([x, y, z]) => [x, y, z * (1 + i / 50)])))).json.id;
+  const made = [];
+  for (let i = 0; i < 6; i++) made.push((await d.made('/v1/embeddings', { mesh: await mesh(2, i) })).url);
+  const running = (await d.post('/v1/embeddings', { mesh: await mesh(5, 7), ...hold })).json;
+  const until = Date.now() + 20_000;
+  while ((await jobs()).length > 4) assert.ok(Date.now() < until, 'nothing was forgotten');
+  assert.equal((await jobs()).filter((state) => state === 'succeeded').length, 3);
+  assert.deepEqual(new Set(await statuses(d, made)), new Set([200]));
+  await d.delete(running.url);
+  await d.stop('SIGTERM');
+  const { stdout } = await promisify(execFile)(binaries.daemon, ['--gc', '--data', d.data, '--keep-jobs', '1']);
+  assert.match(stdout, /removed [23] ended jobs/);
+  await d.start();
+  assert.equal((await jobs()).length, 1);
+  assert.deepEqual(new Set(await statuses(d, made)), new Set([200]));
+});

@@ -125,6 +125,12 @@ for (const name of Object.keys(setUps))
     assert.equal(missing.json.type, '/problems/not-found');
     assert.equal((await ask('/v1/meshes', { method: 'POST', headers: { 'content-length': 600e6 } }).catch((error) => error)).status ?? 413, 413);
 
+    // What is the operator's stays inside, in any spelling.
+    for (const target of ['/metrics', '/%6detrics', '/./metrics', '/readyz?verbose', '/readyz?%76erbose=1', '/%72eadyz?a=1&verbose'])
+      assert.equal((await ask(target)).status, 404, target);
+    assert.deepEqual((await ask('/readyz')).json, { status: 'ready' });
+    assert.equal((await d.get('/metrics')).status, 200);
+
     // HTTP/2 for browsers: many requests over one connection.
     const session = http2.connect(`https://localhost:${port}`, { ca, lookup: (_, o, done) => (o.all ? done(null, [{ address: '127.0.0.1', family: 4 }]) : done(null, '127.0.0.1', 4)) });
     t.after(() => session.close());

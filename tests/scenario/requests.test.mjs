@@ -102,6 +102,9 @@ test('requests that could mean two things are refused', async (t) => {
     'an unknown coding': `POST /v1/embeddings HTTP/1.1\r\nHost: ${host}\r\nTransfer-Encoding: gzip, chunked\r\n\r\n0\r\n\r\n`,
     'a body where none belongs': `GET /v1/meshes HTTP/1.1\r\nHost: ${host}\r\nContent-Length: 5\r\n\r\nhello`,
   };
+  // A target in absolute form is the path behind it (RFC 9112 section 3.2.2).
+  for (const [target, status] of [[`http://${host}/v1/meshes?limit=1`, 200], [`HTTP://${host}`, 200], ['http://other/nothing', 404]])
+    assert.equal(statusOf(await raw(d, `GET ${target} HTTP/1.1\r\nHost: ${host}\r\nConnection: close\r\n\r\n`)), status, target);
   for (const [what, text] of Object.entries(bad)) {
     const reply = await raw(d, text);
     assert.ok([400, 413, 501].includes(statusOf(reply)), `${what}: ${reply.slice(0, 200)}`);

@@ -520,6 +520,35 @@ static void test_owners_of_meshes(void **state) {
   assert_int_equal(catalogue_ownerless(s->cat), 0);
 }
 
+/* The oldest ended jobs are forgotten with their events, unfinished ones never. */
+static void test_forgetting(void **state) {
+  stored *s = *state;
+  job_row jobs[4] = {new_job('1'), new_job('2'), new_job('3'), new_job('4')}, got;
+  event_row event;
+  for (int i = 0; i < 4; i++) { /* the oldest is not ended */
+    assert_int_equal(catalogue_job_insert(s->cat, &jobs[i]), STORE_OK);
+    assert_int_equal(catalogue_job_claim(s->cat, jobs[i].id, 1, 0, 10), STORE_OK);
+    catalogue_event(s->cat, jobs[i].id, 1, "progress", "{}");
+    if (i > 0) {
+      assert_int_equal(catalogue_job_finish(s->cat, jobs[i].id, 1, ORB_JOB_FAILED, "{}", 50, NULL, 5, "{}"), STORE_OK);
+    }
+  }
+  assert_int_equal(catalogue_jobs_ended(s->cat), 3);
+  assert_int_equal(catalogue_jobs_forget(s->cat, 2), STORE_OK);
+  assert_int_equal(catalogue_jobs_ended(s->cat), 1);
+  for (int i = 0; i < 4; i++) {
+    int stays = i == 0 || i == 3;
+    assert_int_equal(catalogue_job_get(s->cat, jobs[i].id, &got), stays ? STORE_OK : STORE_NOT_FOUND);
+    assert_int_equal(catalogue_events(s->cat, jobs[i].id, 0, 1, &event), stays);
+    if (stays) {
+      job_row_free(&got);
+      free(event.json);
+    }
+  }
+  assert_int_equal(catalogue_jobs_forget(s->cat, 100), STORE_OK);
+  assert_int_equal(read_job(s, jobs[0].id).state, ORB_JOB_RUNNING);
+}
+
 /* There may be any number of tokens; all are read, by name. */
 static void test_many_tokens(void **state) {
   stored *s = *state;
@@ -550,6 +579,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_owners, setup, teardown),
       cmocka_unit_test_setup_teardown(test_owners_of_results, setup, teardown),
       cmocka_unit_test_setup_teardown(test_owners_of_meshes, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_forgetting, setup, teardown),
       cmocka_unit_test_setup_teardown(test_many_tokens, setup, teardown),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
