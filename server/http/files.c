@@ -35,7 +35,7 @@ static void reply_part(request *r, object_kind kind, const char *id, object_part
   snprintf(etag, sizeof etag, "\"%.32s\"", sha);
   const char *none_match = header_of(r, "If-None-Match"), *match = header_of(r, "If-Match");
   if (match && !parse_tag_matches_strong(match, etag)) {
-    reply_empty(r, 412);
+    reply_refuse(r, "precondition-failed", "The file has another tag than If-Match asks for: %s.", etag);
     return;
   }
   if (none_match && parse_tag_matches(none_match, etag)) {

@@ -71,7 +71,9 @@ void job_row_free(job_row *row);
  * one of them is gone. */
 store_result catalogue_job_insert(catalogue *cat, job_row *row);
 store_result catalogue_job_list_it(catalogue *cat, const char *id);
-/* queued → running with the next attempt. */
+/* queued → running with the next attempt. No heartbeat follows: one process alone, by the lock of the data folder, runs
+ * jobs, so what is running in the catalogue at its start belongs to a process that is dead (catalogue_recover()).
+ * Several processes would need a time here that (job, attempt) renews, to tell a claim that is dead. */
 store_result catalogue_job_claim(catalogue *cat, const char *id, int attempt, int alone, int64_t now);
 /* running → queued again; its attempt does not count. */
 store_result catalogue_job_release(catalogue *cat, const char *id, int attempt);

@@ -91,6 +91,7 @@ test('sections name the facts that answers have', async (t) => {
   await merge('unknown-member', { ...both, tolerance: 0.1 });
   await merge('invalid-request', { shapes: 'dog' });
   meets('malformed-json', await d.post('/v1/supermeshes', Buffer.from('{"shapes": ['), { headers: { 'content-type': 'application/json' } }));
+  meets('precondition-failed', await d.get(`${a.url}/file`, { headers: { 'if-match': '"other"' } }));
   meets('range-not-satisfiable', await d.get(`${a.url}/file`, { headers: { range: 'bytes=99999999-' } }));
 
   // A long job, and what may not be while it runs.

@@ -589,6 +589,14 @@ export type ProblemUnsupportedEncoding = {
   detail: string;
 };
 
+export type ProblemPreconditionFailed = {
+  type: '/problems/precondition-failed';
+  title: 'If-Match names other bytes';
+  status: 412;
+  /** What is wrong and what to do, in plain words. */
+  detail: string;
+};
+
 export type ProblemRangeNotSatisfiable = {
   type: '/problems/range-not-satisfiable';
   title: 'The range lies outside';
@@ -760,7 +768,7 @@ export type ProblemQuotaExceeded = {
   status: 429;
   /** What is wrong and what to do, in plain words. */
   detail: string;
-  /** Bytes that the token may upload in all, or jobs that it may have unfinished. */
+  /** Bytes of meshes that the token's tenant may own, or jobs that it may have unfinished. */
   quota: number;
 };
 
@@ -857,4 +865,4 @@ export type ProblemStorageFull = {
 };
 
 /** RFC 9457; `type` tells which. */
-export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedEncoding | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemTimeout | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;
+export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedEncoding | ProblemPreconditionFailed | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemTimeout | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;
