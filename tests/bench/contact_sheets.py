@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draws the contact sheet of every pair with landmarks: OUT/A-B.png, five poses each.
 
-    tests/bench/contact_sheets.py [--bin build/bin] [--meshes ../shared/meshes] [--out docs/pairs] [PAIR...]
+    tests/bench/contact_sheets.py [--bin build/bin] [--meshes ../shared/meshes] [--out docs/pairs] [--page docs/pairs.md] [PAIR...]
 
 Merges by the defaults, with the pair's landmarks; a pair that is refused or given up is passed over, and the exit
 status is 1 then. One JSON line a pair on standard output, that of orbmorph-bench.
@@ -14,6 +14,25 @@ import subprocess
 import sys
 import tempfile
 
+TABLE = "| pair | landmarks | triangles | farthest % | rms % | distortion | inverted % | align s | all s |"
+
+
+def row(meshes, run):
+    """A pair's line: the worse of the two shapes, the median energy of the map, wall seconds."""
+    shapes, pair, seconds = run["shapes"], run["pairs"][0], run["seconds"]
+    farthest, rms = (100 * max(shape[key] for shape in shapes) for key in ("hausdorff_relative", "rms_relative"))
+    cells = [" – ".join(pathlib.Path(mesh).stem for mesh in meshes), len(run["landmarks"]), f"{run['triangles']:,}",
+             f"{farthest:.3f}", f"{rms:.3f}", f"{pair['distortion']['symmetric_dirichlet']['median']:.2f}",
+             f"{100 * pair['inverted_fraction']:.2f}", f"{seconds['align']:.1f}",
+             f"{seconds['total'] - seconds['read'] - seconds['embed']:.1f}"]
+    return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+
+def put_table(page, rows):
+    before, after = page.read_text(encoding="utf-8").split(TABLE, 1)
+    rest = after.split("\n\n", 1)[1]
+    page.write_text(before + "\n".join([TABLE, "|---" * 9 + "|", *rows]) + "\n\n" + rest, encoding="utf-8")
+
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -21,10 +40,11 @@ def main():
     parser.add_argument("--meshes", type=pathlib.Path, default="../shared/meshes")
     parser.add_argument("--out", type=pathlib.Path, default="docs/pairs")
     parser.add_argument("--limit", type=float, default=60, help="seconds after which a merge is given up")
+    parser.add_argument("--page", type=pathlib.Path, help="put the table of all pairs into this page: docs/pairs.md")
     parser.add_argument("pairs", nargs="*", help="such as cow-spot; all where none is named")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    refused = 0
+    refused, rows = 0, []
     with tempfile.TemporaryDirectory() as folder:
         for file in sorted((options.meshes / "pairs").glob("*.json")):
             if options.pairs and file.stem not in options.pairs:
@@ -44,8 +64,11 @@ def main():
                 refused += 1
                 continue
             print(merged.stdout.strip(), flush=True)
+            rows.append(row(pair["meshes"], json.loads(merged.stdout)))
             subprocess.run([options.bin / "orbmorph", "view", glb, "--size", "240", "-o",
                             options.out / f"{file.stem}.png"], check=True, stdout=sys.stderr)
+    if options.page:
+        put_table(options.page, rows)
     sys.exit(1 if refused else 0)
 
 
