@@ -97,11 +97,14 @@ for (const name of Object.keys(setUps))
     assert.equal(b.status, 201, b.bytes.toString());
     assert.equal(b.json.bytes, two.length);
 
-    // A long poll is held, and answered when the job has ended; events come one by one, the proxy keeps none back.
-    const job = (await ask('/v1/embeddings', json({ mesh: b.json.id, ...hold }))).json;
+    // A long poll is held, and answered when the job has ended; events come one by one, the proxy keeps none back. The
+    // job takes ten times as long as is needed here, and is cancelled.
+    const c = await ask('/v1/meshes?name=large', { method: 'POST', body: shapes.binaryPly(shapes.egg(7)) });
+    assert.equal(c.status, 201, c.bytes.toString());
+    const job = (await ask('/v1/embeddings', json({ mesh: c.json.id, ...hold }))).json;
     const began = Date.now();
-    assert.equal((await ask(`${job.url}?wait=2`)).json.state, 'running');
-    assert.ok(Date.now() - began >= 1900);
+    assert.equal((await ask(`${job.url}?wait=1`)).json.state, 'running');
+    assert.ok(Date.now() - began >= 900);
     let seen = '';
     const stream = ask(`${job.url}/events`, { each: (text) => (seen += text) });
     for (const until = Date.now() + 30_000; !/^event: ?progress/m.test(seen); await sleep(20)) assert.ok(Date.now() < until, 'an event comes while the job runs');
