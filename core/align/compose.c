@@ -301,6 +301,10 @@ static orb_status meet_pairs(cm_run *c) {
 
 /* The starts, until nothing comes of them any more. */
 static orb_status run_starts(cm_run *c, orb_preset preset) {
+  if (c->pairs.landmarks == 0 && c->best_energy <= GOOD_ENERGY) {
+    return run_start(c,
+                     CM_GIVEN); /* a good map is not given up for another, of a symmetric shape say, that is as good */
+  }
   ORB_TRY(run_start(c, CM_SPATIAL));
   if (preset != ORB_PRESET_QUALITY && c->best_energy <= GOOD_ENERGY) {
     return ORB_OK;
