@@ -38,6 +38,9 @@ void cm_surface_free(orb_context *ctx, cm_surface *b);
 /* Position on the surface, on the sphere, and the interpolated normal of a place. Any output may be NULL. */
 void cm_surface_at(const cm_surface *b, const orb_place *place, double y[3], double x[3], double n[3]);
 
+/* The corner of a place's triangle that is nearest to it. */
+int32_t cm_nearest_corner(const int32_t *triangles, const orb_place *place);
+
 /* Walks straight from a place by `step` (in the frame of its triangle), unfolding over edges. 0 if it does not end. */
 int cm_surface_trace(const cm_surface *b, const orb_place *from, const double step[2], orb_place *out);
 

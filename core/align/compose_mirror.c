@@ -226,9 +226,7 @@ static int32_t image_of(const mirror *m, const plane *p, int32_t landmark) {
   if (fabs(off_plane(m, p, landmark)) < MIDDLE || d > OFF_SURFACE * m->diagonal) {
     return -1;
   }
-  int corner = place.at[1] > place.at[0] ? 1 : 0;
-  corner = place.at[2] > place.at[corner] ? 2 : corner;
-  return m->mesh->triangles[3 * (size_t)place.triangle + (size_t)corner];
+  return cm_nearest_corner(m->mesh->triangles, &place);
 }
 
 orb_status cm_mirror_landmarks(orb_context *ctx, const orb_mesh *const meshes[2], const int32_t *const landmarks[2],

@@ -123,6 +123,12 @@ void cm_surface_at(const cm_surface *b, const orb_place *place, double y[3], dou
   }
 }
 
+int32_t cm_nearest_corner(const int32_t *triangles, const orb_place *place) {
+  int corner = place->at[1] > place->at[0] ? 1 : 0;
+  corner = place->at[2] > place->at[corner] ? 2 : corner;
+  return triangles[3 * (size_t)place->triangle + (size_t)corner];
+}
+
 /* Clamps rounding below zero and makes the sum one. */
 static void tidy(double at[3]) {
   double sum = 0;

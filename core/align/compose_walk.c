@@ -67,13 +67,6 @@ done:
   return status;
 }
 
-/* The corner of a place's triangle that it is nearest to. */
-static int32_t vertex_at(const cm_surface *b, const orb_place *place) {
-  int corner = place->at[1] > place->at[0] ? 1 : 0;
-  corner = place->at[2] > place->at[corner] ? 2 : corner;
-  return b->triangles[3 * (size_t)place->triangle + (size_t)corner];
-}
-
 static int is_apart(const cm_run *c, int32_t moving, int32_t fixed) {
   for (int32_t i = 0; i < c->pairs.count; i++) {
     double d = orb_distance2(c->x + 3 * (size_t)moving, c->x + 3 * (size_t)c->pairs.moving[i]);
@@ -100,7 +93,7 @@ static orb_status sample_targets(cm_run *c, int32_t samples, int32_t *count) {
   for (int32_t i = 0; i < samples && status == ORB_OK; i++) {
     const orb_place *place = &c->goal_place[spread[i]];
     double n[3];
-    int32_t u = vertex_at(b, place);
+    int32_t u = cm_nearest_corner(b->triangles, place);
     cm_surface_at(b, place, NULL, NULL, n);
     if (off[i] <= OFF_SURFACE * mean && orb_dot(n, c->goal_normal + 3 * (size_t)spread[i]) >= FACING &&
         is_apart(c, spread[i], u)) {

@@ -308,9 +308,7 @@ static orb_status write_guess(const trials *t, const trial *winner, const orb_me
   for (int i = 0; i < ORB_GUESS_MAX; i++) {
     orb_place place;
     (void)orb_nearest_query(tree, winner->image[i], INFINITY, &place);
-    int corner = place.at[0] >= place.at[1] ? 0 : 1;
-    corner = place.at[2] > place.at[corner] ? 2 : corner;
-    add_pair(out, t->shape[0].vertex[t->sample[i]], b->triangles[3 * (size_t)place.triangle + (size_t)corner]);
+    add_pair(out, t->shape[0].vertex[t->sample[i]], cm_nearest_corner(b->triangles, &place));
   }
   orb_nearest_destroy(t->ctx, tree);
   return ORB_OK;
