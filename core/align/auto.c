@@ -8,11 +8,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/compose.h"
 #include "align/guess.h"
 #include "align/methods.h"
 #include "base/check.h"
-
-static const double GOOD_ENERGY = 1.2; /* below it no other correspondence is looked for */
 
 typedef struct guesses {
   orb_guess *of;   /* each later shape's, from 1 on */
@@ -142,7 +141,7 @@ orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32
   orb_status status;
   double clear = 1;
   ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, options, out));
-  if (options->preset != ORB_PRESET_FAST && out->energy > GOOD_ENERGY) {
+  if (options->preset != ORB_PRESET_FAST && out->energy > CM_GOOD_ENERGY) {
     ORB_GO(status, improve(ctx, shapes, shape_count, options, out, &clear), failed);
   }
   ORB_GO(status, orb_align_find(ctx, out, clear), failed);

@@ -33,7 +33,6 @@ enum {
 };
 
 static const double WORSE = 2, FOLLOWS = 1e-3; /* of the triangles turned over, either way: reason to swap the shapes */
-static const double GOOD_ENERGY = 1.2;         /* below it the shapes correspond: no further start is tried */
 
 static cm_effort effort_of(orb_preset preset) {
   return preset == ORB_PRESET_QUALITY ? (cm_effort){1.3, 300, 120, 80, 120} : (cm_effort){1.5, 150, 60, 40, 60};
@@ -301,12 +300,12 @@ static orb_status meet_pairs(cm_run *c) {
 
 /* The starts, until nothing comes of them any more. */
 static orb_status run_starts(cm_run *c, orb_preset preset) {
-  if (c->pairs.landmarks == 0 && c->best_energy <= GOOD_ENERGY) {
-    return run_start(c,
-                     CM_GIVEN); /* a good map is not given up for another, of a symmetric shape say, that is as good */
+  if (c->pairs.landmarks == 0 && c->best_energy <= CM_GOOD_ENERGY) {
+    /* A good map is not given up for another, of a symmetric shape say, that is as good. */
+    return run_start(c, CM_GIVEN);
   }
   ORB_TRY(run_start(c, CM_SPATIAL));
-  if (preset != ORB_PRESET_QUALITY && c->best_energy <= GOOD_ENERGY) {
+  if (preset != ORB_PRESET_QUALITY && c->best_energy <= CM_GOOD_ENERGY) {
     return ORB_OK;
   }
   ORB_TRY(meet_pairs(c));

@@ -6,6 +6,9 @@
 #include "orbmorph/align.h"
 #include "orbmorph/remesh.h"
 
+/* Composed energies below it say that shapes correspond: no further start, no other correspondence is tried. */
+static const double CM_GOOD_ENERGY = 1.2;
+
 /* Improves the points of `moving` on the sphere so that the map moving → sphere → fixed is as isometric as can be. The
  * landmarks (vertices of both, whose points are bit-equal already) stay together. both: the fixed shape's points may
  * change too, which leaves more room, and the shapes may change places; else they stay, for further shapes. The result
