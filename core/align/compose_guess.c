@@ -4,12 +4,12 @@
 
 #include "align/compose_run.h"
 #include "base/check.h"
+#include "embed/loops.h"
 #include "numeric/vec3.h"
 
 typedef struct goal_job {
   cm_run *c;
   orb_nearest *tree;
-  int64_t first; /* of this slice */
 } goal_job;
 
 enum { SLICE = 1024 }; /* vertices between looks whether to stop: a search may go through the whole surface */
@@ -38,7 +38,7 @@ static void find_goal_places(void *arg, int64_t begin, int64_t end, int thread) 
   goal_job *job = arg;
   cm_run *c = job->c;
   (void)thread;
-  for (int64_t v = job->first + begin; v < job->first + end; v++) {
+  for (int64_t v = begin; v < end; v++) {
     double n[3];
     (void)orb_nearest_query(job->tree, c->goal + 3 * v, INFINITY, &c->goal_place[v]);
     cm_surface_at(&c->b, &c->goal_place[v], NULL, NULL, n);
@@ -91,11 +91,7 @@ orb_status cm_bend(cm_run *c, int samples) {
   ORB_GO(status, cm_spatial_targets(ctx, &c->b, c->x, c->normal, c->vertex_count, &anchors, c->goal, &fit), done);
   cm_normals(c->goal, c->vertex_count, mesh->triangles, mesh->triangle_count, c->goal_normal);
   ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &job.tree), done);
-  for (; status == ORB_OK && job.first < c->vertex_count; job.first += SLICE) {
-    int64_t left = c->vertex_count - job.first;
-    orb_parallel_for(ctx, left < SLICE ? left : SLICE, 64, find_goal_places, &job);
-    status = orb_context_check(ctx);
-  }
+  status = orb_sliced_by(ctx, c->vertex_count, SLICE, 64, find_goal_places, &job);
   orb_nearest_destroy(ctx, job.tree);
 done:
   orb_free(ctx, goal);

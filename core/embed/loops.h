@@ -9,4 +9,8 @@
 /* orb_parallel_for() in slices, with orb_context_check() between them. Chunks begin at multiples of grain. */
 ORB_MUST_CHECK orb_status orb_sliced_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg);
 
+/* The same with slices of so many iterations, for those that are long. */
+ORB_MUST_CHECK orb_status orb_sliced_by(orb_context *ctx, int64_t count, int64_t slice, int64_t grain, orb_loop_fn body,
+                                        void *arg);
+
 #endif
