@@ -77,7 +77,7 @@ struct request {
   int64_t wait_until;
   int64_t preferred_ms; /* by a Prefer header */
   int wait_for_result;  /* the answer is the result where there is one in time */
-  int cancels;
+  int cancels;          /* a job that waits_for names; the answer is a refusal where it ended otherwise */
 
   unsigned status;
   int64_t sends;          /* bytes of the response's body; streams count theirs as they go */

@@ -19,9 +19,19 @@ int64_t read_wait_ms(request *r) {
   return wait;
 }
 
+static void refuse_ended(request *r, orb_job_state state) {
+  reply_refuse(r, "job-ended", "The job has %s already; there is nothing to cancel.", orb_job_state_name(state));
+}
+
+/* The job; for who cancels it a refusal where it came to an end of its own before it saw the wish. */
 static void reply_job(request *r, job *j) {
   orb_text json = {0};
   orb_job_state state = queue_job_write(r->srv->q, j, &json);
+  if (r->cancels && (state == ORB_JOB_SUCCEEDED || state == ORB_JOB_FAILED)) {
+    orb_text_free(&json);
+    refuse_ended(r, state);
+    return;
+  }
   reply_json(r, 200, &json);
   if (!orb_job_ended(state)) {
     reply_header(r, "Retry-After", "1");
@@ -179,7 +189,7 @@ static void cancel_away(request *r) {
   orb_job_state state = queue_job_write(srv->q, j, &json);
   orb_text_free(&json);
   if (state == ORB_JOB_SUCCEEDED || state == ORB_JOB_FAILED) {
-    reply_refuse(r, "job-ended", "The job has %s already; there is nothing to cancel.", orb_job_state_name(state));
+    refuse_ended(r, state);
     queue_release(srv->q, j);
     return;
   }
@@ -189,6 +199,7 @@ static void cancel_away(request *r) {
     queue_release(srv->q, j);
     return;
   }
+  r->cancels = 1;
   r->waits_for = j;
   r->wait_until = orb_clock_ms() + CANCEL_WAIT_MS;
   r->phase = PHASE_WAIT;
