@@ -33,8 +33,22 @@ typedef struct ks_run {
   int32_t *stamp, stamp_value;
   int32_t *recent, recent_count;
   int64_t iterations_sum, kernel_points_sum;
+  int64_t unchecked; /* candidates evaluated since the last look for a cancel */
   orb_ks_report report;
 } ks_run;
+
+/* Candidates between two looks for a cancel: some milliseconds of work, however fine the steps of Eq. 2 are and however
+ * large the rings. */
+static const int64_t CHECK_AFTER = 40000;
+
+static orb_status check_after(ks_run *run, int32_t v) {
+  run->unchecked += (int64_t)run->sampler.pair_count * run->m.valence[v];
+  if (run->unchecked < CHECK_AFTER) {
+    return ORB_OK;
+  }
+  run->unchecked = 0;
+  return orb_context_check(run->ctx);
+}
 
 /* Scales the mesh to area 4π about its centre. A mesh without area gets unit coordinates as they are. */
 static orb_status normalize(ks_run *run, const orb_mesh *mesh) {
@@ -98,6 +112,7 @@ static void place_base(ks_run *run) {
 /* Moves v to its best sample if that is better than where it is; returns by how far. */
 static orb_status reposition(ks_run *run, int32_t v, double *moved) {
   double *p = run->P + 3 * (size_t)v, best[3], error;
+  ORB_TRY(check_after(run, v));
   ORB_TRY(ks_ring_load(run->ctx, &run->sampler, &run->m, run->P, v));
   *moved = 0;
   if (ks_search(&run->sampler, p, 1, ks_error_at(&run->sampler, p), best, &error)) {
@@ -187,9 +202,6 @@ static orb_status optimize(ks_run *run) {
     ORB_TRY(rank_next(run, iteration == 0));
     for (int32_t i = 0; i < run->active_count; i++) {
       ORB_TRY(reposition(run, run->active[i], &run->displacement[run->active[i]]));
-      if ((i & 255) == 0 || is_pole(run, run->active[i])) {
-        ORB_TRY(orb_context_check(run->ctx));
-      }
     }
     most = 0;
     run->stamp_value++;
@@ -213,6 +225,7 @@ static orb_status optimize(ks_run *run) {
  * the parent. */
 static orb_status place(ks_run *run, int32_t v, int32_t parent, int *found) {
   ks_sampler *s = &run->sampler;
+  ORB_TRY(check_after(run, v));
   ORB_TRY(ks_ring_load(run->ctx, s, &run->m, run->P, v));
   double error, *p = run->P + 3 * (size_t)v;
   const double *apex = run->P + 3 * (size_t)parent;
@@ -254,9 +267,6 @@ static orb_status relieve(ks_run *run, int32_t parent, int32_t rings) {
     for (int32_t i = 0; i < run->next_count && status == ORB_OK; i++) {
       double moved;
       status = reposition(run, run->next[i], &moved);
-      if (status == ORB_OK && (i & 255) == 0) {
-        status = orb_context_check(run->ctx);
-      }
     }
   }
   run->sampler.aspect_exponent = aspect_exponent;
@@ -276,9 +286,6 @@ static orb_status loosen(ks_run *run, int32_t v) {
     for (int32_t i = 0; i < run->next_count; i++) {
       double moved;
       ORB_TRY(reposition(run, run->next[i], &moved));
-      if ((i & 255) == 255) {
-        ORB_TRY(orb_context_check(run->ctx));
-      }
     }
   }
   run->report.loosened++;
@@ -321,9 +328,6 @@ static orb_status refine(ks_run *run) {
     double start = orb_clock();
     while (m->live < until) {
       ORB_TRY(insert_vertex(run));
-      if ((m->live & 63) == 0) {
-        ORB_TRY(orb_context_check(run->ctx));
-      }
     }
     run->report.place_seconds += orb_clock() - start;
     ORB_TRY(optimize(run));

@@ -5,12 +5,18 @@ import { mkdir, readFile, writeFile, readdir, copyFile } from 'node:fs/promises'
 import path from 'node:path';
 import test from 'node:test';
 import { folder, run } from './support/cli.mjs';
-import { binaries, daemon, samples } from './support/daemon.mjs';
+import { binaries, daemon, endless, samples, until } from './support/daemon.mjs';
 import { morphOf } from './support/glb.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const dog = path.join(samples, 'dog.obj'), giraffe = path.join(samples, 'giraffe.off');
 const landmarks = path.join(samples, 'dog-giraffe.json');
+const waits = async (d) => (await d.get('/readyz?verbose')).json.waiting_connections > 0;
+/** Keeps the only worker; its job. */
+async function occupy(d) {
+  const { json: mesh } = await d.upload(shapes.binaryPly(shapes.ball(5, ([x, y, z]) => [x, y * (1.2 + 0.2 * Math.sin(9 * x)), z])));
+  return (await d.post('/v1/embeddings', { mesh: mesh.id, ...endless })).json;
+}
 
 test('wrong usage ends with 2 and says what is wrong', async () => {
   for (const args of [[], ['fly'], ['morph', 'one'], ['morph', '--bend', 'a', 'b'], ['upload'], ['job'], ['morph', 'a', 'b', '--landmarks'],
@@ -115,7 +121,7 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
 });
 
 test('landmark files: an array, an object with one, and plain numbers of vertices', async (t) => {
-  const d = await daemon(t);
+  const d = await daemon(t, { args: ['--workers', '1'] }), before = await occupy(d);
   const env = { ORBMORPH_SERVER: d.url }, at = await folder(t), file = path.join(at, 'l.json');
   const places = JSON.parse(await readFile(landmarks, 'utf8')).landmarks.slice(0, 4).map((l) => ({ at: l.at }));
   const jobs = new Set();
@@ -126,7 +132,7 @@ test('landmark files: an array, an object with one, and plain numbers of vertice
     jobs.add(JSON.parse(sent.out).id);
   }
   assert.equal(jobs.size, 1, 'all three say the same');
-  await run(['job', '--cancel', [...jobs][0]], { env });
+  for (const job of [...jobs, before.id]) assert.equal((await run(['job', '--cancel', job], { env })).code, 0);
   for (const wrong of ['{"landmarks": 3}', '7', '[{"at": ', '']) {
     await writeFile(file, wrong);
     const { code, err } = await run(['merge', dog, giraffe, '-l', file], { env });
@@ -177,14 +183,15 @@ test('what the daemon refuses ends with 1 and the problem on standard error', as
 test('a wait outlives the daemon', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const { port } = new URL(d.url);
-  const { json: mesh } = await d.upload(shapes.binaryPly(shapes.ball(6, ([x, y, z]) => [x, y * (1.2 + 0.2 * Math.sin(9 * x)), z])));
+  const before = await occupy(d), { json: mesh } = await d.upload(shapes.obj(shapes.egg(3)));
   const waiting = run(['embed', mesh.id], { env: { ORBMORPH_SERVER: d.url } });
-  await new Promise((resolve) => setTimeout(resolve, 150));
+  await until(() => waits(d), 'the program waits');
   d.killed = true;
   await d.stop('SIGKILL');
   d.args.push('--listen', `127.0.0.1:${port}`); // the last one counts
   await d.start();
   d.killed = false;
+  assert.equal((await d.delete(before.url)).status, 200);
   const { code, out, err } = await waiting;
   assert.equal(code, 0, err);
   assert.match(out, /0 flipped/);
@@ -192,20 +199,20 @@ test('a wait outlives the daemon', async (t) => {
 
 test('a wait that is broken off says how to go on', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
-  const { json: mesh } = await d.upload(shapes.binaryPly(shapes.ball(6, ([x, y, z]) => [x, y * (1.2 + 0.2 * Math.sin(9 * x)), z])));
+  const before = await occupy(d), { json: mesh } = await d.upload(shapes.obj(shapes.egg(3)));
   const child = spawn(binaries.client, ['embed', mesh.id, '--method', 'kernel-sampling'], { env: { ...process.env, ORBMORPH_SERVER: d.url }, stdio: ['ignore', 'pipe', 'pipe'] });
   let err = '';
   child.stderr.on('data', (chunk) => (err += chunk));
   const ended = new Promise((resolve) => child.on('exit', (code, signal) => resolve(signal ?? code)));
-  let job;
-  while (!(job = (await d.get('/v1/jobs')).json.jobs[0])) await new Promise((resolve) => setTimeout(resolve, 20));
-  await new Promise((resolve) => setTimeout(resolve, 300));
+  await until(() => waits(d), 'the program waits');
+  const job = (await d.get('/v1/jobs')).json.jobs.find(({ id }) => id !== before.id);
   child.kill('SIGINT');
   assert.equal(await ended, 'SIGINT');
   const [, url] = err.match(/orbmorph job --wait (\/v1\/jobs\/\w+)/);
   assert.equal(url, job.url);
   const cancelled = await run(['job', '--cancel', url], { env: { ORBMORPH_SERVER: d.url } });
   assert.equal(cancelled.code, 0, cancelled.err);
+  assert.equal((await d.delete(before.url)).status, 200);
 });
 
 test('progress is drawn on a terminal', async (t) => {

@@ -179,7 +179,7 @@ test(`${kills} kills under load lose nothing`, async (t) => {
         hit.set(point, hit.get(point) + 1); // while it started
         continue;
       }
-      slowest = Math.max(slowest, d.start_ms);
+      slowest = Math.max(slowest, d.start_cpu_ms);
       if (i % 2 === 0) await ledger.settle(d);
       const load = Promise.all([ledger.call(d), ledger.call(d)]);
       const byPoint = await dies(d, point ? 1500 : random() * (slow ? 600 : 400));
@@ -203,8 +203,8 @@ test(`${kills} kills under load lose nothing`, async (t) => {
   const named = [...hit].map(([name, n]) => `${name} ${n}`).join(', ');
   t.diagnostic(`${done} kills in ${((Date.now() - began) / 1000).toFixed(0)} s: ${random_kills} at random instants, ` +
     `${done - random_kills} at named points (${faults ? named : 'not in this build'}); ${accepted} accepted jobs, ${uploads} meshes, ` +
-    `none lost; ${crashed} failed after three deaths alone; slowest start ${slowest} ms`);
-  assert.ok(slowest < 10_000, `a start took ${slowest} ms`);
+    `none lost; ${crashed} failed after three deaths alone; slowest start ${slowest} ms of processor time`);
+  assert.ok(slowest < 10_000, `a start took ${slowest} ms of processor time`);
   if (faults && kills >= 10 * points.length) for (const [name, n] of hit) assert.ok(n > 0, `the point ${name} was never reached`);
 });
 
@@ -221,18 +221,19 @@ test('a poisonous job is given up after three deaths, and holds up no other', { 
   const others = [];
   for (let i = 0; i < 3; i++) others.push(await ledger.upload(d));
   await ledger.ask(d, '/v1/embeddings', { mesh: mesh.id }).catch(() => {});
-  let deaths = 0;
-  for (; deaths < 12; deaths++) {
+  let deaths = 0, end;
+  for (const late = Date.now() + 300_000; !end && deaths < 12; ) {
+    assert.ok(Date.now() < late, `${deaths} deaths, and neither another nor an end`);
     for (const other of others) await ledger.ask(d, '/v1/embeddings', { mesh: other.id }).catch(() => {});
     const { json } = await d.get('/v1/jobs').catch(() => ({}));
-    const end = json?.jobs.find((job) => job.state === 'failed');
-    if (end) {
-      assert.equal(end.problem.type, '/problems/crashed');
-      break;
+    end = json?.jobs.find((job) => job.state === 'failed');
+    if (!end) await Promise.race([d.exited, sleep(500)]);
+    while (gone(d)) {
+      deaths++;
+      await d.start().catch((error) => assert.match(error.message, /exit SIGKILL/)); // again, before it could say so
     }
-    await Promise.race([d.exited, sleep(2000)]);
-    if (gone(d)) await d.start();
   }
+  assert.equal(end?.problem.type, '/problems/crashed');
   assert.ok(deaths >= 3 && deaths < 12, `${deaths} deaths`);
   for (const other of others) await d.made('/v1/embeddings', { mesh: other.id });
   assert.equal((await d.post('/v1/embeddings', { mesh: mesh.id })).status, 202, 'a caller may ask again');

@@ -10,9 +10,9 @@ import { binaries, root, samples } from './support/daemon.mjs';
 
 const skip = path.resolve(binaries.daemon) === path.join(root, 'build/bin/orbmorphd') ? false : 'it builds the release only';
 
-function demo(args, { cwd, script = path.join(root, 'deploy/demo.sh') }) {
+function demo(args, { cwd, script = path.join(root, 'deploy/demo.sh'), env = {} }) {
   return new Promise((resolve) => {
-    const child = spawn('bash', [script, ...args], { cwd, stdio: ['ignore', 'pipe', 'pipe'] });
+    const child = spawn('bash', [script, ...args], { cwd, env: { ...process.env, ...env }, stdio: ['ignore', 'pipe', 'pipe'] });
     let out = '', err = '';
     child.stdout.on('data', (chunk) => (out += chunk));
     child.stderr.on('data', (chunk) => (err += chunk));
@@ -42,12 +42,13 @@ test('the demo takes the files of its caller', { skip }, async (t) => {
   await copyFile(path.join(samples, 'dog.obj'), path.join(cwd, 'my dog.obj'));
   await copyFile(path.join(samples, 'elephant.ply'), path.join(cwd, 'sub dir/élé phant.ply'));
   await symlink(path.join(root, 'deploy/demo.sh'), path.join(cwd, 'demo link'));
-  const before = (await readdir(tmpdir())).filter((f) => f.startsWith('orbmorph-demo.')).length;
-  const { code, out, err } = await demo(['my dog.obj', 'sub dir/élé phant.ply'], { cwd, script: 'demo link' });
+  const temporary = path.join(cwd, 'temporary');
+  await mkdir(temporary);
+  const { code, out, err } = await demo(['my dog.obj', 'sub dir/élé phant.ply'], { cwd, script: 'demo link', env: { TMPDIR: temporary } });
   assert.equal(code, 0, err);
   await clean(found(out, 'GLB'));
   assert.ok((await stat(found(out, 'Report'))).size > 0);
-  assert.equal((await readdir(tmpdir())).filter((f) => f.startsWith('orbmorph-demo.')).length, before, 'no temporary folder stays');
+  assert.deepEqual(await readdir(temporary), [], 'no temporary folder stays');
   const bad = await demo(['my dog.obj', 'nowhere.obj'], { cwd });
   assert.equal(bad.code, 2);
   assert.match(bad.err, /nowhere\.obj/);

@@ -125,14 +125,14 @@ test('decoders share a budget of memory', async (t) => {
     await new Promise((done) => socket.on('error', () => {}).write(`POST /v1/meshes HTTP/1.1\r\nHost: x\r\nContent-Encoding: gzip\r\nContent-Length: ${begin.length}\r\n\r\n`, done));
     socket.write(begin.subarray(0, 100));
   }
-  const until = Date.now() + 10_000;
+  const end = Date.now() + 120_000;
   let reply;
   do reply = await send(d, 'gzip', begin, {});
-  while (reply.status !== 503 && Date.now() < until);
+  while (reply.status !== 503 && Date.now() < end);
   assertProblem(reply, 503, 'unavailable');
   assert.ok(reply.headers.get('retry-after'));
   open.splice(0).forEach((socket) => socket.destroy());
   do reply = await send(d, 'gzip', begin, {});
-  while (reply.status === 503 && Date.now() < until + 10_000);
+  while (reply.status === 503 && Date.now() < end + 120_000);
   assert.ok([200, 201].includes(reply.status));
 });

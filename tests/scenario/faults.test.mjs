@@ -24,7 +24,7 @@ const library = process.env.ORB_INTERPOSE;
 const wanted = process.env.ORB_FAULT_RUNS ?? (slow ? '21' : '48');
 const all = !(Number(wanted) > 0);
 const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? (all ? 6 : 3)); // they wait more than they compute
-const patience = 40_000;
+const patience = 200_000;
 // Sanitizers have an allocator of their own.
 const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(',')).split(',').filter((kind) => kind !== 'alloc' || (wanted !== 'few' && !slow));
 const seed = Number(process.env.ORB_FAULT_SEED ?? 1);

@@ -8,7 +8,7 @@ import test from 'node:test';
 import { promisify } from 'node:util';
 import { gzipSync } from 'node:zlib';
 import Ajv2020 from 'ajv/dist/2020.js';
-import { binaries, daemon, root, samples } from './support/daemon.mjs';
+import { binaries, daemon, endless, root, samples } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const document = JSON.parse(await readFile(path.join(root, 'api/openapi.json'), 'utf8'));
@@ -251,8 +251,8 @@ test('answers about embeddings, supermeshes and jobs', async (t) => {
   assert.equal(failed.problem.type, '/problems/bad-landmarks');
 
   // One worker: the second waits, and holds its mesh, until it is cancelled.
-  const long = await create('supermeshes', { shapes: of(...meshes), asset: { colors: true } });
-  const queued = await create('embeddings', { mesh: meshes[2].id, method: 'kernel-sampling' });
+  const long = await create('supermeshes', { shapes: of(...meshes), embedding: endless, asset: { colors: true } });
+  const queued = await create('embeddings', { mesh: meshes[2].id, method: 'kernel-sampling', options: { ...endless.options, growth: 1.02 } });
   assert.equal((await ask('DELETE', '/v1/meshes/{id}', { id: meshes[2].id })).status, 409);
   assert.equal((await ask('GET', '/v1/jobs', { query: { limit: 2 } })).json.jobs.length, 2);
   for (const { json } of [queued, long]) assert.equal((await ask('DELETE', '/v1/jobs/{job}', { id: json.id })).status, 200);

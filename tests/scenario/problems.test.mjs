@@ -7,7 +7,7 @@ import path from 'node:path';
 import test from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { runProgram } from './support/cli.mjs';
-import { binaries, daemon, root, samples } from './support/daemon.mjs';
+import { binaries, daemon, endless, root, samples } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const text = await readFile(path.join(root, 'docs/troubleshooting.md'), 'utf8');
@@ -95,7 +95,7 @@ test('sections name the facts that answers have', async (t) => {
   meets('range-not-satisfiable', await d.get(`${a.url}/file`, { headers: { range: 'bytes=99999999-' } }));
 
   // A long job, and what may not be while it runs.
-  const body = { mesh: a.id, method: 'kernel-sampling' }, job = await d.post('/v1/embeddings', body);
+  const body = { mesh: a.id, ...endless }, job = await d.post('/v1/embeddings', body);
   assert.equal(job.status, 202);
   meets('queue-full', await d.post('/v1/embeddings', { mesh: b.id }));
   meets('in-use', await d.delete(a.url));

@@ -44,7 +44,7 @@ function get(options) {
       let text = '';
       reply.on('data', (chunk) => (text += chunk)).on('end', () => resolve({ status: reply.statusCode, text }));
     });
-    r.on('error', reject).setTimeout(20_000, () => r.destroy(new Error('no answer')));
+    r.on('error', reject).setTimeout(120_000, () => r.destroy(new Error('no answer')));
   });
 }
 
@@ -120,7 +120,7 @@ test('systemd is told of start, reload, life and end', async (t) => {
   t.after(() => taker.kill());
   taker.stdout.on('data', (chunk) => log.push(...chunk.toString().split('\n').filter(Boolean)));
   const told = async (wanted, times = 1) => {
-    for (const until = Date.now() + 20_000; log.filter((line) => wanted.test(line)).length < times; await sleep(20)) assert.ok(Date.now() < until, `${wanted}: ${log}`);
+    for (const until = Date.now() + 120_000; log.filter((line) => wanted.test(line)).length < times; await sleep(20)) assert.ok(Date.now() < until, `${wanted}: ${log}`);
   };
   await told(/^up$/);
   const file = path.join(home, 'conf');

@@ -5,10 +5,9 @@ import { readdir } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
 import { promisify } from 'node:util';
-import { assertProblem, binaries, daemon } from './support/daemon.mjs';
+import { assertProblem, binaries, daemon, endless, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-const hold = { method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } };
 const wave = (levels, k = 1) => shapes.binaryPly(shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y + k)), 1.5 * y, z]));
 const large = wave(5), small = wave(3, 2), other = wave(3, 3);
 
@@ -19,7 +18,9 @@ async function tenants(t, ...args) {
   const upload = (who, bytes, query = {}) => d.post('/v1/meshes', bytes, { ...who, query });
   const list = async (who, what) => (await d.get(`/v1/${what}`, who)).json[what].map(({ id }) => id);
   const end = async (who, job) => {
-    const reply = await d.get(job.url, { ...who, query: { wait: 60 } });
+    let reply;
+    do reply = await d.get(job.url, { ...who, query: { wait: 60 } });
+    while (reply.json.finished === null);
     assert.equal(reply.json.state, 'succeeded', reply.bytes.toString());
     return reply.json;
   };
@@ -44,8 +45,8 @@ test("another tenant's things are not there", async (t) => {
   const super_ = (await d.post('/v1/supermeshes', { shapes: [{ mesh: a.id }, { mesh: b.id }] }, ann)).json;
   const ended = await end(ann, super_);
   const [embedding] = await list(ann, 'embeddings');
-  const running = (await d.post('/v1/embeddings', { mesh: (await upload(ann, large)).json.id, ...hold }, ann)).json;
-  const queued = (await d.post('/v1/embeddings', { mesh: a.id, ...hold }, ann)).json;
+  const running = (await d.post('/v1/embeddings', { mesh: (await upload(ann, large)).json.id, ...endless }, ann)).json;
+  const queued = (await d.post('/v1/embeddings', { mesh: a.id, ...endless }, ann)).json;
 
   const things = [a.url, `${a.url}/file`, `/v1/embeddings/${embedding}`, `/v1/embeddings/${embedding}/sphere.ply`, ended.result,
     `${ended.result}/asset.glb`, `${ended.result}/places`, `${ended.result}/spheres/0.ply`];
@@ -89,6 +90,7 @@ test("another tenant's things are not there", async (t) => {
   }
   assert.deepEqual((await d.get('/v1/jobs', { ...bob, query: { state: 'running' } })).json.jobs, []);
   // How much there is to do is the operator's business.
+  await until(async () => (await d.get(running.url, ann)).json.state === 'running', 'it runs');
   assert.equal((await d.get('/readyz?verbose', admin)).json.running, 1);
   for (const who of [ann, reader, {}]) assert.deepEqual((await d.get('/readyz?verbose', who)).json, { status: 'ready' });
   const before = await list(admin, 'jobs');
@@ -127,14 +129,13 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
   const ask = (who, more) => d.post('/v1/embeddings', { mesh: id, ...more }, who);
 
   // Bob's job is his own: Ann's ends by her cancel, his goes on.
-  const [his, hers] = [(await ask(ann, hold)).json, (await ask(bob, hold)).json];
+  const [his, hers] = [(await ask(ann, endless)).json, (await ask(bob, endless)).json];
   assert.notEqual(his.id, hers.id);
-  assert.equal((await ask(bob, hold)).json.id, hers.id, 'of one tenant it is the same job');
+  assert.equal((await ask(bob, endless)).json.id, hers.id, 'of one tenant it is the same job');
   assert.equal((await d.get(hers.url, bob)).json.state, 'queued', 'the work is not done twice at once');
   assertProblem(await d.delete(hers.url, ann), 404, 'not-found');
   assert.equal((await d.delete(his.url, ann)).status, 200);
-  const until = Date.now() + 60_000;
-  while ((await d.get(hers.url, bob)).json.state !== 'running') assert.ok(Date.now() < until);
+  await until(async () => (await d.get(hers.url, bob)).json.state === 'running', 'his comes to be worked on');
   assert.equal((await d.delete(hers.url, bob)).status, 200);
 
   // What Ann has is made for Bob anew as far as he can see, but for the time it takes.
@@ -198,7 +199,7 @@ test('who deletes gives up its own', async (t) => {
   await token('set', 'ann', '--quota', '0');
   const hers = (await upload(ann, large)).json;
   assert.equal(hers.id, mesh);
-  const job = (await d.post('/v1/embeddings', { mesh, ...hold }, bob)).json;
+  const job = (await d.post('/v1/embeddings', { mesh, ...endless }, bob)).json;
   assertProblem(await d.delete(big, bob), 409, 'in-use');
   assert.equal((await d.delete(big, ann)).status, 204);
   assert.equal((await d.delete(job.url, bob)).status, 200);
@@ -249,7 +250,7 @@ test("an operator's job on another's mesh outlives its delete", async (t) => {
   const [ann, bob, root] = [await add('ann', 'read,write'), await add('bob', 'read,write'), await add('root', 'read,write,admin')];
   const mesh = (await upload(ann, small, { name: 'secret' })).json;
   await upload(ann, large);
-  const blocker = (await d.post('/v1/embeddings', { mesh: (await upload(bob, large)).json.id, ...hold }, bob)).json;
+  const blocker = (await d.post('/v1/embeddings', { mesh: (await upload(bob, large)).json.id, ...endless }, bob)).json;
   const job = (await d.post('/v1/embeddings', { mesh: mesh.id }, root)).json;
   assert.equal((await d.delete(mesh.url, ann)).status, 204);
   assertProblem(await d.get(mesh.url, ann), 404, 'not-found');
@@ -264,14 +265,13 @@ test("what waits shows nothing of another's job", async (t) => {
   const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')];
   const slow = (await upload(ann, large)).json;
   await upload(bob, large);
-  const hers = (await d.post('/v1/embeddings', { mesh: slow.id, ...hold }, ann)).json;
-  const until = Date.now() + 60_000;
-  while ((await d.get(hers.url, ann)).json.stage !== 'embed') assert.ok(Date.now() < until);
-  const his = (await d.post('/v1/supermeshes', { shapes: [{ mesh: slow.id }, { mesh: slow.id }], embedding: hold }, bob));
+  const hers = (await d.post('/v1/embeddings', { mesh: slow.id, ...endless }, ann)).json;
+  await until(async () => (await d.get(hers.url, ann)).json.stage === 'embed', 'hers is being worked on');
+  const his = (await d.post('/v1/supermeshes', { shapes: [{ mesh: slow.id }, { mesh: slow.id }], embedding: endless }, bob));
   assert.equal(his.status, 202, his.bytes.toString());
-  for (const until = Date.now() + 1000; Date.now() < until; await new Promise((done) => setTimeout(done, 20))) {
+  for (const end = Date.now() + 1000; Date.now() < end; await new Promise((done) => setTimeout(done, 20))) {
     const shown = (await d.get(his.json.url, bob)).json;
-    if ((await d.get(hers.url, ann)).json.state !== 'running') break;
+    assert.equal((await d.get(hers.url, ann)).json.state, 'running');
     assert.equal(shown.state, 'queued', 'while hers is being worked on');
   }
   await d.delete(hers.url, ann);

@@ -1,6 +1,7 @@
 // Starts a real daemon on a free port with a data folder of its own, and talks to it.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
+import { readFileSync } from 'node:fs';
 import { mkdtemp, rm, readFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
@@ -15,7 +16,23 @@ export const binaries = {
 // A build with sanitizers is several times slower; tests that do much take less of it there.
 export const slow = process.env.ORB_SLOW === '1';
 
-const START_MS = slow ? 120_000 : 30_000, STOP_MS = slow ? 120_000 : 20_000;
+/**
+ * An embedding that takes a minute of processor time for 2,000 triangles, and four times as long for four times as many:
+ * thousands of samples a triangle, and a global optimisation to the last bit after every few vertices. With 8,000
+ * triangles it keeps a worker until it is cancelled.
+ */
+export const endless = { method: 'kernel-sampling', options: { step: 0.01, growth: 1.01, first_optimization: 1, displacement_threshold: 1e-15, max_iterations: 1000000 } };
+
+/** Asks `check` again and again until it gives something true; that. The time is for what never comes. */
+export async function until(check, what, seconds = 300) {
+  for (const end = Date.now() + 1000 * seconds; ; await new Promise((done) => setTimeout(done, 20))) {
+    const value = await check();
+    if (value) return value;
+    assert.ok(Date.now() < end, `not within ${seconds} s: ${what}`);
+  }
+}
+
+const START_MS = slow ? 300_000 : 120_000, STOP_MS = slow ? 300_000 : 120_000;
 
 export class Daemon {
   constructor(data, args, env) {
@@ -50,7 +67,14 @@ export class Daemon {
       });
     });
     this.start_ms = Date.now() - began;
+    this.start_cpu_ms = this.cpuMs();
     return this;
+  }
+
+  /** Processor time of all its threads so far. */
+  cpuMs() {
+    const fields = readFileSync(`/proc/${this.child.pid}/stat`, 'latin1').split(') ').pop().split(' ');
+    return 10 * (Number(fields[11]) + Number(fields[12])); // user and system, in ticks of 1/100 s
   }
 
   /** Ends it with a signal; resolves to {code, signal}. */

@@ -147,7 +147,7 @@ export class Caller {
     for (const url of this.jobs.slice(all ? 0 : this.seen)) {
       const reply = await this.d.get(url);
       assert.equal(reply.status, 200, `the accepted job ${url} is lost: ${reply.bytes}`);
-      const end = await this.d.ended(reply.json, { seconds: 120 });
+      const end = await this.d.ended(reply.json);
       assert.ok(end.state === 'succeeded' || (end.state === 'failed' && end.problem.detail), JSON.stringify(end));
     }
     this.seen = this.jobs.length;
