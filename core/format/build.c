@@ -8,6 +8,7 @@
 
 #include "base/check.h"
 #include "base/context.h"
+#include "base/grow.h"
 #include "mesh/polygon.h"
 #include "numeric/vec3.h"
 
@@ -57,13 +58,9 @@ orb_status orb_build_grow(orb_context *ctx, void *array, int64_t *room, int64_t 
   if (wanted < need) {
     wanted = need;
   }
-  void *old;
-  memcpy(&old, array, sizeof old);
-  void *grown = orb_realloc(ctx, old, (size_t)wanted, element);
-  if (!grown) {
+  if (!orb_regrow(ctx, array, (size_t)wanted, element)) {
     return ORB_E_NO_MEMORY;
   }
-  memcpy(array, &grown, sizeof grown);
   *room = wanted;
   return ORB_OK;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/grow.h"
 #include "numeric/vec3.h"
 
 static void move_face(orb_mesh *mesh, size_t from, size_t to) {
@@ -74,16 +75,7 @@ void orb_mesh_turn_face(orb_mesh *mesh, int32_t triangle) {
 }
 
 static int regrow(orb_context *ctx, void *array, size_t count, size_t size, int wanted) {
-  void *old;
-  memcpy(&old, array, sizeof old);
-  if (!wanted) {
-    return 1;
-  }
-  void *grown = orb_realloc(ctx, old, count, size);
-  if (grown) {
-    memcpy(array, &grown, sizeof grown);
-  }
-  return grown != NULL;
+  return !wanted || orb_regrow(ctx, array, count, size);
 }
 
 orb_status orb_mesh_reserve(orb_context *ctx, orb_mesh *mesh, int32_t more_vertices, int32_t more_triangles) {

@@ -37,8 +37,7 @@ static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, i
     }
     ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
     if (round == 0 && strict) { /* while there are vertices left to do it with */
-      int64_t turned;
-      ORB_TRY(orb_match_mend(ctx, match, limit2, &turned));
+      ORB_TRY(orb_match_mend(ctx, match, limit2));
     }
     int64_t after = orb_match_live(match);
     if (after <= target || (round > 0 && (before - after) * 100 < before)) {
@@ -68,11 +67,10 @@ static orb_status hold(orb_context *ctx, orb_match *match, double tolerance) {
 
 /* From a start within the tolerance, by steps none of which leaves it. */
 static orb_status settle(orb_context *ctx, orb_match *match, double tolerance) {
-  int64_t turned = 0;
   ORB_TRY(orb_match_turn_all(ctx, match, tolerance * tolerance, 1));
   ORB_TRY(reduce(ctx, match, tolerance, 0, 1, ROUNDS));
   orb_progress(ctx, "remesh", 0.7);
-  ORB_TRY(orb_match_mend(ctx, match, tolerance * tolerance, &turned));
+  ORB_TRY(orb_match_mend(ctx, match, tolerance * tolerance));
   return reduce(ctx, match, tolerance, 0, 1, 1);
 }
 

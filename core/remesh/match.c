@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/grow.h"
 #include "mesh/normals.h"
 #include "numeric/vec3.h"
 
@@ -43,27 +44,18 @@ void orb_match_free(orb_context *ctx, orb_match *match) {
   memset(match, 0, sizeof *match);
 }
 
-static int grow(orb_context *ctx, void *block, size_t count, size_t size) {
-  void *old, *grown;
-  memcpy(&old, block, sizeof old);
-  grown = orb_realloc(ctx, old, count, size);
-  if (grown) {
-    memcpy(block, &grown, sizeof grown);
-  }
-  return grown != NULL;
-}
-
 orb_status orb_match_reserve(orb_context *ctx, orb_match *match, int64_t more) {
   if (match->net.vertex_count + more <= match->capacity) {
     return ORB_OK;
   }
   ORB_TRY(orb_net_reserve(ctx, &match->net, more));
   size_t n = (size_t)match->net.vertex_capacity, cells = n * (size_t)match->shape_count;
-  if (!grow(ctx, &match->at, 3 * cells, sizeof(double)) || !grow(ctx, &match->normal, 3 * cells, sizeof(double)) ||
-      !grow(ctx, &match->spot, cells, sizeof(orb_spot)) || !grow(ctx, &match->fixed, n, 1) ||
-      !grow(ctx, &match->stayed, n, sizeof(uint64_t)) || !grow(ctx, &match->alone, n, sizeof(uint64_t)) ||
-      !grow(ctx, &match->vertex_items, n, sizeof(int32_t)) ||
-      !grow(ctx, &match->triangle_items, 2 * n, sizeof(int32_t))) {
+  if (!orb_regrow(ctx, &match->at, 3 * cells, sizeof(double)) ||
+      !orb_regrow(ctx, &match->normal, 3 * cells, sizeof(double)) ||
+      !orb_regrow(ctx, &match->spot, cells, sizeof(orb_spot)) || !orb_regrow(ctx, &match->fixed, n, 1) ||
+      !orb_regrow(ctx, &match->stayed, n, sizeof(uint64_t)) || !orb_regrow(ctx, &match->alone, n, sizeof(uint64_t)) ||
+      !orb_regrow(ctx, &match->vertex_items, n, sizeof(int32_t)) ||
+      !orb_regrow(ctx, &match->triangle_items, 2 * n, sizeof(int32_t))) {
     return ORB_E_NO_MEMORY;
   }
   for (size_t i = (size_t)match->capacity; i < n; i++) {

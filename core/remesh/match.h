@@ -161,8 +161,8 @@ static inline uint64_t orb_mixed(uint64_t mark, const void *part, size_t size) {
  * whether it did. Then all vertices in turn, or those at triangles that are not fine. */
 int orb_match_try_move(orb_match *match, int32_t v, double limit2);
 ORB_MUST_CHECK orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2, int only_bad);
-/* Mends triangles that are turned in space, within the limit; *left: how many it could not. */
-ORB_MUST_CHECK orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2, int64_t *left);
+/* Mends triangles that are turned in space, within the limit, as far as it can: see orb_match_turned(). */
+ORB_MUST_CHECK orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2);
 /* How many triangles are turned in space. */
 int64_t orb_match_turned(const orb_match *match);
 /* Refines them and those around them as far as the overlay of the shapes; edges outside may stray. */

@@ -158,15 +158,15 @@ static orb_status pass(const mender *m, int64_t *seen, int64_t *left) {
   return ORB_OK;
 }
 
-orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2, int64_t *left) {
+orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2) {
   static const orb_star_goal goal[] = {ORB_STAR_FEWER, ORB_STAR_FEWER, ORB_STAR_SMALLER, ORB_STAR_FEWER};
-  int64_t seen = 1, before = -1;
+  int64_t seen = 1, left = 0, before = -1;
   for (size_t i = 0; i < sizeof goal / sizeof *goal && seen > 0; i++) {
     mender m = {ctx, match, limit2, goal[i]};
-    if (i > 0 && goal[i] == goal[i - 1] && before == *left) {
+    if (i > 0 && goal[i] == goal[i - 1] && before == left) {
       continue; /* nothing has changed */
     }
-    ORB_TRY(pass(&m, &seen, left));
+    ORB_TRY(pass(&m, &seen, &left));
     before = seen;
   }
   return ORB_OK;

@@ -5,6 +5,7 @@
 #include "base/check.h"
 #include "numeric/predicates.h"
 #include "remesh/distance.h"
+#include "remesh/edge_queue.h"
 #include "remesh/match.h"
 
 static double items_of_turn2(const orb_match *match, int32_t list, int32_t c, int32_t d, int32_t b, int32_t a) {
@@ -110,48 +111,6 @@ void orb_match_crossing_point(const orb_match *match, int32_t v, int32_t w, cons
   (void)orb_normalize(out);
 }
 
-typedef struct edge_queue {
-  int32_t (*ends)[2]; /* edges by their ends: half-edges change hands when triangles are split */
-  int64_t count, capacity;
-} edge_queue;
-
-static orb_status push(orb_context *ctx, edge_queue *queue, int32_t v, int32_t w) {
-  if (queue->count == queue->capacity) {
-    int64_t capacity = 2 * queue->capacity + 1024;
-    int32_t(*grown)[2] = orb_realloc(ctx, queue->ends, (size_t)capacity, sizeof *grown);
-    if (!grown) {
-      return ORB_E_NO_MEMORY;
-    }
-    queue->ends = grown;
-    queue->capacity = capacity;
-  }
-  queue->ends[queue->count][0] = v;
-  queue->ends[queue->count++][1] = w;
-  return ORB_OK;
-}
-
-/* All edges at v. */
-static orb_status push_star(orb_context *ctx, const orb_match *match, int32_t v, edge_queue *queue) {
-  const orb_net *net = &match->net;
-  int32_t first = net->out[v], h = first;
-  do {
-    ORB_TRY(push(ctx, queue, v, net->triangles[orb_next(h)]));
-    h = net->twin[orb_prev(h)];
-  } while (h != first);
-  return ORB_OK;
-}
-
-static int32_t find_edge(const orb_net *net, int32_t v, int32_t w) {
-  int32_t first = net->out[v], h = first;
-  do {
-    if (net->triangles[orb_next(h)] == w) {
-      return h;
-    }
-    h = net->twin[orb_prev(h)];
-  } while (h != first);
-  return -1;
-}
-
 /* Turns the edge whatever it does to the form, if all stays positive on the sphere. */
 static int force_turn(orb_match *match, int32_t h) {
   const orb_net *net = &match->net;
@@ -237,25 +196,26 @@ static int32_t split_at(orb_match *match, int32_t h, const orb_stray *worst) {
 
 /* An edge between needles so thin that no rounded point lies within it: the crossing becomes a vertex wherever it lies,
  * and the edge is turned, which makes the needles' other edges its successors. */
-static orb_status give_room(orb_context *ctx, orb_match *match, int32_t h, const orb_stray *worst, edge_queue *queue) {
+static orb_status give_room(orb_context *ctx, orb_match *match, int32_t h, const orb_stray *worst,
+                            orb_edge_queue *queue) {
   const orb_net *net = &match->net;
   int32_t v = net->triangles[h], w = net->triangles[net->twin[h]], before = net->vertex_count;
   double p[3];
   orb_match_crossing_point(match, v, w, worst, p);
   int32_t n = orb_match_insert(match, h / 3, p);
   if (n >= before) {
-    ORB_TRY(push_star(ctx, match, n, queue));
+    ORB_TRY(orb_edge_queue_push_star(ctx, queue, net, n));
   }
-  h = find_edge(net, v, w);
+  h = orb_net_edge(net, v, w);
   if (h < 0 || !force_turn(match, h)) {
     return ORB_OK;
   }
-  return push(ctx, queue, net->triangles[h], net->triangles[net->twin[h]]);
+  return orb_edge_queue_push(ctx, queue, net->triangles[h], net->triangles[net->twin[h]]);
 }
 
 static orb_status mend_edge(orb_context *ctx, orb_match *match, int32_t v, int32_t w, double limit2,
-                            edge_queue *queue) {
-  int32_t h = find_edge(&match->net, v, w);
+                            orb_edge_queue *queue) {
+  int32_t h = orb_net_edge(&match->net, v, w);
   orb_stray worst = {0, -1, -1, 0};
   if (h < 0 || orb_match_edge2(match, v, w, INFINITY, &worst) <= limit2 || mend_by_turn(match, h, limit2)) {
     return ORB_OK;
@@ -265,8 +225,8 @@ static orb_status mend_edge(orb_context *ctx, orb_match *match, int32_t v, int32
   if (n < 0) {
     return give_room(ctx, match, h, &worst, queue);
   }
-  ORB_TRY(push_star(ctx, match, n, queue));
-  return push(ctx, queue, v, w); /* still there if another edge was split */
+  ORB_TRY(orb_edge_queue_push_star(ctx, queue, &match->net, n));
+  return orb_edge_queue_push(ctx, queue, v, w); /* still there if another edge was split */
 }
 
 typedef struct stray_loop {
@@ -301,14 +261,15 @@ static int32_t farthest_item(const orb_match *match, int32_t t, double limit2) {
 }
 
 /* Makes vertices of the items that stray from their triangles, the farthest of each triangle first. */
-static orb_status take_items_in(orb_context *ctx, orb_match *match, double limit2, edge_queue *queue) {
+static orb_status take_items_in(orb_context *ctx, orb_match *match, double limit2, orb_edge_queue *queue) {
   for (int32_t t = 0; t < match->net.triangle_count; t++) { /* new triangles come at the end and are looked at, too */
     int32_t item = match->net.triangles[3 * (int64_t)t] < 0 ? -1 : farthest_item(match, t, limit2);
     if (item < 0) {
       continue;
     }
     ORB_TRY(orb_match_reserve(ctx, match, 1));
-    ORB_TRY(push_star(ctx, match, orb_match_insert(match, t, orb_match_item_point(match, item)), queue));
+    int32_t n = orb_match_insert(match, t, orb_match_item_point(match, item));
+    ORB_TRY(orb_edge_queue_push_star(ctx, queue, &match->net, n));
     t -= farthest_item(match, t, limit2) >= 0; /* others may still stray from what is left of it */
   }
   return ORB_OK;
@@ -317,7 +278,7 @@ static orb_status take_items_in(orb_context *ctx, orb_match *match, double limit
 orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, int64_t *strays) {
   int64_t half_edges = 3 * (int64_t)match->net.triangle_count;
   stray_loop loop = {match, limit2, ORB_NEW(ctx, unsigned char, half_edges)};
-  edge_queue queue = {0};
+  orb_edge_queue queue = {0};
   orb_status status = loop.strays ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
     orb_parallel_for(ctx, half_edges, 1024, stray_range, &loop);
@@ -325,7 +286,7 @@ orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, i
   }
   for (int64_t h = 0; h < half_edges && status == ORB_OK; h++) {
     if (loop.strays[h]) {
-      status = push(ctx, &queue, match->net.triangles[h], match->net.triangles[match->net.twin[h]]);
+      status = orb_edge_queue_push(ctx, &queue, match->net.triangles[h], match->net.triangles[match->net.twin[h]]);
     }
   }
   if (status == ORB_OK) {
@@ -344,7 +305,7 @@ orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, i
     }
   }
   match->crept |= queue.count > limit;
-  orb_free(ctx, queue.ends);
+  orb_edge_queue_free(ctx, &queue);
   orb_free(ctx, loop.strays);
   return status;
 }

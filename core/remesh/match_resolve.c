@@ -2,10 +2,12 @@
  * become vertices, and edges that leave a shape are split where they cross its edges. What lies in one triangle of
  * every shape cannot be turned. Collapses then reduce it again, and leave no more turned than there are. Edges outside
  * stay as they are, so that the region does not spread. */
+
 #include <math.h>
-#include <string.h>
 
 #include "base/check.h"
+#include "base/grow.h"
+#include "remesh/edge_queue.h"
 #include "remesh/match.h"
 
 enum { SPLITS_EACH = 64 };
@@ -16,62 +18,35 @@ typedef struct region {
   orb_match *match;
   unsigned char *in; /* a triangle */
   int64_t capacity;
-  int32_t (*queue)[2]; /* edges by their ends */
-  int64_t count, queue_capacity;
+  orb_edge_queue queue;
 } region;
 
-static int grow(orb_context *ctx, void *block, int64_t *capacity, int64_t need, size_t size) {
-  void *old;
-  memcpy(&old, block, sizeof old);
-  if (need <= *capacity) {
-    return 1;
+static orb_status make_room(region *r) {
+  int64_t need = r->match->net.triangle_count, to = need + need / 2 + 256;
+  if (need > r->capacity) {
+    if (!orb_regrow(r->ctx, &r->in, (size_t)to, 1)) {
+      return ORB_E_NO_MEMORY;
+    }
+    r->capacity = to;
   }
-  int64_t to = need + need / 2 + 256;
-  void *grown = orb_realloc(ctx, old, (size_t)to, size);
-  if (grown) {
-    memcpy(block, &grown, sizeof grown);
-    *capacity = to;
-  }
-  return grown != NULL;
-}
-
-static orb_status push(region *r, int32_t v, int32_t w) {
-  if (!grow(r->ctx, &r->queue, &r->queue_capacity, r->count + 1, sizeof *r->queue)) {
-    return ORB_E_NO_MEMORY;
-  }
-  r->queue[r->count][0] = v;
-  r->queue[r->count++][1] = w;
   return ORB_OK;
 }
 
 /* A new vertex: its triangles are in the region where those were that they are parts of; its edges are to be seen. */
 static orb_status take_in(region *r, int32_t v, int32_t triangles_before) {
   const orb_net *net = &r->match->net;
-  if (!grow(r->ctx, &r->in, &r->capacity, net->triangle_count, 1)) {
-    return ORB_E_NO_MEMORY;
-  }
+  ORB_TRY(make_room(r));
   for (int32_t t = triangles_before; t < net->triangle_count; t++) {
     r->in[t] = r->in[net->twin[3 * t + 2] / 3];
   }
-  int32_t first = net->out[v], h = first;
-  do {
-    ORB_TRY(push(r, v, net->triangles[orb_next(h)]));
-    h = net->twin[orb_prev(h)];
-  } while (h != first);
-  return ORB_OK;
+  return orb_edge_queue_push_star(r->ctx, &r->queue, net, v);
 }
 
 /* The edge, where it is one of the region or around it; else −1. */
 static int32_t edge_of(const region *r, int32_t v, int32_t w) {
   const orb_net *net = &r->match->net;
-  int32_t first = net->out[v], h = first;
-  do {
-    if (net->triangles[orb_next(h)] == w) {
-      return r->in[h / 3] || r->in[net->twin[h] / 3] ? h : -1;
-    }
-    h = net->twin[orb_prev(h)];
-  } while (h != first);
-  return -1;
+  int32_t h = orb_net_edge(net, v, w);
+  return h >= 0 && (r->in[h / 3] || r->in[net->twin[h] / 3]) ? h : -1;
 }
 
 static orb_status split_edge(region *r, int32_t v, int32_t w, double limit2) {
@@ -139,12 +114,12 @@ static orb_status resolve(region *r, double limit2) {
   }
   for (int32_t h = 0; h < 3 * net->triangle_count; h++) {
     if (net->triangles[h - h % 3] >= 0 && (r->in[h / 3] || r->in[net->twin[h] / 3]) && h < net->twin[h]) {
-      ORB_TRY(push(r, net->triangles[h], net->triangles[net->twin[h]]));
+      ORB_TRY(orb_edge_queue_push(r->ctx, &r->queue, net->triangles[h], net->triangles[net->twin[h]]));
     }
   }
-  int64_t most = r->count + SPLITS_EACH * marked;
-  for (int64_t i = 0; i < r->count && i < most; i++) {
-    ORB_TRY(split_edge(r, r->queue[i][0], r->queue[i][1], limit2));
+  int64_t most = r->queue.count + SPLITS_EACH * marked;
+  for (int64_t i = 0; i < r->queue.count && i < most; i++) {
+    ORB_TRY(split_edge(r, r->queue.ends[i][0], r->queue.ends[i][1], limit2));
     if ((i & 1023) == 0) {
       ORB_TRY(orb_context_check(r->ctx));
     }
@@ -163,12 +138,12 @@ int64_t orb_match_turned(const orb_match *match) {
 
 orb_status orb_match_resolve(orb_context *ctx, orb_match *match, double limit2) {
   region r = {.ctx = ctx, .match = match};
-  orb_status status = ORB_E_NO_MEMORY;
-  if (grow(ctx, &r.in, &r.capacity, match->net.triangle_count, 1)) {
+  orb_status status = make_room(&r);
+  if (status == ORB_OK) {
     mark(&r);
     status = resolve(&r, CLOSE * CLOSE * limit2);
   }
   orb_free(ctx, r.in);
-  orb_free(ctx, r.queue);
+  orb_edge_queue_free(ctx, &r.queue);
   return status;
 }

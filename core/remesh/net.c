@@ -171,15 +171,19 @@ int orb_net_sound(const orb_net *net, int32_t a, int32_t b, int32_t c) {
   return orb_det(p, q, r) > 1e-6 * fmax(orb_distance2(p, q), fmax(orb_distance2(q, r), orb_distance2(r, p)));
 }
 
-int orb_net_adjacent(const orb_net *net, int32_t a, int32_t b) {
-  int32_t first = net->out[a], h = first;
+int32_t orb_net_edge(const orb_net *net, int32_t v, int32_t w) {
+  int32_t first = net->out[v], h = first;
   do {
-    if (origin(net, orb_next(h)) == b) {
-      return 1;
+    if (origin(net, orb_next(h)) == w) {
+      return h;
     }
     h = net->twin[orb_prev(h)];
   } while (h != first);
-  return 0;
+  return -1;
+}
+
+int orb_net_adjacent(const orb_net *net, int32_t a, int32_t b) {
+  return orb_net_edge(net, a, b) >= 0;
 }
 
 int orb_net_can_flip(const orb_net *net, int32_t h) {

@@ -52,6 +52,8 @@ int orb_net_can_collapse(const orb_net *net, int32_t h);
 /* Moves u onto v, h = u→v, and drops the two triangles between: topology only, positive or not is for the caller. */
 void orb_net_collapse(orb_net *net, int32_t h);
 
+/* The half-edge from v to w; −1: there is none. O(valence). */
+int32_t orb_net_edge(const orb_net *net, int32_t v, int32_t w);
 int orb_net_adjacent(const orb_net *net, int32_t a, int32_t b);
 
 enum { ORB_FILL_MOST = 12, ORB_STAR_MOST = 20 };

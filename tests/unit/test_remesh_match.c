@@ -129,9 +129,9 @@ static void mending_leaves_no_stray(void **state) {
     set_up(&b, seed, 2);
     refine(&b);
     assert_within(&b);
-    int64_t before = orb_match_turned(&b.match), left = 0;
+    int64_t before = orb_match_turned(&b.match);
     assert_true(before > 0);
-    assert_int_equal(orb_match_mend(b.ctx, &b.match, LIMIT * LIMIT, &left), ORB_OK);
+    assert_int_equal(orb_match_mend(b.ctx, &b.match, LIMIT * LIMIT), ORB_OK);
     assert_true(orb_match_turned(&b.match) < before);
     assert_within(&b);
     assert_sound(&b);
