@@ -270,8 +270,11 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[ORB_ID_SIZE], const c
   if (result != QUEUE_OK) {
     j->retry_at = orb_clock_ms() + 1000;
   }
-  if (j->cancel) {
-    j->waits_for = 0; /* the next worker ends it */
+  if (j->cancel) { /* while it was planned */
+    j->waits_for = 0;
+    pthread_mutex_unlock(&q->lock);
+    queue_finish(q, j, ORB_JOB_CANCELLED, NULL, NULL);
+    return QUEUE_OK;
   }
   leave(q, j);
   job_unref(j);
@@ -398,47 +401,6 @@ static store_result end_job(queue *q, job *j, orb_job_state state, const char *p
   return stored;
 }
 
-void queue_finish(queue *q, job *j, orb_job_state state, const char *problem, const resource *result) {
-  store_result stored = end_job(q, j, state, problem, result);
-  if (stored != STORE_OK) {
-    log_error("the end of job %s could not be stored; it will be run again", j->row.id);
-    pthread_mutex_lock(&q->lock);
-    j->retry_at = orb_clock_ms() + 5000;
-    pthread_mutex_unlock(&q->lock);
-    queue_give_back(q, j);
-    return;
-  }
-  pthread_mutex_lock(&q->lock);
-  leave(q, j);
-  job_unref(j);
-  pthread_mutex_unlock(&q->lock);
-}
-
-void queue_give_back(queue *q, job *j) {
-  int claimed = j->running;
-  store_result stored = claimed ? catalogue_job_release(q->cat, j->row.id, j->row.attempt) : STORE_OK;
-  pthread_mutex_lock(&q->lock);
-  if (claimed) {
-    j->row.state = ORB_JOB_QUEUED;
-    j->row.attempt -= stored == STORE_OK;
-    j->stage[0] = 0;
-    if (stored != STORE_OK) { /* try again to make the row what it should be before it runs */
-      j->retry_at = orb_clock_ms() + 5000;
-    }
-  }
-  leave(q, j);
-  job_unref(j);
-  pthread_mutex_unlock(&q->lock);
-}
-
-void queue_put_off(queue *q, job *j) {
-  pthread_mutex_lock(&q->lock);
-  j->retry_at = orb_clock_ms() + 1000;
-  leave(q, j);
-  job_unref(j);
-  pthread_mutex_unlock(&q->lock);
-}
-
 /* Notes the wish; 1 where the job is the caller's to end, because no worker has it. */
 static int cancel_locked(job *j) {
   int mine = !orb_job_ended(j->row.state) && !j->taken;
@@ -487,6 +449,50 @@ static void cancel_needless(queue *q, job *of) {
     }
     queue_release(q, needed);
   }
+}
+
+void queue_finish(queue *q, job *j, orb_job_state state, const char *problem, const resource *result) {
+  store_result stored = end_job(q, j, state, problem, result);
+  if (stored != STORE_OK) {
+    log_error("the end of job %s could not be stored; it will be run again", j->row.id);
+    pthread_mutex_lock(&q->lock);
+    j->retry_at = orb_clock_ms() + 5000;
+    pthread_mutex_unlock(&q->lock);
+    queue_give_back(q, j);
+    return;
+  }
+  if (state == ORB_JOB_CANCELLED) {
+    cancel_needless(q, j);
+  }
+  pthread_mutex_lock(&q->lock);
+  leave(q, j);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
+}
+
+void queue_give_back(queue *q, job *j) {
+  int claimed = j->running;
+  store_result stored = claimed ? catalogue_job_release(q->cat, j->row.id, j->row.attempt) : STORE_OK;
+  pthread_mutex_lock(&q->lock);
+  if (claimed) {
+    j->row.state = ORB_JOB_QUEUED;
+    j->row.attempt -= stored == STORE_OK;
+    j->stage[0] = 0;
+    if (stored != STORE_OK) { /* try again to make the row what it should be before it runs */
+      j->retry_at = orb_clock_ms() + 5000;
+    }
+  }
+  leave(q, j);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
+}
+
+void queue_put_off(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  j->retry_at = orb_clock_ms() + 1000;
+  leave(q, j);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
 }
 
 store_result queue_cancel(queue *q, job *j) {

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import test from 'node:test';
 import { promisify } from 'node:util';
-import { binaries, daemon, slow } from './support/daemon.mjs';
+import { binaries, daemon, endless, slow } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const wobble = (seed, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.2 * Math.sin(5 * y + seed)), y * (1.2 + seed / 100), z + 0.2 * Math.cos(4 * x + seed)]);
@@ -28,7 +28,6 @@ const started = async (d, job, options) => {
 };
 
 /** Keeps a worker until free() is called, so that everything that a test sends meanwhile has to queue. */
-const endless = { method: 'kernel-sampling', options: { displacement_threshold: 1e-15, max_iterations: 1000000 } };
 async function occupy(d, options = {}) {
   const job = await submit(d, 99, slow ? 5 : 6, options, { body: endless });
   while ((await d.get(job.url, options)).json.state === 'queued') await new Promise((done) => setTimeout(done, 5));
@@ -74,10 +73,10 @@ test('large jobs leave room for small ones', async (t) => {
     const d = await daemon(t, { args: ['--workers', workers] });
     const large = [];
     // Above 300,000 triangles a job is large.
-    for (let i = 0; i < Number(workers); i++) large.push(await submit(d, i, 8, {}, { body: { method: 'kernel-sampling' } }));
+    for (let i = 0; i < Number(workers); i++) large.push(await submit(d, i, 8, {}, { body: endless }));
     for (let i = 0; i < 3; i++) await started(d, await submit(d, 10 + i, 3));
     const states = await Promise.all(large.map(async (job) => (await d.get(job.url)).json.state));
-    assert.ok(!states.includes('succeeded'), `${workers}: the small ones passed: ${states}`);
+    assert.ok(!states.some((state) => ['succeeded', 'failed'].includes(state)), `${workers}: the small ones passed: ${states}`);
     for (const job of large) await d.delete(job.url);
   }
 });
@@ -93,14 +92,15 @@ test('time, memory and cancelling', async (t) => {
   assert.equal(reply?.type, '/problems/no-memory', JSON.stringify(reply));
 
   const other = await daemon(t, { args: ['--workers', '1'] });
-  const times = [];
-  for (let i = 0; i < 5; i++) {
+  const times = [], busy = [];
+  for (let i = 0; i < 6; i++) {
     const ends = i % 2 === 1; // by itself, perhaps before it is cancelled
-    const job = await submit(other, i, slow ? 6 : 7, {}, { body: ends ? {} : endless });
+    const job = await submit(other, i, ends ? (slow ? 6 : 7) : 5, {}, { body: ends ? {} : endless });
     while ((await other.get(job.url)).json.state === 'queued') await new Promise((done) => setTimeout(done, 5));
     await new Promise((done) => setTimeout(done, 40 * i));
-    const began = performance.now(), answer = await other.delete(job.url);
+    const began = performance.now(), before = other.cpuMs(), answer = await other.delete(job.url);
     times.push(performance.now() - began);
+    busy.push(other.cpuMs() - before);
     if (ends && answer.status === 409) {
       assert.equal((await other.get(job.url)).json.state, 'succeeded');
       continue;
@@ -108,6 +108,8 @@ test('time, memory and cancelling', async (t) => {
     assert.equal(answer.status, 200);
     assert.equal(answer.json.state, 'cancelled', 'the answer comes when it has ended');
   }
-  t.diagnostic(`cancelled within ${times.map((ms) => ms.toFixed(0)).join(', ')} ms`);
-  assert.ok(Math.max(...times) < (slow ? 5000 : 1500), times.join());
+  t.diagnostic(`cancelled within ${times.map((ms) => ms.toFixed(0)).join(', ')} ms and ${busy.join(', ')} ms of processor time`);
+  // The answer comes when the job has ended. On a machine that is busy with other things it comes later, but the
+  // daemon works no longer: two threads for a tenth of a second, read from a clock of hundredths.
+  assert.ok(Math.max(...busy) <= (slow ? 1500 : 220), busy.join());
 });

@@ -82,6 +82,28 @@ test('a job is cancelled while it waits and while it runs', async (t) => {
   assert.equal((await d.delete(next.json.url)).status, 200);
 });
 
+test('what only a cancelled job needed is cancelled with it, at whatever moment; what others want goes on', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '2'] });
+  const [first, second] = [await heavy(d, 1, 5), await heavy(d, 2, 5)];
+  const work = async () => (({ queued, waiting, running }) => queued + waiting + running)((await d.get('/readyz?verbose')).json);
+  const merge = { shapes: [first, second].map(({ id }) => ({ mesh: id })), embedding: endless };
+  for (let i = 0; i < 24; i++) {
+    const job = (await d.post('/v1/supermeshes', merge)).json;
+    if (i % 4 === 3) await until(async () => (await d.get('/readyz?verbose')).json.running === 2, 'both embeddings are made');
+    else for (const end = performance.now() + (i % 12) / 2; performance.now() < end; ); // while it is taken, planned, put to wait
+    const reply = await d.delete(job.url);
+    assert.deepEqual([reply.status, reply.json.state], [200, 'cancelled']);
+    await until(async () => (await work()) === 0, `nothing is left to do (${i})`, 60);
+  }
+  const asked = (await d.post('/v1/embeddings', { mesh: first.id, ...endless })).json;
+  const job = (await d.post('/v1/supermeshes', merge)).json;
+  await until(async () => (await work()) === 3, 'it waits for both');
+  assert.equal((await d.delete(job.url)).status, 200);
+  await until(async () => (await work()) === 1, 'one of them is stopped');
+  assert.equal((await d.get(asked.url)).json.state, 'running');
+  assert.equal((await d.delete(asked.url)).status, 200);
+});
+
 test('the same request while its job runs is that same job', async (t) => {
   const d = await daemon(t);
   const mesh = await heavy(d);
