@@ -243,8 +243,7 @@ done:
   return status;
 }
 
-/* All vertices at these points, the landmarks pinned; s: their order, of the caller. */
-static orb_status full_level(cm_run *c, const double *points, const orb_surface *s, cm_level *level) {
+orb_status cm_full_level(cm_run *c, const double *points, const orb_surface *s, cm_level *level) {
   orb_context *ctx = c->ctx;
   size_t n = (size_t)c->vertex_count;
   unsigned char *flags = ORB_NEW0(ctx, unsigned char, 3 * n); /* alive; pinned; pinned in the mesh's order */
@@ -274,7 +273,7 @@ static orb_status given_energy(cm_run *c, double *energy) {
   orb_surface s;
   cm_level level = {0};
   ORB_TRY(orb_surface_create(c->ctx, &c->moving->mesh, &s));
-  orb_status status = full_level(c, c->moving->points, &s, &level);
+  orb_status status = cm_full_level(c, c->moving->points, &s, &level);
   if (status == ORB_OK) {
     *energy = cm_level_energy(&level);
   }
@@ -422,6 +421,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   ORB_GO(status, cm_bend(&c, from_given ? CM_SAMPLES : 0), done);
   ORB_GO(status, prepare_levels(&c), done);
   ORB_GO(status, run_starts(&c, preset), done);
+  ORB_GO(status, cm_unwind(&c), done);
   status = take_best(&c, fixed, energy, improved);
 done:
   cm_run_free(&c);

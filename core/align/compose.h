@@ -73,6 +73,9 @@ ORB_MUST_CHECK orb_status cm_spatial_targets(orb_context *ctx, const cm_surface 
                                              const double *normal, int32_t vertex_count, const cm_anchors *anchors,
                                              double *out, double *fit);
 
+/* The rotation nearest to a 3×3 matrix, both row-major (Kabsch; reflections turned back). 0: it is not finite. */
+int cm_nearest_rotation(const double h[9], double r[9]);
+
 /* `count` vertices spread over a shape by farthest points; out: their numbers. */
 ORB_MUST_CHECK orb_status cm_spread(orb_context *ctx, const double *x, int32_t vertex_count, int32_t count,
                                     int32_t *out);

@@ -76,6 +76,13 @@ ORB_MUST_CHECK orb_status cm_pairs_create(cm_run *run);
  * is carried to it. *stuck: nothing came of it, and all is as it was. */
 ORB_MUST_CHECK orb_status cm_walk(cm_run *run, int32_t samples, int *stuck);
 
+/* compose.c. All vertices at these points, the landmarks pinned; s: their order, of the caller. */
+ORB_MUST_CHECK orb_status cm_full_level(cm_run *run, const double *points, const orb_surface *s, cm_level *level);
+
+/* compose_unwind.c. Twisted limbs of the best map are turned back, step by step, and what comes of it takes the best
+ * map's place if it is better. */
+ORB_MUST_CHECK orb_status cm_unwind(cm_run *run);
+
 /* compose_rounds.c. Sweeps until hardly a vertex moves any more, `count` at most. */
 ORB_MUST_CHECK orb_status cm_sweeps(cm_run *run, cm_level *level, cm_rules rules, int count);
 /* Rules of sweeps: flips allowed against a barrier of that strength, or none. */

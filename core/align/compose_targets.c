@@ -216,8 +216,7 @@ static orb_status icp_round(targets_run *run, int32_t controls, double stiffness
   return spline_fit(run, kept, stiffness);
 }
 
-/* The rotation nearest to a 3×3 matrix (Kabsch; reflections turned back). */
-static int nearest_rotation(const double h[9], double r[9]) {
+int cm_nearest_rotation(const double h[9], double r[9]) {
   double u[9], v[9], sv[3];
   for (int i = 0; i < 9; i++) {
     if (!isfinite(h[i])) {
@@ -300,7 +299,7 @@ static orb_status rigid_icp(targets_run *run, const double start[9], double *sco
         to[k] /= weight_sum;
       }
     }
-    if (!nearest_rotation(h, r)) {
+    if (!cm_nearest_rotation(h, r)) {
       break;
     }
     for (int k = 0; k < 3; k++) {
@@ -352,7 +351,7 @@ static void base_of_anchors(targets_run *run) {
     }
     spread += orb_distance2(p, from);
   }
-  (void)nearest_rotation(h, r);
+  (void)cm_nearest_rotation(h, r);
   for (int k = 0; k < 9; k++) {
     turned += r[k] * h[k];
   }

@@ -5,6 +5,9 @@
  * - held out: landmarks that the alignment was not given, likewise.
  * - inverted: triangles turned over in space. Of the map: those of either shape whose image on the other turns against
  *   that surface at its centre. Of the supermesh: those that turn against either surface there.
+ * - halfway: how much of its area each patch of the surface keeps halfway of the linear morph, against the mean of both
+ *   ends. A limb that the map turns by half a turn about its axis is thin there. The least of some 200 patches, and the
+ *   share of the surface in patches that keep less than half.
  */
 #include <math.h>
 #include <stdio.h>
@@ -254,6 +257,74 @@ static void write_inverted(const truth_run *run, orb_text *line) {
   orb_json_close(line, '}');
 }
 
+enum { PATCHES = 200 };
+
+/* The patch of each vertex of the supermesh: the nearest of vertices spread by farthest points, at x. far, nearest:
+ * room for all vertices. */
+static void spread_patches(const orb_supermesh *m, const double *x, double *far, int32_t *nearest) {
+  for (int32_t i = 0, last = 0; i < PATCHES; i++) {
+    int32_t next = 0;
+    for (int32_t v = 0; v < m->vertex_count; v++) {
+      double d[3];
+      subtract(x + 3 * v, x + 3 * last, d);
+      if (i == 0 || dot(d, d) < far[v]) {
+        far[v] = dot(d, d);
+        nearest[v] = i;
+      }
+      next = far[v] > far[next] ? v : next;
+    }
+    last = next;
+  }
+}
+
+static double corner_area(const double *x, const int32_t *v) {
+  double n[3];
+  triangle_normal(x + 3 * v[0], x + 3 * v[1], x + 3 * v[2], n);
+  return 0.5 * sqrt(dot(n, n));
+}
+
+static int write_halfway(const truth_run *run, orb_text *line) {
+  const orb_supermesh *m = &run->result->supermesh;
+  size_t n = (size_t)m->vertex_count;
+  double *x = ORB_NEW(run->ctx, double, 10 * n), area[3][PATCHES] = {{0}}, least = 1, thin = 0, whole = 0;
+  int32_t *patch = ORB_NEW(run->ctx, int32_t, n);
+  for (size_t v = 0; x && patch && v < n; v++) {
+    double *end[2] = {x + 3 * v, x + 3 * (n + v)}, *half = x + 3 * (2 * n + v);
+    for (int s = 0; s < 2; s++) {
+      orb_place_position(&run->result->alignment.shapes[s].mesh, &m->places[(size_t)s * n + v], end[s]);
+    }
+    for (int k = 0; k < 3; k++) {
+      half[k] = 0.5 * (end[0][k] + end[1][k]);
+    }
+  }
+  int fine = x && patch;
+  if (fine) {
+    spread_patches(m, x, x + 9 * n, patch);
+  }
+  for (int32_t t = 0; t < m->triangle_count && fine; t++) {
+    const int32_t *v = m->triangles + 3 * t;
+    for (int k = 0; k < 3; k++) {
+      area[k][patch[v[0]]] += corner_area(x + 3 * (size_t)k * n, v);
+    }
+  }
+  for (int i = 0; i < PATCHES; i++) {
+    double ends = 0.5 * (area[0][i] + area[1][i]), kept = ends > 0 ? area[2][i] / ends : 1;
+    least = kept < least ? kept : least;
+    thin += kept < 0.5 ? ends : 0;
+    whole += ends;
+  }
+  if (fine) {
+    orb_json_key(line, "halfway");
+    orb_json_open(line, '{');
+    orb_json_member_number(line, "least", least);
+    orb_json_member_number(line, "thin_fraction", thin / whole);
+    orb_json_close(line, '}');
+  }
+  orb_free(run->ctx, x);
+  orb_free(run->ctx, patch);
+  return fine;
+}
+
 static int write_measures(truth_run *run, orb_text *line) {
   const orb_alignment *alignment = &run->result->alignment;
   int fine = 1;
@@ -269,7 +340,7 @@ static int write_measures(truth_run *run, orb_text *line) {
     orb_json_member_number(line, "energy", alignment->energy);
     orb_json_member_number(line, "distortion_median", run->result->pairs[0].distortion.symmetric_dirichlet.median);
     write_inverted(run, line);
-    fine = write_dense(run, line) && write_held_out(run, line);
+    fine = write_dense(run, line) && write_held_out(run, line) && write_halfway(run, line);
   }
   for (int s = 0; s < 2; s++) {
     orb_locator_destroy(run->ctx, run->locator[s]);

@@ -1,0 +1,205 @@
+/* Limbs that a map has twisted: rings about them, how far they are turned, and back. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "align/compose_limb.h"
+#include "align/compose_twist.h"
+#include "numeric/predicates.h"
+#include "numeric/vec3.h"
+#include "support_shapes.h"
+
+#define DEGREES (180 / M_PI)
+
+static const double axis[3] = {0.6, 0, 0.8}, across[3] = {0, 1, 0}, third[3] = {-0.8, 0, 0.6};
+static const double REACH = 1.2;              /* of the limb beyond the ball */
+static const double FULL = 0.15, FADED = 0.7; /* angles from the axis between which a twist fades away */
+
+/* A ball with one limb, and its own directions as its sphere. */
+typedef struct creature {
+  orb_context *ctx;
+  orb_mesh mesh;
+  double *sphere; /* directions */
+  double *image;  /* the same, twisted */
+  double *x;      /* positions of the shape that is mapped */
+  cm_surface surface;
+  int32_t pole;
+} creature;
+
+static double from_axis(const double p[3]) {
+  return acos(fmin(1, fmax(-1, orb_dot(p, axis))));
+}
+
+/* Rodrigues' rotation about a unit vector. */
+static void rotate(const double about[3], double angle, double p[3]) {
+  double c[3], along = orb_dot(about, p);
+  orb_cross(about, p, c);
+  for (int k = 0; k < 3; k++) {
+    p[k] = p[k] * cos(angle) + c[k] * sin(angle) + about[k] * along * (1 - cos(angle));
+  }
+}
+
+/* A ball with a limb that reaches so far. twist: of the limb's end, counterclockwise as seen from outside; bend: of the
+ * mapped shape's limb. */
+static creature make(double reach, double twist, double bend) {
+  creature c = {.pole = 0};
+  assert_int_equal(orb_context_create(NULL, &c.ctx), ORB_OK);
+  c.mesh = shape_ball(c.ctx, 6);
+  size_t n = 3 * (size_t)c.mesh.vertex_count;
+  c.sphere = malloc(n * sizeof *c.sphere);
+  c.image = malloc(n * sizeof *c.image);
+  c.x = malloc(n * sizeof *c.x);
+  assert_true(c.sphere && c.image && c.x);
+  memcpy(c.sphere, c.mesh.positions, n * sizeof *c.sphere);
+  memcpy(c.image, c.mesh.positions, n * sizeof *c.image);
+  for (int32_t v = 0; v < c.mesh.vertex_count; v++) {
+    double *p = c.mesh.positions + 3 * (size_t)v, far = from_axis(p), fade = (FADED - far) / (FADED - FULL);
+    c.pole = far < from_axis(c.sphere + 3 * (size_t)c.pole) ? v : c.pole;
+    fade = fmin(1, fmax(0, fade));
+    rotate(axis, twist * fade * fade * (3 - 2 * fade), c.image + 3 * (size_t)v);
+    for (int k = 0; k < 3; k++) {
+      p[k] *= 1 + reach * exp(-30 * (1 - cos(far)));
+    }
+  }
+  orb_aligned_shape shape = {.mesh = c.mesh, .points = c.sphere};
+  assert_int_equal(cm_surface_create(c.ctx, &shape, &c.surface), ORB_OK);
+  memcpy(c.x, c.surface.x, n * sizeof *c.x);
+  for (int32_t v = 0; v < c.mesh.vertex_count; v++) {
+    double out = orb_length(c.mesh.positions + 3 * (size_t)v);
+    rotate(across, bend * (out - 1) / REACH, c.x + 3 * (size_t)v);
+  }
+  for (int32_t t = 0; t < c.mesh.triangle_count; t++) {
+    const int32_t *v = c.mesh.triangles + 3 * (size_t)t;
+    assert_true(orb_orient(c.image + 3 * (size_t)v[0], c.image + 3 * (size_t)v[1], c.image + 3 * (size_t)v[2]) > 0);
+  }
+  return c;
+}
+
+static void drop(creature *c) {
+  cm_surface_free(c->ctx, &c->surface);
+  shape_free(c->ctx, &c->mesh);
+  free(c->sphere);
+  free(c->image);
+  free(c->x);
+  orb_context_destroy(c->ctx);
+}
+
+static void find(creature *c, const int32_t *held, int32_t held_count, cm_twists *out) {
+  cm_image map = {c->mesh.vertex_count, c->mesh.triangle_count, c->mesh.triangles, c->x, c->image};
+  assert_int_equal(cm_twists_find(c->ctx, &c->surface, &map, held, held_count, out), ORB_OK);
+}
+
+/* About a part that is round, rings are circles, and angles along them those about the axis. */
+static void turns_go_round_the_axis(void **state) {
+  (void)state;
+  creature c = make(0, 0, 0);
+  size_t n = (size_t)c.mesh.vertex_count;
+  unsigned char *inside = calloc(n, 1);
+  double *height = malloc(n * sizeof *height);
+  assert_true(inside && height);
+  for (size_t v = 0; v < n; v++) {
+    inside[v] = from_axis(c.sphere + 3 * v) < FADED;
+  }
+  assert_int_equal(cm_limb_heights(c.ctx, &c.surface, inside, c.pole, height), ORB_OK);
+  for (int i = 0; i < 200; i++) {
+    double far = 0.25 + 0.25 * i / 200, at = 0.7 * i, angle = (i % 9 - 4) * 0.8, p[3], q[3], wanted[3];
+    for (int k = 0; k < 3; k++) {
+      p[k] = cos(far) * axis[k] + sin(far) * (cos(at) * across[k] + sin(at) * third[k]);
+    }
+    memcpy(wanted, p, sizeof wanted);
+    rotate(axis, angle, wanted);
+    orb_place place;
+    orb_locate(c.surface.locator, p, -1, &place);
+    assert_true(cm_limb_turn(&c.surface, height, angle, &place));
+    cm_surface_at(&c.surface, &place, NULL, q, NULL);
+    assert_true(fabs(place.at[0] + place.at[1] + place.at[2] - 1) < 1e-9);
+    assert_true(fabs(from_axis(q) - far) < 0.06 * far);
+    assert_true(sqrt(orb_distance2(q, wanted)) < 0.12 * sin(far));
+  }
+  orb_place outside = {.triangle = 0, .at = {1, 0, 0}}, as_it_was = outside;
+  for (int32_t t = 0; t < c.mesh.triangle_count; t++) {
+    const double *p = c.sphere + 3 * (size_t)c.mesh.triangles[3 * (size_t)t];
+    outside.triangle = orb_dot(p, axis) < -0.5 ? t : outside.triangle;
+  }
+  as_it_was.triangle = outside.triangle;
+  assert_false(cm_limb_turn(&c.surface, height, 1, &outside));
+  assert_memory_equal(&outside, &as_it_was, sizeof outside);
+  free(inside);
+  free(height);
+  drop(&c);
+}
+
+/* A twist is measured with its sign and beyond half a turn, and undone. */
+static void twists_are_measured_and_undone(void **state) {
+  (void)state;
+  const double degrees[] = {180, -180, 110, -150};
+  for (int i = 0; i < 8; i++) {
+    creature c = make(REACH, degrees[i / 2] / DEGREES, 0);
+    cm_twists t;
+    find(&c, &c.pole, i % 2, &t); /* with the tip known and without */
+    assert_int_equal(t.count, 1);
+    const cm_twist *limb = &t.limb[0];
+    assert_true(from_axis(c.sphere + 3 * (size_t)limb->pole) < 0.15);
+    double end = 0;
+    for (int k = 0; k < limb->count; k++) {
+      end = fabs(limb->angle[k]) > fabs(end) ? limb->angle[k] : end;
+    }
+    assert_true(fabs(end * DEGREES - degrees[i / 2]) < 20);
+    assert_true(fabs(fabs(end) - limb->most) < 1e-12);
+    double before = 0, after = 0;
+    for (int32_t v = 0; v < c.mesh.vertex_count; v++) {
+      orb_place place;
+      double y[3];
+      orb_locate(c.surface.locator, c.image + 3 * (size_t)v, -1, &place);
+      cm_surface_at(&c.surface, &place, y, NULL, NULL);
+      before += sqrt(orb_distance2(y, c.x + 3 * (size_t)v));
+      (void)cm_twists_undo(&t, &c.surface, 1, &place);
+      cm_surface_at(&c.surface, &place, y, NULL, NULL);
+      after += sqrt(orb_distance2(y, c.x + 3 * (size_t)v));
+    }
+    assert_true(after < 0.25 * before);
+    cm_twists_free(c.ctx, &t);
+    drop(&c);
+  }
+}
+
+static void nothing_is_found(double twist, double bend, int both_ends_held) {
+  creature c = make(REACH, twist / DEGREES, bend / DEGREES);
+  cm_twists t;
+  int32_t held[2] = {c.pole, c.pole};
+  for (int32_t v = 0; v < c.mesh.vertex_count; v++) { /* another one on the limb, where the twist is whole */
+    held[1] = fabs(from_axis(c.sphere + 3 * (size_t)v) - 0.2) < 0.02 ? v : held[1];
+  }
+  assert_int_not_equal(held[0], held[1]);
+  find(&c, held, both_ends_held ? 2 : 0, &t);
+  assert_int_equal(t.count, 0);
+  orb_place place, as_it_was;
+  orb_locate(c.surface.locator, axis, -1, &place);
+  as_it_was = place;
+  assert_false(cm_twists_undo(&t, &c.surface, 1, &place));
+  assert_memory_equal(&place, &as_it_was, sizeof place);
+  cm_twists_free(c.ctx, &t);
+  drop(&c);
+}
+
+static void what_is_no_twist_stays(void **state) {
+  (void)state;
+  nothing_is_found(0, 0, 0);
+  nothing_is_found(40, 0, 0);
+  nothing_is_found(0, 100, 0); /* a limb that is bent, not twisted */
+  nothing_is_found(180, 0, 1); /* two partners on one limb are known: it is not to be turned */
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(turns_go_round_the_axis),
+      cmocka_unit_test(twists_are_measured_and_undone),
+      cmocka_unit_test(what_is_no_twist_stays),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
