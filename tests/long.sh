@@ -2,7 +2,7 @@
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
 #   tests/long.sh [PART…]    all of them without arguments:
-#   tsan valgrind fuzz crash faults soak load adversarial arm robust deploy
+#   tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy
 #
 # ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills.
 set -euo pipefail
@@ -34,7 +34,7 @@ part_tsan() {
 # fairness, slow), what measures or needs the release build (bench, report, readme, demo), what preloads a library of
 # its own (faults), what ends the daemon before it can tell of leaks (crash), and large meshes (real_meshes, real_pairs).
 valgrind_scenarios=(abuse assets cli cors disk_full durability embeddings encodings eviction jobs meshes openapi
-  operations places problems requests shell spheres supermeshes systemd tls tokens view)
+  operations places problems requests shell spheres supermeshes systemd tenants tls tokens view)
 part_valgrind() {
   cmake --preset debug -DORB_TESTS=ON >/dev/null
   cmake --build build-debug
@@ -79,6 +79,7 @@ part_crash() {
 }
 
 # Each call of the daemon that may fail is made to fail, once and for ever: ORB_FAULT_RUNS=few leaves out allocations.
+# The same under AddressSanitizer and UBSan: tests/long.sh faults_asan.
 part_faults() {
   cmake --preset release -DORB_TESTS=ON >/dev/null
   cmake --build build --target orbmorphd orbmorph_interpose test_torture_core test_torture_api test_torture_store
@@ -88,6 +89,12 @@ part_faults() {
   done
   ORB_FAULT_RUNS=${ORB_FAULT_RUNS:-all} ORB_INTERPOSE=build/bin/liborbmorph_interpose.so \
     node --test --test-reporter=spec tests/scenario/faults.test.mjs
+}
+
+part_faults_asan() {
+  cmake --preset asan -DORB_TESTS=ON >/dev/null
+  cmake --build build-asan --target orbmorphd orbmorph_interpose
+  ORB_FAULT_RUNS=${ORB_FAULT_RUNS:-all} ctest --test-dir build-asan -V -R '^scenario\.faults$' --timeout 36000
 }
 
 # Mixed work for ORB_SOAK_SECONDS (600): memory, descriptors and threads stay flat.
@@ -140,7 +147,7 @@ part_deploy() {
 }
 
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash faults soak load adversarial arm robust deploy
+  set -- tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy
 fi
 for part in "$@"; do
   echo "== $part =="

@@ -25,8 +25,9 @@ const wanted = process.env.ORB_FAULT_RUNS ?? (slow ? '21' : '48');
 const all = !(Number(wanted) > 0);
 const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? (all ? 6 : 3)); // they wait more than they compute
 const patience = 200_000;
-// Sanitizers have an allocator of their own.
-const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(',')).split(',').filter((kind) => kind !== 'alloc' || (wanted !== 'few' && !slow));
+// A sanitizer has an allocator of its own: where its library comes after the interposer, that one is asked first.
+const asked = !slow || /interpose\S* /.test(library);
+const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(',')).split(',').filter((kind) => kind !== 'alloc' || (wanted !== 'few' && asked));
 const seed = Number(process.env.ORB_FAULT_SEED ?? 1);
 const arguments_ = ['--workers', '1', '--io-threads', '1', '--drain-seconds', '2', '--max-connections', '64'];
 const base = !process.env.TMPDIR && existsSync('/dev/shm') ? '/dev/shm' : tmpdir();
