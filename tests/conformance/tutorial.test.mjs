@@ -54,6 +54,7 @@ test('the tutorial ends with a page that morphs', async (t) => {
 
   const url = await serve(t, path.join(at, 'page'));
   const browser = await chromium.launch({
+    timeout: 180_000,
     executablePath,
     args: ['--no-sandbox', '--headless=new', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
       '--disable-background-networking', '--disable-component-update', '--no-first-run'],
@@ -65,7 +66,7 @@ test('the tutorial ends with a page that morphs', async (t) => {
   page.on('console', (message) => message.type() === 'error' && !/favicon/.test(message.location().url) && faults.push(message.text()));
   page.on('request', (request) => new URL(request.url()).origin === new URL(url).origin || faults.push(`outside: ${request.url()}`));
   await page.goto(url);
-  await page.waitForFunction(() => document.querySelector('canvas')?.width > 300 && performance.getEntriesByName(new URL('morph.glb', location).href).length > 0, null, { timeout: 60_000 });
+  await page.waitForFunction(() => document.querySelector('canvas')?.width > 300 && performance.getEntriesByName(new URL('morph.glb', location).href).length > 0, null, { timeout: 180_000 });
 
   const shot = async (value) => {
     await page.evaluate((v) => {
