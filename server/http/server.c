@@ -1,4 +1,6 @@
 /* The life of a request, and of the daemon that serves them. */
+#include <pthread.h>
+#include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -96,8 +98,25 @@ static void answer_unrouted(request *r, const char *path, const char *allow) {
   }
 }
 
+static unsigned char number_key[crypto_shorthash_KEYBYTES];
+_Static_assert(crypto_shorthash_BYTES == sizeof(uint64_t), "a request's number is one hash");
+
+static void make_number_key(void) {
+  crypto_shorthash_keygen(number_key);
+}
+
+/* Sixteen digits that no two requests share, and that tell nobody how many others there were: a keyed hash of their
+ * number. */
+static void make_number(char *out, size_t size) {
+  static pthread_once_t once = PTHREAD_ONCE_INIT;
+  static uint64_t numbers;
+  uint64_t number = __atomic_add_fetch(&numbers, 1, __ATOMIC_RELAXED), hashed;
+  pthread_once(&once, make_number_key);
+  crypto_shorthash((unsigned char *)&hashed, (const unsigned char *)&number, sizeof number, number_key);
+  snprintf(out, size, "%016llx", (unsigned long long)hashed);
+}
+
 static request *request_create(server *srv, struct MHD_Connection *connection, const char *method) {
-  static unsigned long long numbers;
   request *r = calloc(1, sizeof *r);
   if (r) {
     r->srv = srv;
@@ -108,8 +127,7 @@ static request *request_create(server *srv, struct MHD_Connection *connection, c
     r->watched = info ? info->socket_context : NULL;
     r->temp.fd = -1;
     r->began = clock_us();
-    snprintf(r->number, sizeof r->number, "%llx-%llx", (unsigned long long)srv->started & 0xffffff,
-             __atomic_add_fetch(&numbers, 1, __ATOMIC_RELAXED));
+    make_number(r->number, sizeof r->number);
   }
   return r;
 }

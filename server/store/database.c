@@ -51,6 +51,17 @@ static const char *const migrations[] = {
     " SELECT kind, id, '', iif(kind=0, bytes, 0), created FROM resource r"
     " WHERE NOT EXISTS(SELECT 1 FROM owner o WHERE o.kind=r.kind AND o.id=r.id) ORDER BY seq;"
     "DROP TABLE temp.claim;",
+    /* What is stored of each kind, so that nobody adds up all rows to know it. */
+    "CREATE TABLE total(kind INTEGER PRIMARY KEY, bytes INTEGER NOT NULL);"
+    "INSERT INTO total(kind, bytes) VALUES(0, 0), (1, 0), (2, 0);"
+    "UPDATE total SET bytes=(SELECT coalesce(sum(r.bytes), 0) FROM resource r WHERE r.kind=total.kind);"
+    "CREATE TRIGGER resource_added AFTER INSERT ON resource BEGIN"
+    " UPDATE total SET bytes=bytes+NEW.bytes WHERE kind=NEW.kind; END;"
+    "CREATE TRIGGER resource_removed AFTER DELETE ON resource BEGIN"
+    " UPDATE total SET bytes=bytes-OLD.bytes WHERE kind=OLD.kind; END;"
+    "CREATE TRIGGER resource_changed AFTER UPDATE OF kind, bytes ON resource BEGIN"
+    " UPDATE total SET bytes=bytes-OLD.bytes WHERE kind=OLD.kind;"
+    " UPDATE total SET bytes=bytes+NEW.bytes WHERE kind=NEW.kind; END;",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

@@ -143,7 +143,7 @@ void catalogue_touch(catalogue *cat, resource_kind kind, const char *id) {
 int64_t catalogue_bytes(catalogue *cat, int derived_only) {
   database *db = catalogue_reader(cat);
   int64_t total = -1;
-  sqlite3_stmt *st = database_statement(db, "SELECT coalesce(sum(bytes), 0) FROM resource WHERE kind>=?1");
+  sqlite3_stmt *st = database_statement(db, "SELECT sum(bytes) FROM total WHERE kind>=?1");
   if (st) {
     sqlite3_bind_int(st, 1, derived_only ? 1 : 0);
     if (sqlite3_step(st) == SQLITE_ROW) {

@@ -28,6 +28,13 @@ import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 const HALF = 2.5, EYE = [6, 8, 20], SIZE = ${SIZE};
 
+/** Bytes as base64: as an array of numbers a picture takes seconds on its way out of the browser. */
+function packed(bytes) {
+  let text = "";
+  for (let i = 0; i < bytes.length; i += 8192) text += String.fromCharCode(...bytes.subarray(i, i + 8192));
+  return btoa(text);
+}
+
 function drawThree(root) {
   const renderer = new THREE.WebGLRenderer({ alpha: true, antialias: false, preserveDrawingBuffer: true });
   renderer.setSize(SIZE, SIZE);
@@ -42,7 +49,7 @@ function drawThree(root) {
   gl.readPixels(0, 0, SIZE, SIZE, gl.RGBA, gl.UNSIGNED_BYTE, out);
   renderer.dispose();
   renderer.forceContextLoss();
-  return [...out];
+  return packed(out);
 }
 
 window.direct = async (name, shape) => {
@@ -128,7 +135,7 @@ window.babylon = async (name, target, painted) => {
   await scene.whenReadyAsync();
   scene.render();
   const pixels = await engine.readPixels(0, 0, SIZE, SIZE);
-  const out = [...new Uint8Array(pixels.buffer)];
+  const out = new Uint8Array(pixels.buffer);
   if (painted) { // Babylon.js gives what the texture holds as linear light
     for (let i = 0; i < out.length; i++) {
       const light = out[i] / 255;
@@ -136,7 +143,7 @@ window.babylon = async (name, target, painted) => {
     }
   }
   engine.dispose();
-  return out;
+  return packed(out);
 };
 window.ready = true;
 </script>`;
@@ -158,6 +165,7 @@ before(async () => {
   });
   await new Promise((done) => server.listen(0, "127.0.0.1", done));
   browser = await chromium.launch({
+    timeout: 180_000,
     executablePath,
     args: ["--no-sandbox", "--headless=new", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
       "--disable-background-networking", "--disable-component-update", "--no-first-run"],
@@ -165,7 +173,7 @@ before(async () => {
   page = await browser.newPage();
   page.on("pageerror", (error) => faults.push(String(error)));
   await page.goto(`http://127.0.0.1:${server.address().port}/`);
-  await page.waitForFunction(() => window.ready, null, { timeout: 60_000 });
+  await page.waitForFunction(() => window.ready, null, { timeout: 180_000 });
 });
 after(async () => {
   await browser?.close();
@@ -173,7 +181,7 @@ after(async () => {
   fs.rmSync(folder, { recursive: true, force: true });
 });
 
-const draw = (how, ...args) => page.evaluate(([how, args]) => window[how](...args), [how, args]);
+const draw = async (how, ...args) => Buffer.from(await page.evaluate(([how, args]) => window[how](...args), [how, args]), "base64");
 const covered = (image) => Array.from({ length: SIZE * SIZE }, (_, i) => image[4 * i + 3] > 127);
 
 // Shares of pixels that differ, of those that either image covers.

@@ -99,6 +99,16 @@ test("another tenant's things are not there", async (t) => {
   assert.equal(before.length, 3);
 });
 
+test('the number of a request tells nothing of those of others', async (t) => {
+  const { d, add } = await tenants(t);
+  const [ann, bob] = [await add('ann', 'read'), await add('bob', 'read')], seen = [];
+  for (let i = 0; i < 40; i++) seen.push(BigInt(`0x${(await d.get('/v1/meshes', i % 2 ? ann : bob)).headers.get('x-request-id')}`));
+  assert.equal(new Set(seen).size, seen.length);
+  const steps = seen.slice(1).map((n, i) => n - seen[i]);
+  assert.equal(new Set(steps).size, steps.length, 'no step comes twice');
+  assert.ok(steps.some((step) => step < 0n) && steps.some((step) => step > 0n), 'they do not count');
+});
+
 test('an upload does not tell that others have the same', async (t) => {
   const { d, add, upload } = await tenants(t);
   const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')];

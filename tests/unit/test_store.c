@@ -318,6 +318,8 @@ static void test_migrations(void **state) {
   assert_int_equal(catalogue_get(s->cat, RESOURCE_MESH, "old", &got), STORE_OK);
   assert_int_equal(got.bytes, 7);
   resource_free(&got);
+  assert_int_equal(catalogue_bytes(s->cat, 0), 7);
+  assert_int_equal(catalogue_bytes(s->cat, 1), 0);
   assert_int_equal(catalogue_recover(s->cat, 3, 20, "{}"), STORE_OK);
   assert_int_equal(read_job(s, "oldjob").state, ORB_JOB_QUEUED);
   token_row *tokens = catalogue_tokens(s->cat, &count);
