@@ -51,6 +51,21 @@ test('the second request costs nothing', async (t) => {
   assert.deepEqual(list.map((e) => e.id), [first.resource.id]);
 });
 
+test('what a job made is listed from the moment that its success is told', async (t) => {
+  const d = await daemon(t);
+  for (let i = 0; i < 20; i++) {
+    const mesh = (await d.upload(shapes.obj(shapes.ball(1, ([x, y, z]) => [x, y, z * (1 + i / 50)])))).json;
+    let job = (await d.post('/v1/embeddings', { mesh: mesh.id })).json;
+    while (job.state !== 'succeeded') {
+      assert.ok(['queued', 'running'].includes(job.state), JSON.stringify(job));
+      job = (await d.get(job.url)).json;
+    }
+    const [newest] = (await d.get('/v1/embeddings', { query: { limit: 1 } })).json.embeddings;
+    assert.deepEqual([newest.url, newest.mesh], [job.result, mesh.id]);
+    assert.deepEqual((await d.get(job.result)).json, newest);
+  }
+});
+
 test('the smallest and the oddest meshes embed', async (t) => {
   const d = await daemon(t);
   for (const text of [shapes.tetrahedron, shapes.cube, shapes.obj(shapes.ball(1)), shapes.obj(shapes.ball(3, ([x, y, z]) => [x, 1e-3 * y, 50 * z]))]) {

@@ -1,0 +1,122 @@
+/* Eviction over more rows than are looked at in one go: those that unfinished jobs need stay wherever they stand in the
+ * order of use, the others leave from the oldest on, and no more than the budget asks for. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "evict.h"
+#include "log.h"
+
+enum { NEEDED = 150, FREE = 150, ROW_BYTES = 10 };
+
+typedef struct stored {
+  char data[64];
+  evict_env env;
+} stored;
+
+static int setup(void **state) {
+  stored *s = calloc(1, sizeof *s);
+  const queue_options options = {.workers = 1, .cores = 1, .limit = 1000, .memory = INT64_MAX};
+  strcpy(s->data, access("/dev/shm", W_OK) == 0 ? "/dev/shm/orbmorph-evict-XXXXXX" : "/tmp/orbmorph-evict-XXXXXX");
+  if (!mkdtemp(s->data) || objects_open(s->data, &s->env.store) != STORE_OK ||
+      catalogue_open(s->data, &s->env.cat) != STORE_OK || !(s->env.q = queue_create(&options, s->env.cat))) {
+    return -1;
+  }
+  *state = s;
+  return 0;
+}
+
+static int teardown(void **state) {
+  stored *s = *state;
+  char command[128];
+  queue_stop(s->env.q, 1);
+  queue_destroy(s->env.q);
+  catalogue_close(s->env.cat);
+  objects_close(s->env.store);
+  snprintf(command, sizeof command, "rm -rf %s", s->data);
+  int failed = system(command);
+  free(s);
+  return failed;
+}
+
+static void number_id(char id[ORB_ID_SIZE], char kind, int number) {
+  memset(id, kind, ORB_ID_SIZE - 1);
+  snprintf(id + ORB_ID_SIZE - 9, 9, "%08d", number);
+}
+
+/* An embedding of mesh `number`, last used at `used`. */
+static void add_embedding(stored *s, int number, int64_t used) {
+  char json[160], mesh[ORB_ID_SIZE];
+  resource row = {.kind = RESOURCE_EMBEDDING, .json = json, .bytes = ROW_BYTES, .created = used};
+  number_id(row.id, 'e', number);
+  number_id(row.sha, 'f', number);
+  number_id(mesh, 'a', number);
+  snprintf(json, sizeof json, "{\"mesh\":\"%s\"}", mesh);
+  assert_int_equal(catalogue_put(s->env.cat, &row), STORE_OK);
+}
+
+static void need_mesh(stored *s, int number) {
+  char key[ORB_ID_SIZE], mesh[ORB_ID_SIZE], text[160];
+  job *j = NULL;
+  number_id(key, 'c', number);
+  number_id(mesh, 'a', number);
+  snprintf(text, sizeof text, "{\"mesh\":\"%s\"}", mesh);
+  const queue_request request = {.kind = ORB_JOB_EMBEDDING, .key = key, .request = text, .owner = "", .cost = 1};
+  assert_int_equal(queue_submit(s->env.q, &request, &j, NULL), QUEUE_OK);
+  queue_release(s->env.q, j);
+}
+
+static int is_there(stored *s, int number) {
+  resource got = {0};
+  char id[ORB_ID_SIZE];
+  number_id(id, 'e', number);
+  store_result result = catalogue_get(s->env.cat, RESOURCE_EMBEDDING, id, &got);
+  resource_free(&got);
+  assert_true(result == STORE_OK || result == STORE_NOT_FOUND);
+  return result == STORE_OK;
+}
+
+/* The 150 oldest are needed: more than two pages of them come before the first that may leave. */
+static void test_needed_rows_fill_pages(void **state) {
+  stored *s = *state;
+  for (int i = 0; i < NEEDED; i++) {
+    add_embedding(s, i, 1000 + i);
+    need_mesh(s, i);
+  }
+  for (int i = 0; i < FREE; i++) {
+    add_embedding(s, NEEDED + i, 2000 + i);
+  }
+  const int64_t all = (NEEDED + FREE) * ROW_BYTES;
+  assert_int_equal(evict_derived(&s->env, all, INT64_MAX), all); /* within the budget nothing leaves */
+  assert_int_equal(evict_derived(&s->env, all - 25, INT64_MAX), all - 30);
+  for (int i = 0; i < NEEDED + FREE; i++) {
+    assert_int_equal(is_there(s, i), i < NEEDED || i >= NEEDED + 3);
+  }
+  assert_int_equal(evict_derived(&s->env, 0, 2000 + FREE - 5),
+                   (NEEDED + 5) * ROW_BYTES); /* what was used since stays */
+  assert_int_equal(evict_derived(&s->env, 0, INT64_MAX), NEEDED * ROW_BYTES);
+  for (int i = 0; i < NEEDED + FREE; i++) {
+    assert_int_equal(is_there(s, i), i < NEEDED);
+  }
+  evict_env without = s->env;
+  without.q = NULL; /* without jobs nothing is needed */
+  assert_int_equal(evict_derived(&without, 5 * ROW_BYTES, INT64_MAX), 5 * ROW_BYTES);
+  for (int i = 0; i < NEEDED; i++) {
+    assert_int_equal(is_there(s, i), i >= NEEDED - 5);
+  }
+}
+
+int main(void) {
+  log_setup(LOG_WARN, 0); /* each object that leaves is told */
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test_setup_teardown(test_needed_rows_fill_pages, setup, teardown),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
