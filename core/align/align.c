@@ -201,13 +201,13 @@ static orb_status certify_all(orb_context *ctx, orb_sheet *sheets, int32_t shape
 }
 
 /* Aligned landmarks are not yet a good morph: the maps from the first shape's surface to the others' are improved. */
-orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, int from_given, orb_preset preset) {
+orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, cm_from from, orb_preset preset) {
   double sum = 0;
   for (int32_t s = 1; s < alignment->shape_count; s++) {
     double energy[2];
     int improved;
     int both = alignment->shape_count == 2 && alignment->landmark_count > 0;
-    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, from_given,
+    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, from,
                         preset, energy, &improved));
     sum += energy[1];
   }
@@ -239,7 +239,7 @@ orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int3
     orb_sheet_release(ctx, &sheets[s], &out->shapes[s]);
   }
   if (options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO)) {
-    ORB_GO(status, orb_compose_all(ctx, out, 0, options->preset), end);
+    ORB_GO(status, orb_compose_all(ctx, out, CM_FROM_SPACE, options->preset), end);
   }
 end:
   for (int32_t s = 0; sheets && s < shape_count; s++) {

@@ -1,14 +1,14 @@
 /* Alignment without landmarks.
  *
- * The rotation search and the composed map that starts from it are right for shapes in like poses, and its energy says
- * so. Where the energy stays high, other correspondences are tried on coarse copies (guess.c). What the best of them
- * matches are landmarks of an alignment by pin, whose composed map is then composed once more, free of them. The
- * alignment of less energy is returned.
+ * The rotation search, and then the one shape bent onto the other in space, are right for shapes in like poses, and the
+ * energy of the composed map says so. Where it stays high, other correspondences are tried on coarse copies and ranked
+ * there (guess.c), which costs little. If one is better than what the rotation comes to, what it matches are landmarks
+ * of an alignment by pin, whose composed map is then composed once more, free of them, and the alignment of less energy
+ * is returned; else the rotation is composed to the end. The preset `quality` does that in any case.
  */
 #include <math.h>
 #include <string.h>
 
-#include "align/compose.h"
 #include "align/guess.h"
 #include "align/methods.h"
 #include "base/check.h"
@@ -101,7 +101,7 @@ static orb_status align_guessed(orb_context *ctx, const orb_align_shape *shapes,
     orb_free(ctx, out->shapes[s].landmark_vertices);
     out->shapes[s].landmark_vertices = NULL;
   }
-  ORB_GO(status, orb_compose_all(ctx, out, 1, options->preset), end);
+  ORB_GO(status, orb_compose_all(ctx, out, CM_FROM_MAP, options->preset), end);
   *held = 1;
 end:
   orb_free(ctx, at);
@@ -111,17 +111,31 @@ end:
   return status;
 }
 
-/* Looks for a better alignment than the one at hand, and takes its place. */
-static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                          const orb_align_options *options, orb_alignment *alignment, double *clear) {
+/* From the guesses. *held 0: they are no better than the rotation search, or cannot be met, and `out` is empty. */
+static orb_status try_guesses(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                              const orb_align_options *options, double *clear, orb_alignment *out, int *held) {
   guesses g = {0};
-  orb_alignment other;
-  int held = 0;
   orb_status status;
+  *held = 0;
   ORB_GO(status, guess_all(ctx, shapes, shape_count, &g), end);
   *clear = g.clear;
   if (g.count >= 3) {
-    ORB_GO(status, align_guessed(ctx, shapes, shape_count, &g, options, &other, &held), end);
+    ORB_GO(status, align_guessed(ctx, shapes, shape_count, &g, options, out, held), end);
+  }
+end:
+  orb_free(ctx, g.of);
+  orb_free(ctx, g.vertex);
+  return status;
+}
+
+/* A rotated alignment that space alone has not made good: guesses take its place, or it is composed to the end. */
+static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                          const orb_align_options *options, orb_alignment *alignment, double *clear) {
+  orb_alignment other;
+  int held;
+  ORB_TRY(try_guesses(ctx, shapes, shape_count, options, clear, &other, &held));
+  if (!held && options->preset != ORB_PRESET_QUALITY) {
+    return orb_compose_all(ctx, alignment, CM_FROM_SPACE, options->preset);
   }
   if (held) {
     int better = other.energy < alignment->energy;
@@ -130,19 +144,22 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32
       *alignment = other;
     }
   }
-end:
-  orb_free(ctx, g.of);
-  orb_free(ctx, g.vertex);
-  return status;
+  return ORB_OK;
 }
 
 orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                           const orb_align_options *options, orb_alignment *out) {
   orb_status status;
+  orb_align_options rotated = *options;
   double clear = 1;
-  ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, options, out));
-  if (options->preset != ORB_PRESET_FAST && out->energy > CM_GOOD_ENERGY) {
-    ORB_GO(status, improve(ctx, shapes, shape_count, options, out, &clear), failed);
+  rotated.preset = ORB_PRESET_FAST;
+  ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, &rotated, out));
+  if (options->preset != ORB_PRESET_FAST) {
+    cm_from from = options->preset == ORB_PRESET_QUALITY ? CM_FROM_SPACE : CM_SPACE_ONLY;
+    ORB_GO(status, orb_compose_all(ctx, out, from, options->preset), failed);
+    if (out->energy > CM_GOOD_ENERGY) {
+      ORB_GO(status, improve(ctx, shapes, shape_count, options, out, &clear), failed);
+    }
   }
   ORB_GO(status, orb_align_find(ctx, out, clear), failed);
   return ORB_OK;

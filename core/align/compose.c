@@ -298,13 +298,13 @@ static orb_status meet_pairs(cm_run *c) {
 }
 
 /* The starts, until nothing comes of them any more. */
-static orb_status run_starts(cm_run *c, orb_preset preset) {
+static orb_status run_starts(cm_run *c, cm_from from, orb_preset preset) {
   if (c->pairs.landmarks == 0 && c->best_energy <= CM_GOOD_ENERGY) {
     /* A good map is not given up for another, of a symmetric shape say, that is as good. */
     return run_start(c, CM_GIVEN);
   }
   ORB_TRY(run_start(c, CM_SPATIAL));
-  if (preset != ORB_PRESET_QUALITY && c->best_energy <= CM_GOOD_ENERGY) {
+  if (from == CM_SPACE_ONLY || (preset != ORB_PRESET_QUALITY && c->best_energy <= CM_GOOD_ENERGY)) {
     return ORB_OK;
   }
   ORB_TRY(meet_pairs(c));
@@ -392,7 +392,7 @@ static orb_status should_swap(orb_context *ctx, const orb_aligned_shape *fixed, 
 }
 
 orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
-                       int32_t landmark_count, int from_given, orb_preset preset, double energy[2], int *improved) {
+                       int32_t landmark_count, cm_from from, orb_preset preset, double energy[2], int *improved) {
   int swap = 0;
   *improved = 0;
   if (both) {
@@ -418,9 +418,9 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
   ORB_GO(status, cm_pairs_create(&c), done);
-  ORB_GO(status, cm_bend(&c, from_given ? CM_SAMPLES : 0), done);
+  ORB_GO(status, cm_bend(&c, from == CM_FROM_MAP ? CM_SAMPLES : 0), done);
   ORB_GO(status, prepare_levels(&c), done);
-  ORB_GO(status, run_starts(&c, preset), done);
+  ORB_GO(status, run_starts(&c, from, preset), done);
   ORB_GO(status, cm_unwind(&c), done);
   status = take_best(&c, fixed, energy, improved);
 done:

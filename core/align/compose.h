@@ -9,14 +9,20 @@
 /* Composed energies below it say that shapes correspond: no further start, no other correspondence is tried. */
 static const double CM_GOOD_ENERGY = 1.2;
 
+/* What the first spatial targets of a composed map follow. */
+typedef enum cm_from {
+  CM_FROM_SPACE, /* what fits best in space */
+  CM_FROM_MAP,   /* the map as given, which is roughly right */
+  CM_SPACE_ONLY  /* what fits best in space; and where nothing comes of that, no more is tried */
+} cm_from;
+
 /* Improves the points of `moving` on the sphere so that the map moving → sphere → fixed is as isometric as can be. The
  * landmarks (vertices of both, whose points are bit-equal already) stay together. both: the fixed shape's points may
  * change too, which leaves more room, and the shapes may change places; else they stay, for further shapes. The result
  * is certified and better than what was given, or else all points are left as they are and *improved is 0. energy[2]:
- * composed symmetric Dirichlet, capped at 20 and weighted by area, before and after. from_given: the map as given is
- * roughly right, and the first spatial targets follow it rather than what fits best in space. Stage "align". */
+ * composed symmetric Dirichlet, capped at 20 and weighted by area, before and after. Stage "align". */
 ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
-                                      int32_t landmark_count, int from_given, orb_preset preset, double energy[2],
+                                      int32_t landmark_count, cm_from from, orb_preset preset, double energy[2],
                                       int *improved);
 
 /* ---- The inside, shared by the files compose*.c ---- */

@@ -24,7 +24,7 @@
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
 
-enum { COARSE = 1000, WALK = 300, ROTATIONS = 3, WALKED = 2, SAMPLES = 48 };
+enum { COARSE = 1000, WALK = 300, ROTATIONS = 3, TIP_MAPS = 16, WALKED = 3, SAMPLES = 48 };
 static const double TURN = 1;                /* a half turn in space costs so many times the energy beyond 1 */
 static const double DIFFERENT = 0.15;        /* of the diagonal: maps that differ by more are others */
 static const double CAP = 20, BETTER = 0.95; /* than the rotation search, or it is not worth the work */
@@ -95,8 +95,8 @@ typedef struct trials {
   orb_context *ctx;
   coarse shape[2];
   int32_t sample[SAMPLES];
-  trial list[ORB_TIP_MAPS_MAX + ROTATIONS];
-  int32_t count;
+  trial list[ROTATIONS + TIP_MAPS];
+  int32_t rotations, count; /* rotations: where the maps of tips begin */
 } trials;
 
 /* The map's symmetric Dirichlet energy, capped, in the mean by area, both shapes scaled to one area. */
@@ -216,7 +216,8 @@ static orb_status run_trial(trials *t, trial *one, int compose) {
     status = sample_images(t, sheets, one);
   } else {
     ORB_GO(status,
-           orb_compose(t->ctx, &sheets[0].shape, &sheets[1].shape, 0, 0, 1, ORB_PRESET_DEFAULT, energy, &improved),
+           orb_compose(t->ctx, &sheets[0].shape, &sheets[1].shape, 1, 0, CM_FROM_MAP, ORB_PRESET_DEFAULT, energy,
+                       &improved),
            end);
     one->energy = energy[1];
     ORB_GO(status, sample_images(t, sheets, one), end);
@@ -229,34 +230,47 @@ end:
   return status;
 }
 
-/* The trials: rotations first, best first, then maps of tips. *rotations: how many. */
-static orb_status list_trials(trials *t, int32_t *rotations) {
-  orb_tips tips[2];
-  orb_tip_map maps[ORB_TIP_MAPS_MAX];
+/* The first is the one that the spheres are given anyway. */
+static orb_status list_rotations(trials *t) {
   orb_aligned_shape shape[2];
   double rotation[9 * ROTATIONS];
-  int32_t count;
   memset(shape, 0, sizeof shape);
   for (int s = 0; s < 2; s++) {
     shape[s].mesh = t->shape[s].mesh;
     shape[s].points = t->shape[s].points;
-    ORB_TRY(orb_tips_find(t->ctx, &t->shape[s].mesh, &tips[s]));
   }
-  ORB_TRY(orb_rotation_candidates(t->ctx, &shape[0], &shape[1], ROTATIONS, rotation, rotations));
-  for (t->count = 0; t->count < *rotations; t->count++) {
+  ORB_TRY(orb_rotation_candidates(t->ctx, &shape[0], &shape[1], ROTATIONS, rotation, &t->rotations));
+  for (t->count = 0; t->count < t->rotations; t->count++) {
     memcpy(t->list[t->count].rotation, rotation + 9 * t->count, sizeof(double[9]));
   }
+  return ORB_OK;
+}
+
+static orb_status list_tip_maps(trials *t) {
+  const orb_mesh *meshes[2] = {&t->shape[0].mesh, &t->shape[1].mesh};
+  orb_tips tips[2];
+  int32_t count, chosen_count, chosen[TIP_MAPS];
+  orb_tip_map *maps = ORB_NEW(t->ctx, orb_tip_map, ORB_TIP_MAPS_MAX);
+  orb_status status = ORB_E_NO_MEMORY;
+  if (!maps) {
+    return status;
+  }
+  ORB_GO(status, orb_tips_find(t->ctx, meshes[0], &tips[0]), end);
+  ORB_GO(status, orb_tips_find(t->ctx, meshes[1], &tips[1]), end);
   orb_tip_maps(&tips[0], &tips[1], maps, &count);
-  for (int32_t i = 0; i < count; i++) {
+  ORB_GO(status, orb_tip_maps_choose(t->ctx, meshes, tips, maps, count, TIP_MAPS, chosen, &chosen_count), end);
+  for (int32_t i = 0; i < chosen_count; i++) {
     trial *one = &t->list[t->count++];
     for (int32_t k = 0; k < tips[0].count; k++) {
-      if (maps[i].to[k] >= 0) {
+      if (maps[chosen[i]].to[k] >= 0) {
         one->first[one->count] = tips[0].vertex[k];
-        one->second[one->count++] = tips[1].vertex[maps[i].to[k]];
+        one->second[one->count++] = tips[1].vertex[maps[chosen[i]].to[k]];
       }
     }
   }
-  return ORB_OK;
+end:
+  orb_free(t->ctx, maps);
+  return status;
 }
 
 static double difference(const trials *t, const trial *x, const trial *y) {
@@ -269,20 +283,22 @@ static double difference(const trials *t, const trial *x, const trial *y) {
   return sum / extent.diagonal;
 }
 
-/* The walked map of least energy from `from` on comes there, among those that differ from the one before. */
-static void choose_next(trials *t, int32_t from, int32_t rotations) {
+/* The walked map of least energy among those that differ from all that came before; 0: there is none. */
+static int choose_next(trials *t, int32_t to) {
   int32_t best = -1;
-  for (int32_t i = from; i < t->count; i++) {
-    int other = from == rotations || difference(t, &t->list[i], &t->list[from - 1]) > DIFFERENT;
+  for (int32_t i = to; i < t->count; i++) {
+    int other = t->list[i].energy < INFINITY;
+    for (int32_t k = t->rotations; k < to && other; k++) {
+      other = difference(t, &t->list[i], &t->list[k]) > DIFFERENT;
+    }
     best = other && (best < 0 || t->list[i].energy < t->list[best].energy) ? i : best;
   }
-  if (best < 0) {
-    t->count = from;
-    return;
+  if (best >= 0) {
+    trial one = t->list[to];
+    t->list[to] = t->list[best];
+    t->list[best] = one;
   }
-  trial one = t->list[from];
-  t->list[from] = t->list[best];
-  t->list[best] = one;
+  return best >= 0;
 }
 
 static void add_pair(orb_guess *out, int32_t first, int32_t second) {
@@ -314,32 +330,38 @@ static orb_status write_guess(const trials *t, const trial *winner, const orb_me
   return ORB_OK;
 }
 
-static orb_status run_trials(trials *t, const orb_mesh *b, orb_guess *out) {
-  int32_t rotations, best = 0;
-  ORB_TRY(list_trials(t, &rotations));
-  for (int32_t i = rotations; i < t->count; i++) {
-    ORB_TRY(run_trial(t, &t->list[i], 0));
-  }
-  for (int32_t i = 0; i < t->count && i < rotations + WALKED; i++) {
-    if (i >= rotations) {
-      choose_next(t, i, rotations);
-    }
-    if (i >= t->count || (i >= rotations && !(t->list[i].energy < INFINITY))) {
-      t->count = i;
-      break;
-    }
-    ORB_TRY(run_trial(t, &t->list[i], 1));
+/* The trial that judges best, and how far behind the next one is that differs. */
+static int32_t winner_of(const trials *t, double *clear) {
+  int32_t best = 0;
+  double next = INFINITY;
+  for (int32_t i = 0; i < t->count; i++) {
     best = t->list[i].judge < t->list[best].judge ? i : best;
   }
-  const trial *winner = &t->list[best];
-  double next = INFINITY;
-  for (int32_t i = 0; i < t->count && i < rotations + WALKED; i++) {
-    if (i != best && t->list[i].judge < next && difference(t, winner, &t->list[i]) > DIFFERENT) {
+  for (int32_t i = 0; i < t->count; i++) {
+    if (t->list[i].judge < next && difference(t, &t->list[best], &t->list[i]) > DIFFERENT) {
       next = t->list[i].judge;
     }
   }
-  out->clear = next < INFINITY ? fmax(0, 1 - winner->judge / next) : 1;
-  return winner->judge < BETTER * t->list[0].judge ? write_guess(t, winner, b, out) : ORB_OK;
+  *clear = next < INFINITY ? fmax(0, 1 - t->list[best].judge / next) : 1;
+  return best;
+}
+
+static orb_status run_trials(trials *t, const orb_mesh *b, orb_guess *out) {
+  ORB_TRY(list_rotations(t));
+  for (int32_t i = 0; i < t->rotations; i++) {
+    ORB_TRY(run_trial(t, &t->list[i], 1));
+  }
+  ORB_TRY(list_tip_maps(t));
+  for (int32_t i = t->rotations; i < t->count; i++) {
+    ORB_TRY(run_trial(t, &t->list[i], 0));
+  }
+  int32_t to = t->rotations;
+  for (; to < t->rotations + WALKED && choose_next(t, to); to++) {
+    ORB_TRY(run_trial(t, &t->list[to], 1));
+  }
+  t->count = to;
+  int32_t best = winner_of(t, &out->clear);
+  return t->list[best].judge < BETTER * t->list[0].judge ? write_guess(t, &t->list[best], b, out) : ORB_OK;
 }
 
 orb_status orb_guess_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_guess *out) {

@@ -3,6 +3,7 @@
 #ifndef ORB_ALIGN_METHODS_H
 #define ORB_ALIGN_METHODS_H
 
+#include "align/compose.h"
 #include "align/sheet.h"
 
 /* Which landmarks are distinct: one that shares its vertex with an earlier one on every shape is merged with it; on
@@ -41,8 +42,7 @@ ORB_MUST_CHECK orb_status orb_align_given(orb_context *ctx, const orb_align_shap
                                           const orb_align_options *options, orb_alignment *out);
 
 /* Improves the maps from the first shape to the others, see orb_compose(), and fills alignment->energy. */
-ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, int from_given,
-                                          orb_preset preset);
+ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, cm_from from, orb_preset preset);
 
 /* Method `auto` without landmarks, see auto.c. */
 ORB_MUST_CHECK orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,

@@ -4,7 +4,7 @@
 
 #include "orbmorph/mesh.h"
 
-enum { ORB_TIPS_MAX = 8, ORB_TIP_MAPS_MAX = 24 };
+enum { ORB_TIPS_MAX = 8, ORB_TIP_MAPS_MAX = 256 };
 
 /* Vertices that are farther from the rest of the surface than all about them, farthest first. Distances go along the
  * surface, in units of the mean distance between any two points of it. */
@@ -26,5 +26,12 @@ typedef struct orb_tip_map {
 /* The maps of at least three tips whose distances agree best, best first; none is a part of another. Which way round
  * they turn is not looked at: mirror images are among them. */
 void orb_tip_maps(const orb_tips *a, const orb_tips *b, orb_tip_map out[ORB_TIP_MAPS_MAX], int32_t *count);
+
+/* Of these maps, best first, at most `most` that are worth a trial: by turns from each way round in space that the tips
+ * can be fitted, those whose tips fit best first, none that a mirror image would fit clearly better. chosen: indices.
+ */
+ORB_MUST_CHECK orb_status orb_tip_maps_choose(orb_context *ctx, const orb_mesh *const meshes[2], const orb_tips tips[2],
+                                              const orb_tip_map *maps, int32_t count, int32_t most, int32_t *chosen,
+                                              int32_t *chosen_count);
 
 #endif
