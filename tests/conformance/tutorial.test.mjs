@@ -44,7 +44,7 @@ function difference(a, b) {
 test('the tutorial ends with a page that morphs', async (t) => {
   const d = await daemon(t);
   const { at, env } = await place(t, d);
-  const run = spawnSync('bash', ['-euo', 'pipefail', '-c', (await shellLines('docs/tutorial.md')).replaceAll('http://127.0.0.1:8080', d.url)], { cwd: at, env, encoding: 'utf8', timeout: 240_000 });
+  const run = spawnSync('bash', ['-euo', 'pipefail', '-c', (await shellLines('docs/tutorial.md')).replaceAll('http://127.0.0.1:8080', d.url)], { cwd: at, env, encoding: 'utf8', timeout: 900_000 });
   assert.equal(run.status, 0, `${run.stdout}\n${run.stderr}`);
   const text = fs.readFileSync(path.join(root, 'docs/tutorial.md'), 'utf8');
   const [said] = blocks(text, 'text');

@@ -69,7 +69,7 @@ async function proxy(t, name, changes = []) {
       reply.on('data', (part) => (parts.push(part), each?.(part.toString(), r))).on('error', reject)
         .on('end', () => resolve({ status: reply.statusCode, headers: reply.headers, bytes: Buffer.concat(parts), get json() { return JSON.parse(this.bytes); } }));
     });
-    r.on('error', reject).setTimeout(90_000, () => r.destroy(new Error('no answer')));
+    r.on('error', reject).setTimeout(300_000, () => r.destroy(new Error('no answer')));
     if (chunks) for (const part of chunks) r.write(part);
     r.end(body);
   });

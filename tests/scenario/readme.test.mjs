@@ -34,7 +34,7 @@ for (const file of await documents()) {
   test(`every line of ${file} works`, { skip }, async (t) => {
     const d = await daemon(t);
     const { at, env } = await place(t, d);
-    const run = spawnSync('bash', ['-euo', 'pipefail', '-c', lines.replaceAll('http://127.0.0.1:8080', d.url)], { cwd: at, env, encoding: 'utf8', timeout: 600_000 });
+    const run = spawnSync('bash', ['-euo', 'pipefail', '-c', lines.replaceAll('http://127.0.0.1:8080', d.url)], { cwd: at, env, encoding: 'utf8', timeout: 1_500_000 });
     assert.equal(run.status, 0, `${file}\n${run.stdout}\n${run.stderr}`);
     await expected[file]?.(at, run.stdout);
   });

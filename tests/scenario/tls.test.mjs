@@ -42,7 +42,7 @@ const send = (url, target, { method = 'GET', body, ...options } = {}) =>
       const parts = [];
       reply.on('data', (part) => parts.push(part)).on('end', () => resolve({ status: reply.statusCode, bytes: Buffer.concat(parts) }));
     });
-    r.on('error', reject).setTimeout(60_000, () => r.destroy(new Error('no answer')));
+    r.on('error', reject).setTimeout(300_000, () => r.destroy(new Error('no answer')));
     r.end(body);
   });
 

@@ -54,7 +54,7 @@ test('with a token the whole way works; it stays in the tab and out of addresses
   await button(page, 'Use it').click();
   assert.match(await page.getByRole('region', { name: 'curl: code' }).textContent(), /Authorization: Bearer \$ORBMORPH_TOKEN/);
   await page.reload();
-  await until(() => button(page, 'Play').count(), 'after a reload it goes on without asking', 60_000);
+  await until(() => button(page, 'Play').count(), 'after a reload it goes on without asking');
   assert.equal(await page.getByRole('dialog').count(), 0);
   assert.ok(addresses.every((url) => !url.includes(token['read,write'])));
   assert.ok(!page.url().includes(token['read,write']));
