@@ -4,16 +4,19 @@
  * comes to no end, the overlay of all shapes, which is exact, is the start instead. From then on no step leaves the
  * tolerance. In rounds: edges are collapsed, holes filled anew and neighbours merged, edges turned for well-shaped
  * triangles, and vertices moved to where the edges stray less, which makes room for the next round. Nor does any step
- * leave more triangles turned in space than it found; what the start had of them is mended between the rounds. Where
- * max_triangles asks for fewer triangles, the tolerance is raised step by step until they suffice. */
+ * leave more triangles turned in space than it found; what the start had of them is mended in the first round, and if
+ * that leaves too many, the first round is made again from the overlay, there or everywhere: the other rounds, which
+ * take most of the time, are made but once. Where max_triangles asks for fewer triangles, the tolerance is raised step
+ * by step until they suffice. */
 #include <math.h>
 
 #include "base/check.h"
 #include "remesh/match.h"
 
-enum { HOLDS = 32, ROUNDS = 10 };
-/* Of how many triangles one may be turned; one of how many is many; the most work for a second start. */
-enum { FEW = 2000, MANY = 300, OVERLAY_MOST = 120000 };
+enum { HOLDS = 32 };
+/* Of how many triangles one may be turned after the first round; one of how many is many; the most work for a start
+ * from the overlay. */
+enum { FEW = 3000, MANY = 300, OVERLAY_MOST = 120000 };
 
 /* Later rounds gain a few per cent each. Large meshes, or many shapes, do without: their triangles are small against
  * the tolerance, and time counts. */
@@ -22,25 +25,24 @@ static int rounds_for(int64_t triangles, int32_t shapes) {
   return work < 25000 ? 10 : work < 60000 ? 4 : 2;
 }
 
-static orb_status reduce(orb_context *ctx, orb_match *match, double tolerance, int64_t target, int strict,
-                         int most_rounds) {
-  double limit2 = tolerance * tolerance;
-  int64_t before = orb_match_live(match);
-  int rounds = rounds_for(before, match->shape_count);
-  for (int round = 0; round < rounds && round < most_rounds; round++) {
-    if (round > 0) {
-      ORB_TRY(orb_match_move_all(ctx, match, limit2, 0));
-    }
-    ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, round > 0));
-    if (round > 0) {
-      ORB_TRY(orb_match_merge_all(ctx, match, limit2, target));
-    }
+/* Collapses, and mends turned triangles while there are vertices left to do it with. */
+static orb_status first_round(orb_context *ctx, orb_match *match, double limit2, int64_t target, int strict) {
+  ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, 0));
+  ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
+  return strict ? orb_match_mend(ctx, match, limit2) : ORB_OK;
+}
+
+/* The rounds after it, until they gain little. */
+static orb_status later_rounds(orb_context *ctx, orb_match *match, double limit2, int64_t target, int strict,
+                               int rounds) {
+  int64_t before = orb_match_live(match), after = before;
+  for (int round = 1; round < rounds && after > target; round++) {
+    ORB_TRY(orb_match_move_all(ctx, match, limit2, 0));
+    ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, 1));
+    ORB_TRY(orb_match_merge_all(ctx, match, limit2, target));
     ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
-    if (round == 0 && strict) { /* while there are vertices left to do it with */
-      ORB_TRY(orb_match_mend(ctx, match, limit2));
-    }
-    int64_t after = orb_match_live(match);
-    if (after <= target || (round > 0 && (before - after) * 100 < before)) {
+    after = orb_match_live(match);
+    if ((before - after) * 100 < before) {
       break;
     }
     before = after;
@@ -58,20 +60,11 @@ static orb_status hold(orb_context *ctx, orb_match *match, double tolerance) {
     ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
     if (strays > 0 && i % 4 == 3 && !match->crept) {
       ORB_TRY(orb_match_turn_all(ctx, match, limit2, 1));
-      ORB_TRY(reduce(ctx, match, tolerance, 0, 1, 1));
+      ORB_TRY(first_round(ctx, match, limit2, 0, 1));
     }
   }
   match->crept |= strays > 0;
   return ORB_OK;
-}
-
-/* From a start within the tolerance, by steps none of which leaves it. */
-static orb_status settle(orb_context *ctx, orb_match *match, double tolerance) {
-  ORB_TRY(orb_match_turn_all(ctx, match, tolerance * tolerance, 1));
-  ORB_TRY(reduce(ctx, match, tolerance, 0, 1, ROUNDS));
-  orb_progress(ctx, "remesh", 0.7);
-  ORB_TRY(orb_match_mend(ctx, match, tolerance * tolerance));
-  return reduce(ctx, match, tolerance, 0, 1, 1);
 }
 
 /* Starts anew from the overlay, which is exact. */
@@ -95,10 +88,15 @@ static orb_status start_from_overlay(orb_context *ctx, const orb_remesh_job *job
   return status;
 }
 
-/* Where too many triangles are still turned: anew from the overlay, if there are many and it is not too large, and the
- * better of the two stays; else from the overlay around them only. */
+static orb_status begin(orb_context *ctx, orb_match *match, double limit2) {
+  ORB_TRY(orb_match_turn_all(ctx, match, limit2, 1));
+  return first_round(ctx, match, limit2, 0, 1);
+}
+
+/* Where the first round leaves too many triangles turned: again from the overlay, if there are many and it is not too
+ * large, else from the overlay around them only. */
 static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_match *match, double tolerance,
-                             int was_overlay) {
+                             int is_overlay) {
   int64_t turned = orb_match_turned(match), live = orb_match_live(match), inputs = 0;
   for (int32_t s = 0; s < job->shape_count; s++) {
     inputs += job->shapes[s].mesh.triangle_count;
@@ -106,26 +104,45 @@ static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_ma
   if (turned * FEW <= live) {
     return ORB_OK;
   }
-  if (turned * MANY <= live || was_overlay || inputs * job->shape_count > OVERLAY_MOST) {
+  int anew = turned * MANY > live && !is_overlay && inputs * job->shape_count <= OVERLAY_MOST;
+  if (!anew) {
     ORB_TRY(orb_match_resolve(ctx, match, tolerance * tolerance));
     ORB_TRY(hold(ctx, match, tolerance));
-    if (match->crept) {
-      ORB_TRY(start_from_overlay(ctx, job, match));
-    }
-    return settle(ctx, match, tolerance);
   }
-  orb_match other = {0};
-  orb_status status = start_from_overlay(ctx, job, &other);
-  if (status == ORB_OK) {
-    status = settle(ctx, &other, tolerance);
+  if (anew || match->crept) {
+    ORB_TRY(start_from_overlay(ctx, job, match));
   }
-  if (status == ORB_OK && orb_match_turned(&other) < turned) {
-    orb_match_free(ctx, match);
-    *match = other;
-  } else {
-    orb_match_free(ctx, &other);
+  return begin(ctx, match, tolerance * tolerance);
+}
+
+/* From a start within the tolerance, by steps none of which leaves it. */
+static orb_status settle(orb_context *ctx, const orb_remesh_job *job, orb_match *match, double tolerance,
+                         int is_overlay) {
+  double limit2 = tolerance * tolerance;
+  int rounds = rounds_for(orb_match_live(match), match->shape_count);
+  ORB_TRY(begin(ctx, match, limit2));
+  ORB_TRY(straighten(ctx, job, match, tolerance, is_overlay));
+  orb_progress(ctx, "remesh", 0.4);
+  ORB_TRY(later_rounds(ctx, match, limit2, 0, 1, rounds));
+  orb_progress(ctx, "remesh", 0.8);
+  ORB_TRY(orb_match_mend(ctx, match, limit2));
+  return first_round(ctx, match, limit2, 0, 1);
+}
+
+/* Fewer triangles than `most`, by as little more tolerance as it takes. */
+static orb_status relax(orb_context *ctx, orb_match *match, double tolerance, int64_t most) {
+  while (orb_match_live(match) > most && tolerance < 4) {
+    tolerance *= 1.25;
+    double limit2 = tolerance * tolerance;
+    int strict = tolerance < 0.05, rounds = rounds_for(orb_match_live(match), match->shape_count);
+    ORB_TRY(first_round(ctx, match, limit2, most, strict));
+    ORB_TRY(later_rounds(ctx, match, limit2, most, strict, rounds));
   }
-  return status;
+  if (orb_match_live(match) > most) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION, "The shapes and landmarks need more than max_triangles = %lld; raise it.",
+                    (long long)most);
+  }
+  return ORB_OK;
 }
 
 orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
@@ -141,16 +158,9 @@ orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_
   if (overlay) {
     ORB_GO(status, start_from_overlay(ctx, job, &match), end);
   }
-  ORB_GO(status, settle(ctx, &match, tolerance), end);
-  ORB_GO(status, straighten(ctx, job, &match, tolerance, overlay), end);
-  while (most > 0 && orb_match_live(&match) > most && tolerance < 4) {
-    tolerance *= 1.25;
-    ORB_GO(status, reduce(ctx, &match, tolerance, most, tolerance < 0.05, ROUNDS), end);
-  }
-  if (most > 0 && orb_match_live(&match) > most) {
-    status = orb_fail(ctx, ORB_E_BAD_OPTION, "The shapes and landmarks need more than max_triangles = %lld; raise it.",
-                      (long long)most);
-    goto end;
+  ORB_GO(status, settle(ctx, job, &match, tolerance, overlay), end);
+  if (most > 0) {
+    ORB_GO(status, relax(ctx, &match, tolerance, most), end);
   }
   orb_progress(ctx, "remesh", 0.9);
   ORB_GO(status, orb_match_export(ctx, &match, out), end);

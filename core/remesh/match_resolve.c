@@ -2,7 +2,6 @@
  * become vertices, and edges that leave a shape are split where they cross its edges. What lies in one triangle of
  * every shape cannot be turned. Collapses then reduce it again, and leave no more turned than there are. Edges outside
  * stay as they are, so that the region does not spread. */
-
 #include <math.h>
 
 #include "base/check.h"
