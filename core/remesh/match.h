@@ -165,6 +165,8 @@ ORB_MUST_CHECK orb_status orb_match_move_all(orb_context *ctx, orb_match *match,
 ORB_MUST_CHECK orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2);
 /* How many triangles are turned in space. */
 int64_t orb_match_turned(const orb_match *match);
+/* Which ones: 1 or 0 for each, live or not; parallel. */
+void orb_match_mark_turned(orb_context *ctx, const orb_match *match, unsigned char *turned);
 /* Refines them and those around them as far as the overlay of the shapes; edges outside may stray. */
 ORB_MUST_CHECK orb_status orb_match_resolve(orb_context *ctx, orb_match *match, double limit2);
 /* Puts vertex v at p: point, spots, positions and normals; triangles and items are the caller's care. */

@@ -97,3 +97,31 @@ int orb_form_allows(orb_form before, orb_form after) {
   return after.turned <= before.turned &&
          (after.slivers < before.slivers || after.quality >= fmin(before.quality, LEAST_QUALITY));
 }
+
+int64_t orb_match_turned(const orb_match *match) {
+  int64_t count = 0;
+  for (int32_t t = 0; t < match->net.triangle_count; t++) {
+    const int32_t *c = match->net.triangles + 3 * (int64_t)t;
+    count += c[0] >= 0 && orb_match_is_turned(match, c[0], c[1], c[2]);
+  }
+  return count;
+}
+
+typedef struct turned_loop {
+  const orb_match *match;
+  unsigned char *turned;
+} turned_loop;
+
+static void turned_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  turned_loop *loop = arg;
+  for (int64_t t = begin; t < end; t++) {
+    const int32_t *c = loop->match->net.triangles + 3 * t;
+    loop->turned[t] = c[0] >= 0 && orb_match_is_turned(loop->match, c[0], c[1], c[2]);
+  }
+}
+
+void orb_match_mark_turned(orb_context *ctx, const orb_match *match, unsigned char *turned) {
+  turned_loop loop = {match, turned};
+  orb_parallel_for(ctx, match->net.triangle_count, 256, turned_range, &loop);
+}

@@ -140,18 +140,18 @@ static orb_status mend(const mender *m, int32_t t, int *mended) {
 }
 
 /* Tries to mend every turned triangle; those made on the way wait for the next pass. */
-static orb_status pass(const mender *m, int64_t *seen, int64_t *left) {
+static orb_status pass(const mender *m, unsigned char *turned, int64_t *seen, int64_t *left) {
   orb_match *match = m->match;
   int32_t count = match->net.triangle_count;
   *seen = *left = 0;
+  orb_match_mark_turned(m->ctx, match, turned);
+  ORB_TRY(orb_context_check(m->ctx));
   for (int32_t t = 0; t < count; t++) {
     int mended = 0;
-    if (is_turned(match, t)) {
+    if (turned[t] && is_turned(match, t)) {
       ++*seen;
       ORB_TRY(mend(m, t, &mended));
       *left += !mended;
-    }
-    if ((t & 255) == 0) {
       ORB_TRY(orb_context_check(m->ctx));
     }
   }
@@ -161,13 +161,16 @@ static orb_status pass(const mender *m, int64_t *seen, int64_t *left) {
 orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2) {
   static const orb_star_goal goal[] = {ORB_STAR_FEWER, ORB_STAR_FEWER, ORB_STAR_SMALLER, ORB_STAR_FEWER};
   int64_t seen = 1, left = 0, before = -1;
-  for (size_t i = 0; i < sizeof goal / sizeof *goal && seen > 0; i++) {
+  orb_status status = ORB_OK;
+  for (size_t i = 0; i < sizeof goal / sizeof *goal && seen > 0 && status == ORB_OK; i++) {
     mender m = {ctx, match, limit2, goal[i]};
     if (i > 0 && goal[i] == goal[i - 1] && before == left) {
       continue; /* nothing has changed */
     }
-    ORB_TRY(pass(&m, &seen, &left));
+    unsigned char *turned = ORB_NEW(ctx, unsigned char, match->net.triangle_count);
+    status = turned ? pass(&m, turned, &seen, &left) : ORB_E_NO_MEMORY;
+    orb_free(ctx, turned);
     before = seen;
   }
-  return ORB_OK;
+  return status;
 }

@@ -1,6 +1,7 @@
 /* Making a match hold: edges that stray are turned where the other diagonal strays less, else split where they stray
  * most, at the crossing itself. And turns for the sake of well-shaped triangles, which never leave the tolerance. */
 #include <math.h>
+#include <string.h>
 
 #include "base/check.h"
 #include "numeric/predicates.h"
@@ -48,19 +49,31 @@ static int turn_turns(const orb_match *match, int32_t a, int32_t b, int32_t c, i
   return orb_tally_is_worse(after, before);
 }
 
-static int try_turn(orb_match *match, int32_t h, double limit2, int only_bad) {
+/* Whether a turn of edge h would make its two triangles better in space, whatever else may forbid it. */
+static int turn_is_better(const orb_match *match, int32_t h, int only_bad) {
+  const orb_net *net = &match->net;
+  int32_t g = net->twin[h];
+  orb_form before, after;
+  if (only_bad) { /* most edges are asked no more than this */
+    const int32_t *t = net->triangles + (h - h % 3), *u = net->triangles + (g - g % 3);
+    before = orb_form_join(orb_match_form(match, t[0], t[1], t[2]), orb_match_form(match, u[0], u[1], u[2]));
+    if (!before.turned && !before.slivers) {
+      return 0;
+    }
+  }
+  forms_of_turn(match, net->triangles[h], net->triangles[g], net->triangles[orb_prev(h)], net->triangles[orb_prev(g)],
+                &before, &after);
+  int better = after.quality > before.quality * 1.05 + 1e-9 || (before.facing <= 0 && after.facing > 0);
+  return better && orb_form_allows(before, after);
+}
+
+/* Turns it, if the limit lets it. */
+static int turn_within(orb_match *match, int32_t h, double limit2) {
   const orb_net *net = &match->net;
   int32_t g = net->twin[h];
   int32_t a = net->triangles[h], b = net->triangles[g];
   int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
-  orb_form before, after;
-  forms_of_turn(match, a, b, c, d, &before, &after);
-  if (only_bad && !before.turned && !before.slivers) {
-    return 0;
-  }
-  int better = after.quality > before.quality * 1.05 + 1e-9 || (before.facing <= 0 && after.facing > 0);
-  if (!better || !orb_form_allows(before, after) || !orb_net_can_flip(net, h) ||
-      orb_match_edge2(match, c, d, limit2, NULL) > limit2 ||
+  if (!orb_net_can_flip(net, h) || orb_match_edge2(match, c, d, limit2, NULL) > limit2 ||
       items_of_turn2(match, match->triangle_items[h / 3], c, d, b, a) > limit2 ||
       items_of_turn2(match, match->triangle_items[g / 3], c, d, b, a) > limit2 || turn_turns(match, a, b, c, d)) {
     return 0;
@@ -70,25 +83,62 @@ static int try_turn(orb_match *match, int32_t h, double limit2, int only_bad) {
 }
 
 int orb_match_try_turn(orb_match *match, int32_t h, double limit2) {
-  return try_turn(match, h, limit2, 0);
+  return turn_is_better(match, h, 0) && turn_within(match, h, limit2);
 }
 
-orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2, int only_bad) {
-  for (int pass = 0; pass < 4; pass++) {
-    int64_t turned = 0;
-    for (int32_t h = 0; h < 3 * match->net.triangle_count; h++) {
-      if (match->net.triangles[h - h % 3] >= 0 && h < match->net.twin[h]) {
-        turned += try_turn(match, h, limit2, only_bad);
-      }
-      if ((h & 4095) == 0) {
-        ORB_TRY(orb_context_check(ctx));
-      }
+typedef struct turn_loop {
+  const orb_match *match;
+  int only_bad;
+  unsigned char *better;  /* a half-edge: what turn_is_better() says */
+  unsigned char *changed; /* a triangle: since it was asked */
+} turn_loop;
+
+static void better_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  turn_loop *loop = arg;
+  const orb_net *net = &loop->match->net;
+  for (int64_t h = begin; h < end; h++) {
+    loop->better[h] =
+        net->triangles[h - h % 3] >= 0 && h < net->twin[h] && turn_is_better(loop->match, (int32_t)h, loop->only_bad);
+  }
+}
+
+/* One edge after another; asks again only where a turn has changed one of the two triangles. */
+static orb_status turn_pass(orb_context *ctx, orb_match *match, double limit2, turn_loop *loop, int64_t *turned) {
+  const orb_net *net = &match->net;
+  int32_t half_edges = 3 * net->triangle_count;
+  *turned = 0;
+  memset(loop->changed, 0, (size_t)net->triangle_count);
+  orb_parallel_for(ctx, half_edges, 1024, better_range, loop);
+  ORB_TRY(orb_context_check(ctx));
+  for (int32_t h = 0; h < half_edges; h++) {
+    if (net->triangles[h - h % 3] < 0 || h > net->twin[h]) {
+      continue;
     }
-    if (turned * 200 < match->net.triangle_count) {
-      break;
+    int32_t t = h / 3, u = net->twin[h] / 3;
+    int better = loop->changed[t] || loop->changed[u] ? turn_is_better(match, h, loop->only_bad) : loop->better[h];
+    if (better && turn_within(match, h, limit2)) {
+      loop->changed[t] = loop->changed[u] = 1;
+      ++*turned;
+    }
+    if ((h & 4095) == 0) {
+      ORB_TRY(orb_context_check(ctx));
     }
   }
   return ORB_OK;
+}
+
+orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2, int only_bad) {
+  int64_t triangles = match->net.triangle_count, turned = triangles;
+  turn_loop loop = {match, only_bad, ORB_NEW(ctx, unsigned char, 3 * triangles),
+                    ORB_NEW(ctx, unsigned char, triangles)};
+  orb_status status = loop.better && loop.changed ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int pass = 0; pass < 4 && turned * 200 >= triangles && status == ORB_OK; pass++) {
+    status = turn_pass(ctx, match, limit2, &loop, &turned);
+  }
+  orb_free(ctx, loop.better);
+  orb_free(ctx, loop.changed);
+  return status;
 }
 
 void orb_match_crossing_point(const orb_match *match, int32_t v, int32_t w, const orb_stray *stray, double out[3]) {

@@ -84,10 +84,7 @@ static orb_status take_items(region *r, int32_t t) {
 /* The turned triangles and those around them. */
 static void mark(region *r) {
   const orb_net *net = &r->match->net;
-  for (int32_t t = 0; t < net->triangle_count; t++) {
-    const int32_t *c = net->triangles + 3 * (int64_t)t;
-    r->in[t] = c[0] >= 0 && orb_match_is_turned(r->match, c[0], c[1], c[2]);
-  }
+  orb_match_mark_turned(r->ctx, r->match, r->in);
   for (int32_t h = 0; h < 3 * net->triangle_count; h++) {
     if (net->triangles[h - h % 3] >= 0 && r->in[h / 3] == 1) {
       int32_t e = h;
@@ -124,15 +121,6 @@ static orb_status resolve(region *r, double limit2) {
     }
   }
   return ORB_OK;
-}
-
-int64_t orb_match_turned(const orb_match *match) {
-  int64_t count = 0;
-  for (int32_t t = 0; t < match->net.triangle_count; t++) {
-    const int32_t *c = match->net.triangles + 3 * (int64_t)t;
-    count += c[0] >= 0 && orb_match_is_turned(match, c[0], c[1], c[2]);
-  }
-  return count;
 }
 
 orb_status orb_match_resolve(orb_context *ctx, orb_match *match, double limit2) {

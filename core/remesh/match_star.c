@@ -10,18 +10,23 @@
 #include "numeric/predicates.h"
 #include "remesh/match.h"
 
-enum { MOST = ORB_STAR_MOST, DISC = 48, GROWTH = 12, KNOWN = 96 };
+enum { MOST = ORB_STAR_MOST, DISC = 48, GROWTH = 12 };
+
+/* An edge of the disc's outline, and how far the triangle of the star over it is turned in space. */
+typedef struct side {
+  int32_t h;
+  int judged;
+  double extent; /* negative: there can be no such triangle */
+} side;
 
 typedef struct disc {
   orb_match *match;
   int32_t p; /* the vertex of the star: a number after the last */
-  int32_t triangle[DISC], edge[MOST], inner[DISC];
+  int32_t triangle[DISC], inner[DISC];
+  side side[MOST]; /* counter-clockwise */
   int count, n, inner_count;
-  int rough;            /* triangles are judged by their corners only, until all else is found to be fine */
-  double own[DISC];     /* how far each of its triangles is turned now; −1: not known yet */
-  int32_t known[KNOWN]; /* edges whose triangle of the star has been judged */
-  double extent[KNOWN]; /* turned; negative: impossible */
-  int known_count;
+  int rough;        /* triangles are judged by their corners only, until all else is found to be fine */
+  double own[DISC]; /* how far each of its triangles is turned now; −1: not known yet */
 } disc;
 
 static int holds(const disc *d, int32_t t) {
@@ -63,7 +68,7 @@ static int outline(disc *d) {
       return 0;
     }
     ring[d->n] = net->triangles[h];
-    d->edge[d->n++] = h;
+    d->side[d->n++] = (side){h, 0, 0};
     h = orb_next(h);
     while (holds(d, net->twin[h] / 3)) {
       h = orb_next(net->twin[h]);
@@ -82,26 +87,72 @@ static int outline(disc *d) {
   return d->n == borders && d->n >= 3 && d->count == d->n + 2 * d->inner_count - 2;
 }
 
-/* How far the triangle of the star at edge h is turned in space; −1 where there can be none. */
-static double judge(disc *d, int32_t h) {
+static void add_triangle(disc *d, int32_t t) {
+  d->own[d->count] = -1;
+  d->triangle[d->count++] = t;
+}
+
+/* Takes `removed` sides out from number i on, round the end if need be, and puts one or two in their place. */
+static void replace_sides(disc *d, int i, int removed, const int32_t *put, int count) {
+  side turned[MOST + 1];
+  int n = 0;
+  for (int k = 0; k < count; k++) {
+    turned[n++] = (side){put[k], 0, 0};
+  }
+  for (int k = removed; k < d->n; k++) {
+    turned[n++] = d->side[(i + k) % d->n];
+  }
+  memcpy(d->side, turned, (size_t)n * sizeof *turned);
+  d->n = n;
+}
+
+/* Grows the disc over side i, over the triangle (b, a, c) beyond a→b: its other sides are new ones of the outline,
+ * where they are not the sides next to it, whose ends a or b come to lie inside. 0 where it would be no disc any more,
+ * or too large. */
+static int grow_over(disc *d, int i) {
   const orb_net *net = &d->match->net;
-  for (int i = 0; i < d->known_count; i++) {
-    if (d->known[i] == h) {
-      return d->extent[i];
+  int32_t g = net->twin[d->side[i].h], put[2];
+  int before = (i + d->n - 1) % d->n, after = (i + 1) % d->n, count = 0;
+  int closes_a = net->twin[orb_next(g)] == d->side[before].h, closes_b = net->twin[orb_prev(g)] == d->side[after].h;
+  int32_t apex = net->triangles[orb_prev(g)];
+  for (int k = 0; k < d->n && !closes_a && !closes_b; k++) {
+    if (net->triangles[d->side[k].h] == apex) {
+      return 0;
     }
   }
-  int32_t a = net->triangles[h], b = net->triangles[orb_next(h)];
-  double extent = -1;
-  if (orb_orient(orb_net_point(net, d->p), orb_net_point(net, a), orb_net_point(net, b)) > 0 &&
-      orb_net_sound(net, d->p, a, b)) {
-    extent =
-        d->rough ? orb_match_turned_by_corners(d->match, d->p, a, b) : orb_match_turned_extent(d->match, d->p, a, b);
+  add_triangle(d, g / 3);
+  if (!closes_a) {
+    put[count++] = orb_next(g);
+  } else {
+    d->inner[d->inner_count++] = net->triangles[d->side[i].h];
   }
-  if (d->known_count < KNOWN) {
-    d->known[d->known_count] = h;
-    d->extent[d->known_count++] = extent;
+  if (!closes_b) {
+    put[count++] = orb_prev(g);
+  } else {
+    d->inner[d->inner_count++] = net->triangles[orb_next(d->side[i].h)];
   }
-  return extent;
+  if (d->n + count - 1 - closes_a - closes_b > MOST) {
+    return 0;
+  }
+  replace_sides(d, closes_a ? before : i, 1 + closes_a + closes_b, put, count);
+  ORB_ASSERT(d->n < 3 || d->count == d->n + 2 * d->inner_count - 2);
+  return d->n >= 3;
+}
+
+/* How far the triangle of the star at a side is turned in space; −1 where there can be none. */
+static double judge(const disc *d, side *over) {
+  const orb_net *net = &d->match->net;
+  if (!over->judged) {
+    int32_t a = net->triangles[over->h], b = net->triangles[orb_next(over->h)];
+    over->judged = 1;
+    over->extent = -1;
+    if (orb_orient(orb_net_point(net, d->p), orb_net_point(net, a), orb_net_point(net, b)) > 0 &&
+        orb_net_sound(net, d->p, a, b)) {
+      over->extent =
+          d->rough ? orb_match_turned_by_corners(d->match, d->p, a, b) : orb_match_turned_extent(d->match, d->p, a, b);
+    }
+  }
+  return over->extent;
 }
 
 static int has_fixed(const disc *d) {
@@ -113,20 +164,19 @@ static int has_fixed(const disc *d) {
   return 0;
 }
 
-/* The next triangle to grow over, beyond an edge whose triangle of the star is impossible (*possible is 0 then), else
- * turned; −1: none. */
-static int32_t beyond(disc *d, orb_tally *star, int *possible) {
-  const orb_net *net = &d->match->net;
-  int32_t next = -1;
+/* The next side to grow over, one whose triangle of the star is impossible (*possible is 0 then), else turned; −1:
+ * none. */
+static int beyond(disc *d, orb_tally *star, int *possible) {
+  int next = -1;
   *star = (orb_tally){0, 0};
   *possible = 1;
   for (int i = 0; i < d->n; i++) {
-    double extent = judge(d, d->edge[i]);
+    double extent = judge(d, &d->side[i]);
     if (extent < 0) {
       *possible = 0;
-      return net->twin[d->edge[i]] / 3;
+      return i;
     }
-    next = extent > 0 && next < 0 ? net->twin[d->edge[i]] / 3 : next;
+    next = extent > 0 && next < 0 ? i : next;
     orb_tally_add(star, extent);
   }
   return next;
@@ -138,7 +188,7 @@ static int list_allows(const disc *d, int32_t list, double limit2) {
   for (int32_t item = list; item >= 0; item = match->item_next[item]) {
     const double *x = orb_match_item_point(match, item);
     for (int i = 0; i < d->n; i++) {
-      int32_t a = match->net.triangles[d->edge[i]], b = match->net.triangles[orb_next(d->edge[i])];
+      int32_t a = match->net.triangles[d->side[i].h], b = match->net.triangles[orb_next(d->side[i].h)];
       const double *q = orb_net_point(&match->net, a), *r = orb_net_point(&match->net, b);
       if (orb_orient(p, q, x) >= 0 && orb_orient(r, p, x) >= 0 && orb_orient(q, r, x) >= 0 &&
           orb_match_item2(match, item, d->p, a, b) > limit2) {
@@ -162,7 +212,7 @@ static int is_within(const disc *d, double limit2) {
     }
   }
   for (int i = 0; i < d->n; i++) {
-    if (orb_match_edge2(match, d->p, match->net.triangles[d->edge[i]], limit2, NULL) > limit2) {
+    if (orb_match_edge2(match, d->p, match->net.triangles[d->side[i].h], limit2, NULL) > limit2) {
       return 0;
     }
   }
@@ -186,7 +236,11 @@ static void commit(orb_match *match, const disc *d) {
     orb_match_copy_vertex(match, p, d->p);
   }
   match->stayed[p] = 0;
-  int32_t start = orb_net_star(&match->net, d->triangle, d->count, d->edge, d->n, d->inner, d->inner_count, p);
+  int32_t edges[MOST];
+  for (int i = 0; i < d->n; i++) {
+    edges[i] = d->side[i].h;
+  }
+  int32_t start = orb_net_star(&match->net, d->triangle, d->count, edges, d->n, d->inner, d->inner_count, p);
   for (int i = 0; i < count; i++) {
     orb_match_deal(match, lists[i], start);
   }
@@ -200,11 +254,6 @@ static orb_tally turned_in(disc *d) {
     orb_tally_add(&sum, d->own[i]);
   }
   return sum;
-}
-
-static void add_triangle(disc *d, int32_t t) {
-  d->own[d->count] = -1;
-  d->triangle[d->count++] = t;
 }
 
 static int is_better(disc *d, orb_tally star, orb_star_goal goal) {
@@ -226,7 +275,7 @@ static int is_better(disc *d, orb_tally star, orb_star_goal goal) {
 static int is_better_at_centres(disc *d, orb_star_goal goal) {
   orb_tally star = {0, 0};
   for (int i = 0; i < d->n; i++) {
-    int32_t a = d->match->net.triangles[d->edge[i]], b = d->match->net.triangles[orb_next(d->edge[i])];
+    int32_t a = d->match->net.triangles[d->side[i].h], b = d->match->net.triangles[orb_next(d->side[i].h)];
     orb_tally_add(&star, orb_match_turned_extent(d->match, d->p, a, b));
   }
   return is_better(d, star, goal);
@@ -239,7 +288,7 @@ static int plan(disc *d, const double p[3], const orb_star_wish *wish) {
   for (;;) {
     orb_tally star;
     int possible;
-    int32_t next = beyond(d, &star, &possible);
+    int next = beyond(d, &star, &possible);
     if (possible && d->inner_count >= wish->least_inner && is_better(d, star, wish->goal) &&
         is_within(d, wish->limit2) && (!d->rough || is_better_at_centres(d, wish->goal))) {
       return 1;
@@ -247,8 +296,7 @@ static int plan(disc *d, const double p[3], const orb_star_wish *wish) {
     if (next < 0 || d->count == most) {
       return 0;
     }
-    add_triangle(d, next);
-    if (!outline(d) || d->inner_count > wish->most_inner || has_fixed(d)) {
+    if (!grow_over(d, next) || d->inner_count > wish->most_inner || has_fixed(d)) {
       return 0;
     }
   }
