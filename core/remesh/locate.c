@@ -6,8 +6,7 @@
  */
 #include "base/check.h"
 #include "numeric/vec3.h"
-#include "orbmorph/remesh.h"
-#include "remesh/walk.h"
+#include "remesh/methods.h"
 
 struct orb_locator {
   orb_sphere_view mesh;
@@ -118,10 +117,15 @@ static orb_hit lowest(const orb_sphere_view *mesh, const orb_hit *hit) {
   return best;
 }
 
-void orb_locate(const orb_locator *locator, const double p[3], int32_t hint, orb_place *out) {
+orb_hit orb_locate_hit(const orb_locator *locator, const double p[3], int32_t hint, orb_place *out) {
   int32_t start = hint >= 0 && hint < locator->mesh.triangle_count ? hint : locator->cell[cell_of(locator, p)];
   orb_hit hit = orb_walk(&locator->mesh, p, start);
   hit = lowest(&locator->mesh, &hit);
   out->triangle = hit.triangle;
   orb_project(&locator->mesh, &hit, p, out->at);
+  return hit;
+}
+
+void orb_locate(const orb_locator *locator, const double p[3], int32_t hint, orb_place *out) {
+  (void)orb_locate_hit(locator, p, hint, out);
 }

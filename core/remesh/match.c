@@ -118,19 +118,13 @@ static void put_item_at(orb_match *match, int32_t item, int32_t v) {
   match->vertex_items[v] = item;
 }
 
-/* The spot of a known place; its zeros and ones are exact. */
-static orb_spot spot_of_place(const orb_sphere_view *view, const orb_place *place, const double p[3]) {
-  orb_hit hit = orb_walk(view, p, place->triangle);
-  return orb_spot_of(&hit);
-}
-
 /* Places net vertex v on shape s, starting at triangle `hint`. */
 static void settle(orb_match *match, int32_t v, int32_t s, int32_t hint) {
   const double *p = orb_net_point(&match->net, v);
   orb_place place;
-  orb_locate(match->job->locator[s], p, hint, &place);
+  orb_hit hit = orb_locate_hit(match->job->locator[s], p, hint, &place);
   int64_t cell = (int64_t)v * match->shape_count + s;
-  match->spot[cell] = spot_of_place(&match->view[s], &place, p);
+  match->spot[cell] = orb_spot_of(&hit);
   double *at = match->at + 3 * cell, *normal = match->normal + 3 * cell;
   at[0] = at[1] = at[2] = normal[0] = normal[1] = normal[2] = 0;
   for (int k = 0; k < 3; k++) {

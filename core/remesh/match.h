@@ -118,6 +118,8 @@ static inline orb_form orb_form_join(orb_form f, orb_form g) {
 /* Whether triangles such as `after` may replace some such as `before`: fewer are turned, or none worse than before and
  * the same holds of slivers; measures that are fine count as equal. */
 int orb_form_allows(orb_form before, orb_form after);
+/* Whether triangles of this form may replace any: none is turned, none is worse than the least that is let be. */
+int orb_form_is_fine(orb_form after);
 /* A triangle's form as a cost: turned counts most, then slivers, then shape. */
 static inline double orb_form_cost(orb_form f) {
   return (1 - f.quality) * (1 - f.quality) + 8 * f.slivers + 64 * f.turned;

@@ -23,6 +23,7 @@ typedef struct collapser {
   int strict, thorough;
   orb_quadric *quadric; /* net vertex major, one a shape */
   double *cost;         /* a vertex: of its best target */
+  int32_t *target;      /* a vertex: that */
   int32_t *heap, *slot; /* slot −1: not in the heap */
   int32_t heap_count;
   int64_t live;
@@ -108,25 +109,55 @@ static double move_cost(const collapser *c, int32_t u, int32_t v) {
   return (cost > 0 ? cost : 0) + 1e-5 * length2 * c->limit2;
 }
 
-static void rate(collapser *c, int32_t u) {
+/* The least cost of moving u, and the target. */
+static double least_cost(const collapser *c, int32_t u, int32_t *target) {
   int32_t ring[RING_MAX];
   int n = c->match->fixed[u] ? -1 : ring_of(&c->match->net, u, ring);
   double best = INFINITY;
+  *target = -1;
   for (int i = 0; i < n; i++) {
-    best = fmin(best, move_cost(c, u, ring[i]));
+    double cost = move_cost(c, u, ring[i]);
+    if (cost < best) {
+      best = cost;
+      *target = ring[i];
+    }
   }
-  heap_put(c, u, best);
+  return best;
+}
+
+static void rate(collapser *c, int32_t u) {
+  heap_put(c, u, least_cost(c, u, &c->target[u]));
+}
+
+/* The same when all that has happened around u is that `gone` has moved onto its neighbour v. */
+static void rate_after(collapser *c, int32_t u, int32_t gone, int32_t v) {
+  if (c->match->fixed[u]) {
+    return;
+  }
+  if (c->target[u] < 0 || c->target[u] == gone) {
+    rate(c, u);
+    return;
+  }
+  double cost = move_cost(c, u, v);
+  if (cost < c->cost[u]) {
+    c->cost[u] = cost;
+    c->target[u] = v;
+  }
+  heap_put(c, u, c->cost[u]);
 }
 
 /* In space no new triangle is a worse sliver, or turned worse against the surface, than the worst of those that go,
  * unless it is good enough. ring starts at v. */
 static int shape_allows(const orb_match *match, int32_t u, const int32_t *ring, int n) {
   orb_form before = ORB_FORM_BEST, after = ORB_FORM_BEST;
-  for (int i = 0; i < n; i++) {
-    before = orb_form_join(before, orb_match_form(match, u, ring[i], ring[(i + 1) % n]));
-  }
   for (int i = 1; i + 1 < n; i++) {
     after = orb_form_join(after, orb_match_form(match, ring[0], ring[i], ring[i + 1]));
+  }
+  if (orb_form_is_fine(after)) {
+    return 1;
+  }
+  for (int i = 0; i < n; i++) {
+    before = orb_form_join(before, orb_match_form(match, u, ring[i], ring[(i + 1) % n]));
   }
   return orb_form_allows(before, after);
 }
@@ -221,21 +252,14 @@ static void collapse(collapser *c, int32_t h) {
   }
 }
 
-/* The half-edge of u to the next best target after `above` in order of cost; −1: none. */
-static int32_t next_target(const collapser *c, int32_t u, double above, int32_t last, double *cost) {
-  const orb_net *net = &c->match->net;
-  int32_t best = -1, first = net->out[u], h = first;
-  double best_cost = INFINITY;
-  do {
-    double value = move_cost(c, u, net->triangles[orb_next(h)]);
-    int later = value > above || (value == above && h > last);
-    if (later && (value < best_cost || (value == best_cost && h < best))) {
-      best = h;
-      best_cost = value;
+/* The place in the ring of the best target that has not been tried (those have an infinite cost); −1: none. */
+static int next_target(const double *cost, int n) {
+  int best = -1;
+  for (int i = 0; i < n; i++) {
+    if (cost[i] < INFINITY && (best < 0 || cost[i] < cost[best])) {
+      best = i;
     }
-    h = net->twin[orb_prev(h)];
-  } while (h != first);
-  *cost = best_cost;
+  }
   return best;
 }
 
@@ -259,26 +283,27 @@ static void try_fill(collapser *c, int32_t u, const int32_t *ring, int n, int32_
 static void try_vertex(collapser *c, int32_t u) {
   const orb_net *net = &c->match->net;
   int32_t ring[RING_MAX], turned[RING_MAX];
+  double cost[RING_MAX];
   int n = ring_of(net, u, ring);
-  double cost = -1;
-  int32_t h = -1, heir = -1;
-  for (int attempt = 0; attempt < TRIES && n > 0; attempt++) {
-    h = next_target(c, u, cost, h, &cost);
-    if (h < 0) {
+  int32_t heir = -1;
+  for (int i = 0; i < n; i++) {
+    cost[i] = move_cost(c, u, ring[i]);
+  }
+  for (int attempt = 0; attempt < TRIES; attempt++) {
+    int at = next_target(cost, n);
+    if (at < 0) {
       break;
     }
-    heir = attempt == 0 ? net->triangles[orb_next(h)] : heir;
-    int at = 0;
-    while (ring[at] != net->triangles[orb_next(h)]) {
-      at++;
-    }
+    heir = attempt == 0 ? ring[at] : heir;
+    cost[at] = INFINITY;
     for (int i = 0; i < n; i++) {
       turned[i] = ring[(at + i) % n];
     }
     if (is_allowed(c, u, turned, n)) {
-      collapse(c, h);
-      for (int i = 0; i < n; i++) {
-        rate(c, turned[i]);
+      collapse(c, orb_net_edge(net, u, turned[0]));
+      rate(c, turned[0]);
+      for (int i = 1; i < n; i++) {
+        rate_after(c, turned[i], u, turned[0]);
       }
       return;
     }
@@ -315,6 +340,16 @@ static void quadric_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
+static void cost_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  collapser *c = arg;
+  for (int64_t v = begin; v < end; v++) {
+    if (c->match->net.out[v] >= 0) {
+      c->cost[v] = least_cost(c, (int32_t)v, &c->target[v]);
+    }
+  }
+}
+
 orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2, int64_t target, int strict,
                               int thorough) {
   int32_t vertices = match->net.vertex_count;
@@ -326,17 +361,19 @@ orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2,
                  .live = orb_match_live(match)};
   c.quadric = ORB_NEW(ctx, orb_quadric, (int64_t)vertices * match->shape_count);
   c.cost = ORB_NEW(ctx, double, vertices);
+  c.target = ORB_NEW(ctx, int32_t, vertices);
   c.heap = ORB_NEW(ctx, int32_t, vertices);
   c.slot = ORB_NEW(ctx, int32_t, vertices);
-  orb_status status = c.quadric && c.cost && c.heap && c.slot ? ORB_OK : ORB_E_NO_MEMORY;
+  orb_status status = c.quadric && c.cost && c.target && c.heap && c.slot ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
     orb_parallel_for(ctx, vertices, 512, quadric_range, &c);
+    orb_parallel_for(ctx, vertices, 512, cost_range, &c);
     for (int32_t v = 0; v < vertices; v++) {
       c.slot[v] = -1;
     }
     for (int32_t v = 0; v < vertices; v++) {
       if (match->net.out[v] >= 0) {
-        rate(&c, v);
+        heap_put(&c, v, c.cost[v]);
       }
     }
   }
@@ -350,6 +387,7 @@ orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2,
   }
   orb_free(ctx, c.quadric);
   orb_free(ctx, c.cost);
+  orb_free(ctx, c.target);
   orb_free(ctx, c.heap);
   orb_free(ctx, c.slot);
   return status;

@@ -28,8 +28,8 @@ orb_form orb_match_form(const orb_match *match, int32_t a, int32_t b, int32_t c)
   for (int32_t s = 0; s < match->shape_count; s++) {
     double quality, facing;
     measure(match, s, a, b, c, &quality, &facing);
-    worst.quality = fmin(worst.quality, quality);
-    worst.facing = fmin(worst.facing, facing);
+    worst.quality = quality < worst.quality ? quality : worst.quality;
+    worst.facing = facing < worst.facing ? facing : worst.facing;
   }
   worst.slivers = worst.quality < FINE_QUALITY;
   worst.turned = worst.facing < FINE_FACING;
@@ -91,6 +91,10 @@ orb_tally orb_match_tally_fan(const orb_match *match, int32_t v, const int32_t *
     orb_tally_add(&sum, orb_match_turned_extent(match, v, ring[i], ring[(i + 1) % n]));
   }
   return sum;
+}
+
+int orb_form_is_fine(orb_form after) {
+  return after.turned == 0 && after.quality >= LEAST_QUALITY;
 }
 
 int orb_form_allows(orb_form before, orb_form after) {

@@ -37,10 +37,11 @@ static int star_of(orb_match *match, int32_t v, double limit2, star *out) {
   return 1;
 }
 
-static double form_cost(const star *s, orb_form *all) {
+/* Adds up what the forms of the triangles cost; stops once that is above `most`. */
+static double form_cost(const star *s, double most, orb_form *all) {
   double cost = 0;
   *all = ORB_FORM_BEST;
-  for (int i = 0; i < s->n; i++) {
+  for (int i = 0; i < s->n && cost <= most; i++) {
     orb_form form = orb_match_form(s->match, s->v, s->ring[i], s->ring[(i + 1) % s->n]);
     cost += orb_form_cost(form);
     *all = orb_form_join(*all, form);
@@ -87,8 +88,9 @@ static int positive_at(const star *s, const double p[3]) {
   for (int i = 0; i < s->n; i++) {
     const double *q = orb_net_point(&s->match->net, s->ring[i]);
     const double *r = orb_net_point(&s->match->net, s->ring[(i + 1) % s->n]);
-    double longest2 = fmax(orb_distance2(p, q), fmax(orb_distance2(q, r), orb_distance2(r, p)));
-    if (orb_orient(p, q, r) <= 0 || orb_det(p, q, r) < 1e-4 * longest2) {
+    double height = 1e4 * orb_det(p, q, r);
+    if (orb_orient(p, q, r) <= 0 ||
+        !(height > orb_distance2(p, q) && height > orb_distance2(q, r) && height > orb_distance2(r, p))) {
       return 0;
     }
   }
@@ -135,7 +137,7 @@ static int try_point(const star *s, const double p[3], orb_form before, double *
   }
   stand_copy(s->match, s->v, &old, 0);
   orb_match_place(s->match, s->v, p);
-  double now = form_cost(s, &after);
+  double now = form_cost(s, *cost, &after);
   if (now < *cost && orb_form_allows(before, after)) {
     now += edges_cost(s, *cost - now);
     if (now < *cost * (1 - LEAST_GAIN) && items_allow(s)) {
@@ -217,7 +219,7 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
     }
   }
   orb_form before;
-  double cost = form_cost(&s, &before);
+  double cost = form_cost(&s, INFINITY, &before);
   cost += edges_cost(&s, INFINITY);
   int moved = 0;
   for (int i = 0; i <= s.n; i++) {

@@ -24,4 +24,7 @@ ORB_MUST_CHECK orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh
 ORB_MUST_CHECK orb_status orb_remesh_overlay(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
 ORB_MUST_CHECK orb_status orb_remesh_hull(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
 
+/* orb_locate(), and the hit itself: in the triangle of the place. */
+orb_hit orb_locate_hit(const orb_locator *locator, const double p[3], int32_t hint, orb_place *out);
+
 #endif

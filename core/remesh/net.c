@@ -168,7 +168,8 @@ int32_t orb_net_split_edge(orb_net *net, int32_t h, const double p[3]) {
 
 int orb_net_sound(const orb_net *net, int32_t a, int32_t b, int32_t c) {
   const double *p = orb_net_point(net, a), *q = orb_net_point(net, b), *r = orb_net_point(net, c);
-  return orb_det(p, q, r) > 1e-6 * fmax(orb_distance2(p, q), fmax(orb_distance2(q, r), orb_distance2(r, p)));
+  double height = 1e6 * orb_det(p, q, r);
+  return height > orb_distance2(p, q) && height > orb_distance2(q, r) && height > orb_distance2(r, p);
 }
 
 int32_t orb_net_edge(const orb_net *net, int32_t v, int32_t w) {
