@@ -75,9 +75,10 @@ typedef struct orb_alignment {
  * - pin: the shapes are embedded anew with the landmarks as constraints, meeting at their spherical means; landmarks
  *   that would have to pass through one another meet on surfaces with more edges, at the first shape's points or at
  *   new ones. After pin and rbf a landmark's vertices have bit-equal points on all shapes.
- * - auto: pin where landmarks are given, else the rotation search. Where the energy of the composed map stays above
- *   1.2, other correspondences are tried on coarse copies, by further rotations and by tips of limbs, and the best one
- *   is taken if it lowers the energy (not with the preset fast). `found` then says what was matched.
+ * - auto: pin where landmarks are given, else the rotation search. Where the map that comes of bending one shape onto
+ *   the other in space has an energy above 1.2, other correspondences are tried on coarse copies, by further rotations
+ *   and by tips of limbs, and the best one is composed in full and taken if it lowers the energy (not with the preset
+ *   fast). `found` then says what was matched.
  *
  * Landmarks at one and the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
  * those that are out of range or share a place on some shapes only; of a set
