@@ -4,7 +4,7 @@
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { addFiles, button, clickView, openPage, root, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
+import { addFiles, adopt, button, clickView, hush, openPage, root, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
 
 export const folder = join(root, 'tests/studio/looks');
 const pair = [sample('dog.obj'), sample('giraffe.off')];
@@ -22,7 +22,6 @@ async function landmarked(page) {
   await button(page, 'Landmarks').click();
   await page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
   await page.locator('.marks li').first().waitFor();
-  await until(() => page.locator('.toast').count().then((n) => n === 0), 'no message covers the view');
 }
 async function morphed(page) {
   await landmarked(page);
@@ -112,14 +111,10 @@ export async function look(browser, url, name, whole = false) {
   const { page, done } = await openPage(browser, url, { colorScheme: 'light', ...options });
   await page.evaluate(() => document.fonts.ready);
   await come(page);
-  await page.evaluate((css) => {
-    const sheet = new CSSStyleSheet(); // the page's policy forbids inline style, not this
-    sheet.replaceSync(css);
-    document.adoptedStyleSheets = [sheet];
-  }, STEADY);
+  await adopt(page, STEADY);
+  await hush(page);
   await page.mouse.move(2, 2);
   await page.evaluate(() => document.activeElement?.blur());
-  await until(() => page.locator('.toast').count().then((n) => n === 0), 'no message covers the view');
   await settled(page);
   const full = await page.screenshot({ animations: 'disabled' });
   const png = whole ? full : await halved(page, full);

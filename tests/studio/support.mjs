@@ -11,6 +11,8 @@ import { chromium } from 'playwright-core';
 export const root = fileURLToPath(new URL('../../', import.meta.url));
 export const sample = (name) => join(root, 'tests/samples', name);
 
+const PATIENCE = 180_000; // for what never comes
+
 /** `keep`: the folder stays, for a daemon that is started on it later with `data`. */
 export async function startDaemon({ args = [], data = mkdtempSync(join(tmpdir(), 'orbmorph-studio-')), keep = false } = {}) {
   if (process.env.ORB_STUDIO_URL && !args.length) return { url: process.env.ORB_STUDIO_URL.replace(/\/$/, ''), stop: async () => {} };
@@ -26,7 +28,7 @@ export async function startDaemon({ args = [], data = mkdtempSync(join(tmpdir(),
       if (found) resolve(found[1]);
     });
     child.on('exit', (code) => reject(new Error(`orbmorphd ended with ${code}: ${log}`)));
-    setTimeout(() => reject(new Error(`orbmorphd does not listen: ${log}`)), 20_000).unref();
+    setTimeout(() => reject(new Error(`orbmorphd does not listen: ${log}`)), 120_000).unref();
   });
   return {
     url,
@@ -40,7 +42,7 @@ export async function startDaemon({ args = [], data = mkdtempSync(join(tmpdir(),
           resolve();
         });
         child.kill('SIGTERM');
-        setTimeout(() => child.kill('SIGKILL'), 15_000).unref();
+        setTimeout(() => child.kill('SIGKILL'), 120_000).unref();
       }),
   };
 }
@@ -51,6 +53,7 @@ export async function startDaemon({ args = [], data = mkdtempSync(join(tmpdir(),
  */
 export const startBrowser = ({ compositing = 'software' } = {}) =>
   chromium.launch({
+    timeout: PATIENCE,
     executablePath: process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
     args: ['--no-sandbox', '--headless=new', ...(compositing === 'software' ? ['--disable-gpu'] : ['--ignore-gpu-blocklist']), '--use-gl=angle',
       '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update', '--disable-sync',
@@ -61,6 +64,14 @@ export const startBrowser = ({ compositing = 'software' } = {}) =>
 export async function openPage(browser, url, { hash = '', ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, acceptDownloads: true, ...options });
   const page = await context.newPage();
+  page.setDefaultTimeout(PATIENCE);
+  await page.addInitScript(() => {
+    globalThis.said = []; // messages go after some seconds
+    new MutationObserver((changes) => {
+      for (const { addedNodes } of changes)
+        for (const node of addedNodes) if (node.classList?.contains('toast')) globalThis.said.push(node.innerText);
+    }).observe(document, { subtree: true, childList: true });
+  });
   const faults = [];
   page.on('console', (message) => {
     if (message.type() === 'error' && !/status of 4\d\d/.test(message.text())) faults.push(`console: ${message.text()}`);
@@ -71,7 +82,6 @@ export async function openPage(browser, url, { hash = '', ...options } = {}) {
     if (/^(https?|wss?):$/.test(target.protocol) && target.origin !== new URL(url).origin) faults.push(`outside: ${request.url()}`);
   });
   await page.goto(`${url}/${hash}`);
-  page.setDefaultTimeout(30_000);
   return {
     page,
     done: async () => {
@@ -107,7 +117,7 @@ export async function countPixels(page, selector, test) {
   const png = await page.locator(selector).first().screenshot();
   return page.evaluate(async ({ data, source }) => {
     const accept = new Function('r', 'g', 'b', `return (${source})(r, g, b)`);
-    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(data)], { type: 'image/png' }));
+    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }));
     const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
     const context = canvas.getContext('2d');
     context.drawImage(bitmap, 0, 0);
@@ -115,7 +125,7 @@ export async function countPixels(page, selector, test) {
     let count = 0;
     for (let i = 0; i < pixels.length; i += 4) if (accept(pixels[i], pixels[i + 1], pixels[i + 2])) count++;
     return count;
-  }, { data: [...png], source: test.toString() });
+  }, { data: png.toString('base64'), source: test.toString() });
 }
 
 /** How much two screenshots differ: the share of pixels that do by more than 24 of 255. */
@@ -124,7 +134,7 @@ export async function difference(browser, a, b) {
   try {
     return await page.evaluate(async (both) => {
       const read = async (data) => {
-        const bitmap = await createImageBitmap(new Blob([Uint8Array.from(data)], { type: 'image/png' }));
+        const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }));
         const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
         context.drawImage(bitmap, 0, 0);
         return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
@@ -135,7 +145,7 @@ export async function difference(browser, a, b) {
       for (let i = 0; i < x.length; i += 4)
         if (Math.max(Math.abs(x[i] - y[i]), Math.abs(x[i + 1] - y[i + 1]), Math.abs(x[i + 2] - y[i + 2])) > 24) count++;
       return count / (x.length / 4);
-    }, [[...a], [...b]]);
+    }, [a.toString('base64'), b.toString('base64')]);
   } finally {
     await page.close();
   }
@@ -146,6 +156,19 @@ export async function clickView(page, index, x, y) {
   const box = await page.locator('.pane-view').nth(index).boundingBox();
   await page.mouse.click(box.x + box.width * x, box.y + box.height * y);
 }
+
+/** The messages that the page has shown so far. */
+export const said = (page) => page.evaluate(() => globalThis.said);
+
+/** From now on the page has these styles as well; its policy forbids those in the page, not this. */
+export const adopt = (page, css) => page.evaluate((text) => {
+  const sheet = new CSSStyleSheet();
+  sheet.replaceSync(text);
+  document.adoptedStyleSheets = [...document.adoptedStyleSheets, sheet];
+}, css);
+
+/** Messages cover no view; they are there all the same. */
+export const hush = (page) => adopt(page, '.toasts { visibility: hidden !important; }');
 
 export const json = async (url, path, init) => (await fetch(url + path, init)).json();
 export const bytes = (path) => readFileSync(path);
