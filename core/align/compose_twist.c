@@ -50,105 +50,6 @@ static void add_outer(double h[9], const double y[3], const double x[3], double 
   }
 }
 
-/* Where the surface's vertices come from, by the map. */
-static orb_status trace_back(twist_run *run) {
-  const cm_image *m = run->map;
-  orb_locator *locator;
-  orb_place place = {.triangle = -1};
-  ORB_TRY(orb_locator_create(run->ctx, m->points, m->vertex_count, m->triangles, m->triangle_count, NULL, &locator));
-  for (int32_t w = 0; w < run->b->vertex_count; w++) {
-    orb_locate(locator, run->b->s + 3 * (size_t)w, place.triangle, &place);
-    const int32_t *v = m->triangles + 3 * (size_t)place.triangle;
-    for (int k = 0; k < 3; k++) {
-      run->back[3 * (size_t)w + (size_t)k] = place.at[0] * m->x[3 * (size_t)v[0] + (size_t)k] +
-                                             place.at[1] * m->x[3 * (size_t)v[1] + (size_t)k] +
-                                             place.at[2] * m->x[3 * (size_t)v[2] + (size_t)k];
-    }
-  }
-  orb_locator_destroy(run->ctx, locator);
-  return orb_context_check(run->ctx);
-}
-
-/* The rotation of the whole: of all triangles' centres, weighted by area. */
-static void whole_rotation(const twist_run *run, double rotation[9]) {
-  const cm_surface *b = run->b;
-  double mean[6] = {0}, total = 0, h[9] = {0};
-  for (int pass = 0; pass < 2; pass++) {
-    for (int32_t t = 0; t < b->triangle_count; t++) {
-      const int32_t *v = b->triangles + 3 * (size_t)t;
-      double u[3], w[3], n[3], y[3] = {0}, x[3] = {0};
-      orb_sub(b->x + 3 * (size_t)v[1], b->x + 3 * (size_t)v[0], u);
-      orb_sub(b->x + 3 * (size_t)v[2], b->x + 3 * (size_t)v[0], w);
-      orb_cross(u, w, n);
-      double area = orb_length(n);
-      for (int k = 0; k < 9; k++) {
-        y[k % 3] += b->x[3 * (size_t)v[k / 3] + (size_t)k % 3] / 3;
-        x[k % 3] += run->back[3 * (size_t)v[k / 3] + (size_t)k % 3] / 3;
-      }
-      total += pass == 0 ? area : 0;
-      for (int k = 0; k < 3; k++) {
-        mean[k] += pass == 0 ? area * y[k] : 0;
-        mean[3 + k] += pass == 0 ? area * x[k] : 0;
-        y[k] -= mean[k];
-        x[k] -= mean[3 + k];
-      }
-      if (pass == 1) {
-        add_outer(h, y, x, area);
-      }
-    }
-    for (int k = 0; k < 6 && pass == 0; k++) {
-      mean[k] /= total > 0 ? total : 1;
-    }
-  }
-  if (!cm_nearest_rotation(h, rotation)) {
-    memset(rotation, 0, 9 * sizeof *rotation);
-    rotation[0] = rotation[4] = rotation[8] = 1;
-  }
-}
-
-/* The angle of every vertex's surroundings against the whole: their edges and normals, before and behind the map. */
-static orb_status measure_turns(twist_run *run) {
-  const cm_surface *b = run->b;
-  double whole[9], *sum = ORB_NEW0(run->ctx, double, 16 * (size_t)b->vertex_count);
-  if (!sum) {
-    return ORB_E_NO_MEMORY;
-  }
-  whole_rotation(run, whole);
-  for (int32_t h = 0; h < 3 * b->triangle_count; h++) {
-    size_t v = (size_t)b->triangles[h], q = (size_t)b->triangles[orb_next(h)], r = (size_t)b->triangles[orb_prev(h)];
-    double y[2][3], x[2][3], n[3], *s = sum + 16 * v;
-    orb_sub(b->x + 3 * q, b->x + 3 * v, y[0]);
-    orb_sub(b->x + 3 * r, b->x + 3 * v, y[1]);
-    orb_sub(run->back + 3 * q, run->back + 3 * v, x[0]);
-    orb_sub(run->back + 3 * r, run->back + 3 * v, x[1]);
-    add_outer(s, y[0], x[0], 1);
-    s[15] += sqrt(orb_dot(y[0], y[0]) * orb_dot(x[0], x[0]));
-    orb_cross(y[0], y[1], n);
-    for (int k = 0; k < 3; k++) {
-      s[9 + k] += n[k];
-    }
-    orb_cross(x[0], x[1], n);
-    for (int k = 0; k < 3; k++) {
-      s[12 + k] += n[k];
-    }
-  }
-  for (int32_t v = 0; v < b->vertex_count; v++) {
-    double *s = sum + 16 * (size_t)v, r[9], trace = 0;
-    orb_normalize(s + 9);
-    orb_normalize(s + 12);
-    add_outer(s, s + 9, s + 12, 0.5 * s[15]);
-    run->turn[v] = 0;
-    if (cm_nearest_rotation(s, r)) {
-      for (int k = 0; k < 9; k++) {
-        trace += r[k] * whole[k];
-      }
-      run->turn[v] = acos(fmin(1, fmax(-1, (trace - 1) / 2)));
-    }
-  }
-  orb_free(run->ctx, sum);
-  return orb_context_check(run->ctx);
-}
-
 static int32_t find_part(int32_t *part, int32_t v) {
   while (part[v] != v) {
     v = part[v] = part[part[v]];
@@ -538,8 +439,7 @@ orb_status cm_twists_find(orb_context *ctx, const cm_surface *b, const cm_image 
   for (int32_t i = 0; i < held_count; i++) {
     run.held[held[i]] = 1;
   }
-  ORB_GO(status, trace_back(&run), done);
-  ORB_GO(status, measure_turns(&run), done);
+  ORB_GO(status, cm_turns_measure(ctx, b, map, run.back, run.turn, &out->kept), done);
   status = look_at_all(&run, out);
 done:
   orb_free(ctx, run.back);

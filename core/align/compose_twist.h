@@ -27,6 +27,7 @@ typedef struct cm_twists {
   cm_twist limb[CM_LIMBS];
   int32_t *of;    /* of each vertex of the surface: its limb, -1: none */
   double *height; /* in it; 0: none */
+  double kept;    /* of the area of both shapes in the mean, how much their mean has; 1 where all goes straight */
 } cm_twists;
 
 /* The limbs that the map has twisted by more than a right angle. held: vertices of the surface whose partners are
@@ -38,5 +39,10 @@ void cm_twists_free(orb_context *ctx, cm_twists *twists);
 /* Turns a place on a limb back by a share of its limb's twist there. 0: it is on no limb, and stays. O(triangles around
  * the limb). */
 int cm_twists_undo(const cm_twists *twists, const cm_surface *b, double share, orb_place *place);
+
+/* Of every vertex of the surface: where it comes from (back, 3 a vertex) and the angle by which the map turns its
+ * surroundings in space, against the rotation of the whole (turn). *kept: as in cm_twists (compose_turns.c). O(n). */
+ORB_MUST_CHECK orb_status cm_turns_measure(orb_context *ctx, const cm_surface *b, const cm_image *map, double *back,
+                                           double *turn, double *kept);
 
 #endif

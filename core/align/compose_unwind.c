@@ -1,10 +1,14 @@
 /* Twisted limbs of the best map, turned back.
  *
- * All limbs that cm_twists_find() finds are turned back at once, whole, along their rings. As a map of surfaces that is
+ * All limbs that cm_twists_find() finds are turned back along their rings, whole. As a map of surfaces that is
  * one-to-one; but triangles are straight on the sphere, so some of the small or thin ones flip there, here and there
  * and not in heaps. Untangling clears them, if roughly, and descent, with flips allowed now and then against the
- * barrier (cm_loosen), comes down from there. Small steps without any flip were tried: half of the vertices get stuck
- * on the way, and the twist stays.
+ * barrier (cm_loosen), comes down from there. Where triangles are large against the limb, flips are left; then the
+ * limbs are turned by smaller steps, each untangled and smoothed before the next. Steps without any flip were tried:
+ * half of the vertices get stuck on the way, and the twist stays.
+ *
+ * What comes of it is kept if its energy is less, if less is twisted, and if more of the area is left halfway of a
+ * linear morph: the energy of a twist that is spread over a long limb is small, so it alone does not tell.
  */
 #include <math.h>
 #include <string.h>
@@ -15,18 +19,20 @@
 #include "embed/loops.h"
 
 enum {
-  ROUNDS = 2,
-  CLEARINGS = 4,
+  MOST_STEPS = 8, /* by which limbs are turned back where one does not do */
+  STEP_SWEEPS = 10,
   DESCENTS = 6,
   SLICE = 1024,
-  WORK = 450
-};                               /* WORK: vertex steps a vertex that loosening may take */
-static const double GAIN = 2e-3; /* by a descent, for another one */
+  WORK = 450 /* vertex steps a vertex that loosening may take */
+};
+static const double GAIN = 2e-3;      /* by a descent, for another one */
+static const double KEPT_GAIN = 3e-3; /* of the area halfway: less does not show */
 
 typedef struct unwind {
   cm_run *c;
   cm_level *l;
   const cm_twists *twists;
+  double share; /* of the twists, to turn back at once */
 } unwind;
 
 static void turn_range(void *arg, int64_t begin, int64_t end, int thread) {
@@ -34,7 +40,7 @@ static void turn_range(void *arg, int64_t begin, int64_t end, int thread) {
   cm_level *l = u->l;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
-    if (!l->pinned[v] && cm_twists_undo(u->twists, &u->c->b, 1, &l->place[v])) {
+    if (!l->pinned[v] && cm_twists_undo(u->twists, &u->c->b, u->share, &l->place[v])) {
       cm_surface_at(&u->c->b, &l->place[v], NULL, l->x + 3 * v, NULL);
       cm_level_refresh(l, &u->c->b, (int32_t)v);
     }
@@ -76,74 +82,77 @@ static orb_status find_twists(cm_run *c, const double *points, cm_twists *out) {
   return cm_twists_find(c->ctx, &c->b, &map, c->pairs.fixed, c->pairs.count, out);
 }
 
-/* Takes the level for the best map if its energy is less and it is less twisted; the twists become those that are
- * left. points: room for all. */
-static orb_status keep_better(cm_run *c, const orb_surface *s, const cm_level *l, double *points, cm_twists *twists,
-                              int *better) {
-  double energy = cm_level_energy(l);
+/* Takes the level for the best map if it is better. */
+static orb_status keep_better(cm_run *c, const orb_surface *s, const cm_level *l, const cm_twists *twists) {
+  double energy = cm_level_energy(l), *points;
+  size_t n = 3 * (size_t)c->vertex_count;
   cm_twists left;
-  *better = 0;
   if (!(energy < c->best_energy) || cm_level_flips(l) > 0) {
     return ORB_OK;
+  }
+  points = ORB_NEW(c->ctx, double, n);
+  if (!points) {
+    return ORB_E_NO_MEMORY;
   }
   for (int32_t v = 0; v < l->count; v++) {
     memcpy(points + 3 * (size_t)s->to_mesh[l->vertex[v]], l->x + 3 * (size_t)v, sizeof(double[3]));
   }
-  ORB_TRY(find_twists(c, points, &left));
-  *better = sum_of(&left) < sum_of(twists);
-  if (*better) {
-    c->best_energy = energy;
-    memcpy(c->best, points, 3 * (size_t)c->vertex_count * sizeof *points);
+  orb_status status = find_twists(c, points, &left);
+  if (status == ORB_OK) {
+    if (sum_of(&left) < sum_of(twists) && left.kept > twists->kept + KEPT_GAIN) {
+      c->best_energy = energy;
+      memcpy(c->best, points, n * sizeof *points);
+    }
+    cm_twists_free(c->ctx, &left);
   }
-  cm_twists_free(c->ctx, twists);
-  *twists = left;
+  orb_free(c->ctx, points);
+  return status;
+}
+
+/* Turns back in so many steps, with some descent between them. *flips: what is left and cannot be cleared. */
+static orb_status turn_limbs(unwind *u, const orb_surface *s, int steps, int32_t *flips) {
+  cm_run *c = u->c;
+  cm_level_free(c->ctx, u->l);
+  ORB_TRY(cm_full_level(c, c->best, s, u->l));
+  cm_set_pull(c, u->l, s->to_mesh, 0);
+  *flips = 0;
+  u->share = 1.0 / steps;
+  for (int i = 0; i < steps && *flips == 0; i++) {
+    if (i > 0) {
+      ORB_TRY(cm_sweeps(c, u->l, cm_hard(), STEP_SWEEPS));
+    }
+    ORB_TRY(orb_sliced_by(c->ctx, u->l->count, SLICE, 64, turn_range, u));
+    ORB_TRY(untangle(c, u->l, flips));
+  }
   return ORB_OK;
 }
 
-static orb_status unwind_once(cm_run *c, const orb_surface *s, double *points, cm_twists *twists, int *better) {
+static orb_status unwind_limbs(cm_run *c, const cm_twists *twists) {
+  orb_surface s = {0};
   cm_level level = {0};
-  unwind u = {c, &level, twists};
-  int32_t flips;
-  orb_status status;
+  unwind u = {.c = c, .l = &level, .twists = twists};
+  int32_t flips = 1;
   int64_t least = WORK * (int64_t)c->vertex_count;
+  orb_status status;
+  ORB_GO(status, orb_surface_create(c->ctx, &c->moving->mesh, &s), done);
   c->work = c->work > least ? c->work : least;
-  ORB_GO(status, cm_full_level(c, c->best, s, &level), done);
-  cm_set_pull(c, &level, s->to_mesh, 0);
-  ORB_GO(status, orb_sliced_by(c->ctx, level.count, SLICE, 64, turn_range, &u), done);
-  ORB_GO(status, untangle(c, &level, &flips), done);
-  if (flips) {
-    ORB_GO(status, cm_clear_flips(c, &level, CLEARINGS, &flips), done);
+  for (int steps = 1; steps <= MOST_STEPS && flips; steps *= MOST_STEPS) {
+    ORB_GO(status, turn_limbs(&u, &s, steps, &flips), done);
   }
   if (!flips) {
     ORB_GO(status, descend(c, &level), done);
+    status = keep_better(c, &s, &level, twists);
   }
-  status = keep_better(c, s, &level, points, twists, better);
 done:
   cm_level_free(c->ctx, &level);
+  orb_surface_free(c->ctx, &s);
   return status;
 }
 
 orb_status cm_unwind(cm_run *c) {
-  orb_surface s = {0};
   cm_twists twists;
-  double *points = NULL;
-  orb_status status = ORB_OK;
-  int better = 1;
   ORB_TRY(find_twists(c, c->best, &twists));
-  if (twists.count == 0) {
-    goto done;
-  }
-  points = ORB_NEW(c->ctx, double, 3 * (size_t)c->vertex_count);
-  status = points ? ORB_OK : ORB_E_NO_MEMORY;
-  if (status == ORB_OK) {
-    status = orb_surface_create(c->ctx, &c->moving->mesh, &s);
-  }
-  for (int round = 0; round < ROUNDS && better && twists.count > 0 && status == ORB_OK; round++) {
-    status = unwind_once(c, &s, points, &twists, &better);
-  }
-done:
+  orb_status status = twists.count > 0 ? unwind_limbs(c, &twists) : ORB_OK;
   cm_twists_free(c->ctx, &twists);
-  orb_surface_free(c->ctx, &s);
-  orb_free(c->ctx, points);
   return status;
 }
