@@ -49,18 +49,17 @@ static int turn_turns(const orb_match *match, int32_t a, int32_t b, int32_t c, i
   return orb_tally_is_worse(after, before);
 }
 
+static int is_bad(const orb_match *match, int32_t t) {
+  const int32_t *c = match->net.triangles + 3 * (int64_t)t;
+  orb_form form = c[0] >= 0 ? orb_match_form(match, c[0], c[1], c[2]) : ORB_FORM_BEST;
+  return form.turned || form.slivers;
+}
+
 /* Whether a turn of edge h would make its two triangles better in space, whatever else may forbid it. */
-static int turn_is_better(const orb_match *match, int32_t h, int only_bad) {
+static int turn_is_better(const orb_match *match, int32_t h) {
   const orb_net *net = &match->net;
   int32_t g = net->twin[h];
   orb_form before, after;
-  if (only_bad) { /* most edges are asked no more than this */
-    const int32_t *t = net->triangles + (h - h % 3), *u = net->triangles + (g - g % 3);
-    before = orb_form_join(orb_match_form(match, t[0], t[1], t[2]), orb_match_form(match, u[0], u[1], u[2]));
-    if (!before.turned && !before.slivers) {
-      return 0;
-    }
-  }
   forms_of_turn(match, net->triangles[h], net->triangles[g], net->triangles[orb_prev(h)], net->triangles[orb_prev(g)],
                 &before, &after);
   int better = after.quality > before.quality * 1.05 + 1e-9 || (before.facing <= 0 && after.facing > 0);
@@ -83,32 +82,53 @@ static int turn_within(orb_match *match, int32_t h, double limit2) {
 }
 
 int orb_match_try_turn(orb_match *match, int32_t h, double limit2) {
-  return turn_is_better(match, h, 0) && turn_within(match, h, limit2);
+  return turn_is_better(match, h) && turn_within(match, h, limit2);
 }
 
 typedef struct turn_loop {
   const orb_match *match;
-  int only_bad;
-  unsigned char *better;  /* a half-edge: what turn_is_better() says */
-  unsigned char *changed; /* a triangle: since it was asked */
+  unsigned char *asked;   /* a triangle: its edges are to be looked at */
+  unsigned char *better;  /* a half-edge: what turn_is_better() says, 0 where neither triangle is asked */
+  unsigned char *changed; /* a triangle: since then */
 } turn_loop;
+
+static void bad_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  turn_loop *loop = arg;
+  for (int64_t t = begin; t < end; t++) {
+    loop->asked[t] = (unsigned char)is_bad(loop->match, (int32_t)t);
+  }
+}
 
 static void better_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   turn_loop *loop = arg;
   const orb_net *net = &loop->match->net;
   for (int64_t h = begin; h < end; h++) {
-    loop->better[h] =
-        net->triangles[h - h % 3] >= 0 && h < net->twin[h] && turn_is_better(loop->match, (int32_t)h, loop->only_bad);
+    loop->better[h] = net->triangles[h - h % 3] >= 0 && h < net->twin[h] &&
+                      (loop->asked[h / 3] || loop->asked[net->twin[h] / 3]) && turn_is_better(loop->match, (int32_t)h);
   }
 }
 
+static int is_better_now(const turn_loop *loop, int32_t h, int only_bad) {
+  int32_t t = h / 3, u = loop->match->net.twin[h] / 3;
+  if (!loop->changed[t] && !loop->changed[u]) {
+    return loop->better[h];
+  }
+  return (!only_bad || is_bad(loop->match, t) || is_bad(loop->match, u)) && turn_is_better(loop->match, h);
+}
+
 /* One edge after another; asks again only where a turn has changed one of the two triangles. */
-static orb_status turn_pass(orb_context *ctx, orb_match *match, double limit2, turn_loop *loop, int64_t *turned) {
+static orb_status turn_pass(orb_context *ctx, orb_match *match, double limit2, int only_bad, turn_loop *loop,
+                            int64_t *turned) {
   const orb_net *net = &match->net;
   int32_t half_edges = 3 * net->triangle_count;
   *turned = 0;
+  memset(loop->asked, 1, (size_t)net->triangle_count);
   memset(loop->changed, 0, (size_t)net->triangle_count);
+  if (only_bad) {
+    orb_parallel_for(ctx, net->triangle_count, 512, bad_range, loop);
+  }
   orb_parallel_for(ctx, half_edges, 1024, better_range, loop);
   ORB_TRY(orb_context_check(ctx));
   for (int32_t h = 0; h < half_edges; h++) {
@@ -116,7 +136,7 @@ static orb_status turn_pass(orb_context *ctx, orb_match *match, double limit2, t
       continue;
     }
     int32_t t = h / 3, u = net->twin[h] / 3;
-    int better = loop->changed[t] || loop->changed[u] ? turn_is_better(match, h, loop->only_bad) : loop->better[h];
+    int better = is_better_now(loop, h, only_bad);
     if (better && turn_within(match, h, limit2)) {
       loop->changed[t] = loop->changed[u] = 1;
       ++*turned;
@@ -130,12 +150,13 @@ static orb_status turn_pass(orb_context *ctx, orb_match *match, double limit2, t
 
 orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2, int only_bad) {
   int64_t triangles = match->net.triangle_count, turned = triangles;
-  turn_loop loop = {match, only_bad, ORB_NEW(ctx, unsigned char, 3 * triangles),
+  turn_loop loop = {match, ORB_NEW(ctx, unsigned char, triangles), ORB_NEW(ctx, unsigned char, 3 * triangles),
                     ORB_NEW(ctx, unsigned char, triangles)};
-  orb_status status = loop.better && loop.changed ? ORB_OK : ORB_E_NO_MEMORY;
+  orb_status status = loop.asked && loop.better && loop.changed ? ORB_OK : ORB_E_NO_MEMORY;
   for (int pass = 0; pass < 4 && turned * 200 >= triangles && status == ORB_OK; pass++) {
-    status = turn_pass(ctx, match, limit2, &loop, &turned);
+    status = turn_pass(ctx, match, limit2, only_bad, &loop, &turned);
   }
+  orb_free(ctx, loop.asked);
   orb_free(ctx, loop.better);
   orb_free(ctx, loop.changed);
   return status;
