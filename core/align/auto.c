@@ -17,6 +17,7 @@ typedef struct guesses {
   orb_guess *of;   /* each later shape's, from 1 on */
   int32_t count;   /* vertices that all of them match */
   int32_t *vertex; /* ORB_GUESS_MAX a shape */
+  double energy;   /* in the mean, on the coarse copies */
   double clear;
 } guesses;
 
@@ -47,6 +48,7 @@ static orb_status guess_all(orb_context *ctx, const orb_align_shape *shapes, int
   for (int32_t s = 1; s < shape_count; s++) {
     ORB_TRY(orb_guess_find(ctx, shapes[0].mesh, shapes[s].mesh, &g->of[s]));
     g->clear = fmin(g->clear, g->of[s].clear);
+    g->energy += g->of[s].energy / (shape_count - 1);
   }
   gather(g, shape_count);
   return ORB_OK;
@@ -111,15 +113,17 @@ end:
   return status;
 }
 
-/* From the guesses. *held 0: they are no better than the rotation search, or cannot be met, and `out` is empty. */
+/* From the guesses. *held 0: they are no better than the rotation search or the energy that is reached already, or
+ * cannot be met, and `out` is empty. */
 static orb_status try_guesses(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                              const orb_align_options *options, double *clear, orb_alignment *out, int *held) {
+                              const orb_align_options *options, double reached, double *clear, orb_alignment *out,
+                              int *held) {
   guesses g = {0};
   orb_status status;
   *held = 0;
   ORB_GO(status, guess_all(ctx, shapes, shape_count, &g), end);
   *clear = g.clear;
-  if (g.count >= 3) {
+  if (g.count >= 3 && g.energy < reached) {
     ORB_GO(status, align_guessed(ctx, shapes, shape_count, &g, options, out, held), end);
   }
 end:
@@ -133,7 +137,7 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32
                           const orb_align_options *options, orb_alignment *alignment, double *clear) {
   orb_alignment other;
   int held;
-  ORB_TRY(try_guesses(ctx, shapes, shape_count, options, clear, &other, &held));
+  ORB_TRY(try_guesses(ctx, shapes, shape_count, options, alignment->energy, clear, &other, &held));
   if (!held && options->preset != ORB_PRESET_QUALITY) {
     return orb_compose_all(ctx, alignment, CM_FROM_SPACE, options->preset);
   }

@@ -361,6 +361,7 @@ static orb_status run_trials(trials *t, const orb_mesh *b, orb_guess *out) {
   }
   t->count = to;
   int32_t best = winner_of(t, &out->clear);
+  out->energy = t->list[best].energy;
   return t->list[best].judge < BETTER * t->list[0].judge ? write_guess(t, &t->list[best], b, out) : ORB_OK;
 }
 

@@ -11,6 +11,7 @@ enum { ORB_GUESS_MAX = 12 };
 typedef struct orb_guess {
   int32_t count; /* of pairs; 0: nothing is better than what the rotation search finds */
   int32_t first[ORB_GUESS_MAX], second[ORB_GUESS_MAX]; /* vertices of the given meshes that belong together */
+  double energy;                                       /* of the best correspondence, composed on the coarse copies */
   double clear; /* 0 to 1: how far behind the next best correspondence is that differs */
 } orb_guess;
 
