@@ -11,7 +11,7 @@
  * them all. A map walked to on the sphere by the landmarks, the guesses and some samples of the bent shape
  * (compose_walk.c) has no flips to begin with. The best map so far, drawn to the targets. From a start on the level is
  * refined up to all vertices, and no flip is allowed again. The map of least energy wins, if it is better than the
- * alignment as given.
+ * alignment as given. Limbs that it has twisted about their axes are turned back in the end (compose_unwind.c).
  */
 #include "align/compose.h"
 
