@@ -263,6 +263,7 @@ orb_status cm_full_level(cm_run *c, const double *points, const orb_surface *s, 
     memcpy(level->x + 3 * (size_t)v, points + 3 * (size_t)s->to_mesh[level->vertex[v]], sizeof(double[3]));
     cm_level_locate(level, &c->b, v, hint);
     hint = level->place[v].triangle;
+    status = (v & 4095) == 4095 ? orb_context_check(ctx) : ORB_OK;
   }
   orb_free(ctx, flags);
   return status;
@@ -358,13 +359,15 @@ static orb_status turned_share(orb_context *ctx, const orb_aligned_shape *from, 
   int32_t turned = 0;
   ORB_TRY(cm_surface_create(ctx, to, &b));
   double *image = ORB_NEW(ctx, double, 6 * (size_t)mesh->vertex_count);
+  orb_status status = image ? ORB_OK : ORB_E_NO_MEMORY;
   orb_place place = {.triangle = -1};
-  for (int32_t v = 0; image && v < mesh->vertex_count; v++) {
+  for (int32_t v = 0; v < mesh->vertex_count && status == ORB_OK; v++) {
     double *y = image + 6 * (size_t)v;
     orb_locate(b.locator, from->points + 3 * (size_t)v, place.triangle, &place);
     cm_surface_at(&b, &place, y, NULL, y + 3);
+    status = (v & 4095) == 4095 ? orb_context_check(ctx) : ORB_OK;
   }
-  for (int32_t t = 0; image && t < mesh->triangle_count; t++) {
+  for (int32_t t = 0; t < mesh->triangle_count && status == ORB_OK; t++) {
     const int32_t *v = mesh->triangles + 3 * (size_t)t;
     const double *p = image + 6 * (size_t)v[0], *q = image + 6 * (size_t)v[1], *r = image + 6 * (size_t)v[2];
     double u[3], w[3], n[3];
@@ -374,7 +377,6 @@ static orb_status turned_share(orb_context *ctx, const orb_aligned_shape *from, 
     turned += orb_dot(n, p + 3) + orb_dot(n, q + 3) + orb_dot(n, r + 3) < 0;
   }
   *share = (double)turned / mesh->triangle_count;
-  orb_status status = image ? orb_context_check(ctx) : ORB_E_NO_MEMORY;
   orb_free(ctx, image);
   cm_surface_free(ctx, &b);
   return status;

@@ -124,7 +124,8 @@ orb_status cm_spread(orb_context *ctx, const double *x, int32_t vertex_count, in
   for (int32_t v = 0; v < vertex_count; v++) {
     far[v] = INFINITY;
   }
-  for (int32_t i = 0, last = 0; i < count; i++) {
+  orb_status status = ORB_OK;
+  for (int32_t i = 0, last = 0; i < count && status == ORB_OK; i++) {
     int32_t best = 0;
     for (int32_t v = 0; v < vertex_count; v++) {
       double d = orb_distance2(x + 3 * (size_t)v, x + 3 * (size_t)last);
@@ -132,9 +133,10 @@ orb_status cm_spread(orb_context *ctx, const double *x, int32_t vertex_count, in
       best = far[v] > far[best] ? v : best;
     }
     out[i] = last = best;
+    status = orb_context_check(ctx);
   }
   orb_free(ctx, far);
-  return ORB_OK;
+  return status;
 }
 
 /* The vertex of the fixed shape nearest in position and normal; its score. */
