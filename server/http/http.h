@@ -40,6 +40,7 @@ typedef struct server {
   int needs_token;
   callers *callers;
   int control; /* the descriptor of the control socket */
+  unsigned char secret[CATALOGUE_SECRET];
 } server;
 
 typedef enum request_phase { PHASE_BODY, PHASE_AWAY, PHASE_WAIT, PHASE_SEND } request_phase;

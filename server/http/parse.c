@@ -119,10 +119,12 @@ int64_t parse_event_number(const char *text) {
   return number > 0 ? number : 0;
 }
 
-int parse_page(const char *limit_text, const char *token, int *limit, int64_t *before, const char **why) {
+const char PARSE_PAGE_TOKEN[] = "\"page_token\" must be the \"next_page_token\" of the page before.";
+
+int parse_page(const char *limit_text, const char *token, int *limit, uint64_t *sealed, const char **why) {
   char *end;
   *limit = PAGE_STANDARD;
-  *before = 0;
+  *sealed = 0;
   if (limit_text) {
     long value = strtol(limit_text, &end, 10);
     if (*end || end == limit_text || value < 1) {
@@ -132,12 +134,11 @@ int parse_page(const char *limit_text, const char *token, int *limit, int64_t *b
     *limit = value < PAGE_MOST ? (int)value : PAGE_MOST;
   }
   if (token) {
-    long long value = strtoll(token, &end, 16);
-    if (*end || end == token || value < 1 || strlen(token) > 15 || *token == '-' || *token == '+') {
-      *why = "\"page_token\" must be the \"next_page_token\" of the page before.";
+    if (strlen(token) != 16 || strspn(token, "0123456789abcdef") != 16) {
+      *why = PARSE_PAGE_TOKEN;
       return 0;
     }
-    *before = value;
+    *sealed = strtoull(token, NULL, 16);
   }
   return 1;
 }

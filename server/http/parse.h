@@ -30,9 +30,10 @@ int parse_urgency(const char *text);
 /* The number of the last event that a caller has seen (Last-Event-ID); 0: none. */
 int64_t parse_event_number(const char *text);
 
-/* limit and page_token of a list. 1, or 0 with *why, a sentence. */
+/* limit and page_token of a list; *sealed is 0 without one. 1, or 0 with *why, a sentence. */
 enum { PAGE_MOST = 1000, PAGE_STANDARD = 100 };
-int parse_page(const char *limit_text, const char *token, int *limit, int64_t *before, const char **why);
+int parse_page(const char *limit_text, const char *token, int *limit, uint64_t *sealed, const char **why);
+extern const char PARSE_PAGE_TOKEN[]; /* why another is none */
 
 /* The query of an upload. 1, or 0 with the problem. */
 typedef struct upload_query {

@@ -5,6 +5,7 @@
 
 #include "evict.h"
 #include "http/http.h"
+#include "http/paging.h"
 #include "metrics.h"
 #include "store/owners.h"
 
@@ -66,8 +67,11 @@ enum MHD_Result handle_get(request *r) {
 }
 
 int read_page(request *r, int *limit, int64_t *before) {
-  const char *why;
-  int fine = parse_page(query_of(r, "limit"), query_of(r, "page_token"), limit, before, &why);
+  const char *why = PARSE_PAGE_TOKEN, *token = query_of(r, "page_token");
+  uint64_t sealed;
+  int fine = parse_page(query_of(r, "limit"), token, limit, &sealed, &why);
+  *before = fine && token ? paging_open(r->srv->secret, sealed) : 0;
+  fine &= !token || *before > 0;
   if (!fine) {
     reply_refuse(r, "bad-query", "%s", why);
   }
@@ -100,7 +104,7 @@ void list_end(request *r, list_page *page, int64_t last, int count) {
   orb_json_close(&page->json, ']');
   orb_json_key(&page->json, "next_page_token");
   if (count > page->limit) {
-    orb_text_printf(&page->json, "\"%llx\"", (unsigned long long)last);
+    orb_text_printf(&page->json, "\"%016llx\"", (unsigned long long)paging_seal(r->srv->secret, last));
   } else {
     orb_json_null(&page->json);
   }

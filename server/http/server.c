@@ -296,6 +296,12 @@ int http_start(server *srv) {
     free(key);
     return 0;
   }
+  if (catalogue_secret(srv->cat, srv->secret) != STORE_OK) {
+    log_error("the catalogue has no secret for page tokens");
+    free(certificate);
+    free(key);
+    return 0;
+  }
   srv->connections = watch_start(o, srv->needs_token);
   if (!srv->connections) {
     log_error("the connections cannot be watched: no memory or threads");

@@ -47,6 +47,10 @@ int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resour
 void catalogue_touch(catalogue *cat, resource_kind kind, const char *id); /* does not wait */
 int64_t catalogue_bytes(catalogue *cat, int derived_only);                /* −1: cannot be read */
 
+/* Random bytes that this data folder has had from the beginning. */
+enum { CATALOGUE_SECRET = 16 };
+store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET]);
+
 /* A row of a job. request and problem are of malloc(). */
 typedef struct job_row {
   int64_t seq;

@@ -62,6 +62,8 @@ static const char *const migrations[] = {
     "CREATE TRIGGER resource_changed AFTER UPDATE OF kind, bytes ON resource BEGIN"
     " UPDATE total SET bytes=bytes-OLD.bytes WHERE kind=OLD.kind;"
     " UPDATE total SET bytes=bytes+NEW.bytes WHERE kind=NEW.kind; END;",
+    "CREATE TABLE secret(bytes BLOB NOT NULL);"
+    "INSERT INTO secret(bytes) VALUES(randomblob(16));",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

@@ -155,6 +155,21 @@ int64_t catalogue_bytes(catalogue *cat, int derived_only) {
   return total;
 }
 
+store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET]) {
+  database *db = catalogue_reader(cat);
+  store_result result = STORE_ERROR;
+  sqlite3_stmt *st = database_statement(db, "SELECT bytes FROM secret");
+  if (st) {
+    if (sqlite3_step(st) == SQLITE_ROW && sqlite3_column_bytes(st, 0) == CATALOGUE_SECRET) {
+      memcpy(out, sqlite3_column_blob(st, 0), CATALOGUE_SECRET);
+      result = STORE_OK;
+    }
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return result;
+}
+
 int catalogue_integrity(catalogue *cat) {
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st = database_statement(db, "PRAGMA integrity_check");

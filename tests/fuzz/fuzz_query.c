@@ -34,9 +34,9 @@ static void read_query(char *query, const char *prefer) {
   char *limit = value_of(query, "limit"), *token = value_of(query, "page_token"), *wait = value_of(query, "wait");
   char *name = value_of(query, "name"), *repair = value_of(query, "repair"), *format = value_of(query, "format");
   int most;
-  int64_t before;
+  uint64_t sealed;
   const char *why = NULL;
-  if (parse_page(limit, token, &most, &before, &why) ? most < 1 || most > PAGE_MOST || before < 0 : !why) {
+  if (parse_page(limit, token, &most, &sealed, &why) ? most < 1 || most > PAGE_MOST : !why) {
     abort();
   }
   int64_t ms = parse_wait_ms(wait, prefer);

@@ -109,6 +109,30 @@ test('the number of a request tells nothing of those of others', async (t) => {
   assert.ok(steps.some((step) => step < 0n) && steps.some((step) => step > 0n), 'they do not count');
 });
 
+test('page tokens do not count what others have', async (t) => {
+  const { d, add, upload } = await tenants(t);
+  const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')], tokens = [], seen = [];
+  for (let i = 0; i < 12; i++) for (const who of [ann, bob]) await upload(who, `${shapes.tetrahedron}# ${i} ${who === ann}\n`);
+  const page = (token) => d.get('/v1/meshes', { ...bob, query: { limit: 1, ...(token && { page_token: token }) } });
+  for (let token, first = true; token || first; first = false) {
+    const { json } = await page(token);
+    seen.push(...json.meshes.map(({ id }) => id));
+    if ((token = json.next_page_token)) tokens.push(token);
+  }
+  assert.equal(new Set(seen).size, 12);
+  assert.equal(tokens.length, 11);
+  for (const token of tokens) assert.match(token, /^[0-9a-f]{16}$/);
+  const numbers = tokens.map((token) => BigInt(`0x${token}`)), steps = numbers.slice(1).map((n, i) => n - numbers[i]);
+  assert.equal(new Set(steps).size, steps.length, 'no step comes twice');
+  assert.ok(steps.some((step) => step < 0n) && steps.some((step) => step > 0n), 'they do not count');
+  // They are of this data folder: good after a restart, and nothing else is one.
+  await d.stop();
+  await d.start();
+  assert.deepEqual((await page(tokens[4])).json.meshes.map(({ id }) => id), [seen[5]]);
+  for (const token of ['1', 'ffff', '0'.repeat(16), 'f'.repeat(16), '000000000000000c', tokens[4].slice(1), `${tokens[4]}0`, tokens[4].replace(/.$/, (c) => (c === '0' ? '1' : '0'))])
+    assertProblem(await page(token), 400, 'bad-query', token);
+});
+
 test('an upload does not tell that others have the same', async (t) => {
   const { d, add, upload } = await tenants(t);
   const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')];
