@@ -92,7 +92,7 @@ export async function openPage(browser, url, { hash = '', ...options } = {}) {
 }
 
 /** Until `check` gives something true. */
-export async function until(check, what, limit = 300_000) {
+export async function until(check, what, limit = 900_000) {
   const end = Date.now() + limit;
   for (;;) {
     const value = await check();
