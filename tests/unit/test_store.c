@@ -14,43 +14,15 @@
 #include <cmocka.h>
 
 #include "store/database.h"
-#include "store/objects.h"
 #include "store/owners.h"
 #include "store/tokens.h"
-
-typedef struct stored {
-  char data[64];
-  objects *store;
-  catalogue *cat;
-} stored;
+#include "support_store.h"
 
 static void reopen(stored *s) {
   catalogue_close(s->cat);
   objects_close(s->store);
   assert_int_equal(objects_open(s->data, &s->store), STORE_OK);
   assert_int_equal(catalogue_open(s->data, &s->cat), STORE_OK);
-}
-
-static int setup(void **state) {
-  stored *s = calloc(1, sizeof *s);
-  strcpy(s->data, access("/dev/shm", W_OK) == 0 ? "/dev/shm/orbmorph-store-XXXXXX" : "/tmp/orbmorph-store-XXXXXX");
-  if (!mkdtemp(s->data) || objects_open(s->data, &s->store) != STORE_OK ||
-      catalogue_open(s->data, &s->cat) != STORE_OK) {
-    return -1;
-  }
-  *state = s;
-  return 0;
-}
-
-static int teardown(void **state) {
-  stored *s = *state;
-  char command[128];
-  catalogue_close(s->cat);
-  objects_close(s->store);
-  snprintf(command, sizeof command, "rm -rf %s", s->data);
-  int failed = system(command);
-  free(s);
-  return failed;
 }
 
 static void make_id(char id[ORB_ID_SIZE], char digit) {
@@ -571,18 +543,18 @@ static void test_many_tokens(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test_setup_teardown(test_objects, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_temporaries, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_resources, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_attempts, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_recovery, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_migrations, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_migration_to_owners, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_owners, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_owners_of_results, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_owners_of_meshes, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_forgetting, setup, teardown),
-      cmocka_unit_test_setup_teardown(test_many_tokens, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_objects, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_temporaries, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_resources, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_attempts, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_recovery, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_migrations, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_migration_to_owners, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_owners, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_owners_of_results, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_owners_of_meshes, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_forgetting, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_many_tokens, stored_setup, stored_teardown),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

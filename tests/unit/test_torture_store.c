@@ -12,40 +12,12 @@
 #include <cmocka.h>
 
 #include "log.h"
-#include "store/objects.h"
 #include "store/owners.h"
 #include "store/tokens.h"
+#include "support_store.h"
 #include "torture/torture.h"
 
-typedef struct stored {
-  char data[64];
-  objects *store;
-  catalogue *cat;
-  int64_t number; /* of the run: names what it makes */
-} stored;
-
-static int setup(void **state) {
-  stored *s = calloc(1, sizeof *s);
-  strcpy(s->data, access("/dev/shm", W_OK) == 0 ? "/dev/shm/orbmorph-torture-XXXXXX" : "/tmp/orbmorph-torture-XXXXXX");
-  if (!mkdtemp(s->data) || objects_open(s->data, &s->store) != STORE_OK ||
-      catalogue_open(s->data, &s->cat) != STORE_OK) {
-    return -1;
-  }
-  *state = s;
-  return 0;
-}
-
-static int teardown(void **state) {
-  stored *s = *state;
-  char command[128];
-  catalogue_close(s->cat);
-  objects_close(s->store);
-  snprintf(command, sizeof command, "rm -rf %s", s->data);
-  int failed = system(command);
-  free(s);
-  return failed;
-}
-
+/* Every run has a number of its own, stored.number, that names what it makes. */
 static void make_id(char *out, size_t size, char kind, int64_t number) {
   snprintf(out, size, "%c%0*llx", kind, (int)size - 2, (unsigned long long)number);
 }
@@ -250,7 +222,7 @@ static void test_start(void **state) {
 int main(void) {
   torture_begin();
   log_setup((log_level)(LOG_ERROR + 1), 0); /* nothing: each failure would say so */
-  const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_work, setup, teardown),
-                                     cmocka_unit_test_setup_teardown(test_start, setup, teardown)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_work, stored_setup, stored_teardown),
+                                     cmocka_unit_test_setup_teardown(test_start, stored_setup, stored_teardown)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
