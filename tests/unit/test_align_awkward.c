@@ -12,9 +12,9 @@
 
 #include "align/pin.h"
 #include "numeric/vec3.h"
-#include "orbmorph/format.h"
 #include "support_align.h"
 #include "support_bodies.h"
+#include "support_shared.h"
 
 /* The k-th neighbour of vertex v, in the order of the triangles. */
 static int32_t neighbour(const orb_mesh *mesh, int32_t v, int k) {
@@ -256,17 +256,9 @@ static void work_is_bounded(void **state) {
 }
 
 static int load(orb_context *ctx, const char *name, orb_mesh *mesh, orb_embedding *embedding) {
-  char path[1024];
-  snprintf(path, sizeof path, "%s/good/%s", ORB_SHARED_MESHES, name);
-  FILE *file = fopen(path, "rb");
-  if (!file) {
+  if (!shared_mesh(ctx, name, mesh)) {
     return 0;
   }
-  static unsigned char bytes[1 << 20];
-  size_t size = fread(bytes, 1, sizeof bytes, file);
-  fclose(file);
-  assert_int_equal(orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, mesh, NULL), ORB_OK);
-  assert_int_equal(orb_mesh_repair(ctx, mesh, ORB_REPAIR_SAFE), ORB_OK);
   orb_embed_options options;
   orb_embed_defaults(&options);
   assert_int_equal(orb_embed(ctx, mesh, &options, embedding), ORB_OK);

@@ -11,8 +11,8 @@
 #include <cmocka.h>
 
 #include "orbmorph/embed.h"
-#include "orbmorph/format.h"
 #include "support_align.h"
+#include "support_shared.h"
 
 enum { LANDMARKS_MAX = 64, NAME_MAX_LENGTH = 128 };
 
@@ -21,32 +21,8 @@ static const char *const PAIRS[] = {"armadillo_29k-armadillo_86k", "bumpy_cube-r
                                     "koala_lr-koala_100k",         "shrec381-shrec388",     "shrec397-shrec393",
                                     "shrec397-shrec398",           "spot-koala_lr",         "spot-shrec381"};
 
-/* The bytes of a file below the folder of meshes, with a zero after them; NULL where there is none. */
-static unsigned char *slurp(const char *folder, const char *name, size_t *size) {
-  char path[1024];
-  snprintf(path, sizeof path, "%s/%s/%s", ORB_SHARED_MESHES, folder, name);
-  FILE *file = fopen(path, "rb");
-  if (!file) {
-    return NULL;
-  }
-  fseek(file, 0, SEEK_END);
-  *size = (size_t)ftell(file);
-  rewind(file);
-  unsigned char *bytes = malloc(*size + 1);
-  assert_non_null(bytes);
-  assert_int_equal(fread(bytes, 1, *size, file), *size);
-  bytes[*size] = 0;
-  fclose(file);
-  return bytes;
-}
-
 static void load(orb_context *ctx, const char *name, orb_mesh *mesh, orb_embedding *embedding) {
-  size_t size;
-  unsigned char *bytes = slurp("good", name, &size);
-  assert_non_null(bytes);
-  assert_int_equal(orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, mesh, NULL), ORB_OK);
-  free(bytes);
-  assert_int_equal(orb_mesh_repair(ctx, mesh, ORB_REPAIR_SAFE), ORB_OK);
+  assert_true(shared_mesh(ctx, name, mesh));
   orb_embed_options options;
   orb_embed_defaults(&options);
   assert_int_equal(orb_embed(ctx, mesh, &options, embedding), ORB_OK);
@@ -80,7 +56,7 @@ static int run_pair(orb_context *ctx, const char *name) {
   char file[NAME_MAX_LENGTH];
   size_t size;
   snprintf(file, sizeof file, "%s.json", name);
-  char *text = (char *)slurp("pairs", file, &size);
+  char *text = (char *)shared_bytes("pairs", file, &size);
   if (!text) {
     return 0;
   }

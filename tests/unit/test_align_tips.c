@@ -10,8 +10,8 @@
 
 #include "align/guess.h"
 #include "align/tips.h"
-#include "orbmorph/format.h"
 #include "support_shapes.h"
+#include "support_shared.h"
 
 enum { LIMBS = 5 };
 
@@ -157,21 +157,6 @@ static void mirror_images_are_left_out(void **state) {
   orb_context_destroy(ctx);
 }
 
-static int load(orb_context *ctx, const char *name, orb_mesh *mesh) {
-  char path[1024];
-  snprintf(path, sizeof path, "%s/good/%s", ORB_SHARED_MESHES, name);
-  FILE *file = fopen(path, "rb");
-  if (!file) {
-    return 0;
-  }
-  static unsigned char bytes[1 << 22];
-  size_t size = fread(bytes, 1, sizeof bytes, file);
-  fclose(file);
-  assert_int_equal(orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, mesh, NULL), ORB_OK);
-  assert_int_equal(orb_mesh_repair(ctx, mesh, ORB_REPAIR_SAFE), ORB_OK);
-  return 1;
-}
-
 /* The landmark of a list of vertices that is nearest in space. */
 static int nearest_of(const orb_mesh *mesh, const int32_t *list, int count, int32_t v) {
   int best = 0;
@@ -200,7 +185,7 @@ static void man_to_armadillo(void **state) {
   orb_mesh mesh[2];
   orb_guess guess;
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
-  int found = load(ctx, "human_man.obj", &mesh[0]) && load(ctx, "armadillo_29k.obj", &mesh[1]);
+  int found = shared_mesh(ctx, "human_man.obj", &mesh[0]) && shared_mesh(ctx, "armadillo_29k.obj", &mesh[1]);
   if (found) {
     assert_int_equal(orb_guess_find(ctx, &mesh[0], &mesh[1], &guess), ORB_OK);
     for (int k = 0; k < guess.count; k++) {

@@ -14,6 +14,7 @@
 
 #include "orbmorph/embed.h"
 #include "orbmorph/format.h"
+#include "support_shared.h"
 
 enum { LARGEST_FILE = 1700000 }; /* bytes; larger ones only with ORB_TEST_ALL in the environment */
 
@@ -26,26 +27,11 @@ static const struct {
              {"armadillo_86k.obj", 2.366},
              {"koala_100k.obj", 1.614}};
 
-static int read_file(const char *path, unsigned char **bytes, size_t *size) {
-  FILE *file = fopen(path, "rb");
-  if (!file || fseek(file, 0, SEEK_END) != 0) {
-    return 0;
-  }
-  *size = (size_t)ftell(file);
-  rewind(file);
-  *bytes = malloc(*size + 1);
-  int good = *bytes && fread(*bytes, 1, *size, file) == *size;
-  fclose(file);
-  return good;
-}
-
 static void embed_file(const char *folder, const char *name, unsigned repair) {
-  char path[4096];
-  unsigned char *bytes = NULL;
   size_t size = 0;
-  snprintf(path, sizeof path, "%s/%s", folder, name);
-  if (!read_file(path, &bytes, &size)) {
-    fail_msg("cannot read %s", path);
+  unsigned char *bytes = shared_bytes(folder, name, &size);
+  if (!bytes) {
+    fail_msg("cannot read %s/%s", folder, name);
   }
   if (size <= LARGEST_FILE || getenv("ORB_TEST_ALL")) {
     orb_context *ctx;
@@ -85,7 +71,7 @@ static void embed_folder(const char *name, unsigned repair) {
   }
   for (struct dirent *entry; (entry = readdir(list)) != NULL;) {
     if (entry->d_name[0] != '.') {
-      embed_file(folder, entry->d_name, repair);
+      embed_file(name, entry->d_name, repair);
     }
   }
   closedir(list);

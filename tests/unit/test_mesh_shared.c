@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "orbmorph/format.h"
+#include "support_shared.h"
 
 enum { COLUMNS = 48 };
 
@@ -58,19 +59,6 @@ static int column(const char *name) {
   }
   fail_msg("index.csv has no column %s", name);
   return 0;
-}
-
-static unsigned char *load(const char *path, size_t *size) {
-  FILE *file = fopen(path, "rb");
-  assert_non_null(file);
-  fseek(file, 0, SEEK_END);
-  *size = (size_t)ftell(file);
-  rewind(file);
-  unsigned char *bytes = malloc(*size + 1);
-  assert_non_null(bytes);
-  assert_int_equal(fread(bytes, 1, *size, file), *size);
-  fclose(file);
-  return bytes;
 }
 
 /* What a reason of the index asks for. */
@@ -157,10 +145,9 @@ static void check_row(orb_context *ctx) {
   const char *name = cell[column("name")], *bytes_column = cell[column("bytes")];
   const char *folder = cell[1];
   const char *fix = cell[column("fix")], *reason = cell[column("reason")], *form = cell[column("format")];
-  char path[1024];
-  snprintf(path, sizeof path, "%s/%s/%s", ORB_SHARED_MESHES, folder, name);
   size_t size;
-  unsigned char *bytes = load(path, &size);
+  unsigned char *bytes = shared_bytes(folder, name, &size);
+  assert_non_null(bytes);
   assert_int_equal(size, strtoul(bytes_column, NULL, 10));
   orb_mesh mesh;
   orb_format format;
