@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "orbmorph/utf8.h"
+
 typedef struct scanner {
   const unsigned char *at, *end, *begin;
   const char *why;
@@ -18,29 +20,10 @@ static int refuse(scanner *s, const char *why) {
   return 0;
 }
 
-/* Length of the well-formed UTF-8 sequence at p, 0 if it is none (RFC 3629). */
-static size_t sequence(const unsigned char *p, const unsigned char *end) {
-  unsigned char c = *p;
-  size_t n = c < 0x80 ? 1 : c < 0xc2 ? 0 : c < 0xe0 ? 2 : c < 0xf0 ? 3 : c < 0xf5 ? 4 : 0;
-  if (n == 0 || (size_t)(end - p) < n) {
-    return 0;
-  }
-  for (size_t i = 1; i < n; i++) {
-    if ((p[i] & 0xc0) != 0x80) {
-      return 0;
-    }
-  }
-  if ((c == 0xe0 && p[1] < 0xa0) || (c == 0xed && p[1] > 0x9f) || (c == 0xf0 && p[1] < 0x90) ||
-      (c == 0xf4 && p[1] > 0x8f)) {
-    return 0;
-  }
-  return n;
-}
-
 int orb_utf8_valid(const char *bytes, size_t size) {
   const unsigned char *p = (const unsigned char *)bytes, *end = p + size;
   while (p < end) {
-    size_t n = sequence(p, end);
+    size_t n = orb_utf8_length(p, (size_t)(end - p));
     if (n == 0 || *p == 0) {
       return 0;
     }
@@ -125,7 +108,7 @@ static int string(scanner *s) {
       }
       continue;
     }
-    size_t n = sequence(s->at, s->end);
+    size_t n = orb_utf8_length(s->at, (size_t)(s->end - s->at));
     if (n == 0) {
       return refuse(s, "a string is not valid UTF-8");
     }

@@ -7,6 +7,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "orbmorph/utf8.h"
+
 void orb_text_free(orb_text *text) {
   free(text->data);
   memset(text, 0, sizeof *text);
@@ -81,30 +83,13 @@ void orb_json_close(orb_text *text, char close) {
   orb_text_append(text, &close, 1);
 }
 
-/* The bytes of the character at s, or 0 if it is not UTF-8. The text ends in NUL, which continues nothing. */
-static size_t character(const unsigned char *s) {
-  size_t n = s[0] < 0x80                   ? 1
-             : s[0] >= 0xc2 && s[0] < 0xe0 ? 2
-             : (s[0] & 0xf0) == 0xe0       ? 3
-             : s[0] >= 0xf0 && s[0] < 0xf5 ? 4
-                                           : 0;
-  for (size_t i = 1; i < n; i++) {
-    if ((s[i] & 0xc0) != 0x80) {
-      return 0;
-    }
-  }
-  int overlong = (s[0] == 0xe0 && s[1] < 0xa0) || (s[0] == 0xf0 && s[1] < 0x90);
-  int beyond = (s[0] == 0xed && s[1] > 0x9f) || (s[0] == 0xf4 && s[1] > 0x8f); /* surrogates; above U+10FFFF */
-  return overlong || beyond ? 0 : n;
-}
-
 /* What is not UTF-8 becomes U+FFFD: details quote callers, and may be cut within a character. */
 static void quoted(orb_text *text, const char *s) {
   orb_text_append(text, "\"", 1);
   const char *run = s;
   for (size_t n; *s; s += n) {
     unsigned char c = (unsigned char)*s;
-    size_t whole = character((const unsigned char *)s);
+    size_t whole = orb_utf8_length((const unsigned char *)s, 4);
     n = whole ? whole : 1;
     if (whole && c >= 0x20 && c != '"' && c != '\\') {
       continue;

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "orbmorph/utf8.h"
 
 enum {
   GLB_HEADER = 12,
@@ -70,33 +71,11 @@ static void numbers(writer *w, const char *before, const double *values, int cou
   text(w, "]");
 }
 
-/* The length of the UTF-8 sequence at p, 0 if it is none. */
-static size_t utf8_length(const unsigned char *p) {
-  size_t more = *p < 0x80                 ? 0
-                : *p >= 0xc2 && *p < 0xe0 ? 1
-                : *p >= 0xe0 && *p < 0xf0 ? 2
-                : *p >= 0xf0 && *p < 0xf5 ? 3
-                                          : 9;
-  if (more == 9) {
-    return 0;
-  }
-  for (size_t i = 1; i <= more; i++) {
-    if ((p[i] & 0xc0) != 0x80) {
-      return 0;
-    }
-  }
-  if ((p[0] == 0xe0 && p[1] < 0xa0) || (p[0] == 0xed && p[1] > 0x9f) || (p[0] == 0xf0 && p[1] < 0x90) ||
-      (p[0] == 0xf4 && p[1] > 0x8f)) {
-    return 0;
-  }
-  return more + 1;
-}
-
 static void quoted(writer *w, const char *before, const char *string) {
   text(w, before);
   text(w, "\"");
   for (const unsigned char *p = (const unsigned char *)string; *p;) {
-    size_t length = utf8_length(p);
+    size_t length = orb_utf8_length(p, 4);
     char escape[8];
     if (length == 0) {
       text(w, "\xef\xbf\xbd");
