@@ -304,17 +304,9 @@ store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, co
 }
 
 int64_t catalogue_jobs_ended(catalogue *cat) {
-  int64_t count = -1;
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st = database_statement(db, "SELECT count(*) FROM job WHERE state>=2");
-  if (st && sqlite3_step(st) == SQLITE_ROW) {
-    count = sqlite3_column_int64(st, 0);
-  }
-  if (st) {
-    sqlite3_reset(st);
-  }
-  catalogue_reader_done(cat, db);
-  return count;
+  return rows_integer(cat, db, st);
 }
 
 /* By the rows' own order: the oldest are nearly all ended, and so found without a sort. */

@@ -220,7 +220,6 @@ int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant) {
 }
 
 int64_t catalogue_ownerless(catalogue *cat) {
-  int64_t count = -1;
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st = database_statement(db,
                                         "SELECT (SELECT count(*) FROM resource r WHERE NOT EXISTS"
@@ -229,12 +228,5 @@ int64_t catalogue_ownerless(catalogue *cat) {
                                         "  (SELECT 1 FROM resource r WHERE r.kind=o.kind AND r.id=o.id))"
                                         " + (SELECT count(*) FROM tenant t WHERE t.bytes !="
                                         "  (SELECT coalesce(sum(o.bytes), 0) FROM owner o WHERE o.tenant=t.name))");
-  if (st && sqlite3_step(st) == SQLITE_ROW) {
-    count = sqlite3_column_int64(st, 0);
-  }
-  if (st) {
-    sqlite3_reset(st);
-  }
-  catalogue_reader_done(cat, db);
-  return count;
+  return rows_integer(cat, db, st);
 }

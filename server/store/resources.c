@@ -142,17 +142,11 @@ void catalogue_touch(catalogue *cat, resource_kind kind, const char *id) {
 
 int64_t catalogue_bytes(catalogue *cat, int derived_only) {
   database *db = catalogue_reader(cat);
-  int64_t total = -1;
   sqlite3_stmt *st = database_statement(db, "SELECT sum(bytes) FROM total WHERE kind>=?1");
   if (st) {
     sqlite3_bind_int(st, 1, derived_only ? 1 : 0);
-    if (sqlite3_step(st) == SQLITE_ROW) {
-      total = sqlite3_column_int64(st, 0);
-    }
-    sqlite3_reset(st);
   }
-  catalogue_reader_done(cat, db);
-  return total;
+  return rows_integer(cat, db, st);
 }
 
 store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET]) {

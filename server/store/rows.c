@@ -45,3 +45,15 @@ int rows_many(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *ki
   }
   return -1;
 }
+
+int64_t rows_integer(catalogue *cat, database *db, sqlite3_stmt *st) {
+  int64_t value = -1;
+  if (st) {
+    if (sqlite3_step(st) == SQLITE_ROW) {
+      value = sqlite3_column_int64(st, 0);
+    }
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  return value;
+}

@@ -25,6 +25,8 @@ extern const row_kind resource_rows; /* of seq, kind, id, sha, json, bytes, crea
 store_result rows_one(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out);
 /* The number filled, −1 where not all that there are could be read. */
 int rows_many(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out, int limit);
+/* The integer that the query's one row is, −1 where it cannot be read. */
+int64_t rows_integer(catalogue *cat, database *db, sqlite3_stmt *st);
 
 static inline void row_text(sqlite3_stmt *st, int column, char *out, size_t size) {
   const unsigned char *text = sqlite3_column_text(st, column);
