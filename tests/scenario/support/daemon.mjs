@@ -127,7 +127,7 @@ export class Daemon {
   }
 
   /** Waits for the end of a job. */
-  async ended(job, { seconds = 900 } = {}) {
+  async ended(job, { seconds = slow ? 3600 : 900 } = {}) {
     const until = Date.now() + seconds * 1000;
     while (!['succeeded', 'failed', 'cancelled'].includes(job.state)) {
       assert.ok(Date.now() < until, `job ${job.id} has not ended: ${JSON.stringify(job)}`);
