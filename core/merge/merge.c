@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "merge/report.h"
+#include "mesh/refuse.h"
 
 void orb_merge_defaults(orb_merge_options *options) {
   memset(options, 0, sizeof *options);
@@ -53,6 +54,13 @@ orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char
   memset(out, 0, sizeof *out);
   if (shape_count < 2) {
     return orb_fail(ctx, ORB_E_BAD_OPTION, "A merge needs two shapes or more.");
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    status = orb_refuse_size(ctx, shapes[s].mesh);
+    if (status != ORB_OK) {
+      orb_context_error_edit(ctx)->shape = s;
+      return status;
+    }
   }
   orb_progress(ctx, "align", 0);
   ORB_GO(status, orb_align(ctx, shapes, shape_count, landmarks, landmark_count, &options->align, &out->alignment),

@@ -146,7 +146,33 @@ static void one_shape_is_refused(void **state) {
   orb_context_destroy(ctx);
 }
 
+/* All vertices in one place: there is nothing to show, whichever shape it is. */
+static void shapes_of_no_size_are_refused(void **state) {
+  (void)state;
+  orb_context *ctx;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh ball = shape_ball(ctx, 1), speck = shape_ball(ctx, 1);
+  orb_align_shape shapes[3] = {{&speck, ball.positions}, {&ball, ball.positions}, {&speck, ball.positions}};
+  const char *names[2] = {"one", "other"};
+  orb_merge_options options;
+  orb_merge_defaults(&options);
+  options.align.method = ORB_ALIGN_ROTATE;
+  stretch(&speck, 0, 0, 0);
+  for (int32_t i = 0; i < speck.vertex_count; i++) {
+    speck.positions[3 * i] = 7;
+  }
+  for (int32_t first = 0; first < 2; first++) {
+    orb_merge_result result;
+    assert_int_equal(orb_merge(ctx, shapes + first, names, 2, NULL, 0, &options, &result), ORB_E_DEGENERATE);
+    assert_int_equal(orb_context_error(ctx)->shape, first);
+  }
+  shape_free(ctx, &speck);
+  shape_free(ctx, &ball);
+  orb_context_destroy(ctx);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(two_ellipsoids), cmocka_unit_test(one_shape_is_refused)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(two_ellipsoids), cmocka_unit_test(one_shape_is_refused),
+                                     cmocka_unit_test(shapes_of_no_size_are_refused)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -53,7 +53,8 @@ typedef struct orb_merge_result {
 } orb_merge_result;
 
 /* Merges shape_count ≥ 2 embedded shapes. Stages: "align", "remesh", "transfer", "write". Landmark `at` arrays as for
- * orb_align(). names: shape_count names for the morph targets. */
+ * orb_align(). names: shape_count names for the morph targets. Errors: those of its parts, and ORB_E_DEGENERATE for a
+ * shape without a size that float32 could show, such as one whose vertices all lie in one place. */
 ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
                                     int32_t shape_count, const orb_landmark *landmarks, int32_t landmark_count,
                                     const orb_merge_options *options, orb_merge_result *out);
