@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "align/warp.h"
 #include "numeric/vec3.h"
 #include "support_align.h"
 #include "support_bodies.h"
@@ -79,40 +80,126 @@ static void one_way_moves_the_later_shapes_only(void **state) {
   bodies_close(&b);
 }
 
-/* With small radii and landmarks that agree already but for one, what lies beyond that one's radius stays, up to the
- * affine part of the warp, which is next to nothing when all others hold it; with a large radius far points move. */
+/* Landmarks that agree already but for one, which moves by an edge: how far the points beyond `beyond` of it move. */
+static double moved_beyond(bodies *b, double beyond, double for_all, double own) {
+  orb_align_shape shapes[2] = {b->shape[1], b->shape[1]};
+  bodies_like(b, 40);
+  for (int k = 0; k < 40; k++) {
+    b->at[k][0] = b->at[k][1];
+    b->landmark[k].radius = k == 20 ? own : 0;
+  }
+  int32_t v = bodies_vertex_at(&b->mesh[1], &b->at[20][1]), h = 0;
+  while (b->mesh[1].triangles[h] != v) {
+    h++;
+  }
+  assert_int_equal(orb_place_of_vertex(b->ctx, &b->mesh[1], b->mesh[1].triangles[orb_next(h)], &b->at[20][1]), ORB_OK);
+  orb_align_options options = bodies_options(ORB_ALIGN_RBF);
+  orb_alignment out;
+  options.rbf_radius = for_all;
+  options.one_way = 1;
+  align_and_check(b->ctx, shapes, 2, b->landmark, 40, &options, &out);
+  const double *centre = out.shapes[0].points + 3 * v;
+  double most = 0;
+  for (int32_t u = 0; u < b->mesh[1].vertex_count; u++) {
+    if (orb_distance2(b->points[1] + 3 * u, centre) > beyond * beyond) {
+      most = fmax(most, sqrt(orb_distance2(out.shapes[1].points + 3 * u, out.shapes[0].points + 3 * u)));
+    }
+  }
+  orb_alignment_free(b->ctx, &out);
+  return most;
+}
+
+/* With small radii what lies beyond the moving one's radius stays, up to the affine part of the warp, which is next to
+ * nothing when all others hold it; with a large radius far points move. */
 static void a_radius_bounds_the_influence(void **state) {
   (void)state;
   bodies b;
-  double moved[2] = {0, 0};
   bodies_open(&b, NULL);
-  orb_align_shape shapes[2] = {b.shape[1], b.shape[1]};
-  for (int wide = 0; wide < 2; wide++) {
-    bodies_like(&b, 40);
-    for (int k = 0; k < 40; k++) {
-      b.at[k][0] = b.at[k][1];
+  double narrow = moved_beyond(&b, 0.5, 0.2, 0), wide = moved_beyond(&b, 0.5, 1.5, 0);
+  assert_true(narrow < 0.02);
+  assert_true(wide > narrow);
+  bodies_close(&b);
+}
+
+/* A landmark's own radius rules its influence, not the one for all: the moving one's reaches as far as it says, beside
+ * others that reach nowhere. */
+static void a_landmark_has_a_radius_of_its_own(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  double narrow = moved_beyond(&b, 0.5, 0.2, 0), same = moved_beyond(&b, 0.5, 0.4, 0.2);
+  double wide = moved_beyond(&b, 0.5, 0.2, 1.5), beyond = moved_beyond(&b, 1.5, 0.2, 1.5);
+  assert_true(narrow < 0.02 && same < 0.02);
+  assert_true(wide > 3 * narrow); /* up to 1.5 away */
+  assert_true(beyond < wide / 3); /* and no farther */
+  bodies_close(&b);
+}
+
+/* The points of the landmarks that the second pass takes, where one step of the first has carried them: the paper's
+ * warp through the others, from their points after the rotations to the means. */
+static void carry(const bodies *b, const orb_alignment *rotated, int s, double (*carried)[3]) {
+  double centres[3 * COUNT], moves[3 * COUNT], radii[COUNT];
+  int32_t count = 0;
+  for (int k = 0; k < COUNT; k++) {
+    const double *p[2];
+    for (int i = 0; i < 2; i++) {
+      p[i] = rotated->shapes[i].points + 3 * rotated->shapes[i].landmark_vertices[k];
     }
-    int32_t v = bodies_vertex_at(&b.mesh[1], &b.at[20][1]), h = 0;
-    while (b.mesh[1].triangles[h] != v) {
-      h++;
+    memcpy(carried[k], p[s], 3 * sizeof(double));
+    if (b->landmark[k].pass == 0) {
+      double mean[3];
+      for (int c = 0; c < 3; c++) {
+        mean[c] = p[0][c] + p[1][c];
+      }
+      (void)orb_normalize(mean);
+      memcpy(centres + 3 * count, p[s], 3 * sizeof(double));
+      orb_sub(mean, p[s], moves + 3 * count);
+      radii[count++] = 2;
     }
-    assert_int_equal(orb_place_of_vertex(b.ctx, &b.mesh[1], b.mesh[1].triangles[orb_next(h)], &b.at[20][1]), ORB_OK);
-    orb_align_options options = bodies_options(ORB_ALIGN_RBF);
-    orb_alignment out;
-    options.rbf_radius = wide ? 1.5 : 0.2;
-    options.one_way = 1;
-    align_and_check(b.ctx, shapes, 2, b.landmark, 40, &options, &out);
-    const double *centre = out.shapes[0].points + 3 * v;
-    for (int32_t u = 0; u < b.mesh[1].vertex_count; u++) {
-      if (orb_distance2(b.points[1] + 3 * u, centre) > 0.5 * 0.5) {
-        double d = sqrt(orb_distance2(out.shapes[1].points + 3 * u, out.shapes[0].points + 3 * u));
-        moved[wide] = d > moved[wide] ? d : moved[wide];
+  }
+  orb_warp warp;
+  assert_int_equal(orb_warp_create(b->ctx, centres, moves, radii, count, &warp), ORB_OK);
+  orb_warp_apply(b->ctx, &warp, carried[0], COUNT, carried[0]);
+  orb_warp_free(b->ctx, &warp);
+}
+
+/* The second pass begins where the first ends: its landmarks meet in the middle of where the others' warp has carried
+ * them, and the others stay where they met. */
+static void later_passes_begin_where_earlier_ones_end(void **state) {
+  (void)state;
+  bodies b;
+  bodies_open(&b, NULL);
+  shifted(&b, 0.08);
+  for (int k = 0; k < COUNT; k++) {
+    b.landmark[k].pass = k % 7 == 3;
+  }
+  orb_align_options options = bodies_options(ORB_ALIGN_ROTATE);
+  orb_alignment rotated, out;
+  assert_int_equal(orb_align(b.ctx, b.shape, 2, b.landmark, COUNT, &options, &rotated), ORB_OK);
+  options = bodies_options(ORB_ALIGN_RBF);
+  options.rbf_radius = 2;
+  options.rbf_steps = 1;
+  align_and_check(b.ctx, b.shape, 2, b.landmark, COUNT, &options, &out);
+  double carried[2][COUNT][3], unlike = 0;
+  carry(&b, &rotated, 0, carried[0]);
+  carry(&b, &rotated, 1, carried[1]);
+  for (int k = 0; k < COUNT; k++) {
+    double wanted[3], simply[3];
+    for (int c = 0; c < 3; c++) {
+      wanted[c] = carried[0][k][c] + carried[1][k][c];
+      simply[c] = 0;
+      for (int s = 0; s < 2; s++) {
+        simply[c] += rotated.shapes[s].points[3 * rotated.shapes[s].landmark_vertices[k] + c];
       }
     }
-    orb_alignment_free(b.ctx, &out);
+    (void)orb_normalize(wanted);
+    (void)orb_normalize(simply);
+    unlike = fmax(unlike, orb_distance2(wanted, simply));
+    assert_true(orb_distance2(out.shapes[0].points + 3 * out.shapes[0].landmark_vertices[k], wanted) < 1e-20);
   }
-  assert_true(moved[0] < 0.02);
-  assert_true(moved[1] > moved[0]);
+  assert_true(unlike > 1e-8); /* not where they would meet in one pass */
+  orb_alignment_free(b.ctx, &rotated);
+  orb_alignment_free(b.ctx, &out);
   bodies_close(&b);
 }
 
@@ -136,6 +223,8 @@ int main(void) {
       cmocka_unit_test(every_option_meets),
       cmocka_unit_test(one_way_moves_the_later_shapes_only),
       cmocka_unit_test(a_radius_bounds_the_influence),
+      cmocka_unit_test(a_landmark_has_a_radius_of_its_own),
+      cmocka_unit_test(later_passes_begin_where_earlier_ones_end),
       cmocka_unit_test(crossed_landmarks_meet),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
