@@ -363,6 +363,135 @@ static void landmarks_and_limits_are_kept(void **state) {
   orb_context_destroy(ctx);
 }
 
+/* A cube of n × n quads a side, from −1 to 1; its points are its directions. */
+static void cube_shape(orb_context *ctx, int n, orb_aligned_shape *out) {
+  int32_t *number = malloc((size_t)(n + 1) * (size_t)(n + 1) * (size_t)(n + 1) * sizeof *number);
+  memset(out, 0, sizeof *out);
+  out->mesh.positions = ORB_NEW(ctx, double, 3 * (6 * n * n + 2));
+  out->points = ORB_NEW(ctx, double, 3 * (6 * n * n + 2));
+  out->mesh.triangles = ORB_NEW(ctx, int32_t, 36 * n * n);
+  for (int i = 0; i < (n + 1) * (n + 1) * (n + 1); i++) {
+    int at[3] = {i % (n + 1), i / (n + 1) % (n + 1), i / (n + 1) / (n + 1)};
+    if (at[0] % n && at[1] % n && at[2] % n) {
+      continue; /* inside */
+    }
+    double *p = out->mesh.positions + 3 * out->mesh.vertex_count, *unit = out->points + 3 * out->mesh.vertex_count;
+    for (int k = 0; k < 3; k++) {
+      unit[k] = p[k] = 2.0 * at[k] / n - 1;
+    }
+    (void)orb_normalize(unit);
+    number[i] = out->mesh.vertex_count++;
+  }
+  int step[3] = {1, n + 1, (n + 1) * (n + 1)};
+  for (int q = 0; q < 6 * n * n; q++) {
+    int axis = q % 3, u = step[(axis + 1) % 3], v = step[(axis + 2) % 3];
+    int corner = q / 3 % 2 * n * step[axis] + q / 6 % n * u + q / 6 / n * v;
+    int32_t four[4] = {number[corner], number[corner + u], number[corner + u + v], number[corner + v]};
+    for (int t = 0; t < 2; t++) {
+      int32_t *c = out->mesh.triangles + 3 * out->mesh.triangle_count++;
+      c[0] = four[0];
+      c[1] = q / 3 % 2 ? four[1 + t] : four[2 + t];
+      c[2] = q / 3 % 2 ? four[2 + t] : four[1 + t];
+    }
+  }
+  free(number);
+}
+
+static double distance_to(const orb_nearest *tree, double x, double y, double z) {
+  orb_place place;
+  const double p[3] = {x, y, z};
+  return sqrt(orb_nearest_query(tree, p, INFINITY, &place));
+}
+
+/* How much of a surface faces away from all six sides of a cube by more than ten degrees. */
+static double slanting_area(const orb_supermesh *m, const double *p) {
+  double area = 0;
+  for (int32_t t = 0; t < m->triangle_count; t++) {
+    double u[3], v[3], n[3];
+    orb_sub(p + 3 * m->triangles[3 * t + 1], p + 3 * m->triangles[3 * t], u);
+    orb_sub(p + 3 * m->triangles[3 * t + 2], p + 3 * m->triangles[3 * t], v);
+    orb_cross(u, v, n);
+    double most = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+    area += most < cos(M_PI / 18) * orb_length(n) ? 0.5 * orb_length(n) : 0;
+  }
+  return area;
+}
+
+/* A cube against a ball keeps its edges and corners: each of their points is within the tolerance h, and what slants is
+ * no more than chamfers that go h deep: 2h wide along 12 edges of length 2, twice over for corners and slivers. */
+static void sharp_edges_survive(void **state) {
+  (void)state;
+  static const double tolerance = 0.002;
+  orb_context *ctx = remesh_context(2);
+  orb_aligned_shape shapes[2];
+  cube_shape(ctx, 16, &shapes[0]);
+  sphere_shape(ctx, SPHERE_ICO, 4, 0.2, 3, &shapes[1]);
+  orb_supermesh m;
+  run(ctx, shapes, 2, 0, tolerance, 0, &m);
+  sphere_assert_valid(&m, shapes, 2);
+  assert_within(ctx, &m, shapes, 2, tolerance);
+  double *p = positions_of(&m, &shapes[0], 0), h = tolerance * 2 * sqrt(3);
+  orb_nearest *tree;
+  assert_int_equal(orb_nearest_create(ctx, p, m.triangles, m.triangle_count, &tree), ORB_OK);
+  for (int edge = 0; edge < 12; edge++) {
+    for (int i = 0; i <= 50; i++) {
+      double q[3];
+      q[edge % 3] = i / 25.0 - 1;
+      q[(edge + 1) % 3] = edge / 3 % 2 ? 1 : -1;
+      q[(edge + 2) % 3] = edge / 6 ? 1 : -1;
+      assert_true(distance_to(tree, q[0], q[1], q[2]) <= h);
+    }
+  }
+  assert_true(slanting_area(&m, p) <= 2 * 12 * 2 * 2 * h);
+  free(p);
+  orb_nearest_destroy(ctx, tree);
+  orb_supermesh_free(ctx, &m);
+  sphere_shape_free(ctx, &shapes[0]);
+  sphere_shape_free(ctx, &shapes[1]);
+  orb_context_destroy(ctx);
+}
+
+/* A spike of one vertex, four times as long as the ball that it grows from is thick and a thirtieth as wide as long,
+ * where the other shape has nothing: its tip and its flanks stay. */
+static void thin_limbs_survive(void **state) {
+  (void)state;
+  static const double tolerance = 0.002;
+  orb_context *ctx = remesh_context(2);
+  orb_aligned_shape shapes[2];
+  sphere_shape(ctx, SPHERE_ICO, 4, 0, 0, &shapes[0]);
+  sphere_shape(ctx, SPHERE_UV, 24, 0, 2, &shapes[1]);
+  double *tip = shapes[0].mesh.positions + 3 * 700;
+  for (int k = 0; k < 3; k++) {
+    tip[k] = 9 * shapes[0].points[3 * 700 + k];
+  }
+  orb_supermesh m;
+  run(ctx, shapes, 2, 0, tolerance, 0, &m);
+  sphere_assert_valid(&m, shapes, 2);
+  assert_within(ctx, &m, shapes, 2, tolerance);
+  double *p = positions_of(&m, &shapes[0], 0), h = tolerance * sphere_diagonal(&shapes[0]);
+  double least = INFINITY;
+  for (int32_t v = 0; v < m.vertex_count; v++) {
+    least = fmin(least, sqrt(orb_distance2(p + 3 * v, tip)));
+  }
+  assert_true(least <= h);
+  orb_nearest *tree;
+  assert_int_equal(orb_nearest_create(ctx, p, m.triangles, m.triangle_count, &tree), ORB_OK);
+  for (int32_t e = 0; e < 3 * shapes[0].mesh.triangle_count; e++) { /* edges from the tip, all the way down */
+    const double *q = shapes[0].mesh.positions + 3 * shapes[0].mesh.triangles[orb_next(e)];
+    for (int i = 0; i <= 20 && shapes[0].mesh.triangles[e] == 700; i++) {
+      double f = i / 20.0;
+      assert_true(distance_to(tree, tip[0] + f * (q[0] - tip[0]), tip[1] + f * (q[1] - tip[1]),
+                              tip[2] + f * (q[2] - tip[2])) <= h);
+    }
+  }
+  free(p);
+  orb_nearest_destroy(ctx, tree);
+  orb_supermesh_free(ctx, &m);
+  sphere_shape_free(ctx, &shapes[0]);
+  sphere_shape_free(ctx, &shapes[1]);
+  orb_context_destroy(ctx);
+}
+
 static void bad_options_are_named(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(1);
@@ -404,6 +533,8 @@ int main(void) {
       cmocka_unit_test(wound_maps_keep_the_tolerance),
       cmocka_unit_test(four_shapes),
       cmocka_unit_test(landmarks_and_limits_are_kept),
+      cmocka_unit_test(sharp_edges_survive),
+      cmocka_unit_test(thin_limbs_survive),
       cmocka_unit_test(bad_options_are_named),
       cmocka_unit_test(threads_do_not_matter),
       cmocka_unit_test(failing_allocations),
