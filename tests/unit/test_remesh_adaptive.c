@@ -397,9 +397,8 @@ static void cube_shape(orb_context *ctx, int n, orb_aligned_shape *out) {
   free(number);
 }
 
-static double distance_to(const orb_nearest *tree, double x, double y, double z) {
+static double distance_to(const orb_nearest *tree, const double p[3]) {
   orb_place place;
-  const double p[3] = {x, y, z};
   return sqrt(orb_nearest_query(tree, p, INFINITY, &place));
 }
 
@@ -417,38 +416,54 @@ static double slanting_area(const orb_supermesh *m, const double *p) {
   return area;
 }
 
+/* A shape beside another one within a tolerance, and its surface as the supermesh has it. */
+typedef struct kept {
+  orb_context *ctx;
+  orb_aligned_shape shapes[2];
+  orb_supermesh mesh;
+  double *positions;
+  orb_nearest *tree;
+} kept;
+
+static void keep(kept *k, double tolerance) {
+  run(k->ctx, k->shapes, 2, 0, tolerance, 0, &k->mesh);
+  sphere_assert_valid(&k->mesh, k->shapes, 2);
+  assert_within(k->ctx, &k->mesh, k->shapes, 2, tolerance);
+  k->positions = positions_of(&k->mesh, &k->shapes[0], 0);
+  assert_int_equal(orb_nearest_create(k->ctx, k->positions, k->mesh.triangles, k->mesh.triangle_count, &k->tree),
+                   ORB_OK);
+}
+
+static void kept_free(kept *k) {
+  free(k->positions);
+  orb_nearest_destroy(k->ctx, k->tree);
+  orb_supermesh_free(k->ctx, &k->mesh);
+  sphere_shape_free(k->ctx, &k->shapes[0]);
+  sphere_shape_free(k->ctx, &k->shapes[1]);
+  orb_context_destroy(k->ctx);
+}
+
 /* A cube against a ball keeps its edges and corners: each of their points is within the tolerance h, and what slants is
  * no more than chamfers that go h deep: 2h wide along 12 edges of length 2, twice over for corners and slivers. */
 static void sharp_edges_survive(void **state) {
   (void)state;
   static const double tolerance = 0.002;
-  orb_context *ctx = remesh_context(2);
-  orb_aligned_shape shapes[2];
-  cube_shape(ctx, 16, &shapes[0]);
-  sphere_shape(ctx, SPHERE_ICO, 4, 0.2, 3, &shapes[1]);
-  orb_supermesh m;
-  run(ctx, shapes, 2, 0, tolerance, 0, &m);
-  sphere_assert_valid(&m, shapes, 2);
-  assert_within(ctx, &m, shapes, 2, tolerance);
-  double *p = positions_of(&m, &shapes[0], 0), h = tolerance * 2 * sqrt(3);
-  orb_nearest *tree;
-  assert_int_equal(orb_nearest_create(ctx, p, m.triangles, m.triangle_count, &tree), ORB_OK);
+  double h = tolerance * 2 * sqrt(3);
+  kept k = {.ctx = remesh_context(2)};
+  cube_shape(k.ctx, 16, &k.shapes[0]);
+  sphere_shape(k.ctx, SPHERE_ICO, 4, 0.2, 3, &k.shapes[1]);
+  keep(&k, tolerance);
   for (int edge = 0; edge < 12; edge++) {
     for (int i = 0; i <= 50; i++) {
       double q[3];
       q[edge % 3] = i / 25.0 - 1;
       q[(edge + 1) % 3] = edge / 3 % 2 ? 1 : -1;
       q[(edge + 2) % 3] = edge / 6 ? 1 : -1;
-      assert_true(distance_to(tree, q[0], q[1], q[2]) <= h);
+      assert_true(distance_to(k.tree, q) <= h);
     }
   }
-  assert_true(slanting_area(&m, p) <= 2 * 12 * 2 * 2 * h);
-  free(p);
-  orb_nearest_destroy(ctx, tree);
-  orb_supermesh_free(ctx, &m);
-  sphere_shape_free(ctx, &shapes[0]);
-  sphere_shape_free(ctx, &shapes[1]);
-  orb_context_destroy(ctx);
+  assert_true(slanting_area(&k.mesh, k.positions) <= 2 * 12 * 2 * 2 * h);
+  kept_free(&k);
 }
 
 /* A spike of one vertex, four times as long as the ball that it grows from is thick and a thirtieth as wide as long,
@@ -456,40 +471,32 @@ static void sharp_edges_survive(void **state) {
 static void thin_limbs_survive(void **state) {
   (void)state;
   static const double tolerance = 0.002;
-  orb_context *ctx = remesh_context(2);
-  orb_aligned_shape shapes[2];
-  sphere_shape(ctx, SPHERE_ICO, 4, 0, 0, &shapes[0]);
-  sphere_shape(ctx, SPHERE_UV, 24, 0, 2, &shapes[1]);
-  double *tip = shapes[0].mesh.positions + 3 * 700;
-  for (int k = 0; k < 3; k++) {
-    tip[k] = 9 * shapes[0].points[3 * 700 + k];
+  enum { TIP = 700 };
+  kept k = {.ctx = remesh_context(2)};
+  sphere_shape(k.ctx, SPHERE_ICO, 4, 0, 0, &k.shapes[0]);
+  sphere_shape(k.ctx, SPHERE_UV, 24, 0, 2, &k.shapes[1]);
+  const orb_mesh *mesh = &k.shapes[0].mesh;
+  double *tip = mesh->positions + 3 * TIP, least = INFINITY;
+  for (int c = 0; c < 3; c++) {
+    tip[c] = 9 * k.shapes[0].points[3 * TIP + c];
   }
-  orb_supermesh m;
-  run(ctx, shapes, 2, 0, tolerance, 0, &m);
-  sphere_assert_valid(&m, shapes, 2);
-  assert_within(ctx, &m, shapes, 2, tolerance);
-  double *p = positions_of(&m, &shapes[0], 0), h = tolerance * sphere_diagonal(&shapes[0]);
-  double least = INFINITY;
-  for (int32_t v = 0; v < m.vertex_count; v++) {
-    least = fmin(least, sqrt(orb_distance2(p + 3 * v, tip)));
+  double h = tolerance * sphere_diagonal(&k.shapes[0]);
+  keep(&k, tolerance);
+  for (int32_t v = 0; v < k.mesh.vertex_count; v++) {
+    least = fmin(least, sqrt(orb_distance2(k.positions + 3 * v, tip)));
   }
   assert_true(least <= h);
-  orb_nearest *tree;
-  assert_int_equal(orb_nearest_create(ctx, p, m.triangles, m.triangle_count, &tree), ORB_OK);
-  for (int32_t e = 0; e < 3 * shapes[0].mesh.triangle_count; e++) { /* edges from the tip, all the way down */
-    const double *q = shapes[0].mesh.positions + 3 * shapes[0].mesh.triangles[orb_next(e)];
-    for (int i = 0; i <= 20 && shapes[0].mesh.triangles[e] == 700; i++) {
-      double f = i / 20.0;
-      assert_true(distance_to(tree, tip[0] + f * (q[0] - tip[0]), tip[1] + f * (q[1] - tip[1]),
-                              tip[2] + f * (q[2] - tip[2])) <= h);
+  for (int32_t e = 0; e < 3 * mesh->triangle_count; e++) { /* edges from the tip, all the way down */
+    const double *foot = mesh->positions + 3 * mesh->triangles[orb_next(e)];
+    for (int i = 0; i <= 20 && mesh->triangles[e] == TIP; i++) {
+      double q[3];
+      for (int c = 0; c < 3; c++) {
+        q[c] = tip[c] + i / 20.0 * (foot[c] - tip[c]);
+      }
+      assert_true(distance_to(k.tree, q) <= h);
     }
   }
-  free(p);
-  orb_nearest_destroy(ctx, tree);
-  orb_supermesh_free(ctx, &m);
-  sphere_shape_free(ctx, &shapes[0]);
-  sphere_shape_free(ctx, &shapes[1]);
-  orb_context_destroy(ctx);
+  kept_free(&k);
 }
 
 static void bad_options_are_named(void **state) {
