@@ -150,3 +150,12 @@ orb_mesh shape_ball(orb_context *ctx, int levels) {
   }
   return mesh;
 }
+
+int64_t shape_repaired(const orb_mesh *mesh, const char *kind) {
+  for (int i = 0; i < mesh->repair_count; i++) {
+    if (strcmp(mesh->repairs[i].kind, kind) == 0) {
+      return mesh->repairs[i].count;
+    }
+  }
+  return 0;
+}

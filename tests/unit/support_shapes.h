@@ -14,6 +14,8 @@ orb_mesh shape_globe(orb_context *ctx, int around, int rows);
 orb_mesh shape_cylinder(orb_context *ctx, int around, int rows, double length);
 /* An octahedron split `levels` times four-way, on the unit sphere. */
 orb_mesh shape_ball(orb_context *ctx, int levels);
+/* How many repairs of a kind a mesh tells of. */
+int64_t shape_repaired(const orb_mesh *mesh, const char *kind);
 void shape_free(orb_context *ctx, orb_mesh *mesh);
 
 #endif

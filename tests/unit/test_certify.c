@@ -9,21 +9,9 @@
 #include <cmocka.h>
 
 #include "orbmorph/embed.h"
+#include "support_context.h"
 #include "support_exact.h"
 #include "support_shapes.h"
-
-static orb_context *ctx;
-
-static int set_up(void **unused) {
-  (void)unused;
-  orb_context_options options = {.threads = 2};
-  return orb_context_create(&options, &ctx) != ORB_OK;
-}
-static int tear_down(void **unused) {
-  (void)unused;
-  orb_context_destroy(ctx);
-  return 0;
-}
 
 static orb_certificate certify(const orb_mesh *mesh) {
   orb_certificate out;
@@ -183,5 +171,5 @@ int main(void) {
                                      cmocka_unit_test(test_doubly_wrapped),
                                      cmocka_unit_test(test_nearly_flat),
                                      cmocka_unit_test(test_same_for_any_threads)};
-  return cmocka_run_group_tests(tests, set_up, tear_down);
+  return cmocka_run_group_tests(tests, context_two_threads, context_end);
 }

@@ -12,19 +12,7 @@
 
 #include "format/number.h"
 #include "orbmorph/format.h"
-
-static orb_context *ctx;
-
-static int set_up(void **state) {
-  (void)state;
-  orb_context_options options = {.threads = 1};
-  return orb_context_create(&options, &ctx) != ORB_OK;
-}
-static int tear_down(void **state) {
-  (void)state;
-  orb_context_destroy(ctx); /* asserts that nothing was left behind */
-  return 0;
-}
+#include "support_context.h"
 
 static orb_status read_bytes(const void *bytes, size_t size, orb_mesh *mesh) {
   return orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, mesh, NULL);
@@ -402,5 +390,5 @@ int main(void) {
                                      cmocka_unit_test(test_errors),    cmocka_unit_test(test_range),
                                      cmocka_unit_test(test_numbers),   cmocka_unit_test(test_prefixes),
                                      cmocka_unit_test(test_mutations), cmocka_unit_test(test_attributes)};
-  return cmocka_run_group_tests(tests, set_up, tear_down);
+  return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

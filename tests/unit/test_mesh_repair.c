@@ -12,19 +12,8 @@
 
 #include "numeric/vec3.h"
 #include "orbmorph/format.h"
-
-static orb_context *ctx;
-
-static int set_up(void **state) {
-  (void)state;
-  orb_context_options options = {.threads = 1};
-  return orb_context_create(&options, &ctx) != ORB_OK;
-}
-static int tear_down(void **state) {
-  (void)state;
-  orb_context_destroy(ctx);
-  return 0;
-}
+#include "support_context.h"
+#include "support_shapes.h"
 
 static orb_status mend(const char *text, unsigned repair, orb_mesh *mesh) {
   assert_int_equal(orb_mesh_read(ctx, (const unsigned char *)text, strlen(text), ORB_FORMAT_OBJ, mesh, NULL), ORB_OK);
@@ -33,15 +22,6 @@ static orb_status mend(const char *text, unsigned repair, orb_mesh *mesh) {
     orb_mesh_free(ctx, mesh);
   }
   return status;
-}
-
-static int64_t repaired(const orb_mesh *mesh, const char *kind) {
-  for (int i = 0; i < mesh->repair_count; i++) {
-    if (strcmp(mesh->repairs[i].kind, kind) == 0) {
-      return mesh->repairs[i].count;
-    }
-  }
-  return 0;
 }
 
 #define TETRA_V "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
@@ -57,7 +37,7 @@ static void test_safe(void **state) {
 
   /* inside out: turned, also by none */
   assert_int_equal(mend(TETRA_V "f 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n", ORB_REPAIR_NONE, &mesh), ORB_OK);
-  assert_int_equal(repaired(&mesh, "turn-inside-out"), 4);
+  assert_int_equal(shape_repaired(&mesh, "turn-inside-out"), 4);
   orb_mesh_extent(&mesh, &extent);
   assert_true(fabs(extent.volume - 1.0 / 6) < 1e-15);
   orb_mesh_free(ctx, &mesh);
@@ -66,10 +46,10 @@ static void test_safe(void **state) {
   const char *messy = "v 9 9 9\n" TETRA_V "f 2 4 3\nf 2 3 5\nf 2 4 5\nf 3 4 5\nf 5 4 3\nf 2 2 3\n";
   assert_int_equal(mend(messy, ORB_REPAIR_NONE, &mesh), ORB_E_NOT_MANIFOLD);
   assert_int_equal(mend(messy, ORB_REPAIR_SAFE, &mesh), ORB_OK);
-  assert_int_equal(repaired(&mesh, "reorient"), 1);
-  assert_int_equal(repaired(&mesh, "duplicate-faces"), 1);
-  assert_int_equal(repaired(&mesh, "degenerate-faces"), 1);
-  assert_int_equal(repaired(&mesh, "unused-vertices"), 1);
+  assert_int_equal(shape_repaired(&mesh, "reorient"), 1);
+  assert_int_equal(shape_repaired(&mesh, "duplicate-faces"), 1);
+  assert_int_equal(shape_repaired(&mesh, "degenerate-faces"), 1);
+  assert_int_equal(shape_repaired(&mesh, "unused-vertices"), 1);
   assert_int_equal(mesh.vertex_of_source[0], -1);
   assert_int_equal(mesh.vertex_of_source[1], 0);
   assert_int_equal(mesh.source[3], 4);
@@ -80,7 +60,7 @@ static void test_safe(void **state) {
   /* a seam with −0 against 0 */
   const char *seam = TETRA_V "v -0 0 -0\nv 1 -0 0\nf 5 3 6\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
   assert_int_equal(mend(seam, ORB_REPAIR_SAFE, &mesh), ORB_OK);
-  assert_int_equal(repaired(&mesh, "weld"), 2);
+  assert_int_equal(shape_repaired(&mesh, "weld"), 2);
   assert_int_equal(mesh.vertex_count, 4);
   assert_int_equal(mesh.vertex_of_source[4], 0);
   assert_int_equal(mesh.vertex_of_source[5], 1);
@@ -114,7 +94,7 @@ static void test_welding_of_cubes(void **state) {
   assert_int_equal(mend(text, ORB_REPAIR_SAFE, &mesh), ORB_OK);
   assert_int_equal(mesh.vertex_count, 8);
   assert_int_equal(mesh.triangle_count, 12);
-  assert_int_equal(repaired(&mesh, "weld"), 16);
+  assert_int_equal(shape_repaired(&mesh, "weld"), 16);
   orb_mesh_free(ctx, &mesh);
 
   /* two loose cubes that touch along an edge stay two cubes */
@@ -203,7 +183,7 @@ static void test_fill(void **state) {
     assert_int_equal(mend(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CLOSED);
     assert_int_equal(orb_context_error(ctx)->boundary_loops, 2);
     assert_int_equal(mend(text, ORB_REPAIR_FILL_HOLES, &mesh), ORB_OK);
-    assert_int_equal(repaired(&mesh, "fill_holes"), 2);
+    assert_int_equal(shape_repaired(&mesh, "fill_holes"), 2);
     assert_int_equal(mesh.triangle_count, 2 * n + 2 * (n - 2));
     orb_mesh_extent(&mesh, &extent);
     assert_true(fabs(extent.volume - 0.5 * n * sin(2 * M_PI / n)) < 1e-12); /* a prism of height 1 */
@@ -299,5 +279,5 @@ int main(void) {
                                      cmocka_unit_test(test_refusals), cmocka_unit_test(test_torus),
                                      cmocka_unit_test(test_fill),     cmocka_unit_test(test_concave_polygon),
                                      cmocka_unit_test(test_nearest),  cmocka_unit_test(test_copy)};
-  return cmocka_run_group_tests(tests, set_up, tear_down);
+  return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "orbmorph/format.h"
+#include "support_shapes.h"
 #include "support_shared.h"
 
 enum { COLUMNS = 48 };
@@ -103,15 +104,6 @@ static orb_status mend(orb_context *ctx, const unsigned char *bytes, size_t size
   return status;
 }
 
-static int64_t repaired(const orb_mesh *mesh, const char *kind) {
-  for (int i = 0; i < mesh->repair_count; i++) {
-    if (strcmp(mesh->repairs[i].kind, kind) == 0) {
-      return mesh->repairs[i].count;
-    }
-  }
-  return 0;
-}
-
 static void check_mended(orb_context *ctx, const orb_mesh *mesh) {
   orb_topology topology;
   orb_extent extent;
@@ -170,11 +162,11 @@ static void check_row(orb_context *ctx) {
     assert_int_equal(mesh.vertex_count, atoi(cell[column("usable_v")]) + split_fix);
     assert_int_equal(mesh.triangle_count, atoi(cell[column("usable_f")]));
     check_mended(ctx, &mesh);
-    assert_true((repaired(&mesh, "weld") > 0) == (strncmp(fix, "weld", 4) == 0 || format == ORB_FORMAT_STL));
-    assert_true((repaired(&mesh, "reorient") > 0) == (strcmp(fix, "reorient") == 0));
-    assert_int_equal(repaired(&mesh, "split-vertices"), split_fix);
-    assert_true((repaired(&mesh, "largest_component") > 0) == largest);
-    assert_int_equal(repaired(&mesh, "degenerate-faces"), strstr(fix, "drop200") ? 200 : 0);
+    assert_true((shape_repaired(&mesh, "weld") > 0) == (strncmp(fix, "weld", 4) == 0 || format == ORB_FORMAT_STL));
+    assert_true((shape_repaired(&mesh, "reorient") > 0) == (strcmp(fix, "reorient") == 0));
+    assert_int_equal(shape_repaired(&mesh, "split-vertices"), split_fix);
+    assert_true((shape_repaired(&mesh, "largest_component") > 0) == largest);
+    assert_int_equal(shape_repaired(&mesh, "degenerate-faces"), strstr(fix, "drop200") ? 200 : 0);
     orb_mesh_free(ctx, &mesh);
     if (strcmp(folder, "weldable") == 0) {
       assert_int_not_equal(mend(ctx, bytes, size, ORB_REPAIR_NONE, &mesh, &format), ORB_OK);

@@ -12,23 +12,12 @@
 #include "embed/hierarchy.h"
 #include "embed/kernel.h"
 #include "embed/multires.h"
+#include "support_context.h"
 #include "support_exact.h"
 #include "support_shapes.h"
 
-static orb_context *ctx;
-
 static void assert_near(double x, double y, double within) {
   assert_true(fabs(x - y) <= within);
-}
-static int set_up(void **unused) {
-  (void)unused;
-  orb_context_options options = {.threads = 2};
-  return orb_context_create(&options, &ctx) != ORB_OK;
-}
-static int tear_down(void **unused) {
-  (void)unused;
-  orb_context_destroy(ctx);
-  return 0;
 }
 
 /* A ball with bumps, so that nothing is symmetric. */
@@ -284,5 +273,5 @@ int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_levels),       cmocka_unit_test(test_again),
                                      cmocka_unit_test(test_keep_and_pin), cmocka_unit_test(test_kernels),
                                      cmocka_unit_test(test_kernel_point), cmocka_unit_test(test_distortion)};
-  return cmocka_run_group_tests(tests, set_up, tear_down);
+  return cmocka_run_group_tests(tests, context_two_threads, context_end);
 }

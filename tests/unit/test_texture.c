@@ -11,19 +11,7 @@
 
 #include "format/texture.h"
 #include "orbmorph/format.h"
-
-static orb_context *ctx;
-
-static int set_up(void **state) {
-  (void)state;
-  orb_context_options options = {.threads = 1};
-  return orb_context_create(&options, &ctx) != ORB_OK;
-}
-static int tear_down(void **state) {
-  (void)state;
-  orb_context_destroy(ctx); /* asserts that nothing was left behind */
-  return 0;
-}
+#include "support_context.h"
 
 /* A red pixel, by zlib. */
 static const unsigned char PNG[] = {0x89, 'P',  'N',  'G',  0x0d, 0x0a, 0x1a, 0x0a, 0,   0,    0,    13,   'I',  'H',
@@ -201,5 +189,5 @@ static void test_samplers(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_png), cmocka_unit_test(test_jpeg),
                                      cmocka_unit_test(test_junk_is_left_out), cmocka_unit_test(test_samplers)};
-  return cmocka_run_group_tests(tests, set_up, tear_down);
+  return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }
