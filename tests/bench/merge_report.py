@@ -6,7 +6,7 @@
 Repeats Table 2 and Fig. 19 of Peng & Timalsena 2016 on real pairs of like sizes, with its remeshing and its convex hull
 beside ours, and measures speed and growth on generated bodies. Best of the repeats is taken. With --keep alignments are
 kept there from run to run. The page is written after every part, so that a run that is cut short leaves what it has.
---only growth or visual measures that alone, and puts it in its place on the page that there is. Standard library only.
+--only growth, visual or five measures that alone, and puts it in its place on the page that there is. Standard library only.
 """
 import argparse
 import json
@@ -26,6 +26,7 @@ PAPER = [  # Table 2: pair, vertices, alignment s, remeshing s, supermesh vertic
 PAIRS = ["cow-spot", "spot-koala_lr", "human_man-penguin", "human_man-human_woman", "shrec397-shrec393",
          "bumpy_cube-round_cube", "armadillo_29k-armadillo_86k", "koala_lr-koala_100k"]
 METHODS = ["adaptive", "overlay", "subdivision", "convex-hull"]
+FIVE = ["shrec393.off", "round_cube.obj", "airliner.obj", "shrec388.off", "stellated_15k.obj"]  # nearest to 10k vertices
 FIG19 = ["human_man-human_woman", "cow-spot"]
 
 
@@ -64,6 +65,24 @@ class Bench:
         if result and result["seconds"]["align"] > 0:
             clock.write_text(str(result["seconds"]["align"]))
         return result, len(about["landmarks"]), float(clock.read_text()) if clock.exists() else None
+
+    def five(self):
+        """Five shapes in one: generated bodies, unlike real ones turned to one another, and animals by landmarks."""
+        good, marks = self.meshes / "good", self.folder / "five.json"
+        read = lambda name: json.loads((self.meshes / "pairs" / f"{name}.json").read_text())["landmarks"]
+        # one list of features for the whole class: line i of one pair is line i of the next
+        places = [[b[1], a[1], b[0], a[0], c[0]] for a, b, c in
+                  zip(read("shrec381-shrec388"), read("shrec397-shrec393"), read("spot-shrec381"))]
+        marks.write_text(json.dumps([{"name": f"l{i}", "at": [{"vertex": v} for v in at]}
+                                     for i, at in enumerate(places)]))
+        animals = [f"shrec{n}.off" for n in (393, 388, 397, 381)] + ["spot.obj"]
+        return {"bodies of 10,000 vertices": self.remesh("--bodies", "20000,20000,20000,20000,20000", repeat=3),
+                ", ".join(name.split(".")[0] for name in FIVE) + "; `rotate`": self.remesh(
+                    "--align", "rotate", "--keep", self.keep / "five-unlike.keep", *(good / name for name in FIVE),
+                    repeat=3),
+                ", ".join(name.split(".")[0] for name in animals) + "; `pin`, `fast`, 21 landmarks": self.remesh(
+                    "--align", "pin", "--align-preset", "fast", "--landmarks", marks, "--keep",
+                    self.keep / "five-animals.keep", *(good / name for name in animals), repeat=3)}
 
     def poses(self, glb):
         """The picture of both shapes, side by side."""
@@ -180,7 +199,7 @@ def main():
     parser.add_argument("--out", default="docs")
     parser.add_argument("--keep")
     parser.add_argument("--limit", type=float, default=60, help="seconds after which a run is given up, and noted")
-    parser.add_argument("--only", choices=["growth", "visual"])
+    parser.add_argument("--only", choices=["growth", "visual", "five"])
     parser.add_argument("--quick", action="store_true", help="two pairs and small bodies only")
     options = parser.parse_args()
     out = pathlib.Path(options.out)
@@ -191,11 +210,14 @@ def main():
         if options.only == "growth":
             replace_part(out / "bench-merging.md", growth_part(growth(bench, sizes)))
             return
+        if options.only == "five":
+            replace_part(out / "bench-merging.md", five_part(bench.five()))
+            return
         names, drawn = (PAIRS[:2], FIG19[1:]) if options.quick else (PAIRS, FIG19)
         if options.only == "visual":
             replace_part(out / "bench-merging.md", visual_part({name: figure19(bench, name, out) for name in drawn}))
             return
-        page = {"rows": [], "details": [], "pictures": {}, "speed": {}, "five": None, "grown": [], "notes": bench.notes}
+        page = {"rows": [], "details": [], "pictures": {}, "speed": {}, "five": {}, "grown": [], "notes": bench.notes}
         for name in drawn:
             page["pictures"][name] = figure19(bench, name, out)
             write(out, **page)
@@ -205,10 +227,21 @@ def main():
             page["details"] += details
             write(out, **page)
         page["speed"] = {m: bench.remesh("--bodies", "68000,48000", "--remesh", m) for m in METHODS}
-        page["five"] = bench.remesh("--bodies", "20000,20000,20000,20000,20000")
+        page["five"] = bench.five()
         for size in sizes:
             page["grown"] += growth(bench, [size])
             write(out, **page)
+
+
+def five_part(five):
+    return ["## Five shapes", "", "Five shapes in one supermesh, `adaptive` (0.1 %), the alignment apart; best of three.", "",
+            "| shapes | input triangles | triangles | by largest | bound % | turned % | s | processor s | transfer s |",
+            "|---|---|---|---|---|---|---|---|---|"] + [
+        f"| {name} | {r['input_triangles']:,} | {r['triangles']:,} | {r['by_largest']:.2f} | "
+        f"{100 * worst(r, 'hausdorff_relative'):.2g} | "
+        f"{100 * sum(shape['inverted'] for shape in r['shapes']) / r['triangles']:.3f} | "
+        f"{seconds(r['seconds']['remesh'])} | {seconds(r['seconds']['remesh_cpu'])} | "
+        f"{seconds(r['seconds']['transfer'])} |" for name, r in five.items() if r]
 
 
 def growth_part(grown):
@@ -261,10 +294,7 @@ def write(out, rows, details, pictures, speed, five, grown, notes):
              "took it 188 s.", "", "| method | triangles | seconds | processor seconds |", "|---|---|---|---|"]
     text += [f"| {m} | {r['triangles']:,} | {r['seconds']['remesh']:.2f} | {r['seconds']['remesh_cpu']:.2f} |"
              for m, r in speed.items() if r]
-    if five:
-        s = five["seconds"]
-        text += ["", f"Five such bodies of 10,000 vertices, `adaptive`: remeshing {s['remesh']:.2f} s, transfer "
-                     f"{s['transfer']:.2f} s, writing {s['write']:.2f} s;", f"{five['triangles']:,} triangles."]
+    text += [""] + five_part(five)
     text += [""] + growth_part(grown)
     text += [""] + visual_part(pictures)
     text += [f"\nRefused or given up: {note}" for note in notes]
