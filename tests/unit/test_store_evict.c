@@ -48,7 +48,10 @@ static int teardown(void **state) {
 
 static void number_id(char id[ORB_ID_SIZE], char kind, int number) {
   memset(id, kind, ORB_ID_SIZE - 1);
-  snprintf(id + ORB_ID_SIZE - 9, 9, "%08d", number);
+  id[ORB_ID_SIZE - 1] = 0;
+  for (int at = ORB_ID_SIZE - 2; number > 0 || at == ORB_ID_SIZE - 2; at--, number /= 10) {
+    id[at] = (char)('0' + number % 10);
+  }
 }
 
 /* An embedding of mesh `number`, last used at `used`. */
