@@ -86,6 +86,8 @@ export class Daemon {
   async request(method, target, { body, headers, query, signal } = {}) {
     const url = new URL(target, this.url);
     for (const [name, value] of Object.entries(query ?? {})) url.searchParams.set(name, value);
+    // Whoever computed for long before this has not seen yet that the daemon closed an idle connection: it is looked for.
+    for (let turn = 0; turn < 2; turn++) await new Promise(setImmediate);
     const isJson = body !== undefined && !(body instanceof Uint8Array) && typeof body !== 'string';
     const response = await fetch(url, {
       method,
