@@ -8,9 +8,10 @@
  * The landmarks are joined by guesses: their mirror images, where both shapes are symmetric (compose_mirror.c); these
  * hold likewise. There are three kinds of starts. The shape bent onto the other in space (compose_targets.c) is good
  * where it folds little; flips on the sphere are then allowed against a growing barrier until local untangling clears
- * them all. A map walked to on the sphere by the landmarks, the guesses and some samples of the bent shape
- * (compose_walk.c) has no flips to begin with. The best map so far, drawn to the targets. From a start on the level is
- * refined up to all vertices, and no flip is allowed again. The map of least energy wins, if it is better than the
+ * them all; what is sound of one that nearly came to a map is used (compose_near.c). A map walked to on the sphere by
+ * the landmarks, the guesses and some samples of the bent shape (compose_walk.c) has no flips to begin with. The best
+ * map so far, drawn to the targets. From a start on the level is refined up to all vertices, and no flip is allowed
+ * again. The map of least energy wins, if it is better than the
  * alignment as given. Limbs that it has twisted about their axes are turned back in the end (compose_unwind.c).
  */
 #include "align/compose.h"
@@ -47,6 +48,7 @@ static void cm_run_free(cm_run *c) {
   orb_free(ctx, c->goal_normal);
   orb_free(ctx, c->goal_place);
   orb_free(ctx, c->keep);
+  orb_free(ctx, c->sound);
   orb_hierarchy_destroy(ctx, c->hierarchy);
   orb_free(ctx, c->position);
   orb_free(ctx, c->local);
@@ -69,6 +71,7 @@ static orb_status prepare(cm_run *c) {
   c->x = ORB_NEW(ctx, double, 3 * n);
   c->normal = ORB_NEW(ctx, double, 3 * n);
   c->keep = ORB_NEW0(ctx, unsigned char, n);
+  c->sound = ORB_NEW0(ctx, unsigned char, n);
   c->position = ORB_NEW(ctx, double, 3 * n);
   c->local = ORB_NEW(ctx, int32_t, n);
   c->place = ORB_NEW0(ctx, orb_place, n);
@@ -77,8 +80,8 @@ static orb_status prepare(cm_run *c) {
   c->goal = ORB_NEW(ctx, double, 3 * n);
   c->goal_normal = ORB_NEW(ctx, double, 3 * n);
   c->goal_place = ORB_NEW(ctx, orb_place, n);
-  if (!c->x || !c->normal || !c->keep || !c->position || !c->local || !c->place || !c->start || !c->best || !c->goal ||
-      !c->goal_normal || !c->goal_place) {
+  if (!c->x || !c->normal || !c->keep || !c->sound || !c->position || !c->local || !c->place || !c->start || !c->best ||
+      !c->goal || !c->goal_normal || !c->goal_place) {
     return ORB_E_NO_MEMORY;
   }
   orb_extent extent;
@@ -217,7 +220,12 @@ static orb_status run_start(cm_run *c, cm_start start) {
     if (flips <= level.triangle_count / HOPELESS) {
       ORB_GO(status, cm_clear_flips(c, &level, SOFT_ROUNDS, &flips), done);
     }
-    if (flips && (r->live == c->vertex_count || r->live > LAST_START || flips > level.triangle_count / HOPELESS)) {
+    int last = r->live == c->vertex_count || r->live > LAST_START;
+    if (flips && last && start == CM_SPATIAL && c->pairs.count > 0 && cm_is_near(&level, flips)) {
+      ORB_GO(status, cm_keep_sound(c, &level, to_mesh), done);
+      ORB_GO(status, cm_release(c, &level, to_mesh, &flips), done);
+    }
+    if (flips && (last || flips > level.triangle_count / HOPELESS)) {
       goto done; /* this guess leads nowhere: not an error, another one or the given alignment stays */
     }
     for (int32_t v = 0; v < c->vertex_count && flips; v++) {
@@ -283,15 +291,30 @@ static orb_status given_energy(cm_run *c, double *energy) {
   return status;
 }
 
+/* Walks to a map in which the first `count` pairs meet: by way of samples, of few, of none. */
+static orb_status walk_pairs(cm_run *c, int32_t count, int *stuck) {
+  c->pairs.count = count;
+  *stuck = 1;
+  for (int samples = c->has_sound ? CM_SOUND_STEPS : CM_STEPS; count > 0 && *stuck; samples /= 4) {
+    ORB_TRY(cm_walk(c, samples >= CM_STEPS ? samples : 0, stuck));
+    if (samples < CM_STEPS) {
+      break;
+    }
+  }
+  return ORB_OK;
+}
+
 /* Before the starts that need a map in which all pairs meet: one is walked to, or the guesses are given up. */
 static orb_status meet_pairs(cm_run *c) {
-  int stuck = 1;
-  if (c->pairs.count > 0) {
-    ORB_TRY(cm_walk(c, CM_STEPS, &stuck));
-  }
-  if (stuck && c->pairs.count > c->pairs.landmarks) {
+  int stuck, guesses = c->pairs.count > c->pairs.landmarks;
+  ORB_TRY(walk_pairs(c, c->pairs.count, &stuck));
+  if (stuck && guesses) {
+    int near = c->has_sound;
+    ORB_TRY(walk_pairs(c, near ? c->pairs.landmarks : 0, &stuck));
     c->pairs.count = c->pairs.landmarks;
-    memcpy(c->start, c->moving->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
+    if (stuck) {
+      memcpy(c->start, c->moving->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
+    }
     ORB_TRY(cm_bend(c, 0));
     ORB_TRY(prepare_levels(c));
   }

@@ -84,6 +84,7 @@ orb_status cm_bend(cm_run *c, int samples) {
   int32_t *vertex = ORB_NEW(ctx, int32_t, (size_t)c->pairs.count + CM_SAMPLES);
   goal_job job = {.c = c};
   orb_status status = ORB_E_NO_MEMORY;
+  c->has_sound = 0;
   if (!goal || !vertex) {
     goto done;
   }

@@ -6,8 +6,9 @@
 #include "embed/multires.h"
 
 enum {
-  CM_SAMPLES = 150, /* of a map, from which the moving shape is bent anew */
-  CM_STEPS = 25     /* most samples of the spatial targets that a walk goes by */
+  CM_SAMPLES = 150,    /* of a map, from which the moving shape is bent anew */
+  CM_STEPS = 25,       /* most samples of the spatial targets that a walk goes by */
+  CM_SOUND_STEPS = 100 /* and of a start that was nearly a map */
 };
 
 /* Where a start puts the vertices of its first level. */
@@ -50,6 +51,8 @@ typedef struct cm_run {
   double *goal_normal;
   orb_place *goal_place; /* on the fixed shape, of every vertex of the moving one */
   unsigned char *keep;
+  unsigned char *sound; /* vertices whose goal_place is from a start that was nearly a map, mesh order */
+  int has_sound;
   orb_hierarchy *hierarchy;
   double *position; /* x in the order of the surface */
   int32_t *local;
@@ -69,11 +72,19 @@ ORB_MUST_CHECK orb_status cm_bend(cm_run *run, int samples);
 /* Puts the vertices of a level where the start has them. to_mesh: of the surface's vertices. */
 void cm_guess(cm_run *run, cm_level *level, const int32_t *to_mesh, cm_start start);
 
+/* compose_near.c. Whether a level with so many flips is nearly a map. */
+int cm_is_near(const cm_level *level, int32_t flips);
+/* Lets held vertices near the flips go, clears these, and holds them again at their points. *flips: that are left, and
+ * vertices that did not come home. */
+ORB_MUST_CHECK orb_status cm_release(cm_run *run, cm_level *level, const int32_t *to_mesh, int32_t *flips);
+/* Notes where the vertices away from the flips are: run->sound, run->goal_place. */
+ORB_MUST_CHECK orb_status cm_keep_sound(cm_run *run, const cm_level *level, const int32_t *to_mesh);
+
 /* compose_walk.c. The landmarks, and guesses from them. */
 ORB_MUST_CHECK orb_status cm_pairs_create(cm_run *run);
-/* Embeds both shapes anew so that all pairs meet, together with as many samples of the spatial targets as can be met
- * with them. run->start is what comes of it, and if run->both is set the fixed shape's sphere is replaced, else the map
- * is carried to it. *stuck: nothing came of it, and all is as it was. */
+/* Embeds both shapes anew so that all pairs meet, and with them at most so many samples of the spatial targets, or
+ * of what is sound of a start. run->start is what comes of it, and if run->both is set the fixed shape's sphere is replaced,
+ * else the map is carried to it. *stuck: nothing came of it, and all is as it was. */
 ORB_MUST_CHECK orb_status cm_walk(cm_run *run, int32_t samples, int *stuck);
 
 /* compose.c. All vertices at these points, the landmarks pinned; s: their order, of the caller. */

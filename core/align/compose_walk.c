@@ -17,7 +17,7 @@
 enum { LEVEL = 300, LEVEL_A_PAIR = 6 };
 static const double OFF_SURFACE = 2; /* mean distances of the samples from the surface: farther is no target */
 static const double FACING = 0.7;    /* least cosine between a sample's normal and the surface's */
-static const double APART = 0.15;    /* least distance of a sample from any pair */
+static const double APART = 0.15, SOUND_APART = 0.04; /* least distance of a sample from any pair */
 
 static int is_paired(const cm_pairs *p, int32_t moving, int32_t fixed) {
   for (int32_t i = 0; i < p->count; i++) {
@@ -42,7 +42,7 @@ orb_status cm_pairs_create(cm_run *c) {
   cm_pairs *p = &c->pairs;
   size_t n = (size_t)c->landmark_count;
   int32_t found = 0, *guesses[2] = {ORB_NEW(ctx, int32_t, n + 1), ORB_NEW(ctx, int32_t, n + 1)};
-  p->capacity = 2 * c->landmark_count + CM_STEPS;
+  p->capacity = 2 * c->landmark_count + CM_SOUND_STEPS;
   p->moving = ORB_NEW(ctx, int32_t, p->capacity);
   p->fixed = ORB_NEW(ctx, int32_t, p->capacity);
   if (!guesses[0] || !guesses[1] || !p->moving || !p->fixed) {
@@ -68,10 +68,11 @@ done:
 }
 
 static int is_apart(const cm_run *c, int32_t moving, int32_t fixed) {
+  double apart = c->has_sound ? SOUND_APART : APART;
   for (int32_t i = 0; i < c->pairs.count; i++) {
     double d = orb_distance2(c->x + 3 * (size_t)moving, c->x + 3 * (size_t)c->pairs.moving[i]);
     double e = orb_distance2(c->b.x + 3 * (size_t)fixed, c->b.x + 3 * (size_t)c->pairs.fixed[i]);
-    if (fmin(d, e) < APART * APART) {
+    if (fmin(d, e) < apart * apart) {
       return 0;
     }
   }
@@ -95,8 +96,10 @@ static orb_status sample_targets(cm_run *c, int32_t samples, int32_t *count) {
     double n[3];
     int32_t u = cm_nearest_corner(b->triangles, place);
     cm_surface_at(b, place, NULL, NULL, n);
-    if (off[i] <= OFF_SURFACE * mean && orb_dot(n, c->goal_normal + 3 * (size_t)spread[i]) >= FACING &&
-        is_apart(c, spread[i], u)) {
+    int fits = c->has_sound
+                   ? c->sound[spread[i]]
+                   : off[i] <= OFF_SURFACE * mean && orb_dot(n, c->goal_normal + 3 * (size_t)spread[i]) >= FACING;
+    if (fits && is_apart(c, spread[i], u)) {
       add_pair(&c->pairs, spread[i], u);
     }
   }
@@ -185,14 +188,13 @@ done:
 }
 
 orb_status cm_walk(cm_run *c, int32_t samples, int *stuck) {
-  int32_t held = c->pairs.count, count = held;
+  int32_t count = c->pairs.count;
+  *stuck = 1;
   if (samples > 0 && c->vertex_count > 8 * samples) {
     ORB_TRY(sample_targets(c, samples, &count));
   }
-  *stuck = 1;
-  ORB_TRY(walk_pairs(c, count, stuck));
-  if (*stuck && count > held) {
-    ORB_TRY(walk_pairs(c, held, stuck));
+  if (samples > 0 && count == c->pairs.count) {
+    return ORB_OK; /* nothing to sample: as without samples */
   }
-  return ORB_OK;
+  return walk_pairs(c, count, stuck);
 }

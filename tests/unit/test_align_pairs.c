@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "orbmorph/embed.h"
+#include "orbmorph/remesh.h"
 #include "support_align.h"
 #include "support_shared.h"
 
@@ -52,7 +53,17 @@ static void read_pair(char *text, pair *out) {
   assert_true(out->count > 0);
 }
 
-static int run_pair(orb_context *ctx, const char *name) {
+/* A pair with its landmarks, embedded. */
+typedef struct loaded {
+  pair p;
+  orb_mesh meshes[2];
+  orb_embedding embeddings[2];
+  orb_place at[LANDMARKS_MAX][2];
+  orb_landmark landmarks[LANDMARKS_MAX];
+  orb_align_shape shapes[2];
+} loaded;
+
+static int load_pair(orb_context *ctx, const char *name, loaded *l) {
   char file[NAME_MAX_LENGTH];
   size_t size;
   snprintf(file, sizeof file, "%s.json", name);
@@ -60,23 +71,32 @@ static int run_pair(orb_context *ctx, const char *name) {
   if (!text) {
     return 0;
   }
-  pair p;
-  read_pair(text, &p);
+  memset(l, 0, sizeof *l);
+  read_pair(text, &l->p);
   free(text);
-  orb_mesh meshes[2];
-  orb_embedding embeddings[2];
-  orb_place at[LANDMARKS_MAX][2];
-  orb_landmark landmarks[LANDMARKS_MAX];
-  orb_align_shape shapes[2];
-  memset(landmarks, 0, sizeof landmarks);
   for (int s = 0; s < 2; s++) {
-    load(ctx, p.names[s], &meshes[s], &embeddings[s]);
-    shapes[s] = (orb_align_shape){&meshes[s], embeddings[s].points};
-    for (int32_t k = 0; k < p.count; k++) {
-      int32_t v = meshes[s].vertex_of_source[p.vertices[k][s]];
-      assert_int_equal(orb_place_of_vertex(ctx, &meshes[s], v, &at[k][s]), ORB_OK);
-      landmarks[k].at = at[k];
+    load(ctx, l->p.names[s], &l->meshes[s], &l->embeddings[s]);
+    l->shapes[s] = (orb_align_shape){&l->meshes[s], l->embeddings[s].points};
+    for (int32_t k = 0; k < l->p.count; k++) {
+      int32_t v = l->meshes[s].vertex_of_source[l->p.vertices[k][s]];
+      assert_int_equal(orb_place_of_vertex(ctx, &l->meshes[s], v, &l->at[k][s]), ORB_OK);
+      l->landmarks[k].at = l->at[k];
     }
+  }
+  return 1;
+}
+
+static void free_pair(orb_context *ctx, loaded *l) {
+  for (int s = 0; s < 2; s++) {
+    orb_mesh_free(ctx, &l->meshes[s]);
+    orb_embedding_free(ctx, &l->embeddings[s]);
+  }
+}
+
+static int run_pair(orb_context *ctx, const char *name) {
+  loaded l;
+  if (!load_pair(ctx, name, &l)) {
+    return 0;
   }
   for (int m = 0; m < 2; m++) {
     orb_align_options options;
@@ -84,13 +104,10 @@ static int run_pair(orb_context *ctx, const char *name) {
     options.method = m ? ORB_ALIGN_RBF : ORB_ALIGN_PIN;
     options.preset = ORB_PRESET_FAST;
     orb_alignment out;
-    align_and_check(ctx, shapes, 2, landmarks, p.count, &options, &out);
+    align_and_check(ctx, l.shapes, 2, l.landmarks, l.p.count, &options, &out);
     orb_alignment_free(ctx, &out);
   }
-  for (int s = 0; s < 2; s++) {
-    orb_mesh_free(ctx, &meshes[s]);
-    orb_embedding_free(ctx, &embeddings[s]);
-  }
+  free_pair(ctx, &l);
   return 1;
 }
 
@@ -109,7 +126,62 @@ static void real_pairs_meet(void **state) {
   }
 }
 
+/* The mean distance of where the map takes a vertex from where it belongs, in diagonals of the second shape. */
+static double mean_error(orb_context *ctx, const loaded *l, const orb_alignment *a) {
+  const orb_mesh *first = &a->shapes[0].mesh, *second = &a->shapes[1].mesh;
+  int32_t n = l->meshes[0].vertex_count < first->vertex_count ? l->meshes[0].vertex_count : first->vertex_count;
+  orb_locator *locator;
+  orb_extent extent;
+  double sum = 0;
+  orb_mesh_extent(second, &extent);
+  assert_int_equal(orb_locator_create(ctx, a->shapes[1].points, second->vertex_count, second->triangles,
+                                      second->triangle_count, NULL, &locator),
+                   ORB_OK);
+  for (int32_t v = 0; v < n; v++) { /* vertex v of the one is vertex v of the other */
+    orb_place place;
+    double d = 0;
+    orb_locate(locator, a->shapes[0].points + 3 * (size_t)v, -1, &place);
+    for (int k = 0; k < 3; k++) {
+      double y = -second->positions[3 * (size_t)v + (size_t)k];
+      for (int c = 0; c < 3; c++) {
+        y += place.at[c] * second->positions[3 * (size_t)second->triangles[3 * place.triangle + c] + (size_t)k];
+      }
+      d += y * y;
+    }
+    sum += sqrt(d);
+  }
+  orb_locator_destroy(ctx, locator);
+  return sum / n / extent.diagonal;
+}
+
+/* The bent shape is nearly on the other one, but for a few folds about the fingers, at which landmarks hold. */
+static void more_landmarks_do_not_lead_astray(void **state) {
+  static const int32_t given[] = {10, 16};
+  (void)state;
+  orb_context *ctx;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  loaded l;
+  if (!load_pair(ctx, "human_man-human_woman", &l)) {
+    orb_context_destroy(ctx);
+    print_message("The folder of real meshes is not there.\n");
+    skip();
+  }
+  for (size_t i = 0; i < sizeof given / sizeof *given; i++) {
+    orb_align_options options;
+    orb_alignment out;
+    orb_align_defaults(&options);
+    options.method = ORB_ALIGN_PIN;
+    options.preset = ORB_PRESET_DEFAULT;
+    align_and_check(ctx, l.shapes, 2, l.landmarks, given[i], &options, &out);
+    assert_true(mean_error(ctx, &l, &out) <= 0.0035);
+    orb_alignment_free(ctx, &out);
+  }
+  free_pair(ctx, &l);
+  orb_context_destroy(ctx);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(real_pairs_meet)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(real_pairs_meet),
+                                     cmocka_unit_test(more_landmarks_do_not_lead_astray)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,134 @@
+/* A spatial start that has nearly come to a map: few triangles are still turned over, around vertices that are held.
+ *
+ * The held vertices near them are let go, the flips cleared without them, and the vertices drawn home again while no
+ * flip is allowed. Where that fails, what lies some rings away from the flips is sound: samples of it are what a map
+ * is walked to (compose_walk.c), better ones than the targets by themselves.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "align/compose_run.h"
+#include "base/check.h"
+#include "numeric/predicates.h"
+
+enum { FEW = 30, RELEASE_RINGS = 12, SOUND_RINGS = 4, CLEARINGS = 12, HOME_ROUNDS = 12, HOME_SWEEPS = 20 };
+static const double HOME_PULL = 5;
+
+int cm_is_near(const cm_level *l, int32_t flips) {
+  return flips <= l->triangle_count / FEW;
+}
+
+static const double *point(const cm_level *l, int32_t v) {
+  return l->x + 3 * (size_t)v;
+}
+
+/* The vertices of triangles that are turned over, and some rings about them. next: room for as many. */
+static void mark_about_flips(const cm_level *l, int rings, unsigned char *mark, unsigned char *next) {
+  memset(mark, 0, (size_t)l->count);
+  for (int32_t t = 0; t < l->triangle_count; t++) {
+    const int32_t *v = l->triangle + 3 * (size_t)t;
+    if (orb_orient(point(l, v[0]), point(l, v[1]), point(l, v[2])) <= 0) {
+      mark[v[0]] = mark[v[1]] = mark[v[2]] = 1;
+    }
+  }
+  for (int ring = 0; ring < rings; ring++) {
+    memcpy(next, mark, (size_t)l->count);
+    for (int32_t t = 0; t < l->triangle_count; t++) {
+      const int32_t *v = l->triangle + 3 * (size_t)t;
+      if (mark[v[0]] || mark[v[1]] || mark[v[2]]) {
+        next[v[0]] = next[v[1]] = next[v[2]] = 1;
+      }
+    }
+    memcpy(mark, next, (size_t)l->count);
+  }
+}
+
+/* Holds v at its point again if nothing turns over by that. */
+static int settle(const cm_run *c, cm_level *l, int32_t v, const double home[3]) {
+  double *x = l->x + 3 * (size_t)v, old[3];
+  memcpy(old, x, sizeof old);
+  memcpy(x, home, sizeof old);
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    if (orb_orient(x, point(l, l->spoke[i].q), point(l, l->spoke[i].r)) <= 0) {
+      memcpy(x, old, sizeof old);
+      return 0;
+    }
+  }
+  l->pinned[v] = 1;
+  l->pull[v] = 0;
+  cm_level_locate(l, &c->b, v, l->place[v].triangle);
+  return 1;
+}
+
+/* Draws the released vertices to their points, harder from round to round; how many have not come there. */
+static orb_status draw_home(cm_run *c, cm_level *l, const int32_t *to_mesh, const double *home, unsigned char *released,
+                            int32_t *count) {
+  double pull = HOME_PULL;
+  cm_set_pull(c, l, to_mesh, 0);
+  for (int round = 0; round < HOME_ROUNDS && *count; round++, pull *= 2) {
+    for (int32_t v = 0; v < l->count; v++) {
+      if (released[v] && settle(c, l, v, home + 3 * (size_t)v)) {
+        released[v] = 0;
+        --*count;
+      } else if (released[v]) {
+        l->pull[v] = pull * l->area[v];
+      }
+    }
+    if (*count) {
+      ORB_TRY(cm_sweeps(c, l, cm_hard(), HOME_SWEEPS));
+    }
+  }
+  return ORB_OK;
+}
+
+orb_status cm_release(cm_run *c, cm_level *l, const int32_t *to_mesh, int32_t *flips) {
+  orb_context *ctx = c->ctx;
+  size_t n = (size_t)l->count;
+  unsigned char *released = ORB_NEW0(ctx, unsigned char, 3 * n);
+  double *home = ORB_NEW(ctx, double, 3 * n);
+  int32_t count = 0;
+  orb_status status = released && home ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status != ORB_OK) {
+    goto done;
+  }
+  mark_about_flips(l, RELEASE_RINGS, released + n, released + 2 * n);
+  memcpy(home, l->x, 3 * n * sizeof *home);
+  cm_set_pull(c, l, to_mesh, 1);
+  for (size_t v = 0; v < n; v++) {
+    if (released[n + v] && l->pinned[v]) {
+      released[v] = 1;
+      l->pinned[v] = 0;
+      l->pull[v] = HOME_PULL * l->area[v];
+      count++;
+    }
+  }
+  ORB_GO(status, cm_clear_flips(c, l, CLEARINGS, flips), done);
+  if (*flips == 0) {
+    ORB_GO(status, draw_home(c, l, to_mesh, home, released, &count), done);
+    *flips = count;
+  }
+done:
+  orb_free(ctx, released);
+  orb_free(ctx, home);
+  return status;
+}
+
+orb_status cm_keep_sound(cm_run *c, const cm_level *l, const int32_t *to_mesh) {
+  size_t n = (size_t)l->count;
+  unsigned char *mark = ORB_NEW(c->ctx, unsigned char, 2 * n);
+  if (!mark) {
+    return ORB_E_NO_MEMORY;
+  }
+  mark_about_flips(l, SOUND_RINGS, mark, mark + n);
+  memset(c->sound, 0, (size_t)c->vertex_count);
+  for (size_t i = 0; i < n; i++) {
+    int32_t v = to_mesh[l->vertex[i]];
+    if (!mark[i]) {
+      c->sound[v] = 1;
+      c->goal_place[v] = l->place[i];
+    }
+  }
+  c->has_sound = 1;
+  orb_free(c->ctx, mark);
+  return ORB_OK;
+}
