@@ -82,9 +82,9 @@ ORB_MUST_CHECK orb_status cm_keep_sound(cm_run *run, const cm_level *level, cons
 
 /* compose_walk.c. The landmarks, and guesses from them. */
 ORB_MUST_CHECK orb_status cm_pairs_create(cm_run *run);
-/* Embeds both shapes anew so that all pairs meet, and with them at most so many samples of the spatial targets, or
- * of what is sound of a start. run->start is what comes of it, and if run->both is set the fixed shape's sphere is replaced,
- * else the map is carried to it. *stuck: nothing came of it, and all is as it was. */
+/* Embeds both shapes anew so that all pairs meet, and with them at most so many samples of the spatial targets, or of
+ * what is sound of a start. run->start is what comes of it, and if run->both is set the fixed shape's sphere is
+ * replaced, else the map is carried to it. *stuck: nothing came of it, and all is as it was. */
 ORB_MUST_CHECK orb_status cm_walk(cm_run *run, int32_t samples, int *stuck);
 
 /* compose.c. All vertices at these points, the landmarks pinned; s: their order, of the caller. */
