@@ -97,9 +97,8 @@ int maintain_check(const config *options) {
     puts("the catalogue fails SQLite's integrity check");
     t.wrong++;
   }
-  int64_t ownerless = catalogue_ownerless(t.cat);
-  if (ownerless != 0) {
-    puts("the catalogue's owners do not match what it holds");
+  if (catalogue_mismatches(t.cat) != 0) {
+    puts("the catalogue's owners or sums do not match what it holds");
     t.wrong++;
   }
   for (int kind = 0; kind < RESOURCE_KINDS; kind++) {

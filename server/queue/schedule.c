@@ -374,8 +374,10 @@ static void publish_end(queue *q, job *j, int64_t number, const char *json) {
   pthread_cond_broadcast(&q->work);
 }
 
-/* Writes the end and shows it; the caller has taken the job. */
-static store_result end_job(queue *q, job *j, orb_job_state state, const char *problem, const resource *result) {
+/* Writes the end and shows it; the caller has taken the job. worked: as the worker that has it, and leaves it in the
+ * moment in which others see it ended. */
+static store_result end_job(queue *q, job *j, orb_job_state state, const char *problem, const resource *result,
+                            int worked) {
   int64_t now = unix_ms();
   pthread_mutex_lock(&q->lock);
   job shown = *j;
@@ -394,6 +396,9 @@ static store_result end_job(queue *q, job *j, orb_job_state state, const char *p
   if (stored == STORE_OK) {
     pthread_mutex_lock(&q->lock);
     ended_locked(q, j, state, problem, now);
+    if (worked) {
+      leave(q, j);
+    }
     publish_end(q, j, number, json.data);
     pthread_mutex_unlock(&q->lock);
   }
@@ -413,7 +418,7 @@ static int cancel_locked(job *j) {
 }
 
 static store_result end_cancelled(queue *q, job *j) {
-  store_result stored = end_job(q, j, ORB_JOB_CANCELLED, NULL, NULL);
+  store_result stored = end_job(q, j, ORB_JOB_CANCELLED, NULL, NULL, 0);
   if (stored != STORE_OK) {
     pthread_mutex_lock(&q->lock);
     j->taken = 0;
@@ -452,7 +457,7 @@ static void cancel_needless(queue *q, job *of) {
 }
 
 void queue_finish(queue *q, job *j, orb_job_state state, const char *problem, const resource *result) {
-  store_result stored = end_job(q, j, state, problem, result);
+  store_result stored = end_job(q, j, state, problem, result, 1);
   if (stored != STORE_OK) {
     log_error("the end of job %s could not be stored; it will be run again", j->row.id);
     pthread_mutex_lock(&q->lock);
@@ -465,7 +470,6 @@ void queue_finish(queue *q, job *j, orb_job_state state, const char *problem, co
     cancel_needless(q, j);
   }
   pthread_mutex_lock(&q->lock);
-  leave(q, j);
   job_unref(j);
   pthread_mutex_unlock(&q->lock);
 }

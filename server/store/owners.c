@@ -219,7 +219,7 @@ int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant) {
   return code == SQLITE_OK ? bytes : -1;
 }
 
-int64_t catalogue_ownerless(catalogue *cat) {
+int64_t catalogue_mismatches(catalogue *cat) {
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st = database_statement(db,
                                         "SELECT (SELECT count(*) FROM resource r WHERE NOT EXISTS"
@@ -227,6 +227,8 @@ int64_t catalogue_ownerless(catalogue *cat) {
                                         " + (SELECT count(*) FROM owner o WHERE NOT EXISTS"
                                         "  (SELECT 1 FROM resource r WHERE r.kind=o.kind AND r.id=o.id))"
                                         " + (SELECT count(*) FROM tenant t WHERE t.bytes !="
-                                        "  (SELECT coalesce(sum(o.bytes), 0) FROM owner o WHERE o.tenant=t.name))");
+                                        "  (SELECT coalesce(sum(o.bytes), 0) FROM owner o WHERE o.tenant=t.name))"
+                                        " + (SELECT count(*) FROM total t WHERE t.bytes !="
+                                        "  (SELECT coalesce(sum(r.bytes), 0) FROM resource r WHERE r.kind=t.kind))");
   return rows_integer(cat, db, st);
 }

@@ -31,7 +31,8 @@ int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, in
 store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id, const char *tenant, int *gone);
 /* Bytes of the meshes that a tenant owns; −1: they cannot be read. */
 int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant);
-/* Resources without an owner and owners without a resource, for --check-data; −1: they cannot be read. */
-int64_t catalogue_ownerless(catalogue *cat);
+/* Resources without an owner, owners without a resource, and sums kept that are not what the rows add up to, for
+ * --check-data; −1: they cannot be read. */
+int64_t catalogue_mismatches(catalogue *cat);
 
 #endif
