@@ -122,8 +122,9 @@ static int get_text(const cJSON *object, const char *name, char *out, size_t siz
 
 static int get_count(const cJSON *object, const char *name, int64_t *out) {
   const cJSON *value = cJSON_GetObjectItemCaseSensitive(object, name);
-  *out = cJSON_IsNumber(value) ? (int64_t)value->valuedouble : -1;
-  return *out >= 0;
+  int fine = cJSON_IsNumber(value) && value->valuedouble >= 0 && value->valuedouble <= 0x1p53;
+  *out = fine ? (int64_t)value->valuedouble : -1;
+  return fine;
 }
 
 int orb_mesh_summarise(const char *json, orb_mesh_summary *out) {

@@ -49,7 +49,7 @@ static void anchor_of(const inserter *in, int32_t vertex, int32_t triangle, doub
       return;
     }
   }
-  ORB_ASSERT(!"a piece of a triangle has only corners that lie in it");
+  ORB_ASSERT(0 && "a piece of a triangle has only corners that lie in it");
 }
 
 /* Coordinates of `at` in piece t; returns the least of them. */

@@ -3,6 +3,8 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -204,6 +206,25 @@ static void test_routes(void **state) {
   assert_null(route_find("GET", "/v1/jobs/" MESH, id, allow));
 }
 
+/* What is stored may be damaged: counts are integers that a double tells apart. */
+static void test_stored_meshes(void **state) {
+  static const char *const counts[] = {"800", "9007199254740992", "9007199254740994", "8e49", "-1", "\"8\"", "null"};
+  (void)state;
+  for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+    char text[256];
+    orb_mesh_summary summary;
+    snprintf(text, sizeof text,
+             "{\"name\":\"cow\",\"format\":\"obj\",\"repair\":\"safe\",\"vertices\":402,\"triangles\":%s,"
+             "\"file_vertices\":402,\"file_triangles\":800}",
+             counts[i]);
+    assert_int_equal(orb_mesh_summarise(text, &summary), i < 2);
+    if (i < 2) {
+      assert_int_equal(summary.triangles, strtoll(counts[i], NULL, 10));
+      assert_int_equal(summary.vertices, 402);
+    }
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_grammar),
                                      cmocka_unit_test(test_utf8),
@@ -212,6 +233,7 @@ int main(void) {
                                      cmocka_unit_test(test_ids),
                                      cmocka_unit_test(test_repairs),
                                      cmocka_unit_test(test_supermesh_requests),
+                                     cmocka_unit_test(test_stored_meshes),
                                      cmocka_unit_test(test_routes)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
