@@ -5,6 +5,10 @@
 #include "cli.h"
 #include "make.h"
 
+/* Members of members that --set takes, and the same within its value: far more than a request has, and together far
+ * less than JSON's readers follow (1,000), so that what is sent can be read. */
+enum { SET_DEPTH_MOST = 64 };
+
 cJSON *cli_read_landmarks(const cli *c, const char *path) {
   size_t size;
   const char *end = NULL;
@@ -40,7 +44,7 @@ cJSON *cli_read_landmarks(const cli *c, const char *path) {
 }
 
 int cli_set_member(cJSON *object, const char *path, cJSON *value) {
-  for (;;) {
+  for (int depth = 0; depth < SET_DEPTH_MOST; depth++) {
     const char *dot = strchr(path, '.');
     char *name = cli_text("%.*s", (int)(dot ? dot - path : (long)strlen(path)), path);
     if (!dot) {
@@ -58,13 +62,29 @@ int cli_set_member(cJSON *object, const char *path, cJSON *value) {
     if (!child)
       child = cJSON_AddObjectToObject(object, name);
     free(name);
-    if (!cJSON_IsObject(child)) {
-      cJSON_Delete(value);
-      return 0;
-    }
+    if (!cJSON_IsObject(child))
+      break;
     object = child;
     path = dot + 1;
   }
+  cJSON_Delete(value);
+  return 0;
+}
+
+/* How deep the brackets of a JSON text stand in each other. */
+static int nesting(const char *text) {
+  int depth = 0, most = 0, quoted = 0;
+  for (; *text; text++) {
+    if (quoted && *text == '\\' && text[1])
+      text++;
+    else if (*text == '"')
+      quoted = !quoted;
+    else if (!quoted && (*text == '[' || *text == '{') && ++depth > most)
+      most = depth;
+    else if (!quoted && (*text == ']' || *text == '}'))
+      depth--;
+  }
+  return most;
 }
 
 int cli_apply_sets(const cli *c, cJSON *request) {
@@ -74,10 +94,15 @@ int cli_apply_sets(const cli *c, cJSON *request) {
     cJSON *value = equals ? cJSON_ParseWithOpts(equals + 1, NULL, 1) : NULL;
     if (equals && !value)
       value = cJSON_CreateString(equals + 1);
-    int ok = equals && cli_set_member(request, path, value);
+    if (value && !cJSON_IsString(value) && nesting(equals + 1) > SET_DEPTH_MOST) {
+      cJSON_Delete(value);
+      value = NULL;
+    }
+    int ok = value && cli_set_member(request, path, value);
     free(path);
     if (!ok) {
-      cli_error(c, "--set %s: it takes NAME=VALUE, with dots between the names of members", text);
+      cli_error(c, "--set %s: it takes NAME=VALUE, with dots between the names of members, at most %d deep", text,
+                SET_DEPTH_MOST);
       return CLI_USAGE;
     }
   }

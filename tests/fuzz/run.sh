@@ -2,6 +2,7 @@
 # Builds the libFuzzer targets and runs each for some seconds, as many at once as there are cores.
 #
 #   tests/fuzz/run.sh [--cpu] SECONDS [TARGET…]    with --cpu the seconds are of CPU time, else of wall time
+#                                                  with ORB_FUZZ_SEED the same inputs are made each time
 #   tests/fuzz/run.sh --sums                       what all runs in build-fuzz came to, a line a target
 #   tests/fuzz/run.sh --keep BYTES [TARGET…]       adds what covers more to tests/fuzz/corpus, inputs up to BYTES each
 #
@@ -38,7 +39,7 @@ one() {
   [ "$unit" = wall ] || limit=0
   TIMEFORMAT='%R s wall, %U s user, %S s system'
   { time {
-      build-fuzz/bin/fuzz_"$name" -close_fd_mask=2 -max_total_time="$limit" -rss_limit_mb=2048 \
+      build-fuzz/bin/fuzz_"$name" -close_fd_mask=2 -max_total_time="$limit" -rss_limit_mb=2048 -seed="${ORB_FUZZ_SEED:-0}" \
         -timeout=$([ "$unit" = wall ] && echo 60 || echo 1200) -report_slow_units=1200 -print_final_stats=1 \
         -artifact_prefix="build-fuzz/found/$name-" "build-fuzz/corpus/$name" "tests/fuzz/corpus/$name" &
       fuzzer=$!

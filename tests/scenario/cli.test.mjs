@@ -22,6 +22,7 @@ test('wrong usage ends with 2 and says what is wrong', async () => {
   for (const args of [[], ['fly'], ['morph', 'one'], ['morph', '--bend', 'a', 'b'], ['upload'], ['job'], ['morph', 'a', 'b', '--landmarks'],
     ['morph', 'a', 'b', '--json=yes'], ['ls', 'shoes'], ['get', 'x', '--part', 'wing'], ['completions', 'tcsh'],
     ['morph', dog, giraffe, '--tolerance', 'much'], ['morph', dog, giraffe, '--max-triangles', '1e4'], ['morph', dog, giraffe, '--set', 'x'],
+    ['morph', dog, giraffe, '--set', `${'a.'.repeat(70)}b=1`], ['morph', dog, giraffe, '--set', `a=${'['.repeat(70)}${']'.repeat(70)}`],
     ['morph', dog, giraffe, '-o', '/nowhere/out.glb'], ['morph', dog, giraffe, '--report', '/nowhere/report.md'],
     ['upload', '/nowhere/mesh.obj'], ['morph', dog, giraffe, '--landmarks', '/nowhere.json'], ['upload', '--name', 'n', dog, giraffe]]) {
     const { code, err, out } = await run(args, { env: { ORBMORPH_SERVER: 'http://127.0.0.1:9' } });
