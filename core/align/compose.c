@@ -291,34 +291,32 @@ static orb_status given_energy(cm_run *c, double *energy) {
   return status;
 }
 
-/* Walks to a map in which the first `count` pairs meet: by way of samples, of few, of none. */
-static orb_status walk_pairs(cm_run *c, int32_t count, int *stuck) {
-  c->pairs.count = count;
+/* Walks to a map in which all pairs meet: by way of samples, of few, of none. */
+static orb_status walk_pairs(cm_run *c, int *stuck) {
+  static const int32_t samples[] = {CM_SOUND_STEPS, CM_STEPS, 0};
   *stuck = 1;
-  for (int samples = c->has_sound ? CM_SOUND_STEPS : CM_STEPS; count > 0 && *stuck; samples /= 4) {
-    ORB_TRY(cm_walk(c, samples >= CM_STEPS ? samples : 0, stuck));
-    if (samples < CM_STEPS) {
-      break;
-    }
+  for (int i = c->has_sound ? 0 : 1; i < 3 && c->pairs.count > 0 && *stuck; i++) {
+    ORB_TRY(cm_walk(c, samples[i], stuck));
   }
   return ORB_OK;
 }
 
 /* Before the starts that need a map in which all pairs meet: one is walked to, or the guesses are given up. */
 static orb_status meet_pairs(cm_run *c) {
-  int stuck, guesses = c->pairs.count > c->pairs.landmarks;
-  ORB_TRY(walk_pairs(c, c->pairs.count, &stuck));
-  if (stuck && guesses) {
-    int near = c->has_sound;
-    ORB_TRY(walk_pairs(c, near ? c->pairs.landmarks : 0, &stuck));
-    c->pairs.count = c->pairs.landmarks;
-    if (stuck) {
-      memcpy(c->start, c->moving->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
-    }
-    ORB_TRY(cm_bend(c, 0));
-    ORB_TRY(prepare_levels(c));
+  int stuck;
+  ORB_TRY(walk_pairs(c, &stuck));
+  if (!stuck || c->pairs.count == c->pairs.landmarks) {
+    return ORB_OK;
   }
-  return ORB_OK;
+  c->pairs.count = c->pairs.landmarks;
+  if (c->has_sound) {
+    ORB_TRY(walk_pairs(c, &stuck));
+  }
+  if (stuck) {
+    memcpy(c->start, c->moving->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
+  }
+  ORB_TRY(cm_bend(c, 0));
+  return prepare_levels(c);
 }
 
 /* The starts, until nothing comes of them any more. */

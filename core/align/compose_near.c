@@ -22,27 +22,6 @@ static const double *point(const cm_level *l, int32_t v) {
   return l->x + 3 * (size_t)v;
 }
 
-/* The vertices of triangles that are turned over, and some rings about them. next: room for as many. */
-static void mark_about_flips(const cm_level *l, int rings, unsigned char *mark, unsigned char *next) {
-  memset(mark, 0, (size_t)l->count);
-  for (int32_t t = 0; t < l->triangle_count; t++) {
-    const int32_t *v = l->triangle + 3 * (size_t)t;
-    if (orb_orient(point(l, v[0]), point(l, v[1]), point(l, v[2])) <= 0) {
-      mark[v[0]] = mark[v[1]] = mark[v[2]] = 1;
-    }
-  }
-  for (int ring = 0; ring < rings; ring++) {
-    memcpy(next, mark, (size_t)l->count);
-    for (int32_t t = 0; t < l->triangle_count; t++) {
-      const int32_t *v = l->triangle + 3 * (size_t)t;
-      if (mark[v[0]] || mark[v[1]] || mark[v[2]]) {
-        next[v[0]] = next[v[1]] = next[v[2]] = 1;
-      }
-    }
-    memcpy(mark, next, (size_t)l->count);
-  }
-}
-
 /* Holds v at its point again if nothing turns over by that. */
 static int settle(const cm_run *c, cm_level *l, int32_t v, const double home[3]) {
   double *x = l->x + 3 * (size_t)v, old[3];
@@ -91,7 +70,7 @@ orb_status cm_release(cm_run *c, cm_level *l, const int32_t *to_mesh, int32_t *f
   if (status != ORB_OK) {
     goto done;
   }
-  mark_about_flips(l, RELEASE_RINGS, released + n, released + 2 * n);
+  cm_level_mark_flips(l, RELEASE_RINGS, released + n, released + 2 * n);
   memcpy(home, l->x, 3 * n * sizeof *home);
   cm_set_pull(c, l, to_mesh, 1);
   for (size_t v = 0; v < n; v++) {
@@ -119,7 +98,7 @@ orb_status cm_keep_sound(cm_run *c, const cm_level *l, const int32_t *to_mesh) {
   if (!mark) {
     return ORB_E_NO_MEMORY;
   }
-  mark_about_flips(l, SOUND_RINGS, mark, mark + n);
+  cm_level_mark_flips(l, SOUND_RINGS, mark, mark + n);
   memset(c->sound, 0, (size_t)c->vertex_count);
   for (size_t i = 0; i < n; i++) {
     int32_t v = to_mesh[l->vertex[i]];

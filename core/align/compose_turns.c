@@ -13,12 +13,6 @@ typedef struct turns_run {
   double *back, *turn;
 } turns_run;
 
-static void add_outer(double h[9], const double y[3], const double x[3], double weight) {
-  for (int k = 0; k < 9; k++) {
-    h[k] += weight * y[k / 3] * x[k % 3];
-  }
-}
-
 /* Where the surface's vertices come from, by the map. */
 static orb_status trace_back(turns_run *run) {
   const cm_image *m = run->map;
@@ -62,7 +56,7 @@ static void whole_rotation(const turns_run *run, double rotation[9]) {
         x[k] -= mean[3 + k];
       }
       if (pass == 1) {
-        add_outer(h, y, x, area);
+        orb_add_outer(h, y, x, area);
       }
     }
     for (int k = 0; k < 6 && pass == 0; k++) {
@@ -116,7 +110,7 @@ static orb_status measure_turns(turns_run *run, double *kept) {
     orb_sub(b->x + 3 * r, b->x + 3 * v, y[1]);
     orb_sub(run->back + 3 * q, run->back + 3 * v, x[0]);
     orb_sub(run->back + 3 * r, run->back + 3 * v, x[1]);
-    add_outer(s, y[0], x[0], 1);
+    orb_add_outer(s, y[0], x[0], 1);
     s[15] += sqrt(orb_dot(y[0], y[0]) * orb_dot(x[0], x[0]));
     orb_cross(y[0], y[1], n);
     for (int k = 0; k < 3; k++) {
@@ -131,7 +125,7 @@ static orb_status measure_turns(turns_run *run, double *kept) {
     double *s = sum + 16 * (size_t)v, r[9], trace = 0;
     orb_normalize(s + 9);
     orb_normalize(s + 12);
-    add_outer(s, s + 9, s + 12, 0.5 * s[15]);
+    orb_add_outer(s, s + 9, s + 12, 0.5 * s[15]);
     run->turn[v] = 0;
     if (cm_nearest_rotation(s, r)) {
       for (int k = 0; k < 9; k++) {

@@ -44,12 +44,6 @@ typedef struct band {
   double height, from[3], to[3], rotation[9];
 } band;
 
-static void add_outer(double h[9], const double y[3], const double x[3], double weight) {
-  for (int k = 0; k < 9; k++) {
-    h[k] += weight * y[k / 3] * x[k % 3];
-  }
-}
-
 static int32_t find_part(int32_t *part, int32_t v) {
   while (part[v] != v) {
     v = part[v] = part[part[v]];
@@ -243,7 +237,7 @@ static int fit_band(const twist_run *run, const ranked *list, int32_t count, ban
     double x[3], y[3];
     orb_sub(run->back + 3 * (size_t)list[i].vertex, out->from, x);
     orb_sub(run->b->x + 3 * (size_t)list[i].vertex, out->to, y);
-    add_outer(h, y, x, 1);
+    orb_add_outer(h, y, x, 1);
   }
   return cm_nearest_rotation(h, out->rotation);
 }

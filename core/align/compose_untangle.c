@@ -110,15 +110,23 @@ static int32_t mark_flips(const cm_level *l, unsigned char *mark, double *worst)
   return flips;
 }
 
-static void grow_marks(const cm_level *l, unsigned char *mark, unsigned char *next) {
-  memcpy(next, mark, (size_t)l->count);
-  for (int32_t t = 0; t < l->triangle_count; t++) {
-    const int32_t *v = l->triangle + 3 * (size_t)t;
-    if (mark[v[0]] || mark[v[1]] || mark[v[2]]) {
-      next[v[0]] = next[v[1]] = next[v[2]] = 1;
+static void grow_marks(const cm_level *l, int rings, unsigned char *mark, unsigned char *next) {
+  for (int ring = 0; ring < rings; ring++) {
+    memcpy(next, mark, (size_t)l->count);
+    for (int32_t t = 0; t < l->triangle_count; t++) {
+      const int32_t *v = l->triangle + 3 * (size_t)t;
+      if (mark[v[0]] || mark[v[1]] || mark[v[2]]) {
+        next[v[0]] = next[v[1]] = next[v[2]] = 1;
+      }
     }
+    memcpy(mark, next, (size_t)l->count);
   }
-  memcpy(mark, next, (size_t)l->count);
+}
+
+void cm_level_mark_flips(const cm_level *l, int rings, unsigned char *mark, unsigned char *next) {
+  double worst;
+  (void)mark_flips(l, mark, &worst);
+  grow_marks(l, rings, mark, next);
 }
 
 orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left, int64_t *work) {
@@ -135,9 +143,7 @@ orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left, int64
       break;
     }
     int rings = 1 + round / 4;
-    for (int i = 0; i < (rings < RINGS_MOST ? rings : RINGS_MOST); i++) {
-      grow_marks(l, mark, next);
-    }
+    grow_marks(l, rings < RINGS_MOST ? rings : RINGS_MOST, mark, next);
     /* Many flips need one ε for all; the last few hide in stars far smaller than that. */
     double scale = 1.0 / l->triangle_count;
     double epsilon = *left > FEW && round % 3 ? sqrt(1e-8 * scale * scale + 0.04 * worst * worst) : 0;

@@ -61,9 +61,7 @@ static orb_status fit(orb_context *ctx, double (*a)[3], double (*b)[3], int32_t 
       const double *p = a[i], *q = b[map->to[i]];
       aa += orb_dot(p, p);
       bb += orb_dot(q, q);
-      for (int k = 0; k < 9; k++) {
-        c[k] += p[k / 3] * q[k % 3];
-      }
+      orb_add_outer(c, p, q, 1);
     }
   }
   ORB_TRY(orb_procrustes_covariance(ctx, c, rotation, singular));

@@ -42,6 +42,13 @@ static inline double orb_normalize(double a[3]) {
   return length;
 }
 
+/* h += weight · y xᵀ; h: 3×3, row-major. */
+static inline void orb_add_outer(double h[9], const double y[3], const double x[3], double weight) {
+  for (int k = 0; k < 9; k++) {
+    h[k] += weight * y[k / 3] * x[k % 3];
+  }
+}
+
 /* det(a, b, c), taken from differences to a so that close points lose nothing. */
 static inline double orb_det(const double a[3], const double b[3], const double c[3]) {
   double u[3], w[3], n[3];

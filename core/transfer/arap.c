@@ -201,9 +201,7 @@ static void make_cells(const orb_arap *path, double (*cell)[9], double (*scratch
       double u[3], w[3];
       orb_sub(path->a + 3 * (int64_t)path->neighbor[i], path->a + 3 * (int64_t)v, u);
       orb_sub(path->b + 3 * (int64_t)path->neighbor[i], path->b + 3 * (int64_t)v, w);
-      for (int k = 0; k < 9; k++) {
-        cell[v][k] += path->weight[i] * u[k / 3] * w[k % 3];
-      }
+      orb_add_outer(cell[v], u, w, path->weight[i]);
       size += path->weight[i] * orb_length(u) * orb_length(w);
     }
     for (int k = 0; k < 9 && size > 0; k++) {

@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "numeric/vec3.h"
 #include "orbmorph/embed.h"
 #include "orbmorph/remesh.h"
 #include "support_align.h"
@@ -139,16 +140,10 @@ static double mean_error(orb_context *ctx, const loaded *l, const orb_alignment 
                    ORB_OK);
   for (int32_t v = 0; v < n; v++) { /* vertex v of the one is vertex v of the other */
     orb_place place;
-    double d = 0;
+    double y[3];
     orb_locate(locator, a->shapes[0].points + 3 * (size_t)v, -1, &place);
-    for (int k = 0; k < 3; k++) {
-      double y = -second->positions[3 * (size_t)v + (size_t)k];
-      for (int c = 0; c < 3; c++) {
-        y += place.at[c] * second->positions[3 * (size_t)second->triangles[3 * place.triangle + c] + (size_t)k];
-      }
-      d += y * y;
-    }
-    sum += sqrt(d);
+    orb_place_position(second, &place, y);
+    sum += sqrt(orb_distance2(y, second->positions + 3 * (size_t)v));
   }
   orb_locator_destroy(ctx, locator);
   return sum / n / extent.diagonal;
