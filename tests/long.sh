@@ -4,7 +4,8 @@
 #   tests/long.sh [PART…]    all of them without arguments:
 #   tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy
 #
-# ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills.
+# ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills, ORB_TEST_PATIENCE how many
+# times longer than usual scenarios wait for what should come: 4 with tsan, 20 with valgrind.
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/.."
 
@@ -23,24 +24,27 @@ part_tsan() {
   cmake --build build-tsan
   rm -rf build-tsan/reports
   mkdir -p build-tsan/reports
-  TSAN_OPTIONS="log_path=$PWD/build-tsan/reports/report" \
+  ORB_TEST_PATIENCE=${ORB_TEST_PATIENCE:-4} TSAN_OPTIONS="log_path=$PWD/build-tsan/reports/report" \
     setarch -R ctest --test-dir build-tsan --output-on-failure -R '^(unit|scenario)\.' --timeout 3600 || failed=1
   cat build-tsan/reports/* 2>/dev/null && failed=1
   return $failed
 }
 
 # The units; then daemon and command line under memcheck: a walk through every route, and the scenarios.
-# ORB_VALGRIND_UNITS and ORB_VALGRIND_SCENARIOS name fewer of them, or none. Left out: what is about time (crowd,
+# ORB_VALGRIND_UNITS (programs) and ORB_VALGRIND_SCENARIOS name fewer of them, or none; several runs with different ones
+# may go on side by side. Left out: what is about time (crowd,
 # fairness, slow), what measures or needs the release build (bench, report, readme, demo), what preloads a library of
 # its own (faults), what ends the daemon before it can tell of leaks (crash), and large meshes (real_meshes, real_pairs).
-valgrind_scenarios=(abuse assets cli cors disk_full durability embeddings encodings eviction jobs meshes openapi
+valgrind_scenarios=(walk abuse assets cli cors disk_full durability embeddings encodings eviction jobs meshes openapi
   operations places problems requests shell spheres supermeshes systemd tenants tls tokens view)
 part_valgrind() {
   cmake --preset debug -DORB_TESTS=ON >/dev/null
   cmake --build build-debug
-  local name program folder=$PWD/build-debug/valgrind failed=0
-  rm -rf "$folder"
-  mkdir -p "$folder/reports"
+  local name program folder failed=0
+  local -x ORB_SLOW=1 ORB_TEST_PATIENCE=${ORB_TEST_PATIENCE:-20} ORBMORPHD ORBMORPH
+  folder=$(mktemp -d "$PWD/build-debug/valgrind.XXXXXX")
+  ORBMORPHD=$folder/orbmorphd ORBMORPH=$folder/orbmorph
+  mkdir "$folder/reports"
   ln -s ../bin/orbmorph-bench "$folder/"
   for name in orbmorphd orbmorph; do
     cat >"$folder/$name" <<END
@@ -55,12 +59,12 @@ END
     echo "valgrind $program"
     valgrind --quiet --error-exitcode=9 --leak-check=full "$program" || failed=1
   done
-  echo "valgrind every route"
-  ORB_SLOW=1 ORBMORPHD=$folder/orbmorphd ORBMORPH=$folder/orbmorph node tests/long/walk.mjs || failed=1
   for name in ${ORB_VALGRIND_SCENARIOS-${valgrind_scenarios[*]}}; do
     echo "valgrind scenario $name"
-    ORB_SLOW=1 ORBMORPHD=$folder/orbmorphd ORBMORPH=$folder/orbmorph \
-      node --test --test-reporter=spec "tests/scenario/$name.test.mjs" || failed=1
+    case $name in
+      walk) node tests/long/walk.mjs || failed=1 ;;
+      *) node --test --test-reporter=spec "tests/scenario/$name.test.mjs" || failed=1 ;;
+    esac
   done
   find "$folder/reports" -type f -size +0 -exec cat {} + | tee "$folder/found"
   [ ! -s "$folder/found" ] && [ $failed -eq 0 ]

@@ -7,7 +7,7 @@ import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
 import { gzipSync, createGzip } from 'node:zlib';
-import { Daemon, assertProblem, binaries, daemon, slow, until } from './support/daemon.mjs';
+import { Daemon, assertProblem, binaries, daemon, patience, slow, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 /** Sends bytes as they are; resolves to all that comes until the other side closes or some seconds are over. */
@@ -19,7 +19,7 @@ function raw(d, bytes, seconds = 60) {
     socket.on('data', (chunk) => (text += chunk.toString('latin1')));
     socket.on('error', () => {});
     socket.on('close', () => resolve(text));
-    setTimeout(() => socket.destroy(), seconds * 1000).unref();
+    setTimeout(() => socket.destroy(), seconds * 1000 * patience).unref();
   });
 }
 const statusOf = (text) => Number(/^HTTP\/1\.1 (\d+)/.exec(text)?.[1] ?? 0);

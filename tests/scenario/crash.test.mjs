@@ -12,7 +12,7 @@ import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
 import { promisify } from 'node:util';
-import { binaries, Daemon, daemon, root, slow } from './support/daemon.mjs';
+import { binaries, Daemon, daemon, patience, root, slow } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const kills = Number(process.env.ORB_KILLS ?? 20);
@@ -222,7 +222,7 @@ test('a poisonous job is given up after three deaths, and holds up no other', { 
   for (let i = 0; i < 3; i++) others.push(await ledger.upload(d));
   await ledger.ask(d, '/v1/embeddings', { mesh: mesh.id }).catch(() => {});
   let deaths = 0, end;
-  for (const late = Date.now() + 300_000; !end && deaths < 12; ) {
+  for (const late = Date.now() + 300_000 * patience; !end && deaths < 12; ) {
     assert.ok(Date.now() < late, `${deaths} deaths, and neither another nor an end`);
     for (const other of others) await ledger.ask(d, '/v1/embeddings', { mesh: other.id }).catch(() => {});
     const { json } = await d.get('/v1/jobs').catch(() => ({}));

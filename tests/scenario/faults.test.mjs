@@ -17,14 +17,14 @@ import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
 import { promisify } from 'node:util';
-import { binaries, Daemon, slow } from './support/daemon.mjs';
+import { binaries, Daemon, patience, slow } from './support/daemon.mjs';
 import * as faults from './support/faults.mjs';
 
 const library = process.env.ORB_INTERPOSE;
 const wanted = process.env.ORB_FAULT_RUNS ?? (slow ? '21' : '48');
 const all = !(Number(wanted) > 0);
 const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? (all ? 6 : 3)); // they wait more than they compute
-const patience = 200_000;
+const longest = 200_000 * patience; // for an answer, or an end
 // A sanitizer has an allocator of its own: where its library comes after the interposer, that one is asked first.
 const asked = !slow || /interpose\S* /.test(library);
 const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(',')).split(',').filter((kind) => kind !== 'alloc' || (wanted !== 'few' && asked));
@@ -46,7 +46,7 @@ class Place {
   fresh() {
     this.data = path.join(this.folder, `data-${++this.lives}`);
     this.d = new Daemon(this.data, arguments_, { LD_PRELOAD: library, ORB_FAIL_BOARD: this.board.file, ORB_FAIL_SITES: this.sites });
-    this.caller = new faults.Caller(this.d, patience);
+    this.caller = new faults.Caller(this.d, longest);
   }
   get alive() {
     return this.d.child && this.d.child.exitCode === null && this.d.child.signalCode === null;
@@ -54,7 +54,7 @@ class Place {
 
   /** Exits by itself, with a status and not by a signal. */
   async stopped(how) {
-    const timer = setTimeout(() => this.d.child.kill('SIGABRT'), patience);
+    const timer = setTimeout(() => this.d.child.kill('SIGABRT'), longest);
     const { code, signal } = await this.d.exited;
     clearTimeout(timer);
     if (slow) await new Promise((resolve) => setTimeout(resolve, 20)); // for the last of its log

@@ -7,12 +7,12 @@ import path from 'node:path';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
-import { assertProblem, binaries, daemon, endless, root, until } from './support/daemon.mjs';
+import { assertProblem, binaries, daemon, endless, patience, root, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const lines = (d) => d.log.split('\n').slice(0, -1).filter((l) => l.startsWith('{')).map((l) => JSON.parse(l));
 async function logged(d, wanted) {
-  const end = Date.now() + 120_000;
+  const end = Date.now() + 120_000 * patience;
   for (;;) {
     const found = lines(d).find(wanted);
     if (found) return found;

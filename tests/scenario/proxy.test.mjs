@@ -10,7 +10,7 @@ import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
 import { folder } from './support/cli.mjs';
-import { daemon, endless, root } from './support/daemon.mjs';
+import { daemon, endless, patience, root } from './support/daemon.mjs';
 import { parseGlb } from './support/glb.mjs';
 import * as shapes from './support/shapes.mjs';
 
@@ -69,11 +69,11 @@ async function proxy(t, name, changes = []) {
       reply.on('data', (part) => (parts.push(part), each?.(part.toString(), r))).on('error', reject)
         .on('end', () => resolve({ status: reply.statusCode, headers: reply.headers, bytes: Buffer.concat(parts), get json() { return JSON.parse(this.bytes); } }));
     });
-    r.on('error', reject).setTimeout(300_000, () => r.destroy(new Error('no answer')));
+    r.on('error', reject).setTimeout(300_000 * patience, () => r.destroy(new Error('no answer')));
     if (chunks) for (const part of chunks) r.write(part);
     r.end(body);
   });
-  for (const until = Date.now() + 120_000; ; await sleep(50)) {
+  for (const until = Date.now() + 120_000 * patience; ; await sleep(50)) {
     assert.ok(code === null, `${name} ended with ${code}: ${log}`);
     if ((await ask('/livez').catch(() => ({}))).status === 200) break;
     assert.ok(Date.now() < until, log);
@@ -106,7 +106,7 @@ for (const name of Object.keys(setUps))
     assert.ok(Date.now() - began >= 900);
     let seen = '';
     const stream = ask(`${job.url}/events`, { each: (text) => (seen += text) });
-    for (const until = Date.now() + 120_000; !/^event: ?progress/m.test(seen); await sleep(20)) assert.ok(Date.now() < until, 'an event comes while the job runs');
+    for (const until = Date.now() + 120_000 * patience; !/^event: ?progress/m.test(seen); await sleep(20)) assert.ok(Date.now() < until, 'an event comes while the job runs');
     const poll = ask(`${job.url}?wait=60`);
     assert.equal((await ask(job.url, { method: 'DELETE' })).status, 200);
     assert.equal((await poll).json.state, 'cancelled');

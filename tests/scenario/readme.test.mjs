@@ -6,7 +6,7 @@ import { readFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
 import { documents, place, shellLines } from './support/documents.mjs';
-import { daemon, root, samples, slow } from './support/daemon.mjs';
+import { daemon, patience, root, samples, slow } from './support/daemon.mjs';
 import { morphOf, parseGlb } from './support/glb.mjs';
 
 /** What a document's lines must have left behind, and said. */
@@ -40,7 +40,7 @@ for (const file of await documents()) {
       const { landmarks } = JSON.parse(await readFile(path.join(samples, 'dog-giraffe.json'), 'utf8'));
       await d.made('/v1/supermeshes', { shapes: shapes.map(({ id, name }) => ({ mesh: id, name })), landmarks });
     }
-    const run = spawnSync('bash', ['-euo', 'pipefail', '-c', lines.replaceAll('http://127.0.0.1:8080', d.url)], { cwd: at, env, encoding: 'utf8', timeout: 1_500_000 });
+    const run = spawnSync('bash', ['-euo', 'pipefail', '-c', lines.replaceAll('http://127.0.0.1:8080', d.url)], { cwd: at, env, encoding: 'utf8', timeout: 1_500_000 * patience });
     assert.equal(run.status, 0, `${file}\n${run.stdout}\n${run.stderr}`);
     await expected[file]?.(at, run.stdout);
   });

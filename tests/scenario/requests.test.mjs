@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import net from 'node:net';
 import path from 'node:path';
 import test from 'node:test';
-import { daemon, samples, assertProblem } from './support/daemon.mjs';
+import { daemon, samples, assertProblem, patience } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 /** Sends bytes as they are; resolves to all that comes back until the connection closes. */
@@ -12,7 +12,7 @@ function raw(d, text, { wait = 60_000 } = {}) {
   return new Promise((resolve, reject) => {
     let out = '';
     const socket = net.connect(Number(port), hostname, () => socket.write(text));
-    socket.setTimeout(wait, () => socket.destroy());
+    socket.setTimeout(wait * patience, () => socket.destroy());
     socket.on('data', (chunk) => (out += chunk.toString('latin1')));
     socket.on('close', () => resolve(out));
     socket.on('error', (error) => (out ? resolve(out) : reject(error)));

@@ -4,7 +4,7 @@ import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
 import { folder, run, runProgram } from './support/cli.mjs';
-import { binaries, root } from './support/daemon.mjs';
+import { binaries, patience, root } from './support/daemon.mjs';
 
 const completions = path.join(root, 'deploy/completions');
 const files = { bash: 'orbmorph.bash', zsh: '_orbmorph', fish: 'orbmorph.fish' };
@@ -56,7 +56,7 @@ zpty -w z 'print D""ONE'
 while zpty -r z line; do print -r -- "$line"; [[ $line == *DONE* ]] && break; done
 `;
   await writeFile(path.join(at, 'type.zsh'), script);
-  const { out, err } = await runProgram('timeout', ['60', 'zsh', '-f', path.join(at, 'type.zsh')], { env: { TERM: 'xterm' } });
+  const { out, err } = await runProgram('timeout', [String(60 * patience), 'zsh', '-f', path.join(at, 'type.zsh')], { env: { TERM: 'xterm' } });
   assert.match(out, /:? ?orbmorph completions/, err);
   assert.match(out, /orbmorph morph --remesh overlay x/, `${out}${err}`);
 });

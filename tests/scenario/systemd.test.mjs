@@ -8,7 +8,7 @@ import path from 'node:path';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
-import { binaries, daemon } from './support/daemon.mjs';
+import { binaries, daemon, patience } from './support/daemon.mjs';
 
 async function folder(t) {
   const made = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
@@ -44,7 +44,7 @@ function get(options) {
       let text = '';
       reply.on('data', (chunk) => (text += chunk)).on('end', () => resolve({ status: reply.statusCode, text }));
     });
-    r.on('error', reject).setTimeout(120_000, () => r.destroy(new Error('no answer')));
+    r.on('error', reject).setTimeout(120_000 * patience, () => r.destroy(new Error('no answer')));
   });
 }
 
@@ -120,7 +120,7 @@ test('systemd is told of start, reload, life and end', async (t) => {
   t.after(() => taker.kill());
   taker.stdout.on('data', (chunk) => log.push(...chunk.toString().split('\n').filter(Boolean)));
   const told = async (wanted, times = 1) => {
-    for (const until = Date.now() + 120_000; log.filter((line) => wanted.test(line)).length < times; await sleep(20)) assert.ok(Date.now() < until, `${wanted}: ${log}`);
+    for (const until = Date.now() + 120_000 * patience; log.filter((line) => wanted.test(line)).length < times; await sleep(20)) assert.ok(Date.now() < until, `${wanted}: ${log}`);
   };
   await told(/^up$/);
   const file = path.join(home, 'conf');

@@ -9,7 +9,7 @@ import test from 'node:test';
 import tls from 'node:tls';
 import { promisify } from 'node:util';
 import { folder } from './support/cli.mjs';
-import { binaries } from './support/daemon.mjs';
+import { binaries, patience } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const exec = promisify(execFile);
@@ -42,7 +42,7 @@ const send = (url, target, { method = 'GET', body, ...options } = {}) =>
       const parts = [];
       reply.on('data', (part) => parts.push(part)).on('end', () => resolve({ status: reply.statusCode, bytes: Buffer.concat(parts) }));
     });
-    r.on('error', reject).setTimeout(300_000, () => r.destroy(new Error('no answer')));
+    r.on('error', reject).setTimeout(300_000 * patience, () => r.destroy(new Error('no answer')));
     r.end(body);
   });
 

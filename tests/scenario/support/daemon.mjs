@@ -15,6 +15,9 @@ export const binaries = {
 };
 // A build with sanitizers is several times slower; tests that do much take less of it there.
 export const slow = process.env.ORB_SLOW === '1';
+// How many times longer than usual is waited for what should come: under memcheck, or on a machine with other work.
+export const patience = Number(process.env.ORB_TEST_PATIENCE ?? 1);
+assert.ok(patience >= 1, 'ORB_TEST_PATIENCE is a factor of at least 1');
 
 /**
  * An embedding that takes a minute of processor time for 2,000 triangles, and four times as long for four times as many:
@@ -25,14 +28,14 @@ export const endless = { method: 'kernel-sampling', options: { step: 0.01, growt
 
 /** Asks `check` again and again until it gives something true; that. The time is for what never comes. */
 export async function until(check, what, seconds = 300) {
-  for (const end = Date.now() + 1000 * seconds; ; await new Promise((done) => setTimeout(done, 20))) {
+  for (const end = Date.now() + 1000 * seconds * patience; ; await new Promise((done) => setTimeout(done, 20))) {
     const value = await check();
     if (value) return value;
-    assert.ok(Date.now() < end, `not within ${seconds} s: ${what}`);
+    assert.ok(Date.now() < end, `not within ${seconds * patience} s: ${what}`);
   }
 }
 
-const START_MS = slow ? 300_000 : 120_000, STOP_MS = slow ? 300_000 : 120_000;
+const START_MS = patience * (slow ? 300_000 : 120_000), STOP_MS = START_MS;
 
 export class Daemon {
   constructor(data, args, env) {
@@ -130,7 +133,7 @@ export class Daemon {
 
   /** Waits for the end of a job. */
   async ended(job, { seconds = slow ? 3600 : 900 } = {}) {
-    const until = Date.now() + seconds * 1000;
+    const until = Date.now() + 1000 * seconds * patience;
     while (!['succeeded', 'failed', 'cancelled'].includes(job.state)) {
       assert.ok(Date.now() < until, `job ${job.id} has not ended: ${JSON.stringify(job)}`);
       const reply = await this.get(job.url, { query: { wait: 20 } });
