@@ -1,10 +1,11 @@
 /* Alignment without landmarks.
  *
  * The rotation search, and then the one shape bent onto the other in space, are right for shapes in like poses, and the
- * energy of the composed map says so. Where it stays high, other correspondences are tried on coarse copies and ranked
- * there (guess.c), which costs little. If one is better than what the rotation comes to, what it matches are landmarks
- * of an alignment by pin, whose composed map is then composed once more, free of them, and the alignment of less energy
- * is returned; else the rotation is composed to the end. The preset `quality` does that in any case.
+ * energy of the composed map says so. Where it stays above that of nearly isometric shapes, other correspondences are
+ * tried on coarse copies and ranked there (guess.c), which costs little. If one is better than what the rotation comes
+ * to, what it matches are landmarks of an alignment by pin, whose composed map is then composed once more, free of
+ * them, and the alignment of less energy is returned; else the rotation is composed to the end. The preset `quality`
+ * does that in any case.
  */
 #include <math.h>
 #include <string.h>
@@ -12,6 +13,10 @@
 #include "align/guess.h"
 #include "align/methods.h"
 #include "base/check.h"
+
+/* Energies below it leave nothing to be won. Between it and CM_GOOD_ENERGY shapes may differ so much, or a limb of two
+ * nearly equal ones has gone wrong, which other correspondences show. */
+static const double NEAR_ISOMETRY = 1.05;
 
 typedef struct guesses {
   orb_guess *of;   /* each later shape's, from 1 on */
@@ -132,13 +137,14 @@ end:
   return status;
 }
 
-/* A rotated alignment that space alone has not made good: guesses take its place, or it is composed to the end. */
+/* A rotated alignment that space alone has not made near to isometric: guesses take its place, or, where it is not good
+ * either, it is composed to the end. */
 static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                           const orb_align_options *options, orb_alignment *alignment, double *clear) {
   orb_alignment other;
   int held;
   ORB_TRY(try_guesses(ctx, shapes, shape_count, options, alignment->energy, clear, &other, &held));
-  if (!held && options->preset != ORB_PRESET_QUALITY) {
+  if (!held && options->preset != ORB_PRESET_QUALITY && alignment->energy > CM_GOOD_ENERGY) {
     return orb_compose_all(ctx, alignment, CM_FROM_SPACE, options->preset);
   }
   if (held) {
@@ -161,7 +167,7 @@ orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32
   if (options->preset != ORB_PRESET_FAST) {
     cm_from from = options->preset == ORB_PRESET_QUALITY ? CM_FROM_SPACE : CM_SPACE_ONLY;
     ORB_GO(status, orb_compose_all(ctx, out, from, options->preset), failed);
-    if (out->energy > CM_GOOD_ENERGY) {
+    if (out->energy > NEAR_ISOMETRY) {
       ORB_GO(status, improve(ctx, shapes, shape_count, options, out, &clear), failed);
     }
   }

@@ -321,6 +321,9 @@ static orb_status meet_pairs(cm_run *c) {
 
 /* The starts, until nothing comes of them any more. */
 static orb_status run_starts(cm_run *c, cm_from from, orb_preset preset) {
+  if (from == CM_MAP_ONLY) {
+    return run_start(c, CM_GIVEN);
+  }
   if (c->pairs.landmarks == 0 && c->best_energy <= CM_GOOD_ENERGY) {
     /* A good map is not given up for another, of a symmetric shape say, that is as good. */
     return run_start(c, CM_GIVEN);
@@ -441,10 +444,14 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
   ORB_GO(status, cm_pairs_create(&c), done);
-  ORB_GO(status, cm_bend(&c, from == CM_FROM_MAP ? CM_SAMPLES : 0), done);
+  if (from != CM_MAP_ONLY) {
+    ORB_GO(status, cm_bend(&c, from == CM_FROM_MAP ? CM_SAMPLES : 0), done);
+  }
   ORB_GO(status, prepare_levels(&c), done);
   ORB_GO(status, run_starts(&c, from, preset), done);
-  ORB_GO(status, cm_unwind(&c), done);
+  if (from != CM_MAP_ONLY) {
+    ORB_GO(status, cm_unwind(&c), done);
+  }
   status = take_best(&c, fixed, energy, improved);
 done:
   cm_run_free(&c);

@@ -13,7 +13,8 @@ static const double CM_GOOD_ENERGY = 1.2;
 typedef enum cm_from {
   CM_FROM_SPACE, /* what fits best in space */
   CM_FROM_MAP,   /* the map as given, which is roughly right */
-  CM_SPACE_ONLY  /* what fits best in space; and where nothing comes of that, no more is tried */
+  CM_SPACE_ONLY, /* what fits best in space; and where nothing comes of that, no more is tried */
+  CM_MAP_ONLY    /* none: the map as given is improved where it is, roughly and at little cost */
 } cm_from;
 
 /* Improves the points of `moving` on the sphere so that the map moving → sphere → fixed is as isometric as can be. The

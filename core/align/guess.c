@@ -4,9 +4,11 @@
  * ways, and what a correlation of whole spheres finds best may be a wrong one. So both shapes are decimated to some
  * thousand vertices, and correspondences are tried there: rotations that the correlation likes and that differ, and
  * the likeliest maps of tips of limbs (tips.h), each walked to its common targets as pin does. A map that only a
- * reflection could bring about makes the sphere fold over itself on the way and gets stuck or costs much. Rotations and
- * the best walked maps are composed, and the energy that remains decides. Where shapes are symmetric several energies
- * are nearly alike: then the lesser turn in space counts, since most shapes stand upright and face one way.
+ * reflection could bring about makes the sphere fold over itself on the way and gets stuck or costs much. What a walk
+ * comes to says little, right maps and wrong ones cost alike, but some sweeps of the composed energy set them apart and
+ * cost no more than the walk. The best that differ are composed in full, and the energy that remains decides. Where
+ * shapes are symmetric several energies are nearly alike: then the lesser turn in space counts, since most shapes stand
+ * upright and face one way.
  */
 #include "align/guess.h"
 
@@ -24,10 +26,10 @@
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
 
-enum { COARSE = 1000, WALK = 300, ROTATIONS = 3, TIP_MAPS = 16, WALKED = 3, SAMPLES = 48 };
-static const double TURN = 1;                /* a half turn in space costs so many times the energy beyond 1 */
-static const double DIFFERENT = 0.15;        /* of the diagonal: maps that differ by more are others */
-static const double CAP = 20, BETTER = 0.95; /* than the rotation search, or it is not worth the work */
+enum { COARSE = 1000, WALK = 300, ROTATIONS = 3, TIP_MAPS = 8, COMPOSED = 3, SAMPLES = 48 };
+static const double TURN = 1;         /* a half turn in space costs so many times the energy beyond 1 */
+static const double DIFFERENT = 0.15; /* of the diagonal: maps that differ by more are others */
+static const double BETTER = 0.95;    /* than the rotation search, or it is not worth the work */
 
 /* A decimated copy: compact, with an embedding of its own. */
 typedef struct coarse {
@@ -85,6 +87,7 @@ end:
 /* One correspondence on the coarse copies. */
 typedef struct trial {
   int32_t count; /* tips; 0: a rotation */
+  int is_given;  /* the rotation that the spheres are given anyway */
   double rotation[9];
   int32_t first[ORB_TIPS_MAX], second[ORB_TIPS_MAX];
   double energy, judge;
@@ -95,50 +98,9 @@ typedef struct trials {
   orb_context *ctx;
   coarse shape[2];
   int32_t sample[SAMPLES];
-  trial list[ROTATIONS + TIP_MAPS];
+  trial list[ROTATIONS + TIP_MAPS + ORB_TIP_TURNS];
   int32_t rotations, count; /* rotations: where the maps of tips begin */
 } trials;
-
-/* The map's symmetric Dirichlet energy, capped, in the mean by area, both shapes scaled to one area. */
-static orb_status map_energy(const trials *t, const orb_sheet *sheets, double *energy) {
-  const orb_aligned_shape *a = &sheets[0].shape, *b = &sheets[1].shape;
-  orb_locator *locator;
-  orb_extent extent[2];
-  orb_mesh_extent(&a->mesh, &extent[0]);
-  orb_mesh_extent(&b->mesh, &extent[1]);
-  double scale[2] = {1 / sqrt(extent[0].area), 1 / sqrt(extent[1].area)}, sum = 0, total = 0;
-  double *image = ORB_NEW(t->ctx, double, 3 * (size_t)a->mesh.vertex_count);
-  if (!image) {
-    return ORB_E_NO_MEMORY;
-  }
-  orb_status status = orb_locator_create(t->ctx, b->points, b->mesh.vertex_count, b->mesh.triangles,
-                                         b->mesh.triangle_count, NULL, &locator);
-  if (status == ORB_OK) {
-    for (int32_t v = 0, hint = -1; v < a->mesh.vertex_count; v++) {
-      orb_place place;
-      orb_locate(locator, a->points + 3 * (size_t)v, hint, &place);
-      orb_place_position(&b->mesh, &place, image + 3 * (size_t)v);
-      hint = place.triangle;
-    }
-    for (int32_t f = 0; f < a->mesh.triangle_count; f++) {
-      double p[3][3], q[3][3], area;
-      for (int k = 0; k < 9; k++) {
-        size_t x = 3 * (size_t)a->mesh.triangles[3 * f + k / 3] + (size_t)k % 3;
-        p[k / 3][k % 3] = scale[0] * a->mesh.positions[x];
-        q[k / 3][k % 3] = scale[1] * image[x];
-      }
-      double like = orb_triangle_likeness(p, q, &area);
-      if (area > 0) {
-        sum += area * (like * CAP > 1 ? 1 / like : CAP);
-        total += area;
-      }
-    }
-    *energy = sum / total;
-    orb_locator_destroy(t->ctx, locator);
-  }
-  orb_free(t->ctx, image);
-  return status;
-}
 
 /* Sheets of the coarse copies, carried onto each other by the trial. *held 0: they cannot be. */
 static orb_status carry(trials *t, const trial *one, orb_sheet *sheets, int *held) {
@@ -199,8 +161,8 @@ static orb_status turn_of(const trials *t, const trial *one, double *turn) {
   return ORB_OK;
 }
 
-/* The energy of a trial and where it takes the samples; with `compose` after composing, and its judgement. */
-static orb_status run_trial(trials *t, trial *one, int compose) {
+/* The energy of a trial after composing from its map, where it takes the samples, and its judgement. */
+static orb_status run_trial(trials *t, trial *one, cm_from from) {
   orb_sheet sheets[2];
   orb_status status;
   int held, improved;
@@ -208,16 +170,9 @@ static orb_status run_trial(trials *t, trial *one, int compose) {
   memset(sheets, 0, sizeof sheets);
   one->energy = one->judge = INFINITY;
   ORB_GO(status, carry(t, one, sheets, &held), end);
-  if (!held) {
-    goto end;
-  }
-  ORB_GO(status, map_energy(t, sheets, &one->energy), end);
-  if (!compose) {
-    status = sample_images(t, sheets, one);
-  } else {
+  if (held) {
     ORB_GO(status,
-           orb_compose(t->ctx, &sheets[0].shape, &sheets[1].shape, 1, 0, CM_FROM_MAP, ORB_PRESET_DEFAULT, energy,
-                       &improved),
+           orb_compose(t->ctx, &sheets[0].shape, &sheets[1].shape, 1, 0, from, ORB_PRESET_DEFAULT, energy, &improved),
            end);
     one->energy = energy[1];
     ORB_GO(status, sample_images(t, sheets, one), end);
@@ -230,7 +185,6 @@ end:
   return status;
 }
 
-/* The first is the one that the spheres are given anyway. */
 static orb_status list_rotations(trials *t) {
   orb_aligned_shape shape[2];
   double rotation[9 * ROTATIONS];
@@ -242,31 +196,49 @@ static orb_status list_rotations(trials *t) {
   ORB_TRY(orb_rotation_candidates(t->ctx, &shape[0], &shape[1], ROTATIONS, rotation, &t->rotations));
   for (t->count = 0; t->count < t->rotations; t->count++) {
     memcpy(t->list[t->count].rotation, rotation + 9 * t->count, sizeof(double[9]));
+    t->list[t->count].is_given = t->count == 0;
   }
   return ORB_OK;
+}
+
+/* A map of tips, unless it is listed already. */
+static void list_tip_map(trials *t, const orb_tips tips[2], const orb_tip_map *map) {
+  trial one = {0};
+  for (int32_t k = 0; k < tips[0].count; k++) {
+    if (map->to[k] >= 0) {
+      one.first[one.count] = tips[0].vertex[k];
+      one.second[one.count++] = tips[1].vertex[map->to[k]];
+    }
+  }
+  for (int32_t i = t->rotations; i < t->count; i++) {
+    const trial *other = &t->list[i];
+    if (other->count == one.count && memcmp(other->first, one.first, sizeof one.first) == 0 &&
+        memcmp(other->second, one.second, sizeof one.second) == 0) {
+      return;
+    }
+  }
+  t->list[t->count++] = one;
 }
 
 static orb_status list_tip_maps(trials *t) {
   const orb_mesh *meshes[2] = {&t->shape[0].mesh, &t->shape[1].mesh};
   orb_tips tips[2];
   int32_t count, chosen_count, chosen[TIP_MAPS];
-  orb_tip_map *maps = ORB_NEW(t->ctx, orb_tip_map, ORB_TIP_MAPS_MAX);
+  orb_tip_map turned[ORB_TIP_TURNS], *maps = ORB_NEW(t->ctx, orb_tip_map, ORB_TIP_MAPS_MAX);
   orb_status status = ORB_E_NO_MEMORY;
   if (!maps) {
     return status;
   }
   ORB_GO(status, orb_tips_find(t->ctx, meshes[0], &tips[0]), end);
   ORB_GO(status, orb_tips_find(t->ctx, meshes[1], &tips[1]), end);
+  ORB_GO(status, orb_tip_maps_by_turns(t->ctx, meshes, tips, turned, &count), end);
+  for (int32_t i = 0; i < count; i++) {
+    list_tip_map(t, tips, &turned[i]);
+  }
   orb_tip_maps(&tips[0], &tips[1], maps, &count);
   ORB_GO(status, orb_tip_maps_choose(t->ctx, meshes, tips, maps, count, TIP_MAPS, chosen, &chosen_count), end);
   for (int32_t i = 0; i < chosen_count; i++) {
-    trial *one = &t->list[t->count++];
-    for (int32_t k = 0; k < tips[0].count; k++) {
-      if (maps[chosen[i]].to[k] >= 0) {
-        one->first[one->count] = tips[0].vertex[k];
-        one->second[one->count++] = tips[1].vertex[maps[chosen[i]].to[k]];
-      }
-    }
+    list_tip_map(t, tips, &maps[chosen[i]]);
   }
 end:
   orb_free(t->ctx, maps);
@@ -283,15 +255,15 @@ static double difference(const trials *t, const trial *x, const trial *y) {
   return sum / extent.diagonal;
 }
 
-/* The walked map of least energy among those that differ from all that came before; 0: there is none. */
+/* The trial that judges best among those that differ from all that were chosen, to its place; 0: there is none. */
 static int choose_next(trials *t, int32_t to) {
   int32_t best = -1;
   for (int32_t i = to; i < t->count; i++) {
-    int other = t->list[i].energy < INFINITY;
-    for (int32_t k = t->rotations; k < to && other; k++) {
+    int other = t->list[i].judge < INFINITY;
+    for (int32_t k = 0; k < to && other; k++) {
       other = difference(t, &t->list[i], &t->list[k]) > DIFFERENT;
     }
-    best = other && (best < 0 || t->list[i].energy < t->list[best].energy) ? i : best;
+    best = other && (best < 0 || t->list[i].judge < t->list[best].judge) ? i : best;
   }
   if (best >= 0) {
     trial one = t->list[to];
@@ -348,21 +320,23 @@ static int32_t winner_of(const trials *t, double *clear) {
 
 static orb_status run_trials(trials *t, const orb_mesh *b, orb_guess *out) {
   ORB_TRY(list_rotations(t));
-  for (int32_t i = 0; i < t->rotations; i++) {
-    ORB_TRY(run_trial(t, &t->list[i], 1));
-  }
   ORB_TRY(list_tip_maps(t));
-  for (int32_t i = t->rotations; i < t->count; i++) {
-    ORB_TRY(run_trial(t, &t->list[i], 0));
+  for (int32_t i = 0; i < t->count; i++) {
+    ORB_TRY(run_trial(t, &t->list[i], CM_MAP_ONLY));
   }
-  int32_t to = t->rotations;
-  for (; to < t->rotations + WALKED && choose_next(t, to); to++) {
-    ORB_TRY(run_trial(t, &t->list[to], 1));
+  double given = t->list[0].judge;
+  int32_t to = 0;
+  for (; to < COMPOSED && choose_next(t, to); to++) {
+    ORB_TRY(run_trial(t, &t->list[to], CM_FROM_MAP));
   }
   t->count = to;
-  int32_t best = winner_of(t, &out->clear);
-  out->energy = t->list[best].energy;
-  return t->list[best].judge < BETTER * t->list[0].judge ? write_guess(t, &t->list[best], b, out) : ORB_OK;
+  out->clear = 1;
+  if (to == 0) {
+    return ORB_OK;
+  }
+  const trial *best = &t->list[winner_of(t, &out->clear)];
+  out->energy = best->energy;
+  return !best->is_given && best->judge < BETTER * given ? write_guess(t, best, b, out) : ORB_OK;
 }
 
 orb_status orb_guess_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_guess *out) {

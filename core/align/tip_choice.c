@@ -28,8 +28,7 @@ typedef struct candidate {
   int32_t way; /* −1: left out */
 } candidate;
 
-/* By area, of the surface. */
-static void middle_of(const orb_mesh *mesh, double out[3]) {
+void orb_tips_middle(const orb_mesh *mesh, double out[3]) {
   double total = 0, sum[3] = {0};
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
     const double *p[3];
@@ -106,7 +105,7 @@ orb_status orb_tip_maps_choose(orb_context *ctx, const orb_mesh *const meshes[2]
     goto end;
   }
   for (int s = 0; s < 2; s++) {
-    middle_of(meshes[s], middle);
+    orb_tips_middle(meshes[s], middle);
     for (int32_t i = 0; i < tips[s].count; i++) {
       orb_sub(meshes[s]->positions + 3 * (size_t)tips[s].vertex[i], middle, at[s][i]);
     }

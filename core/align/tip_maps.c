@@ -1,5 +1,5 @@
 /* How the tips of two shapes may belong together: all injective partial maps are tried, depth first; with eight tips
- * each that are 1.4 million. */
+ * each that are 1.4 million, fewer where some pairs are ruled out. */
 #include <math.h>
 #include <string.h>
 
@@ -7,18 +7,20 @@
 
 enum { LEAST = 3 };
 static const double PAIR_SPREAD = 0.35, FAR_SPREAD = 0.25, WORST = -2; /* of logarithms of quotients */
+static const double PAIR_SHARE = 0.05; /* of a pair's distances, where directions say more */
 
 typedef struct matcher {
   const orb_tips *a, *b;
   double pair[ORB_TIPS_MAX][ORB_TIPS_MAX][ORB_TIPS_MAX][ORB_TIPS_MAX]; /* i, j of a to k, l of b */
   double single[ORB_TIPS_MAX][ORB_TIPS_MAX];
+  unsigned char ruled_out[ORB_TIPS_MAX][ORB_TIPS_MAX];
   orb_tip_map *list;
-  int32_t count;
+  int32_t count, capacity;
 } matcher;
 
-static double agreement(double x, double y, double spread) {
+static double agreement(double x, double y, double spread, double worst) {
   double r = log(x / y) / spread, value = 1 - r * r;
-  return value > WORST ? value : WORST;
+  return value > worst ? value : worst;
 }
 
 /* Is one a part of the other? */
@@ -33,7 +35,7 @@ static int consistent(const orb_tip_map *x, const orb_tip_map *y, int32_t count)
 
 /* Into the list, in order, where it is good enough; parts of it leave. */
 static void keep(matcher *m, const orb_tip_map *map) {
-  if (m->count == ORB_TIP_MAPS_MAX && map->score <= m->list[m->count - 1].score) {
+  if (m->count == m->capacity && map->score <= m->list[m->count - 1].score) {
     return;
   }
   int32_t left = 0;
@@ -47,7 +49,7 @@ static void keep(matcher *m, const orb_tip_map *map) {
       m->list[left++] = m->list[i];
     }
   }
-  m->count = left < ORB_TIP_MAPS_MAX ? left + 1 : left;
+  m->count = left < m->capacity ? left + 1 : left;
   int32_t at = m->count - 1;
   for (; at > 0 && m->list[at - 1].score < map->score; at--) {
     m->list[at] = m->list[at - 1];
@@ -63,6 +65,15 @@ static double gain(const matcher *m, const orb_tip_map *map, int32_t i, int32_t 
     }
   }
   return sum;
+}
+
+static int is_free(const matcher *m, const orb_tip_map *map, int32_t i, int32_t k) {
+  for (int32_t j = 0; j < i; j++) {
+    if (map->to[j] == k) {
+      return 0;
+    }
+  }
+  return !m->ruled_out[i][k];
 }
 
 /* Depth first; the choice of each tip counts up from −1. */
@@ -82,11 +93,8 @@ static void try_all(matcher *m) {
       continue;
     }
     int32_t k = choice[depth] == -2 ? -1 : choice[depth] + 1;
-    for (int32_t j = 0; k >= 0 && j < depth && k < m->b->count; j++) {
-      if (at[depth].to[j] == k) {
-        k++;
-        j = -1;
-      }
+    while (k >= 0 && k < m->b->count && !is_free(m, &at[depth], depth, k)) {
+      k++;
     }
     if (k >= m->b->count) {
       depth--;
@@ -105,17 +113,36 @@ static void try_all(matcher *m) {
 }
 
 void orb_tip_maps(const orb_tips *a, const orb_tips *b, orb_tip_map out[ORB_TIP_MAPS_MAX], int32_t *count) {
-  matcher m = {.a = a, .b = b, .list = out};
+  matcher m = {.a = a, .b = b, .list = out, .capacity = ORB_TIP_MAPS_MAX};
   for (int32_t i = 0; i < a->count; i++) {
     for (int32_t k = 0; k < b->count; k++) {
-      m.single[i][k] = agreement(a->far[i], b->far[k], FAR_SPREAD);
+      m.single[i][k] = agreement(a->far[i], b->far[k], FAR_SPREAD, WORST);
       for (int32_t j = 0; j < a->count; j++) {
         for (int32_t l = 0; l < b->count; l++) {
-          m.pair[i][j][k][l] = i != j && k != l ? agreement(a->distance[i][j], b->distance[k][l], PAIR_SPREAD) : 0;
+          m.pair[i][j][k][l] =
+              i != j && k != l ? agreement(a->distance[i][j], b->distance[k][l], PAIR_SPREAD, WORST) : 0;
         }
       }
     }
   }
   try_all(&m);
   *count = m.count;
+}
+
+int orb_tip_map_beside(const orb_tips *a, const orb_tips *b, double (*beside)[ORB_TIPS_MAX], orb_tip_map *out) {
+  matcher m = {.a = a, .b = b, .list = out, .capacity = 1};
+  for (int32_t i = 0; i < a->count; i++) {
+    for (int32_t k = 0; k < b->count; k++) {
+      m.single[i][k] = beside[i][k];
+      m.ruled_out[i][k] = beside[i][k] <= 0;
+      for (int32_t j = 0; j < a->count; j++) {
+        for (int32_t l = 0; l < b->count; l++) {
+          m.pair[i][j][k][l] =
+              i != j && k != l ? PAIR_SHARE * agreement(a->distance[i][j], b->distance[k][l], PAIR_SPREAD, -1) : 0;
+        }
+      }
+    }
+  }
+  try_all(&m);
+  return m.count > 0;
 }

@@ -4,7 +4,7 @@
 
 #include "orbmorph/mesh.h"
 
-enum { ORB_TIPS_MAX = 8, ORB_TIP_MAPS_MAX = 256 };
+enum { ORB_TIPS_MAX = 8, ORB_TIP_MAPS_MAX = 256, ORB_TIP_TURNS = 24 };
 
 /* Vertices that are farther from the rest of the surface than all about them, farthest first. Distances go along the
  * surface, in units of the mean distance between any two points of it. */
@@ -33,5 +33,17 @@ void orb_tip_maps(const orb_tips *a, const orb_tips *b, orb_tip_map out[ORB_TIP_
 ORB_MUST_CHECK orb_status orb_tip_maps_choose(orb_context *ctx, const orb_mesh *const meshes[2], const orb_tips tips[2],
                                               const orb_tip_map *maps, int32_t count, int32_t most, int32_t *chosen,
                                               int32_t *chosen_count);
+
+/* The one map of at least three tips of which most tips lie beside each other, with distances that agree. beside: 1
+ * at the same place, not positive: not to be matched. 0: there is none. */
+int orb_tip_map_beside(const orb_tips *a, const orb_tips *b, double (*beside)[ORB_TIPS_MAX], orb_tip_map *out);
+
+/* The maps that come of turning one shape onto the other in space, best first, see tip_turns.c. They are few, and all
+ * worth a trial. */
+ORB_MUST_CHECK orb_status orb_tip_maps_by_turns(orb_context *ctx, const orb_mesh *const meshes[2],
+                                                const orb_tips tips[2], orb_tip_map out[ORB_TIP_TURNS], int32_t *count);
+
+/* By area, of the surface. */
+void orb_tips_middle(const orb_mesh *mesh, double out[3]);
 
 #endif
