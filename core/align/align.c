@@ -257,11 +257,16 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
                      orb_alignment *out) {
   memset(out, 0, sizeof *out);
   ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
+  const char *before = orb_progress_only(ctx, "align"); /* shapes are embedded anew on the way */
+  orb_status status;
   if (options->method == ORB_ALIGN_AUTO && landmark_count == 0 && shape_count > 1) {
-    ORB_TRY(orb_align_auto(ctx, shapes, shape_count, options, out));
+    status = orb_align_auto(ctx, shapes, shape_count, options, out);
   } else {
-    ORB_TRY(orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out));
+    status = orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
   }
-  orb_progress(ctx, "align", 1);
-  return ORB_OK;
+  if (status == ORB_OK) {
+    orb_progress(ctx, "align", 1);
+  }
+  (void)orb_progress_only(ctx, before);
+  return status;
 }

@@ -133,8 +133,18 @@ void orb_progress(orb_context *ctx, const char *stage, double fraction) {
   if (!ctx->options.progress || pthread_mutex_trylock(&ctx->progress_lock) != 0) {
     return;
   }
-  ctx->options.progress(ctx->options.progress_user, stage, fraction < 0 ? 0 : fraction > 1 ? 1 : fraction);
+  if (!ctx->stage || strcmp(ctx->stage, stage) == 0) {
+    ctx->options.progress(ctx->options.progress_user, stage, fraction < 0 ? 0 : fraction > 1 ? 1 : fraction);
+  }
   pthread_mutex_unlock(&ctx->progress_lock);
+}
+
+const char *orb_progress_only(orb_context *ctx, const char *stage) {
+  pthread_mutex_lock(&ctx->progress_lock);
+  const char *before = ctx->stage;
+  ctx->stage = stage;
+  pthread_mutex_unlock(&ctx->progress_lock);
+  return before;
 }
 
 static orb_cpu widest_of_machine(void) {

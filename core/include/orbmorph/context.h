@@ -92,6 +92,10 @@ void orb_error_clear(orb_context *ctx);
 /* Reports progress; any thread, may drop calls. */
 void orb_progress(orb_context *ctx, const char *stage, double fraction);
 
+/* From now on only this stage is reported: what works for one calls functions that have stages of their own. NULL: any.
+ * Returns what held before, to be set again at the end. Not within a parallel loop. */
+const char *orb_progress_only(orb_context *ctx, const char *stage);
+
 /* Memory. Blocks are 64-byte aligned. count × size is checked for overflow and against the budget; NULL when it
  * cannot be had, with the error set to ORB_E_NO_MEMORY. A count of 0 gives a valid block. Any thread. */
 void *orb_alloc(orb_context *ctx, size_t count, size_t size);
