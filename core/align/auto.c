@@ -3,9 +3,8 @@
  * The rotation search, and then the one shape bent onto the other in space, are right for shapes in like poses, and the
  * energy of the composed map says so. Where it stays above that of nearly isometric shapes, other correspondences are
  * tried on coarse copies and ranked there (guess.c), which costs little. If one is better than what the rotation comes
- * to, what it matches are landmarks of an alignment by pin, whose composed map is then composed once more, free of
- * them, and the alignment of less energy is returned; else the rotation is composed to the end. The preset `quality`
- * does that in any case.
+ * to, an alignment by pin takes what it matches for landmarks and is then composed free of them, and the alignment of
+ * less energy is returned; else the rotation is composed to the end. The preset `quality` does that in any case.
  */
 #include <math.h>
 #include <string.h>
@@ -17,6 +16,8 @@
 /* Energies below it leave nothing to be won. Between it and CM_GOOD_ENERGY shapes may differ so much, or a limb of two
  * nearly equal ones has gone wrong, which other correspondences show. */
 static const double NEAR_ISOMETRY = 1.05;
+/* Above it a map that was only pinned at the guesses before it was composed may have been caught on the way. */
+static const double POOR_ENERGY = 1.5;
 
 typedef struct guesses {
   orb_guess *of;   /* each later shape's, from 1 on */
@@ -69,15 +70,25 @@ static int is_unsplit(const orb_align_shape *shapes, const orb_alignment *a) {
   return 1;
 }
 
-/* Pinned at the guesses and composed with them held, then composed again without. *held 0: they could not be met as
- * the meshes are, and `out` is empty. */
+/* The one of less energy takes the place of the first, the other one is freed. */
+static void keep_better(orb_context *ctx, orb_alignment *one, orb_alignment *other) {
+  int better = other->energy < one->energy;
+  orb_alignment_free(ctx, better ? one : other);
+  if (better) {
+    *one = *other;
+  }
+}
+
+/* Pinned at the guesses, and composed without them; `twice`: before that with them held. *held 0: they could not be met
+ * as the meshes are, and `out` is empty. */
 static orb_status align_guessed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, const guesses *g,
-                                const orb_align_options *options, orb_alignment *out, int *held) {
+                                const orb_align_options *options, int twice, orb_alignment *out, int *held) {
   orb_status status = ORB_E_NO_MEMORY;
   orb_align_options pin = *options;
   orb_place *at = ORB_NEW(ctx, orb_place, (size_t)g->count * (size_t)shape_count);
   orb_landmark landmarks[ORB_GUESS_MAX];
   pin.method = ORB_ALIGN_PIN;
+  pin.preset = twice ? options->preset : ORB_PRESET_FAST;
   pin.max_growth = 1e-9;
   memset(out, 0, sizeof *out);
   memset(landmarks, 0, sizeof landmarks);
@@ -118,6 +129,27 @@ end:
   return status;
 }
 
+/* Guesses that are held pull a map to where they are a little wrong. They are right where shapes are nearly isometric,
+ * as the energy reached says, and help a map out where thin limbs catch it. */
+static orb_status align_guessed_best(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                     const guesses *g, const orb_align_options *options, double reached,
+                                     orb_alignment *out, int *held) {
+  orb_alignment other;
+  int again, twice = reached <= CM_GOOD_ENERGY;
+  ORB_TRY(align_guessed(ctx, shapes, shape_count, g, options, twice, out, held));
+  if (!*held || twice || (out->energy <= POOR_ENERGY && options->preset != ORB_PRESET_QUALITY)) {
+    return ORB_OK;
+  }
+  orb_status status = align_guessed(ctx, shapes, shape_count, g, options, 1, &other, &again);
+  if (status != ORB_OK) {
+    orb_alignment_free(ctx, out);
+    *held = 0;
+  } else if (again) {
+    keep_better(ctx, out, &other);
+  }
+  return status;
+}
+
 /* From the guesses. *held 0: they are no better than the rotation search or the energy that is reached already, or
  * cannot be met, and `out` is empty. */
 static orb_status try_guesses(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
@@ -129,7 +161,7 @@ static orb_status try_guesses(orb_context *ctx, const orb_align_shape *shapes, i
   ORB_GO(status, guess_all(ctx, shapes, shape_count, &g), end);
   *clear = g.clear;
   if (g.count >= 3 && g.energy < reached) {
-    ORB_GO(status, align_guessed(ctx, shapes, shape_count, &g, options, out, held), end);
+    ORB_GO(status, align_guessed_best(ctx, shapes, shape_count, &g, options, reached, out, held), end);
   }
 end:
   orb_free(ctx, g.of);
@@ -145,14 +177,10 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32
   int held;
   ORB_TRY(try_guesses(ctx, shapes, shape_count, options, alignment->energy, clear, &other, &held));
   if (!held && options->preset != ORB_PRESET_QUALITY && alignment->energy > CM_GOOD_ENERGY) {
-    return orb_compose_all(ctx, alignment, CM_FROM_SPACE, options->preset);
+    return orb_compose_all(ctx, alignment, CM_SPACE_DONE, options->preset);
   }
   if (held) {
-    int better = other.energy < alignment->energy;
-    orb_alignment_free(ctx, better ? alignment : &other);
-    if (better) {
-      *alignment = other;
-    }
+    keep_better(ctx, alignment, &other);
   }
   return ORB_OK;
 }

@@ -328,7 +328,9 @@ static orb_status run_starts(cm_run *c, cm_from from, orb_preset preset) {
     /* A good map is not given up for another, of a symmetric shape say, that is as good. */
     return run_start(c, CM_GIVEN);
   }
-  ORB_TRY(run_start(c, CM_SPATIAL));
+  if (from != CM_SPACE_DONE) {
+    ORB_TRY(run_start(c, CM_SPATIAL));
+  }
   if (from == CM_SPACE_ONLY || (preset != ORB_PRESET_QUALITY && c->best_energy <= CM_GOOD_ENERGY)) {
     return ORB_OK;
   }
@@ -438,6 +440,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   c.passes = preset == ORB_PRESET_QUALITY ? 6 : 3;
   c.rough = preset != ORB_PRESET_QUALITY;
   c.work = (preset == ORB_PRESET_QUALITY ? 5000 : WORK) * (int64_t)moving->mesh.vertex_count;
+  c.work = from == CM_SPACE_DONE ? c.work / 2 : c.work; /* the rest is spent */
   orb_status status;
   ORB_GO(status, prepare(&c), done);
   ORB_GO(status, given_energy(&c, &energy[0]), done);

@@ -14,6 +14,7 @@ typedef enum cm_from {
   CM_FROM_SPACE, /* what fits best in space */
   CM_FROM_MAP,   /* the map as given, which is roughly right */
   CM_SPACE_ONLY, /* what fits best in space; and where nothing comes of that, no more is tried */
+  CM_SPACE_DONE, /* what fits best in space, but for what CM_SPACE_ONLY has tried already */
   CM_MAP_ONLY    /* none: the map as given is improved where it is, roughly and at little cost */
 } cm_from;
 
