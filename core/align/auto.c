@@ -17,7 +17,7 @@
  * nearly equal ones has gone wrong, which other correspondences show. */
 static const double NEAR_ISOMETRY = 1.05;
 /* Above it a map that was only pinned at the guesses before it was composed may have been caught on the way. */
-static const double POOR_ENERGY = 1.5;
+static const double POOR_ENERGY = 1.45;
 
 typedef struct guesses {
   orb_guess *of;   /* each later shape's, from 1 on */
