@@ -13,7 +13,9 @@ struct decoder {
   coding which;
   z_stream gzip;
   ZSTD_DCtx *zstd;
-  int whole; /* the last member or frame ended with the last byte */
+  int whole;           /* the last member or frame ended with the last byte */
+  unsigned magic_seen; /* bytes of the current frame's magic number that were looked at */
+  unsigned char kind;  /* the first of them */
 };
 
 coding coding_of(const char *header) {
@@ -95,10 +97,31 @@ static decode_result feed_gzip(decoder *d, const char *bytes, size_t size, decod
   return DECODE_OK;
 }
 
+/* The magic number of a frame of RFC 8878, or of one to skip, as far as it has come. The library would also read the
+ * formats from before the RFC, with decoders to which neither the bound of the window nor the count of memory applies.
+ */
+static int magic_fits(decoder *d, const unsigned char *bytes, size_t size) {
+  static const unsigned char frame[] = {0x28, 0xB5, 0x2F, 0xFD}, skip[] = {0x50, 0x2A, 0x4D, 0x18};
+  for (size_t i = 0; i < size && d->magic_seen < sizeof frame; i++, d->magic_seen++) {
+    if (d->magic_seen == 0) {
+      d->kind = bytes[i];
+    }
+    int skipped = (d->kind & 0xF0) == skip[0];
+    unsigned char want = (skipped ? skip : frame)[d->magic_seen], is = bytes[i];
+    if (is != want && !(skipped && d->magic_seen == 0)) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
 static decode_result feed_zstd(decoder *d, const char *bytes, size_t size, decode_sink sink, void *user) {
   char out[PIECE];
   ZSTD_inBuffer in = {bytes, size, 0};
   for (;;) {
+    if (!magic_fits(d, (const unsigned char *)bytes + in.pos, in.size - in.pos)) {
+      return DECODE_BROKEN;
+    }
     ZSTD_outBuffer made = {out, sizeof out, 0};
     size_t before = in.pos, left = ZSTD_decompressStream(d->zstd, &made, &in);
     if (ZSTD_isError(left)) {
@@ -112,6 +135,7 @@ static decode_result feed_zstd(decoder *d, const char *bytes, size_t size, decod
     }
     if (in.pos > before || made.pos) {
       d->whole = left == 0;
+      d->magic_seen = d->whole ? 0 : d->magic_seen;
     }
     if (in.pos == in.size && made.pos < made.size) {
       return DECODE_OK;

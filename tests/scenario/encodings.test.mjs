@@ -24,6 +24,14 @@ function zstdZeros(blocks) {
   return Buffer.concat([head, body]);
 }
 
+/** A frame of zstd 0.7, from before the RFC: libzstd still reads it. */
+function frameOf07(bytes) {
+  return Buffer.concat([Buffer.from([0x27, 0xb5, 0x2f, 0xfd, 0x20, bytes.length, 0x40, 0, bytes.length]), bytes, Buffer.from([0xc0, 0, 0])]);
+}
+
+/** A frame to skip (RFC 8878, 3.1.2). */
+const skipped = Buffer.from([0x5a, 0x2a, 0x4d, 0x18, 3, 0, 0, 0, 1, 2, 3]);
+
 test('compressed uploads and requests are the same as plain ones', async (t) => {
   const d = await daemon(t);
   const bytes = await readFile(path.join(samples, 'dog.obj'));
@@ -31,7 +39,7 @@ test('compressed uploads and requests are the same as plain ones', async (t) => 
   assert.equal(plain.status, 201);
   const half = bytes.length >> 1, members = await Promise.all([gzip(bytes.subarray(0, half)), gzip(bytes.subarray(half))]);
   const forms = { gzip: [await gzip(bytes), Buffer.concat(members)], 'x-gzip': [await gzip(bytes, { level: 1 })], identity: [bytes],
-    zstd: [zstd(bytes), zstd(bytes, '-19'), Buffer.concat([zstd(bytes.subarray(0, half)), zstd(bytes.subarray(half))])] };
+    zstd: [zstd(bytes), zstd(bytes, '-19'), Buffer.concat([zstd(bytes.subarray(0, half)), skipped, zstd(bytes.subarray(half))])] };
   for (const [coding, bodies] of Object.entries(forms))
     for (const body of bodies) {
       const reply = await send(d, coding, body, { name: 'dog' });
@@ -51,11 +59,13 @@ test('compressed uploads and requests are the same as plain ones', async (t) => 
 test('broken and unknown codings are refused', async (t) => {
   const d = await daemon(t);
   const text = shapes.obj(shapes.egg(3)), packed = await gzip(text), frames = zstd(Buffer.from(text));
+  const old = frameOf07(Buffer.from('OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n'));
   const flipped = (bytes, at) => Buffer.from(bytes.map((b, i) => (i === at ? b ^ 0x55 : b)));
   for (const [coding, body] of [['gzip', Buffer.from(text)], ['gzip', packed.subarray(0, -1)], ['gzip', packed.subarray(0, 5)],
     ['gzip', flipped(packed, packed.length - 6)], ['gzip', Buffer.concat([packed, Buffer.from('more')])], ['gzip', frames],
     ['gzip', zlib.deflateSync(text)], ['zstd', Buffer.from(text)], ['zstd', frames.subarray(0, -1)], ['zstd', flipped(frames, frames.length - 2)],
-    ['zstd', Buffer.concat([frames, Buffer.from('rest')])], ['zstd', packed]])
+    ['zstd', Buffer.concat([frames, Buffer.from('rest')])], ['zstd', packed], ['zstd', old],
+    ['zstd', Buffer.concat([frames, old])]])
     for (const target of ['/v1/meshes', '/v1/embeddings']) {
       const reply = await send(d, coding, body, {}, target);
       assertProblem(reply, 400, 'malformed-encoding', `${coding} ${body.subarray(0, 8).toString('hex')}`);
