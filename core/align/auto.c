@@ -18,6 +18,8 @@
 static const double NEAR_ISOMETRY = 1.05;
 /* Above it a map that was only pinned at the guesses before it was composed may have been caught on the way. */
 static const double POOR_ENERGY = 1.45;
+/* Of the coarse copies: above it thin limbs have caught even the best map there. */
+static const double CAUGHT_ENERGY = 2;
 
 typedef struct guesses {
   orb_guess *of;   /* each later shape's, from 1 on */
@@ -130,12 +132,13 @@ end:
 }
 
 /* Guesses that are held pull a map to where they are a little wrong. They are right where shapes are nearly isometric,
- * as the energy reached says, and help a map out where thin limbs catch it. */
+ * as the energy reached says, and help a map out where thin limbs catch it. Where neither is known before, both ways
+ * are gone if the first one leads to little. */
 static orb_status align_guessed_best(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                      const guesses *g, const orb_align_options *options, double reached,
                                      orb_alignment *out, int *held) {
   orb_alignment other;
-  int again, twice = reached <= CM_GOOD_ENERGY;
+  int again, twice = reached <= CM_GOOD_ENERGY || g->energy > CAUGHT_ENERGY;
   ORB_TRY(align_guessed(ctx, shapes, shape_count, g, options, twice, out, held));
   if (!*held || twice || (out->energy <= POOR_ENERGY && options->preset != ORB_PRESET_QUALITY)) {
     return ORB_OK;

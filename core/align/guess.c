@@ -88,6 +88,7 @@ end:
 typedef struct trial {
   int32_t count; /* tips; 0: a rotation */
   int is_given;  /* the rotation that the spheres are given anyway */
+  int is_stuck;  /* nothing came of composing it in full */
   double rotation[9];
   int32_t first[ORB_TIPS_MAX], second[ORB_TIPS_MAX];
   double energy, judge;
@@ -255,13 +256,24 @@ static double difference(const trials *t, const trial *x, const trial *y) {
   return sum / extent.diagonal;
 }
 
-/* The trial that judges best among those that differ from all that were chosen, to its place; 0: there is none. */
+/* Composes a trial in full. Where that does not certify or brings nothing it stays as it is. */
+static orb_status compose_trial(trials *t, trial *one) {
+  trial before = *one;
+  ORB_TRY(run_trial(t, one, CM_FROM_MAP));
+  if (!(one->energy < before.energy)) {
+    *one = before;
+    one->is_stuck = 1;
+  }
+  return ORB_OK;
+}
+
+/* The trial that judges best among those that differ from all that were composed, to its place; 0: there is none. */
 static int choose_next(trials *t, int32_t to) {
   int32_t best = -1;
   for (int32_t i = to; i < t->count; i++) {
     int other = t->list[i].judge < INFINITY;
     for (int32_t k = 0; k < to && other; k++) {
-      other = difference(t, &t->list[i], &t->list[k]) > DIFFERENT;
+      other = t->list[k].is_stuck || difference(t, &t->list[i], &t->list[k]) > DIFFERENT;
     }
     best = other && (best < 0 || t->list[i].judge < t->list[best].judge) ? i : best;
   }
@@ -327,7 +339,7 @@ static orb_status run_trials(trials *t, const orb_mesh *b, orb_guess *out) {
   double given = t->list[0].judge;
   int32_t to = 0;
   for (; to < COMPOSED && choose_next(t, to); to++) {
-    ORB_TRY(run_trial(t, &t->list[to], CM_FROM_MAP));
+    ORB_TRY(compose_trial(t, &t->list[to]));
   }
   t->count = to;
   out->clear = 1;
