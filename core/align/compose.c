@@ -12,7 +12,8 @@
  * the landmarks, the guesses and some samples of the bent shape (compose_walk.c) has no flips to begin with. The best
  * map so far, drawn to the targets. From a start on the level is refined up to all vertices, and no flip is allowed
  * again. The map of least energy wins, if it is better than the
- * alignment as given. Limbs that it has twisted about their axes are turned back in the end (compose_unwind.c).
+ * alignment as given. Limbs that it has twisted about their axes are turned back (compose_unwind.c) before it is bent
+ * again, and in the end.
  */
 #include "align/compose.h"
 
@@ -30,7 +31,8 @@ enum {
   HOPELESS = 9,        /* one flip in so many triangles: they will not be cleared */
   SOFT_ROUNDS = 8,
   ROUGH_SWEEPS = 40,
-  WORK = 550 /* vertex steps a vertex, see cm_run.work */
+  WORK = 550, /* vertex steps a vertex, see cm_run.work */
+  UNWOUND_WORK = 250
 };
 
 static const double WORSE = 2, FOLLOWS = 1e-3; /* of the triangles turned over, either way: reason to swap the shapes */
@@ -319,6 +321,16 @@ static orb_status meet_pairs(cm_run *c) {
   return prepare_levels(c);
 }
 
+/* Twisted limbs are turned back before the best map is bent again: targets that follow twists keep them. What the
+ * bends are for then is new, so there is some work for them. */
+static orb_status unwind_early(cm_run *c) {
+  double twisted = c->best_energy;
+  int64_t least = UNWOUND_WORK * (int64_t)c->vertex_count;
+  ORB_TRY(cm_unwind(c));
+  c->work = c->best_energy < twisted && c->work < least ? least : c->work;
+  return ORB_OK;
+}
+
 /* The starts, until nothing comes of them any more. */
 static orb_status run_starts(cm_run *c, cm_from from, orb_preset preset) {
   if (from == CM_MAP_ONLY) {
@@ -337,6 +349,7 @@ static orb_status run_starts(cm_run *c, cm_from from, orb_preset preset) {
   ORB_TRY(meet_pairs(c));
   ORB_TRY(run_start(c, CM_GIVEN)); /* without flips and cheap, and the better it is the further the others get */
   ORB_TRY(run_start(c, CM_DRAWN));
+  ORB_TRY(unwind_early(c));
   double last = INFINITY;
   while (c->best_energy < 0.99 * last && c->passes-- > 0 && c->work > 0) {
     last = c->best_energy;

@@ -82,13 +82,7 @@ done:
   return status;
 }
 
-/* What a level holds of its map, to go back to. */
-typedef struct snapshot {
-  orb_place *place;
-  double *y; /* y, n and x, as they lie in the level */
-} snapshot;
-
-static orb_status snapshot_take(cm_run *c, const cm_level *l, snapshot *s) {
+orb_status cm_map_copy_take(cm_run *c, const cm_level *l, cm_map_copy *s) {
   s->place = ORB_NEW(c->ctx, orb_place, l->count);
   s->y = ORB_NEW(c->ctx, double, 9 * (size_t)l->count);
   if (!s->place || !s->y) {
@@ -99,14 +93,15 @@ static orb_status snapshot_take(cm_run *c, const cm_level *l, snapshot *s) {
   return ORB_OK;
 }
 
-static void snapshot_restore(const snapshot *s, cm_level *l) {
+void cm_map_copy_restore(const cm_map_copy *s, cm_level *l) {
   memcpy(l->place, s->place, (size_t)l->count * sizeof *s->place);
   memcpy(l->y, s->y, 9 * (size_t)l->count * sizeof *s->y);
 }
 
-static void snapshot_free(cm_run *c, snapshot *s) {
+void cm_map_copy_free(cm_run *c, cm_map_copy *s) {
   orb_free(c->ctx, s->place);
   orb_free(c->ctx, s->y);
+  memset(s, 0, sizeof *s);
 }
 
 /* The energy with that of the pull, as the sweeps lower it. */
@@ -120,11 +115,11 @@ static double pulled_energy(const cm_level *l) {
 }
 
 orb_status cm_loosen(cm_run *c, cm_level *l, int soft_sweeps, int hard_sweeps) {
-  snapshot before = {0};
+  cm_map_copy before = {0};
   double energy = pulled_energy(l);
   int32_t flips;
   orb_status status;
-  ORB_GO(status, snapshot_take(c, l, &before), done);
+  ORB_GO(status, cm_map_copy_take(c, l, &before), done);
   ORB_GO(status, cm_sweeps(c, l, cm_soft(1), soft_sweeps), done);
   ORB_GO(status, cm_clear_flips(c, l, 3, &flips), done);
   if (!flips) {
@@ -132,10 +127,10 @@ orb_status cm_loosen(cm_run *c, cm_level *l, int soft_sweeps, int hard_sweeps) {
   }
   int worse = flips || cm_level_flips(l) || pulled_energy(l) >= energy;
   if (worse) {
-    snapshot_restore(&before, l);
+    cm_map_copy_restore(&before, l);
   }
 done:
-  snapshot_free(c, &before);
+  cm_map_copy_free(c, &before);
   return status;
 }
 
@@ -145,19 +140,19 @@ orb_status cm_draw(cm_run *c, cm_level *l, const int32_t *to_mesh) {
   double pull = DRAW;
   orb_status status = ORB_OK;
   for (int round = 0; round < DRAW_ROUNDS && status == ORB_OK && c->work > 0; round++, pull *= DRAW_FALL) {
-    snapshot before = {0};
+    cm_map_copy before = {0};
     int32_t flips;
     cm_set_pull(c, l, to_mesh, pull);
-    ORB_GO(status, snapshot_take(c, l, &before), next);
+    ORB_GO(status, cm_map_copy_take(c, l, &before), next);
     ORB_GO(status, cm_sweeps(c, l, cm_soft(FIRST_BARRIER), DRAW_SWEEPS), next);
     ORB_GO(status, cm_clear_flips(c, l, CLEARINGS, &flips), next);
     if (flips) {
-      snapshot_restore(&before, l);
+      cm_map_copy_restore(&before, l);
       round = DRAW_ROUNDS;
     }
     ORB_GO(status, cm_sweeps(c, l, cm_hard(), DRAW_SWEEPS), next);
   next:
-    snapshot_free(c, &before);
+    cm_map_copy_free(c, &before);
   }
   return status;
 }

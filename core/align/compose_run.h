@@ -100,6 +100,14 @@ ORB_MUST_CHECK orb_status cm_sweeps(cm_run *run, cm_level *level, cm_rules rules
 cm_rules cm_soft(double barrier);
 cm_rules cm_hard(void);
 void cm_set_pull(const cm_run *run, cm_level *level, const int32_t *to_mesh, double strength);
+/* What a level holds of its map, to go back to. */
+typedef struct cm_map_copy {
+  orb_place *place;
+  double *y; /* y, n and x, as they lie in the level */
+} cm_map_copy;
+ORB_MUST_CHECK orb_status cm_map_copy_take(cm_run *run, const cm_level *level, cm_map_copy *out);
+void cm_map_copy_restore(const cm_map_copy *copy, cm_level *level);
+void cm_map_copy_free(cm_run *run, cm_map_copy *copy);
 /* Flips are driven out: sweeps against a growing barrier, then untangling of a copy, until that succeeds. */
 ORB_MUST_CHECK orb_status cm_clear_flips(cm_run *run, cm_level *level, int rounds, int32_t *flips);
 /* Vertices that barriers have locked in get free where flips are allowed for a while. What comes of it is kept if it

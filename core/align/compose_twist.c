@@ -310,6 +310,9 @@ int cm_twists_undo(const cm_twists *twists, const cm_surface *b, double share, o
     return 0;
   }
   const cm_twist *t = &twists->limb[limb];
+  if (t->count < 2) {
+    return 0;
+  }
   int k = 1;
   while (k < t->count - 1 && t->height[k] < height) {
     k++;

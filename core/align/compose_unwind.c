@@ -4,8 +4,9 @@
  * one-to-one; but triangles are straight on the sphere, so some of the small or thin ones flip there, here and there
  * and not in heaps. Untangling clears them, if roughly, and descent, with flips allowed now and then against the
  * barrier (cm_loosen), comes down from there. Where triangles are large against the limb, flips are left; then the
- * limbs are turned by smaller steps, each untangled and smoothed before the next. Steps without any flip were tried:
- * half of the vertices get stuck on the way, and the twist stays.
+ * limbs are turned by smaller steps, each untangled and smoothed before the next, and if that folds too, one limb after
+ * the other: those that cannot be turned do not keep the others. Steps without any flip were tried: half of the
+ * vertices get stuck on the way, and the twist stays.
  *
  * What comes of it is kept if its energy is less, if less is twisted, and if more of the area is left halfway of a
  * linear morph: the energy of a twist that is spread over a long limb is small, so it alone does not tell.
@@ -127,6 +128,40 @@ static orb_status turn_limbs(unwind *u, const orb_surface *s, int steps, int32_t
   return ORB_OK;
 }
 
+/* Turns one limb after the other; those that fold are left out. *flips: 0 if any was turned. */
+static orb_status turn_each(unwind *u, const orb_surface *s, int32_t *flips) {
+  cm_run *c = u->c;
+  const cm_twists *all = u->twists;
+  cm_map_copy before = {0};
+  orb_status status;
+  cm_level_free(c->ctx, u->l);
+  *flips = 1;
+  ORB_GO(status, cm_full_level(c, c->best, s, u->l), done);
+  cm_set_pull(c, u->l, s->to_mesh, 0);
+  u->share = 1;
+  for (int32_t i = 0; i < all->count; i++) {
+    cm_twists one = *all;
+    int32_t folded;
+    for (int32_t k = 0; k < all->count; k++) {
+      one.limb[k].count = k == i ? all->limb[k].count : 0;
+    }
+    u->twists = &one;
+    ORB_GO(status, cm_map_copy_take(c, u->l, &before), done);
+    ORB_GO(status, orb_sliced_by(c->ctx, u->l->count, SLICE, 64, turn_range, u), done);
+    ORB_GO(status, untangle(c, u->l, &folded), done);
+    if (folded) {
+      cm_map_copy_restore(&before, u->l);
+    } else {
+      *flips = 0;
+    }
+    cm_map_copy_free(c, &before);
+  }
+done:
+  cm_map_copy_free(c, &before);
+  u->twists = all;
+  return status;
+}
+
 static orb_status unwind_limbs(cm_run *c, const cm_twists *twists) {
   orb_surface s = {0};
   cm_level level = {0};
@@ -138,6 +173,9 @@ static orb_status unwind_limbs(cm_run *c, const cm_twists *twists) {
   c->work = c->work > least ? c->work : least;
   for (int steps = 1; steps <= MOST_STEPS && flips; steps *= MOST_STEPS) {
     ORB_GO(status, turn_limbs(&u, &s, steps, &flips), done);
+  }
+  if (flips && twists->count > 1) {
+    ORB_GO(status, turn_each(&u, &s, &flips), done);
   }
   if (!flips) {
     ORB_GO(status, descend(c, &level), done);
