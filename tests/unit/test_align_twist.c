@@ -94,6 +94,12 @@ static void find(creature *c, const int32_t *held, int32_t held_count, cm_twists
   assert_int_equal(cm_twists_find(c->ctx, &c->surface, &map, held, held_count, out), ORB_OK);
 }
 
+/* To the bit; but not what lies between the members, which is never set. */
+static void assert_same_place(const orb_place *a, const orb_place *b) {
+  assert_int_equal(a->triangle, b->triangle);
+  assert_memory_equal(a->at, b->at, sizeof a->at);
+}
+
 /* About a part that is round, rings are circles, and angles along them those about the axis. */
 static void turns_go_round_the_axis(void **state) {
   (void)state;
@@ -128,7 +134,7 @@ static void turns_go_round_the_axis(void **state) {
   }
   as_it_was.triangle = outside.triangle;
   assert_false(cm_limb_turn(&c.surface, height, 1, &outside));
-  assert_memory_equal(&outside, &as_it_was, sizeof outside);
+  assert_same_place(&outside, &as_it_was);
   free(inside);
   free(height);
   drop(&c);
@@ -184,7 +190,7 @@ static void nothing_is_found(double twist, double bend, int both_ends_held) {
   orb_locate(c.surface.locator, axis, -1, &place);
   as_it_was = place;
   assert_false(cm_twists_undo(&t, &c.surface, 1, &place));
-  assert_memory_equal(&place, &as_it_was, sizeof place);
+  assert_same_place(&place, &as_it_was);
   cm_twists_free(c.ctx, &t);
   drop(&c);
 }
