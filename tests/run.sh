@@ -31,7 +31,7 @@ side_by_side=$(($(nproc) + 1))
 echo "== with sanitizers =="
 ctest --test-dir build-asan --output-on-failure -R '^(unit|scenario)\.' -j $side_by_side
 echo "== fuzzing, 10 s a target =="
-# The same inputs each time, so that a change is judged by itself; long runs look for new ones.
+# From one seed, so that a change is judged by much the same inputs as the one before; long runs look for new ones.
 ORB_FUZZ_SEED=1 tests/fuzz/run.sh 10
 echo "== release =="
 ctest --test-dir build --output-on-failure -j $side_by_side

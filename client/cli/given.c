@@ -6,7 +6,7 @@
 #include "make.h"
 
 /* Members of members that --set takes, and the same within its value: far more than a request has, and together far
- * less than JSON's readers follow (1,000), so that what is sent can be read. */
+ * less than JSON's readers follow (1,000), so that what is sent is JSON to all of them. */
 enum { SET_DEPTH_MOST = 64 };
 
 cJSON *cli_read_landmarks(const cli *c, const char *path) {

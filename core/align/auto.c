@@ -72,13 +72,14 @@ static int is_unsplit(const orb_align_shape *shapes, const orb_alignment *a) {
   return 1;
 }
 
-/* The one of less energy takes the place of the first, the other one is freed. */
-static void keep_better(orb_context *ctx, orb_alignment *one, orb_alignment *other) {
+/* The one of less energy takes the place of the first, the other one is freed. Whether that was the second. */
+static int keep_better(orb_context *ctx, orb_alignment *one, orb_alignment *other) {
   int better = other->energy < one->energy;
   orb_alignment_free(ctx, better ? one : other);
   if (better) {
     *one = *other;
   }
+  return better;
 }
 
 /* Pinned at the guesses, and composed without them; `twice`: before that with them held. *held 0: they could not be met
@@ -133,7 +134,7 @@ end:
 
 /* Guesses that are held pull a map to where they are a little wrong. They are right where shapes are nearly isometric,
  * as the energy reached says, and help a map out where thin limbs catch it. Where neither is known before, both ways
- * are gone if the first one leads to little. */
+ * are tried if the first one leads to little; `quality` always tries both. */
 static orb_status align_guessed_best(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                      const guesses *g, const orb_align_options *options, double reached,
                                      orb_alignment *out, int *held) {
@@ -148,7 +149,7 @@ static orb_status align_guessed_best(orb_context *ctx, const orb_align_shape *sh
     orb_alignment_free(ctx, out);
     *held = 0;
   } else if (again) {
-    keep_better(ctx, out, &other);
+    (void)keep_better(ctx, out, &other);
   }
   return status;
 }
@@ -179,11 +180,9 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32
   orb_alignment other;
   int held;
   ORB_TRY(try_guesses(ctx, shapes, shape_count, options, alignment->energy, clear, &other, &held));
-  if (!held && options->preset != ORB_PRESET_QUALITY && alignment->energy > CM_GOOD_ENERGY) {
+  int taken = held && keep_better(ctx, alignment, &other);
+  if (!taken && options->preset != ORB_PRESET_QUALITY && alignment->energy > CM_GOOD_ENERGY) {
     return orb_compose_all(ctx, alignment, CM_SPACE_DONE, options->preset);
-  }
-  if (held) {
-    keep_better(ctx, alignment, &other);
   }
   return ORB_OK;
 }

@@ -11,9 +11,8 @@
  * them all; what is sound of one that nearly came to a map is used (compose_near.c). A map walked to on the sphere by
  * the landmarks, the guesses and some samples of the bent shape (compose_walk.c) has no flips to begin with. The best
  * map so far, drawn to the targets. From a start on the level is refined up to all vertices, and no flip is allowed
- * again. The map of least energy wins, if it is better than the
- * alignment as given. Limbs that it has twisted about their axes are turned back (compose_unwind.c) before it is bent
- * again, and in the end.
+ * again. The map of least energy wins, if it is better than the alignment as given. Limbs that it has twisted about
+ * their axes are turned back (compose_unwind.c) before it is bent again, and in the end.
  */
 #include "align/compose.h"
 
@@ -31,8 +30,8 @@ enum {
   HOPELESS = 9,        /* one flip in so many triangles: they will not be cleared */
   SOFT_ROUNDS = 8,
   ROUGH_SWEEPS = 40,
-  WORK = 550, /* vertex steps a vertex, see cm_run.work */
-  UNWOUND_WORK = 250
+  WORK = 550,        /* vertex steps a vertex, see cm_run.work */
+  UNWOUND_WORK = 250 /* that bends have at least after an unwinding that helped */
 };
 
 static const double WORSE = 2, FOLLOWS = 1e-3; /* of the triangles turned over, either way: reason to swap the shapes */

@@ -6,7 +6,7 @@
 #include "orbmorph/align.h"
 #include "orbmorph/remesh.h"
 
-/* Composed energies below it say that shapes correspond: no further start, no other correspondence is tried. */
+/* Composed energies below it say that shapes correspond: no further start is tried. */
 static const double CM_GOOD_ENERGY = 1.2;
 
 /* What the first spatial targets of a composed map follow. */

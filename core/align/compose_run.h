@@ -47,7 +47,7 @@ typedef struct cm_run {
   double *fixed_points; /* what they are now; NULL: as given */
   cm_map kept;          /* the best map from before they changed */
   double *x, *normal;   /* moving shape, area 4π */
-  double *goal;         /* spatial targets; NULL: none */
+  double *goal;         /* spatial targets, once it was bent */
   double *goal_normal;
   orb_place *goal_place; /* on the fixed shape, of every vertex of the moving one */
   unsigned char *keep;
@@ -90,8 +90,8 @@ ORB_MUST_CHECK orb_status cm_walk(cm_run *run, int32_t samples, int *stuck);
 /* compose.c. All vertices at these points, the landmarks pinned; s: their order, of the caller. */
 ORB_MUST_CHECK orb_status cm_full_level(cm_run *run, const double *points, const orb_surface *s, cm_level *level);
 
-/* compose_unwind.c. Twisted limbs of the best map are turned back, step by step, and what comes of it takes the best
- * map's place if it is better. */
+/* compose_unwind.c. Twisted limbs of the best map are turned back, whole, by steps, or one by one, and what comes of it
+ * takes the best map's place if it is better. */
 ORB_MUST_CHECK orb_status cm_unwind(cm_run *run);
 
 /* compose_rounds.c. Sweeps until hardly a vertex moves any more, `count` at most. */
@@ -108,6 +108,8 @@ typedef struct cm_map_copy {
 ORB_MUST_CHECK orb_status cm_map_copy_take(cm_run *run, const cm_level *level, cm_map_copy *out);
 void cm_map_copy_restore(const cm_map_copy *copy, cm_level *level);
 void cm_map_copy_free(cm_run *run, cm_map_copy *copy);
+/* Every vertex that is not pinned is looked for again where its point is, from the triangle that it had on. */
+ORB_MUST_CHECK orb_status cm_relocate(cm_run *run, cm_level *level);
 /* Flips are driven out: sweeps against a growing barrier, then untangling of a copy, until that succeeds. */
 ORB_MUST_CHECK orb_status cm_clear_flips(cm_run *run, cm_level *level, int rounds, int32_t *flips);
 /* Vertices that barriers have locked in get free where flips are allowed for a while. What comes of it is kept if it

@@ -48,14 +48,10 @@ static void turn_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
+/* Places are looked for again only if no flip is left: else the level is given up. */
 static orb_status untangle(cm_run *c, cm_level *l, int32_t *flips) {
   ORB_TRY(cm_level_untangle(c->ctx, l, flips, &c->work));
-  for (int32_t v = 0; v < l->count; v++) {
-    if (!l->pinned[v]) {
-      cm_level_locate(l, &c->b, v, l->place[v].triangle);
-    }
-  }
-  return ORB_OK;
+  return *flips == 0 ? cm_relocate(c, l) : ORB_OK;
 }
 
 static orb_status descend(cm_run *c, cm_level *l) {

@@ -29,7 +29,7 @@
 enum { COARSE = 1000, WALK = 300, ROTATIONS = 3, TIP_MAPS = 8, COMPOSED = 3, SAMPLES = 48 };
 static const double TURN = 1;         /* a half turn in space costs so many times the energy beyond 1 */
 static const double DIFFERENT = 0.15; /* of the diagonal: maps that differ by more are others */
-static const double BETTER = 0.95;    /* than the rotation search, or it is not worth the work */
+static const double BETTER = 0.95;    /* than the rotation search after its rough sweeps, or it is not worth the work */
 
 /* A decimated copy: compact, with an embedding of its own. */
 typedef struct coarse {
@@ -267,7 +267,8 @@ static orb_status compose_trial(trials *t, trial *one) {
   return ORB_OK;
 }
 
-/* The trial that judges best among those that differ from all that were composed, to its place; 0: there is none. */
+/* The trial that judges best among those that differ from all of which composing made something, to its place; 0: there
+ * is none. */
 static int choose_next(trials *t, int32_t to) {
   int32_t best = -1;
   for (int32_t i = to; i < t->count; i++) {

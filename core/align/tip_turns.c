@@ -88,6 +88,7 @@ orb_status orb_tip_maps_by_turns(orb_context *ctx, const orb_mesh *const meshes[
     side(i, rotation);
     int found = match(tips, at, rotation, &map), same = 0;
     for (int step = 0; step < STEPS && found && !same; step++) {
+      ORB_TRY(orb_context_check(ctx)); /* matching tries up to 1.4 million maps */
       last = map;
       ORB_TRY(fit(ctx, at, tips[0].count, &map, rotation));
       found = match(tips, at, rotation, &map);

@@ -20,7 +20,7 @@ ORB_MUST_CHECK orb_status orb_tips_find(orb_context *ctx, const orb_mesh *mesh, 
 /* Tip i of the first shape is tip to[i] of the second, −1: none. */
 typedef struct orb_tip_map {
   int32_t count, to[ORB_TIPS_MAX];
-  double score; /* how well distances agree, summed over pairs of tips */
+  double score; /* how well distances, or directions, agree, summed over tips and pairs of them */
 } orb_tip_map;
 
 /* The maps of at least three tips whose distances agree best, best first; none is a part of another. Which way round

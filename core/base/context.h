@@ -19,7 +19,7 @@ struct orb_context {
   int in_loop; /* set by orb_parallel_for() around a loop: the first failure wins */
   pthread_mutex_t progress_lock;
   const char *stage; /* the only one that is reported; NULL: any */
-  orb_pool *pool; /* made by the first parallel loop */
+  orb_pool *pool;    /* made by the first parallel loop */
 };
 
 void orb_pool_stop(orb_context *ctx);

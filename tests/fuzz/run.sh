@@ -2,7 +2,7 @@
 # Builds the libFuzzer targets and runs each for some seconds, as many at once as there are cores.
 #
 #   tests/fuzz/run.sh [--cpu] SECONDS [TARGET…]    with --cpu the seconds are of CPU time, else of wall time
-#                                                  with ORB_FUZZ_SEED the same inputs are made each time
+#                                                  with ORB_FUZZ_SEED all begin with the same inputs each time
 #   tests/fuzz/run.sh --sums                       what all runs in build-fuzz came to, a line a target
 #   tests/fuzz/run.sh --keep BYTES [TARGET…]       adds what covers more to tests/fuzz/corpus, inputs up to BYTES each
 #

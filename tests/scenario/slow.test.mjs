@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import net from 'node:net';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
-import { assertProblem, daemon, endless, until } from './support/daemon.mjs';
+import { assertProblem, daemon, endless, patience, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 /** A plain connection: what came so far, and its end. */
@@ -19,7 +19,7 @@ function connect(d, t) {
   t.after(() => c.socket.destroy());
   return c;
 }
-const within = (promise, what) => Promise.race([promise, sleep(120_000, null, { ref: false }).then(() => assert.fail(`not within two minutes: ${what}`))]);
+const within = (promise, what) => Promise.race([promise, sleep(120_000 * patience, null, { ref: false }).then(() => assert.fail(`not in time: ${what}`))]);
 const HURRY = ['--header-seconds', '1', '--slow-seconds', '1', '--min-rate', '1000'];
 
 test('headers and bodies that only trickle in', async (t) => {

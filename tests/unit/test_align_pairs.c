@@ -175,8 +175,8 @@ static void more_landmarks_do_not_lead_astray(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* Four-legged animals, and in the first map that the starts come to several legs are twisted, some of which cannot be turned
- * back together. With the first eight landmarks the energy is 1.35. */
+/* Four-legged animals, and in the first map that the starts come to several legs are twisted, some of which cannot be
+ * turned back together. All landmarks say no more of the map than the first eight do, so they cost little more. */
 static void twisted_legs_are_turned_back_with_many_landmarks(void **state) {
   (void)state;
   orb_context *ctx;
@@ -192,8 +192,11 @@ static void twisted_legs_are_turned_back_with_many_landmarks(void **state) {
   orb_align_defaults(&options);
   options.method = ORB_ALIGN_PIN;
   options.preset = ORB_PRESET_DEFAULT;
+  align_and_check(ctx, l.shapes, 2, l.landmarks, 8, &options, &out);
+  double few = out.energy;
+  orb_alignment_free(ctx, &out);
   align_and_check(ctx, l.shapes, 2, l.landmarks, l.p.count, &options, &out);
-  assert_true(out.energy <= 1.1 * 1.35);
+  assert_true(out.energy <= 1.1 * few);
   orb_alignment_free(ctx, &out);
   free_pair(ctx, &l);
   orb_context_destroy(ctx);

@@ -220,8 +220,9 @@ static void assert_guess(const char *first, const char *second, int marks, const
   orb_mesh mesh[2];
   orb_guess guess;
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
-  int found = shared_mesh(ctx, first, &mesh[0]) && shared_mesh(ctx, second, &mesh[1]);
+  int found = shared_mesh(ctx, first, &mesh[0]);
   if (found) {
+    assert_true(shared_mesh(ctx, second, &mesh[1]));
     assert_int_equal(orb_guess_find(ctx, &mesh[0], &mesh[1], &guess), ORB_OK);
     for (int k = 0; k < guess.count; k++) {
       assert_int_equal(nearest_of(&mesh[0], mark[0], marks, guess.first[k]),
@@ -243,7 +244,7 @@ static void assert_guess(const char *first, const char *second, int marks, const
 static void man_to_armadillo(void **state) {
   (void)state;
   static const int32_t man[] = {6615, 3218, 5906, 2445, 331}, armadillo[] = {10077, 9912, 14583, 14523, 13173};
-  assert_guess("human_man.obj", "armadillo_29k.obj", 5, (const int32_t *[]){man, armadillo}, 0, 0.9);
+  assert_guess("human_man.obj", "armadillo_29k.obj", 5, (const int32_t *[]){man, armadillo}, 3, 0.9);
 }
 
 /* Four legs and the nose of a stout cow and a lean animal that faces another way. */
