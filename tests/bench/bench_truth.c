@@ -7,7 +7,9 @@
  *   that surface at its centre. Of the supermesh: those that turn against either surface there.
  * - halfway: how much of its area each patch of the surface keeps halfway of the linear morph, against the mean of both
  *   ends. A limb that the map turns by half a turn about its axis is thin there. The least of some 200 patches, and the
- *   share of the surface in patches that keep less than half.
+ *   share of the surface in patches that keep less than half. Shapes that face different ways lose area on the straight
+ *   way whatever the map is; `halfway_fitted` is the same after the second one was moved onto the first (the asset's
+ *   fit `rigid`).
  */
 #include <math.h>
 #include <stdio.h>
@@ -283,21 +285,31 @@ static double corner_area(const double *x, const int32_t *v) {
   return 0.5 * sqrt(dot(n, n));
 }
 
-static int write_halfway(const truth_run *run, orb_text *line) {
+/* Where a vertex is on a shape that was moved by a matrix of orb_asset_transforms(). */
+static void moved_place(const truth_run *run, int s, size_t v, const double *matrix, double out[3]) {
+  const orb_supermesh *m = &run->result->supermesh;
+  double p[3];
+  orb_place_position(&run->result->alignment.shapes[s].mesh, &m->places[(size_t)s * (size_t)m->vertex_count + v], p);
+  for (int k = 0; k < 3; k++) {
+    out[k] = matrix[k] * p[0] + matrix[4 + k] * p[1] + matrix[8 + k] * p[2] + matrix[12 + k];
+  }
+}
+
+static int write_halfway(const truth_run *run, const char *key, orb_fit fit, orb_text *line) {
   const orb_supermesh *m = &run->result->supermesh;
   size_t n = (size_t)m->vertex_count;
-  double *x = ORB_NEW(run->ctx, double, 10 * n), area[3][PATCHES] = {{0}}, least = 1, thin = 0, whole = 0;
+  double *x = ORB_NEW(run->ctx, double, 10 * n), area[3][PATCHES] = {{0}}, least = 1, thin = 0, whole = 0, moves[32];
   int32_t *patch = ORB_NEW(run->ctx, int32_t, n);
-  for (size_t v = 0; x && patch && v < n; v++) {
+  int fine = x && patch && orb_asset_transforms(run->ctx, m, run->result->alignment.shapes, fit, moves) == ORB_OK;
+  for (size_t v = 0; fine && v < n; v++) {
     double *end[2] = {x + 3 * v, x + 3 * (n + v)}, *half = x + 3 * (2 * n + v);
     for (int s = 0; s < 2; s++) {
-      orb_place_position(&run->result->alignment.shapes[s].mesh, &m->places[(size_t)s * n + v], end[s]);
+      moved_place(run, s, v, moves + 16 * s, end[s]);
     }
     for (int k = 0; k < 3; k++) {
       half[k] = 0.5 * (end[0][k] + end[1][k]);
     }
   }
-  int fine = x && patch;
   if (fine) {
     spread_patches(m, x, x + 9 * n, patch);
   }
@@ -314,7 +326,7 @@ static int write_halfway(const truth_run *run, orb_text *line) {
     whole += ends;
   }
   if (fine) {
-    orb_json_key(line, "halfway");
+    orb_json_key(line, key);
     orb_json_open(line, '{');
     orb_json_member_number(line, "least", least);
     orb_json_member_number(line, "thin_fraction", thin / whole);
@@ -340,7 +352,8 @@ static int write_measures(truth_run *run, orb_text *line) {
     orb_json_member_number(line, "energy", alignment->energy);
     orb_json_member_number(line, "distortion_median", run->result->pairs[0].distortion.symmetric_dirichlet.median);
     write_inverted(run, line);
-    fine = write_dense(run, line) && write_held_out(run, line) && write_halfway(run, line);
+    fine = write_dense(run, line) && write_held_out(run, line) && write_halfway(run, "halfway", ORB_FIT_NONE, line) &&
+           write_halfway(run, "halfway_fitted", ORB_FIT_RIGID, line);
   }
   for (int s = 0; s < 2; s++) {
     orb_locator_destroy(run->ctx, run->locator[s]);

@@ -29,7 +29,13 @@ const sample = () => {
 function open() {
   const kinds = {};
   for (const fd of readdirSync(`${proc}/fd`)) {
-    const what = readlinkSync(`${proc}/fd/${fd}`).replace(data, '').replace(/:\[\d+\]$/, '');
+    let what;
+    try {
+      what = readlinkSync(`${proc}/fd/${fd}`).replace(data, '').replace(/:\[\d+\]$/, '');
+    } catch (error) {
+      if (error.code === 'ENOENT') continue; // closed since the folder was listed
+      throw error;
+    }
     kinds[what] = (kinds[what] ?? 0) + 1;
   }
   return kinds;
