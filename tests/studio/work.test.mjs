@@ -187,6 +187,7 @@ test('reload and the address alone bring the same state back', async () => {
   await seek(first.page, 0.25);
   await until(() => /t=0\.250/.test(first.page.url()), 'the address holds the time');
   await hush(first.page);
+  await settled(first.page);
   const before = await first.page.locator('.pane').screenshot();
   await first.page.reload();
   await until(() => button(first.page, 'Play').count(), 'the morph is back');
