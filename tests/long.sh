@@ -32,9 +32,9 @@ part_tsan() {
 
 # The units; then daemon and command line under memcheck: a walk through every route, and the scenarios.
 # ORB_VALGRIND_UNITS (programs) and ORB_VALGRIND_SCENARIOS name fewer of them, or none; several runs with different ones
-# may go on side by side. Left out: what is about time (crowd,
-# fairness, slow), what measures or needs the release build (bench, report, readme, demo), what preloads a library of
-# its own (faults), what ends the daemon before it can tell of leaks (crash), and large meshes (real_meshes, real_pairs).
+# may go on side by side. Left out: what is about time (crowd, fairness, slow), what measures or needs the release build
+# (bench, report, readme, demo), what preloads a library of its own (faults), what ends the daemon before it can tell of
+# leaks (crash), and large meshes (real_meshes, real_pairs). The folder of a run that found something is left.
 valgrind_scenarios=(walk abuse assets cli cors disk_full durability embeddings encodings eviction jobs meshes openapi
   operations places problems requests shell spheres supermeshes systemd tenants tls tokens view)
 part_valgrind() {
@@ -67,7 +67,7 @@ END
     esac
   done
   find "$folder/reports" -type f -size +0 -exec cat {} + | tee "$folder/found"
-  [ ! -s "$folder/found" ] && [ $failed -eq 0 ]
+  [ ! -s "$folder/found" ] && [ $failed -eq 0 ] && rm -r "$folder"
 }
 
 part_fuzz() {

@@ -153,9 +153,10 @@ static orb_status turn_of(const trials *t, const trial *one, double *turn) {
     }
   }
   for (int i = 0; i < SAMPLES; i++) {
-    for (int k = 0; k < 9; k++) {
-      c[k] += (x[3 * (size_t)t->sample[i] + (size_t)k / 3] - mean[0][k / 3]) * (one->image[i][k % 3] - mean[1][k % 3]);
-    }
+    double p[3], q[3];
+    orb_sub(x + 3 * (size_t)t->sample[i], mean[0], p);
+    orb_sub(one->image[i], mean[1], q);
+    orb_add_outer(c, p, q, 1);
   }
   ORB_TRY(orb_procrustes_covariance(t->ctx, c, r, NULL));
   *turn = acos(fmin(1, fmax(-1, (r[0] + r[4] + r[8] - 1) / 2))) / M_PI;

@@ -28,7 +28,8 @@ typedef struct candidate {
   int32_t way; /* −1: left out */
 } candidate;
 
-void orb_tips_middle(const orb_mesh *mesh, double out[3]) {
+/* By area, of the surface. */
+static void middle_of(const orb_mesh *mesh, double out[3]) {
   double total = 0, sum[3] = {0};
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
     const double *p[3];
@@ -47,6 +48,14 @@ void orb_tips_middle(const orb_mesh *mesh, double out[3]) {
   }
   for (int k = 0; k < 3; k++) {
     out[k] = total > 0 ? sum[k] / total : 0;
+  }
+}
+
+void orb_tips_from_middle(const orb_mesh *mesh, const orb_tips *tips, double (*out)[3]) {
+  double middle[3];
+  middle_of(mesh, middle);
+  for (int32_t i = 0; i < tips->count; i++) {
+    orb_sub(mesh->positions + 3 * (size_t)tips->vertex[i], middle, out[i]);
   }
 }
 
@@ -94,7 +103,7 @@ static int32_t take_next(const candidate *list, const way *ways, int32_t count) 
 orb_status orb_tip_maps_choose(orb_context *ctx, const orb_mesh *const meshes[2], const orb_tips tips[2],
                                const orb_tip_map *maps, int32_t count, int32_t most, int32_t *chosen,
                                int32_t *chosen_count) {
-  double at[2][ORB_TIPS_MAX][3], middle[3], rotation[9], value, mirror;
+  double at[2][ORB_TIPS_MAX][3], rotation[9], value, mirror;
   orb_status status = ORB_OK;
   int32_t way_count = 0;
   way *ways = ORB_NEW0(ctx, way, (size_t)count + 1);
@@ -105,10 +114,7 @@ orb_status orb_tip_maps_choose(orb_context *ctx, const orb_mesh *const meshes[2]
     goto end;
   }
   for (int s = 0; s < 2; s++) {
-    orb_tips_middle(meshes[s], middle);
-    for (int32_t i = 0; i < tips[s].count; i++) {
-      orb_sub(meshes[s]->positions + 3 * (size_t)tips[s].vertex[i], middle, at[s][i]);
-    }
+    orb_tips_from_middle(meshes[s], &tips[s], at[s]);
   }
   for (int32_t i = 0; i < count; i++) {
     ORB_GO(status, fit(ctx, at[0], at[1], tips[0].count, &maps[i], rotation, &value, &mirror), end);

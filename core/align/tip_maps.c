@@ -112,19 +112,28 @@ static void try_all(matcher *m) {
   }
 }
 
+/* What pairs of tips say by their distances, at so much a pair. */
+static void fill_pairs(matcher *m, double share, double worst) {
+  for (int32_t i = 0; i < m->a->count; i++) {
+    for (int32_t k = 0; k < m->b->count; k++) {
+      for (int32_t j = 0; j < m->a->count; j++) {
+        for (int32_t l = 0; l < m->b->count; l++) {
+          m->pair[i][j][k][l] =
+              i != j && k != l ? share * agreement(m->a->distance[i][j], m->b->distance[k][l], PAIR_SPREAD, worst) : 0;
+        }
+      }
+    }
+  }
+}
+
 void orb_tip_maps(const orb_tips *a, const orb_tips *b, orb_tip_map out[ORB_TIP_MAPS_MAX], int32_t *count) {
   matcher m = {.a = a, .b = b, .list = out, .capacity = ORB_TIP_MAPS_MAX};
   for (int32_t i = 0; i < a->count; i++) {
     for (int32_t k = 0; k < b->count; k++) {
       m.single[i][k] = agreement(a->far[i], b->far[k], FAR_SPREAD, WORST);
-      for (int32_t j = 0; j < a->count; j++) {
-        for (int32_t l = 0; l < b->count; l++) {
-          m.pair[i][j][k][l] =
-              i != j && k != l ? agreement(a->distance[i][j], b->distance[k][l], PAIR_SPREAD, WORST) : 0;
-        }
-      }
     }
   }
+  fill_pairs(&m, 1, WORST);
   try_all(&m);
   *count = m.count;
 }
@@ -135,14 +144,9 @@ int orb_tip_map_beside(const orb_tips *a, const orb_tips *b, double (*beside)[OR
     for (int32_t k = 0; k < b->count; k++) {
       m.single[i][k] = beside[i][k];
       m.ruled_out[i][k] = beside[i][k] <= 0;
-      for (int32_t j = 0; j < a->count; j++) {
-        for (int32_t l = 0; l < b->count; l++) {
-          m.pair[i][j][k][l] =
-              i != j && k != l ? PAIR_SHARE * agreement(a->distance[i][j], b->distance[k][l], PAIR_SPREAD, -1) : 0;
-        }
-      }
     }
   }
+  fill_pairs(&m, PAIR_SHARE, -1);
   try_all(&m);
   return m.count > 0;
 }

@@ -30,10 +30,8 @@ static void side(int i, double r[9]) {
 }
 
 static void directions(const orb_mesh *mesh, const orb_tips *tips, double (*out)[3]) {
-  double middle[3];
-  orb_tips_middle(mesh, middle);
+  orb_tips_from_middle(mesh, tips, out);
   for (int32_t i = 0; i < tips->count; i++) {
-    orb_sub(mesh->positions + 3 * (size_t)tips->vertex[i], middle, out[i]);
     orb_normalize(out[i]);
   }
 }

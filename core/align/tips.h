@@ -43,7 +43,7 @@ int orb_tip_map_beside(const orb_tips *a, const orb_tips *b, double (*beside)[OR
 ORB_MUST_CHECK orb_status orb_tip_maps_by_turns(orb_context *ctx, const orb_mesh *const meshes[2],
                                                 const orb_tips tips[2], orb_tip_map out[ORB_TIP_TURNS], int32_t *count);
 
-/* By area, of the surface. */
-void orb_tips_middle(const orb_mesh *mesh, double out[3]);
+/* Where tips are, seen from the middle of the surface by area: tips->count points. */
+void orb_tips_from_middle(const orb_mesh *mesh, const orb_tips *tips, double (*out)[3]);
 
 #endif
