@@ -170,6 +170,33 @@ static void add_normal(const orb_mesh *mesh, const double *normals, const orb_pl
   }
 }
 
+/* Does a triangle also turn against the input's face at its centre? Where an edge of the input is sharper than a right
+ * angle, a triangle within one face of it can turn against the smooth normals although it is the surface itself. The
+ * locator is made when first asked for. */
+static orb_status against_face(orb_context *ctx, const orb_aligned_shape *shape, const double *points,
+                               const int32_t *corner, const double normal[3], orb_locator **locator, int *against) {
+  const orb_mesh *mesh = &shape->mesh;
+  if (!*locator) {
+    ORB_TRY(orb_locator_create(ctx, shape->points, mesh->vertex_count, mesh->triangles, mesh->triangle_count, NULL,
+                               locator));
+  }
+  double centre[3], u[3], w[3], face[3];
+  for (int c = 0; c < 3; c++) {
+    centre[c] =
+        points[3 * (int64_t)corner[0] + c] + points[3 * (int64_t)corner[1] + c] + points[3 * (int64_t)corner[2] + c];
+  }
+  orb_normalize(centre);
+  orb_place place;
+  orb_locate(*locator, centre, -1, &place);
+  const int32_t *of = mesh->triangles + 3 * (int64_t)place.triangle;
+  const double *p = mesh->positions + 3 * (int64_t)of[0];
+  orb_sub(mesh->positions + 3 * (int64_t)of[1], p, u);
+  orb_sub(mesh->positions + 3 * (int64_t)of[2], p, w);
+  orb_cross(u, w, face);
+  *against = orb_dot(normal, face) < 0;
+  return ORB_OK;
+}
+
 orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shape,
                              int32_t s, const double *positions, unsigned char *inverted) {
   const orb_mesh *mesh = &shape->mesh;
@@ -177,6 +204,7 @@ orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh, c
   orb_mesh_extent(mesh, &extent);
   const orb_place *places = supermesh->places + (int64_t)s * supermesh->vertex_count;
   double floor = 1e-12 * extent.diagonal * extent.diagonal;
+  orb_locator *locator = NULL;
   double *normals = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
   if (!normals) {
     return ORB_E_NO_MEMORY;
@@ -192,8 +220,13 @@ orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh, c
     for (int k = 0; k < 3; k++) {
       add_normal(mesh, normals, &places[corner[k]], ground);
     }
-    inverted[t] = orb_length(normal) > floor && orb_dot(normal, ground) < 0;
+    int against = orb_length(normal) > floor && orb_dot(normal, ground) < 0;
+    if (against) {
+      status = against_face(ctx, shape, supermesh->points, corner, normal, &locator, &against);
+    }
+    inverted[t] = (unsigned char)against;
   }
+  orb_locator_destroy(ctx, locator);
   orb_free(ctx, normals);
   return status;
 }

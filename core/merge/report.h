@@ -12,7 +12,8 @@ ORB_MUST_CHECK orb_status orb_report_landmarks(orb_context *ctx, const orb_align
 ORB_MUST_CHECK orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb_merge_result *out);
 
 /* Marks the triangles of the supermesh that turn in space on shape s against the mean of the input's smooth normals at
- * their corners. positions: of the supermesh's vertices on the shape; inverted: a triangle. */
+ * their corners, and against its face at their centre on the sphere as well. positions: of the supermesh's vertices on
+ * the shape; inverted: a triangle. */
 ORB_MUST_CHECK orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh,
                                             const orb_aligned_shape *shape, int32_t s, const double *positions,
                                             unsigned char *inverted);

@@ -169,8 +169,42 @@ static void shapes_of_no_size_are_refused(void **state) {
   orb_context_destroy(ctx);
 }
 
+/* An overlay is both surfaces themselves, however they are crumpled: none of its triangles is turned against them.
+ * Against smooth normals alone two fifths would be. */
+static void an_overlay_of_crumpled_shapes_turns_nothing(void **state) {
+  (void)state;
+  orb_context *ctx;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh ball = shape_ball(ctx, 3), globe = shape_globe(ctx, 24, 12);
+  orb_mesh crumpled[2] = {shape_ball(ctx, 3), shape_globe(ctx, 24, 12)};
+  orb_align_shape shapes[2] = {{&crumpled[0], ball.positions}, {&crumpled[1], globe.positions}};
+  const char *names[2] = {"one", "other"};
+  uint32_t seed = 1;
+  for (int s = 0; s < 2; s++) {
+    for (int32_t i = 0; i < 3 * crumpled[s].vertex_count; i++) {
+      seed = seed * 1664525u + 1013904223u;
+      crumpled[s].positions[i] += 0.5 * ((seed >> 8) / 8388608.0 - 1);
+    }
+  }
+  orb_merge_options options;
+  orb_merge_defaults(&options);
+  options.align.method = ORB_ALIGN_ROTATE;
+  options.remesh.method = ORB_REMESH_OVERLAY;
+  orb_merge_result result;
+  assert_int_equal(orb_merge(ctx, shapes, names, 2, NULL, 0, &options, &result), ORB_OK);
+  assert_true(result.pairs[0].inverted_fraction == 0);
+  orb_merge_result_free(ctx, &result);
+  for (int s = 0; s < 2; s++) {
+    shape_free(ctx, &crumpled[s]);
+  }
+  shape_free(ctx, &globe);
+  shape_free(ctx, &ball);
+  orb_context_destroy(ctx);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(two_ellipsoids), cmocka_unit_test(one_shape_is_refused),
-                                     cmocka_unit_test(shapes_of_no_size_are_refused)};
+                                     cmocka_unit_test(shapes_of_no_size_are_refused),
+                                     cmocka_unit_test(an_overlay_of_crumpled_shapes_turns_nothing)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -343,7 +343,7 @@ export type Supermesh = {
     /** Index into shapes. */
     b: number;
     distortion: Distortion;
-    /** Of the source area, where the composed map is turned over. */
+    /** Share of the supermesh's triangles that are turned in space, at either end, against that surface: its smooth normals at their corners and its face at their centre. */
     inverted_fraction: number | null;
   }>;
   /** Of the alignment; null: not measured. */

@@ -27,8 +27,9 @@ typedef struct orb_pair_report {
   /* Its means have no bound: one triangle that collapses at one end only can carry them off. median and p99 do not
    * care, and orb_alignment.energy is the mean with each triangle's value capped. */
   orb_distortion distortion;
-  /* Share of the triangles that are turned in space, at either end, against the input surface (its smooth normals at
-   * their corners). Those of no area to speak of (1e-12 of the squared diagonal) do not count. */
+  /* Share of the triangles that are turned in space, at either end, against the input surface: its smooth normals at
+   * their corners, and its face at their centre as well. Those of no area to speak of (1e-12 of the squared diagonal)
+   * do not count. */
   double inverted_fraction;
 } orb_pair_report;
 
