@@ -7,21 +7,8 @@
 
 #include "base/check.h"
 #include "embed/ks_search.h"
+#include "numeric/clones.h"
 #include "numeric/vec3.h"
-
-/* Clones are chosen while the program is loaded, before a sanitizer's runtime is up. */
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-#define KS_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(thread_sanitizer) || __has_feature(address_sanitizer)
-#define KS_SANITIZED 1
-#endif
-#endif
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(KS_SANITIZED)
-#define KS_VECTOR __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define KS_VECTOR
-#endif
 
 enum { MAX_PAIRS = 20000 };
 
@@ -241,8 +228,8 @@ static inline __attribute__((always_inline)) double add_term(const ks_ring *r, i
 
 /* Eq. 3 for `count` ≤ LANES candidates. Its terms are positive: once all are above `bound` the sums are left as they
  * are. */
-KS_VECTOR static void measure_batch(const ks_ring *r, double area_exponent, double aspect_exponent, const double *x,
-                                    const double *y, const double *z, int32_t count, double bound, double *error) {
+ORB_CLONES static void measure_batch(const ks_ring *r, double area_exponent, double aspect_exponent, const double *x,
+                                     const double *y, const double *z, int32_t count, double bound, double *error) {
   spokes first, pair[2];
   memset(error, 0, (size_t)count * sizeof *error);
   measure_spokes(r->point[0], x, y, z, count, &first);
@@ -261,8 +248,8 @@ KS_VECTOR static void measure_batch(const ks_ring *r, double area_exponent, doub
 }
 
 /* The smallest distance of each candidate from the ring's planes, unscaled. */
-KS_VECTOR static void clip(const ks_ring *r, const double *x, const double *y, const double *z, int32_t count,
-                           double *least) {
+ORB_CLONES static void clip(const ks_ring *r, const double *x, const double *y, const double *z, int32_t count,
+                            double *least) {
   for (int32_t l = 0; l < count; l++) {
     least[l] = INFINITY;
   }
@@ -276,8 +263,8 @@ KS_VECTOR static void clip(const ks_ring *r, const double *x, const double *y, c
 }
 
 /* Points of Eq. 2 in the triangle (apex, i, i+1), drawn in towards the apex, on the sphere. */
-KS_VECTOR static void spread(const double (*pair)[2], int32_t pairs, double draw, const double *apex, const double *q,
-                             const double *w, double *x, double *y, double *z) {
+ORB_CLONES static void spread(const double (*pair)[2], int32_t pairs, double draw, const double *apex, const double *q,
+                              const double *w, double *x, double *y, double *z) {
   double qx = draw * (q[0] - apex[0]), qy = draw * (q[1] - apex[1]), qz = draw * (q[2] - apex[2]);
   double wx = draw * (w[0] - apex[0]), wy = draw * (w[1] - apex[1]), wz = draw * (w[2] - apex[2]);
   for (int32_t l = 0; l < pairs; l++) {

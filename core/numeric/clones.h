@@ -1,0 +1,21 @@
+/* ORB_CLONES before a function: it is compiled for several widths of vectors, and the loader chooses. For loops whose
+ * results do not depend on the width. */
+#ifndef ORB_NUMERIC_CLONES_H
+#define ORB_NUMERIC_CLONES_H
+
+/* Clones are chosen while the program is loaded, before a sanitizer's runtime is up. */
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#define ORB_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer) || __has_feature(address_sanitizer)
+#define ORB_SANITIZED 1
+#endif
+#endif
+
+#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(ORB_SANITIZED)
+#define ORB_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define ORB_CLONES
+#endif
+
+#endif
