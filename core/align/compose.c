@@ -6,7 +6,8 @@
  * composed symmetric Dirichlet energy (compose_step.c). Of two shapes the one moves whose triangles follow the other.
  *
  * The landmarks are joined by guesses: their mirror images, where both shapes are symmetric (compose_mirror.c); these
- * hold likewise. There are three kinds of starts. The shape bent onto the other in space (compose_targets.c) is good
+ * hold likewise, unless a start comes near to a map with them and to a better one without. There are three kinds of
+ * starts. The shape bent onto the other in space (compose_targets.c) is good
  * where it folds little; flips on the sphere are then allowed against a growing barrier until local untangling clears
  * them all; what is sound of one that nearly came to a map is used (compose_near.c). A map walked to on the sphere by
  * the landmarks, the guesses and some samples of the bent shape (compose_walk.c) has no flips to begin with. The best
@@ -330,6 +331,40 @@ static orb_status unwind_early(cm_run *c) {
   return ORB_OK;
 }
 
+/* A spatial start that nearly came to a map, and one more without the guesses: a guess that lies a little beside its
+ * true place folds what the landmarks alone do not. If that leads to nothing better, all is as it was before. */
+static orb_status start_without_guesses(cm_run *c) {
+  orb_context *ctx = c->ctx;
+  size_t n = (size_t)c->vertex_count;
+  int32_t count = c->pairs.count;
+  double before = c->best_energy;
+  unsigned char *sound = ORB_NEW(ctx, unsigned char, n);
+  orb_place *place = ORB_NEW(ctx, orb_place, n);
+  orb_status status = sound && place ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status != ORB_OK) {
+    goto done;
+  }
+  memcpy(sound, c->sound, n);
+  memcpy(place, c->goal_place, n * sizeof *place);
+  c->pairs.count = c->pairs.landmarks;
+  ORB_GO(status, cm_bend(c, 0), done);
+  ORB_GO(status, prepare_levels(c), done);
+  ORB_GO(status, run_start(c, CM_SPATIAL), done);
+  if (c->best_energy < before) {
+    goto done; /* the guesses stay away */
+  }
+  c->pairs.count = count;
+  ORB_GO(status, cm_bend(c, 0), done);
+  ORB_GO(status, prepare_levels(c), done);
+  memcpy(c->sound, sound, n);
+  memcpy(c->goal_place, place, n * sizeof *place);
+  c->has_sound = 1;
+done:
+  orb_free(ctx, sound);
+  orb_free(ctx, place);
+  return status;
+}
+
 /* The starts, until nothing comes of them any more. */
 static orb_status run_starts(cm_run *c, cm_from from, orb_preset preset) {
   if (from == CM_MAP_ONLY) {
@@ -341,6 +376,9 @@ static orb_status run_starts(cm_run *c, cm_from from, orb_preset preset) {
   }
   if (from != CM_SPACE_DONE) {
     ORB_TRY(run_start(c, CM_SPATIAL));
+    if (c->has_sound && c->pairs.count > c->pairs.landmarks && c->best_energy > CM_GOOD_ENERGY) {
+      ORB_TRY(start_without_guesses(c));
+    }
   }
   if (from == CM_SPACE_ONLY || (preset != ORB_PRESET_QUALITY && c->best_energy <= CM_GOOD_ENERGY)) {
     return ORB_OK;
