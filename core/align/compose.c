@@ -7,13 +7,13 @@
  *
  * The landmarks are joined by guesses: their mirror images, where both shapes are symmetric (compose_mirror.c); these
  * hold likewise, unless a start comes near to a map with them and to a better one without. There are three kinds of
- * starts. The shape bent onto the other in space (compose_targets.c) is good
- * where it folds little; flips on the sphere are then allowed against a growing barrier until local untangling clears
- * them all; what is sound of one that nearly came to a map is used (compose_near.c). A map walked to on the sphere by
- * the landmarks, the guesses and some samples of the bent shape (compose_walk.c) has no flips to begin with. The best
- * map so far, drawn to the targets. From a start on the level is refined up to all vertices, and no flip is allowed
- * again. The map of least energy wins, if it is better than the alignment as given. Limbs that it has twisted about
- * their axes are turned back (compose_unwind.c) before it is bent again, and in the end.
+ * starts. The shape bent onto the other in space (compose_targets.c) is good where it folds little; flips on the sphere
+ * are then allowed against a growing barrier until local untangling clears them all; what is sound of one that nearly
+ * came to a map is used (compose_near.c). A map walked to on the sphere by the landmarks, the guesses and some samples
+ * of the bent shape (compose_walk.c) has no flips to begin with. The best map so far, drawn to the targets. From a
+ * start on the level is refined up to all vertices, and no flip is allowed again. The map of least energy wins, if it
+ * is better than the alignment as given. Limbs that it has twisted about their axes are turned back (compose_unwind.c)
+ * before it is bent again, and in the end.
  */
 #include "align/compose.h"
 
