@@ -159,7 +159,10 @@ static int read_file(config *out, const char *path) {
       *c = *c == '_' ? '-' : *c;
     }
     const entry *e = equals ? find(name, strlen(name)) : NULL;
-    if (!e) {
+    if (!equals) {
+      fprintf(stderr, "orbmorphd: %s: a line is NAME = VALUE, not \"%s\"\n", from, name);
+      fine = 0;
+    } else if (!e) {
       fprintf(stderr, "orbmorphd: %s: \"%s\" is none of the names that --help lists\n", from, name);
       fine = 0;
     } else {
@@ -254,7 +257,76 @@ static config_action read_flags(config *out, int argc, char **argv, int only_fil
   return action;
 }
 
+static int is_one_of(const char *name, const char *value, const char *const words[]) {
+  for (int i = 0; words[i]; i++) {
+    if (strcmp(value, words[i]) == 0) {
+      return 1;
+    }
+  }
+  fprintf(stderr, "orbmorphd: %s must be ", name);
+  for (int i = 0; words[i]; i++) {
+    fprintf(stderr, "%s%s", i == 0 ? "" : words[i + 1] ? ", " : " or ", words[i]);
+  }
+  fprintf(stderr, ", not \"%s\"\n", value);
+  return 0;
+}
+
+static int is_address(const char *text) {
+  const char *colon = strrchr(text, ':');
+  size_t digits = colon ? strspn(colon + 1, "0123456789") : 0;
+  int fine = strncmp(text, "unix:", 5) == 0
+                 ? text[5] != 0
+                 : digits > 0 && digits <= 5 && colon[1 + digits] == 0 && strtol(colon + 1, NULL, 10) <= 65535;
+  if (!fine) {
+    fprintf(stderr,
+            "orbmorphd: listen must be ADDR:PORT, [V6]:PORT (a port from 0 to 65535) or unix:PATH, not \"%s\"\n", text);
+  }
+  return fine;
+}
+
+/* Origins as browsers send them: a scheme, a host, perhaps a port, and nothing behind it. */
+static int are_origins(const char *list) {
+  if (strcmp(list, "*") == 0) {
+    return 1;
+  }
+  for (const char *at = list + strspn(list, ", "); *at;) {
+    size_t length = strcspn(at, ", ");
+    const char *host = strstr(at, "://");
+    size_t scheme = host ? (size_t)(host - at) : length;
+    int fine = scheme > 0 && scheme + 3 < length && !memchr(host + 3, '/', length - scheme - 3);
+    if (!fine && (length != 4 || strncmp(at, "null", 4) != 0)) {
+      fprintf(stderr, "orbmorphd: cors must be * alone, or origins such as https://app.example.org, not \"%.*s\"\n",
+              (int)length, at);
+      return 0;
+    }
+    at += length;
+    at += strspn(at, ", ");
+  }
+  return 1;
+}
+
+static int is_readable(const char *name, const char *path) {
+  int fine = !*path || access(path, R_OK) == 0;
+  if (!fine) {
+    fprintf(stderr, "orbmorphd: %s: %s cannot be read: %s\n", name, path, strerror(errno));
+  }
+  return fine;
+}
+
+static int is_mode(const char *text) {
+  char *end;
+  long mode = strtol(text, &end, 8);
+  int fine = end != text && !*end && mode >= 0 && mode <= 0777;
+  if (!fine) {
+    fprintf(stderr, "orbmorphd: socket-mode must be an octal number from 0 to 777, not \"%s\"\n", text);
+  }
+  return fine;
+}
+
 static int consistent(config *out) {
+  static const char *const limits[] = {"remote", "all", "off", NULL}, *const auth[] = {"loopback", "on", "off", NULL},
+                           *const levels[] = {"debug", "info", "warn", "error", NULL},
+                           *const formats[] = {"json", "text", NULL};
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
   if (out->workers == 0) {
     out->workers = cores > 0 ? (cores < 256 ? cores : 256) : 1;
@@ -266,21 +338,10 @@ static int consistent(config *out) {
     fprintf(stderr, "orbmorphd: tls-certificate and tls-key belong together\n");
     return 0;
   }
-  if (strcmp(out->limits, "remote") != 0 && strcmp(out->limits, "all") != 0 && strcmp(out->limits, "off") != 0) {
-    fprintf(stderr, "orbmorphd: limits must be remote, all or off\n");
-    return 0;
-  }
-  char *end;
-  long mode = strtol(out->socket_mode, &end, 8);
-  if (end == out->socket_mode || *end || mode < 0 || mode > 0777) {
-    fprintf(stderr, "orbmorphd: socket-mode must be an octal number from 0 to 777\n");
-    return 0;
-  }
-  if (strcmp(out->auth, "loopback") != 0 && strcmp(out->auth, "on") != 0 && strcmp(out->auth, "off") != 0) {
-    fprintf(stderr, "orbmorphd: auth must be loopback, on or off\n");
-    return 0;
-  }
-  return 1;
+  return is_address(out->listen) && is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) &&
+         is_one_of("auth", out->auth, auth) && is_one_of("log-level", out->log_level, levels) &&
+         is_one_of("log-format", out->log_format, formats) && are_origins(out->cors) &&
+         is_readable("tls-certificate", out->tls_certificate) && is_readable("tls-key", out->tls_key);
 }
 
 config_action config_read(config *out, int argc, char **argv) {

@@ -54,7 +54,7 @@ static int lock_data(const char *data) {
 }
 
 static void say_locked(const char *data) {
-  log_error("the data folder %s is in use by another process, or cannot be locked", data);
+  log_error("the data folder %s is in use by another process, or cannot be locked: stop that first", data);
 }
 
 static void announce(const server *srv) {
