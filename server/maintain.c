@@ -20,22 +20,30 @@ typedef struct tally {
 static const object_kind object_of[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET};
 static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh"};
 
-static void verify(tally *t, const resource *row) {
+/* One object against the hash of its bytes; "": it only must be there, where the row is of an older engine. */
+static void verify_object(tally *t, const resource *row, object_kind kind, const char *what, const char *wanted) {
   unsigned char *bytes = NULL;
   size_t size = 0;
   char sha[ORB_ID_SIZE] = "";
-  t->rows++;
-  if (objects_load(t->store, object_of[row->kind], row->id, &bytes, &size) != STORE_OK) {
-    printf("%s %s: its object cannot be read\n", names[row->kind], row->id);
+  if (objects_load(t->store, kind, row->id, &bytes, &size) != STORE_OK) {
+    printf("%s %s: %s cannot be read\n", names[row->kind], row->id, what);
     t->wrong++;
     return;
   }
   orb_id_of_text((const char *)bytes, size, sha);
-  if (strcmp(sha, row->sha) != 0) {
-    printf("%s %s: its object has %zu bytes that do not match their hash\n", names[row->kind], row->id, size);
+  if (wanted[0] && strcmp(sha, wanted) != 0) {
+    printf("%s %s: %s: %zu bytes that do not match their hash\n", names[row->kind], row->id, what, size);
     t->wrong++;
   }
   free(bytes);
+}
+
+static void verify(tally *t, const resource *row) {
+  t->rows++;
+  verify_object(t, row, object_of[row->kind], "its object", row->sha);
+  if (row->kind == RESOURCE_SUPERMESH && (row->places[0] || strstr(row->json, "\"sphere\":"))) {
+    verify_object(t, row, OBJECT_PLACES, "its places", row->places);
+  }
   /* Supermeshes of older engines have none: their description does not name them. */
   if (row->kind == RESOURCE_SUPERMESH && strstr(row->json, "\"sphere\":") &&
       spheres_check(t->store, row->id) != STORE_OK) {
@@ -101,6 +109,10 @@ int maintain_check(const config *options) {
     puts("the catalogue's owners or sums do not match what it holds");
     t.wrong++;
   }
+  if (catalogue_damaged(t.cat) != 0) {
+    puts("rows of the catalogue do not say what they must");
+    t.wrong++;
+  }
   for (int kind = 0; kind < RESOURCE_KINDS; kind++) {
     each_row(&t, (resource_kind)kind);
   }
@@ -110,6 +122,11 @@ int maintain_check(const config *options) {
   }
   printf("%ld rows and %ld objects checked: %ld wrong, %ld objects without a row (harmless; --gc removes them)\n",
          t.rows, t.objects, t.wrong, t.orphans);
+  if (t.wrong) {
+    puts(
+        "start the service, DELETE what is named here, and send or ask for it again; where the catalogue itself is "
+        "damaged, go back to a copy of the folder");
+  }
   close_both(&t);
   return t.wrong != 0;
 }

@@ -27,7 +27,8 @@ typedef struct resource {
   int64_t seq;
   resource_kind kind;
   char id[ORB_ID_SIZE];
-  char sha[ORB_ID_SIZE]; /* of its object's bytes */
+  char sha[ORB_ID_SIZE];    /* of its object's bytes */
+  char places[ORB_ID_SIZE]; /* of those of its places; "": none, or stored before this was noted */
   char *json;
   int64_t bytes; /* of its objects */
   int64_t created;
@@ -86,6 +87,7 @@ store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, o
                                   int64_t now, const resource *result, int64_t event, const char *event_json);
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out);
 /* owner NULL, state −1: any. */
+enum { CATALOGUE_UNFINISHED = -2 }; /* as a state: queued or running */
 int catalogue_job_list(catalogue *cat, const char *owner, int state, int64_t before, int limit, job_row *out);
 /* After a start: marks what was running, fails what died alone for the last time; then all unfinished, oldest first. */
 store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem);
@@ -107,5 +109,7 @@ int catalogue_events(catalogue *cat, const char *job, int64_t after, int limit, 
 
 /* For --check-data. */
 int catalogue_integrity(catalogue *cat);
+/* Rows that do not say what they must; −1 where they cannot be read. */
+int64_t catalogue_damaged(catalogue *cat);
 
 #endif

@@ -64,6 +64,8 @@ static const char *const migrations[] = {
     " UPDATE total SET bytes=bytes+NEW.bytes WHERE kind=NEW.kind; END;",
     "CREATE TABLE secret(bytes BLOB NOT NULL);"
     "INSERT INTO secret(bytes) VALUES(randomblob(16));",
+    /* The hash of a supermesh's places, for who verifies them. */
+    "ALTER TABLE resource ADD COLUMN places TEXT NOT NULL DEFAULT '';",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

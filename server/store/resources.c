@@ -6,7 +6,7 @@
 #include "store/owners.h"
 #include "store/rows.h"
 
-#define COLUMNS "seq, kind, id, sha, json, bytes, created"
+#define COLUMNS "seq, kind, id, sha, json, bytes, created, places"
 
 void resource_free(resource *r) {
   free(r->json);
@@ -15,8 +15,8 @@ void resource_free(resource *r) {
 
 int resource_insert(database *db, const resource *r) {
   sqlite3_stmt *st = database_statement(db,
-                                        "INSERT INTO resource(kind, id, sha, json, bytes, created, used)"
-                                        " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?6) ON CONFLICT(kind, id) DO NOTHING");
+                                        "INSERT INTO resource(kind, id, sha, json, bytes, created, used, places)"
+                                        " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?6, ?7) ON CONFLICT(kind, id) DO NOTHING");
   if (!st) {
     return SQLITE_ERROR;
   }
@@ -26,6 +26,7 @@ int resource_insert(database *db, const resource *r) {
   sqlite3_bind_text(st, 4, r->json, -1, SQLITE_STATIC);
   sqlite3_bind_int64(st, 5, r->bytes);
   sqlite3_bind_int64(st, 6, r->created);
+  sqlite3_bind_text(st, 7, r->places, -1, SQLITE_STATIC);
   return database_run(db, st);
 }
 
@@ -49,6 +50,7 @@ static int read_row(sqlite3_stmt *st, void *to) {
   out->json = row_copy(st, 4);
   out->bytes = sqlite3_column_int64(st, 5);
   out->created = sqlite3_column_int64(st, 6);
+  row_text(st, 7, out->places, sizeof out->places);
   return out->json != NULL;
 }
 static void release_row(void *row) {
@@ -162,6 +164,19 @@ store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET
   }
   catalogue_reader_done(cat, db);
   return result;
+}
+
+/* Whether a row's description is one, and its own. */
+#define DESCRIBES "iif(json_valid(json), json_extract(json, '$.id') IS id, 0)"
+
+int64_t catalogue_damaged(catalogue *cat) {
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st = database_statement(
+      db, "SELECT (SELECT count(*) FROM resource WHERE NOT " DESCRIBES
+          ") + (SELECT count(*) FROM owner WHERE json NOTNULL AND NOT " DESCRIBES
+          ") + (SELECT count(*) FROM job WHERE kind NOT IN (0, 1) OR state NOT BETWEEN 0 AND 4"
+          "  OR NOT json_valid(request)) + ((SELECT count(*) FROM secret WHERE length(bytes)=16) != 1)");
+  return rows_integer(cat, db, st);
 }
 
 int catalogue_integrity(catalogue *cat) {

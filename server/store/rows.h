@@ -18,7 +18,7 @@ typedef struct row_kind {
   void (*release)(void *row);
   size_t size;
 } row_kind;
-extern const row_kind resource_rows; /* of seq, kind, id, sha, json, bytes, created */
+extern const row_kind resource_rows; /* of seq, kind, id, sha, json, bytes, created, places */
 
 /* Runs a bound query of a reader that catalogue_reader() gave (st NULL: it could not be prepared) and gives the reader
  * back. */

@@ -133,6 +133,7 @@ static int store_places(const run_env *env, orb_context *ctx, const merge_input 
   orb_buffer places = {0};
   int fine = places_write(ctx, in->meshes, in->corners, merged, &places) == ORB_OK;
   if (fine) {
+    orb_id_of_text((const char *)places.data, places.size, result->places);
     store_result stored = objects_put(env->store, OBJECT_PLACES, result->id, places.data, places.size);
     result->bytes += (int64_t)places.size;
     fine = stored == STORE_OK;
