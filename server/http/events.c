@@ -91,6 +91,35 @@ static void add_headers(request *r) {
   reply_header(r, "X-Accel-Buffering", "no");
 }
 
+/* All was seen: tells an EventSource not to come again. */
+static void reply_over(request *r) {
+  reply_empty(r, 204);
+}
+
+/* Events after a number, from the catalogue; 0 where it cannot be read. */
+static int write_stored(const request *r, int64_t after, orb_text *text) {
+  event_row events[ROWS];
+  int n = ROWS;
+  while (n == ROWS) {
+    n = catalogue_events(r->srv->cat, r->id, after, ROWS, events);
+    for (int i = 0; i < n; i++) {
+      event_write(text, events[i].number, events[i].type, events[i].json);
+      after = events[i].number;
+      free(events[i].json);
+    }
+  }
+  return n >= 0;
+}
+
+/* Who names an event that this job has not had, such as one that a crash lost, gets all there is. */
+static int is_event(const request *r, int64_t number) {
+  event_row found = {0};
+  int n = catalogue_events(r->srv->cat, r->id, number - 1, 1, &found);
+  int same = n == 1 && found.number == number;
+  free(found.json);
+  return same;
+}
+
 /* A job that is not in memory has ended: all that is left of its events, at once. */
 static void ended_away(request *r) {
   job_row row;
@@ -106,23 +135,18 @@ static void ended_away(request *r) {
     return;
   }
   orb_text text = {0};
-  event_row events[ROWS];
   int64_t after = last_seen(r);
-  for (int n = ROWS; n == ROWS;) {
-    n = catalogue_events(r->srv->cat, r->id, after, ROWS, events);
-    if (n < 0) {
-      orb_text_free(&text);
-      reply_store(r, STORE_ERROR);
-      return;
-    }
-    for (int i = 0; i < n; i++) {
-      event_write(&text, events[i].number, events[i].type, events[i].json);
-      after = events[i].number;
-      free(events[i].json);
-    }
+  int fine = write_stored(r, after, &text);
+  if (fine && text.size == 0 && after > 0 && !is_event(r, after)) {
+    fine = write_stored(r, 0, &text);
+  }
+  if (!fine) {
+    orb_text_free(&text);
+    reply_store(r, STORE_ERROR);
+    return;
   }
   if (text.size == 0 && !text.failed) {
-    reply_empty(r, 204); /* all was seen: tells an EventSource not to come again */
+    reply_over(r);
     return;
   }
   reply_text(r, 200, "text/event-stream", &text);
@@ -139,6 +163,13 @@ enum MHD_Result handle_job_events(request *r) {
     reply_store(r, STORE_NOT_FOUND);
     return MHD_YES;
   }
+  int over;
+  int64_t after = queue_events_after(r->srv->q, j, last_seen(r), &over);
+  if (over) {
+    queue_release(r->srv->q, j);
+    reply_over(r);
+    return MHD_YES;
+  }
   stream *s = calloc(1, sizeof *s);
   struct MHD_Response *response =
       s ? MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, BLOCK, read_stream, s, free_stream) : NULL;
@@ -152,7 +183,7 @@ enum MHD_Result handle_job_events(request *r) {
   s->of = j;
   s->caller = r->caller;
   r->caller = NULL; /* the stream has it now */
-  s->after = last_seen(r);
+  s->after = after;
   s->last_ms = orb_clock_ms();
   orb_text_add(&s->pending, "retry: 2000\n\n");
   r->response = response;

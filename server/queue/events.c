@@ -158,6 +158,14 @@ int64_t queue_events_write(queue *q, job *j, int64_t after, orb_text *out, int *
   return after;
 }
 
+int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over) {
+  pthread_mutex_lock(&q->lock);
+  *over = orb_job_ended(j->row.state) && seen == j->last_event;
+  int64_t after = seen > j->last_event ? 0 : seen;
+  pthread_mutex_unlock(&q->lock);
+  return after;
+}
+
 /* A job that waits shows the progress of what it waits for, as the first part of its own. */
 static void show_to_dependents(queue *q, const job *of, const char *stage, double fraction) {
   for (job *j = q->first; j; j = j->next) {

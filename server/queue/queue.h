@@ -92,6 +92,9 @@ orb_job_state queue_job_write(queue *q, job *j, orb_text *out);
 int queue_wait(queue *q, job *j, waiter *w, int64_t after, void (*suspend)(waiter *));
 /* Appends events after number `after` as an event stream; returns the last number; *ended when the last was final. */
 int64_t queue_events_write(queue *q, job *j, int64_t after, orb_text *out, int *ended);
+/* Where to go on for who has seen events up to number `seen`: one that is beyond the last of this job was of none that
+ * is known here, and he gets all. *over: the job has ended, and he has seen its end. */
+int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over);
 void event_write(orb_text *out, int64_t number, const char *type, const char *json);
 
 /* Asks a job to end. Blocks for the commit where it was not running. */
