@@ -12,14 +12,24 @@
 #include "http/http.h"
 #include "store/owners.h"
 
-enum { LARGE_UPLOAD = 16 << 20 };
+enum { LARGE_UPLOAD = 16 << 20, LOOK_BYTES = 1 << 20 };
+
+static void refuse_full(request *r) {
+  reply_refuse(r, "storage-full", "The disk of the server has no room for this file. Make room and try again.");
+}
 
 void handle_mesh_begin(request *r) {
   server *srv = r->srv;
+  upload_query query;
+  orb_problem problem = {0};
+  if (!parse_upload(query_of(r, "name"), query_of(r, "repair"), query_of(r, "format"), &query, &problem)) {
+    reply_problem(r, &problem); /* before the bytes are sent for nothing */
+    return;
+  }
   const char *length = header_of(r, "Content-Length");
   uint64_t expected = length ? strtoull(length, NULL, 10) : 0;
   if (expected + (uint64_t)srv->options->disk_reserve > objects_free_bytes(srv->store)) {
-    reply_refuse(r, "storage-full", "The disk of the server has no room for this file.");
+    refuse_full(r);
     return;
   }
   store_result begun = objects_begin(srv->store, &r->temp);
@@ -30,7 +40,15 @@ void handle_mesh_begin(request *r) {
   orb_hash_begin(&r->hash);
 }
 
+/* The reserve is looked at again as the bytes come: chunks and packed bodies do not say before how many they are, and
+ * others take their part meanwhile. */
 void handle_mesh_bytes(request *r, const char *bytes, size_t size) {
+  const server *srv = r->srv;
+  if (r->received / LOOK_BYTES != (r->received - (int64_t)size) / LOOK_BYTES &&
+      objects_free_bytes(srv->store) < (uint64_t)srv->options->disk_reserve) {
+    refuse_full(r);
+    return;
+  }
   store_result stored = objects_append(&r->temp, bytes, size);
   if (stored == STORE_OK) {
     orb_hash_add(&r->hash, bytes, size);
