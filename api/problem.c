@@ -22,7 +22,7 @@ static const struct entry {
     {"in-use", 409, "Unfinished jobs need it"},
     {"job-ended", 409, "The job has ended already"},
     {"length-required", 411, "The length of the body is needed"},
-    {"precondition-failed", 412, "If-Match names other bytes"},
+    {"precondition-failed", 412, "A condition of the request does not hold"},
     {"too-large", 413, "It is too large"},
     {"unknown-format", 415, "The bytes are of no known mesh format"},
     {"unsupported-encoding", 415, "The content encoding is not known"},

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "http/http.h"
+#include "metrics.h"
 #include "worker/spheres.h"
 
 static void add_headers(request *r, const char *etag, const char *mime, const char *name) {
@@ -33,14 +34,10 @@ static void reply_part(request *r, object_kind kind, const char *id, object_part
   int fd;
   uint64_t size, first = 0, length;
   snprintf(etag, sizeof etag, "\"%.32s\"", sha);
-  const char *none_match = header_of(r, "If-None-Match"), *match = header_of(r, "If-Match");
-  if (match && !parse_tag_matches_strong(match, etag)) {
-    reply_refuse(r, "precondition-failed", "The file has another tag than If-Match asks for: %s.", etag);
-    return;
-  }
-  if (none_match && parse_tag_matches(none_match, etag)) {
-    reply_empty(r, 304);
-    add_headers(r, etag, mime, name);
+  if (reply_conditions(r, etag)) {
+    if (r->status == 304) {
+      add_headers(r, etag, mime, name);
+    }
     return;
   }
   store_result found = objects_read(r->srv->store, kind, id, &fd, &size);
@@ -145,6 +142,7 @@ enum MHD_Result handle_file(request *r) {
     }
     return request_go_away(r, r->srv->io, file_away);
   }
+  metrics_cache(1);
   note_use(r->srv, entry);
   file_of(r, entry);
   return MHD_YES;

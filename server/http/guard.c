@@ -6,7 +6,7 @@
 #include "http/http.h"
 
 typedef struct seen {
-  int hosts, lengths, encodings, bad_name, bad_length, bad_encoding;
+  int hosts, lengths, encodings, codings, bad_name, bad_length, bad_encoding;
   const char *length;
 } seen;
 
@@ -25,6 +25,8 @@ static enum MHD_Result look(void *user, enum MHD_ValueKind kind, const char *nam
   } else if (strcasecmp(name, "Transfer-Encoding") == 0) {
     s->encodings++;
     s->bad_encoding |= !value || strcasecmp(value, "chunked") != 0;
+  } else if (strcasecmp(name, "Content-Encoding") == 0) {
+    s->codings++;
   }
   return MHD_YES;
 }
@@ -50,7 +52,7 @@ static int check_length(request *r, const seen *s, orb_problem *problem) {
     orb_json_member_integer(&problem->facts, "limit", most);
     return 0;
   }
-  if (coding_of(header_of(r, "Content-Encoding")) == CODING_UNKNOWN) {
+  if (s->codings > 1 || coding_of(header_of(r, "Content-Encoding")) == CODING_UNKNOWN) {
     return orb_refuse(problem, "unsupported-encoding", "Send the body as it is, or with gzip or zstd, once.");
   }
   return 1;
@@ -84,6 +86,26 @@ const char *header_of(const request *r, const char *name) {
 }
 const char *query_of(const request *r, const char *name) {
   return MHD_lookup_connection_value(r->connection, MHD_GET_ARGUMENT_KIND, name);
+}
+
+typedef struct lines {
+  const char *name, **out;
+  int count;
+} lines;
+
+static enum MHD_Result gather(void *user, enum MHD_ValueKind kind, const char *name, const char *value) {
+  lines *found = user;
+  (void)kind;
+  if (value && strcasecmp(name, found->name) == 0) {
+    found->out[found->count++] = value;
+  }
+  return found->count < HEADER_LINES ? MHD_YES : MHD_NO;
+}
+
+int header_lines(const request *r, const char *name, const char *out[HEADER_LINES]) {
+  lines found = {.name = name, .out = out};
+  MHD_get_connection_values(r->connection, MHD_HEADER_KIND, gather, &found);
+  return found.count;
 }
 
 static enum MHD_Result compare_name(void *user, enum MHD_ValueKind kind, const char *name, const char *value) {

@@ -97,6 +97,9 @@ enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r))
 /* guard.c: 1, or 0 with the problem. */
 int guard_headers(request *r, const char *version, orb_problem *problem);
 const char *header_of(const request *r, const char *name);
+/* Of a header that is a list, every line of it that came (RFC 9110 section 5.3), at most so many; how many. */
+enum { HEADER_LINES = 16 };
+int header_lines(const request *r, const char *name, const char *out[HEADER_LINES]);
 const char *query_of(const request *r, const char *name);
 int query_has(const request *r, const char *name); /* also without a value */
 
@@ -131,6 +134,9 @@ void reply_text(request *r, unsigned status, const char *mime, orb_text *text); 
 /* The description, with ETag and 304; takes the reference. */
 void reply_cached(request *r, unsigned status, const cached *entry);
 void reply_header(request *r, const char *name, const char *value);
+/* Conditions of the request on what has this tag (RFC 9110 section 13.2.2): 0 where it is to be done, 1 with the
+ * response, 412 or 304. */
+int reply_conditions(request *r, const char *etag);
 enum MHD_Result reply_send(request *r);
 /* files.c: an object with ranges and conditions. */
 void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name);

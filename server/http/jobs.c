@@ -11,11 +11,16 @@
 enum { LOOK_MS = 15000, CANCEL_WAIT_MS = 2000 };
 
 int64_t read_wait_ms(request *r) {
-  int64_t wait = parse_wait_ms(query_of(r, "wait"), header_of(r, "Prefer"));
+  const char *query = query_of(r, "wait"), *prefer[HEADER_LINES];
+  int lines = query ? 0 : header_lines(r, "Prefer", prefer);
+  int64_t wait = query ? parse_wait_ms(query) : 0;
+  for (int i = 0; i < lines && wait == 0; i++) {
+    wait = parse_preferred_ms(prefer[i]);
+  }
   if (wait < 0) {
     reply_refuse(r, "bad-query", "\"wait\" must be a number of seconds; more than 60 count as 60.");
   }
-  r->preferred_ms = wait > 0 && !query_of(r, "wait") ? wait : 0;
+  r->preferred_ms = wait > 0 && !query ? wait : 0;
   return wait;
 }
 
@@ -170,14 +175,16 @@ static void cancel_away(request *r) {
       reply_store(r, result);
       return;
     }
-    orb_job_state state = row.state;
-    int seen = access_sees(r, row.owner);
-    job_row_free(&row);
-    if (!seen) {
+    if (!access_sees(r, row.owner)) {
       reply_store(r, STORE_NOT_FOUND);
-      return;
+    } else if (row.state == ORB_JOB_CANCELLED) {
+      orb_text json = {0};
+      write_row(&row, &json);
+      reply_json(r, 200, &json);
+    } else {
+      refuse_ended(r, row.state);
     }
-    reply_refuse(r, "job-ended", "The job is %s already; there is nothing to cancel.", orb_job_state_name(state));
+    job_row_free(&row);
     return;
   }
   if (!access_sees(r, job_owner(j))) {
@@ -209,14 +216,28 @@ enum MHD_Result handle_job_cancel(request *r) {
   return request_go_away(r, r->srv->io, cancel_away);
 }
 
-static void write_live(request *r, const job_row *row, orb_text *out) {
+static orb_job_state write_live(request *r, const job_row *row, orb_text *out) {
   job *live = orb_job_ended(row->state) ? NULL : queue_find(r->srv->q, row->id);
+  orb_job_state state = row->state;
   if (live) {
-    queue_job_write(r->srv->q, live, out);
+    state = queue_job_write(r->srv->q, live, out);
     queue_release(r->srv->q, live);
   } else {
     write_row(row, out);
   }
+  return state;
+}
+
+/* Whether a job of the catalogue's page is in the list, which it then is added to. */
+static int add_to_list(request *r, const job_row *row, int state, int room, orb_text *out) {
+  orb_text json = {0};
+  int shown = (int)write_live(r, row, &json), taken = state < 0 || shown == state;
+  if (taken && room) {
+    orb_json_raw(out, json.data ? json.data : "null");
+    out->failed |= json.failed;
+  }
+  orb_text_free(&json);
+  return taken;
 }
 
 static void list_away(request *r) {
@@ -231,17 +252,24 @@ static void list_away(request *r) {
   if (!list_begin(r, "jobs", sizeof(job_row), &page)) {
     return;
   }
+  /* What is queued in the catalogue may be running, because what it needs is: the state is that which is shown. */
+  int asked = state >= 0 && !orb_job_ended((orb_job_state)state) ? CATALOGUE_UNFINISHED : state;
   job_row *rows = page.rows;
   const char *view = access_view(r);
-  int count = catalogue_job_list(r->srv->cat, view[0] ? view : NULL, state, page.before, page.limit + 1, rows);
-  for (int i = 0; i < count; i++) {
-    if (i < page.limit) {
-      write_live(r, &rows[i], &page.json);
-      last = rows[i].seq;
+  int64_t before = page.before;
+  int found = 0, count;
+  do {
+    count = catalogue_job_list(r->srv->cat, view[0] ? view : NULL, asked, before, page.limit + 1, rows);
+    for (int i = 0; i < count; i++) {
+      before = rows[i].seq;
+      if (found <= page.limit && add_to_list(r, &rows[i], state, found < page.limit, &page.json)) {
+        last = found < page.limit ? before : last;
+        found++;
+      }
+      job_row_free(&rows[i]);
     }
-    job_row_free(&rows[i]);
-  }
-  list_end(r, &page, last, count);
+  } while (count == page.limit + 1 && found <= page.limit);
+  list_end(r, &page, last, count < 0 ? count : found);
 }
 
 enum MHD_Result handle_job_list(request *r) {

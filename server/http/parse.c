@@ -8,7 +8,7 @@
 #include "api/json.h"
 
 int parse_range(const char *text, uint64_t size, uint64_t *first, uint64_t *length) {
-  if (!text || strncmp(text, "bytes=", 6) != 0) {
+  if (!text || strncasecmp(text, "bytes=", 6) != 0) {
     return 0;
   }
   text += 6;
@@ -82,26 +82,57 @@ static int64_t clamped_ms(double seconds) {
   return seconds < WAIT_MOST_S ? (int64_t)(1000 * seconds) : 1000 * WAIT_MOST_S;
 }
 
-/* "wait=N" in a Prefer header, among other preferences. */
-static const char *prefer_wait(const char *prefer) {
-  for (const char *at = prefer; at && *at; at += strcspn(at, ",;"), at += *at != 0) {
-    at += strspn(at, " \t");
-    if (strncasecmp(at, "wait=", 5) == 0) {
-      return at + 5;
-    }
-  }
-  return NULL;
+int64_t parse_wait_ms(const char *query) {
+  char *end;
+  double seconds = strtod(query, &end);
+  return end == query || *end || !(seconds >= 0) ? -1 : clamped_ms(seconds);
 }
 
-int64_t parse_wait_ms(const char *query, const char *prefer) {
-  char *end;
-  if (query) {
-    double seconds = strtod(query, &end);
-    return end == query || *end || !(seconds >= 0) ? -1 : clamped_ms(seconds);
+/* Behind a token or a quoted string. */
+static const char *skip_word(const char *at) {
+  if (*at != '"') {
+    return at + strcspn(at, " \t,;=\"");
   }
-  const char *preferred = prefer_wait(prefer);
-  double seconds = preferred ? strtod(preferred, &end) : 0;
-  return seconds > 0 ? clamped_ms(seconds) : 0;
+  for (at++; *at && *at != '"'; at++) {
+    at += *at == '\\' && at[1];
+  }
+  return at + (*at == '"');
+}
+
+/* name [= word], with blanks around the sign; *value is NULL without one. Behind it and the blanks after it. */
+static const char *read_pair(const char *at, const char **value) {
+  at = skip_word(at);
+  at += strspn(at, " \t");
+  *value = NULL;
+  if (*at == '=') {
+    at++;
+    at += strspn(at, " \t");
+    *value = at;
+    at = skip_word(at);
+    at += strspn(at, " \t");
+  }
+  return at;
+}
+
+int64_t parse_preferred_ms(const char *prefer) {
+  for (const char *at = prefer; at && *at;) {
+    at += strspn(at, " \t,;");
+    const char *name = at, *value, *other;
+    at = read_pair(at, &value);
+    if (value && strncasecmp(name, "wait", 4) == 0 && strchr(" \t=", name[4])) {
+      char *end;
+      value += *value == '"';
+      double seconds = value[0] >= '0' && value[0] <= '9' ? strtod(value, &end) : 0;
+      return seconds > 0 && strchr(" \t,;\"", *end) ? clamped_ms(seconds) : 0;
+    }
+    while (*at == ';') { /* its parameters */
+      at++;
+      at += strspn(at, " \t");
+      at = read_pair(at, &other);
+    }
+    at += *at && *at != ',' && *at != ';'; /* what is none of the grammar is passed over */
+  }
+  return 0;
 }
 
 int parse_urgency(const char *text) {

@@ -20,9 +20,11 @@ int parse_tag_matches_strong(const char *list, const char *tag);
 /* The path of a request's target, which may be in absolute form (RFC 9112 section 3.2.2). */
 const char *parse_target(const char *url);
 
-/* ?wait=SECONDS, else wait=SECONDS among the preferences of a Prefer header, in ms, at most a minute; 0: not to wait;
- * −1: the query's is no number. A preference that is not understood is passed over. */
-int64_t parse_wait_ms(const char *query, const char *prefer);
+/* ?wait=SECONDS in ms, at most a minute; 0: not to wait; −1: it is no number. */
+int64_t parse_wait_ms(const char *query);
+/* Likewise the preference wait=SECONDS of a Prefer header (RFC 7240); 0 also where there is none or it is not
+ * understood. */
+int64_t parse_preferred_ms(const char *prefer);
 
 /* The urgency that a Priority header asks for (RFC 9218): 0, the most urgent, to 7; 3 where it says nothing. */
 int parse_urgency(const char *text);

@@ -96,19 +96,44 @@ void reply_bytes(request *r, unsigned status, const char *mime, const void *byte
   reply_header(r, "Content-Type", mime);
 }
 
-typedef struct held {
-  cache *from;
-  const cached *entry;
-} held;
+static int names_tag(const request *r, const char *header, const char *etag, int (*matches)(const char *, const char *),
+                     int *lines) {
+  const char *text[HEADER_LINES];
+  int named = 0;
+  *lines = header_lines(r, header, text);
+  for (int i = 0; i < *lines; i++) {
+    named |= matches(text[i], etag);
+  }
+  return named;
+}
+
+int reply_conditions(request *r, const char *etag) {
+  int lines, reads = r->route->method[0] == 'G';
+  if (!names_tag(r, "If-Match", etag, parse_tag_matches_strong, &lines) && lines > 0) {
+    reply_refuse(r, "precondition-failed", "It has another tag than If-Match asks for: %s. Nothing was done.", etag);
+    return 1;
+  }
+  if (!names_tag(r, "If-None-Match", etag, parse_tag_matches, &lines)) {
+    return 0;
+  }
+  if (reads) {
+    reply_empty(r, 304);
+  } else {
+    reply_refuse(r, "precondition-failed", "It has a tag that If-None-Match excludes: %s. Nothing was done.", etag);
+  }
+  return 1;
+}
 
 void reply_cached(request *r, unsigned status, const cached *entry) {
   static const char *const paths[RESOURCE_KINDS] = {"meshes", "embeddings", "supermeshes"};
   char location[128];
-  const char *none_match = header_of(r, "If-None-Match");
+  int decided = r->route->method[0] == 'G' && reply_conditions(r, entry->etag);
+  if (decided && r->status != 304) {
+    cache_release(r->srv->descriptions, entry);
+    return;
+  }
   snprintf(location, sizeof location, "/v1/%s/%s", paths[entry->row.kind], entry->row.id);
-  if (none_match && r->route->method[0] == 'G' && parse_tag_matches(none_match, entry->etag)) {
-    reply_empty(r, 304);
-  } else {
+  if (!decided) {
     take(r, status, MHD_create_response_from_buffer(entry->json_size, entry->row.json, MHD_RESPMEM_MUST_COPY),
          entry->json_size);
     reply_header(r, "Content-Type", "application/json");

@@ -145,6 +145,18 @@ static void delete_away(request *r) {
   server *srv = r->srv;
   resource_kind kind = kind_of(r);
   const char *view = access_view(r);
+  if (header_of(r, "If-Match") || header_of(r, "If-None-Match")) {
+    store_result result;
+    const cached *entry = find_description(srv, kind, r->id, view, &result);
+    int decided = entry ? reply_conditions(r, entry->etag) : 1;
+    if (!entry) {
+      reply_store(r, result);
+    }
+    cache_release(srv->descriptions, entry);
+    if (decided) {
+      return;
+    }
+  }
   if (kind == RESOURCE_MESH && queue_needs_mesh(srv->q, r->id, view[0] ? view : NULL)) {
     reply_refuse(r, "in-use", "Unfinished jobs need this mesh: wait for them, or cancel them.");
     return;

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "http/http.h"
 #include "metrics.h"
@@ -67,7 +68,7 @@ static void metrics_away(request *r) {
     }
     fclose(statm);
   }
-  gauge(&text, "process_resident_memory_bytes", "Resident memory.", 4096.0 * (double)resident);
+  gauge(&text, "process_resident_memory_bytes", "Resident memory.", (double)sysconf(_SC_PAGESIZE) * (double)resident);
   reply_text(r, 200, "text/plain; version=0.0.4; charset=utf-8", &text);
 }
 

@@ -194,10 +194,10 @@ int catalogue_job_list(catalogue *cat, const char *owner, int state, int64_t bef
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st =
       owner ? database_statement(db, "SELECT " COLUMNS
-                                     " FROM job WHERE listed=1 AND (?1<0 OR state=?1) AND seq<?2 AND owner=?4"
+                                     " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND seq<?2 AND owner=?4"
                                      " ORDER BY seq DESC LIMIT ?3")
             : database_statement(db, "SELECT " COLUMNS
-                                     " FROM job WHERE listed=1 AND (?1<0 OR state=?1) AND seq<?2"
+                                     " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND seq<?2"
                                      " ORDER BY seq DESC LIMIT ?3");
   if (st && owner) {
     sqlite3_bind_text(st, 4, owner, -1, SQLITE_STATIC);

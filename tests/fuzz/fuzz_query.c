@@ -39,8 +39,8 @@ static void read_query(char *query, const char *prefer) {
   if (parse_page(limit, token, &most, &sealed, &why) ? most < 1 || most > PAGE_MOST : !why) {
     abort();
   }
-  int64_t ms = parse_wait_ms(wait, prefer);
-  if (ms < -1 || ms > 60000) {
+  int64_t ms = wait ? parse_wait_ms(wait) : 0, preferred = parse_preferred_ms(prefer);
+  if (ms < -1 || ms > 60000 || preferred < 0 || preferred > 60000) {
     abort();
   }
   upload_query upload;

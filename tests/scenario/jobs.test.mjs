@@ -172,3 +172,42 @@ test('a full queue refuses new jobs and nothing else', async (t) => {
   assert.equal(third.status, 202, third.bytes.toString());
   for (const job of [jobs[0], third.json]) await d.delete(job.url);
 });
+
+test('the list of a state has the jobs that show it, also those that wait for what runs', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const meshes = [await heavy(d, 1, 5), await heavy(d, 2, 5), await heavy(d, 3, 5)];
+  const merge = (await d.post('/v1/supermeshes', { shapes: meshes.slice(0, 2).map(({ id }) => ({ mesh: id })), embedding: endless })).json;
+  const behind = [];
+  for (let i = 0; i < 3; i++) behind.push((await d.post('/v1/embeddings', { mesh: meshes[2].id, ...endless, options: { ...endless.options, step: 0.01 + i / 1000 } })).json);
+  await until(async () => (await d.get(merge.url)).json.state === 'running', 'what the merge needs runs');
+  const list = async (state, limit) => {
+    const found = [];
+    for (let token; ; ) {
+      const { json } = await d.get('/v1/jobs', { query: { state, limit, ...(token && { page_token: token }) } });
+      for (const job of json.jobs) assert.equal(job.state, state);
+      found.push(...json.jobs.map(({ id }) => id));
+      token = json.next_page_token;
+      if (!token) return found;
+      assert.equal(json.jobs.length, limit, 'a page that others follow is full');
+    }
+  };
+  for (const limit of [1, 2, 100]) {
+    assert.deepEqual(await list('running', limit), [merge.id], `in pages of ${limit}`);
+    assert.deepEqual(await list('queued', limit), behind.map(({ id }) => id).reverse(), `in pages of ${limit}`);
+  }
+  for (const job of [...behind, merge]) assert.equal((await d.delete(job.url)).status, 200);
+});
+
+test('a job that was cancelled may be cancelled again, also after a restart', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const mesh = await heavy(d, 1, 5);
+  const job = (await d.post('/v1/embeddings', { mesh: mesh.id, ...endless })).json;
+  for (let i = 0; i < 3; i++) {
+    const reply = await d.delete(job.url);
+    assert.deepEqual([reply.status, reply.json.state, reply.json.id], [200, 'cancelled', job.id]);
+    if (i === 1) {
+      await d.stop();
+      await d.start();
+    }
+  }
+});

@@ -149,6 +149,7 @@ test('answers about meshes', async (t) => {
     const id = first.json.id;
     const etag = (await ask('GET', '/v1/meshes/{id}', { id })).headers.get('etag');
     assert.equal((await ask('GET', '/v1/meshes/{id}', { id, headers: { 'if-none-match': etag } })).status, 304);
+    for (const method of ['GET', 'DELETE']) assert.equal((await ask(method, '/v1/meshes/{id}', { id, headers: { 'if-match': '"x"' } })).status, 412);
     const whole = await ask('GET', '/v1/meshes/{id}/file', { id });
     assert.ok(whole.bytes.equals(bytes));
     for (const [headers, status] of [[{ range: 'bytes=0-9' }, 206], [{ range: `bytes=${bytes.length}-` }, 416],
@@ -227,6 +228,7 @@ test('answers about embeddings, supermeshes and jobs', async (t) => {
     const { id } = made.json;
     assert.equal((await ask('GET', `/v1/${kind}/{id}`, { id })).status, 200);
     assert.equal((await ask('GET', `/v1/${kind}/{id}`, { id, headers: { 'if-none-match': '*' } })).status, 304);
+    for (const method of ['GET', 'DELETE']) assert.equal((await ask(method, `/v1/${kind}/{id}`, { id, headers: { 'if-match': '"x"' } })).status, 412);
     const files = kind === 'embeddings' ? ['sphere.ply'] : ['asset.glb', 'places', 'spheres/{k}.ply'];
     for (const file of files.map((name) => `/v1/${kind}/{id}/${name}`)) for (const [headers, status] of [[{}, 200], [{ range: 'bytes=0-9' }, 206], [{ range: 'bytes=999999999-' }, 416], [{ 'if-match': '"x"' }, 412], [{ 'if-none-match': '*' }, 304]])
       assert.equal((await ask('GET', file, { id, headers })).status, status);

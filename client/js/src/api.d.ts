@@ -591,7 +591,7 @@ export type ProblemUnsupportedEncoding = {
 
 export type ProblemPreconditionFailed = {
   type: '/problems/precondition-failed';
-  title: 'If-Match names other bytes';
+  title: 'A condition of the request does not hold';
   status: 412;
   /** What is wrong and what to do, in plain words. */
   detail: string;
