@@ -1,5 +1,6 @@
 #include "api/embedding_codec.h"
 
+#include <ctype.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -31,7 +32,8 @@ int orb_embedding_options_read(const cJSON *object, const char *where, int with_
   static const char *const known_mesh[] = {"mesh", "method", "options", NULL};
   orb_embed_defaults(out);
   if (!cJSON_IsObject(object)) {
-    return orb_refuse(problem, "invalid-request", "%s must be a JSON object.", where);
+    return orb_refuse(problem, "invalid-request", "%c%s must be a JSON object.", toupper((unsigned char)where[0]),
+                      where + 1);
   }
   if (!orb_members_known(object, where, with_mesh ? known_mesh : known, problem)) {
     return 0;

@@ -8,7 +8,11 @@
 #include "api/supermesh_codec.h"
 
 static int refuse(orb_problem *problem, int32_t landmark, int32_t shape, const char *why) {
-  orb_refuse(problem, "bad-landmarks", "Landmark %d, shape %d: %s.", landmark, shape, why);
+  if (shape >= 0) {
+    orb_refuse(problem, "bad-landmarks", "Landmark %d, shape %d: %s.", landmark, shape, why);
+  } else {
+    orb_refuse(problem, "bad-landmarks", "Landmark %d: %s.", landmark, why);
+  }
   orb_json_key(&problem->facts, "landmarks");
   orb_json_open(&problem->facts, '[');
   orb_json_integer(&problem->facts, landmark);

@@ -32,7 +32,8 @@ static int read_number(const cJSON *value, const char *where, const orb_option *
   char must[120];
   double x = value->valuedouble;
   int whole = o->kind != ORB_OPTION_NUMBER;
-  snprintf(must, sizeof must, "%s from %.17g to %.17g", whole ? "a whole number" : "a number", o->least, o->most);
+  snprintf(must, sizeof must, whole ? "a whole number from %.17g to %.17g" : "a number from %.10g to %.10g", o->least,
+           o->most);
   if (!cJSON_IsNumber(value) || !(x >= o->least && x <= o->most) || (whole && (x != floor(x) || fabs(x) > EXACT))) {
     return bad(problem, where, o->name, must);
   }

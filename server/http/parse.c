@@ -204,6 +204,9 @@ int parse_trace(const char *text, char out[TRACE_SIZE]) {
       return 0;
     }
   }
+  if (strspn(text + 3, "0") >= 32 || strspn(text + 36, "0") >= 16) { /* "All zeroes is considered an invalid value." */
+    return 0;
+  }
   memcpy(out, text, TRACE_SIZE);
   return 1;
 }

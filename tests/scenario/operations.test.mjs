@@ -48,6 +48,10 @@ test('requests and their traces are in the log', async (t) => {
   const bad = await d.get(url, { headers: { traceparent: '00-","x":"-b7ad6b7169203331-01' } });
   const plain = await logged(d, (l) => l.request === bad.headers.get('x-request-id'));
   assert.deepEqual([plain.traceparent, plain.route, plain.method, plain.status], [undefined, '/v1/meshes/{id}', 'GET', 200]);
+  for (const zeros of [`00-${'0'.repeat(32)}-b7ad6b7169203331-01`, `00-0af7651916cd43dd8448eb211c80319c-${'0'.repeat(16)}-01`]) {
+    const reply = await d.get(url, { headers: { traceparent: zeros } });
+    assert.equal((await logged(d, (l) => l.request === reply.headers.get('x-request-id'))).traceparent, undefined, 'zeros name no trace');
+  }
 });
 
 test('SIGHUP reads the configuration again', async (t) => {

@@ -131,3 +131,21 @@ test('sections about tokens', async (t) => {
     for (const member of Object.keys(problem).filter((k) => !['type', 'title', 'status', 'detail'].includes(k)))
       assert.ok(sections.get(problem.type.split('/').at(-1)).includes(`\`${member}\``), member);
 });
+
+test('details read as sentences, with numbers as people write them', async (t) => {
+  const d = await daemon(t);
+  const { id } = (await d.upload(shapes.obj(shapes.egg(2)))).json;
+  const two = { shapes: [{ mesh: id }, { mesh: id }] };
+  for (const [target, body, detail] of [
+    ['/v1/embeddings', [], 'The request must be a JSON object.'],
+    ['/v1/supermeshes', { ...two, remesh: { tolerance: 0 } }, '"tolerance" in "remesh" must be a number from 1e-09 to 1.'],
+    ['/v1/supermeshes', { ...two, remesh: { max_triangles: 0.5 } }, '"max_triangles" in "remesh" must be a whole number from 0 to 100000000.'],
+    ['/v1/supermeshes', { ...two, landmarks: [{ at: [{ vertex: 0 }] }] }, 'Landmark 0: "at" must list one place for each of the 2 shapes.'],
+    ['/v1/supermeshes', { ...two, landmarks: [{ at: [{ vertex: 0 }, { vertex: -1 }] }] }, /^Landmark 0, shape 1: .*\.$/],
+  ]) {
+    const reply = await d.post(target, body);
+    assert.equal(reply.status, 422);
+    if (typeof detail === 'string') assert.equal(reply.json.detail, detail);
+    else assert.match(reply.json.detail, detail);
+  }
+});
