@@ -28,6 +28,7 @@ static int rounds_for(int64_t triangles, int32_t shapes) {
 /* Collapses, and mends turned triangles while there are vertices left to do it with. */
 static orb_status first_round(orb_context *ctx, orb_match *match, double limit2, int64_t target, int strict) {
   ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, 0));
+  ORB_TRY(orb_match_compact(ctx, match));
   ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
   return strict ? orb_match_mend(ctx, match, limit2) : ORB_OK;
 }

@@ -146,6 +146,9 @@ void orb_match_place(orb_match *match, int32_t v, const double p[3]) {
 
 void orb_match_copy_vertex(orb_match *match, int32_t to, int32_t from) {
   int64_t shapes = match->shape_count;
+  if (to == from) {
+    return;
+  }
   memcpy(match->net.points + 3 * (int64_t)to, match->net.points + 3 * (int64_t)from, 3 * sizeof(double));
   memcpy(match->at + 3 * to * shapes, match->at + 3 * from * shapes, 3 * (size_t)shapes * sizeof(double));
   memcpy(match->normal + 3 * to * shapes, match->normal + 3 * from * shapes, 3 * (size_t)shapes * sizeof(double));
@@ -299,6 +302,68 @@ int32_t orb_match_insert(orb_match *match, int32_t t, const double p[3]) {
   orb_match_deal(match, lists[0], hit.triangle);
   orb_match_deal(match, lists[1], hit.triangle);
   return v;
+}
+
+/* Drops what is dead of the net: `vertex` and `triangle` are the new numbers of what lives, in the same order. */
+static void close_up(orb_match *match, const int32_t *vertex, const int32_t *triangle) {
+  orb_net *net = &match->net;
+  int32_t vertices = 0, triangles = 0;
+  for (int32_t v = 0; v < net->vertex_count; v++) {
+    int32_t h = net->out[v];
+    if (h < 0) {
+      continue;
+    }
+    vertices++;
+    orb_match_copy_vertex(match, vertex[v], v);
+    net->out[vertex[v]] = 3 * triangle[h / 3] + h % 3;
+    match->fixed[vertex[v]] = match->fixed[v];
+    match->stayed[vertex[v]] = match->stayed[v];
+    match->alone[vertex[v]] = match->alone[v];
+    match->vertex_items[vertex[v]] = match->vertex_items[v];
+  }
+  for (int32_t t = 0; t < net->triangle_count; t++) {
+    if (net->triangles[3 * t] < 0) {
+      continue;
+    }
+    triangles++;
+    for (int k = 0; k < 3; k++) {
+      int32_t twin = net->twin[3 * t + k];
+      net->triangles[3 * triangle[t] + k] = vertex[net->triangles[3 * t + k]];
+      net->twin[3 * triangle[t] + k] = 3 * triangle[twin / 3] + twin % 3;
+    }
+    match->triangle_items[triangle[t]] = match->triangle_items[t];
+  }
+  for (int32_t v = vertices; v < net->vertex_count; v++) {
+    match->fixed[v] = 0;
+    match->stayed[v] = match->alone[v] = 0;
+    match->vertex_items[v] = -1;
+  }
+  for (int32_t t = triangles; t < net->triangle_count; t++) {
+    match->triangle_items[t] = -1;
+  }
+  net->vertex_count = vertices;
+  net->triangle_count = triangles;
+}
+
+orb_status orb_match_compact(orb_context *ctx, orb_match *match) {
+  const orb_net *net = &match->net;
+  int32_t *vertex = ORB_NEW(ctx, int32_t, net->vertex_count);
+  int32_t *triangle = ORB_NEW(ctx, int32_t, net->triangle_count);
+  orb_status status = vertex && triangle ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    for (int32_t v = 0, next = 0; v < net->vertex_count; v++) {
+      vertex[v] = next;
+      next += net->out[v] >= 0;
+    }
+    for (int32_t t = 0, next = 0; t < net->triangle_count; t++) {
+      triangle[t] = next;
+      next += net->triangles[3 * t] >= 0;
+    }
+    close_up(match, vertex, triangle);
+  }
+  orb_free(ctx, vertex);
+  orb_free(ctx, triangle);
+  return status;
 }
 
 int64_t orb_match_live(const orb_match *match) {

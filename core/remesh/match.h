@@ -210,6 +210,8 @@ void orb_match_fill(orb_match *match, int32_t u, const int32_t *ring, int n, int
 ORB_MUST_CHECK orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2, int64_t target,
                                              int strict, int thorough);
 int64_t orb_match_live(const orb_match *match);
+/* Closes the gaps that dead vertices and triangles have left: the live ones get new numbers, in the same order. */
+ORB_MUST_CHECK orb_status orb_match_compact(orb_context *ctx, orb_match *match);
 
 /* Places, points, triangles and bounds of the live net. */
 ORB_MUST_CHECK orb_status orb_match_export(orb_context *ctx, const orb_match *match, orb_supermesh *out);

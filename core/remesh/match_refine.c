@@ -66,98 +66,114 @@ static int turn_is_better(const orb_match *match, int32_t h) {
   return better && orb_form_allows(before, after);
 }
 
-/* Turns it, if the limit lets it. */
-static int turn_within(orb_match *match, int32_t h, double limit2) {
+/* Whether the limit lets it be turned. */
+static int can_turn(const orb_match *match, int32_t h, double limit2) {
   const orb_net *net = &match->net;
   int32_t g = net->twin[h];
   int32_t a = net->triangles[h], b = net->triangles[g];
   int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
-  if (!orb_net_can_flip(net, h) || orb_match_edge2(match, c, d, limit2, NULL) > limit2 ||
-      items_of_turn2(match, match->triangle_items[h / 3], c, d, b, a) > limit2 ||
-      items_of_turn2(match, match->triangle_items[g / 3], c, d, b, a) > limit2 || turn_turns(match, a, b, c, d)) {
-    return 0;
-  }
-  turn(match, h);
-  return 1;
+  return orb_net_can_flip(net, h) && orb_match_edge2(match, c, d, limit2, NULL) <= limit2 &&
+         items_of_turn2(match, match->triangle_items[h / 3], c, d, b, a) <= limit2 &&
+         items_of_turn2(match, match->triangle_items[g / 3], c, d, b, a) <= limit2 && !turn_turns(match, a, b, c, d);
 }
 
 int orb_match_try_turn(orb_match *match, int32_t h, double limit2) {
-  return turn_is_better(match, h) && turn_within(match, h, limit2);
+  int can = turn_is_better(match, h) && can_turn(match, h, limit2);
+  if (can) {
+    turn(match, h);
+  }
+  return can;
 }
 
 typedef struct turn_loop {
   const orb_match *match;
+  double limit2;
+  int only_bad;
   unsigned char *asked;   /* a triangle: its edges are to be looked at */
-  unsigned char *better;  /* a half-edge: what turn_is_better() says, 0 where neither triangle is asked */
-  unsigned char *changed; /* a triangle: since then */
+  unsigned char *may;     /* a half-edge: it is to be turned, as things are; 0 where neither triangle is asked */
+  unsigned char *stale;   /* a triangle: what is known of its edges is not true any more */
+  unsigned char *changed; /* a triangle: in this pass */
 } turn_loop;
 
 static void bad_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   turn_loop *loop = arg;
   for (int64_t t = begin; t < end; t++) {
-    loop->asked[t] = (unsigned char)is_bad(loop->match, (int32_t)t);
+    if (loop->stale[t]) {
+      loop->asked[t] = !loop->only_bad || is_bad(loop->match, (int32_t)t);
+    }
   }
 }
 
-static void better_range(void *arg, int64_t begin, int64_t end, int thread) {
+static void may_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   turn_loop *loop = arg;
   const orb_net *net = &loop->match->net;
   for (int64_t h = begin; h < end; h++) {
-    loop->better[h] = net->triangles[h - h % 3] >= 0 && h < net->twin[h] &&
-                      (loop->asked[h / 3] || loop->asked[net->twin[h] / 3]) && turn_is_better(loop->match, (int32_t)h);
+    if (net->triangles[h - h % 3] < 0) {
+      loop->may[h] = 0;
+    } else if (h < net->twin[h] && (loop->stale[h / 3] || loop->stale[net->twin[h] / 3])) {
+      loop->may[h] = (loop->asked[h / 3] || loop->asked[net->twin[h] / 3]) &&
+                     turn_is_better(loop->match, (int32_t)h) && can_turn(loop->match, (int32_t)h, loop->limit2);
+    }
   }
 }
 
-static int is_better_now(const turn_loop *loop, int32_t h, int only_bad) {
-  int32_t t = h / 3, u = loop->match->net.twin[h] / 3;
+/* Whether edge h may be turned now: as was found, if its triangles are as they were; but for the edge that would be
+ * new, which may have come to be elsewhere. */
+static int may_now(const turn_loop *loop, int32_t h) {
+  const orb_match *match = loop->match;
+  const orb_net *net = &match->net;
+  int32_t g = net->twin[h], t = h / 3, u = g / 3;
   if (!loop->changed[t] && !loop->changed[u]) {
-    return loop->better[h];
+    return loop->may[h] && !orb_net_adjacent(net, net->triangles[orb_prev(h)], net->triangles[orb_prev(g)]);
   }
-  return (!only_bad || is_bad(loop->match, t) || is_bad(loop->match, u)) && turn_is_better(loop->match, h);
+  return (!loop->only_bad || is_bad(match, t) || is_bad(match, u)) && turn_is_better(match, h) &&
+         can_turn(match, h, loop->limit2);
 }
 
 /* One edge after another; asks again only where a turn has changed one of the two triangles. */
-static orb_status turn_pass(orb_context *ctx, orb_match *match, double limit2, int only_bad, turn_loop *loop,
-                            int64_t *turned) {
+static orb_status turn_pass(orb_context *ctx, orb_match *match, turn_loop *loop, int64_t *turned) {
   const orb_net *net = &match->net;
   int32_t half_edges = 3 * net->triangle_count;
   *turned = 0;
-  memset(loop->asked, 1, (size_t)net->triangle_count);
   memset(loop->changed, 0, (size_t)net->triangle_count);
-  if (only_bad) {
-    orb_parallel_for(ctx, net->triangle_count, 512, bad_range, loop);
-  }
-  orb_parallel_for(ctx, half_edges, 1024, better_range, loop);
+  orb_parallel_for(ctx, net->triangle_count, 512, bad_range, loop);
+  orb_parallel_for(ctx, half_edges, 1024, may_range, loop);
   ORB_TRY(orb_context_check(ctx));
   for (int32_t h = 0; h < half_edges; h++) {
-    if (net->triangles[h - h % 3] < 0 || h > net->twin[h]) {
-      continue;
-    }
-    int32_t t = h / 3, u = net->twin[h] / 3;
-    int better = is_better_now(loop, h, only_bad);
-    if (better && turn_within(match, h, limit2)) {
-      loop->changed[t] = loop->changed[u] = 1;
+    if (net->triangles[h - h % 3] >= 0 && h < net->twin[h] && may_now(loop, h)) {
+      loop->changed[h / 3] = loop->changed[net->twin[h] / 3] = 1;
+      turn(match, h);
       ++*turned;
     }
     if ((h & 4095) == 0) {
       ORB_TRY(orb_context_check(ctx));
     }
   }
+  unsigned char *stale = loop->stale;
+  loop->stale = loop->changed;
+  loop->changed = stale;
   return ORB_OK;
 }
 
 orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2, int only_bad) {
   int64_t triangles = match->net.triangle_count, turned = triangles;
-  turn_loop loop = {match, ORB_NEW(ctx, unsigned char, triangles), ORB_NEW(ctx, unsigned char, 3 * triangles),
-                    ORB_NEW(ctx, unsigned char, triangles)};
-  orb_status status = loop.asked && loop.better && loop.changed ? ORB_OK : ORB_E_NO_MEMORY;
+  turn_loop loop = {.match = match, .limit2 = limit2, .only_bad = only_bad};
+  loop.asked = ORB_NEW(ctx, unsigned char, triangles);
+  loop.may = ORB_NEW(ctx, unsigned char, 3 * triangles);
+  loop.stale = ORB_NEW(ctx, unsigned char, triangles);
+  loop.changed = ORB_NEW(ctx, unsigned char, triangles);
+  orb_status status = loop.asked && loop.may && loop.stale && loop.changed ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    memset(loop.stale, 1, (size_t)triangles);
+  }
   for (int pass = 0; pass < 4 && turned * 200 >= triangles && status == ORB_OK; pass++) {
-    status = turn_pass(ctx, match, limit2, only_bad, &loop, &turned);
+    status = turn_pass(ctx, match, &loop, &turned);
   }
   orb_free(ctx, loop.asked);
-  orb_free(ctx, loop.better);
+  orb_free(ctx, loop.may);
+  orb_free(ctx, loop.stale);
   orb_free(ctx, loop.changed);
   return status;
 }
