@@ -4,7 +4,12 @@
  * planes weighted by area, lengths relative to the diagonal); the cost of moving u onto v is the sum over the shapes of
  * u's quadric at v. The proof: the new triangles are positive on the sphere, the new edges' crossings and the items
  * that change triangles lie within the limit in every shape. A heap holds each vertex with its best target; a vertex
- * that finds no allowed target waits until its surroundings change. */
+ * that finds no allowed target waits until its surroundings change.
+ *
+ * The proofs take the time, and several are made at once: the cheapest vertices that have no neighbour in common are
+ * taken from the heap together, each is tried by some thread while nothing changes, and what was found is done in their
+ * order. None of it touches what another one's proof looked at. How many are taken depends on the heap alone, so that
+ * threads change nothing. */
 #include <math.h>
 #include <string.h>
 
@@ -15,6 +20,16 @@
 #include "remesh/quadric.h"
 
 enum { RING_MAX = 48, VALENCE_MAX = 14, TRIES = 4 };
+enum { BATCH_MOST = 256, BATCH_PART = 32, BATCH_GRAIN = 4 }; /* at once; one of how many; a thread's share */
+
+/* What was found for a vertex: a way to go, or none. */
+typedef struct plan {
+  int32_t u, ring[RING_MAX];
+  int n, at;                        /* at: moves onto this neighbour; −1: does not */
+  int32_t heir;                     /* who takes the quadrics after */
+  int fills;                        /* it goes, and this fills its hole */
+  int triangles[ORB_FILL_MOST][3];
+} plan;
 
 typedef struct collapser {
   orb_context *ctx;
@@ -27,6 +42,9 @@ typedef struct collapser {
   int32_t *heap, *slot; /* slot −1: not in the heap */
   int32_t heap_count;
   int64_t live;
+  plan *batch;
+  int32_t *later;           /* vertices taken from the heap that have a neighbour in common with one of the batch */
+  uint32_t *taken, batches; /* a vertex: the last batch that it or a neighbour was in */
 } collapser;
 
 static void swap_heap(collapser *c, int32_t i, int32_t j) {
@@ -263,53 +281,109 @@ static int next_target(const double *cost, int n) {
   return best;
 }
 
-/* Takes u away in the best way that there is, if there is one. */
-static void try_fill(collapser *c, int32_t u, const int32_t *ring, int n, int32_t heir) {
-  int triangles[ORB_FILL_MOST][3];
-  int32_t shapes = c->match->shape_count;
-  if (!orb_match_plan_fill(c->match, u, ring, n, c->limit2, c->strict, triangles)) {
-    return;
-  }
-  orb_match_fill(c->match, u, ring, n, triangles);
-  c->live -= 2;
-  for (int32_t k = 0; k < shapes; k++) {
-    orb_quadric_add(&c->quadric[(int64_t)heir * shapes + k], &c->quadric[(int64_t)u * shapes + k]);
-  }
-  for (int i = 0; i < n; i++) {
-    rate(c, ring[i]);
-  }
-}
-
-static void try_vertex(collapser *c, int32_t u) {
-  const orb_net *net = &c->match->net;
-  int32_t ring[RING_MAX], turned[RING_MAX];
+/* Finds a way for p->u to go. Nothing is changed: any thread. */
+static void find_way(const collapser *c, plan *p) {
+  int32_t turned[RING_MAX];
   double cost[RING_MAX];
-  int n = ring_of(net, u, ring);
-  int32_t heir = -1;
+  int n = p->n = ring_of(&c->match->net, p->u, p->ring);
+  p->at = p->heir = -1;
+  p->fills = 0;
   for (int i = 0; i < n; i++) {
-    cost[i] = move_cost(c, u, ring[i]);
+    cost[i] = move_cost(c, p->u, p->ring[i]);
   }
   for (int attempt = 0; attempt < TRIES; attempt++) {
     int at = next_target(cost, n);
     if (at < 0) {
       break;
     }
-    heir = attempt == 0 ? ring[at] : heir;
+    p->heir = attempt == 0 ? p->ring[at] : p->heir;
     cost[at] = INFINITY;
     for (int i = 0; i < n; i++) {
-      turned[i] = ring[(at + i) % n];
+      turned[i] = p->ring[(at + i) % n];
     }
-    if (is_allowed(c, u, turned, n)) {
-      collapse(c, orb_net_edge(net, u, turned[0]));
-      rate(c, turned[0]);
-      for (int i = 1; i < n; i++) {
-        rate_after(c, turned[i], u, turned[0]);
-      }
+    if (is_allowed(c, p->u, turned, n)) {
+      p->at = at;
       return;
     }
   }
-  if (c->thorough && n > 2 && n <= ORB_FILL_MOST) {
-    try_fill(c, u, ring, n, heir);
+  p->fills = c->thorough && n > 2 && n <= ORB_FILL_MOST &&
+             orb_match_plan_fill(c->match, p->u, p->ring, n, c->limit2, c->strict, p->triangles);
+}
+
+static void find_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  collapser *c = arg;
+  for (int64_t i = begin; i < end; i++) {
+    find_way(c, &c->batch[i]);
+  }
+}
+
+/* Goes the way that was found. */
+static void go(collapser *c, const plan *p) {
+  int32_t shapes = c->match->shape_count;
+  if (p->at >= 0) {
+    int32_t v = p->ring[p->at];
+    collapse(c, orb_net_edge(&c->match->net, p->u, v));
+    rate(c, v);
+    for (int i = 1; i < p->n; i++) {
+      rate_after(c, p->ring[(p->at + i) % p->n], p->u, v);
+    }
+  } else if (p->fills) {
+    int triangles[ORB_FILL_MOST][3];
+    memcpy(triangles, p->triangles, sizeof triangles);
+    orb_match_fill(c->match, p->u, p->ring, p->n, triangles);
+    c->live -= 2;
+    for (int32_t k = 0; k < shapes; k++) {
+      orb_quadric_add(&c->quadric[(int64_t)p->heir * shapes + k], &c->quadric[(int64_t)p->u * shapes + k]);
+    }
+    for (int i = 0; i < p->n; i++) {
+      rate(c, p->ring[i]);
+    }
+  }
+}
+
+/* Whether u and its neighbours are free of the present batch; they are its own then. */
+static int take(collapser *c, int32_t u) {
+  const orb_net *net = &c->match->net;
+  int32_t first = net->out[u], h = first;
+  int is_free = c->taken[u] != c->batches;
+  do {
+    is_free = is_free && c->taken[net->triangles[orb_next(h)]] != c->batches;
+    h = net->twin[orb_prev(h)];
+  } while (h != first);
+  if (!is_free) {
+    return 0;
+  }
+  c->taken[u] = c->batches;
+  do {
+    c->taken[net->triangles[orb_next(h)]] = c->batches;
+    h = net->twin[orb_prev(h)];
+  } while (h != first);
+  return 1;
+}
+
+/* Tries the next of the heap, as many at once as it can well spare. */
+static void try_batch(collapser *c, int64_t target) {
+  int most = c->heap_count / BATCH_PART < BATCH_MOST ? c->heap_count / BATCH_PART + 1 : BATCH_MOST;
+  int count = 0, waiting = 0;
+  c->batches++;
+  while (c->heap_count > 0 && count < most && waiting < most) {
+    int32_t u = c->heap[0];
+    heap_remove(c, u);
+    if (take(c, u)) {
+      c->batch[count++].u = u;
+    } else {
+      c->later[waiting++] = u;
+    }
+  }
+  orb_parallel_for(c->ctx, count, BATCH_GRAIN, find_range, c);
+  for (int i = 0; i < count && c->live > target && c->live > 4; i++) {
+    go(c, &c->batch[i]);
+  }
+  for (int i = 0; i < waiting; i++) {
+    if (c->slot[c->later[i]] < 0) {
+      heap_put(c, c->later[i], c->cost[c->later[i]]);
+    }
   }
 }
 
@@ -364,7 +438,11 @@ orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2,
   c.target = ORB_NEW(ctx, int32_t, vertices);
   c.heap = ORB_NEW(ctx, int32_t, vertices);
   c.slot = ORB_NEW(ctx, int32_t, vertices);
-  orb_status status = c.quadric && c.cost && c.target && c.heap && c.slot ? ORB_OK : ORB_E_NO_MEMORY;
+  c.batch = ORB_NEW(ctx, plan, BATCH_MOST);
+  c.later = ORB_NEW(ctx, int32_t, BATCH_MOST);
+  c.taken = ORB_NEW0(ctx, uint32_t, vertices);
+  int fine = c.quadric && c.cost && c.target && c.heap && c.slot && c.batch && c.later && c.taken;
+  orb_status status = fine ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
     orb_parallel_for(ctx, vertices, 512, quadric_range, &c);
     orb_parallel_for(ctx, vertices, 512, cost_range, &c);
@@ -377,18 +455,17 @@ orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2,
       }
     }
   }
-  for (int64_t i = 0; status == ORB_OK && c.heap_count > 0 && c.live > target && c.live > 4; i++) {
-    int32_t u = c.heap[0];
-    heap_remove(&c, u);
-    try_vertex(&c, u);
-    if ((i & 511) == 0) {
-      status = orb_context_check(ctx);
-    }
+  while (status == ORB_OK && c.heap_count > 0 && c.live > target && c.live > 4) {
+    try_batch(&c, target);
+    status = orb_context_check(ctx);
   }
   orb_free(ctx, c.quadric);
   orb_free(ctx, c.cost);
   orb_free(ctx, c.target);
   orb_free(ctx, c.heap);
   orb_free(ctx, c.slot);
+  orb_free(ctx, c.batch);
+  orb_free(ctx, c.later);
+  orb_free(ctx, c.taken);
   return status;
 }
