@@ -38,7 +38,7 @@ static orb_status later_rounds(orb_context *ctx, orb_match *match, double limit2
                                int rounds) {
   int64_t before = orb_match_live(match), after = before;
   for (int round = 1; round < rounds && after > target; round++) {
-    ORB_TRY(orb_match_move_all(ctx, match, limit2, 0));
+    ORB_TRY(orb_match_move_all(ctx, match, limit2, NULL));
     ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, 1));
     ORB_TRY(orb_match_merge_all(ctx, match, limit2, target));
     ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));

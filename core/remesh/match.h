@@ -29,6 +29,7 @@ typedef struct orb_match {
   unsigned char *fixed;          /* a net vertex: a landmark, not to be removed */
   uint64_t *stayed;              /* a net vertex: mark of the star in which no move was found, 0: none */
   uint64_t *alone;               /* a net vertex: mark of its surroundings in which it found none to merge with */
+  uint64_t *hopeless;            /* a triangle, two: marks of its surroundings in which it could not be mended */
   /* Items: the vertices of all shapes, shape after shape. Each is in the list of a net vertex or of a triangle. */
   int32_t *item_begin; /* shape_count + 1 */
   int32_t *item_next;
@@ -159,10 +160,14 @@ static inline uint64_t orb_mixed(uint64_t mark, const void *part, size_t size) {
   return mark;
 }
 
+/* A mark of a vertex's neighbours and theirs, where they are, as a sum with no order. */
+uint64_t orb_match_surroundings(const orb_match *match, int32_t v);
+
 /* Moves v on the sphere if that makes the triangles around it better, or its edges stray less, within the limit;
- * whether it did. Then all vertices in turn, or those at triangles that are not fine. */
+ * whether it did. Then all vertices in turn, or those that `which` (may be NULL) says. */
 int orb_match_try_move(orb_match *match, int32_t v, double limit2);
-ORB_MUST_CHECK orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2, int only_bad);
+ORB_MUST_CHECK orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2,
+                                             const unsigned char *which);
 /* Mends triangles that are turned in space, within the limit, as far as it can: see orb_match_turned(). */
 ORB_MUST_CHECK orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2);
 /* How many triangles are turned in space. */

@@ -1,7 +1,9 @@
 /* Triangles that are turned in space against a shape, though none is turned on the sphere: the shape bends, or the map
  * to it shears, within the triangle. In order of price: an edge is turned; a corner is moved, with as many turned edges
  * as it takes; a vertex is added, where the shape bends most along an edge or at a vertex of a shape. Nothing leaves
- * the limit, and no triangle that was fine comes out turned. */
+ * the limit, and no triangle that was fine comes out turned. Edges are turned one after another; corners without an
+ * edge between them move side by side; and which of the dear ways works for a triangle is looked for side by side, to be
+ * gone one after another. What could not be mended is tried again only when something around it has changed. */
 #include <math.h>
 #include <string.h>
 
@@ -9,13 +11,16 @@
 #include "numeric/vec3.h"
 #include "remesh/match.h"
 
-enum { STAR_MAX = 24, ITEMS = 12 };
+enum { STAR_MAX = 24, ITEMS = 12, WAYS = 7, NO_WAY = 255 };
 
 typedef struct mender {
   orb_context *ctx;
   orb_match *match;
   double limit2;
   orb_star_goal goal;
+  int32_t *turned;    /* the triangles of a pass */
+  unsigned char *way; /* for each: the way that was found */
+  int thread;         /* ≥ 0: only to tell whether it can be done */
 } mender;
 
 static int is_turned(const orb_match *match, int32_t t) {
@@ -69,7 +74,9 @@ static void add_items(trials *list, const orb_match *match, const int32_t *trian
 
 static int try_star(const mender *m, const int32_t *triangles, int count, const trials *list, int least_inner) {
   const orb_star_wish wish = {m->limit2, least_inner, 3, m->goal};
-  return orb_match_star(m->match, triangles, count, (const double(*)[3])list->point, list->count, &wish);
+  const double(*points)[3] = (const double(*)[3])list->point;
+  return m->thread < 0 ? orb_match_star(m->match, triangles, count, points, list->count, &wish)
+                       : orb_match_can_star(m->match, triangles, count, points, list->count, &wish, m->thread);
 }
 
 static int try_corner(const mender *m, int32_t v) {
@@ -105,55 +112,95 @@ static int try_split(const mender *m, int32_t h) {
   return try_star(m, pair, 2, &list, 0);
 }
 
-static int turn_or_move(const mender *m, int32_t t) {
-  orb_match *match = m->match;
-  for (int k = 0; k < 3; k++) {
-    if (orb_match_try_turn(match, 3 * t + k, m->limit2) && !is_turned(match, t)) {
-      return 1;
-    }
+/* By a star: of a corner, of a point on an edge, or of the middle. */
+static int try_way(const mender *m, int32_t t, int way) {
+  const int32_t *c = m->match->net.triangles + 3 * (int64_t)t;
+  if (way < 3) {
+    return try_corner(m, c[way]);
   }
-  for (int k = 0; k < 3; k++) {
-    if (orb_match_try_move(match, match->net.triangles[3 * (int64_t)t + k], m->limit2) && !is_turned(match, t)) {
-      return 1;
-    }
+  if (way < 6) {
+    return try_split(m, 3 * t + way - 3);
   }
-  return 0;
+  trials list = {.count = 0};
+  add_middle(&list, m->match, c[0], c[1], c[2]);
+  return try_star(m, &t, 1, &list, 0);
 }
 
-static orb_status mend(const mender *m, int32_t t, int *mended) {
+/* A mark of what the ways of a triangle depend on, but for what is far. */
+static uint64_t mark_of(const mender *m, int32_t t) {
+  uint64_t mark = orb_mixed(1, &m->limit2, sizeof m->limit2), sum = (uint64_t)m->goal;
+  for (int k = 0; k < 3; k++) {
+    sum += orb_match_surroundings(m->match, m->match->net.triangles[3 * (int64_t)t + k]);
+  }
+  mark = orb_mixed(mark, &sum, sizeof sum);
+  return mark ? mark : 1;
+}
+
+static void find_range(void *arg, int64_t begin, int64_t end, int thread) {
+  mender m = *(const mender *)arg;
+  m.thread = thread;
+  for (int64_t i = begin; i < end; i++) {
+    int32_t t = m.turned[i];
+    uint64_t mark = mark_of(&m, t), *hopeless = m.match->hopeless + 2 * (int64_t)t + (m.goal == ORB_STAR_SMALLER);
+    m.way[i] = NO_WAY;
+    for (int way = 0; way < WAYS && m.way[i] == NO_WAY && *hopeless != mark; way++) {
+      m.way[i] = try_way(&m, t, way) ? (unsigned char)way : NO_WAY;
+    }
+    *hopeless = m.way[i] == NO_WAY ? mark : 0;
+  }
+}
+
+/* Turns edges and moves corners of the turned triangles; sets how many are left, in m->turned. */
+static orb_status turn_and_move(mender *m, unsigned char *marked, int64_t *seen, int64_t *left) {
   orb_match *match = m->match;
-  ORB_TRY(orb_match_reserve(m->ctx, match, 1));
-  *mended = turn_or_move(m, t);
-  const int32_t *c = match->net.triangles + 3 * (int64_t)t;
-  for (int k = 0; k < 3 && !*mended; k++) {
-    *mended = try_corner(m, c[k]);
+  const orb_net *net = &match->net;
+  *seen = *left = 0;
+  orb_match_mark_turned(m->ctx, match, marked);
+  for (int32_t t = 0; t < net->triangle_count; t++) {
+    for (int k = 0; k < 3 && marked[t] && is_turned(match, t); k++) {
+      *seen += k == 0;
+      (void)orb_match_try_turn(match, 3 * t + k, m->limit2);
+    }
   }
-  for (int k = 0; k < 3 && !*mended; k++) {
-    *mended = try_split(m, 3 * t + k);
+  ORB_TRY(orb_context_check(m->ctx));
+  unsigned char *which = ORB_NEW0(m->ctx, unsigned char, net->vertex_count);
+  if (!which) {
+    return ORB_E_NO_MEMORY;
   }
-  if (!*mended) {
-    trials list = {.count = 0};
-    add_middle(&list, match, c[0], c[1], c[2]);
-    *mended = try_star(m, &t, 1, &list, 0);
+  for (int32_t t = 0; t < net->triangle_count; t++) {
+    for (int k = 0; k < 3 && marked[t] && net->triangles[3 * (int64_t)t] >= 0; k++) {
+      which[net->triangles[3 * (int64_t)t + k]] = 1;
+    }
   }
-  return ORB_OK;
+  orb_status status = orb_match_move_all(m->ctx, match, m->limit2, which);
+  orb_free(m->ctx, which);
+  for (int32_t t = 0; t < net->triangle_count && status == ORB_OK; t++) {
+    if (marked[t] && is_turned(match, t)) {
+      m->turned[(*left)++] = t;
+    }
+  }
+  return status;
 }
 
 /* Tries to mend every turned triangle; those made on the way wait for the next pass. */
-static orb_status pass(const mender *m, unsigned char *turned, int64_t *seen, int64_t *left) {
-  orb_match *match = m->match;
-  int32_t count = match->net.triangle_count;
-  *seen = *left = 0;
-  orb_match_mark_turned(m->ctx, match, turned);
-  ORB_TRY(orb_context_check(m->ctx));
-  for (int32_t t = 0; t < count; t++) {
-    int mended = 0;
-    if (turned[t] && is_turned(match, t)) {
-      ++*seen;
-      ORB_TRY(mend(m, t, &mended));
-      *left += !mended;
-      ORB_TRY(orb_context_check(m->ctx));
+static orb_status pass(mender *m, unsigned char *marked, int64_t *seen, int64_t *left) {
+  ORB_TRY(turn_and_move(m, marked, seen, left));
+  ORB_TRY(orb_match_reserve(m->ctx, m->match, orb_threads(m->ctx)));
+  int64_t count = *left;
+  orb_parallel_for(m->ctx, count, 1, find_range, m);
+  for (int64_t i = 0; i < count; i++) {
+    int32_t t = m->turned[i];
+    if (m->way[i] == NO_WAY || !is_turned(m->match, t)) {
+      *left -= m->way[i] != NO_WAY;
+      continue;
     }
+    ORB_TRY(orb_match_reserve(m->ctx, m->match, 1));
+    int mended = try_way(m, t, m->way[i]);
+    for (int way = 0; way < WAYS && !mended; way++) { /* something beside it was mended before */
+      mended = try_way(m, t, way);
+    }
+    *left -= mended;
+    ORB_TRY(orb_context_check(m->ctx));
   }
   return ORB_OK;
 }
@@ -163,13 +210,17 @@ orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2) {
   int64_t seen = 1, left = 0, before = -1;
   orb_status status = ORB_OK;
   for (size_t i = 0; i < sizeof goal / sizeof *goal && seen > 0 && status == ORB_OK; i++) {
-    mender m = {ctx, match, limit2, goal[i]};
     if (i > 0 && goal[i] == goal[i - 1] && before == left) {
       continue; /* nothing has changed */
     }
-    unsigned char *turned = ORB_NEW(ctx, unsigned char, match->net.triangle_count);
-    status = turned ? pass(&m, turned, &seen, &left) : ORB_E_NO_MEMORY;
-    orb_free(ctx, turned);
+    mender m = {.ctx = ctx, .match = match, .limit2 = limit2, .goal = goal[i], .thread = -1};
+    unsigned char *marked = ORB_NEW(ctx, unsigned char, match->net.triangle_count);
+    m.turned = ORB_NEW(ctx, int32_t, match->net.triangle_count);
+    m.way = ORB_NEW(ctx, unsigned char, match->net.triangle_count);
+    status = marked && m.turned && m.way ? pass(&m, marked, &seen, &left) : ORB_E_NO_MEMORY;
+    orb_free(ctx, marked);
+    orb_free(ctx, m.turned);
+    orb_free(ctx, m.way);
     before = seen;
   }
   return status;

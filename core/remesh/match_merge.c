@@ -62,20 +62,25 @@ static int merge_one(orb_match *match, int32_t u, double limit2, int thread) {
   return 0;
 }
 
-/* A mark of what the search depends on, but for what is farther than the neighbours' neighbours. */
-static uint64_t mark_of(const orb_match *match, int32_t u, double limit2) {
+uint64_t orb_match_surroundings(const orb_match *match, int32_t v) {
   const orb_net *net = &match->net;
-  uint64_t mark = orb_mixed(1, &limit2, sizeof limit2), sum = 0;
-  int32_t first = net->out[u], h = first;
+  uint64_t sum = 0;
+  int32_t first = net->out[v], h = first;
   do {
-    int32_t v = net->triangles[orb_next(h)], begin = net->out[v], e = begin;
-    sum += orb_mixed(2, orb_net_point(net, v), 3 * sizeof(double));
+    int32_t w = net->triangles[orb_next(h)], begin = net->out[w], e = begin;
+    sum += orb_mixed(2, orb_net_point(net, w), 3 * sizeof(double));
     do {
       sum += orb_mixed(3, orb_net_point(net, net->triangles[orb_next(e)]), 3 * sizeof(double));
       e = net->twin[orb_prev(e)];
     } while (e != begin);
     h = net->twin[orb_prev(h)];
   } while (h != first);
+  return sum;
+}
+
+/* A mark of what the search depends on, but for what is farther than the neighbours' neighbours. */
+static uint64_t mark_of(const orb_match *match, int32_t u, double limit2) {
+  uint64_t mark = orb_mixed(1, &limit2, sizeof limit2), sum = orb_match_surroundings(match, u);
   mark = orb_mixed(mark, &sum, sizeof sum);
   return mark ? mark : 1;
 }

@@ -11,7 +11,7 @@
 #include "numeric/vec3.h"
 #include "remesh/match.h"
 
-enum { RING_MAX = 16, SHAPES_KEPT = 16, COLOURS = 64 };
+enum { RING_MAX = 16, SHAPES_KEPT = 16, COLOURS = 64, MOVE_GRAIN = 16 };
 
 static const double LEAST_GAIN = 0.01; /* of the cost: many moves that gain less do not make room for collapses */
 
@@ -240,19 +240,6 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
   return moved;
 }
 
-static int is_beside_bad(const orb_match *match, int32_t v) {
-  int32_t first = match->net.out[v], h = first;
-  do {
-    const int32_t *c = match->net.triangles + (h - h % 3);
-    orb_form form = orb_match_form(match, c[0], c[1], c[2]);
-    if (form.turned || form.slivers) {
-      return 1;
-    }
-    h = match->net.twin[orb_prev(h)];
-  } while (h != first);
-  return 0;
-}
-
 /* A colour for each live vertex, so that neighbours differ: vertices of one colour have no triangle in common, and
  * can move at the same time. 64: none is left, it stays. */
 static void colour(const orb_net *net, unsigned char *colours) {
@@ -290,7 +277,7 @@ static void move_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2, int only_bad) {
+orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2, const unsigned char *which) {
   int32_t n = match->net.vertex_count;
   unsigned char *colours = ORB_NEW(ctx, unsigned char, n);
   int32_t *vertices = ORB_NEW(ctx, int32_t, n);
@@ -301,13 +288,13 @@ orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2,
   for (int k = 0; status == ORB_OK && k < COLOURS; k++) {
     int64_t count = 0;
     for (int32_t v = 0; v < n; v++) {
-      if (colours[v] == k && (!only_bad || is_beside_bad(match, v))) {
+      if (colours[v] == k && (!which || which[v])) {
         vertices[count++] = v;
       }
     }
     move_loop loop = {match, limit2, vertices};
     if (count > 0) {
-      orb_parallel_for(ctx, count, 256, move_range, &loop);
+      orb_parallel_for(ctx, count, MOVE_GRAIN, move_range, &loop);
     }
     status = orb_context_check(ctx);
   }

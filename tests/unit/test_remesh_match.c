@@ -157,7 +157,7 @@ static void reducing_keeps_the_limit(void **state) {
     assert_within(&b);
     assert_int_equal(orb_match_turn_all(b.ctx, &b.match, LIMIT * LIMIT, 0), ORB_OK);
     assert_within(&b);
-    assert_int_equal(orb_match_move_all(b.ctx, &b.match, LIMIT * LIMIT, 0), ORB_OK);
+    assert_int_equal(orb_match_move_all(b.ctx, &b.match, LIMIT * LIMIT, NULL), ORB_OK);
     assert_within(&b);
     assert_sound(&b);
     assert_true(orb_match_turned(&b.match) <= turned);
