@@ -7,30 +7,41 @@
 static const double FINE_QUALITY = 0.12, FINE_FACING = 0.05, LEAST_QUALITY = 0.02;
 static const double SURE_FACING = 0.9; /* the centre need not be asked */
 
-/* How well shaped the triangle is on shape s, and how it faces the shape's smooth normals at its corners. */
-static void measure(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c, double *quality,
-                    double *facing) {
+/* A triangle on one shape: its normal, twice as long as its area, and how it lies to the sum of the shape's smooth
+ * normals at its corners. */
+typedef struct pose {
+  double edges;  /* sum of the squared lengths */
+  double area2;  /* of the normal: the squared length */
+  double along;  /* normal by sum */
+} pose;
+
+static inline pose pose_of(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c) {
   double u[3], v[3], n[3], ground[3];
   const double *p = orb_match_at(match, a, s), *q = orb_match_at(match, b, s), *r = orb_match_at(match, c, s);
   orb_sub(q, p, u);
   orb_sub(r, p, v);
   orb_cross(u, v, n);
-  double edges = orb_dot(u, u) + orb_dot(v, v) + orb_distance2(q, r), area2 = orb_length(n);
   for (int k = 0; k < 3; k++) {
     ground[k] = orb_match_normal(match, a, s)[k] + orb_match_normal(match, b, s)[k] + orb_match_normal(match, c, s)[k];
   }
-  *quality = edges > 0 ? 3.4641016151377544 * area2 / edges : 0;
-  *facing = area2 > 0 ? orb_dot(n, ground) / (3 * area2) : 0;
+  return (pose){orb_dot(u, u) + orb_dot(v, v) + orb_distance2(q, r), orb_dot(n, n), orb_dot(n, ground)};
+}
+
+/* Whether along / (3 |normal|), the facing, is below something positive. No root is taken. */
+static inline int faces_less(pose at, double facing) {
+  return at.along <= 0 || at.along * at.along < 9 * facing * facing * at.area2;
 }
 
 orb_form orb_match_form(const orb_match *match, int32_t a, int32_t b, int32_t c) {
-  orb_form worst = ORB_FORM_BEST;
+  double quality2 = 1, facing2 = 1; /* squares, that of the facing with its sign */
   for (int32_t s = 0; s < match->shape_count; s++) {
-    double quality, facing;
-    measure(match, s, a, b, c, &quality, &facing);
-    worst.quality = quality < worst.quality ? quality : worst.quality;
-    worst.facing = facing < worst.facing ? facing : worst.facing;
+    pose at = pose_of(match, s, a, b, c);
+    double q = at.edges > 0 ? 12 * at.area2 / (at.edges * at.edges) : 0;
+    double f = at.area2 > 0 ? at.along * fabs(at.along) / (9 * at.area2) : 0;
+    quality2 = q < quality2 ? q : quality2;
+    facing2 = f < facing2 ? f : facing2;
   }
+  orb_form worst = {sqrt(quality2), facing2 < 0 ? -sqrt(-facing2) : sqrt(facing2), 0, 0};
   worst.slivers = worst.quality < FINE_QUALITY;
   worst.turned = worst.facing < FINE_FACING;
   return worst;
@@ -63,11 +74,10 @@ static int is_turned_at_centre(const orb_match *match, int32_t s, int32_t a, int
 static double turned_extent(const orb_match *match, int32_t a, int32_t b, int32_t c, int by_centre) {
   double extent = 0;
   for (int32_t s = 0; s < match->shape_count; s++) {
-    double facing, quality;
-    measure(match, s, a, b, c, &quality, &facing);
-    if (facing < FINE_FACING || (by_centre && facing < SURE_FACING && is_turned_at_centre(match, s, a, b, c))) {
-      const double *p = orb_match_at(match, a, s), *q = orb_match_at(match, b, s), *r = orb_match_at(match, c, s);
-      extent += orb_distance2(p, q) + orb_distance2(q, r) + orb_distance2(r, p) + 1e-200;
+    pose at = pose_of(match, s, a, b, c);
+    if (faces_less(at, FINE_FACING) ||
+        (by_centre && faces_less(at, SURE_FACING) && is_turned_at_centre(match, s, a, b, c))) {
+      extent += at.edges + 1e-200;
     }
   }
   return extent;

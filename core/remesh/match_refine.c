@@ -49,21 +49,24 @@ static int turn_turns(const orb_match *match, int32_t a, int32_t b, int32_t c, i
   return orb_tally_is_worse(after, before);
 }
 
-static int is_bad(const orb_match *match, int32_t t) {
-  const int32_t *c = match->net.triangles + 3 * (int64_t)t;
-  orb_form form = c[0] >= 0 ? orb_match_form(match, c[0], c[1], c[2]) : ORB_FORM_BEST;
-  return form.turned || form.slivers;
+/* Whether a turn of edge h, beside triangles of this form, would make them better in space, whatever else may forbid
+ * it. */
+static int turn_is_better(const orb_match *match, int32_t h, orb_form before) {
+  const orb_net *net = &match->net;
+  int32_t g = net->twin[h], a = net->triangles[h], b = net->triangles[g];
+  int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
+  orb_form after = orb_match_form(match, c, d, b);
+  double wanted = before.quality * 1.05 + 1e-9;
+  if (after.quality <= wanted && (before.facing > 0 || after.facing <= 0)) {
+    return 0;
+  }
+  after = orb_form_join(after, orb_match_form(match, d, c, a));
+  return (after.quality > wanted || (before.facing <= 0 && after.facing > 0)) && orb_form_allows(before, after);
 }
 
-/* Whether a turn of edge h would make its two triangles better in space, whatever else may forbid it. */
-static int turn_is_better(const orb_match *match, int32_t h) {
-  const orb_net *net = &match->net;
-  int32_t g = net->twin[h];
-  orb_form before, after;
-  forms_of_turn(match, net->triangles[h], net->triangles[g], net->triangles[orb_prev(h)], net->triangles[orb_prev(g)],
-                &before, &after);
-  int better = after.quality > before.quality * 1.05 + 1e-9 || (before.facing <= 0 && after.facing > 0);
-  return better && orb_form_allows(before, after);
+static orb_form form_of(const orb_match *match, int32_t t) {
+  const int32_t *c = match->net.triangles + 3 * (int64_t)t;
+  return c[0] >= 0 ? orb_match_form(match, c[0], c[1], c[2]) : ORB_FORM_BEST;
 }
 
 /* Whether the limit lets it be turned. */
@@ -78,7 +81,8 @@ static int can_turn(const orb_match *match, int32_t h, double limit2) {
 }
 
 int orb_match_try_turn(orb_match *match, int32_t h, double limit2) {
-  int can = turn_is_better(match, h) && can_turn(match, h, limit2);
+  orb_form before = orb_form_join(form_of(match, h / 3), form_of(match, match->net.twin[h] / 3));
+  int can = turn_is_better(match, h, before) && can_turn(match, h, limit2);
   if (can) {
     turn(match, h);
   }
@@ -89,20 +93,27 @@ typedef struct turn_loop {
   const orb_match *match;
   double limit2;
   int only_bad;
-  unsigned char *asked;   /* a triangle: its edges are to be looked at */
-  unsigned char *may;     /* a half-edge: it is to be turned, as things are; 0 where neither triangle is asked */
+  orb_form *form;         /* a triangle */
+  unsigned char *may;     /* a half-edge: it is to be turned, as things are; 0 where neither triangle is to be seen */
   unsigned char *stale;   /* a triangle: what is known of its edges is not true any more */
   unsigned char *changed; /* a triangle: in this pass */
 } turn_loop;
 
-static void bad_range(void *arg, int64_t begin, int64_t end, int thread) {
+static void form_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   turn_loop *loop = arg;
   for (int64_t t = begin; t < end; t++) {
     if (loop->stale[t]) {
-      loop->asked[t] = !loop->only_bad || is_bad(loop->match, (int32_t)t);
+      loop->form[t] = form_of(loop->match, (int32_t)t);
     }
   }
+}
+
+/* Whether edge h would be turned for the sake of the triangles beside it. */
+static int is_to_turn(const turn_loop *loop, int32_t h) {
+  orb_form before = orb_form_join(loop->form[h / 3], loop->form[loop->match->net.twin[h] / 3]);
+  return (!loop->only_bad || before.turned || before.slivers) && turn_is_better(loop->match, h, before) &&
+         can_turn(loop->match, h, loop->limit2);
 }
 
 static void may_range(void *arg, int64_t begin, int64_t end, int thread) {
@@ -113,8 +124,7 @@ static void may_range(void *arg, int64_t begin, int64_t end, int thread) {
     if (net->triangles[h - h % 3] < 0) {
       loop->may[h] = 0;
     } else if (h < net->twin[h] && (loop->stale[h / 3] || loop->stale[net->twin[h] / 3])) {
-      loop->may[h] = (loop->asked[h / 3] || loop->asked[net->twin[h] / 3]) &&
-                     turn_is_better(loop->match, (int32_t)h) && can_turn(loop->match, (int32_t)h, loop->limit2);
+      loop->may[h] = (unsigned char)is_to_turn(loop, (int32_t)h);
     }
   }
 }
@@ -128,8 +138,7 @@ static int may_now(const turn_loop *loop, int32_t h) {
   if (!loop->changed[t] && !loop->changed[u]) {
     return loop->may[h] && !orb_net_adjacent(net, net->triangles[orb_prev(h)], net->triangles[orb_prev(g)]);
   }
-  return (!loop->only_bad || is_bad(match, t) || is_bad(match, u)) && turn_is_better(match, h) &&
-         can_turn(match, h, loop->limit2);
+  return is_to_turn(loop, h);
 }
 
 /* One edge after another; asks again only where a turn has changed one of the two triangles. */
@@ -138,13 +147,17 @@ static orb_status turn_pass(orb_context *ctx, orb_match *match, turn_loop *loop,
   int32_t half_edges = 3 * net->triangle_count;
   *turned = 0;
   memset(loop->changed, 0, (size_t)net->triangle_count);
-  orb_parallel_for(ctx, net->triangle_count, 512, bad_range, loop);
+  orb_parallel_for(ctx, net->triangle_count, 512, form_range, loop);
   orb_parallel_for(ctx, half_edges, 1024, may_range, loop);
   ORB_TRY(orb_context_check(ctx));
   for (int32_t h = 0; h < half_edges; h++) {
     if (net->triangles[h - h % 3] >= 0 && h < net->twin[h] && may_now(loop, h)) {
-      loop->changed[h / 3] = loop->changed[net->twin[h] / 3] = 1;
+      int32_t both[2] = {h / 3, net->twin[h] / 3};
       turn(match, h);
+      for (int i = 0; i < 2; i++) {
+        loop->changed[both[i]] = 1;
+        loop->form[both[i]] = form_of(match, both[i]);
+      }
       ++*turned;
     }
     if ((h & 4095) == 0) {
@@ -160,18 +173,18 @@ static orb_status turn_pass(orb_context *ctx, orb_match *match, turn_loop *loop,
 orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2, int only_bad) {
   int64_t triangles = match->net.triangle_count, turned = triangles;
   turn_loop loop = {.match = match, .limit2 = limit2, .only_bad = only_bad};
-  loop.asked = ORB_NEW(ctx, unsigned char, triangles);
+  loop.form = ORB_NEW(ctx, orb_form, triangles);
   loop.may = ORB_NEW(ctx, unsigned char, 3 * triangles);
   loop.stale = ORB_NEW(ctx, unsigned char, triangles);
   loop.changed = ORB_NEW(ctx, unsigned char, triangles);
-  orb_status status = loop.asked && loop.may && loop.stale && loop.changed ? ORB_OK : ORB_E_NO_MEMORY;
+  orb_status status = loop.form && loop.may && loop.stale && loop.changed ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
     memset(loop.stale, 1, (size_t)triangles);
   }
   for (int pass = 0; pass < 4 && turned * 200 >= triangles && status == ORB_OK; pass++) {
     status = turn_pass(ctx, match, &loop, &turned);
   }
-  orb_free(ctx, loop.asked);
+  orb_free(ctx, loop.form);
   orb_free(ctx, loop.may);
   orb_free(ctx, loop.stale);
   orb_free(ctx, loop.changed);

@@ -27,6 +27,7 @@ typedef struct disc {
   int count, n, inner_count;
   int rough;        /* triangles are judged by their corners only, until all else is found to be fine */
   double own[DISC]; /* how far each of its triangles is turned now; −1: not known yet */
+  int32_t far_end, far_shape; /* the edge to this vertex strayed too far for another point, on this shape; −1: none */
 } disc;
 
 static int holds(const disc *d, int32_t t) {
@@ -199,7 +200,28 @@ static int list_allows(const disc *d, int32_t list, double limit2) {
   return 1;
 }
 
-static int is_within(const disc *d, double limit2) {
+/* Whether the edges stay within the limit: first the one that did not for another point. */
+static int edges_allow(disc *d, double limit2) {
+  const orb_match *match = d->match;
+  for (int i = 0; i < d->n && d->far_end >= 0; i++) {
+    if (match->net.triangles[d->side[i].h] == d->far_end &&
+        orb_match_edge_of_shape2(match, d->far_shape, d->p, d->far_end, limit2, NULL) > limit2) {
+      return 0;
+    }
+  }
+  for (int i = 0; i < d->n; i++) {
+    for (int32_t s = 0; s < match->shape_count; s++) {
+      if (orb_match_edge_of_shape2(match, s, d->p, match->net.triangles[d->side[i].h], limit2, NULL) > limit2) {
+        d->far_end = match->net.triangles[d->side[i].h];
+        d->far_shape = s;
+        return 0;
+      }
+    }
+  }
+  return 1;
+}
+
+static int is_within(disc *d, double limit2) {
   const orb_match *match = d->match;
   for (int i = 0; i < d->count; i++) {
     if (!list_allows(d, match->triangle_items[d->triangle[i]], limit2)) {
@@ -211,12 +233,7 @@ static int is_within(const disc *d, double limit2) {
       return 0;
     }
   }
-  for (int i = 0; i < d->n; i++) {
-    if (orb_match_edge2(match, d->p, match->net.triangles[d->side[i].h], limit2, NULL) > limit2) {
-      return 0;
-    }
-  }
-  return 1;
+  return edges_allow(d, limit2);
 }
 
 static void commit(orb_match *match, const disc *d) {
@@ -305,7 +322,7 @@ static int plan(disc *d, const double p[3], const orb_star_wish *wish) {
 /* The first of the points that has a star, planned in *d; 0: none. */
 static int plan_first(disc *d, orb_match *match, int32_t vertex, const int32_t *triangles, int count,
                       const double (*points)[3], int point_count, const orb_star_wish *wish) {
-  disc start = {.match = match, .p = vertex, .rough = wish->goal == ORB_STAR_NOT_WORSE};
+  disc start = {.match = match, .p = vertex, .far_end = -1, .rough = wish->goal == ORB_STAR_NOT_WORSE};
   ORB_ASSERT(vertex < match->capacity);
   for (int i = 0; i < count && count <= DISC; i++) {
     add_triangle(&start, triangles[i]);
@@ -319,6 +336,8 @@ static int plan_first(disc *d, orb_match *match, int32_t vertex, const int32_t *
     if (plan(d, points[i], wish)) {
       return 1;
     }
+    start.far_end = d->far_end;
+    start.far_shape = d->far_shape;
   }
   return 0;
 }
