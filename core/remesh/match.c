@@ -7,6 +7,7 @@
 #include "base/check.h"
 #include "base/grow.h"
 #include "mesh/normals.h"
+#include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
 const double *orb_match_item_point(const orb_match *match, int32_t item) {
@@ -226,6 +227,24 @@ void orb_match_deal(orb_match *match, int32_t list, int32_t start) {
     orb_hit hit = orb_walk(&view, orb_match_item_point(match, item), start);
     match->item_next[item] = match->triangle_items[hit.triangle];
     match->triangle_items[hit.triangle] = item;
+  }
+}
+
+void orb_match_deal_among(orb_match *match, int32_t list, const int32_t *triangles, int count) {
+  const orb_net *net = &match->net;
+  while (list >= 0) {
+    int32_t item = list;
+    const double *x = orb_match_item_point(match, item);
+    int at = -1;
+    for (int i = 0; i < count && at < 0; i++) {
+      const int32_t *c = net->triangles + 3 * (int64_t)triangles[i];
+      const double *p = orb_net_point(net, c[0]), *q = orb_net_point(net, c[1]), *r = orb_net_point(net, c[2]);
+      at = orb_orient(p, q, x) >= 0 && orb_orient(q, r, x) >= 0 && orb_orient(r, p, x) >= 0 ? i : -1;
+    }
+    ORB_ASSERT(at >= 0);
+    list = match->item_next[item];
+    match->item_next[item] = match->triangle_items[triangles[at]];
+    match->triangle_items[triangles[at]] = item;
   }
 }
 

@@ -91,6 +91,8 @@ int32_t orb_match_insert(orb_match *match, int32_t t, const double p[3]);
 
 /* Puts the items of a list into the triangles that hold them, by walks from triangle `start`. */
 void orb_match_deal(orb_match *match, int32_t list, int32_t start);
+/* The same among a few triangles that are known to hold them all. Touches these only: others may change meanwhile. */
+void orb_match_deal_among(orb_match *match, int32_t list, const int32_t *triangles, int count);
 
 /* Splits, or turns, every edge that strays farther than the tolerance (relative, squared), and takes items that do in
  * as vertices, until none does; *strays (may be NULL) counts the edges that had to be looked at. Where the map flattens
@@ -206,7 +208,7 @@ ORB_MUST_CHECK orb_status orb_match_merge_all(orb_context *ctx, orb_match *match
  * neighbours counter-clockwise, triangles n − 2 triples of numbers in the ring. strict as below. 0: there is no way. */
 int orb_match_plan_fill(const orb_match *match, int32_t u, const int32_t *ring, int n, double limit2, int strict,
                         int (*triangles)[3]);
-/* Does it. */
+/* Does it, and touches nothing beyond the ring. */
 void orb_match_fill(orb_match *match, int32_t u, const int32_t *ring, int n, int (*triangles)[3]);
 
 /* Collapses edges while every matched distance stays within the limit (relative, squared) and more than

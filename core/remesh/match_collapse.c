@@ -7,9 +7,10 @@
  * that finds no allowed target waits until its surroundings change.
  *
  * The proofs take the time, and several are made at once: the cheapest vertices that have no neighbour in common are
- * taken from the heap together, each is tried by some thread while nothing changes, and what was found is done in their
- * order. None of it touches what another one's proof looked at. How many are taken depends on the heap alone, so that
- * threads change nothing. */
+ * taken from the heap together, each is tried by some thread while nothing changes, and then the ways that were found
+ * are gone, side by side again: each changes the triangles around its vertex and the edges and neighbours along their
+ * outline, which no other one's proof has looked at. How many are taken depends on the heap alone, so that threads
+ * change nothing. */
 #include <math.h>
 #include <string.h>
 
@@ -25,10 +26,11 @@ enum { BATCH_MOST = 256, BATCH_PART = 32, BATCH_GRAIN = 4 }; /* at once; one of 
 /* What was found for a vertex: a way to go, or none. */
 typedef struct plan {
   int32_t u, ring[RING_MAX];
-  int n, at;                        /* at: moves onto this neighbour; −1: does not */
-  int32_t heir;                     /* who takes the quadrics after */
-  int fills;                        /* it goes, and this fills its hole */
+  int n, at;    /* at: moves onto this neighbour; −1: does not */
+  int32_t heir; /* who takes the quadrics after */
+  int fills;    /* it goes, and this fills its hole */
   int triangles[ORB_FILL_MOST][3];
+  double cost[RING_MAX]; /* of the neighbours, once it is gone */
 } plan;
 
 typedef struct collapser {
@@ -143,25 +145,17 @@ static double least_cost(const collapser *c, int32_t u, int32_t *target) {
   return best;
 }
 
-static void rate(collapser *c, int32_t u) {
-  heap_put(c, u, least_cost(c, u, &c->target[u]));
-}
-
 /* The same when all that has happened around u is that `gone` has moved onto its neighbour v. */
-static void rate_after(collapser *c, int32_t u, int32_t gone, int32_t v) {
-  if (c->match->fixed[u]) {
-    return;
-  }
-  if (c->target[u] < 0 || c->target[u] == gone) {
-    rate(c, u);
-    return;
+static double least_cost_after(collapser *c, int32_t u, int32_t gone, int32_t v) {
+  if (c->match->fixed[u] || c->target[u] < 0 || c->target[u] == gone) {
+    return least_cost(c, u, &c->target[u]);
   }
   double cost = move_cost(c, u, v);
   if (cost < c->cost[u]) {
-    c->cost[u] = cost;
     c->target[u] = v;
+    return cost;
   }
-  heap_put(c, u, c->cost[u]);
+  return c->cost[u];
 }
 
 /* In space no new triangle is a worse sliver, or turned worse against the surface, than the worst of those that go,
@@ -243,31 +237,37 @@ static int is_allowed(const collapser *c, int32_t u, const int32_t *ring, int n)
   return after.turned == 0 || !orb_tally_is_worse(after, orb_match_tally_fan(match, u, ring, n, 1));
 }
 
+static void hand_over_quadrics(collapser *c, int32_t from, int32_t to) {
+  int64_t shapes = c->match->shape_count;
+  for (int32_t s = 0; s < shapes; s++) {
+    orb_quadric_add(&c->quadric[to * shapes + s], &c->quadric[from * shapes + s]);
+  }
+}
+
 /* Removes u by moving it onto the end of half-edge h = u→v, which is allowed. */
 static void collapse(collapser *c, int32_t h) {
   orb_match *match = c->match;
   orb_net *net = &match->net;
   int32_t u = net->triangles[h], v = net->triangles[orb_next(h)];
-  int32_t lists[RING_MAX + 1];
-  int n = 0;
-  lists[RING_MAX] = match->vertex_items[u];
-  match->vertex_items[u] = -1;
+  int32_t lists[RING_MAX + 1], slots[RING_MAX];
+  int n = 0, left = 0;
   int32_t e = h;
   do {
-    lists[n++] = match->triangle_items[e / 3];
+    lists[n] = match->triangle_items[e / 3];
     match->triangle_items[e / 3] = -1;
+    if (e / 3 != h / 3 && e / 3 != net->twin[h] / 3) {
+      slots[left++] = e / 3;
+    }
+    n++;
     e = net->twin[orb_prev(e)];
   } while (e != h);
+  lists[n++] = match->vertex_items[u];
+  match->vertex_items[u] = -1;
   orb_net_collapse(net, h);
-  c->live -= 2;
-  int32_t start = net->out[v] / 3;
-  orb_match_deal(match, lists[RING_MAX], start);
   for (int i = 0; i < n; i++) {
-    orb_match_deal(match, lists[i], start);
+    orb_match_deal_among(match, lists[i], slots, left);
   }
-  for (int32_t k = 0; k < match->shape_count; k++) {
-    orb_quadric_add(&c->quadric[(int64_t)v * match->shape_count + k], &c->quadric[(int64_t)u * match->shape_count + k]);
-  }
+  hand_over_quadrics(c, u, v);
 }
 
 /* The place in the ring of the best target that has not been tried (those have an infinite cost); −1: none. */
@@ -318,27 +318,29 @@ static void find_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* Goes the way that was found. */
-static void go(collapser *c, const plan *p) {
-  int32_t shapes = c->match->shape_count;
+/* Goes the way that was found, and finds what the neighbours cost then. */
+static void go(collapser *c, plan *p) {
   if (p->at >= 0) {
     int32_t v = p->ring[p->at];
     collapse(c, orb_net_edge(&c->match->net, p->u, v));
-    rate(c, v);
-    for (int i = 1; i < p->n; i++) {
-      rate_after(c, p->ring[(p->at + i) % p->n], p->u, v);
+    for (int i = 0; i < p->n; i++) {
+      int32_t w = p->ring[i];
+      p->cost[i] = w == v ? least_cost(c, v, &c->target[v]) : least_cost_after(c, w, p->u, v);
     }
   } else if (p->fills) {
-    int triangles[ORB_FILL_MOST][3];
-    memcpy(triangles, p->triangles, sizeof triangles);
-    orb_match_fill(c->match, p->u, p->ring, p->n, triangles);
-    c->live -= 2;
-    for (int32_t k = 0; k < shapes; k++) {
-      orb_quadric_add(&c->quadric[(int64_t)p->heir * shapes + k], &c->quadric[(int64_t)p->u * shapes + k]);
-    }
+    orb_match_fill(c->match, p->u, p->ring, p->n, p->triangles);
+    hand_over_quadrics(c, p->u, p->heir);
     for (int i = 0; i < p->n; i++) {
-      rate(c, p->ring[i]);
+      p->cost[i] = least_cost(c, p->ring[i], &c->target[p->ring[i]]);
     }
+  }
+}
+
+static void go_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  collapser *c = arg;
+  for (int64_t i = begin; i < end; i++) {
+    go(c, &c->batch[i]);
   }
 }
 
@@ -377,8 +379,20 @@ static void try_batch(collapser *c, int64_t target) {
     }
   }
   orb_parallel_for(c->ctx, count, BATCH_GRAIN, find_range, c);
-  for (int i = 0; i < count && c->live > target && c->live > 4; i++) {
-    go(c, &c->batch[i]);
+  for (int i = 0; i < count; i++) {
+    plan *p = &c->batch[i];
+    if (c->live <= target || c->live <= 4) {
+      count = i;
+    } else {
+      c->live -= p->at >= 0 || p->fills ? 2 : 0;
+    }
+  }
+  orb_parallel_for(c->ctx, count, BATCH_GRAIN, go_range, c);
+  for (int i = 0; i < count; i++) {
+    const plan *p = &c->batch[i];
+    for (int k = 0; k < p->n && (p->at >= 0 || p->fills); k++) {
+      heap_put(c, p->ring[k], p->cost[k]);
+    }
   }
   for (int i = 0; i < waiting; i++) {
     if (c->slot[c->later[i]] < 0) {

@@ -10,9 +10,9 @@ static const double SURE_FACING = 0.9; /* the centre need not be asked */
 /* A triangle on one shape: its normal, twice as long as its area, and how it lies to the sum of the shape's smooth
  * normals at its corners. */
 typedef struct pose {
-  double edges;  /* sum of the squared lengths */
-  double area2;  /* of the normal: the squared length */
-  double along;  /* normal by sum */
+  double edges; /* sum of the squared lengths */
+  double area2; /* of the normal: the squared length */
+  double along; /* normal by sum */
 } pose;
 
 static inline pose pose_of(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c) {

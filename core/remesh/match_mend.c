@@ -2,8 +2,8 @@
  * to it shears, within the triangle. In order of price: an edge is turned; a corner is moved, with as many turned edges
  * as it takes; a vertex is added, where the shape bends most along an edge or at a vertex of a shape. Nothing leaves
  * the limit, and no triangle that was fine comes out turned. Edges are turned one after another; corners without an
- * edge between them move side by side; and which of the dear ways works for a triangle is looked for side by side, to be
- * gone one after another. What could not be mended is tried again only when something around it has changed. */
+ * edge between them move side by side; and which of the dear ways works for a triangle is looked for side by side, to
+ * be gone one after another. What could not be mended is tried again only when something around it has changed. */
 #include <math.h>
 #include <string.h>
 

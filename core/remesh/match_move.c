@@ -152,20 +152,6 @@ static int try_point(const star *s, const double p[3], orb_form before, double *
   return 0;
 }
 
-/* The triangle of the star, by its number in the ring, that holds a direction within it. */
-static int holder(const star *s, const double x[3]) {
-  const double *p = orb_net_point(&s->match->net, s->v);
-  for (int i = 0; i < s->n; i++) {
-    const double *q = orb_net_point(&s->match->net, s->ring[i]);
-    const double *r = orb_net_point(&s->match->net, s->ring[(i + 1) % s->n]);
-    if (orb_orient(p, q, x) >= 0 && orb_orient(q, r, x) >= 0 && orb_orient(r, p, x) >= 0) {
-      return i;
-    }
-  }
-  ORB_ASSERT(!"what lay in a star lies in it still when its middle has moved");
-  return -1;
-}
-
 static void deal_anew(const star *s) {
   orb_match *match = s->match;
   int32_t lists[RING_MAX + 1];
@@ -176,12 +162,7 @@ static void deal_anew(const star *s) {
     match->triangle_items[s->slot[i]] = -1;
   }
   for (int i = 0; i <= s->n; i++) {
-    for (int32_t item = lists[i], next; item >= 0; item = next) {
-      int32_t slot = s->slot[holder(s, orb_match_item_point(match, item))];
-      next = match->item_next[item];
-      match->item_next[item] = match->triangle_items[slot];
-      match->triangle_items[slot] = item;
-    }
+    orb_match_deal_among(match, lists[i], s->slot, s->n);
   }
 }
 

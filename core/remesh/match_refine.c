@@ -75,9 +75,12 @@ static int can_turn(const orb_match *match, int32_t h, double limit2) {
   int32_t g = net->twin[h];
   int32_t a = net->triangles[h], b = net->triangles[g];
   int32_t c = net->triangles[orb_prev(h)], d = net->triangles[orb_prev(g)];
-  return orb_net_can_flip(net, h) && orb_match_edge2(match, c, d, limit2, NULL) <= limit2 &&
-         items_of_turn2(match, match->triangle_items[h / 3], c, d, b, a) <= limit2 &&
-         items_of_turn2(match, match->triangle_items[g / 3], c, d, b, a) <= limit2 && !turn_turns(match, a, b, c, d);
+  if (!orb_net_can_flip(net, h) || turn_turns(match, a, b, c, d)) {
+    return 0;
+  }
+  return limit2 == INFINITY || (orb_match_edge2(match, c, d, limit2, NULL) <= limit2 &&
+                                items_of_turn2(match, match->triangle_items[h / 3], c, d, b, a) <= limit2 &&
+                                items_of_turn2(match, match->triangle_items[g / 3], c, d, b, a) <= limit2);
 }
 
 int orb_match_try_turn(orb_match *match, int32_t h, double limit2) {

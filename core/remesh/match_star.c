@@ -25,8 +25,8 @@ typedef struct disc {
   int32_t triangle[DISC], inner[DISC];
   side side[MOST]; /* counter-clockwise */
   int count, n, inner_count;
-  int rough;        /* triangles are judged by their corners only, until all else is found to be fine */
-  double own[DISC]; /* how far each of its triangles is turned now; −1: not known yet */
+  int rough;                  /* triangles are judged by their corners only, until all else is found to be fine */
+  double own[DISC];           /* how far each of its triangles is turned now; −1: not known yet */
   int32_t far_end, far_shape; /* the edge to this vertex strayed too far for another point, on this shape; −1: none */
 } disc;
 
