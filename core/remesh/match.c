@@ -37,6 +37,7 @@ void orb_match_free(orb_context *ctx, orb_match *match) {
   orb_free(ctx, match->stayed);
   orb_free(ctx, match->alone);
   orb_free(ctx, match->hopeless);
+  orb_free(ctx, match->within);
   orb_free(ctx, match->item_begin);
   orb_free(ctx, match->item_next);
   orb_free(ctx, match->item_shape);
@@ -57,6 +58,7 @@ orb_status orb_match_reserve(orb_context *ctx, orb_match *match, int64_t more) {
       !orb_regrow(ctx, &match->spot, cells, sizeof(orb_spot)) || !orb_regrow(ctx, &match->fixed, n, 1) ||
       !orb_regrow(ctx, &match->stayed, n, sizeof(uint64_t)) || !orb_regrow(ctx, &match->alone, n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &match->hopeless, 4 * n, sizeof(uint64_t)) ||
+      !orb_regrow(ctx, &match->within, 6 * n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &match->vertex_items, n, sizeof(int32_t)) ||
       !orb_regrow(ctx, &match->triangle_items, 2 * n, sizeof(int32_t))) {
     return ORB_E_NO_MEMORY;
@@ -67,6 +69,7 @@ orb_status orb_match_reserve(orb_context *ctx, orb_match *match, int64_t more) {
     match->vertex_items[i] = -1;
     match->triangle_items[2 * i] = match->triangle_items[2 * i + 1] = -1;
     memset(match->hopeless + 4 * i, 0, 4 * sizeof *match->hopeless);
+    memset(match->within + 6 * i, 0, 6 * sizeof *match->within);
   }
   match->capacity = (int32_t)n;
   return ORB_OK;
@@ -354,6 +357,7 @@ static void close_up(orb_match *match, const int32_t *vertex, const int32_t *tri
       net->twin[3 * triangle[t] + k] = 3 * triangle[twin / 3] + twin % 3;
     }
     match->triangle_items[triangle[t]] = match->triangle_items[t];
+    memmove(match->within + 3 * (int64_t)triangle[t], match->within + 3 * (int64_t)t, 3 * sizeof *match->within);
     memmove(match->hopeless + 2 * (int64_t)triangle[t], match->hopeless + 2 * (int64_t)t, 2 * sizeof *match->hopeless);
   }
   for (int32_t v = vertices; v < net->vertex_count; v++) {

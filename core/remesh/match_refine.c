@@ -316,37 +316,95 @@ static orb_status give_room(orb_context *ctx, orb_match *match, int32_t h, const
   return orb_edge_queue_push(ctx, queue, net->triangles[h], net->triangles[net->twin[h]]);
 }
 
-static orb_status mend_edge(orb_context *ctx, orb_match *match, int32_t v, int32_t w, double limit2,
+/* `ahead` tells where the edge strays most; of shape −1 where that is not known yet. */
+static orb_status mend_edge(orb_context *ctx, orb_match *match, int32_t v, int32_t w, double limit2, orb_stray ahead,
                             orb_edge_queue *queue) {
   int32_t h = orb_net_edge(&match->net, v, w);
-  orb_stray worst = {0, -1, -1, 0};
-  if (h < 0 || orb_match_edge2(match, v, w, INFINITY, &worst) <= limit2 || mend_by_turn(match, h, limit2)) {
+  if (h >= 0 && ahead.shape < 0) {
+    (void)orb_match_edge2(match, v, w, INFINITY, &ahead);
+  }
+  if (h < 0 || ahead.distance2 <= limit2 || mend_by_turn(match, h, limit2)) {
     return ORB_OK;
   }
   ORB_TRY(orb_match_reserve(ctx, match, 1));
-  int32_t n = split_at(match, h, &worst);
+  int32_t n = split_at(match, h, &ahead);
   if (n < 0) {
-    return give_room(ctx, match, h, &worst, queue);
+    return give_room(ctx, match, h, &ahead, queue);
   }
   ORB_TRY(orb_edge_queue_push_star(ctx, queue, &match->net, n));
   return orb_edge_queue_push(ctx, queue, v, w); /* still there if another edge was split */
 }
 
 typedef struct stray_loop {
-  const orb_match *match;
+  orb_match *match;
   double limit2;
   unsigned char *strays; /* a half-edge */
 } stray_loop;
 
+/* A mark of an edge and the limit: found at its half-edge, it was proved to stay within. */
+static uint64_t mark_of_edge(const orb_match *match, int32_t v, int32_t w, double limit2) {
+  uint64_t mark = orb_mixed(1, &limit2, sizeof limit2);
+  mark = orb_mixed(mark, orb_net_point(&match->net, v), 3 * sizeof(double));
+  mark = orb_mixed(mark, orb_net_point(&match->net, w), 3 * sizeof(double));
+  return mark ? mark : 1;
+}
+
 static void stray_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   stray_loop *loop = arg;
-  const orb_net *net = &loop->match->net;
+  orb_match *match = loop->match;
+  const orb_net *net = &match->net;
   for (int64_t h = begin; h < end; h++) {
-    loop->strays[h] = net->triangles[h - h % 3] >= 0 && h < net->twin[h] &&
-                      orb_match_edge2(loop->match, net->triangles[h], net->triangles[net->twin[h]], loop->limit2,
-                                      NULL) > loop->limit2;
+    loop->strays[h] = 0;
+    if (net->triangles[h - h % 3] < 0 || h > net->twin[h]) {
+      continue;
+    }
+    int32_t v = net->triangles[h], w = net->triangles[net->twin[h]];
+    uint64_t mark = mark_of_edge(match, v, w, loop->limit2);
+    if (match->within[h] != mark) {
+      loop->strays[h] = orb_match_edge2(match, v, w, loop->limit2, NULL) > loop->limit2;
+      match->within[h] = loop->strays[h] ? 0 : mark;
+    }
   }
+}
+
+enum { AHEAD = 1024 };
+
+/* Where edges of the queue stray, found side by side before they come up: their ends stay where they are. */
+typedef struct ahead_loop {
+  const orb_match *match;
+  const int32_t (*ends)[2];
+  orb_stray *worst;
+} ahead_loop;
+
+static void ahead_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  ahead_loop *loop = arg;
+  for (int64_t i = begin; i < end; i++) {
+    int32_t v = loop->ends[i][0], w = loop->ends[i][1];
+    loop->worst[i] = (orb_stray){0, -1, -1, 0};
+    if (orb_net_edge(&loop->match->net, v, w) >= 0) {
+      (void)orb_match_edge2(loop->match, v, w, INFINITY, &loop->worst[i]);
+    }
+  }
+}
+
+/* First in, first out: an old long edge is split before those that its neighbours' splits have made, which would else
+ * creep towards it in ever thinner triangles. */
+static orb_status mend_edges(orb_context *ctx, orb_match *match, double limit2, int64_t limit, orb_edge_queue *queue) {
+  orb_stray *worst = ORB_NEW(ctx, orb_stray, AHEAD);
+  orb_status status = worst ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int64_t i = 0; i < queue->count && i < limit && status == ORB_OK;) {
+    int64_t count = queue->count - i < AHEAD ? queue->count - i : AHEAD;
+    ahead_loop loop = {match, (const int32_t(*)[2])queue->ends + i, worst};
+    orb_parallel_for(ctx, count, 32, ahead_range, &loop);
+    status = orb_context_check(ctx);
+    for (int64_t k = 0; k < count && i < limit && status == ORB_OK; k++, i++) {
+      status = mend_edge(ctx, match, queue->ends[i][0], queue->ends[i][1], limit2, worst[k], queue);
+    }
+  }
+  orb_free(ctx, worst);
+  return status;
 }
 
 /* The item of triangle t that is farthest from it, if that is beyond the limit; else −1. */
@@ -399,13 +457,8 @@ orb_status orb_match_refine(orb_context *ctx, orb_match *match, double limit2, i
     *strays = queue.count;
   }
   int64_t limit = 2 * half_edges + 20000;
-  /* First in, first out: an old long edge is split before those that its neighbours' splits have made, which would
-   * else creep towards it in ever thinner triangles. */
-  for (int64_t i = 0; i < queue.count && i < limit && status == ORB_OK; i++) {
-    status = mend_edge(ctx, match, queue.ends[i][0], queue.ends[i][1], limit2, &queue);
-    if (status == ORB_OK && (i & 1023) == 0) {
-      status = orb_context_check(ctx);
-    }
+  if (status == ORB_OK) {
+    status = mend_edges(ctx, match, limit2, limit, &queue);
   }
   match->crept |= queue.count > limit;
   orb_edge_queue_free(ctx, &queue);
