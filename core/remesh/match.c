@@ -144,10 +144,14 @@ static void settle(orb_match *match, int32_t v, int32_t s, int32_t hint) {
   (void)orb_normalize(normal);
 }
 
+void orb_match_place_on(orb_match *match, int32_t v, int32_t s) {
+  settle(match, v, s, match->spot[(int64_t)v * match->shape_count + s].h / 3);
+}
+
 void orb_match_place(orb_match *match, int32_t v, const double p[3]) {
   memcpy(match->net.points + 3 * (int64_t)v, p, 3 * sizeof(double));
   for (int32_t s = 0; s < match->shape_count; s++) {
-    settle(match, v, s, match->spot[(int64_t)v * match->shape_count + s].h / 3);
+    orb_match_place_on(match, v, s);
   }
 }
 

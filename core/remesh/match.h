@@ -114,6 +114,12 @@ typedef struct orb_form {
 } orb_form;
 static const orb_form ORB_FORM_BEST = {1, 1, 0, 0};
 orb_form orb_match_form(const orb_match *match, int32_t a, int32_t b, int32_t c);
+/* The same shape by shape: the squares of the least quality and (with its sign) facing so far, 1 to begin with. */
+typedef struct orb_form_squares {
+  double quality, facing;
+} orb_form_squares;
+void orb_match_form_on(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c, orb_form_squares *least);
+orb_form orb_form_of(orb_form_squares least);
 /* Of two sets of triangles together. */
 static inline orb_form orb_form_join(orb_form f, orb_form g) {
   return (orb_form){f.quality < g.quality ? f.quality : g.quality, f.facing < g.facing ? f.facing : g.facing,
@@ -181,6 +187,8 @@ void orb_match_mark_turned(orb_context *ctx, const orb_match *match, unsigned ch
 ORB_MUST_CHECK orb_status orb_match_resolve(orb_context *ctx, orb_match *match, double limit2);
 /* Puts vertex v at p: point, spots, positions and normals; triangles and items are the caller's care. */
 void orb_match_place(orb_match *match, int32_t v, const double p[3]);
+/* The same for one shape of a vertex whose point is set. */
+void orb_match_place_on(orb_match *match, int32_t v, int32_t s);
 
 /* Copies what is known of a vertex, its point and places, over that of another (or of the one after the last). */
 void orb_match_copy_vertex(orb_match *match, int32_t to, int32_t from);

@@ -32,19 +32,27 @@ static inline int faces_less(pose at, double facing) {
   return at.along <= 0 || at.along * at.along < 9 * facing * facing * at.area2;
 }
 
-orb_form orb_match_form(const orb_match *match, int32_t a, int32_t b, int32_t c) {
-  double quality2 = 1, facing2 = 1; /* squares, that of the facing with its sign */
-  for (int32_t s = 0; s < match->shape_count; s++) {
-    pose at = pose_of(match, s, a, b, c);
-    double q = at.edges > 0 ? 12 * at.area2 / (at.edges * at.edges) : 0;
-    double f = at.area2 > 0 ? at.along * fabs(at.along) / (9 * at.area2) : 0;
-    quality2 = q < quality2 ? q : quality2;
-    facing2 = f < facing2 ? f : facing2;
-  }
-  orb_form worst = {sqrt(quality2), facing2 < 0 ? -sqrt(-facing2) : sqrt(facing2), 0, 0};
+void orb_match_form_on(const orb_match *match, int32_t s, int32_t a, int32_t b, int32_t c, orb_form_squares *least) {
+  pose at = pose_of(match, s, a, b, c);
+  double q = at.edges > 0 ? 12 * at.area2 / (at.edges * at.edges) : 0;
+  double f = at.area2 > 0 ? at.along * fabs(at.along) / (9 * at.area2) : 0;
+  least->quality = q < least->quality ? q : least->quality;
+  least->facing = f < least->facing ? f : least->facing;
+}
+
+orb_form orb_form_of(orb_form_squares least) {
+  orb_form worst = {sqrt(least.quality), least.facing < 0 ? -sqrt(-least.facing) : sqrt(least.facing), 0, 0};
   worst.slivers = worst.quality < FINE_QUALITY;
   worst.turned = worst.facing < FINE_FACING;
   return worst;
+}
+
+orb_form orb_match_form(const orb_match *match, int32_t a, int32_t b, int32_t c) {
+  orb_form_squares least = {1, 1};
+  for (int32_t s = 0; s < match->shape_count; s++) {
+    orb_match_form_on(match, s, a, b, c, &least);
+  }
+  return orb_form_of(least);
 }
 
 /* Against the shape's flat and smooth normals where the centre of the triangle on the sphere lies on it. */

@@ -37,14 +37,40 @@ static int star_of(orb_match *match, int32_t v, double limit2, star *out) {
   return 1;
 }
 
-/* Adds up what the forms of the triangles cost; stops once that is above `most`. */
-static double form_cost(const star *s, double most, orb_form *all) {
+/* Adds up what the forms of the triangles cost. */
+static double form_cost(const star *s, orb_form *all) {
   double cost = 0;
   *all = ORB_FORM_BEST;
-  for (int i = 0; i < s->n && cost <= most; i++) {
+  for (int i = 0; i < s->n; i++) {
     orb_form form = orb_match_form(s->match, s->v, s->ring[i], s->ring[(i + 1) % s->n]);
     cost += orb_form_cost(form);
     *all = orb_form_join(*all, form);
+  }
+  return cost;
+}
+
+/* Places the vertex at p, shape by shape, and adds up the same there: with each shape the forms can only get worse, and
+ * once they cost `most`, or are not allowed in place of `before`, the rest need not be known: infinity. */
+static double place_and_cost(const star *s, const double p[3], double most, orb_form before) {
+  orb_form_squares least[RING_MAX];
+  double cost = 0;
+  memcpy(s->match->net.points + 3 * (int64_t)s->v, p, 3 * sizeof(double));
+  for (int i = 0; i < s->n; i++) {
+    least[i] = (orb_form_squares){1, 1};
+  }
+  for (int32_t k = 0; k < s->match->shape_count; k++) {
+    orb_form all = ORB_FORM_BEST;
+    orb_match_place_on(s->match, s->v, k);
+    cost = 0;
+    for (int i = 0; i < s->n && cost < most; i++) {
+      orb_match_form_on(s->match, k, s->v, s->ring[i], s->ring[(i + 1) % s->n], &least[i]);
+      orb_form form = orb_form_of(least[i]);
+      cost += orb_form_cost(form);
+      all = orb_form_join(all, form);
+    }
+    if (!(cost < most) || !orb_form_allows(before, all)) {
+      return INFINITY;
+    }
   }
   return cost;
 }
@@ -131,14 +157,12 @@ static orb_tally tally_at(const star *s, stand *old) {
 /* Moves v to p if that costs clearly less than *cost, and sets that; whether it did. The items stay in their lists. */
 static int try_point(const star *s, const double p[3], orb_form before, double *cost) {
   stand old;
-  orb_form after;
   if (!positive_at(s, p)) {
     return 0;
   }
   stand_copy(s->match, s->v, &old, 0);
-  orb_match_place(s->match, s->v, p);
-  double now = form_cost(s, *cost, &after);
-  if (now < *cost && orb_form_allows(before, after)) {
+  double now = place_and_cost(s, p, *cost, before);
+  if (now < *cost) {
     now += edges_cost(s, *cost - now);
     if (now < *cost * (1 - LEAST_GAIN) && items_allow(s)) {
       orb_tally tally = orb_match_tally_fan(s->match, s->v, s->ring, s->n, 1);
@@ -200,7 +224,7 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
     }
   }
   orb_form before;
-  double cost = form_cost(&s, INFINITY, &before);
+  double cost = form_cost(&s, &before);
   cost += edges_cost(&s, INFINITY);
   int moved = 0;
   for (int i = 0; i <= s.n; i++) {

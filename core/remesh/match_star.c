@@ -15,8 +15,8 @@ enum { MOST = ORB_STAR_MOST, DISC = 48, GROWTH = 12 };
 /* An edge of the disc's outline, and how far the triangle of the star over it is turned in space. */
 typedef struct side {
   int32_t h;
-  int judged;
-  double extent; /* negative: there can be no such triangle */
+  int possible, judged; /* it is known that the triangle can be; how far it is turned, too */
+  double extent;
 } side;
 
 typedef struct disc {
@@ -25,6 +25,7 @@ typedef struct disc {
   int32_t triangle[DISC], inner[DISC];
   side side[MOST]; /* counter-clockwise */
   int count, n, inner_count;
+  int placed;                 /* p is placed on the shapes; that is not done before it is asked for */
   int rough;                  /* triangles are judged by their corners only, until all else is found to be fine */
   double own[DISC];           /* how far each of its triangles is turned now; −1: not known yet */
   int32_t far_end, far_shape; /* the edge to this vertex strayed too far for another point, on this shape; −1: none */
@@ -69,7 +70,7 @@ static int outline(disc *d) {
       return 0;
     }
     ring[d->n] = net->triangles[h];
-    d->side[d->n++] = (side){h, 0, 0};
+    d->side[d->n++] = (side){.h = h};
     h = orb_next(h);
     while (holds(d, net->twin[h] / 3)) {
       h = orb_next(net->twin[h]);
@@ -98,7 +99,7 @@ static void replace_sides(disc *d, int i, int removed, const int32_t *put, int c
   side turned[MOST + 1];
   int n = 0;
   for (int k = 0; k < count; k++) {
-    turned[n++] = (side){put[k], 0, 0};
+    turned[n++] = (side){.h = put[k]};
   }
   for (int k = removed; k < d->n; k++) {
     turned[n++] = d->side[(i + k) % d->n];
@@ -140,18 +141,25 @@ static int grow_over(disc *d, int i) {
   return d->n >= 3;
 }
 
-/* How far the triangle of the star at a side is turned in space; −1 where there can be none. */
+/* Whether there can be a triangle of the star at a side. */
+static int is_possible(const disc *d, side *over) {
+  const orb_net *net = &d->match->net;
+  if (!over->possible) {
+    int32_t a = net->triangles[over->h], b = net->triangles[orb_next(over->h)];
+    over->possible = orb_orient(orb_net_point(net, d->p), orb_net_point(net, a), orb_net_point(net, b)) > 0 &&
+                     orb_net_sound(net, d->p, a, b);
+  }
+  return over->possible;
+}
+
+/* How far it is turned in space. */
 static double judge(const disc *d, side *over) {
   const orb_net *net = &d->match->net;
   if (!over->judged) {
     int32_t a = net->triangles[over->h], b = net->triangles[orb_next(over->h)];
     over->judged = 1;
-    over->extent = -1;
-    if (orb_orient(orb_net_point(net, d->p), orb_net_point(net, a), orb_net_point(net, b)) > 0 &&
-        orb_net_sound(net, d->p, a, b)) {
-      over->extent =
-          d->rough ? orb_match_turned_by_corners(d->match, d->p, a, b) : orb_match_turned_extent(d->match, d->p, a, b);
-    }
+    over->extent =
+        d->rough ? orb_match_turned_by_corners(d->match, d->p, a, b) : orb_match_turned_extent(d->match, d->p, a, b);
   }
   return over->extent;
 }
@@ -165,22 +173,30 @@ static int has_fixed(const disc *d) {
   return 0;
 }
 
-/* The next side to grow over, one whose triangle of the star is impossible (*possible is 0 then), else turned; −1:
- * none. */
-static int beyond(disc *d, orb_tally *star, int *possible) {
-  int next = -1;
-  *star = (orb_tally){0, 0};
-  *possible = 1;
+/* The first side to grow over since its triangle of the star is impossible; −1: none. */
+static int impossible_side(disc *d) {
   for (int i = 0; i < d->n; i++) {
-    double extent = judge(d, &d->side[i]);
-    if (extent < 0) {
-      *possible = 0;
+    if (!is_possible(d, &d->side[i])) {
       return i;
     }
-    next = extent > 0 && next < 0 ? i : next;
+  }
+  return -1;
+}
+
+/* The first side whose triangle of the star is turned; −1: none. */
+static int turned_side(disc *d, orb_tally *star) {
+  int first = -1;
+  *star = (orb_tally){0, 0};
+  for (int32_t s = 0; s < d->match->shape_count && !d->placed; s++) {
+    orb_match_place_on(d->match, d->p, s);
+  }
+  d->placed = 1;
+  for (int i = 0; i < d->n; i++) {
+    double extent = judge(d, &d->side[i]);
+    first = extent > 0 && first < 0 ? i : first;
     orb_tally_add(star, extent);
   }
-  return next;
+  return first;
 }
 
 static int list_allows(const disc *d, int32_t list, double limit2) {
@@ -301,14 +317,16 @@ static int is_better_at_centres(disc *d, orb_star_goal goal) {
 /* Finds a star of p, from the outline of what is given on; 0: there is none. */
 static int plan(disc *d, const double p[3], const orb_star_wish *wish) {
   int most = d->count + GROWTH < DISC ? d->count + GROWTH : DISC;
-  orb_match_place(d->match, d->p, p);
+  memcpy(d->match->net.points + 3 * (int64_t)d->p, p, 3 * sizeof(double));
   for (;;) {
     orb_tally star;
-    int possible;
-    int next = beyond(d, &star, &possible);
-    if (possible && d->inner_count >= wish->least_inner && is_better(d, star, wish->goal) &&
-        is_within(d, wish->limit2) && (!d->rough || is_better_at_centres(d, wish->goal))) {
-      return 1;
+    int next = impossible_side(d);
+    if (next < 0) {
+      next = turned_side(d, &star);
+      if (d->inner_count >= wish->least_inner && is_better(d, star, wish->goal) && is_within(d, wish->limit2) &&
+          (!d->rough || is_better_at_centres(d, wish->goal))) {
+        return 1;
+      }
     }
     if (next < 0 || d->count == most) {
       return 0;
