@@ -36,6 +36,7 @@ void orb_match_free(orb_context *ctx, orb_match *match) {
   orb_free(ctx, match->fixed);
   orb_free(ctx, match->stayed);
   orb_free(ctx, match->alone);
+  orb_free(ctx, match->stuck);
   orb_free(ctx, match->hopeless);
   orb_free(ctx, match->within);
   orb_free(ctx, match->item_begin);
@@ -57,6 +58,7 @@ orb_status orb_match_reserve(orb_context *ctx, orb_match *match, int64_t more) {
       !orb_regrow(ctx, &match->normal, 3 * cells, sizeof(double)) ||
       !orb_regrow(ctx, &match->spot, cells, sizeof(orb_spot)) || !orb_regrow(ctx, &match->fixed, n, 1) ||
       !orb_regrow(ctx, &match->stayed, n, sizeof(uint64_t)) || !orb_regrow(ctx, &match->alone, n, sizeof(uint64_t)) ||
+      !orb_regrow(ctx, &match->stuck, n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &match->hopeless, 4 * n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &match->within, 6 * n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &match->vertex_items, n, sizeof(int32_t)) ||
@@ -65,7 +67,7 @@ orb_status orb_match_reserve(orb_context *ctx, orb_match *match, int64_t more) {
   }
   for (size_t i = (size_t)match->capacity; i < n; i++) {
     match->fixed[i] = 0;
-    match->stayed[i] = match->alone[i] = 0;
+    match->stayed[i] = match->alone[i] = match->stuck[i] = 0;
     match->vertex_items[i] = -1;
     match->triangle_items[2 * i] = match->triangle_items[2 * i + 1] = -1;
     memset(match->hopeless + 4 * i, 0, 4 * sizeof *match->hopeless);
@@ -348,6 +350,7 @@ static void close_up(orb_match *match, const int32_t *vertex, const int32_t *tri
     match->fixed[vertex[v]] = match->fixed[v];
     match->stayed[vertex[v]] = match->stayed[v];
     match->alone[vertex[v]] = match->alone[v];
+    match->stuck[vertex[v]] = match->stuck[v];
     match->vertex_items[vertex[v]] = match->vertex_items[v];
   }
   for (int32_t t = 0; t < net->triangle_count; t++) {
@@ -366,7 +369,7 @@ static void close_up(orb_match *match, const int32_t *vertex, const int32_t *tri
   }
   for (int32_t v = vertices; v < net->vertex_count; v++) {
     match->fixed[v] = 0;
-    match->stayed[v] = match->alone[v] = 0;
+    match->stayed[v] = match->alone[v] = match->stuck[v] = 0;
     match->vertex_items[v] = -1;
   }
   for (int32_t t = triangles; t < net->triangle_count; t++) {

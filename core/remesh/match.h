@@ -29,6 +29,7 @@ typedef struct orb_match {
   unsigned char *fixed;          /* a net vertex: a landmark, not to be removed */
   uint64_t *stayed;              /* a net vertex: mark of the star in which no move was found, 0: none */
   uint64_t *alone;               /* a net vertex: mark of its surroundings in which it found none to merge with */
+  uint64_t *stuck;               /* a net vertex: mark of its surroundings in which it could not be taken away */
   uint64_t *hopeless;            /* a triangle, two: marks of its surroundings in which it could not be mended */
   uint64_t *within;              /* a half-edge: mark of the edge that was proved to stay within the limit */
   /* Items: the vertices of all shapes, shape after shape. Each is in the list of a net vertex or of a triangle. */

@@ -281,23 +281,23 @@ static int next_target(const double *cost, int n) {
   return best;
 }
 
-/* Finds a way for p->u to go. Nothing is changed: any thread. */
-static void find_way(const collapser *c, plan *p) {
+/* A mark of what decides whether there is a way for u to go; its last bit says that all ways were tried. */
+static uint64_t mark_of(const collapser *c, int32_t u) {
+  uint64_t mark = orb_mixed(4 + (uint64_t)c->strict, &c->limit2, sizeof c->limit2);
+  uint64_t sum = orb_match_surroundings(c->match, u);
+  return (orb_mixed(mark, &sum, sizeof sum) & ~UINT64_C(1)) | (uint64_t)c->thorough;
+}
+
+/* Tries u's best target, then the next ones. */
+static void find_target(const collapser *c, plan *p) {
   int32_t turned[RING_MAX];
   double cost[RING_MAX];
-  int n = p->n = ring_of(&c->match->net, p->u, p->ring);
-  p->at = p->heir = -1;
-  p->fills = 0;
-  for (int i = 0; i < n; i++) {
-    cost[i] = move_cost(c, p->u, p->ring[i]);
+  int n = p->n, at = 0;
+  while (at < n && p->ring[at] != c->target[p->u]) {
+    at++;
   }
-  for (int attempt = 0; attempt < TRIES; attempt++) {
-    int at = next_target(cost, n);
-    if (at < 0) {
-      break;
-    }
+  for (int attempt = 0; attempt < TRIES && at >= 0 && at < n; attempt++) {
     p->heir = attempt == 0 ? p->ring[at] : p->heir;
-    cost[at] = INFINITY;
     for (int i = 0; i < n; i++) {
       turned[i] = p->ring[(at + i) % n];
     }
@@ -305,9 +305,32 @@ static void find_way(const collapser *c, plan *p) {
       p->at = at;
       return;
     }
+    for (int i = 0; i < n && attempt == 0; i++) {
+      cost[i] = move_cost(c, p->u, p->ring[i]);
+    }
+    cost[at] = INFINITY;
+    at = next_target(cost, n);
   }
-  p->fills = c->thorough && n > 2 && n <= ORB_FILL_MOST &&
-             orb_match_plan_fill(c->match, p->u, p->ring, n, c->limit2, c->strict, p->triangles);
+}
+
+/* Finds a way for p->u to go. Nothing is changed that others see: any thread. */
+static void find_way(const collapser *c, plan *p) {
+  orb_match *match = c->match;
+  uint64_t mark = mark_of(c, p->u), known = match->stuck[p->u];
+  p->n = ring_of(&match->net, p->u, p->ring);
+  p->at = p->heir = -1;
+  p->fills = 0;
+  if (p->n < 0 || ((known | 1) == (mark | 1) && known >= mark)) {
+    return;
+  }
+  find_target(c, p);
+  if (p->at < 0) {
+    p->fills = c->thorough && p->n > 2 && p->n <= ORB_FILL_MOST &&
+               orb_match_plan_fill(match, p->u, p->ring, p->n, c->limit2, c->strict, p->triangles);
+  }
+  if (p->at < 0 && !p->fills) {
+    match->stuck[p->u] = mark;
+  }
 }
 
 static void find_range(void *arg, int64_t begin, int64_t end, int thread) {

@@ -356,6 +356,7 @@ static int plan_first(disc *d, orb_match *match, int32_t vertex, const int32_t *
     }
     start.far_end = d->far_end;
     start.far_shape = d->far_shape;
+    memcpy(start.own, d->own, (size_t)start.count * sizeof *start.own);
   }
   return 0;
 }
