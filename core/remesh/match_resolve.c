@@ -10,7 +10,7 @@
 #include "remesh/match.h"
 
 enum { SPLITS_EACH = 64 };
-static const double CLOSE = 0.1; /* of the limit: what is split no more */
+static const double CLOSE = 0.25; /* of the limit: what is split no more */
 
 typedef struct region {
   orb_context *ctx;
