@@ -103,7 +103,7 @@ static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_ma
     inputs += job->shapes[s].mesh.triangle_count;
   }
   for (int i = 0; i < STRAIGHTENINGS; i++) {
-    int64_t turned = orb_match_turned(match), live = orb_match_live(match);
+    int64_t turned = orb_match_turned(ctx, match), live = orb_match_live(match);
     if (turned * FEW <= live) {
       break;
     }

@@ -38,6 +38,7 @@ void orb_match_free(orb_context *ctx, orb_match *match) {
   orb_free(ctx, match->alone);
   orb_free(ctx, match->stuck);
   orb_free(ctx, match->hopeless);
+  orb_free(ctx, match->straight);
   orb_free(ctx, match->within);
   orb_free(ctx, match->item_begin);
   orb_free(ctx, match->item_next);
@@ -60,6 +61,7 @@ orb_status orb_match_reserve(orb_context *ctx, orb_match *match, int64_t more) {
       !orb_regrow(ctx, &match->stayed, n, sizeof(uint64_t)) || !orb_regrow(ctx, &match->alone, n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &match->stuck, n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &match->hopeless, 4 * n, sizeof(uint64_t)) ||
+      !orb_regrow(ctx, &match->straight, 2 * n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &match->within, 6 * n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &match->vertex_items, n, sizeof(int32_t)) ||
       !orb_regrow(ctx, &match->triangle_items, 2 * n, sizeof(int32_t))) {
@@ -71,6 +73,7 @@ orb_status orb_match_reserve(orb_context *ctx, orb_match *match, int64_t more) {
     match->vertex_items[i] = -1;
     match->triangle_items[2 * i] = match->triangle_items[2 * i + 1] = -1;
     memset(match->hopeless + 4 * i, 0, 4 * sizeof *match->hopeless);
+    match->straight[2 * i] = match->straight[2 * i + 1] = 0;
     memset(match->within + 6 * i, 0, 6 * sizeof *match->within);
   }
   match->capacity = (int32_t)n;
@@ -364,6 +367,7 @@ static void close_up(orb_match *match, const int32_t *vertex, const int32_t *tri
       net->twin[3 * triangle[t] + k] = 3 * triangle[twin / 3] + twin % 3;
     }
     match->triangle_items[triangle[t]] = match->triangle_items[t];
+    match->straight[triangle[t]] = match->straight[t];
     memmove(match->within + 3 * (int64_t)triangle[t], match->within + 3 * (int64_t)t, 3 * sizeof *match->within);
     memmove(match->hopeless + 2 * (int64_t)triangle[t], match->hopeless + 2 * (int64_t)t, 2 * sizeof *match->hopeless);
   }

@@ -31,6 +31,7 @@ typedef struct orb_match {
   uint64_t *alone;               /* a net vertex: mark of its surroundings in which it found none to merge with */
   uint64_t *stuck;               /* a net vertex: mark of its surroundings in which it could not be taken away */
   uint64_t *hopeless;            /* a triangle, two: marks of its surroundings in which it could not be mended */
+  uint64_t *straight;            /* a triangle: mark of its corners where it was found not to be turned in space */
   uint64_t *within;              /* a half-edge: mark of the edge that was proved to stay within the limit */
   /* Items: the vertices of all shapes, shape after shape. Each is in the list of a net vertex or of a triangle. */
   int32_t *item_begin; /* shape_count + 1 */
@@ -173,6 +174,16 @@ static inline uint64_t orb_mixed(uint64_t mark, const void *part, size_t size) {
 /* A mark of a vertex's neighbours and theirs, where they are, as a sum with no order. */
 uint64_t orb_match_surroundings(const orb_match *match, int32_t v);
 
+/* A mark of a point. */
+static inline uint64_t orb_point_mark(const double p[3]) {
+  uint64_t word[3];
+  memcpy(word, p, sizeof word);
+  uint64_t mark = word[0] * UINT64_C(0x9E3779B97F4A7C15) + word[1] * UINT64_C(0xC2B2AE3D27D4EB4F) +
+                  word[2] * UINT64_C(0x165667B19E3779F9);
+  mark = (mark ^ mark >> 32) * UINT64_C(0xD6E8FEB86659FD93);
+  return mark ^ mark >> 29;
+}
+
 /* Moves v on the sphere if that makes the triangles around it better, or its edges stray less, within the limit;
  * whether it did. Then all vertices in turn, or those that `which` (may be NULL) says. */
 int orb_match_try_move(orb_match *match, int32_t v, double limit2);
@@ -180,10 +191,10 @@ ORB_MUST_CHECK orb_status orb_match_move_all(orb_context *ctx, orb_match *match,
                                              const unsigned char *which);
 /* Mends triangles that are turned in space, within the limit, as far as it can: see orb_match_turned(). */
 ORB_MUST_CHECK orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2);
-/* How many triangles are turned in space. */
-int64_t orb_match_turned(const orb_match *match);
-/* Which ones: 1 or 0 for each, live or not; parallel. */
-void orb_match_mark_turned(orb_context *ctx, const orb_match *match, unsigned char *turned);
+/* How many triangles are turned in space; parallel. Remembers those that are not. */
+int64_t orb_match_turned(orb_context *ctx, orb_match *match);
+/* Which ones: 1 or 0 for each, live or not; likewise. */
+void orb_match_mark_turned(orb_context *ctx, orb_match *match, unsigned char *turned);
 /* Refines them and those around them as far as the overlay of the shapes; edges outside may stray. */
 ORB_MUST_CHECK orb_status orb_match_resolve(orb_context *ctx, orb_match *match, double limit2);
 /* Puts vertex v at p: point, spots, positions and normals; triangles and items are the caller's care. */

@@ -316,11 +316,11 @@ static void find_target(const collapser *c, plan *p) {
 /* Finds a way for p->u to go. Nothing is changed that others see: any thread. */
 static void find_way(const collapser *c, plan *p) {
   orb_match *match = c->match;
-  uint64_t mark = mark_of(c, p->u), known = match->stuck[p->u];
+  uint64_t known = match->stuck[p->u], mark = known ? mark_of(c, p->u) : 0;
   p->n = ring_of(&match->net, p->u, p->ring);
   p->at = p->heir = -1;
   p->fills = 0;
-  if (p->n < 0 || ((known | 1) == (mark | 1) && known >= mark)) {
+  if (p->n < 0 || (known && (known | 1) == (mark | 1) && known >= mark)) {
     return;
   }
   find_target(c, p);
@@ -329,7 +329,7 @@ static void find_way(const collapser *c, plan *p) {
                orb_match_plan_fill(match, p->u, p->ring, p->n, c->limit2, c->strict, p->triangles);
   }
   if (p->at < 0 && !p->fills) {
-    match->stuck[p->u] = mark;
+    match->stuck[p->u] = known ? mark : mark_of(c, p->u);
   }
 }
 

@@ -1,5 +1,6 @@
 /* How the net's triangles lie in space. */
 #include <math.h>
+#include <stdatomic.h>
 
 #include "numeric/vec3.h"
 #include "remesh/match.h"
@@ -120,30 +121,44 @@ int orb_form_allows(orb_form before, orb_form after) {
          (after.slivers < before.slivers || after.quality >= fmin(before.quality, LEAST_QUALITY));
 }
 
-int64_t orb_match_turned(const orb_match *match) {
-  int64_t count = 0;
-  for (int32_t t = 0; t < match->net.triangle_count; t++) {
-    const int32_t *c = match->net.triangles + 3 * (int64_t)t;
-    count += c[0] >= 0 && orb_match_is_turned(match, c[0], c[1], c[2]);
-  }
-  return count;
-}
-
 typedef struct turned_loop {
-  const orb_match *match;
-  unsigned char *turned;
+  orb_match *match;
+  unsigned char *turned; /* may be NULL */
+  atomic_llong count;
 } turned_loop;
+
+/* A mark of all that the question depends on. */
+static uint64_t mark_of(const orb_net *net, const int32_t *corner) {
+  uint64_t mark = orb_point_mark(orb_net_point(net, corner[0])) + 3 * orb_point_mark(orb_net_point(net, corner[1])) +
+                  5 * orb_point_mark(orb_net_point(net, corner[2]));
+  return mark ? mark : 1;
+}
 
 static void turned_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   turned_loop *loop = arg;
+  orb_match *match = loop->match;
+  int64_t count = 0;
   for (int64_t t = begin; t < end; t++) {
-    const int32_t *c = loop->match->net.triangles + 3 * t;
-    loop->turned[t] = c[0] >= 0 && orb_match_is_turned(loop->match, c[0], c[1], c[2]);
+    const int32_t *c = match->net.triangles + 3 * t;
+    uint64_t mark = c[0] >= 0 ? mark_of(&match->net, c) : 0;
+    int turned = mark != match->straight[t] && c[0] >= 0 && orb_match_is_turned(match, c[0], c[1], c[2]);
+    match->straight[t] = turned ? 0 : mark;
+    count += turned;
+    if (loop->turned) {
+      loop->turned[t] = (unsigned char)turned;
+    }
   }
+  atomic_fetch_add(&loop->count, count);
 }
 
-void orb_match_mark_turned(orb_context *ctx, const orb_match *match, unsigned char *turned) {
-  turned_loop loop = {match, turned};
+void orb_match_mark_turned(orb_context *ctx, orb_match *match, unsigned char *turned) {
+  turned_loop loop = {.match = match, .turned = turned};
   orb_parallel_for(ctx, match->net.triangle_count, 256, turned_range, &loop);
+}
+
+int64_t orb_match_turned(orb_context *ctx, orb_match *match) {
+  turned_loop loop = {.match = match};
+  orb_parallel_for(ctx, match->net.triangle_count, 256, turned_range, &loop);
+  return atomic_load(&loop.count);
 }

@@ -68,9 +68,9 @@ uint64_t orb_match_surroundings(const orb_match *match, int32_t v) {
   int32_t first = net->out[v], h = first;
   do {
     int32_t w = net->triangles[orb_next(h)], begin = net->out[w], e = begin;
-    sum += orb_mixed(2, orb_net_point(net, w), 3 * sizeof(double));
+    sum += orb_point_mark(orb_net_point(net, w)) * 3;
     do {
-      sum += orb_mixed(3, orb_net_point(net, net->triangles[orb_next(e)]), 3 * sizeof(double));
+      sum += orb_point_mark(orb_net_point(net, net->triangles[orb_next(e)]));
       e = net->twin[orb_prev(e)];
     } while (e != begin);
     h = net->twin[orb_prev(h)];

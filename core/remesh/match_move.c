@@ -245,14 +245,14 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
   return moved;
 }
 
-/* A colour for each live vertex, so that neighbours differ: vertices of one colour have no triangle in common, and
- * can move at the same time. 64: none is left, it stays. */
-static void colour(const orb_net *net, unsigned char *colours) {
+/* A colour for each of the vertices that `which` (may be NULL: all live ones) says, so that neighbours differ: vertices
+ * of one colour have no triangle in common, and can move at the same time. 64: none is left, it stays. */
+static void colour(const orb_net *net, const unsigned char *which, unsigned char *colours) {
   memset(colours, 255, (size_t)net->vertex_count);
   for (int32_t v = 0; v < net->vertex_count; v++) {
     uint64_t taken = 0;
     int32_t first = net->out[v], h = first;
-    if (first < 0) {
+    if (first < 0 || (which && !which[v])) {
       continue;
     }
     do {
@@ -288,19 +288,20 @@ orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2,
   int32_t *vertices = ORB_NEW(ctx, int32_t, n);
   orb_status status = colours && vertices ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
-    colour(&match->net, colours);
+    colour(&match->net, which, colours);
   }
   for (int k = 0; status == ORB_OK && k < COLOURS; k++) {
     int64_t count = 0;
     for (int32_t v = 0; v < n; v++) {
-      if (colours[v] == k && (!which || which[v])) {
+      if (colours[v] == k) {
         vertices[count++] = v;
       }
     }
-    move_loop loop = {match, limit2, vertices};
-    if (count > 0) {
-      orb_parallel_for(ctx, count, MOVE_GRAIN, move_range, &loop);
+    if (count == 0) {
+      break;
     }
+    move_loop loop = {match, limit2, vertices};
+    orb_parallel_for(ctx, count, MOVE_GRAIN, move_range, &loop);
     status = orb_context_check(ctx);
   }
   orb_free(ctx, colours);

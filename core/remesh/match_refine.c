@@ -99,7 +99,7 @@ typedef struct turn_loop {
   orb_form *form;         /* a triangle */
   unsigned char *may;     /* a half-edge: it is to be turned, as things are; 0 where neither triangle is to be seen */
   unsigned char *stale;   /* a triangle: what is known of its edges is not true any more */
-  unsigned char *changed; /* a triangle: in this pass */
+  unsigned char *changed; /* a triangle: in this pass, or one beside it */
 } turn_loop;
 
 static void form_range(void *arg, int64_t begin, int64_t end, int thread) {
@@ -124,24 +124,32 @@ static void may_range(void *arg, int64_t begin, int64_t end, int thread) {
   turn_loop *loop = arg;
   const orb_net *net = &loop->match->net;
   for (int64_t h = begin; h < end; h++) {
-    if (net->triangles[h - h % 3] < 0) {
+    if (net->triangles[h - h % 3] < 0 || h > net->twin[h]) {
       loop->may[h] = 0;
-    } else if (h < net->twin[h] && (loop->stale[h / 3] || loop->stale[net->twin[h] / 3])) {
+    } else if (loop->stale[h / 3] || loop->stale[net->twin[h] / 3]) {
       loop->may[h] = (unsigned char)is_to_turn(loop, (int32_t)h);
     }
   }
 }
 
-/* Whether edge h may be turned now: as was found, if its triangles are as they were; but for the edge that would be
- * new, which may have come to be elsewhere. */
+/* Whether edge h may be turned now: as was found, if nothing has changed; but for the edge that would be new, which may
+ * have come to be elsewhere. */
 static int may_now(const turn_loop *loop, int32_t h) {
-  const orb_match *match = loop->match;
-  const orb_net *net = &match->net;
-  int32_t g = net->twin[h], t = h / 3, u = g / 3;
-  if (!loop->changed[t] && !loop->changed[u]) {
-    return loop->may[h] && !orb_net_adjacent(net, net->triangles[orb_prev(h)], net->triangles[orb_prev(g)]);
+  const orb_net *net = &loop->match->net;
+  if (loop->changed[h / 3]) {
+    return h < net->twin[h] && is_to_turn(loop, h);
   }
-  return is_to_turn(loop, h);
+  return loop->may[h] && !orb_net_adjacent(net, net->triangles[orb_prev(h)], net->triangles[orb_prev(net->twin[h])]);
+}
+
+/* A triangle has changed, which those beside it are to know. */
+static void note_change(turn_loop *loop, int32_t t) {
+  const orb_net *net = &loop->match->net;
+  loop->form[t] = form_of(loop->match, t);
+  loop->changed[t] = 1;
+  for (int k = 0; k < 3; k++) {
+    loop->changed[net->twin[3 * t + k] / 3] = 1;
+  }
 }
 
 /* One edge after another; asks again only where a turn has changed one of the two triangles. */
@@ -154,13 +162,10 @@ static orb_status turn_pass(orb_context *ctx, orb_match *match, turn_loop *loop,
   orb_parallel_for(ctx, half_edges, 1024, may_range, loop);
   ORB_TRY(orb_context_check(ctx));
   for (int32_t h = 0; h < half_edges; h++) {
-    if (net->triangles[h - h % 3] >= 0 && h < net->twin[h] && may_now(loop, h)) {
-      int32_t both[2] = {h / 3, net->twin[h] / 3};
+    if (may_now(loop, h)) {
       turn(match, h);
-      for (int i = 0; i < 2; i++) {
-        loop->changed[both[i]] = 1;
-        loop->form[both[i]] = form_of(match, both[i]);
-      }
+      note_change(loop, h / 3);
+      note_change(loop, net->twin[h] / 3);
       ++*turned;
     }
     if ((h & 4095) == 0) {

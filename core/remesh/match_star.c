@@ -183,9 +183,20 @@ static int impossible_side(disc *d) {
   return -1;
 }
 
-/* The first side whose triangle of the star is turned; −1: none. */
-static int turned_side(disc *d, orb_tally *star) {
-  int first = -1;
+static orb_tally turned_in(disc *d) {
+  orb_tally sum = {0, 0};
+  for (int i = 0; i < d->count; i++) {
+    const int32_t *c = d->match->net.triangles + 3 * (int64_t)d->triangle[i];
+    d->own[i] = d->own[i] >= 0 ? d->own[i] : orb_match_turned_extent(d->match, c[0], c[1], c[2]);
+    orb_tally_add(&sum, d->own[i]);
+  }
+  return sum;
+}
+
+/* The first side whose triangle of the star is turned; −1: none. Once there are too many for the goal the rest is not
+ * asked. */
+static int turned_side(disc *d, orb_star_goal goal, orb_tally *star) {
+  int first = -1, most = -1;
   *star = (orb_tally){0, 0};
   for (int32_t s = 0; s < d->match->shape_count && !d->placed; s++) {
     orb_match_place_on(d->match, d->p, s);
@@ -193,8 +204,14 @@ static int turned_side(disc *d, orb_tally *star) {
   d->placed = 1;
   for (int i = 0; i < d->n; i++) {
     double extent = judge(d, &d->side[i]);
-    first = extent > 0 && first < 0 ? i : first;
     orb_tally_add(star, extent);
+    if (extent > 0 && first < 0) {
+      first = i;
+      most = turned_in(d).turned - (goal == ORB_STAR_FEWER);
+    }
+    if (first >= 0 && star->turned > most) {
+      break;
+    }
   }
   return first;
 }
@@ -279,16 +296,6 @@ static void commit(orb_match *match, const disc *d) {
   }
 }
 
-static orb_tally turned_in(disc *d) {
-  orb_tally sum = {0, 0};
-  for (int i = 0; i < d->count; i++) {
-    const int32_t *c = d->match->net.triangles + 3 * (int64_t)d->triangle[i];
-    d->own[i] = d->own[i] >= 0 ? d->own[i] : orb_match_turned_extent(d->match, c[0], c[1], c[2]);
-    orb_tally_add(&sum, d->own[i]);
-  }
-  return sum;
-}
-
 static int is_better(disc *d, orb_tally star, orb_star_goal goal) {
   if (goal == ORB_STAR_NOT_WORSE && star.turned == 0) {
     return 1;
@@ -322,7 +329,7 @@ static int plan(disc *d, const double p[3], const orb_star_wish *wish) {
     orb_tally star;
     int next = impossible_side(d);
     if (next < 0) {
-      next = turned_side(d, &star);
+      next = turned_side(d, wish->goal, &star);
       if (d->inner_count >= wish->least_inner && is_better(d, star, wish->goal) && is_within(d, wish->limit2) &&
           (!d->rough || is_better_at_centres(d, wish->goal))) {
         return 1;

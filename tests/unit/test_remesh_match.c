@@ -129,10 +129,10 @@ static void mending_leaves_no_stray(void **state) {
     set_up(&b, seed, 2);
     refine(&b);
     assert_within(&b);
-    int64_t before = orb_match_turned(&b.match);
+    int64_t before = orb_match_turned(b.ctx, &b.match);
     assert_true(before > 0);
     assert_int_equal(orb_match_mend(b.ctx, &b.match, LIMIT * LIMIT), ORB_OK);
-    assert_true(orb_match_turned(&b.match) < before);
+    assert_true(orb_match_turned(b.ctx, &b.match) < before);
     assert_within(&b);
     assert_sound(&b);
     tear_down(&b);
@@ -145,7 +145,7 @@ static void reducing_keeps_the_limit(void **state) {
   bench b;
   set_up(&b, 3, 1);
   refine(&b);
-  int64_t turned = orb_match_turned(&b.match), live = orb_match_live(&b.match);
+  int64_t turned = orb_match_turned(b.ctx, &b.match), live = orb_match_live(&b.match);
   for (int i = 0; i < 2; i++) {
     assert_int_equal(orb_match_collapse(b.ctx, &b.match, LIMIT * LIMIT, 0, 1, i), ORB_OK);
     assert_within(&b);
@@ -160,8 +160,8 @@ static void reducing_keeps_the_limit(void **state) {
     assert_int_equal(orb_match_move_all(b.ctx, &b.match, LIMIT * LIMIT, NULL), ORB_OK);
     assert_within(&b);
     assert_sound(&b);
-    assert_true(orb_match_turned(&b.match) <= turned);
-    turned = orb_match_turned(&b.match);
+    assert_true(orb_match_turned(b.ctx, &b.match) <= turned);
+    turned = orb_match_turned(b.ctx, &b.match);
   }
   tear_down(&b);
 }
@@ -187,7 +187,7 @@ static void resolving_can_be_held(void **state) {
   refine(&b);
   assert_int_equal(orb_match_collapse(b.ctx, &b.match, LIMIT * LIMIT, 0, 1, 0), ORB_OK);
   int64_t live = orb_match_live(&b.match);
-  assert_true(orb_match_turned(&b.match) > 0);
+  assert_true(orb_match_turned(b.ctx, &b.match) > 0);
   assert_int_equal(orb_match_resolve(b.ctx, &b.match, LIMIT * LIMIT), ORB_OK);
   assert_true(orb_match_live(&b.match) > live);
   assert_sound(&b);
