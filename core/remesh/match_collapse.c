@@ -20,8 +20,14 @@
 #include "remesh/match.h"
 #include "remesh/quadric.h"
 
-enum { RING_MAX = 48, VALENCE_MAX = 14, TRIES = 4 };
+enum { RING_MAX = 48, VALENCE_MAX = 14, TRIES = 4, WAYS = 4 };
 enum { BATCH_MOST = 256, BATCH_PART = 32, BATCH_GRAIN = 4 }; /* at once; one of how many; a thread's share */
+
+/* The cost of a vertex's best target. */
+typedef struct heap_entry {
+  double cost;
+  int32_t v;
+} heap_entry;
 
 /* What was found for a vertex: a way to go, or none. */
 typedef struct plan {
@@ -41,43 +47,46 @@ typedef struct collapser {
   orb_quadric *quadric; /* net vertex major, one a shape */
   double *cost;         /* a vertex: of its best target */
   int32_t *target;      /* a vertex: that */
-  int32_t *heap, *slot; /* slot −1: not in the heap */
+  heap_entry *heap;     /* every one before its WAYS successors */
+  int32_t *slot;        /* a vertex: its place in the heap, −1: none */
   int32_t heap_count;
   int64_t live;
   plan *batch;
-  int32_t *later;           /* vertices taken from the heap that have a neighbour in common with one of the batch */
+  int32_t *later, waiting;  /* taken from the heap, with a neighbour in common with one of the batch: for the next */
   uint32_t *taken, batches; /* a vertex: the last batch that it or a neighbour was in */
 } collapser;
 
-static void swap_heap(collapser *c, int32_t i, int32_t j) {
-  int32_t v = c->heap[i];
-  c->heap[i] = c->heap[j];
-  c->heap[j] = v;
-  c->slot[c->heap[i]] = i;
-  c->slot[c->heap[j]] = j;
+static int is_less(heap_entry a, heap_entry b) {
+  return a.cost < b.cost || (a.cost == b.cost && a.v < b.v);
 }
 
-static int before(const collapser *c, int32_t i, int32_t j) {
-  int32_t v = c->heap[i], w = c->heap[j];
-  return c->cost[v] < c->cost[w] || (c->cost[v] == c->cost[w] && v < w);
+static void heap_set(collapser *c, int32_t i, heap_entry entry) {
+  c->heap[i] = entry;
+  c->slot[entry.v] = i;
 }
 
-static void sift(collapser *c, int32_t i) {
-  while (i > 0 && before(c, i, (i - 1) / 2)) {
-    swap_heap(c, i, (i - 1) / 2);
-    i = (i - 1) / 2;
+/* Puts an entry where place i is free, or higher or lower. */
+static void sift(collapser *c, int32_t i, heap_entry entry) {
+  int32_t begin = i;
+  for (int32_t above; i > 0 && is_less(entry, c->heap[above = (i - 1) / WAYS]); i = above) {
+    heap_set(c, i, c->heap[above]);
   }
-  for (;;) {
-    int32_t least = i, left = 2 * i + 1;
-    for (int32_t k = left; k <= left + 1 && k < c->heap_count; k++) {
-      least = before(c, k, least) ? k : least;
+  while (i >= begin) {
+    int32_t first = WAYS * i + 1, least = first;
+    if (first >= c->heap_count) {
+      break;
     }
-    if (least == i) {
-      return;
+    int32_t last = first + WAYS < c->heap_count ? first + WAYS : c->heap_count;
+    for (int32_t k = first + 1; k < last; k++) {
+      least = is_less(c->heap[k], c->heap[least]) ? k : least;
     }
-    swap_heap(c, i, least);
+    if (!is_less(c->heap[least], entry)) {
+      break;
+    }
+    heap_set(c, i, c->heap[least]);
     i = least;
   }
+  heap_set(c, i, entry);
 }
 
 static void heap_remove(collapser *c, int32_t v) {
@@ -85,24 +94,23 @@ static void heap_remove(collapser *c, int32_t v) {
   if (i < 0) {
     return;
   }
-  swap_heap(c, i, --c->heap_count);
   c->slot[v] = -1;
+  heap_entry last = c->heap[--c->heap_count];
   if (i < c->heap_count) {
-    sift(c, i);
+    sift(c, i, last);
   }
 }
 
 static void heap_put(collapser *c, int32_t v, double cost) {
+  if (c->slot[v] >= 0 && c->cost[v] == cost) {
+    return;
+  }
   c->cost[v] = cost;
   if (!(cost < INFINITY)) {
     heap_remove(c, v);
     return;
   }
-  if (c->slot[v] < 0) {
-    c->slot[v] = c->heap_count;
-    c->heap[c->heap_count++] = v;
-  }
-  sift(c, c->slot[v]);
+  sift(c, c->slot[v] < 0 ? c->heap_count++ : c->slot[v], (heap_entry){cost, v});
 }
 
 /* The neighbours of u in counter-clockwise order; −1 when there are too many. */
@@ -317,7 +325,6 @@ static void find_target(const collapser *c, plan *p) {
 static void find_way(const collapser *c, plan *p) {
   orb_match *match = c->match;
   uint64_t known = match->stuck[p->u], mark = known ? mark_of(c, p->u) : 0;
-  p->n = ring_of(&match->net, p->u, p->ring);
   p->at = p->heir = -1;
   p->fills = 0;
   if (p->n < 0 || (known && (known | 1) == (mark | 1) && known >= mark)) {
@@ -367,40 +374,57 @@ static void go_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* Whether u and its neighbours are free of the present batch; they are its own then. */
-static int take(collapser *c, int32_t u) {
-  const orb_net *net = &c->match->net;
-  int32_t first = net->out[u], h = first;
-  int is_free = c->taken[u] != c->batches;
-  do {
-    is_free = is_free && c->taken[net->triangles[orb_next(h)]] != c->batches;
-    h = net->twin[orb_prev(h)];
-  } while (h != first);
-  if (!is_free) {
+/* Whether u and its neighbours are free of the present batch; they are its own then, and listed. */
+static int take(collapser *c, int32_t u, plan *p) {
+  p->u = u;
+  p->n = ring_of(&c->match->net, u, p->ring);
+  for (int i = 0; i < p->n; i++) {
+    if (c->taken[p->ring[i]] == c->batches) {
+      return 0;
+    }
+  }
+  if (c->taken[u] == c->batches) {
     return 0;
   }
   c->taken[u] = c->batches;
-  do {
-    c->taken[net->triangles[orb_next(h)]] = c->batches;
-    h = net->twin[orb_prev(h)];
-  } while (h != first);
+  for (int i = 0; i < p->n; i++) {
+    c->taken[p->ring[i]] = c->batches;
+  }
   return 1;
+}
+
+/* Takes the next batch: those that had to wait the last time, then from the heap. How many there are. */
+static int take_batch(collapser *c) {
+  int32_t all = c->heap_count + c->waiting;
+  int most = all / BATCH_PART < BATCH_MOST ? all / BATCH_PART + 1 : BATCH_MOST, count = 0, waited = c->waiting;
+  c->batches++;
+  c->waiting = 0;
+  for (int i = 0; i < waited; i++) {
+    int32_t u = c->later[i];
+    if (c->slot[u] >= 0) {
+      continue; /* it has got another cost */
+    }
+    if (count < most && take(c, u, &c->batch[count])) {
+      count++;
+    } else {
+      c->later[c->waiting++] = u;
+    }
+  }
+  while (c->heap_count > 0 && count < most && c->waiting < BATCH_MOST) {
+    int32_t u = c->heap[0].v;
+    heap_remove(c, u);
+    if (take(c, u, &c->batch[count])) {
+      count++;
+    } else {
+      c->later[c->waiting++] = u;
+    }
+  }
+  return count;
 }
 
 /* Tries the next of the heap, as many at once as it can well spare. */
 static void try_batch(collapser *c, int64_t target) {
-  int most = c->heap_count / BATCH_PART < BATCH_MOST ? c->heap_count / BATCH_PART + 1 : BATCH_MOST;
-  int count = 0, waiting = 0;
-  c->batches++;
-  while (c->heap_count > 0 && count < most && waiting < most) {
-    int32_t u = c->heap[0];
-    heap_remove(c, u);
-    if (take(c, u)) {
-      c->batch[count++].u = u;
-    } else {
-      c->later[waiting++] = u;
-    }
-  }
+  int count = take_batch(c);
   orb_parallel_for(c->ctx, count, BATCH_GRAIN, find_range, c);
   for (int i = 0; i < count; i++) {
     plan *p = &c->batch[i];
@@ -415,11 +439,6 @@ static void try_batch(collapser *c, int64_t target) {
     const plan *p = &c->batch[i];
     for (int k = 0; k < p->n && (p->at >= 0 || p->fills); k++) {
       heap_put(c, p->ring[k], p->cost[k]);
-    }
-  }
-  for (int i = 0; i < waiting; i++) {
-    if (c->slot[c->later[i]] < 0) {
-      heap_put(c, c->later[i], c->cost[c->later[i]]);
     }
   }
 }
@@ -473,7 +492,7 @@ orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2,
   c.quadric = ORB_NEW(ctx, orb_quadric, (int64_t)vertices * match->shape_count);
   c.cost = ORB_NEW(ctx, double, vertices);
   c.target = ORB_NEW(ctx, int32_t, vertices);
-  c.heap = ORB_NEW(ctx, int32_t, vertices);
+  c.heap = ORB_NEW(ctx, heap_entry, vertices);
   c.slot = ORB_NEW(ctx, int32_t, vertices);
   c.batch = ORB_NEW(ctx, plan, BATCH_MOST);
   c.later = ORB_NEW(ctx, int32_t, BATCH_MOST);
@@ -492,7 +511,7 @@ orb_status orb_match_collapse(orb_context *ctx, orb_match *match, double limit2,
       }
     }
   }
-  while (status == ORB_OK && c.heap_count > 0 && c.live > target && c.live > 4) {
+  while (status == ORB_OK && c.heap_count + c.waiting > 0 && c.live > target && c.live > 4) {
     try_batch(&c, target);
     status = orb_context_check(ctx);
   }
