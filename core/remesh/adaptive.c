@@ -16,7 +16,7 @@
 enum { HOLDS = 32 };
 /* Of how many triangles one may be turned after the first round; one of how many is many; the most work for a start
  * from the overlay. */
-enum { FEW = 3000, MANY = 300, OVERLAY_MOST = 120000, STRAIGHTENINGS = 3 };
+enum { FEW = 3000, MANY = 100, OVERLAY_MOST = 120000, STRAIGHTENINGS = 3 };
 
 /* Later rounds gain a few per cent each. Large meshes, or many shapes, do without: their triangles are small against
  * the tolerance, and time counts. */
