@@ -30,7 +30,7 @@ static orb_status first_round(orb_context *ctx, orb_match *match, double limit2,
   ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, 0));
   ORB_TRY(orb_match_compact(ctx, match));
   ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
-  return strict ? orb_match_mend(ctx, match, limit2, 1) : ORB_OK;
+  return strict ? orb_match_mend(ctx, match, limit2) : ORB_OK;
 }
 
 /* The rounds after it, until they gain little. */
@@ -130,7 +130,7 @@ static orb_status settle(orb_context *ctx, const orb_remesh_job *job, orb_match 
   orb_progress(ctx, "remesh", 0.4);
   ORB_TRY(later_rounds(ctx, match, limit2, 0, 1, rounds));
   orb_progress(ctx, "remesh", 0.8);
-  ORB_TRY(orb_match_mend(ctx, match, limit2, 0));
+  ORB_TRY(orb_match_mend(ctx, match, limit2));
   return first_round(ctx, match, limit2, 0, 1);
 }
 

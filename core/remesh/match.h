@@ -189,9 +189,8 @@ static inline uint64_t orb_point_mark(const double p[3]) {
 int orb_match_try_move(orb_match *match, int32_t v, double limit2);
 ORB_MUST_CHECK orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2,
                                              const unsigned char *which);
-/* Mends triangles that are turned in space, within the limit, as far as it can: see orb_match_turned(). quick: without
- * making smaller what cannot be made fewer. */
-ORB_MUST_CHECK orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2, int quick);
+/* Mends triangles that are turned in space, within the limit, as far as it can: see orb_match_turned(). */
+ORB_MUST_CHECK orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2);
 /* How many triangles are turned in space; parallel. Remembers those that are not. */
 int64_t orb_match_turned(orb_context *ctx, orb_match *match);
 /* Which ones: 1 or 0 for each, live or not; likewise. */

@@ -205,11 +205,11 @@ static orb_status pass(mender *m, unsigned char *marked, int64_t *seen, int64_t 
   return ORB_OK;
 }
 
-orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2, int quick) {
+orb_status orb_match_mend(orb_context *ctx, orb_match *match, double limit2) {
   static const orb_star_goal goal[] = {ORB_STAR_FEWER, ORB_STAR_FEWER, ORB_STAR_SMALLER, ORB_STAR_FEWER};
   int64_t seen = 1, left = 0, before = -1;
   orb_status status = ORB_OK;
-  for (size_t i = 0; i < (quick ? 2 : sizeof goal / sizeof *goal) && seen > 0 && status == ORB_OK; i++) {
+  for (size_t i = 0; i < sizeof goal / sizeof *goal && seen > 0 && status == ORB_OK; i++) {
     if (i > 0 && goal[i] == goal[i - 1] && before == left) {
       continue; /* nothing has changed */
     }

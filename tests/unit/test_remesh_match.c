@@ -131,7 +131,7 @@ static void mending_leaves_no_stray(void **state) {
     assert_within(&b);
     int64_t before = orb_match_turned(b.ctx, &b.match);
     assert_true(before > 0);
-    assert_int_equal(orb_match_mend(b.ctx, &b.match, LIMIT * LIMIT, 0), ORB_OK);
+    assert_int_equal(orb_match_mend(b.ctx, &b.match, LIMIT * LIMIT), ORB_OK);
     assert_true(orb_match_turned(b.ctx, &b.match) < before);
     assert_within(&b);
     assert_sound(&b);
