@@ -2,12 +2,14 @@
 
 #include <ctype.h>
 #include <errno.h>
+#include <stdarg.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "log.h"
 #include "orbmorph/status.h"
 
 typedef struct entry {
@@ -69,6 +71,23 @@ static const entry table[] = {
 };
 enum { ENTRIES = sizeof table / sizeof table[0] };
 
+/* A daemon that runs says what is wrong in its log. */
+static int runs;
+
+static void complain(const char *format, ...) ORB_PRINTF(1, 2);
+static void complain(const char *format, ...) {
+  char text[1024];
+  va_list args;
+  va_start(args, format);
+  vsnprintf(text, sizeof text, format, args);
+  va_end(args);
+  if (runs) {
+    log_error("SIGHUP: %s", text);
+  } else {
+    fprintf(stderr, "orbmorphd: %s\n", text);
+  }
+}
+
 static const entry *find(const char *name, size_t length) {
   for (size_t i = 0; i < ENTRIES; i++) {
     if (strlen(table[i].name) == length && strncmp(table[i].name, name, length) == 0) {
@@ -103,7 +122,7 @@ static int set(config *out, const entry *e, const char *value, const char *from)
   char *at = (char *)out + e->offset;
   if (e->size) {
     if (strlen(value) >= e->size) {
-      fprintf(stderr, "orbmorphd: %s: %s is too long\n", from, e->name);
+      complain("%s: %s is too long", from, e->name);
       return 0;
     }
     strcpy(at, value);
@@ -112,8 +131,8 @@ static int set(config *out, const entry *e, const char *value, const char *from)
   int64_t number;
   int is_default = strcmp(value, e->standard) == 0; /* 0 may mean "by the machine" */
   if (!config_number(value, &number) || (!is_default && (number < e->least || number > e->most))) {
-    fprintf(stderr, "orbmorphd: %s: %s must be a number from %lld to %lld, not \"%s\"\n", from, e->name,
-            (long long)e->least, (long long)e->most, value);
+    complain("%s: %s must be a number from %lld to %lld, not \"%s\"", from, e->name, (long long)e->least,
+             (long long)e->most, value);
     return 0;
   }
   memcpy(at, &number, sizeof number);
@@ -140,7 +159,7 @@ static int read_file(config *out, const char *path) {
   char line[4096];
   int number = 0, fine = 1;
   if (!file) {
-    fprintf(stderr, "orbmorphd: the config file %s cannot be read: %s\n", path, strerror(errno));
+    complain("the config file %s cannot be read: %s", path, strerror(errno));
     return 0;
   }
   while (fine && fgets(line, sizeof line, file)) {
@@ -160,17 +179,17 @@ static int read_file(config *out, const char *path) {
     }
     const entry *e = equals ? find(name, strlen(name)) : NULL;
     if (!equals) {
-      fprintf(stderr, "orbmorphd: %s: a line is NAME = VALUE, not \"%s\"\n", from, name);
+      complain("%s: a line is NAME = VALUE, not \"%s\"", from, name);
       fine = 0;
     } else if (!e) {
-      fprintf(stderr, "orbmorphd: %s: \"%s\" is none of the names that --help lists\n", from, name);
+      complain("%s: \"%s\" is none of the names that --help lists", from, name);
       fine = 0;
     } else {
       fine = set(out, e, trim(equals + 1), from);
     }
   }
   if (fine && ferror(file)) {
-    fprintf(stderr, "orbmorphd: the config file %s cannot be read: %s\n", path, strerror(errno));
+    complain("the config file %s cannot be read: %s", path, strerror(errno));
     fine = 0;
   }
   fclose(file);
@@ -247,7 +266,7 @@ static config_action read_flags(config *out, int argc, char **argv, int only_fil
     const entry *e = length > 2 && strncmp(flag, "--", 2) == 0 ? find(flag + 2, length - 2) : NULL;
     const char *value = equals ? equals + 1 : i + 1 < argc ? argv[++i] : NULL;
     if (!e || !value) {
-      fprintf(stderr, e ? "orbmorphd: %s needs a value\n" : "orbmorphd: %s is not an option; see --help\n", flag);
+      complain(e ? "%s needs a value" : "%s is not an option; see --help", flag);
       return CONFIG_BAD;
     }
     if ((!only_file || strcmp(e->name, "config") == 0) && !set(out, e, value, flag)) {
@@ -258,16 +277,15 @@ static config_action read_flags(config *out, int argc, char **argv, int only_fil
 }
 
 static int is_one_of(const char *name, const char *value, const char *const words[]) {
+  char must[80] = "";
   for (int i = 0; words[i]; i++) {
     if (strcmp(value, words[i]) == 0) {
       return 1;
     }
+    size_t n = strlen(must);
+    snprintf(must + n, sizeof must - n, "%s%s", i == 0 ? "" : words[i + 1] ? ", " : " or ", words[i]);
   }
-  fprintf(stderr, "orbmorphd: %s must be ", name);
-  for (int i = 0; words[i]; i++) {
-    fprintf(stderr, "%s%s", i == 0 ? "" : words[i + 1] ? ", " : " or ", words[i]);
-  }
-  fprintf(stderr, ", not \"%s\"\n", value);
+  complain("%s must be %s, not \"%s\"", name, must, value);
   return 0;
 }
 
@@ -278,8 +296,7 @@ static int is_address(const char *text) {
                  ? text[5] != 0
                  : digits > 0 && digits <= 5 && colon[1 + digits] == 0 && strtol(colon + 1, NULL, 10) <= 65535;
   if (!fine) {
-    fprintf(stderr,
-            "orbmorphd: listen must be ADDR:PORT, [V6]:PORT (a port from 0 to 65535) or unix:PATH, not \"%s\"\n", text);
+    complain("listen must be ADDR:PORT, [V6]:PORT (a port from 0 to 65535) or unix:PATH, not \"%s\"", text);
   }
   return fine;
 }
@@ -295,8 +312,7 @@ static int are_origins(const char *list) {
     size_t scheme = host ? (size_t)(host - at) : length;
     int fine = scheme > 0 && scheme + 3 < length && !memchr(host + 3, '/', length - scheme - 3);
     if (!fine && (length != 4 || strncmp(at, "null", 4) != 0)) {
-      fprintf(stderr, "orbmorphd: cors must be * alone, or origins such as https://app.example.org, not \"%.*s\"\n",
-              (int)length, at);
+      complain("cors must be * alone, or origins such as https://app.example.org, not \"%.*s\"", (int)length, at);
       return 0;
     }
     at += length;
@@ -308,7 +324,7 @@ static int are_origins(const char *list) {
 static int is_readable(const char *name, const char *path) {
   int fine = !*path || access(path, R_OK) == 0;
   if (!fine) {
-    fprintf(stderr, "orbmorphd: %s: %s cannot be read: %s\n", name, path, strerror(errno));
+    complain("%s: %s cannot be read: %s", name, path, strerror(errno));
   }
   return fine;
 }
@@ -318,7 +334,7 @@ static int is_mode(const char *text) {
   long mode = strtol(text, &end, 8);
   int fine = end != text && !*end && mode >= 0 && mode <= 0777;
   if (!fine) {
-    fprintf(stderr, "orbmorphd: socket-mode must be an octal number from 0 to 777, not \"%s\"\n", text);
+    complain("socket-mode must be an octal number from 0 to 777, not \"%s\"", text);
   }
   return fine;
 }
@@ -335,7 +351,7 @@ static int consistent(config *out) {
     out->job_memory = (int64_t)sysconf(_SC_PHYS_PAGES) / 2 * sysconf(_SC_PAGESIZE);
   }
   if ((out->tls_certificate[0] == 0) != (out->tls_key[0] == 0)) {
-    fprintf(stderr, "orbmorphd: tls-certificate and tls-key belong together\n");
+    complain("tls-certificate and tls-key belong together");
     return 0;
   }
   return is_address(out->listen) && is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) &&
@@ -376,6 +392,7 @@ static int can_change(const char *name) {
 
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken)) {
   static config fresh; /* large; one thread alone handles signals */
+  runs = 1;
   if (config_read(&fresh, argc, argv) != CONFIG_RUN) {
     return 0;
   }

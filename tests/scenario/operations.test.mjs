@@ -73,6 +73,7 @@ test('SIGHUP reads the configuration again', async (t) => {
   assert.equal(reply.status, 201, 'the limit of a body needs a restart');
   await logged(d, (l) => l.level === 'debug' && l.request === reply.headers.get('x-request-id'));
   await hup('log-level = warn\nnonsense = 1\n');
+  await logged(d, (l) => l.level === 'error' && /^SIGHUP: config file, line 2: "nonsense" is none of the names/.test(l.message));
   await logged(d, (l) => /is not valid and stays as it was/.test(l.message));
   assertProblem(await d.get('/v1/nothing'), 404, 'not-found');
   await logged(d, (l) => l.level === 'debug');
