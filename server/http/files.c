@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "http/http.h"
+#include "log.h"
 #include "metrics.h"
 #include "worker/spheres.h"
 
@@ -124,13 +125,33 @@ static resource_kind kind_of(const request *r) {
                                                   : RESOURCE_SUPERMESH;
 }
 
+/* Places and spheres may be missing from supermeshes of older engines; the rest is there as long as the row is. */
+static int is_lost(const request *r) {
+  return r->status == 404 && r->route->id != ROUTE_SUPERMESH_PLACES && r->route->id != ROUTE_SUPERMESH_SPHERE;
+}
+
+/* The file was not there: deleted a moment ago, or lost from the store. */
+static void lost_away(request *r) {
+  resource row = {0};
+  if (catalogue_get(r->srv->cat, kind_of(r), r->id, &row) == STORE_OK) {
+    log_error("the file of %s %s is lost: --check-data finds what else is", r->route->path, r->id);
+    reply_refuse(r, "internal", "The file is lost from the server's store. DELETE this, and send or ask for it again.");
+  } else {
+    reply_store(r, STORE_NOT_FOUND);
+  }
+  resource_free(&row);
+}
+
 static void file_away(request *r) {
   store_result result;
   const cached *entry = find_description(r->srv, kind_of(r), r->id, access_view(r), &result);
-  if (entry) {
-    file_of(r, entry);
-  } else {
+  if (!entry) {
     reply_store(r, result);
+    return;
+  }
+  file_of(r, entry);
+  if (is_lost(r)) {
+    lost_away(r);
   }
 }
 
@@ -145,5 +166,5 @@ enum MHD_Result handle_file(request *r) {
   metrics_cache(1);
   note_use(r->srv, entry);
   file_of(r, entry);
-  return MHD_YES;
+  return is_lost(r) ? request_go_away(r, r->srv->io, lost_away) : MHD_YES;
 }

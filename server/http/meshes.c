@@ -5,11 +5,13 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "api/json.h"
 #include "api/mesh_codec.h"
 #include "faults.h"
 #include "http/http.h"
+#include "log.h"
 #include "store/owners.h"
 
 enum { LARGE_UPLOAD = 16 << 20, LOOK_BYTES = 1 << 20 };
@@ -164,6 +166,22 @@ static void store_mesh(request *r, const upload_query *query, const unsigned cha
   }
 }
 
+/* The bytes of a mesh that is known may be lost or cut off all the same, by a disk or a hand; here they are again. */
+static void put_back(request *r, const char *id) {
+  int fd;
+  uint64_t size = 0;
+  store_result found = objects_read(r->srv->store, OBJECT_MESH, id, &fd, &size);
+  if (found == STORE_OK) {
+    close(fd);
+  }
+  if (found == STORE_NOT_FOUND || (found == STORE_OK && size != (uint64_t)r->received)) {
+    objects_hold(r->srv->store);
+    found = objects_publish(r->srv->store, &r->temp, OBJECT_MESH, id);
+    objects_let_go(r->srv->store);
+    log_warn("the bytes of mesh %s were lost or cut off, and %s", id, found == STORE_OK ? "are back" : "still are");
+  }
+}
+
 static void upload_away(request *r) {
   upload_query query;
   orb_problem problem = {0};
@@ -183,6 +201,7 @@ static void upload_away(request *r) {
   store_result result;
   const cached *known = find_description(r->srv, RESOURCE_MESH, id, access_tenant(r), &result);
   if (known) {
+    put_back(r, id);
     reply_cached(r, 200, known);
   } else {
     if (access_has_room(r, r->received, &problem)) {

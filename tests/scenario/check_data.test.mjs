@@ -1,10 +1,38 @@
-// --check-data finds every kind of damage that a data folder can have, and says what is to be done.
+// Damage to a data folder: what --check-data finds and says, and what the service does with it.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { copyFileSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import test from 'node:test';
-import { binaries, daemon, samples } from './support/daemon.mjs';
+import { assertProblem, binaries, daemon, samples } from './support/daemon.mjs';
+
+test('a file that is lost is told as a fault, and who sends the mesh again puts it back', async (t) => {
+  const d = await daemon(t);
+  const file = path.join(samples, 'dog.obj'), mesh = await d.mesh(file);
+  const embedding = await d.made('/v1/embeddings', { mesh: mesh.id });
+  const object = (kind, id) => path.join(d.data, 'objects', kind, id.slice(0, 2), id);
+  const lost = async (url) => {
+    const reply = await d.get(url);
+    assertProblem(reply, 500, 'internal');
+    assert.match(reply.json.detail, /lost .* DELETE this/);
+  };
+  for (const cut of [false, true]) {
+    rmSync(object('mesh', mesh.id));
+    await lost(`${mesh.url}/file`);
+    if (cut) writeFileSync(object('mesh', mesh.id), 'v 0 0 0\n');
+    assert.equal((await d.uploadFile(file)).status, 200);
+    assert.deepEqual((await d.get(`${mesh.url}/file`)).bytes, readFileSync(file));
+  }
+  rmSync(object('sphere', embedding.id));
+  await lost(embedding.sphere);
+  await d.stop();
+  await d.start(); // nothing is in memory
+  await lost(embedding.sphere);
+  assert.equal((await d.delete(embedding.url)).status, 204);
+  assertProblem(await d.get(embedding.sphere), 404, 'not-found');
+  await d.made('/v1/embeddings', { mesh: mesh.id });
+  assert.equal((await d.get(embedding.sphere)).status, 200);
+});
 
 test('damage to any object, and to any kind of row, is found', async (t) => {
   const d = await daemon(t);
