@@ -207,7 +207,7 @@ static orb_status run_start(cm_run *c, cm_start start) {
   ORB_GO(status, orb_refiner_create(ctx, c->hierarchy, &options, &r), done);
   r->settings.crowded = INFINITY;
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
-  for (int32_t want = start == CM_DRAWN ? DRAWN_LEVEL : FIRST_LEVEL; flips;) {
+  for (int32_t want = start == CM_SPATIAL ? FIRST_LEVEL : DRAWN_LEVEL; flips;) {
     ORB_GO(status, orb_refiner_advance(ctx, r, want < c->vertex_count ? want : c->vertex_count), done);
     for (int32_t v = 0; v < c->vertex_count; v++) {
       r->pinned[v] = c->keep[to_mesh[v]];
@@ -486,6 +486,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
               .moving = moving,
               .both = both,
               .landmark_count = landmark_count,
+              .twisted_energy = INFINITY,
               .effort = effort_of(preset)};
   c.passes = preset == ORB_PRESET_QUALITY ? 6 : 3;
   c.rough = preset != ORB_PRESET_QUALITY;

@@ -8,8 +8,8 @@
  * the other: those that cannot be turned do not keep the others. Steps without any flip were tried: half of the
  * vertices get stuck on the way, and the twist stays.
  *
- * What comes of it is kept if its energy is less, if less is twisted, and if more of the area is left halfway of a
- * linear morph: the energy of a twist that is spread over a long limb is small, so it alone does not tell.
+ * What comes of it is kept if its energy is less and if more of the area is left halfway of a linear morph: the energy
+ * of a twist that is spread over a long limb is small, so it alone does not tell.
  */
 #include <math.h>
 #include <string.h>
@@ -54,54 +54,54 @@ static orb_status untangle(cm_run *c, cm_level *l, int32_t *flips) {
   return *flips == 0 ? cm_relocate(c, l) : ORB_OK;
 }
 
-static orb_status descend(cm_run *c, cm_level *l) {
-  int count = c->effort.level_sweeps;
-  double last = INFINITY;
-  for (int i = 0; i < DESCENTS && cm_level_energy(l) < (1 - GAIN) * last; i++) {
-    last = cm_level_energy(l);
-    ORB_TRY(cm_sweeps(c, l, cm_hard(), count));
-    ORB_TRY(cm_loosen(c, l, count / 2, count / 2));
-  }
-  return cm_sweeps(c, l, cm_hard(), c->effort.final_sweeps);
-}
-
-static double sum_of(const cm_twists *t) {
-  double sum = 0;
-  for (int32_t i = 0; i < t->count; i++) {
-    sum += t->limb[i].most;
-  }
-  return sum;
-}
-
 static orb_status find_twists(cm_run *c, const double *points, cm_twists *out) {
   const orb_mesh *mesh = &c->moving->mesh;
   cm_image map = {c->vertex_count, mesh->triangle_count, mesh->triangles, c->x, points};
   return cm_twists_find(c->ctx, &c->b, &map, c->pairs.fixed, c->pairs.count, out);
 }
 
-/* Takes the level for the best map if it is better. */
-static orb_status keep_better(cm_run *c, const orb_surface *s, const cm_level *l, const cm_twists *twists) {
-  double energy = cm_level_energy(l), *points;
-  size_t n = 3 * (size_t)c->vertex_count;
+/* Whether clearly more of the area is left halfway with the level than with the best map. points: what the level is, in
+ * the mesh's order. */
+static orb_status keeps_more(const unwind *u, const orb_surface *s, double *points, int *more) {
   cm_twists left;
-  if (!(energy < c->best_energy) || cm_level_flips(l) > 0) {
-    return ORB_OK;
+  for (int32_t v = 0; v < u->l->count; v++) {
+    memcpy(points + 3 * (size_t)s->to_mesh[u->l->vertex[v]], u->l->x + 3 * (size_t)v, sizeof(double[3]));
   }
-  points = ORB_NEW(c->ctx, double, n);
-  if (!points) {
-    return ORB_E_NO_MEMORY;
+  ORB_TRY(find_twists(u->c, points, &left));
+  *more = left.kept > u->twists->kept + KEPT_GAIN;
+  cm_twists_free(u->c->ctx, &left);
+  return ORB_OK;
+}
+
+/* Comes down from limbs turned back, and takes the best map's place if that is better. Where no more is left halfway
+ * after the first descent it is given up: the limbs have gone another way. */
+static orb_status descend(const unwind *u, const orb_surface *s) {
+  cm_run *c = u->c;
+  cm_level *l = u->l;
+  int count = c->effort.level_sweeps, more = 1;
+  size_t n = 3 * (size_t)c->vertex_count;
+  double last = INFINITY, *points = ORB_NEW(c->ctx, double, n);
+  orb_status status = points ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int i = 0; i < DESCENTS && status == ORB_OK && more && cm_level_energy(l) < (1 - GAIN) * last; i++) {
+    last = cm_level_energy(l);
+    ORB_GO(status, cm_sweeps(c, l, cm_hard(), count), done);
+    ORB_GO(status, cm_loosen(c, l, count / 2, count / 2), done);
+    if (i == 0) {
+      ORB_GO(status, keeps_more(u, s, points, &more), done);
+    }
   }
-  for (int32_t v = 0; v < l->count; v++) {
-    memcpy(points + 3 * (size_t)s->to_mesh[l->vertex[v]], l->x + 3 * (size_t)v, sizeof(double[3]));
+  if (status != ORB_OK || !more) {
+    goto done;
   }
-  orb_status status = find_twists(c, points, &left);
-  if (status == ORB_OK) {
-    if (sum_of(&left) < sum_of(twists) && left.kept > twists->kept + KEPT_GAIN) {
-      c->best_energy = energy;
+  ORB_GO(status, cm_sweeps(c, l, cm_hard(), c->effort.final_sweeps), done);
+  if (cm_level_energy(l) < c->best_energy && cm_level_flips(l) == 0) {
+    ORB_GO(status, keeps_more(u, s, points, &more), done);
+    if (more) {
+      c->best_energy = cm_level_energy(l);
       memcpy(c->best, points, n * sizeof *points);
     }
-    cm_twists_free(c->ctx, &left);
   }
+done:
   orb_free(c->ctx, points);
   return status;
 }
@@ -163,10 +163,8 @@ static orb_status unwind_limbs(cm_run *c, const cm_twists *twists) {
   cm_level level = {0};
   unwind u = {.c = c, .l = &level, .twists = twists};
   int32_t flips = 1;
-  int64_t least = WORK * (int64_t)c->vertex_count;
   orb_status status;
   ORB_GO(status, orb_surface_create(c->ctx, &c->moving->mesh, &s), done);
-  c->work = c->work > least ? c->work : least;
   for (int steps = 1; steps <= MOST_STEPS && flips; steps *= MOST_STEPS) {
     ORB_GO(status, turn_limbs(&u, &s, steps, &flips), done);
   }
@@ -174,8 +172,7 @@ static orb_status unwind_limbs(cm_run *c, const cm_twists *twists) {
     ORB_GO(status, turn_each(&u, &s, &flips), done);
   }
   if (!flips) {
-    ORB_GO(status, descend(c, &level), done);
-    status = keep_better(c, &s, &level, twists);
+    status = descend(&u, &s);
   }
 done:
   cm_level_free(c->ctx, &level);
@@ -185,8 +182,17 @@ done:
 
 orb_status cm_unwind(cm_run *c) {
   cm_twists twists;
+  if (c->best_energy == c->twisted_energy) {
+    return ORB_OK; /* this map was tried */
+  }
   ORB_TRY(find_twists(c, c->best, &twists));
-  orb_status status = twists.count > 0 ? unwind_limbs(c, &twists) : ORB_OK;
+  orb_status status = ORB_OK;
+  if (twists.count > 0) {
+    int64_t least = WORK * (int64_t)c->vertex_count;
+    c->twisted_energy = c->best_energy;
+    c->work = c->work > least ? c->work : least;
+    status = unwind_limbs(c, &twists);
+  }
   cm_twists_free(c->ctx, &twists);
   return status;
 }
