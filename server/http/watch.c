@@ -138,7 +138,7 @@ static void *watch_main(void *argument) {
   pthread_mutex_lock(&w->lock);
   while (!w->stopping) {
     struct timespec until;
-    clock_gettime(CLOCK_REALTIME, &until);
+    clock_gettime(CLOCK_MONOTONIC, &until); /* a clock that is set back must not make this sleep */
     until.tv_nsec += (w->lingerer_count ? LINGER_TICK_MS : TICK_MS) * 1000000;
     until.tv_sec += until.tv_nsec / 1000000000;
     until.tv_nsec %= 1000000000;
@@ -170,7 +170,11 @@ watch *watch_start(const config *options, int tokens) {
   w->limits = w->limits_local || (strcmp(options->limits, "remote") == 0 && tokens);
   w->from = addresses_create(options->requests_per_second);
   pthread_mutex_init(&w->lock, NULL);
-  pthread_cond_init(&w->wake, NULL);
+  pthread_condattr_t attributes;
+  pthread_condattr_init(&attributes);
+  pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
+  pthread_cond_init(&w->wake, &attributes);
+  pthread_condattr_destroy(&attributes);
   if (!w->from || pthread_create(&w->thread, NULL, watch_main, w) != 0) {
     addresses_destroy(w->from);
     free(w);

@@ -78,7 +78,7 @@ void *timer_main(void *argument) {
   pthread_mutex_lock(&q->lock);
   while (!q->timer_stop) {
     struct timespec until;
-    clock_gettime(CLOCK_REALTIME, &until);
+    clock_gettime(CLOCK_MONOTONIC, &until); /* a clock that is set back must not make this sleep */
     until.tv_nsec += 100000000;
     if (until.tv_nsec >= 1000000000) {
       until.tv_nsec -= 1000000000;

@@ -19,7 +19,11 @@ queue *queue_create(const queue_options *options, catalogue *cat) {
   pthread_mutex_init(&q->lock, NULL);
   pthread_cond_init(&q->work, NULL);
   pthread_cond_init(&q->committed, NULL);
-  pthread_cond_init(&q->timer_wake, NULL);
+  pthread_condattr_t attributes;
+  pthread_condattr_init(&attributes);
+  pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
+  pthread_cond_init(&q->timer_wake, &attributes);
+  pthread_condattr_destroy(&attributes);
   q->timer_started = pthread_create(&q->timer, NULL, timer_main, q) == 0;
   if (!q->timer_started) {
     queue_destroy(q);

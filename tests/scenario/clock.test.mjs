@@ -1,0 +1,33 @@
+// The wall clock is set back by an hour while the daemon runs, as it is at the start of many machines.
+import assert from 'node:assert/strict';
+import net from 'node:net';
+import test from 'node:test';
+import { setTimeout as sleep } from 'node:timers/promises';
+import { daemon, endless, patience } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const library = process.env.ORB_CLOCK;
+
+test('waits end, and slow callers are sent away, also when the clock was set back', { skip: library ? false : 'ORB_CLOCK names no library' }, async (t) => {
+  const ahead = 2000;
+  const d = await daemon(t, { args: ['--workers', '1', '--header-seconds', '1'], env: { LD_PRELOAD: library, ORB_CLOCK_AHEAD_MS: String(ahead) } });
+  const { id } = (await d.upload(shapes.binaryPly(shapes.ball(5)))).json;
+  const job = (await d.post('/v1/embeddings', { mesh: id, ...endless })).json;
+  const early = Date.parse(job.created);
+  await sleep(2 * ahead);
+  assert.ok(early > Date.now() + 3_000_000, 'the clock was ahead');
+  const late = await d.upload(shapes.tetrahedron);
+  assert.ok(Date.parse(late.json.created) < Date.now() + 60_000, 'and is right now');
+  const waited = await d.get(job.url, { query: { wait: 1 }, signal: AbortSignal.timeout(60_000 * patience) });
+  assert.deepEqual([waited.status, waited.json.state], [200, 'running']);
+  const closed = await new Promise((done, reject) => {
+    const { hostname, port } = new URL(d.url);
+    const socket = net.connect(Number(port), hostname, () => socket.write('GET /livez HTTP/1.1\r\nHost: h\r\n'));
+    socket.setTimeout(28_000, () => (socket.destroy(), reject(new Error('it was not closed')))); // the library itself would after 30 s
+    socket.on('close', () => done(true));
+    socket.on('error', () => done(true));
+    socket.resume();
+  });
+  assert.ok(closed);
+  assert.equal((await d.delete(job.url)).status, 200);
+});
