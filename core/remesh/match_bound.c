@@ -12,11 +12,14 @@ double orb_match_edge_of_shape2(const orb_match *match, int32_t s, int32_t v, in
                                 orb_stray *worst) {
   double greatest = 0;
   const double *a = orb_match_at(match, v, s), *b = orb_match_at(match, w, s);
+  orb_spot from = match->spot[(int64_t)v * match->shape_count + s],
+           to = match->spot[(int64_t)w * match->shape_count + s];
+  if (from.kind == ORB_SPOT_FACE && to.kind == ORB_SPOT_FACE && from.h / 3 == to.h / 3) {
+    return 0; /* within one triangle */
+  }
   orb_tracer tracer;
   orb_crossing crossing;
-  orb_trace_between(&tracer, &match->view[s], match->spot[(int64_t)v * match->shape_count + s],
-                    orb_net_point(&match->net, v), match->spot[(int64_t)w * match->shape_count + s],
-                    orb_net_point(&match->net, w));
+  orb_trace_between(&tracer, &match->view[s], from, orb_net_point(&match->net, v), to, orb_net_point(&match->net, w));
   while (greatest <= limit2 && orb_trace_next(&tracer, &crossing)) {
     const double *c = shape_vertex(match, s, crossing.h);
     double distance2 = crossing.at_vertex ? orb_point_segment2(c, a, b)
