@@ -16,7 +16,7 @@
 enum { HOLDS = 32 };
 /* Of how many triangles one may be turned after the first round; one of how many is many; the most work for a start
  * from the overlay. */
-enum { FEW = 3000, MANY = 100, OVERLAY_MOST = 120000, STRAIGHTENINGS = 3 };
+enum { FEW = 3000, MANY = 100, OVERLAY_MOST = 120000 };
 
 /* Later rounds gain a few per cent each. Large meshes, or many shapes, do without: their triangles are small against
  * the tolerance, and time counts. */
@@ -94,27 +94,28 @@ static orb_status begin(orb_context *ctx, orb_match *match, double limit2) {
   return first_round(ctx, match, limit2, 0, 1);
 }
 
-/* Where the first round leaves too many triangles turned: again from the overlay, if there are many and it is not too
- * large, else from the overlay around them only; once more for those that are left then. */
+/* Where the first round leaves too many triangles turned: again from the overlay around them; or from all of the
+ * overlay, unless that is too large, if they are very many or that has not helped. */
 static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_match *match, double tolerance,
                              int is_overlay) {
-  int64_t inputs = 0;
+  int64_t turned = orb_match_turned(ctx, match), live = orb_match_live(match), inputs = 0;
   for (int32_t s = 0; s < job->shape_count; s++) {
     inputs += job->shapes[s].mesh.triangle_count;
   }
-  for (int i = 0; i < STRAIGHTENINGS; i++) {
-    int64_t turned = orb_match_turned(ctx, match), live = orb_match_live(match);
-    if (turned * FEW <= live) {
-      break;
+  if (turned * FEW <= live) {
+    return ORB_OK;
+  }
+  int may = !is_overlay && inputs * job->shape_count <= OVERLAY_MOST, anew = may && turned * MANY > live;
+  if (!anew) {
+    ORB_TRY(orb_match_resolve(ctx, match, tolerance * tolerance));
+    ORB_TRY(hold(ctx, match, tolerance));
+    if (!match->crept) {
+      ORB_TRY(begin(ctx, match, tolerance * tolerance));
+      anew = may && orb_match_turned(ctx, match) * 3 > turned * 2;
     }
-    int anew = i == 0 && turned * MANY > live && !is_overlay && inputs * job->shape_count <= OVERLAY_MOST;
-    if (!anew) {
-      ORB_TRY(orb_match_resolve(ctx, match, tolerance * tolerance));
-      ORB_TRY(hold(ctx, match, tolerance));
-    }
-    if (anew || match->crept) {
-      ORB_TRY(start_from_overlay(ctx, job, match));
-    }
+  }
+  if (anew || match->crept) {
+    ORB_TRY(start_from_overlay(ctx, job, match));
     ORB_TRY(begin(ctx, match, tolerance * tolerance));
   }
   return ORB_OK;

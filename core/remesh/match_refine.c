@@ -92,6 +92,8 @@ int orb_match_try_turn(orb_match *match, int32_t h, double limit2) {
   return can;
 }
 
+enum { PASSES = 6 };
+
 typedef struct turn_loop {
   const orb_match *match;
   double limit2;
@@ -99,7 +101,7 @@ typedef struct turn_loop {
   orb_form *form;         /* a triangle */
   unsigned char *may;     /* a half-edge: it is to be turned, as things are; 0 where neither triangle is to be seen */
   unsigned char *stale;   /* a triangle: what is known of its edges is not true any more */
-  unsigned char *changed; /* a triangle: in this pass, or one beside it */
+  unsigned char *changed; /* a triangle: in this pass */
 } turn_loop;
 
 static void form_range(void *arg, int64_t begin, int64_t end, int thread) {
@@ -132,27 +134,15 @@ static void may_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* Whether edge h may be turned now: as was found, if nothing has changed; but for the edge that would be new, which may
- * have come to be elsewhere. */
+/* Whether edge h may be turned now: as was found, if its triangles are as they were, else it waits for the next pass;
+ * but for the edge that would be new, which may have come to be elsewhere. */
 static int may_now(const turn_loop *loop, int32_t h) {
   const orb_net *net = &loop->match->net;
-  if (loop->changed[h / 3]) {
-    return h < net->twin[h] && is_to_turn(loop, h);
-  }
-  return loop->may[h] && !orb_net_adjacent(net, net->triangles[orb_prev(h)], net->triangles[orb_prev(net->twin[h])]);
+  return loop->may[h] && !loop->changed[h / 3] && !loop->changed[net->twin[h] / 3] &&
+         !orb_net_adjacent(net, net->triangles[orb_prev(h)], net->triangles[orb_prev(net->twin[h])]);
 }
 
-/* A triangle has changed, which those beside it are to know. */
-static void note_change(turn_loop *loop, int32_t t) {
-  const orb_net *net = &loop->match->net;
-  loop->form[t] = form_of(loop->match, t);
-  loop->changed[t] = 1;
-  for (int k = 0; k < 3; k++) {
-    loop->changed[net->twin[3 * t + k] / 3] = 1;
-  }
-}
-
-/* One edge after another; asks again only where a turn has changed one of the two triangles. */
+/* One edge after another, as was found for them side by side. */
 static orb_status turn_pass(orb_context *ctx, orb_match *match, turn_loop *loop, int64_t *turned) {
   const orb_net *net = &match->net;
   int32_t half_edges = 3 * net->triangle_count;
@@ -164,8 +154,7 @@ static orb_status turn_pass(orb_context *ctx, orb_match *match, turn_loop *loop,
   for (int32_t h = 0; h < half_edges; h++) {
     if (may_now(loop, h)) {
       turn(match, h);
-      note_change(loop, h / 3);
-      note_change(loop, net->twin[h] / 3);
+      loop->changed[h / 3] = loop->changed[net->twin[h] / 3] = 1;
       ++*turned;
     }
     if ((h & 4095) == 0) {
@@ -189,7 +178,7 @@ orb_status orb_match_turn_all(orb_context *ctx, orb_match *match, double limit2,
   if (status == ORB_OK) {
     memset(loop.stale, 1, (size_t)triangles);
   }
-  for (int pass = 0; pass < 4 && turned * 200 >= triangles && status == ORB_OK; pass++) {
+  for (int pass = 0; pass < PASSES && turned * 200 >= triangles && status == ORB_OK; pass++) {
     status = turn_pass(ctx, match, &loop, &turned);
   }
   orb_free(ctx, loop.form);

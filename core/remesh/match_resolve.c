@@ -1,7 +1,7 @@
 /* Around triangles that no single step mends, the overlay of the shapes is made, there only: vertices of the shapes
- * become vertices, and edges that leave a shape are split where they cross its edges. What lies in one triangle of
- * every shape cannot be turned. Collapses then reduce it again, and leave no more turned than there are. Edges outside
- * stay as they are, so that the region does not spread. */
+ * become vertices, and edges that leave a shape by more than a little are split where they cross its edges. What lies
+ * in one triangle of every shape cannot be turned. Collapses then reduce it again, and leave no more turned than there
+ * are. Edges outside stay as they are, so that the region does not spread. */
 #include <math.h>
 
 #include "base/check.h"
@@ -10,7 +10,7 @@
 #include "remesh/match.h"
 
 enum { SPLITS_EACH = 64 };
-static const double CLOSE = 0.25; /* of the limit: what is split no more */
+static const double CLOSE = 0.1; /* of the limit: what is split no more */
 
 typedef struct region {
   orb_context *ctx;
