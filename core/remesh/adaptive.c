@@ -68,12 +68,15 @@ static orb_status hold(orb_context *ctx, orb_match *match, double tolerance) {
   return ORB_OK;
 }
 
-/* Starts anew from the overlay, which is exact. */
+/* Starts anew from the overlay, which is exact. Where there is none the match stays as it is, unless it is of no use.
+ */
 static orb_status start_from_overlay(orb_context *ctx, const orb_remesh_job *job, orb_match *match) {
   orb_supermesh overlay = {.error_bound = ORB_NEW(ctx, double, job->shape_count)};
   orb_net net = {0};
-  orb_match_free(ctx, match);
   orb_status status = overlay.error_bound ? ORB_OK : ORB_E_NO_MEMORY;
+  if (match->crept) {
+    orb_match_free(ctx, match);
+  }
   if (status == ORB_OK) {
     status = orb_remesh_overlay(ctx, job, &overlay);
   }
@@ -82,6 +85,7 @@ static orb_status start_from_overlay(orb_context *ctx, const orb_remesh_job *job
                           overlay.vertex_count);
   }
   if (status == ORB_OK) {
+    orb_match_free(ctx, match);
     status = orb_match_create_on(ctx, job, &net, match);
   }
   orb_net_free(ctx, &net);
@@ -114,11 +118,16 @@ static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_ma
       anew = may && orb_match_turned(ctx, match) * 3 > turned * 2;
     }
   }
-  if (anew || match->crept) {
-    ORB_TRY(start_from_overlay(ctx, job, match));
-    ORB_TRY(begin(ctx, match, tolerance * tolerance));
+  if (!anew && !match->crept) {
+    return ORB_OK;
   }
-  return ORB_OK;
+  int needed = match->crept;
+  orb_status status = start_from_overlay(ctx, job, match);
+  if (status == ORB_E_NOT_CERTIFIED && !needed) {
+    orb_error_clear(ctx); /* what there is holds the bound, too, with more triangles turned */
+    return ORB_OK;
+  }
+  return status == ORB_OK ? begin(ctx, match, tolerance * tolerance) : status;
 }
 
 /* From a start within the tolerance, by steps none of which leaves it. */

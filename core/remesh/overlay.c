@@ -178,11 +178,12 @@ static orb_status pile_add(orb_context *ctx, const orb_remesh_job *job, const pi
 static orb_status lay_over(orb_context *ctx, const orb_remesh_job *job, int32_t s, pile *below, pile *out) {
   const orb_aligned_shape *shape = &job->shapes[s];
   orb_overlay overlay = {0};
-  orb_locator *locator = NULL;
-  int32_t *twin = ORB_NEW(ctx, int32_t, 3 * (int64_t)below->triangle_count);
-  orb_status status = twin ? ORB_OK : ORB_E_NO_MEMORY;
+  orb_locator *locator = NULL, *moved = NULL;
+  int32_t *twin = ORB_NEW(ctx, int32_t, 3 * (int64_t)below->triangle_count), snapped = 0;
+  double *points = ORB_NEW(ctx, double, 3 * (int64_t)shape->mesh.vertex_count);
+  orb_status status = twin && points ? ORB_OK : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
-    return status;
+    goto end;
   }
   ORB_GO(status, orb_mesh_twins(ctx, below->triangles, below->triangle_count, below->vertex_count, twin), end);
   ORB_GO(status,
@@ -196,12 +197,23 @@ static orb_status lay_over(orb_context *ctx, const orb_remesh_job *job, int32_t 
       (orb_sphere_view){shape->points, shape->mesh.triangles, job->twin[s], shape->mesh.triangle_count};
   overlay.layer[1].vertex_count = shape->mesh.vertex_count;
   overlay.layer[1].locator = job->locator[s];
+  ORB_GO(status, orb_overlay_snap(ctx, &overlay.layer[0], &overlay.layer[1], points, &snapped), end);
+  if (snapped) {
+    ORB_GO(status,
+           orb_locator_create(ctx, points, shape->mesh.vertex_count, shape->mesh.triangles, shape->mesh.triangle_count,
+                              job->twin[s], &moved),
+           end);
+    overlay.layer[1].view.points = points;
+    overlay.layer[1].locator = moved;
+  }
   ORB_GO(status, orb_overlay_build(ctx, &overlay), end);
   ORB_GO(status, orb_overlay_mend(ctx, &overlay), end);
   ORB_GO(status, pile_add(ctx, job, below, &overlay, out), end);
 end:
   orb_overlay_free(ctx, &overlay);
+  orb_locator_destroy(ctx, moved);
   orb_locator_destroy(ctx, locator);
+  orb_free(ctx, points);
   orb_free(ctx, twin);
   return status;
 }

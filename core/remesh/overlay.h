@@ -40,6 +40,12 @@ typedef struct orb_overlay {
 ORB_MUST_CHECK orb_status orb_overlay_build(orb_context *ctx, orb_overlay *overlay);
 void orb_overlay_free(orb_context *ctx, orb_overlay *overlay);
 
+/* The points of the upper layer with each vertex that lies within rounding (1e-9) of one of the layer below at that
+ * very point, as far as all triangles stay positive. points: 3 a vertex of the layer, of the caller. *snapped: how many
+ * vertices moved. Needs views, vertex_count, and the locator below. */
+ORB_MUST_CHECK orb_status orb_overlay_snap(orb_context *ctx, const orb_layer *below, const orb_layer *layer,
+                                           double *points, int32_t *snapped);
+
 /* The steps of it: events and vertices; then the graph's faces and triangles. */
 ORB_MUST_CHECK orb_status orb_overlay_trace(orb_context *ctx, orb_overlay *overlay);
 ORB_MUST_CHECK orb_status orb_overlay_faces(orb_context *ctx, orb_overlay *overlay);

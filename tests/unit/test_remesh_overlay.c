@@ -162,6 +162,32 @@ static void partial_coincidences(void **state) {
   }
 }
 
+/* A shape over itself, moved by rounding or a little more: its own triangles, exactly, and nothing between them. */
+static void the_same_but_for_rounding(void **state) {
+  (void)state;
+  static const double by[] = {1e-16, 1e-14, 1e-12, 1e-10};
+  for (size_t i = 0; i < 2 * sizeof by / sizeof *by; i++) {
+    orb_context *ctx = remesh_context(1);
+    orb_aligned_shape shapes[2];
+    uint32_t seed = 7;
+    for (int s = 0; s < 2; s++) {
+      sphere_shape(ctx, i % 2 ? SPHERE_UV : SPHERE_ICO, i % 2 ? 24 : 4, 0.2, 3, &shapes[s]);
+    }
+    for (int32_t k = 0; k < 3 * shapes[1].mesh.vertex_count; k++) {
+      seed = seed * 1664525u + 1013904223u;
+      shapes[1].points[k] += by[i / 2] * ((seed >> 8) / 8388608.0 - 1);
+    }
+    orb_supermesh m;
+    assert_int_equal(overlay(ctx, shapes, 2, &m), ORB_OK);
+    sphere_assert_valid(&m, shapes, 2);
+    assert_int_equal(m.triangle_count, shapes[0].mesh.triangle_count);
+    orb_supermesh_free(ctx, &m);
+    sphere_shape_free(ctx, &shapes[0]);
+    sphere_shape_free(ctx, &shapes[1]);
+    orb_context_destroy(ctx);
+  }
+}
+
 static void many_shapes(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(2);
@@ -190,9 +216,10 @@ static void failing_allocations(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(general_position),      cmocka_unit_test(coincidences_add_nothing),
-      cmocka_unit_test(partial_coincidences),  cmocka_unit_test(many_shapes),
-      cmocka_unit_test(threads_do_not_matter), cmocka_unit_test(failing_allocations),
+      cmocka_unit_test(general_position),     cmocka_unit_test(coincidences_add_nothing),
+      cmocka_unit_test(partial_coincidences), cmocka_unit_test(the_same_but_for_rounding),
+      cmocka_unit_test(many_shapes),          cmocka_unit_test(threads_do_not_matter),
+      cmocka_unit_test(failing_allocations),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
