@@ -33,10 +33,11 @@ part_tsan() {
 # The units; then daemon and command line under memcheck: a walk through every route, and the scenarios.
 # ORB_VALGRIND_UNITS (programs) and ORB_VALGRIND_SCENARIOS name fewer of them, or none; several runs with different ones
 # may go on side by side. Left out: what is about time (crowd, fairness, slow), what measures or needs the release build
-# (bench, report, readme, demo), what preloads a library of its own (faults), what ends the daemon before it can tell of
-# leaks (crash), and large meshes (real_meshes, real_pairs). The folder of a run that found something is left.
-valgrind_scenarios=(walk abuse assets cli cors disk_full durability embeddings encodings eviction jobs meshes openapi
-  operations places problems requests shell spheres supermeshes systemd tenants tls tokens view)
+# (bench, report, readme, demo), what preloads a library of its own (clock, faults), what ends the daemon before it can
+# tell of leaks (crash), and large meshes (real_meshes, real_pairs). The folder of a run that found something is left.
+valgrind_scenarios=(walk abuse assets check_data cli conditions config cors disk_full durability embeddings encodings
+  eviction jobs meshes openapi operations places problems requests resume shell spheres supermeshes systemd tenants
+  tls tokens view)
 part_valgrind() {
   cmake --preset debug -DORB_TESTS=ON >/dev/null
   cmake --build build-debug
