@@ -61,9 +61,9 @@ typedef struct cm_run {
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
   double twisted_energy; /* of the last map whose limbs were to be turned back */
-  int rough;    /* the alignment as given is only refined to be sampled */
-  int passes;   /* bends through samples of the best map */
-  int64_t work; /* vertex steps that may still be spent on clearing flips and further starts */
+  int rough;             /* the alignment as given is only refined to be sampled */
+  int passes;            /* bends through samples of the best map */
+  int64_t work;          /* vertex steps that may still be spent on clearing flips and further starts */
   cm_effort effort;
 } cm_run;
 

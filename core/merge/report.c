@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "mesh/normals.h"
 #include "numeric/vec3.h"
 #include "transfer/wedge.h"
 
@@ -180,7 +181,7 @@ static orb_status against_face(orb_context *ctx, const orb_aligned_shape *shape,
     ORB_TRY(orb_locator_create(ctx, shape->points, mesh->vertex_count, mesh->triangles, mesh->triangle_count, NULL,
                                locator));
   }
-  double centre[3], u[3], w[3], face[3];
+  double centre[3], face[3];
   for (int c = 0; c < 3; c++) {
     centre[c] =
         points[3 * (int64_t)corner[0] + c] + points[3 * (int64_t)corner[1] + c] + points[3 * (int64_t)corner[2] + c];
@@ -188,11 +189,7 @@ static orb_status against_face(orb_context *ctx, const orb_aligned_shape *shape,
   orb_normalize(centre);
   orb_place place;
   orb_locate(*locator, centre, -1, &place);
-  const int32_t *of = mesh->triangles + 3 * (int64_t)place.triangle;
-  const double *p = mesh->positions + 3 * (int64_t)of[0];
-  orb_sub(mesh->positions + 3 * (int64_t)of[1], p, u);
-  orb_sub(mesh->positions + 3 * (int64_t)of[2], p, w);
-  orb_cross(u, w, face);
+  orb_face_normal(mesh, place.triangle, face);
   *against = orb_dot(normal, face) < 0;
   return ORB_OK;
 }

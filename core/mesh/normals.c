@@ -42,3 +42,11 @@ orb_status orb_smooth_normals(orb_context *ctx, const double *positions, int32_t
   }
   return ORB_OK;
 }
+
+void orb_face_normal(const orb_mesh *mesh, int32_t triangle, double out[3]) {
+  const int32_t *corner = mesh->triangles + 3 * (int64_t)triangle;
+  double u[3], w[3];
+  orb_sub(mesh->positions + 3 * (int64_t)corner[1], mesh->positions + 3 * (int64_t)corner[0], u);
+  orb_sub(mesh->positions + 3 * (int64_t)corner[2], mesh->positions + 3 * (int64_t)corner[0], w);
+  orb_cross(u, w, out);
+}

@@ -7,5 +7,7 @@
 /* Unit normals (angle-weighted, Thürmer & Wüthrich 1998) of a closed surface; zero where there is none. */
 ORB_MUST_CHECK orb_status orb_smooth_normals(orb_context *ctx, const double *positions, int32_t vertex_count,
                                              const int32_t *triangles, int32_t triangle_count, double *out);
+/* The normal of one triangle, twice as long as its area. */
+void orb_face_normal(const orb_mesh *mesh, int32_t triangle, double out[3]);
 
 #endif

@@ -68,8 +68,7 @@ static orb_status hold(orb_context *ctx, orb_match *match, double tolerance) {
   return ORB_OK;
 }
 
-/* Starts anew from the overlay, which is exact. Where there is none the match stays as it is, unless it is of no use.
- */
+/* Starts anew from the overlay, which is exact. Without one the match stays as it is, unless it is of no use. */
 static orb_status start_from_overlay(orb_context *ctx, const orb_remesh_job *job, orb_match *match) {
   orb_supermesh overlay = {.error_bound = ORB_NEW(ctx, double, job->shape_count)};
   orb_net net = {0};

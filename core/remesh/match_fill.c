@@ -172,7 +172,6 @@ int orb_match_plan_fill(const orb_match *match, int32_t u, const int32_t *ring, 
 void orb_match_fill(orb_match *match, int32_t u, const int32_t *ring, int n, int (*triangles)[3]) {
   orb_net *net = &match->net;
   int32_t lists[MOST + 1], slots[MOST], e = net->out[u];
-  int left = 0;
   lists[n] = match->vertex_items[u];
   match->vertex_items[u] = -1;
   while (net->triangles[orb_next(e)] != ring[0]) {
@@ -184,13 +183,8 @@ void orb_match_fill(orb_match *match, int32_t u, const int32_t *ring, int n, int
     match->triangle_items[e / 3] = -1;
     e = net->twin[orb_prev(e)];
   }
-  (void)orb_net_fill(net, e, n, triangles);
-  for (int i = 0; i < n; i++) {
-    if (net->triangles[3 * (int64_t)slots[i]] >= 0) {
-      slots[left++] = slots[i];
-    }
-  }
+  orb_net_fill(net, e, n, triangles);
   for (int i = 0; i <= n; i++) {
-    orb_match_deal_among(match, lists[i], slots, left);
+    orb_match_deal_among(match, lists[i], slots, n - 2);
   }
 }

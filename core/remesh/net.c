@@ -248,7 +248,7 @@ void orb_net_collapse(orb_net *net, int32_t h) {
   net->out[u] = -1;
 }
 
-int32_t orb_net_fill(orb_net *net, int32_t h, int n, int (*triangles)[3]) {
+void orb_net_fill(orb_net *net, int32_t h, int n, int (*triangles)[3]) {
   int32_t slot[ORB_FILL_MOST], outer[ORB_FILL_MOST], ring[ORB_FILL_MOST], inner[ORB_FILL_MOST][ORB_FILL_MOST];
   int32_t u = origin(net, h);
   for (int i = 0; i < n; i++) {
@@ -276,7 +276,6 @@ int32_t orb_net_fill(orb_net *net, int32_t h, int n, int (*triangles)[3]) {
     }
   }
   net->out[u] = -1;
-  return slot[0];
 }
 
 int32_t orb_net_star(orb_net *net, const int32_t *triangles, int count, const int32_t *edges, int n,

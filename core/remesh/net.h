@@ -58,8 +58,9 @@ int orb_net_adjacent(const orb_net *net, int32_t a, int32_t b);
 
 enum { ORB_FILL_MOST = 12, ORB_STAR_MOST = 20 };
 /* Takes away the origin of h, which has n ≤ ORB_FILL_MOST neighbours, and fills the hole with n − 2 triangles over its
- * ring: corner i is the i-th neighbour counter-clockwise from the end of h. One of the new triangles. */
-int32_t orb_net_fill(orb_net *net, int32_t h, int n, int (*triangles)[3]);
+ * ring: corner i is the i-th neighbour counter-clockwise from the end of h. They take the places of the first n − 2 of
+ * the triangles around it, counter-clockwise from that of h. */
+void orb_net_fill(orb_net *net, int32_t h, int n, int (*triangles)[3]);
 
 /* Replaces a disc of `count` triangles by the star of vertex p over its boundary: `edges` are the n half-edges of the
  * disc's triangles along it, counter-clockwise; `inner` the vertices inside, n = count + 2 − 2 · inner_count. p is a

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "mesh/normals.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
@@ -58,19 +59,11 @@ static int same_value(const wedge_job *job, int64_t g, int64_t h) {
   return 1;
 }
 
-static void face_normal(const orb_mesh *mesh, int32_t triangle, double out[3]) {
-  const int32_t *corner = mesh->triangles + 3 * (int64_t)triangle;
-  double u[3], w[3];
-  orb_sub(mesh->positions + 3 * (int64_t)corner[1], mesh->positions + 3 * (int64_t)corner[0], u);
-  orb_sub(mesh->positions + 3 * (int64_t)corner[2], mesh->positions + 3 * (int64_t)corner[0], w);
-  orb_cross(u, w, out);
-}
-
 static void store(const wedge_job *job, const double value[MAX_WIDTH], int32_t triangle, float *out) {
   double v[MAX_WIDTH];
   memcpy(v, value, sizeof v);
   if (job->unit && !(orb_normalize(v) > 1e-6)) {
-    face_normal(&job->shape->mesh, triangle, v);
+    orb_face_normal(&job->shape->mesh, triangle, v);
     if (!(orb_normalize(v) > 0)) {
       v[0] = v[1] = 0;
       v[2] = 1;

@@ -13,6 +13,7 @@
 
 #include "http/addresses.h"
 #include "orbmorph/context.h"
+#include "wake.h"
 
 enum { TICK_MS = 250, LINGER_TICK_MS = 20, LINGERERS = 256, LINGER_MS = 5000, LINGER_IDLE_MS = 1500 };
 static const int64_t LINGER_BYTES = INT64_C(64) << 20;
@@ -137,12 +138,7 @@ static void *watch_main(void *argument) {
   int64_t inspected = 0;
   pthread_mutex_lock(&w->lock);
   while (!w->stopping) {
-    struct timespec until;
-    clock_gettime(CLOCK_MONOTONIC, &until); /* a clock that is set back must not make this sleep */
-    until.tv_nsec += (w->lingerer_count ? LINGER_TICK_MS : TICK_MS) * 1000000;
-    until.tv_sec += until.tv_nsec / 1000000000;
-    until.tv_nsec %= 1000000000;
-    pthread_cond_timedwait(&w->wake, &w->lock, &until);
+    wake_wait_ms(&w->wake, &w->lock, w->lingerer_count ? LINGER_TICK_MS : TICK_MS);
     int64_t now = orb_clock_ms();
     serve_lingerers(w, now);
     if (now - inspected >= TICK_MS) {
@@ -170,11 +166,7 @@ watch *watch_start(const config *options, int tokens) {
   w->limits = w->limits_local || (strcmp(options->limits, "remote") == 0 && tokens);
   w->from = addresses_create(options->requests_per_second);
   pthread_mutex_init(&w->lock, NULL);
-  pthread_condattr_t attributes;
-  pthread_condattr_init(&attributes);
-  pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
-  pthread_cond_init(&w->wake, &attributes);
-  pthread_condattr_destroy(&attributes);
+  wake_init(&w->wake);
   if (!w->from || pthread_create(&w->thread, NULL, watch_main, w) != 0) {
     addresses_destroy(w->from);
     free(w);

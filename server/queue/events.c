@@ -3,6 +3,9 @@
 #include <string.h>
 
 #include "queue/internal.h"
+#include "wake.h"
+
+enum { TIMER_MS = 100 };
 
 static void unlist(queue *q, waiter *w) {
   *(w->previous ? &w->previous->next : &w->of->waiters) = w->next;
@@ -77,14 +80,7 @@ void *timer_main(void *argument) {
   queue *q = argument;
   pthread_mutex_lock(&q->lock);
   while (!q->timer_stop) {
-    struct timespec until;
-    clock_gettime(CLOCK_MONOTONIC, &until); /* a clock that is set back must not make this sleep */
-    until.tv_nsec += 100000000;
-    if (until.tv_nsec >= 1000000000) {
-      until.tv_nsec -= 1000000000;
-      until.tv_sec++;
-    }
-    pthread_cond_timedwait(&q->timer_wake, &q->lock, &until);
+    wake_wait_ms(&q->timer_wake, &q->lock, TIMER_MS);
     int64_t now = orb_clock_ms();
     for (waiter *w = q->waiters, *next; w; w = next) {
       next = w->all_next;

@@ -6,6 +6,7 @@
 #include "faults.h"
 #include "log.h"
 #include "queue/internal.h"
+#include "wake.h"
 
 enum { MOST_CRASHES = 3, BATCH = 64 };
 
@@ -19,11 +20,7 @@ queue *queue_create(const queue_options *options, catalogue *cat) {
   pthread_mutex_init(&q->lock, NULL);
   pthread_cond_init(&q->work, NULL);
   pthread_cond_init(&q->committed, NULL);
-  pthread_condattr_t attributes;
-  pthread_condattr_init(&attributes);
-  pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
-  pthread_cond_init(&q->timer_wake, &attributes);
-  pthread_condattr_destroy(&attributes);
+  wake_init(&q->timer_wake);
   q->timer_started = pthread_create(&q->timer, NULL, timer_main, q) == 0;
   if (!q->timer_started) {
     queue_destroy(q);

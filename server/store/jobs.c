@@ -190,15 +190,13 @@ store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
   return rows_one(cat, db, st, &job_rows, out);
 }
 
+/* Of state ?1 (−1: any, −2: queued or running), before ?2. */
+#define LISTED " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND seq<?2"
+
 int catalogue_job_list(catalogue *cat, const char *owner, int state, int64_t before, int limit, job_row *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st =
-      owner ? database_statement(db, "SELECT " COLUMNS
-                                     " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND seq<?2 AND owner=?4"
-                                     " ORDER BY seq DESC LIMIT ?3")
-            : database_statement(db, "SELECT " COLUMNS
-                                     " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND seq<?2"
-                                     " ORDER BY seq DESC LIMIT ?3");
+  sqlite3_stmt *st = owner ? database_statement(db, "SELECT " COLUMNS LISTED " AND owner=?4 ORDER BY seq DESC LIMIT ?3")
+                           : database_statement(db, "SELECT " COLUMNS LISTED " ORDER BY seq DESC LIMIT ?3");
   if (st && owner) {
     sqlite3_bind_text(st, 4, owner, -1, SQLITE_STATIC);
   }
