@@ -174,9 +174,13 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
 
   // What Ann has is made for Bob anew as far as he can see, but for the time it takes.
   const one = await end(ann, (await ask(ann)).json);
+  // The one worker is busy with something else while Bob looks, for a result that is there comes at once.
+  const blocker = (await ask(ann, endless)).json;
+  await until(async () => (await d.get(blocker.url, ann)).json.state === 'running', 'the worker is busy');
   const began = Date.now(), reply = await ask(bob);
   assert.equal(reply.status, 202);
   assert.deepEqual(await list(bob, 'embeddings'), []);
+  assert.equal((await d.delete(blocker.url, ann)).status, 200);
   const two = await end(bob, reply.json);
   assert.equal(two.result, one.result);
   const [a, b] = [(await d.get(one.result, ann)).json, (await d.get(two.result, bob)).json];
