@@ -18,6 +18,9 @@ export const slow = process.env.ORB_SLOW === '1';
 // How many times longer than usual is waited for what should come: under memcheck, or on a machine with other work.
 export const patience = Number(process.env.ORB_TEST_PATIENCE ?? 1);
 assert.ok(patience >= 1, 'ORB_TEST_PATIENCE is a factor of at least 1');
+// Milliseconds for which a test dawdles after each answer: finds tests that want to see a job before it has ended.
+const dawdle = Number(process.env.ORB_TEST_DAWDLE ?? 0);
+assert.ok(dawdle >= 0, 'ORB_TEST_DAWDLE is in milliseconds');
 
 /**
  * An embedding that takes a minute of processor time for 2,000 triangles, and four times as long for four times as many:
@@ -101,6 +104,7 @@ export class Daemon {
     const bytes = Buffer.from(await response.arrayBuffer());
     const type = response.headers.get('content-type') ?? '';
     const json = /json/.test(type) && bytes.length ? JSON.parse(bytes.toString()) : undefined;
+    if (dawdle) await new Promise((done) => setTimeout(done, dawdle));
     return { status: response.status, headers: response.headers, type, bytes, json };
   }
 
