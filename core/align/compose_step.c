@@ -176,25 +176,73 @@ typedef struct sweep_job {
   int32_t *stepped;
 } sweep_job;
 
+static void fetch(const void *at) {
+  __builtin_prefetch(at, 0, 3);
+}
+
+/* What a step of v reads: its neighbours and where it is. */
+static void fetch_star(const cm_level *l, const cm_surface *b, int32_t v) {
+  size_t t = (size_t)l->place[v].triangle;
+  fetch(b->triangles + 3 * t);
+  fetch(b->frame + 6 * t);
+  fetch(b->frame + 6 * t + 5);
+  fetch(b->density + t);
+  fetch(l->y + 3 * (size_t)v);
+  fetch(l->x + 3 * (size_t)v);
+  fetch(l->n + 3 * (size_t)v);
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    size_t q = (size_t)l->spoke[i].q;
+    fetch(l->y + 3 * q);
+    fetch(l->x + 3 * q);
+    fetch(l->n + 3 * q);
+    fetch(&l->place[q]);
+  }
+}
+
+/* And the surface there. */
+static void fetch_surface(const cm_level *l, const cm_surface *b, int32_t v) {
+  const int32_t *corner = b->triangles + 3 * (size_t)l->place[v].triangle;
+  for (int k = 0; k < 3; k++) {
+    size_t u = (size_t)corner[k];
+    fetch(b->x + 3 * u);
+    fetch(b->s + 3 * u);
+    fetch(b->normal + 3 * u);
+  }
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    fetch(b->density + l->place[l->spoke[i].q].triangle);
+  }
+}
+
+/* Which vertices of a chunk step is settled before any does: no two of them are neighbours. So what a step needs is on
+ * its way while the ones before it are computed. */
 static void sweep_range(void *arg, int64_t begin, int64_t end, int thread) {
   const sweep_job *job = arg;
   cm_level *l = job->level;
   cm_star star;
   double sum = 0;
-  int32_t stepped = 0;
+  int32_t stirred[GRAIN], count = 0;
   (void)thread;
   for (int64_t i = begin; i < end; i++) {
     int32_t v = l->by_colour[job->first + i];
     if (is_stirred(l, v, job->rules->still)) {
-      l->moved[v] = step_vertex(l, job->b, job->rules, v, &star);
-      sum += l->moved[v];
-      stepped++;
+      stirred[count++] = v;
     } else {
       l->moved[v] = 0;
     }
   }
+  for (int32_t i = 0; i < count; i++) {
+    if (i + 2 < count) {
+      fetch_star(l, job->b, stirred[i + 2]);
+    }
+    if (i + 1 < count) {
+      fetch_surface(l, job->b, stirred[i + 1]);
+    }
+    int32_t v = stirred[i];
+    l->moved[v] = step_vertex(l, job->b, job->rules, v, &star);
+    sum += l->moved[v];
+  }
   job->moved[begin / GRAIN] = sum;
-  job->stepped[begin / GRAIN] = stepped;
+  job->stepped[begin / GRAIN] = count;
 }
 
 orb_status cm_level_sweep(orb_context *ctx, cm_level *l, const cm_surface *b, const cm_rules *rules, double *moved,

@@ -81,6 +81,10 @@ double orb_refiner_weight(const orb_refiner *refiner);
 /* Undoes the collapses of one round (or all of it that is left) and places its vertices: place.c. */
 ORB_MUST_CHECK orb_status orb_refiner_undo_round(orb_context *ctx, orb_refiner *refiner, double blend);
 
+/* Undoes rounds until at least so many vertices live, on the surface only: no new vertex has a point. For those who set
+ * all points then: place.c */
+ORB_MUST_CHECK orb_status orb_refiner_skip(orb_context *ctx, orb_refiner *refiner, int32_t vertices);
+
 /* One damped Newton step of a vertex in its star, accepted only where every triangle stays exactly positive. Returns
  * the relative fall; *crowding (may be NULL) the star's energy over twice its target area. place.c */
 ORB_MUST_CHECK orb_status orb_refiner_relax(orb_context *ctx, orb_refiner *refiner, int32_t vertex, double blend,

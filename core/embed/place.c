@@ -265,21 +265,22 @@ static orb_status relieve_crowded(round_job *job, int32_t count) {
   return ORB_OK;
 }
 
-orb_status orb_refiner_undo_round(orb_context *ctx, orb_refiner *r, double blend) {
-  orb_hierarchy *h = r->hierarchy;
+/* The collapses of the round that is next, or what is left of it: the first of them in the log, and how many. */
+static int32_t next_round(const orb_hierarchy *h, int32_t *first) {
   int32_t end = h->log_count - h->undone, round = h->round_count;
   ORB_ASSERT(end > 0);
   while (h->round_start[round] >= end) {
     round--;
   }
-  int32_t first = h->round_start[round], count = end - first;
-  round_job job = {.ctx = ctx, .r = r, .blend = blend, .first = first};
-  job.failed = ORB_NEW0(ctx, unsigned char, count);
-  if (!job.failed) {
-    return ORB_E_NO_MEMORY;
-  }
+  *first = h->round_start[round];
+  return end - *first;
+}
+
+/* Undoes them on the surface. */
+static void undo_collapses(orb_refiner *r, int32_t first, int32_t count) {
+  orb_hierarchy *h = r->hierarchy;
   r->level.valid = 0;
-  for (int32_t i = end - 1; i >= first; i--) {
+  for (int32_t i = first + count - 1; i >= first; i--) {
     if (i - AHEAD >= first) {
       __builtin_prefetch(h->surface.corner + h->log[i - AHEAD].first, 1);
       __builtin_prefetch(h->surface.corner + h->log[i - AHEAD].last, 1);
@@ -287,6 +288,30 @@ orb_status orb_refiner_undo_round(orb_context *ctx, orb_refiner *r, double blend
     orb_collapse_undo(h, i);
   }
   h->undone += count;
+}
+
+orb_status orb_refiner_skip(orb_context *ctx, orb_refiner *r, int32_t vertices) {
+  while (r->live < vertices) {
+    int32_t first, count = next_round(r->hierarchy, &first);
+    undo_collapses(r, first, count);
+    for (int32_t i = 0; i < count; i++) {
+      r->alive[r->hierarchy->log[first + i].vertex] = 1;
+    }
+    r->live += count;
+    ORB_TRY(orb_context_check(ctx));
+  }
+  return ORB_OK;
+}
+
+orb_status orb_refiner_undo_round(orb_context *ctx, orb_refiner *r, double blend) {
+  const orb_hierarchy *h = r->hierarchy;
+  int32_t first, count = next_round(h, &first);
+  round_job job = {.ctx = ctx, .r = r, .blend = blend, .first = first};
+  job.failed = ORB_NEW0(ctx, unsigned char, count);
+  if (!job.failed) {
+    return ORB_E_NO_MEMORY;
+  }
+  undo_collapses(r, first, count);
   orb_status status;
   ORB_GO(status, orb_sliced_for(ctx, count, GRAIN, place_range, &job), done);
   ORB_GO(status, (orb_status)atomic_load(&job.status), done);
