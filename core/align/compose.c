@@ -44,6 +44,7 @@ static cm_effort effort_of(orb_preset preset) {
 static void cm_run_free(cm_run *c) {
   orb_context *ctx = c->ctx;
   cm_surface_free(ctx, &c->b);
+  cm_packed_free(ctx, &c->packed);
   orb_free(ctx, c->x);
   orb_free(ctx, c->normal);
   orb_free(ctx, c->goal);
@@ -70,6 +71,7 @@ static orb_status prepare(cm_run *c) {
   size_t n = (size_t)mesh->vertex_count;
   c->vertex_count = mesh->vertex_count;
   ORB_TRY(cm_surface_create(ctx, c->fixed, &c->b));
+  ORB_TRY(cm_packed_create(ctx, &c->fixed->mesh, &c->b, &c->packed));
   c->x = ORB_NEW(ctx, double, 3 * n);
   c->normal = ORB_NEW(ctx, double, 3 * n);
   c->keep = ORB_NEW0(ctx, unsigned char, n);
@@ -208,7 +210,7 @@ static orb_status run_start(cm_run *c, cm_start start) {
   r->settings.crowded = INFINITY;
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
   for (int32_t want = start == CM_SPATIAL ? FIRST_LEVEL : DRAWN_LEVEL; flips;) {
-    ORB_GO(status, orb_refiner_advance(ctx, r, want < c->vertex_count ? want : c->vertex_count), done);
+    ORB_GO(status, orb_refiner_skip(ctx, r, want < c->vertex_count ? want : c->vertex_count), done);
     for (int32_t v = 0; v < c->vertex_count; v++) {
       r->pinned[v] = c->keep[to_mesh[v]];
     }

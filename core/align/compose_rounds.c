@@ -42,11 +42,14 @@ orb_status cm_sweeps(cm_run *c, cm_level *l, cm_rules rules, int count) {
   for (int32_t v = 0; v < l->count; v++) {
     l->moved[v] = INFINITY;
   }
-  for (int i = 0; i < count && stepped > l->count / 500; i++) {
-    ORB_TRY(cm_level_sweep(c->ctx, l, &c->b, &rules, &moved, &stepped));
+  orb_status status = ORB_OK;
+  cm_packed_enter(&c->packed, l);
+  for (int i = 0; i < count && stepped > l->count / 500 && status == ORB_OK; i++) {
+    status = cm_level_sweep(c->ctx, l, &c->packed.b, &rules, &moved, &stepped);
     c->work -= stepped;
   }
-  return ORB_OK;
+  cm_packed_leave(&c->packed, l);
+  return status;
 }
 
 void cm_set_pull(const cm_run *c, cm_level *l, const int32_t *to_mesh, double strength) {

@@ -2,7 +2,7 @@
 #ifndef ORB_ALIGN_COMPOSE_RUN_H
 #define ORB_ALIGN_COMPOSE_RUN_H
 
-#include "align/compose_level.h"
+#include "align/compose_packed.h"
 #include "embed/multires.h"
 
 enum {
@@ -39,6 +39,7 @@ typedef struct cm_effort {
 typedef struct cm_run {
   orb_context *ctx;
   cm_surface b;
+  cm_packed packed; /* b, for sweeps */
   const orb_aligned_shape *fixed;
   orb_aligned_shape *moving;
   int32_t vertex_count, landmark_count;

@@ -133,6 +133,7 @@ static orb_status take_both(cm_run *c, orb_sheet *fixed, orb_sheet *moving) {
   orb_aligned_shape shape = {.mesh = c->fixed->mesh, .points = fixed->shape.points};
   ORB_TRY(cm_surface_create(c->ctx, &shape, &b));
   cm_surface_free(c->ctx, &c->b);
+  cm_packed_free(c->ctx, &c->packed);
   c->b = b;
   c->kept = (cm_map){c->best, c->fixed_points, c->best_energy};
   c->fixed_points = fixed->shape.points;
@@ -141,7 +142,7 @@ static orb_status take_both(cm_run *c, orb_sheet *fixed, orb_sheet *moving) {
   c->best = moving->shape.points;
   c->best_energy = INFINITY;
   moving->shape.points = NULL;
-  return ORB_OK;
+  return cm_packed_create(c->ctx, &c->fixed->mesh, &c->b, &c->packed);
 }
 
 /* The walked map as one to the fixed shape's own sphere. */
