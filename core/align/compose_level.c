@@ -33,7 +33,7 @@ static orb_status reserve(orb_context *ctx, cm_level *l) {
   l->spoke = ORB_NEW(ctx, cm_spoke, 3 * (size_t)l->triangle_count);
   l->triangle = ORB_NEW(ctx, int32_t, 3 * (size_t)l->triangle_count);
   l->place = ORB_NEW0(ctx, orb_place, n);
-  l->y = ORB_NEW0(ctx, double, 14 * n);
+  l->y = ORB_NEW0(ctx, double, 15 * n);
   l->pull = ORB_NEW0(ctx, double, n);
   l->pinned = ORB_NEW0(ctx, unsigned char, n);
   l->colour_start = ORB_NEW0(ctx, int32_t, MAX_COLOURS + 1);
@@ -47,6 +47,7 @@ static orb_status reserve(orb_context *ctx, cm_level *l) {
   l->goal = l->y + 9 * n;
   l->area = l->y + 12 * n;
   l->moved = l->y + 13 * n;
+  l->density = l->y + 14 * n;
   for (size_t i = 0; i < n; i++) {
     l->moved[i] = INFINITY;
   }
@@ -214,6 +215,7 @@ done:
 
 void cm_level_refresh(cm_level *l, const cm_surface *b, int32_t v) {
   cm_surface_at(b, &l->place[v], l->y + 3 * (size_t)v, NULL, l->n + 3 * (size_t)v);
+  l->density[v] = b->density[l->place[v].triangle];
 }
 
 void cm_level_locate(cm_level *l, const cm_surface *b, int32_t v, int32_t hint) {

@@ -20,6 +20,7 @@ typedef struct cm_level {
   int32_t *triangle;   /* 3 each, numbers of the level */
   orb_place *place;    /* on the fixed shape */
   double *y, *n, *x;   /* position and normal there, point on the sphere; 3 each */
+  double *density;     /* of the fixed shape there, see cm_surface */
   double *area;        /* a third of the star's */
   double *moved;       /* by each vertex's last step; INFINITY: not yet stepped */
   double *goal, *pull; /* spatial target and the strength of its pull, 0: none */
@@ -43,9 +44,9 @@ ORB_MUST_CHECK orb_status cm_level_create(orb_context *ctx, const orb_surface *s
                                           int32_t *local, cm_level *out);
 void cm_level_free(orb_context *ctx, cm_level *level);
 
-/* Sets y and n from the place. */
+/* Sets y, n and density from the place. */
 void cm_level_refresh(cm_level *level, const cm_surface *b, int32_t v);
-/* Sets place, y and n from x. */
+/* Sets place, y, n and density from x. */
 void cm_level_locate(cm_level *level, const cm_surface *b, int32_t v, int32_t hint);
 
 /* One pass of damped Newton steps over all vertices that are not pinned, colour by colour. *moved: mean length;

@@ -101,6 +101,7 @@ done:
 void cm_packed_enter(const cm_packed *p, cm_level *l) {
   for (int32_t v = 0; v < l->count; v++) {
     l->place[v].triangle = p->to[l->place[v].triangle];
+    l->density[v] = p->b.density[l->place[v].triangle];
   }
 }
 

@@ -75,7 +75,7 @@ static void set_upright(cm_lanes *l, int i, const double y[3]) {
   }
 }
 
-static void gather(cm_lanes *l, int i, const cm_level *level, const cm_surface *b, int32_t v, const cm_spoke *s) {
+static void gather(cm_lanes *l, int i, const cm_level *level, int32_t v, const cm_spoke *s) {
   const double *yq = level->y + 3 * (size_t)s->q, *yr = level->y + 3 * (size_t)s->r;
   const double *xq = level->x + 3 * (size_t)s->q, *xr = level->x + 3 * (size_t)s->r;
   const double *nv = level->n + 3 * (size_t)v, *nq = level->n + 3 * (size_t)s->q, *nr = level->n + 3 * (size_t)s->r;
@@ -90,8 +90,7 @@ static void gather(cm_lanes *l, int i, const cm_level *level, const cm_surface *
   l->cq[i] = s->cq;
   l->cr[i] = s->cr;
   l->area[i] = s->area;
-  double at = b->density[level->place[v].triangle], at_q = b->density[level->place[s->q].triangle];
-  double at_r = b->density[level->place[s->r].triangle];
+  double at = level->density[v], at_q = level->density[s->q], at_r = level->density[s->r];
   at_q = at_q < at_r ? at_q : at_r;
   l->density[i] = at < at_q ? at : at_q;
 }
@@ -106,7 +105,7 @@ static void pad(cm_lanes *l, int i) {
   l->area[i] = l->density[i] = 1;
 }
 
-void cm_star_load(cm_star *star, const cm_level *level, const cm_surface *b, int32_t v) {
+void cm_star_load(cm_star *star, const cm_level *level, int32_t v) {
   const cm_spoke *spoke = level->spoke + level->start[v];
   const double *y = level->y + 3 * (size_t)v, *x = level->x + 3 * (size_t)v;
   star->count = level->start[v + 1] - level->start[v];
@@ -115,7 +114,7 @@ void cm_star_load(cm_star *star, const cm_level *level, const cm_surface *b, int
     cm_lanes *l = &star->lanes[first / CM_LANES];
     int count = star->count - first < CM_LANES ? (int)(star->count - first) : CM_LANES;
     for (int i = 0; i < count; i++) {
-      gather(l, i, level, b, v, &spoke[first + i]);
+      gather(l, i, level, v, &spoke[first + i]);
     }
     for (int i = count; i < CM_LANES; i++) {
       pad(l, i);

@@ -32,7 +32,7 @@ typedef struct cm_newton {
 } cm_newton;
 
 /* Loads the star of v, which has at most CM_RING_MAX triangles. */
-void cm_star_load(cm_star *star, const cm_level *level, const cm_surface *b, int32_t v);
+void cm_star_load(cm_star *star, const cm_level *level, int32_t v);
 
 /* Energy, gradient and Hessian in the tangents e1, e2, without the barrier's derivatives where j1, the derivative of
  * the point on the sphere, is NULL. Sets the lanes' ε. */

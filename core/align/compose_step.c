@@ -67,7 +67,7 @@ static void gather_system(const cm_level *l, const cm_surface *b, const cm_rules
                           cm_newton *n) {
   const double *y = l->y + 3 * (size_t)v, *e1 = b->frame + 6 * (size_t)l->place[v].triangle, *e2 = e1 + 3;
   double j1[3], j2[3];
-  cm_star_load(star, l, b, v);
+  cm_star_load(star, l, v);
   if (star->hinged) {
     sphere_jacobian(b, &l->place[v], l->x + 3 * (size_t)v, j1, j2);
   }
@@ -86,6 +86,7 @@ static void gather_system(const cm_level *l, const cm_surface *b, const cm_rules
 static void put(cm_level *l, const cm_surface *b, int32_t v, const orb_place *place, const double y[3],
                 const double x[3]) {
   l->place[v] = *place;
+  l->density[v] = b->density[place->triangle];
   memcpy(l->y + 3 * (size_t)v, y, sizeof(double[3]));
   memcpy(l->x + 3 * (size_t)v, x, sizeof(double[3]));
   cm_surface_at(b, place, NULL, NULL, l->n + 3 * (size_t)v);
@@ -143,7 +144,7 @@ int cm_level_try(cm_level *l, const cm_surface *b, const cm_rules *rules, int32_
   if (l->pinned[v] || l->start[v + 1] - l->start[v] > CM_RING_MAX) {
     return 0;
   }
-  cm_star_load(&star, l, b, v);
+  cm_star_load(&star, l, v);
   cm_star_system(&star, rules, old_y, b->frame, b->frame + 3, NULL, NULL, &present); /* sets ε */
   cm_surface_at(b, place, y, x, NULL);
   if (!(cm_star_energy(&star, rules, y, x, 0) < cm_star_energy(&star, rules, old_y, old_x, 0))) {
@@ -187,15 +188,15 @@ static void fetch_star(const cm_level *l, const cm_surface *b, int32_t v) {
   fetch(b->frame + 6 * t);
   fetch(b->frame + 6 * t + 5);
   fetch(b->density + t);
-  fetch(l->y + 3 * (size_t)v);
-  fetch(l->x + 3 * (size_t)v);
-  fetch(l->n + 3 * (size_t)v);
   for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
     size_t q = (size_t)l->spoke[i].q;
     fetch(l->y + 3 * q);
+    fetch(l->y + 3 * q + 2);
     fetch(l->x + 3 * q);
+    fetch(l->x + 3 * q + 2);
     fetch(l->n + 3 * q);
-    fetch(&l->place[q]);
+    fetch(l->n + 3 * q + 2);
+    fetch(l->density + q);
   }
 }
 
@@ -207,9 +208,6 @@ static void fetch_surface(const cm_level *l, const cm_surface *b, int32_t v) {
     fetch(b->x + 3 * u);
     fetch(b->s + 3 * u);
     fetch(b->normal + 3 * u);
-  }
-  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
-    fetch(b->density + l->place[l->spoke[i].q].triangle);
   }
 }
 
