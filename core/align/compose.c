@@ -31,10 +31,13 @@ enum {
   HOPELESS = 9,        /* one flip in so many triangles: they will not be cleared */
   SOFT_ROUNDS = 8,
   ROUGH_SWEEPS = 40,
-  WORK = 550,        /* vertex steps a vertex, see cm_run.work */
-  UNWOUND_WORK = 250 /* that bends have at least after an unwinding that helped */
+  GIVEN_UP_WORK = 90, /* what a start would take, not left to others: draws that go on for longer gain nothing */
+  WORK = 550,          /* vertex steps a vertex, see cm_run.work */
+  UNWOUND_WORK = 250   /* that bends have at least after an unwinding that helped */
 };
 
+/* A guess of so many times the best map's energy, bent after that map, comes to no better one. */
+static const double FAR_ABOVE = 1.5;
 static const double WORSE = 2, FOLLOWS = 1e-3; /* of the triangles turned over, either way: reason to swap the shapes */
 
 static cm_effort effort_of(orb_preset preset) {
@@ -222,6 +225,10 @@ static orb_status run_start(cm_run *c, cm_start start) {
     cm_set_pull(c, &level, to_mesh, start == CM_SPATIAL ? 1 : 0);
     flips = cm_level_flips(&level);
     if (flips <= level.triangle_count / HOPELESS) {
+      if (cm_level_energy(&level) > c->hopeless) {
+        c->work -= GIVEN_UP_WORK * (int64_t)c->vertex_count;
+        goto done;
+      }
       ORB_GO(status, cm_clear_flips(c, &level, SOFT_ROUNDS, &flips), done);
     }
     int last = r->live == c->vertex_count || r->live > LAST_START;
@@ -393,7 +400,9 @@ static orb_status run_starts(cm_run *c, cm_from from, orb_preset preset) {
   while (c->best_energy < 0.99 * last && c->passes-- > 0 && c->work > 0) {
     last = c->best_energy;
     ORB_TRY(cm_bend(c, CM_SAMPLES));
+    c->hopeless = FAR_ABOVE * c->best_energy;
     ORB_TRY(run_start(c, CM_SPATIAL));
+    c->hopeless = INFINITY;
     if (!(c->best_energy < last)) {
       ORB_TRY(run_start(c, CM_DRAWN));
     }
@@ -488,6 +497,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
               .moving = moving,
               .both = both,
               .landmark_count = landmark_count,
+              .hopeless = INFINITY,
               .twisted_energy = INFINITY,
               .effort = effort_of(preset)};
   c.passes = preset == ORB_PRESET_QUALITY ? 6 : 3;

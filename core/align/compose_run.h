@@ -61,6 +61,7 @@ typedef struct cm_run {
   double *start;    /* points of a map in which all pairs meet, mesh order: as given, later as walked */
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
+  double hopeless;       /* a start whose guess is above this energy is given up */
   double twisted_energy; /* of the last map whose limbs were to be turned back */
   int rough;             /* the alignment as given is only refined to be sampled */
   int passes;            /* bends through samples of the best map */
