@@ -26,8 +26,8 @@ cmake --build build
 cmake --preset asan -DORB_TESTS=ON >/dev/null
 cmake --build build-asan
 
-# One more than there are cores: many tests wait more than they compute.
-side_by_side=$(($(nproc) + 1))
+# Two more than there are cores: most tests wait more than they compute.
+side_by_side=$(($(nproc) + 2))
 echo "== with sanitizers =="
 ctest --test-dir build-asan --output-on-failure -R '^(unit|scenario)\.' -j $side_by_side
 echo "== fuzzing, 10 s a target =="
