@@ -1,13 +1,15 @@
 /* The adaptive method: as few triangles as keep every shape within the tolerance, the bound proved (see match.h).
  *
  * The start holds every vertex of every shape; edges that stray are turned or split until the bound holds. Where that
- * comes to no end, the overlay of all shapes, which is exact, is the start instead. From then on no step leaves the
- * tolerance. In rounds: edges are collapsed, holes filled anew and neighbours merged, edges turned for well-shaped
- * triangles, and vertices moved to where the edges stray less, which makes room for the next round. Nor does any step
- * leave more triangles turned in space than it found; what the start had of them is mended in the first round, and if
- * that leaves too many, the first round is made again from the overlay, there or everywhere: the other rounds, which
- * take most of the time, are made but once. Where max_triangles asks for fewer triangles, the tolerance is raised step
- * by step until they suffice. */
+ * comes to no end, the overlay of all shapes, which is exact, is the start instead. Where the shapes are wound about
+ * each other so much that the overlay is huge, the start is the overlay of reduced shapes (see match_start.c), and
+ * edges are only collapsed and turned: what holds the tolerance there has many times the triangles of the shapes in any
+ * case, and the rest would take minutes for a few per cent. From then on no step leaves the tolerance. In rounds: edges
+ * are collapsed, holes filled anew and neighbours merged, edges turned for well-shaped triangles, and vertices moved to
+ * where the edges stray less, which makes room for the next round. Nor does any step leave more triangles turned in
+ * space than it found; what the start had of them is mended in the first round, and if that leaves too many, the first
+ * round is made again from the overlay, there or everywhere: the other rounds, which take most of the time, are made
+ * but once. Where max_triangles asks for fewer triangles, the tolerance is raised step by step until they suffice. */
 #include <math.h>
 
 #include "base/check.h"
@@ -17,6 +19,8 @@ enum { HOLDS = 32 };
 /* Of how many triangles one may be turned after the first round; one of how many is many; the most work for a start
  * from the overlay. */
 enum { FEW = 3000, MANY = 100, OVERLAY_MOST = 120000 };
+/* The overlay is huge, and the shapes wound about each other: it has so many triangles, and so many times theirs. */
+enum { HUGE_OVERLAY = 600000, HUGE_GROWTH = 12 };
 
 /* Later rounds gain a few per cent each. Large meshes, or many shapes, do without: their triangles are small against
  * the tolerance, and time counts. */
@@ -68,43 +72,24 @@ static orb_status hold(orb_context *ctx, orb_match *match, double tolerance) {
   return ORB_OK;
 }
 
-/* Starts anew from the overlay, which is exact. Without one the match stays as it is, unless it is of no use. */
-static orb_status start_from_overlay(orb_context *ctx, const orb_remesh_job *job, orb_match *match) {
-  orb_supermesh overlay = {.error_bound = ORB_NEW(ctx, double, job->shape_count)};
-  orb_net net = {0};
-  orb_status status = overlay.error_bound ? ORB_OK : ORB_E_NO_MEMORY;
-  if (match->crept) {
-    orb_match_free(ctx, match);
-  }
-  if (status == ORB_OK) {
-    status = orb_remesh_overlay(ctx, job, &overlay);
-  }
-  if (status == ORB_OK) {
-    status = orb_net_init(ctx, &net, overlay.points, overlay.vertex_count, overlay.triangles, overlay.triangle_count,
-                          overlay.vertex_count);
-  }
-  if (status == ORB_OK) {
-    orb_match_free(ctx, match);
-    status = orb_match_create_on(ctx, job, &net, match);
-  }
-  orb_net_free(ctx, &net);
-  orb_supermesh_free(ctx, &overlay);
-  return status;
-}
-
 static orb_status begin(orb_context *ctx, orb_match *match, double limit2) {
   ORB_TRY(orb_match_turn_all(ctx, match, limit2, 1));
   return first_round(ctx, match, limit2, 0, 1);
+}
+
+static int64_t triangles_of(const orb_remesh_job *job) {
+  int64_t inputs = 0;
+  for (int32_t s = 0; s < job->shape_count; s++) {
+    inputs += job->shapes[s].mesh.triangle_count;
+  }
+  return inputs;
 }
 
 /* Where the first round leaves too many triangles turned: again from the overlay around them; or from all of the
  * overlay, unless that is too large, if they are very many or that has not helped. */
 static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_match *match, double tolerance,
                              int is_overlay) {
-  int64_t turned = orb_match_turned(ctx, match), live = orb_match_live(match), inputs = 0;
-  for (int32_t s = 0; s < job->shape_count; s++) {
-    inputs += job->shapes[s].mesh.triangle_count;
-  }
+  int64_t turned = orb_match_turned(ctx, match), live = orb_match_live(match), inputs = triangles_of(job);
   if (turned * FEW <= live) {
     return ORB_OK;
   }
@@ -121,12 +106,27 @@ static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_ma
     return ORB_OK;
   }
   int needed = match->crept;
-  orb_status status = start_from_overlay(ctx, job, match);
+  orb_status status = orb_match_start_from_overlay(ctx, job, match);
   if (status == ORB_E_NOT_CERTIFIED && !needed) {
     orb_error_clear(ctx); /* what there is holds the bound, too, with more triangles turned */
     return ORB_OK;
   }
   return status == ORB_OK ? begin(ctx, match, tolerance * tolerance) : status;
+}
+
+/* For shapes that are wound about each other: the whole of it, to a net within the tolerance. */
+static orb_status unwind(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_match *match) {
+  double limit2 = tolerance * tolerance;
+  ORB_TRY(orb_match_start_from_reduced(ctx, job, limit2, match));
+  orb_progress(ctx, "remesh", 0.3);
+  ORB_TRY(hold(ctx, match, tolerance));
+  if (match->crept) {
+    ORB_TRY(orb_match_start_from_overlay(ctx, job, match));
+  }
+  orb_progress(ctx, "remesh", 0.4);
+  ORB_TRY(orb_match_collapse(ctx, match, limit2, 0, 1, 0));
+  ORB_TRY(orb_match_compact(ctx, match));
+  return orb_match_turn_all(ctx, match, limit2, 0);
 }
 
 /* From a start within the tolerance, by steps none of which leaves it. */
@@ -159,26 +159,42 @@ static orb_status relax(orb_context *ctx, orb_match *match, double tolerance, in
   return ORB_OK;
 }
 
+/* To a net within the tolerance, as small as it can well be made. */
+static orb_status approach(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_match *match) {
+  int64_t overlay = 0;
+  ORB_TRY(orb_match_overlay_size(ctx, job, &overlay));
+  if (overlay > HUGE_OVERLAY && overlay > HUGE_GROWTH * triangles_of(job)) {
+    orb_status status = unwind(ctx, job, tolerance, match);
+    if (status != ORB_E_NOT_CERTIFIED) {
+      return status;
+    }
+    orb_error_clear(ctx); /* the other way needs no overlay, perhaps */
+    orb_match_free(ctx, match);
+  }
+  ORB_TRY(orb_match_create(ctx, job, match));
+  orb_progress(ctx, "remesh", 0.15);
+  ORB_TRY(orb_match_turn_all(ctx, match, INFINITY, 1));
+  ORB_TRY(hold(ctx, match, tolerance));
+  int is_overlay = match->crept;
+  if (is_overlay) {
+    orb_match_free(ctx, match);
+    ORB_TRY(orb_match_start_from_overlay(ctx, job, match));
+  }
+  return settle(ctx, job, match, tolerance, is_overlay);
+}
+
 orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
-  orb_match match;
-  ORB_TRY(orb_match_create(ctx, job, &match));
+  orb_match match = {0};
   double tolerance = job->options->tolerance * (1 - 1e-9) - 1e-12; /* so that rounding of the bound finds room */
   int64_t most = job->options->max_triangles;
-  orb_status status;
-  orb_progress(ctx, "remesh", 0.15);
-  ORB_GO(status, orb_match_turn_all(ctx, &match, INFINITY, 1), end);
-  ORB_GO(status, hold(ctx, &match, tolerance), end);
-  int overlay = match.crept;
-  if (overlay) {
-    ORB_GO(status, start_from_overlay(ctx, job, &match), end);
-  }
-  ORB_GO(status, settle(ctx, job, &match, tolerance, overlay), end);
-  if (most > 0) {
-    ORB_GO(status, relax(ctx, &match, tolerance, most), end);
+  orb_status status = approach(ctx, job, tolerance, &match);
+  if (status == ORB_OK && most > 0) {
+    status = relax(ctx, &match, tolerance, most);
   }
   orb_progress(ctx, "remesh", 0.9);
-  ORB_GO(status, orb_match_export(ctx, &match, out), end);
-end:
+  if (status == ORB_OK) {
+    status = orb_match_export(ctx, &match, out);
+  }
   orb_match_free(ctx, &match);
   return status;
 }

@@ -171,12 +171,17 @@ void orb_match_copy_vertex(orb_match *match, int32_t to, int32_t from) {
   memcpy(match->spot + to * shapes, match->spot + from * shapes, (size_t)shapes * sizeof(orb_spot));
 }
 
+/* Vertices that follow each other mostly lie near each other; then the one before is a better start than a cell of the
+ * locator, which holds about four triangles. */
 static void settle_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   orb_match *match = arg;
   for (int64_t v = begin; v < end; v++) {
+    const double *p = match->net.points + 3 * v;
+    double apart2 = v > begin ? orb_distance2(p, p - 3) : INFINITY;
     for (int32_t s = 0; s < match->shape_count; s++) {
-      settle(match, (int32_t)v, s, -1);
+      int near = apart2 * match->view[s].triangle_count < 50;
+      settle(match, (int32_t)v, s, near ? match->spot[(v - 1) * match->shape_count + s].h / 3 : -1);
     }
   }
 }
@@ -412,8 +417,36 @@ int64_t orb_match_live(const orb_match *match) {
   return live;
 }
 
+typedef struct place_loop {
+  const orb_match *match;
+  const int32_t *number; /* a vertex: in the supermesh */
+  orb_supermesh *out;
+} place_loop;
+
+static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  place_loop *loop = arg;
+  const orb_match *match = loop->match;
+  for (int64_t v = begin; v < end; v++) {
+    for (int32_t s = 0; s < match->shape_count && match->net.out[v] >= 0; s++) {
+      orb_locate(match->job->locator[s], match->net.points + 3 * v, match->spot[v * match->shape_count + s].h / 3,
+                 &loop->out->places[(int64_t)s * loop->out->vertex_count + loop->number[v]]);
+    }
+  }
+}
+
 orb_status orb_match_export(orb_context *ctx, const orb_match *match, orb_supermesh *out) {
-  ORB_TRY(orb_net_export(ctx, &match->net, out, NULL));
-  ORB_TRY(orb_remesh_places(ctx, match->job, out));
-  return orb_match_bounds(ctx, match, out->error_bound);
+  int32_t *number = ORB_NEW(ctx, int32_t, match->net.vertex_count);
+  orb_status status = number ? orb_net_export(ctx, &match->net, out, number) : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    out->places = ORB_NEW(ctx, orb_place, (int64_t)match->shape_count * out->vertex_count);
+    status = out->places ? ORB_OK : ORB_E_NO_MEMORY;
+  }
+  if (status == ORB_OK) {
+    place_loop loop = {match, number, out};
+    orb_parallel_for(ctx, match->net.vertex_count, 512, place_range, &loop);
+    status = orb_match_bounds(ctx, match, out->error_bound);
+  }
+  orb_free(ctx, number);
+  return status;
 }

@@ -48,6 +48,15 @@ ORB_MUST_CHECK orb_status orb_match_create_on(orb_context *ctx, const orb_remesh
                                               orb_match *match);
 void orb_match_free(orb_context *ctx, orb_match *match);
 
+/* About how many triangles the overlay of all shapes has, by a sample of their edges; parallel. */
+ORB_MUST_CHECK orb_status orb_match_overlay_size(orb_context *ctx, const orb_remesh_job *job, int64_t *triangles);
+/* Starts anew from the overlay, which is exact. If there is none the match (may be zeroed) stays as it is. */
+ORB_MUST_CHECK orb_status orb_match_start_from_overlay(orb_context *ctx, const orb_remesh_job *job, orb_match *match);
+/* The same from the overlay of the shapes reduced one by one within the limit (relative, squared): far smaller where
+ * the shapes are wound about each other. Edges and items may stray a little. */
+ORB_MUST_CHECK orb_status orb_match_start_from_reduced(orb_context *ctx, const orb_remesh_job *job, double limit2,
+                                                       orb_match *match);
+
 static inline const double *orb_match_at(const orb_match *match, int32_t v, int32_t s) {
   return match->at + 3 * ((int64_t)v * match->shape_count + s);
 }

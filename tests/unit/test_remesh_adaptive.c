@@ -300,6 +300,39 @@ static void wound_maps_keep_the_tolerance(void **state) {
   }
 }
 
+/* Winds the sphere's points about the axis, by so many turns from pole to pole, ring by ring; the surface stays. */
+static void wind_points(const orb_aligned_shape *shape, double turns) {
+  for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
+    double *p = shape->points + 3 * v, turn = turns * acos(fmax(-1, fmin(1, p[2]))) * 2, x = p[0], y = p[1];
+    p[0] = cos(turn) * x - sin(turn) * y;
+    p[1] = sin(turn) * x + cos(turn) * y;
+  }
+}
+
+/* So wound that the overlay has forty times the triangles of both and more: they are reduced before they are laid over
+ * each other, and the bound holds against the shapes themselves. */
+static void huge_overlays_are_not_needed(void **state) {
+  (void)state;
+  orb_context *ctx = remesh_context(2);
+  orb_aligned_shape shapes[2];
+  orb_certificate certificate;
+  sphere_shape(ctx, SPHERE_UV, 97, 0, 0, &shapes[0]);
+  sphere_shape(ctx, SPHERE_UV, 100, 0, 0, &shapes[1]);
+  wind_points(&shapes[0], 3);
+  wind_points(&shapes[1], -3);
+  for (int s = 0; s < 2; s++) {
+    const orb_mesh *mesh = &shapes[s].mesh;
+    assert_int_equal(
+        orb_certify(ctx, shapes[s].points, mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate),
+        ORB_OK);
+    assert_true(certificate.valid);
+  }
+  check(shapes, 2, ctx, 0.02);
+  sphere_shape_free(ctx, &shapes[0]);
+  sphere_shape_free(ctx, &shapes[1]);
+  orb_context_destroy(ctx);
+}
+
 static void four_shapes(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(2);
@@ -538,6 +571,7 @@ int main(void) {
       cmocka_unit_test(sheared_maps_keep_the_tolerance),
       cmocka_unit_test(flattened_belts_do_not_creep),
       cmocka_unit_test(wound_maps_keep_the_tolerance),
+      cmocka_unit_test(huge_overlays_are_not_needed),
       cmocka_unit_test(four_shapes),
       cmocka_unit_test(landmarks_and_limits_are_kept),
       cmocka_unit_test(sharp_edges_survive),

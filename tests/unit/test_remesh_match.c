@@ -139,6 +139,30 @@ static void mending_leaves_no_stray(void **state) {
   }
 }
 
+/* The overlay of the reduced shapes is smaller than that of the shapes, all of their vertices lie in it, and it needs
+ * little to be within the limit. How large the overlay is, is told well enough. */
+static void reduced_shapes_give_a_start(void **state) {
+  (void)state;
+  bench b;
+  set_up(&b, 3, 2);
+  orb_match_free(b.ctx, &b.match);
+  int64_t told, exact, strays;
+  assert_int_equal(orb_match_overlay_size(b.ctx, &b.job, &told), ORB_OK);
+  assert_int_equal(orb_match_start_from_overlay(b.ctx, &b.job, &b.match), ORB_OK);
+  assert_sound(&b);
+  exact = orb_match_live(&b.match);
+  assert_true(10 * told > 8 * exact && 10 * told < 12 * exact);
+  assert_int_equal(orb_match_start_from_reduced(b.ctx, &b.job, LIMIT * LIMIT, &b.match), ORB_OK);
+  assert_sound(&b);
+  assert_true(orb_match_live(&b.match) < exact);
+  assert_int_equal(orb_match_refine(b.ctx, &b.match, LIMIT * LIMIT, &strays), ORB_OK);
+  assert_true(strays < orb_match_live(&b.match) / 4);
+  refine(&b);
+  assert_within(&b);
+  assert_sound(&b);
+  tear_down(&b);
+}
+
 /* Collapses, merges, turns and moves keep the limit, and turn no triangle. */
 static void reducing_keeps_the_limit(void **state) {
   (void)state;
@@ -231,11 +255,9 @@ static void flat_triangles_are_as_near_as_their_sides(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(mending_leaves_no_stray),
-      cmocka_unit_test(reducing_keeps_the_limit),
-      cmocka_unit_test(merges_stop_at_the_target),
-      cmocka_unit_test(resolving_can_be_held),
-      cmocka_unit_test(flat_triangles_are_as_near_as_their_sides),
+      cmocka_unit_test(mending_leaves_no_stray),  cmocka_unit_test(reduced_shapes_give_a_start),
+      cmocka_unit_test(reducing_keeps_the_limit), cmocka_unit_test(merges_stop_at_the_target),
+      cmocka_unit_test(resolving_can_be_held),    cmocka_unit_test(flat_triangles_are_as_near_as_their_sides),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
