@@ -32,8 +32,8 @@ enum {
   SOFT_ROUNDS = 8,
   ROUGH_SWEEPS = 40,
   GIVEN_UP_WORK = 90, /* what a start would take, not left to others: draws that go on for longer gain nothing */
-  WORK = 550,          /* vertex steps a vertex, see cm_run.work */
-  UNWOUND_WORK = 250   /* that bends have at least after an unwinding that helped */
+  WORK = 550,         /* vertex steps a vertex, see cm_run.work */
+  UNWOUND_WORK = 250  /* that bends have at least after an unwinding that helped */
 };
 
 /* A guess of so many times the best map's energy, bent after that map, comes to no better one. */
@@ -278,11 +278,11 @@ orb_status cm_full_level(cm_run *c, const double *points, const orb_surface *s, 
     memcpy(c->position + 3 * v, c->x + 3 * (size_t)s->to_mesh[v], sizeof(double[3]));
   }
   orb_status status = cm_level_create(ctx, s, flags, flags + n, c->position, c->vertex_count, c->local, level);
-  for (int32_t v = 0, hint = -1; status == ORB_OK && v < level->count; v++) {
+  for (int32_t v = 0; status == ORB_OK && v < level->count; v++) {
     memcpy(level->x + 3 * (size_t)v, points + 3 * (size_t)s->to_mesh[level->vertex[v]], sizeof(double[3]));
-    cm_level_locate(level, &c->b, v, hint);
-    hint = level->place[v].triangle;
-    status = (v & 4095) == 4095 ? orb_context_check(ctx) : ORB_OK;
+  }
+  if (status == ORB_OK) {
+    status = cm_level_locate_all(ctx, level, &c->b, 1);
   }
   orb_free(ctx, flags);
   return status;

@@ -5,10 +5,11 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "embed/loops.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { MAX_COLOURS = 64 };
+enum { MAX_COLOURS = 64, LOCATE_SLICE = 8192, LOCATE_GRAIN = 256 };
 static const double MOLLIFY = 1e-3; /* least slack of a triangle's longest edge, relative to its mean edge */
 static const double CAP = 20;
 
@@ -221,6 +222,30 @@ void cm_level_refresh(cm_level *l, const cm_surface *b, int32_t v) {
 void cm_level_locate(cm_level *l, const cm_surface *b, int32_t v, int32_t hint) {
   orb_locate(b->locator, l->x + 3 * (size_t)v, hint, &l->place[v]);
   cm_level_refresh(l, b, v);
+}
+
+typedef struct locate_job {
+  cm_level *level;
+  const cm_surface *b;
+  int fresh;
+} locate_job;
+
+static void locate_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const locate_job *job = arg;
+  cm_level *l = job->level;
+  (void)thread;
+  for (int32_t v = (int32_t)begin; v < end; v++) {
+    if (job->fresh) {
+      cm_level_locate(l, job->b, v, v > begin ? l->place[v - 1].triangle : -1);
+    } else if (!l->pinned[v]) {
+      cm_level_locate(l, job->b, v, l->place[v].triangle);
+    }
+  }
+}
+
+orb_status cm_level_locate_all(orb_context *ctx, cm_level *l, const cm_surface *b, int fresh) {
+  locate_job job = {l, b, fresh};
+  return orb_sliced_by(ctx, l->count, LOCATE_SLICE, LOCATE_GRAIN, locate_range, &job);
 }
 
 int32_t cm_level_flips(const cm_level *l) {

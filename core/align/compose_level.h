@@ -48,6 +48,9 @@ void cm_level_free(orb_context *ctx, cm_level *level);
 void cm_level_refresh(cm_level *level, const cm_surface *b, int32_t v);
 /* Sets place, y, n and density from x. */
 void cm_level_locate(cm_level *level, const cm_surface *b, int32_t v, int32_t hint);
+/* The same for all vertices. fresh: they have no places yet; else those that are pinned keep theirs, and the others
+ * are looked for from where they were. */
+ORB_MUST_CHECK orb_status cm_level_locate_all(orb_context *ctx, cm_level *level, const cm_surface *b, int fresh);
 
 /* One pass of damped Newton steps over all vertices that are not pinned, colour by colour. *moved: mean length;
  * *stepped: how many vertices did not wait. */

@@ -6,7 +6,7 @@
 #include "base/check.h"
 #include "numeric/vec3.h"
 
-enum { SOFT_SWEEPS = 20, DRAW_ROUNDS = 5, DRAW_SWEEPS = 40, CLEARINGS = 8, CHECK_EVERY = 4096 };
+enum { SOFT_SWEEPS = 20, DRAW_ROUNDS = 5, DRAW_SWEEPS = 40, CLEARINGS = 8 };
 static const double EPSILON = 0.1;
 static const double FIRST_BARRIER = 1e-4;
 static const double STILL = 1e-3; /* of a mean edge: less does not count as moving */
@@ -20,18 +20,6 @@ cm_rules cm_soft(double barrier) {
 
 cm_rules cm_hard(void) {
   return (cm_rules){.soft = 0, .barrier = 1, .epsilon = EPSILON, .omega = OVER};
-}
-
-orb_status cm_relocate(cm_run *c, cm_level *l) {
-  for (int32_t v = 0; v < l->count; v++) {
-    if (v % CHECK_EVERY == 0) {
-      ORB_TRY(orb_context_check(c->ctx));
-    }
-    if (!l->pinned[v]) {
-      cm_level_locate(l, &c->b, v, l->place[v].triangle);
-    }
-  }
-  return ORB_OK;
 }
 
 /* All vertices take part in the first one. */
@@ -80,7 +68,7 @@ orb_status cm_clear_flips(cm_run *c, cm_level *l, int rounds, int32_t *flips) {
       if (*flips) {
         memcpy(l->x, copy, 3 * (size_t)l->count * sizeof *copy);
       } else {
-        ORB_GO(status, cm_relocate(c, l), done);
+        ORB_GO(status, cm_level_locate_all(c->ctx, l, &c->b, 0), done);
       }
     }
   }

@@ -111,8 +111,6 @@ typedef struct cm_map_copy {
 ORB_MUST_CHECK orb_status cm_map_copy_take(cm_run *run, const cm_level *level, cm_map_copy *out);
 void cm_map_copy_restore(const cm_map_copy *copy, cm_level *level);
 void cm_map_copy_free(cm_run *run, cm_map_copy *copy);
-/* Every vertex that is not pinned is looked for again where its point is, from the triangle that it had on. */
-ORB_MUST_CHECK orb_status cm_relocate(cm_run *run, cm_level *level);
 /* Flips are driven out: sweeps against a growing barrier, then untangling of a copy, until that succeeds. */
 ORB_MUST_CHECK orb_status cm_clear_flips(cm_run *run, cm_level *level, int rounds, int32_t *flips);
 /* Vertices that barriers have locked in get free where flips are allowed for a while. What comes of it is kept if it

@@ -11,6 +11,7 @@
 
 #include "align/compose.h"
 #include "base/check.h"
+#include "embed/loops.h"
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 
@@ -20,7 +21,8 @@ enum {
   LAST_CONTROLS = 300,
   RIGID_SAMPLES = 150,
   RIGID_STEPS = 20,
-  FIXED_SEARCH = 50000
+  FIXED_SEARCH = 50000,
+  SLICE = 8192
 };
 static const double NORMAL_WEIGHT = 0.25; /* of |n − n'|², against |x − x'|² */
 static const double FIRST_STIFFNESS = 1.0, LAST_STIFFNESS = 0.02, LANDMARK_STIFFNESS = 1e-6, SAMPLE_STIFFNESS = 0.1;
@@ -46,6 +48,7 @@ typedef struct targets_run {
   spline s;
   double base[12]; /* the similarity that the spline departs from, laid out like its affine part */
   double *matrix;
+  double *out; /* targets, 3 a vertex */
 } targets_run;
 
 /* The spline at p, and its Jacobian (row-major, NULL: not wanted). */
@@ -368,6 +371,14 @@ static void base_of_anchors(targets_run *run) {
   memcpy(run->base, run->s.weight, sizeof run->base);
 }
 
+static void bend_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const targets_run *run = arg;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    spline_at(&run->s, run->x + 3 * v, run->out + 3 * v, NULL);
+  }
+}
+
 static orb_status targets_compute(targets_run *run, double *out, double *fit) {
   run->control_count = run->vertex_count < LAST_CONTROLS ? run->vertex_count : LAST_CONTROLS;
   ORB_TRY(cm_spread(run->ctx, run->x, run->vertex_count, run->control_count, run->control));
@@ -386,10 +397,8 @@ static orb_status targets_compute(targets_run *run, double *out, double *fit) {
     controls = controls < run->control_count ? controls : run->control_count;
     ORB_TRY(icp_round(run, controls, FIRST_STIFFNESS * pow(LAST_STIFFNESS / FIRST_STIFFNESS, f), fit));
   }
-  for (int32_t v = 0; v < run->vertex_count; v++) {
-    spline_at(&run->s, run->x + 3 * (size_t)v, out + 3 * (size_t)v, NULL);
-  }
-  return ORB_OK;
+  run->out = out;
+  return orb_sliced_by(run->ctx, run->vertex_count, SLICE, 64, bend_range, run);
 }
 
 orb_status cm_spatial_targets(orb_context *ctx, const cm_surface *b, const double *x, const double *normal,

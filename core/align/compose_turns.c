@@ -4,32 +4,43 @@
 
 #include "align/compose_twist.h"
 #include "base/check.h"
+#include "embed/loops.h"
 #include "numeric/vec3.h"
+
+enum { SLICE = 8192 };
 
 typedef struct turns_run {
   orb_context *ctx;
   const cm_surface *b;
   const cm_image *map;
   double *back, *turn;
+  orb_locator *locator; /* on the map's points */
 } turns_run;
+
+static void trace_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const turns_run *run = arg;
+  const cm_image *m = run->map;
+  orb_place place = {.triangle = -1};
+  (void)thread;
+  for (int64_t w = begin; w < end; w++) {
+    orb_locate(run->locator, run->b->s + 3 * w, place.triangle, &place);
+    const int32_t *v = m->triangles + 3 * (size_t)place.triangle;
+    for (int k = 0; k < 3; k++) {
+      run->back[3 * w + k] = place.at[0] * m->x[3 * (size_t)v[0] + (size_t)k] +
+                             place.at[1] * m->x[3 * (size_t)v[1] + (size_t)k] +
+                             place.at[2] * m->x[3 * (size_t)v[2] + (size_t)k];
+    }
+  }
+}
 
 /* Where the surface's vertices come from, by the map. */
 static orb_status trace_back(turns_run *run) {
   const cm_image *m = run->map;
-  orb_locator *locator;
-  orb_place place = {.triangle = -1};
-  ORB_TRY(orb_locator_create(run->ctx, m->points, m->vertex_count, m->triangles, m->triangle_count, NULL, &locator));
-  for (int32_t w = 0; w < run->b->vertex_count; w++) {
-    orb_locate(locator, run->b->s + 3 * (size_t)w, place.triangle, &place);
-    const int32_t *v = m->triangles + 3 * (size_t)place.triangle;
-    for (int k = 0; k < 3; k++) {
-      run->back[3 * (size_t)w + (size_t)k] = place.at[0] * m->x[3 * (size_t)v[0] + (size_t)k] +
-                                             place.at[1] * m->x[3 * (size_t)v[1] + (size_t)k] +
-                                             place.at[2] * m->x[3 * (size_t)v[2] + (size_t)k];
-    }
-  }
-  orb_locator_destroy(run->ctx, locator);
-  return orb_context_check(run->ctx);
+  ORB_TRY(
+      orb_locator_create(run->ctx, m->points, m->vertex_count, m->triangles, m->triangle_count, NULL, &run->locator));
+  orb_status status = orb_sliced_by(run->ctx, run->b->vertex_count, SLICE, 256, trace_range, run);
+  orb_locator_destroy(run->ctx, run->locator);
+  return status;
 }
 
 /* The rotation of the whole: of all triangles' centres, weighted by area. */
@@ -140,7 +151,7 @@ static orb_status measure_turns(turns_run *run, double *kept) {
 
 orb_status cm_turns_measure(orb_context *ctx, const cm_surface *b, const cm_image *map, double *back, double *turn,
                             double *kept) {
-  turns_run run = {ctx, b, map, back, turn};
+  turns_run run = {.ctx = ctx, .b = b, .map = map, .back = back, .turn = turn};
   ORB_TRY(trace_back(&run));
   return measure_turns(&run, kept);
 }

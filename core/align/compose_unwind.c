@@ -51,7 +51,7 @@ static void turn_range(void *arg, int64_t begin, int64_t end, int thread) {
 /* Places are looked for again only if no flip is left: else the level is given up. */
 static orb_status untangle(cm_run *c, cm_level *l, int32_t *flips) {
   ORB_TRY(cm_level_untangle(c->ctx, l, flips, &c->work));
-  return *flips == 0 ? cm_relocate(c, l) : ORB_OK;
+  return *flips == 0 ? cm_level_locate_all(c->ctx, l, &c->b, 0) : ORB_OK;
 }
 
 static orb_status find_twists(cm_run *c, const double *points, cm_twists *out) {
