@@ -19,7 +19,8 @@ enum { HOLDS = 32 };
 /* Of how many triangles one may be turned after the first round; one of how many is many; the most work for a start
  * from the overlay. */
 enum { FEW = 3000, MANY = 100, OVERLAY_MOST = 120000 };
-/* The overlay is huge, and the shapes wound about each other: it has so many triangles, and so many times theirs. */
+/* The overlay is huge, and the shapes wound about each other: it has so many triangles, and so many times theirs for
+ * each shape after the first (shapes that lie well have four or five times theirs for each). */
 enum { HUGE_OVERLAY = 600000, HUGE_GROWTH = 12 };
 
 /* Later rounds gain a few per cent each. Large meshes, or many shapes, do without: their triangles are small against
@@ -163,7 +164,7 @@ static orb_status relax(orb_context *ctx, orb_match *match, double tolerance, in
 static orb_status approach(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_match *match) {
   int64_t overlay = 0;
   ORB_TRY(orb_match_overlay_size(ctx, job, &overlay));
-  if (overlay > HUGE_OVERLAY && overlay > HUGE_GROWTH * triangles_of(job)) {
+  if (overlay > HUGE_OVERLAY && overlay > HUGE_GROWTH * (job->shape_count - 1) * triangles_of(job)) {
     orb_status status = unwind(ctx, job, tolerance, match);
     if (status != ORB_E_NOT_CERTIFIED) {
       return status;
