@@ -16,9 +16,9 @@
 #include "remesh/match.h"
 
 enum { HOLDS = 32 };
-/* Of how many triangles one may be turned after the first round; one of how many is many; the most work for a start
- * from the overlay. */
-enum { FEW = 3000, MANY = 100, OVERLAY_MOST = 120000 };
+/* Of how many triangles one may be turned after the first round, and once that is mended; one of how many is many; the
+ * most work for a start from the overlay. */
+enum { FEW = 3000, SOME = 1000, MANY = 100, OVERLAY_MOST = 120000 };
 /* The overlay is huge, and the shapes wound about each other: it has so many triangles, and so many times theirs for
  * each shape after the first (shapes that lie well have four or five times theirs for each). */
 enum { HUGE_OVERLAY = 600000, HUGE_GROWTH = 12 };
@@ -100,7 +100,8 @@ static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_ma
     ORB_TRY(hold(ctx, match, tolerance));
     if (!match->crept) {
       ORB_TRY(begin(ctx, match, tolerance * tolerance));
-      anew = may && orb_match_turned(ctx, match) * 3 > turned * 2;
+      int64_t left = orb_match_turned(ctx, match);
+      anew = may && left * 3 > turned * 2 && left * SOME > live;
     }
   }
   if (!anew && !match->crept) {
