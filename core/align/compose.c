@@ -38,6 +38,7 @@ enum {
 
 /* A guess of so many times the best map's energy, bent after that map, comes to no better one. */
 static const double FAR_ABOVE = 1.5;
+static const double WOUND = 2;                 /* energy of a rough map from which on limbs are turned back at once */
 static const double WORSE = 2, FOLLOWS = 1e-3; /* of the triangles turned over, either way: reason to swap the shapes */
 
 static cm_effort effort_of(orb_preset preset) {
@@ -340,6 +341,19 @@ static orb_status unwind_early(cm_run *c) {
   return ORB_OK;
 }
 
+/* A rough map of much energy has limbs that are wound: drawn to its targets it folds, and samples of it are wound too.
+ * So limbs are turned back before it is drawn. If that does not help, it has cost the draws nothing. */
+static orb_status unwind_first(cm_run *c) {
+  double before = c->best_energy;
+  int64_t work = c->work;
+  if (before <= WOUND) {
+    return ORB_OK;
+  }
+  ORB_TRY(unwind_early(c));
+  c->work = c->best_energy < before ? c->work : work;
+  return ORB_OK;
+}
+
 /* A spatial start that nearly came to a map, and one more without the guesses: a guess that lies a little beside its
  * true place folds what the landmarks alone do not. If that leads to nothing better, all is as it was before. */
 static orb_status start_without_guesses(cm_run *c) {
@@ -394,6 +408,7 @@ static orb_status run_starts(cm_run *c, cm_from from, orb_preset preset) {
   }
   ORB_TRY(meet_pairs(c));
   ORB_TRY(run_start(c, CM_GIVEN)); /* without flips and cheap, and the better it is the further the others get */
+  ORB_TRY(unwind_first(c));
   ORB_TRY(run_start(c, CM_DRAWN));
   ORB_TRY(unwind_early(c));
   double last = INFINITY;
