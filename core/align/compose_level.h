@@ -66,7 +66,8 @@ int cm_level_try(cm_level *level, const cm_surface *b, const cm_rules *rules, in
 int32_t cm_level_flips(const cm_level *level);
 /* Marks the vertices of such triangles, and so many rings about them; the others' marks are 0. next: room for as many
  * (compose_untangle.c). */
-void cm_level_mark_flips(const cm_level *level, int rings, unsigned char *mark, unsigned char *next);
+ORB_MUST_CHECK orb_status cm_level_mark_flips(orb_context *ctx, const cm_level *level, int rings, unsigned char *mark,
+                                              unsigned char *next);
 /* Optimises flipped neighbourhoods on the sphere until no flip is left (compose_untangle.c); *left: how many are;
  * *work: falls by the steps it took. Only x changes, and only near flips. */
 ORB_MUST_CHECK orb_status cm_level_untangle(orb_context *ctx, cm_level *level, int32_t *left, int64_t *work);

@@ -70,7 +70,7 @@ orb_status cm_release(cm_run *c, cm_level *l, const int32_t *to_mesh, int32_t *f
   if (status != ORB_OK) {
     goto done;
   }
-  cm_level_mark_flips(l, RELEASE_RINGS, released + n, released + 2 * n);
+  ORB_GO(status, cm_level_mark_flips(ctx, l, RELEASE_RINGS, released + n, released + 2 * n), done);
   memcpy(home, l->x, 3 * n * sizeof *home);
   cm_set_pull(c, l, to_mesh, 1);
   for (size_t v = 0; v < n; v++) {
@@ -98,7 +98,11 @@ orb_status cm_keep_sound(cm_run *c, const cm_level *l, const int32_t *to_mesh) {
   if (!mark) {
     return ORB_E_NO_MEMORY;
   }
-  cm_level_mark_flips(l, SOUND_RINGS, mark, mark + n);
+  orb_status status = cm_level_mark_flips(c->ctx, l, SOUND_RINGS, mark, mark + n);
+  if (status != ORB_OK) {
+    orb_free(c->ctx, mark);
+    return status;
+  }
   memset(c->sound, 0, (size_t)c->vertex_count);
   for (size_t i = 0; i < n; i++) {
     int32_t v = to_mesh[l->vertex[i]];

@@ -7,6 +7,7 @@
  * 2021).
  */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "align/compose_level.h"
@@ -15,7 +16,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { FEW = 12, ROUNDS = 60, STALE = 12, PASSES = 6, RINGS_MOST = 5, TRIES = 6 };
+enum { TURN_GRAIN = 1024, FEW = 12, ROUNDS = 60, STALE = 12, PASSES = 6, RINGS_MOST = 5, TRIES = 6 };
 
 static double chi(double d, double e) {
   double root = sqrt(d * d + e * e);
@@ -94,14 +95,29 @@ static void step(cm_level *l, int32_t v, double least_epsilon) {
   }
 }
 
+typedef struct turn_job {
+  const cm_level *l;
+  unsigned char *turned; /* of each triangle: does not turn positively */
+} turn_job;
+
+static void turn_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const turn_job *job = arg;
+  const cm_level *l = job->l;
+  (void)thread;
+  for (int64_t t = begin; t < end; t++) {
+    const int32_t *v = l->triangle + 3 * t;
+    job->turned[t] = orb_orient(point(l, v[0]), point(l, v[1]), point(l, v[2])) <= 0;
+  }
+}
+
 /* Marks the vertices of triangles that do not turn positively; how many such triangles, and the worst determinant. */
-static int32_t mark_flips(const cm_level *l, unsigned char *mark, double *worst) {
+static int32_t mark_flips(const cm_level *l, const unsigned char *turned, unsigned char *mark, double *worst) {
   int32_t flips = 0;
   memset(mark, 0, (size_t)l->count);
   *worst = 0;
   for (int32_t t = 0; t < l->triangle_count; t++) {
     const int32_t *v = l->triangle + 3 * (size_t)t;
-    if (orb_orient(point(l, v[0]), point(l, v[1]), point(l, v[2])) <= 0) {
+    if (turned[t]) {
       mark[v[0]] = mark[v[1]] = mark[v[2]] = 1;
       *worst = fmin(*worst, orb_det(point(l, v[0]), point(l, v[1]), point(l, v[2])));
       flips++;
@@ -123,20 +139,121 @@ static void grow_marks(const cm_level *l, int rings, unsigned char *mark, unsign
   }
 }
 
-void cm_level_mark_flips(const cm_level *l, int rings, unsigned char *mark, unsigned char *next) {
+orb_status cm_level_mark_flips(orb_context *ctx, const cm_level *l, int rings, unsigned char *mark,
+                               unsigned char *next) {
   double worst;
-  (void)mark_flips(l, mark, &worst);
+  turn_job turn = {l, ORB_NEW(ctx, unsigned char, l->triangle_count)};
+  if (!turn.turned) {
+    return ORB_E_NO_MEMORY;
+  }
+  orb_parallel_for(ctx, l->triangle_count, TURN_GRAIN, turn_range, &turn);
+  (void)mark_flips(l, turn.turned, mark, &worst);
   grow_marks(l, rings, mark, next);
+  orb_free(ctx, turn.turned);
+  return ORB_OK;
+}
+
+/* Parts of what is marked that no edge joins: steps in one know nothing of another, so each goes on a thread of its
+ * own, its vertices in their order, and what comes of it is the same. */
+typedef struct island {
+  int32_t first, size;
+} island;
+
+typedef struct islands {
+  cm_level *level;
+  double least_epsilon;
+  int32_t count;
+  island *list;
+  int32_t *part;   /* union-find; of a vertex that stays: −1 */
+  int32_t *order;  /* vertices by island */
+  int32_t *number; /* of an island, by its lowest vertex */
+} islands;
+
+static int32_t find_part(int32_t *part, int32_t v) {
+  while (part[v] != v) {
+    v = part[v] = part[part[v]];
+  }
+  return v;
+}
+
+static int by_size(const void *a, const void *b) {
+  const island *x = a, *y = b;
+  return x->size != y->size ? (x->size < y->size) - (x->size > y->size) : (x->first > y->first) - (x->first < y->first);
+}
+
+/* Joins the marked vertices that an edge joins; the lowest of each island stands for it. */
+static void join_islands(islands *is, const unsigned char *mark) {
+  const cm_level *l = is->level;
+  for (int32_t v = 0; v < l->count; v++) {
+    is->part[v] = mark[v] && !l->pinned[v] ? v : -1;
+  }
+  for (int32_t v = 0; v < l->count; v++) {
+    for (int32_t i = l->start[v]; is->part[v] >= 0 && i < l->start[v + 1]; i++) {
+      int32_t q = l->spoke[i].q;
+      if (is->part[q] >= 0) {
+        int32_t a = find_part(is->part, v), b = find_part(is->part, q);
+        is->part[a > b ? a : b] = a > b ? b : a;
+      }
+    }
+  }
+}
+
+/* Lists the islands, the largest first. Returns how many vertices are to move. */
+static int32_t list_islands(islands *is) {
+  int32_t n = is->level->count, total = 0;
+  is->count = 0;
+  for (int32_t v = 0; v < n; v++) {
+    if (is->part[v] >= 0) {
+      is->part[v] = find_part(is->part, v);
+      if (is->part[v] == v) {
+        is->number[v] = is->count;
+        is->list[is->count++] = (island){0, 0};
+      }
+      is->list[is->number[is->part[v]]].size++;
+    }
+  }
+  for (int32_t i = 0; i < is->count; i++) {
+    is->list[i].first = total;
+    total += is->list[i].size;
+    is->list[i].size = 0;
+  }
+  for (int32_t v = 0; v < n; v++) {
+    if (is->part[v] >= 0) {
+      island *at = &is->list[is->number[is->part[v]]];
+      is->order[at->first + at->size++] = v;
+    }
+  }
+  qsort(is->list, (size_t)is->count, sizeof *is->list, by_size);
+  return total;
+}
+
+static void untangle_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const islands *is = arg;
+  (void)thread;
+  for (int64_t k = begin; k < end; k++) {
+    const int32_t *vertex = is->order + is->list[k].first;
+    for (int pass = 0; pass < PASSES; pass++) {
+      for (int32_t i = 0; i < is->list[k].size; i++) {
+        step(is->level, vertex[i], is->least_epsilon);
+      }
+    }
+  }
 }
 
 orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left, int64_t *work) {
-  unsigned char *mark = ORB_NEW(ctx, unsigned char, l->count), *next = ORB_NEW(ctx, unsigned char, l->count);
-  orb_status status = mark && next ? ORB_OK : ORB_E_NO_MEMORY;
+  size_t n = (size_t)l->count;
+  unsigned char *mark = ORB_NEW(ctx, unsigned char, 2 * n), *next = mark ? mark + n : NULL;
+  turn_job turn = {l, ORB_NEW(ctx, unsigned char, l->triangle_count)};
+  islands is = {.level = l, .part = ORB_NEW(ctx, int32_t, 3 * n), .list = ORB_NEW(ctx, island, n)};
+  orb_status status = mark && turn.turned && is.part && is.list ? ORB_OK : ORB_E_NO_MEMORY;
   int32_t fewest = INT32_MAX;
   int stale = 0; /* rounds since there were fewest flips */
+  is.order = is.part ? is.part + n : NULL;
+  is.number = is.part ? is.part + 2 * n : NULL;
   for (int round = 0; status == ORB_OK; round++) {
     double worst;
-    *left = mark_flips(l, mark, &worst);
+    orb_parallel_for(ctx, l->triangle_count, TURN_GRAIN, turn_range, &turn);
+    *left = mark_flips(l, turn.turned, mark, &worst);
     stale = *left < fewest ? 0 : stale + 1;
     fewest = *left < fewest ? *left : fewest;
     if (*left == 0 || round == ROUNDS || stale > STALE) {
@@ -146,18 +263,15 @@ orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left, int64
     grow_marks(l, rings < RINGS_MOST ? rings : RINGS_MOST, mark, next);
     /* Many flips need one ε for all; the last few hide in stars far smaller than that. */
     double scale = 1.0 / l->triangle_count;
-    double epsilon = *left > FEW && round % 3 ? sqrt(1e-8 * scale * scale + 0.04 * worst * worst) : 0;
-    for (int pass = 0; pass < PASSES; pass++) {
-      for (int32_t v = 0; v < l->count; v++) {
-        if (mark[v] && !l->pinned[v]) {
-          step(l, v, epsilon);
-          --*work;
-        }
-      }
-    }
+    is.least_epsilon = *left > FEW && round % 3 ? sqrt(1e-8 * scale * scale + 0.04 * worst * worst) : 0;
+    join_islands(&is, mark);
+    *work -= PASSES * (int64_t)list_islands(&is);
+    orb_parallel_for(ctx, is.count, 1, untangle_range, &is);
     status = orb_context_check(ctx);
   }
   orb_free(ctx, mark);
-  orb_free(ctx, next);
+  orb_free(ctx, turn.turned);
+  orb_free(ctx, is.part);
+  orb_free(ctx, is.list);
   return status;
 }
