@@ -38,7 +38,8 @@ enum {
 
 /* A guess of so many times the best map's energy, bent after that map, comes to no better one. */
 static const double FAR_ABOVE = 1.5;
-static const double WOUND = 2;                 /* energy of a rough map from which on limbs are turned back at once */
+/* A rough map from this energy on, with no more of the area left halfway of a morph: limbs are turned back at once. */
+static const double WOUND = 2, WOUND_KEPT = 0.9;
 static const double WORSE = 2, FOLLOWS = 1e-3; /* of the triangles turned over, either way: reason to swap the shapes */
 
 static cm_effort effort_of(orb_preset preset) {
@@ -333,23 +334,24 @@ static orb_status meet_pairs(cm_run *c) {
 
 /* Twisted limbs are turned back before the best map is bent again: targets that follow twists keep them. What the
  * bends are for then is new, so there is some work for them. */
-static orb_status unwind_early(cm_run *c) {
+static orb_status unwind_early(cm_run *c, double most_kept) {
   double twisted = c->best_energy;
   int64_t least = UNWOUND_WORK * (int64_t)c->vertex_count;
-  ORB_TRY(cm_unwind(c));
+  ORB_TRY(cm_unwind(c, most_kept));
   c->work = c->best_energy < twisted && c->work < least ? least : c->work;
   return ORB_OK;
 }
 
-/* A rough map of much energy has limbs that are wound: drawn to its targets it folds, and samples of it are wound too.
- * So limbs are turned back before it is drawn. If that does not help, it has cost the draws nothing. */
+/* A rough map of much energy that is thin halfway has limbs that are wound: drawn to its targets it folds, and samples
+ * of it are wound too. So limbs are turned back before it is drawn. If that does not help, it has cost the draws
+ * nothing. */
 static orb_status unwind_first(cm_run *c) {
   double before = c->best_energy;
   int64_t work = c->work;
   if (before <= WOUND) {
     return ORB_OK;
   }
-  ORB_TRY(unwind_early(c));
+  ORB_TRY(unwind_early(c, WOUND_KEPT));
   c->work = c->best_energy < before ? c->work : work;
   return ORB_OK;
 }
@@ -410,7 +412,7 @@ static orb_status run_starts(cm_run *c, cm_from from, orb_preset preset) {
   ORB_TRY(run_start(c, CM_GIVEN)); /* without flips and cheap, and the better it is the further the others get */
   ORB_TRY(unwind_first(c));
   ORB_TRY(run_start(c, CM_DRAWN));
-  ORB_TRY(unwind_early(c));
+  ORB_TRY(unwind_early(c, INFINITY));
   double last = INFINITY;
   while (c->best_energy < 0.99 * last && c->passes-- > 0 && c->work > 0) {
     last = c->best_energy;
@@ -531,7 +533,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   ORB_GO(status, prepare_levels(&c), done);
   ORB_GO(status, run_starts(&c, from, preset), done);
   if (from != CM_MAP_ONLY) {
-    ORB_GO(status, cm_unwind(&c), done);
+    ORB_GO(status, cm_unwind(&c, INFINITY), done);
   }
   status = take_best(&c, fixed, energy, improved);
 done:

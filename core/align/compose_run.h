@@ -94,8 +94,8 @@ ORB_MUST_CHECK orb_status cm_walk(cm_run *run, int32_t samples, int *stuck);
 ORB_MUST_CHECK orb_status cm_full_level(cm_run *run, const double *points, const orb_surface *s, cm_level *level);
 
 /* compose_unwind.c. Twisted limbs of the best map are turned back, whole, by steps, or one by one, and what comes of it
- * takes the best map's place if it is better. */
-ORB_MUST_CHECK orb_status cm_unwind(cm_run *run);
+ * takes the best map's place if it is better. Nothing is done where more than so much of the area is left halfway. */
+ORB_MUST_CHECK orb_status cm_unwind(cm_run *run, double most_kept);
 
 /* compose_rounds.c. Sweeps until hardly a vertex moves any more, `count` at most. */
 ORB_MUST_CHECK orb_status cm_sweeps(cm_run *run, cm_level *level, cm_rules rules, int count);

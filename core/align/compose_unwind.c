@@ -180,14 +180,14 @@ done:
   return status;
 }
 
-orb_status cm_unwind(cm_run *c) {
+orb_status cm_unwind(cm_run *c, double most_kept) {
   cm_twists twists;
   if (c->best_energy == c->twisted_energy) {
     return ORB_OK; /* this map was tried */
   }
   ORB_TRY(find_twists(c, c->best, &twists));
   orb_status status = ORB_OK;
-  if (twists.count > 0) {
+  if (twists.count > 0 && twists.kept <= most_kept) {
     int64_t least = WORK * (int64_t)c->vertex_count;
     c->twisted_energy = c->best_energy;
     c->work = c->work > least ? c->work : least;
