@@ -135,6 +135,10 @@ static int decide_exactly(const double a[3], const double b[3], const double c[3
   return exact_sign(a, b, c);
 }
 
+static int coincide(const double a[3], const double b[3]) {
+  return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
 int orb_orient_careful(const double a[3], const double b[3], const double c[3]) {
   double size = fabs(a[0]) + fabs(a[1]) + fabs(a[2]) + fabs(b[0]) + fabs(b[1]) + fabs(b[2]) + fabs(c[0]) + fabs(c[1]) +
                 fabs(c[2]);
@@ -147,6 +151,9 @@ int orb_orient_careful(const double a[3], const double b[3], const double c[3]) 
     if (fabs(d) > 1e-15 * permanent + 1e-220) {
       return d > 0 ? 1 : -1;
     }
+  }
+  if (coincide(a, b) || coincide(b, c) || coincide(c, a)) { /* what comes here mostly is: points that are vertices */
+    return 0;
   }
   return decide_exactly(a, b, c);
 }
