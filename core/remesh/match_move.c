@@ -18,13 +18,14 @@ static const double LEAST_GAIN = 0.01; /* of the cost: many moves that gain less
 typedef struct star {
   orb_match *match;
   int32_t v, ring[RING_MAX], slot[RING_MAX];
-  int n;
+  int n, far; /* far: the number of the edge that was last found to stray beyond the limit, on this shape; −1: none */
+  int32_t far_shape;
   double limit2;
 } star;
 
 static int star_of(orb_match *match, int32_t v, double limit2, star *out) {
   const orb_net *net = &match->net;
-  *out = (star){.match = match, .v = v, .limit2 = limit2};
+  *out = (star){.match = match, .v = v, .far = -1, .limit2 = limit2};
   int32_t first = net->out[v], h = first;
   do {
     if (out->n == RING_MAX) {
@@ -75,12 +76,29 @@ static double place_and_cost(const star *s, const double p[3], double most, orb_
   return cost;
 }
 
-/* Adds up how far the edges stray; infinity beyond the limit, or once the sum is above `most`. */
-static double edges_cost(const star *s, double most) {
+static double edge_on(const star *s, int i, int32_t shape) {
+  return orb_match_edge_of_shape2(s->match, shape, s->v, s->ring[i], s->limit2, NULL);
+}
+
+/* Adds up how far the edges stray; infinity beyond the limit, or once the sum is above `most`. The edge that went
+ * beyond it for another point is asked first. */
+static double edges_cost(star *s, double most) {
   double cost = 0;
+  if (s->far >= 0 && edge_on(s, s->far, s->far_shape) > s->limit2) {
+    return INFINITY;
+  }
   for (int i = 0; i < s->n && cost <= most; i++) {
-    double distance2 = orb_match_edge2(s->match, s->v, s->ring[i], s->limit2, NULL);
-    cost += distance2 <= s->limit2 ? distance2 / s->limit2 : INFINITY;
+    double greatest = 0;
+    for (int32_t k = 0; k < s->match->shape_count; k++) {
+      double distance2 = edge_on(s, i, k);
+      if (!(distance2 <= s->limit2)) {
+        s->far = i;
+        s->far_shape = k;
+        return INFINITY;
+      }
+      greatest = distance2 > greatest ? distance2 : greatest;
+    }
+    cost += greatest / s->limit2;
   }
   return cost;
 }
@@ -155,7 +173,7 @@ static orb_tally tally_at(const star *s, stand *old) {
 }
 
 /* Moves v to p if that costs clearly less than *cost, and sets that; whether it did. The items stay in their lists. */
-static int try_point(const star *s, const double p[3], orb_form before, double *cost) {
+static int try_point(star *s, const double p[3], orb_form before, double *cost) {
   stand old;
   if (!positive_at(s, p)) {
     return 0;

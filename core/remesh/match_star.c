@@ -216,18 +216,24 @@ static int turned_side(disc *d, orb_star_goal goal, orb_tally *star) {
   return first;
 }
 
+/* Whether the listed items are near enough to the triangles of the star that they lie in: left of the edge from p to
+ * one corner, not left of that to the next, and within the outline. */
 static int list_allows(const disc *d, int32_t list, double limit2) {
   const orb_match *match = d->match;
   const double *p = orb_net_point(&match->net, d->p);
   for (int32_t item = list; item >= 0; item = match->item_next[item]) {
     const double *x = orb_match_item_point(match, item);
+    int32_t a = match->net.triangles[d->side[0].h];
+    int begin = orb_orient(p, orb_net_point(&match->net, a), x), here = begin;
     for (int i = 0; i < d->n; i++) {
-      int32_t a = match->net.triangles[d->side[i].h], b = match->net.triangles[orb_next(d->side[i].h)];
-      const double *q = orb_net_point(&match->net, a), *r = orb_net_point(&match->net, b);
-      if (orb_orient(p, q, x) >= 0 && orb_orient(r, p, x) >= 0 && orb_orient(q, r, x) >= 0 &&
+      int32_t b = match->net.triangles[orb_next(d->side[i].h)];
+      int next = i + 1 < d->n ? orb_orient(p, orb_net_point(&match->net, b), x) : begin;
+      if (here >= 0 && next <= 0 && orb_orient(orb_net_point(&match->net, a), orb_net_point(&match->net, b), x) >= 0 &&
           orb_match_item2(match, item, d->p, a, b) > limit2) {
         return 0;
       }
+      a = b;
+      here = next;
     }
   }
   return 1;
