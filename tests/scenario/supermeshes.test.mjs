@@ -114,9 +114,11 @@ test('correspondence without landmarks', async (t) => {
       assert.ok(l.residual_relative[s] < 0.01, `${l.name}: ${l.residual_relative}`);
     }
   });
-  const exact = await d.made('/v1/supermeshes', { shapes: pair, remesh: { method: 'overlay' } });
-  assert.deepEqual(exact.landmarks.map(({ at }) => at), found.map(({ at }) => at), 'the alignment does not hang on the remeshing');
-  for (const l of exact.landmarks) for (const residual of l.residual_relative) assert.ok(residual < 1e-6, `${l.name}: ${l.residual_relative}`);
+  if (!slow) {
+    const exact = await d.made('/v1/supermeshes', { shapes: pair, remesh: { method: 'overlay' } });
+    assert.deepEqual(exact.landmarks.map(({ at }) => at), found.map(({ at }) => at), 'the alignment does not hang on the remeshing');
+    for (const l of exact.landmarks) for (const residual of l.residual_relative) assert.ok(residual < 1e-6, `${l.name}: ${l.residual_relative}`);
+  }
   const again = await d.make('/v1/supermeshes', { shapes: pair, landmarks: found.map(({ name, at }) => ({ name, at })) });
   assert.ok(again.resource, JSON.stringify(again.problem));
   assert.equal(again.resource.certificate.landmarks_exact, true);
