@@ -38,7 +38,7 @@ typedef struct cm_rules {
 } cm_rules;
 
 /* Gathers the live vertices of a surface; position: 3 a vertex of the surface, area 4π at full resolution. local: an
- * array of the caller, vertex_count. x, place, y, n, goal, pull are not set. */
+ * array of the caller, vertex_count. x, place, y, n, density, goal, pull are not set. */
 ORB_MUST_CHECK orb_status cm_level_create(orb_context *ctx, const orb_surface *s, const unsigned char *alive,
                                           const unsigned char *pinned, const double *position, int32_t live,
                                           int32_t *local, cm_level *out);

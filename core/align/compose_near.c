@@ -95,13 +95,9 @@ done:
 orb_status cm_keep_sound(cm_run *c, const cm_level *l, const int32_t *to_mesh) {
   size_t n = (size_t)l->count;
   unsigned char *mark = ORB_NEW(c->ctx, unsigned char, 2 * n);
-  if (!mark) {
-    return ORB_E_NO_MEMORY;
-  }
-  orb_status status = cm_level_mark_flips(c->ctx, l, SOUND_RINGS, mark, mark + n);
+  orb_status status = mark ? cm_level_mark_flips(c->ctx, l, SOUND_RINGS, mark, mark + n) : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
-    orb_free(c->ctx, mark);
-    return status;
+    goto done;
   }
   memset(c->sound, 0, (size_t)c->vertex_count);
   for (size_t i = 0; i < n; i++) {
@@ -112,6 +108,7 @@ orb_status cm_keep_sound(cm_run *c, const cm_level *l, const int32_t *to_mesh) {
     }
   }
   c->has_sound = 1;
+done:
   orb_free(c->ctx, mark);
-  return ORB_OK;
+  return status;
 }

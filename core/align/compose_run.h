@@ -103,7 +103,7 @@ ORB_MUST_CHECK orb_status cm_sweeps(cm_run *run, cm_level *level, cm_rules rules
 cm_rules cm_soft(double barrier);
 cm_rules cm_hard(void);
 void cm_set_pull(const cm_run *run, cm_level *level, const int32_t *to_mesh, double strength);
-/* What a level holds of its map, to go back to. */
+/* What a level holds of its map, to go back to. Sweeps set the density anew; single steps need it refreshed. */
 typedef struct cm_map_copy {
   orb_place *place;
   double *y; /* y, n and x, as they lie in the level */

@@ -108,6 +108,9 @@ static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_ma
     return ORB_OK;
   }
   int needed = match->crept;
+  if (needed) { /* of no use: what it holds is room for the overlay */
+    orb_match_free(ctx, match);
+  }
   orb_status status = orb_match_start_from_overlay(ctx, job, match);
   if (status == ORB_E_NOT_CERTIFIED && !needed) {
     orb_error_clear(ctx); /* what there is holds the bound, too, with more triangles turned */
@@ -123,6 +126,7 @@ static orb_status unwind(orb_context *ctx, const orb_remesh_job *job, double tol
   orb_progress(ctx, "remesh", 0.3);
   ORB_TRY(hold(ctx, match, tolerance));
   if (match->crept) {
+    orb_match_free(ctx, match);
     ORB_TRY(orb_match_start_from_overlay(ctx, job, match));
   }
   orb_progress(ctx, "remesh", 0.4);
@@ -163,9 +167,11 @@ static orb_status relax(orb_context *ctx, orb_match *match, double tolerance, in
 
 /* To a net within the tolerance, as small as it can well be made. */
 static orb_status approach(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_match *match) {
-  int64_t overlay = 0;
-  ORB_TRY(orb_match_overlay_size(ctx, job, &overlay));
-  if (overlay > HUGE_OVERLAY && overlay > HUGE_GROWTH * (job->shape_count - 1) * triangles_of(job)) {
+  int64_t overlay = 0, others = job->shape_count - 1;
+  if (others > 0) { /* one shape alone is its own overlay, and wound about nothing */
+    ORB_TRY(orb_match_overlay_size(ctx, job, &overlay));
+  }
+  if (overlay > HUGE_OVERLAY && overlay > HUGE_GROWTH * others * triangles_of(job)) {
     orb_status status = unwind(ctx, job, tolerance, match);
     if (status != ORB_E_NOT_CERTIFIED) {
       return status;

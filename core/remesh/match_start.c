@@ -61,10 +61,11 @@ orb_status orb_match_overlay_size(orb_context *ctx, const orb_remesh_job *job, i
       int64_t samples = (3 * (int64_t)job->shapes[s].mesh.triangle_count + SAMPLE - 1) / SAMPLE;
       orb_parallel_for(ctx, samples, 64, crossing_range, &loop);
       vertices += SAMPLE * atomic_load(&loop.count);
+      ORB_TRY(orb_context_check(ctx));
     }
   }
   *triangles = 2 * vertices;
-  return orb_context_check(ctx);
+  return ORB_OK;
 }
 
 /* The reduced shapes in place of the shapes. */

@@ -64,14 +64,19 @@ static void failing_free(void *user, void *block) {
   free(block);
 }
 
+orb_context *remesh_failing_context(int64_t *left) {
+  orb_context *ctx;
+  orb_context_options options = {.threads = 1, .allocator = {failing_alloc, failing_free, left}};
+  assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
+  return ctx;
+}
+
 void remesh_assert_fails_cleanly(orb_remesh_method method) {
   int done = 0;
   for (int64_t n = 0; !done; n++) {
     assert_true(n < 3000);
     int64_t left = INT64_MAX;
-    orb_context_options options = {.threads = 1, .allocator = {failing_alloc, failing_free, &left}};
-    orb_context *ctx;
-    assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
+    orb_context *ctx = remesh_failing_context(&left);
     orb_aligned_shape shapes[3];
     for (int s = 0; s < 3; s++) {
       sphere_shape(ctx, SPHERE_OCTA, s == 2 ? 0 : 1, 0, (unsigned)s + 1, &shapes[s]);

@@ -5,6 +5,8 @@
 #include "support_sphere.h"
 
 orb_context *remesh_context(int threads);
+/* Of one thread; allocations fail once *left of them have been made. */
+orb_context *remesh_failing_context(int64_t *left);
 
 /* Remeshes with the method's defaults; says why where it fails for another reason than memory. */
 orb_status remesh_by(orb_context *ctx, orb_remesh_method method, const orb_aligned_shape *shapes, int count,

@@ -37,12 +37,12 @@ static void shear(const orb_aligned_shape *shape, int axis, double most) {
   }
 }
 
-/* Two rough balls; the second wound up, so that large triangles turn in space. */
-static void set_up(bench *b, unsigned seed, double wind) {
+/* Two rough balls of so many divisions; the second wound up, so that large triangles turn in space. */
+static void set_up_in(bench *b, orb_context *ctx, int size, unsigned seed, double wind) {
   memset(b, 0, sizeof *b);
-  b->ctx = remesh_context(2);
-  sphere_shape(b->ctx, SPHERE_ICO, 3, 0.2, seed, &b->shape[0]);
-  sphere_shape(b->ctx, SPHERE_OCTA, 3, 0.2, seed + 10, &b->shape[1]);
+  b->ctx = ctx;
+  sphere_shape(b->ctx, SPHERE_ICO, size, 0.2, seed, &b->shape[0]);
+  sphere_shape(b->ctx, SPHERE_OCTA, size, 0.2, seed + 10, &b->shape[1]);
   shear(&b->shape[1], 2, wind);
   shear(&b->shape[1], 0, wind);
   unsigned random = seed;
@@ -70,6 +70,10 @@ static void set_up(bench *b, unsigned seed, double wind) {
                             .locator = b->locator,
                             .diagonal = b->diagonal};
   assert_int_equal(orb_match_create(b->ctx, &b->job, &b->match), ORB_OK);
+}
+
+static void set_up(bench *b, unsigned seed, double wind) {
+  set_up_in(b, remesh_context(2), 3, seed, wind);
 }
 
 static void tear_down(bench *b) {
@@ -159,6 +163,46 @@ static void reduced_shapes_give_a_start(void **state) {
   assert_true(strays < orb_match_live(&b.match) / 4);
   refine(&b);
   assert_within(&b);
+  assert_sound(&b);
+  tear_down(&b);
+}
+
+/* One thread and four tell the same size and come to the same start. */
+static void starts_do_not_depend_on_threads(void **state) {
+  (void)state;
+  bench b[2];
+  int64_t told[2];
+  for (int i = 0; i < 2; i++) {
+    set_up_in(&b[i], remesh_context(i ? 4 : 1), 4, 3, 2);
+    assert_int_equal(orb_match_overlay_size(b[i].ctx, &b[i].job, &told[i]), ORB_OK);
+    assert_int_equal(orb_match_start_from_reduced(b[i].ctx, &b[i].job, LIMIT * LIMIT, &b[i].match), ORB_OK);
+  }
+  const orb_net *one = &b[0].match.net, *four = &b[1].match.net;
+  assert_int_equal(told[0], told[1]);
+  assert_int_equal(one->vertex_count, four->vertex_count);
+  assert_int_equal(one->triangle_count, four->triangle_count);
+  assert_memory_equal(one->points, four->points, 3 * (size_t)one->vertex_count * sizeof(double));
+  assert_memory_equal(one->triangles, four->triangles, 3 * (size_t)one->triangle_count * sizeof(int32_t));
+  assert_memory_equal(b[0].match.at, b[1].match.at, 6 * (size_t)one->vertex_count * sizeof(double));
+  tear_down(&b[0]);
+  tear_down(&b[1]);
+}
+
+/* Each allocation of a start from reduced shapes fails once: it says so, and leaves nothing behind. */
+static void starts_fail_cleanly(void **state) {
+  (void)state;
+  int64_t left = INT64_MAX;
+  bench b;
+  set_up_in(&b, remesh_failing_context(&left), 1, 3, 1);
+  orb_status status = ORB_E_NO_MEMORY;
+  for (int64_t n = 0; status != ORB_OK; n++) {
+    assert_true(n < 3000);
+    left = n;
+    status = orb_match_start_from_reduced(b.ctx, &b.job, LIMIT * LIMIT, &b.match);
+    assert_true(status == ORB_OK || status == ORB_E_NO_MEMORY);
+    assert_true(n > 20 || status == ORB_E_NO_MEMORY); /* there are many more than that */
+  }
+  left = INT64_MAX;
   assert_sound(&b);
   tear_down(&b);
 }
@@ -255,9 +299,10 @@ static void flat_triangles_are_as_near_as_their_sides(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(mending_leaves_no_stray),  cmocka_unit_test(reduced_shapes_give_a_start),
-      cmocka_unit_test(reducing_keeps_the_limit), cmocka_unit_test(merges_stop_at_the_target),
-      cmocka_unit_test(resolving_can_be_held),    cmocka_unit_test(flat_triangles_are_as_near_as_their_sides),
+      cmocka_unit_test(mending_leaves_no_stray),         cmocka_unit_test(reduced_shapes_give_a_start),
+      cmocka_unit_test(starts_do_not_depend_on_threads), cmocka_unit_test(starts_fail_cleanly),
+      cmocka_unit_test(reducing_keeps_the_limit),        cmocka_unit_test(merges_stop_at_the_target),
+      cmocka_unit_test(resolving_can_be_held),           cmocka_unit_test(flat_triangles_are_as_near_as_their_sides),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
