@@ -16,7 +16,16 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { TURN_GRAIN = 1024, FEW = 12, ROUNDS = 60, STALE = 12, PASSES = 6, RINGS_MOST = 5, TRIES = 6 };
+enum {
+  TURN_GRAIN = 1024,
+  FEW = 12,
+  ROUNDS = 60,
+  STALE = 12,
+  PASSES = 6,
+  RINGS_MOST = 5,
+  TRIES = 6,
+  CHECK_EVERY = 4096
+};
 
 static double chi(double d, double e) {
   double root = sqrt(d * d + e * e);
@@ -160,6 +169,7 @@ typedef struct island {
 } island;
 
 typedef struct islands {
+  orb_context *ctx;
   cm_level *level;
   double least_epsilon;
   int32_t count;
@@ -234,6 +244,9 @@ static void untangle_range(void *arg, int64_t begin, int64_t end, int thread) {
     const int32_t *vertex = is->order + is->list[k].first;
     for (int pass = 0; pass < PASSES; pass++) {
       for (int32_t i = 0; i < is->list[k].size; i++) {
+        if (i % CHECK_EVERY == 0 && orb_context_check(is->ctx) != ORB_OK) {
+          return; /* as cm_level_untangle() will say */
+        }
         step(is->level, vertex[i], is->least_epsilon);
       }
     }
@@ -244,7 +257,7 @@ orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left, int64
   size_t n = (size_t)l->count;
   unsigned char *mark = ORB_NEW(ctx, unsigned char, 2 * n), *next = mark ? mark + n : NULL;
   turn_job turn = {l, ORB_NEW(ctx, unsigned char, l->triangle_count)};
-  islands is = {.level = l, .part = ORB_NEW(ctx, int32_t, 3 * n), .list = ORB_NEW(ctx, island, n)};
+  islands is = {.ctx = ctx, .level = l, .part = ORB_NEW(ctx, int32_t, 3 * n), .list = ORB_NEW(ctx, island, n)};
   orb_status status = mark && turn.turned && is.part && is.list ? ORB_OK : ORB_E_NO_MEMORY;
   int32_t fewest = INT32_MAX;
   int stale = 0; /* rounds since there were fewest flips */

@@ -173,9 +173,18 @@ void orb_match_copy_vertex(orb_match *match, int32_t to, int32_t from) {
 
 /* Vertices that follow each other mostly lie near each other; then the one before is a better start than a cell of the
  * locator, which holds about four triangles. */
+typedef struct settle_loop {
+  orb_context *ctx;
+  orb_match *match;
+} settle_loop;
+
 static void settle_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
-  orb_match *match = arg;
+  const settle_loop *loop = arg;
+  orb_match *match = loop->match;
+  if (orb_context_check(loop->ctx) != ORB_OK) {
+    return; /* as settle_all() will say */
+  }
   for (int64_t v = begin; v < end; v++) {
     const double *p = match->net.points + 3 * v;
     double apart2 = v > begin ? orb_distance2(p, p - 3) : INFINITY;
@@ -184,6 +193,12 @@ static void settle_range(void *arg, int64_t begin, int64_t end, int thread) {
       settle(match, (int32_t)v, s, near ? match->spot[(v - 1) * match->shape_count + s].h / 3 : -1);
     }
   }
+}
+
+static orb_status settle_all(orb_context *ctx, orb_match *match) {
+  settle_loop loop = {ctx, match};
+  orb_parallel_for(ctx, match->net.vertex_count, 512, settle_range, &loop);
+  return orb_context_check(ctx);
 }
 
 static void fix_landmarks(orb_match *match) {
@@ -229,8 +244,7 @@ orb_status orb_match_create(orb_context *ctx, const orb_remesh_job *job, orb_mat
     }
   }
   fix_landmarks(match);
-  orb_parallel_for(ctx, match->net.vertex_count, 512, settle_range, match);
-  return orb_context_check(ctx);
+  return settle_all(ctx, match);
 fail:
   orb_match_free(ctx, match);
   return status;
@@ -281,8 +295,9 @@ orb_status orb_match_create_on(orb_context *ctx, const orb_remesh_job *job, cons
                             match->net.triangle_count, match->net.twin, &locator),
          fail);
   orb_sphere_view view = orb_net_view(&match->net);
-  for (int32_t i = 0; i < match->item_begin[match->shape_count]; i++) {
+  for (int32_t i = 0; i < match->item_begin[match->shape_count] && status == ORB_OK; i++) {
     orb_place place;
+    status = (i & 4095) == 0 ? orb_context_check(ctx) : ORB_OK;
     orb_locate(locator, orb_match_item_point(match, i), -1, &place);
     orb_hit hit = orb_walk(&view, orb_match_item_point(match, i), place.triangle);
     int corner = orb_hit_corner(&hit);
@@ -294,9 +309,11 @@ orb_status orb_match_create_on(orb_context *ctx, const orb_remesh_job *job, cons
     }
   }
   orb_locator_destroy(ctx, locator);
+  if (status != ORB_OK) {
+    goto fail;
+  }
   fix_landmarks(match);
-  orb_parallel_for(ctx, match->net.vertex_count, 512, settle_range, match);
-  return orb_context_check(ctx);
+  return settle_all(ctx, match);
 fail:
   orb_match_free(ctx, match);
   return status;
@@ -418,6 +435,7 @@ int64_t orb_match_live(const orb_match *match) {
 }
 
 typedef struct place_loop {
+  orb_context *ctx;
   const orb_match *match;
   const int32_t *number; /* a vertex: in the supermesh */
   orb_supermesh *out;
@@ -427,6 +445,9 @@ static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   place_loop *loop = arg;
   const orb_match *match = loop->match;
+  if (orb_context_check(loop->ctx) != ORB_OK) {
+    return; /* as orb_match_export() will say */
+  }
   for (int64_t v = begin; v < end; v++) {
     for (int32_t s = 0; s < match->shape_count && match->net.out[v] >= 0; s++) {
       orb_locate(match->job->locator[s], match->net.points + 3 * v, match->spot[v * match->shape_count + s].h / 3,
@@ -443,8 +464,11 @@ orb_status orb_match_export(orb_context *ctx, const orb_match *match, orb_superm
     status = out->places ? ORB_OK : ORB_E_NO_MEMORY;
   }
   if (status == ORB_OK) {
-    place_loop loop = {match, number, out};
+    place_loop loop = {ctx, match, number, out};
     orb_parallel_for(ctx, match->net.vertex_count, 512, place_range, &loop);
+    status = orb_context_check(ctx);
+  }
+  if (status == ORB_OK) {
     status = orb_match_bounds(ctx, match, out->error_bound);
   }
   orb_free(ctx, number);
