@@ -4,7 +4,7 @@
 
 #include "align/compose_run.h"
 #include "base/check.h"
-#include "embed/loops.h"
+#include "base/loops.h"
 #include "numeric/vec3.h"
 
 typedef struct goal_job {

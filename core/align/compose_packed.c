@@ -11,11 +11,7 @@
 #include "embed/surface.h"
 
 void cm_packed_free(orb_context *ctx, cm_packed *p) {
-  orb_free(ctx, p->b.x);
-  orb_free(ctx, p->b.normal);
-  orb_free(ctx, p->b.twin);
-  orb_free(ctx, p->b.frame);
-  orb_free(ctx, p->b.density);
+  cm_surface_free(ctx, &p->b);
   orb_free(ctx, p->s);
   orb_free(ctx, p->triangles);
   orb_free(ctx, p->to);

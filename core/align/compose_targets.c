@@ -11,7 +11,7 @@
 
 #include "align/compose.h"
 #include "base/check.h"
-#include "embed/loops.h"
+#include "base/loops.h"
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 

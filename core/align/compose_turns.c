@@ -4,7 +4,7 @@
 
 #include "align/compose_twist.h"
 #include "base/check.h"
-#include "embed/loops.h"
+#include "base/loops.h"
 #include "numeric/vec3.h"
 
 enum { SLICE = 8192 };

@@ -120,13 +120,15 @@ static void turn_range(void *arg, int64_t begin, int64_t end, int thread) {
 }
 
 /* Marks the vertices of triangles that do not turn positively; how many such triangles, and the worst determinant. */
-static int32_t mark_flips(const cm_level *l, const unsigned char *turned, unsigned char *mark, double *worst) {
+static int32_t mark_flips(orb_context *ctx, turn_job *job, unsigned char *mark, double *worst) {
+  const cm_level *l = job->l;
   int32_t flips = 0;
+  orb_parallel_for(ctx, l->triangle_count, TURN_GRAIN, turn_range, job);
   memset(mark, 0, (size_t)l->count);
   *worst = 0;
   for (int32_t t = 0; t < l->triangle_count; t++) {
     const int32_t *v = l->triangle + 3 * (size_t)t;
-    if (turned[t]) {
+    if (job->turned[t]) {
       mark[v[0]] = mark[v[1]] = mark[v[2]] = 1;
       *worst = fmin(*worst, orb_det(point(l, v[0]), point(l, v[1]), point(l, v[2])));
       flips++;
@@ -155,8 +157,7 @@ orb_status cm_level_mark_flips(orb_context *ctx, const cm_level *l, int rings, u
   if (!turn.turned) {
     return ORB_E_NO_MEMORY;
   }
-  orb_parallel_for(ctx, l->triangle_count, TURN_GRAIN, turn_range, &turn);
-  (void)mark_flips(l, turn.turned, mark, &worst);
+  (void)mark_flips(ctx, &turn, mark, &worst);
   grow_marks(l, rings, mark, next);
   orb_free(ctx, turn.turned);
   return ORB_OK;
@@ -265,8 +266,7 @@ orb_status cm_level_untangle(orb_context *ctx, cm_level *l, int32_t *left, int64
   is.number = is.part ? is.part + 2 * n : NULL;
   for (int round = 0; status == ORB_OK; round++) {
     double worst;
-    orb_parallel_for(ctx, l->triangle_count, TURN_GRAIN, turn_range, &turn);
-    *left = mark_flips(l, turn.turned, mark, &worst);
+    *left = mark_flips(ctx, &turn, mark, &worst);
     stale = *left < fewest ? 0 : stale + 1;
     fewest = *left < fewest ? *left : fewest;
     if (*left == 0 || round == ROUNDS || stale > STALE) {

@@ -17,7 +17,7 @@
 #include "align/compose_run.h"
 #include "align/compose_twist.h"
 #include "base/check.h"
-#include "embed/loops.h"
+#include "base/loops.h"
 
 enum {
   MOST_STEPS = 8, /* by which limbs are turned back where one does not do */

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "base/check.h"
-#include "embed/loops.h"
+#include "base/loops.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 #include "orbmorph/embed.h"

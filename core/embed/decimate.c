@@ -12,8 +12,8 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/loops.h"
 #include "embed/kernels.h"
-#include "embed/loops.h"
 #include "embed/multires.h"
 
 enum {

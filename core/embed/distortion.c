@@ -12,7 +12,7 @@
 #include <string.h>
 
 #include "base/check.h"
-#include "embed/loops.h"
+#include "base/loops.h"
 #include "numeric/vec3.h"
 #include "orbmorph/embed.h"
 

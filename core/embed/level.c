@@ -1,7 +1,7 @@
 #include "embed/level.h"
 
 #include "base/check.h"
-#include "embed/loops.h"
+#include "base/loops.h"
 
 enum { BINS = ORB_LEVEL_RING_MAX + 1, GRAIN = 1024, UNCOLOURED = -1, SET_ASIDE = -2 };
 

@@ -10,7 +10,7 @@
 #include <math.h>
 
 #include "base/check.h"
-#include "embed/loops.h"
+#include "base/loops.h"
 #include "embed/multires.h"
 #include "numeric/vec3.h"
 

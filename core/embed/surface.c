@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "base/check.h"
-#include "embed/loops.h"
+#include "base/loops.h"
 
 enum { MORTON_BITS = 10, GRAIN = 8192 };
 

@@ -6,9 +6,12 @@
 
 #include "base/check.h"
 #include "base/grow.h"
+#include "base/loops.h"
 #include "mesh/normals.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
+
+enum { GRAIN = 512, SLICE = 8192 };
 
 const double *orb_match_item_point(const orb_match *match, int32_t item) {
   int32_t s = match->item_shape[item];
@@ -173,18 +176,9 @@ void orb_match_copy_vertex(orb_match *match, int32_t to, int32_t from) {
 
 /* Vertices that follow each other mostly lie near each other; then the one before is a better start than a cell of the
  * locator, which holds about four triangles. */
-typedef struct settle_loop {
-  orb_context *ctx;
-  orb_match *match;
-} settle_loop;
-
 static void settle_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
-  const settle_loop *loop = arg;
-  orb_match *match = loop->match;
-  if (orb_context_check(loop->ctx) != ORB_OK) {
-    return; /* as settle_all() will say */
-  }
+  orb_match *match = arg;
   for (int64_t v = begin; v < end; v++) {
     const double *p = match->net.points + 3 * v;
     double apart2 = v > begin ? orb_distance2(p, p - 3) : INFINITY;
@@ -193,12 +187,6 @@ static void settle_range(void *arg, int64_t begin, int64_t end, int thread) {
       settle(match, (int32_t)v, s, near ? match->spot[(v - 1) * match->shape_count + s].h / 3 : -1);
     }
   }
-}
-
-static orb_status settle_all(orb_context *ctx, orb_match *match) {
-  settle_loop loop = {ctx, match};
-  orb_parallel_for(ctx, match->net.vertex_count, 512, settle_range, &loop);
-  return orb_context_check(ctx);
 }
 
 static void fix_landmarks(orb_match *match) {
@@ -244,7 +232,7 @@ orb_status orb_match_create(orb_context *ctx, const orb_remesh_job *job, orb_mat
     }
   }
   fix_landmarks(match);
-  return settle_all(ctx, match);
+  return orb_sliced_by(ctx, match->net.vertex_count, SLICE, GRAIN, settle_range, match);
 fail:
   orb_match_free(ctx, match);
   return status;
@@ -313,7 +301,7 @@ orb_status orb_match_create_on(orb_context *ctx, const orb_remesh_job *job, cons
     goto fail;
   }
   fix_landmarks(match);
-  return settle_all(ctx, match);
+  return orb_sliced_by(ctx, match->net.vertex_count, SLICE, GRAIN, settle_range, match);
 fail:
   orb_match_free(ctx, match);
   return status;
@@ -435,7 +423,6 @@ int64_t orb_match_live(const orb_match *match) {
 }
 
 typedef struct place_loop {
-  orb_context *ctx;
   const orb_match *match;
   const int32_t *number; /* a vertex: in the supermesh */
   orb_supermesh *out;
@@ -445,9 +432,6 @@ static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   place_loop *loop = arg;
   const orb_match *match = loop->match;
-  if (orb_context_check(loop->ctx) != ORB_OK) {
-    return; /* as orb_match_export() will say */
-  }
   for (int64_t v = begin; v < end; v++) {
     for (int32_t s = 0; s < match->shape_count && match->net.out[v] >= 0; s++) {
       orb_locate(match->job->locator[s], match->net.points + 3 * v, match->spot[v * match->shape_count + s].h / 3,
@@ -464,9 +448,8 @@ orb_status orb_match_export(orb_context *ctx, const orb_match *match, orb_superm
     status = out->places ? ORB_OK : ORB_E_NO_MEMORY;
   }
   if (status == ORB_OK) {
-    place_loop loop = {ctx, match, number, out};
-    orb_parallel_for(ctx, match->net.vertex_count, 512, place_range, &loop);
-    status = orb_context_check(ctx);
+    place_loop loop = {match, number, out};
+    status = orb_sliced_by(ctx, match->net.vertex_count, SLICE, GRAIN, place_range, &loop);
   }
   if (status == ORB_OK) {
     status = orb_match_bounds(ctx, match, out->error_bound);

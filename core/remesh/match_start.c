@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/loops.h"
 #include "remesh/match.h"
 
 /* A shape is traced through another: every SAMPLE-th of its edges. A prime, or regular meshes would show one kind of
@@ -20,7 +21,7 @@ typedef struct crossing_loop {
   atomic_llong count;
 } crossing_loop;
 
-enum { SAMPLE = 17, REDUCTIONS = 4 };
+enum { SAMPLE = 17, REDUCTIONS = 4, SLICE = 4096 };
 
 static int64_t crossings_of(const crossing_loop *loop, int32_t h) {
   const orb_remesh_job *job = loop->job;
@@ -59,9 +60,8 @@ orb_status orb_match_overlay_size(orb_context *ctx, const orb_remesh_job *job, i
     for (int32_t t = 0; t < s; t++) {
       crossing_loop loop = {.job = job, .own = s, .other = t};
       int64_t samples = (3 * (int64_t)job->shapes[s].mesh.triangle_count + SAMPLE - 1) / SAMPLE;
-      orb_parallel_for(ctx, samples, 64, crossing_range, &loop);
+      ORB_TRY(orb_sliced_by(ctx, samples, SLICE, 64, crossing_range, &loop));
       vertices += SAMPLE * atomic_load(&loop.count);
-      ORB_TRY(orb_context_check(ctx));
     }
   }
   *triangles = 2 * vertices;

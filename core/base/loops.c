@@ -1,4 +1,4 @@
-#include "embed/loops.h"
+#include "base/loops.h"
 
 #include "base/check.h"
 

@@ -1,6 +1,6 @@
 /* Parallel loops that can be cancelled on the way. */
-#ifndef ORB_EMBED_LOOPS_H
-#define ORB_EMBED_LOOPS_H
+#ifndef ORB_BASE_LOOPS_H
+#define ORB_BASE_LOOPS_H
 
 #include <stdatomic.h>
 
