@@ -8,22 +8,22 @@
 #include "api/problem.h"
 #include "orbmorph/embed.h"
 
-typedef struct orb_embedding_request {
-  char mesh[ORB_ID_SIZE];
+typedef struct api_embedding_request {
+  char mesh[API_ID_SIZE];
   orb_embed_options options;
-} orb_embedding_request;
+} api_embedding_request;
 
 /* 1, or 0 with the problem. */
-int orb_embedding_request_read(const cJSON *body, orb_embedding_request *out, orb_problem *problem);
+int api_embedding_request_read(const cJSON *body, api_embedding_request *out, api_problem *problem);
 /* Only {"method","options"}, as a supermesh request may carry it. where: for messages. */
-int orb_embedding_options_read(const cJSON *object, const char *where, int with_mesh, orb_embed_options *out,
-                               orb_problem *problem);
+int api_embedding_options_read(const cJSON *object, const char *where, int with_mesh, orb_embed_options *out,
+                               api_problem *problem);
 /* The canonical request, itself a valid request; its id also covers the engine's version. */
-void orb_embedding_request_write(const orb_embedding_request *request, orb_text *out);
-void orb_embedding_options_members(const orb_embed_options *options, orb_text *out); /* "method":…,"options":{…} */
+void api_embedding_request_write(const api_embedding_request *request, api_text *out);
+void api_embedding_options_members(const orb_embed_options *options, api_text *out); /* "method":…,"options":{…} */
 /* 1, or 0 out of memory. */
-int orb_embedding_request_id(const orb_embedding_request *request, char id[ORB_ID_SIZE]);
+int api_embedding_request_id(const api_embedding_request *request, char id[API_ID_SIZE]);
 
-void orb_embedding_write(const char *id, const orb_embedding_request *request, const orb_embedding *embedding,
-                         int64_t created, orb_text *out);
+void api_embedding_write(const char *id, const api_embedding_request *request, const orb_embedding *embedding,
+                         int64_t created, api_text *out);
 #endif

@@ -2,34 +2,34 @@
 
 #include <string.h>
 
-void orb_hash_begin(orb_hash *hash) {
+void api_hash_begin(api_hash *hash) {
   crypto_hash_sha256_init(&hash->state);
 }
-void orb_hash_add(orb_hash *hash, const void *bytes, size_t size) {
+void api_hash_add(api_hash *hash, const void *bytes, size_t size) {
   crypto_hash_sha256_update(&hash->state, bytes, size);
 }
-void orb_hash_end(orb_hash *hash, char out[ORB_ID_SIZE]) {
+void api_hash_end(api_hash *hash, char out[API_ID_SIZE]) {
   unsigned char digest[crypto_hash_sha256_BYTES];
   crypto_hash_sha256_final(&hash->state, digest);
-  sodium_bin2hex(out, ORB_ID_SIZE, digest, sizeof digest);
+  sodium_bin2hex(out, API_ID_SIZE, digest, sizeof digest);
 }
 
-void orb_id_of_text(const char *text, size_t size, char out[ORB_ID_SIZE]) {
-  orb_hash hash;
-  orb_hash_begin(&hash);
-  orb_hash_add(&hash, text, size);
-  orb_hash_end(&hash, out);
+void api_id_of_text(const char *text, size_t size, char out[API_ID_SIZE]) {
+  api_hash hash;
+  api_hash_begin(&hash);
+  api_hash_add(&hash, text, size);
+  api_hash_end(&hash, out);
 }
 
-void orb_mesh_id(const orb_hash *bytes, const char *repair, const char *forced, char out[ORB_ID_SIZE]) {
-  orb_hash hash = *bytes;
-  orb_hash_add(&hash, "\0repair=", 8);
-  orb_hash_add(&hash, repair, strlen(repair));
+void api_mesh_id(const api_hash *bytes, const char *repair, const char *forced, char out[API_ID_SIZE]) {
+  api_hash hash = *bytes;
+  api_hash_add(&hash, "\0repair=", 8);
+  api_hash_add(&hash, repair, strlen(repair));
   if (forced) {
-    orb_hash_add(&hash, "\0format=", 8);
-    orb_hash_add(&hash, forced, strlen(forced));
+    api_hash_add(&hash, "\0format=", 8);
+    api_hash_add(&hash, forced, strlen(forced));
   }
-  orb_hash_end(&hash, out);
+  api_hash_end(&hash, out);
 }
 
 static int all_hex(const char *text, size_t size) {
@@ -41,16 +41,16 @@ static int all_hex(const char *text, size_t size) {
   return 1;
 }
 
-int orb_id_valid(const char *text, size_t size) {
-  return size == ORB_ID_SIZE - 1 && all_hex(text, size);
+int api_id_valid(const char *text, size_t size) {
+  return size == API_ID_SIZE - 1 && all_hex(text, size);
 }
 
-void orb_random_id(char out[ORB_JOB_ID_SIZE]) {
+void api_random_id(char out[API_JOB_ID_SIZE]) {
   unsigned char bytes[16];
   randombytes_buf(bytes, sizeof bytes);
-  sodium_bin2hex(out, ORB_JOB_ID_SIZE, bytes, sizeof bytes);
+  sodium_bin2hex(out, API_JOB_ID_SIZE, bytes, sizeof bytes);
 }
 
-int orb_job_id_valid(const char *text, size_t size) {
-  return size == ORB_JOB_ID_SIZE - 1 && all_hex(text, size);
+int api_job_id_valid(const char *text, size_t size) {
+  return size == API_JOB_ID_SIZE - 1 && all_hex(text, size);
 }

@@ -20,7 +20,7 @@ static int refuse(scanner *s, const char *why) {
   return 0;
 }
 
-int orb_utf8_valid(const char *bytes, size_t size) {
+int api_utf8_valid(const char *bytes, size_t size) {
   const unsigned char *p = (const unsigned char *)bytes, *end = p + size;
   while (p < end) {
     size_t n = orb_utf8_length(p, (size_t)(end - p));
@@ -226,7 +226,7 @@ static int after_value(scanner *s, const char *stack, int *depth) {
 }
 
 static int scan(scanner *s) {
-  char stack[ORB_JSON_DEPTH];
+  char stack[API_JSON_DEPTH];
   int depth = 0, more = 1;
   while (more == 1) {
     blanks(s);
@@ -235,7 +235,7 @@ static int scan(scanner *s) {
     }
     unsigned char c = *s->at;
     if (c == '{' || c == '[') {
-      if (depth == ORB_JSON_DEPTH) {
+      if (depth == API_JSON_DEPTH) {
         return refuse(s, "it is nested deeper than 32 levels");
       }
       stack[depth++] = (char)c;
@@ -299,7 +299,7 @@ static int has_duplicates(const cJSON *value) {
   return 0;
 }
 
-cJSON *orb_json_parse(const char *bytes, size_t size, orb_json_error *error) {
+cJSON *api_json_parse(const char *bytes, size_t size, api_json_error *error) {
   const unsigned char *begin = (const unsigned char *)bytes;
   scanner s = {.at = begin, .begin = begin, .end = begin + size};
   if (!scan(&s)) {
@@ -307,7 +307,7 @@ cJSON *orb_json_parse(const char *bytes, size_t size, orb_json_error *error) {
     error->offset = (size_t)(s.at - s.begin);
     return NULL;
   }
-  *error = (orb_json_error){NULL, 0};
+  *error = (api_json_error){NULL, 0};
   cJSON *value = cJSON_ParseWithLength(bytes, size);
   int twice = value ? has_duplicates(value) : -1;
   if (twice) {

@@ -10,18 +10,18 @@
 #include <cjson/cJSON.h>
 #include <stddef.h>
 
-enum { ORB_JSON_DEPTH = 32, ORB_JSON_BYTES = 1 << 20 };
+enum { API_JSON_DEPTH = 32, API_JSON_BYTES = 1 << 20 };
 
 /* Why bytes were refused, and where. */
-typedef struct orb_json_error {
+typedef struct api_json_error {
   const char *why; /* a literal, plain words; NULL: out of memory */
   size_t offset;
-} orb_json_error;
+} api_json_error;
 
 /* The value, to be given to cJSON_Delete(); NULL with *error filled. O(n log n). */
-cJSON *orb_json_parse(const char *bytes, size_t size, orb_json_error *error);
+cJSON *api_json_parse(const char *bytes, size_t size, api_json_error *error);
 
 /* True for well-formed UTF-8 without NUL. */
-int orb_utf8_valid(const char *bytes, size_t size);
+int api_utf8_valid(const char *bytes, size_t size);
 
 #endif

@@ -7,18 +7,18 @@
 #include "api/options.h"
 #include "api/supermesh_codec.h"
 
-static int refuse(orb_problem *problem, int32_t landmark, int32_t shape, const char *why) {
+static int refuse(api_problem *problem, int32_t landmark, int32_t shape, const char *why) {
   if (shape >= 0) {
-    orb_refuse(problem, "bad-landmarks", "Landmark %d, shape %d: %s.", landmark, shape, why);
+    api_refuse(problem, "bad-landmarks", "Landmark %d, shape %d: %s.", landmark, shape, why);
   } else {
-    orb_refuse(problem, "bad-landmarks", "Landmark %d: %s.", landmark, why);
+    api_refuse(problem, "bad-landmarks", "Landmark %d: %s.", landmark, why);
   }
-  orb_json_key(&problem->facts, "landmarks");
-  orb_json_open(&problem->facts, '[');
-  orb_json_integer(&problem->facts, landmark);
-  orb_json_close(&problem->facts, ']');
+  api_json_key(&problem->facts, "landmarks");
+  api_json_open(&problem->facts, '[');
+  api_json_integer(&problem->facts, landmark);
+  api_json_close(&problem->facts, ']');
   if (shape >= 0) {
-    orb_json_member_integer(&problem->facts, "shape", shape);
+    api_json_member_integer(&problem->facts, "shape", shape);
   }
   return 0;
 }
@@ -62,7 +62,7 @@ static const char *read_barycentric(const cJSON *value, double out[3]) {
 }
 
 /* NULL where fine, else why not. */
-static const char *read_spot(const cJSON *value, orb_spot *out) {
+static const char *read_spot(const cJSON *value, api_place *out) {
   const cJSON *vertex = cJSON_GetObjectItemCaseSensitive(value, "vertex");
   const cJSON *point = cJSON_GetObjectItemCaseSensitive(value, "point");
   const cJSON *triangle = cJSON_GetObjectItemCaseSensitive(value, "triangle");
@@ -70,21 +70,21 @@ static const char *read_spot(const cJSON *value, orb_spot *out) {
     return "a place is one of {\"vertex\":i}, {\"point\":[x,y,z]}, {\"triangle\":t,\"barycentric\":[a,b,c]}";
   }
   if (vertex) {
-    out->kind = ORB_SPOT_VERTEX;
+    out->kind = API_PLACE_VERTEX;
     return read_index(vertex, &out->index) ? NULL : "\"vertex\" must be a whole number from 0, as in the file";
   }
   if (point) {
-    out->kind = ORB_SPOT_POINT;
+    out->kind = API_PLACE_POINT;
     return read_triple(point, out->at) ? NULL : "\"point\" must be three numbers";
   }
-  out->kind = ORB_SPOT_TRIANGLE;
+  out->kind = API_PLACE_TRIANGLE;
   if (!read_index(triangle, &out->index)) {
     return "\"triangle\" must be a whole number from 0, in the order of the file";
   }
   return read_barycentric(cJSON_GetObjectItemCaseSensitive(value, "barycentric"), out->at);
 }
 
-static int read_places(const cJSON *at, int32_t landmark, orb_landmark_list *list, orb_problem *problem) {
+static int read_places(const cJSON *at, int32_t landmark, api_landmark_list *list, api_problem *problem) {
   static const char *const known[] = {"vertex", "point", "triangle", "barycentric", NULL};
   if (!cJSON_IsArray(at) || cJSON_GetArraySize(at) != list->shape_count) {
     char why[100];
@@ -93,7 +93,7 @@ static int read_places(const cJSON *at, int32_t landmark, orb_landmark_list *lis
   }
   int32_t shape = 0;
   for (const cJSON *place = at->child; place; place = place->next, shape++) {
-    if (cJSON_IsObject(place) && !orb_members_known(place, "a landmark's place", known, problem)) {
+    if (cJSON_IsObject(place) && !api_members_known(place, "a landmark's place", known, problem)) {
       return 0;
     }
     const char *why = read_spot(place, &list->spots[(size_t)landmark * (size_t)list->shape_count + (size_t)shape]);
@@ -104,20 +104,20 @@ static int read_places(const cJSON *at, int32_t landmark, orb_landmark_list *lis
   return 1;
 }
 
-#define AT(field) offsetof(orb_landmark_spec, field)
-static const orb_option numbers[] = {{"pass", ORB_OPTION_INT32, AT(pass), 0, 100, NULL},
-                                     {"radius", ORB_OPTION_NUMBER, AT(radius), 0, 2, NULL},
-                                     {"confidence", ORB_OPTION_NUMBER, AT(confidence), 0, 1, NULL}};
+#define AT(field) offsetof(api_landmark_spec, field)
+static const api_option numbers[] = {{"pass", API_OPTION_INT32, AT(pass), 0, 100, NULL},
+                                     {"radius", API_OPTION_NUMBER, AT(radius), 0, 2, NULL},
+                                     {"confidence", API_OPTION_NUMBER, AT(confidence), 0, 1, NULL}};
 
-static int read_landmark(const cJSON *value, int32_t index, orb_landmark_list *list, orb_problem *problem) {
+static int read_landmark(const cJSON *value, int32_t index, api_landmark_list *list, api_problem *problem) {
   static const char *const known[] = {"name", "at", "pass", "radius", "confidence", NULL};
-  orb_landmark_spec *spec = &list->items[index];
+  api_landmark_spec *spec = &list->items[index];
   spec->confidence = 1;
   snprintf(spec->name, sizeof spec->name, "landmark %d", index);
   if (!cJSON_IsObject(value)) {
     return refuse(problem, index, -1, "a landmark is an object with \"name\" and \"at\"");
   }
-  if (!orb_members_known(value, "a landmark", known, problem)) {
+  if (!api_members_known(value, "a landmark", known, problem)) {
     return 0;
   }
   const cJSON *name = cJSON_GetObjectItemCaseSensitive(value, "name");
@@ -132,7 +132,7 @@ static int read_landmark(const cJSON *value, int32_t index, orb_landmark_list *l
     if (given) {
       cJSON one = *given, only = {.child = &one, .type = cJSON_Object};
       one.next = NULL;
-      if (!orb_options_read(&only, "a landmark", numbers, 3, spec, problem)) {
+      if (!api_options_read(&only, "a landmark", numbers, 3, spec, problem)) {
         return 0;
       }
     }
@@ -140,7 +140,7 @@ static int read_landmark(const cJSON *value, int32_t index, orb_landmark_list *l
   return read_places(cJSON_GetObjectItemCaseSensitive(value, "at"), index, list, problem);
 }
 
-int orb_landmarks_read(const cJSON *value, int32_t shape_count, orb_landmark_list *out, orb_problem *problem) {
+int api_landmarks_read(const cJSON *value, int32_t shape_count, api_landmark_list *out, api_problem *problem) {
   memset(out, 0, sizeof *out);
   if (cJSON_IsObject(value)) {
     value = cJSON_GetObjectItemCaseSensitive(value, "landmarks");
@@ -149,12 +149,12 @@ int orb_landmarks_read(const cJSON *value, int32_t shape_count, orb_landmark_lis
     return 1;
   }
   if (!cJSON_IsArray(value)) {
-    return orb_refuse(problem, "bad-landmarks", "\"landmarks\" must be an array, or \"auto\".");
+    return api_refuse(problem, "bad-landmarks", "\"landmarks\" must be an array, or \"auto\".");
   }
   int count = cJSON_GetArraySize(value);
-  if (count > ORB_LANDMARKS_MAX) {
-    return orb_refuse(problem, "bad-landmarks", "There are %d landmarks; at most %d are allowed.", count,
-                      ORB_LANDMARKS_MAX);
+  if (count > API_LANDMARKS_MAX) {
+    return api_refuse(problem, "bad-landmarks", "There are %d landmarks; at most %d are allowed.", count,
+                      API_LANDMARKS_MAX);
   }
   if (shape_count == 0 && count > 0) {
     shape_count = cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(value->child, "at"));
@@ -166,7 +166,7 @@ int orb_landmarks_read(const cJSON *value, int32_t shape_count, orb_landmark_lis
   out->items = calloc((size_t)count, sizeof *out->items);
   out->spots = calloc((size_t)count * (size_t)(shape_count > 0 ? shape_count : 1), sizeof *out->spots);
   if (!out->items || !out->spots) {
-    return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
   for (const cJSON *item = value->child; item; item = item->next, out->count++) {
     if (!read_landmark(item, out->count, out, problem)) {
@@ -176,7 +176,7 @@ int orb_landmarks_read(const cJSON *value, int32_t shape_count, orb_landmark_lis
   return 1;
 }
 
-void orb_landmarks_free(orb_landmark_list *list) {
+void api_landmarks_free(api_landmark_list *list) {
   free(list->items);
   free(list->spots);
   memset(list, 0, sizeof *list);

@@ -13,7 +13,7 @@ static const struct {
              {"largest_component", ORB_REPAIR_LARGEST_COMPONENT}};
 enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
-int orb_repair_parse(const char *list, unsigned *flags, char canonical[ORB_REPAIR_TEXT], orb_problem *problem) {
+int api_repair_parse(const char *list, unsigned *flags, char canonical[API_REPAIR_TEXT], api_problem *problem) {
   unsigned all = 0;
   int none = 0;
   for (const char *at = list;; at++) {
@@ -22,7 +22,7 @@ int orb_repair_parse(const char *list, unsigned *flags, char canonical[ORB_REPAI
       k++;
     }
     if (k == KINDS) {
-      return orb_refuse(problem, "bad-query",
+      return api_refuse(problem, "bad-query",
                         "There is no repair \"%.*s\"; use none, safe, fill_holes, largest_component.",
                         (int)(n < 60 ? n : 60), at);
     }
@@ -34,85 +34,85 @@ int orb_repair_parse(const char *list, unsigned *flags, char canonical[ORB_REPAI
     }
   }
   if (none && all) {
-    return orb_refuse(problem, "bad-query", "The repair \"none\" stands alone or not at all.");
+    return api_refuse(problem, "bad-query", "The repair \"none\" stands alone or not at all.");
   }
   all |= all ? ORB_REPAIR_SAFE : 0;
   *flags = all;
-  snprintf(canonical, ORB_REPAIR_TEXT, "%s%s%s", all ? "safe" : "none",
+  snprintf(canonical, API_REPAIR_TEXT, "%s%s%s", all ? "safe" : "none",
            all & ORB_REPAIR_FILL_HOLES ? ",fill_holes" : "",
            all & ORB_REPAIR_LARGEST_COMPONENT ? ",largest_component" : "");
   return 1;
 }
 
-static void write_vector(orb_text *out, const char *name, const double v[3]) {
-  orb_json_key(out, name);
-  orb_json_open(out, '[');
+static void write_vector(api_text *out, const char *name, const double v[3]) {
+  api_json_key(out, name);
+  api_json_open(out, '[');
   for (int k = 0; k < 3; k++) {
-    orb_json_number(out, v[k]);
+    api_json_number(out, v[k]);
   }
-  orb_json_close(out, ']');
+  api_json_close(out, ']');
 }
 
-static void write_topology(const orb_topology *topology, orb_text *out) {
-  orb_json_key(out, "topology");
-  orb_json_open(out, '{');
-  orb_json_member_integer(out, "components", topology->components);
-  orb_json_member_number(out, "genus", topology->genus);
-  orb_json_member_integer(out, "boundary_loops", topology->boundary_loops);
-  orb_json_member_integer(out, "nonmanifold_edges", topology->nonmanifold_edges);
-  orb_json_member_integer(out, "nonmanifold_vertices", topology->nonmanifold_vertices);
-  orb_json_close(out, '}');
+static void write_topology(const orb_topology *topology, api_text *out) {
+  api_json_key(out, "topology");
+  api_json_open(out, '{');
+  api_json_member_integer(out, "components", topology->components);
+  api_json_member_number(out, "genus", topology->genus);
+  api_json_member_integer(out, "boundary_loops", topology->boundary_loops);
+  api_json_member_integer(out, "nonmanifold_edges", topology->nonmanifold_edges);
+  api_json_member_integer(out, "nonmanifold_vertices", topology->nonmanifold_vertices);
+  api_json_close(out, '}');
 }
 
-static void write_lists(const orb_mesh *mesh, orb_text *out) {
-  orb_json_key(out, "repairs");
-  orb_json_open(out, '[');
+static void write_lists(const orb_mesh *mesh, api_text *out) {
+  api_json_key(out, "repairs");
+  api_json_open(out, '[');
   for (int32_t i = 0; i < mesh->repair_count; i++) {
-    orb_json_open(out, '{');
-    orb_json_member_string(out, "kind", mesh->repairs[i].kind);
-    orb_json_member_integer(out, "count", mesh->repairs[i].count);
-    orb_json_close(out, '}');
+    api_json_open(out, '{');
+    api_json_member_string(out, "kind", mesh->repairs[i].kind);
+    api_json_member_integer(out, "count", mesh->repairs[i].count);
+    api_json_close(out, '}');
   }
-  orb_json_close(out, ']');
-  orb_json_key(out, "attributes");
-  orb_json_open(out, '[');
+  api_json_close(out, ']');
+  api_json_key(out, "attributes");
+  api_json_open(out, '[');
   if (mesh->normals) {
-    orb_json_string(out, "normal");
+    api_json_string(out, "normal");
   }
   if (mesh->texcoords) {
-    orb_json_string(out, "texcoord");
+    api_json_string(out, "texcoord");
   }
   if (mesh->colors) {
-    orb_json_string(out, "color");
+    api_json_string(out, "color");
   }
-  orb_json_close(out, ']');
+  api_json_close(out, ']');
 }
 
-void orb_mesh_write(const orb_mesh_facts *facts, orb_text *out) {
+void api_mesh_write(const api_mesh_facts *facts, api_text *out) {
   const orb_mesh *mesh = facts->mesh;
-  orb_json_open(out, '{');
-  orb_json_member_string(out, "id", facts->id);
-  orb_json_key(out, "url");
-  orb_text_printf(out, "\"/v1/meshes/%s\"", facts->id);
-  orb_json_member_string(out, "name", facts->name);
-  orb_json_member_string(out, "format", facts->format);
-  orb_json_member_integer(out, "bytes", facts->bytes);
-  orb_json_member_integer(out, "vertices", mesh->vertex_count);
-  orb_json_member_integer(out, "triangles", mesh->triangle_count);
-  orb_json_member_integer(out, "file_vertices", mesh->file_vertex_count);
-  orb_json_member_integer(out, "file_triangles", mesh->file_triangle_count);
+  api_json_open(out, '{');
+  api_json_member_string(out, "id", facts->id);
+  api_json_key(out, "url");
+  api_text_printf(out, "\"/v1/meshes/%s\"", facts->id);
+  api_json_member_string(out, "name", facts->name);
+  api_json_member_string(out, "format", facts->format);
+  api_json_member_integer(out, "bytes", facts->bytes);
+  api_json_member_integer(out, "vertices", mesh->vertex_count);
+  api_json_member_integer(out, "triangles", mesh->triangle_count);
+  api_json_member_integer(out, "file_vertices", mesh->file_vertex_count);
+  api_json_member_integer(out, "file_triangles", mesh->file_triangle_count);
   write_topology(&facts->topology, out);
-  orb_json_member_number(out, "area", facts->extent.area);
-  orb_json_member_number(out, "volume", facts->extent.volume);
-  orb_json_key(out, "bounds");
-  orb_json_open(out, '{');
+  api_json_member_number(out, "area", facts->extent.area);
+  api_json_member_number(out, "volume", facts->extent.volume);
+  api_json_key(out, "bounds");
+  api_json_open(out, '{');
   write_vector(out, "min", facts->extent.min);
   write_vector(out, "max", facts->extent.max);
-  orb_json_close(out, '}');
-  orb_json_member_string(out, "repair", facts->repair);
+  api_json_close(out, '}');
+  api_json_member_string(out, "repair", facts->repair);
   write_lists(mesh, out);
-  orb_json_member_instant(out, "created", facts->created);
-  orb_json_close(out, '}');
+  api_json_member_instant(out, "created", facts->created);
+  api_json_close(out, '}');
 }
 
 static int get_text(const cJSON *object, const char *name, char *out, size_t size) {
@@ -127,7 +127,7 @@ static int get_count(const cJSON *object, const char *name, int64_t *out) {
   return fine;
 }
 
-int orb_mesh_summarise(const char *json, orb_mesh_summary *out) {
+int api_mesh_summarise(const char *json, api_mesh_summary *out) {
   cJSON *object = cJSON_Parse(json);
   int fine = get_text(object, "name", out->name, sizeof out->name) &&
              get_text(object, "format", out->format, sizeof out->format) &&

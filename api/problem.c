@@ -63,23 +63,23 @@ static const struct entry *find(const char *name) {
   return find("internal");
 }
 
-int orb_problem_status(const char *name) {
+int api_problem_status(const char *name) {
   return find(name)->status;
 }
-const char *orb_problem_title(const char *name) {
+const char *api_problem_title(const char *name) {
   return find(name)->title;
 }
-const char *orb_problem_name_at(size_t index) {
+const char *api_problem_name_at(size_t index) {
   return index < COUNT ? table[index].name : NULL;
 }
 
-void orb_problem_free(orb_problem *problem) {
-  orb_text_free(&problem->facts);
+void api_problem_free(api_problem *problem) {
+  api_text_free(&problem->facts);
   memset(problem, 0, sizeof *problem);
 }
 
-int orb_refuse(orb_problem *problem, const char *name, const char *format, ...) {
-  orb_problem_free(problem);
+int api_refuse(api_problem *problem, const char *name, const char *format, ...) {
+  api_problem_free(problem);
   problem->name = find(name)->name;
   va_list args;
   va_start(args, format);
@@ -88,84 +88,84 @@ int orb_refuse(orb_problem *problem, const char *name, const char *format, ...) 
   return 0;
 }
 
-static void pairs(orb_text *out, const char *name, const orb_error *error) {
-  orb_json_key(out, name);
-  orb_json_open(out, '[');
+static void pairs(api_text *out, const char *name, const orb_error *error) {
+  api_json_key(out, name);
+  api_json_open(out, '[');
   for (int32_t i = 0; i < error->edge_count; i++) {
-    orb_json_open(out, '[');
-    orb_json_integer(out, error->edges[i][0]);
-    orb_json_integer(out, error->edges[i][1]);
-    orb_json_close(out, ']');
+    api_json_open(out, '[');
+    api_json_integer(out, error->edges[i][0]);
+    api_json_integer(out, error->edges[i][1]);
+    api_json_close(out, ']');
   }
-  orb_json_close(out, ']');
+  api_json_close(out, ']');
 }
 
-static void integers(orb_text *out, const char *name, const int32_t *values, int32_t count) {
-  orb_json_key(out, name);
-  orb_json_open(out, '[');
+static void integers(api_text *out, const char *name, const int32_t *values, int32_t count) {
+  api_json_key(out, name);
+  api_json_open(out, '[');
   for (int32_t i = 0; i < count; i++) {
-    orb_json_integer(out, values[i]);
+    api_json_integer(out, values[i]);
   }
-  orb_json_close(out, ']');
+  api_json_close(out, ']');
 }
 
-static void topology_facts(const orb_error *error, orb_text *out) {
+static void topology_facts(const orb_error *error, api_text *out) {
   int open = error->status == ORB_E_NOT_CLOSED;
   if (error->boundary_loops >= 0) {
-    orb_json_member_integer(out, "boundary_loops", error->boundary_loops);
+    api_json_member_integer(out, "boundary_loops", error->boundary_loops);
   }
   if (error->genus >= 0) {
-    orb_json_member_integer(out, "genus", error->genus);
+    api_json_member_integer(out, "genus", error->genus);
   }
   if (error->edge_total > 0 || open) {
-    orb_json_member_integer(out, open ? "boundary_edge_count" : "edge_count", error->edge_total);
+    api_json_member_integer(out, open ? "boundary_edge_count" : "edge_count", error->edge_total);
     pairs(out, open ? "boundary_edges" : "edges", error);
   }
   if (error->vertex_total > 0) {
-    orb_json_member_integer(out, "vertex_count", error->vertex_total);
+    api_json_member_integer(out, "vertex_count", error->vertex_total);
     integers(out, "vertices", error->vertices, error->vertex_count);
   }
   if (error->component_total > 0) {
-    orb_json_member_integer(out, "component_count", error->component_total);
-    orb_json_key(out, "components");
-    orb_json_open(out, '[');
+    api_json_member_integer(out, "component_count", error->component_total);
+    api_json_key(out, "components");
+    api_json_open(out, '[');
     for (int32_t i = 0; i < error->component_count; i++) {
-      orb_json_integer(out, error->components[i]);
+      api_json_integer(out, error->components[i]);
     }
-    orb_json_close(out, ']');
+    api_json_close(out, ']');
   }
 }
 
-void orb_problem_of_error(const orb_error *error, orb_problem *problem) {
-  orb_refuse(problem, orb_status_name(error->status), "%s", error->detail);
-  orb_text *out = &problem->facts;
+void api_problem_of_error(const orb_error *error, api_problem *problem) {
+  api_refuse(problem, orb_status_name(error->status), "%s", error->detail);
+  api_text *out = &problem->facts;
   if (error->line >= 0) {
-    orb_json_member_integer(out, "line", error->line);
+    api_json_member_integer(out, "line", error->line);
   }
   if (error->offset >= 0) {
-    orb_json_member_integer(out, "offset", error->offset);
+    api_json_member_integer(out, "offset", error->offset);
   }
   topology_facts(error, out);
   if (error->landmark_count > 0) {
     integers(out, "landmarks", error->landmarks, error->landmark_count);
   }
   if (error->shape >= 0) {
-    orb_json_member_integer(out, "shape", error->shape);
+    api_json_member_integer(out, "shape", error->shape);
   }
 }
 
-void orb_problem_write(const orb_problem *problem, orb_text *out) {
+void api_problem_write(const api_problem *problem, api_text *out) {
   const struct entry *entry = find(problem->name);
-  orb_json_open(out, '{');
-  orb_json_key(out, "type");
-  orb_text_printf(out, "\"/problems/%s\"", entry->name);
-  orb_json_member_string(out, "title", entry->title);
-  orb_json_member_integer(out, "status", entry->status);
-  orb_json_member_string(out, "detail", problem->detail);
+  api_json_open(out, '{');
+  api_json_key(out, "type");
+  api_text_printf(out, "\"/problems/%s\"", entry->name);
+  api_json_member_string(out, "title", entry->title);
+  api_json_member_integer(out, "status", entry->status);
+  api_json_member_string(out, "detail", problem->detail);
   if (problem->facts.size) {
-    orb_text_append(out, ",", 1);
-    orb_text_append(out, problem->facts.data, problem->facts.size);
+    api_text_append(out, ",", 1);
+    api_text_append(out, problem->facts.data, problem->facts.size);
   }
   out->failed |= problem->facts.failed;
-  orb_json_close(out, '}');
+  api_json_close(out, '}');
 }

@@ -6,26 +6,26 @@
 #include "orbmorph/context.h"
 
 /* name: of /problems/NAME; must be one of the table in problem.c, which holds title and status. */
-typedef struct orb_problem {
+typedef struct api_problem {
   const char *name; /* a literal; NULL: no problem */
   char detail[512];
-  orb_text facts; /* members without braces: "\"genus\":1"; may be empty */
-} orb_problem;
+  api_text facts; /* members without braces: "\"genus\":1"; may be empty */
+} api_problem;
 
-int orb_problem_status(const char *name);
-const char *orb_problem_title(const char *name);
-void orb_problem_free(orb_problem *problem);
+int api_problem_status(const char *name);
+const char *api_problem_title(const char *name);
+void api_problem_free(api_problem *problem);
 
-/* Fills *problem (freed first) and returns 0, so that a parser can `return orb_refuse(…)`. */
-int orb_refuse(orb_problem *problem, const char *name, const char *format, ...) ORB_PRINTF(3, 4);
+/* Fills *problem (freed first) and returns 0, so that a parser can `return api_refuse(…)`. */
+int api_refuse(api_problem *problem, const char *name, const char *format, ...) ORB_PRINTF(3, 4);
 
 /* From an error of the library, with its facts. */
-void orb_problem_of_error(const orb_error *error, orb_problem *problem);
+void api_problem_of_error(const orb_error *error, api_problem *problem);
 
 /* Appends the document. extra: further members without braces, or NULL. */
-void orb_problem_write(const orb_problem *problem, orb_text *out);
+void api_problem_write(const api_problem *problem, api_text *out);
 
 /* All names, for the document of the API: NULL-terminated by name. */
-const char *orb_problem_name_at(size_t index);
+const char *api_problem_name_at(size_t index);
 
 #endif

@@ -7,9 +7,9 @@
 #include "orbmorph/transfer.h"
 
 /* Each appends one JSON value. */
-void orb_certificate_write(orb_text *out, const orb_certificate *certificate);
-void orb_distortion_write(orb_text *out, const orb_distortion *distortion);
+void api_certificate_write(api_text *out, const orb_certificate *certificate);
+void api_distortion_write(api_text *out, const orb_distortion *distortion);
 /* The members of one shape's report, into an object that is already open. */
-void orb_shape_report_members(orb_text *out, const orb_shape_report *report);
+void api_shape_report_members(api_text *out, const orb_shape_report *report);
 
 #endif

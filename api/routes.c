@@ -57,7 +57,7 @@ static int ends_as(const char *pattern, const char *path) {
 }
 
 /* Matches a path against a pattern. */
-static int matches(const char *pattern, const char *path, char id[ORB_ID_SIZE]) {
+static int matches(const char *pattern, const char *path, char id[API_ID_SIZE]) {
   const char *brace = strchr(pattern, '{');
   if (!brace) {
     return strcmp(pattern, path) == 0;
@@ -67,7 +67,7 @@ static int matches(const char *pattern, const char *path, char id[ORB_ID_SIZE]) 
     return 0;
   }
   size_t length = strcspn(path + head, "/");
-  int fine = strncmp(brace, "{id}", 4) == 0 ? orb_id_valid(path + head, length) : orb_job_id_valid(path + head, length);
+  int fine = strncmp(brace, "{id}", 4) == 0 ? api_id_valid(path + head, length) : api_job_id_valid(path + head, length);
   if (!fine || !ends_as(strchr(brace, '}') + 1, path + head + length)) {
     return 0;
   }
@@ -76,7 +76,7 @@ static int matches(const char *pattern, const char *path, char id[ORB_ID_SIZE]) 
   return 1;
 }
 
-const route *route_find(const char *method, const char *path, char id[ORB_ID_SIZE], char allow[64]) {
+const route *route_find(const char *method, const char *path, char id[API_ID_SIZE], char allow[64]) {
   const char *wanted = strcmp(method, "HEAD") == 0 ? "GET" : method;
   allow[0] = 0;
   id[0] = 0;

@@ -50,7 +50,7 @@ const route *route_table(void); /* ROUTE_COUNT entries */
 
 /* Finds the route; NULL with *allow empty: no such path; NULL with *allow filled ("GET, HEAD"): not that method.
  * HEAD goes to GET. id: filled where the path has one. */
-const route *route_find(const char *method, const char *path, char id[ORB_ID_SIZE], char allow[64]);
+const route *route_find(const char *method, const char *path, char id[API_ID_SIZE], char allow[64]);
 /* The number that stands for {k} in a path that route_find() took; −1: the route has none. */
 int route_number(const route *found, const char *path);
 

@@ -6,64 +6,64 @@
 #include "api/mesh_codec.h"
 #include "orbmorph/merge.h"
 
-enum { ORB_SHAPES_MAX = 16, ORB_LANDMARKS_MAX = 1024 };
+enum { API_SHAPES_MAX = 16, API_LANDMARKS_MAX = 1024 };
 
-typedef enum orb_spot_kind { ORB_SPOT_VERTEX, ORB_SPOT_POINT, ORB_SPOT_TRIANGLE } orb_spot_kind;
+typedef enum api_place_kind { API_PLACE_VERTEX, API_PLACE_POINT, API_PLACE_TRIANGLE } api_place_kind;
 
 /* A place as a caller names it: a vertex or triangle of the file, or a point in space. */
-typedef struct orb_spot {
-  orb_spot_kind kind;
+typedef struct api_place {
+  api_place_kind kind;
   int32_t index; /* of the vertex or triangle, in the file */
   double at[3];  /* the point, or barycentric coordinates (≥ 0, sum 1) */
-} orb_spot;
+} api_place;
 
-typedef struct orb_landmark_spec {
+typedef struct api_landmark_spec {
   char name[ORB_NAME_MAX];
   int32_t pass;
   double radius, confidence;
-} orb_landmark_spec;
+} api_landmark_spec;
 
-typedef struct orb_landmark_list {
+typedef struct api_landmark_list {
   int32_t count, shape_count;
-  orb_landmark_spec *items; /* malloc'ed */
-  orb_spot *spots;          /* count × shape_count */
-} orb_landmark_list;
+  api_landmark_spec *items; /* malloc'ed */
+  api_place *spots;         /* count × shape_count */
+} api_landmark_list;
 
 /* Reads a `landmarks` array, or an object with that member (a landmark file). shape_count 0: as many as the first
  * landmark has. 1, or 0 with the problem. */
-int orb_landmarks_read(const cJSON *value, int32_t shape_count, orb_landmark_list *out, orb_problem *problem);
-void orb_landmarks_free(orb_landmark_list *list);
+int api_landmarks_read(const cJSON *value, int32_t shape_count, api_landmark_list *out, api_problem *problem);
+void api_landmarks_free(api_landmark_list *list);
 
-typedef struct orb_supermesh_request {
+typedef struct api_supermesh_request {
   int32_t shape_count;
-  struct orb_shape_spec {
-    char mesh[ORB_ID_SIZE];
+  struct api_shape_spec {
+    char mesh[API_ID_SIZE];
     char name[ORB_NAME_MAX]; /* empty: that of the mesh */
-  } shapes[ORB_SHAPES_MAX];
-  orb_landmark_list landmarks;
+  } shapes[API_SHAPES_MAX];
+  api_landmark_list landmarks;
   orb_embed_options embedding; /* of every shape */
   orb_merge_options merge;
-} orb_supermesh_request;
+} api_supermesh_request;
 
 /* 1, or 0 with the problem; *out is to be freed either way. */
-int orb_supermesh_request_read(const cJSON *body, orb_supermesh_request *out, orb_problem *problem);
-void orb_supermesh_request_free(orb_supermesh_request *request);
+int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, api_problem *problem);
+void api_supermesh_request_free(api_supermesh_request *request);
 
 /* Fills empty names from the meshes and refuses landmarks beyond their files. meshes: one summary a shape. */
-int orb_supermesh_request_resolve(orb_supermesh_request *request, const orb_mesh_summary *meshes, orb_problem *problem);
+int api_supermesh_request_resolve(api_supermesh_request *request, const api_mesh_summary *meshes, api_problem *problem);
 
 /* The canonical request, itself a valid request that reads back the same. */
-void orb_supermesh_request_write(const orb_supermesh_request *request, orb_text *out);
-int orb_supermesh_request_id(const orb_supermesh_request *request, char id[ORB_ID_SIZE]);
+void api_supermesh_request_write(const api_supermesh_request *request, api_text *out);
+int api_supermesh_request_id(const api_supermesh_request *request, char id[API_ID_SIZE]);
 
 /* {"vertex":i}, {"point":[…]} or {"triangle":t,"barycentric":[…]}. */
-void orb_spot_write(orb_text *out, const orb_spot *spot);
+void api_place_write(api_text *out, const api_place *spot);
 
 /* embed_ms: what the embeddings of this job took; 0 where all were known. found: the places that the alignment found,
  * as a request would name them: found_count × shape_count. */
-void orb_supermesh_write(const char *id, const orb_supermesh_request *request, const orb_merge_result *result,
-                         const orb_spot *found, double embed_ms, int64_t created, orb_text *out);
+void api_supermesh_write(const char *id, const api_supermesh_request *request, const orb_merge_result *result,
+                         const api_place *found, double embed_ms, int64_t created, api_text *out);
 /* The values of "certificate" and "pairs", for the bench as well. */
-void orb_merge_certificate_write(const orb_merge_result *result, orb_text *out);
-void orb_pairs_write(const orb_merge_result *result, orb_text *out);
+void api_merge_certificate_write(const orb_merge_result *result, api_text *out);
+void api_pairs_write(const orb_merge_result *result, api_text *out);
 #endif

@@ -15,60 +15,60 @@ static const char *const fits[] = {"none", "rigid", "similarity", NULL};
 static const char *const paths[] = {"linear", "rigid", NULL};
 
 #define ALIGN(field) offsetof(orb_align_options, field)
-static const orb_option align_method[] = {{"method", ORB_OPTION_NAME, ALIGN(method), 0, 0, aligns}};
-static const orb_option align_table[] = {
-    {"preset", ORB_OPTION_NAME, ALIGN(preset), 0, 0, presets},
-    {"steps", ORB_OPTION_INT32, ALIGN(rbf_steps), 1, 10000, NULL},
-    {"one_way", ORB_OPTION_BOOL, ALIGN(one_way), 0, 0, NULL},
-    {"radius", ORB_OPTION_NUMBER, ALIGN(rbf_radius), 0, 2, NULL},
-    {"seed", ORB_OPTION_UINT64, ALIGN(seed), 0, 9007199254740992.0, NULL},
+static const api_option align_method[] = {{"method", API_OPTION_NAME, ALIGN(method), 0, 0, aligns}};
+static const api_option align_table[] = {
+    {"preset", API_OPTION_NAME, ALIGN(preset), 0, 0, presets},
+    {"steps", API_OPTION_INT32, ALIGN(rbf_steps), 1, 10000, NULL},
+    {"one_way", API_OPTION_BOOL, ALIGN(one_way), 0, 0, NULL},
+    {"radius", API_OPTION_NUMBER, ALIGN(rbf_radius), 0, 2, NULL},
+    {"seed", API_OPTION_UINT64, ALIGN(seed), 0, 9007199254740992.0, NULL},
 };
 #define REMESH(field) offsetof(orb_remesh_options, field)
-static const orb_option remesh_table[] = {
-    {"method", ORB_OPTION_NAME, REMESH(method), 0, 0, remeshes},
-    {"tolerance", ORB_OPTION_NUMBER, REMESH(tolerance), 1e-9, 1, NULL},
-    {"max_triangles", ORB_OPTION_INT64, REMESH(max_triangles), 0, 1e8, NULL},
+static const api_option remesh_table[] = {
+    {"method", API_OPTION_NAME, REMESH(method), 0, 0, remeshes},
+    {"tolerance", API_OPTION_NUMBER, REMESH(tolerance), 1e-9, 1, NULL},
+    {"max_triangles", API_OPTION_INT64, REMESH(max_triangles), 0, 1e8, NULL},
 };
 #define ASSET(field) offsetof(orb_asset_options, field)
-static const orb_option asset_table[] = {
-    {"normals", ORB_OPTION_BOOL, ASSET(normals), 0, 0, NULL},
-    {"animation", ORB_OPTION_NAME, ASSET(animation), 0, 0, animations},
-    {"fit", ORB_OPTION_NAME, ASSET(fit), 0, 0, fits},
-    {"path", ORB_OPTION_NAME, ASSET(path), 0, 0, paths},
-    {"path_steps", ORB_OPTION_INT32, ASSET(path_steps), 1, 16, NULL},
-    {"colors", ORB_OPTION_BOOL, ASSET(colors), 0, 0, NULL},
+static const api_option asset_table[] = {
+    {"normals", API_OPTION_BOOL, ASSET(normals), 0, 0, NULL},
+    {"animation", API_OPTION_NAME, ASSET(animation), 0, 0, animations},
+    {"fit", API_OPTION_NAME, ASSET(fit), 0, 0, fits},
+    {"path", API_OPTION_NAME, ASSET(path), 0, 0, paths},
+    {"path_steps", API_OPTION_INT32, ASSET(path_steps), 1, 16, NULL},
+    {"colors", API_OPTION_BOOL, ASSET(colors), 0, 0, NULL},
 };
 #define COUNT(table) (sizeof(table) / sizeof(table)[0])
 
-static int read_shape(const cJSON *value, int32_t index, orb_supermesh_request *out, orb_problem *problem) {
+static int read_shape(const cJSON *value, int32_t index, api_supermesh_request *out, api_problem *problem) {
   static const char *const known[] = {"mesh", "name", NULL};
-  struct orb_shape_spec *shape = &out->shapes[index];
+  struct api_shape_spec *shape = &out->shapes[index];
   if (!cJSON_IsObject(value)) {
-    return orb_refuse(problem, "invalid-request", "Each of \"shapes\" must be an object with \"mesh\".");
+    return api_refuse(problem, "invalid-request", "Each of \"shapes\" must be an object with \"mesh\".");
   }
-  if (!orb_members_known(value, "a shape", known, problem)) {
+  if (!api_members_known(value, "a shape", known, problem)) {
     return 0;
   }
   const cJSON *mesh = cJSON_GetObjectItemCaseSensitive(value, "mesh");
   const cJSON *name = cJSON_GetObjectItemCaseSensitive(value, "name");
   if (!cJSON_IsString(mesh)) {
-    return orb_refuse(problem, "invalid-request", "\"mesh\" of shape %d must be the id of an uploaded mesh.", index);
+    return api_refuse(problem, "invalid-request", "\"mesh\" of shape %d must be the id of an uploaded mesh.", index);
   }
-  if (!orb_id_valid(mesh->valuestring, strlen(mesh->valuestring))) {
-    return orb_refuse(problem, "not-found", "\"mesh\" of shape %d is not the id of a mesh: upload it first.", index);
+  if (!api_id_valid(mesh->valuestring, strlen(mesh->valuestring))) {
+    return api_refuse(problem, "not-found", "\"mesh\" of shape %d is not the id of a mesh: upload it first.", index);
   }
-  memcpy(shape->mesh, mesh->valuestring, ORB_ID_SIZE);
+  memcpy(shape->mesh, mesh->valuestring, API_ID_SIZE);
   if (name && (!cJSON_IsString(name) || strlen(name->valuestring) >= ORB_NAME_MAX)) {
-    return orb_refuse(problem, "invalid-request", "\"name\" of shape %d must be a string of at most 127 bytes.", index);
+    return api_refuse(problem, "invalid-request", "\"name\" of shape %d must be a string of at most 127 bytes.", index);
   }
   snprintf(shape->name, sizeof shape->name, "%s", name ? name->valuestring : "");
   return 1;
 }
 
-static int read_shapes(const cJSON *list, orb_supermesh_request *out, orb_problem *problem) {
+static int read_shapes(const cJSON *list, api_supermesh_request *out, api_problem *problem) {
   int count = cJSON_GetArraySize(list);
-  if (!cJSON_IsArray(list) || count < 2 || count > ORB_SHAPES_MAX) {
-    return orb_refuse(problem, "invalid-request", "\"shapes\" must be an array of 2 to %d shapes.", ORB_SHAPES_MAX);
+  if (!cJSON_IsArray(list) || count < 2 || count > API_SHAPES_MAX) {
+    return api_refuse(problem, "invalid-request", "\"shapes\" must be an array of 2 to %d shapes.", API_SHAPES_MAX);
   }
   for (const cJSON *item = list->child; item; item = item->next, out->shape_count++) {
     if (!read_shape(item, out->shape_count, out, problem)) {
@@ -78,14 +78,14 @@ static int read_shapes(const cJSON *list, orb_supermesh_request *out, orb_proble
   return 1;
 }
 
-static int read_align(cJSON *align, orb_supermesh_request *out, orb_problem *problem) {
+static int read_align(cJSON *align, api_supermesh_request *out, api_problem *problem) {
   static const char *const known[] = {"method", "options", NULL};
   out->merge.align.method = out->landmarks.count ? ORB_ALIGN_PIN : ORB_ALIGN_AUTO;
   if (align) {
     if (!cJSON_IsObject(align)) {
-      return orb_refuse(problem, "invalid-request", "\"align\" must be an object.");
+      return api_refuse(problem, "invalid-request", "\"align\" must be an object.");
     }
-    if (!orb_members_known(align, "\"align\"", known, problem)) {
+    if (!api_members_known(align, "\"align\"", known, problem)) {
       return 0;
     }
     const cJSON *method = cJSON_GetObjectItemCaseSensitive(align, "method");
@@ -93,42 +93,42 @@ static int read_align(cJSON *align, orb_supermesh_request *out, orb_problem *pro
     if (method) {
       cJSON one = *method, only = {.child = &one, .type = cJSON_Object};
       one.next = NULL;
-      if (!orb_options_read(&only, "\"align\"", align_method, 1, &out->merge.align, problem)) {
+      if (!api_options_read(&only, "\"align\"", align_method, 1, &out->merge.align, problem)) {
         return 0;
       }
     }
     if (options &&
-        !orb_options_read(options, "\"align.options\"", align_table, COUNT(align_table), &out->merge.align, problem)) {
+        !api_options_read(options, "\"align.options\"", align_table, COUNT(align_table), &out->merge.align, problem)) {
       return 0;
     }
   }
   orb_align_method method = out->merge.align.method;
   if (out->landmarks.count == 0 && (method == ORB_ALIGN_PIN || method == ORB_ALIGN_RBF)) {
-    return orb_refuse(problem, "bad-landmarks",
+    return api_refuse(problem, "bad-landmarks",
                       "The alignment \"%s\" needs landmarks: give some, or use auto or rotate.", aligns[method]);
   }
   return 1;
 }
 
-static int check_built(const orb_supermesh_request *request, orb_problem *problem) {
+static int check_built(const api_supermesh_request *request, api_problem *problem) {
   if (orb_remesh_available(request->merge.remesh.method)) {
     return 1;
   }
   const char *name = remeshes[request->merge.remesh.method];
-  orb_refuse(problem, "unsupported-method", "The remesh method \"%s\" is not built yet; use adaptive.", name);
-  orb_json_member_string(&problem->facts, "method", name);
+  api_refuse(problem, "unsupported-method", "The remesh method \"%s\" is not built yet; use adaptive.", name);
+  api_json_member_string(&problem->facts, "method", name);
   return 0;
 }
 
-int orb_supermesh_request_read(const cJSON *body, orb_supermesh_request *out, orb_problem *problem) {
+int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, api_problem *problem) {
   static const char *const known[] = {"shapes", "landmarks", "embedding", "align", "remesh", "asset", NULL};
   memset(out, 0, sizeof *out);
   orb_merge_defaults(&out->merge);
   orb_embed_defaults(&out->embedding);
   if (!cJSON_IsObject(body)) {
-    return orb_refuse(problem, "invalid-request", "The request must be a JSON object.");
+    return api_refuse(problem, "invalid-request", "The request must be a JSON object.");
   }
-  if (!orb_members_known(body, "the request", known, problem) ||
+  if (!api_members_known(body, "the request", known, problem) ||
       !read_shapes(cJSON_GetObjectItemCaseSensitive(body, "shapes"), out, problem)) {
     return 0;
   }
@@ -137,25 +137,25 @@ int orb_supermesh_request_read(const cJSON *body, orb_supermesh_request *out, or
   const cJSON *remesh = cJSON_GetObjectItemCaseSensitive(body, "remesh");
   const cJSON *asset = cJSON_GetObjectItemCaseSensitive(body, "asset");
   if (landmarks && cJSON_IsObject(landmarks)) {
-    return orb_refuse(problem, "bad-landmarks", "\"landmarks\" must be an array, or \"auto\".");
+    return api_refuse(problem, "bad-landmarks", "\"landmarks\" must be an array, or \"auto\".");
   }
-  if (landmarks && !orb_landmarks_read(landmarks, out->shape_count, &out->landmarks, problem)) {
+  if (landmarks && !api_landmarks_read(landmarks, out->shape_count, &out->landmarks, problem)) {
     return 0;
   }
-  return (!embedding || orb_embedding_options_read(embedding, "\"embedding\"", 0, &out->embedding, problem)) &&
+  return (!embedding || api_embedding_options_read(embedding, "\"embedding\"", 0, &out->embedding, problem)) &&
          read_align(cJSON_GetObjectItemCaseSensitive(body, "align"), out, problem) &&
          (!remesh ||
-          orb_options_read(remesh, "\"remesh\"", remesh_table, COUNT(remesh_table), &out->merge.remesh, problem)) &&
+          api_options_read(remesh, "\"remesh\"", remesh_table, COUNT(remesh_table), &out->merge.remesh, problem)) &&
          check_built(out, problem) &&
-         (!asset || orb_options_read(asset, "\"asset\"", asset_table, COUNT(asset_table), &out->merge.asset, problem));
+         (!asset || api_options_read(asset, "\"asset\"", asset_table, COUNT(asset_table), &out->merge.asset, problem));
 }
 
-void orb_supermesh_request_free(orb_supermesh_request *request) {
-  orb_landmarks_free(&request->landmarks);
+void api_supermesh_request_free(api_supermesh_request *request) {
+  api_landmarks_free(&request->landmarks);
 }
 
-int orb_supermesh_request_resolve(orb_supermesh_request *request, const orb_mesh_summary *meshes,
-                                  orb_problem *problem) {
+int api_supermesh_request_resolve(api_supermesh_request *request, const api_mesh_summary *meshes,
+                                  api_problem *problem) {
   for (int32_t s = 0; s < request->shape_count; s++) {
     if (!request->shapes[s].name[0]) {
       memcpy(request->shapes[s].name, meshes[s].name, ORB_NAME_MAX);
@@ -163,14 +163,14 @@ int orb_supermesh_request_resolve(orb_supermesh_request *request, const orb_mesh
   }
   for (int32_t l = 0; l < request->landmarks.count; l++) {
     for (int32_t s = 0; s < request->shape_count; s++) {
-      const orb_spot *spot = &request->landmarks.spots[(size_t)l * (size_t)request->shape_count + (size_t)s];
-      int64_t count = spot->kind == ORB_SPOT_VERTEX ? meshes[s].file_vertices : meshes[s].file_triangles;
-      if (spot->kind != ORB_SPOT_POINT && spot->index >= count) {
-        orb_refuse(problem, "bad-landmarks",
+      const api_place *spot = &request->landmarks.spots[(size_t)l * (size_t)request->shape_count + (size_t)s];
+      int64_t count = spot->kind == API_PLACE_VERTEX ? meshes[s].file_vertices : meshes[s].file_triangles;
+      if (spot->kind != API_PLACE_POINT && spot->index >= count) {
+        api_refuse(problem, "bad-landmarks",
                    "Landmark %d (\"%.60s\"), shape %d (\"%.60s\"): %s %d is out of range: the file has %lld.", l,
                    request->landmarks.items[l].name, s, request->shapes[s].name,
-                   spot->kind == ORB_SPOT_VERTEX ? "vertex" : "triangle", spot->index, (long long)count);
-        orb_text_printf(&problem->facts, "\"landmarks\":[%d],\"shape\":%d,\"reason\":\"out-of-range\"", l, s);
+                   spot->kind == API_PLACE_VERTEX ? "vertex" : "triangle", spot->index, (long long)count);
+        api_text_printf(&problem->facts, "\"landmarks\":[%d],\"shape\":%d,\"reason\":\"out-of-range\"", l, s);
         return 0;
       }
     }
@@ -178,90 +178,90 @@ int orb_supermesh_request_resolve(orb_supermesh_request *request, const orb_mesh
   return 1;
 }
 
-static void write_triple(orb_text *out, const char *name, const double v[3]) {
-  orb_json_key(out, name);
-  orb_json_open(out, '[');
+static void write_triple(api_text *out, const char *name, const double v[3]) {
+  api_json_key(out, name);
+  api_json_open(out, '[');
   for (int k = 0; k < 3; k++) {
-    orb_json_number(out, v[k]);
+    api_json_number(out, v[k]);
   }
-  orb_json_close(out, ']');
+  api_json_close(out, ']');
 }
 
-void orb_spot_write(orb_text *out, const orb_spot *spot) {
-  orb_json_open(out, '{');
-  if (spot->kind == ORB_SPOT_POINT) {
+void api_place_write(api_text *out, const api_place *spot) {
+  api_json_open(out, '{');
+  if (spot->kind == API_PLACE_POINT) {
     write_triple(out, "point", spot->at);
   } else {
-    orb_json_member_integer(out, spot->kind == ORB_SPOT_VERTEX ? "vertex" : "triangle", spot->index);
-    if (spot->kind == ORB_SPOT_TRIANGLE) {
+    api_json_member_integer(out, spot->kind == API_PLACE_VERTEX ? "vertex" : "triangle", spot->index);
+    if (spot->kind == API_PLACE_TRIANGLE) {
       write_triple(out, "barycentric", spot->at);
     }
   }
-  orb_json_close(out, '}');
+  api_json_close(out, '}');
 }
 
-static void write_landmarks(orb_text *out, const orb_landmark_list *list) {
-  orb_json_key(out, "landmarks");
+static void write_landmarks(api_text *out, const api_landmark_list *list) {
+  api_json_key(out, "landmarks");
   if (list->count == 0) {
-    orb_json_string(out, "auto");
+    api_json_string(out, "auto");
     return;
   }
-  orb_json_open(out, '[');
+  api_json_open(out, '[');
   for (int32_t l = 0; l < list->count; l++) {
-    const orb_landmark_spec *spec = &list->items[l];
-    orb_json_open(out, '{');
-    orb_json_member_string(out, "name", spec->name);
-    orb_json_key(out, "at");
-    orb_json_open(out, '[');
+    const api_landmark_spec *spec = &list->items[l];
+    api_json_open(out, '{');
+    api_json_member_string(out, "name", spec->name);
+    api_json_key(out, "at");
+    api_json_open(out, '[');
     for (int32_t s = 0; s < list->shape_count; s++) {
-      orb_spot_write(out, &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s]);
+      api_place_write(out, &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s]);
     }
-    orb_json_close(out, ']');
-    orb_json_member_integer(out, "pass", spec->pass);
-    orb_json_member_number(out, "radius", spec->radius);
-    orb_json_member_number(out, "confidence", spec->confidence);
-    orb_json_close(out, '}');
+    api_json_close(out, ']');
+    api_json_member_integer(out, "pass", spec->pass);
+    api_json_member_number(out, "radius", spec->radius);
+    api_json_member_number(out, "confidence", spec->confidence);
+    api_json_close(out, '}');
   }
-  orb_json_close(out, ']');
+  api_json_close(out, ']');
 }
 
-void orb_supermesh_request_write(const orb_supermesh_request *request, orb_text *out) {
-  orb_json_open(out, '{');
-  orb_json_key(out, "shapes");
-  orb_json_open(out, '[');
+void api_supermesh_request_write(const api_supermesh_request *request, api_text *out) {
+  api_json_open(out, '{');
+  api_json_key(out, "shapes");
+  api_json_open(out, '[');
   for (int32_t s = 0; s < request->shape_count; s++) {
-    orb_json_open(out, '{');
-    orb_json_member_string(out, "mesh", request->shapes[s].mesh);
-    orb_json_member_string(out, "name", request->shapes[s].name);
-    orb_json_close(out, '}');
+    api_json_open(out, '{');
+    api_json_member_string(out, "mesh", request->shapes[s].mesh);
+    api_json_member_string(out, "name", request->shapes[s].name);
+    api_json_close(out, '}');
   }
-  orb_json_close(out, ']');
+  api_json_close(out, ']');
   write_landmarks(out, &request->landmarks);
-  orb_json_key(out, "embedding");
-  orb_json_open(out, '{');
-  orb_embedding_options_members(&request->embedding, out);
-  orb_json_close(out, '}');
-  orb_json_key(out, "align");
-  orb_json_open(out, '{');
-  orb_json_member_string(out, "method", aligns[request->merge.align.method]);
-  orb_json_key(out, "options");
-  orb_options_write(out, align_table, COUNT(align_table), &request->merge.align, NULL);
-  orb_json_close(out, '}');
-  orb_json_key(out, "remesh");
-  orb_options_write(out, remesh_table, COUNT(remesh_table), &request->merge.remesh, NULL);
-  orb_json_key(out, "asset");
-  orb_options_write(out, asset_table, COUNT(asset_table), &request->merge.asset, NULL);
-  orb_json_close(out, '}');
+  api_json_key(out, "embedding");
+  api_json_open(out, '{');
+  api_embedding_options_members(&request->embedding, out);
+  api_json_close(out, '}');
+  api_json_key(out, "align");
+  api_json_open(out, '{');
+  api_json_member_string(out, "method", aligns[request->merge.align.method]);
+  api_json_key(out, "options");
+  api_options_write(out, align_table, COUNT(align_table), &request->merge.align, NULL);
+  api_json_close(out, '}');
+  api_json_key(out, "remesh");
+  api_options_write(out, remesh_table, COUNT(remesh_table), &request->merge.remesh, NULL);
+  api_json_key(out, "asset");
+  api_options_write(out, asset_table, COUNT(asset_table), &request->merge.asset, NULL);
+  api_json_close(out, '}');
 }
 
-int orb_supermesh_request_id(const orb_supermesh_request *request, char id[ORB_ID_SIZE]) {
-  orb_text text = {0};
-  orb_text_add(&text, ORB_ENGINE " supermesh");
-  orb_supermesh_request_write(request, &text);
+int api_supermesh_request_id(const api_supermesh_request *request, char id[API_ID_SIZE]) {
+  api_text text = {0};
+  api_text_add(&text, ORB_ENGINE " supermesh");
+  api_supermesh_request_write(request, &text);
   int fine = !text.failed;
   if (fine) {
-    orb_id_of_text(text.data, text.size, id);
+    api_id_of_text(text.data, text.size, id);
   }
-  orb_text_free(&text);
+  api_text_free(&text);
   return fine;
 }

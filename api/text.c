@@ -9,12 +9,12 @@
 
 #include "orbmorph/utf8.h"
 
-void orb_text_free(orb_text *text) {
+void api_text_free(api_text *text) {
   free(text->data);
   memset(text, 0, sizeof *text);
 }
 
-static int reserve(orb_text *text, size_t more) {
+static int reserve(api_text *text, size_t more) {
   if (text->failed || more > SIZE_MAX / 4 || text->size > SIZE_MAX / 4) {
     text->failed = 1;
     return 0;
@@ -37,7 +37,7 @@ static int reserve(orb_text *text, size_t more) {
   return 1;
 }
 
-void orb_text_append(orb_text *text, const char *bytes, size_t size) {
+void api_text_append(api_text *text, const char *bytes, size_t size) {
   if (reserve(text, size)) {
     if (size) {
       memcpy(text->data + text->size, bytes, size);
@@ -47,11 +47,11 @@ void orb_text_append(orb_text *text, const char *bytes, size_t size) {
   }
 }
 
-void orb_text_add(orb_text *text, const char *string) {
-  orb_text_append(text, string, strlen(string));
+void api_text_add(api_text *text, const char *string) {
+  api_text_append(text, string, strlen(string));
 }
 
-void orb_text_printf(orb_text *text, const char *format, ...) {
+void api_text_printf(api_text *text, const char *format, ...) {
   va_list args, again;
   va_start(args, format);
   va_copy(again, args);
@@ -67,25 +67,25 @@ void orb_text_printf(orb_text *text, const char *format, ...) {
 }
 
 /* A comma belongs before a value or key unless the text is empty or something was just opened. */
-static void separate(orb_text *text) {
+static void separate(api_text *text) {
   char last = text->size ? text->data[text->size - 1] : '{';
   if (last != '{' && last != '[' && last != ':') {
-    orb_text_append(text, ",", 1);
+    api_text_append(text, ",", 1);
   }
 }
 
-void orb_json_open(orb_text *text, char open) {
+void api_json_open(api_text *text, char open) {
   separate(text);
-  orb_text_append(text, &open, 1);
+  api_text_append(text, &open, 1);
 }
 
-void orb_json_close(orb_text *text, char close) {
-  orb_text_append(text, &close, 1);
+void api_json_close(api_text *text, char close) {
+  api_text_append(text, &close, 1);
 }
 
 /* What is not UTF-8 becomes U+FFFD: details quote callers, and may be cut within a character. */
-static void quoted(orb_text *text, const char *s) {
-  orb_text_append(text, "\"", 1);
+static void quoted(api_text *text, const char *s) {
+  api_text_append(text, "\"", 1);
   const char *run = s;
   for (size_t n; *s; s += n) {
     unsigned char c = (unsigned char)*s;
@@ -94,37 +94,37 @@ static void quoted(orb_text *text, const char *s) {
     if (whole && c >= 0x20 && c != '"' && c != '\\') {
       continue;
     }
-    orb_text_append(text, run, (size_t)(s - run));
+    api_text_append(text, run, (size_t)(s - run));
     run = s + 1;
     if (!whole) {
-      orb_text_add(text, "\xef\xbf\xbd");
+      api_text_add(text, "\xef\xbf\xbd");
     } else if (c == '"' || c == '\\') {
-      orb_text_printf(text, "\\%c", c);
+      api_text_printf(text, "\\%c", c);
     } else if (c == '\n') {
-      orb_text_add(text, "\\n");
+      api_text_add(text, "\\n");
     } else {
-      orb_text_printf(text, "\\u%04x", c);
+      api_text_printf(text, "\\u%04x", c);
     }
   }
-  orb_text_append(text, run, (size_t)(s - run));
-  orb_text_append(text, "\"", 1);
+  api_text_append(text, run, (size_t)(s - run));
+  api_text_append(text, "\"", 1);
 }
 
-void orb_json_key(orb_text *text, const char *name) {
+void api_json_key(api_text *text, const char *name) {
   separate(text);
   quoted(text, name);
-  orb_text_append(text, ":", 1);
+  api_text_append(text, ":", 1);
 }
 
-void orb_json_string(orb_text *text, const char *utf8) {
+void api_json_string(api_text *text, const char *utf8) {
   separate(text);
   quoted(text, utf8);
 }
 
-void orb_json_number(orb_text *text, double value) {
+void api_json_number(api_text *text, double value) {
   separate(text);
   if (!isfinite(value)) {
-    orb_text_add(text, "null");
+    api_text_add(text, "null");
     return;
   }
   char digits[40];
@@ -134,54 +134,54 @@ void orb_json_number(orb_text *text, double value) {
       break;
     }
   }
-  orb_text_add(text, digits);
+  api_text_add(text, digits);
 }
 
-void orb_json_integer(orb_text *text, int64_t value) {
+void api_json_integer(api_text *text, int64_t value) {
   separate(text);
-  orb_text_printf(text, "%lld", (long long)value);
+  api_text_printf(text, "%lld", (long long)value);
 }
 
-void orb_json_bool(orb_text *text, int value) {
+void api_json_bool(api_text *text, int value) {
   separate(text);
-  orb_text_add(text, value ? "true" : "false");
+  api_text_add(text, value ? "true" : "false");
 }
 
-void orb_json_null(orb_text *text) {
+void api_json_null(api_text *text) {
   separate(text);
-  orb_text_add(text, "null");
+  api_text_add(text, "null");
 }
 
-void orb_json_raw(orb_text *text, const char *json) {
+void api_json_raw(api_text *text, const char *json) {
   separate(text);
-  orb_text_add(text, json ? json : "null");
+  api_text_add(text, json ? json : "null");
 }
 
-void orb_json_member_string(orb_text *text, const char *name, const char *utf8) {
-  orb_json_key(text, name);
-  orb_json_string(text, utf8);
+void api_json_member_string(api_text *text, const char *name, const char *utf8) {
+  api_json_key(text, name);
+  api_json_string(text, utf8);
 }
-void orb_json_member_number(orb_text *text, const char *name, double value) {
-  orb_json_key(text, name);
-  orb_json_number(text, value);
+void api_json_member_number(api_text *text, const char *name, double value) {
+  api_json_key(text, name);
+  api_json_number(text, value);
 }
-void orb_json_member_integer(orb_text *text, const char *name, int64_t value) {
-  orb_json_key(text, name);
-  orb_json_integer(text, value);
+void api_json_member_integer(api_text *text, const char *name, int64_t value) {
+  api_json_key(text, name);
+  api_json_integer(text, value);
 }
-void orb_json_member_bool(orb_text *text, const char *name, int value) {
-  orb_json_key(text, name);
-  orb_json_bool(text, value);
+void api_json_member_bool(api_text *text, const char *name, int value) {
+  api_json_key(text, name);
+  api_json_bool(text, value);
 }
-void orb_json_member_raw(orb_text *text, const char *name, const char *json) {
-  orb_json_key(text, name);
-  orb_json_raw(text, json);
+void api_json_member_raw(api_text *text, const char *name, const char *json) {
+  api_json_key(text, name);
+  api_json_raw(text, json);
 }
 
-void orb_json_member_instant(orb_text *text, const char *name, int64_t unix_ms) {
-  orb_json_key(text, name);
+void api_json_member_instant(api_text *text, const char *name, int64_t unix_ms) {
+  api_json_key(text, name);
   if (unix_ms <= 0) {
-    orb_json_null(text);
+    api_json_null(text);
     return;
   }
   time_t seconds = (time_t)(unix_ms / 1000);
@@ -190,5 +190,5 @@ void orb_json_member_instant(orb_text *text, const char *name, int64_t unix_ms) 
   gmtime_r(&seconds, &utc);
   size_t n = strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", &utc);
   snprintf(stamp + n, sizeof stamp - n, ".%03dZ", (int)(unix_ms % 1000));
-  orb_json_string(text, stamp);
+  api_json_string(text, stamp);
 }

@@ -12,35 +12,35 @@
 
 #include "orbmorph/status.h"
 
-typedef struct orb_text {
+typedef struct api_text {
   char *data; /* ends in a NUL that `size` does not count; NULL while empty */
   size_t size, capacity;
   int failed;
-} orb_text;
+} api_text;
 
-void orb_text_free(orb_text *text);
-void orb_text_append(orb_text *text, const char *bytes, size_t size);
-void orb_text_add(orb_text *text, const char *string);
-void orb_text_printf(orb_text *text, const char *format, ...) ORB_PRINTF(2, 3);
+void api_text_free(api_text *text);
+void api_text_append(api_text *text, const char *bytes, size_t size);
+void api_text_add(api_text *text, const char *string);
+void api_text_printf(api_text *text, const char *format, ...) ORB_PRINTF(2, 3);
 
 /* JSON: values. `open` is '{' or '[', `close` '}' or ']'. */
-void orb_json_open(orb_text *text, char open);
-void orb_json_close(orb_text *text, char close);
-void orb_json_key(orb_text *text, const char *name);
-void orb_json_string(orb_text *text, const char *utf8);
-void orb_json_number(orb_text *text, double value);
-void orb_json_integer(orb_text *text, int64_t value);
-void orb_json_bool(orb_text *text, int value);
-void orb_json_null(orb_text *text);
-void orb_json_raw(orb_text *text, const char *json); /* a whole value; NULL: null */
+void api_json_open(api_text *text, char open);
+void api_json_close(api_text *text, char close);
+void api_json_key(api_text *text, const char *name);
+void api_json_string(api_text *text, const char *utf8);
+void api_json_number(api_text *text, double value);
+void api_json_integer(api_text *text, int64_t value);
+void api_json_bool(api_text *text, int value);
+void api_json_null(api_text *text);
+void api_json_raw(api_text *text, const char *json); /* a whole value; NULL: null */
 
 /* JSON: members. */
-void orb_json_member_string(orb_text *text, const char *name, const char *utf8);
-void orb_json_member_number(orb_text *text, const char *name, double value);
-void orb_json_member_integer(orb_text *text, const char *name, int64_t value);
-void orb_json_member_bool(orb_text *text, const char *name, int value);
-void orb_json_member_raw(orb_text *text, const char *name, const char *json);
+void api_json_member_string(api_text *text, const char *name, const char *utf8);
+void api_json_member_number(api_text *text, const char *name, double value);
+void api_json_member_integer(api_text *text, const char *name, int64_t value);
+void api_json_member_bool(api_text *text, const char *name, int value);
+void api_json_member_raw(api_text *text, const char *name, const char *json);
 /* Milliseconds since 1970 as an RFC 3339 string in UTC; 0 as null. */
-void orb_json_member_instant(orb_text *text, const char *name, int64_t unix_ms);
+void api_json_member_instant(api_text *text, const char *name, int64_t unix_ms);
 
 #endif

@@ -105,12 +105,12 @@ const cached *cache_add(cache *c, resource *row, const char *tenant, unsigned lo
     resource_free(row);
     return NULL;
   }
-  char hash[ORB_ID_SIZE];
+  char hash[API_ID_SIZE];
   it->entry.row = *row;
   snprintf(it->entry.tenant, sizeof it->entry.tenant, "%s", tenant);
   row->json = NULL;
   it->entry.json_size = strlen(it->entry.row.json);
-  orb_id_of_text(it->entry.row.json, it->entry.json_size, hash);
+  api_id_of_text(it->entry.row.json, it->entry.json_size, hash);
   snprintf(it->entry.etag, sizeof it->entry.etag, "\"%.32s\"", hash);
   it->refs = 1;
   pthread_mutex_lock(&c->lock);

@@ -97,7 +97,7 @@ void control_serve(int fd, control_handler handle, void *user) {
   struct ucred who = {0};
   socklen_t size = sizeof who;
   char line[LINE_MOST], status;
-  orb_text reply = {0};
+  api_text reply = {0};
   if (peer < 0) {
     return;
   }
@@ -110,11 +110,11 @@ void control_serve(int fd, control_handler handle, void *user) {
       write_all(peer, reply.data, reply.size);
     }
   }
-  orb_text_free(&reply);
+  api_text_free(&reply);
   close(peer);
 }
 
-int control_ask(const char *data, const char *line, orb_text *reply) {
+int control_ask(const char *data, const char *line, api_text *reply) {
   struct sockaddr_un at;
   int folder = address_of(data, &at), fd = open_socket(), status = -1;
   char part[4096];
@@ -122,7 +122,7 @@ int control_ask(const char *data, const char *line, orb_text *reply) {
       write_all(fd, line, strlen(line)) && write_all(fd, "\n", 1) && read(fd, part, 1) == 1) {
     status = part[0] - '0';
     for (ssize_t n; (n = read(fd, part, sizeof part)) > 0;) {
-      orb_text_append(reply, part, (size_t)n);
+      api_text_append(reply, part, (size_t)n);
     }
   }
   if (fd >= 0) {

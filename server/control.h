@@ -6,7 +6,7 @@
 
 #include "api/text.h"
 
-typedef int (*control_handler)(void *user, const char *line, orb_text *reply); /* the exit status */
+typedef int (*control_handler)(void *user, const char *line, api_text *reply); /* the exit status */
 
 /* With the data folder locked. The descriptor; −1 with the reason logged. */
 int control_listen(const char *data);
@@ -15,6 +15,6 @@ void control_close(const char *data, int fd);
 void control_serve(int fd, control_handler handle, void *user);
 
 /* Asks the daemon that has the folder. The exit status, or −1 if none listens. */
-int control_ask(const char *data, const char *line, orb_text *reply);
+int control_ask(const char *data, const char *line, api_text *reply);
 
 #endif

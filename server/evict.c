@@ -45,7 +45,7 @@ store_result evict_owned(const evict_env *env, resource_kind kind, const char *i
 static int is_needed(const evict_env *env, const resource *row) {
   static const char member[] = "\"mesh\":\"";
   const char *at = row->kind == RESOURCE_EMBEDDING && env->q ? strstr(row->json, member) : NULL;
-  char mesh[ORB_ID_SIZE];
+  char mesh[API_ID_SIZE];
   if (!at) {
     return 0;
   }

@@ -31,23 +31,23 @@ void log_write(log_level level, const char *fields, const char *format, ...) {
   va_end(args);
   struct timespec now;
   clock_gettime(CLOCK_REALTIME, &now);
-  orb_text line = {0};
+  api_text line = {0};
   if (atomic_load(&as_json)) {
-    orb_json_open(&line, '{');
-    orb_json_member_instant(&line, "time", (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000);
-    orb_json_member_string(&line, "level", names[level]);
-    orb_json_member_string(&line, "message", message);
+    api_json_open(&line, '{');
+    api_json_member_instant(&line, "time", (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000);
+    api_json_member_string(&line, "level", names[level]);
+    api_json_member_string(&line, "message", message);
     if (fields && fields[0]) {
-      orb_text_printf(&line, ",%s", fields);
+      api_text_printf(&line, ",%s", fields);
     }
-    orb_json_close(&line, '}');
+    api_json_close(&line, '}');
   } else {
-    orb_text_printf(&line, "%s: %s%s%s", names[level], message, fields && fields[0] ? " " : "", fields ? fields : "");
+    api_text_printf(&line, "%s: %s%s%s", names[level], message, fields && fields[0] ? " " : "", fields ? fields : "");
   }
-  orb_text_add(&line, "\n");
+  api_text_add(&line, "\n");
   if (!line.failed) {
     ssize_t ignored = write(STDERR_FILENO, line.data, line.size);
     (void)ignored;
   }
-  orb_text_free(&line);
+  api_text_free(&line);
 }

@@ -106,7 +106,7 @@ static void keep_budget(const server *srv, int64_t *seen, int *over) {
   if (budget <= 0) {
     return;
   }
-  int64_t succeeded = queue_ended(srv->q, ORB_JOB_SUCCEEDED);
+  int64_t succeeded = queue_ended(srv->q, API_JOB_SUCCEEDED);
   if (succeeded != *seen || *over) {
     const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
     struct timespec now;
@@ -133,8 +133,8 @@ static void keep_jobs(const server *srv, ended_jobs *jobs) {
     return;
   }
   int64_t stored = jobs->counted ? 0 : catalogue_jobs_ended(srv->cat);
-  for (int s = ORB_JOB_SUCCEEDED; s <= ORB_JOB_CANCELLED; s++) {
-    since += queue_ended(srv->q, (orb_job_state)s);
+  for (int s = API_JOB_SUCCEEDED; s <= API_JOB_CANCELLED; s++) {
+    since += queue_ended(srv->q, (api_job_state)s);
   }
   if (!jobs->counted && stored >= 0) {
     *jobs = (ended_jobs){1, stored - since};
@@ -185,7 +185,7 @@ static int reload_callers(server *srv) {
 }
 
 /* A command from outside, through the control socket. */
-static int on_command(void *user, const char *line, orb_text *reply) {
+static int on_command(void *user, const char *line, api_text *reply) {
   server *srv = user;
   int status = token_command_apply(srv->cat, line, reply);
   if (status == 0 && strncmp(line, "token list ", 11) != 0) {

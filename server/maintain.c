@@ -24,13 +24,13 @@ static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermes
 static void verify_object(tally *t, const resource *row, object_kind kind, const char *what, const char *wanted) {
   unsigned char *bytes = NULL;
   size_t size = 0;
-  char sha[ORB_ID_SIZE] = "";
+  char sha[API_ID_SIZE] = "";
   if (objects_load(t->store, kind, row->id, &bytes, &size) != STORE_OK) {
     printf("%s %s: %s cannot be read\n", names[row->kind], row->id, what);
     t->wrong++;
     return;
   }
-  orb_id_of_text((const char *)bytes, size, sha);
+  api_id_of_text((const char *)bytes, size, sha);
   if (wanted[0] && strcmp(sha, wanted) != 0) {
     printf("%s %s: %s: %zu bytes that do not match their hash\n", names[row->kind], row->id, what, size);
     t->wrong++;

@@ -73,26 +73,26 @@ static int seen(histogram *h) {
   return sum > 0;
 }
 
-static void write_histogram(orb_text *out, const char *name, const char *label, histogram *h) {
+static void write_histogram(api_text *out, const char *name, const char *label, histogram *h) {
   long long sum = 0;
   const char *comma = label[0] ? "," : "";
   for (int i = 0; i <= BOUNDS; i++) {
     sum += atomic_load(&h->counts[i]);
     if (i < BOUNDS) {
-      orb_text_printf(out, "%s_bucket{%s%sle=\"%g\"} %lld\n", name, label, comma, bounds[i], sum);
+      api_text_printf(out, "%s_bucket{%s%sle=\"%g\"} %lld\n", name, label, comma, bounds[i], sum);
     }
   }
-  orb_text_printf(out, "%s_bucket{%s%sle=\"+Inf\"} %lld\n", name, label, comma, sum);
-  orb_text_printf(out, "%s_sum%s%s%s %.6f\n", name, label[0] ? "{" : "", label, label[0] ? "}" : "",
+  api_text_printf(out, "%s_bucket{%s%sle=\"+Inf\"} %lld\n", name, label, comma, sum);
+  api_text_printf(out, "%s_sum%s%s%s %.6f\n", name, label[0] ? "{" : "", label, label[0] ? "}" : "",
                   1e-6 * (double)atomic_load(&h->micros));
-  orb_text_printf(out, "%s_count%s%s%s %lld\n", name, label[0] ? "{" : "", label, label[0] ? "}" : "", sum);
+  api_text_printf(out, "%s_count%s%s%s %lld\n", name, label[0] ? "{" : "", label, label[0] ? "}" : "", sum);
 }
 
-void metrics_family(orb_text *out, const char *name, const char *type, const char *help) {
-  orb_text_printf(out, "# HELP %s %s\n# TYPE %s %s\n", name, help, name, type);
+void metrics_family(api_text *out, const char *name, const char *type, const char *help) {
+  api_text_printf(out, "# HELP %s %s\n# TYPE %s %s\n", name, help, name, type);
 }
 
-void metrics_write(orb_text *out) {
+void metrics_write(api_text *out) {
   metrics_family(out, "orbmorph_job_seconds", "histogram", "Time of attempts of jobs, by kind.");
   write_histogram(out, "orbmorph_job_seconds", "kind=\"embedding\"", &jobs[0]);
   write_histogram(out, "orbmorph_job_seconds", "kind=\"supermesh\"", &jobs[1]);
@@ -107,14 +107,14 @@ void metrics_write(orb_text *out) {
     }
   }
   metrics_family(out, "orbmorph_job_failures_total", "counter", "Attempts that did not succeed.");
-  orb_text_printf(out, "orbmorph_job_failures_total{kind=\"embedding\"} %lld\n", atomic_load(&job_failed[0]));
-  orb_text_printf(out, "orbmorph_job_failures_total{kind=\"supermesh\"} %lld\n", atomic_load(&job_failed[1]));
+  api_text_printf(out, "orbmorph_job_failures_total{kind=\"embedding\"} %lld\n", atomic_load(&job_failed[0]));
+  api_text_printf(out, "orbmorph_job_failures_total{kind=\"supermesh\"} %lld\n", atomic_load(&job_failed[1]));
   metrics_family(out, "orbmorph_http_request_seconds", "histogram",
                  "Time of requests, without those that wait for a job.");
   write_histogram(out, "orbmorph_http_request_seconds", "", &requests);
   metrics_family(out, "orbmorph_http_responses_total", "counter", "Answers by class of status.");
   for (int i = 1; i < 6; i++) {
-    orb_text_printf(out, "orbmorph_http_responses_total{class=\"%dxx\"} %lld\n", i, atomic_load(&statuses[i]));
+    api_text_printf(out, "orbmorph_http_responses_total{class=\"%dxx\"} %lld\n", i, atomic_load(&statuses[i]));
   }
   const struct {
     const char *name, *type, *help;
@@ -129,6 +129,6 @@ void metrics_write(orb_text *out) {
   };
   for (size_t i = 0; i < sizeof single / sizeof single[0]; i++) {
     metrics_family(out, single[i].name, single[i].type, single[i].help);
-    orb_text_printf(out, "%s %lld\n", single[i].name, single[i].value);
+    api_text_printf(out, "%s %lld\n", single[i].name, single[i].value);
   }
 }

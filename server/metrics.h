@@ -15,8 +15,8 @@ void metrics_bytes(int64_t received, int64_t sent);
 void metrics_connection(int change);
 int64_t metrics_connections(void);
 /* Appends them as Prometheus text. */
-void metrics_write(orb_text *out);
+void metrics_write(api_text *out);
 /* The two lines before the values of a family. */
-void metrics_family(orb_text *out, const char *name, const char *type, const char *help);
+void metrics_family(api_text *out, const char *name, const char *type, const char *help);
 
 #endif

@@ -109,7 +109,7 @@ int token_command_read(token_command *out, int *argc, char **argv) {
   return 1;
 }
 
-static int list(catalogue *cat, orb_text *reply) {
+static int list(catalogue *cat, api_text *reply) {
   int count;
   token_row *rows = catalogue_tokens(cat, &count);
   for (int i = 0; i < count; i++) {
@@ -121,7 +121,7 @@ static int list(catalogue *cat, orb_text *reply) {
       }
     }
     int other = strcmp(rows[i].tenant, rows[i].name) != 0;
-    orb_text_printf(reply, "%s %s uploaded=%lld quota=%lld quota-jobs=%lld priority=%d%s%s\n", rows[i].name, names,
+    api_text_printf(reply, "%s %s uploaded=%lld quota=%lld quota-jobs=%lld priority=%d%s%s\n", rows[i].name, names,
                     (long long)rows[i].used, (long long)rows[i].quota, (long long)rows[i].jobs, rows[i].priority,
                     other ? " tenant=" : "", other ? rows[i].tenant : "");
   }
@@ -129,13 +129,13 @@ static int list(catalogue *cat, orb_text *reply) {
   return count < 0;
 }
 
-int token_command_apply(catalogue *cat, const char *line, orb_text *reply) {
+int token_command_apply(catalogue *cat, const char *line, api_text *reply) {
   char verb[8], hash[TOKEN_TEXT];
   long long quota, jobs;
   token_row row = {.created = (int64_t)time(NULL) * 1000};
   if (sscanf(line, "token %7s %63s %d %lld %lld %d %63s %64s", verb, row.name, &row.scopes, &quota, &jobs,
              &row.priority, row.tenant, hash) != 8) {
-    orb_text_add(reply, "the command is not understood\n");
+    api_text_add(reply, "the command is not understood\n");
     return 2;
   }
   row.quota = quota;
@@ -160,11 +160,11 @@ int token_command_apply(catalogue *cat, const char *line, orb_text *reply) {
     result = catalogue_token_remove(cat, row.name);
   }
   if (result == STORE_CONFLICT) {
-    orb_text_printf(reply, "there is a token \"%s\" already; set or remove it\n", row.name);
+    api_text_printf(reply, "there is a token \"%s\" already; set or remove it\n", row.name);
   } else if (result == STORE_NOT_FOUND) {
-    orb_text_printf(reply, "there is no token \"%s\"\n", row.name);
+    api_text_printf(reply, "there is no token \"%s\"\n", row.name);
   } else if (result != STORE_OK) {
-    orb_text_add(reply, "the catalogue could not be written\n");
+    api_text_add(reply, "the catalogue could not be written\n");
   }
   return result != STORE_OK;
 }
@@ -183,7 +183,7 @@ static void write_line(const token_command *command, char line[TOKEN_LINE], char
            command->tenant ? command->tenant : "-", hash);
 }
 
-static int show(const token_command *command, int status, const orb_text *reply, const char *text) {
+static int show(const token_command *command, int status, const api_text *reply, const char *text) {
   if (status != 0) {
     fprintf(stderr, "orbmorphd: %s", reply->data ? reply->data : "that did not work; the log says why\n");
   } else if (strcmp(command->verb, "add") == 0) {
@@ -196,26 +196,26 @@ static int show(const token_command *command, int status, const orb_text *reply,
 
 int token_command_ask(const token_command *command, const config *options) {
   char line[TOKEN_LINE], text[TOKEN_TEXT];
-  orb_text reply = {0};
+  api_text reply = {0};
   write_line(command, line, text);
   int status = control_ask(options->data, line, &reply);
   if (status >= 0) {
     show(command, status, &reply, text);
   }
-  orb_text_free(&reply);
+  api_text_free(&reply);
   return status;
 }
 
 int token_command_run(const token_command *command, const config *options) {
   char line[TOKEN_LINE], text[TOKEN_TEXT];
   catalogue *cat = NULL;
-  orb_text reply = {0};
+  api_text reply = {0};
   if (catalogue_open(options->data, &cat) != STORE_OK) {
     return 1;
   }
   write_line(command, line, text);
   int status = show(command, token_command_apply(cat, line, &reply), &reply, text);
-  orb_text_free(&reply);
+  api_text_free(&reply);
   catalogue_close(cat);
   return status;
 }

@@ -23,6 +23,6 @@ int token_command_ask(const token_command *command, const config *options);
 /* With the data folder locked. The exit status. */
 int token_command_run(const token_command *command, const config *options);
 /* Carries out a line. The exit status, with what is to be shown in *reply. */
-int token_command_apply(catalogue *cat, const char *line, orb_text *reply);
+int token_command_apply(catalogue *cat, const char *line, api_text *reply);
 
 #endif

@@ -68,14 +68,14 @@ static int is_public(const request *r, const char *path) {
   return is_open(path) || (r->route ? r->route->scope == SCOPE_NONE : is_page(path));
 }
 
-int access_check(request *r, const char *path, orb_problem *problem) {
+int access_check(request *r, const char *path, api_problem *problem) {
   /* Browsers ask for permission to call without the token; the answer tells nothing but methods. */
   if (!r->srv->needs_token || is_public(r, path) || strcmp(r->method, "OPTIONS") == 0) {
     return 1;
   }
   r->caller = find_caller(r->srv, header_of(r, "Authorization"));
   if (!r->caller) {
-    return orb_refuse(problem, "unauthorized",
+    return api_refuse(problem, "unauthorized",
                       "Send a token that is known here: Authorization: Bearer TOKEN. The operator makes one with "
                       "orbmorphd token add.");
   }
@@ -91,9 +91,9 @@ int access_check(request *r, const char *path, orb_problem *problem) {
   while (names[i].scope != wanted) {
     i++;
   }
-  orb_refuse(problem, "forbidden", "The token \"%s\" has not the scope \"%s\", which this needs.", r->caller->row.name,
+  api_refuse(problem, "forbidden", "The token \"%s\" has not the scope \"%s\", which this needs.", r->caller->row.name,
              names[i].name);
-  orb_json_member_string(&problem->facts, "scope", names[i].name);
+  api_json_member_string(&problem->facts, "scope", names[i].name);
   return 0;
 }
 
@@ -118,17 +118,17 @@ int access_sees(const request *r, const char *owner) {
   return !view[0] || strcmp(view, owner) == 0;
 }
 
-int access_has_room(const request *r, int64_t bytes, orb_problem *problem) {
+int access_has_room(const request *r, int64_t bytes, api_problem *problem) {
   const token_row *token = r->caller ? &r->caller->row : NULL;
   int64_t used = token ? __atomic_load_n(&token->used, __ATOMIC_RELAXED) : 0;
   int64_t quota = token ? __atomic_load_n(&token->quota, __ATOMIC_RELAXED) : 0;
   if (quota == 0 || used + bytes <= quota) {
     return 1;
   }
-  orb_refuse(problem, "quota-exceeded",
+  api_refuse(problem, "quota-exceeded",
              "The meshes of the token \"%s\" may have %lld bytes in all, and have %lld: delete some, or ask for more.",
              token->name, (long long)quota, (long long)used);
-  orb_json_member_integer(&problem->facts, "quota", quota);
+  api_json_member_integer(&problem->facts, "quota", quota);
   return 0;
 }
 

@@ -22,11 +22,11 @@ static int64_t limit_of(const request *r) {
 }
 
 static void refuse_size(request *r) {
-  orb_problem problem = {0};
+  api_problem problem = {0};
   long long most = (long long)limit_of(r);
-  orb_refuse(&problem, "too-large", "The body%s has more than the %lld bytes that are taken here.",
+  api_refuse(&problem, "too-large", "The body%s has more than the %lld bytes that are taken here.",
              r->decoder ? ", unpacked," : "", most);
-  orb_json_member_integer(&problem.facts, "limit", most);
+  api_json_member_integer(&problem.facts, "limit", most);
   reply_problem(r, &problem);
 }
 
@@ -66,23 +66,23 @@ static int take_plain(void *user, const char *bytes, size_t size) {
   if (r->received > limit_of(r)) {
     refuse_size(r);
   } else if (r->decoder && r->received > MEBIBYTE && r->received / r->srv->options->max_ratio >= r->wire) {
-    orb_problem problem = {0};
-    orb_refuse(&problem, "too-large", "The body unpacks to more than %lld times its size; send it plain.",
+    api_problem problem = {0};
+    api_refuse(&problem, "too-large", "The body unpacks to more than %lld times its size; send it plain.",
                (long long)r->srv->options->max_ratio);
-    orb_json_member_integer(&problem.facts, "ratio_limit", r->srv->options->max_ratio);
+    api_json_member_integer(&problem.facts, "ratio_limit", r->srv->options->max_ratio);
     reply_problem(r, &problem);
   } else if (r->route->body == ROUTE_MESH_BODY) {
     handle_mesh_bytes(r, bytes, size);
   } else {
-    orb_text_append(&r->body, bytes, size);
+    api_text_append(&r->body, bytes, size);
   }
   return r->response == NULL;
 }
 
 static void refuse_coding(request *r, const char *why) {
-  orb_problem problem = {0};
-  orb_refuse(&problem, "malformed-encoding", "The body cannot be unpacked: %s.", why);
-  orb_json_member_integer(&problem.facts, "offset", r->wire);
+  api_problem problem = {0};
+  api_refuse(&problem, "malformed-encoding", "The body cannot be unpacked: %s.", why);
+  api_json_member_integer(&problem.facts, "offset", r->wire);
   reply_problem(r, &problem);
 }
 
@@ -163,5 +163,5 @@ void body_free(request *r) {
     r->decoder = NULL;
     account(r);
   }
-  orb_text_free(&r->body);
+  api_text_free(&r->body);
 }

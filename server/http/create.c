@@ -11,68 +11,68 @@
 /* A request that was read and checked. */
 typedef struct wanted {
   resource_kind kind;
-  char id[ORB_ID_SIZE];
-  orb_text canonical;
+  char id[API_ID_SIZE];
+  api_text canonical;
   int64_t cost;
 } wanted;
 
-static int summary_of(request *r, const char *mesh, orb_mesh_summary *out, orb_problem *problem) {
+static int summary_of(request *r, const char *mesh, api_mesh_summary *out, api_problem *problem) {
   server *srv = r->srv;
   store_result result;
   const cached *entry = find_description(srv, RESOURCE_MESH, mesh, access_view(r), &result);
   if (!entry && result == STORE_NOT_FOUND) {
-    orb_refuse(problem, "not-found", "There is no mesh %s: upload it first.", mesh);
-    orb_json_member_string(&problem->facts, "mesh", mesh);
+    api_refuse(problem, "not-found", "There is no mesh %s: upload it first.", mesh);
+    api_json_member_string(&problem->facts, "mesh", mesh);
     return 0;
   }
-  int fine = entry && orb_mesh_summarise(entry->row.json, out);
+  int fine = entry && api_mesh_summarise(entry->row.json, out);
   cache_release(srv->descriptions, entry);
-  return fine || orb_refuse(problem, "internal", "The description of the mesh %s cannot be read.", mesh);
+  return fine || api_refuse(problem, "internal", "The description of the mesh %s cannot be read.", mesh);
 }
 
-static int no_memory(orb_problem *problem) {
-  return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+static int no_memory(api_problem *problem) {
+  return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
 }
 
-static int read_embedding(request *r, const cJSON *body, wanted *out, orb_problem *problem) {
-  orb_embedding_request wish;
-  orb_mesh_summary mesh;
-  if (!orb_embedding_request_read(body, &wish, problem) || !summary_of(r, wish.mesh, &mesh, problem)) {
+static int read_embedding(request *r, const cJSON *body, wanted *out, api_problem *problem) {
+  api_embedding_request wish;
+  api_mesh_summary mesh;
+  if (!api_embedding_request_read(body, &wish, problem) || !summary_of(r, wish.mesh, &mesh, problem)) {
     return 0;
   }
   out->kind = RESOURCE_EMBEDDING;
   out->cost = mesh.triangles;
-  orb_embedding_request_write(&wish, &out->canonical);
-  return (orb_embedding_request_id(&wish, out->id) && !out->canonical.failed) || no_memory(problem);
+  api_embedding_request_write(&wish, &out->canonical);
+  return (api_embedding_request_id(&wish, out->id) && !out->canonical.failed) || no_memory(problem);
 }
 
-static int read_supermesh(request *r, const cJSON *body, wanted *out, orb_problem *problem) {
-  orb_supermesh_request wish;
-  orb_mesh_summary meshes[ORB_SHAPES_MAX];
-  int fine = orb_supermesh_request_read(body, &wish, problem);
+static int read_supermesh(request *r, const cJSON *body, wanted *out, api_problem *problem) {
+  api_supermesh_request wish;
+  api_mesh_summary meshes[API_SHAPES_MAX];
+  int fine = api_supermesh_request_read(body, &wish, problem);
   out->kind = RESOURCE_SUPERMESH;
   for (int32_t s = 0; fine && s < wish.shape_count; s++) {
     fine = summary_of(r, wish.shapes[s].mesh, &meshes[s], problem);
     out->cost += fine ? meshes[s].triangles : 0;
   }
-  fine = fine && orb_supermesh_request_resolve(&wish, meshes, problem);
+  fine = fine && api_supermesh_request_resolve(&wish, meshes, problem);
   if (fine) {
-    orb_supermesh_request_write(&wish, &out->canonical);
-    fine = (orb_supermesh_request_id(&wish, out->id) && !out->canonical.failed) || no_memory(problem);
+    api_supermesh_request_write(&wish, &out->canonical);
+    fine = (api_supermesh_request_id(&wish, out->id) && !out->canonical.failed) || no_memory(problem);
   }
-  orb_supermesh_request_free(&wish);
+  api_supermesh_request_free(&wish);
   return fine;
 }
 
-static int read_wish(request *r, wanted *out, orb_problem *problem) {
-  orb_json_error error;
-  cJSON *body = orb_json_parse(r->body.data ? r->body.data : "", r->body.size, &error);
+static int read_wish(request *r, wanted *out, api_problem *problem) {
+  api_json_error error;
+  cJSON *body = api_json_parse(r->body.data ? r->body.data : "", r->body.size, &error);
   if (!body) {
     if (!error.why) {
       return no_memory(problem);
     }
-    orb_refuse(problem, "malformed-json", "The body is not valid JSON: %s (at byte %zu).", error.why, error.offset);
-    orb_json_member_integer(&problem->facts, "offset", (int64_t)error.offset);
+    api_refuse(problem, "malformed-json", "The body is not valid JSON: %s (at byte %zu).", error.why, error.offset);
+    api_json_member_integer(&problem->facts, "offset", (int64_t)error.offset);
     return 0;
   }
   int fine = r->route->id == ROUTE_EMBEDDING_CREATE ? read_embedding(r, body, out, problem)
@@ -82,7 +82,7 @@ static int read_wish(request *r, wanted *out, orb_problem *problem) {
 }
 
 static void reply_accepted(request *r, job *j) {
-  orb_text json = {0};
+  api_text json = {0};
   char location[64];
   queue_job_write(r->srv->q, j, &json);
   snprintf(location, sizeof location, "/v1/jobs/%s", job_id(j));
@@ -92,7 +92,7 @@ static void reply_accepted(request *r, job *j) {
 }
 
 static void submit(request *r, const wanted *wish) {
-  queue_request wanted_job = {.kind = wish->kind == RESOURCE_EMBEDDING ? ORB_JOB_EMBEDDING : ORB_JOB_SUPERMESH,
+  queue_request wanted_job = {.kind = wish->kind == RESOURCE_EMBEDDING ? API_JOB_EMBEDDING : API_JOB_SUPERMESH,
                               .key = wish->id,
                               .request = wish->canonical.data,
                               .owner = access_tenant(r),
@@ -120,10 +120,10 @@ static void submit(request *r, const wanted *wish) {
       reply_refuse(r, "queue-full", "There are too many unfinished jobs; try again when some have ended.");
       break;
     case QUEUE_QUOTA: {
-      orb_problem problem = {0};
-      orb_refuse(&problem, "quota-exceeded", "The token \"%s\" may have %lld unfinished jobs; wait for one to end.",
+      api_problem problem = {0};
+      api_refuse(&problem, "quota-exceeded", "The token \"%s\" may have %lld unfinished jobs; wait for one to end.",
                  r->caller->row.name, (long long)wanted_job.owner_limit);
-      orb_json_member_integer(&problem.facts, "quota", wanted_job.owner_limit);
+      api_json_member_integer(&problem.facts, "quota", wanted_job.owner_limit);
       reply_problem(r, &problem);
       break;
     }
@@ -152,7 +152,7 @@ static void submit(request *r, const wanted *wish) {
 
 static void create_away(request *r) {
   wanted wish = {0};
-  orb_problem problem = {0};
+  api_problem problem = {0};
   store_result result;
   if (!read_wish(r, &wish, &problem)) {
     reply_problem(r, &problem);
@@ -166,7 +166,7 @@ static void create_away(request *r) {
       submit(r, &wish);
     }
   }
-  orb_text_free(&wish.canonical);
+  api_text_free(&wish.canonical);
 }
 
 enum MHD_Result handle_create(request *r) {

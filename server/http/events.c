@@ -16,7 +16,7 @@ typedef struct stream {
   struct MHD_Connection *connection;
   job *of;
   caller *caller;
-  orb_text pending;
+  api_text pending;
   size_t sent;
   int64_t after, last_ms;
   int ended;
@@ -36,7 +36,7 @@ static int fill(stream *s) {
   s->after = queue_events_write(s->srv->q, s->of, s->after, &s->pending, &ended);
   s->ended = ended;
   if (s->pending.size == 0 && !ended && orb_clock_ms() - s->last_ms >= PING_MS - 500) {
-    orb_text_add(&s->pending, ": still there\n\n");
+    api_text_add(&s->pending, ": still there\n\n");
   }
   return s->pending.size > 0;
 }
@@ -73,7 +73,7 @@ static void free_stream(void *user) {
   stream *s = user;
   queue_release(s->srv->q, s->of);
   caller_release(s->caller);
-  orb_text_free(&s->pending);
+  api_text_free(&s->pending);
   free(s);
 }
 
@@ -97,7 +97,7 @@ static void reply_over(request *r) {
 }
 
 /* Events after a number, from the catalogue; 0 where it cannot be read. */
-static int write_stored(const request *r, int64_t after, orb_text *text) {
+static int write_stored(const request *r, int64_t after, api_text *text) {
   event_row events[ROWS];
   int n = ROWS;
   while (n == ROWS) {
@@ -134,14 +134,14 @@ static void ended_away(request *r) {
     reply_store(r, STORE_NOT_FOUND);
     return;
   }
-  orb_text text = {0};
+  api_text text = {0};
   int64_t after = last_seen(r);
   int fine = write_stored(r, after, &text);
   if (fine && text.size == 0 && after > 0 && !is_event(r, after)) {
     fine = write_stored(r, 0, &text);
   }
   if (!fine) {
-    orb_text_free(&text);
+    api_text_free(&text);
     reply_store(r, STORE_ERROR);
     return;
   }
@@ -185,7 +185,7 @@ enum MHD_Result handle_job_events(request *r) {
   r->caller = NULL; /* the stream has it now */
   s->after = after;
   s->last_ms = orb_clock_ms();
-  orb_text_add(&s->pending, "retry: 2000\n\n");
+  api_text_add(&s->pending, "retry: 2000\n\n");
   r->response = response;
   r->status = 200;
   r->phase = PHASE_SEND;

@@ -31,11 +31,11 @@ static enum MHD_Result look(void *user, enum MHD_ValueKind kind, const char *nam
   return MHD_YES;
 }
 
-static int bad(orb_problem *problem, const char *why) {
-  return orb_refuse(problem, "bad-request", "%s", why);
+static int bad(api_problem *problem, const char *why) {
+  return api_refuse(problem, "bad-request", "%s", why);
 }
 
-static int check_length(request *r, const seen *s, orb_problem *problem) {
+static int check_length(request *r, const seen *s, api_problem *problem) {
   const config *options = r->srv->options;
   route_body kind = r->route ? r->route->body : ROUTE_NO_BODY;
   int64_t length = s->lengths ? strtoll(s->length, NULL, 10) : 0;
@@ -43,22 +43,22 @@ static int check_length(request *r, const seen *s, orb_problem *problem) {
     return r->has_body && r->route ? bad(problem, "This route takes no body.") : 1;
   }
   if (!s->lengths && !s->encodings) {
-    return orb_refuse(problem, "length-required", "Send a Content-Length, or the body in chunks.");
+    return api_refuse(problem, "length-required", "Send a Content-Length, or the body in chunks.");
   }
   int64_t most = kind == ROUTE_JSON_BODY ? options->max_json : options->max_body;
   if (length > most) {
-    orb_refuse(problem, "too-large", "The body has %lld bytes; at most %lld are taken here.", (long long)length,
+    api_refuse(problem, "too-large", "The body has %lld bytes; at most %lld are taken here.", (long long)length,
                (long long)most);
-    orb_json_member_integer(&problem->facts, "limit", most);
+    api_json_member_integer(&problem->facts, "limit", most);
     return 0;
   }
   if (s->codings > 1 || coding_of(header_of(r, "Content-Encoding")) == CODING_UNKNOWN) {
-    return orb_refuse(problem, "unsupported-encoding", "Send the body as it is, or with gzip or zstd, once.");
+    return api_refuse(problem, "unsupported-encoding", "Send the body as it is, or with gzip or zstd, once.");
   }
   return 1;
 }
 
-int guard_headers(request *r, const char *version, orb_problem *problem) {
+int guard_headers(request *r, const char *version, api_problem *problem) {
   seen s = {0};
   MHD_get_connection_values(r->connection, MHD_HEADER_KIND, look, &s);
   r->has_body = s.encodings || (s.lengths && !s.bad_length && strtoll(s.length, NULL, 10) > 0);

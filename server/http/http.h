@@ -55,7 +55,7 @@ struct request {
   allowance allowance;
   const route *route;
   const char *method;
-  char id[ORB_ID_SIZE];
+  char id[API_ID_SIZE];
   int shape;       /* {k} of the path; −1: none */
   char number[24]; /* of the request, for the log and X-Request-Id */
   caller *caller;  /* referenced; NULL where no token is needed */
@@ -68,10 +68,10 @@ struct request {
   int64_t decoder_bytes;           /* as counted in server.decoding */
   int64_t wire, received, dropped; /* bytes of the body: as they came, decoded, after a refusal */
   int body_done;                   /* all of it came */
-  orb_text body;                   /* JSON */
-  orb_text refusal;                /* the text of a refusal that was made while the body came */
+  api_text body;                   /* JSON */
+  api_text refusal;                /* the text of a refusal that was made while the body came */
   object_temp temp;                /* upload */
-  orb_hash hash;
+  api_hash hash;
 
   waiter waiter;
   job *waits_for;
@@ -95,7 +95,7 @@ void http_stop(server *srv);
 enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r));
 
 /* guard.c: 1, or 0 with the problem. */
-int guard_headers(request *r, const char *version, orb_problem *problem);
+int guard_headers(request *r, const char *version, api_problem *problem);
 const char *header_of(const request *r, const char *name);
 /* Of a header that is a list, every line of it that came (RFC 9110 section 5.3), at most so many; how many. */
 enum { HEADER_LINES = 16 };
@@ -108,7 +108,7 @@ int access_within_limits(request *r, const char *path);
 /* RateLimit and RateLimit-Policy (draft-ietf-httpapi-ratelimit-headers) of what holds for the caller. */
 void access_headers(request *r);
 /* 1, or 0 with the problem. */
-int access_check(request *r, const char *path, orb_problem *problem);
+int access_check(request *r, const char *path, api_problem *problem);
 /* Its priority in the queue: the token's, then what the Priority header says (RFC 9218, u=0 to 7). */
 int access_priority(const request *r);
 /* Whether it may look behind the scenes: with the scope admin, or where no token is needed. */
@@ -121,16 +121,16 @@ const char *access_view(const request *r);
 /* Whether it sees what a tenant asked for. What it does not see is not there for it. */
 int access_sees(const request *r, const char *owner);
 /* Room for an upload in the token's quota; 0 with the problem. */
-int access_has_room(const request *r, int64_t bytes, orb_problem *problem);
+int access_has_room(const request *r, int64_t bytes, api_problem *problem);
 
 /* reply.c: each leaves a response. */
-void reply_json(request *r, unsigned status, orb_text *json); /* takes json */
-void reply_problem(request *r, orb_problem *problem);         /* frees problem */
+void reply_json(request *r, unsigned status, api_text *json); /* takes json */
+void reply_problem(request *r, api_problem *problem);         /* frees problem */
 void reply_refuse(request *r, const char *name, const char *format, ...) ORB_PRINTF(3, 4);
 void reply_store(request *r, store_result result);
 void reply_empty(request *r, unsigned status);
 void reply_bytes(request *r, unsigned status, const char *mime, const void *bytes, size_t size); /* static bytes */
-void reply_text(request *r, unsigned status, const char *mime, orb_text *text);                  /* takes text */
+void reply_text(request *r, unsigned status, const char *mime, api_text *text);                  /* takes text */
 /* The description, with ETag and 304; takes the reference. */
 void reply_cached(request *r, unsigned status, const cached *entry);
 void reply_header(request *r, const char *name, const char *value);
@@ -165,7 +165,7 @@ typedef struct list_page {
   int limit;
   int64_t before;
   void *rows; /* of malloc() */
-  orb_text json;
+  api_text json;
 } list_page;
 int list_begin(request *r, const char *name, size_t row_size, list_page *page); /* 0 with a response */
 /* Takes the page; last: the sequence number of its last row; count: of the rows found, −1 where they cannot be read. */

@@ -24,21 +24,21 @@ int64_t read_wait_ms(request *r) {
   return wait;
 }
 
-static void refuse_ended(request *r, orb_job_state state) {
-  reply_refuse(r, "job-ended", "The job has %s already; there is nothing to cancel.", orb_job_state_name(state));
+static void refuse_ended(request *r, api_job_state state) {
+  reply_refuse(r, "job-ended", "The job has %s already; there is nothing to cancel.", api_job_state_name(state));
 }
 
 /* The job; for who cancels it a refusal where it came to an end of its own before it saw the wish. */
 static void reply_job(request *r, job *j) {
-  orb_text json = {0};
-  orb_job_state state = queue_job_write(r->srv->q, j, &json);
-  if (r->cancels && (state == ORB_JOB_SUCCEEDED || state == ORB_JOB_FAILED)) {
-    orb_text_free(&json);
+  api_text json = {0};
+  api_job_state state = queue_job_write(r->srv->q, j, &json);
+  if (r->cancels && (state == API_JOB_SUCCEEDED || state == API_JOB_FAILED)) {
+    api_text_free(&json);
     refuse_ended(r, state);
     return;
   }
   reply_json(r, 200, &json);
-  if (!orb_job_ended(state)) {
+  if (!api_job_ended(state)) {
     reply_header(r, "Retry-After", "1");
   }
 }
@@ -65,7 +65,7 @@ static int peer_is_gone(const request *r) {
 static void result_away(request *r) {
   store_result result;
   job *j = r->waits_for;
-  resource_kind kind = job_kind(j) == ORB_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
+  resource_kind kind = job_kind(j) == API_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
   const cached *entry = find_description(r->srv, kind, job_key(j), access_tenant(r), &result);
   if (entry) {
     reply_cached(r, 200, entry);
@@ -80,9 +80,9 @@ static enum MHD_Result waited_enough(request *r) {
     reply_job(r, j);
     return MHD_YES;
   }
-  orb_text json = {0};
-  if (queue_job_write(r->srv->q, j, &json) == ORB_JOB_SUCCEEDED) {
-    orb_text_free(&json);
+  api_text json = {0};
+  if (queue_job_write(r->srv->q, j, &json) == API_JOB_SUCCEEDED) {
+    api_text_free(&json);
     return request_go_away(r, r->srv->io, result_away);
   }
   char location[64];
@@ -109,19 +109,19 @@ enum MHD_Result handle_wait(request *r) {
   return waited_enough(r);
 }
 
-static void write_row(const job_row *row, orb_text *out) {
-  orb_job_view view = {.id = row->id,
+static void write_row(const job_row *row, api_text *out) {
+  api_job_view view = {.id = row->id,
                        .key = row->key,
                        .stage = NULL,
                        .problem = row->problem,
                        .kind = row->kind,
                        .state = row->state,
-                       .progress = row->state == ORB_JOB_SUCCEEDED ? 1 : 0,
+                       .progress = row->state == API_JOB_SUCCEEDED ? 1 : 0,
                        .attempt = row->attempt,
                        .created = row->created,
                        .started = row->started,
                        .finished = row->finished};
-  orb_job_write(&view, out);
+  api_job_write(&view, out);
 }
 
 static void get_away(request *r) {
@@ -132,7 +132,7 @@ static void get_away(request *r) {
     return;
   }
   if (access_sees(r, row.owner)) {
-    orb_text json = {0};
+    api_text json = {0};
     write_row(&row, &json);
     reply_json(r, 200, &json);
   } else {
@@ -177,8 +177,8 @@ static void cancel_away(request *r) {
     }
     if (!access_sees(r, row.owner)) {
       reply_store(r, STORE_NOT_FOUND);
-    } else if (row.state == ORB_JOB_CANCELLED) {
-      orb_text json = {0};
+    } else if (row.state == API_JOB_CANCELLED) {
+      api_text json = {0};
       write_row(&row, &json);
       reply_json(r, 200, &json);
     } else {
@@ -192,10 +192,10 @@ static void cancel_away(request *r) {
     queue_release(srv->q, j);
     return;
   }
-  orb_text json = {0};
-  orb_job_state state = queue_job_write(srv->q, j, &json);
-  orb_text_free(&json);
-  if (state == ORB_JOB_SUCCEEDED || state == ORB_JOB_FAILED) {
+  api_text json = {0};
+  api_job_state state = queue_job_write(srv->q, j, &json);
+  api_text_free(&json);
+  if (state == API_JOB_SUCCEEDED || state == API_JOB_FAILED) {
     refuse_ended(r, state);
     queue_release(srv->q, j);
     return;
@@ -216,9 +216,9 @@ enum MHD_Result handle_job_cancel(request *r) {
   return request_go_away(r, r->srv->io, cancel_away);
 }
 
-static orb_job_state write_live(request *r, const job_row *row, orb_text *out) {
-  job *live = orb_job_ended(row->state) ? NULL : queue_find(r->srv->q, row->id);
-  orb_job_state state = row->state;
+static api_job_state write_live(request *r, const job_row *row, api_text *out) {
+  job *live = api_job_ended(row->state) ? NULL : queue_find(r->srv->q, row->id);
+  api_job_state state = row->state;
   if (live) {
     state = queue_job_write(r->srv->q, live, out);
     queue_release(r->srv->q, live);
@@ -229,14 +229,14 @@ static orb_job_state write_live(request *r, const job_row *row, orb_text *out) {
 }
 
 /* Whether a job of the catalogue's page is in the list, which it then is added to. */
-static int add_to_list(request *r, const job_row *row, int state, int room, orb_text *out) {
-  orb_text json = {0};
+static int add_to_list(request *r, const job_row *row, int state, int room, api_text *out) {
+  api_text json = {0};
   int shown = (int)write_live(r, row, &json), taken = state < 0 || shown == state;
   if (taken && room) {
-    orb_json_raw(out, json.data ? json.data : "null");
+    api_json_raw(out, json.data ? json.data : "null");
     out->failed |= json.failed;
   }
-  orb_text_free(&json);
+  api_text_free(&json);
   return taken;
 }
 
@@ -245,7 +245,7 @@ static void list_away(request *r) {
   const char *state_text = query_of(r, "state");
   list_page page;
   int64_t last = 0;
-  if (state_text && (state = orb_job_state_of_name(state_text)) < 0) {
+  if (state_text && (state = api_job_state_of_name(state_text)) < 0) {
     reply_refuse(r, "bad-query", "\"state\" must be queued, running, succeeded, failed or cancelled.");
     return;
   }
@@ -253,7 +253,7 @@ static void list_away(request *r) {
     return;
   }
   /* What is queued in the catalogue may be running, because what it needs is: the state is that which is shown. */
-  int asked = state >= 0 && !orb_job_ended((orb_job_state)state) ? CATALOGUE_UNFINISHED : state;
+  int asked = state >= 0 && !api_job_ended((api_job_state)state) ? CATALOGUE_UNFINISHED : state;
   job_row *rows = page.rows;
   const char *view = access_view(r);
   int64_t before = page.before;

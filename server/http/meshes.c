@@ -23,7 +23,7 @@ static void refuse_full(request *r) {
 void handle_mesh_begin(request *r) {
   server *srv = r->srv;
   upload_query query;
-  orb_problem problem = {0};
+  api_problem problem = {0};
   if (!parse_upload(query_of(r, "name"), query_of(r, "repair"), query_of(r, "format"), &query, &problem)) {
     reply_problem(r, &problem); /* before the bytes are sent for nothing */
     return;
@@ -39,7 +39,7 @@ void handle_mesh_begin(request *r) {
     reply_store(r, begun);
     return;
   }
-  orb_hash_begin(&r->hash);
+  api_hash_begin(&r->hash);
 }
 
 /* The reserve is looked at again as the bytes come: chunks and packed bodies do not say before how many they are, and
@@ -53,7 +53,7 @@ void handle_mesh_bytes(request *r, const char *bytes, size_t size) {
   }
   store_result stored = objects_append(&r->temp, bytes, size);
   if (stored == STORE_OK) {
-    orb_hash_add(&r->hash, bytes, size);
+    api_hash_add(&r->hash, bytes, size);
   } else {
     reply_store(r, stored);
   }
@@ -76,7 +76,7 @@ static void unmap_upload(const request *r, const unsigned char *bytes) {
 
 /* Reads and repairs; on success the description is in *json. */
 static int check_mesh(request *r, const upload_query *query, const unsigned char *bytes, orb_format format,
-                      const char *id, int64_t created, orb_text *json, orb_problem *problem) {
+                      const char *id, int64_t created, api_text *json, api_problem *problem) {
   const config *options = r->srv->options;
   orb_context_options limits = {.memory_limit = (size_t)options->job_memory,
                                 .threads = 1,
@@ -84,11 +84,11 @@ static int check_mesh(request *r, const upload_query *query, const unsigned char
                                 .max_triangles = options->max_triangles};
   orb_context *ctx = NULL;
   orb_mesh mesh;
-  orb_mesh_facts facts = {
+  api_mesh_facts facts = {
       .id = id, .name = query->name, .repair = query->repair, .bytes = r->received, .created = created, .mesh = &mesh};
   memset(&mesh, 0, sizeof mesh);
   if (orb_context_create(&limits, &ctx) != ORB_OK) {
-    return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
   orb_format found = format;
   int fine = orb_mesh_read(ctx, bytes, (size_t)r->received, format, &mesh, &found) == ORB_OK &&
@@ -97,10 +97,10 @@ static int check_mesh(request *r, const upload_query *query, const unsigned char
   if (fine) {
     orb_mesh_extent(&mesh, &facts.extent);
     facts.format = orb_format_name(found);
-    orb_mesh_write(&facts, json);
-    fine = !json->failed || orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+    api_mesh_write(&facts, json);
+    fine = !json->failed || api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   } else {
-    orb_problem_of_error(orb_context_error(ctx), problem);
+    api_problem_of_error(orb_context_error(ctx), problem);
   }
   orb_mesh_free(ctx, &mesh);
   orb_context_destroy(ctx);
@@ -124,16 +124,16 @@ static void store_mesh(request *r, const upload_query *query, const unsigned cha
   server *srv = r->srv;
   const char *tenant = access_tenant(r);
   int fresh = 0;
-  orb_text json = {0};
-  orb_problem problem = {0};
+  api_text json = {0};
+  api_problem problem = {0};
   resource row = {.kind = RESOURCE_MESH, .bytes = r->received, .created = (int64_t)time(NULL) * 1000};
   if (!check_mesh(r, query, bytes, format, id, row.created, &json, &problem)) {
-    orb_text_free(&json);
+    api_text_free(&json);
     reply_problem(r, &problem);
     return;
   }
   memcpy(row.id, id, sizeof row.id);
-  orb_hash_end(&r->hash, row.sha);
+  api_hash_end(&r->hash, row.sha);
   row.json = json.data;
   objects_hold(srv->store);
   store_result stored = objects_publish(srv->store, &r->temp, OBJECT_MESH, id);
@@ -151,8 +151,8 @@ static void store_mesh(request *r, const upload_query *query, const unsigned cha
     drop_unused(srv, id);
     callers_recount(srv->callers, tenant);
     if (access_has_room(r, r->received, &problem)) {
-      orb_refuse(&problem, "quota-exceeded", "There was no room for this mesh in the quota of the token; try again.");
-      orb_json_member_integer(&problem.facts, "quota", __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED));
+      api_refuse(&problem, "quota-exceeded", "There was no room for this mesh in the quota of the token; try again.");
+      api_json_member_integer(&problem.facts, "quota", __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED));
     }
     reply_problem(r, &problem);
     return;
@@ -184,8 +184,8 @@ static void put_back(request *r, const char *id) {
 
 static void upload_away(request *r) {
   upload_query query;
-  orb_problem problem = {0};
-  char id[ORB_ID_SIZE];
+  api_problem problem = {0};
+  char id[API_ID_SIZE];
   if (!parse_upload(query_of(r, "name"), query_of(r, "repair"), query_of(r, "format"), &query, &problem)) {
     reply_problem(r, &problem);
     return;
@@ -197,7 +197,7 @@ static void upload_away(request *r) {
   }
   orb_format found = orb_format_detect(bytes, (size_t)r->received);
   int forced = found == ORB_FORMAT_AUTO && query.hint != ORB_FORMAT_AUTO;
-  orb_mesh_id(&r->hash, query.repair, forced ? orb_format_name(query.hint) : NULL, id);
+  api_mesh_id(&r->hash, query.repair, forced ? orb_format_name(query.hint) : NULL, id);
   store_result result;
   const cached *known = find_description(r->srv, RESOURCE_MESH, id, access_tenant(r), &result);
   if (known) {

@@ -39,11 +39,11 @@ extern const char PARSE_PAGE_TOKEN[]; /* why another is none */
 
 /* The query of an upload. 1, or 0 with the problem. */
 typedef struct upload_query {
-  char name[ORB_NAME_MAX], repair[ORB_REPAIR_TEXT];
+  char name[ORB_NAME_MAX], repair[API_REPAIR_TEXT];
   unsigned flags;
   orb_format hint;
 } upload_query;
-int parse_upload(const char *name, const char *repair, const char *format, upload_query *out, orb_problem *problem);
+int parse_upload(const char *name, const char *repair, const char *format, upload_query *out, api_problem *problem);
 
 /* W3C Trace Context, version 00. Others are passed over. */
 enum { TRACE_SIZE = 56 };

@@ -24,7 +24,7 @@ void reply_header(request *r, const char *name, const char *value) {
   }
 }
 
-void reply_text(request *r, unsigned status, const char *mime, orb_text *text) {
+void reply_text(request *r, unsigned status, const char *mime, api_text *text) {
   struct MHD_Response *response = NULL;
   size_t size = text->size;
   if (!text->failed) {
@@ -32,25 +32,25 @@ void reply_text(request *r, unsigned status, const char *mime, orb_text *text) {
                           : MHD_create_response_from_buffer(0, (void *)(uintptr_t) "", MHD_RESPMEM_PERSISTENT);
   }
   if (response) {
-    *text = (orb_text){0};
+    *text = (api_text){0};
   } else {
-    orb_text_free(text);
+    api_text_free(text);
   }
   take(r, status, response, size);
   reply_header(r, "Content-Type", mime);
 }
 
-void reply_json(request *r, unsigned status, orb_text *json) {
+void reply_json(request *r, unsigned status, api_text *json) {
   reply_text(r, status, "application/json", json);
   reply_header(r, "Cache-Control", "no-store");
 }
 
-void reply_problem(request *r, orb_problem *problem) {
-  orb_text text = {0};
-  orb_problem_write(problem, &text);
-  unsigned status = (unsigned)orb_problem_status(problem->name);
+void reply_problem(request *r, api_problem *problem) {
+  api_text text = {0};
+  api_problem_write(problem, &text);
+  unsigned status = (unsigned)api_problem_status(problem->name);
   if (r->wire > 0 && !r->body_done) {
-    orb_text_append(&r->refusal, text.data ? text.data : "", text.size);
+    api_text_append(&r->refusal, text.data ? text.data : "", text.size);
   }
   reply_text(r, status, "application/problem+json", &text);
   reply_header(r, "Cache-Control", "no-store");
@@ -63,17 +63,17 @@ void reply_problem(request *r, orb_problem *problem) {
   if (status == 401) {
     reply_header(r, "WWW-Authenticate", "Bearer");
   }
-  orb_problem_free(problem);
+  api_problem_free(problem);
 }
 
 void reply_refuse(request *r, const char *name, const char *format, ...) {
   char detail[512];
-  orb_problem problem = {0};
+  api_problem problem = {0};
   va_list args;
   va_start(args, format);
   vsnprintf(detail, sizeof detail, format, args);
   va_end(args);
-  orb_refuse(&problem, name, "%s", detail);
+  api_refuse(&problem, name, "%s", detail);
   reply_problem(r, &problem);
 }
 

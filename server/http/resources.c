@@ -88,27 +88,27 @@ int list_begin(request *r, const char *name, size_t row_size, list_page *page) {
     reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
     return 0;
   }
-  orb_json_open(&page->json, '{');
-  orb_json_key(&page->json, name);
-  orb_json_open(&page->json, '[');
+  api_json_open(&page->json, '{');
+  api_json_key(&page->json, name);
+  api_json_open(&page->json, '[');
   return 1;
 }
 
 void list_end(request *r, list_page *page, int64_t last, int count) {
   if (count < 0) {
-    orb_text_free(&page->json);
+    api_text_free(&page->json);
     free(page->rows);
     reply_store(r, STORE_ERROR);
     return;
   }
-  orb_json_close(&page->json, ']');
-  orb_json_key(&page->json, "next_page_token");
+  api_json_close(&page->json, ']');
+  api_json_key(&page->json, "next_page_token");
   if (count > page->limit) {
-    orb_text_printf(&page->json, "\"%016llx\"", (unsigned long long)paging_seal(r->srv->secret, last));
+    api_text_printf(&page->json, "\"%016llx\"", (unsigned long long)paging_seal(r->srv->secret, last));
   } else {
-    orb_json_null(&page->json);
+    api_json_null(&page->json);
   }
-  orb_json_close(&page->json, '}');
+  api_json_close(&page->json, '}');
   free(page->rows);
   reply_json(r, 200, &page->json);
 }
@@ -127,7 +127,7 @@ static void list_away(request *r) {
                       : catalogue_list(r->srv->cat, kind, page.before, page.limit + 1, rows);
   for (int i = 0; i < count; i++) {
     if (i < page.limit) {
-      orb_json_raw(&page.json, rows[i].json);
+      api_json_raw(&page.json, rows[i].json);
       last = rows[i].seq;
     }
     resource_free(&rows[i]);

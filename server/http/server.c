@@ -141,7 +141,7 @@ void request_fields(const request *r, char out[REQUEST_FIELDS]) {
 /* The first call of a request: everything that the headers decide. Leaves a response where the answer is clear. */
 static void request_begin(request *r, const char *path, const char *version) {
   char allow[64];
-  orb_problem problem = {0};
+  api_problem problem = {0};
   r->route = route_find(r->method, path, r->id, allow);
   watched_headers(r->watched);
   r->shape = r->route ? route_number(r->route, path) : -1;
@@ -233,7 +233,7 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
   queue_release(r->srv->q, r->waits_for);
   objects_abandon(&r->temp);
   body_free(r);
-  orb_text_free(&r->refusal);
+  api_text_free(&r->refusal);
   if (r->response) {
     MHD_destroy_response(r->response);
   }

@@ -10,9 +10,9 @@
 #include "pages.h"
 #include "studio/studio.h"
 
-static void gauge(orb_text *out, const char *name, const char *help, double value) {
+static void gauge(api_text *out, const char *name, const char *help, double value) {
   metrics_family(out, name, "gauge", help);
-  orb_text_printf(out, "%s %.17g\n", name, value);
+  api_text_printf(out, "%s %.17g\n", name, value);
 }
 
 static double count_entries(const char *folder) {
@@ -29,21 +29,21 @@ static double count_entries(const char *folder) {
 
 static void metrics_away(request *r) {
   server *srv = r->srv;
-  orb_text text = {0};
+  api_text text = {0};
   queue_numbers n;
   queue_count(srv->q, &n);
   metrics_write(&text);
   metrics_family(&text, "orbmorph_jobs", "gauge", "Unfinished jobs; waiting: for the embeddings that they need.");
-  orb_text_printf(&text, "orbmorph_jobs{state=\"queued\"} %d\norbmorph_jobs{state=\"waiting\"} %d\n", n.queued,
+  api_text_printf(&text, "orbmorph_jobs{state=\"queued\"} %d\norbmorph_jobs{state=\"waiting\"} %d\n", n.queued,
                   n.waiting);
-  orb_text_printf(&text, "orbmorph_jobs{state=\"running\"} %d\n", n.running);
+  api_text_printf(&text, "orbmorph_jobs{state=\"running\"} %d\n", n.running);
   metrics_family(&text, "orbmorph_jobs_running", "gauge", "Running jobs by stage.");
   for (size_t i = 0; i < sizeof n.stages / sizeof n.stages[0] && n.stages[i].jobs > 0; i++) {
-    orb_text_printf(&text, "orbmorph_jobs_running{stage=\"%s\"} %d\n", n.stages[i].name, n.stages[i].jobs);
+    api_text_printf(&text, "orbmorph_jobs_running{stage=\"%s\"} %d\n", n.stages[i].name, n.stages[i].jobs);
   }
   metrics_family(&text, "orbmorph_jobs_ended_total", "counter", "Jobs that ended since the start.");
-  for (int s = ORB_JOB_SUCCEEDED; s <= ORB_JOB_CANCELLED; s++) {
-    orb_text_printf(&text, "orbmorph_jobs_ended_total{state=\"%s\"} %lld\n", orb_job_state_name((orb_job_state)s),
+  for (int s = API_JOB_SUCCEEDED; s <= API_JOB_CANCELLED; s++) {
+    api_text_printf(&text, "orbmorph_jobs_ended_total{state=\"%s\"} %lld\n", api_job_state_name((api_job_state)s),
                     (long long)n.ended[s]);
   }
   gauge(&text, "orbmorph_queue_oldest_seconds", "Age of the oldest job that nothing but a worker is missing for.",
@@ -79,26 +79,26 @@ static enum MHD_Result ready(request *r) {
     reply_refuse(r, "unavailable", "The service is starting or stopping.");
     return MHD_YES;
   }
-  orb_text json = {0};
-  orb_json_open(&json, '{');
-  orb_json_member_string(&json, "status", "ready");
+  api_text json = {0};
+  api_json_open(&json, '{');
+  api_json_member_string(&json, "status", "ready");
   if (query_has(r, "verbose") && access_is_operator(r)) {
     queue_numbers n; /* a walk under the queue's lock: not for everybody */
     queue_count(srv->q, &n);
-    orb_json_member_integer(&json, "queued", n.queued);
-    orb_json_member_integer(&json, "waiting", n.waiting);
-    orb_json_member_integer(&json, "running", n.running);
-    orb_json_member_integer(&json, "queue_limit", srv->options->queue_limit);
-    orb_json_member_integer(&json, "oldest_ms", n.oldest_ms);
-    orb_json_member_integer(&json, "workers", srv->options->workers);
-    orb_json_member_integer(&json, "connections", metrics_connections());
-    orb_json_member_integer(&json, "max_connections", srv->options->max_connections);
-    orb_json_member_integer(&json, "waiting_connections", n.waiters);
-    orb_json_member_integer(&json, "disk_free_bytes", (int64_t)objects_free_bytes(srv->store));
-    orb_json_member_integer(&json, "uptime_seconds", (int64_t)time(NULL) - srv->started);
-    orb_json_member_string(&json, "engine", ORB_ENGINE);
+    api_json_member_integer(&json, "queued", n.queued);
+    api_json_member_integer(&json, "waiting", n.waiting);
+    api_json_member_integer(&json, "running", n.running);
+    api_json_member_integer(&json, "queue_limit", srv->options->queue_limit);
+    api_json_member_integer(&json, "oldest_ms", n.oldest_ms);
+    api_json_member_integer(&json, "workers", srv->options->workers);
+    api_json_member_integer(&json, "connections", metrics_connections());
+    api_json_member_integer(&json, "max_connections", srv->options->max_connections);
+    api_json_member_integer(&json, "waiting_connections", n.waiters);
+    api_json_member_integer(&json, "disk_free_bytes", (int64_t)objects_free_bytes(srv->store));
+    api_json_member_integer(&json, "uptime_seconds", (int64_t)time(NULL) - srv->started);
+    api_json_member_string(&json, "engine", ORB_ENGINE);
   }
-  orb_json_close(&json, '}');
+  api_json_close(&json, '}');
   reply_json(r, 200, &json);
   return MHD_YES;
 }
@@ -140,10 +140,10 @@ void handle_page(request *r, const char *path) {
 enum MHD_Result handle_system(request *r) {
   switch (r->route->id) {
     case ROUTE_LIVEZ: {
-      orb_text json = {0};
-      orb_json_open(&json, '{');
-      orb_json_member_string(&json, "status", "alive");
-      orb_json_close(&json, '}');
+      api_text json = {0};
+      api_json_open(&json, '{');
+      api_json_member_string(&json, "status", "alive");
+      api_json_close(&json, '}');
       reply_json(r, 200, &json);
       return MHD_YES;
     }

@@ -54,7 +54,7 @@ void queue_wake_once(queue *q) {
 
 int queue_wait(queue *q, job *j, waiter *w, int64_t after, void (*suspend)(waiter *)) {
   pthread_mutex_lock(&q->lock);
-  int ready = orb_job_ended(j->row.state) || q->waking || (w->events && j->last_event > after);
+  int ready = api_job_ended(j->row.state) || q->waking || (w->events && j->last_event > after);
   if (!ready) {
     suspend(w);
     w->of = j;
@@ -94,10 +94,10 @@ void *timer_main(void *argument) {
   return NULL;
 }
 
-int64_t prepare_event(job *j, orb_text *json) {
-  orb_job_view view;
+int64_t prepare_event(job *j, api_text *json) {
+  api_job_view view;
   job_view(j, &view);
-  orb_job_write(&view, json);
+  api_job_write(&view, json);
   int64_t least = (int64_t)j->row.attempt * EVENT_STRIDE;
   return (j->last_event > least ? j->last_event : least) + 1;
 }
@@ -121,7 +121,7 @@ void keep_event(job *j, int64_t number, const char *type, const char *json) {
 }
 
 void add_event(queue *q, job *j, const char *type, int store) {
-  orb_text json = {0};
+  api_text json = {0};
   int64_t number = prepare_event(j, &json);
   if (!json.failed) {
     keep_event(j, number, type, json.data);
@@ -130,19 +130,19 @@ void add_event(queue *q, job *j, const char *type, int store) {
     }
   }
   j->last_event_ms = orb_clock_ms();
-  orb_text_free(&json);
+  api_text_free(&json);
   wake_job(q, j, 0);
 }
 
-void event_write(orb_text *out, int64_t number, const char *type, const char *json) {
-  orb_text_printf(out, "id: %lld\nevent: %s\ndata: ", (long long)number, type);
-  orb_text_add(out, json);
-  orb_text_add(out, "\n\n");
+void event_write(api_text *out, int64_t number, const char *type, const char *json) {
+  api_text_printf(out, "id: %lld\nevent: %s\ndata: ", (long long)number, type);
+  api_text_add(out, json);
+  api_text_add(out, "\n\n");
 }
 
-int64_t queue_events_write(queue *q, job *j, int64_t after, orb_text *out, int *ended) {
+int64_t queue_events_write(queue *q, job *j, int64_t after, api_text *out, int *ended) {
   pthread_mutex_lock(&q->lock);
-  *ended = orb_job_ended(j->row.state);
+  *ended = api_job_ended(j->row.state);
   for (int i = 0; i < j->event_count; i++) {
     if (j->events[i].number > after) {
       event_write(out, j->events[i].number, j->events[i].type, j->events[i].json);
@@ -156,7 +156,7 @@ int64_t queue_events_write(queue *q, job *j, int64_t after, orb_text *out, int *
 
 int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over) {
   pthread_mutex_lock(&q->lock);
-  *over = orb_job_ended(j->row.state) && seen == j->last_event;
+  *over = api_job_ended(j->row.state) && seen == j->last_event;
   int64_t after = seen > j->last_event ? 0 : seen;
   pthread_mutex_unlock(&q->lock);
   return after;
@@ -167,7 +167,7 @@ static void show_to_dependents(queue *q, const job *of, const char *stage, doubl
   for (job *j = q->first; j; j = j->next) {
     for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
       if (is_for(of, j->dependencies[d], j->row.owner)) {
-        j->row.state = ORB_JOB_RUNNING;
+        j->row.state = API_JOB_RUNNING;
         if (!j->row.started) {
           j->row.started = unix_ms();
         }
@@ -187,15 +187,15 @@ static void show_to_dependents(queue *q, const job *of, const char *stage, doubl
 /* Where each stage lies in the progress of its kind of job. */
 static double overall(const job *j, const char *stage, double fraction) {
   static const struct {
-    orb_job_kind kind;
+    api_job_kind kind;
     const char *stage;
     double from, to;
-  } spans[] = {{ORB_JOB_EMBEDDING, "read", 0, 0.05},      {ORB_JOB_EMBEDDING, "check", 0.05, 0.1},
-               {ORB_JOB_EMBEDDING, "simplify", 0.1, 0.3}, {ORB_JOB_EMBEDDING, "embed", 0.3, 0.9},
-               {ORB_JOB_EMBEDDING, "certify", 0.9, 0.97}, {ORB_JOB_EMBEDDING, "store", 0.97, 1},
-               {ORB_JOB_SUPERMESH, "read", 0.6, 0.62},    {ORB_JOB_SUPERMESH, "align", 0.62, 0.75},
-               {ORB_JOB_SUPERMESH, "remesh", 0.75, 0.9},  {ORB_JOB_SUPERMESH, "transfer", 0.9, 0.94},
-               {ORB_JOB_SUPERMESH, "write", 0.94, 0.98},  {ORB_JOB_SUPERMESH, "store", 0.98, 1}};
+  } spans[] = {{API_JOB_EMBEDDING, "read", 0, 0.05},      {API_JOB_EMBEDDING, "check", 0.05, 0.1},
+               {API_JOB_EMBEDDING, "simplify", 0.1, 0.3}, {API_JOB_EMBEDDING, "embed", 0.3, 0.9},
+               {API_JOB_EMBEDDING, "certify", 0.9, 0.97}, {API_JOB_EMBEDDING, "store", 0.97, 1},
+               {API_JOB_SUPERMESH, "read", 0.6, 0.62},    {API_JOB_SUPERMESH, "align", 0.62, 0.75},
+               {API_JOB_SUPERMESH, "remesh", 0.75, 0.9},  {API_JOB_SUPERMESH, "transfer", 0.9, 0.94},
+               {API_JOB_SUPERMESH, "write", 0.94, 0.98},  {API_JOB_SUPERMESH, "store", 0.98, 1}};
   for (size_t i = 0; i < sizeof spans / sizeof spans[0]; i++) {
     if (spans[i].kind == j->row.kind && strcmp(spans[i].stage, stage) == 0) {
       return spans[i].from + fraction * (spans[i].to - spans[i].from);
@@ -212,7 +212,7 @@ void queue_progress(queue *q, job *j, const char *stage, double fraction) {
   copy_text(j->stage, sizeof j->stage, stage);
   if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
     add_event(q, j, "progress", stage_changed);
-    if (j->row.kind == ORB_JOB_EMBEDDING) {
+    if (j->row.kind == API_JOB_EMBEDDING) {
       show_to_dependents(q, j, j->stage, j->progress);
     }
   }

@@ -30,7 +30,7 @@ struct job {
   int cancel;
   int adopters;  /* requests that are making it listed */
   int waits_for; /* unfinished jobs that it needs */
-  char dependencies[DEPENDENCIES][ORB_ID_SIZE];
+  char dependencies[DEPENDENCIES][API_ID_SIZE];
   int dependency_count;
   char *dependency_problem;
   int64_t retry_at; /* not before, orb_clock_ms() */
@@ -68,7 +68,7 @@ struct queue {
   int waiter_count;
   pthread_t timer;
   int timer_started, timer_stop;
-  int64_t ended[ORB_JOB_CANCELLED + 1];
+  int64_t ended[API_JOB_CANCELLED + 1];
 };
 
 int64_t unix_ms(void);
@@ -85,11 +85,11 @@ void table_ended(queue *q, job *j);
 job *table_find(queue *q, const char *key, const char *owner); /* an unfinished one */
 int table_key_taken(const queue *q, const job *by_other);      /* another job for the same result is being worked on */
 void job_unref(job *j);
-void job_view(const job *j, orb_job_view *view);
+void job_view(const job *j, api_job_view *view);
 void wake_job(queue *q, job *j, int ended);
 /* Makes an event of the job's present state. Not for final ones, which the catalogue writes with the end. */
 void add_event(queue *q, job *j, const char *type, int store);
-int64_t prepare_event(job *j, orb_text *json);
+int64_t prepare_event(job *j, api_text *json);
 void keep_event(job *j, int64_t number, const char *type, const char *json);
 void *timer_main(void *argument);
 

@@ -83,14 +83,14 @@ static store_result load(queue *q, job_row *row) {
 }
 
 store_result queue_recover(queue *q) {
-  orb_problem problem = {0};
-  orb_text text = {0};
-  orb_refuse(&problem, "crashed", "The service died %d times while this job ran alone; it is not tried again.",
+  api_problem problem = {0};
+  api_text text = {0};
+  api_refuse(&problem, "crashed", "The service died %d times while this job ran alone; it is not tried again.",
              MOST_CRASHES);
-  orb_problem_write(&problem, &text);
+  api_problem_write(&problem, &text);
   store_result result = text.failed ? STORE_ERROR : catalogue_recover(q->cat, MOST_CRASHES, unix_ms(), text.data);
-  orb_text_free(&text);
-  orb_problem_free(&problem);
+  api_text_free(&text);
+  api_problem_free(&problem);
   FAULT_POINT("recovered");
   int64_t after = 0;
   int loaded = 0;

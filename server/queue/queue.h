@@ -57,7 +57,7 @@ void queue_wake_once(queue *q);
 
 /* Submitting. Blocks for the commit. owner and request are copied. */
 typedef struct queue_request {
-  orb_job_kind kind;
+  api_job_kind kind;
   const char *key, *request, *owner;
   int64_t cost;
   int priority, listed;
@@ -81,21 +81,21 @@ void queue_release(queue *q, job *j);
 
 const char *job_id(const job *j);
 const char *job_key(const job *j);
-orb_job_kind job_kind(const job *j);
+api_job_kind job_kind(const job *j);
 const char *job_request(const job *j);
 const char *job_owner(const job *j); /* the tenant that asked; "" where no token was needed */
 /* Appends the job as JSON; returns its state. */
-orb_job_state queue_job_write(queue *q, job *j, orb_text *out);
+api_job_state queue_job_write(queue *q, job *j, api_text *out);
 
 /* 1 if the connection is to wait: `suspend` was called under the lock and the waiter is listed. 0 if the job has
  * ended already (or has an event after `after` where events are wanted). */
 int queue_wait(queue *q, job *j, waiter *w, int64_t after, void (*suspend)(waiter *));
 /* Appends events after number `after` as an event stream; returns the last number; *ended when the last was final. */
-int64_t queue_events_write(queue *q, job *j, int64_t after, orb_text *out, int *ended);
+int64_t queue_events_write(queue *q, job *j, int64_t after, api_text *out, int *ended);
 /* Where to go on for who has seen events up to number `seen`: one that is beyond the last of this job was of none that
  * is known here, and he gets all. *over: the job has ended, and he has seen its end. */
 int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over);
-void event_write(orb_text *out, int64_t number, const char *type, const char *json);
+void event_write(api_text *out, int64_t number, const char *type, const char *json);
 
 /* Asks a job to end. Blocks for the commit where it was not running. */
 store_result queue_cancel(queue *q, job *j);
@@ -106,7 +106,7 @@ int queue_needs_mesh(queue *q, const char *mesh, const char *owner);
 /* Waits for a job; 0 when the queue stops. small_only: for the lane that large jobs cannot block. */
 int queue_take(queue *q, int small_only, job **out, int *threads);
 /* Makes a taken job wait until the jobs of these keys have ended. */
-queue_result queue_wait_for(queue *q, job *j, char (*keys)[ORB_ID_SIZE], const char *const *requests,
+queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const char *const *requests,
                             const int64_t *costs, int count);
 /* Why a job that it waited for failed, in malloc() memory; NULL if none did. */
 char *queue_dependency_problem(queue *q, job *j);
@@ -117,7 +117,7 @@ void queue_progress(queue *q, job *j, const char *stage, double fraction);
 void queue_add_embed_ms(queue *q, job *j, double ms);
 double queue_embed_ms(queue *q, job *j);
 /* Ends a taken job with its result, or problem. On a store that fails the job is queued again after a while. */
-void queue_finish(queue *q, job *j, orb_job_state state, const char *problem, const resource *result);
+void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result);
 /* Gives a taken job back to be taken a second later, because the store did not answer. */
 void queue_put_off(queue *q, job *j);
 /* Gives a taken job back. */
@@ -131,10 +131,10 @@ typedef struct queue_numbers {
     int jobs;
   } stages[16]; /* of the running; the rest is empty */
   int64_t oldest_ms;
-  int64_t ended[ORB_JOB_CANCELLED + 1]; /* by state, since the start */
+  int64_t ended[API_JOB_CANCELLED + 1]; /* by state, since the start */
 } queue_numbers;
 void queue_count(queue *q, queue_numbers *out); /* walks all unfinished jobs */
 /* Jobs that ended since the start, in this state. */
-int64_t queue_ended(queue *q, orb_job_state state);
+int64_t queue_ended(queue *q, api_job_state state);
 
 #endif

@@ -60,7 +60,7 @@ static queue_result submit_locked(queue *q, const queue_request *request, job **
   j->row.priority = request->priority;
   j->row.listed = request->listed;
   j->row.created = unix_ms();
-  orb_random_id(j->row.id);
+  api_random_id(j->row.id);
   copy_text(j->row.key, sizeof j->row.key, request->key);
   copy_text(j->row.owner, sizeof j->row.owner, request->owner);
   table_add(q, j);
@@ -102,7 +102,7 @@ queue_result queue_submit(queue *q, const queue_request *request, job **out, int
     pthread_cond_signal(&q->work);
   } else {
     j->dead = 1;
-    j->row.state = ORB_JOB_FAILED;
+    j->row.state = API_JOB_FAILED;
     table_drop_key(q, j);
     j->committed = 0;
     table_ended(q, j);
@@ -241,7 +241,7 @@ static void leave(queue *q, job *j) {
   pthread_cond_broadcast(&q->work);
 }
 
-queue_result queue_wait_for(queue *q, job *j, char (*keys)[ORB_ID_SIZE], const char *const *requests,
+queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const char *const *requests,
                             const int64_t *costs, int count) {
   queue_result result = QUEUE_OK;
   pthread_mutex_lock(&q->lock);
@@ -251,7 +251,7 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[ORB_ID_SIZE], const c
   pthread_mutex_unlock(&q->lock);
   for (int i = 0; i < count && result == QUEUE_OK; i++) {
     job *needed = NULL;
-    queue_request request = {.kind = ORB_JOB_EMBEDDING,
+    queue_request request = {.kind = API_JOB_EMBEDDING,
                              .key = keys[i],
                              .request = requests[i],
                              .owner = j->row.owner,
@@ -273,7 +273,7 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[ORB_ID_SIZE], const c
   if (j->cancel) { /* while it was planned */
     j->waits_for = 0;
     pthread_mutex_unlock(&q->lock);
-    queue_finish(q, j, ORB_JOB_CANCELLED, NULL, NULL);
+    queue_finish(q, j, API_JOB_CANCELLED, NULL, NULL);
     return QUEUE_OK;
   }
   leave(q, j);
@@ -298,7 +298,7 @@ store_result queue_claim(queue *q, job *j) {
   pthread_mutex_lock(&q->lock);
   if (result == STORE_OK) {
     j->row.attempt++;
-    j->row.state = ORB_JOB_RUNNING;
+    j->row.state = API_JOB_RUNNING;
     j->row.started = j->row.started ? j->row.started : now;
     j->running = 1;
   }
@@ -346,7 +346,7 @@ static void release_dependents(queue *q, job *ended) {
     for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
       if (is_for(ended, j->dependencies[d], j->row.owner)) {
         j->waits_for--;
-        if (ended->row.state == ORB_JOB_FAILED && ended->row.problem && !j->dependency_problem) {
+        if (ended->row.state == API_JOB_FAILED && ended->row.problem && !j->dependency_problem) {
           j->dependency_problem = strdup(ended->row.problem);
         }
       }
@@ -355,11 +355,11 @@ static void release_dependents(queue *q, job *ended) {
 }
 
 /* The end of a job in memory, after its row was committed. */
-static void ended_locked(queue *q, job *j, orb_job_state state, const char *problem, int64_t now) {
+static void ended_locked(queue *q, job *j, api_job_state state, const char *problem, int64_t now) {
   j->row.state = state;
   j->row.finished = now;
   j->row.problem = problem ? strdup(problem) : NULL;
-  if (state == ORB_JOB_SUCCEEDED) {
+  if (state == API_JOB_SUCCEEDED) {
     j->progress = 1;
   }
   table_drop_key(q, j);
@@ -367,7 +367,7 @@ static void ended_locked(queue *q, job *j, orb_job_state state, const char *prob
 }
 
 static void publish_end(queue *q, job *j, int64_t number, const char *json) {
-  keep_event(j, number, orb_job_state_name(j->row.state), json);
+  keep_event(j, number, api_job_state_name(j->row.state), json);
   release_dependents(q, j);
   wake_job(q, j, 1);
   table_ended(q, j);
@@ -376,7 +376,7 @@ static void publish_end(queue *q, job *j, int64_t number, const char *json) {
 
 /* Writes the end and shows it; the caller has taken the job. worked: as the worker that has it, and leaves it in the
  * moment in which others see it ended. */
-static store_result end_job(queue *q, job *j, orb_job_state state, const char *problem, const resource *result,
+static store_result end_job(queue *q, job *j, api_job_state state, const char *problem, const resource *result,
                             int worked) {
   int64_t now = unix_ms();
   pthread_mutex_lock(&q->lock);
@@ -384,8 +384,8 @@ static store_result end_job(queue *q, job *j, orb_job_state state, const char *p
   shown.row.state = state;
   shown.row.finished = now;
   shown.row.problem = (char *)(uintptr_t)problem;
-  shown.progress = state == ORB_JOB_SUCCEEDED ? 1 : j->progress;
-  orb_text json = {0};
+  shown.progress = state == API_JOB_SUCCEEDED ? 1 : j->progress;
+  api_text json = {0};
   int64_t number = prepare_event(&shown, &json) + 1000; /* beyond events that are still on their way */
   pthread_mutex_unlock(&q->lock);
   FAULT_POINT("before-finish");
@@ -402,13 +402,13 @@ static store_result end_job(queue *q, job *j, orb_job_state state, const char *p
     publish_end(q, j, number, json.data);
     pthread_mutex_unlock(&q->lock);
   }
-  orb_text_free(&json);
+  api_text_free(&json);
   return stored;
 }
 
 /* Notes the wish; 1 where the job is the caller's to end, because no worker has it. */
 static int cancel_locked(job *j) {
-  int mine = !orb_job_ended(j->row.state) && !j->taken;
+  int mine = !api_job_ended(j->row.state) && !j->taken;
   j->cancel = 1;
   if (j->ctx) {
     orb_context_cancel(j->ctx);
@@ -418,7 +418,7 @@ static int cancel_locked(job *j) {
 }
 
 static store_result end_cancelled(queue *q, job *j) {
-  store_result stored = end_job(q, j, ORB_JOB_CANCELLED, NULL, NULL, 0);
+  store_result stored = end_job(q, j, API_JOB_CANCELLED, NULL, NULL, 0);
   if (stored != STORE_OK) {
     pthread_mutex_lock(&q->lock);
     j->taken = 0;
@@ -456,7 +456,7 @@ static void cancel_needless(queue *q, job *of) {
   }
 }
 
-void queue_finish(queue *q, job *j, orb_job_state state, const char *problem, const resource *result) {
+void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result) {
   store_result stored = end_job(q, j, state, problem, result, 1);
   if (stored != STORE_OK) {
     log_error("the end of job %s could not be stored; it will be run again", j->row.id);
@@ -466,7 +466,7 @@ void queue_finish(queue *q, job *j, orb_job_state state, const char *problem, co
     queue_give_back(q, j);
     return;
   }
-  if (state == ORB_JOB_CANCELLED) {
+  if (state == API_JOB_CANCELLED) {
     cancel_needless(q, j);
   }
   pthread_mutex_lock(&q->lock);
@@ -479,7 +479,7 @@ void queue_give_back(queue *q, job *j) {
   store_result stored = claimed ? catalogue_job_release(q->cat, j->row.id, j->row.attempt) : STORE_OK;
   pthread_mutex_lock(&q->lock);
   if (claimed) {
-    j->row.state = ORB_JOB_QUEUED;
+    j->row.state = API_JOB_QUEUED;
     j->row.attempt -= stored == STORE_OK;
     j->stage[0] = 0;
     if (stored != STORE_OK) { /* try again to make the row what it should be before it runs */

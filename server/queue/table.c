@@ -128,7 +128,7 @@ const char *job_id(const job *j) {
 const char *job_key(const job *j) {
   return j->row.key;
 }
-orb_job_kind job_kind(const job *j) {
+api_job_kind job_kind(const job *j) {
   return j->row.kind;
 }
 const char *job_owner(const job *j) {
@@ -138,8 +138,8 @@ const char *job_request(const job *j) {
   return j->row.request;
 }
 
-void job_view(const job *j, orb_job_view *view) {
-  *view = (orb_job_view){.id = j->row.id,
+void job_view(const job *j, api_job_view *view) {
+  *view = (api_job_view){.id = j->row.id,
                          .key = j->row.key,
                          .stage = j->stage,
                          .problem = j->row.problem,
@@ -152,12 +152,12 @@ void job_view(const job *j, orb_job_view *view) {
                          .finished = j->row.finished};
 }
 
-orb_job_state queue_job_write(queue *q, job *j, orb_text *out) {
-  orb_job_view view;
+api_job_state queue_job_write(queue *q, job *j, api_text *out) {
+  api_job_view view;
   pthread_mutex_lock(&q->lock);
   job_view(j, &view);
-  orb_job_write(&view, out);
-  orb_job_state state = j->row.state;
+  api_job_write(&view, out);
+  api_job_state state = j->row.state;
   pthread_mutex_unlock(&q->lock);
   return state;
 }
@@ -203,7 +203,7 @@ void queue_count(queue *q, queue_numbers *out) {
   pthread_mutex_unlock(&q->lock);
 }
 
-int64_t queue_ended(queue *q, orb_job_state state) {
+int64_t queue_ended(queue *q, api_job_state state) {
   pthread_mutex_lock(&q->lock);
   int64_t ended = q->ended[state];
   pthread_mutex_unlock(&q->lock);

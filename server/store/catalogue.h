@@ -26,9 +26,9 @@ typedef enum resource_kind { RESOURCE_MESH, RESOURCE_EMBEDDING, RESOURCE_SUPERME
 typedef struct resource {
   int64_t seq;
   resource_kind kind;
-  char id[ORB_ID_SIZE];
-  char sha[ORB_ID_SIZE];    /* of its object's bytes */
-  char places[ORB_ID_SIZE]; /* of those of its places; "": none, or stored before this was noted */
+  char id[API_ID_SIZE];
+  char sha[API_ID_SIZE];    /* of its object's bytes */
+  char places[API_ID_SIZE]; /* of those of its places; "": none, or stored before this was noted */
   char *json;
   int64_t bytes; /* of its objects */
   int64_t created;
@@ -55,10 +55,10 @@ store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET
 /* A row of a job. request and problem are of malloc(). */
 typedef struct job_row {
   int64_t seq;
-  char id[ORB_JOB_ID_SIZE];
-  char key[ORB_ID_SIZE];
-  orb_job_kind kind;
-  orb_job_state state;
+  char id[API_JOB_ID_SIZE];
+  char key[API_ID_SIZE];
+  api_job_kind kind;
+  api_job_state state;
   int attempt;
   int crashes; /* attempts in which it ran alone and the process died */
   int suspect; /* was running when a process died: to be run alone */
@@ -83,7 +83,7 @@ store_result catalogue_job_claim(catalogue *cat, const char *id, int attempt, in
 /* running → queued again; its attempt does not count. */
 store_result catalogue_job_release(catalogue *cat, const char *id, int attempt);
 /* Ends it if (id, attempt) still holds, with its result (or NULL) in the same transaction. STORE_CONFLICT if not. */
-store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, orb_job_state state, const char *problem,
+store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, api_job_state state, const char *problem,
                                   int64_t now, const resource *result, int64_t event, const char *event_json);
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out);
 /* owner NULL, state −1: any. */

@@ -131,16 +131,16 @@ static int finish(database *db, void *arg) {
   if (code == SQLITE_OK && c->result) {
     code = resource_insert(db, c->result);
   }
-  if (code == SQLITE_OK && c->state == ORB_JOB_SUCCEEDED) {
+  if (code == SQLITE_OK && c->state == API_JOB_SUCCEEDED) {
     code = owner_of_job(db, c->id, c->now);
   }
   if (code == SQLITE_OK && c->event_json) {
-    code = write_event(db, c->id, c->event, orb_job_state_name((orb_job_state)c->state), c->event_json);
+    code = write_event(db, c->id, c->event, api_job_state_name((api_job_state)c->state), c->event_json);
   }
   return code;
 }
 
-store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, orb_job_state state, const char *problem,
+store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, api_job_state state, const char *problem,
                                   int64_t now, const resource *result, int64_t event, const char *event_json) {
   change c = {.id = id,
               .attempt = attempt,
@@ -159,8 +159,8 @@ static int read_row(sqlite3_stmt *st, void *to) {
   out->seq = sqlite3_column_int64(st, 0);
   row_text(st, 1, out->id, sizeof out->id);
   row_text(st, 2, out->key, sizeof out->key);
-  out->kind = (orb_job_kind)sqlite3_column_int(st, 3);
-  out->state = (orb_job_state)sqlite3_column_int(st, 4);
+  out->kind = (api_job_kind)sqlite3_column_int(st, 3);
+  out->state = (api_job_state)sqlite3_column_int(st, 4);
   out->attempt = sqlite3_column_int(st, 5);
   out->crashes = sqlite3_column_int(st, 6);
   out->suspect = sqlite3_column_int(st, 7);
@@ -221,10 +221,10 @@ int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out)
 
 /* Fails one that died alone too often, with its last event, so that who follows it learns of the end. */
 static int give_up(database *db, job_row *row, const change *c) {
-  orb_text json = {0};
+  api_text json = {0};
   int64_t number = 0;
-  row->state = ORB_JOB_FAILED;
-  orb_job_write(&(orb_job_view){.id = row->id,
+  row->state = API_JOB_FAILED;
+  api_job_write(&(api_job_view){.id = row->id,
                                 .key = row->key,
                                 .problem = c->problem,
                                 .kind = row->kind,
@@ -236,15 +236,15 @@ static int give_up(database *db, job_row *row, const change *c) {
                 &json);
   sqlite3_stmt *st = database_statement(db, "SELECT coalesce(max(number), 0) + 1 FROM event WHERE job=?1");
   if (!st || json.failed) {
-    orb_text_free(&json);
+    api_text_free(&json);
     return SQLITE_NOMEM;
   }
   sqlite3_bind_text(st, 1, row->id, -1, SQLITE_STATIC);
   int code = sqlite3_step(st);
   number = code == SQLITE_ROW ? sqlite3_column_int64(st, 0) : 0;
   sqlite3_reset(st);
-  code = code == SQLITE_ROW ? write_event(db, row->id, number, orb_job_state_name(row->state), json.data) : code;
-  orb_text_free(&json);
+  code = code == SQLITE_ROW ? write_event(db, row->id, number, api_job_state_name(row->state), json.data) : code;
+  api_text_free(&json);
   if (code == SQLITE_OK) {
     st = database_statement(db, "UPDATE job SET state=3, problem=?1, finished=?2 WHERE id=?3");
     if (!st) {
@@ -329,7 +329,7 @@ store_result catalogue_jobs_forget(catalogue *cat, int count) {
 }
 
 typedef struct event_arg {
-  char job[ORB_JOB_ID_SIZE], type[16];
+  char job[API_JOB_ID_SIZE], type[16];
   int64_t number;
   char json[];
 } event_arg;

@@ -94,7 +94,7 @@ int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resour
 
 typedef struct key_arg {
   int kind;
-  char id[ORB_ID_SIZE];
+  char id[API_ID_SIZE];
   int64_t now;
 } key_arg;
 

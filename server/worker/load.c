@@ -6,11 +6,11 @@
 #include "worker/run.h"
 #include "worker/sphere.h"
 
-void run_problem_of_store(store_result result, orb_problem *problem) {
+void run_problem_of_store(store_result result, api_problem *problem) {
   if (result == STORE_FULL) {
-    orb_refuse(problem, "storage-full", "The disk of the server is full; make room and try again.");
+    api_refuse(problem, "storage-full", "The disk of the server is full; make room and try again.");
   } else {
-    orb_refuse(problem, "internal", "The store could not be read or written; the log of the server says why.");
+    api_refuse(problem, "internal", "The store could not be read or written; the log of the server says why.");
   }
 }
 
@@ -41,23 +41,23 @@ static int32_t *copy_corners(orb_context *ctx, const orb_mesh *raw) {
 }
 
 int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh *mesh, file_triangle *noted,
-                  int32_t noted_count, int32_t **corners, orb_problem *problem) {
+                  int32_t noted_count, int32_t **corners, api_problem *problem) {
   resource row = {0};
-  orb_mesh_summary summary;
+  api_mesh_summary summary;
   unsigned repair;
-  char canonical[ORB_REPAIR_TEXT];
+  char canonical[API_REPAIR_TEXT];
   unsigned char *bytes = NULL;
   size_t size;
   memset(mesh, 0, sizeof *mesh);
   store_result found = catalogue_get(env->cat, RESOURCE_MESH, id, &row);
   if (found == STORE_NOT_FOUND) {
-    return orb_refuse(problem, "not-found", "The mesh %s was deleted before the job could use it.", id);
+    return api_refuse(problem, "not-found", "The mesh %s was deleted before the job could use it.", id);
   }
-  int fine = found == STORE_OK && orb_mesh_summarise(row.json, &summary) &&
-             orb_repair_parse(summary.repair, &repair, canonical, problem);
+  int fine = found == STORE_OK && api_mesh_summarise(row.json, &summary) &&
+             api_repair_parse(summary.repair, &repair, canonical, problem);
   resource_free(&row);
   if (!fine || objects_load(env->store, OBJECT_MESH, id, &bytes, &size) != STORE_OK) {
-    return orb_refuse(problem, "corrupt", "The stored mesh %s cannot be read.", id);
+    return api_refuse(problem, "corrupt", "The stored mesh %s cannot be read.", id);
   }
   orb_status status = orb_mesh_read(ctx, bytes, size, orb_format_of_name(summary.format), mesh, NULL);
   free(bytes);
@@ -72,7 +72,7 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
 }
 
 int run_load_points(const run_env *env, orb_context *ctx, const char *embedding, const orb_mesh *mesh, double **points,
-                    orb_problem *problem) {
+                    api_problem *problem) {
   unsigned char *bytes = NULL;
   size_t size = 0;
   *points = NULL;
@@ -82,7 +82,7 @@ int run_load_points(const run_env *env, orb_context *ctx, const char *embedding,
       found == STORE_OK ? sphere_points(bytes, size, mesh->vertex_count, mesh->triangle_count) : NULL;
   if (!first) {
     free(bytes);
-    return orb_refuse(problem, "corrupt", "The stored embedding %s cannot be read, or does not belong to its mesh.",
+    return api_refuse(problem, "corrupt", "The stored embedding %s cannot be read, or does not belong to its mesh.",
                       embedding);
   }
   *points = ORB_NEW(ctx, double, 3 * count);
@@ -94,7 +94,7 @@ int run_load_points(const run_env *env, orb_context *ctx, const char *embedding,
   return *points != NULL;
 }
 
-static int place_triangle(const orb_mesh *mesh, const orb_spot *spot, const file_triangle *noted, orb_place *out,
+static int place_triangle(const orb_mesh *mesh, const api_place *spot, const file_triangle *noted, orb_place *out,
                           const char **why) {
   int32_t t = 0;
   while (t < mesh->triangle_count && mesh->source_triangle[t] != spot->index) {
@@ -124,13 +124,13 @@ static int place_triangle(const orb_mesh *mesh, const orb_spot *spot, const file
   return 1;
 }
 
-int run_place(orb_context *ctx, const orb_mesh *mesh, const orb_spot *spot, const file_triangle *noted,
+int run_place(orb_context *ctx, const orb_mesh *mesh, const api_place *spot, const file_triangle *noted,
               orb_nearest **tree, orb_place *out, const char **why) {
   *why = NULL;
-  if (spot->kind == ORB_SPOT_TRIANGLE) {
+  if (spot->kind == API_PLACE_TRIANGLE) {
     return place_triangle(mesh, spot, noted, out, why);
   }
-  if (spot->kind == ORB_SPOT_POINT) {
+  if (spot->kind == API_PLACE_POINT) {
     if (!*tree && orb_nearest_create(ctx, mesh->positions, mesh->triangles, mesh->triangle_count, tree) != ORB_OK) {
       return 0;
     }

@@ -41,7 +41,7 @@ static void enter_stage(progress_of *p, const char *stage) {
   }
   double now = orb_clock();
   if (p->stage[0]) {
-    metrics_stage(job_kind(p->j) == ORB_JOB_EMBEDDING, p->stage, now - p->began);
+    metrics_stage(job_kind(p->j) == API_JOB_EMBEDDING, p->stage, now - p->began);
   }
   snprintf(p->stage, sizeof p->stage, "%s", stage);
   p->began = now;
@@ -55,25 +55,25 @@ static void on_progress(void *user, const char *stage, double fraction) {
 
 /* 1: the job was made to wait for embeddings. 0: all are there, or nothing is needed. −1: cannot be told now. */
 static int plan(const run_env *env, job *j) {
-  char keys[ORB_SHAPES_MAX][ORB_ID_SIZE];
-  orb_text texts[ORB_SHAPES_MAX];
-  const char *requests[ORB_SHAPES_MAX];
-  int64_t costs[ORB_SHAPES_MAX];
+  char keys[API_SHAPES_MAX][API_ID_SIZE];
+  api_text texts[API_SHAPES_MAX];
+  const char *requests[API_SHAPES_MAX];
+  int64_t costs[API_SHAPES_MAX];
   int count = 0, result = 0;
-  orb_problem problem = {0};
-  orb_supermesh_request request;
-  orb_json_error error;
+  api_problem problem = {0};
+  api_supermesh_request request;
+  api_json_error error;
   memset(texts, 0, sizeof texts);
   memset(&request, 0, sizeof request);
-  cJSON *body = orb_json_parse(job_request(j), strlen(job_request(j)), &error);
-  if (!body || !orb_supermesh_request_read(body, &request, &problem)) {
+  cJSON *body = api_json_parse(job_request(j), strlen(job_request(j)), &error);
+  if (!body || !api_supermesh_request_read(body, &request, &problem)) {
     goto done; /* the run itself reports it */
   }
   for (int32_t s = 0; s < request.shape_count; s++) {
-    orb_embedding_request wanted = {.options = request.embedding};
+    api_embedding_request wanted = {.options = request.embedding};
     resource known = {0};
     memcpy(wanted.mesh, request.shapes[s].mesh, sizeof wanted.mesh);
-    if (!orb_embedding_request_id(&wanted, keys[count])) {
+    if (!api_embedding_request_id(&wanted, keys[count])) {
       result = -1;
       goto done;
     }
@@ -92,13 +92,13 @@ static int plan(const run_env *env, job *j) {
     if (found == STORE_OK) {
       continue;
     }
-    orb_mesh_summary summary = {0};
+    api_mesh_summary summary = {0};
     costs[count] = 0;
     if (catalogue_get(env->cat, RESOURCE_MESH, wanted.mesh, &known) == STORE_OK) {
-      costs[count] = orb_mesh_summarise(known.json, &summary) ? summary.triangles : 0;
+      costs[count] = api_mesh_summarise(known.json, &summary) ? summary.triangles : 0;
       resource_free(&known);
     }
-    orb_embedding_request_write(&wanted, &texts[count]);
+    api_embedding_request_write(&wanted, &texts[count]);
     if (texts[count].failed) {
       result = -1;
       goto done;
@@ -113,33 +113,33 @@ static int plan(const run_env *env, job *j) {
     }
   }
 done:
-  for (int i = 0; i < ORB_SHAPES_MAX; i++) {
-    orb_text_free(&texts[i]);
+  for (int i = 0; i < API_SHAPES_MAX; i++) {
+    api_text_free(&texts[i]);
   }
-  orb_supermesh_request_free(&request);
-  orb_problem_free(&problem);
+  api_supermesh_request_free(&request);
+  api_problem_free(&problem);
   cJSON_Delete(body);
   return result;
 }
 
 /* Ends a job whose run failed. */
-static void finish_failed(const run_env *env, job *j, orb_context *ctx, orb_problem *problem) {
+static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_problem *problem) {
   if (!problem->name) {
     const orb_error *error = orb_context_error(ctx);
     if (error->status == ORB_E_CANCELLED) {
       if (queue_cancel_wanted(env->q, j)) {
-        queue_finish(env->q, j, ORB_JOB_CANCELLED, NULL, NULL);
+        queue_finish(env->q, j, API_JOB_CANCELLED, NULL, NULL);
       } else {
         queue_give_back(env->q, j); /* the service stops */
       }
       return;
     }
-    orb_problem_of_error(error, problem);
+    api_problem_of_error(error, problem);
   }
-  orb_text text = {0};
-  orb_problem_write(problem, &text);
-  queue_finish(env->q, j, ORB_JOB_FAILED, text.failed ? NULL : text.data, NULL);
-  orb_text_free(&text);
+  api_text text = {0};
+  api_problem_write(problem, &text);
+  queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data, NULL);
+  api_text_free(&text);
 }
 
 static void run_claimed(worker_pool *pool, job *j, int threads) {
@@ -152,19 +152,19 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
                                  .progress = on_progress,
                                  .progress_user = &progress};
   orb_context *ctx = NULL;
-  orb_problem problem = {0};
+  api_problem problem = {0};
   run_output out = {0};
   int64_t began = orb_clock_ms();
   if (orb_context_create(&options, &ctx) != ORB_OK) {
-    orb_refuse(&problem, "no-memory", "The server has no memory left; try again later.");
+    api_refuse(&problem, "no-memory", "The server has no memory left; try again later.");
     finish_failed(env, j, NULL, &problem);
-    orb_problem_free(&problem);
+    api_problem_free(&problem);
     return;
   }
   queue_set_context(env->q, j, ctx);
   FAULT_POINT("run-begun");
   FAULT_POINT(job_key(j));
-  int embedding = job_kind(j) == ORB_JOB_EMBEDDING;
+  int embedding = job_kind(j) == API_JOB_EMBEDDING;
   int fine = embedding ? run_embedding(env, ctx, j, &out, &problem) : run_supermesh(env, ctx, j, &out, &problem);
   queue_set_context(env->q, j, NULL);
   enter_stage(&progress, "");
@@ -173,12 +173,12 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
   metrics_job(embedding, fine, seconds);
   char fields[128];
   snprintf(fields, sizeof fields, "\"job\":\"%s\",\"seconds\":%.3f", job_id(j), seconds);
-  log_write(LOG_INFO, fields, "%s job %s", orb_job_kind_name(job_kind(j)), fine ? "done" : "did not succeed");
+  log_write(LOG_INFO, fields, "%s job %s", api_job_kind_name(job_kind(j)), fine ? "done" : "did not succeed");
   if (fine) {
     if (embedding) {
       queue_add_embed_ms(env->q, j, 1e3 * seconds);
     }
-    queue_finish(env->q, j, ORB_JOB_SUCCEEDED, NULL, out.row.json ? &out.row : NULL);
+    queue_finish(env->q, j, API_JOB_SUCCEEDED, NULL, out.row.json ? &out.row : NULL);
   } else if (out.gone) {
     queue_give_back(env->q, j); /* to be planned again */
   } else {
@@ -188,23 +188,23 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
     objects_let_go(env->store);
   }
   resource_free(&out.row);
-  orb_problem_free(&problem);
+  api_problem_free(&problem);
   orb_context_destroy(ctx);
 }
 
 static void run_one(worker_pool *pool, job *j, int threads) {
   const run_env *env = &pool->env;
   if (queue_cancel_wanted(env->q, j)) {
-    queue_finish(env->q, j, ORB_JOB_CANCELLED, NULL, NULL);
+    queue_finish(env->q, j, API_JOB_CANCELLED, NULL, NULL);
     return;
   }
   char *reason = queue_dependency_problem(env->q, j);
   if (reason) {
-    queue_finish(env->q, j, ORB_JOB_FAILED, reason, NULL);
+    queue_finish(env->q, j, API_JOB_FAILED, reason, NULL);
     free(reason);
     return;
   }
-  int waits = job_kind(j) == ORB_JOB_SUPERMESH ? plan(env, j) : 0;
+  int waits = job_kind(j) == API_JOB_SUPERMESH ? plan(env, j) : 0;
   if (waits > 0) {
     return;
   }

@@ -6,21 +6,21 @@
 #include "metrics.h"
 #include "worker/run.h"
 
-static int read_request(const job *j, orb_embedding_request *request, orb_problem *problem) {
-  orb_json_error error;
-  cJSON *body = orb_json_parse(job_request(j), strlen(job_request(j)), &error);
-  int fine = body ? orb_embedding_request_read(body, request, problem)
-                  : orb_refuse(problem, "corrupt", "The stored request of the job does not decode.");
+static int read_request(const job *j, api_embedding_request *request, api_problem *problem) {
+  api_json_error error;
+  cJSON *body = api_json_parse(job_request(j), strlen(job_request(j)), &error);
+  int fine = body ? api_embedding_request_read(body, request, problem)
+                  : api_refuse(problem, "corrupt", "The stored request of the job does not decode.");
   cJSON_Delete(body);
   return fine;
 }
 
 static int store_sphere(const run_env *env, orb_context *ctx, const char *key, const orb_mesh *mesh,
-                        const orb_embedding *embedding, resource *result, orb_problem *problem) {
+                        const orb_embedding *embedding, resource *result, api_problem *problem) {
   orb_buffer ply = {0};
   int fine = orb_sphere_ply_write(ctx, mesh, embedding->points, &ply) == ORB_OK;
   if (fine) {
-    orb_id_of_text((const char *)ply.data, ply.size, result->sha);
+    api_id_of_text((const char *)ply.data, ply.size, result->sha);
     result->bytes = (int64_t)ply.size;
     store_result stored = objects_put(env->store, OBJECT_SPHERE, key, ply.data, ply.size);
     if (stored != STORE_OK) {
@@ -32,9 +32,9 @@ static int store_sphere(const run_env *env, orb_context *ctx, const char *key, c
   return fine;
 }
 
-int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out, orb_problem *problem) {
+int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem) {
   resource *result = &out->row;
-  orb_embedding_request request;
+  api_embedding_request request;
   orb_mesh mesh = {0};
   orb_embedding embedding = {0};
   resource known = {0};
@@ -65,15 +65,15 @@ int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out,
   if (!store_sphere(env, ctx, job_key(j), &mesh, &embedding, result, problem)) {
     goto done;
   }
-  orb_text json = {0};
+  api_text json = {0};
   result->kind = RESOURCE_EMBEDDING;
   result->created = (int64_t)time(NULL) * 1000;
   memcpy(result->id, job_key(j), sizeof result->id);
-  orb_embedding_write(result->id, &request, &embedding, result->created, &json);
+  api_embedding_write(result->id, &request, &embedding, result->created, &json);
   result->json = json.data;
   fine = !json.failed;
   if (!fine) {
-    orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+    api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
 done:
   orb_embedding_free(ctx, &embedding);

@@ -11,12 +11,12 @@
 
 /* Everything that a merge needs; of the context. */
 typedef struct merge_input {
-  orb_supermesh_request request;
-  orb_mesh meshes[ORB_SHAPES_MAX];
-  int32_t *corners[ORB_SHAPES_MAX]; /* of each file's triangles */
-  double *points[ORB_SHAPES_MAX];
-  orb_align_shape shapes[ORB_SHAPES_MAX];
-  const char *names[ORB_SHAPES_MAX];
+  api_supermesh_request request;
+  orb_mesh meshes[API_SHAPES_MAX];
+  int32_t *corners[API_SHAPES_MAX]; /* of each file's triangles */
+  double *points[API_SHAPES_MAX];
+  orb_align_shape shapes[API_SHAPES_MAX];
+  const char *names[API_SHAPES_MAX];
   orb_landmark *landmarks;
   orb_place *places;
   file_triangle *noted; /* landmark-major, as the spots */
@@ -32,30 +32,30 @@ static void free_input(orb_context *ctx, merge_input *in) {
   orb_free(ctx, in->landmarks);
   orb_free(ctx, in->places);
   orb_free(ctx, in->noted);
-  orb_supermesh_request_free(&in->request);
+  api_supermesh_request_free(&in->request);
 }
 
-static int read_request(const job *j, orb_supermesh_request *request, orb_problem *problem) {
-  orb_json_error error;
-  cJSON *body = orb_json_parse(job_request(j), strlen(job_request(j)), &error);
-  int fine = body ? orb_supermesh_request_read(body, request, problem)
-                  : orb_refuse(problem, "corrupt", "The stored request of the job does not decode.");
+static int read_request(const job *j, api_supermesh_request *request, api_problem *problem) {
+  api_json_error error;
+  cJSON *body = api_json_parse(job_request(j), strlen(job_request(j)), &error);
+  int fine = body ? api_supermesh_request_read(body, request, problem)
+                  : api_refuse(problem, "corrupt", "The stored request of the job does not decode.");
   cJSON_Delete(body);
   return fine;
 }
 
-static int refuse_landmark(const merge_input *in, int32_t l, int32_t s, const char *why, orb_problem *problem) {
-  const orb_spot *spot = &in->request.landmarks.spots[(size_t)l * (size_t)in->request.shape_count + (size_t)s];
-  orb_refuse(problem, "bad-landmarks", "Landmark %d (\"%.60s\"), shape %d (\"%.60s\"), %s %d: %s.", l,
+static int refuse_landmark(const merge_input *in, int32_t l, int32_t s, const char *why, api_problem *problem) {
+  const api_place *spot = &in->request.landmarks.spots[(size_t)l * (size_t)in->request.shape_count + (size_t)s];
+  api_refuse(problem, "bad-landmarks", "Landmark %d (\"%.60s\"), shape %d (\"%.60s\"), %s %d: %s.", l,
              in->request.landmarks.items[l].name, s, in->names[s],
-             spot->kind == ORB_SPOT_TRIANGLE ? "triangle" : "vertex", spot->index, why);
-  orb_text_printf(&problem->facts, "\"landmarks\":[%d],\"shape\":%d,\"reason\":\"dropped\"", l, s);
+             spot->kind == API_PLACE_TRIANGLE ? "triangle" : "vertex", spot->index, why);
+  api_text_printf(&problem->facts, "\"landmarks\":[%d],\"shape\":%d,\"reason\":\"dropped\"", l, s);
   return 0;
 }
 
 /* Places of all landmarks on one shape. */
-static int place_all(orb_context *ctx, merge_input *in, int32_t s, orb_problem *problem) {
-  const orb_landmark_list *list = &in->request.landmarks;
+static int place_all(orb_context *ctx, merge_input *in, int32_t s, api_problem *problem) {
+  const api_landmark_list *list = &in->request.landmarks;
   orb_nearest *tree = NULL;
   int fine = 1;
   for (int32_t l = 0; l < list->count && fine; l++) {
@@ -70,21 +70,21 @@ static int place_all(orb_context *ctx, merge_input *in, int32_t s, orb_problem *
   return fine;
 }
 
-static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int32_t s, orb_problem *problem) {
-  const orb_landmark_list *list = &in->request.landmarks;
-  orb_embedding_request wanted = {.options = in->request.embedding};
-  char embedding[ORB_ID_SIZE];
+static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int32_t s, api_problem *problem) {
+  const api_landmark_list *list = &in->request.landmarks;
+  api_embedding_request wanted = {.options = in->request.embedding};
+  char embedding[API_ID_SIZE];
   memcpy(wanted.mesh, in->request.shapes[s].mesh, sizeof wanted.mesh);
-  if (!orb_embedding_request_id(&wanted, embedding)) {
-    return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  if (!api_embedding_request_id(&wanted, embedding)) {
+    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
   file_triangle *noted = ORB_NEW(ctx, file_triangle, list->count);
   if (!noted) {
     return 0;
   }
   for (int32_t l = 0; l < list->count; l++) {
-    const orb_spot *spot = &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s];
-    noted[l].index = spot->kind == ORB_SPOT_TRIANGLE ? spot->index : -1;
+    const api_place *spot = &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s];
+    noted[l].index = spot->kind == API_PLACE_TRIANGLE ? spot->index : -1;
   }
   int fine = run_load_mesh(env, ctx, wanted.mesh, &in->meshes[s], noted, list->count, &in->corners[s], problem);
   for (int32_t l = 0; fine && l < list->count; l++) {
@@ -101,8 +101,8 @@ static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int
   return fine && place_all(ctx, in, s, problem);
 }
 
-static int load_input(const run_env *env, orb_context *ctx, merge_input *in, orb_problem *problem) {
-  const orb_landmark_list *list = &in->request.landmarks;
+static int load_input(const run_env *env, orb_context *ctx, merge_input *in, api_problem *problem) {
+  const api_landmark_list *list = &in->request.landmarks;
   size_t places = (size_t)list->count * (size_t)in->request.shape_count;
   in->landmarks = ORB_NEW0(ctx, orb_landmark, list->count);
   in->places = ORB_NEW0(ctx, orb_place, places);
@@ -129,11 +129,11 @@ static int load_input(const run_env *env, orb_context *ctx, merge_input *in, orb
 
 /* Before the row, as the asset: a supermesh that is there has all of them. */
 static int store_places(const run_env *env, orb_context *ctx, const merge_input *in, const orb_merge_result *merged,
-                        resource *result, orb_problem *problem) {
+                        resource *result, api_problem *problem) {
   orb_buffer places = {0};
   int fine = places_write(ctx, in->meshes, in->corners, merged, &places) == ORB_OK;
   if (fine) {
-    orb_id_of_text((const char *)places.data, places.size, result->places);
+    api_id_of_text((const char *)places.data, places.size, result->places);
     store_result stored = objects_put(env->store, OBJECT_PLACES, result->id, places.data, places.size);
     result->bytes += (int64_t)places.size;
     fine = stored == STORE_OK;
@@ -146,7 +146,7 @@ static int store_places(const run_env *env, orb_context *ctx, const merge_input 
 }
 
 static int store_spheres(const run_env *env, orb_context *ctx, const orb_merge_result *merged, resource *result,
-                         orb_problem *problem) {
+                         api_problem *problem) {
   int64_t bytes = 0;
   orb_status status;
   store_result stored = spheres_put(env->store, ctx, result->id, &merged->alignment, &bytes, &status);
@@ -159,15 +159,15 @@ static int store_spheres(const run_env *env, orb_context *ctx, const orb_merge_r
 
 /* The places that the alignment found, as a request would name them: by the file's triangle, or as a point where a
  * repair made the triangle. NULL if memory is out. */
-static orb_spot *found_spots(orb_context *ctx, const merge_input *in, const orb_merge_result *merged) {
+static api_place *found_spots(orb_context *ctx, const merge_input *in, const orb_merge_result *merged) {
   size_t shapes = (size_t)in->request.shape_count, count = (size_t)merged->alignment.found_count * shapes;
-  orb_spot *spots = ORB_NEW(ctx, orb_spot, count);
+  api_place *spots = ORB_NEW(ctx, api_place, count);
   for (size_t i = 0; spots && i < count; i++) {
     const orb_mesh *mesh = &in->meshes[i % shapes];
     const orb_place *found = &merged->alignment.found[i];
     orb_place file;
     places_to_file(mesh, in->corners[i % shapes], found, &file);
-    spots[i].kind = file.triangle >= 0 ? ORB_SPOT_TRIANGLE : ORB_SPOT_POINT;
+    spots[i].kind = file.triangle >= 0 ? API_PLACE_TRIANGLE : API_PLACE_POINT;
     spots[i].index = file.triangle;
     memcpy(spots[i].at, file.at, sizeof file.at);
     if (file.triangle < 0) {
@@ -178,9 +178,9 @@ static orb_spot *found_spots(orb_context *ctx, const merge_input *in, const orb_
 }
 
 static int store_result_of(const run_env *env, orb_context *ctx, job *j, const merge_input *in,
-                           const orb_merge_result *merged, resource *result, orb_problem *problem) {
-  orb_text json = {0};
-  orb_id_of_text((const char *)merged->asset.data, merged->asset.size, result->sha);
+                           const orb_merge_result *merged, resource *result, api_problem *problem) {
+  api_text json = {0};
+  api_id_of_text((const char *)merged->asset.data, merged->asset.size, result->sha);
   result->kind = RESOURCE_SUPERMESH;
   result->bytes = (int64_t)merged->asset.size;
   result->created = (int64_t)time(NULL) * 1000;
@@ -193,21 +193,21 @@ static int store_result_of(const run_env *env, orb_context *ctx, job *j, const m
   if (!store_places(env, ctx, in, merged, result, problem) || !store_spheres(env, ctx, merged, result, problem)) {
     return 0;
   }
-  orb_spot *found = found_spots(ctx, in, merged);
+  api_place *found = found_spots(ctx, in, merged);
   if (!found) {
     return 0;
   }
-  orb_supermesh_write(result->id, &in->request, merged, found, queue_embed_ms(env->q, j), result->created, &json);
+  api_supermesh_write(result->id, &in->request, merged, found, queue_embed_ms(env->q, j), result->created, &json);
   orb_free(ctx, found);
   if (json.failed) {
-    orb_text_free(&json);
-    return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+    api_text_free(&json);
+    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
   result->json = json.data;
   return 1;
 }
 
-int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out, orb_problem *problem) {
+int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem) {
   resource known = {0};
   orb_merge_result merged;
   if (catalogue_get(env->cat, RESOURCE_SUPERMESH, job_key(j), &known) == STORE_OK) {
@@ -216,7 +216,7 @@ int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out,
   }
   merge_input *in = calloc(1, sizeof *in);
   if (!in) {
-    return orb_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
   memset(&merged, 0, sizeof merged);
   int fine = read_request(j, &in->request, problem) && load_input(env, ctx, in, problem) &&

@@ -81,21 +81,21 @@ static int read_word(const char *name, const char *text, const char *const *word
 
 /* The table of the wire's embedding options reads them, so that names and ranges are the same. */
 static int read_options(const char *text, orb_embed_options *options) {
-  orb_text request = {0};
-  orb_problem problem = {0};
-  orb_json_error error;
+  api_text request = {0};
+  api_problem problem = {0};
+  api_json_error error;
   orb_embed_method method = options->method;
-  orb_text_printf(&request, "{\"options\":%s}", text);
-  cJSON *body = request.failed ? NULL : orb_json_parse(request.data, request.size, &error);
-  int fine = body ? orb_embedding_options_read(body, "--options", 0, options, &problem)
+  api_text_printf(&request, "{\"options\":%s}", text);
+  cJSON *body = request.failed ? NULL : api_json_parse(request.data, request.size, &error);
+  int fine = body ? api_embedding_options_read(body, "--options", 0, options, &problem)
                   : wrong("--options must be a JSON object, not ", text);
   if (body && !fine) {
     fprintf(stderr, "orbmorph-bench: %s\n", problem.detail);
   }
   options->method = method;
-  orb_problem_free(&problem);
+  api_problem_free(&problem);
   cJSON_Delete(body);
-  orb_text_free(&request);
+  api_text_free(&request);
   return fine;
 }
 
@@ -116,10 +116,10 @@ static int interpret(const texts *t, bench_options *o) {
     return 0;
   }
   if (t->repair) {
-    orb_problem problem = {0};
-    char canonical[ORB_REPAIR_TEXT];
-    int fine = orb_repair_parse(t->repair, &o->repair, canonical, &problem) || wrong("--repair: ", problem.detail);
-    orb_problem_free(&problem);
+    api_problem problem = {0};
+    char canonical[API_REPAIR_TEXT];
+    int fine = api_repair_parse(t->repair, &o->repair, canonical, &problem) || wrong("--repair: ", problem.detail);
+    api_problem_free(&problem);
     if (!fine) {
       return 0;
     }
@@ -271,7 +271,7 @@ static int parse(int argc, char **argv, int command, bench_options *o) {
   if (o->file_count < (command == EMBED ? 1 : 2) && !o->bodies && !o->keep) {
     return wrong(command == EMBED ? "embed needs a file" : "two files or more are needed", "");
   }
-  if ((command == MERGE || command == REMESH) && o->file_count > ORB_SHAPES_MAX) {
+  if ((command == MERGE || command == REMESH) && o->file_count > API_SHAPES_MAX) {
     return wrong("merge takes 16 files at most", "");
   }
   if (command == TRUTH && (o->file_count > 2 || !o->landmarks)) {

@@ -56,7 +56,7 @@ double bench_cpu(void);
 void bench_complain(const char *path, const orb_context *ctx);
 
 /* Ends a line: prints the text and frees it. 0 out of memory. */
-int bench_print(orb_text *line);
+int bench_print(api_text *line);
 
 /* A mesh as the daemon takes it: read, then repaired. */
 typedef struct bench_mesh {
@@ -82,17 +82,17 @@ void bench_fleet_free(bench_fleet *fleet);
 orb_context *bench_open_limited(const bench_options *options);
 
 /* The place that a caller names; 0 and why (a literal). */
-int bench_place(orb_context *ctx, const bench_mesh *mesh, const orb_spot *spot, orb_nearest **tree, orb_place *out,
+int bench_place(orb_context *ctx, const bench_mesh *mesh, const api_place *spot, orb_nearest **tree, orb_place *out,
                 const char **why);
 
 /* The shapes of one merge, embedded. */
 typedef struct bench_set {
   int32_t count;
-  bench_mesh mesh[ORB_SHAPES_MAX];
-  orb_embedding embedding[ORB_SHAPES_MAX];
-  orb_align_shape shape[ORB_SHAPES_MAX];
-  const char *name[ORB_SHAPES_MAX];
-  orb_landmark_list list;
+  bench_mesh mesh[API_SHAPES_MAX];
+  orb_embedding embedding[API_SHAPES_MAX];
+  orb_align_shape shape[API_SHAPES_MAX];
+  const char *name[API_SHAPES_MAX];
+  api_landmark_list list;
   orb_landmark *landmarks;
   orb_place *places;
   double read, embed;

@@ -9,41 +9,41 @@
 #include "embed/kernel_sampling.h"
 
 static void add_point(void *user, int32_t inserted, double place_seconds, double optimize_seconds) {
-  orb_text *points = user;
-  orb_json_open(points, '[');
-  orb_json_integer(points, inserted);
-  orb_json_number(points, place_seconds);
-  orb_json_number(points, optimize_seconds);
-  orb_json_close(points, ']');
+  api_text *points = user;
+  api_json_open(points, '[');
+  api_json_integer(points, inserted);
+  api_json_number(points, place_seconds);
+  api_json_number(points, optimize_seconds);
+  api_json_close(points, ']');
 }
 
 static int print_line(const bench_mesh *m, const orb_ks_report *r, const orb_certificate *certificate,
-                      const orb_distortion *distortion, double cpu, orb_text *points) {
-  orb_text line = {0};
-  orb_json_open(&line, '{');
-  orb_json_member_string(&line, "mesh", m->name);
-  orb_json_member_integer(&line, "vertices", m->mesh.vertex_count);
-  orb_json_member_integer(&line, "triangles", m->mesh.triangle_count);
-  orb_json_member_number(&line, "simplify_seconds", r->simplify_seconds);
-  orb_json_member_number(&line, "place_seconds", r->place_seconds);
-  orb_json_member_number(&line, "optimize_seconds", r->optimize_seconds);
-  orb_json_member_number(&line, "cpu_seconds", cpu);
-  orb_json_member_number(&line, "kernel_points", r->kernel_points);
-  orb_json_member_number(&line, "iterations", r->iterations);
-  orb_json_member_integer(&line, "executions", r->executions);
-  orb_json_member_integer(&line, "clipped", r->clipped);
-  orb_json_member_integer(&line, "loosened", r->loosened);
-  orb_json_member_integer(&line, "relieved", r->relieved);
-  orb_json_member_integer(&line, "attempts", r->attempts);
-  orb_json_key(&line, "certificate");
-  orb_certificate_write(&line, certificate);
-  orb_json_key(&line, "distortion");
-  orb_distortion_write(&line, distortion);
+                      const orb_distortion *distortion, double cpu, api_text *points) {
+  api_text line = {0};
+  api_json_open(&line, '{');
+  api_json_member_string(&line, "mesh", m->name);
+  api_json_member_integer(&line, "vertices", m->mesh.vertex_count);
+  api_json_member_integer(&line, "triangles", m->mesh.triangle_count);
+  api_json_member_number(&line, "simplify_seconds", r->simplify_seconds);
+  api_json_member_number(&line, "place_seconds", r->place_seconds);
+  api_json_member_number(&line, "optimize_seconds", r->optimize_seconds);
+  api_json_member_number(&line, "cpu_seconds", cpu);
+  api_json_member_number(&line, "kernel_points", r->kernel_points);
+  api_json_member_number(&line, "iterations", r->iterations);
+  api_json_member_integer(&line, "executions", r->executions);
+  api_json_member_integer(&line, "clipped", r->clipped);
+  api_json_member_integer(&line, "loosened", r->loosened);
+  api_json_member_integer(&line, "relieved", r->relieved);
+  api_json_member_integer(&line, "attempts", r->attempts);
+  api_json_key(&line, "certificate");
+  api_certificate_write(&line, certificate);
+  api_json_key(&line, "distortion");
+  api_distortion_write(&line, distortion);
   if (points) {
-    orb_json_close(points, ']');
-    orb_json_member_raw(&line, "trace", points->data);
+    api_json_close(points, ']');
+    api_json_member_raw(&line, "trace", points->data);
   }
-  orb_json_close(&line, '}');
+  api_json_close(&line, '}');
   return bench_print(&line);
 }
 
@@ -54,11 +54,11 @@ static int run_once(const char *path, int trace) {
   if (fine) {
     orb_embed_options options;
     orb_embed_defaults(&options);
-    orb_text points = {0};
+    api_text points = {0};
     orb_ks_report report = {.trace = trace ? add_point : NULL, .trace_user = &points};
     orb_certificate certificate;
     orb_distortion distortion;
-    orb_json_open(&points, '[');
+    api_json_open(&points, '[');
     double *sphere = ORB_NEW(ctx, double, 3 * (size_t)m.mesh.vertex_count), cpu = bench_cpu();
     fine = sphere && orb_kernel_sampling(ctx, &m.mesh, &options, sphere, &report) == ORB_OK;
     cpu = bench_cpu() - cpu;
@@ -71,7 +71,7 @@ static int run_once(const char *path, int trace) {
       bench_complain(path, ctx);
     }
     fine = fine && print_line(&m, &report, &certificate, &distortion, cpu, trace ? &points : NULL);
-    orb_text_free(&points);
+    api_text_free(&points);
     orb_free(ctx, sphere);
     bench_unload(ctx, &m);
   }

@@ -212,34 +212,34 @@ static void run_set(const bench_options *options, const bench_fleet *fleet, cons
 }
 
 static int print_line(const bench_fleet *fleet, const landmark_set *set, const outcome *o) {
-  orb_text line = {0};
-  orb_json_open(&line, '{');
-  orb_json_member_integer(&line, "set", set->number);
-  orb_json_key(&line, "shapes");
-  orb_json_open(&line, '[');
+  api_text line = {0};
+  api_json_open(&line, '{');
+  api_json_member_integer(&line, "set", set->number);
+  api_json_key(&line, "shapes");
+  api_json_open(&line, '[');
   for (int s = 0; s < 2; s++) {
-    orb_json_string(&line, fleet->mesh[set->pair[s]].name);
+    api_json_string(&line, fleet->mesh[set->pair[s]].name);
   }
-  orb_json_close(&line, ']');
-  orb_json_member_integer(&line, "landmarks", set->count);
-  orb_json_member_bool(&line, "contradicts", set->contradicts);
-  orb_json_member_string(&line, "status", orb_status_name(o->status));
-  orb_json_member_string(&line, "detail", o->detail);
-  orb_json_member_integer(&line, "named", o->named);
-  orb_json_member_bool(&line, "right", o->right);
-  orb_json_key(&line, "growth");
-  orb_json_open(&line, '[');
-  orb_json_number(&line, o->growth[0]);
-  orb_json_number(&line, o->growth[1]);
-  orb_json_close(&line, ']');
-  orb_json_member_number(&line, "seconds", o->seconds);
-  orb_json_member_number(&line, "cpu_seconds", o->cpu);
+  api_json_close(&line, ']');
+  api_json_member_integer(&line, "landmarks", set->count);
+  api_json_member_bool(&line, "contradicts", set->contradicts);
+  api_json_member_string(&line, "status", orb_status_name(o->status));
+  api_json_member_string(&line, "detail", o->detail);
+  api_json_member_integer(&line, "named", o->named);
+  api_json_member_bool(&line, "right", o->right);
+  api_json_key(&line, "growth");
+  api_json_open(&line, '[');
+  api_json_number(&line, o->growth[0]);
+  api_json_number(&line, o->growth[1]);
+  api_json_close(&line, ']');
+  api_json_member_number(&line, "seconds", o->seconds);
+  api_json_member_number(&line, "cpu_seconds", o->cpu);
   if (o->merged) {
-    orb_json_member_integer(&line, "triangles", o->triangles);
-    orb_json_member_number(&line, "bound_relative", o->bound);
-    orb_json_member_number(&line, "remesh_seconds", o->merge_seconds);
+    api_json_member_integer(&line, "triangles", o->triangles);
+    api_json_member_number(&line, "bound_relative", o->bound);
+    api_json_member_number(&line, "remesh_seconds", o->merge_seconds);
   }
-  orb_json_close(&line, '}');
+  api_json_close(&line, '}');
   return bench_print(&line);
 }
 

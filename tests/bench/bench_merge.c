@@ -6,76 +6,76 @@
 #include "api/report_codec.h"
 #include "bench.h"
 
-static void write_members(orb_text *line, const bench_set *set, const orb_merge_result *r) {
-  orb_json_key(line, "shapes");
-  orb_json_open(line, '[');
+static void write_members(api_text *line, const bench_set *set, const orb_merge_result *r) {
+  api_json_key(line, "shapes");
+  api_json_open(line, '[');
   for (int32_t s = 0; s < set->count; s++) {
-    orb_json_open(line, '{');
-    orb_json_member_string(line, "name", set->name[s]);
-    orb_json_member_integer(line, "triangles", set->mesh[s].mesh.triangle_count);
-    orb_shape_report_members(line, &r->shapes[s]);
-    orb_json_close(line, '}');
+    api_json_open(line, '{');
+    api_json_member_string(line, "name", set->name[s]);
+    api_json_member_integer(line, "triangles", set->mesh[s].mesh.triangle_count);
+    api_shape_report_members(line, &r->shapes[s]);
+    api_json_close(line, '}');
   }
-  orb_json_close(line, ']');
-  orb_json_key(line, "landmarks");
-  orb_json_open(line, '[');
+  api_json_close(line, ']');
+  api_json_key(line, "landmarks");
+  api_json_open(line, '[');
   for (int32_t l = 0; l < r->alignment.landmark_count; l++) {
-    orb_json_open(line, '{');
-    orb_json_member_string(line, "name", l < set->list.count ? set->list.items[l].name : "");
-    orb_json_key(line, "residual_relative");
-    orb_json_open(line, '[');
+    api_json_open(line, '{');
+    api_json_member_string(line, "name", l < set->list.count ? set->list.items[l].name : "");
+    api_json_key(line, "residual_relative");
+    api_json_open(line, '[');
     for (int32_t s = 0; s < set->count; s++) {
-      orb_json_number(line, r->landmark_residuals[(size_t)l * (size_t)set->count + (size_t)s]);
+      api_json_number(line, r->landmark_residuals[(size_t)l * (size_t)set->count + (size_t)s]);
     }
-    orb_json_close(line, ']');
-    orb_json_close(line, '}');
+    api_json_close(line, ']');
+    api_json_close(line, '}');
   }
-  orb_json_close(line, ']');
-  orb_json_key(line, "certificate");
-  orb_merge_certificate_write(r, line);
+  api_json_close(line, ']');
+  api_json_key(line, "certificate");
+  api_merge_certificate_write(r, line);
   if (r->pair_count > 0) {
-    orb_json_key(line, "distortion");
-    orb_distortion_write(line, &r->pairs[0].distortion);
+    api_json_key(line, "distortion");
+    api_distortion_write(line, &r->pairs[0].distortion);
   }
-  orb_json_key(line, "pairs");
-  orb_pairs_write(r, line);
+  api_json_key(line, "pairs");
+  api_pairs_write(r, line);
 }
 
 static int print_line(const bench_set *set, const orb_merge_result *r, double cpu, int64_t peak, int repeat,
                       int threads) {
-  orb_text line = {0}, name = {0};
+  api_text line = {0}, name = {0};
   int64_t input = 0;
   for (int32_t s = 0; s < set->count; s++) {
-    orb_text_add(&name, s ? "+" : "");
-    orb_text_add(&name, set->name[s]);
+    api_text_add(&name, s ? "+" : "");
+    api_text_add(&name, set->name[s]);
     input += set->mesh[s].mesh.triangle_count;
   }
-  orb_json_open(&line, '{');
-  orb_json_member_string(&line, "mesh", name.data ? name.data : "");
-  orb_text_free(&name);
-  orb_json_member_integer(&line, "vertices", r->supermesh.vertex_count);
-  orb_json_member_integer(&line, "triangles", r->supermesh.triangle_count);
-  orb_json_member_integer(&line, "input_triangles", input);
-  orb_json_member_integer(&line, "asset_bytes", (int64_t)r->asset.size);
-  orb_json_member_integer(&line, "threads", threads);
-  orb_json_member_integer(&line, "repeat", repeat);
-  orb_json_key(&line, "seconds");
-  orb_json_open(&line, '{');
-  orb_json_member_number(&line, "read", set->read);
-  orb_json_member_number(&line, "embed", set->embed);
-  orb_json_member_number(&line, "align", r->timings.align);
-  orb_json_member_number(&line, "remesh", r->timings.remesh);
-  orb_json_member_number(&line, "transfer", r->timings.transfer);
-  orb_json_member_number(&line, "write", r->timings.write);
-  orb_json_member_number(&line, "total", r->timings.total);
-  orb_json_close(&line, '}');
-  orb_json_member_number(&line, "cpu_seconds", cpu);
-  orb_json_member_number(&line, "triangles_per_minute", 60.0 * r->supermesh.triangle_count / r->timings.total);
-  orb_json_member_integer(&line, "peak_rss_bytes", peak);
-  orb_json_member_number(&line, "energy", r->alignment.energy);
+  api_json_open(&line, '{');
+  api_json_member_string(&line, "mesh", name.data ? name.data : "");
+  api_text_free(&name);
+  api_json_member_integer(&line, "vertices", r->supermesh.vertex_count);
+  api_json_member_integer(&line, "triangles", r->supermesh.triangle_count);
+  api_json_member_integer(&line, "input_triangles", input);
+  api_json_member_integer(&line, "asset_bytes", (int64_t)r->asset.size);
+  api_json_member_integer(&line, "threads", threads);
+  api_json_member_integer(&line, "repeat", repeat);
+  api_json_key(&line, "seconds");
+  api_json_open(&line, '{');
+  api_json_member_number(&line, "read", set->read);
+  api_json_member_number(&line, "embed", set->embed);
+  api_json_member_number(&line, "align", r->timings.align);
+  api_json_member_number(&line, "remesh", r->timings.remesh);
+  api_json_member_number(&line, "transfer", r->timings.transfer);
+  api_json_member_number(&line, "write", r->timings.write);
+  api_json_member_number(&line, "total", r->timings.total);
+  api_json_close(&line, '}');
+  api_json_member_number(&line, "cpu_seconds", cpu);
+  api_json_member_number(&line, "triangles_per_minute", 60.0 * r->supermesh.triangle_count / r->timings.total);
+  api_json_member_integer(&line, "peak_rss_bytes", peak);
+  api_json_member_number(&line, "energy", r->alignment.energy);
   write_members(&line, set, r);
-  orb_json_member_string(&line, "engine", ORB_ENGINE);
-  orb_json_close(&line, '}');
+  api_json_member_string(&line, "engine", ORB_ENGINE);
+  api_json_close(&line, '}');
   return bench_print(&line);
 }
 

@@ -7,27 +7,27 @@
 #include "api/report_codec.h"
 #include "bench.h"
 
-static void write_result(orb_text *line, const orb_merge_result *r, const orb_align_shape *shapes) {
+static void write_result(api_text *line, const orb_merge_result *r, const orb_align_shape *shapes) {
   double bound = 0, rms = 0;
   for (int s = 0; s < 2; s++) {
     bound = fmax(bound, r->shapes[s].hausdorff / r->shapes[s].diagonal);
     rms = fmax(rms, r->shapes[s].rms / r->shapes[s].diagonal);
   }
-  orb_json_member_integer(line, "triangles", r->supermesh.triangle_count);
-  orb_json_key(line, "growth");
-  orb_json_open(line, '[');
+  api_json_member_integer(line, "triangles", r->supermesh.triangle_count);
+  api_json_key(line, "growth");
+  api_json_open(line, '[');
   for (int s = 0; s < 2; s++) {
-    orb_json_number(line, (double)r->alignment.shapes[s].mesh.triangle_count / shapes[s].mesh->triangle_count);
+    api_json_number(line, (double)r->alignment.shapes[s].mesh.triangle_count / shapes[s].mesh->triangle_count);
   }
-  orb_json_close(line, ']');
-  orb_json_member_number(line, "bound_relative", bound);
-  orb_json_member_number(line, "rms_relative", rms);
-  orb_json_member_number(line, "energy", r->alignment.energy);
-  orb_json_member_number(line, "inverted", r->pairs[0].inverted_fraction);
-  orb_json_member_number(line, "align_seconds", r->timings.align);
-  orb_json_member_number(line, "remesh_seconds", r->timings.remesh);
-  orb_json_key(line, "certificate");
-  orb_merge_certificate_write(r, line);
+  api_json_close(line, ']');
+  api_json_member_number(line, "bound_relative", bound);
+  api_json_member_number(line, "rms_relative", rms);
+  api_json_member_number(line, "energy", r->alignment.energy);
+  api_json_member_number(line, "inverted", r->pairs[0].inverted_fraction);
+  api_json_member_number(line, "align_seconds", r->timings.align);
+  api_json_member_number(line, "remesh_seconds", r->timings.remesh);
+  api_json_key(line, "certificate");
+  api_merge_certificate_write(r, line);
 }
 
 static int run_pair(const bench_options *options, const bench_fleet *fleet, int a, int b) {
@@ -41,26 +41,26 @@ static int run_pair(const bench_options *options, const bench_fleet *fleet, int 
   double start = orb_clock(), cpu = bench_cpu();
   orb_status status = orb_merge(ctx, shapes, names, 2, NULL, 0, &merge, &result);
   double seconds = orb_clock() - start;
-  orb_text line = {0};
-  orb_json_open(&line, '{');
-  orb_json_key(&line, "shapes");
-  orb_json_open(&line, '[');
-  orb_json_string(&line, names[0]);
-  orb_json_string(&line, names[1]);
-  orb_json_close(&line, ']');
-  orb_json_member_integer(&line, "largest_input",
+  api_text line = {0};
+  api_json_open(&line, '{');
+  api_json_key(&line, "shapes");
+  api_json_open(&line, '[');
+  api_json_string(&line, names[0]);
+  api_json_string(&line, names[1]);
+  api_json_close(&line, ']');
+  api_json_member_integer(&line, "largest_input",
                           shapes[0].mesh->triangle_count > shapes[1].mesh->triangle_count
                               ? shapes[0].mesh->triangle_count
                               : shapes[1].mesh->triangle_count);
-  orb_json_member_string(&line, "status", orb_status_name(status));
-  orb_json_member_string(&line, "detail", status == ORB_OK ? "" : orb_context_error(ctx)->detail);
-  orb_json_member_number(&line, "seconds", seconds);
-  orb_json_member_number(&line, "cpu_seconds", bench_cpu() - cpu);
+  api_json_member_string(&line, "status", orb_status_name(status));
+  api_json_member_string(&line, "detail", status == ORB_OK ? "" : orb_context_error(ctx)->detail);
+  api_json_member_number(&line, "seconds", seconds);
+  api_json_member_number(&line, "cpu_seconds", bench_cpu() - cpu);
   if (status == ORB_OK) {
     write_result(&line, &result, shapes);
     orb_merge_result_free(ctx, &result);
   }
-  orb_json_close(&line, '}');
+  api_json_close(&line, '}');
   orb_context_destroy(ctx);
   return bench_print(&line);
 }

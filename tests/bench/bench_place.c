@@ -15,7 +15,7 @@ static int place_vertex(orb_context *ctx, const orb_mesh *mesh, int32_t index, o
 }
 
 /* Corners are matched by the vertices of the file that they stand for: a repair may have turned the triangle. */
-static int place_triangle(const bench_mesh *m, const orb_spot *spot, orb_place *out, const char **why) {
+static int place_triangle(const bench_mesh *m, const api_place *spot, orb_place *out, const char **why) {
   *why = "the repair dropped or changed this triangle, or the file has fewer";
   int32_t t = 0, taken = 0;
   while (t < m->mesh.triangle_count && m->mesh.source_triangle[t] != spot->index) {
@@ -40,14 +40,14 @@ static int place_triangle(const bench_mesh *m, const orb_spot *spot, orb_place *
   return taken == 7;
 }
 
-int bench_place(orb_context *ctx, const bench_mesh *m, const orb_spot *spot, orb_nearest **tree, orb_place *out,
+int bench_place(orb_context *ctx, const bench_mesh *m, const api_place *spot, orb_nearest **tree, orb_place *out,
                 const char **why) {
   switch (spot->kind) {
-    case ORB_SPOT_VERTEX:
+    case API_PLACE_VERTEX:
       return place_vertex(ctx, &m->mesh, spot->index, out, why);
-    case ORB_SPOT_TRIANGLE:
+    case API_PLACE_TRIANGLE:
       return place_triangle(m, spot, out, why);
-    case ORB_SPOT_POINT:
+    case API_PLACE_POINT:
       break;
   }
   *why = "out of memory";

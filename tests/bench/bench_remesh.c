@@ -12,7 +12,7 @@ typedef struct remesh_run {
   const bench_options *options;
   int32_t count, landmark_count;
   double align; /* seconds; 0: it was kept */
-  orb_aligned_shape shape[ORB_SHAPES_MAX];
+  orb_aligned_shape shape[API_SHAPES_MAX];
 } remesh_run;
 
 static int bytes_io(FILE *file, void *bytes, size_t size, int write) {
@@ -49,7 +49,7 @@ static int keep_io(orb_context *ctx, remesh_run *run, int write) {
     return 0;
   }
   int32_t sizes[2] = {run->count, run->landmark_count};
-  int fine = bytes_io(file, sizes, sizeof sizes, write) && sizes[0] <= ORB_SHAPES_MAX;
+  int fine = bytes_io(file, sizes, sizeof sizes, write) && sizes[0] <= API_SHAPES_MAX;
   run->count = fine ? sizes[0] : 0;
   run->landmark_count = sizes[1];
   for (int32_t s = 0; s < run->count && fine; s++) {
@@ -66,7 +66,7 @@ static int make_bodies(orb_context *ctx, remesh_run *run) {
   for (const char *at = run->options->bodies; *at; run->count++) {
     char *end;
     long triangles = strtol(at, &end, 10);
-    if (end == at || triangles < 8 || triangles > 20000000 || run->count == ORB_SHAPES_MAX ||
+    if (end == at || triangles < 8 || triangles > 20000000 || run->count == API_SHAPES_MAX ||
         !bench_body(ctx, (int32_t)triangles, (uint64_t)run->count + 1, &run->shape[run->count])) {
       fprintf(stderr, "orbmorph-bench: no bodies of %s triangles\n", run->options->bodies);
       return 0;
@@ -177,7 +177,7 @@ static int64_t count_against_centre(orb_context *ctx, const orb_supermesh *mesh,
   return count;
 }
 
-static int write_shape(orb_context *ctx, orb_text *line, const remesh_run *run, const orb_supermesh *mesh, int32_t s,
+static int write_shape(orb_context *ctx, api_text *line, const remesh_run *run, const orb_supermesh *mesh, int32_t s,
                        const orb_shape_report *report) {
   double *positions = ORB_NEW(ctx, double, 3 * (size_t)mesh->vertex_count);
   unsigned char *inverted = ORB_NEW(ctx, unsigned char, mesh->triangle_count);
@@ -191,16 +191,16 @@ static int write_shape(orb_context *ctx, orb_text *line, const remesh_run *run, 
   }
   orb_extent extent;
   orb_mesh_extent(&run->shape[s].mesh, &extent);
-  orb_json_open(line, '{');
-  orb_json_member_integer(line, "triangles", run->shape[s].mesh.triangle_count);
-  orb_json_member_number(line, "hausdorff_relative", mesh->error_bound[s] / extent.diagonal);
-  orb_json_member_number(line, "hausdorff_sampled_relative", report->hausdorff_sampled / extent.diagonal);
-  orb_json_member_number(line, "rms_relative", report->rms / extent.diagonal);
-  orb_json_member_integer(line, "inverted", turned);
-  orb_json_member_integer(line, "against_centre",
+  api_json_open(line, '{');
+  api_json_member_integer(line, "triangles", run->shape[s].mesh.triangle_count);
+  api_json_member_number(line, "hausdorff_relative", mesh->error_bound[s] / extent.diagonal);
+  api_json_member_number(line, "hausdorff_sampled_relative", report->hausdorff_sampled / extent.diagonal);
+  api_json_member_number(line, "rms_relative", report->rms / extent.diagonal);
+  api_json_member_integer(line, "inverted", turned);
+  api_json_member_integer(line, "against_centre",
                           fine ? count_against_centre(ctx, mesh, &run->shape[s], positions) : -1);
-  orb_json_member_integer(line, "slivers", fine ? count_slivers(mesh, positions) : 0);
-  orb_json_close(line, '}');
+  api_json_member_integer(line, "slivers", fine ? count_slivers(mesh, positions) : 0);
+  api_json_close(line, '}');
   orb_free(ctx, positions);
   orb_free(ctx, inverted);
   return fine;
@@ -209,8 +209,8 @@ static int write_shape(orb_context *ctx, orb_text *line, const remesh_run *run, 
 static int run_once(orb_context *ctx, const remesh_run *run, int repeat) {
   orb_supermesh mesh = {0};
   orb_buffer asset = {0};
-  orb_text line = {0};
-  const char *names[ORB_SHAPES_MAX];
+  api_text line = {0};
+  const char *names[API_SHAPES_MAX];
   static const char *const methods[] = {"adaptive", "overlay", "subdivision", "convex-hull"};
   int64_t input = 0, largest = 0;
   for (int32_t s = 0; s < run->count; s++) {
@@ -225,41 +225,41 @@ static int run_once(orb_context *ctx, const remesh_run *run, int repeat) {
   fine = fine && (run->count < 2 ||
                   orb_asset_write(ctx, &mesh, run->shape, names, &run->options->merge.asset, NULL, &asset) == ORB_OK);
   double written = orb_clock();
-  orb_shape_report report[ORB_SHAPES_MAX];
+  orb_shape_report report[API_SHAPES_MAX];
   for (int32_t s = 0; fine && s < run->count; s++) {
     fine = orb_shape_measure(ctx, &run->shape[s], &mesh, s, &report[s]) == ORB_OK;
   }
   double measured = orb_clock();
-  orb_json_open(&line, '{');
-  orb_json_member_string(&line, "remesh", methods[run->options->merge.remesh.method]);
-  orb_json_member_integer(&line, "vertices", mesh.vertex_count);
-  orb_json_member_integer(&line, "triangles", mesh.triangle_count);
-  orb_json_member_integer(&line, "input_triangles", input);
-  orb_json_member_integer(&line, "largest_input", largest);
-  orb_json_member_number(&line, "by_largest", (double)mesh.triangle_count / (double)largest);
-  orb_json_member_integer(&line, "threads", orb_threads(ctx));
-  orb_json_member_integer(&line, "repeat", repeat);
-  orb_json_key(&line, "seconds");
-  orb_json_open(&line, '{');
-  orb_json_member_number(&line, "align", run->align);
-  orb_json_member_number(&line, "remesh", remeshed - start);
-  orb_json_member_number(&line, "remesh_cpu", remesh_cpu - cpu);
-  orb_json_member_number(&line, "transfer", measured - written);
-  orb_json_member_number(&line, "write", written - remeshed);
-  orb_json_close(&line, '}');
-  orb_json_member_integer(&line, "peak_rss_bytes", bench_peak());
-  orb_json_key(&line, "shapes");
-  orb_json_open(&line, '[');
+  api_json_open(&line, '{');
+  api_json_member_string(&line, "remesh", methods[run->options->merge.remesh.method]);
+  api_json_member_integer(&line, "vertices", mesh.vertex_count);
+  api_json_member_integer(&line, "triangles", mesh.triangle_count);
+  api_json_member_integer(&line, "input_triangles", input);
+  api_json_member_integer(&line, "largest_input", largest);
+  api_json_member_number(&line, "by_largest", (double)mesh.triangle_count / (double)largest);
+  api_json_member_integer(&line, "threads", orb_threads(ctx));
+  api_json_member_integer(&line, "repeat", repeat);
+  api_json_key(&line, "seconds");
+  api_json_open(&line, '{');
+  api_json_member_number(&line, "align", run->align);
+  api_json_member_number(&line, "remesh", remeshed - start);
+  api_json_member_number(&line, "remesh_cpu", remesh_cpu - cpu);
+  api_json_member_number(&line, "transfer", measured - written);
+  api_json_member_number(&line, "write", written - remeshed);
+  api_json_close(&line, '}');
+  api_json_member_integer(&line, "peak_rss_bytes", bench_peak());
+  api_json_key(&line, "shapes");
+  api_json_open(&line, '[');
   for (int32_t s = 0; fine && s < run->count; s++) {
     fine = write_shape(ctx, &line, run, &mesh, s, &report[s]);
   }
-  orb_json_close(&line, ']');
-  orb_json_close(&line, '}');
+  api_json_close(&line, ']');
+  api_json_close(&line, '}');
   if (fine) {
     fine = bench_print(&line) && (!run->options->out || bench_spill(run->options->out, asset.data, asset.size));
   } else {
     bench_complain("remesh", ctx);
-    orb_text_free(&line);
+    api_text_free(&line);
   }
   orb_buffer_free(ctx, &asset);
   orb_supermesh_free(ctx, &mesh);
@@ -278,7 +278,7 @@ int bench_remesh(const bench_options *options) {
     bench_reset_peak();
     fine = run_once(ctx, run, repeat);
   }
-  for (int32_t s = 0; s < ORB_SHAPES_MAX; s++) {
+  for (int32_t s = 0; s < API_SHAPES_MAX; s++) {
     orb_mesh_free(ctx, &run->shape[s].mesh);
     orb_free(ctx, run->shape[s].points);
     orb_free(ctx, run->shape[s].parent);

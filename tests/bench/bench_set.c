@@ -9,23 +9,23 @@
 static int read_landmarks(const char *path, bench_set *set) {
   unsigned char *bytes;
   size_t size;
-  orb_json_error where;
-  orb_problem problem = {0};
+  api_json_error where;
+  api_problem problem = {0};
   if (!bench_slurp(path, &bytes, &size)) {
     return 0;
   }
-  cJSON *value = orb_json_parse((const char *)bytes, size, &where);
+  cJSON *value = api_json_parse((const char *)bytes, size, &where);
   free(bytes);
   if (!value) {
     fprintf(stderr, "%s: malformed-json: %s at byte %zu\n", path, where.why ? where.why : "out of memory",
             where.offset);
     return 0;
   }
-  int fine = orb_landmarks_read(value, set->count, &set->list, &problem);
+  int fine = api_landmarks_read(value, set->count, &set->list, &problem);
   if (!fine) {
     fprintf(stderr, "%s: %s: %s\n", path, problem.name, problem.detail);
   }
-  orb_problem_free(&problem);
+  api_problem_free(&problem);
   cJSON_Delete(value);
   return fine;
 }
@@ -51,7 +51,7 @@ static int place_landmarks(orb_context *ctx, bench_set *set) {
     orb_nearest_destroy(ctx, tree);
   }
   for (int32_t l = 0; l < set->list.count; l++) {
-    const orb_landmark_spec *spec = &set->list.items[l];
+    const api_landmark_spec *spec = &set->list.items[l];
     orb_landmark *mark = &set->landmarks[l];
     snprintf(mark->name, sizeof mark->name, "%s", spec->name);
     mark->at = set->places + (size_t)l * shapes;
@@ -91,5 +91,5 @@ void bench_set_free(orb_context *ctx, bench_set *set) {
   }
   orb_free(ctx, set->landmarks);
   orb_free(ctx, set->places);
-  orb_landmarks_free(&set->list);
+  api_landmarks_free(&set->list);
 }

@@ -119,24 +119,24 @@ static int by_value(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-static void write_errors(orb_text *line, const char *name, double *error, int32_t count) {
+static void write_errors(api_text *line, const char *name, double *error, int32_t count) {
   double sum = 0;
-  orb_json_key(line, name);
+  api_json_key(line, name);
   if (count == 0) {
-    orb_text_add(line, "null");
+    api_text_add(line, "null");
     return;
   }
   qsort(error, (size_t)count, sizeof *error, by_value);
   for (int32_t i = 0; i < count; i++) {
     sum += error[i];
   }
-  orb_json_open(line, '{');
-  orb_json_member_integer(line, "count", count);
-  orb_json_member_number(line, "mean", sum / count);
-  orb_json_member_number(line, "median", error[count / 2]);
-  orb_json_member_number(line, "p95", error[(int64_t)count * 95 / 100]);
-  orb_json_member_number(line, "max", error[count - 1]);
-  orb_json_close(line, '}');
+  api_json_open(line, '{');
+  api_json_member_integer(line, "count", count);
+  api_json_member_number(line, "mean", sum / count);
+  api_json_member_number(line, "median", error[count / 2]);
+  api_json_member_number(line, "p95", error[(int64_t)count * 95 / 100]);
+  api_json_member_number(line, "max", error[count - 1]);
+  api_json_close(line, '}');
 }
 
 static int same_connectivity(const bench_set *set) {
@@ -146,7 +146,7 @@ static int same_connectivity(const bench_set *set) {
 }
 
 /* Vertices of the given mesh keep their numbers in the aligned one. */
-static int write_dense(truth_run *run, orb_text *line) {
+static int write_dense(truth_run *run, api_text *line) {
   const orb_mesh *target = &run->set->mesh[1].mesh;
   int32_t count = same_connectivity(run->set) ? target->vertex_count : 0;
   double *error = ORB_NEW(run->ctx, double, (size_t)count + 1);
@@ -164,7 +164,7 @@ static int write_dense(truth_run *run, orb_text *line) {
 }
 
 /* A place on a given mesh, on the sphere: through the nearest place of the aligned mesh, which is the same surface. */
-static int write_held_out(truth_run *run, orb_text *line) {
+static int write_held_out(truth_run *run, api_text *line) {
   const bench_set *set = run->set;
   int32_t count = set->list.count - run->given;
   double *error = ORB_NEW(run->ctx, double, (size_t)count + 1);
@@ -187,12 +187,12 @@ static int write_held_out(truth_run *run, orb_text *line) {
     subtract(to, wanted, d);
     error[l] = 100 * sqrt(dot(d, d)) / run->diagonal;
   }
-  orb_json_key(line, "held_out");
-  orb_json_open(line, '[');
+  api_json_key(line, "held_out");
+  api_json_open(line, '[');
   for (int32_t l = 0; l < count; l++) {
-    orb_json_number(line, error[l]);
+    api_json_number(line, error[l]);
   }
-  orb_json_close(line, ']');
+  api_json_close(line, ']');
   write_errors(line, "held_out_percent", error, count);
   orb_nearest_destroy(run->ctx, tree);
   orb_free(run->ctx, error);
@@ -248,15 +248,15 @@ static double supermesh_inverted(const truth_run *run, int s) {
   return (double)count / m->triangle_count;
 }
 
-static void write_inverted(const truth_run *run, orb_text *line) {
-  orb_json_key(line, "inverted_fraction");
-  orb_json_open(line, '{');
-  orb_json_member_number(line, "map", map_inverted(run, 0));
-  orb_json_member_number(line, "map_back", map_inverted(run, 1));
-  orb_json_member_number(line, "supermesh_first", supermesh_inverted(run, 0));
-  orb_json_member_number(line, "supermesh_second", supermesh_inverted(run, 1));
-  orb_json_member_number(line, "report", run->result->pairs[0].inverted_fraction);
-  orb_json_close(line, '}');
+static void write_inverted(const truth_run *run, api_text *line) {
+  api_json_key(line, "inverted_fraction");
+  api_json_open(line, '{');
+  api_json_member_number(line, "map", map_inverted(run, 0));
+  api_json_member_number(line, "map_back", map_inverted(run, 1));
+  api_json_member_number(line, "supermesh_first", supermesh_inverted(run, 0));
+  api_json_member_number(line, "supermesh_second", supermesh_inverted(run, 1));
+  api_json_member_number(line, "report", run->result->pairs[0].inverted_fraction);
+  api_json_close(line, '}');
 }
 
 enum { PATCHES = 200 };
@@ -295,7 +295,7 @@ static void moved_place(const truth_run *run, int s, size_t v, const double *mat
   }
 }
 
-static int write_halfway(const truth_run *run, const char *key, orb_fit fit, orb_text *line) {
+static int write_halfway(const truth_run *run, const char *key, orb_fit fit, api_text *line) {
   const orb_supermesh *m = &run->result->supermesh;
   size_t n = (size_t)m->vertex_count;
   double *x = ORB_NEW(run->ctx, double, 10 * n), area[3][PATCHES] = {{0}}, least = 1, thin = 0, whole = 0, moves[32];
@@ -326,18 +326,18 @@ static int write_halfway(const truth_run *run, const char *key, orb_fit fit, orb
     whole += ends;
   }
   if (fine) {
-    orb_json_key(line, key);
-    orb_json_open(line, '{');
-    orb_json_member_number(line, "least", least);
-    orb_json_member_number(line, "thin_fraction", thin / whole);
-    orb_json_close(line, '}');
+    api_json_key(line, key);
+    api_json_open(line, '{');
+    api_json_member_number(line, "least", least);
+    api_json_member_number(line, "thin_fraction", thin / whole);
+    api_json_close(line, '}');
   }
   orb_free(run->ctx, x);
   orb_free(run->ctx, patch);
   return fine;
 }
 
-static int write_measures(truth_run *run, orb_text *line) {
+static int write_measures(truth_run *run, api_text *line) {
   const orb_alignment *alignment = &run->result->alignment;
   int fine = 1;
   for (int s = 0; s < 2 && fine; s++) {
@@ -346,11 +346,11 @@ static int write_measures(truth_run *run, orb_text *line) {
                               shape->mesh.triangle_count, NULL, &run->locator[s]) == ORB_OK;
   }
   if (fine) {
-    orb_json_member_integer(line, "flipped",
+    api_json_member_integer(line, "flipped",
                             alignment->shapes[0].certificate.flipped + alignment->shapes[1].certificate.flipped +
                                 run->result->supermesh.flipped);
-    orb_json_member_number(line, "energy", alignment->energy);
-    orb_json_member_number(line, "distortion_median", run->result->pairs[0].distortion.symmetric_dirichlet.median);
+    api_json_member_number(line, "energy", alignment->energy);
+    api_json_member_number(line, "distortion_median", run->result->pairs[0].distortion.symmetric_dirichlet.median);
     write_inverted(run, line);
     fine = write_dense(run, line) && write_held_out(run, line) && write_halfway(run, "halfway", ORB_FIT_NONE, line) &&
            write_halfway(run, "halfway_fitted", ORB_FIT_RIGID, line);
@@ -384,18 +384,18 @@ static int run_method(const bench_options *options, orb_context *ctx, const benc
   double across[3];
   subtract(extent.max, extent.min, across);
   truth_run run = {.ctx = ctx, .set = set, .given = given, .result = &result, .diagonal = sqrt(dot(across, across))};
-  orb_text line = {0};
-  orb_json_open(&line, '{');
-  orb_json_member_string(&line, "first", set->name[0]);
-  orb_json_member_string(&line, "second", set->name[1]);
-  orb_json_member_string(&line, "method", m->name);
-  orb_json_member_integer(&line, "given", given);
-  orb_json_member_integer(&line, "triangles", result.supermesh.triangle_count);
-  orb_json_member_number(&line, "align_seconds", result.timings.align);
-  orb_json_member_number(&line, "total_seconds", result.timings.total);
-  orb_json_member_number(&line, "cpu_seconds", cpu);
+  api_text line = {0};
+  api_json_open(&line, '{');
+  api_json_member_string(&line, "first", set->name[0]);
+  api_json_member_string(&line, "second", set->name[1]);
+  api_json_member_string(&line, "method", m->name);
+  api_json_member_integer(&line, "given", given);
+  api_json_member_integer(&line, "triangles", result.supermesh.triangle_count);
+  api_json_member_number(&line, "align_seconds", result.timings.align);
+  api_json_member_number(&line, "total_seconds", result.timings.total);
+  api_json_member_number(&line, "cpu_seconds", cpu);
   int fine = write_measures(&run, &line);
-  orb_json_close(&line, '}');
+  api_json_close(&line, '}');
   fine = bench_print(&line) && fine;
   orb_merge_result_free(ctx, &result);
   return fine;

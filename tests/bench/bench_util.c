@@ -101,7 +101,7 @@ void bench_complain(const char *path, const orb_context *ctx) {
   fprintf(stderr, "%s: %s: %s\n", path, orb_status_name(error->status), error->detail);
 }
 
-int bench_print(orb_text *line) {
+int bench_print(api_text *line) {
   int fine = !line->failed && line->data;
   if (fine) {
     fine = puts(line->data) >= 0 && fflush(stdout) == 0;
@@ -109,7 +109,7 @@ int bench_print(orb_text *line) {
   if (!fine) {
     fprintf(stderr, "orbmorph-bench: the result could not be written\n");
   }
-  orb_text_free(line);
+  api_text_free(line);
   return fine;
 }
 

@@ -8,32 +8,32 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-static void free_problem(orb_problem *problem, int fine) {
+static void free_problem(api_problem *problem, int fine) {
   if (!fine && !problem->name) {
     abort(); /* refused without a reason */
   }
-  orb_text text = {0};
+  api_text text = {0};
   if (problem->name) {
-    orb_problem_write(problem, &text);
-    orb_json_error error;
-    cJSON *again = orb_json_parse(text.data, text.size, &error);
+    api_problem_write(problem, &text);
+    api_json_error error;
+    cJSON *again = api_json_parse(text.data, text.size, &error);
     if (!again) {
       abort(); /* a problem that is no JSON */
     }
     cJSON_Delete(again);
   }
-  orb_text_free(&text);
-  orb_problem_free(problem);
+  api_text_free(&text);
+  api_problem_free(problem);
 }
 
-static int write_embedding(const char *bytes, size_t size, orb_text *out) {
-  orb_json_error error;
-  orb_problem problem = {0};
-  orb_embedding_request request;
-  cJSON *body = orb_json_parse(bytes, size, &error);
-  int fine = body && orb_embedding_request_read(body, &request, &problem);
+static int write_embedding(const char *bytes, size_t size, api_text *out) {
+  api_json_error error;
+  api_problem problem = {0};
+  api_embedding_request request;
+  cJSON *body = api_json_parse(bytes, size, &error);
+  int fine = body && api_embedding_request_read(body, &request, &problem);
   if (fine) {
-    orb_embedding_request_write(&request, out);
+    api_embedding_request_write(&request, out);
   }
   if (body) {
     free_problem(&problem, fine);
@@ -42,54 +42,54 @@ static int write_embedding(const char *bytes, size_t size, orb_text *out) {
   return fine;
 }
 
-static int write_supermesh(const char *bytes, size_t size, orb_text *out) {
-  orb_json_error error;
-  orb_problem problem = {0};
-  orb_supermesh_request request = {0};
-  cJSON *body = orb_json_parse(bytes, size, &error);
-  int fine = body && orb_supermesh_request_read(body, &request, &problem);
+static int write_supermesh(const char *bytes, size_t size, api_text *out) {
+  api_json_error error;
+  api_problem problem = {0};
+  api_supermesh_request request = {0};
+  cJSON *body = api_json_parse(bytes, size, &error);
+  int fine = body && api_supermesh_request_read(body, &request, &problem);
   if (fine) {
-    orb_supermesh_request_write(&request, out);
+    api_supermesh_request_write(&request, out);
   }
   if (body) {
     free_problem(&problem, fine);
-    orb_supermesh_request_free(&request);
+    api_supermesh_request_free(&request);
   }
   cJSON_Delete(body);
   return fine;
 }
 
-static void round_trip(int (*write)(const char *, size_t, orb_text *), const char *bytes, size_t size) {
-  orb_text first = {0}, second = {0};
+static void round_trip(int (*write)(const char *, size_t, api_text *), const char *bytes, size_t size) {
+  api_text first = {0}, second = {0};
   if (write(bytes, size, &first) && (!write(first.data, first.size, &second) || first.size != second.size ||
                                      memcmp(first.data, second.data, first.size) != 0)) {
     abort();
   }
-  orb_text_free(&first);
-  orb_text_free(&second);
+  api_text_free(&first);
+  api_text_free(&second);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-  orb_json_error error = {0};
-  cJSON *body = orb_json_parse((const char *)data, size, &error);
+  api_json_error error = {0};
+  cJSON *body = api_json_parse((const char *)data, size, &error);
   if (!body) {
     if (!error.why || error.offset > size) {
       abort();
     }
     return 0;
   }
-  orb_landmark_list list = {0};
-  orb_problem problem = {0};
-  int fine = orb_landmarks_read(body, 0, &list, &problem);
+  api_landmark_list list = {0};
+  api_problem problem = {0};
+  int fine = api_landmarks_read(body, 0, &list, &problem);
   free_problem(&problem, fine);
-  orb_landmarks_free(&list);
+  api_landmarks_free(&list);
   cJSON_Delete(body);
   round_trip(write_embedding, (const char *)data, size);
   round_trip(write_supermesh, (const char *)data, size);
   char *text = strndup((const char *)data, size);
-  orb_mesh_summary summary;
+  api_mesh_summary summary;
   if (text) {
-    (void)orb_mesh_summarise(text, &summary); /* a stored description */
+    (void)api_mesh_summarise(text, &summary); /* a stored description */
   }
   free(text);
   return 0;

@@ -44,18 +44,18 @@ static void read_query(char *query, const char *prefer) {
     abort();
   }
   upload_query upload;
-  orb_problem problem = {0};
+  api_problem problem = {0};
   if (parse_upload(name, repair, format, &upload, &problem)) {
-    char again[ORB_REPAIR_TEXT];
+    char again[API_REPAIR_TEXT];
     unsigned flags;
-    if (!orb_repair_parse(upload.repair, &flags, again, &problem) || flags != upload.flags ||
+    if (!api_repair_parse(upload.repair, &flags, again, &problem) || flags != upload.flags ||
         strcmp(again, upload.repair) != 0) {
       abort(); /* the canonical list of repairs does not read back */
     }
   } else if (!problem.name) {
     abort();
   }
-  orb_problem_free(&problem);
+  api_problem_free(&problem);
   free(limit);
   free(token);
   free(wait);
@@ -72,7 +72,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   char *method = next_line(&at), *path = next_line(&at), *query = next_line(&at), *prefer = next_line(&at);
   char *trace = next_line(&at), *tags = next_line(&at);
   char *urgency = next_line(&at), *event = next_line(&at), *body = next_line(&at);
-  char id[ORB_ID_SIZE] = "", allow[64], kept[TRACE_SIZE];
+  char id[API_ID_SIZE] = "", allow[64], kept[TRACE_SIZE];
   const route *found = path ? route_find(method, path, id, allow) : NULL;
   if ((found && found->id >= ROUTE_COUNT) || memchr(id, 0, sizeof id) == NULL) {
     abort();

@@ -46,12 +46,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   char *text = strndup((const char *)data, size), *at = text;
   for (char *line; at && (line = strsep(&at, "\n"));) {
     unsigned char hash[TOKEN_BYTES];
-    orb_text reply = {0};
+    api_text reply = {0};
     int status = token_command_apply(cat, line, &reply);
     if (status < 0 || status > 2 || (status == 2 && reply.size == 0)) {
       abort();
     }
-    orb_text_free(&reply);
+    api_text_free(&reply);
     if (token_hash(line, hash) && strlen(line) != TOKEN_TEXT - 1) {
       abort();
     }

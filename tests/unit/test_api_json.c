@@ -16,8 +16,8 @@
 #include "api/supermesh_codec.h"
 
 static int accepts(const char *text, size_t size) {
-  orb_json_error error;
-  cJSON *value = orb_json_parse(text, size, &error);
+  api_json_error error;
+  cJSON *value = api_json_parse(text, size, &error);
   if (!value) {
     assert_non_null(error.why);
     assert_true(error.offset <= size);
@@ -90,72 +90,72 @@ static void test_numbers_read_back(void **state) {
   (void)state;
   static const double values[] = {0, 1, -1, 0.1, 1.0 / 3, 5e-324, 1.7976931348623157e308, 123456789.25};
   for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
-    orb_text text = {0};
-    orb_json_error error;
-    orb_json_number(&text, values[i]);
-    cJSON *value = orb_json_parse(text.data, text.size, &error);
+    api_text text = {0};
+    api_json_error error;
+    api_json_number(&text, values[i]);
+    cJSON *value = api_json_parse(text.data, text.size, &error);
     assert_non_null(value);
     assert_memory_equal(&value->valuedouble, &values[i], sizeof(double));
     cJSON_Delete(value);
-    orb_text_free(&text);
+    api_text_free(&text);
   }
 }
 
 static void test_ids(void **state) {
   (void)state;
-  char id[ORB_ID_SIZE];
-  orb_id_of_text("abc", 3, id); /* FIPS 180-4, appendix B.1 */
+  char id[API_ID_SIZE];
+  api_id_of_text("abc", 3, id); /* FIPS 180-4, appendix B.1 */
   assert_string_equal(id, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-  assert_true(orb_id_valid(id, 64));
+  assert_true(api_id_valid(id, 64));
   id[0] = 'B';
-  assert_false(orb_id_valid(id, 64));
+  assert_false(api_id_valid(id, 64));
 }
 
 static void test_repairs(void **state) {
   (void)state;
   unsigned flags;
-  char text[ORB_REPAIR_TEXT];
-  orb_problem problem = {0};
-  assert_true(orb_repair_parse("largest_component,fill_holes", &flags, text, &problem));
+  char text[API_REPAIR_TEXT];
+  api_problem problem = {0};
+  assert_true(api_repair_parse("largest_component,fill_holes", &flags, text, &problem));
   assert_int_equal(flags, ORB_REPAIR_SAFE | ORB_REPAIR_FILL_HOLES | ORB_REPAIR_LARGEST_COMPONENT);
   assert_string_equal(text, "safe,fill_holes,largest_component");
-  assert_false(orb_repair_parse("none,safe", &flags, text, &problem));
-  assert_false(orb_repair_parse("", &flags, text, &problem));
-  assert_false(orb_repair_parse("safe,", &flags, text, &problem));
-  orb_problem_free(&problem);
+  assert_false(api_repair_parse("none,safe", &flags, text, &problem));
+  assert_false(api_repair_parse("", &flags, text, &problem));
+  assert_false(api_repair_parse("safe,", &flags, text, &problem));
+  api_problem_free(&problem);
 }
 
 #define MESH "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
 
 /* The name of the problem, "" where the request is fine; its id. */
-static const char *supermesh(const char *json, char id[ORB_ID_SIZE]) {
-  orb_supermesh_request request;
-  orb_problem problem = {0};
-  orb_json_error error;
-  orb_mesh_summary meshes[2] = {{.name = "a", .file_vertices = 10, .file_triangles = 16},
+static const char *supermesh(const char *json, char id[API_ID_SIZE]) {
+  api_supermesh_request request;
+  api_problem problem = {0};
+  api_json_error error;
+  api_mesh_summary meshes[2] = {{.name = "a", .file_vertices = 10, .file_triangles = 16},
                                 {.name = "b", .file_vertices = 10, .file_triangles = 16}};
-  cJSON *body = orb_json_parse(json, strlen(json), &error);
+  cJSON *body = api_json_parse(json, strlen(json), &error);
   assert_non_null(body);
   int fine =
-      orb_supermesh_request_read(body, &request, &problem) && orb_supermesh_request_resolve(&request, meshes, &problem);
+      api_supermesh_request_read(body, &request, &problem) && api_supermesh_request_resolve(&request, meshes, &problem);
   if (fine) {
-    orb_text text = {0};
-    orb_supermesh_request again;
-    char twice[ORB_ID_SIZE];
-    assert_true(orb_supermesh_request_id(&request, id));
-    orb_supermesh_request_write(&request, &text); /* the canonical text reads back as the same request */
-    cJSON *canonical = orb_json_parse(text.data, text.size, &error);
-    assert_true(orb_supermesh_request_read(canonical, &again, &problem));
-    assert_true(orb_supermesh_request_id(&again, twice));
+    api_text text = {0};
+    api_supermesh_request again;
+    char twice[API_ID_SIZE];
+    assert_true(api_supermesh_request_id(&request, id));
+    api_supermesh_request_write(&request, &text); /* the canonical text reads back as the same request */
+    cJSON *canonical = api_json_parse(text.data, text.size, &error);
+    assert_true(api_supermesh_request_read(canonical, &again, &problem));
+    assert_true(api_supermesh_request_id(&again, twice));
     assert_string_equal(id, twice);
-    orb_supermesh_request_free(&again);
+    api_supermesh_request_free(&again);
     cJSON_Delete(canonical);
-    orb_text_free(&text);
+    api_text_free(&text);
   }
-  orb_supermesh_request_free(&request);
+  api_supermesh_request_free(&request);
   cJSON_Delete(body);
   const char *name = fine ? "" : problem.name;
-  orb_problem_free(&problem);
+  api_problem_free(&problem);
   return name;
 }
 
@@ -163,7 +163,7 @@ static const char *supermesh(const char *json, char id[ORB_ID_SIZE]) {
 
 static void test_supermesh_requests(void **state) {
   (void)state;
-  char a[ORB_ID_SIZE], b[ORB_ID_SIZE];
+  char a[API_ID_SIZE], b[API_ID_SIZE];
   assert_string_equal(supermesh("{" SHAPES "}", a), "");
   assert_string_equal(supermesh("{\"landmarks\":\"auto\"," SHAPES ",\"remesh\":{\"tolerance\":1e-3}}", b), "");
   assert_string_equal(a, b); /* what is default need not be said, order does not matter */
@@ -183,7 +183,7 @@ static void test_supermesh_requests(void **state) {
 
 static void test_routes(void **state) {
   (void)state;
-  char id[ORB_ID_SIZE], allow[64];
+  char id[API_ID_SIZE], allow[64];
   assert_int_equal(route_find("HEAD", "/v1/meshes/" MESH, id, allow)->id, ROUTE_MESH_GET);
   assert_string_equal(id, MESH);
   assert_null(route_find("PUT", "/v1/meshes", id, allow));
@@ -212,12 +212,12 @@ static void test_stored_meshes(void **state) {
   (void)state;
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
     char text[256];
-    orb_mesh_summary summary;
+    api_mesh_summary summary;
     snprintf(text, sizeof text,
              "{\"name\":\"cow\",\"format\":\"obj\",\"repair\":\"safe\",\"vertices\":402,\"triangles\":%s,"
              "\"file_vertices\":402,\"file_triangles\":800}",
              counts[i]);
-    assert_int_equal(orb_mesh_summarise(text, &summary), i < 2);
+    assert_int_equal(api_mesh_summarise(text, &summary), i < 2);
     if (i < 2) {
       assert_int_equal(summary.triangles, strtoll(counts[i], NULL, 10));
       assert_int_equal(summary.vertices, 402);

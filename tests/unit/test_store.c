@@ -25,9 +25,9 @@ static void reopen(stored *s) {
   assert_int_equal(catalogue_open(s->data, &s->cat), STORE_OK);
 }
 
-static void make_id(char id[ORB_ID_SIZE], char digit) {
-  memset(id, digit, ORB_ID_SIZE - 1);
-  id[ORB_ID_SIZE - 1] = 0;
+static void make_id(char id[API_ID_SIZE], char digit) {
+  memset(id, digit, API_ID_SIZE - 1);
+  id[API_ID_SIZE - 1] = 0;
 }
 
 static int files_in(const stored *s, const char *folder) {
@@ -44,7 +44,7 @@ static int files_in(const stored *s, const char *folder) {
 
 static void test_objects(void **state) {
   stored *s = *state;
-  char id[ORB_ID_SIZE], other[ORB_ID_SIZE], part[8] = {0};
+  char id[API_ID_SIZE], other[API_ID_SIZE], part[8] = {0};
   unsigned char *bytes = NULL;
   size_t size = 0;
   uint64_t length = 0;
@@ -74,7 +74,7 @@ static void test_objects(void **state) {
 static void test_temporaries(void **state) {
   stored *s = *state;
   object_temp temp, abandoned;
-  char id[ORB_ID_SIZE];
+  char id[API_ID_SIZE];
   unsigned char *bytes = NULL;
   size_t size = 0;
   make_id(id, 'c');
@@ -135,7 +135,7 @@ static void test_resources(void **state) {
 
 static job_row new_job(char digit) {
   job_row row = {
-      .kind = ORB_JOB_EMBEDDING, .listed = 1, .cost = 100, .request = (char *)(uintptr_t) "{}", .created = 1};
+      .kind = API_JOB_EMBEDDING, .listed = 1, .cost = 100, .request = (char *)(uintptr_t) "{}", .created = 1};
   memset(row.id, digit, sizeof row.id - 1);
   make_id(row.key, digit);
   return row;
@@ -167,14 +167,14 @@ static void test_attempts(void **state) {
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 1, 0, 20), STORE_OK);
   assert_int_equal(read_job(s, job.id).started, 10);
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 2, 0, 30), STORE_OK); /* taken over */
-  assert_int_equal(catalogue_job_finish(s->cat, job.id, 1, ORB_JOB_SUCCEEDED, NULL, 40, &result, 5, "{}"),
+  assert_int_equal(catalogue_job_finish(s->cat, job.id, 1, API_JOB_SUCCEEDED, NULL, 40, &result, 5, "{}"),
                    STORE_CONFLICT);
   assert_int_equal(catalogue_get(s->cat, RESOURCE_EMBEDDING, result.id, &got), STORE_NOT_FOUND); /* nor its result */
   assert_int_equal(catalogue_events(s->cat, job.id, 0, 4, events), 0);
-  assert_int_equal(catalogue_job_finish(s->cat, job.id, 2, ORB_JOB_SUCCEEDED, NULL, 50, &result, 6, "{}"), STORE_OK);
-  assert_int_equal(catalogue_job_finish(s->cat, job.id, 2, ORB_JOB_FAILED, "{}", 60, NULL, 7, "{}"), STORE_CONFLICT);
+  assert_int_equal(catalogue_job_finish(s->cat, job.id, 2, API_JOB_SUCCEEDED, NULL, 50, &result, 6, "{}"), STORE_OK);
+  assert_int_equal(catalogue_job_finish(s->cat, job.id, 2, API_JOB_FAILED, "{}", 60, NULL, 7, "{}"), STORE_CONFLICT);
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 3, 0, 70), STORE_CONFLICT);
-  assert_int_equal(read_job(s, job.id).state, ORB_JOB_SUCCEEDED);
+  assert_int_equal(read_job(s, job.id).state, API_JOB_SUCCEEDED);
   assert_int_equal(catalogue_get(s->cat, RESOURCE_EMBEDDING, result.id, &got), STORE_OK);
   resource_free(&got);
   assert_int_equal(catalogue_events(s->cat, job.id, 0, 4, events), 1);
@@ -197,7 +197,7 @@ static void test_recovery(void **state) {
   catalogue_event(s->cat, a.id, 3, "progress", "{}");
   reopen(s);
   assert_int_equal(catalogue_recover(s->cat, 3, 20, "{\"why\":1}"), STORE_OK);
-  assert_int_equal(read_job(s, a.id).state, ORB_JOB_QUEUED);
+  assert_int_equal(read_job(s, a.id).state, API_JOB_QUEUED);
   assert_int_equal(read_job(s, a.id).suspect, 1);
   assert_int_equal(read_job(s, a.id).crashes, 0); /* it was not alone */
   assert_int_equal(read_job(s, waiting.id).suspect, 0);
@@ -206,7 +206,7 @@ static void test_recovery(void **state) {
     reopen(s);
     assert_int_equal(catalogue_recover(s->cat, 3, 40, "{\"why\":1}"), STORE_OK);
     assert_int_equal(read_job(s, a.id).crashes, death);
-    assert_int_equal(read_job(s, a.id).state, death < 3 ? ORB_JOB_QUEUED : ORB_JOB_FAILED);
+    assert_int_equal(read_job(s, a.id).state, death < 3 ? API_JOB_QUEUED : API_JOB_FAILED);
   }
   assert_int_equal(catalogue_job_claim(s->cat, a.id, 5, 1, 50), STORE_CONFLICT);
   assert_int_equal(catalogue_events(s->cat, a.id, 3, 4, events), 1);
@@ -293,7 +293,7 @@ static void test_migrations(void **state) {
   assert_int_equal(catalogue_bytes(s->cat, 0), 7);
   assert_int_equal(catalogue_bytes(s->cat, 1), 0);
   assert_int_equal(catalogue_recover(s->cat, 3, 20, "{}"), STORE_OK);
-  assert_int_equal(read_job(s, "oldjob").state, ORB_JOB_QUEUED);
+  assert_int_equal(read_job(s, "oldjob").state, API_JOB_QUEUED);
   token_row *tokens = catalogue_tokens(s->cat, &count);
   assert_int_equal(count, 1);
   assert_string_equal(tokens[0].name, "old");
@@ -445,9 +445,9 @@ static void test_owners_of_results(void **state) {
     assert_int_equal(catalogue_job_insert(s->cat, jobs[i]), STORE_OK);
     assert_int_equal(catalogue_job_claim(s->cat, jobs[i]->id, 1, 0, 10), STORE_OK);
   }
-  assert_int_equal(catalogue_job_finish(s->cat, ann.id, 1, ORB_JOB_SUCCEEDED, NULL, 50, &result, 5, "{}"), STORE_OK);
+  assert_int_equal(catalogue_job_finish(s->cat, ann.id, 1, API_JOB_SUCCEEDED, NULL, 50, &result, 5, "{}"), STORE_OK);
   assert_false(owns(s, RESOURCE_EMBEDDING, result.id, "bob"));
-  assert_int_equal(catalogue_job_finish(s->cat, bob.id, 1, ORB_JOB_SUCCEEDED, NULL, 86400123, NULL, 5, "{}"), STORE_OK);
+  assert_int_equal(catalogue_job_finish(s->cat, bob.id, 1, API_JOB_SUCCEEDED, NULL, 86400123, NULL, 5, "{}"), STORE_OK);
   assert_int_equal(catalogue_get_of(s->cat, RESOURCE_EMBEDDING, result.id, "ann", &got), STORE_OK);
   assert_string_equal(got.json, result.json);
   resource_free(&got);
@@ -455,8 +455,8 @@ static void test_owners_of_results(void **state) {
   assert_string_equal(got.json, "{\"w\":1.50,\"created\":\"1970-01-02T00:00:00.123Z\"}");
   resource_free(&got);
   assert_int_equal(catalogue_delete(s->cat, RESOURCE_EMBEDDING, result.id), STORE_OK);
-  assert_int_equal(catalogue_job_finish(s->cat, eve.id, 1, ORB_JOB_SUCCEEDED, NULL, 70, NULL, 5, "{}"), STORE_CONFLICT);
-  assert_int_equal(read_job(s, eve.id).state, ORB_JOB_RUNNING);
+  assert_int_equal(catalogue_job_finish(s->cat, eve.id, 1, API_JOB_SUCCEEDED, NULL, 70, NULL, 5, "{}"), STORE_CONFLICT);
+  assert_int_equal(read_job(s, eve.id).state, API_JOB_RUNNING);
 }
 
 /* Who asks for a job owns the meshes that it names, so that the first owner can give them up. One that is gone refuses
@@ -504,7 +504,7 @@ static void test_forgetting(void **state) {
     assert_int_equal(catalogue_job_claim(s->cat, jobs[i].id, 1, 0, 10), STORE_OK);
     catalogue_event(s->cat, jobs[i].id, 1, "progress", "{}");
     if (i > 0) {
-      assert_int_equal(catalogue_job_finish(s->cat, jobs[i].id, 1, ORB_JOB_FAILED, "{}", 50, NULL, 5, "{}"), STORE_OK);
+      assert_int_equal(catalogue_job_finish(s->cat, jobs[i].id, 1, API_JOB_FAILED, "{}", 50, NULL, 5, "{}"), STORE_OK);
     }
   }
   assert_int_equal(catalogue_jobs_ended(s->cat), 3);
@@ -520,7 +520,7 @@ static void test_forgetting(void **state) {
     }
   }
   assert_int_equal(catalogue_jobs_forget(s->cat, 100), STORE_OK);
-  assert_int_equal(read_job(s, jobs[0].id).state, ORB_JOB_RUNNING);
+  assert_int_equal(read_job(s, jobs[0].id).state, API_JOB_RUNNING);
 }
 
 /* There may be any number of tokens; all are read, by name. */

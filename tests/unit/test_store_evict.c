@@ -46,17 +46,17 @@ static int teardown(void **state) {
   return failed;
 }
 
-static void number_id(char id[ORB_ID_SIZE], char kind, int number) {
-  memset(id, kind, ORB_ID_SIZE - 1);
-  id[ORB_ID_SIZE - 1] = 0;
-  for (int at = ORB_ID_SIZE - 2; number > 0 || at == ORB_ID_SIZE - 2; at--, number /= 10) {
+static void number_id(char id[API_ID_SIZE], char kind, int number) {
+  memset(id, kind, API_ID_SIZE - 1);
+  id[API_ID_SIZE - 1] = 0;
+  for (int at = API_ID_SIZE - 2; number > 0 || at == API_ID_SIZE - 2; at--, number /= 10) {
     id[at] = (char)('0' + number % 10);
   }
 }
 
 /* An embedding of mesh `number`, last used at `used`. */
 static void add_embedding(stored *s, int number, int64_t used) {
-  char json[160], mesh[ORB_ID_SIZE];
+  char json[160], mesh[API_ID_SIZE];
   resource row = {.kind = RESOURCE_EMBEDDING, .json = json, .bytes = ROW_BYTES, .created = used};
   number_id(row.id, 'e', number);
   number_id(row.sha, 'f', number);
@@ -66,19 +66,19 @@ static void add_embedding(stored *s, int number, int64_t used) {
 }
 
 static void need_mesh(stored *s, int number) {
-  char key[ORB_ID_SIZE], mesh[ORB_ID_SIZE], text[160];
+  char key[API_ID_SIZE], mesh[API_ID_SIZE], text[160];
   job *j = NULL;
   number_id(key, 'c', number);
   number_id(mesh, 'a', number);
   snprintf(text, sizeof text, "{\"mesh\":\"%s\"}", mesh);
-  const queue_request request = {.kind = ORB_JOB_EMBEDDING, .key = key, .request = text, .owner = "", .cost = 1};
+  const queue_request request = {.kind = API_JOB_EMBEDDING, .key = key, .request = text, .owner = "", .cost = 1};
   assert_int_equal(queue_submit(s->env.q, &request, &j, NULL), QUEUE_OK);
   queue_release(s->env.q, j);
 }
 
 static int is_there(stored *s, int number) {
   resource got = {0};
-  char id[ORB_ID_SIZE];
+  char id[API_ID_SIZE];
   number_id(id, 'e', number);
   store_result result = catalogue_get(s->env.cat, RESOURCE_EMBEDDING, id, &got);
   resource_free(&got);

@@ -18,51 +18,51 @@
 /* Reads a body and writes what was read; 0 with *problem where it is refused. */
 typedef struct body {
   const char *text;
-  int (*through)(const cJSON *value, orb_text *out, orb_problem *problem);
+  int (*through)(const cJSON *value, api_text *out, api_problem *problem);
   char expected[8192]; /* without faults */
 } body;
 
-static int through_supermesh(const cJSON *value, orb_text *out, orb_problem *problem) {
-  orb_supermesh_request request;
-  char id[ORB_ID_SIZE] = "";
-  int fine = orb_supermesh_request_read(value, &request, problem);
+static int through_supermesh(const cJSON *value, api_text *out, api_problem *problem) {
+  api_supermesh_request request;
+  char id[API_ID_SIZE] = "";
+  int fine = api_supermesh_request_read(value, &request, problem);
   if (fine) {
-    orb_supermesh_request_write(&request, out);
-    out->failed |= !orb_supermesh_request_id(&request, id);
-    orb_text_add(out, id);
+    api_supermesh_request_write(&request, out);
+    out->failed |= !api_supermesh_request_id(&request, id);
+    api_text_add(out, id);
   }
-  orb_supermesh_request_free(&request);
+  api_supermesh_request_free(&request);
   return fine;
 }
 
-static int through_embedding(const cJSON *value, orb_text *out, orb_problem *problem) {
-  orb_embedding_request request;
-  char id[ORB_ID_SIZE] = "";
-  int fine = orb_embedding_request_read(value, &request, problem);
+static int through_embedding(const cJSON *value, api_text *out, api_problem *problem) {
+  api_embedding_request request;
+  char id[API_ID_SIZE] = "";
+  int fine = api_embedding_request_read(value, &request, problem);
   if (fine) {
-    orb_embedding_request_write(&request, out);
-    out->failed |= !orb_embedding_request_id(&request, id);
-    orb_text_add(out, id);
+    api_embedding_request_write(&request, out);
+    out->failed |= !api_embedding_request_id(&request, id);
+    api_text_add(out, id);
   }
   return fine;
 }
 
 /* A refusal, written as its document. */
-static int through_refusal(const cJSON *value, orb_text *out, orb_problem *problem) {
+static int through_refusal(const cJSON *value, api_text *out, api_problem *problem) {
   int fine = through_supermesh(value, out, problem);
   if (!fine) {
-    orb_problem_write(problem, out);
+    api_problem_write(problem, out);
   }
   return 1;
 }
 
 static int read_body(void *user, torture_kind kind, long number, int for_ever) {
   body *b = user;
-  orb_json_error error = {0};
-  orb_problem problem = {0};
-  orb_text out = {0};
+  api_json_error error = {0};
+  api_problem problem = {0};
+  api_text out = {0};
   torture_arm(kind, number, for_ever);
-  cJSON *value = orb_json_parse(b->text, strlen(b->text), &error);
+  cJSON *value = api_json_parse(b->text, strlen(b->text), &error);
   int read = value && b->through(value, &out, &problem);
   int met = torture_disarm();
   if (!value) {
@@ -75,24 +75,24 @@ static int read_body(void *user, torture_kind kind, long number, int for_ever) {
   }
   assert_true(met || (read && !out.failed));
   cJSON_Delete(value);
-  orb_problem_free(&problem);
-  orb_text_free(&out);
+  api_problem_free(&problem);
+  api_text_free(&out);
   return met;
 }
 
 static void torture_body(body *b) {
-  orb_json_error error;
-  orb_problem problem = {0};
-  orb_text out = {0};
-  cJSON *value = orb_json_parse(b->text, strlen(b->text), &error);
+  api_json_error error;
+  api_problem problem = {0};
+  api_text out = {0};
+  cJSON *value = api_json_parse(b->text, strlen(b->text), &error);
   assert_non_null(value);
   if (!b->through(value, &out, &problem)) {
     fail_msg("%s", problem.detail);
   }
   snprintf(b->expected, sizeof b->expected, "%s", out.data);
   cJSON_Delete(value);
-  orb_problem_free(&problem);
-  orb_text_free(&out);
+  api_problem_free(&problem);
+  api_text_free(&out);
   for (int for_ever = 0; for_ever < 2; for_ever++) {
     long failures = torture(read_body, b, TORTURE_ALLOC, for_ever, 1);
     print_message("%ld allocations failed, %s\n", failures, for_ever ? "for ever" : "once");

@@ -30,7 +30,7 @@ static resource new_resource(resource_kind kind, char letter, int64_t number) {
 }
 
 static job_row new_job(int64_t number) {
-  job_row row = {.kind = ORB_JOB_EMBEDDING, .listed = 1, .cost = 12, .owner = "me", .created = 1};
+  job_row row = {.kind = API_JOB_EMBEDDING, .listed = 1, .cost = 12, .owner = "me", .created = 1};
   make_id(row.id, sizeof row.id, 'd', number);
   make_id(row.key, sizeof row.key, 'e', number);
   row.request = (char *)(uintptr_t) "{\"r\":1}";
@@ -66,7 +66,7 @@ static void check(stored *s, const told *t, int64_t number) {
   if (t->job == STORE_OK) {
     assert_int_equal(catalogue_job_get(s->cat, job.id, &got), STORE_OK);
     assert_string_equal(got.request, job.request);
-    assert_true(got.state == ORB_JOB_SUCCEEDED || (t->finish != STORE_OK && got.state < ORB_JOB_SUCCEEDED));
+    assert_true(got.state == API_JOB_SUCCEEDED || (t->finish != STORE_OK && got.state < API_JOB_SUCCEEDED));
     job_row_free(&got);
   }
   if (t->finish == STORE_OK) {
@@ -93,14 +93,14 @@ static void read_lists(stored *s, const told *t) {
   assert_true(n < 0 || t->mesh != STORE_OK || n > 0);
   for (int i = 0; i < n; i++) {
     assert_string_equal(rows[i].json, "{\"a\":1}");
-    assert_int_equal(strlen(rows[i].id), ORB_ID_SIZE - 1);
+    assert_int_equal(strlen(rows[i].id), API_ID_SIZE - 1);
     resource_free(&rows[i]);
   }
   n = catalogue_job_list(s->cat, "me", -1, 0, 8, jobs);
   assert_true(n < 0 || t->job != STORE_OK || n > 0);
   for (int i = 0; i < n; i++) {
     assert_string_equal(jobs[i].request, "{\"r\":1}");
-    assert_int_equal(strlen(jobs[i].id), ORB_JOB_ID_SIZE - 1);
+    assert_int_equal(strlen(jobs[i].id), API_JOB_ID_SIZE - 1);
     job_row_free(&jobs[i]);
   }
   n = catalogue_events(s->cat, new_job(s->number).id, 0, 8, events);
@@ -129,7 +129,7 @@ static told work(stored *s, int64_t number) {
   t.claim = catalogue_job_claim(s->cat, job.id, 1, 0, 10);
   catalogue_event(s->cat, job.id, 3, "progress", "{}");
   t.finish =
-      catalogue_job_finish(s->cat, job.id, 1, ORB_JOB_SUCCEEDED, NULL, 20, &result, 4, "{\"state\":\"succeeded\"}");
+      catalogue_job_finish(s->cat, job.id, 1, API_JOB_SUCCEEDED, NULL, 20, &result, 4, "{\"state\":\"succeeded\"}");
   t.token = catalogue_token_add(s->cat, &token);
   read_lists(s, &t);
   t.gone = catalogue_disown(s->cat, RESOURCE_EMBEDDING, result.id, "me", &gone);
@@ -189,11 +189,11 @@ static int one_start(void *user, torture_kind kind, long number, int for_ever) {
   assert_int_equal(catalogue_recover(s->cat, 1, 20, "{\"why\":1}"), STORE_OK);
   job_row got;
   assert_int_equal(catalogue_job_get(s->cat, ran.id, &got), STORE_OK);
-  assert_int_equal(got.state, ORB_JOB_FAILED);
+  assert_int_equal(got.state, API_JOB_FAILED);
   assert_string_equal(got.problem, "{\"why\":1}");
   job_row_free(&got);
   assert_int_equal(catalogue_job_claim(s->cat, waits.id, 1, 0, 10), STORE_OK);
-  assert_int_equal(catalogue_job_finish(s->cat, waits.id, 1, ORB_JOB_CANCELLED, NULL, 20, NULL, 4, "{}"), STORE_OK);
+  assert_int_equal(catalogue_job_finish(s->cat, waits.id, 1, API_JOB_CANCELLED, NULL, 20, NULL, 4, "{}"), STORE_OK);
   return met;
 }
 
