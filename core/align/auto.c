@@ -9,12 +9,13 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/guess.h"
+#include "align/find/found.h"
+#include "align/find/guess.h"
 #include "align/methods.h"
 #include "base/check.h"
 
-/* Energies below it leave nothing to be won. Between it and CM_GOOD_ENERGY shapes may differ so much, or a limb of two
- * nearly equal ones has gone wrong, which other correspondences show. */
+/* Energies below it leave nothing to be won. Between it and ORB_MAP_GOOD_ENERGY shapes may differ so much, or a limb of
+ * two nearly equal ones has gone wrong, which other correspondences show. */
 static const double NEAR_ISOMETRY = 1.05;
 /* Above it a map that was only pinned at the guesses before it was composed may have been caught on the way. */
 static const double POOR_ENERGY = 1.45;
@@ -122,7 +123,7 @@ static orb_status align_guessed(orb_context *ctx, const orb_align_shape *shapes,
     orb_free(ctx, out->shapes[s].landmark_vertices);
     out->shapes[s].landmark_vertices = NULL;
   }
-  ORB_GO(status, orb_compose_all(ctx, out, CM_FROM_MAP, options->preset), end);
+  ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_MAP, options->preset), end);
   *held = 1;
 end:
   orb_free(ctx, at);
@@ -139,7 +140,7 @@ static orb_status align_guessed_best(orb_context *ctx, const orb_align_shape *sh
                                      const guesses *g, const orb_align_options *options, double reached,
                                      orb_alignment *out, int *held) {
   orb_alignment other;
-  int again, twice = reached <= CM_GOOD_ENERGY || g->energy > CAUGHT_ENERGY;
+  int again, twice = reached <= ORB_MAP_GOOD_ENERGY || g->energy > CAUGHT_ENERGY;
   ORB_TRY(align_guessed(ctx, shapes, shape_count, g, options, twice, out, held));
   if (!*held || twice || (out->energy <= POOR_ENERGY && options->preset != ORB_PRESET_QUALITY)) {
     return ORB_OK;
@@ -181,8 +182,8 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32
   int held;
   ORB_TRY(try_guesses(ctx, shapes, shape_count, options, alignment->energy, clear, &other, &held));
   int taken = held && keep_better(ctx, alignment, &other);
-  if (!taken && options->preset != ORB_PRESET_QUALITY && alignment->energy > CM_GOOD_ENERGY) {
-    return orb_compose_all(ctx, alignment, CM_SPACE_DONE, options->preset);
+  if (!taken && options->preset != ORB_PRESET_QUALITY && alignment->energy > ORB_MAP_GOOD_ENERGY) {
+    return orb_compose_all(ctx, alignment, ORB_MAP_SPACE_DONE, options->preset);
   }
   return ORB_OK;
 }
@@ -195,7 +196,7 @@ orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32
   rotated.preset = ORB_PRESET_FAST;
   ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, &rotated, out));
   if (options->preset != ORB_PRESET_FAST) {
-    cm_from from = options->preset == ORB_PRESET_QUALITY ? CM_FROM_SPACE : CM_SPACE_ONLY;
+    orb_map_from from = options->preset == ORB_PRESET_QUALITY ? ORB_MAP_FROM_SPACE : ORB_MAP_SPACE_ONLY;
     ORB_GO(status, orb_compose_all(ctx, out, from, options->preset), failed);
     if (out->energy > NEAR_ISOMETRY) {
       ORB_GO(status, improve(ctx, shapes, shape_count, options, out, &clear), failed);

@@ -26,7 +26,7 @@ orb_status orb_collapse_reserve(orb_context *ctx, orb_hierarchy *h, int32_t vale
   return ORB_OK;
 }
 
-static float doubled_area(const orb_surface *s, int32_t a, int32_t b, int32_t c) {
+static float doubled_area(const orb_corner_table *s, int32_t a, int32_t b, int32_t c) {
   const float *p = s->position4 + 4 * (int64_t)a, *q = s->position4 + 4 * (int64_t)b;
   const float *r = s->position4 + 4 * (int64_t)c;
   float u[3], w[3];
@@ -38,13 +38,13 @@ static float doubled_area(const orb_surface *s, int32_t a, int32_t b, int32_t c)
   return sqrtf(x * x + y * y + z * z);
 }
 
-static void link(orb_surface *s, int32_t a, int32_t b) {
+static void link(orb_corner_table *s, int32_t a, int32_t b) {
   s->opposite[a] = b;
   s->opposite[b] = a;
 }
 
 /* Spreads the star's area over the triangles that stay: second … last but one. */
-static void carry_areas(orb_surface *s, int32_t u, int32_t second, int32_t kept, float star_area) {
+static void carry_areas(orb_corner_table *s, int32_t u, int32_t second, int32_t kept, float star_area) {
   float sum = 0;
   int32_t c = second;
   for (int32_t i = 0; i < kept; i++, c = orb_corner_swing(s, c)) {
@@ -59,7 +59,7 @@ static void carry_areas(orb_surface *s, int32_t u, int32_t second, int32_t kept,
   }
 }
 
-void orb_collapse_apply(orb_surface *s, int32_t first, int32_t valence, orb_collapse *out, float *areas) {
+void orb_collapse_apply(orb_corner_table *s, int32_t first, int32_t valence, orb_collapse *out, float *areas) {
   int32_t v = s->corner[first], u = s->corner[orb_corner_next(first)];
   int32_t second = orb_corner_swing(s, first), c = second, before = second;
   float star_area = orb_corner_area(s, first);
@@ -86,9 +86,9 @@ void orb_collapse_apply(orb_surface *s, int32_t first, int32_t valence, orb_coll
   s->vertex_corner[u] = second;
   s->vertex_corner[left] = orb_corner_next(second);
   s->vertex_corner[right] = orb_corner_prev(before);
-  orb_surface_set_valence(s, left, s->valence[left] - 1);
-  orb_surface_set_valence(s, right, s->valence[right] - 1);
-  orb_surface_set_valence(s, u, s->valence[u] + valence - 4);
+  orb_corner_table_set_valence(s, left, s->valence[left] - 1);
+  orb_corner_table_set_valence(s, right, s->valence[right] - 1);
+  orb_corner_table_set_valence(s, u, s->valence[u] + valence - 4);
   if (out) {
     *out = (orb_collapse){.vertex = v, .first = first, .last = last, .valence = valence};
   }
@@ -96,7 +96,7 @@ void orb_collapse_apply(orb_surface *s, int32_t first, int32_t valence, orb_coll
 
 void orb_collapse_undo(orb_hierarchy *h, int32_t index) {
   const orb_collapse *log = &h->log[index];
-  orb_surface *s = &h->surface;
+  orb_corner_table *s = &h->surface;
   int32_t first = log->first, last = log->last, v = log->vertex, u = s->corner[orb_corner_next(first)];
   int32_t *o = s->opposite;
   o[o[last]] = last;
@@ -115,9 +115,9 @@ void orb_collapse_undo(orb_hierarchy *h, int32_t index) {
   s->vertex_corner[v] = first;
   s->vertex_corner[u] = orb_corner_next(first);
   int32_t left = s->corner[orb_corner_prev(first)], right = s->corner[orb_corner_next(last)];
-  orb_surface_set_valence(s, left, s->valence[left] + 1);
-  orb_surface_set_valence(s, right, s->valence[right] + 1);
-  orb_surface_set_valence(s, u, s->valence[u] - (log->valence - 4));
+  orb_corner_table_set_valence(s, left, s->valence[left] + 1);
+  orb_corner_table_set_valence(s, right, s->valence[right] + 1);
+  orb_corner_table_set_valence(s, u, s->valence[u] - (log->valence - 4));
 }
 
 void orb_collapse_redo(orb_hierarchy *h, int32_t index) {

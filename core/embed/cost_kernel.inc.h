@@ -17,7 +17,7 @@ typedef struct cost_ring {
 } cost_ring;
 
 /* Reads the ring of v; 0 where it is too large. */
-static int cost_gather(const orb_surface *s, int32_t v, cost_ring *r) {
+static int cost_gather(const orb_corner_table *s, int32_t v, cost_ring *r) {
   int32_t start = s->vertex_corner[v], c = start;
   int k = 0;
   r->target_area = 0;
@@ -106,7 +106,7 @@ static wf cost_of_targets(const cost_ring *r, int j) {
   return wf_choose(crowd > 0.0F, sum * (crowd * 0.25F + 1.0F), sum);
 }
 
-static float cost_of_vertex(const orb_surface *s, int32_t v, int32_t *target) {
+static float cost_of_vertex(const orb_corner_table *s, int32_t v, int32_t *target) {
   cost_ring r;
   if (!cost_gather(s, v, &r)) {
     *target = s->corner[orb_corner_next(s->vertex_corner[v])];
@@ -136,7 +136,7 @@ static inline int cost_is_due(const orb_cost_job *job, int32_t v) {
 /* Fetches early: first the block of a vertex, then, when that is there, what it leads to. */
 static void cost_range(const orb_cost_job *job, int64_t begin, int64_t end) {
   enum { NEAR = 4, FAR = 10 };
-  const orb_surface *s = job->surface;
+  const orb_corner_table *s = job->surface;
   for (int64_t i = begin; i < end; i++) {
     int32_t v = job->vertex[i];
     if (i + FAR < end && cost_is_due(job, job->vertex[i + FAR])) {

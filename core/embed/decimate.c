@@ -48,7 +48,7 @@ typedef struct decimation {
 } decimation;
 
 static orb_status walk_ring(decimation *d, int32_t v) {
-  const orb_surface *s = &d->h->surface;
+  const orb_corner_table *s = &d->h->surface;
   if (s->valence[v] > d->ring.capacity) {
     int32_t capacity = s->valence[v] + 64;
     int32_t *grown = ORB_NEW(d->ctx, int32_t, capacity);
@@ -77,7 +77,7 @@ static void mark_ring(decimation *d) {
 
 /* Has u just two neighbours in the marked ring? */
 static int link_holds(const decimation *d, int32_t u) {
-  const orb_surface *s = &d->h->surface;
+  const orb_corner_table *s = &d->h->surface;
   int32_t start = s->vertex_corner[u], c = start, common = 0;
   do {
     common += d->mark[s->corner[orb_corner_next(c)]] == d->stamp;
@@ -134,7 +134,7 @@ static int is_kept(const decimation *d, int32_t v, int32_t live) {
 
 static orb_status collapse_into(decimation *d, int32_t v, int32_t u) {
   orb_hierarchy *h = d->h;
-  orb_surface *s = &h->surface;
+  orb_corner_table *s = &h->surface;
   int32_t valence = d->ring.count, c = s->vertex_corner[v];
   ORB_TRY(orb_collapse_reserve(d->ctx, h, valence));
   while (s->corner[orb_corner_next(c)] != u) {
@@ -260,7 +260,7 @@ static orb_status begin_round(decimation *d) {
 static orb_status run_round(decimation *d) {
   ORB_TRY(begin_round(d));
   int32_t done = 0, n = d->live_count;
-  const orb_surface *s = &d->h->surface;
+  const orb_corner_table *s = &d->h->surface;
   for (int32_t i = 0; i < n && n - done > 4; i++) {
     if (i + AHEAD < n && d->cost[d->live[i + AHEAD]] <= d->threshold) {
       __builtin_prefetch(s->corner + s->vertex_corner[d->live[i + AHEAD]]);

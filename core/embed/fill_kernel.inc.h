@@ -7,7 +7,7 @@
 static const double FILL_TINY2 = 1e-30, FILL_FLAT = 1e-6; /* as in star.c */
 
 /* All lanes walk in step, so that their cache misses overlap. */
-static inline void fill_walk(const orb_surface *s, const int32_t *vertex, int k, int32_t *ring, float *shape) {
+static inline void fill_walk(const orb_corner_table *s, const int32_t *vertex, int k, int32_t *ring, float *shape) {
   int32_t c[LANES];
   for (int l = 0; l < LANES; l++) {
     c[l] = s->vertex_corner[vertex[l]];

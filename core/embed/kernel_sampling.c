@@ -19,12 +19,12 @@ static const struct effort {
 } EFFORTS[MAX_ATTEMPTS] = {{0.3, 3}, {0.5, 8}, {0.7, 20}};
 static const double SPHERE_AREA = 4 * M_PI;
 
-typedef struct ks_run {
+typedef struct orb_ks_run {
   orb_context *ctx;
   const orb_embed_options *options;
   struct effort effort;
-  ks_mesh m;
-  ks_sampler sampler;
+  orb_ks_mesh m;
+  orb_ks_sampler sampler;
   orb_kernel_room kernel_room;
   double *x;            /* positions, total area 4π */
   double *P;            /* the result: 3 a vertex */
@@ -35,13 +35,13 @@ typedef struct ks_run {
   int64_t iterations_sum, kernel_points_sum;
   int64_t unchecked; /* candidates evaluated since the last look for a cancel */
   orb_ks_report report;
-} ks_run;
+} orb_ks_run;
 
 /* Candidates between two looks for a cancel: some milliseconds of work, however fine the steps of Eq. 2 are and however
  * large the rings. */
 static const int64_t CHECK_AFTER = 40000;
 
-static orb_status check_after(ks_run *run, int32_t v) {
+static orb_status check_after(orb_ks_run *run, int32_t v) {
   run->unchecked += (int64_t)run->sampler.pair_count * run->m.valence[v];
   if (run->unchecked < CHECK_AFTER) {
     return ORB_OK;
@@ -51,7 +51,7 @@ static orb_status check_after(ks_run *run, int32_t v) {
 }
 
 /* Scales the mesh to area 4π about its centre. A mesh without area gets unit coordinates as they are. */
-static orb_status normalize(ks_run *run, const orb_mesh *mesh) {
+static orb_status normalize(orb_ks_run *run, const orb_mesh *mesh) {
   orb_extent extent;
   orb_mesh_extent(mesh, &extent);
   run->x = ORB_NEW(run->ctx, double, 3 * (size_t)mesh->vertex_count);
@@ -70,8 +70,8 @@ static orb_status normalize(ks_run *run, const orb_mesh *mesh) {
 }
 
 /* Section 5: rays from the centroid of the tetrahedron through its vertices; a regular one where that folds. */
-static void place_base(ks_run *run) {
-  const ks_mesh *m = &run->m;
+static void place_base(orb_ks_run *run) {
+  const orb_ks_mesh *m = &run->m;
   int32_t v[4], found = 0;
   for (int32_t i = 0; i < m->vertex_count && found < 4; i++) {
     if (m->valence[i]) {
@@ -80,7 +80,8 @@ static void place_base(ks_run *run) {
   }
   ORB_ASSERT(found == 4 && m->live == 4);
   int32_t face = m->out[v[0]];
-  int32_t a = m->tri[face], b = ks_head(m, face), c = m->tri[orb_prev(face)], d = v[0] + v[1] + v[2] + v[3] - a - b - c;
+  int32_t a = m->tri[face], b = orb_ks_head(m, face), c = m->tri[orb_prev(face)],
+          d = v[0] + v[1] + v[2] + v[3] - a - b - c;
   const int32_t order[4] = {a, b, c, d};
   double centre[3] = {0, 0, 0};
   for (int i = 0; i < 4; i++) {
@@ -110,12 +111,12 @@ static void place_base(ks_run *run) {
 }
 
 /* Moves v to its best sample if that is better than where it is; returns by how far. */
-static orb_status reposition(ks_run *run, int32_t v, double *moved) {
+static orb_status reposition(orb_ks_run *run, int32_t v, double *moved) {
   double *p = run->P + 3 * (size_t)v, best[3], error;
   ORB_TRY(check_after(run, v));
-  ORB_TRY(ks_ring_load(run->ctx, &run->sampler, &run->m, run->P, v));
+  ORB_TRY(orb_ks_ring_load(run->ctx, &run->sampler, &run->m, run->P, v));
   *moved = 0;
-  if (ks_search(&run->sampler, p, 1, ks_error_at(&run->sampler, p), best, &error)) {
+  if (orb_ks_search(&run->sampler, p, 1, orb_ks_error_at(&run->sampler, p), best, &error)) {
     *moved = sqrt(orb_distance2(p, best));
     memcpy(p, best, sizeof best);
   }
@@ -132,7 +133,7 @@ static int by_displacement(const void *a, const void *b) {
   return p->key != q->key ? (p->key > q->key ? -1 : 1) : (p->vertex > q->vertex) - (p->vertex < q->vertex);
 }
 
-static void enlist(ks_run *run, int32_t v) {
+static void enlist(orb_ks_run *run, int32_t v) {
   if (run->stamp[v] != run->stamp_value) {
     run->stamp[v] = run->stamp_value;
     run->next[run->next_count++] = v;
@@ -141,21 +142,21 @@ static void enlist(ks_run *run, int32_t v) {
 
 /* Around a new vertex a pole's ring is not followed outwards, as it would be most of the mesh for each vertex at it,
  * and the pole itself is left to the global optimisation, as its own ring costs most of all. */
-static int is_pole(const ks_run *run, int32_t v) {
+static int is_pole(const orb_ks_run *run, int32_t v) {
   return run->m.valence[v] >= POLE;
 }
 
-static void enlist_star(ks_run *run, int32_t v) {
+static void enlist_star(orb_ks_run *run, int32_t v) {
   enlist(run, v);
   int32_t e = run->m.out[v];
   do {
-    enlist(run, ks_head(&run->m, e));
-    e = ks_rotate(&run->m, e);
+    enlist(run, orb_ks_head(&run->m, e));
+    e = orb_ks_rotate(&run->m, e);
   } while (e != run->m.out[v]);
 }
 
 /* A vertex that sits out an iteration counts as unmoved in it. */
-static void forget_displacements(ks_run *run) {
+static void forget_displacements(orb_ks_run *run) {
   for (int32_t i = 0; i < run->active_count; i++) {
     run->displacement[run->active[i]] = 0;
   }
@@ -163,7 +164,7 @@ static void forget_displacements(ks_run *run) {
 }
 
 /* Lines 4 and 11 to 13: those in `next`, by falling neighbour displacement. */
-static orb_status rank_next(ks_run *run, int first) {
+static orb_status rank_next(orb_ks_run *run, int first) {
   ranked *order = ORB_NEW(run->ctx, ranked, run->next_count);
   if (!order) {
     return ORB_E_NO_MEMORY;
@@ -172,8 +173,8 @@ static orb_status rank_next(ks_run *run, int first) {
     int32_t v = run->next[i], e = run->m.out[v];
     order[i] = (ranked){0, v};
     do {
-      order[i].key += run->displacement[ks_head(&run->m, e)];
-      e = ks_rotate(&run->m, e);
+      order[i].key += run->displacement[orb_ks_head(&run->m, e)];
+      e = orb_ks_rotate(&run->m, e);
     } while (e != run->m.out[v]);
   }
   if (!first) {
@@ -189,7 +190,7 @@ static orb_status rank_next(ks_run *run, int first) {
 }
 
 /* Algorithm 1, begun with the vertices inserted since the last time and their neighbours. */
-static orb_status optimize(ks_run *run) {
+static orb_status optimize(orb_ks_run *run) {
   double start = orb_clock(), most = INFINITY;
   int32_t iteration = 0;
   run->stamp_value++;
@@ -223,13 +224,13 @@ static orb_status optimize(ks_run *run) {
 
 /* Section 5.1 and 5.2: the best sample in the fan of the parent, or else the kernel's centroid. The ring begins with
  * the parent. */
-static orb_status place(ks_run *run, int32_t v, int32_t parent, int *found) {
-  ks_sampler *s = &run->sampler;
+static orb_status place(orb_ks_run *run, int32_t v, int32_t parent, int *found) {
+  orb_ks_sampler *s = &run->sampler;
   ORB_TRY(check_after(run, v));
-  ORB_TRY(ks_ring_load(run->ctx, s, &run->m, run->P, v));
+  ORB_TRY(orb_ks_ring_load(run->ctx, s, &run->m, run->P, v));
   double error, *p = run->P + 3 * (size_t)v;
   const double *apex = run->P + 3 * (size_t)parent;
-  *found = ks_best_sample(s, apex, 1, s->ring.count - 1, 1, INFINITY, p, &error);
+  *found = orb_ks_best_sample(s, apex, 1, s->ring.count - 1, 1, INFINITY, p, &error);
   if (!*found) {
     ORB_TRY(orb_kernel_point(run->ctx, &run->kernel_room, (const double(*)[3])s->ring.point, s->ring.count, p, found));
     run->report.clipped += *found;
@@ -238,7 +239,7 @@ static orb_status place(ks_run *run, int32_t v, int32_t parent, int *found) {
 }
 
 /* Adds so many rings around the one vertex that is enlisted, and takes out the poles among them or leaves them in. */
-static void enlist_rings(ks_run *run, int32_t rings, int poles) {
+static void enlist_rings(orb_ks_run *run, int32_t rings, int poles) {
   for (int32_t r = 0; r < rings; r++) {
     for (int32_t i = 0, end = run->next_count; i < end; i++) {
       if (i == 0 || !is_pole(run, run->next[i])) {
@@ -255,7 +256,7 @@ static void enlist_rings(ks_run *run, int32_t rings, int poles) {
 }
 
 /* Opens a kernel that doubles cannot hold: the surroundings of the parent are optimised for area rather than shape. */
-static orb_status relieve(ks_run *run, int32_t parent, int32_t rings) {
+static orb_status relieve(orb_ks_run *run, int32_t parent, int32_t rings) {
   double aspect_exponent = run->sampler.aspect_exponent;
   run->sampler.aspect_exponent = aspect_exponent < 1 ? aspect_exponent : 1;
   run->stamp_value++;
@@ -277,7 +278,7 @@ static orb_status relieve(ks_run *run, int32_t parent, int32_t rings) {
 /* Sweeps over the rings around a new vertex in a dense region. Eq. 1 removes whole limbs one after another, so that
  * they come back one after another: long before the next global optimisation they would be squeezed by orders of
  * magnitude. */
-static orb_status loosen(ks_run *run, int32_t v) {
+static orb_status loosen(orb_ks_run *run, int32_t v) {
   run->stamp_value++;
   run->next_count = 0;
   enlist(run, v);
@@ -292,12 +293,12 @@ static orb_status loosen(ks_run *run, int32_t v) {
   return ORB_OK;
 }
 
-static orb_status insert_vertex(ks_run *run) {
-  ks_mesh *m = &run->m;
-  int32_t parent = ks_head(m, m->log[m->log_count - 1].edge), v;
+static orb_status insert_vertex(orb_ks_run *run) {
+  orb_ks_mesh *m = &run->m;
+  int32_t parent = orb_ks_head(m, m->log[m->log_count - 1].edge), v;
   int found = 0;
   for (int32_t tries = 0;; tries++) {
-    v = ks_split_last(m);
+    v = orb_ks_split_last(m);
     ORB_TRY(place(run, v, parent, &found));
     if (found) {
       break;
@@ -309,7 +310,7 @@ static orb_status insert_vertex(ks_run *run) {
           "newton, or other exponents.",
           m->live, m->vertex_count);
     }
-    ORB_TRY(ks_collapse_edge(run->ctx, m, m->out[v]));
+    ORB_TRY(orb_ks_collapse_edge(run->ctx, m, m->out[v]));
     ORB_TRY(relieve(run, parent, 2 << tries));
   }
   run->kernel_points_sum += run->sampler.kernel_points;
@@ -320,8 +321,8 @@ static orb_status insert_vertex(ks_run *run) {
   return ORB_OK;
 }
 
-static orb_status refine(ks_run *run) {
-  ks_mesh *m = &run->m;
+static orb_status refine(orb_ks_run *run) {
+  orb_ks_mesh *m = &run->m;
   double interval = run->options->first_optimization;
   while (m->live < m->vertex_count) {
     int32_t until = interval < m->vertex_count - m->live ? m->live + (int32_t)interval : m->vertex_count;
@@ -340,9 +341,9 @@ static orb_status refine(ks_run *run) {
   return ORB_OK;
 }
 
-static void run_free(ks_run *run) {
-  ks_mesh_free(run->ctx, &run->m);
-  ks_sampler_free(run->ctx, &run->sampler);
+static void run_free(orb_ks_run *run) {
+  orb_ks_mesh_free(run->ctx, &run->m);
+  orb_ks_sampler_free(run->ctx, &run->sampler);
   orb_kernel_room_free(run->ctx, &run->kernel_room);
   orb_free(run->ctx, run->x);
   orb_free(run->ctx, run->displacement);
@@ -368,13 +369,13 @@ static orb_status check_options(orb_context *ctx, const orb_embed_options *o) {
   return ORB_OK;
 }
 
-static orb_status run_once(ks_run *run, const orb_mesh *mesh) {
+static orb_status run_once(orb_ks_run *run, const orb_mesh *mesh) {
   orb_context *ctx = run->ctx;
   size_t n = (size_t)mesh->vertex_count;
   double start = orb_clock();
   ORB_TRY(normalize(run, mesh));
-  ORB_TRY(ks_mesh_create(ctx, mesh, run->x, &run->m));
-  ORB_TRY(ks_sampler_create(ctx, run->options, &run->sampler));
+  ORB_TRY(orb_ks_mesh_create(ctx, mesh, run->x, &run->m));
+  ORB_TRY(orb_ks_sampler_create(ctx, run->options, &run->sampler));
   run->displacement = ORB_NEW0(ctx, double, n);
   run->active = ORB_NEW(ctx, int32_t, n);
   run->next = ORB_NEW(ctx, int32_t, n);
@@ -383,7 +384,7 @@ static orb_status run_once(ks_run *run, const orb_mesh *mesh) {
   if (!run->displacement || !run->active || !run->next || !run->stamp || !run->recent) {
     return ORB_E_NO_MEMORY;
   }
-  ORB_TRY(ks_simplify(ctx, &run->m, run->options->qem_until));
+  ORB_TRY(orb_ks_simplify(ctx, &run->m, run->options->qem_until));
   run->report.simplify_seconds += orb_clock() - start;
   place_base(run);
   ORB_TRY(refine(run));
@@ -406,7 +407,7 @@ orb_status orb_kernel_sampling(orb_context *ctx, const orb_mesh *mesh, const orb
   }
   orb_status status = ORB_E_NOT_CERTIFIED;
   for (int attempt = 0; attempt < MAX_ATTEMPTS && status == ORB_E_NOT_CERTIFIED; attempt++) {
-    ks_run run = {.ctx = ctx, .options = options, .P = points, .effort = EFFORTS[attempt], .report = sum};
+    orb_ks_run run = {.ctx = ctx, .options = options, .P = points, .effort = EFFORTS[attempt], .report = sum};
     run.report.attempts = attempt + 1;
     orb_error_clear(ctx);
     status = run_once(&run, mesh);

@@ -4,14 +4,14 @@
 #ifndef ORB_EMBED_KERNELS_H
 #define ORB_EMBED_KERNELS_H
 
-#include "embed/surface.h"
+#include "embed/corner_table.h"
 
 enum { ORB_COST_RING_MAX = 40 }; /* larger stars cost ORB_COST_LARGE and are collapsed last */
 #define ORB_COST_LARGE 1e30F
 
 /* Evaluates what it costs to collapse vertices. */
 typedef struct orb_cost_job {
-  const orb_surface *surface;
+  const orb_corner_table *surface;
   const int32_t *vertex; /* the list [begin, end) is taken from */
   unsigned char *dirty;  /* only these are evaluated; cleared */
   float threshold;       /* … and of these only such whose old cost is not above it */
@@ -35,7 +35,7 @@ typedef struct orb_sweep_job {
 
 /* Fills batches that have their vertices: rings and shapes. */
 typedef struct orb_fill_job {
-  const orb_surface *surface;
+  const orb_corner_table *surface;
   double blend;    /* of shapes towards equilateral */
   int32_t *vertex; /* as in orb_sweep_job; lanes that do not count are given the last one that does */
   const unsigned char *fill;

@@ -9,7 +9,7 @@
 
 #include "orbmorph/embed.h"
 
-typedef struct ks_mesh {
+typedef struct orb_ks_mesh {
   int32_t vertex_count, triangle_count, live;
   const double *x;   /* positions on the mesh, total area 4π */
   double area_floor; /* what Eq. 3 takes for a triangle that has less */
@@ -18,39 +18,39 @@ typedef struct ks_mesh {
   int32_t *out;     /* a half-edge out of each live vertex */
   int32_t *valence; /* of live vertices; 0: collapsed */
   int32_t log_count;
-  struct ks_collapse {
+  struct orb_ks_collapse {
     int32_t vertex, edge; /* v1, and the half-edge v1→v2 */
   } * log;
   double *saved; /* the areas of each collapsed star, last in, first out */
   size_t saved_count, saved_capacity;
-} ks_mesh;
+} orb_ks_mesh;
 
 /* The next half-edge out of the same vertex, counter-clockwise. */
-static inline int32_t ks_rotate(const ks_mesh *m, int32_t h) {
+static inline int32_t orb_ks_rotate(const orb_ks_mesh *m, int32_t h) {
   return m->twin[orb_prev(h)];
 }
-static inline int32_t ks_head(const ks_mesh *m, int32_t h) {
+static inline int32_t orb_ks_head(const orb_ks_mesh *m, int32_t h) {
   return m->tri[orb_next(h)];
 }
 
 /* x: positions scaled by the caller; borrowed. */
-ORB_MUST_CHECK orb_status ks_mesh_create(orb_context *ctx, const orb_mesh *mesh, const double *x, ks_mesh *out);
-void ks_mesh_free(orb_context *ctx, ks_mesh *m);
+ORB_MUST_CHECK orb_status orb_ks_mesh_create(orb_context *ctx, const orb_mesh *mesh, const double *x, orb_ks_mesh *out);
+void orb_ks_mesh_free(orb_context *ctx, orb_ks_mesh *m);
 
 /* Whether collapsing half-edge h = v1→v2 keeps a closed manifold: exactly two common neighbours (link condition), and
  * more than four vertices. mark: vertex_count ints of the caller, stamp: a value not in it. */
-int ks_link_holds(const ks_mesh *m, int32_t h, int32_t *mark, int32_t stamp);
+int orb_ks_link_holds(const orb_ks_mesh *m, int32_t h, int32_t *mark, int32_t stamp);
 
 /* The area of the triangle of half-edge h on the coarse mesh. */
-double ks_triangle_area(const ks_mesh *m, int32_t h);
+double orb_ks_triangle_area(const orb_ks_mesh *m, int32_t h);
 
 /* ORB_E_NO_MEMORY leaves the mesh as it was. */
-ORB_MUST_CHECK orb_status ks_collapse_edge(orb_context *ctx, ks_mesh *m, int32_t h);
+ORB_MUST_CHECK orb_status orb_ks_collapse_edge(orb_context *ctx, orb_ks_mesh *m, int32_t h);
 
 /* Undoes the last collapse; returns the vertex that is back. */
-int32_t ks_split_last(ks_mesh *m);
+int32_t orb_ks_split_last(orb_ks_mesh *m);
 
 /* Eq. 1 down to a tetrahedron, QEM first while more than qem_until vertices live. */
-ORB_MUST_CHECK orb_status ks_simplify(orb_context *ctx, ks_mesh *m, int32_t qem_until);
+ORB_MUST_CHECK orb_status orb_ks_simplify(orb_context *ctx, orb_ks_mesh *m, int32_t qem_until);
 
 #endif

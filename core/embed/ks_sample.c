@@ -18,8 +18,8 @@ static const double SQUEEZED = 1e-4;
 /* Share of the mean area below which a triangle's does not fall in the angle term, which divides by it. */
 static const double AREA_FLOOR = 1e-2;
 
-orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options, ks_sampler *out) {
-  ks_sampler s = {.area_exponent = options->area_exponent, .aspect_exponent = options->aspect_exponent};
+orb_status orb_ks_sampler_create(orb_context *ctx, const orb_embed_options *options, orb_ks_sampler *out) {
+  orb_ks_sampler s = {.area_exponent = options->area_exponent, .aspect_exponent = options->aspect_exponent};
   int32_t steps = (int32_t)floor(1 / options->step);
   s.pair = orb_alloc(ctx, MAX_PAIRS, sizeof *s.pair);
   if (!s.pair) {
@@ -51,7 +51,7 @@ orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options,
   return ORB_OK;
 }
 
-static void ring_free(orb_context *ctx, ks_ring *r) {
+static void ring_free(orb_context *ctx, orb_ks_ring *r) {
   orb_free(ctx, r->point);
   orb_free(ctx, r->plane);
   orb_free(ctx, r->side);
@@ -59,7 +59,7 @@ static void ring_free(orb_context *ctx, ks_ring *r) {
   memset(r, 0, sizeof *r);
 }
 
-void ks_sampler_free(orb_context *ctx, ks_sampler *s) {
+void orb_ks_sampler_free(orb_context *ctx, orb_ks_sampler *s) {
   ring_free(ctx, &s->ring);
   orb_free(ctx, s->pair);
   orb_free(ctx, s->pair_s);
@@ -69,8 +69,8 @@ void ks_sampler_free(orb_context *ctx, ks_sampler *s) {
   memset(s, 0, sizeof *s);
 }
 
-static orb_status ring_reserve(orb_context *ctx, ks_sampler *s, int32_t count) {
-  ks_ring *r = &s->ring;
+static orb_status ring_reserve(orb_context *ctx, orb_ks_sampler *s, int32_t count) {
+  orb_ks_ring *r = &s->ring;
   if (count <= r->capacity) {
     return ORB_OK;
   }
@@ -82,7 +82,7 @@ static orb_status ring_reserve(orb_context *ctx, ks_sampler *s, int32_t count) {
   s->room = (int32_t)(capacity < KS_WHOLE_RING ? capacity : KS_WHOLE_RING) * s->padded_count + KS_LANES;
   s->candidate = orb_alloc(ctx, (size_t)s->room, 4 * sizeof(double));
   s->near_candidate = orb_alloc(ctx, (size_t)s->room, 4 * sizeof(float));
-  s->edge = ORB_NEW(ctx, ks_edge, capacity);
+  s->edge = ORB_NEW(ctx, orb_ks_edge, capacity);
   r->point = orb_alloc(ctx, capacity, sizeof *r->point);
   r->plane = orb_alloc(ctx, capacity, sizeof *r->plane);
   r->side = ORB_NEW(ctx, double, 6 * capacity);
@@ -99,27 +99,27 @@ static orb_status ring_reserve(orb_context *ctx, ks_sampler *s, int32_t count) {
   return ORB_OK;
 }
 
-int32_t ks_stride(const ks_sampler *s, int32_t ring_count) {
+int32_t orb_ks_stride(const orb_ks_sampler *s, int32_t ring_count) {
   int64_t most = KS_WORK / ((int64_t)s->padded_count * ring_count); /* triangles to be sampled */
   most = most < 8 ? 8 : most > KS_WHOLE_RING ? KS_WHOLE_RING : most;
   return (int32_t)((ring_count + most - 1) / most);
 }
 
-orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const double *P, int32_t v) {
+orb_status orb_ks_ring_load(orb_context *ctx, orb_ks_sampler *s, const orb_ks_mesh *m, const double *P, int32_t v) {
   ORB_TRY(ring_reserve(ctx, s, m->valence[v]));
-  ks_ring *r = &s->ring;
+  orb_ks_ring *r = &s->ring;
   r->count = 0;
   double area_floor = AREA_FLOOR * 4 * M_PI / (2 * m->live - 4);
   int32_t e = m->out[v];
   do {
-    int32_t w = ks_head(m, e);
+    int32_t w = orb_ks_head(m, e);
     r->vertex[r->count] = w;
     memcpy(r->point[r->count++], P + 3 * (size_t)w, 3 * sizeof(double));
-    e = ks_rotate(m, e);
+    e = orb_ks_rotate(m, e);
   } while (e != m->out[v]);
   const double *xp = m->x + 3 * (size_t)v;
   double mesh_area = 0, fan_area = 0;
-  for (int32_t i = 0; i < r->count; i++, e = ks_rotate(m, e)) {
+  for (int32_t i = 0; i < r->count; i++, e = orb_ks_rotate(m, e)) {
     int32_t j = i + 1 < r->count ? i + 1 : 0;
     double d[3], u[3], w[3], n[3];
     orb_sub(r->point[j], r->point[i], d);
@@ -200,7 +200,7 @@ static inline __attribute__((always_inline)) void measure_spokes(const double *q
 }
 
 /* Adds the term of Eq. 3 of the ring triangle between spokes u and w; returns the least error so far. */
-static inline __attribute__((always_inline)) double add_term(const ks_ring *r, int32_t i, double area_exponent,
+static inline __attribute__((always_inline)) double add_term(const orb_ks_ring *r, int32_t i, double area_exponent,
                                                              double aspect_exponent, const spokes *u, const spokes *w,
                                                              int32_t count, double *error) {
   double a = r->side[i], a2 = r->side2[i], mp = r->angle_p[i], mq = r->angle_q[i], mr = r->angle_r[i];
@@ -228,8 +228,9 @@ static inline __attribute__((always_inline)) double add_term(const ks_ring *r, i
 
 /* Eq. 3 for `count` ≤ LANES candidates. Its terms are positive: once all are above `bound` the sums are left as they
  * are. */
-ORB_CLONES static void measure_batch(const ks_ring *r, double area_exponent, double aspect_exponent, const double *x,
-                                     const double *y, const double *z, int32_t count, double bound, double *error) {
+ORB_CLONES static void measure_batch(const orb_ks_ring *r, double area_exponent, double aspect_exponent,
+                                     const double *x, const double *y, const double *z, int32_t count, double bound,
+                                     double *error) {
   spokes first, pair[2];
   memset(error, 0, (size_t)count * sizeof *error);
   measure_spokes(r->point[0], x, y, z, count, &first);
@@ -248,7 +249,7 @@ ORB_CLONES static void measure_batch(const ks_ring *r, double area_exponent, dou
 }
 
 /* The smallest distance of each candidate from the ring's planes, unscaled. */
-ORB_CLONES static void clip(const ks_ring *r, const double *x, const double *y, const double *z, int32_t count,
+ORB_CLONES static void clip(const orb_ks_ring *r, const double *x, const double *y, const double *z, int32_t count,
                             double *least) {
   for (int32_t l = 0; l < count; l++) {
     least[l] = INFINITY;
@@ -288,8 +289,8 @@ static double raise(double x, double e) {
   return result;
 }
 
-double ks_error_at(const ks_sampler *s, const double p[3]) {
-  const ks_ring *r = &s->ring;
+double orb_ks_error_at(const orb_ks_sampler *s, const double p[3]) {
+  const orb_ks_ring *r = &s->ring;
   double error = 0, u[3], w[3], n[3];
   orb_sub(r->point[0], p, u);
   double c2 = orb_dot(u, u), c = sqrt(c2);
@@ -310,7 +311,7 @@ double ks_error_at(const ks_sampler *s, const double p[3]) {
 }
 
 /* Keeps the candidates that lie above all planes; returns how many. */
-static int32_t keep_inside(ks_sampler *s, double *x, double *y, double *z, int32_t count) {
+static int32_t keep_inside(orb_ks_sampler *s, double *x, double *y, double *z, int32_t count) {
   int32_t kept = 0;
   double least[LANES];
   for (int32_t begin = 0; begin < count; begin += LANES) {
@@ -326,12 +327,12 @@ static int32_t keep_inside(ks_sampler *s, double *x, double *y, double *z, int32
   return kept;
 }
 
-int ks_best_sample(ks_sampler *s, const double apex[3], int32_t first, int32_t last, double draw, double bound,
-                   double out[3], double *error) {
+int orb_ks_best_sample(orb_ks_sampler *s, const double apex[3], int32_t first, int32_t last, double draw, double bound,
+                       double out[3], double *error) {
   double *x = s->candidate, *y = x + s->room, *z = y + s->room, *e = z + s->room;
   int32_t count = 0;
   double best_error = bound;
-  int32_t stride = ks_stride(s, s->ring.count);
+  int32_t stride = orb_ks_stride(s, s->ring.count);
   for (int32_t i = first; i < last; i += stride, count += s->pair_count) {
     spread((const double(*)[2])s->pair, s->pair_count, draw, apex, s->ring.point[i],
            s->ring.point[i + 1 < s->ring.count ? i + 1 : 0], x + count, y + count, z + count);

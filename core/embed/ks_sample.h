@@ -6,7 +6,7 @@
 #include "embed/ks_mesh.h"
 
 /* The ring of one vertex: neighbour i and its successor span ring triangle i. All arrays have `capacity` entries. */
-typedef struct ks_ring {
+typedef struct orb_ks_ring {
   int32_t count, capacity;
   double (*point)[3];                  /* the neighbours on the sphere */
   double (*plane)[3];                  /* cross(point i, point i+1), from differences */
@@ -16,20 +16,20 @@ typedef struct ks_ring {
   int32_t *vertex;
   double aspect_exponent; /* of this ring */
   double fill;            /* area of its fan on the sphere over the area that it stands for */
-} ks_ring;
+} orb_ks_ring;
 
 enum { KS_LANES = 16 };
 
 /* One ring triangle as floats, for ks_search.c. */
-typedef struct ks_edge {
+typedef struct orb_ks_edge {
   float q[3], w[3];       /* its ends */
   float normal[3], at;    /* of the plane through the edge and the centre */
   float a;                /* its length */
   float k0, kb, kc;       /* angle term: (k0 + kb·b² + kc·c²) / doubled area */
   float kappa, inv_kappa; /* ratio of areas = kappa · doubled area */
-} ks_edge;
+} orb_ks_edge;
 
-typedef struct ks_sampler {
+typedef struct orb_ks_sampler {
   double area_exponent, aspect_exponent;
   int32_t pair_count; /* of (s, t) in Eq. 2 */
   double (*pair)[2];  /* s, t */
@@ -38,31 +38,33 @@ typedef struct ks_sampler {
   int32_t padded_count;   /* pair_count in whole vectors */
   float *pair_s, *pair_t; /* the same pairs; behind them (1, 1), which lies outside of any kernel */
   float *near_candidate;  /* as candidate */
-  ks_edge *edge;          /* as many as the ring's capacity */
+  orb_ks_edge *edge;      /* as many as the ring's capacity */
   orb_cpu cpu;
-  ks_ring ring;
+  orb_ks_ring ring;
   int32_t kernel_points; /* how many the last call found inside */
-} ks_sampler;
+} orb_ks_sampler;
 
-ORB_MUST_CHECK orb_status ks_sampler_create(orb_context *ctx, const orb_embed_options *options, ks_sampler *out);
-void ks_sampler_free(orb_context *ctx, ks_sampler *s);
+ORB_MUST_CHECK orb_status orb_ks_sampler_create(orb_context *ctx, const orb_embed_options *options,
+                                                orb_ks_sampler *out);
+void orb_ks_sampler_free(orb_context *ctx, orb_ks_sampler *s);
 
 /* Samples times planes that one search may take, and triangles that it may sample. A larger ring (a pole's, or with a
  * very small step some hundreds of triangles) is sampled in every n-th of its triangles, in eight at least, so that no
  * search takes longer than some milliseconds. With the step of 0.11 all of 1,024 triangles are sampled. */
 enum { KS_WORK = 1 << 26, KS_WHOLE_RING = 1024 };
-int32_t ks_stride(const ks_sampler *s, int32_t ring_count);
+int32_t orb_ks_stride(const orb_ks_sampler *s, int32_t ring_count);
 
 /* Loads the ring of v: sphere points P (3 a vertex). */
-ORB_MUST_CHECK orb_status ks_ring_load(orb_context *ctx, ks_sampler *s, const ks_mesh *m, const double *P, int32_t v);
+ORB_MUST_CHECK orb_status orb_ks_ring_load(orb_context *ctx, orb_ks_sampler *s, const orb_ks_mesh *m, const double *P,
+                                           int32_t v);
 
 /* Takes the best sample from the triangles (apex, i, i+1) for first ≤ i < last into `out`, if one lies in the kernel
  * and its error is below `bound`; returns whether. draw (≤ 1): the samples
  * are drawn in towards the apex by this factor. *error: its error. */
-int ks_best_sample(ks_sampler *s, const double apex[3], int32_t first, int32_t last, double draw, double bound,
-                   double out[3], double *error);
+int orb_ks_best_sample(orb_ks_sampler *s, const double apex[3], int32_t first, int32_t last, double draw, double bound,
+                       double out[3], double *error);
 
 /* Eq. 3 at one point of the kernel. */
-double ks_error_at(const ks_sampler *s, const double p[3]);
+double orb_ks_error_at(const orb_ks_sampler *s, const double p[3]);
 
 #endif

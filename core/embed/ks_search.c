@@ -41,12 +41,12 @@ static scaling scale_to(double bound, double area_exponent, double aspect_expone
   return c;
 }
 
-static ks_edge edge_of(const ks_ring *r, int32_t i, const double apex[3], double inv_radius, scaling c) {
+static orb_ks_edge edge_of(const orb_ks_ring *r, int32_t i, const double apex[3], double inv_radius, scaling c) {
   int32_t j = i + 1 < r->count ? i + 1 : 0;
   double q[3], w[3], length = orb_length(r->plane[i]) + 1e-300;
   orb_sub(r->point[i], apex, q);
   orb_sub(r->point[j], apex, w);
-  ks_edge e;
+  orb_ks_edge e;
   for (int k = 0; k < 3; k++) {
     e.q[k] = (float)(q[k] * inv_radius);
     e.w[k] = (float)(w[k] * inv_radius);
@@ -65,7 +65,7 @@ static ks_edge edge_of(const ks_ring *r, int32_t i, const double apex[3], double
 }
 
 KS_INLINE void spread(const float *s, const float *t, int32_t pairs, float draw, float radius, const float *apex,
-                      const ks_edge *e, float *x, float *y, float *z) {
+                      const orb_ks_edge *e, float *x, float *y, float *z) {
   float qx = draw * e->q[0], qy = draw * e->q[1], qz = draw * e->q[2];
   float wx = draw * e->w[0], wy = draw * e->w[1], wz = draw * e->w[2], ax = apex[0], ay = apex[1], az = apex[2];
   for (int32_t l = 0; l < pairs; l++) {
@@ -129,7 +129,7 @@ KS_INLINE int32_t keep_below(orb_cpu cpu, float limit, float *x, float *y, float
 }
 
 /* Measures how far each candidate lies beyond the nearest plane of an edge: negative inside. */
-KS_INLINE void measure_depth(const ks_edge *edge, int32_t edges, const float *restrict x, const float *restrict y,
+KS_INLINE void measure_depth(const orb_ks_edge *edge, int32_t edges, const float *restrict x, const float *restrict y,
                              const float *restrict z, float *restrict beyond, int32_t count) {
   for (int32_t l = 0; l < count; l++) {
     beyond[l] = -INFINITY;
@@ -178,7 +178,7 @@ KS_INLINE void raise_each(float *restrict x, float e) {
 }
 
 /* The factors of Eq. 3 of one ring triangle at a candidate, before their exponents. */
-KS_INLINE void measure(const ks_edge *e, float quarter, float x, float y, float z, float *angle, float *area,
+KS_INLINE void measure(const orb_ks_edge *e, float quarter, float x, float y, float z, float *angle, float *area,
                        float *shape) {
   float ux = e->q[0] - x, uy = e->q[1] - y, uz = e->q[2] - z, vx = e->w[0] - x, vy = e->w[1] - y, vz = e->w[2] - z;
   float c2 = ux * ux + uy * uy + uz * uz, b2 = vx * vx + vy * vy + vz * vz;
@@ -191,9 +191,10 @@ KS_INLINE void measure(const ks_edge *e, float quarter, float x, float y, float 
 }
 
 /* Adds the term of one ring triangle, the exponents being 1, 3 or 12. */
-KS_INLINE void add_term(const ks_edge *edge, int area_kind, int shape_kind, float shape_scale, const float *restrict x,
-                        const float *restrict y, const float *restrict z, int32_t count, float *restrict error) {
-  const ks_edge e = *edge;
+KS_INLINE void add_term(const orb_ks_edge *edge, int area_kind, int shape_kind, float shape_scale,
+                        const float *restrict x, const float *restrict y, const float *restrict z, int32_t count,
+                        float *restrict error) {
+  const orb_ks_edge e = *edge;
   float quarter = 0.25f * shape_scale;
   for (int32_t l = 0; l < count; l++) {
     float angle, area, shape;
@@ -203,10 +204,10 @@ KS_INLINE void add_term(const ks_edge *edge, int area_kind, int shape_kind, floa
 }
 
 /* The same for any exponents. */
-KS_INLINE void add_any_term(const ks_edge *edge, float area_exponent, float aspect_exponent, float shape_scale,
+KS_INLINE void add_any_term(const orb_ks_edge *edge, float area_exponent, float aspect_exponent, float shape_scale,
                             const float *restrict x, const float *restrict y, const float *restrict z, int32_t count,
                             float *restrict error) {
-  const ks_edge e = *edge;
+  const orb_ks_edge e = *edge;
   float quarter = 0.25f * shape_scale, angle[LANES], area[LANES], shape[LANES];
   for (int32_t begin = 0; begin < count; begin += LANES) {
     for (int32_t l = 0; l < LANES; l++) {
@@ -221,7 +222,7 @@ KS_INLINE void add_any_term(const ks_edge *edge, float area_exponent, float aspe
 }
 
 typedef struct search {
-  const ks_edge *edge;
+  const orb_ks_edge *edge;
   int32_t edges, stride, pairs;
   const float *s, *t;
   float draw, radius, apex[3], area_exponent, aspect_exponent, shape_scale;
@@ -276,7 +277,7 @@ __attribute__((target(KS_TARGET_512))) static void run_avx512(search *q) {
 }
 #endif
 
-static void run_widest(const ks_sampler *s, search *q) {
+static void run_widest(const orb_ks_sampler *s, search *q) {
 #if defined(__x86_64__)
   if (s->cpu == ORB_CPU_AVX512) {
     run_avx512(q);
@@ -291,8 +292,8 @@ static void run_widest(const ks_sampler *s, search *q) {
   run_plain(q);
 }
 
-int ks_search(ks_sampler *s, const double apex[3], double draw, double bound, double out[3], double *error) {
-  const ks_ring *r = &s->ring;
+int orb_ks_search(orb_ks_sampler *s, const double apex[3], double draw, double bound, double out[3], double *error) {
+  const orb_ks_ring *r = &s->ring;
   double radius2 = 1e-300;
   for (int32_t i = 0; i < r->count; i++) {
     double d2 = orb_distance2(r->point[i], apex);
@@ -306,7 +307,7 @@ int ks_search(ks_sampler *s, const double apex[3], double draw, double bound, do
   float *x = s->near_candidate;
   search q = {.edge = s->edge,
               .edges = r->count,
-              .stride = ks_stride(s, r->count),
+              .stride = orb_ks_stride(s, r->count),
               .pairs = s->padded_count,
               .s = s->pair_s,
               .t = s->pair_t,
@@ -329,6 +330,6 @@ int ks_search(ks_sampler *s, const double apex[3], double draw, double bound, do
   out[1] = apex[1] + radius * (double)q.y[q.best];
   out[2] = apex[2] + radius * (double)q.z[q.best];
   orb_normalize(out);
-  *error = ks_error_at(s, out);
+  *error = orb_ks_error_at(s, out);
   return *error < bound && orb_kernel_contains((const double(*)[3])r->point, r->count, out);
 }

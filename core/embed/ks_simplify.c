@@ -25,7 +25,7 @@ static const double POLE_COST = 1e300;
 
 typedef struct simplifier {
   orb_context *ctx;
-  ks_mesh *m;
+  orb_ks_mesh *m;
   double *cost;          /* of each vertex's cheapest collapse */
   int32_t *target;       /* its half-edge */
   double *aspect_sum;    /* Eq. 1: Σ cr / 2ir around each vertex */
@@ -99,8 +99,8 @@ static double ring_aspect(const simplifier *s, int32_t v) {
   double sum = 0;
   int32_t e = s->m->out[v];
   do {
-    int32_t next = ks_rotate(s->m, e);
-    sum += aspect(at(s, v), at(s, ks_head(s->m, e)), at(s, ks_head(s->m, next)));
+    int32_t next = orb_ks_rotate(s->m, e);
+    sum += aspect(at(s, v), at(s, orb_ks_head(s->m, e)), at(s, orb_ks_head(s->m, next)));
     e = next;
   } while (e != s->m->out[v]);
   return sum;
@@ -111,10 +111,10 @@ static double curvature_factor(const simplifier *s, int32_t v) {
   double angles = 0, area = 0;
   int32_t e = s->m->out[v];
   do {
-    int32_t next = ks_rotate(s->m, e);
+    int32_t next = orb_ks_rotate(s->m, e);
     double u[3], w[3], n[3];
-    orb_sub(at(s, ks_head(s->m, e)), at(s, v), u);
-    orb_sub(at(s, ks_head(s->m, next)), at(s, v), w);
+    orb_sub(at(s, orb_ks_head(s->m, e)), at(s, v), u);
+    orb_sub(at(s, orb_ks_head(s->m, next)), at(s, v), w);
     orb_cross(u, w, n);
     double doubled = orb_length(n);
     angles += atan2(doubled, orb_dot(u, w));
@@ -128,16 +128,16 @@ static double curvature_factor(const simplifier *s, int32_t v) {
 /* The second factor for collapsing h = v1→v2: what stands around v2, less the two triangles that die, plus what is left
  * of v1's star, turned to v2. */
 static double aspect_after(const simplifier *s, int32_t h) {
-  const ks_mesh *m = s->m;
-  int32_t v1 = m->tri[h], v2 = ks_head(m, h), first = ks_rotate(m, h), last = orb_next(m->twin[h]);
-  double sum = s->aspect_sum[v2] - aspect(at(s, v1), at(s, v2), at(s, ks_head(m, first))) -
-               aspect(at(s, v1), at(s, ks_head(m, last)), at(s, v2));
+  const orb_ks_mesh *m = s->m;
+  int32_t v1 = m->tri[h], v2 = orb_ks_head(m, h), first = orb_ks_rotate(m, h), last = orb_next(m->twin[h]);
+  double sum = s->aspect_sum[v2] - aspect(at(s, v1), at(s, v2), at(s, orb_ks_head(m, first))) -
+               aspect(at(s, v1), at(s, orb_ks_head(m, last)), at(s, v2));
   if (sum < 0) {
     sum = 0; /* the difference of two clamped giants */
   }
   for (int32_t e = first; e != last;) {
-    int32_t next = ks_rotate(m, e);
-    sum += aspect(at(s, v2), at(s, ks_head(m, e)), at(s, ks_head(m, next)));
+    int32_t next = orb_ks_rotate(m, e);
+    sum += aspect(at(s, v2), at(s, orb_ks_head(m, e)), at(s, orb_ks_head(m, next)));
     e = next;
   }
   return sum;
@@ -150,7 +150,7 @@ static double quadric_value(const double *q, const double *p) {
 
 /* Quadric error, with a touch of edge length so that flat regions thin out evenly. */
 static double quadric_cost(const simplifier *s, int32_t h) {
-  int32_t v1 = s->m->tri[h], v2 = ks_head(s->m, h);
+  int32_t v1 = s->m->tri[h], v2 = orb_ks_head(s->m, h);
   const double *p = at(s, v2);
   double error = quadric_value(s->quadric[v1], p) + quadric_value(s->quadric[v2], p);
   return fmax(error, 0) + 1e-6 * (4 * M_PI / s->m->vertex_count) * orb_distance2(at(s, v1), p);
@@ -167,14 +167,14 @@ static void evaluate(simplifier *s, int32_t v, int linked) {
   double factor = s->quadric || pole ? 1 : curvature_factor(s, v), best = INFINITY;
   int32_t target = -1, e = s->m->out[v];
   do {
-    if (!linked || ks_link_holds(s->m, e, s->mark, ++s->stamp)) {
+    if (!linked || orb_ks_link_holds(s->m, e, s->mark, ++s->stamp)) {
       double cost = pole ? POLE_COST : s->quadric ? quadric_cost(s, e) : factor * aspect_after(s, e);
       if (cost < best) {
         best = cost;
         target = e;
       }
     }
-    e = ks_rotate(s->m, e);
+    e = orb_ks_rotate(s->m, e);
   } while (e != s->m->out[v] && !(pole && target >= 0));
   s->cost[v] = best;
   s->target[v] = target;
@@ -189,7 +189,7 @@ static void reevaluate(simplifier *s, int32_t v) {
 /* After a collapse into v: quadric costs change on v's ring; those of Eq. 1 one ring further, but not beyond a pole,
  * whose whole ring would be looked at for every collapse in it. */
 static void refresh_around(simplifier *s, int32_t v) {
-  const ks_mesh *m = s->m;
+  const orb_ks_mesh *m = s->m;
   if (!s->quadric) {
     s->aspect_sum[v] = ring_aspect(s, v);
   }
@@ -198,36 +198,36 @@ static void refresh_around(simplifier *s, int32_t v) {
   int32_t ring_count = 0;
   do {
     if (!s->quadric) {
-      s->aspect_sum[ks_head(m, e)] = ring_aspect(s, ks_head(m, e));
+      s->aspect_sum[orb_ks_head(m, e)] = ring_aspect(s, orb_ks_head(m, e));
     }
     ring_count++;
-    e = ks_rotate(m, e);
+    e = orb_ks_rotate(m, e);
   } while (e != m->out[v]);
   ORB_ASSERT(ring_count == m->valence[v]);
   s->mark[v] = seen;
   reevaluate(s, v);
   e = m->out[v];
   do {
-    int32_t w = ks_head(m, e);
+    int32_t w = orb_ks_head(m, e);
     if (s->mark[w] != seen) {
       s->mark[w] = seen;
       reevaluate(s, w);
     }
     for (int32_t f = m->out[w], start = f; !s->quadric && !is_pole(s, w);) {
-      if (s->mark[ks_head(m, f)] != seen) {
-        s->mark[ks_head(m, f)] = seen;
-        reevaluate(s, ks_head(m, f));
+      if (s->mark[orb_ks_head(m, f)] != seen) {
+        s->mark[orb_ks_head(m, f)] = seen;
+        reevaluate(s, orb_ks_head(m, f));
       }
-      if ((f = ks_rotate(m, f)) == start) {
+      if ((f = orb_ks_rotate(m, f)) == start) {
         break;
       }
     }
-    e = ks_rotate(m, e);
+    e = orb_ks_rotate(m, e);
   } while (e != m->out[v]);
 }
 
 static void build_quadrics(simplifier *s) {
-  const ks_mesh *m = s->m;
+  const orb_ks_mesh *m = s->m;
   for (int32_t t = 0; t < m->triangle_count; t++) {
     const int32_t *v = m->tri + 3 * (size_t)t;
     double u[3], w[3], n[3];
@@ -262,7 +262,7 @@ static void fill_heap(simplifier *s) {
 
 /* Collapses in order of cost until `until` vertices live. */
 static orb_status collapse_until(simplifier *s, int32_t until) {
-  ks_mesh *m = s->m;
+  orb_ks_mesh *m = s->m;
   fill_heap(s);
   int32_t total = m->vertex_count;
   while (m->live > until) {
@@ -270,7 +270,7 @@ static orb_status collapse_until(simplifier *s, int32_t until) {
     if (s->cost[v] == INFINITY) {
       return orb_fail(s->ctx, ORB_E_INTERNAL, "No edge can be collapsed at %d vertices.", m->live);
     }
-    if (!ks_link_holds(m, s->target[v], s->mark, ++s->stamp)) {
+    if (!orb_ks_link_holds(m, s->target[v], s->mark, ++s->stamp)) {
       double stale = s->cost[v];
       evaluate(s, v, 1);
       ORB_ASSERT(s->cost[v] >= stale);
@@ -282,14 +282,14 @@ static orb_status collapse_until(simplifier *s, int32_t until) {
         continue;
       }
     }
-    int32_t v2 = ks_head(m, s->target[v]);
+    int32_t v2 = orb_ks_head(m, s->target[v]);
     if (s->quadric) {
       for (int i = 0; i < 10; i++) {
         s->quadric[v2][i] += s->quadric[v][i];
       }
     }
     heap_remove(s, v);
-    ORB_TRY(ks_collapse_edge(s->ctx, m, s->target[v]));
+    ORB_TRY(orb_ks_collapse_edge(s->ctx, m, s->target[v]));
     refresh_around(s, v2);
     if ((m->log_count & 255) == 0 || is_pole(s, v2)) {
       ORB_TRY(orb_context_check(s->ctx));
@@ -299,7 +299,7 @@ static orb_status collapse_until(simplifier *s, int32_t until) {
   return ORB_OK;
 }
 
-orb_status ks_simplify(orb_context *ctx, ks_mesh *m, int32_t qem_until) {
+orb_status orb_ks_simplify(orb_context *ctx, orb_ks_mesh *m, int32_t qem_until) {
   simplifier s = {.ctx = ctx, .m = m};
   orb_status status = ORB_E_NO_MEMORY;
   size_t n = (size_t)m->vertex_count;

@@ -8,7 +8,7 @@ enum { BINS = ORB_LEVEL_RING_MAX + 1, GRAIN = 1024, UNCOLOURED = -1, SET_ASIDE =
 typedef struct builder {
   orb_context *ctx;
   orb_level *level;
-  const orb_surface *s;
+  const orb_corner_table *s;
   double blend;
   unsigned char *valence;                     /* of level vertices, capped */
   int32_t bin[ORB_LEVEL_COLOURS][BINS];       /* vertices of each colour and valence */
@@ -46,7 +46,7 @@ void orb_level_free(orb_context *ctx, orb_level *level) {
 /* Greedy colouring in vertex order; counts the bins. */
 static orb_status colour_vertices(builder *b) {
   orb_level *level = b->level;
-  const orb_surface *s = b->s;
+  const orb_corner_table *s = b->s;
   int32_t heavy = 0;
   for (int32_t i = 0; i < level->count; i++) {
     int32_t v = level->vertex[i], start = s->vertex_corner[v], c = start;
@@ -167,8 +167,9 @@ static orb_status list_vertices(builder *b, const unsigned char *alive, const un
   return ORB_OK;
 }
 
-orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_kernels *kernels, const orb_surface *surface,
-                           const unsigned char *alive, const unsigned char *pinned, int32_t live, double blend) {
+orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_kernels *kernels,
+                           const orb_corner_table *surface, const unsigned char *alive, const unsigned char *pinned,
+                           int32_t live, double blend) {
   free_batches(ctx, level);
   level->kernels = kernels;
   builder *b = ORB_NEW0(ctx, builder, 1);

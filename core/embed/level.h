@@ -27,7 +27,7 @@ typedef struct orb_level {
 
 /* Gathers the level of the vertices whose `alive` flag is set and `pinned` (or NULL) is not. */
 ORB_MUST_CHECK orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_kernels *kernels,
-                                          const orb_surface *surface, const unsigned char *alive,
+                                          const orb_corner_table *surface, const unsigned char *alive,
                                           const unsigned char *pinned, int32_t live, double blend);
 void orb_level_free(orb_context *ctx, orb_level *level);
 

@@ -3,11 +3,11 @@
 #ifndef ORB_EMBED_MULTIRES_H
 #define ORB_EMBED_MULTIRES_H
 
+#include "embed/corner_table.h"
 #include "embed/hierarchy.h"
 #include "embed/kernel.h"
 #include "embed/level.h"
 #include "embed/star.h"
-#include "embed/surface.h"
 
 /* One half-edge collapse: vertex `vertex` into the vertex next to corner `first`. Its star was the corners first …
  * last counter-clockwise, `valence` of them; the triangles of first and last are gone while it is collapsed. */
@@ -18,7 +18,7 @@ typedef struct orb_collapse {
 
 struct orb_hierarchy {
   const orb_kernels *kernels;
-  orb_surface surface;
+  orb_corner_table surface;
   orb_collapse *log; /* in the order of decimation */
   int32_t log_count; /* vertex_count − 4 in all */
   int32_t undone;    /* how many of them, from the end, are undone at present */
@@ -35,7 +35,7 @@ ORB_MUST_CHECK orb_status orb_decimate(orb_context *ctx, orb_hierarchy *hierarch
 
 /* Collapse and undo of one logged collapse: collapse.c. Both take O(valence). */
 ORB_MUST_CHECK orb_status orb_collapse_reserve(orb_context *ctx, orb_hierarchy *h, int32_t valence);
-void orb_collapse_apply(orb_surface *s, int32_t first, int32_t valence, orb_collapse *out, float *areas);
+void orb_collapse_apply(orb_corner_table *s, int32_t first, int32_t valence, orb_collapse *out, float *areas);
 void orb_collapse_redo(orb_hierarchy *h, int32_t index);
 void orb_collapse_undo(orb_hierarchy *h, int32_t index);
 

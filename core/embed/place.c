@@ -63,7 +63,7 @@ static int centroid_inside(const orb_star *star, double p[3]) {
  * inside is left to the sweeps. */
 static orb_status place_vertex(orb_context *ctx, orb_refiner *r, int32_t v, double blend, int thread, int *found) {
   orb_star *star = &r->star[thread];
-  const orb_surface *s = &r->hierarchy->surface;
+  const orb_corner_table *s = &r->hierarchy->surface;
   double p[3], before;
   ORB_TRY(orb_star_walk(ctx, star, s, v, r->point));
   *found = centroid_inside(star, p);
@@ -86,7 +86,7 @@ static orb_status place_vertex(orb_context *ctx, orb_refiner *r, int32_t v, doub
 
 static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
   round_job *job = arg;
-  const orb_surface *s = &job->r->hierarchy->surface;
+  const orb_corner_table *s = &job->r->hierarchy->surface;
   for (int64_t i = begin; i < end; i++) {
     if (i + AHEAD < end) {
       __builtin_prefetch(s->corner + job->r->hierarchy->log[job->first + i + AHEAD].first);
@@ -147,7 +147,7 @@ static void enqueue(queue *q, int32_t v) {
 }
 
 static void enqueue_ring(queue *q, int32_t v) {
-  const orb_surface *s = &q->r->hierarchy->surface;
+  const orb_corner_table *s = &q->r->hierarchy->surface;
   int32_t start = s->vertex_corner[v], c = start;
   do {
     enqueue(q, s->corner[orb_corner_next(c)]);
@@ -163,7 +163,7 @@ static int32_t dequeue(queue *q) {
 
 /* Relaxes the neighbourhood of a vertex that landed where it is narrow, as long and as far as that pays. */
 static orb_status relieve(orb_context *ctx, orb_refiner *r, int32_t v, double blend) {
-  const orb_surface *s = &r->hierarchy->surface;
+  const orb_corner_table *s = &r->hierarchy->surface;
   queue q = {.r = r};
   orb_status status = ORB_OK;
   enqueue_ring(&q, v);

@@ -18,7 +18,7 @@ orb_status orb_hierarchy_create(orb_context *ctx, const orb_mesh *mesh, const un
   h->kernels = orb_kernels_of(orb_context_cpu(ctx));
   unsigned char *kept = NULL;
   orb_status status;
-  ORB_GO(status, orb_surface_create(ctx, mesh, &h->surface), done);
+  ORB_GO(status, orb_corner_table_create(ctx, mesh, &h->surface), done);
   if (keep) {
     kept = ORB_NEW(ctx, unsigned char, mesh->vertex_count);
     if (!kept) {
@@ -40,7 +40,7 @@ done:
 
 void orb_hierarchy_destroy(orb_context *ctx, orb_hierarchy *h) {
   if (h) {
-    orb_surface_free(ctx, &h->surface);
+    orb_corner_table_free(ctx, &h->surface);
     orb_free(ctx, h->log);
     orb_free(ctx, h->area_log);
     orb_free(ctx, h->round_start);
@@ -51,7 +51,7 @@ void orb_hierarchy_destroy(orb_context *ctx, orb_hierarchy *h) {
 /* The first tetrahedron: regular, turned so that its faces are positive. */
 static void place_base(orb_refiner *r) {
   const orb_hierarchy *h = r->hierarchy;
-  const orb_surface *s = &h->surface;
+  const orb_corner_table *s = &h->surface;
   const double a = 0.57735026918962576451; /* 1/√3 */
   const double corner[4][3] = {{a, a, a}, {a, -a, -a}, {-a, a, -a}, {-a, -a, a}};
   int32_t c = s->vertex_corner[h->base[0]];
@@ -308,7 +308,7 @@ int32_t orb_refiner_live(const orb_refiner *r) {
 
 orb_status orb_refiner_level(orb_context *ctx, const orb_refiner *r, int32_t **vertices, int32_t *vertex_count,
                              int32_t **triangles, int32_t *triangle_count) {
-  const orb_surface *s = &r->hierarchy->surface;
+  const orb_corner_table *s = &r->hierarchy->surface;
   int32_t *v = ORB_NEW(ctx, int32_t, r->live), *t = ORB_NEW(ctx, int32_t, 3 * (2 * (int64_t)r->live - 4));
   if (!v || !t) {
     orb_free(ctx, v);
@@ -354,7 +354,7 @@ void orb_refiner_pin(orb_refiner *r, int32_t vertex, int pinned) {
 }
 
 void orb_refiner_points(const orb_refiner *r, double *points) {
-  const orb_surface *s = &r->hierarchy->surface;
+  const orb_corner_table *s = &r->hierarchy->surface;
   for (int64_t i = 0; i < s->vertex_count; i++) {
     memcpy(points + 3 * (int64_t)s->to_mesh[i], r->point + 4 * i, 3 * sizeof *points);
   }

@@ -11,8 +11,8 @@ orb_status orb_refiner_resume(orb_context *ctx, const orb_mesh *mesh, const doub
   }
   h->kernels = orb_kernels_of(orb_context_cpu(ctx));
   orb_status status;
-  ORB_GO(status, orb_surface_create(ctx, mesh, &h->surface), done);
-  const orb_surface *s = &h->surface;
+  ORB_GO(status, orb_corner_table_create(ctx, mesh, &h->surface), done);
+  const orb_corner_table *s = &h->surface;
   /* Any four vertices about an edge serve as the base: every position is set below. */
   int32_t c = s->vertex_corner[0];
   h->base[0] = s->corner[c];

@@ -42,7 +42,7 @@ void orb_star_free(orb_context *ctx, orb_star *star) {
   memset(star, 0, sizeof *star);
 }
 
-orb_status orb_star_walk(orb_context *ctx, orb_star *star, const orb_surface *s, int32_t v, const double *point) {
+orb_status orb_star_walk(orb_context *ctx, orb_star *star, const orb_corner_table *s, int32_t v, const double *point) {
   ORB_TRY(orb_star_reserve(ctx, star, s->valence[v]));
   int32_t start = s->vertex_corner[v], c = start, k = 0;
   do {
@@ -57,7 +57,7 @@ orb_status orb_star_walk(orb_context *ctx, orb_star *star, const orb_surface *s,
   return ORB_OK;
 }
 
-void orb_shape_cotangents(const orb_surface *s, int32_t a, int32_t b, int32_t c, double blend, double out[3]) {
+void orb_shape_cotangents(const orb_corner_table *s, int32_t a, int32_t b, int32_t c, double blend, double out[3]) {
   const double *p = s->position + 3 * (int64_t)a, *q = s->position + 3 * (int64_t)b;
   const double *r = s->position + 3 * (int64_t)c;
   double ab = orb_distance2(p, q), ac = orb_distance2(p, r), bc = orb_distance2(q, r);
@@ -73,7 +73,7 @@ void orb_shape_cotangents(const orb_surface *s, int32_t a, int32_t b, int32_t c,
   out[2] = (ac + bc - ab) * half;
 }
 
-void orb_star_shape(orb_star *star, const orb_surface *s, int32_t v, double blend) {
+void orb_star_shape(orb_star *star, const orb_corner_table *s, int32_t v, double blend) {
   star->area = 0;
   for (int32_t i = 0; i < star->count; i++) {
     int32_t j = i + 1 < star->count ? i + 1 : 0;

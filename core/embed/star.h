@@ -8,7 +8,7 @@
 #ifndef ORB_EMBED_STAR_H
 #define ORB_EMBED_STAR_H
 
-#include "embed/surface.h"
+#include "embed/corner_table.h"
 
 typedef struct orb_star {
   int32_t count, capacity;
@@ -26,14 +26,14 @@ ORB_MUST_CHECK orb_status orb_star_reserve(orb_context *ctx, orb_star *star, int
 void orb_star_free(orb_context *ctx, orb_star *star);
 
 /* Walks the ring of v from its vertex_corner on; point holds 4 a vertex. */
-ORB_MUST_CHECK orb_status orb_star_walk(orb_context *ctx, orb_star *star, const orb_surface *s, int32_t v,
+ORB_MUST_CHECK orb_status orb_star_walk(orb_context *ctx, orb_star *star, const orb_corner_table *s, int32_t v,
                                         const double *point);
 
 /* The shapes and target areas. blend moves them towards equilateral. */
-void orb_star_shape(orb_star *star, const orb_surface *s, int32_t v, double blend);
+void orb_star_shape(orb_star *star, const orb_corner_table *s, int32_t v, double blend);
 
 /* Half cotangents at the three vertices, in order, of a triangle whose squared edges are blended. */
-void orb_shape_cotangents(const orb_surface *s, int32_t a, int32_t b, int32_t c, double blend, double out[3]);
+void orb_shape_cotangents(const orb_corner_table *s, int32_t a, int32_t b, int32_t c, double blend, double out[3]);
 
 /* Moves p by at most one damped Newton step that lowers the energy and keeps every triangle exactly positive. Returns
  * the energy after, *before the one before; both infinite where p lies too near the edge of the kernel to tell. */

@@ -14,7 +14,8 @@
 
 #include "base/check.h"
 #include "numeric/predicates.h"
-#include "remesh/match.h"
+#include "remesh/adaptive/match.h"
+#include "sphere/delaunay.h"
 
 enum { ROUNDS = 16 };
 

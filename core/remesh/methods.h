@@ -3,7 +3,8 @@
 #ifndef ORB_REMESH_METHODS_H
 #define ORB_REMESH_METHODS_H
 
-#include "remesh/net.h"
+#include "sphere/net.h"
+#include "orbmorph/remesh.h"
 
 /* What all methods need of the shapes. */
 typedef struct orb_remesh_job {
@@ -23,8 +24,5 @@ ORB_MUST_CHECK orb_status orb_remesh_subdivision(orb_context *ctx, const orb_rem
 ORB_MUST_CHECK orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
 ORB_MUST_CHECK orb_status orb_remesh_overlay(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
 ORB_MUST_CHECK orb_status orb_remesh_hull(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
-
-/* orb_locate(), and the hit itself: in the triangle of the place. */
-orb_hit orb_locate_hit(const orb_locator *locator, const double p[3], int32_t hint, orb_place *out);
 
 #endif

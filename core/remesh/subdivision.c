@@ -6,9 +6,10 @@
  * edges that still stray from a shape are turned or split (see match.h). */
 #include "base/check.h"
 #include "numeric/vec3.h"
-#include "remesh/match.h"
+#include "remesh/adaptive/match.h"
 #include "remesh/methods.h"
 #include "remesh/quadtree.h"
+#include "sphere/delaunay.h"
 
 /* Reproduction is within half a percent of the diagonal: the proved bound is kept below. */
 static const double MOST_ERROR = 0.004;

@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
-#include "align/compose.h"
 #include "support_shapes.h"
+#include "align/map/starts/mirror.h"
 
 /* Four limbs in two pairs and two more in the plane x = 0; bent: one limb of each pair turned away. */
 static const double limb[6][3] = {{0.6, -0.8, 0},      {-0.6, -0.8, 0},  {0.48, -0.6, 0.64},
@@ -65,7 +65,7 @@ static guessed guess(orb_context *ctx, const double (*second)[3]) {
   const orb_mesh *const meshes[2] = {&g.mesh[0], &g.mesh[1]};
   const int32_t *const landmarks[2] = {landmark[0], landmark[1]};
   int32_t *const guesses[2] = {g.vertex[0], g.vertex[1]};
-  assert_int_equal(cm_mirror_landmarks(ctx, meshes, landmarks, 3, guesses, &g.count), ORB_OK);
+  assert_int_equal(orb_map_mirror_landmarks(ctx, meshes, landmarks, 3, guesses, &g.count), ORB_OK);
   return g;
 }
 

@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-#include "align/warp.h"
+#include "align/rbf/warp.h"
 #include "numeric/vec3.h"
 #include "support_align.h"
 #include "support_bodies.h"

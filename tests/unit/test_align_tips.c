@@ -8,10 +8,11 @@
 
 #include <cmocka.h>
 
-#include "align/guess.h"
-#include "align/tips.h"
+#include "align/find/guess.h"
 #include "support_shapes.h"
 #include "support_shared.h"
+#include "align/find/tip_choice.h"
+#include "align/find/tip_turns.h"
 
 enum { LIMBS = 5 };
 

@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
-#include "align/compose_limb.h"
-#include "align/compose_twist.h"
+#include "align/map/twist/limb.h"
+#include "align/map/twist/twist.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 #include "support_shapes.h"
@@ -27,7 +27,7 @@ typedef struct creature {
   double *sphere; /* directions */
   double *image;  /* the same, twisted */
   double *x;      /* positions of the shape that is mapped */
-  cm_surface surface;
+  orb_map_surface surface;
   int32_t pole;
 } creature;
 
@@ -67,7 +67,7 @@ static creature make(double reach, double twist, double bend) {
     }
   }
   orb_aligned_shape shape = {.mesh = c.mesh, .points = c.sphere};
-  assert_int_equal(cm_surface_create(c.ctx, &shape, &c.surface), ORB_OK);
+  assert_int_equal(orb_map_surface_create(c.ctx, &shape, &c.surface), ORB_OK);
   memcpy(c.x, c.surface.x, n * sizeof *c.x);
   for (int32_t v = 0; v < c.mesh.vertex_count; v++) {
     double out = orb_length(c.mesh.positions + 3 * (size_t)v);
@@ -81,7 +81,7 @@ static creature make(double reach, double twist, double bend) {
 }
 
 static void drop(creature *c) {
-  cm_surface_free(c->ctx, &c->surface);
+  orb_map_surface_free(c->ctx, &c->surface);
   shape_free(c->ctx, &c->mesh);
   free(c->sphere);
   free(c->image);
@@ -89,9 +89,9 @@ static void drop(creature *c) {
   orb_context_destroy(c->ctx);
 }
 
-static void find(creature *c, const int32_t *held, int32_t held_count, cm_twists *out) {
-  cm_image map = {c->mesh.vertex_count, c->mesh.triangle_count, c->mesh.triangles, c->x, c->image};
-  assert_int_equal(cm_twists_find(c->ctx, &c->surface, &map, held, held_count, out), ORB_OK);
+static void find(creature *c, const int32_t *held, int32_t held_count, orb_map_twists *out) {
+  orb_map_image map = {c->mesh.vertex_count, c->mesh.triangle_count, c->mesh.triangles, c->x, c->image};
+  assert_int_equal(orb_map_twists_find(c->ctx, &c->surface, &map, held, held_count, out), ORB_OK);
 }
 
 /* To the bit; but not what lies between the members, which is never set. */
@@ -111,7 +111,7 @@ static void turns_go_round_the_axis(void **state) {
   for (size_t v = 0; v < n; v++) {
     inside[v] = from_axis(c.sphere + 3 * v) < FADED;
   }
-  assert_int_equal(cm_limb_heights(c.ctx, &c.surface, inside, c.pole, height), ORB_OK);
+  assert_int_equal(orb_map_limb_heights(c.ctx, &c.surface, inside, c.pole, height), ORB_OK);
   for (int i = 0; i < 200; i++) {
     double far = 0.25 + 0.25 * i / 200, at = 0.7 * i, angle = (i % 9 - 4) * 0.8, p[3], q[3], wanted[3];
     for (int k = 0; k < 3; k++) {
@@ -121,8 +121,8 @@ static void turns_go_round_the_axis(void **state) {
     rotate(axis, angle, wanted);
     orb_place place;
     orb_locate(c.surface.locator, p, -1, &place);
-    assert_true(cm_limb_turn(&c.surface, height, angle, &place));
-    cm_surface_at(&c.surface, &place, NULL, q, NULL);
+    assert_true(orb_map_limb_turn(&c.surface, height, angle, &place));
+    orb_map_surface_at(&c.surface, &place, NULL, q, NULL);
     assert_true(fabs(place.at[0] + place.at[1] + place.at[2] - 1) < 1e-9);
     assert_true(fabs(from_axis(q) - far) < 0.06 * far);
     assert_true(sqrt(orb_distance2(q, wanted)) < 0.12 * sin(far));
@@ -133,7 +133,7 @@ static void turns_go_round_the_axis(void **state) {
     outside.triangle = orb_dot(p, axis) < -0.5 ? t : outside.triangle;
   }
   as_it_was.triangle = outside.triangle;
-  assert_false(cm_limb_turn(&c.surface, height, 1, &outside));
+  assert_false(orb_map_limb_turn(&c.surface, height, 1, &outside));
   assert_same_place(&outside, &as_it_was);
   free(inside);
   free(height);
@@ -146,10 +146,10 @@ static void twists_are_measured_and_undone(void **state) {
   const double degrees[] = {180, -180, 110, -150};
   for (int i = 0; i < 8; i++) {
     creature c = make(REACH, degrees[i / 2] / DEGREES, 0);
-    cm_twists t;
+    orb_map_twists t;
     find(&c, &c.pole, i % 2, &t); /* with the tip known and without */
     assert_int_equal(t.count, 1);
-    const cm_twist *limb = &t.limb[0];
+    const orb_map_twist *limb = &t.limb[0];
     assert_true(from_axis(c.sphere + 3 * (size_t)limb->pole) < 0.15);
     double end = 0;
     for (int k = 0; k < limb->count; k++) {
@@ -163,21 +163,21 @@ static void twists_are_measured_and_undone(void **state) {
       orb_place place;
       double y[3];
       orb_locate(c.surface.locator, c.image + 3 * (size_t)v, -1, &place);
-      cm_surface_at(&c.surface, &place, y, NULL, NULL);
+      orb_map_surface_at(&c.surface, &place, y, NULL, NULL);
       before += sqrt(orb_distance2(y, c.x + 3 * (size_t)v));
-      (void)cm_twists_undo(&t, &c.surface, 1, &place);
-      cm_surface_at(&c.surface, &place, y, NULL, NULL);
+      (void)orb_map_twists_undo(&t, &c.surface, 1, &place);
+      orb_map_surface_at(&c.surface, &place, y, NULL, NULL);
       after += sqrt(orb_distance2(y, c.x + 3 * (size_t)v));
     }
     assert_true(after < 0.25 * before);
-    cm_twists_free(c.ctx, &t);
+    orb_map_twists_free(c.ctx, &t);
     drop(&c);
   }
 }
 
 static void nothing_is_found(double twist, double bend, int both_ends_held) {
   creature c = make(REACH, twist / DEGREES, bend / DEGREES);
-  cm_twists t;
+  orb_map_twists t;
   int32_t held[2] = {c.pole, c.pole};
   for (int32_t v = 0; v < c.mesh.vertex_count; v++) { /* another one on the limb, where the twist is whole */
     held[1] = fabs(from_axis(c.sphere + 3 * (size_t)v) - 0.2) < 0.02 ? v : held[1];
@@ -189,9 +189,9 @@ static void nothing_is_found(double twist, double bend, int both_ends_held) {
   orb_place place, as_it_was;
   orb_locate(c.surface.locator, axis, -1, &place);
   as_it_was = place;
-  assert_false(cm_twists_undo(&t, &c.surface, 1, &place));
+  assert_false(orb_map_twists_undo(&t, &c.surface, 1, &place));
   assert_same_place(&place, &as_it_was);
-  cm_twists_free(c.ctx, &t);
+  orb_map_twists_free(c.ctx, &t);
   drop(&c);
 }
 

@@ -129,17 +129,17 @@ static void test_error(void **unused) {
   (void)unused;
   orb_context *ctx = open_context(1);
   orb_mesh mesh = shape_octahedron(ctx);
-  ks_mesh m;
-  ks_sampler s;
+  orb_ks_mesh m;
+  orb_ks_sampler s;
   orb_embed_options options = sampling();
-  assert_int_equal(ks_mesh_create(ctx, &mesh, mesh.positions, &m), ORB_OK);
+  assert_int_equal(orb_ks_mesh_create(ctx, &mesh, mesh.positions, &m), ORB_OK);
   double edge2[3] = {2, 2, 2}, one = 0.5 * sqrt(3), carried = 4 * M_PI / 8; /* of a unit octahedron */
   static const double exponents[][2] = {{3, 12}, {3, 1}, {1.5, 6}, {2, 0}, {0, 0}, {2.5, 7.3}};
   for (size_t i = 0; i < sizeof exponents / sizeof exponents[0]; i++) {
     options.area_exponent = exponents[i][0];
     options.aspect_exponent = exponents[i][1];
-    assert_int_equal(ks_sampler_create(ctx, &options, &s), ORB_OK);
-    assert_int_equal(ks_ring_load(ctx, &s, &m, mesh.positions, 0), ORB_OK);
+    assert_int_equal(orb_ks_sampler_create(ctx, &options, &s), ORB_OK);
+    assert_int_equal(orb_ks_ring_load(ctx, &s, &m, mesh.positions, 0), ORB_OK);
     double p[3], found[3] = {0}, error = 0, present;
     memcpy(p, mesh.positions, sizeof p);
     p[0] += 0.21;
@@ -149,7 +149,7 @@ static void test_error(void **unused) {
     for (int k = 0; k < 3; k++) {
       p[k] /= length;
     }
-    present = ks_error_at(&s, p);
+    present = orb_ks_error_at(&s, p);
     double expected = error_by_definition((const double(*)[3])s.ring.point, s.ring.count, p, edge2, one, carried,
                                           exponents[i][0], exponents[i][1]);
     /* An angle term without a floor on the mesh's area is what the definition has; the floor changes it by 1 %. */
@@ -157,9 +157,9 @@ static void test_error(void **unused) {
     for (orb_cpu cpu = ORB_CPU_PLAIN; cpu <= orb_context_cpu(ctx); cpu++) {
       double out[3], e;
       s.cpu = cpu;
-      int better = ks_search(&s, p, 1, present, out, &e);
+      int better = orb_ks_search(&s, p, 1, present, out, &e);
       assert_true(better && e < present);
-      assert_true(fabs(e - ks_error_at(&s, out)) <= 1e-12 * e);
+      assert_true(fabs(e - orb_ks_error_at(&s, out)) <= 1e-12 * e);
       if (cpu > ORB_CPU_PLAIN) { /* the same bits for every width */
         assert_memory_equal(out, found, sizeof out);
         assert_true(e == error);
@@ -169,11 +169,11 @@ static void test_error(void **unused) {
     }
     /* Two independent searches, in double and in single precision, over the same samples. */
     double best[3], least;
-    assert_int_equal(ks_best_sample(&s, p, 0, s.ring.count, 1, INFINITY, best, &least), 1);
+    assert_int_equal(orb_ks_best_sample(&s, p, 0, s.ring.count, 1, INFINITY, best, &least), 1);
     assert_true(fabs(error / least - 1) < 1e-3);
-    ks_sampler_free(ctx, &s);
+    orb_ks_sampler_free(ctx, &s);
   }
-  ks_mesh_free(ctx, &m);
+  orb_ks_mesh_free(ctx, &m);
   shape_free(ctx, &mesh);
   orb_context_destroy(ctx);
 }
@@ -183,8 +183,8 @@ static void test_mesh_undo(void **unused) {
   (void)unused;
   orb_context *ctx = open_context(1);
   orb_mesh mesh = limbed(ctx, 3);
-  ks_mesh m;
-  assert_int_equal(ks_mesh_create(ctx, &mesh, mesh.positions, &m), ORB_OK);
+  orb_ks_mesh m;
+  assert_int_equal(orb_ks_mesh_create(ctx, &mesh, mesh.positions, &m), ORB_OK);
   size_t corners = 3 * (size_t)m.triangle_count;
   int32_t *tri = test_malloc(corners * sizeof *tri), *twin = test_malloc(corners * sizeof *twin);
   double *area = test_malloc((size_t)m.triangle_count * sizeof *area), total = 0;
@@ -195,7 +195,7 @@ static void test_mesh_undo(void **unused) {
     total += area[t];
   }
   assert_true(fabs(total - 4 * M_PI) < 1e-9);
-  assert_int_equal(ks_simplify(ctx, &m, 200), ORB_OK);
+  assert_int_equal(orb_ks_simplify(ctx, &m, 200), ORB_OK);
   assert_int_equal(m.live, 4);
   double left = 0;
   for (int32_t t = 0; t < m.triangle_count; t++) { /* of the tetrahedron: each corner's out-edges are alive */
@@ -207,7 +207,7 @@ static void test_mesh_undo(void **unused) {
   }
   assert_true(fabs(left - 4 * M_PI) < 1e-9);
   while (m.live < m.vertex_count) {
-    ks_split_last(&m);
+    orb_ks_split_last(&m);
   }
   assert_memory_equal(tri, m.tri, corners * sizeof *tri);
   assert_memory_equal(twin, m.twin, corners * sizeof *twin);
@@ -215,7 +215,7 @@ static void test_mesh_undo(void **unused) {
   test_free(tri);
   test_free(twin);
   test_free(area);
-  ks_mesh_free(ctx, &m);
+  orb_ks_mesh_free(ctx, &m);
   shape_free(ctx, &mesh);
   orb_context_destroy(ctx);
 }
@@ -336,14 +336,14 @@ static void test_search_is_bounded(void **unused) {
   for (int i = 0; i < 4; i++) {
     orb_embed_options options = sampling();
     options.step = steps[i];
-    ks_sampler s;
-    assert_int_equal(ks_sampler_create(ctx, &options, &s), ORB_OK);
+    orb_ks_sampler s;
+    assert_int_equal(orb_ks_sampler_create(ctx, &options, &s), ORB_OK);
     for (int32_t ring = 3; ring < 1000000; ring += 1 + ring / 3) {
-      int64_t stride = ks_stride(&s, ring), sampled = (ring + stride - 1) / stride;
+      int64_t stride = orb_ks_stride(&s, ring), sampled = (ring + stride - 1) / stride;
       assert_true(sampled >= 1 && sampled <= KS_WHOLE_RING);
       assert_true(sampled <= 8 || sampled * s.padded_count * ring <= KS_WORK);
     }
-    ks_sampler_free(ctx, &s);
+    orb_ks_sampler_free(ctx, &s);
   }
   orb_context_destroy(ctx);
 }

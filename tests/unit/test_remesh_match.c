@@ -10,8 +10,9 @@
 
 #include "numeric/vec3.h"
 #include "remesh/distance.h"
-#include "remesh/match.h"
+#include "remesh/adaptive/match.h"
 #include "support_remesh.h"
+#include "remesh/net_export.h"
 
 typedef struct bench {
   orb_context *ctx;

@@ -93,7 +93,8 @@ void orb_error_clear(orb_context *ctx);
 void orb_progress(orb_context *ctx, const char *stage, double fraction);
 
 /* From now on only this stage is reported: what works for one calls functions that have stages of their own. NULL: any.
- * The text is not copied and must last until it is replaced. Returns what held before, to be set again at the end. Not within a parallel loop. */
+ * The text is not copied and must last until it is replaced. Returns what held before, to be set again at the end. Not
+ * within a parallel loop. */
 const char *orb_progress_only(orb_context *ctx, const char *stage);
 
 /* Memory. Blocks are 64-byte aligned. count × size is checked for overflow and against the budget; NULL when it

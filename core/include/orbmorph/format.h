@@ -32,7 +32,8 @@ orb_format orb_format_detect(const unsigned char *bytes, size_t size);
 
 /* Reads a mesh as it stands in the file: polygons made triangles, nothing else mended (see orb_mesh_repair()).
  * format AUTO: detected; *format_out (may be NULL) says what it was. Errors: ORB_E_UNKNOWN_FORMAT,
- * ORB_E_MALFORMED_MESH with line or offset, ORB_E_NOT_FINITE (also beyond ORB_COORDINATE_MAX), ORB_E_TOO_LARGE, ORB_E_NO_MEMORY. */
+ * ORB_E_MALFORMED_MESH with line or offset, ORB_E_NOT_FINITE (also beyond ORB_COORDINATE_MAX), ORB_E_TOO_LARGE,
+ * ORB_E_NO_MEMORY. */
 ORB_MUST_CHECK orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_format format,
                                         orb_mesh *out, orb_format *format_out);
 

@@ -1,0 +1,15 @@
+/* The found landmarks of an alignment, and their confidence. */
+#ifndef ORB_ALIGN_FIND_FOUND_H
+#define ORB_ALIGN_FIND_FOUND_H
+
+#include "orbmorph/align.h"
+
+/* Fills found, found_points and confidence of an alignment made without landmarks: its meshes are those given, unsplit.
+ * clear, 0 to 1: how far behind other correspondences are (guess.h). See found.c. */
+ORB_MUST_CHECK orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment, double clear);
+
+/* 1/E of the linear map from triangle p to triangle q, E = (|J|² + |J⁻¹|²)/4: 1 for a rigid motion, 0 where it is
+ * degenerate. *area: of p. */
+double orb_triangle_likeness(double p[3][3], double q[3][3], double *area);
+
+#endif

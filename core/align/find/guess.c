@@ -1,0 +1,379 @@
+/* Alignment without landmarks: the trials.
+ *
+ * A shape that is nearly its own mirror image, or whose limbs are like each other, can be matched with another in many
+ * ways, and what a correlation of whole spheres finds best may be a wrong one. So both shapes are decimated to some
+ * thousand vertices, and correspondences are tried there: rotations that the correlation likes and that differ, and
+ * the likeliest maps of tips of limbs (tips.h), each walked to its common targets as pin does. A map that only a
+ * reflection could bring about makes the sphere fold over itself on the way and gets stuck or costs much. What a walk
+ * comes to says little, right maps and wrong ones cost alike, but some sweeps of the composed energy set them apart and
+ * cost no more than the walk. The best that differ are composed in full, and the energy that remains decides. Where
+ * shapes are symmetric several energies are nearly alike: then the lesser turn in space counts, since most shapes stand
+ * upright and face one way.
+ */
+#include "align/find/guess.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "align/find/tip_choice.h"
+#include "align/find/tip_turns.h"
+#include "align/find/tips.h"
+#include "align/map/compose.h"
+#include "align/map/engine/spread.h"
+#include "align/map/engine/surface.h"
+#include "align/pin/walk.h"
+#include "align/rotate/correlate.h"
+#include "align/rotate/procrustes.h"
+#include "align/rotate/rotate.h"
+#include "base/check.h"
+#include "embed/hierarchy.h"
+#include "numeric/dense.h"
+#include "numeric/vec3.h"
+#include "orbmorph/remesh.h"
+
+enum { COARSE = 1000, WALK = 300, ROTATIONS = 3, TIP_MAPS = 8, COMPOSED = 3, SAMPLES = 48 };
+static const double TURN = 1;         /* a half turn in space costs so many times the energy beyond 1 */
+static const double DIFFERENT = 0.15; /* of the diagonal: maps that differ by more are others */
+static const double BETTER = 0.95;    /* than the rotation search after its rough sweeps, or it is not worth the work */
+
+/* A decimated copy: compact, with an embedding of its own. */
+typedef struct coarse {
+  orb_mesh mesh;
+  double *points;
+  int32_t *vertex; /* numbers in the given mesh */
+} coarse;
+
+static void coarse_free(orb_context *ctx, coarse *c) {
+  orb_mesh_free(ctx, &c->mesh);
+  orb_free(ctx, c->points);
+  orb_free(ctx, c->vertex);
+}
+
+static orb_status coarse_create(orb_context *ctx, const orb_mesh *mesh, coarse *out) {
+  orb_status status;
+  orb_hierarchy *hierarchy = NULL;
+  orb_refiner *refiner = NULL;
+  orb_embed_options options;
+  int32_t *number = ORB_NEW(ctx, int32_t, mesh->vertex_count);
+  orb_embed_defaults(&options);
+  options.preset = ORB_PRESET_FAST;
+  if (!number) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_GO(status, orb_hierarchy_create(ctx, mesh, NULL, 4, &hierarchy), end);
+  ORB_GO(status, orb_refiner_create(ctx, hierarchy, &options, &refiner), end);
+  ORB_GO(status, orb_refiner_advance(ctx, refiner, mesh->vertex_count < COARSE ? mesh->vertex_count : COARSE), end);
+  ORB_GO(status,
+         orb_refiner_level(ctx, refiner, &out->vertex, &out->mesh.vertex_count, &out->mesh.triangles,
+                           &out->mesh.triangle_count),
+         end);
+  out->mesh.positions = ORB_NEW(ctx, double, 3 * (size_t)out->mesh.vertex_count);
+  out->points = ORB_NEW(ctx, double, 3 * (size_t)out->mesh.vertex_count);
+  if (!out->mesh.positions || !out->points) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  for (int32_t i = 0; i < out->mesh.vertex_count; i++) {
+    int32_t v = out->vertex[i];
+    number[v] = i;
+    memcpy(out->mesh.positions + 3 * (size_t)i, mesh->positions + 3 * (size_t)v, 3 * sizeof(double));
+    orb_refiner_point(refiner, v, out->points + 3 * (size_t)i);
+  }
+  for (int32_t h = 0; h < 3 * out->mesh.triangle_count; h++) {
+    out->mesh.triangles[h] = number[out->mesh.triangles[h]];
+  }
+end:
+  orb_free(ctx, number);
+  orb_refiner_destroy(ctx, refiner);
+  orb_hierarchy_destroy(ctx, hierarchy);
+  return status;
+}
+
+/* One correspondence on the coarse copies. */
+typedef struct trial {
+  int32_t count; /* tips; 0: a rotation */
+  int is_given;  /* the rotation that the spheres are given anyway */
+  int is_stuck;  /* nothing came of composing it in full */
+  double rotation[9];
+  int32_t first[ORB_TIPS_MAX], second[ORB_TIPS_MAX];
+  double energy, judge;
+  double image[SAMPLES][3]; /* where the samples of the first shape go */
+} trial;
+
+typedef struct trials {
+  orb_context *ctx;
+  coarse shape[2];
+  int32_t sample[SAMPLES];
+  trial list[ROTATIONS + TIP_MAPS + ORB_TIP_TURNS];
+  int32_t rotations, count; /* rotations: where the maps of tips begin */
+} trials;
+
+/* Sheets of the coarse copies, carried onto each other by the trial. *held 0: they cannot be. */
+static orb_status carry(trials *t, const trial *one, orb_sheet *sheets, int *held) {
+  static const int32_t numbers[ORB_TIPS_MAX] = {0, 1, 2, 3, 4, 5, 6, 7};
+  *held = 1;
+  for (int s = 0; s < 2; s++) {
+    const int32_t *vertices = s ? one->second : one->first;
+    ORB_TRY(orb_sheet_create(t->ctx, &t->shape[s].mesh, t->shape[s].points, &sheets[s]));
+    if (one->count) {
+      sheets[s].shape.landmark_vertices = ORB_NEW(t->ctx, int32_t, one->count);
+      if (!sheets[s].shape.landmark_vertices) {
+        return ORB_E_NO_MEMORY;
+      }
+      memcpy(sheets[s].shape.landmark_vertices, vertices, (size_t)one->count * sizeof *vertices);
+      sheets[s].landmark_count = one->count;
+    }
+  }
+  if (!one->count) {
+    return orb_sheet_rotate(t->ctx, &sheets[1], one->rotation);
+  }
+  int stuck;
+  ORB_TRY(orb_pin_walk(t->ctx, sheets, 2, numbers, one->count, ORB_PRESET_FAST, WALK, &stuck));
+  *held = !stuck;
+  return ORB_OK;
+}
+
+static orb_status sample_images(const trials *t, const orb_sheet *sheets, trial *one) {
+  const orb_aligned_shape *a = &sheets[0].shape, *b = &sheets[1].shape;
+  orb_locator *locator;
+  ORB_TRY(orb_locator_create(t->ctx, b->points, b->mesh.vertex_count, b->mesh.triangles, b->mesh.triangle_count, NULL,
+                             &locator));
+  for (int i = 0; i < SAMPLES; i++) {
+    orb_place place;
+    orb_locate(locator, a->points + 3 * (size_t)t->sample[i], -1, &place);
+    orb_place_position(&b->mesh, &place, one->image[i]);
+  }
+  orb_locator_destroy(t->ctx, locator);
+  return ORB_OK;
+}
+
+/* The angle of the rotation in space that carries the samples best onto their images, over π. */
+static orb_status turn_of(const trials *t, const trial *one, double *turn) {
+  double mean[2][3] = {{0}}, c[9] = {0}, r[9];
+  const double *x = t->shape[0].mesh.positions;
+  for (int i = 0; i < SAMPLES; i++) {
+    for (int k = 0; k < 3; k++) {
+      mean[0][k] += x[3 * (size_t)t->sample[i] + (size_t)k] / SAMPLES;
+      mean[1][k] += one->image[i][k] / SAMPLES;
+    }
+  }
+  for (int i = 0; i < SAMPLES; i++) {
+    double p[3], q[3];
+    orb_sub(x + 3 * (size_t)t->sample[i], mean[0], p);
+    orb_sub(one->image[i], mean[1], q);
+    orb_add_outer(c, p, q, 1);
+  }
+  ORB_TRY(orb_procrustes_covariance(t->ctx, c, r, NULL));
+  *turn = acos(fmin(1, fmax(-1, (r[0] + r[4] + r[8] - 1) / 2))) / M_PI;
+  return ORB_OK;
+}
+
+/* The energy of a trial after composing from its map, where it takes the samples, and its judgement. */
+static orb_status run_trial(trials *t, trial *one, orb_map_from from) {
+  orb_sheet sheets[2];
+  orb_status status;
+  int held, improved;
+  double energy[2], turn;
+  memset(sheets, 0, sizeof sheets);
+  one->energy = one->judge = INFINITY;
+  ORB_GO(status, carry(t, one, sheets, &held), end);
+  if (held) {
+    ORB_GO(status,
+           orb_compose(t->ctx, &sheets[0].shape, &sheets[1].shape, 1, 0, from, ORB_PRESET_DEFAULT, energy, &improved),
+           end);
+    one->energy = energy[1];
+    ORB_GO(status, sample_images(t, sheets, one), end);
+    ORB_GO(status, turn_of(t, one, &turn), end);
+    one->judge = (one->energy - 1) * (1 + TURN * turn);
+  }
+end:
+  orb_sheet_free(t->ctx, &sheets[0]);
+  orb_sheet_free(t->ctx, &sheets[1]);
+  return status;
+}
+
+static orb_status list_rotations(trials *t) {
+  orb_aligned_shape shape[2];
+  double rotation[9 * ROTATIONS];
+  memset(shape, 0, sizeof shape);
+  for (int s = 0; s < 2; s++) {
+    shape[s].mesh = t->shape[s].mesh;
+    shape[s].points = t->shape[s].points;
+  }
+  ORB_TRY(orb_rotation_candidates(t->ctx, &shape[0], &shape[1], ROTATIONS, rotation, &t->rotations));
+  for (t->count = 0; t->count < t->rotations; t->count++) {
+    memcpy(t->list[t->count].rotation, rotation + 9 * t->count, sizeof(double[9]));
+    t->list[t->count].is_given = t->count == 0;
+  }
+  return ORB_OK;
+}
+
+/* A map of tips, unless it is listed already. */
+static void list_tip_map(trials *t, const orb_tips tips[2], const orb_tip_map *map) {
+  trial one = {0};
+  for (int32_t k = 0; k < tips[0].count; k++) {
+    if (map->to[k] >= 0) {
+      one.first[one.count] = tips[0].vertex[k];
+      one.second[one.count++] = tips[1].vertex[map->to[k]];
+    }
+  }
+  for (int32_t i = t->rotations; i < t->count; i++) {
+    const trial *other = &t->list[i];
+    if (other->count == one.count && memcmp(other->first, one.first, sizeof one.first) == 0 &&
+        memcmp(other->second, one.second, sizeof one.second) == 0) {
+      return;
+    }
+  }
+  t->list[t->count++] = one;
+}
+
+static orb_status list_tip_maps(trials *t) {
+  const orb_mesh *meshes[2] = {&t->shape[0].mesh, &t->shape[1].mesh};
+  orb_tips tips[2];
+  int32_t count, chosen_count, chosen[TIP_MAPS];
+  orb_tip_map turned[ORB_TIP_TURNS], *maps = ORB_NEW(t->ctx, orb_tip_map, ORB_TIP_MAPS_MAX);
+  orb_status status = ORB_E_NO_MEMORY;
+  if (!maps) {
+    return status;
+  }
+  ORB_GO(status, orb_tips_find(t->ctx, meshes[0], &tips[0]), end);
+  ORB_GO(status, orb_tips_find(t->ctx, meshes[1], &tips[1]), end);
+  ORB_GO(status, orb_tip_maps_by_turns(t->ctx, meshes, tips, turned, &count), end);
+  for (int32_t i = 0; i < count; i++) {
+    list_tip_map(t, tips, &turned[i]);
+  }
+  orb_tip_maps(&tips[0], &tips[1], maps, &count);
+  ORB_GO(status, orb_tip_maps_choose(t->ctx, meshes, tips, maps, count, TIP_MAPS, chosen, &chosen_count), end);
+  for (int32_t i = 0; i < chosen_count; i++) {
+    list_tip_map(t, tips, &maps[chosen[i]]);
+  }
+end:
+  orb_free(t->ctx, maps);
+  return status;
+}
+
+static double difference(const trials *t, const trial *x, const trial *y) {
+  orb_extent extent;
+  double sum = 0;
+  orb_mesh_extent(&t->shape[1].mesh, &extent);
+  for (int i = 0; i < SAMPLES; i++) {
+    sum += sqrt(orb_distance2(x->image[i], y->image[i])) / SAMPLES;
+  }
+  return sum / extent.diagonal;
+}
+
+/* Composes a trial in full. Where that does not certify or brings nothing it stays as it is. */
+static orb_status compose_trial(trials *t, trial *one) {
+  trial before = *one;
+  ORB_TRY(run_trial(t, one, ORB_MAP_FROM_MAP));
+  if (!(one->energy < before.energy)) {
+    *one = before;
+    one->is_stuck = 1;
+  }
+  return ORB_OK;
+}
+
+/* The trial that judges best among those that differ from all of which composing made something, to its place; 0: there
+ * is none. */
+static int choose_next(trials *t, int32_t to) {
+  int32_t best = -1;
+  for (int32_t i = to; i < t->count; i++) {
+    int other = t->list[i].judge < INFINITY;
+    for (int32_t k = 0; k < to && other; k++) {
+      other = t->list[k].is_stuck || difference(t, &t->list[i], &t->list[k]) > DIFFERENT;
+    }
+    best = other && (best < 0 || t->list[i].judge < t->list[best].judge) ? i : best;
+  }
+  if (best >= 0) {
+    trial one = t->list[to];
+    t->list[to] = t->list[best];
+    t->list[best] = one;
+  }
+  return best >= 0;
+}
+
+static void add_pair(orb_guess *out, int32_t first, int32_t second) {
+  for (int32_t k = 0; k < out->count; k++) {
+    if (out->first[k] == first || out->second[k] == second) {
+      return;
+    }
+  }
+  out->first[out->count] = first;
+  out->second[out->count++] = second;
+}
+
+/* The winner's tips, or of a rotation its first samples, as vertices of the given meshes. */
+static orb_status write_guess(const trials *t, const trial *winner, const orb_mesh *b, orb_guess *out) {
+  for (int32_t k = 0; k < winner->count; k++) {
+    add_pair(out, t->shape[0].vertex[winner->first[k]], t->shape[1].vertex[winner->second[k]]);
+  }
+  if (winner->count) {
+    return ORB_OK;
+  }
+  orb_nearest *tree;
+  ORB_TRY(orb_nearest_create(t->ctx, b->positions, b->triangles, b->triangle_count, &tree));
+  for (int i = 0; i < ORB_GUESS_MAX; i++) {
+    orb_place place;
+    (void)orb_nearest_query(tree, winner->image[i], INFINITY, &place);
+    add_pair(out, t->shape[0].vertex[t->sample[i]], orb_map_nearest_corner(b->triangles, &place));
+  }
+  orb_nearest_destroy(t->ctx, tree);
+  return ORB_OK;
+}
+
+/* The trial that judges best, and how far behind the next one is that differs. */
+static int32_t winner_of(const trials *t, double *clear) {
+  int32_t best = 0;
+  double next = INFINITY;
+  for (int32_t i = 0; i < t->count; i++) {
+    best = t->list[i].judge < t->list[best].judge ? i : best;
+  }
+  for (int32_t i = 0; i < t->count; i++) {
+    if (t->list[i].judge < next && difference(t, &t->list[best], &t->list[i]) > DIFFERENT) {
+      next = t->list[i].judge;
+    }
+  }
+  *clear = next < INFINITY ? fmax(0, 1 - t->list[best].judge / next) : 1;
+  return best;
+}
+
+static orb_status run_trials(trials *t, const orb_mesh *b, orb_guess *out) {
+  ORB_TRY(list_rotations(t));
+  ORB_TRY(list_tip_maps(t));
+  for (int32_t i = 0; i < t->count; i++) {
+    ORB_TRY(run_trial(t, &t->list[i], ORB_MAP_MAP_ONLY));
+  }
+  double given = t->list[0].judge;
+  int32_t to = 0;
+  for (; to < COMPOSED && choose_next(t, to); to++) {
+    ORB_TRY(compose_trial(t, &t->list[to]));
+  }
+  t->count = to;
+  out->clear = 1;
+  if (to == 0) {
+    return ORB_OK;
+  }
+  const trial *best = &t->list[winner_of(t, &out->clear)];
+  out->energy = best->energy;
+  return !best->is_given && best->judge < BETTER * given ? write_guess(t, best, b, out) : ORB_OK;
+}
+
+orb_status orb_guess_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_guess *out) {
+  orb_status status;
+  trials *t = ORB_NEW0(ctx, trials, 1);
+  memset(out, 0, sizeof *out);
+  if (!t) {
+    return ORB_E_NO_MEMORY;
+  }
+  t->ctx = ctx;
+  ORB_GO(status, coarse_create(ctx, a, &t->shape[0]), end);
+  ORB_GO(status, coarse_create(ctx, b, &t->shape[1]), end);
+  ORB_GO(status, orb_map_spread(ctx, t->shape[0].mesh.positions, t->shape[0].mesh.vertex_count, SAMPLES, t->sample),
+         end);
+  status = run_trials(t, b, out);
+end:
+  coarse_free(ctx, &t->shape[0]);
+  coarse_free(ctx, &t->shape[1]);
+  orb_free(ctx, t);
+  return status;
+}

@@ -1,0 +1,116 @@
+/* Alignment by one method: a working copy of each shape gets the landmarks as vertices, the method runs, the result
+ * is certified, and the composed map is improved. */
+#include <math.h>
+#include <string.h>
+
+#include "align/methods.h"
+#include "align/pin/pin.h"
+#include "align/rbf/rbf.h"
+#include "align/rotate/rotate.h"
+#include "align/sheet/landmarks.h"
+#include "base/check.h"
+
+static orb_status run_method(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const orb_landmark *landmarks,
+                             int32_t landmark_count, const orb_align_options *options) {
+  orb_status status = ORB_OK;
+  int32_t unique_count = 0, *unique = ORB_NEW(ctx, int32_t, landmark_count);
+  if (!unique) {
+    return ORB_E_NO_MEMORY;
+  }
+  if (landmark_count > 0) {
+    ORB_GO(status, orb_landmarks_distinct(ctx, sheets, shape_count, landmark_count, unique, &unique_count), end);
+  }
+  if (options->method == ORB_ALIGN_PIN || (options->method == ORB_ALIGN_AUTO && landmark_count > 0)) {
+    status = orb_align_pin(ctx, sheets, shape_count, unique, unique_count, options);
+  } else if (options->method == ORB_ALIGN_RBF) {
+    status = orb_align_rbf(ctx, sheets, shape_count, landmarks, unique, unique_count, options);
+  } else if (landmark_count > 0) {
+    status = orb_rotate_by_landmarks(ctx, sheets, shape_count, unique, unique_count);
+  } else {
+    status = orb_rotate_by_search(ctx, sheets, shape_count);
+  }
+end:
+  orb_free(ctx, unique);
+  return status;
+}
+
+static orb_status certify_all(orb_context *ctx, orb_sheet *sheets, int32_t shape_count) {
+  for (int32_t s = 0; s < shape_count; s++) {
+    orb_aligned_shape *shape = &sheets[s].shape;
+    ORB_TRY(orb_certify(ctx, shape->points, shape->mesh.vertex_count, shape->mesh.triangles, shape->mesh.triangle_count,
+                        &shape->certificate));
+    if (!shape->certificate.valid) {
+      orb_status status = orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The alignment of shape %d is not certified.", s);
+      orb_context_error_edit(ctx)->shape = s;
+      return status;
+    }
+  }
+  return ORB_OK;
+}
+
+/* Aligned landmarks are not yet a good morph: the maps from the first shape's surface to the others' are improved. */
+orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from, orb_preset preset) {
+  double sum = 0;
+  for (int32_t s = 1; s < alignment->shape_count; s++) {
+    double energy[2];
+    int improved;
+    int both = alignment->shape_count == 2 && alignment->landmark_count > 0;
+    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, from,
+                        preset, energy, &improved));
+    sum += energy[1];
+  }
+  alignment->energy = sum / (alignment->shape_count - 1);
+  return ORB_OK;
+}
+
+orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                           const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                           orb_alignment *out) {
+  orb_status status = ORB_OK;
+  memset(out, 0, sizeof *out);
+  orb_sheet *sheets = ORB_NEW0(ctx, orb_sheet, shape_count);
+  out->shapes = ORB_NEW0(ctx, orb_aligned_shape, shape_count);
+  out->shape_count = shape_count;
+  out->landmark_count = landmark_count;
+  out->energy = NAN;
+  if (!sheets || !out->shapes) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    ORB_GO(status, orb_sheet_create(ctx, shapes[s].mesh, shapes[s].points, &sheets[s]), end);
+    ORB_GO(status, orb_sheet_insert_landmarks(ctx, &sheets[s], landmarks, landmark_count, s), end);
+  }
+  ORB_GO(status, run_method(ctx, sheets, shape_count, landmarks, landmark_count, options), end);
+  ORB_GO(status, certify_all(ctx, sheets, shape_count), end);
+  for (int32_t s = 0; s < shape_count; s++) {
+    orb_sheet_release(ctx, &sheets[s], &out->shapes[s]);
+  }
+  if (options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO)) {
+    ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, options->preset), end);
+  }
+end:
+  for (int32_t s = 0; sheets && s < shape_count; s++) {
+    orb_sheet_free(ctx, &sheets[s]);
+  }
+  orb_free(ctx, sheets);
+  if (status != ORB_OK) {
+    orb_alignment_free(ctx, out);
+  }
+  return status;
+}
+
+void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
+  for (int32_t s = 0; alignment->shapes && s < alignment->shape_count; s++) {
+    orb_aligned_shape *shape = &alignment->shapes[s];
+    orb_mesh_free(ctx, &shape->mesh);
+    orb_free(ctx, shape->parent);
+    orb_free(ctx, shape->points);
+    orb_free(ctx, shape->landmark_vertices);
+  }
+  orb_free(ctx, alignment->shapes);
+  orb_free(ctx, alignment->found);
+  orb_free(ctx, alignment->confidence);
+  orb_free(ctx, alignment->found_points);
+  memset(alignment, 0, sizeof *alignment);
+}

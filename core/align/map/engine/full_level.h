@@ -1,0 +1,11 @@
+/* The level of all vertices. */
+#ifndef ORB_ALIGN_MAP_ENGINE_FULL_LEVEL_H
+#define ORB_ALIGN_MAP_ENGINE_FULL_LEVEL_H
+
+#include "align/map/engine/run.h"
+
+/* compose.c. All vertices at these points, the landmarks pinned; s: their order, of the caller. */
+ORB_MUST_CHECK orb_status orb_map_full_level(orb_map_run *run, const double *points, const orb_corner_table *s,
+                                             orb_map_level *level);
+
+#endif

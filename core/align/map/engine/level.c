@@ -1,0 +1,286 @@
+/* The level's life: gathering it from the surface, its flips, its energy. */
+#include "align/map/engine/level.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "base/loops.h"
+#include "numeric/predicates.h"
+#include "numeric/vec3.h"
+
+enum { MAX_COLOURS = 64, LOCATE_SLICE = 8192, LOCATE_GRAIN = 256 };
+static const double MOLLIFY = 1e-3; /* least slack of a triangle's longest edge, relative to its mean edge */
+static const double CAP = 20;
+
+void orb_map_level_free(orb_context *ctx, orb_map_level *l) {
+  orb_free(ctx, l->vertex);
+  orb_free(ctx, l->start);
+  orb_free(ctx, l->spoke);
+  orb_free(ctx, l->triangle);
+  orb_free(ctx, l->place);
+  orb_free(ctx, l->y);
+  orb_free(ctx, l->pull);
+  orb_free(ctx, l->pinned);
+  orb_free(ctx, l->colour_start);
+  orb_free(ctx, l->by_colour);
+  memset(l, 0, sizeof *l);
+}
+
+static orb_status reserve(orb_context *ctx, orb_map_level *l) {
+  size_t n = (size_t)l->count;
+  l->vertex = ORB_NEW(ctx, int32_t, n);
+  l->start = ORB_NEW(ctx, int32_t, n + 1);
+  l->spoke = ORB_NEW(ctx, orb_map_spoke, 3 * (size_t)l->triangle_count);
+  l->triangle = ORB_NEW(ctx, int32_t, 3 * (size_t)l->triangle_count);
+  l->place = ORB_NEW0(ctx, orb_place, n);
+  l->y = ORB_NEW0(ctx, double, 15 * n);
+  l->pull = ORB_NEW0(ctx, double, n);
+  l->pinned = ORB_NEW0(ctx, unsigned char, n);
+  l->colour_start = ORB_NEW0(ctx, int32_t, MAX_COLOURS + 1);
+  l->by_colour = ORB_NEW(ctx, int32_t, n);
+  if (!l->vertex || !l->start || !l->spoke || !l->triangle || !l->place || !l->y || !l->pull || !l->pinned ||
+      !l->colour_start || !l->by_colour) {
+    return ORB_E_NO_MEMORY;
+  }
+  l->n = l->y + 3 * n;
+  l->x = l->y + 6 * n;
+  l->goal = l->y + 9 * n;
+  l->area = l->y + 12 * n;
+  l->moved = l->y + 13 * n;
+  l->density = l->y + 14 * n;
+  for (size_t i = 0; i < n; i++) {
+    l->moved[i] = INFINITY;
+  }
+  return ORB_OK;
+}
+
+/* Cotangents and area of a triangle from its edge lengths, with a little added to all three where they are collinear.
+ */
+static void shape_of(const double length[3], double slack, double cot[3], double *area) {
+  double l[3], least = INFINITY;
+  for (int k = 0; k < 3; k++) {
+    least = fmin(least, length[(k + 1) % 3] + length[(k + 2) % 3] - length[k]);
+  }
+  for (int k = 0; k < 3; k++) {
+    l[k] = length[k] + (least < slack ? slack - least : 0);
+  }
+  double s = 0.5 * (l[0] + l[1] + l[2]), a2 = s * (s - l[0]) * (s - l[1]) * (s - l[2]);
+  *area = sqrt(a2 > 0 ? a2 : 0) + 1e-300;
+  for (int k = 0; k < 3; k++) {
+    double b = l[(k + 1) % 3], c = l[(k + 2) % 3];
+    cot[k] = (b * b + c * c - l[k] * l[k]) / (4 * *area);
+  }
+}
+
+/* Areas are those of the level's own triangles; the sum stays what it is without the mollification. */
+static void fill_triangles(orb_map_level *l, const double *position, double *shape) {
+  double mean = 0, raw = 0, total = 0;
+  for (int pass = 0; pass < 2; pass++) {
+    for (int32_t t = 0; t < l->triangle_count; t++) {
+      const double *p[3];
+      double length[3], e[3], f[3], n[3], sum = 0;
+      for (int k = 0; k < 3; k++) {
+        p[k] = position + 3 * (size_t)l->vertex[l->triangle[3 * (size_t)t + (size_t)k]];
+      }
+      for (int k = 0; k < 3; k++) {
+        length[k] = sqrt(orb_distance2(p[(k + 1) % 3], p[(k + 2) % 3]));
+        sum += length[k];
+      }
+      if (pass == 0) {
+        orb_sub(p[1], p[0], e);
+        orb_sub(p[2], p[0], f);
+        orb_cross(e, f, n);
+        raw += 0.5 * orb_length(n);
+        mean += sum / (3.0 * l->triangle_count);
+      } else {
+        double *out = shape + 4 * (size_t)t;
+        shape_of(length, MOLLIFY * (sum / 3 + 1e-3 * mean), out, out + 3);
+        total += out[3];
+      }
+    }
+  }
+  for (int32_t t = 0; t < l->triangle_count; t++) {
+    shape[4 * (size_t)t + 3] *= total > 0 ? raw / total : 1;
+  }
+}
+
+static void fill_spokes(orb_map_level *l, const double *shape) {
+  int32_t *at = l->start;
+  memset(at, 0, ((size_t)l->count + 1) * sizeof *at);
+  for (int32_t h = 0; h < 3 * l->triangle_count; h++) {
+    at[l->triangle[h] + 1]++;
+  }
+  for (int32_t v = 0; v < l->count; v++) {
+    at[v + 1] += at[v];
+    l->area[v] = 0;
+  }
+  for (int32_t t = l->triangle_count - 1; t >= 0; t--) {
+    const double *cot = shape + 4 * (size_t)t;
+    const int32_t *v = l->triangle + 3 * (size_t)t;
+    for (int k = 0; k < 3; k++) {
+      int i = (k + 1) % 3, j = (k + 2) % 3;
+      l->spoke[--at[v[k] + 1]] = (orb_map_spoke){v[i], v[j], cot[k], cot[i], cot[j], cot[3]};
+      l->area[v[k]] += cot[3] / 3;
+    }
+  }
+  /* at[v + 1] now is the start of v: shift back. */
+  for (int32_t v = 0; v < l->count; v++) {
+    at[v] = at[v + 1];
+  }
+  at[l->count] = 3 * l->triangle_count;
+}
+
+/* Greedy colours, so that neighbours never move at once. Vertices beyond the last colour stay still. */
+static orb_status fill_colours(orb_context *ctx, orb_map_level *l) {
+  signed char *colour = ORB_NEW(ctx, signed char, l->count);
+  if (!colour) {
+    return ORB_E_NO_MEMORY;
+  }
+  memset(colour, -1, (size_t)l->count);
+  int32_t count[MAX_COLOURS] = {0};
+  for (int32_t v = 0; v < l->count; v++) {
+    uint64_t used = 0;
+    for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+      int c = colour[l->spoke[i].q];
+      used |= c >= 0 ? (uint64_t)1 << c : 0;
+    }
+    if (!l->pinned[v] && ~used) {
+      colour[v] = (signed char)__builtin_ctzll(~used);
+      count[colour[v]]++;
+    }
+  }
+  for (int c = 0; c < MAX_COLOURS; c++) {
+    l->colour_start[c + 1] = l->colour_start[c] + count[c];
+    l->colours = count[c] ? c + 1 : l->colours;
+    count[c] = l->colour_start[c];
+  }
+  for (int32_t v = 0; v < l->count; v++) {
+    if (colour[v] >= 0) {
+      l->by_colour[count[(int)colour[v]]++] = v;
+    }
+  }
+  orb_free(ctx, colour);
+  return ORB_OK;
+}
+
+orb_status orb_map_level_create(orb_context *ctx, const orb_corner_table *s, const unsigned char *alive,
+                                const unsigned char *pinned, const double *position, int32_t live, int32_t *local,
+                                orb_map_level *out) {
+  orb_map_level l = {.count = live, .triangle_count = 2 * live - 4, .local = local};
+  double *shape = NULL;
+  orb_status status;
+  ORB_GO(status, reserve(ctx, &l), done);
+  shape = ORB_NEW(ctx, double, 4 * (size_t)l.triangle_count);
+  if (!shape) {
+    status = ORB_E_NO_MEMORY;
+    goto done;
+  }
+  int32_t count = 0, t = 0;
+  for (int32_t v = 0; v < s->vertex_count; v++) {
+    local[v] = alive[v] ? count : -1;
+    if (alive[v]) {
+      l.pinned[count] = pinned[v];
+      l.vertex[count++] = v;
+    }
+  }
+  ORB_ASSERT(count == live);
+  /* Each live triangle once: at the corner of its lowest vertex. */
+  for (int32_t i = 0; i < live; i++) {
+    int32_t v = l.vertex[i], first = s->vertex_corner[v], c = first;
+    do {
+      int32_t q = s->corner[orb_corner_next(c)], r = s->corner[orb_corner_prev(c)];
+      if (v < q && v < r) {
+        ORB_ASSERT(t < l.triangle_count);
+        l.triangle[3 * (size_t)t] = i;
+        l.triangle[3 * (size_t)t + 1] = local[q];
+        l.triangle[3 * (size_t)t + 2] = local[r];
+        t++;
+      }
+      c = orb_corner_swing(s, c);
+    } while (c != first);
+  }
+  ORB_ASSERT(t == l.triangle_count);
+  fill_triangles(&l, position, shape);
+  fill_spokes(&l, shape);
+  status = fill_colours(ctx, &l);
+done:
+  orb_free(ctx, shape);
+  if (status == ORB_OK) {
+    *out = l;
+  } else {
+    orb_map_level_free(ctx, &l);
+  }
+  return status;
+}
+
+void orb_map_level_refresh(orb_map_level *l, const orb_map_surface *b, int32_t v) {
+  orb_map_surface_at(b, &l->place[v], l->y + 3 * (size_t)v, NULL, l->n + 3 * (size_t)v);
+  l->density[v] = b->density[l->place[v].triangle];
+}
+
+void orb_map_level_locate(orb_map_level *l, const orb_map_surface *b, int32_t v, int32_t hint) {
+  orb_locate(b->locator, l->x + 3 * (size_t)v, hint, &l->place[v]);
+  orb_map_level_refresh(l, b, v);
+}
+
+typedef struct locate_job {
+  orb_map_level *level;
+  const orb_map_surface *b;
+  int fresh;
+} locate_job;
+
+static void locate_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const locate_job *job = arg;
+  orb_map_level *l = job->level;
+  (void)thread;
+  for (int32_t v = (int32_t)begin; v < end; v++) {
+    if (job->fresh) {
+      orb_map_level_locate(l, job->b, v, v > begin ? l->place[v - 1].triangle : -1);
+    } else if (!l->pinned[v]) {
+      orb_map_level_locate(l, job->b, v, l->place[v].triangle);
+    }
+  }
+}
+
+orb_status orb_map_level_locate_all(orb_context *ctx, orb_map_level *l, const orb_map_surface *b, int fresh) {
+  locate_job job = {l, b, fresh};
+  return orb_sliced_by(ctx, l->count, LOCATE_SLICE, LOCATE_GRAIN, locate_range, &job);
+}
+
+int32_t orb_map_level_flips(const orb_map_level *l) {
+  int32_t flips = 0;
+  for (int32_t t = 0; t < l->triangle_count; t++) {
+    const int32_t *v = l->triangle + 3 * (size_t)t;
+    flips += orb_orient(l->x + 3 * (size_t)v[0], l->x + 3 * (size_t)v[1], l->x + 3 * (size_t)v[2]) <= 0;
+  }
+  return flips;
+}
+
+double orb_map_level_energy(const orb_map_level *l) {
+  double energy = 0, weight = 0;
+  for (int32_t v = 0; v < l->count; v++) {
+    for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+      const orb_map_spoke *s = &l->spoke[i];
+      if (v > s->q || v > s->r) {
+        continue; /* each triangle once */
+      }
+      const double *y = l->y + 3 * (size_t)v, *q = l->y + 3 * (size_t)s->q, *r = l->y + 3 * (size_t)s->r;
+      double u[3], w[3], cross[3], normal[3];
+      orb_sub(q, y, u);
+      orb_sub(r, y, w);
+      orb_cross(u, w, cross);
+      for (int k = 0; k < 3; k++) {
+        normal[k] =
+            l->n[3 * (size_t)v + (size_t)k] + l->n[3 * (size_t)s->q + (size_t)k] + l->n[3 * (size_t)s->r + (size_t)k];
+      }
+      double signed_area = 0.5 * orb_dot(cross, normal) / (orb_length(normal) + 1e-300);
+      double dirichlet = 0.5 * (s->cv * orb_distance2(q, r) + s->cq * orb_dot(w, w) + s->cr * orb_dot(u, u));
+      double ratio = signed_area > 0 ? s->area / signed_area : INFINITY;
+      double value = dirichlet * (1 + ratio * ratio) / (4 * s->area);
+      energy += s->area * (value < CAP ? value : CAP);
+      weight += s->area;
+    }
+  }
+  return weight > 0 ? energy / weight : CAP;
+}

@@ -1,0 +1,116 @@
+/* A spatial start that has nearly come to a map: few triangles are still turned over, around vertices that are held.
+ *
+ * The held vertices near them are let go, the flips cleared without them, and the vertices drawn home again while no
+ * flip is allowed. Where that fails, what lies some rings away from the flips is sound: samples of it are what a map
+ * is walked to (compose_walk.c), better ones than the targets by themselves.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "align/map/engine/near.h"
+#include "align/map/engine/rounds.h"
+#include "align/map/engine/untangle.h"
+#include "base/check.h"
+#include "numeric/predicates.h"
+
+enum { FEW = 30, RELEASE_RINGS = 12, SOUND_RINGS = 4, CLEARINGS = 12, HOME_ROUNDS = 12, HOME_SWEEPS = 20 };
+static const double HOME_PULL = 5;
+
+int orb_map_is_near(const orb_map_level *l, int32_t flips) {
+  return flips <= l->triangle_count / FEW;
+}
+
+static const double *point(const orb_map_level *l, int32_t v) {
+  return l->x + 3 * (size_t)v;
+}
+
+/* Holds v at its point again if nothing turns over by that. */
+static int settle(const orb_map_run *c, orb_map_level *l, int32_t v, const double home[3]) {
+  double *x = l->x + 3 * (size_t)v, old[3];
+  memcpy(old, x, sizeof old);
+  memcpy(x, home, sizeof old);
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    if (orb_orient(x, point(l, l->spoke[i].q), point(l, l->spoke[i].r)) <= 0) {
+      memcpy(x, old, sizeof old);
+      return 0;
+    }
+  }
+  l->pinned[v] = 1;
+  l->pull[v] = 0;
+  orb_map_level_locate(l, &c->b, v, l->place[v].triangle);
+  return 1;
+}
+
+/* Draws the released vertices to their points, harder from round to round; how many have not come there. */
+static orb_status draw_home(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, const double *home,
+                            unsigned char *released, int32_t *count) {
+  double pull = HOME_PULL;
+  orb_map_set_pull(c, l, to_mesh, 0);
+  for (int round = 0; round < HOME_ROUNDS && *count; round++, pull *= 2) {
+    for (int32_t v = 0; v < l->count; v++) {
+      if (released[v] && settle(c, l, v, home + 3 * (size_t)v)) {
+        released[v] = 0;
+        --*count;
+      } else if (released[v]) {
+        l->pull[v] = pull * l->area[v];
+      }
+    }
+    if (*count) {
+      ORB_TRY(orb_map_sweeps(c, l, orb_map_hard(), HOME_SWEEPS));
+    }
+  }
+  return ORB_OK;
+}
+
+orb_status orb_map_release(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, int32_t *flips) {
+  orb_context *ctx = c->ctx;
+  size_t n = (size_t)l->count;
+  unsigned char *released = ORB_NEW0(ctx, unsigned char, 3 * n);
+  double *home = ORB_NEW(ctx, double, 3 * n);
+  int32_t count = 0;
+  orb_status status = released && home ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status != ORB_OK) {
+    goto done;
+  }
+  ORB_GO(status, orb_map_level_mark_flips(ctx, l, RELEASE_RINGS, released + n, released + 2 * n), done);
+  memcpy(home, l->x, 3 * n * sizeof *home);
+  orb_map_set_pull(c, l, to_mesh, 1);
+  for (size_t v = 0; v < n; v++) {
+    if (released[n + v] && l->pinned[v]) {
+      released[v] = 1;
+      l->pinned[v] = 0;
+      l->pull[v] = HOME_PULL * l->area[v];
+      count++;
+    }
+  }
+  ORB_GO(status, orb_map_clear_flips(c, l, CLEARINGS, flips), done);
+  if (*flips == 0) {
+    ORB_GO(status, draw_home(c, l, to_mesh, home, released, &count), done);
+    *flips = count;
+  }
+done:
+  orb_free(ctx, released);
+  orb_free(ctx, home);
+  return status;
+}
+
+orb_status orb_map_keep_sound(orb_map_run *c, const orb_map_level *l, const int32_t *to_mesh) {
+  size_t n = (size_t)l->count;
+  unsigned char *mark = ORB_NEW(c->ctx, unsigned char, 2 * n);
+  orb_status status = mark ? orb_map_level_mark_flips(c->ctx, l, SOUND_RINGS, mark, mark + n) : ORB_E_NO_MEMORY;
+  if (status != ORB_OK) {
+    goto done;
+  }
+  memset(c->sound, 0, (size_t)c->vertex_count);
+  for (size_t i = 0; i < n; i++) {
+    int32_t v = to_mesh[l->vertex[i]];
+    if (!mark[i]) {
+      c->sound[v] = 1;
+      c->goal_place[v] = l->place[i];
+    }
+  }
+  c->has_sound = 1;
+done:
+  orb_free(c->ctx, mark);
+  return status;
+}

@@ -1,0 +1,290 @@
+/* Untangling on the sphere: flipped neighbourhoods are optimised until every triangle turns positively.
+ *
+ * Around the flipped triangles, and a growing number of rings about them, vertices take damped Newton steps of
+ * Σ D / χ(d): D the Dirichlet energy of the triangle from an equilateral one, d = det(p, q, r), χ(d) = ½(d + √(d² +
+ * ε²)) its regularised positive part. ε follows the star's worst determinant down, so that the energy stays finite
+ * while there are flips and becomes a barrier as they go (Garanzha et al., Foldover-free maps in 50 lines of code,
+ * 2021).
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "align/map/engine/untangle.h"
+#include "base/check.h"
+#include "embed/star.h"
+#include "numeric/predicates.h"
+#include "numeric/vec3.h"
+
+enum {
+  TURN_GRAIN = 1024,
+  FEW = 12,
+  ROUNDS = 60,
+  STALE = 12,
+  PASSES = 6,
+  RINGS_MOST = 5,
+  TRIES = 6,
+  CHECK_EVERY = 4096
+};
+
+static double chi(double d, double e) {
+  double root = sqrt(d * d + e * e);
+  return d >= 0 ? 0.5 * (d + root) : 0.5 * e * e / (root - d) + 1e-300;
+}
+
+static const double *point(const orb_map_level *l, int32_t v) {
+  return l->x + 3 * (size_t)v;
+}
+
+static double star_energy(const orb_map_level *l, int32_t v, const double p[3], double epsilon) {
+  double energy = 0;
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    const double *q = point(l, l->spoke[i].q), *r = point(l, l->spoke[i].r);
+    double d = orb_distance2(p, q) + orb_distance2(p, r) + orb_distance2(q, r);
+    energy += d / chi(orb_det(p, q, r), epsilon);
+  }
+  return energy;
+}
+
+/* ε for the star of v: small against its determinants, and against the worst of them. */
+static double star_epsilon(const orb_map_level *l, int32_t v) {
+  double sum = 0, worst = 0;
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    double det = orb_det(point(l, v), point(l, l->spoke[i].q), point(l, l->spoke[i].r));
+    sum += fabs(det);
+    worst = fmin(worst, det);
+  }
+  return 0.05 * sum / (l->start[v + 1] - l->start[v]) - 0.2 * worst + 1e-100;
+}
+
+/* One step of v; the point only changes where the energy falls. */
+static void step(orb_map_level *l, int32_t v, double least_epsilon) {
+  double epsilon = fmax(star_epsilon(l, v), least_epsilon);
+  double *p = l->x + 3 * (size_t)v, e1[3], e2[3], g[2] = {0, 0}, h[3] = {0, 0, 0}, energy = 0, longest = 0;
+  orb_tangent_frame(p, e1, e2);
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    const double *q = point(l, l->spoke[i].q), *r = point(l, l->spoke[i].r);
+    double side[3], plane[3], u[3], w[3];
+    orb_sub(r, q, side);
+    orb_cross(q, side, plane);
+    orb_sub(p, q, u);
+    orb_sub(p, r, w);
+    double d = orb_dot(u, u) + orb_dot(w, w) + orb_dot(side, side), det = orb_dot(plane, p);
+    double d1 = 2 * (orb_dot(u, e1) + orb_dot(w, e1)), d2 = 2 * (orb_dot(u, e2) + orb_dot(w, e2));
+    double s1 = orb_dot(plane, e1), s2 = orb_dot(plane, e2);
+    double root = sqrt(det * det + epsilon * epsilon), c = chi(det, epsilon), c1 = c / root;
+    double c2 = 0.5 * epsilon * epsilon / (root * root * root);
+    double f = 1 / c, fp = -c1 / (c * c), fpp = fmax(0, 2 * c1 * c1 / (c * c * c) - c2 / (c * c));
+    energy += d * f;
+    g[0] += f * d1 + d * fp * s1;
+    g[1] += f * d2 + d * fp * s2;
+    h[0] += 4 * f + 2 * fp * d1 * s1 + d * fpp * s1 * s1;
+    h[1] += fp * (d1 * s2 + d2 * s1) + d * fpp * s1 * s2;
+    h[2] += 4 * f + 2 * fp * d2 * s2 + d * fpp * s2 * s2;
+    longest = fmax(longest, orb_dot(u, u));
+  }
+  double mean = 0.5 * (h[0] + h[2]), spread = sqrt(0.25 * (h[0] - h[2]) * (h[0] - h[2]) + h[1] * h[1]);
+  double low = mean - spread, floor = 0.05 * fmax(fabs(mean + spread), fabs(low)), lift = low < floor ? floor - low : 0;
+  double a = h[0] + lift, b = h[1], c = h[2] + lift, det = a * c - b * b;
+  double s = -(c * g[0] - b * g[1]) / det, t = -(a * g[1] - b * g[0]) / det, length = sqrt(s * s + t * t);
+  if (!(det > 0) || !(length > 0)) {
+    return;
+  }
+  double most = fmin(0.5, sqrt(longest)), scale = length > most ? most / length : 1;
+  for (int tries = 0; tries < TRIES; tries++, scale *= 0.4) {
+    double moved[3];
+    for (int k = 0; k < 3; k++) {
+      moved[k] = p[k] + scale * (s * e1[k] + t * e2[k]);
+    }
+    orb_normalize(moved);
+    if (star_energy(l, v, moved, epsilon) < energy) {
+      memcpy(p, moved, sizeof moved);
+      return;
+    }
+  }
+}
+
+typedef struct turn_job {
+  const orb_map_level *l;
+  unsigned char *turned; /* of each triangle: does not turn positively */
+} turn_job;
+
+static void turn_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const turn_job *job = arg;
+  const orb_map_level *l = job->l;
+  (void)thread;
+  for (int64_t t = begin; t < end; t++) {
+    const int32_t *v = l->triangle + 3 * t;
+    job->turned[t] = orb_orient(point(l, v[0]), point(l, v[1]), point(l, v[2])) <= 0;
+  }
+}
+
+/* Marks the vertices of triangles that do not turn positively; how many such triangles, and the worst determinant. */
+static int32_t mark_flips(orb_context *ctx, turn_job *job, unsigned char *mark, double *worst) {
+  const orb_map_level *l = job->l;
+  int32_t flips = 0;
+  orb_parallel_for(ctx, l->triangle_count, TURN_GRAIN, turn_range, job);
+  memset(mark, 0, (size_t)l->count);
+  *worst = 0;
+  for (int32_t t = 0; t < l->triangle_count; t++) {
+    const int32_t *v = l->triangle + 3 * (size_t)t;
+    if (job->turned[t]) {
+      mark[v[0]] = mark[v[1]] = mark[v[2]] = 1;
+      *worst = fmin(*worst, orb_det(point(l, v[0]), point(l, v[1]), point(l, v[2])));
+      flips++;
+    }
+  }
+  return flips;
+}
+
+static void grow_marks(const orb_map_level *l, int rings, unsigned char *mark, unsigned char *next) {
+  for (int ring = 0; ring < rings; ring++) {
+    memcpy(next, mark, (size_t)l->count);
+    for (int32_t t = 0; t < l->triangle_count; t++) {
+      const int32_t *v = l->triangle + 3 * (size_t)t;
+      if (mark[v[0]] || mark[v[1]] || mark[v[2]]) {
+        next[v[0]] = next[v[1]] = next[v[2]] = 1;
+      }
+    }
+    memcpy(mark, next, (size_t)l->count);
+  }
+}
+
+orb_status orb_map_level_mark_flips(orb_context *ctx, const orb_map_level *l, int rings, unsigned char *mark,
+                                    unsigned char *next) {
+  double worst;
+  turn_job turn = {l, ORB_NEW(ctx, unsigned char, l->triangle_count)};
+  if (!turn.turned) {
+    return ORB_E_NO_MEMORY;
+  }
+  (void)mark_flips(ctx, &turn, mark, &worst);
+  grow_marks(l, rings, mark, next);
+  orb_free(ctx, turn.turned);
+  return ORB_OK;
+}
+
+/* Parts of what is marked that no edge joins: steps in one know nothing of another, so each goes on a thread of its
+ * own, its vertices in their order, and what comes of it is the same. */
+typedef struct island {
+  int32_t first, size;
+} island;
+
+typedef struct islands {
+  orb_context *ctx;
+  orb_map_level *level;
+  double least_epsilon;
+  int32_t count;
+  island *list;
+  int32_t *part;   /* union-find; of a vertex that stays: −1 */
+  int32_t *order;  /* vertices by island */
+  int32_t *number; /* of an island, by its lowest vertex */
+} islands;
+
+static int32_t find_part(int32_t *part, int32_t v) {
+  while (part[v] != v) {
+    v = part[v] = part[part[v]];
+  }
+  return v;
+}
+
+static int by_size(const void *a, const void *b) {
+  const island *x = a, *y = b;
+  return x->size != y->size ? (x->size < y->size) - (x->size > y->size) : (x->first > y->first) - (x->first < y->first);
+}
+
+/* Joins the marked vertices that an edge joins; the lowest of each island stands for it. */
+static void join_islands(islands *is, const unsigned char *mark) {
+  const orb_map_level *l = is->level;
+  for (int32_t v = 0; v < l->count; v++) {
+    is->part[v] = mark[v] && !l->pinned[v] ? v : -1;
+  }
+  for (int32_t v = 0; v < l->count; v++) {
+    for (int32_t i = l->start[v]; is->part[v] >= 0 && i < l->start[v + 1]; i++) {
+      int32_t q = l->spoke[i].q;
+      if (is->part[q] >= 0) {
+        int32_t a = find_part(is->part, v), b = find_part(is->part, q);
+        is->part[a > b ? a : b] = a > b ? b : a;
+      }
+    }
+  }
+}
+
+/* Lists the islands, the largest first. Returns how many vertices are to move. */
+static int32_t list_islands(islands *is) {
+  int32_t n = is->level->count, total = 0;
+  is->count = 0;
+  for (int32_t v = 0; v < n; v++) {
+    if (is->part[v] >= 0) {
+      is->part[v] = find_part(is->part, v);
+      if (is->part[v] == v) {
+        is->number[v] = is->count;
+        is->list[is->count++] = (island){0, 0};
+      }
+      is->list[is->number[is->part[v]]].size++;
+    }
+  }
+  for (int32_t i = 0; i < is->count; i++) {
+    is->list[i].first = total;
+    total += is->list[i].size;
+    is->list[i].size = 0;
+  }
+  for (int32_t v = 0; v < n; v++) {
+    if (is->part[v] >= 0) {
+      island *at = &is->list[is->number[is->part[v]]];
+      is->order[at->first + at->size++] = v;
+    }
+  }
+  qsort(is->list, (size_t)is->count, sizeof *is->list, by_size);
+  return total;
+}
+
+static void untangle_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const islands *is = arg;
+  (void)thread;
+  for (int64_t k = begin; k < end; k++) {
+    const int32_t *vertex = is->order + is->list[k].first;
+    for (int pass = 0; pass < PASSES; pass++) {
+      for (int32_t i = 0; i < is->list[k].size; i++) {
+        if (i % CHECK_EVERY == 0 && orb_context_check(is->ctx) != ORB_OK) {
+          return; /* as orb_map_level_untangle() will say */
+        }
+        step(is->level, vertex[i], is->least_epsilon);
+      }
+    }
+  }
+}
+
+orb_status orb_map_level_untangle(orb_context *ctx, orb_map_level *l, int32_t *left, int64_t *work) {
+  size_t n = (size_t)l->count;
+  unsigned char *mark = ORB_NEW(ctx, unsigned char, 2 * n), *next = mark ? mark + n : NULL;
+  turn_job turn = {l, ORB_NEW(ctx, unsigned char, l->triangle_count)};
+  islands is = {.ctx = ctx, .level = l, .part = ORB_NEW(ctx, int32_t, 3 * n), .list = ORB_NEW(ctx, island, n)};
+  orb_status status = mark && turn.turned && is.part && is.list ? ORB_OK : ORB_E_NO_MEMORY;
+  int32_t fewest = INT32_MAX;
+  int stale = 0; /* rounds since there were fewest flips */
+  is.order = is.part ? is.part + n : NULL;
+  is.number = is.part ? is.part + 2 * n : NULL;
+  for (int round = 0; status == ORB_OK; round++) {
+    double worst;
+    *left = mark_flips(ctx, &turn, mark, &worst);
+    stale = *left < fewest ? 0 : stale + 1;
+    fewest = *left < fewest ? *left : fewest;
+    if (*left == 0 || round == ROUNDS || stale > STALE) {
+      break;
+    }
+    int rings = 1 + round / 4;
+    grow_marks(l, rings < RINGS_MOST ? rings : RINGS_MOST, mark, next);
+    /* Many flips need one ε for all; the last few hide in stars far smaller than that. */
+    double scale = 1.0 / l->triangle_count;
+    is.least_epsilon = *left > FEW && round % 3 ? sqrt(1e-8 * scale * scale + 0.04 * worst * worst) : 0;
+    join_islands(&is, mark);
+    *work -= PASSES * (int64_t)list_islands(&is);
+    orb_parallel_for(ctx, is.count, 1, untangle_range, &is);
+    status = orb_context_check(ctx);
+  }
+  orb_free(ctx, mark);
+  orb_free(ctx, turn.turned);
+  orb_free(ctx, is.part);
+  orb_free(ctx, is.list);
+  return status;
+}

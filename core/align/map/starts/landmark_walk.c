@@ -1,0 +1,203 @@
+/* Guessed pairs, and a first map in which pairs meet.
+ *
+ * The alignment as given meets at the landmarks and is each shape's own between them, so limbs may lie elsewhere or be
+ * turned; and vertices put straight at their spatial targets fold where limbs are thin. The way between: both shapes
+ * are embedded anew with the landmarks, their mirror images and some samples of the spatial targets pinned together
+ * (orb_pin_walk). That is certified, near the targets, and cheap. Samples are only steps on the way: they are free to
+ * move afterwards.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "align/map/engine/spread.h"
+#include "align/map/starts/landmark_walk.h"
+#include "align/map/starts/mirror.h"
+#include "align/pin/walk.h"
+#include "base/check.h"
+#include "numeric/vec3.h"
+
+enum { LEVEL = 300, LEVEL_A_PAIR = 6 };
+static const double OFF_SURFACE = 2; /* mean distances of the samples from the surface: farther is no target */
+static const double FACING = 0.7;    /* least cosine between a sample's normal and the surface's */
+static const double APART = 0.15, SOUND_APART = 0.04; /* least distance of a sample from any pair */
+
+static int is_paired(const orb_map_pairs *p, int32_t moving, int32_t fixed) {
+  for (int32_t i = 0; i < p->count; i++) {
+    if (p->moving[i] == moving || p->fixed[i] == fixed) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
+static void add_pair(orb_map_pairs *p, int32_t moving, int32_t fixed) {
+  if (moving >= 0 && fixed >= 0 && !is_paired(p, moving, fixed)) {
+    ORB_ASSERT(p->count < p->capacity);
+    p->moving[p->count] = moving;
+    p->fixed[p->count++] = fixed;
+  }
+}
+
+orb_status orb_map_pairs_create(orb_map_run *c) {
+  orb_context *ctx = c->ctx;
+  orb_status status = ORB_OK;
+  orb_map_pairs *p = &c->pairs;
+  size_t n = (size_t)c->landmark_count;
+  int32_t found = 0, *guesses[2] = {ORB_NEW(ctx, int32_t, n + 1), ORB_NEW(ctx, int32_t, n + 1)};
+  p->capacity = 2 * c->landmark_count + ORB_MAP_SOUND_STEPS;
+  p->moving = ORB_NEW(ctx, int32_t, p->capacity);
+  p->fixed = ORB_NEW(ctx, int32_t, p->capacity);
+  if (!guesses[0] || !guesses[1] || !p->moving || !p->fixed) {
+    status = ORB_E_NO_MEMORY;
+    goto done;
+  }
+  for (size_t i = 0; i < n; i++) {
+    add_pair(p, c->moving->landmark_vertices[i], c->fixed->landmark_vertices[i]);
+  }
+  p->landmarks = p->count;
+  if (p->count > 0) {
+    const orb_mesh *meshes[2] = {&c->fixed->mesh, &c->moving->mesh};
+    const int32_t *landmarks[2] = {p->fixed, p->moving};
+    ORB_GO(status, orb_map_mirror_landmarks(ctx, meshes, landmarks, p->count, guesses, &found), done);
+  }
+  for (int32_t i = 0; i < found; i++) {
+    add_pair(p, guesses[1][i], guesses[0][i]);
+  }
+done:
+  orb_free(ctx, guesses[0]);
+  orb_free(ctx, guesses[1]);
+  return status;
+}
+
+static int is_apart(const orb_map_run *c, int32_t moving, int32_t fixed) {
+  double apart = c->has_sound ? SOUND_APART : APART;
+  for (int32_t i = 0; i < c->pairs.count; i++) {
+    double d = orb_distance2(c->x + 3 * (size_t)moving, c->x + 3 * (size_t)c->pairs.moving[i]);
+    double e = orb_distance2(c->b.x + 3 * (size_t)fixed, c->b.x + 3 * (size_t)c->pairs.fixed[i]);
+    if (fmin(d, e) < apart * apart) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* Adds samples of the spatial targets, where these lie well on the fixed shape, behind the pairs; *count: with them. */
+static orb_status sample_targets(orb_map_run *c, int32_t samples, int32_t *count) {
+  const orb_map_surface *b = &c->b;
+  int32_t held = c->pairs.count, *spread = ORB_NEW(c->ctx, int32_t, samples);
+  double *off = ORB_NEW(c->ctx, double, samples), mean = 0;
+  orb_status status = spread && off ? orb_map_spread(c->ctx, c->x, c->vertex_count, samples, spread) : ORB_E_NO_MEMORY;
+  for (int32_t i = 0; i < samples && status == ORB_OK; i++) {
+    double y[3];
+    orb_map_surface_at(b, &c->goal_place[spread[i]], y, NULL, NULL);
+    off[i] = sqrt(orb_distance2(y, c->goal + 3 * (size_t)spread[i]));
+    mean += off[i] / samples;
+  }
+  for (int32_t i = 0; i < samples && status == ORB_OK; i++) {
+    const orb_place *place = &c->goal_place[spread[i]];
+    double n[3];
+    int32_t u = orb_map_nearest_corner(b->triangles, place);
+    orb_map_surface_at(b, place, NULL, NULL, n);
+    int fits = c->has_sound
+                   ? c->sound[spread[i]]
+                   : off[i] <= OFF_SURFACE * mean && orb_dot(n, c->goal_normal + 3 * (size_t)spread[i]) >= FACING;
+    if (fits && is_apart(c, spread[i], u)) {
+      add_pair(&c->pairs, spread[i], u);
+    }
+  }
+  *count = c->pairs.count;
+  c->pairs.count = held;
+  orb_free(c->ctx, spread);
+  orb_free(c->ctx, off);
+  return status;
+}
+
+/* A shape as orb_pin_walk() takes it: only the points are its own. */
+static orb_status borrow(orb_context *ctx, const orb_aligned_shape *shape, int32_t *landmarks, int32_t count,
+                         orb_sheet *out) {
+  size_t n = 3 * (size_t)shape->mesh.vertex_count;
+  *out = (orb_sheet){.shape = {.mesh = shape->mesh, .landmark_vertices = landmarks},
+                     .landmark_count = count,
+                     .vertex_capacity = shape->mesh.vertex_count,
+                     .triangle_capacity = shape->mesh.triangle_count,
+                     .given_vertices = shape->mesh.vertex_count};
+  out->shape.points = ORB_NEW(ctx, double, n);
+  if (!out->shape.points) {
+    return ORB_E_NO_MEMORY;
+  }
+  memcpy(out->shape.points, shape->points, n * sizeof *out->shape.points);
+  return ORB_OK;
+}
+
+/* The walked spheres become those of the run; what it had come to before is kept beside. */
+static orb_status take_both(orb_map_run *c, orb_sheet *fixed, orb_sheet *moving) {
+  orb_map_surface b;
+  orb_aligned_shape shape = {.mesh = c->fixed->mesh, .points = fixed->shape.points};
+  ORB_TRY(orb_map_surface_create(c->ctx, &shape, &b));
+  orb_map_surface_free(c->ctx, &c->b);
+  orb_map_packed_free(c->ctx, &c->packed);
+  c->b = b;
+  c->kept = (orb_map_candidate){c->best, c->fixed_points, c->best_energy};
+  c->fixed_points = fixed->shape.points;
+  fixed->shape.points = NULL;
+  memcpy(c->start, moving->shape.points, 3 * (size_t)c->vertex_count * sizeof *c->start);
+  c->best = moving->shape.points;
+  c->best_energy = INFINITY;
+  moving->shape.points = NULL;
+  return orb_map_packed_create(c->ctx, &c->fixed->mesh, &c->b, &c->packed);
+}
+
+/* The walked map as one to the fixed shape's own sphere. */
+static orb_status carry_over(orb_map_run *c, const orb_sheet *fixed, const orb_sheet *moving) {
+  orb_locator *locator;
+  const orb_map_surface *b = &c->b;
+  ORB_TRY(orb_locator_create(c->ctx, fixed->shape.points, b->vertex_count, b->triangles, b->triangle_count, b->twin,
+                             &locator));
+  for (int32_t v = 0; v < c->vertex_count; v++) {
+    orb_place place;
+    orb_locate(locator, moving->shape.points + 3 * (size_t)v, -1, &place);
+    orb_map_surface_at(b, &place, NULL, c->start + 3 * (size_t)v, NULL);
+  }
+  for (int32_t i = 0; i < c->pairs.count; i++) {
+    memcpy(c->start + 3 * (size_t)c->pairs.moving[i], b->s + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
+  }
+  orb_locator_destroy(c->ctx, locator);
+  return ORB_OK;
+}
+
+static orb_status walk_pairs(orb_map_run *c, int32_t count, int *stuck) {
+  orb_context *ctx = c->ctx;
+  orb_sheet sheets[2] = {0};
+  orb_status status = ORB_OK;
+  int32_t coarse = LEVEL_A_PAIR * count > LEVEL ? LEVEL_A_PAIR * count : LEVEL;
+  int32_t *numbers = ORB_NEW(ctx, int32_t, count);
+  if (!numbers) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < count; i++) {
+    numbers[i] = i;
+  }
+  ORB_GO(status, borrow(ctx, c->fixed, c->pairs.fixed, count, &sheets[0]), done);
+  ORB_GO(status, borrow(ctx, c->moving, c->pairs.moving, count, &sheets[1]), done);
+  ORB_GO(status, orb_pin_walk(ctx, sheets, 2, numbers, count, ORB_PRESET_FAST, coarse, stuck), done);
+  if (!*stuck) {
+    status = c->both ? take_both(c, &sheets[0], &sheets[1]) : carry_over(c, &sheets[0], &sheets[1]);
+  }
+done:
+  orb_free(ctx, sheets[0].shape.points);
+  orb_free(ctx, sheets[1].shape.points);
+  orb_free(ctx, numbers);
+  return status;
+}
+
+orb_status orb_map_landmark_walk(orb_map_run *c, int32_t samples, int *stuck) {
+  int32_t count = c->pairs.count;
+  *stuck = 1;
+  if (samples > 0 && c->vertex_count > 8 * samples) {
+    ORB_TRY(sample_targets(c, samples, &count));
+  }
+  if (samples > 0 && count == c->pairs.count) {
+    return ORB_OK; /* nothing to sample: as without samples */
+  }
+  return walk_pairs(c, count, stuck);
+}

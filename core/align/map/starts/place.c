@@ -1,0 +1,158 @@
+/* Guesses of a composed map: where each vertex of the moving shape would lie on the fixed one. */
+#include <math.h>
+#include <string.h>
+
+#include "align/map/engine/spread.h"
+#include "align/map/starts/place.h"
+#include "align/map/starts/registration.h"
+#include "base/check.h"
+#include "base/loops.h"
+#include "numeric/vec3.h"
+
+typedef struct goal_job {
+  orb_map_run *c;
+  orb_nearest *tree;
+} goal_job;
+
+enum { SLICE = 1024 }; /* vertices between looks whether to stop: a search may go through the whole surface */
+
+/* The fixed shape's vertex nearest to a target in position and normal. */
+static orb_place nearest_with_normal(const orb_map_run *c, int32_t v) {
+  const orb_map_surface *b = &c->b;
+  int32_t best = 0, stride = 3 * (1 + b->triangle_count / 40000);
+  double least = INFINITY;
+  for (int32_t h = 0; h < 3 * b->triangle_count; h += stride) {
+    int32_t u = b->triangles[h];
+    double d = orb_distance2(b->x + 3 * (size_t)u, c->goal + 3 * (size_t)v) +
+               0.25 * orb_distance2(b->normal + 3 * (size_t)u, c->goal_normal + 3 * (size_t)v);
+    if (d < least) {
+      least = d;
+      best = h;
+    }
+  }
+  orb_place place = {.triangle = best / 3};
+  place.at[best % 3] = 1;
+  return place;
+}
+
+/* The nearest point, if the surface faces the right way there; else the best compromise. */
+static void find_goal_places(void *arg, int64_t begin, int64_t end, int thread) {
+  goal_job *job = arg;
+  orb_map_run *c = job->c;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    double n[3];
+    (void)orb_nearest_query(job->tree, c->goal + 3 * v, INFINITY, &c->goal_place[v]);
+    orb_map_surface_at(&c->b, &c->goal_place[v], NULL, NULL, n);
+    if (orb_dot(n, c->goal_normal + 3 * v) < 0.5) {
+      c->goal_place[v] = nearest_with_normal(c, (int32_t)v);
+    }
+  }
+}
+
+/* The pairs as anchors, and, where a map is known already (c->best), samples of it. Arrays of the caller: room for all
+ * pairs and ORB_MAP_SAMPLES. */
+static orb_status gather_anchors(orb_map_run *c, int samples, int32_t *vertex, double *goal, orb_map_anchors *out) {
+  *out = (orb_map_anchors){.vertex = vertex, .goal = goal};
+  for (int32_t i = 0; i < c->pairs.count; i++) {
+    memcpy(goal + 3 * (size_t)i, c->b.x + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
+    vertex[i] = c->pairs.moving[i];
+  }
+  out->count = out->exact = c->pairs.count;
+  samples = samples < c->vertex_count / 2 ? samples : c->vertex_count / 2;
+  if (samples > 0) {
+    ORB_TRY(orb_map_spread(c->ctx, c->x, c->vertex_count, samples, vertex + out->count));
+  }
+  for (int i = 0; i < samples; i++) {
+    int32_t v = vertex[out->exact + i], paired = 0;
+    for (int32_t k = 0; k < c->pairs.count; k++) {
+      paired |= c->pairs.moving[k] == v;
+    }
+    if (!paired) {
+      orb_place place;
+      orb_locate(c->b.locator, c->best + 3 * (size_t)v, -1, &place);
+      orb_map_surface_at(&c->b, &place, goal + 3 * (size_t)out->count, NULL, NULL);
+      vertex[out->count++] = v;
+    }
+  }
+  return ORB_OK;
+}
+
+orb_status orb_map_register(orb_map_run *c, int samples) {
+  orb_context *ctx = c->ctx;
+  const orb_mesh *mesh = &c->moving->mesh;
+  orb_map_anchors anchors;
+  double fit, *goal = ORB_NEW(ctx, double, 3 * ((size_t)c->pairs.count + ORB_MAP_SAMPLES));
+  int32_t *vertex = ORB_NEW(ctx, int32_t, (size_t)c->pairs.count + ORB_MAP_SAMPLES);
+  goal_job job = {.c = c};
+  orb_status status = ORB_E_NO_MEMORY;
+  c->has_sound = 0;
+  if (!goal || !vertex) {
+    goto done;
+  }
+  ORB_GO(status, gather_anchors(c, samples, vertex, goal, &anchors), done);
+  ORB_GO(status, orb_map_register_in_space(ctx, &c->b, c->x, c->normal, c->vertex_count, &anchors, c->goal, &fit),
+         done);
+  orb_map_normals(c->goal, c->vertex_count, mesh->triangles, mesh->triangle_count, c->goal_normal);
+  ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &job.tree), done);
+  status = orb_sliced_by(ctx, c->vertex_count, SLICE, 64, find_goal_places, &job);
+  orb_nearest_destroy(ctx, job.tree);
+done:
+  orb_free(ctx, goal);
+  orb_free(ctx, vertex);
+  return status;
+}
+
+typedef struct guess_job {
+  orb_map_run *c;
+  orb_map_level *l;
+  const int32_t *to_mesh;
+  const double *points; /* NULL: spatial */
+} guess_job;
+
+static void guess_range(void *arg, int64_t begin, int64_t end, int thread) {
+  guess_job *job = arg;
+  (void)thread;
+  for (int64_t i = begin; i < end; i++) {
+    int32_t v = job->to_mesh[job->l->vertex[i]];
+    if (!job->points && !job->l->pinned[i]) {
+      job->l->place[i] = job->c->goal_place[v];
+      orb_map_surface_at(&job->c->b, &job->l->place[i], NULL, job->l->x + 3 * i, NULL);
+      orb_map_level_refresh(job->l, &job->c->b, (int32_t)i);
+    } else {
+      const double *points = job->points ? job->points : job->c->start;
+      memcpy(job->l->x + 3 * i, points + 3 * (size_t)v, sizeof(double[3]));
+      orb_map_level_locate(job->l, &job->c->b, (int32_t)i, -1);
+    }
+  }
+}
+
+/* Vertices that share a point cannot be told apart by an untangling: spread them a little inside their places. */
+static void spread_out(orb_map_run *c, orb_map_level *l) {
+  uint64_t state = 0x9e3779b97f4a7c15u;
+  for (int32_t v = 0; v < l->count; v++) {
+    if (l->pinned[v]) {
+      continue;
+    }
+    double w[3], sum = 0;
+    for (int k = 0; k < 3; k++) {
+      state = state * 6364136223846793005u + 1442695040888963407u;
+      w[k] = l->place[v].at[k] + 0.3 * (double)(state >> 40) * 0x1p-24;
+      sum += w[k];
+    }
+    for (int k = 0; k < 3; k++) {
+      l->place[v].at[k] = w[k] / sum;
+    }
+    orb_map_surface_at(&c->b, &l->place[v], NULL, l->x + 3 * (size_t)v, NULL);
+    orb_map_level_refresh(l, &c->b, v);
+  }
+}
+
+void orb_map_place(orb_map_run *c, orb_map_level *level, const int32_t *to_mesh, orb_map_start start) {
+  const double *points = start == ORB_MAP_SPATIAL ? NULL : start == ORB_MAP_DRAWN ? c->best : c->start;
+  guess_job job = {c, level, to_mesh, points};
+  orb_parallel_for(c->ctx, level->count, 16, guess_range, &job);
+  if (start == ORB_MAP_SPATIAL) {
+    spread_out(c, level);
+  }
+}

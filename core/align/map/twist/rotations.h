@@ -1,0 +1,20 @@
+/* How a map rotates the surroundings of each vertex in space. */
+#ifndef ORB_ALIGN_MAP_TWIST_ROTATIONS_H
+#define ORB_ALIGN_MAP_TWIST_ROTATIONS_H
+
+#include "align/map/engine/surface.h"
+
+/* A map onto a surface: a shape, scaled like the surface, and its points on the surface's sphere. */
+typedef struct orb_map_image {
+  int32_t vertex_count, triangle_count;
+  const int32_t *triangles;
+  const double *x, *points; /* 3 a vertex; without flips */
+} orb_map_image;
+
+/* Of every vertex of the surface: where it comes from (back, 3 a vertex) and the angle by which the map turns its
+ * surroundings in space, against the rotation of the whole (turn). *kept: as in orb_map_twists (compose_turns.c). O(n).
+ */
+ORB_MUST_CHECK orb_status orb_map_rotations_measure(orb_context *ctx, const orb_map_surface *b,
+                                                    const orb_map_image *map, double *back, double *turn, double *kept);
+
+#endif

@@ -1,0 +1,66 @@
+/* Sweeps over full surfaces with landmarks held, and thinning between them. */
+#include <string.h>
+
+#include "align/pin/relax.h"
+#include "align/sheet/thin.h"
+#include "base/check.h"
+#include "embed/hierarchy.h"
+
+enum { ROUNDS = 24, ROUND_SWEEPS = 5, SWEEPS = 60 };
+static const double LITTLE = 0.02; /* of the new vertices: not worth another round */
+
+orb_status orb_pin_relax(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count, orb_preset preset,
+                         int32_t sweeps) {
+  const orb_mesh *mesh = &sheet->shape.mesh;
+  orb_hierarchy *hierarchy = NULL;
+  orb_refiner *refiner = NULL;
+  orb_status status = ORB_OK;
+  double *points = ORB_NEW(ctx, double, 3 * (size_t)sheet->vertex_capacity);
+  orb_embed_options options;
+  orb_embed_defaults(&options);
+  options.preset = preset;
+  if (!points) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_GO(status, orb_refiner_resume(ctx, mesh, sheet->shape.points, &options, &hierarchy, &refiner), end);
+  for (int32_t k = 0; k < count; k++) {
+    orb_refiner_pin(refiner, sheet->shape.landmark_vertices[landmarks[k]], 1);
+  }
+  for (int32_t done = 0; done < sweeps; done += 5) {
+    double gain;
+    ORB_GO(status, orb_refiner_sweep(ctx, refiner, 5, &gain), end);
+    ORB_GO(status, orb_context_check(ctx), end);
+    if (gain < 1e-3) {
+      break;
+    }
+  }
+  orb_refiner_points(refiner, points);
+  orb_certificate certificate;
+  ORB_GO(status, orb_certify(ctx, points, mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate),
+         end);
+  if (certificate.valid) {
+    double *old = sheet->shape.points;
+    sheet->shape.points = points;
+    points = old;
+  }
+end:
+  orb_free(ctx, points);
+  orb_refiner_destroy(ctx, refiner);
+  orb_hierarchy_destroy(ctx, hierarchy);
+  return status;
+}
+
+orb_status orb_pin_slim(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count, orb_preset preset,
+                        int64_t *work) {
+  for (int round = 0; round < ROUNDS && (*work) > 0; round++) {
+    int32_t removed, more;
+    ORB_TRY(orb_sheet_thin(ctx, sheet, &removed));
+    more = sheet->shape.mesh.vertex_count - sheet->given_vertices;
+    if (removed == 0 || removed < LITTLE * more) {
+      break;
+    }
+    ORB_TRY(orb_pin_relax(ctx, sheet, landmarks, count, ORB_PRESET_FAST, ROUND_SWEEPS));
+    *work -= ROUND_SWEEPS * (int64_t)sheet->shape.mesh.vertex_count;
+  }
+  return orb_pin_relax(ctx, sheet, landmarks, count, preset, SWEEPS);
+}

@@ -1,0 +1,16 @@
+/* What a pinning may use up. */
+#ifndef ORB_ALIGN_PIN_ROOM_H
+#define ORB_ALIGN_PIN_ROOM_H
+
+#include "align/sheet/sheet.h"
+
+/* What a pinning may use up. */
+typedef struct orb_pin_room {
+  double growth; /* of a sheet, see orb_pin_limit() */
+  int64_t work;  /* visits of nodes and vertices that are left; where it is used up the landmarks count as not met */
+} orb_pin_room;
+
+/* Most triangles of a sheet that may grow by this share of its own number; small ones by more. */
+int32_t orb_pin_limit(const orb_sheet *sheet, double growth);
+
+#endif

@@ -1,0 +1,365 @@
+/* Landmarks walked to their targets on a coarse level.
+ *
+ * All shapes are decimated with their landmarks kept and embedded up to a level of a few hundred vertices. There the
+ * landmarks are gathered by rotations, and their spherical means become targets. Each step takes a landmark as far
+ * along the great circle as keeps every triangle about it from shrinking below a share of what it is; sweeps of the
+ * other vertices make room between the steps. Where no landmark gets ahead, the level is refined and the walk goes on:
+ * more vertices, more freedom. Once all have arrived they are pinned, and the refinement carries the rest.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "align/pin/walk.h"
+#include "align/rotate/procrustes.h"
+#include "align/rotate/rotate.h"
+#include "base/check.h"
+#include "embed/hierarchy.h"
+#include "numeric/vec3.h"
+
+enum { STEPS_MAX = 160, TRIES = 24, SWEEPS = 3, LEVELS = 3, FINEST_WALK = 4000, SETTLE = 60 };
+static const double LEAST_SHARE = 0.6, SHORTER = 0.6, NO_PROGRESS = 1e-4;
+
+typedef struct walker {
+  orb_context *ctx;
+  orb_sheet *sheet;
+  orb_hierarchy *hierarchy;
+  orb_refiner *refiner;
+  const int32_t *landmarks; /* which of the request */
+  int32_t count;
+  int32_t *vertices, *triangles; /* of the present level */
+  int32_t vertex_count, triangle_count;
+  int32_t *link_start, *link; /* for each landmark the far edges of its triangles, two vertices each */
+} walker;
+
+static int32_t landmark_vertex(const walker *w, int32_t k) {
+  return w->sheet->shape.landmark_vertices[w->landmarks[k]];
+}
+
+static void walker_free(walker *w) {
+  if (!w->ctx) {
+    return;
+  }
+  orb_refiner_destroy(w->ctx, w->refiner);
+  orb_hierarchy_destroy(w->ctx, w->hierarchy);
+  orb_free(w->ctx, w->vertices);
+  orb_free(w->ctx, w->triangles);
+  orb_free(w->ctx, w->link_start);
+  orb_free(w->ctx, w->link);
+  memset(w, 0, sizeof *w);
+}
+
+/* Reads the level and gathers the links of the landmarks. */
+static orb_status read_level(walker *w) {
+  orb_context *ctx = w->ctx;
+  orb_free(ctx, w->vertices);
+  orb_free(ctx, w->triangles);
+  orb_free(ctx, w->link_start);
+  orb_free(ctx, w->link);
+  w->vertices = w->triangles = w->link_start = w->link = NULL;
+  ORB_TRY(orb_refiner_level(ctx, w->refiner, &w->vertices, &w->vertex_count, &w->triangles, &w->triangle_count));
+  int32_t n = w->sheet->shape.mesh.vertex_count;
+  int32_t *number = ORB_NEW(ctx, int32_t, n);
+  w->link_start = ORB_NEW0(ctx, int32_t, w->count + 2);
+  w->link = ORB_NEW(ctx, int32_t, 6 * (size_t)w->triangle_count);
+  if (!number || !w->link_start || !w->link) {
+    orb_free(ctx, number);
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t v = 0; v < n; v++) {
+    number[v] = -1;
+  }
+  for (int32_t k = 0; k < w->count; k++) {
+    number[landmark_vertex(w, k)] = k;
+  }
+  int32_t *fill = w->link_start + 2;
+  for (int32_t h = 0; h < 3 * w->triangle_count; h++) {
+    int32_t k = number[w->triangles[h]];
+    if (k >= 0 && k + 1 < w->count) {
+      fill[k]++;
+    }
+  }
+  for (int32_t k = 1; k + 1 < w->count; k++) {
+    fill[k] += fill[k - 1];
+  }
+  for (int32_t h = 0; h < 3 * w->triangle_count; h++) {
+    int32_t k = number[w->triangles[h]];
+    if (k >= 0) {
+      int32_t at = w->link_start[k + 1]++;
+      w->link[2 * at] = w->triangles[orb_next(h)];
+      w->link[2 * at + 1] = w->triangles[orb_prev(h)];
+    }
+  }
+  orb_free(ctx, number);
+  return ORB_OK;
+}
+
+static orb_status walker_create(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count,
+                                orb_preset preset, int32_t coarse, walker *w) {
+  const orb_mesh *mesh = &sheet->shape.mesh;
+  orb_status status = ORB_OK;
+  *w = (walker){.ctx = ctx, .sheet = sheet, .landmarks = landmarks, .count = count};
+  unsigned char *keep = ORB_NEW0(ctx, unsigned char, mesh->vertex_count);
+  if (!keep) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t k = 0; k < count; k++) {
+    keep[landmark_vertex(w, k)] = 1;
+  }
+  orb_embed_options options;
+  orb_embed_defaults(&options);
+  options.preset = preset;
+  ORB_GO(status, orb_hierarchy_create(ctx, mesh, keep, coarse, &w->hierarchy), end);
+  ORB_GO(status, orb_refiner_create(ctx, w->hierarchy, &options, &w->refiner), end);
+  ORB_GO(status, orb_refiner_advance(ctx, w->refiner, coarse), end);
+  ORB_GO(status, read_level(w), end);
+end:
+  orb_free(ctx, keep);
+  return status;
+}
+
+static int all_live(const walker *w) {
+  int32_t found = 0;
+  for (int32_t k = 0; k < w->count; k++) {
+    found += w->link_start[k + 1] > w->link_start[k];
+  }
+  return found == w->count;
+}
+
+static void rotate_level(walker *w, const double rotation[9]) {
+  for (int32_t i = 0; i < w->vertex_count; i++) {
+    double p[3];
+    orb_refiner_point(w->refiner, w->vertices[i], p);
+    orb_rotate_point(rotation, p, p);
+    orb_normalize(p);
+    orb_refiner_move(w->refiner, w->vertices[i], p);
+  }
+}
+
+/* Does landmark k at x keep its share of every determinant that it has at p? */
+static int may_stand(const walker *w, int32_t k, const double p[3], const double x[3]) {
+  for (int32_t i = w->link_start[k]; i < w->link_start[k + 1]; i++) {
+    double a[3], b[3];
+    orb_refiner_point(w->refiner, w->link[2 * i], a);
+    orb_refiner_point(w->refiner, w->link[2 * i + 1], b);
+    if (!(orb_det(x, a, b) >= LEAST_SHARE * orb_det(p, a, b))) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* One landmark's step; returns how far it came, *arrived whether it stands on its target, bit for bit. */
+static double step_one(walker *w, int32_t k, const double target[3], int *arrived) {
+  int32_t v = landmark_vertex(w, k);
+  double p[3], x[3];
+  orb_refiner_point(w->refiner, v, p);
+  if (memcmp(p, target, sizeof p) == 0) {
+    *arrived = 1;
+    return 0;
+  }
+  double length = sqrt(orb_distance2(p, target)), t = 1;
+  *arrived = 0;
+  for (int i = 0; i < TRIES; i++, t *= SHORTER) {
+    for (int c = 0; c < 3; c++) {
+      x[c] = i == 0 ? target[c] : p[c] + t * (target[c] - p[c]);
+    }
+    if (i > 0 && orb_normalize(x) < 1e-3) {
+      continue;
+    }
+    if (may_stand(w, k, p, x)) {
+      orb_refiner_move(w->refiner, v, x);
+      *arrived = i == 0;
+      return t * length;
+    }
+  }
+  return 0;
+}
+
+/* Walks all landmarks of one shape; *left of them do not arrive on any level. */
+static orb_status walk(walker *w, const double *targets, int32_t *left) {
+  for (int32_t k = 0; k < w->count; k++) {
+    orb_refiner_pin(w->refiner, landmark_vertex(w, k), 1);
+  }
+  int32_t n = w->sheet->shape.mesh.vertex_count;
+  for (int level = 0;; level++) {
+    for (int step = 0; step < STEPS_MAX; step++) {
+      double progress = 0;
+      *left = 0;
+      for (int32_t k = 0; k < w->count; k++) {
+        int arrived;
+        progress += step_one(w, k, targets + 3 * (size_t)k, &arrived);
+        *left += !arrived;
+      }
+      ORB_TRY(orb_refiner_sweep(w->ctx, w->refiner, SWEEPS, NULL));
+      ORB_TRY(orb_context_check(w->ctx));
+      if (*left == 0) {
+        double gain = 1;
+        for (int i = 0; i < SETTLE / SWEEPS && gain > 0.002; i++) {
+          ORB_TRY(orb_refiner_sweep(w->ctx, w->refiner, SWEEPS, &gain));
+        }
+        return ORB_OK;
+      }
+      if (progress < NO_PROGRESS) {
+        break;
+      }
+    }
+    int32_t live = orb_refiner_live(w->refiner);
+    if (level + 1 >= LEVELS || live >= n || live >= FINEST_WALK) {
+      return ORB_OK;
+    }
+    ORB_TRY(orb_refiner_advance(w->ctx, w->refiner, live * 2));
+    ORB_TRY(read_level(w));
+  }
+}
+
+/* A level as a shape of its own: positions and triangles are borrowed, points are made. */
+static orb_status level_shape(const walker *w, orb_aligned_shape *out) {
+  const orb_mesh *mesh = &w->sheet->shape.mesh;
+  *out = (orb_aligned_shape){.mesh = {.vertex_count = mesh->vertex_count,
+                                      .triangle_count = w->triangle_count,
+                                      .positions = mesh->positions,
+                                      .triangles = w->triangles}};
+  out->points = ORB_NEW0(w->ctx, double, 3 * (size_t)mesh->vertex_count);
+  for (int32_t i = 0; out->points && i < w->vertex_count; i++) {
+    orb_refiner_point(w->refiner, w->vertices[i], out->points + 3 * (size_t)w->vertices[i]);
+  }
+  return out->points ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+static orb_status find_rotations(orb_context *ctx, const walker *walkers, const double *points, int32_t shape_count,
+                                 int32_t count, double *rotations, double *targets) {
+  orb_status status = ORB_OK;
+  orb_aligned_shape *levels = ORB_NEW0(ctx, orb_aligned_shape, shape_count);
+  const orb_aligned_shape **list = ORB_NEW(ctx, const orb_aligned_shape *, shape_count);
+  if (!levels || !list) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    list[s] = &levels[s];
+    ORB_GO(status, level_shape(&walkers[s], &levels[s]), end);
+  }
+  status = orb_rotations_find(ctx, list, points, shape_count, count, rotations, targets);
+end:
+  for (int32_t s = 0; levels && s < shape_count; s++) {
+    orb_free(ctx, levels[s].points);
+  }
+  orb_free(ctx, levels);
+  orb_free(ctx, list);
+  return status;
+}
+
+/* Gathers the shapes' levels by rotation; fills the common targets. */
+static orb_status gather(orb_context *ctx, walker *walkers, int32_t shape_count, int32_t count, double *targets) {
+  orb_status status = ORB_OK;
+  double *points = ORB_NEW(ctx, double, 3 * (size_t)shape_count * (size_t)count),
+         *rotations = ORB_NEW(ctx, double, 9 * (size_t)shape_count);
+  if (!points || !rotations) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    for (int32_t k = 0; k < count; k++) {
+      orb_refiner_point(walkers[s].refiner, landmark_vertex(&walkers[s], k),
+                        points + 3 * ((size_t)s * (size_t)count + (size_t)k));
+    }
+  }
+  ORB_GO(status, find_rotations(ctx, walkers, points, shape_count, count, rotations, targets), end);
+  for (int32_t s = 1; s < shape_count; s++) {
+    rotate_level(&walkers[s], rotations + 9 * (size_t)s);
+  }
+end:
+  orb_free(ctx, points);
+  orb_free(ctx, rotations);
+  return status;
+}
+
+/* Two targets nearly at one place cannot be told apart by a coarse level. */
+static int targets_apart(const double *targets, int32_t count) {
+  for (int32_t i = 0; i < count; i++) {
+    for (int32_t j = 0; j < i; j++) {
+      if (orb_distance2(targets + 3 * (size_t)i, targets + 3 * (size_t)j) < 1e-16) {
+        return 0;
+      }
+    }
+  }
+  return 1;
+}
+
+/* Refines one walked shape to the end; *good: certified. The result goes to `points`. */
+static orb_status finish(orb_context *ctx, walker *w, double *points, int *good) {
+  const orb_mesh *mesh = &w->sheet->shape.mesh;
+  orb_certificate certificate;
+  ORB_TRY(orb_refiner_advance(ctx, w->refiner, mesh->vertex_count));
+  orb_refiner_points(w->refiner, points);
+  ORB_TRY(orb_certify(ctx, points, mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate));
+  *good = certificate.valid;
+  return ORB_OK;
+}
+
+orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
+                        int32_t count, orb_preset preset, int32_t coarse, int *stuck) {
+  orb_status status = ORB_OK;
+  walker *walkers = ORB_NEW0(ctx, walker, shape_count);
+  double *targets = ORB_NEW(ctx, double, 3 * (size_t)count), **points = ORB_NEW0(ctx, double *, shape_count);
+  *stuck = 1;
+  if (!walkers || !targets || !points) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    ORB_GO(status, walker_create(ctx, &sheets[s], landmarks, count, preset, coarse, &walkers[s]), end);
+    if (!all_live(&walkers[s])) {
+      goto end;
+    }
+    orb_progress(ctx, "align", 0.4 * (s + 1) / shape_count);
+  }
+  ORB_GO(status, gather(ctx, walkers, shape_count, count, targets), end);
+  if (!targets_apart(targets, count)) {
+    goto end;
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    int32_t left = 0;
+    ORB_GO(status, walk(&walkers[s], targets, &left), end);
+    if (left > 0) {
+      goto end;
+    }
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    int good = 0;
+    points[s] = ORB_NEW(ctx, double, 3 * (size_t)sheets[s].vertex_capacity);
+    if (!points[s]) {
+      status = ORB_E_NO_MEMORY;
+      goto end;
+    }
+    ORB_GO(status, finish(ctx, &walkers[s], points[s], &good), end);
+    walker_free(&walkers[s]);
+    orb_progress(ctx, "align", 0.4 + 0.6 * (s + 1) / shape_count);
+    if (!good) {
+      goto end;
+    }
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    double *old = sheets[s].shape.points;
+    sheets[s].shape.points = points[s];
+    points[s] = old;
+  }
+  *stuck = 0;
+end:
+  if (status == ORB_E_NOT_CERTIFIED) { /* pinned landmarks left a vertex no room: as good as stuck */
+    orb_error_clear(ctx);
+    status = ORB_OK;
+  }
+  for (int32_t s = 0; s < shape_count; s++) {
+    if (walkers) {
+      walker_free(&walkers[s]);
+    }
+    if (points) {
+      orb_free(ctx, points[s]);
+    }
+  }
+  orb_free(ctx, walkers);
+  orb_free(ctx, targets);
+  orb_free(ctx, points);
+  return status;
+}

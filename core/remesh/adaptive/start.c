@@ -1,0 +1,195 @@
+/* Starts from the overlay of the shapes, for maps along which splits of edges would creep without end.
+ *
+ * Where shapes are wound about each other, as by landmarks that lie in another order on each, the overlay has a hundred
+ * times their triangles, most of them far smaller than the tolerance asks for. Then each shape is reduced alone first,
+ * within the tolerance, and what is left of them is laid over each other: crossings become fewer with the lines of
+ * both. The result is linear on both reduced shapes, so that few of its edges stray from the shapes themselves; these
+ * are split. What is proved is always the distance from the shapes as they were given. */
+#include <math.h>
+#include <stdatomic.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "base/loops.h"
+#include "remesh/adaptive/match.h"
+#include "remesh/net_export.h"
+#include "sphere/locate.h"
+
+/* A shape is traced through another: every SAMPLE-th of its edges. A prime, or regular meshes would show one kind of
+ * edge only. */
+typedef struct crossing_loop {
+  const orb_remesh_job *job;
+  int32_t own, other;
+  atomic_llong count;
+} crossing_loop;
+
+enum { SAMPLE = 17, REDUCTIONS = 4, SLICE = 4096 };
+
+static int64_t crossings_of(const crossing_loop *loop, int32_t h) {
+  const orb_remesh_job *job = loop->job;
+  const orb_aligned_shape *own = &job->shapes[loop->own], *other = &job->shapes[loop->other];
+  orb_sphere_view view = {other->points, other->mesh.triangles, job->twin[loop->other], other->mesh.triangle_count};
+  const double *p = own->points + 3 * (int64_t)own->mesh.triangles[h];
+  const double *q = own->points + 3 * (int64_t)own->mesh.triangles[orb_next(h)];
+  orb_place place;
+  orb_hit from = orb_locate_hit(job->locator[loop->other], p, -1, &place);
+  orb_arc_tracer tracer;
+  orb_crossing crossing;
+  int64_t count = 0;
+  orb_trace_start(&tracer, &view, orb_spot_of(&from), p, q);
+  while (orb_trace_next(&tracer, &crossing)) {
+    count += !crossing.at_vertex;
+  }
+  return count;
+}
+
+static void crossing_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  crossing_loop *loop = arg;
+  const int32_t *twin = loop->job->twin[loop->own];
+  int64_t count = 0;
+  for (int64_t i = begin; i < end; i++) {
+    int32_t h = (int32_t)(SAMPLE * i);
+    count += h < twin[h] ? crossings_of(loop, h) : 0;
+  }
+  atomic_fetch_add(&loop->count, count);
+}
+
+orb_status orb_match_overlay_size(orb_context *ctx, const orb_remesh_job *job, int64_t *triangles) {
+  int64_t vertices = 0;
+  for (int32_t s = 0; s < job->shape_count; s++) {
+    vertices += job->shapes[s].mesh.vertex_count;
+    for (int32_t t = 0; t < s; t++) {
+      crossing_loop loop = {.job = job, .own = s, .other = t};
+      int64_t samples = (3 * (int64_t)job->shapes[s].mesh.triangle_count + SAMPLE - 1) / SAMPLE;
+      ORB_TRY(orb_sliced_by(ctx, samples, SLICE, 64, crossing_range, &loop));
+      vertices += SAMPLE * atomic_load(&loop.count);
+    }
+  }
+  *triangles = 2 * vertices;
+  return ORB_OK;
+}
+
+/* The reduced shapes in place of the shapes. */
+typedef struct reduced {
+  orb_remesh_job job;
+  orb_aligned_shape *shapes;
+} reduced;
+
+static void reduced_free(orb_context *ctx, reduced *r) {
+  for (int32_t s = 0; r->shapes && s < r->job.shape_count; s++) {
+    orb_free(ctx, r->shapes[s].points);
+    orb_free(ctx, r->shapes[s].mesh.positions);
+    orb_free(ctx, r->shapes[s].mesh.triangles);
+  }
+  for (int32_t s = 0; r->job.twin && s < r->job.shape_count; s++) {
+    orb_free(ctx, r->job.twin[s]);
+  }
+  for (int32_t s = 0; r->job.locator && s < r->job.shape_count; s++) {
+    orb_locator_destroy(ctx, r->job.locator[s]);
+  }
+  orb_free(ctx, r->shapes);
+  orb_free(ctx, r->job.twin);
+  orb_free(ctx, r->job.locator);
+  memset(r, 0, sizeof *r);
+}
+
+/* What is left of a shape, as another one. */
+static orb_status take_net(orb_context *ctx, const orb_match *match, orb_aligned_shape *out) {
+  orb_supermesh net = {0};
+  int32_t *number = ORB_NEW(ctx, int32_t, match->net.vertex_count);
+  orb_status status = number ? orb_net_export(ctx, &match->net, &net, number) : ORB_E_NO_MEMORY;
+  out->points = net.points;
+  out->mesh.triangles = net.triangles;
+  out->mesh.vertex_count = net.vertex_count;
+  out->mesh.triangle_count = net.triangle_count;
+  if (status == ORB_OK) {
+    out->mesh.positions = ORB_NEW(ctx, double, 3 * (int64_t)net.vertex_count);
+    status = out->mesh.positions ? ORB_OK : ORB_E_NO_MEMORY;
+  }
+  for (int32_t v = 0; status == ORB_OK && v < match->net.vertex_count; v++) {
+    if (number[v] >= 0) {
+      memcpy(out->mesh.positions + 3 * (int64_t)number[v], orb_match_at(match, v, 0), 3 * sizeof(double));
+    }
+  }
+  orb_free(ctx, number);
+  return status;
+}
+
+static orb_status reduce_shape(orb_context *ctx, const orb_remesh_job *job, int32_t s, double limit2, reduced *out) {
+  orb_remesh_job alone = *job;
+  alone.shapes += s;
+  alone.shape_count = 1;
+  alone.twin += s;
+  alone.locator += s;
+  alone.diagonal += s;
+  orb_match match;
+  orb_aligned_shape *shape = &out->shapes[s];
+  orb_status status;
+  ORB_GO(status, orb_match_create(ctx, &alone, &match), end);
+  for (int i = 0; i < REDUCTIONS; i++) {
+    ORB_GO(status, orb_match_collapse(ctx, &match, limit2, 0, 1, i > 0), end);
+    ORB_GO(status, orb_match_compact(ctx, &match), end);
+    ORB_GO(status, orb_match_turn_all(ctx, &match, limit2, 0), end);
+  }
+  ORB_GO(status, take_net(ctx, &match, shape), end);
+  const orb_mesh *mesh = &shape->mesh;
+  out->job.twin[s] = ORB_NEW(ctx, int32_t, 3 * (int64_t)mesh->triangle_count);
+  status = out->job.twin[s] ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    status = orb_mesh_twins(ctx, mesh->triangles, mesh->triangle_count, mesh->vertex_count, out->job.twin[s]);
+  }
+  if (status == ORB_OK) {
+    status = orb_locator_create(ctx, shape->points, mesh->vertex_count, mesh->triangles, mesh->triangle_count,
+                                out->job.twin[s], &out->job.locator[s]);
+  }
+end:
+  orb_match_free(ctx, &match);
+  return status;
+}
+
+static orb_status reduce(orb_context *ctx, const orb_remesh_job *job, double limit2, reduced *out) {
+  int32_t shapes = job->shape_count;
+  *out = (reduced){.job = *job, .shapes = ORB_NEW0(ctx, orb_aligned_shape, shapes)};
+  out->job.shapes = out->shapes;
+  out->job.twin = ORB_NEW0(ctx, int32_t *, shapes);
+  out->job.locator = ORB_NEW0(ctx, orb_locator *, shapes);
+  orb_status status = out->shapes && out->job.twin && out->job.locator ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int32_t s = 0; s < shapes && status == ORB_OK; s++) {
+    status = reduce_shape(ctx, job, s, limit2, out);
+  }
+  return status;
+}
+
+/* The overlay of `laid`, whose shapes stand for those of `job`. */
+static orb_status create_on_overlay(orb_context *ctx, const orb_remesh_job *laid, const orb_remesh_job *job,
+                                    orb_match *match) {
+  orb_supermesh overlay = {.error_bound = ORB_NEW(ctx, double, job->shape_count)};
+  orb_net net = {0};
+  orb_status status = overlay.error_bound ? orb_remesh_overlay(ctx, laid, &overlay) : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    status = orb_net_init(ctx, &net, overlay.points, overlay.vertex_count, overlay.triangles, overlay.triangle_count,
+                          overlay.vertex_count);
+  }
+  orb_supermesh_free(ctx, &overlay);
+  if (status == ORB_OK) {
+    orb_match_free(ctx, match);
+    status = orb_match_create_on(ctx, job, &net, match);
+  }
+  orb_net_free(ctx, &net);
+  return status;
+}
+
+orb_status orb_match_start_from_overlay(orb_context *ctx, const orb_remesh_job *job, orb_match *match) {
+  return create_on_overlay(ctx, job, job, match);
+}
+
+orb_status orb_match_start_from_reduced(orb_context *ctx, const orb_remesh_job *job, double limit2, orb_match *match) {
+  reduced r;
+  orb_status status = reduce(ctx, job, limit2, &r);
+  if (status == ORB_OK) {
+    status = create_on_overlay(ctx, &r.job, job, match);
+  }
+  reduced_free(ctx, &r);
+  return status;
+}
