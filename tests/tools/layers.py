@@ -1,0 +1,160 @@
+#!/usr/bin/env python3
+"""Checks the layers: no circle of files, and nothing that includes or calls upward.
+
+    tests/tools/layers.py BUILD [--list]
+
+A unit is a source file together with the header of its name. An arrow runs from unit A to unit B where A includes B's
+header, or an object file of A uses a symbol that B defines (nm). In TypeScript and JavaScript an arrow is an import.
+--list prints the arrows between folders. Exit status 1: a circle or an upward arrow; each is printed with its cause.
+Standard library only; needs nm and git.
+"""
+import collections
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+# Each folder may use those before it, and itself. What a folder holds is said in CONTRIBUTING.md.
+ORDER = [
+    "core/include/orbmorph", "core/base", "core/numeric", "core/mesh", "core/format", "core/embed",
+    "core/embed/kernel_sampling", "core/sphere", "core/align/sheet", "core/align/rotate", "core/align/pin",
+    "core/align/rbf", "core/align/map/engine", "core/align/map/starts", "core/align/map/twist", "core/align/map",
+    "core/align/find", "core/align", "core/remesh/common", "core/remesh/overlay", "core/remesh/adaptive", "core/remesh",
+    "core/transfer", "core/merge", "api", "server", "client/cli"]
+SOURCE = re.compile(r"\.(inc\.h|c|h|cc|hh)$")
+SCRIPT = re.compile(r"\.(d\.ts|tsx|ts|mjs|js)$")
+
+
+def tracked(*places):
+    listed = subprocess.run(["git", "-C", ROOT, "ls-files", "-co", "--exclude-standard", *places], capture_output=True,
+                            text=True, check=True).stdout.splitlines()
+    return [file for file in listed if (ROOT / file).is_file()]
+
+
+def unit(file):
+    return SCRIPT.sub("", SOURCE.sub("", file))
+
+
+def add_includes(files, arrows):
+    known = set(files)
+    for file in files:
+        for name in re.findall(r'#include "([^"]+)"', (ROOT / file).read_text(encoding="utf-8")):
+            folder = os.path.dirname(file)
+            for base in ("core/" + name, "core/include/" + name, "server/" + name, name, folder + "/" + name):
+                base = os.path.normpath(base)
+                if base in known:
+                    if unit(base) != unit(file):
+                        arrows[unit(file)][unit(base)].add(f"#include {name}")
+                    break
+
+
+def add_calls(build, arrows):
+    defined, used = {}, collections.defaultdict(set)
+    for item in pathlib.Path(build).rglob("*.o"):
+        found = re.search(r"/(core|api|server|client)/CMakeFiles/[^/]+\.dir/(.*)\.o$", str(item))
+        file = f"{found[1]}/{found[2]}" if found else ""
+        if not found or not (ROOT / file).is_file():
+            continue
+        names = subprocess.run(["nm", item], capture_output=True, text=True, check=True).stdout
+        for line in names.splitlines():
+            kind, name = line.split()[-2:]
+            if kind in "TDBRVWC":
+                defined.setdefault(name, unit(file))
+            elif kind == "U":
+                used[unit(file)].add(name)
+    for one, names in used.items():
+        for name in names:
+            if defined.get(name, one) != one:
+                arrows[one][defined[name]].add(name)
+
+
+def add_imports(files, arrows):
+    known = {unit(file): file for file in files}
+    for file in files:
+        for name in re.findall(r"""(?:from|import)\s*\(?\s*['"](\.[^'"]+)['"]""", (ROOT / file).read_text(encoding="utf-8")):
+            target = unit(os.path.normpath(os.path.join(os.path.dirname(file), name)))
+            if target in known and target != unit(file):
+                arrows[unit(file)][target].add(f"import {name}")
+
+
+def circles(arrows):
+    """Strongly connected components of more than one unit (Tarjan 1972, without recursion)."""
+    index, low, stack, on, found = {}, {}, [], set(), []
+    for root in sorted(arrows):
+        if root in index:
+            continue
+        work = [(root, iter(sorted(arrows[root])))]
+        index[root] = low[root] = len(index)
+        stack.append(root)
+        on.add(root)
+        while work:
+            at, rest = work[-1]
+            for to in rest:
+                if to not in index:
+                    index[to] = low[to] = len(index)
+                    stack.append(to)
+                    on.add(to)
+                    work.append((to, iter(sorted(arrows.get(to, ())))))
+                    break
+                if to in on:
+                    low[at] = min(low[at], index[to])
+            else:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[at])
+                if low[at] == index[at]:
+                    part = []
+                    while not part or part[-1] != at:
+                        part.append(stack.pop())
+                        on.discard(part[-1])
+                    if len(part) > 1:
+                        found.append(sorted(part))
+    return found
+
+
+def level(name):
+    folder = os.path.dirname(name)
+    while folder and folder not in ORDER:
+        folder = os.path.dirname(folder)
+    return ORDER.index(folder) if folder else None
+
+
+def main():
+    build, listing = sys.argv[1], "--list" in sys.argv
+    sources = [file for file in tracked("core", "api", "server", "client/cli") if SOURCE.search(file)]
+    scripts = [file for file in tracked("client/web/src", "client/js/src") if SCRIPT.search(file)]
+    arrows = collections.defaultdict(lambda: collections.defaultdict(set))
+    add_includes(sources, arrows)
+    add_calls(build, arrows)
+    if not any(name in cause for ends in arrows.values() for cause in ends.values() for name in ("orb_align", "api_json_parse")):
+        print(f"{build} holds no object files; build first")
+        return 1
+    add_imports(scripts, arrows)
+    faults = 0
+    for part in circles(arrows):
+        faults += 1
+        print("circle:", " ".join(part))
+        for one in part:
+            for other in sorted(set(arrows[one]) & set(part)):
+                print(f"    {one} -> {other}: {', '.join(sorted(arrows[one][other])[:4])}")
+    for one in sorted(arrows):
+        for other in sorted(arrows[one]):
+            if level(one) is not None and level(other) is not None and level(other) > level(one):
+                faults += 1
+                print(f"upward: {one} -> {other}: {', '.join(sorted(arrows[one][other])[:4])}")
+    if listing:
+        folders = collections.defaultdict(set)
+        for one in arrows:
+            for other in arrows[one]:
+                if os.path.dirname(one) != os.path.dirname(other):
+                    folders[os.path.dirname(one)].add(os.path.dirname(other))
+        for one in sorted(folders):
+            print(f"{one} -> {' '.join(sorted(folders[one]))}")
+    print(f"{sum(len(ends) for ends in arrows.values())} arrows between {len(arrows)} units, {faults} at fault")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
