@@ -67,7 +67,7 @@ class Bench:
         return result, len(about["landmarks"]), float(clock.read_text()) if clock.exists() else None
 
     def five(self):
-        """Five shapes in one: generated bodies, unlike real ones turned to one another, and animals by landmarks."""
+        """Five shapes in one: generated bodies, unlike real ones rotated onto each other, and animals by landmarks."""
         good, marks = self.meshes / "good", self.folder / "five.json"
         read = lambda name: json.loads((self.meshes / "pairs" / f"{name}.json").read_text())["landmarks"]
         # one list of features for the whole class: line i of one pair is line i of the next
@@ -113,13 +113,13 @@ def table2(bench, names):
                 continue
             by_method[method] = result
             counts = [shape["triangles"] for shape in result["shapes"]]
-            turned = sum(shape["inverted"] for shape in result["shapes"])
+            inverted = sum(shape["inverted"] for shape in result["shapes"])
             slivers = sum(shape["slivers"] for shape in result["shapes"])
             bound = worst(result, "hausdorff_relative")
             details.append(f"| {name.replace('-', ' – ')} | {method} | {result['triangles']:,} | "
                            f"{result['triangles'] / max(counts):.2f} | {result['triangles'] / sum(counts):.2f} | "
                            f"{100 * bound:.2g} | {100 * worst(result, 'hausdorff_sampled_relative'):.2g} | "
-                           f"{100 * turned / result['triangles']:.3f} | {100 * slivers / result['triangles']:.2f} | "
+                           f"{100 * inverted / result['triangles']:.3f} | {100 * slivers / result['triangles']:.2f} | "
                            f"{seconds(result['seconds']['remesh'])} | {seconds(result['seconds']['remesh_cpu'])} |")
         if "subdivision" in by_method and "adaptive" in by_method:
             sizes = " + ".join(f"{(shape['triangles'] / 2 + 2) / 1000:.1f}k" for shape in by_method["adaptive"]["shapes"])
@@ -234,8 +234,8 @@ def main():
 
 
 def five_part(five):
-    return ["## Five shapes", "", "Five shapes in one supermesh, `adaptive` (0.1 %), the alignment apart; best of three.", "",
-            "| shapes | input triangles | triangles | by largest | bound % | turned % | s | processor s | transfer s |",
+    return ["## Five shapes", "", "Five shapes in one supermesh, `adaptive` (0.1 %), without the alignment; best of three.", "",
+            "| shapes | input triangles | triangles | by largest | bound % | inverted % | s | processor s | transfer s |",
             "|---|---|---|---|---|---|---|---|---|"] + [
         f"| {name} | {r['input_triangles']:,} | {r['triangles']:,} | {r['by_largest']:.2f} | "
         f"{100 * worst(r, 'hausdorff_relative'):.2g} | "
@@ -245,16 +245,18 @@ def five_part(five):
 
 
 def growth_part(grown):
-    return ["## Growth", "", "Two bodies of so many triangles each.", "",
+    return ["## Growth", "", "Two generated bodies with this number of triangles each.", "",
             "| triangles a shape | overlay s | processor s | µs a triangle | MB | adaptive s | processor s | µs a triangle | MB |",
             "|---|---|---|---|---|---|---|---|---|"] + grown
 
 
 def visual_part(pictures):
     text = ["## Visual error (Fig. 19 of the paper)", "",
-             "Rendered by `orbmorph view`: the two inputs, then the difference of each method's picture from theirs, dark blue none,",
-             "bright red a quarter of the range or more: `adaptive` (0.1 %), `subdivision` (the paper's), `convex-hull` (its",
-             "Fig. 11).", "", "| pair | method | mean difference % | pixels above an eighth of the range % |", "|---|---|---|---|"]
+             "Rendered by `orbmorph view`: the two inputs, then the difference between the picture of each method and that of the "
+             "input. Dark",
+             "blue is no difference, bright red a quarter of the range or more. The methods are `adaptive` (0.1 %), "
+             "`subdivision` (that of the",
+             "paper) and `convex-hull` (Fig. 11 of the paper).", "", "| pair | method | mean difference % | pixels above an eighth of the range % |", "|---|---|---|---|"]
     for name, shown in pictures.items():
         text += [f"| {name.replace('-', ' – ')} | {m} | {mean:.2f} | {high:.2f} |" for m, mean, high in shown]
     for name in (name for name, shown in pictures.items() if shown):
@@ -275,23 +277,30 @@ def replace_part(page, part):
 
 def write(out, rows, details, pictures, speed, five, grown, notes):
     text = ["# Merging, measured", "",
-            "Written by `tests/bench/merge_report.py`. Two threads, embeddings cached; seconds are wall time on a machine that",
-            "others use too, so upper bounds. *Turned* are triangles that face away from a shape's surface, *slivers* those of a",
-            "height below a ninetieth of their longest side, in % of the supermesh, over all shapes.", "",
+            "Written by `tests/bench/merge_report.py`. Two threads, stored embeddings.",
+            "Seconds are wall time on a shared machine, so they are upper bounds. *Inverted* triangles face away from the "
+            "surface of a shape;",
+            "*slivers* have a height below a ninetieth of their longest side. Both are given in % of the triangles of the "
+            "supermesh, over all",
+            "shapes.", "",
             "## Table 2 of the paper", "",
-            "The paper's pairs, then real pairs of like sizes. Its alignment is the warp; ours ends with the composed map, which",
-            "costs more and decides how a morph looks.", "",
+            "The pairs of the paper, then real pairs of similar sizes. The paper aligns with its warp. orbmorph also improves "
+            "the composed map,",
+            "which takes longer and decides how a morph looks.", "",
             "| pair | vertices | alignment s | remeshing s | supermesh vertices | triangles | control points |",
             "|---|---|---|---|---|---|---|"]
     text += [f"| paper: {p[0]} | {p[1]} | {p[2]:.2f} | {p[3]:.2f} | {p[4]:,} | {p[5]:,} | {p[6]} |" for p in PAPER]
     text += rows + ["", "## All methods", "",
-                    "*By largest* and *by inputs*: triangles over those of the largest shape, and of all together. Distances in % of",
-                    "the diagonal, the worse of the shapes: the proved bound, and the farthest of many samples.", "",
-                    "| pair | method | triangles | by largest | by inputs | bound % | sampled % | turned % | slivers % | s | processor s |",
+                    "*By largest* and *by inputs* divide the number of triangles by that of the largest shape, and by that of "
+                    "all shapes together.",
+                    "Distances are in % of the diagonal, for the worst shape: *bound* is proved, *sampled* is the largest of "
+                    "many samples.", "",
+                    "| pair | method | triangles | by largest | by inputs | bound % | sampled % | inverted % | slivers % | s | processor s |",
                     "|---|---|---|---|---|---|---|---|---|---|---|"] + details
     text += ["", "## Speed", "",
-             "Generated bodies with limbs, of 34,000 and 24,000 vertices: the sizes of the paper's Elf and Monster, whose remeshing",
-             "took it 188 s.", "", "| method | triangles | seconds | processor seconds |", "|---|---|---|---|"]
+             "Generated bodies with limbs, of 34,000 and 24,000 vertices. These are the sizes of the paper's Elf and Monster, "
+             "which the paper",
+             "remeshes in 188 s.", "", "| method | triangles | seconds | processor seconds |", "|---|---|---|---|"]
     text += [f"| {m} | {r['triangles']:,} | {r['seconds']['remesh']:.2f} | {r['seconds']['remesh_cpu']:.2f} |"
              for m, r in speed.items() if r]
     text += [""] + five_part(five)

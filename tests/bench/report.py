@@ -121,7 +121,7 @@ def share(part, whole):
 
 
 def paper_table(bench, report):
-    report.add("## The paper's method: Table 1", "Its columns; one thread. The paper's own rows (Core i7, 3.60 GHz) first.")
+    report.add("## The paper's method: Table 1", "The columns of the paper, on one thread. The rows of the paper (Core i7, 3.60 GHz) come first.")
     heads = ["Models", "# of triangles", "Simplification time (s)", "Parameterization time (s)", "Avg. # of kernel points",
              "Optimization time (s)", "Avg. # of iterations", "Total", "triangles/min"]
     rows = [(n, t, share(s, a), share(p, a), k, share(o, a), i, a, rate(60 * t / a)) for n, t, s, p, k, o, i, a in PAPER]
@@ -135,8 +135,8 @@ def paper_table(bench, report):
                      f"{m['kernel_points']:.1f}", share(o, m["cpu_seconds"]), f"{m['iterations']:.1f}",
                      f"{m['cpu_seconds']:.2f}", rate(60 * m["triangles"] / m["cpu_seconds"])))
     report.table(heads, rows)
-    report.add("Ours are *in italics*, in processor seconds. Parameterization holds the sweeps around insertions into dense "
-               "regions (core/embed/kernel_sampling.h), so it takes a larger share than in the paper.",
+    report.add("The rows of orbmorph are *in italics*, in processor seconds. Parameterization includes the sweeps around "
+               "insertions into dense regions (core/embed/kernel_sampling.h), so it takes a larger share than in the paper.",
                *([f"Refused: {', '.join(bench.refused)}."] if bench.refused else []))
     return measured
 
@@ -229,7 +229,7 @@ def fig18(report, measured):
 
 
 def methods(bench, report, repeat):
-    report.add("## Both methods", "Rates by wall clock on one thread, everything but reading included.")
+    report.add("## Both methods", "Rates by wall clock on one thread, without reading the file.")
     rows = []
     for name in ("spot.obj", "cow.off", "human_man.obj", "shrec397.off"):
         path = bench.find(name)
@@ -252,7 +252,7 @@ def newton_goals(bench, report, repeat):
             rows.append((path.stem, PROTOTYPE[name], *(f"{v:.4f}" for v in by_preset[name])))
             report.goal(f"symmetric Dirichlet mean, {path.stem}: no worse than the prototype's", f"{PROTOTYPE[name]}",
                         f"{by_preset[name][1]:.4f}", by_preset[name][1] <= PROTOTYPE[name])
-    report.add("## Newton: quality", "Mean symmetric Dirichlet energy by preset, and of the first prototype.")
+    report.add("## Newton: quality", "Mean symmetric Dirichlet energy of each preset and of the first prototype.")
     report.table(["mesh", "prototype", "fast", "default", "quality"], rows)
     if by_preset:
         gain = math.exp(sum(math.log(v[2] / v[1]) for v in by_preset.values()) / len(by_preset))
@@ -350,7 +350,7 @@ def stored_adversarial(report):
     stored = ROOT / "docs/bench/adversarial-1000.txt"
     if stored.exists():
         text = stored.read_text().strip()
-        report.add("1,000 of them, as last run by `tests/long.sh adversarial` (docs/bench/adversarial-1000.txt):",
+        report.add("The last run of 1,000 by `tests/long.sh adversarial` (docs/bench/adversarial-1000.txt):",
                    "```\n" + text + "\n```")
         report.goal("1,000 adversarial meshes certified (stored)", "1000", text.split()[0],
                     text.startswith("1000 of 1000 "))
@@ -388,7 +388,7 @@ def cancels(bench, report, folder):
     rows = []
     for method, path in runs:
         rows += bench.lines_of("bench-cancel", "--method", method, "--threads", 1, "--cancels", 8, path)
-    report.add("## Cancelling", "Embeddings cancelled at 8 moments spread over their time, one thread; `bench-cancel`.")
+    report.add("## Cancelling", "Embeddings cancelled at 8 moments spread over the run, one thread; `bench-cancel`.")
     report.table(["mesh", "triangles", "method", "whole run, s", "mean delay, ms", "longest, ms", "longest, processor ms"],
                  [(m["mesh"], m["triangles"], m["method"], m["seconds"], m["mean_ms"], m["longest_ms"],
                    m["longest_cpu_ms"]) for m in rows])

@@ -21,9 +21,9 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 CHUNK = 25  # sets or pairs a process
-HEAD = """# Landmarks at random, and every pair
+HEAD = """# Random landmarks, and every pair
 
-Written by `tests/bench/robust.py` on the real meshes of 2,000 to 50,000 triangles.
+Written by `tests/bench/robust.py`, on the real meshes of 2,000 to 50,000 triangles.
 
 | what | run | certified | failed |
 |---|---|---|---|
@@ -31,24 +31,29 @@ Written by `tests/bench/robust.py` on the real meshes of 2,000 to 50,000 triangl
 LANDMARKS = """
 ## Random landmarks
 
-A set takes two meshes and as many places on each, at random vertices, inside triangles and on edges, and matches them
-in random order: the surfaces must be wound about each other. `pin` with the preset `fast`. Met: certified in exact
-arithmetic, closed, landmarks at bit-equal points on both spheres. *Growth*: how many times its triangles the mesh that
-grew more has afterwards. CPU seconds are of one thread; the machine had other work.
+A set takes two meshes and the same number of places on each: random vertices, points inside triangles and points on edges. It
+matches them in random order, so the surfaces must wind around each other. The method is `pin` with the preset `fast`. CPU seconds
+are those of one thread; the machine had other load.
+
+* *met*: certified in exact arithmetic, closed, landmarks at bit-equal points on both spheres
+* *growth*: the number of triangles after alignment divided by that before, of the mesh that grew more
 """
 AWKWARD = """
 ## Awkward landmarks
 
-Eight landmarks on two of the meshes, of which the first are, by turns: on adjacent vertices of one mesh; of both; three
-inside one triangle of the one and on one edge of the other; two at one place of one mesh only, a contradiction that
-must be refused with both named.
+Each set has eight landmarks on two of the meshes. The sets cycle through four kinds of first landmarks: on adjacent vertices of
+one mesh; on adjacent vertices of both; three inside one triangle of one mesh and on one edge of the other; two at one place of one
+mesh only. The last kind is a contradiction: the request must be refused, and the refusal must name both.
 """
 PAIRS = """
 ## Every pair
 
-No landmarks, `auto`, `adaptive` at the tolerance 0.1 %. Certified: closed, of genus zero, nothing flipped on the
-sphere. *Triangles* of the supermesh; *energy* of the composed map (1: isometric); *inverted*: the share of triangles
-turned in space, in %; CPU seconds. A dash: not run yet.
+Every pair of the meshes without landmarks: `auto`, and `adaptive` with the tolerance 0.1 %. A dash means not run yet.
+
+* *certified*: closed, of genus zero, no triangle flipped
+* *triangles*: those of the supermesh
+* *energy*: that of the composed map; 1 for an isometry
+* *inverted*: the share of inverted triangles
 """
 
 

@@ -20,20 +20,24 @@ import tempfile
 NAMES = ["rotate", "rbf", "fast", "default", "quality", "auto"]
 HEAD = """# How true the maps are
 
-Written by `tests/bench/truth.py`. The alignment gets the first landmarks of a pair (column *given*), the map takes the
-others from the first shape to the second, and *held out* is their mean distance from where they belong, in % of the
-second shape's diagonal. *Dense* is the same at every vertex, mean / 95th percentile, where both meshes share their
-triangles. `rbf` is the method of Peng & Timalsena 2016, section 7; `fast`, `default` and `quality` are presets of
-`pin`; `auto` gets no landmarks. *Flipped* counts triangles on the sphere, of both shapes and of the supermesh.
-*Inverted* is the share of the supermesh's triangles, in %, that turn against the surface at their centre (the
-triangle of the input that is there), on the first and on the second shape, *inverted map* of the first shape's
-triangles whose image on the second does.
-*Halfway*: of the area of 200 patches of the surface, what the worst keeps halfway of the linear morph, against the mean
-of both ends, and the share of the surface, in %, in patches that keep less than half: limbs that are turned or twisted.
-*Fitted*: the same after the second shape was moved onto the first (`"fit": "rigid"`): spot faces a quarter turn away
-from the cow and from shrec381, and on straight ways that alone makes legs thin, whatever the map is.
-*Energy*: symmetric Dirichlet of the map, capped at 20, 1 where isometric. The landmarks
-themselves are set by hand: those of the cow are stated to be right to 0.8 % in the mean, 2.2 % at worst.
+Written by `tests/bench/truth.py`. The alignment gets the first landmarks of a pair. The map from the first shape to the second
+is then measured at the others. `rbf` is the method of Peng & Timalsena 2016, section 7; `fast`, `default` and `quality` are
+presets of `pin`; `auto` gets no landmarks. The landmarks are set by hand. Those of the cow are stated to be accurate to 0.8 % in
+the mean and 2.2 % at worst.
+
+* *given*: the number of landmarks that the alignment gets
+* *held out*: the mean distance of the other landmarks from their targets, in % of the diagonal of the second shape
+* *dense*: the same at every vertex, as mean / 95th percentile, where both meshes share their triangles
+* *flipped*: the number of flipped triangles, of both shapes and of the supermesh
+* *inverted*: the share of the triangles of the supermesh that are inverted on the first / the second shape, judged at their
+  centre by the triangle of the input there
+* *inverted map*: the share of the triangles of the first shape whose image on the second shape is inverted
+* *halfway*: the area that patches of the surface keep halfway through the linear morph, against the mean of both ends. The first
+  number is the worst of 200 patches. The second is the share of the surface, in %, in patches that keep less than half: these
+  are limbs that are rotated or twisted
+* *fitted*: the same after the second shape is moved onto the first (`"fit": "rigid"`). Spot faces a quarter turn away from the cow
+  and from shrec381; on straight paths that alone makes legs thin, whatever the map is
+* *energy*: the symmetric Dirichlet energy of the map, capped at 20; 1 for an isometry
 """
 
 

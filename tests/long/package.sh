@@ -52,7 +52,7 @@ for file in /lib/systemd/system/orbmorphd.service /lib/systemd/system/orbmorphd.
   /usr/share/man/man1/orbmorph-bench.1.gz /usr/share/man/man8/orbmorphd.8.gz; do
   [ -s "$debian$file" ]
 done
-grep -o '](\(docs\|client\|CONTRIBUTING\)[^)#]*' "$debian/usr/share/doc/orbmorph/README.md" | cut -c3- | while read -r link; do
+grep -o '](\(docs\|client\|CONTRIBUTING\|SECURITY\)[^)#]*' "$debian/usr/share/doc/orbmorph/README.md" | cut -c3- | while read -r link; do
   [ -e "$debian/usr/share/doc/orbmorph/$link" ] || { echo "the installed README's link $link leads nowhere"; exit 1; }
 done
 

@@ -6,7 +6,7 @@ import { binaries, root } from './daemon.mjs';
 import { writeGlb } from './glb_write.mjs';
 import { writePng } from './png.mjs';
 
-export const documents = async () => ['README.md', 'CONTRIBUTING.md', ...(await readdir(path.join(root, 'docs'))).filter((f) => f.endsWith('.md')).map((f) => `docs/${f}`)];
+export const documents = async () => ['README.md', 'CONTRIBUTING.md', 'SECURITY.md', ...(await readdir(path.join(root, 'docs'))).filter((f) => f.endsWith('.md')).map((f) => `docs/${f}`)];
 
 export const blocks = (text, language) => [...text.matchAll(new RegExp(`^\`\`\`${language}\\n([^]*?)^\`\`\`$`, 'gm'))].map((m) => m[1]);
 
