@@ -44,8 +44,9 @@ const seen = new Set();
 /** Holds an answer to what the document says of this operation; what was seen is noted. */
 function hold(reply, method, target) {
   const what = `${method} ${target}: ${reply.status} ${reply.type}`;
-  const described = document.paths[target][method.toLowerCase()].responses[reply.status];
-  assert.ok(described, `${what} is not in the document: ${reply.bytes.toString().slice(0, 300)}`);
+  const entry = document.paths[target][method.toLowerCase()].responses[reply.status];
+  assert.ok(entry, `${what} is not in the document: ${reply.bytes.toString().slice(0, 300)}`);
+  const described = resolve(entry);
   const names = Object.keys(described.headers ?? {}).map((name) => name.toLowerCase());
   for (const [name] of reply.headers) assert.ok(PLAIN.includes(name) || names.includes(name), `${what}: the header ${name} is not in the document`);
   for (const [name, header] of Object.entries(described.headers ?? {})) {
@@ -89,7 +90,7 @@ function bare(d, method, target, headers, body) {
   });
 }
 
-test('the document is sound, and its examples are of its schemas', () => {
+test('the document is valid, and its examples match their schemas', () => {
   assert.match(document.openapi, /^3\.1\./);
   for (const [name, schema] of Object.entries(document.components.schemas))
     for (const example of schema.examples ?? []) validate({ $ref: `#/components/schemas/${name}` }, example, `example of ${name}`);
@@ -103,15 +104,41 @@ test('the document is sound, and its examples are of its schemas', () => {
       const inPath = parameters.filter((p) => p.in === 'path').map((p) => p.name);
       assert.deepEqual(inPath, [...target.matchAll(/\{(\w+)\}/g)].map((m) => m[1]), target);
       for (const p of parameters) validate(p.schema, p.example, `${verb} ${target}: ${p.name}`);
-      for (const content of [operation.requestBody, ...Object.values(operation.responses)].map((r) => r?.content ?? {}))
+      for (const content of [operation.requestBody, ...Object.values(operation.responses).map(resolve)].map((r) => r?.content ?? {}))
         for (const media of Object.values(content)) {
-          const examples = media.examples ? Object.values(media.examples).map((e) => e.value) : [media.example];
+          const examples = media.examples ? Object.values(media.examples).map((e) => resolve(e).value) : [media.example];
           for (const example of examples) {
             assert.notEqual(example, undefined, `${verb} ${target} has no example`);
             validate(media.schema, example, `${verb} ${target}`);
           }
         }
     }
+});
+
+test('every reference leads somewhere, and every component is used', () => {
+  const used = new Set([...JSON.stringify(document).matchAll(/"\$ref":"#\/components\/([^"]+)"/g)].map((m) => m[1]));
+  const named = ['parameters', 'headers', 'responses', 'schemas', 'examples'].flatMap((kind) => Object.keys(document.components[kind]).map((name) => `${kind}/${name}`));
+  assert.deepEqual([...used].sort(), named.sort());
+});
+
+test('every problem has an example whose detail says more than its title', async () => {
+  const table = (await readFile(path.join(root, 'api/problem.c'), 'utf8')).match(/table\[\] = \{\n([^]*?)\n\};/)[1];
+  const titles = new Map([...table.matchAll(/\{"([a-z-]+)", (\d{3}), "([^"]+)"\}/g)].map((m) => [`/problems/${m[1]}`, { status: Number(m[2]), title: m[3] }]));
+  const schemas = document.components.schemas;
+  const examples = [...Object.values(document.components.examples).map((e) => e.value), ...Object.values(schemas).flatMap((s) => s.examples ?? [])];
+  const problems = examples.filter((e) => /^\/problems\//.test(e.type));
+  const known = schemas.Problem.oneOf.map((s) => resolve(s).properties);
+  for (const { type, title, status } of known) {
+    assert.deepEqual({ title: title.const, status: status.const }, titles.get(type.const), type.const);
+    assert.ok(problems.some((p) => p.type === type.const), `${type.const} has no example`);
+  }
+  for (const { type, title, detail } of problems) {
+    assert.match(detail, /^\S.*[.]$/, type);
+    const words = (text) => text.toLowerCase().replace(/[^a-z ]/g, '').trim();
+    assert.ok(!words(title).includes(words(detail)), `${type}: the detail repeats the title`);
+    assert.ok(detail.length > title.length, `${type}: ${detail}`);
+  }
+  assert.equal(new Set(problems.map((p) => p.detail)).size, problems.length, 'each example has a detail of its own');
 });
 
 test('the document and the daemon know the same paths and methods', async (t) => {

@@ -2,31 +2,31 @@
 
 /** What the daemon takes and answers, version 1.0.0 of its interface. */
 
-/** SHA-256 in lower-case hex. */
+/** A SHA-256 in lower-case hexadecimal. */
 export type Id = string;
 
-/** 128 random bits in lower-case hex. */
+/** 128 random bits in lower-case hexadecimal. */
 export type JobId = string;
 
-/** RFC 3339, UTC, with milliseconds. */
+/** A time by RFC 3339, in UTC, with milliseconds. */
 export type Instant = string;
 
 export type Mesh = {
   id: Id;
   url: string;
-  /** UTF-8 of 1 to 127 bytes. */
+  /** 1 to 127 bytes of UTF-8. */
   name: string;
-  /** Told by the content. */
+  /** The format, as determined from the content. */
   format: 'obj' | 'off' | 'ply' | 'stl' | 'gltf' | 'glb';
-  /** Of the file as uploaded. */
+  /** The size of the uploaded file. */
   bytes: number;
-  /** After the repairs. */
+  /** The count after repairs. */
   vertices: number;
-  /** After the repairs. */
+  /** The count after repairs. */
   triangles: number;
-  /** Vertices of the file, before any repair: the range of landmark vertex numbers. */
+  /** The vertices of the file before repairs. Landmark vertex numbers are below this count. */
   file_vertices: number;
-  /** Triangles of the file, polygons cut, before any repair: the range of landmark triangle numbers. */
+  /** The triangles of the file before repairs, with polygons triangulated. Landmark triangle numbers are below this count. */
   file_triangles: number;
   topology: {
     components: number;
@@ -35,17 +35,17 @@ export type Mesh = {
     nonmanifold_edges: number;
     nonmanifold_vertices: number;
   };
-  /** In squared units of the file. */
+  /** The surface area, in squared units of the file. */
   area: number;
-  /** In cubed units of the file; positive, the mesh faces outward. */
+  /** The volume, in cubed units of the file. It is positive: the mesh faces outward. */
   volume: number;
   bounds: {
     min: [number, number, number];
     max: [number, number, number];
   };
-  /** The repairs that were allowed, in canonical order. */
+  /** The repairs that the upload allowed, in canonical order. */
   repair: string;
-  /** What was done, in order; empty where nothing was needed. */
+  /** The repairs that were made, in order; empty if the file needed none. */
   repairs: Array<{
     kind: 'triangulate' | 'weld' | 'unused-vertices' | 'duplicate-faces' | 'degenerate-faces' | 'reorient' | 'turn-inside-out' | 'split-vertices' | 'fill_holes' | 'largest_component';
     count: number;
@@ -54,29 +54,29 @@ export type Mesh = {
   created: Instant;
 };
 
-/** newton: progressive, symmetric Dirichlet energy. kernel-sampling: Peng and Timalsena, 2016. */
+/** newton: progressive embedding that minimises the symmetric Dirichlet energy. kernel-sampling: Peng and Timalsena, 2016. */
 export type EmbeddingMethod = 'newton' | 'kernel-sampling';
 
-/** Members that the method has no use for are accepted and belong to the id. Answers hold those that differ from the defaults. */
+/** Members that the method does not use are accepted and are part of the id. Responses contain the members that differ from their defaults. */
 export type EmbeddingOptions = {
   preset?: 'default' | 'fast' | 'quality';
-  /** w of the energy: 1 symmetric Dirichlet, 0 stretch alone. */
+  /** The weight w of the energy: 1 is symmetric Dirichlet, 0 is stretch alone. */
   energy_weight?: number;
-  /** Of kernel-sampling. */
+  /** For kernel-sampling. */
   area_exponent?: number;
-  /** Of kernel-sampling. */
+  /** For kernel-sampling. */
   aspect_exponent?: number;
-  /** Of kernel-sampling. */
+  /** For kernel-sampling. */
   step?: number;
-  /** Of kernel-sampling. */
+  /** For kernel-sampling. */
   displacement_threshold?: number;
-  /** Of kernel-sampling. */
+  /** For kernel-sampling. */
   max_iterations?: number;
-  /** Of kernel-sampling: vertices inserted before the first optimisation of all. */
+  /** For kernel-sampling: how many vertices are inserted before the first optimisation of all vertices. */
   first_optimization?: number;
-  /** Of kernel-sampling: of that number, after each. */
+  /** For kernel-sampling: the factor by which first_optimization grows after each optimisation. */
   growth?: number;
-  /** Of kernel-sampling: quadrics are used down to this many vertices. */
+  /** For kernel-sampling: quadrics are used down to this many vertices. */
   qem_until?: number;
 };
 
@@ -87,19 +87,19 @@ export type EmbeddingRequest = {
 };
 
 export type Certificate = {
-  /** No triangle flipped or degenerate, degree 1. */
+  /** True if no triangle is flipped or degenerate and the degree is 1. */
   valid: boolean;
   flipped: number;
   degenerate: number;
-  /** How often the sphere is covered, with sign. */
+  /** How often the map covers the sphere, with sign. */
   degree: number;
-  /** Decided by exact arithmetic. */
+  /** True if exact arithmetic decided the signs. */
   exact: boolean;
-  /** The smallest det(p, q, r) of a triangle. */
+  /** The smallest det(p, q, r) of all triangles. */
   min_determinant: number | null;
 };
 
-/** Weighted by the source area. null: not measured, or not finite. */
+/** Statistics weighted by the area of the source triangles. A value is null if it was not measured or is not finite. */
 export type Measure = {
   mean: number | null;
   median: number | null;
@@ -107,14 +107,14 @@ export type Measure = {
   max: number | null;
   std: number | null;
   histogram: {
-    /** One more than counts. */
+    /** The limits of the bins: one more than counts. */
     edges: Array<number | null>;
-    /** Triangles in each bin. */
+    /** The number of triangles in each bin. */
     counts: number[];
   };
 };
 
-/** Both areas scaled equal; σ₁ ≥ σ₂ the singular values. symmetric_dirichlet ¼(σ₁²+σ₁⁻²+σ₂²+σ₂⁻²), 1 = isometric; angle σ₁/σ₂; area ln σ₁σ₂; aspect circumradius / 2 inradius of the image. */
+/** Distortion after both surfaces are scaled to equal area; σ₁ ≥ σ₂ are the singular values. symmetric_dirichlet is ¼(σ₁²+σ₁⁻²+σ₂²+σ₂⁻²), 1 for an isometry; angle is σ₁/σ₂; area is ln σ₁σ₂; aspect is circumradius / (2 inradius) of the image triangle. */
 export type Distortion = {
   symmetric_dirichlet: Measure;
   angle: Measure;
@@ -140,58 +140,58 @@ export type Embedding = {
     total: number;
   };
   sphere: string;
-  /** Name and version. */
+  /** The name and version of the engine. */
   engine: string;
   created: Instant;
 };
 
-/** A place on a shape; numbers as in the uploaded file, before any repair. */
+/** A place on a shape. Vertices and triangles are numbered as in the uploaded file, before repairs. */
 export type Place = {
   vertex: number;
 } | {
-  /** The nearest point of the surface is meant. */
+  /** A point in space, which stands for the nearest point of the surface. */
   point: [number, number, number];
 } | {
   triangle: number;
-  /** Not negative, sum 1 within 1e-6. */
+  /** Barycentric coordinates: not negative, with a sum within 1e-6 of 1. */
   barycentric: [number, number, number];
 };
 
 export type Landmark = {
-  /** Default: "landmark" and its number. */
+  /** Default: "landmark" and its number, from 0. */
   name?: string;
-  /** One for each shape, in their order. */
+  /** One place for each shape, in request order. */
   at: Place[];
-  /** rbf: 0 first, then 1, … */
+  /** For rbf: the pass that moves this landmark; pass 0 runs first. */
   pass?: number;
-  /** rbf: of its influence, chord length on the unit sphere; 0: the default. */
+  /** For rbf: the radius of influence, as a chord length on the unit sphere; 0 selects the default. */
   radius?: number;
   confidence?: number;
 };
 
-/** Members that are not known are refused by name; those that a method has no use for belong to the id. */
+/** Unknown members are refused by name. Members that a method does not use are accepted and are part of the id. */
 export type SupermeshRequest = {
   shapes: Array<{
     mesh: Id;
     /** Default: the name of the mesh. */
     name?: string;
   }>;
-  /** "auto", none or an empty list: correspondence is found without help. */
+  /** If "auto", omitted or empty, the alignment finds the correspondence itself. */
   landmarks?: 'auto' | Landmark[];
   embedding?: {
     method?: EmbeddingMethod;
     options?: EmbeddingOptions;
   };
   align?: {
-    /** Default: pin with landmarks, auto without. pin and rbf need landmarks. */
+    /** Default: pin with landmarks, auto without. pin and rbf require landmarks. */
     method?: 'pin' | 'rbf' | 'rotate' | 'auto';
     options?: {
       preset?: 'default' | 'fast' | 'quality';
-      /** rbf: steps of a pass. */
+      /** For rbf: the number of steps of a pass. */
       steps?: number;
-      /** rbf: move the later shapes only. */
+      /** For rbf: move only the later shapes, not the first. */
       one_way?: boolean;
-      /** rbf: of all landmarks; 0: the default. */
+      /** For rbf: the radius of influence of landmarks that set none; 0 selects the default. */
       radius?: number;
       /** Of what is tried in a random order. */
       seed?: number;
@@ -199,9 +199,9 @@ export type SupermeshRequest = {
   };
   remesh?: {
     method?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull';
-    /** Largest deviation, relative to the diagonal of the bounding box. */
+    /** The largest deviation, relative to the diagonal of the bounding box. */
     tolerance?: number;
-    /** 0: no limit. Goes before tolerance. */
+    /** The largest number of triangles; 0 sets no limit. It takes precedence over tolerance. */
     max_triangles?: number;
   };
   asset?: {
@@ -209,20 +209,20 @@ export type SupermeshRequest = {
     animation?: 'pingpong' | 'none';
     /** Move the later shapes onto the first by their landmarks. */
     fit?: 'none' | 'rigid' | 'similarity';
-    /** rigid: in-between targets that keep lengths. */
+    /** rigid adds in-between targets that preserve lengths. */
     path?: 'linear' | 'rigid';
-    /** rigid: targets between two neighbours. */
+    /** For rigid: the number of targets between two consecutive shapes. */
     path_steps?: number;
-    /** Carry the later shapes' colours as morphed attributes. */
+    /** Store the colours of later shapes as morphed attributes. */
     colors?: boolean;
   };
 };
 
-/** The request as it was understood: every member written out (of the embedding, the options that are not default). Sent again it names the same supermesh. */
+/** The request with every member written out; of the embedding options, those that are not default. Sending it again names the same supermesh. */
 export type CanonicalRequest = {
   shapes: Array<{
     mesh: Id;
-    /** UTF-8 of 1 to 127 bytes. */
+    /** 1 to 127 bytes of UTF-8. */
     name: string;
   }>;
   landmarks: 'auto' | Array<{
@@ -240,11 +240,11 @@ export type CanonicalRequest = {
     method: 'pin' | 'rbf' | 'rotate' | 'auto';
     options: {
       preset: 'default' | 'fast' | 'quality';
-      /** rbf: steps of a pass. */
+      /** For rbf: the number of steps of a pass. */
       steps: number;
-      /** rbf: move the later shapes only. */
+      /** For rbf: move only the later shapes, not the first. */
       one_way: boolean;
-      /** rbf: of all landmarks; 0: the default. */
+      /** For rbf: the radius of influence of landmarks that set none; 0 selects the default. */
       radius: number;
       /** Of what is tried in a random order. */
       seed: number;
@@ -252,9 +252,9 @@ export type CanonicalRequest = {
   };
   remesh: {
     method: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull';
-    /** Largest deviation, relative to the diagonal of the bounding box. */
+    /** The largest deviation, relative to the diagonal of the bounding box. */
     tolerance: number;
-    /** 0: no limit. Goes before tolerance. */
+    /** The largest number of triangles; 0 sets no limit. It takes precedence over tolerance. */
     max_triangles: number;
   };
   asset: {
@@ -262,11 +262,11 @@ export type CanonicalRequest = {
     animation: 'pingpong' | 'none';
     /** Move the later shapes onto the first by their landmarks. */
     fit: 'none' | 'rigid' | 'similarity';
-    /** rigid: in-between targets that keep lengths. */
+    /** rigid adds in-between targets that preserve lengths. */
     path: 'linear' | 'rigid';
-    /** rigid: targets between two neighbours. */
+    /** For rigid: the number of targets between two consecutive shapes. */
     path_steps: number;
-    /** Carry the later shapes' colours as morphed attributes. */
+    /** Store the colours of later shapes as morphed attributes. */
     colors: boolean;
   };
 };
@@ -278,75 +278,75 @@ export type Supermesh = {
   asset_bytes: number;
   vertices: number;
   triangles: number;
-  /** In the order of the request. */
+  /** The shapes, in request order. */
   shapes: Array<{
     mesh: Id;
-    /** UTF-8 of 1 to 127 bytes. */
+    /** 1 to 127 bytes of UTF-8. */
     name: string;
-    /** The shape on the common sphere, as PLY. Missing where an older engine made the supermesh. */
+    /** The shape on the common sphere, as PLY. Absent if an older engine made the supermesh. */
     sphere?: string;
-    /** Distance of the supermesh's shape from the mesh: the proved bound where there is one, else sampled. */
+    /** The Hausdorff distance between the supermesh's shape and the mesh: a proved bound if there is one, else sampled. */
     hausdorff_relative: number | null;
     /** Whether hausdorff_relative is a proved bound. */
     hausdorff_proved: boolean;
     hausdorff_sampled_relative: number | null;
     rms_relative: number | null;
-    /** In degrees. */
+    /** The angle between normals, in degrees. */
     normal_deviation: {
       mean: number | null;
       p99: number | null;
     };
-    /** Of the mesh's bounding box, in its own units. */
+    /** The diagonal of the mesh's bounding box, in units of the mesh. */
     diagonal: number | null;
-    /** The smallest triangle's area by the mean one's. */
+    /** The area of the smallest triangle divided by the mean area. */
     min_area_ratio: number | null;
-    /** Column-major 4×4 matrix, as in glTF, that takes the shape's own coordinates to those of the asset: the identity, or what `asset.fit` found. Missing where an older engine made the supermesh. */
+    /** The 4×4 matrix, column-major as in glTF, from the shape's own coordinates to those of the asset: the identity, or the result of `asset.fit`. Absent if an older engine made the supermesh. */
     transform?: number[];
   }>;
-  /** Those of the request, or those that were found. */
+  /** The landmarks of the request, or else the found ones. */
   landmarks: Array<{
-    /** As given, or "landmark" and its number. */
+    /** The name from the request, or "landmark" and its number, from 0. */
     name: string;
-    /** The vertex of the supermesh; −1: none. */
+    /** The vertex of the supermesh; −1 if there is none. */
     vertex: number;
-    /** Distance from where the request put it, one for each shape. */
+    /** The distance from the place that the request gives, one for each shape. */
     residual_relative: Array<number | null>;
   } | {
     /** "auto" and its number, from 1. */
     name: string;
-    /** One for each shape, in their order; can be corrected and sent as a landmark. */
+    /** One place for each shape, in request order. A client can correct them and send them as a landmark. */
     at: Place[];
-    /** One for each shape. */
+    /** One distance for each shape. */
     residual_relative: Array<number | null>;
-    /** 0 to 1. */
+    /** From 0 to 1. */
     confidence: number | null;
   }>;
   certificate: {
     closed: boolean;
     genus: number;
-    /** Of each shape's aligned sphere. */
+    /** For the aligned sphere of each shape. */
     flipped: number[];
-    /** Of each shape's aligned sphere. */
+    /** For the aligned sphere of each shape. */
     degree: number[];
-    /** Each landmark is one vertex, at its place on every shape. */
+    /** True if each landmark is one vertex, at its place on every shape. */
     landmarks_exact: boolean;
-    /** Of the supermesh on the sphere. */
+    /** For the supermesh on the sphere. */
     supermesh: {
       flipped: number;
       degree: number;
     };
   };
-  /** The composed maps. */
+  /** The composed maps between two shapes. */
   pairs: Array<{
-    /** Index into shapes. */
+    /** An index into shapes. */
     a: number;
-    /** Index into shapes. */
+    /** An index into shapes. */
     b: number;
     distortion: Distortion;
-    /** Share of the supermesh's triangles that are turned in space, at either end, against that surface: its smooth normals at their corners and its face at their centre. */
+    /** The share of the supermesh's triangles that are inverted on either shape: turned against the smooth normals of the surface at their corners and its face at their centre. */
     inverted_fraction: number | null;
   }>;
-  /** Of the alignment; null: not measured. */
+  /** The energy of the alignment; null if it was not measured. */
   energy: number | null;
   timings_ms: {
     embed: number;
@@ -357,7 +357,7 @@ export type Supermesh = {
     total: number;
   };
   request: CanonicalRequest;
-  /** Name and version. */
+  /** The name and version of the engine. */
   engine: string;
   created: Instant;
 };
@@ -367,15 +367,15 @@ export type Job = {
   url: string;
   kind: 'embedding' | 'supermesh';
   state: 'queued' | 'running' | 'succeeded' | 'failed' | 'cancelled';
-  /** What is being done: read, simplify, embed, certify, align, remesh, transfer, write, store. */
+  /** The current step: read, simplify, embed, certify, align, remesh, transfer, write or store. */
   stage: string | null;
-  /** Of the whole job. */
+  /** The progress of the whole job. */
   progress: number;
-  /** Once it has succeeded. */
+  /** The result, once the job has succeeded. */
   result: string | null;
-  /** Of a failed job. */
+  /** Why the job failed. */
   problem: Problem | null;
-  /** How often it was begun. */
+  /** How often the job was started. */
   attempt: number;
   created: Instant;
   started: Instant | null;
@@ -383,30 +383,30 @@ export type Job = {
 };
 
 export type MeshPage = {
-  /** The newest first. */
+  /** Newest first. */
   meshes: Mesh[];
-  /** For page_token; null on the last page. */
+  /** The value of page_token for the next page; null on the last page. */
   next_page_token: string | null;
 };
 
 export type EmbeddingPage = {
-  /** The newest first. */
+  /** Newest first. */
   embeddings: Embedding[];
-  /** For page_token; null on the last page. */
+  /** The value of page_token for the next page; null on the last page. */
   next_page_token: string | null;
 };
 
 export type SupermeshPage = {
-  /** The newest first. */
+  /** Newest first. */
   supermeshes: Supermesh[];
-  /** For page_token; null on the last page. */
+  /** The value of page_token for the next page; null on the last page. */
   next_page_token: string | null;
 };
 
 export type JobPage = {
-  /** The newest first. */
+  /** Newest first. */
   jobs: Job[];
-  /** For page_token; null on the last page. */
+  /** The value of page_token for the next page; null on the last page. */
   next_page_token: string | null;
 };
 
@@ -414,7 +414,7 @@ export type Live = {
   status: 'alive';
 };
 
-/** All but status with ?verbose. */
+/** Members other than status appear with ?verbose only. */
 export type Ready = {
   status: 'ready';
   queued?: number;
@@ -423,28 +423,28 @@ export type Ready = {
   connections?: number;
   /** Jobs that wait for embeddings. */
   waiting?: number;
-  /** Unfinished jobs that are taken. */
+  /** The limit on unfinished jobs. */
   queue_limit?: number;
   /** The age of the oldest queued job. */
   oldest_ms?: number;
-  /** Connections that are taken. */
+  /** The limit on connections. */
   max_connections?: number;
-  /** Suspended: they wait for a job. */
+  /** Connections that wait for a job. */
   waiting_connections?: number;
-  /** Of the data folder's disk. */
+  /** Free space of the file system that holds the data folder. */
   disk_free_bytes?: number;
-  /** Since the start. */
+  /** The time since the daemon started. */
   uptime_seconds?: number;
-  /** Name and version. */
+  /** The name and version of the engine. */
   engine?: string;
 };
 
-/** Two readers could understand the headers in different ways, or a route that takes no body was given one. The connection closes. */
+/** The headers are ambiguous, or the route takes no body but the request has one. The daemon closes the connection. */
 export type ProblemBadRequest = {
   type: '/problems/bad-request';
   title: 'The request is malformed';
   status: 400;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
@@ -452,7 +452,7 @@ export type ProblemBadQuery = {
   type: '/problems/bad-query';
   title: 'A query parameter is not valid';
   status: 400;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
@@ -460,40 +460,40 @@ export type ProblemMalformedJson = {
   type: '/problems/malformed-json';
   title: 'The body is not valid JSON';
   status: 400;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** The byte where reading stopped. */
+  /** The byte at which the parser stopped. */
   offset: number;
 };
 
-/** Always with line or offset. */
+/** Has line or offset. */
 export type ProblemMalformedMesh = {
   type: '/problems/malformed-mesh';
-  title: 'The mesh file is broken';
+  title: 'The mesh file is malformed';
   status: 400;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Of the text file, from 1; the end where something is missing. */
+  /** The line of a text file, from 1; the last line if something is missing. */
   line?: number;
-  /** In bytes. */
+  /** The offset in bytes. */
   offset?: number;
 };
 
 export type ProblemMalformedEncoding = {
   type: '/problems/malformed-encoding';
-  title: 'The compressed body is broken';
+  title: 'The compressed body is malformed';
   status: 400;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** In bytes of the body as it came. */
+  /** The offset in bytes of the body before unpacking. */
   offset?: number;
 };
 
 export type ProblemUnauthorized = {
   type: '/problems/unauthorized';
-  title: 'A token is needed';
+  title: 'A valid token is required';
   status: 401;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
@@ -501,107 +501,107 @@ export type ProblemForbidden = {
   type: '/problems/forbidden';
   title: 'The token does not allow this';
   status: 403;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** The one that is needed. */
+  /** The required scope. */
   scope: 'read' | 'write' | 'admin';
 };
 
 export type ProblemNotFound = {
   type: '/problems/not-found';
-  title: 'There is no such thing here';
+  title: 'Not found';
   status: 404;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** The id that is not known, where a request names it. */
+  /** The unknown id, if the request names it in the body. */
   mesh?: string;
 };
 
 export type ProblemMethodNotAllowed = {
   type: '/problems/method-not-allowed';
-  title: 'This path does not answer to that method';
+  title: 'Method not allowed';
   status: 405;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
 export type ProblemInUse = {
   type: '/problems/in-use';
-  title: 'Unfinished jobs need it';
+  title: 'Unfinished jobs use this mesh';
   status: 409;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
 export type ProblemJobEnded = {
   type: '/problems/job-ended';
-  title: 'The job has ended already';
+  title: 'The job has already ended';
   status: 409;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
 export type ProblemLengthRequired = {
   type: '/problems/length-required';
-  title: 'The length of the body is needed';
+  title: 'The length of the body is required';
   status: 411;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
 export type ProblemTooLarge = {
   type: '/problems/too-large';
-  title: 'It is too large';
+  title: 'The input is too large';
   status: 413;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** In bytes, where the body is beyond it. */
+  /** The limit in bytes, if the body exceeds it. */
   limit?: number;
-  /** Of the text file, from 1; the end where something is missing. */
+  /** The line of a text file, from 1; the last line if something is missing. */
   line?: number;
-  /** In bytes. */
+  /** The offset in bytes. */
   offset?: number;
-  /** Their numbers in the request. */
+  /** The numbers of the landmarks in the request, from 0. */
   landmarks?: number[];
-  /** Its number in the request. */
+  /** The number of the shape in the request, from 0. */
   shape?: number;
-  /** Where a compressed body grows beyond so many times its size. */
+  /** The limit that a compressed body exceeds: unpacked size over packed size. */
   ratio_limit?: number;
 };
 
 export type ProblemUnknownFormat = {
   type: '/problems/unknown-format';
-  title: 'The bytes are of no known mesh format';
+  title: 'The mesh format is not recognised';
   status: 415;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Of the text file, from 1; the end where something is missing. */
+  /** The line of a text file, from 1; the last line if something is missing. */
   line?: number;
-  /** In bytes. */
+  /** The offset in bytes. */
   offset?: number;
 };
 
 export type ProblemUnsupportedEncoding = {
   type: '/problems/unsupported-encoding';
-  title: 'The content encoding is not known';
+  title: 'The content encoding is not supported';
   status: 415;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
 export type ProblemPreconditionFailed = {
   type: '/problems/precondition-failed';
-  title: 'A condition of the request does not hold';
+  title: 'A precondition failed';
   status: 412;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
 export type ProblemRangeNotSatisfiable = {
   type: '/problems/range-not-satisfiable';
-  title: 'The range lies outside';
+  title: 'The range lies outside the file';
   status: 416;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
@@ -609,32 +609,32 @@ export type ProblemNotClosed = {
   type: '/problems/not-closed';
   title: 'The mesh is not closed';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
   boundary_loops: number;
   boundary_edge_count: number;
-  /** Pairs of vertex numbers of the file, up to 100. */
+  /** Up to 100 pairs of vertex numbers of the file, from 0. */
   boundary_edges: [number, number][];
   component_count?: number;
-  /** Triangles of each, the largest first. */
+  /** The number of triangles of each component, largest first. */
   components?: number[];
 };
 
-/** edges: those of more than two faces; vertices: those where two fans touch. */
+/** edges: edges of more than two faces; vertices: vertices where two fans of faces touch. */
 export type ProblemNotManifold = {
   type: '/problems/not-manifold';
   title: 'The mesh is not manifold';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
   edge_count?: number;
-  /** Pairs of vertex numbers of the file, up to 100. */
+  /** Up to 100 pairs of vertex numbers of the file, from 0. */
   edges?: [number, number][];
   vertex_count?: number;
-  /** Vertex numbers of the file, up to 100. */
+  /** Up to 100 vertex numbers of the file, from 0. */
   vertices?: number[];
   component_count?: number;
-  /** Triangles of each, the largest first. */
+  /** The number of triangles of each component, largest first. */
   components?: number[];
 };
 
@@ -642,24 +642,24 @@ export type ProblemNotOrientable = {
   type: '/problems/not-orientable';
   title: 'The mesh cannot be oriented';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
   edge_count?: number;
-  /** Pairs of vertex numbers of the file, up to 100. */
+  /** Up to 100 pairs of vertex numbers of the file, from 0. */
   edges?: [number, number][];
   component_count?: number;
-  /** Triangles of each, the largest first. */
+  /** The number of triangles of each component, largest first. */
   components?: number[];
 };
 
 export type ProblemNotConnected = {
   type: '/problems/not-connected';
-  title: 'The mesh is in several pieces';
+  title: 'The mesh is not connected';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
   component_count: number;
-  /** Triangles of each, the largest first. */
+  /** The number of triangles of each component, largest first. */
   components: number[];
 };
 
@@ -667,16 +667,16 @@ export type ProblemNotGenusZero = {
   type: '/problems/not-genus-zero';
   title: 'The mesh has handles';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
   genus: number;
 };
 
 export type ProblemDegenerate = {
   type: '/problems/degenerate';
-  title: 'The surface is degenerate';
+  title: 'The mesh is degenerate';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
@@ -684,26 +684,26 @@ export type ProblemNotFinite = {
   type: '/problems/not-finite';
   title: 'A coordinate is not finite or too large';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Of the text file, from 1; the end where something is missing. */
+  /** The line of a text file, from 1; the last line if something is missing. */
   line?: number;
-  /** In bytes. */
+  /** The offset in bytes. */
   offset?: number;
   vertex_count?: number;
-  /** Vertex numbers of the file, up to 100. */
+  /** Up to 100 vertex numbers of the file, from 0. */
   vertices?: number[];
 };
 
 export type ProblemBadLandmarks = {
   type: '/problems/bad-landmarks';
-  title: 'The landmarks cannot be met';
+  title: 'The landmarks are invalid or contradict each other';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Their numbers in the request. */
+  /** The numbers of the landmarks in the request, from 0. */
   landmarks?: number[];
-  /** Its number in the request. */
+  /** The number of the shape in the request, from 0. */
   shape?: number;
   reason?: 'out-of-range' | 'dropped';
 };
@@ -712,23 +712,23 @@ export type ProblemBadOption = {
   type: '/problems/bad-option';
   title: 'An option is not valid';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Its name. */
+  /** The name of the member. */
   member?: string;
-  /** Their numbers in the request. */
+  /** The numbers of the landmarks in the request, from 0. */
   landmarks?: number[];
-  /** Its number in the request. */
+  /** The number of the shape in the request, from 0. */
   shape?: number;
 };
 
 export type ProblemUnknownMember = {
   type: '/problems/unknown-member';
-  title: 'A member is not known';
+  title: 'A member is unknown';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Its name. */
+  /** The name of the member. */
   member: string;
 };
 
@@ -736,21 +736,21 @@ export type ProblemInvalidRequest = {
   type: '/problems/invalid-request';
   title: 'The request is not valid';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
 export type ProblemUnsupportedMethod = {
   type: '/problems/unsupported-method';
-  title: 'The method is not available';
+  title: 'The method is not available in this build';
   status: 422;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Its name. */
+  /** The name of the method. */
   method?: string;
-  /** Their numbers in the request. */
+  /** The numbers of the landmarks in the request, from 0. */
   landmarks?: number[];
-  /** Its number in the request. */
+  /** The number of the shape in the request, from 0. */
   shape?: number;
 };
 
@@ -758,17 +758,17 @@ export type ProblemTooManyRequests = {
   type: '/problems/too-many-requests';
   title: 'Too many requests';
   status: 429;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
 export type ProblemQuotaExceeded = {
   type: '/problems/quota-exceeded';
-  title: 'The quota is used up';
+  title: 'The quota is exhausted';
   status: 429;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Bytes of meshes that the token's tenant may own, or jobs that it may have unfinished. */
+  /** The bytes of meshes that the token's tenant may own, or the unfinished jobs that it may have. */
   quota: number;
 };
 
@@ -776,93 +776,93 @@ export type ProblemQueueFull = {
   type: '/problems/queue-full';
   title: 'The queue is full';
   status: 429;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
 export type ProblemInternal = {
   type: '/problems/internal';
-  title: 'A fault of the server';
+  title: 'Internal server error';
   status: 500;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Their numbers in the request. */
+  /** The numbers of the landmarks in the request, from 0. */
   landmarks?: number[];
-  /** Its number in the request. */
+  /** The number of the shape in the request, from 0. */
   shape?: number;
 };
 
-/** Of a job: no result is given rather than one that is not valid. */
+/** For jobs: the daemon returns no result rather than an invalid one. */
 export type ProblemNotCertified = {
   type: '/problems/not-certified';
   title: 'The result could not be certified';
   status: 500;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Their numbers in the request. */
+  /** The numbers of the landmarks in the request, from 0. */
   landmarks?: number[];
-  /** Its number in the request. */
+  /** The number of the shape in the request, from 0. */
   shape?: number;
 };
 
-/** Of a job. */
+/** For jobs. */
 export type ProblemCorrupt = {
   type: '/problems/corrupt';
-  title: 'Stored data do not decode';
+  title: 'Stored data is corrupt';
   status: 500;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
-/** Of a job. */
+/** For jobs. */
 export type ProblemCrashed = {
   type: '/problems/crashed';
-  title: 'The job ended the process repeatedly';
+  title: 'The job crashed the server repeatedly';
   status: 500;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
-/** Of a job, or of the check of an upload. */
+/** For jobs, and for the check of an upload. */
 export type ProblemTimeout = {
   type: '/problems/timeout';
-  title: 'The job ran out of time';
+  title: 'The time limit was reached';
   status: 503;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Their numbers in the request. */
+  /** The numbers of the landmarks in the request, from 0. */
   landmarks?: number[];
-  /** Its number in the request. */
+  /** The number of the shape in the request, from 0. */
   shape?: number;
 };
 
 export type ProblemNoMemory = {
   type: '/problems/no-memory';
-  title: 'The job ran out of memory';
+  title: 'Out of memory';
   status: 503;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
-  /** Their numbers in the request. */
+  /** The numbers of the landmarks in the request, from 0. */
   landmarks?: number[];
-  /** Its number in the request. */
+  /** The number of the shape in the request, from 0. */
   shape?: number;
 };
 
 export type ProblemUnavailable = {
   type: '/problems/unavailable';
-  title: 'The service is not available now';
+  title: 'The service is unavailable';
   status: 503;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
 export type ProblemStorageFull = {
   type: '/problems/storage-full';
-  title: 'The storage is full';
+  title: 'The disk is full';
   status: 507;
-  /** What is wrong and what to do, in plain words. */
+  /** What is wrong and what to do. */
   detail: string;
 };
 
-/** RFC 9457; `type` tells which. */
+/** A problem document of RFC 9457; `type` identifies the problem. */
 export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedEncoding | ProblemPreconditionFailed | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemTimeout | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;
