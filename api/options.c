@@ -110,7 +110,6 @@ static void write_one(api_text *out, const api_option *o, const char *from) {
       api_json_number(out, number);
       break;
     case API_OPTION_INT64:
-    case API_OPTION_UINT64:
       memcpy(&wide, from, sizeof wide);
       api_json_integer(out, wide);
       break;

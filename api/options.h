@@ -11,7 +11,6 @@ typedef enum api_option_kind {
   API_OPTION_NUMBER, /* double */
   API_OPTION_INT32,
   API_OPTION_INT64,
-  API_OPTION_UINT64,
   API_OPTION_BOOL, /* int */
   API_OPTION_NAME, /* an enum; its names in words */
 } api_option_kind;

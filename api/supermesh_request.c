@@ -21,7 +21,6 @@ static const api_option align_table[] = {
     {"steps", API_OPTION_INT32, ALIGN(rbf_steps), 1, 10000, NULL},
     {"one_way", API_OPTION_BOOL, ALIGN(one_way), 0, 0, NULL},
     {"radius", API_OPTION_NUMBER, ALIGN(rbf_radius), 0, 2, NULL},
-    {"seed", API_OPTION_UINT64, ALIGN(seed), 0, 9007199254740992.0, NULL},
 };
 #define REMESH(field) offsetof(orb_remesh_options, field)
 static const api_option remesh_table[] = {

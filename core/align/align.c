@@ -12,7 +12,6 @@ void orb_align_defaults(orb_align_options *options) {
   memset(options, 0, sizeof *options);
   options->method = ORB_ALIGN_PIN;
   options->rbf_steps = 10;
-  options->seed = 1;
 }
 
 static orb_status check_request(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,

@@ -170,6 +170,7 @@ static void test_supermesh_requests(void **state) {
   assert_string_equal(supermesh("{" SHAPES ",\"remesh\":{\"tolerance\":0.002}}", b), "");
   assert_string_not_equal(a, b);
   assert_string_equal(supermesh("{" SHAPES ",\"zap\":1}", b), "unknown-member");
+  assert_string_equal(supermesh("{" SHAPES ",\"align\":{\"options\":{\"seed\":1}}}", b), "unknown-member");
   assert_string_equal(supermesh("{" SHAPES ",\"align\":{\"method\":\"pin\"}}", b), "bad-landmarks");
   assert_string_equal(supermesh("{" SHAPES ",\"remesh\":{\"method\":\"magic\"}}", b), "bad-option");
   assert_string_equal(supermesh("{" SHAPES ",\"landmarks\":[{\"at\":[{\"vertex\":1}]}]}", b), "bad-landmarks");

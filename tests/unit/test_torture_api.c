@@ -107,7 +107,7 @@ static void test_supermesh(void **state) {
                     "\"landmarks\":[{\"name\":\"nose\",\"at\":[{\"vertex\":1},{\"point\":[1,0.5,2]}]},"
                     "{\"at\":[{\"triangle\":3,\"barycentric\":[0.25,0.25,0.5]},{\"vertex\":7}]},"
                     "{\"at\":[{\"vertex\":2},{\"vertex\":3}],\"confidence\":0.5}],"
-                    "\"align\":{\"method\":\"pin\",\"options\":{\"seed\":7}},"
+                    "\"align\":{\"method\":\"pin\",\"options\":{\"steps\":7}},"
                     "\"remesh\":{\"method\":\"adaptive\",\"tolerance\":0.01}}",
             .through = through_supermesh};
   torture_body(&b);

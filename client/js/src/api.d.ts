@@ -193,8 +193,6 @@ export type SupermeshRequest = {
       one_way?: boolean;
       /** For rbf: the radius of influence of landmarks that set none; 0 selects the default. */
       radius?: number;
-      /** Of what is tried in a random order. */
-      seed?: number;
     };
   };
   remesh?: {
@@ -246,8 +244,6 @@ export type CanonicalRequest = {
       one_way: boolean;
       /** For rbf: the radius of influence of landmarks that set none; 0 selects the default. */
       radius: number;
-      /** Of what is tried in a random order. */
-      seed: number;
     };
   };
   remesh: {

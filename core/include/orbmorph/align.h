@@ -27,7 +27,6 @@ typedef struct orb_align_options {
   double rbf_radius; /* for all landmarks; 0: default */
   double max_growth; /* pin: a mesh may get so many times its triangles (or 2000 if it has fewer) more, at most 800000,
                         before landmarks are refused; 0: 64 */
-  uint64_t seed;
 } orb_align_options;
 void orb_align_defaults(orb_align_options *options);
 
