@@ -62,7 +62,8 @@ int api_embedding_request_read(const cJSON *body, api_embedding_request *out, ap
     return api_refuse(problem, "invalid-request", "\"mesh\" must be the id of an uploaded mesh.");
   }
   if (!api_id_valid(mesh->valuestring, strlen(mesh->valuestring))) {
-    return api_refuse(problem, "not-found", "\"mesh\" is not the id of a mesh: upload it first, and use its \"id\".");
+    return api_refuse(problem, "not-found",
+                      "\"mesh\" is not the id of a mesh. Upload the mesh and use the \"id\" of the answer.");
   }
   memcpy(out->mesh, mesh->valuestring, API_ID_SIZE);
   return 1;

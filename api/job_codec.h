@@ -1,4 +1,4 @@
-/* Jobs on the wire. */
+/* The JSON of jobs. */
 #ifndef ORB_API_JOB_CODEC_H
 #define ORB_API_JOB_CODEC_H
 
@@ -15,7 +15,7 @@ typedef enum api_job_state {
 
 typedef struct api_job_view {
   const char *id, *key, *stage;
-  const char *problem; /* a document, or NULL */
+  const char *problem; /* its JSON document, or NULL */
   api_job_kind kind;
   api_job_state state;
   double progress;
@@ -25,7 +25,7 @@ typedef struct api_job_view {
 
 const char *api_job_kind_name(api_job_kind kind);
 const char *api_job_state_name(api_job_state state);
-/* −1 for an unknown name. */
+/* Returns −1 for an unknown name. */
 int api_job_state_of_name(const char *name);
 static inline int api_job_ended(api_job_state state) {
   return state >= API_JOB_SUCCEEDED;

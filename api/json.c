@@ -1,5 +1,5 @@
-/* The scanner keeps a bit a level (object or array) instead of recursing; what it lets through is a subset of what
- * cJSON reads, so cJSON can only fail for want of memory. */
+/* The scanner keeps one character per level ('{' or '[') instead of recursing. It accepts a subset of what cJSON reads,
+ * so cJSON can only fail when memory runs out. */
 #include "api/json.h"
 
 #include <math.h>
@@ -42,7 +42,7 @@ static int hex4(scanner *s, unsigned *out) {
   unsigned value = 0;
   for (int i = 0; i < 4; i++, s->at++) {
     if (s->at >= s->end) {
-      return refuse(s, "a string does not end");
+      return refuse(s, "a string is not closed");
     }
     unsigned char c = *s->at;
     unsigned digit = c >= '0' && c <= '9'   ? (unsigned)c - '0'
@@ -61,31 +61,31 @@ static int hex4(scanner *s, unsigned *out) {
 static int escape(scanner *s) {
   unsigned unit, low;
   if (s->at >= s->end) {
-    return refuse(s, "a string does not end");
+    return refuse(s, "a string is not closed");
   }
   unsigned char c = *s->at++;
   if (c != 'u') {
-    return strchr("\"\\/bfnrt", c) && c ? 1 : refuse(s, "a backslash is followed by none of \"\\/bfnrtu");
+    return strchr("\"\\/bfnrt", c) && c ? 1 : refuse(s, "a backslash must be followed by one of \"\\/bfnrtu");
   }
   if (!hex4(s, &unit)) {
     return 0;
   }
   if (unit == 0) {
-    return refuse(s, "a string holds the character NUL");
+    return refuse(s, "a string contains the character NUL");
   }
   if (unit >= 0xdc00 && unit <= 0xdfff) {
-    return refuse(s, "a surrogate stands alone");
+    return refuse(s, "a surrogate is not paired");
   }
   if (unit >= 0xd800 && unit <= 0xdbff) {
     if (s->end - s->at < 6 || s->at[0] != '\\' || s->at[1] != 'u') {
-      return refuse(s, "a surrogate stands alone");
+      return refuse(s, "a surrogate is not paired");
     }
     s->at += 2;
     if (!hex4(s, &low)) {
       return 0;
     }
     if (low < 0xdc00 || low > 0xdfff) {
-      return refuse(s, "a surrogate stands alone");
+      return refuse(s, "a surrogate is not paired");
     }
   }
   return 1;
@@ -99,7 +99,7 @@ static int string(scanner *s) {
       return 1;
     }
     if (c < 0x20) {
-      return refuse(s, "a string holds a control character");
+      return refuse(s, "a string contains a control character");
     }
     if (c == '\\') {
       s->at++;
@@ -114,7 +114,7 @@ static int string(scanner *s) {
     }
     s->at += n;
   }
-  return refuse(s, "a string does not end");
+  return refuse(s, "a string is not closed");
 }
 
 static size_t digits(scanner *s) {
@@ -151,7 +151,7 @@ static int number(scanner *s) {
       return refuse(s, "a number is malformed");
     }
   }
-  /* cJSON copies at most 63 characters of a number: longer ones would be cut. */
+  /* cJSON truncates numbers of more than 63 characters. */
   char copy[64];
   size_t length = (size_t)(s->at - begin);
   if (length >= sizeof copy) {
@@ -204,12 +204,13 @@ static int name(scanner *s) {
   return 1;
 }
 
-/* After a value: closes what is complete. Returns 1 when another value must follow, 2 at the end of all, 0 refused. */
+/* Closes the objects and arrays that end after a value. Returns 1 if another value must follow, 2 at the end of the
+ * text, 0 if it refuses. */
 static int after_value(scanner *s, const char *stack, int *depth) {
   while (*depth > 0) {
     blanks(s);
     if (s->at >= s->end) {
-      return refuse(s, "the text ends too early");
+      return refuse(s, "the text ends before the value is complete");
     }
     char open = stack[*depth - 1];
     if (*s->at == ',') {
@@ -231,12 +232,12 @@ static int scan(scanner *s) {
   while (more == 1) {
     blanks(s);
     if (s->at >= s->end) {
-      return refuse(s, s->begin == s->end ? "the body is empty" : "the text ends too early");
+      return refuse(s, s->begin == s->end ? "the body is empty" : "the text ends before the value is complete");
     }
     unsigned char c = *s->at;
     if (c == '{' || c == '[') {
       if (depth == API_JSON_DEPTH) {
-        return refuse(s, "it is nested deeper than 32 levels");
+        return refuse(s, "the value is nested deeper than 32 levels");
       }
       stack[depth++] = (char)c;
       s->at++;
@@ -260,14 +261,15 @@ static int scan(scanner *s) {
     return 0;
   }
   blanks(s);
-  return s->at == s->end ? 1 : refuse(s, "something follows after the value");
+  return s->at == s->end ? 1 : refuse(s, "the value is followed by more text");
 }
 
 static int by_name(const void *a, const void *b) {
   return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-/* 1 if an object of the tree has a name twice, 0 if none, −1 out of memory. Depth is bounded by the scanner. */
+/* Returns 1 if an object in the tree has the same name twice, 0 if none has, −1 if memory runs out. It recurses: the
+ * scanner bounds the depth. */
 static int has_duplicates(const cJSON *value) {
   if (cJSON_IsObject(value)) {
     size_t n = (size_t)cJSON_GetArraySize(value), i = 0;

@@ -1,4 +1,4 @@
-/* Landmarks of a request or of a landmark file. */
+/* Reads the landmarks of a request or a landmark file. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -46,7 +46,7 @@ static int read_index(const cJSON *value, int32_t *out) {
   return 1;
 }
 
-/* Barycentric coordinates as given need only be near a sum of one; they are kept scaled to it. */
+/* The sum of barycentric coordinates may differ from 1 by 1e-6; they are stored scaled to a sum of 1. */
 static const char *read_barycentric(const cJSON *value, double out[3]) {
   if (!read_triple(value, out)) {
     return "\"barycentric\" must be three numbers";
@@ -61,17 +61,17 @@ static const char *read_barycentric(const cJSON *value, double out[3]) {
   return NULL;
 }
 
-/* NULL where fine, else why not. */
+/* Returns NULL, or why the place is not valid. */
 static const char *read_spot(const cJSON *value, api_place *out) {
   const cJSON *vertex = cJSON_GetObjectItemCaseSensitive(value, "vertex");
   const cJSON *point = cJSON_GetObjectItemCaseSensitive(value, "point");
   const cJSON *triangle = cJSON_GetObjectItemCaseSensitive(value, "triangle");
   if (!cJSON_IsObject(value) || !!vertex + !!point + !!triangle != 1) {
-    return "a place is one of {\"vertex\":i}, {\"point\":[x,y,z]}, {\"triangle\":t,\"barycentric\":[a,b,c]}";
+    return "a place must be one of {\"vertex\":i}, {\"point\":[x,y,z]}, {\"triangle\":t,\"barycentric\":[a,b,c]}";
   }
   if (vertex) {
     out->kind = API_PLACE_VERTEX;
-    return read_index(vertex, &out->index) ? NULL : "\"vertex\" must be a whole number from 0, as in the file";
+    return read_index(vertex, &out->index) ? NULL : "\"vertex\" must be a vertex number of the file, from 0";
   }
   if (point) {
     out->kind = API_PLACE_POINT;
@@ -79,7 +79,7 @@ static const char *read_spot(const cJSON *value, api_place *out) {
   }
   out->kind = API_PLACE_TRIANGLE;
   if (!read_index(triangle, &out->index)) {
-    return "\"triangle\" must be a whole number from 0, in the order of the file";
+    return "\"triangle\" must be a triangle number of the file, from 0";
   }
   return read_barycentric(cJSON_GetObjectItemCaseSensitive(value, "barycentric"), out->at);
 }
@@ -115,7 +115,7 @@ static int read_landmark(const cJSON *value, int32_t index, api_landmark_list *l
   spec->confidence = 1;
   snprintf(spec->name, sizeof spec->name, "landmark %d", index);
   if (!cJSON_IsObject(value)) {
-    return refuse(problem, index, -1, "a landmark is an object with \"name\" and \"at\"");
+    return refuse(problem, index, -1, "a landmark must be an object with \"at\"");
   }
   if (!api_members_known(value, "a landmark", known, problem)) {
     return 0;
@@ -153,7 +153,7 @@ int api_landmarks_read(const cJSON *value, int32_t shape_count, api_landmark_lis
   }
   int count = cJSON_GetArraySize(value);
   if (count > API_LANDMARKS_MAX) {
-    return api_refuse(problem, "bad-landmarks", "There are %d landmarks; at most %d are allowed.", count,
+    return api_refuse(problem, "bad-landmarks", "The request has %d landmarks; at most %d are accepted.", count,
                       API_LANDMARKS_MAX);
   }
   if (shape_count == 0 && count > 0) {
@@ -166,7 +166,7 @@ int api_landmarks_read(const cJSON *value, int32_t shape_count, api_landmark_lis
   out->items = calloc((size_t)count, sizeof *out->items);
   out->spots = calloc((size_t)count * (size_t)(shape_count > 0 ? shape_count : 1), sizeof *out->spots);
   if (!out->items || !out->spots) {
-    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+    return api_refuse(problem, "no-memory", "The server has no memory left. Try again later.");
   }
   for (const cJSON *item = value->child; item; item = item->next, out->count++) {
     if (!read_landmark(item, out->count, out, problem)) {

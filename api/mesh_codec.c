@@ -23,7 +23,7 @@ int api_repair_parse(const char *list, unsigned *flags, char canonical[API_REPAI
     }
     if (k == KINDS) {
       return api_refuse(problem, "bad-query",
-                        "There is no repair \"%.*s\"; use none, safe, fill_holes, largest_component.",
+                        "There is no repair \"%.*s\". Use none, safe, fill_holes or largest_component.",
                         (int)(n < 60 ? n : 60), at);
     }
     none |= k == 0;
@@ -34,7 +34,7 @@ int api_repair_parse(const char *list, unsigned *flags, char canonical[API_REPAI
     }
   }
   if (none && all) {
-    return api_refuse(problem, "bad-query", "The repair \"none\" stands alone or not at all.");
+    return api_refuse(problem, "bad-query", "The repair \"none\" excludes all others. Remove it or the others.");
   }
   all |= all ? ORB_REPAIR_SAFE : 0;
   *flags = all;

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static const double EXACT = 9007199254740992.0; /* 2^53: integers up to here are exact in JSON */
+static const double EXACT = 9007199254740992.0; /* 2^53: doubles represent all integers up to it exactly */
 
 int api_members_known(const cJSON *object, const char *where, const char *const *names, api_problem *problem) {
   for (const cJSON *m = object->child; m; m = m->next) {
@@ -13,7 +13,7 @@ int api_members_known(const cJSON *object, const char *where, const char *const 
       i++;
     }
     if (!names[i]) {
-      api_refuse(problem, "unknown-member", "There is no member \"%.100s\" in %s; take it out or mend its spelling.",
+      api_refuse(problem, "unknown-member", "There is no member \"%.100s\" in %s. Correct its spelling or remove it.",
                  m->string, where);
       api_json_member_string(&problem->facts, "member", m->string);
       return 0;
@@ -77,7 +77,7 @@ static int read_one(const cJSON *value, const char *where, const api_option *o, 
 int api_options_read(const cJSON *object, const char *where, const api_option *table, size_t count, void *base,
                      api_problem *problem) {
   if (!cJSON_IsObject(object)) {
-    return api_refuse(problem, "invalid-request", "%s must be an object.", where);
+    return api_refuse(problem, "invalid-request", "%s must be a JSON object.", where);
   }
   for (const cJSON *m = object->child; m; m = m->next) {
     size_t i = 0;

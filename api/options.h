@@ -1,5 +1,6 @@
-/* Members of a request by table: name, type, range, place in a struct. One table serves parsing (unknown members are
- * refused by name, values checked) and the canonical text (values that differ from the default, in table order). */
+/* Tables of request members: name, kind, range and offset in a struct. The same table drives the parser, which refuses
+ * unknown members by name and checks values, and the writer of the canonical text, which follows the order of the
+ * table. */
 #ifndef ORB_API_OPTIONS_H
 #define ORB_API_OPTIONS_H
 
@@ -12,25 +13,26 @@ typedef enum api_option_kind {
   API_OPTION_INT32,
   API_OPTION_INT64,
   API_OPTION_BOOL, /* int */
-  API_OPTION_NAME, /* an enum; its names in words */
+  API_OPTION_NAME, /* an enum, whose names are in words */
 } api_option_kind;
 
 typedef struct api_option {
   const char *name;
   api_option_kind kind;
   size_t offset;
-  double least, most;       /* of numbers, both allowed */
-  const char *const *words; /* of names, NULL-terminated, in enum order */
+  double least, most;       /* the range of a number, inclusive */
+  const char *const *words; /* the names in enum order, NULL-terminated */
 } api_option;
 
-/* Reads the members of an object into base. where: for messages, e.g. "options". 1, or 0 with the problem. */
+/* Reads the members of an object into base. Returns 1, or 0 with *problem filled. where: names the object in messages,
+ * such as "options". */
 int api_options_read(const cJSON *object, const char *where, const api_option *table, size_t count, void *base,
                      api_problem *problem);
 
-/* Appends an object of the values; those equal to defaults are left out unless defaults is NULL. */
+/* Appends an object with the values that differ from defaults, or with all values if defaults is NULL. */
 void api_options_write(api_text *out, const api_option *table, size_t count, const void *base, const void *defaults);
 
-/* Refuses members beside the names (NULL-terminated). 1 fine, 0 refused. */
+/* Refuses members that are not in the NULL-terminated list. Returns 1, or 0 with *problem filled. */
 int api_members_known(const cJSON *object, const char *where, const char *const *names, api_problem *problem);
 
 #endif

@@ -69,9 +69,6 @@ int api_problem_status(const char *name) {
 const char *api_problem_title(const char *name) {
   return find(name)->title;
 }
-const char *api_problem_name_at(size_t index) {
-  return index < COUNT ? table[index].name : NULL;
-}
 
 void api_problem_free(api_problem *problem) {
   api_text_free(&problem->facts);

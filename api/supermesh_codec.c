@@ -23,7 +23,7 @@ static int landmarks_exact(const orb_merge_result *result) {
 void api_merge_certificate_write(const orb_merge_result *result, api_text *out) {
   const orb_supermesh *mesh = &result->supermesh;
   api_json_open(out, '{');
-  /* The engine only returns supermeshes that are closed and of genus zero; Euler's count says it once more. */
+  /* Redundant by design: the engine returns only closed supermeshes of genus zero, and Euler's formula checks it. */
   api_json_member_bool(out, "closed", (int64_t)mesh->triangle_count == 2 * (int64_t)mesh->vertex_count - 4);
   api_json_member_number(out, "genus", (2 - ((double)mesh->vertex_count - 0.5 * (double)mesh->triangle_count)) / 2);
   api_json_key(out, "flipped");
@@ -106,7 +106,7 @@ static void write_found(const orb_merge_result *result, const api_place *found, 
   }
 }
 
-/* The landmarks of the request, or else those that were found. */
+/* Writes the landmarks of the request, or else the found ones. */
 static void write_landmarks(const api_supermesh_request *request, const orb_merge_result *result,
                             const api_place *found, api_text *out) {
   int32_t shapes = request->shape_count;

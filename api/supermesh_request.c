@@ -1,5 +1,6 @@
-/* The request for a supermesh: reading, checking against the meshes, canonical text. Everything is written out in the
- * canonical text, also what is default and what the chosen method has no use for, so that each belongs to the id. */
+/* The request for a supermesh: reads it, checks it against the meshes, and writes its canonical text. The canonical
+ * text contains every member, even those that are default or that the method does not use, so all of them are part of
+ * the id. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,7 +44,7 @@ static int read_shape(const cJSON *value, int32_t index, api_supermesh_request *
   static const char *const known[] = {"mesh", "name", NULL};
   struct api_shape_spec *shape = &out->shapes[index];
   if (!cJSON_IsObject(value)) {
-    return api_refuse(problem, "invalid-request", "Each of \"shapes\" must be an object with \"mesh\".");
+    return api_refuse(problem, "invalid-request", "Each entry of \"shapes\" must be an object with \"mesh\".");
   }
   if (!api_members_known(value, "a shape", known, problem)) {
     return 0;
@@ -54,7 +55,8 @@ static int read_shape(const cJSON *value, int32_t index, api_supermesh_request *
     return api_refuse(problem, "invalid-request", "\"mesh\" of shape %d must be the id of an uploaded mesh.", index);
   }
   if (!api_id_valid(mesh->valuestring, strlen(mesh->valuestring))) {
-    return api_refuse(problem, "not-found", "\"mesh\" of shape %d is not the id of a mesh: upload it first.", index);
+    return api_refuse(problem, "not-found", "\"mesh\" of shape %d is not the id of a mesh. Upload the mesh first.",
+                      index);
   }
   memcpy(shape->mesh, mesh->valuestring, API_ID_SIZE);
   if (name && (!cJSON_IsString(name) || strlen(name->valuestring) >= ORB_NAME_MAX)) {
@@ -82,7 +84,7 @@ static int read_align(cJSON *align, api_supermesh_request *out, api_problem *pro
   out->merge.align.method = out->landmarks.count ? ORB_ALIGN_PIN : ORB_ALIGN_AUTO;
   if (align) {
     if (!cJSON_IsObject(align)) {
-      return api_refuse(problem, "invalid-request", "\"align\" must be an object.");
+      return api_refuse(problem, "invalid-request", "\"align\" must be a JSON object.");
     }
     if (!api_members_known(align, "\"align\"", known, problem)) {
       return 0;
@@ -104,7 +106,8 @@ static int read_align(cJSON *align, api_supermesh_request *out, api_problem *pro
   orb_align_method method = out->merge.align.method;
   if (out->landmarks.count == 0 && (method == ORB_ALIGN_PIN || method == ORB_ALIGN_RBF)) {
     return api_refuse(problem, "bad-landmarks",
-                      "The alignment \"%s\" needs landmarks: give some, or use auto or rotate.", aligns[method]);
+                      "The alignment method \"%s\" requires landmarks. Add some, or choose auto or rotate.",
+                      aligns[method]);
   }
   return 1;
 }
@@ -114,7 +117,8 @@ static int check_built(const api_supermesh_request *request, api_problem *proble
     return 1;
   }
   const char *name = remeshes[request->merge.remesh.method];
-  api_refuse(problem, "unsupported-method", "The remesh method \"%s\" is not built yet; use adaptive.", name);
+  api_refuse(problem, "unsupported-method", "This build does not include the remesh method \"%s\". Use adaptive.",
+             name);
   api_json_member_string(&problem->facts, "method", name);
   return 0;
 }
@@ -163,12 +167,13 @@ int api_supermesh_request_resolve(api_supermesh_request *request, const api_mesh
   for (int32_t l = 0; l < request->landmarks.count; l++) {
     for (int32_t s = 0; s < request->shape_count; s++) {
       const api_place *spot = &request->landmarks.spots[(size_t)l * (size_t)request->shape_count + (size_t)s];
-      int64_t count = spot->kind == API_PLACE_VERTEX ? meshes[s].file_vertices : meshes[s].file_triangles;
+      int vertex = spot->kind == API_PLACE_VERTEX;
+      int64_t count = vertex ? meshes[s].file_vertices : meshes[s].file_triangles;
       if (spot->kind != API_PLACE_POINT && spot->index >= count) {
         api_refuse(problem, "bad-landmarks",
-                   "Landmark %d (\"%.60s\"), shape %d (\"%.60s\"): %s %d is out of range: the file has %lld.", l,
-                   request->landmarks.items[l].name, s, request->shapes[s].name,
-                   spot->kind == API_PLACE_VERTEX ? "vertex" : "triangle", spot->index, (long long)count);
+                   "Landmark %d (\"%.60s\"), shape %d (\"%.60s\"): %s %d is out of range; the file has %lld %s.", l,
+                   request->landmarks.items[l].name, s, request->shapes[s].name, vertex ? "vertex" : "triangle",
+                   spot->index, (long long)count, vertex ? "vertices" : "triangles");
         api_text_printf(&problem->facts, "\"landmarks\":[%d],\"shape\":%d,\"reason\":\"out-of-range\"", l, s);
         return 0;
       }

@@ -66,7 +66,7 @@ void api_text_printf(api_text *text, const char *format, ...) {
   va_end(again);
 }
 
-/* A comma belongs before a value or key unless the text is empty or something was just opened. */
+/* Writes the comma before a value or key, unless the text is empty or ends in an opening bracket or a colon. */
 static void separate(api_text *text) {
   char last = text->size ? text->data[text->size - 1] : '{';
   if (last != '{' && last != '[' && last != ':') {
@@ -83,7 +83,7 @@ void api_json_close(api_text *text, char close) {
   api_text_append(text, &close, 1);
 }
 
-/* What is not UTF-8 becomes U+FFFD: details quote callers, and may be cut within a character. */
+/* Bytes that are not UTF-8 become U+FFFD: details quote requests, and truncation may split a character. */
 static void quoted(api_text *text, const char *s) {
   api_text_append(text, "\"", 1);
   const char *run = s;

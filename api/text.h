@@ -1,8 +1,8 @@
-/* A growing text and a writer of JSON into it.
+/* A growing text, and a JSON writer that appends to it.
  *
- * The writer puts commas by itself, looking at the last byte, so calls read like the document. Running out of memory
- * is sticky: look at `failed` once, at the end. Numbers are the shortest decimals that read back as the same double;
- * NaN and infinities become null.
+ * The writer inserts commas itself by looking at the last byte, so calls read like the document. `failed` stays set
+ * once memory has run out: check it once, at the end. Numbers are the shortest decimals that read back as the same
+ * double; NaN and infinities become null.
  */
 #ifndef ORB_API_TEXT_H
 #define ORB_API_TEXT_H
@@ -13,7 +13,7 @@
 #include "orbmorph/status.h"
 
 typedef struct api_text {
-  char *data; /* ends in a NUL that `size` does not count; NULL while empty */
+  char *data; /* ends in a NUL that `size` does not count; NULL until something is appended */
   size_t size, capacity;
   int failed;
 } api_text;
@@ -23,7 +23,7 @@ void api_text_append(api_text *text, const char *bytes, size_t size);
 void api_text_add(api_text *text, const char *string);
 void api_text_printf(api_text *text, const char *format, ...) ORB_PRINTF(2, 3);
 
-/* JSON: values. `open` is '{' or '[', `close` '}' or ']'. */
+/* JSON values. `open` is '{' or '[', `close` is '}' or ']'. */
 void api_json_open(api_text *text, char open);
 void api_json_close(api_text *text, char close);
 void api_json_key(api_text *text, const char *name);
@@ -32,15 +32,15 @@ void api_json_number(api_text *text, double value);
 void api_json_integer(api_text *text, int64_t value);
 void api_json_bool(api_text *text, int value);
 void api_json_null(api_text *text);
-void api_json_raw(api_text *text, const char *json); /* a whole value; NULL: null */
+void api_json_raw(api_text *text, const char *json); /* a complete value; NULL writes null */
 
-/* JSON: members. */
+/* JSON members. */
 void api_json_member_string(api_text *text, const char *name, const char *utf8);
 void api_json_member_number(api_text *text, const char *name, double value);
 void api_json_member_integer(api_text *text, const char *name, int64_t value);
 void api_json_member_bool(api_text *text, const char *name, int value);
 void api_json_member_raw(api_text *text, const char *name, const char *json);
-/* Milliseconds since 1970 as an RFC 3339 string in UTC; 0 as null. */
+/* Writes milliseconds since 1970 as an RFC 3339 string in UTC, and 0 as null. */
 void api_json_member_instant(api_text *text, const char *name, int64_t unix_ms);
 
 #endif

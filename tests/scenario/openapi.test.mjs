@@ -1,4 +1,4 @@
-// The document of the interface is held to what the daemon answers: every status, header and member must be in it.
+// Holds the API document to what the daemon answers: it must contain every status, header and member.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { readFile } from 'node:fs/promises';
@@ -14,7 +14,7 @@ import * as shapes from './support/shapes.mjs';
 const document = JSON.parse(await readFile(path.join(root, 'api/openapi.json'), 'utf8'));
 const VERBS = ['get', 'post', 'put', 'patch', 'delete'];
 
-/** Validators of the document's schemas. */
+/** Validates values against the schemas of the document. */
 function validators() {
   const ajv = new Ajv2020.default({ strict: true, allowUnionTypes: true, strictRequired: false, strictTypes: false, allErrors: true,
     formats: { 'date-time': true, 'uri-reference': true } });
@@ -26,7 +26,7 @@ function validators() {
     if (!made.has(key)) made.set(key, ajv.compile(moved(schema)));
     const check = made.get(key);
     const fine = check(value);
-    // Of the alternatives of problems, what the one that is meant says.
+    // Of the alternatives of a problem, report the errors of the one that its type names.
     const meant = /^\/problems\//.test(value?.type) ? `/Problem${value.type.slice(10).replace(/(^|-)(.)/g, (_, __, c) => c.toUpperCase())}/` : '';
     const errors = (check.errors ?? []).filter((e) => e.schemaPath.includes(meant)).slice(0, 6);
     assert.ok(fine, `${what}\n${JSON.stringify(errors)}\n${JSON.stringify(value).slice(0, 1500)}`);
@@ -35,13 +35,13 @@ function validators() {
 const validate = validators();
 const resolve = (o) => (o.$ref ? o.$ref.split('/').slice(1).reduce((at, name) => at[name], document) : o);
 
-// Headers that HTTP itself brings.
+// Headers of HTTP itself.
 const PLAIN = ['content-type', 'content-length', 'date', 'connection', 'keep-alive', 'transfer-encoding', 'x-content-type-options'];
 
-// What was asked and answered in all tests of this file.
+// Each operation and status that a test of this file has seen.
 const seen = new Set();
 
-/** Holds an answer to what the document says of this operation; what was seen is noted. */
+/** Checks an answer against the document's description of the operation, and records that it was seen. */
 function hold(reply, method, target) {
   const what = `${method} ${target}: ${reply.status} ${reply.type}`;
   const entry = document.paths[target][method.toLowerCase()].responses[reply.status];
@@ -65,7 +65,7 @@ function hold(reply, method, target) {
   return reply;
 }
 
-/** A daemon whose every answer is held to the document. */
+/** Requests to a daemon, each answer of which is checked against the document. */
 function held(d) {
   const ask = async (method, target, { id, body, query, headers } = {}) =>
     hold(await d.request(method, target.replace(/\{k\}/, 0).replace(/\{\w+\}/, id), { body, query, headers }), method, target);
@@ -338,8 +338,8 @@ test('answers to callers without the right token', async (t) => {
   assert.equal(over.json.type, '/problems/quota-exceeded');
 });
 
-test('every answer but faults was seen above', () => {
-  // Events that were all seen answer 204 only once the daemon has forgotten the job.
+test('every status below 400 was seen above', () => {
+  // The events of a job answer 204 only after the daemon has forgotten the job.
   const rare = ['GET /v1/jobs/{job}/events 204', 'GET / 304'];
   for (const [target, item] of Object.entries(document.paths))
     for (const verb of VERBS.filter((v) => item[v]))

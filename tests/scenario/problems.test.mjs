@@ -1,5 +1,5 @@
-// docs/troubleshooting.md against the daemon: a section for every problem, its page under the problem's type, and in
-// each section the facts that the daemon's answer really has.
+// Holds docs/troubleshooting.md to the daemon: a section for every problem, its page at the problem's type, and in each
+// section the facts that the daemon's answers have.
 import assert from 'node:assert/strict';
 import http from 'node:http';
 import { readFile } from 'node:fs/promises';
@@ -94,7 +94,7 @@ test('sections name the facts that answers have', async (t) => {
   meets('precondition-failed', await d.get(`${a.url}/file`, { headers: { 'if-match': '"other"' } }));
   meets('range-not-satisfiable', await d.get(`${a.url}/file`, { headers: { range: 'bytes=99999999-' } }));
 
-  // A long job, and what may not be while it runs.
+  // A long job, and what is refused while it runs.
   const body = { mesh: a.id, ...endless }, job = await d.post('/v1/embeddings', body);
   assert.equal(job.status, 202);
   meets('queue-full', await d.post('/v1/embeddings', { mesh: b.id }));

@@ -1,4 +1,4 @@
-/* The strict JSON reader, problems and ids, against RFC 8259, RFC 3629 and known hashes. */
+/* The strict JSON reader, ids, requests and routes, against RFC 8259, RFC 3629 and known hashes. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -127,7 +127,7 @@ static void test_repairs(void **state) {
 
 #define MESH "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
 
-/* The name of the problem, "" where the request is fine; its id. */
+/* Returns the name of the problem, or "" and the id of a valid request. */
 static const char *supermesh(const char *json, char id[API_ID_SIZE]) {
   api_supermesh_request request;
   api_problem problem = {0};
@@ -166,7 +166,7 @@ static void test_supermesh_requests(void **state) {
   char a[API_ID_SIZE], b[API_ID_SIZE];
   assert_string_equal(supermesh("{" SHAPES "}", a), "");
   assert_string_equal(supermesh("{\"landmarks\":\"auto\"," SHAPES ",\"remesh\":{\"tolerance\":1e-3}}", b), "");
-  assert_string_equal(a, b); /* what is default need not be said, order does not matter */
+  assert_string_equal(a, b); /* defaults may be omitted, and order does not matter */
   assert_string_equal(supermesh("{" SHAPES ",\"remesh\":{\"tolerance\":0.002}}", b), "");
   assert_string_not_equal(a, b);
   assert_string_equal(supermesh("{" SHAPES ",\"zap\":1}", b), "unknown-member");
@@ -207,7 +207,7 @@ static void test_routes(void **state) {
   assert_null(route_find("GET", "/v1/jobs/" MESH, id, allow));
 }
 
-/* What is stored may be damaged: counts are integers that a double tells apart. */
+/* Stored descriptions may be damaged: counts must be integers that a double represents exactly. */
 static void test_stored_meshes(void **state) {
   static const char *const counts[] = {"800", "9007199254740992", "9007199254740994", "8e49", "-1", "\"8\"", "null"};
   (void)state;
