@@ -3,41 +3,11 @@
 #include <stdio.h>
 #include <string.h>
 
-static const route table[ROUTE_COUNT] = {
-    {ROUTE_MESH_UPLOAD, "POST", "/v1/meshes", ROUTE_MESH_BODY, SCOPE_WRITE},
-    {ROUTE_MESH_LIST, "GET", "/v1/meshes", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_MESH_GET, "GET", "/v1/meshes/{id}", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_MESH_DELETE, "DELETE", "/v1/meshes/{id}", ROUTE_NO_BODY, SCOPE_WRITE},
-    {ROUTE_MESH_FILE, "GET", "/v1/meshes/{id}/file", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_EMBEDDING_CREATE, "POST", "/v1/embeddings", ROUTE_JSON_BODY, SCOPE_WRITE},
-    {ROUTE_EMBEDDING_LIST, "GET", "/v1/embeddings", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_EMBEDDING_GET, "GET", "/v1/embeddings/{id}", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_EMBEDDING_DELETE, "DELETE", "/v1/embeddings/{id}", ROUTE_NO_BODY, SCOPE_WRITE},
-    {ROUTE_EMBEDDING_SPHERE, "GET", "/v1/embeddings/{id}/sphere.ply", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_SUPERMESH_CREATE, "POST", "/v1/supermeshes", ROUTE_JSON_BODY, SCOPE_WRITE},
-    {ROUTE_SUPERMESH_LIST, "GET", "/v1/supermeshes", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_SUPERMESH_GET, "GET", "/v1/supermeshes/{id}", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_SUPERMESH_DELETE, "DELETE", "/v1/supermeshes/{id}", ROUTE_NO_BODY, SCOPE_WRITE},
-    {ROUTE_SUPERMESH_ASSET, "GET", "/v1/supermeshes/{id}/asset.glb", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_SUPERMESH_PLACES, "GET", "/v1/supermeshes/{id}/places", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_SUPERMESH_SPHERE, "GET", "/v1/supermeshes/{id}/spheres/{k}.ply", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_JOB_LIST, "GET", "/v1/jobs", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_JOB_GET, "GET", "/v1/jobs/{job}", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_JOB_CANCEL, "DELETE", "/v1/jobs/{job}", ROUTE_NO_BODY, SCOPE_WRITE},
-    {ROUTE_JOB_EVENTS, "GET", "/v1/jobs/{job}/events", ROUTE_NO_BODY, SCOPE_READ},
-    {ROUTE_LIVEZ, "GET", "/livez", ROUTE_NO_BODY, SCOPE_NONE},
-    {ROUTE_READYZ, "GET", "/readyz", ROUTE_NO_BODY, SCOPE_NONE},
-    {ROUTE_METRICS, "GET", "/metrics", ROUTE_NO_BODY, SCOPE_ADMIN},
-    {ROUTE_OPENAPI, "GET", "/openapi.json", ROUTE_NO_BODY, SCOPE_NONE},
-    {ROUTE_DOCS, "GET", "/docs", ROUTE_NO_BODY, SCOPE_NONE},
-    {ROUTE_ROOT, "GET", "/", ROUTE_NO_BODY, SCOPE_NONE},
-};
+#define ROW(id, method, path, body, scope, handler) {id, method, path, body, scope},
+static const route table[ROUTE_COUNT] = {API_ROUTES(ROW)};
+#undef ROW
 
-const route *route_table(void) {
-  return table;
-}
-
-/* The number in front of the rest of a path: one or two digits, none needless; −1: not that. */
+/* Returns the number before the rest of a path: one or two digits without leading zero; −1 if the path has none. */
 static int number_before(const char *path, const char *rest) {
   size_t digits = strspn(path, "0123456789");
   if (digits < 1 || digits > 2 || (digits == 2 && path[0] == '0') || strcmp(path + digits, rest) != 0) {
@@ -46,7 +16,7 @@ static int number_before(const char *path, const char *rest) {
   return digits == 1 ? path[0] - '0' : 10 * (path[0] - '0') + path[1] - '0';
 }
 
-/* What follows an id: as it stands, or with {k}. */
+/* Matches the part of a path after the id, which may contain {k}. */
 static int ends_as(const char *pattern, const char *path) {
   const char *brace = strstr(pattern, "{k}");
   if (!brace) {
@@ -56,7 +26,7 @@ static int ends_as(const char *pattern, const char *path) {
   return strncmp(pattern, path, head) == 0 && number_before(path + head, brace + 3) >= 0;
 }
 
-/* Matches a path against a pattern. */
+/* Matches a path against a pattern, and fills id if the pattern has one. */
 static int matches(const char *pattern, const char *path, char id[API_ID_SIZE]) {
   const char *brace = strchr(pattern, '{');
   if (!brace) {

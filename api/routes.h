@@ -1,39 +1,46 @@
-/* The route table: every path and method of the service, in one place. */
+/* Routing: the table of all routes, and finding the route of a request. */
 #ifndef ORB_API_ROUTES_H
 #define ORB_API_ROUTES_H
 
 #include "api/ids.h"
 
-typedef enum route_id {
-  ROUTE_MESH_UPLOAD,
-  ROUTE_MESH_LIST,
-  ROUTE_MESH_GET,
-  ROUTE_MESH_DELETE,
-  ROUTE_MESH_FILE,
-  ROUTE_EMBEDDING_CREATE,
-  ROUTE_EMBEDDING_LIST,
-  ROUTE_EMBEDDING_GET,
-  ROUTE_EMBEDDING_DELETE,
-  ROUTE_EMBEDDING_SPHERE,
-  ROUTE_SUPERMESH_CREATE,
-  ROUTE_SUPERMESH_LIST,
-  ROUTE_SUPERMESH_GET,
-  ROUTE_SUPERMESH_DELETE,
-  ROUTE_SUPERMESH_ASSET,
-  ROUTE_SUPERMESH_PLACES,
-  ROUTE_SUPERMESH_SPHERE,
-  ROUTE_JOB_LIST,
-  ROUTE_JOB_GET,
-  ROUTE_JOB_CANCEL,
-  ROUTE_JOB_EVENTS,
-  ROUTE_LIVEZ,
-  ROUTE_READYZ,
-  ROUTE_METRICS,
-  ROUTE_OPENAPI,
-  ROUTE_DOCS,
-  ROUTE_ROOT,
-  ROUTE_COUNT
-} route_id;
+/* The route table: one row for each method of each path, with what its body holds, the scope that a token needs, and
+ * the function of server/http that handles it. Adding a row is all that routing needs: route_id, route_find() and the
+ * server's dispatch follow from it. The api library itself does not use the handlers.
+ *
+ * Paths contain {id} for 64 hexadecimal digits or {job} for a job's id, and after either {k} for a small number. */
+#define API_ROUTES(ROUTE)                                                                                              \
+  ROUTE(ROUTE_MESH_UPLOAD, "POST", "/v1/meshes", ROUTE_MESH_BODY, SCOPE_WRITE, handle_mesh_upload)                     \
+  ROUTE(ROUTE_MESH_LIST, "GET", "/v1/meshes", ROUTE_NO_BODY, SCOPE_READ, handle_list)                                  \
+  ROUTE(ROUTE_MESH_GET, "GET", "/v1/meshes/{id}", ROUTE_NO_BODY, SCOPE_READ, handle_get)                               \
+  ROUTE(ROUTE_MESH_DELETE, "DELETE", "/v1/meshes/{id}", ROUTE_NO_BODY, SCOPE_WRITE, handle_delete)                     \
+  ROUTE(ROUTE_MESH_FILE, "GET", "/v1/meshes/{id}/file", ROUTE_NO_BODY, SCOPE_READ, handle_file)                        \
+  ROUTE(ROUTE_EMBEDDING_CREATE, "POST", "/v1/embeddings", ROUTE_JSON_BODY, SCOPE_WRITE, handle_create)                 \
+  ROUTE(ROUTE_EMBEDDING_LIST, "GET", "/v1/embeddings", ROUTE_NO_BODY, SCOPE_READ, handle_list)                         \
+  ROUTE(ROUTE_EMBEDDING_GET, "GET", "/v1/embeddings/{id}", ROUTE_NO_BODY, SCOPE_READ, handle_get)                      \
+  ROUTE(ROUTE_EMBEDDING_DELETE, "DELETE", "/v1/embeddings/{id}", ROUTE_NO_BODY, SCOPE_WRITE, handle_delete)            \
+  ROUTE(ROUTE_EMBEDDING_SPHERE, "GET", "/v1/embeddings/{id}/sphere.ply", ROUTE_NO_BODY, SCOPE_READ, handle_file)       \
+  ROUTE(ROUTE_SUPERMESH_CREATE, "POST", "/v1/supermeshes", ROUTE_JSON_BODY, SCOPE_WRITE, handle_create)                \
+  ROUTE(ROUTE_SUPERMESH_LIST, "GET", "/v1/supermeshes", ROUTE_NO_BODY, SCOPE_READ, handle_list)                        \
+  ROUTE(ROUTE_SUPERMESH_GET, "GET", "/v1/supermeshes/{id}", ROUTE_NO_BODY, SCOPE_READ, handle_get)                     \
+  ROUTE(ROUTE_SUPERMESH_DELETE, "DELETE", "/v1/supermeshes/{id}", ROUTE_NO_BODY, SCOPE_WRITE, handle_delete)           \
+  ROUTE(ROUTE_SUPERMESH_ASSET, "GET", "/v1/supermeshes/{id}/asset.glb", ROUTE_NO_BODY, SCOPE_READ, handle_file)        \
+  ROUTE(ROUTE_SUPERMESH_PLACES, "GET", "/v1/supermeshes/{id}/places", ROUTE_NO_BODY, SCOPE_READ, handle_file)          \
+  ROUTE(ROUTE_SUPERMESH_SPHERE, "GET", "/v1/supermeshes/{id}/spheres/{k}.ply", ROUTE_NO_BODY, SCOPE_READ, handle_file) \
+  ROUTE(ROUTE_JOB_LIST, "GET", "/v1/jobs", ROUTE_NO_BODY, SCOPE_READ, handle_job_list)                                 \
+  ROUTE(ROUTE_JOB_GET, "GET", "/v1/jobs/{job}", ROUTE_NO_BODY, SCOPE_READ, handle_job_get)                             \
+  ROUTE(ROUTE_JOB_CANCEL, "DELETE", "/v1/jobs/{job}", ROUTE_NO_BODY, SCOPE_WRITE, handle_job_cancel)                   \
+  ROUTE(ROUTE_JOB_EVENTS, "GET", "/v1/jobs/{job}/events", ROUTE_NO_BODY, SCOPE_READ, handle_job_events)                \
+  ROUTE(ROUTE_LIVEZ, "GET", "/livez", ROUTE_NO_BODY, SCOPE_NONE, handle_system)                                        \
+  ROUTE(ROUTE_READYZ, "GET", "/readyz", ROUTE_NO_BODY, SCOPE_NONE, handle_system)                                      \
+  ROUTE(ROUTE_METRICS, "GET", "/metrics", ROUTE_NO_BODY, SCOPE_ADMIN, handle_system)                                   \
+  ROUTE(ROUTE_OPENAPI, "GET", "/openapi.json", ROUTE_NO_BODY, SCOPE_NONE, handle_system)                               \
+  ROUTE(ROUTE_DOCS, "GET", "/docs", ROUTE_NO_BODY, SCOPE_NONE, handle_system)                                          \
+  ROUTE(ROUTE_ROOT, "GET", "/", ROUTE_NO_BODY, SCOPE_NONE, handle_system)
+
+#define API_ROUTE_ID(id, method, path, body, scope, handler) id,
+typedef enum route_id { API_ROUTES(API_ROUTE_ID) ROUTE_COUNT } route_id;
+#undef API_ROUTE_ID
 
 typedef enum route_body { ROUTE_NO_BODY, ROUTE_JSON_BODY, ROUTE_MESH_BODY } route_body;
 typedef enum route_scope { SCOPE_NONE = 0, SCOPE_READ = 1, SCOPE_WRITE = 2, SCOPE_ADMIN = 4 } route_scope;
@@ -41,17 +48,16 @@ typedef enum route_scope { SCOPE_NONE = 0, SCOPE_READ = 1, SCOPE_WRITE = 2, SCOP
 typedef struct route {
   route_id id;
   const char *method;
-  const char *path; /* with {id} for 64 hex digits, {job} for a job's id; after either, {k} for a small number */
+  const char *path;
   route_body body;
   route_scope scope;
 } route;
 
-const route *route_table(void); /* ROUTE_COUNT entries */
-
-/* Finds the route; NULL with *allow empty: no such path; NULL with *allow filled ("GET, HEAD"): not that method.
- * HEAD goes to GET. id: filled where the path has one. */
+/* Finds the route of a request, and fills id if the path has one. HEAD finds the route of GET. Returns NULL with an
+ * empty allow if there is no such path, and NULL with allow filled, such as "GET, HEAD", if the path has other methods.
+ */
 const route *route_find(const char *method, const char *path, char id[API_ID_SIZE], char allow[64]);
-/* The number that stands for {k} in a path that route_find() took; −1: the route has none. */
+/* Returns the number in place of {k} in the path of a found route; −1 if the route has none. */
 int route_number(const route *found, const char *path);
 
 #endif

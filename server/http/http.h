@@ -144,17 +144,9 @@ void reply_object(request *r, object_kind kind, const char *id, const char *sha,
 /* Handlers; called when the whole body is there. */
 void handle_mesh_begin(request *r); /* before the first byte of an upload */
 void handle_mesh_bytes(request *r, const char *bytes, size_t size);
-enum MHD_Result handle_mesh_upload(request *r);
-enum MHD_Result handle_list(request *r);
-enum MHD_Result handle_get(request *r);
-enum MHD_Result handle_delete(request *r);
-enum MHD_Result handle_file(request *r);
-enum MHD_Result handle_create(request *r);
-enum MHD_Result handle_job_list(request *r);
-enum MHD_Result handle_job_get(request *r);
-enum MHD_Result handle_job_cancel(request *r);
-enum MHD_Result handle_job_events(request *r);
-enum MHD_Result handle_system(request *r);
+#define DECLARE(id, method, path, body, scope, handler) enum MHD_Result handler(request *r);
+API_ROUTES(DECLARE)
+#undef DECLARE
 /* In PHASE_WAIT: waits on, or leaves the response. */
 enum MHD_Result handle_wait(request *r);
 

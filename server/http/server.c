@@ -42,43 +42,9 @@ enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r))
   return REQUEST_AWAY;
 }
 
-static enum MHD_Result dispatch(request *r) {
-  switch (r->route->id) {
-    case ROUTE_MESH_UPLOAD:
-      return handle_mesh_upload(r);
-    case ROUTE_MESH_LIST:
-    case ROUTE_EMBEDDING_LIST:
-    case ROUTE_SUPERMESH_LIST:
-      return handle_list(r);
-    case ROUTE_MESH_GET:
-    case ROUTE_EMBEDDING_GET:
-    case ROUTE_SUPERMESH_GET:
-      return handle_get(r);
-    case ROUTE_MESH_DELETE:
-    case ROUTE_EMBEDDING_DELETE:
-    case ROUTE_SUPERMESH_DELETE:
-      return handle_delete(r);
-    case ROUTE_MESH_FILE:
-    case ROUTE_EMBEDDING_SPHERE:
-    case ROUTE_SUPERMESH_ASSET:
-    case ROUTE_SUPERMESH_PLACES:
-    case ROUTE_SUPERMESH_SPHERE:
-      return handle_file(r);
-    case ROUTE_EMBEDDING_CREATE:
-    case ROUTE_SUPERMESH_CREATE:
-      return handle_create(r);
-    case ROUTE_JOB_LIST:
-      return handle_job_list(r);
-    case ROUTE_JOB_GET:
-      return handle_job_get(r);
-    case ROUTE_JOB_CANCEL:
-      return handle_job_cancel(r);
-    case ROUTE_JOB_EVENTS:
-      return handle_job_events(r);
-    default:
-      return handle_system(r);
-  }
-}
+#define HANDLER(id, method, path, body, scope, handler) [id] = handler,
+static enum MHD_Result (*const handlers[ROUTE_COUNT])(request *) = {API_ROUTES(HANDLER)};
+#undef HANDLER
 
 /* No route: a page, OPTIONS, 405 or 404. */
 static void answer_unrouted(request *r, const char *path, const char *allow) {
@@ -194,7 +160,7 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
     body_end(r);
   }
   if (r->phase == PHASE_BODY) {
-    result = dispatch(r);
+    result = handlers[r->route->id](r);
   } else if (r->phase == PHASE_WAIT) {
     result = handle_wait(r);
   }

@@ -143,8 +143,8 @@ test('every problem has an example whose detail says more than its title', async
 
 test('the document and the daemon know the same paths and methods', async (t) => {
   const d = await daemon(t);
-  const table = await readFile(path.join(root, 'api/routes.c'), 'utf8');
-  const routes = [...table.matchAll(/\{ROUTE_\w+, "(\w+)", "([^"]+)"/g)].map((m) => `${m[1]} ${m[2]}`).sort();
+  const table = await readFile(path.join(root, 'api/routes.h'), 'utf8');
+  const routes = [...table.matchAll(/ROUTE\(ROUTE_\w+, "(\w+)", "([^"]+)"/g)].map((m) => `${m[1]} ${m[2]}`).sort();
   const described = Object.entries(document.paths).flatMap(([target, item]) => VERBS.filter((v) => item[v]).map((v) => `${v.toUpperCase()} ${target}`)).sort();
   assert.ok(routes.length > 20);
   assert.deepEqual(described, routes);
