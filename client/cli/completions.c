@@ -1,36 +1,29 @@
 /* Completions for shells, made of the lists of commands and options. */
 #include <string.h>
 
-#include "cli.h"
-
-/* What a command takes besides options, where that is a fixed list. */
-static const char *operand_words(const cli_command *command) {
-  return !strcmp(command->name, "ls")            ? "meshes embeddings supermeshes jobs"
-         : !strcmp(command->name, "completions") ? "bash zsh fish"
-                                                 : NULL;
-}
+#include "commands.h"
+#include "terminal.h"
 
 static void bash_command(const cli_command *command) {
-  const char *operands = operand_words(command);
   printf("    %s)\n      words=\"", command->name);
   for (int id = 0; id < OPT_COUNT; id++)
     if (command->options & CLI_BIT(id))
       printf("--%s ", cli_options[id].name);
   printf("\"\n");
-  if (operands)
-    printf("      operands=\"%s\"\n", operands);
+  if (command->words)
+    printf("      operands=\"%s\"\n", command->words);
   puts("      ;;");
 }
 
-static void bash(void) {
+static void bash(const cli_commands *commands) {
   puts(
       "# Completions of orbmorph for bash. Made by 'orbmorph completions bash'.\n"
       "_orbmorph() {\n"
       "  local current=\"${COMP_WORDS[COMP_CWORD]}\" previous=\"${COMP_WORDS[COMP_CWORD-1]}\" words=\"\" operands=\"\" "
       "choices=\"\"");
   fputs("  if [ \"$COMP_CWORD\" -eq 1 ]; then\n    COMPREPLY=($(compgen -W \"", stdout);
-  for (int i = 0; i < cli_command_count; i++)
-    printf("%s ", cli_commands[i].name);
+  for (int i = 0; i < commands->count; i++)
+    printf("%s ", commands->list[i].name);
   puts("--help --version\" -- \"$current\"))\n    return\n  fi\n  case \"$previous\" in");
   for (int id = 0; id < OPT_COUNT; id++)
     if (cli_options[id].choices)
@@ -39,8 +32,8 @@ static void bash(void) {
       "  esac\n"
       "  if [ -n \"$choices\" ]; then\n    COMPREPLY=($(compgen -W \"$choices\" -- \"$current\"))\n    return\n  fi\n"
       "  case \"${COMP_WORDS[1]}\" in");
-  for (int i = 0; i < cli_command_count; i++)
-    bash_command(&cli_commands[i]);
+  for (int i = 0; i < commands->count; i++)
+    bash_command(&commands->list[i]);
   puts(
       "  esac\n"
       "  case \"$current\" in\n"
@@ -78,27 +71,27 @@ static void zsh_command(const cli_command *command) {
       printf(":%s:%s", o->value, strcmp(o->value, "FILE") ? "" : "_files");
     putchar('\'');
   }
-  if (operand_words(command))
-    printf(" \\\n        '1:what:(%s)'", operand_words(command));
+  if (command->words)
+    printf(" \\\n        '1:what:(%s)'", command->words);
   else
     fputs(" \\\n        '*:file:_files'", stdout);
   puts(" ;;");
 }
 
-static void zsh(void) {
+static void zsh(const cli_commands *commands) {
   puts(
       "#compdef orbmorph\n# Completions of orbmorph for zsh. Made by 'orbmorph completions zsh'.\n"
       "_orbmorph() {\n  local -a commands\n  commands=(");
-  for (int i = 0; i < cli_command_count; i++) {
-    printf("    '%s:", cli_commands[i].name);
-    zsh_text(cli_commands[i].summary);
+  for (int i = 0; i < commands->count; i++) {
+    printf("    '%s:", commands->list[i].name);
+    zsh_text(commands->list[i].summary);
     puts("'");
   }
   puts(
       "  )\n  if (( CURRENT == 2 )); then\n    _describe command commands\n    return\n  fi\n"
       "  local command=$words[2]\n  shift words\n  (( CURRENT-- ))\n  case $command in");
-  for (int i = 0; i < cli_command_count; i++)
-    zsh_command(&cli_commands[i]);
+  for (int i = 0; i < commands->count; i++)
+    zsh_command(&commands->list[i]);
   puts("  esac\n}\n_orbmorph \"$@\"");
 }
 
@@ -115,9 +108,8 @@ static void fish_command(const cli_command *command) {
   printf("complete -c orbmorph -n __fish_use_subcommand -f -a %s -d '", command->name);
   fish_text(command->summary);
   puts("'");
-  if (operand_words(command))
-    printf("complete -c orbmorph -n '__fish_seen_subcommand_from %s' -f -a '%s'\n", command->name,
-           operand_words(command));
+  if (command->words)
+    printf("complete -c orbmorph -n '__fish_seen_subcommand_from %s' -f -a '%s'\n", command->name, command->words);
   for (int id = 0; id < OPT_COUNT; id++) {
     const cli_option *o = &cli_options[id];
     if (!(command->options & CLI_BIT(id)))
@@ -135,22 +127,22 @@ static void fish_command(const cli_command *command) {
   }
 }
 
-static void fish(void) {
+static void fish(const cli_commands *commands) {
   puts("# Completions of orbmorph for fish. Made by 'orbmorph completions fish'.");
   puts("complete -c orbmorph -n __fish_use_subcommand -l help -d 'this help'");
   puts("complete -c orbmorph -n __fish_use_subcommand -l version -d 'the version'");
-  for (int i = 0; i < cli_command_count; i++)
-    fish_command(&cli_commands[i]);
+  for (int i = 0; i < commands->count; i++)
+    fish_command(&commands->list[i]);
 }
 
 int cli_run_completions(cli *c) {
   static const struct {
     const char *name;
-    void (*print)(void);
+    void (*print)(const cli_commands *);
   } shells[] = {{"bash", bash}, {"zsh", zsh}, {"fish", fish}};
   for (size_t i = 0; i < sizeof shells / sizeof shells[0]; i++)
     if (!strcmp(c->args.operands[0], shells[i].name)) {
-      shells[i].print();
+      shells[i].print(&c->commands);
       return CLI_DONE;
     }
   cli_error(c, "there are completions for bash, zsh and fish, but not for '%s'", c->args.operands[0]);

@@ -1,10 +1,12 @@
 /* doctor: checks a mesh by way of the daemon, tries the stronger repairs, and says what helps. What it uploads and the
  * daemon did not hold before is deleted again. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "commands.h"
+#include "mesh.h"
+#include "problem.h"
+#include "text.h"
 
 static void forget(cli *c, const cli_reply *reply) {
   char *path = cli_text("/v1/meshes/%s", cli_string(reply->json, "id", ""));

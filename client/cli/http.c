@@ -1,11 +1,14 @@
-/* Requests through libcurl: one connection that is kept, bodies streamed from and to files. */
+/* libcurl keeps one connection; bodies are streamed from and to files. */
+#include "http.h"
+
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <time.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "terminal.h"
+#include "text.h"
 
 enum {
   CONNECT_SECONDS = 10,

@@ -1,48 +1,51 @@
 /* orbmorph: the command line. It knows only HTTP; the daemon does the work. */
-#include <locale.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "commands.h"
+#include "terminal.h"
+#include "text.h"
 
-#define MERGE_OPTIONS                                                                                        \
-  (CLI_COMMON | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_REPORT) | CLI_BIT(OPT_LANDMARKS) | CLI_BIT(OPT_ALIGN) |    \
-   CLI_BIT(OPT_REMESH) | CLI_BIT(OPT_TOLERANCE) | CLI_BIT(OPT_MAX_TRIANGLES) | CLI_BIT(OPT_NO_NORMALS) |     \
-   CLI_BIT(OPT_ANIMATION) | CLI_BIT(OPT_FIT) | CLI_BIT(OPT_PATH) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_NO_WAIT) | \
+#define COMMON_OPTIONS (CLI_BIT(OPT_SERVER) | CLI_BIT(OPT_JSON) | CLI_BIT(OPT_QUIET) | CLI_BIT(OPT_HELP))
+#define MERGE_OPTIONS                                                                                         \
+  (COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_REPORT) | CLI_BIT(OPT_LANDMARKS) | CLI_BIT(OPT_ALIGN) | \
+   CLI_BIT(OPT_REMESH) | CLI_BIT(OPT_TOLERANCE) | CLI_BIT(OPT_MAX_TRIANGLES) | CLI_BIT(OPT_NO_NORMALS) |      \
+   CLI_BIT(OPT_ANIMATION) | CLI_BIT(OPT_FIT) | CLI_BIT(OPT_PATH) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_NO_WAIT) |  \
    CLI_BIT(OPT_REPAIR))
 
-const cli_command cli_commands[] = {
-    {"morph", "FILE FILE…", "Upload meshes, merge them and download one GLB that morphs", 2, -1, MERGE_OPTIONS,
+static const cli_command command_list[] = {
+    {"morph", "FILE FILE…", "Upload meshes, merge them and download one GLB that morphs", 2, -1, MERGE_OPTIONS, NULL,
      cli_run_morph},
     {"upload", "FILE…", "Upload meshes", 1, -1,
-     CLI_COMMON | CLI_BIT(OPT_NAME) | CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_FORMAT), cli_run_upload},
+     COMMON_OPTIONS | CLI_BIT(OPT_NAME) | CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_FORMAT), NULL, cli_run_upload},
     {"embed", "MESH…", "Embed meshes, ids or files, on the sphere", 1, -1,
-     CLI_COMMON | CLI_BIT(OPT_METHOD) | CLI_BIT(OPT_PRESET) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_OUTPUT) |
+     COMMON_OPTIONS | CLI_BIT(OPT_METHOD) | CLI_BIT(OPT_PRESET) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_OUTPUT) |
          CLI_BIT(OPT_NO_WAIT) | CLI_BIT(OPT_REPAIR),
-     cli_run_embed},
-    {"merge", "MESH MESH…", "Merge meshes, ids or files; with -o also download the GLB", 2, -1, MERGE_OPTIONS,
+     NULL, cli_run_embed},
+    {"merge", "MESH MESH…", "Merge meshes, ids or files; with -o also download the GLB", 2, -1, MERGE_OPTIONS, NULL,
      cli_run_merge},
-    {"job", "ID", "Show, wait for or cancel a job", 1, 1, CLI_COMMON | CLI_BIT(OPT_WAIT) | CLI_BIT(OPT_CANCEL),
-     cli_run_job},
+    {"job", "ID", "Show, wait for or cancel a job", 1, 1, COMMON_OPTIONS | CLI_BIT(OPT_WAIT) | CLI_BIT(OPT_CANCEL),
+     NULL, cli_run_job},
     {"ls", "[meshes|embeddings|supermeshes|jobs]", "List what the daemon holds", 0, 1,
-     CLI_COMMON | CLI_BIT(OPT_STATE) | CLI_BIT(OPT_LIMIT), cli_run_ls},
+     COMMON_OPTIONS | CLI_BIT(OPT_STATE) | CLI_BIT(OPT_LIMIT), "meshes embeddings supermeshes jobs", cli_run_ls},
     {"get", "ID|PATH", "Show a resource, or download a part of it", 1, 1,
-     CLI_COMMON | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_PART), cli_run_get},
-    {"rm", "ID|PATH…", "Delete resources", 1, -1, CLI_COMMON, cli_run_rm},
-    {"doctor", "FILE…", "Check meshes, and say how to mend them", 1, -1, CLI_COMMON, cli_run_doctor},
+     COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_PART), NULL, cli_run_get},
+    {"rm", "ID|PATH…", "Delete resources", 1, -1, COMMON_OPTIONS, NULL, cli_run_rm},
+    {"doctor", "FILE…", "Check meshes, and say how to mend them", 1, -1, COMMON_OPTIONS, NULL, cli_run_doctor},
     {"view", "FILE.glb", "Draw the poses of a morph into a PNG file, in software", 1, 1,
      CLI_BIT(OPT_HELP) | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_POSES) | CLI_BIT(OPT_SIZE) | CLI_BIT(OPT_UP) |
          CLI_BIT(OPT_YAW) | CLI_BIT(OPT_PITCH) | CLI_BIT(OPT_WIRE) | CLI_BIT(OPT_INSIDE) | CLI_BIT(OPT_FRAMES),
-     cli_run_view},
-    {"completions", "bash|zsh|fish", "Print the completions of a shell", 1, 1, CLI_BIT(OPT_HELP), cli_run_completions},
+     NULL, cli_run_view},
+    {"completions", "bash|zsh|fish", "Print the completions of a shell", 1, 1, CLI_BIT(OPT_HELP), "bash zsh fish",
+     cli_run_completions},
 };
-const int cli_command_count = (int)(sizeof cli_commands / sizeof cli_commands[0]);
+static const cli_commands commands = {command_list, sizeof command_list / sizeof command_list[0]};
 
 static const cli_command *find_command(const char *name) {
-  for (int i = 0; i < cli_command_count; i++)
-    if (!strcmp(cli_commands[i].name, name))
-      return &cli_commands[i];
+  for (int i = 0; i < commands.count; i++)
+    if (!strcmp(commands.list[i].name, name))
+      return &commands.list[i];
   return NULL;
 }
 
@@ -97,21 +100,24 @@ int main(int argc, char **argv) {
   }
   if (argc >= 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h") || !strcmp(argv[1], "help"))) {
     const cli_command *about = argc > 2 ? find_command(argv[2]) : NULL;
-    cli_help(stdout, about);
+    if (about)
+      cli_help_command(stdout, about);
+    else
+      cli_help(stdout, &commands);
     return CLI_DONE;
   }
   int given, rc;
   char **line = command_first(argc, argv, &given);
   const cli_command *command = given ? find_command(line[1]) : NULL;
-  cli c = {0};
+  cli c = {.commands = commands};
   if (!command) {
     if (given)
       fprintf(stderr, "orbmorph: there is no command '%s'\n", line[1]);
-    cli_help(stderr, NULL);
+    cli_help(stderr, &commands);
     rc = CLI_USAGE;
   } else if ((rc = cli_parse(command, argc, line, 2, &c.args)) == CLI_DONE) {
     if (c.args.value[OPT_HELP])
-      cli_help(stdout, command);
+      cli_help_command(stdout, command);
     else
       rc = run(command, &c);
   }

@@ -1,12 +1,16 @@
 /* morph and merge: the request, the wait, the download. */
 #include <errno.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "cli.h"
-#include "make.h"
+#include "commands.h"
+#include "input.h"
+#include "mesh.h"
+#include "report.h"
+#include "resource.h"
+#include "terminal.h"
+#include "text.h"
 
 static void set_text(const cli *c, cJSON *request, cli_option_id option, const char *path) {
   if (c->args.value[option])
@@ -72,66 +76,6 @@ static int add_shapes(cli *c, cJSON *request) {
     cli_mesh_free(&mesh);
   }
   return CLI_DONE;
-}
-
-int cli_download(cli *c, const char *path, const char *file) {
-  int to_stdout = !strcmp(file, "-");
-  char *part = to_stdout ? NULL : cli_text("%s.part-%ld", file, (long)getpid());
-  FILE *out = to_stdout ? tmpfile() : fopen(part, "w+b");
-  cli_reply reply = {0};
-  if (!out) {
-    cli_error(c, "%s: %s", file, strerror(errno));
-    free(part);
-    return CLI_USAGE;
-  }
-  cli_request request = {.method = "GET", .path = path, .download = out, .label = "download", .patient = 1};
-  int rc = cli_send(c, &request, &reply);
-  cli_bar_end(c);
-  if (rc == CLI_DONE && !cli_ok(&reply))
-    rc = cli_refused(c, path, &reply);
-  if (rc == CLI_DONE && to_stdout) {
-    char block[1 << 16];
-    rewind(out);
-    for (size_t got; (got = fread(block, 1, sizeof block, out)) > 0;)
-      fwrite(block, 1, got, stdout);
-  }
-  int closed = fclose(out) == 0;
-  if (part && rc == CLI_DONE && (!closed || rename(part, file) != 0)) {
-    cli_error(c, "%s: %s", file, strerror(errno));
-    rc = CLI_USAGE;
-  }
-  if (part && rc != CLI_DONE)
-    unlink(part);
-  cli_reply_free(&reply);
-  free(part);
-  return rc;
-}
-
-int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource) {
-  char *text = cJSON_PrintUnformatted(body), *result = NULL;
-  cli_request request = {.method = "POST", .path = path, .json = text};
-  int rc = cli_send(c, &request, resource);
-  if (rc == CLI_DONE && !cli_ok(resource)) {
-    rc = cli_refused(c, NULL, resource);
-  } else if (rc == CLI_DONE && resource->status == 202 && c->args.value[OPT_NO_WAIT]) {
-    if (c->json)
-      puts(resource->body);
-    else
-      printf("%s\n", cli_string(resource->json, "url", "?"));
-    cli_reply_free(resource);
-  } else if (rc == CLI_DONE && resource->status == 202) {
-    rc = cli_wait(c, resource->json, &result);
-    cli_reply_free(resource);
-    if (rc == CLI_DONE) {
-      cli_request get = {.method = "GET", .path = result, .patient = 1};
-      rc = cli_send(c, &get, resource);
-      if (rc == CLI_DONE && !cli_ok(resource))
-        rc = cli_refused(c, NULL, resource);
-    }
-  }
-  free(result);
-  free(text);
-  return rc;
 }
 
 static int finish(cli *c, const cli_reply *supermesh, const char *output) {

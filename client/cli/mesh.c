@@ -1,11 +1,14 @@
-/* Meshes as operands: an id, or a file that is uploaded. */
+#include "mesh.h"
+
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "problem.h"
+#include "terminal.h"
+#include "text.h"
 
 int cli_upload(cli *c, const char *path, const char *name, const char *repair, cli_reply *reply) {
   memset(reply, 0, sizeof *reply);
@@ -81,25 +84,4 @@ void cli_mesh_free(cli_mesh *mesh) {
   free(mesh->id);
   free(mesh->name);
   memset(mesh, 0, sizeof *mesh);
-}
-
-int cli_run_upload(cli *c) {
-  const char *name = c->args.value[OPT_NAME];
-  int rc = CLI_DONE;
-  if (name && c->args.operand_count > 1) {
-    cli_error(c, "--name goes with one file only");
-    return CLI_USAGE;
-  }
-  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
-    cli_reply reply;
-    rc = cli_upload(c, c->args.operands[i], name, c->args.value[OPT_REPAIR], &reply);
-    if (rc == CLI_DONE && !cli_ok(&reply))
-      rc = cli_refused(c, c->args.operands[i], &reply);
-    else if (rc == CLI_DONE && c->json)
-      puts(reply.body);
-    else if (rc == CLI_DONE)
-      cli_print_mesh(reply.json);
-    cli_reply_free(&reply);
-  }
-  return rc;
 }

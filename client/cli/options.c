@@ -1,10 +1,14 @@
-/* The options of all commands, their parser, and the help that is made of the same lists. */
+#include "options.h"
+
 #include <glob.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "program.h"
+#include "text.h"
+
+_Static_assert(OPT_COUNT <= 64, "a command holds its options in 64 bits");
 
 const cli_option cli_options[OPT_COUNT] = {
     [OPT_SERVER] = {"server", 's', "URL", NULL, "the daemon (else $ORBMORPH_SERVER, else " CLI_DEFAULT_SERVER ")"},
@@ -166,17 +170,17 @@ static void help_option(FILE *out, int id) {
   fputc('\n', out);
 }
 
-void cli_help(FILE *out, const cli_command *command) {
-  if (command) {
-    fprintf(out, "usage: orbmorph %s [options] %s\n%s.\n\n", command->name, command->operands, command->summary);
-    for (int id = 0; id < OPT_COUNT; id++)
-      if (command->options & CLI_BIT(id))
-        help_option(out, id);
-    return;
-  }
+void cli_help_command(FILE *out, const cli_command *command) {
+  fprintf(out, "usage: orbmorph %s [options] %s\n%s.\n\n", command->name, command->operands, command->summary);
+  for (int id = 0; id < OPT_COUNT; id++)
+    if (command->options & CLI_BIT(id))
+      help_option(out, id);
+}
+
+void cli_help(FILE *out, const cli_commands *commands) {
   fputs("usage: orbmorph COMMAND [options] …\nMorphs between closed meshes through the daemon orbmorphd.\n\n", out);
-  for (int i = 0; i < cli_command_count; i++)
-    fprintf(out, "  %-12s %s\n", cli_commands[i].name, cli_commands[i].summary);
+  for (int i = 0; i < commands->count; i++)
+    fprintf(out, "  %-12s %s\n", commands->list[i].name, commands->list[i].summary);
   fputs(
       "\n'orbmorph COMMAND --help' tells more; 'orbmorph --version' the version.\n"
       "Environment: ORBMORPH_SERVER (the daemon's URL), ORBMORPH_TOKEN.\n"

@@ -1,8 +1,10 @@
-/* What went wrong, in words: the daemon's problems, and advice for the owners of meshes. */
+#include "problem.h"
+
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "terminal.h"
+#include "text.h"
 
 enum { FACT_LENGTH_MOST = 160 };
 

@@ -1,10 +1,13 @@
-/* Resources in words: for the terminal, and as a report in Markdown. */
+#include "report.h"
+
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "problem.h"
+#include "terminal.h"
+#include "text.h"
 
 static const cJSON *member(const cJSON *object, const char *name) {
   return cJSON_GetObjectItemCaseSensitive(object, name);
@@ -35,6 +38,14 @@ void cli_print_embedding(const cJSON *embedding) {
          cli_number(dirichlet, "median"), cli_number(dirichlet, "max"));
   printf("  stretch efficiency: %.3g\n", cli_number(distortion, "stretch_efficiency"));
   printf("  time: %.3g s\n", cli_number(member(embedding, "timings_ms"), "total") / 1000);
+}
+
+void cli_print_job(const cJSON *job) {
+  double progress = cli_number(job, "progress");
+  const cJSON *problem = cJSON_GetObjectItemCaseSensitive(job, "problem");
+  printf("%s  %-10s %-9s %3.0f %%  %s\n", cli_string(job, "id", "?"), cli_string(job, "kind", "?"),
+         cli_string(job, "state", "?"), isfinite(progress) ? 100 * progress : 0,
+         cJSON_IsObject(problem) ? cli_problem_type(problem) : cli_string(job, "result", cli_string(job, "stage", "")));
 }
 
 /* "0.04 %", or "?" where it was not measured. */

@@ -1,11 +1,13 @@
-/* Small helpers: memory, text, numbers, JSON members. */
+#include "text.h"
+
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "program.h"
 
 void *cli_alloc(size_t size) {
   void *block = calloc(1, size ? size : 1);
@@ -87,29 +89,6 @@ char *cli_base_name(const char *path) {
 
 int cli_is_id(const char *text) {
   return strlen(text) == 64 && strspn(text, "0123456789abcdef") == 64;
-}
-
-void cli_error(const cli *c, const char *format, ...) {
-  va_list list;
-  if (c->bar_drawn)
-    fputs("\r\033[K", stderr);
-  fputs("orbmorph: ", stderr);
-  va_start(list, format);
-  vfprintf(stderr, format, list);
-  va_end(list);
-  fputc('\n', stderr);
-}
-
-void cli_note(const cli *c, const char *format, ...) {
-  if (c->quiet)
-    return;
-  va_list list;
-  if (c->bar_drawn)
-    fputs("\r\033[K", stderr);
-  va_start(list, format);
-  vfprintf(stderr, format, list);
-  va_end(list);
-  fputc('\n', stderr);
 }
 
 const char *cli_string(const cJSON *object, const char *name, const char *otherwise) {

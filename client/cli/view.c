@@ -1,4 +1,3 @@
-/* The sheet and the animation: which poses are drawn where. */
 #include "view.h"
 
 #include <math.h>
@@ -6,11 +5,17 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "view_canvas.h"
+#include "view_mesh.h"
+#include "view_movie.h"
+#include "view_png.h"
+#include "view_pose.h"
+
 enum { MAX_SIDE = 16384, FRAME_MILLISECONDS = 50 };
 #define MAX_MOVIE_BYTES ((size_t)1 << 30)
 
-void orb_view_defaults(orb_view_options *options) {
-  *options = (orb_view_options){.poses = 5, .size = 320, .up = 'y', .yaw = 30, .pitch = 15};
+void view_defaults(view_options *options) {
+  *options = (view_options){.poses = 5, .size = 320, .up = 'y', .yaw = 30, .pitch = 15};
 }
 
 static int no_memory(char *error, size_t error_size) {
@@ -18,7 +23,7 @@ static int no_memory(char *error, size_t error_size) {
   return -1;
 }
 
-static int draw_sheet(const view_mesh *mesh, const char *png, const orb_view_options *options, view_vertex *vertices,
+static int draw_sheet(const view_mesh *mesh, const char *png, const view_options *options, view_vertex *vertices,
                       char *error, size_t error_size) {
   view_canvas canvas;
   int shapes = view_shape_count(mesh), rows = shapes > 1 ? shapes - 1 : 1, side = options->size * VIEW_SUPERSAMPLE;
@@ -46,7 +51,7 @@ static int draw_sheet(const view_mesh *mesh, const char *png, const orb_view_opt
 
 /* What the animation shows at a time from 0 to 1: there and back; or round, where three or more shapes have no
  * in-betweens. It starts and ends each leg slowly. */
-static void pose_at(const view_mesh *mesh, double time, const orb_view_options *options, view_vertex *out) {
+static void pose_at(const view_mesh *mesh, double time, const view_options *options, view_vertex *out) {
   int shapes = view_shape_count(mesh), round = shapes > 2 && mesh->between == 0;
   int legs = shapes < 2 ? 1 : round ? shapes : 2 * (shapes - 1), leg = (int)floor(time * legs);
   double t = time * legs - leg;
@@ -62,7 +67,7 @@ static void pose_at(const view_mesh *mesh, double time, const orb_view_options *
   }
 }
 
-static int draw_movie(const view_mesh *mesh, const char *png, const orb_view_options *options, view_vertex *vertices,
+static int draw_movie(const view_mesh *mesh, const char *png, const view_options *options, view_vertex *vertices,
                       char *error, size_t error_size) {
   view_canvas canvas;
   view_frame frame;
@@ -97,7 +102,7 @@ static int draw_movie(const view_mesh *mesh, const char *png, const orb_view_opt
   return rc;
 }
 
-int orbmorph_view(const char *glb, const char *png, const orb_view_options *options, char *error, size_t error_size) {
+int view_file(const char *glb, const char *png, const view_options *options, char *error, size_t error_size) {
   view_mesh mesh;
   if (options->poses < 2 || options->poses > 100 || options->size < 16 || options->size > 4096 || options->frames < 0) {
     snprintf(error, error_size, "poses must be 2 to 100 and the size 16 to 4096");

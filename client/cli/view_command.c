@@ -2,7 +2,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "commands.h"
+#include "terminal.h"
+#include "text.h"
 #include "view.h"
 
 static int whole(const cli *c, cli_option_id id, long least, long most, int *out) {
@@ -29,8 +31,8 @@ static int angle(const cli *c, cli_option_id id, double *out) {
 int cli_run_view(cli *c) {
   const char *glb = c->args.operands[0], *output = c->args.value[OPT_OUTPUT], *up = c->args.value[OPT_UP];
   char error[512] = "";
-  orb_view_options options;
-  orb_view_defaults(&options);
+  view_options options;
+  view_defaults(&options);
   if (up && strcmp(up, "y") != 0 && strcmp(up, "z") != 0) {
     cli_error(c, "--up is y or z, not '%s'", up);
     return CLI_USAGE;
@@ -44,7 +46,7 @@ int cli_run_view(cli *c) {
   options.inside = c->args.value[OPT_INSIDE] != NULL;
   char *base = cli_base_name(glb), *png = output ? cli_text("%s", output) : cli_text("%s.png", base);
   int rc = CLI_DONE;
-  if (orbmorph_view(glb, png, &options, error, sizeof error) == 0) {
+  if (view_file(glb, png, &options, error, sizeof error) == 0) {
     printf("%s\n", png);
   } else {
     cli_error(c, "%s", error);

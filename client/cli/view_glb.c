@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-int glb_refuse(glb *r, const char *format, ...) {
+int glb_refuse(glb_file *r, const char *format, ...) {
   va_list args;
   va_start(args, format);
   vsnprintf(r->error, r->error_size, format, args);
@@ -21,7 +21,7 @@ static uint32_t word(const unsigned char *p) {
   return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
-int glb_load(glb *r, const char *path) {
+int glb_load(glb_file *r, const char *path) {
   FILE *file = fopen(path, "rb");
   if (!file) {
     return glb_refuse(r, "%s: %s", path, strerror(errno));
@@ -50,7 +50,7 @@ int glb_load(glb *r, const char *path) {
   return 0;
 }
 
-void glb_free(glb *r) {
+void glb_free(glb_file *r) {
   cJSON_Delete(r->json);
   free(r->bytes);
 }
@@ -66,13 +66,13 @@ int glb_code(const cJSON *object, const char *name, int otherwise) {
   return value <= INT_MAX ? (int)value : otherwise;
 }
 
-const cJSON *glb_entry(const glb *r, const char *list, double index) {
+const cJSON *glb_entry(const glb_file *r, const char *list, double index) {
   return index >= 0 && index <= INT_MAX
              ? cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(r->json, list), (int)index)
              : NULL;
 }
 
-const unsigned char *glb_view(const glb *r, double index, size_t *size) {
+const unsigned char *glb_view(const glb_file *r, double index, size_t *size) {
   const cJSON *view = glb_entry(r, "bufferViews", index);
   double at = glb_number(view, "byteOffset", 0), length = glb_number(view, "byteLength", 0);
   if (!view || length < 1 || at + length > (double)r->binary_size) {
@@ -82,7 +82,7 @@ const unsigned char *glb_view(const glb *r, double index, size_t *size) {
   return r->binary + (size_t)at;
 }
 
-int glb_open(const glb *r, double index, glb_span *out) {
+int glb_open(const glb_file *r, double index, glb_span *out) {
   const cJSON *accessor = glb_entry(r, "accessors", index);
   const cJSON *view = glb_entry(r, "bufferViews", glb_number(accessor, "bufferView", -1));
   const cJSON *type = cJSON_GetObjectItemCaseSensitive(accessor, "type");
@@ -136,7 +136,7 @@ static float component(const glb_span *s, uint32_t element, int c) {
   }
 }
 
-int glb_copy(glb *r, const cJSON *attributes, const char *name, uint32_t count, int components, float *out) {
+int glb_copy(glb_file *r, const cJSON *attributes, const char *name, uint32_t count, int components, float *out) {
   double index = glb_number(attributes, name, -1);
   glb_span s;
   if (index < 0) {

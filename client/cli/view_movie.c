@@ -1,12 +1,15 @@
 /* Animated PNG: the chunks of a PNG, written by hand since libpng knows no animation. Each frame after the first holds
  * only the rectangle that differs from the frame before. https://www.w3.org/TR/png-3/ */
+#include "view_movie.h"
+
 #include <errno.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <zlib.h>
 
-#include "view.h"
+#include "view_palette.h"
 
 typedef struct writer {
   FILE *file;

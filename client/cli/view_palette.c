@@ -1,10 +1,10 @@
 /* A palette by median cut (P. Heckbert, Color image quantization for frame buffer display, SIGGRAPH 1982): the box of
  * colours with the largest spread is cut at its weighted median until there are 256. Colours are counted to 7 bits. */
+#include "view_palette.h"
+
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "view.h"
 
 enum { BITS = 7, SIDE = 1 << BITS, BINS = SIDE * SIDE * SIDE };
 

@@ -1,31 +1,11 @@
-/* A canvas into a PNG: 2 × 2 pixels averaged in linear light, then sRGB. */
+#include "view_png.h"
+
 #include <errno.h>
-#include <math.h>
 #include <png.h>
 #include <setjmp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "view.h"
-
-static unsigned char srgb(float linear) {
-  float v = !(linear > 0) ? 0 : linear >= 1 ? 1 : linear; /* colours of a file may be anything: no number is black */
-  v = v <= 0.0031308f ? 12.92f * v : 1.055f * powf(v, 1 / 2.4f) - 0.055f;
-  return (unsigned char)(v * 255 + 0.5f);
-}
-
-void view_canvas_row(const view_canvas *canvas, int y, unsigned char *row) {
-  for (int x = 0; x < canvas->width / 2; x++) {
-    for (int c = 0; c < 3; c++) {
-      float sum = 0;
-      for (int k = 0; k < 4; k++) {
-        sum += canvas->color[3 * ((long)(2 * y + k / 2) * canvas->width + 2 * x + k % 2) + c];
-      }
-      row[3 * x + c] = srgb(sum / 4);
-    }
-  }
-}
 
 /* Apart, for setjmp and locals do not mix well. */
 static int write_rows(png_structp png, png_infop info, FILE *file, const view_canvas *canvas, unsigned char *row) {

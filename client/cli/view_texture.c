@@ -1,4 +1,5 @@
-/* Textures: decoded to sRGB bytes, halved until one pixel is left, sampled in linear light. */
+#include "view_texture.h"
+
 /* jpeglib.h needs stdio.h before it. */
 #include <stdio.h>
 
@@ -8,8 +9,6 @@
 #include <setjmp.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "view.h"
 
 enum { MAX_TEXTURE_SIDE = 16384 };
 #define MAX_TEXTURE_PIXELS ((size_t)1 << 28)
@@ -92,7 +91,7 @@ static unsigned char encoded(float linear) {
   return (unsigned char)(v * 255 + 0.5f);
 }
 
-float view_linear(unsigned char srgb) {
+static float linear_of(unsigned char srgb) {
   float v = (float)srgb / 255;
   return v <= 0.04045f ? v / 12.92f : powf((v + 0.055f) / 1.055f, 2.4f);
 }
@@ -127,7 +126,7 @@ int view_texture_decode(const unsigned char *bytes, size_t size, view_texture *o
            : size > 3 && memcmp(bytes, "\xff\xd8", 2) == 0 ? decode_jpeg(bytes, size, out)
                                                            : -1;
   for (int i = 0; i < 256; i++) {
-    linear[i] = view_linear((unsigned char)i);
+    linear[i] = linear_of((unsigned char)i);
   }
   out->levels = 1;
   while (rc == 0 && out->levels < VIEW_LEVELS &&
@@ -174,7 +173,7 @@ void view_texture_sample(const view_texture *t, float u, float v, float span, fl
     const unsigned char *p = t->pixels[level] + 3 * ((size_t)row * (size_t)t->width[level] + (size_t)column);
     float weight = (k % 2 ? fx : 1 - fx) * (k / 2 ? fy : 1 - fy);
     for (int c = 0; c < 3; c++) {
-      out[c] += weight * view_linear(p[c]);
+      out[c] += weight * linear_of(p[c]);
     }
   }
 }

@@ -1,9 +1,10 @@
-/* What the user gives for a request: a landmark file, and members by --set. */
+#include "input.h"
+
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
-#include "make.h"
+#include "terminal.h"
+#include "text.h"
 
 /* Members of members that --set takes, and the same within its value: far more than a request has, and together far
  * less than JSON's readers follow (1,000), so that what is sent is JSON to all of them. */

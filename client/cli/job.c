@@ -1,37 +1,16 @@
-/* Progress on a terminal, and waiting for jobs. */
+#include "job.h"
+
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "http.h"
+#include "problem.h"
+#include "terminal.h"
+#include "text.h"
 
-enum { BAR_WIDTH = 32, POLL_MICROSECONDS = 120 * 1000 };
-
-void cli_bar(cli *c, const char *label, double fraction) {
-  if (!c->bar)
-    return;
-  if (!(fraction >= 0 && fraction <= 1))
-    fraction = 0;
-  int full = (int)(fraction * BAR_WIDTH + 0.5), percent = (int)(100 * fraction + 0.5);
-  if (c->bar_drawn && percent == c->bar_percent && !strncmp(label, c->bar_label, sizeof c->bar_label - 1))
-    return;
-  c->bar_percent = percent;
-  snprintf(c->bar_label, sizeof c->bar_label, "%s", label);
-  char line[BAR_WIDTH + 1];
-  for (int i = 0; i < BAR_WIDTH; i++)
-    line[i] = i < full ? '#' : '.';
-  line[BAR_WIDTH] = 0;
-  fprintf(stderr, "\r\033[K%-24.24s [%s] %3d %%", label, line, percent);
-  fflush(stderr);
-  c->bar_drawn = 1;
-}
-
-void cli_bar_end(cli *c) {
-  if (c->bar_drawn)
-    fputs("\r\033[K", stderr);
-  c->bar_drawn = 0;
-}
+enum { POLL_MICROSECONDS = 120 * 1000 };
 
 /* The job again: on a terminal at once, to draw its progress; else when it has ended or 20 s have passed. */
 static int poll(cli *c, const char *url, cli_reply *reply) {

@@ -1,9 +1,9 @@
 /* Triangles onto a canvas with depths: barycentric coordinates over the bounding box, normals blended, one lamp over
  * the viewer's shoulder, a weaker one from the other side, and light from the sky. */
+#include "view_canvas.h"
+
 #include <math.h>
 #include <stdlib.h>
-
-#include "view.h"
 
 int view_canvas_make(view_canvas *canvas, int width, int height) {
   size_t pixels = (size_t)width * (size_t)height;
@@ -28,6 +28,24 @@ void view_canvas_free(view_canvas *canvas) {
   free(canvas->color);
   free(canvas->depth);
   *canvas = (view_canvas){0};
+}
+
+static unsigned char srgb(float linear) {
+  float v = !(linear > 0) ? 0 : linear >= 1 ? 1 : linear; /* colours of a file may be anything: no number is black */
+  v = v <= 0.0031308f ? 12.92f * v : 1.055f * powf(v, 1 / 2.4f) - 0.055f;
+  return (unsigned char)(v * 255 + 0.5f);
+}
+
+void view_canvas_row(const view_canvas *canvas, int y, unsigned char *row) {
+  for (int x = 0; x < canvas->width / 2; x++) {
+    for (int c = 0; c < 3; c++) {
+      float sum = 0;
+      for (int k = 0; k < 4; k++) {
+        sum += canvas->color[3 * ((long)(2 * y + k / 2) * canvas->width + 2 * x + k % 2) + c];
+      }
+      row[3 * x + c] = srgb(sum / 4);
+    }
+  }
 }
 
 static float shade(const float normal[3]) {
