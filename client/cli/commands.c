@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "commands.h"
+#include "http.h"
 #include "input.h"
 #include "job.h"
 #include "mesh.h"
@@ -22,12 +23,13 @@ int cli_run_upload(cli *c) {
   for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
     cli_reply reply;
     rc = cli_upload(c, c->args.operands[i], name, c->args.value[OPT_REPAIR], &reply);
-    if (rc == CLI_DONE && !cli_ok(&reply))
+    if (rc == CLI_DONE && !cli_ok(&reply)) {
       rc = cli_refused(c, c->args.operands[i], &reply);
-    else if (rc == CLI_DONE && c->json)
+    } else if (rc == CLI_DONE && c->json) {
       puts(reply.body);
-    else if (rc == CLI_DONE)
+    } else if (rc == CLI_DONE) {
       cli_print_mesh(reply.json);
+    }
     cli_reply_free(&reply);
   }
   return rc;
@@ -37,22 +39,27 @@ static int embed_one(cli *c, const char *operand) {
   cli_mesh mesh;
   cli_reply reply = {0};
   int rc = cli_mesh_of(c, operand, &mesh);
-  if (rc != CLI_DONE)
+  if (rc != CLI_DONE) {
     return rc;
+  }
   cJSON *request = cJSON_CreateObject();
   cJSON_AddStringToObject(request, "mesh", mesh.id);
-  if (c->args.value[OPT_METHOD])
+  if (c->args.value[OPT_METHOD]) {
     cJSON_AddStringToObject(request, "method", c->args.value[OPT_METHOD]);
-  if (c->args.value[OPT_PRESET])
+  }
+  if (c->args.value[OPT_PRESET]) {
     cJSON_AddStringToObject(cJSON_AddObjectToObject(request, "options"), "preset", c->args.value[OPT_PRESET]);
+  }
   rc = cli_apply_sets(c, request);
-  if (rc == CLI_DONE)
+  if (rc == CLI_DONE) {
     rc = cli_make(c, "/v1/embeddings", request, &reply);
+  }
   if (rc == CLI_DONE && reply.json) {
-    if (c->json)
+    if (c->json) {
       puts(reply.body);
-    else
+    } else {
       cli_print_embedding(reply.json);
+    }
     if (c->args.value[OPT_OUTPUT]) {
       char *path = cli_text("%s/sphere.ply", cli_string(reply.json, "url", ""));
       rc = cli_download(c, path, c->args.value[OPT_OUTPUT]);
@@ -71,8 +78,9 @@ int cli_run_embed(cli *c) {
     cli_error(c, "--output goes with one mesh only");
     return CLI_USAGE;
   }
-  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++)
+  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
     rc = embed_one(c, c->args.operands[i]);
+  }
   return rc;
 }
 
@@ -81,8 +89,9 @@ int cli_run_job(cli *c) {
   cli_reply reply = {0};
   cli_request request = {.method = c->args.value[OPT_CANCEL] ? "DELETE" : "GET", .path = path};
   int rc = cli_send(c, &request, &reply);
-  if (rc == CLI_DONE && !cli_ok(&reply))
+  if (rc == CLI_DONE && !cli_ok(&reply)) {
     rc = cli_not_found(c, "job", c->args.operands[0], &reply);
+  }
   if (rc == CLI_DONE && c->args.value[OPT_WAIT] && reply.json) {
     rc = cli_wait(c, reply.json, &result);
     if (rc == CLI_DONE) {
@@ -90,10 +99,11 @@ int cli_run_job(cli *c) {
       rc = cli_get(c, path, &reply);
     }
   }
-  if (rc == CLI_DONE && reply.body && c->json)
+  if (rc == CLI_DONE && reply.body && c->json) {
     puts(reply.body);
-  else if (rc == CLI_DONE && reply.json)
+  } else if (rc == CLI_DONE && reply.json) {
     cli_print_job(reply.json);
+  }
   free(result);
   free(path);
   cli_reply_free(&reply);
@@ -114,17 +124,20 @@ static void print_row(const char *collection, const cJSON *item) {
   } else {
     printf("%s  %10s ", cli_string(item, "id", "?"), triangles);
     const cJSON *shape;
-    cJSON_ArrayForEach(shape, cJSON_GetObjectItemCaseSensitive(item, "shapes"))
-        printf(" %s", cli_string(shape, "name", "?"));
+    cJSON_ArrayForEach(shape, cJSON_GetObjectItemCaseSensitive(item, "shapes")) {
+      printf(" %s", cli_string(shape, "name", "?"));
+    }
     putchar('\n');
   }
 }
 
 /* The list of a page: the member that is an array. */
 static const cJSON *page_items(const cJSON *page) {
-  for (const cJSON *item = page ? page->child : NULL; item; item = item->next)
-    if (cJSON_IsArray(item))
+  for (const cJSON *item = page ? page->child : NULL; item; item = item->next) {
+    if (cJSON_IsArray(item)) {
       return item;
+    }
+  }
   return NULL;
 }
 
@@ -143,20 +156,25 @@ static int list(cli *c, const char *collection, long limit) {
     free(from);
     free(token);
     token = NULL;
-    if (rc == CLI_DONE && !cli_ok(&reply))
+    if (rc == CLI_DONE && !cli_ok(&reply)) {
       rc = cli_refused(c, NULL, &reply);
-    if (rc == CLI_DONE && c->json)
+    }
+    if (rc == CLI_DONE && c->json) {
       puts(reply.body);
+    }
     const cJSON *item;
-    if (rc == CLI_DONE)
+    if (rc == CLI_DONE) {
       cJSON_ArrayForEach(item, page_items(reply.json)) {
-        if (!c->json)
+        if (!c->json) {
           print_row(collection, item);
+        }
         limit--;
       }
+    }
     const char *next = cli_string(reply.json, "next_page_token", NULL);
-    if (rc == CLI_DONE && next && *next && limit > 0)
+    if (rc == CLI_DONE && next && *next && limit > 0) {
       token = cli_text("%s", next);
+    }
     cli_reply_free(&reply);
   } while (token);
   return rc;
@@ -170,22 +188,25 @@ int cli_run_ls(cli *c) {
     cli_error(c, "--limit takes a whole number from 1 on");
     return CLI_USAGE;
   }
-  for (size_t i = 0; i < 4; i++)
-    if (!strcmp(wanted, collections[i]))
+  for (size_t i = 0; i < 4; i++) {
+    if (!strcmp(wanted, collections[i])) {
       return list(c, wanted, limit);
+    }
+  }
   cli_error(c, "there are meshes, embeddings, supermeshes and jobs, but no '%s'", wanted);
   return CLI_USAGE;
 }
 
 static void print_any(const char *path, const cli_reply *reply) {
-  if (strstr(path, "/v1/meshes/"))
+  if (strstr(path, "/v1/meshes/")) {
     cli_print_mesh(reply->json);
-  else if (strstr(path, "/v1/embeddings/"))
+  } else if (strstr(path, "/v1/embeddings/")) {
     cli_print_embedding(reply->json);
-  else if (strstr(path, "/v1/supermeshes/"))
+  } else if (strstr(path, "/v1/supermeshes/")) {
     cli_print_supermesh(reply->json);
-  else if (strstr(path, "/v1/jobs/"))
+  } else if (strstr(path, "/v1/jobs/")) {
     cli_print_job(reply->json);
+  }
 }
 
 int cli_run_get(cli *c) {
@@ -209,18 +230,21 @@ int cli_run_get(cli *c) {
   if (part || output) {
     char *base = part ? cli_resource_path(home, c->args.operands[0]) : NULL;
     rc = CLI_DONE;
-    if (!part)
+    if (!part) {
       rc = cli_find(c, c->args.operands[0], &base, &reply);
+    }
     path = cli_text("%s%s", base ? base : "", tail);
-    if (rc == CLI_DONE)
+    if (rc == CLI_DONE) {
       rc = cli_download(c, path, output ? output : "-");
+    }
     free(base);
   } else {
     rc = cli_find(c, c->args.operands[0], &path, &reply);
-    if (rc == CLI_DONE && (c->json || !reply.json))
+    if (rc == CLI_DONE && (c->json || !reply.json)) {
       puts(reply.body ? reply.body : "");
-    else if (rc == CLI_DONE)
+    } else if (rc == CLI_DONE) {
       print_any(path, &reply);
+    }
   }
   cli_reply_free(&reply);
   free(path);
@@ -237,8 +261,9 @@ int cli_run_rm(cli *c) {
     if (rc == CLI_DONE) {
       cli_request request = {.method = "DELETE", .path = path};
       rc = cli_send(c, &request, &reply);
-      if (rc == CLI_DONE && !cli_ok(&reply))
+      if (rc == CLI_DONE && !cli_ok(&reply)) {
         rc = cli_refused(c, c->args.operands[i], &reply);
+      }
       cli_reply_free(&reply);
     }
     free(path);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "commands.h"
+#include "http.h"
 #include "mesh.h"
 #include "problem.h"
 #include "text.h"
@@ -12,8 +13,9 @@ static void forget(cli *c, const cli_reply *reply) {
   char *path = cli_text("/v1/meshes/%s", cli_string(reply->json, "id", ""));
   cli_request request = {.method = "DELETE", .path = path};
   cli_reply gone = {0};
-  if (reply->status == 201 && cli_send(c, &request, &gone) == CLI_DONE)
+  if (reply->status == 201 && cli_send(c, &request, &gone) == CLI_DONE) {
     cli_reply_free(&gone);
+  }
   free(path);
 }
 
@@ -41,12 +43,15 @@ static int try_repair(cli *c, const char *path, const char *repair) {
 }
 
 static int suggest(cli *c, const char *path, const char *type) {
-  if (!strcmp(type, "not-closed") && try_repair(c, path, "fill_holes"))
+  if (!strcmp(type, "not-closed") && try_repair(c, path, "fill_holes")) {
     return 1;
-  if (!strcmp(type, "not-connected") && try_repair(c, path, "largest_component"))
+  }
+  if (!strcmp(type, "not-connected") && try_repair(c, path, "largest_component")) {
     return 1;
-  if (!strcmp(type, "not-closed") || !strcmp(type, "not-connected"))
+  }
+  if (!strcmp(type, "not-closed") || !strcmp(type, "not-connected")) {
     return try_repair(c, path, "largest_component,fill_holes");
+  }
   return 0;
 }
 
@@ -60,8 +65,9 @@ static int examine(cli *c, const char *path) {
   if (c->json && reply.body) {
     puts(reply.body);
     rc = cli_ok(&reply) ? CLI_DONE : CLI_REFUSED;
-    if (cli_ok(&reply))
+    if (cli_ok(&reply)) {
       forget(c, &reply);
+    }
   } else if (cli_ok(&reply)) {
     char triangles[32];
     cli_count(cli_number(reply.json, "triangles"), triangles);
@@ -72,10 +78,12 @@ static int examine(cli *c, const char *path) {
     fflush(stdout);
     rc = cli_refused(c, path, &reply);
     const char *type = reply.json ? cli_problem_type(reply.json) : "", *advice = cli_advice(type);
-    if (advice)
+    if (advice) {
       printf("  %s\n", advice);
-    if (reply.json && !suggest(c, path, type) && (!strcmp(type, "not-closed") || !strcmp(type, "not-connected")))
+    }
+    if (reply.json && !suggest(c, path, type) && (!strcmp(type, "not-closed") || !strcmp(type, "not-connected"))) {
       printf("  No repair of the daemon's is enough for this one.\n");
+    }
   }
   cli_reply_free(&reply);
   return rc;
@@ -85,8 +93,9 @@ int cli_run_doctor(cli *c) {
   int worst = CLI_DONE;
   for (int i = 0; i < c->args.operand_count; i++) {
     int rc = examine(c, c->args.operands[i]);
-    if (rc == CLI_UNREACHABLE)
+    if (rc == CLI_UNREACHABLE) {
       return rc;
+    }
     worst = rc > worst ? rc : worst;
   }
   return worst;

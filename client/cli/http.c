@@ -38,8 +38,9 @@ static size_t on_body(char *bytes, size_t size, size_t count, void *user) {
   if (t->reply->size + length + 1 > t->room) {
     size_t room = 2 * (t->reply->size + length + 1);
     char *more = realloc(t->reply->body, room);
-    if (!more)
+    if (!more) {
       return 0;
+    }
     t->reply->body = more;
     t->room = room;
   }
@@ -52,13 +53,16 @@ static size_t on_body(char *bytes, size_t size, size_t count, void *user) {
 /* The value of a header line if it has this name, to free; else NULL. */
 static char *header_value(const char *line, size_t length, const char *name) {
   size_t n = strlen(name);
-  if (length <= n || strncasecmp(line, name, n) != 0 || line[n] != ':')
+  if (length <= n || strncasecmp(line, name, n) != 0 || line[n] != ':') {
     return NULL;
+  }
   const char *begin = line + n + 1, *end = line + length;
-  while (begin < end && (*begin == ' ' || *begin == '\t'))
+  while (begin < end && (*begin == ' ' || *begin == '\t')) {
     begin++;
-  while (end > begin && (end[-1] == '\r' || end[-1] == '\n' || end[-1] == ' '))
+  }
+  while (end > begin && (end[-1] == '\r' || end[-1] == '\n' || end[-1] == ' ')) {
     end--;
+  }
   return cli_text("%.*s", (int)(end - begin), begin);
 }
 
@@ -71,8 +75,9 @@ static size_t on_header(char *line, size_t size, size_t count, void *user) {
     t->reply->location = location;
   }
   if (after) {
-    if (!cli_whole_number(after, 0, 86400, &t->reply->retry_after))
+    if (!cli_whole_number(after, 0, 86400, &t->reply->retry_after)) {
       t->reply->retry_after = -1;
+    }
     free(after);
   }
   return size * count;
@@ -90,19 +95,21 @@ static int on_seek(void *user, curl_off_t offset, int origin) {
 
 static int on_progress(void *user, curl_off_t down_total, curl_off_t down, curl_off_t up_total, curl_off_t up) {
   transfer *t = user;
-  if (t->request->label && t->request->upload && up_total > 0)
+  if (t->request->label && t->request->upload && up_total > 0) {
     cli_bar(t->c, t->request->label, (double)up / (double)up_total);
-  else if (t->request->label && t->request->download && down_total > 0)
+  } else if (t->request->label && t->request->download && down_total > 0) {
     cli_bar(t->c, t->request->label, (double)down / (double)down_total);
+  }
   return 0;
 }
 
 static struct curl_slist *headers_of(const cli *c, const cli_request *request) {
   struct curl_slist *list = curl_slist_append(NULL, "User-Agent: orbmorph/" CLI_VERSION);
-  if (request->json)
+  if (request->json) {
     list = curl_slist_append(list, "Content-Type: application/json");
-  else if (request->upload)
+  } else if (request->upload) {
     list = curl_slist_append(list, "Content-Type: application/octet-stream");
+  }
   if (c->token) {
     char *line = cli_text("Authorization: Bearer %s", c->token);
     list = curl_slist_append(list, line);
@@ -153,10 +160,12 @@ static CURLcode perform(transfer *t, const char *url) {
 }
 
 static int rewind_all(const cli_request *request) {
-  if (request->upload && fseeko(request->upload, 0, SEEK_SET) != 0)
+  if (request->upload && fseeko(request->upload, 0, SEEK_SET) != 0) {
     return 0;
-  if (request->download)
+  }
+  if (request->download) {
     return fseeko(request->download, 0, SEEK_SET) == 0 && ftruncate(fileno(request->download), 0) == 0;
+  }
   return 1;
 }
 
@@ -202,8 +211,9 @@ int cli_send(cli *c, const cli_request *request, cli_reply *out) {
     cli_reply_free(out);
     usleep(300 * 1000);
   }
-  if (rc == CLI_DONE && out->body)
+  if (rc == CLI_DONE && out->body) {
     out->json = cJSON_ParseWithLength(out->body, out->size);
+  }
   free(url);
   return rc;
 }

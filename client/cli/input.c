@@ -14,8 +14,9 @@ cJSON *cli_read_landmarks(const cli *c, const char *path) {
   size_t size;
   const char *end = NULL;
   char *text = cli_read_file(path, &size);
-  if (!text)
+  if (!text) {
     return NULL;
+  }
   cJSON *whole = cJSON_ParseWithLengthOpts(text, size + 1, &end, 1), *list = whole;
   if (!whole) {
     cli_error(c, "%s: not JSON at byte %zu", path, end ? (size_t)(end - text) : 0);
@@ -31,8 +32,9 @@ cJSON *cli_read_landmarks(const cli *c, const char *path) {
   }
   for (cJSON *item = list ? list->child : NULL, *next; item; item = next) {
     next = item->next;
-    if (!cJSON_IsArray(item))
+    if (!cJSON_IsArray(item)) {
       continue;
+    }
     cJSON *landmark = cJSON_CreateObject(), *at = cJSON_AddArrayToObject(landmark, "at");
     for (const cJSON *vertex = item->child; vertex; vertex = vertex->next) {
       cJSON *place = cJSON_CreateObject();
@@ -60,11 +62,13 @@ int cli_set_member(cJSON *object, const char *path, cJSON *value) {
       return ok;
     }
     cJSON *child = cJSON_GetObjectItemCaseSensitive(object, name);
-    if (!child)
+    if (!child) {
       child = cJSON_AddObjectToObject(object, name);
+    }
     free(name);
-    if (!cJSON_IsObject(child))
+    if (!cJSON_IsObject(child)) {
       break;
+    }
     object = child;
     path = dot + 1;
   }
@@ -76,14 +80,15 @@ int cli_set_member(cJSON *object, const char *path, cJSON *value) {
 static int nesting(const char *text) {
   int depth = 0, most = 0, quoted = 0;
   for (; *text; text++) {
-    if (quoted && *text == '\\' && text[1])
+    if (quoted && *text == '\\' && text[1]) {
       text++;
-    else if (*text == '"')
+    } else if (*text == '"') {
       quoted = !quoted;
-    else if (!quoted && (*text == '[' || *text == '{') && ++depth > most)
+    } else if (!quoted && (*text == '[' || *text == '{') && ++depth > most) {
       most = depth;
-    else if (!quoted && (*text == ']' || *text == '}'))
+    } else if (!quoted && (*text == ']' || *text == '}')) {
       depth--;
+    }
   }
   return most;
 }
@@ -93,8 +98,9 @@ int cli_apply_sets(const cli *c, cJSON *request) {
     const char *text = c->args.sets[i], *equals = strchr(text, '=');
     char *path = equals ? cli_text("%.*s", (int)(equals - text), text) : NULL;
     cJSON *value = equals ? cJSON_ParseWithOpts(equals + 1, NULL, 1) : NULL;
-    if (equals && !value)
+    if (equals && !value) {
       value = cJSON_CreateString(equals + 1);
+    }
     if (value && !cJSON_IsString(value) && nesting(equals + 1) > SET_DEPTH_MOST) {
       cJSON_Delete(value);
       value = NULL;

@@ -16,8 +16,9 @@ enum { POLL_MICROSECONDS = 120 * 1000 };
 static int poll(cli *c, const char *url, cli_reply *reply) {
   char *path = cli_text("%s%s", url, c->bar ? "" : "?wait=20");
   cli_request request = {.method = "GET", .path = path, .patient = 1};
-  if (c->bar)
+  if (c->bar) {
     usleep(POLL_MICROSECONDS);
+  }
   int rc = cli_send(c, &request, reply);
   free(path);
   return rc;
@@ -35,8 +36,9 @@ static int conclude(cli *c, const cJSON *job, char **result) {
     *result = cli_text("%s", cli_string(job, "result", ""));
     return CLI_DONE;
   }
-  if (cJSON_IsObject(problem))
+  if (cJSON_IsObject(problem)) {
     return cli_problem(c, NULL, problem);
+  }
   cli_error(c, "job %s has %s", cli_string(job, "id", "?"), state);
   return CLI_REFUSED;
 }
@@ -45,8 +47,9 @@ static int conclude(cli *c, const cJSON *job, char **result) {
 static char farewell[256];
 
 static void on_interrupt(int signal_number) {
-  if (write(STDERR_FILENO, farewell, strlen(farewell)) >= 0)
+  if (write(STDERR_FILENO, farewell, strlen(farewell)) >= 0) {
     signal(signal_number, SIG_DFL);
+  }
   raise(signal_number);
 }
 
@@ -83,8 +86,9 @@ int cli_wait(cli *c, const cJSON *job, char **result) {
     job = reply.json;
   }
   signal(SIGINT, SIG_DFL);
-  if (rc == CLI_DONE)
+  if (rc == CLI_DONE) {
     rc = conclude(c, job, result);
+  }
   cli_reply_free(&reply);
   free(url);
   return rc;

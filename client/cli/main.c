@@ -43,9 +43,11 @@ static const cli_command command_list[] = {
 static const cli_commands commands = {command_list, sizeof command_list / sizeof command_list[0]};
 
 static const cli_command *find_command(const char *name) {
-  for (int i = 0; i < commands.count; i++)
-    if (!strcmp(commands.list[i].name, name))
+  for (int i = 0; i < commands.count; i++) {
+    if (!strcmp(commands.list[i].name, name)) {
       return &commands.list[i];
+    }
+  }
   return NULL;
 }
 
@@ -79,16 +81,20 @@ static int run(const cli_command *command, cli *c) {
 /* --server and the like may stand before the command as well: they are moved behind it. */
 static char **command_first(int argc, char **argv, int *at) {
   int i = 1;
-  while (i < argc && argv[i][0] == '-')
+  while (i < argc && argv[i][0] == '-') {
     i += !strcmp(argv[i], "--server") || !strcmp(argv[i], "-s") ? 2 : 1;
+  }
   char **line = cli_alloc((size_t)(argc + 1) * sizeof *line);
   int fill = 0;
   line[fill++] = argv[0];
-  if (i < argc)
+  if (i < argc) {
     line[fill++] = argv[i];
-  for (int k = 1; k < argc; k++)
-    if (k != i)
+  }
+  for (int k = 1; k < argc; k++) {
+    if (k != i) {
       line[fill++] = argv[k];
+    }
+  }
   *at = i < argc;
   return line;
 }
@@ -100,10 +106,11 @@ int main(int argc, char **argv) {
   }
   if (argc >= 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h") || !strcmp(argv[1], "help"))) {
     const cli_command *about = argc > 2 ? find_command(argv[2]) : NULL;
-    if (about)
+    if (about) {
       cli_help_command(stdout, about);
-    else
+    } else {
       cli_help(stdout, &commands);
+    }
     return CLI_DONE;
   }
   int given, rc;
@@ -111,15 +118,17 @@ int main(int argc, char **argv) {
   const cli_command *command = given ? find_command(line[1]) : NULL;
   cli c = {.commands = commands};
   if (!command) {
-    if (given)
+    if (given) {
       fprintf(stderr, "orbmorph: there is no command '%s'\n", line[1]);
+    }
     cli_help(stderr, &commands);
     rc = CLI_USAGE;
   } else if ((rc = cli_parse(command, argc, line, 2, &c.args)) == CLI_DONE) {
-    if (c.args.value[OPT_HELP])
+    if (c.args.value[OPT_HELP]) {
       cli_help_command(stdout, command);
-    else
+    } else {
       rc = run(command, &c);
+    }
   }
   cli_args_free(&c.args);
   free(line);

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "commands.h"
+#include "http.h"
 #include "input.h"
 #include "mesh.h"
 #include "report.h"
@@ -13,8 +14,9 @@
 #include "text.h"
 
 static void set_text(const cli *c, cJSON *request, cli_option_id option, const char *path) {
-  if (c->args.value[option])
+  if (c->args.value[option]) {
     cli_set_member(request, path, cJSON_CreateString(c->args.value[option]));
+  }
 }
 
 static int add_options(const cli *c, cJSON *request) {
@@ -40,8 +42,9 @@ static int add_options(const cli *c, cJSON *request) {
     }
     cli_set_member(request, "remesh.max_triangles", cJSON_CreateNumber((double)n));
   }
-  if (c->args.value[OPT_NO_NORMALS])
+  if (c->args.value[OPT_NO_NORMALS]) {
     cli_set_member(request, "asset.normals", cJSON_CreateBool(0));
+  }
   return cli_apply_sets(c, request);
 }
 
@@ -55,8 +58,9 @@ static int make_request(cli *c, cJSON **out) {
     cJSON_AddStringToObject(request, "landmarks", "auto");
   } else if (landmarks) {
     cJSON *list = cli_read_landmarks(c, landmarks);
-    if (!list)
+    if (!list) {
       return CLI_USAGE;
+    }
     cJSON_AddItemToObject(request, "landmarks", list);
   }
   return add_options(c, request);
@@ -67,8 +71,9 @@ static int add_shapes(cli *c, cJSON *request) {
   for (int i = 0; i < c->args.operand_count; i++) {
     cli_mesh mesh;
     int rc = cli_mesh_of(c, c->args.operands[i], &mesh);
-    if (rc != CLI_DONE)
+    if (rc != CLI_DONE) {
       return rc;
+    }
     cJSON *shape = cJSON_CreateObject();
     cJSON_AddStringToObject(shape, "mesh", mesh.id);
     cJSON_AddStringToObject(shape, "name", mesh.name);
@@ -86,15 +91,18 @@ static int finish(cli *c, const cli_reply *supermesh, const char *output) {
     rc = cli_download(c, asset, output);
     free(asset);
   }
-  if (rc == CLI_DONE && report)
+  if (rc == CLI_DONE && report) {
     rc = cli_write_report(c, report, supermesh);
-  if (rc != CLI_DONE || (output && !strcmp(output, "-")))
+  }
+  if (rc != CLI_DONE || (output && !strcmp(output, "-"))) {
     return rc;
+  }
   if (c->json) {
     puts(supermesh->body);
   } else {
-    if (output)
+    if (output) {
       printf("%s\n", output);
+    }
     cli_print_supermesh(supermesh->json);
   }
   return CLI_DONE;
@@ -102,13 +110,15 @@ static int finish(cli *c, const cli_reply *supermesh, const char *output) {
 
 /* Whether a file can be made there, before any work is done for it. */
 static int can_write(const cli *c, const char *file) {
-  if (!file || !strcmp(file, "-"))
+  if (!file || !strcmp(file, "-")) {
     return CLI_DONE;
+  }
   const char *slash = strrchr(file, '/');
   char *folder = slash ? cli_text("%.*s", (int)(slash - file + 1), file) : cli_text(".");
   int fine = access(folder, W_OK | X_OK) == 0;
-  if (!fine)
+  if (!fine) {
     cli_error(c, "%s cannot be written: the folder %s: %s", file, folder, strerror(errno));
+  }
   free(folder);
   return fine ? CLI_DONE : CLI_USAGE;
 }
@@ -117,16 +127,21 @@ static int merge(cli *c, const char *output) {
   cJSON *request = NULL;
   cli_reply supermesh = {0};
   int rc = can_write(c, output);
-  if (rc == CLI_DONE)
+  if (rc == CLI_DONE) {
     rc = can_write(c, c->args.value[OPT_REPORT]);
-  if (rc == CLI_DONE)
+  }
+  if (rc == CLI_DONE) {
     rc = make_request(c, &request);
-  if (rc == CLI_DONE)
+  }
+  if (rc == CLI_DONE) {
     rc = add_shapes(c, request);
-  if (rc == CLI_DONE)
+  }
+  if (rc == CLI_DONE) {
     rc = cli_make(c, "/v1/supermeshes", request, &supermesh);
-  if (rc == CLI_DONE && supermesh.json)
+  }
+  if (rc == CLI_DONE && supermesh.json) {
     rc = finish(c, &supermesh, output);
+  }
   cli_reply_free(&supermesh);
   cJSON_Delete(request);
   return rc;
@@ -138,8 +153,9 @@ int cli_run_merge(cli *c) {
 
 int cli_run_morph(cli *c) {
   const char *output = c->args.value[OPT_OUTPUT];
-  if (output)
+  if (output) {
     return merge(c, output);
+  }
   char *first = cli_base_name(c->args.operands[0]), *last = cli_base_name(c->args.operands[c->args.operand_count - 1]);
   char *made = cli_text("%s-%s.glb", first, last);
   int rc = merge(c, made);

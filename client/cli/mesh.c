@@ -16,8 +16,9 @@ int cli_upload(cli *c, const char *path, const char *name, const char *repair, c
   struct stat info;
   if (!file || fstat(fileno(file), &info) != 0 || S_ISDIR(info.st_mode)) {
     cli_error(c, "%s: %s", path, file ? "is not a file" : strerror(errno));
-    if (file)
+    if (file) {
       fclose(file);
+    }
     return CLI_USAGE;
   }
   char *base = cli_base_name(path), *escaped = cli_escape(name ? name : base), *target;
@@ -67,12 +68,14 @@ int cli_mesh_of(cli *c, const char *operand, cli_mesh *out) {
   if (rc == CLI_DONE && !cli_ok(&reply)) {
     rc = cli_refused(c, operand, &reply);
     const char *advice = reply.json ? cli_advice(cli_problem_type(reply.json)) : NULL;
-    if (advice && !c->json)
+    if (advice && !c->json) {
       cli_note(c, "  %s", advice);
+    }
   }
   if (rc == CLI_DONE) {
-    if (!known)
+    if (!known) {
       note_mesh(c, operand, &reply);
+    }
     out->id = cli_text("%s", cli_string(reply.json, "id", ""));
     out->name = known ? cli_text("%s", cli_string(reply.json, "name", "")) : cli_base_name(operand);
   }

@@ -49,17 +49,21 @@ const cli_option cli_options[OPT_COUNT] = {
 };
 
 static int find_long(const cli_command *command, const char *text, size_t length) {
-  for (int id = 0; id < OPT_COUNT; id++)
+  for (int id = 0; id < OPT_COUNT; id++) {
     if ((command->options & CLI_BIT(id)) && strlen(cli_options[id].name) == length &&
-        !strncmp(cli_options[id].name, text, length))
+        !strncmp(cli_options[id].name, text, length)) {
       return id;
+    }
+  }
   return -1;
 }
 
 static int find_letter(const cli_command *command, char letter) {
-  for (int id = 0; id < OPT_COUNT; id++)
-    if ((command->options & CLI_BIT(id)) && cli_options[id].letter == letter && letter)
+  for (int id = 0; id < OPT_COUNT; id++) {
+    if ((command->options & CLI_BIT(id)) && cli_options[id].letter == letter && letter) {
       return id;
+    }
+  }
   return -1;
 }
 
@@ -73,16 +77,18 @@ static int store(cli_args *out, int id, const char *value) {
     out->value[id] = value;
     return 1;
   }
-  if (out->set_count == CLI_SETS_MAX)
+  if (out->set_count == CLI_SETS_MAX) {
     return 0;
+  }
   out->sets[out->set_count++] = value;
   return 1;
 }
 
 static void add_operand(cli_args *out, const char *text) {
   out->operands = realloc(out->operands, (size_t)(out->operand_count + 1) * sizeof(char *));
-  if (!out->operands)
+  if (!out->operands) {
     exit(CLI_REFUSED);
+  }
   out->operands[out->operand_count++] = cli_text("%s", text);
 }
 
@@ -90,8 +96,9 @@ static void add_operand(cli_args *out, const char *text) {
 static void add_operands(cli_args *out, const char *text) {
   glob_t found;
   if (strpbrk(text, "*?[") && access(text, F_OK) != 0 && glob(text, 0, NULL, &found) == 0) {
-    for (size_t i = 0; i < found.gl_pathc; i++)
+    for (size_t i = 0; i < found.gl_pathc; i++) {
       add_operand(out, found.gl_pathv[i]);
+    }
     globfree(&found);
     return;
   }
@@ -111,15 +118,18 @@ static int parse_option(const cli_command *command, int argc, char **argv, int *
     id = find_letter(command, text[1]);
     value = text[2] ? text + 2 : NULL;
   }
-  if (id < 0)
+  if (id < 0) {
     return usage_error(command, "unknown option", text);
+  }
   if (!cli_options[id].value) {
-    if (value)
+    if (value) {
       return usage_error(command, "no value goes with", text);
+    }
     value = "";
   } else if (!value) {
-    if (*i + 1 >= argc)
+    if (*i + 1 >= argc) {
       return usage_error(command, "a value is missing after", text);
+    }
     value = argv[++*i];
   }
   return store(out, id, value) ? CLI_DONE : usage_error(command, "too many options", text);
@@ -133,26 +143,31 @@ int cli_parse(const cli_command *command, int argc, char **argv, int first, cli_
       literal = 1;
     } else if (!literal && argv[i][0] == '-' && argv[i][1]) {
       int rc = parse_option(command, argc, argv, &i, out);
-      if (rc != CLI_DONE)
+      if (rc != CLI_DONE) {
         return rc;
+      }
     } else if (literal) {
       add_operand(out, argv[i]);
     } else {
       add_operands(out, argv[i]);
     }
   }
-  if (out->value[OPT_HELP])
+  if (out->value[OPT_HELP]) {
     return CLI_DONE;
-  if (out->operand_count < command->least)
+  }
+  if (out->operand_count < command->least) {
     return usage_error(command, "too few arguments; it takes", command->operands);
-  if (command->most >= 0 && out->operand_count > command->most)
+  }
+  if (command->most >= 0 && out->operand_count > command->most) {
     return usage_error(command, "too many arguments; it takes", *command->operands ? command->operands : "none");
+  }
   return CLI_DONE;
 }
 
 void cli_args_free(cli_args *args) {
-  for (int i = 0; i < args->operand_count; i++)
+  for (int i = 0; i < args->operand_count; i++) {
     free(args->operands[i]);
+  }
   free(args->operands);
   memset(args, 0, sizeof *args);
 }
@@ -160,27 +175,32 @@ void cli_args_free(cli_args *args) {
 static void help_option(FILE *out, int id) {
   const cli_option *o = &cli_options[id];
   char left[64];
-  if (o->letter)
+  if (o->letter) {
     snprintf(left, sizeof left, "-%c, --%s%s%s", o->letter, o->name, o->value ? " " : "", o->value ? o->value : "");
-  else
+  } else {
     snprintf(left, sizeof left, "    --%s%s%s", o->name, o->value ? " " : "", o->value ? o->value : "");
+  }
   fprintf(out, "  %-26s %s", left, o->help);
-  if (o->choices)
+  if (o->choices) {
     fprintf(out, " (%s)", o->choices);
+  }
   fputc('\n', out);
 }
 
 void cli_help_command(FILE *out, const cli_command *command) {
   fprintf(out, "usage: orbmorph %s [options] %s\n%s.\n\n", command->name, command->operands, command->summary);
-  for (int id = 0; id < OPT_COUNT; id++)
-    if (command->options & CLI_BIT(id))
+  for (int id = 0; id < OPT_COUNT; id++) {
+    if (command->options & CLI_BIT(id)) {
       help_option(out, id);
+    }
+  }
 }
 
 void cli_help(FILE *out, const cli_commands *commands) {
   fputs("usage: orbmorph COMMAND [options] …\nMorphs between closed meshes through the daemon orbmorphd.\n\n", out);
-  for (int i = 0; i < commands->count; i++)
+  for (int i = 0; i < commands->count; i++) {
     fprintf(out, "  %-12s %s\n", commands->list[i].name, commands->list[i].summary);
+  }
   fputs(
       "\n'orbmorph COMMAND --help' tells more; 'orbmorph --version' the version.\n"
       "Environment: ORBMORPH_SERVER (the daemon's URL), ORBMORPH_TOKEN.\n"

@@ -15,21 +15,26 @@ const char *cli_problem_type(const cJSON *problem) {
 
 static int is_standard(const char *name) {
   static const char *const names[] = {"type", "title", "status", "detail", "instance"};
-  for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
-    if (!strcmp(name, names[i]))
+  for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+    if (!strcmp(name, names[i])) {
       return 1;
+    }
+  }
   return 0;
 }
 
 static void print_facts(const cJSON *problem) {
   for (const cJSON *item = problem->child; item; item = item->next) {
-    if (!item->string || is_standard(item->string))
+    if (!item->string || is_standard(item->string)) {
       continue;
+    }
     char *text = cJSON_PrintUnformatted(item);
-    if (!text)
+    if (!text) {
       continue;
-    if (strlen(text) > FACT_LENGTH_MOST)
+    }
+    if (strlen(text) > FACT_LENGTH_MOST) {
       strcpy(text + FACT_LENGTH_MOST - 4, " …");
+    }
     fprintf(stderr, "  %s: %s\n", item->string, text);
     free(text);
   }
@@ -51,8 +56,9 @@ int cli_problem(cli *c, const char *subject, const cJSON *problem) {
 
 int cli_refused(cli *c, const char *subject, const cli_reply *reply) {
   cli_bar_end(c);
-  if (cJSON_IsObject(reply->json))
+  if (cJSON_IsObject(reply->json)) {
     return cli_problem(c, subject, reply->json);
+  }
   cli_error(c, "%s%sthe server answered with status %ld", subject ? subject : "", subject ? ": " : "", reply->status);
   return CLI_REFUSED;
 }
@@ -84,8 +90,10 @@ const char *cli_advice(const char *type) {
       {"unknown-format", "Supported are OBJ, OFF, PLY, STL, glTF and GLB."},
       {"too-large", "The mesh is larger than the daemon accepts. Decimate it first, or raise the daemon's limits."},
   };
-  for (size_t i = 0; i < sizeof list / sizeof list[0]; i++)
-    if (!strcmp(list[i].type, type))
+  for (size_t i = 0; i < sizeof list / sizeof list[0]; i++) {
+    if (!strcmp(list[i].type, type)) {
       return list[i].advice;
+    }
+  }
   return NULL;
 }

@@ -2,7 +2,6 @@
 
 #include <errno.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "problem.h"
@@ -50,19 +49,24 @@ void cli_print_job(const cJSON *job) {
 
 /* "0.04 %", or "?" where it was not measured. */
 static void percent(double fraction, char out[32]) {
-  if (isfinite(fraction))
+  if (isfinite(fraction)) {
     snprintf(out, 32, "%.3g %%", 100 * fraction);
-  else
+  } else {
     snprintf(out, 32, "?");
+  }
 }
 
 /* The largest distance of any landmark from its place, as a fraction of the diagonal. */
 static double worst_residual(const cJSON *supermesh) {
   double worst = 0;
   const cJSON *landmark, *residual;
-  cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) cJSON_ArrayForEach(
-      residual, member(landmark, "residual_relative")) if (cJSON_IsNumber(residual) && residual->valuedouble > worst)
-      worst = residual->valuedouble;
+  cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
+    cJSON_ArrayForEach(residual, member(landmark, "residual_relative")) {
+      if (cJSON_IsNumber(residual) && residual->valuedouble > worst) {
+        worst = residual->valuedouble;
+      }
+    }
+  }
   return worst;
 }
 
@@ -115,8 +119,12 @@ static void markdown_shapes(FILE *out, const cJSON *supermesh) {
 static void markdown_numbers(FILE *out, const char *title, const cJSON *object) {
   const cJSON *item;
   fprintf(out, "\n%s:", title);
-  cJSON_ArrayForEach(item, object) if (cJSON_IsNumber(item)) fprintf(
-      out, " %s %.*f%s", item->string, item->valuedouble < 100 ? 1 : 0, item->valuedouble, item->next ? "," : ".");
+  cJSON_ArrayForEach(item, object) {
+    if (cJSON_IsNumber(item)) {
+      fprintf(out, " %s %.*f%s", item->string, item->valuedouble < 100 ? 1 : 0, item->valuedouble,
+              item->next ? "," : ".");
+    }
+  }
   fputc('\n', out);
 }
 
@@ -124,8 +132,9 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   char vertices[32], triangles[32];
   const cJSON *shape, *landmark, *certificate = member(supermesh, "certificate");
   fputs("# Morph of ", out);
-  cJSON_ArrayForEach(shape, member(supermesh, "shapes"))
-      fprintf(out, "%s%s", cli_string(shape, "name", "?"), shape->next ? ", " : "\n\n");
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    fprintf(out, "%s%s", cli_string(shape, "name", "?"), shape->next ? ", " : "\n\n");
+  }
   cli_count(cli_number(supermesh, "vertices"), vertices);
   cli_count(cli_number(supermesh, "triangles"), triangles);
   fprintf(out, "One surface of %s vertices and %s triangles, %s, genus %.0f. Resource `%s`, made by %s.\n\n", vertices,

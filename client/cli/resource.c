@@ -20,8 +20,9 @@ char *cli_resource_path(const char *collection, const char *operand) {
 }
 
 int cli_not_found(cli *c, const char *kind, const char *operand, const cli_reply *reply) {
-  if (reply->status != 404 || c->json || operand[0] == '/')
+  if (reply->status != 404 || c->json || operand[0] == '/') {
     return cli_refused(c, operand, reply);
+  }
   cli_error(c, "%s: not-found: no %s has this id; 'orbmorph ls' lists what there is", operand, kind);
   return CLI_REFUSED;
 }
@@ -32,13 +33,15 @@ int cli_find(cli *c, const char *operand, char **path, cli_reply *reply) {
   for (size_t i = 0; i < 4; i++) {
     *path = cli_resource_path(collections[i], operand);
     rc = cli_get(c, *path, reply);
-    if (rc != CLI_DONE || reply->status != 404 || i == 3 || operand[0] == '/')
+    if (rc != CLI_DONE || reply->status != 404 || i == 3 || operand[0] == '/') {
       break;
+    }
     cli_reply_free(reply);
     free(*path);
   }
-  if (rc == CLI_DONE && !cli_ok(reply))
+  if (rc == CLI_DONE && !cli_ok(reply)) {
     rc = cli_not_found(c, "mesh, embedding, supermesh or job", operand, reply);
+  }
   return rc;
 }
 
@@ -55,21 +58,24 @@ int cli_download(cli *c, const char *path, const char *file) {
   cli_request request = {.method = "GET", .path = path, .download = out, .label = "download", .patient = 1};
   int rc = cli_send(c, &request, &reply);
   cli_bar_end(c);
-  if (rc == CLI_DONE && !cli_ok(&reply))
+  if (rc == CLI_DONE && !cli_ok(&reply)) {
     rc = cli_refused(c, path, &reply);
+  }
   if (rc == CLI_DONE && to_stdout) {
     char block[1 << 16];
     rewind(out);
-    for (size_t got; (got = fread(block, 1, sizeof block, out)) > 0;)
+    for (size_t got; (got = fread(block, 1, sizeof block, out)) > 0;) {
       fwrite(block, 1, got, stdout);
+    }
   }
   int closed = fclose(out) == 0;
   if (part && rc == CLI_DONE && (!closed || rename(part, file) != 0)) {
     cli_error(c, "%s: %s", file, strerror(errno));
     rc = CLI_USAGE;
   }
-  if (part && rc != CLI_DONE)
+  if (part && rc != CLI_DONE) {
     unlink(part);
+  }
   cli_reply_free(&reply);
   free(part);
   return rc;
@@ -82,10 +88,11 @@ int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource) {
   if (rc == CLI_DONE && !cli_ok(resource)) {
     rc = cli_refused(c, NULL, resource);
   } else if (rc == CLI_DONE && resource->status == 202 && c->args.value[OPT_NO_WAIT]) {
-    if (c->json)
+    if (c->json) {
       puts(resource->body);
-    else
+    } else {
       printf("%s\n", cli_string(resource->json, "url", "?"));
+    }
     cli_reply_free(resource);
   } else if (rc == CLI_DONE && resource->status == 202) {
     rc = cli_wait(c, resource->json, &result);
@@ -93,8 +100,9 @@ int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource) {
     if (rc == CLI_DONE) {
       cli_request get = {.method = "GET", .path = result, .patient = 1};
       rc = cli_send(c, &get, resource);
-      if (rc == CLI_DONE && !cli_ok(resource))
+      if (rc == CLI_DONE && !cli_ok(resource)) {
         rc = cli_refused(c, NULL, resource);
+      }
     }
   }
   free(result);

@@ -69,8 +69,9 @@ char *cli_read_file(const char *path, size_t *size) {
     }
   }
   int failed = ferror(file);
-  if (failed)
+  if (failed) {
     fprintf(stderr, "orbmorph: %s: %s\n", path, strerror(errno));
+  }
   fclose(file);
   if (failed) {
     free(bytes);
@@ -108,11 +109,13 @@ void cli_count(double value, char out[32]) {
     return;
   }
   int length = snprintf(digits, sizeof digits, "%.0f", fabs(value)), fill = 0;
-  if (value < 0)
+  if (value < 0) {
     out[fill++] = '-';
+  }
   for (int i = 0; i < length; i++) {
-    if (i && (length - i) % 3 == 0)
+    if (i && (length - i) % 3 == 0) {
       out[fill++] = ',';
+    }
     out[fill++] = digits[i];
   }
   out[fill] = 0;

@@ -10,8 +10,9 @@
 static int whole(const cli *c, cli_option_id id, long least, long most, int *out) {
   const char *text = c->args.value[id];
   long value;
-  if (!text)
+  if (!text) {
     return 1;
+  }
   if (!cli_whole_number(text, least, most, &value)) {
     cli_error(c, "--%s takes a whole number from %ld to %ld, not '%s'", cli_options[id].name, least, most, text);
     return 0;
@@ -22,8 +23,9 @@ static int whole(const cli *c, cli_option_id id, long least, long most, int *out
 
 static int angle(const cli *c, cli_option_id id, double *out) {
   const char *text = c->args.value[id];
-  if (!text || cli_decimal(text, out))
+  if (!text || cli_decimal(text, out)) {
     return 1;
+  }
   cli_error(c, "--%s takes degrees, not '%s'", cli_options[id].name, text);
   return 0;
 }
@@ -39,8 +41,9 @@ int cli_run_view(cli *c) {
   }
   if (!whole(c, OPT_POSES, 2, 100, &options.poses) || !whole(c, OPT_SIZE, 16, 4096, &options.size) ||
       !whole(c, OPT_FRAMES, 2, 10000, &options.frames) || !angle(c, OPT_YAW, &options.yaw) ||
-      !angle(c, OPT_PITCH, &options.pitch))
+      !angle(c, OPT_PITCH, &options.pitch)) {
     return CLI_USAGE;
+  }
   options.up = up ? up[0] : options.up;
   options.wire = c->args.value[OPT_WIRE] != NULL;
   options.inside = c->args.value[OPT_INSIDE] != NULL;

@@ -4,7 +4,6 @@
 
 #include <stdint.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { BITS = 7, SIDE = 1 << BITS, BINS = SIDE * SIDE * SIDE };
 
