@@ -17,7 +17,7 @@ int cli_run_upload(cli *c) {
   const char *name = c->args.value[OPT_NAME];
   int rc = CLI_DONE;
   if (name && c->args.operand_count > 1) {
-    cli_error(c, "--name goes with one file only");
+    cli_error(c, "--name needs exactly one file");
     return CLI_USAGE;
   }
   for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
@@ -75,7 +75,7 @@ static int embed_one(cli *c, const char *operand) {
 int cli_run_embed(cli *c) {
   int rc = CLI_DONE;
   if (c->args.value[OPT_OUTPUT] && c->args.operand_count > 1) {
-    cli_error(c, "--output goes with one mesh only");
+    cli_error(c, "--output needs exactly one mesh");
     return CLI_USAGE;
   }
   for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
@@ -131,7 +131,7 @@ static void print_row(const char *collection, const cJSON *item) {
   }
 }
 
-/* The list of a page: the member that is an array. */
+/* The items of a page: its only member that is an array. */
 static const cJSON *page_items(const cJSON *page) {
   for (const cJSON *item = page ? page->child : NULL; item; item = item->next) {
     if (cJSON_IsArray(item)) {
@@ -185,7 +185,7 @@ int cli_run_ls(cli *c) {
   const char *wanted = c->args.operand_count ? c->args.operands[0] : c->args.value[OPT_STATE] ? "jobs" : "meshes";
   long limit = 1000000;
   if (c->args.value[OPT_LIMIT] && !cli_whole_number(c->args.value[OPT_LIMIT], 1, 1000000, &limit)) {
-    cli_error(c, "--limit takes a whole number from 1 on");
+    cli_error(c, "--limit takes a whole number from 1 to 1000000");
     return CLI_USAGE;
   }
   for (size_t i = 0; i < 4; i++) {
@@ -193,7 +193,7 @@ int cli_run_ls(cli *c) {
       return list(c, wanted, limit);
     }
   }
-  cli_error(c, "there are meshes, embeddings, supermeshes and jobs, but no '%s'", wanted);
+  cli_error(c, "cannot list '%s'; choose meshes, embeddings, supermeshes or jobs", wanted);
   return CLI_USAGE;
 }
 

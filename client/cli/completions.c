@@ -1,4 +1,4 @@
-/* Completions for shells, made of the lists of commands and options. */
+/* Completions for shells, made from the tables of commands and options. */
 #include <string.h>
 
 #include "commands.h"
@@ -20,7 +20,7 @@ static void bash_command(const cli_command *command) {
 
 static void bash(const cli_commands *commands) {
   puts(
-      "# Completions of orbmorph for bash. Made by 'orbmorph completions bash'.\n"
+      "# Completions of orbmorph for bash, printed by 'orbmorph completions bash'.\n"
       "_orbmorph() {\n"
       "  local current=\"${COMP_WORDS[COMP_CWORD]}\" previous=\"${COMP_WORDS[COMP_CWORD-1]}\" words=\"\" operands=\"\" "
       "choices=\"\"");
@@ -51,7 +51,7 @@ static void bash(const cli_commands *commands) {
       "complete -o bashdefault -o default -F _orbmorph orbmorph");
 }
 
-/* Text within single quotes and brackets of _arguments. */
+/* Escapes text for single quotes and the brackets of _arguments. */
 static void zsh_text(const char *text) {
   for (; *text; text++) {
     if (*text == '\'') {
@@ -91,7 +91,7 @@ static void zsh_command(const cli_command *command) {
 
 static void zsh(const cli_commands *commands) {
   puts(
-      "#compdef orbmorph\n# Completions of orbmorph for zsh. Made by 'orbmorph completions zsh'.\n"
+      "#compdef orbmorph\n# Completions of orbmorph for zsh, printed by 'orbmorph completions zsh'.\n"
       "_orbmorph() {\n  local -a commands\n  commands=(");
   for (int i = 0; i < commands->count; i++) {
     printf("    '%s:", commands->list[i].name);
@@ -107,7 +107,7 @@ static void zsh(const cli_commands *commands) {
   puts("  esac\n}\n_orbmorph \"$@\"");
 }
 
-/* Text within single quotes of fish. */
+/* Escapes text for the single quotes of fish. */
 static void fish_text(const char *text) {
   for (; *text; text++) {
     if (*text == '\'' || *text == '\\') {
@@ -145,9 +145,9 @@ static void fish_command(const cli_command *command) {
 }
 
 static void fish(const cli_commands *commands) {
-  puts("# Completions of orbmorph for fish. Made by 'orbmorph completions fish'.");
-  puts("complete -c orbmorph -n __fish_use_subcommand -l help -d 'this help'");
-  puts("complete -c orbmorph -n __fish_use_subcommand -l version -d 'the version'");
+  puts("# Completions of orbmorph for fish, printed by 'orbmorph completions fish'.");
+  puts("complete -c orbmorph -n __fish_use_subcommand -l help -d 'show help'");
+  puts("complete -c orbmorph -n __fish_use_subcommand -l version -d 'show the version'");
   for (int i = 0; i < commands->count; i++) {
     fish_command(&commands->list[i]);
   }
@@ -164,6 +164,6 @@ int cli_run_completions(cli *c) {
       return CLI_DONE;
     }
   }
-  cli_error(c, "there are completions for bash, zsh and fish, but not for '%s'", c->args.operands[0]);
+  cli_error(c, "no completions for '%s'; choose bash, zsh or fish", c->args.operands[0]);
   return CLI_USAGE;
 }

@@ -1,5 +1,4 @@
-/* doctor: checks a mesh by way of the daemon, tries the stronger repairs, and says what helps. What it uploads and the
- * daemon did not hold before is deleted again. */
+/* doctor: checks a mesh by uploading it, tries the stronger repairs and prints the one that helps. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,8 +6,10 @@
 #include "http.h"
 #include "mesh.h"
 #include "problem.h"
+#include "report.h"
 #include "text.h"
 
+/* Deletes an uploaded mesh unless the daemon already held it before the upload. */
 static void forget(cli *c, const cli_reply *reply) {
   char *path = cli_text("/v1/meshes/%s", cli_string(reply->json, "id", ""));
   cli_request request = {.method = "DELETE", .path = path};
@@ -19,23 +20,14 @@ static void forget(cli *c, const cli_reply *reply) {
   free(path);
 }
 
-static void print_repairs(const cJSON *mesh, const char *lead) {
-  const cJSON *repair;
-  cJSON_ArrayForEach(repair, cJSON_GetObjectItemCaseSensitive(mesh, "repairs")) {
-    char count[32];
-    cli_count(cli_number(repair, "count"), count);
-    printf("  %s %s: %s\n", lead, cli_string(repair, "kind", "?"), count);
-  }
-}
-
-/* Would this repair make it fit? Prints the finding if so. */
+/* Uploads the file with a repair. Returns 1 and prints the command if the daemon accepts the mesh. */
 static int try_repair(cli *c, const char *path, const char *repair) {
   cli_reply reply;
   int helps = 0;
   if (cli_upload(c, path, NULL, repair, &reply) == CLI_DONE && cli_ok(&reply)) {
     helps = 1;
     printf("  helps: orbmorph upload --repair %s %s\n", repair, path);
-    print_repairs(reply.json, "  it does");
+    cli_print_repairs(reply.json);
     forget(c, &reply);
   }
   cli_reply_free(&reply);
@@ -72,7 +64,7 @@ static int examine(cli *c, const char *path) {
     char triangles[32];
     cli_count(cli_number(reply.json, "triangles"), triangles);
     printf("%s: healthy: closed, in one piece, genus 0, %s triangles\n", path, triangles);
-    print_repairs(reply.json, "mended at upload,");
+    cli_print_repairs(reply.json);
     forget(c, &reply);
   } else {
     fflush(stdout);
@@ -82,7 +74,7 @@ static int examine(cli *c, const char *path) {
       printf("  %s\n", advice);
     }
     if (reply.json && !suggest(c, path, type) && (!strcmp(type, "not-closed") || !strcmp(type, "not-connected"))) {
-      printf("  No repair of the daemon's is enough for this one.\n");
+      printf("  None of the daemon's repairs fixes this mesh.\n");
     }
   }
   cli_reply_free(&reply);

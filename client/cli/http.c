@@ -1,4 +1,3 @@
-/* libcurl keeps one connection; bodies are streamed from and to files. */
 #include "http.h"
 
 #include <stdlib.h>
@@ -12,10 +11,10 @@
 
 enum {
   CONNECT_SECONDS = 10,
-  STALL_SECONDS = 120, /* a transfer that moves nothing for so long is given up */
-  PATIENCE_SECONDS = 60,
-  RETRIES = 8,
-  RETRY_AFTER_MOST = 15,
+  STALL_SECONDS = 120,   /* a transfer that moves no byte for this long fails */
+  PATIENCE_SECONDS = 60, /* how long a patient request waits for a daemon that does not respond */
+  RETRIES = 8,           /* after responses with Retry-After */
+  RETRY_AFTER_MOST = 15, /* seconds; a longer Retry-After ends the request */
 };
 
 typedef struct transfer {
@@ -50,7 +49,7 @@ static size_t on_body(char *bytes, size_t size, size_t count, void *user) {
   return length;
 }
 
-/* The value of a header line if it has this name, to free; else NULL. */
+/* The value of a header line with this name, which the caller frees; NULL for other lines. */
 static char *header_value(const char *line, size_t length, const char *name) {
   size_t n = strlen(name);
   if (length <= n || strncasecmp(line, name, n) != 0 || line[n] != ':') {
@@ -169,7 +168,7 @@ static int rewind_all(const cli_request *request) {
   return 1;
 }
 
-/* An answer may have come although sending was cut short: a body that is refused before it is read. */
+/* The daemon may refuse a body before it has read all of it; then sending fails, but the response is there. */
 static int answered(CURLcode code, const cli_reply *reply) {
   return code == CURLE_OK || (code == CURLE_SEND_ERROR && reply->status >= 400);
 }
@@ -197,14 +196,14 @@ int cli_send(cli *c, const cli_request *request, cli_reply *out) {
       break;
     }
     if (t.failed_write) {
-      cli_error(c, "the file cannot be written: the disk may be full");
+      cli_error(c, "cannot write the downloaded file; the disk may be full");
       rc = CLI_USAGE;
       break;
     }
     int may_repeat = request->patient && time(NULL) < give_up && code != CURLE_URL_MALFORMAT &&
                      code != CURLE_UNSUPPORTED_PROTOCOL && rewind_all(request);
     if (!may_repeat) {
-      cli_error(c, "%s: %s\nIs the daemon running there? --server or ORBMORPH_SERVER says where it is.", c->server,
+      cli_error(c, "%s: %s\nIs the daemon running there? Set its address with --server or ORBMORPH_SERVER.", c->server,
                 curl_easy_strerror(code));
       break;
     }

@@ -6,8 +6,8 @@
 #include "terminal.h"
 #include "text.h"
 
-/* Members of members that --set takes, and the same within its value: far more than a request has, and together far
- * less than JSON's readers follow (1,000), so that what is sent is JSON to all of them. */
+/* How deep --set nests: in its dotted name, and again in its value. A request needs far less, and JSON parsers accept
+ * far more (1,000). */
 enum { SET_DEPTH_MOST = 64 };
 
 cJSON *cli_read_landmarks(const cli *c, const char *path) {
@@ -19,14 +19,14 @@ cJSON *cli_read_landmarks(const cli *c, const char *path) {
   }
   cJSON *whole = cJSON_ParseWithLengthOpts(text, size + 1, &end, 1), *list = whole;
   if (!whole) {
-    cli_error(c, "%s: not JSON at byte %zu", path, end ? (size_t)(end - text) : 0);
+    cli_error(c, "%s: not valid JSON at byte %zu", path, end ? (size_t)(end - text) : 0);
   } else if (cJSON_IsObject(whole)) {
     list = cJSON_DetachItemFromObjectCaseSensitive(whole, "landmarks");
     cJSON_Delete(whole);
   }
   free(text);
   if (whole && !cJSON_IsArray(list)) {
-    cli_error(c, "%s: a landmark file is an array, or an object with one as its member \"landmarks\"", path);
+    cli_error(c, "%s: a landmark file is an array, or an object whose member \"landmarks\" is one", path);
     cJSON_Delete(list);
     return NULL;
   }
@@ -76,7 +76,7 @@ int cli_set_member(cJSON *object, const char *path, cJSON *value) {
   return 0;
 }
 
-/* How deep the brackets of a JSON text stand in each other. */
+/* The nesting depth of the brackets of a JSON text. */
 static int nesting(const char *text) {
   int depth = 0, most = 0, quoted = 0;
   for (; *text; text++) {
@@ -108,7 +108,7 @@ int cli_apply_sets(const cli *c, cJSON *request) {
     int ok = value && cli_set_member(request, path, value);
     free(path);
     if (!ok) {
-      cli_error(c, "--set %s: it takes NAME=VALUE, with dots between the names of members, at most %d deep", text,
+      cli_error(c, "--set %s: expected NAME=VALUE, with dots between member names, nested at most %d deep", text,
                 SET_DEPTH_MOST);
       return CLI_USAGE;
     }

@@ -12,7 +12,7 @@
 
 enum { POLL_MICROSECONDS = 120 * 1000 };
 
-/* The job again: on a terminal at once, to draw its progress; else when it has ended or 20 s have passed. */
+/* Fetches the job again: on a terminal soon, to draw its progress; else when it ends or after 20 s. */
 static int poll(cli *c, const char *url, cli_reply *reply) {
   char *path = cli_text("%s%s", url, c->bar ? "" : "?wait=20");
   cli_request request = {.method = "GET", .path = path, .patient = 1};
@@ -39,11 +39,11 @@ static int conclude(cli *c, const cJSON *job, char **result) {
   if (cJSON_IsObject(problem)) {
     return cli_problem(c, NULL, problem);
   }
-  cli_error(c, "job %s has %s", cli_string(job, "id", "?"), state);
+  cli_error(c, "job %s: %s", cli_string(job, "id", "?"), state);
   return CLI_REFUSED;
 }
 
-/* What is said when the user ends the wait, made beforehand: a signal handler may not do it. */
+/* Printed when the user interrupts the wait. Formatted beforehand: a signal handler must not call printf. */
 static char farewell[256];
 
 static void on_interrupt(int signal_number) {
@@ -53,10 +53,10 @@ static void on_interrupt(int signal_number) {
   raise(signal_number);
 }
 
-static void say_farewell(const cli *c, const char *url) {
+static void prepare_farewell(const cli *c, const char *url) {
   snprintf(farewell, sizeof farewell,
-           "%sorbmorph: the job goes on without you. To wait again: orbmorph job --wait %s\n"
-           "The same command again waits for it too; to stop it: orbmorph job --cancel %s\n",
+           "%sorbmorph: the job keeps running. To wait for it: orbmorph job --wait %s\n"
+           "Repeating the command also waits for it. To cancel it: orbmorph job --cancel %s\n",
            c->bar ? "\r\033[K" : "", url, url);
   struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = SA_NODEFER};
   sigaction(SIGINT, &action, NULL);
@@ -67,13 +67,13 @@ int cli_wait(cli *c, const cJSON *job, char **result) {
   cli_reply reply = {0};
   int rc = CLI_DONE;
   *result = NULL;
-  say_farewell(c, url);
+  prepare_farewell(c, url);
   while (!ended(cli_string(job, "state", ""))) {
     cli_reply next;
     const char *stage = cli_string(job, "stage", cli_string(job, "state", ""));
     cli_bar(c, *stage ? stage : cli_string(job, "state", ""), cli_number(job, "progress"));
     if ((rc = poll(c, url, &next)) != CLI_DONE) {
-      cli_error(c, "the job goes on where the daemon does: orbmorph job --wait %s", url);
+      cli_error(c, "the job continues when the daemon is back. To wait for it: orbmorph job --wait %s", url);
       cli_reply_free(&next);
       break;
     }

@@ -1,4 +1,4 @@
-/* orbmorph: the command line. It knows only HTTP; the daemon does the work. */
+/* orbmorph: the command-line client. The daemon does the work; the client only speaks HTTP. */
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -15,30 +15,33 @@
    CLI_BIT(OPT_REPAIR))
 
 static const cli_command command_list[] = {
-    {"morph", "FILE FILE…", "Upload meshes, merge them and download one GLB that morphs", 2, -1, MERGE_OPTIONS, NULL,
-     cli_run_morph},
+    {"morph", "FILE FILE…", "Upload meshes, merge them and download a GLB that morphs between them", 2, -1,
+     MERGE_OPTIONS, NULL, "dog.obj giraffe.off --landmarks dog-giraffe.json -o out.glb", cli_run_morph},
     {"upload", "FILE…", "Upload meshes", 1, -1,
-     COMMON_OPTIONS | CLI_BIT(OPT_NAME) | CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_FORMAT), NULL, cli_run_upload},
-    {"embed", "MESH…", "Embed meshes, ids or files, on the sphere", 1, -1,
+     COMMON_OPTIONS | CLI_BIT(OPT_NAME) | CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_FORMAT), NULL,
+     "--repair fill_holes scan.stl", cli_run_upload},
+    {"embed", "MESH…", "Embed meshes (ids or files) on the sphere", 1, -1,
      COMMON_OPTIONS | CLI_BIT(OPT_METHOD) | CLI_BIT(OPT_PRESET) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_OUTPUT) |
          CLI_BIT(OPT_NO_WAIT) | CLI_BIT(OPT_REPAIR),
-     NULL, cli_run_embed},
-    {"merge", "MESH MESH…", "Merge meshes, ids or files; with -o also download the GLB", 2, -1, MERGE_OPTIONS, NULL,
-     cli_run_merge},
-    {"job", "ID", "Show, wait for or cancel a job", 1, 1, COMMON_OPTIONS | CLI_BIT(OPT_WAIT) | CLI_BIT(OPT_CANCEL),
-     NULL, cli_run_job},
-    {"ls", "[meshes|embeddings|supermeshes|jobs]", "List what the daemon holds", 0, 1,
-     COMMON_OPTIONS | CLI_BIT(OPT_STATE) | CLI_BIT(OPT_LIMIT), "meshes embeddings supermeshes jobs", cli_run_ls},
-    {"get", "ID|PATH", "Show a resource, or download a part of it", 1, 1,
-     COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_PART), NULL, cli_run_get},
-    {"rm", "ID|PATH…", "Delete resources", 1, -1, COMMON_OPTIONS, NULL, cli_run_rm},
-    {"doctor", "FILE…", "Check meshes, and say how to mend them", 1, -1, COMMON_OPTIONS, NULL, cli_run_doctor},
-    {"view", "FILE.glb", "Draw the poses of a morph into a PNG file, in software", 1, 1,
+     NULL, "dog.obj --preset quality -o sphere.ply", cli_run_embed},
+    {"merge", "MESH MESH…", "Merge meshes (ids or files); with -o, also download the GLB", 2, -1, MERGE_OPTIONS, NULL,
+     "--tolerance 0.0005 -o walk.glb 'frames/*.ply'", cli_run_merge},
+    {"job", "ID", "Show a job, wait for it or cancel it", 1, 1,
+     COMMON_OPTIONS | CLI_BIT(OPT_WAIT) | CLI_BIT(OPT_CANCEL), NULL, "--wait /v1/jobs/ID", cli_run_job},
+    {"ls", "[meshes|embeddings|supermeshes|jobs]", "List meshes, embeddings, supermeshes or jobs", 0, 1,
+     COMMON_OPTIONS | CLI_BIT(OPT_STATE) | CLI_BIT(OPT_LIMIT), "meshes embeddings supermeshes jobs",
+     "jobs --state running", cli_run_ls},
+    {"get", "ID|PATH", "Show a resource, or download its data", 1, 1,
+     COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_PART), NULL, "/v1/supermeshes/ID --part asset -o out.glb",
+     cli_run_get},
+    {"rm", "ID|PATH…", "Delete resources", 1, -1, COMMON_OPTIONS, NULL, "/v1/supermeshes/ID", cli_run_rm},
+    {"doctor", "FILE…", "Check meshes and suggest repairs", 1, -1, COMMON_OPTIONS, NULL, "scan.stl", cli_run_doctor},
+    {"view", "FILE.glb", "Draw poses of a morph into a PNG file, without the daemon", 1, 1,
      CLI_BIT(OPT_HELP) | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_POSES) | CLI_BIT(OPT_SIZE) | CLI_BIT(OPT_UP) |
          CLI_BIT(OPT_YAW) | CLI_BIT(OPT_PITCH) | CLI_BIT(OPT_WIRE) | CLI_BIT(OPT_INSIDE) | CLI_BIT(OPT_FRAMES),
-     NULL, cli_run_view},
-    {"completions", "bash|zsh|fish", "Print the completions of a shell", 1, 1, CLI_BIT(OPT_HELP), "bash zsh fish",
-     cli_run_completions},
+     NULL, "out.glb --frames 60 -o out.png", cli_run_view},
+    {"completions", "bash|zsh|fish", "Print the completion script of a shell", 1, 1, CLI_BIT(OPT_HELP), "bash zsh fish",
+     "bash > /etc/bash_completion.d/orbmorph", cli_run_completions},
 };
 static const cli_commands commands = {command_list, sizeof command_list / sizeof command_list[0]};
 
@@ -64,7 +67,7 @@ static int run(const cli_command *command, cli *c) {
   c->quiet = c->args.value[OPT_QUIET] != NULL;
   c->bar = !c->quiet && isatty(STDERR_FILENO) && term && strcmp(term, "dumb") != 0;
   if (curl_global_init(CURL_GLOBAL_DEFAULT) != 0 || !(c->curl = curl_easy_init())) {
-    fputs("orbmorph: libcurl does not start\n", stderr);
+    fputs("orbmorph: cannot initialize libcurl\n", stderr);
     return CLI_UNREACHABLE;
   }
   int rc = command->run(c);
@@ -78,7 +81,7 @@ static int run(const cli_command *command, cli *c) {
   return rc;
 }
 
-/* --server and the like may stand before the command as well: they are moved behind it. */
+/* Options may also precede the command: returns argv with the command first. *at: there is a command. */
 static char **command_first(int argc, char **argv, int *at) {
   int i = 1;
   while (i < argc && argv[i][0] == '-') {
@@ -119,7 +122,7 @@ int main(int argc, char **argv) {
   cli c = {.commands = commands};
   if (!command) {
     if (given) {
-      fprintf(stderr, "orbmorph: there is no command '%s'\n", line[1]);
+      fprintf(stderr, "orbmorph: unknown command '%s'\n", line[1]);
     }
     cli_help(stderr, &commands);
     rc = CLI_USAGE;

@@ -1,4 +1,4 @@
-/* morph and merge: the request, the wait, the download. */
+/* morph and merge: build the request, wait, download. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -37,7 +37,7 @@ static int add_options(const cli *c, cJSON *request) {
   }
   if (triangles) {
     if (!cli_whole_number(triangles, 4, 100000000, &n)) {
-      cli_error(c, "--max-triangles takes a whole number from 4 on, not '%s'", triangles);
+      cli_error(c, "--max-triangles takes a whole number from 4 to 100000000, not '%s'", triangles);
       return CLI_USAGE;
     }
     cli_set_member(request, "remesh.max_triangles", cJSON_CreateNumber((double)n));
@@ -48,7 +48,7 @@ static int add_options(const cli *c, cJSON *request) {
   return cli_apply_sets(c, request);
 }
 
-/* Everything but the shapes; before any upload, so that a typing error costs nothing. */
+/* Everything but the shapes. Runs before any upload, so that a usage error is reported at once. */
 static int make_request(cli *c, cJSON **out) {
   const char *landmarks = c->args.value[OPT_LANDMARKS];
   cJSON *request = cJSON_CreateObject();
@@ -108,7 +108,7 @@ static int finish(cli *c, const cli_reply *supermesh, const char *output) {
   return CLI_DONE;
 }
 
-/* Whether a file can be made there, before any work is done for it. */
+/* Checks before any work that the folder of an output file is writable. */
 static int can_write(const cli *c, const char *file) {
   if (!file || !strcmp(file, "-")) {
     return CLI_DONE;
@@ -117,7 +117,7 @@ static int can_write(const cli *c, const char *file) {
   char *folder = slash ? cli_text("%.*s", (int)(slash - file + 1), file) : cli_text(".");
   int fine = access(folder, W_OK | X_OK) == 0;
   if (!fine) {
-    cli_error(c, "%s cannot be written: the folder %s: %s", file, folder, strerror(errno));
+    cli_error(c, "cannot write %s: folder %s: %s", file, folder, strerror(errno));
   }
   free(folder);
   return fine ? CLI_DONE : CLI_USAGE;

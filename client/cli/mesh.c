@@ -15,7 +15,7 @@ int cli_upload(cli *c, const char *path, const char *name, const char *repair, c
   FILE *file = fopen(path, "rb");
   struct stat info;
   if (!file || fstat(fileno(file), &info) != 0 || S_ISDIR(info.st_mode)) {
-    cli_error(c, "%s: %s", path, file ? "is not a file" : strerror(errno));
+    cli_error(c, "%s: %s", path, file ? "not a regular file" : strerror(errno));
     if (file) {
       fclose(file);
     }
@@ -45,12 +45,12 @@ int cli_upload(cli *c, const char *path, const char *name, const char *repair, c
 static void note_mesh(const cli *c, const char *operand, const cli_reply *reply) {
   char triangles[32];
   cli_count(cli_number(reply->json, "triangles"), triangles);
-  cli_note(c, "%s: %s triangles%s", operand, triangles, reply->status == 200 ? ", known already" : "");
+  cli_note(c, "%s: %s triangles%s", operand, triangles, reply->status == 200 ? ", already uploaded" : "");
   const cJSON *repair;
   cJSON_ArrayForEach(repair, cJSON_GetObjectItemCaseSensitive(reply->json, "repairs")) {
     char count[32];
     cli_count(cli_number(repair, "count"), count);
-    cli_note(c, "  mended: %s (%s)", cli_string(repair, "kind", "?"), count);
+    cli_note(c, "  repaired: %s (%s)", cli_string(repair, "kind", "?"), count);
   }
 }
 

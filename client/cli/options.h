@@ -61,7 +61,8 @@ typedef struct cli_command {
   const char *name, *operands, *summary;
   int least, most; /* number of operands; most −1: no limit */
   uint64_t options;
-  const char *words; /* the operands that completion offers, separated by blanks; NULL: files */
+  const char *words;   /* the operands that completion offers, separated by blanks; NULL: files */
+  const char *example; /* arguments, for the help */
   int (*run)(struct cli *c);
 } cli_command;
 

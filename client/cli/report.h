@@ -5,6 +5,7 @@
 #include "http.h"
 
 void cli_print_mesh(const cJSON *mesh);
+void cli_print_repairs(const cJSON *mesh); /* the repairs made at upload */
 void cli_print_embedding(const cJSON *embedding);
 void cli_print_supermesh(const cJSON *supermesh);
 void cli_print_job(const cJSON *job);

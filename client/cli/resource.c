@@ -23,7 +23,7 @@ int cli_not_found(cli *c, const char *kind, const char *operand, const cli_reply
   if (reply->status != 404 || c->json || operand[0] == '/') {
     return cli_refused(c, operand, reply);
   }
-  cli_error(c, "%s: not-found: no %s has this id; 'orbmorph ls' lists what there is", operand, kind);
+  cli_error(c, "%s: not-found: no %s has this id; 'orbmorph ls' lists the ids", operand, kind);
   return CLI_REFUSED;
 }
 

@@ -1,5 +1,5 @@
-/* Triangles onto a canvas with depths: barycentric coordinates over the bounding box, normals blended, one lamp over
- * the viewer's shoulder, a weaker one from the other side, and light from the sky. */
+/* Rasterizes by barycentric coordinates over the bounding box of a triangle. Normals are interpolated; a lamp over the
+ * viewer's shoulder, a weaker one from the other side and light from above shade them. */
 #include "view_canvas.h"
 
 #include <math.h>
@@ -31,7 +31,7 @@ void view_canvas_free(view_canvas *canvas) {
 }
 
 static unsigned char srgb(float linear) {
-  float v = !(linear > 0) ? 0 : linear >= 1 ? 1 : linear; /* colours of a file may be anything: no number is black */
+  float v = !(linear > 0) ? 0 : linear >= 1 ? 1 : linear; /* a file may hold any float: NaN becomes black */
   v = v <= 0.0031308f ? 12.92f * v : 1.055f * powf(v, 1 / 2.4f) - 0.055f;
   return (unsigned char)(v * 255 + 0.5f);
 }
@@ -62,7 +62,6 @@ static float blend(const float at[3], float a, float b, float c) {
   return at[0] * a + at[1] * b + at[2] * c;
 }
 
-/* span: how many pixels of the texture a pixel of the canvas covers, each way. */
 static void pixel_color(const view_vertex *const v[3], const float at[3], const view_paint *paint, float span,
                         float out[3]) {
   float normal[3], length = 0, texel[3] = {1, 1, 1};
@@ -89,7 +88,7 @@ static float cross2(const view_vertex *a, const view_vertex *b, float x, float y
   return (b->x - a->x) * (y - a->y) - (b->y - a->y) * (x - a->x);
 }
 
-/* Texture pixels a canvas pixel, from the triangle's areas in both. */
+/* Pixels of the texture per pixel of the canvas in each direction, from the areas of the triangle in both. */
 static float texture_span(const view_vertex *const v[3], const view_texture *texture, float area) {
   if (!texture) {
     return 1;
@@ -114,7 +113,7 @@ void view_triangle(view_canvas *canvas, const view_vertex *const v[3], const vie
   }
   int x0 = clip(floorf(left), canvas->width), x1 = clip(ceilf(right), canvas->width - 1);
   int y0 = clip(floorf(top), canvas->height), y1 = clip(ceilf(bottom), canvas->height - 1);
-  float height[3]; /* of each corner over the edge opposite, in pixels */
+  float height[3]; /* of each corner over the opposite edge, in pixels */
   for (int k = 0; k < 3; k++) {
     const view_vertex *p = v[(k + 1) % 3], *q = v[(k + 2) % 3];
     height[k] = fabsf(area) / fmaxf(1e-6f, hypotf(q->x - p->x, q->y - p->y));

@@ -1,4 +1,4 @@
-/* view: the command; the drawing is in view.c. */
+/* view: its options. view.c draws. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,4 +1,3 @@
-/* Binary glTF: chunks, entries, accessors. */
 #include "view_glb.h"
 
 #include <errno.h>
@@ -32,20 +31,20 @@ int glb_load(glb_file *r, const char *path) {
   r->size = r->bytes ? fread(r->bytes, 1, (size_t)size, file) : 0;
   fclose(file);
   if (!r->bytes || r->size != (size_t)size) {
-    return glb_refuse(r, "%s cannot be read, or is empty", path);
+    return glb_refuse(r, "cannot read %s, or it is empty", path);
   }
   if (r->size < 20 || memcmp(r->bytes, "glTF", 4) != 0 || memcmp(r->bytes + 16, "JSON", 4) != 0) {
-    return glb_refuse(r, "%s is not a GLB file (binary glTF): view draws what 'orbmorph morph' has made", path);
+    return glb_refuse(r, "%s is not a GLB file (binary glTF); view draws files that 'orbmorph morph' made", path);
   }
   size_t json_size = word(r->bytes + 12);
   if (r->size < 28 || json_size == 0 || json_size > r->size - 28) {
-    return glb_refuse(r, "%s is cut off or damaged", path);
+    return glb_refuse(r, "%s is truncated or damaged", path);
   }
   r->json = cJSON_ParseWithLength((const char *)r->bytes + 20, json_size);
   r->binary = r->bytes + 28 + json_size;
   r->binary_size = word(r->bytes + 20 + json_size);
   if (!r->json || r->binary_size > r->size - 28 - json_size) {
-    return glb_refuse(r, "%s is cut off or damaged", path);
+    return glb_refuse(r, "%s is truncated or damaged", path);
   }
   return 0;
 }
@@ -103,7 +102,7 @@ int glb_open(const glb_file *r, double index, glb_span *out) {
   }
   size_t element = size * (size_t)out->components;
   out->stride = (size_t)glb_number(view, "byteStride", (double)element);
-  if (out->stride < element) { /* elements would lie in each other, more of them than the file has bytes */
+  if (out->stride < element) { /* elements would overlap, and there could be more of them than the file has bytes */
     return -1;
   }
   double at = glb_number(view, "byteOffset", 0) + glb_number(accessor, "byteOffset", 0);
@@ -119,7 +118,7 @@ uint32_t glb_index(const glb_span *s, uint32_t element) {
   return s->kind == GLB_UBYTE ? p[0] : s->kind == GLB_USHORT ? (uint32_t)(p[0] | p[1] << 8) : word(p);
 }
 
-/* Integers stand for fractions: that is what colours and texture coordinates are. */
+/* Integers are normalized: colours and texture coordinates are fractions. */
 static float component(const glb_span *s, uint32_t element, int c) {
   const unsigned char *p = s->bytes + element * s->stride;
   float value;
@@ -143,7 +142,7 @@ int glb_copy(glb_file *r, const cJSON *attributes, const char *name, uint32_t co
     return 0;
   }
   if (glb_open(r, index, &s) != 0 || s.count != count || s.components < components) {
-    return glb_refuse(r, "the accessor of %s is not what it should be", name);
+    return glb_refuse(r, "the accessor of %s has the wrong type or count", name);
   }
   for (uint32_t i = 0; i < count; i++) {
     for (int c = 0; c < components; c++) {

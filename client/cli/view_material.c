@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* How a texture goes on beyond its edge; glTF's default is to repeat. */
 static void read_wrap(const glb_file *r, const cJSON *texture, int wrap[2]) {
   const cJSON *sampler = glb_entry(r, "samplers", glb_number(texture, "sampler", -1));
   wrap[0] = glb_code(sampler, "wrapS", VIEW_REPEAT);
@@ -15,7 +14,7 @@ static int read_texture(glb_file *r, const cJSON *texture, view_texture *out) {
   size_t size = 0;
   const unsigned char *bytes = glb_view(r, glb_number(image, "bufferView", -1), &size);
   if (!bytes || view_texture_decode(bytes, size, out) != 0) {
-    return glb_refuse(r, "a texture is not a PNG or JPEG image within the file, or is damaged");
+    return glb_refuse(r, "a texture is damaged, or is not a PNG or JPEG image within the file");
   }
   read_wrap(r, texture, out->wrap);
   return 0;
@@ -35,7 +34,7 @@ int view_materials_read(glb_file *r, view_materials *out) {
   out->list = calloc((size_t)cJSON_GetArraySize(materials) + 1, sizeof *out->list);
   out->textures = calloc((size_t)cJSON_GetArraySize(textures) + 1, sizeof *out->textures);
   if (!out->list || !out->textures) {
-    return glb_refuse(r, "there is not enough memory");
+    return glb_refuse(r, "not enough memory");
   }
   cJSON_ArrayForEach(texture, textures) {
     if (read_texture(r, texture, &out->textures[out->texture_count++]) != 0) {

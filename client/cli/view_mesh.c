@@ -12,11 +12,11 @@ static int count_all(glb_file *r, const cJSON *primitives, view_mesh *out) {
     glb_span s;
     const cJSON *attributes = cJSON_GetObjectItemCaseSensitive(primitive, "attributes");
     if (glb_number(primitive, "mode", 4) != 4 || glb_open(r, glb_number(attributes, "POSITION", -1), &s) != 0) {
-      return glb_refuse(r, "only triangles with positions can be drawn");
+      return glb_refuse(r, "cannot draw primitives other than triangles with positions");
     }
     vertices += s.count;
     if (glb_open(r, glb_number(primitive, "indices", -1), &s) != 0 || s.kind == GLB_FLOAT || s.count % 3 != 0) {
-      return glb_refuse(r, "only indexed triangles can be drawn");
+      return glb_refuse(r, "cannot draw triangles without indices");
     }
     indices += s.count;
     out->target_count = (uint32_t)cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(primitive, "targets"));
@@ -29,7 +29,7 @@ static int count_all(glb_file *r, const cJSON *primitives, view_mesh *out) {
   return 0;
 }
 
-/* White under a texture or a colour of the material; a tone of clay under greys, which say little of colours. */
+/* White under a texture or a coloured material; a tone of clay under a grey material. */
 static void base_colors(const view_mesh *mesh, int32_t material, uint32_t first, uint32_t count) {
   const view_material *paint = &mesh->materials.list[material];
   int gray = paint->texture < 0 && paint->factor[0] == paint->factor[1] && paint->factor[1] == paint->factor[2];
@@ -114,7 +114,7 @@ static int read_mesh(glb_file *r, view_mesh *out) {
     return -1;
   }
   if (allocate(out) != 0) {
-    return glb_refuse(r, "there is not enough memory");
+    return glb_refuse(r, "not enough memory");
   }
   double between = glb_number(cJSON_GetObjectItemCaseSensitive(mesh, "extras"), "inBetweens", 0);
   out->between = between < out->target_count ? (uint32_t)between : 0;

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Apart, for setjmp and locals do not mix well. */
+/* A function of its own: longjmp leaves modified locals of the function that called setjmp indeterminate. */
 static int write_rows(png_structp png, png_infop info, FILE *file, const view_canvas *canvas, unsigned char *row) {
   if (setjmp(png_jmpbuf(png))) {
     return -1;
@@ -27,7 +27,7 @@ static int write_rows(png_structp png, png_infop info, FILE *file, const view_ca
 int view_png_write(const char *path, const view_canvas *canvas, char *error, size_t error_size) {
   FILE *file = fopen(path, "wb");
   if (!file) {
-    snprintf(error, error_size, "%s cannot be written: %s", path, strerror(errno));
+    snprintf(error, error_size, "cannot write %s: %s", path, strerror(errno));
     return -1;
   }
   unsigned char *row = malloc(3 * (size_t)canvas->width);
@@ -37,7 +37,7 @@ int view_png_write(const char *path, const view_canvas *canvas, char *error, siz
   png_destroy_write_struct(&png, &info);
   free(row);
   if (fclose(file) != 0 || rc != 0) {
-    snprintf(error, error_size, "%s could not be written in full", path);
+    snprintf(error, error_size, "cannot write all of %s", path);
     return -1;
   }
   return 0;

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-/* Rows: right, up, towards the viewer. */
+/* The rows of out: right, up, towards the viewer. */
 static void view_axes(const view_options *options, double out[3][3]) {
   double yaw = options->yaw * 3.14159265358979 / 180, pitch = options->pitch * 3.14159265358979 / 180;
   double right[3] = {cos(yaw), 0, -sin(yaw)};
@@ -16,8 +16,8 @@ static void view_axes(const view_options *options, double out[3][3]) {
   }
 }
 
-/* The two targets (−1: the base) around t, and the weight of the second. In-betweens stand after the shapes, those of
- * the first transition first; there are none for other pairs than neighbours. */
+/* The two targets around t (−1: the base); returns the weight of the second. The targets of in-betweens follow those of
+ * the shapes, in the order of the transitions; only consecutive shapes have in-betweens. */
 static double blend_of(const view_mesh *mesh, int from, int to, double t, int *first, int *second) {
   int steps = to == from + 1 ? (int)mesh->between : 0, leg = (int)floor(t * (steps + 1));
   int between = view_shape_count(mesh) - 1 + from * steps;
