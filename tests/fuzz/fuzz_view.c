@@ -1,5 +1,5 @@
-/* A GLB file as the command line's view reads it, its textures included; small ones are also drawn. Numbers that the
- * mesh holds must lie within it. */
+/* A GLB file, read with its textures as `orbmorph view` reads it; small ones are also drawn. The indices of the mesh
+ * must be in range. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/mman.h>
