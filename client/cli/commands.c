@@ -1,31 +1,65 @@
-/* embed, job, ls, get, rm. */
-#include <math.h>
+/* upload, embed, job, ls, get, rm. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
-#include "make.h"
+#include "commands.h"
+#include "http.h"
+#include "input.h"
+#include "job.h"
+#include "mesh.h"
+#include "problem.h"
+#include "report.h"
+#include "resource.h"
+#include "terminal.h"
+#include "text.h"
+
+int cli_run_upload(cli *c) {
+  const char *name = c->args.value[OPT_NAME];
+  int rc = CLI_DONE;
+  if (name && c->args.operand_count > 1) {
+    cli_error(c, "--name needs exactly one file");
+    return CLI_USAGE;
+  }
+  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
+    cli_reply reply;
+    rc = cli_upload(c, c->args.operands[i], name, c->args.value[OPT_REPAIR], &reply);
+    if (rc == CLI_DONE && !cli_ok(&reply)) {
+      rc = cli_refused(c, c->args.operands[i], &reply);
+    } else if (rc == CLI_DONE && c->json) {
+      puts(reply.body);
+    } else if (rc == CLI_DONE) {
+      cli_print_mesh(reply.json);
+    }
+    cli_reply_free(&reply);
+  }
+  return rc;
+}
 
 static int embed_one(cli *c, const char *operand) {
   cli_mesh mesh;
   cli_reply reply = {0};
   int rc = cli_mesh_of(c, operand, &mesh);
-  if (rc != CLI_DONE)
+  if (rc != CLI_DONE) {
     return rc;
+  }
   cJSON *request = cJSON_CreateObject();
   cJSON_AddStringToObject(request, "mesh", mesh.id);
-  if (c->args.value[OPT_METHOD])
+  if (c->args.value[OPT_METHOD]) {
     cJSON_AddStringToObject(request, "method", c->args.value[OPT_METHOD]);
-  if (c->args.value[OPT_PRESET])
+  }
+  if (c->args.value[OPT_PRESET]) {
     cJSON_AddStringToObject(cJSON_AddObjectToObject(request, "options"), "preset", c->args.value[OPT_PRESET]);
+  }
   rc = cli_apply_sets(c, request);
-  if (rc == CLI_DONE)
+  if (rc == CLI_DONE) {
     rc = cli_make(c, "/v1/embeddings", request, &reply);
+  }
   if (rc == CLI_DONE && reply.json) {
-    if (c->json)
+    if (c->json) {
       puts(reply.body);
-    else
+    } else {
       cli_print_embedding(reply.json);
+    }
     if (c->args.value[OPT_OUTPUT]) {
       char *path = cli_text("%s/sphere.ply", cli_string(reply.json, "url", ""));
       rc = cli_download(c, path, c->args.value[OPT_OUTPUT]);
@@ -41,47 +75,23 @@ static int embed_one(cli *c, const char *operand) {
 int cli_run_embed(cli *c) {
   int rc = CLI_DONE;
   if (c->args.value[OPT_OUTPUT] && c->args.operand_count > 1) {
-    cli_error(c, "--output goes with one mesh only");
+    cli_error(c, "--output needs exactly one mesh");
     return CLI_USAGE;
   }
-  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++)
+  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
     rc = embed_one(c, c->args.operands[i]);
+  }
   return rc;
 }
 
-static void print_job(const cJSON *job) {
-  double progress = cli_number(job, "progress");
-  const cJSON *problem = cJSON_GetObjectItemCaseSensitive(job, "problem");
-  printf("%s  %-10s %-9s %3.0f %%  %s\n", cli_string(job, "id", "?"), cli_string(job, "kind", "?"),
-         cli_string(job, "state", "?"), isfinite(progress) ? 100 * progress : 0,
-         cJSON_IsObject(problem) ? cli_problem_type(problem) : cli_string(job, "result", cli_string(job, "stage", "")));
-}
-
-/* "/v1/jobs/ID" for an id, or a path as it is; a whole URL loses its authority. */
-static char *path_of(const char *collection, const char *operand) {
-  const char *authority = strstr(operand, "://");
-  if (authority) {
-    const char *slash = strchr(authority + 3, '/');
-    return cli_text("%s", slash ? slash : "/");
-  }
-  return operand[0] == '/' ? cli_text("%s", operand) : cli_text("/v1/%s/%s", collection, operand);
-}
-
-/* What the daemon answers for an id that nothing has speaks of paths; here it is said of ids. */
-static int no_such(cli *c, const char *what, const char *operand, const cli_reply *reply) {
-  if (reply->status != 404 || c->json || operand[0] == '/')
-    return cli_refused(c, operand, reply);
-  cli_error(c, "%s: not-found: no %s has this id; 'orbmorph ls' lists what there is", operand, what);
-  return CLI_REFUSED;
-}
-
 int cli_run_job(cli *c) {
-  char *path = path_of("jobs", c->args.operands[0]), *result = NULL;
+  char *path = cli_resource_path("jobs", c->args.operands[0]), *result = NULL;
   cli_reply reply = {0};
   cli_request request = {.method = c->args.value[OPT_CANCEL] ? "DELETE" : "GET", .path = path};
   int rc = cli_send(c, &request, &reply);
-  if (rc == CLI_DONE && !cli_ok(&reply))
-    rc = no_such(c, "job", c->args.operands[0], &reply);
+  if (rc == CLI_DONE && !cli_ok(&reply)) {
+    rc = cli_not_found(c, "job", c->args.operands[0], &reply);
+  }
   if (rc == CLI_DONE && c->args.value[OPT_WAIT] && reply.json) {
     rc = cli_wait(c, reply.json, &result);
     if (rc == CLI_DONE) {
@@ -89,10 +99,11 @@ int cli_run_job(cli *c) {
       rc = cli_get(c, path, &reply);
     }
   }
-  if (rc == CLI_DONE && reply.body && c->json)
+  if (rc == CLI_DONE && reply.body && c->json) {
     puts(reply.body);
-  else if (rc == CLI_DONE && reply.json)
-    print_job(reply.json);
+  } else if (rc == CLI_DONE && reply.json) {
+    cli_print_job(reply.json);
+  }
   free(result);
   free(path);
   cli_reply_free(&reply);
@@ -103,7 +114,7 @@ static void print_row(const char *collection, const cJSON *item) {
   char triangles[32];
   cli_count(cli_number(item, "triangles"), triangles);
   if (!strcmp(collection, "jobs")) {
-    print_job(item);
+    cli_print_job(item);
   } else if (!strcmp(collection, "meshes")) {
     printf("%s  %10s  %-5s %s\n", cli_string(item, "id", "?"), triangles, cli_string(item, "format", ""),
            cli_string(item, "name", ""));
@@ -113,17 +124,20 @@ static void print_row(const char *collection, const cJSON *item) {
   } else {
     printf("%s  %10s ", cli_string(item, "id", "?"), triangles);
     const cJSON *shape;
-    cJSON_ArrayForEach(shape, cJSON_GetObjectItemCaseSensitive(item, "shapes"))
-        printf(" %s", cli_string(shape, "name", "?"));
+    cJSON_ArrayForEach(shape, cJSON_GetObjectItemCaseSensitive(item, "shapes")) {
+      printf(" %s", cli_string(shape, "name", "?"));
+    }
     putchar('\n');
   }
 }
 
-/* The list of a page: the member that is an array. */
+/* The items of a page: its only member that is an array. */
 static const cJSON *page_items(const cJSON *page) {
-  for (const cJSON *item = page ? page->child : NULL; item; item = item->next)
-    if (cJSON_IsArray(item))
+  for (const cJSON *item = page ? page->child : NULL; item; item = item->next) {
+    if (cJSON_IsArray(item)) {
       return item;
+    }
+  }
   return NULL;
 }
 
@@ -142,20 +156,25 @@ static int list(cli *c, const char *collection, long limit) {
     free(from);
     free(token);
     token = NULL;
-    if (rc == CLI_DONE && !cli_ok(&reply))
+    if (rc == CLI_DONE && !cli_ok(&reply)) {
       rc = cli_refused(c, NULL, &reply);
-    if (rc == CLI_DONE && c->json)
+    }
+    if (rc == CLI_DONE && c->json) {
       puts(reply.body);
+    }
     const cJSON *item;
-    if (rc == CLI_DONE)
+    if (rc == CLI_DONE) {
       cJSON_ArrayForEach(item, page_items(reply.json)) {
-        if (!c->json)
+        if (!c->json) {
           print_row(collection, item);
+        }
         limit--;
       }
+    }
     const char *next = cli_string(reply.json, "next_page_token", NULL);
-    if (rc == CLI_DONE && next && *next && limit > 0)
+    if (rc == CLI_DONE && next && *next && limit > 0) {
       token = cli_text("%s", next);
+    }
     cli_reply_free(&reply);
   } while (token);
   return rc;
@@ -166,42 +185,28 @@ int cli_run_ls(cli *c) {
   const char *wanted = c->args.operand_count ? c->args.operands[0] : c->args.value[OPT_STATE] ? "jobs" : "meshes";
   long limit = 1000000;
   if (c->args.value[OPT_LIMIT] && !cli_whole_number(c->args.value[OPT_LIMIT], 1, 1000000, &limit)) {
-    cli_error(c, "--limit takes a whole number from 1 on");
+    cli_error(c, "--limit takes a whole number from 1 to 1000000");
     return CLI_USAGE;
   }
-  for (size_t i = 0; i < 4; i++)
-    if (!strcmp(wanted, collections[i]))
+  for (size_t i = 0; i < 4; i++) {
+    if (!strcmp(wanted, collections[i])) {
       return list(c, wanted, limit);
-  cli_error(c, "there are meshes, embeddings, supermeshes and jobs, but no '%s'", wanted);
+    }
+  }
+  cli_error(c, "cannot list '%s'; choose meshes, embeddings, supermeshes or jobs", wanted);
   return CLI_USAGE;
 }
 
-/* Which collection holds this id: the first that answers. */
-static int find(cli *c, const char *operand, char **path, cli_reply *reply) {
-  static const char *const collections[] = {"supermeshes", "meshes", "embeddings", "jobs"};
-  int rc = CLI_DONE;
-  for (size_t i = 0; i < 4; i++) {
-    *path = path_of(collections[i], operand);
-    rc = cli_get(c, *path, reply);
-    if (rc != CLI_DONE || reply->status != 404 || i == 3 || operand[0] == '/')
-      break;
-    cli_reply_free(reply);
-    free(*path);
-  }
-  if (rc == CLI_DONE && !cli_ok(reply))
-    rc = no_such(c, "mesh, embedding, supermesh or job", operand, reply);
-  return rc;
-}
-
 static void print_any(const char *path, const cli_reply *reply) {
-  if (strstr(path, "/v1/meshes/"))
+  if (strstr(path, "/v1/meshes/")) {
     cli_print_mesh(reply->json);
-  else if (strstr(path, "/v1/embeddings/"))
+  } else if (strstr(path, "/v1/embeddings/")) {
     cli_print_embedding(reply->json);
-  else if (strstr(path, "/v1/supermeshes/"))
+  } else if (strstr(path, "/v1/supermeshes/")) {
     cli_print_supermesh(reply->json);
-  else if (strstr(path, "/v1/jobs/"))
-    print_job(reply->json);
+  } else if (strstr(path, "/v1/jobs/")) {
+    cli_print_job(reply->json);
+  }
 }
 
 int cli_run_get(cli *c) {
@@ -223,20 +228,23 @@ int cli_run_get(cli *c) {
     return CLI_USAGE;
   }
   if (part || output) {
-    char *base = part ? path_of(home, c->args.operands[0]) : NULL;
+    char *base = part ? cli_resource_path(home, c->args.operands[0]) : NULL;
     rc = CLI_DONE;
-    if (!part)
-      rc = find(c, c->args.operands[0], &base, &reply);
+    if (!part) {
+      rc = cli_find(c, c->args.operands[0], &base, &reply);
+    }
     path = cli_text("%s%s", base ? base : "", tail);
-    if (rc == CLI_DONE)
+    if (rc == CLI_DONE) {
       rc = cli_download(c, path, output ? output : "-");
+    }
     free(base);
   } else {
-    rc = find(c, c->args.operands[0], &path, &reply);
-    if (rc == CLI_DONE && (c->json || !reply.json))
+    rc = cli_find(c, c->args.operands[0], &path, &reply);
+    if (rc == CLI_DONE && (c->json || !reply.json)) {
       puts(reply.body ? reply.body : "");
-    else if (rc == CLI_DONE)
+    } else if (rc == CLI_DONE) {
       print_any(path, &reply);
+    }
   }
   cli_reply_free(&reply);
   free(path);
@@ -248,13 +256,14 @@ int cli_run_rm(cli *c) {
   for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
     char *path = NULL;
     cli_reply reply = {0};
-    rc = find(c, c->args.operands[i], &path, &reply);
+    rc = cli_find(c, c->args.operands[i], &path, &reply);
     cli_reply_free(&reply);
     if (rc == CLI_DONE) {
       cli_request request = {.method = "DELETE", .path = path};
       rc = cli_send(c, &request, &reply);
-      if (rc == CLI_DONE && !cli_ok(&reply))
+      if (rc == CLI_DONE && !cli_ok(&reply)) {
         rc = cli_refused(c, c->args.operands[i], &reply);
+      }
       cli_reply_free(&reply);
     }
     free(path);

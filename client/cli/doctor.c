@@ -1,37 +1,33 @@
-/* doctor: checks a mesh by way of the daemon, tries the stronger repairs, and says what helps. What it uploads and the
- * daemon did not hold before is deleted again. */
-#include <math.h>
+/* doctor: checks a mesh by uploading it, tries the stronger repairs and prints the one that helps. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "commands.h"
+#include "http.h"
+#include "mesh.h"
+#include "problem.h"
+#include "report.h"
+#include "text.h"
 
+/* Deletes an uploaded mesh unless the daemon already held it before the upload. */
 static void forget(cli *c, const cli_reply *reply) {
   char *path = cli_text("/v1/meshes/%s", cli_string(reply->json, "id", ""));
   cli_request request = {.method = "DELETE", .path = path};
   cli_reply gone = {0};
-  if (reply->status == 201 && cli_send(c, &request, &gone) == CLI_DONE)
+  if (reply->status == 201 && cli_send(c, &request, &gone) == CLI_DONE) {
     cli_reply_free(&gone);
+  }
   free(path);
 }
 
-static void print_repairs(const cJSON *mesh, const char *lead) {
-  const cJSON *repair;
-  cJSON_ArrayForEach(repair, cJSON_GetObjectItemCaseSensitive(mesh, "repairs")) {
-    char count[32];
-    cli_count(cli_number(repair, "count"), count);
-    printf("  %s %s: %s\n", lead, cli_string(repair, "kind", "?"), count);
-  }
-}
-
-/* Would this repair make it fit? Prints the finding if so. */
+/* Uploads the file with a repair. Returns 1 and prints the command if the daemon accepts the mesh. */
 static int try_repair(cli *c, const char *path, const char *repair) {
   cli_reply reply;
   int helps = 0;
   if (cli_upload(c, path, NULL, repair, &reply) == CLI_DONE && cli_ok(&reply)) {
     helps = 1;
     printf("  helps: orbmorph upload --repair %s %s\n", repair, path);
-    print_repairs(reply.json, "  it does");
+    cli_print_repairs(reply.json);
     forget(c, &reply);
   }
   cli_reply_free(&reply);
@@ -39,12 +35,15 @@ static int try_repair(cli *c, const char *path, const char *repair) {
 }
 
 static int suggest(cli *c, const char *path, const char *type) {
-  if (!strcmp(type, "not-closed") && try_repair(c, path, "fill_holes"))
+  if (!strcmp(type, "not-closed") && try_repair(c, path, "fill_holes")) {
     return 1;
-  if (!strcmp(type, "not-connected") && try_repair(c, path, "largest_component"))
+  }
+  if (!strcmp(type, "not-connected") && try_repair(c, path, "largest_component")) {
     return 1;
-  if (!strcmp(type, "not-closed") || !strcmp(type, "not-connected"))
+  }
+  if (!strcmp(type, "not-closed") || !strcmp(type, "not-connected")) {
     return try_repair(c, path, "largest_component,fill_holes");
+  }
   return 0;
 }
 
@@ -58,22 +57,25 @@ static int examine(cli *c, const char *path) {
   if (c->json && reply.body) {
     puts(reply.body);
     rc = cli_ok(&reply) ? CLI_DONE : CLI_REFUSED;
-    if (cli_ok(&reply))
+    if (cli_ok(&reply)) {
       forget(c, &reply);
+    }
   } else if (cli_ok(&reply)) {
     char triangles[32];
     cli_count(cli_number(reply.json, "triangles"), triangles);
     printf("%s: healthy: closed, in one piece, genus 0, %s triangles\n", path, triangles);
-    print_repairs(reply.json, "mended at upload,");
+    cli_print_repairs(reply.json);
     forget(c, &reply);
   } else {
     fflush(stdout);
     rc = cli_refused(c, path, &reply);
     const char *type = reply.json ? cli_problem_type(reply.json) : "", *advice = cli_advice(type);
-    if (advice)
+    if (advice) {
       printf("  %s\n", advice);
-    if (reply.json && !suggest(c, path, type) && (!strcmp(type, "not-closed") || !strcmp(type, "not-connected")))
-      printf("  No repair of the daemon's is enough for this one.\n");
+    }
+    if (reply.json && !suggest(c, path, type) && (!strcmp(type, "not-closed") || !strcmp(type, "not-connected"))) {
+      printf("  None of the daemon's repairs fixes this mesh.\n");
+    }
   }
   cli_reply_free(&reply);
   return rc;
@@ -83,8 +85,9 @@ int cli_run_doctor(cli *c) {
   int worst = CLI_DONE;
   for (int i = 0; i < c->args.operand_count; i++) {
     int rc = examine(c, c->args.operands[i]);
-    if (rc == CLI_UNREACHABLE)
+    if (rc == CLI_UNREACHABLE) {
       return rc;
+    }
     worst = rc > worst ? rc : worst;
   }
   return worst;

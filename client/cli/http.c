@@ -1,18 +1,20 @@
-/* Requests through libcurl: one connection that is kept, bodies streamed from and to files. */
+#include "http.h"
+
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <time.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "terminal.h"
+#include "text.h"
 
 enum {
   CONNECT_SECONDS = 10,
-  STALL_SECONDS = 120, /* a transfer that moves nothing for so long is given up */
-  PATIENCE_SECONDS = 60,
-  RETRIES = 8,
-  RETRY_AFTER_MOST = 15,
+  STALL_SECONDS = 120,   /* a transfer that moves no byte for this long fails */
+  PATIENCE_SECONDS = 60, /* how long a patient request waits for a daemon that does not respond */
+  RETRIES = 8,           /* after responses with Retry-After */
+  RETRY_AFTER_MOST = 15, /* seconds; a longer Retry-After ends the request */
 };
 
 typedef struct transfer {
@@ -35,8 +37,9 @@ static size_t on_body(char *bytes, size_t size, size_t count, void *user) {
   if (t->reply->size + length + 1 > t->room) {
     size_t room = 2 * (t->reply->size + length + 1);
     char *more = realloc(t->reply->body, room);
-    if (!more)
+    if (!more) {
       return 0;
+    }
     t->reply->body = more;
     t->room = room;
   }
@@ -46,16 +49,19 @@ static size_t on_body(char *bytes, size_t size, size_t count, void *user) {
   return length;
 }
 
-/* The value of a header line if it has this name, to free; else NULL. */
+/* The value of a header line with this name, which the caller frees; NULL for other lines. */
 static char *header_value(const char *line, size_t length, const char *name) {
   size_t n = strlen(name);
-  if (length <= n || strncasecmp(line, name, n) != 0 || line[n] != ':')
+  if (length <= n || strncasecmp(line, name, n) != 0 || line[n] != ':') {
     return NULL;
+  }
   const char *begin = line + n + 1, *end = line + length;
-  while (begin < end && (*begin == ' ' || *begin == '\t'))
+  while (begin < end && (*begin == ' ' || *begin == '\t')) {
     begin++;
-  while (end > begin && (end[-1] == '\r' || end[-1] == '\n' || end[-1] == ' '))
+  }
+  while (end > begin && (end[-1] == '\r' || end[-1] == '\n' || end[-1] == ' ')) {
     end--;
+  }
   return cli_text("%.*s", (int)(end - begin), begin);
 }
 
@@ -68,8 +74,9 @@ static size_t on_header(char *line, size_t size, size_t count, void *user) {
     t->reply->location = location;
   }
   if (after) {
-    if (!cli_whole_number(after, 0, 86400, &t->reply->retry_after))
+    if (!cli_whole_number(after, 0, 86400, &t->reply->retry_after)) {
       t->reply->retry_after = -1;
+    }
     free(after);
   }
   return size * count;
@@ -87,19 +94,21 @@ static int on_seek(void *user, curl_off_t offset, int origin) {
 
 static int on_progress(void *user, curl_off_t down_total, curl_off_t down, curl_off_t up_total, curl_off_t up) {
   transfer *t = user;
-  if (t->request->label && t->request->upload && up_total > 0)
+  if (t->request->label && t->request->upload && up_total > 0) {
     cli_bar(t->c, t->request->label, (double)up / (double)up_total);
-  else if (t->request->label && t->request->download && down_total > 0)
+  } else if (t->request->label && t->request->download && down_total > 0) {
     cli_bar(t->c, t->request->label, (double)down / (double)down_total);
+  }
   return 0;
 }
 
 static struct curl_slist *headers_of(const cli *c, const cli_request *request) {
   struct curl_slist *list = curl_slist_append(NULL, "User-Agent: orbmorph/" CLI_VERSION);
-  if (request->json)
+  if (request->json) {
     list = curl_slist_append(list, "Content-Type: application/json");
-  else if (request->upload)
+  } else if (request->upload) {
     list = curl_slist_append(list, "Content-Type: application/octet-stream");
+  }
   if (c->token) {
     char *line = cli_text("Authorization: Bearer %s", c->token);
     list = curl_slist_append(list, line);
@@ -150,14 +159,16 @@ static CURLcode perform(transfer *t, const char *url) {
 }
 
 static int rewind_all(const cli_request *request) {
-  if (request->upload && fseeko(request->upload, 0, SEEK_SET) != 0)
+  if (request->upload && fseeko(request->upload, 0, SEEK_SET) != 0) {
     return 0;
-  if (request->download)
+  }
+  if (request->download) {
     return fseeko(request->download, 0, SEEK_SET) == 0 && ftruncate(fileno(request->download), 0) == 0;
+  }
   return 1;
 }
 
-/* An answer may have come although sending was cut short: a body that is refused before it is read. */
+/* The daemon may refuse a body before it has read all of it; then sending fails, but the response is there. */
 static int answered(CURLcode code, const cli_reply *reply) {
   return code == CURLE_OK || (code == CURLE_SEND_ERROR && reply->status >= 400);
 }
@@ -185,22 +196,23 @@ int cli_send(cli *c, const cli_request *request, cli_reply *out) {
       break;
     }
     if (t.failed_write) {
-      cli_error(c, "the file cannot be written: the disk may be full");
+      cli_error(c, "cannot write the downloaded file; the disk may be full");
       rc = CLI_USAGE;
       break;
     }
     int may_repeat = request->patient && time(NULL) < give_up && code != CURLE_URL_MALFORMAT &&
                      code != CURLE_UNSUPPORTED_PROTOCOL && rewind_all(request);
     if (!may_repeat) {
-      cli_error(c, "%s: %s\nIs the daemon running there? --server or ORBMORPH_SERVER says where it is.", c->server,
+      cli_error(c, "%s: %s\nIs the daemon running there? Set its address with --server or ORBMORPH_SERVER.", c->server,
                 curl_easy_strerror(code));
       break;
     }
     cli_reply_free(out);
     usleep(300 * 1000);
   }
-  if (rc == CLI_DONE && out->body)
+  if (rc == CLI_DONE && out->body) {
     out->json = cJSON_ParseWithLength(out->body, out->size);
+  }
   free(url);
   return rc;
 }

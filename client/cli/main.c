@@ -1,48 +1,56 @@
-/* orbmorph: the command line. It knows only HTTP; the daemon does the work. */
-#include <locale.h>
+/* orbmorph: the command-line client. The daemon does the work; the client only speaks HTTP. */
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "commands.h"
+#include "terminal.h"
+#include "text.h"
 
-#define MERGE_OPTIONS                                                                                        \
-  (CLI_COMMON | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_REPORT) | CLI_BIT(OPT_LANDMARKS) | CLI_BIT(OPT_ALIGN) |    \
-   CLI_BIT(OPT_REMESH) | CLI_BIT(OPT_TOLERANCE) | CLI_BIT(OPT_MAX_TRIANGLES) | CLI_BIT(OPT_NO_NORMALS) |     \
-   CLI_BIT(OPT_ANIMATION) | CLI_BIT(OPT_FIT) | CLI_BIT(OPT_PATH) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_NO_WAIT) | \
+#define COMMON_OPTIONS (CLI_BIT(OPT_SERVER) | CLI_BIT(OPT_JSON) | CLI_BIT(OPT_QUIET) | CLI_BIT(OPT_HELP))
+#define MERGE_OPTIONS                                                                                         \
+  (COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_REPORT) | CLI_BIT(OPT_LANDMARKS) | CLI_BIT(OPT_ALIGN) | \
+   CLI_BIT(OPT_REMESH) | CLI_BIT(OPT_TOLERANCE) | CLI_BIT(OPT_MAX_TRIANGLES) | CLI_BIT(OPT_NO_NORMALS) |      \
+   CLI_BIT(OPT_ANIMATION) | CLI_BIT(OPT_FIT) | CLI_BIT(OPT_PATH) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_NO_WAIT) |  \
    CLI_BIT(OPT_REPAIR))
 
-const cli_command cli_commands[] = {
-    {"morph", "FILE FILE…", "Upload meshes, merge them and download one GLB that morphs", 2, -1, MERGE_OPTIONS,
-     cli_run_morph},
+static const cli_command command_list[] = {
+    {"morph", "FILE FILE…", "Upload meshes, merge them and download a GLB that morphs between them", 2, -1,
+     MERGE_OPTIONS, NULL, "dog.obj giraffe.off --landmarks dog-giraffe.json -o out.glb", cli_run_morph},
     {"upload", "FILE…", "Upload meshes", 1, -1,
-     CLI_COMMON | CLI_BIT(OPT_NAME) | CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_FORMAT), cli_run_upload},
-    {"embed", "MESH…", "Embed meshes, ids or files, on the sphere", 1, -1,
-     CLI_COMMON | CLI_BIT(OPT_METHOD) | CLI_BIT(OPT_PRESET) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_OUTPUT) |
+     COMMON_OPTIONS | CLI_BIT(OPT_NAME) | CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_FORMAT), NULL,
+     "--repair fill_holes scan.stl", cli_run_upload},
+    {"embed", "MESH…", "Embed meshes (ids or files) on the sphere", 1, -1,
+     COMMON_OPTIONS | CLI_BIT(OPT_METHOD) | CLI_BIT(OPT_PRESET) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_OUTPUT) |
          CLI_BIT(OPT_NO_WAIT) | CLI_BIT(OPT_REPAIR),
-     cli_run_embed},
-    {"merge", "MESH MESH…", "Merge meshes, ids or files; with -o also download the GLB", 2, -1, MERGE_OPTIONS,
-     cli_run_merge},
-    {"job", "ID", "Show, wait for or cancel a job", 1, 1, CLI_COMMON | CLI_BIT(OPT_WAIT) | CLI_BIT(OPT_CANCEL),
-     cli_run_job},
-    {"ls", "[meshes|embeddings|supermeshes|jobs]", "List what the daemon holds", 0, 1,
-     CLI_COMMON | CLI_BIT(OPT_STATE) | CLI_BIT(OPT_LIMIT), cli_run_ls},
-    {"get", "ID|PATH", "Show a resource, or download a part of it", 1, 1,
-     CLI_COMMON | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_PART), cli_run_get},
-    {"rm", "ID|PATH…", "Delete resources", 1, -1, CLI_COMMON, cli_run_rm},
-    {"doctor", "FILE…", "Check meshes, and say how to mend them", 1, -1, CLI_COMMON, cli_run_doctor},
-    {"view", "FILE.glb", "Draw the poses of a morph into a PNG file, in software", 1, 1,
+     NULL, "dog.obj --preset quality -o sphere.ply", cli_run_embed},
+    {"merge", "MESH MESH…", "Merge meshes (ids or files); with -o, also download the GLB", 2, -1, MERGE_OPTIONS, NULL,
+     "--tolerance 0.0005 -o walk.glb 'frames/*.ply'", cli_run_merge},
+    {"job", "ID", "Show a job, wait for it or cancel it", 1, 1,
+     COMMON_OPTIONS | CLI_BIT(OPT_WAIT) | CLI_BIT(OPT_CANCEL), NULL, "--wait /v1/jobs/ID", cli_run_job},
+    {"ls", "[meshes|embeddings|supermeshes|jobs]", "List meshes, embeddings, supermeshes or jobs", 0, 1,
+     COMMON_OPTIONS | CLI_BIT(OPT_STATE) | CLI_BIT(OPT_LIMIT), "meshes embeddings supermeshes jobs",
+     "jobs --state running", cli_run_ls},
+    {"get", "ID|PATH", "Show a resource, or download its data", 1, 1,
+     COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_PART), NULL, "/v1/supermeshes/ID --part asset -o out.glb",
+     cli_run_get},
+    {"rm", "ID|PATH…", "Delete resources", 1, -1, COMMON_OPTIONS, NULL, "/v1/supermeshes/ID", cli_run_rm},
+    {"doctor", "FILE…", "Check meshes and suggest repairs", 1, -1, COMMON_OPTIONS, NULL, "scan.stl", cli_run_doctor},
+    {"view", "FILE.glb", "Draw poses of a morph into a PNG file, without the daemon", 1, 1,
      CLI_BIT(OPT_HELP) | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_POSES) | CLI_BIT(OPT_SIZE) | CLI_BIT(OPT_UP) |
          CLI_BIT(OPT_YAW) | CLI_BIT(OPT_PITCH) | CLI_BIT(OPT_WIRE) | CLI_BIT(OPT_INSIDE) | CLI_BIT(OPT_FRAMES),
-     cli_run_view},
-    {"completions", "bash|zsh|fish", "Print the completions of a shell", 1, 1, CLI_BIT(OPT_HELP), cli_run_completions},
+     NULL, "out.glb --frames 60 -o out.png", cli_run_view},
+    {"completions", "bash|zsh|fish", "Print the completion script of a shell", 1, 1, CLI_BIT(OPT_HELP), "bash zsh fish",
+     "bash > /etc/bash_completion.d/orbmorph", cli_run_completions},
 };
-const int cli_command_count = (int)(sizeof cli_commands / sizeof cli_commands[0]);
+static const cli_commands commands = {command_list, sizeof command_list / sizeof command_list[0]};
 
 static const cli_command *find_command(const char *name) {
-  for (int i = 0; i < cli_command_count; i++)
-    if (!strcmp(cli_commands[i].name, name))
-      return &cli_commands[i];
+  for (int i = 0; i < commands.count; i++) {
+    if (!strcmp(commands.list[i].name, name)) {
+      return &commands.list[i];
+    }
+  }
   return NULL;
 }
 
@@ -59,7 +67,7 @@ static int run(const cli_command *command, cli *c) {
   c->quiet = c->args.value[OPT_QUIET] != NULL;
   c->bar = !c->quiet && isatty(STDERR_FILENO) && term && strcmp(term, "dumb") != 0;
   if (curl_global_init(CURL_GLOBAL_DEFAULT) != 0 || !(c->curl = curl_easy_init())) {
-    fputs("orbmorph: libcurl does not start\n", stderr);
+    fputs("orbmorph: cannot initialize libcurl\n", stderr);
     return CLI_UNREACHABLE;
   }
   int rc = command->run(c);
@@ -73,19 +81,23 @@ static int run(const cli_command *command, cli *c) {
   return rc;
 }
 
-/* --server and the like may stand before the command as well: they are moved behind it. */
+/* Options may also precede the command: returns argv with the command first. *at: there is a command. */
 static char **command_first(int argc, char **argv, int *at) {
   int i = 1;
-  while (i < argc && argv[i][0] == '-')
+  while (i < argc && argv[i][0] == '-') {
     i += !strcmp(argv[i], "--server") || !strcmp(argv[i], "-s") ? 2 : 1;
+  }
   char **line = cli_alloc((size_t)(argc + 1) * sizeof *line);
   int fill = 0;
   line[fill++] = argv[0];
-  if (i < argc)
+  if (i < argc) {
     line[fill++] = argv[i];
-  for (int k = 1; k < argc; k++)
-    if (k != i)
+  }
+  for (int k = 1; k < argc; k++) {
+    if (k != i) {
       line[fill++] = argv[k];
+    }
+  }
   *at = i < argc;
   return line;
 }
@@ -97,23 +109,29 @@ int main(int argc, char **argv) {
   }
   if (argc >= 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h") || !strcmp(argv[1], "help"))) {
     const cli_command *about = argc > 2 ? find_command(argv[2]) : NULL;
-    cli_help(stdout, about);
+    if (about) {
+      cli_help_command(stdout, about);
+    } else {
+      cli_help(stdout, &commands);
+    }
     return CLI_DONE;
   }
   int given, rc;
   char **line = command_first(argc, argv, &given);
   const cli_command *command = given ? find_command(line[1]) : NULL;
-  cli c = {0};
+  cli c = {.commands = commands};
   if (!command) {
-    if (given)
-      fprintf(stderr, "orbmorph: there is no command '%s'\n", line[1]);
-    cli_help(stderr, NULL);
+    if (given) {
+      fprintf(stderr, "orbmorph: unknown command '%s'\n", line[1]);
+    }
+    cli_help(stderr, &commands);
     rc = CLI_USAGE;
   } else if ((rc = cli_parse(command, argc, line, 2, &c.args)) == CLI_DONE) {
-    if (c.args.value[OPT_HELP])
-      cli_help(stdout, command);
-    else
+    if (c.args.value[OPT_HELP]) {
+      cli_help_command(stdout, command);
+    } else {
       rc = run(command, &c);
+    }
   }
   cli_args_free(&c.args);
   free(line);

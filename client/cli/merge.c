@@ -1,16 +1,22 @@
-/* morph and merge: the request, the wait, the download. */
+/* morph and merge: build the request, wait, download. */
 #include <errno.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "cli.h"
-#include "make.h"
+#include "commands.h"
+#include "http.h"
+#include "input.h"
+#include "mesh.h"
+#include "report.h"
+#include "resource.h"
+#include "terminal.h"
+#include "text.h"
 
 static void set_text(const cli *c, cJSON *request, cli_option_id option, const char *path) {
-  if (c->args.value[option])
+  if (c->args.value[option]) {
     cli_set_member(request, path, cJSON_CreateString(c->args.value[option]));
+  }
 }
 
 static int add_options(const cli *c, cJSON *request) {
@@ -31,17 +37,18 @@ static int add_options(const cli *c, cJSON *request) {
   }
   if (triangles) {
     if (!cli_whole_number(triangles, 4, 100000000, &n)) {
-      cli_error(c, "--max-triangles takes a whole number from 4 on, not '%s'", triangles);
+      cli_error(c, "--max-triangles takes a whole number from 4 to 100000000, not '%s'", triangles);
       return CLI_USAGE;
     }
     cli_set_member(request, "remesh.max_triangles", cJSON_CreateNumber((double)n));
   }
-  if (c->args.value[OPT_NO_NORMALS])
+  if (c->args.value[OPT_NO_NORMALS]) {
     cli_set_member(request, "asset.normals", cJSON_CreateBool(0));
+  }
   return cli_apply_sets(c, request);
 }
 
-/* Everything but the shapes; before any upload, so that a typing error costs nothing. */
+/* Everything but the shapes. Runs before any upload, so that a usage error is reported at once. */
 static int make_request(cli *c, cJSON **out) {
   const char *landmarks = c->args.value[OPT_LANDMARKS];
   cJSON *request = cJSON_CreateObject();
@@ -51,8 +58,9 @@ static int make_request(cli *c, cJSON **out) {
     cJSON_AddStringToObject(request, "landmarks", "auto");
   } else if (landmarks) {
     cJSON *list = cli_read_landmarks(c, landmarks);
-    if (!list)
+    if (!list) {
       return CLI_USAGE;
+    }
     cJSON_AddItemToObject(request, "landmarks", list);
   }
   return add_options(c, request);
@@ -63,8 +71,9 @@ static int add_shapes(cli *c, cJSON *request) {
   for (int i = 0; i < c->args.operand_count; i++) {
     cli_mesh mesh;
     int rc = cli_mesh_of(c, c->args.operands[i], &mesh);
-    if (rc != CLI_DONE)
+    if (rc != CLI_DONE) {
       return rc;
+    }
     cJSON *shape = cJSON_CreateObject();
     cJSON_AddStringToObject(shape, "mesh", mesh.id);
     cJSON_AddStringToObject(shape, "name", mesh.name);
@@ -72,66 +81,6 @@ static int add_shapes(cli *c, cJSON *request) {
     cli_mesh_free(&mesh);
   }
   return CLI_DONE;
-}
-
-int cli_download(cli *c, const char *path, const char *file) {
-  int to_stdout = !strcmp(file, "-");
-  char *part = to_stdout ? NULL : cli_text("%s.part-%ld", file, (long)getpid());
-  FILE *out = to_stdout ? tmpfile() : fopen(part, "w+b");
-  cli_reply reply = {0};
-  if (!out) {
-    cli_error(c, "%s: %s", file, strerror(errno));
-    free(part);
-    return CLI_USAGE;
-  }
-  cli_request request = {.method = "GET", .path = path, .download = out, .label = "download", .patient = 1};
-  int rc = cli_send(c, &request, &reply);
-  cli_bar_end(c);
-  if (rc == CLI_DONE && !cli_ok(&reply))
-    rc = cli_refused(c, path, &reply);
-  if (rc == CLI_DONE && to_stdout) {
-    char block[1 << 16];
-    rewind(out);
-    for (size_t got; (got = fread(block, 1, sizeof block, out)) > 0;)
-      fwrite(block, 1, got, stdout);
-  }
-  int closed = fclose(out) == 0;
-  if (part && rc == CLI_DONE && (!closed || rename(part, file) != 0)) {
-    cli_error(c, "%s: %s", file, strerror(errno));
-    rc = CLI_USAGE;
-  }
-  if (part && rc != CLI_DONE)
-    unlink(part);
-  cli_reply_free(&reply);
-  free(part);
-  return rc;
-}
-
-int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource) {
-  char *text = cJSON_PrintUnformatted(body), *result = NULL;
-  cli_request request = {.method = "POST", .path = path, .json = text};
-  int rc = cli_send(c, &request, resource);
-  if (rc == CLI_DONE && !cli_ok(resource)) {
-    rc = cli_refused(c, NULL, resource);
-  } else if (rc == CLI_DONE && resource->status == 202 && c->args.value[OPT_NO_WAIT]) {
-    if (c->json)
-      puts(resource->body);
-    else
-      printf("%s\n", cli_string(resource->json, "url", "?"));
-    cli_reply_free(resource);
-  } else if (rc == CLI_DONE && resource->status == 202) {
-    rc = cli_wait(c, resource->json, &result);
-    cli_reply_free(resource);
-    if (rc == CLI_DONE) {
-      cli_request get = {.method = "GET", .path = result, .patient = 1};
-      rc = cli_send(c, &get, resource);
-      if (rc == CLI_DONE && !cli_ok(resource))
-        rc = cli_refused(c, NULL, resource);
-    }
-  }
-  free(result);
-  free(text);
-  return rc;
 }
 
 static int finish(cli *c, const cli_reply *supermesh, const char *output) {
@@ -142,29 +91,34 @@ static int finish(cli *c, const cli_reply *supermesh, const char *output) {
     rc = cli_download(c, asset, output);
     free(asset);
   }
-  if (rc == CLI_DONE && report)
+  if (rc == CLI_DONE && report) {
     rc = cli_write_report(c, report, supermesh);
-  if (rc != CLI_DONE || (output && !strcmp(output, "-")))
+  }
+  if (rc != CLI_DONE || (output && !strcmp(output, "-"))) {
     return rc;
+  }
   if (c->json) {
     puts(supermesh->body);
   } else {
-    if (output)
+    if (output) {
       printf("%s\n", output);
+    }
     cli_print_supermesh(supermesh->json);
   }
   return CLI_DONE;
 }
 
-/* Whether a file can be made there, before any work is done for it. */
+/* Checks before any work that the folder of an output file is writable. */
 static int can_write(const cli *c, const char *file) {
-  if (!file || !strcmp(file, "-"))
+  if (!file || !strcmp(file, "-")) {
     return CLI_DONE;
+  }
   const char *slash = strrchr(file, '/');
   char *folder = slash ? cli_text("%.*s", (int)(slash - file + 1), file) : cli_text(".");
   int fine = access(folder, W_OK | X_OK) == 0;
-  if (!fine)
-    cli_error(c, "%s cannot be written: the folder %s: %s", file, folder, strerror(errno));
+  if (!fine) {
+    cli_error(c, "cannot write %s: folder %s: %s", file, folder, strerror(errno));
+  }
   free(folder);
   return fine ? CLI_DONE : CLI_USAGE;
 }
@@ -173,16 +127,21 @@ static int merge(cli *c, const char *output) {
   cJSON *request = NULL;
   cli_reply supermesh = {0};
   int rc = can_write(c, output);
-  if (rc == CLI_DONE)
+  if (rc == CLI_DONE) {
     rc = can_write(c, c->args.value[OPT_REPORT]);
-  if (rc == CLI_DONE)
+  }
+  if (rc == CLI_DONE) {
     rc = make_request(c, &request);
-  if (rc == CLI_DONE)
+  }
+  if (rc == CLI_DONE) {
     rc = add_shapes(c, request);
-  if (rc == CLI_DONE)
+  }
+  if (rc == CLI_DONE) {
     rc = cli_make(c, "/v1/supermeshes", request, &supermesh);
-  if (rc == CLI_DONE && supermesh.json)
+  }
+  if (rc == CLI_DONE && supermesh.json) {
     rc = finish(c, &supermesh, output);
+  }
   cli_reply_free(&supermesh);
   cJSON_Delete(request);
   return rc;
@@ -194,8 +153,9 @@ int cli_run_merge(cli *c) {
 
 int cli_run_morph(cli *c) {
   const char *output = c->args.value[OPT_OUTPUT];
-  if (output)
+  if (output) {
     return merge(c, output);
+  }
   char *first = cli_base_name(c->args.operands[0]), *last = cli_base_name(c->args.operands[c->args.operand_count - 1]);
   char *made = cli_text("%s-%s.glb", first, last);
   int rc = merge(c, made);

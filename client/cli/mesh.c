@@ -1,20 +1,24 @@
-/* Meshes as operands: an id, or a file that is uploaded. */
+#include "mesh.h"
+
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "problem.h"
+#include "terminal.h"
+#include "text.h"
 
 int cli_upload(cli *c, const char *path, const char *name, const char *repair, cli_reply *reply) {
   memset(reply, 0, sizeof *reply);
   FILE *file = fopen(path, "rb");
   struct stat info;
   if (!file || fstat(fileno(file), &info) != 0 || S_ISDIR(info.st_mode)) {
-    cli_error(c, "%s: %s", path, file ? "is not a file" : strerror(errno));
-    if (file)
+    cli_error(c, "%s: %s", path, file ? "not a regular file" : strerror(errno));
+    if (file) {
       fclose(file);
+    }
     return CLI_USAGE;
   }
   char *base = cli_base_name(path), *escaped = cli_escape(name ? name : base), *target;
@@ -41,12 +45,12 @@ int cli_upload(cli *c, const char *path, const char *name, const char *repair, c
 static void note_mesh(const cli *c, const char *operand, const cli_reply *reply) {
   char triangles[32];
   cli_count(cli_number(reply->json, "triangles"), triangles);
-  cli_note(c, "%s: %s triangles%s", operand, triangles, reply->status == 200 ? ", known already" : "");
+  cli_note(c, "%s: %s triangles%s", operand, triangles, reply->status == 200 ? ", already uploaded" : "");
   const cJSON *repair;
   cJSON_ArrayForEach(repair, cJSON_GetObjectItemCaseSensitive(reply->json, "repairs")) {
     char count[32];
     cli_count(cli_number(repair, "count"), count);
-    cli_note(c, "  mended: %s (%s)", cli_string(repair, "kind", "?"), count);
+    cli_note(c, "  repaired: %s (%s)", cli_string(repair, "kind", "?"), count);
   }
 }
 
@@ -64,12 +68,14 @@ int cli_mesh_of(cli *c, const char *operand, cli_mesh *out) {
   if (rc == CLI_DONE && !cli_ok(&reply)) {
     rc = cli_refused(c, operand, &reply);
     const char *advice = reply.json ? cli_advice(cli_problem_type(reply.json)) : NULL;
-    if (advice && !c->json)
+    if (advice && !c->json) {
       cli_note(c, "  %s", advice);
+    }
   }
   if (rc == CLI_DONE) {
-    if (!known)
+    if (!known) {
       note_mesh(c, operand, &reply);
+    }
     out->id = cli_text("%s", cli_string(reply.json, "id", ""));
     out->name = known ? cli_text("%s", cli_string(reply.json, "name", "")) : cli_base_name(operand);
   }
@@ -81,25 +87,4 @@ void cli_mesh_free(cli_mesh *mesh) {
   free(mesh->id);
   free(mesh->name);
   memset(mesh, 0, sizeof *mesh);
-}
-
-int cli_run_upload(cli *c) {
-  const char *name = c->args.value[OPT_NAME];
-  int rc = CLI_DONE;
-  if (name && c->args.operand_count > 1) {
-    cli_error(c, "--name goes with one file only");
-    return CLI_USAGE;
-  }
-  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
-    cli_reply reply;
-    rc = cli_upload(c, c->args.operands[i], name, c->args.value[OPT_REPAIR], &reply);
-    if (rc == CLI_DONE && !cli_ok(&reply))
-      rc = cli_refused(c, c->args.operands[i], &reply);
-    else if (rc == CLI_DONE && c->json)
-      puts(reply.body);
-    else if (rc == CLI_DONE)
-      cli_print_mesh(reply.json);
-    cli_reply_free(&reply);
-  }
-  return rc;
 }

@@ -1,61 +1,72 @@
-/* The options of all commands, their parser, and the help that is made of the same lists. */
+#include "options.h"
+
 #include <glob.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "program.h"
+#include "text.h"
+
+_Static_assert(OPT_COUNT <= 64, "a command holds its options in 64 bits");
 
 const cli_option cli_options[OPT_COUNT] = {
-    [OPT_SERVER] = {"server", 's', "URL", NULL, "the daemon (else $ORBMORPH_SERVER, else " CLI_DEFAULT_SERVER ")"},
+    [OPT_SERVER] = {"server", 's', "URL", NULL,
+                    "address of the daemon; default: $ORBMORPH_SERVER or " CLI_DEFAULT_SERVER},
     [OPT_JSON] = {"json", 0, NULL, NULL, "print the daemon's JSON"},
-    [OPT_QUIET] = {"quiet", 'q', NULL, NULL, "no progress and no notes"},
-    [OPT_HELP] = {"help", 'h', NULL, NULL, "this help"},
-    [OPT_OUTPUT] = {"output", 'o', "FILE", NULL, "where the result goes; - is standard output"},
-    [OPT_REPORT] = {"report", 0, "FILE", NULL, "also write the report: .md readable, else JSON"},
-    [OPT_LANDMARKS] = {"landmarks", 'l', "FILE", NULL, "landmark file, or auto"},
-    [OPT_ALIGN] = {"align", 0, "METHOD", "pin rbf rotate auto", "how shapes are aligned"},
-    [OPT_REMESH] = {"remesh", 0, "METHOD", "adaptive overlay subdivision convex-hull", "how the common mesh is made"},
-    [OPT_TOLERANCE] = {"tolerance", 't', "X", NULL, "error allowed, as a fraction of each shape's diagonal"},
-    [OPT_MAX_TRIANGLES] = {"max-triangles", 'n', "N", NULL, "at most so many triangles"},
-    [OPT_NO_NORMALS] = {"no-normals", 0, NULL, NULL, "leave normals out of the asset"},
-    [OPT_ANIMATION] = {"animation", 0, "KIND", "pingpong none", "the animation in the asset"},
-    [OPT_FIT] = {"fit", 0, "KIND", "none rigid similarity", "move later shapes onto the first"},
-    [OPT_PATH] = {"path", 0, "KIND", "linear rigid", "the way that vertices take"},
-    [OPT_SET] = {"set", 0, "NAME=VALUE", NULL, "any member of the request, as in align.options.radius=0.5"},
-    [OPT_NO_WAIT] = {"no-wait", 0, NULL, NULL, "print the job and leave it running"},
-    [OPT_NAME] = {"name", 0, "NAME", NULL, "name of the mesh (else that of the file)"},
-    [OPT_REPAIR] = {"repair", 0, "LIST", "safe none fill_holes largest_component", "repairs, with commas between"},
-    [OPT_FORMAT] = {"format", 0, "FORMAT", "obj off ply stl gltf glb", "of the file (else told by its content)"},
-    [OPT_METHOD] = {"method", 0, "METHOD", "newton kernel-sampling", "how meshes are embedded"},
+    [OPT_QUIET] = {"quiet", 'q', NULL, NULL, "print no progress and no notes"},
+    [OPT_HELP] = {"help", 'h', NULL, NULL, "show this help"},
+    [OPT_OUTPUT] = {"output", 'o', "FILE", NULL, "write the result to FILE; - is standard output"},
+    [OPT_REPORT] = {"report", 0, "FILE", NULL, "also write a report: Markdown if FILE ends in .md, else JSON"},
+    [OPT_LANDMARKS] = {"landmarks", 'l', "FILE", NULL, "read landmarks from FILE, or find them with auto"},
+    [OPT_ALIGN] = {"align", 0, "METHOD", "pin rbf rotate auto", "alignment method"},
+    [OPT_REMESH] = {"remesh", 0, "METHOD", "adaptive overlay subdivision convex-hull", "remeshing method"},
+    [OPT_TOLERANCE] = {"tolerance", 't', "X", NULL, "allowed error, as a fraction of each shape's diagonal"},
+    [OPT_MAX_TRIANGLES] = {"max-triangles", 'n', "N", NULL, "make at most N triangles"},
+    [OPT_NO_NORMALS] = {"no-normals", 0, NULL, NULL, "write no normals into the asset"},
+    [OPT_ANIMATION] = {"animation", 0, "KIND", "pingpong none", "animation in the asset"},
+    [OPT_FIT] = {"fit", 0, "KIND", "none rigid similarity", "move the other shapes onto the first"},
+    [OPT_PATH] = {"path", 0, "KIND", "linear rigid", "path of the vertices between shapes"},
+    [OPT_SET] = {"set", 0, "NAME=VALUE", NULL, "set any member of the request, such as align.options.radius=0.5"},
+    [OPT_NO_WAIT] = {"no-wait", 0, NULL, NULL, "print the job and do not wait for it"},
+    [OPT_NAME] = {"name", 0, "NAME", NULL, "name of the mesh; default: the file name"},
+    [OPT_REPAIR] = {"repair", 0, "LIST", "safe none fill_holes largest_component",
+                    "allowed repairs, separated by commas"},
+    [OPT_FORMAT] = {"format", 0, "FORMAT", "obj off ply stl gltf glb",
+                    "file format; default: detected from the content"},
+    [OPT_METHOD] = {"method", 0, "METHOD", "newton kernel-sampling", "embedding method"},
     [OPT_PRESET] = {"preset", 0, "PRESET", "fast default quality", "effort of the embedding"},
-    [OPT_WAIT] = {"wait", 'w', NULL, NULL, "wait until the job has ended"},
+    [OPT_WAIT] = {"wait", 'w', NULL, NULL, "wait until the job ends"},
     [OPT_CANCEL] = {"cancel", 0, NULL, NULL, "cancel the job"},
-    [OPT_STATE] = {"state", 0, "STATE", "queued running succeeded failed cancelled", "only jobs in this state"},
-    [OPT_LIMIT] = {"limit", 0, "N", NULL, "at most so many"},
-    [OPT_PART] = {"part", 0, "PART", "file asset sphere", "the bytes of a mesh, a supermesh or an embedding"},
-    [OPT_POSES] = {"poses", 0, "N", NULL, "poses in each row, 5"},
-    [OPT_SIZE] = {"size", 0, "PIXELS", NULL, "width and height of one pose, 320"},
-    [OPT_UP] = {"up", 0, "AXIS", "y z", "the axis that points up"},
-    [OPT_YAW] = {"yaw", 0, "DEGREES", NULL, "turn about that axis, 30"},
-    [OPT_PITCH] = {"pitch", 0, "DEGREES", NULL, "look from above, 15"},
-    [OPT_WIRE] = {"wire", 0, NULL, NULL, "draw the edges of triangles"},
-    [OPT_INSIDE] = {"inside", 0, NULL, NULL, "paint red what is seen from within"},
-    [OPT_FRAMES] = {"frames", 0, "N", NULL, "an animated PNG of so many frames, 20 a second, instead of a sheet"},
+    [OPT_STATE] = {"state", 0, "STATE", "queued running succeeded failed cancelled", "list only jobs in this state"},
+    [OPT_LIMIT] = {"limit", 0, "N", NULL, "list at most N"},
+    [OPT_PART] = {"part", 0, "PART", "file asset sphere", "download the data of a mesh, a supermesh or an embedding"},
+    [OPT_POSES] = {"poses", 0, "N", NULL, "poses in each row; default: 5"},
+    [OPT_SIZE] = {"size", 0, "PIXELS", NULL, "width and height of a pose; default: 320"},
+    [OPT_UP] = {"up", 0, "AXIS", "y z", "axis that points up; default: y"},
+    [OPT_YAW] = {"yaw", 0, "DEGREES", NULL, "turn around the up axis; default: 30"},
+    [OPT_PITCH] = {"pitch", 0, "DEGREES", NULL, "look from above; default: 15"},
+    [OPT_WIRE] = {"wire", 0, NULL, NULL, "draw the edges of the triangles"},
+    [OPT_INSIDE] = {"inside", 0, NULL, NULL, "paint triangles seen from inside red"},
+    [OPT_FRAMES] = {"frames", 0, "N", NULL, "draw an animated PNG of N frames, 20 per second, instead of a sheet"},
 };
 
 static int find_long(const cli_command *command, const char *text, size_t length) {
-  for (int id = 0; id < OPT_COUNT; id++)
+  for (int id = 0; id < OPT_COUNT; id++) {
     if ((command->options & CLI_BIT(id)) && strlen(cli_options[id].name) == length &&
-        !strncmp(cli_options[id].name, text, length))
+        !strncmp(cli_options[id].name, text, length)) {
       return id;
+    }
+  }
   return -1;
 }
 
 static int find_letter(const cli_command *command, char letter) {
-  for (int id = 0; id < OPT_COUNT; id++)
-    if ((command->options & CLI_BIT(id)) && cli_options[id].letter == letter && letter)
+  for (int id = 0; id < OPT_COUNT; id++) {
+    if ((command->options & CLI_BIT(id)) && cli_options[id].letter == letter && letter) {
       return id;
+    }
+  }
   return -1;
 }
 
@@ -69,32 +80,35 @@ static int store(cli_args *out, int id, const char *value) {
     out->value[id] = value;
     return 1;
   }
-  if (out->set_count == CLI_SETS_MAX)
+  if (out->set_count == CLI_SETS_MAX) {
     return 0;
+  }
   out->sets[out->set_count++] = value;
   return 1;
 }
 
 static void add_operand(cli_args *out, const char *text) {
   out->operands = realloc(out->operands, (size_t)(out->operand_count + 1) * sizeof(char *));
-  if (!out->operands)
+  if (!out->operands) {
     exit(CLI_REFUSED);
+  }
   out->operands[out->operand_count++] = cli_text("%s", text);
 }
 
-/* A pattern that the shell has left alone, because it was quoted, stands for the files that match it. */
+/* Expands a pattern that the shell did not expand because it was quoted. */
 static void add_operands(cli_args *out, const char *text) {
   glob_t found;
   if (strpbrk(text, "*?[") && access(text, F_OK) != 0 && glob(text, 0, NULL, &found) == 0) {
-    for (size_t i = 0; i < found.gl_pathc; i++)
+    for (size_t i = 0; i < found.gl_pathc; i++) {
       add_operand(out, found.gl_pathv[i]);
+    }
     globfree(&found);
     return;
   }
   add_operand(out, text);
 }
 
-/* One argument that begins with a dash; *i moves on where the value is the next one. */
+/* Parses the option argv[*i]; advances *i if its value is the next argument. */
 static int parse_option(const cli_command *command, int argc, char **argv, int *i, cli_args *out) {
   const char *text = argv[*i], *value = NULL;
   int id;
@@ -107,18 +121,21 @@ static int parse_option(const cli_command *command, int argc, char **argv, int *
     id = find_letter(command, text[1]);
     value = text[2] ? text + 2 : NULL;
   }
-  if (id < 0)
+  if (id < 0) {
     return usage_error(command, "unknown option", text);
+  }
   if (!cli_options[id].value) {
-    if (value)
-      return usage_error(command, "no value goes with", text);
+    if (value) {
+      return usage_error(command, "option takes no value:", text);
+    }
     value = "";
   } else if (!value) {
-    if (*i + 1 >= argc)
-      return usage_error(command, "a value is missing after", text);
+    if (*i + 1 >= argc) {
+      return usage_error(command, "option needs a value:", text);
+    }
     value = argv[++*i];
   }
-  return store(out, id, value) ? CLI_DONE : usage_error(command, "too many options", text);
+  return store(out, id, value) ? CLI_DONE : usage_error(command, "too many options:", text);
 }
 
 int cli_parse(const cli_command *command, int argc, char **argv, int first, cli_args *out) {
@@ -129,26 +146,31 @@ int cli_parse(const cli_command *command, int argc, char **argv, int first, cli_
       literal = 1;
     } else if (!literal && argv[i][0] == '-' && argv[i][1]) {
       int rc = parse_option(command, argc, argv, &i, out);
-      if (rc != CLI_DONE)
+      if (rc != CLI_DONE) {
         return rc;
+      }
     } else if (literal) {
       add_operand(out, argv[i]);
     } else {
       add_operands(out, argv[i]);
     }
   }
-  if (out->value[OPT_HELP])
+  if (out->value[OPT_HELP]) {
     return CLI_DONE;
-  if (out->operand_count < command->least)
+  }
+  if (out->operand_count < command->least) {
     return usage_error(command, "too few arguments; it takes", command->operands);
-  if (command->most >= 0 && out->operand_count > command->most)
+  }
+  if (command->most >= 0 && out->operand_count > command->most) {
     return usage_error(command, "too many arguments; it takes", *command->operands ? command->operands : "none");
+  }
   return CLI_DONE;
 }
 
 void cli_args_free(cli_args *args) {
-  for (int i = 0; i < args->operand_count; i++)
+  for (int i = 0; i < args->operand_count; i++) {
     free(args->operands[i]);
+  }
   free(args->operands);
   memset(args, 0, sizeof *args);
 }
@@ -156,30 +178,42 @@ void cli_args_free(cli_args *args) {
 static void help_option(FILE *out, int id) {
   const cli_option *o = &cli_options[id];
   char left[64];
-  if (o->letter)
+  if (o->letter) {
     snprintf(left, sizeof left, "-%c, --%s%s%s", o->letter, o->name, o->value ? " " : "", o->value ? o->value : "");
-  else
+  } else {
     snprintf(left, sizeof left, "    --%s%s%s", o->name, o->value ? " " : "", o->value ? o->value : "");
+  }
   fprintf(out, "  %-26s %s", left, o->help);
-  if (o->choices)
+  if (o->choices) {
     fprintf(out, " (%s)", o->choices);
+  }
   fputc('\n', out);
 }
 
-void cli_help(FILE *out, const cli_command *command) {
-  if (command) {
-    fprintf(out, "usage: orbmorph %s [options] %s\n%s.\n\n", command->name, command->operands, command->summary);
-    for (int id = 0; id < OPT_COUNT; id++)
-      if (command->options & CLI_BIT(id))
-        help_option(out, id);
-    return;
+void cli_help_command(FILE *out, const cli_command *command) {
+  fprintf(out, "usage: orbmorph %s [options] %s\n%s.\n\n", command->name, command->operands, command->summary);
+  for (int id = 0; id < OPT_COUNT; id++) {
+    if (command->options & CLI_BIT(id)) {
+      help_option(out, id);
+    }
   }
-  fputs("usage: orbmorph COMMAND [options] …\nMorphs between closed meshes through the daemon orbmorphd.\n\n", out);
-  for (int i = 0; i < cli_command_count; i++)
-    fprintf(out, "  %-12s %s\n", cli_commands[i].name, cli_commands[i].summary);
+  fprintf(out, "\nExample:\n  $ orbmorph %s %s\n", command->name, command->example);
+}
+
+void cli_help(FILE *out, const cli_commands *commands) {
   fputs(
-      "\n'orbmorph COMMAND --help' tells more; 'orbmorph --version' the version.\n"
-      "Environment: ORBMORPH_SERVER (the daemon's URL), ORBMORPH_TOKEN.\n"
-      "Exit status: 0 done, 1 refused by the daemon, 2 wrong usage, 3 daemon out of reach.\n",
+      "usage: orbmorph COMMAND [options] …\nMorphs between closed meshes; the daemon orbmorphd computes the morph.\n\n",
+      out);
+  for (int i = 0; i < commands->count; i++) {
+    fprintf(out, "  %-12s %s\n", commands->list[i].name, commands->list[i].summary);
+  }
+  fputs(
+      "\nExamples:\n"
+      "  $ orbmorph morph dog.obj giraffe.off --landmarks dog-giraffe.json -o out.glb\n"
+      "  $ orbmorph view out.glb --frames 60 -o out.png\n"
+      "  $ orbmorph doctor scan.stl\n"
+      "\n'orbmorph COMMAND --help' lists the options of a command; 'orbmorph --version' prints the version.\n"
+      "Environment: ORBMORPH_SERVER (address of the daemon), ORBMORPH_TOKEN (token, if the daemon requires one).\n"
+      "Exit status: 0 success, 1 refused by the daemon or failed job, 2 usage or file error, 3 daemon unreachable.\n",
       out);
 }

@@ -1,8 +1,10 @@
-/* What went wrong, in words: the daemon's problems, and advice for the owners of meshes. */
+#include "problem.h"
+
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "terminal.h"
+#include "text.h"
 
 enum { FACT_LENGTH_MOST = 160 };
 
@@ -13,21 +15,26 @@ const char *cli_problem_type(const cJSON *problem) {
 
 static int is_standard(const char *name) {
   static const char *const names[] = {"type", "title", "status", "detail", "instance"};
-  for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
-    if (!strcmp(name, names[i]))
+  for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+    if (!strcmp(name, names[i])) {
       return 1;
+    }
+  }
   return 0;
 }
 
 static void print_facts(const cJSON *problem) {
   for (const cJSON *item = problem->child; item; item = item->next) {
-    if (!item->string || is_standard(item->string))
+    if (!item->string || is_standard(item->string)) {
       continue;
+    }
     char *text = cJSON_PrintUnformatted(item);
-    if (!text)
+    if (!text) {
       continue;
-    if (strlen(text) > FACT_LENGTH_MOST)
+    }
+    if (strlen(text) > FACT_LENGTH_MOST) {
       strcpy(text + FACT_LENGTH_MOST - 4, " …");
+    }
     fprintf(stderr, "  %s: %s\n", item->string, text);
     free(text);
   }
@@ -49,9 +56,10 @@ int cli_problem(cli *c, const char *subject, const cJSON *problem) {
 
 int cli_refused(cli *c, const char *subject, const cli_reply *reply) {
   cli_bar_end(c);
-  if (cJSON_IsObject(reply->json))
+  if (cJSON_IsObject(reply->json)) {
     return cli_problem(c, subject, reply->json);
-  cli_error(c, "%s%sthe server answered with status %ld", subject ? subject : "", subject ? ": " : "", reply->status);
+  }
+  cli_error(c, "%s%sthe server returned status %ld", subject ? subject : "", subject ? ": " : "", reply->status);
   return CLI_REFUSED;
 }
 
@@ -60,30 +68,33 @@ const char *cli_advice(const char *type) {
     const char *type, *advice;
   } list[] = {
       {"not-closed",
-       "The surface has holes. Close them in the program that made it, or upload with "
-       "--repair fill_holes to have each closed by a patch."},
+       "The surface has holes. Close them in the program that made the mesh, or upload with "
+       "--repair fill_holes, which covers each hole with a patch."},
       {"not-manifold",
-       "Some edges have more than two faces, or faces meet in a point only. Remove inner walls and "
-       "doubled faces; 'merge by distance' and 'select non-manifold' help in Blender."},
+       "Some edges have more than two faces, or faces meet only at a point. Remove inner walls and "
+       "duplicate faces; in Blender, use 'Merge by Distance' and 'Select Non Manifold'."},
       {"not-orientable",
-       "The faces cannot all point outwards: the surface is one-sided, or with --repair none turned "
-       "against itself. Recalculate the normals, or upload with --repair safe."},
+       "The faces cannot all point outward: the surface is one-sided or, with --repair none, its faces "
+       "are not consistently oriented. Recalculate the normals, or upload with --repair safe."},
       {"not-connected",
-       "The file holds several pieces. Join them into one closed skin, upload them one by one, or keep "
-       "only the largest with --repair largest_component."},
+       "The file holds several pieces. Join them into one closed surface, upload each piece by itself, or "
+       "keep only the largest with --repair largest_component."},
       {"not-genus-zero",
-       "The surface has handles, like a ring or a cup. Cut each handle and close both ends: only "
-       "surfaces like a ball can be laid on the sphere."},
+       "The surface has handles, like a ring or a cup. Cut each handle and close both ends: only surfaces "
+       "without handles can be embedded on the sphere."},
       {"degenerate",
-       "Hardly any triangles are left after repair, or the mesh is tiny or far from the origin. Check that the right "
-       "object was exported; scale it or move it to the origin."},
-      {"not-finite", "Some coordinates are not numbers, or beyond 1e30. Export again, or scale the mesh down."},
-      {"malformed-mesh", "The file is damaged or cut short at the place named. Export or download it again."},
-      {"unknown-format", "Supported are OBJ, OFF, PLY, STL, glTF and GLB."},
+       "Too few triangles remain after repair, or the mesh is tiny or far from the origin. Check that you exported "
+       "the right object; scale it or move it to the origin."},
+      {"not-finite",
+       "Some coordinates are not finite numbers or exceed 1e30. Export the mesh again, or scale it down."},
+      {"malformed-mesh", "The file is damaged or truncated at the reported position. Export or download it again."},
+      {"unknown-format", "The supported formats are OBJ, OFF, PLY, STL, glTF and GLB."},
       {"too-large", "The mesh is larger than the daemon accepts. Decimate it first, or raise the daemon's limits."},
   };
-  for (size_t i = 0; i < sizeof list / sizeof list[0]; i++)
-    if (!strcmp(list[i].type, type))
+  for (size_t i = 0; i < sizeof list / sizeof list[0]; i++) {
+    if (!strcmp(list[i].type, type)) {
       return list[i].advice;
+    }
+  }
   return NULL;
 }

@@ -1,13 +1,24 @@
-/* Resources in words: for the terminal, and as a report in Markdown. */
+#include "report.h"
+
 #include <errno.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "problem.h"
+#include "terminal.h"
+#include "text.h"
 
 static const cJSON *member(const cJSON *object, const char *name) {
   return cJSON_GetObjectItemCaseSensitive(object, name);
+}
+
+void cli_print_repairs(const cJSON *mesh) {
+  const cJSON *repair;
+  cJSON_ArrayForEach(repair, member(mesh, "repairs")) {
+    char count[32];
+    cli_count(cli_number(repair, "count"), count);
+    printf("  repaired: %s (%s)\n", cli_string(repair, "kind", "?"), count);
+  }
 }
 
 void cli_print_mesh(const cJSON *mesh) {
@@ -16,12 +27,7 @@ void cli_print_mesh(const cJSON *mesh) {
   cli_count(cli_number(mesh, "triangles"), triangles);
   printf("%s  %s: %s vertices, %s triangles\n", cli_string(mesh, "id", "?"), cli_string(mesh, "name", ""), vertices,
          triangles);
-  const cJSON *repair;
-  cJSON_ArrayForEach(repair, member(mesh, "repairs")) {
-    char count[32];
-    cli_count(cli_number(repair, "count"), count);
-    printf("  mended: %s (%s)\n", cli_string(repair, "kind", "?"), count);
-  }
+  cli_print_repairs(mesh);
 }
 
 void cli_print_embedding(const cJSON *embedding) {
@@ -37,25 +43,38 @@ void cli_print_embedding(const cJSON *embedding) {
   printf("  time: %.3g s\n", cli_number(member(embedding, "timings_ms"), "total") / 1000);
 }
 
-/* "0.04 %", or "?" where it was not measured. */
-static void percent(double fraction, char out[32]) {
-  if (isfinite(fraction))
-    snprintf(out, 32, "%.3g %%", 100 * fraction);
-  else
-    snprintf(out, 32, "?");
+void cli_print_job(const cJSON *job) {
+  double progress = cli_number(job, "progress");
+  const cJSON *problem = cJSON_GetObjectItemCaseSensitive(job, "problem");
+  printf("%s  %-10s %-9s %3.0f %%  %s\n", cli_string(job, "id", "?"), cli_string(job, "kind", "?"),
+         cli_string(job, "state", "?"), isfinite(progress) ? 100 * progress : 0,
+         cJSON_IsObject(problem) ? cli_problem_type(problem) : cli_string(job, "result", cli_string(job, "stage", "")));
 }
 
-/* The largest distance of any landmark from its place, as a fraction of the diagonal. */
+/* "0.04 %", or "?" if it was not measured. */
+static void percent(double fraction, char out[32]) {
+  if (isfinite(fraction)) {
+    snprintf(out, 32, "%.3g %%", 100 * fraction);
+  } else {
+    snprintf(out, 32, "?");
+  }
+}
+
+/* The largest distance of a landmark from its given place, as a fraction of the diagonal. */
 static double worst_residual(const cJSON *supermesh) {
   double worst = 0;
   const cJSON *landmark, *residual;
-  cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) cJSON_ArrayForEach(
-      residual, member(landmark, "residual_relative")) if (cJSON_IsNumber(residual) && residual->valuedouble > worst)
-      worst = residual->valuedouble;
+  cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
+    cJSON_ArrayForEach(residual, member(landmark, "residual_relative")) {
+      if (cJSON_IsNumber(residual) && residual->valuedouble > worst) {
+        worst = residual->valuedouble;
+      }
+    }
+  }
   return worst;
 }
 
-/* Whether landmarks were found by the daemon, not given. */
+/* The daemon found the landmarks: the request gave none. */
 static int were_found(const cJSON *supermesh) {
   return member(cJSON_GetArrayItem(member(supermesh, "landmarks"), 0), "vertex") == NULL;
 }
@@ -71,14 +90,15 @@ void cli_print_supermesh(const cJSON *supermesh) {
   cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
     percent(cli_number(shape, "hausdorff_relative"), error);
     percent(cli_number(shape, "rms_relative"), rms);
-    printf("  %-16s farthest from its input %s of the diagonal, on average %s\n", cli_string(shape, "name", "?"), error,
+    printf("  %-16s distance to its input: at most %s of the diagonal, RMS %s\n", cli_string(shape, "name", "?"), error,
            rms);
   }
   if (landmarks && were_found(supermesh)) {
-    printf("  %d landmarks were found; see 'orbmorph get %s --json'\n", landmarks, cli_string(supermesh, "url", "?"));
+    printf("  %d landmarks found; 'orbmorph get %s --json' prints them\n", landmarks,
+           cli_string(supermesh, "url", "?"));
   } else if (landmarks) {
     percent(worst_residual(supermesh), error);
-    printf("  %d landmarks, %s (off by at most %s)\n", landmarks,
+    printf("  %d landmarks, %s (distance at most %s)\n", landmarks,
            cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "exact" : "not exact", error);
   }
   printf("  time: %.3g s\n", cli_number(member(supermesh, "timings_ms"), "total") / 1000);
@@ -87,7 +107,8 @@ void cli_print_supermesh(const cJSON *supermesh) {
 static void markdown_shapes(FILE *out, const cJSON *supermesh) {
   const cJSON *shape;
   fputs(
-      "| shape | farthest from its input | root mean square | normals off, mean | normals off, 99 of 100 |\n"
+      "| shape | distance to input, maximum | distance, RMS | normal deviation, mean | normal deviation, 99th "
+      "percentile |\n"
       "|---|---|---|---|---|\n",
       out);
   cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
@@ -104,8 +125,12 @@ static void markdown_shapes(FILE *out, const cJSON *supermesh) {
 static void markdown_numbers(FILE *out, const char *title, const cJSON *object) {
   const cJSON *item;
   fprintf(out, "\n%s:", title);
-  cJSON_ArrayForEach(item, object) if (cJSON_IsNumber(item)) fprintf(
-      out, " %s %.*f%s", item->string, item->valuedouble < 100 ? 1 : 0, item->valuedouble, item->next ? "," : ".");
+  cJSON_ArrayForEach(item, object) {
+    if (cJSON_IsNumber(item)) {
+      fprintf(out, " %s %.*f%s", item->string, item->valuedouble < 100 ? 1 : 0, item->valuedouble,
+              item->next ? "," : ".");
+    }
+  }
   fputc('\n', out);
 }
 
@@ -113,20 +138,23 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   char vertices[32], triangles[32];
   const cJSON *shape, *landmark, *certificate = member(supermesh, "certificate");
   fputs("# Morph of ", out);
-  cJSON_ArrayForEach(shape, member(supermesh, "shapes"))
-      fprintf(out, "%s%s", cli_string(shape, "name", "?"), shape->next ? ", " : "\n\n");
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    fprintf(out, "%s%s", cli_string(shape, "name", "?"), shape->next ? ", " : "\n\n");
+  }
   cli_count(cli_number(supermesh, "vertices"), vertices);
   cli_count(cli_number(supermesh, "triangles"), triangles);
-  fprintf(out, "One surface of %s vertices and %s triangles, %s, genus %.0f. Resource `%s`, made by %s.\n\n", vertices,
+  fprintf(out, "One mesh of %s vertices and %s triangles, %s, genus %.0f. Resource `%s`, made by %s.\n\n", vertices,
           triangles, cJSON_IsTrue(member(certificate, "closed")) ? "closed" : "not closed",
           cli_number(certificate, "genus"), cli_string(supermesh, "url", "?"), cli_string(supermesh, "engine", "?"));
   markdown_shapes(out, supermesh);
   if (cJSON_GetArraySize(member(supermesh, "landmarks"))) {
-    const char *exact =
-        cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "They coincide exactly." : "They coincide only nearly.";
-    fprintf(out, "\n## Landmarks\n\n%s\n\n| landmark | off by, one column a shape |\n|---|---|\n",
-            were_found(supermesh) ? "None were given; these were found. Look at them before you rely on the result."
-                                  : exact);
+    const char *exact = cJSON_IsTrue(member(certificate, "landmarks_exact"))
+                            ? "All landmarks coincide exactly."
+                            : "The landmarks coincide only approximately.";
+    fprintf(out, "\n## Landmarks\n\n%s\n\n| landmark | distance on each shape |\n|---|---|\n",
+            were_found(supermesh)
+                ? "The request gave no landmarks; orbmorph found these. Check them before you rely on the result."
+                : exact);
     cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
       const cJSON *residual;
       fprintf(out, "| %s |", cli_string(landmark, "name", ""));

@@ -1,11 +1,13 @@
-/* Small helpers: memory, text, numbers, JSON members. */
+#include "text.h"
+
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "program.h"
 
 void *cli_alloc(size_t size) {
   void *block = calloc(1, size ? size : 1);
@@ -67,8 +69,9 @@ char *cli_read_file(const char *path, size_t *size) {
     }
   }
   int failed = ferror(file);
-  if (failed)
+  if (failed) {
     fprintf(stderr, "orbmorph: %s: %s\n", path, strerror(errno));
+  }
   fclose(file);
   if (failed) {
     free(bytes);
@@ -89,29 +92,6 @@ int cli_is_id(const char *text) {
   return strlen(text) == 64 && strspn(text, "0123456789abcdef") == 64;
 }
 
-void cli_error(const cli *c, const char *format, ...) {
-  va_list list;
-  if (c->bar_drawn)
-    fputs("\r\033[K", stderr);
-  fputs("orbmorph: ", stderr);
-  va_start(list, format);
-  vfprintf(stderr, format, list);
-  va_end(list);
-  fputc('\n', stderr);
-}
-
-void cli_note(const cli *c, const char *format, ...) {
-  if (c->quiet)
-    return;
-  va_list list;
-  if (c->bar_drawn)
-    fputs("\r\033[K", stderr);
-  va_start(list, format);
-  vfprintf(stderr, format, list);
-  va_end(list);
-  fputc('\n', stderr);
-}
-
 const char *cli_string(const cJSON *object, const char *name, const char *otherwise) {
   const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(object, name));
   return text ? text : otherwise;
@@ -129,11 +109,13 @@ void cli_count(double value, char out[32]) {
     return;
   }
   int length = snprintf(digits, sizeof digits, "%.0f", fabs(value)), fill = 0;
-  if (value < 0)
+  if (value < 0) {
     out[fill++] = '-';
+  }
   for (int i = 0; i < length; i++) {
-    if (i && (length - i) % 3 == 0)
+    if (i && (length - i) % 3 == 0) {
       out[fill++] = ',';
+    }
     out[fill++] = digits[i];
   }
   out[fill] = 0;

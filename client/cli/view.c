@@ -1,29 +1,33 @@
-/* The sheet and the animation: which poses are drawn where. */
 #include "view.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
+
+#include "view_canvas.h"
+#include "view_mesh.h"
+#include "view_movie.h"
+#include "view_png.h"
+#include "view_pose.h"
 
 enum { MAX_SIDE = 16384, FRAME_MILLISECONDS = 50 };
 #define MAX_MOVIE_BYTES ((size_t)1 << 30)
 
-void orb_view_defaults(orb_view_options *options) {
-  *options = (orb_view_options){.poses = 5, .size = 320, .up = 'y', .yaw = 30, .pitch = 15};
+void view_defaults(view_options *options) {
+  *options = (view_options){.poses = 5, .size = 320, .up = 'y', .yaw = 30, .pitch = 15};
 }
 
 static int no_memory(char *error, size_t error_size) {
-  snprintf(error, error_size, "there is not enough memory");
+  snprintf(error, error_size, "not enough memory");
   return -1;
 }
 
-static int draw_sheet(const view_mesh *mesh, const char *png, const orb_view_options *options, view_vertex *vertices,
+static int draw_sheet(const view_mesh *mesh, const char *png, const view_options *options, view_vertex *vertices,
                       char *error, size_t error_size) {
   view_canvas canvas;
   int shapes = view_shape_count(mesh), rows = shapes > 1 ? shapes - 1 : 1, side = options->size * VIEW_SUPERSAMPLE;
   if (options->poses * side > MAX_SIDE || rows * side > MAX_SIDE) {
-    snprintf(error, error_size, "the sheet would be too large: give fewer poses, or a smaller size");
+    snprintf(error, error_size, "the sheet would be too large; use fewer poses or a smaller size");
     return -1;
   }
   if (view_canvas_make(&canvas, options->poses * side, rows * side) != 0) {
@@ -44,9 +48,9 @@ static int draw_sheet(const view_mesh *mesh, const char *png, const orb_view_opt
   return rc;
 }
 
-/* What the animation shows at a time from 0 to 1: there and back; or round, where three or more shapes have no
- * in-betweens. It starts and ends each leg slowly. */
-static void pose_at(const view_mesh *mesh, double time, const orb_view_options *options, view_vertex *out) {
+/* The pose at a time from 0 to 1. A leg is one transition; it starts and ends slowly. The animation goes to the last
+ * shape and back, or around from the last to the first if three or more shapes have no in-betweens. */
+static void pose_at(const view_mesh *mesh, double time, const view_options *options, view_vertex *out) {
   int shapes = view_shape_count(mesh), round = shapes > 2 && mesh->between == 0;
   int legs = shapes < 2 ? 1 : round ? shapes : 2 * (shapes - 1), leg = (int)floor(time * legs);
   double t = time * legs - leg;
@@ -62,14 +66,14 @@ static void pose_at(const view_mesh *mesh, double time, const orb_view_options *
   }
 }
 
-static int draw_movie(const view_mesh *mesh, const char *png, const orb_view_options *options, view_vertex *vertices,
+static int draw_movie(const view_mesh *mesh, const char *png, const view_options *options, view_vertex *vertices,
                       char *error, size_t error_size) {
   view_canvas canvas;
   view_frame frame;
   view_movie movie = {.width = options->size, .height = options->size, .count = options->frames};
   size_t bytes = 3 * (size_t)options->size * (size_t)options->size;
   if (bytes * (size_t)options->frames > MAX_MOVIE_BYTES) {
-    snprintf(error, error_size, "the animation would be too large: give fewer frames, or a smaller size");
+    snprintf(error, error_size, "the animation would be too large; use fewer frames or a smaller size");
     return -1;
   }
   movie.milliseconds = FRAME_MILLISECONDS;
@@ -97,10 +101,10 @@ static int draw_movie(const view_mesh *mesh, const char *png, const orb_view_opt
   return rc;
 }
 
-int orbmorph_view(const char *glb, const char *png, const orb_view_options *options, char *error, size_t error_size) {
+int view_file(const char *glb, const char *png, const view_options *options, char *error, size_t error_size) {
   view_mesh mesh;
   if (options->poses < 2 || options->poses > 100 || options->size < 16 || options->size > 4096 || options->frames < 0) {
-    snprintf(error, error_size, "poses must be 2 to 100 and the size 16 to 4096");
+    snprintf(error, error_size, "the number of poses must be 2 to 100 and the size 16 to 4096");
     return -1;
   }
   if (view_mesh_read(glb, &mesh, error, error_size) != 0) {

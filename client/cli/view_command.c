@@ -1,15 +1,18 @@
-/* view: the command; the drawing is in view.c. */
+/* view: its options. view.c draws. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
+#include "commands.h"
+#include "terminal.h"
+#include "text.h"
 #include "view.h"
 
 static int whole(const cli *c, cli_option_id id, long least, long most, int *out) {
   const char *text = c->args.value[id];
   long value;
-  if (!text)
+  if (!text) {
     return 1;
+  }
   if (!cli_whole_number(text, least, most, &value)) {
     cli_error(c, "--%s takes a whole number from %ld to %ld, not '%s'", cli_options[id].name, least, most, text);
     return 0;
@@ -20,8 +23,9 @@ static int whole(const cli *c, cli_option_id id, long least, long most, int *out
 
 static int angle(const cli *c, cli_option_id id, double *out) {
   const char *text = c->args.value[id];
-  if (!text || cli_decimal(text, out))
+  if (!text || cli_decimal(text, out)) {
     return 1;
+  }
   cli_error(c, "--%s takes degrees, not '%s'", cli_options[id].name, text);
   return 0;
 }
@@ -29,22 +33,23 @@ static int angle(const cli *c, cli_option_id id, double *out) {
 int cli_run_view(cli *c) {
   const char *glb = c->args.operands[0], *output = c->args.value[OPT_OUTPUT], *up = c->args.value[OPT_UP];
   char error[512] = "";
-  orb_view_options options;
-  orb_view_defaults(&options);
+  view_options options;
+  view_defaults(&options);
   if (up && strcmp(up, "y") != 0 && strcmp(up, "z") != 0) {
     cli_error(c, "--up is y or z, not '%s'", up);
     return CLI_USAGE;
   }
   if (!whole(c, OPT_POSES, 2, 100, &options.poses) || !whole(c, OPT_SIZE, 16, 4096, &options.size) ||
       !whole(c, OPT_FRAMES, 2, 10000, &options.frames) || !angle(c, OPT_YAW, &options.yaw) ||
-      !angle(c, OPT_PITCH, &options.pitch))
+      !angle(c, OPT_PITCH, &options.pitch)) {
     return CLI_USAGE;
+  }
   options.up = up ? up[0] : options.up;
   options.wire = c->args.value[OPT_WIRE] != NULL;
   options.inside = c->args.value[OPT_INSIDE] != NULL;
   char *base = cli_base_name(glb), *png = output ? cli_text("%s", output) : cli_text("%s.png", base);
   int rc = CLI_DONE;
-  if (orbmorph_view(glb, png, &options, error, sizeof error) == 0) {
+  if (view_file(glb, png, &options, error, sizeof error) == 0) {
     printf("%s\n", png);
   } else {
     cli_error(c, "%s", error);

@@ -1,4 +1,3 @@
-/* Binary glTF: chunks, entries, accessors. */
 #include "view_glb.h"
 
 #include <errno.h>
@@ -9,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-int glb_refuse(glb *r, const char *format, ...) {
+int glb_refuse(glb_file *r, const char *format, ...) {
   va_list args;
   va_start(args, format);
   vsnprintf(r->error, r->error_size, format, args);
@@ -21,7 +20,7 @@ static uint32_t word(const unsigned char *p) {
   return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
-int glb_load(glb *r, const char *path) {
+int glb_load(glb_file *r, const char *path) {
   FILE *file = fopen(path, "rb");
   if (!file) {
     return glb_refuse(r, "%s: %s", path, strerror(errno));
@@ -32,25 +31,25 @@ int glb_load(glb *r, const char *path) {
   r->size = r->bytes ? fread(r->bytes, 1, (size_t)size, file) : 0;
   fclose(file);
   if (!r->bytes || r->size != (size_t)size) {
-    return glb_refuse(r, "%s cannot be read, or is empty", path);
+    return glb_refuse(r, "cannot read %s, or it is empty", path);
   }
   if (r->size < 20 || memcmp(r->bytes, "glTF", 4) != 0 || memcmp(r->bytes + 16, "JSON", 4) != 0) {
-    return glb_refuse(r, "%s is not a GLB file (binary glTF): view draws what 'orbmorph morph' has made", path);
+    return glb_refuse(r, "%s is not a GLB file (binary glTF); view draws files that 'orbmorph morph' made", path);
   }
   size_t json_size = word(r->bytes + 12);
   if (r->size < 28 || json_size == 0 || json_size > r->size - 28) {
-    return glb_refuse(r, "%s is cut off or damaged", path);
+    return glb_refuse(r, "%s is truncated or damaged", path);
   }
   r->json = cJSON_ParseWithLength((const char *)r->bytes + 20, json_size);
   r->binary = r->bytes + 28 + json_size;
   r->binary_size = word(r->bytes + 20 + json_size);
   if (!r->json || r->binary_size > r->size - 28 - json_size) {
-    return glb_refuse(r, "%s is cut off or damaged", path);
+    return glb_refuse(r, "%s is truncated or damaged", path);
   }
   return 0;
 }
 
-void glb_free(glb *r) {
+void glb_free(glb_file *r) {
   cJSON_Delete(r->json);
   free(r->bytes);
 }
@@ -66,13 +65,13 @@ int glb_code(const cJSON *object, const char *name, int otherwise) {
   return value <= INT_MAX ? (int)value : otherwise;
 }
 
-const cJSON *glb_entry(const glb *r, const char *list, double index) {
+const cJSON *glb_entry(const glb_file *r, const char *list, double index) {
   return index >= 0 && index <= INT_MAX
              ? cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(r->json, list), (int)index)
              : NULL;
 }
 
-const unsigned char *glb_view(const glb *r, double index, size_t *size) {
+const unsigned char *glb_view(const glb_file *r, double index, size_t *size) {
   const cJSON *view = glb_entry(r, "bufferViews", index);
   double at = glb_number(view, "byteOffset", 0), length = glb_number(view, "byteLength", 0);
   if (!view || length < 1 || at + length > (double)r->binary_size) {
@@ -82,7 +81,7 @@ const unsigned char *glb_view(const glb *r, double index, size_t *size) {
   return r->binary + (size_t)at;
 }
 
-int glb_open(const glb *r, double index, glb_span *out) {
+int glb_open(const glb_file *r, double index, glb_span *out) {
   const cJSON *accessor = glb_entry(r, "accessors", index);
   const cJSON *view = glb_entry(r, "bufferViews", glb_number(accessor, "bufferView", -1));
   const cJSON *type = cJSON_GetObjectItemCaseSensitive(accessor, "type");
@@ -103,7 +102,7 @@ int glb_open(const glb *r, double index, glb_span *out) {
   }
   size_t element = size * (size_t)out->components;
   out->stride = (size_t)glb_number(view, "byteStride", (double)element);
-  if (out->stride < element) { /* elements would lie in each other, more of them than the file has bytes */
+  if (out->stride < element) { /* elements would overlap, and there could be more of them than the file has bytes */
     return -1;
   }
   double at = glb_number(view, "byteOffset", 0) + glb_number(accessor, "byteOffset", 0);
@@ -119,7 +118,7 @@ uint32_t glb_index(const glb_span *s, uint32_t element) {
   return s->kind == GLB_UBYTE ? p[0] : s->kind == GLB_USHORT ? (uint32_t)(p[0] | p[1] << 8) : word(p);
 }
 
-/* Integers stand for fractions: that is what colours and texture coordinates are. */
+/* Integers are normalized: colours and texture coordinates are fractions. */
 static float component(const glb_span *s, uint32_t element, int c) {
   const unsigned char *p = s->bytes + element * s->stride;
   float value;
@@ -136,14 +135,14 @@ static float component(const glb_span *s, uint32_t element, int c) {
   }
 }
 
-int glb_copy(glb *r, const cJSON *attributes, const char *name, uint32_t count, int components, float *out) {
+int glb_copy(glb_file *r, const cJSON *attributes, const char *name, uint32_t count, int components, float *out) {
   double index = glb_number(attributes, name, -1);
   glb_span s;
   if (index < 0) {
     return 0;
   }
   if (glb_open(r, index, &s) != 0 || s.count != count || s.components < components) {
-    return glb_refuse(r, "the accessor of %s is not what it should be", name);
+    return glb_refuse(r, "the accessor of %s has the wrong type or count", name);
   }
   for (uint32_t i = 0; i < count; i++) {
     for (int c = 0; c < components; c++) {

@@ -1,21 +1,22 @@
-/* The mesh of a GLB with its morph targets, as the view draws it: all primitives in one. */
+#include "view_mesh.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "view_glb.h"
 
-static int count_all(glb *r, const cJSON *primitives, view_mesh *out) {
+static int count_all(glb_file *r, const cJSON *primitives, view_mesh *out) {
   const cJSON *primitive;
   uint64_t vertices = 0, indices = 0;
   cJSON_ArrayForEach(primitive, primitives) {
     glb_span s;
     const cJSON *attributes = cJSON_GetObjectItemCaseSensitive(primitive, "attributes");
     if (glb_number(primitive, "mode", 4) != 4 || glb_open(r, glb_number(attributes, "POSITION", -1), &s) != 0) {
-      return glb_refuse(r, "only triangles with positions can be drawn");
+      return glb_refuse(r, "cannot draw primitives other than triangles with positions");
     }
     vertices += s.count;
     if (glb_open(r, glb_number(primitive, "indices", -1), &s) != 0 || s.kind == GLB_FLOAT || s.count % 3 != 0) {
-      return glb_refuse(r, "only indexed triangles can be drawn");
+      return glb_refuse(r, "cannot draw triangles without indices");
     }
     indices += s.count;
     out->target_count = (uint32_t)cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(primitive, "targets"));
@@ -28,16 +29,16 @@ static int count_all(glb *r, const cJSON *primitives, view_mesh *out) {
   return 0;
 }
 
-/* White under a texture or a colour of the material; a tone of clay under greys, which say little of colours. */
+/* White under a texture or a coloured material; a tone of clay under a grey material. */
 static void base_colors(const view_mesh *mesh, int32_t material, uint32_t first, uint32_t count) {
-  const view_material *paint = &mesh->materials[material];
+  const view_material *paint = &mesh->materials.list[material];
   int gray = paint->texture < 0 && paint->factor[0] == paint->factor[1] && paint->factor[1] == paint->factor[2];
   for (size_t i = 0; i < 3 * (size_t)count; i++) {
     mesh->colors[3 * (size_t)first + i] = gray ? 0.9f - 0.05f * (float)(i % 3) : 1;
   }
 }
 
-static int read_indices(glb *r, const cJSON *primitive, view_mesh *out, uint32_t vertex, uint32_t count,
+static int read_indices(glb_file *r, const cJSON *primitive, view_mesh *out, uint32_t vertex, uint32_t count,
                         uint32_t *index) {
   glb_span s;
   if (glb_open(r, glb_number(primitive, "indices", -1), &s) != 0) {
@@ -54,7 +55,7 @@ static int read_indices(glb *r, const cJSON *primitive, view_mesh *out, uint32_t
   return 0;
 }
 
-static int read_primitive(glb *r, const cJSON *primitive, view_mesh *out, uint32_t *vertex, uint32_t *index) {
+static int read_primitive(glb_file *r, const cJSON *primitive, view_mesh *out, uint32_t *vertex, uint32_t *index) {
   const cJSON *attributes = cJSON_GetObjectItemCaseSensitive(primitive, "attributes");
   glb_span s;
   if (glb_open(r, glb_number(attributes, "POSITION", -1), &s) != 0) {
@@ -63,7 +64,7 @@ static int read_primitive(glb *r, const cJSON *primitive, view_mesh *out, uint32
   uint32_t count = s.count, first = *index;
   size_t at = 3 * (size_t)*vertex;
   double named = glb_number(primitive, "material", -1);
-  int32_t material = named >= 0 && named < out->material_count - 1 ? (int32_t)named : out->material_count - 1;
+  int32_t material = named >= 0 && named < out->materials.count - 1 ? (int32_t)named : out->materials.count - 1;
   base_colors(out, material, *vertex, count);
   if (glb_copy(r, attributes, "POSITION", count, 3, out->positions + at) != 0 ||
       glb_copy(r, attributes, "NORMAL", count, 3, out->normals + at) != 0 ||
@@ -106,14 +107,14 @@ static int allocate(view_mesh *out) {
              : -1;
 }
 
-static int read_mesh(glb *r, view_mesh *out) {
+static int read_mesh(glb_file *r, view_mesh *out) {
   const cJSON *mesh = glb_entry(r, "meshes", 0);
   const cJSON *primitives = cJSON_GetObjectItemCaseSensitive(mesh, "primitives"), *primitive;
-  if (count_all(r, primitives, out) != 0 || view_materials_read(r, out) != 0) {
+  if (count_all(r, primitives, out) != 0 || view_materials_read(r, &out->materials) != 0) {
     return -1;
   }
   if (allocate(out) != 0) {
-    return glb_refuse(r, "there is not enough memory");
+    return glb_refuse(r, "not enough memory");
   }
   double between = glb_number(cJSON_GetObjectItemCaseSensitive(mesh, "extras"), "inBetweens", 0);
   out->between = between < out->target_count ? (uint32_t)between : 0;
@@ -127,7 +128,7 @@ static int read_mesh(glb *r, view_mesh *out) {
 }
 
 int view_mesh_read(const char *path, view_mesh *out, char *error, size_t error_size) {
-  glb r = {.error = error, .error_size = error_size};
+  glb_file r = {.error = error, .error_size = error_size};
   memset(out, 0, sizeof *out);
   int rc = glb_load(&r, path) == 0 ? read_mesh(&r, out) : -1;
   glb_free(&r);
@@ -138,11 +139,7 @@ int view_mesh_read(const char *path, view_mesh *out, char *error, size_t error_s
 }
 
 void view_mesh_free(view_mesh *mesh) {
-  for (int32_t i = 0; i < mesh->texture_count; i++) {
-    view_texture_free(&mesh->textures[i]);
-  }
-  free(mesh->textures);
-  free(mesh->materials);
+  view_materials_free(&mesh->materials);
   free(mesh->painted);
   free(mesh->positions);
   free(mesh->normals);
@@ -152,4 +149,8 @@ void view_mesh_free(view_mesh *mesh) {
   free(mesh->delta_normals);
   free(mesh->indices);
   memset(mesh, 0, sizeof *mesh);
+}
+
+int view_shape_count(const view_mesh *mesh) {
+  return (int)(mesh->target_count / (mesh->between + 1)) + 1;
 }

@@ -1,12 +1,15 @@
-/* Animated PNG: the chunks of a PNG, written by hand since libpng knows no animation. Each frame after the first holds
- * only the rectangle that differs from the frame before. https://www.w3.org/TR/png-3/ */
+/* Writes the chunks of an animated PNG directly, since libpng does not support animation. Each frame after the first
+ * holds only the rectangle that differs from the previous frame. https://www.w3.org/TR/png-3/ */
+#include "view_movie.h"
+
 #include <errno.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <zlib.h>
 
-#include "view.h"
+#include "view_palette.h"
 
 typedef struct writer {
   FILE *file;
@@ -25,7 +28,7 @@ static void put16(unsigned char *p, int value) {
   p[1] = (unsigned char)value;
 }
 
-/* A chunk; fdAT begins with its number in the sequence. */
+/* fdAT chunks begin with a sequence number. */
 static void chunk(writer *w, const char *name, const unsigned char *bytes, size_t size) {
   unsigned char word[4], sequence[4];
   int numbered = strcmp(name, "fdAT") == 0;
@@ -46,7 +49,7 @@ typedef struct rectangle {
   int left, top, width, height;
 } rectangle;
 
-/* What differs between two frames; one pixel where nothing does. */
+/* The bounding rectangle of the pixels that differ; one pixel if the frames are equal. */
 static rectangle difference(const unsigned char *a, const unsigned char *b, int width, int height) {
   int left = width, right = 0, top = height, bottom = 0;
   for (int y = 0; y < height; y++) {
@@ -63,7 +66,7 @@ static rectangle difference(const unsigned char *a, const unsigned char *b, int 
 }
 
 static void frame_control(writer *w, rectangle r, int milliseconds) {
-  unsigned char bytes[26] = {0}; /* the last two: nothing is disposed of, nothing is blended */
+  unsigned char bytes[26] = {0}; /* the last two: no disposal, no blending */
   put32(bytes, w->sequence++);
   put32(bytes + 4, (uint32_t)r.width);
   put32(bytes + 8, (uint32_t)r.height);
@@ -74,7 +77,7 @@ static void frame_control(writer *w, rectangle r, int milliseconds) {
   chunk(w, "fcTL", bytes, sizeof bytes);
 }
 
-/* Rows without a filter, which suits a palette, deflated. */
+/* Deflates rows without a filter, which suits a palette. */
 static int frame_data(writer *w, const char *name, const unsigned char *frame, int width, rectangle r) {
   size_t stride = (size_t)r.width + 1, raw = stride * (size_t)r.height;
   uLongf size = compressBound((uLong)raw);
@@ -98,12 +101,12 @@ static int frame_data(writer *w, const char *name, const unsigned char *frame, i
 
 static void header(writer *w, const view_movie *movie, const unsigned char palette[256][3], int colors) {
   static const unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-  unsigned char head[13] = {0}, control[8] = {0}; /* plays for ever */
+  unsigned char head[13] = {0}, control[8] = {0}; /* 0 plays: loop */
   w->failed |= fwrite(signature, 1, sizeof signature, w->file) != sizeof signature;
   put32(head, (uint32_t)movie->width);
   put32(head + 4, (uint32_t)movie->height);
   head[8] = 8;
-  head[9] = 3; /* a palette */
+  head[9] = 3; /* colour type: palette */
   chunk(w, "IHDR", head, sizeof head);
   put32(control, (uint32_t)movie->count);
   chunk(w, "acTL", control, sizeof control);
@@ -131,16 +134,16 @@ int view_movie_write(const char *path, const view_movie *movie, char *error, siz
   int colors = indices ? view_palette(movie->pixels, pixels, palette, indices) : 0;
   writer w = {.file = colors ? fopen(path, "wb") : NULL};
   if (!colors) {
-    snprintf(error, error_size, "there is not enough memory");
+    snprintf(error, error_size, "not enough memory");
   } else if (!w.file) {
-    snprintf(error, error_size, "%s cannot be written: %s", path, strerror(errno));
+    snprintf(error, error_size, "cannot write %s: %s", path, strerror(errno));
   }
   int rc = -1;
   if (w.file) {
     header(&w, movie, palette, colors);
     rc = write_frames(&w, movie, indices);
     if (fclose(w.file) != 0 || rc != 0 || w.failed) {
-      snprintf(error, error_size, "%s could not be written in full", path);
+      snprintf(error, error_size, "cannot write all of %s", path);
       rc = -1;
     }
   }

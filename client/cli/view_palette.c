@@ -1,21 +1,20 @@
-/* A palette by median cut (P. Heckbert, Color image quantization for frame buffer display, SIGGRAPH 1982): the box of
- * colours with the largest spread is cut at its weighted median until there are 256. Colours are counted to 7 bits. */
+/* Median cut (P. Heckbert, Color image quantization for frame buffer display, SIGGRAPH 1982): cuts the box of colours
+ * with the largest weight at its median until there are 256. Colours are counted at 7 bits per channel. */
+#include "view_palette.h"
+
 #include <stdint.h>
 #include <stdlib.h>
-#include <string.h>
-
-#include "view.h"
 
 enum { BITS = 7, SIDE = 1 << BITS, BINS = SIDE * SIDE * SIDE };
 
 typedef struct color {
-  unsigned char at[3]; /* the upper bits */
+  unsigned char at[3]; /* the upper 7 bits of each channel */
   uint32_t count;      /* of pixels */
 } color;
 
 typedef struct box {
   int first, end, axis;
-  uint64_t weight; /* pixels × spread along the axis; 0: cannot be cut */
+  uint64_t weight; /* pixels × squared spread along the axis; 0: cannot be cut */
 } box;
 
 static int bin_of(const unsigned char *p) {
@@ -50,7 +49,7 @@ static int by_blue(const void *a, const void *b) {
   return ((const color *)a)->at[2] - ((const color *)b)->at[2];
 }
 
-/* Cuts b behind half of its pixels, both parts with one colour or more; returns the upper part. */
+/* Cuts b after half of its pixels; both parts keep at least one colour. Returns the upper part. */
 static box cut(color *colors, box *b) {
   static int (*const orders[3])(const void *, const void *) = {by_red, by_green, by_blue};
   uint64_t all = 0, below = 0;
@@ -87,7 +86,7 @@ static int make_boxes(color *colors, int count, box boxes[256]) {
   return made;
 }
 
-/* The colours that occur, each with its pixels, to free; NULL without memory. */
+/* The colours that occur, each with its number of pixels. The caller frees them. NULL: no memory. */
 static color *count_colors(const unsigned char *rgb, size_t pixels, int *count) {
   uint32_t *bins = calloc(BINS, sizeof *bins);
   *count = 0;
@@ -111,7 +110,7 @@ static color *count_colors(const unsigned char *rgb, size_t pixels, int *count) 
   return out;
 }
 
-/* The mean colour of a box; 0 stays 0 and the highest 255. */
+/* The mean colour of a box, scaled so that the lowest value is 0 and the highest 255. */
 static void mean_color(const color *colors, const box *b, unsigned char out[3]) {
   for (int c = 0; c < 3; c++) {
     uint64_t count = 0, sum = 0;

@@ -1,10 +1,9 @@
-/* Poses: blended between shapes, turned into the viewer's axes, framed, drawn. */
+#include "view_pose.h"
+
 #include <math.h>
 
-#include "view.h"
-
-/* Rows: right, up, towards the viewer. */
-static void view_axes(const orb_view_options *options, double out[3][3]) {
+/* The rows of out: right, up, towards the viewer. */
+static void view_axes(const view_options *options, double out[3][3]) {
   double yaw = options->yaw * 3.14159265358979 / 180, pitch = options->pitch * 3.14159265358979 / 180;
   double right[3] = {cos(yaw), 0, -sin(yaw)};
   double to[3] = {sin(yaw) * cos(pitch), sin(pitch), cos(yaw) * cos(pitch)};
@@ -17,12 +16,8 @@ static void view_axes(const orb_view_options *options, double out[3][3]) {
   }
 }
 
-int view_shape_count(const view_mesh *mesh) {
-  return (int)(mesh->target_count / (mesh->between + 1)) + 1;
-}
-
-/* The two targets (−1: the base) around t, and the weight of the second. In-betweens stand after the shapes, those of
- * the first transition first; there are none for other pairs than neighbours. */
+/* The two targets around t (−1: the base); returns the weight of the second. The targets of in-betweens follow those of
+ * the shapes, in the order of the transitions; only consecutive shapes have in-betweens. */
 static double blend_of(const view_mesh *mesh, int from, int to, double t, int *first, int *second) {
   int steps = to == from + 1 ? (int)mesh->between : 0, leg = (int)floor(t * (steps + 1));
   int between = view_shape_count(mesh) - 1 + from * steps;
@@ -40,7 +35,7 @@ static float posed(const float *base, const float *deltas, const view_mesh *mesh
   return base[i] + (1 - w) * a + w * b;
 }
 
-void view_pose(const view_mesh *mesh, int from, int to, double t, const orb_view_options *options, view_vertex *out) {
+void view_pose(const view_mesh *mesh, int from, int to, double t, const view_options *options, view_vertex *out) {
   int first, second;
   double axes[3][3];
   float w = (float)blend_of(mesh, from, to, t, &first, &second);
@@ -78,7 +73,7 @@ void view_frame_add(view_frame *frame, const view_vertex *vertices, uint32_t cou
   }
 }
 
-void view_draw(const view_mesh *mesh, const orb_view_options *options, const view_frame *frame, int left, int top,
+void view_draw(const view_mesh *mesh, const view_options *options, const view_frame *frame, int left, int top,
                view_vertex *vertices, view_canvas *canvas) {
   float side = (float)(options->size * VIEW_SUPERSAMPLE);
   float extent = fmaxf(frame->high[0] - frame->low[0], frame->high[1] - frame->low[1]);
@@ -92,8 +87,8 @@ void view_draw(const view_mesh *mesh, const orb_view_options *options, const vie
     const view_vertex *corners[3] = {&vertices[mesh->indices[i]], &vertices[mesh->indices[i + 1]],
                                      &vertices[mesh->indices[i + 2]]};
     view_paint paint = {
-        .material = mesh->materials[mesh->painted[i / 3]], .wire = options->wire, .inside = options->inside};
-    paint.texture = paint.material.texture >= 0 ? &mesh->textures[paint.material.texture] : NULL;
+        .material = mesh->materials.list[mesh->painted[i / 3]], .wire = options->wire, .inside = options->inside};
+    paint.texture = paint.material.texture >= 0 ? &mesh->materials.textures[paint.material.texture] : NULL;
     view_triangle(canvas, corners, &paint);
   }
 }

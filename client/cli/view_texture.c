@@ -1,4 +1,5 @@
-/* Textures: decoded to sRGB bytes, halved until one pixel is left, sampled in linear light. */
+#include "view_texture.h"
+
 /* jpeglib.h needs stdio.h before it. */
 #include <stdio.h>
 
@@ -8,8 +9,6 @@
 #include <setjmp.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "view.h"
 
 enum { MAX_TEXTURE_SIDE = 16384 };
 #define MAX_TEXTURE_PIXELS ((size_t)1 << 28)
@@ -36,23 +35,23 @@ static int decode_png(const unsigned char *bytes, size_t size, view_texture *out
   return fine ? 0 : -1;
 }
 
-typedef struct jpeg_fault {
+typedef struct jpeg_failure {
   struct jpeg_error_mgr manager;
   jmp_buf back;
-} jpeg_fault;
+} jpeg_failure;
 
 static void on_jpeg_error(j_common_ptr info) {
-  longjmp(((jpeg_fault *)info->err)->back, 1);
+  longjmp(((jpeg_failure *)info->err)->back, 1);
 }
 
 static void on_jpeg_message(j_common_ptr info) {
   (void)info;
 }
 
-/* Apart, for setjmp and locals do not mix well. */
-static int jpeg_rows(struct jpeg_decompress_struct *info, jpeg_fault *fault, const unsigned char *bytes, size_t size,
-                     view_texture *out) {
-  if (setjmp(fault->back)) {
+/* A function of its own: longjmp leaves modified locals of the function that called setjmp indeterminate. */
+static int jpeg_rows(struct jpeg_decompress_struct *info, jpeg_failure *failure, const unsigned char *bytes,
+                     size_t size, view_texture *out) {
+  if (setjmp(failure->back)) {
     return -1;
   }
   jpeg_mem_src(info, bytes, (unsigned long)size);
@@ -77,12 +76,12 @@ static int jpeg_rows(struct jpeg_decompress_struct *info, jpeg_fault *fault, con
 
 static int decode_jpeg(const unsigned char *bytes, size_t size, view_texture *out) {
   struct jpeg_decompress_struct info;
-  jpeg_fault fault;
-  info.err = jpeg_std_error(&fault.manager);
-  fault.manager.error_exit = on_jpeg_error;
-  fault.manager.output_message = on_jpeg_message;
+  jpeg_failure failure;
+  info.err = jpeg_std_error(&failure.manager);
+  failure.manager.error_exit = on_jpeg_error;
+  failure.manager.output_message = on_jpeg_message;
   jpeg_create_decompress(&info);
-  int rc = jpeg_rows(&info, &fault, bytes, size, out);
+  int rc = jpeg_rows(&info, &failure, bytes, size, out);
   jpeg_destroy_decompress(&info);
   return rc;
 }
@@ -92,12 +91,13 @@ static unsigned char encoded(float linear) {
   return (unsigned char)(v * 255 + 0.5f);
 }
 
-float view_linear(unsigned char srgb) {
+static float linear_of(unsigned char srgb) {
   float v = (float)srgb / 255;
   return v <= 0.04045f ? v / 12.92f : powf((v + 0.055f) / 1.055f, 2.4f);
 }
 
-/* The next level: four pixels into one, an odd last row or column twice. */
+/* Makes the next level: each pixel is the mean of four. The last row or column of an odd side is dropped; a side of one
+ * pixel stays. */
 static int halve(view_texture *t, int level, const float linear[256]) {
   int w = t->width[level], h = t->height[level], width = w > 1 ? w / 2 : 1, height = h > 1 ? h / 2 : 1;
   const unsigned char *from = t->pixels[level];
@@ -127,7 +127,7 @@ int view_texture_decode(const unsigned char *bytes, size_t size, view_texture *o
            : size > 3 && memcmp(bytes, "\xff\xd8", 2) == 0 ? decode_jpeg(bytes, size, out)
                                                            : -1;
   for (int i = 0; i < 256; i++) {
-    linear[i] = view_linear((unsigned char)i);
+    linear[i] = linear_of((unsigned char)i);
   }
   out->levels = 1;
   while (rc == 0 && out->levels < VIEW_LEVELS &&
@@ -148,7 +148,7 @@ void view_texture_free(view_texture *texture) {
   memset(texture, 0, sizeof *texture);
 }
 
-/* A pixel's column or row, within the image. */
+/* Maps a column or row into the image as the wrap mode says. */
 static int wrapped(int at, int size, int wrap) {
   if (wrap == VIEW_CLAMP) {
     return at < 0 ? 0 : at >= size ? size - 1 : at;
@@ -174,7 +174,7 @@ void view_texture_sample(const view_texture *t, float u, float v, float span, fl
     const unsigned char *p = t->pixels[level] + 3 * ((size_t)row * (size_t)t->width[level] + (size_t)column);
     float weight = (k % 2 ? fx : 1 - fx) * (k / 2 ? fy : 1 - fy);
     for (int c = 0; c < 3; c++) {
-      out[c] += weight * view_linear(p[c]);
+      out[c] += weight * linear_of(p[c]);
     }
   }
 }

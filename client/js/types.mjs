@@ -1,6 +1,6 @@
-// Writes src/api.d.ts from the daemon's OpenAPI document: one type a schema.
-//   node client/js/types.mjs            writes it
-//   node client/js/types.mjs --check    says whether it is as the document has it
+// Generates src/api.d.ts from the daemon's OpenAPI document: one type for each schema.
+//   node client/js/types.mjs            writes the file
+//   node client/js/types.mjs --check    fails if the file is not up to date
 import { readFileSync, writeFileSync } from 'node:fs';
 
 const here = (path) => new URL(path, import.meta.url);
@@ -18,7 +18,7 @@ function typeOf(schema, pad) {
   if (schema.$ref) return schema.$ref.split('/').at(-1);
   if ('const' in schema) return literal(schema.const);
   if (schema.enum) return either(schema.enum.map(literal));
-  // beside members, alternatives only say which of them must be there
+  // next to properties, alternatives only say which properties are required
   if ((schema.oneOf || schema.anyOf) && !schema.properties) return either((schema.oneOf ?? schema.anyOf).map((s) => typeOf(s, pad)));
   if (Array.isArray(schema.type)) return either(schema.type.map((type) => typeOf({ ...schema, type }, pad)));
   if (schema.type === 'array') return arrayOf(schema, pad);
@@ -42,7 +42,7 @@ function objectOf({ properties = {}, required = [], additionalProperties }, pad)
   return `{\n${lines.join('')}${pad}}`;
 }
 
-const text = `// Made from api/openapi.json by client/js/types.mjs; not to be changed by hand.\n\n/** What the daemon takes and answers, version ${info.version} of its interface. */\n\n${
+const text = `// Generated from api/openapi.json by client/js/types.mjs. Do not edit.\n\n/** Requests and responses of the daemon, interface version ${info.version}. */\n\n${
   Object.entries(components.schemas).map(([name, schema]) => `${comment(schema.description, '')}export type ${name} = ${typeOf(schema, '')};\n`).join('\n')}`;
 
 if (process.argv.includes('--check')) {
@@ -50,10 +50,10 @@ if (process.argv.includes('--check')) {
   try {
     now = readFileSync(target, 'utf8');
   } catch {
-    // not there
+    // the file does not exist yet
   }
   if (now !== text) {
-    console.error('client/js/src/api.d.ts is not as api/openapi.json has it: node client/js/types.mjs');
+    console.error('client/js/src/api.d.ts is not up to date with api/openapi.json: run node client/js/types.mjs');
     process.exit(1);
   }
 } else writeFileSync(target, text);

@@ -1,4 +1,4 @@
-# Completions of orbmorph for bash. Made by 'orbmorph completions bash'.
+# Completions of orbmorph for bash, printed by 'orbmorph completions bash'.
 _orbmorph() {
   local current="${COMP_WORDS[COMP_CWORD]}" previous="${COMP_WORDS[COMP_CWORD-1]}" words="" operands="" choices=""
   if [ "$COMP_CWORD" -eq 1 ]; then

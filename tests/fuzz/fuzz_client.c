@@ -1,12 +1,12 @@
-/* What the command line reads of its user: a line as `--set` has it, then a landmark file. What comes out is JSON. Run
- * with -close_fd_mask=2: each refusal says why on standard error. */
+/* User input of the command line: the first line is an argument of --set, the rest a landmark file. The resulting
+ * request must be JSON. Run with -close_fd_mask=2: each refused input prints an error. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "make.h"
+#include "input.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -1,4 +1,4 @@
-// The command line against a real daemon: what it prints, what it writes, how it ends.
+// The command line with a real daemon: its output, its files and its exit status.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { mkdir, readFile, writeFile, readdir, copyFile } from 'node:fs/promises';
@@ -12,13 +12,13 @@ import * as shapes from './support/shapes.mjs';
 const dog = path.join(samples, 'dog.obj'), giraffe = path.join(samples, 'giraffe.off');
 const landmarks = path.join(samples, 'dog-giraffe.json');
 const waits = async (d) => (await d.get('/readyz?verbose')).json.waiting_connections > 0;
-/** Keeps the only worker; its job. */
+/** Starts a job that keeps the only worker busy; returns the job. */
 async function occupy(d) {
   const { json: mesh } = await d.upload(shapes.binaryPly(shapes.ball(5, ([x, y, z]) => [x, y * (1.2 + 0.2 * Math.sin(9 * x)), z])));
   return (await d.post('/v1/embeddings', { mesh: mesh.id, ...endless })).json;
 }
 
-test('wrong usage ends with 2 and says what is wrong', async () => {
+test('wrong usage exits with 2 and explains the error', async () => {
   for (const args of [[], ['fly'], ['morph', 'one'], ['morph', '--bend', 'a', 'b'], ['upload'], ['job'], ['morph', 'a', 'b', '--landmarks'],
     ['morph', 'a', 'b', '--json=yes'], ['ls', 'shoes'], ['get', 'x', '--part', 'wing'], ['completions', 'tcsh'],
     ['morph', dog, giraffe, '--tolerance', 'much'], ['morph', dog, giraffe, '--max-triangles', '1e4'], ['morph', dog, giraffe, '--set', 'x'],
@@ -38,7 +38,7 @@ test('wrong usage ends with 2 and says what is wrong', async () => {
   assert.match((await run(['--version'])).out, /^orbmorph \d+\.\d+\.\d+\n$/);
 });
 
-test('a daemon that is not there ends with 3', async () => {
+test('an unreachable daemon exits with 3', async () => {
   for (const args of [['ls'], ['upload', dog], ['morph', dog, giraffe]]) {
     const { code, err } = await run(['--server', 'http://127.0.0.1:9', ...args]);
     assert.equal(code, 3, err);
@@ -47,7 +47,7 @@ test('a daemon that is not there ends with 3', async () => {
   assert.equal((await run(['ls'], { env: { ORBMORPH_SERVER: 'gopher://127.0.0.1' } })).code, 3);
 });
 
-test('morph does the whole job', async (t) => {
+test('morph uploads, merges and downloads', async (t) => {
   const d = await daemon(t);
   const env = { ORBMORPH_SERVER: d.url };
   const at = await folder(t);
@@ -55,7 +55,7 @@ test('morph does the whole job', async (t) => {
   const done = await run(['morph', dog, giraffe, '--landmarks', landmarks, '-o', out, '--report', md], { env });
   assert.equal(done.code, 0, done.err);
   assert.match(done.out, /landmarks, exact/);
-  assert.equal(done.err.includes('\r'), false, 'no progress bar where there is no terminal');
+  assert.equal(done.err.includes('\r'), false, 'no progress bar without a terminal');
   const morph = morphOf(await readFile(out));
   assert.deepEqual(morph.names, ['giraffe']);
   const report = await readFile(md, 'utf8');
@@ -68,7 +68,7 @@ test('morph does the whole job', async (t) => {
   assert.equal(again.err, '', 'quiet is quiet');
   assert.deepEqual(JSON.parse(again.out), JSON.parse(await readFile(json, 'utf8')));
   assert.equal(JSON.parse(again.out).certificate.closed, true);
-  assert.deepEqual((await readdir(at)).sort(), ['a morph.glb', 'report.json', 'report.md'], 'no temporary files stay');
+  assert.deepEqual((await readdir(at)).sort(), ['a morph.glb', 'report.json', 'report.md'], 'no temporary files remain');
 
   const piped = await run(['morph', dog, giraffe, '-l', landmarks, '-q', '-o', '-'], { env });
   assert.ok(piped.bytes.equals(await readFile(out)), 'the asset on standard output');
@@ -87,7 +87,7 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
   const uploaded = await run(['upload', 'in/*', '--json'], { env, cwd: at });
   assert.equal(uploaded.code, 0, uploaded.err);
   const meshes = uploaded.out.trim().split('\n').map((line) => JSON.parse(line));
-  assert.deepEqual(meshes.map((m) => m.name), ['dog', 'giraffe'], 'a pattern in quotes is expanded');
+  assert.deepEqual(meshes.map((m) => m.name), ['dog', 'giraffe'], 'the program expands a quoted pattern');
   const list = await run(['ls'], { env });
   for (const m of meshes) assert.ok(list.out.includes(m.id));
   const embedded = await run(['embed', meshes[0].id, '-o', path.join(at, 'sphere.ply')], { env });
@@ -121,7 +121,7 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
   assert.equal(JSON.parse((await run(['get', id, '--json'], { env })).err).type, '/problems/not-found');
 });
 
-test('landmark files: an array, an object with one, and plain numbers of vertices', async (t) => {
+test('landmark files: an array, an object with one, and plain vertex numbers', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] }), before = await occupy(d);
   const env = { ORBMORPH_SERVER: d.url }, at = await folder(t), file = path.join(at, 'l.json');
   const places = JSON.parse(await readFile(landmarks, 'utf8')).landmarks.slice(0, 4).map((l) => ({ at: l.at }));
@@ -132,7 +132,7 @@ test('landmark files: an array, an object with one, and plain numbers of vertice
     assert.equal(sent.code, 0, sent.err);
     jobs.add(JSON.parse(sent.out).id);
   }
-  assert.equal(jobs.size, 1, 'all three say the same');
+  assert.equal(jobs.size, 1, 'all three make the same request');
   for (const job of [...jobs, before.id]) assert.equal((await run(['job', '--cancel', job], { env })).code, 0);
   for (const wrong of ['{"landmarks": 3}', '7', '[{"at": ', '']) {
     await writeFile(file, wrong);
@@ -142,7 +142,7 @@ test('landmark files: an array, an object with one, and plain numbers of vertice
   }
 });
 
-test('what the daemon refuses ends with 1 and the problem on standard error', async (t) => {
+test('a refused request exits with 1 and prints the problem on standard error', async (t) => {
   const d = await daemon(t);
   const env = { ORBMORPH_SERVER: d.url };
   const at = await folder(t);
@@ -171,17 +171,17 @@ test('what the daemon refuses ends with 1 and the problem on standard error', as
   const healthy = await run(['doctor', dog], { env });
   assert.equal(healthy.code, 0, healthy.err);
   assert.match(healthy.out, /healthy/);
-  assert.equal((await run(['ls'], { env })).out.includes('dog'), true, 'what was there before stays');
+  assert.equal((await run(['ls'], { env })).out.includes('dog'), true, 'doctor keeps meshes that were there before');
   const sick = await run(['doctor', open, two, ring, turned], { env });
   assert.equal(sick.code, 1);
   assert.match(sick.out, /--repair fill_holes/);
   assert.match(sick.out, /--repair largest_component/);
   assert.match(sick.out, /handles/);
   assert.match(sick.out, /turn-inside-out/);
-  assert.equal((await run(['ls'], { env })).out.includes('turned'), false, 'the doctor leaves nothing behind');
+  assert.equal((await run(['ls'], { env })).out.includes('turned'), false, 'doctor deletes the meshes it added');
 });
 
-test('a wait outlives the daemon', async (t) => {
+test('a wait survives a restart of the daemon', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const { port } = new URL(d.url);
   const before = await occupy(d), { json: mesh } = await d.upload(shapes.obj(shapes.egg(3)));
@@ -189,7 +189,7 @@ test('a wait outlives the daemon', async (t) => {
   await until(() => waits(d), 'the program waits');
   d.killed = true;
   await d.stop('SIGKILL');
-  d.args.push('--listen', `127.0.0.1:${port}`); // the last one counts
+  d.args.push('--listen', `127.0.0.1:${port}`); // the last --listen wins
   await d.start();
   d.killed = false;
   assert.equal((await d.delete(before.url)).status, 200);
@@ -198,7 +198,7 @@ test('a wait outlives the daemon', async (t) => {
   assert.match(out, /0 flipped/);
 });
 
-test('a wait that is broken off says how to go on', async (t) => {
+test('an interrupted wait prints how to continue', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const before = await occupy(d), { json: mesh } = await d.upload(shapes.obj(shapes.egg(3)));
   const child = spawn(binaries.client, ['embed', mesh.id, '--method', 'kernel-sampling'], { env: { ...process.env, ORBMORPH_SERVER: d.url }, stdio: ['ignore', 'pipe', 'pipe'] });
@@ -216,7 +216,7 @@ test('a wait that is broken off says how to go on', async (t) => {
   assert.equal((await d.delete(before.url)).status, 200);
 });
 
-test('progress is drawn on a terminal', async (t) => {
+test('a terminal shows progress', async (t) => {
   const d = await daemon(t);
   const at = await folder(t);
   const line = [binaries.client, 'morph', dog, giraffe, '-l', landmarks, '-o', path.join(at, 'o.glb')].join(' ');

@@ -1,4 +1,4 @@
-// docs/report.md against the daemon: every number of a report is explained.
+// docs/report.md explains every member of a report.
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import path from 'node:path';
@@ -8,7 +8,7 @@ import * as shapes from './support/shapes.mjs';
 
 const text = await readFile(path.join(root, 'docs/report.md'), 'utf8');
 
-/** The names of all members, but of those in `skip`. */
+/** Yields the names of all members, nested ones included, except within the members in `skip`. */
 function* members(value, skip) {
   if (Array.isArray(value)) yield* value.flatMap((item) => [...members(item, skip)]);
   else if (value && typeof value === 'object')

@@ -1,4 +1,4 @@
-// What surrounds the programs: completions in three shells, manual pages.
+// Completions in three shells, and the manual pages.
 import assert from 'node:assert/strict';
 import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
@@ -9,7 +9,7 @@ import { binaries, patience, root } from './support/daemon.mjs';
 const completions = path.join(root, 'deploy/completions');
 const files = { bash: 'orbmorph.bash', zsh: '_orbmorph', fish: 'orbmorph.fish' };
 
-test('the files of completions are what the program prints', async () => {
+test('the completion files match what the program prints', async () => {
   for (const [shell, file] of Object.entries(files)) {
     const { out } = await run(['completions', shell]);
     assert.equal(out, await readFile(path.join(completions, file), 'utf8'), `stale: orbmorph completions ${shell} > deploy/completions/${file}`);
@@ -75,7 +75,7 @@ test('the manual pages render without a warning', async () => {
   }
 });
 
-test('the manual pages tell every command and option', async () => {
+test('the manual pages document every command and option', async () => {
   const text = async (page) => (await runProgram('mandoc', ['-T', 'utf8', path.join(root, 'deploy/man', page)])).out.replace(/.\x08/g, '');
   const options = (help) => [...new Set(help.match(/(?<=^|[ ,(])--[a-z][a-z-]+/gm))];
   const client = await text('orbmorph.1'), top = (await run(['--help'])).out;

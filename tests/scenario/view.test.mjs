@@ -1,4 +1,4 @@
-// view: what the pictures show, from files made here by hand.
+// The pictures that view draws of small GLB files made here.
 import assert from 'node:assert/strict';
 import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
@@ -8,7 +8,7 @@ import { writeGlb } from './support/glb_write.mjs';
 import { readPng, writePng } from './support/png.mjs';
 import { samples } from './support/daemon.mjs';
 
-/** A GLB of one square in the plane z = 0, from (−1,−1) to (1,1), that a target moves. */
+/** A GLB of one square in the plane z = 0, from (−1,−1) to (1,1), moved by one morph target. */
 function square({ move = [0, 0, 0], ...rest }) {
   const positions = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]];
   return writeGlb({ positions, normals: positions.map(() => [0, 0, 1]), triangles: [[0, 1, 2], [0, 2, 3]], moves: positions.map(() => move), ...rest });
@@ -22,17 +22,17 @@ async function draw(t, glb, ...options) {
   return readPng(await readFile(path.join(at, 'out.png')));
 }
 
-/** The pixel at a share of the width and height of a frame. */
+/** The pixel at a fraction of the width and height of a frame. */
 const at = (png, x, y, frame = 0) => [...png.frames[frame].subarray(3 * (Math.floor(y * png.height) * png.width + Math.floor(x * png.width))).subarray(0, 3)];
 const mainly = (rgb) => { const k = rgb.indexOf(Math.max(...rgb)); return rgb.every((v, i) => i === k || v < 0.5 * rgb[k]) ? 'rgb'[k] : rgb.join(); };
 
-const corners = [[0, 1], [1, 1], [1, 0], [0, 0]]; // glTF counts down from the top of the image
+const corners = [[0, 1], [1, 1], [1, 0], [0, 0]]; // in glTF, v grows downward from the top of the image
 const quarters = writePng(16, 16, (x, y) => (y < 8 ? (x < 8 ? [230, 0, 0] : [0, 230, 0]) : x < 8 ? [0, 0, 230] : [230, 230, 230]));
 
-test('a texture is drawn where its coordinates say', async (t) => {
+test('a texture appears where its coordinates place it', async (t) => {
   const png = await draw(t, square({ uv: corners, image: quarters }), '--poses', '2', '--size', '64');
   assert.deepEqual([png.width, png.height], [128, 64]);
-  // the left cell's quarters, seen from the front
+  // the quarters of the left cell, seen from the front
   assert.equal(mainly(at(png, 0.12, 0.25)), 'r');
   assert.equal(mainly(at(png, 0.38, 0.25)), 'g');
   assert.equal(mainly(at(png, 0.12, 0.75)), 'b');
@@ -40,12 +40,12 @@ test('a texture is drawn where its coordinates say', async (t) => {
   assert.ok(Math.abs(r - g) < 3 && Math.abs(g - b) < 3 && r > 100, `${r} ${g} ${b}`);
 });
 
-test('textures repeat or stop as their sampler says, and are smoothed where they are small', async (t) => {
+test('textures repeat or clamp as their sampler says, and are averaged when minified', async (t) => {
   const twice = corners.map(([u, v]) => [2 * u, 2 * v]);
   const repeat = await draw(t, square({ uv: twice, image: quarters }), '--poses', '2', '--size', '64');
-  assert.equal(mainly(at(repeat, 0.32, 0.12)), 'r', 'the first quarter again');
+  assert.equal(mainly(at(repeat, 0.32, 0.12)), 'r', 'the first quarter repeats');
   const clamp = await draw(t, square({ uv: twice, image: quarters, wrap: 33071 }), '--poses', '2', '--size', '64');
-  assert.equal(mainly(at(clamp, 0.38, 0.12)), 'g', 'the edge goes on');
+  assert.equal(mainly(at(clamp, 0.38, 0.12)), 'g', 'the edge continues');
   const stripes = writePng(256, 256, (x) => (x % 2 ? [255, 255, 255] : [0, 0, 0]));
   const fine = await draw(t, square({ uv: corners.map(([u, v]) => [4 * u, 4 * v]), image: stripes }), '--poses', '2', '--size', '32');
   const tones = [];
@@ -53,20 +53,20 @@ test('textures repeat or stop as their sampler says, and are smoothed where they
   assert.ok(Math.max(...tones) - Math.min(...tones) < 12, `${tones}`);
 });
 
-test('colours of vertices and of the material are drawn', async (t) => {
+test('vertex colours and material colours appear', async (t) => {
   const red = await draw(t, square({ colors: [[1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]] }), '--poses', '2', '--size', '32');
   assert.equal(mainly(at(red, 0.25, 0.5)), 'r');
   const blue = await draw(t, square({ factor: [0, 0, 1, 1] }), '--poses', '2', '--size', '32');
   assert.equal(mainly(at(blue, 0.25, 0.5)), 'b');
 });
 
-test('what is seen from within is red on demand', async (t) => {
+test('--inside paints triangles seen from inside red', async (t) => {
   const glb = square({ factor: [0, 1, 0, 1] });
   assert.equal(mainly(at(await draw(t, glb, '--poses', '2', '--size', '32', '--yaw', '180'), 0.25, 0.5)), 'g');
   assert.equal(mainly(at(await draw(t, glb, '--poses', '2', '--size', '32', '--yaw', '180', '--inside'), 0.25, 0.5)), 'r');
 });
 
-test('an animation goes there and back', async (t) => {
+test('an animation goes to the last shape and back', async (t) => {
   const png = await draw(t, square({ factor: [1, 0, 0, 1], move: [4, 0, 0] }), '--frames', '8', '--size', '60');
   assert.equal(png.frames.length, 8);
   assert.equal(png.milliseconds, 50);
@@ -74,14 +74,14 @@ test('an animation goes there and back', async (t) => {
   const right = [...Array(8).keys()].map((k) => mainly(at(png, 0.8, 0.5, k)) === 'r');
   assert.deepEqual([left[0], right[0]], [true, false]);
   assert.deepEqual([left[4], right[4]], [false, true]);
-  for (let k = 1; k < 4; k++) assert.ok(png.frames[k].equals(png.frames[8 - k]), `frame ${k} comes again`);
+  for (let k = 1; k < 4; k++) assert.ok(png.frames[k].equals(png.frames[8 - k]), `frame ${k} repeats on the way back`);
 });
 
-test('what cannot be drawn is said', async (t) => {
+test('view explains why it cannot draw a file', async (t) => {
   const where = await folder(t), broken = square({ uv: corners, image: Buffer.from('no image at all') });
   await writeFile(path.join(where, 'cut.glb'), square({}).subarray(0, 200));
   await writeFile(path.join(where, 'image.glb'), broken);
-  for (const [file, why] of [['cut.glb', /cut off|damaged/], ['image.glb', /texture/], ['none.glb', /No such file/], [path.join(samples, 'dog.obj'), /not a GLB/]]) {
+  for (const [file, why] of [['cut.glb', /truncated or damaged/], ['image.glb', /texture/], ['none.glb', /No such file/], [path.join(samples, 'dog.obj'), /not a GLB/]]) {
     const { code, err } = await run(['view', file, '-o', 'o.png'], { cwd: where });
     assert.equal(code, 2, err);
     assert.match(err, why);

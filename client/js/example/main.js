@@ -1,4 +1,4 @@
-// Uploads the chosen files, asks the daemon for their morph, and plays the animation that the GLB carries.
+// Uploads the chosen files, requests their morph from the daemon and plays the animation in the GLB.
 import orbmorph from 'orbmorph';
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
@@ -30,7 +30,7 @@ document.getElementById('form').addEventListener('submit', async (event) => {
     play(await new GLTFLoader().parseAsync(await morph.glb(), ''));
     status.value = `${morph.triangles} triangles for ${morph.shapes.map((shape) => shape.name).join(', ')}`;
   } catch (error) {
-    status.value = error.message; // what the daemon refuses says why, and what to do
+    status.value = error.message; // a ProblemError says why the daemon refused, and what to do
   }
 });
 

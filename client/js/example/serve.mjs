@@ -1,4 +1,4 @@
-// Serves this page with the client and three.js (from client/web/node_modules), and passes /v1 on to the daemon at
+// Serves this page, the client and three.js (from client/web/node_modules). Forwards /v1 to the daemon at
 // ORBMORPH_SERVER (http://127.0.0.1:8080), so that the page and the daemon share an origin.
 import { createServer, request } from 'node:http';
 import { readFile } from 'node:fs/promises';

@@ -1,6 +1,6 @@
-// Made from api/openapi.json by client/js/types.mjs; not to be changed by hand.
+// Generated from api/openapi.json by client/js/types.mjs. Do not edit.
 
-/** What the daemon takes and answers, version 1.0.0 of its interface. */
+/** Requests and responses of the daemon, interface version 1.0.0. */
 
 /** A SHA-256 in lower-case hexadecimal. */
 export type Id = string;

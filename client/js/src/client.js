@@ -1,4 +1,4 @@
-/** The daemon's resources as methods. Everything that can take long accepts `signal` and `onProgress`. */
+/** The daemon's resources as methods. Every method that can take long accepts `signal` and `onProgress`. */
 import { CancelledError, ProblemError, UnreachableError, abortError, isAbort } from './errors.js';
 import { readEvents } from './events.js';
 import { openSource, parse, sendBody } from './upload.js';
@@ -25,7 +25,7 @@ export class Orbmorph {
     this.fetch = fetch ?? ((...args) => globalThis.fetch(...args));
   }
 
-  /** The full address of a path of the daemon, for instance of `supermesh.asset`. */
+  /** The full URL of a path of the daemon, for example of `supermesh.asset`. */
   url(path) {
     return /^https?:/.test(path) ? path : this.server + path;
   }
@@ -34,7 +34,7 @@ export class Orbmorph {
     return { ...(this.token ? { Authorization: `Bearer ${this.token}` } : {}), ...more };
   }
 
-  /** One request; a refusal is thrown as ProblemError. -> Response */
+  /** Sends a request. Throws ProblemError if the daemon refuses it. -> Response */
   async request(path, { method = 'GET', json, headers, signal } = {}) {
     const init = { method, signal, headers: this.headers(headers) };
     if (json !== undefined) {
@@ -62,7 +62,7 @@ export class Orbmorph {
 
   // ---- meshes
 
-  /** Uploads one mesh. `source`: File, Blob, ArrayBuffer, typed array, or in Node a path. -> the mesh */
+  /** Uploads a mesh. `source`: a File, Blob, ArrayBuffer, typed array or, in Node, a path. -> the mesh */
   async uploadMesh(source, { name, format, repair, onProgress, signal } = {}) {
     const file = await openSource(source, name);
     const query = new URLSearchParams({ name: file.name });
@@ -81,7 +81,7 @@ export class Orbmorph {
     return this.json(`/v1/meshes/${id}`, options);
   }
 
-  /** The file as it was uploaded. -> ArrayBuffer */
+  /** The uploaded file. -> ArrayBuffer */
   async meshFile(id, options) {
     return (await this.request(`/v1/meshes/${id}/file`, options)).arrayBuffer();
   }
@@ -96,7 +96,7 @@ export class Orbmorph {
     return this.json(`/v1/embeddings/${id}`, options);
   }
 
-  /** Embeds a mesh and waits. -> the embedding */
+  /** Embeds a mesh and waits for the job. -> the embedding */
   embed(mesh, { method, options, ...watch } = {}) {
     return this.make('/v1/embeddings', clean({ mesh, method, options }), watch);
   }
@@ -116,7 +116,7 @@ export class Orbmorph {
     return this.json(`/v1/supermeshes/${id}`, options);
   }
 
-  /** Merges shapes that are on the daemon and waits. `request` is the body of POST /v1/supermeshes. -> the supermesh */
+  /** Merges uploaded meshes and waits for the job. `request`: the body of POST /v1/supermeshes. -> the supermesh */
   merge(request, watch = {}) {
     return this.make('/v1/supermeshes', request, watch);
   }
@@ -126,12 +126,12 @@ export class Orbmorph {
     return (await this.request(`/v1/supermeshes/${id}/asset.glb`, options)).arrayBuffer();
   }
 
-  /** The binary PLY of shape `k` on the sphere that all shapes share. -> ArrayBuffer */
+  /** The binary PLY of the aligned embedding of shape `k`. -> ArrayBuffer */
   async alignedSphere(id, k, options) {
     return (await this.request(`/v1/supermeshes/${id}/spheres/${k}.ply`, options)).arrayBuffer();
   }
 
-  /** Where every vertex lies in the uploaded files, as bytes (docs/places.md). -> ArrayBuffer */
+  /** The place of every vertex in the uploaded files, in the format of docs/places.md. -> ArrayBuffer */
   async places(id, options) {
     return (await this.request(`/v1/supermeshes/${id}/places`, options)).arrayBuffer();
   }
@@ -142,7 +142,7 @@ export class Orbmorph {
 
   // ---- jobs
 
-  /** `wait`: seconds for which the answer may be held back until the job has ended. */
+  /** `wait`: the daemon responds when the job ends, or after this many seconds. */
   getJob(id, { wait, ...options } = {}) {
     return this.json(`${jobPath(id)}${wait ? `?wait=${wait}` : ''}`, options);
   }
@@ -152,13 +152,13 @@ export class Orbmorph {
   }
 
   /**
-   * Follows a job to its end, by events, or by long polling where events do not come through.
-   * `onProgress(job)`. -> the job as it ended. Aborting `signal` stops the watching only.
+   * Follows a job until it ends, by events, or by long polling if events do not arrive. Calls `onProgress(job)`. Aborting
+   * `signal` stops following the job; the job keeps running. -> the ended job
    */
   async watchJob(job, { onProgress, signal } = {}) {
     const path = jobPath(job);
     let current = typeof job === 'object' ? { ...job } : { id: job };
-    const tell = (news) => {
+    const update = (news) => {
       current = { ...current, ...news };
       onProgress?.(current);
     };
@@ -178,13 +178,13 @@ export class Orbmorph {
             pause = 250;
             const news = parse(event.data);
             if (ENDED.has(event.event)) {
-              tell(await this.getJob(path, { signal }));
+              update(await this.getJob(path, { signal }));
               return current;
             }
-            if (news && typeof news === 'object') tell(news);
+            if (news && typeof news === 'object') update(news);
           }
         }
-        tell(await this.getJob(path, { wait: events ? undefined : 20, signal }));
+        update(await this.getJob(path, { wait: events ? undefined : 20, signal }));
         if (ENDED.has(current.state)) return current;
       } catch (error) {
         if (signal?.aborted) throw abortError(signal);
@@ -200,7 +200,7 @@ export class Orbmorph {
     }
   }
 
-  /** Follows a job and fetches its result; a failed job is thrown as ProblemError. */
+  /** Follows a job and fetches its result. Throws ProblemError if the job failed. */
   async result(job, watch = {}) {
     const ended = ENDED.has(job?.state) ? job : await this.watchJob(job, watch);
     if (ended.state === 'cancelled') throw new CancelledError(ended);
@@ -209,8 +209,8 @@ export class Orbmorph {
   }
 
   /**
-   * POST, then wait for the job if there is one. `onJob(job)` is told the job once; aborting `signal` cancels it on the
-   * daemon too, unless `detach` is set.
+   * Posts a request and waits for its job, if there is one. Calls `onJob(job)` once. Aborting `signal` also cancels the
+   * job, unless `detach` is set.
    */
   async make(path, body, { onJob, onProgress, signal, detach } = {}) {
     const response = await this.request(path, { method: 'POST', json: body, signal });
@@ -228,7 +228,7 @@ export class Orbmorph {
 
   // ---- lists
 
-  /** One page: {items, next}. `kind`: meshes, embeddings, supermeshes or jobs. */
+  /** Fetches a page of a list. `kind`: meshes, embeddings, supermeshes or jobs. -> {items, next} */
   async page(kind, { limit, pageToken, state, signal } = {}) {
     const query = new URLSearchParams();
     if (limit) query.set('limit', limit);
@@ -239,7 +239,7 @@ export class Orbmorph {
     return { items: body[kind] ?? body.items ?? Object.values(body).find(Array.isArray) ?? [], next: body.next_page_token ?? null };
   }
 
-  /** All of a kind, page by page: `for await (const mesh of client.list('meshes'))`. */
+  /** Yields all items of a kind and fetches pages as needed: `for await (const mesh of client.list('meshes'))`. */
   async *list(kind, options = {}) {
     let pageToken;
     do {
@@ -249,12 +249,12 @@ export class Orbmorph {
     } while (pageToken);
   }
 
-  // ---- the whole way
+  // ---- morphs
 
   /**
-   * Uploads the files, merges them, waits. `options`: the members of POST /v1/supermeshes (`landmarks`, `align`,
-   * `remesh`, `asset`), `repair`, and `onProgress({step, file, job, progress})`, `signal`.
-   * -> the supermesh, with `meshes`, `assetUrl` and `glb()`.
+   * Uploads files, merges them and waits for the job. Options: the members of POST /v1/supermeshes (`landmarks`,
+   * `align`, `remesh`, `asset`), `repair`, `names`, `onProgress({step, file, job, progress})` and `signal`.
+   * -> the supermesh with `meshes`, `assetUrl` and `glb()`
    */
   async morph(sources, { landmarks, align, remesh, asset, repair, names, onProgress, signal } = {}) {
     const meshes = [];
@@ -263,8 +263,8 @@ export class Orbmorph {
         meshes.push(source);
         continue;
       }
-      const tell = onProgress && ((sent, total) => onProgress({ step: 'upload', file: index, progress: total ? sent / total : 1 }));
-      meshes.push(await this.uploadMesh(source, { name: names?.[index], repair, onProgress: tell, signal }));
+      const onUpload = onProgress && ((sent, total) => onProgress({ step: 'upload', file: index, progress: total ? sent / total : 1 }));
+      meshes.push(await this.uploadMesh(source, { name: names?.[index], repair, onProgress: onUpload, signal }));
     }
     const shapes = meshes.map((mesh) => clean({ mesh: mesh.id, name: mesh.name }));
     const given = Array.isArray(landmarks) || typeof landmarks === 'string' ? landmarks : landmarks?.landmarks;
@@ -281,10 +281,10 @@ export class Orbmorph {
   }
 }
 
-/** A mesh that the daemon has told of, rather than a file. */
+/** A mesh of the daemon rather than a file. */
 const isMesh = (value) => typeof value?.id === 'string' && /^[0-9a-f]{64}$/.test(value.id);
 
-/** -> "/v1/jobs/ID" of a job object, its address or its id. */
+/** "/v1/jobs/ID" for a job object, its path or its id. */
 const jobPath = (job) => {
   const text = typeof job === 'object' ? job.url ?? job.id : job;
   return text.startsWith('/') ? text : `/v1/jobs/${text}`;

@@ -1,10 +1,10 @@
 /**
- * An error that the daemon answered (RFC 9457). `type` is the address of the kind of problem, `kind` its last part
- * ("not-closed"), `problem` the whole object with the facts as members.
+ * A problem that the daemon returned (RFC 9457). `type` is the URI of the problem type, `kind` its last part
+ * ("not-closed"), `problem` the whole problem object with its details.
  */
 export class ProblemError extends Error {
   constructor(problem, status) {
-    super(problem.detail || problem.title || `The daemon answered ${status}.`);
+    super(problem.detail || problem.title || `The daemon returned status ${status}.`);
     this.name = 'ProblemError';
     this.problem = problem;
     this.type = problem.type || 'about:blank';
@@ -15,16 +15,16 @@ export class ProblemError extends Error {
   }
 }
 
-/** The daemon could not be reached, or the connection broke. */
+/** The daemon is unreachable, or the connection broke. */
 export class UnreachableError extends Error {
   constructor(url, cause) {
-    super(`No answer from ${url || 'the daemon'}. Is orbmorphd running there?`, { cause });
+    super(`No response from ${url || 'the daemon'}. Is orbmorphd running there?`, { cause });
     this.name = 'UnreachableError';
     this.url = url;
   }
 }
 
-/** A job that ended as `cancelled` although this caller did not ask for it. */
+/** The job was cancelled, but not by this call. */
 export class CancelledError extends Error {
   constructor(job) {
     super('The job was cancelled.');

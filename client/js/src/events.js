@@ -1,6 +1,6 @@
 /**
- * Reads server-sent events from the body of a fetch response: yields {event, data, id}. The browser's EventSource is
- * not used because it cannot send a token and does not exist in Node.
+ * Reads server-sent events from the body of a fetch response; yields {event, data, id}. The browser's EventSource cannot
+ * send a token, and Node 18 has none.
  */
 export async function* readEvents(body) {
   const reader = body.getReader();

@@ -1,20 +1,20 @@
-/** The types of this client; those of the daemon's answers are in api.d.ts, made from its OpenAPI document. */
+/** The types of the client. api.d.ts, generated from the OpenAPI document, has those of the daemon's responses. */
 import type { Embedding, Job, Landmark, Mesh, Supermesh, SupermeshRequest } from './api.js';
 
 export type Repair = 'none' | 'safe' | 'fill_holes' | 'largest_component';
 export type Source = Blob | ArrayBuffer | ArrayBufferView | string | URL | { source: Blob | ArrayBuffer | ArrayBufferView | string; name?: string };
 
 export type { Distortion, Embedding, Job, Landmark, Measure, Mesh, Place, Supermesh, SupermeshRequest } from './api.js';
-/** What the daemon refuses, kind by kind: `type` tells which. */
+/** A problem of a known type; `type` discriminates. */
 export type { Problem as KnownProblem } from './api.js';
 
-/** A problem of any kind, with its facts as members. */
+/** A problem of any type, with its details. */
 export interface Problem {
   type: string;
   title: string;
   status: number;
   detail: string;
-  [fact: string]: unknown;
+  [member: string]: unknown;
 }
 
 export interface RequestOptions {
@@ -30,9 +30,9 @@ export interface UploadOptions extends RequestOptions {
 
 export interface WatchOptions extends RequestOptions {
   onProgress?: (job: Job) => void;
-  /** Told once, when the daemon has accepted a job. */
+  /** Called once, when the daemon has accepted the job. */
   onJob?: (job: Job) => void;
-  /** Leave the job running when `signal` is aborted. */
+  /** Keep the job running when `signal` is aborted. */
   detach?: boolean;
 }
 
@@ -75,7 +75,7 @@ export interface ListOptions extends RequestOptions {
 export class Orbmorph {
   constructor(options?: ConnectOptions);
   readonly server: string;
-  /** Sent with every request; may be set at any time. */
+  /** Sent with every request; can be changed at any time. */
   token: string | undefined;
   url(path: string): string;
   request(path: string, options?: RequestOptions & { method?: string; json?: unknown; headers?: Record<string, string> }): Promise<Response>;

@@ -5,8 +5,8 @@
  *   const morph = await orbmorph.morph([fileA, fileB], { landmarks });
  *   const glb = await morph.glb();
  *
- * The functions of the default export talk to the daemon that served the page, or in Node to ORBMORPH_SERVER
- * (http://127.0.0.1:8080); `new Orbmorph({server, token})` to any other.
+ * The functions of the default export use the daemon that served the page or, in Node, ORBMORPH_SERVER
+ * (http://127.0.0.1:8080). `new Orbmorph({server, token})` uses any other daemon.
  */
 import { Orbmorph } from './client.js';
 

@@ -1,13 +1,13 @@
-/** Turning what a caller has (File, Blob, bytes, path) into a request body, and sending it with progress. */
+/** Turns a source (File, Blob, bytes, path) into a request body and sends it with progress. */
 import { ProblemError, UnreachableError, abortError } from './errors.js';
 
 const isNode = typeof process !== 'undefined' && !!process.versions?.node;
 
-/** -> {name, size, body}: `body` is a Blob or bytes. A string is a path, in Node only. */
+/** Opens a source. A string is a path, in Node only. -> {name, size, body}; `body` is a Blob or bytes */
 export async function openSource(source, name) {
   if (typeof source === 'string' || source instanceof URL) {
-    if (!isNode) throw new TypeError('A path can be read in Node only; pass a File, a Blob or bytes.');
-    const module = 'node:fs/promises'; // a name that bundlers do not follow
+    if (!isNode) throw new TypeError('Only Node can read a path; pass a File, a Blob or bytes.');
+    const module = 'node:fs/promises'; // a variable, so that bundlers do not resolve it
     const { readFile } = await import(/* @vite-ignore */ module);
     const bytes = await readFile(source);
     const file = String(source).split(/[\\/]/).pop();
@@ -21,12 +21,12 @@ export async function openSource(source, name) {
     const bytes = new Uint8Array(source.buffer, source.byteOffset, source.byteLength);
     return { name: name ?? 'mesh', size: bytes.byteLength, body: bytes };
   }
-  throw new TypeError('A mesh is a File, a Blob, bytes or (in Node) a path.');
+  throw new TypeError('A mesh must be a File, a Blob, bytes or (in Node) a path.');
 }
 
 export const stem = (file) => file.replace(/\.[A-Za-z0-9]{1,5}$/, '') || 'mesh';
 
-/** POST of `body`; `onProgress(sent, total)`. Resolves to {status, headers, json}. */
+/** Posts `body`; calls `onProgress(sent, total)`. Only XMLHttpRequest reports progress in browsers. -> {status, json} */
 export function sendBody(url, body, size, { headers, onProgress, signal, fetch }) {
   if (typeof XMLHttpRequest !== 'undefined' && onProgress) return sendXhr(url, body, size, { headers, onProgress, signal });
   return sendFetch(url, body, size, { headers, onProgress, signal, fetch });
@@ -73,8 +73,8 @@ async function sendFetch(url, body, size, { headers, onProgress, signal, fetch }
   return { status: response.status, json };
 }
 
-/** A stream of the body in pieces that tells how far it got. */
-function counted(body, tell) {
+/** A stream of the body in pieces; calls `onSent(bytes)` after each. */
+function counted(body, onSent) {
   const whole = body instanceof Uint8Array ? body : null;
   const piece = 256 * 1024;
   const size = whole ? whole.byteLength : body.size;
@@ -86,7 +86,7 @@ function counted(body, tell) {
       const part = whole ? whole.subarray(at, end) : new Uint8Array(await body.slice(at, end).arrayBuffer());
       at = end;
       controller.enqueue(part);
-      tell(at);
+      onSent(at);
     },
   });
 }

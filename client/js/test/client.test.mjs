@@ -34,7 +34,7 @@ test('morph uploads, merges, waits and fetches', using({}, async (daemon) => {
   assert.equal(merging.at(-1), 1);
 }));
 
-test('a path is read in Node and gives the name', using({}, async (daemon, client) => {
+test('in Node, a path is read and names the mesh', using({}, async (daemon, client) => {
   const folder = await mkdtemp(join(tmpdir(), 'orbmorph-js-'));
   await writeFile(join(folder, 'horse.obj'), 'v 0 0 0');
   const mesh = await client.uploadMesh(join(folder, 'horse.obj'));
@@ -43,7 +43,7 @@ test('a path is read in Node and gives the name', using({}, async (daemon, clien
   assert.equal(daemon.seen.uploads[0].bytes, 7);
 }));
 
-test('upload progress reaches the whole size', using({}, async (daemon, client) => {
+test('upload progress reaches the full size', using({}, async (daemon, client) => {
   const seen = [];
   await client.uploadMesh(new Uint8Array(700_000), { name: 'big', onProgress: (sent, total) => seen.push([sent, total]) });
   assert.ok(seen.length >= 3);
@@ -51,7 +51,7 @@ test('upload progress reaches the whole size', using({}, async (daemon, client) 
   assert.equal(daemon.seen.uploads[0].bytes, 700_000);
 }));
 
-test('a refusal is a ProblemError with its facts', using({}, async (daemon, client) => {
+test('a refused request throws a ProblemError with its details', using({}, async (daemon, client) => {
   await assert.rejects(client.uploadMesh(bytes('open')), (error) => {
     assert.ok(error instanceof ProblemError);
     assert.equal(error.kind, 'not-closed');
@@ -66,50 +66,50 @@ test('a failed job throws its problem', using({}, async (daemon, client) => {
   await assert.rejects(client.merge({ shapes: [], fail: true }), (error) => error instanceof ProblemError && error.kind === 'bad-landmarks');
 }));
 
-test('a broken event stream is resumed after the last event', using({ breakStream: true, jobSteps: 4 }, async (daemon, client) => {
+test('a broken event stream resumes after the last event', using({ breakStream: true, jobSteps: 4 }, async (daemon, client) => {
   const result = await client.merge({ shapes: [] });
   assert.equal(result.id, '1');
   assert.equal(daemon.seen.lastEventIds[0], undefined);
   assert.equal(daemon.seen.lastEventIds[1], '1');
 }));
 
-test('without events it polls', using({ noEvents: true }, async (daemon, client) => {
+test('the client polls if there are no events', using({ noEvents: true }, async (daemon, client) => {
   assert.equal((await client.merge({ shapes: [] })).id, '1');
   assert.ok(daemon.seen.requests.some((request) => request.query === '?wait=20'));
   await assert.rejects(client.watchJob({ id: '77' }), ProblemError);
 }));
 
-test('abort cancels the job on the daemon', using({ jobSteps: 1e6 }, async (daemon, client) => {
+test('abort cancels the job', using({ jobSteps: 1e6 }, async (daemon, client) => {
   const abort = new AbortController();
   const running = client.merge({ shapes: [] }, { signal: abort.signal, onProgress: () => setTimeout(() => abort.abort(), 60) });
   await assert.rejects(running, { name: 'AbortError' });
   assert.equal(daemon.jobs.get('1').state, 'cancelled');
 }));
 
-test('abort with detach leaves it running', using({ jobSteps: 1e6 }, async (daemon, client) => {
+test('abort with detach keeps the job running', using({ jobSteps: 1e6 }, async (daemon, client) => {
   const abort = new AbortController();
   await assert.rejects(client.merge({ shapes: [] }, { signal: abort.signal, detach: true, onProgress: ({ state }) => state === 'running' && abort.abort() }), { name: 'AbortError' });
   assert.equal(daemon.jobs.get('1').state, 'running');
 }));
 
-test('lists follow their pages', using({}, async (daemon, client) => {
+test('a list continues on its next pages', using({}, async (daemon, client) => {
   for (const text of ['a', 'b', 'c']) await client.uploadMesh(bytes(text), { name: text });
   const names = [];
   for await (const mesh of client.list('meshes')) names.push(mesh.name);
   assert.deepEqual(names, ['a', 'b', 'c']);
 }));
 
-test('the token goes with every request', using({ token: 'secret' }, async (daemon) => {
+test('every request carries the token', using({ token: 'secret' }, async (daemon) => {
   const client = new Orbmorph({ server: daemon.url, token: 'secret' });
   assert.equal((await client.uploadMesh(bytes('a'))).name, 'mesh');
   await assert.rejects(new Orbmorph({ server: daemon.url }).getMesh('x'), (error) => error.status === 401);
 }));
 
-test('a daemon that is not there is UnreachableError', async () => {
+test('an unreachable daemon throws UnreachableError', async () => {
   await assert.rejects(new Orbmorph({ server: 'http://127.0.0.1:9' }).getMesh('x'), UnreachableError);
 });
 
-test('events: line ends, comments and data over several lines, cut anywhere', async () => {
+test('events: line ends, comments and multi-line data, split anywhere', async () => {
   const text = ': hello\r\n\r\nid: 7\r\nevent: progress\ndata: a\ndata:b\n\ndata: {"ü":1}\n\n';
   const all = new TextEncoder().encode(text);
   for (const size of [1, 2, 3, 7, 100]) {

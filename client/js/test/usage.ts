@@ -1,4 +1,4 @@
-// Compiled, never run: what callers write, and what the compiler must refuse.
+// Compiled but never run: code that must compile, and code that the compiler must reject.
 import orbmorph, { Orbmorph, ProblemError, type KnownProblem, type Landmark, type Mesh, type Supermesh } from '../src/index.js';
 
 export async function usage(a: File, b: Uint8Array) {
@@ -16,7 +16,7 @@ export async function usage(a: File, b: Uint8Array) {
   return [glb, mean, sphere];
 }
 
-export function tell(error: unknown) {
+export function describe(error: unknown) {
   if (!(error instanceof ProblemError)) throw error;
   const problem = error.problem as KnownProblem;
   return problem.type === '/problems/not-closed' ? problem.boundary_edges.length : error.kind;
@@ -24,5 +24,5 @@ export function tell(error: unknown) {
 
 // @ts-expect-error a method that does not exist
 void new Orbmorph().merge({ shapes: [{ mesh: 'x' }, { mesh: 'y' }], remesh: { method: 'magic' } });
-// @ts-expect-error a place is a vertex, a point or a triangle with barycentrics
+// @ts-expect-error a place is a vertex, a point, or a triangle with barycentric coordinates
 export const wrong: Landmark = { at: [{ corner: 1 }, { vertex: 2 }] };

@@ -1,6 +1,6 @@
 /**
- * A stand-in for the daemon, as small as the client's tests need: it speaks the contract's paths and can be told to
- * misbehave (break an event stream, be busy), which a real daemon cannot.
+ * A fake daemon for the client's tests. It serves the paths that the client uses, and it can break an event stream, refuse
+ * events or stop a job from ending, which a real daemon does not do on request.
  */
 import { createServer } from 'node:http';
 import { createHash } from 'node:crypto';

@@ -1,9 +1,9 @@
-/* Triangles onto a canvas with depths: barycentric coordinates over the bounding box, normals blended, one lamp over
- * the viewer's shoulder, a weaker one from the other side, and light from the sky. */
+/* Rasterizes by barycentric coordinates over the bounding box of a triangle. Normals are interpolated; a lamp over the
+ * viewer's shoulder, a weaker one from the other side and light from above shade them. */
+#include "view_canvas.h"
+
 #include <math.h>
 #include <stdlib.h>
-
-#include "view.h"
 
 int view_canvas_make(view_canvas *canvas, int width, int height) {
   size_t pixels = (size_t)width * (size_t)height;
@@ -30,6 +30,24 @@ void view_canvas_free(view_canvas *canvas) {
   *canvas = (view_canvas){0};
 }
 
+static unsigned char srgb(float linear) {
+  float v = !(linear > 0) ? 0 : linear >= 1 ? 1 : linear; /* a file may hold any float: NaN becomes black */
+  v = v <= 0.0031308f ? 12.92f * v : 1.055f * powf(v, 1 / 2.4f) - 0.055f;
+  return (unsigned char)(v * 255 + 0.5f);
+}
+
+void view_canvas_row(const view_canvas *canvas, int y, unsigned char *row) {
+  for (int x = 0; x < canvas->width / 2; x++) {
+    for (int c = 0; c < 3; c++) {
+      float sum = 0;
+      for (int k = 0; k < 4; k++) {
+        sum += canvas->color[3 * ((long)(2 * y + k / 2) * canvas->width + 2 * x + k % 2) + c];
+      }
+      row[3 * x + c] = srgb(sum / 4);
+    }
+  }
+}
+
 static float shade(const float normal[3]) {
   static const float key[3] = {-0.45f, 0.62f, 0.64f}, fill[3] = {0.75f, 0.1f, 0.65f};
   float k = 0, f = 0;
@@ -44,7 +62,6 @@ static float blend(const float at[3], float a, float b, float c) {
   return at[0] * a + at[1] * b + at[2] * c;
 }
 
-/* span: how many pixels of the texture a pixel of the canvas covers, each way. */
 static void pixel_color(const view_vertex *const v[3], const float at[3], const view_paint *paint, float span,
                         float out[3]) {
   float normal[3], length = 0, texel[3] = {1, 1, 1};
@@ -71,7 +88,7 @@ static float cross2(const view_vertex *a, const view_vertex *b, float x, float y
   return (b->x - a->x) * (y - a->y) - (b->y - a->y) * (x - a->x);
 }
 
-/* Texture pixels a canvas pixel, from the triangle's areas in both. */
+/* Pixels of the texture per pixel of the canvas in each direction, from the areas of the triangle in both. */
 static float texture_span(const view_vertex *const v[3], const view_texture *texture, float area) {
   if (!texture) {
     return 1;
@@ -96,7 +113,7 @@ void view_triangle(view_canvas *canvas, const view_vertex *const v[3], const vie
   }
   int x0 = clip(floorf(left), canvas->width), x1 = clip(ceilf(right), canvas->width - 1);
   int y0 = clip(floorf(top), canvas->height), y1 = clip(ceilf(bottom), canvas->height - 1);
-  float height[3]; /* of each corner over the edge opposite, in pixels */
+  float height[3]; /* of each corner over the opposite edge, in pixels */
   for (int k = 0; k < 3; k++) {
     const view_vertex *p = v[(k + 1) % 3], *q = v[(k + 2) % 3];
     height[k] = fabsf(area) / fmaxf(1e-6f, hypotf(q->x - p->x, q->y - p->y));

@@ -1,37 +1,40 @@
-/* What the user gives for a request: a landmark file, and members by --set. */
+#include "input.h"
+
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli.h"
-#include "make.h"
+#include "terminal.h"
+#include "text.h"
 
-/* Members of members that --set takes, and the same within its value: far more than a request has, and together far
- * less than JSON's readers follow (1,000), so that what is sent is JSON to all of them. */
+/* How deep --set nests: in its dotted name, and again in its value. A request needs far less, and JSON parsers accept
+ * far more (1,000). */
 enum { SET_DEPTH_MOST = 64 };
 
 cJSON *cli_read_landmarks(const cli *c, const char *path) {
   size_t size;
   const char *end = NULL;
   char *text = cli_read_file(path, &size);
-  if (!text)
+  if (!text) {
     return NULL;
+  }
   cJSON *whole = cJSON_ParseWithLengthOpts(text, size + 1, &end, 1), *list = whole;
   if (!whole) {
-    cli_error(c, "%s: not JSON at byte %zu", path, end ? (size_t)(end - text) : 0);
+    cli_error(c, "%s: not valid JSON at byte %zu", path, end ? (size_t)(end - text) : 0);
   } else if (cJSON_IsObject(whole)) {
     list = cJSON_DetachItemFromObjectCaseSensitive(whole, "landmarks");
     cJSON_Delete(whole);
   }
   free(text);
   if (whole && !cJSON_IsArray(list)) {
-    cli_error(c, "%s: a landmark file is an array, or an object with one as its member \"landmarks\"", path);
+    cli_error(c, "%s: a landmark file is an array, or an object whose member \"landmarks\" is one", path);
     cJSON_Delete(list);
     return NULL;
   }
   for (cJSON *item = list ? list->child : NULL, *next; item; item = next) {
     next = item->next;
-    if (!cJSON_IsArray(item))
+    if (!cJSON_IsArray(item)) {
       continue;
+    }
     cJSON *landmark = cJSON_CreateObject(), *at = cJSON_AddArrayToObject(landmark, "at");
     for (const cJSON *vertex = item->child; vertex; vertex = vertex->next) {
       cJSON *place = cJSON_CreateObject();
@@ -59,11 +62,13 @@ int cli_set_member(cJSON *object, const char *path, cJSON *value) {
       return ok;
     }
     cJSON *child = cJSON_GetObjectItemCaseSensitive(object, name);
-    if (!child)
+    if (!child) {
       child = cJSON_AddObjectToObject(object, name);
+    }
     free(name);
-    if (!cJSON_IsObject(child))
+    if (!cJSON_IsObject(child)) {
       break;
+    }
     object = child;
     path = dot + 1;
   }
@@ -71,18 +76,19 @@ int cli_set_member(cJSON *object, const char *path, cJSON *value) {
   return 0;
 }
 
-/* How deep the brackets of a JSON text stand in each other. */
+/* The nesting depth of the brackets of a JSON text. */
 static int nesting(const char *text) {
   int depth = 0, most = 0, quoted = 0;
   for (; *text; text++) {
-    if (quoted && *text == '\\' && text[1])
+    if (quoted && *text == '\\' && text[1]) {
       text++;
-    else if (*text == '"')
+    } else if (*text == '"') {
       quoted = !quoted;
-    else if (!quoted && (*text == '[' || *text == '{') && ++depth > most)
+    } else if (!quoted && (*text == '[' || *text == '{') && ++depth > most) {
       most = depth;
-    else if (!quoted && (*text == ']' || *text == '}'))
+    } else if (!quoted && (*text == ']' || *text == '}')) {
       depth--;
+    }
   }
   return most;
 }
@@ -92,8 +98,9 @@ int cli_apply_sets(const cli *c, cJSON *request) {
     const char *text = c->args.sets[i], *equals = strchr(text, '=');
     char *path = equals ? cli_text("%.*s", (int)(equals - text), text) : NULL;
     cJSON *value = equals ? cJSON_ParseWithOpts(equals + 1, NULL, 1) : NULL;
-    if (equals && !value)
+    if (equals && !value) {
       value = cJSON_CreateString(equals + 1);
+    }
     if (value && !cJSON_IsString(value) && nesting(equals + 1) > SET_DEPTH_MOST) {
       cJSON_Delete(value);
       value = NULL;
@@ -101,7 +108,7 @@ int cli_apply_sets(const cli *c, cJSON *request) {
     int ok = value && cli_set_member(request, path, value);
     free(path);
     if (!ok) {
-      cli_error(c, "--set %s: it takes NAME=VALUE, with dots between the names of members, at most %d deep", text,
+      cli_error(c, "--set %s: expected NAME=VALUE, with dots between member names, nested at most %d deep", text,
                 SET_DEPTH_MOST);
       return CLI_USAGE;
     }

@@ -1,44 +1,24 @@
-/* Progress on a terminal, and waiting for jobs. */
+#include "job.h"
+
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "cli.h"
+#include "http.h"
+#include "problem.h"
+#include "terminal.h"
+#include "text.h"
 
-enum { BAR_WIDTH = 32, POLL_MICROSECONDS = 120 * 1000 };
+enum { POLL_MICROSECONDS = 120 * 1000 };
 
-void cli_bar(cli *c, const char *label, double fraction) {
-  if (!c->bar)
-    return;
-  if (!(fraction >= 0 && fraction <= 1))
-    fraction = 0;
-  int full = (int)(fraction * BAR_WIDTH + 0.5), percent = (int)(100 * fraction + 0.5);
-  if (c->bar_drawn && percent == c->bar_percent && !strncmp(label, c->bar_label, sizeof c->bar_label - 1))
-    return;
-  c->bar_percent = percent;
-  snprintf(c->bar_label, sizeof c->bar_label, "%s", label);
-  char line[BAR_WIDTH + 1];
-  for (int i = 0; i < BAR_WIDTH; i++)
-    line[i] = i < full ? '#' : '.';
-  line[BAR_WIDTH] = 0;
-  fprintf(stderr, "\r\033[K%-24.24s [%s] %3d %%", label, line, percent);
-  fflush(stderr);
-  c->bar_drawn = 1;
-}
-
-void cli_bar_end(cli *c) {
-  if (c->bar_drawn)
-    fputs("\r\033[K", stderr);
-  c->bar_drawn = 0;
-}
-
-/* The job again: on a terminal at once, to draw its progress; else when it has ended or 20 s have passed. */
+/* Fetches the job again: on a terminal soon, to draw its progress; else when it ends or after 20 s. */
 static int poll(cli *c, const char *url, cli_reply *reply) {
   char *path = cli_text("%s%s", url, c->bar ? "" : "?wait=20");
   cli_request request = {.method = "GET", .path = path, .patient = 1};
-  if (c->bar)
+  if (c->bar) {
     usleep(POLL_MICROSECONDS);
+  }
   int rc = cli_send(c, &request, reply);
   free(path);
   return rc;
@@ -56,25 +36,27 @@ static int conclude(cli *c, const cJSON *job, char **result) {
     *result = cli_text("%s", cli_string(job, "result", ""));
     return CLI_DONE;
   }
-  if (cJSON_IsObject(problem))
+  if (cJSON_IsObject(problem)) {
     return cli_problem(c, NULL, problem);
-  cli_error(c, "job %s has %s", cli_string(job, "id", "?"), state);
+  }
+  cli_error(c, "job %s: %s", cli_string(job, "id", "?"), state);
   return CLI_REFUSED;
 }
 
-/* What is said when the user ends the wait, made beforehand: a signal handler may not do it. */
+/* Printed when the user interrupts the wait. Formatted beforehand: a signal handler must not call printf. */
 static char farewell[256];
 
 static void on_interrupt(int signal_number) {
-  if (write(STDERR_FILENO, farewell, strlen(farewell)) >= 0)
+  if (write(STDERR_FILENO, farewell, strlen(farewell)) >= 0) {
     signal(signal_number, SIG_DFL);
+  }
   raise(signal_number);
 }
 
-static void say_farewell(const cli *c, const char *url) {
+static void prepare_farewell(const cli *c, const char *url) {
   snprintf(farewell, sizeof farewell,
-           "%sorbmorph: the job goes on without you. To wait again: orbmorph job --wait %s\n"
-           "The same command again waits for it too; to stop it: orbmorph job --cancel %s\n",
+           "%sorbmorph: the job keeps running. To wait for it: orbmorph job --wait %s\n"
+           "Repeating the command also waits for it. To cancel it: orbmorph job --cancel %s\n",
            c->bar ? "\r\033[K" : "", url, url);
   struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = SA_NODEFER};
   sigaction(SIGINT, &action, NULL);
@@ -85,13 +67,13 @@ int cli_wait(cli *c, const cJSON *job, char **result) {
   cli_reply reply = {0};
   int rc = CLI_DONE;
   *result = NULL;
-  say_farewell(c, url);
+  prepare_farewell(c, url);
   while (!ended(cli_string(job, "state", ""))) {
     cli_reply next;
     const char *stage = cli_string(job, "stage", cli_string(job, "state", ""));
     cli_bar(c, *stage ? stage : cli_string(job, "state", ""), cli_number(job, "progress"));
     if ((rc = poll(c, url, &next)) != CLI_DONE) {
-      cli_error(c, "the job goes on where the daemon does: orbmorph job --wait %s", url);
+      cli_error(c, "the job continues when the daemon is back. To wait for it: orbmorph job --wait %s", url);
       cli_reply_free(&next);
       break;
     }
@@ -104,8 +86,9 @@ int cli_wait(cli *c, const cJSON *job, char **result) {
     job = reply.json;
   }
   signal(SIGINT, SIG_DFL);
-  if (rc == CLI_DONE)
+  if (rc == CLI_DONE) {
     rc = conclude(c, job, result);
+  }
   cli_reply_free(&reply);
   free(url);
   return rc;

@@ -1,0 +1,19 @@
+/* Meshes as operands: an id, or a file to upload. */
+#ifndef ORB_CLI_MESH_H
+#define ORB_CLI_MESH_H
+
+#include "http.h"
+
+typedef struct cli_mesh {
+  char *id, *name;
+} cli_mesh;
+
+/* Looks an id up, or uploads a file. */
+int cli_mesh_of(cli *c, const char *operand, cli_mesh *out);
+void cli_mesh_free(cli_mesh *mesh);
+
+/* Uploads a file; the response goes into reply whatever its status. name NULL: the file's name; repair NULL: the
+ * daemon's default. */
+int cli_upload(cli *c, const char *path, const char *name, const char *repair, cli_reply *reply);
+
+#endif

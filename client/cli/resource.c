@@ -1,0 +1,111 @@
+#include "resource.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "job.h"
+#include "problem.h"
+#include "terminal.h"
+#include "text.h"
+
+char *cli_resource_path(const char *collection, const char *operand) {
+  const char *authority = strstr(operand, "://");
+  if (authority) {
+    const char *slash = strchr(authority + 3, '/');
+    return cli_text("%s", slash ? slash : "/");
+  }
+  return operand[0] == '/' ? cli_text("%s", operand) : cli_text("/v1/%s/%s", collection, operand);
+}
+
+int cli_not_found(cli *c, const char *kind, const char *operand, const cli_reply *reply) {
+  if (reply->status != 404 || c->json || operand[0] == '/') {
+    return cli_refused(c, operand, reply);
+  }
+  cli_error(c, "%s: not-found: no %s has this id; 'orbmorph ls' lists the ids", operand, kind);
+  return CLI_REFUSED;
+}
+
+int cli_find(cli *c, const char *operand, char **path, cli_reply *reply) {
+  static const char *const collections[] = {"supermeshes", "meshes", "embeddings", "jobs"};
+  int rc = CLI_DONE;
+  for (size_t i = 0; i < 4; i++) {
+    *path = cli_resource_path(collections[i], operand);
+    rc = cli_get(c, *path, reply);
+    if (rc != CLI_DONE || reply->status != 404 || i == 3 || operand[0] == '/') {
+      break;
+    }
+    cli_reply_free(reply);
+    free(*path);
+  }
+  if (rc == CLI_DONE && !cli_ok(reply)) {
+    rc = cli_not_found(c, "mesh, embedding, supermesh or job", operand, reply);
+  }
+  return rc;
+}
+
+int cli_download(cli *c, const char *path, const char *file) {
+  int to_stdout = !strcmp(file, "-");
+  char *part = to_stdout ? NULL : cli_text("%s.part-%ld", file, (long)getpid());
+  FILE *out = to_stdout ? tmpfile() : fopen(part, "w+b");
+  cli_reply reply = {0};
+  if (!out) {
+    cli_error(c, "%s: %s", file, strerror(errno));
+    free(part);
+    return CLI_USAGE;
+  }
+  cli_request request = {.method = "GET", .path = path, .download = out, .label = "download", .patient = 1};
+  int rc = cli_send(c, &request, &reply);
+  cli_bar_end(c);
+  if (rc == CLI_DONE && !cli_ok(&reply)) {
+    rc = cli_refused(c, path, &reply);
+  }
+  if (rc == CLI_DONE && to_stdout) {
+    char block[1 << 16];
+    rewind(out);
+    for (size_t got; (got = fread(block, 1, sizeof block, out)) > 0;) {
+      fwrite(block, 1, got, stdout);
+    }
+  }
+  int closed = fclose(out) == 0;
+  if (part && rc == CLI_DONE && (!closed || rename(part, file) != 0)) {
+    cli_error(c, "%s: %s", file, strerror(errno));
+    rc = CLI_USAGE;
+  }
+  if (part && rc != CLI_DONE) {
+    unlink(part);
+  }
+  cli_reply_free(&reply);
+  free(part);
+  return rc;
+}
+
+int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource) {
+  char *text = cJSON_PrintUnformatted(body), *result = NULL;
+  cli_request request = {.method = "POST", .path = path, .json = text};
+  int rc = cli_send(c, &request, resource);
+  if (rc == CLI_DONE && !cli_ok(resource)) {
+    rc = cli_refused(c, NULL, resource);
+  } else if (rc == CLI_DONE && resource->status == 202 && c->args.value[OPT_NO_WAIT]) {
+    if (c->json) {
+      puts(resource->body);
+    } else {
+      printf("%s\n", cli_string(resource->json, "url", "?"));
+    }
+    cli_reply_free(resource);
+  } else if (rc == CLI_DONE && resource->status == 202) {
+    rc = cli_wait(c, resource->json, &result);
+    cli_reply_free(resource);
+    if (rc == CLI_DONE) {
+      cli_request get = {.method = "GET", .path = result, .patient = 1};
+      rc = cli_send(c, &get, resource);
+      if (rc == CLI_DONE && !cli_ok(resource)) {
+        rc = cli_refused(c, NULL, resource);
+      }
+    }
+  }
+  free(result);
+  free(text);
+  return rc;
+}

@@ -1,0 +1,24 @@
+/* The daemon's resources: finding, making and downloading them. */
+#ifndef ORB_CLI_RESOURCE_H
+#define ORB_CLI_RESOURCE_H
+
+#include "http.h"
+
+/* The path of an operand: "/v1/jobs/ID" for an id, the path of a URL, or a path as it is. The caller frees it. */
+char *cli_resource_path(const char *collection, const char *operand);
+
+/* Finds the collection that holds an id; fetches the resource into reply. The caller frees *path and the reply. */
+int cli_find(cli *c, const char *operand, char **path, cli_reply *reply);
+
+/* Prints that no resource of this kind has the id if the reply is 404, else what the reply says. Returns CLI_REFUSED.
+ */
+int cli_not_found(cli *c, const char *kind, const char *operand, const cli_reply *reply);
+
+/* Posts a request, waits for its job and fetches the resource into `resource`. With --no-wait it prints the job, and
+ * resource->json stays NULL. */
+int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource);
+
+/* Downloads a resource into a file ("-": standard output); a temporary file beside it receives the bytes first. */
+int cli_download(cli *c, const char *path, const char *file);
+
+#endif

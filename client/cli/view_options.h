@@ -1,0 +1,16 @@
+/* How the view draws. */
+#ifndef ORB_CLI_VIEW_OPTIONS_H
+#define ORB_CLI_VIEW_OPTIONS_H
+
+typedef struct view_options {
+  int poses;    /* columns of a sheet: evenly spaced weights from one shape to the next, both included */
+  int frames;   /* 0: a sheet; else the number of frames of an animated PNG that loops */
+  int size;     /* width and height of a pose in pixels */
+  char up;      /* 'y' as in glTF, or 'z' */
+  double yaw;   /* degrees around the up axis */
+  double pitch; /* degrees from above */
+  int wire;     /* draw the edges of the triangles */
+  int inside;   /* paint triangles seen from inside red */
+} view_options;
+
+#endif
