@@ -32,9 +32,9 @@ typedef enum config_action {
 
 /* A number as options take it, perhaps with K, M or G. 0 if it is none. */
 int config_number(const char *text, int64_t *out);
-/* Reads it all again and takes over what can change while the service runs (log-level, queue-limit, derived-bytes, keep-jobs);
- * calls back for each option that differs, with whether it was taken. 0 where it is not valid: nothing changes then,
- * and the reason is on standard error. Readers of derived_bytes on other threads load it atomically. */
+/* Reads it all again and takes over what can change while the service runs (log-level, queue-limit, derived-bytes,
+ * keep-jobs); calls back for each option that differs, with whether it was taken. 0 where it is not valid: nothing
+ * changes then, and the reason is on standard error. Readers of derived_bytes on other threads load it atomically. */
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken));
 config_action config_read(config *out, int argc, char **argv);
 

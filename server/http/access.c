@@ -6,8 +6,6 @@
 
 #include "http/http.h"
 
-int is_page(const char *path);
-
 static caller *find_caller(const server *srv, const char *header) {
   unsigned char hash[TOKEN_BYTES];
   if (!header || strncasecmp(header, "Bearer ", 7) != 0 || !token_hash(header + 7 + strspn(header + 7, " "), hash)) {

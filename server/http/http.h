@@ -89,6 +89,8 @@ struct request {
 /* server.c */
 int http_start(server *srv);
 void http_stop(server *srv);
+
+/* request.c */
 /* Suspends and runs fn on a thread of the pool; fn must leave a response or PHASE_WAIT. Returns REQUEST_AWAY, which a
  * handler passes on: from here the request belongs to the task and must not be looked at. */
 #define REQUEST_AWAY ((enum MHD_Result)2)
@@ -137,7 +139,13 @@ void reply_header(request *r, const char *name, const char *value);
 /* Conditions of the request on what has this tag (RFC 9110 section 13.2.2): 0 where it is to be done, 1 with the
  * response, 412 or 304. */
 int reply_conditions(request *r, const char *etag);
+/* send.c: adds the headers that every response carries and queues the response. */
 enum MHD_Result reply_send(request *r);
+
+/* pages.c: what is compiled in. */
+int is_page(const char *path);
+void handle_page(request *r, const char *path);
+
 /* files.c: an object with ranges and conditions. */
 void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name);
 

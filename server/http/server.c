@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "faults.h"
 #include "http/body.h"
@@ -13,34 +12,6 @@
 #include "metrics.h"
 
 enum { CONNECTION_MEMORY = 16 * 1024 };
-
-int is_page(const char *path);
-void handle_page(request *r, const char *path);
-
-int64_t clock_us(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
-static void run_away(task *t) {
-  request *r = (request *)(void *)t;
-  r->away(r);
-  FAULT_POINT("before-reply");
-  if (r->phase == PHASE_AWAY) {
-    r->phase = PHASE_SEND; /* no response could be made: the connection closes */
-  }
-  MHD_resume_connection(r->connection);
-}
-
-enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r)) {
-  r->away = fn;
-  r->away_task.run = run_away;
-  r->phase = PHASE_AWAY;
-  MHD_suspend_connection(r->connection);
-  tasks_add(pool, &r->away_task);
-  return REQUEST_AWAY;
-}
 
 static enum MHD_Result dispatch(request *r) {
   switch (r->route->id) {
@@ -130,12 +101,6 @@ static request *request_create(server *srv, struct MHD_Connection *connection, c
     make_number(r->number, sizeof r->number);
   }
   return r;
-}
-
-void request_fields(const request *r, char out[REQUEST_FIELDS]) {
-  snprintf(out, REQUEST_FIELDS, "\"request\":\"%s\"%s%s%s,\"method\":\"%.8s\",\"route\":\"%s\"", r->number,
-           r->trace[0] ? ",\"traceparent\":\"" : "", r->trace, r->trace[0] ? "\"" : "",
-           r->route ? r->route->method : "", r->route ? r->route->path : "");
 }
 
 /* The first call of a request: everything that the headers decide. Leaves a response where the answer is clear. */

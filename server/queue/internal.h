@@ -79,6 +79,7 @@ static inline int is_for(const job *j, const char *key, const char *owner) {
 /* Counts the job with its owner. */
 void owner_enter(queue *q, job *j);
 void owner_leave(queue *q, const job *j);
+void schedule_leave(queue *q, job *j); /* undoes what queue_take() counted */
 void table_add(queue *q, job *j);
 void table_drop_key(queue *q, job *j); /* when it ends */
 void table_ended(queue *q, job *j);

@@ -136,3 +136,9 @@ int queue_running(queue *q) {
   pthread_mutex_unlock(&q->lock);
   return running;
 }
+
+void queue_set_limit(queue *q, int limit) {
+  pthread_mutex_lock(&q->lock);
+  q->options.limit = limit;
+  pthread_mutex_unlock(&q->lock);
+}

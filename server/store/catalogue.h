@@ -35,8 +35,6 @@ typedef struct resource {
 } resource;
 void resource_free(resource *r);
 
-/* Keeps one that is there; owned by "". See store/owners.h for those who own. */
-store_result catalogue_put(catalogue *cat, const resource *r);
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out);
 store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id);
 /* The functions that list return the number filled, −1 where the rows cannot be read: nothing is filled then. */

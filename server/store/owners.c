@@ -99,6 +99,16 @@ int owner_of_meshes(database *db, const char *request, const char *tenant, int64
   return code == SQLITE_DONE ? SQLITE_OK : code == SQLITE_ROW ? SQLITE_NOTFOUND : code;
 }
 
+/* Of nobody: what is put without an owner belongs to "". */
+static int put_unowned(database *db, void *arg) {
+  int code = resource_insert(db, arg);
+  return code == SQLITE_OK ? owner_insert(db, arg, "", NULL) : code;
+}
+
+store_result catalogue_put(catalogue *cat, const resource *r) {
+  return catalogue_write(cat, put_unowned, (void *)(uintptr_t)r);
+}
+
 static const char owner_exists[] = "SELECT 1 FROM owner WHERE kind=?1 AND id=?2 AND tenant=?3";
 
 typedef struct put_arg {

@@ -20,6 +20,8 @@ int owner_of_job(database *db, const char *job, int64_t now);
  * takes them away. SQLITE_NOTFOUND where one is gone and `all` is wanted. */
 int owner_of_meshes(database *db, const char *request, const char *tenant, int64_t now, int all);
 
+/* Puts a row if it is absent, owned by "". */
+store_result catalogue_put(catalogue *cat, const resource *r);
 /* Puts a mesh if it is absent, and makes the tenant its owner. STORE_CONFLICT: with it the tenant would have more bytes
  * than quota (0: no limit); nothing is changed then. *fresh: the tenant did not own it before. */
 store_result catalogue_put_for(catalogue *cat, const resource *r, const char *tenant, int64_t quota, int *fresh);
