@@ -1,4 +1,4 @@
-/* Files that are compiled in: the studio, the API document and its reader, a page for each problem type. */
+/* Compiled-in files: the studio, the API document and its reader, a page for each problem type. */
 #include <string.h>
 
 #include "http/http.h"
@@ -29,7 +29,7 @@ void handle_page(request *r, const char *path) {
   } else if (own) {
     reply_bytes(r, 200, own->mime, own->bytes, own->size);
   } else {
-    reply_refuse(r, "not-found", "There is nothing at this path; /openapi.json lists what there is.");
+    reply_refuse(r, "not-found", "Nothing exists at this path; /openapi.json lists all routes.");
     return;
   }
   if (file) {

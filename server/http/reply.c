@@ -16,7 +16,7 @@ static void take(request *r, unsigned status, struct MHD_Response *response, siz
 
 void reply_header(request *r, const char *name, const char *value) {
   if (r->response && MHD_add_response_header(r->response, name, value) != MHD_YES) {
-    MHD_destroy_response(r->response); /* no memory: none is better than one without its type or its place */
+    MHD_destroy_response(r->response); /* out of memory: no response is better than one that lacks a header */
     r->response = NULL;
   }
 }
@@ -76,11 +76,11 @@ void reply_refuse(request *r, const char *name, const char *format, ...) {
 
 void reply_store(request *r, store_result result) {
   if (result == STORE_NOT_FOUND) {
-    reply_refuse(r, "not-found", "There is nothing with this id; it may have been deleted.");
+    reply_refuse(r, "not-found", "Nothing has this id; it may have been deleted.");
   } else if (result == STORE_FULL) {
-    reply_refuse(r, "storage-full", "The disk of the server is full; nothing was stored. Make room and try again.");
+    reply_refuse(r, "storage-full", "The server's disk is full; nothing was stored. Free some space and try again.");
   } else {
-    reply_refuse(r, "internal", "The store could not be read or written; the log of the server says why.");
+    reply_refuse(r, "internal", "The store could not be read or written; the server's log says why.");
   }
 }
 
@@ -107,7 +107,8 @@ static int names_tag(const request *r, const char *header, const char *etag, int
 int reply_conditions(request *r, const char *etag) {
   int lines, reads = r->route->method[0] == 'G';
   if (!names_tag(r, "If-Match", etag, parse_tag_matches_strong, &lines) && lines > 0) {
-    reply_refuse(r, "precondition-failed", "It has another tag than If-Match asks for: %s. Nothing was done.", etag);
+    reply_refuse(r, "precondition-failed", "The current ETag is %s, which If-Match does not name. Nothing was done.",
+                 etag);
     return 1;
   }
   if (!names_tag(r, "If-None-Match", etag, parse_tag_matches, &lines)) {
@@ -116,7 +117,8 @@ int reply_conditions(request *r, const char *etag) {
   if (reads) {
     reply_empty(r, 304);
   } else {
-    reply_refuse(r, "precondition-failed", "It has a tag that If-None-Match excludes: %s. Nothing was done.", etag);
+    reply_refuse(r, "precondition-failed", "The current ETag is %s, which If-None-Match excludes. Nothing was done.",
+                 etag);
   }
   return 1;
 }

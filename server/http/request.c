@@ -1,4 +1,4 @@
-/* What every handler may do with its request: leave the HTTP thread, and name itself in the log. */
+/* What all handlers share: moving a request to another thread, and its fields in the log. */
 #include <stdio.h>
 #include <time.h>
 
@@ -22,7 +22,7 @@ static void run_away(task *t) {
   r->away(r);
   FAULT_POINT("before-reply");
   if (r->phase == PHASE_AWAY) {
-    r->phase = PHASE_SEND; /* no response could be made: the connection closes */
+    r->phase = PHASE_SEND; /* the task could not make a response: reply_send() closes the connection */
   }
   MHD_resume_connection(r->connection);
 }

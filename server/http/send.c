@@ -1,10 +1,10 @@
-/* The last step of a request: headers that every response carries, and sending it. */
+/* The last step of a request: adds the headers that every response carries and queues the response. */
 #include <stdio.h>
 #include <string.h>
 
 #include "http/http.h"
 
-/* Whether the list, comma-separated and perhaps with spaces, names the origin. */
+/* Whether the list, separated by commas or spaces, names the origin. */
 static int is_listed(const char *list, const char *origin) {
   size_t n = strlen(origin);
   for (const char *at = list; *at;) {
@@ -18,8 +18,8 @@ static int is_listed(const char *list, const char *origin) {
   return 0;
 }
 
-/* Whether the browser's origin may call. Where that depends on the origin every answer says so, also to those who may
- * not or did not name one, or a cache would hand them each other's (Fetch, "CORS protocol and HTTP caches"). */
+/* Adds the CORS headers. If they depend on the origin, every response carries Vary, even one to an origin that is not
+ * allowed or not named, so that a cache does not mix them up (Fetch, "CORS protocol and HTTP caches"). */
 static void add_cors(request *r) {
   const char *allowed = r->srv->options->cors, *origin = header_of(r, "Origin");
   if (!allowed[0]) {
@@ -47,7 +47,7 @@ static void add_cors(request *r) {
 
 enum MHD_Result reply_send(request *r) {
   if (!r->response) {
-    return MHD_NO; /* no memory even for an answer: the connection closes */
+    return MHD_NO; /* out of memory: the connection closes without a response */
   }
   if (r->closes || (r->status >= 400 && r->has_body)) {
     reply_header(r, "Connection", "close");

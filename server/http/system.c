@@ -30,7 +30,7 @@ static void metrics_away(request *r) {
   queue_numbers n;
   queue_count(srv->q, &n);
   metrics_write(&text);
-  metrics_family(&text, "orbmorph_jobs", "gauge", "Unfinished jobs; waiting: for the embeddings that they need.");
+  metrics_family(&text, "orbmorph_jobs", "gauge", "Unfinished jobs; waiting: for embeddings that they need.");
   api_text_printf(&text, "orbmorph_jobs{state=\"queued\"} %d\norbmorph_jobs{state=\"waiting\"} %d\n", n.queued,
                   n.waiting);
   api_text_printf(&text, "orbmorph_jobs{state=\"running\"} %d\n", n.running);
@@ -43,17 +43,17 @@ static void metrics_away(request *r) {
     api_text_printf(&text, "orbmorph_jobs_ended_total{state=\"%s\"} %lld\n", api_job_state_name((api_job_state)s),
                     (long long)n.ended[s]);
   }
-  gauge(&text, "orbmorph_queue_oldest_seconds", "Age of the oldest job that nothing but a worker is missing for.",
+  gauge(&text, "orbmorph_queue_oldest_seconds", "Age of the oldest job that waits for a worker.",
         1e-3 * (double)n.oldest_ms);
-  gauge(&text, "orbmorph_waiting_connections", "Connections that wait for a job.", n.waiters);
+  gauge(&text, "orbmorph_waiting_connections", "Connections that wait for a job to end.", n.waiters);
   int64_t stored = catalogue_bytes(srv->cat, 0);
   if (stored >= 0) {
     gauge(&text, "orbmorph_stored_bytes", "Bytes of stored objects.", (double)stored);
   }
-  gauge(&text, "orbmorph_disk_free_bytes", "Free bytes of the file system of the data.",
+  gauge(&text, "orbmorph_disk_free_bytes", "Free bytes of the file system that holds the data folder.",
         (double)objects_free_bytes(srv->store));
-  gauge(&text, "orbmorph_queue_limit", "Unfinished jobs that are accepted at most.", (double)srv->options->queue_limit);
-  gauge(&text, "orbmorph_decoding_bytes", "Memory of the decoders of compressed bodies.",
+  gauge(&text, "orbmorph_queue_limit", "Largest number of unfinished jobs.", (double)srv->options->queue_limit);
+  gauge(&text, "orbmorph_decoding_bytes", "Bytes held by decoders of compressed bodies.",
         (double)__atomic_load_n(&srv->decoding, __ATOMIC_RELAXED));
   gauge(&text, "process_open_fds", "Open file descriptors.", count_entries("/proc/self/fd"));
   gauge(&text, "process_threads", "Threads.", count_entries("/proc/self/task"));
@@ -80,7 +80,7 @@ static enum MHD_Result ready(request *r) {
   api_json_open(&json, '{');
   api_json_member_string(&json, "status", "ready");
   if (query_has(r, "verbose") && access_is_operator(r)) {
-    queue_numbers n; /* a walk under the queue's lock: not for everybody */
+    queue_numbers n; /* for operators only: counting walks all jobs under the queue's lock */
     queue_count(srv->q, &n);
     api_json_member_integer(&json, "queued", n.queued);
     api_json_member_integer(&json, "waiting", n.waiting);

@@ -1,4 +1,4 @@
-/* A supermesh waits for its embeddings. */
+/* A supermesh job waits for the jobs of its embeddings. */
 #include <string.h>
 
 #include "queue/internal.h"
@@ -9,7 +9,7 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const c
   pthread_mutex_lock(&q->lock);
   memcpy(j->dependencies, keys, (size_t)count * sizeof *keys);
   j->dependency_count = count;
-  j->waits_for = 1; /* so that it does not run before all are there */
+  j->waits_for = 1; /* keeps it from running before all of them are submitted */
   pthread_mutex_unlock(&q->lock);
   for (int i = 0; i < count && result == QUEUE_OK; i++) {
     job *needed = NULL;
@@ -32,7 +32,7 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const c
   if (result != QUEUE_OK) {
     j->retry_at = orb_clock_ms() + 1000;
   }
-  if (j->cancel) { /* while it was planned */
+  if (j->cancel) { /* cancelled in the meantime */
     j->waits_for = 0;
     pthread_mutex_unlock(&q->lock);
     queue_finish(q, j, API_JOB_CANCELLED, NULL, NULL);

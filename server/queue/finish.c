@@ -1,4 +1,4 @@
-/* Ending, cancelling and retrying. */
+/* The end of a job, cancelling, and retry: jobs that a worker returns are chosen again after retry_at. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,7 +19,7 @@ static void release_dependents(queue *q, job *ended) {
   }
 }
 
-/* The end of a job in memory, after its row was committed. */
+/* Marks the job as ended in memory, after its row was committed. */
 static void ended_locked(queue *q, job *j, api_job_state state, const char *problem, int64_t now) {
   j->row.state = state;
   j->row.finished = now;
@@ -39,8 +39,8 @@ static void publish_end(queue *q, job *j, int64_t number, const char *json) {
   pthread_cond_broadcast(&q->work);
 }
 
-/* Writes the end and shows it; the caller has taken the job. worked: as the worker that has it, and leaves it in the
- * moment in which others see it ended. */
+/* Commits the end of a taken job, then shows it. worked: a worker has taken the job; it leaves the job in the same step
+ * in which others see that it has ended. */
 static store_result end_job(queue *q, job *j, api_job_state state, const char *problem, const resource *result,
                             int worked) {
   int64_t now = unix_ms();
@@ -51,7 +51,7 @@ static store_result end_job(queue *q, job *j, api_job_state state, const char *p
   shown.row.problem = (char *)(uintptr_t)problem;
   shown.progress = state == API_JOB_SUCCEEDED ? 1 : j->progress;
   api_text json = {0};
-  int64_t number = prepare_event(&shown, &json) + 1000; /* beyond events that are still on their way */
+  int64_t number = prepare_event(&shown, &json) + 1000; /* above any event that is added before the commit */
   pthread_mutex_unlock(&q->lock);
   FAULT_POINT("before-finish");
   store_result stored = json.failed ? STORE_ERROR
@@ -71,7 +71,7 @@ static store_result end_job(queue *q, job *j, api_job_state state, const char *p
   return stored;
 }
 
-/* Notes the wish; 1 where the job is the caller's to end, because no worker has it. */
+/* Marks the job as cancelled. 1 if no worker has it: the caller has then taken it and must end it. */
 static int cancel_locked(job *j) {
   int mine = !api_job_ended(j->row.state) && !j->taken;
   j->cancel = 1;
@@ -102,7 +102,8 @@ static int is_wanted(const queue *q, const job *needed, const job *besides) {
   return wanted;
 }
 
-/* Ends the sub-jobs that only this job wanted. Looked at and marked under one lock: who comes later gets another. */
+/* Cancels the embedding jobs that only this job needed. Each is checked and marked under one lock, so a request that
+ * comes later gets a new job. */
 static void cancel_needless(queue *q, job *of) {
   for (int d = 0; d < of->dependency_count; d++) {
     pthread_mutex_lock(&q->lock);
@@ -124,7 +125,7 @@ static void cancel_needless(queue *q, job *of) {
 void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result) {
   store_result stored = end_job(q, j, state, problem, result, 1);
   if (stored != STORE_OK) {
-    log_error("the end of job %s could not be stored; it will be run again", j->row.id);
+    log_error("the end of job %s could not be stored; the job will run again", j->row.id);
     pthread_mutex_lock(&q->lock);
     j->retry_at = orb_clock_ms() + 5000;
     pthread_mutex_unlock(&q->lock);
@@ -147,7 +148,7 @@ void queue_give_back(queue *q, job *j) {
     j->row.state = API_JOB_QUEUED;
     j->row.attempt -= stored == STORE_OK;
     j->stage[0] = 0;
-    if (stored != STORE_OK) { /* try again to make the row what it should be before it runs */
+    if (stored != STORE_OK) { /* the row still says that it runs: the next claim corrects it */
       j->retry_at = orb_clock_ms() + 5000;
     }
   }
@@ -169,7 +170,7 @@ store_result queue_cancel(queue *q, job *j) {
   int mine = cancel_locked(j);
   pthread_mutex_unlock(&q->lock);
   if (!mine) {
-    return STORE_OK; /* the worker that has it sees the wish */
+    return STORE_OK; /* the worker that has the job ends it */
   }
   store_result stored = end_cancelled(q, j);
   if (stored == STORE_OK) {

@@ -1,9 +1,9 @@
-/* How much work each owner has had, for fairness between owners. */
+/* The work done for each owner so far, for fairness between owners. */
 #include <string.h>
 
 #include "queue/internal.h"
 
-/* An entry for a name; one that has nothing unfinished makes room where all are taken. */
+/* The index of an owner's entry. If the table is full, an owner without unfinished jobs gives up its entry. */
 static int owner_at(queue *q, const char *name) {
   int at = 0, free_at = OWNERS - 1;
   while (at < q->owner_count && strcmp(q->owners[at].name, name) != 0) {
@@ -25,7 +25,7 @@ static int owner_at(queue *q, const char *name) {
   return at;
 }
 
-/* Who had nothing to do saves nothing up: it starts level with the least of those who have. */
+/* An owner without unfinished jobs does not save up service: it starts level with the least served of the others. */
 void owner_enter(queue *q, job *j) {
   j->owner = owner_at(q, j->row.owner);
   if (q->owners[j->owner].unfinished++ > 0) {

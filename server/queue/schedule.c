@@ -1,9 +1,9 @@
-/* Submitting, choosing, ending. */
+/* Choosing, taking and claiming a job. */
 
 #include "faults.h"
 #include "queue/internal.h"
 
-/* Whether a goes before b, which is older. */
+/* Whether job a goes before job b; b is the older one. */
 static int goes_before(const queue *q, const job *a, const job *b) {
   int class_a = a->row.priority / QUEUE_URGENCIES, class_b = b->row.priority / QUEUE_URGENCIES;
   if (class_a != class_b) {

@@ -1,12 +1,12 @@
-/* Submitting: a request becomes a job, or joins the unfinished job that already makes the same result. */
+/* Submitting: a request becomes a job, or joins the owner's unfinished job with the same key. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "faults.h"
 #include "queue/internal.h"
 
-/* The owner's job for the same, referenced; NULL with the number of the owner's listed jobs. One that was cancelled
- * while it was waited for is none. */
+/* The owner's unfinished job with the same key, with a reference; or NULL, and *mine is the number of the owner's
+ * listed jobs. Skips cancelled jobs, also one that is cancelled while this waits for its commit. */
 static job *adopt_locked(queue *q, const queue_request *request, int64_t *mine) {
   for (;;) {
     job *j;
@@ -18,7 +18,7 @@ static job *adopt_locked(queue *q, const queue_request *request, int64_t *mine) 
       return NULL;
     }
     j->refs++;
-    while (!j->committed && !j->dead) { /* until then the row is read by who writes it, without the lock */
+    while (!j->committed && !j->dead) { /* until then, the thread that commits the row reads it without the lock */
       pthread_cond_wait(&q->committed, &q->lock);
     }
     if (!j->cancel || j->dead) {
@@ -52,7 +52,7 @@ static queue_result submit_locked(queue *q, const queue_request *request, job **
     free(text);
     return QUEUE_ERROR;
   }
-  j->refs = 2; /* the table's and the caller's */
+  j->refs = 2; /* one of the table, one of the caller */
   j->row.request = text;
   j->row.kind = request->kind;
   j->row.cost = request->cost;
@@ -74,7 +74,7 @@ queue_result queue_submit(queue *q, const queue_request *request, job **out, int
   queue_result result = submit_locked(q, request, out, &is_fresh);
   if (result == QUEUE_OK && !is_fresh && request->listed && !(*out)->row.listed) {
     make_listed = 1;
-    (*out)->adopters++; /* from here nobody cancels it as needless */
+    (*out)->adopters++; /* keeps cancel_needless() away from it */
   }
   pthread_mutex_unlock(&q->lock);
   if (fresh) {

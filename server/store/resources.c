@@ -155,7 +155,7 @@ store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET
   return result;
 }
 
-/* Whether a row's description is one, and its own. */
+/* Whether a row's description is valid JSON with the row's own id. */
 #define DESCRIBES "iif(json_valid(json), json_extract(json, '$.id') IS id, 0)"
 
 int64_t catalogue_damaged(catalogue *cat) {

@@ -34,7 +34,7 @@ typedef struct progress_of {
   double began;
 } progress_of;
 
-/* The stage that was running is over; the next begins. */
+/* Ends the time measurement of the current stage and begins the next. */
 static void enter_stage(progress_of *p, const char *stage) {
   if (strncmp(p->stage, stage, sizeof p->stage - 1) == 0) {
     return;
@@ -53,7 +53,8 @@ static void on_progress(void *user, const char *stage, double fraction) {
   queue_progress(p->q, p->j, stage, fraction);
 }
 
-/* 1: the job was made to wait for embeddings. 0: all are there, or nothing is needed. −1: cannot be told now. */
+/* Looks for the embeddings that a supermesh needs. 1: some are missing and the job now waits for them; 0: none are
+ * missing; −1: the store failed, retry later. */
 static int plan(const run_env *env, job *j) {
   char keys[API_SHAPES_MAX][API_ID_SIZE];
   api_text texts[API_SHAPES_MAX];
@@ -67,7 +68,7 @@ static int plan(const run_env *env, job *j) {
   memset(&request, 0, sizeof request);
   cJSON *body = api_json_parse(job_request(j), strlen(job_request(j)), &error);
   if (!body || !api_supermesh_request_read(body, &request, &problem)) {
-    goto done; /* the run itself reports it */
+    goto done; /* run_supermesh() reports the error */
   }
   for (int32_t s = 0; s < request.shape_count; s++) {
     api_embedding_request wanted = {.options = request.embedding};
@@ -81,7 +82,7 @@ static int plan(const run_env *env, job *j) {
     for (int k = 0; k < count; k++) {
       twice |= strcmp(keys[k], keys[count]) == 0;
     }
-    /* One that only others own is made for this owner as well, which takes no time. */
+    /* An embedding that only others own is requested for this owner too; its job finds the result and ends at once. */
     store_result found =
         twice ? STORE_OK : catalogue_get_of(env->cat, RESOURCE_EMBEDDING, keys[count], job_owner(j), &known);
     resource_free(&known);
@@ -109,7 +110,7 @@ static int plan(const run_env *env, job *j) {
   if (count > 0) {
     result = 1;
     if (queue_wait_for(env->q, j, keys, requests, costs, count) != QUEUE_OK) {
-      log_warn("the embeddings that a job needs could not be queued; it is tried again");
+      log_warn("the embeddings that a job needs could not be queued; the job is retried");
     }
   }
 done:
@@ -130,7 +131,7 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_prob
       if (queue_cancel_wanted(env->q, j)) {
         queue_finish(env->q, j, API_JOB_CANCELLED, NULL, NULL);
       } else {
-        queue_give_back(env->q, j); /* the service stops */
+        queue_give_back(env->q, j); /* the service is stopping */
       }
       return;
     }
@@ -180,7 +181,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
     }
     queue_finish(env->q, j, API_JOB_SUCCEEDED, NULL, out.row.json ? &out.row : NULL);
   } else if (out.gone) {
-    queue_give_back(env->q, j); /* to be planned again */
+    queue_give_back(env->q, j); /* a worker plans it again */
   } else {
     finish_failed(env, j, ctx, &problem);
   }
@@ -219,7 +220,7 @@ static void *worker_main(void *argument) {
   worker *self = argument;
   job *j;
   int threads;
-  /* Requests come first; the threads that a job starts inherit this. Where it is not allowed, they compete. */
+  /* Gives requests precedence over jobs; threads that a job starts inherit the value. Failure is harmless. */
   (void)setpriority(PRIO_PROCESS, (id_t)gettid(), self->pool->options.nice);
   while (queue_take(self->pool->env.q, self->small_only, &j, &threads)) {
     run_one(self->pool, j, threads);
@@ -228,7 +229,7 @@ static void *worker_main(void *argument) {
 }
 
 worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogue *cat, objects *store) {
-  int lanes = options->workers + (options->workers == 1); /* one more for small jobs */
+  int lanes = options->workers + (options->workers == 1); /* a single worker gets a second one for small jobs */
   worker_pool *pool = calloc(1, sizeof *pool + (size_t)lanes * sizeof(worker));
   if (!pool) {
     return NULL;
