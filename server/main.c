@@ -1,4 +1,4 @@
-/* orbmorphd: command line, start, signals, stop. Its parts in the order in which they start: serve(). */
+/* orbmorphd: command line, start, signals, stop. start() shows all parts in order. */
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -274,7 +274,8 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
   queue_stop(srv->q, 1);
 }
 
-static int serve(server *srv, const command_line *line, int signals, const sigset_t *set) {
+/* Starts all parts in order; 0 if one of them failed. */
+static int start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
   queue_options queued = {.workers = (int)o->workers,
@@ -286,32 +287,21 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
                            .job_memory = o->job_memory,
                            .job_ms = 1000 * o->job_seconds,
                            .max_triangles = o->max_triangles};
-  worker_pool *workers = NULL;
-  int result = 1;
   if (queued.cores < queued.workers) {
     queued.cores = queued.workers;
   }
   int listens = listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
-  if (!listens || objects_open(o->data, &srv->store) != STORE_OK || catalogue_open(o->data, &srv->cat) != STORE_OK ||
-      !(srv->callers = callers_open(srv->cat)) || !(srv->q = queue_create(&queued, srv->cat)) ||
-      queue_recover(srv->q) != STORE_OK || !(srv->descriptions = cache_create(CACHE_BYTES)) ||
-      !(srv->io = tasks_start((int)o->io_threads)) || !(srv->checks = tasks_start((int)o->workers)) ||
-      !(srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) ||
-      !(workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) || !http_start(srv)) {
-    log_error("the service could not be started");
-  } else {
-    __atomic_store_n(&srv->ready, 1, __ATOMIC_RELEASE);
-    if (srv->needs_token && callers_count(srv->callers) == 0) {
-      log_warn("tokens are needed but none exist: create one with orbmorphd token add");
-    }
-    srv->control = control_listen(o->data);
-    announce(srv);
-    pthread_sigmask(SIG_UNBLOCK, set, NULL); /* only in this thread */
-    wait_for_stop(srv, line, signals);
-    control_close(o->data, srv->control);
-    result = 0;
-  }
+  return listens && objects_open(o->data, &srv->store) == STORE_OK && catalogue_open(o->data, &srv->cat) == STORE_OK &&
+         (srv->callers = callers_open(srv->cat)) && (srv->q = queue_create(&queued, srv->cat)) &&
+         queue_recover(srv->q) == STORE_OK && (srv->descriptions = cache_create(CACHE_BYTES)) &&
+         (srv->io = tasks_start((int)o->io_threads)) && (srv->checks = tasks_start((int)o->workers)) &&
+         (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&
+         (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) && http_start(srv);
+}
+
+/* Stops all parts that were started. */
+static void stop(server *srv, worker_pool *workers) {
   __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
   if (srv->q) {
     queue_stop(srv->q, 1);
@@ -331,7 +321,26 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
   objects_close(srv->store);
   cache_destroy(srv->descriptions);
   callers_close(srv->callers);
-  return result;
+}
+
+static int serve(server *srv, const command_line *line, int signals, const sigset_t *set) {
+  worker_pool *workers = NULL;
+  int started = start(srv, &workers);
+  if (!started) {
+    log_error("the service could not be started");
+  } else {
+    __atomic_store_n(&srv->ready, 1, __ATOMIC_RELEASE);
+    if (srv->needs_token && callers_count(srv->callers) == 0) {
+      log_warn("tokens are needed but none exist: create one with orbmorphd token add");
+    }
+    srv->control = control_listen(srv->options->data);
+    announce(srv);
+    pthread_sigmask(SIG_UNBLOCK, set, NULL); /* only in this thread */
+    wait_for_stop(srv, line, signals);
+    control_close(srv->options->data, srv->control);
+  }
+  stop(srv, workers);
+  return !started;
 }
 
 static int run(const command_line *line) {

@@ -6,7 +6,7 @@
 
 #include "evict.h"
 #include "store/owners.h"
-#include "worker/spheres.h"
+#include "store/spheres.h"
 
 enum { PAGE = 64 };
 

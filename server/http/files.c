@@ -8,7 +8,7 @@
 #include "http/http.h"
 #include "log.h"
 #include "metrics.h"
-#include "worker/spheres.h"
+#include "store/spheres.h"
 
 static void add_headers(request *r, const char *etag, const char *mime, const char *name) {
   char disposition[160];

@@ -8,7 +8,7 @@
  *   catalogue.c   the writer thread with group commit, the pool of readers
  *   rows.c        reading rows of any kind
  *   resources.c, owners.c, jobs.c, tokens.c   the SQL of each kind of row
- *   objects.c     publishing, reading and deleting files
+ *   objects.c     publishing, reading and deleting files; spheres.c   the file of aligned spheres
  *
  * Contract. ONE connection writes and checkpoints, and one thread owns it (SQLite before 3.51.3 can lose a WAL reset
  * with two). Writes are passed to it as functions. It runs all waiting writes in one transaction (group commit), each

@@ -53,69 +53,79 @@ static void on_progress(void *user, const char *stage, double fraction) {
   queue_progress(p->q, p->j, stage, fraction);
 }
 
-/* Looks for the embeddings that a supermesh needs. 1: some are missing and the job now waits for them; 0: none are
- * missing; −1: the store failed, retry later. */
-static int plan(const run_env *env, job *j) {
+/* The embeddings that a supermesh lacks, each once: keys, requests and triangles. */
+typedef struct missing {
   char keys[API_SHAPES_MAX][API_ID_SIZE];
   api_text texts[API_SHAPES_MAX];
-  const char *requests[API_SHAPES_MAX];
   int64_t costs[API_SHAPES_MAX];
-  int count = 0, result = 0;
+  int count;
+} missing;
+
+static int64_t triangles_of(const run_env *env, const char *mesh) {
+  resource row = {0};
+  api_mesh_summary summary = {0};
+  int64_t triangles = 0;
+  if (catalogue_get(env->cat, RESOURCE_MESH, mesh, &row) == STORE_OK) {
+    triangles = api_mesh_summarise(row.json, &summary) ? summary.triangles : 0;
+    resource_free(&row);
+  }
+  return triangles;
+}
+
+/* Adds the embedding of a shape if it is missing. 0: the store failed, or out of memory. */
+static int add_if_missing(const run_env *env, const job *j, const api_supermesh_request *request, int32_t s,
+                          missing *list) {
+  api_embedding_request wanted = {.options = request->embedding};
+  char *key = list->keys[list->count];
+  memcpy(wanted.mesh, request->shapes[s].mesh, sizeof wanted.mesh);
+  if (!api_embedding_request_id(&wanted, key)) {
+    return 0;
+  }
+  for (int k = 0; k < list->count; k++) {
+    if (strcmp(list->keys[k], key) == 0) {
+      return 1;
+    }
+  }
+  /* An embedding that only others own is requested for this owner too; its job finds the result and ends at once. */
+  resource known = {0};
+  store_result found = catalogue_get_of(env->cat, RESOURCE_EMBEDDING, key, job_owner(j), &known);
+  resource_free(&known);
+  if (found == STORE_ERROR || found == STORE_OK) {
+    return found == STORE_OK;
+  }
+  list->costs[list->count] = triangles_of(env, wanted.mesh);
+  api_text *text = &list->texts[list->count++];
+  api_embedding_request_write(&wanted, text);
+  return !text->failed;
+}
+
+/* Makes a supermesh wait for the embeddings that it lacks. 1: it now waits; 0: it lacks none; −1: the store failed or
+ * out of memory, retry later. */
+static int plan(const run_env *env, job *j) {
+  const char *requests[API_SHAPES_MAX];
+  missing list = {.count = 0};
+  int result = 0;
   api_problem problem = {0};
   api_supermesh_request request;
   api_json_error error;
-  memset(texts, 0, sizeof texts);
   memset(&request, 0, sizeof request);
   cJSON *body = api_json_parse(job_request(j), strlen(job_request(j)), &error);
-  if (!body || !api_supermesh_request_read(body, &request, &problem)) {
-    goto done; /* run_supermesh() reports the error */
+  if (body && api_supermesh_request_read(body, &request, &problem)) { /* else run_supermesh() reports the error */
+    for (int32_t s = 0; s < request.shape_count && result == 0; s++) {
+      result = add_if_missing(env, j, &request, s, &list) ? 0 : -1;
+    }
   }
-  for (int32_t s = 0; s < request.shape_count; s++) {
-    api_embedding_request wanted = {.options = request.embedding};
-    resource known = {0};
-    memcpy(wanted.mesh, request.shapes[s].mesh, sizeof wanted.mesh);
-    if (!api_embedding_request_id(&wanted, keys[count])) {
-      result = -1;
-      goto done;
-    }
-    int twice = 0;
-    for (int k = 0; k < count; k++) {
-      twice |= strcmp(keys[k], keys[count]) == 0;
-    }
-    /* An embedding that only others own is requested for this owner too; its job finds the result and ends at once. */
-    store_result found =
-        twice ? STORE_OK : catalogue_get_of(env->cat, RESOURCE_EMBEDDING, keys[count], job_owner(j), &known);
-    resource_free(&known);
-    if (found == STORE_ERROR) {
-      result = -1;
-      goto done;
-    }
-    if (found == STORE_OK) {
-      continue;
-    }
-    api_mesh_summary summary = {0};
-    costs[count] = 0;
-    if (catalogue_get(env->cat, RESOURCE_MESH, wanted.mesh, &known) == STORE_OK) {
-      costs[count] = api_mesh_summarise(known.json, &summary) ? summary.triangles : 0;
-      resource_free(&known);
-    }
-    api_embedding_request_write(&wanted, &texts[count]);
-    if (texts[count].failed) {
-      result = -1;
-      goto done;
-    }
-    requests[count] = texts[count].data;
-    count++;
+  for (int i = 0; i < list.count; i++) {
+    requests[i] = list.texts[i].data;
   }
-  if (count > 0) {
+  if (result == 0 && list.count > 0) {
     result = 1;
-    if (queue_wait_for(env->q, j, keys, requests, costs, count) != QUEUE_OK) {
+    if (queue_wait_for(env->q, j, list.keys, requests, list.costs, list.count) != QUEUE_OK) {
       log_warn("the embeddings that a job needs could not be queued; the job is retried");
     }
   }
-done:
-  for (int i = 0; i < API_SHAPES_MAX; i++) {
-    api_text_free(&texts[i]);
+  for (int i = 0; i < list.count; i++) {
+    api_text_free(&list.texts[i]);
   }
   api_supermesh_request_free(&request);
   api_problem_free(&problem);

@@ -6,7 +6,7 @@
  *   run_embedding.c   an embedding: mesh → sphere        sphere.c    reading a stored sphere
  *   run_supermesh.c   a supermesh: embeddings and landmarks → asset, places, aligned spheres
  *   load.c            inputs that both read
- *   places.c          the file of places                 spheres.c   the file of aligned spheres
+ *   places.c          the file of places
  *
  * Contract. A worker first plans the job: a supermesh that lacks embeddings goes back to the queue to wait for them.
  * Otherwise the worker claims the job (a commit), runs it with a context of its own (memory, time, threads), publishes

@@ -5,9 +5,9 @@
 
 #include "api/json.h"
 #include "metrics.h"
+#include "store/spheres.h"
 #include "worker/places.h"
 #include "worker/run.h"
-#include "worker/spheres.h"
 
 /* The inputs of a merge; memory of the context. */
 typedef struct merge_input {

@@ -145,7 +145,7 @@ test('ended jobs beyond keep-jobs are forgotten, what is unfinished and what the
   await d.delete(running.url);
   await d.stop('SIGTERM');
   const { stdout } = await promisify(execFile)(binaries.daemon, ['--gc', '--data', d.data, '--keep-jobs', '1']);
-  assert.match(stdout, /removed [23] ended jobs/);
+  assert.match(stdout, /deleted [23] ended jobs/);
   await d.start();
   assert.equal((await jobs()).length, 1);
   assert.deepEqual(new Set(await statuses(d, made)), new Set([200]));

@@ -7,8 +7,8 @@
  *   uint8[32]           SHA-256 of all bytes so far
  *   uint32 shapes, char[8] "ORBSPHER"
  */
-#ifndef ORB_WORKER_SPHERES_H
-#define ORB_WORKER_SPHERES_H
+#ifndef ORB_STORE_SPHERES_H
+#define ORB_STORE_SPHERES_H
 
 #include "orbmorph/align.h"
 #include "store/objects.h"
