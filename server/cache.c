@@ -11,7 +11,7 @@ typedef struct item {
   cached entry; /* first: pointers to it are pointers to the item */
   struct item *next_hash, *newer, *older;
   int refs, linked;
-  int64_t used; /* as told to the catalogue */
+  int64_t used; /* last use recorded in the catalogue */
 } item;
 
 struct cache {
@@ -70,7 +70,7 @@ static void drop(cache *c, item *it) {
   unref(it);
 }
 
-/* tenant NULL: any. */
+/* tenant NULL: any tenant. */
 static item *find(cache *c, resource_kind kind, const char *id, const char *tenant) {
   item *it = *bucket(c, kind, id);
   while (it && (it->entry.row.kind != kind || strcmp(it->entry.row.id, id) != 0 ||

@@ -27,51 +27,53 @@ typedef struct entry {
 static const entry table[] = {
     {"listen", TEXT(listen), "127.0.0.1:8080", "ADDR:PORT, [V6]:PORT or unix:PATH; port 0 picks a free one"},
     {"socket-mode", TEXT(socket_mode), "0660", "permissions of a Unix socket, in octal"},
-    {"data", TEXT(data), "orbmorph-data", "the folder of everything that is kept"},
-    {"config", TEXT(file), "", "a file of lines NAME = VALUE with these same names"},
-    {"workers", NUMBER(workers, 1, 256), "0", "jobs that run side by side; 0: one a core"},
-    {"worker-nice", NUMBER(worker_nice, 0, 19), "5", "by how much jobs give way to requests and to other programs"},
+    {"data", TEXT(data), "orbmorph-data", "the data folder: everything that the service stores"},
+    {"config", TEXT(file), "", "a file of lines NAME = VALUE with these names"},
+    {"workers", NUMBER(workers, 1, 256), "0", "jobs that run at once; 0: one per core"},
+    {"worker-nice", NUMBER(worker_nice, 0, 19), "5", "nice value of jobs; higher yields more to requests and programs"},
     {"io-threads", NUMBER(io_threads, 1, 64), "6", "threads for queries and commits"},
     {"http-threads", NUMBER(http_threads, 2, 64), "2", "threads that serve connections"},
-    {"max-connections", NUMBER(max_connections, 16, 1000000), "16384", "connections at once"},
+    {"max-connections", NUMBER(max_connections, 16, 1000000), "16384", "limit on open connections"},
     {"connections-per-address", NUMBER(connections_per_address, 0, 1000000), "256",
-     "connections of one address, where limits hold; 0: no limit"},
+     "limit on open connections of one address, see --limits; 0: no limit"},
     {"requests-per-second", NUMBER(requests_per_second, 0, 1000000), "100",
-     "of one address, where limits hold, over 10 s; 0: no limit"},
+     "limit on requests of one address, averaged over 10 s, see --limits; 0: no limit"},
     {"limits", TEXT(limits), "remote",
-     "whom the two limits above hold for; remote: other machines, where tokens are needed; all; off"},
-    {"idle-seconds", NUMBER(idle_seconds, 1, 3600), "30", "a connection that is silent for so long is closed"},
-    {"header-seconds", NUMBER(header_seconds, 1, 3600), "15", "the headers of a request must be there after so long"},
+     "which addresses the two limits above apply to; remote: other machines, if tokens are needed; all; off"},
+    {"idle-seconds", NUMBER(idle_seconds, 1, 3600), "30", "a connection is closed after this long without data"},
+    {"header-seconds", NUMBER(header_seconds, 1, 3600), "15", "time limit for the headers of a request"},
     {"slow-seconds", NUMBER(slow_seconds, 1, 3600), "10", "time over which min-rate is measured"},
     {"min-rate", NUMBER(min_rate, 0, 1 << 30), "256",
-     "bytes a second by which a body must come and an answer be taken; 0: any"},
+     "slowest allowed transfer of a body or response, in bytes per second; 0: any"},
     {"slow-ms", NUMBER(slow_ms, 1, 3600000), "1000", "a request that takes longer is logged as slow"},
-    {"max-body", NUMBER(max_body, 1024, INT64_C(1) << 40), "512M", "bytes of an upload"},
-    {"max-json", NUMBER(max_json, 1024, 1 << 26), "1M", "bytes of a JSON body"},
+    {"max-body", NUMBER(max_body, 1024, INT64_C(1) << 40), "512M", "limit on the bytes of an upload"},
+    {"max-json", NUMBER(max_json, 1024, 1 << 26), "1M", "limit on the bytes of a JSON body"},
     {"max-ratio", NUMBER(max_ratio, 2, 1000000), "200",
-     "times by which a compressed body may grow beyond its first 1M"},
-    {"decode-memory", NUMBER(decode_memory, 1 << 20, INT64_C(1) << 40), "256M", "bytes that unpack bodies at once"},
-    {"max-triangles", NUMBER(max_triangles, 4, 500000000), "5000000", "triangles of a mesh"},
-    {"queue-limit", NUMBER(queue_limit, 1, 1000000), "10000", "unfinished jobs"},
-    {"job-memory", NUMBER(job_memory, 1 << 20, INT64_C(1) << 46), "0", "bytes of one job; 0: half of the memory"},
-    {"job-seconds", NUMBER(job_seconds, 1, 864000), "3600", "seconds of one job"},
-    {"disk-reserve", NUMBER(disk_reserve, 0, INT64_C(1) << 46), "64M", "bytes that are left free on the disk"},
+     "limit on the compression ratio of a body that decompresses to more than 1M"},
+    {"decode-memory", NUMBER(decode_memory, 1 << 20, INT64_C(1) << 40), "256M",
+     "bytes for decompressing all bodies at once"},
+    {"max-triangles", NUMBER(max_triangles, 4, 500000000), "5000000", "limit on the triangles of a mesh"},
+    {"queue-limit", NUMBER(queue_limit, 1, 1000000), "10000", "limit on unfinished jobs"},
+    {"job-memory", NUMBER(job_memory, 1 << 20, INT64_C(1) << 46), "0",
+     "memory limit of one job in bytes; 0: half of the machine's memory"},
+    {"job-seconds", NUMBER(job_seconds, 1, 864000), "3600", "time limit of one job"},
+    {"disk-reserve", NUMBER(disk_reserve, 0, INT64_C(1) << 46), "64M", "bytes that uploads leave free on the disk"},
     {"drain-seconds", NUMBER(drain_seconds, 0, 3600), "8", "on SIGTERM, time for running jobs to end"},
     {"derived-bytes", NUMBER(derived_bytes, 1 << 20, INT64_C(1) << 50), "0",
-     "bytes of embeddings and supermeshes, the least used leave first; 0: no limit"},
+     "bytes of embeddings and supermeshes to keep, most recently used ones first; 0: all"},
     {"keep-jobs", NUMBER(keep_jobs, 0, INT64_C(1) << 40), "100000",
-     "ended jobs that stay in the catalogue, the newest; 0: all"},
+     "ended jobs to keep in the catalogue, newest first; 0: all"},
     {"cors", TEXT(cors), "", "origins that browsers may call from, comma-separated, or *"},
-    {"log-level", TEXT(log_level), "info", "debug, info, warn, error"},
+    {"log-level", TEXT(log_level), "info", "debug, info, warn or error"},
     {"log-format", TEXT(log_format), "json", "json or text"},
-    {"tls-certificate", TEXT(tls_certificate), "", "PEM file; with tls-key the service speaks https"},
+    {"tls-certificate", TEXT(tls_certificate), "", "PEM file; with tls-key, the service speaks https"},
     {"tls-key", TEXT(tls_key), "", "PEM file"},
     {"auth", TEXT(auth), "loopback",
-     "loopback: tokens are needed unless it listens on loopback; on: always; off: never, a front end guards it"},
+     "loopback: tokens are needed unless the service listens on loopback; on: always; off: never, a proxy checks"},
 };
 enum { ENTRIES = sizeof table / sizeof table[0] };
 
-/* A daemon that runs says what is wrong in its log. */
+/* The daemon is running: complain() writes to the log. */
 static int runs;
 
 static void complain(const char *format, ...) ORB_PRINTF(1, 2);
@@ -129,7 +131,7 @@ static int set(config *out, const entry *e, const char *value, const char *from)
     return 1;
   }
   int64_t number;
-  int is_default = strcmp(value, e->standard) == 0; /* 0 may mean "by the machine" */
+  int is_default = strcmp(value, e->standard) == 0; /* a default of 0 may lie outside the range: "by the machine" */
   if (!config_number(value, &number) || (!is_default && (number < e->least || number > e->most))) {
     complain("%s: %s must be a number from %lld to %lld, not \"%s\"", from, e->name, (long long)e->least,
              (long long)e->most, value);
@@ -179,10 +181,10 @@ static int read_file(config *out, const char *path) {
     }
     const entry *e = equals ? find(name, strlen(name)) : NULL;
     if (!equals) {
-      complain("%s: a line is NAME = VALUE, not \"%s\"", from, name);
+      complain("%s: a line must be NAME = VALUE, not \"%s\"", from, name);
       fine = 0;
     } else if (!e) {
-      complain("%s: \"%s\" is none of the names that --help lists", from, name);
+      complain("%s: unknown name \"%s\"; see --help", from, name);
       fine = 0;
     } else {
       fine = set(out, e, trim(equals + 1), from);
@@ -216,27 +218,26 @@ static void print_help(void) {
   puts(
       "orbmorphd: meshes in over HTTP, one certified morphing GLB out\n\n"
       "  orbmorphd [--NAME VALUE]…      run the service\n"
-      "  orbmorphd --check-config       read the configuration and say whether it is valid\n"
-      "  orbmorphd --check-data         verify every object and row of the data folder\n"
-      "  orbmorphd --gc                 remove derived objects beyond derived-bytes, ended jobs beyond\n"
+      "  orbmorphd --check-config       check the configuration and exit\n"
+      "  orbmorphd --check-data         verify all objects and rows of the data folder\n"
+      "  orbmorphd --gc                 delete derived objects beyond derived-bytes, ended jobs beyond\n"
       "                                 keep-jobs, and objects without a row\n"
       "  orbmorphd token add NAME --scope read,write,admin [--tenant NAME] [--quota BYTES] [--quota-jobs N]\n"
       "                                 [--priority 0..9]\n"
       "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-jobs …] [--priority …]\n"
       "  orbmorphd token list | token remove NAME\n"
-      "                                 also while the service runs; --tenant: whose things it sees, its own name if "
-      "not\n"
-      "                                 given; --quota: of its meshes in all; --quota-jobs: unfinished at once; with "
-      "--data as above\n"
+      "                                 manage tokens, also while the service runs; give the same --data.\n"
+      "                                 --tenant: the owner of what the token makes, by default NAME;\n"
+      "                                 --quota: bytes of its meshes; --quota-jobs: its unfinished jobs\n"
       "  orbmorphd --version, --help\n\n"
-      "Each NAME is also an environment variable (ORBMORPH_NAME) and a line of the config file; a flag wins over the\n"
-      "environment, that over the file, that over the default.\n");
+      "Each NAME is also an environment variable (ORBMORPH_NAME) and a line of the config file. A flag overrides the\n"
+      "environment, which overrides the file, which overrides the default in brackets.\n");
   for (size_t i = 0; i < ENTRIES; i++) {
     printf("  --%-24s %s [%s]\n", table[i].name, table[i].help, table[i].standard);
   }
 }
 
-/* Flags in two passes: the first only looks for the config file. */
+/* Reads the flags. Called twice: the first pass only looks for --config. */
 static config_action read_flags(config *out, int argc, char **argv, int only_file) {
   config_action action = CONFIG_RUN;
   for (int i = 1; i < argc; i++) {
@@ -266,7 +267,7 @@ static config_action read_flags(config *out, int argc, char **argv, int only_fil
     const entry *e = length > 2 && strncmp(flag, "--", 2) == 0 ? find(flag + 2, length - 2) : NULL;
     const char *value = equals ? equals + 1 : i + 1 < argc ? argv[++i] : NULL;
     if (!e || !value) {
-      complain(e ? "%s needs a value" : "%s is not an option; see --help", flag);
+      complain(e ? "%s needs a value" : "unknown option %s; see --help", flag);
       return CONFIG_BAD;
     }
     if ((!only_file || strcmp(e->name, "config") == 0) && !set(out, e, value, flag)) {
@@ -301,7 +302,7 @@ static int is_address(const char *text) {
   return fine;
 }
 
-/* Origins as browsers send them: a scheme, a host, perhaps a port, and nothing behind it. */
+/* Whether all are origins as browsers send them: a scheme, a host, optionally a port, and no path. */
 static int are_origins(const char *list) {
   if (strcmp(list, "*") == 0) {
     return 1;
@@ -312,7 +313,7 @@ static int are_origins(const char *list) {
     size_t scheme = host ? (size_t)(host - at) : length;
     int fine = scheme > 0 && scheme + 3 < length && !memchr(host + 3, '/', length - scheme - 3);
     if (!fine && (length != 4 || strncmp(at, "null", 4) != 0)) {
-      complain("cors must be * alone, or origins such as https://app.example.org, not \"%.*s\"", (int)length, at);
+      complain("cors must be *, or a list of origins such as https://app.example.org, not \"%.*s\"", (int)length, at);
       return 0;
     }
     at += length;
@@ -351,7 +352,7 @@ static int consistent(config *out) {
     out->job_memory = (int64_t)sysconf(_SC_PHYS_PAGES) / 2 * sysconf(_SC_PAGESIZE);
   }
   if ((out->tls_certificate[0] == 0) != (out->tls_key[0] == 0)) {
-    complain("tls-certificate and tls-key belong together");
+    complain("tls-certificate and tls-key must both be set, or neither");
     return 0;
   }
   return is_address(out->listen) && is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) &&
@@ -391,7 +392,7 @@ static int can_change(const char *name) {
 }
 
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken)) {
-  static config fresh; /* large; one thread alone handles signals */
+  static config fresh; /* static because it is large; only the main thread gets here */
   runs = 1;
   if (config_read(&fresh, argc, argv) != CONFIG_RUN) {
     return 0;

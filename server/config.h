@@ -1,4 +1,5 @@
-/* The configuration: flag > environment (ORBMORPH_NAME) > config file > default. */
+/* The configuration. A flag overrides the environment (ORBMORPH_NAME), which overrides the config file, which overrides
+ * the default. A new option: its field here, its line in the table of config.c, deploy/man/orbmorphd.8. */
 #ifndef ORB_CONFIG_H
 #define ORB_CONFIG_H
 
@@ -23,18 +24,19 @@ typedef struct config {
 
 typedef enum config_action {
   CONFIG_RUN,
-  CONFIG_PRINTED, /* --help, --version: nothing more to do */
-  CONFIG_BAD,     /* said why on standard error */
+  CONFIG_PRINTED, /* --help, --version: done */
+  CONFIG_BAD,     /* the reason is on standard error */
   CONFIG_CHECKED, /* --check-config */
   CONFIG_CHECK_DATA,
   CONFIG_GC,
 } config_action;
 
-/* A number as options take it, perhaps with K, M or G. 0 if it is none. */
+/* Parses a number ≥ 0 with an optional suffix K, M or G (powers of 1024). 0 if malformed. */
 int config_number(const char *text, int64_t *out);
-/* Reads it all again and takes over what can change while the service runs (log-level, queue-limit, derived-bytes, keep-jobs);
- * calls back for each option that differs, with whether it was taken. 0 where it is not valid: nothing changes then,
- * and the reason is on standard error. Readers of derived_bytes on other threads load it atomically. */
+/* Reads the configuration again and applies the options that may change at run time (log-level, queue-limit,
+ * derived-bytes, keep-jobs). Calls `changed` for each option that differs; `taken` says whether it was applied. 0 if
+ * the new configuration is invalid: nothing changes, and the reason is in the log. Other threads must load
+ * derived_bytes atomically. */
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken));
 config_action config_read(config *out, int argc, char **argv);
 

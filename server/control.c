@@ -15,7 +15,7 @@
 enum { LINE_MOST = 512, PATIENCE_S = 10 };
 static const char name[] = "control";
 
-/* The path of a data folder may be longer than a socket's address allows, but that of its descriptor never is. */
+/* The path of a data folder may be too long for a socket address, so the address goes through its descriptor. */
 static int address_of(const char *data, struct sockaddr_un *out) {
   int folder = open(data, O_PATH | O_DIRECTORY | O_CLOEXEC);
   *out = (struct sockaddr_un){.sun_family = AF_UNIX};
@@ -39,13 +39,13 @@ int control_listen(const char *data) {
   struct sockaddr_un at;
   int folder = address_of(data, &at), fd = open_socket();
   if (folder >= 0) {
-    unlinkat(folder, name, 0); /* of a process that is dead: the folder is ours */
+    unlinkat(folder, name, 0); /* left by a dead process: this process holds the lock */
   }
   int fine = folder >= 0 && fd >= 0 && bind(fd, (struct sockaddr *)&at, sizeof at) == 0 &&
              fchmodat(folder, name, 0600, 0) == 0 && listen(fd, 4) == 0 &&
              fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK) == 0;
   if (!fine) {
-    log_warn("commands cannot reach this daemon while it runs: %s", strerror(errno));
+    log_warn("token commands cannot reach this daemon while it runs: %s", strerror(errno));
   }
   if (folder >= 0) {
     close(folder);
@@ -67,7 +67,7 @@ void control_close(const char *data, int fd) {
   }
 }
 
-/* Up to the end of the line, or of what the peer sends. */
+/* Reads up to the end of the line or of the connection. */
 static void read_line(int fd, char line[LINE_MOST]) {
   size_t size = 0;
   ssize_t n = 1;

@@ -1,20 +1,21 @@
-/* A running daemon's ear for its own command line: a Unix socket in the data folder, which only its user can reach.
- * One line asks, one answer ends the connection: a digit for the exit status, then text.
+/* The control socket: a Unix socket in the data folder through which `orbmorphd token` reaches a running daemon. Only
+ * the daemon's user and root may use it. A client sends one line; the daemon replies with a digit, the exit status,
+ * then text, and closes the connection.
  */
 #ifndef ORB_CONTROL_H
 #define ORB_CONTROL_H
 
 #include "api/text.h"
 
-typedef int (*control_handler)(void *user, const char *line, api_text *reply); /* the exit status */
+typedef int (*control_handler)(void *user, const char *line, api_text *reply); /* returns the exit status */
 
-/* With the data folder locked. The descriptor; −1 with the reason logged. */
+/* The caller holds the lock of the data folder. Returns the descriptor, or −1 with the reason logged. */
 int control_listen(const char *data);
 void control_close(const char *data, int fd);
-/* Serves one connection that waits, if any. */
+/* Serves one waiting connection, if any. */
 void control_serve(int fd, control_handler handle, void *user);
 
-/* Asks the daemon that has the folder. The exit status, or −1 if none listens. */
+/* Sends a line to the daemon that serves the folder. Returns the exit status, or −1 if no daemon listens. */
 int control_ask(const char *data, const char *line, api_text *reply);
 
 #endif

@@ -9,7 +9,7 @@
 
 enum { PAGE = 64 };
 
-/* The row goes first: what is left by a crash in between is an object without a row, which --gc removes. */
+/* Deletes the row first: a crash in between then leaves an object without a row, which --gc deletes. */
 static store_result evict(const evict_env *env, resource_kind kind, const char *id, const char *tenant) {
   static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET};
   FAULT_POINT("evict");

@@ -1,4 +1,5 @@
-/* Eviction: derived objects beyond a budget leave, the least recently used first. Uploads never do. */
+/* Eviction: deletes derived objects (embeddings, supermeshes) beyond a budget, least recently used first. Never deletes
+ * uploads. */
 #ifndef ORB_EVICT_H
 #define ORB_EVICT_H
 
@@ -9,16 +10,16 @@ typedef struct evict_env {
   catalogue *cat;
   objects *store;
   cache *descriptions; /* NULL: none */
-  queue *q;            /* NULL: no jobs; else embeddings of meshes that unfinished jobs need stay */
+  queue *q;            /* NULL: no jobs; else embeddings whose mesh an unfinished job needs are kept */
 } evict_env;
 
-/* Removes derived objects until at most `budget` bytes are left, but none that was used since `before` (unix time in
+/* Deletes derived objects until at most `budget` bytes are left, but none that was used since `before` (Unix time in
  * ms). Returns the bytes that are left. Blocks for commits. */
 int64_t evict_derived(const evict_env *env, int64_t budget, int64_t before);
 
-/* Row, description and objects. */
+/* Deletes a resource: row, cached description and objects. */
 store_result evict_one(const evict_env *env, resource_kind kind, const char *id);
-/* What the tenant has of it; all of it where nobody else owns it. STORE_NOT_FOUND: the tenant does not own it. */
+/* Ends a tenant's ownership; deletes the resource if it was the last owner. STORE_NOT_FOUND: it does not own it. */
 store_result evict_owned(const evict_env *env, resource_kind kind, const char *id, const char *tenant);
 
 #endif

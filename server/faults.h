@@ -1,8 +1,8 @@
-/* Points at which a test build (ORB_FAULTS) ends the process as kill -9 would.
+/* Fault injection: points at which a test build (ORB_FAULTS) kills its own process with SIGKILL.
  *
- * ORBMORPH_FAULT="kill:NAME:2" ends it at the second pass of that point, "kill:NAME:1+" at each. A job's key is the
- * name of the point at which its run begins, so that a test can make a job that kills whoever runs it. Release builds
- * have none of this. Failing calls are injected from outside: tests/faults.
+ * ORBMORPH_FAULT="kill:NAME:2" kills it at the second pass of point NAME, "kill:NAME:1+" at every pass. The start of a
+ * job's run is a point named after its key, so that a test can make a job that kills every process that runs it.
+ * Release builds contain no such points. Failing system calls are injected from outside: tests/faults.
  */
 #ifndef ORB_FAULTS_H
 #define ORB_FAULTS_H

@@ -1,4 +1,4 @@
-/* The log: one JSON object a line on standard error (or plain text), written with one call, from any thread. */
+/* The log: one line of JSON or plain text per message, on standard error, each in one write(). Any thread. */
 #ifndef ORB_LOG_H
 #define ORB_LOG_H
 

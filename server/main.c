@@ -1,4 +1,4 @@
-/* orbmorphd: start, signals, stop. */
+/* orbmorphd: command line, start, signals, stop. start() shows all parts in order. */
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -27,21 +27,21 @@ static void raise_descriptor_limit(void) {
   if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
     limit.rlim_cur = limit.rlim_max;
     if (setrlimit(RLIMIT_NOFILE, &limit) != 0) {
-      log_warn("the limit of open files stays at what it was");
+      log_warn("the limit on open files could not be raised");
     }
   }
 }
 
-/* One process a data folder; the lock goes with the process, however it ends. */
+/* One process per data folder. The kernel releases the lock when the process ends, also after a crash. */
 static int lock_data(const char *data) {
   char path[PATH_MAX];
   if (mkdir(data, 0700) != 0 && errno != EEXIST) {
-    log_error("the folder %s cannot be made: %s", data, strerror(errno));
+    log_error("the folder %s cannot be created: %s", data, strerror(errno));
     return -1;
   }
   snprintf(path, sizeof path, "%s/lock", data);
   int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-  for (int tries = 0; fd >= 0 && tries < 50; tries++) { /* one that is being killed may hold it a moment longer */
+  for (int tries = 0; fd >= 0 && tries < 50; tries++) { /* a dying process may hold it a moment longer */
     if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
       return fd;
     }
@@ -54,7 +54,7 @@ static int lock_data(const char *data) {
 }
 
 static void say_locked(const char *data) {
-  log_error("the data folder %s is in use by another process, or cannot be locked: stop that first", data);
+  log_error("the data folder %s is in use by another process or cannot be locked; stop that process first", data);
 }
 
 static void announce(const server *srv) {
@@ -68,19 +68,19 @@ static void announce(const server *srv) {
   systemd_notify("READY=1\nSTATUS=serving\n");
 }
 
-/* Signals come through a pipe: threads that libraries start before main() do not have them blocked, so a signalfd
- * would miss what is delivered to those. */
+/* Signals come through a pipe. A signalfd would miss some: threads that libraries start before main() do not block
+ * signals, and the kernel may deliver to those threads. */
 static int signal_pipe[2] = {-1, -1};
 
 static void on_signal(int number) {
   int saved = errno;
   unsigned char byte = (unsigned char)number;
   ssize_t written = write(signal_pipe[1], &byte, 1);
-  (void)written; /* full: more than enough are waiting */
+  (void)written; /* if the pipe is full, enough signals are waiting */
   errno = saved;
 }
 
-/* Blocks them for the threads to come; where on_signal() is read, or −1. */
+/* Blocks the signals for later threads. Returns the read end of the pipe, or −1. */
 static int take_signals(sigset_t *set) {
   struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
   static const int numbers[] = {SIGTERM, SIGINT, SIGHUP};
@@ -99,8 +99,8 @@ static int take_signals(sigset_t *set) {
 
 enum { TICK_MS = 1000, EVICT_GRACE_MS = 5000 };
 
-/* Keeps derived objects within their budget, when a job has made more or some could not leave yet: what was just made
- * or used stays for a while, so that who waits for it can have it. */
+/* Evicts derived objects beyond derived-bytes, after jobs succeeded or when the last round could not evict enough.
+ * Objects made or used in the last EVICT_GRACE_MS stay, so that a waiting client can fetch them. */
 static void keep_budget(const server *srv, int64_t *seen, int *over) {
   const int64_t budget = srv->options->derived_bytes;
   if (budget <= 0) {
@@ -118,14 +118,14 @@ static void keep_budget(const server *srv, int64_t *seen, int *over) {
 
 enum { FORGET_BATCH = 256, FORGET_ROUNDS = 4 };
 
-/* The ended jobs of the catalogue: those before this process began, less what it forgot. */
+/* Ended jobs in the catalogue. before: those from before this process started, less those forgotten since. */
 typedef struct ended_jobs {
   int counted;
   int64_t before;
 } ended_jobs;
 
-/* Forgets the oldest ended jobs beyond keep-jobs, a few at a time, so that other writes get their turn. They are
- * counted in the catalogue once, from then on by those that end. */
+/* Deletes the oldest ended jobs beyond keep-jobs, in small batches so that other writes are not delayed. Counts the
+ * catalogue's ended jobs once; after that, the queue's counts suffice. */
 static void keep_jobs(const server *srv, ended_jobs *jobs) {
   const int64_t keep = srv->options->keep_jobs;
   int64_t since = 0;
@@ -150,7 +150,7 @@ static void keep_jobs(const server *srv, ended_jobs *jobs) {
   }
 }
 
-/* For reading the configuration again. */
+/* Kept to read the configuration again on SIGHUP. */
 typedef struct command_line {
   int argc;
   char **argv;
@@ -168,23 +168,23 @@ static void set_log(const config *options) {
 
 static void on_change(const char *name, int taken) {
   if (taken) {
-    log_warn("SIGHUP: %s is changed", name);
+    log_warn("SIGHUP: %s changed", name);
   } else {
-    log_warn("SIGHUP: %s is not what it was; it needs a restart", name);
+    log_warn("SIGHUP: %s differs; the change takes effect after a restart", name);
   }
 }
 
 static int reload_callers(server *srv) {
   int fine = callers_reload(srv->callers);
   if (fine) {
-    queue_wake_once(srv->q); /* what is open with a token that is gone ends */
+    queue_wake_once(srv->q); /* ends streams and waits whose token has been removed */
   } else {
-    log_error("the tokens could not be read again and stay as they were");
+    log_error("the tokens could not be read again; the previous ones stay valid");
   }
   return fine;
 }
 
-/* A command from outside, through the control socket. */
+/* A command from the control socket. */
 static int on_command(void *user, const char *line, api_text *reply) {
   server *srv = user;
   int status = token_command_apply(srv->cat, line, reply);
@@ -205,15 +205,15 @@ static void reload(server *srv, const command_line *line) {
     reload_callers(srv);
     log_info("SIGHUP: the configuration was read again");
   } else {
-    log_error("SIGHUP: the configuration is not valid and stays as it was");
+    log_error("SIGHUP: the new configuration is not valid; the previous one stays in effect");
   }
   systemd_notify("READY=1\n");
 }
 
-/* The watchdog is told only while a thread that serves requests still takes a task. */
+/* systemd's watchdog is fed only if a thread of the io pool has run the previous probe. */
 typedef struct probe {
   task task; /* first */
-  int idle;  /* under __atomic */
+  int idle;  /* the pool has run the task; __atomic */
 } probe;
 
 static void probe_run(task *t) {
@@ -227,9 +227,10 @@ static void feed_watchdog(server *srv, probe *p) {
   }
 }
 
-/* Waits for a signal to stop; a second one, or the end of the time for draining, stops at once. */
+/* Serves until a signal to stop, then waits for running jobs. A second signal, or the end of drain-seconds, interrupts
+ * them. */
 static void wait_for_stop(server *srv, const command_line *line, int signals) {
-  static probe probed = {.task = {.run = probe_run}, .idle = 1}; /* outlives this function in the pool's list */
+  static probe probed = {.task = {.run = probe_run}, .idle = 1}; /* static: the pool may hold it after the return */
   struct pollfd wait[2] = {{.fd = signals, .events = POLLIN}, {.fd = srv->control, .events = POLLIN}};
   int64_t seen = -1, every = systemd_watchdog_ms(), fed = 0, kept = 0;
   int tick = every > 0 && every < TICK_MS ? (int)every : TICK_MS;
@@ -259,8 +260,8 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
     }
     break;
   }
-  log_info("stopping: running jobs have %lld s", (long long)srv->options->drain_seconds);
-  systemd_notify("STOPPING=1\nSTATUS=running jobs end\n");
+  log_info("stopping: running jobs have %lld s to end", (long long)srv->options->drain_seconds);
+  systemd_notify("STOPPING=1\nSTATUS=waiting for running jobs\n");
   __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
   queue_stop(srv->q, 0);
   int64_t until = orb_clock_ms() + 1000 * srv->options->drain_seconds;
@@ -273,7 +274,8 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
   queue_stop(srv->q, 1);
 }
 
-static int serve(server *srv, const command_line *line, int signals, const sigset_t *set) {
+/* Starts all parts in order; 0 if one of them failed. */
+static int start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
   queue_options queued = {.workers = (int)o->workers,
@@ -285,32 +287,21 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
                            .job_memory = o->job_memory,
                            .job_ms = 1000 * o->job_seconds,
                            .max_triangles = o->max_triangles};
-  worker_pool *workers = NULL;
-  int result = 1;
   if (queued.cores < queued.workers) {
     queued.cores = queued.workers;
   }
   int listens = listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
-  if (!listens || objects_open(o->data, &srv->store) != STORE_OK || catalogue_open(o->data, &srv->cat) != STORE_OK ||
-      !(srv->callers = callers_open(srv->cat)) || !(srv->q = queue_create(&queued, srv->cat)) ||
-      queue_recover(srv->q) != STORE_OK || !(srv->descriptions = cache_create(CACHE_BYTES)) ||
-      !(srv->io = tasks_start((int)o->io_threads)) || !(srv->checks = tasks_start((int)o->workers)) ||
-      !(srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) ||
-      !(workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) || !http_start(srv)) {
-    log_error("the service could not be started");
-  } else {
-    __atomic_store_n(&srv->ready, 1, __ATOMIC_RELEASE);
-    if (srv->needs_token && callers_count(srv->callers) == 0) {
-      log_warn("tokens are needed and there are none: make one with orbmorphd token add");
-    }
-    srv->control = control_listen(o->data);
-    announce(srv);
-    pthread_sigmask(SIG_UNBLOCK, set, NULL); /* in this thread, which alone waits for them */
-    wait_for_stop(srv, line, signals);
-    control_close(o->data, srv->control);
-    result = 0;
-  }
+  return listens && objects_open(o->data, &srv->store) == STORE_OK && catalogue_open(o->data, &srv->cat) == STORE_OK &&
+         (srv->callers = callers_open(srv->cat)) && (srv->q = queue_create(&queued, srv->cat)) &&
+         queue_recover(srv->q) == STORE_OK && (srv->descriptions = cache_create(CACHE_BYTES)) &&
+         (srv->io = tasks_start((int)o->io_threads)) && (srv->checks = tasks_start((int)o->workers)) &&
+         (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&
+         (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) && http_start(srv);
+}
+
+/* Stops all parts that were started. */
+static void stop(server *srv, worker_pool *workers) {
   __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
   if (srv->q) {
     queue_stop(srv->q, 1);
@@ -320,7 +311,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
   if (srv->daemon) {
     MHD_quiesce_daemon(srv->daemon);
   }
-  tasks_stop(srv->checks); /* resumes what they had */
+  tasks_stop(srv->checks); /* runs the remaining tasks, which resume their connections */
   tasks_stop(srv->large_checks);
   tasks_stop(srv->io);
   http_stop(srv);
@@ -330,7 +321,26 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
   objects_close(srv->store);
   cache_destroy(srv->descriptions);
   callers_close(srv->callers);
-  return result;
+}
+
+static int serve(server *srv, const command_line *line, int signals, const sigset_t *set) {
+  worker_pool *workers = NULL;
+  int started = start(srv, &workers);
+  if (!started) {
+    log_error("the service could not be started");
+  } else {
+    __atomic_store_n(&srv->ready, 1, __ATOMIC_RELEASE);
+    if (srv->needs_token && callers_count(srv->callers) == 0) {
+      log_warn("tokens are needed but none exist: create one with orbmorphd token add");
+    }
+    srv->control = control_listen(srv->options->data);
+    announce(srv);
+    pthread_sigmask(SIG_UNBLOCK, set, NULL); /* only in this thread */
+    wait_for_stop(srv, line, signals);
+    control_close(srv->options->data, srv->control);
+  }
+  stop(srv, workers);
+  return !started;
 }
 
 static int run(const command_line *line) {
@@ -384,7 +394,7 @@ int main(int argc, char **argv) {
   }
   int asked = is_token ? token_command_ask(&tokens, &options) : -1;
   int lock = asked < 0 ? lock_data(options.data) : -1;
-  if (lock < 0 && asked < 0) { /* perhaps a daemon that was just starting */
+  if (lock < 0 && asked < 0) { /* the daemon may have just been starting */
     asked = is_token ? token_command_ask(&tokens, &options) : -1;
     if (asked < 0) {
       say_locked(options.data);

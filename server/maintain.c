@@ -6,7 +6,7 @@
 
 #include "evict.h"
 #include "store/owners.h"
-#include "worker/spheres.h"
+#include "store/spheres.h"
 
 enum { PAGE = 64 };
 
@@ -20,7 +20,8 @@ typedef struct tally {
 static const object_kind object_of[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET};
 static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh"};
 
-/* One object against the hash of its bytes; "": it only must be there, where the row is of an older engine. */
+/* Verifies an object against its hash. wanted "": the row is of an older engine and has no hash; the object must only
+ * exist. */
 static void verify_object(tally *t, const resource *row, object_kind kind, const char *what, const char *wanted) {
   unsigned char *bytes = NULL;
   size_t size = 0;
@@ -32,7 +33,7 @@ static void verify_object(tally *t, const resource *row, object_kind kind, const
   }
   api_id_of_text((const char *)bytes, size, sha);
   if (wanted[0] && strcmp(sha, wanted) != 0) {
-    printf("%s %s: %s: %zu bytes that do not match their hash\n", names[row->kind], row->id, what, size);
+    printf("%s %s: %s (%zu bytes) does not match its hash\n", names[row->kind], row->id, what, size);
     t->wrong++;
   }
   free(bytes);
@@ -42,9 +43,9 @@ static void verify(tally *t, const resource *row) {
   t->rows++;
   verify_object(t, row, object_of[row->kind], "its object", row->sha);
   if (row->kind == RESOURCE_SUPERMESH && (row->places[0] || strstr(row->json, "\"sphere\":"))) {
-    verify_object(t, row, OBJECT_PLACES, "its places", row->places);
+    verify_object(t, row, OBJECT_PLACES, "its places file", row->places);
   }
-  /* Supermeshes of older engines have none: their description does not name them. */
+  /* Supermeshes of older engines have no aligned spheres; their descriptions do not name any. */
   if (row->kind == RESOURCE_SUPERMESH && strstr(row->json, "\"sphere\":") &&
       spheres_check(t->store, row->id) != STORE_OK) {
     printf("supermesh %s: its aligned spheres are missing or damaged\n", row->id);
@@ -58,7 +59,7 @@ static void each_row(tally *t, resource_kind kind) {
   for (int n = PAGE; n == PAGE;) {
     n = catalogue_list(t->cat, kind, before, PAGE, rows);
     if (n < 0) {
-      puts("the catalogue's rows cannot be read");
+      puts("the rows of the catalogue cannot be read");
       t->wrong++;
     }
     for (int i = 0; i < n; i++) {
@@ -69,7 +70,7 @@ static void each_row(tally *t, resource_kind kind) {
   }
 }
 
-/* An object without a row is no harm: a crash between publishing and commit leaves one. */
+/* An object without a row is harmless: a crash between publishing and commit leaves one. */
 static void each_object(void *user, object_kind kind, const char *id, uint64_t size) {
   tally *t = user;
   resource row = {0};
@@ -80,7 +81,7 @@ static void each_object(void *user, object_kind kind, const char *id, uint64_t s
   if (catalogue_get(t->cat, owner, id, &row) == STORE_NOT_FOUND) {
     t->orphans++;
     if (t->remove_orphans && objects_delete(t->store, kind, id) == STORE_OK) {
-      printf("removed an object of %llu bytes without a row: %s\n", (unsigned long long)size, id);
+      printf("deleted object %s (%llu bytes), which has no row\n", id, (unsigned long long)size);
     }
   }
   resource_free(&row);
@@ -106,26 +107,26 @@ int maintain_check(const config *options) {
     t.wrong++;
   }
   if (catalogue_mismatches(t.cat) != 0) {
-    puts("the catalogue's owners or sums do not match what it holds");
+    puts("the catalogue's owners or stored sums do not match its rows");
     t.wrong++;
   }
   if (catalogue_damaged(t.cat) != 0) {
-    puts("rows of the catalogue do not say what they must");
+    puts("the catalogue has rows with invalid values");
     t.wrong++;
   }
   for (int kind = 0; kind < RESOURCE_KINDS; kind++) {
     each_row(&t, (resource_kind)kind);
   }
   if (objects_each(t.store, each_object, &t) != STORE_OK) {
-    puts("not every folder of objects can be read");
+    puts("some folders of objects cannot be read");
     t.wrong++;
   }
-  printf("%ld rows and %ld objects checked: %ld wrong, %ld objects without a row (harmless; --gc removes them)\n",
+  printf("%ld rows and %ld objects checked: %ld wrong, %ld objects without a row (harmless; --gc deletes them)\n",
          t.rows, t.objects, t.wrong, t.orphans);
   if (t.wrong) {
     puts(
-        "start the service, DELETE what is named here, and send or ask for it again; where the catalogue itself is "
-        "damaged, go back to a copy of the folder");
+        "start the service, DELETE the resources named above, and upload or request them again; if the catalogue "
+        "itself is damaged, restore a backup of the data folder");
   }
   close_both(&t);
   return t.wrong != 0;
@@ -136,7 +137,7 @@ static int forget_jobs(catalogue *cat, int64_t keep) {
   int64_t many = catalogue_jobs_ended(cat) - keep;
   store_result result = STORE_OK;
   if (keep > 0 && many > 0) {
-    printf("removed %lld ended jobs beyond keep-jobs\n", (long long)many);
+    printf("deleted %lld ended jobs beyond keep-jobs\n", (long long)many);
   }
   for (; keep > 0 && many > 0 && result == STORE_OK; many -= BATCH) {
     result = catalogue_jobs_forget(cat, many < BATCH ? (int)many : BATCH);

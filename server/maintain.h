@@ -1,12 +1,12 @@
-/* What an operator runs beside the service: verifying and clearing the data folder. */
+/* Maintenance of the data folder while the service is stopped: --check-data and --gc. */
 #ifndef ORB_MAINTAIN_H
 #define ORB_MAINTAIN_H
 
 #include "config.h"
 
-/* Verifies the catalogue, and every object against its hash; prints what is wrong. 0 clean, 1 not. */
+/* Verifies the catalogue and the hash of every object, and prints all damage. 0: no damage; else 1. */
 int maintain_check(const config *options);
-/* Removes objects without a row, and the least used derived ones beyond derived-bytes. 0 done. */
+/* Deletes objects without a row, derived objects beyond derived-bytes and ended jobs beyond keep-jobs. 0: done. */
 int maintain_gc(const config *options);
 
 #endif

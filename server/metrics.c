@@ -11,7 +11,7 @@ typedef struct histogram {
   atomic_llong counts[BOUNDS + 1], micros;
 } histogram;
 
-/* The stages that jobs report, as progress shows them. */
+/* The stages that jobs report. */
 static const char *const stages[] = {"read",  "check",  "simplify", "embed", "certify",
                                      "align", "remesh", "transfer", "write", "store"};
 enum { STAGES = sizeof stages / sizeof stages[0] };
@@ -93,10 +93,10 @@ void metrics_family(api_text *out, const char *name, const char *type, const cha
 }
 
 void metrics_write(api_text *out) {
-  metrics_family(out, "orbmorph_job_seconds", "histogram", "Time of attempts of jobs, by kind.");
+  metrics_family(out, "orbmorph_job_seconds", "histogram", "Time of attempts at jobs, by kind.");
   write_histogram(out, "orbmorph_job_seconds", "kind=\"embedding\"", &jobs[0]);
   write_histogram(out, "orbmorph_job_seconds", "kind=\"supermesh\"", &jobs[1]);
-  metrics_family(out, "orbmorph_stage_seconds", "histogram", "Time of the stages of jobs.");
+  metrics_family(out, "orbmorph_stage_seconds", "histogram", "Time of stages of jobs.");
   for (int kind = 0; kind < 2; kind++) {
     for (int i = 0; i < STAGES; i++) {
       char labels[64];
@@ -110,9 +110,9 @@ void metrics_write(api_text *out) {
   api_text_printf(out, "orbmorph_job_failures_total{kind=\"embedding\"} %lld\n", atomic_load(&job_failed[0]));
   api_text_printf(out, "orbmorph_job_failures_total{kind=\"supermesh\"} %lld\n", atomic_load(&job_failed[1]));
   metrics_family(out, "orbmorph_http_request_seconds", "histogram",
-                 "Time of requests, without those that wait for a job.");
+                 "Time of requests, except those that wait for a job.");
   write_histogram(out, "orbmorph_http_request_seconds", "", &requests);
-  metrics_family(out, "orbmorph_http_responses_total", "counter", "Answers by class of status.");
+  metrics_family(out, "orbmorph_http_responses_total", "counter", "Responses by status class.");
   for (int i = 1; i < 6; i++) {
     api_text_printf(out, "orbmorph_http_responses_total{class=\"%dxx\"} %lld\n", i, atomic_load(&statuses[i]));
   }
@@ -120,7 +120,7 @@ void metrics_write(api_text *out) {
     const char *name, *type, *help;
     long long value;
   } single[] = {
-      {"orbmorph_cache_hits_total", "counter", "Descriptions answered from memory.", atomic_load(&cache[1])},
+      {"orbmorph_cache_hits_total", "counter", "Descriptions found in memory.", atomic_load(&cache[1])},
       {"orbmorph_cache_misses_total", "counter", "Descriptions read from the catalogue.", atomic_load(&cache[0])},
       {"orbmorph_flips_total", "counter", "Flipped triangles found in results; always 0.", atomic_load(&flips)},
       {"orbmorph_received_bytes_total", "counter", "Bytes of bodies received.", atomic_load(&received_bytes)},

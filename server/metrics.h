@@ -7,16 +7,16 @@
 #include "api/text.h"
 
 void metrics_job(int embedding, int succeeded, double seconds);
-void metrics_stage(int embedding, const char *stage, double seconds); /* one that is over */
+void metrics_stage(int embedding, const char *stage, double seconds); /* after the stage has ended */
 void metrics_cache(int hit);
 void metrics_flips(int64_t flips);
-void metrics_request(int status, double seconds); /* seconds < 0: it waited for a job, its time says nothing */
+void metrics_request(int status, double seconds); /* seconds < 0: it waited for a job; its time is not counted */
 void metrics_bytes(int64_t received, int64_t sent);
 void metrics_connection(int change);
 int64_t metrics_connections(void);
-/* Appends them as Prometheus text. */
+/* Appends all of them in the Prometheus text format. */
 void metrics_write(api_text *out);
-/* The two lines before the values of a family. */
+/* Appends the HELP and TYPE lines of a metric family. */
 void metrics_family(api_text *out, const char *name, const char *type, const char *help);
 
 #endif

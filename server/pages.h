@@ -1,4 +1,4 @@
-/* The API's document and its reader, compiled in by server/pages.cmake. */
+/* The API document, its reader and the problem pages, compiled in by server/pages.cmake. http/pages.c serves them. */
 #ifndef ORB_PAGES_H
 #define ORB_PAGES_H
 

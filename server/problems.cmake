@@ -1,7 +1,7 @@
-# A page for each problem type, made of the sections of docs/troubleshooting.md, so that the `type` of a problem leads
-# somewhere. Appends to the lists of pages.cmake: OUT (a folder), TROUBLESHOOTING (the file).
+# A page for each problem type, made from the sections of docs/troubleshooting.md, so that the `type` of a problem is a
+# working link. Appends to the lists of pages.cmake: OUT (a prefix of paths), TROUBLESHOOTING (the file).
 
-# Markdown to HTML, as far as those sections need it: paragraphs, `code`, *words*, links (their text alone).
+# Converts the Markdown that those sections use to HTML: paragraphs, `code`, *words*, links (text only).
 function(orb_html markdown result)
   string(STRIP "${markdown}" text)
   string(REPLACE "&" "&amp;" text "${text}")
@@ -22,14 +22,14 @@ while(NOT at EQUAL -1)
   string(FIND "${rest}" "\n" line)
   string(SUBSTRING "${rest}" 0 ${line} name)
   string(SUBSTRING "${rest}" ${line} -1 rest)
-  # The section goes as far as the next heading of any kind.
+  # The section ends at the next heading of any level.
   string(FIND "${rest}" "\n#" end)
   string(SUBSTRING "${rest}" 0 ${end} section)
   orb_html("${section}" body)
   file(WRITE "${OUT}.${name}.html"
     "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n"
     "<title>orbmorph: ${name}</title>\n<link rel=\"stylesheet\" href=\"/docs.css\">\n<h1>${name}</h1>\n${body}\n"
-    "<p><a href=\"/docs\">The interface</a></p>\n</html>\n")
+    "<p><a href=\"/docs\">API reference</a></p>\n</html>\n")
   list(APPEND paths "/problems/${name}")
   list(APPEND files "${OUT}.${name}.html")
   list(APPEND mimes "text/html")

@@ -19,7 +19,7 @@ void systemd_notify(const char *text) {
     return;
   }
   strcpy(address.sun_path, path);
-  if (path[0] == '@') { /* an abstract one */
+  if (path[0] == '@') { /* an abstract socket */
     address.sun_path[0] = 0;
   }
   int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);

@@ -1,14 +1,14 @@
-/* Talking to systemd, where there is one: sd_notify(3) without its library. */
+/* Notifications to systemd: sd_notify(3) without libsystemd. */
 #ifndef ORB_SYSTEMD_H
 #define ORB_SYSTEMD_H
 
 #include <stdint.h>
 
-/* Sends lines of NAME=VALUE to NOTIFY_SOCKET; nothing happens where that is not set. */
+/* Sends lines of NAME=VALUE to NOTIFY_SOCKET; does nothing if that is not set. */
 void systemd_notify(const char *text);
-/* RELOADING=1 with the time, which Type=notify-reload wants. */
+/* Sends RELOADING=1 with the time, as Type=notify-reload requires. */
 void systemd_reloading(void);
-/* How often to send WATCHDOG=1, in ms: half of what WATCHDOG_USEC allows; 0: never. */
+/* The interval for WATCHDOG=1 in ms: half of WATCHDOG_USEC; 0: never. */
 int64_t systemd_watchdog_ms(void);
 
 #endif

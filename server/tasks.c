@@ -27,7 +27,7 @@ static void *thread_main(void *argument) {
       pool->last = &pool->first;
     }
     pthread_mutex_unlock(&pool->lock);
-    t->run(t); /* may be freed by now */
+    t->run(t); /* may free t */
     pthread_mutex_lock(&pool->lock);
   }
   pthread_mutex_unlock(&pool->lock);

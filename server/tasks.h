@@ -1,6 +1,7 @@
-/* A few threads that do what handlers must not: query, commit, read and check files.
+/* Thread pools for work that handlers must not do themselves: queries, commits, reading and checking files.
  *
- * Contract. Tasks run in the order in which they came, each on one thread. Stopping runs those that wait and joins. */
+ * Contract. Tasks start in the order in which they were added, each on one thread. tasks_stop() runs the waiting tasks,
+ * then joins the threads. */
 #ifndef ORB_TASKS_H
 #define ORB_TASKS_H
 

@@ -42,13 +42,13 @@ static int wrong(const char *why) {
   return 0;
 }
 
-/* A name is a word of up to 63 letters, digits, '-', '_' and '.'. */
+/* A name has 1 to 63 letters, digits, '-', '_' and '.', and does not begin with '-'. */
 static int good_name(const char *name) {
   static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
   return name && *name && *name != '-' && strlen(name) < 64 && name[strspn(name, letters)] == 0;
 }
 
-/* Takes one of the command's own flags with its value at argv[i]: 1; 0: it is none of them; −1: a bad value. */
+/* Reads one of the command's own flags. 1: read; 0: not one of them; −1: invalid value. */
 static int read_flag(token_command *out, const char *flag, const char *value) {
   int64_t number;
   if (strcmp(flag, "--scope") == 0) {
@@ -80,7 +80,7 @@ int token_command_read(token_command *out, int *argc, char **argv) {
     which++;
   }
   if (which == 4) {
-    return wrong("say add, set, list or remove");
+    return wrong("the command must be add, set, list or remove");
   }
   *out = (token_command){.verb = verbs[which], .name = "-", .scopes = -1, .quota = -1, .jobs = -1, .priority = -1};
   int adds = which == 0, sets = which == 1;
@@ -88,13 +88,13 @@ int token_command_read(token_command *out, int *argc, char **argv) {
     out->name = *argc > 3 ? argv[3] : NULL;
     from = 4;
     if (!good_name(out->name)) {
-      return wrong("a NAME is needed, of up to 63 letters, digits, '-', '_' and '.'");
+      return wrong("NAME must have 1 to 63 letters, digits, '-', '_' and '.', and not begin with '-'");
     }
   }
   for (int i = from; i < *argc; i++) {
     int taken = adds || sets ? read_flag(out, argv[i], i + 1 < *argc ? argv[i + 1] : NULL) : 0;
     if (taken < 0) {
-      return wrong("--scope takes read, write and admin, comma-separated; --tenant a name; the others a number");
+      return wrong("--scope takes read, write and admin, comma-separated; --tenant takes a name; the others a number");
     }
     if (taken) {
       i++;
@@ -103,7 +103,7 @@ int token_command_read(token_command *out, int *argc, char **argv) {
     }
   }
   if (adds && out->scopes < 0) {
-    return wrong("--scope is needed");
+    return wrong("--scope is required");
   }
   *argc = kept;
   return 1;
@@ -135,7 +135,7 @@ int token_command_apply(catalogue *cat, const char *line, api_text *reply) {
   token_row row = {.created = (int64_t)time(NULL) * 1000};
   if (sscanf(line, "token %7s %63s %d %lld %lld %d %63s %64s", verb, row.name, &row.scopes, &quota, &jobs,
              &row.priority, row.tenant, hash) != 8) {
-    api_text_add(reply, "the command is not understood\n");
+    api_text_add(reply, "unknown command\n");
     return 2;
   }
   row.quota = quota;
@@ -160,16 +160,16 @@ int token_command_apply(catalogue *cat, const char *line, api_text *reply) {
     result = catalogue_token_remove(cat, row.name);
   }
   if (result == STORE_CONFLICT) {
-    api_text_printf(reply, "there is a token \"%s\" already; set or remove it\n", row.name);
+    api_text_printf(reply, "a token \"%s\" already exists; change it with set, or remove it\n", row.name);
   } else if (result == STORE_NOT_FOUND) {
-    api_text_printf(reply, "there is no token \"%s\"\n", row.name);
+    api_text_printf(reply, "token \"%s\" does not exist\n", row.name);
   } else if (result != STORE_OK) {
-    api_text_add(reply, "the catalogue could not be written\n");
+    api_text_add(reply, "the catalogue could not be written; the log says why\n");
   }
   return result != STORE_OK;
 }
 
-/* Of a new token only the hash leaves this process. */
+/* Writes the command as a line. A new token is made here; only its hash leaves this process. */
 static void write_line(const token_command *command, char line[TOKEN_LINE], char text[TOKEN_TEXT]) {
   unsigned char token[TOKEN_BYTES], hashed[TOKEN_BYTES];
   char hash[TOKEN_TEXT];
@@ -185,9 +185,9 @@ static void write_line(const token_command *command, char line[TOKEN_LINE], char
 
 static int show(const token_command *command, int status, const api_text *reply, const char *text) {
   if (status != 0) {
-    fprintf(stderr, "orbmorphd: %s", reply->data ? reply->data : "that did not work; the log says why\n");
+    fprintf(stderr, "orbmorphd: %s", reply->data ? reply->data : "the command failed; the log says why\n");
   } else if (strcmp(command->verb, "add") == 0) {
-    puts(text); /* shown this once */
+    puts(text); /* the only time that the token is shown */
   } else {
     fputs(reply->data ? reply->data : "", stdout);
   }

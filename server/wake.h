@@ -1,5 +1,4 @@
-/* Threads that look around at intervals: a condition waited for by a clock that nobody sets, so that a wall clock that
- * is set back does not make them sleep. */
+/* Timed waits on a condition by the monotonic clock, so that setting the wall clock back does not prolong them. */
 #ifndef ORB_SERVER_WAKE_H
 #define ORB_SERVER_WAKE_H
 
@@ -7,7 +6,7 @@
 #include <stdint.h>
 
 void wake_init(pthread_cond_t *wake);
-/* Until it is signalled, or so long. `wake` is of wake_init(), `lock` is held. */
+/* Waits until `wake` is signalled, but at most this long. `wake` is from wake_init(); the caller holds `lock`. */
 void wake_wait_ms(pthread_cond_t *wake, pthread_mutex_t *lock, int64_t ms);
 
 #endif

@@ -1,12 +1,10 @@
-/* Who may call, and how often. */
+/* Who may call, how often, and what a caller sees: tokens, scopes, tenants, limits and quotas. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 #include "http/http.h"
-
-int is_page(const char *path);
 
 static caller *find_caller(const server *srv, const char *header) {
   unsigned char hash[TOKEN_BYTES];
@@ -16,7 +14,7 @@ static caller *find_caller(const server *srv, const char *header) {
   return callers_find(srv->callers, hash);
 }
 
-/* Health is for everybody, always. */
+/* Health checks need no token and have no limits. */
 static int is_open(const char *path) {
   return strcmp(path, "/livez") == 0 || strcmp(path, "/readyz") == 0;
 }
@@ -31,10 +29,10 @@ int access_within_limits(request *r, const char *path) {
   }
   if (r->allowance.refused == 2) {
     r->closes = 1;
-    reply_refuse(r, "too-many-requests", "This address has more than %lld connections open; close some.",
+    reply_refuse(r, "too-many-requests", "This address has more than %lld open connections; close some.",
                  (long long)r->srv->options->connections_per_address);
   } else {
-    reply_refuse(r, "too-many-requests", "This address may make %lld requests a second; wait a little.",
+    reply_refuse(r, "too-many-requests", "This address may make %lld requests per second; try again soon.",
                  (long long)r->srv->options->requests_per_second);
   }
   return 0;
@@ -63,20 +61,20 @@ void access_headers(request *r) {
   }
 }
 
-/* The pages and the document hold nothing of anybody; the studio's page asks its user for a token. */
+/* Pages and the API document contain no user data; the studio asks its user for a token. */
 static int is_public(const request *r, const char *path) {
   return is_open(path) || (r->route ? r->route->scope == SCOPE_NONE : is_page(path));
 }
 
 int access_check(request *r, const char *path, api_problem *problem) {
-  /* Browsers ask for permission to call without the token; the answer tells nothing but methods. */
+  /* Browsers send CORS preflight requests without a token; the response lists only methods. */
   if (!r->srv->needs_token || is_public(r, path) || strcmp(r->method, "OPTIONS") == 0) {
     return 1;
   }
   r->caller = find_caller(r->srv, header_of(r, "Authorization"));
   if (!r->caller) {
     return api_refuse(problem, "unauthorized",
-                      "Send a token that is known here: Authorization: Bearer TOKEN. The operator makes one with "
+                      "The request needs a valid token: Authorization: Bearer TOKEN. The operator creates one with "
                       "orbmorphd token add.");
   }
   static const struct {
@@ -91,8 +89,8 @@ int access_check(request *r, const char *path, api_problem *problem) {
   while (names[i].scope != wanted) {
     i++;
   }
-  api_refuse(problem, "forbidden", "The token \"%s\" has not the scope \"%s\", which this needs.", r->caller->row.name,
-             names[i].name);
+  api_refuse(problem, "forbidden", "The token \"%s\" lacks the scope \"%s\", which this request needs.",
+             r->caller->row.name, names[i].name);
   api_json_member_string(&problem->facts, "scope", names[i].name);
   return 0;
 }
@@ -126,7 +124,8 @@ int access_has_room(const request *r, int64_t bytes, api_problem *problem) {
     return 1;
   }
   api_refuse(problem, "quota-exceeded",
-             "The meshes of the token \"%s\" may have %lld bytes in all, and have %lld: delete some, or ask for more.",
+             "The token \"%s\" may store %lld bytes of meshes and already stores %lld: delete some meshes, or ask the "
+             "operator for a larger quota.",
              token->name, (long long)quota, (long long)used);
   api_json_member_integer(&problem->facts, "quota", quota);
   return 0;

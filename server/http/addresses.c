@@ -38,7 +38,7 @@ void addresses_destroy(addresses *a) {
   free(a);
 }
 
-/* The IPv4 address, or the first 64 bits of the IPv6 one: who has one address there has all of them. */
+/* The IPv4 address, or the first 64 bits of the IPv6 address: a host with one address of a /64 has all of them. */
 static void key_of(const struct sockaddr *address, unsigned char key[KEY_BYTES]) {
   memset(key, 0, KEY_BYTES);
   if (address->sa_family == AF_INET) {
@@ -93,7 +93,7 @@ address_entry *addresses_enter(addresses *a, const struct sockaddr *address, int
 }
 
 void addresses_leave(addresses *a, address_entry *e) {
-  (void)a; /* a sweep removes it */
+  (void)a; /* addresses_sweep() frees the entry */
   e->connections--;
 }
 

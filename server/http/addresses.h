@@ -1,7 +1,7 @@
-/* Addresses of callers: how many connections each has, and its bucket of requests. Not locked: see the caller.
+/* Connections and request rate of each client address. Not locked: watch.c calls it under its own lock.
  *
- * The bucket holds the requests of ADDRESS_WINDOW seconds and fills at the rate that is allowed, so short bursts pass.
- * An entry lives while it has connections or its bucket is not full.
+ * Each address has a token bucket that holds the requests of ADDRESS_WINDOW seconds and fills at the allowed rate, so
+ * short bursts pass. An entry lives while it has connections or its bucket is not full.
  */
 #ifndef ORB_HTTP_ADDRESSES_H
 #define ORB_HTTP_ADDRESSES_H

@@ -1,10 +1,10 @@
-/* Limits. The decoded size counts against the limit of the route, and so does the size on the wire. Beyond the first
- * MEBIBYTE the decoded size may be max-ratio times what came, so that a bomb ends early. Windows of all decoders
- * together are held under decode-memory: a body that would go beyond is told to come again later.
+/* Limits. Both the decoded size and the size on the wire count against the limit of the route. Beyond the first
+ * MEBIBYTE the decoded size may be at most max-ratio times the size on the wire, so that a decompression bomb is
+ * refused early. All decoders together may hold decode-memory bytes; a body that would exceed it gets 503.
  *
- * libmicrohttpd takes an answer only before the first byte of a body or after its last one. So what is left of a
- * refused body is read and dropped; of an endless one up to DROP_MOST, and then the refusal is written to the socket
- * past the library, and the connection ends. Over TLS it then ends without one.
+ * libmicrohttpd accepts a response only before the first byte of a body or after its last one. So the rest of a
+ * refused body is read and dropped. After DROP_MOST bytes the refusal is written to the socket directly, past the
+ * library, and the connection closes. Over TLS the connection then closes without a response.
  */
 #include "http/body.h"
 
@@ -24,19 +24,20 @@ static int64_t limit_of(const request *r) {
 static void refuse_size(request *r) {
   api_problem problem = {0};
   long long most = (long long)limit_of(r);
-  api_refuse(&problem, "too-large", "The body%s has more than the %lld bytes that are taken here.",
-             r->decoder ? ", unpacked," : "", most);
+  api_refuse(&problem, "too-large", "The%s body has more than %lld bytes, the limit of this route.",
+             r->decoder ? " decompressed" : "", most);
   api_json_member_integer(&problem.facts, "limit", most);
   reply_problem(r, &problem);
 }
 
-/* Accounts for what the decoder holds; 0 with a refusal when all together hold too much. */
+/* Updates the count of decoder memory; 0 with a refusal if all decoders together hold too much. */
 static int account(request *r) {
   int64_t now = r->decoder ? (int64_t)decoder_memory(r->decoder) : 0, more = now - r->decoder_bytes;
   int64_t all = __atomic_add_fetch(&r->srv->decoding, more, __ATOMIC_RELAXED);
   r->decoder_bytes = now;
   if (more > 0 && all > r->srv->options->decode_memory) {
-    reply_refuse(r, "unavailable", "Too many compressed bodies are being unpacked; try again soon, or send it plain.");
+    reply_refuse(r, "unavailable",
+                 "The server is decompressing too many bodies; try again soon, or send the body uncompressed.");
     return 0;
   }
   return 1;
@@ -59,7 +60,7 @@ void body_begin(request *r) {
   }
 }
 
-/* Decoded bytes; 0 where they were refused. */
+/* Takes decoded bytes; 0 if they were refused. */
 static int take_plain(void *user, const char *bytes, size_t size) {
   request *r = user;
   r->received += (int64_t)size;
@@ -67,7 +68,7 @@ static int take_plain(void *user, const char *bytes, size_t size) {
     refuse_size(r);
   } else if (r->decoder && r->received > MEBIBYTE && r->received / r->srv->options->max_ratio >= r->wire) {
     api_problem problem = {0};
-    api_refuse(&problem, "too-large", "The body unpacks to more than %lld times its size; send it plain.",
+    api_refuse(&problem, "too-large", "The body decompresses to more than %lld times its size; send it uncompressed.",
                (long long)r->srv->options->max_ratio);
     api_json_member_integer(&problem.facts, "ratio_limit", r->srv->options->max_ratio);
     reply_problem(r, &problem);
@@ -81,7 +82,7 @@ static int take_plain(void *user, const char *bytes, size_t size) {
 
 static void refuse_coding(request *r, const char *why) {
   api_problem problem = {0};
-  api_refuse(&problem, "malformed-encoding", "The body cannot be unpacked: %s.", why);
+  api_refuse(&problem, "malformed-encoding", "The body cannot be decompressed: %s.", why);
   api_json_member_integer(&problem.facts, "offset", r->wire);
   reply_problem(r, &problem);
 }
@@ -89,10 +90,10 @@ static void refuse_coding(request *r, const char *why) {
 static void unpack(request *r, const char *bytes, size_t size) {
   switch (decoder_feed(r->decoder, bytes, size, take_plain, r)) {
     case DECODE_BROKEN:
-      refuse_coding(r, "it is not what its Content-Encoding says, or was damaged on the way");
+      refuse_coding(r, "it does not match its Content-Encoding, or was damaged on the way");
       break;
     case DECODE_WINDOW:
-      refuse_coding(r, "it needs a window of more than 8 MB (zstd without --long or --ultra keeps below)");
+      refuse_coding(r, "it needs a window of more than 8 MB (zstd without --long or --ultra needs less)");
       break;
     case DECODE_NO_MEMORY:
       reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
@@ -104,7 +105,7 @@ static void unpack(request *r, const char *bytes, size_t size) {
   }
 }
 
-/* The refusal past the library, for a client that would never stop sending. */
+/* Writes the refusal to the socket past the library, for a client that never stops sending. */
 static void write_refusal(request *r) {
   const union MHD_ConnectionInfo *fd = MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
   char head[256];
@@ -117,14 +118,15 @@ static void write_refusal(request *r) {
                    r->status, r->number, r->refusal.size);
   struct iovec parts[2] = {{head, (size_t)n}, {r->refusal.data, r->refusal.size}};
   struct msghdr message = {.msg_iov = parts, .msg_iovlen = 2};
-  r->closes = sendmsg(fd->connect_fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL) > 0; /* some hundred bytes: all or none */
+  r->closes = sendmsg(fd->connect_fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL) >
+              0; /* a few hundred bytes: sent whole or not at all */
 }
 
 int body_take(request *r, const char *bytes, size_t size) {
   r->wire += (int64_t)size;
   if (!r->response) {
     if (r->decoder && r->wire > limit_of(r)) {
-      refuse_size(r); /* a stream that gives no output would never end */
+      refuse_size(r); /* compressed data without output would never reach the limit on the decoded size */
     } else if (r->decoder) {
       unpack(r, bytes, size);
     } else {
@@ -150,7 +152,7 @@ int body_end(request *r) {
     refuse_coding(r, "its end is missing");
   }
   if (r->decoder) {
-    decoder_free(r->decoder); /* its window is not needed while the request waits */
+    decoder_free(r->decoder); /* frees its window while the request waits */
     r->decoder = NULL;
     account(r);
   }

@@ -8,7 +8,7 @@
 
 struct callers {
   pthread_rwlock_t lock;
-  pthread_mutex_t reading; /* of the catalogue: what was read later is taken later */
+  pthread_mutex_t reading; /* held from reading the catalogue to storing the values, so a later read wins */
   catalogue *cat;
   caller **all;
   int count;
@@ -44,7 +44,7 @@ static caller *make(const token_row *row) {
   return who;
 }
 
-/* What can change of a token. */
+/* Copies what can change of a token. */
 static void update(caller *who, const token_row *row) {
   __atomic_store_n(&who->row.scopes, row->scopes, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.used, row->used, __ATOMIC_RELAXED);
@@ -67,7 +67,7 @@ static int reload(callers *c) {
     if (all[i]) {
       update(all[i], &rows[i]);
     } else {
-      all[i] = make(&rows[i]); /* NULL without memory: refused until the next time, and said */
+      all[i] = make(&rows[i]); /* NULL if out of memory: unknown until the next reload, which the result reports */
       fine &= all[i] != NULL;
     }
   }
@@ -142,7 +142,7 @@ int callers_count(callers *c) {
 caller *callers_find(callers *c, const unsigned char hash[TOKEN_BYTES]) {
   caller *found = NULL;
   pthread_rwlock_rdlock(&c->lock);
-  for (int i = 0; i < c->count; i++) { /* all of them, so that time tells nothing */
+  for (int i = 0; i < c->count; i++) { /* always all of them: the time must not depend on the token */
     if (c->all[i] && sodium_memcmp(hash, c->all[i]->row.hash, TOKEN_BYTES) == 0) {
       found = c->all[i];
     }

@@ -1,6 +1,6 @@
-/* The tokens that open this daemon, as they are now: read from the catalogue, and again whenever a command or SIGHUP
- * says so, while requests use them. A request holds its caller; a caller whose token is gone is revoked, and what it
- * still has open ends.
+/* The tokens of the catalogue in memory. A token command or SIGHUP reloads them while requests use them. A request
+ * holds a reference to its caller. When a token is removed, its caller is revoked: its open event streams and waiting
+ * requests end.
  */
 #ifndef ORB_HTTP_CALLERS_H
 #define ORB_HTTP_CALLERS_H
@@ -13,14 +13,15 @@ typedef struct caller {
 } caller;
 
 typedef struct callers callers;
-callers *callers_open(catalogue *cat); /* NULL where they cannot be read */
+callers *callers_open(catalogue *cat); /* NULL if the tokens cannot be read */
 void callers_close(callers *c);
-/* Reads them again; 0 where that fails: they stay as they are, but a new one may be refused until the next time. */
+/* Reads the tokens again. 0 on failure: known tokens keep their values, and a new one may stay unknown until the next
+ * reload. */
 int callers_reload(callers *c);
-/* After the meshes of a tenant changed: the bytes that its tokens have used. Blocks. */
+/* Updates the bytes used by a tenant's tokens after its meshes changed. Blocks. */
 void callers_recount(callers *c, const char *tenant);
 int callers_count(callers *c);
-/* By the hash of the token, compared in constant time; referenced. NULL: none. */
+/* Finds a token by its hash, in constant time; adds a reference. NULL: unknown. */
 caller *callers_find(callers *c, const unsigned char hash[TOKEN_BYTES]);
 void caller_release(caller *who);
 int caller_revoked(const caller *who); /* NULL: no */

@@ -1,4 +1,4 @@
-/* Requests for embeddings and supermeshes: known ones are answered, others become jobs. */
+/* POST /v1/embeddings and /v1/supermeshes: responds with a known result, or submits a job that makes it. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +8,7 @@
 #include "http/http.h"
 #include "log.h"
 
-/* A request that was read and checked. */
+/* A request that was read and validated. */
 typedef struct wanted {
   resource_kind kind;
   char id[API_ID_SIZE];
@@ -21,7 +21,7 @@ static int summary_of(request *r, const char *mesh, api_mesh_summary *out, api_p
   store_result result;
   const cached *entry = find_description(srv, RESOURCE_MESH, mesh, access_view(r), &result);
   if (!entry && result == STORE_NOT_FOUND) {
-    api_refuse(problem, "not-found", "There is no mesh %s: upload it first.", mesh);
+    api_refuse(problem, "not-found", "Mesh %s does not exist: upload it first.", mesh);
     api_json_member_string(&problem->facts, "mesh", mesh);
     return 0;
   }
@@ -91,6 +91,38 @@ static void reply_accepted(request *r, job *j) {
   reply_header(r, "Retry-After", "1");
 }
 
+static void log_submitted(const request *r, const job *j, int fresh) {
+  char fields[REQUEST_FIELDS + 80];
+  request_fields(r, fields);
+  size_t n = strlen(fields);
+  snprintf(fields + n, sizeof fields - n, ",\"job\":\"%s\"", job_id(j));
+  log_write(LOG_INFO, fields, fresh ? "job accepted" : "job already known");
+}
+
+static void refuse_submit(request *r, queue_result result, int64_t owner_limit) {
+  api_problem problem = {0};
+  switch (result) {
+    case QUEUE_FULL:
+      reply_refuse(r, "queue-full", "The queue is full; try again when some jobs have ended.");
+      break;
+    case QUEUE_QUOTA:
+      api_refuse(&problem, "quota-exceeded",
+                 "The token \"%s\" may have at most %lld unfinished jobs; wait for one to end.", r->caller->row.name,
+                 (long long)owner_limit);
+      api_json_member_integer(&problem.facts, "quota", owner_limit);
+      reply_problem(r, &problem);
+      break;
+    case QUEUE_STOPPING:
+      reply_refuse(r, "unavailable", "The service is stopping; try again soon.");
+      break;
+    case QUEUE_MESH_GONE:
+      reply_refuse(r, "not-found", "A mesh of this request has just been deleted: upload it again.");
+      break;
+    default:
+      reply_store(r, result == QUEUE_STORE_FULL ? STORE_FULL : STORE_ERROR);
+  }
+}
+
 static void submit(request *r, const wanted *wish) {
   queue_request wanted_job = {.kind = wish->kind == RESOURCE_EMBEDDING ? API_JOB_EMBEDDING : API_JOB_SUPERMESH,
                               .key = wish->id,
@@ -103,43 +135,15 @@ static void submit(request *r, const wanted *wish) {
   job *j = NULL;
   int fresh = 0;
   queue_result result = queue_submit(r->srv->q, &wanted_job, &j, &fresh);
-  if (fresh && result == QUEUE_OK && r->caller && !access_view(r)[0]) {
-    callers_recount(r->srv->callers, access_tenant(r)); /* meshes of others may be its own now */
-  }
-  if (result == QUEUE_OK) {
-    char fields[REQUEST_FIELDS + 80];
-    request_fields(r, fields);
-    size_t n = strlen(fields);
-    snprintf(fields + n, sizeof fields - n, ",\"job\":\"%s\"", job_id(j));
-    log_write(LOG_INFO, fields, fresh ? "job accepted" : "job known");
-  }
-  switch (result) {
-    case QUEUE_OK:
-      break;
-    case QUEUE_FULL:
-      reply_refuse(r, "queue-full", "There are too many unfinished jobs; try again when some have ended.");
-      break;
-    case QUEUE_QUOTA: {
-      api_problem problem = {0};
-      api_refuse(&problem, "quota-exceeded", "The token \"%s\" may have %lld unfinished jobs; wait for one to end.",
-                 r->caller->row.name, (long long)wanted_job.owner_limit);
-      api_json_member_integer(&problem.facts, "quota", wanted_job.owner_limit);
-      reply_problem(r, &problem);
-      break;
-    }
-    case QUEUE_STOPPING:
-      reply_refuse(r, "unavailable", "The service is stopping; try again soon.");
-      break;
-    case QUEUE_MESH_GONE:
-      reply_refuse(r, "not-found", "A mesh of this request was deleted meanwhile: upload it again.");
-      break;
-    default:
-      reply_store(r, result == QUEUE_STORE_FULL ? STORE_FULL : STORE_ERROR);
-  }
   if (result != QUEUE_OK) {
+    refuse_submit(r, result, wanted_job.owner_limit);
     queue_release(r->srv->q, j);
     return;
   }
+  if (fresh && r->caller && !access_view(r)[0]) {
+    callers_recount(r->srv->callers, access_tenant(r)); /* the job may have made it an owner of further meshes */
+  }
+  log_submitted(r, j, fresh);
   if (r->wait_until > orb_clock_ms()) {
     r->waits_for = j;
     r->wait_for_result = 1;

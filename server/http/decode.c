@@ -13,9 +13,9 @@ struct decoder {
   coding which;
   z_stream gzip;
   ZSTD_DCtx *zstd;
-  int whole;           /* the last member or frame ended with the last byte */
-  unsigned magic_seen; /* bytes of the current frame's magic number that were looked at */
-  unsigned char kind;  /* the first of them */
+  int whole;           /* the last byte ended a member or frame */
+  unsigned magic_seen; /* bytes of the current frame's magic number checked so far */
+  unsigned char kind;  /* the first byte of that magic number */
 };
 
 coding coding_of(const char *header) {
@@ -71,7 +71,7 @@ static decode_result feed_gzip(decoder *d, const char *bytes, size_t size, decod
   unsigned char out[PIECE];
   z_stream *z = &d->gzip;
   z->next_in = (unsigned char *)(uintptr_t)bytes;
-  z->avail_in = (uInt)size; /* pieces of an upload: far below its range */
+  z->avail_in = (uInt)size; /* a piece of an upload: far below UINT_MAX */
   do {
     if (d->whole && z->avail_in) { /* another member follows */
       inflateReset(z);
@@ -97,9 +97,8 @@ static decode_result feed_gzip(decoder *d, const char *bytes, size_t size, decod
   return DECODE_OK;
 }
 
-/* The magic number of a frame of RFC 8878, or of one to skip, as far as it has come. The library would also read the
- * formats from before the RFC, with decoders to which neither the bound of the window nor the count of memory applies.
- */
+/* Whether the bytes so far match the magic number of an RFC 8878 frame or skippable frame. libzstd would also decode
+ * its legacy formats, whose decoders ignore the window limit and do not show up in ZSTD_sizeof_DCtx(). */
 static int magic_fits(decoder *d, const unsigned char *bytes, size_t size) {
   static const unsigned char frame[] = {0x28, 0xB5, 0x2F, 0xFD}, skip[] = {0x50, 0x2A, 0x4D, 0x18};
   for (size_t i = 0; i < size && d->magic_seen < sizeof frame; i++, d->magic_seen++) {

@@ -1,6 +1,6 @@
-/* Server-sent events. A stream is a response that is read bit by bit: with nothing to send, its reader suspends the
- * connection and lists it with the queue; each event of the job resumes it. A comment every 15 s finds out whether the
- * client is still there. */
+/* GET /v1/jobs/{job}/events: server-sent events. The response is a stream that libmicrohttpd reads piece by piece. When
+ * there is nothing to send, the reader suspends the connection and registers it as a waiter of the job; each event
+ * resumes it. A comment every 15 s detects clients that have gone. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,7 +29,7 @@ static void resume(waiter *w) {
   MHD_resume_connection(((stream *)(void *)w)->connection);
 }
 
-/* Fills `pending`; 0 when there is nothing yet. */
+/* Fills `pending`; 0 if there is nothing to send. */
 static int fill(stream *s) {
   int ended;
   s->pending.size = s->sent = 0;
@@ -91,12 +91,12 @@ static void add_headers(request *r) {
   reply_header(r, "X-Accel-Buffering", "no");
 }
 
-/* All was seen: tells an EventSource not to come again. */
+/* The client has seen every event: 204 stops an EventSource from reconnecting. */
 static void reply_over(request *r) {
   reply_empty(r, 204);
 }
 
-/* Events after a number, from the catalogue; 0 where it cannot be read. */
+/* Appends the stored events after a number; 0 if the catalogue cannot be read. */
 static int write_stored(const request *r, int64_t after, api_text *text) {
   event_row events[ROWS];
   int n = ROWS;
@@ -111,7 +111,8 @@ static int write_stored(const request *r, int64_t after, api_text *text) {
   return n >= 0;
 }
 
-/* Who names an event that this job has not had, such as one that a crash lost, gets all there is. */
+/* Whether the job has a stored event of this number. A client may name one that a crash lost; it then gets all events.
+ */
 static int is_event(const request *r, int64_t number) {
   event_row found = {0};
   int n = catalogue_events(r->srv->cat, r->id, number - 1, 1, &found);
@@ -120,7 +121,7 @@ static int is_event(const request *r, int64_t number) {
   return same;
 }
 
-/* A job that is not in memory has ended: all that is left of its events, at once. */
+/* A job that is not in memory has ended: sends its stored events in one response. */
 static void ended_away(request *r) {
   job_row row;
   store_result result = catalogue_job_get(r->srv->cat, r->id, &row);
@@ -182,7 +183,7 @@ enum MHD_Result handle_job_events(request *r) {
   s->connection = r->connection;
   s->of = j;
   s->caller = r->caller;
-  r->caller = NULL; /* the stream has it now */
+  r->caller = NULL; /* the stream owns the reference now */
   s->after = after;
   s->last_ms = orb_clock_ms();
   api_text_add(&s->pending, "retry: 2000\n\n");

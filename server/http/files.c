@@ -1,5 +1,5 @@
-/* Objects as files: conditions, ranges, sendfile. Several ranges at once are answered with the whole file, as RFC 9110
- * section 14.2 allows. */
+/* GET of stored objects, with conditions, ranges and sendfile. A request for several ranges gets the whole file, as
+ * RFC 9110 section 14.2 allows. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,12 +8,12 @@
 #include "http/http.h"
 #include "log.h"
 #include "metrics.h"
-#include "worker/spheres.h"
+#include "store/spheres.h"
 
 static void add_headers(request *r, const char *etag, const char *mime, const char *name) {
   char disposition[160];
   reply_header(r, "ETag", etag);
-  /* What one token may see is not for a cache that others share. */
+  /* A shared cache must not keep what only one token may see. */
   reply_header(r, "Cache-Control",
                r->caller ? "private, max-age=31536000, immutable" : "public, max-age=31536000, immutable");
   reply_header(r, "Accept-Ranges", "bytes");
@@ -24,7 +24,7 @@ static void add_headers(request *r, const char *etag, const char *mime, const ch
   }
 }
 
-/* A part of an object, as if it were a file of its own; length 0: the whole object. */
+/* A part of an object, served like a file of its own; length 0: the whole object. */
 typedef struct object_part {
   uint64_t start, length;
 } object_part;
@@ -53,7 +53,7 @@ static void reply_part(request *r, object_kind kind, const char *id, object_part
   int ranged = usable ? parse_range(header_of(r, "Range"), size, &first, &length) : 0;
   if (ranged < 0) {
     close(fd);
-    reply_refuse(r, "range-not-satisfiable", "The file has %llu bytes.", (unsigned long long)size);
+    reply_refuse(r, "range-not-satisfiable", "The file has only %llu bytes.", (unsigned long long)size);
     snprintf(content_range, sizeof content_range, "bytes */%llu", (unsigned long long)size);
     reply_header(r, "Content-Range", content_range);
     return;
@@ -78,7 +78,7 @@ void reply_object(request *r, object_kind kind, const char *id, const char *sha,
   reply_part(r, kind, id, (object_part){0}, sha, mime, name);
 }
 
-/* Blocks: it looks into the object. */
+/* Blocks: reads the object's table. */
 static void reply_sphere(request *r) {
   object_part part;
   char name[32];
@@ -125,17 +125,18 @@ static resource_kind kind_of(const request *r) {
                                                   : RESOURCE_SUPERMESH;
 }
 
-/* Places and spheres may be missing from supermeshes of older engines; the rest is there as long as the row is. */
+/* Whether an object is missing that must exist as long as its row does. Supermeshes of older engines may have no
+ * places and no spheres. */
 static int is_lost(const request *r) {
   return r->status == 404 && r->route->id != ROUTE_SUPERMESH_PLACES && r->route->id != ROUTE_SUPERMESH_SPHERE;
 }
 
-/* The file was not there: deleted a moment ago, or lost from the store. */
+/* Distinguishes an object that has just been deleted from one that is lost. */
 static void lost_away(request *r) {
   resource row = {0};
   if (catalogue_get(r->srv->cat, kind_of(r), r->id, &row) == STORE_OK) {
-    log_error("the file of %s %s is lost: --check-data finds what else is", r->route->path, r->id);
-    reply_refuse(r, "internal", "The file is lost from the server's store. DELETE this, and send or ask for it again.");
+    log_error("the file of %s %s is lost: --check-data lists all damage", r->route->path, r->id);
+    reply_refuse(r, "internal", "The server has lost this file. DELETE the resource, then upload or request it again.");
   } else {
     reply_store(r, STORE_NOT_FOUND);
   }

@@ -1,4 +1,5 @@
-/* Forms of requests that two readers could understand in different ways are refused before anything is done. */
+/* Refuses ambiguous headers before anything else runs: forms that a proxy and this server could read differently
+ * (request smuggling). */
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -43,17 +44,18 @@ static int check_length(request *r, const seen *s, api_problem *problem) {
     return r->has_body && r->route ? bad(problem, "This route takes no body.") : 1;
   }
   if (!s->lengths && !s->encodings) {
-    return api_refuse(problem, "length-required", "Send a Content-Length, or the body in chunks.");
+    return api_refuse(problem, "length-required", "Send a Content-Length, or use chunked Transfer-Encoding.");
   }
   int64_t most = kind == ROUTE_JSON_BODY ? options->max_json : options->max_body;
   if (length > most) {
-    api_refuse(problem, "too-large", "The body has %lld bytes; at most %lld are taken here.", (long long)length,
+    api_refuse(problem, "too-large", "The body has %lld bytes; the limit of this route is %lld.", (long long)length,
                (long long)most);
     api_json_member_integer(&problem->facts, "limit", most);
     return 0;
   }
   if (s->codings > 1 || coding_of(header_of(r, "Content-Encoding")) == CODING_UNKNOWN) {
-    return api_refuse(problem, "unsupported-encoding", "Send the body as it is, or with gzip or zstd, once.");
+    return api_refuse(problem, "unsupported-encoding",
+                      "Send the body uncompressed, or compressed once with gzip or zstd.");
   }
   return 1;
 }
@@ -63,20 +65,20 @@ int guard_headers(request *r, const char *version, api_problem *problem) {
   MHD_get_connection_values(r->connection, MHD_HEADER_KIND, look, &s);
   r->has_body = s.encodings || (s.lengths && !s.bad_length && strtoll(s.length, NULL, 10) > 0);
   if (s.bad_name) {
-    return bad(problem, "A header's name holds a space or control character.");
+    return bad(problem, "A header name contains a space or control character.");
   }
   if (s.hosts > 1 || (s.hosts == 0 && strcmp(version, "HTTP/1.0") != 0)) {
-    return bad(problem, "A request needs exactly one Host header.");
+    return bad(problem, "A request must have exactly one Host header.");
   }
   if (s.bad_length || s.lengths > 1) {
     r->has_body = 1;
-    return bad(problem, "Content-Length must be given once, in digits.");
+    return bad(problem, "Content-Length must appear once and consist of digits.");
   }
   if (s.bad_encoding || s.encodings > 1) {
-    return bad(problem, "Transfer-Encoding must be chunked, given once.");
+    return bad(problem, "Transfer-Encoding must appear once, as chunked.");
   }
   if (s.lengths && s.encodings) {
-    return bad(problem, "Content-Length and Transfer-Encoding exclude each other.");
+    return bad(problem, "A request must not have both Content-Length and Transfer-Encoding.");
   }
   return check_length(r, &s, problem);
 }

@@ -1,10 +1,30 @@
-/* Serving requests over libmicrohttpd: the request, its phases, and what handlers share.
+/* HTTP over libmicrohttpd. In: connections and requests. Out: responses, and jobs submitted to the queue.
  *
- * Contract. A handler runs on a thread that serves many connections, so it only parses, looks into memory, and makes
- * a response. What needs a query, a commit, a file to be checked, or a hash over much goes away: the connection is
- * suspended, a task runs on another thread, makes the response, and resumes the connection; then the handler is called
- * again and sends it. Waiting for a job is the same with the queue in place of the task. A request belongs to exactly
- * one thread at any time, which is why it needs no lock: handler → task or queue → handler.
+ * Reading order:
+ *   server.c     the life of a request: answer() is called for headers, body and response; handlers[] maps each route
+ *                of api/routes.h to its handler
+ *   guard.c, access.c, body.c   what is checked before a handler runs: headers; limits, token, tenant; body
+ *   request.c    how a handler leaves the HTTP thread
+ *   meshes.c     POST /v1/meshes          create.c      POST /v1/embeddings, POST /v1/supermeshes
+ *   resources.c  GET, DELETE and lists of meshes, embeddings and supermeshes
+ *   files.c      GET of stored objects    jobs.c        GET, DELETE and lists of jobs; waiting for a job
+ *   events.c     GET /v1/jobs/{job}/events
+ *   system.c     /livez, /readyz, /metrics              pages.c       the studio, /openapi.json, /docs
+ *   reply.c, send.c   responses; the headers that every response carries
+ *   listen.c (the socket), watch.c and addresses.c (slow and too many connections), callers.c (tokens in memory),
+ *   decode.c (gzip, zstd), parse.c (texts of requests), paging.c (page tokens)
+ *
+ * A new route: its row in API_ROUTES (api/routes.h), its handler in the file of its resource, its description in
+ * api/openapi.json.
+ * The text of an error: handlers call reply_refuse() or api_refuse() with the problem's name and its detail, so search
+ * for the text here, in server/worker or in api; status and title of each name are in api/problem.c.
+ *
+ * Contract. A handler runs on a thread that serves many connections, so it only parses, reads memory and makes a
+ * response. Anything that needs a query, a commit, a file check or a hash of much data goes away
+ * (request_go_away()): the connection is suspended, a task makes the response on another thread and resumes the
+ * connection, and libmicrohttpd calls answer() again, which sends it. Waiting for a job works the same way, with the
+ * queue in place of the task. Exactly one thread owns a request at any time (handler → task or queue → handler), so a
+ * request needs no lock.
  */
 #ifndef ORB_HTTP_H
 #define ORB_HTTP_H
@@ -30,12 +50,12 @@ typedef struct server {
   objects *store;
   queue *q;
   cache *descriptions;
-  tasks *io, *checks, *large_checks; /* large uploads do not stand before small ones */
+  tasks *io, *checks, *large_checks; /* large uploads have threads of their own and do not delay small ones */
   listener at;
   watch *connections;
   struct MHD_Daemon *daemon;
   int ready, stopping; /* written under __atomic */
-  int64_t decoding;    /* bytes that decoders of bodies hold; __atomic */
+  int64_t decoding;    /* bytes held by the decoders of bodies; __atomic */
   int64_t started;
   int needs_token;
   callers *callers;
@@ -60,44 +80,46 @@ struct request {
   char number[24]; /* of the request, for the log and X-Request-Id */
   caller *caller;  /* referenced; NULL where no token is needed */
   int has_body, head;
-  int closes; /* the connection ends with this answer */
+  int closes; /* the connection closes after this response */
   request_phase phase;
   int64_t began; /* µs */
 
   decoder *decoder;                /* NULL: the body is plain */
-  int64_t decoder_bytes;           /* as counted in server.decoding */
-  int64_t wire, received, dropped; /* bytes of the body: as they came, decoded, after a refusal */
-  int body_done;                   /* all of it came */
+  int64_t decoder_bytes;           /* its share of server.decoding */
+  int64_t wire, received, dropped; /* bytes of the body: as sent, decoded, dropped after a refusal */
+  int body_done;                   /* the whole body has arrived */
   api_text body;                   /* JSON */
-  api_text refusal;                /* the text of a refusal that was made while the body came */
+  api_text refusal;                /* body of a refusal that was made while the request's body arrived */
   object_temp temp;                /* upload */
   api_hash hash;
 
   waiter waiter;
   job *waits_for;
   int64_t wait_until;
-  int64_t preferred_ms; /* by a Prefer header */
-  int wait_for_result;  /* the answer is the result where there is one in time */
-  int cancels;          /* a job that waits_for names; the answer is a refusal where it ended otherwise */
+  int64_t preferred_ms; /* from a Prefer header */
+  int wait_for_result;  /* respond with the result if the job succeeds in time, else with the job */
+  int cancels;          /* the request cancels waits_for; refused if the job ends in another way */
 
   unsigned status;
-  int64_t sends;          /* bytes of the response's body; streams count theirs as they go */
-  char trace[TRACE_SIZE]; /* traceparent, where the caller sent a well-formed one */
+  int64_t sends;          /* bytes of the response's body; event streams count theirs as they send */
+  char trace[TRACE_SIZE]; /* traceparent, if the caller sent a well-formed one */
   struct MHD_Response *response;
 };
 
 /* server.c */
 int http_start(server *srv);
 void http_stop(server *srv);
-/* Suspends and runs fn on a thread of the pool; fn must leave a response or PHASE_WAIT. Returns REQUEST_AWAY, which a
- * handler passes on: from here the request belongs to the task and must not be looked at. */
+
+/* request.c */
+/* Suspends the connection and runs fn on a thread of the pool; fn must leave a response or PHASE_WAIT. Returns
+ * REQUEST_AWAY, which the handler returns in turn: the task owns the request now, and the handler must not touch it. */
 #define REQUEST_AWAY ((enum MHD_Result)2)
 enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r));
 
 /* guard.c: 1, or 0 with the problem. */
 int guard_headers(request *r, const char *version, api_problem *problem);
 const char *header_of(const request *r, const char *name);
-/* Of a header that is a list, every line of it that came (RFC 9110 section 5.3), at most so many; how many. */
+/* All lines of a header that is a list (RFC 9110 section 5.3), at most HEADER_LINES; returns their number. */
 enum { HEADER_LINES = 16 };
 int header_lines(const request *r, const char *name, const char *out[HEADER_LINES]);
 const char *query_of(const request *r, const char *name);
@@ -105,54 +127,60 @@ int query_has(const request *r, const char *name); /* also without a value */
 
 /* access.c: 1, or 0 with a response. */
 int access_within_limits(request *r, const char *path);
-/* RateLimit and RateLimit-Policy (draft-ietf-httpapi-ratelimit-headers) of what holds for the caller. */
+/* Adds RateLimit and RateLimit-Policy (draft-ietf-httpapi-ratelimit-headers) with the limits of the caller. */
 void access_headers(request *r);
 /* 1, or 0 with the problem. */
 int access_check(request *r, const char *path, api_problem *problem);
-/* Its priority in the queue: the token's, then what the Priority header says (RFC 9218, u=0 to 7). */
+/* The priority of the caller's jobs: first the token's class, then the urgency of the Priority header (RFC 9218,
+ * u=0 to 7). */
 int access_priority(const request *r);
-/* Whether it may look behind the scenes: with the scope admin, or where no token is needed. */
+/* 1 with the scope admin, or where no token is needed: the caller may see the numbers of the whole service. */
 int access_is_operator(const request *r);
-/* Tenants. Whose the caller's requests are; "" where no token is needed. */
+/* The tenant that owns what the caller makes; "" where no token is needed. */
 const char *access_tenant(const request *r);
-/* Through whose eyes it sees: its tenant's, or "" for all there is, with the scope admin or where no token is needed.
- */
+/* The tenant whose resources the caller sees; "" means all of them (scope admin, or no token needed). */
 const char *access_view(const request *r);
-/* Whether it sees what a tenant asked for. What it does not see is not there for it. */
+/* Whether the caller sees a job of this owner. Handlers answer 404 for jobs that the caller does not see. */
 int access_sees(const request *r, const char *owner);
-/* Room for an upload in the token's quota; 0 with the problem. */
+/* 1 if the token's quota has room for an upload; 0 with the problem. */
 int access_has_room(const request *r, int64_t bytes, api_problem *problem);
 
 /* reply.c: each leaves a response. */
-void reply_json(request *r, unsigned status, api_text *json); /* takes json */
+void reply_json(request *r, unsigned status, api_text *json); /* frees json */
 void reply_problem(request *r, api_problem *problem);         /* frees problem */
 void reply_refuse(request *r, const char *name, const char *format, ...) ORB_PRINTF(3, 4);
 void reply_store(request *r, store_result result);
 void reply_empty(request *r, unsigned status);
 void reply_bytes(request *r, unsigned status, const char *mime, const void *bytes, size_t size); /* static bytes */
-void reply_text(request *r, unsigned status, const char *mime, api_text *text);                  /* takes text */
-/* The description, with ETag and 304; takes the reference. */
+void reply_text(request *r, unsigned status, const char *mime, api_text *text);                  /* frees text */
+/* The description, with ETag and 304; releases the reference. */
 void reply_cached(request *r, unsigned status, const cached *entry);
 void reply_header(request *r, const char *name, const char *value);
-/* Conditions of the request on what has this tag (RFC 9110 section 13.2.2): 0 where it is to be done, 1 with the
- * response, 412 or 304. */
+/* Evaluates If-Match and If-None-Match against this tag (RFC 9110 section 13.2.2): 0 if the request may proceed, 1
+ * with a response, 412 or 304. */
 int reply_conditions(request *r, const char *etag);
+/* send.c: adds the headers that every response carries and queues the response. */
 enum MHD_Result reply_send(request *r);
-/* files.c: an object with ranges and conditions. */
+
+/* pages.c: what is compiled in. */
+int is_page(const char *path);
+void handle_page(request *r, const char *path);
+
+/* files.c: responds with an object, with ranges and conditions. */
 void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name);
 
-/* Handlers; called when the whole body is there. */
-void handle_mesh_begin(request *r); /* before the first byte of an upload */
+/* Handlers. server.c calls them when the whole body has arrived; the two of an upload run while it arrives. */
+void handle_mesh_begin(request *r);
 void handle_mesh_bytes(request *r, const char *bytes, size_t size);
 #define DECLARE(id, method, path, body, scope, handler) enum MHD_Result handler(request *r);
 API_ROUTES(DECLARE)
 #undef DECLARE
-/* In PHASE_WAIT: waits on, or leaves the response. */
+/* In PHASE_WAIT: keeps waiting, or leaves the response. */
 enum MHD_Result handle_wait(request *r);
 
 /* Reads limit and page_token. 1, or 0 with a response. */
 int read_page(request *r, int *limit, int64_t *before);
-/* A page of a list: room for limit + 1 rows, and the JSON so far. */
+/* A page of a list: space for limit + 1 rows, and the JSON written so far. */
 typedef struct list_page {
   int limit;
   int64_t before;
@@ -160,15 +188,16 @@ typedef struct list_page {
   api_text json;
 } list_page;
 int list_begin(request *r, const char *name, size_t row_size, list_page *page); /* 0 with a response */
-/* Takes the page; last: the sequence number of its last row; count: of the rows found, −1 where they cannot be read. */
+/* Frees the page and leaves a response. last: sequence number of the page's last row; count: rows found, −1 if they
+ * could not be read. */
 void list_end(request *r, list_page *page, int64_t last, int count);
-/* Seconds to wait by ?wait= or Prefer: wait=, clamped to 60; 0: not. −1: bad, with a response. */
+/* How long to wait by ?wait= or Prefer: wait=, in ms, at most 60 s; 0: do not wait; −1: malformed, with a response. */
 int64_t read_wait_ms(request *r);
-/* As a tenant sees it ("": everything), from the cache or the catalogue; blocks. NULL with *result. */
+/* The description as a tenant sees it (view "": any), from the cache or the catalogue; blocks. NULL with *result. */
 const cached *find_description(server *srv, resource_kind kind, const char *id, const char *view, store_result *result);
-/* Of a description that the cache had: says so to the catalogue, for eviction. Does not wait. */
+/* Records in the catalogue that a cached description was used, for eviction. Does not block. */
 void note_use(server *srv, const cached *entry);
-/* Members for the log: the request's number, its trace and route. */
+/* JSON members for the log: the request's number, trace and route. */
 enum { REQUEST_FIELDS = 256 };
 void request_fields(const request *r, char out[REQUEST_FIELDS]);
 int64_t clock_us(void);

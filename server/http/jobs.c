@@ -1,4 +1,4 @@
-/* Jobs: their state, waiting for their end, cancelling. */
+/* Jobs: GET, lists and DELETE (cancelling), and waiting for a job to end. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,17 +18,17 @@ int64_t read_wait_ms(request *r) {
     wait = parse_preferred_ms(prefer[i]);
   }
   if (wait < 0) {
-    reply_refuse(r, "bad-query", "\"wait\" must be a number of seconds; more than 60 count as 60.");
+    reply_refuse(r, "bad-query", "\"wait\" must be a number of seconds; values above 60 mean 60.");
   }
   r->preferred_ms = wait > 0 && !query ? wait : 0;
   return wait;
 }
 
 static void refuse_ended(request *r, api_job_state state) {
-  reply_refuse(r, "job-ended", "The job has %s already; there is nothing to cancel.", api_job_state_name(state));
+  reply_refuse(r, "job-ended", "The job has already %s and cannot be cancelled.", api_job_state_name(state));
 }
 
-/* The job; for who cancels it a refusal where it came to an end of its own before it saw the wish. */
+/* Responds with the job. A request that cancels it is refused if the job succeeded or failed first. */
 static void reply_job(request *r, job *j) {
   api_text json = {0};
   api_job_state state = queue_job_write(r->srv->q, j, &json);
@@ -168,7 +168,7 @@ enum MHD_Result handle_job_get(request *r) {
 static void cancel_away(request *r) {
   server *srv = r->srv;
   job *j = queue_find(srv->q, r->id);
-  if (!j) { /* not in memory: it ended long ago, or never was */
+  if (!j) { /* not in memory: it ended long ago, or does not exist */
     job_row row;
     store_result result = catalogue_job_get(srv->cat, r->id, &row);
     if (result != STORE_OK) {
@@ -228,7 +228,7 @@ static api_job_state write_live(request *r, const job_row *row, api_text *out) {
   return state;
 }
 
-/* Whether a job of the catalogue's page is in the list, which it then is added to. */
+/* Adds a job to the list if its state is wanted (state < 0: any) and there is room. 1 if its state is wanted. */
 static int add_to_list(request *r, const job_row *row, int state, int room, api_text *out) {
   api_text json = {0};
   int shown = (int)write_live(r, row, &json), taken = state < 0 || shown == state;
@@ -252,7 +252,8 @@ static void list_away(request *r) {
   if (!list_begin(r, "jobs", sizeof(job_row), &page)) {
     return;
   }
-  /* What is queued in the catalogue may be running, because what it needs is: the state is that which is shown. */
+  /* A job that is queued in the catalogue is shown as running while an embedding that it needs runs. The filter
+   * applies to the shown state, so the query asks for both. */
   int asked = state >= 0 && !api_job_ended((api_job_state)state) ? CATALOGUE_UNFINISHED : state;
   job_row *rows = page.rows;
   const char *view = access_view(r);

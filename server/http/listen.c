@@ -25,7 +25,7 @@ typedef union address {
   struct sockaddr_storage room;
 } address;
 
-/* What the socket is bound to. host: as the caller wrote it; empty: as it is bound. */
+/* Fills text and local from the bound address. host: as the configuration writes it; "": the numeric address. */
 static int describe(listener *out, const char *host) {
   address at = {0};
   socklen_t size = sizeof at;
@@ -54,12 +54,12 @@ static int describe(listener *out, const char *host) {
       }
       return 1;
     default:
-      log_error("a socket of family %d cannot be served", at.any.sa_family);
+      log_error("sockets of address family %d are not supported", at.any.sa_family);
       return 0;
   }
 }
 
-/* 1: systemd passed one and *out has it; 0: none; −1: not one that can be used. */
+/* 1: systemd passed a socket, now in *out; 0: it passed none; −1: it passed one that cannot be used (logged). */
 static int take_passed(listener *out) {
   const char *count = getenv("LISTEN_FDS"), *pid = getenv("LISTEN_PID");
   if (!count || !pid || atol(pid) != (long)getpid()) {
@@ -67,15 +67,15 @@ static int take_passed(listener *out) {
   }
   int wanted = atoi(count), listens = 0;
   socklen_t size = sizeof listens;
-  unsetenv("LISTEN_FDS"); /* not for what we start */
+  unsetenv("LISTEN_FDS"); /* child processes must not inherit them */
   unsetenv("LISTEN_PID");
   unsetenv("LISTEN_FDNAMES");
   if (wanted != 1) {
-    log_error("systemd passed %d sockets; exactly one can be served", wanted);
+    log_error("systemd passed %d sockets; orbmorphd serves exactly one", wanted);
     return -1;
   }
   if (getsockopt(PASSED_FD, SOL_SOCKET, SO_ACCEPTCONN, &listens, &size) != 0 || !listens) {
-    log_error("what systemd passed is no stream socket that listens: set Accept=no and ListenStream=");
+    log_error("the socket from systemd is not a listening stream socket: set Accept=no and ListenStream=");
     return -1;
   }
   fcntl(PASSED_FD, F_SETFD, FD_CLOEXEC);
@@ -84,14 +84,14 @@ static int take_passed(listener *out) {
   return describe(out, "") ? 1 : -1;
 }
 
-/* Makes room for the socket: a path that is free, or a socket that nobody listens on any more. */
+/* Removes a socket file that no process listens on any more. 0, with the reason logged, if the path is taken. */
 static int clear_path(const struct sockaddr_un *at) {
   struct stat info;
   if (lstat(at->sun_path, &info) != 0) {
     return 1;
   }
   if (!S_ISSOCK(info.st_mode)) {
-    log_error("%s is there and is no socket", at->sun_path);
+    log_error("%s exists and is not a socket", at->sun_path);
     return 0;
   }
   int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
@@ -110,7 +110,7 @@ static int listen_unix(const char *path, mode_t mode, listener *out) {
   struct sockaddr_un at = {.sun_family = AF_UNIX};
   struct stat info;
   if (!*path || strlen(path) >= sizeof at.sun_path) {
-    log_error("the path of a Unix socket has 1 to %zu bytes", sizeof at.sun_path - 1);
+    log_error("the path of a Unix socket must have 1 to %zu bytes", sizeof at.sun_path - 1);
     return 0;
   }
   strcpy(at.sun_path, path);
@@ -118,7 +118,7 @@ static int listen_unix(const char *path, mode_t mode, listener *out) {
     return 0;
   }
   out->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  /* Nobody connects before listen(), so the mode holds from the first connection on. */
+  /* No client can connect before listen(), so the mode applies from the first connection. */
   if (out->fd < 0 || bind(out->fd, (struct sockaddr *)&at, sizeof at) != 0 || chmod(path, mode) != 0 ||
       stat(path, &info) != 0 || listen(out->fd, SOMAXCONN) != 0) {
     log_error("cannot listen on %s: %s", path, strerror(errno));

@@ -1,4 +1,4 @@
-/* The socket that the daemon listens on: ADDR:PORT, a Unix socket, or one that systemd holds and passes on. */
+/* The socket that the daemon listens on: ADDR:PORT, a Unix socket, or one that systemd passes to it. */
 #ifndef ORB_HTTP_LISTEN_H
 #define ORB_HTTP_LISTEN_H
 
@@ -9,15 +9,15 @@
 typedef struct listener {
   int fd;         /* −1: none */
   int local;      /* only this machine reaches it: loopback, or a Unix socket */
-  char text[300]; /* HOST:PORT with the port that was got, or unix:PATH */
-  char path[108]; /* of a Unix socket that was made here; to be removed */
-  dev_t device;   /* and what it was then, so that no other's is removed */
+  char text[300]; /* HOST:PORT with the actual port, or unix:PATH */
+  char path[108]; /* of a Unix socket made here; listen_remove() unlinks it */
+  dev_t device;   /* identity of that file, so that another process's socket is not unlinked */
   ino_t inode;
 } listener;
 
-/* 1, or 0 with the reason logged. Sockets of systemd (LISTEN_FDS, sd_listen_fds(3)) go before `listen`. */
+/* 1, or 0 with the reason logged. A socket from systemd (LISTEN_FDS, sd_listen_fds(3)) overrides `listen`. */
 int listen_open(const config *options, listener *out);
-/* Removes the path of a Unix socket; the descriptor is closed by who has it. */
+/* Unlinks a Unix socket. Does not close the descriptor: libmicrohttpd owns it. */
 void listen_remove(listener *of);
 
 #endif

@@ -1,5 +1,5 @@
-/* Uploads: the body streams into a temporary file and a hash; then, on a thread for checks, the mesh is read, repaired
- * and, where it can be embedded, stored. */
+/* POST /v1/meshes. The body streams into a temporary file and a hash. Then a thread for checks reads the mesh, repairs
+ * it, checks its topology and stores it. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +17,7 @@
 enum { LARGE_UPLOAD = 16 << 20, LOOK_BYTES = 1 << 20 };
 
 static void refuse_full(request *r) {
-  reply_refuse(r, "storage-full", "The disk of the server has no room for this file. Make room and try again.");
+  reply_refuse(r, "storage-full", "The server's disk has no room for this file. Free some space and try again.");
 }
 
 void handle_mesh_begin(request *r) {
@@ -25,7 +25,7 @@ void handle_mesh_begin(request *r) {
   upload_query query;
   api_problem problem = {0};
   if (!parse_upload(query_of(r, "name"), query_of(r, "repair"), query_of(r, "format"), &query, &problem)) {
-    reply_problem(r, &problem); /* before the bytes are sent for nothing */
+    reply_problem(r, &problem); /* now, before the client sends the whole file */
     return;
   }
   const char *length = header_of(r, "Content-Length");
@@ -42,8 +42,8 @@ void handle_mesh_begin(request *r) {
   api_hash_begin(&r->hash);
 }
 
-/* The reserve is looked at again as the bytes come: chunks and packed bodies do not say before how many they are, and
- * others take their part meanwhile. */
+/* Checks the disk reserve again every LOOK_BYTES: chunked and compressed bodies do not announce their size, and other
+ * uploads take space meanwhile. */
 void handle_mesh_bytes(request *r, const char *bytes, size_t size) {
   const server *srv = r->srv;
   if (r->received / LOOK_BYTES != (r->received - (int64_t)size) / LOOK_BYTES &&
@@ -59,7 +59,7 @@ void handle_mesh_bytes(request *r, const char *bytes, size_t size) {
   }
 }
 
-/* The upload's bytes in memory; unmapped by the caller. */
+/* Maps the upload's bytes into memory; free with unmap_upload(). */
 static const unsigned char *map_upload(const request *r) {
   if (r->received == 0) {
     return (const unsigned char *)"";
@@ -74,7 +74,7 @@ static void unmap_upload(const request *r, const unsigned char *bytes) {
   }
 }
 
-/* Reads and repairs; on success the description is in *json. */
+/* Reads, repairs and checks the mesh; on success *json holds its description. */
 static int check_mesh(request *r, const upload_query *query, const unsigned char *bytes, orb_format format,
                       const char *id, int64_t created, api_text *json, api_problem *problem) {
   const config *options = r->srv->options;
@@ -107,7 +107,7 @@ static int check_mesh(request *r, const upload_query *query, const unsigned char
   return fine;
 }
 
-/* Takes back an object that got no row. */
+/* Deletes an object that got no row. */
 static void drop_unused(server *srv, const char *id) {
   resource row = {0};
   objects_exclude(srv->store);
@@ -118,7 +118,7 @@ static void drop_unused(server *srv, const char *id) {
   resource_free(&row);
 }
 
-/* Also where others have the same mesh: the caller is not to see that, neither by the answer nor by its time. */
+/* Checks the mesh even if another tenant already owns it: neither the response nor its time may reveal that. */
 static void store_mesh(request *r, const upload_query *query, const unsigned char *bytes, orb_format format,
                        const char *id) {
   server *srv = r->srv;
@@ -147,17 +147,17 @@ static void store_mesh(request *r, const upload_query *query, const unsigned cha
   if (fresh && r->caller) {
     callers_recount(srv->callers, tenant);
   }
-  if (stored == STORE_CONFLICT && r->caller) { /* others of this tenant took the room meanwhile */
+  if (stored == STORE_CONFLICT && r->caller) { /* other uploads of this tenant have used up the quota */
     drop_unused(srv, id);
     callers_recount(srv->callers, tenant);
     if (access_has_room(r, r->received, &problem)) {
-      api_refuse(&problem, "quota-exceeded", "There was no room for this mesh in the quota of the token; try again.");
+      api_refuse(&problem, "quota-exceeded", "The token's quota had no room for this mesh; try again.");
       api_json_member_integer(&problem.facts, "quota", __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED));
     }
     reply_problem(r, &problem);
     return;
   }
-  /* Of two that sent the same at once, both get the row that was first. */
+  /* If two requests upload the same mesh at once, both get the row that was written first. */
   const cached *entry = stored == STORE_OK ? find_description(srv, RESOURCE_MESH, id, tenant, &stored) : NULL;
   if (entry) {
     reply_cached(r, 201, entry);
@@ -166,7 +166,7 @@ static void store_mesh(request *r, const upload_query *query, const unsigned cha
   }
 }
 
-/* The bytes of a mesh that is known may be lost or cut off all the same, by a disk or a hand; here they are again. */
+/* A known mesh whose file is lost or truncated is restored from this upload. */
 static void put_back(request *r, const char *id) {
   int fd;
   uint64_t size = 0;
@@ -178,7 +178,8 @@ static void put_back(request *r, const char *id) {
     objects_hold(r->srv->store);
     found = objects_publish(r->srv->store, &r->temp, OBJECT_MESH, id);
     objects_let_go(r->srv->store);
-    log_warn("the bytes of mesh %s were lost or cut off, and %s", id, found == STORE_OK ? "are back" : "still are");
+    log_warn("the file of mesh %s was lost or truncated and %s", id,
+             found == STORE_OK ? "is restored" : "could not be restored");
   }
 }
 

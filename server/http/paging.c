@@ -1,4 +1,5 @@
-/* A permutation of 64 bits: four rounds of a Feistel network (Luby and Rackoff 1988) with SipHash-2-4 in the rounds. */
+/* A permutation of 64 bits: a Feistel network of four rounds (Luby and Rackoff 1988) with SipHash-2-4 as its round
+ * function. */
 #include "http/paging.h"
 
 #include <sodium.h>
@@ -7,7 +8,7 @@
 enum { ROUNDS = 4 };
 _Static_assert(CATALOGUE_SECRET == crypto_shorthash_KEYBYTES, "the secret is a key of the hash");
 
-/* What a number may have: those that tokens open to otherwise were given out by nobody. */
+/* Sequence numbers are below this; a token that decrypts to any other number was never issued. */
 static const int64_t NUMBERS = (int64_t)1 << 40;
 
 static uint32_t scramble(const unsigned char *key, int round, uint32_t half) {

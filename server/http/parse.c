@@ -88,7 +88,7 @@ int64_t parse_wait_ms(const char *query) {
   return end == query || *end || !(seconds >= 0) ? -1 : clamped_ms(seconds);
 }
 
-/* Behind a token or a quoted string. */
+/* Returns the end of a token or quoted string. */
 static const char *skip_word(const char *at) {
   if (*at != '"') {
     return at + strcspn(at, " \t,;=\"");
@@ -99,7 +99,8 @@ static const char *skip_word(const char *at) {
   return at + (*at == '"');
 }
 
-/* name [= word], with blanks around the sign; *value is NULL without one. Behind it and the blanks after it. */
+/* Reads name [= word], with blanks allowed around the sign; *value is NULL without a sign. Returns the end, after any
+ * blanks. */
 static const char *read_pair(const char *at, const char **value) {
   at = skip_word(at);
   at += strspn(at, " \t");
@@ -130,7 +131,7 @@ int64_t parse_preferred_ms(const char *prefer) {
       at += strspn(at, " \t");
       at = read_pair(at, &other);
     }
-    at += *at && *at != ',' && *at != ';'; /* what is none of the grammar is passed over */
+    at += *at && *at != ',' && *at != ';'; /* skips a character outside the grammar */
   }
   return 0;
 }
@@ -150,7 +151,7 @@ int64_t parse_event_number(const char *text) {
   return number > 0 ? number : 0;
 }
 
-const char PARSE_PAGE_TOKEN[] = "\"page_token\" must be the \"next_page_token\" of the page before.";
+const char PARSE_PAGE_TOKEN[] = "\"page_token\" must be the \"next_page_token\" of the previous page.";
 
 int parse_page(const char *limit_text, const char *token, int *limit, uint64_t *sealed, const char **why) {
   char *end;
@@ -159,7 +160,7 @@ int parse_page(const char *limit_text, const char *token, int *limit, uint64_t *
   if (limit_text) {
     long value = strtol(limit_text, &end, 10);
     if (*end || end == limit_text || value < 1) {
-      *why = "\"limit\" must be a whole number from 1; more than 1000 count as that.";
+      *why = "\"limit\" must be a whole number of at least 1; values above 1000 mean 1000.";
       return 0;
     }
     *limit = value < PAGE_MOST ? (int)value : PAGE_MOST;
@@ -182,13 +183,13 @@ int parse_upload(const char *name, const char *repair, const char *format, uploa
   snprintf(out->name, sizeof out->name, "%s", name ? name : "mesh");
   for (const unsigned char *c = (const unsigned char *)out->name; *c; c++) {
     if (*c < 0x20 || *c == 0x7f) {
-      return api_refuse(problem, "bad-query", "\"name\" must not hold control characters.");
+      return api_refuse(problem, "bad-query", "\"name\" must not contain control characters.");
     }
   }
   if (format) {
     out->hint = orb_format_of_name(format);
     if (out->hint == ORB_FORMAT_AUTO) {
-      return api_refuse(problem, "bad-query", "\"format\" must be obj, off, ply, stl, gltf or glb, or left out.");
+      return api_refuse(problem, "bad-query", "\"format\" must be obj, off, ply, stl, gltf or glb, or be omitted.");
     }
   }
   return api_repair_parse(repair ? repair : "safe", &out->flags, out->repair, problem);

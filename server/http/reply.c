@@ -1,11 +1,8 @@
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "http/http.h"
-#include "log.h"
-#include "metrics.h"
 
 static void take(request *r, unsigned status, struct MHD_Response *response, size_t size) {
   if (r->response) {
@@ -19,7 +16,7 @@ static void take(request *r, unsigned status, struct MHD_Response *response, siz
 
 void reply_header(request *r, const char *name, const char *value) {
   if (r->response && MHD_add_response_header(r->response, name, value) != MHD_YES) {
-    MHD_destroy_response(r->response); /* no memory: none is better than one without its type or its place */
+    MHD_destroy_response(r->response); /* out of memory: no response is better than one that lacks a header */
     r->response = NULL;
   }
 }
@@ -79,11 +76,11 @@ void reply_refuse(request *r, const char *name, const char *format, ...) {
 
 void reply_store(request *r, store_result result) {
   if (result == STORE_NOT_FOUND) {
-    reply_refuse(r, "not-found", "There is nothing with this id; it may have been deleted.");
+    reply_refuse(r, "not-found", "Nothing has this id; it may have been deleted.");
   } else if (result == STORE_FULL) {
-    reply_refuse(r, "storage-full", "The disk of the server is full; nothing was stored. Make room and try again.");
+    reply_refuse(r, "storage-full", "The server's disk is full; nothing was stored. Free some space and try again.");
   } else {
-    reply_refuse(r, "internal", "The store could not be read or written; the log of the server says why.");
+    reply_refuse(r, "internal", "The store could not be read or written; the server's log says why.");
   }
 }
 
@@ -110,7 +107,8 @@ static int names_tag(const request *r, const char *header, const char *etag, int
 int reply_conditions(request *r, const char *etag) {
   int lines, reads = r->route->method[0] == 'G';
   if (!names_tag(r, "If-Match", etag, parse_tag_matches_strong, &lines) && lines > 0) {
-    reply_refuse(r, "precondition-failed", "It has another tag than If-Match asks for: %s. Nothing was done.", etag);
+    reply_refuse(r, "precondition-failed", "The current ETag is %s, which If-Match does not name. Nothing was done.",
+                 etag);
     return 1;
   }
   if (!names_tag(r, "If-None-Match", etag, parse_tag_matches, &lines)) {
@@ -119,7 +117,8 @@ int reply_conditions(request *r, const char *etag) {
   if (reads) {
     reply_empty(r, 304);
   } else {
-    reply_refuse(r, "precondition-failed", "It has a tag that If-None-Match excludes: %s. Nothing was done.", etag);
+    reply_refuse(r, "precondition-failed", "The current ETag is %s, which If-None-Match excludes. Nothing was done.",
+                 etag);
   }
   return 1;
 }
@@ -145,68 +144,4 @@ void reply_cached(request *r, unsigned status, const cached *entry) {
     reply_header(r, "Content-Location", location);
   }
   cache_release(r->srv->descriptions, entry);
-}
-
-/* Whether the list, comma-separated and perhaps with spaces, names the origin. */
-static int is_listed(const char *list, const char *origin) {
-  size_t n = strlen(origin);
-  for (const char *at = list; *at;) {
-    at += strspn(at, ", ");
-    size_t length = strcspn(at, ", ");
-    if (length == n && n > 0 && strncmp(at, origin, n) == 0) {
-      return 1;
-    }
-    at += length;
-  }
-  return 0;
-}
-
-/* Whether the browser's origin may call. Where that depends on the origin every answer says so, also to those who may
- * not or did not name one, or a cache would hand them each other's (Fetch, "CORS protocol and HTTP caches"). */
-static void add_cors(request *r) {
-  const char *allowed = r->srv->options->cors, *origin = header_of(r, "Origin");
-  if (!allowed[0]) {
-    return;
-  }
-  int any = strcmp(allowed, "*") == 0;
-  if (!any) {
-    reply_header(r, "Vary", "Origin");
-  }
-  if (!origin || (!any && !is_listed(allowed, origin))) {
-    return;
-  }
-  reply_header(r, "Access-Control-Allow-Origin", any ? "*" : origin);
-  reply_header(r, "Access-Control-Expose-Headers",
-               "Location, Content-Location, Retry-After, ETag, Accept-Ranges, Content-Range, Content-Disposition, "
-               "Accept-Encoding, WWW-Authenticate, X-Request-Id, RateLimit, RateLimit-Policy, Preference-Applied");
-  if (strcmp(r->method, "OPTIONS") == 0) {
-    reply_header(r, "Access-Control-Allow-Methods", "GET, HEAD, POST, DELETE");
-    reply_header(r, "Access-Control-Allow-Headers",
-                 "Authorization, Content-Type, Content-Encoding, Prefer, Priority, If-Match, If-None-Match, If-Range, "
-                 "Range, Last-Event-ID, traceparent");
-    reply_header(r, "Access-Control-Max-Age", "600");
-  }
-}
-
-enum MHD_Result reply_send(request *r) {
-  if (!r->response) {
-    return MHD_NO; /* no memory even for an answer: the connection closes */
-  }
-  if (r->closes || (r->status >= 400 && r->has_body)) {
-    reply_header(r, "Connection", "close");
-  }
-  access_headers(r);
-  if (r->preferred_ms > 0 && r->status < 300) {
-    char applied[32];
-    snprintf(applied, sizeof applied, "wait=%lld", (long long)((r->preferred_ms + 999) / 1000));
-    reply_header(r, "Preference-Applied", applied);
-  }
-  reply_header(r, "X-Content-Type-Options", "nosniff");
-  reply_header(r, "X-Request-Id", r->number);
-  add_cors(r);
-  watched_answer(r->watched);
-  enum MHD_Result result = MHD_queue_response(r->connection, r->status, r->response);
-  MHD_destroy_response(r->response);
-  r->response = NULL;
-  return result;
 }

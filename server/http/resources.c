@@ -139,8 +139,8 @@ enum MHD_Result handle_list(request *r) {
   return request_go_away(r, r->srv->io, list_away);
 }
 
-/* Deleting a mesh leaves what was derived from it; only unfinished jobs that need it stand in the way. A tenant gives
- * up what it has of it, which others may have as well. */
+/* Deleting a mesh keeps the embeddings and supermeshes derived from it; only unfinished jobs that need it prevent it.
+ * A tenant gives up its own ownership; other owners keep the resource. */
 static void delete_away(request *r) {
   server *srv = r->srv;
   resource_kind kind = kind_of(r);
@@ -158,7 +158,7 @@ static void delete_away(request *r) {
     }
   }
   if (kind == RESOURCE_MESH && queue_needs_mesh(srv->q, r->id, view[0] ? view : NULL)) {
-    reply_refuse(r, "in-use", "Unfinished jobs need this mesh: wait for them, or cancel them.");
+    reply_refuse(r, "in-use", "Unfinished jobs need this mesh: wait until they end, or cancel them.");
     return;
   }
   const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions};
@@ -167,7 +167,7 @@ static void delete_away(request *r) {
     if (kind == RESOURCE_MESH && view[0]) {
       callers_recount(srv->callers, view);
     } else if (kind == RESOURCE_MESH && r->caller) {
-      callers_reload(srv->callers); /* the bytes of all who owned it */
+      callers_reload(srv->callers); /* updates the used bytes of all its owners */
     }
     reply_empty(r, 204);
   } else {

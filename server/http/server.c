@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "faults.h"
 #include "http/body.h"
@@ -13,34 +12,6 @@
 #include "metrics.h"
 
 enum { CONNECTION_MEMORY = 16 * 1024 };
-
-int is_page(const char *path);
-void handle_page(request *r, const char *path);
-
-int64_t clock_us(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
-static void run_away(task *t) {
-  request *r = (request *)(void *)t;
-  r->away(r);
-  FAULT_POINT("before-reply");
-  if (r->phase == PHASE_AWAY) {
-    r->phase = PHASE_SEND; /* no response could be made: the connection closes */
-  }
-  MHD_resume_connection(r->connection);
-}
-
-enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r)) {
-  r->away = fn;
-  r->away_task.run = run_away;
-  r->phase = PHASE_AWAY;
-  MHD_suspend_connection(r->connection);
-  tasks_add(pool, &r->away_task);
-  return REQUEST_AWAY;
-}
 
 #define HANDLER(id, method, path, body, scope, handler) [id] = handler,
 static enum MHD_Result (*const handlers[ROUTE_COUNT])(request *) = {API_ROUTES(HANDLER)};
@@ -54,12 +25,12 @@ static void answer_unrouted(request *r, const char *path, const char *allow) {
   if (page && get) {
     handle_page(r, path);
   } else if (!allow[0] && !page) {
-    reply_refuse(r, "not-found", "There is nothing at this path; /openapi.json lists what there is.");
+    reply_refuse(r, "not-found", "Nothing exists at this path; /openapi.json lists all routes.");
   } else if (strcmp(r->method, "OPTIONS") == 0) {
     reply_empty(r, 204);
     reply_header(r, "Allow", methods);
   } else {
-    reply_refuse(r, "method-not-allowed", "This path answers to: %s.", methods);
+    reply_refuse(r, "method-not-allowed", "This path accepts: %s.", methods);
     reply_header(r, "Allow", methods);
   }
 }
@@ -71,8 +42,8 @@ static void make_number_key(void) {
   crypto_shorthash_keygen(number_key);
 }
 
-/* Sixteen digits that no two requests share, and that tell nobody how many others there were: a keyed hash of their
- * number. */
+/* Sixteen hexadecimal digits, different for each request: a keyed hash of a counter, so that a caller cannot tell how
+ * many requests others make. */
 static void make_number(char *out, size_t size) {
   static pthread_once_t once = PTHREAD_ONCE_INIT;
   static uint64_t numbers;
@@ -98,13 +69,7 @@ static request *request_create(server *srv, struct MHD_Connection *connection, c
   return r;
 }
 
-void request_fields(const request *r, char out[REQUEST_FIELDS]) {
-  snprintf(out, REQUEST_FIELDS, "\"request\":\"%s\"%s%s%s,\"method\":\"%.8s\",\"route\":\"%s\"", r->number,
-           r->trace[0] ? ",\"traceparent\":\"" : "", r->trace, r->trace[0] ? "\"" : "",
-           r->route ? r->route->method : "", r->route ? r->route->path : "");
-}
-
-/* The first call of a request: everything that the headers decide. Leaves a response where the answer is clear. */
+/* The first call of a request, with its headers. Leaves a response if the headers alone decide it. */
 static void request_begin(request *r, const char *path, const char *version) {
   char allow[64];
   api_problem problem = {0};
@@ -126,7 +91,7 @@ static void request_begin(request *r, const char *path, const char *version) {
   }
 }
 
-/* %00 stays as it is: unescaped it would end the text, and "/%00" would be "/". */
+/* Keeps %00 escaped: unescaped it would end the string, and "/%00" would become "/". */
 static size_t unescape(void *user, struct MHD_Connection *connection, char *text) {
   (void)user;
   (void)connection;
@@ -230,7 +195,7 @@ static void on_mhd_log(void *user, const char *format, va_list args) {
   log_write(LOG_DEBUG, NULL, "http: %s", text);
 }
 
-/* A small text file, in memory of malloc(); NULL with the reason logged. */
+/* A small text file, allocated with malloc(); NULL with the reason logged. */
 static char *read_text(const char *path) {
   enum { MOST = 1 << 20 };
   FILE *file = fopen(path, "rb");
@@ -250,7 +215,7 @@ static char *read_text(const char *path) {
   return text;
 }
 
-/* GnuTLS itself would still speak 1.0 and 1.1, which RFC 8996 forbids. */
+/* GnuTLS would also offer TLS 1.0 and 1.1, which RFC 8996 forbids. */
 static const char TLS_VERSIONS[] = "NORMAL:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2";
 
 int http_start(server *srv) {
@@ -270,7 +235,7 @@ int http_start(server *srv) {
   }
   srv->connections = watch_start(o, srv->needs_token);
   if (!srv->connections) {
-    log_error("the connections cannot be watched: no memory or threads");
+    log_error("the thread that watches connections cannot be started");
     free(certificate);
     free(key);
     return 0;
@@ -291,7 +256,7 @@ int http_start(server *srv) {
   srv->daemon =
       MHD_start_daemon(flags, 0, NULL, NULL, answer, srv, MHD_OPTION_EXTERNAL_LOGGER, on_mhd_log, NULL,
                        MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL, MHD_OPTION_ARRAY, options, MHD_OPTION_END);
-  free(certificate); /* parsed at the start */
+  free(certificate); /* the daemon has parsed them */
   free(key);
   if (!srv->daemon) {
     log_error("the HTTP service cannot be started on %s", srv->at.text);

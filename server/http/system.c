@@ -1,14 +1,11 @@
-/* Health, metrics, the API's document, and the pages. */
+/* Health and metrics. */
 #include <dirent.h>
 #include <stdio.h>
-#include <string.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "http/http.h"
 #include "metrics.h"
-#include "pages.h"
-#include "studio/studio.h"
 
 static void gauge(api_text *out, const char *name, const char *help, double value) {
   metrics_family(out, name, "gauge", help);
@@ -33,7 +30,7 @@ static void metrics_away(request *r) {
   queue_numbers n;
   queue_count(srv->q, &n);
   metrics_write(&text);
-  metrics_family(&text, "orbmorph_jobs", "gauge", "Unfinished jobs; waiting: for the embeddings that they need.");
+  metrics_family(&text, "orbmorph_jobs", "gauge", "Unfinished jobs; waiting: for embeddings that they need.");
   api_text_printf(&text, "orbmorph_jobs{state=\"queued\"} %d\norbmorph_jobs{state=\"waiting\"} %d\n", n.queued,
                   n.waiting);
   api_text_printf(&text, "orbmorph_jobs{state=\"running\"} %d\n", n.running);
@@ -46,17 +43,17 @@ static void metrics_away(request *r) {
     api_text_printf(&text, "orbmorph_jobs_ended_total{state=\"%s\"} %lld\n", api_job_state_name((api_job_state)s),
                     (long long)n.ended[s]);
   }
-  gauge(&text, "orbmorph_queue_oldest_seconds", "Age of the oldest job that nothing but a worker is missing for.",
+  gauge(&text, "orbmorph_queue_oldest_seconds", "Age of the oldest job that waits for a worker.",
         1e-3 * (double)n.oldest_ms);
-  gauge(&text, "orbmorph_waiting_connections", "Connections that wait for a job.", n.waiters);
+  gauge(&text, "orbmorph_waiting_connections", "Connections that wait for a job to end.", n.waiters);
   int64_t stored = catalogue_bytes(srv->cat, 0);
   if (stored >= 0) {
     gauge(&text, "orbmorph_stored_bytes", "Bytes of stored objects.", (double)stored);
   }
-  gauge(&text, "orbmorph_disk_free_bytes", "Free bytes of the file system of the data.",
+  gauge(&text, "orbmorph_disk_free_bytes", "Free bytes of the file system that holds the data folder.",
         (double)objects_free_bytes(srv->store));
-  gauge(&text, "orbmorph_queue_limit", "Unfinished jobs that are accepted at most.", (double)srv->options->queue_limit);
-  gauge(&text, "orbmorph_decoding_bytes", "Memory of the decoders of compressed bodies.",
+  gauge(&text, "orbmorph_queue_limit", "Largest number of unfinished jobs.", (double)srv->options->queue_limit);
+  gauge(&text, "orbmorph_decoding_bytes", "Bytes held by decoders of compressed bodies.",
         (double)__atomic_load_n(&srv->decoding, __ATOMIC_RELAXED));
   gauge(&text, "process_open_fds", "Open file descriptors.", count_entries("/proc/self/fd"));
   gauge(&text, "process_threads", "Threads.", count_entries("/proc/self/task"));
@@ -83,7 +80,7 @@ static enum MHD_Result ready(request *r) {
   api_json_open(&json, '{');
   api_json_member_string(&json, "status", "ready");
   if (query_has(r, "verbose") && access_is_operator(r)) {
-    queue_numbers n; /* a walk under the queue's lock: not for everybody */
+    queue_numbers n; /* for operators only: counting walks all jobs under the queue's lock */
     queue_count(srv->q, &n);
     api_json_member_integer(&json, "queued", n.queued);
     api_json_member_integer(&json, "waiting", n.waiting);
@@ -101,40 +98,6 @@ static enum MHD_Result ready(request *r) {
   api_json_close(&json, '}');
   reply_json(r, 200, &json);
   return MHD_YES;
-}
-
-static const page *find_page(const char *path) {
-  for (const page *p = pages; p->path; p++) {
-    if (strcmp(p->path, path) == 0) {
-      return p;
-    }
-  }
-  return NULL;
-}
-
-int is_page(const char *path) {
-  return orb_studio_find(path) || find_page(path);
-}
-
-void handle_page(request *r, const char *path) {
-  const orb_studio_file *file = orb_studio_find(path);
-  const page *own = file ? NULL : find_page(path);
-  const char *none_match = header_of(r, "If-None-Match");
-  if (file && none_match && parse_tag_matches(none_match, file->etag)) {
-    reply_empty(r, 304);
-  } else if (file) {
-    reply_bytes(r, 200, file->type, file->data, file->size);
-  } else if (own) {
-    reply_bytes(r, 200, own->mime, own->bytes, own->size);
-  } else {
-    reply_refuse(r, "not-found", "There is nothing at this path; /openapi.json lists what there is.");
-    return;
-  }
-  if (file) {
-    reply_header(r, "ETag", file->etag);
-  }
-  reply_header(r, "Content-Security-Policy", ORB_STUDIO_CSP);
-  reply_header(r, "Cache-Control", file ? file->cache_control : "no-cache");
 }
 
 enum MHD_Result handle_system(request *r) {

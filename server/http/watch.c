@@ -25,10 +25,10 @@ struct watched {
   watched *previous, *next;
   int fd, lingers, doomed;
   address_entry *from; /* NULL: no limits */
-  int over;            /* the address had too many connections when this came */
-  int phase;           /* these three under __atomic: written by the thread that serves the connection */
+  int over;            /* the address had too many connections when this one opened */
+  int phase;           /* phase, since and received: __atomic, written by the thread that serves the connection */
   int64_t since, received;
-  int64_t seen_received, seen_acked, looked; /* by the watching thread */
+  int64_t seen_received, seen_acked, looked; /* of the watching thread only */
 };
 
 typedef struct lingerer {
@@ -49,7 +49,7 @@ struct watch {
   int lingerer_count;
 };
 
-/* Bytes that wait in the kernel to be taken by the peer, and those it took so far. 0 where that cannot be told. */
+/* Bytes in the kernel that the peer has not acknowledged, and those it has. 0 if the kernel does not say. */
 static int look_at(int fd, int64_t *waiting, int64_t *acked) {
   struct tcp_info info;
   socklen_t size = sizeof info;
@@ -63,7 +63,8 @@ static int look_at(int fd, int64_t *waiting, int64_t *acked) {
   return 1;
 }
 
-/* The library finds the end of the connection by itself. Nothing more is sent, so that the kernel keeps nothing. */
+/* Shuts the socket down; libmicrohttpd then notices and closes the connection. Linger time 0 discards unsent data, so
+ * that the kernel keeps none. */
 static void doom(watched *c) {
   struct linger at_once = {.l_onoff = 1, .l_linger = 0};
   setsockopt(c->fd, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
@@ -102,7 +103,7 @@ static void inspect(watch *w, watched *c, int64_t now) {
     }
     c->seen_received = received;
   } else if (!look_at(c->fd, &waiting, &acked) || waiting == 0) {
-    c->seen_acked = -1; /* nothing is waiting for the peer */
+    c->seen_acked = -1; /* the peer has acknowledged everything */
   } else if (c->seen_acked >= 0 && acked - c->seen_acked < least) {
     doom(c);
   } else {
@@ -110,9 +111,9 @@ static void inspect(watch *w, watched *c, int64_t now) {
   }
 }
 
-/* Reads away what still comes. */
+/* Reads and discards what still arrives on lingering sockets. */
 static void serve_lingerers(watch *w, int64_t now) {
-  static char dropped[64 * 1024]; /* of the one watching thread; what is in it is of no interest */
+  static char dropped[64 * 1024]; /* only the watching thread uses it */
   for (int i = 0; i < w->lingerer_count;) {
     lingerer *l = &w->lingerers[i];
     ssize_t n = 1;

@@ -1,14 +1,14 @@
-/* Every connection, seen from outside the HTTP library: who it is from, how long it takes, how it ends.
+/* Limits on connections that libmicrohttpd does not have: slow clients, limits per address, lingering close.
  *
- * The library closes connections that are silent for idle-seconds; one that sends a byte now and then it keeps for
- * ever. A thread here ends those whose headers are not whole after header-seconds, and those that move a body or an
- * answer slower than min-rate over slow-seconds. A suspended request and an event stream with nothing to send are
- * not slow.
+ * libmicrohttpd closes connections that are silent for idle-seconds, but keeps one that sends a byte now and then. A
+ * thread here closes connections whose headers are incomplete after header-seconds, and those that transfer a body or
+ * a response more slowly than min-rate, measured over slow-seconds. A suspended request and an event stream with
+ * nothing to send do not count as slow.
  *
- * Addresses (of IPv6 their /64) have a number of connections and a bucket of requests, where limits hold for them.
+ * An address (for IPv6 its /64) has a limit on connections and a bucket of requests, see addresses.h.
  *
- * A connection that ends with an answer while its body is still coming would be reset by the kernel, and the reset may
- * overtake the answer. So its socket is read on for a while after the library closed it (lingering close).
+ * If a connection closes after a response while its body still arrives, the kernel resets it, and the reset may
+ * overtake the response. So its socket is read for a while after libmicrohttpd closed it (lingering close).
  */
 #ifndef ORB_HTTP_WATCH_H
 #define ORB_HTTP_WATCH_H
@@ -21,24 +21,24 @@
 typedef struct watch watch;
 typedef struct watched watched;
 
-watch *watch_start(const config *options, int tokens); /* tokens: callers need one; NULL: out of memory or threads */
+watch *watch_start(const config *options, int tokens); /* tokens: requests need one; NULL: out of memory or threads */
 void watch_stop(watch *w);
 
-/* For a new connection; NULL out of memory: it is then not watched. */
+/* For a new connection; NULL if out of memory: the connection is then not watched. */
 watched *watch_open(watch *w, int fd, const struct sockaddr *address);
 void watch_close(watch *w, watched *c); /* before the descriptor is closed */
 
-/* Steps of a request. NULL is fine. */
-void watched_headers(watched *c); /* whole */
+/* Steps of a request. c may be NULL. */
+void watched_headers(watched *c); /* the headers are complete */
 void watched_body(watched *c, int64_t bytes);
-void watched_work(watched *c); /* the body is there; nothing is expected of the client */
+void watched_work(watched *c); /* the body is complete; the client need not send anything */
 void watched_answer(watched *c);
 void watched_done(watched *c); /* the next request may come */
 void watched_linger(watched *c);
 
-/* What the caller's address has left. */
+/* What the client's address has left. */
 typedef struct allowance {
-  int limited;                        /* 0: no limits hold for it */
+  int limited;                        /* 0: the address has no limits */
   int refused;                        /* 0, 1: too many requests, 2: too many connections */
   int64_t quota, window, left, reset; /* requests, s, requests, s */
 } allowance;

@@ -1,8 +1,12 @@
-// Shows /openapi.json as a page, with nothing from outside.
+// Renders /openapi.json as a page, without third-party code.
 function element(name, text, parent) {
   const e = document.createElement(name);
-  if (text !== undefined) e.textContent = text;
-  if (parent) parent.append(e);
+  if (text !== undefined) {
+    e.textContent = text;
+  }
+  if (parent) {
+    parent.append(e);
+  }
   return e;
 }
 function schema(parent, title, value) {
@@ -23,17 +27,23 @@ function show(api) {
   element("p", api.info.description, root);
   for (const [path, item] of Object.entries(resolved(api, api.paths))) {
     for (const [method, op] of Object.entries(item)) {
-      if (!op.responses) continue;
+      if (!op.responses) {
+        continue;
+      }
       const box = element("details", undefined, root);
       const head = element("summary", undefined, box);
       element("span", method.toUpperCase(), head).className = "method";
       element("code", path, head);
       element("span", " " + op.summary, head);
-      if (op.description) element("p", op.description, box);
+      if (op.description) {
+        element("p", op.description, box);
+      }
       for (const p of [...(item.parameters || []), ...(op.parameters || [])]) {
         element("p", p.name + " (" + p.in + "): " + (p.description || ""), box);
       }
-      if (op.requestBody) schema(box, "Body", op.requestBody.content);
+      if (op.requestBody) {
+        schema(box, "Body", op.requestBody.content);
+      }
       for (const [status, answer] of Object.entries(op.responses)) {
         schema(box, status + " " + (answer.description || ""), answer.content || answer);
       }

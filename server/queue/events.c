@@ -1,4 +1,5 @@
-/* Events of jobs, and the connections that wait for them. */
+/* Events and progress of jobs, the connections that wait for them, and the timer: it wakes waiters at their deadline
+ * and workers when a retry may be due. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -88,7 +89,7 @@ void *timer_main(void *argument) {
         wake(q, w);
       }
     }
-    pthread_cond_broadcast(&q->work); /* jobs that were put off may be due */
+    pthread_cond_broadcast(&q->work); /* the retry_at of a job may have passed */
   }
   pthread_mutex_unlock(&q->lock);
   return NULL;
@@ -104,7 +105,7 @@ int64_t prepare_event(job *j, api_text *json) {
 
 void keep_event(job *j, int64_t number, const char *type, const char *json) {
   char *copy = strdup(json);
-  j->last_event = number; /* taken, even if there is no memory to keep what it says */
+  j->last_event = number; /* the number is used even if there is no memory for the event */
   if (!copy) {
     return;
   }
@@ -149,7 +150,7 @@ int64_t queue_events_write(queue *q, job *j, int64_t after, api_text *out, int *
       after = j->events[i].number;
     }
   }
-  after = j->last_event > after ? j->last_event : after; /* one that found no memory is not waited for */
+  after = j->last_event > after ? j->last_event : after; /* an event may be missing for lack of memory */
   pthread_mutex_unlock(&q->lock);
   return after;
 }
@@ -162,7 +163,7 @@ int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over) {
   return after;
 }
 
-/* A job that waits shows the progress of what it waits for, as the first part of its own. */
+/* A job that waits shows the progress of the jobs that it needs as the first 60 % of its own. */
 static void show_to_dependents(queue *q, const job *of, const char *stage, double fraction) {
   for (job *j = q->first; j; j = j->next) {
     for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
@@ -184,7 +185,7 @@ static void show_to_dependents(queue *q, const job *of, const char *stage, doubl
   }
 }
 
-/* Where each stage lies in the progress of its kind of job. */
+/* The progress of the whole job at a fraction of a stage. */
 static double overall(const job *j, const char *stage, double fraction) {
   static const struct {
     api_job_kind kind;
@@ -208,7 +209,7 @@ void queue_progress(queue *q, job *j, const char *stage, double fraction) {
   pthread_mutex_lock(&q->lock);
   double shown = overall(j, stage, fraction);
   int stage_changed = strncmp(j->stage, stage, sizeof j->stage - 1) != 0;
-  j->progress = shown > j->progress ? shown : j->progress; /* never backwards */
+  j->progress = shown > j->progress ? shown : j->progress; /* never decreases */
   copy_text(j->stage, sizeof j->stage, stage);
   if (stage_changed || orb_clock_ms() - j->last_event_ms >= 250) {
     add_event(q, j, "progress", stage_changed);

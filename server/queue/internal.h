@@ -1,4 +1,4 @@
-/* The inside of the queue, shared by its files. Everything is guarded by queue.lock unless said. */
+/* The inside of the queue, shared by its files. queue.lock guards everything unless a comment says otherwise. */
 #ifndef ORB_QUEUE_INTERNAL_H
 #define ORB_QUEUE_INTERNAL_H
 
@@ -9,9 +9,9 @@
 #include "queue/queue.h"
 
 enum { BUCKETS = 8192, KEEP_ENDED = 512, EVENTS_KEPT = 64, OWNERS = 1100, DEPENDENCIES = 16 };
-static const int64_t LARGE = 300000;          /* triangles from which a job is large */
+static const int64_t LARGE = 300000;          /* a job with more triangles than this is large */
 static const int64_t BYTES_A_TRIANGLE = 1024; /* estimate of a running job's memory */
-static const int64_t EVENT_STRIDE = 1000000;  /* event numbers of an attempt start at attempt times this */
+static const int64_t EVENT_STRIDE = 1000000;  /* event numbers of an attempt start above attempt times this */
 
 typedef struct job_event {
   int64_t number;
@@ -24,26 +24,26 @@ struct job {
   char stage[24];
   double progress, embed_ms;
   int committed; /* its row is in the catalogue */
-  int dead;      /* the row could not be written */
-  int taken;     /* by a worker, or by one who ends it */
+  int dead;      /* its row could not be written */
+  int taken;     /* by a worker, or by a thread that ends it */
   int running;   /* claimed */
   int cancel;
-  int adopters;  /* requests that are making it listed */
-  int waits_for; /* unfinished jobs that it needs */
+  int adopters;  /* requests that are making it a listed job */
+  int waits_for; /* number of unfinished jobs that it needs */
   char dependencies[DEPENDENCIES][API_ID_SIZE];
   int dependency_count;
   char *dependency_problem;
-  int64_t retry_at; /* not before, orb_clock_ms() */
+  int64_t retry_at; /* not chosen before this time, orb_clock_ms() */
   orb_context *ctx;
   int64_t last_event, last_event_ms;
   job_event events[EVENTS_KEPT];
   int event_count;
   waiter *waiters;
   int refs;
-  int owner;               /* in queue.owners, while unfinished */
-  job *next_id, *next_key; /* buckets */
-  job *previous, *next;    /* of the unfinished, oldest first */
-  job *newer_ended;        /* of the ended, oldest first */
+  int owner;               /* index into queue.owners, while unfinished */
+  job *next_id, *next_key; /* in the hash buckets */
+  job *previous, *next;    /* in the list of unfinished jobs, oldest first */
+  job *newer_ended;        /* in the list of ended jobs, oldest first */
 };
 
 struct queue {
@@ -60,7 +60,7 @@ struct queue {
   int stopping, waking;
   struct {
     char name[64];
-    double service; /* triangles worked for this owner */
+    double service; /* work done for this owner: triangles, plus 1000 a job */
     int unfinished;
   } owners[OWNERS];
   int owner_count;
@@ -72,28 +72,30 @@ struct queue {
 };
 
 int64_t unix_ms(void);
-/* Whether the job makes what an owner wants under this key. */
+/* Whether the job makes this key for this owner. */
 static inline int is_for(const job *j, const char *key, const char *owner) {
   return strcmp(j->row.key, key) == 0 && strcmp(j->row.owner, owner) == 0;
 }
-/* Counts the job with its owner. */
-void owner_enter(queue *q, job *j);
+void owner_enter(queue *q, job *j); /* sets j->owner */
 void owner_leave(queue *q, const job *j);
+void schedule_leave(queue *q, job *j); /* undoes what queue_take() counted */
 void table_add(queue *q, job *j);
-void table_drop_key(queue *q, job *j); /* when it ends */
+void table_drop_key(queue *q, job *j); /* removes an ended job from the unfinished ones */
 void table_ended(queue *q, job *j);
-job *table_find(queue *q, const char *key, const char *owner); /* an unfinished one */
-int table_key_taken(const queue *q, const job *by_other);      /* another job for the same result is being worked on */
+job *table_find(queue *q, const char *key, const char *owner); /* an unfinished job, or NULL */
+int table_key_taken(const queue *q, const job *by_other);      /* a worker has another job with the same key */
 void job_unref(job *j);
 void job_view(const job *j, api_job_view *view);
 void wake_job(queue *q, job *j, int ended);
-/* Makes an event of the job's present state. Not for final ones, which the catalogue writes with the end. */
+/* Adds an event with the job's current state; `store` also writes it to the catalogue. Not for the final event, which
+ * catalogue_job_finish() writes. */
 void add_event(queue *q, job *j, const char *type, int store);
+/* Writes the JSON of the next event and returns its number. */
 int64_t prepare_event(job *j, api_text *json);
 void keep_event(job *j, int64_t number, const char *type, const char *json);
 void *timer_main(void *argument);
 
-/* Copies a text, cut to the room there is. */
+/* Copies a string, truncated to the destination. */
 static inline void copy_text(char *to, size_t room, const char *from) {
   size_t length = strnlen(from, room - 1);
   memcpy(to, from, length);

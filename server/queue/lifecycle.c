@@ -1,4 +1,4 @@
-/* Start, recovery, stop. */
+/* Start, recovery after a crash, stop. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -51,7 +51,7 @@ void queue_destroy(queue *q) {
   free(q);
 }
 
-/* Takes the row. */
+/* Adds a job of the catalogue to the table. Takes ownership of the row. */
 static store_result load(queue *q, job_row *row) {
   job *j = calloc(1, sizeof *j);
   if (!j) {
@@ -61,7 +61,7 @@ static store_result load(queue *q, job_row *row) {
   j->row = *row;
   j->refs = 1;
   j->committed = 1;
-  /* Numbers go on after those of the log. */
+  /* New events continue after the numbers of the stored ones. */
   event_row events[BATCH];
   int64_t after = 0;
   for (int n = BATCH; n == BATCH;) {
@@ -85,7 +85,7 @@ static store_result load(queue *q, job_row *row) {
 store_result queue_recover(queue *q) {
   api_problem problem = {0};
   api_text text = {0};
-  api_refuse(&problem, "crashed", "The service died %d times while this job ran alone; it is not tried again.",
+  api_refuse(&problem, "crashed", "The service crashed %d times while this job ran alone; the job is not retried.",
              MOST_CRASHES);
   api_problem_write(&problem, &text);
   store_result result = text.failed ? STORE_ERROR : catalogue_recover(q->cat, MOST_CRASHES, unix_ms(), text.data);
@@ -108,12 +108,12 @@ store_result queue_recover(queue *q) {
       }
     }
   }
-  if (result != STORE_OK) { /* a job that is not loaded would wait for the next start */
+  if (result != STORE_OK) { /* a job that is not loaded would not run before the next start */
     log_error("the unfinished jobs cannot be read");
     return result;
   }
   if (loaded) {
-    log_info("%d unfinished jobs go on", loaded);
+    log_info("%d unfinished jobs resumed", loaded);
   }
   return result;
 }
@@ -135,4 +135,10 @@ int queue_running(queue *q) {
   int running = q->running;
   pthread_mutex_unlock(&q->lock);
   return running;
+}
+
+void queue_set_limit(queue *q, int limit) {
+  pthread_mutex_lock(&q->lock);
+  q->options.limit = limit;
+  pthread_mutex_unlock(&q->lock);
 }

@@ -1,19 +1,34 @@
-/* The queue: every unfinished job in memory, who waits for it, and which is to run next.
+/* The queue: all unfinished jobs in memory, the connections that wait for them, and the choice of the next job to run.
+ * In: requests from server/http. Out: jobs for server/worker, events and ended jobs for waiting connections.
  *
- * Contract. One lock guards all of it; it is held for short steps only, never over input or output. The catalogue is
- * the truth: a job is taken, shown as accepted, or shown as ended only after the row was committed, so what a caller
- * was told survives the process. A key (the id of the result) has at most one unfinished job for each owner: a second
- * request of the owner gets the first one's job, and those of different owners run one after another, so that the work
- * is done once and nobody can tell, or cancel, the other's. Ended jobs stay in memory for a while, least recently ended
- * leave first.
+ * Reading order:
+ *   internal.h      the structs
+ *   submit.c        a request becomes a job, or joins the unfinished job with the same key
+ *   schedule.c      choosing, taking and claiming a job       owners.c   fairness between owners
+ *   dependencies.c  a supermesh waits for its embeddings
+ *   finish.c        the end of a job, cancelling, retry
+ *   events.c        events, progress, waiters, the timer
+ *   table.c         lookup by id and key, references, counts
+ *   lifecycle.c     start, recovery after a crash, stop
  *
- * Waiters are suspended connections. They are listed and woken under the lock; `wake` must not call back into the
- * queue. Every waiter is woken by its deadline at the latest.
+ * The retry of a job: if the store fails, queue_finish(), queue_give_back() and queue_put_off() in finish.c set
+ * retry_at, before which schedule.c does not choose the job. After a crash, queue_recover() in lifecycle.c queues what
+ * was running again; catalogue_recover() in store/jobs.c counts the crashes and fails a job after MOST_CRASHES.
  *
- * Fairness. Among runnable jobs the highest class goes first, then the owner who has had the least work so far (one
- * who comes back after a pause starts level with those who are there), then that owner's most urgent, then the oldest.
- * Large jobs never take all workers: one stays for small ones. A suspect (it was running when the process died) runs
- * with nothing beside it.
+ * Contract. One lock guards all of it; it is held for short steps only, never during input or output. The catalogue is
+ * authoritative: a job is taken, shown as accepted, or shown as ended only after its row was committed, so everything
+ * a caller has seen survives a crash. A key (the id of the result) has at most one unfinished job for each owner. A
+ * second request of the same owner gets the first one's job. Jobs of different owners with the same key run one after
+ * another: the work is done once, and no owner can see or cancel another's job. Up to KEEP_ENDED ended jobs stay in
+ * memory; the one that ended first leaves first.
+ *
+ * Waiters are suspended connections. They are listed and woken under the lock; `wake` must not call into the queue.
+ * Every waiter is woken at its deadline at the latest.
+ *
+ * Fairness. Among runnable jobs the highest class goes first, then the owner with the least work so far (an owner who
+ * returns after a pause starts level with the least served of the others), then that owner's most urgent job, then the
+ * oldest. Large jobs never occupy all workers: one stays free for small jobs. A suspect (a job that was running when
+ * the process died) runs alone.
  */
 #ifndef ORB_QUEUE_H
 #define ORB_QUEUE_H
@@ -21,16 +36,16 @@
 #include "orbmorph/context.h"
 #include "store/catalogue.h"
 
-/* A priority is QUEUE_URGENCIES · class + urgency: classes (of tokens) go before everything, urgencies order the jobs
- * of one owner. */
+/* A priority is QUEUE_URGENCIES · class + urgency. Classes come from tokens and order all jobs; urgencies order the
+ * jobs of one owner. */
 enum { QUEUE_URGENCIES = 8 };
 
 typedef struct queue queue;
 typedef struct job job;
 
 typedef struct waiter {
-  struct waiter *previous, *next;         /* of the job */
-  struct waiter *all_previous, *all_next; /* of the queue */
+  struct waiter *previous, *next;         /* in the job's list */
+  struct waiter *all_previous, *all_next; /* in the queue's list */
   job *of;                                /* NULL: not listed */
   int64_t deadline;                       /* orb_clock_ms() */
   int events;                             /* wake at each event, not only at the end */
@@ -39,29 +54,30 @@ typedef struct waiter {
 
 typedef struct queue_options {
   int workers, cores, limit;
-  int64_t memory; /* bytes that running jobs may need together, by estimate */
+  int64_t memory; /* estimated bytes that all running jobs together may need */
 } queue_options;
 
 queue *queue_create(const queue_options *options, catalogue *cat);
 void queue_destroy(queue *q);
 void queue_set_limit(queue *q, int limit);
-/* Loads what is unfinished. */
+/* Recovers from a crash and loads the unfinished jobs of the catalogue. */
 store_result queue_recover(queue *q);
-/* No more jobs are taken; wakes the workers. With `now`, running ones are cancelled to be queued again. */
+/* Stops handing out jobs and wakes the workers. With `now`, also interrupts the running jobs, which their workers then
+ * give back. */
 void queue_stop(queue *q, int now);
 int queue_running(queue *q);
-/* Wakes every waiter, at once and from now on. */
+/* Wakes every waiter and accepts no new ones. */
 void queue_wake_all(queue *q);
-/* Wakes every waiter to look again. */
+/* Wakes every waiter so that it checks its state again. */
 void queue_wake_once(queue *q);
 
-/* Submitting. Blocks for the commit. owner and request are copied. */
+/* A request for a job. queue_submit() copies its strings. */
 typedef struct queue_request {
   api_job_kind kind;
   const char *key, *request, *owner;
   int64_t cost;
   int priority, listed;
-  int64_t owner_limit; /* of the owner's unfinished jobs that are listed; 0: none */
+  int64_t owner_limit; /* of the owner's listed unfinished jobs; 0: no limit */
 } queue_request;
 typedef enum queue_result {
   QUEUE_OK,
@@ -69,10 +85,10 @@ typedef enum queue_result {
   QUEUE_QUOTA,
   QUEUE_STOPPING,
   QUEUE_STORE_FULL,
-  QUEUE_MESH_GONE, /* one that the request names was deleted meanwhile */
+  QUEUE_MESH_GONE, /* a mesh that the request names has been deleted */
   QUEUE_ERROR
 } queue_result;
-/* *out is referenced. *fresh (may be NULL): 0 where the job was there. */
+/* Blocks for the commit. Adds a reference to *out. *fresh (may be NULL): 1 for a new job, 0 for one that existed. */
 queue_result queue_submit(queue *q, const queue_request *request, job **out, int *fresh);
 
 /* References. */
@@ -83,58 +99,61 @@ const char *job_id(const job *j);
 const char *job_key(const job *j);
 api_job_kind job_kind(const job *j);
 const char *job_request(const job *j);
-const char *job_owner(const job *j); /* the tenant that asked; "" where no token was needed */
+const char *job_owner(const job *j); /* the tenant that requested it; "" if no token was needed */
 /* Appends the job as JSON; returns its state. */
 api_job_state queue_job_write(queue *q, job *j, api_text *out);
 
-/* 1 if the connection is to wait: `suspend` was called under the lock and the waiter is listed. 0 if the job has
- * ended already (or has an event after `after` where events are wanted). */
+/* 1: the connection must wait; `suspend` was called under the lock and the waiter is listed. 0: the job has ended, or
+ * w->events is set and the job has an event after `after`. */
 int queue_wait(queue *q, job *j, waiter *w, int64_t after, void (*suspend)(waiter *));
-/* Appends events after number `after` as an event stream; returns the last number; *ended when the last was final. */
+/* Appends the events after number `after` as an event stream and returns the last number. *ended: the job has ended. */
 int64_t queue_events_write(queue *q, job *j, int64_t after, api_text *out, int *ended);
-/* Where to go on for who has seen events up to number `seen`: one that is beyond the last of this job was of none that
- * is known here, and he gets all. *over: the job has ended, and he has seen its end. */
+/* Where a client that last saw `seen` resumes. A number beyond the job's last event is unknown: the client gets all
+ * events. *over: the job has ended and the client has seen its end. */
 int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over);
 void event_write(api_text *out, int64_t number, const char *type, const char *json);
 
-/* Asks a job to end. Blocks for the commit where it was not running. */
+/* Cancels a job. If a worker runs it, the worker ends it later; else blocks for the commit. */
 store_result queue_cancel(queue *q, job *j);
-/* True if an unfinished job names the mesh; one of `owner`, where that is not NULL. */
+/* True if an unfinished job (of `owner`, unless NULL) names the mesh. */
 int queue_needs_mesh(queue *q, const char *mesh, const char *owner);
 
-/* For the workers. */
-/* Waits for a job; 0 when the queue stops. small_only: for the lane that large jobs cannot block. */
+/* For the workers. A worker takes a job, then ends it with queue_finish(), or returns it with queue_wait_for(),
+ * queue_put_off() or queue_give_back(). Each of these releases the worker's reference. */
+/* Waits for a job; 0 when the queue stops. small_only: for the worker that takes only small jobs. *threads: the job's
+ * share of the cores. */
 int queue_take(queue *q, int small_only, job **out, int *threads);
-/* Makes a taken job wait until the jobs of these keys have ended. */
+/* Returns a taken job to wait until the jobs of these keys have ended; submits those jobs. */
 queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const char *const *requests,
                             const int64_t *costs, int count);
-/* Why a job that it waited for failed, in malloc() memory; NULL if none did. */
+/* The problem of a job that this one waited for and that failed, allocated with malloc(); NULL if none failed. */
 char *queue_dependency_problem(queue *q, job *j);
+/* Marks a taken job as running, in memory and in the catalogue. Blocks for the commit. */
 store_result queue_claim(queue *q, job *j);
 void queue_set_context(queue *q, job *j, orb_context *ctx);
 int queue_cancel_wanted(queue *q, job *j);
 void queue_progress(queue *q, job *j, const char *stage, double fraction);
 void queue_add_embed_ms(queue *q, job *j, double ms);
 double queue_embed_ms(queue *q, job *j);
-/* Ends a taken job with its result, or problem. On a store that fails the job is queued again after a while. */
+/* Ends a taken job with its result or problem. If the store fails, the job is queued again and retried later. */
 void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result);
-/* Gives a taken job back to be taken a second later, because the store did not answer. */
+/* Returns a taken job that was not claimed; it is retried after a second. For a store that fails. */
 void queue_put_off(queue *q, job *j);
-/* Gives a taken job back. */
+/* Returns a taken job; its attempt does not count. */
 void queue_give_back(queue *q, job *j);
 
-/* Numbers for /metrics. */
+/* Numbers for /metrics and /readyz?verbose. */
 typedef struct queue_numbers {
   int queued, waiting, running, waiters;
   struct {
     char name[24];
     int jobs;
-  } stages[16]; /* of the running; the rest is empty */
-  int64_t oldest_ms;
+  } stages[16];                         /* running jobs by stage; unused entries have 0 jobs */
+  int64_t oldest_ms;                    /* age of the oldest queued job */
   int64_t ended[API_JOB_CANCELLED + 1]; /* by state, since the start */
 } queue_numbers;
-void queue_count(queue *q, queue_numbers *out); /* walks all unfinished jobs */
-/* Jobs that ended since the start, in this state. */
+void queue_count(queue *q, queue_numbers *out); /* O(unfinished jobs) */
+/* Jobs that have ended in this state since the start. */
 int64_t queue_ended(queue *q, api_job_state state);
 
 #endif

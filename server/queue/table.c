@@ -1,4 +1,4 @@
-/* Jobs by id and by key, references, and the ended ones that are kept. */
+/* Jobs by id and by key, references, counts, and the ended jobs that stay in memory. */
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -56,7 +56,7 @@ static void drop_id(queue *q, job *j) {
   }
 }
 
-/* The table's own reference passes to the list of the ended. */
+/* The table's reference moves to the list of ended jobs. */
 void table_ended(queue *q, job *j) {
   *(q->newest_ended ? &q->newest_ended->newer_ended : &q->oldest_ended) = j;
   q->newest_ended = j;

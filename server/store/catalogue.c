@@ -1,4 +1,4 @@
-/* The writer's thread with group commit, and the pool of readers. */
+/* The writer thread with group commit, and the pool of readers. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,12 +9,12 @@
 #include "log.h"
 #include "store/database.h"
 
-/* A write that waits. Those of catalogue_write() lie on the caller's stack. */
+/* A waiting write. That of catalogue_write() lies on its caller's stack. */
 typedef struct pending {
   struct pending *next;
   write_fn fn;
   void *arg;
-  int later; /* nobody waits: free after */
+  int later; /* of catalogue_write_later(): the writer frees it */
   int done, code;
 } pending;
 
@@ -44,11 +44,11 @@ static store_result result_of(int code) {
   }
 }
 
-/* Runs a batch in one transaction. A write that fails is rolled back alone; a commit that fails fails all. */
+/* Runs a batch in one transaction. A write that fails is rolled back alone; if the commit fails, all writes fail. */
 static void run_batch(catalogue *cat, pending *batch) {
   database *db = &cat->writer;
   FAULT_POINT("before-begin");
-  /* A transaction whose rollback failed too is still open. */
+  /* A previous transaction may still be open if its rollback failed. */
   int code = sqlite3_get_autocommit(db->handle) ? SQLITE_OK : database_execute(db, "ROLLBACK");
   code = code == SQLITE_OK ? database_execute(db, "BEGIN IMMEDIATE") : code;
   for (pending *p = batch; p && code == SQLITE_OK; p = p->next) {
@@ -104,7 +104,7 @@ static void *writer_main(void *argument) {
         free(p->arg);
         free(p);
       } else {
-        p->done = 1; /* from here its owner may go */
+        p->done = 1; /* its thread may now return, and p with it */
       }
     }
     pthread_cond_broadcast(&cat->committed);

@@ -24,7 +24,7 @@ static const char *const migrations[] = {
     " quota_bytes INTEGER NOT NULL, quota_jobs INTEGER NOT NULL, created INTEGER NOT NULL);",
     "ALTER TABLE token ADD COLUMN used_bytes INTEGER NOT NULL DEFAULT 0;",
     "ALTER TABLE token ADD COLUMN priority INTEGER NOT NULL DEFAULT 0;",
-    /* Owners. What was there belongs to those whose jobs made or named it, the rest to "". */
+    /* Owners. Existing resources belong to the tenants whose jobs made or named them, all others to "". */
     "CREATE TABLE owner(seq INTEGER PRIMARY KEY AUTOINCREMENT, kind INTEGER NOT NULL, id TEXT NOT NULL,"
     " tenant TEXT NOT NULL, json TEXT, bytes INTEGER NOT NULL, created INTEGER NOT NULL, UNIQUE(kind, id, tenant),"
     " FOREIGN KEY(kind, id) REFERENCES resource(kind, id) ON DELETE CASCADE);"
@@ -51,7 +51,7 @@ static const char *const migrations[] = {
     " SELECT kind, id, '', iif(kind=0, bytes, 0), created FROM resource r"
     " WHERE NOT EXISTS(SELECT 1 FROM owner o WHERE o.kind=r.kind AND o.id=r.id) ORDER BY seq;"
     "DROP TABLE temp.claim;",
-    /* What is stored of each kind, so that nobody adds up all rows to know it. */
+    /* Stored bytes of each kind, so that no query has to sum over all rows. */
     "CREATE TABLE total(kind INTEGER PRIMARY KEY, bytes INTEGER NOT NULL);"
     "INSERT INTO total(kind, bytes) VALUES(0, 0), (1, 0), (2, 0);"
     "UPDATE total SET bytes=(SELECT coalesce(sum(r.bytes), 0) FROM resource r WHERE r.kind=total.kind);"
@@ -64,7 +64,7 @@ static const char *const migrations[] = {
     " UPDATE total SET bytes=bytes+NEW.bytes WHERE kind=NEW.kind; END;",
     "CREATE TABLE secret(bytes BLOB NOT NULL);"
     "INSERT INTO secret(bytes) VALUES(randomblob(16));",
-    /* The hash of a supermesh's places, for who verifies them. */
+    /* The hash of a supermesh's places, for --check-data. */
     "ALTER TABLE resource ADD COLUMN places TEXT NOT NULL DEFAULT '';",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
@@ -146,7 +146,8 @@ int database_migrate(database *db) {
   int version = sqlite3_column_int(statement, 0);
   sqlite3_reset(statement);
   if (version > SCHEMA) {
-    log_error("the catalogue has schema %d, this program knows %d: use a newer program", version, (int)SCHEMA);
+    log_error("the catalogue has schema %d, but this program supports up to %d: install a newer version", version,
+              (int)SCHEMA);
     return SQLITE_SCHEMA;
   }
   for (; version < SCHEMA; version++) {

@@ -8,7 +8,7 @@
 
 enum { DATABASE_STATEMENTS = 64, DATABASE_READERS = 6 };
 
-/* A connection; statements are cached by the address of their text. One thread at a time. */
+/* A connection, for one thread at a time. Statements are cached by the address of their text. */
 typedef struct database {
   sqlite3 *handle;
   struct {
@@ -19,22 +19,22 @@ typedef struct database {
 
 int database_open(const char *path, int writer, database *out);
 void database_close(database *db);
-/* Reset and unbound, ready to bind; NULL on error. */
+/* The statement, reset and without bindings; NULL on error. */
 sqlite3_stmt *database_statement(database *db, const char *sql);
-/* Steps once; for statements that return no row. SQLITE_OK or the error. */
+/* Steps once, for statements without result rows. SQLITE_OK or the error. */
 int database_run(database *db, sqlite3_stmt *statement);
 int database_execute(database *db, const char *sql);
-/* Brings the schema up to date. SQLITE_OK, or SQLITE_SCHEMA for one from the future. */
+/* Brings the schema up to date. SQLITE_OK, or SQLITE_SCHEMA if the schema is newer than this program. */
 int database_migrate(database *db);
 
-typedef int (*write_fn)(database *db, void *arg); /* an SQLite code; SQLITE_CONSTRAINT means a condition failed */
+typedef int (*write_fn)(database *db, void *arg); /* returns an SQLite code; SQLITE_CONSTRAINT: a condition failed */
 
 /* Runs fn in the next transaction and waits for its commit. */
 store_result catalogue_write(catalogue *cat, write_fn fn, void *arg);
-/* Likewise without waiting; arg is given to free(). */
+/* The same without waiting; frees arg with free(). */
 void catalogue_write_later(catalogue *cat, write_fn fn, void *arg);
 
-database *catalogue_reader(catalogue *cat); /* waits for a free one */
+database *catalogue_reader(catalogue *cat); /* waits until one is free */
 void catalogue_reader_done(catalogue *cat, database *db);
 
 #endif

@@ -48,7 +48,7 @@ typedef struct change {
   const resource *result;
 } change;
 
-/* Runs an update that must touch one row. */
+/* Runs an update that must change exactly one row. */
 static int must_change(database *db, sqlite3_stmt *st) {
   int code = database_run(db, st);
   return code == SQLITE_OK && sqlite3_changes(db->handle) != 1 ? SQLITE_CONSTRAINT : code;
@@ -190,7 +190,7 @@ store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
   return rows_one(cat, db, st, &job_rows, out);
 }
 
-/* Of state ?1 (−1: any, −2: queued or running), before ?2. */
+/* Listed jobs of state ?1 (−1: any, −2: queued or running) with a sequence number below ?2. */
 #define LISTED " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND seq<?2"
 
 int catalogue_job_list(catalogue *cat, const char *owner, int state, int64_t before, int limit, job_row *out) {
@@ -219,7 +219,7 @@ int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out)
   return rows_many(cat, db, st, &job_rows, out, limit);
 }
 
-/* Fails one that died alone too often, with its last event, so that who follows it learns of the end. */
+/* Fails a job that crashed alone too often, and writes its final event for clients that follow it. */
 static int give_up(database *db, job_row *row, const change *c) {
   api_text json = {0};
   int64_t number = 0;
@@ -258,8 +258,8 @@ static int give_up(database *db, job_row *row, const change *c) {
   return code;
 }
 
-/* What was running when the process died is queued again as a suspect. A crash counts against a job that ran alone:
- * by order, or because nothing else was running. */
+/* Retry after a crash: jobs that were running are queued again as suspects. A crash counts against a job only if it ran
+ * alone, on purpose or because no other job was running. */
 static int recover(database *db, void *arg) {
   const change *c = arg;
   sqlite3_stmt *st = database_statement(db,
@@ -269,7 +269,7 @@ static int recover(database *db, void *arg) {
   if (code == SQLITE_OK) {
     code = database_run(db, database_statement(db, "UPDATE job SET state=0, suspect=1, alone=0 WHERE state=1"));
   }
-  while (code == SQLITE_OK) { /* there is rarely more than one */
+  while (code == SQLITE_OK) { /* rarely more than one job */
     job_row row;
     st = database_statement(db, "SELECT " COLUMNS " FROM job WHERE state=0 AND crashes>=?1 ORDER BY seq LIMIT 1");
     if (!st) {
@@ -307,7 +307,7 @@ int64_t catalogue_jobs_ended(catalogue *cat) {
   return rows_integer(cat, db, st);
 }
 
-/* By the rows' own order: the oldest are nearly all ended, and so found without a sort. */
+/* NOT INDEXED scans in row order: nearly all of the oldest jobs have ended, so this finds them without a sort. */
 #define OLDEST_ENDED " FROM job NOT INDEXED WHERE state>=2 ORDER BY seq LIMIT ?1)"
 
 static int forget(database *db, void *arg) {

@@ -59,7 +59,7 @@ static void sweep(const char *folder) {
   }
   closedir(dir);
   if (swept) {
-    log_info("swept %d temporary files", swept);
+    log_info("deleted %d temporary files", swept);
   }
 }
 

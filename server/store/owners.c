@@ -20,7 +20,7 @@ int owner_insert(database *db, const resource *r, const char *tenant, const char
   return database_run(db, st);
 }
 
-/* Whether a query with the three keys bound gives a row. */
+/* Whether a query returns a row, with kind, id and text (unless NULL) bound. */
 static int exists(database *db, const char *sql, int kind, const char *id, const char *text, int *code) {
   sqlite3_stmt *st = database_statement(db, sql);
   if (!st) {
@@ -38,7 +38,7 @@ static int exists(database *db, const char *sql, int kind, const char *id, const
   return found == SQLITE_ROW;
 }
 
-/* A result that was there already is described with the time of this job, not with that of the first one. */
+/* For a result that existed before, this owner's description has the time of its own job. */
 int owner_of_job(database *db, const char *job, int64_t now) {
   sqlite3_stmt *st = database_statement(
       db,
@@ -67,8 +67,8 @@ int owner_of_job(database *db, const char *job, int64_t now) {
   " named(id) AS (SELECT json_extract(request, '$.mesh') FROM given UNION" \
   "  SELECT json_extract(shape.value, '$.mesh') FROM given, json_each(request, '$.shapes') AS shape)"
 
-/* Mostly they are the caller's own already; an operator works with those of others. Then the description is without
- * what the first owner said. */
+/* Usually the tenant owns the meshes already; an operator may name those of others. The new owner's description then
+ * omits the first owner's name and time. */
 int owner_of_meshes(database *db, const char *request, const char *tenant, int64_t now, int all) {
   sqlite3_stmt *st =
       database_statement(db, NAMED
@@ -97,6 +97,15 @@ int owner_of_meshes(database *db, const char *request, const char *tenant, int64
   code = sqlite3_step(st);
   sqlite3_reset(st);
   return code == SQLITE_DONE ? SQLITE_OK : code == SQLITE_ROW ? SQLITE_NOTFOUND : code;
+}
+
+static int put_unowned(database *db, void *arg) {
+  int code = resource_insert(db, arg);
+  return code == SQLITE_OK ? owner_insert(db, arg, "", NULL) : code;
+}
+
+store_result catalogue_put(catalogue *cat, const resource *r) {
+  return catalogue_write(cat, put_unowned, (void *)(uintptr_t)r);
 }
 
 static const char owner_exists[] = "SELECT 1 FROM owner WHERE kind=?1 AND id=?2 AND tenant=?3";

@@ -3,7 +3,6 @@
 #include <string.h>
 #include <time.h>
 
-#include "store/owners.h"
 #include "store/rows.h"
 
 #define COLUMNS "seq, kind, id, sha, json, bytes, created, places"
@@ -28,16 +27,6 @@ int resource_insert(database *db, const resource *r) {
   sqlite3_bind_int64(st, 6, r->created);
   sqlite3_bind_text(st, 7, r->places, -1, SQLITE_STATIC);
   return database_run(db, st);
-}
-
-/* Of nobody: what is put without an owner belongs to "". */
-static int put(database *db, void *arg) {
-  int code = resource_insert(db, arg);
-  return code == SQLITE_OK ? owner_insert(db, arg, "", NULL) : code;
-}
-
-store_result catalogue_put(catalogue *cat, const resource *r) {
-  return catalogue_write(cat, put, (void *)(uintptr_t)r);
 }
 
 static int read_row(sqlite3_stmt *st, void *to) {
@@ -166,7 +155,7 @@ store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET
   return result;
 }
 
-/* Whether a row's description is one, and its own. */
+/* Whether a row's description is valid JSON with the row's own id. */
 #define DESCRIBES "iif(json_valid(json), json_extract(json, '$.id') IS id, 0)"
 
 int64_t catalogue_damaged(catalogue *cat) {

@@ -1,11 +1,12 @@
 #include "store/rows.h"
 
-/* SQLite gives NULL for a text that it has no memory to copy, and only its error code tells that from a true one. */
+/* SQLite returns NULL for a text that it has no memory to convert; only its error code distinguishes that from SQL
+ * NULL. */
 static int fill(database *db, sqlite3_stmt *st, const row_kind *kind, void *out) {
   if (kind->read(st, out) && (sqlite3_errcode(db->handle) & 0xff) != SQLITE_NOMEM) {
     return 1;
   }
-  log_error("catalogue: no memory for a row");
+  log_error("catalogue: out of memory for a row");
   kind->release(out);
   return 0;
 }

@@ -1,4 +1,4 @@
-/* Shared by the files that read and write rows. */
+/* Reading rows, shared by resources.c, owners.c, jobs.c and tokens.c. */
 #ifndef ORB_STORE_ROWS_H
 #define ORB_STORE_ROWS_H
 
@@ -8,24 +8,24 @@
 #include "log.h"
 #include "store/database.h"
 
-/* Inside a transaction; keeps a row that is there. */
-int resource_insert(database *db, const resource *r);
-int resource_remove(database *db, resource_kind kind, const char *id); /* SQLITE_NOTFOUND: it was not there */
+/* These two run inside a transaction of the writer. */
+int resource_insert(database *db, const resource *r);                  /* keeps an existing row */
+int resource_remove(database *db, resource_kind kind, const char *id); /* SQLITE_NOTFOUND: no such row */
 
-/* read fills one row and says 0 where memory is out; release frees what it filled, all of it or a part. */
+/* read fills one row and returns 0 if out of memory; release frees a row, also one that was filled in part. */
 typedef struct row_kind {
   int (*read)(sqlite3_stmt *st, void *out);
   void (*release)(void *row);
   size_t size;
 } row_kind;
-extern const row_kind resource_rows; /* of seq, kind, id, sha, json, bytes, created, places */
+extern const row_kind resource_rows; /* columns: seq, kind, id, sha, json, bytes, created, places */
 
-/* Runs a bound query of a reader that catalogue_reader() gave (st NULL: it could not be prepared) and gives the reader
- * back. */
+/* These three run a bound query on a reader from catalogue_reader() (st NULL: it could not be prepared) and release
+ * the reader. */
 store_result rows_one(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out);
-/* The number filled, −1 where not all that there are could be read. */
+/* The number of rows filled, or −1, and no rows, if one of them could not be read. */
 int rows_many(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out, int limit);
-/* The integer that the query's one row is, −1 where it cannot be read. */
+/* The integer in the query's only row; −1 if it cannot be read. */
 int64_t rows_integer(catalogue *cat, database *db, sqlite3_stmt *st);
 
 static inline void row_text(sqlite3_stmt *st, int column, char *out, size_t size) {
@@ -33,7 +33,7 @@ static inline void row_text(sqlite3_stmt *st, int column, char *out, size_t size
   snprintf(out, size, "%s", text ? (const char *)text : "");
 }
 
-/* In memory of malloc(); NULL for NULL or when memory is out: row_lacks() tells. */
+/* A copy allocated with malloc(); NULL for SQL NULL and if out of memory, which row_lacks() distinguishes. */
 static inline char *row_copy(sqlite3_stmt *st, int column) {
   const unsigned char *text = sqlite3_column_text(st, column);
   return text ? strdup((const char *)text) : NULL;

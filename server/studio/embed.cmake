@@ -1,5 +1,5 @@
-# Embeds client/web/dist into a target: a generated C file with a table of paths, types and ETags, and one .incbin for
-# each file. Run at configure time; new or changed files configure again.
+# Embeds client/web/dist into a target: generates a C file with a table of paths, types and ETags, and one .incbin per
+# file. Runs at configure time; new or changed files cause a new configure run.
 function(orb_embed_studio target dist)
   file(GLOB_RECURSE files RELATIVE ${dist} CONFIGURE_DEPENDS LIST_DIRECTORIES false ${dist}/*)
   list(FILTER files EXCLUDE REGEX "(^|/)\\.")
@@ -11,7 +11,7 @@ function(orb_embed_studio target dist)
       list(APPEND paths "/${file}")
     endif()
   endforeach()
-  list(SORT paths) # by bytes, as strcmp() does
+  list(SORT paths) # in the order of strcmp()
 
   set(data "")
   set(rows "")
@@ -71,6 +71,6 @@ function(orb_embed_studio target dist)
       "const size_t orb_studio_count = sizeof orb_studio_table / sizeof orb_studio_table[0];\n")
   endif()
   set(generated ${CMAKE_CURRENT_BINARY_DIR}/studio_table.c)
-  file(CONFIGURE OUTPUT ${generated} CONTENT "${text}" @ONLY) # rewritten only where it differs
+  file(CONFIGURE OUTPUT ${generated} CONTENT "${text}" @ONLY) # writes only if the content differs
   target_sources(${target} PRIVATE ${generated})
 endfunction()

@@ -1,4 +1,4 @@
-/* Finding a file of the studio. The table is generated, sorted by path (see embed.cmake). */
+/* Finds a file of the studio in the generated table, which is sorted by path (see embed.cmake). */
 #include "studio/studio.h"
 
 #include <stdlib.h>
@@ -8,9 +8,9 @@
 
 static const char missing_page[] =
     "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>orbmorph</title>"
-    "<h1>orbmorph</h1><p>This daemon was built without its studio. To have it here, run "
+    "<h1>orbmorph</h1><p>This daemon was built without the studio. To include it, run "
     "<code>client/web/build.sh</code> "
-    "(Node 18, npm), then build the daemon again. The HTTP interface is complete: see "
+    "(Node 18, npm), then build the daemon again. The HTTP API is complete: see "
     "<a href=\"/openapi.json\">openapi.json</a>.</p></html>\n";
 
 static const orb_studio_file missing = {

@@ -1,8 +1,8 @@
 /* The studio's files, compiled into the daemon.
  *
- * client/web/build.sh makes client/web/dist; CMake embeds what is there (server/studio/embed.cmake). Paths are those of
- * the address: "/" is dist/index.html, "/assets/x.js" dist/assets/x.js. A daemon built without the studio serves a page
- * at "/" that says how to build it. All answers with these files carry ORB_STUDIO_CSP as Content-Security-Policy. */
+ * client/web/build.sh builds client/web/dist; CMake embeds its files (server/studio/embed.cmake). Paths are URL paths:
+ * "/" is dist/index.html, "/assets/x.js" is dist/assets/x.js. A daemon built without the studio serves a page at "/"
+ * that says how to build it. All responses with these files carry ORB_STUDIO_CSP as Content-Security-Policy. */
 #ifndef ORB_STUDIO_H
 #define ORB_STUDIO_H
 
@@ -13,16 +13,15 @@
   "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
 typedef struct orb_studio_file {
-  const char *path; /* of the address, from "/" on, without the query */
-  const char *type; /* Content-Type */
-  const char *etag; /* strong, with its quotes */
-  const char
-      *cache_control; /* names under /assets/ carry a hash of the content: immutable; others are asked for again */
+  const char *path;          /* URL path, without the query */
+  const char *type;          /* Content-Type */
+  const char *etag;          /* strong, with quotes */
+  const char *cache_control; /* immutable under /assets/, whose names contain a hash of the content; else no-cache */
   const unsigned char *data; /* static, never freed */
   size_t size;
 } orb_studio_file;
 
-/* The file of a path, or NULL. */
+/* The file at a path, or NULL. */
 const orb_studio_file *orb_studio_find(const char *path);
 
 #endif

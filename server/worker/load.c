@@ -1,4 +1,4 @@
-/* Inputs of a job: meshes as they were uploaded, spheres as they were stored, landmarks as places. */
+/* Inputs of a job: uploaded meshes, stored spheres, landmarks as places. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,9 +8,9 @@
 
 void run_problem_of_store(store_result result, api_problem *problem) {
   if (result == STORE_FULL) {
-    api_refuse(problem, "storage-full", "The disk of the server is full; make room and try again.");
+    api_refuse(problem, "storage-full", "The server's disk is full; free some space and try again.");
   } else {
-    api_refuse(problem, "internal", "The store could not be read or written; the log of the server says why.");
+    api_refuse(problem, "internal", "The store could not be read or written; the server's log says why.");
   }
 }
 
@@ -31,7 +31,7 @@ static void note_triangles(const orb_mesh *raw, file_triangle *noted, int32_t co
   }
 }
 
-/* A mesh as read has its triangles in the file's order and its vertices by the file's numbers in `source`. */
+/* Before repairs, a mesh has the file's triangles in the file's order, and `source` has the file's vertex numbers. */
 static int32_t *copy_corners(orb_context *ctx, const orb_mesh *raw) {
   int32_t *corners = ORB_NEW(ctx, int32_t, 3 * (size_t)raw->triangle_count);
   for (size_t h = 0; corners && h < 3 * (size_t)raw->triangle_count; h++) {
@@ -51,7 +51,7 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
   memset(mesh, 0, sizeof *mesh);
   store_result found = catalogue_get(env->cat, RESOURCE_MESH, id, &row);
   if (found == STORE_NOT_FOUND) {
-    return api_refuse(problem, "not-found", "The mesh %s was deleted before the job could use it.", id);
+    return api_refuse(problem, "not-found", "Mesh %s was deleted before the job could use it.", id);
   }
   int fine = found == STORE_OK && api_mesh_summarise(row.json, &summary) &&
              api_repair_parse(summary.repair, &repair, canonical, problem);
@@ -82,7 +82,7 @@ int run_load_points(const run_env *env, orb_context *ctx, const char *embedding,
       found == STORE_OK ? sphere_points(bytes, size, mesh->vertex_count, mesh->triangle_count) : NULL;
   if (!first) {
     free(bytes);
-    return api_refuse(problem, "corrupt", "The stored embedding %s cannot be read, or does not belong to its mesh.",
+    return api_refuse(problem, "corrupt", "The stored embedding %s cannot be read or does not match its mesh.",
                       embedding);
   }
   *points = ORB_NEW(ctx, double, 3 * count);
@@ -101,10 +101,10 @@ static int place_triangle(const orb_mesh *mesh, const api_place *spot, const fil
     t++;
   }
   if (t == mesh->triangle_count || noted->corners[0] < 0) {
-    *why = "this triangle of the file was dropped, because it was degenerate or there twice";
+    *why = "this triangle of the file was dropped because it was degenerate or a duplicate";
     return 0;
   }
-  /* Repairs may have turned the triangle, so corners are matched by the vertices that they stand for. */
+  /* A repair may have reordered the triangle's corners, so they are matched by vertex. */
   out->triangle = t;
   int used[3] = {0, 0, 0};
   for (int k = 0; k < 3; k++) {
@@ -115,7 +115,7 @@ static int place_triangle(const orb_mesh *mesh, const api_place *spot, const fil
       corner++;
     }
     if (corner == 3) {
-      *why = "this triangle of the file was changed by the repair";
+      *why = "the repair changed this triangle of the file";
       return 0;
     }
     used[corner] = 1;
@@ -140,8 +140,8 @@ int run_place(orb_context *ctx, const orb_mesh *mesh, const api_place *spot, con
   int32_t vertex = spot->index < mesh->file_vertex_count ? mesh->vertex_of_source[spot->index] : -1;
   if (vertex < 0) {
     *why = spot->index < mesh->file_vertex_count
-               ? "this vertex of the file was dropped, because no triangle uses it or the repair removed it"
-               : "it is out of range: the file has fewer vertices";
+               ? "this vertex of the file was dropped because no triangle uses it or the repair removed it"
+               : "the file has fewer vertices";
     return 0;
   }
   return orb_place_of_vertex(ctx, mesh, vertex, out) == ORB_OK;

@@ -23,8 +23,8 @@ static double dot(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Barycentrics of a point that lies in the triangle up to rounding. A triangle without area is taken as its longest
- * edge, a point as its first corner. */
+/* Barycentric coordinates of a point that lies in the triangle up to rounding. A degenerate triangle is treated as its
+ * longest edge, one without extent as a single corner. */
 static void barycentric(const double *const corner[3], const double p[3], double out[3]) {
   double e[3][3], d[3], length[3];
   for (int k = 0; k < 3; k++) { /* e[k] is opposite to corner k */
@@ -70,8 +70,8 @@ static void make_proper(double at[3]) {
   }
 }
 
-/* From the aligned shape's triangle to the one of the mesh before alignment that holds it. Corners that both have are
- * carried over exactly; others were put in by the alignment, and are told by where they lie. */
+/* Converts a place on the aligned shape to a place on the mesh before alignment. Weights of corners that both triangles
+ * share carry over exactly; other corners were added by the alignment and are located by their position. */
 static void to_parent(const orb_mesh *mesh, const orb_aligned_shape *shape, const orb_place *from, orb_place *out) {
   const double *corner[3];
   size_t parent = (size_t)shape->parent[from->triangle];
@@ -101,7 +101,7 @@ static void to_parent(const orb_mesh *mesh, const orb_aligned_shape *shape, cons
   make_proper(out->at);
 }
 
-/* Repairs may have turned a triangle, so corners are matched by the vertices that they stand for. */
+/* A repair may have reordered a triangle's corners, so they are matched by vertex. */
 void places_to_file(const orb_mesh *mesh, const int32_t *corners, const orb_place *from, orb_place *out) {
   int used[3] = {0, 0, 0};
   int32_t number = mesh->source_triangle[from->triangle];
@@ -152,7 +152,7 @@ static orb_status write_shape(orb_context *ctx, const orb_mesh *mesh, const int3
   return ORB_OK;
 }
 
-/* Which supermesh vertex each vertex of the asset stands for. */
+/* Writes which supermesh vertex each vertex of the asset represents. */
 static orb_status write_asset_map(orb_context *ctx, const orb_merge_result *merged, orb_buffer *out) {
   unsigned char bytes[4 * BATCH], *at = bytes + 12;
   int32_t count = merged->asset_facts.vertex_count;

@@ -34,7 +34,7 @@ typedef struct progress_of {
   double began;
 } progress_of;
 
-/* The stage that was running is over; the next begins. */
+/* Ends the time measurement of the current stage and begins the next. */
 static void enter_stage(progress_of *p, const char *stage) {
   if (strncmp(p->stage, stage, sizeof p->stage - 1) == 0) {
     return;
@@ -53,68 +53,79 @@ static void on_progress(void *user, const char *stage, double fraction) {
   queue_progress(p->q, p->j, stage, fraction);
 }
 
-/* 1: the job was made to wait for embeddings. 0: all are there, or nothing is needed. −1: cannot be told now. */
-static int plan(const run_env *env, job *j) {
+/* The embeddings that a supermesh lacks, each once: keys, requests and triangles. */
+typedef struct missing {
   char keys[API_SHAPES_MAX][API_ID_SIZE];
   api_text texts[API_SHAPES_MAX];
-  const char *requests[API_SHAPES_MAX];
   int64_t costs[API_SHAPES_MAX];
-  int count = 0, result = 0;
+  int count;
+} missing;
+
+static int64_t triangles_of(const run_env *env, const char *mesh) {
+  resource row = {0};
+  api_mesh_summary summary = {0};
+  int64_t triangles = 0;
+  if (catalogue_get(env->cat, RESOURCE_MESH, mesh, &row) == STORE_OK) {
+    triangles = api_mesh_summarise(row.json, &summary) ? summary.triangles : 0;
+    resource_free(&row);
+  }
+  return triangles;
+}
+
+/* Adds the embedding of a shape if it is missing. 0: the store failed, or out of memory. */
+static int add_if_missing(const run_env *env, const job *j, const api_supermesh_request *request, int32_t s,
+                          missing *list) {
+  api_embedding_request wanted = {.options = request->embedding};
+  char *key = list->keys[list->count];
+  memcpy(wanted.mesh, request->shapes[s].mesh, sizeof wanted.mesh);
+  if (!api_embedding_request_id(&wanted, key)) {
+    return 0;
+  }
+  for (int k = 0; k < list->count; k++) {
+    if (strcmp(list->keys[k], key) == 0) {
+      return 1;
+    }
+  }
+  /* An embedding that only others own is requested for this owner too; its job finds the result and ends at once. */
+  resource known = {0};
+  store_result found = catalogue_get_of(env->cat, RESOURCE_EMBEDDING, key, job_owner(j), &known);
+  resource_free(&known);
+  if (found == STORE_ERROR || found == STORE_OK) {
+    return found == STORE_OK;
+  }
+  list->costs[list->count] = triangles_of(env, wanted.mesh);
+  api_text *text = &list->texts[list->count++];
+  api_embedding_request_write(&wanted, text);
+  return !text->failed;
+}
+
+/* Makes a supermesh wait for the embeddings that it lacks. 1: it now waits; 0: it lacks none; −1: the store failed or
+ * out of memory, retry later. */
+static int plan(const run_env *env, job *j) {
+  const char *requests[API_SHAPES_MAX];
+  missing list = {.count = 0};
+  int result = 0;
   api_problem problem = {0};
   api_supermesh_request request;
   api_json_error error;
-  memset(texts, 0, sizeof texts);
   memset(&request, 0, sizeof request);
   cJSON *body = api_json_parse(job_request(j), strlen(job_request(j)), &error);
-  if (!body || !api_supermesh_request_read(body, &request, &problem)) {
-    goto done; /* the run itself reports it */
+  if (body && api_supermesh_request_read(body, &request, &problem)) { /* else run_supermesh() reports the error */
+    for (int32_t s = 0; s < request.shape_count && result == 0; s++) {
+      result = add_if_missing(env, j, &request, s, &list) ? 0 : -1;
+    }
   }
-  for (int32_t s = 0; s < request.shape_count; s++) {
-    api_embedding_request wanted = {.options = request.embedding};
-    resource known = {0};
-    memcpy(wanted.mesh, request.shapes[s].mesh, sizeof wanted.mesh);
-    if (!api_embedding_request_id(&wanted, keys[count])) {
-      result = -1;
-      goto done;
-    }
-    int twice = 0;
-    for (int k = 0; k < count; k++) {
-      twice |= strcmp(keys[k], keys[count]) == 0;
-    }
-    /* One that only others own is made for this owner as well, which takes no time. */
-    store_result found =
-        twice ? STORE_OK : catalogue_get_of(env->cat, RESOURCE_EMBEDDING, keys[count], job_owner(j), &known);
-    resource_free(&known);
-    if (found == STORE_ERROR) {
-      result = -1;
-      goto done;
-    }
-    if (found == STORE_OK) {
-      continue;
-    }
-    api_mesh_summary summary = {0};
-    costs[count] = 0;
-    if (catalogue_get(env->cat, RESOURCE_MESH, wanted.mesh, &known) == STORE_OK) {
-      costs[count] = api_mesh_summarise(known.json, &summary) ? summary.triangles : 0;
-      resource_free(&known);
-    }
-    api_embedding_request_write(&wanted, &texts[count]);
-    if (texts[count].failed) {
-      result = -1;
-      goto done;
-    }
-    requests[count] = texts[count].data;
-    count++;
+  for (int i = 0; i < list.count; i++) {
+    requests[i] = list.texts[i].data;
   }
-  if (count > 0) {
+  if (result == 0 && list.count > 0) {
     result = 1;
-    if (queue_wait_for(env->q, j, keys, requests, costs, count) != QUEUE_OK) {
-      log_warn("the embeddings that a job needs could not be queued; it is tried again");
+    if (queue_wait_for(env->q, j, list.keys, requests, list.costs, list.count) != QUEUE_OK) {
+      log_warn("the embeddings that a job needs could not be queued; the job is retried");
     }
   }
-done:
-  for (int i = 0; i < API_SHAPES_MAX; i++) {
-    api_text_free(&texts[i]);
+  for (int i = 0; i < list.count; i++) {
+    api_text_free(&list.texts[i]);
   }
   api_supermesh_request_free(&request);
   api_problem_free(&problem);
@@ -130,7 +141,7 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_prob
       if (queue_cancel_wanted(env->q, j)) {
         queue_finish(env->q, j, API_JOB_CANCELLED, NULL, NULL);
       } else {
-        queue_give_back(env->q, j); /* the service stops */
+        queue_give_back(env->q, j); /* the service is stopping */
       }
       return;
     }
@@ -180,7 +191,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
     }
     queue_finish(env->q, j, API_JOB_SUCCEEDED, NULL, out.row.json ? &out.row : NULL);
   } else if (out.gone) {
-    queue_give_back(env->q, j); /* to be planned again */
+    queue_give_back(env->q, j); /* a worker plans it again */
   } else {
     finish_failed(env, j, ctx, &problem);
   }
@@ -219,7 +230,7 @@ static void *worker_main(void *argument) {
   worker *self = argument;
   job *j;
   int threads;
-  /* Requests come first; the threads that a job starts inherit this. Where it is not allowed, they compete. */
+  /* Gives requests precedence over jobs; threads that a job starts inherit the value. Failure is harmless. */
   (void)setpriority(PRIO_PROCESS, (id_t)gettid(), self->pool->options.nice);
   while (queue_take(self->pool->env.q, self->small_only, &j, &threads)) {
     run_one(self->pool, j, threads);
@@ -228,7 +239,7 @@ static void *worker_main(void *argument) {
 }
 
 worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogue *cat, objects *store) {
-  int lanes = options->workers + (options->workers == 1); /* one more for small jobs */
+  int lanes = options->workers + (options->workers == 1); /* a single worker gets a second one for small jobs */
   worker_pool *pool = calloc(1, sizeof *pool + (size_t)lanes * sizeof(worker));
   if (!pool) {
     return NULL;

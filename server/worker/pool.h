@@ -1,8 +1,16 @@
-/* The workers: threads that take jobs from the queue and run them with the library.
+/* The workers: threads that take jobs from the queue and run them with core. In: jobs, and meshes and embeddings from
+ * the store. Out: objects and rows in the store; progress and the end of each job to the queue.
  *
- * Contract. A worker first looks at what the job needs: a supermesh whose embeddings are not all there is put back to
- * wait for them. Else it claims the job (a commit), runs it with a context of its own (memory, time, threads), writes
- * the objects, and ends the job with its result in one commit.
+ * Reading order:
+ *   pool.c            the thread, the life of a job: plan, claim, run, end
+ *   run_embedding.c   an embedding: mesh → sphere        sphere.c    reading a stored sphere
+ *   run_supermesh.c   a supermesh: embeddings and landmarks → asset, places, aligned spheres
+ *   load.c            inputs that both read
+ *   places.c          the file of places
+ *
+ * Contract. A worker first plans the job: a supermesh that lacks embeddings goes back to the queue to wait for them.
+ * Otherwise the worker claims the job (a commit), runs it with a context of its own (memory, time, threads), publishes
+ * the objects, and ends the job with its result in one commit. Retry: queue/queue.h.
  */
 #ifndef ORB_WORKER_POOL_H
 #define ORB_WORKER_POOL_H
@@ -11,14 +19,14 @@
 
 typedef struct worker_options {
   int workers;
-  int nice;                                  /* of the workers and of the threads that their jobs start; 0 to 19 */
+  int nice;                                  /* of the workers and the threads that their jobs start; 0 to 19 */
   int64_t job_memory, job_ms, max_triangles; /* limits of one job */
 } worker_options;
 
 typedef struct worker_pool worker_pool;
 
 worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogue *cat, objects *store);
-/* queue_stop() comes first. */
+/* Joins and frees the workers. Call queue_stop() first. */
 void worker_pool_join(worker_pool *pool);
 
 #endif

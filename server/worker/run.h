@@ -1,4 +1,4 @@
-/* What one job does; shared by the files of the worker. */
+/* Running one job; shared by the files of the worker. */
 #ifndef ORB_WORKER_RUN_H
 #define ORB_WORKER_RUN_H
 
@@ -14,30 +14,31 @@ typedef struct run_env {
 } run_env;
 
 typedef struct run_output {
-  resource row; /* json of malloc() */
-  int holds;    /* objects_hold() was called, for what was published; until the row is committed */
-  int gone;     /* an embedding that the job needs was removed after it was planned */
+  resource row; /* json is allocated with malloc(); NULL: the result existed already */
+  int holds;    /* objects_hold() was called; let go after the row is committed */
+  int gone;     /* an embedding that the job needs was deleted after planning */
 } run_output;
 
-/* Each runs a claimed job: 1 with *out filled, or 0 with the problem. A problem without a name means that the context
- * holds the error. */
+/* Each runs a claimed job: 1 with *out filled, or 0 with the problem. A problem without a name: the context holds the
+ * error. */
 int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem);
 int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem);
 
-/* A file's triangle as its corners' vertices in the file, noted before the repair. */
+/* A triangle of the file and its vertices in the file, recorded before the repair. */
 typedef struct file_triangle {
   int32_t index, corners[3]; /* −1: not found */
 } file_triangle;
 
-/* Reads an uploaded mesh again and repairs it as at upload. noted may be NULL. corners (may be NULL): 3 a triangle of
- * the file, its vertices in the file; of the context. */
+/* Reads an uploaded mesh and repairs it in the same way as at upload. noted may be NULL. corners (may be NULL): the
+ * vertices of each triangle of the file, 3 a triangle, numbered as in the file; memory of the context. */
 int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh *mesh, file_triangle *noted,
                   int32_t noted_count, int32_t **corners, api_problem *problem);
-/* The points of a stored sphere: 3 a vertex, of the context. */
+/* The points of a stored sphere, 3 numbers a vertex; memory of the context. */
 int run_load_points(const run_env *env, orb_context *ctx, const char *embedding, const orb_mesh *mesh, double **points,
                     api_problem *problem);
 
-/* Landmarks of a request as places on the meshes. */
+/* Turns a landmark of a request into a place on the mesh. *tree is created on first use. 0 with *why, or with *why NULL
+ * and the error in the context. */
 int run_place(orb_context *ctx, const orb_mesh *mesh, const api_place *spot, const file_triangle *noted,
               orb_nearest **tree, orb_place *out, const char **why);
 

@@ -43,7 +43,7 @@ int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out,
     return 0;
   }
   if (catalogue_get(env->cat, RESOURCE_EMBEDDING, job_key(j), &known) == STORE_OK) {
-    resource_free(&known); /* an earlier attempt got so far */
+    resource_free(&known); /* of an earlier attempt or another owner */
     return 1;
   }
   orb_progress(ctx, "read", 0);

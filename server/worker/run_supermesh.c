@@ -5,22 +5,22 @@
 
 #include "api/json.h"
 #include "metrics.h"
+#include "store/spheres.h"
 #include "worker/places.h"
 #include "worker/run.h"
-#include "worker/spheres.h"
 
-/* Everything that a merge needs; of the context. */
+/* The inputs of a merge; memory of the context. */
 typedef struct merge_input {
   api_supermesh_request request;
   orb_mesh meshes[API_SHAPES_MAX];
-  int32_t *corners[API_SHAPES_MAX]; /* of each file's triangles */
+  int32_t *corners[API_SHAPES_MAX]; /* see run_load_mesh() */
   double *points[API_SHAPES_MAX];
   orb_align_shape shapes[API_SHAPES_MAX];
   const char *names[API_SHAPES_MAX];
   orb_landmark *landmarks;
   orb_place *places;
   file_triangle *noted; /* landmark-major, as the spots */
-  int gone;             /* an embedding is there no more */
+  int gone;             /* an embedding has been deleted */
 } merge_input;
 
 static void free_input(orb_context *ctx, merge_input *in) {
@@ -53,7 +53,7 @@ static int refuse_landmark(const merge_input *in, int32_t l, int32_t s, const ch
   return 0;
 }
 
-/* Places of all landmarks on one shape. */
+/* Computes the places of all landmarks on one shape. */
 static int place_all(orb_context *ctx, merge_input *in, int32_t s, api_problem *problem) {
   const api_landmark_list *list = &in->request.landmarks;
   orb_nearest *tree = NULL;
@@ -127,7 +127,7 @@ static int load_input(const run_env *env, orb_context *ctx, merge_input *in, api
   return 1;
 }
 
-/* Before the row, as the asset: a supermesh that is there has all of them. */
+/* Like the asset, stored before the row: a supermesh with a row has all its objects. */
 static int store_places(const run_env *env, orb_context *ctx, const merge_input *in, const orb_merge_result *merged,
                         resource *result, api_problem *problem) {
   orb_buffer places = {0};
@@ -157,8 +157,8 @@ static int store_spheres(const run_env *env, orb_context *ctx, const orb_merge_r
   return stored == STORE_OK;
 }
 
-/* The places that the alignment found, as a request would name them: by the file's triangle, or as a point where a
- * repair made the triangle. NULL if memory is out. */
+/* The found landmarks in the form in which a request names places: by a triangle of the file, or as a point if a repair
+ * added the triangle. NULL if out of memory. */
 static api_place *found_spots(orb_context *ctx, const merge_input *in, const orb_merge_result *merged) {
   size_t shapes = (size_t)in->request.shape_count, count = (size_t)merged->alignment.found_count * shapes;
   api_place *spots = ORB_NEW(ctx, api_place, count);
@@ -211,7 +211,7 @@ int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out,
   resource known = {0};
   orb_merge_result merged;
   if (catalogue_get(env->cat, RESOURCE_SUPERMESH, job_key(j), &known) == STORE_OK) {
-    resource_free(&known); /* an earlier attempt got so far */
+    resource_free(&known); /* of an earlier attempt or another owner */
     return 1;
   }
   merge_input *in = calloc(1, sizeof *in);

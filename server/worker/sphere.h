@@ -1,13 +1,13 @@
-/* The stored sphere is the sphere.ply that callers get. Its layout is ours, yet nothing of it is believed: the size
- * must fit the counts, and every point must lie on the unit sphere. */
+/* Reads a stored sphere, the sphere.ply that callers download. The file is validated although this program wrote it:
+ * its size must match the counts, and every point must lie on the unit sphere. */
 #ifndef ORB_WORKER_SPHERE_H
 #define ORB_WORKER_SPHERE_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* Where the points begin in the bytes; they lie SPHERE_STRIDE apart, 3 doubles each, not aligned. NULL: the bytes are
- * not the sphere of a mesh with so many vertices and triangles. */
+/* The first point in the bytes. Points are SPHERE_STRIDE bytes apart, 3 unaligned doubles each. NULL: the bytes are not
+ * a valid sphere of a mesh with these counts. */
 enum { SPHERE_STRIDE = 52 };
 const unsigned char *sphere_points(const unsigned char *bytes, size_t size, int32_t vertices, int32_t triangles);
 

@@ -14,7 +14,7 @@ test('a file that is lost is told as a fault, and who sends the mesh again puts 
   const lost = async (url) => {
     const reply = await d.get(url);
     assertProblem(reply, 500, 'internal');
-    assert.match(reply.json.detail, /lost .* DELETE this/);
+    assert.match(reply.json.detail, /lost this file. DELETE the resource/);
   };
   for (const cut of [false, true]) {
     rmSync(object('mesh', mesh.id));
@@ -51,7 +51,7 @@ test('damage to any object, and to any kind of row, is found', async (t) => {
     const { status, stdout } = check();
     assert.equal(status, 1, `${what}\n${stdout}`);
     assert.match(stdout, /: 1 wrong/, `${what}\n${stdout}`);
-    assert.match(stdout, /start the service, DELETE what is named/, what);
+    assert.match(stdout, /start the service, DELETE the resources named above/, what);
   };
   for (const [kind, file] of files) {
     const bytes = readFileSync(file), bad = Buffer.from(bytes);

@@ -35,5 +35,5 @@ test('a line of the file without a value is told as one', (t) => {
   const file = path.join(folder, 'conf');
   writeFileSync(file, '# a comment\nmax-body = 1M\nworkers 2\n');
   const { status, stderr } = check('--config', file);
-  assert.deepEqual([status, stderr], [2, 'orbmorphd: config file, line 3: a line is NAME = VALUE, not "workers 2"\n']);
+  assert.deepEqual([status, stderr], [2, 'orbmorphd: config file, line 3: a line must be NAME = VALUE, not "workers 2"\n']);
 });

@@ -137,7 +137,7 @@ test('a job that ends the process three times fails, and the queue goes on', asy
   const end = (await d.get(poison.url)).json;
   assert.equal(end.state, 'failed');
   assert.equal(end.problem.type, '/problems/crashed');
-  assert.match(end.problem.detail, /died 3 times/);
+  assert.match(end.problem.detail, /crashed 3 times/);
   const events = await d.get(`${poison.url}/events`);
   assert.match(events.bytes.toString(), /^event: progress$/m);
   assert.equal((await d.ended((await d.get(behind.url)).json)).state, 'succeeded');

@@ -88,7 +88,7 @@ test('the unpacked size counts', async (t) => {
   for (const body of [await gzip(text), zstd(Buffer.from(text))]) {
     const reply = await send(d, body[0] === 0x1f ? 'gzip' : 'zstd', body, {});
     assertProblem(reply, 413, 'too-large');
-    assert.match(reply.json.detail, /unpacked, has more than the 102400 bytes/);
+    assert.match(reply.json.detail, /decompressed body has more than 102400 bytes/);
     assert.equal(reply.json.limit, 102400);
   }
   assertProblem(await send(d, 'gzip', await gzip(' '.repeat(3000)), {}, '/v1/embeddings'), 413, 'too-large');
@@ -111,7 +111,7 @@ test('bombs end early', async (t) => {
       assertProblem(reply, 413, 'too-large', `${coding} ${target}`);
       if (target === '/v1/meshes') {
         assert.equal(reply.json.ratio_limit, 200);
-        assert.match(reply.json.detail, /unpacks to more than 200 times its size/);
+        assert.match(reply.json.detail, /decompresses to more than 200 times its size/);
       }
     }
   assert.ok((await memory(d)) - before < 16 << 20, `${(await memory(d)) - before} bytes more`);

@@ -119,7 +119,7 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
   await writeFile(twin, 'left behind');
   assert.match(await check(), / 0 wrong, 1 objects without a row/);
   const { stdout } = await gc('--derived-bytes', '1M');
-  assert.match(stdout, /^removed an object of 11 bytes without a row/m);
+  assert.match(stdout, /^deleted object \S+ \(11 bytes\), which has no row/m);
   assert.match(await check(), / 0 wrong, 0 objects without a row/);
 
   await d.start();
@@ -145,7 +145,7 @@ test('ended jobs beyond keep-jobs are forgotten, what is unfinished and what the
   await d.delete(running.url);
   await d.stop('SIGTERM');
   const { stdout } = await promisify(execFile)(binaries.daemon, ['--gc', '--data', d.data, '--keep-jobs', '1']);
-  assert.match(stdout, /removed [23] ended jobs/);
+  assert.match(stdout, /deleted [23] ended jobs/);
   await d.start();
   assert.equal((await jobs()).length, 1);
   assert.deepEqual(new Set(await statuses(d, made)), new Set([200]));

@@ -67,14 +67,14 @@ test('SIGHUP reads the configuration again', async (t) => {
   };
   await hup('log-level = debug\nmax-body = 2048\nqueue-limit = 7\n');
   await logged(d, (l) => l.message === 'SIGHUP: the configuration was read again');
-  await logged(d, (l) => /queue-limit is changed/.test(l.message));
-  await logged(d, (l) => /max-body .*needs a restart/.test(l.message));
+  await logged(d, (l) => /queue-limit changed/.test(l.message));
+  await logged(d, (l) => /max-body .*after a restart/.test(l.message));
   const reply = await d.upload(shapes.obj(shapes.egg(3)));
   assert.equal(reply.status, 201, 'the limit of a body needs a restart');
   await logged(d, (l) => l.level === 'debug' && l.request === reply.headers.get('x-request-id'));
   await hup('log-level = warn\nnonsense = 1\n');
-  await logged(d, (l) => l.level === 'error' && /^SIGHUP: config file, line 2: "nonsense" is none of the names/.test(l.message));
-  await logged(d, (l) => /is not valid and stays as it was/.test(l.message));
+  await logged(d, (l) => l.level === 'error' && /^SIGHUP: config file, line 2: unknown name "nonsense"/.test(l.message));
+  await logged(d, (l) => /is not valid; the previous one stays in effect/.test(l.message));
   assertProblem(await d.get('/v1/nothing'), 404, 'not-found');
   await logged(d, (l) => l.level === 'debug');
 });

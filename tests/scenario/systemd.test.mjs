@@ -73,7 +73,7 @@ test('a Unix socket', async (t) => {
   await writeFile(at, 'precious');
   d = await start(t, args);
   assert.equal((await d.exited).code, 1);
-  assert.match(d.log, /is no socket/);
+  assert.match(d.log, /is not a socket/);
   assert.ok((await lstat(at)).isFile());
   for (const [listen, why, status] of [[`unix:${'x'.repeat(200)}`, /1 to 107 bytes/, 1], ['unix:', /unix:PATH/, 2], ['127.0.0.1', /ADDR:PORT/, 2], ['127.0.0.1:http?', /ADDR:PORT/, 2], ['nowhere.invalid:80', /cannot listen/, 1]]) {
     d = await start(t, ['--listen', listen, '--data', data]);
@@ -95,7 +95,7 @@ test('a socket that systemd passes', async (t) => {
     d.child.kill('SIGTERM');
     assert.equal((await d.exited).code, 0, d.log);
   }
-  for (const [count, why] of [[2, /passed 2 sockets/], [-1, /no stream socket that listens/]]) {
+  for (const [count, why] of [[2, /passed 2 sockets/], [-1, /not a listening stream socket/]]) {
     const d = await start(t, ['--data', data], { pass: ['127.0.0.1', 0, count] });
     assert.equal((await d.exited).code, 1);
     assert.match(d.log, why);
@@ -108,7 +108,7 @@ test('a socket that systemd passes', async (t) => {
 test('a passed socket that others can reach needs tokens', async (t) => {
   const d = await start(t, ['--data', await folder(t), '--listen', '127.0.0.1:8080'], { pass: ['0.0.0.0', 0, 1] });
   const port = Number(/^orbmorphd listening on http:\/\/0\.0\.0\.0:(\d+)\n$/.exec(d.out)?.[1]);
-  assert.match(d.log, /tokens are needed and there are none/);
+  assert.match(d.log, /tokens are needed but none exist/);
   assert.equal((await get({ port, agent: false })).status, 401);
 });
 

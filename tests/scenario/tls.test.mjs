@@ -90,6 +90,6 @@ test('without a certificate that works it does not start', async (t) => {
     const d = await start(t, data, ...args);
     assert.equal(d.url, undefined, args.join(' '));
     assert.ok([1, 2].includes(await d.exited), `${args}: ${await d.exited}`);
-    assert.match(d.log, /tls-certificate and tls-key belong together|cannot be read|cannot be started/, args.join(' '));
+    assert.match(d.log, /tls-certificate and tls-key must both be set|cannot be read|cannot be started/, args.join(' '));
   }
 });

@@ -86,7 +86,7 @@ test('tokens change while the daemon runs', async (t) => {
   assert.equal(made.headers.get('ratelimit'), `"upload";r=${1048576 - text.length}`);
   assert.match((await run(d, 'list')).stdout, /^web read,write uploaded=\d+ quota=1048576 quota-jobs=2 priority=3\n$/);
   await assert.rejects(run(d, 'add', 'web', '--scope', 'read'), { code: 1, stderr: /already/ });
-  await assert.rejects(run(d, 'set', 'nobody', '--quota', '1'), { code: 1, stderr: /no token/ });
+  await assert.rejects(run(d, 'set', 'nobody', '--quota', '1'), { code: 1, stderr: /token "nobody" does not exist/ });
 
   // Unfinished jobs are counted, ended ones are not.
   const meshes = [];

@@ -13,6 +13,7 @@
 
 #include "evict.h"
 #include "log.h"
+#include "store/owners.h"
 
 enum { NEEDED = 150, FREE = 150, ROW_BYTES = 10 };
 

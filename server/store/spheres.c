@@ -1,4 +1,4 @@
-#include "worker/spheres.h"
+#include "store/spheres.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,0 +1,37 @@
+/* What all handlers share: moving a request to another thread, and its fields in the log. */
+#include <stdio.h>
+#include <time.h>
+
+#include "faults.h"
+#include "http/http.h"
+
+int64_t clock_us(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+void request_fields(const request *r, char out[REQUEST_FIELDS]) {
+  snprintf(out, REQUEST_FIELDS, "\"request\":\"%s\"%s%s%s,\"method\":\"%.8s\",\"route\":\"%s\"", r->number,
+           r->trace[0] ? ",\"traceparent\":\"" : "", r->trace, r->trace[0] ? "\"" : "",
+           r->route ? r->route->method : "", r->route ? r->route->path : "");
+}
+
+static void run_away(task *t) {
+  request *r = (request *)(void *)t;
+  r->away(r);
+  FAULT_POINT("before-reply");
+  if (r->phase == PHASE_AWAY) {
+    r->phase = PHASE_SEND; /* the task could not make a response: reply_send() closes the connection */
+  }
+  MHD_resume_connection(r->connection);
+}
+
+enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r)) {
+  r->away = fn;
+  r->away_task.run = run_away;
+  r->phase = PHASE_AWAY;
+  MHD_suspend_connection(r->connection);
+  tasks_add(pool, &r->away_task);
+  return REQUEST_AWAY;
+}

@@ -1,0 +1,180 @@
+/* The end of a job, cancelling, and retry: jobs that a worker returns are chosen again after retry_at. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "faults.h"
+#include "log.h"
+#include "queue/internal.h"
+
+static void release_dependents(queue *q, job *ended) {
+  for (job *j = q->first; j; j = j->next) {
+    for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
+      if (is_for(ended, j->dependencies[d], j->row.owner)) {
+        j->waits_for--;
+        if (ended->row.state == API_JOB_FAILED && ended->row.problem && !j->dependency_problem) {
+          j->dependency_problem = strdup(ended->row.problem);
+        }
+      }
+    }
+  }
+}
+
+/* Marks the job as ended in memory, after its row was committed. */
+static void ended_locked(queue *q, job *j, api_job_state state, const char *problem, int64_t now) {
+  j->row.state = state;
+  j->row.finished = now;
+  j->row.problem = problem ? strdup(problem) : NULL;
+  if (state == API_JOB_SUCCEEDED) {
+    j->progress = 1;
+  }
+  table_drop_key(q, j);
+  q->ended[state]++;
+}
+
+static void publish_end(queue *q, job *j, int64_t number, const char *json) {
+  keep_event(j, number, api_job_state_name(j->row.state), json);
+  release_dependents(q, j);
+  wake_job(q, j, 1);
+  table_ended(q, j);
+  pthread_cond_broadcast(&q->work);
+}
+
+/* Commits the end of a taken job, then shows it. worked: a worker has taken the job; it leaves the job in the same step
+ * in which others see that it has ended. */
+static store_result end_job(queue *q, job *j, api_job_state state, const char *problem, const resource *result,
+                            int worked) {
+  int64_t now = unix_ms();
+  pthread_mutex_lock(&q->lock);
+  job shown = *j;
+  shown.row.state = state;
+  shown.row.finished = now;
+  shown.row.problem = (char *)(uintptr_t)problem;
+  shown.progress = state == API_JOB_SUCCEEDED ? 1 : j->progress;
+  api_text json = {0};
+  int64_t number = prepare_event(&shown, &json) + 1000; /* above any event that is added before the commit */
+  pthread_mutex_unlock(&q->lock);
+  FAULT_POINT("before-finish");
+  store_result stored = json.failed ? STORE_ERROR
+                                    : catalogue_job_finish(q->cat, j->row.id, j->row.attempt, state, problem, now,
+                                                           result, number, json.data);
+  FAULT_POINT("after-finish");
+  if (stored == STORE_OK) {
+    pthread_mutex_lock(&q->lock);
+    ended_locked(q, j, state, problem, now);
+    if (worked) {
+      schedule_leave(q, j);
+    }
+    publish_end(q, j, number, json.data);
+    pthread_mutex_unlock(&q->lock);
+  }
+  api_text_free(&json);
+  return stored;
+}
+
+/* Marks the job as cancelled. 1 if no worker has it: the caller has then taken it and must end it. */
+static int cancel_locked(job *j) {
+  int mine = !api_job_ended(j->row.state) && !j->taken;
+  j->cancel = 1;
+  if (j->ctx) {
+    orb_context_cancel(j->ctx);
+  }
+  j->taken |= mine;
+  return mine;
+}
+
+static store_result end_cancelled(queue *q, job *j) {
+  store_result stored = end_job(q, j, API_JOB_CANCELLED, NULL, NULL, 0);
+  if (stored != STORE_OK) {
+    pthread_mutex_lock(&q->lock);
+    j->taken = 0;
+    pthread_mutex_unlock(&q->lock);
+  }
+  return stored;
+}
+
+static int is_wanted(const queue *q, const job *needed, const job *besides) {
+  int wanted = needed->row.listed || needed->adopters > 0 || !needed->committed;
+  for (const job *j = q->first; j && !wanted; j = j->next) {
+    for (int k = 0; j != besides && k < j->dependency_count; k++) {
+      wanted |= is_for(needed, j->dependencies[k], j->row.owner);
+    }
+  }
+  return wanted;
+}
+
+/* Cancels the embedding jobs that only this job needed. Each is checked and marked under one lock, so a request that
+ * comes later gets a new job. */
+static void cancel_needless(queue *q, job *of) {
+  for (int d = 0; d < of->dependency_count; d++) {
+    pthread_mutex_lock(&q->lock);
+    job *needed = table_find(q, of->dependencies[d], of->row.owner);
+    if (!needed || is_wanted(q, needed, of)) {
+      pthread_mutex_unlock(&q->lock);
+      continue;
+    }
+    needed->refs++;
+    int mine = cancel_locked(needed);
+    pthread_mutex_unlock(&q->lock);
+    if (mine && end_cancelled(q, needed) != STORE_OK) {
+      log_warn("job %s could not be cancelled", needed->row.id);
+    }
+    queue_release(q, needed);
+  }
+}
+
+void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result) {
+  store_result stored = end_job(q, j, state, problem, result, 1);
+  if (stored != STORE_OK) {
+    log_error("the end of job %s could not be stored; the job will run again", j->row.id);
+    pthread_mutex_lock(&q->lock);
+    j->retry_at = orb_clock_ms() + 5000;
+    pthread_mutex_unlock(&q->lock);
+    queue_give_back(q, j);
+    return;
+  }
+  if (state == API_JOB_CANCELLED) {
+    cancel_needless(q, j);
+  }
+  pthread_mutex_lock(&q->lock);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
+}
+
+void queue_give_back(queue *q, job *j) {
+  int claimed = j->running;
+  store_result stored = claimed ? catalogue_job_release(q->cat, j->row.id, j->row.attempt) : STORE_OK;
+  pthread_mutex_lock(&q->lock);
+  if (claimed) {
+    j->row.state = API_JOB_QUEUED;
+    j->row.attempt -= stored == STORE_OK;
+    j->stage[0] = 0;
+    if (stored != STORE_OK) { /* the row still says that it runs: the next claim corrects it */
+      j->retry_at = orb_clock_ms() + 5000;
+    }
+  }
+  schedule_leave(q, j);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
+}
+
+void queue_put_off(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  j->retry_at = orb_clock_ms() + 1000;
+  schedule_leave(q, j);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
+}
+
+store_result queue_cancel(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  int mine = cancel_locked(j);
+  pthread_mutex_unlock(&q->lock);
+  if (!mine) {
+    return STORE_OK; /* the worker that has the job ends it */
+  }
+  store_result stored = end_cancelled(q, j);
+  if (stored == STORE_OK) {
+    cancel_needless(q, j);
+  }
+  return stored;
+}

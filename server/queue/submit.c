@@ -1,0 +1,115 @@
+/* Submitting: a request becomes a job, or joins the owner's unfinished job with the same key. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "faults.h"
+#include "queue/internal.h"
+
+/* The owner's unfinished job with the same key, with a reference; or NULL, and *mine is the number of the owner's
+ * listed jobs. Skips cancelled jobs, also one that is cancelled while this waits for its commit. */
+static job *adopt_locked(queue *q, const queue_request *request, int64_t *mine) {
+  for (;;) {
+    job *j;
+    *mine = 0;
+    for (j = q->first; j && (j->cancel || !is_for(j, request->key, request->owner)); j = j->next) {
+      *mine += request->owner_limit > 0 && j->row.listed && strcmp(j->row.owner, request->owner) == 0;
+    }
+    if (!j) {
+      return NULL;
+    }
+    j->refs++;
+    while (!j->committed && !j->dead) { /* until then, the thread that commits the row reads it without the lock */
+      pthread_cond_wait(&q->committed, &q->lock);
+    }
+    if (!j->cancel || j->dead) {
+      return j;
+    }
+    job_unref(j);
+  }
+}
+
+static queue_result submit_locked(queue *q, const queue_request *request, job **out, int *fresh) {
+  int64_t mine = 0;
+  job *j = adopt_locked(q, request, &mine);
+  if (j) {
+    j->row.priority = request->priority > j->row.priority ? request->priority : j->row.priority;
+    *out = j;
+    return j->dead ? QUEUE_ERROR : QUEUE_OK;
+  }
+  if (q->stopping) {
+    return QUEUE_STOPPING;
+  }
+  if (request->listed && q->unfinished >= q->options.limit) {
+    return QUEUE_FULL;
+  }
+  if (request->owner_limit > 0 && mine >= request->owner_limit) {
+    return QUEUE_QUOTA;
+  }
+  j = calloc(1, sizeof *j);
+  char *text = strdup(request->request);
+  if (!j || !text) {
+    free(j);
+    free(text);
+    return QUEUE_ERROR;
+  }
+  j->refs = 2; /* one of the table, one of the caller */
+  j->row.request = text;
+  j->row.kind = request->kind;
+  j->row.cost = request->cost;
+  j->row.priority = request->priority;
+  j->row.listed = request->listed;
+  j->row.created = unix_ms();
+  api_random_id(j->row.id);
+  copy_text(j->row.key, sizeof j->row.key, request->key);
+  copy_text(j->row.owner, sizeof j->row.owner, request->owner);
+  table_add(q, j);
+  *out = j;
+  *fresh = 1;
+  return QUEUE_OK;
+}
+
+queue_result queue_submit(queue *q, const queue_request *request, job **out, int *fresh) {
+  int is_fresh = 0, make_listed = 0;
+  pthread_mutex_lock(&q->lock);
+  queue_result result = submit_locked(q, request, out, &is_fresh);
+  if (result == QUEUE_OK && !is_fresh && request->listed && !(*out)->row.listed) {
+    make_listed = 1;
+    (*out)->adopters++; /* keeps cancel_needless() away from it */
+  }
+  pthread_mutex_unlock(&q->lock);
+  if (fresh) {
+    *fresh = is_fresh;
+  }
+  if (make_listed) {
+    store_result stored = catalogue_job_list_it(q->cat, (*out)->row.id);
+    pthread_mutex_lock(&q->lock);
+    (*out)->adopters--;
+    (*out)->row.listed |= stored == STORE_OK;
+    pthread_mutex_unlock(&q->lock);
+    result = stored == STORE_OK ? QUEUE_OK : stored == STORE_FULL ? QUEUE_STORE_FULL : QUEUE_ERROR;
+  }
+  if (!is_fresh) {
+    return result;
+  }
+  job *j = *out;
+  FAULT_POINT("before-accept");
+  store_result stored = catalogue_job_insert(q->cat, &j->row);
+  FAULT_POINT("after-accept");
+  pthread_mutex_lock(&q->lock);
+  if (stored == STORE_OK) {
+    j->committed = 1;
+    pthread_cond_signal(&q->work);
+  } else {
+    j->dead = 1;
+    j->row.state = API_JOB_FAILED;
+    table_drop_key(q, j);
+    j->committed = 0;
+    table_ended(q, j);
+    job_unref(j);
+    *out = NULL;
+    result = stored == STORE_FULL ? QUEUE_STORE_FULL : stored == STORE_NOT_FOUND ? QUEUE_MESH_GONE : QUEUE_ERROR;
+  }
+  pthread_cond_broadcast(&q->committed);
+  pthread_mutex_unlock(&q->lock);
+  return result;
+}

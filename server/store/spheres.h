@@ -1,0 +1,27 @@
+/* The file of aligned spheres: all spheres of a supermesh, one a shape, in one object.
+ *
+ * Each is the PLY of orb_sphere_ply_write(): the shape's surface after alignment (vertices that the alignment added
+ * have source −1) and its points on the common sphere. After the last PLY, little-endian:
+ *
+ *   uint64[shapes + 1]  where each begins, and where the last ends
+ *   uint8[32]           SHA-256 of all bytes so far
+ *   uint32 shapes, char[8] "ORBSPHER"
+ */
+#ifndef ORB_STORE_SPHERES_H
+#define ORB_STORE_SPHERES_H
+
+#include "orbmorph/align.h"
+#include "store/objects.h"
+
+/* Writes and publishes the object; *bytes: its size. Holds one sphere in memory at a time. If *status is not ORB_OK,
+ * the context holds the error and the result is STORE_ERROR. */
+store_result spheres_put(objects *store, orb_context *ctx, const char *id, const orb_alignment *alignment,
+                         int64_t *bytes, orb_status *status);
+
+/* The byte range of a shape's sphere in the object. STORE_NOT_FOUND: no object, or no such shape. Blocks. */
+store_result spheres_find(const objects *store, const char *id, int shape, uint64_t *start, uint64_t *length);
+
+/* Verifies the object's hash. STORE_NOT_FOUND: no object. */
+store_result spheres_check(const objects *store, const char *id);
+
+#endif
