@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/landmark_codec.h"
 #include "api/options.h"
-#include "api/supermesh_codec.h"
 
 static int refuse(api_problem *problem, int32_t landmark, int32_t shape, const char *why) {
   if (shape >= 0) {
@@ -180,4 +180,26 @@ void api_landmarks_free(api_landmark_list *list) {
   free(list->items);
   free(list->spots);
   memset(list, 0, sizeof *list);
+}
+
+static void write_triple(api_text *out, const char *name, const double v[3]) {
+  api_json_key(out, name);
+  api_json_open(out, '[');
+  for (int k = 0; k < 3; k++) {
+    api_json_number(out, v[k]);
+  }
+  api_json_close(out, ']');
+}
+
+void api_place_write(api_text *out, const api_place *spot) {
+  api_json_open(out, '{');
+  if (spot->kind == API_PLACE_POINT) {
+    write_triple(out, "point", spot->at);
+  } else {
+    api_json_member_integer(out, spot->kind == API_PLACE_VERTEX ? "vertex" : "triangle", spot->index);
+    if (spot->kind == API_PLACE_TRIANGLE) {
+      write_triple(out, "barycentric", spot->at);
+    }
+  }
+  api_json_close(out, '}');
 }

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "api/options.h"
-#include "api/supermesh_codec.h"
+#include "api/supermesh_request.h"
 
 static const char *const aligns[] = {"pin", "rbf", "rotate", "auto", NULL};
 static const char *const presets[] = {"default", "fast", "quality", NULL};
@@ -180,28 +180,6 @@ int api_supermesh_request_resolve(api_supermesh_request *request, const api_mesh
     }
   }
   return 1;
-}
-
-static void write_triple(api_text *out, const char *name, const double v[3]) {
-  api_json_key(out, name);
-  api_json_open(out, '[');
-  for (int k = 0; k < 3; k++) {
-    api_json_number(out, v[k]);
-  }
-  api_json_close(out, ']');
-}
-
-void api_place_write(api_text *out, const api_place *spot) {
-  api_json_open(out, '{');
-  if (spot->kind == API_PLACE_POINT) {
-    write_triple(out, "point", spot->at);
-  } else {
-    api_json_member_integer(out, spot->kind == API_PLACE_VERTEX ? "vertex" : "triangle", spot->index);
-    if (spot->kind == API_PLACE_TRIANGLE) {
-      write_triple(out, "barycentric", spot->at);
-    }
-  }
-  api_json_close(out, '}');
 }
 
 static void write_landmarks(api_text *out, const api_landmark_list *list) {

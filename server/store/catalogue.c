@@ -1,4 +1,5 @@
 /* The writer thread with group commit, and the pool of readers. */
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +8,8 @@
 
 #include "faults.h"
 #include "log.h"
-#include "store/database.h"
+#include "store/catalogue.h"
+#include "store/transactions.h"
 
 /* A waiting write. That of catalogue_write() lies on its caller's stack. */
 typedef struct pending {

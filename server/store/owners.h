@@ -8,7 +8,8 @@
 #ifndef ORB_STORE_OWNERS_H
 #define ORB_STORE_OWNERS_H
 
-#include "store/database.h"
+#include "store/catalogue.h"
+#include "store/transactions.h"
 
 /* Functions with a database argument run inside a transaction of the writer. */
 /* Adds an owner if absent. json NULL: the owner sees the resource's own description. */

@@ -6,7 +6,8 @@
 #include <string.h>
 
 #include "log.h"
-#include "store/database.h"
+#include "store/catalogue.h"
+#include "store/transactions.h"
 
 /* These two run inside a transaction of the writer. */
 int resource_insert(database *db, const resource *r);                  /* keeps an existing row */

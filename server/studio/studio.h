@@ -6,20 +6,11 @@
 #ifndef ORB_STUDIO_H
 #define ORB_STUDIO_H
 
-#include <stddef.h>
+#include "studio/file.h"
 
 #define ORB_STUDIO_CSP                                                                                  \
   "default-src 'self'; img-src 'self' blob: data:; worker-src 'self' blob:; connect-src 'self' blob:; " \
   "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-
-typedef struct orb_studio_file {
-  const char *path;          /* URL path, without the query */
-  const char *type;          /* Content-Type */
-  const char *etag;          /* strong, with quotes */
-  const char *cache_control; /* immutable under /assets/, whose names contain a hash of the content; else no-cache */
-  const unsigned char *data; /* static, never freed */
-  size_t size;
-} orb_studio_file;
 
 /* The file at a path, or NULL. */
 const orb_studio_file *orb_studio_find(const char *path);

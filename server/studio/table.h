@@ -2,7 +2,7 @@
 #ifndef ORB_STUDIO_TABLE_H
 #define ORB_STUDIO_TABLE_H
 
-#include "studio/studio.h"
+#include "studio/file.h"
 
 extern const orb_studio_file orb_studio_table[];
 extern const size_t orb_studio_count;

@@ -13,9 +13,10 @@
 
 #include <cmocka.h>
 
-#include "store/database.h"
+#include "store/catalogue.h"
 #include "store/owners.h"
 #include "store/tokens.h"
+#include "store/transactions.h"
 #include "support_store.h"
 
 static void reopen(stored *s) {

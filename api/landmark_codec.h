@@ -1,0 +1,42 @@
+/* The JSON of landmarks and places. */
+#ifndef ORB_API_LANDMARK_CODEC_H
+#define ORB_API_LANDMARK_CODEC_H
+
+#include "api/json.h"
+#include "api/problem.h"
+#include "api/text.h"
+#include "orbmorph/mesh.h"
+
+enum { API_SHAPES_MAX = 16, API_LANDMARKS_MAX = 1024 };
+
+typedef enum api_place_kind { API_PLACE_VERTEX, API_PLACE_POINT, API_PLACE_TRIANGLE } api_place_kind;
+
+/* A place as a request names it: a vertex or triangle of the file, or a point in space. */
+typedef struct api_place {
+  api_place_kind kind;
+  int32_t index; /* vertex or triangle number of the file */
+  double at[3];  /* the point, or barycentric coordinates (≥ 0, sum 1) */
+} api_place;
+
+typedef struct api_landmark_spec {
+  char name[ORB_NAME_MAX];
+  int32_t pass;
+  double radius, confidence;
+} api_landmark_spec;
+
+typedef struct api_landmark_list {
+  int32_t count, shape_count;
+  api_landmark_spec *items; /* malloc'ed */
+  api_place *spots;         /* count × shape_count */
+} api_landmark_list;
+
+/* Reads a `landmarks` array, or an object with that member (a landmark file). Returns 1, or 0 with *problem filled. The
+ * caller frees *out in either case. shape_count: 0 takes the number of places of the first landmark. */
+int api_landmarks_read(const cJSON *value, int32_t shape_count, api_landmark_list *out, api_problem *problem);
+
+void api_landmarks_free(api_landmark_list *list);
+
+/* Appends {"vertex":i}, {"point":[…]} or {"triangle":t,"barycentric":[…]}. */
+void api_place_write(api_text *out, const api_place *spot);
+
+#endif

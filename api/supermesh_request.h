@@ -1,0 +1,35 @@
+/* The JSON of a request for a supermesh: its members, its canonical text and id. */
+#ifndef ORB_API_SUPERMESH_REQUEST_H
+#define ORB_API_SUPERMESH_REQUEST_H
+
+#include "api/embedding_codec.h"
+#include "api/landmark_codec.h"
+#include "api/mesh_codec.h"
+#include "orbmorph/merge.h"
+
+typedef struct api_supermesh_request {
+  int32_t shape_count;
+  struct api_shape_spec {
+    char mesh[API_ID_SIZE];
+    char name[ORB_NAME_MAX]; /* empty: the name of the mesh */
+  } shapes[API_SHAPES_MAX];
+  api_landmark_list landmarks;
+  orb_embed_options embedding; /* for every shape */
+  orb_merge_options merge;
+} api_supermesh_request;
+
+/* Returns 1, or 0 with *problem filled. The caller frees *out in either case. */
+int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, api_problem *problem);
+
+void api_supermesh_request_free(api_supermesh_request *request);
+
+/* Fills empty names from the meshes, and refuses landmarks whose vertex or triangle the file does not have. Returns 1,
+ * or 0 with *problem filled. meshes: one summary for each shape. */
+int api_supermesh_request_resolve(api_supermesh_request *request, const api_mesh_summary *meshes, api_problem *problem);
+
+/* Appends the canonical request, which is itself a valid request and reads back as the same one. */
+void api_supermesh_request_write(const api_supermesh_request *request, api_text *out);
+
+int api_supermesh_request_id(const api_supermesh_request *request, char id[API_ID_SIZE]);
+
+#endif

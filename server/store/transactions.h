@@ -1,0 +1,22 @@
+/* Transactions of the catalogue, for the files that define its rows: one writer thread, several readers. */
+#ifndef ORB_STORE_TRANSACTIONS_H
+#define ORB_STORE_TRANSACTIONS_H
+
+#include "store/database.h"
+#include "store/objects.h"
+
+typedef struct catalogue catalogue;
+
+typedef int (*write_fn)(database *db, void *arg); /* returns an SQLite code; SQLITE_CONSTRAINT: a condition failed */
+
+/* Runs fn in the next transaction and waits for its commit. */
+store_result catalogue_write(catalogue *cat, write_fn fn, void *arg);
+
+/* The same without waiting; frees arg with free(). */
+void catalogue_write_later(catalogue *cat, write_fn fn, void *arg);
+
+database *catalogue_reader(catalogue *cat); /* waits until one is free */
+
+void catalogue_reader_done(catalogue *cat, database *db);
+
+#endif
