@@ -3,13 +3,11 @@ import type { Landmark as WireLandmark, Place } from 'orbmorph';
 import { work } from '../mesh/work';
 import type { Spot } from '../mesh/worker';
 import { readyShapes, set, state, toast, wireLandmarks, type Landmark, type Shape } from '../state';
-import { clearResult } from './merge';
 
 let count = 0;
 
-/** Every change goes through here, so that it can be undone. */
+/** Every change goes through here, so that it can be undone. A morph made from the old landmarks stays in view. */
 function change(landmarks: Landmark[], active = state.active) {
-  if (state.result && !state.running) clearResult(true);
   set({ past: [...state.past.slice(-199), state.landmarks], future: [], landmarks, active });
 }
 

@@ -113,9 +113,7 @@ export async function openResult(supermesh: Supermesh, request: SupermeshRequest
   }
 }
 
-/** `stale`: the landmarks have changed, so the result no longer is what "Morph" would give; it stays in view. */
-export function clearResult(stale = false) {
-  if (stale) return;
+export function clearResult() {
   const { result } = state;
   if (!result) return;
   player.unload();
