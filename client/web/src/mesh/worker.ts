@@ -332,9 +332,11 @@ function towardsPlanes(raw: RawMesh, bvh: Bvh, all: Float64Array, stride: number
     const n = faceNormal(raw, hit.triangle);
     const d = [all[i] - c[0], all[i + 1] - c[1], all[i + 2] - c[2]];
     size = Math.max(size, Math.hypot(d[0], d[1], d[2]));
+    // biome-ignore format: turn, shift, scale and right-hand side
     const row = [
       d[1] * n[2] - d[2] * n[1], d[2] * n[0] - d[0] * n[2], d[0] * n[1] - d[1] * n[0],
-      n[0], n[1], n[2], n[0] * d[0] + n[1] * d[1] + n[2] * d[2],
+      n[0], n[1], n[2],
+      n[0] * d[0] + n[1] * d[1] + n[2] * d[2],
       n[0] * (q[0] - all[i]) + n[1] * (q[1] - all[i + 1]) + n[2] * (q[2] - all[i + 2]),
     ];
     for (let r = 0; r < 7; r++) for (let k = 0; k < 8; k++) A[r][k] += row[r] * row[k];
@@ -357,6 +359,7 @@ function towardsPlanes(raw: RawMesh, bvh: Bvh, all: Float64Array, stride: number
   const [ux, uy, uz] = angle > 0 ? [x[0] / angle, x[1] / angle, x[2] / angle] : [1, 0, 0];
   const s = Math.sin(angle);
   const h = 1 - Math.cos(angle);
+  // biome-ignore format: rows of a matrix
   const m = [
     1 - h * (uy * uy + uz * uz), h * ux * uy - s * uz, h * ux * uz + s * uy,
     h * ux * uy + s * uz, 1 - h * (ux * ux + uz * uz), h * uy * uz - s * ux,
@@ -437,6 +440,7 @@ function applyFit(all: Float64Array, from: number[][], to: number[][]): Float64A
     q = next.map((x) => x / l);
   }
   const [w, x, y, z] = q;
+  // biome-ignore format: rows of a matrix
   const m = [
     1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
     2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
