@@ -41,7 +41,9 @@ function licenses(): Plugin {
     apply: 'build',
     generateBundle() {
       const { dependencies } = JSON.parse(read('package.json')) as { dependencies: Record<string, string> };
-      const parts = Object.entries(dependencies).map(([name, version]) => `${name} ${version}\n\n${read(`node_modules/${name}/LICENSE`)}\n`);
+      const parts = Object.entries(dependencies).map(
+        ([name, version]) => `${name} ${version}\n\n${read(`node_modules/${name}/LICENSE`)}\n`,
+      );
       const source = [`orbmorph\n\n${read('../../LICENSE')}\n`, ...parts].join(`\n${'-'.repeat(80)}\n\n`);
       this.emitFile({ type: 'asset', fileName: 'licenses.txt', source });
     },

@@ -12,5 +12,7 @@ if (!existsSync(compiler)) {
 }
 let failed = false;
 for (const folder of ['client/js', 'client/web'])
-  failed = spawnSync(process.execPath, [compiler, '--noEmit', '-p', join(root, folder)], { stdio: 'inherit' }).status !== 0 || failed;
+  failed =
+    spawnSync(process.execPath, [compiler, '--noEmit', '-p', join(root, folder)], { stdio: 'inherit' }).status !== 0 ||
+    failed;
 process.exit(failed ? 1 : 0);

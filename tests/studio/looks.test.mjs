@@ -31,7 +31,10 @@ for (const name of Object.keys(SCENES))
       await mkdir(join(tmpdir(), 'orbmorph-looks'), { recursive: true });
       await writeFile(kept, now);
     }
-    assert.ok(fine, `${(100 * share).toFixed(1)} % of it looks otherwise (mean ${mean.toFixed(1)}${size ? `, sizes ${size}` : ''}); now: ${kept}`);
+    assert.ok(
+      fine,
+      `${(100 * share).toFixed(1)} % of it looks otherwise (mean ${mean.toFixed(1)}${size ? `, sizes ${size}` : ''}); now: ${kept}`,
+    );
   });
 
 test('a picture of something else is told apart', async () => {

@@ -3,7 +3,17 @@ import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { readFile } from 'node:fs/promises';
-import { addFiles, button, difference, openPage, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
+import {
+  addFiles,
+  button,
+  difference,
+  openPage,
+  sample,
+  settled,
+  startBrowser,
+  startDaemon,
+  until,
+} from './support.mjs';
 
 let daemon;
 let browser;
@@ -24,7 +34,13 @@ async function findings(page) {
   const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
   return violations
     .filter((v) => v.impact === 'serious' || v.impact === 'critical')
-    .map((v) => `${v.id}: ${v.nodes.map((n) => `${n.html.slice(0, 120)} ${n.any[0]?.message ?? ''}`).slice(0, 3).join(' | ')}`);
+    .map(
+      (v) =>
+        `${v.id}: ${v.nodes
+          .map((n) => `${n.html.slice(0, 120)} ${n.any[0]?.message ?? ''}`)
+          .slice(0, 3)
+          .join(' | ')}`,
+    );
 }
 
 test('the files have types, validators and a policy without unsafe-inline', async () => {
@@ -57,7 +73,14 @@ test('the licences of what is bundled come with it', async () => {
   assert.equal(file.status, 200);
   assert.match(file.headers.get('content-type'), /^text\/plain/);
   const text = await file.text();
-  for (const words of ['The orbmorph authors', 'three.js authors', 'Jason Miller', 'Inter Project Authors', 'SIL OPEN FONT LICENSE']) assert.ok(text.includes(words), words);
+  for (const words of [
+    'The orbmorph authors',
+    'three.js authors',
+    'Jason Miller',
+    'Inter Project Authors',
+    'SIL OPEN FONT LICENSE',
+  ])
+    assert.ok(text.includes(words), words);
 });
 
 for (const colorScheme of ['light', 'dark'])
@@ -86,7 +109,14 @@ for (const colorScheme of ['light', 'dark'])
     found.server = await findings(page);
     await button(page, 'Close').click();
     await button(page, 'Spheres').click();
-    await until(() => page.getByText('Certified one to one').count().then((n) => n === 2), 'spheres');
+    await until(
+      () =>
+        page
+          .getByText('Certified one to one')
+          .count()
+          .then((n) => n === 2),
+      'spheres',
+    );
     found.spheres = await findings(page);
     assert.deepEqual(found, Object.fromEntries(Object.keys(found).map((key) => [key, []])));
     await done();
@@ -99,7 +129,13 @@ test('every control has a name', async () => {
   for (const tab of ['Shapes', 'Landmarks', 'Spheres']) {
     await button(page, tab, { exact: true }).click();
     const snapshot = await page.locator('body').ariaSnapshot();
-    const nameless = snapshot.split('\n').filter((line) => /^\s*- (button|link|slider|switch|checkbox|textbox|combobox|spinbutton|application)\s*:?\s*(\[[^\]]*\])?$/.test(line));
+    const nameless = snapshot
+      .split('\n')
+      .filter((line) =>
+        /^\s*- (button|link|slider|switch|checkbox|textbox|combobox|spinbutton|application)\s*:?\s*(\[[^\]]*\])?$/.test(
+          line,
+        ),
+      );
     assert.deepEqual(nameless, [], `${tab}:\n${snapshot}`);
   }
   await done();
@@ -124,7 +160,10 @@ test('keys turn the view and change the page; at rest nothing is drawn', async (
   await page.keyboard.press('0');
   await settled(page);
   // the ring of the focus is there now, and little else may differ
-  assert.ok((await difference(browser, still, await page.locator('.stage-area').screenshot())) < 0.01, 'the view is as at first');
+  assert.ok(
+    (await difference(browser, still, await page.locator('.stage-area').screenshot())) < 0.01,
+    'the view is as at first',
+  );
   await page.keyboard.press('2');
   await page.getByRole('heading', { name: 'Landmarks' }).waitFor();
   await page.keyboard.press('1');
@@ -133,19 +172,31 @@ test('keys turn the view and change the page; at rest nothing is drawn', async (
 });
 
 test('a small screen holds everything without scrolling sideways', async () => {
-  const { page, done } = await openPage(browser, daemon.url, { viewport: { width: 360, height: 740 }, hasTouch: true, isMobile: true });
+  const { page, done } = await openPage(browser, daemon.url, {
+    viewport: { width: 360, height: 740 },
+    hasTouch: true,
+    isMobile: true,
+  });
   const fits = () => page.evaluate(() => document.documentElement.scrollWidth <= innerWidth);
   assert.ok(await fits());
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   for (const tab of ['Shapes', 'Landmarks', 'Spheres']) {
     await button(page, tab, { exact: true }).click();
     assert.ok(await fits(), tab);
-    assert.ok(await button(page, /^Morph/).last().isVisible(), tab);
+    assert.ok(
+      await button(page, /^Morph/)
+        .last()
+        .isVisible(),
+      tab,
+    );
   }
   await page.setViewportSize({ width: 740, height: 360 });
   await button(page, 'Shapes', { exact: true }).click();
   assert.ok(await fits(), 'on its side');
   const settings = await page.locator('.inspector .scroll').boundingBox();
-  assert.ok(settings.height > 120 && settings.y + settings.height <= 360, `settings can be read on its side: ${JSON.stringify(settings)}`);
+  assert.ok(
+    settings.height > 120 && settings.y + settings.height <= 360,
+    `settings can be read on its side: ${JSON.stringify(settings)}`,
+  );
   await done();
 });

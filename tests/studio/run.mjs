@@ -8,11 +8,13 @@ const needed = {
   'client/web/node_modules (client/web/build.sh)': here('../../client/web/node_modules/esbuild'),
   'client/web/dist (client/web/build.sh)': here('../../client/web/dist/index.html'),
   'tests/node_modules (npm ci in tests/)': here('../node_modules/playwright-core'),
-  'chromium': process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
+  chromium: process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
 };
 for (const [what, path] of Object.entries(needed))
   if (!existsSync(path)) {
     console.log(`skipped: ${what} is not there`);
     process.exit(77);
   }
-spawn(process.execPath, ['--test', here(process.argv[2])], { stdio: 'inherit' }).on('exit', (code) => process.exit(code ?? 1));
+spawn(process.execPath, ['--test', here(process.argv[2])], { stdio: 'inherit' }).on('exit', (code) =>
+  process.exit(code ?? 1),
+);

@@ -14,10 +14,17 @@ export const sample = (name) => join(root, 'tests/samples', name);
 const PATIENCE = 180_000; // for what never comes
 
 /** `keep`: the folder stays, for a daemon that is started on it later with `data`. */
-export async function startDaemon({ args = [], data = mkdtempSync(join(tmpdir(), 'orbmorph-studio-')), keep = false } = {}) {
-  if (process.env.ORB_STUDIO_URL && !args.length) return { url: process.env.ORB_STUDIO_URL.replace(/\/$/, ''), stop: async () => {} };
+export async function startDaemon({
+  args = [],
+  data = mkdtempSync(join(tmpdir(), 'orbmorph-studio-')),
+  keep = false,
+} = {}) {
+  if (process.env.ORB_STUDIO_URL && !args.length)
+    return { url: process.env.ORB_STUDIO_URL.replace(/\/$/, ''), stop: async () => {} };
   const program = process.env.ORB_DAEMON ?? join(root, 'build/bin/orbmorphd');
-  const child = spawn(program, ['--listen', '127.0.0.1:0', '--data', data, ...args], { stdio: ['ignore', 'pipe', 'pipe'] });
+  const child = spawn(program, ['--listen', '127.0.0.1:0', '--data', data, ...args], {
+    stdio: ['ignore', 'pipe', 'pipe'],
+  });
   let log = '';
   child.stderr.on('data', (text) => (log += text));
   const url = await new Promise((resolve, reject) => {
@@ -55,14 +62,27 @@ export const startBrowser = ({ compositing = 'software' } = {}) =>
   chromium.launch({
     timeout: PATIENCE,
     executablePath: process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
-    args: ['--no-sandbox', '--headless=new', ...(compositing === 'software' ? ['--disable-gpu'] : ['--ignore-gpu-blocklist']), '--use-gl=angle',
-      '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update', '--disable-sync',
-      '--no-first-run'],
+    args: [
+      '--no-sandbox',
+      '--headless=new',
+      ...(compositing === 'software' ? ['--disable-gpu'] : ['--ignore-gpu-blocklist']),
+      '--use-gl=angle',
+      '--use-angle=swiftshader',
+      '--enable-unsafe-swiftshader',
+      '--disable-background-networking',
+      '--disable-component-update',
+      '--disable-sync',
+      '--no-first-run',
+    ],
   });
 
 /** A page of its own context. `refusals`: how many answers of 4xx are expected, which Chromium reports as errors. */
 export async function openPage(browser, url, { hash = '', ...options } = {}) {
-  const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, acceptDownloads: true, ...options });
+  const context = await browser.newContext({
+    viewport: { width: 1280, height: 800 },
+    acceptDownloads: true,
+    ...options,
+  });
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE);
   await page.addInitScript(() => {
@@ -74,12 +94,14 @@ export async function openPage(browser, url, { hash = '', ...options } = {}) {
   });
   const faults = [];
   page.on('console', (message) => {
-    if (message.type() === 'error' && !/status of 4\d\d/.test(message.text())) faults.push(`console: ${message.text()}`);
+    if (message.type() === 'error' && !/status of 4\d\d/.test(message.text()))
+      faults.push(`console: ${message.text()}`);
   });
   page.on('pageerror', (error) => faults.push(`exception: ${error.stack}`));
   page.on('request', (request) => {
     const target = new URL(request.url());
-    if (/^(https?|wss?):$/.test(target.protocol) && target.origin !== new URL(url).origin) faults.push(`outside: ${request.url()}`);
+    if (/^(https?|wss?):$/.test(target.protocol) && target.origin !== new URL(url).origin)
+      faults.push(`outside: ${request.url()}`);
   });
   await page.goto(`${url}/${hash}`);
   return {
@@ -107,45 +129,70 @@ export const button = (page, name, options) => page.getByRole('button', { name, 
 /** Adds files of the samples and waits until they are taken and shown. */
 export async function addFiles(page, ...files) {
   await page.locator('input[type=file]').first().setInputFiles(files);
-  await until(() => page.locator('.card.ready').count().then((n) => n >= files.length), 'the shapes are uploaded');
-  await until(() => page.getByText('reading…').count().then((n) => n === 0), 'the shapes are read');
+  await until(
+    () =>
+      page
+        .locator('.card.ready')
+        .count()
+        .then((n) => n >= files.length),
+    'the shapes are uploaded',
+  );
+  await until(
+    () =>
+      page
+        .getByText('reading…')
+        .count()
+        .then((n) => n === 0),
+    'the shapes are read',
+  );
   await settled(page);
 }
 
 /** The number of pixels of the stage that `test(r, g, b)` accepts, from a screenshot of it. */
 export async function countPixels(page, selector, test) {
   const png = await page.locator(selector).first().screenshot();
-  return page.evaluate(async ({ data, source }) => {
-    const accept = new Function('r', 'g', 'b', `return (${source})(r, g, b)`);
-    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }));
-    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
-    const context = canvas.getContext('2d');
-    context.drawImage(bitmap, 0, 0);
-    const pixels = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
-    let count = 0;
-    for (let i = 0; i < pixels.length; i += 4) if (accept(pixels[i], pixels[i + 1], pixels[i + 2])) count++;
-    return count;
-  }, { data: png.toString('base64'), source: test.toString() });
+  return page.evaluate(
+    async ({ data, source }) => {
+      const accept = new Function('r', 'g', 'b', `return (${source})(r, g, b)`);
+      const bitmap = await createImageBitmap(
+        new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }),
+      );
+      const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+      const context = canvas.getContext('2d');
+      context.drawImage(bitmap, 0, 0);
+      const pixels = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+      let count = 0;
+      for (let i = 0; i < pixels.length; i += 4) if (accept(pixels[i], pixels[i + 1], pixels[i + 2])) count++;
+      return count;
+    },
+    { data: png.toString('base64'), source: test.toString() },
+  );
 }
 
 /** How much two screenshots differ: the share of pixels that do by more than 24 of 255. */
 export async function difference(browser, a, b) {
   const page = await browser.newPage();
   try {
-    return await page.evaluate(async (both) => {
-      const read = async (data) => {
-        const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }));
-        const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-        context.drawImage(bitmap, 0, 0);
-        return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
-      };
-      const [x, y] = [await read(both[0]), await read(both[1])];
-      if (x.length !== y.length) return 1;
-      let count = 0;
-      for (let i = 0; i < x.length; i += 4)
-        if (Math.max(Math.abs(x[i] - y[i]), Math.abs(x[i + 1] - y[i + 1]), Math.abs(x[i + 2] - y[i + 2])) > 24) count++;
-      return count / (x.length / 4);
-    }, [a.toString('base64'), b.toString('base64')]);
+    return await page.evaluate(
+      async (both) => {
+        const read = async (data) => {
+          const bitmap = await createImageBitmap(
+            new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }),
+          );
+          const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+          context.drawImage(bitmap, 0, 0);
+          return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+        };
+        const [x, y] = [await read(both[0]), await read(both[1])];
+        if (x.length !== y.length) return 1;
+        let count = 0;
+        for (let i = 0; i < x.length; i += 4)
+          if (Math.max(Math.abs(x[i] - y[i]), Math.abs(x[i + 1] - y[i + 1]), Math.abs(x[i + 2] - y[i + 2])) > 24)
+            count++;
+        return count / (x.length / 4);
+      },
+      [a.toString('base64'), b.toString('base64')],
+    );
   } finally {
     await page.close();
   }
@@ -161,11 +208,12 @@ export async function clickView(page, index, x, y) {
 export const said = (page) => page.evaluate(() => globalThis.said);
 
 /** From now on the page has these styles as well; its policy forbids those in the page, not this. */
-export const adopt = (page, css) => page.evaluate((text) => {
-  const sheet = new CSSStyleSheet();
-  sheet.replaceSync(text);
-  document.adoptedStyleSheets = [...document.adoptedStyleSheets, sheet];
-}, css);
+export const adopt = (page, css) =>
+  page.evaluate((text) => {
+    const sheet = new CSSStyleSheet();
+    sheet.replaceSync(text);
+    document.adoptedStyleSheets = [...document.adoptedStyleSheets, sheet];
+  }, css);
 
 /** Messages cover no view; they are there all the same. */
 export const hush = (page) => adopt(page, '.toasts { visibility: hidden !important; }');
@@ -176,6 +224,9 @@ export const bytes = (path) => readFileSync(path);
 /** Until the stage has nothing left to draw, and the browser has shown it. */
 export async function settled(page) {
   await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 50)));
-  await until(() => page.evaluate(() => document.querySelector('.stage')?.dataset.busy === undefined), 'the stage has drawn');
+  await until(
+    () => page.evaluate(() => document.querySelector('.stage')?.dataset.busy === undefined),
+    'the stage has drawn',
+  );
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }

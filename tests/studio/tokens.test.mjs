@@ -13,7 +13,15 @@ before(async () => {
   daemon = await startDaemon({ args: ['--auth', 'on'], keep: true });
   await daemon.stop();
   for (const scope of ['read', 'read,write']) {
-    const { stdout } = await promisify(execFile)(daemon.program, ['token', 'add', scope.replace(',', '-'), '--scope', scope, '--data', daemon.data]);
+    const { stdout } = await promisify(execFile)(daemon.program, [
+      'token',
+      'add',
+      scope.replace(',', '-'),
+      '--scope',
+      scope,
+      '--data',
+      daemon.data,
+    ]);
     token[scope] = stdout.trim();
   }
   daemon = await startDaemon({ args: ['--auth', 'on'], data: daemon.data });
@@ -44,15 +52,28 @@ test('with a token the whole way works; it stays in the tab and out of addresses
   const addresses = [];
   page.on('request', (request) => addresses.push(request.url()));
   await give(page, token['read,write']);
-  await until(() => page.getByRole('dialog').count().then((n) => n === 0), 'the dialog is gone');
+  await until(
+    () =>
+      page
+        .getByRole('dialog')
+        .count()
+        .then((n) => n === 0),
+    'the dialog is gone',
+  );
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   await button(page, /^Morph 2 shapes$/).click();
   await until(() => button(page, 'Pause').count(), 'the morph plays');
   await button(page, 'Pause').click();
-  const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name: 'Download GLB' }).click()]);
+  const [download] = await Promise.all([
+    page.waitForEvent('download'),
+    page.getByRole('link', { name: 'Download GLB' }).click(),
+  ]);
   assert.equal((await readFile(await download.path())).toString('latin1', 0, 4), 'glTF');
   await button(page, 'Use it').click();
-  assert.match(await page.getByRole('region', { name: 'curl: code' }).textContent(), /Authorization: Bearer \$ORBMORPH_TOKEN/);
+  assert.match(
+    await page.getByRole('region', { name: 'curl: code' }).textContent(),
+    /Authorization: Bearer \$ORBMORPH_TOKEN/,
+  );
   await page.reload();
   await until(() => button(page, 'Play').count(), 'after a reload it goes on without asking');
   assert.equal(await page.getByRole('dialog').count(), 0);
@@ -68,12 +89,29 @@ test('with a token the whole way works; it stays in the tab and out of addresses
 test('a token that may only read is told so in words', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await give(page, token.read);
-  await until(() => page.getByRole('dialog').count().then((n) => n === 0), 'the dialog is gone');
-  await page.locator('input[type=file]').first().setInputFiles([sample('dog.obj')]);
+  await until(
+    () =>
+      page
+        .getByRole('dialog')
+        .count()
+        .then((n) => n === 0),
+    'the dialog is gone',
+  );
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles([sample('dog.obj')]);
   await page.getByText('The token lacks the scope “write”').waitFor();
   await button(page, 'Token', { exact: true }).click();
   await give(page, token['read,write']);
-  await until(() => page.getByRole('dialog').count().then((n) => n === 0), 'another token is taken');
+  await until(
+    () =>
+      page
+        .getByRole('dialog')
+        .count()
+        .then((n) => n === 0),
+    'another token is taken',
+  );
   await button(page, 'Try again').click();
   await page.locator('.card.ready').waitFor();
   await done();

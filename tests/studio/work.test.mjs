@@ -8,7 +8,23 @@ import { join } from 'node:path';
 import { promisify } from 'node:util';
 import { endless } from '../scenario/support/daemon.mjs';
 import { ball, obj } from '../scenario/support/shapes.mjs';
-import { addFiles, button, clickView, countPixels, difference, hush, json, openPage, root, said, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
+import {
+  addFiles,
+  button,
+  clickView,
+  countPixels,
+  difference,
+  hush,
+  json,
+  openPage,
+  root,
+  said,
+  sample,
+  settled,
+  startBrowser,
+  startDaemon,
+  until,
+} from './support.mjs';
 
 let daemon;
 let browser;
@@ -24,19 +40,37 @@ after(async () => {
 const scrubber = (page) => page.getByRole('slider', { name: 'Along the morph' });
 const time = (page) => scrubber(page).evaluate((input) => Number(input.value));
 const landmarks = (page) => page.locator('.marks li');
-const seek = (page, value) => scrubber(page).evaluate((input, v) => {
-  input.value = String(v);
-  input.dispatchEvent(new Event('input', { bubbles: true }));
-}, value);
+const seek = (page, value) =>
+  scrubber(page).evaluate((input, v) => {
+    input.value = String(v);
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+  }, value);
 
 /** Three landmarks, each on both shapes, at places where both have surface. */
 async function pickThree(page) {
   await button(page, 'Landmarks').click();
-  for (const [n, [x, y]] of [[0.5, 0.5], [0.4, 0.5], [0.45, 0.56]].entries()) {
+  for (const [n, [x, y]] of [
+    [0.5, 0.5],
+    [0.4, 0.5],
+    [0.45, 0.56],
+  ].entries()) {
     await clickView(page, 0, x, y);
-    await until(() => landmarks(page).count().then((count) => count === n + 1), `landmark ${n + 1} on the first shape`);
+    await until(
+      () =>
+        landmarks(page)
+          .count()
+          .then((count) => count === n + 1),
+      `landmark ${n + 1} on the first shape`,
+    );
     await clickView(page, 1, x, y);
-    await until(() => page.locator('.badge.warn').count().then((count) => count === 0), `landmark ${n + 1} on the second shape`);
+    await until(
+      () =>
+        page
+          .locator('.badge.warn')
+          .count()
+          .then((count) => count === 0),
+      `landmark ${n + 1} on the second shape`,
+    );
   }
 }
 
@@ -53,7 +87,14 @@ test('from the empty page to a playing morph in at most five clicks', async () =
     clicks++;
   };
   await click('Try with samples');
-  await until(() => page.locator('.card.ready').count().then((n) => n === 2), 'two samples are taken');
+  await until(
+    () =>
+      page
+        .locator('.card.ready')
+        .count()
+        .then((n) => n === 2),
+    'two samples are taken',
+  );
   await click(/^Morph 2 shapes$/);
   await until(() => button(page, 'Pause').count(), 'the morph plays');
   const seen = new Set();
@@ -91,8 +132,16 @@ test('upload, pick, name, undo, redo, export, import', async () => {
 
   await button(page, 'Clear').click();
   assert.equal(await landmarks(page).count(), 0);
-  await page.getByLabel('Landmark file').setInputFiles({ name: 'l.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(exported)) });
-  await until(() => landmarks(page).count().then((n) => n === 3), 'the landmarks are back');
+  await page
+    .getByLabel('Landmark file')
+    .setInputFiles({ name: 'l.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(exported)) });
+  await until(
+    () =>
+      landmarks(page)
+        .count()
+        .then((n) => n === 3),
+    'the landmarks are back',
+  );
   const [again] = await Promise.all([page.waitForEvent('download'), button(page, 'Export').click()]);
   assert.deepEqual(JSON.parse(await readFile(await again.path(), 'utf8')), exported);
   await done();
@@ -128,7 +177,9 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
   const count = await landmarks(page).count();
   await morph(page);
   await button(page, 'Pause').click();
-  const id = new URLSearchParams((await until(() => page.url().match(/r=[0-9a-f]{64}/), 'the address names the morph'))[0]).get('r');
+  const id = new URLSearchParams(
+    (await until(() => page.url().match(/r=[0-9a-f]{64}/), 'the address names the morph'))[0],
+  ).get('r');
   const supermesh = await json(daemon.url, `/v1/supermeshes/${id}`);
   assert.equal(supermesh.landmarks.length, count);
   assert.equal(supermesh.certificate.landmarks_exact, true);
@@ -147,27 +198,47 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
     input.dispatchEvent(new Event('input', { bubbles: true }));
   });
   await settled(page);
-  assert.ok((await difference(browser, await page.locator('.pane').screenshot(), await page.locator('.pane').screenshot())) === 0);
+  assert.ok(
+    (await difference(browser, await page.locator('.pane').screenshot(), await page.locator('.pane').screenshot())) ===
+      0,
+  );
   assert.equal(await page.getByRole('slider', { name: 'Share of giraffe' }).inputValue(), '0.5');
 
   const plain = await page.locator('.stage-area').screenshot();
   await page.getByRole('switch', { name: 'Wireframe' }).click();
   await settled(page);
-  assert.ok((await difference(browser, plain, await page.locator('.stage-area').screenshot())) > 0.005, 'the wireframe is drawn');
+  assert.ok(
+    (await difference(browser, plain, await page.locator('.stage-area').screenshot())) > 0.005,
+    'the wireframe is drawn',
+  );
   // The common mesh on each shape is shown with its triangles, which the same switch takes away; the error without.
   for (const view of ['Each shape', 'Error']) {
     await page.getByRole('group', { name: 'What is shown' }).getByRole('button', { name: view }).click();
-    if (view === 'Error') await until(() => page.getByText(/largest/).count().then((n) => n > 0), 'the errors are measured');
+    if (view === 'Error')
+      await until(
+        () =>
+          page
+            .getByText(/largest/)
+            .count()
+            .then((n) => n > 0),
+        'the errors are measured',
+      );
     assert.ok(await page.getByRole('switch', { name: 'Wireframe' }).isChecked(), view);
     await settled(page);
     const drawn = await page.locator('.stage-area').screenshot();
     await page.getByRole('switch', { name: 'Wireframe' }).click();
     await settled(page);
-    assert.ok((await difference(browser, drawn, await page.locator('.stage-area').screenshot())) > 0.005, `${view}: the wireframe is gone`);
+    assert.ok(
+      (await difference(browser, drawn, await page.locator('.stage-area').screenshot())) > 0.005,
+      `${view}: the wireframe is gone`,
+    );
   }
   await page.getByRole('group', { name: 'What is shown' }).getByRole('button', { name: 'Morph' }).click();
 
-  const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name: 'Download GLB' }).click()]);
+  const [download] = await Promise.all([
+    page.waitForEvent('download'),
+    page.getByRole('link', { name: 'Download GLB' }).click(),
+  ]);
   assert.match(download.suggestedFilename(), /\.glb$/);
   const glb = await readFile(await download.path());
   assert.equal(glb.toString('latin1', 0, 4), 'glTF');
@@ -192,7 +263,10 @@ test('reload and the address alone bring the same state back', async () => {
   await first.page.reload();
   await until(() => button(first.page, 'Play').count(), 'the morph is back');
   await settled(first.page);
-  await until(async () => (await difference(browser, before, await first.page.locator('.pane').screenshot())) < 0.002, 'it looks the same');
+  await until(
+    async () => (await difference(browser, before, await first.page.locator('.pane').screenshot())) < 0.002,
+    'it looks the same',
+  );
   const address = first.page.url();
   await first.done();
 
@@ -208,8 +282,14 @@ test('a refused mesh says why, shows the rim in red, and can be mended', async (
   const { page, done } = await openPage(browser, daemon.url);
   // the dog without its first 40 faces
   let left = 40;
-  const text = (await readFile(sample('dog.obj'), 'utf8')).split('\n').filter((line) => !(line.startsWith('f ') && left-- > 0)).join('\n');
-  await page.locator('input[type=file]').first().setInputFiles({ name: 'open.obj', mimeType: 'text/plain', buffer: Buffer.from(text) });
+  const text = (await readFile(sample('dog.obj'), 'utf8'))
+    .split('\n')
+    .filter((line) => !(line.startsWith('f ') && left-- > 0))
+    .join('\n');
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles({ name: 'open.obj', mimeType: 'text/plain', buffer: Buffer.from(text) });
   await page.locator('.card.refused').waitFor();
   assert.match(await page.getByRole('alert').innerText(), /hole/);
   await until(() => page.getByText('Shown in red on the model.').count(), 'the rim is found');
@@ -230,10 +310,23 @@ test('loose pieces are shown in red, and the largest can be kept', async () => {
   const known = text.split('\n').filter((line) => line.startsWith('v '));
   const [x, y, z] = [0, 1, 2].map((k) => Math.max(...known.map((line) => Number(line.split(/\s+/)[k + 1]))));
   const size = 0.2 * y;
-  const corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map((c) => `v ${[x, y, z].map((at, k) => at + size * (c[k] - 0.5)).join(' ')}`);
-  const faces = [[1, 3, 2], [1, 2, 4], [2, 3, 4], [1, 4, 3]].map((f) => `f ${f.map((v) => v + known.length).join(' ')}`);
+  const corners = [
+    [0, 0, 0],
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ].map((c) => `v ${[x, y, z].map((at, k) => at + size * (c[k] - 0.5)).join(' ')}`);
+  const faces = [
+    [1, 3, 2],
+    [1, 2, 4],
+    [2, 3, 4],
+    [1, 4, 3],
+  ].map((f) => `f ${f.map((v) => v + known.length).join(' ')}`);
   const both = [...known, ...corners, ...text.split('\n').filter((line) => line.startsWith('f ')), ...faces].join('\n');
-  await page.locator('input[type=file]').first().setInputFiles({ name: 'two.obj', mimeType: 'text/plain', buffer: Buffer.from(`${both}\n`) });
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles({ name: 'two.obj', mimeType: 'text/plain', buffer: Buffer.from(`${both}\n`) });
   await page.locator('.card.refused').waitFor();
   await until(() => page.getByText('Shown in red on the model.').count(), 'the loose piece is found');
   await settled(page);
@@ -273,7 +366,12 @@ test('an upload shows how far it is', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const session = await page.context().newCDPSession(page);
   await session.send('Network.enable');
-  await session.send('Network.emulateNetworkConditions', { offline: false, latency: 0, downloadThroughput: -1, uploadThroughput: 400_000 });
+  await session.send('Network.emulateNetworkConditions', {
+    offline: false,
+    latency: 0,
+    downloadThroughput: -1,
+    uploadThroughput: 400_000,
+  });
   await page.evaluate(() => {
     globalThis.seen = [];
     new MutationObserver(() => {
@@ -284,17 +382,26 @@ test('an upload shows how far it is', async () => {
   });
   const dog = await readFile(sample('dog.obj'), 'utf8');
   const long = Buffer.from(`${dog}\n${`# ${'x'.repeat(98)}\n`.repeat(12_000)}`);
-  await page.locator('input[type=file]').first().setInputFiles({ name: 'dog.obj', mimeType: 'text/plain', buffer: long });
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles({ name: 'dog.obj', mimeType: 'text/plain', buffer: long });
   await page.locator('.card.ready').waitFor();
   const seen = await page.evaluate(() => globalThis.seen);
   assert.ok(seen.length >= 3, `shares seen: ${seen}`);
-  assert.deepEqual(seen, [...seen].sort((a, b) => a - b));
+  assert.deepEqual(
+    seen,
+    [...seen].sort((a, b) => a - b),
+  );
   await done();
 });
 
 test('no mesh at all is refused in words', async () => {
   const { page, done } = await openPage(browser, daemon.url);
-  await page.locator('input[type=file]').first().setInputFiles({ name: 'letter.obj', mimeType: 'text/plain', buffer: Buffer.from('Dear Sir or Madam\n') });
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles({ name: 'letter.obj', mimeType: 'text/plain', buffer: Buffer.from('Dear Sir or Madam\n') });
   await page.locator('.card.refused, .card.failed').waitFor();
   assert.ok((await page.getByRole('alert').first().innerText()).length > 20);
   await done();
@@ -303,8 +410,12 @@ test('no mesh at all is refused in words', async () => {
 test('a morph is cancelled before it is done', async () => {
   // The only worker has something else to do: the morph does not end before it is cancelled.
   const busy = await startDaemon({ args: ['--workers', '1'] });
-  const post = async (path, body) => (await fetch(busy.url + path, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body })).json();
-  const other = await post('/v1/embeddings', JSON.stringify({ mesh: (await post('/v1/meshes', obj(ball(5)))).id, ...endless }));
+  const post = async (path, body) =>
+    (await fetch(busy.url + path, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body })).json();
+  const other = await post(
+    '/v1/embeddings',
+    JSON.stringify({ mesh: (await post('/v1/meshes', obj(ball(5)))).id, ...endless }),
+  );
   const { page, done } = await openPage(browser, busy.url);
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await page.getByText('Options', { exact: true }).click();
@@ -340,7 +451,10 @@ test('a job goes on when the page is closed, and is found again', async () => {
   const first = await openPage(browser, daemon.url);
   await addFiles(first.page, sample('giraffe.off'), sample('elephant.ply'));
   await button(first.page, /^Morph 2 shapes$/).click();
-  const address = await until(() => (/j=[^&]+/.test(first.page.url()) || /r=/.test(first.page.url())) && first.page.url(), 'the address names the job');
+  const address = await until(
+    () => (/j=[^&]+/.test(first.page.url()) || /r=/.test(first.page.url())) && first.page.url(),
+    'the address names the job',
+  );
   await first.done();
   const second = await openPage(browser, daemon.url, { hash: new URL(address).hash });
   await until(() => button(second.page, /^(Play|Pause)$/).count(), 'the morph is there');
@@ -364,7 +478,14 @@ test('spheres before and after the alignment: certified, painted, measured', asy
   await until(() => landmarks(page).count(), 'landmarks');
   const count = await landmarks(page).count();
   await button(page, 'Spheres').click();
-  await until(() => page.getByText('Certified one to one').count().then((n) => n === 2), 'both are embedded');
+  await until(
+    () =>
+      page
+        .getByText('Certified one to one')
+        .count()
+        .then((n) => n === 2),
+    'both are embedded',
+  );
   assert.ok(await button(page, 'After', { exact: true }).isDisabled(), 'there is no morph yet');
   const shots = [];
   for (const name of ['Normals', 'Checkerboard', 'Stretch', 'Areas']) {
@@ -372,36 +493,74 @@ test('spheres before and after the alignment: certified, painted, measured', asy
     await settled(page);
     shots.push(await page.locator('.stage-area').screenshot());
   }
-  for (let i = 1; i < shots.length; i++) assert.ok((await difference(browser, shots[i - 1], shots[i])) > 0.03, `paint ${i} differs from the one before`);
+  for (let i = 1; i < shots.length; i++)
+    assert.ok((await difference(browser, shots[i - 1], shots[i])) > 0.03, `paint ${i} differs from the one before`);
   assert.equal(await page.getByRole('img', { name: /^Histogram/ }).count(), 2);
 
   // Where each landmark is on the two balls, in pixels of its own view.
-  const spots = () => page.evaluate(() => [...document.querySelectorAll('.pane-view:has(.marker.small)')].map((view) => {
-    const box = view.getBoundingClientRect();
-    return [...view.querySelectorAll('.marker.small')].map((mark) => {
-      const m = mark.getBoundingClientRect();
-      return [m.x + m.width / 2 - box.x, m.y + m.height / 2 - box.y];
-    });
-  }));
+  const spots = () =>
+    page.evaluate(() =>
+      [...document.querySelectorAll('.pane-view:has(.marker.small)')].map((view) => {
+        const box = view.getBoundingClientRect();
+        return [...view.querySelectorAll('.marker.small')].map((mark) => {
+          const m = mark.getBoundingClientRect();
+          return [m.x + m.width / 2 - box.x, m.y + m.height / 2 - box.y];
+        });
+      }),
+    );
   const gap = ([a, b]) => Math.max(...a.map((p, i) => Math.hypot(p[0] - b[i][0], p[1] - b[i][1])));
   const before = await spots();
-  assert.deepEqual(before.map((list) => list.length), [count, count]);
+  assert.deepEqual(
+    before.map((list) => list.length),
+    [count, count],
+  );
   assert.ok(gap(before) > 20, 'by themselves the spheres do not correspond');
   await morph(page);
   await button(page, 'Pause').click();
   await button(page, 'Spheres').click();
   await button(page, 'After', { exact: true }).click();
-  await until(() => page.getByText('on the common sphere').count().then((n) => n === 2), 'the aligned spheres');
-  await until(() => page.locator('.marker.small').count().then((n) => n === 2 * count), 'with their landmarks');
+  await until(
+    () =>
+      page
+        .getByText('on the common sphere')
+        .count()
+        .then((n) => n === 2),
+    'the aligned spheres',
+  );
+  await until(
+    () =>
+      page
+        .locator('.marker.small')
+        .count()
+        .then((n) => n === 2 * count),
+    'with their landmarks',
+  );
   await settled(page);
   assert.ok(gap(await spots()) < 1, 'after the alignment landmarks coincide');
   await until(() => /side=after/.test(page.url()), 'the address says so');
   const shown = await page.locator('.pane').nth(1).screenshot();
   await page.reload();
-  await until(() => page.getByText('on the common sphere').count().then((n) => n === 2), 'also after a reload');
-  await until(() => page.locator('.marker.small').count().then((n) => n === 2 * count), 'with their landmarks');
+  await until(
+    () =>
+      page
+        .getByText('on the common sphere')
+        .count()
+        .then((n) => n === 2),
+    'also after a reload',
+  );
+  await until(
+    () =>
+      page
+        .locator('.marker.small')
+        .count()
+        .then((n) => n === 2 * count),
+    'with their landmarks',
+  );
   await settled(page);
-  await until(async () => (await difference(browser, shown, await page.locator('.pane').nth(1).screenshot())) < 0.01, 'it looks the same');
+  await until(
+    async () => (await difference(browser, shown, await page.locator('.pane').nth(1).screenshot())) < 0.01,
+    'it looks the same',
+  );
   await done();
 });
 
@@ -431,7 +590,14 @@ test('the lines and pages that are offered show this very morph', async () => {
   other.on('pageerror', (error) => faults.push(error.stack));
   const site = `${daemon.url}/page-of-somebody`;
   await context.route('https://cdn.jsdelivr.net/npm/three@*/**', (route) =>
-    route.fulfill({ path: join(root, 'client/web/node_modules/three', new URL(route.request().url()).pathname.replace(/^\/npm\/three@[^/]+\//, '')) }));
+    route.fulfill({
+      path: join(
+        root,
+        'client/web/node_modules/three',
+        new URL(route.request().url()).pathname.replace(/^\/npm\/three@[^/]+\//, ''),
+      ),
+    }),
+  );
   await context.route(site, (route) => route.fulfill({ contentType: 'text/html', body: html }));
   await other.goto(site);
   await other.locator('canvas').waitFor();
@@ -452,7 +618,14 @@ test('the error of the common mesh is measured and below the tolerance', async (
   await button(page, 'As in the files').click();
   await morph(page);
   await button(page, 'Error').click();
-  await until(() => page.locator('.pane .legend').count().then((n) => n === 2), 'both shapes are measured');
+  await until(
+    () =>
+      page
+        .locator('.pane .legend')
+        .count()
+        .then((n) => n === 2),
+    'both shapes are measured',
+  );
   const captions = await page.locator('.pane .caption').allInnerTexts();
   for (const text of captions) {
     const percent = Number(text.match(/largest ([\d.e+-]+) %/)[1]);

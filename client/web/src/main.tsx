@@ -9,5 +9,6 @@ import { toast } from './state';
 
 applyTheme();
 render(<App />, document.getElementById('app')!);
-stage.onFailed = () => toast('This browser shows no WebGL, so shapes cannot be drawn. Uploading and morphing work all the same.', 'error');
+stage.onFailed = () =>
+  toast('This browser shows no WebGL, so shapes cannot be drawn. Uploading and morphing work all the same.', 'error');
 void enter().then(restore).finally(keepUrl);

@@ -79,7 +79,12 @@ class Player {
     const weights = new Array<number>(result.data.names.length).fill(0);
     part.forEach((x, i) => result.data.shapes[i]?.forEach((w, k) => (weights[k] += x * w)));
     this.weigh(weights);
-    result.main.color(mixed(part.map((_, i) => tint(i)), part));
+    result.main.color(
+      mixed(
+        part.map((_, i) => tint(i)),
+        part,
+      ),
+    );
     set({ mix: shares });
   }
 

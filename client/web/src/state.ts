@@ -58,7 +58,13 @@ export interface Options {
 }
 
 export const DEFAULTS: Options = {
-  align: 'default', remesh: 'adaptive', tolerance: 0.001, maxTriangles: null, path: 'linear', fit: 'similarity', repair: 'safe',
+  align: 'default',
+  remesh: 'adaptive',
+  tolerance: 0.001,
+  maxTriangles: null,
+  path: 'linear',
+  fit: 'similarity',
+  repair: 'safe',
 };
 
 export interface Running {
@@ -109,9 +115,31 @@ export interface State {
 }
 
 export const state: State = {
-  tab: 'shapes', shapes: [], landmarks: [], active: null, past: [], future: [], options: { ...DEFAULTS },
-  running: null, problem: null, loading: null, result: null, playing: false, mix: null, show: 'morph', wire: false, meshWire: true, linked: true,
-  paint: 'direction', side: 'before', token: 'none', asking: null, drawer: null, server: null, toasts: [], dragging: false,
+  tab: 'shapes',
+  shapes: [],
+  landmarks: [],
+  active: null,
+  past: [],
+  future: [],
+  options: { ...DEFAULTS },
+  running: null,
+  problem: null,
+  loading: null,
+  result: null,
+  playing: false,
+  mix: null,
+  show: 'morph',
+  wire: false,
+  meshWire: true,
+  linked: true,
+  paint: 'direction',
+  side: 'before',
+  token: 'none',
+  asking: null,
+  drawer: null,
+  server: null,
+  toasts: [],
+  dragging: false,
 };
 
 export const client = new Orbmorph({ server: '' });
@@ -156,7 +184,20 @@ const TINTS = ['#f0b79a', '#a8c3ee', '#b4d3a6', '#ecd08a', '#d9b3dc', '#93d0cb',
 export const tint = (index: number) => TINTS[index % TINTS.length];
 
 /** Colours of the landmarks, told apart at a glance; the number says the same. */
-const HUES = ['#d6336c', '#1971c2', '#2b7a3a', '#c2410c', '#7048e8', '#0b7285', '#a61e4d', '#4d7c0f', '#364fc7', '#c92a2a', '#087057', '#862e9c'];
+const HUES = [
+  '#d6336c',
+  '#1971c2',
+  '#2b7a3a',
+  '#c2410c',
+  '#7048e8',
+  '#0b7285',
+  '#a61e4d',
+  '#4d7c0f',
+  '#364fc7',
+  '#c92a2a',
+  '#087057',
+  '#862e9c',
+];
 export const hue = (index: number) => HUES[index % HUES.length];
 
 /** The landmarks that are set on every shape, as the daemon takes them. */

@@ -30,7 +30,8 @@ function decodePlace(text: string): Place | undefined {
   if (!text) return undefined;
   const values = text.replace(/^t/, '').split('_').map(Number);
   if (!values.every(Number.isFinite)) return undefined;
-  if (text.startsWith('t') && values.length === 4) return { triangle: values[0], barycentric: [values[1], values[2], values[3]] };
+  if (text.startsWith('t') && values.length === 4)
+    return { triangle: values[0], barycentric: [values[1], values[2], values[3]] };
   if (values.length === 3) return { point: [values[0], values[1], values[2]] };
   return values.length === 1 ? { vertex: values[0] } : undefined;
 }
@@ -63,9 +64,15 @@ function encode(): string {
   put('r', state.result?.supermesh.id ?? '');
   put('j', state.running?.job?.id ?? '');
   if (state.result && !state.playing) put('t', player.time.toFixed(3));
-  put('l', state.landmarks
-    .map((l) => `${shapes.map((s) => encodePlace(l.at[s.key]?.place)).join(':')}${l.name ? `~${encodeURIComponent(l.name)}` : ''}`)
-    .join(';'));
+  put(
+    'l',
+    state.landmarks
+      .map(
+        (l) =>
+          `${shapes.map((s) => encodePlace(l.at[s.key]?.place)).join(':')}${l.name ? `~${encodeURIComponent(l.name)}` : ''}`,
+      )
+      .join(';'),
+  );
   if (encodeOptions(state.options) !== encodeOptions(DEFAULTS)) put('o', encodeOptions(state.options));
   if (state.paint !== 'direction') put('paint', state.paint);
   if (state.side !== 'before') put('side', state.side);
@@ -107,12 +114,22 @@ export async function restore() {
       await Promise.all(meshes.flatMap((m) => (m.status === 'fulfilled' ? [addFromServer(m.value)] : [])));
       set({ loading: null });
       const lost = meshes.filter((m) => m.status === 'rejected').length;
-      if (lost) set({ problem: { title: 'Not on the server any more', detail: `${lost} of ${ids.length} shapes of this address are gone. Add the files again.`, facts: null } });
+      if (lost)
+        set({
+          problem: {
+            title: 'Not on the server any more',
+            detail: `${lost} of ${ids.length} shapes of this address are gone. Add the files again.`,
+            facts: null,
+          },
+        });
     }
-    const landmarks = (query.get('l') ?? '').split(';').filter(Boolean).map((text) => {
-      const [places, name = ''] = text.split('~');
-      return { name, at: places.split(':').map(decodePlace) as Place[] };
-    });
+    const landmarks = (query.get('l') ?? '')
+      .split(';')
+      .filter(Boolean)
+      .map((text) => {
+        const [places, name = ''] = text.split('~');
+        return { name, at: places.split(':').map(decodePlace) as Place[] };
+      });
     if (landmarks.length) await takeLandmarks(landmarks, { undoable: false });
     const paint = PAINTS.find((name) => name === query.get('paint'));
     if (paint) setPaint(paint);

@@ -42,7 +42,11 @@ export function placeOn(shape: Shape, spot: Spot) {
 
 export async function moveOn(id: number, shape: Shape, origin: number[], direction: number[]) {
   const spot = await work('pick', shape.key, origin, direction);
-  if (spot) change(state.landmarks.map((l) => (l.id === id ? { ...l, at: { ...l.at, [shape.key]: spot } } : l)), id);
+  if (spot)
+    change(
+      state.landmarks.map((l) => (l.id === id ? { ...l, at: { ...l.at, [shape.key]: spot } } : l)),
+      id,
+    );
 }
 
 export function renameLandmark(id: number, name: string) {
@@ -50,7 +54,10 @@ export function renameLandmark(id: number, name: string) {
 }
 
 export function removeLandmark(id: number) {
-  change(state.landmarks.filter((l) => l.id !== id), state.active === id ? null : state.active);
+  change(
+    state.landmarks.filter((l) => l.id !== id),
+    state.active === id ? null : state.active,
+  );
 }
 
 export function clearLandmarks() {
@@ -65,13 +72,21 @@ export function forgetShape(key: string) {
 }
 
 /** Replaces the landmarks by those of a file or of an answer. -> how many were taken */
-export async function takeLandmarks(list: Pick<WireLandmark, 'name' | 'at'>[], { undoable = true, snap = false } = {}): Promise<number> {
+export async function takeLandmarks(
+  list: Pick<WireLandmark, 'name' | 'at'>[],
+  { undoable = true, snap = false } = {},
+): Promise<number> {
   const shapes = readyShapes();
   const made: Landmark[] = list.map((l) => ({ id: ++count, name: l.name ?? '', at: {} }));
   await Promise.all(
     shapes.map(async (shape, index) => {
       const wanted = list.map((l, row) => ({ row, place: l.at?.[index] })).filter((w) => w.place);
-      const spots = await work('locate', shape.key, wanted.map((w) => w.place as Place), snap);
+      const spots = await work(
+        'locate',
+        shape.key,
+        wanted.map((w) => w.place as Place),
+        snap,
+      );
       wanted.forEach((w, i) => {
         if (spots[i]) made[w.row].at[shape.key] = spots[i]!;
       });
@@ -89,14 +104,19 @@ export async function importLandmarks(file: File) {
     const list = Array.isArray(content) ? content : content.landmarks;
     if (!Array.isArray(list)) throw new Error('It holds no array of landmarks.');
     const taken = await takeLandmarks(list);
-    toast(taken === list.length ? `${taken} landmarks read.` : `${taken} of ${list.length} landmarks fit these shapes.`);
+    toast(
+      taken === list.length ? `${taken} landmarks read.` : `${taken} of ${list.length} landmarks fit these shapes.`,
+    );
   } catch (error) {
     toast(`${file.name} is no landmark file. ${(error as Error).message}`, 'error');
   }
 }
 
 export function exportLandmarks() {
-  save(new Blob([JSON.stringify({ landmarks: wireLandmarks() }, null, 2)], { type: 'application/json' }), 'landmarks.json');
+  save(
+    new Blob([JSON.stringify({ landmarks: wireLandmarks() }, null, 2)], { type: 'application/json' }),
+    'landmarks.json',
+  );
 }
 
 export function save(blob: Blob, name: string) {

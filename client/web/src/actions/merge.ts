@@ -27,8 +27,12 @@ export async function startMerge(purpose: Running['purpose'] = 'morph') {
   const running: Running = { purpose, job: null, abort: new AbortController() };
   set({ running, problem: null });
   const request = buildRequest(purpose === 'find');
-  await follow(running, () =>
-    client.merge(request, { signal: running.abort.signal, onJob: progress(running), onProgress: progress(running) }), request);
+  await follow(
+    running,
+    () =>
+      client.merge(request, { signal: running.abort.signal, onJob: progress(running), onProgress: progress(running) }),
+    request,
+  );
 }
 
 /** Goes on with a job that an earlier visit began. */
@@ -36,14 +40,18 @@ export async function resumeJob(id: string) {
   const running: Running = { purpose: 'morph', job: null, abort: new AbortController() };
   set({ running });
   const { signal } = running.abort;
-  await follow(running, async () => {
-    try {
-      return await client.result<Supermesh>(id, { signal, onProgress: progress(running) });
-    } catch (error) {
-      if (signal.aborted) await client.cancelJob(id).catch(() => {});
-      throw error;
-    }
-  }, null);
+  await follow(
+    running,
+    async () => {
+      try {
+        return await client.result<Supermesh>(id, { signal, onProgress: progress(running) });
+      } catch (error) {
+        if (signal.aborted) await client.cancelJob(id).catch(() => {});
+        throw error;
+      }
+    },
+    null,
+  );
 }
 
 const progress = (running: Running) => (job: Job) => {
@@ -71,7 +79,8 @@ async function follow(running: Running, get: () => Promise<Supermesh>, request: 
 function tell(error: unknown) {
   if (error instanceof ProblemError && (error.status === 401 || error.status === 403))
     return { title: 'Not with this token', detail: explain(error), facts: null };
-  if (error instanceof ProblemError) return { title: error.title || 'The daemon refused', detail: error.detail, facts: error.problem };
+  if (error instanceof ProblemError)
+    return { title: error.title || 'The daemon refused', detail: error.detail, facts: error.problem };
   return { title: 'That did not work', detail: (error as Error).message, facts: null };
 }
 
@@ -80,7 +89,9 @@ const PROPOSALS = 12;
 /** The landmarks that the answer names, or else well-spread places of the correspondence it stands for. */
 async function takeFound(supermesh: Supermesh) {
   const named = (supermesh.landmarks ?? []).filter((l) => 'at' in l);
-  const points = named.length ? [] : await work('propose', await client.asset(supermesh.id), supermesh.shapes.length, PROPOSALS);
+  const points = named.length
+    ? []
+    : await work('propose', await client.asset(supermesh.id), supermesh.shapes.length, PROPOSALS);
   const found = named.length ? named : points.map((at) => ({ name: '', at: at.map((point) => ({ point })) }));
   const taken = await takeLandmarks(found, { snap: true });
   set({ tab: 'landmarks' });
@@ -99,8 +110,18 @@ export async function openResult(supermesh: Supermesh, request: SupermeshRequest
     clearResult();
     const models = morphModels(data, supermesh.shapes.length + 1, tint(0));
     const result: Result = {
-      supermesh, request, main: models[0], each: models.slice(1),
-      data: { times: data.times, weights: data.weights, shapes: data.shapes, names: data.names, vertices: data.vertices, triangles: data.triangles },
+      supermesh,
+      request,
+      main: models[0],
+      each: models.slice(1),
+      data: {
+        times: data.times,
+        weights: data.weights,
+        shapes: data.shapes,
+        names: data.names,
+        vertices: data.vertices,
+        triangles: data.triangles,
+      },
     };
     result.each.forEach((model, i) => {
       model.weights(result.data.shapes[i] ?? []);
@@ -132,7 +153,8 @@ export async function measureErrors() {
   const shapes = readyShapes();
   const fit = (result.supermesh.request ?? result.request)?.asset?.fit ?? 'none';
   for (const [index, shape] of shapes.entries()) {
-    if (shape.error?.result === result.supermesh.id || shape.mesh?.id !== result.supermesh.shapes[index]?.mesh) continue;
+    if (shape.error?.result === result.supermesh.id || shape.mesh?.id !== result.supermesh.shapes[index]?.mesh)
+      continue;
     set({ loading: `Measuring the error on ${shape.name}` });
     try {
       const found = await work('error', shape.key, result.supermesh.id, index, index > 0 && fit !== 'none');

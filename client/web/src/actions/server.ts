@@ -15,7 +15,9 @@ export async function loadServer() {
       client.page('supermeshes', { limit: 100 }),
       client.page('jobs', { limit: 50 }),
     ]);
-    set({ server: { meshes: meshes.items, supermeshes: supermeshes.items, jobs: jobs.items, message: null, loading: false } });
+    set({
+      server: { meshes: meshes.items, supermeshes: supermeshes.items, jobs: jobs.items, message: null, loading: false },
+    });
   } catch (error) {
     set({ server: { meshes: [], supermeshes: [], jobs: [], message: explain(error), loading: false } });
   }

@@ -32,7 +32,10 @@ async function draw(shape: Shape, buffer: ArrayBuffer) {
     const display = await work('open', shape.key, buffer);
     if (!shapeOf(shape.key)) return void work('close', shape.key);
     const model = shapeModel(display, tint(state.shapes.indexOf(shape)));
-    patch(shape, { model, facts: { vertices: display.vertices, triangles: display.triangles, format: display.format } });
+    patch(shape, {
+      model,
+      facts: { vertices: display.vertices, triangles: display.triangles, format: display.format },
+    });
   } catch (error) {
     patch(shape, { message: (error as Error).message });
   }
@@ -57,8 +60,10 @@ async function send(shape: Shape, repair = state.options.repair) {
   }
 }
 
-const numbers = (value: unknown): number[] => (Array.isArray(value) ? value.flat(2).filter((x) => typeof x === 'number') : []);
-const pairs = (value: unknown): number[][] => (Array.isArray(value) ? value.filter((x) => Array.isArray(x) && x.length === 2) : []);
+const numbers = (value: unknown): number[] =>
+  Array.isArray(value) ? value.flat(2).filter((x) => typeof x === 'number') : [];
+const pairs = (value: unknown): number[][] =>
+  Array.isArray(value) ? value.filter((x) => Array.isArray(x) && x.length === 2) : [];
 
 async function showFaults(shape: Shape, error: ProblemError) {
   const { problem } = error;
@@ -79,7 +84,10 @@ export async function addFiles(files: Iterable<File>) {
     list.map(async (file) => {
       const shape = create(file.name.replace(/\.[A-Za-z0-9]{1,5}$/, ''));
       shape.file = file;
-      drawn.set(shape.key, file.arrayBuffer().then((buffer) => draw(shape, buffer)));
+      drawn.set(
+        shape.key,
+        file.arrayBuffer().then((buffer) => draw(shape, buffer)),
+      );
       await send(shape);
     }),
   );
@@ -148,6 +156,7 @@ export function mend(key: string, repair: string) {
 export function remedies(problem: Problem): { repair: string; label: string }[] {
   const kind = problem.type.split('/').pop();
   if (kind === 'not-closed') return [{ repair: 'safe,fill_holes', label: 'Fill the holes' }];
-  if (kind === 'not-connected' || (kind === 'not-manifold' && problem.components)) return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }];
+  if (kind === 'not-connected' || (kind === 'not-manifold' && problem.components))
+    return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }];
   return [];
 }

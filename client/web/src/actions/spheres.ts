@@ -12,13 +12,16 @@ import { stage } from '../view/shared';
 import type { Paint } from '../view/colors';
 
 /** The sphere that is shown of a shape. */
-export const sphereOf = (shape: Shape): SphereState | undefined => (state.side === 'after' ? shape.aligned : shape.sphere);
+export const sphereOf = (shape: Shape): SphereState | undefined =>
+  state.side === 'after' ? shape.aligned : shape.sphere;
 
 /** Whether the morph is of these shapes and says where its spheres are. */
-export const canAlign = () => !!state.result && readyShapes().every((shape, i) => {
-  const of = state.result!.supermesh.shapes[i];
-  return of?.mesh === shape.mesh!.id && !!of.sphere;
-});
+export const canAlign = () =>
+  !!state.result &&
+  readyShapes().every((shape, i) => {
+    const of = state.result!.supermesh.shapes[i];
+    return of?.mesh === shape.mesh!.id && !!of.sphere;
+  });
 
 export function showSide(side: 'before' | 'after') {
   set({ side });
@@ -30,13 +33,16 @@ export async function loadSpheres() {
   if (side === 'after' && !canAlign()) return set({ side: 'before' });
   // the embeddings first: their measures give the ranges of the colours and the histograms, on both sides
   await Promise.all(readyShapes().map((shape) => bring(shape, 'before', () => loadEmbedded(shape))));
-  if (side === 'after') await Promise.all(readyShapes().map((shape, i) => {
-    if (shape.aligned?.result !== result!.supermesh.id) {
-      dropSphere(shape, side);
-      shape.aligned = undefined;
-    }
-    return bring(shape, side, () => loadAligned(shape, i));
-  }));
+  if (side === 'after')
+    await Promise.all(
+      readyShapes().map((shape, i) => {
+        if (shape.aligned?.result !== result!.supermesh.id) {
+          dropSphere(shape, side);
+          shape.aligned = undefined;
+        }
+        return bring(shape, side, () => loadAligned(shape, i));
+      }),
+    );
   for (const shape of state.shapes) for (const sphere of [shape.sphere, shape.aligned]) paintSphere(sphere);
 }
 
@@ -84,7 +90,13 @@ async function load(shape: Shape, side: 'before' | 'after', sphere: SphereState,
   try {
     const data = await work('sphere', `${shape.key} ${side}`, await fetch());
     const models = sphereModels(data);
-    Object.assign(sphere, { ...models, values: data.values, normals: data.surface.normal, places: data.sphere, state: 'ready' });
+    Object.assign(sphere, {
+      ...models,
+      values: data.values,
+      normals: data.surface.normal,
+      places: data.sphere,
+      state: 'ready',
+    });
     paintSphere(sphere);
     await placeLandmarks(shape, side);
   } catch (error) {
@@ -98,7 +110,11 @@ async function placeLandmarks(shape: Shape, side: 'before' | 'after') {
   const sphere = side === 'after' ? shape.aligned : shape.sphere;
   const here = state.landmarks.filter((landmark) => landmark.at[shape.key]);
   if (sphere?.state !== 'ready') return;
-  const spots = await work('sphereSpots', `${shape.key} ${side}`, here.map((landmark) => landmark.at[shape.key].position));
+  const spots = await work(
+    'sphereSpots',
+    `${shape.key} ${side}`,
+    here.map((landmark) => landmark.at[shape.key].position),
+  );
   sphere.spots = new Map(here.map((landmark, i) => [landmark.id, spots[i]]));
   set();
 }

@@ -74,7 +74,9 @@ export const ask = (reason: string | null = null) => set({ asking: { reason } })
 const isAsking = (error: unknown) => error instanceof ProblemError && error.status === 401;
 
 const NEEDS: Record<string, string> = {
-  read: 'see what is on the server', write: 'upload, morph, cancel or delete', admin: 'do this',
+  read: 'see what is on the server',
+  write: 'upload, morph, cancel or delete',
+  admin: 'do this',
 };
 
 /** What to say of an error; asks for a token where that is what is missing. */
@@ -89,4 +91,3 @@ export function explain(error: unknown): string {
   }
   return error instanceof ProblemError ? error.detail || error.title : (error as Error).message;
 }
-

@@ -55,7 +55,11 @@ export function weld(positions: Float64Array): { place: Uint32Array; count: numb
         place[v] = count++;
         break;
       }
-      if (positions[3 * other] === positions[3 * v] && positions[3 * other + 1] === positions[3 * v + 1] && positions[3 * other + 2] === positions[3 * v + 2]) {
+      if (
+        positions[3 * other] === positions[3 * v] &&
+        positions[3 * other + 1] === positions[3 * v + 1] &&
+        positions[3 * other + 2] === positions[3 * v + 2]
+      ) {
         place[v] = place[other];
         break;
       }
@@ -115,7 +119,8 @@ export function buildDisplay(raw: RawMesh, creaseDegrees = 48): Display {
       const l = length[t] || 1;
       let group = -1;
       for (let g = start; g < n; g++) {
-        const d = normal[3 * g] * face[3 * t] + normal[3 * g + 1] * face[3 * t + 1] + normal[3 * g + 2] * face[3 * t + 2];
+        const d =
+          normal[3 * g] * face[3 * t] + normal[3 * g + 1] * face[3 * t + 1] + normal[3 * g + 2] * face[3 * t + 2];
         const gl = Math.hypot(normal[3 * g], normal[3 * g + 1], normal[3 * g + 2]);
         if (creaseDegrees >= 180 || d >= cosine * gl * l) {
           group = g;

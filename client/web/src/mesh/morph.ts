@@ -50,14 +50,19 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData 
     base += part.position.length / 3;
   }
   const hasNormals = parts.every((p) => p.primitive.attributes.NORMAL !== undefined);
-  const normal = hasNormals ? joined(parts.map((p) => gltf.floats(p.primitive.attributes.NORMAL))) : smoothNormals(position, index);
+  const normal = hasNormals
+    ? joined(parts.map((p) => gltf.floats(p.primitive.attributes.NORMAL)))
+    : smoothNormals(position, index);
   const targets = Array.from({ length: targetCount }, (_, k) => {
     const delta = joined(parts.map((p) => gltf.floats(p.primitive.targets![k].POSITION)));
     const withNormals = hasNormals && parts.every((p) => p.primitive.targets![k].NORMAL !== undefined);
     let turned: Float32Array;
     if (withNormals) turned = joined(parts.map((p) => gltf.floats(p.primitive.targets![k].NORMAL)));
     else {
-      turned = smoothNormals(position.map((x, i) => x + delta[i]), index);
+      turned = smoothNormals(
+        position.map((x, i) => x + delta[i]),
+        index,
+      );
       for (let i = 0; i < turned.length; i++) turned[i] -= normal[i];
     }
     return { position: delta, normal: turned };
@@ -116,7 +121,10 @@ const equal = (a: Float32Array, b: Float32Array) => a.every((x, i) => Math.abs(x
  * are taken from the animation's keyframes; where it rests at a shape is left out. Without an animation the way is
  * straight.
  */
-export function pathOf(frames: Float32Array[], shapes: Float32Array[]): { times: Float32Array; weights: Float32Array[] } {
+export function pathOf(
+  frames: Float32Array[],
+  shapes: Float32Array[],
+): { times: Float32Array; weights: Float32Array[] } {
   const legs = Math.max(shapes.length - 1, 1);
   const straight = { times: Float32Array.from(shapes, (_, i) => i / legs), weights: shapes };
   const times: number[] = [];

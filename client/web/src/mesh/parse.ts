@@ -215,7 +215,10 @@ function parseOff(bytes: Uint8Array): RawMesh {
 function parseStl(bytes: Uint8Array): RawMesh {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const facets = bytes.length >= 84 ? view.getUint32(80, true) : 0;
-  const binary = bytes.length >= 84 && 84 + 50 * facets <= bytes.length && (84 + 50 * facets === bytes.length || !/^solid/.test(ascii(bytes, 0, 5)));
+  const binary =
+    bytes.length >= 84 &&
+    84 + 50 * facets <= bytes.length &&
+    (84 + 50 * facets === bytes.length || !/^solid/.test(ascii(bytes, 0, 5)));
   let positions: Float64Array;
   if (binary) {
     positions = new Float64Array(facets * 9);
@@ -245,26 +248,63 @@ function parseStl(bytes: Uint8Array): RawMesh {
 const ascii = (bytes: Uint8Array, from: number, to: number) => String.fromCharCode(...bytes.subarray(from, to));
 
 const PLY_SIZES: Record<string, number> = {
-  char: 1, int8: 1, uchar: 1, uint8: 1, short: 2, int16: 2, ushort: 2, uint16: 2,
-  int: 4, int32: 4, uint: 4, uint32: 4, float: 4, float32: 4, double: 8, float64: 8,
+  char: 1,
+  int8: 1,
+  uchar: 1,
+  uint8: 1,
+  short: 2,
+  int16: 2,
+  ushort: 2,
+  uint16: 2,
+  int: 4,
+  int32: 4,
+  uint: 4,
+  uint32: 4,
+  float: 4,
+  float32: 4,
+  double: 8,
+  float64: 8,
 };
 
 type Reader = (view: DataView, at: number, little: boolean) => number;
 function plyReader(type: string): Reader {
   switch (type) {
-    case 'char': case 'int8': return (v, at) => v.getInt8(at);
-    case 'uchar': case 'uint8': return (v, at) => v.getUint8(at);
-    case 'short': case 'int16': return (v, at, l) => v.getInt16(at, l);
-    case 'ushort': case 'uint16': return (v, at, l) => v.getUint16(at, l);
-    case 'int': case 'int32': return (v, at, l) => v.getInt32(at, l);
-    case 'uint': case 'uint32': return (v, at, l) => v.getUint32(at, l);
-    case 'float': case 'float32': return (v, at, l) => v.getFloat32(at, l);
-    default: return (v, at, l) => v.getFloat64(at, l);
+    case 'char':
+    case 'int8':
+      return (v, at) => v.getInt8(at);
+    case 'uchar':
+    case 'uint8':
+      return (v, at) => v.getUint8(at);
+    case 'short':
+    case 'int16':
+      return (v, at, l) => v.getInt16(at, l);
+    case 'ushort':
+    case 'uint16':
+      return (v, at, l) => v.getUint16(at, l);
+    case 'int':
+    case 'int32':
+      return (v, at, l) => v.getInt32(at, l);
+    case 'uint':
+    case 'uint32':
+      return (v, at, l) => v.getUint32(at, l);
+    case 'float':
+    case 'float32':
+      return (v, at, l) => v.getFloat32(at, l);
+    default:
+      return (v, at, l) => v.getFloat64(at, l);
   }
 }
 
-interface PlyProperty { name: string; type: string; count?: string }
-interface PlyElement { name: string; count: number; properties: PlyProperty[] }
+interface PlyProperty {
+  name: string;
+  type: string;
+  count?: string;
+}
+interface PlyElement {
+  name: string;
+  count: number;
+  properties: PlyProperty[];
+}
 
 function plyHeader(bytes: Uint8Array) {
   let text = '';

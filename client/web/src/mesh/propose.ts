@@ -89,7 +89,10 @@ export function proposeLandmarks(data: MorphData, count: number): [number, numbe
       const [i, j] = [3 * first[a], 3 * first[b]];
       length += Math.hypot(p[i] - p[j], p[i + 1] - p[j + 1], p[i + 2] - p[j + 2]) / size[s];
     });
-    for (const [from, to] of [[a, b], [b, a]]) {
+    for (const [from, to] of [
+      [a, b],
+      [b, a],
+    ]) {
       other[fill[from]] = to;
       long[fill[from]++] = length;
     }
@@ -127,5 +130,7 @@ export function proposeLandmarks(data: MorphData, count: number): [number, numbe
     chosen.push(next);
     spread(next);
   }
-  return chosen.map((v) => shapes.map((p): [number, number, number] => [p[3 * first[v]], p[3 * first[v] + 1], p[3 * first[v] + 2]]));
+  return chosen.map((v) =>
+    shapes.map((p): [number, number, number] => [p[3 * first[v]], p[3 * first[v] + 1], p[3 * first[v] + 2]]),
+  );
 }

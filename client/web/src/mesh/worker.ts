@@ -34,8 +34,12 @@ function bvhOf(mesh: Held): Bvh {
 
 function faceNormal({ positions: p, corners }: RawMesh, t: number): [number, number, number] {
   const [a, b, c] = [3 * corners[3 * t], 3 * corners[3 * t + 1], 3 * corners[3 * t + 2]];
-  const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
-  const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+  const ux = p[b] - p[a];
+  const uy = p[b + 1] - p[a + 1];
+  const uz = p[b + 2] - p[a + 2];
+  const vx = p[c] - p[a];
+  const vy = p[c + 1] - p[a + 1];
+  const vz = p[c + 2] - p[a + 2];
   const n = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
   const l = Math.hypot(n[0], n[1], n[2]) || 1;
   return [n[0] / l, n[1] / l, n[2] / l];
@@ -139,7 +143,8 @@ const ops = {
   /** Line segments and triangles to be drawn in red, in view coordinates. */
   faults(key: string, kind: string, edges: number[][], vertices: number[]) {
     const mesh = held.get(key);
-    if (!mesh) return { lines: new Float32Array(), triangles: new Float32Array(), points: new Float32Array(), found: 0 };
+    if (!mesh)
+      return { lines: new Float32Array(), triangles: new Float32Array(), points: new Float32Array(), found: 0 };
     const { raw, frame } = mesh;
     let pairs: ArrayLike<number> = edges.flat();
     if (!pairs.length && (kind === 'not-closed' || kind === 'not-manifold')) {
@@ -187,7 +192,11 @@ const ops = {
   /** The surface and the sphere of a PLY of the daemon; kept under `key` for sphereSpots(). */
   sphere(key: string, buffer: ArrayBuffer): SphereData {
     const data = decodeSphere(buffer);
-    spheres.set(key, { surface: data.surface.position.slice(), index: data.surface.index.slice(), place: data.sphere.slice() });
+    spheres.set(key, {
+      surface: data.surface.position.slice(),
+      index: data.surface.index.slice(),
+      place: data.sphere.slice(),
+    });
     return data;
   },
 
@@ -200,7 +209,9 @@ const ops = {
     return points.map(([x, y, z]) => {
       const hit = bvh.closest(x, y, z)!;
       const weights = [1 - hit.u - hit.v, hit.u, hit.v];
-      const p = [0, 1, 2].map((k) => weights.reduce((sum, w, c) => sum + w * place[3 * index[3 * hit.triangle + c] + k], 0));
+      const p = [0, 1, 2].map((k) =>
+        weights.reduce((sum, w, c) => sum + w * place[3 * index[3 * hit.triangle + c] + k], 0),
+      );
       const l = Math.hypot(p[0], p[1], p[2]) || 1;
       return [p[0] / l, p[1] / l, p[2] / l];
     });
@@ -210,7 +221,12 @@ const ops = {
    * For each vertex drawn of a shape its distance from the supermesh, relative to the shape's diagonal. Where the asset
    * has moved and scaled the shape (asset.fit), both are first brought together (see settle).
    */
-  error(key: string, morphKey: string, shape: number, fitted: boolean): { values: Float32Array; max: number; rms: number } {
+  error(
+    key: string,
+    morphKey: string,
+    shape: number,
+    fitted: boolean,
+  ): { values: Float32Array; max: number; rms: number } {
     const mesh = held.get(key);
     const morph = morphs.get(morphKey);
     if (!mesh || !morph) throw new Error('The shape or the morph is not loaded.');
@@ -249,7 +265,8 @@ const ops = {
       for (let k = 0; k < 4; k++) {
         const used = k === 3 ? [0, 1, 2] : [k, (k + 1) % 3];
         if (k < 3 && raw.corners[t + k] > raw.corners[t + used[1]]) continue; // each edge once
-        for (let i = 0; i < 3; i++) middle[i] = used.reduce((total, corner) => total + p[3 * raw.corners[t + corner] + i], 0) / used.length;
+        for (let i = 0; i < 3; i++)
+          middle[i] = used.reduce((total, corner) => total + p[3 * raw.corners[t + corner] + i], 0) / used.length;
         const d = away(middle[0], middle[1], middle[2]);
         for (const corner of used) {
           const v = raw.corners[t + corner];
@@ -376,8 +393,12 @@ function moments(p: ArrayLike<number>, corners: Uint32Array) {
   for (const pass of [0, 1])
     for (let t = 0; t < corners.length; t += 3) {
       const [a, b, c] = [3 * corners[t], 3 * corners[t + 1], 3 * corners[t + 2]];
-      const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
-      const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+      const ux = p[b] - p[a];
+      const uy = p[b + 1] - p[a + 1];
+      const uz = p[b + 2] - p[a + 2];
+      const vx = p[c] - p[a];
+      const vy = p[c + 1] - p[a + 1];
+      const vz = p[c + 2] - p[a + 2];
       const w = Math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
       const m = [0, 1, 2].map((k) => (p[a + k] + p[b + k] + p[c + k]) / 3);
       if (pass === 0) {
@@ -391,7 +412,14 @@ function moments(p: ArrayLike<number>, corners: Uint32Array) {
 
 /** The 24 rotations of the cube. */
 function* rotations(): Generator<number[]> {
-  const axes = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+  const axes = [
+    [0, 1, 2],
+    [1, 2, 0],
+    [2, 0, 1],
+    [0, 2, 1],
+    [2, 1, 0],
+    [1, 0, 2],
+  ];
   for (const [n, order] of axes.entries())
     for (let s = 0; s < 8; s++) {
       const signs = [s & 1 ? -1 : 1, s & 2 ? -1 : 1, s & 4 ? -1 : 1];
@@ -405,7 +433,9 @@ function* rotations(): Generator<number[]> {
 function moved3(p: Float64Array, m: number[], scale: number, from: number[], to: number[]): Float64Array {
   const out = new Float64Array(p.length);
   for (let i = 0; i < p.length; i += 3) {
-    const x = p[i] - from[0], y = p[i + 1] - from[1], z = p[i + 2] - from[2];
+    const x = p[i] - from[0];
+    const y = p[i + 1] - from[1];
+    const z = p[i + 2] - from[2];
     for (let k = 0; k < 3; k++) out[i + k] = to[k] + scale * (m[3 * k] * x + m[3 * k + 1] * y + m[3 * k + 2] * z);
   }
   return out;
@@ -454,7 +484,8 @@ function applyFit(all: Float64Array, from: number[][], to: number[][]): Float64A
 /** The buffers inside an answer, to be handed over rather than copied. */
 function buffersIn(value: unknown, found = new Set<ArrayBuffer>(), depth = 0): Set<ArrayBuffer> {
   if (ArrayBuffer.isView(value)) found.add(value.buffer as ArrayBuffer);
-  else if (value && typeof value === 'object' && depth < 4) for (const part of Object.values(value)) buffersIn(part, found, depth + 1);
+  else if (value && typeof value === 'object' && depth < 4)
+    for (const part of Object.values(value)) buffersIn(part, found, depth + 1);
   return found;
 }
 

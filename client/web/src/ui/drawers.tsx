@@ -15,8 +15,13 @@ export function Drawer() {
     dialog.current!.showModal();
   }, []);
   return (
-    <dialog ref={dialog} class="drawer" aria-label={TITLES[kind]} onClose={() => set({ drawer: null })}
-      onClick={(event) => event.target === dialog.current && dialog.current!.close()}>
+    <dialog
+      ref={dialog}
+      class="drawer"
+      aria-label={TITLES[kind]}
+      onClose={() => set({ drawer: null })}
+      onClick={(event) => event.target === dialog.current && dialog.current!.close()}
+    >
       <div class="drawer-in">
         <div class="row spread">
           <h2>{TITLES[kind]}</h2>
@@ -43,12 +48,20 @@ function when(text: string | undefined): string {
 function Server() {
   useEffect(() => {
     void loadServer();
-    const timer = setInterval(() => state.server?.jobs.some((job) => job.state === 'running' || job.state === 'queued') && void loadServer(), 2000);
+    const timer = setInterval(
+      () => state.server?.jobs.some((job) => job.state === 'running' || job.state === 'queued') && void loadServer(),
+      2000,
+    );
     return () => clearInterval(timer);
   }, []);
   const list = state.server;
   if (!list) return <p class="hint">Reading…</p>;
-  if (list.message) return <p class="red" role="alert">{list.message}</p>;
+  if (list.message)
+    return (
+      <p class="red" role="alert">
+        {list.message}
+      </p>
+    );
   const jobs = list.jobs.filter((job) => job.state !== 'succeeded');
   return (
     <>
@@ -63,7 +76,12 @@ function Server() {
                 <strong>{name}</strong>
                 <span class="muted">{item.triangles !== undefined && `${count(item.triangles)} triangles`}</span>
               </button>
-              <Button kind="quiet" icon="trash" label={`Delete the morph ${name}`} onClick={() => void remove('supermesh', item)} />
+              <Button
+                kind="quiet"
+                icon="trash"
+                label={`Delete the morph ${name}`}
+                onClick={() => void remove('supermesh', item)}
+              />
             </li>
           );
         })}
@@ -75,14 +93,25 @@ function Server() {
           <li key={mesh.id}>
             <button type="button" class="item" onClick={() => void addMesh(mesh)} aria-label={`Add ${mesh.name}`}>
               <strong>{mesh.name}</strong>
-              <span class="muted">{count(mesh.triangles)} triangles · {when(mesh.created)}</span>
+              <span class="muted">
+                {count(mesh.triangles)} triangles · {when(mesh.created)}
+              </span>
             </button>
-            <Button kind="quiet" icon="trash" label={`Delete the shape ${mesh.name}`} onClick={() => void remove('mesh', mesh)} />
+            <Button
+              kind="quiet"
+              icon="trash"
+              label={`Delete the shape ${mesh.name}`}
+              onClick={() => void remove('mesh', mesh)}
+            />
           </li>
         ))}
       </ul>
       {jobs.length > 0 && <h3>Jobs</h3>}
-      <ul class="list">{jobs.map((job) => <JobRow key={job.id} job={job} />)}</ul>
+      <ul class="list">
+        {jobs.map((job) => (
+          <JobRow key={job.id} job={job} />
+        ))}
+      </ul>
     </>
   );
 }
@@ -93,10 +122,17 @@ function JobRow({ job }: { job: Job }) {
     <li>
       <div class="item">
         <strong>{job.kind === 'supermesh' ? 'Morph' : 'Map to the sphere'}</strong>
-        <span class="muted">{job.state}{job.problem ? `: ${job.problem.detail}` : ''} · {when(job.created)}</span>
+        <span class="muted">
+          {job.state}
+          {job.problem ? `: ${job.problem.detail}` : ''} · {when(job.created)}
+        </span>
         {live && <Bar label="Progress" value={job.progress ?? null} />}
       </div>
-      {live && job.kind === 'supermesh' && <Button kind="quiet" onClick={() => void watchJob(job.id)}>Follow</Button>}
+      {live && job.kind === 'supermesh' && (
+        <Button kind="quiet" onClick={() => void watchJob(job.id)}>
+          Follow
+        </Button>
+      )}
       {live && <Button kind="quiet" icon="close" label="Cancel this job" onClick={() => void cancelJob(job.id)} />}
     </li>
   );
@@ -121,9 +157,13 @@ function Snippet({ title, text }: { title: string; text: string }) {
     <section class="snippet" aria-label={title}>
       <div class="row spread">
         <h3>{title}</h3>
-        <Button kind="quiet" icon={copied ? 'check' : 'copy'} onClick={() => void copy()}>{copied ? 'Copied' : 'Copy'}</Button>
+        <Button kind="quiet" icon={copied ? 'check' : 'copy'} onClick={() => void copy()}>
+          {copied ? 'Copied' : 'Copy'}
+        </Button>
       </div>
-      <pre id={`snippet-${title}`} tabIndex={0} role="region" aria-label={`${title}: code`}>{text}</pre>
+      <pre id={`snippet-${title}`} tabIndex={0} role="region" aria-label={`${title}: code`}>
+        {text}
+      </pre>
     </section>
   );
 }
@@ -132,7 +172,8 @@ function Snippet({ title, text }: { title: string; text: string }) {
 const quoted = (text: string) => `'${text.replace(/'/g, "'\\''")}'`;
 
 /** Text that stands in HTML. */
-const escaped = (text: string) => text.replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]!);
+const escaped = (text: string) =>
+  text.replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]!);
 
 const viewerPage = (asset: string, names: string[]) => `<!doctype html>
 <meta charset="utf-8">
@@ -195,7 +236,11 @@ function Share() {
       <p class="hint">The address of an asset never changes and can be cached for ever.</p>
       <Snippet title="Asset" text={asset} />
       <Snippet title="curl" text={curl} />
-      {client.token && <p class="hint">The pages below show <code>morph.glb</code>, which the second line above brings: put it beside them.</p>}
+      {client.token && (
+        <p class="hint">
+          The pages below show <code>morph.glb</code>, which the second line above brings: put it beside them.
+        </p>
+      )}
       <Snippet title="three.js" text={threePage(shown, names)} />
       <Snippet title="model-viewer" text={viewerPage(shown, names)} />
     </>
@@ -203,21 +248,45 @@ function Share() {
 }
 
 const KEYS: [string, string][] = [
-  ['1 2 3 4', 'Shapes, Landmarks, Morph, Spheres'], ['Space', 'Play or pause'], ['W', 'Wireframe'],
-  ['Arrow keys', 'Turn the view that has the focus'], ['+ and −', 'Nearer and farther'], ['0', 'The view as it was at first'],
-  ['Enter', 'Landmark in the middle of the view'], ['Delete', 'Remove the chosen landmark'], ['Ctrl Z, Ctrl Shift Z', 'Undo, redo'], ['Esc', 'Close'],
+  ['1 2 3 4', 'Shapes, Landmarks, Morph, Spheres'],
+  ['Space', 'Play or pause'],
+  ['W', 'Wireframe'],
+  ['Arrow keys', 'Turn the view that has the focus'],
+  ['+ and −', 'Nearer and farther'],
+  ['0', 'The view as it was at first'],
+  ['Enter', 'Landmark in the middle of the view'],
+  ['Delete', 'Remove the chosen landmark'],
+  ['Ctrl Z, Ctrl Shift Z', 'Undo, redo'],
+  ['Esc', 'Close'],
 ];
 
 function Help() {
   return (
     <>
-      <p>Add two or more closed meshes and press <strong>Morph</strong>. Where the result does not match as you would, set landmarks: the same feature on each shape.</p>
-      <p>Drag turns, the wheel or two fingers zoom, the right button or Shift moves. The address of the page holds all of its state; it can be kept and sent.</p>
+      <p>
+        Add two or more closed meshes and press <strong>Morph</strong>. Where the result does not match as you would,
+        set landmarks: the same feature on each shape.
+      </p>
+      <p>
+        Drag turns, the wheel or two fingers zoom, the right button or Shift moves. The address of the page holds all of
+        its state; it can be kept and sent.
+      </p>
       <h3>Keys</h3>
       <table class="report keys">
-        <tbody>{KEYS.map(([key, what]) => <tr key={key}><th scope="row"><kbd>{key}</kbd></th><td>{what}</td></tr>)}</tbody>
+        <tbody>
+          {KEYS.map(([key, what]) => (
+            <tr key={key}>
+              <th scope="row">
+                <kbd>{key}</kbd>
+              </th>
+              <td>{what}</td>
+            </tr>
+          ))}
+        </tbody>
       </table>
-      <p><a href="/docs">The HTTP interface</a> · <a href="/licenses.txt">Licences</a></p>
+      <p>
+        <a href="/docs">The HTTP interface</a> · <a href="/licenses.txt">Licences</a>
+      </p>
     </>
   );
 }

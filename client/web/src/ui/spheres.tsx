@@ -8,12 +8,19 @@ import { Pane } from './pane';
 import { Legend } from './morph';
 
 const NAMES: Record<SpherePaint, string> = {
-  direction: 'Normals', checker: 'Checkerboard', symmetric_dirichlet: 'Stretch', angle: 'Angles', area: 'Areas', aspect: 'Triangle shape',
+  direction: 'Normals',
+  checker: 'Checkerboard',
+  symmetric_dirichlet: 'Stretch',
+  angle: 'Angles',
+  area: 'Areas',
+  aspect: 'Triangle shape',
 };
 const MEANING: Record<SpherePaint, string> = {
   direction: 'The direction of the surface as colour, carried to the sphere: parts can be recognised.',
-  checker: 'A regular checkerboard on the sphere, carried back to the surface: where its cells are large, the surface was squeezed.',
-  symmetric_dirichlet: 'Symmetric Dirichlet energy: 1 where the map keeps lengths, growing with stretch and with squeeze.',
+  checker:
+    'A regular checkerboard on the sphere, carried back to the surface: where its cells are large, the surface was squeezed.',
+  symmetric_dirichlet:
+    'Symmetric Dirichlet energy: 1 where the map keeps lengths, growing with stretch and with squeeze.',
   angle: 'Ratio of the singular values: 1 where angles are kept.',
   area: 'Logarithm of the area ratio: blue where the sphere has less room than the surface, red where it has more.',
   aspect: 'Circumradius over twice the inradius of the triangles on the sphere: 1 for equilateral ones.',
@@ -33,11 +40,27 @@ export function SpheresStage() {
               <span class="dot" style={{ background: tint(index) }} aria-hidden="true" />
               <strong>{shape.name}</strong>
             </div>
-            {sphere?.state === 'working' && <div class="centered"><Bar label={`Mapping ${shape.name} to the sphere`} value={sphere.job?.progress ?? null} /></div>}
-            {sphere?.state === 'failed' && <div class="centered"><p class="red">{sphere.message}</p></div>}
+            {sphere?.state === 'working' && (
+              <div class="centered">
+                <Bar label={`Mapping ${shape.name} to the sphere`} value={sphere.job?.progress ?? null} />
+              </div>
+            )}
+            {sphere?.state === 'failed' && (
+              <div class="centered">
+                <p class="red">{sphere.message}</p>
+              </div>
+            )}
           </Pane>,
-          <Pane key={`${shape.key}b`} label={`${shape.name}, sphere ${state.side} the alignment`} model={sphere?.ball} wire={state.wire} spots={sphere}>
-            <div class="caption"><span class="muted">{state.side === 'after' ? 'on the common sphere' : 'on its own sphere'}</span></div>
+          <Pane
+            key={`${shape.key}b`}
+            label={`${shape.name}, sphere ${state.side} the alignment`}
+            model={sphere?.ball}
+            wire={state.wire}
+            spots={sphere}
+          >
+            <div class="caption">
+              <span class="muted">{state.side === 'after' ? 'on the common sphere' : 'on its own sphere'}</span>
+            </div>
           </Pane>,
         ];
       })}
@@ -51,16 +74,40 @@ export function SpheresInspector() {
   return (
     <>
       <h2>Spheres</h2>
-      <Segments label="Alignment" value={state.side} onChange={showSide}
-        items={[{ value: 'before', label: 'Before alignment' }, { value: 'after', label: 'After', off: !canAlign(), hint: canAlign() ? undefined : 'Morph the shapes first' }]} />
+      <Segments
+        label="Alignment"
+        value={state.side}
+        onChange={showSide}
+        items={[
+          { value: 'before', label: 'Before alignment' },
+          { value: 'after', label: 'After', off: !canAlign(), hint: canAlign() ? undefined : 'Morph the shapes first' },
+        ]}
+      />
       <p class="hint">
-        {state.side === 'after' ? 'Every shape on the one sphere that all share: what lies at the same place corresponds.'
-          : canAlign() ? 'Each shape mapped to a sphere by itself.' : 'Each shape mapped to a sphere by itself. Morph them to see the spheres brought into line.'}
+        {state.side === 'after'
+          ? 'Every shape on the one sphere that all share: what lies at the same place corresponds.'
+          : canAlign()
+            ? 'Each shape mapped to a sphere by itself.'
+            : 'Each shape mapped to a sphere by itself. Morph them to see the spheres brought into line.'}
       </p>
-      <Segments label="Colour" value={paint} onChange={setPaint} items={PAINTS.map((value) => ({ value, label: NAMES[value] }))} />
+      <Segments
+        label="Colour"
+        value={paint}
+        onChange={setPaint}
+        items={PAINTS.map((value) => ({ value, label: NAMES[value] }))}
+      />
       <p class="hint">{MEANING[paint]}</p>
-      {range && <Legend ramp={paint === 'area' ? 'diverging' : 'heat'} low={range.low.toFixed(2)} high={range.high.toFixed(2)} label={`${NAMES[paint]}${paint === 'area' ? '' : ', logarithmic'}`} />}
-      {readyShapes().map((shape) => <ShapeReport key={shape.key} shape={shape} />)}
+      {range && (
+        <Legend
+          ramp={paint === 'area' ? 'diverging' : 'heat'}
+          low={range.low.toFixed(2)}
+          high={range.high.toFixed(2)}
+          label={`${NAMES[paint]}${paint === 'area' ? '' : ', logarithmic'}`}
+        />
+      )}
+      {readyShapes().map((shape) => (
+        <ShapeReport key={shape.key} shape={shape} />
+      ))}
     </>
   );
 }
@@ -73,16 +120,25 @@ function ShapeReport({ shape }: { shape: Shape }) {
   const { certificate } = embedding;
   return (
     <section class="sphere-report" aria-label={`Distortion of ${shape.name}`}>
-      <h3><span class="dot" style={{ background: tint(state.shapes.indexOf(shape)) }} aria-hidden="true" /> {shape.name}</h3>
+      <h3>
+        <span class="dot" style={{ background: tint(state.shapes.indexOf(shape)) }} aria-hidden="true" /> {shape.name}
+      </h3>
       <p class={`facts ${certificate?.valid ? 'good' : 'red'}`}>
-        {certificate?.valid ? 'Certified one to one' : 'Not certified'}: {certificate?.flipped} flipped, degree {certificate?.degree}
+        {certificate?.valid ? 'Certified one to one' : 'Not certified'}: {certificate?.flipped} flipped, degree{' '}
+        {certificate?.degree}
       </p>
       {measure && (
         <>
-          <Histogram measure={measure} label={`${NAMES[isMeasure(paint) ? paint : 'symmetric_dirichlet']} of ${shape.name}`} />
+          <Histogram
+            measure={measure}
+            label={`${NAMES[isMeasure(paint) ? paint : 'symmetric_dirichlet']} of ${shape.name}`}
+          />
           <dl class="numbers">
             {(['mean', 'median', 'p99', 'max'] as const).map((key) => (
-              <div key={key}><dt>{key === 'p99' ? '99 %' : key}</dt><dd>{measure[key]?.toPrecision(3)}</dd></div>
+              <div key={key}>
+                <dt>{key === 'p99' ? '99 %' : key}</dt>
+                <dd>{measure[key]?.toPrecision(3)}</dd>
+              </div>
             ))}
           </dl>
         </>
@@ -99,14 +155,21 @@ function Histogram({ measure, label }: { measure: Measure; label: string }) {
   const middle = counts.reduce((best, c, i) => (c > counts[best] ? i : best), 0);
   return (
     <figure class="histogram">
-      <svg viewBox="0 0 300 84" role="img" preserveAspectRatio="none"
-        aria-label={`Histogram, ${label}: from ${edges[0]?.toPrecision(3)} to ${edges.at(-1)?.toPrecision(3)}, most around ${edges[middle]?.toPrecision(3)}`}>
+      <svg
+        viewBox="0 0 300 84"
+        role="img"
+        preserveAspectRatio="none"
+        aria-label={`Histogram, ${label}: from ${edges[0]?.toPrecision(3)} to ${edges.at(-1)?.toPrecision(3)}, most around ${edges[middle]?.toPrecision(3)}`}
+      >
         {counts.map((c, i) => {
           const h = (c / most) * 82;
           return <rect key={i} x={i * width + 0.5} y={84 - h} width={Math.max(width - 1, 0.5)} height={h} rx="1" />;
         })}
       </svg>
-      <figcaption class="row spread"><span>{edges[0]?.toPrecision(3)}</span><span>{edges.at(-1)?.toPrecision(3)}</span></figcaption>
+      <figcaption class="row spread">
+        <span>{edges[0]?.toPrecision(3)}</span>
+        <span>{edges.at(-1)?.toPrecision(3)}</span>
+      </figcaption>
     </figure>
   );
 }

@@ -19,18 +19,40 @@ export function TokenDialog() {
     work(false);
   };
   return (
-    <dialog ref={dialog} class="ask" aria-labelledby="ask-title" onCancel={(event) => must && event.preventDefault()} onClose={() => set({ asking: null })}>
+    <dialog
+      ref={dialog}
+      class="ask"
+      aria-labelledby="ask-title"
+      onCancel={(event) => must && event.preventDefault()}
+      onClose={() => set({ asking: null })}
+    >
       <form class="ask-in" onSubmit={(event) => void send(event)}>
         <h2 id="ask-title">This daemon wants a token</h2>
-        <p class="hint">Whoever runs it makes one with <code>orbmorphd token add</code>. It stays in this tab and is forgotten when you close it.</p>
+        <p class="hint">
+          Whoever runs it makes one with <code>orbmorphd token add</code>. It stays in this tab and is forgotten when
+          you close it.
+        </p>
         <label class="field">
           <span class="field-name">Token</span>
           <input type="password" name="token" autocomplete="off" spellcheck={false} required />
         </label>
-        {message && <p class="notice error" role="alert"><Icon name="alert" /><span>{message}</span></p>}
+        {message && (
+          <p class="notice error" role="alert">
+            <Icon name="alert" />
+            <span>{message}</span>
+          </p>
+        )}
         <div class="row spread gap-top">
-          {client.token ? <Button kind="quiet" onClick={forgetToken}>Forget the present one</Button> : <span />}
-          <button type="submit" class="button primary" disabled={busy}>Continue</button>
+          {client.token ? (
+            <Button kind="quiet" onClick={forgetToken}>
+              Forget the present one
+            </Button>
+          ) : (
+            <span />
+          )}
+          <button type="submit" class="button primary" disabled={busy}>
+            Continue
+          </button>
         </div>
       </form>
     </dialog>

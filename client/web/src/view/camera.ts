@@ -62,7 +62,11 @@ export class Orbit {
 }
 
 /** Where a point is seen: 0 to 1 from the left and from the top; and how much a normal there faces the eye. */
-export function project(look: Look, point: ArrayLike<number>, normal: ArrayLike<number>): { x: number; y: number; facing: number } {
+export function project(
+  look: Look,
+  point: ArrayLike<number>,
+  normal: ArrayLike<number>,
+): { x: number; y: number; facing: number } {
   const d = look.eye.map((e, k) => point[k] - e);
   const depth = Math.max(-dot(d, look.back), 1e-6);
   return {

@@ -1,8 +1,25 @@
 /// <reference lib="webworker" />
 /** Draws: holds the canvas, the scene objects and their buffers. See messages.ts for what it is told. */
 import {
-  BufferAttribute, BufferGeometry, Color, Group, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, PerspectiveCamera, Points,
-  PointsMaterial, Scene, ShaderMaterial, Sphere, Vector3, WebGLRenderer, type Material, type Object3D,
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  Group,
+  LineBasicMaterial,
+  LineSegments,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  PerspectiveCamera,
+  Points,
+  PointsMaterial,
+  Scene,
+  ShaderMaterial,
+  Sphere,
+  Vector3,
+  WebGLRenderer,
+  type Material,
+  type Object3D,
 } from 'three';
 import { FIELD, type Look } from './camera';
 import type { Paint, Rgb } from './colors';
@@ -35,7 +52,10 @@ class Buffers {
     this.normal = normal === position ? this.position : new BufferAttribute(normal, 3);
     this.index = new BufferAttribute(index, 1);
     this.edges = new BufferAttribute(edges, 1);
-    this.targets = targets.map((t) => ({ move: new BufferAttribute(t.position, 3), turn: new BufferAttribute(t.normal, 3) }));
+    this.targets = targets.map((t) => ({
+      move: new BufferAttribute(t.position, 3),
+      turn: new BufferAttribute(t.normal, 3),
+    }));
     this.slots = Math.min(targets.length, SLOTS);
     this.dense = index.length >= 3 * DENSE;
   }
@@ -57,7 +77,11 @@ class Model {
   private extra: Group | null = null;
   private current: number[] = [];
 
-  constructor(readonly buffers: Buffers, paint: Paint, scale = 1) {
+  constructor(
+    readonly buffers: Buffers,
+    paint: Paint,
+    scale = 1,
+  ) {
     this.mesh = new Mesh(buffers.geometry(buffers.index, true), surfaceMaterial(paint, buffers.slots, buffers.dense));
     this.mesh.frustumCulled = false;
     this.group.scale.setScalar(scale);
@@ -85,7 +109,10 @@ class Model {
     this.current = weights;
     const { slots, targets } = this.buffers;
     if (!slots) return;
-    const taken = [...weights.keys()].sort((a, b) => Math.abs(weights[b]) - Math.abs(weights[a])).slice(0, slots).sort((a, b) => a - b);
+    const taken = [...weights.keys()]
+      .sort((a, b) => Math.abs(weights[b]) - Math.abs(weights[a]))
+      .slice(0, slots)
+      .sort((a, b) => a - b);
     for (const object of [this.mesh, this.lines]) {
       if (!object) continue;
       taken.forEach((k, slot) => {
@@ -129,8 +156,14 @@ class Model {
     };
     add(faults.triangles, (g) => new Mesh(g, new MeshBasicMaterial({ color: red, transparent: true, opacity: 0.75 })));
     add(faults.lines, (g) => new LineSegments(g, new LineBasicMaterial({ color: red, depthTest: false })));
-    add(faults.lines, (g) => new Points(g, new PointsMaterial({ color: red, size: 5, sizeAttenuation: false, depthTest: false })));
-    add(faults.points, (g) => new Points(g, new PointsMaterial({ color: red, size: 10, sizeAttenuation: false, depthTest: false })));
+    add(
+      faults.lines,
+      (g) => new Points(g, new PointsMaterial({ color: red, size: 5, sizeAttenuation: false, depthTest: false })),
+    );
+    add(
+      faults.points,
+      (g) => new Points(g, new PointsMaterial({ color: red, size: 10, sizeAttenuation: false, depthTest: false })),
+    );
     this.group.add(extra);
   }
 }
@@ -156,7 +189,9 @@ function start(canvas: OffscreenCanvas, ratio: number) {
 }
 
 function stand({ eye, right, up, back, near, far, aspect }: Look) {
-  camera.matrix.copy(new Matrix4().makeBasis(new Vector3(...right), new Vector3(...up), new Vector3(...back)).setPosition(...eye));
+  camera.matrix.copy(
+    new Matrix4().makeBasis(new Vector3(...right), new Vector3(...up), new Vector3(...back)).setPosition(...eye),
+  );
   camera.near = near;
   camera.far = far;
   camera.aspect = aspect;
@@ -168,7 +203,8 @@ function draw(width: number, height: number, frames: Frame[]) {
   if (!renderer) return;
   const ratio = renderer.getPixelRatio();
   const { domElement: canvas } = renderer;
-  if (canvas.width !== Math.floor(width * ratio) || canvas.height !== Math.floor(height * ratio)) renderer.setSize(width, height, false);
+  if (canvas.width !== Math.floor(width * ratio) || canvas.height !== Math.floor(height * ratio))
+    renderer.setSize(width, height, false);
   renderer.setClearColor(0, 0);
   renderer.setScissor(0, 0, width, height);
   renderer.setViewport(0, 0, width, height);
@@ -203,12 +239,18 @@ function carryOut(order: Order) {
   const model = models.get(order.model);
   if (!model) return;
   switch (order.op) {
-    case 'paint': return model.paint(order.paint);
-    case 'color': return model.color(order.color);
-    case 'attribute': return model.attribute(order.name, order.data);
-    case 'weights': return model.weights(order.weights);
-    case 'wireframe': return model.wireframe(order.shown, order.color);
-    case 'faults': return model.faults(order.faults);
+    case 'paint':
+      return model.paint(order.paint);
+    case 'color':
+      return model.color(order.color);
+    case 'attribute':
+      return model.attribute(order.name, order.data);
+    case 'weights':
+      return model.weights(order.weights);
+    case 'wireframe':
+      return model.wireframe(order.shown, order.color);
+    case 'faults':
+      return model.faults(order.faults);
     case 'dispose':
       dispose(model.group);
       models.delete(order.model);

@@ -22,8 +22,17 @@ export class Model {
       return;
     }
     const { surface, hand, scale } = from;
-    const arrays = [surface.position, surface.normal, surface.index, surface.edges, ...(surface.targets ?? []).flatMap((t) => [t.position, t.normal])];
-    order({ op: 'model', model: this.id, surface, scale, paint }, hand ? [...new Set(arrays.map((a) => a.buffer as ArrayBuffer))] : []);
+    const arrays = [
+      surface.position,
+      surface.normal,
+      surface.index,
+      surface.edges,
+      ...(surface.targets ?? []).flatMap((t) => [t.position, t.normal]),
+    ];
+    order(
+      { op: 'model', model: this.id, surface, scale, paint },
+      hand ? [...new Set(arrays.map((a) => a.buffer as ArrayBuffer))] : [],
+    );
   }
 
   paint(paint: Paint) {
@@ -66,7 +75,8 @@ export class Model {
   }
 }
 
-export const shapeModel = (d: Display, color: string) => new Model({ surface: d, hand: true }, { kind: 'plain', color });
+export const shapeModel = (d: Display, color: string) =>
+  new Model({ surface: d, hand: true }, { kind: 'plain', color });
 
 /** Models of one morph share its buffers: one on the GPU, any number of weights. */
 export function morphModels(d: MorphData, count: number, color: string): Model[] {
@@ -82,5 +92,8 @@ export const BALL_SCALE = 0.72;
 /** The surface and the sphere of an embedding. */
 export const sphereModels = ({ surface, sphere }: SphereData) => ({
   surface: new Model({ surface }, WHITE),
-  ball: new Model({ surface: { position: sphere, normal: sphere, index: surface.index, edges: surface.edges }, scale: BALL_SCALE }, WHITE),
+  ball: new Model(
+    { surface: { position: sphere, normal: sphere, index: surface.index, edges: surface.edges }, scale: BALL_SCALE },
+    WHITE,
+  ),
 });

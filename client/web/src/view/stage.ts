@@ -25,7 +25,10 @@ export class View {
   onPick: ((ray: Ray) => void) | null = null;
   own = new Orbit();
 
-  constructor(readonly element: HTMLElement, readonly stage: Stage) {}
+  constructor(
+    readonly element: HTMLElement,
+    readonly stage: Stage,
+  ) {}
 
   get orbit(): Orbit {
     return this.stage.linked ? this.stage.orbit : this.own;
@@ -131,7 +134,15 @@ export class Stage {
       if (box.width < 2 || box.height < 2) continue;
       const look = view.orbit.look(box.width / box.height);
       view.placeMarkers(look, box.width, box.height);
-      if (view.content) frames.push({ model: view.content.id, left: box.left - whole.left, top: box.top - whole.top, width: box.width, height: box.height, look });
+      if (view.content)
+        frames.push({
+          model: view.content.id,
+          left: box.left - whole.left,
+          top: box.top - whole.top,
+          width: box.width,
+          height: box.height,
+          look,
+        });
     }
     this.drawing = true;
     order({ op: 'draw', width: whole.width, height: whole.height, frames });
@@ -183,7 +194,8 @@ function listen(view: View, stage: Stage) {
   });
   const end = (event: PointerEvent) => {
     if (!fingers.delete(event.pointerId)) return;
-    if (event.type === 'pointerup' && start && !start.moved && event.button === 0) view.onPick?.(view.rayAt(event.clientX, event.clientY));
+    if (event.type === 'pointerup' && start && !start.moved && event.button === 0)
+      view.onPick?.(view.rayAt(event.clientX, event.clientY));
     start = null;
   };
   element.addEventListener('pointerup', end);

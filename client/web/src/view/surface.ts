@@ -54,9 +54,14 @@ vec3 shown(vec3 c) {
 }`;
 
 const morph = (slots: number, normals: boolean) =>
-  Array.from({ length: slots }, (_, i) => `p += weight[${i}] * move${i};${normals ? ` n += weight[${i}] * turn${i};` : ''}`).join(' ');
+  Array.from(
+    { length: slots },
+    (_, i) => `p += weight[${i}] * move${i};${normals ? ` n += weight[${i}] * turn${i};` : ''}`,
+  ).join(' ');
 const declared = (slots: number, normals: boolean) =>
-  slots ? `uniform float weight[${slots}]; ${Array.from({ length: slots }, (_, i) => `in vec3 move${i};${normals ? ` in vec3 turn${i};` : ''}`).join(' ')}` : '';
+  slots
+    ? `uniform float weight[${slots}]; ${Array.from({ length: slots }, (_, i) => `in vec3 move${i};${normals ? ` in vec3 turn${i};` : ''}`).join(' ')}`
+    : '';
 
 const COLOR: Record<Paint['kind'], string> = {
   plain: 'vec3 c = base;',
@@ -77,8 +82,16 @@ const COLOR: Record<Paint['kind'], string> = {
 
 export function surfaceMaterial(paint: Paint, slots: number, dense: boolean): ShaderMaterial {
   const tone = paint.kind === 'direction' || paint.kind === 'checker';
-  const carry = paint.kind === 'value' ? ['in float value; out float vValue;', 'vValue = value;', 'in float vValue; uniform sampler2D ramp; uniform vec2 rampRange; uniform bool rampLog;']
-    : tone ? ['in vec3 tone; out vec3 vTone;', 'vTone = tone;', 'in vec3 vTone;'] : ['', '', ''];
+  const carry =
+    paint.kind === 'value'
+      ? [
+          'in float value; out float vValue;',
+          'vValue = value;',
+          'in float vValue; uniform sampler2D ramp; uniform vec2 rampRange; uniform bool rampLog;',
+        ]
+      : tone
+        ? ['in vec3 tone; out vec3 vTone;', 'vTone = tone;', 'in vec3 vTone;']
+        : ['', '', ''];
   const made = new ShaderMaterial({
     glslVersion: GLSL3,
     vertexShader: `${declared(slots, true)} ${carry[0]} out vec3 vLit; ${dense ? LIGHT : ''}
@@ -95,7 +108,10 @@ export function surfaceMaterial(paint: Paint, slots: number, dense: boolean): Sh
         ${COLOR[paint.kind]}
         color = vec4(shown(c * ${dense ? 'vLit' : 'light(normalize(vLit))'}), 1.0);
       }`,
-    uniforms: { base: { value: paint.kind === 'plain' ? linear(paint.color) : [1, 1, 1] }, weight: { value: new Array<number>(slots).fill(0) } },
+    uniforms: {
+      base: { value: paint.kind === 'plain' ? linear(paint.color) : [1, 1, 1] },
+      weight: { value: new Array<number>(slots).fill(0) },
+    },
     polygonOffset: true,
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
@@ -119,8 +135,13 @@ export function wireMaterial(slots: number): ShaderMaterial {
         ${morph(slots, false)}
         gl_Position = projectionMatrix * modelViewMatrix * vec4(p, 1.0);
       }`,
-    fragmentShader: 'uniform vec3 base; uniform float strength; out vec4 color; void main() { color = vec4(base, strength); }',
-    uniforms: { base: { value: [0, 0, 0] }, strength: { value: 0.42 }, weight: { value: new Array<number>(slots).fill(0) } },
+    fragmentShader:
+      'uniform vec3 base; uniform float strength; out vec4 color; void main() { color = vec4(base, strength); }',
+    uniforms: {
+      base: { value: [0, 0, 0] },
+      strength: { value: 0.42 },
+      weight: { value: new Array<number>(slots).fill(0) },
+    },
     transparent: true,
   });
 }
