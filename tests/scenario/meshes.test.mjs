@@ -194,7 +194,10 @@ test('cut and scrambled files never do harm', async (t) => {
     shapes.binaryStl(ball(1)),
   ];
   let seed = 12345;
-  const random = (n) => ((seed = (Math.imul(seed, 1103515245) + 12345) >>> 0), seed % n);
+  const random = (n) => {
+    seed = (Math.imul(seed, 1103515245) + 12345) >>> 0;
+    return seed % n;
+  };
   for (const file of files)
     for (let i = 0; i < 25; i++) {
       const bytes = Buffer.from(file.subarray(0, 1 + random(file.length)));

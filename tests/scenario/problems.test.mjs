@@ -11,8 +11,10 @@ import { binaries, daemon, endless, root, samples } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const text = await readFile(path.join(root, 'docs/troubleshooting.md'), 'utf8');
-const sections = new Map([...text.matchAll(/^## (\S+)\n([^]*?)(?=^#|$(?![^]))/gm)].map((m) => [m[1], m[2].trim()]));
-const table = (await readFile(path.join(root, 'api/problem.c'), 'utf8')).match(/table\[\] = \{\n([^]*?)\n\};/)[1];
+const sections = new Map(
+  [...text.matchAll(/^## (\S+)\n([\s\S]*?)(?=^#|$(?![\s\S]))/gm)].map((m) => [m[1], m[2].trim()]),
+);
+const table = (await readFile(path.join(root, 'api/problem.c'), 'utf8')).match(/table\[\] = \{\n([\s\S]*?)\n\};/)[1];
 const names = [...table.matchAll(/\{"([a-z-]+)", \d{3}, /g)].map((m) => m[1]);
 
 test('there is a section for every problem, and none for others', async () => {

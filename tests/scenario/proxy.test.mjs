@@ -115,7 +115,10 @@ async function proxy(t, name, changes = []) {
         (reply) => {
           const parts = [];
           reply
-            .on('data', (part) => (parts.push(part), each?.(part.toString(), r)))
+            .on('data', (part) => {
+              parts.push(part);
+              each?.(part.toString(), r);
+            })
             .on('error', reject)
             .on('end', () =>
               resolve({

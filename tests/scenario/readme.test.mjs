@@ -67,7 +67,7 @@ test('the documents with lines that run are there', async () => {
 test('links and pictures are there', async () => {
   for (const file of await documents()) {
     const text = await readFile(path.join(root, file), 'utf8');
-    for (const [, target] of text.replace(/^```[^]*?^```$/gm, '').matchAll(/\]\(([^)]+)\)/g)) {
+    for (const [, target] of text.replace(/^```[\s\S]*?^```$/gm, '').matchAll(/\]\(([^)]+)\)/g)) {
       if (/^(https?:|#)/.test(target)) continue;
       assert.ok(existsSync(path.resolve(root, path.dirname(file), target.split('#')[0])), `${file}: ${target}`);
     }

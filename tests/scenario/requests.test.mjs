@@ -125,7 +125,7 @@ test('a body must say how long it is, or come in chunks', async (t) => {
   assert.equal(statusOf(none), 411, none.slice(0, 300));
   const text = shapes.tetrahedron;
   const chunks = text
-    .match(/[^]{1,17}/g)
+    .match(/[\s\S]{1,17}/g)
     .map((c) => `${c.length.toString(16)}\r\n${c}\r\n`)
     .join('');
   const chunked = await raw(

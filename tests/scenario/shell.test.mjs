@@ -100,11 +100,12 @@ test('the manual pages render without a warning', async () => {
 
 test('the manual pages document every command and option', async () => {
   const text = async (page) =>
+    // biome-ignore lint/suspicious/noControlCharactersInRegex: mandoc overstrikes with backspaces
     (await runProgram('mandoc', ['-T', 'utf8', path.join(root, 'deploy/man', page)])).out.replace(/.\x08/g, '');
   const options = (help) => [...new Set(help.match(/(?<=^|[ ,(])--[a-z][a-z-]+/gm))];
   const client = await text('orbmorph.1');
   const top = (await run(['--help'])).out;
-  for (const [, command] of top.matchAll(/^  ([a-z]+) /gm)) {
+  for (const [, command] of top.matchAll(/^ {2}([a-z]+) /gm)) {
     assert.match(client, new RegExp(`^ +${command} `, 'm'), command);
     for (const option of options((await run([command, '--help'])).out))
       assert.match(client, new RegExp(`${option}\\b`), `orbmorph.1: ${command} ${option}`);

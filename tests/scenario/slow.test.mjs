@@ -92,7 +92,7 @@ test('answers that nobody takes, and clients that wait', async (t) => {
   assert.equal(polled.json.state, 'queued', 'the first keeps the worker');
   assert.ok(!stream.closed && /retry: 2000/.test(stream.text), 'the stream is still there');
   kept.socket.write('GET /livez HTTP/1.1\r\nHost: x\r\n\r\n');
-  await until(() => /200 OK[^]*200 OK/.test(kept.text), 'an answer on the connection that was kept');
+  await until(() => /200 OK[\s\S]*200 OK/.test(kept.text), 'an answer on the connection that was kept');
   stuck.socket.resume();
   await within(stuck.ended, 'the stuck one is closed');
   assert.ok(stuck.bytes < size, `${stuck.bytes} bytes`);
@@ -151,7 +151,7 @@ test('an address has so many requests and connections', async (t) => {
     const late = connect(d, t);
     late.socket.write('GET /v1/meshes HTTP/1.1\r\nHost: x\r\n\r\n');
     await Promise.race([late.ended, sleep(2000)]); // answered: it came before some of the many were seen
-    return late.closed && /^HTTP\/1\.1 429 [^]*more than 20 connections/.test(late.text);
+    return late.closed && /^HTTP\/1\.1 429 [\s\S]*more than 20 connections/.test(late.text);
   }, 'refused and closed');
   const alive = connect(d, t);
   alive.socket.write('GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n');

@@ -106,7 +106,7 @@ test('from the empty page to a playing morph in at most five clicks', async () =
 test('upload, pick, name, undo, redo, export, import', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
-  assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > b + 40)) > 2000, 'the first shape is drawn');
+  assert.ok((await countPixels(page, '.stage-area', (r, _g, b) => r > b + 40)) > 2000, 'the first shape is drawn');
   await pickThree(page);
   assert.equal(await page.locator('.marker:not(.still)').count(), 6);
 

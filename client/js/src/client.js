@@ -7,8 +7,14 @@ const ENDED = new Set(['succeeded', 'failed', 'cancelled']);
 const sleep = (ms, signal) =>
   new Promise((resolve, reject) => {
     if (signal?.aborted) return reject(abortError(signal));
-    const stop = () => (clearTimeout(timer), reject(abortError(signal)));
-    const timer = setTimeout(() => (signal?.removeEventListener('abort', stop), resolve()), ms);
+    const stop = () => {
+      clearTimeout(timer);
+      reject(abortError(signal));
+    };
+    const timer = setTimeout(() => {
+      signal?.removeEventListener('abort', stop);
+      resolve();
+    }, ms);
     signal?.addEventListener('abort', stop, { once: true });
   });
 

@@ -49,8 +49,14 @@ function sendXhr(url, body, size, { headers, onProgress, signal }) {
       if (xhr.status >= 200 && xhr.status < 300) resolve(answer);
       else reject(new ProblemError(answer.json ?? { title: xhr.statusText }, xhr.status));
     };
-    xhr.onerror = () => (end(), reject(new UnreachableError(url)));
-    xhr.onabort = () => (end(), reject(abortError(signal)));
+    xhr.onerror = () => {
+      end();
+      reject(new UnreachableError(url));
+    };
+    xhr.onabort = () => {
+      end();
+      reject(abortError(signal));
+    };
     signal?.addEventListener('abort', abort);
     xhr.send(body);
   });

@@ -74,7 +74,7 @@ test(
 
 test(
   'a refused request throws a ProblemError with its details',
-  using({}, async (daemon, client) => {
+  using({}, async (_daemon, client) => {
     await assert.rejects(client.uploadMesh(bytes('open')), (error) => {
       assert.ok(error instanceof ProblemError);
       assert.equal(error.kind, 'not-closed');
@@ -88,7 +88,7 @@ test(
 
 test(
   'a failed job throws its problem',
-  using({}, async (daemon, client) => {
+  using({}, async (_daemon, client) => {
     await assert.rejects(
       client.merge({ shapes: [], fail: true }),
       (error) => error instanceof ProblemError && error.kind === 'bad-landmarks',
@@ -145,7 +145,7 @@ test(
 
 test(
   'a list continues on its next pages',
-  using({}, async (daemon, client) => {
+  using({}, async (_daemon, client) => {
     for (const text of ['a', 'b', 'c']) await client.uploadMesh(bytes(text), { name: text });
     const names = [];
     for await (const mesh of client.list('meshes')) names.push(mesh.name);

@@ -140,10 +140,10 @@ export function parse(text) {
   if (/^(OFF|ply)/.test(text)) {
     const words = text
       .replace(/#.*$/gm, '')
-      .replace(/^ply[^]*?end_header\n/, '')
+      .replace(/^ply[\s\S]*?end_header\n/, '')
       .trim()
       .split(/\s+/);
-    const head = /element vertex (\d+)[^]*element face (\d+)/.exec(text);
+    const head = /element vertex (\d+)[\s\S]*element face (\d+)/.exec(text);
     let at = 0;
     let n;
     let m;
@@ -153,10 +153,10 @@ export function parse(text) {
       [n, m] = [Number(words[1]), Number(words[2])];
     }
     const positions = Array.from({ length: n }, () => [Number(words[at++]), Number(words[at++]), Number(words[at++])]);
-    const triangles = Array.from(
-      { length: m },
-      () => (at++, [Number(words[at++]), Number(words[at++]), Number(words[at++])]),
-    );
+    const triangles = Array.from({ length: m }, () => {
+      at++; // the number of corners
+      return [Number(words[at++]), Number(words[at++]), Number(words[at++])];
+    });
     return { positions, triangles };
   }
   const positions = [];

@@ -115,7 +115,7 @@ export function icosphere(steps) {
 
 const RADII = [
   (x, y) => 1 + 0.35 * Math.sin(5 * x) * Math.cos(4 * y),
-  (x, y, z) => 1 + 0.5 * Math.max(0, y) ** 4 + 0.3 * Math.cos(6 * z),
+  (_x, y, z) => 1 + 0.5 * Math.max(0, y) ** 4 + 0.3 * Math.cos(6 * z),
 ];
 
 function placed({ points }, radius) {

@@ -125,6 +125,9 @@ export async function startDaemon({ jobSteps = 3, breakStream = false, noEvents 
     url: `http://127.0.0.1:${server.address().port}`,
     seen,
     jobs,
-    stop: () => (server.closeAllConnections(), new Promise((resolve) => server.close(resolve))),
+    stop: () => {
+      server.closeAllConnections();
+      return new Promise((resolve) => server.close(resolve));
+    },
   };
 }

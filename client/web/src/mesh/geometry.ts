@@ -209,8 +209,8 @@ export function edgesOf(index: Uint32Array): Uint32Array {
     for (let k = 0; k < 3; k++) {
       const i = index[t + k];
       const j = index[t + ((k + 1) % 3)];
-      const a = i < j ? i : j;
-      const b = i < j ? j : i;
+      const a = Math.min(i, j);
+      const b = Math.max(i, j);
       let slot = ((Math.imul(a, 0x9e3779b1) ^ Math.imul(b, 0x85ebca6b)) >>> 7) & (size - 1);
       while (low[slot] >= 0 && (low[slot] !== a || high[slot] !== b)) slot = (slot + 1) & (size - 1);
       if (low[slot] >= 0) continue;

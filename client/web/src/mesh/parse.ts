@@ -93,6 +93,10 @@ class Scanner {
     while (this.at < this.bytes.length && this.bytes[this.at] > 32) this.at++;
     return String.fromCharCode(...this.bytes.subarray(start, Math.min(this.at, start + 64)));
   }
+  nextNumber(): number {
+    this.skip();
+    return this.number();
+  }
   number(): number {
     const { bytes } = this;
     const start = this.at;
@@ -186,13 +190,9 @@ function parseOff(bytes: Uint8Array): RawMesh {
   s.skip();
   const head = s.word();
   const counts: number[] = /OFF$/i.test(head) ? [] : [parseFloat(head)];
-  while (counts.length < 3) {
-    s.skip();
-    counts.push(s.number());
-  }
+  while (counts.length < 3) counts.push(s.nextNumber());
   for (let i = 0; i < counts[0] && !s.ended; i++) {
-    s.skip();
-    const x = s.number();
+    const x = s.nextNumber();
     s.more();
     const y = s.number();
     s.more();
@@ -202,8 +202,7 @@ function parseOff(bytes: Uint8Array): RawMesh {
   }
   const polygon: number[] = [];
   for (let i = 0; i < counts[1] && !s.ended; i++) {
-    s.skip();
-    const n = s.number();
+    const n = s.nextNumber();
     let count = 0;
     while (count < n && s.more()) polygon[count++] = s.number();
     s.nextLine();
@@ -355,18 +354,18 @@ function parsePly(bytes: Uint8Array): RawMesh {
         const property = element.properties[k];
         if (!property.count) {
           if (text ? text.ended : at + PLY_SIZES[property.type] > bytes.length) break rows;
-          const value = text ? (text.skip(), text.number()) : readers[k](view, at, little);
+          const value = text ? text.nextNumber() : readers[k](view, at, little);
           if (!text) at += PLY_SIZES[property.type];
           if (columns[k]) columns[k]![row] = value;
           continue;
         }
         if (text ? text.ended : at >= bytes.length) break rows;
         const size = PLY_SIZES[property.type];
-        const count = text ? (text.skip(), text.number()) : plyReader(property.count)(view, at, little);
+        const count = text ? text.nextNumber() : plyReader(property.count)(view, at, little);
         if (!text) at += PLY_SIZES[property.count];
         if (!text && at + count * size > bytes.length) break rows;
         for (let i = 0; i < count; i++) {
-          polygon[i] = text ? (text.skip(), text.number()) : readers[k](view, at, little);
+          polygon[i] = text ? text.nextNumber() : readers[k](view, at, little);
           if (!text) at += size;
         }
         if (element.name === 'face' && /^vertex_ind/.test(property.name)) corners.fan(polygon, count);

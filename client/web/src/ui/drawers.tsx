@@ -15,6 +15,7 @@ export function Drawer() {
     dialog.current!.showModal();
   }, []);
   return (
+    // biome-ignore lint/a11y/useKeyWithClickEvents: the click is on the backdrop; Escape closes a dialog by itself
     <dialog
       ref={dialog}
       class="drawer"

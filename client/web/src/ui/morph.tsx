@@ -6,7 +6,7 @@ import { explain } from '../actions/token';
 import { measureErrors } from '../actions/merge';
 import { player } from '../player';
 import { client } from '../state';
-import { RAMPS, rampCss } from '../view/colors';
+import { type RAMPS, rampCss } from '../view/colors';
 import { Button, count, Icon, relative, Segments, Switch } from './parts';
 import { Pane } from './pane';
 import { OptionsFold } from './shapes';

@@ -70,6 +70,7 @@ export function Button({ icon, label, kind = 'plain', children, ...rest }: Butto
 export function Switch({ label, on, onChange }: { label: string; on: boolean; onChange: (on: boolean) => void }) {
   return (
     <label class="switch">
+      {/* biome-ignore lint/a11y/useAriaPropsForRole: a checkbox has its checked state without aria-checked */}
       <input type="checkbox" role="switch" checked={on} onChange={(event) => onChange(event.currentTarget.checked)} />
       <span class="track" aria-hidden="true" />
       <span>{label}</span>
@@ -108,6 +109,7 @@ export function Segments<T extends string>({
 
 export function Field({ label, hint, children }: { label: string; hint?: string; children: ComponentChildren }) {
   return (
+    // biome-ignore lint/a11y/noLabelWithoutControl: the children hold the control
     <label class="field">
       <span class="field-name">{label}</span>
       {children}

@@ -45,8 +45,8 @@ function Empty() {
   const pair = samplePair();
   return (
     <div class="welcome">
-      <div class="welcome-art" aria-hidden="true">
-        <svg viewBox="0 0 360 120">
+      <div class="welcome-art">
+        <svg viewBox="0 0 360 120" aria-hidden="true">
           <defs>
             <linearGradient id="g1" x1="0" y1="0" x2="1" y2="1">
               <stop offset="0" stop-color="#f2c3aa" />

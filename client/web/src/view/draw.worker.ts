@@ -14,7 +14,7 @@ import {
   Points,
   PointsMaterial,
   Scene,
-  ShaderMaterial,
+  type ShaderMaterial,
   Sphere,
   Vector3,
   WebGLRenderer,
