@@ -138,8 +138,8 @@ test('STL: corner k of facet i is vertex 3i + k, in text and binary', () => {
   }
   const display = mesh.buildDisplay(mesh.parseMesh(binary.buffer));
   assert.equal(new Set(display.edges).size > 0, true);
-  assert.equal(mesh.faultyEdges(mesh.parseMesh(binary.buffer), true).length, 0, 'closed once welded');
-  assert.equal(mesh.faultyEdges(mesh.parseMesh(binary.buffer), false).length, 24, 'every edge open in the file');
+  assert.equal(mesh.defectiveEdges(mesh.parseMesh(binary.buffer), true).length, 0, 'closed once welded');
+  assert.equal(mesh.defectiveEdges(mesh.parseMesh(binary.buffer), false).length, 24, 'every edge open in the file');
 });
 
 test('glTF: accessors of all primitives one after another, after node transforms', () => {
@@ -195,7 +195,7 @@ test('the samples are closed, and their geometry is what the files say', async (
   ]) {
     const raw = mesh.parseMesh(await file(sample(name)));
     if (triangles) assert.equal(raw.corners.length / 3, triangles);
-    assert.equal(mesh.faultyEdges(raw, false).length, 0, name);
+    assert.equal(mesh.defectiveEdges(raw, false).length, 0, name);
     const display = mesh.buildDisplay(raw);
     assert.equal(mesh.edgesOf(raw.corners).length / 2, (raw.corners.length / 3) * 1.5, 'edges = 3/2 triangles');
     let far = 0;

@@ -39,9 +39,9 @@ const give = async (page, secret) => {
 
 test('without a token the page asks for one, and says when it is not known', async () => {
   const { page, done } = await openPage(browser, daemon.url);
-  await page.getByRole('dialog', { name: 'This daemon wants a token' }).waitFor();
+  await page.getByRole('dialog', { name: 'This daemon requires a token' }).waitFor();
   await give(page, 'f'.repeat(64));
-  await page.getByText('This token is not known here.').waitFor();
+  await page.getByText('The daemon does not know this token.').waitFor();
   await page.keyboard.press('Escape');
   assert.ok(await page.getByRole('dialog').isVisible(), 'there is no way around it');
   await done();
@@ -82,7 +82,7 @@ test('with a token the whole way works; it stays in the tab and out of addresses
   await done();
 
   const other = await openPage(browser, daemon.url);
-  await other.page.getByRole('dialog', { name: 'This daemon wants a token' }).waitFor();
+  await other.page.getByRole('dialog', { name: 'This daemon requires a token' }).waitFor();
   await other.done();
 });
 

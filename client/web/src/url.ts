@@ -1,7 +1,8 @@
 /**
- * The state of the page in the fragment of its address, so that a link or a reload brings it back:
+ * Keeps the state of the page in the fragment of its URL, so that a link or a reload restores it:
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
- * m: meshes on the server, r: a supermesh, j: a job, l: landmarks (vertex, or x_y_z, one for each shape), cam: camera.
+ * m: meshes on the server, r: a supermesh, j: a job, t: time along the morph, l: landmarks (a vertex or x_y_z for each
+ * shape), cam: camera, o: options.
  */
 import type { Place } from 'orbmorph';
 import { client, DEFAULTS, readyShapes, set, state, TABS, watch, type Options, type Tab } from './state';
@@ -109,7 +110,7 @@ export async function restore() {
     const result = query.get('r');
     const tab = query.get('tab') as Tab;
     if (ids.length) {
-      set({ loading: 'Opening the shapes' });
+      set({ loading: 'Loading the shapes' });
       const meshes = await Promise.allSettled(ids.map((id) => client.getMesh(id)));
       await Promise.all(meshes.flatMap((m) => (m.status === 'fulfilled' ? [addFromServer(m.value)] : [])));
       set({ loading: null });
@@ -117,8 +118,8 @@ export async function restore() {
       if (lost)
         set({
           problem: {
-            title: 'Not on the server any more',
-            detail: `${lost} of ${ids.length} shapes of this address are gone. Add the files again.`,
+            title: 'Some shapes are missing',
+            detail: `${lost} of the ${ids.length} shapes in this URL are no longer on the server. Add the files again.`,
             facts: null,
           },
         });
@@ -151,7 +152,7 @@ export async function restore() {
   if (job) void resumeJob(job);
 }
 
-/** Keeps the address true; a link to another state of this page, pasted into the address, is followed. */
+/** Keeps the URL up to date. Pasting a URL of another state reloads the page with that state. */
 export function keepUrl() {
   watch(save);
   player.listen(save);

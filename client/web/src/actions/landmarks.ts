@@ -1,4 +1,4 @@
-/** Landmarks: set, moved, named, deleted, undone; read from and written to files in the daemon's format. */
+/** Edits landmarks with undo, and imports and exports them in the daemon's format. */
 import type { Landmark as WireLandmark, Place } from 'orbmorph';
 import { work } from '../mesh/work';
 import type { Spot } from '../mesh/worker';
@@ -6,7 +6,7 @@ import { readyShapes, set, state, toast, wireLandmarks, type Landmark, type Shap
 
 let count = 0;
 
-/** Every change goes through here, so that it can be undone. A morph made from the old landmarks stays in view. */
+/** Every edit goes through here, which makes it undoable. A morph made from the old landmarks stays in view. */
 function change(landmarks: Landmark[], active = state.active) {
   set({ past: [...state.past.slice(-199), state.landmarks], future: [], landmarks, active });
 }
@@ -21,7 +21,7 @@ export function redo() {
   if (next) set({ future, past: [...state.past, state.landmarks], landmarks: next });
 }
 
-/** The landmark that the next click belongs to: the active one while it is not on every shape. */
+/** The landmark that the next click sets: the active one, as long as a shape lacks it. */
 export function pending(): Landmark | null {
   const active = state.landmarks.find((landmark) => landmark.id === state.active);
   const shapes = readyShapes();
@@ -71,7 +71,7 @@ export function forgetShape(key: string) {
   set({ landmarks, past: [], future: [] });
 }
 
-/** Replaces the landmarks by those of a file or of an answer. -> how many were taken */
+/** Replaces the landmarks by those of a file or a response. Returns how many fit the shapes. */
 export async function takeLandmarks(
   list: Pick<WireLandmark, 'name' | 'at'>[],
   { undoable = true, snap = false } = {},
@@ -102,13 +102,13 @@ export async function importLandmarks(file: File) {
   try {
     const content = JSON.parse(await file.text());
     const list = Array.isArray(content) ? content : content.landmarks;
-    if (!Array.isArray(list)) throw new Error('It holds no array of landmarks.');
+    if (!Array.isArray(list)) throw new Error('It contains no array of landmarks.');
     const taken = await takeLandmarks(list);
     toast(
-      taken === list.length ? `${taken} landmarks read.` : `${taken} of ${list.length} landmarks fit these shapes.`,
+      taken === list.length ? `${taken} landmarks imported.` : `${taken} of ${list.length} landmarks fit these shapes.`,
     );
   } catch (error) {
-    toast(`${file.name} is no landmark file. ${(error as Error).message}`, 'error');
+    toast(`${file.name} is not a landmark file. ${(error as Error).message}`, 'error');
   }
 }
 

@@ -1,4 +1,4 @@
-/** Morphing: the request, the job with its progress, the asset, and playing it. */
+/** Sends the merge request, follows its job, loads the asset and plays it. */
 import { CancelledError, ProblemError, type Job, type Supermesh, type SupermeshRequest } from 'orbmorph';
 import { client, readyShapes, set, state, tint, toast, wireLandmarks, type Result, type Running } from '../state';
 import { work } from '../mesh/work';
@@ -35,7 +35,7 @@ export async function startMerge(purpose: Running['purpose'] = 'morph') {
   );
 }
 
-/** Goes on with a job that an earlier visit began. */
+/** Follows a job that an earlier visit started. */
 export async function resumeJob(id: string) {
   const running: Running = { purpose: 'morph', job: null, abort: new AbortController() };
   set({ running });
@@ -70,23 +70,23 @@ async function follow(running: Running, get: () => Promise<Supermesh>, request: 
     }
   } catch (error) {
     if (running.abort.signal.aborted || error instanceof CancelledError) toast('Cancelled.');
-    else set({ problem: tell(error) });
+    else set({ problem: describe(error) });
   } finally {
     if (state.running === running) set({ running: null });
   }
 }
 
-function tell(error: unknown) {
+function describe(error: unknown) {
   if (error instanceof ProblemError && (error.status === 401 || error.status === 403))
-    return { title: 'Not with this token', detail: explain(error), facts: null };
+    return { title: 'The token does not allow this', detail: explain(error), facts: null };
   if (error instanceof ProblemError)
-    return { title: error.title || 'The daemon refused', detail: error.detail, facts: error.problem };
-  return { title: 'That did not work', detail: (error as Error).message, facts: null };
+    return { title: error.title || 'The daemon refused the request', detail: error.detail, facts: error.problem };
+  return { title: 'The request failed', detail: (error as Error).message, facts: null };
 }
 
 const PROPOSALS = 12;
 
-/** The landmarks that the answer names, or else well-spread places of the correspondence it stands for. */
+/** Takes the landmarks of the response; if it has none, well-spread places of the correspondence it found. */
 async function takeFound(supermesh: Supermesh) {
   const named = (supermesh.landmarks ?? []).filter((l) => 'at' in l);
   const points = named.length
@@ -95,7 +95,7 @@ async function takeFound(supermesh: Supermesh) {
   const found = named.length ? named : points.map((at) => ({ name: '', at: at.map((point) => ({ point })) }));
   const taken = await takeLandmarks(found, { snap: true });
   set({ tab: 'landmarks' });
-  toast(`${taken} landmarks found. Drag those that are off.`);
+  toast(`${taken} landmarks found. Drag any that are off.`);
 }
 
 export function cancelMerge() {
@@ -103,7 +103,7 @@ export function cancelMerge() {
 }
 
 export async function openResult(supermesh: Supermesh, request: SupermeshRequest | null) {
-  set({ loading: 'Fetching the morph' });
+  set({ loading: 'Loading the morph' });
   try {
     const buffer = await client.asset(supermesh.id);
     const data = await work('morph', supermesh.id, buffer, supermesh.shapes.length);
@@ -146,7 +146,7 @@ export function clearResult() {
   set({ result: null, mix: null, playing: false, show: 'morph', side: 'before' });
 }
 
-/** The error of the supermesh on every shape, painted on the original. */
+/** Measures the supermesh's error on every shape and paints it on the original surface. */
 export async function measureErrors() {
   const { result } = state;
   if (!result) return;
@@ -158,7 +158,7 @@ export async function measureErrors() {
     set({ loading: `Measuring the error on ${shape.name}` });
     try {
       const found = await work('error', shape.key, result.supermesh.id, index, index > 0 && fit !== 'none');
-      const model = shape.model!.twin();
+      const model = shape.model!.copy();
       model.attribute('value', found.values);
       model.paint({ kind: 'value', ramp: 'heat', low: 0, high: Math.max(found.max, 1e-9) });
       shape.error = { result: result.supermesh.id, model, ...found };

@@ -1,11 +1,11 @@
-/** A tree of boxes over triangles: rays for picking, closest points for error maps. Built and asked in the worker. */
+/** A tree of boxes over triangles: rays for picking, nearest points for error maps. The worker builds and queries it. */
 
 export interface Hit {
   triangle: number;
   /** barycentric coordinates of the second and third corner */
   u: number;
   v: number;
-  /** along the ray, or the distance */
+  /** the parameter along the ray, or the distance */
   t: number;
 }
 

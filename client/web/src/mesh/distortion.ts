@@ -1,6 +1,6 @@
 /**
- * The distortion of a spherical map from sphere.ply, per triangle and per vertex, with the daemon's definitions: both
- * areas scaled equal, the image of a triangle is its flat chord triangle, sigma1 >= sigma2 the singular values.
+ * The distortion of a spherical map from sphere.ply, per triangle and per vertex, as the daemon defines it: both areas
+ * are scaled to be equal, the image of a triangle is its flat chord triangle, sigma1 >= sigma2 are the singular values.
  */
 import { buildDisplay, type Display } from './geometry';
 import { parseMesh } from './parse';
@@ -10,7 +10,7 @@ export type MeasureName = (typeof MEASURES)[number];
 
 export interface SphereData {
   surface: Display;
-  /** for each vertex drawn, its place on the sphere */
+  /** for each drawn vertex, its point on the sphere */
   sphere: Float32Array;
   values: Record<MeasureName, Float32Array>;
 }
@@ -19,7 +19,7 @@ export function decodeSphere(buffer: ArrayBuffer): SphereData {
   const raw = parseMesh(buffer);
   const { positions: x, corners, properties } = raw;
   const [px, py, pz] = ['px', 'py', 'pz'].map((name) => properties?.get(name));
-  if (!px || !py || !pz) throw new Error('The file has no places on the sphere.');
+  if (!px || !py || !pz) throw new Error('The file has no points on the sphere.');
   const n = x.length / 3;
   const image = new Float64Array(3 * n);
   for (let i = 0; i < n; i++) {
@@ -28,7 +28,7 @@ export function decodeSphere(buffer: ArrayBuffer): SphereData {
     image[3 * i + 2] = pz[i];
   }
   const values = vertexDistortion(x, image, corners);
-  // one vertex drawn for each vertex of the mesh: no creases, so that the sphere stays closed
+  // one drawn vertex for each vertex of the mesh: splitting at creases would open the sphere
   const surface = buildDisplay({ ...raw, properties: undefined }, 180);
   const sphere = new Float32Array(surface.position.length);
   const spread = {} as Record<MeasureName, Float32Array>;

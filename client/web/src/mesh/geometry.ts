@@ -1,4 +1,4 @@
-/** From a parsed mesh to what the GPU draws: centred, scaled to the unit ball, smooth normals with creases, edges. */
+/** Turns a parsed mesh into what the GPU draws: scaled to the unit ball, with smooth normals, creases and edges. */
 import type { RawMesh } from './parse';
 
 export interface Frame {
@@ -35,7 +35,7 @@ export function frameOf(positions: ArrayLike<number>, used?: Uint32Array): Frame
   return { center: [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2], radius: d / 2 || 1 };
 }
 
-/** Equal places get equal numbers. -> for each vertex the number of its place */
+/** Numbers the distinct positions. Returns the number of each vertex's position. */
 export function weld(positions: Float64Array): { place: Uint32Array; count: number } {
   const n = positions.length / 3;
   let size = 1;
@@ -98,7 +98,7 @@ export function buildDisplay(raw: RawMesh, creaseDegrees = 48): Display {
     length[t] = Math.hypot(nx, ny, nz);
   }
 
-  // the corners around each place
+  // the corners at each position
   const first = new Uint32Array(places + 1);
   for (let i = 0; i < corners.length; i++) first[place[corners[i]] + 1]++;
   for (let p = 0; p < places; p++) first[p + 1] += first[p];
@@ -222,7 +222,7 @@ export function edgesOf(index: Uint32Array): Uint32Array {
   return out.slice(0, n);
 }
 
-/** The triangles of all pieces but the largest, for showing what is loose. -> triangle flags, number of pieces */
+/** Finds the triangles of all components but the largest. Returns triangle flags and the number of components. */
 export function loosePieces(raw: RawMesh): { loose: Uint8Array; pieces: number } {
   const { place, count } = weld(raw.positions);
   const parent = Uint32Array.from({ length: count }, (_, i) => i);
@@ -248,8 +248,8 @@ export function loosePieces(raw: RawMesh): { loose: Uint8Array; pieces: number }
   return { loose, pieces: sizes.size };
 }
 
-/** Edges that belong to other than two faces: the rims of holes and the seams of three faces. -> pairs of vertices */
-export function faultyEdges(raw: RawMesh, welded: boolean): Uint32Array {
+/** Edges without exactly two faces: boundaries of holes and non-manifold edges. Returns pairs of vertices. */
+export function defectiveEdges(raw: RawMesh, welded: boolean): Uint32Array {
   const n = raw.positions.length / 3;
   const place = welded ? weld(raw.positions).place : Uint32Array.from({ length: n }, (_, i) => i);
   const uses = new Map<number, [number, number, number]>();

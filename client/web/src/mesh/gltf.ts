@@ -1,4 +1,4 @@
-/** As much of glTF 2.0 as meshes and morphs need: accessors (sparse and normalised ones too), nodes, targets. */
+/** The part of glTF 2.0 that meshes and morphs need: accessors (also sparse and normalised), nodes, targets. */
 
 interface Accessor {
   bufferView?: number;
@@ -168,7 +168,7 @@ export class Gltf {
   floats = (accessor: number) => this.read(accessor, (n) => new Float32Array(n));
   integers = (accessor: number) => this.read(accessor, (n) => new Uint32Array(n));
 
-  /** The matrix of the first node that shows each mesh. */
+  /** For each mesh, the matrix of the first node that uses it. */
   private matrices(): Map<number, number[]> {
     const { json } = this;
     const found = new Map<number, number[]>();
@@ -207,7 +207,7 @@ export class Gltf {
 
 function dataUri(uri: string): Uint8Array {
   const text = uri.match(/^data:[^,]*;base64,(.*)$/s);
-  if (!text) throw new Error('The file refers to another file, which is not here; save it as GLB.');
+  if (!text) throw new Error('The file refers to another file, which is not included. Save it as GLB.');
   return Uint8Array.from(atob(text[1]), (c) => c.charCodeAt(0));
 }
 

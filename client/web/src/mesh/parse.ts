@@ -1,7 +1,7 @@
 /**
- * Reads mesh files for display: OBJ, OFF, PLY, STL, glTF and GLB. Vertices keep the numbers of the file, as the daemon
- * counts them: OBJ, OFF and PLY in file order, STL 3·facet + corner, glTF the POSITION accessors of all triangle
- * primitives one after another. It is lenient (the daemon decides what is a mesh); it shows what can be shown.
+ * Reads mesh files for display: OBJ, OFF, PLY, STL, glTF and GLB. Vertices have the same numbers as in the daemon: OBJ,
+ * OFF and PLY in file order, STL 3·facet + corner, glTF the POSITION accessors of all triangle primitives one after
+ * another. The reader is lenient and shows what it can; the daemon decides what is a mesh.
  */
 import { readGlb, type Gltf } from './gltf';
 
@@ -11,7 +11,7 @@ export interface RawMesh {
   positions: Float64Array;
   /** three vertices of the file for each triangle */
   corners: Uint32Array;
-  /** further properties of PLY vertices, by name */
+  /** other properties of PLY vertices, by name */
   properties?: Map<string, Float64Array>;
 }
 
@@ -43,7 +43,7 @@ class Corners {
     }
     this.data[this.length++] = value;
   }
-  /** A polygon as a fan. */
+  /** Adds a polygon as a triangle fan. */
   fan(polygon: number[], count = polygon.length) {
     for (let i = 2; i < count; i++) {
       this.push(polygon[0]);
@@ -54,14 +54,14 @@ class Corners {
   done = () => this.data.slice(0, this.length);
 }
 
-/** Walks over text as bytes; numbers are read without making strings where that is exact enough for display. */
+/** Scans text as bytes; reads numbers without creating strings where that is exact enough for display. */
 class Scanner {
   at = 0;
   constructor(readonly bytes: Uint8Array) {}
   get ended() {
     return this.at >= this.bytes.length;
   }
-  /** Skips blanks within the line; true where something follows on it. */
+  /** Skips blanks within the line. Returns whether something follows on it. */
   more(): boolean {
     const { bytes } = this;
     for (;;) {
@@ -408,7 +408,7 @@ function parseGltf(gltf: Gltf, format: string): RawMesh {
   return { format, positions, corners };
 }
 
-/** What cannot be drawn (a vertex that does not exist or is not finite) is left out. */
+/** Drops triangles that cannot be drawn because a vertex does not exist or is not finite. */
 function drawable(raw: RawMesh): RawMesh {
   const { positions, corners } = raw;
   const vertices = positions.length / 3;
@@ -427,7 +427,7 @@ function drawable(raw: RawMesh): RawMesh {
   return { ...raw, corners: n === corners.length ? corners : corners.slice(0, n) };
 }
 
-/** Told by content, as the daemon does. */
+/** Detects the format by content, as the daemon does. */
 export function parseMesh(buffer: ArrayBuffer): RawMesh {
   const bytes = new Uint8Array(buffer);
   const head = ascii(bytes, 0, Math.min(512, bytes.length)).trimStart();

@@ -1,6 +1,6 @@
 /**
- * Landmarks from a found correspondence: tips and other places that stand far apart, on every shape. The common mesh
- * carries each of its vertices to all shapes, so one choice gives a landmark everywhere.
+ * Landmarks from a found correspondence: tips and other places that are far apart on every shape. The common mesh has
+ * a place on all shapes for each vertex, so choosing a vertex gives a landmark on every shape.
  */
 import { edgesOf, weld } from './geometry';
 import type { MorphData } from './morph';
@@ -60,8 +60,8 @@ export function shapePositions(data: MorphData, shape: number): Float64Array {
 }
 
 /**
- * `count` places, each as a point on every shape. Farthest-point sampling by distance along the surface, the mean of
- * the shapes: the first places taken are the ends of limbs.
+ * `count` places, each as a point on every shape, by farthest-point sampling. The distance is measured along the
+ * surface and averaged over the shapes, so the first places are the tips of limbs.
  */
 export function proposeLandmarks(data: MorphData, count: number): [number, number, number][][] {
   const shapes = data.shapes.map((_, i) => shapePositions(data, i));

@@ -1,12 +1,12 @@
 /// <reference lib="webworker" />
 /**
- * Everything that takes long: parsing, geometry, picking, distortion, errors. Requests {id, op, args}; parsed meshes
- * stay here under a key, so that picking and error maps need no second copy on the page's side.
+ * Does all long computations: parsing, geometry, picking, distortion, errors. A request is {id, op, args}. The worker
+ * keeps parsed meshes under a key, so the page needs no copy for picking and error maps.
  */
 import { Bvh } from './bvh';
 import { decodeMorph, type MorphData } from './morph';
 import { decodeSphere, type SphereData } from './distortion';
-import { buildDisplay, faultyEdges, loosePieces, type Display, type Frame } from './geometry';
+import { buildDisplay, defectiveEdges, loosePieces, type Display, type Frame } from './geometry';
 import { parseMesh, type RawMesh } from './parse';
 import { proposeLandmarks } from './propose';
 import type { Place } from 'orbmorph';
@@ -22,7 +22,7 @@ const morphs = new Map<string, MorphData>();
 const spheres = new Map<string, { surface: Float32Array; index: Uint32Array; place: Float32Array; bvh?: Bvh }>();
 
 export interface Spot {
-  /** where it is, in view coordinates, and the surface's normal there */
+  /** in view coordinates */
   position: [number, number, number];
   normal: [number, number, number];
   place: Place;
@@ -56,7 +56,7 @@ function pointOf({ positions: p, corners }: RawMesh, t: number, w: [number, numb
   return out;
 }
 
-/** The vertex where one is near (1 % of the diagonal), else the point itself. */
+/** The nearest corner if it is near (within 1 % of the diagonal), otherwise the point itself. */
 function spotOn(mesh: Held, t: number, u: number, v: number): Spot {
   const { raw, frame } = mesh;
   const weights: [number, number, number] = [1 - u - v, u, v];
@@ -71,7 +71,7 @@ function spotOn(mesh: Held, t: number, u: number, v: number): Spot {
   return { position: toView(frame, point), normal, place: { point } };
 }
 
-/** A face at each vertex asked for, for its normal. */
+/** For each wanted vertex a triangle that has it, whose normal stands for the vertex's. */
 function facesAt(raw: RawMesh, wanted: Set<number>): Map<number, number> {
   const found = new Map<number, number>();
   if (!wanted.size) return found;
@@ -88,16 +88,10 @@ function facesAt(raw: RawMesh, wanted: Set<number>): Map<number, number> {
 const ops = {
   open(key: string, buffer: ArrayBuffer): Display {
     const raw = parseMesh(buffer);
-    if (!raw.corners.length) throw new Error('There are no triangles to show in this file.');
+    if (!raw.corners.length) throw new Error('The file has no triangles.');
     const display = buildDisplay(raw);
     held.set(key, { raw, frame: display.frame });
     return display;
-  },
-
-  rename(from: string, to: string) {
-    const mesh = held.get(from);
-    if (mesh) held.set(to, mesh);
-    held.delete(from);
   },
 
   close(key: string) {
@@ -116,7 +110,7 @@ const ops = {
     return hit && spotOn(mesh, hit.triangle, hit.u, hit.v);
   },
 
-  /** With `snap`, points become the vertex that is near. */
+  /** With `snap`, points become a near vertex (see spotOn). */
   locate(key: string, places: Place[], snap = false): (Spot | null)[] {
     const mesh = held.get(key);
     if (!mesh) return places.map(() => null);
@@ -140,16 +134,16 @@ const ops = {
     });
   },
 
-  /** Line segments and triangles to be drawn in red, in view coordinates. */
-  faults(key: string, kind: string, edges: number[][], vertices: number[]) {
+  /** The segments, points and triangles to draw in red, in view coordinates. */
+  defects(key: string, kind: string, edges: number[][], vertices: number[]) {
     const mesh = held.get(key);
     if (!mesh)
       return { lines: new Float32Array(), triangles: new Float32Array(), points: new Float32Array(), found: 0 };
     const { raw, frame } = mesh;
     let pairs: ArrayLike<number> = edges.flat();
     if (!pairs.length && (kind === 'not-closed' || kind === 'not-manifold')) {
-      pairs = faultyEdges(raw, false);
-      const welded = faultyEdges(raw, true);
+      pairs = defectiveEdges(raw, false);
+      const welded = defectiveEdges(raw, true);
       if (welded.length && welded.length < pairs.length) pairs = welded;
     }
     const known = raw.positions.length / 3;
@@ -184,12 +178,12 @@ const ops = {
     return data;
   },
 
-  /** From an asset with `fit` none: for each proposal a point on every shape, in the coordinates of its file. */
+  /** For each proposed landmark a point on every shape, in the shape's file coordinates. The asset has `fit` none. */
   propose(buffer: ArrayBuffer, shapeCount: number, count: number): [number, number, number][][] {
     return proposeLandmarks(decodeMorph(buffer, shapeCount), count);
   },
 
-  /** The surface and the sphere of a PLY of the daemon; kept under `key` for sphereSpots(). */
+  /** The surface and the sphere in a PLY from the daemon. Keeps them under `key` for sphereSpots(). */
   sphere(key: string, buffer: ArrayBuffer): SphereData {
     const data = decodeSphere(buffer);
     spheres.set(key, {
@@ -200,7 +194,7 @@ const ops = {
     return data;
   },
 
-  /** Where points of a surface (in view coordinates) are on its sphere. */
+  /** The points of the sphere that correspond to points of the surface, both in view coordinates. */
   sphereSpots(key: string, points: number[][]): [number, number, number][] {
     const sphere = spheres.get(key);
     if (!sphere) return [];
@@ -218,8 +212,8 @@ const ops = {
   },
 
   /**
-   * For each vertex drawn of a shape its distance from the supermesh, relative to the shape's diagonal. Where the asset
-   * has moved and scaled the shape (asset.fit), both are first brought together (see settle).
+   * For each drawn vertex of a shape its distance from the supermesh, relative to the shape's diagonal. If the asset
+   * has moved and scaled the shape (asset.fit), undoFit() first moves it back.
    */
   error(
     key: string,
@@ -237,7 +231,7 @@ const ops = {
     });
     const file = new Float64Array(moved.length);
     for (let i = 0; i < moved.length; i++) file[i] = moved[i] * morph.frame.radius + morph.frame.center[i % 3];
-    const place = fitted ? settle(raw, file, morph.index) : file;
+    const place = fitted ? undoFit(raw, file, morph.index) : file;
     const bvh = new Bvh(place, morph.index);
     const n = raw.positions.length / 3;
     const distance = new Float32Array(n).fill(-1);
@@ -255,7 +249,7 @@ const ops = {
       count++;
       return d;
     };
-    // at vertices, and between them: a triangle's largest error shows at its corners
+    // Also measured at edge midpoints and centroids: the corners get a triangle's largest error.
     for (let c = 0; c < raw.corners.length; c++) {
       const v = raw.corners[c];
       if (distance[v] < 0) distance[v] = away(p[3 * v], p[3 * v + 1], p[3 * v + 2]);
@@ -283,10 +277,10 @@ const ops = {
 export type Ops = typeof ops;
 
 /**
- * Undoes the similarity that the asset has applied to a shape: the least-squares similarity between the two
- * surfaces, from 24 rotations by nearest points, then by tangent planes.
+ * Undoes the similarity that the asset has applied to a shape. It finds the least-squares similarity between the two
+ * surfaces by nearest points, starting from 24 rotations, and then improves it by tangent planes.
  */
-function settle(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64Array {
+function undoFit(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64Array {
   const a = moments(raw.positions, raw.corners);
   const b = moments(place, index);
   const scale = a.spread / b.spread;
@@ -315,8 +309,8 @@ function settle(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64A
     }
     return [moved, cost];
   };
-  for (const turn of rotations()) {
-    const [moved, cost] = nearer(moved3(place, turn, scale, b.center, a.center), 12, 0.98);
+  for (const rotation of rotations()) {
+    const [moved, cost] = nearer(transformed(place, rotation, scale, b.center, a.center), 12, 0.98);
     if (cost < least) {
       least = cost;
       best = moved;
@@ -332,7 +326,8 @@ function settle(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64A
 
 /**
  * One step of a similarity towards the tangent planes of the nearest points, which converges far faster than nearest
- * points do: least squares in turn (3), shift (3) and scale (1) about the centre. -> null where it changes nothing.
+ * points do: least squares in rotation (3), translation (3) and scale (1) around the centre. Returns null if the step
+ * changes nothing.
  */
 function towardsPlanes(raw: RawMesh, bvh: Bvh, all: Float64Array, stride: number): Float64Array | null {
   const c = [0, 1, 2].map((k) => {
@@ -349,7 +344,7 @@ function towardsPlanes(raw: RawMesh, bvh: Bvh, all: Float64Array, stride: number
     const n = faceNormal(raw, hit.triangle);
     const d = [all[i] - c[0], all[i + 1] - c[1], all[i + 2] - c[2]];
     size = Math.max(size, Math.hypot(d[0], d[1], d[2]));
-    // biome-ignore format: turn, shift, scale and right-hand side
+    // biome-ignore format: rotation, translation, scale and right-hand side
     const row = [
       d[1] * n[2] - d[2] * n[1], d[2] * n[0] - d[0] * n[2], d[0] * n[1] - d[1] * n[0],
       n[0], n[1], n[2],
@@ -382,7 +377,7 @@ function towardsPlanes(raw: RawMesh, bvh: Bvh, all: Float64Array, stride: number
     h * ux * uy + s * uz, 1 - h * (ux * ux + uz * uz), h * uy * uz - s * ux,
     h * ux * uz - s * uy, h * uy * uz + s * ux, 1 - h * (ux * ux + uy * uy),
   ];
-  return moved3(all, m, Math.exp(x[6]), c, [c[0] + x[3], c[1] + x[4], c[2] + x[5]]);
+  return transformed(all, m, Math.exp(x[6]), c, [c[0] + x[3], c[1] + x[4], c[2] + x[5]]);
 }
 
 /** Centre of area and root mean square radius. */
@@ -430,7 +425,7 @@ function* rotations(): Generator<number[]> {
     }
 }
 
-function moved3(p: Float64Array, m: number[], scale: number, from: number[], to: number[]): Float64Array {
+function transformed(p: Float64Array, m: number[], scale: number, from: number[], to: number[]): Float64Array {
   const out = new Float64Array(p.length);
   for (let i = 0; i < p.length; i += 3) {
     const x = p[i] - from[0];
@@ -441,7 +436,7 @@ function moved3(p: Float64Array, m: number[], scale: number, from: number[], to:
   return out;
 }
 
-/** Horn's closed form (1987): the similarity that takes the points `from` nearest to `to`, applied to all. */
+/** Applies to `all` the least-squares similarity from the points `from` to `to`, in Horn's closed form (1987). */
 function applyFit(all: Float64Array, from: number[][], to: number[][]): Float64Array {
   const n = from.length;
   const mean = (list: number[][]) => [0, 1, 2].map((k) => list.reduce((s, p) => s + p[k], 0) / n);
@@ -478,10 +473,10 @@ function applyFit(all: Float64Array, from: number[][], to: number[][]): Float64A
   ];
   let dot = 0;
   for (let r = 0; r < 3; r++) for (let c = 0; c < 3; c++) dot += m[3 * c + r] * S[3 * r + c];
-  return moved3(all, m, spread > 0 ? dot / spread : 1, a, b);
+  return transformed(all, m, spread > 0 ? dot / spread : 1, a, b);
 }
 
-/** The buffers inside an answer, to be handed over rather than copied. */
+/** The buffers inside a reply, which postMessage transfers instead of copying. */
 function buffersIn(value: unknown, found = new Set<ArrayBuffer>(), depth = 0): Set<ArrayBuffer> {
   if (ArrayBuffer.isView(value)) found.add(value.buffer as ArrayBuffer);
   else if (value && typeof value === 'object' && depth < 4)

@@ -1,17 +1,17 @@
-/** The one main action, always in the same place: morph, or the progress of it. */
+/** The main action, always in the same place: the Morph button, or the progress of a morph. */
 import { readyShapes, set, state, wireLandmarks } from '../state';
 import { cancelMerge, startMerge } from '../actions/merge';
 import { Bar, Button, Icon } from './parts';
 
 const STAGES: Record<string, string> = {
-  queued: 'Waiting for its turn',
+  queued: 'Queued',
   check: 'Checking',
   simplify: 'Simplifying',
   embed: 'Mapping to the sphere',
   certify: 'Certifying',
   align: 'Matching the shapes',
   remesh: 'Building the common mesh',
-  transfer: 'Carrying the shapes over',
+  transfer: 'Transferring the shapes',
   write: 'Writing the asset',
 };
 
@@ -48,7 +48,7 @@ export function Action() {
             value={running.job?.progress ?? null}
           />
           <div class="row spread">
-            <span class="hint">You may close the page; it goes on.</span>
+            <span class="hint">You may close the page; the job continues.</span>
             <Button kind="quiet" onClick={cancelMerge}>
               Cancel
             </Button>
@@ -69,10 +69,10 @@ export function Action() {
                 ? 'Uploading…'
                 : ready === 1
                   ? 'Add one more shape.'
-                  : 'Two shapes are needed.'
+                  : 'Add two shapes.'
               : landmarks
                 ? `${landmarks} landmark${landmarks > 1 ? 's' : ''} will meet exactly.`
-                : 'Correspondence is found without landmarks.'}
+                : 'Shapes are matched without landmarks.'}
           </p>
         </>
       )}

@@ -58,7 +58,7 @@ function Header() {
     tab === 'shapes' || (tab === 'morph' ? !!state.result : state.shapes.some((s) => s.state === 'ready'));
   return (
     <header class="header">
-      <a class="brand" href="./" aria-label="orbmorph: start afresh">
+      <a class="brand" href="./" aria-label="orbmorph: start over">
         <svg viewBox="0 0 32 32" aria-hidden="true" class="logo">
           <circle cx="16" cy="16" r="13" />
           <path d="M3.600 19c6-5.500 18.500-5.500 24.800 0M16 3c-5.500 7.500-5.500 18.500 0 26M7.500 6.500c6 5 11 5 17 0" />
@@ -86,7 +86,7 @@ function Header() {
         <Button
           kind="quiet"
           icon="theme"
-          label={`Colours: ${now === 'auto' ? 'as the system' : now}`}
+          label={`Colours: ${now === 'auto' ? 'system' : now}`}
           onClick={() => {
             applyTheme(next[now]);
             setNow(next[now]);

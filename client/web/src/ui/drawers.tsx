@@ -1,4 +1,4 @@
-/** What slides in from the right: the server's content, ways to use a morph, help. */
+/** Drawers on the right: the server's content, ways to use a morph, help. */
 import { useEffect, useRef, useState } from 'preact/hooks';
 import type { Job } from 'orbmorph';
 import { client, set, state } from '../state';
@@ -56,7 +56,7 @@ function Server() {
     return () => clearInterval(timer);
   }, []);
   const list = state.server;
-  if (!list) return <p class="hint">Reading…</p>;
+  if (!list) return <p class="hint">Loading…</p>;
   if (list.message)
     return (
       <p class="red" role="alert">
@@ -169,10 +169,10 @@ function Snippet({ title, text }: { title: string; text: string }) {
   );
 }
 
-/** Quoted for a POSIX shell. */
+/** Quotes text for a POSIX shell. */
 const quoted = (text: string) => `'${text.replace(/'/g, "'\\''")}'`;
 
-/** Text that stands in HTML. */
+/** Escapes text for HTML. */
 const escaped = (text: string) =>
   text.replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]!);
 
@@ -184,7 +184,7 @@ const viewerPage = (asset: string, names: string[]) => `<!doctype html>
 <model-viewer src="${asset}" alt="${escaped(names.join(' to '))}" autoplay camera-controls></model-viewer>
 `;
 
-/** The asset carries an animation through all shapes, so the page plays that. */
+/** The page plays the asset's animation, which passes through all shapes. */
 const threePage = (asset: string, names: string[]) => `<!doctype html>
 <meta charset="utf-8">
 <title>${escaped(names.join(' to '))}</title>
@@ -230,16 +230,16 @@ function Share() {
   const names = result.supermesh.shapes.map((s) => s.name);
   const secret = client.token ? ` -H "Authorization: Bearer $ORBMORPH_TOKEN"` : '';
   const curl = `curl -sS${secret} ${origin}/v1/supermeshes -H 'Content-Type: application/json' -H 'Prefer: wait=60' \\\n  -d ${quoted(JSON.stringify(request))}\ncurl -sS${secret} -o morph.glb ${asset}`;
-  // a page cannot carry the token: it shows the file that the curl line above brings
+  // a page must not contain the token, so it loads the file that the curl command downloads
   const shown = client.token ? 'morph.glb' : asset;
   return (
     <>
-      <p class="hint">The address of an asset never changes and can be cached for ever.</p>
+      <p class="hint">The URL of an asset never changes, so it can be cached forever.</p>
       <Snippet title="Asset" text={asset} />
       <Snippet title="curl" text={curl} />
       {client.token && (
         <p class="hint">
-          The pages below show <code>morph.glb</code>, which the second line above brings: put it beside them.
+          The pages below load <code>morph.glb</code>, which the second command downloads. Put it beside them.
         </p>
       )}
       <Snippet title="three.js" text={threePage(shown, names)} />
@@ -252,11 +252,11 @@ const KEYS: [string, string][] = [
   ['1 2 3 4', 'Shapes, Landmarks, Morph, Spheres'],
   ['Space', 'Play or pause'],
   ['W', 'Wireframe'],
-  ['Arrow keys', 'Turn the view that has the focus'],
-  ['+ and −', 'Nearer and farther'],
-  ['0', 'The view as it was at first'],
-  ['Enter', 'Landmark in the middle of the view'],
-  ['Delete', 'Remove the chosen landmark'],
+  ['Arrow keys', 'Rotate the focused view'],
+  ['+ and −', 'Zoom in and out'],
+  ['0', 'Reset the view'],
+  ['Enter', 'Set a landmark at the centre of the view'],
+  ['Delete', 'Delete the selected landmark'],
   ['Ctrl Z, Ctrl Shift Z', 'Undo, redo'],
   ['Esc', 'Close'],
 ];
@@ -265,12 +265,12 @@ function Help() {
   return (
     <>
       <p>
-        Add two or more closed meshes and press <strong>Morph</strong>. Where the result does not match as you would,
-        set landmarks: the same feature on each shape.
+        Add two or more closed meshes and press <strong>Morph</strong>. Where features do not match, set landmarks on
+        them: the same feature on each shape.
       </p>
       <p>
-        Drag turns, the wheel or two fingers zoom, the right button or Shift moves. The address of the page holds all of
-        its state; it can be kept and sent.
+        Drag to rotate, use the wheel or two fingers to zoom, drag with the right button or Shift to move. The URL of
+        the page holds its state: bookmark it or send it.
       </p>
       <h3>Keys</h3>
       <table class="report keys">

@@ -33,7 +33,7 @@ export function LandmarksStage() {
           <Caption shape={shape} index={state.shapes.indexOf(shape)} />
           {open && !open.at[shape.key] && (
             <div class="wanted" style={{ '--hue': hue(state.landmarks.indexOf(open)) }}>
-              Click {open.name ? `“${open.name}”` : `number ${state.landmarks.indexOf(open) + 1}`} here
+              Click {open.name ? `“${open.name}”` : `landmark ${state.landmarks.indexOf(open) + 1}`} here
             </div>
           )}
         </Pane>
@@ -56,8 +56,8 @@ export function LandmarksInspector() {
         </div>
       </div>
       <p class="lead small">
-        Click the same feature on each shape: a nose, a foot, the tip of a tail. They will meet exactly. Five to ten,
-        well spread, do most of the work.
+        Click the same feature on each shape: a nose, a foot, the tip of a tail. These points will meet exactly. Five to
+        ten, well spread, do most of the work.
       </p>
       <div class="row wrap">
         <Button icon="wand" disabled={shapes.length < 2 || !!state.running} onClick={() => void startMerge('find')}>
@@ -69,7 +69,7 @@ export function LandmarksInspector() {
           <span class="marker still" style={{ '--hue': hue(0) }} aria-hidden="true">
             1
           </span>
-          <p>No landmarks yet. Without any the correspondence is found from the shapes alone.</p>
+          <p>No landmarks yet. Without landmarks, the shapes alone determine the correspondence.</p>
         </div>
       ) : (
         <ol class="marks">
@@ -114,7 +114,7 @@ export function LandmarksInspector() {
       )}
       {complete < state.landmarks.length && (
         <p class="hint">
-          <Icon name="alert" /> Only landmarks that are on every shape count.
+          <Icon name="alert" /> Only landmarks set on every shape are used.
         </p>
       )}
       <div class="row wrap gap-top">

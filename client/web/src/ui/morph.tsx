@@ -1,4 +1,4 @@
-/** The morph: played, scrubbed, mixed; its mesh on every shape; its error; what to take away. */
+/** The Morph tab: playing, scrubbing and mixing; the common mesh on each shape; the error; downloads. */
 import { useEffect, useRef } from 'preact/hooks';
 import { set, state, tint, toast, type Result } from '../state';
 import { save } from '../actions/landmarks';
@@ -49,7 +49,7 @@ export function MorphStage() {
                   ramp="heat"
                   low="0"
                   high={relative(shape.error.max)}
-                  label="distance from the common mesh, of the shape's size"
+                  label="distance from the common mesh, relative to the shape's size"
                 />
               )}
             </Pane>
@@ -64,7 +64,7 @@ function NoMorph() {
   return (
     <div class="blank big">
       <p>No morph yet. Add two shapes and press “Morph”.</p>
-      <Button onClick={() => set({ tab: 'shapes' })}>To the shapes</Button>
+      <Button onClick={() => set({ tab: 'shapes' })}>Go to the shapes</Button>
     </div>
   );
 }
@@ -165,7 +165,7 @@ function Transport({ result }: { result: Result }) {
   );
 }
 
-/** The one that is seen: on “Each shape” it is another than elsewhere. */
+/** Switches the wireframe of the current view; “Each shape” has one of its own. */
 export const switchWire = () =>
   set(state.tab === 'morph' && state.show === 'each' ? { meshWire: !state.meshWire } : { wire: !state.wire });
 
@@ -289,7 +289,7 @@ export function MorphInspector() {
 
 function ErrorLoader() {
   useEffect(() => void measureErrors(), [state.result]);
-  return <p class="hint">How far each shape's own vertices lie from the common mesh, measured in this browser.</p>;
+  return <p class="hint">Distance of each shape from the common mesh, measured in this browser.</p>;
 }
 
 function Mix({ result }: { result: Result }) {

@@ -1,4 +1,4 @@
-/** A view of the stage with its caption, and landmarks as numbered buttons on it. */
+/** A view of the stage with its caption and its landmarks as numbered buttons. */
 import type { ComponentChildren } from 'preact';
 import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import { stage } from '../view/shared';
@@ -14,7 +14,7 @@ interface PaneProps {
   wire?: boolean;
   pickable?: Shape;
   markers?: Shape;
-  /** landmarks as they lie on a ball */
+  /** a sphere whose landmarks the view shows */
   spots?: SphereState;
   children?: ComponentChildren;
 }
@@ -43,7 +43,7 @@ export function Pane({ label, model, wire = false, pickable, markers, spots, chi
         tabIndex={0}
         role="application"
         aria-roledescription="3D view"
-        aria-label={`${label}. Arrow keys turn, plus and minus zoom, 0 resets${pickable ? ', Enter sets a landmark in the middle' : ''}.`}
+        aria-label={`${label}. Arrow keys rotate, plus and minus zoom, 0 resets${pickable ? ', Enter sets a landmark at the centre' : ''}.`}
       >
         {markers && <Markers shape={markers} view={view} />}
         {spots?.spots && spots.spots.size > 0 && <Spots spots={spots.spots} view={view} />}
@@ -111,7 +111,7 @@ function Markers({ shape, view }: { shape: Shape; view: { current: View | null }
   );
 }
 
-/** Landmarks on a ball: numbers to be seen, not to be moved. */
+/** Landmarks on a sphere: numbers that cannot be moved. */
 function Spots({ spots, view }: { spots: Map<number, [number, number, number]>; view: { current: View | null } }) {
   const box = useRef<HTMLDivElement>(null);
   const here = state.landmarks

@@ -3,7 +3,7 @@ import type { ComponentChildren, JSX } from 'preact';
 import { useEffect, useState } from 'preact/hooks';
 import { watch } from '../state';
 
-/** Renders the component again whenever the state changes. */
+/** Renders the component whenever the state changes. */
 export function useStateOfPage() {
   const [, tick] = useState(0);
   useEffect(() => watch(() => tick((n) => n + 1)), []);
@@ -51,7 +51,7 @@ type ButtonProps = JSX.HTMLAttributes<HTMLButtonElement> & {
   children?: ComponentChildren;
 };
 
-/** With children they name the button; an icon alone needs `label`. */
+/** Children name the button; an icon alone needs `label`. */
 export function Button({ icon, label, kind = 'plain', children, ...rest }: ButtonProps) {
   return (
     <button

@@ -4,9 +4,9 @@ import { set, state, tint, type Options, type Shape } from '../state';
 import {
   addFiles,
   addSamples,
-  mend,
+  uploadAgain,
   moveShape,
-  remedies,
+  repairsFor,
   removeShape,
   sampleList,
   samplePair,
@@ -75,8 +75,8 @@ function Empty() {
       </div>
       <h1>Drop two shapes. Get a morph.</h1>
       <p class="lead">
-        Any closed meshes, of any make: OBJ, OFF, PLY, STL or glTF. They come back as one GLB that blends from each to
-        every other, ready for three.js, Blender, Unity and the web.
+        Any closed meshes: OBJ, OFF, PLY, STL or glTF. The result is one GLB that blends between all of them, ready for
+        three.js, Blender, Unity and the web.
       </p>
       <div class="row center">
         <FilePicker label="Choose files" kind={pair.length ? 'plain' : 'primary'} />
@@ -197,7 +197,9 @@ function ShapeCard({ shape, index }: { shape: Shape; index: number }) {
         <Bar label={`Uploading ${shape.name}`} value={shape.progress} />
       )}
       {repairs.length > 0 && (
-        <p class="facts">Mended: {repairs.map((r) => `${r.kind.replace(/_/g, ' ')} (${count(r.count)})`).join(', ')}</p>
+        <p class="facts">
+          Repaired: {repairs.map((r) => `${r.kind.replace(/_/g, ' ')} (${count(r.count)})`).join(', ')}
+        </p>
       )}
       {shape.state === 'ready' && (
         <p class="facts good">
@@ -212,7 +214,7 @@ function ShapeCard({ shape, index }: { shape: Shape; index: number }) {
             <p>{shape.message}</p>
           </div>
           {shape.file && shape.state === 'failed' && (
-            <Button onClick={() => mend(shape.key, state.options.repair)}>Try again</Button>
+            <Button onClick={() => uploadAgain(shape.key, state.options.repair)}>Try again</Button>
           )}
         </div>
       )}
@@ -236,12 +238,12 @@ function Refusal({ shape }: { shape: Shape }) {
           {problem.genus !== undefined && `Genus ${String(problem.genus)}. `}
           {problem.line !== undefined && `Line ${String(problem.line)}. `}
           {problem.offset !== undefined && `Byte ${String(problem.offset)}. `}
-          {!!shape.faults && shape.model && <span class="red">Shown in red on the model.</span>}
+          {!!shape.defects && shape.model && <span class="red">Shown in red on the model.</span>}
         </p>
         <div class="row wrap">
-          {remedies(problem).map((remedy) => (
-            <Button key={remedy.repair} onClick={() => mend(shape.key, remedy.repair)}>
-              {remedy.label}
+          {repairsFor(problem).map((option) => (
+            <Button key={option.repair} onClick={() => uploadAgain(shape.key, option.repair)}>
+              {option.label}
             </Button>
           ))}
         </div>
@@ -261,7 +263,7 @@ export function OptionsFold() {
       <summary>Options</summary>
       <Field
         label="Matching"
-        hint="How the shapes are brought into correspondence. Automatic: pinned where there are landmarks, else found."
+        hint="How the correspondence is found. Automatic: from the landmarks if there are any, otherwise from the shapes."
       >
         <select
           value={options.align}
@@ -269,8 +271,8 @@ export function OptionsFold() {
         >
           <option value="default">Automatic</option>
           <option value="pin">Pinned landmarks</option>
-          <option value="auto">Found from the shapes</option>
-          <option value="rbf">Radial functions</option>
+          <option value="auto">From the shapes alone</option>
+          <option value="rbf">Radial basis functions</option>
           <option value="rotate">Rotation only</option>
         </select>
       </Field>
@@ -279,7 +281,7 @@ export function OptionsFold() {
           value={options.remesh}
           onChange={(event) => change({ remesh: event.currentTarget.value as Options['remesh'] })}
         >
-          <option value="adaptive">Adaptive: as few triangles as will do</option>
+          <option value="adaptive">Adaptive: as few triangles as needed</option>
           <option value="overlay">Overlay: exact, many triangles</option>
           <option value="subdivision">Subdivision</option>
           <option value="convex-hull">Convex hull</option>
@@ -296,7 +298,7 @@ export function OptionsFold() {
           onInput={(event) => change({ tolerance: Number((10 ** Number(event.currentTarget.value)).toPrecision(2)) })}
         />
       </Field>
-      <Field label="At most so many triangles" hint="Empty: no limit. It goes before the tolerance.">
+      <Field label="Most triangles" hint="Empty: no limit. The limit takes precedence over the tolerance.">
         <input
           type="number"
           min={4}
@@ -330,7 +332,11 @@ export function OptionsFold() {
           value={options.fit}
           onChange={(fit) => change({ fit })}
           items={[
-            { value: 'similarity', label: 'Fit size', hint: 'Move, turn and scale the later shapes onto the first' },
+            {
+              value: 'similarity',
+              label: 'Fit size',
+              hint: 'Translate, rotate and scale the other shapes to fit the first',
+            },
             { value: 'rigid', label: 'Move' },
             { value: 'none', label: 'As in the files' },
           ]}

@@ -1,4 +1,4 @@
-/** The maps to the sphere: surface beside sphere in the same colours, distortion as heat map and histogram. */
+/** The Spheres tab: each surface beside its sphere in the same colours, distortion as heat map and histogram. */
 import { useEffect } from 'preact/hooks';
 import type { Measure } from 'orbmorph';
 import { PAINTS, readyShapes, state, tint, type Shape, type SpherePaint } from '../state';
@@ -16,14 +16,14 @@ const NAMES: Record<SpherePaint, string> = {
   aspect: 'Triangle shape',
 };
 const MEANING: Record<SpherePaint, string> = {
-  direction: 'The direction of the surface as colour, carried to the sphere: parts can be recognised.',
+  direction: 'Normals of the surface as colours. The sphere has the same colours, so you can recognise parts on it.',
   checker:
-    'A regular checkerboard on the sphere, carried back to the surface: where its cells are large, the surface was squeezed.',
+    'A regular checkerboard on the sphere, mapped back to the surface. Cells are large where the map shrinks the surface.',
   symmetric_dirichlet:
-    'Symmetric Dirichlet energy: 1 where the map keeps lengths, growing with stretch and with squeeze.',
-  angle: 'Ratio of the singular values: 1 where angles are kept.',
-  area: 'Logarithm of the area ratio: blue where the sphere has less room than the surface, red where it has more.',
-  aspect: 'Circumradius over twice the inradius of the triangles on the sphere: 1 for equilateral ones.',
+    'Symmetric Dirichlet energy: 1 where the map preserves lengths, more where it stretches or shrinks them.',
+  angle: 'Ratio of the singular values: 1 where the map preserves angles.',
+  area: 'Logarithm of the area ratio: blue where the map shrinks areas, red where it enlarges them.',
+  aspect: 'Circumradius over twice the inradius of the triangles on the sphere: 1 for equilateral triangles.',
 };
 
 export function SpheresStage() {
@@ -85,10 +85,10 @@ export function SpheresInspector() {
       />
       <p class="hint">
         {state.side === 'after'
-          ? 'Every shape on the one sphere that all share: what lies at the same place corresponds.'
+          ? 'All shapes on one common sphere: points at the same position correspond.'
           : canAlign()
-            ? 'Each shape mapped to a sphere by itself.'
-            : 'Each shape mapped to a sphere by itself. Morph them to see the spheres brought into line.'}
+            ? 'Each shape on its own sphere.'
+            : 'Each shape on its own sphere. Morph the shapes to see the aligned spheres.'}
       </p>
       <Segments
         label="Colour"

@@ -1,4 +1,4 @@
-/** Asks for the token of a daemon that wants one. */
+/** The dialog that asks for the daemon's token. */
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { client, set, state } from '../state';
 import { forgetToken, tryToken } from '../actions/token';
@@ -6,17 +6,17 @@ import { Button, Icon } from './parts';
 
 export function TokenDialog() {
   const dialog = useRef<HTMLDialogElement>(null);
-  const [message, say] = useState(state.asking!.reason);
-  const [busy, work] = useState(false);
+  const [message, setMessage] = useState(state.asking!.reason);
+  const [busy, setBusy] = useState(false);
   const must = !client.token;
   useEffect(() => dialog.current!.showModal(), []);
   const send = async (event: Event) => {
     event.preventDefault();
     const token = new FormData(event.currentTarget as HTMLFormElement).get('token') as string;
     if (!token.trim()) return;
-    work(true);
-    say(await tryToken(token.trim()));
-    work(false);
+    setBusy(true);
+    setMessage(await tryToken(token.trim()));
+    setBusy(false);
   };
   return (
     <dialog
@@ -27,10 +27,10 @@ export function TokenDialog() {
       onClose={() => set({ asking: null })}
     >
       <form class="ask-in" onSubmit={(event) => void send(event)}>
-        <h2 id="ask-title">This daemon wants a token</h2>
+        <h2 id="ask-title">This daemon requires a token</h2>
         <p class="hint">
-          Whoever runs it makes one with <code>orbmorphd token add</code>. It stays in this tab and is forgotten when
-          you close it.
+          Its administrator creates one with <code>orbmorphd token add</code>. The token stays in this tab until you
+          close it.
         </p>
         <label class="field">
           <span class="field-name">Token</span>
@@ -45,7 +45,7 @@ export function TokenDialog() {
         <div class="row spread gap-top">
           {client.token ? (
             <Button kind="quiet" onClick={forgetToken}>
-              Forget the present one
+              Forget the current token
             </Button>
           ) : (
             <span />

@@ -1,4 +1,4 @@
-/** Colours that the page and the drawing worker share. */
+/** Colours of the page and the drawing worker. */
 
 export type Rgb = [number, number, number];
 export const RAMPS: Record<'heat' | 'diverging', Rgb[]> = {
@@ -27,7 +27,7 @@ export function rampCss(name: keyof typeof RAMPS): string {
   return `linear-gradient(90deg, ${RAMPS[name].map((c) => `rgb(${c.join(' ')})`).join(', ')})`;
 }
 
-/** "#rrggbb" as linear light, 0 to 1. */
+/** Converts "#rrggbb" to linear light, 0 to 1. */
 export function linear(hex: string): Rgb {
   const part = (at: number) => {
     const x = parseInt(hex.slice(at, at + 2), 16) / 255;
@@ -36,7 +36,7 @@ export function linear(hex: string): Rgb {
   return [part(1), part(3), part(5)];
 }
 
-/** A mixture in linear light; the shares sum to 1. */
+/** Mixes colours in linear light; the shares sum to 1. */
 export function mixed(colors: string[], shares: number[]): Rgb {
   const out: Rgb = [0, 0, 0];
   colors.forEach((color, i) => linear(color).forEach((x, k) => (out[k] += shares[i] * x)));
@@ -49,5 +49,5 @@ export type Paint =
   | { kind: 'value'; ramp: keyof typeof RAMPS; low: number; high: number; log?: boolean }
   /** attribute `tone` (a direction) as colour */
   | { kind: 'direction' }
-  /** attribute `tone` (a place on the sphere) as a checkerboard */
+  /** attribute `tone` (a point on the sphere) as a checkerboard */
   | { kind: 'checker' };

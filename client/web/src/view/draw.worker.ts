@@ -1,5 +1,5 @@
 /// <reference lib="webworker" />
-/** Draws: holds the canvas, the scene objects and their buffers. See messages.ts for what it is told. */
+/** The drawing worker. It owns the canvas, the scene objects and their buffers; messages.ts defines its orders. */
 import {
   BufferAttribute,
   BufferGeometry,
@@ -23,11 +23,11 @@ import {
 } from 'three';
 import { FIELD, type Look } from './camera';
 import type { Paint, Rgb } from './colors';
-import type { Faults, Frame, Order, Report, Surface } from './messages';
+import type { Defects, Frame, Order, Report, Surface } from './messages';
 import { DENSE, SLOTS, surfaceMaterial, wireMaterial } from './surface';
 
 const BALL = new Sphere(new Vector3(), 4);
-const tell = (report: Report) => self.postMessage(report);
+const send = (report: Report) => self.postMessage(report);
 
 function dispose(object: Object3D) {
   object.traverse((part) => {
@@ -43,7 +43,7 @@ class Buffers {
   readonly normal: BufferAttribute;
   readonly index: BufferAttribute;
   readonly edges: BufferAttribute;
-  readonly targets: { move: BufferAttribute; turn: BufferAttribute }[];
+  readonly targets: { position: BufferAttribute; normal: BufferAttribute }[];
   readonly slots: number;
   readonly dense: boolean;
 
@@ -53,8 +53,8 @@ class Buffers {
     this.index = new BufferAttribute(index, 1);
     this.edges = new BufferAttribute(edges, 1);
     this.targets = targets.map((t) => ({
-      move: new BufferAttribute(t.position, 3),
-      turn: new BufferAttribute(t.normal, 3),
+      position: new BufferAttribute(t.position, 3),
+      normal: new BufferAttribute(t.normal, 3),
     }));
     this.slots = Math.min(targets.length, SLOTS);
     this.dense = index.length >= 3 * DENSE;
@@ -116,8 +116,8 @@ class Model {
     for (const object of [this.mesh, this.lines]) {
       if (!object) continue;
       taken.forEach((k, slot) => {
-        object.geometry.setAttribute(`move${slot}`, targets[k].move);
-        if (object === this.mesh) object.geometry.setAttribute(`turn${slot}`, targets[k].turn);
+        object.geometry.setAttribute(`targetPosition${slot}`, targets[k].position);
+        if (object === this.mesh) object.geometry.setAttribute(`targetNormal${slot}`, targets[k].normal);
       });
       object.material.uniforms.weight.value = taken.map((k) => weights[k]);
     }
@@ -136,13 +136,13 @@ class Model {
     this.lines.material.uniforms.strength.value = this.buffers.dense ? 0.2 : 0.42;
   }
 
-  faults(faults: Faults | null) {
+  defects(defects: Defects | null) {
     if (this.extra) {
       this.group.remove(this.extra);
       dispose(this.extra);
     }
     this.extra = null;
-    if (!faults) return;
+    if (!defects) return;
     const red = new Color('#e5383b');
     const extra = (this.extra = new Group());
     const add = (data: Float32Array, make: (g: BufferGeometry) => Mesh | LineSegments | Points) => {
@@ -154,14 +154,14 @@ class Model {
       object.frustumCulled = false;
       extra.add(object);
     };
-    add(faults.triangles, (g) => new Mesh(g, new MeshBasicMaterial({ color: red, transparent: true, opacity: 0.75 })));
-    add(faults.lines, (g) => new LineSegments(g, new LineBasicMaterial({ color: red, depthTest: false })));
+    add(defects.triangles, (g) => new Mesh(g, new MeshBasicMaterial({ color: red, transparent: true, opacity: 0.75 })));
+    add(defects.lines, (g) => new LineSegments(g, new LineBasicMaterial({ color: red, depthTest: false })));
     add(
-      faults.lines,
+      defects.lines,
       (g) => new Points(g, new PointsMaterial({ color: red, size: 5, sizeAttenuation: false, depthTest: false })),
     );
     add(
-      faults.points,
+      defects.points,
       (g) => new Points(g, new PointsMaterial({ color: red, size: 10, sizeAttenuation: false, depthTest: false })),
     );
     this.group.add(extra);
@@ -181,14 +181,14 @@ function start(canvas: OffscreenCanvas, ratio: number) {
     renderer.debug.checkShaderErrors = import.meta.env.DEV;
     renderer.setScissorTest(true);
     renderer.setPixelRatio(ratio);
-    canvas.addEventListener('webglcontextrestored', () => tell({ op: 'restored' }));
+    canvas.addEventListener('webglcontextrestored', () => send({ op: 'restored' }));
   } catch {
-    // told below
+    // reported below
   }
-  tell({ op: 'started', works: renderer !== null });
+  send({ op: 'started', works: renderer !== null });
 }
 
-function stand({ eye, right, up, back, near, far, aspect }: Look) {
+function placeCamera({ eye, right, up, back, near, far, aspect }: Look) {
   camera.matrix.copy(
     new Matrix4().makeBasis(new Vector3(...right), new Vector3(...up), new Vector3(...back)).setPosition(...eye),
   );
@@ -215,21 +215,21 @@ function draw(width: number, height: number, frames: Frame[]) {
     const bottom = height - frame.top - frame.height;
     renderer.setViewport(frame.left, bottom, frame.width, frame.height);
     renderer.setScissor(frame.left, bottom, frame.width, frame.height);
-    stand(frame.look);
+    placeCamera(frame.look);
     scene.add(model.group);
     renderer.render(scene, camera);
     scene.remove(model.group);
   }
 }
 
-function carryOut(order: Order) {
+function execute(order: Order) {
   if (order.op === 'start') return start(order.canvas, order.ratio);
   if (order.op === 'draw')
     return void requestAnimationFrame(() => {
       draw(order.width, order.height, order.frames);
-      tell({ op: 'drawn' });
-      // the next animation frame comes when this one was taken
-      requestAnimationFrame(() => tell({ op: 'shown' }));
+      send({ op: 'drawn' });
+      // the next animation frame starts after the browser has taken this one
+      requestAnimationFrame(() => send({ op: 'shown' }));
     });
   if (order.op === 'model') {
     const buffers = order.surface ? new Buffers(order.surface) : models.get(order.same!)?.buffers;
@@ -249,12 +249,12 @@ function carryOut(order: Order) {
       return model.weights(order.weights);
     case 'wireframe':
       return model.wireframe(order.shown, order.color);
-    case 'faults':
-      return model.faults(order.faults);
+    case 'defects':
+      return model.defects(order.defects);
     case 'dispose':
       dispose(model.group);
       models.delete(order.model);
   }
 }
 
-self.onmessage = ({ data }: MessageEvent<Order>) => carryOut(data);
+self.onmessage = ({ data }: MessageEvent<Order>) => execute(data);

@@ -1,14 +1,14 @@
 /**
- * How surfaces are shaded: one painted studio light over the normals, tinted, with colours from data on request. Morph
- * targets are plain vertex attributes, for those few that have a weight; meshes of many small triangles are lit at
- * their vertices, which looks the same there and costs less than the loaders' standard materials.
+ * The materials of surfaces: one studio light computed from the normals, times a tint or colours from data. The few
+ * morph targets that have a weight are plain vertex attributes. Meshes of many small triangles are lit at their
+ * vertices, which looks the same and costs less than the loaders' standard materials.
  */
 import { DataTexture, GLSL3, LinearFilter, RGBAFormat, ShaderMaterial, SRGBColorSpace } from 'three';
 import { linear, RAMPS, type Paint } from './colors';
 
-/** As many targets can have a weight at once: two attributes each, beside the surface's own three. */
+/** How many targets can have a weight at once. Each takes two attributes; the surface itself takes three. */
 export const SLOTS = 6;
-/** From so many triangles on they are smaller than a few pixels. */
+/** From this number on, triangles are smaller than a few pixels. */
 export const DENSE = 60_000;
 
 const textures = new Map<string, DataTexture>();
@@ -31,7 +31,7 @@ function rampTexture(name: keyof typeof RAMPS): DataTexture {
   return texture;
 }
 
-/** Soft key light from the upper left, a cool fill, a rim, a small highlight: linear light by the normal as seen. */
+/** Linear light from the normal in view space: a soft key light from the upper left, a cool fill, a rim, a highlight. */
 const LIGHT = `
 vec3 light(vec3 n) {
   float key = max(0.0, dot(n, vec3(-0.4240, 0.7067, 0.5654)) * 0.72 + 0.28);
@@ -45,7 +45,7 @@ vec3 light(vec3 n) {
   return c * (0.8 + 0.2 * c);
 }`;
 
-/** From linear light to the screen's: a fit of the sRGB curve by square roots. */
+/** Converts linear light to sRGB by a fit of its curve with square roots. */
 const SHOWN = `
 vec3 shown(vec3 c) {
   vec3 s1 = sqrt(c);
@@ -56,11 +56,11 @@ vec3 shown(vec3 c) {
 const morph = (slots: number, normals: boolean) =>
   Array.from(
     { length: slots },
-    (_, i) => `p += weight[${i}] * move${i};${normals ? ` n += weight[${i}] * turn${i};` : ''}`,
+    (_, i) => `p += weight[${i}] * targetPosition${i};${normals ? ` n += weight[${i}] * targetNormal${i};` : ''}`,
   ).join(' ');
 const declared = (slots: number, normals: boolean) =>
   slots
-    ? `uniform float weight[${slots}]; ${Array.from({ length: slots }, (_, i) => `in vec3 move${i};${normals ? ` in vec3 turn${i};` : ''}`).join(' ')}`
+    ? `uniform float weight[${slots}]; ${Array.from({ length: slots }, (_, i) => `in vec3 targetPosition${i};${normals ? ` in vec3 targetNormal${i};` : ''}`).join(' ')}`
     : '';
 
 const COLOR: Record<Paint['kind'], string> = {
