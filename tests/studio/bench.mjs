@@ -1,8 +1,9 @@
-// How fluent the studio is with large shapes, beside a bare three.js page that shows the same GLB in the same browser:
-//   node tests/studio/bench.mjs [LEVEL] [--software-compositing]     20·4^LEVEL triangles a shape; 7 (327,680) unless told
-// Prints one JSON object: median frames while scrubbing (ms) of both pages, their ratio, and for each step the long tasks
-// of the main thread, with the time that the thread itself computed (see bench/tasks.mjs). The daemon's answers are made
-// here, so that only the page is measured; the page is client/web/dist. docs/bench-studio.md says what was found.
+// Measures the studio with large shapes, and a bare three.js page that shows the same GLB in the same browser:
+//   node tests/studio/bench.mjs [LEVEL] [--software-compositing]
+// A shape has 20·4^LEVEL triangles; the default level is 7 (327,680 triangles). Prints one JSON object: the median
+// frame time (ms) of both pages while scrubbing, their ratio, and for each step the long tasks of the main thread with
+// their CPU time (see bench/tasks.mjs). A stub replaces the daemon, so that only the page (client/web/dist) is
+// measured. docs/bench-studio.md has the results.
 import { createServer } from 'node:http';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -92,17 +93,17 @@ const url = `http://127.0.0.1:${server.address().port}`;
 const browser = await startBrowser({ compositing });
 
 /**
- * Gives a new value as soon as the last one is drawn, 22 times, and -> the median time between drawings. The studio says
- * so by an event of its stage, for it draws in a worker; the bare page draws in its animation frames.
+ * Sets a new value as soon as the last one is drawn, 22 times. Returns the median time between drawings. The studio
+ * draws in a worker and dispatches an event after each drawing; the bare page draws in its animation frames.
  */
 const frames = (page, step) =>
   page.evaluate(async (source) => {
     const step = new Function('value', source);
     const stage = document.querySelector('.stage');
-    const next = (tell) =>
+    const next = (done) =>
       stage
-        ? stage.addEventListener('drawn', () => tell(performance.now()), { once: true })
-        : requestAnimationFrame(tell);
+        ? stage.addEventListener('drawn', () => done(performance.now()), { once: true })
+        : requestAnimationFrame(done);
     const times = [];
     let last = 0;
     await new Promise((resolve) => {

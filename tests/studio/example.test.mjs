@@ -1,4 +1,4 @@
-// The example page of the JavaScript client: two files in, a moving morph out.
+// The example page of the JavaScript client turns two files into a moving morph.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';

@@ -1,6 +1,6 @@
-// The scenes of the studio whose looks are kept: how to come there, and comparing by pictures.
-//   node tests/studio/looks.mjs [SCENE…]               takes the reference pictures anew (tests/studio/looks/SCENE.png)
-//   ORB_PICTURE=FILE.png node tests/studio/looks.mjs SCENE   one picture as it is, for the documents
+// The scenes of the studio that have reference pictures: how to reach them, and how to compare pictures.
+//   node tests/studio/looks.mjs [SCENE…]                     retakes reference pictures (tests/studio/looks/SCENE.png)
+//   ORB_PICTURE=FILE.png node tests/studio/looks.mjs SCENE   takes one picture at full size, for the documents
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -9,7 +9,7 @@ import {
   adopt,
   button,
   clickView,
-  hush,
+  hideToasts,
   openPage,
   root,
   sample,
@@ -63,7 +63,7 @@ async function spheres(page) {
   );
 }
 
-/** name: [how to come there, options of the page] */
+/** name: [steps that lead to the scene, options of the page] */
 export const SCENES = {
   empty: [async () => {}],
   'empty-dark': [async () => {}, { colorScheme: 'dark' }],
@@ -175,17 +175,17 @@ export const SCENES = {
   ],
 };
 
-/** What differs from run to run: times, and how long things took. */
+/** Hides what differs between runs: timings and the text cursor. */
 const STEADY = '[data-varies] { visibility: hidden !important; } * { caret-color: transparent !important; }';
 
-/** A picture of a scene as PNG: half size, or as it is. */
+/** Takes a picture of a scene as PNG, at half size or at full size (`whole`). */
 export async function look(browser, url, name, whole = false) {
-  const [come, options] = SCENES[name];
+  const [reach, options] = SCENES[name];
   const { page, done } = await openPage(browser, url, { colorScheme: 'light', ...options });
   await page.evaluate(() => document.fonts.ready);
-  await come(page);
+  await reach(page);
   await adopt(page, STEADY);
-  await hush(page);
+  await hideToasts(page);
   await page.mouse.move(2, 2);
   await page.evaluate(() => document.activeElement?.blur());
   await settled(page);
@@ -206,7 +206,7 @@ async function halved(page, png) {
       const context = canvas.getContext('2d');
       context.imageSmoothingQuality = 'high';
       context.drawImage(bitmap, 0, 0, canvas.width, canvas.height);
-      // 32 levels a channel: the file is a third as large, and blocks average out what is lost
+      // 32 levels per channel make the file a third as large; averaging over blocks hides the loss
       const pixels = context.getImageData(0, 0, canvas.width, canvas.height);
       for (let i = 0; i < pixels.data.length; i++)
         if (i % 4 < 3) pixels.data[i] = Math.round(Math.round(pixels.data[i] / 8.226) * 8.226);
@@ -223,9 +223,9 @@ async function halved(page, png) {
 }
 
 /**
- * How far two pictures are apart: the largest and the mean difference of the mean colours of blocks of 8 × 8 pixels
- * (0 to 255), and the share of blocks that differ by more than 20. Edges that fall otherwise, and the smoothing of
- * another GPU or another font renderer, average out in a block; a missing shape, colour or panel does not.
+ * Compares the mean colours (0 to 255) of blocks of 8 × 8 pixels. Returns the mean difference and the share of blocks
+ * that differ by more than 20. Another GPU or font renderer draws edges differently, which averages out in a block; a
+ * missing shape, colour or panel does not.
  */
 export async function apart(browser, a, b) {
   const page = await browser.newPage();

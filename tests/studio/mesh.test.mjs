@@ -1,4 +1,4 @@
-// The studio's own readers and measures, against small files written here and against plain computations.
+// Checks the studio's own readers and measures with small files and straightforward computations.
 import { before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
@@ -73,7 +73,7 @@ test('OFF: counts on the first line or the next, comments, colours after faces',
   }
 });
 
-test('PLY: text, binary in both orders, further properties and elements', () => {
+test('PLY: text, binary in both orders, other properties and elements', () => {
   const header = (format) =>
     `ply\nformat ${format} 1.0\ncomment c\nelement vertex 4\nproperty uchar red\nproperty double x\nproperty float y\nproperty float z\nelement face 4\nproperty list uchar int vertex_indices\nproperty uchar flag\nend_header\n`;
   const ascii = mesh.parseMesh(
@@ -180,14 +180,14 @@ test('glTF: accessors of all primitives one after another, after node transforms
   assert.deepEqual([...raw.corners], [...FACES.flat(), ...FACES.flat().map((v) => v + 4)]);
 });
 
-test('what cannot be drawn is left out, and nothing throws on rubbish', () => {
+test('what cannot be drawn is left out, and invalid files do not throw', () => {
   const raw = mesh.parseMesh(text('v 0 0 0\nv 1 0 0\nv nan 1 0\nv 0 1 0\nf 1 2 4\nf 1 2 3\nf 1 2 9\n'));
   assert.deepEqual([...raw.corners], [0, 1, 3]);
   assert.equal(mesh.parseMesh(text('Dear Sir or Madam')).corners.length, 0);
   assert.equal(mesh.parseMesh(new ArrayBuffer(0)).corners.length, 0);
 });
 
-test('the samples are closed, and their geometry is what the files say', async () => {
+test('the samples are closed, and their geometry is that of the files', async () => {
   for (const [name, triangles] of [
     ['dog.obj', 5600],
     ['giraffe.off', null],
@@ -306,7 +306,7 @@ test('distortion: an isometry has none, a stretch by known factors is found', ()
   assert.ok(Math.abs(same.aspect[0] - Math.SQRT1_2 / (2 - Math.SQRT2)) < 1e-9);
 });
 
-test('the way through the shapes follows the keyframes', () => {
+test('the path through the shapes follows the keyframes', () => {
   const path = {
     times: Float32Array.of(0, 0.5, 1),
     weights: [Float32Array.of(0, 0), Float32Array.of(1, 0), Float32Array.of(0, 1)],
@@ -319,7 +319,7 @@ test('the way through the shapes follows the keyframes', () => {
   assert.deepEqual(mesh.weightsAt({ times: Float32Array.of(0), weights: [new Float32Array(0)] }, 0.3), []);
 });
 
-test('in-betweens of a curved path are passed on the way, rests are not', () => {
+test('the path contains the in-betweens of a curved path, but no rests', () => {
   const [zero, b, c, p, q] = [
     [0, 0, 0, 0],
     [1, 0, 0, 0],

@@ -1,4 +1,4 @@
-// What holds on every page: nothing from outside, a strict policy, names on every control, keys, no work at rest.
+// Checks every page: no request to other origins, a strict policy, named controls, keys, no drawing at rest.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
@@ -28,7 +28,7 @@ after(async () => {
   await daemon?.stop();
 });
 
-/** Serious and critical findings of axe. `evaluate` is not held by the page's policy, so the policy stays as it is. */
+/** Serious and critical findings of axe. `evaluate` is exempt from the page's policy, so the policy stays as it is. */
 async function findings(page) {
   await page.evaluate(axe);
   const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
@@ -68,7 +68,7 @@ test('the files have types, validators and a policy without unsafe-inline', asyn
   assert.equal((await fetch(`${daemon.url}/no/such/page`)).status, 404);
 });
 
-test('the licences of what is bundled come with it', async () => {
+test('the licences of bundled packages are served', async () => {
   const file = await fetch(`${daemon.url}/licenses.txt`);
   assert.equal(file.status, 200);
   assert.match(file.headers.get('content-type'), /^text\/plain/);
@@ -141,7 +141,7 @@ test('every control has a name', async () => {
   await done();
 });
 
-test('keys turn the view and change the page; at rest nothing is drawn', async () => {
+test('keys rotate the view and change the page; at rest nothing is drawn', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   await settled(page);
@@ -155,11 +155,11 @@ test('keys turn the view and change the page; at rest nothing is drawn', async (
   await page.locator('.pane-view').first().focus();
   for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowLeft');
   await settled(page);
-  const turned = await page.locator('.stage-area').screenshot();
-  assert.ok((await difference(browser, still, turned)) > 0.01, 'the view has turned');
+  const rotated = await page.locator('.stage-area').screenshot();
+  assert.ok((await difference(browser, still, rotated)) > 0.01, 'the view has rotated');
   await page.keyboard.press('0');
   await settled(page);
-  // the ring of the focus is there now, and little else may differ
+  // now with the focus ring; little else may differ
   assert.ok(
     (await difference(browser, still, await page.locator('.stage-area').screenshot())) < 0.01,
     'the view is as at first',
@@ -192,7 +192,7 @@ test('a small screen holds everything without scrolling sideways', async () => {
   }
   await page.setViewportSize({ width: 740, height: 360 });
   await button(page, 'Shapes', { exact: true }).click();
-  assert.ok(await fits(), 'on its side');
+  assert.ok(await fits(), 'in landscape');
   const settings = await page.locator('.inspector .scroll').boundingBox();
   assert.ok(
     settings.height > 120 && settings.y + settings.height <= 360,

@@ -1,4 +1,4 @@
-// A daemon that wants tokens: the studio asks, keeps the token for the tab, and says what a token does not allow.
+// With a daemon that requires tokens, the studio asks for one, keeps it for the tab and says what it does not allow.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
@@ -32,26 +32,26 @@ after(async () => {
   await daemon?.stop();
 });
 
-const give = async (page, secret) => {
+const enterToken = async (page, secret) => {
   await page.locator('dialog input[name=token]').fill(secret);
   await button(page, 'Continue').click();
 };
 
-test('without a token the page asks for one, and says when it is not known', async () => {
+test('without a token the page asks for one, and rejects an unknown one', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await page.getByRole('dialog', { name: 'This daemon requires a token' }).waitFor();
-  await give(page, 'f'.repeat(64));
+  await enterToken(page, 'f'.repeat(64));
   await page.getByText('The daemon does not know this token.').waitFor();
   await page.keyboard.press('Escape');
-  assert.ok(await page.getByRole('dialog').isVisible(), 'there is no way around it');
+  assert.ok(await page.getByRole('dialog').isVisible(), 'the dialog cannot be dismissed');
   await done();
 });
 
-test('with a token the whole way works; it stays in the tab and out of addresses', async () => {
+test('with a token everything works; the token stays in the tab and out of URLs', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const addresses = [];
   page.on('request', (request) => addresses.push(request.url()));
-  await give(page, token['read,write']);
+  await enterToken(page, token['read,write']);
   await until(
     () =>
       page
@@ -75,7 +75,7 @@ test('with a token the whole way works; it stays in the tab and out of addresses
     /Authorization: Bearer \$ORBMORPH_TOKEN/,
   );
   await page.reload();
-  await until(() => button(page, 'Play').count(), 'after a reload it goes on without asking');
+  await until(() => button(page, 'Play').count(), 'a reload does not ask again');
   assert.equal(await page.getByRole('dialog').count(), 0);
   assert.ok(addresses.every((url) => !url.includes(token['read,write'])));
   assert.ok(!page.url().includes(token['read,write']));
@@ -86,9 +86,9 @@ test('with a token the whole way works; it stays in the tab and out of addresses
   await other.done();
 });
 
-test('a token that may only read is told so in words', async () => {
+test('a token that may only read gets an explanation', async () => {
   const { page, done } = await openPage(browser, daemon.url);
-  await give(page, token.read);
+  await enterToken(page, token.read);
   await until(
     () =>
       page
@@ -103,7 +103,7 @@ test('a token that may only read is told so in words', async () => {
     .setInputFiles([sample('dog.obj')]);
   await page.getByText('The token lacks the scope “write”').waitFor();
   await button(page, 'Token', { exact: true }).click();
-  await give(page, token['read,write']);
+  await enterToken(page, token['read,write']);
   await until(
     () =>
       page

@@ -1,4 +1,4 @@
-// What a modeller does, from the empty page to the file on disk.
+// The work of a modeller, from the empty page to the file on disk.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
@@ -14,11 +14,11 @@ import {
   clickView,
   countPixels,
   difference,
-  hush,
+  hideToasts,
   json,
   openPage,
   root,
-  said,
+  shownToasts,
   sample,
   settled,
   startBrowser,
@@ -46,7 +46,7 @@ const seek = (page, value) =>
     input.dispatchEvent(new Event('input', { bubbles: true }));
   }, value);
 
-/** Three landmarks, each on both shapes, at places where both have surface. */
+/** Three landmarks, each on both shapes, at positions where both have a surface. */
 async function pickThree(page) {
   await button(page, 'Landmarks').click();
   for (const [n, [x, y]] of [
@@ -178,7 +178,7 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
   await morph(page);
   await button(page, 'Pause').click();
   const id = new URLSearchParams(
-    (await until(() => page.url().match(/r=[0-9a-f]{64}/), 'the address names the morph'))[0],
+    (await until(() => page.url().match(/r=[0-9a-f]{64}/), 'the URL names the morph'))[0],
   ).get('r');
   const supermesh = await json(daemon.url, `/v1/supermeshes/${id}`);
   assert.equal(supermesh.landmarks.length, count);
@@ -190,8 +190,8 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
     await settled(page);
     shots.push(await page.locator('.stage-area').screenshot());
   }
-  assert.ok((await difference(browser, shots[0], shots[1])) > 0.005, 'half way differs from the first shape');
-  assert.ok((await difference(browser, shots[1], shots[2])) > 0.005, 'half way differs from the second shape');
+  assert.ok((await difference(browser, shots[0], shots[1])) > 0.005, 'halfway differs from the first shape');
+  assert.ok((await difference(browser, shots[1], shots[2])) > 0.005, 'halfway differs from the second shape');
 
   await page.getByRole('slider', { name: 'Share of dog' }).evaluate((input) => {
     input.value = '0.5';
@@ -211,7 +211,7 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
     (await difference(browser, plain, await page.locator('.stage-area').screenshot())) > 0.005,
     'the wireframe is drawn',
   );
-  // The common mesh on each shape is shown with its triangles, which the same switch takes away; the error without.
+  // The wireframe is on in “Each shape” by default, and in “Error” since the step above. The switch hides it in both.
   for (const view of ['Each shape', 'Error']) {
     await page.getByRole('group', { name: 'What is shown' }).getByRole('button', { name: view }).click();
     if (view === 'Error')
@@ -246,7 +246,7 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
   await done();
 });
 
-test('reload and the address alone bring the same state back', async () => {
+test('a reload and the URL alone restore the same state', async () => {
   const first = await openPage(browser, daemon.url);
   await addFiles(first.page, sample('dog.obj'), sample('giraffe.off'));
   await button(first.page, 'Landmarks').click();
@@ -256,8 +256,8 @@ test('reload and the address alone bring the same state back', async () => {
   await morph(first.page);
   await button(first.page, 'Pause').click();
   await seek(first.page, 0.25);
-  await until(() => /t=0\.250/.test(first.page.url()), 'the address holds the time');
-  await hush(first.page);
+  await until(() => /t=0\.250/.test(first.page.url()), 'the URL holds the time');
+  await hideToasts(first.page);
   await settled(first.page);
   const before = await first.page.locator('.pane').screenshot();
   await first.page.reload();
@@ -278,7 +278,7 @@ test('reload and the address alone bring the same state back', async () => {
   await second.done();
 });
 
-test('a refused mesh says why, shows the rim in red, and can be mended', async () => {
+test('a refused mesh says why, shows the rim in red, and can be repaired', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   // the dog without its first 40 faces
   let left = 40;
@@ -293,11 +293,11 @@ test('a refused mesh says why, shows the rim in red, and can be mended', async (
   await page.locator('.card.refused').waitFor();
   assert.match(await page.getByRole('alert').innerText(), /hole/);
   await until(() => page.getByText('Shown in red on the model.').count(), 'the rim is found');
-  // turned about, the rim comes into view from some side; the lines are drawn over the surface anyway
+  // the lines are drawn over the surface, so the rim is visible from any side
   await settled(page);
   assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 180 && g < 110 && b < 110)) > 20, 'red is drawn');
   await button(page, 'Fill the holes').click();
-  await until(() => page.locator('.card.ready').count(), 'it is mended');
+  await until(() => page.locator('.card.ready').count(), 'it is repaired');
   assert.equal(await page.locator('.card.refused').count(), 0);
   await settled(page);
   assert.equal(await countPixels(page, '.stage-area', (r, g, b) => r > 180 && g < 110 && b < 110), 0, 'no red is left');
@@ -332,11 +332,11 @@ test('loose pieces are shown in red, and the largest can be kept', async () => {
   await settled(page);
   assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 150 && g < 110 && b < 110)) > 50, 'red is drawn');
   await button(page, 'Keep the largest piece').click();
-  await until(() => page.locator('.card.ready').count(), 'it is mended');
+  await until(() => page.locator('.card.ready').count(), 'it is repaired');
   await done();
 });
 
-test('linked cameras turn together, others alone', async () => {
+test('linked cameras rotate together, others alone', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   const views = async () => {
@@ -351,18 +351,18 @@ test('linked cameras turn together, others alone', async () => {
   const first = await views();
   await turn();
   const second = await views();
-  for (const k of [0, 1]) assert.ok((await difference(browser, first[k], second[k])) > 0.01, `view ${k} has turned`);
+  for (const k of [0, 1]) assert.ok((await difference(browser, first[k], second[k])) > 0.01, `view ${k} has rotated`);
   await page.getByRole('switch', { name: 'Link the cameras' }).click();
   await page.locator('.pane-view').first().focus();
   const third = await views();
   await turn();
   const fourth = await views();
-  assert.ok((await difference(browser, third[0], fourth[0])) > 0.01, 'the view that has the focus has turned');
+  assert.ok((await difference(browser, third[0], fourth[0])) > 0.01, 'the focused view has rotated');
   assert.ok((await difference(browser, third[1], fourth[1])) < 0.002, 'the other has not');
   await done();
 });
 
-test('an upload shows how far it is', async () => {
+test('an upload shows its progress', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const session = await page.context().newCDPSession(page);
   await session.send('Network.enable');
@@ -396,7 +396,7 @@ test('an upload shows how far it is', async () => {
   await done();
 });
 
-test('no mesh at all is refused in words', async () => {
+test('a file without a mesh is refused with an explanation', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await page
     .locator('input[type=file]')
@@ -408,7 +408,7 @@ test('no mesh at all is refused in words', async () => {
 });
 
 test('a morph is cancelled before it is done', async () => {
-  // The only worker has something else to do: the morph does not end before it is cancelled.
+  // Another job occupies the only worker, so the morph cannot finish before it is cancelled.
   const busy = await startDaemon({ args: ['--workers', '1'] });
   const post = async (path, body) =>
     (await fetch(busy.url + path, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body })).json();
@@ -425,7 +425,7 @@ test('a morph is cancelled before it is done', async () => {
   });
   await button(page, /^Morph 2 shapes$/).click();
   await button(page, 'Cancel').click();
-  await until(() => said(page).then((list) => list.includes('Cancelled.')), 'the page says so');
+  await until(() => shownToasts(page).then((list) => list.includes('Cancelled.')), 'the page says so');
   const { jobs } = await json(busy.url, '/v1/jobs');
   const morph = jobs.find(({ kind }) => kind === 'supermesh');
   await until(async () => (await json(busy.url, morph.url)).state === 'cancelled', 'the job has stopped');
@@ -440,14 +440,14 @@ test('landmarks are found', async () => {
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await button(page, 'Landmarks').click();
   await button(page, 'Find them for me').click();
-  const [text] = await until(() => said(page).then((list) => list.length > 0 && list), 'an answer');
+  const [text] = await until(() => shownToasts(page).then((list) => list.length > 0 && list), 'an answer');
   const found = Number(text.match(/^(\d+) landmarks found/)?.[1] ?? 0);
   assert.equal(await landmarks(page).count(), found);
   assert.ok(found > 0 || /matched/.test(text), text);
   await done();
 });
 
-test('a job goes on when the page is closed, and is found again', async () => {
+test('a job continues when the page is closed, and is found again', async () => {
   const first = await openPage(browser, daemon.url);
   await addFiles(first.page, sample('giraffe.off'), sample('elephant.ply'));
   await button(first.page, /^Morph 2 shapes$/).click();
@@ -497,7 +497,7 @@ test('spheres before and after the alignment: certified, painted, measured', asy
     assert.ok((await difference(browser, shots[i - 1], shots[i])) > 0.03, `paint ${i} differs from the one before`);
   assert.equal(await page.getByRole('img', { name: /^Histogram/ }).count(), 2);
 
-  // Where each landmark is on the two balls, in pixels of its own view.
+  // The position of each landmark on the two spheres, in pixels of its own view.
   const spots = () =>
     page.evaluate(() =>
       [...document.querySelectorAll('.pane-view:has(.marker.small)')].map((view) => {
@@ -514,7 +514,7 @@ test('spheres before and after the alignment: certified, painted, measured', asy
     before.map((list) => list.length),
     [count, count],
   );
-  assert.ok(gap(before) > 20, 'by themselves the spheres do not correspond');
+  assert.ok(gap(before) > 20, 'before the alignment the spheres do not correspond');
   await morph(page);
   await button(page, 'Pause').click();
   await button(page, 'Spheres').click();
@@ -537,7 +537,7 @@ test('spheres before and after the alignment: certified, painted, measured', asy
   );
   await settled(page);
   assert.ok(gap(await spots()) < 1, 'after the alignment landmarks coincide');
-  await until(() => /side=after/.test(page.url()), 'the address says so');
+  await until(() => /side=after/.test(page.url()), 'the URL says so');
   const shown = await page.locator('.pane').nth(1).screenshot();
   await page.reload();
   await until(
@@ -564,7 +564,7 @@ test('spheres before and after the alignment: certified, painted, measured', asy
   await done();
 });
 
-test('the lines and pages that are offered show this very morph', async () => {
+test('the offered commands and pages show this morph', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   await button(page, 'Landmarks').click();
@@ -578,11 +578,11 @@ test('the lines and pages that are offered show this very morph', async () => {
 
   const folder = await mkdtemp(join(tmpdir(), 'orbmorph-curl-'));
   const { stdout } = await promisify(execFile)('bash', ['-e', '-c', await text('curl')], { cwd: folder });
-  assert.deepEqual(await readFile(join(folder, 'morph.glb')), asset, 'curl brings the same bytes');
+  assert.deepEqual(await readFile(join(folder, 'morph.glb')), asset, 'curl downloads the same bytes');
   assert.equal(`${daemon.url}${JSON.parse(stdout).asset}`, await text('Asset'), 'the request names the same morph');
   await rm(folder, { recursive: true });
 
-  // The page as it would stand on another site; what it loads from a content network comes from the packages here.
+  // Serves the page as from another site; requests to the CDN are answered from the npm packages here.
   const html = await text('three.js');
   const context = await browser.newContext({ viewport: { width: 400, height: 300 } });
   const other = await context.newPage();

@@ -1,4 +1,4 @@
-// Two shapes over one icosphere of 20·4^steps triangles: as OBJ files, and merged as a GLB with one morph target.
+// Two shapes on one icosphere of 20·4^steps triangles: as OBJ files, and merged as a GLB with one morph target.
 
 export function icosphere(steps) {
   const t = (1 + Math.sqrt(5)) / 2;

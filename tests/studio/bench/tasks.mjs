@@ -1,5 +1,5 @@
-// The tasks of a page's main thread, from Chromium's own trace: how long each lasted, and how much of that the thread
-// computed. What is left it waited, for the GPU's process (which under software GL draws on the same cores) or for a core.
+// The tasks of a page's main thread, from Chromium's own trace: the wall time and the CPU time of each. The difference
+// is time spent waiting for the GPU process (which under software GL draws on the same cores) or for a core.
 
 const CATEGORIES = [
   'toplevel',
@@ -11,7 +11,7 @@ const CATEGORIES = [
 ];
 const LONG = 50;
 
-/** Runs `body` and -> {value, tasks: [{ms, cpu_ms, what}]}, tasks of 50 ms and more, the longest first. */
+/** Runs `body`. Returns {value, tasks: [{ms, cpu_ms, what}]} with the tasks of 50 ms and more, longest first. */
 export async function traced(browser, page, body) {
   await browser.startTracing(page, { categories: CATEGORIES });
   const value = await body();
@@ -34,7 +34,7 @@ function tasksIn(events) {
   return unique
     .sort((a, b) => b.dur - a.dur)
     .map((e) => {
-      // what filled it: the innermost span that takes most of it
+      // `what`: the innermost span that takes more than half of the task
       const inside = spans.filter(
         (s) =>
           thread(s) === thread(e) &&

@@ -1,4 +1,4 @@
-/** A tree of boxes over triangles: rays for picking, nearest points for error maps. The worker builds and queries it. */
+/** A tree of boxes over triangles, in the worker: finds ray hits for picking and nearest points for error maps. */
 
 export interface Hit {
   triangle: number;

@@ -31,7 +31,7 @@ function rampTexture(name: keyof typeof RAMPS): DataTexture {
   return texture;
 }
 
-/** Linear light from the normal in view space: a soft key light from the upper left, a cool fill, a rim, a highlight. */
+/** Linear light by the normal in view space: a soft key light from the upper left, a cool fill, a rim, a highlight. */
 const LIGHT = `
 vec3 light(vec3 n) {
   float key = max(0.0, dot(n, vec3(-0.4240, 0.7067, 0.5654)) * 0.72 + 0.28);
