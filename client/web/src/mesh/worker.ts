@@ -71,7 +71,7 @@ function spotOn(mesh: Held, t: number, u: number, v: number): Spot {
   return { position: toView(frame, point), normal, place: { point } };
 }
 
-/** For each wanted vertex a triangle that has it, whose normal stands for the vertex's. */
+/** For each wanted vertex a triangle that has it, for the vertex's normal. */
 function facesAt(raw: RawMesh, wanted: Set<number>): Map<number, number> {
   const found = new Map<number, number>();
   if (!wanted.size) return found;
