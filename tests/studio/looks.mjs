@@ -61,6 +61,8 @@ async function spheres(page) {
         .then((n) => n === 2),
     'both are embedded',
   );
+  const working = page.locator('.centered').getByRole('progressbar');
+  await until(() => working.count().then((n) => n === 0), 'both spheres are loaded');
 }
 
 /** name: [steps that lead to the scene, options of the page] */

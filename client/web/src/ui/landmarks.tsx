@@ -56,8 +56,8 @@ export function LandmarksInspector() {
         </div>
       </div>
       <p class="lead small">
-        Click the same feature on each shape: a nose, a foot, the tip of a tail. These points will meet exactly. Five to
-        ten, well spread, do most of the work.
+        Click the same feature on each shape: a nose, a foot, the tip of a tail. Landmarks meet exactly. Five to ten,
+        well spread, do most of the work.
       </p>
       <div class="row wrap">
         <Button icon="wand" disabled={shapes.length < 2 || !!state.running} onClick={() => void startMerge('find')}>

@@ -19,8 +19,7 @@ const MEANING: Record<SpherePaint, string> = {
   direction: 'Normals of the surface as colours. The sphere has the same colours, so you can recognise parts on it.',
   checker:
     'A regular checkerboard on the sphere, mapped back to the surface. Cells are large where the map shrinks the surface.',
-  symmetric_dirichlet:
-    'Symmetric Dirichlet energy: 1 where the map preserves lengths, more where it stretches or shrinks them.',
+  symmetric_dirichlet: 'Symmetric Dirichlet energy: 1 where the map preserves lengths, more where it distorts them.',
   angle: 'Ratio of the singular values: 1 where the map preserves angles.',
   area: 'Logarithm of the area ratio: blue where the map shrinks areas, red where it enlarges them.',
   aspect: 'Circumradius over twice the inradius of the triangles on the sphere: 1 for equilateral triangles.',
