@@ -166,7 +166,7 @@ test('every reference leads somewhere, and every component is used', () => {
 });
 
 test('every problem has an example whose detail says more than its title', async () => {
-  const table = (await readFile(path.join(root, 'api/problem.c'), 'utf8')).match(/table\[\] = \{\n([^]*?)\n\};/)[1];
+  const table = (await readFile(path.join(root, 'api/problem.c'), 'utf8')).match(/table\[\] = \{\n([\s\S]*?)\n\};/)[1];
   const titles = new Map(
     [...table.matchAll(/\{"([a-z-]+)", (\d{3}), "([^"]+)"\}/g)].map((m) => [
       `/problems/${m[1]}`,
