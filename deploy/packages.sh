@@ -6,7 +6,9 @@ orb_build_packages=(
   libcjson-dev libsodium-dev libmicrohttpd-dev libsqlite3-dev libcurl4-openssl-dev libpng-dev libjpeg62-turbo-dev
   zlib1g-dev libzstd-dev
 )
-orb_test_packages=(libcmocka-dev openssl sqlite3 zstd curl jq python3 binutils man-db mandoc zsh fish bsdutils chromium)
+orb_test_packages=(
+  libcmocka-dev clang-format openssl sqlite3 zstd curl jq python3 binutils man-db mandoc zsh fish bsdutils chromium
+)
 orb_fuzz_packages=(clang libclang-rt-dev)
 orb_long_packages=(valgrind wrk nginx caddy debootstrap lintian buildah podman runc prometheus systemd)
 

@@ -19,7 +19,8 @@ function typeOf(schema, pad) {
   if ('const' in schema) return literal(schema.const);
   if (schema.enum) return either(schema.enum.map(literal));
   // next to properties, alternatives only say which properties are required
-  if ((schema.oneOf || schema.anyOf) && !schema.properties) return either((schema.oneOf ?? schema.anyOf).map((s) => typeOf(s, pad)));
+  if ((schema.oneOf || schema.anyOf) && !schema.properties)
+    return either((schema.oneOf ?? schema.anyOf).map((s) => typeOf(s, pad)));
   if (Array.isArray(schema.type)) return either(schema.type.map((type) => typeOf({ ...schema, type }, pad)));
   if (schema.type === 'array') return arrayOf(schema, pad);
   if (schema.type === 'object' || schema.properties) return objectOf(schema, pad);
@@ -28,22 +29,33 @@ function typeOf(schema, pad) {
 
 function arrayOf({ items = true, minItems, maxItems }, pad) {
   const item = typeOf(items, pad);
-  if (minItems !== undefined && minItems === maxItems && minItems <= 4) return `[${Array(minItems).fill(item).join(', ')}]`;
+  if (minItems !== undefined && minItems === maxItems && minItems <= 4)
+    return `[${Array(minItems).fill(item).join(', ')}]`;
   return /[|{]/.test(item) ? `Array<${item}>` : `${item}[]`;
 }
 
 function objectOf({ properties = {}, required = [], additionalProperties }, pad) {
   const inner = `${pad}  `;
-  const lines = Object.entries(properties).map(([name, schema]) =>
-    `${comment(schema.description, inner)}${inner}${member(name)}${required.includes(name) ? '' : '?'}: ${typeOf(schema, inner)};\n`);
-  const more = additionalProperties && additionalProperties !== true ? typeOf(additionalProperties, inner) : additionalProperties ? 'unknown' : null;
+  const lines = Object.entries(properties).map(
+    ([name, schema]) =>
+      `${comment(schema.description, inner)}${inner}${member(name)}${required.includes(name) ? '' : '?'}: ${typeOf(schema, inner)};\n`,
+  );
+  const more =
+    additionalProperties && additionalProperties !== true
+      ? typeOf(additionalProperties, inner)
+      : additionalProperties
+        ? 'unknown'
+        : null;
   if (!lines.length) return `Record<string, ${more ?? 'unknown'}>`;
   if (more) lines.push(`${inner}[name: string]: unknown;\n`);
   return `{\n${lines.join('')}${pad}}`;
 }
 
-const text = `// Generated from api/openapi.json by client/js/types.mjs. Do not edit.\n\n/** Requests and responses of the daemon, interface version ${info.version}. */\n\n${
-  Object.entries(components.schemas).map(([name, schema]) => `${comment(schema.description, '')}export type ${name} = ${typeOf(schema, '')};\n`).join('\n')}`;
+const text = `// Generated from api/openapi.json by client/js/types.mjs. Do not edit.\n\n/** Requests and responses of the daemon, interface version ${info.version}. */\n\n${Object.entries(
+  components.schemas,
+)
+  .map(([name, schema]) => `${comment(schema.description, '')}export type ${name} = ${typeOf(schema, '')};\n`)
+  .join('\n')}`;
 
 if (process.argv.includes('--check')) {
   let now = '';

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the studio into client/web/dist; does nothing when that is newer than everything it is made of.
+# Builds the studio into client/web/dist. Does nothing if dist is newer than all sources.
 set -euo pipefail
 cd "$(dirname "$0")"
 

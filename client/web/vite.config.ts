@@ -7,8 +7,8 @@ const here = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 const isMesh = (name: string) => /\.(obj|off|ply|stl|glb)$/i.test(name);
 
 /**
- * The repository's sample meshes become assets of the studio; `virtual:samples` lists them as {name, file, bytes, url}.
- * "Try with samples" opens the first two.
+ * Bundles the repository's sample meshes as assets. `virtual:samples` lists them as {name, file, bytes, url}; "Try with
+ * samples" opens the first two.
  */
 function samples(): Plugin {
   const folder = here('../../tests/samples');
@@ -33,7 +33,7 @@ function samples(): Plugin {
   };
 }
 
-/** licenses.txt: the licences of what is bundled, which is what package.json calls `dependencies`. They ask for it. */
+/** Writes licenses.txt with the licences of the bundled packages (`dependencies` in package.json), as they require. */
 function licenses(): Plugin {
   const read = (path: string) => readFileSync(here(path), 'utf8').trim();
   return {
@@ -41,7 +41,9 @@ function licenses(): Plugin {
     apply: 'build',
     generateBundle() {
       const { dependencies } = JSON.parse(read('package.json')) as { dependencies: Record<string, string> };
-      const parts = Object.entries(dependencies).map(([name, version]) => `${name} ${version}\n\n${read(`node_modules/${name}/LICENSE`)}\n`);
+      const parts = Object.entries(dependencies).map(
+        ([name, version]) => `${name} ${version}\n\n${read(`node_modules/${name}/LICENSE`)}\n`,
+      );
       const source = [`orbmorph\n\n${read('../../LICENSE')}\n`, ...parts].join(`\n${'-'.repeat(80)}\n\n`);
       this.emitFile({ type: 'asset', fileName: 'licenses.txt', source });
     },

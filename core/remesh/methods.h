@@ -3,8 +3,8 @@
 #ifndef ORB_REMESH_METHODS_H
 #define ORB_REMESH_METHODS_H
 
-#include "sphere/net.h"
 #include "orbmorph/remesh.h"
+#include "sphere/net.h"
 
 /* What all methods need of the shapes. */
 typedef struct orb_remesh_job {

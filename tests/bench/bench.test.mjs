@@ -9,19 +9,32 @@ import { test } from 'node:test';
 const { ORB_BIN: bin, ORB_SAMPLES: samples } = process.env;
 const bench = (args, env = {}) => {
   const r = spawnSync(join(bin, 'orbmorph-bench'), args, { encoding: 'utf8', env: { ...process.env, ...env } });
-  return { status: r.status, error: r.stderr, lines: r.stdout.split('\n').filter(Boolean).map((l) => JSON.parse(l)) };
+  return {
+    status: r.status,
+    error: r.stderr,
+    lines: r.stdout
+      .split('\n')
+      .filter(Boolean)
+      .map((l) => JSON.parse(l)),
+  };
 };
-const dog = join(samples, 'dog.obj'), giraffe = join(samples, 'giraffe.off');
+const dog = join(samples, 'dog.obj');
+const giraffe = join(samples, 'giraffe.off');
 
 test('embed prints one line a repeat of every file', () => {
   const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));
-  const r = bench(['embed', '--threads', '2', '--repeat', '2', '--out', dir, dog, giraffe], { OPENBLAS_NUM_THREADS: '7' });
+  const r = bench(['embed', '--threads', '2', '--repeat', '2', '--out', dir, dog, giraffe], {
+    OPENBLAS_NUM_THREADS: '7',
+  });
   assert.equal(r.status, 0, r.error);
-  assert.deepEqual(r.lines.map((l) => l.mesh), ['dog', 'dog', 'giraffe', 'giraffe']);
+  assert.deepEqual(
+    r.lines.map((l) => l.mesh),
+    ['dog', 'dog', 'giraffe', 'giraffe'],
+  );
   for (const l of r.lines) {
     const s = l.seconds;
     assert.ok(s.read > 0 && s.total >= s.read + s.check + s.simplify + s.embed + s.certify - 1e-9);
-    assert.ok(Math.abs(l.triangles_per_minute / (60 * l.triangles / (s.total - s.read)) - 1) < 1e-9);
+    assert.ok(Math.abs(l.triangles_per_minute / ((60 * l.triangles) / (s.total - s.read)) - 1) < 1e-9);
     assert.ok(l.peak_rss_bytes > 1e6);
     assert.equal(l.threads, 2);
     assert.deepEqual([l.certificate.valid, l.certificate.flipped, l.certificate.degree], [true, 0, 1]);
@@ -52,7 +65,17 @@ test('both methods, options of a request, and the same sphere for any number of 
 test('merge writes the asset and its report', () => {
   const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));
   const out = join(dir, 'out.glb');
-  const r = bench(['merge', '--align', 'rotate', '--landmarks', join(samples, 'dog-giraffe.json'), '--out', out, dog, giraffe]);
+  const r = bench([
+    'merge',
+    '--align',
+    'rotate',
+    '--landmarks',
+    join(samples, 'dog-giraffe.json'),
+    '--out',
+    out,
+    dog,
+    giraffe,
+  ]);
   assert.equal(r.status, 0, r.error);
   const [l] = r.lines;
   assert.equal(l.triangles, 2 * l.vertices - 4);
@@ -73,7 +96,15 @@ test('landmarks: a set depends on the seed and its number only, and is right', (
     return r.lines;
   };
   const all = run('--sets', '4', '--seed', '9', '--merge-every', '3');
-  assert.deepEqual(all.map((l) => [l.set, l.landmarks]), [[0, 3], [1, 12], [2, 3], [3, 12]]);
+  assert.deepEqual(
+    all.map((l) => [l.set, l.landmarks]),
+    [
+      [0, 3],
+      [1, 12],
+      [2, 3],
+      [3, 12],
+    ],
+  );
   for (const l of all) {
     assert.equal(l.status, 'ok', l.detail);
     assert.equal(l.right, true);
@@ -88,20 +119,40 @@ test('landmarks: a set depends on the seed and its number only, and is right', (
 test('pairs: every pair once, certified', () => {
   const r = bench(['pairs', '--align-preset', 'fast', dog, giraffe, join(samples, 'elephant.ply')]);
   assert.equal(r.status, 0, r.error);
-  assert.deepEqual(r.lines.map((l) => l.shapes.join()), ['dog,giraffe', 'dog,elephant', 'giraffe,elephant']);
+  assert.deepEqual(
+    r.lines.map((l) => l.shapes.join()),
+    ['dog,giraffe', 'dog,elephant', 'giraffe,elephant'],
+  );
   for (const l of r.lines) {
     assert.equal(l.status, 'ok', l.detail);
     assert.equal(l.certificate.closed, true);
     assert.ok(l.bound_relative <= 0.001);
   }
-  const one = bench(['pairs', '--align-preset', 'fast', '--first', '1', '--sets', '1', dog, giraffe, join(samples, 'elephant.ply')]);
-  assert.deepEqual(one.lines.map((l) => l.shapes.join()), ['dog,elephant']);
+  const one = bench([
+    'pairs',
+    '--align-preset',
+    'fast',
+    '--first',
+    '1',
+    '--sets',
+    '1',
+    dog,
+    giraffe,
+    join(samples, 'elephant.ply'),
+  ]);
+  assert.deepEqual(
+    one.lines.map((l) => l.shapes.join()),
+    ['dog,elephant'],
+  );
 });
 
 test('landmarks: awkward sets meet, and contradictions are refused with both named', () => {
   const r = bench(['landmarks', '--sizes', 'awkward', '--sets', '8', dog, giraffe, join(samples, 'elephant.ply')]);
   assert.equal(r.status, 0, r.error);
-  assert.deepEqual(r.lines.map((l) => l.status), [0, 1].flatMap(() => ['ok', 'ok', 'ok', 'bad-landmarks']));
+  assert.deepEqual(
+    r.lines.map((l) => l.status),
+    [0, 1].flatMap(() => ['ok', 'ok', 'ok', 'bad-landmarks']),
+  );
   assert.ok(r.lines.every((l) => l.right));
 });
 
@@ -112,7 +163,14 @@ test('truth: a shape mapped to itself is where it was; landmarks not given are m
   writeFileSync(same, JSON.stringify({ landmarks: marks.map((m) => ({ ...m, at: [m.at[0], m.at[0]] })) }));
   const r = bench(['truth', '--landmarks', same, '--given', '5', '--methods', 'rotate,default,auto', dog, dog]);
   assert.equal(r.status, 0, r.error);
-  assert.deepEqual(r.lines.map((l) => [l.method, l.given]), [['rotate', 5], ['default', 5], ['auto', 0]]);
+  assert.deepEqual(
+    r.lines.map((l) => [l.method, l.given]),
+    [
+      ['rotate', 5],
+      ['default', 5],
+      ['auto', 0],
+    ],
+  );
   for (const l of r.lines) {
     assert.equal(l.flipped, 0);
     assert.ok(l.dense_percent.mean < 0.5, `${l.method}: ${l.dense_percent.mean}`);
@@ -120,7 +178,17 @@ test('truth: a shape mapped to itself is where it was; landmarks not given are m
     assert.ok(l.held_out_percent.max < 2, `${l.method}: ${l.held_out_percent.max}`);
     assert.ok(l.inverted_fraction.map < 0.001);
   }
-  const other = bench(['truth', '--landmarks', join(samples, 'dog-giraffe.json'), '--given', '5', '--methods', 'fast', dog, giraffe]);
+  const other = bench([
+    'truth',
+    '--landmarks',
+    join(samples, 'dog-giraffe.json'),
+    '--given',
+    '5',
+    '--methods',
+    'fast',
+    dog,
+    giraffe,
+  ]);
   assert.equal(other.status, 0, other.error);
   assert.equal(other.lines[0].dense_percent, null);
   assert.ok(other.lines[0].held_out_percent.mean > 0.1 && other.lines[0].held_out_percent.mean < 30);

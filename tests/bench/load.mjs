@@ -25,34 +25,46 @@ function report(what, value, goal, met) {
   console.log(`${what}: ${value} (goal: ${goal}) ${met ? 'met' : 'MISSED'}`);
 }
 
-const freePort = () => new Promise((resolve) => {
-  const server = net.createServer().listen(0, '127.0.0.1', () => {
-    const { port } = server.address();
-    server.close(() => resolve(port));
+const freePort = () =>
+  new Promise((resolve) => {
+    const server = net.createServer().listen(0, '127.0.0.1', () => {
+      const { port } = server.address();
+      server.close(() => resolve(port));
+    });
   });
-});
 
 /** nginx with sendfile and as many workers as the daemon has threads for connections, over one folder. */
 async function nginx(root) {
   const port = await freePort();
   const conf = path.join(scratch, 'nginx.conf');
-  writeFileSync(conf, `daemon off; worker_processes 2; pid ${scratch}/nginx.pid; error_log /dev/null;
+  writeFileSync(
+    conf,
+    `daemon off; worker_processes 2; pid ${scratch}/nginx.pid; error_log /dev/null;
 user root;
 events { worker_connections 4096; }
 http { access_log off; sendfile on; tcp_nopush on; keepalive_requests 100000000; default_type application/json;
   client_body_temp_path ${scratch}/t1; proxy_temp_path ${scratch}/t2; fastcgi_temp_path ${scratch}/t3;
   uwsgi_temp_path ${scratch}/t4; scgi_temp_path ${scratch}/t5;
-  server { listen 127.0.0.1:${port}; root ${root}; } }\n`);
+  server { listen 127.0.0.1:${port}; root ${root}; } }\n`,
+  );
   const child = spawn('nginx', ['-c', conf, '-e', '/dev/null'], { stdio: 'inherit' });
   for (let i = 0; i < 100; i++) {
-    if (await fetch(`http://127.0.0.1:${port}/`).then(() => true, () => false)) break;
+    if (
+      await fetch(`http://127.0.0.1:${port}/`).then(
+        () => true,
+        () => false,
+      )
+    )
+      break;
     await sleep(50);
   }
   return { url: `http://127.0.0.1:${port}`, stop: () => child.kill() };
 }
 
 function wrk(url, connections) {
-  const text = execFileSync('wrk', ['-t2', `-c${connections}`, `-d${seconds}s`, '--latency', url], { encoding: 'utf8' });
+  const text = execFileSync('wrk', ['-t2', `-c${connections}`, `-d${seconds}s`, '--latency', url], {
+    encoding: 'utf8',
+  });
   const unit = { us: 1e-3, ms: 1, s: 1e3, m: 6e4 };
   const [, p99, of] = /99%\s+([\d.]+)(us|ms|s|m)\b/.exec(text);
   const bad = /Non-2xx or 3xx responses: (\d+)/.exec(text)?.[1] ?? /Socket errors: (.*)/.exec(text)?.[1];
@@ -68,18 +80,29 @@ function compare(a, b, connections) {
   return [best(a1, a2), best(b1, b2)];
 }
 
-const status = (d, field) => Number(new RegExp(`${field}:\\s+(\\d+) kB`).exec(readFileSync(`/proc/${d.child.pid}/status`, 'utf8'))[1]) / 1024;
+const status = (d, field) =>
+  Number(new RegExp(`${field}:\\s+(\\d+) kB`).exec(readFileSync(`/proc/${d.child.pid}/status`, 'utf8'))[1]) / 1024;
 
 async function start(args = []) {
   mkdirSync(path.join(scratch, 'data'), { recursive: true });
   return new Daemon(mkdtempSync(path.join(scratch, 'data/')), ['--workers', '2', ...args], {}).start();
 }
-const mesh = async (d, levels, n) => (await d.upload(shapes.binaryPly(shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(3 * y + n)), y, z + 0.1 * n])), { name: `m${n}` })).json;
+const mesh = async (d, levels, n) =>
+  (
+    await d.upload(
+      shapes.binaryPly(shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(3 * y + n)), y, z + 0.1 * n])),
+      { name: `m${n}` },
+    )
+  ).json;
 
 async function asset() {
   const d = await start();
   const [a, b] = [await mesh(d, 5, 1), await mesh(d, 4, 2)];
-  const made = await d.made('/v1/supermeshes', { shapes: [{ mesh: a.id }, { mesh: b.id }], align: { method: 'rotate' }, remesh: { method: 'overlay' } });
+  const made = await d.made('/v1/supermeshes', {
+    shapes: [{ mesh: a.id }, { mesh: b.id }],
+    align: { method: 'rotate' },
+    remesh: { method: 'overlay' },
+  });
   const file = await d.get(made.asset);
   mkdirSync(`${scratch}/www`, { recursive: true });
   writeFileSync(`${scratch}/www/asset.glb`, file.bytes);
@@ -88,7 +111,12 @@ async function asset() {
   other.stop();
   await d.stop();
   const ratio = ours.rate / theirs.rate;
-  report(`GET asset.glb, ${(file.bytes.length / 1e6).toFixed(2)} MB, 64 connections`, `${show(ours)}; nginx ${show(theirs)}; ratio ${ratio.toFixed(2)}`, 'ratio >= 0.8', ratio >= 0.8);
+  report(
+    `GET asset.glb, ${(file.bytes.length / 1e6).toFixed(2)} MB, 64 connections`,
+    `${show(ours)}; nginx ${show(theirs)}; ratio ${ratio.toFixed(2)}`,
+    'ratio >= 0.8',
+    ratio >= 0.8,
+  );
 }
 
 async function job() {
@@ -103,7 +131,12 @@ async function job() {
   other.stop();
   await d.stop();
   const ratio = ours.rate / theirs.rate;
-  report('GET /v1/jobs/{id}, no job running, 64 connections', `${show(ours)}; nginx ${show(theirs)}; ratio ${ratio.toFixed(2)}`, 'ratio >= 0.5', ratio >= 0.5);
+  report(
+    'GET /v1/jobs/{id}, no job running, 64 connections',
+    `${show(ours)}; nginx ${show(theirs)}; ratio ${ratio.toFixed(2)}`,
+    'ratio >= 0.5',
+    ratio >= 0.5,
+  );
 }
 
 /** Two jobs that take minutes, and one more that waits behind them. */
@@ -126,34 +159,57 @@ async function jobs() {
   const got = wrk(d.url + first.url, 64);
   const still = await running(d);
   await d.stop('SIGKILL');
-  report(`GET /v1/jobs/{id} while ${still} jobs run, 64 connections`, show(got), '>= 15000 requests/s, p99 < 20 ms, 2 jobs running', got.rate >= 15000 && got.p99 < 20 && still === 2);
+  report(
+    `GET /v1/jobs/{id} while ${still} jobs run, 64 connections`,
+    show(got),
+    '>= 15000 requests/s, p99 < 20 ms, 2 jobs running',
+    got.rate >= 15000 && got.p99 < 20 && still === 2,
+  );
 }
 
 async function streams() {
   const clients = 10_000;
   const d = await start();
   const [first, , last] = await busy(d);
-  const before = wrk(d.url + first.url, 16), memory = status(d, 'VmRSS');
+  const before = wrk(d.url + first.url, 16);
+  const memory = status(d, 'VmRSS');
   // The clients live in processes of their own, so that a limit of open files does not stop them.
-  const child = spawn(process.execPath, [new URL(import.meta.url).pathname, '--streams', d.url + last.url + '/events', String(clients)], { stdio: ['ignore', 'pipe', 'inherit'] });
+  const child = spawn(
+    process.execPath,
+    [new URL(import.meta.url).pathname, '--streams', d.url + last.url + '/events', String(clients)],
+    { stdio: ['ignore', 'pipe', 'inherit'] },
+  );
   const opened = await new Promise((resolve) => child.stdout.once('data', (chunk) => resolve(Number(chunk))));
   await sleep(1000);
   const grown = status(d, 'VmRSS') - memory;
   const after = wrk(d.url + first.url, 16);
   child.kill();
   await d.stop('SIGKILL');
-  report(`${opened} idle event streams`, `${grown.toFixed(0)} MB`, `${clients} use < 200 MB`, opened === clients && grown < 200);
-  report('p99 of GET /v1/jobs/{id} with them', `${after.p99.toFixed(1)} ms, before ${before.p99.toFixed(1)} ms`, 'unchanged (at most 1.5 times and 5 ms)', after.p99 <= Math.max(1.5 * before.p99, before.p99 + 5));
+  report(
+    `${opened} idle event streams`,
+    `${grown.toFixed(0)} MB`,
+    `${clients} use < 200 MB`,
+    opened === clients && grown < 200,
+  );
+  report(
+    'p99 of GET /v1/jobs/{id} with them',
+    `${after.p99.toFixed(1)} ms, before ${before.p99.toFixed(1)} ms`,
+    'unchanged (at most 1.5 times and 5 ms)',
+    after.p99 <= Math.max(1.5 * before.p99, before.p99 + 5),
+  );
 }
 
 async function openStreams(url, count) {
-  let open = 0, failed = 0;
+  let open = 0;
+  let failed = 0;
   const agent = new http.Agent({ maxSockets: Infinity, keepAlive: false });
   for (let i = 0; i < count; i++) {
-    http.get(url, { agent }, (response) => {
-      response.on('data', () => {}).on('error', () => {});
-      open += response.statusCode === 200;
-    }).on('error', () => failed++);
+    http
+      .get(url, { agent }, (response) => {
+        response.on('data', () => {}).on('error', () => {});
+        open += response.statusCode === 200;
+      })
+      .on('error', () => failed++);
     if (i % 200 === 199) await sleep(5);
   }
   for (let i = 0; i < 600 && open + failed < count; i++) await sleep(50);
@@ -162,18 +218,28 @@ async function openStreams(url, count) {
 }
 
 async function uploads() {
-  const limit = 1024, count = 100;
+  const limit = 1024;
+  const count = 100;
   const d = await start(['--job-memory', '512M']);
   const bytes = shapes.binaryPly(shapes.ball(8)); // 10 MB
-  const text = bytes.subarray(0, 300).toString('latin1'), at = text.indexOf('\n', text.indexOf('format')) + 1;
+  const text = bytes.subarray(0, 300).toString('latin1');
+  const at = text.indexOf('\n', text.indexOf('format')) + 1;
   const began = Date.now();
-  const codes = await Promise.all(Array.from({ length: count }, async (_, i) => {
-    const body = Buffer.concat([bytes.subarray(0, at), Buffer.from(`comment ${i}\n`), bytes.subarray(at)]);
-    return (await d.upload(body, { name: `u${i}` })).status;
-  }));
-  const peak = status(d, 'VmHWM'), stored = codes.filter((code) => code === 201).length;
+  const codes = await Promise.all(
+    Array.from({ length: count }, async (_, i) => {
+      const body = Buffer.concat([bytes.subarray(0, at), Buffer.from(`comment ${i}\n`), bytes.subarray(at)]);
+      return (await d.upload(body, { name: `u${i}` })).status;
+    }),
+  );
+  const peak = status(d, 'VmHWM');
+  const stored = codes.filter((code) => code === 201).length;
   await d.stop();
-  report(`${count} uploads of ${(bytes.length / 1e6).toFixed(1)} MB at once`, `${stored} stored in ${((Date.now() - began) / 1000).toFixed(0)} s, peak memory ${peak.toFixed(0)} MB`, `all stored, < ${limit} MB (two checks of --job-memory 512M)`, stored === count && peak < limit);
+  report(
+    `${count} uploads of ${(bytes.length / 1e6).toFixed(1)} MB at once`,
+    `${stored} stored in ${((Date.now() - began) / 1000).toFixed(0)} s, peak memory ${peak.toFixed(0)} MB`,
+    `all stored, < ${limit} MB (two checks of --job-memory 512M)`,
+    stored === count && peak < limit,
+  );
 }
 
 if (process.argv[2] === '--streams') {
@@ -184,8 +250,12 @@ if (process.argv[2] === '--streams') {
   }
   try {
     for (const part of parts) await { asset, job, jobs, streams, uploads }[part]();
-    console.log(`\n| what | measured | goal | |\n|---|---|---|---|\n${rows.map((row) => `| ${row.join(' | ')} |`).join('\n')}`);
-    console.log(`\n${os.cpus().length} cores, ${os.cpus()[0].model}, load ${os.loadavg()[0].toFixed(1)}, ${seconds} s a measurement`);
+    console.log(
+      `\n| what | measured | goal | |\n|---|---|---|---|\n${rows.map((row) => `| ${row.join(' | ')} |`).join('\n')}`,
+    );
+    console.log(
+      `\n${os.cpus().length} cores, ${os.cpus()[0].model}, load ${os.loadavg()[0].toFixed(1)}, ${seconds} s a measurement`,
+    );
   } finally {
     rmSync(scratch, { recursive: true, force: true });
   }

@@ -1,41 +1,43 @@
 // The assets that the fixture writes, before the Khronos validator and as three.js shows them.
-import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
-import fs from "node:fs";
-import os from "node:os";
-import path from "node:path";
-import { after, before, test } from "node:test";
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
+import { after, before, test } from 'node:test';
 
-let validator, three, GLTFLoader;
+let validator;
+let three;
+let GLTFLoader;
 try {
-  validator = (await import("gltf-validator")).default;
-  three = await import("three");
+  validator = (await import('gltf-validator')).default;
+  three = await import('three');
   globalThis.self ??= globalThis;
   // Pictures are not looked at: the loader needs only that decoding them succeeds.
   globalThis.createImageBitmap ??= async () => ({ width: 1, height: 1, close() {} });
-  ({ GLTFLoader } = await import("three/addons/loaders/GLTFLoader.js"));
+  ({ GLTFLoader } = await import('three/addons/loaders/GLTFLoader.js'));
 } catch {
-  console.log("the npm packages are missing: npm ci in tests/");
+  console.log('the npm packages are missing: npm ci in tests/');
   process.exit(0);
 }
 
 let folder;
 before(() => {
-  folder = fs.mkdtempSync(path.join(os.tmpdir(), "orbmorph-asset-"));
-  execFileSync(process.env.ORB_ASSET_FIXTURE, [folder], { stdio: "inherit" });
+  folder = fs.mkdtempSync(path.join(os.tmpdir(), 'orbmorph-asset-'));
+  execFileSync(process.env.ORB_ASSET_FIXTURE, [folder], { stdio: 'inherit' });
 });
 after(() => fs.rmSync(folder, { recursive: true, force: true }));
 
 const bytesOf = (name) => fs.readFileSync(path.join(folder, `${name}.glb`));
-const factsOf = (name) => JSON.parse(fs.readFileSync(path.join(folder, `${name}.json`), "utf8"));
+const factsOf = (name) => JSON.parse(fs.readFileSync(path.join(folder, `${name}.json`), 'utf8'));
 function jsonOf(bytes) {
-  return JSON.parse(bytes.subarray(20, 20 + bytes.readUInt32LE(12)).toString("utf8"));
+  return JSON.parse(bytes.subarray(20, 20 + bytes.readUInt32LE(12)).toString('utf8'));
 }
 
 async function load(name) {
   const bytes = bytesOf(name);
   const buffer = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length);
-  const gltf = await new GLTFLoader().parseAsync(buffer, "");
+  const gltf = await new GLTFLoader().parseAsync(buffer, '');
   const meshes = [];
   gltf.scene.traverse((object) => object.isMesh && meshes.push(object));
   return { gltf, meshes };
@@ -59,10 +61,19 @@ function match(mesh, facts) {
   const numberOf = new Map();
   const count = facts.shapes[0].length / 3;
   for (let v = 0; v < count; v++) {
-    numberOf.set(facts.shapes[0].slice(3 * v, 3 * v + 3).map((x) => Math.fround(x) + 0).join(), v);
+    numberOf.set(
+      facts.shapes[0]
+        .slice(3 * v, 3 * v + 3)
+        .map((x) => Math.fround(x) + 0)
+        .join(),
+      v,
+    );
   }
   const numbers = shown(mesh, -1).map((p) => numberOf.get(p.map((x) => x + 0).join()));
-  assert.ok(numbers.every((v) => v !== undefined), "a base position is no vertex of the first shape");
+  assert.ok(
+    numbers.every((v) => v !== undefined),
+    'a base position is no vertex of the first shape',
+  );
   for (let s = 1; s < facts.shapes.length; s++) {
     shown(mesh, s - 1).forEach((p, i) => {
       for (let c = 0; c < 3; c++) {
@@ -79,7 +90,7 @@ function turned([a, b, c]) {
   return a < b && a < c ? [a, b, c].join() : b < c ? [b, c, a].join() : [c, a, b].join();
 }
 
-for (const name of ["two", "six", "dressed", "colours", "rigid", "bare", "painted", "painted-adaptive"]) {
+for (const name of ['two', 'six', 'dressed', 'colours', 'rigid', 'bare', 'painted', 'painted-adaptive']) {
   test(`${name}: the Khronos validator has nothing to say`, async () => {
     const report = await validator.validateBytes(new Uint8Array(bytesOf(name)), { maxIssues: 100 });
     const serious = report.issues.messages.filter((m) => m.severity < 2);
@@ -89,7 +100,7 @@ for (const name of ["two", "six", "dressed", "colours", "rigid", "bare", "painte
   });
 }
 
-for (const name of ["two", "six", "dressed", "colours", "rigid", "bare"]) {
+for (const name of ['two', 'six', 'dressed', 'colours', 'rigid', 'bare']) {
   test(`${name}: three.js shows each shape at its weight`, async () => {
     const { meshes } = await load(name);
     const facts = factsOf(name);
@@ -108,7 +119,7 @@ for (const name of ["two", "six", "dressed", "colours", "rigid", "bare"]) {
     const json = jsonOf(bytesOf(name));
     assert.equal(json.meshes.length, 1);
     assert.equal(json.nodes.length, 1);
-    assert.equal(json.asset.generator, "orbmorph 1.0.0");
+    assert.equal(json.asset.generator, 'orbmorph 1.0.0');
     for (const primitive of json.meshes[0].primitives) {
       assert.equal(primitive.mode, 4);
       const kinds = primitive.targets.map((t) => Object.keys(t).sort().join());
@@ -122,8 +133,8 @@ for (const name of ["two", "six", "dressed", "colours", "rigid", "bare"]) {
   });
 }
 
-test("the animation shows every shape alone, as three.js plays it", async () => {
-  const { gltf, meshes } = await load("six");
+test('the animation shows every shape alone, as three.js plays it', async () => {
+  const { gltf, meshes } = await load('six');
   const [clip] = gltf.animations;
   const mixer = new three.AnimationMixer(gltf.scene);
   mixer.clipAction(clip).play();
@@ -139,23 +150,23 @@ test("the animation shows every shape alone, as three.js plays it", async () => 
   assert.deepEqual([...alone].sort(), [-1, 0, 1, 2, 3, 4]);
 });
 
-test("names come through, whatever they hold", async () => {
-  const { meshes } = await load("six");
-  assert.deepEqual(Object.keys(meshes[0].morphTargetDictionary), ["zwei", "trois", 'four "quoted"', "five\\", "six"]);
+test('names come through, whatever they hold', async () => {
+  const { meshes } = await load('six');
+  assert.deepEqual(Object.keys(meshes[0].morphTargetDictionary), ['zwei', 'trois', 'four "quoted"', 'five\\', 'six']);
 });
 
-test("more targets than a client must support are told of", () => {
-  assert.match(jsonOf(bytesOf("six")).meshes[0].extras.note ?? "", /8 morphed attributes/);
-  assert.equal(jsonOf(bytesOf("two")).meshes[0].extras.note, undefined);
+test('more targets than a client must support are told of', () => {
+  assert.match(jsonOf(bytesOf('six')).meshes[0].extras.note ?? '', /8 morphed attributes/);
+  assert.equal(jsonOf(bytesOf('two')).meshes[0].extras.note, undefined);
 });
 
-test("split vertices have the same bits on every shape, and weld back to the supermesh", () => {
-  const bytes = bytesOf("dressed");
+test('split vertices have the same bits on every shape, and weld back to the supermesh', () => {
+  const bytes = bytesOf('dressed');
   const json = jsonOf(bytes);
   const binary = bytes.subarray(28 + bytes.readUInt32LE(12));
   const raw = (accessor, i) => {
     const view = json.bufferViews[json.accessors[accessor].bufferView];
-    return binary.subarray((view.byteOffset ?? 0) + 12 * i, (view.byteOffset ?? 0) + 12 * i + 12).toString("hex");
+    return binary.subarray((view.byteOffset ?? 0) + 12 * i, (view.byteOffset ?? 0) + 12 * i + 12).toString('hex');
   };
   const distinct = new Set();
   let vertices = 0;
@@ -165,21 +176,24 @@ test("split vertices have the same bits on every shape, and weld back to the sup
       distinct.add(parts.join());
     }
   }
-  assert.equal(distinct.size, factsOf("dressed").shapes[0].length / 3);
+  assert.equal(distinct.size, factsOf('dressed').shapes[0].length / 3);
   assert.ok(vertices > distinct.size);
 });
 
-test("materials, image, colours and coordinates of the first shape are there", async () => {
-  const json = jsonOf(bytesOf("dressed"));
+test('materials, image, colours and coordinates of the first shape are there', async () => {
+  const json = jsonOf(bytesOf('dressed'));
   assert.equal(json.meshes[0].primitives.length, 2);
-  assert.deepEqual(json.materials.map((m) => m.name), ["paint 0", "paint 1"]);
+  assert.deepEqual(
+    json.materials.map((m) => m.name),
+    ['paint 0', 'paint 1'],
+  );
   assert.equal(json.materials[0].pbrMetallicRoughness.baseColorTexture, undefined);
   assert.equal(json.materials[1].pbrMetallicRoughness.baseColorTexture.index, 0);
-  const { meshes } = await load("dressed");
+  const { meshes } = await load('dressed');
   for (const mesh of meshes) {
     const { position, uv, color } = mesh.geometry.attributes;
     const index = mesh.geometry.index.array;
-    const facts = factsOf("dressed");
+    const facts = factsOf('dressed');
     const numbers = match(mesh, facts);
     for (let i = 0; i < position.count; i++) {
       assert.ok(color.getX(i) >= 0 && color.getX(i) <= 1);
@@ -191,6 +205,6 @@ test("materials, image, colours and coordinates of the first shape are there", a
       assert.ok(Math.max(...u) - Math.min(...u) < 1.01 / 24);
     }
   }
-  const colours = await load("colours");
+  const colours = await load('colours');
   assert.equal(colours.meshes[0].geometry.morphAttributes.color.length, 1);
 });

@@ -1,22 +1,22 @@
 // Written assets in three.js and in Babylon.js, drawn by headless Chromium, against a direct drawing of the shapes that
 // the facts give: the same camera, the same shading (flat normals as colours in three.js; silhouettes in Babylon.js).
-import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
-import fs from "node:fs";
-import http from "node:http";
-import os from "node:os";
-import path from "node:path";
-import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import fs from 'node:fs';
+import http from 'node:http';
+import os from 'node:os';
+import path from 'node:path';
+import { after, before, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
 
-const modules = fileURLToPath(new URL("../node_modules/", import.meta.url));
-const executablePath = process.env.ORB_CHROMIUM ?? "/usr/bin/chromium";
-const needed = ["three", "babylonjs", "babylonjs-loaders", "playwright-core"].map((name) => path.join(modules, name));
+const modules = fileURLToPath(new URL('../node_modules/', import.meta.url));
+const executablePath = process.env.ORB_CHROMIUM ?? '/usr/bin/chromium';
+const needed = ['three', 'babylonjs', 'babylonjs-loaders', 'playwright-core'].map((name) => path.join(modules, name));
 if (![...needed, executablePath].every((file) => fs.existsSync(file))) {
-  console.log("Chromium or the npm packages are missing: npm ci in tests/");
+  console.log('Chromium or the npm packages are missing: npm ci in tests/');
   process.exit(0);
 }
-const { chromium } = await import("playwright-core");
+const { chromium } = await import('playwright-core');
 
 const SIZE = 256;
 const PAGE = `<!doctype html><title>asset</title>
@@ -148,30 +148,41 @@ window.babylon = async (name, target, painted) => {
 window.ready = true;
 </script>`;
 
-let folder, server, browser, page;
+let folder;
+let server;
+let browser;
+let page;
 const faults = [];
 before(async () => {
-  folder = fs.mkdtempSync(path.join(os.tmpdir(), "orbmorph-browser-"));
-  execFileSync(process.env.ORB_ASSET_FIXTURE, [folder], { stdio: "inherit" });
-  const types = { ".js": "text/javascript", ".json": "application/json", ".glb": "model/gltf-binary" };
+  folder = fs.mkdtempSync(path.join(os.tmpdir(), 'orbmorph-browser-'));
+  execFileSync(process.env.ORB_ASSET_FIXTURE, [folder], { stdio: 'inherit' });
+  const types = { '.js': 'text/javascript', '.json': 'application/json', '.glb': 'model/gltf-binary' };
   server = http.createServer((request, response) => {
-    const [, kind, ...rest] = decodeURIComponent(new URL(request.url, "http://x").pathname).split("/");
-    const root = kind === "npm" ? modules : folder;
+    const [, kind, ...rest] = decodeURIComponent(new URL(request.url, 'http://x').pathname).split('/');
+    const root = kind === 'npm' ? modules : folder;
     const file = path.join(root, ...rest);
-    if (kind !== "npm" && kind !== "asset") return response.writeHead(200, { "Content-Type": "text/html" }).end(PAGE);
+    if (kind !== 'npm' && kind !== 'asset') return response.writeHead(200, { 'Content-Type': 'text/html' }).end(PAGE);
     if (!file.startsWith(root) || !fs.existsSync(file)) return response.writeHead(404).end();
-    response.writeHead(200, { "Content-Type": types[path.extname(file)] ?? "application/octet-stream" });
+    response.writeHead(200, { 'Content-Type': types[path.extname(file)] ?? 'application/octet-stream' });
     fs.createReadStream(file).pipe(response);
   });
-  await new Promise((done) => server.listen(0, "127.0.0.1", done));
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
   browser = await chromium.launch({
     timeout: 180_000,
     executablePath,
-    args: ["--no-sandbox", "--headless=new", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-      "--disable-background-networking", "--disable-component-update", "--no-first-run"],
+    args: [
+      '--no-sandbox',
+      '--headless=new',
+      '--use-gl=angle',
+      '--use-angle=swiftshader',
+      '--enable-unsafe-swiftshader',
+      '--disable-background-networking',
+      '--disable-component-update',
+      '--no-first-run',
+    ],
   });
   page = await browser.newPage();
-  page.on("pageerror", (error) => faults.push(String(error)));
+  page.on('pageerror', (error) => faults.push(String(error)));
   await page.goto(`http://127.0.0.1:${server.address().port}/`);
   await page.waitForFunction(() => window.ready, null, { timeout: 180_000 });
 });
@@ -181,20 +192,23 @@ after(async () => {
   fs.rmSync(folder, { recursive: true, force: true });
 });
 
-const draw = async (how, ...args) => Buffer.from(await page.evaluate(([how, args]) => window[how](...args), [how, args]), "base64");
+const draw = async (how, ...args) =>
+  Buffer.from(await page.evaluate(([how, args]) => window[how](...args), [how, args]), 'base64');
 const covered = (image) => Array.from({ length: SIZE * SIZE }, (_, i) => image[4 * i + 3] > 127);
 
 // Shares of pixels that differ, of those that either image covers.
 function difference(a, b, tolerance) {
-  let either = 0, differ = 0;
-  const inA = covered(a), inB = covered(b);
+  let either = 0;
+  let differ = 0;
+  const inA = covered(a);
+  const inB = covered(b);
   for (let i = 0; i < SIZE * SIZE; i++) {
     if (!inA[i] && !inB[i]) continue;
     either++;
     const far = [0, 1, 2].some((c) => Math.abs(a[4 * i + c] - b[4 * i + c]) > tolerance);
     if (inA[i] !== inB[i] || far) differ++;
   }
-  assert.ok(either > 0.05 * SIZE * SIZE, "the picture is empty");
+  assert.ok(either > 0.05 * SIZE * SIZE, 'the picture is empty');
   return differ / either;
 }
 
@@ -207,25 +221,33 @@ function keep(name, image) {
       for (let c = 0; c < 3; c++) rgb[3 * (y * SIZE + x) + c] = image[4 * ((SIZE - 1 - y) * SIZE + x) + c];
     }
   }
-  fs.writeFileSync(path.join(process.env.ORB_SHOTS, `${name}.ppm`), Buffer.concat([Buffer.from(`P6 ${SIZE} ${SIZE} 255\n`), rgb]));
+  fs.writeFileSync(
+    path.join(process.env.ORB_SHOTS, `${name}.ppm`),
+    Buffer.concat([Buffer.from(`P6 ${SIZE} ${SIZE} 255\n`), rgb]),
+  );
 }
 
-for (const [name, shape] of [["two", 0], ["two", 1], ["dressed", 2], ["six", 1]]) {
+for (const [name, shape] of [
+  ['two', 0],
+  ['two', 1],
+  ['dressed', 2],
+  ['six', 1],
+]) {
   test(`${name}, shape ${shape}: three.js draws it as it is, Babylon.js its outline`, async () => {
-    const wanted = await draw("direct", name, shape);
-    assert.ok(difference(wanted, await draw("three", name, shape - 1), 6) < 0.005);
-    assert.ok(difference(wanted, await draw("babylon", name, shape - 1), 256) < 0.01);
+    const wanted = await draw('direct', name, shape);
+    assert.ok(difference(wanted, await draw('three', name, shape - 1), 6) < 0.005);
+    assert.ok(difference(wanted, await draw('babylon', name, shape - 1), 256) < 0.01);
   });
 }
 
 // Three shapes of unlike triangles; the overlay has every edge of the textured one, so that its texture is exact there.
 // On the others the direct picture interpolates coordinates over other triangles, which moves the tiles' borders.
-for (const name of ["painted", "painted-adaptive"]) {
+for (const name of ['painted', 'painted-adaptive']) {
   for (const shape of [0, 1, 2]) {
     test(`${name}, shape ${shape}: both draw its texture as it is`, async () => {
-      const wanted = await draw("paintedDirect", name, shape);
-      const most = name === "painted" && shape === 0 ? 0.01 : 0.08;
-      for (const how of ["paintedThree", "paintedBabylon"]) {
+      const wanted = await draw('paintedDirect', name, shape);
+      const most = name === 'painted' && shape === 0 ? 0.01 : 0.08;
+      for (const how of ['paintedThree', 'paintedBabylon']) {
         const got = await draw(how, name, shape - 1);
         keep(`${name}-${shape}-${how}`, got);
         keep(`${name}-${shape}-wanted`, wanted);
@@ -237,10 +259,10 @@ for (const name of ["painted", "painted-adaptive"]) {
   }
 }
 
-test("the shapes differ by far more than the tolerances", async () => {
-  const first = await draw("direct", "two", 0);
-  assert.ok(difference(first, await draw("direct", "two", 1), 256) > 0.1);
-  assert.ok(difference(first, await draw("three", "two", 0), 6) > 0.2);
+test('the shapes differ by far more than the tolerances', async () => {
+  const first = await draw('direct', 'two', 0);
+  assert.ok(difference(first, await draw('direct', 'two', 1), 256) > 0.1);
+  assert.ok(difference(first, await draw('three', 'two', 0), 6) > 0.2);
 });
 
-test("the page had no exception", () => assert.deepEqual(faults, []));
+test('the page had no exception', () => assert.deepEqual(faults, []));

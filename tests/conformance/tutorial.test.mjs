@@ -13,7 +13,11 @@ import { readPng } from '../scenario/support/png.mjs';
 
 const modules = fileURLToPath(new URL('../node_modules/', import.meta.url));
 const executablePath = process.env.ORB_CHROMIUM ?? '/usr/bin/chromium';
-if (![path.join(modules, 'three'), path.join(modules, 'playwright-core'), executablePath].every((file) => fs.existsSync(file))) {
+if (
+  ![path.join(modules, 'three'), path.join(modules, 'playwright-core'), executablePath].every((file) =>
+    fs.existsSync(file),
+  )
+) {
   console.log('Chromium or the npm packages are missing: npm ci in tests/');
   process.exit(0);
 }
@@ -25,7 +29,9 @@ const types = { '.js': 'text/javascript', '.html': 'text/html', '.glb': 'model/g
 function serve(t, folder) {
   const server = http.createServer((request, response) => {
     const where = decodeURIComponent(new URL(request.url, 'http://x').pathname);
-    const file = where.startsWith('/node_modules/') ? path.join(modules, where.slice(14)) : path.join(folder, where === '/' ? 'index.html' : where);
+    const file = where.startsWith('/node_modules/')
+      ? path.join(modules, where.slice(14))
+      : path.join(folder, where === '/' ? 'index.html' : where);
     if (!fs.existsSync(file)) return response.writeHead(404).end();
     response.writeHead(200, { 'Content-Type': types[path.extname(file)] ?? 'application/octet-stream' });
     fs.createReadStream(file).pipe(response);
@@ -44,7 +50,11 @@ function difference(a, b) {
 test('the tutorial ends with a page that morphs', async (t) => {
   const d = await daemon(t);
   const { at, env } = await place(t, d);
-  const run = spawnSync('bash', ['-euo', 'pipefail', '-c', (await shellLines('docs/tutorial.md')).replaceAll('http://127.0.0.1:8080', d.url)], { cwd: at, env, encoding: 'utf8', timeout: 900_000 });
+  const run = spawnSync(
+    'bash',
+    ['-euo', 'pipefail', '-c', (await shellLines('docs/tutorial.md')).replaceAll('http://127.0.0.1:8080', d.url)],
+    { cwd: at, env, encoding: 'utf8', timeout: 900_000 },
+  );
   assert.equal(run.status, 0, `${run.stdout}\n${run.stderr}`);
   const text = fs.readFileSync(path.join(root, 'docs/tutorial.md'), 'utf8');
   const [said] = blocks(text, 'text');
@@ -56,17 +66,37 @@ test('the tutorial ends with a page that morphs', async (t) => {
   const browser = await chromium.launch({
     timeout: 180_000,
     executablePath,
-    args: ['--no-sandbox', '--headless=new', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
-      '--disable-background-networking', '--disable-component-update', '--no-first-run'],
+    args: [
+      '--no-sandbox',
+      '--headless=new',
+      '--use-gl=angle',
+      '--use-angle=swiftshader',
+      '--enable-unsafe-swiftshader',
+      '--disable-background-networking',
+      '--disable-component-update',
+      '--no-first-run',
+    ],
   });
   t.after(() => browser.close());
   const page = await browser.newPage({ viewport: { width: 640, height: 400 } });
   const faults = [];
   page.on('pageerror', (error) => faults.push(String(error)));
-  page.on('console', (message) => message.type() === 'error' && !/favicon/.test(message.location().url) && faults.push(message.text()));
-  page.on('request', (request) => new URL(request.url()).origin === new URL(url).origin || faults.push(`outside: ${request.url()}`));
+  page.on(
+    'console',
+    (message) => message.type() === 'error' && !/favicon/.test(message.location().url) && faults.push(message.text()),
+  );
+  page.on(
+    'request',
+    (request) => new URL(request.url()).origin === new URL(url).origin || faults.push(`outside: ${request.url()}`),
+  );
   await page.goto(url);
-  await page.waitForFunction(() => document.querySelector('canvas')?.width > 300 && performance.getEntriesByName(new URL('morph.glb', location).href).length > 0, null, { timeout: 180_000 });
+  await page.waitForFunction(
+    () =>
+      document.querySelector('canvas')?.width > 300 &&
+      performance.getEntriesByName(new URL('morph.glb', location).href).length > 0,
+    null,
+    { timeout: 180_000 },
+  );
 
   const shot = async (value) => {
     await page.evaluate((v) => {
@@ -77,22 +107,32 @@ test('the tutorial ends with a page that morphs', async (t) => {
     await page.waitForTimeout(700);
     return page.screenshot();
   };
-  let dog, shown = 0;
+  let dog;
+  let shown = 0;
   for (let i = 0; i < 30 && shown < 0.02; i++) {
     dog = await shot(0);
-    const { frames: [rgb] } = readPng(dog);
+    const {
+      frames: [rgb],
+    } = readPng(dog);
     shown = difference(rgb, Buffer.from(Array.from({ length: rgb.length }, (_, k) => rgb[k % 3])));
   }
   assert.ok(shown > 0.02, 'an animal is to be seen');
-  const half = await shot(0.5), elephant = await shot(1);
+  const half = await shot(0.5);
+  const elephant = await shot(1);
   assert.ok(difference(readPng(dog).frames[0], readPng(elephant).frames[0]) > 0.03, 'the shapes differ');
   assert.ok(difference(readPng(dog).frames[0], readPng(half).frames[0]) > 0.01, 'and between them is another');
   assert.deepEqual(faults, []);
 
   if (process.env.ORB_PICTURES) {
     fs.writeFileSync(path.join(root, 'docs/tutorial.png'), half);
-    spawnSync('orbmorph', ['view', 'morph.glb', '-o', path.join(root, 'docs/tutorial-sheet.png'), '--size', '200'], { cwd: at, env });
+    spawnSync('orbmorph', ['view', 'morph.glb', '-o', path.join(root, 'docs/tutorial-sheet.png'), '--size', '200'], {
+      cwd: at,
+      env,
+    });
   }
   const kept = readPng(fs.readFileSync(path.join(root, 'docs/tutorial.png')));
-  assert.ok(difference(kept.frames[0], readPng(half).frames[0]) < 0.05, 'docs/tutorial.png is stale: run with ORB_PICTURES=1');
+  assert.ok(
+    difference(kept.frames[0], readPng(half).frames[0]) < 0.05,
+    'docs/tutorial.png is stale: run with ORB_PICTURES=1',
+  );
 });

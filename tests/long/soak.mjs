@@ -31,7 +31,9 @@ function open() {
   for (const fd of readdirSync(`${proc}/fd`)) {
     let what;
     try {
-      what = readlinkSync(`${proc}/fd/${fd}`).replace(data, '').replace(/:\[\d+\]$/, '');
+      what = readlinkSync(`${proc}/fd/${fd}`)
+        .replace(data, '')
+        .replace(/:\[\d+\]$/, '');
     } catch (error) {
       if (error.code === 'ENOENT') continue; // closed since the folder was listed
       throw error;
@@ -43,10 +45,14 @@ function open() {
 
 const counts = {};
 const count = (what) => (counts[what] = (counts[what] ?? 0) + 1);
-let stop = false, number = 0;
+let stop = false;
+let number = 0;
 const mesh = () => {
-  const n = ++number, levels = 1 + (n % 4);
-  return shapes.obj(shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(n)), y + 0.1 * Math.sin(3 * x), z + 1e-4 * n]));
+  const n = ++number;
+  const levels = 1 + (n % 4);
+  return shapes.obj(
+    shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(n)), y + 0.1 * Math.sin(3 * x), z + 1e-4 * n]),
+  );
 };
 
 /** One caller after another: uploads, jobs, waits, streams, downloads, errors, cancels, aborted requests, deletions. */
@@ -55,14 +61,20 @@ async function caller() {
     const [a, b] = [(await d.upload(mesh(), { name: 'a' })).json, (await d.upload(mesh(), { name: 'b' })).json];
     const embedding = await d.make('/v1/embeddings', { mesh: a.id });
     count(embedding.resource ? 'embeddings' : 'embeddings that failed');
-    const reply = await d.post('/v1/supermeshes', { shapes: [{ mesh: a.id }, { mesh: b.id }], align: { method: 'rotate' }, remesh: { method: number % 2 ? 'overlay' : 'adaptive' } });
+    const reply = await d.post('/v1/supermeshes', {
+      shapes: [{ mesh: a.id }, { mesh: b.id }],
+      align: { method: 'rotate' },
+      remesh: { method: number % 2 ? 'overlay' : 'adaptive' },
+    });
     if (number % 5 === 0 && reply.status === 202) {
       await d.delete(reply.json.url);
       count('cancelled');
     } else if (reply.status === 202) {
       const events = await d.get(`${reply.json.url}/events`);
       count(/^event: succeeded/m.test(events.bytes.toString()) ? 'supermeshes' : 'supermeshes that failed');
-      const asset = await d.get(`/v1/supermeshes/${(await d.get(reply.json.url)).json.result?.split('/').pop()}/asset.glb`);
+      const asset = await d.get(
+        `/v1/supermeshes/${(await d.get(reply.json.url)).json.result?.split('/').pop()}/asset.glb`,
+      );
       count(asset.status === 200 ? 'assets' : 'assets that are gone');
     }
     await d.upload('this is no mesh', { name: 'x' });
@@ -70,23 +82,29 @@ async function caller() {
     await d.get('/v1/meshes', { query: { limit: 50 } });
     await d.get('/metrics');
     await d.upload(Buffer.alloc(200_000, 'v 0 0 0\n'), { name: 'y' });
-    await d.get(reply.json.url ?? '/v1/jobs', { query: { wait: 5 }, signal: AbortSignal.timeout(20) }).catch(() => count('aborted waits'));
+    await d
+      .get(reply.json.url ?? '/v1/jobs', { query: { wait: 5 }, signal: AbortSignal.timeout(20) })
+      .catch(() => count('aborted waits'));
     await d.delete(`/v1/meshes/${a.id}`);
     await d.delete(`/v1/meshes/${b.id}`);
     count('rounds');
   }
 }
 
-const first = sample(), at_first = open(), samples = [];
+const first = sample();
+const at_first = open();
+const samples = [];
 let warm = 700;
-await Promise.all(Array.from({ length: 8 }, async () => {
-  for (; warm > 0; warm--) {
-    const small = shapes.obj(shapes.ball(1, ([x, y, z]) => [x, y, z + 1e-4 * ++number]));
-    const { json } = await d.upload(small, { name: 'w' });
-    await d.made('/v1/embeddings', { mesh: json.id });
-    await d.delete(json.url);
-  }
-}));
+await Promise.all(
+  Array.from({ length: 8 }, async () => {
+    for (; warm > 0; warm--) {
+      const small = shapes.obj(shapes.ball(1, ([x, y, z]) => [x, y, z + 1e-4 * ++number]));
+      const { json } = await d.upload(small, { name: 'w' });
+      await d.made('/v1/embeddings', { mesh: json.id });
+      await d.delete(json.url);
+    }
+  }),
+);
 const callers = Array.from({ length: 4 }, caller);
 for (const began = Date.now(); Date.now() - began < seconds * 1000; ) {
   await sleep(1000);
@@ -96,22 +114,35 @@ stop = true;
 const failed = (await Promise.allSettled(callers)).filter((result) => result.status === 'rejected');
 const idle = ['--', ...failed.map((result) => String(result.reason))];
 await sleep(35_000); // kept connections end after 30 s
-const last = sample(), at_last = open();
+const last = sample();
+const at_last = open();
 const { code } = await d.stop();
 rmSync(data, { recursive: true, force: true });
 
-const closed = Object.entries(at_last).every(([what, n]) => n <= (what === '/catalogue.sqlite-wal' ? at_first['/catalogue.sqlite'] : (at_first[what] ?? 0)));
+const closed = Object.entries(at_last).every(
+  ([what, n]) => n <= (what === '/catalogue.sqlite-wal' ? at_first['/catalogue.sqlite'] : (at_first[what] ?? 0)),
+);
 let bad = failed.length > 0 || code !== 0;
-console.log(`${seconds} s: ${Object.entries(counts).map(([what, n]) => `${n} ${what}`).join(', ')}; the daemon ended with ${code}`);
+console.log(
+  `${seconds} s: ${Object.entries(counts)
+    .map(([what, n]) => `${n} ${what}`)
+    .join(', ')}; the daemon ended with ${code}`,
+);
 for (const what of ['memory', 'descriptors', 'threads']) {
   const rest = samples.filter((s) => s.at > seconds / 5);
-  const n = rest.length, mean = rest.reduce((sum, s) => sum + s[what], 0) / n, at = rest.reduce((sum, s) => sum + s.at, 0) / n;
-  const slope = rest.reduce((sum, s) => sum + (s.at - at) * (s[what] - mean), 0) / rest.reduce((sum, s) => sum + (s.at - at) ** 2, 0);
+  const n = rest.length;
+  const mean = rest.reduce((sum, s) => sum + s[what], 0) / n;
+  const at = rest.reduce((sum, s) => sum + s.at, 0) / n;
+  const slope =
+    rest.reduce((sum, s) => sum + (s.at - at) * (s[what] - mean), 0) /
+    rest.reduce((sum, s) => sum + (s.at - at) ** 2, 0);
   const rise = slope * (rest.at(-1).at - rest[0].at);
   const flat = rise <= Math.max(0.1 * mean, what === 'memory' ? 5 : 2);
   const back = { memory: true, threads: last.threads <= first.threads, descriptors: closed }[what];
   bad ||= !flat || !back;
-  console.log(`${what}: ${first[what].toFixed(0)} at first, ${mean.toFixed(1)} on average, from ${Math.min(...rest.map((s) => s[what])).toFixed(0)} to ${Math.max(...rest.map((s) => s[what])).toFixed(0)}, rise ${rise.toFixed(1)}, ${last[what].toFixed(0)} when idle again${flat && back ? '' : ' NOT FLAT'}`);
+  console.log(
+    `${what}: ${first[what].toFixed(0)} at first, ${mean.toFixed(1)} on average, from ${Math.min(...rest.map((s) => s[what])).toFixed(0)} to ${Math.max(...rest.map((s) => s[what])).toFixed(0)}, rise ${rise.toFixed(1)}, ${last[what].toFixed(0)} when idle again${flat && back ? '' : ' NOT FLAT'}`,
+  );
 }
 if (!closed) console.log(`open at first ${JSON.stringify(at_first)}\nwhen idle again ${JSON.stringify(at_last)}`);
 if (idle.length > 1) console.log(idle.join('\n'));

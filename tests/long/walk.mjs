@@ -17,13 +17,18 @@ const WAIT = { headers: { prefer: 'wait=60' } };
 const step = (what) => console.log(`${new Date().toISOString().slice(11, 19)} ${what}`);
 const is = async (status, reply) => {
   const got = await reply;
-  assert.ok([status].flat().includes(got.status), `${got.status}, not ${status}: ${got.bytes.toString().slice(0, 300)}`);
+  assert.ok(
+    [status].flat().includes(got.status),
+    `${got.status}, not ${status}: ${got.bytes.toString().slice(0, 300)}`,
+  );
   return got;
 };
 
 async function meshes() {
   step('every format, coding and repair; what is no mesh');
-  const egg = shapes.egg(1), bean = shapes.bean(1), kinds = {};
+  const egg = shapes.egg(1);
+  const bean = shapes.bean(1);
+  const kinds = {};
   const [first, second] = [shapes.obj(egg), shapes.off(bean)];
   kinds.egg = (await is(201, d.upload(first, { name: 'egg' }))).json;
   kinds.bean = (await is(201, d.upload(second, { name: 'bean', format: 'off' }))).json;
@@ -33,15 +38,22 @@ async function meshes() {
   kinds.glb = (await is(201, d.upload(writeGlb({ ...egg, uv, factor: [1, 0.5, 0, 1] })))).json;
   await is([200, 201], d.upload(shapes.obj(shapes.soup(bean)), { repair: 'safe' }));
   await is([200, 201], d.upload(shapes.obj(shapes.withoutFace(egg)), { repair: 'safe,fill_holes' }));
-  await is([200, 201], d.upload(shapes.obj(shapes.apart(shapes.egg(2), shapes.bean(1))), { repair: 'safe,largest_component' }));
-  for (const [coding, body] of [['gzip', zlib.gzipSync(first)], ['zstd', execFileSync('zstd', ['-q', '-c'], { input: first })]]) {
+  await is(
+    [200, 201],
+    d.upload(shapes.obj(shapes.apart(shapes.egg(2), shapes.bean(1))), { repair: 'safe,largest_component' }),
+  );
+  for (const [coding, body] of [
+    ['gzip', zlib.gzipSync(first)],
+    ['zstd', execFileSync('zstd', ['-q', '-c'], { input: first })],
+  ]) {
     const headers = { 'content-encoding': coding };
     await is(200, d.post('/v1/meshes', body, { headers, query: { name: 'egg' } }));
     await is(400, d.post('/v1/meshes', body.subarray(0, body.length - 5), { headers }));
   }
   for (const bad of [shapes.torus(6, 5), shapes.withoutFace(egg), shapes.turned(egg, (i) => i === 3)])
     await is(422, d.upload(shapes.obj(bad), { repair: 'none' }));
-  for (const text of ['', 'no mesh', 'v 1 2\nf 1 1 1\n', 'OFF\n1 1 1\n', 'ply\n', 'glTF\x02']) await is([400, 415, 422], d.upload(text));
+  for (const text of ['', 'no mesh', 'v 1 2\nf 1 1 1\n', 'OFF\n1 1 1\n', 'ply\n', 'glTF\x02'])
+    await is([400, 415, 422], d.upload(text));
   return kinds;
 }
 
@@ -56,9 +68,18 @@ async function jobs({ egg, bean, glb }) {
   const remeshes = ['adaptive', 'overlay', 'subdivision', 'convex-hull'];
   for (const [i, method] of Object.keys(landmarks).entries()) {
     step(`a supermesh: ${method}, ${remeshes[i]}`);
-    made.push(await d.made('/v1/supermeshes', {
-      shapes: [{ mesh: i % 2 ? glb.id : egg.id, name: 'a' }, { mesh: bean.id, name: 'b' }], landmarks: landmarks[method], align: { method },
-      remesh: { method: remeshes[i] }, asset: { path: i % 2 ? 'rigid' : 'linear', fit: ['none', 'rigid', 'similarity', 'none'][i] } }));
+    made.push(
+      await d.made('/v1/supermeshes', {
+        shapes: [
+          { mesh: i % 2 ? glb.id : egg.id, name: 'a' },
+          { mesh: bean.id, name: 'b' },
+        ],
+        landmarks: landmarks[method],
+        align: { method },
+        remesh: { method: remeshes[i] },
+        asset: { path: i % 2 ? 'rigid' : 'linear', fit: ['none', 'rigid', 'similarity', 'none'][i] },
+      }),
+    );
   }
   step('one that is cancelled, one that is wrong');
   const reply = await is(202, d.post('/v1/embeddings', { mesh: bean.id, options: { preset: 'quality' } }));
@@ -67,7 +88,13 @@ async function jobs({ egg, bean, glb }) {
   await events;
   await is(400, d.post('/v1/embeddings', '{"mesh":', { headers: { 'content-type': 'application/json' } }));
   await is([400, 404, 422], d.post('/v1/embeddings', { mesh: '0'.repeat(64) }));
-  await is([400, 422], d.post('/v1/supermeshes', { shapes: [{ mesh: egg.id }, { mesh: bean.id }], landmarks: [{ at: [{ vertex: 1e6 }, { vertex: 0 }] }] }));
+  await is(
+    [400, 422],
+    d.post('/v1/supermeshes', {
+      shapes: [{ mesh: egg.id }, { mesh: bean.id }],
+      landmarks: [{ at: [{ vertex: 1e6 }, { vertex: 0 }] }],
+    }),
+  );
   await is(200, d.post('/v1/embeddings', { mesh: egg.id }, WAIT));
   return made;
 }
@@ -80,8 +107,12 @@ async function reads(kinds, made) {
     const got = await is(200, d.get(resource.url));
     await is(304, d.get(resource.url, { headers: { 'if-none-match': got.headers.get('etag') } }));
     for (const part of supermesh ? ['asset.glb', 'places', 'spheres/0.ply', 'spheres/1.ply'] : ['sphere.ply']) {
-      const file = `${resource.url}/${part}`, whole = await is(200, d.get(file));
-      const part_of = await is(206, d.get(file, { headers: { range: 'bytes=10-19', 'if-range': whole.headers.get('etag') } }));
+      const file = `${resource.url}/${part}`;
+      const whole = await is(200, d.get(file));
+      const part_of = await is(
+        206,
+        d.get(file, { headers: { range: 'bytes=10-19', 'if-range': whole.headers.get('etag') } }),
+      );
       assert.deepEqual(part_of.bytes, whole.bytes.subarray(10, 20));
       await is(416, d.get(file, { headers: { range: 'bytes=999999999-' } }));
       await is(200, d.request('HEAD', file));
@@ -90,7 +121,8 @@ async function reads(kinds, made) {
   }
   for (const list of ['meshes', 'embeddings', 'supermeshes', 'jobs']) {
     const page = await is(200, d.get(`/v1/${list}`, { query: { limit: 2 } }));
-    if (page.json.next_page_token) await is(200, d.get(`/v1/${list}`, { query: { limit: 2, page_token: page.json.next_page_token } }));
+    if (page.json.next_page_token)
+      await is(200, d.get(`/v1/${list}`, { query: { limit: 2, page_token: page.json.next_page_token } }));
     await is(400, d.get(`/v1/${list}`, { query: { limit: 'x' } }));
   }
   for (const job of (await d.get('/v1/jobs')).json.jobs) {
@@ -99,25 +131,48 @@ async function reads(kinds, made) {
     assert.match(all.bytes.toString(), /^event: ?(succeeded|failed|cancelled)/m);
     await is([200, 204], d.get(`${job.url}/events`, { headers: { 'last-event-id': '1' } }));
   }
-  for (const page of ['/livez', '/readyz?verbose', '/metrics', '/openapi.json', '/docs', '/', '/problems/not-closed']) await is([200, 308, 302], d.get(page));
+  for (const page of ['/livez', '/readyz?verbose', '/metrics', '/openapi.json', '/docs', '/', '/problems/not-closed'])
+    await is([200, 308, 302], d.get(page));
   await is(404, d.get('/nothing'));
   await is(405, d.request('PUT', '/v1/meshes'));
-  await is(204, d.request('OPTIONS', '/v1/meshes', { headers: { origin: 'https://a.example', 'access-control-request-method': 'POST' } }));
+  await is(
+    204,
+    d.request('OPTIONS', '/v1/meshes', {
+      headers: { origin: 'https://a.example', 'access-control-request-method': 'POST' },
+    }),
+  );
 }
 
 async function commands(kinds, made) {
   step('the command line');
   const env = { ORBMORPH_SERVER: d.url };
-  for (const args of [['ls'], ['ls', '--json'], ['get', made.at(-1).url], ['embed', kinds.egg.id], ['doctor'], ['completions', 'bash'], ['--help'], ['nothing']])
+  for (const args of [
+    ['ls'],
+    ['ls', '--json'],
+    ['get', made.at(-1).url],
+    ['embed', kinds.egg.id],
+    ['doctor'],
+    ['completions', 'bash'],
+    ['--help'],
+    ['nothing'],
+  ])
     step(`${args.join(' ')}: ${(await run(args, { env })).code}`);
-  const out = path.join(data, 'walk.glb'), png = path.join(data, 'walk.png');
-  const morph = await run(['morph', kinds.egg.id, kinds.bean.id, '--align', 'rotate', '-o', out, '--report', path.join(data, 'walk.md')], { env });
+  const out = path.join(data, 'walk.glb');
+  const png = path.join(data, 'walk.png');
+  const morph = await run(
+    ['morph', kinds.egg.id, kinds.bean.id, '--align', 'rotate', '-o', out, '--report', path.join(data, 'walk.md')],
+    { env },
+  );
   assert.equal(morph.code, 0, morph.err);
   for (const more of [[], ['--frames', '3', '--wire']]) {
     const view = await run(['view', out, '-o', png, '--size', '32', ...more], { env });
     assert.equal(view.code, 0, view.err);
   }
-  for (const args of [['token', 'add', 'walker', '--scope', 'read'], ['token', 'list'], ['token', 'remove', 'walker']])
+  for (const args of [
+    ['token', 'add', 'walker', '--scope', 'read'],
+    ['token', 'list'],
+    ['token', 'remove', 'walker'],
+  ])
     execFileSync(binaries.daemon, [...args, '--data', data]);
 }
 
@@ -133,7 +188,8 @@ async function removals(kinds, made) {
 }
 
 try {
-  const kinds = await meshes(), made = await jobs(kinds);
+  const kinds = await meshes();
+  const made = await jobs(kinds);
   await reads(kinds, made);
   await commands(kinds, made);
   await removals(kinds, made);

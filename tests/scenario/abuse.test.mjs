@@ -30,8 +30,10 @@ async function well(d) {
   const mesh = await d.upload(shapes.obj(shapes.egg(1)), { name: 'well' });
   assert.ok([200, 201].includes(mesh.status), mesh.bytes.toString());
 }
-const descriptors = (d) => Number(execFileSync('sh', ['-c', `ls /proc/${d.child.pid}/fd | wc -l`], { encoding: 'utf8' }));
-const memory = (d) => Number(/VmHWM:\s+(\d+)/.exec(execFileSync('cat', [`/proc/${d.child.pid}/status`], { encoding: 'utf8' }))[1]) / 1024;
+const descriptors = (d) =>
+  Number(execFileSync('sh', ['-c', `ls /proc/${d.child.pid}/fd | wc -l`], { encoding: 'utf8' }));
+const memory = (d) =>
+  Number(/VmHWM:\s+(\d+)/.exec(execFileSync('cat', [`/proc/${d.child.pid}/status`], { encoding: 'utf8' }))[1]) / 1024;
 
 test('floods of headers', async (t) => {
   const d = await daemon(t);
@@ -56,11 +58,25 @@ test('paths and ids that are tricks', async (t) => {
   const d = await daemon(t);
   const hex = 'a'.repeat(64);
   for (const target of [
-    '/v1/meshes/../../etc/passwd', '/v1/meshes/..%2f..%2f..%2fetc%2fpasswd', '/../lock', '/%2e%2e/%2e%2e/etc/passwd',
-    `/v1/meshes/${hex.slice(2)}..`, `/v1/meshes/${hex}%00`, `/v1/meshes/${hex}/`, `/v1/meshes/${hex}/file/..`,
-    `/v1/meshes/${hex.toUpperCase()}`, `/v1/meshes/${'%61'.repeat(63)}`, `/v1//meshes/${hex}`, `/v1/meshes/%`,
-    `/v1/meshes/${hex}%0d%0aX-Evil:1`, '/v1/jobs/../../../lock', '/catalogue.sqlite', '//etc/passwd', '/v1/meshes/‮x',
-    `/v1/supermeshes/${hex}/../../../catalogue.sqlite`, `/problems/../../lock`,
+    '/v1/meshes/../../etc/passwd',
+    '/v1/meshes/..%2f..%2f..%2fetc%2fpasswd',
+    '/../lock',
+    '/%2e%2e/%2e%2e/etc/passwd',
+    `/v1/meshes/${hex.slice(2)}..`,
+    `/v1/meshes/${hex}%00`,
+    `/v1/meshes/${hex}/`,
+    `/v1/meshes/${hex}/file/..`,
+    `/v1/meshes/${hex.toUpperCase()}`,
+    `/v1/meshes/${'%61'.repeat(63)}`,
+    `/v1//meshes/${hex}`,
+    `/v1/meshes/%`,
+    `/v1/meshes/${hex}%0d%0aX-Evil:1`,
+    '/v1/jobs/../../../lock',
+    '/catalogue.sqlite',
+    '//etc/passwd',
+    '/v1/meshes/‮x',
+    `/v1/supermeshes/${hex}/../../../catalogue.sqlite`,
+    `/problems/../../lock`,
   ]) {
     const text = await raw(d, Buffer.from(`GET ${target} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n`));
     assert.ok([400, 404].includes(statusOf(text)) || text === '', `${target}: ${text.slice(0, 100)}`);
@@ -72,15 +88,27 @@ test('paths and ids that are tricks', async (t) => {
 test('JSON that is deep, wide or strange', async (t) => {
   const d = await daemon(t);
   for (const body of [
-    '['.repeat(100_000), '{"a":'.repeat(100_000), `${'['.repeat(33)}${']'.repeat(33)}`, `[${'0,'.repeat(400_000)}0]`,
-    `{"mesh":"${'a'.repeat(64)}","options":{"preset":"${'x'.repeat(100_000)}"}}`, `{${Array.from({ length: 50_000 }, (_, i) => `"k${i}":0`)}}`,
-    '{"mesh":1e999}', '{"mesh":"\\ud800"}', '\u0000', '{"mesh":"a","mesh":"b"}', '{"__proto__":{}}',
+    '['.repeat(100_000),
+    '{"a":'.repeat(100_000),
+    `${'['.repeat(33)}${']'.repeat(33)}`,
+    `[${'0,'.repeat(400_000)}0]`,
+    `{"mesh":"${'a'.repeat(64)}","options":{"preset":"${'x'.repeat(100_000)}"}}`,
+    `{${Array.from({ length: 50_000 }, (_, i) => `"k${i}":0`)}}`,
+    '{"mesh":1e999}',
+    '{"mesh":"\\ud800"}',
+    '\u0000',
+    '{"mesh":"a","mesh":"b"}',
+    '{"__proto__":{}}',
   ]) {
-    const before = d.cpuMs(), reply = await d.request('POST', '/v1/embeddings', { body, headers: { 'content-type': 'application/json' } });
+    const before = d.cpuMs();
+    const reply = await d.request('POST', '/v1/embeddings', { body, headers: { 'content-type': 'application/json' } });
     assert.ok([400, 404, 413, 422].includes(reply.status), `${body.slice(0, 40)}: ${reply.status} ${reply.bytes}`);
     assert.equal(reply.type, 'application/problem+json');
     assert.ok(reply.bytes.length < 4000, 'the refusal does not send it all back');
-    assert.ok(d.cpuMs() - before < (slow ? 15_000 : 3000), `${d.cpuMs() - before} ms of processor time for ${body.slice(0, 40)}`);
+    assert.ok(
+      d.cpuMs() - before < (slow ? 15_000 : 3000),
+      `${d.cpuMs() - before} ms of processor time for ${body.slice(0, 40)}`,
+    );
   }
   await well(d);
 });
@@ -88,11 +116,14 @@ test('JSON that is deep, wide or strange', async (t) => {
 test('a gigabyte of zeros, compressed', async (t) => {
   const d = await daemon(t, { args: ['--max-body', '64M'] });
   const zeros = await new Promise((resolve) => {
-    const chunks = [], gzip = createGzip({ level: 9 }), part = Buffer.alloc(1 << 20);
+    const chunks = [];
+    const gzip = createGzip({ level: 9 });
+    const part = Buffer.alloc(1 << 20);
     gzip.on('data', (chunk) => chunks.push(chunk)).on('end', () => resolve(Buffer.concat(chunks)));
     let left = 1024;
     const more = () => {
-      while (left > 0) if (!gzip.write(part, () => {}) && left-- > 0) return gzip.once('drain', more);
+      while (left > 0)
+        if (!gzip.write(part, () => {}) && left-- > 0) return gzip.once('drain', more);
         else left--;
       gzip.end();
     };
@@ -101,12 +132,18 @@ test('a gigabyte of zeros, compressed', async (t) => {
   assert.ok(zeros.length < 2 << 20);
   const before = memory(d);
   for (const target of ['/v1/meshes', '/v1/embeddings']) {
-    const reply = await d.request('POST', target, { body: zeros, headers: { 'content-encoding': 'gzip', 'content-type': 'application/json' } });
+    const reply = await d.request('POST', target, {
+      body: zeros,
+      headers: { 'content-encoding': 'gzip', 'content-type': 'application/json' },
+    });
     assert.ok([400, 413].includes(reply.status), `${reply.status} ${reply.bytes}`);
     assert.equal(reply.type, 'application/problem+json');
   }
   // A bomb within a bomb is one layer too many.
-  const twice = await d.request('POST', '/v1/meshes', { body: gzipSync(zeros), headers: { 'content-encoding': 'gzip, gzip' } });
+  const twice = await d.request('POST', '/v1/meshes', {
+    body: gzipSync(zeros),
+    headers: { 'content-encoding': 'gzip, gzip' },
+  });
   assert.ok([400, 413, 415].includes(twice.status), `${twice.status}`);
   assert.ok(memory(d) - before < (slow ? 600 : 100), `${before} MB before, ${memory(d)} MB at most`);
   await well(d);
@@ -116,24 +153,39 @@ test('tokens that are wrong, and what a token sees', async (t) => {
   const data = mkdtempSync(path.join(tmpdir(), 'orbmorph-abuse-'));
   t.after(() => rmSync(data, { recursive: true, force: true }));
   const add = (name, scope) => {
-    const text = execFileSync(binaries.daemon, ['token', 'add', name, '--scope', scope, '--data', data], { encoding: 'utf8' });
+    const text = execFileSync(binaries.daemon, ['token', 'add', name, '--scope', scope, '--data', data], {
+      encoding: 'utf8',
+    });
     return /[0-9a-f]{64}/.exec(text)[0];
   };
-  const reader = add('reader', 'read'), writer = add('writer', 'read,write');
+  const reader = add('reader', 'read');
+  const writer = add('writer', 'read,write');
   const d = await new Daemon(data, ['--auth', 'on'], {}).start();
   t.after(() => d.stop());
   const as = (token) => ({ authorization: `Bearer ${token}` });
   const flipped = (reader[0] === '0' ? '1' : '0') + reader.slice(1);
   const answers = new Set();
-  for (const authorization of [undefined, '', 'Bearer', 'Bearer ', `Bearer ${flipped}`, `Bearer ${reader.slice(1)}`, `Bearer ${reader}0`,
-    `Basic ${reader}`, reader, `Bearer ${'a'.repeat(5000)}`, `Bearer ' OR 1=1 --`]) {
+  for (const authorization of [
+    undefined,
+    '',
+    'Bearer',
+    'Bearer ',
+    `Bearer ${flipped}`,
+    `Bearer ${reader.slice(1)}`,
+    `Bearer ${reader}0`,
+    `Basic ${reader}`,
+    reader,
+    `Bearer ${'a'.repeat(5000)}`,
+    `Bearer ' OR 1=1 --`,
+  ]) {
     const reply = await d.get('/v1/meshes', { headers: authorization === undefined ? {} : { authorization } });
     assertProblem(reply, 401, 'unauthorized', String(authorization));
     assert.match(reply.headers.get('www-authenticate') ?? '', /^Bearer/);
     answers.add(reply.bytes.toString());
   }
   assert.equal(answers.size, 1, 'all wrong tokens are told the same');
-  const upload = (token) => d.post('/v1/meshes', Buffer.from(shapes.cube), { headers: as(token), query: { name: 'secret' } });
+  const upload = (token) =>
+    d.post('/v1/meshes', Buffer.from(shapes.cube), { headers: as(token), query: { name: 'secret' } });
   assertProblem(await upload(reader), 403, 'forbidden');
   assert.equal((await upload(writer)).status, 201);
   for (const token of [reader, flipped]) {

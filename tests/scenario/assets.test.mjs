@@ -12,7 +12,13 @@ import * as shapes from './support/shapes.mjs';
 async function makeAsset(d) {
   const landmarks = JSON.parse(await readFile(path.join(samples, 'dog-giraffe.json'), 'utf8')).landmarks;
   const [dog, giraffe] = [await d.mesh(path.join(samples, 'dog.obj')), await d.mesh(path.join(samples, 'giraffe.off'))];
-  return d.made('/v1/supermeshes', { shapes: [{ mesh: dog.id, name: 'dog' }, { mesh: giraffe.id, name: 'giraffe' }], landmarks });
+  return d.made('/v1/supermeshes', {
+    shapes: [
+      { mesh: dog.id, name: 'dog' },
+      { mesh: giraffe.id, name: 'giraffe' },
+    ],
+    landmarks,
+  });
 }
 
 test('an asset is immutable, comes in ranges, passes the validator and loads in three.js', async (t) => {
@@ -28,7 +34,12 @@ test('an asset is immutable, comes in ranges, passes the validator and loads in 
 
   const headers = (range, more) => ({ headers: { range, ...more } });
   const n = whole.bytes.length;
-  for (const [range, from, to] of [['bytes=0-99', 0, 99], ['bytes=100-', 100, n - 1], ['bytes=-50', n - 50, n - 1], [`bytes=10-${n + 999}`, 10, n - 1]]) {
+  for (const [range, from, to] of [
+    ['bytes=0-99', 0, 99],
+    ['bytes=100-', 100, n - 1],
+    ['bytes=-50', n - 50, n - 1],
+    [`bytes=10-${n + 999}`, 10, n - 1],
+  ]) {
     const part = await d.get(supermesh.asset, headers(range));
     assert.equal(part.status, 206, range);
     assert.equal(part.headers.get('content-range'), `bytes ${from}-${to}/${n}`);
@@ -38,14 +49,26 @@ test('an asset is immutable, comes in ranges, passes the validator and loads in 
   assert.equal(beyond.status, 416);
   assert.equal(beyond.headers.get('content-range'), `bytes */${n}`);
   // Several ranges, and what is no range of bytes, are answered with all of it, as RFC 9110 allows.
-  for (const range of ['bytes=0-1,3-4', 'bytes=5-2', 'bytes=', 'bytes=-', 'bytes=a-b', 'lines=0-1', `bytes=${'9'.repeat(30)}-`]) {
+  for (const range of [
+    'bytes=0-1,3-4',
+    'bytes=5-2',
+    'bytes=',
+    'bytes=-',
+    'bytes=a-b',
+    'lines=0-1',
+    `bytes=${'9'.repeat(30)}-`,
+  ]) {
     const all = await d.get(supermesh.asset, headers(range));
     assert.equal(all.status, 200, range);
     assert.ok(all.bytes.equals(whole.bytes), range);
     assert.equal(all.headers.get('content-range'), null);
   }
   assert.equal((await d.get(supermesh.asset, headers('bytes=-0'))).status, 416);
-  assert.equal((await d.get(supermesh.asset, headers('bytes=0-9', { 'if-range': '"other"' }))).status, 200, 'If-Range that does not match');
+  assert.equal(
+    (await d.get(supermesh.asset, headers('bytes=0-9', { 'if-range': '"other"' }))).status,
+    200,
+    'If-Range that does not match',
+  );
   assert.equal((await d.get(supermesh.asset, headers('bytes=0-9', { 'if-range': etag }))).status, 206);
   for (const match of [etag, `"x", ${etag}`, '*']) {
     const same = await d.get(supermesh.asset, { headers: { 'if-none-match': match } });
@@ -74,9 +97,16 @@ test('an asset is immutable, comes in ranges, passes the validator and loads in 
   assert.equal(mesh.geometry.morphTargetsRelative, true);
   const at = (weight) => Array.from(position.array, (x, i) => x + weight * target.array[i]);
   const triangles = Array.from(mesh.geometry.index.array);
-  for (const [weight, file] of [[0, 'dog.obj'], [1, 'giraffe.off']]) {
+  for (const [weight, file] of [
+    [0, 'dog.obj'],
+    [1, 'giraffe.off'],
+  ]) {
     const source = shapes.parse(await readFile(path.join(samples, file), 'utf8'));
-    const diagonal = Math.hypot(...[0, 1, 2].map((k) => Math.max(...source.positions.map((p) => p[k])) - Math.min(...source.positions.map((p) => p[k]))));
+    const diagonal = Math.hypot(
+      ...[0, 1, 2].map(
+        (k) => Math.max(...source.positions.map((p) => p[k])) - Math.min(...source.positions.map((p) => p[k])),
+      ),
+    );
     const off = farthest(source.positions, at(weight), triangles) / diagonal;
     assert.ok(off < 0.0011, `${file} at weight ${weight}: ${off} of the diagonal`);
     const report = supermesh.shapes[weight].hausdorff_relative;

@@ -8,7 +8,8 @@ import { assertProblem, binaries, daemon, samples } from './support/daemon.mjs';
 
 test('a file that is lost is told as a fault, and who sends the mesh again puts it back', async (t) => {
   const d = await daemon(t);
-  const file = path.join(samples, 'dog.obj'), mesh = await d.mesh(file);
+  const file = path.join(samples, 'dog.obj');
+  const mesh = await d.mesh(file);
   const embedding = await d.made('/v1/embeddings', { mesh: mesh.id });
   const object = (kind, id) => path.join(d.data, 'objects', kind, id.slice(0, 2), id);
   const lost = async (url) => {
@@ -37,15 +38,23 @@ test('a file that is lost is told as a fault, and who sends the mesh again puts 
 test('damage to any object, and to any kind of row, is found', async (t) => {
   const d = await daemon(t);
   const [a, b] = [await d.mesh(path.join(samples, 'dog.obj')), await d.mesh(path.join(samples, 'giraffe.off'))];
-  await d.made('/v1/supermeshes', { shapes: [{ mesh: a.id }, { mesh: b.id }], align: { method: 'rotate' }, remesh: { max_triangles: 4000 } });
+  await d.made('/v1/supermeshes', {
+    shapes: [{ mesh: a.id }, { mesh: b.id }],
+    align: { method: 'rotate' },
+    remesh: { max_triangles: 4000 },
+  });
   assert.equal((await d.stop()).code, 0, d.log);
   const check = () => spawnSync(binaries.daemon, ['--check-data', '--data', d.data], { encoding: 'utf8' });
-  const clean = (what) => assert.deepEqual([check().status, / 0 wrong, 0 objects without a row/.test(check().stdout)], [0, true], what);
+  const clean = (what) =>
+    assert.deepEqual([check().status, / 0 wrong, 0 objects without a row/.test(check().stdout)], [0, true], what);
   clean('as it was left');
 
   const objects = path.join(d.data, 'objects');
   const files = readdirSync(objects).flatMap((kind) =>
-    readdirSync(path.join(objects, kind)).flatMap((shard) => readdirSync(path.join(objects, kind, shard)).map((name) => [kind, path.join(objects, kind, shard, name)])));
+    readdirSync(path.join(objects, kind)).flatMap((shard) =>
+      readdirSync(path.join(objects, kind, shard)).map((name) => [kind, path.join(objects, kind, shard, name)]),
+    ),
+  );
   assert.deepEqual([...new Set(files.map(([kind]) => kind))].sort(), ['asset', 'mesh', 'places', 'sphere', 'spheres']);
   const found = (what) => {
     const { status, stdout } = check();
@@ -54,9 +63,14 @@ test('damage to any object, and to any kind of row, is found', async (t) => {
     assert.match(stdout, /start the service, DELETE the resources named above/, what);
   };
   for (const [kind, file] of files) {
-    const bytes = readFileSync(file), bad = Buffer.from(bytes);
+    const bytes = readFileSync(file);
+    const bad = Buffer.from(bytes);
     bad[bytes.length >> 1] ^= 1;
-    for (const [what, make] of [['a bit', () => writeFileSync(file, bad)], ['its end', () => writeFileSync(file, bytes.subarray(0, -1))], ['all of it', () => rmSync(file)]]) {
+    for (const [what, make] of [
+      ['a bit', () => writeFileSync(file, bad)],
+      ['its end', () => writeFileSync(file, bytes.subarray(0, -1))],
+      ['all of it', () => rmSync(file)],
+    ]) {
       make();
       found(`${kind}: ${what}`);
     }
@@ -64,11 +78,20 @@ test('damage to any object, and to any kind of row, is found', async (t) => {
   }
   clean('put right again');
 
-  const catalogue = path.join(d.data, 'catalogue.sqlite'), kept = `${d.data}.kept`;
+  const catalogue = path.join(d.data, 'catalogue.sqlite');
+  const kept = `${d.data}.kept`;
   t.after(() => rmSync(kept, { force: true }));
   copyFileSync(catalogue, kept);
-  for (const sql of ["DELETE FROM resource WHERE kind=2", 'DELETE FROM owner WHERE kind=0', "UPDATE resource SET json='{}' WHERE kind=1", "UPDATE resource SET json=substr(json, 2) WHERE kind=0",
-    'UPDATE job SET state=7', "UPDATE job SET request='zz'", 'DELETE FROM secret', "UPDATE tenant SET bytes=bytes+1"]) {
+  for (const sql of [
+    'DELETE FROM resource WHERE kind=2',
+    'DELETE FROM owner WHERE kind=0',
+    "UPDATE resource SET json='{}' WHERE kind=1",
+    'UPDATE resource SET json=substr(json, 2) WHERE kind=0',
+    'UPDATE job SET state=7',
+    "UPDATE job SET request='zz'",
+    'DELETE FROM secret',
+    'UPDATE tenant SET bytes=bytes+1',
+  ]) {
     const made = spawnSync('sqlite3', [catalogue, sql], { encoding: 'utf8' });
     assert.equal(made.status, 0, `${sql}: ${made.stderr ?? made.error}`);
     found(sql);

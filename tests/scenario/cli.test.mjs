@@ -9,22 +9,42 @@ import { binaries, daemon, endless, samples, until } from './support/daemon.mjs'
 import { morphOf } from './support/glb.mjs';
 import * as shapes from './support/shapes.mjs';
 
-const dog = path.join(samples, 'dog.obj'), giraffe = path.join(samples, 'giraffe.off');
+const dog = path.join(samples, 'dog.obj');
+const giraffe = path.join(samples, 'giraffe.off');
 const landmarks = path.join(samples, 'dog-giraffe.json');
 const waits = async (d) => (await d.get('/readyz?verbose')).json.waiting_connections > 0;
 /** Starts a job that keeps the only worker busy; returns the job. */
 async function occupy(d) {
-  const { json: mesh } = await d.upload(shapes.binaryPly(shapes.ball(5, ([x, y, z]) => [x, y * (1.2 + 0.2 * Math.sin(9 * x)), z])));
+  const { json: mesh } = await d.upload(
+    shapes.binaryPly(shapes.ball(5, ([x, y, z]) => [x, y * (1.2 + 0.2 * Math.sin(9 * x)), z])),
+  );
   return (await d.post('/v1/embeddings', { mesh: mesh.id, ...endless })).json;
 }
 
 test('wrong usage exits with 2 and explains the error', async () => {
-  for (const args of [[], ['fly'], ['morph', 'one'], ['morph', '--bend', 'a', 'b'], ['upload'], ['job'], ['morph', 'a', 'b', '--landmarks'],
-    ['morph', 'a', 'b', '--json=yes'], ['ls', 'shoes'], ['get', 'x', '--part', 'wing'], ['completions', 'tcsh'],
-    ['morph', dog, giraffe, '--tolerance', 'much'], ['morph', dog, giraffe, '--max-triangles', '1e4'], ['morph', dog, giraffe, '--set', 'x'],
-    ['morph', dog, giraffe, '--set', `${'a.'.repeat(70)}b=1`], ['morph', dog, giraffe, '--set', `a=${'['.repeat(70)}${']'.repeat(70)}`],
-    ['morph', dog, giraffe, '-o', '/nowhere/out.glb'], ['morph', dog, giraffe, '--report', '/nowhere/report.md'],
-    ['upload', '/nowhere/mesh.obj'], ['morph', dog, giraffe, '--landmarks', '/nowhere.json'], ['upload', '--name', 'n', dog, giraffe]]) {
+  for (const args of [
+    [],
+    ['fly'],
+    ['morph', 'one'],
+    ['morph', '--bend', 'a', 'b'],
+    ['upload'],
+    ['job'],
+    ['morph', 'a', 'b', '--landmarks'],
+    ['morph', 'a', 'b', '--json=yes'],
+    ['ls', 'shoes'],
+    ['get', 'x', '--part', 'wing'],
+    ['completions', 'tcsh'],
+    ['morph', dog, giraffe, '--tolerance', 'much'],
+    ['morph', dog, giraffe, '--max-triangles', '1e4'],
+    ['morph', dog, giraffe, '--set', 'x'],
+    ['morph', dog, giraffe, '--set', `${'a.'.repeat(70)}b=1`],
+    ['morph', dog, giraffe, '--set', `a=${'['.repeat(70)}${']'.repeat(70)}`],
+    ['morph', dog, giraffe, '-o', '/nowhere/out.glb'],
+    ['morph', dog, giraffe, '--report', '/nowhere/report.md'],
+    ['upload', '/nowhere/mesh.obj'],
+    ['morph', dog, giraffe, '--landmarks', '/nowhere.json'],
+    ['upload', '--name', 'n', dog, giraffe],
+  ]) {
     const { code, err, out } = await run(args, { env: { ORBMORPH_SERVER: 'http://127.0.0.1:9' } });
     assert.equal(code, 2, `${args}: ${code} ${err}`);
     assert.ok(err.length > 0 && out === '', `${args}`);
@@ -51,7 +71,9 @@ test('morph uploads, merges and downloads', async (t) => {
   const d = await daemon(t);
   const env = { ORBMORPH_SERVER: d.url };
   const at = await folder(t);
-  const out = path.join(at, 'a morph.glb'), md = path.join(at, 'report.md'), json = path.join(at, 'report.json');
+  const out = path.join(at, 'a morph.glb');
+  const md = path.join(at, 'report.md');
+  const json = path.join(at, 'report.json');
   const done = await run(['morph', dog, giraffe, '--landmarks', landmarks, '-o', out, '--report', md], { env });
   assert.equal(done.code, 0, done.err);
   assert.match(done.out, /landmarks, exact/);
@@ -63,12 +85,18 @@ test('morph uploads, merges and downloads', async (t) => {
   assert.match(report, /\| nose \|/);
   assert.doesNotMatch(report, /nan|\?/i);
 
-  const again = await run(['morph', dog, giraffe, '-l', landmarks, '-o', out, '--report', json, '--json', '-q'], { env });
+  const again = await run(['morph', dog, giraffe, '-l', landmarks, '-o', out, '--report', json, '--json', '-q'], {
+    env,
+  });
   assert.equal(again.code, 0, again.err);
   assert.equal(again.err, '', 'quiet is quiet');
   assert.deepEqual(JSON.parse(again.out), JSON.parse(await readFile(json, 'utf8')));
   assert.equal(JSON.parse(again.out).certificate.closed, true);
-  assert.deepEqual((await readdir(at)).sort(), ['a morph.glb', 'report.json', 'report.md'], 'no temporary files remain');
+  assert.deepEqual(
+    (await readdir(at)).sort(),
+    ['a morph.glb', 'report.json', 'report.md'],
+    'no temporary files remain',
+  );
 
   const piped = await run(['morph', dog, giraffe, '-l', landmarks, '-q', '-o', '-'], { env });
   assert.ok(piped.bytes.equals(await readFile(out)), 'the asset on standard output');
@@ -86,15 +114,28 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
   await copyFile(giraffe, path.join(at, 'in/giraffe.off'));
   const uploaded = await run(['upload', 'in/*', '--json'], { env, cwd: at });
   assert.equal(uploaded.code, 0, uploaded.err);
-  const meshes = uploaded.out.trim().split('\n').map((line) => JSON.parse(line));
-  assert.deepEqual(meshes.map((m) => m.name), ['dog', 'giraffe'], 'the program expands a quoted pattern');
+  const meshes = uploaded.out
+    .trim()
+    .split('\n')
+    .map((line) => JSON.parse(line));
+  assert.deepEqual(
+    meshes.map((m) => m.name),
+    ['dog', 'giraffe'],
+    'the program expands a quoted pattern',
+  );
   const list = await run(['ls'], { env });
   for (const m of meshes) assert.ok(list.out.includes(m.id));
   const embedded = await run(['embed', meshes[0].id, '-o', path.join(at, 'sphere.ply')], { env });
   assert.equal(embedded.code, 0, embedded.err);
   assert.match(embedded.out, /valid, 0 flipped, degree 1/);
-  assert.match((await readFile(path.join(at, 'sphere.ply'))).toString('latin1', 0, 40), /^ply\nformat binary_little_endian/);
-  const sent = await run(['merge', meshes[0].id, meshes[1].id, '-l', landmarks, '--no-wait', '--json', '--set', 'asset.animation=none'], { env });
+  assert.match(
+    (await readFile(path.join(at, 'sphere.ply'))).toString('latin1', 0, 40),
+    /^ply\nformat binary_little_endian/,
+  );
+  const sent = await run(
+    ['merge', meshes[0].id, meshes[1].id, '-l', landmarks, '--no-wait', '--json', '--set', 'asset.animation=none'],
+    { env },
+  );
   assert.equal(sent.code, 0, sent.err);
   const job = JSON.parse(sent.out);
   const waited = await run(['job', '--wait', job.id, '--json'], { env });
@@ -113,7 +154,11 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
   const gone = await run(['get', id], { env });
   assert.equal(gone.code, 1);
   assert.match(gone.err, /not-found/);
-  for (const args of [['get', '0000'], ['rm', '0'.repeat(64)], ['job', 'nonsense']]) {
+  for (const args of [
+    ['get', '0000'],
+    ['rm', '0'.repeat(64)],
+    ['job', 'nonsense'],
+  ]) {
     const { code, err } = await run(args, { env });
     assert.equal(code, 1, err);
     assert.match(err, /has this id/);
@@ -122,9 +167,14 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
 });
 
 test('landmark files: an array, an object with one, and plain vertex numbers', async (t) => {
-  const d = await daemon(t, { args: ['--workers', '1'] }), before = await occupy(d);
-  const env = { ORBMORPH_SERVER: d.url }, at = await folder(t), file = path.join(at, 'l.json');
-  const places = JSON.parse(await readFile(landmarks, 'utf8')).landmarks.slice(0, 4).map((l) => ({ at: l.at }));
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const before = await occupy(d);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  const file = path.join(at, 'l.json');
+  const places = JSON.parse(await readFile(landmarks, 'utf8'))
+    .landmarks.slice(0, 4)
+    .map((l) => ({ at: l.at }));
   const jobs = new Set();
   for (const list of [places, { landmarks: places }, places.map((l) => l.at.map((p) => p.vertex))]) {
     await writeFile(file, JSON.stringify(list));
@@ -146,7 +196,10 @@ test('a refused request exits with 1 and prints the problem on standard error', 
   const d = await daemon(t);
   const env = { ORBMORPH_SERVER: d.url };
   const at = await folder(t);
-  const open = path.join(at, 'open.obj'), two = path.join(at, 'two.obj'), ring = path.join(at, 'ring.obj'), turned = path.join(at, 'turned.obj');
+  const open = path.join(at, 'open.obj');
+  const two = path.join(at, 'two.obj');
+  const ring = path.join(at, 'ring.obj');
+  const turned = path.join(at, 'turned.obj');
   await writeFile(open, shapes.obj(shapes.withoutFace(shapes.ball(2))));
   await writeFile(two, shapes.obj(shapes.apart(shapes.ball(2), shapes.ball(1))));
   await writeFile(ring, shapes.obj(shapes.torus()));
@@ -184,7 +237,8 @@ test('a refused request exits with 1 and prints the problem on standard error', 
 test('a wait survives a restart of the daemon', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const { port } = new URL(d.url);
-  const before = await occupy(d), { json: mesh } = await d.upload(shapes.obj(shapes.egg(3)));
+  const before = await occupy(d);
+  const { json: mesh } = await d.upload(shapes.obj(shapes.egg(3)));
   const waiting = run(['embed', mesh.id], { env: { ORBMORPH_SERVER: d.url } });
   await until(() => waits(d), 'the program waits');
   d.killed = true;
@@ -200,8 +254,12 @@ test('a wait survives a restart of the daemon', async (t) => {
 
 test('an interrupted wait prints how to continue', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
-  const before = await occupy(d), { json: mesh } = await d.upload(shapes.obj(shapes.egg(3)));
-  const child = spawn(binaries.client, ['embed', mesh.id, '--method', 'kernel-sampling'], { env: { ...process.env, ORBMORPH_SERVER: d.url }, stdio: ['ignore', 'pipe', 'pipe'] });
+  const before = await occupy(d);
+  const { json: mesh } = await d.upload(shapes.obj(shapes.egg(3)));
+  const child = spawn(binaries.client, ['embed', mesh.id, '--method', 'kernel-sampling'], {
+    env: { ...process.env, ORBMORPH_SERVER: d.url },
+    stdio: ['ignore', 'pipe', 'pipe'],
+  });
   let err = '';
   child.stderr.on('data', (chunk) => (err += chunk));
   const ended = new Promise((resolve) => child.on('exit', (code, signal) => resolve(signal ?? code)));
@@ -220,7 +278,10 @@ test('a terminal shows progress', async (t) => {
   const d = await daemon(t);
   const at = await folder(t);
   const line = [binaries.client, 'morph', dog, giraffe, '-l', landmarks, '-o', path.join(at, 'o.glb')].join(' ');
-  const child = spawn('script', ['-qec', line, '/dev/null'], { env: { ...process.env, ORBMORPH_SERVER: d.url, TERM: 'xterm' }, stdio: ['ignore', 'pipe', 'inherit'] });
+  const child = spawn('script', ['-qec', line, '/dev/null'], {
+    env: { ...process.env, ORBMORPH_SERVER: d.url, TERM: 'xterm' },
+    stdio: ['ignore', 'pipe', 'inherit'],
+  });
   let out = '';
   child.stdout.on('data', (chunk) => (out += chunk));
   const code = await new Promise((resolve) => child.on('close', resolve));
@@ -232,7 +293,10 @@ test('a terminal shows progress', async (t) => {
 test('view draws a picture of a morph', async (t) => {
   const d = await daemon(t);
   const at = await folder(t);
-  await run(['morph', dog, giraffe, '-l', landmarks, '-o', 'o.glb', '-q'], { env: { ORBMORPH_SERVER: d.url }, cwd: at });
+  await run(['morph', dog, giraffe, '-l', landmarks, '-o', 'o.glb', '-q'], {
+    env: { ORBMORPH_SERVER: d.url },
+    cwd: at,
+  });
   const { code, err } = await run(['view', 'o.glb', '-o', 'o.png', '--poses', '3', '--size', '64'], { cwd: at });
   assert.equal(code, 0, err);
   const png = await readFile(path.join(at, 'o.png'));

@@ -8,9 +8,14 @@ import * as shapes from './support/shapes.mjs';
 
 const library = process.env.ORB_CLOCK;
 
-test('waits end, and slow callers are sent away, also when the clock was set back', { skip: library ? false : 'ORB_CLOCK names no library' }, async (t) => {
+test('waits end, and slow callers are sent away, also when the clock was set back', {
+  skip: library ? false : 'ORB_CLOCK names no library',
+}, async (t) => {
   const ahead = 8000; // by then the job is under way, on a busy machine too
-  const d = await daemon(t, { args: ['--workers', '1', '--header-seconds', '1'], env: { LD_PRELOAD: library, ORB_CLOCK_AHEAD_MS: String(ahead) } });
+  const d = await daemon(t, {
+    args: ['--workers', '1', '--header-seconds', '1'],
+    env: { LD_PRELOAD: library, ORB_CLOCK_AHEAD_MS: String(ahead) },
+  });
   const { id } = (await d.upload(shapes.binaryPly(shapes.ball(5)))).json;
   const job = (await d.post('/v1/embeddings', { mesh: id, ...endless })).json;
   const early = Date.parse(job.created);
@@ -23,7 +28,11 @@ test('waits end, and slow callers are sent away, also when the clock was set bac
   const closed = await new Promise((done, reject) => {
     const { hostname, port } = new URL(d.url);
     const socket = net.connect(Number(port), hostname, () => socket.write('GET /livez HTTP/1.1\r\nHost: h\r\n'));
-    socket.setTimeout(28_000, () => (socket.destroy(), reject(new Error('it was not closed')))); // the library itself would after 30 s
+    // before the library's own 30 s
+    socket.setTimeout(28_000, () => {
+      socket.destroy();
+      reject(new Error('it was not closed'));
+    });
     socket.on('close', () => done(true));
     socket.on('error', () => done(true));
     socket.resume();

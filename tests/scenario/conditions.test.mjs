@@ -25,14 +25,25 @@ test('nothing is deleted, or given, against the condition of the request', async
   const embedding = await d.made('/v1/embeddings', { mesh: mesh.id });
   for (const { url } of [mesh, embedding]) {
     const etag = (await d.get(url)).headers.get('etag');
-    for (const headers of [{ 'if-match': '"other"' }, { 'if-match': `W/${etag}` }, { 'if-none-match': etag }, { 'if-none-match': '*' }, { 'if-match': etag, 'if-none-match': `"other", W/${etag}` }]) {
+    for (const headers of [
+      { 'if-match': '"other"' },
+      { 'if-match': `W/${etag}` },
+      { 'if-none-match': etag },
+      { 'if-none-match': '*' },
+      { 'if-match': etag, 'if-none-match': `"other", W/${etag}` },
+    ]) {
       assertProblem(await d.delete(url, { headers }), 412, 'precondition-failed', JSON.stringify(headers));
       assert.equal((await d.get(url)).status, 200, 'it is still there');
     }
-    for (const match of ['"other"', `W/${etag}`]) assertProblem(await d.get(url, { headers: { 'if-match': match } }), 412, 'precondition-failed');
-    for (const match of [etag, '*', `"other", ${etag}`]) assert.equal((await d.get(url, { headers: { 'if-match': match } })).status, 200);
+    for (const match of ['"other"', `W/${etag}`])
+      assertProblem(await d.get(url, { headers: { 'if-match': match } }), 412, 'precondition-failed');
+    for (const match of [etag, '*', `"other", ${etag}`])
+      assert.equal((await d.get(url, { headers: { 'if-match': match } })).status, 200);
     assert.equal((await d.get(url, { headers: { 'if-match': etag, 'if-none-match': etag } })).status, 304);
-    assert.equal((await d.delete(url, { headers: { 'if-match': `"other", ${etag}`, 'if-none-match': '"other"' } })).status, 204);
+    assert.equal(
+      (await d.delete(url, { headers: { 'if-match': `"other", ${etag}`, 'if-none-match': '"other"' } })).status,
+      204,
+    );
     assertProblem(await d.delete(url, { headers: { 'if-match': etag } }), 404, 'not-found');
   }
 });
@@ -47,7 +58,13 @@ test('a list may come in several lines', async (t) => {
     assert.equal((await lines(d, 'GET', target, { 'if-none-match': ['"a"', etag] })).status, 304);
   }
   // Two codings are not the first of them.
-  const twice = await lines(d, 'POST', '/v1/meshes', { 'content-encoding': ['identity', 'gzip'], 'content-length': 4 }, 'abcd');
+  const twice = await lines(
+    d,
+    'POST',
+    '/v1/meshes',
+    { 'content-encoding': ['identity', 'gzip'], 'content-length': 4 },
+    'abcd',
+  );
   assert.equal(twice.status, 415);
   assert.equal(JSON.parse(twice.bytes).type, '/problems/unsupported-encoding');
 });
@@ -56,7 +73,10 @@ test('a query that no upload can have is refused before its body is sent', async
   const d = await daemon(t);
   for (const query of ['repair=glue', 'format=doc', 'name=', 'name=%01', `name=${'x'.repeat(128)}`]) {
     const told = await new Promise((done, reject) => {
-      const r = http.request(new URL(`/v1/meshes?${query}`, d.url), { method: 'POST', headers: { expect: '100-continue', 'content-length': 1_000_000 } });
+      const r = http.request(new URL(`/v1/meshes?${query}`, d.url), {
+        method: 'POST',
+        headers: { expect: '100-continue', 'content-length': 1_000_000 },
+      });
       r.on('continue', () => done('send it'));
       r.on('response', (answer) => done(answer.statusCode));
       r.on('error', reject);
@@ -73,7 +93,10 @@ test('the unit of a range is told in any case', async (t) => {
   const { url, bytes } = await d.mesh(path.join(samples, 'dog.obj'));
   for (const unit of ['bytes', 'Bytes', 'BYTES']) {
     const part = await d.get(`${url}/file`, { headers: { range: `${unit}=0-9` } });
-    assert.deepEqual([part.status, part.bytes.length, part.headers.get('content-range')], [206, 10, `bytes 0-9/${bytes}`]);
+    assert.deepEqual(
+      [part.status, part.bytes.length, part.headers.get('content-range')],
+      [206, 10, `bytes 0-9/${bytes}`],
+    );
   }
 });
 
@@ -83,9 +106,37 @@ test('a preference is found wherever it stands, and only where it is one', async
   const { url } = (await d.post('/v1/embeddings', { mesh: id })).json;
   await d.get(url, { query: { wait: 60 } });
   const applied = async (prefer) => (await lines(d, 'GET', url, { prefer })).headers['preference-applied'];
-  for (const prefer of [['respond-async', 'wait=7'], 'wait="7"', 'wait = 7', 'WAIT=7', 'respond-async; x=1, wait=7; y="a,b"', 'x="\\",wait=9", wait=7', 'wait=7, wait=9', ['wait=7', 'wait=9'], 'handling=lenient,,wait=7'])
+  for (const prefer of [
+    ['respond-async', 'wait=7'],
+    'wait="7"',
+    'wait = 7',
+    'WAIT=7',
+    'respond-async; x=1, wait=7; y="a,b"',
+    'x="\\",wait=9", wait=7',
+    'wait=7, wait=9',
+    ['wait=7', 'wait=9'],
+    'handling=lenient,,wait=7',
+  ])
     assert.equal(await applied(prefer), 'wait=7', String(prefer));
-  for (const prefer of ['x="wait=7"', 'x="a, wait=7"', 'return=minimal; wait=7', 'wait', 'wait=', 'wait=-7', 'wait=7s', 'wait=soon', 'wait=inf', 'wait=nan', 'await=7', 'waits=7', 'wait=0', '"', ';=,', 'wait="', '='])
+  for (const prefer of [
+    'x="wait=7"',
+    'x="a, wait=7"',
+    'return=minimal; wait=7',
+    'wait',
+    'wait=',
+    'wait=-7',
+    'wait=7s',
+    'wait=soon',
+    'wait=inf',
+    'wait=nan',
+    'await=7',
+    'waits=7',
+    'wait=0',
+    '"',
+    ';=,',
+    'wait="',
+    '=',
+  ])
     assert.equal(await applied(prefer), undefined, prefer);
   assert.equal(await applied('wait=1000000000'), 'wait=60');
 });

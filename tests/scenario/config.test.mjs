@@ -11,7 +11,15 @@ const check = (...args) => spawnSync(binaries.daemon, ['--check-config', ...args
 
 test('values that no daemon can use are refused by name', () => {
   for (const [name, values] of Object.entries({
-    listen: ['127.0.0.1:65536', '127.0.0.1:99999', '127.0.0.1:', '127.0.0.1', '127.0.0.1:http', '127.0.0.1:-1', 'unix:'],
+    listen: [
+      '127.0.0.1:65536',
+      '127.0.0.1:99999',
+      '127.0.0.1:',
+      '127.0.0.1',
+      '127.0.0.1:http',
+      '127.0.0.1:-1',
+      'unix:',
+    ],
     'log-level': ['verbose', 'INFO', ''],
     'log-format': ['xml', 'JSON'],
     cors: ['https://a.example/', 'a.example', '*, https://a.example', 'https://a.example, b', '://x', 'https://'],
@@ -21,11 +29,24 @@ test('values that no daemon can use are refused by name', () => {
     'socket-mode': ['0999', '1777', 'rw'],
   }))
     for (const value of values) {
-      const { status, stderr } = check(`--${name}`, value, ...(name === 'tls-key' ? ['--tls-certificate', binaries.daemon] : []));
+      const { status, stderr } = check(
+        `--${name}`,
+        value,
+        ...(name === 'tls-key' ? ['--tls-certificate', binaries.daemon] : []),
+      );
       assert.equal(status, 2, `${name} = ${value}`);
       assert.match(stderr, new RegExp(`^orbmorphd: ${name}\\b`), `${name} = ${value}`);
     }
-  for (const args of [['--listen', '127.0.0.1:65535'], ['--listen', '[::1]:0'], ['--listen', ':8080'], ['--listen', 'unix:/tmp/x'], ['--cors', '*'], ['--cors', 'https://a.example,http://localhost:5173, null'], ['--cors', ''], ['--log-level', 'warn', '--log-format', 'text']])
+  for (const args of [
+    ['--listen', '127.0.0.1:65535'],
+    ['--listen', '[::1]:0'],
+    ['--listen', ':8080'],
+    ['--listen', 'unix:/tmp/x'],
+    ['--cors', '*'],
+    ['--cors', 'https://a.example,http://localhost:5173, null'],
+    ['--cors', ''],
+    ['--log-level', 'warn', '--log-format', 'text'],
+  ])
     assert.equal(check(...args).status, 0, args.join(' '));
 });
 
@@ -35,5 +56,8 @@ test('a line of the file without a value is told as one', (t) => {
   const file = path.join(folder, 'conf');
   writeFileSync(file, '# a comment\nmax-body = 1M\nworkers 2\n');
   const { status, stderr } = check('--config', file);
-  assert.deepEqual([status, stderr], [2, 'orbmorphd: config file, line 3: a line must be NAME = VALUE, not "workers 2"\n']);
+  assert.deepEqual(
+    [status, stderr],
+    [2, 'orbmorphd: config file, line 3: a line must be NAME = VALUE, not "workers 2"\n'],
+  );
 });

@@ -7,17 +7,25 @@ import test from 'node:test';
 import { daemon, root } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-const ours = 'https://studio.example.org', also = 'http://localhost:5173', other = 'https://example.com';
+const ours = 'https://studio.example.org';
+const also = 'http://localhost:5173';
+const other = 'https://example.com';
 const listed = (text) => (text ?? '').toLowerCase().split(/\s*,\s*/);
 
 /** Like d.request, but with headers that fetch() would not send. */
 const send = (d, method, target, headers = {}, body) =>
   new Promise((resolve, reject) => {
-    const r = http.request(new URL(target, d.url), { method, headers }, (reply) => reply.resume().on('end', () => resolve({ status: reply.statusCode, headers: reply.headers })));
+    const r = http.request(new URL(target, d.url), { method, headers }, (reply) =>
+      reply.resume().on('end', () => resolve({ status: reply.statusCode, headers: reply.headers })),
+    );
     r.on('error', reject).end(body);
   });
 const preflight = (d, origin, method, headers, target = '/v1/meshes') =>
-  send(d, 'OPTIONS', target, { origin, 'access-control-request-method': method, 'access-control-request-headers': headers });
+  send(d, 'OPTIONS', target, {
+    origin,
+    'access-control-request-method': method,
+    'access-control-request-headers': headers,
+  });
 const granted = (reply) => Object.keys(reply.headers).filter((name) => name.startsWith('access-control-'));
 
 test('origins that are named may call, others not', async (t) => {
@@ -35,29 +43,51 @@ test('origins that are named may call, others not', async (t) => {
     const reply = await upload(origin);
     assert.equal(reply.status, 200, 'a browser hides the answer; whoever is no browser gets it');
     assert.deepEqual(granted(reply), [], String(origin));
-    assert.deepEqual(granted(await send(d, 'OPTIONS', '/v1/meshes', origin ? { origin, 'access-control-request-method': 'POST' } : {})), [], String(origin));
+    assert.deepEqual(
+      granted(
+        await send(d, 'OPTIONS', '/v1/meshes', origin ? { origin, 'access-control-request-method': 'POST' } : {}),
+      ),
+      [],
+      String(origin),
+    );
   }
   for (const origin of [ours, other, undefined])
-    assert.ok(listed((await send(d, 'GET', '/v1/meshes', origin ? { origin } : {})).headers.vary).includes('origin'), 'a shared cache keeps them apart');
+    assert.ok(
+      listed((await send(d, 'GET', '/v1/meshes', origin ? { origin } : {})).headers.vary).includes('origin'),
+      'a shared cache keeps them apart',
+    );
 });
 
 test('any origin', async (t) => {
   const d = await daemon(t, { args: ['--cors', '*', '--auth', 'on'] });
   const reply = await send(d, 'GET', '/v1/meshes', { origin: other });
-  assert.deepEqual([reply.status, reply.headers['access-control-allow-origin']], [401, '*'], 'a page can read why it was refused');
-  assert.equal(reply.headers['access-control-allow-credentials'], undefined, 'tokens come in a header, never from a cookie');
+  assert.deepEqual(
+    [reply.status, reply.headers['access-control-allow-origin']],
+    [401, '*'],
+    'a page can read why it was refused',
+  );
+  assert.equal(
+    reply.headers['access-control-allow-credentials'],
+    undefined,
+    'tokens come in a header, never from a cookie',
+  );
   assert.equal((await preflight(d, other, 'DELETE', 'authorization')).status, 204, 'a preflight carries no token');
 });
 
 test('none by default', async (t) => {
   const d = await daemon(t);
-  for (const method of ['GET', 'OPTIONS']) assert.deepEqual(granted(await send(d, method, '/v1/meshes', { origin: ours, 'access-control-request-method': 'POST' })), []);
+  for (const method of ['GET', 'OPTIONS'])
+    assert.deepEqual(
+      granted(await send(d, method, '/v1/meshes', { origin: ours, 'access-control-request-method': 'POST' })),
+      [],
+    );
 });
 
 test('pages may send and read every header of the description', async (t) => {
   const d = await daemon(t, { args: ['--cors', ours] });
   const document = JSON.parse(await readFile(path.join(root, 'api/openapi.json'), 'utf8'));
-  const wanted = new Set(['Authorization', 'Content-Type']), replied = new Set();
+  const wanted = new Set(['Authorization', 'Content-Type']);
+  const replied = new Set();
   const walk = (value) => {
     if (!value || typeof value !== 'object') return;
     if (value.in === 'header') wanted.add(value.name);
@@ -68,15 +98,25 @@ test('pages may send and read every header of the description', async (t) => {
   const names = [...wanted].map((name) => name.toLowerCase());
   assert.ok(names.includes('prefer') && names.includes('range') && replied.has('ETag'));
   const { url } = (await d.upload(shapes.tetrahedron)).json;
-  for (const [method, target] of [['POST', '/v1/meshes'], ['DELETE', url], ['GET', `${url}/file`], ['HEAD', url]]) {
+  for (const [method, target] of [
+    ['POST', '/v1/meshes'],
+    ['DELETE', url],
+    ['GET', `${url}/file`],
+    ['HEAD', url],
+  ]) {
     const reply = await preflight(d, ours, method, names.join(','), target);
     assert.equal(reply.status, 204, target);
     assert.equal(reply.headers['access-control-allow-origin'], ours);
     assert.ok(listed(reply.headers['access-control-allow-methods']).includes(method.toLowerCase()), method);
-    for (const name of names) assert.ok(listed(reply.headers['access-control-allow-headers']).includes(name), `${name} may be sent`);
+    for (const name of names)
+      assert.ok(listed(reply.headers['access-control-allow-headers']).includes(name), `${name} may be sent`);
     assert.ok(Number(reply.headers['access-control-max-age']) > 0);
   }
   // Scripts see Cache-Control without being told, and these two are for browsers and proxies.
-  const exposed = listed((await send(d, 'GET', '/v1/meshes', { origin: ours })).headers['access-control-expose-headers']);
-  for (const name of replied) if (!['Cache-Control', 'Content-Security-Policy', 'X-Accel-Buffering'].includes(name)) assert.ok(exposed.includes(name.toLowerCase()), `${name} is exposed`);
+  const exposed = listed(
+    (await send(d, 'GET', '/v1/meshes', { origin: ours })).headers['access-control-expose-headers'],
+  );
+  for (const name of replied)
+    if (!['Cache-Control', 'Content-Security-Policy', 'X-Accel-Buffering'].includes(name))
+      assert.ok(exposed.includes(name.toLowerCase()), `${name} is exposed`);
 });

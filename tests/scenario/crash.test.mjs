@@ -32,7 +32,9 @@ function pointsOf(folder) {
   return readdirSync(folder, { withFileTypes: true }).flatMap((entry) => {
     const at = path.join(folder, entry.name);
     if (entry.isDirectory()) return pointsOf(at);
-    return at.endsWith('.c') ? [...readFileSync(at, 'utf8').matchAll(/FAULT_POINT\("([^"]+)"\)/g)].map((m) => m[1]) : [];
+    return at.endsWith('.c')
+      ? [...readFileSync(at, 'utf8').matchAll(/FAULT_POINT\("([^"]+)"\)/g)].map((m) => m[1])
+      : [];
   });
 }
 const points = [...new Set(pointsOf(path.join(root, 'server')))].sort();
@@ -81,7 +83,11 @@ class Ledger {
       for (;;) {
         const [a, b] = [await this.upload(d), await this.upload(d)];
         await this.ask(d, '/v1/embeddings', { mesh: a.id });
-        await this.ask(d, '/v1/supermeshes', { shapes: [{ mesh: a.id }, { mesh: b.id }], align: { method: 'rotate' }, remesh: { method: 'overlay' } });
+        await this.ask(d, '/v1/supermeshes', {
+          shapes: [{ mesh: a.id }, { mesh: b.id }],
+          align: { method: 'rotate' },
+          remesh: { method: 'overlay' },
+        });
         await d.get('/v1/jobs', { query: { limit: 5 } });
         const c = await this.upload(d);
         const embedding = await this.ask(d, '/v1/embeddings', { mesh: c.id });
@@ -113,7 +119,11 @@ class Ledger {
       const last = events.match(/^event: (succeeded|failed|cancelled)$/gm) ?? [];
       assert.equal(last.length, 1, `${url} ended ${last.length} times:\n${events}`);
       const numbers = [...events.matchAll(/^id: (\d+)$/gm)].map((m) => Number(m[1]));
-      assert.deepEqual(numbers, [...new Set(numbers)].sort((a, b) => a - b), events);
+      assert.deepEqual(
+        numbers,
+        [...new Set(numbers)].sort((a, b) => a - b),
+        events,
+      );
     }
   }
 
@@ -127,7 +137,8 @@ class Ledger {
         token = json.next_page_token;
       }
       assert.equal(new Set(ids).size, ids.length, `${kind}: one is there twice`);
-      if (kind === 'jobs') for (const url of this.ends.keys()) assert.ok(ids.includes(url.split('/').pop()), `${url} is not listed`);
+      if (kind === 'jobs')
+        for (const url of this.ends.keys()) assert.ok(ids.includes(url.split('/').pop()), `${url} is not listed`);
     }
     for (const [url, sha] of this.meshes) {
       const file = await d.get(`${url}/file`);
@@ -140,7 +151,9 @@ class Ledger {
 }
 
 async function checkData(d) {
-  const { stdout } = await run(binaries.daemon, ['--check-data', '--data', d.data]).catch((error) => assert.fail(`--check-data: ${error.stdout}${error.stderr}`));
+  const { stdout } = await run(binaries.daemon, ['--check-data', '--data', d.data]).catch((error) =>
+    assert.fail(`--check-data: ${error.stdout}${error.stderr}`),
+  );
   assert.match(stdout, / 0 wrong/);
 }
 
@@ -158,7 +171,12 @@ async function dies(d, ms) {
 test(`${kills} kills under load lose nothing`, async (t) => {
   const hit = new Map(points.map((name) => [name, 0]));
   const began = Date.now();
-  let done = 0, random_kills = 0, crashed = 0, accepted = 0, uploads = 0, slowest = 0;
+  let done = 0;
+  let random_kills = 0;
+  let crashed = 0;
+  let accepted = 0;
+  let uploads = 0;
+  let slowest = 0;
   while (done < kills) {
     const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-crash-'));
     const d = new Daemon(data, ['--workers', '2'], {});
@@ -169,7 +187,12 @@ test(`${kills} kills under load lose nothing`, async (t) => {
       // In a fresh folder while its schema is made; then in turn: an instant after all that waited has ended; then a named point or any instant, also while it
       // recovers. So no job is alone in three deaths one after another.
       const least = Math.min(...[...hit].filter(([name]) => name !== 'migrate').map(([, n]) => n)); // those least seen first
-      const point = faults && i === 0 ? 'migrate' : faults && i % 2 === 1 ? pick(points.filter((name) => hit.get(name) === least && name !== 'migrate')) : null;
+      const point =
+        faults && i === 0
+          ? 'migrate'
+          : faults && i % 2 === 1
+            ? pick(points.filter((name) => hit.get(name) === least && name !== 'migrate'))
+            : null;
       const nth = 1 + Math.floor(random() * (hit.get(point) > 0 ? 8 : 2));
       d.env = point ? { ORBMORPH_FAULT: `kill:${point}:${nth}` } : {};
       try {
@@ -201,14 +224,19 @@ test(`${kills} kills under load lose nothing`, async (t) => {
     await rm(data, { recursive: true, force: true });
   }
   const named = [...hit].map(([name, n]) => `${name} ${n}`).join(', ');
-  t.diagnostic(`${done} kills in ${((Date.now() - began) / 1000).toFixed(0)} s: ${random_kills} at random instants, ` +
-    `${done - random_kills} at named points (${faults ? named : 'not in this build'}); ${accepted} accepted jobs, ${uploads} meshes, ` +
-    `none lost; ${crashed} failed after three deaths alone; slowest start ${slowest} ms of processor time`);
+  t.diagnostic(
+    `${done} kills in ${((Date.now() - began) / 1000).toFixed(0)} s: ${random_kills} at random instants, ` +
+      `${done - random_kills} at named points (${faults ? named : 'not in this build'}); ${accepted} accepted jobs, ${uploads} meshes, ` +
+      `none lost; ${crashed} failed after three deaths alone; slowest start ${slowest} ms of processor time`,
+  );
   assert.ok(slowest < 10_000, `a start took ${slowest} ms of processor time`);
-  if (faults && kills >= 10 * points.length) for (const [name, n] of hit) assert.ok(n > 0, `the point ${name} was never reached`);
+  if (faults && kills >= 10 * points.length)
+    for (const [name, n] of hit) assert.ok(n > 0, `the point ${name} was never reached`);
 });
 
-test('a poisonous job is given up after three deaths, and holds up no other', { skip: !faults && 'needs a build with ORB_FAULTS' }, async (t) => {
+test('a poisonous job is given up after three deaths, and holds up no other', {
+  skip: !faults && 'needs a build with ORB_FAULTS',
+}, async (t) => {
   const d = await daemon(t, { args: ['--workers', '2'] });
   const ledger = new Ledger();
   const mesh = await ledger.upload(d);
@@ -221,7 +249,8 @@ test('a poisonous job is given up after three deaths, and holds up no other', { 
   const others = [];
   for (let i = 0; i < 3; i++) others.push(await ledger.upload(d));
   await ledger.ask(d, '/v1/embeddings', { mesh: mesh.id }).catch(() => {});
-  let deaths = 0, end;
+  let deaths = 0;
+  let end;
   for (const late = Date.now() + 300_000 * patience; !end && deaths < 12; ) {
     assert.ok(Date.now() < late, `${deaths} deaths, and neither another nor an end`);
     for (const other of others) await ledger.ask(d, '/v1/embeddings', { mesh: other.id }).catch(() => {});

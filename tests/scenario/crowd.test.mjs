@@ -5,7 +5,11 @@ import { daemon, endless } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const shape = (seed, levels) =>
-  shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(3 * y + seed)), (1 + (seed % 5) / 10) * y, z + 0.1 * Math.sin(6 * x + seed)]);
+  shapes.ball(levels, ([x, y, z]) => [
+    x * (1 + 0.3 * Math.sin(3 * y + seed)),
+    (1 + (seed % 5) / 10) * y,
+    z + 0.1 * Math.sin(6 * x + seed),
+  ]);
 
 test('64 clients submit and poll while jobs run', async (t) => {
   const d = await daemon(t, { args: ['--workers', '2'] });

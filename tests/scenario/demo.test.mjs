@@ -8,12 +8,18 @@ import test from 'node:test';
 import validator from 'gltf-validator';
 import { binaries, root, samples } from './support/daemon.mjs';
 
-const skip = path.resolve(binaries.daemon) === path.join(root, 'build/bin/orbmorphd') ? false : 'it builds the release only';
+const skip =
+  path.resolve(binaries.daemon) === path.join(root, 'build/bin/orbmorphd') ? false : 'it builds the release only';
 
 function demo(args, { cwd, script = path.join(root, 'deploy/demo.sh'), env = {} }) {
   return new Promise((resolve) => {
-    const child = spawn('bash', [script, ...args], { cwd, env: { ...process.env, ...env }, stdio: ['ignore', 'pipe', 'pipe'] });
-    let out = '', err = '';
+    const child = spawn('bash', [script, ...args], {
+      cwd,
+      env: { ...process.env, ...env },
+      stdio: ['ignore', 'pipe', 'pipe'],
+    });
+    let out = '';
+    let err = '';
     child.stdout.on('data', (chunk) => (out += chunk));
     child.stderr.on('data', (chunk) => (err += chunk));
     child.on('close', (code) => resolve({ code, out, err }));
@@ -24,7 +30,11 @@ const found = (out, name) => new RegExp(`^${name}: +(\\S+)$`, 'm').exec(out)?.[1
 
 async function clean(file) {
   const report = await validator.validateBytes(new Uint8Array(await readFile(file)));
-  assert.equal(report.issues.numErrors + report.issues.numWarnings, 0, JSON.stringify(report.issues.messages.slice(0, 3)));
+  assert.equal(
+    report.issues.numErrors + report.issues.numWarnings,
+    0,
+    JSON.stringify(report.issues.messages.slice(0, 3)),
+  );
 }
 
 test('the demo morphs the samples', { skip }, async () => {
@@ -44,7 +54,11 @@ test('the demo takes the files of its caller', { skip }, async (t) => {
   await symlink(path.join(root, 'deploy/demo.sh'), path.join(cwd, 'demo link'));
   const temporary = path.join(cwd, 'temporary');
   await mkdir(temporary);
-  const { code, out, err } = await demo(['my dog.obj', 'sub dir/élé phant.ply'], { cwd, script: 'demo link', env: { TMPDIR: temporary } });
+  const { code, out, err } = await demo(['my dog.obj', 'sub dir/élé phant.ply'], {
+    cwd,
+    script: 'demo link',
+    env: { TMPDIR: temporary },
+  });
   assert.equal(code, 0, err);
   await clean(found(out, 'GLB'));
   assert.ok((await stat(found(out, 'Report'))).size > 0);

@@ -34,7 +34,12 @@ test('Prometheus takes the metrics, and the queries of the dashboard', { skip: l
   const queries = panels.flatMap(({ targets }) => targets.map(({ expr }) => expr.replaceAll('$__rate_interval', '5m')));
   assert.ok(queries.length > 10);
   const file = path.join(await folder(t), 'rules.yml');
-  await writeFile(file, JSON.stringify({ groups: [{ name: 'dashboard', rules: queries.map((expr, i) => ({ record: `query:${i}`, expr })) }] }));
+  await writeFile(
+    file,
+    JSON.stringify({
+      groups: [{ name: 'dashboard', rules: queries.map((expr, i) => ({ record: `query:${i}`, expr })) }],
+    }),
+  );
   const rules = run('promtool', ['check', 'rules', file]);
   assert.equal(rules.status, 0, rules.text);
   assert.match(rules.text, new RegExp(`${queries.length} rules`));

@@ -21,7 +21,10 @@ function fill(file) {
   closeSync(fd);
 }
 
-for (const [reserve, what] of [['0', 'found when it is written'], ['4M', 'foreseen by the reserve']]) {
+for (const [reserve, what] of [
+  ['0', 'found when it is written'],
+  ['4M', 'foreseen by the reserve'],
+]) {
   test(`a full disk, ${what}`, async (t) => {
     const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-full-'));
     const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=24m', 'tmpfs', mount]);
@@ -62,7 +65,11 @@ for (const [reserve, what] of [['0', 'found when it is written'], ['4M', 'forese
     await d.made('/v1/embeddings', { mesh: kept.json.id, method: 'kernel-sampling' });
     const { code } = await d.stop();
     assert.equal(code, 0, d.log);
-    const { stdout } = spawnSync('sh', ['-c', `"${process.env.ORBMORPHD ?? 'build/bin/orbmorphd'}" --check-data --data ${d.data}`], { encoding: 'utf8' });
+    const { stdout } = spawnSync(
+      'sh',
+      ['-c', `"${process.env.ORBMORPHD ?? 'build/bin/orbmorphd'}" --check-data --data ${d.data}`],
+      { encoding: 'utf8' },
+    );
     assert.match(stdout, / 0 wrong/);
   });
 }
@@ -87,7 +94,13 @@ test('the reserve is kept also from a body that does not say how long it is', as
   const send = async (count) => {
     const reply = await fetch(`${d.url}/v1/meshes`, { method: 'POST', body: chunks(count), duplex: 'half' });
     const bytes = Buffer.from(await reply.arrayBuffer());
-    return { status: reply.status, headers: reply.headers, type: reply.headers.get('content-type'), bytes, json: JSON.parse(bytes) };
+    return {
+      status: reply.status,
+      headers: reply.headers,
+      type: reply.headers.get('content-type'),
+      bytes,
+      json: JSON.parse(bytes),
+    };
   };
   assertProblem(await send(96), 507, 'storage-full'); // 24 MB, which the disk would have room for
   assertProblem(await send(16), 400, 'malformed-mesh'); // 4 MB are read to the end

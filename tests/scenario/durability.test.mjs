@@ -7,7 +7,12 @@ import { assertProblem, daemon, endless, samples, slow, until } from './support/
 import * as shapes from './support/shapes.mjs';
 
 const kills = Number(process.env.ORB_CRASHES ?? (slow ? 3 : 6));
-const wobble = (seed, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.2 * Math.sin(5 * y + seed)), 1.3 * y, z + 0.2 * Math.cos(4 * x + seed)]);
+const wobble = (seed, levels) =>
+  shapes.ball(levels, ([x, y, z]) => [
+    x * (1 + 0.2 * Math.sin(5 * y + seed)),
+    1.3 * y,
+    z + 0.2 * Math.cos(4 * x + seed),
+  ]);
 
 async function kill(d) {
   d.killed = true;
@@ -66,7 +71,10 @@ test('results stay after an orderly end, and the second run finds them', async (
 
 test('SIGTERM ends it in time while a job runs, and the jobs are kept', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1', '--drain-seconds', '1'] });
-  const [large, small] = [(await d.upload(shapes.binaryPly(wobble(1, 5)))).json, (await d.upload(shapes.obj(wobble(2, 3)))).json];
+  const [large, small] = [
+    (await d.upload(shapes.binaryPly(wobble(1, 5)))).json,
+    (await d.upload(shapes.obj(wobble(2, 3)))).json,
+  ];
   const { json: job } = await d.post('/v1/embeddings', { mesh: large.id, ...endless });
   await until(async () => (await d.get(job.url)).json.state === 'running', 'it runs');
   const { json: behind } = await d.post('/v1/embeddings', { mesh: small.id });
@@ -75,7 +83,10 @@ test('SIGTERM ends it in time while a job runs, and the jobs are kept', async (t
   assert.equal(code, 0, d.log);
   await waiting;
   await d.start();
-  const again = await until(async () => ((job) => job.state === 'running' && job)((await d.get(job.url)).json), 'it runs again');
+  const again = await until(
+    async () => ((job) => job.state === 'running' && job)((await d.get(job.url)).json),
+    'it runs again',
+  );
   assert.equal(again.id, job.id);
   assert.equal((await d.get(behind.url)).json.state, 'queued');
   assert.equal((await d.delete(job.url)).status, 200);
@@ -107,7 +118,11 @@ test('a second SIGTERM ends it at once while it drains, and the job is kept', as
   d.child.kill('SIGHUP');
   assert.equal((await d.get('/livez')).status, 200);
   const { json: other } = await d.upload(shapes.tetrahedron);
-  assertProblem(await d.post('/v1/embeddings', { mesh: (other.id ? other : mesh).id, method: 'kernel-sampling' }), 503, 'unavailable');
+  assertProblem(
+    await d.post('/v1/embeddings', { mesh: (other.id ? other : mesh).id, method: 'kernel-sampling' }),
+    503,
+    'unavailable',
+  );
   await sleep(1500);
   assert.deepEqual([d.child.exitCode, d.child.signalCode], [null, null], 'it gives the job its time');
   assert.equal((await d.get(job.url)).json.state, 'running');

@@ -48,7 +48,10 @@ test('the second request costs nothing', async (t) => {
   assert.deepEqual(second.resource, first.resource);
   assert.deepEqual((await d.get(first.resource.url)).json, first.resource);
   const list = Object.values((await d.get('/v1/embeddings')).json).find(Array.isArray);
-  assert.deepEqual(list.map((e) => e.id), [first.resource.id]);
+  assert.deepEqual(
+    list.map((e) => e.id),
+    [first.resource.id],
+  );
 });
 
 test('what a job made is listed from the moment that its success is told', async (t) => {
@@ -68,7 +71,12 @@ test('what a job made is listed from the moment that its success is told', async
 
 test('the smallest and the oddest meshes embed', async (t) => {
   const d = await daemon(t);
-  for (const text of [shapes.tetrahedron, shapes.cube, shapes.obj(shapes.ball(1)), shapes.obj(shapes.ball(3, ([x, y, z]) => [x, 1e-3 * y, 50 * z]))]) {
+  for (const text of [
+    shapes.tetrahedron,
+    shapes.cube,
+    shapes.obj(shapes.ball(1)),
+    shapes.obj(shapes.ball(3, ([x, y, z]) => [x, 1e-3 * y, 50 * z])),
+  ]) {
     const { json: mesh } = await d.upload(text);
     const embedding = await d.made('/v1/embeddings', { mesh: mesh.id });
     assert.equal(embedding.certificate.flipped, 0);

@@ -11,22 +11,32 @@ import { assertProblem, daemon, patience, samples } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const gzip = promisify(zlib.gzip);
-const zstd = (bytes, ...options) => execFileSync('zstd', ['-q', '-c', ...options], { input: bytes, maxBuffer: 1 << 28 });
+const zstd = (bytes, ...options) =>
+  execFileSync('zstd', ['-q', '-c', ...options], { input: bytes, maxBuffer: 1 << 28 });
 const send = (d, coding, body, query, target = '/v1/meshes') =>
-  d.post(target, body, { query, headers: { 'content-encoding': coding, 'content-type': target === '/v1/meshes' ? 'model/obj' : 'application/json' } });
-const memory = async (d) => Number(/VmHWM:\s+(\d+) kB/.exec(await readFile(`/proc/${d.child.pid}/status`, 'utf8'))[1]) * 1024;
+  d.post(target, body, {
+    query,
+    headers: { 'content-encoding': coding, 'content-type': target === '/v1/meshes' ? 'model/obj' : 'application/json' },
+  });
+const memory = async (d) =>
+  Number(/VmHWM:\s+(\d+) kB/.exec(await readFile(`/proc/${d.child.pid}/status`, 'utf8'))[1]) * 1024;
 
 /** A zstd frame of RLE blocks: n·128 KB of zeros in 4 n bytes (RFC 8878, 3.1.1). */
 function zstdZeros(blocks) {
   const head = Buffer.from([0x28, 0xb5, 0x2f, 0xfd, 0x00, 0x38]); // a window of 128 KB, no checksum
   const body = Buffer.alloc(4 * blocks);
-  for (let i = 0; i < blocks; i++) body.writeUInt32LE(((0x20000 << 3) | (1 << 1) | (i === blocks - 1 ? 1 : 0)) >>> 0, 4 * i);
+  for (let i = 0; i < blocks; i++)
+    body.writeUInt32LE(((0x20000 << 3) | (1 << 1) | (i === blocks - 1 ? 1 : 0)) >>> 0, 4 * i);
   return Buffer.concat([head, body]);
 }
 
 /** A frame of zstd 0.7, from before the RFC: libzstd still reads it. */
 function frameOf07(bytes) {
-  return Buffer.concat([Buffer.from([0x27, 0xb5, 0x2f, 0xfd, 0x20, bytes.length, 0x40, 0, bytes.length]), bytes, Buffer.from([0xc0, 0, 0])]);
+  return Buffer.concat([
+    Buffer.from([0x27, 0xb5, 0x2f, 0xfd, 0x20, bytes.length, 0x40, 0, bytes.length]),
+    bytes,
+    Buffer.from([0xc0, 0, 0]),
+  ]);
 }
 
 /** A frame to skip (RFC 8878, 3.1.2). */
@@ -37,9 +47,18 @@ test('compressed uploads and requests are the same as plain ones', async (t) => 
   const bytes = await readFile(path.join(samples, 'dog.obj'));
   const plain = await d.upload(bytes, { name: 'dog' });
   assert.equal(plain.status, 201);
-  const half = bytes.length >> 1, members = await Promise.all([gzip(bytes.subarray(0, half)), gzip(bytes.subarray(half))]);
-  const forms = { gzip: [await gzip(bytes), Buffer.concat(members)], 'x-gzip': [await gzip(bytes, { level: 1 })], identity: [bytes],
-    zstd: [zstd(bytes), zstd(bytes, '-19'), Buffer.concat([zstd(bytes.subarray(0, half)), skipped, zstd(bytes.subarray(half))])] };
+  const half = bytes.length >> 1;
+  const members = await Promise.all([gzip(bytes.subarray(0, half)), gzip(bytes.subarray(half))]);
+  const forms = {
+    gzip: [await gzip(bytes), Buffer.concat(members)],
+    'x-gzip': [await gzip(bytes, { level: 1 })],
+    identity: [bytes],
+    zstd: [
+      zstd(bytes),
+      zstd(bytes, '-19'),
+      Buffer.concat([zstd(bytes.subarray(0, half)), skipped, zstd(bytes.subarray(half))]),
+    ],
+  };
   for (const [coding, bodies] of Object.entries(forms))
     for (const body of bodies) {
       const reply = await send(d, coding, body, { name: 'dog' });
@@ -49,7 +68,11 @@ test('compressed uploads and requests are the same as plain ones', async (t) => 
   const other = await gzip(await readFile(path.join(samples, 'giraffe.off')));
   const fresh = await send(d, 'GZIP', other, { name: 'giraffe' });
   assert.equal(fresh.status, 201);
-  assert.equal(fresh.json.bytes, (await readFile(path.join(samples, 'giraffe.off'))).length, 'the size is that of the file');
+  assert.equal(
+    fresh.json.bytes,
+    (await readFile(path.join(samples, 'giraffe.off'))).length,
+    'the size is that of the file',
+  );
   const request = JSON.stringify({ mesh: plain.json.id });
   const { json: job } = await send(d, 'zstd', zstd(Buffer.from(request)), {}, '/v1/embeddings');
   assert.equal((await d.ended(job)).state, 'succeeded');
@@ -58,14 +81,27 @@ test('compressed uploads and requests are the same as plain ones', async (t) => 
 
 test('broken and unknown codings are refused', async (t) => {
   const d = await daemon(t);
-  const text = shapes.obj(shapes.egg(3)), packed = await gzip(text), frames = zstd(Buffer.from(text));
+  const text = shapes.obj(shapes.egg(3));
+  const packed = await gzip(text);
+  const frames = zstd(Buffer.from(text));
   const old = frameOf07(Buffer.from('OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n'));
   const flipped = (bytes, at) => Buffer.from(bytes.map((b, i) => (i === at ? b ^ 0x55 : b)));
-  for (const [coding, body] of [['gzip', Buffer.from(text)], ['gzip', packed.subarray(0, -1)], ['gzip', packed.subarray(0, 5)],
-    ['gzip', flipped(packed, packed.length - 6)], ['gzip', Buffer.concat([packed, Buffer.from('more')])], ['gzip', frames],
-    ['gzip', zlib.deflateSync(text)], ['zstd', Buffer.from(text)], ['zstd', frames.subarray(0, -1)], ['zstd', flipped(frames, frames.length - 2)],
-    ['zstd', Buffer.concat([frames, Buffer.from('rest')])], ['zstd', packed], ['zstd', old],
-    ['zstd', Buffer.concat([frames, old])]])
+  for (const [coding, body] of [
+    ['gzip', Buffer.from(text)],
+    ['gzip', packed.subarray(0, -1)],
+    ['gzip', packed.subarray(0, 5)],
+    ['gzip', flipped(packed, packed.length - 6)],
+    ['gzip', Buffer.concat([packed, Buffer.from('more')])],
+    ['gzip', frames],
+    ['gzip', zlib.deflateSync(text)],
+    ['zstd', Buffer.from(text)],
+    ['zstd', frames.subarray(0, -1)],
+    ['zstd', flipped(frames, frames.length - 2)],
+    ['zstd', Buffer.concat([frames, Buffer.from('rest')])],
+    ['zstd', packed],
+    ['zstd', old],
+    ['zstd', Buffer.concat([frames, old])],
+  ])
     for (const target of ['/v1/meshes', '/v1/embeddings']) {
       const reply = await send(d, coding, body, {}, target);
       assertProblem(reply, 400, 'malformed-encoding', `${coding} ${body.subarray(0, 8).toString('hex')}`);
@@ -105,7 +141,10 @@ test('bombs end early', async (t) => {
   for (let i = 0; i < 64; i++) await new Promise((done) => packer.write(zeros, done));
   await new Promise((done) => packer.end(done));
   const before = await memory(d);
-  for (const [coding, body] of [['gzip', Buffer.concat(gigabyte)], ['zstd', zstdZeros(8192)]])
+  for (const [coding, body] of [
+    ['gzip', Buffer.concat(gigabyte)],
+    ['zstd', zstdZeros(8192)],
+  ])
     for (const target of ['/v1/meshes', '/v1/embeddings']) {
       const reply = await send(d, coding, body, {}, target);
       assertProblem(reply, 413, 'too-large', `${coding} ${target}`);
@@ -132,7 +171,14 @@ test('decoders share a budget of memory', async (t) => {
   for (let i = 0; i < 40; i++) {
     const socket = net.connect(Number(port), hostname);
     open.push(socket);
-    await new Promise((done) => socket.on('error', () => {}).write(`POST /v1/meshes HTTP/1.1\r\nHost: x\r\nContent-Encoding: gzip\r\nContent-Length: ${begin.length}\r\n\r\n`, done));
+    await new Promise((done) =>
+      socket
+        .on('error', () => {})
+        .write(
+          `POST /v1/meshes HTTP/1.1\r\nHost: x\r\nContent-Encoding: gzip\r\nContent-Length: ${begin.length}\r\n\r\n`,
+          done,
+        ),
+    );
     socket.write(begin.subarray(0, 100));
   }
   const end = Date.now() + 120_000 * patience;

@@ -11,13 +11,15 @@ import * as shapes from './support/shapes.mjs';
 
 const statuses = async (d, urls) => Promise.all(urls.map(async (url) => (await d.request('HEAD', url)).status));
 const bytes = async (d) => Number(/^orbmorph_stored_bytes (\S+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
-const uploaded = async (d, urls) => (await Promise.all(urls.map(async (url) => (await d.get(`${url}/file`)).bytes.length))).reduce((a, b) => a + b);
+const uploaded = async (d, urls) =>
+  (await Promise.all(urls.map(async (url) => (await d.get(`${url}/file`)).bytes.length))).reduce((a, b) => a + b);
 const stored = async (d, kind) => (await d.get(`/v1/${kind}`, { query: { limit: 1000 } })).json[kind];
 
 test('the least used embeddings leave, uploads never', async (t) => {
   // A sphere of 8·4^4 triangles takes about 80 kB as PLY: some 13 of them are a megabyte.
   const d = await daemon(t, { args: ['--derived-bytes', '1M'] });
-  const meshes = [], embeddings = [];
+  const meshes = [];
+  const embeddings = [];
   const add = async () => {
     const i = meshes.length;
     const mesh = (await d.upload(shapes.obj(shapes.ball(4, ([x, y, z]) => [x, y, z * (1 + i / 50)])))).json;
@@ -34,7 +36,8 @@ test('the least used embeddings leave, uploads never', async (t) => {
   await until(async () => (await bytes(d)) - uploads <= 1 << 20, 'what is beyond the budget is evicted');
   const left = new Set((await stored(d, 'embeddings')).map((e) => e.url));
   assert.ok(left.size >= 8 && left.size < 15, `${left.size} are left`);
-  for (const i of [0, 1, ...embeddings.keys()].filter((i) => i < 2 || i >= 15)) assert.ok(left.has(embeddings[i]), `${i} was used`);
+  for (const i of [0, 1, ...embeddings.keys()].filter((i) => i < 2 || i >= 15))
+    assert.ok(left.has(embeddings[i]), `${i} was used`);
   for (const i of [2, 3, 4]) {
     assert.ok(!left.has(embeddings[i]), `${i} was not used`);
     assert.equal((await d.get(embeddings[i])).status, 404);
@@ -49,12 +52,14 @@ test('the least used embeddings leave, uploads never', async (t) => {
 test('what is removed while it is needed is made again', async (t) => {
   const d = await daemon(t, { args: ['--workers', '2', '--derived-bytes', '1M'] });
   const meshes = [];
-  for (let i = 0; i < 6; i++) meshes.push((await d.upload(shapes.obj(shapes.ball(3, ([x, y, z]) => [x, y * (1 + i / 7), z])))).json.id);
+  for (let i = 0; i < 6; i++)
+    meshes.push((await d.upload(shapes.obj(shapes.ball(3, ([x, y, z]) => [x, y * (1 + i / 7), z])))).json.id);
   // At a pace that leaves time to make what was removed, however slow the machine is.
   const began = Date.now();
   await d.made('/v1/embeddings', { mesh: meshes[0] });
   const pause = Math.max(20, 2 * (Date.now() - began));
-  let going = true, removed = 0;
+  let going = true;
+  let removed = 0;
   const remover = (async () => {
     while (going) {
       for (const kind of ['embeddings', 'supermeshes'])
@@ -63,17 +68,29 @@ test('what is removed while it is needed is made again', async (t) => {
     }
   })();
   for (let round = 0; round < 3 || removed <= 20; round++) {
-    const wanted = meshes.map((mesh, i) => ({ shapes: [{ mesh }, { mesh: meshes[(i + 1 + (round % 5)) % meshes.length] }], align: { method: 'rotate' }, remesh: { method: 'overlay' } }));
-    const ends = await Promise.all(wanted.map((body) => d.post('/v1/supermeshes', body).then((r) => (r.status === 202 ? d.ended(r.json) : { state: 'succeeded' }))));
+    const wanted = meshes.map((mesh, i) => ({
+      shapes: [{ mesh }, { mesh: meshes[(i + 1 + (round % 5)) % meshes.length] }],
+      align: { method: 'rotate' },
+      remesh: { method: 'overlay' },
+    }));
+    const ends = await Promise.all(
+      wanted.map((body) =>
+        d.post('/v1/supermeshes', body).then((r) => (r.status === 202 ? d.ended(r.json) : { state: 'succeeded' })),
+      ),
+    );
     for (const end of ends) assert.equal(end.state, 'succeeded', JSON.stringify(end.problem));
   }
   going = false;
   await remover;
   // What the lists name is there, whole; what the budget takes meanwhile is in the list no more.
-  for (const [kind, file] of [['embeddings', 'sphere.ply'], ['supermeshes', 'asset.glb']])
+  for (const [kind, file] of [
+    ['embeddings', 'sphere.ply'],
+    ['supermeshes', 'asset.glb'],
+  ])
     for (const { url } of await stored(d, kind)) {
       const { status } = await d.get(`${url}/${file}`);
-      if (status !== 200) assert.ok(status === 404 && !(await stored(d, kind)).some((one) => one.url === url), `${url}: ${status}`);
+      if (status !== 200)
+        assert.ok(status === 404 && !(await stored(d, kind)).some((one) => one.url === url), `${url}: ${status}`);
     }
   await d.stop();
   const { stdout } = await promisify(execFile)(binaries.daemon, ['--check-data', '--data', d.data]);
@@ -87,7 +104,8 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
   const gc = (...args) => promisify(execFile)(binaries.daemon, ['--gc', '--data', d.data, ...args]);
   const check = async () => (await promisify(execFile)(binaries.daemon, ['--check-data', '--data', d.data])).stdout;
   await assert.rejects(gc(), { code: 1 }, 'not while the daemon has the folder');
-  const meshes = [], made = [];
+  const meshes = [];
+  const made = [];
   for (let i = 0; i < 18; i++) {
     const mesh = (await d.upload(shapes.obj(shapes.ball(4, ([x, y, z]) => [x, y, z * (1 + i / 50)])))).json;
     meshes.push(mesh.url);
@@ -99,7 +117,9 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
     meshes.push(mesh.url);
     pair.push({ mesh: mesh.id });
   }
-  const merged = (await d.made('/v1/supermeshes', { shapes: pair, align: { method: 'rotate' }, remesh: { method: 'overlay' } })).url;
+  const merged = (
+    await d.made('/v1/supermeshes', { shapes: pair, align: { method: 'rotate' }, remesh: { method: 'overlay' } })
+  ).url;
   await d.stop();
 
   // Without a budget all that has a row stays.
@@ -112,10 +132,15 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
   await d.stop();
 
   // An object that a crash left between publishing and commit: of a kind of its own, beside one that is there.
-  const files = (await readdir(path.join(d.data, 'objects'), { recursive: true, withFileTypes: true })).filter((f) => f.isFile());
+  const files = (await readdir(path.join(d.data, 'objects'), { recursive: true, withFileTypes: true })).filter((f) =>
+    f.isFile(),
+  );
   const example = files.find((f) => /[0-9a-f]{60,}/.test(f.name));
   assert.ok(example, files.map((f) => f.name).join());
-  const twin = path.join(example.path, example.name.replace(/[0-9a-f]{8}(?=[^0-9a-f]|$)/, (c) => (c === '00000000' ? '11111111' : '00000000')));
+  const twin = path.join(
+    example.path,
+    example.name.replace(/[0-9a-f]{8}(?=[^0-9a-f]|$)/, (c) => (c === '00000000' ? '11111111' : '00000000')),
+  );
   await writeFile(twin, 'left behind');
   assert.match(await check(), / 0 wrong, 1 objects without a row/);
   const { stdout } = await gc('--derived-bytes', '1M');
@@ -124,7 +149,8 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
 
   await d.start();
   assert.deepEqual(new Set(await statuses(d, meshes)), new Set([200]), 'uploads stay');
-  const left = await statuses(d, made), kept = left.filter((status) => status === 200).length;
+  const left = await statuses(d, made);
+  const kept = left.filter((status) => status === 200).length;
   assert.ok(kept >= 2 && kept < 16, `${kept} of 18 are left`);
   assert.deepEqual([left[0], left[1], (await statuses(d, [merged]))[0]], [200, 200, 200], 'what was used last stays');
   assert.deepEqual(new Set(left.slice(2, 4)), new Set([404]), 'what was not used for longest is gone');
@@ -135,7 +161,8 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
 test('ended jobs beyond keep-jobs are forgotten, what is unfinished and what they made stays', async (t) => {
   const d = await daemon(t, { args: ['--keep-jobs', '3', '--workers', '1'] });
   const jobs = async () => (await d.get('/v1/jobs')).json.jobs.map(({ state }) => state);
-  const mesh = async (level, i) => (await d.upload(shapes.obj(shapes.ball(level, ([x, y, z]) => [x, y, z * (1 + i / 50)])))).json.id;
+  const mesh = async (level, i) =>
+    (await d.upload(shapes.obj(shapes.ball(level, ([x, y, z]) => [x, y, z * (1 + i / 50)])))).json.id;
   const made = [];
   for (let i = 0; i < 6; i++) made.push((await d.made('/v1/embeddings', { mesh: await mesh(2, i) })).url);
   const running = (await d.post('/v1/embeddings', { mesh: await mesh(5, 7), ...endless })).json;

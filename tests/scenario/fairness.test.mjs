@@ -6,16 +6,34 @@ import { promisify } from 'node:util';
 import { binaries, daemon, endless, slow } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-const wobble = (seed, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.2 * Math.sin(5 * y + seed)), y * (1.2 + seed / 100), z + 0.2 * Math.cos(4 * x + seed)]);
+const wobble = (seed, levels) =>
+  shapes.ball(levels, ([x, y, z]) => [
+    x * (1 + 0.2 * Math.sin(5 * y + seed)),
+    y * (1.2 + seed / 100),
+    z + 0.2 * Math.cos(4 * x + seed),
+  ]);
 const bearer = async (d, name, ...more) => {
-  const { stdout } = await promisify(execFile)(binaries.daemon, ['token', 'add', name, '--scope', 'admin', ...more, '--data', d.data]);
+  const { stdout } = await promisify(execFile)(binaries.daemon, [
+    'token',
+    'add',
+    name,
+    '--scope',
+    'admin',
+    ...more,
+    '--data',
+    d.data,
+  ]);
   return { headers: { authorization: `Bearer ${stdout.trim()}` } };
 };
 /** Uploads the mesh and asks for its embedding; the job. */
 async function submit(d, seed, levels, options = {}, more = {}) {
   const mesh = await d.post('/v1/meshes', shapes.binaryPly(wobble(seed, levels)), options);
   assert.equal(mesh.status, 201, mesh.bytes.toString());
-  const reply = await d.post('/v1/embeddings', { mesh: mesh.json.id, ...more.body }, { headers: { ...options.headers, ...more.headers } });
+  const reply = await d.post(
+    '/v1/embeddings',
+    { mesh: mesh.json.id, ...more.body },
+    { headers: { ...options.headers, ...more.headers } },
+  );
   assert.equal(reply.status, 202, reply.bytes.toString());
   return reply.json;
 }
@@ -39,11 +57,16 @@ async function occupy(d, options = {}) {
 
 test('callers take turns', async (t) => {
   const d = await daemon(t, { args: ['--auth', 'on', '--workers', '1'] });
-  const [many, few, first] = [await bearer(d, 'many'), await bearer(d, 'few'), await bearer(d, 'first', '--priority', '5')];
+  const [many, few, first] = [
+    await bearer(d, 'many'),
+    await bearer(d, 'few'),
+    await bearer(d, 'first', '--priority', '5'),
+  ];
   const free = await occupy(d, many);
   const crowd = [];
   for (let i = 0; i < 8; i++) crowd.push(await submit(d, i, 4, many));
-  const guests = [await submit(d, 20, 4, few), await submit(d, 21, 4, few)], vip = await submit(d, 30, 4, first);
+  const guests = [await submit(d, 20, 4, few), await submit(d, 21, 4, few)];
+  const vip = await submit(d, 30, 4, first);
   await free();
   const times = [];
   for (const job of crowd) times.push(await started(d, job, many));
@@ -59,7 +82,13 @@ test('the urgent jobs of a caller go first', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const free = await occupy(d);
   const jobs = [];
-  for (const [seed, priority] of [[1, 'u=7'], [2, undefined], [3, 'i, u=0'], [4, 'u=9'], [5, 'u=1']])
+  for (const [seed, priority] of [
+    [1, 'u=7'],
+    [2, undefined],
+    [3, 'i, u=0'],
+    [4, 'u=9'],
+    [5, 'u=1'],
+  ])
     jobs.push(await submit(d, seed, 3, {}, { headers: priority ? { priority } : {} }));
   await free();
   const times = [];
@@ -76,7 +105,10 @@ test('large jobs leave room for small ones', async (t) => {
     for (let i = 0; i < Number(workers); i++) large.push(await submit(d, i, 8, {}, { body: endless }));
     for (let i = 0; i < 3; i++) await started(d, await submit(d, 10 + i, 3));
     const states = await Promise.all(large.map(async (job) => (await d.get(job.url)).json.state));
-    assert.ok(!states.some((state) => ['succeeded', 'failed'].includes(state)), `${workers}: the small ones passed: ${states}`);
+    assert.ok(
+      !states.some((state) => ['succeeded', 'failed'].includes(state)),
+      `${workers}: the small ones passed: ${states}`,
+    );
     for (const job of large) await d.delete(job.url);
   }
 });
@@ -92,13 +124,16 @@ test('time, memory and cancelling', async (t) => {
   assert.equal(reply?.type, '/problems/no-memory', JSON.stringify(reply));
 
   const other = await daemon(t, { args: ['--workers', '1'] });
-  const times = [], busy = [];
+  const times = [];
+  const busy = [];
   for (let i = 0; i < 6; i++) {
     const ends = i % 2 === 1; // by itself, perhaps before it is cancelled
     const job = await submit(other, i, ends ? (slow ? 6 : 7) : 5, {}, { body: ends ? {} : endless });
     while ((await other.get(job.url)).json.state === 'queued') await new Promise((done) => setTimeout(done, 5));
     await new Promise((done) => setTimeout(done, 40 * i));
-    const began = performance.now(), before = other.cpuMs(), answer = await other.delete(job.url);
+    const began = performance.now();
+    const before = other.cpuMs();
+    const answer = await other.delete(job.url);
     times.push(performance.now() - began);
     busy.push(other.cpuMs() - before);
     if (ends && answer.status === 409) {
@@ -108,7 +143,9 @@ test('time, memory and cancelling', async (t) => {
     assert.equal(answer.status, 200);
     assert.equal(answer.json.state, 'cancelled', 'the answer comes when it has ended');
   }
-  t.diagnostic(`cancelled within ${times.map((ms) => ms.toFixed(0)).join(', ')} ms and ${busy.join(', ')} ms of processor time`);
+  t.diagnostic(
+    `cancelled within ${times.map((ms) => ms.toFixed(0)).join(', ')} ms and ${busy.join(', ')} ms of processor time`,
+  );
   // The answer comes when the job has ended. On a machine that is busy with other things it comes later, but the
   // daemon works no longer: two threads for a tenth of a second, read from a clock of hundredths.
   assert.ok(Math.max(...busy) <= (slow ? 1500 : 220), busy.join());

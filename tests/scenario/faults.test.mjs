@@ -27,7 +27,9 @@ const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? (all ? 6 : 3)); //
 const longest = 200_000 * patience; // for an answer, or an end
 // A sanitizer has an allocator of its own: where its library comes after the interposer, that one is asked first.
 const asked = !slow || /interpose\S* /.test(library);
-const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(',')).split(',').filter((kind) => kind !== 'alloc' || (wanted !== 'few' && asked));
+const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(','))
+  .split(',')
+  .filter((kind) => kind !== 'alloc' || (wanted !== 'few' && asked));
 const seed = Number(process.env.ORB_FAULT_SEED ?? 1);
 const arguments_ = ['--workers', '1', '--io-threads', '1', '--drain-seconds', '2', '--max-connections', '64'];
 const base = !process.env.TMPDIR && existsSync('/dev/shm') ? '/dev/shm' : tmpdir();
@@ -45,7 +47,11 @@ class Place {
   }
   fresh() {
     this.data = path.join(this.folder, `data-${++this.lives}`);
-    this.d = new Daemon(this.data, arguments_, { LD_PRELOAD: library, ORB_FAIL_BOARD: this.board.file, ORB_FAIL_SITES: this.sites });
+    this.d = new Daemon(this.data, arguments_, {
+      LD_PRELOAD: library,
+      ORB_FAIL_BOARD: this.board.file,
+      ORB_FAIL_SITES: this.sites,
+    });
     this.caller = new faults.Caller(this.d, longest);
   }
   get alive() {
@@ -148,7 +154,9 @@ const beginnings = {
     if (!place.alive) await place.revive();
     if (!place.caller.jobs.length) await place.caller.sequence(true);
     const mesh = await place.caller.upload(true, place.caller.newMesh());
-    await place.caller.ask(true, 'POST', '/v1/embeddings', { body: { mesh: mesh.id } }).then((reply) => place.caller.jobs.push(reply.json.url));
+    await place.caller
+      .ask(true, 'POST', '/v1/embeddings', { body: { mesh: mesh.id } })
+      .then((reply) => place.caller.jobs.push(reply.json.url));
     place.d.child.kill('SIGKILL'); // with a job that was accepted and may run
     await place.d.exited;
   },
@@ -176,7 +184,8 @@ class Runner {
         // It is well again; a start that failed and was repeated needs less to show it, and each of many.
         const brief = when !== 'work' || (faults.by_site.includes(kind) && this.faults % 10 !== 0);
         await (brief ? place.caller.glance() : place.caller.sequence(true));
-        if (this.faults % 100 === 0 && all) console.error(`${this.faults} faults, ${this.failed.length} failed; at ${what}`);
+        if (this.faults % 100 === 0 && all)
+          console.error(`${this.faults} faults, ${this.failed.length} failed; at ${what}`);
       }
       return met;
     } catch (error) {
@@ -192,7 +201,8 @@ class Runner {
     const sites = faults.by_site.includes(kind);
     for (const when of Object.keys(phase_of)) {
       const needed = sites && when !== 'first' ? 2 * places.length : 1; // a site may be passed only now and then
-      let next = 1, clean = 0;
+      let next = 1;
+      let clean = 0;
       const work = async (place) => {
         while (clean < needed) {
           const n = next++;
@@ -208,12 +218,23 @@ class Runner {
   /** `count` faults over the phases, by a stride with a seeded start, both ways in turn. */
   async sample(place, kind, count) {
     const start = (seed * 0.6180339887498949) % 1;
-    for (const [when, share] of [['first', 1], ['again', 1], ['work', Math.max(1, count - 3)], ['stop', 1]]) {
+    for (const [when, share] of [
+      ['first', 1],
+      ['again', 1],
+      ['work', Math.max(1, count - 3)],
+      ['stop', 1],
+    ]) {
       await beginnings[when](place);
       await phase_of[when](place, () => place.board.arm(kind, 'once', 0xffffffff));
       const calls = place.board.get('passed');
       for (let i = 0; i < share && i < calls; i++)
-        await this.one(place, when, kind, (i + seed) % 2 ? 'once' : 'ever', 1 + Math.floor(((i + start) * calls) / share));
+        await this.one(
+          place,
+          when,
+          kind,
+          (i + seed) % 2 ? 'once' : 'ever',
+          1 + Math.floor(((i + start) * calls) / share),
+        );
     }
     await this.end(place, kind);
   }
@@ -233,7 +254,10 @@ const skip = library ? false : 'ORB_INTERPOSE names no library';
 test('calls that fail are answered, not died of', { skip }, async (t) => {
   const runner = new Runner();
   const folder = await mkdtemp(path.join(base, 'orbmorph-fault-'));
-  const places = Array.from({ length: side_by_side }, (_, i) => new Place(path.join(folder, `${i}`), path.join(folder, 'sites')));
+  const places = Array.from(
+    { length: side_by_side },
+    (_, i) => new Place(path.join(folder, `${i}`), path.join(folder, 'sites')),
+  );
   const tasks = kinds.flatMap((kind) => (all ? ['once', 'ever'] : ['']).map((mode) => [kind, mode]));
   try {
     for (const [kind, mode] of all ? tasks : []) {
@@ -242,7 +266,8 @@ test('calls that fail are answered, not died of', { skip }, async (t) => {
     }
     faults.makeSites(path.join(folder, 'sites'));
     const sample = async (place) => {
-      for (let task; !all && (task = tasks.shift()); ) await runner.sample(place, task[0], Math.ceil(Number(wanted) / kinds.length));
+      for (let task; !all && (task = tasks.shift()); )
+        await runner.sample(place, task[0], Math.ceil(Number(wanted) / kinds.length));
     };
     await Promise.all(places.map(sample));
   } finally {
@@ -250,9 +275,21 @@ test('calls that fail are answered, not died of', { skip }, async (t) => {
     await rm(folder, { recursive: true, force: true });
   }
   const stops = places.reduce((sum, place) => sum + place.stops, 0);
-  t.diagnostic(`${runner.faults} faults, ${runner.failed.length} failed; the daemon stopped by itself ${stops} times while it ran`);
+  t.diagnostic(
+    `${runner.faults} faults, ${runner.failed.length} failed; the daemon stopped by itself ${stops} times while it ran`,
+  );
   for (const kind of kinds)
-    t.diagnostic(`${kind}: ${Object.keys(phase_of).map((when) => `${runner.told[`${kind} ${when}`] ?? 0} ${when}`).join(', ')}`);
-  assert.deepEqual(runner.failed.map((message) => message.split('\n')[0]), []);
-  assert.ok(runner.faults > 0 && (all || runner.faults >= 0.8 * runner.planned), `only ${runner.faults} of ${runner.planned} faults were met`);
+    t.diagnostic(
+      `${kind}: ${Object.keys(phase_of)
+        .map((when) => `${runner.told[`${kind} ${when}`] ?? 0} ${when}`)
+        .join(', ')}`,
+    );
+  assert.deepEqual(
+    runner.failed.map((message) => message.split('\n')[0]),
+    [],
+  );
+  assert.ok(
+    runner.faults > 0 && (all || runner.faults >= 0.8 * runner.planned),
+    `only ${runner.faults} of ${runner.planned} faults were met`,
+  );
 });

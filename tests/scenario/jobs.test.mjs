@@ -7,7 +7,11 @@ import * as shapes from './support/shapes.mjs';
 
 /** A mesh that takes a while to embed, different for every seed. */
 async function heavy(d, seed = 1, levels = 6) {
-  const m = shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y + seed)), 1.5 * y + 0.4 * Math.sin(5 * x), z * (1 + 0.2 * Math.cos(9 * x))]);
+  const m = shapes.ball(levels, ([x, y, z]) => [
+    x * (1 + 0.3 * Math.sin(7 * y + seed)),
+    1.5 * y + 0.4 * Math.sin(5 * x),
+    z * (1 + 0.2 * Math.cos(9 * x)),
+  ]);
   const reply = await d.upload(shapes.binaryPly(m), { name: `heavy${seed}` });
   assert.equal(reply.status, 201, reply.bytes.toString());
   return reply.json;
@@ -30,7 +34,11 @@ test('a job can be waited for', async (t) => {
   assert.ok(Date.parse(done.json.finished) >= Date.parse(done.json.started));
   assert.equal((await d.get(done.json.result)).status, 200);
 
-  const prefer = await d.post('/v1/embeddings', { mesh: (await d.upload(shapes.obj(shapes.egg(2)))).json.id }, { headers: { prefer: 'wait=30' } });
+  const prefer = await d.post(
+    '/v1/embeddings',
+    { mesh: (await d.upload(shapes.obj(shapes.egg(2)))).json.id },
+    { headers: { prefer: 'wait=30' } },
+  );
   assert.equal(prefer.status, 200, 'Prefer: wait on the request itself brings the result');
   assert.equal(prefer.json.certificate.valid, true);
   assert.equal(prefer.headers.get('preference-applied'), 'wait=30');
@@ -38,7 +46,11 @@ test('a job can be waited for', async (t) => {
   assert.equal(header.json.state, 'succeeded');
   assert.equal(header.headers.get('preference-applied'), 'wait=5');
   for (const reply of [accepted, done]) assert.equal(reply.headers.get('preference-applied'), null, 'none was sent');
-  assert.equal((await d.get(accepted.json.url, { query: { wait: 999999 } })).status, 200, 'wait is clamped, not refused');
+  assert.equal(
+    (await d.get(accepted.json.url, { query: { wait: 999999 } })).status,
+    200,
+    'wait is clamped, not refused',
+  );
 });
 
 test('events tell the progress and the end, and resume', async (t) => {
@@ -48,7 +60,10 @@ test('events tell the progress and the end, and resume', async (t) => {
   const events = await d.get(`${job.url}/events`, { headers: { accept: 'text/event-stream' } });
   assert.equal(events.status, 200);
   assert.equal(events.type.split(';')[0], 'text/event-stream');
-  const list = events.bytes.toString().split('\n\n').filter((e) => /^event:/m.test(e));
+  const list = events.bytes
+    .toString()
+    .split('\n\n')
+    .filter((e) => /^event:/m.test(e));
   const names = list.map((e) => /^event: ?(\w+)/m.exec(e)[1]);
   assert.equal(names.at(-1), 'succeeded', names.join());
   assert.ok(names.slice(0, -1).every((n) => n === 'progress'));
@@ -85,11 +100,13 @@ test('a job is cancelled while it waits and while it runs', async (t) => {
 test('what only a cancelled job needed is cancelled with it, at whatever moment; what others want goes on', async (t) => {
   const d = await daemon(t, { args: ['--workers', '2'] });
   const [first, second] = [await heavy(d, 1, 5), await heavy(d, 2, 5)];
-  const work = async () => (({ queued, waiting, running }) => queued + waiting + running)((await d.get('/readyz?verbose')).json);
+  const work = async () =>
+    (({ queued, waiting, running }) => queued + waiting + running)((await d.get('/readyz?verbose')).json);
   const merge = { shapes: [first, second].map(({ id }) => ({ mesh: id })), embedding: endless };
   for (let i = 0; i < 24; i++) {
     const job = (await d.post('/v1/supermeshes', merge)).json;
-    if (i % 4 === 3) await until(async () => (await d.get('/readyz?verbose')).json.running === 2, 'both embeddings are made');
+    if (i % 4 === 3)
+      await until(async () => (await d.get('/readyz?verbose')).json.running === 2, 'both embeddings are made');
     else for (const end = performance.now() + (i % 12) / 2; performance.now() < end; ); // while it is taken, planned, put to wait
     const reply = await d.delete(job.url);
     assert.deepEqual([reply.status, reply.json.state], [200, 'cancelled']);
@@ -119,7 +136,8 @@ test('jobs are listed by state', async (t) => {
   const d = await daemon(t);
   const mesh = await d.mesh(path.join(samples, 'dog.obj'));
   await d.made('/v1/embeddings', { mesh: mesh.id });
-  const items = async (state) => Object.values((await d.get('/v1/jobs', { query: { state } })).json).find(Array.isArray);
+  const items = async (state) =>
+    Object.values((await d.get('/v1/jobs', { query: { state } })).json).find(Array.isArray);
   assert.equal((await items('succeeded')).length, 1);
   assert.equal((await items('failed')).length, 0);
   assertProblem(await d.get('/v1/jobs/nothing'), 404, 'not-found');
@@ -176,10 +194,21 @@ test('a full queue refuses new jobs and nothing else', async (t) => {
 test('the list of a state has the jobs that show it, also those that wait for what runs', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const meshes = [await heavy(d, 1, 5), await heavy(d, 2, 5), await heavy(d, 3, 5)];
-  const merge = (await d.post('/v1/supermeshes', { shapes: meshes.slice(0, 2).map(({ id }) => ({ mesh: id })), embedding: endless })).json;
+  const merge = (
+    await d.post('/v1/supermeshes', { shapes: meshes.slice(0, 2).map(({ id }) => ({ mesh: id })), embedding: endless })
+  ).json;
   await until(async () => (await d.get(merge.url)).json.state === 'running', 'what the merge needs runs');
   const behind = []; // asked for only now: which of several begins first is the queue's choice
-  for (let i = 0; i < 3; i++) behind.push((await d.post('/v1/embeddings', { mesh: meshes[2].id, ...endless, options: { ...endless.options, step: 0.01 + i / 1000 } })).json);
+  for (let i = 0; i < 3; i++)
+    behind.push(
+      (
+        await d.post('/v1/embeddings', {
+          mesh: meshes[2].id,
+          ...endless,
+          options: { ...endless.options, step: 0.01 + i / 1000 },
+        })
+      ).json,
+    );
   const list = async (state, limit) => {
     const found = [];
     for (let token; ; ) {

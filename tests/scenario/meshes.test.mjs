@@ -23,7 +23,14 @@ test('a mesh is known by its content', async (t) => {
   assert.equal(mesh.bytes, bytes.length);
   assert.equal(mesh.triangles, 2 * mesh.vertices - 4);
   assert.equal(mesh.triangles, 5600);
-  assert.deepEqual(mesh.topology, { ...mesh.topology, components: 1, genus: 0, boundary_loops: 0, nonmanifold_edges: 0, nonmanifold_vertices: 0 });
+  assert.deepEqual(mesh.topology, {
+    ...mesh.topology,
+    components: 1,
+    genus: 0,
+    boundary_loops: 0,
+    nonmanifold_edges: 0,
+    nonmanifold_vertices: 0,
+  });
   assert.deepEqual(mesh.repairs, []);
   assert.ok(Math.abs(Date.parse(mesh.created) - Date.now()) < 600_000);
 
@@ -80,7 +87,11 @@ test('safe repairs mend what changes no shape, and say so', async (t) => {
     assert.ok(reply.json.volume > 0, `${what}: the surface faces outwards`);
   };
   await mended(shapes.soup(m), 'weld', 'vertices at one place');
-  await mended(shapes.turned(m, (i) => i % 5 === 2), 'reorient', 'some faces turned');
+  await mended(
+    shapes.turned(m, (i) => i % 5 === 2),
+    'reorient',
+    'some faces turned',
+  );
   await mended(shapes.turned(m), 'turn-inside-out', 'all faces turned');
   await mended({ ...m, positions: [...m.positions, [9, 9, 9]] }, 'unused-vertices', 'a vertex without faces');
   await mended({ ...m, triangles: [...m.triangles, m.triangles[3]] }, 'duplicate-faces', 'a face twice');
@@ -117,13 +128,42 @@ test('bad meshes are refused with what is wrong and where', async (t) => {
   assert.match(open.detail, /3 edges in 1 boundary loop have a face on one side only\. Close the hole,/);
   assert.equal(open.boundary_loops, 1);
   assert.equal(open.boundary_edges.length, 3);
-  assert.deepEqual([...new Set(open.boundary_edges.flat())].sort((a, b) => a - b), [...m.triangles[0]].sort((a, b) => a - b));
+  assert.deepEqual(
+    [...new Set(open.boundary_edges.flat())].sort((a, b) => a - b),
+    [...m.triangles[0]].sort((a, b) => a - b),
+  );
   assert.equal((await refused(shapes.torus(), 422, 'not-genus-zero')).genus, 1);
   assert.deepEqual((await refused(shapes.apart(ball(2), ball(1)), 422, 'not-connected')).components, [128, 32]);
-  const along = { positions: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0], [0, 0, -1]], // two tetrahedra with an edge in common
-    triangles: [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3], [0, 4, 1], [0, 1, 5], [0, 5, 4], [1, 4, 5]] };
-  assert.deepEqual((await refused(along, 422, 'not-manifold')).edges.map((e) => [...e].sort()), [[0, 1]]);
-  await refused(shapes.turned(m, (i) => i === 5), 422, 'not-orientable', { repair: 'none' });
+  const along = {
+    positions: [
+      [0, 0, 0],
+      [1, 0, 0],
+      [0, 1, 0],
+      [0, 0, 1],
+      [0, -1, 0],
+      [0, 0, -1],
+    ], // two tetrahedra with an edge in common
+    triangles: [
+      [0, 2, 1],
+      [0, 1, 3],
+      [0, 3, 2],
+      [1, 2, 3],
+      [0, 4, 1],
+      [0, 1, 5],
+      [0, 5, 4],
+      [1, 4, 5],
+    ],
+  };
+  assert.deepEqual(
+    (await refused(along, 422, 'not-manifold')).edges.map((e) => [...e].sort()),
+    [[0, 1]],
+  );
+  await refused(
+    shapes.turned(m, (i) => i === 5),
+    422,
+    'not-orientable',
+    { repair: 'none' },
+  );
   await refused(obj(m).replace('v 1 0 0', 'v nan 0 0'), 422, 'not-finite');
   const grown = (scale, shift = 0) => ({ ...m, positions: m.positions.map((p) => p.map((x) => x * scale + shift)) });
   for (const scale of [1.1e30, 1e100, 1e150, 1e200, 1e308]) {
@@ -131,7 +171,8 @@ test('bad meshes are refused with what is wrong and where', async (t) => {
     assert.match(far.detail, /scale the mesh down/);
     assert.ok(far.vertex_count > 0);
   }
-  for (const scale of [1e-31, 1e-40, 1e-200]) assert.match((await refused(grown(scale), 422, 'degenerate')).detail, /scale it up/);
+  for (const scale of [1e-31, 1e-40, 1e-200])
+    assert.match((await refused(grown(scale), 422, 'degenerate')).detail, /scale it up/);
   assert.match((await refused(grown(1, 1e9), 422, 'degenerate')).detail, /move it to the origin/);
   const line = await refused(obj(m).replace(/\nf (\d+)/, '\nf 99999'), 400, 'malformed-mesh');
   assert.equal(line.line, m.positions.length + 1);
@@ -146,9 +187,17 @@ test('bad meshes are refused with what is wrong and where', async (t) => {
 
 test('cut and scrambled files never do harm', async (t) => {
   const d = await daemon(t);
-  const files = [Buffer.from(obj(ball(1))), Buffer.from(shapes.off(ball(1))), shapes.binaryPly(ball(1)), shapes.binaryStl(ball(1))];
+  const files = [
+    Buffer.from(obj(ball(1))),
+    Buffer.from(shapes.off(ball(1))),
+    shapes.binaryPly(ball(1)),
+    shapes.binaryStl(ball(1)),
+  ];
   let seed = 12345;
-  const random = (n) => ((seed = (Math.imul(seed, 1103515245) + 12345) >>> 0), seed % n);
+  const random = (n) => {
+    seed = (Math.imul(seed, 1103515245) + 12345) >>> 0;
+    return seed % n;
+  };
   for (const file of files)
     for (let i = 0; i < 25; i++) {
       const bytes = Buffer.from(file.subarray(0, 1 + random(file.length)));
@@ -162,9 +211,11 @@ test('cut and scrambled files never do harm', async (t) => {
 test('lists come in pages; what is deleted is gone', async (t) => {
   const d = await daemon(t);
   const ids = [];
-  for (let i = 0; i < 5; i++) ids.push((await d.upload(shapes.tetrahedron.replace('v 1 0 0', `v ${i + 1} 0 0`), { name: `t${i}` })).json.id);
+  for (let i = 0; i < 5; i++)
+    ids.push((await d.upload(shapes.tetrahedron.replace('v 1 0 0', `v ${i + 1} 0 0`), { name: `t${i}` })).json.id);
   const seen = [];
-  let token, pages = 0;
+  let token;
+  let pages = 0;
   do {
     const page = (await d.get('/v1/meshes', { query: { limit: 2, ...(token ? { page_token: token } : {}) } })).json;
     const items = Object.values(page).find(Array.isArray);
@@ -184,12 +235,14 @@ test('lists come in pages; what is deleted is gone', async (t) => {
 test('uploads of many megabytes are checked beside the small ones', async (t) => {
   // One worker: one thread checks what has more than 16 MB, another the rest.
   const d = await daemon(t, { args: ['--workers', '1'] });
-  const shape = shapes.ball(8, ([x, y, z]) => [x, 1.5 * y, z * (1 + 0.2 * x)]), text = shapes.obj(shape);
+  const shape = shapes.ball(8, ([x, y, z]) => [x, 1.5 * y, z * (1 + 0.2 * x)]);
+  const text = shapes.obj(shape);
   assert.ok(text.length > 20 << 20, `${text.length} bytes`);
   let ended = 0;
   const large = (slow ? [0, 1] : [0, 1, 2, 3]).map((i) => d.upload(`# ${i}\n${text}`).finally(() => ended++));
   // Once the first large one is in, it is being checked and the other waits; each small one is answered all the same.
-  const received = async () => Number(/^orbmorph_received_bytes_total (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
+  const received = async () =>
+    Number(/^orbmorph_received_bytes_total (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
   while (ended === 0 && (await received()) < text.length) await new Promise((done) => setTimeout(done, 20));
   let between = 0;
   for (let i = 0; ended < large.length; i++) {

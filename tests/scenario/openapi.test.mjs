@@ -16,8 +16,14 @@ const VERBS = ['get', 'post', 'put', 'patch', 'delete'];
 
 /** Validates values against the schemas of the document. */
 function validators() {
-  const ajv = new Ajv2020.default({ strict: true, allowUnionTypes: true, strictRequired: false, strictTypes: false, allErrors: true,
-    formats: { 'date-time': true, 'uri-reference': true } });
+  const ajv = new Ajv2020.default({
+    strict: true,
+    allowUnionTypes: true,
+    strictRequired: false,
+    strictTypes: false,
+    allErrors: true,
+    formats: { 'date-time': true, 'uri-reference': true },
+  });
   const moved = (value) => JSON.parse(JSON.stringify(value).replaceAll('#/components/schemas/', 'document#/$defs/'));
   ajv.addSchema({ $id: 'document', $defs: moved(document.components.schemas) });
   const made = new Map();
@@ -27,16 +33,32 @@ function validators() {
     const check = made.get(key);
     const fine = check(value);
     // Of the alternatives of a problem, report the errors of the one that its type names.
-    const meant = /^\/problems\//.test(value?.type) ? `/Problem${value.type.slice(10).replace(/(^|-)(.)/g, (_, __, c) => c.toUpperCase())}/` : '';
+    const meant = /^\/problems\//.test(value?.type)
+      ? `/Problem${value.type.slice(10).replace(/(^|-)(.)/g, (_, __, c) => c.toUpperCase())}/`
+      : '';
     const errors = (check.errors ?? []).filter((e) => e.schemaPath.includes(meant)).slice(0, 6);
     assert.ok(fine, `${what}\n${JSON.stringify(errors)}\n${JSON.stringify(value).slice(0, 1500)}`);
   };
 }
 const validate = validators();
-const resolve = (o) => (o.$ref ? o.$ref.split('/').slice(1).reduce((at, name) => at[name], document) : o);
+const resolve = (o) =>
+  o.$ref
+    ? o.$ref
+        .split('/')
+        .slice(1)
+        .reduce((at, name) => at[name], document)
+    : o;
 
 // Headers of HTTP itself.
-const PLAIN = ['content-type', 'content-length', 'date', 'connection', 'keep-alive', 'transfer-encoding', 'x-content-type-options'];
+const PLAIN = [
+  'content-type',
+  'content-length',
+  'date',
+  'connection',
+  'keep-alive',
+  'transfer-encoding',
+  'x-content-type-options',
+];
 
 // Each operation and status that a test of this file has seen.
 const seen = new Set();
@@ -48,7 +70,8 @@ function hold(reply, method, target) {
   assert.ok(entry, `${what} is not in the document: ${reply.bytes.toString().slice(0, 300)}`);
   const described = resolve(entry);
   const names = Object.keys(described.headers ?? {}).map((name) => name.toLowerCase());
-  for (const [name] of reply.headers) assert.ok(PLAIN.includes(name) || names.includes(name), `${what}: the header ${name} is not in the document`);
+  for (const [name] of reply.headers)
+    assert.ok(PLAIN.includes(name) || names.includes(name), `${what}: the header ${name} is not in the document`);
   for (const [name, header] of Object.entries(described.headers ?? {})) {
     const value = reply.headers.get(name);
     const { schema } = resolve(header);
@@ -68,7 +91,11 @@ function hold(reply, method, target) {
 /** Requests to a daemon, each answer of which is checked against the document. */
 function held(d) {
   const ask = async (method, target, { id, body, query, headers } = {}) =>
-    hold(await d.request(method, target.replace(/\{k\}/, 0).replace(/\{\w+\}/, id), { body, query, headers }), method, target);
+    hold(
+      await d.request(method, target.replace(/\{k\}/, 0).replace(/\{\w+\}/, id), { body, query, headers }),
+      method,
+      target,
+    );
   const upload = (bytes, query) => ask('POST', '/v1/meshes', { body: Buffer.from(bytes), query });
   return { ask, upload };
 }
@@ -81,7 +108,13 @@ function bare(d, method, target, headers, body) {
       answer.on('data', (part) => parts.push(part));
       answer.on('end', () => {
         const bytes = Buffer.concat(parts);
-        done({ status: answer.statusCode, type: answer.headers['content-type'] ?? '', bytes, headers: new Headers(Object.entries(answer.headers)), json: JSON.parse(bytes) });
+        done({
+          status: answer.statusCode,
+          type: answer.headers['content-type'] ?? '',
+          bytes,
+          headers: new Headers(Object.entries(answer.headers)),
+          json: JSON.parse(bytes),
+        });
       });
     });
     r.useChunkedEncodingByDefault = false;
@@ -93,7 +126,8 @@ function bare(d, method, target, headers, body) {
 test('the document is valid, and its examples match their schemas', () => {
   assert.match(document.openapi, /^3\.1\./);
   for (const [name, schema] of Object.entries(document.components.schemas))
-    for (const example of schema.examples ?? []) validate({ $ref: `#/components/schemas/${name}` }, example, `example of ${name}`);
+    for (const example of schema.examples ?? [])
+      validate({ $ref: `#/components/schemas/${name}` }, example, `example of ${name}`);
   const ids = new Set();
   for (const [target, item] of Object.entries(document.paths))
     for (const verb of VERBS.filter((v) => item[v])) {
@@ -102,11 +136,19 @@ test('the document is valid, and its examples match their schemas', () => {
       ids.add(operation.operationId);
       const parameters = [...(item.parameters ?? []), ...(operation.parameters ?? [])].map(resolve);
       const inPath = parameters.filter((p) => p.in === 'path').map((p) => p.name);
-      assert.deepEqual(inPath, [...target.matchAll(/\{(\w+)\}/g)].map((m) => m[1]), target);
+      assert.deepEqual(
+        inPath,
+        [...target.matchAll(/\{(\w+)\}/g)].map((m) => m[1]),
+        target,
+      );
       for (const p of parameters) validate(p.schema, p.example, `${verb} ${target}: ${p.name}`);
-      for (const content of [operation.requestBody, ...Object.values(operation.responses).map(resolve)].map((r) => r?.content ?? {}))
+      for (const content of [operation.requestBody, ...Object.values(operation.responses).map(resolve)].map(
+        (r) => r?.content ?? {},
+      ))
         for (const media of Object.values(content)) {
-          const examples = media.examples ? Object.values(media.examples).map((e) => resolve(e).value) : [media.example];
+          const examples = media.examples
+            ? Object.values(media.examples).map((e) => resolve(e).value)
+            : [media.example];
           for (const example of examples) {
             assert.notEqual(example, undefined, `${verb} ${target} has no example`);
             validate(media.schema, example, `${verb} ${target}`);
@@ -117,24 +159,41 @@ test('the document is valid, and its examples match their schemas', () => {
 
 test('every reference leads somewhere, and every component is used', () => {
   const used = new Set([...JSON.stringify(document).matchAll(/"\$ref":"#\/components\/([^"]+)"/g)].map((m) => m[1]));
-  const named = ['parameters', 'headers', 'responses', 'schemas', 'examples'].flatMap((kind) => Object.keys(document.components[kind]).map((name) => `${kind}/${name}`));
+  const named = ['parameters', 'headers', 'responses', 'schemas', 'examples'].flatMap((kind) =>
+    Object.keys(document.components[kind]).map((name) => `${kind}/${name}`),
+  );
   assert.deepEqual([...used].sort(), named.sort());
 });
 
 test('every problem has an example whose detail says more than its title', async () => {
-  const table = (await readFile(path.join(root, 'api/problem.c'), 'utf8')).match(/table\[\] = \{\n([^]*?)\n\};/)[1];
-  const titles = new Map([...table.matchAll(/\{"([a-z-]+)", (\d{3}), "([^"]+)"\}/g)].map((m) => [`/problems/${m[1]}`, { status: Number(m[2]), title: m[3] }]));
+  const table = (await readFile(path.join(root, 'api/problem.c'), 'utf8')).match(/table\[\] = \{\n([\s\S]*?)\n\};/)[1];
+  const titles = new Map(
+    [...table.matchAll(/\{"([a-z-]+)", (\d{3}), "([^"]+)"\}/g)].map((m) => [
+      `/problems/${m[1]}`,
+      { status: Number(m[2]), title: m[3] },
+    ]),
+  );
   const schemas = document.components.schemas;
-  const examples = [...Object.values(document.components.examples).map((e) => e.value), ...Object.values(schemas).flatMap((s) => s.examples ?? [])];
+  const examples = [
+    ...Object.values(document.components.examples).map((e) => e.value),
+    ...Object.values(schemas).flatMap((s) => s.examples ?? []),
+  ];
   const problems = examples.filter((e) => /^\/problems\//.test(e.type));
   const known = schemas.Problem.oneOf.map((s) => resolve(s).properties);
   for (const { type, title, status } of known) {
     assert.deepEqual({ title: title.const, status: status.const }, titles.get(type.const), type.const);
-    assert.ok(problems.some((p) => p.type === type.const), `${type.const} has no example`);
+    assert.ok(
+      problems.some((p) => p.type === type.const),
+      `${type.const} has no example`,
+    );
   }
   for (const { type, title, detail } of problems) {
     assert.match(detail, /^\S.*[.]$/, type);
-    const words = (text) => text.toLowerCase().replace(/[^a-z ]/g, '').trim();
+    const words = (text) =>
+      text
+        .toLowerCase()
+        .replace(/[^a-z ]/g, '')
+        .trim();
     assert.ok(!words(title).includes(words(detail)), `${type}: the detail repeats the title`);
     assert.ok(detail.length > title.length, `${type}: ${detail}`);
   }
@@ -145,7 +204,9 @@ test('the document and the daemon know the same paths and methods', async (t) =>
   const d = await daemon(t);
   const table = await readFile(path.join(root, 'api/routes.h'), 'utf8');
   const routes = [...table.matchAll(/ROUTE\(ROUTE_\w+, "(\w+)", "([^"]+)"/g)].map((m) => `${m[1]} ${m[2]}`).sort();
-  const described = Object.entries(document.paths).flatMap(([target, item]) => VERBS.filter((v) => item[v]).map((v) => `${v.toUpperCase()} ${target}`)).sort();
+  const described = Object.entries(document.paths)
+    .flatMap(([target, item]) => VERBS.filter((v) => item[v]).map((v) => `${v.toUpperCase()} ${target}`))
+    .sort();
   assert.ok(routes.length > 20);
   assert.deepEqual(described, routes);
   for (const [target, item] of Object.entries(document.paths)) {
@@ -166,7 +227,8 @@ test('the document and the daemon know the same paths and methods', async (t) =>
 test('answers about meshes', async (t) => {
   const d = await daemon(t);
   const { ask, upload } = held(d);
-  const { obj, ball } = shapes, m = ball(2);
+  const { obj, ball } = shapes;
+  const m = ball(2);
   for (const file of ['dog.obj', 'giraffe.off', 'elephant.ply']) {
     const bytes = await readFile(path.join(samples, file));
     const first = await upload(bytes, { name: file });
@@ -176,32 +238,76 @@ test('answers about meshes', async (t) => {
     const id = first.json.id;
     const etag = (await ask('GET', '/v1/meshes/{id}', { id })).headers.get('etag');
     assert.equal((await ask('GET', '/v1/meshes/{id}', { id, headers: { 'if-none-match': etag } })).status, 304);
-    for (const method of ['GET', 'DELETE']) assert.equal((await ask(method, '/v1/meshes/{id}', { id, headers: { 'if-match': '"x"' } })).status, 412);
+    for (const method of ['GET', 'DELETE'])
+      assert.equal((await ask(method, '/v1/meshes/{id}', { id, headers: { 'if-match': '"x"' } })).status, 412);
     const whole = await ask('GET', '/v1/meshes/{id}/file', { id });
     assert.ok(whole.bytes.equals(bytes));
-    for (const [headers, status] of [[{ range: 'bytes=0-9' }, 206], [{ range: `bytes=${bytes.length}-` }, 416],
-      [{ 'if-match': '"other"' }, 412], [{ 'if-match': `W/${whole.headers.get('etag')}` }, 412], [{ 'if-match': whole.headers.get('etag') }, 200], [{ 'if-none-match': whole.headers.get('etag') }, 304]])
+    for (const [headers, status] of [
+      [{ range: 'bytes=0-9' }, 206],
+      [{ range: `bytes=${bytes.length}-` }, 416],
+      [{ 'if-match': '"other"' }, 412],
+      [{ 'if-match': `W/${whole.headers.get('etag')}` }, 412],
+      [{ 'if-match': whole.headers.get('etag') }, 200],
+      [{ 'if-none-match': whole.headers.get('etag') }, 304],
+    ])
       assert.equal((await ask('GET', '/v1/meshes/{id}/file', { id, headers })).status, status);
   }
   const page = await ask('GET', '/v1/meshes', { query: { limit: 1 } });
-  assert.equal((await ask('GET', '/v1/meshes', { query: { limit: 1, page_token: page.json.next_page_token } })).json.meshes.length, 1);
+  assert.equal(
+    (await ask('GET', '/v1/meshes', { query: { limit: 1, page_token: page.json.next_page_token } })).json.meshes.length,
+    1,
+  );
   await ask('GET', '/v1/meshes', { query: { limit: 'x' } });
 
-  const two = obj(shapes.apart(ball(1), m)), hole = obj(shapes.withoutFace(m));
-  const along = obj({ positions: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]], triangles: [[0, 1, 2], [1, 0, 3], [0, 1, 4]] });
-  const edits = [[obj(shapes.soup(m))], [shapes.cube], [hole, { repair: 'fill_holes' }], [two, { repair: 'largest_component' }],
-    [obj(shapes.turned(m, (i) => i % 3 === 0))], [obj(shapes.turned(m))], [`${obj(m)}v 9 9 9\nf 1 1 2\n`]];
+  const two = obj(shapes.apart(ball(1), m));
+  const hole = obj(shapes.withoutFace(m));
+  const along = obj({
+    positions: [
+      [0, 0, 0],
+      [1, 0, 0],
+      [0, 1, 0],
+      [0, 0, 1],
+      [0, -1, 0],
+    ],
+    triangles: [
+      [0, 1, 2],
+      [1, 0, 3],
+      [0, 1, 4],
+    ],
+  });
+  const edits = [
+    [obj(shapes.soup(m))],
+    [shapes.cube],
+    [hole, { repair: 'fill_holes' }],
+    [two, { repair: 'largest_component' }],
+    [obj(shapes.turned(m, (i) => i % 3 === 0))],
+    [obj(shapes.turned(m))],
+    [`${obj(m)}v 9 9 9\nf 1 1 2\n`],
+  ];
   for (const [text, query] of edits) {
     const reply = await upload(text, query);
     assert.equal(reply.status, 201, reply.bytes.toString());
   }
-  const refusals = [['not-closed', hole], ['not-connected', two], ['not-genus-zero', obj(shapes.torus())], ['not-manifold', along],
-    ['not-orientable', obj(shapes.turned(m, (i) => i === 5)), { repair: 'none' }], ['not-finite', obj(m).replace('v 1 0 0', 'v nan 0 0')],
-    ['degenerate', 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n'], ['malformed-mesh', 'OFF\n4 4 0\n0 0 0\n'],
-    ['malformed-mesh', shapes.binaryPly(m).subarray(0, 400)], ['unknown-format', Buffer.from([0, 1, 2, 3, 255, 254, 7, 9])],
-    ['bad-query', obj(m), { repair: 'magic' }]];
-  for (const [name, bytes, query] of refusals) assert.equal((await upload(bytes, query)).json.type, `/problems/${name}`);
-  const encoded = hold(await bare(d, 'POST', '/v1/meshes', { 'content-encoding': 'br', 'content-length': 10 }), 'POST', '/v1/meshes');
+  const refusals = [
+    ['not-closed', hole],
+    ['not-connected', two],
+    ['not-genus-zero', obj(shapes.torus())],
+    ['not-manifold', along],
+    ['not-orientable', obj(shapes.turned(m, (i) => i === 5)), { repair: 'none' }],
+    ['not-finite', obj(m).replace('v 1 0 0', 'v nan 0 0')],
+    ['degenerate', 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n'],
+    ['malformed-mesh', 'OFF\n4 4 0\n0 0 0\n'],
+    ['malformed-mesh', shapes.binaryPly(m).subarray(0, 400)],
+    ['unknown-format', Buffer.from([0, 1, 2, 3, 255, 254, 7, 9])],
+    ['bad-query', obj(m), { repair: 'magic' }],
+  ];
+  for (const [name, bytes, query] of refusals)
+    assert.equal((await upload(bytes, query)).json.type, `/problems/${name}`);
+  const encoded = hold(
+    await bare(d, 'POST', '/v1/meshes', { 'content-encoding': 'br', 'content-length': 10 }),
+    'POST',
+    '/v1/meshes',
+  );
   assert.equal(encoded.status, 415);
   const coded = (body) => ask('POST', '/v1/meshes', { body, headers: { 'content-encoding': 'gzip' } });
   assert.equal((await coded(gzipSync(shapes.tetrahedron))).status, 201);
@@ -210,7 +316,11 @@ test('answers about meshes', async (t) => {
   assert.equal(hold(await bare(d, 'POST', '/v1/meshes', {}), 'POST', '/v1/meshes').status, 411);
   const { id } = (await upload(shapes.tetrahedron)).json;
   assert.equal((await ask('DELETE', '/v1/meshes/{id}', { id })).status, 204);
-  for (const [method, target] of [['DELETE', '/v1/meshes/{id}'], ['GET', '/v1/meshes/{id}'], ['GET', '/v1/meshes/{id}/file']])
+  for (const [method, target] of [
+    ['DELETE', '/v1/meshes/{id}'],
+    ['GET', '/v1/meshes/{id}'],
+    ['GET', '/v1/meshes/{id}/file'],
+  ])
     assert.equal((await ask(method, target, { id })).status, 404);
 });
 
@@ -229,25 +339,45 @@ test('answers about embeddings, supermeshes and jobs', async (t) => {
     while (job.finished === null) job = (await ask('GET', '/v1/jobs/{job}', { id: job.id, query: { wait: 20 } })).json;
     return job;
   };
-  const pair = of(...small), three = [0, 1, 2].map((k) => ({ at: [{ point: [1 - k, k, 0] }, { vertex: k }] }));
+  const pair = of(...small);
+  const three = [0, 1, 2].map((k) => ({ at: [{ point: [1 - k, k, 0] }, { vertex: k }] }));
 
   const wanted = [
-    ['embeddings', { mesh: meshes[0].id }], ['embeddings', { mesh: small[0].id, method: 'kernel-sampling', options: { growth: 1.5 } }],
+    ['embeddings', { mesh: meshes[0].id }],
+    ['embeddings', { mesh: small[0].id, method: 'kernel-sampling', options: { growth: 1.5 } }],
     ['embeddings', { mesh: meshes[1].id, options: { preset: 'quality', energy_weight: 0.5 } }],
-    ['supermeshes', { shapes: of(meshes[0], meshes[1]), landmarks, remesh: { max_triangles: 8000 }, asset: { fit: 'similarity' } }],
-    ['supermeshes', { shapes: pair }], ['supermeshes', { shapes: pair, align: { method: 'rotate' }, embedding: { options: { preset: 'fast' } } }],
-    ['supermeshes', { shapes: pair, remesh: { method: 'overlay' }, asset: { animation: 'none', normals: false, path: 'rigid' } }],
-    ['supermeshes', { shapes: pair, remesh: { method: 'subdivision', tolerance: 0.01 } }], ['supermeshes', { shapes: pair, remesh: { method: 'convex-hull' } }],
-    ['supermeshes', { shapes: pair, landmarks: three, align: { method: 'rbf', options: { steps: 5, one_way: true, radius: 0.5, preset: 'fast' } } }]];
+    [
+      'supermeshes',
+      { shapes: of(meshes[0], meshes[1]), landmarks, remesh: { max_triangles: 8000 }, asset: { fit: 'similarity' } },
+    ],
+    ['supermeshes', { shapes: pair }],
+    ['supermeshes', { shapes: pair, align: { method: 'rotate' }, embedding: { options: { preset: 'fast' } } }],
+    [
+      'supermeshes',
+      { shapes: pair, remesh: { method: 'overlay' }, asset: { animation: 'none', normals: false, path: 'rigid' } },
+    ],
+    ['supermeshes', { shapes: pair, remesh: { method: 'subdivision', tolerance: 0.01 } }],
+    ['supermeshes', { shapes: pair, remesh: { method: 'convex-hull' } }],
+    [
+      'supermeshes',
+      {
+        shapes: pair,
+        landmarks: three,
+        align: { method: 'rbf', options: { steps: 5, one_way: true, radius: 0.5, preset: 'fast' } },
+      },
+    ],
+  ];
   for (const [kind, body] of wanted) {
     const sent = await create(kind, body);
     if (sent.json.type === '/problems/unsupported-method') continue; // of a build without it
     assert.equal(sent.status, 202, sent.bytes.toString());
     assert.equal(sent.headers.get('location'), sent.json.url);
     assert.ok(sent.headers.get('retry-after'));
-    const job = await end(sent), what = JSON.stringify(body).slice(0, 300);
+    const job = await end(sent);
+    const what = JSON.stringify(body).slice(0, 300);
     const events = await ask('GET', '/v1/jobs/{job}/events', { id: job.id });
-    for (const [, data] of events.bytes.toString().matchAll(/^data: (.*)$/gm)) validate({ $ref: '#/components/schemas/Job' }, JSON.parse(data), `event of ${what}`);
+    for (const [, data] of events.bytes.toString().matchAll(/^data: (.*)$/gm))
+      validate({ $ref: '#/components/schemas/Job' }, JSON.parse(data), `event of ${what}`);
     if (!body.align?.options) assert.equal(job.state, 'succeeded', `${what} ${JSON.stringify(job.problem)}`);
     if (job.state !== 'succeeded') continue;
     const made = await create(kind, body, { query: { wait: 1 } });
@@ -255,54 +385,87 @@ test('answers about embeddings, supermeshes and jobs', async (t) => {
     const { id } = made.json;
     assert.equal((await ask('GET', `/v1/${kind}/{id}`, { id })).status, 200);
     assert.equal((await ask('GET', `/v1/${kind}/{id}`, { id, headers: { 'if-none-match': '*' } })).status, 304);
-    for (const method of ['GET', 'DELETE']) assert.equal((await ask(method, `/v1/${kind}/{id}`, { id, headers: { 'if-match': '"x"' } })).status, 412);
+    for (const method of ['GET', 'DELETE'])
+      assert.equal((await ask(method, `/v1/${kind}/{id}`, { id, headers: { 'if-match': '"x"' } })).status, 412);
     const files = kind === 'embeddings' ? ['sphere.ply'] : ['asset.glb', 'places', 'spheres/{k}.ply'];
-    for (const file of files.map((name) => `/v1/${kind}/{id}/${name}`)) for (const [headers, status] of [[{}, 200], [{ range: 'bytes=0-9' }, 206], [{ range: 'bytes=999999999-' }, 416], [{ 'if-match': '"x"' }, 412], [{ 'if-none-match': '*' }, 304]])
-      assert.equal((await ask('GET', file, { id, headers })).status, status);
-    if (kind === 'supermeshes') assert.equal((await create(kind, made.json.request)).json.id, id, 'the request of the answer names the same');
+    for (const file of files.map((name) => `/v1/${kind}/{id}/${name}`))
+      for (const [headers, status] of [
+        [{}, 200],
+        [{ range: 'bytes=0-9' }, 206],
+        [{ range: 'bytes=999999999-' }, 416],
+        [{ 'if-match': '"x"' }, 412],
+        [{ 'if-none-match': '*' }, 304],
+      ])
+        assert.equal((await ask('GET', file, { id, headers })).status, status);
+    if (kind === 'supermeshes')
+      assert.equal((await create(kind, made.json.request)).json.id, id, 'the request of the answer names the same');
   }
 
-  const [kept] = wanted[0].slice(1), none = '0'.repeat(64);
-  const refusals = [['embeddings', 'not-found', { mesh: none }], ['embeddings', 'bad-option', { ...kept, options: { growth: 0 } }],
-    ['embeddings', 'unknown-member', { ...kept, colour: 1 }], ['embeddings', 'invalid-request', []], ['embeddings', 'malformed-json', Buffer.from('{')],
+  const [kept] = wanted[0].slice(1);
+  const none = '0'.repeat(64);
+  const refusals = [
+    ['embeddings', 'not-found', { mesh: none }],
+    ['embeddings', 'bad-option', { ...kept, options: { growth: 0 } }],
+    ['embeddings', 'unknown-member', { ...kept, colour: 1 }],
+    ['embeddings', 'invalid-request', []],
+    ['embeddings', 'malformed-json', Buffer.from('{')],
     ['supermeshes', 'invalid-request', { shapes: [] }],
-    ['supermeshes', 'not-found', { shapes: of(small[0], { id: none }) }], ['supermeshes', 'bad-landmarks', { shapes: pair, align: { method: 'pin' } }],
+    ['supermeshes', 'not-found', { shapes: of(small[0], { id: none }) }],
+    ['supermeshes', 'bad-landmarks', { shapes: pair, align: { method: 'pin' } }],
     ['supermeshes', 'bad-landmarks', { shapes: pair, landmarks: [{ at: [{ vertex: 0 }, { vertex: 999999 }] }] }],
     ['supermeshes', 'bad-landmarks', { shapes: pair, landmarks: [{ at: [{ vertex: 0 }, { vertex: 0.5 }] }] }],
-    ['supermeshes', 'unknown-member', { shapes: pair, remesh: { tolerence: 1 } }], ['supermeshes', 'unknown-member', { shapes: pair, align: { options: { seed: 3 } } }], ['supermeshes', 'malformed-json', Buffer.from('')]];
-  for (const [kind, name, body] of refusals) assert.equal((await create(kind, body)).json.type, `/problems/${name}`, JSON.stringify(body).slice(0, 200));
+    ['supermeshes', 'unknown-member', { shapes: pair, remesh: { tolerence: 1 } }],
+    ['supermeshes', 'unknown-member', { shapes: pair, align: { options: { seed: 3 } } }],
+    ['supermeshes', 'malformed-json', Buffer.from('')],
+  ];
+  for (const [kind, name, body] of refusals)
+    assert.equal((await create(kind, body)).json.type, `/problems/${name}`, JSON.stringify(body).slice(0, 200));
   assert.equal((await create('embeddings', kept, { query: { wait: 'long' } })).status, 400);
   // Refused by its headers: the body is never sent, for the connection closes.
   const large = await bare(d, 'POST', '/v1/embeddings', { 'content-length': 1_100_000 });
   assert.equal(hold(large, 'POST', '/v1/embeddings').json.type, '/problems/too-large');
-  const clash = await create('supermeshes', { shapes: pair, landmarks: [{ at: [{ vertex: 0 }, { vertex: 0 }] }, { at: [{ vertex: 0 }, { vertex: 1 }] }] });
+  const clash = await create('supermeshes', {
+    shapes: pair,
+    landmarks: [{ at: [{ vertex: 0 }, { vertex: 0 }] }, { at: [{ vertex: 0 }, { vertex: 1 }] }],
+  });
   const failed = clash.status === 202 ? await end(clash) : { problem: clash.json };
   assert.equal(failed.problem.type, '/problems/bad-landmarks');
 
   // One worker: the second waits, and holds its mesh, until it is cancelled.
   const long = await create('supermeshes', { shapes: of(...meshes), embedding: endless, asset: { colors: true } });
-  const queued = await create('embeddings', { mesh: meshes[2].id, method: 'kernel-sampling', options: { ...endless.options, growth: 1.02 } });
+  const queued = await create('embeddings', {
+    mesh: meshes[2].id,
+    method: 'kernel-sampling',
+    options: { ...endless.options, growth: 1.02 },
+  });
   assert.equal((await ask('DELETE', '/v1/meshes/{id}', { id: meshes[2].id })).status, 409);
   assert.equal((await ask('GET', '/v1/jobs', { query: { limit: 2 } })).json.jobs.length, 2);
-  for (const { json } of [queued, long]) assert.equal((await ask('DELETE', '/v1/jobs/{job}', { id: json.id })).status, 200);
+  for (const { json } of [queued, long])
+    assert.equal((await ask('DELETE', '/v1/jobs/{job}', { id: json.id })).status, 200);
   assert.equal((await ask('GET', '/v1/jobs', { query: { state: 'cancelled' } })).status, 200);
   assert.equal((await ask('GET', '/v1/jobs', { query: { state: 'lost' } })).status, 400);
   const done = (await ask('GET', '/v1/jobs', { query: { state: 'succeeded' } })).json.jobs[0];
   assert.equal((await ask('DELETE', '/v1/jobs/{job}', { id: done.id })).status, 409);
-  for (const [method, target] of [['GET', '/v1/jobs/{job}'], ['DELETE', '/v1/jobs/{job}'], ['GET', '/v1/jobs/{job}/events']])
+  for (const [method, target] of [
+    ['GET', '/v1/jobs/{job}'],
+    ['DELETE', '/v1/jobs/{job}'],
+    ['GET', '/v1/jobs/{job}/events'],
+  ])
     assert.equal((await ask(method, target, { id: '0'.repeat(32) })).status, 404);
   for (const kind of ['embeddings', 'supermeshes']) {
     const { json } = await ask('GET', `/v1/${kind}`, { query: { limit: 2 } });
     assert.equal(json[kind].length, 2);
     assert.equal((await ask('DELETE', `/v1/${kind}/{id}`, { id: json[kind][0].id })).status, 204);
-    for (const method of ['GET', 'DELETE']) assert.equal((await ask(method, `/v1/${kind}/{id}`, { id: json[kind][0].id })).status, 404);
+    for (const method of ['GET', 'DELETE'])
+      assert.equal((await ask(method, `/v1/${kind}/{id}`, { id: json[kind][0].id })).status, 404);
   }
 });
 
 test('answers about the daemon itself', async (t) => {
   const d = await daemon(t);
   const { ask } = held(d);
-  for (const target of ['/livez', '/readyz', '/metrics', '/docs', '/']) assert.equal((await ask('GET', target)).status, 200);
+  for (const target of ['/livez', '/readyz', '/metrics', '/docs', '/'])
+    assert.equal((await ask('GET', target)).status, 200);
   assert.deepEqual((await ask('GET', '/openapi.json')).json, document);
   assert.ok('workers' in (await ask('GET', '/readyz', { query: { verbose: '' } })).json);
   const refused = hold(await bare(d, 'GET', '/livez', { 'content-length': 2 }, 'ab'), 'GET', '/livez');
@@ -318,20 +481,39 @@ test('answers to callers without the right token', async (t) => {
   const d = await daemon(t, { args: ['--auth', 'on'] });
   await d.stop();
   const make = async (name, scope, ...more) => {
-    const { stdout } = await promisify(execFile)(binaries.daemon, ['token', 'add', name, '--scope', scope, ...more, '--data', d.data]);
+    const { stdout } = await promisify(execFile)(binaries.daemon, [
+      'token',
+      'add',
+      name,
+      '--scope',
+      scope,
+      ...more,
+      '--data',
+      d.data,
+    ]);
     return { authorization: `Bearer ${stdout.trim()}` };
   };
-  const read = await make('read', 'read'), write = await make('write', 'write', '--quota', '9');
+  const read = await make('read', 'read');
+  const write = await make('write', 'write', '--quota', '9');
   await d.start();
   const { ask } = held(d);
   for (const [target, item] of Object.entries(document.paths))
     for (const verb of VERBS.filter((v) => item[v])) {
-      const id = target.includes('{job}') ? '0'.repeat(32) : '0'.repeat(64), body = verb === 'post' ? Buffer.from('{}') : undefined;
-      const guarded = Boolean(item[verb].security), scope = /scope (\w+)/.exec(item[verb].description)?.[1];
+      const id = target.includes('{job}') ? '0'.repeat(32) : '0'.repeat(64);
+      const body = verb === 'post' ? Buffer.from('{}') : undefined;
+      const guarded = Boolean(item[verb].security);
+      const scope = /scope (\w+)/.exec(item[verb].description)?.[1];
       assert.equal((await ask(verb.toUpperCase(), target, { id, body })).status === 401, guarded, `${verb} ${target}`);
-      for (const [name, headers] of [['read', read], ['write', write]]) {
+      for (const [name, headers] of [
+        ['read', read],
+        ['write', write],
+      ]) {
         const reply = await ask(verb.toUpperCase(), target, { id, body, headers });
-        assert.equal(reply.status === 403, guarded && scope !== undefined && scope !== name, `${verb} ${target} ${name}`);
+        assert.equal(
+          reply.status === 403,
+          guarded && scope !== undefined && scope !== name,
+          `${verb} ${target} ${name}`,
+        );
       }
     }
   const over = await ask('POST', '/v1/meshes', { body: Buffer.from(shapes.tetrahedron), headers: write });

@@ -10,7 +10,12 @@ import { promisify } from 'node:util';
 import { assertProblem, binaries, daemon, endless, patience, root, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-const lines = (d) => d.log.split('\n').slice(0, -1).filter((l) => l.startsWith('{')).map((l) => JSON.parse(l));
+const lines = (d) =>
+  d.log
+    .split('\n')
+    .slice(0, -1)
+    .filter((l) => l.startsWith('{'))
+    .map((l) => JSON.parse(l));
 async function logged(d, wanted) {
   const end = Date.now() + 120_000 * patience;
   for (;;) {
@@ -23,14 +28,16 @@ async function logged(d, wanted) {
 
 test('bytes that were sent are counted', async (t) => {
   const d = await daemon(t);
-  const sent = async () => Number(/^orbmorph_sent_bytes_total (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
+  const sent = async () =>
+    Number(/^orbmorph_sent_bytes_total (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
   const text = shapes.obj(shapes.egg(3));
   const { url } = (await d.upload(text)).json;
   const before = await sent();
   for (let i = 0; i < 3; i++) assert.equal((await d.get(`${url}/file`)).bytes.toString(), text);
   assert.equal((await d.get(`${url}/file`, { headers: { range: 'bytes=0-99' } })).status, 206);
   assert.equal((await d.request('HEAD', `${url}/file`)).status, 200);
-  const grown = (await sent()) - before, files = 3 * text.length + 100;
+  const grown = (await sent()) - before;
+  const files = 3 * text.length + 100;
   // Beside the files only the first answer of /metrics itself was sent.
   assert.ok(grown > files && grown < files + 10_000, `${grown} for ${files}`);
 });
@@ -47,10 +54,20 @@ test('requests and their traces are in the log', async (t) => {
   assert.equal(accepted.job, reply.json.id);
   const bad = await d.get(url, { headers: { traceparent: '00-","x":"-b7ad6b7169203331-01' } });
   const plain = await logged(d, (l) => l.request === bad.headers.get('x-request-id'));
-  assert.deepEqual([plain.traceparent, plain.route, plain.method, plain.status], [undefined, '/v1/meshes/{id}', 'GET', 200]);
-  for (const zeros of [`00-${'0'.repeat(32)}-b7ad6b7169203331-01`, `00-0af7651916cd43dd8448eb211c80319c-${'0'.repeat(16)}-01`]) {
+  assert.deepEqual(
+    [plain.traceparent, plain.route, plain.method, plain.status],
+    [undefined, '/v1/meshes/{id}', 'GET', 200],
+  );
+  for (const zeros of [
+    `00-${'0'.repeat(32)}-b7ad6b7169203331-01`,
+    `00-0af7651916cd43dd8448eb211c80319c-${'0'.repeat(16)}-01`,
+  ]) {
     const reply = await d.get(url, { headers: { traceparent: zeros } });
-    assert.equal((await logged(d, (l) => l.request === reply.headers.get('x-request-id'))).traceparent, undefined, 'zeros name no trace');
+    assert.equal(
+      (await logged(d, (l) => l.request === reply.headers.get('x-request-id'))).traceparent,
+      undefined,
+      'zeros name no trace',
+    );
   }
 });
 
@@ -73,7 +90,10 @@ test('SIGHUP reads the configuration again', async (t) => {
   assert.equal(reply.status, 201, 'the limit of a body needs a restart');
   await logged(d, (l) => l.level === 'debug' && l.request === reply.headers.get('x-request-id'));
   await hup('log-level = warn\nnonsense = 1\n');
-  await logged(d, (l) => l.level === 'error' && /^SIGHUP: config file, line 2: unknown name "nonsense"/.test(l.message));
+  await logged(
+    d,
+    (l) => l.level === 'error' && /^SIGHUP: config file, line 2: unknown name "nonsense"/.test(l.message),
+  );
   await logged(d, (l) => /is not valid; the previous one stays in effect/.test(l.message));
   assertProblem(await d.get('/v1/nothing'), 404, 'not-found');
   await logged(d, (l) => l.level === 'debug');
@@ -86,7 +106,17 @@ test('SIGHUP reads limits and quotas that take effect', async (t) => {
   await writeFile(file, 'queue-limit = 1\n');
   const d = await daemon(t, { args: ['--config', file, '--auth', 'on', '--workers', '1'] });
   const run = promisify(execFile);
-  const { stdout } = await run(binaries.daemon, ['token', 'add', 'web', '--scope', 'admin', '--quota', '50M', '--data', d.data]);
+  const { stdout } = await run(binaries.daemon, [
+    'token',
+    'add',
+    'web',
+    '--scope',
+    'admin',
+    '--quota',
+    '50M',
+    '--data',
+    d.data,
+  ]);
   const web = { headers: { authorization: `Bearer ${stdout.trim()}` } };
   const hup = async () => {
     d.log = '';
@@ -94,8 +124,10 @@ test('SIGHUP reads limits and quotas that take effect', async (t) => {
     await logged(d, (l) => l.message === 'SIGHUP: the configuration was read again');
   };
   const upload = (text) => d.post('/v1/meshes', text, web);
-  const wave = (levels, k) => shapes.binaryPly(shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y + k)), 1.5 * y, z]));
-  const large = (await upload(wave(5, 1))).json, small = (await upload(wave(3, 2))).json;
+  const wave = (levels, k) =>
+    shapes.binaryPly(shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y + k)), 1.5 * y, z]));
+  const large = (await upload(wave(5, 1))).json;
+  const small = (await upload(wave(3, 2))).json;
   const job = (mesh) => d.post('/v1/embeddings', { mesh: mesh.id, ...endless }, web);
   const first = await job(large);
   assert.equal(first.status, 202);
@@ -107,7 +139,13 @@ test('SIGHUP reads limits and quotas that take effect', async (t) => {
   for (const { json } of [first, second]) await d.delete(json.url, web);
 
   // The catalogue may be changed by other means than the command, as a restored copy would.
-  const set = (quota) => run('sqlite3', ['-cmd', '.timeout 10000', path.join(d.data, 'catalogue.sqlite'), `UPDATE token SET quota_bytes = ${quota} WHERE name = 'web'`]);
+  const set = (quota) =>
+    run('sqlite3', [
+      '-cmd',
+      '.timeout 10000',
+      path.join(d.data, 'catalogue.sqlite'),
+      `UPDATE token SET quota_bytes = ${quota} WHERE name = 'web'`,
+    ]);
   await set(1000);
   assert.equal((await upload(shapes.tetrahedron)).status, 201, 'before it is told, the old quota holds');
   await hup();
@@ -130,7 +168,11 @@ test('workers, and the threads of their jobs, give way by worker-nice', async (t
     return found;
   };
   const own = Number((await readFile('/proc/self/stat', 'latin1')).split(') ')[1].split(' ')[16]);
-  for (const [more, level] of [[{}, 5], [{ args: ['--worker-nice', '12'] }, 12], [{ env: { ORBMORPH_WORKER_NICE: '9' } }, 9]]) {
+  for (const [more, level] of [
+    [{}, 5],
+    [{ args: ['--worker-nice', '12'] }, 12],
+    [{ env: { ORBMORPH_WORKER_NICE: '9' } }, 9],
+  ]) {
     if (level <= own) continue; // these tests themselves run at a level that cannot be left
     const d = await daemon(t, { ...more, args: ['--workers', '2', ...(more.args ?? [])] });
     const { json } = await d.upload(shapes.obj(shapes.ball(5, ([x, y, z]) => [x, 1.2 * y, z])));
@@ -138,11 +180,17 @@ test('workers, and the threads of their jobs, give way by worker-nice', async (t
     await until(async () => (await levels(d))[level] >= 2, 'two workers are at their level');
     for (let state = 'queued'; !['succeeded', 'failed'].includes(state); ) {
       const found = await levels(d);
-      assert.deepEqual(Object.keys(found).sort(), [String(own), String(level)].sort(), 'every thread is at one of the two levels');
+      assert.deepEqual(
+        Object.keys(found).sort(),
+        [String(own), String(level)].sort(),
+        'every thread is at one of the two levels',
+      );
       ({ state } = (await d.get(job.url)).json);
     }
   }
-  await assert.rejects(promisify(execFile)(binaries.daemon, ['--check-config', '--worker-nice', '20']), { stderr: /from 0 to 19/ });
+  await assert.rejects(promisify(execFile)(binaries.daemon, ['--check-config', '--worker-nice', '20']), {
+    stderr: /from 0 to 19/,
+  });
 });
 
 test('the counters tell of jobs, stages and the process', async (t) => {
@@ -151,14 +199,32 @@ test('the counters tell of jobs, stages and the process', async (t) => {
   await d.made('/v1/embeddings', { mesh: id });
   const text = (await d.get('/metrics')).bytes.toString();
   const value = (name) => Number(new RegExp(`^${name.replace(/[{}"]/g, '\\$&')} (\\S+)$`, 'm').exec(text)?.[1] ?? NaN);
-  for (const name of ['orbmorph_jobs{state="queued"}', 'orbmorph_jobs{state="running"}', 'orbmorph_queue_oldest_seconds', 'orbmorph_flips_total']) assert.equal(value(name), 0, name);
+  for (const name of [
+    'orbmorph_jobs{state="queued"}',
+    'orbmorph_jobs{state="running"}',
+    'orbmorph_queue_oldest_seconds',
+    'orbmorph_flips_total',
+  ])
+    assert.equal(value(name), 0, name);
   assert.equal(value('orbmorph_jobs_ended_total{state="succeeded"}'), 1);
-  for (const stage of ['read', 'embed', 'certify', 'store']) assert.equal(value(`orbmorph_stage_seconds_count{kind="embedding",stage="${stage}"}`), 1, `${stage}\n${text}`);
+  for (const stage of ['read', 'embed', 'certify', 'store'])
+    assert.equal(value(`orbmorph_stage_seconds_count{kind="embedding",stage="${stage}"}`), 1, `${stage}\n${text}`);
   assert.equal(value('orbmorph_job_seconds_count{kind="embedding"}'), 1);
-  for (const name of ['orbmorph_cache_hits_total', 'orbmorph_connections', 'orbmorph_received_bytes_total', 'orbmorph_stored_bytes', 'process_resident_memory_bytes', 'process_open_fds', 'process_threads'])
+  for (const name of [
+    'orbmorph_cache_hits_total',
+    'orbmorph_connections',
+    'orbmorph_received_bytes_total',
+    'orbmorph_stored_bytes',
+    'process_resident_memory_bytes',
+    'process_open_fds',
+    'process_threads',
+  ])
     assert.ok(value(name) > 0, name);
   const ready = (await d.get('/readyz', { query: { verbose: '' } })).json;
-  assert.deepEqual([ready.queued, ready.waiting, ready.running, ready.queue_limit, ready.oldest_ms], [0, 0, 0, 10000, 0]);
+  assert.deepEqual(
+    [ready.queued, ready.waiting, ready.running, ready.queue_limit, ready.oldest_ms],
+    [0, 0, 0, 10000, 0],
+  );
   assert.deepEqual((await d.get('/readyz')).json, { status: 'ready' });
 });
 
@@ -168,7 +234,8 @@ test('the dashboard shows every family of metrics, and none that is not there', 
   await d.made('/v1/embeddings', { mesh: id });
   const text = (await d.get('/metrics')).bytes.toString();
   const families = new Map([...text.matchAll(/^# TYPE (\S+) (\S+)$/gm)].map(([, name, type]) => [name, type]));
-  const series = new Set(), labels = new Map();
+  const series = new Set();
+  const labels = new Map();
   for (const [, name, list = ''] of text.matchAll(/^([a-z_]+)(?:\{(.*)\})? \S+$/gm)) {
     series.add(name);
     labels.set(name, new Set([...(labels.get(name) ?? []), ...[...list.matchAll(/(\w+)=/g)].map((m) => m[1])]));
@@ -182,15 +249,21 @@ test('the dashboard shows every family of metrics, and none that is not there', 
       const names = [...expr.matchAll(/\b(?:orbmorph|process)_[a-z_]+/g)].map((m) => m[0]);
       assert.ok(names.length > 0, `${title}: ${expr}`);
       for (const name of names) {
-        const family = familyOf(name), type = families.get(family);
+        const family = familyOf(name);
+        const type = families.get(family);
         assert.ok(type && (series.has(name) || name === 'orbmorph_jobs_running'), `${title}: ${name} is exported`); // by stage: only while one runs
         assert.equal(type === 'histogram', name !== family, `${title}: ${name}`);
         if (type === 'gauge') assert.ok(!expr.includes('rate('), `${title}: no rate of a gauge`);
-        for (const [, label] of legendFormat.matchAll(/\{\{(\w+)\}\}/g)) assert.ok(labels.get(name)?.has(label) || name === 'orbmorph_jobs_running', `${title}: ${name} has ${label}`);
+        for (const [, label] of legendFormat.matchAll(/\{\{(\w+)\}\}/g))
+          assert.ok(labels.get(name)?.has(label) || name === 'orbmorph_jobs_running', `${title}: ${name} has ${label}`);
         shown.add(family);
       }
     }
-  assert.deepEqual([...families.keys()].filter((name) => !shown.has(name)), [], 'families without a panel');
+  assert.deepEqual(
+    [...families.keys()].filter((name) => !shown.has(name)),
+    [],
+    'families without a panel',
+  );
   assert.equal(new Set(panels.map((p) => p.id)).size, panels.length);
   const places = panels.map(({ gridPos }) => `${gridPos.x},${gridPos.y}`);
   assert.equal(new Set(places).size, panels.length, 'none lies on another');
@@ -200,6 +273,9 @@ test('slow requests are in the log', async (t) => {
   const d = await daemon(t, { args: ['--slow-ms', '1'] });
   const { headers } = await d.upload(shapes.binaryPly(shapes.ball(6)));
   const line = await logged(d, (l) => l.message === 'slow request');
-  assert.deepEqual([line.level, line.request, line.route, line.status], ['warn', headers.get('x-request-id'), '/v1/meshes', 201]);
+  assert.deepEqual(
+    [line.level, line.request, line.route, line.status],
+    ['warn', headers.get('x-request-id'), '/v1/meshes', 201],
+  );
   assert.ok(line.ms >= 1);
 });

@@ -34,7 +34,17 @@ test('places of a supermesh name triangles of the files', async (t) => {
   const d = await daemon(t);
   const sources = [shapes.egg(3), shapes.bean(3)];
   // The second file has every triangle turned inside out, and each begun at another corner: the repair turns them back.
-  sources[1] = { ...sources[1], triangles: sources[1].triangles.map(([a, b, c], i) => [[b, a, c], [a, c, b], [c, b, a]][i % 3]) };
+  sources[1] = {
+    ...sources[1],
+    triangles: sources[1].triangles.map(
+      ([a, b, c], i) =>
+        [
+          [b, a, c],
+          [a, c, b],
+          [c, b, a],
+        ][i % 3],
+    ),
+  };
   const pair = [];
   for (const m of sources) pair.push({ mesh: (await d.upload(shapes.obj(m))).json.id });
   const landmarks = [0, 1, 2].map((axis) => ({
@@ -84,8 +94,10 @@ test('places of a supermesh name triangles of the files', async (t) => {
     supermesh.landmarks.forEach((l, i) => {
       for (const s of [0, 1]) {
         const asked = landmarks[i].at[s];
-        const wanted = asked.vertex !== undefined ? sources[s].positions[asked.vertex]
-          : position(sources[s], { triangle: asked.triangle, weights: asked.barycentric });
+        const wanted =
+          asked.vertex !== undefined
+            ? sources[s].positions[asked.vertex]
+            : position(sources[s], { triangle: asked.triangle, weights: asked.barycentric });
         const got = position(sources[s], places.at(s, l.vertex));
         assert.ok(Math.hypot(...got.map((x, k) => x - wanted[k])) < 1e-12, `${method} ${l.name} ${s}`);
       }
@@ -102,15 +114,22 @@ test('places of a supermesh name triangles of the files', async (t) => {
 test('an attribute is carried to the asset by the places', async (t) => {
   const d = await daemon(t);
   // Every triangle of the first file has three texture coordinates of its own: the asset splits every vertex.
-  const first = shapes.egg(3), second = shapes.bean(3);
+  const first = shapes.egg(3);
+  const second = shapes.bean(3);
   const seams = [
     ...first.positions.map((p) => `v ${p.join(' ')}`),
-    ...first.triangles.flatMap((_, i) => [0, 1, 2].map((k) => `vt ${((i % 37) + 0.3 * k) / 40} ${((i % 29) + 0.2 * k * k) / 40}`)),
+    ...first.triangles.flatMap((_, i) =>
+      [0, 1, 2].map((k) => `vt ${((i % 37) + 0.3 * k) / 40} ${((i % 29) + 0.2 * k * k) / 40}`),
+    ),
     ...first.triangles.map((c, i) => `f ${c.map((v, k) => `${v + 1}/${3 * i + k + 1}`).join(' ')}`),
   ].join('\n');
   const pair = [];
   for (const text of [seams, shapes.obj(second)]) pair.push({ mesh: (await d.upload(text)).json.id });
-  const supermesh = await d.made('/v1/supermeshes', { shapes: pair, align: { method: 'rotate' }, remesh: { method: 'adaptive' } });
+  const supermesh = await d.made('/v1/supermeshes', {
+    shapes: pair,
+    align: { method: 'rotate' },
+    remesh: { method: 'adaptive' },
+  });
   const places = read((await d.get(`${supermesh.url}/places`)).bytes);
   const morph = morphOf((await d.get(supermesh.asset)).bytes);
   assert.equal(places.asset.length, morph.shapes[0].length / 3);

@@ -11,8 +11,10 @@ import { binaries, daemon, endless, root, samples } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const text = await readFile(path.join(root, 'docs/troubleshooting.md'), 'utf8');
-const sections = new Map([...text.matchAll(/^## (\S+)\n([^]*?)(?=^#|$(?![^]))/gm)].map((m) => [m[1], m[2].trim()]));
-const table = (await readFile(path.join(root, 'api/problem.c'), 'utf8')).match(/table\[\] = \{\n([^]*?)\n\};/)[1];
+const sections = new Map(
+  [...text.matchAll(/^## (\S+)\n([\s\S]*?)(?=^#|$(?![\s\S]))/gm)].map((m) => [m[1], m[2].trim()]),
+);
+const table = (await readFile(path.join(root, 'api/problem.c'), 'utf8')).match(/table\[\] = \{\n([\s\S]*?)\n\};/)[1];
 const names = [...table.matchAll(/\{"([a-z-]+)", \d{3}, /g)].map((m) => m[1]);
 
 test('there is a section for every problem, and none for others', async () => {
@@ -20,7 +22,8 @@ test('there is a section for every problem, and none for others', async () => {
   assert.deepEqual([...sections.keys()].sort(), [...names].sort());
   const document = await readFile(path.join(root, 'api/openapi.json'), 'utf8');
   for (const [, name] of document.matchAll(/"\/problems\/([a-z-]+)"/g)) assert.ok(sections.has(name), name);
-  for (const [name, section] of sections) assert.ok(section.split('\n\n').length >= 2, `${name}: what it means, and what helps`);
+  for (const [name, section] of sections)
+    assert.ok(section.split('\n\n').length >= 2, `${name}: what it means, and what helps`);
 });
 
 test('the type of every problem leads to its section', async (t) => {
@@ -29,10 +32,17 @@ test('the type of every problem leads to its section', async (t) => {
     const reply = await d.get(`/problems/${name}`);
     assert.equal(reply.status, 200, name);
     assert.equal(reply.type, 'text/html; charset=utf-8');
-    const shown = reply.bytes.toString().replace(/<[^>]+>/g, '').replaceAll('&lt;', '<').replaceAll('&gt;', '>').replaceAll('&amp;', '&');
+    const shown = reply.bytes
+      .toString()
+      .replace(/<[^>]+>/g, '')
+      .replaceAll('&lt;', '<')
+      .replaceAll('&gt;', '>')
+      .replaceAll('&amp;', '&');
     assert.match(shown, new RegExp(`orbmorph: ${name}\\n`));
-    for (const line of section.split('\n').filter((l) => l && !/[`*[]/.test(l))) assert.ok(shown.includes(line), `${name}: ${line}`);
-    for (const other of sections.keys()) assert.ok(!shown.includes(`## ${other}`), `${name} ends where ${other} begins`);
+    for (const line of section.split('\n').filter((l) => l && !/[`*[]/.test(l)))
+      assert.ok(shown.includes(line), `${name}: ${line}`);
+    for (const other of sections.keys())
+      assert.ok(!shown.includes(`## ${other}`), `${name} ends where ${other} begins`);
   }
   assert.equal((await d.get('/problems/none-such')).status, 404);
 });
@@ -53,15 +63,20 @@ function bare(url, method, target, headers, body) {
 
 test('sections name the facts that answers have', async (t) => {
   const d = await daemon(t, { args: ['--max-body', '300K', '--queue-limit', '1', '--workers', '1'] });
-  const { obj, ball } = shapes, met = new Set(), missing = [];
+  const { obj, ball } = shapes;
+  const met = new Set();
+  const missing = [];
   const meets = (type, reply) => {
     const problem = reply.json.problem ?? reply.json;
     assert.equal(problem.type, `/problems/${type}`, JSON.stringify(problem).slice(0, 400));
-    for (const member of Object.keys(problem).filter((k) => !['type', 'title', 'status', 'detail', 'instance'].includes(k)))
+    for (const member of Object.keys(problem).filter(
+      (k) => !['type', 'title', 'status', 'detail', 'instance'].includes(k),
+    ))
       if (!sections.get(type).includes(`\`${member}\``)) missing.push(`${type}: ${member}`);
     met.add(type);
   };
-  const upload = async (type, bytes, query, headers) => meets(type, await d.post('/v1/meshes', Buffer.from(bytes), { query, headers }));
+  const upload = async (type, bytes, query, headers) =>
+    meets(type, await d.post('/v1/meshes', Buffer.from(bytes), { query, headers }));
   const m = ball(2);
   await upload('unknown-format', 'no mesh at all');
   await upload('malformed-mesh', 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n');
@@ -83,19 +98,25 @@ test('sections name the facts that answers have', async (t) => {
   meets('method-not-allowed', await d.request('PUT', '/v1/meshes'));
   meets('not-found', await d.get(`/v1/meshes/${'0'.repeat(64)}`));
 
-  const a = await d.mesh(path.join(samples, 'dog.obj')), b = await d.mesh(path.join(samples, 'giraffe.off'));
-  const both = { shapes: [{ mesh: a.id }, { mesh: b.id }] }, place = (i) => ({ vertex: i });
+  const a = await d.mesh(path.join(samples, 'dog.obj'));
+  const b = await d.mesh(path.join(samples, 'giraffe.off'));
+  const both = { shapes: [{ mesh: a.id }, { mesh: b.id }] };
+  const place = (i) => ({ vertex: i });
   const merge = async (type, body) => meets(type, await d.post('/v1/supermeshes', body));
   await merge('bad-landmarks', { ...both, landmarks: [{ at: [place(10), place(1e6)] }] });
   await merge('bad-option', { ...both, remesh: { tolerance: -1 } });
   await merge('unknown-member', { ...both, tolerance: 0.1 });
   await merge('invalid-request', { shapes: 'dog' });
-  meets('malformed-json', await d.post('/v1/supermeshes', Buffer.from('{"shapes": ['), { headers: { 'content-type': 'application/json' } }));
+  meets(
+    'malformed-json',
+    await d.post('/v1/supermeshes', Buffer.from('{"shapes": ['), { headers: { 'content-type': 'application/json' } }),
+  );
   meets('precondition-failed', await d.get(`${a.url}/file`, { headers: { 'if-match': '"other"' } }));
   meets('range-not-satisfiable', await d.get(`${a.url}/file`, { headers: { range: 'bytes=99999999-' } }));
 
   // A long job, and what is refused while it runs.
-  const body = { mesh: a.id, ...endless }, job = await d.post('/v1/embeddings', body);
+  const body = { mesh: a.id, ...endless };
+  const job = await d.post('/v1/embeddings', body);
   assert.equal(job.status, 202);
   meets('queue-full', await d.post('/v1/embeddings', { mesh: b.id }));
   meets('in-use', await d.delete(a.url));
@@ -111,8 +132,27 @@ test('sections name the facts that answers have', async (t) => {
 
   assert.deepEqual(missing, [], 'facts that a section does not name');
   const rest = [...sections.keys()].filter((name) => !met.has(name));
-  const elsewhere = ['bad-header', 'unauthorized', 'forbidden', 'quota-exceeded', 'too-many-requests', 'unsupported-method', 'cancelled', 'unavailable', 'storage-full', 'timeout', 'no-memory', 'not-certified', 'corrupt', 'crashed', 'internal'];
-  assert.deepEqual(rest.filter((name) => !elsewhere.includes(name)), []);
+  const elsewhere = [
+    'bad-header',
+    'unauthorized',
+    'forbidden',
+    'quota-exceeded',
+    'too-many-requests',
+    'unsupported-method',
+    'cancelled',
+    'unavailable',
+    'storage-full',
+    'timeout',
+    'no-memory',
+    'not-certified',
+    'corrupt',
+    'crashed',
+    'internal',
+  ];
+  assert.deepEqual(
+    rest.filter((name) => !elsewhere.includes(name)),
+    [],
+  );
 });
 
 test('sections about tokens', async (t) => {
@@ -120,10 +160,25 @@ test('sections about tokens', async (t) => {
   const reply = await first.get('/v1/meshes');
   assert.equal(reply.json.type, '/problems/unauthorized');
   await first.stop();
-  const made = await runProgram(binaries.daemon, ['token', 'add', 'reader', '--scope', 'read', '--quota', '1000', '--data', first.data]);
+  const made = await runProgram(binaries.daemon, [
+    'token',
+    'add',
+    'reader',
+    '--scope',
+    'read',
+    '--quota',
+    '1000',
+    '--data',
+    first.data,
+  ]);
   assert.equal(made.code, 0, made.err);
   await first.start();
-  const headers = { authorization: `Bearer ${made.out.trim().split(/\s+/).find((w) => w.length > 20)}` };
+  const headers = {
+    authorization: `Bearer ${made.out
+      .trim()
+      .split(/\s+/)
+      .find((w) => w.length > 20)}`,
+  };
   assert.equal((await first.get('/v1/meshes', { headers })).status, 200);
   const refused = await first.post('/v1/meshes', Buffer.from('x'), { headers });
   assert.equal(refused.json.type, '/problems/forbidden');
@@ -138,10 +193,26 @@ test('details read as sentences, with numbers as people write them', async (t) =
   const two = { shapes: [{ mesh: id }, { mesh: id }] };
   for (const [target, body, detail] of [
     ['/v1/embeddings', [], 'The request must be a JSON object.'],
-    ['/v1/supermeshes', { ...two, remesh: { tolerance: 0 } }, '"tolerance" in "remesh" must be a number from 1e-09 to 1.'],
-    ['/v1/supermeshes', { ...two, remesh: { max_triangles: 0.5 } }, '"max_triangles" in "remesh" must be a whole number from 0 to 100000000.'],
-    ['/v1/supermeshes', { ...two, landmarks: [{ at: [{ vertex: 0 }] }] }, 'Landmark 0: "at" must list one place for each of the 2 shapes.'],
-    ['/v1/supermeshes', { ...two, landmarks: [{ at: [{ vertex: 0 }, { vertex: -1 }] }] }, /^Landmark 0, shape 1: .*\.$/],
+    [
+      '/v1/supermeshes',
+      { ...two, remesh: { tolerance: 0 } },
+      '"tolerance" in "remesh" must be a number from 1e-09 to 1.',
+    ],
+    [
+      '/v1/supermeshes',
+      { ...two, remesh: { max_triangles: 0.5 } },
+      '"max_triangles" in "remesh" must be a whole number from 0 to 100000000.',
+    ],
+    [
+      '/v1/supermeshes',
+      { ...two, landmarks: [{ at: [{ vertex: 0 }] }] },
+      'Landmark 0: "at" must list one place for each of the 2 shapes.',
+    ],
+    [
+      '/v1/supermeshes',
+      { ...two, landmarks: [{ at: [{ vertex: 0 }, { vertex: -1 }] }] },
+      /^Landmark 0, shape 1: .*\.$/,
+    ],
   ]) {
     const reply = await d.post(target, body);
     assert.equal(reply.status, 422);

@@ -20,10 +20,19 @@ const expected = {
     assert.deepEqual(morphOf(await readFile(path.join(at, 'morph.glb'))).names, ['giraffe']);
     const dressed = parseGlb(await readFile(path.join(at, 'dressed.glb')));
     assert.equal((dressed.gltf ?? dressed).images.length, 1);
-    for (const line of [/"type": "\/problems\/not-closed"/, /helps: orbmorph upload --repair fill_holes open\.obj/, /^succeeded: \/v1\/supermeshes\//m, /^event: ?succeeded/m, /^cancelled$/m, /^304$/m, /^\/problems\/unauthorized$/m])
+    for (const line of [
+      /"type": "\/problems\/not-closed"/,
+      /helps: orbmorph upload --repair fill_holes open\.obj/,
+      /^succeeded: \/v1\/supermeshes\//m,
+      /^event: ?succeeded/m,
+      /^cancelled$/m,
+      /^304$/m,
+      /^\/problems\/unauthorized$/m,
+    ])
       assert.match(out, line);
   },
-  'docs/tutorial.md': async (at) => assert.deepEqual(morphOf(await readFile(path.join(at, 'morph.glb'))).names, ['elephant']),
+  'docs/tutorial.md': async (at) =>
+    assert.deepEqual(morphOf(await readFile(path.join(at, 'morph.glb'))).names, ['elephant']),
 };
 
 for (const file of await documents()) {
@@ -40,7 +49,12 @@ for (const file of await documents()) {
       const { landmarks } = JSON.parse(await readFile(path.join(samples, 'dog-giraffe.json'), 'utf8'));
       await d.made('/v1/supermeshes', { shapes: shapes.map(({ id, name }) => ({ mesh: id, name })), landmarks });
     }
-    const run = spawnSync('bash', ['-euo', 'pipefail', '-c', lines.replaceAll('http://127.0.0.1:8080', d.url)], { cwd: at, env, encoding: 'utf8', timeout: 1_500_000 * patience });
+    const run = spawnSync('bash', ['-euo', 'pipefail', '-c', lines.replaceAll('http://127.0.0.1:8080', d.url)], {
+      cwd: at,
+      env,
+      encoding: 'utf8',
+      timeout: 1_500_000 * patience,
+    });
     assert.equal(run.status, 0, `${file}\n${run.stdout}\n${run.stderr}`);
     await expected[file]?.(at, run.stdout);
   });
@@ -53,7 +67,7 @@ test('the documents with lines that run are there', async () => {
 test('links and pictures are there', async () => {
   for (const file of await documents()) {
     const text = await readFile(path.join(root, file), 'utf8');
-    for (const [, target] of text.replace(/^```[^]*?^```$/gm, '').matchAll(/\]\(([^)]+)\)/g)) {
+    for (const [, target] of text.replace(/^```[\s\S]*?^```$/gm, '').matchAll(/\]\(([^)]+)\)/g)) {
       if (/^(https?:|#)/.test(target)) continue;
       assert.ok(existsSync(path.resolve(root, path.dirname(file), target.split('#')[0])), `${file}: ${target}`);
     }

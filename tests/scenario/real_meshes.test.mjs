@@ -26,7 +26,14 @@ test('good meshes are accepted as they stand, and embed', { skip }, async (t) =>
       assert.equal(reply.status, 201, reply.bytes.toString());
       assert.equal(reply.json.triangles, Number(row.f));
       assert.equal(reply.json.format, row.format);
-      assert.deepEqual(reply.json.topology, { ...reply.json.topology, components: 1, genus: 0, boundary_loops: 0, nonmanifold_edges: 0, nonmanifold_vertices: 0 });
+      assert.deepEqual(reply.json.topology, {
+        ...reply.json.topology,
+        components: 1,
+        genus: 0,
+        boundary_loops: 0,
+        nonmanifold_edges: 0,
+        nonmanifold_vertices: 0,
+      });
       await embeds(d, reply.json, row.name);
     });
   }
@@ -34,13 +41,21 @@ test('good meshes are accepted as they stand, and embed', { skip }, async (t) =>
 
 test('mendable meshes are mended, with a word on how', { skip }, async (t) => {
   const d = await daemon(t);
-  const kinds = { weld: ['weld'], 'weld+drop200': ['weld', 'degenerate-faces'], reorient: ['reorient'], split: ['split-vertices'], largest: ['largest_component'], flip: ['turn-inside-out'] };
+  const kinds = {
+    weld: ['weld'],
+    'weld+drop200': ['weld', 'degenerate-faces'],
+    reorient: ['reorient'],
+    split: ['split-vertices'],
+    largest: ['largest_component'],
+    flip: ['turn-inside-out'],
+  };
   for (const row of real.rows('weldable')) {
     await t.test(`${row.name} (${row.fix})`, async () => {
       assert.ok(kinds[row.fix], `a fix that the test does not know: ${row.fix}`);
       const largest = row.fix === 'largest';
       if (largest) assertProblem(await d.uploadFile(row.file), 422, 'not-connected');
-      else assert.ok([422].includes((await d.uploadFile(row.file, { repair: 'none' })).status), 'refused without repairs');
+      else
+        assert.ok([422].includes((await d.uploadFile(row.file, { repair: 'none' })).status), 'refused without repairs');
       const reply = await d.uploadFile(row.file, { repair: largest ? 'largest_component' : 'safe' });
       assert.equal(reply.status, 201, reply.bytes.toString());
       assert.equal(reply.json.triangles, Number(row.usable_f));
@@ -54,14 +69,48 @@ test('mendable meshes are mended, with a word on how', { skip }, async (t) => {
 /** The problem type that fits what the index says of a bad mesh; several where two reasons hold at once. */
 function expected(reason) {
   const list = [
-    [/^empty file/, [[415, 'unknown-format'], [400, 'malformed-mesh']]],
+    [
+      /^empty file/,
+      [
+        [415, 'unknown-format'],
+        [400, 'malformed-mesh'],
+      ],
+    ],
     [/NaN|inf/, [[422, 'not-finite']]],
     [/malformed|out of range|no faces|binary (PLY|STL)/, [[400, 'malformed-mesh']]],
-    [/two tetrahedra|non-manifold|non-orientable/, [[422, 'not-manifold'], [422, 'not-orientable'], [422, 'not-closed'], [422, 'not-connected'], [422, 'degenerate']]],
-    [/repeated-index/, [[422, 'not-closed'], [422, 'degenerate']]],
-    [/boundary and \d+ components/, [[422, 'not-closed'], [422, 'not-manifold'], [422, 'not-connected']]],
+    [
+      /two tetrahedra|non-manifold|non-orientable/,
+      [
+        [422, 'not-manifold'],
+        [422, 'not-orientable'],
+        [422, 'not-closed'],
+        [422, 'not-connected'],
+        [422, 'degenerate'],
+      ],
+    ],
+    [
+      /repeated-index/,
+      [
+        [422, 'not-closed'],
+        [422, 'degenerate'],
+      ],
+    ],
+    [
+      /boundary and \d+ components/,
+      [
+        [422, 'not-closed'],
+        [422, 'not-manifold'],
+        [422, 'not-connected'],
+      ],
+    ],
     [/components/, [[422, 'not-connected']]],
-    [/boundary|truncated in the middle/, [[422, 'not-closed'], [400, 'malformed-mesh']]],
+    [
+      /boundary|truncated in the middle/,
+      [
+        [422, 'not-closed'],
+        [400, 'malformed-mesh'],
+      ],
+    ],
     [/genus/, [[422, 'not-genus-zero']]],
   ];
   return list.find(([pattern]) => pattern.test(reason))?.[1];
@@ -80,7 +129,8 @@ test('bad meshes are refused for their reason, with facts', { skip }, async (t) 
       const p = reply.json;
       const facts = {
         'malformed-mesh': () => p.line > 0 || p.offset >= 0,
-        'not-closed': () => p.boundary_loops > 0 && p.boundary_edges.length > 0 && p.boundary_edges.every((e) => e.length === 2),
+        'not-closed': () =>
+          p.boundary_loops > 0 && p.boundary_edges.length > 0 && p.boundary_edges.every((e) => e.length === 2),
         'not-connected': () => p.components.length > 1,
         'not-genus-zero': () => p.genus === Number(row.genus),
         'not-manifold': () => (p.edges?.length ?? 0) + (p.vertices?.length ?? 0) > 0,

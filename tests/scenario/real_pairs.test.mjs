@@ -28,8 +28,11 @@ test('every pair merges', { skip }, async (t) => {
       assert.deepEqual(s.certificate.flipped, [0, 0]);
       assert.deepEqual(s.certificate.degree, [1, 1]);
       assert.equal(s.certificate.landmarks_exact, true);
-      for (const shape of s.shapes) assert.ok(shape.hausdorff_relative <= 0.005, `${shape.name}: ${shape.hausdorff_relative}`);
-      u.diagnostic(`${s.triangles} triangles, off by ${s.shapes.map((x) => (100 * x.hausdorff_relative).toFixed(3)).join(' and ')} %, ${s.timings_ms.total} ms`);
+      for (const shape of s.shapes)
+        assert.ok(shape.hausdorff_relative <= 0.005, `${shape.name}: ${shape.hausdorff_relative}`);
+      u.diagnostic(
+        `${s.triangles} triangles, off by ${s.shapes.map((x) => (100 * x.hausdorff_relative).toFixed(3)).join(' and ')} %, ${s.timings_ms.total} ms`,
+      );
 
       const asset = (await d.get(s.asset)).bytes;
       const morph = morphOf(asset);
@@ -40,14 +43,21 @@ test('every pair merges', { skip }, async (t) => {
       const sources = await Promise.all(pair.files.map(async (file) => shapes.parse(await readFile(file, 'utf8'))));
       const used = new Set();
       for (const { name, at } of pair.landmarks) {
-        const vertex = vertexAt(morph, at.map((place, i) => sources[i].positions[place.vertex]));
+        const vertex = vertexAt(
+          morph,
+          at.map((place, i) => sources[i].positions[place.vertex]),
+        );
         assert.ok(vertex >= 0, `landmark ${name} is no vertex of the supermesh`);
         used.add(topology.weld[vertex]);
       }
       assert.equal(used.size, pair.landmarks.length);
       if (asset.length < 20e6) {
         const report = await validator.validateBytes(new Uint8Array(asset));
-        assert.equal(report.issues.numErrors + report.issues.numWarnings, 0, JSON.stringify(report.issues.messages.slice(0, 3)));
+        assert.equal(
+          report.issues.numErrors + report.issues.numWarnings,
+          0,
+          JSON.stringify(report.issues.messages.slice(0, 3)),
+        );
       }
       const again = await d.make('/v1/supermeshes', request);
       assert.equal(again.status, 200);

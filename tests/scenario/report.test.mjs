@@ -20,13 +20,30 @@ function* members(value, skip) {
 
 test('docs/report.md explains every member of a supermesh and of an embedding', async (t) => {
   const d = await daemon(t);
-  const [a, b] = await Promise.all([shapes.egg(), shapes.bean()].map(async (m) => (await d.upload(shapes.obj(m))).json));
+  const [a, b] = await Promise.all(
+    [shapes.egg(), shapes.bean()].map(async (m) => (await d.upload(shapes.obj(m))).json),
+  );
   const embedding = await d.made('/v1/embeddings', { mesh: a.id });
-  const body = { shapes: [{ mesh: a.id, name: 'egg' }, { mesh: b.id, name: 'bean' }] };
+  const body = {
+    shapes: [
+      { mesh: a.id, name: 'egg' },
+      { mesh: b.id, name: 'bean' },
+    ],
+  };
   const found = await d.made('/v1/supermeshes', body);
-  const given = await d.made('/v1/supermeshes', { ...body, landmarks: [{ name: 'tip', at: [{ vertex: 0 }, { vertex: 0 }] }] });
-  const names = new Set([embedding, found, given].flatMap((report) => [...members(report, ['request', 'at', 'options'])]));
+  const given = await d.made('/v1/supermeshes', {
+    ...body,
+    landmarks: [{ name: 'tip', at: [{ vertex: 0 }, { vertex: 0 }] }],
+  });
+  const names = new Set(
+    [embedding, found, given].flatMap((report) => [...members(report, ['request', 'at', 'options'])]),
+  );
   assert.ok(names.size > 40);
-  const explained = new Set([...text.matchAll(/`([^`]+)`/g)].flatMap(([, code]) => code.match(/[a-z][a-z0-9_]*/g) ?? []));
-  assert.deepEqual([...names].filter((name) => !explained.has(name)), []);
+  const explained = new Set(
+    [...text.matchAll(/`([^`]+)`/g)].flatMap(([, code]) => code.match(/[a-z][a-z0-9_]*/g) ?? []),
+  );
+  assert.deepEqual(
+    [...names].filter((name) => !explained.has(name)),
+    [],
+  );
 });

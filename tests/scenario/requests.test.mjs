@@ -22,11 +22,29 @@ const statusOf = (text) => Number(/^HTTP\/1\.[01] (\d+)/.exec(text)?.[1]);
 
 test('unknown paths, unknown ids, wrong methods', async (t) => {
   const d = await daemon(t);
-  for (const target of ['/nothing', '/v1', '/v1/', '/v1/meshes/', '/v1/mesh', '/v2/meshes', `/v1/meshes/${'0'.repeat(64)}`, '/v1/meshes/abc',
-    `/v1/embeddings/${'0'.repeat(64)}/sphere.ply`, '/v1/jobs/1', '/v1/jobs/1/events', '/%00', '/..%2f..%2fetc/passwd'])
+  for (const target of [
+    '/nothing',
+    '/v1',
+    '/v1/',
+    '/v1/meshes/',
+    '/v1/mesh',
+    '/v2/meshes',
+    `/v1/meshes/${'0'.repeat(64)}`,
+    '/v1/meshes/abc',
+    `/v1/embeddings/${'0'.repeat(64)}/sphere.ply`,
+    '/v1/jobs/1',
+    '/v1/jobs/1/events',
+    '/%00',
+    '/..%2f..%2fetc/passwd',
+  ])
     assertProblem(await d.get(target), 404, 'not-found', target);
-  for (const [method, target, allowed] of [['PUT', '/v1/meshes', ['GET', 'POST']], ['PATCH', `/v1/meshes/${'0'.repeat(64)}`, ['GET', 'DELETE']],
-    ['DELETE', '/v1/embeddings', ['GET', 'POST']], ['POST', '/livez', ['GET']], ['DELETE', '/readyz', ['GET']]]) {
+  for (const [method, target, allowed] of [
+    ['PUT', '/v1/meshes', ['GET', 'POST']],
+    ['PATCH', `/v1/meshes/${'0'.repeat(64)}`, ['GET', 'DELETE']],
+    ['DELETE', '/v1/embeddings', ['GET', 'POST']],
+    ['POST', '/livez', ['GET']],
+    ['DELETE', '/readyz', ['GET']],
+  ]) {
     const reply = await d.request(method, target);
     assertProblem(reply, 405, 'method-not-allowed', `${method} ${target}`);
     const allow = (reply.headers.get('allow') ?? '').split(/, */);
@@ -52,12 +70,28 @@ test('JSON that is none', async (t) => {
   const mesh = await d.mesh(path.join(samples, 'dog.obj'));
   const body = JSON.stringify({ mesh: mesh.id });
   const deep = '['.repeat(5000) + ']'.repeat(5000);
-  for (const text of ['', '{', '{"mesh":', `${body} x`, `${body}${body}`, '{"mesh":1e999}', '{"mesh":NaN}', "{'mesh':1}", '{"a":1,}', deep, '\ufeff' + '{']) {
+  for (const text of [
+    '',
+    '{',
+    '{"mesh":',
+    `${body} x`,
+    `${body}${body}`,
+    '{"mesh":1e999}',
+    '{"mesh":NaN}',
+    "{'mesh':1}",
+    '{"a":1,}',
+    deep,
+    '\ufeff' + '{',
+  ]) {
     const reply = await d.post('/v1/embeddings', text, { headers: { 'content-type': 'application/json' } });
     assertProblem(reply, 400, 'malformed-json', text.slice(0, 40));
   }
   const invalid = Buffer.concat([Buffer.from('{"mesh":"'), Buffer.from([0xff, 0xfe]), Buffer.from('"}')]);
-  assertProblem(await d.post('/v1/embeddings', invalid, { headers: { 'content-type': 'application/json' } }), 400, 'malformed-json');
+  assertProblem(
+    await d.post('/v1/embeddings', invalid, { headers: { 'content-type': 'application/json' } }),
+    400,
+    'malformed-json',
+  );
   for (const text of ['[]', '3', 'null', '"x"', 'true']) {
     const reply = await d.post('/v1/embeddings', text, { headers: { 'content-type': 'application/json' } });
     assert.ok([400, 422].includes(reply.status), `${text}: ${reply.status}`);
@@ -71,10 +105,16 @@ test('JSON that is none', async (t) => {
 test('a body that is too large is refused before it is read', async (t) => {
   const d = await daemon(t);
   const { hostname, port } = new URL(d.url);
-  const reply = await raw(d, `POST /v1/meshes?name=big HTTP/1.1\r\nHost: ${hostname}:${port}\r\nContent-Length: ${600 * 1024 * 1024}\r\nExpect: 100-continue\r\n\r\n`);
+  const reply = await raw(
+    d,
+    `POST /v1/meshes?name=big HTTP/1.1\r\nHost: ${hostname}:${port}\r\nContent-Length: ${600 * 1024 * 1024}\r\nExpect: 100-continue\r\n\r\n`,
+  );
   assert.equal(statusOf(reply), 413, reply.slice(0, 300));
   assert.match(reply, /too-large/);
-  const sent = await raw(d, `POST /v1/meshes?name=big HTTP/1.1\r\nHost: ${hostname}:${port}\r\nContent-Length: ${600 * 1024 * 1024}\r\n\r\nv 0 0 0\n`);
+  const sent = await raw(
+    d,
+    `POST /v1/meshes?name=big HTTP/1.1\r\nHost: ${hostname}:${port}\r\nContent-Length: ${600 * 1024 * 1024}\r\n\r\nv 0 0 0\n`,
+  );
   assert.equal(statusOf(sent), 413, sent.slice(0, 300));
 });
 
@@ -84,8 +124,14 @@ test('a body must say how long it is, or come in chunks', async (t) => {
   const none = await raw(d, `POST /v1/meshes HTTP/1.1\r\nHost: ${host}\r\nConnection: close\r\n\r\n`);
   assert.equal(statusOf(none), 411, none.slice(0, 300));
   const text = shapes.tetrahedron;
-  const chunks = text.match(/[^]{1,17}/g).map((c) => `${c.length.toString(16)}\r\n${c}\r\n`).join('');
-  const chunked = await raw(d, `POST /v1/meshes?name=t HTTP/1.1\r\nHost: ${host}\r\nTransfer-Encoding: chunked\r\nConnection: close\r\n\r\n${chunks}0\r\n\r\n`);
+  const chunks = text
+    .match(/[\s\S]{1,17}/g)
+    .map((c) => `${c.length.toString(16)}\r\n${c}\r\n`)
+    .join('');
+  const chunked = await raw(
+    d,
+    `POST /v1/meshes?name=t HTTP/1.1\r\nHost: ${host}\r\nTransfer-Encoding: chunked\r\nConnection: close\r\n\r\n${chunks}0\r\n\r\n`,
+  );
   assert.equal(statusOf(chunked), 201, chunked.slice(0, 300));
 });
 
@@ -101,8 +147,16 @@ test('requests that could mean two things are refused', async (t) => {
     'a body where none belongs': `GET /v1/meshes HTTP/1.1\r\nHost: ${host}\r\nContent-Length: 5\r\n\r\nhello`,
   };
   // A target in absolute form is the path behind it (RFC 9112 section 3.2.2).
-  for (const [target, status] of [[`http://${host}/v1/meshes?limit=1`, 200], [`HTTP://${host}`, 200], ['http://other/nothing', 404]])
-    assert.equal(statusOf(await raw(d, `GET ${target} HTTP/1.1\r\nHost: ${host}\r\nConnection: close\r\n\r\n`)), status, target);
+  for (const [target, status] of [
+    [`http://${host}/v1/meshes?limit=1`, 200],
+    [`HTTP://${host}`, 200],
+    ['http://other/nothing', 404],
+  ])
+    assert.equal(
+      statusOf(await raw(d, `GET ${target} HTTP/1.1\r\nHost: ${host}\r\nConnection: close\r\n\r\n`)),
+      status,
+      target,
+    );
   for (const [what, text] of Object.entries(bad)) {
     const reply = await raw(d, text);
     assert.ok([400, 413, 501].includes(statusOf(reply)), `${what}: ${reply.slice(0, 200)}`);

@@ -4,7 +4,8 @@ import test from 'node:test';
 import { daemon, endless, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-const events = (d, job, seen) => d.get(`${job.url}/events`, { headers: seen === undefined ? {} : { 'last-event-id': String(seen) } });
+const events = (d, job, seen) =>
+  d.get(`${job.url}/events`, { headers: seen === undefined ? {} : { 'last-event-id': String(seen) } });
 const names = (reply) => [...reply.bytes.toString().matchAll(/^event: (\w+)$/gm)].map((m) => m[1]);
 const ids = (reply) => [...reply.bytes.toString().matchAll(/^id: (\d+)$/gm)].map((m) => Number(m[1]));
 

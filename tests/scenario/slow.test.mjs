@@ -19,11 +19,16 @@ function connect(d, t) {
   t.after(() => c.socket.destroy());
   return c;
 }
-const within = (promise, what) => Promise.race([promise, sleep(120_000 * patience, null, { ref: false }).then(() => assert.fail(`not in time: ${what}`))]);
+const within = (promise, what) =>
+  Promise.race([
+    promise,
+    sleep(120_000 * patience, null, { ref: false }).then(() => assert.fail(`not in time: ${what}`)),
+  ]);
 const HURRY = ['--header-seconds', '1', '--slow-seconds', '1', '--min-rate', '1000'];
 
 test('headers and bodies that only trickle in', async (t) => {
-  const d = await daemon(t, { args: HURRY }), patient = await daemon(t, { args: ['--slow-seconds', '3', '--min-rate', '100'] });
+  const d = await daemon(t, { args: HURRY });
+  const patient = await daemon(t, { args: ['--slow-seconds', '3', '--min-rate', '100'] });
   const trickle = async (c, head, letter) => {
     c.socket.write(head);
     while (!c.closed) {
@@ -32,12 +37,19 @@ test('headers and bodies that only trickle in', async (t) => {
     }
   };
   const slow = [connect(d, t), connect(d, t), connect(d, t), connect(d, t)];
-  const all = Promise.all([trickle(slow[0], 'GET /livez HTTP/1.1\r\nHost: x\r\nX-Long: ', 'a'), trickle(slow[1], 'G', 'E'),
+  const all = Promise.all([
+    trickle(slow[0], 'GET /livez HTTP/1.1\r\nHost: x\r\nX-Long: ', 'a'),
+    trickle(slow[1], 'G', 'E'),
     trickle(slow[2], 'POST /v1/meshes HTTP/1.1\r\nHost: x\r\nContent-Length: 1000000\r\n\r\n', '#'),
-    trickle(slow[3], 'POST /v1/embeddings HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n', '1\r\n \r\n')]);
+    trickle(slow[3], 'POST /v1/embeddings HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n', '1\r\n \r\n'),
+  ]);
   // Slow, but not too slow: 4 kB/s over more than two looks, where 100 would do.
-  const fine = connect(patient, t), text = `${shapes.tetrahedron}${'#'.repeat(27_000)}\n`, began = Date.now();
-  fine.socket.write(`POST /v1/meshes HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: ${text.length}\r\n\r\n`);
+  const fine = connect(patient, t);
+  const text = `${shapes.tetrahedron}${'#'.repeat(27_000)}\n`;
+  const began = Date.now();
+  fine.socket.write(
+    `POST /v1/meshes HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: ${text.length}\r\n\r\n`,
+  );
   for (let at = 0; at < text.length; await sleep(100)) {
     const due = Math.min(text.length, 4 * (Date.now() - began));
     fine.socket.write(text.slice(at, due));
@@ -51,9 +63,13 @@ test('headers and bodies that only trickle in', async (t) => {
 
 test('answers that nobody takes, and clients that wait', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
-  const size = 60_000_000, head = `${shapes.tetrahedron}`;
-  const { url } = (await d.upload(head + `#${'-'.repeat(99_998)}\n`.repeat(Math.ceil((size - head.length) / 100_000)))).json;
-  const { id } = (await d.upload(shapes.binaryPly(shapes.ball(5, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y)), 1.5 * y, z])))).json;
+  const size = 60_000_000;
+  const head = `${shapes.tetrahedron}`;
+  const { url } = (await d.upload(head + `#${'-'.repeat(99_998)}\n`.repeat(Math.ceil((size - head.length) / 100_000))))
+    .json;
+  const { id } = (
+    await d.upload(shapes.binaryPly(shapes.ball(5, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y)), 1.5 * y, z])))
+  ).json;
   await d.stop();
   d.args.push(...HURRY); // for what follows, which is slow on purpose
   await d.start();
@@ -62,8 +78,13 @@ test('answers that nobody takes, and clients that wait', async (t) => {
   stuck.socket.write(`GET ${url}/file HTTP/1.1\r\nHost: x\r\n\r\n`);
   // A stream, a poll and a kept connection, all silent for as long, are not slow.
   const jobs = [];
-  for (const area of [2, 3]) jobs.push((await d.post('/v1/embeddings', { mesh: id, ...endless, options: { ...endless.options, area_exponent: area } })).json);
-  const stream = connect(d, t), kept = connect(d, t);
+  for (const area of [2, 3])
+    jobs.push(
+      (await d.post('/v1/embeddings', { mesh: id, ...endless, options: { ...endless.options, area_exponent: area } }))
+        .json,
+    );
+  const stream = connect(d, t);
+  const kept = connect(d, t);
   stream.socket.write(`GET ${jobs[1].url}/events HTTP/1.1\r\nHost: x\r\n\r\n`);
   kept.socket.write('GET /livez HTTP/1.1\r\nHost: x\r\n\r\n');
   const polled = await d.get(jobs[1].url, { query: { wait: 5 } });
@@ -71,7 +92,7 @@ test('answers that nobody takes, and clients that wait', async (t) => {
   assert.equal(polled.json.state, 'queued', 'the first keeps the worker');
   assert.ok(!stream.closed && /retry: 2000/.test(stream.text), 'the stream is still there');
   kept.socket.write('GET /livez HTTP/1.1\r\nHost: x\r\n\r\n');
-  await until(() => /200 OK[^]*200 OK/.test(kept.text), 'an answer on the connection that was kept');
+  await until(() => /200 OK[\s\S]*200 OK/.test(kept.text), 'an answer on the connection that was kept');
   stuck.socket.resume();
   await within(stuck.ended, 'the stuck one is closed');
   assert.ok(stuck.bytes < size, `${stuck.bytes} bytes`);
@@ -81,9 +102,14 @@ test('answers that nobody takes, and clients that wait', async (t) => {
 test('a refusal reaches those who send first and read later', async (t) => {
   const d = await daemon(t, { args: ['--max-body', '1M'] });
   const block = Buffer.alloc(64 * 1024, '#');
-  for (const [what, framing, megabytes] of [['a length', `Content-Length: ${20 << 20}`, 20], ['an unknown coding', `Content-Encoding: br\r\nContent-Length: ${1 << 20}`, 1],
-    ['chunks', 'Transfer-Encoding: chunked', 20], ['endless chunks', 'Transfer-Encoding: chunked', 80]]) {
-    const c = connect(d, t), chunked = /chunked/.test(framing);
+  for (const [what, framing, megabytes] of [
+    ['a length', `Content-Length: ${20 << 20}`, 20],
+    ['an unknown coding', `Content-Encoding: br\r\nContent-Length: ${1 << 20}`, 1],
+    ['chunks', 'Transfer-Encoding: chunked', 20],
+    ['endless chunks', 'Transfer-Encoding: chunked', 80],
+  ]) {
+    const c = connect(d, t);
+    const chunked = /chunked/.test(framing);
     c.socket.pause();
     c.socket.write(`POST /v1/meshes HTTP/1.1\r\nHost: x\r\n${framing}\r\n\r\n`);
     for (let sent = 0; sent < megabytes * 16 && !c.closed; sent++) {
@@ -103,7 +129,9 @@ test('a refusal reaches those who send first and read later', async (t) => {
 test('an address has so many requests and connections', async (t) => {
   const free = await daemon(t);
   assert.equal((await free.get('/v1/meshes')).headers.get('ratelimit'), null, 'on loopback there is no limit');
-  const d = await daemon(t, { args: ['--limits', 'all', '--requests-per-second', '2', '--connections-per-address', '20'] });
+  const d = await daemon(t, {
+    args: ['--limits', 'all', '--requests-per-second', '2', '--connections-per-address', '20'],
+  });
   const first = await d.get('/v1/meshes');
   assert.equal(first.status, 200);
   assert.equal(first.headers.get('ratelimit-policy'), '"requests";q=20;w=10');
@@ -113,7 +141,8 @@ test('an address has so many requests and connections', async (t) => {
   assertProblem(reply, 429, 'too-many-requests');
   assert.ok(Number(reply.headers.get('retry-after')) >= 1);
   assert.match(reply.headers.get('ratelimit'), /^"requests";r=0;t=\d+$/);
-  for (let i = 0; i < 50; i++) for (const target of ['/livez', '/readyz']) assert.equal((await d.get(target)).status, 200);
+  for (let i = 0; i < 50; i++)
+    for (const target of ['/livez', '/readyz']) assert.equal((await d.get(target)).status, 200);
   await until(async () => (await d.get('/v1/meshes')).status === 200, 'the bucket fills again');
 
   const many = Array.from({ length: 40 }, () => connect(d, t));
@@ -122,7 +151,7 @@ test('an address has so many requests and connections', async (t) => {
     const late = connect(d, t);
     late.socket.write('GET /v1/meshes HTTP/1.1\r\nHost: x\r\n\r\n');
     await Promise.race([late.ended, sleep(2000)]); // answered: it came before some of the many were seen
-    return late.closed && /^HTTP\/1\.1 429 [^]*more than 20 connections/.test(late.text);
+    return late.closed && /^HTTP\/1\.1 429 [\s\S]*more than 20 connections/.test(late.text);
   }, 'refused and closed');
   const alive = connect(d, t);
   alive.socket.write('GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n');

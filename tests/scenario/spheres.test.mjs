@@ -45,7 +45,8 @@ const vertexAt = (sphere, p) => sphere.vertices.filter((v) => Math.hypot(...minu
 test('two animals: landmarks share their point of the sphere', async (t) => {
   const d = await daemon(t);
   const files = ['dog.obj', 'giraffe.off'];
-  const meshes = [], sources = [];
+  const meshes = [];
+  const sources = [];
   for (const file of files) {
     meshes.push(await d.mesh(path.join(samples, file)));
     sources.push(shapes.parse(await readFile(path.join(samples, file), 'utf8')));
@@ -72,7 +73,9 @@ test('landmarks inside triangles become vertices; each shape has its sphere and 
   const sources = [shapes.egg(3), shapes.bean(3), shapes.egg(2)];
   const list = [];
   for (const m of sources) list.push({ mesh: (await d.upload(shapes.obj(m))).json.id });
-  const tips = [0, 1, 2].map((axis) => ({ at: sources.map((m) => ({ vertex: m.points.findIndex((p) => Math.abs(p[axis] - 1) < 1e-12) })) }));
+  const tips = [0, 1, 2].map((axis) => ({
+    at: sources.map((m) => ({ vertex: m.points.findIndex((p) => Math.abs(p[axis] - 1) < 1e-12) })),
+  }));
   const weights = [0.25, 0.15, 0.6];
   const landmarks = [...tips, { at: sources.map(() => ({ triangle: 47, barycentric: weights })) }];
   const supermesh = await d.made('/v1/supermeshes', { shapes: list, landmarks });
@@ -81,7 +84,10 @@ test('landmarks inside triangles become vertices; each shape has its sphere and 
     coversOnce(sphere, `shape ${s}`);
     isSurfaceOf(sphere, sources[s], `shape ${s}`);
     const corners = sources[s].triangles[47].map((v) => sources[s].positions[v]);
-    const there = vertexAt(sphere, [0, 1, 2].map((k) => corners.reduce((sum, p, c) => sum + weights[c] * p[k], 0)));
+    const there = vertexAt(
+      sphere,
+      [0, 1, 2].map((k) => corners.reduce((sum, p, c) => sum + weights[c] * p[k], 0)),
+    );
     assert.equal(there.length, 1);
     assert.equal(there[0].source, -1, 'put in by the alignment');
     return there[0].on;
@@ -98,7 +104,8 @@ test('landmarks inside triangles become vertices; each shape has its sphere and 
   assert.deepEqual(last.bytes, spheres[1].bytes.subarray(-5));
   assert.equal((await d.get(sphere, { headers: { range: `bytes=${spheres[1].bytes.length}-` } })).status, 416);
   assert.equal((await d.get(sphere, { headers: { 'if-none-match': part.headers.get('etag') } })).status, 304);
-  for (const k of ['3', '15', '16', '00', '-1', 'x']) assertProblem(await d.get(`${supermesh.url}/spheres/${k}.ply`), 404, 'not-found', k);
+  for (const k of ['3', '15', '16', '00', '-1', 'x'])
+    assertProblem(await d.get(`${supermesh.url}/spheres/${k}.ply`), 404, 'not-found', k);
   assertProblem(await d.post(sphere, {}), 405, 'method-not-allowed');
   assert.equal((await d.delete(supermesh.url)).status, 204);
   assertProblem(await d.get(sphere), 404, 'not-found');

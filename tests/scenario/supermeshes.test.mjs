@@ -21,8 +21,14 @@ async function check(d, supermesh, sources, landmarks) {
   assert.equal(supermesh.triangles, 2 * supermesh.vertices - 4);
   assert.equal(supermesh.certificate.closed, true);
   assert.equal(supermesh.certificate.genus, 0);
-  assert.deepEqual(supermesh.certificate.flipped, sources.map(() => 0));
-  assert.deepEqual(supermesh.certificate.degree, sources.map(() => 1));
+  assert.deepEqual(
+    supermesh.certificate.flipped,
+    sources.map(() => 0),
+  );
+  assert.deepEqual(
+    supermesh.certificate.degree,
+    sources.map(() => 1),
+  );
   const asset = await d.get(supermesh.asset);
   assert.equal(asset.status, 200);
   const morph = morphOf(asset.bytes);
@@ -34,7 +40,10 @@ async function check(d, supermesh, sources, landmarks) {
   assert.equal(topology.triangles, supermesh.triangles);
   const used = new Set();
   for (const { name, at } of landmarks ?? []) {
-    const vertex = vertexAt(morph, at.map((place, s) => sources[s].positions[place.vertex]));
+    const vertex = vertexAt(
+      morph,
+      at.map((place, s) => sources[s].positions[place.vertex]),
+    );
     assert.ok(vertex >= 0, `landmark ${name} is no vertex of the supermesh`);
     used.add(topology.weld[vertex]);
   }
@@ -55,9 +64,15 @@ test('two animals with landmarks, from requests to the asset', async (t) => {
   const sources = [await sample('dog.obj'), await sample('giraffe.off')];
   const morph = await check(d, supermesh, sources, landmarks);
   assert.equal(supermesh.certificate.landmarks_exact, true);
-  assert.deepEqual(supermesh.landmarks.map((l) => l.name), landmarks.map((l) => l.name));
+  assert.deepEqual(
+    supermesh.landmarks.map((l) => l.name),
+    landmarks.map((l) => l.name),
+  );
   for (const l of supermesh.landmarks) for (const r of l.residual_relative) assert.ok(r < 1e-6, `${l.name}: ${r}`);
-  assert.deepEqual(supermesh.shapes.map((s) => [s.mesh, s.name]), pair.map((s) => [s.mesh, s.name]));
+  assert.deepEqual(
+    supermesh.shapes.map((s) => [s.mesh, s.name]),
+    pair.map((s) => [s.mesh, s.name]),
+  );
   for (const s of supermesh.shapes) {
     assert.ok(s.hausdorff_relative < 0.005, `${s.name}: ${s.hausdorff_relative}`);
     assert.ok(s.rms_relative <= s.hausdorff_relative);
@@ -79,7 +94,10 @@ test('two animals with landmarks, from requests to the asset', async (t) => {
   assert.deepEqual(second.resource, supermesh);
   assert.deepEqual((await d.get(supermesh.url)).json, supermesh);
   assert.equal(Object.values((await d.get('/v1/embeddings')).json).find(Array.isArray).length, 2);
-  const embedded = async () => Number(/^orbmorph_job_seconds_count\{kind="embedding"\} (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
+  const embedded = async () =>
+    Number(
+      /^orbmorph_job_seconds_count\{kind="embedding"\} (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1],
+    );
   assert.equal(await embedded(), 2);
   const other = await d.made('/v1/supermeshes', { ...request, asset: { animation: 'none', normals: false } });
   assert.notEqual(other.id, supermesh.id);
@@ -116,10 +134,18 @@ test('correspondence without landmarks', async (t) => {
   });
   if (!slow) {
     const exact = await d.made('/v1/supermeshes', { shapes: pair, remesh: { method: 'overlay' } });
-    assert.deepEqual(exact.landmarks.map(({ at }) => at), found.map(({ at }) => at), 'the alignment does not hang on the remeshing');
-    for (const l of exact.landmarks) for (const residual of l.residual_relative) assert.ok(residual < 1e-6, `${l.name}: ${l.residual_relative}`);
+    assert.deepEqual(
+      exact.landmarks.map(({ at }) => at),
+      found.map(({ at }) => at),
+      'the alignment does not hang on the remeshing',
+    );
+    for (const l of exact.landmarks)
+      for (const residual of l.residual_relative) assert.ok(residual < 1e-6, `${l.name}: ${l.residual_relative}`);
   }
-  const again = await d.make('/v1/supermeshes', { shapes: pair, landmarks: found.map(({ name, at }) => ({ name, at })) });
+  const again = await d.make('/v1/supermeshes', {
+    shapes: pair,
+    landmarks: found.map(({ name, at }) => ({ name, at })),
+  });
   assert.ok(again.resource, JSON.stringify(again.problem));
   assert.equal(again.resource.certificate.landmarks_exact, true);
   const named = await d.make('/v1/supermeshes', { shapes: pair, landmarks: 'auto' });
@@ -135,9 +161,15 @@ test('places of landmarks can be points and triangles', async (t) => {
   const landmarks = [0, 1, 2].map((axis) => ({ name: 'xyz'[axis], at: at(axis).map((vertex) => ({ vertex })) }));
   const vertices = await d.made('/v1/supermeshes', { shapes: pair, landmarks });
   await check(d, vertices, sources, landmarks);
-  const asPoints = landmarks.map((l) => ({ name: l.name, at: l.at.map(({ vertex }, s) => ({ point: sources[s].positions[vertex] })) }));
+  const asPoints = landmarks.map((l) => ({
+    name: l.name,
+    at: l.at.map(({ vertex }, s) => ({ point: sources[s].positions[vertex] })),
+  }));
   await check(d, await d.made('/v1/supermeshes', { shapes: pair, landmarks: asPoints }), sources, landmarks);
-  const inside = landmarks.map((l, i) => ({ name: l.name, at: l.at.map(() => ({ triangle: 40 * i + 7, barycentric: [0.25, 0.25, 0.5] })) }));
+  const inside = landmarks.map((l, i) => ({
+    name: l.name,
+    at: l.at.map(() => ({ triangle: 40 * i + 7, barycentric: [0.25, 0.25, 0.5] })),
+  }));
   const supermesh = await d.made('/v1/supermeshes', { shapes: pair, landmarks: inside });
   const morph = await check(d, supermesh, sources);
   for (const l of inside) {
@@ -165,12 +197,18 @@ test('methods of alignment and of remeshing', async (t) => {
   const sources = [shapes.egg(3), shapes.bean(3)];
   const pair = [];
   for (const m of sources) pair.push({ mesh: (await d.upload(shapes.obj(m))).json.id });
-  const corner = (x, y, z) => sources.map((m) => {
-    const size = Math.hypot(x, y, z);
-    const far = m.points.map((p) => Math.hypot(p[0] - x / size, p[1] - y / size, p[2] - z / size));
-    return { vertex: far.indexOf(Math.min(...far)) };
-  });
-  const landmarks = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, -1, 0.2]].map((c, i) => ({ name: `l${i}`, at: corner(...c) }));
+  const corner = (x, y, z) =>
+    sources.map((m) => {
+      const size = Math.hypot(x, y, z);
+      const far = m.points.map((p) => Math.hypot(p[0] - x / size, p[1] - y / size, p[2] - z / size));
+      return { vertex: far.indexOf(Math.min(...far)) };
+    });
+  const landmarks = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [-1, -1, 0.2],
+  ].map((c, i) => ({ name: `l${i}`, at: corner(...c) }));
   const built = [];
   for (const method of ['pin', 'rotate', 'rbf']) {
     const result = await d.make('/v1/supermeshes', { shapes: pair, landmarks, align: { method } });
@@ -200,7 +238,8 @@ test('tolerance and a triangle budget', async (t) => {
   const d = await daemon(t);
   const pair = [];
   for (const m of [shapes.egg(4), shapes.bean(4)]) pair.push({ mesh: (await d.upload(shapes.obj(m))).json.id });
-  const build = async (remesh) => d.make('/v1/supermeshes', { shapes: pair, remesh: { method: 'adaptive', ...remesh } });
+  const build = async (remesh) =>
+    d.make('/v1/supermeshes', { shapes: pair, remesh: { method: 'adaptive', ...remesh } });
   const fine = await build({ tolerance: 0.0005 });
   if (!fine.resource) {
     assert.equal(fine.problem.status, 422);
@@ -218,16 +257,30 @@ test('bad landmarks and bad requests are refused with what is wrong', async (t) 
   const d = await daemon(t);
   const pair = [];
   for (const m of [shapes.egg(2), shapes.bean(2)]) pair.push({ mesh: (await d.upload(shapes.obj(m))).json.id });
-  const good = [{ name: 'a', at: [{ vertex: 0 }, { vertex: 0 }] }, { name: 'b', at: [{ vertex: 1 }, { vertex: 1 }] }];
+  const good = [
+    { name: 'a', at: [{ vertex: 0 }, { vertex: 0 }] },
+    { name: 'b', at: [{ vertex: 1 }, { vertex: 1 }] },
+  ];
   const refused = async (request, statuses, type) => {
     const result = await d.make('/v1/supermeshes', { shapes: pair, ...request });
     assert.ok(result.problem, `accepted: ${JSON.stringify(request)}`);
-    assert.ok(statuses.includes(result.problem.status), `${JSON.stringify(request)}: ${JSON.stringify(result.problem)}`);
+    assert.ok(
+      statuses.includes(result.problem.status),
+      `${JSON.stringify(request)}: ${JSON.stringify(result.problem)}`,
+    );
     if (type) assert.equal(result.problem.type, `/problems/${type}`, JSON.stringify(result.problem));
     return result.problem;
   };
-  await refused({ landmarks: [...good, { name: 'far', at: [{ vertex: 2 }, { vertex: 1e6 }] }] }, [422], 'bad-landmarks');
-  await refused({ landmarks: [...good, { name: 'twice', at: [{ vertex: 0 }, { vertex: 5 }] }] }, [422], 'bad-landmarks');
+  await refused(
+    { landmarks: [...good, { name: 'far', at: [{ vertex: 2 }, { vertex: 1e6 }] }] },
+    [422],
+    'bad-landmarks',
+  );
+  await refused(
+    { landmarks: [...good, { name: 'twice', at: [{ vertex: 0 }, { vertex: 5 }] }] },
+    [422],
+    'bad-landmarks',
+  );
   await refused({ landmarks: [{ name: 'short', at: [{ vertex: 0 }] }] }, [400, 422]);
   await refused({ landmarks: [{ at: [{ vertex: -1 }, { vertex: 0 }] }] }, [400, 422]);
   await refused({ landmarks: [{ at: [{ triangle: 0, barycentric: [2, -1, 0] }, { vertex: 0 }] }] }, [400, 422]);

@@ -33,7 +33,9 @@ async function start(t, args, { env = {}, pass } = {}) {
     await made.exited;
   });
   child.stderr.on('data', (chunk) => (made.log += chunk));
-  const ready = new Promise((resolve) => child.stdout.on('data', (chunk) => (made.out += chunk).includes('\n') && resolve()));
+  const ready = new Promise((resolve) =>
+    child.stdout.on('data', (chunk) => (made.out += chunk).includes('\n') && resolve()),
+  );
   await Promise.race([ready, made.exited]);
   return made;
 }
@@ -49,7 +51,9 @@ function get(options) {
 }
 
 test('a Unix socket', async (t) => {
-  const home = await folder(t), at = path.join(home, 'http.sock'), data = path.join(home, 'data');
+  const home = await folder(t);
+  const at = path.join(home, 'http.sock');
+  const data = path.join(home, 'data');
   const args = ['--listen', `unix:${at}`, '--data', data];
   let d = await start(t, [...args, '--socket-mode', '0600']);
   assert.equal(d.out, `orbmorphd listening on unix:${at}\n`, d.log);
@@ -75,7 +79,13 @@ test('a Unix socket', async (t) => {
   assert.equal((await d.exited).code, 1);
   assert.match(d.log, /is not a socket/);
   assert.ok((await lstat(at)).isFile());
-  for (const [listen, why, status] of [[`unix:${'x'.repeat(200)}`, /1 to 107 bytes/, 1], ['unix:', /unix:PATH/, 2], ['127.0.0.1', /ADDR:PORT/, 2], ['127.0.0.1:http?', /ADDR:PORT/, 2], ['nowhere.invalid:80', /cannot listen/, 1]]) {
+  for (const [listen, why, status] of [
+    [`unix:${'x'.repeat(200)}`, /1 to 107 bytes/, 1],
+    ['unix:', /unix:PATH/, 2],
+    ['127.0.0.1', /ADDR:PORT/, 2],
+    ['127.0.0.1:http?', /ADDR:PORT/, 2],
+    ['nowhere.invalid:80', /cannot listen/, 1],
+  ]) {
     d = await start(t, ['--listen', listen, '--data', data]);
     assert.equal((await d.exited).code, status, listen);
     assert.match(d.log, why);
@@ -95,7 +105,10 @@ test('a socket that systemd passes', async (t) => {
     d.child.kill('SIGTERM');
     assert.equal((await d.exited).code, 0, d.log);
   }
-  for (const [count, why] of [[2, /passed 2 sockets/], [-1, /not a listening stream socket/]]) {
+  for (const [count, why] of [
+    [2, /passed 2 sockets/],
+    [-1, /not a listening stream socket/],
+  ]) {
     const d = await start(t, ['--data', data], { pass: ['127.0.0.1', 0, count] });
     assert.equal((await d.exited).code, 1);
     assert.match(d.log, why);
@@ -113,20 +126,28 @@ test('a passed socket that others can reach needs tokens', async (t) => {
 });
 
 test('systemd is told of start, reload, life and end', async (t) => {
-  const home = await folder(t), at = path.join(home, 'notify'), log = [];
+  const home = await folder(t);
+  const at = path.join(home, 'notify');
+  const log = [];
   const take = `use Socket; $| = 1; socket(S, PF_UNIX, SOCK_DGRAM, 0); bind(S, sockaddr_un($ARGV[0])) or die; print "up\\n";
     while (defined recv(S, $b, 4096, 0)) { print map { "$_\\n" } split /\\n/, $b }`;
   const taker = spawn('perl', ['-e', take, at], { stdio: ['ignore', 'pipe', 'inherit'] });
   t.after(() => taker.kill());
   taker.stdout.on('data', (chunk) => log.push(...chunk.toString().split('\n').filter(Boolean)));
   const told = async (wanted, times = 1) => {
-    for (const until = Date.now() + 120_000 * patience; log.filter((line) => wanted.test(line)).length < times; await sleep(20)) assert.ok(Date.now() < until, `${wanted}: ${log}`);
+    for (
+      const until = Date.now() + 120_000 * patience;
+      log.filter((line) => wanted.test(line)).length < times;
+      await sleep(20)
+    )
+      assert.ok(Date.now() < until, `${wanted}: ${log}`);
   };
   await told(/^up$/);
   const file = path.join(home, 'conf');
   await writeFile(file, 'queue-limit = 5\n');
-  const d = await start(t, ['--data', path.join(home, 'data'), '--listen', '127.0.0.1:0', '--config', file],
-    { env: { NOTIFY_SOCKET: at, WATCHDOG_USEC: '200000' } });
+  const d = await start(t, ['--data', path.join(home, 'data'), '--listen', '127.0.0.1:0', '--config', file], {
+    env: { NOTIFY_SOCKET: at, WATCHDOG_USEC: '200000' },
+  });
   await told(/^READY=1$/);
   await told(/^WATCHDOG=1$/, 5);
   d.child.kill('SIGHUP');

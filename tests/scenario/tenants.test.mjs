@@ -8,13 +8,19 @@ import { promisify } from 'node:util';
 import { assertProblem, binaries, daemon, endless, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
-const wave = (levels, k = 1) => shapes.binaryPly(shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y + k)), 1.5 * y, z]));
-const large = wave(5), small = wave(3, 2), other = wave(3, 3);
+const wave = (levels, k = 1) =>
+  shapes.binaryPly(shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.3 * Math.sin(7 * y + k)), 1.5 * y, z]));
+const large = wave(5);
+const small = wave(3, 2);
+const other = wave(3, 3);
 
 async function tenants(t, ...args) {
   const d = await daemon(t, { args: ['--auth', 'on', '--workers', '1', ...args] });
-  const token = (...words) => promisify(execFile)(binaries.daemon, ['token', ...words, '--data', d.data]).then(({ stdout }) => stdout.trim());
-  const add = async (name, scope, ...more) => ({ headers: { authorization: `Bearer ${await token('add', name, '--scope', scope, ...more)}` } });
+  const token = (...words) =>
+    promisify(execFile)(binaries.daemon, ['token', ...words, '--data', d.data]).then(({ stdout }) => stdout.trim());
+  const add = async (name, scope, ...more) => ({
+    headers: { authorization: `Bearer ${await token('add', name, '--scope', scope, ...more)}` },
+  });
   const upload = (who, bytes, query = {}) => d.post('/v1/meshes', bytes, { ...who, query });
   const list = async (who, what) => (await d.get(`/v1/${what}`, who)).json[what].map(({ id }) => id);
   const end = async (who, job) => {
@@ -39,7 +45,12 @@ function assertSame(a, b, hide, what) {
 
 test("another tenant's things are not there", async (t) => {
   const { d, add, upload, list, end } = await tenants(t);
-  const [ann, bob, reader, admin] = [await add('ann', 'read,write'), await add('bob', 'read,write'), await add('reader', 'read'), await add('root', 'admin')];
+  const [ann, bob, reader, admin] = [
+    await add('ann', 'read,write'),
+    await add('bob', 'read,write'),
+    await add('reader', 'read'),
+    await add('root', 'admin'),
+  ];
   const viewer = await add('viewer', 'read', '--tenant', 'ann');
   const [a, b] = [(await upload(ann, small, { name: 'secret' })).json, (await upload(ann, other)).json];
   const super_ = (await d.post('/v1/supermeshes', { shapes: [{ mesh: a.id }, { mesh: b.id }] }, ann)).json;
@@ -48,16 +59,26 @@ test("another tenant's things are not there", async (t) => {
   const running = (await d.post('/v1/embeddings', { mesh: (await upload(ann, large)).json.id, ...endless }, ann)).json;
   const queued = (await d.post('/v1/embeddings', { mesh: a.id, ...endless }, ann)).json;
 
-  const things = [a.url, `${a.url}/file`, `/v1/embeddings/${embedding}`, `/v1/embeddings/${embedding}/sphere.ply`, ended.result,
-    `${ended.result}/asset.glb`, `${ended.result}/places`, `${ended.result}/spheres/0.ply`];
+  const things = [
+    a.url,
+    `${a.url}/file`,
+    `/v1/embeddings/${embedding}`,
+    `/v1/embeddings/${embedding}/sphere.ply`,
+    ended.result,
+    `${ended.result}/asset.glb`,
+    `${ended.result}/places`,
+    `${ended.result}/spheres/0.ply`,
+  ];
   const jobs = [super_.url, running.url, queued.url];
   for (const url of [...things, ...jobs]) {
     for (const who of [ann, viewer, admin]) {
       const reply = await d.get(url, who);
       assert.equal(reply.status, 200, url);
-      if (/\.(glb|ply)$|places$|file$/.test(url)) assert.match(reply.headers.get('cache-control'), /^private/, 'no shared cache keeps it');
+      if (/\.(glb|ply)$|places$|file$/.test(url))
+        assert.match(reply.headers.get('cache-control'), /^private/, 'no shared cache keeps it');
     }
-    const id = /[0-9a-f]{32,64}/.exec(url)[0], nothing = url.replace(id, '0'.repeat(id.length));
+    const id = /[0-9a-f]{32,64}/.exec(url)[0];
+    const nothing = url.replace(id, '0'.repeat(id.length));
     for (const who of [bob, reader]) {
       assertSame(await d.get(url, who), await d.get(nothing, who), [id, '0'.repeat(id.length)], url);
       assert.equal((await d.get(url, who)).status, 404, url);
@@ -77,7 +98,12 @@ test("another tenant's things are not there", async (t) => {
   }
   // By its id alone nothing can be made of a mesh.
   const nobodys = { mesh: '0'.repeat(64) };
-  assertSame(await d.post('/v1/embeddings', { mesh: a.id }, bob), await d.post('/v1/embeddings', nobodys, bob), [a.id, nobodys.mesh], 'embedding');
+  assertSame(
+    await d.post('/v1/embeddings', { mesh: a.id }, bob),
+    await d.post('/v1/embeddings', nobodys, bob),
+    [a.id, nobodys.mesh],
+    'embedding',
+  );
   const merge = (mesh) => d.post('/v1/supermeshes', { shapes: [{ mesh }, { mesh }] }, bob);
   assertSame(await merge(a.id), await merge(nobodys.mesh), [a.id, nobodys.mesh], 'supermesh');
 
@@ -92,7 +118,8 @@ test("another tenant's things are not there", async (t) => {
   // How much there is to do is the operator's business.
   await until(async () => (await d.get(running.url, ann)).json.state === 'running', 'it runs');
   assert.equal((await d.get('/readyz?verbose', admin)).json.running, 1);
-  for (const who of [ann, reader, {}]) assert.deepEqual((await d.get('/readyz?verbose', who)).json, { status: 'ready' });
+  for (const who of [ann, reader, {}])
+    assert.deepEqual((await d.get('/readyz?verbose', who)).json, { status: 'ready' });
   const before = await list(admin, 'jobs');
   const [queued_end, running_end] = [await d.delete(queued.url, ann), await d.delete(running.url, admin)];
   assert.deepEqual([queued_end.status, running_end.status], [200, 200], 'its own, and all with admin');
@@ -101,8 +128,10 @@ test("another tenant's things are not there", async (t) => {
 
 test('the number of a request tells nothing of those of others', async (t) => {
   const { d, add } = await tenants(t);
-  const [ann, bob] = [await add('ann', 'read'), await add('bob', 'read')], seen = [];
-  for (let i = 0; i < 40; i++) seen.push(BigInt(`0x${(await d.get('/v1/meshes', i % 2 ? ann : bob)).headers.get('x-request-id')}`));
+  const [ann, bob] = [await add('ann', 'read'), await add('bob', 'read')];
+  const seen = [];
+  for (let i = 0; i < 40; i++)
+    seen.push(BigInt(`0x${(await d.get('/v1/meshes', i % 2 ? ann : bob)).headers.get('x-request-id')}`));
   assert.equal(new Set(seen).size, seen.length);
   const steps = seen.slice(1).map((n, i) => n - seen[i]);
   assert.equal(new Set(steps).size, steps.length, 'no step comes twice');
@@ -111,8 +140,11 @@ test('the number of a request tells nothing of those of others', async (t) => {
 
 test('page tokens do not count what others have', async (t) => {
   const { d, add, upload } = await tenants(t);
-  const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')], tokens = [], seen = [];
-  for (let i = 0; i < 12; i++) for (const who of [ann, bob]) await upload(who, `${shapes.tetrahedron}# ${i} ${who === ann}\n`);
+  const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')];
+  const tokens = [];
+  const seen = [];
+  for (let i = 0; i < 12; i++)
+    for (const who of [ann, bob]) await upload(who, `${shapes.tetrahedron}# ${i} ${who === ann}\n`);
   const page = (token) => d.get('/v1/meshes', { ...bob, query: { limit: 1, ...(token && { page_token: token }) } });
   for (let token, first = true; token || first; first = false) {
     const { json } = await page(token);
@@ -122,14 +154,27 @@ test('page tokens do not count what others have', async (t) => {
   assert.equal(new Set(seen).size, 12);
   assert.equal(tokens.length, 11);
   for (const token of tokens) assert.match(token, /^[0-9a-f]{16}$/);
-  const numbers = tokens.map((token) => BigInt(`0x${token}`)), steps = numbers.slice(1).map((n, i) => n - numbers[i]);
+  const numbers = tokens.map((token) => BigInt(`0x${token}`));
+  const steps = numbers.slice(1).map((n, i) => n - numbers[i]);
   assert.equal(new Set(steps).size, steps.length, 'no step comes twice');
   assert.ok(steps.some((step) => step < 0n) && steps.some((step) => step > 0n), 'they do not count');
   // They are of this data folder: good after a restart, and nothing else is one.
   await d.stop();
   await d.start();
-  assert.deepEqual((await page(tokens[4])).json.meshes.map(({ id }) => id), [seen[5]]);
-  for (const token of ['1', 'ffff', '0'.repeat(16), 'f'.repeat(16), '000000000000000c', tokens[4].slice(1), `${tokens[4]}0`, tokens[4].replace(/.$/, (c) => (c === '0' ? '1' : '0'))])
+  assert.deepEqual(
+    (await page(tokens[4])).json.meshes.map(({ id }) => id),
+    [seen[5]],
+  );
+  for (const token of [
+    '1',
+    'ffff',
+    '0'.repeat(16),
+    'f'.repeat(16),
+    '000000000000000c',
+    tokens[4].slice(1),
+    `${tokens[4]}0`,
+    tokens[4].replace(/.$/, (c) => (c === '0' ? '1' : '0')),
+  ])
     assertProblem(await page(token), 400, 'bad-query', token);
 });
 
@@ -143,7 +188,11 @@ test('an upload does not tell that others have the same', async (t) => {
   assert.equal(second.json.id, first.json.id);
   assert.equal(second.json.name, 'mine');
   assert.ok(Date.parse(second.json.created) > Date.parse(first.json.created), 'with its own time');
-  assert.deepEqual({ ...second.json, name: 'secret', created: first.json.created }, first.json, 'all else follows from the bytes');
+  assert.deepEqual(
+    { ...second.json, name: 'secret', created: first.json.created },
+    first.json,
+    'all else follows from the bytes',
+  );
   assert.deepEqual((await d.get(second.json.url, bob)).json, second.json);
   assert.deepEqual((await d.get(first.json.url, ann)).json, first.json);
   assert.deepEqual((await d.get('/v1/meshes', bob)).json.meshes, [second.json]);
@@ -177,7 +226,8 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
   // The one worker is busy with something else while Bob looks, for a result that is there comes at once.
   const blocker = (await ask(ann, endless)).json;
   await until(async () => (await d.get(blocker.url, ann)).json.state === 'running', 'the worker is busy');
-  const began = Date.now(), reply = await ask(bob);
+  const began = Date.now();
+  const reply = await ask(bob);
   assert.equal(reply.status, 202);
   assert.deepEqual(await list(bob, 'embeddings'), []);
   assert.equal((await d.delete(blocker.url, ann)).status, 200);
@@ -187,7 +237,13 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
   assert.ok(Date.parse(b.created) >= began && Date.parse(a.created) < began);
   assert.deepEqual({ ...b, created: a.created }, a, 'the very same result');
   assert.equal((await ask(bob)).status, 200);
-  assert.equal((await readdir(path.join(d.data, 'objects'), { recursive: true })).filter((f) => f.endsWith(a.id) || f.includes(a.id)).length, 1, 'stored once');
+  assert.equal(
+    (await readdir(path.join(d.data, 'objects'), { recursive: true })).filter(
+      (f) => f.endsWith(a.id) || f.includes(a.id),
+    ).length,
+    1,
+    'stored once',
+  );
 
   // A merge of Bob's shows him the embeddings that it needed, though Ann's were there.
   const third = (await upload(ann, other)).json;
@@ -201,12 +257,19 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
 test('who deletes gives up its own', async (t) => {
   const { d, token, add, upload, list, end } = await tenants(t);
   const quota = ['--quota', String(small.length + other.length)];
-  const [ann, bob, admin] = [await add('ann', 'read,write', ...quota), await add('bob', 'read,write', ...quota), await add('root', 'admin')];
-  const left = async (who) => Number(/"upload";r=(\d+)/.exec((await d.get('/v1/meshes', who)).headers.get('ratelimit'))[1]);
+  const [ann, bob, admin] = [
+    await add('ann', 'read,write', ...quota),
+    await add('bob', 'read,write', ...quota),
+    await add('root', 'admin'),
+  ];
+  const left = async (who) =>
+    Number(/"upload";r=(\d+)/.exec((await d.get('/v1/meshes', who)).headers.get('ratelimit'))[1]);
   const { id, url } = (await upload(ann, small)).json;
   await upload(bob, small);
   assert.deepEqual([await left(ann), await left(bob)], [other.length, other.length], 'each has it, each pays for it');
-  const made = await Promise.all([ann, bob].map(async (who) => (await end(who, (await d.post('/v1/embeddings', { mesh: id }, who)).json)).result));
+  const made = await Promise.all(
+    [ann, bob].map(async (who) => (await end(who, (await d.post('/v1/embeddings', { mesh: id }, who)).json)).result),
+  );
   assert.equal(made[0], made[1]);
 
   for (const thing of [url, made[0]]) {
@@ -216,14 +279,19 @@ test('who deletes gives up its own', async (t) => {
     assert.equal((await d.get(thing, bob)).status, 200, 'the other has it still');
   }
   assert.equal((await d.get(`${url}/file`, bob)).bytes.length, small.length);
-  assert.deepEqual([await left(ann), await left(bob)], [small.length + other.length, other.length], 'what is given up is free again');
+  assert.deepEqual(
+    [await left(ann), await left(bob)],
+    [small.length + other.length, other.length],
+    'what is given up is free again',
+  );
   assert.equal((await upload(ann, small)).status, 201, 'and may come back');
   assert.equal((await upload(ann, other)).status, 201);
   assertProblem(await upload(ann, wave(3, 4)), 429, 'quota-exceeded');
   assert.equal((await d.delete(url, ann)).status, 204);
 
   // The last owner takes it away, for all.
-  const files = async () => (await readdir(path.join(d.data, 'objects'), { recursive: true })).filter((f) => f.includes(id)).length;
+  const files = async () =>
+    (await readdir(path.join(d.data, 'objects'), { recursive: true })).filter((f) => f.includes(id)).length;
   assert.equal(await files(), 1);
   assert.equal((await d.delete(url, bob)).status, 204);
   assert.equal(await files(), 0);
@@ -258,14 +326,18 @@ test('who deletes gives up its own', async (t) => {
   assert.match(stdout, /: 0 wrong, 0 objects without a row/);
 });
 
-test('what was made without tokens is the operator\'s', async (t) => {
+test("what was made without tokens is the operator's", async (t) => {
   const d = await daemon(t, {});
   const { id, url } = (await d.upload(small)).json;
   const { resource } = await d.make('/v1/embeddings', { mesh: id });
   await d.stop();
   d.args = ['--auth', 'on'];
   await d.start();
-  const add = async (name, scope) => ({ headers: { authorization: `Bearer ${(await promisify(execFile)(binaries.daemon, ['token', 'add', name, '--scope', scope, '--data', d.data])).stdout.trim()}` } });
+  const add = async (name, scope) => ({
+    headers: {
+      authorization: `Bearer ${(await promisify(execFile)(binaries.daemon, ['token', 'add', name, '--scope', scope, '--data', d.data])).stdout.trim()}`,
+    },
+  });
   const [ann, admin] = [await add('ann', 'read,write'), await add('root', 'admin')];
   for (const thing of [url, resource.url]) {
     assertProblem(await d.get(thing, ann), 404, 'not-found');
@@ -285,7 +357,11 @@ test('what was made without tokens is the operator\'s', async (t) => {
 
 test("an operator's job on another's mesh outlives its delete", async (t) => {
   const { d, add, upload, end } = await tenants(t);
-  const [ann, bob, root] = [await add('ann', 'read,write'), await add('bob', 'read,write'), await add('root', 'read,write,admin')];
+  const [ann, bob, root] = [
+    await add('ann', 'read,write'),
+    await add('bob', 'read,write'),
+    await add('root', 'read,write,admin'),
+  ];
   const mesh = (await upload(ann, small, { name: 'secret' })).json;
   await upload(ann, large);
   const blocker = (await d.post('/v1/embeddings', { mesh: (await upload(bob, large)).json.id, ...endless }, bob)).json;
@@ -305,7 +381,11 @@ test("what waits shows nothing of another's job", async (t) => {
   await upload(bob, large);
   const hers = (await d.post('/v1/embeddings', { mesh: slow.id, ...endless }, ann)).json;
   await until(async () => (await d.get(hers.url, ann)).json.stage === 'embed', 'hers is being worked on');
-  const his = (await d.post('/v1/supermeshes', { shapes: [{ mesh: slow.id }, { mesh: slow.id }], embedding: endless }, bob));
+  const his = await d.post(
+    '/v1/supermeshes',
+    { shapes: [{ mesh: slow.id }, { mesh: slow.id }], embedding: endless },
+    bob,
+  );
   assert.equal(his.status, 202, his.bytes.toString());
   for (const end = Date.now() + 1000; Date.now() < end; await new Promise((done) => setTimeout(done, 20))) {
     const shown = (await d.get(his.json.url, bob)).json;

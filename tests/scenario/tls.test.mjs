@@ -15,15 +15,35 @@ import * as shapes from './support/shapes.mjs';
 const exec = promisify(execFile);
 
 async function certificate(t) {
-  const home = await folder(t), at = (name) => path.join(home, name);
-  await exec('openssl', ['req', '-x509', '-newkey', 'ec', '-pkeyopt', 'ec_paramgen_curve:prime256v1', '-nodes', '-days', '2', '-subj', '/CN=localhost',
-    '-addext', 'subjectAltName=IP:127.0.0.1,DNS:localhost', '-keyout', at('key.pem'), '-out', at('cert.pem')]);
+  const home = await folder(t);
+  const at = (name) => path.join(home, name);
+  await exec('openssl', [
+    'req',
+    '-x509',
+    '-newkey',
+    'ec',
+    '-pkeyopt',
+    'ec_paramgen_curve:prime256v1',
+    '-nodes',
+    '-days',
+    '2',
+    '-subj',
+    '/CN=localhost',
+    '-addext',
+    'subjectAltName=IP:127.0.0.1,DNS:localhost',
+    '-keyout',
+    at('key.pem'),
+    '-out',
+    at('cert.pem'),
+  ]);
   return { home, key: at('key.pem'), file: at('cert.pem'), ca: await readFile(at('cert.pem')) };
 }
 
 /** Starts it; resolves to the line that it prints, or to its end. */
 async function start(t, data, ...args) {
-  const child = spawn(binaries.daemon, ['--listen', '127.0.0.1:0', '--data', data, ...args], { stdio: ['ignore', 'pipe', 'pipe'] });
+  const child = spawn(binaries.daemon, ['--listen', '127.0.0.1:0', '--data', data, ...args], {
+    stdio: ['ignore', 'pipe', 'pipe'],
+  });
   const made = { child, out: '', log: '' };
   made.exited = new Promise((resolve) => child.once('exit', (code, signal) => resolve(code ?? signal)));
   t.after(async () => {
@@ -31,7 +51,10 @@ async function start(t, data, ...args) {
     await made.exited;
   });
   child.stderr.on('data', (chunk) => (made.log += chunk));
-  await Promise.race([made.exited, new Promise((resolve) => child.stdout.on('data', (chunk) => (made.out += chunk).includes('\n') && resolve()))]);
+  await Promise.race([
+    made.exited,
+    new Promise((resolve) => child.stdout.on('data', (chunk) => (made.out += chunk).includes('\n') && resolve())),
+  ]);
   made.url = /^orbmorphd listening on (\S+)\n/m.exec(made.out)?.[1];
   return made;
 }
@@ -40,7 +63,9 @@ const send = (url, target, { method = 'GET', body, ...options } = {}) =>
   new Promise((resolve, reject) => {
     const r = https.request(new URL(target, url), { method, agent: false, ...options }, (reply) => {
       const parts = [];
-      reply.on('data', (part) => parts.push(part)).on('end', () => resolve({ status: reply.statusCode, bytes: Buffer.concat(parts) }));
+      reply
+        .on('data', (part) => parts.push(part))
+        .on('end', () => resolve({ status: reply.statusCode, bytes: Buffer.concat(parts) }));
     });
     r.on('error', reject).setTimeout(300_000 * patience, () => r.destroy(new Error('no answer')));
     r.end(body);
@@ -63,17 +88,39 @@ test('a morph over TLS', async (t) => {
   assert.equal((await send(d.url, `${mesh.url}/file`, { ca })).bytes.toString(), text);
   const part = await send(d.url, `${mesh.url}/file`, { ca, headers: { range: 'bytes=100000-299999' } });
   assert.deepEqual([part.status, part.bytes.toString()], [206, text.slice(100_000, 300_000)]);
-  const small = JSON.parse((await send(d.url, '/v1/meshes', { ca, method: 'POST', body: shapes.obj(shapes.bean(3)) })).bytes);
-  const made = await send(d.url, '/v1/embeddings', { ca, method: 'POST', body: JSON.stringify({ mesh: small.id }), headers: { 'content-type': 'application/json', prefer: 'wait=60' } });
+  const small = JSON.parse(
+    (await send(d.url, '/v1/meshes', { ca, method: 'POST', body: shapes.obj(shapes.bean(3)) })).bytes,
+  );
+  const made = await send(d.url, '/v1/embeddings', {
+    ca,
+    method: 'POST',
+    body: JSON.stringify({ mesh: small.id }),
+    headers: { 'content-type': 'application/json', prefer: 'wait=60' },
+  });
   assert.equal(made.status, 200, made.bytes.toString());
   assert.equal(JSON.parse(made.bytes).certificate.valid, true);
 
   // Plain HTTP gets nothing there, nor does TLS before 1.2; and neither harms it.
-  await assert.rejects(new Promise((resolve, reject) => http.get(d.url.replace('https', 'http'), { agent: false }, resolve).on('error', reject)));
-  const speaks = (version) => new Promise((resolve, reject) => {
-    const socket = tls.connect({ port: Number(new URL(d.url).port), host: '127.0.0.1', ca, minVersion: version, maxVersion: version, ciphers: 'ALL:@SECLEVEL=0' }, () => resolve(socket.destroy()));
-    socket.on('error', reject).on('end', () => reject(new Error('closed')));
-  });
+  await assert.rejects(
+    new Promise((resolve, reject) =>
+      http.get(d.url.replace('https', 'http'), { agent: false }, resolve).on('error', reject),
+    ),
+  );
+  const speaks = (version) =>
+    new Promise((resolve, reject) => {
+      const socket = tls.connect(
+        {
+          port: Number(new URL(d.url).port),
+          host: '127.0.0.1',
+          ca,
+          minVersion: version,
+          maxVersion: version,
+          ciphers: 'ALL:@SECLEVEL=0',
+        },
+        () => resolve(socket.destroy()),
+      );
+      socket.on('error', reject).on('end', () => reject(new Error('closed')));
+    });
   for (const version of ['TLSv1.2', 'TLSv1.3']) await speaks(version);
   for (const version of ['TLSv1', 'TLSv1.1']) await assert.rejects(speaks(version), undefined, version);
   assert.equal((await send(d.url, '/readyz', { ca })).status, 200);
@@ -83,13 +130,23 @@ test('a morph over TLS', async (t) => {
 
 test('without a certificate that works it does not start', async (t) => {
   const { home, key, file } = await certificate(t);
-  const data = path.join(home, 'data'), broken = path.join(home, 'broken.pem');
+  const data = path.join(home, 'data');
+  const broken = path.join(home, 'broken.pem');
   await writeFile(broken, '-----BEGIN CERTIFICATE-----\nno\n-----END CERTIFICATE-----\n');
-  for (const args of [['--tls-certificate', file], ['--tls-key', key], ['--tls-certificate', path.join(home, 'none'), '--tls-key', key],
-    ['--tls-certificate', broken, '--tls-key', key], ['--tls-certificate', file, '--tls-key', broken]]) {
+  for (const args of [
+    ['--tls-certificate', file],
+    ['--tls-key', key],
+    ['--tls-certificate', path.join(home, 'none'), '--tls-key', key],
+    ['--tls-certificate', broken, '--tls-key', key],
+    ['--tls-certificate', file, '--tls-key', broken],
+  ]) {
     const d = await start(t, data, ...args);
     assert.equal(d.url, undefined, args.join(' '));
     assert.ok([1, 2].includes(await d.exited), `${args}: ${await d.exited}`);
-    assert.match(d.log, /tls-certificate and tls-key must both be set|cannot be read|cannot be started/, args.join(' '));
+    assert.match(
+      d.log,
+      /tls-certificate and tls-key must both be set|cannot be read|cannot be started/,
+      args.join(' '),
+    );
   }
 });

@@ -29,12 +29,24 @@ test('tokens open what their scopes say', async (t) => {
   await run(d, 'remove', 'gone');
   await assert.rejects(run(d, 'add', 'read', '--scope', 'read'), { code: 1 });
   await assert.rejects(run(d, 'remove', 'nobody'), { code: 1 });
-  for (const wrong of [['add', 'x'], ['add', 'x', '--scope', 'root'], ['add'], ['drop', 'x'], ['add', 'x', '--scope', 'read', '--tenant', '-'], ['set', 'read', '--tenant', 'x']]) {
+  for (const wrong of [
+    ['add', 'x'],
+    ['add', 'x', '--scope', 'root'],
+    ['add'],
+    ['drop', 'x'],
+    ['add', 'x', '--scope', 'read', '--tenant', '-'],
+    ['set', 'read', '--tenant', 'x'],
+  ]) {
     await assert.rejects(run(d, ...wrong), { code: 2 });
   }
   const listed = (await run(d, 'list')).stdout;
-  assert.deepEqual(listed.trim().split('\n').map((l) => l.split(' ').slice(0, 2).join(' ')),
-    ['admin admin', 'read read', 'read-write read,write', 'small write', 'write write']);
+  assert.deepEqual(
+    listed
+      .trim()
+      .split('\n')
+      .map((l) => l.split(' ').slice(0, 2).join(' ')),
+    ['admin admin', 'read read', 'read-write read,write', 'small write', 'write write'],
+  );
   for (const file of (await readdir(d.data)).filter((f) => f.startsWith('catalogue'))) {
     const bytes = (await readFile(path.join(d.data, file))).toString('latin1');
     for (const secret of Object.values(token)) assert.ok(!bytes.includes(secret), `${file} holds a token`);
@@ -42,15 +54,21 @@ test('tokens open what their scopes say', async (t) => {
 
   await d.start();
   const upload = (who, body = text) => d.post('/v1/meshes', Buffer.from(body), bearer(token[who]));
-  for (const headers of [{}, { authorization: 'Bearer ' }, { authorization: `Basic ${token.read}` },
-    { authorization: `Bearer ${token.gone}` }, { authorization: `Bearer ${token.read.replace(/^./, (c) => (c === '0' ? '1' : '0'))}` }]) {
+  for (const headers of [
+    {},
+    { authorization: 'Bearer ' },
+    { authorization: `Basic ${token.read}` },
+    { authorization: `Bearer ${token.gone}` },
+    { authorization: `Bearer ${token.read.replace(/^./, (c) => (c === '0' ? '1' : '0'))}` },
+  ]) {
     for (const target of ['/v1/meshes', '/metrics', '/nowhere', '/v1']) {
       const reply = await d.get(target, { headers });
       assertProblem(reply, 401, 'unauthorized', target);
       assert.equal(reply.headers.get('www-authenticate'), 'Bearer');
     }
     assertProblem(await d.post('/v1/meshes', Buffer.from(text), { headers }), 401, 'unauthorized');
-    for (const open of ['/', '/docs', '/openapi.json']) assert.equal((await d.get(open, { headers })).status, 200, open);
+    for (const open of ['/', '/docs', '/openapi.json'])
+      assert.equal((await d.get(open, { headers })).status, 200, open);
   }
   assertProblem(await upload('read'), 403, 'forbidden');
   const made = await upload('write');
@@ -59,7 +77,8 @@ test('tokens open what their scopes say', async (t) => {
   assertProblem(await d.get(url, bearer(token.write)), 403, 'forbidden');
   assertProblem(await d.delete(url, bearer(token.read)), 403, 'forbidden');
   for (const who of ['read', 'read,write', 'admin']) assert.equal((await d.get(url, bearer(token[who]))).status, 200);
-  for (const who of ['read', 'read,write', 'write']) assertProblem(await d.get('/metrics', bearer(token[who])), 403, 'forbidden');
+  for (const who of ['read', 'read,write', 'write'])
+    assertProblem(await d.get('/metrics', bearer(token[who])), 403, 'forbidden');
   assert.equal((await d.get('/metrics', bearer(token.admin))).status, 200);
   assertProblem(await d.post('/v1/embeddings', { mesh: id }, bearer(token.read)), 403, 'forbidden');
   assert.ok([200, 202].includes((await d.post('/v1/embeddings', { mesh: id }, bearer(token['read,write']))).status));
@@ -90,9 +109,19 @@ test('tokens change while the daemon runs', async (t) => {
 
   // Unfinished jobs are counted, ended ones are not.
   const meshes = [];
-  for (let i = 0; i < 3; i++) meshes.push((await d.post('/v1/meshes', shapes.binaryPly(shapes.ball(5, ([x, y, z]) => [x, y * (1 + i / 9), z + 0.2 * Math.sin(6 * x)])), bearer(await add(`m${i}`, '--scope', 'write', '--tenant', 'web')))).json);
+  for (let i = 0; i < 3; i++)
+    meshes.push(
+      (
+        await d.post(
+          '/v1/meshes',
+          shapes.binaryPly(shapes.ball(5, ([x, y, z]) => [x, y * (1 + i / 9), z + 0.2 * Math.sin(6 * x)])),
+          bearer(await add(`m${i}`, '--scope', 'write', '--tenant', 'web')),
+        )
+      ).json,
+    );
   const jobs = [];
-  for (const mesh of meshes.slice(0, 2)) jobs.push((await d.post('/v1/embeddings', { mesh: mesh.id, ...endless }, bearer(web))).json);
+  for (const mesh of meshes.slice(0, 2))
+    jobs.push((await d.post('/v1/embeddings', { mesh: mesh.id, ...endless }, bearer(web))).json);
   const third = () => d.post('/v1/embeddings', { mesh: meshes[2].id, ...endless }, bearer(web));
   assertProblem(await third(), 429, 'quota-exceeded');
   assert.equal((await d.delete(jobs[1].url, bearer(web))).status, 200);
@@ -106,7 +135,9 @@ test('tokens change while the daemon runs', async (t) => {
 
   // A stream and a poll that are open with a token end when it is taken back.
   let ended = false; // by itself the job goes on for long, and the wait for a minute
-  const stream = d.get(`${again.json.url}/events`, bearer(web)), poll = d.get(again.json.url, { ...bearer(web), query: { wait: 60 } }).catch((error) => error), timer = setTimeout(() => (ended = true), 45_000);
+  const stream = d.get(`${again.json.url}/events`, bearer(web));
+  const poll = d.get(again.json.url, { ...bearer(web), query: { wait: 60 } }).catch((error) => error);
+  const timer = setTimeout(() => (ended = true), 45_000);
   await new Promise((done) => setTimeout(done, 300));
   await run(d, 'remove', 'web');
   assertProblem(await d.get('/v1/meshes', bearer(web)), 401, 'unauthorized');

@@ -10,24 +10,54 @@ import { samples } from './support/daemon.mjs';
 
 /** A GLB of one square in the plane z = 0, from (−1,−1) to (1,1), moved by one morph target. */
 function square({ move = [0, 0, 0], ...rest }) {
-  const positions = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]];
-  return writeGlb({ positions, normals: positions.map(() => [0, 0, 1]), triangles: [[0, 1, 2], [0, 2, 3]], moves: positions.map(() => move), ...rest });
+  const positions = [
+    [-1, -1, 0],
+    [1, -1, 0],
+    [1, 1, 0],
+    [-1, 1, 0],
+  ];
+  return writeGlb({
+    positions,
+    normals: positions.map(() => [0, 0, 1]),
+    triangles: [
+      [0, 1, 2],
+      [0, 2, 3],
+    ],
+    moves: positions.map(() => move),
+    ...rest,
+  });
 }
 
 async function draw(t, glb, ...options) {
   const at = await folder(t);
   await writeFile(path.join(at, 'in.glb'), glb);
-  const { code, err } = await run(['view', 'in.glb', '-o', 'out.png', '--yaw', '0', '--pitch', '0', ...options], { cwd: at });
+  const { code, err } = await run(['view', 'in.glb', '-o', 'out.png', '--yaw', '0', '--pitch', '0', ...options], {
+    cwd: at,
+  });
   assert.equal(code, 0, err);
   return readPng(await readFile(path.join(at, 'out.png')));
 }
 
 /** The pixel at a fraction of the width and height of a frame. */
-const at = (png, x, y, frame = 0) => [...png.frames[frame].subarray(3 * (Math.floor(y * png.height) * png.width + Math.floor(x * png.width))).subarray(0, 3)];
-const mainly = (rgb) => { const k = rgb.indexOf(Math.max(...rgb)); return rgb.every((v, i) => i === k || v < 0.5 * rgb[k]) ? 'rgb'[k] : rgb.join(); };
+const at = (png, x, y, frame = 0) => [
+  ...png.frames[frame]
+    .subarray(3 * (Math.floor(y * png.height) * png.width + Math.floor(x * png.width)))
+    .subarray(0, 3),
+];
+const mainly = (rgb) => {
+  const k = rgb.indexOf(Math.max(...rgb));
+  return rgb.every((v, i) => i === k || v < 0.5 * rgb[k]) ? 'rgb'[k] : rgb.join();
+};
 
-const corners = [[0, 1], [1, 1], [1, 0], [0, 0]]; // in glTF, v grows downward from the top of the image
-const quarters = writePng(16, 16, (x, y) => (y < 8 ? (x < 8 ? [230, 0, 0] : [0, 230, 0]) : x < 8 ? [0, 0, 230] : [230, 230, 230]));
+const corners = [
+  [0, 1],
+  [1, 1],
+  [1, 0],
+  [0, 0],
+]; // in glTF, v grows downward from the top of the image
+const quarters = writePng(16, 16, (x, y) =>
+  y < 8 ? (x < 8 ? [230, 0, 0] : [0, 230, 0]) : x < 8 ? [0, 0, 230] : [230, 230, 230],
+);
 
 test('a texture appears where its coordinates place it', async (t) => {
   const png = await draw(t, square({ uv: corners, image: quarters }), '--poses', '2', '--size', '64');
@@ -47,14 +77,35 @@ test('textures repeat or clamp as their sampler says, and are averaged when mini
   const clamp = await draw(t, square({ uv: twice, image: quarters, wrap: 33071 }), '--poses', '2', '--size', '64');
   assert.equal(mainly(at(clamp, 0.38, 0.12)), 'g', 'the edge continues');
   const stripes = writePng(256, 256, (x) => (x % 2 ? [255, 255, 255] : [0, 0, 0]));
-  const fine = await draw(t, square({ uv: corners.map(([u, v]) => [4 * u, 4 * v]), image: stripes }), '--poses', '2', '--size', '32');
+  const fine = await draw(
+    t,
+    square({ uv: corners.map(([u, v]) => [4 * u, 4 * v]), image: stripes }),
+    '--poses',
+    '2',
+    '--size',
+    '32',
+  );
   const tones = [];
   for (let x = 0.06; x < 0.44; x += 1 / 64) tones.push(at(fine, x, 0.5)[0]);
   assert.ok(Math.max(...tones) - Math.min(...tones) < 12, `${tones}`);
 });
 
 test('vertex colours and material colours appear', async (t) => {
-  const red = await draw(t, square({ colors: [[1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]] }), '--poses', '2', '--size', '32');
+  const red = await draw(
+    t,
+    square({
+      colors: [
+        [1, 0, 0],
+        [1, 0, 0],
+        [1, 0, 0],
+        [1, 0, 0],
+      ],
+    }),
+    '--poses',
+    '2',
+    '--size',
+    '32',
+  );
   assert.equal(mainly(at(red, 0.25, 0.5)), 'r');
   const blue = await draw(t, square({ factor: [0, 0, 1, 1] }), '--poses', '2', '--size', '32');
   assert.equal(mainly(at(blue, 0.25, 0.5)), 'b');
@@ -63,7 +114,10 @@ test('vertex colours and material colours appear', async (t) => {
 test('--inside paints triangles seen from inside red', async (t) => {
   const glb = square({ factor: [0, 1, 0, 1] });
   assert.equal(mainly(at(await draw(t, glb, '--poses', '2', '--size', '32', '--yaw', '180'), 0.25, 0.5)), 'g');
-  assert.equal(mainly(at(await draw(t, glb, '--poses', '2', '--size', '32', '--yaw', '180', '--inside'), 0.25, 0.5)), 'r');
+  assert.equal(
+    mainly(at(await draw(t, glb, '--poses', '2', '--size', '32', '--yaw', '180', '--inside'), 0.25, 0.5)),
+    'r',
+  );
 });
 
 test('an animation goes to the last shape and back', async (t) => {
@@ -78,10 +132,16 @@ test('an animation goes to the last shape and back', async (t) => {
 });
 
 test('view explains why it cannot draw a file', async (t) => {
-  const where = await folder(t), broken = square({ uv: corners, image: Buffer.from('no image at all') });
+  const where = await folder(t);
+  const broken = square({ uv: corners, image: Buffer.from('no image at all') });
   await writeFile(path.join(where, 'cut.glb'), square({}).subarray(0, 200));
   await writeFile(path.join(where, 'image.glb'), broken);
-  for (const [file, why] of [['cut.glb', /truncated or damaged/], ['image.glb', /texture/], ['none.glb', /No such file/], [path.join(samples, 'dog.obj'), /not a GLB/]]) {
+  for (const [file, why] of [
+    ['cut.glb', /truncated or damaged/],
+    ['image.glb', /texture/],
+    ['none.glb', /No such file/],
+    [path.join(samples, 'dog.obj'), /not a GLB/],
+  ]) {
     const { code, err } = await run(['view', file, '-o', 'o.png'], { cwd: where });
     assert.equal(code, 2, err);
     assert.match(err, why);

@@ -1,8 +1,9 @@
-// How fluent the studio is with large shapes, beside a bare three.js page that shows the same GLB in the same browser:
-//   node tests/studio/bench.mjs [LEVEL] [--software-compositing]     20·4^LEVEL triangles a shape; 7 (327,680) unless told
-// Prints one JSON object: median frames while scrubbing (ms) of both pages, their ratio, and for each step the long tasks
-// of the main thread, with the time that the thread itself computed (see bench/tasks.mjs). The daemon's answers are made
-// here, so that only the page is measured; the page is client/web/dist. docs/bench-studio.md says what was found.
+// Measures the studio with large shapes, and a bare three.js page that shows the same GLB in the same browser:
+//   node tests/studio/bench.mjs [LEVEL] [--software-compositing]
+// A shape has 20·4^LEVEL triangles; the default level is 7 (327,680 triangles). Prints one JSON object: the median
+// frame time (ms) of both pages while scrubbing, their ratio, and for each step the long tasks of the main thread with
+// their CPU time (see bench/tasks.mjs). A stub replaces the daemon, so that only the page (client/web/dist) is
+// measured. docs/bench-studio.md has the results.
 import { createServer } from 'node:http';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -43,11 +44,26 @@ const triangles = sphere.faces.length / 3;
 const asset = glb(sphere);
 const meshes = objFiles(sphere).map((file, i) => ({ id: String(i).repeat(64), file }));
 const supermesh = {
-  id: 'e'.repeat(64), url: `/v1/supermeshes/${'e'.repeat(64)}`, asset: `/v1/supermeshes/${'e'.repeat(64)}/asset.glb`, vertices, triangles,
-  shapes: meshes.map((m, i) => ({ mesh: m.id, name: `shape${i}`, hausdorff_relative: 0, rms_relative: 0 })), landmarks: [],
-  certificate: { closed: true, genus: 0, flipped: [0, 0], degree: [1, 1] }, timings_ms: { total: 1 }, engine: 'bench',
+  id: 'e'.repeat(64),
+  url: `/v1/supermeshes/${'e'.repeat(64)}`,
+  asset: `/v1/supermeshes/${'e'.repeat(64)}/asset.glb`,
+  vertices,
+  triangles,
+  shapes: meshes.map((m, i) => ({ mesh: m.id, name: `shape${i}`, hausdorff_relative: 0, rms_relative: 0 })),
+  landmarks: [],
+  certificate: { closed: true, genus: 0, flipped: [0, 0], degree: [1, 1] },
+  timings_ms: { total: 1 },
+  engine: 'bench',
 };
-const describe = (m, i) => ({ id: m.id, url: `/v1/meshes/${m.id}`, name: `shape${i}`, format: 'obj', vertices, triangles, repairs: [] });
+const describe = (m, i) => ({
+  id: m.id,
+  url: `/v1/meshes/${m.id}`,
+  name: `shape${i}`,
+  format: 'obj',
+  vertices,
+  triangles,
+  repairs: [],
+});
 const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.svg': 'image/svg+xml' };
 const folder = mkdtempSync(join(tmpdir(), 'orbmorph-bench-'));
 let uploads = 0;
@@ -55,13 +71,20 @@ const server = createServer((req, res) => {
   const path = new URL(req.url, 'http://x').pathname;
   const json = (value) => res.writeHead(200, { 'Content-Type': 'application/json' }).end(JSON.stringify(value));
   if (req.method === 'POST') {
-    req.resume().on('end', () => json(path === '/v1/meshes' ? describe(meshes[uploads % 2], uploads++ % 2) : supermesh));
+    req
+      .resume()
+      .on('end', () => json(path === '/v1/meshes' ? describe(meshes[uploads % 2], uploads++ % 2) : supermesh));
   } else if (path.endsWith('/asset.glb')) res.writeHead(200, { 'Content-Type': 'model/gltf-binary' }).end(asset);
   else if (path.startsWith('/v1/supermeshes/')) json(supermesh);
   else if (path === '/bare') res.writeHead(200, { 'Content-Type': 'text/html' }).end(BARE);
   else {
-    const file = path.startsWith('/three/') ? join(root, 'client/web/node_modules/three', path.slice(7)) : join(root, 'client/web/dist', path === '/' ? 'index.html' : path);
-    if (existsSync(file)) res.writeHead(200, { 'Content-Type': TYPES[extname(file)] ?? 'application/octet-stream' }).end(readFileSync(file));
+    const file = path.startsWith('/three/')
+      ? join(root, 'client/web/node_modules/three', path.slice(7))
+      : join(root, 'client/web/dist', path === '/' ? 'index.html' : path);
+    if (existsSync(file))
+      res
+        .writeHead(200, { 'Content-Type': TYPES[extname(file)] ?? 'application/octet-stream' })
+        .end(readFileSync(file));
     else res.writeHead(404).end();
   }
 });
@@ -70,29 +93,34 @@ const url = `http://127.0.0.1:${server.address().port}`;
 const browser = await startBrowser({ compositing });
 
 /**
- * Gives a new value as soon as the last one is drawn, 22 times, and -> the median time between drawings. The studio says
- * so by an event of its stage, for it draws in a worker; the bare page draws in its animation frames.
+ * Sets a new value as soon as the last one is drawn, 22 times. Returns the median time between drawings. The studio
+ * draws in a worker and dispatches an event after each drawing; the bare page draws in its animation frames.
  */
-const frames = (page, step) => page.evaluate(async (source) => {
-  const step = new Function('value', source);
-  const stage = document.querySelector('.stage');
-  const next = (tell) => (stage ? stage.addEventListener('drawn', () => tell(performance.now()), { once: true }) : requestAnimationFrame(tell));
-  const times = [];
-  let last = 0;
-  await new Promise((resolve) => {
-    let n = 0;
-    const tick = (now) => {
-      if (n > 5) times.push(now - last);
-      last = now;
-      if (n++ > 20) return resolve();
-      next(tick);
-      step(0.5 - 0.5 * Math.cos(n / 9));
-    };
-    tick(0);
-  });
-  return times.sort((a, b) => a - b)[times.length >> 1];
-}, step);
-const SCRUB = "const i = document.querySelector('.scrub input'); i.value = value; i.dispatchEvent(new Event('input', { bubbles: true }));";
+const frames = (page, step) =>
+  page.evaluate(async (source) => {
+    const step = new Function('value', source);
+    const stage = document.querySelector('.stage');
+    const next = (done) =>
+      stage
+        ? stage.addEventListener('drawn', () => done(performance.now()), { once: true })
+        : requestAnimationFrame(done);
+    const times = [];
+    let last = 0;
+    await new Promise((resolve) => {
+      let n = 0;
+      const tick = (now) => {
+        if (n > 5) times.push(now - last);
+        last = now;
+        if (n++ > 20) return resolve();
+        next(tick);
+        step(0.5 - 0.5 * Math.cos(n / 9));
+      };
+      tick(0);
+    });
+    return times.sort((a, b) => a - b)[times.length >> 1];
+  }, step);
+const SCRUB =
+  "const i = document.querySelector('.scrub input'); i.value = value; i.dispatchEvent(new Event('input', { bubbles: true }));";
 const middle = (list) => list.sort((a, b) => a - b)[list.length >> 1];
 const files = meshes.map((m, i) => {
   const path = join(folder, `shape${i}.obj`);
@@ -114,8 +142,22 @@ try {
   await step('start', page, () => page.goto(url));
   await step('open two shapes', page, async () => {
     await page.locator('input[type=file]').first().setInputFiles(files);
-    await until(() => page.locator('.card.ready .facts.good').count().then((n) => n === 2), 'both uploaded');
-    await until(() => page.locator('.caption .muted', { hasText: 'triangles' }).count().then((n) => n === 2), 'both drawn');
+    await until(
+      () =>
+        page
+          .locator('.card.ready .facts.good')
+          .count()
+          .then((n) => n === 2),
+      'both uploaded',
+    );
+    await until(
+      () =>
+        page
+          .locator('.caption .muted', { hasText: 'triangles' })
+          .count()
+          .then((n) => n === 2),
+      'both drawn',
+    );
     await page.waitForTimeout(1500);
   });
   await step('pick', page, async () => {
@@ -150,8 +192,23 @@ try {
     await page.getByRole('switch', { name: 'Wireframe' }).click();
     await page.waitForTimeout(1500);
   });
-  const longest = Object.fromEntries(Object.entries(tasks).map(([name, list]) => [name, list.sort((a, b) => b.ms - a.ms).slice(0, 4)]));
-  console.log(JSON.stringify({ triangles, compositing, studio_ms: middle(studio), bare_ms: middle(plain), ratio: middle(studio) / middle(plain), long_tasks: longest }, null, 1));
+  const longest = Object.fromEntries(
+    Object.entries(tasks).map(([name, list]) => [name, list.sort((a, b) => b.ms - a.ms).slice(0, 4)]),
+  );
+  console.log(
+    JSON.stringify(
+      {
+        triangles,
+        compositing,
+        studio_ms: middle(studio),
+        bare_ms: middle(plain),
+        ratio: middle(studio) / middle(plain),
+        long_tasks: longest,
+      },
+      null,
+      1,
+    ),
+  );
 } finally {
   await browser.close();
   server.close();

@@ -1,4 +1,4 @@
-// The types of the studio and of the JavaScript client, by the compiler that client/web has. 77 where it is not there.
+// Checks the types of the studio and the JavaScript client with client/web's compiler. Exits with 77 if it is missing.
 import { spawnSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
 import { join } from 'node:path';
@@ -7,10 +7,12 @@ import { fileURLToPath } from 'node:url';
 const root = fileURLToPath(new URL('../../', import.meta.url));
 const compiler = join(root, 'client/web/node_modules/typescript/bin/tsc');
 if (!existsSync(compiler)) {
-  console.log('skipped: client/web/node_modules is not there (client/web/build.sh)');
+  console.log('skipped: client/web/node_modules is missing (client/web/build.sh)');
   process.exit(77);
 }
 let failed = false;
 for (const folder of ['client/js', 'client/web'])
-  failed = spawnSync(process.execPath, [compiler, '--noEmit', '-p', join(root, folder)], { stdio: 'inherit' }).status !== 0 || failed;
+  failed =
+    spawnSync(process.execPath, [compiler, '--noEmit', '-p', join(root, folder)], { stdio: 'inherit' }).status !== 0 ||
+    failed;
 process.exit(failed ? 1 : 0);

@@ -1,4 +1,4 @@
-// The example page of the JavaScript client: two files in, a moving morph out.
+// The example page of the JavaScript client turns two files into a moving morph.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
@@ -13,7 +13,8 @@ before(async () => {
   daemon = await startDaemon();
   browser = await startBrowser();
   server = spawn(process.execPath, [join(root, 'client/js/example/serve.mjs')], {
-    env: { ...process.env, ORBMORPH_SERVER: daemon.url, PORT: '0' }, stdio: ['ignore', 'pipe', 'inherit'],
+    env: { ...process.env, ORBMORPH_SERVER: daemon.url, PORT: '0' },
+    stdio: ['ignore', 'pipe', 'inherit'],
   });
   url = await new Promise((resolve) => server.stdout.on('data', (text) => resolve(String(text).match(/http:\S+/)[0])));
 });
@@ -27,7 +28,14 @@ test('the example plays a morph of two files', async () => {
   const { page, done } = await openPage(browser, url, { viewport: { width: 640, height: 480 } });
   await page.locator('#files').setInputFiles([sample('dog.obj'), sample('giraffe.off')]);
   await page.getByRole('button', { name: 'Morph' }).click();
-  await until(() => page.locator('#status').innerText().then((text) => /\d+ triangles for dog, giraffe/.test(text)), 'the morph is there');
+  await until(
+    () =>
+      page
+        .locator('#status')
+        .innerText()
+        .then((text) => /\d+ triangles for dog, giraffe/.test(text)),
+    'the morph is there',
+  );
   const first = await page.screenshot();
   await until(async () => (await difference(browser, first, await page.screenshot())) > 0.005, 'it moves');
   await done();

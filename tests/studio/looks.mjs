@@ -1,21 +1,38 @@
-// The scenes of the studio whose looks are kept: how to come there, and comparing by pictures.
-//   node tests/studio/looks.mjs [SCENE…]               takes the reference pictures anew (tests/studio/looks/SCENE.png)
-//   ORB_PICTURE=FILE.png node tests/studio/looks.mjs SCENE   one picture as it is, for the documents
+// The scenes of the studio that have reference pictures: how to reach them, and how to compare pictures.
+//   node tests/studio/looks.mjs [SCENE…]                     retakes reference pictures (tests/studio/looks/SCENE.png)
+//   ORB_PICTURE=FILE.png node tests/studio/looks.mjs SCENE   takes one picture at full size, for the documents
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { addFiles, adopt, button, clickView, hush, openPage, root, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
+import {
+  addFiles,
+  adopt,
+  button,
+  clickView,
+  hideToasts,
+  openPage,
+  root,
+  sample,
+  settled,
+  startBrowser,
+  startDaemon,
+  until,
+} from './support.mjs';
 
 export const folder = join(root, 'tests/studio/looks');
 const pair = [sample('dog.obj'), sample('giraffe.off')];
 const SMALL = { viewport: { width: 390, height: 780 }, hasTouch: true, isMobile: true };
 
-const without = (file, keep) => ({ name: `${file.split('.')[0]}.obj`, mimeType: 'text/plain',
-  buffer: Buffer.from(readFileSync(sample(file), 'utf8').split('\n').filter(keep()).join('\n')) });
-const open = () => without('dog.obj', () => {
-  let left = 60;
-  return (line) => !(line.startsWith('f ') && left-- > 0);
+const without = (file, keep) => ({
+  name: `${file.split('.')[0]}.obj`,
+  mimeType: 'text/plain',
+  buffer: Buffer.from(readFileSync(sample(file), 'utf8').split('\n').filter(keep()).join('\n')),
 });
+const open = () =>
+  without('dog.obj', () => {
+    let left = 60;
+    return (line) => !(line.startsWith('f ') && left-- > 0);
+  });
 
 async function landmarked(page) {
   await addFiles(page, ...pair);
@@ -29,90 +46,148 @@ async function morphed(page) {
   await until(() => button(page, 'Pause').count(), 'the morph plays');
   await button(page, 'Pause').click();
 }
-const slide = (page, name, value) => page.getByRole('slider', { name }).evaluate((input, v) => {
-  input.value = String(v);
-  input.dispatchEvent(new Event('input', { bubbles: true }));
-}, value);
+const slide = (page, name, value) =>
+  page.getByRole('slider', { name }).evaluate((input, v) => {
+    input.value = String(v);
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+  }, value);
 async function spheres(page) {
   await button(page, 'Spheres').click();
-  await until(() => page.getByText('Certified one to one').count().then((n) => n === 2), 'both are embedded');
+  await until(
+    () =>
+      page
+        .getByText('Certified one to one')
+        .count()
+        .then((n) => n === 2),
+    'both are embedded',
+  );
+  const working = page.locator('.centered').getByRole('progressbar');
+  await until(() => working.count().then((n) => n === 0), 'both spheres are loaded');
 }
 
-/** name: [how to come there, options of the page] */
+/** name: [steps that lead to the scene, options of the page] */
 export const SCENES = {
   empty: [async () => {}],
   'empty-dark': [async () => {}, { colorScheme: 'dark' }],
   shapes: [(page) => addFiles(page, ...pair)],
-  'shapes-dark': [async (page) => {
-    await addFiles(page, ...pair, sample('elephant.ply'));
-    await page.getByRole('switch', { name: 'Wireframe' }).click();
-  }, { colorScheme: 'dark' }],
+  'shapes-dark': [
+    async (page) => {
+      await addFiles(page, ...pair, sample('elephant.ply'));
+      await page.getByRole('switch', { name: 'Wireframe' }).click();
+    },
+    { colorScheme: 'dark' },
+  ],
   'shapes-small': [(page) => addFiles(page, ...pair), SMALL],
-  refused: [async (page) => {
-    await page.locator('input[type=file]').first().setInputFiles([open()]);
-    await until(() => page.getByText('Shown in red on the model.').count(), 'the rim is found');
-  }],
-  landmarks: [async (page) => {
-    await landmarked(page);
-    await clickView(page, 0, 0.5, 0.5);
-    await page.locator('.wanted').waitFor();
-  }],
-  morph: [async (page) => {
-    await morphed(page);
-    await slide(page, 'Along the morph', 0.5);
-  }],
-  'morph-dark': [async (page) => {
-    await morphed(page);
-    await slide(page, 'Share of dog', 0.25);
-    await page.getByRole('switch', { name: 'Wireframe' }).click();
-  }, { colorScheme: 'dark' }],
-  'morph-small': [async (page) => {
-    await morphed(page);
-    await slide(page, 'Along the morph', 0.5);
-  }, SMALL],
-  each: [async (page) => {
-    await morphed(page);
-    await button(page, 'Each shape').click();
-  }],
-  error: [async (page) => {
-    await morphed(page);
-    await button(page, 'Error').click();
-    await until(() => page.locator('.pane .legend').count().then((n) => n === 2), 'both are measured');
-  }],
-  'use-it': [async (page) => {
-    await morphed(page);
-    await button(page, 'Use it').click();
-  }],
-  'spheres-before': [async (page) => {
-    await morphed(page);
-    await spheres(page);
-  }],
-  'spheres-after': [async (page) => {
-    await morphed(page);
-    await spheres(page);
-    await button(page, 'Checkerboard').click();
-    await button(page, 'After').click();
-    await until(() => page.getByText('on the common sphere').count().then((n) => n === 2), 'they are aligned');
-    await until(() => page.locator('.marker.small').count().then((n) => n > 2), 'landmarks are on them');
-  }],
-  'heat-map': [async (page) => {
-    await addFiles(page, ...pair);
-    await spheres(page);
-    await button(page, 'Stretch').click();
-  }],
+  refused: [
+    async (page) => {
+      await page.locator('input[type=file]').first().setInputFiles([open()]);
+      await until(() => page.getByText('Shown in red on the model.').count(), 'the rim is found');
+    },
+  ],
+  landmarks: [
+    async (page) => {
+      await landmarked(page);
+      await clickView(page, 0, 0.5, 0.5);
+      await page.locator('.wanted').waitFor();
+    },
+  ],
+  morph: [
+    async (page) => {
+      await morphed(page);
+      await slide(page, 'Along the morph', 0.5);
+    },
+  ],
+  'morph-dark': [
+    async (page) => {
+      await morphed(page);
+      await slide(page, 'Share of dog', 0.25);
+      await page.getByRole('switch', { name: 'Wireframe' }).click();
+    },
+    { colorScheme: 'dark' },
+  ],
+  'morph-small': [
+    async (page) => {
+      await morphed(page);
+      await slide(page, 'Along the morph', 0.5);
+    },
+    SMALL,
+  ],
+  each: [
+    async (page) => {
+      await morphed(page);
+      await button(page, 'Each shape').click();
+    },
+  ],
+  error: [
+    async (page) => {
+      await morphed(page);
+      await button(page, 'Error').click();
+      await until(
+        () =>
+          page
+            .locator('.pane .legend')
+            .count()
+            .then((n) => n === 2),
+        'both are measured',
+      );
+    },
+  ],
+  'use-it': [
+    async (page) => {
+      await morphed(page);
+      await button(page, 'Use it').click();
+    },
+  ],
+  'spheres-before': [
+    async (page) => {
+      await morphed(page);
+      await spheres(page);
+    },
+  ],
+  'spheres-after': [
+    async (page) => {
+      await morphed(page);
+      await spheres(page);
+      await button(page, 'Checkerboard').click();
+      await button(page, 'After').click();
+      await until(
+        () =>
+          page
+            .getByText('on the common sphere')
+            .count()
+            .then((n) => n === 2),
+        'they are aligned',
+      );
+      await until(
+        () =>
+          page
+            .locator('.marker.small')
+            .count()
+            .then((n) => n > 2),
+        'landmarks are on them',
+      );
+    },
+  ],
+  'heat-map': [
+    async (page) => {
+      await addFiles(page, ...pair);
+      await spheres(page);
+      await button(page, 'Stretch').click();
+    },
+  ],
 };
 
-/** What differs from run to run: times, and how long things took. */
+/** Hides what differs between runs: timings and the text cursor. */
 const STEADY = '[data-varies] { visibility: hidden !important; } * { caret-color: transparent !important; }';
 
-/** A picture of a scene as PNG: half size, or as it is. */
+/** Takes a picture of a scene as PNG, at half size or at full size (`whole`). */
 export async function look(browser, url, name, whole = false) {
-  const [come, options] = SCENES[name];
+  const [reach, options] = SCENES[name];
   const { page, done } = await openPage(browser, url, { colorScheme: 'light', ...options });
   await page.evaluate(() => document.fonts.ready);
-  await come(page);
+  await reach(page);
   await adopt(page, STEADY);
-  await hush(page);
+  await hideToasts(page);
   await page.mouse.move(2, 2);
   await page.evaluate(() => document.activeElement?.blur());
   await settled(page);
@@ -126,14 +201,17 @@ async function halved(page, png) {
   const helper = await page.context().browser().newPage();
   try {
     const text = await helper.evaluate(async (data) => {
-      const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }));
+      const bitmap = await createImageBitmap(
+        new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }),
+      );
       const canvas = new OffscreenCanvas(bitmap.width >> 1, bitmap.height >> 1);
       const context = canvas.getContext('2d');
       context.imageSmoothingQuality = 'high';
       context.drawImage(bitmap, 0, 0, canvas.width, canvas.height);
-      // 32 levels a channel: the file is a third as large, and blocks average out what is lost
+      // 32 levels per channel make the file a third as large; averaging over blocks hides the loss
       const pixels = context.getImageData(0, 0, canvas.width, canvas.height);
-      for (let i = 0; i < pixels.data.length; i++) if (i % 4 < 3) pixels.data[i] = Math.round(Math.round(pixels.data[i] / 8.226) * 8.226);
+      for (let i = 0; i < pixels.data.length; i++)
+        if (i % 4 < 3) pixels.data[i] = Math.round(Math.round(pixels.data[i] / 8.226) * 8.226);
       context.putImageData(pixels, 0, 0);
       const bytes = new Uint8Array(await (await canvas.convertToBlob({ type: 'image/png' })).arrayBuffer());
       let out = '';
@@ -147,41 +225,48 @@ async function halved(page, png) {
 }
 
 /**
- * How far two pictures are apart: the largest and the mean difference of the mean colours of blocks of 8 × 8 pixels
- * (0 to 255), and the share of blocks that differ by more than 20. Edges that fall otherwise, and the smoothing of
- * another GPU or another font renderer, average out in a block; a missing shape, colour or panel does not.
+ * Compares the mean colours (0 to 255) of blocks of 8 × 8 pixels. Returns the mean difference and the share of blocks
+ * that differ by more than 20. Another GPU or font renderer draws edges differently, which averages out in a block; a
+ * missing shape, colour or panel does not.
  */
 export async function apart(browser, a, b) {
   const page = await browser.newPage();
   try {
-    return await page.evaluate(async (both) => {
-      const read = async (data) => {
-        const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }));
-        const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-        context.drawImage(bitmap, 0, 0);
-        return context.getImageData(0, 0, bitmap.width, bitmap.height);
-      };
-      const [x, y] = [await read(both[0]), await read(both[1])];
-      if (x.width !== y.width || x.height !== y.height) return { size: [x.width, x.height, y.width, y.height], share: 1, mean: 255 };
-      const SIDE = 8;
-      let blocks = 0;
-      let many = 0;
-      let sum = 0;
-      for (let top = 0; top + SIDE <= x.height; top += SIDE)
-        for (let left = 0; left + SIDE <= x.width; left += SIDE) {
-          const d = [0, 0, 0];
-          for (let j = 0; j < SIDE; j++)
-            for (let i = 0; i < SIDE; i++) for (let c = 0; c < 3; c++) {
-              const at = 4 * ((top + j) * x.width + left + i) + c;
-              d[c] += x.data[at] - y.data[at];
-            }
-          const far = Math.max(...d.map(Math.abs)) / (SIDE * SIDE);
-          blocks++;
-          sum += far;
-          if (far > 20) many++;
-        }
-      return { share: many / blocks, mean: sum / blocks };
-    }, [a.toString('base64'), b.toString('base64')]);
+    return await page.evaluate(
+      async (both) => {
+        const read = async (data) => {
+          const bitmap = await createImageBitmap(
+            new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }),
+          );
+          const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+          context.drawImage(bitmap, 0, 0);
+          return context.getImageData(0, 0, bitmap.width, bitmap.height);
+        };
+        const [x, y] = [await read(both[0]), await read(both[1])];
+        if (x.width !== y.width || x.height !== y.height)
+          return { size: [x.width, x.height, y.width, y.height], share: 1, mean: 255 };
+        const SIDE = 8;
+        let blocks = 0;
+        let many = 0;
+        let sum = 0;
+        for (let top = 0; top + SIDE <= x.height; top += SIDE)
+          for (let left = 0; left + SIDE <= x.width; left += SIDE) {
+            const d = [0, 0, 0];
+            for (let j = 0; j < SIDE; j++)
+              for (let i = 0; i < SIDE; i++)
+                for (let c = 0; c < 3; c++) {
+                  const at = 4 * ((top + j) * x.width + left + i) + c;
+                  d[c] += x.data[at] - y.data[at];
+                }
+            const far = Math.max(...d.map(Math.abs)) / (SIDE * SIDE);
+            blocks++;
+            sum += far;
+            if (far > 20) many++;
+          }
+        return { share: many / blocks, mean: sum / blocks };
+      },
+      [a.toString('base64'), b.toString('base64')],
+    );
   } finally {
     await page.close();
   }
@@ -194,11 +279,12 @@ if (process.argv[1] === fileURLToPath(import.meta.url)) {
   try {
     const picture = process.env.ORB_PICTURE;
     if (picture) writeFileSync(picture, await look(browser, daemon.url, process.argv[2], true));
-    else for (const name of process.argv.length > 2 ? process.argv.slice(2) : Object.keys(SCENES)) {
-      const png = await look(browser, daemon.url, name);
-      writeFileSync(join(folder, `${name}.png`), png);
-      console.log(`${name}.png ${png.length} bytes`);
-    }
+    else
+      for (const name of process.argv.length > 2 ? process.argv.slice(2) : Object.keys(SCENES)) {
+        const png = await look(browser, daemon.url, name);
+        writeFileSync(join(folder, `${name}.png`), png);
+        console.log(`${name}.png ${png.length} bytes`);
+      }
   } finally {
     await browser.close();
     await daemon.stop();

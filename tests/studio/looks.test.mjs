@@ -1,4 +1,4 @@
-// How the studio looks, beside stored pictures: node tests/studio/looks.mjs takes them anew (then look at them).
+// Compares the studio with the reference pictures. node tests/studio/looks.mjs retakes them; look at them afterwards.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
@@ -22,7 +22,7 @@ after(async () => {
 for (const name of Object.keys(SCENES))
   test(name, async () => {
     const stored = join(folder, `${name}.png`);
-    assert.ok(existsSync(stored), `there is no ${stored}: node tests/studio/looks.mjs ${name}`);
+    assert.ok(existsSync(stored), `${stored} is missing: node tests/studio/looks.mjs ${name}`);
     const now = await look(browser, daemon.url, name);
     const { share, mean, size } = await apart(browser, now, await readFile(stored));
     const kept = join(tmpdir(), 'orbmorph-looks', `${name}.png`);
@@ -31,10 +31,13 @@ for (const name of Object.keys(SCENES))
       await mkdir(join(tmpdir(), 'orbmorph-looks'), { recursive: true });
       await writeFile(kept, now);
     }
-    assert.ok(fine, `${(100 * share).toFixed(1)} % of it looks otherwise (mean ${mean.toFixed(1)}${size ? `, sizes ${size}` : ''}); now: ${kept}`);
+    assert.ok(
+      fine,
+      `${(100 * share).toFixed(1)} % of the blocks differ (mean ${mean.toFixed(1)}${size ? `, sizes ${size}` : ''}), see ${kept}`,
+    );
   });
 
-test('a picture of something else is told apart', async () => {
+test('the comparison detects another picture', async () => {
   const [a, b] = await Promise.all(['shapes', 'landmarks'].map((name) => readFile(join(folder, `${name}.png`))));
   assert.ok((await apart(browser, a, b)).share > 0.03);
   assert.deepEqual(await apart(browser, a, a), { share: 0, mean: 0 });

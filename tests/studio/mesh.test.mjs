@@ -1,4 +1,4 @@
-// The studio's own readers and measures, against small files written here and against plain computations.
+// Checks the studio's own readers and measures with small files and straightforward computations.
 import { before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
@@ -15,11 +15,16 @@ before(async () => {
   const out = join(await mkdtemp(join(tmpdir(), 'orbmorph-mesh-')), 'mesh.mjs');
   await build({
     stdin: {
-      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion'].map((name) => `export * from './${name}.ts';`).join('\n'),
+      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion']
+        .map((name) => `export * from './${name}.ts';`)
+        .join('\n'),
       resolveDir: join(root, 'client/web/src/mesh'),
       loader: 'ts',
     },
-    bundle: true, format: 'esm', target: 'node18', outfile: out,
+    bundle: true,
+    format: 'esm',
+    target: 'node18',
+    outfile: out,
   });
   mesh = await import(pathToFileURL(out));
 });
@@ -29,11 +34,25 @@ const file = async (path) => {
   const bytes = await readFile(path);
   return bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
 };
-const TETRAHEDRON = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
-const FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+const TETRAHEDRON = [
+  [0, 0, 0],
+  [1, 0, 0],
+  [0, 1, 0],
+  [0, 0, 1],
+];
+const FACES = [
+  [0, 2, 1],
+  [0, 1, 3],
+  [1, 2, 3],
+  [0, 3, 2],
+];
 
 test('OBJ: numbers, slashes, negative indices, polygons, comments, line ends', () => {
-  const raw = mesh.parseMesh(text('# a comment\r\nv 0 0 0\r\nv 1e0 .0 -0\r\nv 0 1. 0\nv 1 1 0 1.0\nv 0 0 +2.5e-1\nvn 0 0 1\nf 1/1/1 2//1 4 3\nf -1 -5 -4\nf 1 2 \\\n 5\n'));
+  const raw = mesh.parseMesh(
+    text(
+      '# a comment\r\nv 0 0 0\r\nv 1e0 .0 -0\r\nv 0 1. 0\nv 1 1 0 1.0\nv 0 0 +2.5e-1\nvn 0 0 1\nf 1/1/1 2//1 4 3\nf -1 -5 -4\nf 1 2 \\\n 5\n',
+    ),
+  );
   assert.equal(raw.format, 'obj');
   assert.deepEqual([...raw.positions], [0, 0, 0, 1, 0, -0, 0, 1, 0, 1, 1, 0, 0, 0, 0.25]);
   assert.deepEqual([...raw.corners], [0, 1, 3, 0, 3, 2, 4, 0, 1, 0, 1, 4]);
@@ -41,15 +60,31 @@ test('OBJ: numbers, slashes, negative indices, polygons, comments, line ends', (
 
 test('OFF: counts on the first line or the next, comments, colours after faces', () => {
   for (const head of ['OFF\n# c\n4 4 6\n', 'OFF 4 4 6\n', 'OFF\n4 4 0\n']) {
-    const raw = mesh.parseMesh(text(head + TETRAHEDRON.map((p) => p.join(' ')).join('\n') + '\n' + FACES.map((f) => `3 ${f.join(' ')} 255 0 0`).join('\n')));
+    const raw = mesh.parseMesh(
+      text(
+        head +
+          TETRAHEDRON.map((p) => p.join(' ')).join('\n') +
+          '\n' +
+          FACES.map((f) => `3 ${f.join(' ')} 255 0 0`).join('\n'),
+      ),
+    );
     assert.deepEqual([...raw.corners], FACES.flat());
     assert.deepEqual([...raw.positions], TETRAHEDRON.flat());
   }
 });
 
-test('PLY: text, binary in both orders, further properties and elements', () => {
-  const header = (format) => `ply\nformat ${format} 1.0\ncomment c\nelement vertex 4\nproperty uchar red\nproperty double x\nproperty float y\nproperty float z\nelement face 4\nproperty list uchar int vertex_indices\nproperty uchar flag\nend_header\n`;
-  const ascii = mesh.parseMesh(text(header('ascii') + TETRAHEDRON.map((p) => `7 ${p.join(' ')}`).join('\n') + '\n' + FACES.map((f) => `3 ${f.join(' ')} 9`).join('\n') + '\n'));
+test('PLY: text, binary in both orders, other properties and elements', () => {
+  const header = (format) =>
+    `ply\nformat ${format} 1.0\ncomment c\nelement vertex 4\nproperty uchar red\nproperty double x\nproperty float y\nproperty float z\nelement face 4\nproperty list uchar int vertex_indices\nproperty uchar flag\nend_header\n`;
+  const ascii = mesh.parseMesh(
+    text(
+      header('ascii') +
+        TETRAHEDRON.map((p) => `7 ${p.join(' ')}`).join('\n') +
+        '\n' +
+        FACES.map((f) => `3 ${f.join(' ')} 9`).join('\n') +
+        '\n',
+    ),
+  );
   assert.deepEqual([...ascii.corners], FACES.flat());
   for (const little of [true, false]) {
     const head = new TextEncoder().encode(header(little ? 'binary_little_endian' : 'binary_big_endian'));
@@ -79,19 +114,32 @@ test('PLY: text, binary in both orders, further properties and elements', () => 
 });
 
 test('STL: corner k of facet i is vertex 3i + k, in text and binary', () => {
-  const solid = 'solid s\n' + FACES.map((f) => `facet normal 0 0 0\nouter loop\n${f.map((v) => `vertex ${TETRAHEDRON[v].join(' ')}`).join('\n')}\nendloop\nendfacet\n`).join('') + 'endsolid s\n';
+  const solid =
+    'solid s\n' +
+    FACES.map(
+      (f) =>
+        `facet normal 0 0 0\nouter loop\n${f.map((v) => `vertex ${TETRAHEDRON[v].join(' ')}`).join('\n')}\nendloop\nendfacet\n`,
+    ).join('') +
+    'endsolid s\n';
   const binary = new DataView(new ArrayBuffer(84 + 50 * 4));
   binary.setUint32(80, 4, true);
-  FACES.forEach((f, i) => f.forEach((v, c) => TETRAHEDRON[v].forEach((x, k) => binary.setFloat32(84 + 50 * i + 12 + 12 * c + 4 * k, x, true))));
+  FACES.forEach((f, i) =>
+    f.forEach((v, c) =>
+      TETRAHEDRON[v].forEach((x, k) => binary.setFloat32(84 + 50 * i + 12 + 12 * c + 4 * k, x, true)),
+    ),
+  );
   for (const raw of [mesh.parseMesh(text(solid)), mesh.parseMesh(binary.buffer)]) {
     assert.equal(raw.format, 'stl');
-    assert.deepEqual([...raw.positions], FACES.flat().flatMap((v) => TETRAHEDRON[v]));
+    assert.deepEqual(
+      [...raw.positions],
+      FACES.flat().flatMap((v) => TETRAHEDRON[v]),
+    );
     assert.deepEqual([...raw.corners], [...Array(12).keys()]);
   }
   const display = mesh.buildDisplay(mesh.parseMesh(binary.buffer));
   assert.equal(new Set(display.edges).size > 0, true);
-  assert.equal(mesh.faultyEdges(mesh.parseMesh(binary.buffer), true).length, 0, 'closed once welded');
-  assert.equal(mesh.faultyEdges(mesh.parseMesh(binary.buffer), false).length, 24, 'every edge open in the file');
+  assert.equal(mesh.defectiveEdges(mesh.parseMesh(binary.buffer), true).length, 0, 'closed once welded');
+  assert.equal(mesh.defectiveEdges(mesh.parseMesh(binary.buffer), false).length, 24, 'every edge open in the file');
 });
 
 test('glTF: accessors of all primitives one after another, after node transforms', () => {
@@ -99,33 +147,60 @@ test('glTF: accessors of all primitives one after another, after node transforms
   const indices = Buffer.from(Uint16Array.from(FACES.flat()).buffer);
   const data = Buffer.concat([positions, indices]).toString('base64');
   const json = {
-    asset: { version: '2.0' }, scenes: [{ nodes: [0] }], nodes: [{ children: [1], translation: [10, 0, 0] }, { mesh: 0, scale: [2, 2, 2] }],
-    meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1 }, { attributes: { POSITION: 0 }, indices: 1, mode: 1 }, { attributes: { POSITION: 0 }, indices: 1 }] }],
-    accessors: [{ bufferView: 0, componentType: 5126, count: 4, type: 'VEC3' }, { bufferView: 1, componentType: 5123, count: 12, type: 'SCALAR' }],
-    bufferViews: [{ buffer: 0, byteLength: 48 }, { buffer: 0, byteOffset: 48, byteLength: 24 }],
+    asset: { version: '2.0' },
+    scenes: [{ nodes: [0] }],
+    nodes: [
+      { children: [1], translation: [10, 0, 0] },
+      { mesh: 0, scale: [2, 2, 2] },
+    ],
+    meshes: [
+      {
+        primitives: [
+          { attributes: { POSITION: 0 }, indices: 1 },
+          { attributes: { POSITION: 0 }, indices: 1, mode: 1 },
+          { attributes: { POSITION: 0 }, indices: 1 },
+        ],
+      },
+    ],
+    accessors: [
+      { bufferView: 0, componentType: 5126, count: 4, type: 'VEC3' },
+      { bufferView: 1, componentType: 5123, count: 12, type: 'SCALAR' },
+    ],
+    bufferViews: [
+      { buffer: 0, byteLength: 48 },
+      { buffer: 0, byteOffset: 48, byteLength: 24 },
+    ],
     buffers: [{ byteLength: 72, uri: `data:application/octet-stream;base64,${data}` }],
   };
   const raw = mesh.parseMesh(text(JSON.stringify(json)));
-  assert.deepEqual([...raw.positions.slice(0, 12)], TETRAHEDRON.flatMap(([x, y, z]) => [10 + 2 * x, 2 * y, 2 * z]));
+  assert.deepEqual(
+    [...raw.positions.slice(0, 12)],
+    TETRAHEDRON.flatMap(([x, y, z]) => [10 + 2 * x, 2 * y, 2 * z]),
+  );
   assert.deepEqual([...raw.corners], [...FACES.flat(), ...FACES.flat().map((v) => v + 4)]);
 });
 
-test('what cannot be drawn is left out, and nothing throws on rubbish', () => {
+test('what cannot be drawn is left out, and invalid files do not throw', () => {
   const raw = mesh.parseMesh(text('v 0 0 0\nv 1 0 0\nv nan 1 0\nv 0 1 0\nf 1 2 4\nf 1 2 3\nf 1 2 9\n'));
   assert.deepEqual([...raw.corners], [0, 1, 3]);
   assert.equal(mesh.parseMesh(text('Dear Sir or Madam')).corners.length, 0);
   assert.equal(mesh.parseMesh(new ArrayBuffer(0)).corners.length, 0);
 });
 
-test('the samples are closed, and their geometry is what the files say', async () => {
-  for (const [name, triangles] of [['dog.obj', 5600], ['giraffe.off', null], ['elephant.ply', 5400]]) {
+test('the samples are closed, and their geometry is that of the files', async () => {
+  for (const [name, triangles] of [
+    ['dog.obj', 5600],
+    ['giraffe.off', null],
+    ['elephant.ply', 5400],
+  ]) {
     const raw = mesh.parseMesh(await file(sample(name)));
     if (triangles) assert.equal(raw.corners.length / 3, triangles);
-    assert.equal(mesh.faultyEdges(raw, false).length, 0, name);
+    assert.equal(mesh.defectiveEdges(raw, false).length, 0, name);
     const display = mesh.buildDisplay(raw);
     assert.equal(mesh.edgesOf(raw.corners).length / 2, (raw.corners.length / 3) * 1.5, 'edges = 3/2 triangles');
     let far = 0;
-    for (let i = 0; i < display.position.length; i += 3) far = Math.max(far, Math.hypot(display.position[i], display.position[i + 1], display.position[i + 2]));
+    for (let i = 0; i < display.position.length; i += 3)
+      far = Math.max(far, Math.hypot(display.position[i], display.position[i + 1], display.position[i + 2]));
     assert.ok(far <= 1.0001 && far > 0.5, `${name} fills the unit ball: ${far}`);
     for (let i = 0; i < display.normal.length; i += 3)
       assert.ok(Math.abs(Math.hypot(display.normal[i], display.normal[i + 1], display.normal[i + 2]) - 1) < 1e-4);
@@ -133,7 +208,8 @@ test('the samples are closed, and their geometry is what the files say', async (
 });
 
 test('a cube keeps its edges, a sphere has none', () => {
-  const cube = 'v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nf 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 2 3 7 6\nf 1 5 8 4\n';
+  const cube =
+    'v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nf 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 2 3 7 6\nf 1 5 8 4\n';
   assert.equal(mesh.buildDisplay(mesh.parseMesh(text(cube))).position.length / 3, 24);
   assert.equal(mesh.buildDisplay(mesh.parseMesh(text(cube)), 180).position.length / 3, 8);
 });
@@ -152,11 +228,19 @@ test('rays and nearest points agree with a search through all triangles', async 
   const segment = (x, a, b) => {
     const d = sub(b, a);
     const s = Math.max(0, Math.min(1, dot(sub(x, a), d) / (dot(d, d) || 1)));
-    return Math.hypot(...sub(x, a.map((y, k) => y + s * d[k])));
+    return Math.hypot(
+      ...sub(
+        x,
+        a.map((y, k) => y + s * d[k]),
+      ),
+    );
   };
   const toTriangle = (x, a, b, c) => {
     const n = cross(sub(b, a), sub(c, a));
-    const inside = dot(cross(sub(b, a), sub(x, a)), n) >= 0 && dot(cross(sub(c, b), sub(x, b)), n) >= 0 && dot(cross(sub(a, c), sub(x, c)), n) >= 0;
+    const inside =
+      dot(cross(sub(b, a), sub(x, a)), n) >= 0 &&
+      dot(cross(sub(c, b), sub(x, b)), n) >= 0 &&
+      dot(cross(sub(a, c), sub(x, c)), n) >= 0;
     const flat = Math.abs(dot(sub(x, a), n)) / Math.hypot(...n);
     return inside ? flat : Math.min(segment(x, a, b), segment(x, b, c), segment(x, c, a));
   };
@@ -164,19 +248,30 @@ test('rays and nearest points agree with a search through all triangles', async 
   for (let round = 0; round < 60; round++) {
     const x = center.map((c) => c + 2 * radius * random());
     let least = Infinity;
-    for (let t = 0; t < corners.length; t += 3) least = Math.min(least, toTriangle(x, at(corners[t]), at(corners[t + 1]), at(corners[t + 2])));
+    for (let t = 0; t < corners.length; t += 3)
+      least = Math.min(least, toTriangle(x, at(corners[t]), at(corners[t + 1]), at(corners[t + 2])));
     const found = tree.closest(...x);
     assert.ok(Math.abs(found.t - least) < 1e-9 * radius + 1e-12, `${found.t} and ${least}`);
 
     const o = center.map((c) => c + 4 * radius * random());
-    const d = sub(center.map((c) => c + 0.6 * radius * random()), o);
+    const d = sub(
+      center.map((c) => c + 0.6 * radius * random()),
+      o,
+    );
     let first = Infinity;
     for (let t = 0; t < corners.length; t += 3) {
       const [a, b, c] = [at(corners[t]), at(corners[t + 1]), at(corners[t + 2])];
       const n = cross(sub(b, a), sub(c, a));
       const s = dot(sub(a, o), n) / dot(d, n);
       const y = o.map((v, k) => v + s * d[k]);
-      if (s > 0 && s < first && dot(cross(sub(b, a), sub(y, a)), n) >= 0 && dot(cross(sub(c, b), sub(y, b)), n) >= 0 && dot(cross(sub(a, c), sub(y, c)), n) >= 0) first = s;
+      if (
+        s > 0 &&
+        s < first &&
+        dot(cross(sub(b, a), sub(y, a)), n) >= 0 &&
+        dot(cross(sub(c, b), sub(y, b)), n) >= 0 &&
+        dot(cross(sub(a, c), sub(y, c)), n) >= 0
+      )
+        first = s;
     }
     const hit = tree.ray(...o, ...d);
     assert.equal(hit === null, first === Infinity);
@@ -192,8 +287,16 @@ test('distortion: an isometry has none, a stretch by known factors is found', ()
   // a plane grid mapped by (x, y) -> (3x, y): both areas are scaled equal, so sigma = sqrt(3) and 1 / sqrt(3)
   const x = Float64Array.from([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0]);
   const corners = Uint32Array.from([0, 1, 2, 0, 2, 3]);
-  const same = mesh.triangleDistortion(x, x.map((v) => 5 * v), corners);
-  const stretched = mesh.triangleDistortion(x, x.map((v, i) => (i % 3 === 0 ? 3 * v : v)), corners);
+  const same = mesh.triangleDistortion(
+    x,
+    x.map((v) => 5 * v),
+    corners,
+  );
+  const stretched = mesh.triangleDistortion(
+    x,
+    x.map((v, i) => (i % 3 === 0 ? 3 * v : v)),
+    corners,
+  );
   for (let t = 0; t < 2; t++) {
     assert.ok(Math.abs(same.sigma1[t] - 1) < 1e-6 && Math.abs(same.sigma2[t] - 1) < 1e-6);
     assert.ok(Math.abs(stretched.sigma1[t] - Math.sqrt(3)) < 1e-9);
@@ -203,8 +306,11 @@ test('distortion: an isometry has none, a stretch by known factors is found', ()
   assert.ok(Math.abs(same.aspect[0] - Math.SQRT1_2 / (2 - Math.SQRT2)) < 1e-9);
 });
 
-test('the way through the shapes follows the keyframes', () => {
-  const path = { times: Float32Array.of(0, 0.5, 1), weights: [Float32Array.of(0, 0), Float32Array.of(1, 0), Float32Array.of(0, 1)] };
+test('the path through the shapes follows the keyframes', () => {
+  const path = {
+    times: Float32Array.of(0, 0.5, 1),
+    weights: [Float32Array.of(0, 0), Float32Array.of(1, 0), Float32Array.of(0, 1)],
+  };
   assert.deepEqual(mesh.weightsAt(path, 0), [0, 0]);
   assert.deepEqual(mesh.weightsAt(path, 0.25), [0.5, 0]);
   assert.deepEqual(mesh.weightsAt(path, 0.5), [1, 0]);
@@ -213,8 +319,14 @@ test('the way through the shapes follows the keyframes', () => {
   assert.deepEqual(mesh.weightsAt({ times: Float32Array.of(0), weights: [new Float32Array(0)] }, 0.3), []);
 });
 
-test('in-betweens of a curved path are passed on the way, rests are not', () => {
-  const [zero, b, c, p, q] = [[0, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]].map((w) => Float32Array.from(w));
+test('the path contains the in-betweens of a curved path, but no rests', () => {
+  const [zero, b, c, p, q] = [
+    [0, 0, 0, 0],
+    [1, 0, 0, 0],
+    [0, 1, 0, 0],
+    [0, 0, 1, 0],
+    [0, 0, 0, 1],
+  ].map((w) => Float32Array.from(w));
   const path = mesh.pathOf([zero, zero, p, b, b, q, c, c, q, b], [zero, b, c]);
   assert.deepEqual([...path.times], [0, 0.25, 0.5, 0.75, 1]);
   assert.deepEqual(path.weights, [zero, p, b, q, c]);

@@ -1,9 +1,19 @@
-// What holds on every page: nothing from outside, a strict policy, names on every control, keys, no work at rest.
+// Checks every page: no request to other origins, a strict policy, named controls, keys, no drawing at rest.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { readFile } from 'node:fs/promises';
-import { addFiles, button, difference, openPage, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
+import {
+  addFiles,
+  button,
+  difference,
+  openPage,
+  sample,
+  settled,
+  startBrowser,
+  startDaemon,
+  until,
+} from './support.mjs';
 
 let daemon;
 let browser;
@@ -18,13 +28,19 @@ after(async () => {
   await daemon?.stop();
 });
 
-/** Serious and critical findings of axe. `evaluate` is not held by the page's policy, so the policy stays as it is. */
+/** Serious and critical findings of axe. `evaluate` is exempt from the page's policy, so the policy stays as it is. */
 async function findings(page) {
   await page.evaluate(axe);
   const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
   return violations
     .filter((v) => v.impact === 'serious' || v.impact === 'critical')
-    .map((v) => `${v.id}: ${v.nodes.map((n) => `${n.html.slice(0, 120)} ${n.any[0]?.message ?? ''}`).slice(0, 3).join(' | ')}`);
+    .map(
+      (v) =>
+        `${v.id}: ${v.nodes
+          .map((n) => `${n.html.slice(0, 120)} ${n.any[0]?.message ?? ''}`)
+          .slice(0, 3)
+          .join(' | ')}`,
+    );
 }
 
 test('the files have types, validators and a policy without unsafe-inline', async () => {
@@ -52,12 +68,19 @@ test('the files have types, validators and a policy without unsafe-inline', asyn
   assert.equal((await fetch(`${daemon.url}/no/such/page`)).status, 404);
 });
 
-test('the licences of what is bundled come with it', async () => {
+test('the licences of bundled packages are served', async () => {
   const file = await fetch(`${daemon.url}/licenses.txt`);
   assert.equal(file.status, 200);
   assert.match(file.headers.get('content-type'), /^text\/plain/);
   const text = await file.text();
-  for (const words of ['The orbmorph authors', 'three.js authors', 'Jason Miller', 'Inter Project Authors', 'SIL OPEN FONT LICENSE']) assert.ok(text.includes(words), words);
+  for (const words of [
+    'The orbmorph authors',
+    'three.js authors',
+    'Jason Miller',
+    'Inter Project Authors',
+    'SIL OPEN FONT LICENSE',
+  ])
+    assert.ok(text.includes(words), words);
 });
 
 for (const colorScheme of ['light', 'dark'])
@@ -86,7 +109,14 @@ for (const colorScheme of ['light', 'dark'])
     found.server = await findings(page);
     await button(page, 'Close').click();
     await button(page, 'Spheres').click();
-    await until(() => page.getByText('Certified one to one').count().then((n) => n === 2), 'spheres');
+    await until(
+      () =>
+        page
+          .getByText('Certified one to one')
+          .count()
+          .then((n) => n === 2),
+      'spheres',
+    );
     found.spheres = await findings(page);
     assert.deepEqual(found, Object.fromEntries(Object.keys(found).map((key) => [key, []])));
     await done();
@@ -99,13 +129,19 @@ test('every control has a name', async () => {
   for (const tab of ['Shapes', 'Landmarks', 'Spheres']) {
     await button(page, tab, { exact: true }).click();
     const snapshot = await page.locator('body').ariaSnapshot();
-    const nameless = snapshot.split('\n').filter((line) => /^\s*- (button|link|slider|switch|checkbox|textbox|combobox|spinbutton|application)\s*:?\s*(\[[^\]]*\])?$/.test(line));
+    const nameless = snapshot
+      .split('\n')
+      .filter((line) =>
+        /^\s*- (button|link|slider|switch|checkbox|textbox|combobox|spinbutton|application)\s*:?\s*(\[[^\]]*\])?$/.test(
+          line,
+        ),
+      );
     assert.deepEqual(nameless, [], `${tab}:\n${snapshot}`);
   }
   await done();
 });
 
-test('keys turn the view and change the page; at rest nothing is drawn', async () => {
+test('keys rotate the view and change the page; at rest nothing is drawn', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   await settled(page);
@@ -119,12 +155,15 @@ test('keys turn the view and change the page; at rest nothing is drawn', async (
   await page.locator('.pane-view').first().focus();
   for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowLeft');
   await settled(page);
-  const turned = await page.locator('.stage-area').screenshot();
-  assert.ok((await difference(browser, still, turned)) > 0.01, 'the view has turned');
+  const rotated = await page.locator('.stage-area').screenshot();
+  assert.ok((await difference(browser, still, rotated)) > 0.01, 'the view has rotated');
   await page.keyboard.press('0');
   await settled(page);
-  // the ring of the focus is there now, and little else may differ
-  assert.ok((await difference(browser, still, await page.locator('.stage-area').screenshot())) < 0.01, 'the view is as at first');
+  // now with the focus ring; little else may differ
+  assert.ok(
+    (await difference(browser, still, await page.locator('.stage-area').screenshot())) < 0.01,
+    'the view is as at first',
+  );
   await page.keyboard.press('2');
   await page.getByRole('heading', { name: 'Landmarks' }).waitFor();
   await page.keyboard.press('1');
@@ -133,19 +172,31 @@ test('keys turn the view and change the page; at rest nothing is drawn', async (
 });
 
 test('a small screen holds everything without scrolling sideways', async () => {
-  const { page, done } = await openPage(browser, daemon.url, { viewport: { width: 360, height: 740 }, hasTouch: true, isMobile: true });
+  const { page, done } = await openPage(browser, daemon.url, {
+    viewport: { width: 360, height: 740 },
+    hasTouch: true,
+    isMobile: true,
+  });
   const fits = () => page.evaluate(() => document.documentElement.scrollWidth <= innerWidth);
   assert.ok(await fits());
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   for (const tab of ['Shapes', 'Landmarks', 'Spheres']) {
     await button(page, tab, { exact: true }).click();
     assert.ok(await fits(), tab);
-    assert.ok(await button(page, /^Morph/).last().isVisible(), tab);
+    assert.ok(
+      await button(page, /^Morph/)
+        .last()
+        .isVisible(),
+      tab,
+    );
   }
   await page.setViewportSize({ width: 740, height: 360 });
   await button(page, 'Shapes', { exact: true }).click();
-  assert.ok(await fits(), 'on its side');
+  assert.ok(await fits(), 'in landscape');
   const settings = await page.locator('.inspector .scroll').boundingBox();
-  assert.ok(settings.height > 120 && settings.y + settings.height <= 360, `settings can be read on its side: ${JSON.stringify(settings)}`);
+  assert.ok(
+    settings.height > 120 && settings.y + settings.height <= 360,
+    `settings can be read on its side: ${JSON.stringify(settings)}`,
+  );
   await done();
 });

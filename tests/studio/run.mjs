@@ -1,4 +1,4 @@
-// Runs one test file, or exits with 77 (skipped) and says what is missing.
+// Runs one test file. Exits with 77 (skipped) and names what is missing if it cannot run.
 import { spawn } from 'node:child_process';
 import { existsSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
@@ -8,11 +8,13 @@ const needed = {
   'client/web/node_modules (client/web/build.sh)': here('../../client/web/node_modules/esbuild'),
   'client/web/dist (client/web/build.sh)': here('../../client/web/dist/index.html'),
   'tests/node_modules (npm ci in tests/)': here('../node_modules/playwright-core'),
-  'chromium': process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
+  chromium: process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
 };
 for (const [what, path] of Object.entries(needed))
   if (!existsSync(path)) {
-    console.log(`skipped: ${what} is not there`);
+    console.log(`skipped: ${what} is missing`);
     process.exit(77);
   }
-spawn(process.execPath, ['--test', here(process.argv[2])], { stdio: 'inherit' }).on('exit', (code) => process.exit(code ?? 1));
+spawn(process.execPath, ['--test', here(process.argv[2])], { stdio: 'inherit' }).on('exit', (code) =>
+  process.exit(code ?? 1),
+);

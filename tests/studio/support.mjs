@@ -1,5 +1,5 @@
-// A daemon on a free port with a fresh folder, Debian's Chromium, and a page that is watched: every console error,
-// every exception and every request that leaves the daemon is noted, and `done` fails the test for them.
+// Starts a daemon on a free port with a fresh folder, Debian's Chromium, and pages that record every console error,
+// every exception and every request to another origin; `done` fails the test if there was any.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -11,13 +11,20 @@ import { chromium } from 'playwright-core';
 export const root = fileURLToPath(new URL('../../', import.meta.url));
 export const sample = (name) => join(root, 'tests/samples', name);
 
-const PATIENCE = 180_000; // for what never comes
+const PATIENCE = 180_000; // ms; only a failing test waits that long
 
-/** `keep`: the folder stays, for a daemon that is started on it later with `data`. */
-export async function startDaemon({ args = [], data = mkdtempSync(join(tmpdir(), 'orbmorph-studio-')), keep = false } = {}) {
-  if (process.env.ORB_STUDIO_URL && !args.length) return { url: process.env.ORB_STUDIO_URL.replace(/\/$/, ''), stop: async () => {} };
+/** `keep`: do not delete the folder, so that a later daemon can use it through `data`. */
+export async function startDaemon({
+  args = [],
+  data = mkdtempSync(join(tmpdir(), 'orbmorph-studio-')),
+  keep = false,
+} = {}) {
+  if (process.env.ORB_STUDIO_URL && !args.length)
+    return { url: process.env.ORB_STUDIO_URL.replace(/\/$/, ''), stop: async () => {} };
   const program = process.env.ORB_DAEMON ?? join(root, 'build/bin/orbmorphd');
-  const child = spawn(program, ['--listen', '127.0.0.1:0', '--data', data, ...args], { stdio: ['ignore', 'pipe', 'pipe'] });
+  const child = spawn(program, ['--listen', '127.0.0.1:0', '--data', data, ...args], {
+    stdio: ['ignore', 'pipe', 'pipe'],
+  });
   let log = '';
   child.stderr.on('data', (text) => (log += text));
   const url = await new Promise((resolve, reject) => {
@@ -48,50 +55,66 @@ export async function startDaemon({ args = [], data = mkdtempSync(join(tmpdir(),
 }
 
 /**
- * Debian's Chromium with software GL. `compositing`: "software", the most robust, reads every drawn canvas back on the
- * page's main thread; "gpu" puts pages together with the same GL, as browsers with a GPU do.
+ * Starts Debian's Chromium with software GL. `compositing`: "software", the most robust, reads every drawn canvas back
+ * on the page's main thread; "gpu" composites pages with the same GL, as browsers with a GPU do.
  */
 export const startBrowser = ({ compositing = 'software' } = {}) =>
   chromium.launch({
     timeout: PATIENCE,
     executablePath: process.env.ORB_CHROMIUM ?? '/usr/bin/chromium',
-    args: ['--no-sandbox', '--headless=new', ...(compositing === 'software' ? ['--disable-gpu'] : ['--ignore-gpu-blocklist']), '--use-gl=angle',
-      '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update', '--disable-sync',
-      '--no-first-run'],
+    args: [
+      '--no-sandbox',
+      '--headless=new',
+      ...(compositing === 'software' ? ['--disable-gpu'] : ['--ignore-gpu-blocklist']),
+      '--use-gl=angle',
+      '--use-angle=swiftshader',
+      '--enable-unsafe-swiftshader',
+      '--disable-background-networking',
+      '--disable-component-update',
+      '--disable-sync',
+      '--no-first-run',
+    ],
   });
 
-/** A page of its own context. `refusals`: how many answers of 4xx are expected, which Chromium reports as errors. */
+/** Opens a page in its own context. Responses of 4xx, which Chromium logs as errors, are allowed. */
 export async function openPage(browser, url, { hash = '', ...options } = {}) {
-  const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, acceptDownloads: true, ...options });
+  const context = await browser.newContext({
+    viewport: { width: 1280, height: 800 },
+    acceptDownloads: true,
+    ...options,
+  });
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE);
   await page.addInitScript(() => {
-    globalThis.said = []; // messages go after some seconds
+    globalThis.shownToasts = []; // toasts disappear after some seconds
     new MutationObserver((changes) => {
       for (const { addedNodes } of changes)
-        for (const node of addedNodes) if (node.classList?.contains('toast')) globalThis.said.push(node.innerText);
+        for (const node of addedNodes)
+          if (node.classList?.contains('toast')) globalThis.shownToasts.push(node.innerText);
     }).observe(document, { subtree: true, childList: true });
   });
-  const faults = [];
+  const errors = [];
   page.on('console', (message) => {
-    if (message.type() === 'error' && !/status of 4\d\d/.test(message.text())) faults.push(`console: ${message.text()}`);
+    if (message.type() === 'error' && !/status of 4\d\d/.test(message.text()))
+      errors.push(`console: ${message.text()}`);
   });
-  page.on('pageerror', (error) => faults.push(`exception: ${error.stack}`));
+  page.on('pageerror', (error) => errors.push(`exception: ${error.stack}`));
   page.on('request', (request) => {
     const target = new URL(request.url());
-    if (/^(https?|wss?):$/.test(target.protocol) && target.origin !== new URL(url).origin) faults.push(`outside: ${request.url()}`);
+    if (/^(https?|wss?):$/.test(target.protocol) && target.origin !== new URL(url).origin)
+      errors.push(`outside: ${request.url()}`);
   });
   await page.goto(`${url}/${hash}`);
   return {
     page,
     done: async () => {
       await context.close();
-      assert.deepEqual(faults, []);
+      assert.deepEqual(errors, []);
     },
   };
 }
 
-/** Until `check` gives something true. */
+/** Waits until `check` returns a true value, and returns it. */
 export async function until(check, what, limit = 900_000) {
   const end = Date.now() + limit;
   for (;;) {
@@ -104,78 +127,107 @@ export async function until(check, what, limit = 900_000) {
 
 export const button = (page, name, options) => page.getByRole('button', { name, ...options });
 
-/** Adds files of the samples and waits until they are taken and shown. */
+/** Adds files and waits until they are uploaded and drawn. */
 export async function addFiles(page, ...files) {
   await page.locator('input[type=file]').first().setInputFiles(files);
-  await until(() => page.locator('.card.ready').count().then((n) => n >= files.length), 'the shapes are uploaded');
-  await until(() => page.getByText('reading…').count().then((n) => n === 0), 'the shapes are read');
+  await until(
+    () =>
+      page
+        .locator('.card.ready')
+        .count()
+        .then((n) => n >= files.length),
+    'the shapes are uploaded',
+  );
+  await until(
+    () =>
+      page
+        .getByText('reading…')
+        .count()
+        .then((n) => n === 0),
+    'the shapes are read',
+  );
   await settled(page);
 }
 
-/** The number of pixels of the stage that `test(r, g, b)` accepts, from a screenshot of it. */
+/** Counts the pixels in a screenshot of `selector` that `test(r, g, b)` accepts. */
 export async function countPixels(page, selector, test) {
   const png = await page.locator(selector).first().screenshot();
-  return page.evaluate(async ({ data, source }) => {
-    const accept = new Function('r', 'g', 'b', `return (${source})(r, g, b)`);
-    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }));
-    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
-    const context = canvas.getContext('2d');
-    context.drawImage(bitmap, 0, 0);
-    const pixels = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
-    let count = 0;
-    for (let i = 0; i < pixels.length; i += 4) if (accept(pixels[i], pixels[i + 1], pixels[i + 2])) count++;
-    return count;
-  }, { data: png.toString('base64'), source: test.toString() });
+  return page.evaluate(
+    async ({ data, source }) => {
+      const accept = new Function('r', 'g', 'b', `return (${source})(r, g, b)`);
+      const bitmap = await createImageBitmap(
+        new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }),
+      );
+      const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+      const context = canvas.getContext('2d');
+      context.drawImage(bitmap, 0, 0);
+      const pixels = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+      let count = 0;
+      for (let i = 0; i < pixels.length; i += 4) if (accept(pixels[i], pixels[i + 1], pixels[i + 2])) count++;
+      return count;
+    },
+    { data: png.toString('base64'), source: test.toString() },
+  );
 }
 
-/** How much two screenshots differ: the share of pixels that do by more than 24 of 255. */
+/** The share of pixels that differ by more than 24 of 255 between two screenshots. */
 export async function difference(browser, a, b) {
   const page = await browser.newPage();
   try {
-    return await page.evaluate(async (both) => {
-      const read = async (data) => {
-        const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }));
-        const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-        context.drawImage(bitmap, 0, 0);
-        return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
-      };
-      const [x, y] = [await read(both[0]), await read(both[1])];
-      if (x.length !== y.length) return 1;
-      let count = 0;
-      for (let i = 0; i < x.length; i += 4)
-        if (Math.max(Math.abs(x[i] - y[i]), Math.abs(x[i + 1] - y[i + 1]), Math.abs(x[i + 2] - y[i + 2])) > 24) count++;
-      return count / (x.length / 4);
-    }, [a.toString('base64'), b.toString('base64')]);
+    return await page.evaluate(
+      async (both) => {
+        const read = async (data) => {
+          const bitmap = await createImageBitmap(
+            new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], { type: 'image/png' }),
+          );
+          const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+          context.drawImage(bitmap, 0, 0);
+          return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+        };
+        const [x, y] = [await read(both[0]), await read(both[1])];
+        if (x.length !== y.length) return 1;
+        let count = 0;
+        for (let i = 0; i < x.length; i += 4)
+          if (Math.max(Math.abs(x[i] - y[i]), Math.abs(x[i + 1] - y[i + 1]), Math.abs(x[i + 2] - y[i + 2])) > 24)
+            count++;
+        return count / (x.length / 4);
+      },
+      [a.toString('base64'), b.toString('base64')],
+    );
   } finally {
     await page.close();
   }
 }
 
-/** Clicks into a view at a share of its width and height. */
+/** Clicks into a view; `x` and `y` are fractions of its width and height. */
 export async function clickView(page, index, x, y) {
   const box = await page.locator('.pane-view').nth(index).boundingBox();
   await page.mouse.click(box.x + box.width * x, box.y + box.height * y);
 }
 
-/** The messages that the page has shown so far. */
-export const said = (page) => page.evaluate(() => globalThis.said);
+/** The toasts that the page has shown so far. */
+export const shownToasts = (page) => page.evaluate(() => globalThis.shownToasts);
 
-/** From now on the page has these styles as well; its policy forbids those in the page, not this. */
-export const adopt = (page, css) => page.evaluate((text) => {
-  const sheet = new CSSStyleSheet();
-  sheet.replaceSync(text);
-  document.adoptedStyleSheets = [...document.adoptedStyleSheets, sheet];
-}, css);
+/** Adds styles to the page. Its policy forbids style elements, but not adopted style sheets. */
+export const adopt = (page, css) =>
+  page.evaluate((text) => {
+    const sheet = new CSSStyleSheet();
+    sheet.replaceSync(text);
+    document.adoptedStyleSheets = [...document.adoptedStyleSheets, sheet];
+  }, css);
 
-/** Messages cover no view; they are there all the same. */
-export const hush = (page) => adopt(page, '.toasts { visibility: hidden !important; }');
+/** Hides the toasts, so that they cover no view. They stay in the document. */
+export const hideToasts = (page) => adopt(page, '.toasts { visibility: hidden !important; }');
 
 export const json = async (url, path, init) => (await fetch(url + path, init)).json();
 export const bytes = (path) => readFileSync(path);
 
-/** Until the stage has nothing left to draw, and the browser has shown it. */
+/** Waits until the stage has drawn everything and the browser has shown it. */
 export async function settled(page) {
   await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 50)));
-  await until(() => page.evaluate(() => document.querySelector('.stage')?.dataset.busy === undefined), 'the stage has drawn');
+  await until(
+    () => page.evaluate(() => document.querySelector('.stage')?.dataset.busy === undefined),
+    'the stage has drawn',
+  );
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }

@@ -1,4 +1,4 @@
-// A daemon that wants tokens: the studio asks, keeps the token for the tab, and says what a token does not allow.
+// With a daemon that requires tokens, the studio asks for one, keeps it for the tab and says what it does not allow.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
@@ -13,7 +13,15 @@ before(async () => {
   daemon = await startDaemon({ args: ['--auth', 'on'], keep: true });
   await daemon.stop();
   for (const scope of ['read', 'read,write']) {
-    const { stdout } = await promisify(execFile)(daemon.program, ['token', 'add', scope.replace(',', '-'), '--scope', scope, '--data', daemon.data]);
+    const { stdout } = await promisify(execFile)(daemon.program, [
+      'token',
+      'add',
+      scope.replace(',', '-'),
+      '--scope',
+      scope,
+      '--data',
+      daemon.data,
+    ]);
     token[scope] = stdout.trim();
   }
   daemon = await startDaemon({ args: ['--auth', 'on'], data: daemon.data });
@@ -24,56 +32,86 @@ after(async () => {
   await daemon?.stop();
 });
 
-const give = async (page, secret) => {
+const enterToken = async (page, secret) => {
   await page.locator('dialog input[name=token]').fill(secret);
   await button(page, 'Continue').click();
 };
 
-test('without a token the page asks for one, and says when it is not known', async () => {
+test('without a token the page asks for one, and rejects an unknown one', async () => {
   const { page, done } = await openPage(browser, daemon.url);
-  await page.getByRole('dialog', { name: 'This daemon wants a token' }).waitFor();
-  await give(page, 'f'.repeat(64));
-  await page.getByText('This token is not known here.').waitFor();
+  await page.getByRole('dialog', { name: 'This daemon requires a token' }).waitFor();
+  await enterToken(page, 'f'.repeat(64));
+  await page.getByText('The daemon does not know this token.').waitFor();
   await page.keyboard.press('Escape');
-  assert.ok(await page.getByRole('dialog').isVisible(), 'there is no way around it');
+  assert.ok(await page.getByRole('dialog').isVisible(), 'the dialog cannot be dismissed');
   await done();
 });
 
-test('with a token the whole way works; it stays in the tab and out of addresses', async () => {
+test('with a token everything works; the token stays in the tab and out of URLs', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const addresses = [];
   page.on('request', (request) => addresses.push(request.url()));
-  await give(page, token['read,write']);
-  await until(() => page.getByRole('dialog').count().then((n) => n === 0), 'the dialog is gone');
+  await enterToken(page, token['read,write']);
+  await until(
+    () =>
+      page
+        .getByRole('dialog')
+        .count()
+        .then((n) => n === 0),
+    'the dialog is gone',
+  );
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   await button(page, /^Morph 2 shapes$/).click();
   await until(() => button(page, 'Pause').count(), 'the morph plays');
   await button(page, 'Pause').click();
-  const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name: 'Download GLB' }).click()]);
+  const [download] = await Promise.all([
+    page.waitForEvent('download'),
+    page.getByRole('link', { name: 'Download GLB' }).click(),
+  ]);
   assert.equal((await readFile(await download.path())).toString('latin1', 0, 4), 'glTF');
   await button(page, 'Use it').click();
-  assert.match(await page.getByRole('region', { name: 'curl: code' }).textContent(), /Authorization: Bearer \$ORBMORPH_TOKEN/);
+  assert.match(
+    await page.getByRole('region', { name: 'curl: code' }).textContent(),
+    /Authorization: Bearer \$ORBMORPH_TOKEN/,
+  );
   await page.reload();
-  await until(() => button(page, 'Play').count(), 'after a reload it goes on without asking');
+  await until(() => button(page, 'Play').count(), 'a reload does not ask again');
   assert.equal(await page.getByRole('dialog').count(), 0);
   assert.ok(addresses.every((url) => !url.includes(token['read,write'])));
   assert.ok(!page.url().includes(token['read,write']));
   await done();
 
   const other = await openPage(browser, daemon.url);
-  await other.page.getByRole('dialog', { name: 'This daemon wants a token' }).waitFor();
+  await other.page.getByRole('dialog', { name: 'This daemon requires a token' }).waitFor();
   await other.done();
 });
 
-test('a token that may only read is told so in words', async () => {
+test('a token that may only read gets an explanation', async () => {
   const { page, done } = await openPage(browser, daemon.url);
-  await give(page, token.read);
-  await until(() => page.getByRole('dialog').count().then((n) => n === 0), 'the dialog is gone');
-  await page.locator('input[type=file]').first().setInputFiles([sample('dog.obj')]);
+  await enterToken(page, token.read);
+  await until(
+    () =>
+      page
+        .getByRole('dialog')
+        .count()
+        .then((n) => n === 0),
+    'the dialog is gone',
+  );
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles([sample('dog.obj')]);
   await page.getByText('The token lacks the scope “write”').waitFor();
   await button(page, 'Token', { exact: true }).click();
-  await give(page, token['read,write']);
-  await until(() => page.getByRole('dialog').count().then((n) => n === 0), 'another token is taken');
+  await enterToken(page, token['read,write']);
+  await until(
+    () =>
+      page
+        .getByRole('dialog')
+        .count()
+        .then((n) => n === 0),
+    'another token is taken',
+  );
   await button(page, 'Try again').click();
   await page.locator('.card.ready').waitFor();
   await done();

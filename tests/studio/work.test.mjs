@@ -1,4 +1,4 @@
-// What a modeller does, from the empty page to the file on disk.
+// The work of a modeller, from the empty page to the file on disk.
 import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
@@ -8,7 +8,23 @@ import { join } from 'node:path';
 import { promisify } from 'node:util';
 import { endless } from '../scenario/support/daemon.mjs';
 import { ball, obj } from '../scenario/support/shapes.mjs';
-import { addFiles, button, clickView, countPixels, difference, hush, json, openPage, root, said, sample, settled, startBrowser, startDaemon, until } from './support.mjs';
+import {
+  addFiles,
+  button,
+  clickView,
+  countPixels,
+  difference,
+  hideToasts,
+  json,
+  openPage,
+  root,
+  shownToasts,
+  sample,
+  settled,
+  startBrowser,
+  startDaemon,
+  until,
+} from './support.mjs';
 
 let daemon;
 let browser;
@@ -24,19 +40,37 @@ after(async () => {
 const scrubber = (page) => page.getByRole('slider', { name: 'Along the morph' });
 const time = (page) => scrubber(page).evaluate((input) => Number(input.value));
 const landmarks = (page) => page.locator('.marks li');
-const seek = (page, value) => scrubber(page).evaluate((input, v) => {
-  input.value = String(v);
-  input.dispatchEvent(new Event('input', { bubbles: true }));
-}, value);
+const seek = (page, value) =>
+  scrubber(page).evaluate((input, v) => {
+    input.value = String(v);
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+  }, value);
 
-/** Three landmarks, each on both shapes, at places where both have surface. */
+/** Three landmarks, each on both shapes, at positions where both have a surface. */
 async function pickThree(page) {
   await button(page, 'Landmarks').click();
-  for (const [n, [x, y]] of [[0.5, 0.5], [0.4, 0.5], [0.45, 0.56]].entries()) {
+  for (const [n, [x, y]] of [
+    [0.5, 0.5],
+    [0.4, 0.5],
+    [0.45, 0.56],
+  ].entries()) {
     await clickView(page, 0, x, y);
-    await until(() => landmarks(page).count().then((count) => count === n + 1), `landmark ${n + 1} on the first shape`);
+    await until(
+      () =>
+        landmarks(page)
+          .count()
+          .then((count) => count === n + 1),
+      `landmark ${n + 1} on the first shape`,
+    );
     await clickView(page, 1, x, y);
-    await until(() => page.locator('.badge.warn').count().then((count) => count === 0), `landmark ${n + 1} on the second shape`);
+    await until(
+      () =>
+        page
+          .locator('.badge.warn')
+          .count()
+          .then((count) => count === 0),
+      `landmark ${n + 1} on the second shape`,
+    );
   }
 }
 
@@ -53,7 +87,14 @@ test('from the empty page to a playing morph in at most five clicks', async () =
     clicks++;
   };
   await click('Try with samples');
-  await until(() => page.locator('.card.ready').count().then((n) => n === 2), 'two samples are taken');
+  await until(
+    () =>
+      page
+        .locator('.card.ready')
+        .count()
+        .then((n) => n === 2),
+    'two samples are taken',
+  );
   await click(/^Morph 2 shapes$/);
   await until(() => button(page, 'Pause').count(), 'the morph plays');
   const seen = new Set();
@@ -65,7 +106,7 @@ test('from the empty page to a playing morph in at most five clicks', async () =
 test('upload, pick, name, undo, redo, export, import', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
-  assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > b + 40)) > 2000, 'the first shape is drawn');
+  assert.ok((await countPixels(page, '.stage-area', (r, _g, b) => r > b + 40)) > 2000, 'the first shape is drawn');
   await pickThree(page);
   assert.equal(await page.locator('.marker:not(.still)').count(), 6);
 
@@ -91,8 +132,16 @@ test('upload, pick, name, undo, redo, export, import', async () => {
 
   await button(page, 'Clear').click();
   assert.equal(await landmarks(page).count(), 0);
-  await page.getByLabel('Landmark file').setInputFiles({ name: 'l.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(exported)) });
-  await until(() => landmarks(page).count().then((n) => n === 3), 'the landmarks are back');
+  await page
+    .getByLabel('Landmark file')
+    .setInputFiles({ name: 'l.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify(exported)) });
+  await until(
+    () =>
+      landmarks(page)
+        .count()
+        .then((n) => n === 3),
+    'the landmarks are back',
+  );
   const [again] = await Promise.all([page.waitForEvent('download'), button(page, 'Export').click()]);
   assert.deepEqual(JSON.parse(await readFile(await again.path(), 'utf8')), exported);
   await done();
@@ -128,7 +177,9 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
   const count = await landmarks(page).count();
   await morph(page);
   await button(page, 'Pause').click();
-  const id = new URLSearchParams((await until(() => page.url().match(/r=[0-9a-f]{64}/), 'the address names the morph'))[0]).get('r');
+  const id = new URLSearchParams(
+    (await until(() => page.url().match(/r=[0-9a-f]{64}/), 'the URL names the morph'))[0],
+  ).get('r');
   const supermesh = await json(daemon.url, `/v1/supermeshes/${id}`);
   assert.equal(supermesh.landmarks.length, count);
   assert.equal(supermesh.certificate.landmarks_exact, true);
@@ -139,35 +190,55 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
     await settled(page);
     shots.push(await page.locator('.stage-area').screenshot());
   }
-  assert.ok((await difference(browser, shots[0], shots[1])) > 0.005, 'half way differs from the first shape');
-  assert.ok((await difference(browser, shots[1], shots[2])) > 0.005, 'half way differs from the second shape');
+  assert.ok((await difference(browser, shots[0], shots[1])) > 0.005, 'halfway differs from the first shape');
+  assert.ok((await difference(browser, shots[1], shots[2])) > 0.005, 'halfway differs from the second shape');
 
   await page.getByRole('slider', { name: 'Share of dog' }).evaluate((input) => {
     input.value = '0.5';
     input.dispatchEvent(new Event('input', { bubbles: true }));
   });
   await settled(page);
-  assert.ok((await difference(browser, await page.locator('.pane').screenshot(), await page.locator('.pane').screenshot())) === 0);
+  assert.ok(
+    (await difference(browser, await page.locator('.pane').screenshot(), await page.locator('.pane').screenshot())) ===
+      0,
+  );
   assert.equal(await page.getByRole('slider', { name: 'Share of giraffe' }).inputValue(), '0.5');
 
   const plain = await page.locator('.stage-area').screenshot();
   await page.getByRole('switch', { name: 'Wireframe' }).click();
   await settled(page);
-  assert.ok((await difference(browser, plain, await page.locator('.stage-area').screenshot())) > 0.005, 'the wireframe is drawn');
-  // The common mesh on each shape is shown with its triangles, which the same switch takes away; the error without.
+  assert.ok(
+    (await difference(browser, plain, await page.locator('.stage-area').screenshot())) > 0.005,
+    'the wireframe is drawn',
+  );
+  // The wireframe is on in “Each shape” by default, and in “Error” since the step above. The switch hides it in both.
   for (const view of ['Each shape', 'Error']) {
     await page.getByRole('group', { name: 'What is shown' }).getByRole('button', { name: view }).click();
-    if (view === 'Error') await until(() => page.getByText(/largest/).count().then((n) => n > 0), 'the errors are measured');
+    if (view === 'Error')
+      await until(
+        () =>
+          page
+            .getByText(/largest/)
+            .count()
+            .then((n) => n > 0),
+        'the errors are measured',
+      );
     assert.ok(await page.getByRole('switch', { name: 'Wireframe' }).isChecked(), view);
     await settled(page);
     const drawn = await page.locator('.stage-area').screenshot();
     await page.getByRole('switch', { name: 'Wireframe' }).click();
     await settled(page);
-    assert.ok((await difference(browser, drawn, await page.locator('.stage-area').screenshot())) > 0.005, `${view}: the wireframe is gone`);
+    assert.ok(
+      (await difference(browser, drawn, await page.locator('.stage-area').screenshot())) > 0.005,
+      `${view}: the wireframe is gone`,
+    );
   }
   await page.getByRole('group', { name: 'What is shown' }).getByRole('button', { name: 'Morph' }).click();
 
-  const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name: 'Download GLB' }).click()]);
+  const [download] = await Promise.all([
+    page.waitForEvent('download'),
+    page.getByRole('link', { name: 'Download GLB' }).click(),
+  ]);
   assert.match(download.suggestedFilename(), /\.glb$/);
   const glb = await readFile(await download.path());
   assert.equal(glb.toString('latin1', 0, 4), 'glTF');
@@ -175,7 +246,7 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
   await done();
 });
 
-test('reload and the address alone bring the same state back', async () => {
+test('a reload and the URL alone restore the same state', async () => {
   const first = await openPage(browser, daemon.url);
   await addFiles(first.page, sample('dog.obj'), sample('giraffe.off'));
   await button(first.page, 'Landmarks').click();
@@ -185,14 +256,17 @@ test('reload and the address alone bring the same state back', async () => {
   await morph(first.page);
   await button(first.page, 'Pause').click();
   await seek(first.page, 0.25);
-  await until(() => /t=0\.250/.test(first.page.url()), 'the address holds the time');
-  await hush(first.page);
+  await until(() => /t=0\.250/.test(first.page.url()), 'the URL holds the time');
+  await hideToasts(first.page);
   await settled(first.page);
   const before = await first.page.locator('.pane').screenshot();
   await first.page.reload();
   await until(() => button(first.page, 'Play').count(), 'the morph is back');
   await settled(first.page);
-  await until(async () => (await difference(browser, before, await first.page.locator('.pane').screenshot())) < 0.002, 'it looks the same');
+  await until(
+    async () => (await difference(browser, before, await first.page.locator('.pane').screenshot())) < 0.002,
+    'it looks the same',
+  );
   const address = first.page.url();
   await first.done();
 
@@ -204,20 +278,26 @@ test('reload and the address alone bring the same state back', async () => {
   await second.done();
 });
 
-test('a refused mesh says why, shows the rim in red, and can be mended', async () => {
+test('a refused mesh says why, shows the rim in red, and can be repaired', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   // the dog without its first 40 faces
   let left = 40;
-  const text = (await readFile(sample('dog.obj'), 'utf8')).split('\n').filter((line) => !(line.startsWith('f ') && left-- > 0)).join('\n');
-  await page.locator('input[type=file]').first().setInputFiles({ name: 'open.obj', mimeType: 'text/plain', buffer: Buffer.from(text) });
+  const text = (await readFile(sample('dog.obj'), 'utf8'))
+    .split('\n')
+    .filter((line) => !(line.startsWith('f ') && left-- > 0))
+    .join('\n');
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles({ name: 'open.obj', mimeType: 'text/plain', buffer: Buffer.from(text) });
   await page.locator('.card.refused').waitFor();
   assert.match(await page.getByRole('alert').innerText(), /hole/);
   await until(() => page.getByText('Shown in red on the model.').count(), 'the rim is found');
-  // turned about, the rim comes into view from some side; the lines are drawn over the surface anyway
+  // the lines are drawn over the surface, so the rim is visible from any side
   await settled(page);
   assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 180 && g < 110 && b < 110)) > 20, 'red is drawn');
   await button(page, 'Fill the holes').click();
-  await until(() => page.locator('.card.ready').count(), 'it is mended');
+  await until(() => page.locator('.card.ready').count(), 'it is repaired');
   assert.equal(await page.locator('.card.refused').count(), 0);
   await settled(page);
   assert.equal(await countPixels(page, '.stage-area', (r, g, b) => r > 180 && g < 110 && b < 110), 0, 'no red is left');
@@ -230,20 +310,33 @@ test('loose pieces are shown in red, and the largest can be kept', async () => {
   const known = text.split('\n').filter((line) => line.startsWith('v '));
   const [x, y, z] = [0, 1, 2].map((k) => Math.max(...known.map((line) => Number(line.split(/\s+/)[k + 1]))));
   const size = 0.2 * y;
-  const corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map((c) => `v ${[x, y, z].map((at, k) => at + size * (c[k] - 0.5)).join(' ')}`);
-  const faces = [[1, 3, 2], [1, 2, 4], [2, 3, 4], [1, 4, 3]].map((f) => `f ${f.map((v) => v + known.length).join(' ')}`);
+  const corners = [
+    [0, 0, 0],
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ].map((c) => `v ${[x, y, z].map((at, k) => at + size * (c[k] - 0.5)).join(' ')}`);
+  const faces = [
+    [1, 3, 2],
+    [1, 2, 4],
+    [2, 3, 4],
+    [1, 4, 3],
+  ].map((f) => `f ${f.map((v) => v + known.length).join(' ')}`);
   const both = [...known, ...corners, ...text.split('\n').filter((line) => line.startsWith('f ')), ...faces].join('\n');
-  await page.locator('input[type=file]').first().setInputFiles({ name: 'two.obj', mimeType: 'text/plain', buffer: Buffer.from(`${both}\n`) });
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles({ name: 'two.obj', mimeType: 'text/plain', buffer: Buffer.from(`${both}\n`) });
   await page.locator('.card.refused').waitFor();
   await until(() => page.getByText('Shown in red on the model.').count(), 'the loose piece is found');
   await settled(page);
   assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 150 && g < 110 && b < 110)) > 50, 'red is drawn');
   await button(page, 'Keep the largest piece').click();
-  await until(() => page.locator('.card.ready').count(), 'it is mended');
+  await until(() => page.locator('.card.ready').count(), 'it is repaired');
   await done();
 });
 
-test('linked cameras turn together, others alone', async () => {
+test('linked cameras rotate together, others alone', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   const views = async () => {
@@ -258,22 +351,27 @@ test('linked cameras turn together, others alone', async () => {
   const first = await views();
   await turn();
   const second = await views();
-  for (const k of [0, 1]) assert.ok((await difference(browser, first[k], second[k])) > 0.01, `view ${k} has turned`);
+  for (const k of [0, 1]) assert.ok((await difference(browser, first[k], second[k])) > 0.01, `view ${k} has rotated`);
   await page.getByRole('switch', { name: 'Link the cameras' }).click();
   await page.locator('.pane-view').first().focus();
   const third = await views();
   await turn();
   const fourth = await views();
-  assert.ok((await difference(browser, third[0], fourth[0])) > 0.01, 'the view that has the focus has turned');
+  assert.ok((await difference(browser, third[0], fourth[0])) > 0.01, 'the focused view has rotated');
   assert.ok((await difference(browser, third[1], fourth[1])) < 0.002, 'the other has not');
   await done();
 });
 
-test('an upload shows how far it is', async () => {
+test('an upload shows its progress', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const session = await page.context().newCDPSession(page);
   await session.send('Network.enable');
-  await session.send('Network.emulateNetworkConditions', { offline: false, latency: 0, downloadThroughput: -1, uploadThroughput: 400_000 });
+  await session.send('Network.emulateNetworkConditions', {
+    offline: false,
+    latency: 0,
+    downloadThroughput: -1,
+    uploadThroughput: 400_000,
+  });
   await page.evaluate(() => {
     globalThis.seen = [];
     new MutationObserver(() => {
@@ -284,27 +382,40 @@ test('an upload shows how far it is', async () => {
   });
   const dog = await readFile(sample('dog.obj'), 'utf8');
   const long = Buffer.from(`${dog}\n${`# ${'x'.repeat(98)}\n`.repeat(12_000)}`);
-  await page.locator('input[type=file]').first().setInputFiles({ name: 'dog.obj', mimeType: 'text/plain', buffer: long });
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles({ name: 'dog.obj', mimeType: 'text/plain', buffer: long });
   await page.locator('.card.ready').waitFor();
   const seen = await page.evaluate(() => globalThis.seen);
   assert.ok(seen.length >= 3, `shares seen: ${seen}`);
-  assert.deepEqual(seen, [...seen].sort((a, b) => a - b));
+  assert.deepEqual(
+    seen,
+    [...seen].sort((a, b) => a - b),
+  );
   await done();
 });
 
-test('no mesh at all is refused in words', async () => {
+test('a file without a mesh is refused with an explanation', async () => {
   const { page, done } = await openPage(browser, daemon.url);
-  await page.locator('input[type=file]').first().setInputFiles({ name: 'letter.obj', mimeType: 'text/plain', buffer: Buffer.from('Dear Sir or Madam\n') });
+  await page
+    .locator('input[type=file]')
+    .first()
+    .setInputFiles({ name: 'letter.obj', mimeType: 'text/plain', buffer: Buffer.from('Dear Sir or Madam\n') });
   await page.locator('.card.refused, .card.failed').waitFor();
   assert.ok((await page.getByRole('alert').first().innerText()).length > 20);
   await done();
 });
 
 test('a morph is cancelled before it is done', async () => {
-  // The only worker has something else to do: the morph does not end before it is cancelled.
+  // Another job occupies the only worker, so the morph cannot finish before it is cancelled.
   const busy = await startDaemon({ args: ['--workers', '1'] });
-  const post = async (path, body) => (await fetch(busy.url + path, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body })).json();
-  const other = await post('/v1/embeddings', JSON.stringify({ mesh: (await post('/v1/meshes', obj(ball(5)))).id, ...endless }));
+  const post = async (path, body) =>
+    (await fetch(busy.url + path, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body })).json();
+  const other = await post(
+    '/v1/embeddings',
+    JSON.stringify({ mesh: (await post('/v1/meshes', obj(ball(5)))).id, ...endless }),
+  );
   const { page, done } = await openPage(browser, busy.url);
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await page.getByText('Options', { exact: true }).click();
@@ -314,7 +425,7 @@ test('a morph is cancelled before it is done', async () => {
   });
   await button(page, /^Morph 2 shapes$/).click();
   await button(page, 'Cancel').click();
-  await until(() => said(page).then((list) => list.includes('Cancelled.')), 'the page says so');
+  await until(() => shownToasts(page).then((list) => list.includes('Cancelled.')), 'the page says so');
   const { jobs } = await json(busy.url, '/v1/jobs');
   const morph = jobs.find(({ kind }) => kind === 'supermesh');
   await until(async () => (await json(busy.url, morph.url)).state === 'cancelled', 'the job has stopped');
@@ -329,18 +440,21 @@ test('landmarks are found', async () => {
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await button(page, 'Landmarks').click();
   await button(page, 'Find them for me').click();
-  const [text] = await until(() => said(page).then((list) => list.length > 0 && list), 'an answer');
+  const [text] = await until(() => shownToasts(page).then((list) => list.length > 0 && list), 'an answer');
   const found = Number(text.match(/^(\d+) landmarks found/)?.[1] ?? 0);
   assert.equal(await landmarks(page).count(), found);
   assert.ok(found > 0 || /matched/.test(text), text);
   await done();
 });
 
-test('a job goes on when the page is closed, and is found again', async () => {
+test('a job continues when the page is closed, and is found again', async () => {
   const first = await openPage(browser, daemon.url);
   await addFiles(first.page, sample('giraffe.off'), sample('elephant.ply'));
   await button(first.page, /^Morph 2 shapes$/).click();
-  const address = await until(() => (/j=[^&]+/.test(first.page.url()) || /r=/.test(first.page.url())) && first.page.url(), 'the address names the job');
+  const address = await until(
+    () => (/j=[^&]+/.test(first.page.url()) || /r=/.test(first.page.url())) && first.page.url(),
+    'the address names the job',
+  );
   await first.done();
   const second = await openPage(browser, daemon.url, { hash: new URL(address).hash });
   await until(() => button(second.page, /^(Play|Pause)$/).count(), 'the morph is there');
@@ -364,7 +478,14 @@ test('spheres before and after the alignment: certified, painted, measured', asy
   await until(() => landmarks(page).count(), 'landmarks');
   const count = await landmarks(page).count();
   await button(page, 'Spheres').click();
-  await until(() => page.getByText('Certified one to one').count().then((n) => n === 2), 'both are embedded');
+  await until(
+    () =>
+      page
+        .getByText('Certified one to one')
+        .count()
+        .then((n) => n === 2),
+    'both are embedded',
+  );
   assert.ok(await button(page, 'After', { exact: true }).isDisabled(), 'there is no morph yet');
   const shots = [];
   for (const name of ['Normals', 'Checkerboard', 'Stretch', 'Areas']) {
@@ -372,40 +493,78 @@ test('spheres before and after the alignment: certified, painted, measured', asy
     await settled(page);
     shots.push(await page.locator('.stage-area').screenshot());
   }
-  for (let i = 1; i < shots.length; i++) assert.ok((await difference(browser, shots[i - 1], shots[i])) > 0.03, `paint ${i} differs from the one before`);
+  for (let i = 1; i < shots.length; i++)
+    assert.ok((await difference(browser, shots[i - 1], shots[i])) > 0.03, `paint ${i} differs from the one before`);
   assert.equal(await page.getByRole('img', { name: /^Histogram/ }).count(), 2);
 
-  // Where each landmark is on the two balls, in pixels of its own view.
-  const spots = () => page.evaluate(() => [...document.querySelectorAll('.pane-view:has(.marker.small)')].map((view) => {
-    const box = view.getBoundingClientRect();
-    return [...view.querySelectorAll('.marker.small')].map((mark) => {
-      const m = mark.getBoundingClientRect();
-      return [m.x + m.width / 2 - box.x, m.y + m.height / 2 - box.y];
-    });
-  }));
+  // The position of each landmark on the two spheres, in pixels of its own view.
+  const spots = () =>
+    page.evaluate(() =>
+      [...document.querySelectorAll('.pane-view:has(.marker.small)')].map((view) => {
+        const box = view.getBoundingClientRect();
+        return [...view.querySelectorAll('.marker.small')].map((mark) => {
+          const m = mark.getBoundingClientRect();
+          return [m.x + m.width / 2 - box.x, m.y + m.height / 2 - box.y];
+        });
+      }),
+    );
   const gap = ([a, b]) => Math.max(...a.map((p, i) => Math.hypot(p[0] - b[i][0], p[1] - b[i][1])));
   const before = await spots();
-  assert.deepEqual(before.map((list) => list.length), [count, count]);
-  assert.ok(gap(before) > 20, 'by themselves the spheres do not correspond');
+  assert.deepEqual(
+    before.map((list) => list.length),
+    [count, count],
+  );
+  assert.ok(gap(before) > 20, 'before the alignment the spheres do not correspond');
   await morph(page);
   await button(page, 'Pause').click();
   await button(page, 'Spheres').click();
   await button(page, 'After', { exact: true }).click();
-  await until(() => page.getByText('on the common sphere').count().then((n) => n === 2), 'the aligned spheres');
-  await until(() => page.locator('.marker.small').count().then((n) => n === 2 * count), 'with their landmarks');
+  await until(
+    () =>
+      page
+        .getByText('on the common sphere')
+        .count()
+        .then((n) => n === 2),
+    'the aligned spheres',
+  );
+  await until(
+    () =>
+      page
+        .locator('.marker.small')
+        .count()
+        .then((n) => n === 2 * count),
+    'with their landmarks',
+  );
   await settled(page);
   assert.ok(gap(await spots()) < 1, 'after the alignment landmarks coincide');
-  await until(() => /side=after/.test(page.url()), 'the address says so');
+  await until(() => /side=after/.test(page.url()), 'the URL says so');
   const shown = await page.locator('.pane').nth(1).screenshot();
   await page.reload();
-  await until(() => page.getByText('on the common sphere').count().then((n) => n === 2), 'also after a reload');
-  await until(() => page.locator('.marker.small').count().then((n) => n === 2 * count), 'with their landmarks');
+  await until(
+    () =>
+      page
+        .getByText('on the common sphere')
+        .count()
+        .then((n) => n === 2),
+    'also after a reload',
+  );
+  await until(
+    () =>
+      page
+        .locator('.marker.small')
+        .count()
+        .then((n) => n === 2 * count),
+    'with their landmarks',
+  );
   await settled(page);
-  await until(async () => (await difference(browser, shown, await page.locator('.pane').nth(1).screenshot())) < 0.01, 'it looks the same');
+  await until(
+    async () => (await difference(browser, shown, await page.locator('.pane').nth(1).screenshot())) < 0.01,
+    'it looks the same',
+  );
   await done();
 });
 
-test('the lines and pages that are offered show this very morph', async () => {
+test('the offered commands and pages show this morph', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   await button(page, 'Landmarks').click();
@@ -419,11 +578,11 @@ test('the lines and pages that are offered show this very morph', async () => {
 
   const folder = await mkdtemp(join(tmpdir(), 'orbmorph-curl-'));
   const { stdout } = await promisify(execFile)('bash', ['-e', '-c', await text('curl')], { cwd: folder });
-  assert.deepEqual(await readFile(join(folder, 'morph.glb')), asset, 'curl brings the same bytes');
+  assert.deepEqual(await readFile(join(folder, 'morph.glb')), asset, 'curl downloads the same bytes');
   assert.equal(`${daemon.url}${JSON.parse(stdout).asset}`, await text('Asset'), 'the request names the same morph');
   await rm(folder, { recursive: true });
 
-  // The page as it would stand on another site; what it loads from a content network comes from the packages here.
+  // Serves the page as from another site; requests to the CDN are answered from the npm packages here.
   const html = await text('three.js');
   const context = await browser.newContext({ viewport: { width: 400, height: 300 } });
   const other = await context.newPage();
@@ -431,7 +590,14 @@ test('the lines and pages that are offered show this very morph', async () => {
   other.on('pageerror', (error) => faults.push(error.stack));
   const site = `${daemon.url}/page-of-somebody`;
   await context.route('https://cdn.jsdelivr.net/npm/three@*/**', (route) =>
-    route.fulfill({ path: join(root, 'client/web/node_modules/three', new URL(route.request().url()).pathname.replace(/^\/npm\/three@[^/]+\//, '')) }));
+    route.fulfill({
+      path: join(
+        root,
+        'client/web/node_modules/three',
+        new URL(route.request().url()).pathname.replace(/^\/npm\/three@[^/]+\//, ''),
+      ),
+    }),
+  );
   await context.route(site, (route) => route.fulfill({ contentType: 'text/html', body: html }));
   await other.goto(site);
   await other.locator('canvas').waitFor();
@@ -452,7 +618,14 @@ test('the error of the common mesh is measured and below the tolerance', async (
   await button(page, 'As in the files').click();
   await morph(page);
   await button(page, 'Error').click();
-  await until(() => page.locator('.pane .legend').count().then((n) => n === 2), 'both shapes are measured');
+  await until(
+    () =>
+      page
+        .locator('.pane .legend')
+        .count()
+        .then((n) => n === 2),
+    'both shapes are measured',
+  );
   const captions = await page.locator('.pane .caption').allInnerTexts();
   for (const text of captions) {
     const percent = Number(text.match(/largest ([\d.e+-]+) %/)[1]);

@@ -8,7 +8,8 @@
  * landmark k at bit-equal points on all shapes. */
 void check_alignment(const orb_alignment *alignment, int landmarks_meet);
 
-/* Runs orb_align() and checks the result, and that each surface is still the one that was given; prints the reason where it fails. Free `out` after. */
+/* Runs orb_align() and checks the result, and that each surface is still the one that was given; prints the reason
+ * where it fails. Free `out` after. */
 void align_and_check(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                      const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                      orb_alignment *out);

@@ -10,12 +10,12 @@
 
 #include <cmocka.h>
 
+#include "align/pin/joint.h"
+#include "align/sheet/landmarks.h"
 #include "numeric/vec3.h"
 #include "support_align.h"
 #include "support_bodies.h"
 #include "support_shared.h"
-#include "align/pin/joint.h"
-#include "align/sheet/landmarks.h"
 
 /* The k-th neighbour of vertex v, in the order of the triangles. */
 static int32_t neighbour(const orb_mesh *mesh, int32_t v, int k) {

@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
-#include "support_shapes.h"
 #include "align/map/starts/mirror.h"
+#include "support_shapes.h"
 
 /* Four limbs in two pairs and two more in the plane x = 0; bent: one limb of each pair turned away. */
 static const double limb[6][3] = {{0.6, -0.8, 0},      {-0.6, -0.8, 0},  {0.48, -0.6, 0.64},

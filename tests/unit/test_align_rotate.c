@@ -8,11 +8,11 @@
 
 #include <cmocka.h>
 
+#include "align/rotate/correlate.h"
+#include "align/rotate/procrustes.h"
 #include "align/rotate/rotate.h"
 #include "numeric/vec3.h"
 #include "support_shapes.h"
-#include "align/rotate/procrustes.h"
-#include "align/rotate/correlate.h"
 
 static orb_context *make_context(int threads) {
   orb_context_options options = {.threads = threads};

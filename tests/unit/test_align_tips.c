@@ -9,10 +9,10 @@
 #include <cmocka.h>
 
 #include "align/find/guess.h"
-#include "support_shapes.h"
-#include "support_shared.h"
 #include "align/find/tip_choice.h"
 #include "align/find/tip_turns.h"
+#include "support_shapes.h"
+#include "support_shared.h"
 
 enum { LIMBS = 5 };
 

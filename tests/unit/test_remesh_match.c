@@ -9,10 +9,10 @@
 #include <cmocka.h>
 
 #include "numeric/vec3.h"
-#include "remesh/distance.h"
 #include "remesh/adaptive/match.h"
-#include "support_remesh.h"
+#include "remesh/distance.h"
 #include "remesh/net_export.h"
+#include "support_remesh.h"
 
 typedef struct bench {
   orb_context *ctx;

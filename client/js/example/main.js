@@ -24,7 +24,7 @@ document.getElementById('form').addEventListener('submit', async (event) => {
     const morph = await orbmorph.morph([...document.getElementById('files').files], {
       asset: { fit: 'similarity' },
       onProgress: ({ step, progress, job }) => {
-        status.value = `${step === 'upload' ? 'uploading' : job.stage ?? 'waiting'} ${Math.round(progress * 100)} %`;
+        status.value = `${step === 'upload' ? 'uploading' : (job.stage ?? 'waiting')} ${Math.round(progress * 100)} %`;
       },
     });
     play(await new GLTFLoader().parseAsync(await morph.glb(), ''));

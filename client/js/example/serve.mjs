@@ -7,18 +7,26 @@ import { fileURLToPath } from 'node:url';
 
 const here = fileURLToPath(new URL('.', import.meta.url));
 const folders = { '/orbmorph/': join(here, '../src'), '/three/': join(here, '../../web/node_modules/three') };
-const types = { '.html': 'text/html; charset=utf-8', '.js': 'text/javascript; charset=utf-8', '.css': 'text/css; charset=utf-8' };
+const types = {
+  '.html': 'text/html; charset=utf-8',
+  '.js': 'text/javascript; charset=utf-8',
+  '.css': 'text/css; charset=utf-8',
+};
 const daemon = new URL(process.env.ORBMORPH_SERVER ?? 'http://127.0.0.1:8080');
 
 const server = createServer(async (req, res) => {
   const path = new URL(req.url, daemon).pathname;
   if (path.startsWith('/v1/')) {
     const { connection, ...headers } = req.headers;
-    const onward = request(new URL(req.url, daemon), { method: req.method, headers: { ...headers, host: daemon.host } }, (answer) => {
-      res.writeHead(answer.statusCode, answer.headers);
-      answer.pipe(res);
-    });
-    onward.on('error', () => res.headersSent ? res.destroy() : res.writeHead(502).end());
+    const onward = request(
+      new URL(req.url, daemon),
+      { method: req.method, headers: { ...headers, host: daemon.host } },
+      (answer) => {
+        res.writeHead(answer.statusCode, answer.headers);
+        answer.pipe(res);
+      },
+    );
+    onward.on('error', () => (res.headersSent ? res.destroy() : res.writeHead(502).end()));
     res.on('close', () => onward.destroy());
     req.pipe(onward);
     return;
@@ -34,4 +42,6 @@ const server = createServer(async (req, res) => {
     res.writeHead(404).end();
   }
 });
-server.listen(Number(process.env.PORT ?? 8090), '127.0.0.1', () => console.log(`example on http://127.0.0.1:${server.address().port}`));
+server.listen(Number(process.env.PORT ?? 8090), '127.0.0.1', () =>
+  console.log(`example on http://127.0.0.1:${server.address().port}`),
+);

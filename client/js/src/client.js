@@ -7,8 +7,14 @@ const ENDED = new Set(['succeeded', 'failed', 'cancelled']);
 const sleep = (ms, signal) =>
   new Promise((resolve, reject) => {
     if (signal?.aborted) return reject(abortError(signal));
-    const stop = () => (clearTimeout(timer), reject(abortError(signal)));
-    const timer = setTimeout(() => (signal?.removeEventListener('abort', stop), resolve()), ms);
+    const stop = () => {
+      clearTimeout(timer);
+      reject(abortError(signal));
+    };
+    const timer = setTimeout(() => {
+      signal?.removeEventListener('abort', stop);
+      resolve();
+    }, ms);
     signal?.addEventListener('abort', stop, { once: true });
   });
 
@@ -188,7 +194,10 @@ export class Orbmorph {
         if (ENDED.has(current.state)) return current;
       } catch (error) {
         if (signal?.aborted) throw abortError(signal);
-        const passing = error instanceof UnreachableError || error instanceof TypeError || [429, 502, 503, 504].includes(error.status);
+        const passing =
+          error instanceof UnreachableError ||
+          error instanceof TypeError ||
+          [429, 502, 503, 504].includes(error.status);
         if (!passing) {
           if (!events || !(error instanceof ProblemError) || error.status === 404) throw error;
           events = false;
@@ -236,7 +245,10 @@ export class Orbmorph {
     if (state) query.set('state', state);
     const text = query.toString();
     const body = await this.json(`/v1/${kind}${text ? `?${text}` : ''}`, { signal });
-    return { items: body[kind] ?? body.items ?? Object.values(body).find(Array.isArray) ?? [], next: body.next_page_token ?? null };
+    return {
+      items: body[kind] ?? body.items ?? Object.values(body).find(Array.isArray) ?? [],
+      next: body.next_page_token ?? null,
+    };
   }
 
   /** Yields all items of a kind and fetches pages as needed: `for await (const mesh of client.list('meshes'))`. */
@@ -263,7 +275,9 @@ export class Orbmorph {
         meshes.push(source);
         continue;
       }
-      const onUpload = onProgress && ((sent, total) => onProgress({ step: 'upload', file: index, progress: total ? sent / total : 1 }));
+      const onUpload =
+        onProgress &&
+        ((sent, total) => onProgress({ step: 'upload', file: index, progress: total ? sent / total : 1 }));
       meshes.push(await this.uploadMesh(source, { name: names?.[index], repair, onProgress: onUpload, signal }));
     }
     const shapes = meshes.map((mesh) => clean({ mesh: mesh.id, name: mesh.name }));
@@ -286,7 +300,7 @@ const isMesh = (value) => typeof value?.id === 'string' && /^[0-9a-f]{64}$/.test
 
 /** "/v1/jobs/ID" for a job object, its path or its id. */
 const jobPath = (job) => {
-  const text = typeof job === 'object' ? job.url ?? job.id : job;
+  const text = typeof job === 'object' ? (job.url ?? job.id) : job;
   return text.startsWith('/') ? text : `/v1/jobs/${text}`;
 };
 

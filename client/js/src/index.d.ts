@@ -2,7 +2,13 @@
 import type { Embedding, Job, Landmark, Mesh, Supermesh, SupermeshRequest } from './api.js';
 
 export type Repair = 'none' | 'safe' | 'fill_holes' | 'largest_component';
-export type Source = Blob | ArrayBuffer | ArrayBufferView | string | URL | { source: Blob | ArrayBuffer | ArrayBufferView | string; name?: string };
+export type Source =
+  | Blob
+  | ArrayBuffer
+  | ArrayBufferView
+  | string
+  | URL
+  | { source: Blob | ArrayBuffer | ArrayBufferView | string; name?: string };
 
 export type { Distortion, Embedding, Job, Landmark, Measure, Mesh, Place, Supermesh, SupermeshRequest } from './api.js';
 /** A problem of a known type; `type` discriminates. */
@@ -78,12 +84,18 @@ export class Orbmorph {
   /** Sent with every request; can be changed at any time. */
   token: string | undefined;
   url(path: string): string;
-  request(path: string, options?: RequestOptions & { method?: string; json?: unknown; headers?: Record<string, string> }): Promise<Response>;
+  request(
+    path: string,
+    options?: RequestOptions & { method?: string; json?: unknown; headers?: Record<string, string> },
+  ): Promise<Response>;
   uploadMesh(source: Source, options?: UploadOptions): Promise<Mesh>;
   getMesh(id: string, options?: RequestOptions): Promise<Mesh>;
   meshFile(id: string, options?: RequestOptions): Promise<ArrayBuffer>;
   deleteMesh(id: string, options?: RequestOptions): Promise<void>;
-  embed(mesh: string, options?: WatchOptions & { method?: Embedding['method']; options?: Record<string, unknown> }): Promise<Embedding>;
+  embed(
+    mesh: string,
+    options?: WatchOptions & { method?: Embedding['method']; options?: Record<string, unknown> },
+  ): Promise<Embedding>;
   getEmbedding(id: string, options?: RequestOptions): Promise<Embedding>;
   sphere(id: string, options?: RequestOptions): Promise<ArrayBuffer>;
   deleteEmbedding(id: string, options?: RequestOptions): Promise<void>;

@@ -13,7 +13,8 @@ import { Orbmorph } from './client.js';
 export { Orbmorph } from './client.js';
 export { CancelledError, ProblemError, UnreachableError } from './errors.js';
 
-export const morph = (sources, { server, token, ...options } = {}) => new Orbmorph({ server, token }).morph(sources, options);
+export const morph = (sources, { server, token, ...options } = {}) =>
+  new Orbmorph({ server, token }).morph(sources, options);
 
 export default {
   Orbmorph,

@@ -16,7 +16,8 @@ export async function openSource(source, name) {
   if (source && typeof source === 'object' && 'source' in source) return openSource(source.source, source.name ?? name);
   if (typeof Blob !== 'undefined' && source instanceof Blob)
     return { name: name ?? (source.name ? stem(source.name) : 'mesh'), size: source.size, body: source };
-  if (source instanceof ArrayBuffer) return { name: name ?? 'mesh', size: source.byteLength, body: new Uint8Array(source) };
+  if (source instanceof ArrayBuffer)
+    return { name: name ?? 'mesh', size: source.byteLength, body: new Uint8Array(source) };
   if (ArrayBuffer.isView(source)) {
     const bytes = new Uint8Array(source.buffer, source.byteOffset, source.byteLength);
     return { name: name ?? 'mesh', size: bytes.byteLength, body: bytes };
@@ -28,7 +29,8 @@ export const stem = (file) => file.replace(/\.[A-Za-z0-9]{1,5}$/, '') || 'mesh';
 
 /** Posts `body`; calls `onProgress(sent, total)`. Only XMLHttpRequest reports progress in browsers. -> {status, json} */
 export function sendBody(url, body, size, { headers, onProgress, signal, fetch }) {
-  if (typeof XMLHttpRequest !== 'undefined' && onProgress) return sendXhr(url, body, size, { headers, onProgress, signal });
+  if (typeof XMLHttpRequest !== 'undefined' && onProgress)
+    return sendXhr(url, body, size, { headers, onProgress, signal });
   return sendFetch(url, body, size, { headers, onProgress, signal, fetch });
 }
 
@@ -47,8 +49,14 @@ function sendXhr(url, body, size, { headers, onProgress, signal }) {
       if (xhr.status >= 200 && xhr.status < 300) resolve(answer);
       else reject(new ProblemError(answer.json ?? { title: xhr.statusText }, xhr.status));
     };
-    xhr.onerror = () => (end(), reject(new UnreachableError(url)));
-    xhr.onabort = () => (end(), reject(abortError(signal)));
+    xhr.onerror = () => {
+      end();
+      reject(new UnreachableError(url));
+    };
+    xhr.onabort = () => {
+      end();
+      reject(abortError(signal));
+    };
     signal?.addEventListener('abort', abort);
     xhr.send(body);
   });

@@ -14,96 +14,153 @@ const using = (options, body) => async (t) => {
 };
 const bytes = (text) => new TextEncoder().encode(text);
 
-test('morph uploads, merges, waits and fetches', using({}, async (daemon) => {
-  const steps = [];
-  const landmarks = [{ name: 'nose', at: [{ vertex: 1 }, { vertex: 2 }] }];
-  const result = await orbmorph.morph([new Blob(['a']), { source: bytes('bb'), name: 'cow' }], {
-    server: daemon.url, landmarks, remesh: { tolerance: 0.01 }, repair: ['safe', 'fill_holes'],
-    onProgress: (step) => steps.push(step),
-  });
-  assert.deepEqual(daemon.seen.uploads.map((u) => [u.name, u.repair, u.bytes]), [['mesh', 'safe,fill_holes', 1], ['cow', 'safe,fill_holes', 2]]);
-  assert.deepEqual(result.request.landmarks, landmarks);
-  assert.equal(result.request.shapes[1].name, 'cow');
-  assert.equal(result.request.align, undefined);
-  assert.equal(result.meshes.length, 2);
-  assert.equal(result.assetUrl, `${daemon.url}/v1/supermeshes/1/asset.glb`);
-  assert.equal(Buffer.from(await result.glb()).toString(), 'glTF');
-  assert.ok(steps.some((s) => s.step === 'upload' && s.progress === 1));
-  const merging = steps.filter((s) => s.step === 'merge').map((s) => s.progress);
-  assert.deepEqual(merging, [...merging].sort());
-  assert.equal(merging.at(-1), 1);
-}));
+test(
+  'morph uploads, merges, waits and fetches',
+  using({}, async (daemon) => {
+    const steps = [];
+    const landmarks = [{ name: 'nose', at: [{ vertex: 1 }, { vertex: 2 }] }];
+    const result = await orbmorph.morph([new Blob(['a']), { source: bytes('bb'), name: 'cow' }], {
+      server: daemon.url,
+      landmarks,
+      remesh: { tolerance: 0.01 },
+      repair: ['safe', 'fill_holes'],
+      onProgress: (step) => steps.push(step),
+    });
+    assert.deepEqual(
+      daemon.seen.uploads.map((u) => [u.name, u.repair, u.bytes]),
+      [
+        ['mesh', 'safe,fill_holes', 1],
+        ['cow', 'safe,fill_holes', 2],
+      ],
+    );
+    assert.deepEqual(result.request.landmarks, landmarks);
+    assert.equal(result.request.shapes[1].name, 'cow');
+    assert.equal(result.request.align, undefined);
+    assert.equal(result.meshes.length, 2);
+    assert.equal(result.assetUrl, `${daemon.url}/v1/supermeshes/1/asset.glb`);
+    assert.equal(Buffer.from(await result.glb()).toString(), 'glTF');
+    assert.ok(steps.some((s) => s.step === 'upload' && s.progress === 1));
+    const merging = steps.filter((s) => s.step === 'merge').map((s) => s.progress);
+    assert.deepEqual(merging, [...merging].sort());
+    assert.equal(merging.at(-1), 1);
+  }),
+);
 
-test('in Node, a path is read and names the mesh', using({}, async (daemon, client) => {
-  const folder = await mkdtemp(join(tmpdir(), 'orbmorph-js-'));
-  await writeFile(join(folder, 'horse.obj'), 'v 0 0 0');
-  const mesh = await client.uploadMesh(join(folder, 'horse.obj'));
-  await rm(folder, { recursive: true });
-  assert.equal(mesh.name, 'horse');
-  assert.equal(daemon.seen.uploads[0].bytes, 7);
-}));
+test(
+  'in Node, a path is read and names the mesh',
+  using({}, async (daemon, client) => {
+    const folder = await mkdtemp(join(tmpdir(), 'orbmorph-js-'));
+    await writeFile(join(folder, 'horse.obj'), 'v 0 0 0');
+    const mesh = await client.uploadMesh(join(folder, 'horse.obj'));
+    await rm(folder, { recursive: true });
+    assert.equal(mesh.name, 'horse');
+    assert.equal(daemon.seen.uploads[0].bytes, 7);
+  }),
+);
 
-test('upload progress reaches the full size', using({}, async (daemon, client) => {
-  const seen = [];
-  await client.uploadMesh(new Uint8Array(700_000), { name: 'big', onProgress: (sent, total) => seen.push([sent, total]) });
-  assert.ok(seen.length >= 3);
-  assert.deepEqual(seen.at(-1), [700_000, 700_000]);
-  assert.equal(daemon.seen.uploads[0].bytes, 700_000);
-}));
+test(
+  'upload progress reaches the full size',
+  using({}, async (daemon, client) => {
+    const seen = [];
+    await client.uploadMesh(new Uint8Array(700_000), {
+      name: 'big',
+      onProgress: (sent, total) => seen.push([sent, total]),
+    });
+    assert.ok(seen.length >= 3);
+    assert.deepEqual(seen.at(-1), [700_000, 700_000]);
+    assert.equal(daemon.seen.uploads[0].bytes, 700_000);
+  }),
+);
 
-test('a refused request throws a ProblemError with its details', using({}, async (daemon, client) => {
-  await assert.rejects(client.uploadMesh(bytes('open')), (error) => {
-    assert.ok(error instanceof ProblemError);
-    assert.equal(error.kind, 'not-closed');
-    assert.equal(error.status, 422);
-    assert.deepEqual(error.problem.boundary_edges, [[0, 1]]);
-    assert.equal(error.message, 'It is not-closed.');
-    return true;
-  });
-}));
+test(
+  'a refused request throws a ProblemError with its details',
+  using({}, async (_daemon, client) => {
+    await assert.rejects(client.uploadMesh(bytes('open')), (error) => {
+      assert.ok(error instanceof ProblemError);
+      assert.equal(error.kind, 'not-closed');
+      assert.equal(error.status, 422);
+      assert.deepEqual(error.problem.boundary_edges, [[0, 1]]);
+      assert.equal(error.message, 'It is not-closed.');
+      return true;
+    });
+  }),
+);
 
-test('a failed job throws its problem', using({}, async (daemon, client) => {
-  await assert.rejects(client.merge({ shapes: [], fail: true }), (error) => error instanceof ProblemError && error.kind === 'bad-landmarks');
-}));
+test(
+  'a failed job throws its problem',
+  using({}, async (_daemon, client) => {
+    await assert.rejects(
+      client.merge({ shapes: [], fail: true }),
+      (error) => error instanceof ProblemError && error.kind === 'bad-landmarks',
+    );
+  }),
+);
 
-test('a broken event stream resumes after the last event', using({ breakStream: true, jobSteps: 4 }, async (daemon, client) => {
-  const result = await client.merge({ shapes: [] });
-  assert.equal(result.id, '1');
-  assert.equal(daemon.seen.lastEventIds[0], undefined);
-  assert.equal(daemon.seen.lastEventIds[1], '1');
-}));
+test(
+  'a broken event stream resumes after the last event',
+  using({ breakStream: true, jobSteps: 4 }, async (daemon, client) => {
+    const result = await client.merge({ shapes: [] });
+    assert.equal(result.id, '1');
+    assert.equal(daemon.seen.lastEventIds[0], undefined);
+    assert.equal(daemon.seen.lastEventIds[1], '1');
+  }),
+);
 
-test('the client polls if there are no events', using({ noEvents: true }, async (daemon, client) => {
-  assert.equal((await client.merge({ shapes: [] })).id, '1');
-  assert.ok(daemon.seen.requests.some((request) => request.query === '?wait=20'));
-  await assert.rejects(client.watchJob({ id: '77' }), ProblemError);
-}));
+test(
+  'the client polls if there are no events',
+  using({ noEvents: true }, async (daemon, client) => {
+    assert.equal((await client.merge({ shapes: [] })).id, '1');
+    assert.ok(daemon.seen.requests.some((request) => request.query === '?wait=20'));
+    await assert.rejects(client.watchJob({ id: '77' }), ProblemError);
+  }),
+);
 
-test('abort cancels the job', using({ jobSteps: 1e6 }, async (daemon, client) => {
-  const abort = new AbortController();
-  const running = client.merge({ shapes: [] }, { signal: abort.signal, onProgress: () => setTimeout(() => abort.abort(), 60) });
-  await assert.rejects(running, { name: 'AbortError' });
-  assert.equal(daemon.jobs.get('1').state, 'cancelled');
-}));
+test(
+  'abort cancels the job',
+  using({ jobSteps: 1e6 }, async (daemon, client) => {
+    const abort = new AbortController();
+    const running = client.merge(
+      { shapes: [] },
+      { signal: abort.signal, onProgress: () => setTimeout(() => abort.abort(), 60) },
+    );
+    await assert.rejects(running, { name: 'AbortError' });
+    assert.equal(daemon.jobs.get('1').state, 'cancelled');
+  }),
+);
 
-test('abort with detach keeps the job running', using({ jobSteps: 1e6 }, async (daemon, client) => {
-  const abort = new AbortController();
-  await assert.rejects(client.merge({ shapes: [] }, { signal: abort.signal, detach: true, onProgress: ({ state }) => state === 'running' && abort.abort() }), { name: 'AbortError' });
-  assert.equal(daemon.jobs.get('1').state, 'running');
-}));
+test(
+  'abort with detach keeps the job running',
+  using({ jobSteps: 1e6 }, async (daemon, client) => {
+    const abort = new AbortController();
+    await assert.rejects(
+      client.merge(
+        { shapes: [] },
+        { signal: abort.signal, detach: true, onProgress: ({ state }) => state === 'running' && abort.abort() },
+      ),
+      { name: 'AbortError' },
+    );
+    assert.equal(daemon.jobs.get('1').state, 'running');
+  }),
+);
 
-test('a list continues on its next pages', using({}, async (daemon, client) => {
-  for (const text of ['a', 'b', 'c']) await client.uploadMesh(bytes(text), { name: text });
-  const names = [];
-  for await (const mesh of client.list('meshes')) names.push(mesh.name);
-  assert.deepEqual(names, ['a', 'b', 'c']);
-}));
+test(
+  'a list continues on its next pages',
+  using({}, async (_daemon, client) => {
+    for (const text of ['a', 'b', 'c']) await client.uploadMesh(bytes(text), { name: text });
+    const names = [];
+    for await (const mesh of client.list('meshes')) names.push(mesh.name);
+    assert.deepEqual(names, ['a', 'b', 'c']);
+  }),
+);
 
-test('every request carries the token', using({ token: 'secret' }, async (daemon) => {
-  const client = new Orbmorph({ server: daemon.url, token: 'secret' });
-  assert.equal((await client.uploadMesh(bytes('a'))).name, 'mesh');
-  await assert.rejects(new Orbmorph({ server: daemon.url }).getMesh('x'), (error) => error.status === 401);
-}));
+test(
+  'every request carries the token',
+  using({ token: 'secret' }, async (daemon) => {
+    const client = new Orbmorph({ server: daemon.url, token: 'secret' });
+    assert.equal((await client.uploadMesh(bytes('a'))).name, 'mesh');
+    await assert.rejects(new Orbmorph({ server: daemon.url }).getMesh('x'), (error) => error.status === 401);
+  }),
+);
 
 test('an unreachable daemon throws UnreachableError', async () => {
   await assert.rejects(new Orbmorph({ server: 'http://127.0.0.1:9' }).getMesh('x'), UnreachableError);

@@ -1,16 +1,31 @@
 // Compiled but never run: code that must compile, and code that the compiler must reject.
-import orbmorph, { Orbmorph, ProblemError, type KnownProblem, type Landmark, type Mesh, type Supermesh } from '../src/index.js';
+import orbmorph, {
+  Orbmorph,
+  ProblemError,
+  type KnownProblem,
+  type Landmark,
+  type Mesh,
+  type Supermesh,
+} from '../src/index.js';
 
 export async function usage(a: File, b: Uint8Array) {
   const landmarks: Landmark[] = [{ name: 'nose', at: [{ vertex: 12 }, { point: [1, 2, 3] }] }];
-  const morph = await orbmorph.morph([a, b, 'horse.obj'], { landmarks, remesh: { tolerance: 0.001 }, onProgress: ({ step, progress }) => `${step} ${progress}` });
+  const morph = await orbmorph.morph([a, b, 'horse.obj'], {
+    landmarks,
+    remesh: { tolerance: 0.001 },
+    onProgress: ({ step, progress }) => `${step} ${progress}`,
+  });
   const glb: ArrayBuffer = await morph.glb();
   const client = new Orbmorph({ server: 'http://127.0.0.1:8080', token: 'secret' });
   client.token = undefined;
   const mesh: Mesh = await client.uploadMesh(a, { repair: ['safe', 'fill_holes'] });
   const embedding = await client.embed(mesh.id, { method: 'newton', options: { preset: 'quality' } });
   const mean: number | null = embedding.distortion.symmetric_dirichlet.mean;
-  const supermesh: Supermesh = await client.merge({ shapes: [{ mesh: mesh.id }, { mesh: mesh.id }], landmarks: 'auto', align: { method: 'auto' } });
+  const supermesh: Supermesh = await client.merge({
+    shapes: [{ mesh: mesh.id }, { mesh: mesh.id }],
+    landmarks: 'auto',
+    align: { method: 'auto' },
+  });
   const sphere: ArrayBuffer = await client.alignedSphere(supermesh.id, 0);
   for await (const job of client.list('jobs', { state: 'running' })) job.progress?.toFixed(2);
   return [glb, mean, sphere];

@@ -1,6 +1,6 @@
 /**
- * The clock of the morph. It changes weights and asks for a drawing; the page is not rendered again for each frame:
- * those who show the time (the slider) listen to it directly.
+ * The clock of the morph. It changes weights and requests a drawing without rendering the page again for each frame;
+ * controls that show the time (the slider) listen to it directly.
  */
 import { set, state, tint, type Result } from './state';
 import { stage } from './view/shared';
@@ -15,13 +15,13 @@ class Player {
   time = 0;
   private phase = 0;
   private last = 0;
-  private asked = 0;
+  private frame = 0;
   private listeners = new Set<(time: number) => void>();
 
-  listen(tell: (time: number) => void): () => void {
-    this.listeners.add(tell);
-    tell(this.time);
-    return () => this.listeners.delete(tell);
+  listen(listener: (time: number) => void): () => void {
+    this.listeners.add(listener);
+    listener(this.time);
+    return () => this.listeners.delete(listener);
   }
 
   load(result: Result) {
@@ -40,17 +40,16 @@ class Player {
   }
 
   play() {
-    if (!this.result || this.asked) return;
-    if (matchMedia('(prefers-reduced-motion: reduce)').matches && !this.phase) this.phase = 0;
+    if (!this.result || this.frame) return;
     this.phase = this.phaseOf(this.time);
     this.last = 0;
     set({ playing: true, mix: null });
-    this.asked = requestAnimationFrame(this.tick);
+    this.frame = requestAnimationFrame(this.tick);
   }
 
   pause() {
-    cancelAnimationFrame(this.asked);
-    this.asked = 0;
+    cancelAnimationFrame(this.frame);
+    this.frame = 0;
     if (state.playing) set({ playing: false });
   }
 
@@ -63,13 +62,13 @@ class Player {
     this.time = Math.max(0, Math.min(1, time));
     const { result } = this;
     if (result) {
-      this.weigh(weightsAt(result.data, this.time));
+      this.setWeights(weightsAt(result.data, this.time));
       this.tintAt(this.time);
     }
-    for (const tell of this.listeners) tell(this.time);
+    for (const listener of this.listeners) listener(this.time);
   }
 
-  /** Shares of the shapes, summing to anything. */
+  /** Shows a mixture of the shapes; `shares` may have any sum. */
   mix(shares: number[]) {
     const { result } = this;
     if (!result) return;
@@ -78,12 +77,17 @@ class Player {
     const part = sum > 0 ? shares.map((x) => x / sum) : shares.map((_, i) => (i ? 0 : 1));
     const weights = new Array<number>(result.data.names.length).fill(0);
     part.forEach((x, i) => result.data.shapes[i]?.forEach((w, k) => (weights[k] += x * w)));
-    this.weigh(weights);
-    result.main.color(mixed(part.map((_, i) => tint(i)), part));
+    this.setWeights(weights);
+    result.main.color(
+      mixed(
+        part.map((_, i) => tint(i)),
+        part,
+      ),
+    );
     set({ mix: shares });
   }
 
-  private weigh(weights: ArrayLike<number>) {
+  private setWeights(weights: ArrayLike<number>) {
     this.result?.main.weights(weights);
     stage.draw();
   }
@@ -94,7 +98,7 @@ class Player {
     this.result?.main.color(mixed([tint(i), tint(i + 1)], [1 - at + i, at - i]));
   }
 
-  /** There and back, resting a little at each shape. */
+  /** The time of a phase: back and forth, with a short rest at each shape. */
   private timeOf(phase: number): number {
     const there = phase % (2 * this.legs);
     const at = there <= this.legs ? there : 2 * this.legs - there;
@@ -119,7 +123,7 @@ class Player {
     this.last = now;
     this.phase += passed / SECONDS_A_SHAPE;
     this.seek(this.timeOf(this.phase));
-    this.asked = requestAnimationFrame(this.tick);
+    this.frame = requestAnimationFrame(this.tick);
   };
 }
 

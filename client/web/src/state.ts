@@ -1,4 +1,4 @@
-/** The state of the page, and who is told when it changes. Changes are made in actions/*.ts. */
+/** The state of the page and its listeners. actions/*.ts change it. */
 import type { Job, Landmark as WireLandmark, Mesh, Problem, Supermesh, SupermeshRequest, Embedding } from 'orbmorph';
 import { Orbmorph } from 'orbmorph';
 import type { MorphData } from './mesh/morph';
@@ -20,9 +20,10 @@ export interface Shape {
   facts?: { vertices: number; triangles: number; format: string };
   problem?: Problem;
   message?: string;
-  faults?: number;
-  /** the embedding, and the sphere after the alignment of the result that is named */
+  defects?: number;
+  /** the embedding */
   sphere?: SphereState;
+  /** the sphere after the alignment; `result` is the supermesh it belongs to */
   aligned?: SphereState & { result: string };
   error?: { result: string; values: Float32Array; max: number; rms: number; model: Model };
 }
@@ -37,7 +38,7 @@ export interface SphereState {
   ball?: Model;
   normals?: Float32Array;
   places?: Float32Array;
-  /** of the landmarks, by their ids */
+  /** points on the sphere by landmark id */
   spots?: Map<number, [number, number, number]>;
 }
 
@@ -58,7 +59,13 @@ export interface Options {
 }
 
 export const DEFAULTS: Options = {
-  align: 'default', remesh: 'adaptive', tolerance: 0.001, maxTriangles: null, path: 'linear', fit: 'similarity', repair: 'safe',
+  align: 'default',
+  remesh: 'adaptive',
+  tolerance: 0.001,
+  maxTriangles: null,
+  path: 'linear',
+  fit: 'similarity',
+  repair: 'safe',
 };
 
 export interface Running {
@@ -94,13 +101,14 @@ export interface State {
   mix: number[] | null;
   show: 'morph' | 'each' | 'error';
   wire: boolean;
-  /** of the common mesh on each shape, which is shown for its triangles */
+  /** wireframe of the common mesh on each shape, separate because that view is about its triangles */
   meshWire: boolean;
   linked: boolean;
   paint: SpherePaint;
   side: 'before' | 'after';
-  /** a token is in use; what is said when one is asked for */
+  /** whether a token is in use */
   token: 'none' | 'kept';
+  /** the token dialog, and why it is open */
   asking: { reason: string | null } | null;
   drawer: 'server' | 'share' | 'help' | null;
   server: { meshes: Mesh[]; supermeshes: Supermesh[]; jobs: Job[]; message: string | null; loading: boolean } | null;
@@ -109,30 +117,52 @@ export interface State {
 }
 
 export const state: State = {
-  tab: 'shapes', shapes: [], landmarks: [], active: null, past: [], future: [], options: { ...DEFAULTS },
-  running: null, problem: null, loading: null, result: null, playing: false, mix: null, show: 'morph', wire: false, meshWire: true, linked: true,
-  paint: 'direction', side: 'before', token: 'none', asking: null, drawer: null, server: null, toasts: [], dragging: false,
+  tab: 'shapes',
+  shapes: [],
+  landmarks: [],
+  active: null,
+  past: [],
+  future: [],
+  options: { ...DEFAULTS },
+  running: null,
+  problem: null,
+  loading: null,
+  result: null,
+  playing: false,
+  mix: null,
+  show: 'morph',
+  wire: false,
+  meshWire: true,
+  linked: true,
+  paint: 'direction',
+  side: 'before',
+  token: 'none',
+  asking: null,
+  drawer: null,
+  server: null,
+  toasts: [],
+  dragging: false,
 };
 
 export const client = new Orbmorph({ server: '' });
 
 const listeners = new Set<() => void>();
-let asked = false;
+let scheduled = false;
 
-/** Changes the state; those who watch are told once, soon. */
+/** Changes the state. Several changes in one task notify the listeners once. */
 export function set(change: Partial<State> = {}) {
   Object.assign(state, change);
-  if (asked) return;
-  asked = true;
+  if (scheduled) return;
+  scheduled = true;
   queueMicrotask(() => {
-    asked = false;
-    for (const tell of [...listeners]) tell();
+    scheduled = false;
+    for (const listener of [...listeners]) listener();
   });
 }
 
-export function watch(tell: () => void): () => void {
-  listeners.add(tell);
-  return () => listeners.delete(tell);
+export function watch(listener: () => void): () => void {
+  listeners.add(listener);
+  return () => listeners.delete(listener);
 }
 
 export function shapeOf(key: string): Shape | undefined {
@@ -151,15 +181,28 @@ export function toast(text: string, kind: 'info' | 'error' = 'info') {
   setTimeout(() => set({ toasts: state.toasts.filter((t) => t.id !== id) }), kind === 'error' ? 9000 : 4000);
 }
 
-/** Tints of the shapes, in their order. */
+/** Tints of the shapes in order. */
 const TINTS = ['#f0b79a', '#a8c3ee', '#b4d3a6', '#ecd08a', '#d9b3dc', '#93d0cb', '#e6a9b4', '#c2c6cc'];
 export const tint = (index: number) => TINTS[index % TINTS.length];
 
-/** Colours of the landmarks, told apart at a glance; the number says the same. */
-const HUES = ['#d6336c', '#1971c2', '#2b7a3a', '#c2410c', '#7048e8', '#0b7285', '#a61e4d', '#4d7c0f', '#364fc7', '#c92a2a', '#087057', '#862e9c'];
+/** Colours of the landmarks, easy to distinguish; each marker also shows its number. */
+const HUES = [
+  '#d6336c',
+  '#1971c2',
+  '#2b7a3a',
+  '#c2410c',
+  '#7048e8',
+  '#0b7285',
+  '#a61e4d',
+  '#4d7c0f',
+  '#364fc7',
+  '#c92a2a',
+  '#087057',
+  '#862e9c',
+];
 export const hue = (index: number) => HUES[index % HUES.length];
 
-/** The landmarks that are set on every shape, as the daemon takes them. */
+/** The landmarks that are set on every shape, in the daemon's format. */
 export function wireLandmarks(shapes = readyShapes()): WireLandmark[] {
   return state.landmarks
     .filter((landmark) => shapes.length > 0 && shapes.every((shape) => landmark.at[shape.key]))

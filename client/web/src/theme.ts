@@ -1,4 +1,4 @@
-/** Light, dark, or as the system says; kept for the next visit. */
+/** Light, dark or the system's choice; stored for the next visit. */
 import { stage } from './view/shared';
 
 export type Theme = 'auto' | 'light' | 'dark';
@@ -17,7 +17,7 @@ export function applyTheme(next: Theme = theme()) {
   try {
     localStorage.setItem(KEY, next);
   } catch {
-    // storage may be switched off; the choice then lasts as long as the page
+    // the browser may forbid storage; the choice then lasts as long as the page
   }
   if (next === 'auto') delete document.documentElement.dataset.theme;
   else document.documentElement.dataset.theme = next;

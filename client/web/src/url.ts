@@ -1,7 +1,8 @@
 /**
- * The state of the page in the fragment of its address, so that a link or a reload brings it back:
+ * Keeps the state of the page in the fragment of its URL, so that a link or a reload restores it:
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
- * m: meshes on the server, r: a supermesh, j: a job, l: landmarks (vertex, or x_y_z, one for each shape), cam: camera.
+ * m: meshes on the server, r: a supermesh, j: a job, t: time along the morph, l: landmarks (a vertex or x_y_z for each
+ * shape), cam: camera, o: options.
  */
 import type { Place } from 'orbmorph';
 import { client, DEFAULTS, readyShapes, set, state, TABS, watch, type Options, type Tab } from './state';
@@ -30,7 +31,8 @@ function decodePlace(text: string): Place | undefined {
   if (!text) return undefined;
   const values = text.replace(/^t/, '').split('_').map(Number);
   if (!values.every(Number.isFinite)) return undefined;
-  if (text.startsWith('t') && values.length === 4) return { triangle: values[0], barycentric: [values[1], values[2], values[3]] };
+  if (text.startsWith('t') && values.length === 4)
+    return { triangle: values[0], barycentric: [values[1], values[2], values[3]] };
   if (values.length === 3) return { point: [values[0], values[1], values[2]] };
   return values.length === 1 ? { vertex: values[0] } : undefined;
 }
@@ -63,9 +65,15 @@ function encode(): string {
   put('r', state.result?.supermesh.id ?? '');
   put('j', state.running?.job?.id ?? '');
   if (state.result && !state.playing) put('t', player.time.toFixed(3));
-  put('l', state.landmarks
-    .map((l) => `${shapes.map((s) => encodePlace(l.at[s.key]?.place)).join(':')}${l.name ? `~${encodeURIComponent(l.name)}` : ''}`)
-    .join(';'));
+  put(
+    'l',
+    state.landmarks
+      .map(
+        (l) =>
+          `${shapes.map((s) => encodePlace(l.at[s.key]?.place)).join(':')}${l.name ? `~${encodeURIComponent(l.name)}` : ''}`,
+      )
+      .join(';'),
+  );
   if (encodeOptions(state.options) !== encodeOptions(DEFAULTS)) put('o', encodeOptions(state.options));
   if (state.paint !== 'direction') put('paint', state.paint);
   if (state.side !== 'before') put('side', state.side);
@@ -102,17 +110,27 @@ export async function restore() {
     const result = query.get('r');
     const tab = query.get('tab') as Tab;
     if (ids.length) {
-      set({ loading: 'Opening the shapes' });
+      set({ loading: 'Loading the shapes' });
       const meshes = await Promise.allSettled(ids.map((id) => client.getMesh(id)));
       await Promise.all(meshes.flatMap((m) => (m.status === 'fulfilled' ? [addFromServer(m.value)] : [])));
       set({ loading: null });
       const lost = meshes.filter((m) => m.status === 'rejected').length;
-      if (lost) set({ problem: { title: 'Not on the server any more', detail: `${lost} of ${ids.length} shapes of this address are gone. Add the files again.`, facts: null } });
+      if (lost)
+        set({
+          problem: {
+            title: 'Some shapes are missing',
+            detail: `${lost} of the ${ids.length} shapes in this URL are no longer on the server. Add the files again.`,
+            facts: null,
+          },
+        });
     }
-    const landmarks = (query.get('l') ?? '').split(';').filter(Boolean).map((text) => {
-      const [places, name = ''] = text.split('~');
-      return { name, at: places.split(':').map(decodePlace) as Place[] };
-    });
+    const landmarks = (query.get('l') ?? '')
+      .split(';')
+      .filter(Boolean)
+      .map((text) => {
+        const [places, name = ''] = text.split('~');
+        return { name, at: places.split(':').map(decodePlace) as Place[] };
+      });
     if (landmarks.length) await takeLandmarks(landmarks, { undoable: false });
     const paint = PAINTS.find((name) => name === query.get('paint'));
     if (paint) setPaint(paint);
@@ -134,7 +152,7 @@ export async function restore() {
   if (job) void resumeJob(job);
 }
 
-/** Keeps the address true; a link to another state of this page, pasted into the address, is followed. */
+/** Keeps the URL up to date. Pasting a URL of another state reloads the page with that state. */
 export function keepUrl() {
   watch(save);
   player.listen(save);

@@ -13,9 +13,9 @@
 
 #include <string.h>
 
+#include "orbmorph/remesh.h"
 #include "remesh/methods.h"
 #include "sphere/trace.h"
-#include "orbmorph/remesh.h"
 
 typedef struct orb_match {
   const orb_remesh_job *job;

@@ -2,9 +2,9 @@
 #ifndef ORB_REMESH_OVERLAY_OVERLAY_H
 #define ORB_REMESH_OVERLAY_OVERLAY_H
 
+#include "orbmorph/remesh.h"
 #include "remesh/methods.h"
 #include "sphere/trace.h"
-#include "orbmorph/remesh.h"
 
 /* One of the two triangulations. */
 typedef struct orb_layer {

@@ -8,17 +8,30 @@ import { binaries } from './daemon.mjs';
 /** Resolves to {code, bytes, out, err} of a program. */
 export function runProgram(program, args, { env = {}, cwd, input } = {}) {
   return new Promise((resolve, reject) => {
-    const child = spawn(program, args, { cwd, env: { ...process.env, ...env }, stdio: [input === undefined ? 'ignore' : 'pipe', 'pipe', 'pipe'] });
-    const out = [], err = [];
+    const child = spawn(program, args, {
+      cwd,
+      env: { ...process.env, ...env },
+      stdio: [input === undefined ? 'ignore' : 'pipe', 'pipe', 'pipe'],
+    });
+    const out = [];
+    const err = [];
     child.stdout.on('data', (chunk) => out.push(chunk));
     child.stderr.on('data', (chunk) => err.push(chunk));
     child.on('error', reject);
-    child.on('close', (code, signal) => resolve({ code: code ?? signal, bytes: Buffer.concat(out), out: Buffer.concat(out).toString(), err: Buffer.concat(err).toString() }));
+    child.on('close', (code, signal) =>
+      resolve({
+        code: code ?? signal,
+        bytes: Buffer.concat(out),
+        out: Buffer.concat(out).toString(),
+        err: Buffer.concat(err).toString(),
+      }),
+    );
     child.stdin?.end(input);
   });
 }
 
-export const run = (args, { env = {}, ...rest } = {}) => runProgram(binaries.client, args, { env: { ORBMORPH_SERVER: '', ...env }, ...rest });
+export const run = (args, { env = {}, ...rest } = {}) =>
+  runProgram(binaries.client, args, { env: { ORBMORPH_SERVER: '', ...env }, ...rest });
 
 /** A folder that goes when the test does. */
 export async function folder(t) {

@@ -27,7 +27,10 @@ assert.ok(dawdle >= 0, 'ORB_TEST_DAWDLE is in milliseconds');
  * thousands of samples a triangle, and a global optimisation to the last bit after every few vertices. With 8,000
  * triangles it keeps a worker until it is cancelled.
  */
-export const endless = { method: 'kernel-sampling', options: { step: 0.01, growth: 1.01, first_optimization: 1, displacement_threshold: 1e-15, max_iterations: 1000000 } };
+export const endless = {
+  method: 'kernel-sampling',
+  options: { step: 0.01, growth: 1.01, first_optimization: 1, displacement_threshold: 1e-15, max_iterations: 1000000 },
+};
 
 /** Asks `check` again and again until it gives something true; that. The time is for what never comes. */
 export async function until(check, what, seconds = 300) {
@@ -38,7 +41,8 @@ export async function until(check, what, seconds = 300) {
   }
 }
 
-const START_MS = patience * (slow ? 300_000 : 120_000), STOP_MS = START_MS;
+const START_MS = patience * (slow ? 300_000 : 120_000);
+const STOP_MS = START_MS;
 
 export class Daemon {
   constructor(data, args, env) {

@@ -5,15 +5,22 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 /** The distance from p to the triangle a, b, c (Ericson, Real-Time Collision Detection, 5.1.5). */
 export function toTriangle(p, a, b, c) {
-  const ab = sub(b, a), ac = sub(c, a), ap = sub(p, a);
+  const ab = sub(b, a);
+  const ac = sub(c, a);
+  const ap = sub(p, a);
   const at = (s, t) => Math.hypot(...[0, 1, 2].map((k) => ap[k] - s * ab[k] - t * ac[k]));
-  const d1 = dot(ab, ap), d2 = dot(ac, ap);
+  const d1 = dot(ab, ap);
+  const d2 = dot(ac, ap);
   if (d1 <= 0 && d2 <= 0) return at(0, 0);
-  const bp = sub(p, b), d3 = dot(ab, bp), d4 = dot(ac, bp);
+  const bp = sub(p, b);
+  const d3 = dot(ab, bp);
+  const d4 = dot(ac, bp);
   if (d3 >= 0 && d4 <= d3) return at(1, 0);
   const vc = d1 * d4 - d3 * d2;
   if (vc <= 0 && d1 >= 0 && d3 <= 0) return at(d1 / (d1 - d3), 0);
-  const cp = sub(p, c), d5 = dot(ab, cp), d6 = dot(ac, cp);
+  const cp = sub(p, c);
+  const d5 = dot(ab, cp);
+  const d6 = dot(ac, cp);
   if (d6 >= 0 && d5 <= d6) return at(0, 1);
   const vb = d5 * d2 - d1 * d6;
   if (vb <= 0 && d2 >= 0 && d6 <= 0) return at(0, d2 / (d2 - d6));
@@ -38,7 +45,10 @@ export function farthest(points, positions, triangles) {
   for (const p of points) {
     let least = Infinity;
     for (const { corners, centre, radius } of balls) {
-      const dx = p[0] - centre[0], dy = p[1] - centre[1], dz = p[2] - centre[2], reach = least + radius;
+      const dx = p[0] - centre[0];
+      const dy = p[1] - centre[1];
+      const dz = p[2] - centre[2];
+      const reach = least + radius;
       if (dx * dx + dy * dy + dz * dz < reach * reach) least = Math.min(least, toTriangle(p, ...corners));
     }
     worst = Math.max(worst, least);

@@ -6,9 +6,15 @@ import { binaries, root } from './daemon.mjs';
 import { writeGlb } from './glb_write.mjs';
 import { writePng } from './png.mjs';
 
-export const documents = async () => ['README.md', 'CONTRIBUTING.md', 'SECURITY.md', ...(await readdir(path.join(root, 'docs'))).filter((f) => f.endsWith('.md')).map((f) => `docs/${f}`)];
+export const documents = async () => [
+  'README.md',
+  'CONTRIBUTING.md',
+  'SECURITY.md',
+  ...(await readdir(path.join(root, 'docs'))).filter((f) => f.endsWith('.md')).map((f) => `docs/${f}`),
+];
 
-export const blocks = (text, language) => [...text.matchAll(new RegExp(`^\`\`\`${language}\\n([^]*?)^\`\`\`$`, 'gm'))].map((m) => m[1]);
+export const blocks = (text, language) =>
+  [...text.matchAll(new RegExp(`^\`\`\`${language}\\n([^]*?)^\`\`\`$`, 'gm'))].map((m) => m[1]);
 
 /** The lines of all ```sh blocks of a document as one script in which curl fails when the daemon refuses; "" without. */
 export async function shellLines(file) {
@@ -18,11 +24,18 @@ export async function shellLines(file) {
 
 /** A box with a texture: "any GLB with a texture" of the cookbook. */
 function texturedBox() {
-  const positions = [], uv = [], triangles = [];
+  const positions = [];
+  const uv = [];
+  const triangles = [];
   for (const axis of [0, 1, 2])
     for (const side of [-1, 1]) {
       const first = positions.length;
-      for (const [s, t] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+      for (const [s, t] of [
+        [-1, -1],
+        [1, -1],
+        [1, 1],
+        [-1, 1],
+      ]) {
         const p = [0, 0, 0];
         p[axis] = side;
         p[(axis + 1) % 3] = side * s;
@@ -32,7 +45,7 @@ function texturedBox() {
       }
       triangles.push([first, first + 1, first + 2], [first, first + 2, first + 3]);
     }
-  const image = writePng(32, 32, (x, y) => ((x >> 2) + (y >> 2)) % 2 ? [220, 120, 40] : [250, 240, 220]);
+  const image = writePng(32, 32, (x, y) => (((x >> 2) + (y >> 2)) % 2 ? [220, 120, 40] : [250, 240, 220]));
   return writeGlb({ positions, uv, triangles, image });
 }
 
@@ -42,6 +55,10 @@ export async function place(t, d) {
   t.after(() => rm(at, { recursive: true, force: true }));
   await symlink(path.join(root, 'tests'), path.join(at, 'tests'));
   await writeFile(path.join(at, 'textured.glb'), texturedBox());
-  const env = { ...process.env, ORBMORPH_SERVER: d.url, PATH: `${path.dirname(binaries.client)}:${path.dirname(binaries.daemon)}:${process.env.PATH}` };
+  const env = {
+    ...process.env,
+    ORBMORPH_SERVER: d.url,
+    PATH: `${path.dirname(binaries.client)}:${path.dirname(binaries.daemon)}:${process.env.PATH}`,
+  };
   return { at, env };
 }

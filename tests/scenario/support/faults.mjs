@@ -121,7 +121,9 @@ export class Caller {
     const embedding = await this.make(calm, '/v1/embeddings', { mesh: mesh.id });
     if (embedding) await this.ask(calm, 'GET', `${embedding}/sphere.ply`);
     const supermesh = await this.make(calm, '/v1/supermeshes', {
-      shapes: [{ mesh: mesh.id }, { mesh: (b ?? mesh).id }], align: { method: 'rotate' }, remesh: { method: 'overlay' },
+      shapes: [{ mesh: mesh.id }, { mesh: (b ?? mesh).id }],
+      align: { method: 'rotate' },
+      remesh: { method: 'overlay' },
     });
     if (supermesh) {
       const asset = await this.ask(calm, 'GET', `${supermesh}/asset.glb`);

@@ -1,7 +1,14 @@
 // A reader of binary glTF that is written against the specification only, and facts of the morph in it.
 import assert from 'node:assert/strict';
 
-const components = { 5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
+const components = {
+  5120: Int8Array,
+  5121: Uint8Array,
+  5122: Int16Array,
+  5123: Uint16Array,
+  5125: Uint32Array,
+  5126: Float32Array,
+};
 const widths = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
 export function parseGlb(bytes) {
@@ -14,17 +21,31 @@ export function parseGlb(bytes) {
   const view = (index, offset, type, count) => {
     const v = gltf.bufferViews[index];
     const start = (v.byteOffset ?? 0) + (offset ?? 0);
-    return new components[type](new Uint8Array(bin.subarray(start, start + count * components[type].BYTES_PER_ELEMENT)).buffer);
+    return new components[type](
+      new Uint8Array(bin.subarray(start, start + count * components[type].BYTES_PER_ELEMENT)).buffer,
+    );
   };
   const read = (index) => {
     const a = gltf.accessors[index];
     const width = widths[a.type];
     const v = a.bufferView === undefined ? null : gltf.bufferViews[a.bufferView];
     assert.ok(!v?.byteStride || v.byteStride === width * components[a.componentType].BYTES_PER_ELEMENT, 'interleaved');
-    const out = v ? view(a.bufferView, a.byteOffset, a.componentType, a.count * width) : new components[a.componentType](a.count * width);
+    const out = v
+      ? view(a.bufferView, a.byteOffset, a.componentType, a.count * width)
+      : new components[a.componentType](a.count * width);
     if (a.sparse) {
-      const at = view(a.sparse.indices.bufferView, a.sparse.indices.byteOffset, a.sparse.indices.componentType, a.sparse.count);
-      const values = view(a.sparse.values.bufferView, a.sparse.values.byteOffset, a.componentType, a.sparse.count * width);
+      const at = view(
+        a.sparse.indices.bufferView,
+        a.sparse.indices.byteOffset,
+        a.sparse.indices.componentType,
+        a.sparse.count,
+      );
+      const values = view(
+        a.sparse.values.bufferView,
+        a.sparse.values.byteOffset,
+        a.componentType,
+        a.sparse.count * width,
+      );
       at.forEach((vertex, i) => out.set(values.subarray(i * width, (i + 1) * width), vertex * width));
     }
     return out;
@@ -36,7 +57,9 @@ export function parseGlb(bytes) {
 export function morphOf(bytes) {
   const { gltf, read } = parseGlb(bytes);
   assert.equal(gltf.meshes.length, 1);
-  const shapes = [], triangles = [], deltas = [];
+  const shapes = [];
+  const triangles = [];
+  const deltas = [];
   let first = 0;
   for (const primitive of gltf.meshes[0].primitives) {
     const base = read(primitive.attributes.POSITION);
@@ -49,7 +72,15 @@ export function morphOf(bytes) {
     for (const v of read(primitive.indices)) triangles.push(v + first);
     first += base.length / 3;
   }
-  return { gltf, read, shapes, deltas, triangles, names: gltf.meshes[0].extras?.targetNames, count: shapes[0].length / 3 };
+  return {
+    gltf,
+    read,
+    shapes,
+    deltas,
+    triangles,
+    names: gltf.meshes[0].extras?.targetNames,
+    count: shapes[0].length / 3,
+  };
 }
 
 /** Welds vertices that are the same in every shape, then counts: {vertices, triangles, closed, genus, weld}. */
@@ -65,23 +96,27 @@ export function topologyOf({ shapes, deltas, triangles, count }) {
   let doubled = 0;
   for (let t = 0; t < triangles.length; t += 3)
     for (let k = 0; k < 3; k++) {
-      const a = weld[triangles[t + k]], b = weld[triangles[t + ((k + 1) % 3)]];
+      const a = weld[triangles[t + k]];
+      const b = weld[triangles[t + ((k + 1) % 3)]];
       const key = a * known.size + b;
       if (edges.has(key) || a === b) doubled++;
       edges.add(key);
     }
   let open = 0;
   for (const key of edges) {
-    const a = Math.floor(key / known.size), b = key % known.size;
+    const a = Math.floor(key / known.size);
+    const b = key % known.size;
     if (!edges.has(b * known.size + a)) open++;
   }
-  const v = known.size, f = triangles.length / 3;
+  const v = known.size;
+  const f = triangles.length / 3;
   return { vertices: v, triangles: f, closed: open === 0 && doubled === 0, euler: v - edges.size / 2 + f, weld };
 }
 
 /** The vertex of the asset that is at all these places at once, to float32; −1 if none is. */
 export function vertexAt({ shapes, count }, places) {
-  let best = -1, least = Infinity;
+  let best = -1;
+  let least = Infinity;
   for (let v = 0; v < count; v++) {
     let worst = 0;
     places.forEach((p, s) => p.forEach((x, k) => (worst = Math.max(worst, Math.abs(shapes[s][3 * v + k] - x)))));

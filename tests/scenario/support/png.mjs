@@ -12,7 +12,8 @@ function crc(bytes) {
 }
 
 function chunk(name, bytes) {
-  const body = Buffer.concat([Buffer.from(name), bytes]), out = Buffer.alloc(body.length + 8);
+  const body = Buffer.concat([Buffer.from(name), bytes]);
+  const out = Buffer.alloc(body.length + 8);
   out.writeUInt32BE(bytes.length, 0);
   body.copy(out, 4);
   out.writeUInt32BE(crc(body), body.length + 4);
@@ -25,14 +26,21 @@ export function writePng(width, height, pixel) {
   head.writeUInt32BE(height, 4);
   head.set([8, 2], 8);
   const rows = Buffer.alloc((3 * width + 1) * height);
-  for (let y = 0; y < height; y++) for (let x = 0; x < width; x++) rows.set(pixel(x, y), y * (3 * width + 1) + 1 + 3 * x);
-  return Buffer.concat([Buffer.from('\x89PNG\r\n\x1a\n', 'latin1'), chunk('IHDR', head), chunk('IDAT', deflateSync(rows)), chunk('IEND', Buffer.alloc(0))]);
+  for (let y = 0; y < height; y++)
+    for (let x = 0; x < width; x++) rows.set(pixel(x, y), y * (3 * width + 1) + 1 + 3 * x);
+  return Buffer.concat([
+    Buffer.from('\x89PNG\r\n\x1a\n', 'latin1'),
+    chunk('IHDR', head),
+    chunk('IDAT', deflateSync(rows)),
+    chunk('IEND', Buffer.alloc(0)),
+  ]);
 }
 
 function* chunks(bytes) {
   assert.equal(bytes.toString('latin1', 0, 8), '\x89PNG\r\n\x1a\n');
-  for (let at = 8; at < bytes.length;) {
-    const size = bytes.readUInt32BE(at), body = bytes.subarray(at + 4, at + 8 + size);
+  for (let at = 8; at < bytes.length; ) {
+    const size = bytes.readUInt32BE(at);
+    const body = bytes.subarray(at + 4, at + 8 + size);
     assert.equal(bytes.readUInt32BE(at + 8 + size), crc(body), 'the sum of a chunk');
     yield { name: body.toString('latin1', 0, 4), data: body.subarray(4) };
     at += 12 + size;
@@ -41,14 +49,23 @@ function* chunks(bytes) {
 
 /** Bytes of the pixels, `channels` each, with the rows' filters undone. */
 function unfilter(packed, width, height, channels) {
-  const raw = inflateSync(packed), stride = width * channels, out = Buffer.alloc(stride * height);
+  const raw = inflateSync(packed);
+  const stride = width * channels;
+  const out = Buffer.alloc(stride * height);
   assert.equal(raw.length, (stride + 1) * height);
   for (let y = 0; y < height; y++) {
     const filter = raw[y * (stride + 1)];
     for (let i = 0; i < stride; i++) {
-      const left = i >= channels ? out[y * stride + i - channels] : 0, up = y ? out[(y - 1) * stride + i] : 0;
-      const corner = i >= channels && y ? out[(y - 1) * stride + i - channels] : 0, p = left + up - corner;
-      const paeth = Math.abs(p - left) <= Math.abs(p - up) && Math.abs(p - left) <= Math.abs(p - corner) ? left : Math.abs(p - up) <= Math.abs(p - corner) ? up : corner;
+      const left = i >= channels ? out[y * stride + i - channels] : 0;
+      const up = y ? out[(y - 1) * stride + i] : 0;
+      const corner = i >= channels && y ? out[(y - 1) * stride + i - channels] : 0;
+      const p = left + up - corner;
+      const paeth =
+        Math.abs(p - left) <= Math.abs(p - up) && Math.abs(p - left) <= Math.abs(p - corner)
+          ? left
+          : Math.abs(p - up) <= Math.abs(p - corner)
+            ? up
+            : corner;
       out[y * stride + i] = raw[y * (stride + 1) + 1 + i] + [0, left, up, (left + up) >> 1, paeth][filter];
     }
   }
@@ -57,8 +74,16 @@ function unfilter(packed, width, height, channels) {
 
 /** {width, height, frames: [RGB bytes…], milliseconds}; a picture that stands still is one frame. */
 export function readPng(bytes) {
-  let width, height, channels, palette, control, count = 1, milliseconds = 0, expected = 0;
-  const frames = [], parts = [];
+  let width;
+  let height;
+  let channels;
+  let palette;
+  let control;
+  let count = 1;
+  let milliseconds = 0;
+  let expected = 0;
+  const frames = [];
+  const parts = [];
   const show = () => {
     if (!parts.length) return;
     const { x, y, w, h } = control ?? { x: 0, y: 0, w: width, h: height };
@@ -83,7 +108,12 @@ export function readPng(bytes) {
     else if (name === 'fcTL') {
       show();
       assert.equal(data.readUInt32BE(0), expected++, 'frames in sequence');
-      control = { w: data.readUInt32BE(4), h: data.readUInt32BE(8), x: data.readUInt32BE(12), y: data.readUInt32BE(16) };
+      control = {
+        w: data.readUInt32BE(4),
+        h: data.readUInt32BE(8),
+        x: data.readUInt32BE(12),
+        y: data.readUInt32BE(16),
+      };
       milliseconds = (1000 * data.readUInt16BE(20)) / data.readUInt16BE(22);
     } else if (name === 'IDAT') parts.push(data);
     else if (name === 'fdAT') {

@@ -7,7 +7,8 @@ export const there = folder !== '' && existsSync(path.join(folder, 'index.csv'))
 
 function csvRow(line) {
   const fields = [];
-  for (const [, quoted, plain] of line.matchAll(/(?:^|,)(?:"((?:[^"]|"")*)"|([^,]*))/g)) fields.push(quoted?.replaceAll('""', '"') ?? plain);
+  for (const [, quoted, plain] of line.matchAll(/(?:^|,)(?:"((?:[^"]|"")*)"|([^,]*))/g))
+    fields.push(quoted?.replaceAll('""', '"') ?? plain);
   return fields;
 }
 
@@ -29,7 +30,15 @@ export function pairs() {
     .sort()
     .map((name) => {
       const pair = JSON.parse(readFileSync(path.join(folder, 'pairs', name), 'utf8'));
-      const landmarks = pair.landmarks.map((at, i) => ({ name: pair.landmark_names?.[i] ?? `${i + 1}`, at: at.map((vertex) => ({ vertex })) }));
-      return { name: path.parse(name).name, files: pair.meshes.map((m) => path.join(folder, 'good', m)), names: pair.meshes.map((m) => path.parse(m).name), landmarks };
+      const landmarks = pair.landmarks.map((at, i) => ({
+        name: pair.landmark_names?.[i] ?? `${i + 1}`,
+        at: at.map((vertex) => ({ vertex })),
+      }));
+      return {
+        name: path.parse(name).name,
+        files: pair.meshes.map((m) => path.join(folder, 'good', m)),
+        names: pair.meshes.map((m) => path.parse(m).name),
+        landmarks,
+      };
     });
 }

@@ -7,13 +7,32 @@ export const cube =
   'f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n';
 
 export function obj({ positions, triangles }) {
-  return positions.map((p) => `v ${p.join(' ')}\n`).join('') + triangles.map((t) => `f ${t.map((v) => v + 1).join(' ')}\n`).join('');
+  return (
+    positions.map((p) => `v ${p.join(' ')}\n`).join('') +
+    triangles.map((t) => `f ${t.map((v) => v + 1).join(' ')}\n`).join('')
+  );
 }
 
 /** A sphere of 8·4^levels triangles, its points moved by `shape`. */
 export function ball(levels = 3, shape = (p) => p) {
-  let triangles = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
-  const points = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
+  let triangles = [
+    [0, 2, 4],
+    [2, 1, 4],
+    [1, 3, 4],
+    [3, 0, 4],
+    [2, 0, 5],
+    [1, 2, 5],
+    [3, 1, 5],
+    [0, 3, 5],
+  ];
+  const points = [
+    [1, 0, 0],
+    [-1, 0, 0],
+    [0, 1, 0],
+    [0, -1, 0],
+    [0, 0, 1],
+    [0, 0, -1],
+  ];
   for (let level = 0; level < levels; level++) {
     const middles = new Map();
     const middle = (a, b) => {
@@ -27,7 +46,12 @@ export function ball(levels = 3, shape = (p) => p) {
     };
     triangles = triangles.flatMap(([a, b, c]) => {
       const [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-      return [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+      return [
+        [a, ab, ca],
+        [ab, b, bc],
+        [ca, bc, c],
+        [ab, bc, ca],
+      ];
     });
   }
   return { positions: points.map(shape), triangles, points };
@@ -37,10 +61,13 @@ export const egg = (levels = 3) => ball(levels, ([x, y, z]) => [1.4 * x + 0.2 * 
 export const bean = (levels = 3) => ball(levels, ([x, y, z]) => [x, 0.9 * y + 0.35 * x * x, 0.7 * z * (1 + 0.3 * x)]);
 
 export function torus(n = 12, m = 8) {
-  const positions = [], triangles = [];
+  const positions = [];
+  const triangles = [];
   for (let i = 0; i < n; i++)
     for (let j = 0; j < m; j++) {
-      const u = (2 * Math.PI * i) / n, v = (2 * Math.PI * j) / m, r = 2 + Math.cos(v);
+      const u = (2 * Math.PI * i) / n;
+      const v = (2 * Math.PI * j) / m;
+      const r = 2 + Math.cos(v);
       positions.push([r * Math.cos(u), r * Math.sin(u), Math.sin(v)]);
       const at = (a, b) => (a % n) * m + (b % m);
       triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
@@ -75,7 +102,9 @@ export function binaryStl({ positions, triangles }) {
   const bytes = Buffer.alloc(84 + 50 * triangles.length);
   bytes.write('solid but binary');
   bytes.writeUInt32LE(triangles.length, 80);
-  triangles.forEach((t, i) => t.forEach((v, c) => positions[v].forEach((x, k) => bytes.writeFloatLE(x, 84 + 50 * i + 12 + 12 * c + 4 * k))));
+  triangles.forEach((t, i) =>
+    t.forEach((v, c) => positions[v].forEach((x, k) => bytes.writeFloatLE(x, 84 + 50 * i + 12 + 12 * c + 4 * k))),
+  );
   return bytes;
 }
 
@@ -109,19 +138,29 @@ export function off({ positions, triangles }) {
 export function parse(text) {
   const lines = text.split(/\r?\n/);
   if (/^(OFF|ply)/.test(text)) {
-    const words = text.replace(/#.*$/gm, '').replace(/^ply[^]*?end_header\n/, '').trim().split(/\s+/);
-    const head = /element vertex (\d+)[^]*element face (\d+)/.exec(text);
-    let at = 0, n, m;
+    const words = text
+      .replace(/#.*$/gm, '')
+      .replace(/^ply[\s\S]*?end_header\n/, '')
+      .trim()
+      .split(/\s+/);
+    const head = /element vertex (\d+)[\s\S]*element face (\d+)/.exec(text);
+    let at = 0;
+    let n;
+    let m;
     if (head) [n, m] = [Number(head[1]), Number(head[2])];
     else {
       at = 4;
       [n, m] = [Number(words[1]), Number(words[2])];
     }
     const positions = Array.from({ length: n }, () => [Number(words[at++]), Number(words[at++]), Number(words[at++])]);
-    const triangles = Array.from({ length: m }, () => (at++, [Number(words[at++]), Number(words[at++]), Number(words[at++])]));
+    const triangles = Array.from({ length: m }, () => {
+      at++; // the number of corners
+      return [Number(words[at++]), Number(words[at++]), Number(words[at++])];
+    });
     return { positions, triangles };
   }
-  const positions = [], triangles = [];
+  const positions = [];
+  const triangles = [];
   for (const line of lines) {
     const [kind, ...rest] = line.trim().split(/\s+/);
     if (kind === 'v') positions.push(rest.slice(0, 3).map(Number));

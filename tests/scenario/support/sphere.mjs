@@ -5,11 +5,21 @@ export function readSphere(bytes) {
   const end = bytes.indexOf('end_header\n') + 11;
   const head = bytes.toString('latin1', 0, end);
   assert.match(head, /^ply\nformat binary_little_endian 1\.0\n/);
-  const count = Number(/element vertex (\d+)/.exec(head)[1]), faces = Number(/element face (\d+)/.exec(head)[1]);
+  const count = Number(/element vertex (\d+)/.exec(head)[1]);
+  const faces = Number(/element face (\d+)/.exec(head)[1]);
   const properties = [...head.matchAll(/property (?!list)(\w+) (\w+)/g)].map((m) => m.slice(1).join(' '));
-  assert.deepEqual(properties, ['double x', 'double y', 'double z', 'double px', 'double py', 'double pz', 'int source']);
+  assert.deepEqual(properties, [
+    'double x',
+    'double y',
+    'double z',
+    'double px',
+    'double py',
+    'double pz',
+    'int source',
+  ]);
   assert.match(head, /property list uchar int vertex_indices/);
-  const vertices = [], triangles = [];
+  const vertices = [];
+  const triangles = [];
   let at = end;
   for (let v = 0; v < count; v++, at += 52) {
     const x = Array.from({ length: 6 }, (_, k) => bytes.readDoubleLE(at + 8 * k));
@@ -23,7 +33,8 @@ export function readSphere(bytes) {
   return { vertices, triangles };
 }
 
-const determinant = ([a, b, c], [d, e, f], [g, h, i]) => a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
+const determinant = ([a, b, c], [d, e, f], [g, h, i]) =>
+  a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
 
 /** Twice the tangent of half the solid angle, by Oosterom and Strackee. */
 function solidAngle(p, q, r) {

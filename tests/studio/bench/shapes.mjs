@@ -1,4 +1,4 @@
-// Two shapes over one icosphere of 20·4^steps triangles: as OBJ files, and merged as a GLB with one morph target.
+// Two shapes on one icosphere of 20·4^steps triangles: as OBJ files, and merged as a GLB with one morph target.
 
 export function icosphere(steps) {
   const t = (1 + Math.sqrt(5)) / 2;
@@ -10,16 +10,94 @@ export function icosphere(steps) {
     points.set([x / l, y / l, z / l], 3 * n);
     return n++;
   };
-  for (const p of [[-1, t, 0], [1, t, 0], [-1, -t, 0], [1, -t, 0], [0, -1, t], [0, 1, t], [0, -1, -t], [0, 1, -t], [t, 0, -1], [t, 0, 1], [-t, 0, -1], [-t, 0, 1]]) add(...p);
-  let faces = Uint32Array.of(0, 11, 5, 0, 5, 1, 0, 1, 7, 0, 7, 10, 0, 10, 11, 1, 5, 9, 5, 11, 4, 11, 10, 2, 10, 7, 6, 7, 1, 8,
-    3, 9, 4, 3, 4, 2, 3, 2, 6, 3, 6, 8, 3, 8, 9, 4, 9, 5, 2, 4, 11, 6, 2, 10, 8, 6, 7, 9, 8, 1);
+  for (const p of [
+    [-1, t, 0],
+    [1, t, 0],
+    [-1, -t, 0],
+    [1, -t, 0],
+    [0, -1, t],
+    [0, 1, t],
+    [0, -1, -t],
+    [0, 1, -t],
+    [t, 0, -1],
+    [t, 0, 1],
+    [-t, 0, -1],
+    [-t, 0, 1],
+  ])
+    add(...p);
+  let faces = Uint32Array.of(
+    0,
+    11,
+    5,
+    0,
+    5,
+    1,
+    0,
+    1,
+    7,
+    0,
+    7,
+    10,
+    0,
+    10,
+    11,
+    1,
+    5,
+    9,
+    5,
+    11,
+    4,
+    11,
+    10,
+    2,
+    10,
+    7,
+    6,
+    7,
+    1,
+    8,
+    3,
+    9,
+    4,
+    3,
+    4,
+    2,
+    3,
+    2,
+    6,
+    3,
+    6,
+    8,
+    3,
+    8,
+    9,
+    4,
+    9,
+    5,
+    2,
+    4,
+    11,
+    6,
+    2,
+    10,
+    8,
+    6,
+    7,
+    9,
+    8,
+    1,
+  );
   for (let step = 0; step < steps; step++) {
     const middles = new Map();
     const middle = (a, b) => {
       const key = Math.min(a, b) * 2 ** 26 + Math.max(a, b);
       let m = middles.get(key);
       if (m === undefined) {
-        m = add(points[3 * a] + points[3 * b], points[3 * a + 1] + points[3 * b + 1], points[3 * a + 2] + points[3 * b + 2]);
+        m = add(
+          points[3 * a] + points[3 * b],
+          points[3 * a + 1] + points[3 * b + 1],
+          points[3 * a + 2] + points[3 * b + 2],
+        );
         middles.set(key, m);
       }
       return m;
@@ -35,7 +113,10 @@ export function icosphere(steps) {
   return { points, faces };
 }
 
-const RADII = [(x, y) => 1 + 0.35 * Math.sin(5 * x) * Math.cos(4 * y), (x, y, z) => 1 + 0.5 * Math.max(0, y) ** 4 + 0.3 * Math.cos(6 * z)];
+const RADII = [
+  (x, y) => 1 + 0.35 * Math.sin(5 * x) * Math.cos(4 * y),
+  (_x, y, z) => 1 + 0.5 * Math.max(0, y) ** 4 + 0.3 * Math.cos(6 * z),
+];
 
 function placed({ points }, radius) {
   const out = new Float32Array(points.length);
@@ -51,8 +132,10 @@ export function objFiles(sphere) {
   return RADII.map((radius) => {
     const p = placed(sphere, radius);
     const lines = [];
-    for (let i = 0; i < p.length; i += 3) lines.push(`v ${p[i].toFixed(6)} ${p[i + 1].toFixed(6)} ${p[i + 2].toFixed(6)}`);
-    for (let f = 0; f < sphere.faces.length; f += 3) lines.push(`f ${sphere.faces[f] + 1} ${sphere.faces[f + 1] + 1} ${sphere.faces[f + 2] + 1}`);
+    for (let i = 0; i < p.length; i += 3)
+      lines.push(`v ${p[i].toFixed(6)} ${p[i + 1].toFixed(6)} ${p[i + 2].toFixed(6)}`);
+    for (let f = 0; f < sphere.faces.length; f += 3)
+      lines.push(`f ${sphere.faces[f] + 1} ${sphere.faces[f + 1] + 1} ${sphere.faces[f + 2] + 1}`);
     return Buffer.from(`${lines.join('\n')}\n`);
   });
 }
@@ -61,8 +144,12 @@ function normalsOf(p, faces) {
   const n = new Float32Array(p.length);
   for (let f = 0; f < faces.length; f += 3) {
     const [a, b, c] = [3 * faces[f], 3 * faces[f + 1], 3 * faces[f + 2]];
-    const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
-    const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+    const ux = p[b] - p[a];
+    const uy = p[b + 1] - p[a + 1];
+    const uz = p[b + 2] - p[a + 2];
+    const vx = p[c] - p[a];
+    const vy = p[c + 1] - p[a + 1];
+    const vz = p[c + 2] - p[a + 2];
     for (const q of [a, b, c]) {
       n[q] += uy * vz - uz * vy;
       n[q + 1] += uz * vx - ux * vz;
@@ -87,7 +174,13 @@ export function glb(sphere) {
     const piece = Buffer.from(array.buffer);
     bufferViews.push({ buffer: 0, byteOffset: size, byteLength: piece.length });
     const width = type === 'VEC3' ? 3 : 1;
-    accessors.push({ bufferView: bufferViews.length - 1, componentType, count: array.length / width, type, ...(width === 3 && { min: [-2, -2, -2], max: [2, 2, 2] }) });
+    accessors.push({
+      bufferView: bufferViews.length - 1,
+      componentType,
+      count: array.length / width,
+      type,
+      ...(width === 3 && { min: [-2, -2, -2], max: [2, 2, 2] }),
+    });
     pieces.push(piece);
     size += piece.length;
     return accessors.length - 1;
@@ -95,10 +188,21 @@ export function glb(sphere) {
   const minus = (a, b) => a.map((x, i) => x - b[i]);
   const attributes = { POSITION: add(places[0], 'VEC3', 5126), NORMAL: add(normals[0], 'VEC3', 5126) };
   const indices = add(sphere.faces, 'SCALAR', 5125);
-  const targets = [{ POSITION: add(minus(places[1], places[0]), 'VEC3', 5126), NORMAL: add(minus(normals[1], normals[0]), 'VEC3', 5126) }];
+  const targets = [
+    {
+      POSITION: add(minus(places[1], places[0]), 'VEC3', 5126),
+      NORMAL: add(minus(normals[1], normals[0]), 'VEC3', 5126),
+    },
+  ];
   let json = JSON.stringify({
-    asset: { version: '2.0' }, scene: 0, scenes: [{ nodes: [0] }], nodes: [{ mesh: 0 }],
-    meshes: [{ primitives: [{ attributes, indices, targets }], weights: [0], extras: { targetNames: ['b'] } }], accessors, bufferViews, buffers: [{ byteLength: size }],
+    asset: { version: '2.0' },
+    scene: 0,
+    scenes: [{ nodes: [0] }],
+    nodes: [{ mesh: 0 }],
+    meshes: [{ primitives: [{ attributes, indices, targets }], weights: [0], extras: { targetNames: ['b'] } }],
+    accessors,
+    bufferViews,
+    buffers: [{ byteLength: size }],
   });
   json += ' '.repeat((4 - (json.length % 4)) % 4);
   const head = Buffer.alloc(20);

@@ -12,14 +12,26 @@ export async function startDaemon({ jobSteps = 3, breakStream = false, noEvents 
   let broken = false;
 
   const send = (res, status, body, headers = {}) => {
-    res.writeHead(status, { 'Content-Type': status >= 400 ? 'application/problem+json' : 'application/json', ...headers });
+    res.writeHead(status, {
+      'Content-Type': status >= 400 ? 'application/problem+json' : 'application/json',
+      ...headers,
+    });
     res.end(body === undefined ? '' : JSON.stringify(body));
   };
   const problem = (res, status, name, more = {}) =>
     send(res, status, { type: `/problems/${name}`, title: name, status, detail: `It is ${name}.`, ...more });
-  const view = (job) => ({ id: job.id, url: `/v1/jobs/${job.id}`, kind: 'supermesh', state: job.state, stage: job.stage,
-    progress: job.step / jobSteps, result: job.state === 'succeeded' ? `/v1/supermeshes/${job.id}` : null,
-    problem: job.problem ?? null, attempt: 1, created: '2026-01-01T00:00:00Z' });
+  const view = (job) => ({
+    id: job.id,
+    url: `/v1/jobs/${job.id}`,
+    kind: 'supermesh',
+    state: job.state,
+    stage: job.stage,
+    progress: job.step / jobSteps,
+    result: job.state === 'succeeded' ? `/v1/supermeshes/${job.id}` : null,
+    problem: job.problem ?? null,
+    attempt: 1,
+    created: '2026-01-01T00:00:00Z',
+  });
   const advance = (job) => {
     if (job.state === 'cancelled' || job.state === 'failed') return;
     job.step++;
@@ -27,7 +39,8 @@ export async function startDaemon({ jobSteps = 3, breakStream = false, noEvents 
     job.stage = 'align';
     if (job.step >= jobSteps) {
       job.state = job.body.fail ? 'failed' : 'succeeded';
-      if (job.body.fail) job.problem = { type: '/problems/bad-landmarks', title: 'Bad', status: 422, detail: 'Two are the same.' };
+      if (job.body.fail)
+        job.problem = { type: '/problems/bad-landmarks', title: 'Bad', status: 422, detail: 'Two are the same.' };
     }
   };
 
@@ -41,8 +54,13 @@ export async function startDaemon({ jobSteps = 3, breakStream = false, noEvents 
     if (token && req.headers.authorization !== `Bearer ${token}`) return problem(res, 401, 'unauthorized');
 
     if (url.pathname === '/v1/meshes' && req.method === 'POST') {
-      seen.uploads.push({ name: url.searchParams.get('name'), repair: url.searchParams.get('repair'), bytes: body.length });
-      if (body.toString().includes('open')) return problem(res, 422, 'not-closed', { boundary_loops: 1, boundary_edges: [[0, 1]] });
+      seen.uploads.push({
+        name: url.searchParams.get('name'),
+        repair: url.searchParams.get('repair'),
+        bytes: body.length,
+      });
+      if (body.toString().includes('open'))
+        return problem(res, 422, 'not-closed', { boundary_loops: 1, boundary_edges: [[0, 1]] });
       const id = createHash('sha256').update(body).digest('hex');
       const known = meshes.has(id);
       meshes.set(id, { id, url: `/v1/meshes/${id}`, name: url.searchParams.get('name') });
@@ -51,7 +69,10 @@ export async function startDaemon({ jobSteps = 3, breakStream = false, noEvents 
     if (url.pathname === '/v1/meshes') {
       const all = [...meshes.values()];
       const at = Number(url.searchParams.get('page_token') ?? 0);
-      return send(res, 200, { meshes: all.slice(at, at + 1), next_page_token: at + 1 < all.length ? String(at + 1) : null });
+      return send(res, 200, {
+        meshes: all.slice(at, at + 1),
+        next_page_token: at + 1 < all.length ? String(at + 1) : null,
+      });
     }
     if (url.pathname === '/v1/supermeshes' && req.method === 'POST') {
       const request = JSON.parse(body);
@@ -65,7 +86,12 @@ export async function startDaemon({ jobSteps = 3, breakStream = false, noEvents 
       return res.end('glTF');
     }
     if (parts[1] === 'supermeshes')
-      return send(res, 200, { id: parts[2], url: url.pathname, asset: `${url.pathname}/asset.glb`, request: jobs.get(parts[2]).body });
+      return send(res, 200, {
+        id: parts[2],
+        url: url.pathname,
+        asset: `${url.pathname}/asset.glb`,
+        request: jobs.get(parts[2]).body,
+      });
     if (parts[1] === 'jobs' && jobs.has(parts[2])) {
       const job = jobs.get(parts[2]);
       if (req.method === 'DELETE') {
@@ -99,6 +125,9 @@ export async function startDaemon({ jobSteps = 3, breakStream = false, noEvents 
     url: `http://127.0.0.1:${server.address().port}`,
     seen,
     jobs,
-    stop: () => (server.closeAllConnections(), new Promise((resolve) => server.close(resolve))),
+    stop: () => {
+      server.closeAllConnections();
+      return new Promise((resolve) => server.close(resolve));
+    },
   };
 }

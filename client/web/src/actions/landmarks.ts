@@ -1,15 +1,13 @@
-/** Landmarks: set, moved, named, deleted, undone; read from and written to files in the daemon's format. */
+/** Edits landmarks with undo, and imports and exports them in the daemon's format. */
 import type { Landmark as WireLandmark, Place } from 'orbmorph';
 import { work } from '../mesh/work';
 import type { Spot } from '../mesh/worker';
 import { readyShapes, set, state, toast, wireLandmarks, type Landmark, type Shape } from '../state';
-import { clearResult } from './merge';
 
 let count = 0;
 
-/** Every change goes through here, so that it can be undone. */
+/** Every edit goes through here, which makes it undoable. A morph made from the old landmarks stays in view. */
 function change(landmarks: Landmark[], active = state.active) {
-  if (state.result && !state.running) clearResult(true);
   set({ past: [...state.past.slice(-199), state.landmarks], future: [], landmarks, active });
 }
 
@@ -23,7 +21,7 @@ export function redo() {
   if (next) set({ future, past: [...state.past, state.landmarks], landmarks: next });
 }
 
-/** The landmark that the next click belongs to: the active one while it is not on every shape. */
+/** The landmark that the next click sets: the active one, as long as a shape lacks it. */
 export function pending(): Landmark | null {
   const active = state.landmarks.find((landmark) => landmark.id === state.active);
   const shapes = readyShapes();
@@ -44,7 +42,11 @@ export function placeOn(shape: Shape, spot: Spot) {
 
 export async function moveOn(id: number, shape: Shape, origin: number[], direction: number[]) {
   const spot = await work('pick', shape.key, origin, direction);
-  if (spot) change(state.landmarks.map((l) => (l.id === id ? { ...l, at: { ...l.at, [shape.key]: spot } } : l)), id);
+  if (spot)
+    change(
+      state.landmarks.map((l) => (l.id === id ? { ...l, at: { ...l.at, [shape.key]: spot } } : l)),
+      id,
+    );
 }
 
 export function renameLandmark(id: number, name: string) {
@@ -52,7 +54,10 @@ export function renameLandmark(id: number, name: string) {
 }
 
 export function removeLandmark(id: number) {
-  change(state.landmarks.filter((l) => l.id !== id), state.active === id ? null : state.active);
+  change(
+    state.landmarks.filter((l) => l.id !== id),
+    state.active === id ? null : state.active,
+  );
 }
 
 export function clearLandmarks() {
@@ -66,14 +71,22 @@ export function forgetShape(key: string) {
   set({ landmarks, past: [], future: [] });
 }
 
-/** Replaces the landmarks by those of a file or of an answer. -> how many were taken */
-export async function takeLandmarks(list: Pick<WireLandmark, 'name' | 'at'>[], { undoable = true, snap = false } = {}): Promise<number> {
+/** Replaces the landmarks by those of a file or a response. Returns how many fit the shapes. */
+export async function takeLandmarks(
+  list: Pick<WireLandmark, 'name' | 'at'>[],
+  { undoable = true, snap = false } = {},
+): Promise<number> {
   const shapes = readyShapes();
   const made: Landmark[] = list.map((l) => ({ id: ++count, name: l.name ?? '', at: {} }));
   await Promise.all(
     shapes.map(async (shape, index) => {
       const wanted = list.map((l, row) => ({ row, place: l.at?.[index] })).filter((w) => w.place);
-      const spots = await work('locate', shape.key, wanted.map((w) => w.place as Place), snap);
+      const spots = await work(
+        'locate',
+        shape.key,
+        wanted.map((w) => w.place as Place),
+        snap,
+      );
       wanted.forEach((w, i) => {
         if (spots[i]) made[w.row].at[shape.key] = spots[i]!;
       });
@@ -89,16 +102,21 @@ export async function importLandmarks(file: File) {
   try {
     const content = JSON.parse(await file.text());
     const list = Array.isArray(content) ? content : content.landmarks;
-    if (!Array.isArray(list)) throw new Error('It holds no array of landmarks.');
+    if (!Array.isArray(list)) throw new Error('It contains no array of landmarks.');
     const taken = await takeLandmarks(list);
-    toast(taken === list.length ? `${taken} landmarks read.` : `${taken} of ${list.length} landmarks fit these shapes.`);
+    toast(
+      taken === list.length ? `${taken} landmarks imported.` : `${taken} of ${list.length} landmarks fit these shapes.`,
+    );
   } catch (error) {
-    toast(`${file.name} is no landmark file. ${(error as Error).message}`, 'error');
+    toast(`${file.name} is not a landmark file. ${(error as Error).message}`, 'error');
   }
 }
 
 export function exportLandmarks() {
-  save(new Blob([JSON.stringify({ landmarks: wireLandmarks() }, null, 2)], { type: 'application/json' }), 'landmarks.json');
+  save(
+    new Blob([JSON.stringify({ landmarks: wireLandmarks() }, null, 2)], { type: 'application/json' }),
+    'landmarks.json',
+  );
 }
 
 export function save(blob: Blob, name: string) {

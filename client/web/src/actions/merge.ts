@@ -1,4 +1,4 @@
-/** Morphing: the request, the job with its progress, the asset, and playing it. */
+/** Sends the merge request, follows its job, loads the asset and plays it. */
 import { CancelledError, ProblemError, type Job, type Supermesh, type SupermeshRequest } from 'orbmorph';
 import { client, readyShapes, set, state, tint, toast, wireLandmarks, type Result, type Running } from '../state';
 import { work } from '../mesh/work';
@@ -27,23 +27,31 @@ export async function startMerge(purpose: Running['purpose'] = 'morph') {
   const running: Running = { purpose, job: null, abort: new AbortController() };
   set({ running, problem: null });
   const request = buildRequest(purpose === 'find');
-  await follow(running, () =>
-    client.merge(request, { signal: running.abort.signal, onJob: progress(running), onProgress: progress(running) }), request);
+  await follow(
+    running,
+    () =>
+      client.merge(request, { signal: running.abort.signal, onJob: progress(running), onProgress: progress(running) }),
+    request,
+  );
 }
 
-/** Goes on with a job that an earlier visit began. */
+/** Follows a job that an earlier visit started. */
 export async function resumeJob(id: string) {
   const running: Running = { purpose: 'morph', job: null, abort: new AbortController() };
   set({ running });
   const { signal } = running.abort;
-  await follow(running, async () => {
-    try {
-      return await client.result<Supermesh>(id, { signal, onProgress: progress(running) });
-    } catch (error) {
-      if (signal.aborted) await client.cancelJob(id).catch(() => {});
-      throw error;
-    }
-  }, null);
+  await follow(
+    running,
+    async () => {
+      try {
+        return await client.result<Supermesh>(id, { signal, onProgress: progress(running) });
+      } catch (error) {
+        if (signal.aborted) await client.cancelJob(id).catch(() => {});
+        throw error;
+      }
+    },
+    null,
+  );
 }
 
 const progress = (running: Running) => (job: Job) => {
@@ -62,29 +70,32 @@ async function follow(running: Running, get: () => Promise<Supermesh>, request: 
     }
   } catch (error) {
     if (running.abort.signal.aborted || error instanceof CancelledError) toast('Cancelled.');
-    else set({ problem: tell(error) });
+    else set({ problem: describe(error) });
   } finally {
     if (state.running === running) set({ running: null });
   }
 }
 
-function tell(error: unknown) {
+function describe(error: unknown) {
   if (error instanceof ProblemError && (error.status === 401 || error.status === 403))
-    return { title: 'Not with this token', detail: explain(error), facts: null };
-  if (error instanceof ProblemError) return { title: error.title || 'The daemon refused', detail: error.detail, facts: error.problem };
-  return { title: 'That did not work', detail: (error as Error).message, facts: null };
+    return { title: 'The token does not allow this', detail: explain(error), facts: null };
+  if (error instanceof ProblemError)
+    return { title: error.title || 'The daemon refused the request', detail: error.detail, facts: error.problem };
+  return { title: 'The request failed', detail: (error as Error).message, facts: null };
 }
 
 const PROPOSALS = 12;
 
-/** The landmarks that the answer names, or else well-spread places of the correspondence it stands for. */
+/** Takes the landmarks of the response; if it has none, well-spread places of the correspondence it found. */
 async function takeFound(supermesh: Supermesh) {
   const named = (supermesh.landmarks ?? []).filter((l) => 'at' in l);
-  const points = named.length ? [] : await work('propose', await client.asset(supermesh.id), supermesh.shapes.length, PROPOSALS);
+  const points = named.length
+    ? []
+    : await work('propose', await client.asset(supermesh.id), supermesh.shapes.length, PROPOSALS);
   const found = named.length ? named : points.map((at) => ({ name: '', at: at.map((point) => ({ point })) }));
   const taken = await takeLandmarks(found, { snap: true });
   set({ tab: 'landmarks' });
-  toast(`${taken} landmarks found. Drag those that are off.`);
+  toast(`${taken} landmarks found. Drag any that are off.`);
 }
 
 export function cancelMerge() {
@@ -92,15 +103,25 @@ export function cancelMerge() {
 }
 
 export async function openResult(supermesh: Supermesh, request: SupermeshRequest | null) {
-  set({ loading: 'Fetching the morph' });
+  set({ loading: 'Loading the morph' });
   try {
     const buffer = await client.asset(supermesh.id);
     const data = await work('morph', supermesh.id, buffer, supermesh.shapes.length);
     clearResult();
     const models = morphModels(data, supermesh.shapes.length + 1, tint(0));
     const result: Result = {
-      supermesh, request, main: models[0], each: models.slice(1),
-      data: { times: data.times, weights: data.weights, shapes: data.shapes, names: data.names, vertices: data.vertices, triangles: data.triangles },
+      supermesh,
+      request,
+      main: models[0],
+      each: models.slice(1),
+      data: {
+        times: data.times,
+        weights: data.weights,
+        shapes: data.shapes,
+        names: data.names,
+        vertices: data.vertices,
+        triangles: data.triangles,
+      },
     };
     result.each.forEach((model, i) => {
       model.weights(result.data.shapes[i] ?? []);
@@ -113,9 +134,7 @@ export async function openResult(supermesh: Supermesh, request: SupermeshRequest
   }
 }
 
-/** `stale`: the landmarks have changed, so the result no longer is what "Morph" would give; it stays in view. */
-export function clearResult(stale = false) {
-  if (stale) return;
+export function clearResult() {
   const { result } = state;
   if (!result) return;
   player.unload();
@@ -127,18 +146,19 @@ export function clearResult(stale = false) {
   set({ result: null, mix: null, playing: false, show: 'morph', side: 'before' });
 }
 
-/** The error of the supermesh on every shape, painted on the original. */
+/** Measures the supermesh's error on every shape and paints it on the original surface. */
 export async function measureErrors() {
   const { result } = state;
   if (!result) return;
   const shapes = readyShapes();
   const fit = (result.supermesh.request ?? result.request)?.asset?.fit ?? 'none';
   for (const [index, shape] of shapes.entries()) {
-    if (shape.error?.result === result.supermesh.id || shape.mesh?.id !== result.supermesh.shapes[index]?.mesh) continue;
+    if (shape.error?.result === result.supermesh.id || shape.mesh?.id !== result.supermesh.shapes[index]?.mesh)
+      continue;
     set({ loading: `Measuring the error on ${shape.name}` });
     try {
       const found = await work('error', shape.key, result.supermesh.id, index, index > 0 && fit !== 'none');
-      const model = shape.model!.twin();
+      const model = shape.model!.copy();
       model.attribute('value', found.values);
       model.paint({ kind: 'value', ramp: 'heat', low: 0, high: Math.max(found.max, 1e-9) });
       shape.error = { result: result.supermesh.id, model, ...found };

@@ -1,4 +1,4 @@
-/** What is on the server: lists, opening and deleting. */
+/** Lists, opens and deletes what the server stores. */
 import type { Mesh, Supermesh } from 'orbmorph';
 import { client, set, state, toast } from '../state';
 import { addFromServer, removeShape } from './shapes';
@@ -15,7 +15,9 @@ export async function loadServer() {
       client.page('supermeshes', { limit: 100 }),
       client.page('jobs', { limit: 50 }),
     ]);
-    set({ server: { meshes: meshes.items, supermeshes: supermeshes.items, jobs: jobs.items, message: null, loading: false } });
+    set({
+      server: { meshes: meshes.items, supermeshes: supermeshes.items, jobs: jobs.items, message: null, loading: false },
+    });
   } catch (error) {
     set({ server: { meshes: [], supermeshes: [], jobs: [], message: explain(error), loading: false } });
   }
@@ -26,12 +28,12 @@ export async function addMesh(mesh: Mesh) {
   await addFromServer(mesh);
 }
 
-/** Opens a morph with its shapes. */
+/** Opens a morph together with its shapes. */
 export async function openSupermesh(id: string, play = true) {
   set({ drawer: null });
   try {
     const supermesh = await client.getSupermesh(id);
-    await bringShapes(supermesh);
+    await openShapes(supermesh);
     await openResult(supermesh, supermesh.request ?? null);
     set({ tab: 'morph', show: 'morph' });
     if (play) player.play();
@@ -40,7 +42,7 @@ export async function openSupermesh(id: string, play = true) {
   }
 }
 
-async function bringShapes(supermesh: Supermesh) {
+async function openShapes(supermesh: Supermesh) {
   const wanted = supermesh.shapes.map((shape) => shape.mesh);
   const present = state.shapes.map((shape) => shape.mesh?.id);
   if (wanted.length === present.length && wanted.every((id, i) => id === present[i])) return;

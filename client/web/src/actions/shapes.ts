@@ -1,4 +1,4 @@
-/** Bringing shapes in: files, samples, meshes that are on the server; refusals and how to mend them. */
+/** Adds shapes from files, samples and the server; offers repairs for refused meshes. */
 import { ProblemError, type Mesh, type Problem } from 'orbmorph';
 import samples from 'virtual:samples';
 import { client, patch, set, shapeOf, state, tint, toast, type Shape } from '../state';
@@ -26,21 +26,24 @@ function create(name: string): Shape {
   return shape;
 }
 
-/** Parses in the worker and makes the model; a file that cannot be drawn leaves the view empty. */
+/** Parses the file in the worker and creates the model. The view stays empty if the file cannot be drawn. */
 async function draw(shape: Shape, buffer: ArrayBuffer) {
   try {
     const display = await work('open', shape.key, buffer);
     if (!shapeOf(shape.key)) return void work('close', shape.key);
     const model = shapeModel(display, tint(state.shapes.indexOf(shape)));
-    patch(shape, { model, facts: { vertices: display.vertices, triangles: display.triangles, format: display.format } });
+    patch(shape, {
+      model,
+      facts: { vertices: display.vertices, triangles: display.triangles, format: display.format },
+    });
   } catch (error) {
     patch(shape, { message: (error as Error).message });
   }
 }
 
 async function send(shape: Shape, repair = state.options.repair) {
-  patch(shape, { state: 'uploading', progress: 0, problem: undefined, message: undefined, faults: undefined });
-  shape.model?.faults(null);
+  patch(shape, { state: 'uploading', progress: 0, problem: undefined, message: undefined, defects: undefined });
+  shape.model?.defects(null);
   try {
     const mesh = await client.uploadMesh(shape.file!, {
       name: shape.name,
@@ -53,20 +56,22 @@ async function send(shape: Shape, repair = state.options.repair) {
       return patch(shape, { state: 'failed', message: explain(error) });
     patch(shape, { state: 'refused', problem: error.problem });
     await drawn.get(shape.key);
-    await showFaults(shape, error);
+    await showDefects(shape, error);
   }
 }
 
-const numbers = (value: unknown): number[] => (Array.isArray(value) ? value.flat(2).filter((x) => typeof x === 'number') : []);
-const pairs = (value: unknown): number[][] => (Array.isArray(value) ? value.filter((x) => Array.isArray(x) && x.length === 2) : []);
+const numbers = (value: unknown): number[] =>
+  Array.isArray(value) ? value.flat(2).filter((x) => typeof x === 'number') : [];
+const pairs = (value: unknown): number[][] =>
+  Array.isArray(value) ? value.filter((x) => Array.isArray(x) && x.length === 2) : [];
 
-async function showFaults(shape: Shape, error: ProblemError) {
+async function showDefects(shape: Shape, error: ProblemError) {
   const { problem } = error;
   const edges = [...pairs(problem.boundary_edges), ...pairs(problem.nonmanifold_edges), ...pairs(problem.edges)];
   const vertices = [...numbers(problem.nonmanifold_vertices), ...numbers(problem.vertices)];
-  const faults = await work('faults', shape.key, error.kind, edges, vertices);
-  shape.model?.faults(faults);
-  patch(shape, { faults: faults.found });
+  const defects = await work('defects', shape.key, error.kind, edges, vertices);
+  shape.model?.defects(defects);
+  patch(shape, { defects: defects.found });
 }
 
 const drawn = new Map<string, Promise<void>>();
@@ -79,7 +84,10 @@ export async function addFiles(files: Iterable<File>) {
     list.map(async (file) => {
       const shape = create(file.name.replace(/\.[A-Za-z0-9]{1,5}$/, ''));
       shape.file = file;
-      drawn.set(shape.key, file.arrayBuffer().then((buffer) => draw(shape, buffer)));
+      drawn.set(
+        shape.key,
+        file.arrayBuffer().then((buffer) => draw(shape, buffer)),
+      );
       await send(shape);
     }),
   );
@@ -93,13 +101,13 @@ export async function addSamples(list: Sample[]) {
         if (!response.ok) throw new Error(String(response.status));
         await addFiles([new File([await response.blob()], sample.file)]);
       } catch {
-        toast(`The sample ${sample.name} could not be read.`, 'error');
+        toast(`The sample ${sample.name} could not be loaded.`, 'error');
       }
     }),
   );
 }
 
-/** The two that "Try with samples" opens: the first pair of the list. */
+/** The pair that "Try with samples" opens. */
 export const samplePair = () => sampleList.slice(0, 2);
 
 export async function addFromServer(mesh: Mesh): Promise<Shape> {
@@ -139,15 +147,16 @@ export function moveShape(key: string, by: number) {
   shapes.forEach((other, index) => other.model?.color(tint(index)));
 }
 
-export function mend(key: string, repair: string) {
+export function uploadAgain(key: string, repair: string) {
   const shape = shapeOf(key);
   if (shape?.file) void send(shape, repair);
 }
 
-/** The repairs that a refusal can be answered with. */
-export function remedies(problem: Problem): { repair: string; label: string }[] {
+/** The repairs that the page offers for a refusal. */
+export function repairsFor(problem: Problem): { repair: string; label: string }[] {
   const kind = problem.type.split('/').pop();
   if (kind === 'not-closed') return [{ repair: 'safe,fill_holes', label: 'Fill the holes' }];
-  if (kind === 'not-connected' || (kind === 'not-manifold' && problem.components)) return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }];
+  if (kind === 'not-connected' || (kind === 'not-manifold' && problem.components))
+    return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }];
   return [];
 }

@@ -1,6 +1,6 @@
 /**
- * The shapes as spheres, before the alignment (their embeddings) and after it (as the morph has them), painted on the
- * surface and on the sphere. Asked for when they come into view.
+ * The spheres of the shapes before the alignment (their embeddings) and after it (from the supermesh), painted on the
+ * surface and on the sphere. They are loaded when they come into view.
  */
 import type { Embedding } from 'orbmorph';
 import { client, readyShapes, set, state, type Shape, type SpherePaint, type SphereState } from '../state';
@@ -11,14 +11,17 @@ import { sphereModels } from '../view/models';
 import { stage } from '../view/shared';
 import type { Paint } from '../view/colors';
 
-/** The sphere that is shown of a shape. */
-export const sphereOf = (shape: Shape): SphereState | undefined => (state.side === 'after' ? shape.aligned : shape.sphere);
+/** The sphere of a shape that the page shows. */
+export const sphereOf = (shape: Shape): SphereState | undefined =>
+  state.side === 'after' ? shape.aligned : shape.sphere;
 
-/** Whether the morph is of these shapes and says where its spheres are. */
-export const canAlign = () => !!state.result && readyShapes().every((shape, i) => {
-  const of = state.result!.supermesh.shapes[i];
-  return of?.mesh === shape.mesh!.id && !!of.sphere;
-});
+/** Whether the morph is of these shapes and has their aligned spheres. */
+export const canAlign = () =>
+  !!state.result &&
+  readyShapes().every((shape, i) => {
+    const of = state.result!.supermesh.shapes[i];
+    return of?.mesh === shape.mesh!.id && !!of.sphere;
+  });
 
 export function showSide(side: 'before' | 'after') {
   set({ side });
@@ -28,19 +31,22 @@ export function showSide(side: 'before' | 'after') {
 export async function loadSpheres() {
   const { result, side } = state;
   if (side === 'after' && !canAlign()) return set({ side: 'before' });
-  // the embeddings first: their measures give the ranges of the colours and the histograms, on both sides
-  await Promise.all(readyShapes().map((shape) => bring(shape, 'before', () => loadEmbedded(shape))));
-  if (side === 'after') await Promise.all(readyShapes().map((shape, i) => {
-    if (shape.aligned?.result !== result!.supermesh.id) {
-      dropSphere(shape, side);
-      shape.aligned = undefined;
-    }
-    return bring(shape, side, () => loadAligned(shape, i));
-  }));
+  // Both sides need the embeddings first: their measures give the colour ranges and the histograms.
+  await Promise.all(readyShapes().map((shape) => loadOnce(shape, 'before', () => loadEmbedded(shape))));
+  if (side === 'after')
+    await Promise.all(
+      readyShapes().map((shape, i) => {
+        if (shape.aligned?.result !== result!.supermesh.id) {
+          dropSphere(shape, side);
+          shape.aligned = undefined;
+        }
+        return loadOnce(shape, side, () => loadAligned(shape, i));
+      }),
+    );
   for (const shape of state.shapes) for (const sphere of [shape.sphere, shape.aligned]) paintSphere(sphere);
 }
 
-async function bring(shape: Shape, side: 'before' | 'after', make: () => Promise<void>) {
+async function loadOnce(shape: Shape, side: 'before' | 'after', make: () => Promise<void>) {
   const known = side === 'after' ? shape.aligned : shape.sphere;
   if (known && known.state !== 'failed') return placeLandmarks(shape, side);
   dropSphere(shape, side);
@@ -84,7 +90,13 @@ async function load(shape: Shape, side: 'before' | 'after', sphere: SphereState,
   try {
     const data = await work('sphere', `${shape.key} ${side}`, await fetch());
     const models = sphereModels(data);
-    Object.assign(sphere, { ...models, values: data.values, normals: data.surface.normal, places: data.sphere, state: 'ready' });
+    Object.assign(sphere, {
+      ...models,
+      values: data.values,
+      normals: data.surface.normal,
+      places: data.sphere,
+      state: 'ready',
+    });
     paintSphere(sphere);
     await placeLandmarks(shape, side);
   } catch (error) {
@@ -93,12 +105,16 @@ async function load(shape: Shape, side: 'before' | 'after', sphere: SphereState,
   set();
 }
 
-/** Landmarks as they lie on the sphere. */
+/** Places the landmarks on the sphere. */
 async function placeLandmarks(shape: Shape, side: 'before' | 'after') {
   const sphere = side === 'after' ? shape.aligned : shape.sphere;
   const here = state.landmarks.filter((landmark) => landmark.at[shape.key]);
   if (sphere?.state !== 'ready') return;
-  const spots = await work('sphereSpots', `${shape.key} ${side}`, here.map((landmark) => landmark.at[shape.key].position));
+  const spots = await work(
+    'sphereSpots',
+    `${shape.key} ${side}`,
+    here.map((landmark) => landmark.at[shape.key].position),
+  );
   sphere.spots = new Map(here.map((landmark, i) => [landmark.id, spots[i]]));
   set();
 }
@@ -107,7 +123,7 @@ export const isMeasure = (paint: SpherePaint): paint is MeasureName => (MEASURES
 
 const embeddings = (): Embedding[] => state.shapes.flatMap((shape) => shape.sphere?.embedding ?? []);
 
-/** The range over which a measure is painted: the same for every shape, so that they compare. */
+/** The range over which a measure is painted. All shapes share it, which makes them comparable. */
 export function measureRange(name: MeasureName): { low: number; high: number } {
   const most = Math.max(...embeddings().map((e) => e.distortion?.[name]?.p99 ?? 0), 1e-6);
   if (name !== 'area') return { low: 1, high: Math.max(most, 1.05) };

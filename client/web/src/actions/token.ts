@@ -1,6 +1,6 @@
 /**
- * Tokens: a daemon that wants one is asked for what needs it first, so that the page can ask for a token before anything
- * else. It is kept for as long as the tab is open, and sent in the header only, never in an address.
+ * Tokens. The page first sends a request that needs one, so that it asks for a token before anything else. It keeps the
+ * token as long as the tab is open and sends it only in the header, never in a URL.
  */
 import { ProblemError } from 'orbmorph';
 import { client, set, state } from '../state';
@@ -11,7 +11,7 @@ function kept(): string | undefined {
   try {
     return sessionStorage.getItem(KEY) ?? undefined;
   } catch {
-    return undefined; // storage may be switched off
+    return undefined; // the browser may forbid storage
   }
 }
 
@@ -21,26 +21,26 @@ function keep(token: string | undefined) {
     if (token) sessionStorage.setItem(KEY, token);
     else sessionStorage.removeItem(KEY);
   } catch {
-    // it then lasts as long as the page
+    // the token then lasts as long as the page
   }
 }
 
 let entered: (() => void) | null = null;
 
-/** Until the daemon answers: at once where it wants no token, or when one that it knows has been entered. */
-export async function enter() {
+/** Waits for access: until the user enters a valid token if the daemon requires one. */
+export async function waitForAccess() {
   keep(kept());
   try {
     await client.page('jobs', { limit: 1 });
     if (client.token) set({ token: 'kept' });
   } catch (error) {
     if (!isAsking(error)) return client.token ? set({ token: 'kept' }) : undefined;
-    ask(client.token ? 'The token of this tab is not known here any more.' : null);
+    ask(client.token ? 'The daemon no longer knows the token of this tab.' : null);
     await new Promise<void>((resolve) => (entered = resolve));
   }
 }
 
-/** Tries a token; a message where it is of no use. */
+/** Tries a token. Returns a message if the daemon does not accept it. */
 export async function tryToken(token: string): Promise<string | null> {
   const before = client.token;
   client.token = token;
@@ -49,13 +49,13 @@ export async function tryToken(token: string): Promise<string | null> {
   } catch (error) {
     if (error instanceof ProblemError && error.status === 401) {
       client.token = before;
-      return 'This token is not known here.';
+      return 'The daemon does not know this token.';
     }
     if (!(error instanceof ProblemError) || error.status !== 403) {
       client.token = before;
       return (error as Error).message;
     }
-    // it is known, but may not read: what it may do will show
+    // valid, but without the scope to read; each later refusal names its scope
   }
   keep(token);
   set({ token: 'kept', asking: null, problem: null });
@@ -74,14 +74,16 @@ export const ask = (reason: string | null = null) => set({ asking: { reason } })
 const isAsking = (error: unknown) => error instanceof ProblemError && error.status === 401;
 
 const NEEDS: Record<string, string> = {
-  read: 'see what is on the server', write: 'upload, morph, cancel or delete', admin: 'do this',
+  read: 'list what is on the server',
+  write: 'upload, morph, cancel or delete',
+  admin: 'do this',
 };
 
-/** What to say of an error; asks for a token where that is what is missing. */
+/** The message for an error. Asks for a token if the error is a missing one. */
 export function explain(error: unknown): string {
   if (isAsking(error)) {
-    if (!state.asking) ask(client.token ? 'The token is not known here any more.' : null);
-    return 'The daemon wants a token.';
+    if (!state.asking) ask(client.token ? 'The daemon no longer knows the token.' : null);
+    return 'The daemon requires a token.';
   }
   if (error instanceof ProblemError && error.status === 403) {
     const scope = String(error.problem.scope ?? 'write');
@@ -89,4 +91,3 @@ export function explain(error: unknown): string {
   }
   return error instanceof ProblemError ? error.detail || error.title : (error as Error).message;
 }
-

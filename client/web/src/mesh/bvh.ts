@@ -1,11 +1,11 @@
-/** A tree of boxes over triangles: rays for picking, closest points for error maps. Built and asked in the worker. */
+/** A tree of boxes over triangles, in the worker: finds ray hits for picking and nearest points for error maps. */
 
 export interface Hit {
   triangle: number;
   /** barycentric coordinates of the second and third corner */
   u: number;
   v: number;
-  /** along the ray, or the distance */
+  /** the parameter along the ray, or the distance */
   t: number;
 }
 
@@ -18,12 +18,18 @@ export class Bvh {
   private readonly order: Uint32Array;
   private nodes = 0;
 
-  constructor(private readonly positions: ArrayLike<number>, private readonly corners: Uint32Array) {
+  constructor(
+    private readonly positions: ArrayLike<number>,
+    private readonly corners: Uint32Array,
+  ) {
     const n = corners.length / 3;
     const centers = new Float64Array(n * 3);
     for (let t = 0; t < n; t++)
       for (let k = 0; k < 3; k++)
-        centers[3 * t + k] = positions[3 * corners[3 * t] + k] + positions[3 * corners[3 * t + 1] + k] + positions[3 * corners[3 * t + 2] + k];
+        centers[3 * t + k] =
+          positions[3 * corners[3 * t] + k] +
+          positions[3 * corners[3 * t + 1] + k] +
+          positions[3 * corners[3 * t + 2] + k];
     this.order = Uint32Array.from({ length: n }, (_, i) => i);
     const capacity = Math.max(1, 2 * n);
     this.boxes = new Float64Array(capacity * 6);
@@ -141,16 +147,26 @@ export class Bvh {
         const a = 3 * corners[3 * t];
         const q = 3 * corners[3 * t + 1];
         const c = 3 * corners[3 * t + 2];
-        const e1x = p[q] - p[a], e1y = p[q + 1] - p[a + 1], e1z = p[q + 2] - p[a + 2];
-        const e2x = p[c] - p[a], e2y = p[c + 1] - p[a + 1], e2z = p[c + 2] - p[a + 2];
-        const hx = dy * e2z - dz * e2y, hy = dz * e2x - dx * e2z, hz = dx * e2y - dy * e2x;
+        const e1x = p[q] - p[a];
+        const e1y = p[q + 1] - p[a + 1];
+        const e1z = p[q + 2] - p[a + 2];
+        const e2x = p[c] - p[a];
+        const e2y = p[c + 1] - p[a + 1];
+        const e2z = p[c + 2] - p[a + 2];
+        const hx = dy * e2z - dz * e2y;
+        const hy = dz * e2x - dx * e2z;
+        const hz = dx * e2y - dy * e2x;
         const det = e1x * hx + e1y * hy + e1z * hz;
         if (det === 0) continue;
         const f = 1 / det;
-        const sx = ox - p[a], sy = oy - p[a + 1], sz = oz - p[a + 2];
+        const sx = ox - p[a];
+        const sy = oy - p[a + 1];
+        const sz = oz - p[a + 2];
         const u = f * (sx * hx + sy * hy + sz * hz);
         if (u < -1e-9 || u > 1 + 1e-9) continue;
-        const qx = sy * e1z - sz * e1y, qy = sz * e1x - sx * e1z, qz = sx * e1y - sy * e1x;
+        const qx = sy * e1z - sz * e1y;
+        const qy = sz * e1x - sx * e1z;
+        const qz = sx * e1y - sy * e1x;
         const v = f * (dx * qx + dy * qy + dz * qz);
         if (v < -1e-9 || u + v > 1 + 1e-9) continue;
         const s = f * (e2x * qx + e2y * qy + e2z * qz);
@@ -211,15 +227,25 @@ export class Bvh {
     const a = 3 * this.corners[3 * t];
     const b = 3 * this.corners[3 * t + 1];
     const c = 3 * this.corners[3 * t + 2];
-    const abx = p[b] - p[a], aby = p[b + 1] - p[a + 1], abz = p[b + 2] - p[a + 2];
-    const acx = p[c] - p[a], acy = p[c + 1] - p[a + 1], acz = p[c + 2] - p[a + 2];
-    const apx = x - p[a], apy = y - p[a + 1], apz = z - p[a + 2];
+    const abx = p[b] - p[a];
+    const aby = p[b + 1] - p[a + 1];
+    const abz = p[b + 2] - p[a + 2];
+    const acx = p[c] - p[a];
+    const acy = p[c + 1] - p[a + 1];
+    const acz = p[c + 2] - p[a + 2];
+    const apx = x - p[a];
+    const apy = y - p[a + 1];
+    const apz = z - p[a + 2];
     const d1 = abx * apx + aby * apy + abz * apz;
     const d2 = acx * apx + acy * apy + acz * apz;
-    const bpx = x - p[b], bpy = y - p[b + 1], bpz = z - p[b + 2];
+    const bpx = x - p[b];
+    const bpy = y - p[b + 1];
+    const bpz = z - p[b + 2];
     const d3 = abx * bpx + aby * bpy + abz * bpz;
     const d4 = acx * bpx + acy * bpy + acz * bpz;
-    const cpx = x - p[c], cpy = y - p[c + 1], cpz = z - p[c + 2];
+    const cpx = x - p[c];
+    const cpy = y - p[c + 1];
+    const cpz = z - p[c + 2];
     const d5 = abx * cpx + aby * cpy + abz * cpz;
     const d6 = acx * cpx + acy * cpy + acz * cpz;
     const vc = d1 * d4 - d3 * d2;

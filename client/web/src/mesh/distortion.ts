@@ -1,6 +1,6 @@
 /**
- * The distortion of a spherical map from sphere.ply, per triangle and per vertex, with the daemon's definitions: both
- * areas scaled equal, the image of a triangle is its flat chord triangle, sigma1 >= sigma2 the singular values.
+ * The distortion of a spherical map from sphere.ply, per triangle and per vertex, as the daemon defines it: both areas
+ * are scaled to be equal, the image of a triangle is its flat chord triangle, sigma1 >= sigma2 are the singular values.
  */
 import { buildDisplay, type Display } from './geometry';
 import { parseMesh } from './parse';
@@ -10,7 +10,7 @@ export type MeasureName = (typeof MEASURES)[number];
 
 export interface SphereData {
   surface: Display;
-  /** for each vertex drawn, its place on the sphere */
+  /** for each drawn vertex, its point on the sphere */
   sphere: Float32Array;
   values: Record<MeasureName, Float32Array>;
 }
@@ -19,7 +19,7 @@ export function decodeSphere(buffer: ArrayBuffer): SphereData {
   const raw = parseMesh(buffer);
   const { positions: x, corners, properties } = raw;
   const [px, py, pz] = ['px', 'py', 'pz'].map((name) => properties?.get(name));
-  if (!px || !py || !pz) throw new Error('The file has no places on the sphere.');
+  if (!px || !py || !pz) throw new Error('The file has no points on the sphere.');
   const n = x.length / 3;
   const image = new Float64Array(3 * n);
   for (let i = 0; i < n; i++) {
@@ -28,7 +28,7 @@ export function decodeSphere(buffer: ArrayBuffer): SphereData {
     image[3 * i + 2] = pz[i];
   }
   const values = vertexDistortion(x, image, corners);
-  // one vertex drawn for each vertex of the mesh: no creases, so that the sphere stays closed
+  // one drawn vertex for each vertex of the mesh: splitting at creases would open the sphere
   const surface = buildDisplay({ ...raw, properties: undefined }, 180);
   const sphere = new Float32Array(surface.position.length);
   const spread = {} as Record<MeasureName, Float32Array>;
@@ -43,15 +43,23 @@ export function decodeSphere(buffer: ArrayBuffer): SphereData {
 }
 
 function area2(p: Float64Array, a: number, b: number, c: number): number {
-  const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
-  const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+  const ux = p[b] - p[a];
+  const uy = p[b + 1] - p[a + 1];
+  const uz = p[b + 2] - p[a + 2];
+  const vx = p[c] - p[a];
+  const vy = p[c + 1] - p[a + 1];
+  const vz = p[c + 2] - p[a + 2];
   return Math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
 }
 
 /** The Gram matrix of the edges at the first corner: (uu, uv, vv). */
 function gram(p: Float64Array, a: number, b: number, c: number): [number, number, number] {
-  const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
-  const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+  const ux = p[b] - p[a];
+  const uy = p[b + 1] - p[a + 1];
+  const uz = p[b + 2] - p[a + 2];
+  const vx = p[c] - p[a];
+  const vy = p[c + 1] - p[a + 1];
+  const vz = p[c + 2] - p[a + 2];
   return [ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz];
 }
 
@@ -64,7 +72,12 @@ export interface TriangleDistortion {
 
 export function triangleDistortion(x: Float64Array, image: Float64Array, corners: Uint32Array): TriangleDistortion {
   const n = corners.length / 3;
-  const out = { sigma1: new Float64Array(n), sigma2: new Float64Array(n), aspect: new Float64Array(n), weight: new Float64Array(n) };
+  const out = {
+    sigma1: new Float64Array(n),
+    sigma2: new Float64Array(n),
+    aspect: new Float64Array(n),
+    weight: new Float64Array(n),
+  };
   let sumX = 0;
   let sumP = 0;
   for (let t = 0; t < n; t++) {
@@ -82,18 +95,24 @@ export function triangleDistortion(x: Float64Array, image: Float64Array, corners
     // the eigenvalues of (source metric)^-1 (image metric) are the squared singular values
     const trace = (scale * (G * e - 2 * F * f + E * g)) / det;
     const product = (scale * scale * Math.max(e * g - f * f, 0)) / det;
-    const root = Math.sqrt(Math.max(trace * trace / 4 - product, 0));
+    const root = Math.sqrt(Math.max((trace * trace) / 4 - product, 0));
     const large = trace / 2 + root;
     out.sigma1[t] = Math.sqrt(large);
     out.sigma2[t] = Math.sqrt(large > 0 ? product / large : 0);
-    const l1 = Math.sqrt(e), l2 = Math.sqrt(g), l3 = Math.sqrt(Math.max(e + g - 2 * f, 0));
+    const l1 = Math.sqrt(e);
+    const l2 = Math.sqrt(g);
+    const l3 = Math.sqrt(Math.max(e + g - 2 * f, 0));
     const double = Math.sqrt(Math.max(e * g - f * f, 1e-300));
     out.aspect[t] = (l1 * l2 * l3 * (l1 + l2 + l3)) / (4 * double * double);
   }
   return out;
 }
 
-function vertexDistortion(x: Float64Array, image: Float64Array, corners: Uint32Array): Record<MeasureName, Float64Array> {
+function vertexDistortion(
+  x: Float64Array,
+  image: Float64Array,
+  corners: Uint32Array,
+): Record<MeasureName, Float64Array> {
   const n = x.length / 3;
   const d = triangleDistortion(x, image, corners);
   const total = new Float64Array(n);

@@ -1,4 +1,4 @@
-/** From a parsed mesh to what the GPU draws: centred, scaled to the unit ball, smooth normals with creases, edges. */
+/** Turns a parsed mesh into what the GPU draws: scaled to the unit ball, with smooth normals, creases and edges. */
 import type { RawMesh } from './parse';
 
 export interface Frame {
@@ -35,7 +35,7 @@ export function frameOf(positions: ArrayLike<number>, used?: Uint32Array): Frame
   return { center: [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2], radius: d / 2 || 1 };
 }
 
-/** Equal places get equal numbers. -> for each vertex the number of its place */
+/** Numbers the distinct positions. Returns the number of each vertex's position. */
 export function weld(positions: Float64Array): { place: Uint32Array; count: number } {
   const n = positions.length / 3;
   let size = 1;
@@ -55,7 +55,11 @@ export function weld(positions: Float64Array): { place: Uint32Array; count: numb
         place[v] = count++;
         break;
       }
-      if (positions[3 * other] === positions[3 * v] && positions[3 * other + 1] === positions[3 * v + 1] && positions[3 * other + 2] === positions[3 * v + 2]) {
+      if (
+        positions[3 * other] === positions[3 * v] &&
+        positions[3 * other + 1] === positions[3 * v + 1] &&
+        positions[3 * other + 2] === positions[3 * v + 2]
+      ) {
         place[v] = place[other];
         break;
       }
@@ -94,7 +98,7 @@ export function buildDisplay(raw: RawMesh, creaseDegrees = 48): Display {
     length[t] = Math.hypot(nx, ny, nz);
   }
 
-  // the corners around each place
+  // the corners at each position
   const first = new Uint32Array(places + 1);
   for (let i = 0; i < corners.length; i++) first[place[corners[i]] + 1]++;
   for (let p = 0; p < places; p++) first[p + 1] += first[p];
@@ -115,7 +119,8 @@ export function buildDisplay(raw: RawMesh, creaseDegrees = 48): Display {
       const l = length[t] || 1;
       let group = -1;
       for (let g = start; g < n; g++) {
-        const d = normal[3 * g] * face[3 * t] + normal[3 * g + 1] * face[3 * t + 1] + normal[3 * g + 2] * face[3 * t + 2];
+        const d =
+          normal[3 * g] * face[3 * t] + normal[3 * g + 1] * face[3 * t + 1] + normal[3 * g + 2] * face[3 * t + 2];
         const gl = Math.hypot(normal[3 * g], normal[3 * g + 1], normal[3 * g + 2]);
         if (creaseDegrees >= 180 || d >= cosine * gl * l) {
           group = g;
@@ -204,8 +209,8 @@ export function edgesOf(index: Uint32Array): Uint32Array {
     for (let k = 0; k < 3; k++) {
       const i = index[t + k];
       const j = index[t + ((k + 1) % 3)];
-      const a = i < j ? i : j;
-      const b = i < j ? j : i;
+      const a = Math.min(i, j);
+      const b = Math.max(i, j);
       let slot = ((Math.imul(a, 0x9e3779b1) ^ Math.imul(b, 0x85ebca6b)) >>> 7) & (size - 1);
       while (low[slot] >= 0 && (low[slot] !== a || high[slot] !== b)) slot = (slot + 1) & (size - 1);
       if (low[slot] >= 0) continue;
@@ -217,7 +222,7 @@ export function edgesOf(index: Uint32Array): Uint32Array {
   return out.slice(0, n);
 }
 
-/** The triangles of all pieces but the largest, for showing what is loose. -> triangle flags, number of pieces */
+/** Finds the triangles of all components but the largest. Returns triangle flags and the number of components. */
 export function loosePieces(raw: RawMesh): { loose: Uint8Array; pieces: number } {
   const { place, count } = weld(raw.positions);
   const parent = Uint32Array.from({ length: count }, (_, i) => i);
@@ -243,8 +248,8 @@ export function loosePieces(raw: RawMesh): { loose: Uint8Array; pieces: number }
   return { loose, pieces: sizes.size };
 }
 
-/** Edges that belong to other than two faces: the rims of holes and the seams of three faces. -> pairs of vertices */
-export function faultyEdges(raw: RawMesh, welded: boolean): Uint32Array {
+/** Edges without exactly two faces: boundaries of holes and non-manifold edges. Returns pairs of vertices. */
+export function defectiveEdges(raw: RawMesh, welded: boolean): Uint32Array {
   const n = raw.positions.length / 3;
   const place = welded ? weld(raw.positions).place : Uint32Array.from({ length: n }, (_, i) => i);
   const uses = new Map<number, [number, number, number]>();

@@ -1,11 +1,32 @@
-/** As much of glTF 2.0 as meshes and morphs need: accessors (sparse and normalised ones too), nodes, targets. */
+/** The part of glTF 2.0 that meshes and morphs need: accessors (also sparse and normalised), nodes, targets. */
 
 interface Accessor {
-  bufferView?: number; byteOffset?: number; componentType: number; count: number; type: string; normalized?: boolean;
-  sparse?: { count: number; indices: { bufferView: number; byteOffset?: number; componentType: number }; values: { bufferView: number; byteOffset?: number } };
+  bufferView?: number;
+  byteOffset?: number;
+  componentType: number;
+  count: number;
+  type: string;
+  normalized?: boolean;
+  sparse?: {
+    count: number;
+    indices: { bufferView: number; byteOffset?: number; componentType: number };
+    values: { bufferView: number; byteOffset?: number };
+  };
 }
-interface Primitive { mode?: number; attributes: Record<string, number>; indices?: number; targets?: Record<string, number>[] }
-interface Node { mesh?: number; children?: number[]; matrix?: number[]; translation?: number[]; rotation?: number[]; scale?: number[] }
+interface Primitive {
+  mode?: number;
+  attributes: Record<string, number>;
+  indices?: number;
+  targets?: Record<string, number>[];
+}
+interface Node {
+  mesh?: number;
+  children?: number[];
+  matrix?: number[];
+  translation?: number[];
+  rotation?: number[];
+  scale?: number[];
+}
 interface Document {
   accessors?: Accessor[];
   bufferViews?: { buffer: number; byteOffset?: number; byteLength: number; byteStride?: number }[];
@@ -14,7 +35,10 @@ interface Document {
   nodes?: Node[];
   scenes?: { nodes?: number[] }[];
   scene?: number;
-  animations?: { channels: { sampler: number; target: { node?: number; path: string } }[]; samplers: { input: number; output: number; interpolation?: string }[] }[];
+  animations?: {
+    channels: { sampler: number; target: { node?: number; path: string } }[];
+    samplers: { input: number; output: number; interpolation?: string }[];
+  }[];
 }
 
 export interface Part {
@@ -40,6 +64,7 @@ function localMatrix(node: Node): number[] {
   const [x, y, z, w] = node.rotation ?? [0, 0, 0, 1];
   const [sx, sy, sz] = node.scale ?? [1, 1, 1];
   const [tx, ty, tz] = node.translation ?? [0, 0, 0];
+  // biome-ignore format: columns of the matrix
   return [
     (1 - 2 * (y * y + z * z)) * sx, 2 * (x * y + z * w) * sx, 2 * (x * z - y * w) * sx, 0,
     2 * (x * y - z * w) * sy, (1 - 2 * (x * x + z * z)) * sy, 2 * (y * z + x * w) * sy, 0,
@@ -49,33 +74,53 @@ function localMatrix(node: Node): number[] {
 }
 
 export class Gltf {
-  constructor(readonly json: Document, readonly buffers: Uint8Array[]) {}
+  constructor(
+    readonly json: Document,
+    readonly buffers: Uint8Array[],
+  ) {}
 
   private component(view: DataView, at: number, type: number, normalized: boolean): number {
     switch (type) {
-      case 5120: return normalized ? Math.max(view.getInt8(at) / 127, -1) : view.getInt8(at);
-      case 5121: return normalized ? view.getUint8(at) / 255 : view.getUint8(at);
-      case 5122: return normalized ? Math.max(view.getInt16(at, true) / 32767, -1) : view.getInt16(at, true);
-      case 5123: return normalized ? view.getUint16(at, true) / 65535 : view.getUint16(at, true);
-      case 5125: return view.getUint32(at, true);
-      default: return view.getFloat32(at, true);
+      case 5120:
+        return normalized ? Math.max(view.getInt8(at) / 127, -1) : view.getInt8(at);
+      case 5121:
+        return normalized ? view.getUint8(at) / 255 : view.getUint8(at);
+      case 5122:
+        return normalized ? Math.max(view.getInt16(at, true) / 32767, -1) : view.getInt16(at, true);
+      case 5123:
+        return normalized ? view.getUint16(at, true) / 65535 : view.getUint16(at, true);
+      case 5125:
+        return view.getUint32(at, true);
+      default:
+        return view.getFloat32(at, true);
     }
   }
 
-  private fill(out: Float32Array | Uint32Array, bufferView: number, offset: number, type: number, count: number, width: number, normalized: boolean) {
+  private fill(
+    out: Float32Array | Uint32Array,
+    bufferView: number,
+    offset: number,
+    type: number,
+    count: number,
+    width: number,
+    normalized: boolean,
+  ) {
     const view = this.json.bufferViews![bufferView];
     const bytes = this.buffers[view.buffer];
     const size = type === 5120 || type === 5121 ? 1 : type === 5122 || type === 5123 ? 2 : 4;
     const start = bytes.byteOffset + (view.byteOffset ?? 0) + offset;
     const stride = view.byteStride ?? size * width;
     if (stride === size * width && start % size === 0 && !normalized) {
-      const View = { 5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array }[type] ?? Float32Array;
+      const View =
+        { 5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array }[type] ??
+        Float32Array;
       out.set(new View(bytes.buffer as ArrayBuffer, start, count * width));
       return;
     }
     const data = new DataView(bytes.buffer as ArrayBuffer, start);
     for (let i = 0; i < count; i++)
-      for (let k = 0; k < width; k++) out[i * width + k] = this.component(data, i * stride + k * size, type, normalized);
+      for (let k = 0; k < width; k++)
+        out[i * width + k] = this.component(data, i * stride + k * size, type, normalized);
   }
 
   private read<T extends Float32Array | Uint32Array>(number: number, make: (length: number) => T): T {
@@ -83,13 +128,37 @@ export class Gltf {
     const width = WIDTH[accessor.type];
     const out = make(accessor.count * width);
     if (accessor.bufferView !== undefined)
-      this.fill(out, accessor.bufferView, accessor.byteOffset ?? 0, accessor.componentType, accessor.count, width, !!accessor.normalized);
+      this.fill(
+        out,
+        accessor.bufferView,
+        accessor.byteOffset ?? 0,
+        accessor.componentType,
+        accessor.count,
+        width,
+        !!accessor.normalized,
+      );
     const { sparse } = accessor;
     if (sparse) {
       const where = new Uint32Array(sparse.count);
       const values = make(sparse.count * width);
-      this.fill(where, sparse.indices.bufferView, sparse.indices.byteOffset ?? 0, sparse.indices.componentType, sparse.count, 1, false);
-      this.fill(values, sparse.values.bufferView, sparse.values.byteOffset ?? 0, accessor.componentType, sparse.count, width, !!accessor.normalized);
+      this.fill(
+        where,
+        sparse.indices.bufferView,
+        sparse.indices.byteOffset ?? 0,
+        sparse.indices.componentType,
+        sparse.count,
+        1,
+        false,
+      );
+      this.fill(
+        values,
+        sparse.values.bufferView,
+        sparse.values.byteOffset ?? 0,
+        accessor.componentType,
+        sparse.count,
+        width,
+        !!accessor.normalized,
+      );
       for (let i = 0; i < sparse.count; i++)
         for (let k = 0; k < width; k++) out[where[i] * width + k] = values[i * width + k];
     }
@@ -99,7 +168,7 @@ export class Gltf {
   floats = (accessor: number) => this.read(accessor, (n) => new Float32Array(n));
   integers = (accessor: number) => this.read(accessor, (n) => new Uint32Array(n));
 
-  /** The matrix of the first node that shows each mesh. */
+  /** For each mesh, the matrix of the first node that uses it. */
   private matrices(): Map<number, number[]> {
     const { json } = this;
     const found = new Map<number, number[]>();
@@ -138,7 +207,7 @@ export class Gltf {
 
 function dataUri(uri: string): Uint8Array {
   const text = uri.match(/^data:[^,]*;base64,(.*)$/s);
-  if (!text) throw new Error('The file refers to another file, which is not here; save it as GLB.');
+  if (!text) throw new Error('The file refers to another file, which is not included. Save it as GLB.');
   return Uint8Array.from(atob(text[1]), (c) => c.charCodeAt(0));
 }
 
@@ -150,8 +219,11 @@ export function readGlb(buffer: ArrayBuffer): Gltf {
     const length = view.getUint32(12, true);
     json = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 20, length)));
     const at = 20 + length;
-    if (at + 8 <= view.byteLength) binary = new Uint8Array(buffer, at + 8, Math.min(view.getUint32(at, true), view.byteLength - at - 8));
+    if (at + 8 <= view.byteLength)
+      binary = new Uint8Array(buffer, at + 8, Math.min(view.getUint32(at, true), view.byteLength - at - 8));
   } else json = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer)));
-  const buffers = (json.buffers ?? []).map((b) => (b.uri === undefined ? binary ?? new Uint8Array() : dataUri(b.uri)));
+  const buffers = (json.buffers ?? []).map((b) =>
+    b.uri === undefined ? (binary ?? new Uint8Array()) : dataUri(b.uri),
+  );
   return new Gltf(json, buffers);
 }

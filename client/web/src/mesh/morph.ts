@@ -12,10 +12,10 @@ export interface MorphData {
   index: Uint32Array;
   edges: Uint32Array;
   targets: { position: Float32Array; normal: Float32Array }[];
-  /** the way there (not back): for each time in 0..1 the weights of the targets */
+  /** the path from the first to the last shape: for each time in 0..1 the weights of the targets */
   times: Float32Array;
   weights: Float32Array[];
-  /** for each shape, the weights that show it alone */
+  /** for each shape, the weights that show only this shape */
   shapes: Float32Array[];
 }
 
@@ -33,7 +33,7 @@ function joined(arrays: Float32Array[]): Float32Array {
   return out;
 }
 
-/** Targets 0 … shapeCount − 2 are the further shapes; more of them are in-betweens of a curved path. */
+/** Targets 0 … shapeCount − 2 are the other shapes; the rest are in-betweens of a curved path. */
 export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData {
   const gltf = readGlb(buffer);
   const parts = gltf.triangles().filter((part, _, all) => part.mesh === all[0].mesh);
@@ -50,17 +50,22 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData 
     base += part.position.length / 3;
   }
   const hasNormals = parts.every((p) => p.primitive.attributes.NORMAL !== undefined);
-  const normal = hasNormals ? joined(parts.map((p) => gltf.floats(p.primitive.attributes.NORMAL))) : smoothNormals(position, index);
+  const normal = hasNormals
+    ? joined(parts.map((p) => gltf.floats(p.primitive.attributes.NORMAL)))
+    : smoothNormals(position, index);
   const targets = Array.from({ length: targetCount }, (_, k) => {
     const delta = joined(parts.map((p) => gltf.floats(p.primitive.targets![k].POSITION)));
     const withNormals = hasNormals && parts.every((p) => p.primitive.targets![k].NORMAL !== undefined);
-    let turned: Float32Array;
-    if (withNormals) turned = joined(parts.map((p) => gltf.floats(p.primitive.targets![k].NORMAL)));
+    let normalDelta: Float32Array;
+    if (withNormals) normalDelta = joined(parts.map((p) => gltf.floats(p.primitive.targets![k].NORMAL)));
     else {
-      turned = smoothNormals(position.map((x, i) => x + delta[i]), index);
-      for (let i = 0; i < turned.length; i++) turned[i] -= normal[i];
+      normalDelta = smoothNormals(
+        position.map((x, i) => x + delta[i]),
+        index,
+      );
+      for (let i = 0; i < normalDelta.length; i++) normalDelta[i] -= normal[i];
     }
-    return { position: delta, normal: turned };
+    return { position: delta, normal: normalDelta };
   });
 
   const shapes = Array.from({ length: Math.min(shapeCount, targetCount + 1) }, (_, i) => single(i - 1, targetCount));
@@ -90,7 +95,7 @@ function targetNames(gltf: ReturnType<typeof readGlb>, mesh: number, count: numb
   return Array.from({ length: count }, (_, k) => names?.[k] ?? `target ${k + 1}`);
 }
 
-/** The frame that holds every shape. */
+/** The frame that contains every shape. */
 function fit(position: Float32Array, targets: MorphData['targets'], shapes: Float32Array[]): Frame {
   const min = [Infinity, Infinity, Infinity];
   const max = [-Infinity, -Infinity, -Infinity];
@@ -112,11 +117,14 @@ const single = (k: number, count: number) => Float32Array.from({ length: count }
 const equal = (a: Float32Array, b: Float32Array) => a.every((x, i) => Math.abs(x - b[i]) < 1e-6);
 
 /**
- * The weights along the way from the first to the last shape, each shape at its even share of the time. In-betweens
- * are taken from the animation's keyframes; where it rests at a shape is left out. Without an animation the way is
+ * The weights along the path from the first to the last shape, which reaches the shapes at equal intervals. The
+ * in-betweens come from the animation's keyframes, without its rests at a shape. Without an animation the path is
  * straight.
  */
-export function pathOf(frames: Float32Array[], shapes: Float32Array[]): { times: Float32Array; weights: Float32Array[] } {
+export function pathOf(
+  frames: Float32Array[],
+  shapes: Float32Array[],
+): { times: Float32Array; weights: Float32Array[] } {
   const legs = Math.max(shapes.length - 1, 1);
   const straight = { times: Float32Array.from(shapes, (_, i) => i / legs), weights: shapes };
   const times: number[] = [];
@@ -155,7 +163,7 @@ function animationPath(gltf: ReturnType<typeof readGlb>, count: number, shapes: 
   return pathOf([], shapes);
 }
 
-/** The weights at a time in 0..1. */
+/** The weights at `time`, in 0..1. */
 export function weightsAt(data: Pick<MorphData, 'times' | 'weights'>, time: number): number[] {
   const { times, weights } = data;
   let i = 0;

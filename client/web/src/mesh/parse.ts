@@ -1,7 +1,7 @@
 /**
- * Reads mesh files for display: OBJ, OFF, PLY, STL, glTF and GLB. Vertices keep the numbers of the file, as the daemon
- * counts them: OBJ, OFF and PLY in file order, STL 3·facet + corner, glTF the POSITION accessors of all triangle
- * primitives one after another. It is lenient (the daemon decides what is a mesh); it shows what can be shown.
+ * Reads mesh files for display: OBJ, OFF, PLY, STL, glTF and GLB. Vertices have the same numbers as in the daemon: OBJ,
+ * OFF and PLY in file order, STL 3·facet + corner, glTF the POSITION accessors of all triangle primitives one after
+ * another. The reader is lenient and shows what it can; the daemon decides what is a mesh.
  */
 import { readGlb, type Gltf } from './gltf';
 
@@ -11,7 +11,7 @@ export interface RawMesh {
   positions: Float64Array;
   /** three vertices of the file for each triangle */
   corners: Uint32Array;
-  /** further properties of PLY vertices, by name */
+  /** other properties of PLY vertices, by name */
   properties?: Map<string, Float64Array>;
 }
 
@@ -43,7 +43,7 @@ class Corners {
     }
     this.data[this.length++] = value;
   }
-  /** A polygon as a fan. */
+  /** Adds a polygon as a triangle fan. */
   fan(polygon: number[], count = polygon.length) {
     for (let i = 2; i < count; i++) {
       this.push(polygon[0]);
@@ -54,14 +54,14 @@ class Corners {
   done = () => this.data.slice(0, this.length);
 }
 
-/** Walks over text as bytes; numbers are read without making strings where that is exact enough for display. */
+/** Scans text as bytes; reads numbers without creating strings where that is exact enough for display. */
 class Scanner {
   at = 0;
   constructor(readonly bytes: Uint8Array) {}
   get ended() {
     return this.at >= this.bytes.length;
   }
-  /** Skips blanks within the line; true where something follows on it. */
+  /** Skips blanks within the line. Returns whether something follows on it. */
   more(): boolean {
     const { bytes } = this;
     for (;;) {
@@ -92,6 +92,10 @@ class Scanner {
     const start = this.at;
     while (this.at < this.bytes.length && this.bytes[this.at] > 32) this.at++;
     return String.fromCharCode(...this.bytes.subarray(start, Math.min(this.at, start + 64)));
+  }
+  nextNumber(): number {
+    this.skip();
+    return this.number();
   }
   number(): number {
     const { bytes } = this;
@@ -186,13 +190,9 @@ function parseOff(bytes: Uint8Array): RawMesh {
   s.skip();
   const head = s.word();
   const counts: number[] = /OFF$/i.test(head) ? [] : [parseFloat(head)];
-  while (counts.length < 3) {
-    s.skip();
-    counts.push(s.number());
-  }
+  while (counts.length < 3) counts.push(s.nextNumber());
   for (let i = 0; i < counts[0] && !s.ended; i++) {
-    s.skip();
-    const x = s.number();
+    const x = s.nextNumber();
     s.more();
     const y = s.number();
     s.more();
@@ -202,8 +202,7 @@ function parseOff(bytes: Uint8Array): RawMesh {
   }
   const polygon: number[] = [];
   for (let i = 0; i < counts[1] && !s.ended; i++) {
-    s.skip();
-    const n = s.number();
+    const n = s.nextNumber();
     let count = 0;
     while (count < n && s.more()) polygon[count++] = s.number();
     s.nextLine();
@@ -215,7 +214,10 @@ function parseOff(bytes: Uint8Array): RawMesh {
 function parseStl(bytes: Uint8Array): RawMesh {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const facets = bytes.length >= 84 ? view.getUint32(80, true) : 0;
-  const binary = bytes.length >= 84 && 84 + 50 * facets <= bytes.length && (84 + 50 * facets === bytes.length || !/^solid/.test(ascii(bytes, 0, 5)));
+  const binary =
+    bytes.length >= 84 &&
+    84 + 50 * facets <= bytes.length &&
+    (84 + 50 * facets === bytes.length || !/^solid/.test(ascii(bytes, 0, 5)));
   let positions: Float64Array;
   if (binary) {
     positions = new Float64Array(facets * 9);
@@ -245,26 +247,63 @@ function parseStl(bytes: Uint8Array): RawMesh {
 const ascii = (bytes: Uint8Array, from: number, to: number) => String.fromCharCode(...bytes.subarray(from, to));
 
 const PLY_SIZES: Record<string, number> = {
-  char: 1, int8: 1, uchar: 1, uint8: 1, short: 2, int16: 2, ushort: 2, uint16: 2,
-  int: 4, int32: 4, uint: 4, uint32: 4, float: 4, float32: 4, double: 8, float64: 8,
+  char: 1,
+  int8: 1,
+  uchar: 1,
+  uint8: 1,
+  short: 2,
+  int16: 2,
+  ushort: 2,
+  uint16: 2,
+  int: 4,
+  int32: 4,
+  uint: 4,
+  uint32: 4,
+  float: 4,
+  float32: 4,
+  double: 8,
+  float64: 8,
 };
 
 type Reader = (view: DataView, at: number, little: boolean) => number;
 function plyReader(type: string): Reader {
   switch (type) {
-    case 'char': case 'int8': return (v, at) => v.getInt8(at);
-    case 'uchar': case 'uint8': return (v, at) => v.getUint8(at);
-    case 'short': case 'int16': return (v, at, l) => v.getInt16(at, l);
-    case 'ushort': case 'uint16': return (v, at, l) => v.getUint16(at, l);
-    case 'int': case 'int32': return (v, at, l) => v.getInt32(at, l);
-    case 'uint': case 'uint32': return (v, at, l) => v.getUint32(at, l);
-    case 'float': case 'float32': return (v, at, l) => v.getFloat32(at, l);
-    default: return (v, at, l) => v.getFloat64(at, l);
+    case 'char':
+    case 'int8':
+      return (v, at) => v.getInt8(at);
+    case 'uchar':
+    case 'uint8':
+      return (v, at) => v.getUint8(at);
+    case 'short':
+    case 'int16':
+      return (v, at, l) => v.getInt16(at, l);
+    case 'ushort':
+    case 'uint16':
+      return (v, at, l) => v.getUint16(at, l);
+    case 'int':
+    case 'int32':
+      return (v, at, l) => v.getInt32(at, l);
+    case 'uint':
+    case 'uint32':
+      return (v, at, l) => v.getUint32(at, l);
+    case 'float':
+    case 'float32':
+      return (v, at, l) => v.getFloat32(at, l);
+    default:
+      return (v, at, l) => v.getFloat64(at, l);
   }
 }
 
-interface PlyProperty { name: string; type: string; count?: string }
-interface PlyElement { name: string; count: number; properties: PlyProperty[] }
+interface PlyProperty {
+  name: string;
+  type: string;
+  count?: string;
+}
+interface PlyElement {
+  name: string;
+  count: number;
+  properties: PlyProperty[];
+}
 
 function plyHeader(bytes: Uint8Array) {
   let text = '';
@@ -315,18 +354,18 @@ function parsePly(bytes: Uint8Array): RawMesh {
         const property = element.properties[k];
         if (!property.count) {
           if (text ? text.ended : at + PLY_SIZES[property.type] > bytes.length) break rows;
-          const value = text ? (text.skip(), text.number()) : readers[k](view, at, little);
+          const value = text ? text.nextNumber() : readers[k](view, at, little);
           if (!text) at += PLY_SIZES[property.type];
           if (columns[k]) columns[k]![row] = value;
           continue;
         }
         if (text ? text.ended : at >= bytes.length) break rows;
         const size = PLY_SIZES[property.type];
-        const count = text ? (text.skip(), text.number()) : plyReader(property.count)(view, at, little);
+        const count = text ? text.nextNumber() : plyReader(property.count)(view, at, little);
         if (!text) at += PLY_SIZES[property.count];
         if (!text && at + count * size > bytes.length) break rows;
         for (let i = 0; i < count; i++) {
-          polygon[i] = text ? (text.skip(), text.number()) : readers[k](view, at, little);
+          polygon[i] = text ? text.nextNumber() : readers[k](view, at, little);
           if (!text) at += size;
         }
         if (element.name === 'face' && /^vertex_ind/.test(property.name)) corners.fan(polygon, count);
@@ -369,7 +408,7 @@ function parseGltf(gltf: Gltf, format: string): RawMesh {
   return { format, positions, corners };
 }
 
-/** What cannot be drawn (a vertex that does not exist or is not finite) is left out. */
+/** Drops triangles that cannot be drawn because a vertex does not exist or is not finite. */
 function drawable(raw: RawMesh): RawMesh {
   const { positions, corners } = raw;
   const vertices = positions.length / 3;
@@ -388,7 +427,7 @@ function drawable(raw: RawMesh): RawMesh {
   return { ...raw, corners: n === corners.length ? corners : corners.slice(0, n) };
 }
 
-/** Told by content, as the daemon does. */
+/** Detects the format by content, as the daemon does. */
 export function parseMesh(buffer: ArrayBuffer): RawMesh {
   const bytes = new Uint8Array(buffer);
   const head = ascii(bytes, 0, Math.min(512, bytes.length)).trimStart();

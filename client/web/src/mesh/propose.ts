@@ -1,6 +1,6 @@
 /**
- * Landmarks from a found correspondence: tips and other places that stand far apart, on every shape. The common mesh
- * carries each of its vertices to all shapes, so one choice gives a landmark everywhere.
+ * Landmarks from a found correspondence: tips and other places that are far apart on every shape. The common mesh has
+ * a place on all shapes for each vertex, so choosing a vertex gives a landmark on every shape.
  */
 import { edgesOf, weld } from './geometry';
 import type { MorphData } from './morph';
@@ -60,8 +60,8 @@ export function shapePositions(data: MorphData, shape: number): Float64Array {
 }
 
 /**
- * `count` places, each as a point on every shape. Farthest-point sampling by distance along the surface, the mean of
- * the shapes: the first places taken are the ends of limbs.
+ * `count` places, each as a point on every shape, by farthest-point sampling. The distance is measured along the
+ * surface and averaged over the shapes, so the first places are the tips of limbs.
  */
 export function proposeLandmarks(data: MorphData, count: number): [number, number, number][][] {
   const shapes = data.shapes.map((_, i) => shapePositions(data, i));
@@ -89,7 +89,10 @@ export function proposeLandmarks(data: MorphData, count: number): [number, numbe
       const [i, j] = [3 * first[a], 3 * first[b]];
       length += Math.hypot(p[i] - p[j], p[i + 1] - p[j + 1], p[i + 2] - p[j + 2]) / size[s];
     });
-    for (const [from, to] of [[a, b], [b, a]]) {
+    for (const [from, to] of [
+      [a, b],
+      [b, a],
+    ]) {
       other[fill[from]] = to;
       long[fill[from]++] = length;
     }
@@ -127,5 +130,7 @@ export function proposeLandmarks(data: MorphData, count: number): [number, numbe
     chosen.push(next);
     spread(next);
   }
-  return chosen.map((v) => shapes.map((p): [number, number, number] => [p[3 * first[v]], p[3 * first[v] + 1], p[3 * first[v] + 2]]));
+  return chosen.map((v) =>
+    shapes.map((p): [number, number, number] => [p[3 * first[v]], p[3 * first[v] + 1], p[3 * first[v] + 2]]),
+  );
 }

@@ -1,4 +1,4 @@
-/** The page's side of the worker: `await work('open', key, buffer)`. Buffers among the arguments are handed over. */
+/** The page's side of the worker: `await work('open', key, buffer)`. ArrayBuffer arguments are transferred. */
 import type { Ops } from './worker';
 
 let worker: Worker | null = null;
@@ -14,7 +14,7 @@ function start(): Worker {
     else call?.resolve(data.value as never);
   };
   made.onerror = () => {
-    for (const call of waiting.values()) call.reject(new Error('The worker of the page has failed; reload the page.'));
+    for (const call of waiting.values()) call.reject(new Error('The worker of the page failed. Reload the page.'));
     waiting.clear();
   };
   return made;

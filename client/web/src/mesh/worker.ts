@@ -1,12 +1,12 @@
 /// <reference lib="webworker" />
 /**
- * Everything that takes long: parsing, geometry, picking, distortion, errors. Requests {id, op, args}; parsed meshes
- * stay here under a key, so that picking and error maps need no second copy on the page's side.
+ * Does all long computations: parsing, geometry, picking, distortion, errors. A request is {id, op, args}. The worker
+ * keeps parsed meshes under a key, so the page needs no copy for picking and error maps.
  */
 import { Bvh } from './bvh';
 import { decodeMorph, type MorphData } from './morph';
 import { decodeSphere, type SphereData } from './distortion';
-import { buildDisplay, faultyEdges, loosePieces, type Display, type Frame } from './geometry';
+import { buildDisplay, defectiveEdges, loosePieces, type Display, type Frame } from './geometry';
 import { parseMesh, type RawMesh } from './parse';
 import { proposeLandmarks } from './propose';
 import type { Place } from 'orbmorph';
@@ -22,7 +22,7 @@ const morphs = new Map<string, MorphData>();
 const spheres = new Map<string, { surface: Float32Array; index: Uint32Array; place: Float32Array; bvh?: Bvh }>();
 
 export interface Spot {
-  /** where it is, in view coordinates, and the surface's normal there */
+  /** in view coordinates */
   position: [number, number, number];
   normal: [number, number, number];
   place: Place;
@@ -34,8 +34,12 @@ function bvhOf(mesh: Held): Bvh {
 
 function faceNormal({ positions: p, corners }: RawMesh, t: number): [number, number, number] {
   const [a, b, c] = [3 * corners[3 * t], 3 * corners[3 * t + 1], 3 * corners[3 * t + 2]];
-  const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
-  const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+  const ux = p[b] - p[a];
+  const uy = p[b + 1] - p[a + 1];
+  const uz = p[b + 2] - p[a + 2];
+  const vx = p[c] - p[a];
+  const vy = p[c + 1] - p[a + 1];
+  const vz = p[c + 2] - p[a + 2];
   const n = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
   const l = Math.hypot(n[0], n[1], n[2]) || 1;
   return [n[0] / l, n[1] / l, n[2] / l];
@@ -52,7 +56,7 @@ function pointOf({ positions: p, corners }: RawMesh, t: number, w: [number, numb
   return out;
 }
 
-/** The vertex where one is near (1 % of the diagonal), else the point itself. */
+/** The nearest corner if it is near (within 1 % of the diagonal), otherwise the point itself. */
 function spotOn(mesh: Held, t: number, u: number, v: number): Spot {
   const { raw, frame } = mesh;
   const weights: [number, number, number] = [1 - u - v, u, v];
@@ -67,7 +71,7 @@ function spotOn(mesh: Held, t: number, u: number, v: number): Spot {
   return { position: toView(frame, point), normal, place: { point } };
 }
 
-/** A face at each vertex asked for, for its normal. */
+/** For each wanted vertex a triangle that has it, for the vertex's normal. */
 function facesAt(raw: RawMesh, wanted: Set<number>): Map<number, number> {
   const found = new Map<number, number>();
   if (!wanted.size) return found;
@@ -84,16 +88,10 @@ function facesAt(raw: RawMesh, wanted: Set<number>): Map<number, number> {
 const ops = {
   open(key: string, buffer: ArrayBuffer): Display {
     const raw = parseMesh(buffer);
-    if (!raw.corners.length) throw new Error('There are no triangles to show in this file.');
+    if (!raw.corners.length) throw new Error('The file has no triangles.');
     const display = buildDisplay(raw);
     held.set(key, { raw, frame: display.frame });
     return display;
-  },
-
-  rename(from: string, to: string) {
-    const mesh = held.get(from);
-    if (mesh) held.set(to, mesh);
-    held.delete(from);
   },
 
   close(key: string) {
@@ -112,7 +110,7 @@ const ops = {
     return hit && spotOn(mesh, hit.triangle, hit.u, hit.v);
   },
 
-  /** With `snap`, points become the vertex that is near. */
+  /** With `snap`, points become a near vertex (see spotOn). */
   locate(key: string, places: Place[], snap = false): (Spot | null)[] {
     const mesh = held.get(key);
     if (!mesh) return places.map(() => null);
@@ -136,15 +134,16 @@ const ops = {
     });
   },
 
-  /** Line segments and triangles to be drawn in red, in view coordinates. */
-  faults(key: string, kind: string, edges: number[][], vertices: number[]) {
+  /** The segments, points and triangles to draw in red, in view coordinates. */
+  defects(key: string, kind: string, edges: number[][], vertices: number[]) {
     const mesh = held.get(key);
-    if (!mesh) return { lines: new Float32Array(), triangles: new Float32Array(), points: new Float32Array(), found: 0 };
+    if (!mesh)
+      return { lines: new Float32Array(), triangles: new Float32Array(), points: new Float32Array(), found: 0 };
     const { raw, frame } = mesh;
     let pairs: ArrayLike<number> = edges.flat();
     if (!pairs.length && (kind === 'not-closed' || kind === 'not-manifold')) {
-      pairs = faultyEdges(raw, false);
-      const welded = faultyEdges(raw, true);
+      pairs = defectiveEdges(raw, false);
+      const welded = defectiveEdges(raw, true);
       if (welded.length && welded.length < pairs.length) pairs = welded;
     }
     const known = raw.positions.length / 3;
@@ -179,19 +178,23 @@ const ops = {
     return data;
   },
 
-  /** From an asset with `fit` none: for each proposal a point on every shape, in the coordinates of its file. */
+  /** For each proposed landmark a point on every shape, in the shape's file coordinates. The asset has `fit` none. */
   propose(buffer: ArrayBuffer, shapeCount: number, count: number): [number, number, number][][] {
     return proposeLandmarks(decodeMorph(buffer, shapeCount), count);
   },
 
-  /** The surface and the sphere of a PLY of the daemon; kept under `key` for sphereSpots(). */
+  /** The surface and the sphere in a PLY from the daemon. Keeps them under `key` for sphereSpots(). */
   sphere(key: string, buffer: ArrayBuffer): SphereData {
     const data = decodeSphere(buffer);
-    spheres.set(key, { surface: data.surface.position.slice(), index: data.surface.index.slice(), place: data.sphere.slice() });
+    spheres.set(key, {
+      surface: data.surface.position.slice(),
+      index: data.surface.index.slice(),
+      place: data.sphere.slice(),
+    });
     return data;
   },
 
-  /** Where points of a surface (in view coordinates) are on its sphere. */
+  /** The points of the sphere that correspond to points of the surface, both in view coordinates. */
   sphereSpots(key: string, points: number[][]): [number, number, number][] {
     const sphere = spheres.get(key);
     if (!sphere) return [];
@@ -200,17 +203,24 @@ const ops = {
     return points.map(([x, y, z]) => {
       const hit = bvh.closest(x, y, z)!;
       const weights = [1 - hit.u - hit.v, hit.u, hit.v];
-      const p = [0, 1, 2].map((k) => weights.reduce((sum, w, c) => sum + w * place[3 * index[3 * hit.triangle + c] + k], 0));
+      const p = [0, 1, 2].map((k) =>
+        weights.reduce((sum, w, c) => sum + w * place[3 * index[3 * hit.triangle + c] + k], 0),
+      );
       const l = Math.hypot(p[0], p[1], p[2]) || 1;
       return [p[0] / l, p[1] / l, p[2] / l];
     });
   },
 
   /**
-   * For each vertex drawn of a shape its distance from the supermesh, relative to the shape's diagonal. Where the asset
-   * has moved and scaled the shape (asset.fit), both are first brought together (see settle).
+   * For each drawn vertex of a shape its distance from the supermesh, relative to the shape's diagonal. If the asset
+   * has moved and scaled the shape (asset.fit), undoFit() first moves it back.
    */
-  error(key: string, morphKey: string, shape: number, fitted: boolean): { values: Float32Array; max: number; rms: number } {
+  error(
+    key: string,
+    morphKey: string,
+    shape: number,
+    fitted: boolean,
+  ): { values: Float32Array; max: number; rms: number } {
     const mesh = held.get(key);
     const morph = morphs.get(morphKey);
     if (!mesh || !morph) throw new Error('The shape or the morph is not loaded.');
@@ -221,7 +231,7 @@ const ops = {
     });
     const file = new Float64Array(moved.length);
     for (let i = 0; i < moved.length; i++) file[i] = moved[i] * morph.frame.radius + morph.frame.center[i % 3];
-    const place = fitted ? settle(raw, file, morph.index) : file;
+    const place = fitted ? undoFit(raw, file, morph.index) : file;
     const bvh = new Bvh(place, morph.index);
     const n = raw.positions.length / 3;
     const distance = new Float32Array(n).fill(-1);
@@ -239,7 +249,7 @@ const ops = {
       count++;
       return d;
     };
-    // at vertices, and between them: a triangle's largest error shows at its corners
+    // Also measured at edge midpoints and centroids: the corners get a triangle's largest error.
     for (let c = 0; c < raw.corners.length; c++) {
       const v = raw.corners[c];
       if (distance[v] < 0) distance[v] = away(p[3 * v], p[3 * v + 1], p[3 * v + 2]);
@@ -249,7 +259,8 @@ const ops = {
       for (let k = 0; k < 4; k++) {
         const used = k === 3 ? [0, 1, 2] : [k, (k + 1) % 3];
         if (k < 3 && raw.corners[t + k] > raw.corners[t + used[1]]) continue; // each edge once
-        for (let i = 0; i < 3; i++) middle[i] = used.reduce((total, corner) => total + p[3 * raw.corners[t + corner] + i], 0) / used.length;
+        for (let i = 0; i < 3; i++)
+          middle[i] = used.reduce((total, corner) => total + p[3 * raw.corners[t + corner] + i], 0) / used.length;
         const d = away(middle[0], middle[1], middle[2]);
         for (const corner of used) {
           const v = raw.corners[t + corner];
@@ -266,10 +277,10 @@ const ops = {
 export type Ops = typeof ops;
 
 /**
- * Undoes the similarity that the asset has applied to a shape: the least-squares similarity between the two
- * surfaces, from 24 rotations by nearest points, then by tangent planes.
+ * Undoes the similarity that the asset has applied to a shape. It finds the least-squares similarity between the two
+ * surfaces by nearest points, starting from 24 rotations, and then improves it by tangent planes.
  */
-function settle(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64Array {
+function undoFit(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64Array {
   const a = moments(raw.positions, raw.corners);
   const b = moments(place, index);
   const scale = a.spread / b.spread;
@@ -298,8 +309,8 @@ function settle(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64A
     }
     return [moved, cost];
   };
-  for (const turn of rotations()) {
-    const [moved, cost] = nearer(moved3(place, turn, scale, b.center, a.center), 12, 0.98);
+  for (const rotation of rotations()) {
+    const [moved, cost] = nearer(transformed(place, rotation, scale, b.center, a.center), 12, 0.98);
     if (cost < least) {
       least = cost;
       best = moved;
@@ -315,7 +326,8 @@ function settle(raw: RawMesh, place: Float64Array, index: Uint32Array): Float64A
 
 /**
  * One step of a similarity towards the tangent planes of the nearest points, which converges far faster than nearest
- * points do: least squares in turn (3), shift (3) and scale (1) about the centre. -> null where it changes nothing.
+ * points do: least squares in rotation (3), translation (3) and scale (1) around the centre. Returns null if the step
+ * changes nothing.
  */
 function towardsPlanes(raw: RawMesh, bvh: Bvh, all: Float64Array, stride: number): Float64Array | null {
   const c = [0, 1, 2].map((k) => {
@@ -332,9 +344,11 @@ function towardsPlanes(raw: RawMesh, bvh: Bvh, all: Float64Array, stride: number
     const n = faceNormal(raw, hit.triangle);
     const d = [all[i] - c[0], all[i + 1] - c[1], all[i + 2] - c[2]];
     size = Math.max(size, Math.hypot(d[0], d[1], d[2]));
+    // biome-ignore format: rotation, translation, scale and right-hand side
     const row = [
       d[1] * n[2] - d[2] * n[1], d[2] * n[0] - d[0] * n[2], d[0] * n[1] - d[1] * n[0],
-      n[0], n[1], n[2], n[0] * d[0] + n[1] * d[1] + n[2] * d[2],
+      n[0], n[1], n[2],
+      n[0] * d[0] + n[1] * d[1] + n[2] * d[2],
       n[0] * (q[0] - all[i]) + n[1] * (q[1] - all[i + 1]) + n[2] * (q[2] - all[i + 2]),
     ];
     for (let r = 0; r < 7; r++) for (let k = 0; k < 8; k++) A[r][k] += row[r] * row[k];
@@ -357,12 +371,13 @@ function towardsPlanes(raw: RawMesh, bvh: Bvh, all: Float64Array, stride: number
   const [ux, uy, uz] = angle > 0 ? [x[0] / angle, x[1] / angle, x[2] / angle] : [1, 0, 0];
   const s = Math.sin(angle);
   const h = 1 - Math.cos(angle);
+  // biome-ignore format: rows of a matrix
   const m = [
     1 - h * (uy * uy + uz * uz), h * ux * uy - s * uz, h * ux * uz + s * uy,
     h * ux * uy + s * uz, 1 - h * (ux * ux + uz * uz), h * uy * uz - s * ux,
     h * ux * uz - s * uy, h * uy * uz + s * ux, 1 - h * (ux * ux + uy * uy),
   ];
-  return moved3(all, m, Math.exp(x[6]), c, [c[0] + x[3], c[1] + x[4], c[2] + x[5]]);
+  return transformed(all, m, Math.exp(x[6]), c, [c[0] + x[3], c[1] + x[4], c[2] + x[5]]);
 }
 
 /** Centre of area and root mean square radius. */
@@ -373,8 +388,12 @@ function moments(p: ArrayLike<number>, corners: Uint32Array) {
   for (const pass of [0, 1])
     for (let t = 0; t < corners.length; t += 3) {
       const [a, b, c] = [3 * corners[t], 3 * corners[t + 1], 3 * corners[t + 2]];
-      const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
-      const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+      const ux = p[b] - p[a];
+      const uy = p[b + 1] - p[a + 1];
+      const uz = p[b + 2] - p[a + 2];
+      const vx = p[c] - p[a];
+      const vy = p[c + 1] - p[a + 1];
+      const vz = p[c + 2] - p[a + 2];
       const w = Math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
       const m = [0, 1, 2].map((k) => (p[a + k] + p[b + k] + p[c + k]) / 3);
       if (pass === 0) {
@@ -388,7 +407,14 @@ function moments(p: ArrayLike<number>, corners: Uint32Array) {
 
 /** The 24 rotations of the cube. */
 function* rotations(): Generator<number[]> {
-  const axes = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+  const axes = [
+    [0, 1, 2],
+    [1, 2, 0],
+    [2, 0, 1],
+    [0, 2, 1],
+    [2, 1, 0],
+    [1, 0, 2],
+  ];
   for (const [n, order] of axes.entries())
     for (let s = 0; s < 8; s++) {
       const signs = [s & 1 ? -1 : 1, s & 2 ? -1 : 1, s & 4 ? -1 : 1];
@@ -399,16 +425,18 @@ function* rotations(): Generator<number[]> {
     }
 }
 
-function moved3(p: Float64Array, m: number[], scale: number, from: number[], to: number[]): Float64Array {
+function transformed(p: Float64Array, m: number[], scale: number, from: number[], to: number[]): Float64Array {
   const out = new Float64Array(p.length);
   for (let i = 0; i < p.length; i += 3) {
-    const x = p[i] - from[0], y = p[i + 1] - from[1], z = p[i + 2] - from[2];
+    const x = p[i] - from[0];
+    const y = p[i + 1] - from[1];
+    const z = p[i + 2] - from[2];
     for (let k = 0; k < 3; k++) out[i + k] = to[k] + scale * (m[3 * k] * x + m[3 * k + 1] * y + m[3 * k + 2] * z);
   }
   return out;
 }
 
-/** Horn's closed form (1987): the similarity that takes the points `from` nearest to `to`, applied to all. */
+/** Applies to `all` the least-squares similarity from the points `from` to `to`, in Horn's closed form (1987). */
 function applyFit(all: Float64Array, from: number[][], to: number[][]): Float64Array {
   const n = from.length;
   const mean = (list: number[][]) => [0, 1, 2].map((k) => list.reduce((s, p) => s + p[k], 0) / n);
@@ -437,6 +465,7 @@ function applyFit(all: Float64Array, from: number[][], to: number[][]): Float64A
     q = next.map((x) => x / l);
   }
   const [w, x, y, z] = q;
+  // biome-ignore format: rows of a matrix
   const m = [
     1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
     2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
@@ -444,13 +473,14 @@ function applyFit(all: Float64Array, from: number[][], to: number[][]): Float64A
   ];
   let dot = 0;
   for (let r = 0; r < 3; r++) for (let c = 0; c < 3; c++) dot += m[3 * c + r] * S[3 * r + c];
-  return moved3(all, m, spread > 0 ? dot / spread : 1, a, b);
+  return transformed(all, m, spread > 0 ? dot / spread : 1, a, b);
 }
 
-/** The buffers inside an answer, to be handed over rather than copied. */
+/** The buffers inside a reply, which postMessage transfers instead of copying. */
 function buffersIn(value: unknown, found = new Set<ArrayBuffer>(), depth = 0): Set<ArrayBuffer> {
   if (ArrayBuffer.isView(value)) found.add(value.buffer as ArrayBuffer);
-  else if (value && typeof value === 'object' && depth < 4) for (const part of Object.values(value)) buffersIn(part, found, depth + 1);
+  else if (value && typeof value === 'object' && depth < 4)
+    for (const part of Object.values(value)) buffersIn(part, found, depth + 1);
   return found;
 }
 

@@ -1,11 +1,18 @@
-/** The one main action, always in the same place: morph, or the progress of it. */
+/** The main action, always in the same place: the Morph button, or the progress of a morph. */
 import { readyShapes, set, state, wireLandmarks } from '../state';
 import { cancelMerge, startMerge } from '../actions/merge';
 import { Bar, Button, Icon } from './parts';
 
 const STAGES: Record<string, string> = {
-  queued: 'Waiting for its turn', check: 'Checking', simplify: 'Simplifying', embed: 'Mapping to the sphere', certify: 'Certifying',
-  align: 'Matching the shapes', remesh: 'Building the common mesh', transfer: 'Carrying the shapes over', write: 'Writing the asset',
+  queued: 'Queued',
+  check: 'Checking',
+  simplify: 'Simplifying',
+  embed: 'Mapping to the sphere',
+  certify: 'Certifying',
+  align: 'Matching the shapes',
+  remesh: 'Building the common mesh',
+  transfer: 'Transferring the shapes',
+  write: 'Writing the asset',
 };
 
 export function Action() {
@@ -29,24 +36,43 @@ export function Action() {
       {running ? (
         <div class="progress">
           <div class="progress-text" role="status">
-            <span>{(running.job && (STAGES[running.job.state === 'queued' ? 'queued' : running.job.stage ?? ''] ?? running.job.stage)) || 'Starting'}</span>
+            <span>
+              {(running.job &&
+                (STAGES[running.job.state === 'queued' ? 'queued' : (running.job.stage ?? '')] ?? running.job.stage)) ||
+                'Starting'}
+            </span>
             <span class="number">{running.job?.progress ? `${Math.round(running.job.progress * 100)} %` : ''}</span>
           </div>
-          <Bar label={running.purpose === 'find' ? 'Finding landmarks' : 'Morphing'} value={running.job?.progress ?? null} />
+          <Bar
+            label={running.purpose === 'find' ? 'Finding landmarks' : 'Morphing'}
+            value={running.job?.progress ?? null}
+          />
           <div class="row spread">
-            <span class="hint">You may close the page; it goes on.</span>
-            <Button kind="quiet" onClick={cancelMerge}>Cancel</Button>
+            <span class="hint">You may close the page; the job continues.</span>
+            <Button kind="quiet" onClick={cancelMerge}>
+              Cancel
+            </Button>
           </div>
         </div>
       ) : (
         <>
-          <Button class={`button wide ${again ? '' : 'primary'}`} disabled={ready < 2 || busy} onClick={() => startMerge()}>
+          <Button
+            class={`button wide ${again ? '' : 'primary'}`}
+            disabled={ready < 2 || busy}
+            onClick={() => startMerge()}
+          >
             {ready < 2 ? 'Morph' : again ? 'Morph again' : `Morph ${ready} shapes`}
           </Button>
           <p class="hint center">
             {ready < 2
-              ? busy ? 'Uploading…' : ready === 1 ? 'Add one more shape.' : 'Two shapes are needed.'
-              : landmarks ? `${landmarks} landmark${landmarks > 1 ? 's' : ''} will meet exactly.` : 'Correspondence is found without landmarks.'}
+              ? busy
+                ? 'Uploading…'
+                : ready === 1
+                  ? 'Add one more shape.'
+                  : 'Add two shapes.'
+              : landmarks
+                ? `${landmarks} landmark${landmarks > 1 ? 's' : ''} will meet exactly.`
+                : 'Shapes are matched without landmarks.'}
           </p>
         </>
       )}

@@ -54,10 +54,11 @@ export function App() {
 function Header() {
   const [now, setNow] = useState<Theme>(theme());
   const next: Record<Theme, Theme> = { auto: 'dark', dark: 'light', light: 'auto' };
-  const usable = (tab: Tab) => tab === 'shapes' || (tab === 'morph' ? !!state.result : state.shapes.some((s) => s.state === 'ready'));
+  const usable = (tab: Tab) =>
+    tab === 'shapes' || (tab === 'morph' ? !!state.result : state.shapes.some((s) => s.state === 'ready'));
   return (
     <header class="header">
-      <a class="brand" href="#" onClick={() => setTimeout(() => location.reload())} aria-label="orbmorph: start afresh">
+      <a class="brand" href="./" aria-label="orbmorph: start over">
         <svg viewBox="0 0 32 32" aria-hidden="true" class="logo">
           <circle cx="16" cy="16" r="13" />
           <path d="M3.600 19c6-5.500 18.500-5.500 24.800 0M16 3c-5.500 7.500-5.500 18.500 0 26M7.500 6.500c6 5 11 5 17 0" />
@@ -67,7 +68,13 @@ function Header() {
       {state.shapes.length > 0 && (
         <nav class="tabs" aria-label="Views">
           {(Object.keys(TITLES) as Tab[]).map((tab) => (
-            <button type="button" key={tab} aria-current={state.tab === tab ? 'page' : undefined} disabled={!usable(tab)} onClick={() => set({ tab })}>
+            <button
+              type="button"
+              key={tab}
+              aria-current={state.tab === tab ? 'page' : undefined}
+              disabled={!usable(tab)}
+              onClick={() => set({ tab })}
+            >
               {TITLES[tab]}
             </button>
           ))}
@@ -76,12 +83,16 @@ function Header() {
       <div class="tools">
         {state.token === 'kept' && <Button kind="quiet" icon="key" label="Token" onClick={() => ask()} />}
         <Button kind="quiet" icon="server" label="On the server" onClick={() => set({ drawer: 'server' })} />
-        <Button kind="quiet" icon="theme" label={`Colours: ${now === 'auto' ? 'as the system' : now}`}
+        <Button
+          kind="quiet"
+          icon="theme"
+          label={`Colours: ${now === 'auto' ? 'system' : now}`}
           onClick={() => {
             applyTheme(next[now]);
             setNow(next[now]);
             set();
-          }} />
+          }}
+        />
         <Button kind="quiet" icon="help" label="Help and keys" onClick={() => set({ drawer: 'help' })} />
       </div>
     </header>
@@ -107,13 +118,22 @@ function StageArea() {
           {state.loading}
         </div>
       )}
-      {state.dragging && <div class="drop-here" aria-hidden="true">Drop to add</div>}
+      {state.dragging && (
+        <div class="drop-here" aria-hidden="true">
+          Drop to add
+        </div>
+      )}
     </div>
   );
 }
 
 function Inspector() {
-  const parts = { shapes: ShapesInspector, landmarks: LandmarksInspector, morph: MorphInspector, spheres: SpheresInspector };
+  const parts = {
+    shapes: ShapesInspector,
+    landmarks: LandmarksInspector,
+    morph: MorphInspector,
+    spheres: SpheresInspector,
+  };
   const Part = parts[state.tab];
   return <Part />;
 }
@@ -137,7 +157,12 @@ function useDrop() {
       set({ dragging: false });
       void addFiles(event.dataTransfer!.files);
     };
-    const all: [string, (event: never) => void][] = [['dragenter', enter], ['dragleave', leave], ['dragover', over], ['drop', drop]];
+    const all: [string, (event: never) => void][] = [
+      ['dragenter', enter],
+      ['dragleave', leave],
+      ['dragover', over],
+      ['drop', drop],
+    ];
     for (const [name, listener] of all) addEventListener(name, listener as EventListener);
     return () => all.forEach(([name, listener]) => removeEventListener(name, listener as EventListener));
   }, []);
@@ -162,7 +187,13 @@ function useShortcuts() {
         event.preventDefault();
         player.toggle();
       } else if (key === 'w' && state.result) switchWire();
-      else if ((key === 'delete' || key === 'backspace') && state.tab === 'landmarks' && state.active !== null && !target.closest('button')) removeLandmark(state.active);
+      else if (
+        (key === 'delete' || key === 'backspace') &&
+        state.tab === 'landmarks' &&
+        state.active !== null &&
+        !target.closest('button')
+      )
+        removeLandmark(state.active);
       else if (/^[1-4]$/.test(key) && state.shapes.length) {
         const tab = (Object.keys(TITLES) as Tab[])[Number(key) - 1];
         if (tab !== 'morph' || state.result) set({ tab });

@@ -1,4 +1,4 @@
-/** What slides in from the right: the server's content, ways to use a morph, help. */
+/** Drawers on the right: the server's content, ways to use a morph, help. */
 import { useEffect, useRef, useState } from 'preact/hooks';
 import type { Job } from 'orbmorph';
 import { client, set, state } from '../state';
@@ -15,8 +15,14 @@ export function Drawer() {
     dialog.current!.showModal();
   }, []);
   return (
-    <dialog ref={dialog} class="drawer" aria-label={TITLES[kind]} onClose={() => set({ drawer: null })}
-      onClick={(event) => event.target === dialog.current && dialog.current!.close()}>
+    // biome-ignore lint/a11y/useKeyWithClickEvents: the click is on the backdrop; Escape closes a dialog by itself
+    <dialog
+      ref={dialog}
+      class="drawer"
+      aria-label={TITLES[kind]}
+      onClose={() => set({ drawer: null })}
+      onClick={(event) => event.target === dialog.current && dialog.current!.close()}
+    >
       <div class="drawer-in">
         <div class="row spread">
           <h2>{TITLES[kind]}</h2>
@@ -43,12 +49,20 @@ function when(text: string | undefined): string {
 function Server() {
   useEffect(() => {
     void loadServer();
-    const timer = setInterval(() => state.server?.jobs.some((job) => job.state === 'running' || job.state === 'queued') && void loadServer(), 2000);
+    const timer = setInterval(
+      () => state.server?.jobs.some((job) => job.state === 'running' || job.state === 'queued') && void loadServer(),
+      2000,
+    );
     return () => clearInterval(timer);
   }, []);
   const list = state.server;
-  if (!list) return <p class="hint">Reading…</p>;
-  if (list.message) return <p class="red" role="alert">{list.message}</p>;
+  if (!list) return <p class="hint">Loading…</p>;
+  if (list.message)
+    return (
+      <p class="red" role="alert">
+        {list.message}
+      </p>
+    );
   const jobs = list.jobs.filter((job) => job.state !== 'succeeded');
   return (
     <>
@@ -63,7 +77,12 @@ function Server() {
                 <strong>{name}</strong>
                 <span class="muted">{item.triangles !== undefined && `${count(item.triangles)} triangles`}</span>
               </button>
-              <Button kind="quiet" icon="trash" label={`Delete the morph ${name}`} onClick={() => void remove('supermesh', item)} />
+              <Button
+                kind="quiet"
+                icon="trash"
+                label={`Delete the morph ${name}`}
+                onClick={() => void remove('supermesh', item)}
+              />
             </li>
           );
         })}
@@ -75,14 +94,25 @@ function Server() {
           <li key={mesh.id}>
             <button type="button" class="item" onClick={() => void addMesh(mesh)} aria-label={`Add ${mesh.name}`}>
               <strong>{mesh.name}</strong>
-              <span class="muted">{count(mesh.triangles)} triangles · {when(mesh.created)}</span>
+              <span class="muted">
+                {count(mesh.triangles)} triangles · {when(mesh.created)}
+              </span>
             </button>
-            <Button kind="quiet" icon="trash" label={`Delete the shape ${mesh.name}`} onClick={() => void remove('mesh', mesh)} />
+            <Button
+              kind="quiet"
+              icon="trash"
+              label={`Delete the shape ${mesh.name}`}
+              onClick={() => void remove('mesh', mesh)}
+            />
           </li>
         ))}
       </ul>
       {jobs.length > 0 && <h3>Jobs</h3>}
-      <ul class="list">{jobs.map((job) => <JobRow key={job.id} job={job} />)}</ul>
+      <ul class="list">
+        {jobs.map((job) => (
+          <JobRow key={job.id} job={job} />
+        ))}
+      </ul>
     </>
   );
 }
@@ -93,10 +123,17 @@ function JobRow({ job }: { job: Job }) {
     <li>
       <div class="item">
         <strong>{job.kind === 'supermesh' ? 'Morph' : 'Map to the sphere'}</strong>
-        <span class="muted">{job.state}{job.problem ? `: ${job.problem.detail}` : ''} · {when(job.created)}</span>
+        <span class="muted">
+          {job.state}
+          {job.problem ? `: ${job.problem.detail}` : ''} · {when(job.created)}
+        </span>
         {live && <Bar label="Progress" value={job.progress ?? null} />}
       </div>
-      {live && job.kind === 'supermesh' && <Button kind="quiet" onClick={() => void watchJob(job.id)}>Follow</Button>}
+      {live && job.kind === 'supermesh' && (
+        <Button kind="quiet" onClick={() => void watchJob(job.id)}>
+          Follow
+        </Button>
+      )}
       {live && <Button kind="quiet" icon="close" label="Cancel this job" onClick={() => void cancelJob(job.id)} />}
     </li>
   );
@@ -121,18 +158,23 @@ function Snippet({ title, text }: { title: string; text: string }) {
     <section class="snippet" aria-label={title}>
       <div class="row spread">
         <h3>{title}</h3>
-        <Button kind="quiet" icon={copied ? 'check' : 'copy'} onClick={() => void copy()}>{copied ? 'Copied' : 'Copy'}</Button>
+        <Button kind="quiet" icon={copied ? 'check' : 'copy'} onClick={() => void copy()}>
+          {copied ? 'Copied' : 'Copy'}
+        </Button>
       </div>
-      <pre id={`snippet-${title}`} tabIndex={0} role="region" aria-label={`${title}: code`}>{text}</pre>
+      <pre id={`snippet-${title}`} tabIndex={0} role="region" aria-label={`${title}: code`}>
+        {text}
+      </pre>
     </section>
   );
 }
 
-/** Quoted for a POSIX shell. */
+/** Quotes text for a POSIX shell. */
 const quoted = (text: string) => `'${text.replace(/'/g, "'\\''")}'`;
 
-/** Text that stands in HTML. */
-const escaped = (text: string) => text.replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]!);
+/** Escapes text for HTML. */
+const escaped = (text: string) =>
+  text.replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]!);
 
 const viewerPage = (asset: string, names: string[]) => `<!doctype html>
 <meta charset="utf-8">
@@ -142,7 +184,7 @@ const viewerPage = (asset: string, names: string[]) => `<!doctype html>
 <model-viewer src="${asset}" alt="${escaped(names.join(' to '))}" autoplay camera-controls></model-viewer>
 `;
 
-/** The asset carries an animation through all shapes, so the page plays that. */
+/** The page plays the asset's animation, which passes through all shapes. */
 const threePage = (asset: string, names: string[]) => `<!doctype html>
 <meta charset="utf-8">
 <title>${escaped(names.join(' to '))}</title>
@@ -188,14 +230,18 @@ function Share() {
   const names = result.supermesh.shapes.map((s) => s.name);
   const secret = client.token ? ` -H "Authorization: Bearer $ORBMORPH_TOKEN"` : '';
   const curl = `curl -sS${secret} ${origin}/v1/supermeshes -H 'Content-Type: application/json' -H 'Prefer: wait=60' \\\n  -d ${quoted(JSON.stringify(request))}\ncurl -sS${secret} -o morph.glb ${asset}`;
-  // a page cannot carry the token: it shows the file that the curl line above brings
+  // a page must not contain the token, so it loads the file that the curl command downloads
   const shown = client.token ? 'morph.glb' : asset;
   return (
     <>
-      <p class="hint">The address of an asset never changes and can be cached for ever.</p>
+      <p class="hint">The URL of an asset never changes, so it can be cached forever.</p>
       <Snippet title="Asset" text={asset} />
       <Snippet title="curl" text={curl} />
-      {client.token && <p class="hint">The pages below show <code>morph.glb</code>, which the second line above brings: put it beside them.</p>}
+      {client.token && (
+        <p class="hint">
+          The pages below load <code>morph.glb</code>, which the second command downloads. Put it beside them.
+        </p>
+      )}
       <Snippet title="three.js" text={threePage(shown, names)} />
       <Snippet title="model-viewer" text={viewerPage(shown, names)} />
     </>
@@ -203,21 +249,45 @@ function Share() {
 }
 
 const KEYS: [string, string][] = [
-  ['1 2 3 4', 'Shapes, Landmarks, Morph, Spheres'], ['Space', 'Play or pause'], ['W', 'Wireframe'],
-  ['Arrow keys', 'Turn the view that has the focus'], ['+ and −', 'Nearer and farther'], ['0', 'The view as it was at first'],
-  ['Enter', 'Landmark in the middle of the view'], ['Delete', 'Remove the chosen landmark'], ['Ctrl Z, Ctrl Shift Z', 'Undo, redo'], ['Esc', 'Close'],
+  ['1 2 3 4', 'Shapes, Landmarks, Morph, Spheres'],
+  ['Space', 'Play or pause'],
+  ['W', 'Wireframe'],
+  ['Arrow keys', 'Rotate the focused view'],
+  ['+ and −', 'Zoom in and out'],
+  ['0', 'Reset the view'],
+  ['Enter', 'Set a landmark at the centre of the view'],
+  ['Delete', 'Delete the selected landmark'],
+  ['Ctrl Z, Ctrl Shift Z', 'Undo, redo'],
+  ['Esc', 'Close'],
 ];
 
 function Help() {
   return (
     <>
-      <p>Add two or more closed meshes and press <strong>Morph</strong>. Where the result does not match as you would, set landmarks: the same feature on each shape.</p>
-      <p>Drag turns, the wheel or two fingers zoom, the right button or Shift moves. The address of the page holds all of its state; it can be kept and sent.</p>
+      <p>
+        Add two or more closed meshes and press <strong>Morph</strong>. Where features do not match, set landmarks on
+        them: the same feature on each shape.
+      </p>
+      <p>
+        Drag to rotate, use the wheel or two fingers to zoom, drag with the right button or Shift to move. The URL of
+        the page holds its state: bookmark it or send it.
+      </p>
       <h3>Keys</h3>
       <table class="report keys">
-        <tbody>{KEYS.map(([key, what]) => <tr key={key}><th scope="row"><kbd>{key}</kbd></th><td>{what}</td></tr>)}</tbody>
+        <tbody>
+          {KEYS.map(([key, what]) => (
+            <tr key={key}>
+              <th scope="row">
+                <kbd>{key}</kbd>
+              </th>
+              <td>{what}</td>
+            </tr>
+          ))}
+        </tbody>
       </table>
-      <p><a href="/docs">The HTTP interface</a> · <a href="/licenses.txt">Licences</a></p>
+      <p>
+        <a href="/docs">The HTTP interface</a> · <a href="/licenses.txt">Licences</a>
+      </p>
     </>
   );
 }

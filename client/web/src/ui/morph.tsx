@@ -1,4 +1,4 @@
-/** The morph: played, scrubbed, mixed; its mesh on every shape; its error; what to take away. */
+/** The Morph tab: playing, scrubbing and mixing; the common mesh on each shape; the error; downloads. */
 import { useEffect, useRef } from 'preact/hooks';
 import { set, state, tint, toast, type Result } from '../state';
 import { save } from '../actions/landmarks';
@@ -6,7 +6,7 @@ import { explain } from '../actions/token';
 import { measureErrors } from '../actions/merge';
 import { player } from '../player';
 import { client } from '../state';
-import { RAMPS, rampCss } from '../view/colors';
+import { type RAMPS, rampCss } from '../view/colors';
 import { Button, count, Icon, relative, Segments, Switch } from './parts';
 import { Pane } from './pane';
 import { OptionsFold } from './shapes';
@@ -18,17 +18,42 @@ export function MorphStage() {
     <div class="morph">
       <div class="grid" data-count={show === 'morph' ? 1 : result.supermesh.shapes.length}>
         {show === 'morph' && <Pane key="main" label="Morph" model={result.main} wire={state.wire} />}
-        {show === 'each' && result.supermesh.shapes.map((shape, i) => (
-          <Pane key={`each${i}`} label={`The common mesh as ${shape.name}`} model={result.each[i]} wire={state.meshWire}>
-            <Name index={i} name={shape.name} note={`${count(result.supermesh.triangles)} triangles`} />
-          </Pane>
-        ))}
-        {show === 'error' && state.shapes.map((shape, i) => (
-          <Pane key={`error${shape.key}`} label={`Error on ${shape.name}`} model={shape.error?.model} wire={state.wire}>
-            <Name index={i} name={shape.name} note={shape.error ? `largest ${relative(shape.error.max)}, rms ${relative(shape.error.rms)}` : 'measuring…'} />
-            {shape.error && <Legend ramp="heat" low="0" high={relative(shape.error.max)} label="distance from the common mesh, of the shape's size" />}
-          </Pane>
-        ))}
+        {show === 'each' &&
+          result.supermesh.shapes.map((shape, i) => (
+            <Pane
+              key={`each${i}`}
+              label={`The common mesh as ${shape.name}`}
+              model={result.each[i]}
+              wire={state.meshWire}
+            >
+              <Name index={i} name={shape.name} note={`${count(result.supermesh.triangles)} triangles`} />
+            </Pane>
+          ))}
+        {show === 'error' &&
+          state.shapes.map((shape, i) => (
+            <Pane
+              key={`error${shape.key}`}
+              label={`Error on ${shape.name}`}
+              model={shape.error?.model}
+              wire={state.wire}
+            >
+              <Name
+                index={i}
+                name={shape.name}
+                note={
+                  shape.error ? `largest ${relative(shape.error.max)}, rms ${relative(shape.error.rms)}` : 'measuring…'
+                }
+              />
+              {shape.error && (
+                <Legend
+                  ramp="heat"
+                  low="0"
+                  high={relative(shape.error.max)}
+                  label="distance from the common mesh, relative to the shape's size"
+                />
+              )}
+            </Pane>
+          ))}
       </div>
       {show === 'morph' && <Transport result={result} />}
     </div>
@@ -39,7 +64,7 @@ function NoMorph() {
   return (
     <div class="blank big">
       <p>No morph yet. Add two shapes and press “Morph”.</p>
-      <Button onClick={() => set({ tab: 'shapes' })}>To the shapes</Button>
+      <Button onClick={() => set({ tab: 'shapes' })}>Go to the shapes</Button>
     </div>
   );
 }
@@ -54,11 +79,24 @@ function Name({ index, name, note }: { index: number; name: string; note: string
   );
 }
 
-export function Legend({ ramp, low, high, label }: { ramp: keyof typeof RAMPS; low: string; high: string; label: string }) {
+export function Legend({
+  ramp,
+  low,
+  high,
+  label,
+}: {
+  ramp: keyof typeof RAMPS;
+  low: string;
+  high: string;
+  label: string;
+}) {
   return (
     <div class="legend">
       <span class="ramp" style={{ background: rampCss(ramp) }} aria-hidden="true" />
-      <span class="row spread"><span>{low}</span><span>{high}</span></span>
+      <span class="row spread">
+        <span>{low}</span>
+        <span>{high}</span>
+      </span>
       <span class="muted">{label}</span>
     </div>
   );
@@ -67,12 +105,16 @@ export function Legend({ ramp, low, high, label }: { ramp: keyof typeof RAMPS; l
 function Transport({ result }: { result: Result }) {
   const slider = useRef<HTMLInputElement>(null);
   const names = result.supermesh.shapes.map((shape) => shape.name);
-  useEffect(() => player.listen((time) => {
-    const input = slider.current;
-    if (!input) return;
-    input.value = String(time);
-    input.style.setProperty('--at', `${time * 100}%`);
-  }), [result]);
+  useEffect(
+    () =>
+      player.listen((time) => {
+        const input = slider.current;
+        if (!input) return;
+        input.value = String(time);
+        input.style.setProperty('--at', `${time * 100}%`);
+      }),
+    [result],
+  );
   const say = () => {
     const at = player.time * (names.length - 1);
     const i = Math.min(Math.floor(at), names.length - 2);
@@ -84,21 +126,35 @@ function Transport({ result }: { result: Result }) {
         <Icon name={state.playing ? 'pause' : 'play'} />
       </button>
       <div class="scrub">
-        <input ref={slider} type="range" min={0} max={1} step={0.001} aria-label="Along the morph" aria-valuetext={say()}
+        <input
+          ref={slider}
+          type="range"
+          min={0}
+          max={1}
+          step={0.001}
+          aria-label="Along the morph"
+          aria-valuetext={say()}
           onInput={(event) => {
             const time = Number(event.currentTarget.value);
             player.pause();
             if (state.mix) set({ mix: null });
             player.seek(time);
             event.currentTarget.setAttribute('aria-valuetext', say());
-          }} />
+          }}
+        />
         <div class="stops">
           {names.map((name, i) => (
-            <button type="button" key={i} class="stop" aria-label={`Show ${name}`} onClick={() => {
-              player.pause();
-              if (state.mix) set({ mix: null });
-              player.seek(i / Math.max(names.length - 1, 1));
-            }}>
+            <button
+              type="button"
+              key={i}
+              class="stop"
+              aria-label={`Show ${name}`}
+              onClick={() => {
+                player.pause();
+                if (state.mix) set({ mix: null });
+                player.seek(i / Math.max(names.length - 1, 1));
+              }}
+            >
               <span class="dot" style={{ background: tint(i) }} aria-hidden="true" />
               {name}
             </button>
@@ -109,57 +165,116 @@ function Transport({ result }: { result: Result }) {
   );
 }
 
-/** The one that is seen: on “Each shape” it is another than elsewhere. */
-export const switchWire = () => set(state.tab === 'morph' && state.show === 'each' ? { meshWire: !state.meshWire } : { wire: !state.wire });
+/** Switches the wireframe of the current view; “Each shape” has one of its own. */
+export const switchWire = () =>
+  set(state.tab === 'morph' && state.show === 'each' ? { meshWire: !state.meshWire } : { wire: !state.wire });
 
 const assetName = ({ supermesh }: Result) => `${supermesh.shapes.map((s) => s.name).join('-')}.glb`;
 
 export function MorphInspector() {
   const { result } = state;
-  if (!result) return <><h2>Morph</h2><OptionsFold /></>;
+  if (!result)
+    return (
+      <>
+        <h2>Morph</h2>
+        <OptionsFold />
+      </>
+    );
   const { supermesh } = result;
   const exact = supermesh.certificate?.landmarks_exact;
   return (
     <>
       <h2>Morph</h2>
-      <Segments label="What is shown" value={state.show}
+      <Segments
+        label="What is shown"
+        value={state.show}
         onChange={(show) => {
           set({ show });
           if (show !== 'morph') player.pause();
         }}
-        items={[{ value: 'morph', label: 'Morph' }, { value: 'each', label: 'Each shape' }, { value: 'error', label: 'Error' }]} />
+        items={[
+          { value: 'morph', label: 'Morph' },
+          { value: 'each', label: 'Each shape' },
+          { value: 'error', label: 'Error' },
+        ]}
+      />
       {state.show === 'error' && <ErrorLoader />}
       {state.show === 'morph' && <Mix result={result} />}
       <div class="row wrap gap-top">
         <Switch label="Wireframe" on={state.show === 'each' ? state.meshWire : state.wire} onChange={switchWire} />
       </div>
       <div class="row wrap gap-top">
-        <a class="button primary" href={client.url(supermesh.asset)} download={assetName(result)}
+        <a
+          class="button primary"
+          href={client.url(supermesh.asset)}
+          download={assetName(result)}
           onClick={(event) => {
             if (!client.token) return;
             event.preventDefault(); // a link cannot send the token
-            void client.asset(supermesh.id).then((glb) => save(new Blob([glb], { type: 'model/gltf-binary' }), assetName(result)), (error) => toast(explain(error), 'error'));
-          }}>
-          <Icon name="download" /><span>Download GLB</span>
+            void client.asset(supermesh.id).then(
+              (glb) => save(new Blob([glb], { type: 'model/gltf-binary' }), assetName(result)),
+              (error) => toast(explain(error), 'error'),
+            );
+          }}
+        >
+          <Icon name="download" />
+          <span>Download GLB</span>
         </a>
-        <Button icon="code" onClick={() => set({ drawer: 'share' })}>Use it</Button>
+        <Button icon="code" onClick={() => set({ drawer: 'share' })}>
+          Use it
+        </Button>
       </div>
       <h3>Report</h3>
       <table class="report">
         <tbody>
-          <tr><th scope="row">Common mesh</th><td>{count(supermesh.triangles)} triangles</td></tr>
-          <tr><th scope="row">Closed, genus</th><td>{supermesh.certificate?.closed ? 'yes' : 'no'}, {supermesh.certificate?.genus}</td></tr>
-          <tr><th scope="row">Flipped triangles</th><td>{(supermesh.certificate?.flipped ?? []).join(', ') || '–'}</td></tr>
-          {!!supermesh.landmarks?.length && <tr><th scope="row">Landmarks</th><td>{supermesh.landmarks.length}{exact ? ', exact' : ''}</td></tr>}
-          <tr><th scope="row">Time</th><td data-varies>{supermesh.timings_ms?.total !== undefined ? `${(supermesh.timings_ms.total / 1000).toPrecision(2)} s` : '–'}</td></tr>
+          <tr>
+            <th scope="row">Common mesh</th>
+            <td>{count(supermesh.triangles)} triangles</td>
+          </tr>
+          <tr>
+            <th scope="row">Closed, genus</th>
+            <td>
+              {supermesh.certificate?.closed ? 'yes' : 'no'}, {supermesh.certificate?.genus}
+            </td>
+          </tr>
+          <tr>
+            <th scope="row">Flipped triangles</th>
+            <td>{(supermesh.certificate?.flipped ?? []).join(', ') || '–'}</td>
+          </tr>
+          {!!supermesh.landmarks?.length && (
+            <tr>
+              <th scope="row">Landmarks</th>
+              <td>
+                {supermesh.landmarks.length}
+                {exact ? ', exact' : ''}
+              </td>
+            </tr>
+          )}
+          <tr>
+            <th scope="row">Time</th>
+            <td data-varies>
+              {supermesh.timings_ms?.total !== undefined
+                ? `${(supermesh.timings_ms.total / 1000).toPrecision(2)} s`
+                : '–'}
+            </td>
+          </tr>
         </tbody>
       </table>
       <table class="report">
-        <thead><tr><th scope="col">Shape</th><th scope="col">Largest error</th><th scope="col">RMS</th><th scope="col">Normals</th></tr></thead>
+        <thead>
+          <tr>
+            <th scope="col">Shape</th>
+            <th scope="col">Largest error</th>
+            <th scope="col">RMS</th>
+            <th scope="col">Normals</th>
+          </tr>
+        </thead>
         <tbody>
           {supermesh.shapes.map((shape, i) => (
             <tr key={i}>
-              <th scope="row"><span class="dot" style={{ background: tint(i) }} aria-hidden="true" /> {shape.name}</th>
+              <th scope="row">
+                <span class="dot" style={{ background: tint(i) }} aria-hidden="true" /> {shape.name}
+              </th>
               <td>{relative(shape.hausdorff_relative ?? shape.hausdorff_sampled_relative)}</td>
               <td>{relative(shape.rms_relative)}</td>
               <td>{shape.normal_deviation?.mean != null ? `${shape.normal_deviation.mean.toFixed(1)}°` : '–'}</td>
@@ -174,19 +289,23 @@ export function MorphInspector() {
 
 function ErrorLoader() {
   useEffect(() => void measureErrors(), [state.result]);
-  return <p class="hint">How far each shape's own vertices lie from the common mesh, measured in this browser.</p>;
+  return <p class="hint">Distance of each shape from the common mesh, measured in this browser.</p>;
 }
 
 function Mix({ result }: { result: Result }) {
   const names = result.supermesh.shapes.map((shape) => shape.name);
   const inputs = useRef<(HTMLInputElement | null)[]>([]);
-  useEffect(() => player.listen((time) => {
-    if (state.mix) return;
-    const at = time * (names.length - 1);
-    inputs.current.forEach((input, i) => {
-      if (input) input.value = String(Math.max(0, 1 - Math.abs(at - i)));
-    });
-  }), [result]);
+  useEffect(
+    () =>
+      player.listen((time) => {
+        if (state.mix) return;
+        const at = time * (names.length - 1);
+        inputs.current.forEach((input, i) => {
+          if (input) input.value = String(Math.max(0, 1 - Math.abs(at - i)));
+        });
+      }),
+    [result],
+  );
   const read = () => inputs.current.slice(0, names.length).map((input) => Number(input?.value ?? 0));
   return (
     <fieldset class="mix">
@@ -195,7 +314,13 @@ function Mix({ result }: { result: Result }) {
         <label key={i} class="mix-row">
           <span class="dot" style={{ background: tint(i) }} aria-hidden="true" />
           <span class="clip">{name}</span>
-          <input ref={(el) => void (inputs.current[i] = el)} type="range" min={0} max={1} step={0.01} aria-label={`Share of ${name}`}
+          <input
+            ref={(el) => void (inputs.current[i] = el)}
+            type="range"
+            min={0}
+            max={1}
+            step={0.01}
+            aria-label={`Share of ${name}`}
             onInput={() => {
               const values = read();
               if (names.length === 2) {
@@ -203,10 +328,10 @@ function Mix({ result }: { result: Result }) {
                 inputs.current[1 - i]!.value = String(values[1 - i]);
               }
               player.mix(values);
-            }} />
+            }}
+          />
         </label>
       ))}
     </fieldset>
   );
 }
-

@@ -1,4 +1,4 @@
-/** A view of the stage with its caption, and landmarks as numbered buttons on it. */
+/** A view of the stage with its caption and its landmarks as numbered buttons. */
 import type { ComponentChildren } from 'preact';
 import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import { stage } from '../view/shared';
@@ -14,7 +14,7 @@ interface PaneProps {
   wire?: boolean;
   pickable?: Shape;
   markers?: Shape;
-  /** landmarks as they lie on a ball */
+  /** a sphere whose landmarks the view shows */
   spots?: SphereState;
   children?: ComponentChildren;
 }
@@ -37,8 +37,14 @@ export function Pane({ label, model, wire = false, pickable, markers, spots, chi
 
   return (
     <section class={`pane${pickable ? ' pickable' : ''}`} aria-label={label}>
-      <div class="pane-view" ref={element} tabIndex={0} role="application" aria-roledescription="3D view"
-        aria-label={`${label}. Arrow keys turn, plus and minus zoom, 0 resets${pickable ? ', Enter sets a landmark in the middle' : ''}.`}>
+      <div
+        class="pane-view"
+        ref={element}
+        tabIndex={0}
+        role="application"
+        aria-roledescription="3D view"
+        aria-label={`${label}. Arrow keys rotate, plus and minus zoom, 0 resets${pickable ? ', Enter sets a landmark at the centre' : ''}.`}
+      >
         {markers && <Markers shape={markers} view={view} />}
         {spots?.spots && spots.spots.size > 0 && <Spots spots={spots.spots} view={view} />}
       </div>
@@ -49,7 +55,9 @@ export function Pane({ label, model, wire = false, pickable, markers, spots, chi
 
 function Markers({ shape, view }: { shape: Shape; view: { current: View | null } }) {
   const box = useRef<HTMLDivElement>(null);
-  const here = state.landmarks.map((landmark, index) => ({ landmark, index })).filter(({ landmark }) => landmark.at[shape.key]);
+  const here = state.landmarks
+    .map((landmark, index) => ({ landmark, index }))
+    .filter(({ landmark }) => landmark.at[shape.key]);
 
   useEffect(() => {
     const buttons = [...box.current!.children] as HTMLElement[];
@@ -83,13 +91,19 @@ function Markers({ shape, view }: { shape: Shape; view: { current: View | null }
   return (
     <div class="markers" ref={box}>
       {here.map(({ landmark, index }) => (
-        <button type="button" key={landmark.id} class="marker" aria-pressed={landmark.id === state.active} style={{ '--hue': hue(index) }}
+        <button
+          type="button"
+          key={landmark.id}
+          class="marker"
+          aria-pressed={landmark.id === state.active}
+          style={{ '--hue': hue(index) }}
           aria-label={`Landmark ${index + 1}${landmark.name ? `, ${landmark.name},` : ''} on ${shape.name}. Delete removes it.`}
           onPointerDown={drag(landmark.id)}
           onClick={() => set({ active: landmark.id })}
           onKeyDown={(event) => {
             if (event.key === 'Delete' || event.key === 'Backspace') removeLandmark(landmark.id);
-          }}>
+          }}
+        >
           {index + 1}
         </button>
       ))}
@@ -97,10 +111,12 @@ function Markers({ shape, view }: { shape: Shape; view: { current: View | null }
   );
 }
 
-/** Landmarks on a ball: numbers to be seen, not to be moved. */
+/** Landmarks on a sphere: numbers that cannot be moved. */
 function Spots({ spots, view }: { spots: Map<number, [number, number, number]>; view: { current: View | null } }) {
   const box = useRef<HTMLDivElement>(null);
-  const here = state.landmarks.map((landmark, index) => ({ landmark, index })).filter(({ landmark }) => spots.has(landmark.id));
+  const here = state.landmarks
+    .map((landmark, index) => ({ landmark, index }))
+    .filter(({ landmark }) => spots.has(landmark.id));
   useEffect(() => {
     const marks = [...box.current!.children] as HTMLElement[];
     view.current!.markers = here.map(({ landmark }, i): Marker => {
@@ -112,7 +128,11 @@ function Spots({ spots, view }: { spots: Map<number, [number, number, number]>; 
   });
   return (
     <div class="markers" ref={box} aria-hidden="true">
-      {here.map(({ landmark, index }) => <span key={landmark.id} class="marker small" style={{ '--hue': hue(index) }}>{index + 1}</span>)}
+      {here.map(({ landmark, index }) => (
+        <span key={landmark.id} class="marker small" style={{ '--hue': hue(index) }}>
+          {index + 1}
+        </span>
+      ))}
     </div>
   );
 }

@@ -3,7 +3,7 @@ import type { ComponentChildren, JSX } from 'preact';
 import { useEffect, useState } from 'preact/hooks';
 import { watch } from '../state';
 
-/** Renders the component again whenever the state changes. */
+/** Renders the component whenever the state changes. */
 export function useStateOfPage() {
   const [, tick] = useState(0);
   useEffect(() => watch(() => tick((n) => n + 1)), []);
@@ -29,7 +29,8 @@ const PATHS: Record<string, string> = {
   wand: 'M5 19L15 9M14 4v3M20 10h-3M18 5l-1.500 1.500M18.500 14.500L17 13M10.500 6.500L12 8',
   file: 'M6 3h8l4 4v14H6zM14 3v4h4',
   check: 'M5 12.500l4.500 4.500L19 7',
-  alert: 'M12 8v5M12 16.500h.01M10.300 4L2.500 18a2 2 0 0 0 1.700 3h15.600a2 2 0 0 0 1.700-3L13.700 4a2 2 0 0 0-3.400 0z',
+  alert:
+    'M12 8v5M12 16.500h.01M10.300 4L2.500 18a2 2 0 0 0 1.700 3h15.600a2 2 0 0 0 1.700-3L13.700 4a2 2 0 0 0-3.400 0z',
   copy: 'M9 9h11v11H9zM15 9V4H4v11h5',
   key: 'M14 10l6-6M17 7l2.500 2.500M15 14.500a5 5 0 1 1-3.500-8.500 5 5 0 0 1 3.500 8.500z',
 };
@@ -43,13 +44,23 @@ export function Icon({ name }: { name: string }) {
 }
 
 type ButtonProps = JSX.HTMLAttributes<HTMLButtonElement> & {
-  icon?: string; label?: string; kind?: 'primary' | 'quiet' | 'plain' | 'danger'; disabled?: boolean; children?: ComponentChildren;
+  icon?: string;
+  label?: string;
+  kind?: 'primary' | 'quiet' | 'plain' | 'danger';
+  disabled?: boolean;
+  children?: ComponentChildren;
 };
 
-/** With children they name the button; an icon alone needs `label`. */
+/** Children name the button; an icon alone needs `label`. */
 export function Button({ icon, label, kind = 'plain', children, ...rest }: ButtonProps) {
   return (
-    <button type="button" class={`button ${kind}${children ? '' : ' only-icon'}`} aria-label={children ? undefined : label} title={label} {...rest}>
+    <button
+      type="button"
+      class={`button ${kind}${children ? '' : ' only-icon'}`}
+      aria-label={children ? undefined : label}
+      title={label}
+      {...rest}
+    >
       {icon && <Icon name={icon} />}
       {children && <span>{children}</span>}
     </button>
@@ -59,6 +70,7 @@ export function Button({ icon, label, kind = 'plain', children, ...rest }: Butto
 export function Switch({ label, on, onChange }: { label: string; on: boolean; onChange: (on: boolean) => void }) {
   return (
     <label class="switch">
+      {/* biome-ignore lint/a11y/useAriaPropsForRole: a checkbox has its checked state without aria-checked */}
       <input type="checkbox" role="switch" checked={on} onChange={(event) => onChange(event.currentTarget.checked)} />
       <span class="track" aria-hidden="true" />
       <span>{label}</span>
@@ -66,13 +78,28 @@ export function Switch({ label, on, onChange }: { label: string; on: boolean; on
   );
 }
 
-export function Segments<T extends string>({ label, value, items, onChange }: {
-  label: string; value: T; items: { value: T; label: string; hint?: string; off?: boolean }[]; onChange: (value: T) => void;
+export function Segments<T extends string>({
+  label,
+  value,
+  items,
+  onChange,
+}: {
+  label: string;
+  value: T;
+  items: { value: T; label: string; hint?: string; off?: boolean }[];
+  onChange: (value: T) => void;
 }) {
   return (
     <div class="segments" role="group" aria-label={label}>
       {items.map((item) => (
-        <button type="button" key={item.value} aria-pressed={item.value === value} title={item.hint} disabled={item.off} onClick={() => onChange(item.value)}>
+        <button
+          type="button"
+          key={item.value}
+          aria-pressed={item.value === value}
+          title={item.hint}
+          disabled={item.off}
+          onClick={() => onChange(item.value)}
+        >
           {item.label}
         </button>
       ))}
@@ -82,6 +109,7 @@ export function Segments<T extends string>({ label, value, items, onChange }: {
 
 export function Field({ label, hint, children }: { label: string; hint?: string; children: ComponentChildren }) {
   return (
+    // biome-ignore lint/a11y/noLabelWithoutControl: the children hold the control
     <label class="field">
       <span class="field-name">{label}</span>
       {children}
@@ -93,7 +121,14 @@ export function Field({ label, hint, children }: { label: string; hint?: string;
 export function Bar({ value, label }: { value: number | null; label: string }) {
   const percent = value === null ? undefined : Math.round(value * 100);
   return (
-    <div class={`bar${value === null ? ' unknown' : ''}`} role="progressbar" aria-label={label} aria-valuemin={0} aria-valuemax={100} aria-valuenow={percent}>
+    <div
+      class={`bar${value === null ? ' unknown' : ''}`}
+      role="progressbar"
+      aria-label={label}
+      aria-valuemin={0}
+      aria-valuemax={100}
+      aria-valuenow={percent}
+    >
       <span style={{ width: `${percent ?? 30}%` }} />
     </div>
   );

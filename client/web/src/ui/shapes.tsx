@@ -1,7 +1,16 @@
 /** Shapes: the empty page, the views side by side, the list with uploads and refusals, the options. */
 import { useRef } from 'preact/hooks';
 import { set, state, tint, type Options, type Shape } from '../state';
-import { addFiles, addSamples, mend, moveShape, remedies, removeShape, sampleList, samplePair } from '../actions/shapes';
+import {
+  addFiles,
+  addSamples,
+  uploadAgain,
+  moveShape,
+  repairsFor,
+  removeShape,
+  sampleList,
+  samplePair,
+} from '../actions/shapes';
 import { stage } from '../view/shared';
 import { Bar, Button, count, Field, Icon, Segments, Switch } from './parts';
 import { Pane } from './pane';
@@ -12,12 +21,22 @@ function FilePicker({ label, kind = 'plain' }: { label: string; kind?: 'plain' |
   const input = useRef<HTMLInputElement>(null);
   return (
     <>
-      <Button kind={kind} icon="plus" onClick={() => input.current!.click()}>{label}</Button>
-      <input ref={input} class="hidden" type="file" multiple accept={ACCEPT} aria-label="Mesh files" tabIndex={-1}
+      <Button kind={kind} icon="plus" onClick={() => input.current!.click()}>
+        {label}
+      </Button>
+      <input
+        ref={input}
+        class="hidden"
+        type="file"
+        multiple
+        accept={ACCEPT}
+        aria-label="Mesh files"
+        tabIndex={-1}
         onChange={(event) => {
           void addFiles(event.currentTarget.files ?? []);
           event.currentTarget.value = '';
-        }} />
+        }}
+      />
     </>
   );
 }
@@ -26,30 +45,52 @@ function Empty() {
   const pair = samplePair();
   return (
     <div class="welcome">
-      <div class="welcome-art" aria-hidden="true">
-        <svg viewBox="0 0 360 120">
+      <div class="welcome-art">
+        <svg viewBox="0 0 360 120" aria-hidden="true">
           <defs>
-            <linearGradient id="g1" x1="0" y1="0" x2="1" y2="1"><stop offset="0" stop-color="#f2c3aa" /><stop offset="1" stop-color="#d98761" /></linearGradient>
-            <linearGradient id="g2" x1="0" y1="0" x2="1" y2="1"><stop offset="0" stop-color="#d9c3d3" /><stop offset="1" stop-color="#9b7fae" /></linearGradient>
-            <linearGradient id="g3" x1="0" y1="0" x2="1" y2="1"><stop offset="0" stop-color="#bcd0f3" /><stop offset="1" stop-color="#5d7fd6" /></linearGradient>
+            <linearGradient id="g1" x1="0" y1="0" x2="1" y2="1">
+              <stop offset="0" stop-color="#f2c3aa" />
+              <stop offset="1" stop-color="#d98761" />
+            </linearGradient>
+            <linearGradient id="g2" x1="0" y1="0" x2="1" y2="1">
+              <stop offset="0" stop-color="#d9c3d3" />
+              <stop offset="1" stop-color="#9b7fae" />
+            </linearGradient>
+            <linearGradient id="g3" x1="0" y1="0" x2="1" y2="1">
+              <stop offset="0" stop-color="#bcd0f3" />
+              <stop offset="1" stop-color="#5d7fd6" />
+            </linearGradient>
           </defs>
-          <path fill="url(#g1)" d="M24 62c0-26 14-46 38-46 20 0 24 16 42 18 14 2 16 18 8 30-10 14-6 42-44 42-30 0-44-18-44-44z" />
+          <path
+            fill="url(#g1)"
+            d="M24 62c0-26 14-46 38-46 20 0 24 16 42 18 14 2 16 18 8 30-10 14-6 42-44 42-30 0-44-18-44-44z"
+          />
           <circle fill="url(#g2)" cx="180" cy="60" r="44" />
-          <path fill="url(#g3)" d="M250 40c4-22 26-26 38-14 8 8 18 0 28 6 16 10 20 40 8 56-10 14-26 20-40 10-10-8-22 2-30-10-8-14-8-30-4-48z" />
+          <path
+            fill="url(#g3)"
+            d="M250 40c4-22 26-26 38-14 8 8 18 0 28 6 16 10 20 40 8 56-10 14-26 20-40 10-10-8-22 2-30-10-8-14-8-30-4-48z"
+          />
           <path class="flow" d="M122 60h10m6 0h0M228 60h10" />
         </svg>
       </div>
       <h1>Drop two shapes. Get a morph.</h1>
       <p class="lead">
-        Any closed meshes, of any make: OBJ, OFF, PLY, STL or glTF. They come back as one GLB that blends from each to
-        every other, ready for three.js, Blender, Unity and the web.
+        Any closed meshes: OBJ, OFF, PLY, STL or glTF. The result is one GLB that blends between all of them, ready for
+        three.js, Blender, Unity and the web.
       </p>
       <div class="row center">
         <FilePicker label="Choose files" kind={pair.length ? 'plain' : 'primary'} />
-        {pair.length > 1 && <Button kind="primary" icon="wand" onClick={() => void addSamples(pair)}>Try with samples</Button>}
+        {pair.length > 1 && (
+          <Button kind="primary" icon="wand" onClick={() => void addSamples(pair)}>
+            Try with samples
+          </Button>
+        )}
       </div>
       <p class="hint">
-        or <button type="button" class="link" onClick={() => set({ drawer: 'server' })}>open what is on the server</button>
+        or{' '}
+        <button type="button" class="link" onClick={() => set({ drawer: 'server' })}>
+          open what is on the server
+        </button>
       </p>
     </div>
   );
@@ -93,17 +134,28 @@ export function ShapesInspector() {
       <div class="row wrap">
         <FilePicker label="Add files" />
         {left.slice(0, 4).map((sample) => (
-          <Button kind="quiet" key={sample.file} icon="plus" onClick={() => void addSamples([sample])} label={`Add the sample ${sample.name}`}>{sample.name}</Button>
+          <Button
+            kind="quiet"
+            key={sample.file}
+            icon="plus"
+            onClick={() => void addSamples([sample])}
+            label={`Add the sample ${sample.name}`}
+          >
+            {sample.name}
+          </Button>
         ))}
       </div>
       <div class="row wrap gap-top">
-        <Switch label="Link the cameras" on={state.linked}
+        <Switch
+          label="Link the cameras"
+          on={state.linked}
           onChange={(linked) => {
             for (const view of stage.views) view.own.restore(stage.orbit.toString());
             stage.linked = linked;
             set({ linked });
             stage.draw();
-          }} />
+          }}
+        />
         <Switch label="Wireframe" on={state.wire} onChange={(wire) => set({ wire })} />
       </div>
       <OptionsFold />
@@ -119,25 +171,51 @@ function ShapeCard({ shape, index }: { shape: Shape; index: number }) {
       <div class="row spread">
         <div class="row tight">
           <span class="dot" style={{ background: tint(index) }} aria-hidden="true" />
-          <strong class="clip" title={shape.name}>{shape.name}</strong>
+          <strong class="clip" title={shape.name}>
+            {shape.name}
+          </strong>
         </div>
         <div class="row tight">
-          {index > 0 && <Button kind="quiet" icon="up" label={`Move ${shape.name} before ${state.shapes[index - 1].name}`} onClick={() => moveShape(shape.key, -1)} />}
+          {index > 0 && (
+            <Button
+              kind="quiet"
+              icon="up"
+              label={`Move ${shape.name} before ${state.shapes[index - 1].name}`}
+              onClick={() => moveShape(shape.key, -1)}
+            />
+          )}
           <Button kind="quiet" icon="close" label={`Remove ${shape.name}`} onClick={() => removeShape(shape.key)} />
         </div>
       </div>
       {shape.facts && (
-        <p class="facts">{count(shape.facts.vertices)} vertices · {count(shape.facts.triangles)} triangles · {shape.facts.format.toUpperCase()}</p>
+        <p class="facts">
+          {count(shape.facts.vertices)} vertices · {count(shape.facts.triangles)} triangles ·{' '}
+          {shape.facts.format.toUpperCase()}
+        </p>
       )}
-      {(shape.state === 'uploading' || shape.state === 'reading') && !mesh && <Bar label={`Uploading ${shape.name}`} value={shape.progress} />}
-      {repairs.length > 0 && <p class="facts">Mended: {repairs.map((r) => `${r.kind.replace(/_/g, ' ')} (${count(r.count)})`).join(', ')}</p>}
-      {shape.state === 'ready' && <p class="facts good"><Icon name="check" /> Closed, in one piece, no handles</p>}
+      {(shape.state === 'uploading' || shape.state === 'reading') && !mesh && (
+        <Bar label={`Uploading ${shape.name}`} value={shape.progress} />
+      )}
+      {repairs.length > 0 && (
+        <p class="facts">
+          Repaired: {repairs.map((r) => `${r.kind.replace(/_/g, ' ')} (${count(r.count)})`).join(', ')}
+        </p>
+      )}
+      {shape.state === 'ready' && (
+        <p class="facts good">
+          <Icon name="check" /> Closed, in one piece, no handles
+        </p>
+      )}
       {shape.problem && <Refusal shape={shape} />}
       {shape.message && !shape.problem && (
         <div class="notice error" role="alert">
           <Icon name="alert" />
-          <div><p>{shape.message}</p></div>
-          {shape.file && shape.state === 'failed' && <Button onClick={() => mend(shape.key, state.options.repair)}>Try again</Button>}
+          <div>
+            <p>{shape.message}</p>
+          </div>
+          {shape.file && shape.state === 'failed' && (
+            <Button onClick={() => uploadAgain(shape.key, state.options.repair)}>Try again</Button>
+          )}
         </div>
       )}
     </li>
@@ -160,11 +238,13 @@ function Refusal({ shape }: { shape: Shape }) {
           {problem.genus !== undefined && `Genus ${String(problem.genus)}. `}
           {problem.line !== undefined && `Line ${String(problem.line)}. `}
           {problem.offset !== undefined && `Byte ${String(problem.offset)}. `}
-          {!!shape.faults && shape.model && <span class="red">Shown in red on the model.</span>}
+          {!!shape.defects && shape.model && <span class="red">Shown in red on the model.</span>}
         </p>
         <div class="row wrap">
-          {remedies(problem).map((remedy) => (
-            <Button key={remedy.repair} onClick={() => mend(shape.key, remedy.repair)}>{remedy.label}</Button>
+          {repairsFor(problem).map((option) => (
+            <Button key={option.repair} onClick={() => uploadAgain(shape.key, option.repair)}>
+              {option.label}
+            </Button>
           ))}
         </div>
       </div>
@@ -181,41 +261,86 @@ export function OptionsFold() {
   return (
     <details class="fold">
       <summary>Options</summary>
-      <Field label="Matching" hint="How the shapes are brought into correspondence. Automatic: pinned where there are landmarks, else found.">
-        <select value={options.align} onChange={(event) => change({ align: event.currentTarget.value as Options['align'] })}>
+      <Field
+        label="Matching"
+        hint="How the correspondence is found. Automatic: from the landmarks if there are any, otherwise from the shapes."
+      >
+        <select
+          value={options.align}
+          onChange={(event) => change({ align: event.currentTarget.value as Options['align'] })}
+        >
           <option value="default">Automatic</option>
           <option value="pin">Pinned landmarks</option>
-          <option value="auto">Found from the shapes</option>
-          <option value="rbf">Radial functions</option>
+          <option value="auto">From the shapes alone</option>
+          <option value="rbf">Radial basis functions</option>
           <option value="rotate">Rotation only</option>
         </select>
       </Field>
       <Field label="Common mesh">
-        <select value={options.remesh} onChange={(event) => change({ remesh: event.currentTarget.value as Options['remesh'] })}>
-          <option value="adaptive">Adaptive: as few triangles as will do</option>
+        <select
+          value={options.remesh}
+          onChange={(event) => change({ remesh: event.currentTarget.value as Options['remesh'] })}
+        >
+          <option value="adaptive">Adaptive: as few triangles as needed</option>
           <option value="overlay">Overlay: exact, many triangles</option>
           <option value="subdivision">Subdivision</option>
           <option value="convex-hull">Convex hull</option>
         </select>
       </Field>
       <Field label={`Tolerance: ${relative(options.tolerance)} of the size`}>
-        <input type="range" min={-4} max={-1.5} step={0.05} value={Math.log10(options.tolerance)}
+        <input
+          type="range"
+          min={-4}
+          max={-1.5}
+          step={0.05}
+          value={Math.log10(options.tolerance)}
           aria-valuetext={`${relative(options.tolerance)} of the size`}
-          onInput={(event) => change({ tolerance: Number((10 ** Number(event.currentTarget.value)).toPrecision(2)) })} />
+          onInput={(event) => change({ tolerance: Number((10 ** Number(event.currentTarget.value)).toPrecision(2)) })}
+        />
       </Field>
-      <Field label="At most so many triangles" hint="Empty: no limit. It goes before the tolerance.">
-        <input type="number" min={4} step={1000} placeholder="no limit" value={options.maxTriangles ?? ''}
-          onChange={(event) => change({ maxTriangles: Number(event.currentTarget.value) >= 4 ? Math.round(Number(event.currentTarget.value)) : null })} />
+      <Field label="Most triangles" hint="Empty: no limit. The limit takes precedence over the tolerance.">
+        <input
+          type="number"
+          min={4}
+          step={1000}
+          placeholder="no limit"
+          value={options.maxTriangles ?? ''}
+          onChange={(event) =>
+            change({
+              maxTriangles:
+                Number(event.currentTarget.value) >= 4 ? Math.round(Number(event.currentTarget.value)) : null,
+            })
+          }
+        />
       </Field>
       <div class="field">
         <span class="field-name">Path between the shapes</span>
-        <Segments label="Path between the shapes" value={options.path} onChange={(path) => change({ path })}
-          items={[{ value: 'linear', label: 'Straight' }, { value: 'rigid', label: 'As rigid as possible' }]} />
+        <Segments
+          label="Path between the shapes"
+          value={options.path}
+          onChange={(path) => change({ path })}
+          items={[
+            { value: 'linear', label: 'Straight' },
+            { value: 'rigid', label: 'As rigid as possible' },
+          ]}
+        />
       </div>
       <div class="field">
         <span class="field-name">Placement</span>
-        <Segments label="Placement" value={options.fit} onChange={(fit) => change({ fit })}
-          items={[{ value: 'similarity', label: 'Fit size', hint: 'Move, turn and scale the later shapes onto the first' }, { value: 'rigid', label: 'Move' }, { value: 'none', label: 'As in the files' }]} />
+        <Segments
+          label="Placement"
+          value={options.fit}
+          onChange={(fit) => change({ fit })}
+          items={[
+            {
+              value: 'similarity',
+              label: 'Fit size',
+              hint: 'Translate, rotate and scale the other shapes to fit the first',
+            },
+            { value: 'rigid', label: 'Move' },
+            { value: 'none', label: 'As in the files' },
+          ]}
+        />
       </div>
     </details>
   );

@@ -1,4 +1,4 @@
-/** The maps to the sphere: surface beside sphere in the same colours, distortion as heat map and histogram. */
+/** The Spheres tab: each surface beside its sphere in the same colours, distortion as heat map and histogram. */
 import { useEffect } from 'preact/hooks';
 import type { Measure } from 'orbmorph';
 import { PAINTS, readyShapes, state, tint, type Shape, type SpherePaint } from '../state';
@@ -8,15 +8,21 @@ import { Pane } from './pane';
 import { Legend } from './morph';
 
 const NAMES: Record<SpherePaint, string> = {
-  direction: 'Normals', checker: 'Checkerboard', symmetric_dirichlet: 'Stretch', angle: 'Angles', area: 'Areas', aspect: 'Triangle shape',
+  direction: 'Normals',
+  checker: 'Checkerboard',
+  symmetric_dirichlet: 'Stretch',
+  angle: 'Angles',
+  area: 'Areas',
+  aspect: 'Triangle shape',
 };
 const MEANING: Record<SpherePaint, string> = {
-  direction: 'The direction of the surface as colour, carried to the sphere: parts can be recognised.',
-  checker: 'A regular checkerboard on the sphere, carried back to the surface: where its cells are large, the surface was squeezed.',
-  symmetric_dirichlet: 'Symmetric Dirichlet energy: 1 where the map keeps lengths, growing with stretch and with squeeze.',
-  angle: 'Ratio of the singular values: 1 where angles are kept.',
-  area: 'Logarithm of the area ratio: blue where the sphere has less room than the surface, red where it has more.',
-  aspect: 'Circumradius over twice the inradius of the triangles on the sphere: 1 for equilateral ones.',
+  direction: 'Normals of the surface as colours. The sphere has the same colours, so you can recognise parts on it.',
+  checker:
+    'A regular checkerboard on the sphere, mapped back to the surface. Cells are large where the map shrinks the surface.',
+  symmetric_dirichlet: 'Symmetric Dirichlet energy: 1 where the map preserves lengths, more where it distorts them.',
+  angle: 'Ratio of the singular values: 1 where the map preserves angles.',
+  area: 'Logarithm of the area ratio: blue where the map shrinks areas, red where it enlarges them.',
+  aspect: 'Circumradius over twice the inradius of the triangles on the sphere: 1 for equilateral triangles.',
 };
 
 export function SpheresStage() {
@@ -33,11 +39,27 @@ export function SpheresStage() {
               <span class="dot" style={{ background: tint(index) }} aria-hidden="true" />
               <strong>{shape.name}</strong>
             </div>
-            {sphere?.state === 'working' && <div class="centered"><Bar label={`Mapping ${shape.name} to the sphere`} value={sphere.job?.progress ?? null} /></div>}
-            {sphere?.state === 'failed' && <div class="centered"><p class="red">{sphere.message}</p></div>}
+            {sphere?.state === 'working' && (
+              <div class="centered">
+                <Bar label={`Mapping ${shape.name} to the sphere`} value={sphere.job?.progress ?? null} />
+              </div>
+            )}
+            {sphere?.state === 'failed' && (
+              <div class="centered">
+                <p class="red">{sphere.message}</p>
+              </div>
+            )}
           </Pane>,
-          <Pane key={`${shape.key}b`} label={`${shape.name}, sphere ${state.side} the alignment`} model={sphere?.ball} wire={state.wire} spots={sphere}>
-            <div class="caption"><span class="muted">{state.side === 'after' ? 'on the common sphere' : 'on its own sphere'}</span></div>
+          <Pane
+            key={`${shape.key}b`}
+            label={`${shape.name}, sphere ${state.side} the alignment`}
+            model={sphere?.ball}
+            wire={state.wire}
+            spots={sphere}
+          >
+            <div class="caption">
+              <span class="muted">{state.side === 'after' ? 'on the common sphere' : 'on its own sphere'}</span>
+            </div>
           </Pane>,
         ];
       })}
@@ -51,16 +73,40 @@ export function SpheresInspector() {
   return (
     <>
       <h2>Spheres</h2>
-      <Segments label="Alignment" value={state.side} onChange={showSide}
-        items={[{ value: 'before', label: 'Before alignment' }, { value: 'after', label: 'After', off: !canAlign(), hint: canAlign() ? undefined : 'Morph the shapes first' }]} />
+      <Segments
+        label="Alignment"
+        value={state.side}
+        onChange={showSide}
+        items={[
+          { value: 'before', label: 'Before alignment' },
+          { value: 'after', label: 'After', off: !canAlign(), hint: canAlign() ? undefined : 'Morph the shapes first' },
+        ]}
+      />
       <p class="hint">
-        {state.side === 'after' ? 'Every shape on the one sphere that all share: what lies at the same place corresponds.'
-          : canAlign() ? 'Each shape mapped to a sphere by itself.' : 'Each shape mapped to a sphere by itself. Morph them to see the spheres brought into line.'}
+        {state.side === 'after'
+          ? 'All shapes on one common sphere: points at the same position correspond.'
+          : canAlign()
+            ? 'Each shape on its own sphere.'
+            : 'Each shape on its own sphere. Morph the shapes to see the aligned spheres.'}
       </p>
-      <Segments label="Colour" value={paint} onChange={setPaint} items={PAINTS.map((value) => ({ value, label: NAMES[value] }))} />
+      <Segments
+        label="Colour"
+        value={paint}
+        onChange={setPaint}
+        items={PAINTS.map((value) => ({ value, label: NAMES[value] }))}
+      />
       <p class="hint">{MEANING[paint]}</p>
-      {range && <Legend ramp={paint === 'area' ? 'diverging' : 'heat'} low={range.low.toFixed(2)} high={range.high.toFixed(2)} label={`${NAMES[paint]}${paint === 'area' ? '' : ', logarithmic'}`} />}
-      {readyShapes().map((shape) => <ShapeReport key={shape.key} shape={shape} />)}
+      {range && (
+        <Legend
+          ramp={paint === 'area' ? 'diverging' : 'heat'}
+          low={range.low.toFixed(2)}
+          high={range.high.toFixed(2)}
+          label={`${NAMES[paint]}${paint === 'area' ? '' : ', logarithmic'}`}
+        />
+      )}
+      {readyShapes().map((shape) => (
+        <ShapeReport key={shape.key} shape={shape} />
+      ))}
     </>
   );
 }
@@ -73,16 +119,25 @@ function ShapeReport({ shape }: { shape: Shape }) {
   const { certificate } = embedding;
   return (
     <section class="sphere-report" aria-label={`Distortion of ${shape.name}`}>
-      <h3><span class="dot" style={{ background: tint(state.shapes.indexOf(shape)) }} aria-hidden="true" /> {shape.name}</h3>
+      <h3>
+        <span class="dot" style={{ background: tint(state.shapes.indexOf(shape)) }} aria-hidden="true" /> {shape.name}
+      </h3>
       <p class={`facts ${certificate?.valid ? 'good' : 'red'}`}>
-        {certificate?.valid ? 'Certified one to one' : 'Not certified'}: {certificate?.flipped} flipped, degree {certificate?.degree}
+        {certificate?.valid ? 'Certified one to one' : 'Not certified'}: {certificate?.flipped} flipped, degree{' '}
+        {certificate?.degree}
       </p>
       {measure && (
         <>
-          <Histogram measure={measure} label={`${NAMES[isMeasure(paint) ? paint : 'symmetric_dirichlet']} of ${shape.name}`} />
+          <Histogram
+            measure={measure}
+            label={`${NAMES[isMeasure(paint) ? paint : 'symmetric_dirichlet']} of ${shape.name}`}
+          />
           <dl class="numbers">
             {(['mean', 'median', 'p99', 'max'] as const).map((key) => (
-              <div key={key}><dt>{key === 'p99' ? '99 %' : key}</dt><dd>{measure[key]?.toPrecision(3)}</dd></div>
+              <div key={key}>
+                <dt>{key === 'p99' ? '99 %' : key}</dt>
+                <dd>{measure[key]?.toPrecision(3)}</dd>
+              </div>
             ))}
           </dl>
         </>
@@ -99,14 +154,21 @@ function Histogram({ measure, label }: { measure: Measure; label: string }) {
   const middle = counts.reduce((best, c, i) => (c > counts[best] ? i : best), 0);
   return (
     <figure class="histogram">
-      <svg viewBox="0 0 300 84" role="img" preserveAspectRatio="none"
-        aria-label={`Histogram, ${label}: from ${edges[0]?.toPrecision(3)} to ${edges.at(-1)?.toPrecision(3)}, most around ${edges[middle]?.toPrecision(3)}`}>
+      <svg
+        viewBox="0 0 300 84"
+        role="img"
+        preserveAspectRatio="none"
+        aria-label={`Histogram, ${label}: from ${edges[0]?.toPrecision(3)} to ${edges.at(-1)?.toPrecision(3)}, most around ${edges[middle]?.toPrecision(3)}`}
+      >
         {counts.map((c, i) => {
           const h = (c / most) * 82;
           return <rect key={i} x={i * width + 0.5} y={84 - h} width={Math.max(width - 1, 0.5)} height={h} rx="1" />;
         })}
       </svg>
-      <figcaption class="row spread"><span>{edges[0]?.toPrecision(3)}</span><span>{edges.at(-1)?.toPrecision(3)}</span></figcaption>
+      <figcaption class="row spread">
+        <span>{edges[0]?.toPrecision(3)}</span>
+        <span>{edges.at(-1)?.toPrecision(3)}</span>
+      </figcaption>
     </figure>
   );
 }

@@ -1,13 +1,13 @@
-/** A turntable camera as a value: several views may share one, which is what links them. */
+/** A turntable camera. Views that share one are linked. */
 
 type Vec = [number, number, number];
 const dot = (a: ArrayLike<number>, b: ArrayLike<number>) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 const HOME = { yaw: 0.55, pitch: 0.22, distance: 3.15, panX: 0, panY: 0 };
-export const FIELD = 32; // degrees, from the bottom to the top
+export const FIELD = 32; // vertical field of view in degrees
 const SLOPE = Math.tan((FIELD * Math.PI) / 360);
 
-/** Where a camera is and how it stands: `back` points from what it looks at to the eye. */
+/** Position and orientation of a camera: `back` points from its target to the eye. */
 export interface Look {
   eye: Vec;
   right: Vec;
@@ -41,7 +41,7 @@ export class Orbit {
   }
 
   look(aspect: number): Look {
-    // a narrow view backs off so that the shape still fits across
+    // a narrow view moves back until the shape fits its width
     const distance = this.distance / Math.min(1, aspect);
     const [sy, cy, sp, cp] = [Math.sin(this.yaw), Math.cos(this.yaw), Math.sin(this.pitch), Math.cos(this.pitch)];
     const back: Vec = [sy * cp, sp, cy * cp];
@@ -61,8 +61,12 @@ export class Orbit {
   }
 }
 
-/** Where a point is seen: 0 to 1 from the left and from the top; and how much a normal there faces the eye. */
-export function project(look: Look, point: ArrayLike<number>, normal: ArrayLike<number>): { x: number; y: number; facing: number } {
+/** The view position of a point, 0 to 1 from the left and the top, and how much its normal faces the eye. */
+export function project(
+  look: Look,
+  point: ArrayLike<number>,
+  normal: ArrayLike<number>,
+): { x: number; y: number; facing: number } {
   const d = look.eye.map((e, k) => point[k] - e);
   const depth = Math.max(-dot(d, look.back), 1e-6);
   return {
@@ -72,7 +76,7 @@ export function project(look: Look, point: ArrayLike<number>, normal: ArrayLike<
   };
 }
 
-/** The ray through a place of the view, 0 to 1 from the left and from the top. */
+/** The ray through a position of the view, 0 to 1 from the left and the top. */
 export function rayThrough(look: Look, x: number, y: number): { origin: number[]; direction: number[] } {
   const a = (2 * x - 1) * SLOPE * look.aspect;
   const b = (1 - 2 * y) * SLOPE;

@@ -1,16 +1,33 @@
 /// <reference lib="webworker" />
-/** Draws: holds the canvas, the scene objects and their buffers. See messages.ts for what it is told. */
+/** The drawing worker. It owns the canvas, the scene objects and their buffers; messages.ts defines its orders. */
 import {
-  BufferAttribute, BufferGeometry, Color, Group, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, PerspectiveCamera, Points,
-  PointsMaterial, Scene, ShaderMaterial, Sphere, Vector3, WebGLRenderer, type Material, type Object3D,
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  Group,
+  LineBasicMaterial,
+  LineSegments,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  PerspectiveCamera,
+  Points,
+  PointsMaterial,
+  Scene,
+  type ShaderMaterial,
+  Sphere,
+  Vector3,
+  WebGLRenderer,
+  type Material,
+  type Object3D,
 } from 'three';
 import { FIELD, type Look } from './camera';
 import type { Paint, Rgb } from './colors';
-import type { Faults, Frame, Order, Report, Surface } from './messages';
+import type { Defects, Frame, Order, Report, Surface } from './messages';
 import { DENSE, SLOTS, surfaceMaterial, wireMaterial } from './surface';
 
 const BALL = new Sphere(new Vector3(), 4);
-const tell = (report: Report) => self.postMessage(report);
+const send = (report: Report) => self.postMessage(report);
 
 function dispose(object: Object3D) {
   object.traverse((part) => {
@@ -26,7 +43,7 @@ class Buffers {
   readonly normal: BufferAttribute;
   readonly index: BufferAttribute;
   readonly edges: BufferAttribute;
-  readonly targets: { move: BufferAttribute; turn: BufferAttribute }[];
+  readonly targets: { position: BufferAttribute; normal: BufferAttribute }[];
   readonly slots: number;
   readonly dense: boolean;
 
@@ -35,7 +52,10 @@ class Buffers {
     this.normal = normal === position ? this.position : new BufferAttribute(normal, 3);
     this.index = new BufferAttribute(index, 1);
     this.edges = new BufferAttribute(edges, 1);
-    this.targets = targets.map((t) => ({ move: new BufferAttribute(t.position, 3), turn: new BufferAttribute(t.normal, 3) }));
+    this.targets = targets.map((t) => ({
+      position: new BufferAttribute(t.position, 3),
+      normal: new BufferAttribute(t.normal, 3),
+    }));
     this.slots = Math.min(targets.length, SLOTS);
     this.dense = index.length >= 3 * DENSE;
   }
@@ -57,7 +77,11 @@ class Model {
   private extra: Group | null = null;
   private current: number[] = [];
 
-  constructor(readonly buffers: Buffers, paint: Paint, scale = 1) {
+  constructor(
+    readonly buffers: Buffers,
+    paint: Paint,
+    scale = 1,
+  ) {
     this.mesh = new Mesh(buffers.geometry(buffers.index, true), surfaceMaterial(paint, buffers.slots, buffers.dense));
     this.mesh.frustumCulled = false;
     this.group.scale.setScalar(scale);
@@ -85,12 +109,15 @@ class Model {
     this.current = weights;
     const { slots, targets } = this.buffers;
     if (!slots) return;
-    const taken = [...weights.keys()].sort((a, b) => Math.abs(weights[b]) - Math.abs(weights[a])).slice(0, slots).sort((a, b) => a - b);
+    const taken = [...weights.keys()]
+      .sort((a, b) => Math.abs(weights[b]) - Math.abs(weights[a]))
+      .slice(0, slots)
+      .sort((a, b) => a - b);
     for (const object of [this.mesh, this.lines]) {
       if (!object) continue;
       taken.forEach((k, slot) => {
-        object.geometry.setAttribute(`move${slot}`, targets[k].move);
-        if (object === this.mesh) object.geometry.setAttribute(`turn${slot}`, targets[k].turn);
+        object.geometry.setAttribute(`targetPosition${slot}`, targets[k].position);
+        if (object === this.mesh) object.geometry.setAttribute(`targetNormal${slot}`, targets[k].normal);
       });
       object.material.uniforms.weight.value = taken.map((k) => weights[k]);
     }
@@ -109,13 +136,13 @@ class Model {
     this.lines.material.uniforms.strength.value = this.buffers.dense ? 0.2 : 0.42;
   }
 
-  faults(faults: Faults | null) {
+  defects(defects: Defects | null) {
     if (this.extra) {
       this.group.remove(this.extra);
       dispose(this.extra);
     }
     this.extra = null;
-    if (!faults) return;
+    if (!defects) return;
     const red = new Color('#e5383b');
     const extra = (this.extra = new Group());
     const add = (data: Float32Array, make: (g: BufferGeometry) => Mesh | LineSegments | Points) => {
@@ -127,10 +154,16 @@ class Model {
       object.frustumCulled = false;
       extra.add(object);
     };
-    add(faults.triangles, (g) => new Mesh(g, new MeshBasicMaterial({ color: red, transparent: true, opacity: 0.75 })));
-    add(faults.lines, (g) => new LineSegments(g, new LineBasicMaterial({ color: red, depthTest: false })));
-    add(faults.lines, (g) => new Points(g, new PointsMaterial({ color: red, size: 5, sizeAttenuation: false, depthTest: false })));
-    add(faults.points, (g) => new Points(g, new PointsMaterial({ color: red, size: 10, sizeAttenuation: false, depthTest: false })));
+    add(defects.triangles, (g) => new Mesh(g, new MeshBasicMaterial({ color: red, transparent: true, opacity: 0.75 })));
+    add(defects.lines, (g) => new LineSegments(g, new LineBasicMaterial({ color: red, depthTest: false })));
+    add(
+      defects.lines,
+      (g) => new Points(g, new PointsMaterial({ color: red, size: 5, sizeAttenuation: false, depthTest: false })),
+    );
+    add(
+      defects.points,
+      (g) => new Points(g, new PointsMaterial({ color: red, size: 10, sizeAttenuation: false, depthTest: false })),
+    );
     this.group.add(extra);
   }
 }
@@ -148,15 +181,17 @@ function start(canvas: OffscreenCanvas, ratio: number) {
     renderer.debug.checkShaderErrors = import.meta.env.DEV;
     renderer.setScissorTest(true);
     renderer.setPixelRatio(ratio);
-    canvas.addEventListener('webglcontextrestored', () => tell({ op: 'restored' }));
+    canvas.addEventListener('webglcontextrestored', () => send({ op: 'restored' }));
   } catch {
-    // told below
+    // reported below
   }
-  tell({ op: 'started', works: renderer !== null });
+  send({ op: 'started', works: renderer !== null });
 }
 
-function stand({ eye, right, up, back, near, far, aspect }: Look) {
-  camera.matrix.copy(new Matrix4().makeBasis(new Vector3(...right), new Vector3(...up), new Vector3(...back)).setPosition(...eye));
+function placeCamera({ eye, right, up, back, near, far, aspect }: Look) {
+  camera.matrix.copy(
+    new Matrix4().makeBasis(new Vector3(...right), new Vector3(...up), new Vector3(...back)).setPosition(...eye),
+  );
   camera.near = near;
   camera.far = far;
   camera.aspect = aspect;
@@ -168,7 +203,8 @@ function draw(width: number, height: number, frames: Frame[]) {
   if (!renderer) return;
   const ratio = renderer.getPixelRatio();
   const { domElement: canvas } = renderer;
-  if (canvas.width !== Math.floor(width * ratio) || canvas.height !== Math.floor(height * ratio)) renderer.setSize(width, height, false);
+  if (canvas.width !== Math.floor(width * ratio) || canvas.height !== Math.floor(height * ratio))
+    renderer.setSize(width, height, false);
   renderer.setClearColor(0, 0);
   renderer.setScissor(0, 0, width, height);
   renderer.setViewport(0, 0, width, height);
@@ -179,21 +215,21 @@ function draw(width: number, height: number, frames: Frame[]) {
     const bottom = height - frame.top - frame.height;
     renderer.setViewport(frame.left, bottom, frame.width, frame.height);
     renderer.setScissor(frame.left, bottom, frame.width, frame.height);
-    stand(frame.look);
+    placeCamera(frame.look);
     scene.add(model.group);
     renderer.render(scene, camera);
     scene.remove(model.group);
   }
 }
 
-function carryOut(order: Order) {
+function execute(order: Order) {
   if (order.op === 'start') return start(order.canvas, order.ratio);
   if (order.op === 'draw')
     return void requestAnimationFrame(() => {
       draw(order.width, order.height, order.frames);
-      tell({ op: 'drawn' });
-      // the next animation frame comes when this one was taken
-      requestAnimationFrame(() => tell({ op: 'shown' }));
+      send({ op: 'drawn' });
+      // the next animation frame starts after the browser has taken this one
+      requestAnimationFrame(() => send({ op: 'shown' }));
     });
   if (order.op === 'model') {
     const buffers = order.surface ? new Buffers(order.surface) : models.get(order.same!)?.buffers;
@@ -203,16 +239,22 @@ function carryOut(order: Order) {
   const model = models.get(order.model);
   if (!model) return;
   switch (order.op) {
-    case 'paint': return model.paint(order.paint);
-    case 'color': return model.color(order.color);
-    case 'attribute': return model.attribute(order.name, order.data);
-    case 'weights': return model.weights(order.weights);
-    case 'wireframe': return model.wireframe(order.shown, order.color);
-    case 'faults': return model.faults(order.faults);
+    case 'paint':
+      return model.paint(order.paint);
+    case 'color':
+      return model.color(order.color);
+    case 'attribute':
+      return model.attribute(order.name, order.data);
+    case 'weights':
+      return model.weights(order.weights);
+    case 'wireframe':
+      return model.wireframe(order.shown, order.color);
+    case 'defects':
+      return model.defects(order.defects);
     case 'dispose':
       dispose(model.group);
       models.delete(order.model);
   }
 }
 
-self.onmessage = ({ data }: MessageEvent<Order>) => carryOut(data);
+self.onmessage = ({ data }: MessageEvent<Order>) => execute(data);

@@ -1,13 +1,13 @@
-/** The way to the drawing worker. Orders are carried out in the order in which they are given. */
+/** Sends orders to the drawing worker, which executes them in sequence. */
 import type { Order, Report } from './messages';
 
 const worker = new Worker(new URL('./draw.worker.ts', import.meta.url), { type: 'module' });
 
-export function order(what: Order, hand: Transferable[] = []) {
-  worker.postMessage(what, hand);
+export function order(what: Order, transfer: Transferable[] = []) {
+  worker.postMessage(what, transfer);
 }
 
-export function onReport(hear: (report: Report) => void) {
-  worker.onmessage = ({ data }: MessageEvent<Report>) => hear(data);
-  worker.onerror = () => hear({ op: 'started', works: false });
+export function onReport(listener: (report: Report) => void) {
+  worker.onmessage = ({ data }: MessageEvent<Report>) => listener(data);
+  worker.onerror = () => listener({ op: 'started', works: false });
 }

@@ -1,4 +1,4 @@
-/** What the page tells the drawing worker, and hears from it. Models are known by number. */
+/** The orders of the page to the drawing worker and its reports. Models have numbers. */
 import type { Look } from './camera';
 import type { Paint, Rgb } from './colors';
 
@@ -10,13 +10,13 @@ export interface Surface {
   targets?: { position: Float32Array; normal: Float32Array }[];
 }
 
-export interface Faults {
+export interface Defects {
   lines: Float32Array;
   points: Float32Array;
   triangles: Float32Array;
 }
 
-/** One view to be drawn: pixels of the page from the left and the top of the canvas. */
+/** One view to draw, in CSS pixels from the left and the top of the canvas. */
 export interface Frame {
   model: number;
   left: number;
@@ -29,14 +29,14 @@ export interface Frame {
 export type Order =
   | { op: 'start'; canvas: OffscreenCanvas; ratio: number }
   | { op: 'draw'; width: number; height: number; frames: Frame[] }
-  /** `same`: the number of a model whose buffers it shares */
+  /** `same`: the model whose buffers this one shares */
   | { op: 'model'; model: number; surface?: Surface; same?: number; scale?: number; paint: Paint }
   | { op: 'paint'; model: number; paint: Paint }
   | { op: 'color'; model: number; color: Rgb }
   | { op: 'attribute'; model: number; name: 'value' | 'tone'; data: Float32Array }
   | { op: 'weights'; model: number; weights: number[] }
   | { op: 'wireframe'; model: number; shown: boolean; color: Rgb }
-  | { op: 'faults'; model: number; faults: Faults | null }
+  | { op: 'defects'; model: number; defects: Defects | null }
   | { op: 'dispose'; model: number };
 
 export type Report = { op: 'started'; works: boolean } | { op: 'drawn' } | { op: 'shown' } | { op: 'restored' };

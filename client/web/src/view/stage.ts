@@ -1,7 +1,7 @@
 /**
- * One canvas under all views. Each view is a rectangle of the page with a model in it; the canvas belongs to a worker,
- * so that neither uploads nor slow GPUs hold up the page. It is drawn only when something has changed, and never again
- * before the last drawing is done. Views that share an Orbit are linked.
+ * One canvas under all views. Each view is a rectangle of the page that shows a model. The canvas belongs to a worker,
+ * so neither uploads nor slow GPUs block the page. The worker draws only when something has changed and never starts a
+ * drawing before the last one is done. Views that share an Orbit are linked.
  */
 import { Orbit, project, rayThrough, type Look } from './camera';
 import { onReport, order } from './link';
@@ -25,7 +25,10 @@ export class View {
   onPick: ((ray: Ray) => void) | null = null;
   own = new Orbit();
 
-  constructor(readonly element: HTMLElement, readonly stage: Stage) {}
+  constructor(
+    readonly element: HTMLElement,
+    readonly stage: Stage,
+  ) {}
 
   get orbit(): Orbit {
     return this.stage.linked ? this.stage.orbit : this.own;
@@ -61,7 +64,7 @@ export class Stage {
   linked = true;
   onMoved: (() => void) | null = null;
   onFailed: (() => void) | null = null;
-  private asked = false;
+  private scheduled = false;
   private drawing = false;
   private again = false;
   private readonly observer = new ResizeObserver(() => this.draw());
@@ -75,7 +78,7 @@ export class Stage {
       if (report.op === 'started' && !report.works) this.fail();
       else if (report.op === 'restored') this.draw();
       else if (report.op === 'drawn') this.drawn();
-      else if (report.op === 'shown' && !this.drawing && !this.asked) delete this.host.dataset.busy;
+      else if (report.op === 'shown' && !this.drawing && !this.scheduled) delete this.host.dataset.busy;
     });
     try {
       const canvas = this.canvas.transferControlToOffscreen();
@@ -110,8 +113,8 @@ export class Stage {
   draw() {
     this.host.dataset.busy = '';
     if (this.drawing) this.again = true;
-    else if (!this.asked) {
-      this.asked = true;
+    else if (!this.scheduled) {
+      this.scheduled = true;
       this.soon.port2.postMessage(null);
     }
   }
@@ -122,7 +125,7 @@ export class Stage {
   }
 
   private paint() {
-    this.asked = false;
+    this.scheduled = false;
     const whole = this.host.getBoundingClientRect();
     if (this.host.dataset.failed || whole.width < 2 || whole.height < 2) return void delete this.host.dataset.busy;
     const frames: Frame[] = [];
@@ -131,13 +134,21 @@ export class Stage {
       if (box.width < 2 || box.height < 2) continue;
       const look = view.orbit.look(box.width / box.height);
       view.placeMarkers(look, box.width, box.height);
-      if (view.content) frames.push({ model: view.content.id, left: box.left - whole.left, top: box.top - whole.top, width: box.width, height: box.height, look });
+      if (view.content)
+        frames.push({
+          model: view.content.id,
+          left: box.left - whole.left,
+          top: box.top - whole.top,
+          width: box.width,
+          height: box.height,
+          look,
+        });
     }
     this.drawing = true;
     order({ op: 'draw', width: whole.width, height: whole.height, frames });
   }
 
-  /** The event and the mark are for those who measure and take pictures; nothing else depends on them. */
+  /** Tests use the event and data-busy to measure and to take pictures; nothing else depends on them. */
   private drawn() {
     this.drawing = false;
     this.host.dispatchEvent(new Event('drawn'));
@@ -147,7 +158,7 @@ export class Stage {
   }
 }
 
-/** Mouse, touch, wheel and keys of one view. */
+/** Handles mouse, touch, wheel and keys of one view. */
 function listen(view: View, stage: Stage) {
   const { element } = view;
   const fingers = new Map<number, { x: number; y: number }>();
@@ -183,7 +194,8 @@ function listen(view: View, stage: Stage) {
   });
   const end = (event: PointerEvent) => {
     if (!fingers.delete(event.pointerId)) return;
-    if (event.type === 'pointerup' && start && !start.moved && event.button === 0) view.onPick?.(view.rayAt(event.clientX, event.clientY));
+    if (event.type === 'pointerup' && start && !start.moved && event.button === 0)
+      view.onPick?.(view.rayAt(event.clientX, event.clientY));
     start = null;
   };
   element.addEventListener('pointerup', end);
@@ -201,11 +213,11 @@ function listen(view: View, stage: Stage) {
   element.addEventListener('keydown', (event) => {
     if (event.target !== element || event.ctrlKey || event.metaKey || event.altKey) return;
     const { orbit } = view;
-    const turn = 0.12;
-    if (event.key === 'ArrowLeft') orbit.rotate(-turn, 0);
-    else if (event.key === 'ArrowRight') orbit.rotate(turn, 0);
-    else if (event.key === 'ArrowUp') orbit.rotate(0, -turn);
-    else if (event.key === 'ArrowDown') orbit.rotate(0, turn);
+    const step = 0.12;
+    if (event.key === 'ArrowLeft') orbit.rotate(-step, 0);
+    else if (event.key === 'ArrowRight') orbit.rotate(step, 0);
+    else if (event.key === 'ArrowUp') orbit.rotate(0, -step);
+    else if (event.key === 'ArrowDown') orbit.rotate(0, step);
     else if (event.key === '+' || event.key === '=') orbit.zoom(0.88);
     else if (event.key === '-') orbit.zoom(1.14);
     else if (event.key === '0') orbit.reset();

@@ -1,14 +1,14 @@
 /**
- * How surfaces are shaded: one painted studio light over the normals, tinted, with colours from data on request. Morph
- * targets are plain vertex attributes, for those few that have a weight; meshes of many small triangles are lit at
- * their vertices, which looks the same there and costs less than the loaders' standard materials.
+ * The materials of surfaces: one studio light computed from the normals, times a tint or colours from data. The few
+ * morph targets that have a weight are plain vertex attributes. Meshes of many small triangles are lit at their
+ * vertices, which looks the same and costs less than the loaders' standard materials.
  */
 import { DataTexture, GLSL3, LinearFilter, RGBAFormat, ShaderMaterial, SRGBColorSpace } from 'three';
 import { linear, RAMPS, type Paint } from './colors';
 
-/** As many targets can have a weight at once: two attributes each, beside the surface's own three. */
+/** How many targets can have a weight at once. Each takes two attributes; the surface itself takes three. */
 export const SLOTS = 6;
-/** From so many triangles on they are smaller than a few pixels. */
+/** From this number on, triangles are smaller than a few pixels. */
 export const DENSE = 60_000;
 
 const textures = new Map<string, DataTexture>();
@@ -31,7 +31,7 @@ function rampTexture(name: keyof typeof RAMPS): DataTexture {
   return texture;
 }
 
-/** Soft key light from the upper left, a cool fill, a rim, a small highlight: linear light by the normal as seen. */
+/** Linear light by the normal in view space: a soft key light from the upper left, a cool fill, a rim, a highlight. */
 const LIGHT = `
 vec3 light(vec3 n) {
   float key = max(0.0, dot(n, vec3(-0.4240, 0.7067, 0.5654)) * 0.72 + 0.28);
@@ -45,7 +45,7 @@ vec3 light(vec3 n) {
   return c * (0.8 + 0.2 * c);
 }`;
 
-/** From linear light to the screen's: a fit of the sRGB curve by square roots. */
+/** Converts linear light to sRGB by a fit of its curve with square roots. */
 const SHOWN = `
 vec3 shown(vec3 c) {
   vec3 s1 = sqrt(c);
@@ -54,9 +54,14 @@ vec3 shown(vec3 c) {
 }`;
 
 const morph = (slots: number, normals: boolean) =>
-  Array.from({ length: slots }, (_, i) => `p += weight[${i}] * move${i};${normals ? ` n += weight[${i}] * turn${i};` : ''}`).join(' ');
+  Array.from(
+    { length: slots },
+    (_, i) => `p += weight[${i}] * targetPosition${i};${normals ? ` n += weight[${i}] * targetNormal${i};` : ''}`,
+  ).join(' ');
 const declared = (slots: number, normals: boolean) =>
-  slots ? `uniform float weight[${slots}]; ${Array.from({ length: slots }, (_, i) => `in vec3 move${i};${normals ? ` in vec3 turn${i};` : ''}`).join(' ')}` : '';
+  slots
+    ? `uniform float weight[${slots}]; ${Array.from({ length: slots }, (_, i) => `in vec3 targetPosition${i};${normals ? ` in vec3 targetNormal${i};` : ''}`).join(' ')}`
+    : '';
 
 const COLOR: Record<Paint['kind'], string> = {
   plain: 'vec3 c = base;',
@@ -77,8 +82,16 @@ const COLOR: Record<Paint['kind'], string> = {
 
 export function surfaceMaterial(paint: Paint, slots: number, dense: boolean): ShaderMaterial {
   const tone = paint.kind === 'direction' || paint.kind === 'checker';
-  const carry = paint.kind === 'value' ? ['in float value; out float vValue;', 'vValue = value;', 'in float vValue; uniform sampler2D ramp; uniform vec2 rampRange; uniform bool rampLog;']
-    : tone ? ['in vec3 tone; out vec3 vTone;', 'vTone = tone;', 'in vec3 vTone;'] : ['', '', ''];
+  const carry =
+    paint.kind === 'value'
+      ? [
+          'in float value; out float vValue;',
+          'vValue = value;',
+          'in float vValue; uniform sampler2D ramp; uniform vec2 rampRange; uniform bool rampLog;',
+        ]
+      : tone
+        ? ['in vec3 tone; out vec3 vTone;', 'vTone = tone;', 'in vec3 vTone;']
+        : ['', '', ''];
   const made = new ShaderMaterial({
     glslVersion: GLSL3,
     vertexShader: `${declared(slots, true)} ${carry[0]} out vec3 vLit; ${dense ? LIGHT : ''}
@@ -95,7 +108,10 @@ export function surfaceMaterial(paint: Paint, slots: number, dense: boolean): Sh
         ${COLOR[paint.kind]}
         color = vec4(shown(c * ${dense ? 'vLit' : 'light(normalize(vLit))'}), 1.0);
       }`,
-    uniforms: { base: { value: paint.kind === 'plain' ? linear(paint.color) : [1, 1, 1] }, weight: { value: new Array<number>(slots).fill(0) } },
+    uniforms: {
+      base: { value: paint.kind === 'plain' ? linear(paint.color) : [1, 1, 1] },
+      weight: { value: new Array<number>(slots).fill(0) },
+    },
     polygonOffset: true,
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
@@ -119,8 +135,13 @@ export function wireMaterial(slots: number): ShaderMaterial {
         ${morph(slots, false)}
         gl_Position = projectionMatrix * modelViewMatrix * vec4(p, 1.0);
       }`,
-    fragmentShader: 'uniform vec3 base; uniform float strength; out vec4 color; void main() { color = vec4(base, strength); }',
-    uniforms: { base: { value: [0, 0, 0] }, strength: { value: 0.42 }, weight: { value: new Array<number>(slots).fill(0) } },
+    fragmentShader:
+      'uniform vec3 base; uniform float strength; out vec4 color; void main() { color = vec4(base, strength); }',
+    uniforms: {
+      base: { value: [0, 0, 0] },
+      strength: { value: 0.42 },
+      weight: { value: new Array<number>(slots).fill(0) },
+    },
     transparent: true,
   });
 }
