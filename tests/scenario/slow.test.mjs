@@ -151,7 +151,7 @@ test('an address has so many requests and connections', async (t) => {
     const late = connect(d, t);
     late.socket.write('GET /v1/meshes HTTP/1.1\r\nHost: x\r\n\r\n');
     await Promise.race([late.ended, sleep(2000)]); // answered: it came before some of the many were seen
-    return late.closed && /^HTTP\/1\.1 429 [\s\S]*more than 20 connections/.test(late.text);
+    return late.closed && /^HTTP\/1\.1 429 [\s\S]*more than 20 open connections/.test(late.text);
   }, 'refused and closed');
   const alive = connect(d, t);
   alive.socket.write('GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n');
