@@ -4,9 +4,6 @@
  * whatever lies beside them, so the process is never larger than what is in use; they come zeroed; and from the size of
  * a huge page on they are aligned to one and ask for huge pages, which saves most page faults and TLB misses. The
  * sanitizers keep malloc(), which they watch. */
-#include <errno.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #if defined(__linux__)
@@ -14,7 +11,7 @@
 #endif
 
 #include "base/check.h"
-#include "base/context.h"
+#include "base/state.h"
 
 #if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define ORB_MAPS 1
@@ -226,62 +223,4 @@ size_t orb_memory_used(const orb_context *ctx) {
 }
 size_t orb_memory_peak(const orb_context *ctx) {
   return atomic_load(&ctx->memory_peak);
-}
-
-static orb_status buffer_reserve(orb_context *ctx, orb_buffer *buffer, size_t more) {
-  size_t max = buffer->max ? buffer->max : (size_t)UINT32_MAX;
-  if (more > max || buffer->size > max - more) {
-    return orb_fail(ctx, ORB_E_TOO_LARGE, "A result would be larger than %zu bytes.", max);
-  }
-  size_t need = buffer->size + more;
-  if (need <= buffer->capacity) {
-    return ORB_OK;
-  }
-  size_t capacity = buffer->capacity < 4096 ? 4096 : buffer->capacity + buffer->capacity / 2;
-  if (capacity < need) {
-    capacity = need;
-  }
-  if (capacity > max) {
-    capacity = max;
-  }
-  unsigned char *data = orb_realloc(ctx, buffer->data, capacity, 1);
-  if (!data) {
-    return ORB_E_NO_MEMORY;
-  }
-  buffer->data = data;
-  buffer->capacity = capacity;
-  return ORB_OK;
-}
-
-orb_status orb_buffer_append(orb_context *ctx, orb_buffer *buffer, const void *bytes, size_t size) {
-  ORB_TRY(buffer_reserve(ctx, buffer, size));
-  if (size) {
-    memcpy(buffer->data + buffer->size, bytes, size);
-  }
-  buffer->size += size;
-  return ORB_OK;
-}
-
-orb_status orb_buffer_printf(orb_context *ctx, orb_buffer *buffer, const char *format, ...) {
-  va_list args, again;
-  va_start(args, format);
-  va_copy(again, args);
-  int length = vsnprintf(NULL, 0, format, args);
-  va_end(args);
-  orb_status status = ORB_E_INTERNAL;
-  if (length >= 0) {
-    status = buffer_reserve(ctx, buffer, (size_t)length + 1);
-    if (status == ORB_OK) {
-      vsnprintf((char *)buffer->data + buffer->size, (size_t)length + 1, format, again);
-      buffer->size += (size_t)length;
-    }
-  }
-  va_end(again);
-  return status;
-}
-
-void orb_buffer_free(orb_context *ctx, orb_buffer *buffer) {
-  orb_free(ctx, buffer->data);
-  buffer->data = NULL;
-  buffer->size = buffer->capacity = 0;
 }

@@ -7,12 +7,13 @@
  * to enter (the machine is busy) holds nobody up. Workers spin for a short while between loops, then sleep on a
  * condition variable. Threads that cannot be started are done without: results do not depend on how many there are.
  */
-#include <sched.h>
+#include "base/parallel.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/check.h"
-#include "base/context.h"
+#include "base/state.h"
 
 enum { MAX_WORKERS = 63, SPINS = 1000 };
 
@@ -34,7 +35,7 @@ struct orb_pool {
   } worker[MAX_WORKERS];
 };
 
-static void take_chunks(orb_pool *pool, int thread) {
+static void take_chunks(struct orb_pool *pool, int thread) {
   int64_t begin;
   while ((begin = atomic_fetch_add_explicit(&pool->next, pool->grain, memory_order_relaxed)) < pool->count) {
     int64_t end = begin + pool->grain < pool->count ? begin + pool->grain : pool->count;
@@ -52,7 +53,7 @@ static void pause_cpu(void) {
 
 static void *worker_main(void *argument) {
   struct worker *self = argument;
-  orb_pool *pool = self->ctx->pool;
+  struct orb_pool *pool = self->ctx->pool;
   unsigned seen = 0;
   for (;;) {
     for (int spin = 0; spin < SPINS && atomic_load_explicit(&pool->round, memory_order_acquire) == seen; spin++) {
@@ -82,8 +83,8 @@ static void *worker_main(void *argument) {
   }
 }
 
-static orb_pool *pool_start(orb_context *ctx) {
-  orb_pool *pool = orb_calloc(ctx, 1, sizeof *pool);
+static struct orb_pool *pool_start(orb_context *ctx) {
+  struct orb_pool *pool = orb_calloc(ctx, 1, sizeof *pool);
   if (!pool) {
     orb_error_clear(ctx); /* the loop runs in the caller alone */
     return NULL;
@@ -104,7 +105,7 @@ static orb_pool *pool_start(orb_context *ctx) {
 }
 
 void orb_pool_stop(orb_context *ctx) {
-  orb_pool *pool = ctx->pool;
+  struct orb_pool *pool = ctx->pool;
   if (!pool) {
     return;
   }
@@ -130,7 +131,7 @@ static void run_alone(int64_t count, int64_t grain, orb_loop_fn body, void *arg)
 
 void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
   ORB_ASSERT(grain >= 1);
-  orb_pool *pool = ctx->pool;
+  struct orb_pool *pool = ctx->pool;
   if (count <= grain || ctx->options.threads == 1 || (!pool && !(pool = pool_start(ctx))) || pool->workers == 0) {
     run_alone(count, grain, body, arg);
     return;

@@ -1,13 +1,14 @@
-/* One half-edge collapse on the surface, its record, and its exact undoing.
+/* The areas that a collapse carries, and the links that it and its undo change.
  *
  * Vertex v goes into u, its neighbour next to corner `first`. Of the k triangles of v's star the first and the last
  * (those at the edge vu) vanish, in the others u takes the place of v. Carried areas: the star's whole target area goes
  * to the k − 2 triangles that are left, in proportion to their new areas plus a floor, so that a limb keeps its room on
  * the sphere on every coarse level. */
+#include "embed/collapse.h"
+
 #include <math.h>
 
 #include "base/check.h"
-#include "embed/multires.h"
 
 static const float CARRY_FLOOR = 0.1F; /* of the mean new area, so that no triangle gets nothing */
 

@@ -9,11 +9,13 @@
  * round is undone. A collapse keeps the link condition: its edge's ends have just two common neighbours. On a sphere of
  * more than four vertices some vertex of valence at most five always has such an edge, so the end is always reached.
  */
+#include "embed/decimate.h"
+
 #include <math.h>
 
 #include "base/check.h"
 #include "base/loops.h"
-#include "embed/kernels.h"
+#include "embed/collapse.h"
 #include "embed/multires.h"
 
 enum {
@@ -33,7 +35,7 @@ typedef struct ring {
 typedef struct decimation {
   orb_context *ctx;
   orb_hierarchy *h;
-  const orb_kernels *kernels;
+  const orb_vector_loops *loops;
   const unsigned char *keep; /* flags in surface numbers, or NULL */
   int32_t keep_until;
   float *cost;
@@ -231,7 +233,7 @@ static void evaluate(void *arg, int64_t begin, int64_t end, int thread) {
                       .threshold = d->threshold,
                       .cost = d->cost,
                       .target = d->target};
-  d->kernels->costs(&job, begin, end);
+  d->loops->costs(&job, begin, end);
 }
 
 static orb_status begin_round(decimation *d) {
@@ -321,7 +323,7 @@ static orb_status allocate(decimation *d) {
 }
 
 orb_status orb_decimate(orb_context *ctx, orb_hierarchy *h, const unsigned char *keep, int32_t keep_until) {
-  decimation d = {.ctx = ctx, .h = h, .kernels = h->kernels, .keep = keep, .keep_until = keep_until};
+  decimation d = {.ctx = ctx, .h = h, .loops = h->loops, .keep = keep, .keep_until = keep_until};
   double full = log((double)h->surface.vertex_count / 4) + 1e-9;
   orb_status status;
   ORB_GO(status, allocate(&d), done);

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "base/check.h"
-#include "embed/kernel_sampling.h"
+#include "embed/kernel_sampling/kernel_sampling.h"
 #include "embed/newton.h"
 
 void orb_embed_defaults(orb_embed_options *options) {

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "base/check.h"
-#include "embed/star.h"
+#include "numeric/frame.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 

@@ -4,6 +4,7 @@
 
 #include "base/check.h"
 #include "embed/kernel.h"
+#include "numeric/frame.h"
 #include "numeric/vec3.h"
 
 enum { FIELDS = 13, TRIES = 8 };
@@ -14,7 +15,7 @@ static const double FLAT = 1e-6;       /* least 4·area over the sum of squared 
 static const double EIGEN_FLOOR = .05; /* least over greatest eigenvalue of the Hessian */
 static const double EDGE_SHARE = 0.8;  /* a step goes at most so far to the nearest plane */
 
-orb_status orb_star_reserve(orb_context *ctx, orb_star *star, int32_t count) {
+static orb_status reserve(orb_context *ctx, orb_star *star, int32_t count) {
   if (count <= star->capacity) {
     return ORB_OK;
   }
@@ -43,7 +44,7 @@ void orb_star_free(orb_context *ctx, orb_star *star) {
 }
 
 orb_status orb_star_walk(orb_context *ctx, orb_star *star, const orb_corner_table *s, int32_t v, const double *point) {
-  ORB_TRY(orb_star_reserve(ctx, star, s->valence[v]));
+  ORB_TRY(reserve(ctx, star, s->valence[v]));
   int32_t start = s->vertex_corner[v], c = start, k = 0;
   do {
     int32_t u = s->corner[orb_corner_next(c)];
@@ -86,16 +87,6 @@ void orb_star_shape(orb_star *star, const orb_corner_table *s, int32_t v, double
     star->area += area;
     star->a2[i] = area * area;
   }
-}
-
-void orb_tangent_frame(const double p[3], double e1[3], double e2[3]) {
-  double s = copysign(1, p[2]), a = -1 / (s + p[2]), b = p[0] * p[1] * a;
-  e1[0] = 1 + s * p[0] * p[0] * a;
-  e1[1] = s * b;
-  e1[2] = -s * p[0];
-  e2[0] = b;
-  e2[1] = s + p[1] * p[1] * a;
-  e2[2] = -p[1];
 }
 
 /* The ring in the frame of p. */

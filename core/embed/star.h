@@ -22,7 +22,6 @@ typedef struct orb_star {
   double *block;
 } orb_star;
 
-ORB_MUST_CHECK orb_status orb_star_reserve(orb_context *ctx, orb_star *star, int32_t count);
 void orb_star_free(orb_context *ctx, orb_star *star);
 
 /* Walks the ring of v from its vertex_corner on; point holds 4 a vertex. */
@@ -38,8 +37,5 @@ void orb_shape_cotangents(const orb_corner_table *s, int32_t a, int32_t b, int32
 /* Moves p by at most one damped Newton step that lowers the energy and keeps every triangle exactly positive. Returns
  * the energy after, *before the one before; both infinite where p lies too near the edge of the kernel to tell. */
 double orb_star_newton(orb_star *star, double weight, double p[3], double *before);
-
-/* An orthonormal frame of the tangent plane at a unit vector (Duff et al. 2017). */
-void orb_tangent_frame(const double p[3], double e1[3], double e2[3]);
 
 #endif

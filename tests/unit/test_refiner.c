@@ -9,9 +9,10 @@
 
 #include <cmocka.h>
 
-#include "embed/hierarchy.h"
+#include "embed/advance.h"
 #include "embed/kernel.h"
-#include "embed/multires.h"
+#include "embed/resume.h"
+#include "embed/vector/loops.h"
 #include "support_context.h"
 #include "support_exact.h"
 #include "support_shapes.h"
@@ -173,7 +174,7 @@ static void test_kernels(void **unused) {
     assert_int_equal(
         orb_distortion_measure(ctx, mesh.positions, points, mesh.triangles, mesh.triangle_count, &distortion), ORB_OK);
     double mean = distortion.symmetric_dirichlet.mean;
-    print_message("%s: %.6f\n", orb_kernels_of(cpu)->name, mean);
+    print_message("%s: %.6f\n", orb_vector_loops_of(cpu)->name, mean);
     first = cpu == ORB_CPU_PLAIN ? mean : first;
     assert_true(fabs(mean - first) < 0.05 * first);
   }

@@ -93,12 +93,6 @@ ORB_MUST_CHECK orb_status orb_embed(orb_context *ctx, const orb_mesh *mesh, cons
                                     orb_embedding *out);
 void orb_embedding_free(orb_context *ctx, orb_embedding *embedding);
 
-/* Stored form: header, points, certificate, distortion, timings, checksum. Decoding certifies again against the
- * mesh; any truncation or change is ORB_E_CORRUPT. */
-ORB_MUST_CHECK orb_status orb_embedding_encode(orb_context *ctx, const orb_embedding *embedding, orb_buffer *out);
-ORB_MUST_CHECK orb_status orb_embedding_decode(orb_context *ctx, const unsigned char *bytes, size_t size,
-                                               const orb_mesh *mesh, orb_embedding *out);
-
 #ifdef __cplusplus
 }
 #endif
