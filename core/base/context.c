@@ -11,8 +11,11 @@
 #include "base/parallel.h"
 #include "base/state.h"
 
-enum { CONTEXT_MAGIC = 0x0eb3c07e, MAX_THREADS = 64 };
-static const int64_t DEFAULT_MAX_TRIANGLES = 5000000;
+enum {
+  CONTEXT_MAGIC = 0x0eb3c07e, /* tells a context from any other pointer */
+  MAX_THREADS = 64            /* of a context, as its header says */
+};
+static const int64_t DEFAULT_MAX_TRIANGLES = 5000000; /* as its header says */
 
 double orb_clock(void) {
   struct timespec now;
@@ -86,7 +89,7 @@ orb_status orb_context_check(orb_context *ctx) {
     return orb_fail(ctx, ORB_E_CANCELLED, "The job was cancelled.");
   }
   if (ctx->options.deadline_ms && orb_clock_ms() > ctx->options.deadline_ms) {
-    return orb_fail(ctx, ORB_E_TIMEOUT, "The job ran out of its time; raise the limit or send a smaller mesh.");
+    return orb_fail(ctx, ORB_E_TIMEOUT, "The job exceeded its time limit; raise the limit or send a smaller mesh.");
   }
   return ORB_OK;
 }

@@ -29,7 +29,7 @@ static void sweep_batches(void *arg, int64_t begin, int64_t end, int thread) {
   loop->level->loops->sweep(&loop->job, loop->start + begin, loop->start + end);
 }
 
-/* What the vector sweep left over. */
+/* Relaxes the vertices that the vector sweep left over. */
 static orb_status relax_left_over(orb_context *ctx, orb_refiner *r, int32_t begin, int32_t end, double blend) {
   const orb_level *level = &r->level;
   for (int32_t b = begin; b < end; b++) {
@@ -44,8 +44,8 @@ static orb_status relax_left_over(orb_context *ctx, orb_refiner *r, int32_t begi
   return ORB_OK;
 }
 
-/* One sweep; *energy before it (the stars hold each triangle three times), *fall by it. Sums are taken in the order of
- * batches. */
+/* One sweep; *energy: of the level before it (each triangle lies in three stars), *fall: by how much it fell. Sums are
+ * taken in the order of batches. */
 static orb_status sweep_once(orb_context *ctx, orb_refiner *r, double relax, double *energy, double *fall) {
   orb_level *level = &r->level;
   double blend = blend_of(r);
@@ -101,8 +101,8 @@ orb_status orb_refiner_sweep(orb_context *ctx, orb_refiner *r, int32_t sweeps, d
   return ORB_OK;
 }
 
-/* The sweeps of a level that has just been reached: many on coarse ones, where they cost nothing and decide most. A
- * sweep ends the level early when it gains almost nothing; more are added while each still gains much. */
+/* Sweeps a level that has just been reached: often if it is coarse, where sweeps are cheap and decide most. A sweep
+ * that gains almost nothing ends the level; sweeps are added while each still gains much. */
 static orb_status settle_level(orb_context *ctx, orb_refiner *r) {
   const orb_newton_settings *set = &r->settings;
   int32_t n = r->hierarchy->surface.vertex_count;
@@ -125,7 +125,7 @@ static orb_status settle_level(orb_context *ctx, orb_refiner *r) {
   return ORB_OK;
 }
 
-/* All collapses are undone for good. */
+/* Frees what only collapses need, once all are undone for good. */
 static void drop_collapses(orb_context *ctx, orb_refiner *r) {
   orb_hierarchy *h = r->hierarchy;
   orb_free(ctx, h->log);

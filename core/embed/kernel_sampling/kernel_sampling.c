@@ -1,4 +1,9 @@
-/* The driver: simplify, base mesh, insertion, intermittent optimisation (Algorithm 1). */
+/* The driver: simplify, base mesh, insertion, intermittent optimisation (Algorithm 1).
+ *
+ * Reading order of the folder: kernel_sampling.h (what differs from the paper and why), this file, mesh (the
+ * progressive mesh), simplify (section 4), sample (Eq. 2 and 3 in double precision), search (the same in floats, for
+ * speed).
+ */
 #include "embed/kernel_sampling/kernel_sampling.h"
 
 #include <math.h>
@@ -11,9 +16,16 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { MAX_RELIEF = 8, LOOSEN_RINGS = 2, MAX_ATTEMPTS = 3, POLE = 100 };
-/* A new vertex whose ring has less than the share `tight` of the area that it stands for has its surroundings loosened
- * by so many sweeps. The first effort serves but for meshes made to break it. */
+enum {
+  MAX_RELIEF = 8, /* times that the surroundings of a kernel too narrow for doubles are optimised, each time wider */
+  RELIEF_SWEEPS = 20, /* over these surroundings */
+  LOOSEN_RINGS = 2,   /* around a new vertex in a dense region */
+  MAX_ATTEMPTS = 3,   /* of the whole, with growing effort; only meshes made to break the method need more than one */
+  POLE = 100          /* valence of one */
+};
+
+/* The surroundings of a new vertex get so many sweeps if its ring has less than the share `tight` of the area that it
+ * stands for. */
 static const struct effort {
   double tight;
   int32_t sweeps;
@@ -27,19 +39,19 @@ typedef struct orb_ks_run {
   orb_ks_mesh m;
   orb_ks_sampler sampler;
   orb_kernel_room kernel_room;
-  double *x;            /* positions, total area 4π */
-  double *P;            /* the result: 3 a vertex */
-  double *displacement; /* of each vertex in the present iteration, neighbours' sum of the last */
-  int32_t *active, *next, active_count, next_count;
+  double *x;                                        /* positions, total area 4π */
+  double *P;                                        /* the result: 3 a vertex */
+  double *displacement;                             /* of each active vertex in the present iteration */
+  int32_t *active, *next, active_count, next_count; /* vertices of this iteration, and of the next one */
   int32_t *stamp, stamp_value;
-  int32_t *recent, recent_count;
+  int32_t *recent, recent_count; /* inserted since the last optimisation */
   int64_t iterations_sum, kernel_points_sum;
-  int64_t unchecked; /* candidates evaluated since the last look for a cancel */
+  int64_t unchecked; /* candidates evaluated since the last check for cancellation */
   orb_ks_report report;
 } orb_ks_run;
 
-/* Candidates between two looks for a cancel: some milliseconds of work, however fine the steps of Eq. 2 are and however
- * large the rings. */
+/* Candidates between two checks for cancellation: a few milliseconds of work, however fine the steps of Eq. 2 are and
+ * however large the rings. */
 static const int64_t CHECK_AFTER = 40000;
 
 static orb_status check_after(orb_ks_run *run, int32_t v) {
@@ -51,7 +63,7 @@ static orb_status check_after(orb_ks_run *run, int32_t v) {
   return orb_context_check(run->ctx);
 }
 
-/* Scales the mesh to area 4π about its centre. A mesh without area gets unit coordinates as they are. */
+/* Scales the mesh to area 4π around its centre. A mesh without area is scaled to a diagonal of 1. */
 static orb_status normalize(orb_ks_run *run, const orb_mesh *mesh) {
   orb_extent extent;
   orb_mesh_extent(mesh, &extent);
@@ -70,7 +82,7 @@ static orb_status normalize(orb_ks_run *run, const orb_mesh *mesh) {
   return ORB_OK;
 }
 
-/* Section 5: rays from the centroid of the tetrahedron through its vertices; a regular one where that folds. */
+/* Section 5: rays from the centroid of the tetrahedron through its vertices; a regular one where that flips a face. */
 static void place_base(orb_ks_run *run) {
   const orb_ks_mesh *m = &run->m;
   int32_t v[4], found = 0;
@@ -111,7 +123,7 @@ static void place_base(orb_ks_run *run) {
   }
 }
 
-/* Moves v to its best sample if that is better than where it is; returns by how far. */
+/* Moves v to its best sample if that is better than where it is; *moved: by how far. */
 static orb_status reposition(orb_ks_run *run, int32_t v, double *moved) {
   double *p = run->P + 3 * (size_t)v, best[3], error;
   ORB_TRY(check_after(run, v));
@@ -141,8 +153,8 @@ static void enlist(orb_ks_run *run, int32_t v) {
   }
 }
 
-/* Around a new vertex a pole's ring is not followed outwards, as it would be most of the mesh for each vertex at it,
- * and the pole itself is left to the global optimisation, as its own ring costs most of all. */
+/* The rings around a new vertex do not grow across a pole, whose ring would be most of the mesh for each vertex at it.
+ * The pole itself is left to the global optimisation, as its own ring costs most of all. */
 static int is_pole(const orb_ks_run *run, int32_t v) {
   return run->m.valence[v] >= POLE;
 }
@@ -156,7 +168,7 @@ static void enlist_star(orb_ks_run *run, int32_t v) {
   } while (e != run->m.out[v]);
 }
 
-/* A vertex that sits out an iteration counts as unmoved in it. */
+/* A vertex that takes no part in an iteration counts as unmoved in it. */
 static void forget_displacements(orb_ks_run *run) {
   for (int32_t i = 0; i < run->active_count; i++) {
     run->displacement[run->active[i]] = 0;
@@ -164,7 +176,7 @@ static void forget_displacements(orb_ks_run *run) {
   run->active_count = 0;
 }
 
-/* Lines 4 and 11 to 13: those in `next`, by falling neighbour displacement. */
+/* Lines 4 and 11 to 13 of Algorithm 1: makes `next` active, ordered by falling displacement of the neighbours. */
 static orb_status rank_next(orb_ks_run *run, int first) {
   ranked *order = ORB_NEW(run->ctx, ranked, run->next_count);
   if (!order) {
@@ -190,7 +202,7 @@ static orb_status rank_next(orb_ks_run *run, int first) {
   return ORB_OK;
 }
 
-/* Algorithm 1, begun with the vertices inserted since the last time and their neighbours. */
+/* Algorithm 1, which starts with the recent vertices and their neighbours. */
 static orb_status optimize(orb_ks_run *run) {
   double start = orb_clock(), most = INFINITY;
   int32_t iteration = 0;
@@ -223,7 +235,7 @@ static orb_status optimize(orb_ks_run *run) {
   return ORB_OK;
 }
 
-/* Section 5.1 and 5.2: the best sample in the fan of the parent, or else the kernel's centroid. The ring begins with
+/* Sections 5.1 and 5.2: the best sample in the fan of the parent, or else the kernel's centroid. The ring begins with
  * the parent. */
 static orb_status place(orb_ks_run *run, int32_t v, int32_t parent, int *found) {
   orb_ks_sampler *s = &run->sampler;
@@ -239,7 +251,7 @@ static orb_status place(orb_ks_run *run, int32_t v, int32_t parent, int *found) 
   return ORB_OK;
 }
 
-/* Adds so many rings around the one vertex that is enlisted, and takes out the poles among them or leaves them in. */
+/* Enlists so many rings around the one vertex that is enlisted; poles among them are left out unless `poles`. */
 static void enlist_rings(orb_ks_run *run, int32_t rings, int poles) {
   for (int32_t r = 0; r < rings; r++) {
     for (int32_t i = 0, end = run->next_count; i < end; i++) {
@@ -256,7 +268,7 @@ static void enlist_rings(orb_ks_run *run, int32_t rings, int poles) {
   run->next_count = kept;
 }
 
-/* Opens a kernel that doubles cannot hold: the surroundings of the parent are optimised for area rather than shape. */
+/* Widens a kernel that doubles cannot hold: optimises the surroundings of the parent for area rather than shape. */
 static orb_status relieve(orb_ks_run *run, int32_t parent, int32_t rings) {
   double aspect_exponent = run->sampler.aspect_exponent;
   run->sampler.aspect_exponent = aspect_exponent < 1 ? aspect_exponent : 1;
@@ -265,7 +277,7 @@ static orb_status relieve(orb_ks_run *run, int32_t parent, int32_t rings) {
   enlist(run, parent);
   enlist_rings(run, rings, 1);
   orb_status status = ORB_OK;
-  for (int32_t sweep = 0; sweep < 20 && status == ORB_OK; sweep++) {
+  for (int32_t sweep = 0; sweep < RELIEF_SWEEPS && status == ORB_OK; sweep++) {
     for (int32_t i = 0; i < run->next_count && status == ORB_OK; i++) {
       double moved;
       status = reposition(run, run->next[i], &moved);
@@ -276,9 +288,8 @@ static orb_status relieve(orb_ks_run *run, int32_t parent, int32_t rings) {
   return status;
 }
 
-/* Sweeps over the rings around a new vertex in a dense region. Eq. 1 removes whole limbs one after another, so that
- * they come back one after another: long before the next global optimisation they would be squeezed by orders of
- * magnitude. */
+/* Sweeps over the rings around a new vertex in a dense region. Eq. 1 removes whole limbs one after another, so they
+ * come back one after another too, and are squeezed by orders of magnitude long before the next global optimisation. */
 static orb_status loosen(orb_ks_run *run, int32_t v) {
   run->stamp_value++;
   run->next_count = 0;

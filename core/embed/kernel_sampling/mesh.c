@@ -6,7 +6,7 @@
 #include "base/check.h"
 #include "numeric/vec3.h"
 
-/* Share of the mean below which the area of a triangle does not fall: Eq. 3 divides by it. */
+/* Least area of a triangle, as a share of the mean: Eq. 3 divides by it. */
 static const double AREA_FLOOR = 1e-2;
 
 void orb_ks_mesh_free(orb_context *ctx, orb_ks_mesh *m) {
@@ -94,7 +94,7 @@ static void pair_up(orb_ks_mesh *m, int32_t a, int32_t b) {
   m->twin[b] = a;
 }
 
-/* Puts by the areas of the star of h's origin; room grows by half. */
+/* Saves the areas of the star of h's origin; *total: their sum. */
 static orb_status save_areas(orb_context *ctx, orb_ks_mesh *m, int32_t h, double *total) {
   size_t count = (size_t)m->valence[m->tri[h]];
   if (m->saved_count + count > m->saved_capacity) {
@@ -116,8 +116,8 @@ static orb_status save_areas(orb_context *ctx, orb_ks_mesh *m, int32_t h, double
   return ORB_OK;
 }
 
-/* Gives `total` to the triangles of `count` half-edges from `first` on: half in proportion to their areas on the mesh,
- * half in equal parts, so that none is left with next to nothing. */
+/* Distributes `total` over the triangles of `count` half-edges from `first` on: half in proportion to their areas on
+ * the mesh, half in equal parts, so that each gets some. */
 static void share_area(orb_ks_mesh *m, int32_t first, int32_t count, double total) {
   double sum = 0;
   int32_t e = first;
@@ -175,7 +175,7 @@ int32_t orb_ks_split_last(orb_ks_mesh *m) {
   int32_t h = c.edge, v1 = c.vertex, v2 = orb_ks_head(m, h);
   int32_t first = m->twin[orb_prev(h)], last = orb_next(m->twin[h]), before = m->twin[last];
   int32_t r1 = m->tri[orb_prev(h)], rk = m->tri[before];
-  /* The dead triangles still point at their neighbours; let these point back. */
+  /* The dead triangles still point at their neighbours; make these point back. */
   m->twin[first] = orb_prev(h);
   m->twin[m->twin[orb_next(h)]] = orb_next(h);
   m->twin[before] = last;

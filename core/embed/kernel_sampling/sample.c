@@ -1,5 +1,4 @@
-/* Eq. 2, the clipping of section 5.1 and Eq. 3, over all candidates of a ring at once: the loops run over candidates so
- * that the compiler can use whatever vectors the processor has. */
+/* Loops run over the candidates of a ring, so that the compiler can use the widest vectors of the processor. */
 #include "embed/kernel_sampling/sample.h"
 
 #include <math.h>
@@ -9,12 +8,12 @@
 #include "numeric/clones.h"
 #include "numeric/vec3.h"
 
-enum { MAX_PAIRS = 20000 };
+enum { MAX_PAIRS = 20000 }; /* of (s, t); the smallest step, 0.01, makes fewer than 5,000 */
 
-/* A ring of less than this share of its area is squeezed: see kernel_sampling.h. */
+/* A ring with less than this share of its area is squeezed: see kernel_sampling.h. */
 static const double SQUEEZED = 1e-4;
 
-/* Share of the mean area below which a triangle's does not fall in the angle term, which divides by it. */
+/* Least area of a triangle in the angle term, which divides by it, as a share of the mean. */
 static const double AREA_FLOOR = 1e-2;
 
 orb_status orb_ks_sampler_create(orb_context *ctx, const orb_embed_options *options, orb_ks_sampler *out) {
@@ -147,10 +146,10 @@ orb_status orb_ks_ring_load(orb_context *ctx, orb_ks_sampler *s, const orb_ks_me
   return ORB_OK;
 }
 
-enum { LANES = 64 };
+enum { LANES = 64 }; /* candidates of a batch */
 
-/* x to the power e for each; whole and half powers by multiplication. Bit by bit over all lanes, so that each pass is a
- * plain vector loop. */
+/* Raises each x to the power e; whole and half powers up to 64 by multiplication, bit by bit over all lanes, so that
+ * each pass is a plain vector loop. */
 static inline __attribute__((always_inline)) void raise_each(double *x, int32_t count, double e) {
   double doubled = 2 * e, power[LANES];
   if (doubled != floor(doubled) || doubled < 0 || doubled > 128) {
@@ -198,7 +197,7 @@ static inline __attribute__((always_inline)) void measure_spokes(const double *q
   }
 }
 
-/* Adds the term of Eq. 3 of the ring triangle between spokes u and w; returns the least error so far. */
+/* Adds the term of Eq. 3 for the ring triangle between spokes u and w; returns the least error so far. */
 static inline __attribute__((always_inline)) double add_term(const orb_ks_ring *r, int32_t i, double area_exponent,
                                                              double aspect_exponent, const spokes *u, const spokes *w,
                                                              int32_t count, double *error) {
@@ -225,8 +224,7 @@ static inline __attribute__((always_inline)) double add_term(const orb_ks_ring *
   return least;
 }
 
-/* Eq. 3 for `count` ≤ LANES candidates. Its terms are positive: once all are above `bound` the sums are left as they
- * are. */
+/* Eq. 3 for `count` ≤ LANES candidates. Its terms are positive, so it stops once all sums are above `bound`. */
 ORB_CLONES static void measure_batch(const orb_ks_ring *r, double area_exponent, double aspect_exponent,
                                      const double *x, const double *y, const double *z, int32_t count, double bound,
                                      double *error) {
@@ -247,7 +245,7 @@ ORB_CLONES static void measure_batch(const orb_ks_ring *r, double area_exponent,
   }
 }
 
-/* The smallest distance of each candidate from the ring's planes, unscaled. */
+/* The smallest signed distance of each candidate to the ring's planes, unscaled. */
 ORB_CLONES static void clip(const orb_ks_ring *r, const double *x, const double *y, const double *z, int32_t count,
                             double *least) {
   for (int32_t l = 0; l < count; l++) {
@@ -262,7 +260,7 @@ ORB_CLONES static void clip(const orb_ks_ring *r, const double *x, const double 
   }
 }
 
-/* Points of Eq. 2 in the triangle (apex, i, i+1), drawn in towards the apex, on the sphere. */
+/* The points of Eq. 2 in the triangle (apex, q, w), pulled towards the apex by `draw`, on the sphere. */
 ORB_CLONES static void spread(const double (*pair)[2], int32_t pairs, double draw, const double *apex, const double *q,
                               const double *w, double *x, double *y, double *z) {
   double qx = draw * (q[0] - apex[0]), qy = draw * (q[1] - apex[1]), qz = draw * (q[2] - apex[2]);
@@ -277,6 +275,7 @@ ORB_CLONES static void spread(const double (*pair)[2], int32_t pairs, double dra
   }
 }
 
+/* x to the power e, whole powers up to 64 by multiplication. */
 static double raise(double x, double e) {
   if (e != floor(e) || e < 0 || e > 64) {
     return pow(x, e);
@@ -346,7 +345,7 @@ int orb_ks_best_sample(orb_ks_sampler *s, const double apex[3], int32_t first, i
       best_error = e[begin + l] < best_error ? e[begin + l] : best_error;
     }
   }
-  /* The best whose signs hold exactly; rounding lets almost every best one pass at once. */
+  /* The best candidate whose signs hold exactly: almost always the first one tried. */
   for (;;) {
     int32_t best = -1;
     double least = bound;

@@ -1,10 +1,10 @@
 /* Eq. 2, the clipping of section 5.1 and Eq. 3 in single precision, many candidates at a time.
  *
- * This is where the time of `kernel-sampling` goes. Three things make it fast. Coordinates are relative to the vertex
- * and divided by the ring's radius, so that floats hold them as well for small rings as for large ones. All terms of
- * Eq. 3 are positive, so a candidate is dropped as soon as its sum reaches the present error: high exponents drop
- * most of them after one or two triangles. And the sum is scaled so that the present error is 1: what overflows is
- * worse than the present place and what underflows does not count.
+ * `kernel-sampling` spends most of its time here. Three things make it fast. Coordinates are relative to the vertex and
+ * divided by the ring's radius, so that floats serve small rings as well as large ones. All terms of Eq. 3 are
+ * positive, so a candidate is dropped as soon as its sum reaches the present error: high exponents drop most of them
+ * after one or two triangles. And the sum is scaled so that the present error is 1: what overflows is worse than the
+ * present point, and what underflows does not count.
  *
  * The winner is measured again in double precision, and its signs are decided exactly. Loops run over candidates; the
  * same source is compiled for several vector widths, without contraction, so that all give the same bits.
@@ -24,7 +24,7 @@ enum { LANES = KS_LANES };
 
 #define KS_INLINE static inline __attribute__((always_inline))
 
-/* Where the scale of the sum goes: the factor of Eq. 3 that has an exponent to take its root by. */
+/* The scale of the sum, as factors of the terms of Eq. 3: its root goes into a term with an exponent of 1 or more. */
 typedef struct scaling {
   float angle, area, shape;
 } scaling;
@@ -59,7 +59,7 @@ static orb_ks_edge edge_of(const orb_ks_ring *r, int32_t i, const double apex[3]
   e.kb = (float)(0.5 * (mp - mq + mr)) * c.angle;
   e.kc = (float)(0.5 * (mp + mq - mr)) * c.angle;
   double kappa = 0.5 * r->inverse_area[i] / (inv_radius * inv_radius);
-  e.kappa = (float)(kappa)*c.area;
+  e.kappa = (float)kappa * c.area;
   e.inv_kappa = (float)(1 / kappa) * c.area;
   return e;
 }
@@ -88,7 +88,7 @@ static int32_t keep_below_plain(float limit, float *x, float *y, float *z, float
     y[kept] = y[l];
     z[kept] = z[l];
     key[kept] = e;
-    kept += e < limit; /* not where it is no number */
+    kept += e < limit; /* false for NaN */
   }
   return kept;
 }
@@ -128,7 +128,7 @@ KS_INLINE int32_t keep_below(orb_cpu cpu, float limit, float *x, float *y, float
   return keep_below_plain(limit, x, y, z, key, count);
 }
 
-/* Measures how far each candidate lies beyond the nearest plane of an edge: negative inside. */
+/* Measures how far each candidate lies outside the ring: the greatest distance beyond a plane, negative inside. */
 KS_INLINE void measure_depth(const orb_ks_edge *edge, int32_t edges, const float *restrict x, const float *restrict y,
                              const float *restrict z, float *restrict beyond, int32_t count) {
   for (int32_t l = 0; l < count; l++) {
@@ -143,13 +143,13 @@ KS_INLINE void measure_depth(const orb_ks_edge *edge, int32_t edges, const float
   }
 }
 
-/* x to the power e, where kind is e if straight code is known for it. */
+/* x to the power `kind`: 1, 3 or 12. */
 KS_INLINE float power(float x, int kind) {
   float x3 = x * x * x, x6 = x3 * x3;
   return kind == 1 ? x : kind == 3 ? x3 : x6 * x6;
 }
 
-/* x to the power e for each; whole and half powers up to 64 by multiplication, bit by bit over all lanes. */
+/* Raises each x to the power e; whole and half powers up to 64 by multiplication, bit by bit over all lanes. */
 KS_INLINE void raise_each(float *restrict x, float e) {
   float doubled = 2 * e, power[LANES];
   if (doubled != floorf(doubled) || doubled < 0 || doubled > 128) {
@@ -190,7 +190,7 @@ KS_INLINE void measure(const orb_ks_edge *e, float quarter, float x, float y, fl
   *angle = (e->k0 + e->kb * b2 + e->kc * c2) * inv;
 }
 
-/* Adds the term of one ring triangle, the exponents being 1, 3 or 12. */
+/* Adds the term of one ring triangle for exponents of 1, 3 or 12. */
 KS_INLINE void add_term(const orb_ks_edge *edge, int area_kind, int shape_kind, float shape_scale,
                         const float *restrict x, const float *restrict y, const float *restrict z, int32_t count,
                         float *restrict error) {
@@ -230,7 +230,7 @@ typedef struct search {
   int32_t inside, best;
 } search;
 
-/* Loops run over whole vectors; what lies behind the last candidate is computed and not looked at. */
+/* Loops run over whole vectors; what lies behind the last candidate is computed and ignored. */
 KS_INLINE int32_t padded(int32_t count) {
   return (count + LANES - 1) / LANES * LANES;
 }

@@ -1,14 +1,12 @@
-/* Simplification of `kernel-sampling`: section 4 of Peng & Timalsena 2016.
- *
- * Every live vertex v1 keeps its cheapest collapse v1→v2 in an indexed heap. Eq. 1 is the product of a factor that
+/* An indexed heap holds every live vertex v1 by its cheapest collapse v1→v2. Eq. 1 is the product of a factor that
  * falls with the Gaussian curvature at v1 (so that limbs go first and coarse meshes are round) and the aspect ratios of
- * the triangles around v2 after the collapse. For large meshes quadric errors (Garland & Heckbert 1997) lead down to
- * qem_until vertices first (section 9.2).
+ * the triangles around v2 after the collapse. Large meshes are first reduced to qem_until vertices by quadric errors
+ * (Garland & Heckbert 1997; section 9.2).
  *
- * Where the paper leaves a gap: 1/(1 + K) depends on scale and blows up, then turns negative, as K nears −1 and passes
- * it. The mesh has area 4π here, so that K is 1 on average for a sphere, and for K < 0 the factor continues along its
- * tangent, 1 − K: smooth, positive, falling. A collapse keeps the link condition; without a permitted one a vertex
- * waits until its surroundings change.
+ * The paper leaves a gap: 1/(1 + K) depends on scale, and as K falls to −1 and below it blows up and turns negative.
+ * The mesh has area 4π here, so that K is 1 on average for a sphere, and for K < 0 the factor continues along its
+ * tangent, 1 − K: smooth, positive, falling. A collapse keeps the link condition; a vertex for which none does waits
+ * until its surroundings change.
  */
 #include "embed/kernel_sampling/simplify.h"
 
@@ -18,10 +16,10 @@
 #include "base/check.h"
 #include "numeric/vec3.h"
 
-static const double MAX_ASPECT = 1e12;
+static const double MAX_ASPECT = 1e12; /* of a degenerate triangle, so that sums stay finite */
 
-enum { POLE = 100 }; /* valence of one */
-static const double POLE_COST = 1e300;
+enum { POLE = 100 };                   /* valence above which a vertex is one */
+static const double POLE_COST = 1e300; /* above all others */
 
 typedef struct simplifier {
   orb_context *ctx;
@@ -125,15 +123,15 @@ static double curvature_factor(const simplifier *s, int32_t v) {
   return curvature >= 0 ? 1 / (1 + curvature) : 1 - curvature;
 }
 
-/* The second factor for collapsing h = v1→v2: what stands around v2, less the two triangles that die, plus what is left
- * of v1's star, turned to v2. */
+/* The second factor for collapsing h = v1→v2: the triangles around v2, less the two that die, plus the rest of v1's
+ * star connected to v2. */
 static double aspect_after(const simplifier *s, int32_t h) {
   const orb_ks_mesh *m = s->m;
   int32_t v1 = m->tri[h], v2 = orb_ks_head(m, h), first = orb_ks_rotate(m, h), last = orb_next(m->twin[h]);
   double sum = s->aspect_sum[v2] - aspect(at(s, v1), at(s, v2), at(s, orb_ks_head(m, first))) -
                aspect(at(s, v1), at(s, orb_ks_head(m, last)), at(s, v2));
   if (sum < 0) {
-    sum = 0; /* the difference of two clamped giants */
+    sum = 0; /* rounding, where MAX_ASPECT cancels */
   }
   for (int32_t e = first; e != last;) {
     int32_t next = orb_ks_rotate(m, e);
@@ -148,7 +146,7 @@ static double quadric_value(const double *q, const double *p) {
          2 * (q[1] * p[0] * p[1] + q[2] * p[0] * p[2] + q[5] * p[1] * p[2] + q[3] * p[0] + q[6] * p[1] + q[8] * p[2]);
 }
 
-/* Quadric error, with a touch of edge length so that flat regions thin out evenly. */
+/* Quadric error, plus a small share of the squared edge length so that flat regions thin out evenly. */
 static double quadric_cost(const simplifier *s, int32_t h) {
   int32_t v1 = s->m->tri[h], v2 = orb_ks_head(s->m, h);
   const double *p = at(s, v2);
@@ -156,7 +154,7 @@ static double quadric_cost(const simplifier *s, int32_t h) {
   return fmax(error, 0) + 1e-6 * (4 * M_PI / s->m->vertex_count) * orb_distance2(at(s, v1), p);
 }
 
-/* A pole, whose every cost would take O(valence²): it goes last, or when it is one no more. */
+/* Evaluating a pole would take O(valence²): it goes last, or when it is a pole no longer. */
 static int is_pole(const simplifier *s, int32_t v) {
   return s->m->valence[v] > POLE;
 }
@@ -186,14 +184,14 @@ static void reevaluate(simplifier *s, int32_t v) {
   sift_down(s, s->slot[v]);
 }
 
-/* After a collapse into v: quadric costs change on v's ring; those of Eq. 1 one ring further, but not beyond a pole,
- * whose whole ring would be looked at for every collapse in it. */
+/* Updates costs after a collapse into v: quadric costs change on v's ring, those of Eq. 1 one ring further, but not
+ * beyond a pole, whose whole ring would be visited for every collapse at it. */
 static void refresh_around(simplifier *s, int32_t v) {
   const orb_ks_mesh *m = s->m;
   if (!s->quadric) {
     s->aspect_sum[v] = ring_aspect(s, v);
   }
-  int32_t seen = s->stamp += 2; /* seen − 1 is free for nobody: stamps only grow */
+  int32_t seen = s->stamp += 2; /* stamps only grow, so no mark has this value */
   int32_t e = m->out[v];
   int32_t ring_count = 0;
   do {
