@@ -2,7 +2,6 @@
 #ifndef ORB_EMBED_COLLAPSE_H
 #define ORB_EMBED_COLLAPSE_H
 
-#include "embed/hierarchy.h"
 #include "embed/multires.h"
 
 /* Makes room in area_log for a collapse of this valence. */

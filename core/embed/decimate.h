@@ -2,7 +2,7 @@
 #ifndef ORB_EMBED_DECIMATE_H
 #define ORB_EMBED_DECIMATE_H
 
-#include "embed/hierarchy.h"
+#include "embed/multires.h"
 
 /* Decimates a fresh hierarchy; keep and keep_until as for orb_hierarchy_create(), but with flags in the numbers of the
  * surface. */

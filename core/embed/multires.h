@@ -17,6 +17,7 @@ typedef struct orb_collapse {
   int64_t areas; /* index in area_log of the target areas of the star's other triangles */
 } orb_collapse;
 
+typedef struct orb_hierarchy orb_hierarchy; /* as in hierarchy.h */
 struct orb_hierarchy {
   const orb_vector_loops *loops;
   orb_corner_table surface;
@@ -31,7 +32,7 @@ struct orb_hierarchy {
 };
 
 struct orb_refiner {
-  struct orb_hierarchy *hierarchy;
+  orb_hierarchy *hierarchy;
   orb_newton_settings settings;
   double *point;                  /* 4 a vertex, the last unused */
   unsigned char *alive;           /* flags of vertices */
