@@ -1,4 +1,7 @@
-/* Vectors of three doubles, as plain arrays. */
+/* Vectors of three doubles, as plain arrays.
+ *
+ * The folder depends on nothing: vec3.h, frame (tangent planes), predicates (exact orientations), dense (linear solver,
+ * singular values), rotation (nearest rotation), clones.h (one function for several vector widths). */
 #ifndef ORB_NUMERIC_VEC3_H
 #define ORB_NUMERIC_VEC3_H
 
