@@ -1,14 +1,14 @@
-/* Invariants that stay on in every build, and checked size arithmetic. */
+/* Invariants, which every build checks, and the two ways out of a failed call. */
 #ifndef ORB_BASE_CHECK_H
 #define ORB_BASE_CHECK_H
 
 #include <stddef.h>
 
-/* Ends the process with the place and the broken invariant: for faults of ours, never for bad input. */
+/* Prints the broken invariant and where it is, and ends the process: for bugs, never for bad input. */
 _Noreturn void orb_assert_failed(const char *expression, const char *file, int line);
 #define ORB_ASSERT(expression) ((expression) ? (void)0 : orb_assert_failed(#expression, __FILE__, __LINE__))
 
-/* Leaves the function with the status of a failed call; only where nothing has to be freed. */
+/* Returns the status of a failed call; only where nothing has to be freed. */
 #define ORB_TRY(call)                   \
   do {                                  \
     orb_status orb_try_status = (call); \

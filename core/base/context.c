@@ -1,22 +1,21 @@
-/* The context: error record, cancel flag, deadline, progress. Memory lies in memory.c, threads in parallel.c. */
+/* The context: creation, cancel flag, deadline, progress, the processor. */
 #include "base/context.h"
 
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "base/state.h"
 
-enum { CONTEXT_MAGIC = 0x0eb3c07e, MAX_THREADS = 64 };
-static const int64_t DEFAULT_MAX_TRIANGLES = 5000000;
-
-_Noreturn void orb_assert_failed(const char *expression, const char *file, int line) {
-  fprintf(stderr, "orbmorph: broken invariant: %s (%s:%d)\n", expression, file, line);
-  abort();
-}
+enum {
+  CONTEXT_MAGIC = 0x0eb3c07e, /* tells a context from any other pointer */
+  MAX_THREADS = 64            /* of a context, as its header says */
+};
+static const int64_t DEFAULT_MAX_TRIANGLES = 5000000; /* as its header says */
 
 double orb_clock(void) {
   struct timespec now;
@@ -28,12 +27,6 @@ int64_t orb_clock_ms(void) {
   struct timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
   return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
-
-static void error_reset(orb_error *error) {
-  memset(error, 0, sizeof *error);
-  error->line = error->offset = error->boundary_loops = error->genus = -1;
-  error->shape = -1;
 }
 
 static int default_threads(void) {
@@ -63,7 +56,7 @@ orb_status orb_context_create(const orb_context_options *options, orb_context **
   if (ctx->options.threads > MAX_THREADS) {
     ctx->options.threads = MAX_THREADS;
   }
-  error_reset(&ctx->error);
+  orb_error_reset(&ctx->error);
   pthread_mutex_init(&ctx->error_lock, NULL);
   pthread_mutex_init(&ctx->progress_lock, NULL);
   *out = ctx;
@@ -96,37 +89,9 @@ orb_status orb_context_check(orb_context *ctx) {
     return orb_fail(ctx, ORB_E_CANCELLED, "The job was cancelled.");
   }
   if (ctx->options.deadline_ms && orb_clock_ms() > ctx->options.deadline_ms) {
-    return orb_fail(ctx, ORB_E_TIMEOUT, "The job ran out of its time; raise the limit or send a smaller mesh.");
+    return orb_fail(ctx, ORB_E_TIMEOUT, "The job exceeded its time limit; raise the limit or send a smaller mesh.");
   }
   return ORB_OK;
-}
-
-const orb_error *orb_context_error(const orb_context *ctx) {
-  return &ctx->error;
-}
-orb_error *orb_context_error_edit(orb_context *ctx) {
-  return &ctx->error;
-}
-
-void orb_error_clear(orb_context *ctx) {
-  pthread_mutex_lock(&ctx->error_lock);
-  error_reset(&ctx->error);
-  pthread_mutex_unlock(&ctx->error_lock);
-}
-
-orb_status orb_fail(orb_context *ctx, orb_status status, const char *format, ...) {
-  ORB_ASSERT(status != ORB_OK);
-  pthread_mutex_lock(&ctx->error_lock);
-  if (!ctx->in_loop || ctx->error.status == ORB_OK) {
-    error_reset(&ctx->error);
-    ctx->error.status = status;
-    va_list args;
-    va_start(args, format);
-    vsnprintf(ctx->error.detail, sizeof ctx->error.detail, format, args);
-    va_end(args);
-  }
-  pthread_mutex_unlock(&ctx->error_lock);
-  return status;
 }
 
 void orb_progress(orb_context *ctx, const char *stage, double fraction) {

@@ -1,4 +1,4 @@
-/* An array that its owner holds by a pointer of any type grows in place. */
+/* Growing an array through a pointer of any type. */
 #ifndef ORB_BASE_GROW_H
 #define ORB_BASE_GROW_H
 
@@ -6,7 +6,7 @@
 
 #include "orbmorph/context.h"
 
-/* array: the address of the pointer. 0 where memory cannot be had: all is then as before. */
+/* array: the address of the pointer. Returns 0 without memory; the array is then unchanged. */
 static inline int orb_regrow(orb_context *ctx, void *array, size_t count, size_t size) {
   void *block;
   memcpy(&block, array, sizeof block);

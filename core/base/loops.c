@@ -2,7 +2,7 @@
 
 #include "base/check.h"
 
-enum { SLICE = 65536 };
+enum { SLICE = 65536 }; /* iterations between checks for cancellation */
 
 typedef struct shifted_loop {
   orb_loop_fn body;

@@ -1,4 +1,4 @@
-/* Parallel loops that can be cancelled on the way. */
+/* Parallel loops that check for cancellation. */
 #ifndef ORB_BASE_LOOPS_H
 #define ORB_BASE_LOOPS_H
 
@@ -6,10 +6,11 @@
 
 #include "orbmorph/context.h"
 
-/* orb_parallel_for() in slices, with orb_context_check() between them. Chunks begin at multiples of grain. */
+/* orb_parallel_for() in slices of 65,536 iterations, with orb_context_check() between them. Chunks begin at multiples
+ * of grain. */
 ORB_MUST_CHECK orb_status orb_sliced_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg);
 
-/* The same with slices of so many iterations, for those that are long. */
+/* The same with slices of `slice` iterations, for bodies that take long. */
 ORB_MUST_CHECK orb_status orb_sliced_by(orb_context *ctx, int64_t count, int64_t slice, int64_t grain, orb_loop_fn body,
                                         void *arg);
 

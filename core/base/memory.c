@@ -1,12 +1,9 @@
-/* Budgeted memory: every block has a header that remembers its size, so that the budget can be kept and freed.
+/* Budgeted memory: the header of each block records its size, which is charged to the budget and given back.
  *
  * Large blocks are mapped one by one instead of taken from malloc(): they go back to the system when they are freed,
  * whatever lies beside them, so the process is never larger than what is in use; they come zeroed; and from the size of
- * a huge page on they are aligned to one and ask for huge pages, which saves most page faults and TLB misses. The
- * sanitizers keep malloc(), which they watch. */
-#include <errno.h>
-#include <stdarg.h>
-#include <stdio.h>
+ * a huge page on they are aligned to one and ask for huge pages, which saves most page faults and TLB misses. With
+ * sanitizers malloc() serves all blocks, because they watch it. */
 #include <stdlib.h>
 #include <string.h>
 #if defined(__linux__)
@@ -14,7 +11,7 @@
 #endif
 
 #include "base/check.h"
-#include "base/context.h"
+#include "base/state.h"
 
 #if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define ORB_MAPS 1
@@ -26,21 +23,21 @@
 #endif
 
 enum {
-  ALIGNMENT = 64,
-  PAGE = 1 << 16 /* of any machine */,
-  MAP_FROM = 1 << 19,
-  HUGE_PAGE = 1 << 21,
+  ALIGNMENT = 64,      /* bytes: a cache line, and the widest vector */
+  PAGE = 1 << 16,      /* a multiple of the page size of every supported machine */
+  MAP_FROM = 1 << 19,  /* bytes; smaller blocks are not worth a system call each */
+  HUGE_PAGE = 1 << 21, /* of x86-64, and of Arm with 4 KiB pages */
   BLOCK_MAGIC = 0x0b10c4ed,
   FREED_MAGIC = 0x0b10dead
 };
 
-/* Lies in the 64 bytes before the block that the caller sees; raw is what the allocator gave, or the mapping. */
+/* Occupies the 64 bytes before the block that the caller sees. raw: what the allocator returned, or the mapping. */
 typedef struct block_header {
   uint32_t magic;
   int mapped;
   void *raw;
   size_t total; /* charged to the budget */
-  size_t size;  /* asked for */
+  size_t size;  /* requested */
 } block_header;
 
 _Static_assert(sizeof(block_header) <= ALIGNMENT, "the header fits before the block");
@@ -52,11 +49,11 @@ static block_header *header_of(void *block) {
 static void *out_of_memory(orb_context *ctx, size_t wanted, int budget) {
   if (budget) {
     (void)orb_fail(ctx, ORB_E_NO_MEMORY,
-                   "The job needs more than its memory budget of %zu bytes (%zu more asked for); raise the budget or "
+                   "The job needs more than its memory budget of %zu bytes (%zu more requested); raise the budget or "
                    "send a smaller mesh.",
                    ctx->options.memory_limit, wanted);
   } else {
-    (void)orb_fail(ctx, ORB_E_NO_MEMORY, "The machine has no memory left (%zu bytes asked for).", wanted);
+    (void)orb_fail(ctx, ORB_E_NO_MEMORY, "The machine is out of memory (%zu bytes requested).", wanted);
   }
   return NULL;
 }
@@ -74,7 +71,7 @@ static int charge(orb_context *ctx, size_t total) {
 }
 
 #ifdef ORB_MAPS
-/* A fresh zeroed mapping of `total` bytes, a multiple of PAGE; NULL where the system has none. */
+/* A zeroed mapping of `total` bytes, a multiple of PAGE; NULL without memory. */
 static void *map_block(size_t total) {
   size_t slack = total >= HUGE_PAGE ? HUGE_PAGE : 0;
   char *raw = mmap(NULL, total + slack, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -90,7 +87,7 @@ static void *map_block(size_t total) {
       munmap(raw + before + total, slack - before);
     }
     raw += before;
-    (void)madvise(raw, total, MADV_HUGEPAGE); /* a wish: without it all works, only slower */
+    (void)madvise(raw, total, MADV_HUGEPAGE); /* a hint; without it everything is only slower */
   }
   return raw;
 }
@@ -117,7 +114,7 @@ static void *get_raw(orb_context *ctx, size_t total, int mapped) {
                                       : malloc(total);
 }
 
-/* What a block of count × size takes in all; 0 where that overflows. */
+/* The bytes that a block of count × size takes in all; 0 if that overflows. */
 static size_t total_of(const orb_context *ctx, size_t count, size_t size, size_t *bytes) {
   size_t total;
   if (__builtin_mul_overflow(count, size, bytes) || __builtin_add_overflow(*bytes, (size_t)(2 * PAGE), &total)) {
@@ -226,62 +223,4 @@ size_t orb_memory_used(const orb_context *ctx) {
 }
 size_t orb_memory_peak(const orb_context *ctx) {
   return atomic_load(&ctx->memory_peak);
-}
-
-static orb_status buffer_reserve(orb_context *ctx, orb_buffer *buffer, size_t more) {
-  size_t max = buffer->max ? buffer->max : (size_t)UINT32_MAX;
-  if (more > max || buffer->size > max - more) {
-    return orb_fail(ctx, ORB_E_TOO_LARGE, "A result would be larger than %zu bytes.", max);
-  }
-  size_t need = buffer->size + more;
-  if (need <= buffer->capacity) {
-    return ORB_OK;
-  }
-  size_t capacity = buffer->capacity < 4096 ? 4096 : buffer->capacity + buffer->capacity / 2;
-  if (capacity < need) {
-    capacity = need;
-  }
-  if (capacity > max) {
-    capacity = max;
-  }
-  unsigned char *data = orb_realloc(ctx, buffer->data, capacity, 1);
-  if (!data) {
-    return ORB_E_NO_MEMORY;
-  }
-  buffer->data = data;
-  buffer->capacity = capacity;
-  return ORB_OK;
-}
-
-orb_status orb_buffer_append(orb_context *ctx, orb_buffer *buffer, const void *bytes, size_t size) {
-  ORB_TRY(buffer_reserve(ctx, buffer, size));
-  if (size) {
-    memcpy(buffer->data + buffer->size, bytes, size);
-  }
-  buffer->size += size;
-  return ORB_OK;
-}
-
-orb_status orb_buffer_printf(orb_context *ctx, orb_buffer *buffer, const char *format, ...) {
-  va_list args, again;
-  va_start(args, format);
-  va_copy(again, args);
-  int length = vsnprintf(NULL, 0, format, args);
-  va_end(args);
-  orb_status status = ORB_E_INTERNAL;
-  if (length >= 0) {
-    status = buffer_reserve(ctx, buffer, (size_t)length + 1);
-    if (status == ORB_OK) {
-      vsnprintf((char *)buffer->data + buffer->size, (size_t)length + 1, format, again);
-      buffer->size += (size_t)length;
-    }
-  }
-  va_end(again);
-  return status;
-}
-
-void orb_buffer_free(orb_context *ctx, orb_buffer *buffer) {
-  orb_free(ctx, buffer->data);
-  buffer->data = NULL;
-  buffer->size = buffer->capacity = 0;
 }

@@ -1,26 +1,30 @@
-/* Parallel loops on threads of the context's own.
+/* Parallel loops on the context's own threads.
  *
- * Contract. One loop runs at a time; the caller takes part as thread 0. The owner publishes a loop under the lock: it
- * sets `open` and raises `round`. A worker that sees a new round enters under the lock, if the loop is still open, and
- * counts itself in `inside`; it takes chunks from the atomic counter until none is left, and leaves under the lock. The
- * caller, when the counter is spent, closes the loop and waits only for workers that are inside: one that was too late
- * to enter (the machine is busy) holds nobody up. Workers spin for a short while between loops, then sleep on a
- * condition variable. Threads that cannot be started are done without: results do not depend on how many there are.
+ * One loop runs at a time; the caller takes part as thread 0. It publishes the loop under the lock: it sets `open` and
+ * raises `round`. A worker that sees a new round enters under the lock, if the loop is still open, and counts itself in
+ * `inside`; it takes chunks from the atomic counter until none is left, and leaves under the lock. When the counter is
+ * spent, the caller closes the loop and waits only for workers that are inside: a worker that is too late to enter (the
+ * machine is busy) delays nobody. Workers spin for a short while between loops, then sleep on a condition variable. If
+ * some threads cannot be started, the loop runs on the others: results do not depend on how many there are.
  */
-#include <sched.h>
+#include "base/parallel.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/check.h"
-#include "base/context.h"
+#include "base/state.h"
 
-enum { MAX_WORKERS = 63, SPINS = 1000 };
+enum {
+  MAX_WORKERS = 63, /* and the caller: the 64 threads that context.c allows */
+  SPINS = 1000      /* pauses before a thread sleeps: waking it costs more than a short wait for the next loop */
+};
 
 struct orb_pool {
   pthread_mutex_t lock;
   pthread_cond_t wake, done;
   int workers, stopping;
-  int open;          /* a loop may be entered; under the lock, as `inside` is written */
+  int open;          /* the loop may be entered; guarded by the lock */
   atomic_int inside; /* workers in the present loop */
   atomic_uint round;
   orb_loop_fn body;
@@ -34,7 +38,7 @@ struct orb_pool {
   } worker[MAX_WORKERS];
 };
 
-static void take_chunks(orb_pool *pool, int thread) {
+static void take_chunks(struct orb_pool *pool, int thread) {
   int64_t begin;
   while ((begin = atomic_fetch_add_explicit(&pool->next, pool->grain, memory_order_relaxed)) < pool->count) {
     int64_t end = begin + pool->grain < pool->count ? begin + pool->grain : pool->count;
@@ -52,7 +56,7 @@ static void pause_cpu(void) {
 
 static void *worker_main(void *argument) {
   struct worker *self = argument;
-  orb_pool *pool = self->ctx->pool;
+  struct orb_pool *pool = self->ctx->pool;
   unsigned seen = 0;
   for (;;) {
     for (int spin = 0; spin < SPINS && atomic_load_explicit(&pool->round, memory_order_acquire) == seen; spin++) {
@@ -82,10 +86,10 @@ static void *worker_main(void *argument) {
   }
 }
 
-static orb_pool *pool_start(orb_context *ctx) {
-  orb_pool *pool = orb_calloc(ctx, 1, sizeof *pool);
+static struct orb_pool *pool_start(orb_context *ctx) {
+  struct orb_pool *pool = orb_calloc(ctx, 1, sizeof *pool);
   if (!pool) {
-    orb_error_clear(ctx); /* the loop runs in the caller alone */
+    orb_error_clear(ctx); /* the loop then runs in the caller alone */
     return NULL;
   }
   pthread_mutex_init(&pool->lock, NULL);
@@ -104,7 +108,7 @@ static orb_pool *pool_start(orb_context *ctx) {
 }
 
 void orb_pool_stop(orb_context *ctx) {
-  orb_pool *pool = ctx->pool;
+  struct orb_pool *pool = ctx->pool;
   if (!pool) {
     return;
   }
@@ -130,7 +134,7 @@ static void run_alone(int64_t count, int64_t grain, orb_loop_fn body, void *arg)
 
 void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
   ORB_ASSERT(grain >= 1);
-  orb_pool *pool = ctx->pool;
+  struct orb_pool *pool = ctx->pool;
   if (count <= grain || ctx->options.threads == 1 || (!pool && !(pool = pool_start(ctx))) || pool->workers == 0) {
     run_alone(count, grain, body, arg);
     return;

@@ -1,13 +1,13 @@
 /* The exact certificate of a spherical embedding.
  *
- * Orientation. Each triangle's sign is that of det(p, q, r), exactly (numeric/predicates.h).
+ * Orientation. A triangle's sign is that of det(p, q, r), exactly (numeric/predicates.h).
  *
- * Degree. Positive triangles alone may still cover the sphere more than once, so the degree of the map is counted: the
- * number of triangles, with sign, whose cone holds a direction x in general position. The cone of p, q, r with sign σ
- * holds x just where det(p, q, x), det(q, r, x), det(r, p, x) all have the sign σ: by Cramer's rule these are the
- * coordinates of x in p, q, r, times det(p, q, r). If one of the three is zero while the others do not exclude the
- * triangle, x is not in general position (or the triangle is flat and passes through x): the next direction is taken.
- * No rounding enters, so the degree is exact; for a closed list it does not depend on x.
+ * Degree. Positive triangles alone may cover the sphere more than once, so the degree of the map is counted: the number
+ * of triangles, with sign, whose cone contains a direction x in general position. The cone of p, q, r with sign σ
+ * contains x if and only if det(p, q, x), det(q, r, x) and det(r, p, x) all have the sign σ: by Cramer's rule these are
+ * the coordinates of x in p, q, r, times det(p, q, r). If one of the three is zero while the others do not exclude the
+ * triangle, x is not in general position (or the triangle is degenerate and passes through x), and the next direction
+ * is tried. No rounding enters, so the degree is exact; for a closed list it does not depend on x.
  */
 #include <math.h>
 #include <string.h>
@@ -18,8 +18,12 @@
 #include "numeric/vec3.h"
 #include "orbmorph/embed.h"
 
-enum { GRAIN = 4096, DIRECTIONS = 64 };
-static const double FAR_SIDE = -1e-9;
+enum {
+  GRAIN = 4096,   /* triangles of a chunk */
+  DIRECTIONS = 64 /* tried before the degree counts as 0; a map that is not degenerate spoils one only by coincidence */
+};
+static const double FAR_SIDE =
+    -1e-9; /* cosine to x of corners that are certainly on the far side; far above rounding */
 
 typedef struct partial {
   int64_t flipped, degenerate, degree, on_edge;
@@ -34,10 +38,10 @@ typedef struct certify_job {
   partial *chunk;
 } certify_job;
 
-/* +1, −1 or 0 as the triangle covers x; *on_edge where that is undecided. */
+/* +1 or −1 if the triangle covers x with that sign, 0 if not; counts *on_edge where x is not in general position. */
 static int covers(const double *p, const double *q, const double *r, const double x[3], int sign, int64_t *on_edge) {
   if (orb_dot(p, x) < FAR_SIDE && orb_dot(q, x) < FAR_SIDE && orb_dot(r, x) < FAR_SIDE) {
-    return 0; /* x·x > 0 needs a corner on the side of x; the margin is far above rounding */
+    return 0; /* x·x > 0 needs a corner on the side of x */
   }
   int a = orb_orient(p, q, x), b, c;
   if (sign && a == -sign) {
@@ -76,7 +80,7 @@ static void certify_range(void *arg, int64_t begin, int64_t end, int thread) {
   job->chunk[begin / GRAIN] = out;
 }
 
-/* Directions without a pattern that meshes share. */
+/* A spiral by the golden angle, offset so that it meets no axis or plane of symmetry of common meshes. */
 static void pick_direction(int index, double out[3]) {
   double height = 0.9137 - 1.8 * fmod(0.3819660112501051 * index + 0.1234567, 1.0);
   double angle = 2.399963229728653 * index + 0.7;

@@ -1,15 +1,14 @@
-/* One half-edge collapse on the surface, its record, and its exact undoing.
- *
- * Vertex v goes into u, its neighbour next to corner `first`. Of the k triangles of v's star the first and the last
- * (those at the edge vu) vanish, in the others u takes the place of v. Carried areas: the star's whole target area goes
- * to the k − 2 triangles that are left, in proportion to their new areas plus a floor, so that a limb keeps its room on
+/* Vertex v goes into u, its neighbour next to corner `first`. Of the k triangles of v's star the first and the last
+ * (those at the edge vu) vanish; in the others u replaces v. Areas are carried: the star's whole target area goes to
+ * the k − 2 triangles that are left, in proportion to their new areas plus a floor, so that a limb keeps its room on
  * the sphere on every coarse level. */
+#include "embed/collapse.h"
+
 #include <math.h>
 
 #include "base/check.h"
-#include "embed/multires.h"
 
-static const float CARRY_FLOOR = 0.1F; /* of the mean new area, so that no triangle gets nothing */
+static const float CARRY_FLOOR = 0.1F; /* share of the mean new area, so that every triangle gets some */
 
 orb_status orb_collapse_reserve(orb_context *ctx, orb_hierarchy *h, int32_t valence) {
   int64_t need = h->area_count + valence;
@@ -43,7 +42,7 @@ static void link(orb_corner_table *s, int32_t a, int32_t b) {
   s->opposite[b] = a;
 }
 
-/* Spreads the star's area over the triangles that stay: second … last but one. */
+/* Spreads the star's area over the triangles that stay: the second to the last but one. */
 static void carry_areas(orb_corner_table *s, int32_t u, int32_t second, int32_t kept, float star_area) {
   float sum = 0;
   int32_t c = second;
@@ -73,7 +72,7 @@ void orb_collapse_apply(orb_corner_table *s, int32_t first, int32_t valence, orb
   }
   int32_t last = c;
   star_area += orb_corner_area(s, last);
-  carry_areas(s, u, second, valence - 2, star_area); /* walks while all links are still there */
+  carry_areas(s, u, second, valence - 2, star_area); /* before the links it walks along change */
   c = second;
   for (int32_t i = 1; i < valence - 1; i++) {
     int32_t next = orb_corner_swing(s, c);

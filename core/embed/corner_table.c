@@ -1,4 +1,3 @@
-/* Set-up: Morton order, half-edges, normalisation, target areas. */
 #include "embed/corner_table.h"
 
 #include <math.h>
@@ -6,11 +5,16 @@
 #include "base/check.h"
 #include "base/loops.h"
 
-enum { MORTON_BITS = 10, GRAIN = 8192 };
+enum {
+  MORTON_BITS = 10, /* of each coordinate; 30 bits sort in three passes */
+  GRAIN = 8192      /* elements of a chunk */
+};
 
 static const double PI = 3.14159265358979323846;
-/* Shares of the mean triangle, and of the squared extent, below which areas are not believed. */
-static const double AREA_FLOOR = 1e-7, THIN = 1e-12, VANISHING = 1e-30;
+static const double AREA_FLOOR = 1e-7; /* least target area of a triangle, as a share of the mean */
+/* Whole areas of a mesh in the box [−1, 1]³: below THIN the scale stops growing, so that floats hold the positions;
+ * below VANISHING areas are rounding, and all triangles count alike. */
+static const double THIN = 1e-12, VANISHING = 1e-30;
 
 typedef struct setup {
   orb_context *ctx;
@@ -137,7 +141,7 @@ static orb_status order_vertices(setup *w) {
   return orb_sliced_for(ctx, n, GRAIN, copy_positions, w);
 }
 
-/* Triangles in the order of their least vertex. */
+/* Orders triangles by their least vertex. */
 static orb_status order_triangles(setup *w) {
   orb_corner_table *s = w->s;
   int64_t n = s->vertex_count, faces = s->triangle_count;
@@ -203,8 +207,8 @@ static orb_status list_incidences(setup *w) {
   return orb_context_check(w->ctx);
 }
 
-/* The corner across the edge that corner c sees. Its triangle has that edge from b to a; it is looked for among the
- * corners of whichever end has fewer, so that a pole of any valence costs nothing. */
+/* The corner opposite to c, −1 if there is none. Its triangle has the edge from b to a; the search goes over the
+ * corners of the end that has fewer, so that a pole of any valence costs little. */
 static int32_t find_opposite(const setup *w, int32_t c) {
   const orb_corner_table *s = w->s;
   int32_t a = s->corner[orb_corner_next(c)], b = s->corner[orb_corner_prev(c)];
@@ -241,7 +245,7 @@ static void link_opposites(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* Every vertex must be one fan. */
+/* Checks that the triangles of each vertex form one fan. */
 static void check_fans(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   setup *w = arg;
@@ -344,11 +348,11 @@ static orb_status check_counts(orb_context *ctx, const orb_mesh *mesh) {
                     mesh->vertex_count, mesh->triangle_count);
   }
   if (mesh->triangle_count > INT32_MAX / 8 - 1) {
-    return orb_fail(ctx, ORB_E_TOO_LARGE, "The mesh has more triangles than corner numbers reach.");
+    return orb_fail(ctx, ORB_E_TOO_LARGE, "The mesh has more triangles than 32-bit corner numbers reach.");
   }
   for (int64_t i = 0; i < 3 * (int64_t)mesh->triangle_count; i++) {
     if (mesh->triangles[i] < 0 || mesh->triangles[i] >= mesh->vertex_count) {
-      return orb_fail(ctx, ORB_E_INTERNAL, "Triangle %lld names a vertex that is not there.", (long long)(i / 3));
+      return orb_fail(ctx, ORB_E_INTERNAL, "Triangle %lld names a vertex that does not exist.", (long long)(i / 3));
     }
   }
   return ORB_OK;

@@ -1,8 +1,8 @@
-/* The working surface of an embedding: a closed triangle mesh in space-filling order, normalised to area 4π, with
- * corners that know their opposites. Decimation and its undoing rewrite it in place.
+/* The working surface of an embedding: a closed triangle mesh in space-filling order, normalised to area 4π, whose
+ * corners know their opposites. Decimation and its undo rewrite it in place.
  *
- * Corners. Triangle t has the corners 8t, 8t + 1, 8t + 2. One block of 8 words a triangle holds their vertices, the
- * bits of the target area, their opposites and a spare word, so that a step round a vertex costs one cache line:
+ * Corners. Triangle t has the corners 8t, 8t + 1, 8t + 2. One block of 8 words for each triangle holds their vertices,
+ * the bits of the target area, their opposites and a spare word, so that a step around a vertex costs one cache line:
  * corner[c] is the vertex of corner c, opposite[c] the corner across the edge that lies opposite to it. */
 #ifndef ORB_EMBED_CORNER_TABLE_H
 #define ORB_EMBED_CORNER_TABLE_H
@@ -13,9 +13,9 @@
 
 typedef struct orb_corner_table {
   int32_t vertex_count, triangle_count;
-  int32_t *to_mesh, *from_mesh; /* vertex numbers: Morton order ↔ the mesh's own */
+  int32_t *to_mesh, *from_mesh; /* vertex numbers: from Morton order to the mesh's own, and back */
   double *position;             /* 3 a vertex; centred, area 4π (but see orb_corner_table_create) */
-  float *position4;             /* the same, 4 a vertex; the last is the vertex's valence */
+  float *position4;             /* the same as floats, 4 a vertex; the last is the vertex's valence */
   int32_t *corner, *opposite;   /* 8 a triangle; opposite = corner + 4 */
   int32_t *vertex_corner;       /* a corner of each vertex */
   int32_t *valence;             /* of each vertex */
@@ -48,9 +48,9 @@ static inline void orb_corner_set_area(orb_corner_table *s, int32_t c, float are
   memcpy(&s->corner[c | 3], &area, sizeof area);
 }
 
-/* Builds it. Areas are scaled to a sum of 4π with a floor for vanishing triangles; where the whole area vanishes all
- * triangles count alike. Positions far thinner than they are long are scaled less, so that floats hold them.
- * ORB_E_NOT_MANIFOLD and others where the mesh is not what orb_mesh_repair() leaves. O(n). */
+/* Builds the surface. Target areas sum to 4π, with a floor for vanishing triangles; where the whole area vanishes, all
+ * triangles count alike. A mesh that is far thinner than long is scaled to less than 4π, so that floats hold it.
+ * ORB_E_NOT_MANIFOLD and other errors if the mesh is not what orb_mesh_repair() leaves. O(n). */
 ORB_MUST_CHECK orb_status orb_corner_table_create(orb_context *ctx, const orb_mesh *mesh, orb_corner_table *out);
 void orb_corner_table_free(orb_context *ctx, orb_corner_table *surface);
 

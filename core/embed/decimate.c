@@ -1,28 +1,37 @@
-/* Decimation to a tetrahedron in rounds of independent collapses; no heap.
+/* Decimation to a tetrahedron in rounds of independent collapses, without a heap.
  *
- * Each round takes a threshold at a sampled quantile of the costs, evaluates (in parallel) the vertices below it whose
- * star has changed since they were last looked at, and collapses, in order of vertex number, those that are still below
- * and whose ring is not locked; costs that were above are left stale, as they mostly grow. On coarse levels, where it
- * costs nothing, all that have changed are evaluated before the threshold is taken.
- * a collapse locks its
- * ring for the round. So the stars of a round do not overlap, and their vertices can be placed side by side when the
- * round is undone. A collapse keeps the link condition: its edge's ends have just two common neighbours. On a sphere of
- * more than four vertices some vertex of valence at most five always has such an edge, so the end is always reached.
+ * Each round takes a threshold at a sampled quantile of the costs. It evaluates, in parallel, the vertices whose old
+ * cost is below the threshold and whose star has changed since; then it collapses, in order of vertex number, those
+ * that are still below and whose ring is not locked. Costs above the threshold stay stale, as they mostly grow. On
+ * coarse levels, where it costs little, all changed vertices are evaluated before the threshold is taken.
+ *
+ * A collapse locks its ring for the round. So the stars of a round do not overlap, and its vertices can be placed in
+ * parallel when the round is undone. A collapse keeps the link condition: the ends of its edge have exactly two common
+ * neighbours. On a sphere of more than four vertices some vertex of valence at most five always has such an edge, so
+ * decimation always reaches the tetrahedron.
  */
+#include "embed/decimate.h"
+
 #include <math.h>
 
 #include "base/check.h"
 #include "base/loops.h"
-#include "embed/kernels.h"
+#include "embed/collapse.h"
 #include "embed/multires.h"
 
 enum {
-  LAZY_ABOVE = 4000, /* vertices */
-  GRAIN = 1024,
-  AHEAD = 12,
-  SAMPLES = 2048,
-  SMALL = 1024,     /* below that many vertices the quantile is exact */
-  SINGLE_BELOW = 60 /* below that many vertices one collapse a round */
+  LAZY_ABOVE = 4000, /* with more live vertices, stale costs stay */
+  GRAIN = 1024,      /* vertices of a chunk */
+  AHEAD = 12,        /* vertices between a prefetch and its use */
+  SAMPLES = 2048,    /* of the costs, for the quantile */
+  SMALL = 1024,      /* up to so many live vertices the quantile is exact */
+  SINGLE_BELOW = 60, /* with fewer live vertices a round is one collapse */
+  CANCEL_EVERY = 8192,
+  /* Rounds in a row without a collapse, after which … */
+  FAILS_UNTIL_COSTLY = 2, /* … any target that keeps the link condition will do */
+  FAILS_UNTIL_ALL = 30,   /* … the threshold is infinite */
+  FAILS_UNTIL_KEPT = 40,  /* … the vertices to keep may go too */
+  FAILS_MOST = 60         /* … the surface is no sphere */
 };
 
 typedef struct ring {
@@ -33,13 +42,13 @@ typedef struct ring {
 typedef struct decimation {
   orb_context *ctx;
   orb_hierarchy *h;
-  const orb_kernels *kernels;
+  const orb_vector_loops *loops;
   const unsigned char *keep; /* flags in surface numbers, or NULL */
   int32_t keep_until;
   float *cost;
   int32_t *target;
   unsigned char *dirty, *dead;
-  int32_t *mark, *lock; /* stamps */
+  int32_t *mark, *lock; /* the stamp and the round that last marked and locked a vertex */
   int32_t stamp, round;
   int32_t *live, live_count;
   float threshold;
@@ -75,7 +84,7 @@ static void mark_ring(decimation *d) {
   }
 }
 
-/* Has u just two neighbours in the marked ring? */
+/* Whether u has exactly two neighbours in the marked ring. */
 static int link_holds(const decimation *d, int32_t u) {
   const orb_corner_table *s = &d->h->surface;
   int32_t start = s->vertex_corner[u], c = start, common = 0;
@@ -86,7 +95,8 @@ static int link_holds(const decimation *d, int32_t u) {
   return common == 2;
 }
 
-/* The cost's shape term for going into ring[j]; for targets that the kernel did not pick. */
+/* The shape term of the cost (vector/cost.inc.h) of going into ring[j], for targets that the vector loop did not pick.
+ */
 static float plain_cost(const decimation *d, int32_t j) {
   const float *x = d->h->surface.position4;
   int32_t k = d->ring.count;
@@ -112,7 +122,7 @@ static float plain_cost(const decimation *d, int32_t j) {
 static int32_t other_target(const decimation *d, float *cost) {
   int32_t best = -1;
   *cost = INFINITY;
-  int large = d->ring.count > ORB_COST_RING_MAX; /* then any will do: the cost would take O(k²) */
+  int large = d->ring.count > ORB_COST_RING_MAX; /* then the first will do: the costs would take O(k²) */
   for (int32_t j = 0; j < d->ring.count; j++) {
     if (link_holds(d, d->ring.vertex[j])) {
       float c = large ? ORB_COST_LARGE : plain_cost(d, j);
@@ -129,7 +139,7 @@ static int32_t other_target(const decimation *d, float *cost) {
 }
 
 static int is_kept(const decimation *d, int32_t v, int32_t live) {
-  return d->keep && d->keep[v] && live > d->keep_until && d->fails < 40;
+  return d->keep && d->keep[v] && live > d->keep_until && d->fails < FAILS_UNTIL_KEPT;
 }
 
 static orb_status collapse_into(decimation *d, int32_t v, int32_t u) {
@@ -152,7 +162,7 @@ static orb_status collapse_into(decimation *d, int32_t v, int32_t u) {
   return ORB_OK;
 }
 
-/* Collapses v if it may be; *done counts. */
+/* Collapses v if the round allows it, and counts it in *done. */
 static orb_status try_collapse(decimation *d, int32_t v, float threshold, int32_t *done) {
   if (d->cost[v] > threshold || d->lock[v] == d->round || is_kept(d, v, d->live_count - *done)) {
     return ORB_OK;
@@ -163,7 +173,7 @@ static orb_status try_collapse(decimation *d, int32_t v, float threshold, int32_
   if (!link_holds(d, u)) {
     float cost;
     u = other_target(d, &cost);
-    if (u < 0 || (cost > 4 * threshold && d->fails < 2)) {
+    if (u < 0 || (cost > 4 * threshold && d->fails < FAILS_UNTIL_COSTLY)) {
       return ORB_OK;
     }
   }
@@ -171,7 +181,7 @@ static orb_status try_collapse(decimation *d, int32_t v, float threshold, int32_
   return collapse_into(d, v, u);
 }
 
-/* The value that would stand at `at` if x were sorted (Hoare's selection); rearranges x. */
+/* The value at index `at` of x, were x sorted (Hoare's selection); rearranges x. */
 static float select_float(float *x, int32_t count, int32_t at) {
   int32_t low = 0, high = count - 1;
   while (low < high) {
@@ -201,14 +211,15 @@ static float select_float(float *x, int32_t count, int32_t at) {
   return x[at];
 }
 
-/* The cost below which vertices are collapsed in this round. */
+/* The cost up to which this round collapses. Larger shares make fewer rounds but worse collapses; many vertices afford
+ * them. */
 static float find_threshold(const decimation *d) {
   int32_t n = d->live_count, count = n <= SMALL ? n : SAMPLES;
   double share = n > 20000 ? 0.4 : n > 2000 ? 0.24 : n >= SINGLE_BELOW ? 0.05 : 0;
-  if (d->fails > 2) { /* stuck: raise it to everything */
+  if (d->fails > 2) { /* stuck: raise the share, in the end to all */
     share = share * (1 << (d->fails < 6 ? d->fails : 6)) + 0.02 * d->fails;
   }
-  if (share > 0.9 || d->fails > 30) {
+  if (share > 0.9 || d->fails > FAILS_UNTIL_ALL) {
     return INFINITY;
   }
   float sample[SAMPLES];
@@ -231,7 +242,7 @@ static void evaluate(void *arg, int64_t begin, int64_t end, int thread) {
                       .threshold = d->threshold,
                       .cost = d->cost,
                       .target = d->target};
-  d->kernels->costs(&job, begin, end);
+  d->loops->costs(&job, begin, end);
 }
 
 static orb_status begin_round(decimation *d) {
@@ -269,12 +280,12 @@ static orb_status run_round(decimation *d) {
     if (n < SINGLE_BELOW && done) {
       break;
     }
-    if ((i & 8191) == 8191) {
+    if (i % CANCEL_EVERY == CANCEL_EVERY - 1) {
       ORB_TRY(orb_context_check(d->ctx));
     }
   }
   if (done == 0) {
-    if (++d->fails > 60) {
+    if (++d->fails > FAILS_MOST) {
       return orb_fail(d->ctx, ORB_E_NOT_GENUS_ZERO,
                       "The surface cannot be reduced below %d vertices, so it is not a sphere; repair the mesh first.",
                       n);
@@ -321,11 +332,11 @@ static orb_status allocate(decimation *d) {
 }
 
 orb_status orb_decimate(orb_context *ctx, orb_hierarchy *h, const unsigned char *keep, int32_t keep_until) {
-  decimation d = {.ctx = ctx, .h = h, .kernels = h->kernels, .keep = keep, .keep_until = keep_until};
+  decimation d = {.ctx = ctx, .h = h, .loops = h->loops, .keep = keep, .keep_until = keep_until};
   double full = log((double)h->surface.vertex_count / 4) + 1e-9;
   orb_status status;
   ORB_GO(status, allocate(&d), done);
-  ORB_GO(status, begin_round(&d), done); /* round_start must exist even where there is nothing to do */
+  ORB_GO(status, begin_round(&d), done); /* round_start must exist even if there is nothing to do */
   while (d.live_count > 4) {
     ORB_GO(status, run_round(&d), done);
     orb_progress(ctx, "simplify", 1 - log((double)d.live_count / 4) / full);

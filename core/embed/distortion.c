@@ -3,9 +3,9 @@
  * With U, W two edges of a source triangle, u, w their images and c the ratio of the whole areas, the linear map has
  * σ₁² + σ₂² = (u²W² + w²U² − 2 (u·w)(U·W)) / |U×W|² / c and σ₁σ₂ = |u×w| / |U×W| / c; all measures follow from the two.
  *
- * Percentiles need no sort: weights are summed in fine bins (1/1024 of an octave, or of a unit for the logarithm of
- * area), and only the values of the bin that holds the percentile are sorted. The published histogram joins fine bins.
- * Sums are taken chunk by chunk in fixed order, so threads do not change a bit.
+ * Percentiles need no full sort: weights are summed in fine bins (1/1024 of an octave, or of a unit for the logarithm
+ * of area), and only the values of the bin that holds the percentile are sorted. The published histogram joins fine
+ * bins. Sums are taken chunk by chunk in a fixed order, so the number of threads changes no bit.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -16,10 +16,14 @@
 #include "numeric/vec3.h"
 #include "orbmorph/embed.h"
 
-enum { MEASURES = 4, DIRICHLET = 0, ANGLE, AREA, ASPECT, GRAIN = 4096, FINE = 1 << 16 };
+enum { DIRICHLET = 0, ANGLE, AREA, ASPECT, MEASURES };
+enum {
+  GRAIN = 4096,  /* triangles of a chunk */
+  FINE = 1 << 16 /* fine bins: 64 octaves, or logarithms of area from −32 to 32; the last ones take what is beyond */
+};
 
-static const double ZERO_AREA = 1e-13; /* |U×W| over U² + W² that is rounding, not area */
-static const double LARGEST = 1e300;
+static const double ZERO_AREA = 1e-13; /* |U×W| over U² + W² up to which an area is rounding */
+static const double LARGEST = 1e300;   /* stands for infinite values, so that sums stay finite */
 
 typedef struct moments {
   double weight, mean, square; /* square: Σ w (x − mean)² */
@@ -147,7 +151,8 @@ static void measure_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* Fine bins: monotone in x. All measures but area are at least 1 and go by the bits of the double. */
+/* The fine bin of a value, monotone in x. All measures but area are at least 1, so the exponent and the first 10 bits
+ * of the mantissa give the bin. */
 static int32_t fine_bin(int measure, double x) {
   if (measure == AREA) {
     double at = floor((x + 32) * 1024);
@@ -197,7 +202,7 @@ static int compare_weighted(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* The least value whose weight and that of all below reach `share` of the whole. */
+/* The least value whose weight, with that of all smaller ones, reaches `share` of the whole. */
 static orb_status percentile(measure_job *job, int measure, const double *fine, const double *counts, double share,
                              double *out) {
   double want = share * job->total[measure].weight, below = 0;
@@ -266,7 +271,7 @@ static void summarise_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* The longest side of the source, so that tiny and huge units do not under- or overflow. */
+/* The longest side of the source's bounding box: a unit in which neither tiny nor huge meshes under- or overflow. */
 static double extent_of(const measure_job *job) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, extent = 0;
   for (int64_t i = 0; i < 3 * (int64_t)job->count; i++) {

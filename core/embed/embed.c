@@ -1,9 +1,16 @@
-/* orb_embed(): options, the method, the certificate, the measures. */
+/* Embedding: a mesh in, a certified embedding out.
+ *
+ * embed.c runs a method, then certify.c and distortion.c. The method `newton` (newton.c) decimates a corner_table by
+ * collapses (hierarchy, decimate, collapse; multires.h holds the structs), then refines it on the sphere (advance,
+ * which calls place to undo collapses and sweeps level after level; refiner, relax, star, kernel). vector/ holds the
+ * loops that decide its speed. kernel_sampling/ is the method of Peng & Timalsena 2016. Alignment uses the hierarchy
+ * and its refiner too, and resume.c.
+ */
 #include <math.h>
 #include <string.h>
 
 #include "base/check.h"
-#include "embed/kernel_sampling.h"
+#include "embed/kernel_sampling/kernel_sampling.h"
 #include "embed/newton.h"
 
 void orb_embed_defaults(orb_embed_options *options) {
@@ -37,14 +44,15 @@ static orb_status run_method(orb_context *ctx, const orb_mesh *mesh, const orb_e
     case ORB_EMBED_KERNEL_SAMPLING:
       return run_kernel_sampling(ctx, mesh, options, out);
   }
-  return orb_fail(ctx, ORB_E_UNSUPPORTED, "This build has no such embedding method; ask for newton.");
+  return orb_fail(ctx, ORB_E_UNSUPPORTED, "This build has no such embedding method; use newton.");
 }
 
 static orb_status refuse(orb_context *ctx, const orb_certificate *certificate) {
-  return orb_fail(ctx, ORB_E_NOT_CERTIFIED,
-                  "The embedding was computed but is not valid (%lld triangles flipped, %lld degenerate, degree %d); "
-                  "no result is given. Remove the thinnest triangles of the mesh and try again.",
-                  (long long)certificate->flipped, (long long)certificate->degenerate, certificate->degree);
+  return orb_fail(
+      ctx, ORB_E_NOT_CERTIFIED,
+      "The embedding was computed but is not valid (%lld triangles flipped, %lld degenerate, degree %d), so "
+      "no result is returned. Remove the thinnest triangles of the mesh and try again.",
+      (long long)certificate->flipped, (long long)certificate->degenerate, certificate->degree);
 }
 
 orb_status orb_embed(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options, orb_embedding *out) {

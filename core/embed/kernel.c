@@ -4,9 +4,14 @@
 #include <string.h>
 
 #include "base/check.h"
-#include "embed/star.h"
+#include "numeric/frame.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
+
+enum { HALVINGS = 50 }; /* of the distance to r_0: 2⁻⁵⁰ is near the spacing of doubles */
+
+/* Chart coordinates: a chart reaches at most so far, that is 84° from r_0. */
+static const double CHART_RADIUS = 10;
 
 /* A half-plane of the chart: s·x + t·y + at > 0, (x, y) of unit length. */
 typedef struct half_plane {
@@ -60,8 +65,8 @@ static orb_status open_chart(orb_context *ctx, orb_kernel_room *room, const doub
   return ORB_OK;
 }
 
-/* Edge planes from differences to r_0; the two edges at r_0 pass through it exactly. Returns the chart radius that
- * holds the ring. */
+/* Sets the planes of the edges from differences to r_0; the two edges at r_0 pass through it exactly. Returns the chart
+ * radius that holds the ring. */
 static double set_planes(chart *c, const double (*ring)[3]) {
   double radius = 0;
   for (int32_t i = 0; i < c->count; i++) {
@@ -83,7 +88,7 @@ static double set_planes(chart *c, const double (*ring)[3]) {
     }
     c->plane[i] = h;
     double far = sqrt(x[0] * x[0] + y[0] * y[0]);
-    radius = fmax(radius, z[0] > 0.1 * far ? far / z[0] : 10);
+    radius = fmax(radius, z[0] > 0.1 * far ? far / z[0] : CHART_RADIUS);
   }
   return radius;
 }
@@ -134,6 +139,7 @@ static chart_point centroid(const chart *c) {
   return (chart_point){.s = p[0].s + ms, .t = p[0].t + mt};
 }
 
+/* Takes a point of the chart to the sphere; whether it lies in the kernel. */
 static int lift(const chart *c, const double (*ring)[3], chart_point q, double out[3]) {
   for (int k = 0; k < 3; k++) {
     out[k] = c->origin[k] + q.s * c->e1[k] + q.t * c->e2[k];
@@ -142,9 +148,9 @@ static int lift(const chart *c, const double (*ring)[3], chart_point q, double o
   return orb_kernel_contains(ring, c->count, out);
 }
 
-/* Points towards r_0 along q: all in the kernel in exact arithmetic where q is. */
+/* Tries q and points between it and r_0: in exact arithmetic all are in the kernel if q is. */
 static int lift_towards(const chart *c, const double (*ring)[3], chart_point q, double out[3]) {
-  for (int i = 0; i < 50; i++) {
+  for (int i = 0; i < HALVINGS; i++) {
     if (lift(c, ring, q, out)) {
       return 1;
     }
@@ -154,7 +160,7 @@ static int lift_towards(const chart *c, const double (*ring)[3], chart_point q, 
   return 0;
 }
 
-/* Inside the wedge at r_0, along its bisector. */
+/* Tries points of the wedge at r_0, along its bisector. */
 static int search_wedge(const chart *c, const double (*ring)[3], double radius, double out[3]) {
   const half_plane *a = &c->plane[0], *b = &c->plane[c->count - 1];
   chart_point q = {.s = (a->x + b->x), .t = (a->y + b->y)};
@@ -171,7 +177,7 @@ orb_status orb_kernel_point(orb_context *ctx, orb_kernel_room *room, const doubl
                             double out[3], int *found) {
   chart c;
   ORB_TRY(open_chart(ctx, room, ring, count, &c));
-  double radius = 4 * fmin(set_planes(&c, ring), 10);
+  double radius = 4 * fmin(set_planes(&c, ring), CHART_RADIUS); /* half the side of the square that is clipped */
   c.polygon[0][0] = (chart_point){-radius, -radius};
   c.polygon[0][1] = (chart_point){radius, -radius};
   c.polygon[0][2] = (chart_point){radius, radius};

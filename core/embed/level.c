@@ -3,7 +3,12 @@
 #include "base/check.h"
 #include "base/loops.h"
 
-enum { BINS = ORB_LEVEL_RING_MAX + 1, GRAIN = 1024, UNCOLOURED = -1, SET_ASIDE = -2 };
+enum {
+  BINS = ORB_SWEEP_RING_MAX + 1, /* one for each valence */
+  GRAIN = 128,                   /* batches of a chunk */
+  UNCOLOURED = -1,               /* colours that are none: */
+  SET_ASIDE = -2                 /* heavy */
+};
 
 typedef struct builder {
   orb_context *ctx;
@@ -31,10 +36,10 @@ static void free_batches(orb_context *ctx, orb_level *level) {
   orb_free(ctx, level->shape);
   orb_free(ctx, level->heavy);
   signed char *colour = level->colour;
-  const orb_kernels *kernels = level->kernels;
+  const orb_vector_loops *loops = level->loops;
   memset(level, 0, sizeof *level);
   level->colour = colour;
-  level->kernels = kernels;
+  level->loops = loops;
 }
 
 void orb_level_free(orb_context *ctx, orb_level *level) {
@@ -56,7 +61,7 @@ static orb_status colour_vertices(builder *b) {
       used |= q >= 0 ? UINT64_C(1) << q : 0;
       c = orb_corner_swing(s, c);
     } while (c != start);
-    if (s->valence[v] > ORB_LEVEL_RING_MAX || used == UINT64_MAX) {
+    if (s->valence[v] > ORB_SWEEP_RING_MAX || used == UINT64_MAX) {
       level->colour[v] = SET_ASIDE;
       level->heavy[heavy++] = v;
       continue;
@@ -76,7 +81,7 @@ static orb_status colour_vertices(builder *b) {
 static orb_status lay_out(builder *b) {
   orb_level *level = b->level;
   orb_context *ctx = b->ctx;
-  int lanes = level->kernels->lanes;
+  int lanes = level->loops->lanes;
   b->batches = 0;
   b->entries = 0;
   for (int q = 0; q < level->colours; q++) {
@@ -106,7 +111,7 @@ static orb_status lay_out(builder *b) {
 
 static void assign_lanes(builder *b) {
   orb_level *level = b->level;
-  int lanes = level->kernels->lanes;
+  int lanes = level->loops->lanes;
   int64_t offset = 0;
   for (int q = 0; q < level->colours; q++) {
     for (int k = 0; k < BINS; k++) {
@@ -140,7 +145,7 @@ static void fill_batches(void *arg, int64_t begin, int64_t end, int thread) {
                       .offset = level->batch_offset,
                       .ring = level->ring,
                       .shape = level->shape};
-  level->kernels->fill(&job, begin, end);
+  level->loops->fill(&job, begin, end);
 }
 
 static orb_status list_vertices(builder *b, const unsigned char *alive, const unsigned char *pinned, int32_t live) {
@@ -167,11 +172,11 @@ static orb_status list_vertices(builder *b, const unsigned char *alive, const un
   return ORB_OK;
 }
 
-orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_kernels *kernels,
+orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_vector_loops *loops,
                            const orb_corner_table *surface, const unsigned char *alive, const unsigned char *pinned,
                            int32_t live, double blend) {
   free_batches(ctx, level);
-  level->kernels = kernels;
+  level->loops = loops;
   builder *b = ORB_NEW0(ctx, builder, 1);
   if (!b) {
     return ORB_E_NO_MEMORY;
@@ -185,7 +190,7 @@ orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_kernels
   ORB_GO(status, colour_vertices(b), done);
   ORB_GO(status, lay_out(b), done);
   assign_lanes(b);
-  ORB_GO(status, orb_sliced_for(ctx, b->batches, GRAIN / 8, fill_batches, b), done);
+  ORB_GO(status, orb_sliced_for(ctx, b->batches, GRAIN, fill_batches, b), done);
   level->valid = 1;
 done:
   orb_free(ctx, b);

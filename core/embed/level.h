@@ -1,16 +1,17 @@
-/* One level of the refinement as batches for the sweeps: its vertices coloured so that neighbours differ, grouped by
- * colour and valence, `lanes` to a batch; a batch holds its rings and the shapes of its triangles lane by lane. */
+/* One level of the refinement, laid out as batches for the vector sweeps. Its vertices are coloured so that neighbours
+ * differ, and grouped by colour and valence, `lanes` to a batch. A batch holds the rings of its vertices and the shapes
+ * of their triangles lane by lane. */
 #ifndef ORB_EMBED_LEVEL_H
 #define ORB_EMBED_LEVEL_H
 
-#include "embed/kernels.h"
+#include "embed/vector/jobs.h"
 
-enum { ORB_LEVEL_COLOURS = 64, ORB_LEVEL_RING_MAX = 62 };
+enum { ORB_LEVEL_COLOURS = 64 }; /* bits of the word that collects the colours around a vertex */
 
 typedef struct orb_level {
   int valid;
-  const orb_kernels *kernels;
-  int32_t *vertex; /* of the level, live and not pinned, ascending */
+  const orb_vector_loops *loops;
+  int32_t *vertex; /* live and not pinned, ascending */
   int32_t count;
   int colours;
   int32_t batch_start[ORB_LEVEL_COLOURS + 1]; /* first batch of each colour */
@@ -21,12 +22,14 @@ typedef struct orb_level {
   int32_t *ring;
   float *shape;
   signed char *colour; /* of each vertex of the surface */
-  int32_t *heavy;      /* vertices beyond ORB_LEVEL_RING_MAX or the colours: relaxed one by one */
+  int32_t *heavy;      /* vertices of more than ORB_SWEEP_RING_MAX neighbours, or left without a colour: relaxed one by
+                          one */
   int32_t heavy_count;
 } orb_level;
 
-/* Gathers the level of the vertices whose `alive` flag is set and `pinned` (or NULL) is not. */
-ORB_MUST_CHECK orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_kernels *kernels,
+/* Lays out the vertices whose `alive` flag is set and whose `pinned` flag (NULL: none) is not. live: how many flags of
+ * alive are set. O(vertex_count). */
+ORB_MUST_CHECK orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_vector_loops *loops,
                                           const orb_corner_table *surface, const unsigned char *alive,
                                           const unsigned char *pinned, int32_t live, double blend);
 void orb_level_free(orb_context *ctx, orb_level *level);

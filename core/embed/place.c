@@ -1,29 +1,37 @@
-/* New vertices: undoing a round, placing its vertices in their kernels, and what is done where that is hard.
+/* Undoing a round, placing its vertices in their kernels, and what happens where doubles have no room for that.
  *
- * A vertex goes to the centroid of its ring where that lies well inside its kernel, else to a point that a search of
- * the kernel finds; then it makes one Newton step. Stars of a round do not overlap, so all of it runs in parallel.
- * In exact arithmetic the kernel is never empty, because the ring is a fan from the vertex that was split. Where
- * doubles have no room for it, the collapse is made again, the vertices around it are relaxed (their energy is a
- * barrier that opens thin triangles), more of them each time, and the vertex is tried again. Every placement is tested
- * exactly, so all live triangles are exactly positive at all times.
+ * A vertex goes to the centroid of its ring if that lies well inside its kernel, otherwise to a point that a search of
+ * the kernel finds; then it makes one Newton step. The stars of a round do not overlap, so all of this runs in
+ * parallel. In exact arithmetic the kernel is never empty, because the ring is a fan from the vertex that was split.
+ * Where doubles have no room for it, the collapse is applied again, the vertices around it are relaxed (their energy is
+ * a barrier that opens thin triangles), more of them at each attempt, and the placement is tried again. Every placement
+ * is tested exactly, so all live triangles are exactly positive at all times.
  */
+#include "embed/place.h"
+
 #include <math.h>
 
 #include "base/check.h"
 #include "base/loops.h"
+#include "embed/collapse.h"
+#include "embed/kernel.h"
 #include "embed/multires.h"
+#include "embed/refiner.h"
+#include "embed/relax.h"
+#include "embed/star.h"
 #include "numeric/vec3.h"
 
 enum {
-  GRAIN = 256,
-  AHEAD = 8,
-  PLAIN_ABOVE = 4000, /* live vertices */
-  RELAX_MOST = 400,   /* ring entries relaxed round one crowded vertex: about 60 stars, or one pole */
-  HUB = 100,          /* valence of a pole, which the sweeps alone move */
-  ATTEMPTS = 16       /* at a kernel that doubles have no room for */
+  GRAIN = 256, /* vertices of a chunk */
+  AHEAD = 8,   /* collapses between a prefetch and its use */
+  PLAIN_ABOVE =
+      4000,         /* with more live vertices, a vertex well inside its kernel makes no step: the sweeps follow soon */
+  RELAX_MOST = 400, /* ring entries relaxed around one crowded vertex: about 60 stars, or one pole */
+  POLE = 100,       /* valence from which on only the sweeps move a vertex */
+  ATTEMPTS = 16     /* at a kernel that doubles have no room for */
 };
 
-static const double WELL_INSIDE = 0.02; /* least det over the squared edge that it stands on */
+static const double WELL_INSIDE = 0.02; /* least determinant of a triangle over its squared edge on the ring */
 
 typedef struct round_job {
   orb_context *ctx;
@@ -35,6 +43,7 @@ typedef struct round_job {
   atomic_int any_failed;
 } round_job;
 
+/* Sets p to the centroid of the ring; whether it lies well inside the kernel. */
 static int centroid_inside(const orb_star *star, double p[3]) {
   p[0] = p[1] = p[2] = 0;
   for (int32_t i = 0; i < star->count; i++) {
@@ -55,12 +64,11 @@ static int centroid_inside(const orb_star *star, double p[3]) {
     radius2 = reach2 > radius2 ? reach2 : radius2;
     least = det < least ? det : least;
   }
-  /* orb_det() is off by less than 1e-15 times a sum of six products, each at most the square of the reach */
+  /* the error of orb_det() is below 1e-15 times a sum of six products, each at most the squared radius */
   return least > 1e-14 * radius2 || orb_kernel_contains((const double(*)[3])star->ring, star->count, p);
 }
 
-/* Places one vertex whose collapse is undone; *found 0 where its kernel has no room. On fine levels one that lies well
- * inside is left to the sweeps. */
+/* Places one vertex whose collapse is undone; *found is 0 where its kernel has no room. */
 static orb_status place_vertex(orb_context *ctx, orb_refiner *r, int32_t v, double blend, int thread, int *found) {
   orb_star *star = &r->star[thread];
   const orb_corner_table *s = &r->hierarchy->surface;
@@ -92,7 +100,7 @@ static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
       __builtin_prefetch(s->corner + job->r->hierarchy->log[job->first + i + AHEAD].first);
       __builtin_prefetch(s->corner + job->r->hierarchy->log[job->first + i + AHEAD].last);
     }
-    if (i + AHEAD / 2 < end) { /* what those blocks lead to */
+    if (i + AHEAD / 2 < end) { /* what those blocks point to */
       int32_t c = job->r->hierarchy->log[job->first + i + AHEAD / 2].first;
       __builtin_prefetch(s->corner + s->opposite[orb_corner_next(c)]);
       __builtin_prefetch(job->r->point + 4 * (int64_t)s->corner[orb_corner_next(c)]);
@@ -110,28 +118,6 @@ static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
       atomic_store(&job->any_failed, 1);
     }
   }
-}
-
-orb_status orb_refiner_relax(orb_context *ctx, orb_refiner *r, int32_t v, double blend, double *gain,
-                             double *crowding) {
-  orb_star *star = &r->star[0];
-  *gain = 0;
-  if (crowding) {
-    *crowding = 0;
-  }
-  if (r->pinned[v]) {
-    return ORB_OK;
-  }
-  ORB_TRY(orb_star_walk(ctx, star, &r->hierarchy->surface, v, r->point));
-  orb_star_shape(star, &r->hierarchy->surface, v, blend);
-  double before, after = orb_star_newton(star, orb_refiner_weight(r), r->point + 4 * (int64_t)v, &before);
-  if (isfinite(before) && before > 0) {
-    *gain = (before - after) / before;
-    if (crowding) {
-      *crowding = after / (2 * star->area);
-    }
-  }
-  return ORB_OK;
 }
 
 typedef struct queue {
@@ -161,7 +147,8 @@ static int32_t dequeue(queue *q) {
   return v;
 }
 
-/* Relaxes the neighbourhood of a vertex that landed where it is narrow, as long and as far as that pays. */
+/* Relaxes the surroundings of a vertex that was placed in a narrow kernel, as long and as far as that lowers the energy
+ * of crowded stars. */
 static orb_status relieve(orb_context *ctx, orb_refiner *r, int32_t v, double blend) {
   const orb_corner_table *s = &r->hierarchy->surface;
   queue q = {.r = r};
@@ -170,13 +157,13 @@ static orb_status relieve(orb_context *ctx, orb_refiner *r, int32_t v, double bl
   enqueue(&q, v);
   for (int32_t done = 0; q.head < q.tail && done < RELAX_MOST && status == ORB_OK;) {
     int32_t u = dequeue(&q);
-    if (s->valence[u] >= HUB && u != v) {
+    if (s->valence[u] >= POLE && u != v) {
       continue;
     }
-    done += s->valence[u] < HUB ? s->valence[u] : HUB;
+    done += s->valence[u] < POLE ? s->valence[u] : POLE;
     double gain, crowding;
     status = orb_refiner_relax(ctx, r, u, blend, &gain, &crowding);
-    if (s->valence[u] < HUB && gain > 0.02 && crowding > 0.5 * r->settings.crowded) {
+    if (s->valence[u] < POLE && gain > 0.02 && crowding > 0.5 * r->settings.crowded) {
       enqueue_ring(&q, u);
       enqueue(&q, u);
     }
@@ -187,14 +174,14 @@ static orb_status relieve(orb_context *ctx, orb_refiner *r, int32_t v, double bl
   return status;
 }
 
-/* Relaxes `most` vertices outwards from v, pass by pass. */
+/* Relaxes about `most` vertices outwards from v, in each of so many passes. */
 static orb_status open_up(orb_context *ctx, orb_refiner *r, int32_t v, double blend, int32_t most, int passes) {
   orb_status status = ORB_OK;
   for (int pass = 0; pass < passes && status == ORB_OK; pass++) {
     queue q = {.r = r};
     enqueue(&q, v);
     int64_t seen = 0;
-    for (; seen < q.tail && q.tail < most; seen++) { /* flags stay set: each comes once */
+    for (; seen < q.tail && q.tail < most; seen++) { /* flags stay set, so each vertex comes once */
       enqueue_ring(&q, r->queue[seen]);
     }
     for (int64_t i = 0; i < q.tail && status == ORB_OK; i++) {
@@ -211,7 +198,7 @@ static orb_status open_up(orb_context *ctx, orb_refiner *r, int32_t v, double bl
   return status;
 }
 
-/* Places a vertex whose collapse has been made again. */
+/* Places a vertex whose collapse has been applied again. */
 static orb_status place_stubborn(orb_context *ctx, orb_refiner *r, int32_t index, double blend) {
   orb_hierarchy *h = r->hierarchy;
   int32_t parent = h->surface.corner[orb_corner_next(h->log[index].first)];
@@ -226,10 +213,11 @@ static orb_status place_stubborn(orb_context *ctx, orb_refiner *r, int32_t index
     orb_collapse_redo(h, index);
   }
   orb_collapse_undo(h, index);
-  return orb_fail(ctx, ORB_E_NOT_CERTIFIED,
-                  "Vertex %d of the mesh has no place on the sphere: the triangles around it are too thin for double "
-                  "precision. Remove its thinnest triangles and try again.",
-                  h->surface.to_mesh[h->log[index].vertex]);
+  return orb_fail(
+      ctx, ORB_E_NOT_CERTIFIED,
+      "Vertex %d of the mesh cannot be placed on the sphere: the triangles around it are too thin for double "
+      "precision. Remove its thinnest triangles and try again.",
+      h->surface.to_mesh[h->log[index].vertex]);
 }
 
 static orb_status place_failures(round_job *job, int32_t count) {
@@ -245,7 +233,7 @@ static orb_status place_failures(round_job *job, int32_t count) {
     if (job->failed[i] && status == ORB_OK) {
       status = place_stubborn(job->ctx, r, job->first + i, job->blend);
     } else if (job->failed[i]) {
-      orb_collapse_undo(h, job->first + i); /* leave a surface that can be rewound */
+      orb_collapse_undo(h, job->first + i); /* the surface must match h->undone */
     }
   }
   return status;
@@ -265,7 +253,7 @@ static orb_status relieve_crowded(round_job *job, int32_t count) {
   return ORB_OK;
 }
 
-/* The collapses of the round that is next, or what is left of it: the first of them in the log, and how many. */
+/* The collapses of the next round to undo, or what is left of it: returns how many; *first: the first in the log. */
 static int32_t next_round(const orb_hierarchy *h, int32_t *first) {
   int32_t end = h->log_count - h->undone, round = h->round_count;
   ORB_ASSERT(end > 0);
@@ -276,7 +264,7 @@ static int32_t next_round(const orb_hierarchy *h, int32_t *first) {
   return end - *first;
 }
 
-/* Undoes them on the surface. */
+/* Undoes these collapses on the surface. */
 static void undo_collapses(orb_refiner *r, int32_t first, int32_t count) {
   orb_hierarchy *h = r->hierarchy;
   r->level.valid = 0;

@@ -1,54 +1,19 @@
-/* The hierarchy's and the refiner's life: from the tetrahedron up, level by level. */
+#include "embed/refiner.h"
+
 #include <math.h>
 
 #include "base/check.h"
-#include "base/loops.h"
+#include "embed/collapse.h"
+#include "embed/kernel.h"
+#include "embed/level.h"
 #include "embed/multires.h"
+#include "embed/star.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { SWEEP_GRAIN = 32, QUEUE_MOST = 65536 };
+enum { QUEUE_MOST = 65536 }; /* entries of the relaxation queue; a vertex that finds it full is not relaxed */
 
-orb_status orb_hierarchy_create(orb_context *ctx, const orb_mesh *mesh, const unsigned char *keep, int32_t keep_until,
-                                orb_hierarchy **out) {
-  orb_hierarchy *h = ORB_NEW0(ctx, orb_hierarchy, 1);
-  if (!h) {
-    return ORB_E_NO_MEMORY;
-  }
-  h->kernels = orb_kernels_of(orb_context_cpu(ctx));
-  unsigned char *kept = NULL;
-  orb_status status;
-  ORB_GO(status, orb_corner_table_create(ctx, mesh, &h->surface), done);
-  if (keep) {
-    kept = ORB_NEW(ctx, unsigned char, mesh->vertex_count);
-    if (!kept) {
-      status = ORB_E_NO_MEMORY;
-      goto done;
-    }
-    for (int32_t i = 0; i < mesh->vertex_count; i++) {
-      kept[i] = keep[h->surface.to_mesh[i]];
-    }
-  }
-  ORB_GO(status, orb_decimate(ctx, h, kept, keep_until), done);
-  *out = h;
-  h = NULL;
-done:
-  orb_free(ctx, kept);
-  orb_hierarchy_destroy(ctx, h);
-  return status;
-}
-
-void orb_hierarchy_destroy(orb_context *ctx, orb_hierarchy *h) {
-  if (h) {
-    orb_corner_table_free(ctx, &h->surface);
-    orb_free(ctx, h->log);
-    orb_free(ctx, h->area_log);
-    orb_free(ctx, h->round_start);
-    orb_free(ctx, h);
-  }
-}
-
-/* The first tetrahedron: regular, turned so that its faces are positive. */
+/* Puts the base on the sphere as a regular tetrahedron whose faces are positive. */
 static void place_base(orb_refiner *r) {
   const orb_hierarchy *h = r->hierarchy;
   const orb_corner_table *s = &h->surface;
@@ -63,9 +28,9 @@ static void place_base(orb_refiner *r) {
       v[3] = u;
     }
   }
-  int turned = orb_orient(corner[0], corner[1], corner[2]) < 0;
+  int reversed = orb_orient(corner[0], corner[1], corner[2]) < 0;
   for (int i = 0; i < 4; i++) {
-    int at = turned && i == 1 ? 2 : turned && i == 2 ? 1 : i;
+    int at = reversed && i == 1 ? 2 : reversed && i == 2 ? 1 : i;
     memcpy(r->point + 4 * (int64_t)v[i], corner[at], sizeof corner[at]);
     (void)orb_normalize(r->point + 4 * (int64_t)v[i]);
   }
@@ -146,160 +111,14 @@ void orb_refiner_abandon(orb_context *ctx, orb_refiner *r) {
   orb_free(ctx, r);
 }
 
-static double blend_of(const orb_refiner *r) {
-  return r->live == r->hierarchy->surface.vertex_count ? r->settings.finest : r->settings.blend;
-}
-
-/* Coarse levels do not follow a w below 1: without the symmetric term they grow some triangles without bound, and the
- * fine ones cannot mend that. */
+/* Coarse levels do not follow a w below 1: without the symmetric term some of their triangles grow without bound, and
+ * finer levels cannot repair that. */
 double orb_refiner_weight(const orb_refiner *r) {
   return r->live == r->hierarchy->surface.vertex_count ? r->settings.weight : fmax(r->settings.weight, 1);
 }
 
-typedef struct sweep_loop {
-  const orb_level *level;
-  orb_sweep_job job;
-  int32_t start;
-} sweep_loop;
-
-static void sweep_batches(void *arg, int64_t begin, int64_t end, int thread) {
-  (void)thread;
-  const sweep_loop *loop = arg;
-  loop->level->kernels->sweep(&loop->job, loop->start + begin, loop->start + end);
-}
-
-/* What the vector sweep left over. */
-static orb_status relax_left_over(orb_context *ctx, orb_refiner *r, int32_t begin, int32_t end, double blend) {
-  const orb_level *level = &r->level;
-  for (int32_t b = begin; b < end; b++) {
-    for (int l = 0; level->batch_stiff[b] >> l; l++) {
-      if (level->batch_stiff[b] >> l & 1) {
-        double gain;
-        ORB_TRY(
-            orb_refiner_relax(ctx, r, level->batch_vertex[(int64_t)b * level->kernels->lanes + l], blend, &gain, NULL));
-      }
-    }
-  }
-  return ORB_OK;
-}
-
-/* One sweep; *energy before it (the stars hold each triangle three times), *fall by it. Sums are taken in the order of
- * batches. */
-static orb_status sweep_once(orb_context *ctx, orb_refiner *r, double relax, double *energy, double *fall) {
-  orb_level *level = &r->level;
-  double blend = blend_of(r);
-  sweep_loop loop = {.level = level,
-                     .job = {.point = r->point,
-                             .vertex = level->batch_vertex,
-                             .fill = level->batch_fill,
-                             .valence = level->batch_valence,
-                             .offset = level->batch_offset,
-                             .ring = level->ring,
-                             .shape = level->shape,
-                             .weight = orb_refiner_weight(r),
-                             .relax = relax,
-                             .energy = level->batch_energy,
-                             .fall = level->batch_fall,
-                             .stiff = level->batch_stiff}};
-  *energy = *fall = 0;
-  for (int q = 0; q < level->colours; q++) {
-    int32_t begin = level->batch_start[q], end = level->batch_start[q + 1];
-    loop.start = begin;
-    ORB_TRY(orb_sliced_for(ctx, end - begin, SWEEP_GRAIN, sweep_batches, &loop));
-    ORB_TRY(relax_left_over(ctx, r, begin, end, blend));
-    for (int32_t b = begin; b < end; b++) {
-      *energy += level->batch_energy[b];
-      *fall += level->batch_fall[b];
-    }
-  }
-  *energy /= 3;
-  for (int32_t i = 0; i < level->heavy_count; i++) {
-    double gain;
-    ORB_TRY(orb_refiner_relax(ctx, r, level->heavy[i], blend, &gain, NULL));
-  }
-  return ORB_OK;
-}
-
-static orb_status need_level(orb_context *ctx, orb_refiner *r) {
-  if (r->level.valid) {
-    return ORB_OK;
-  }
-  return orb_level_build(ctx, &r->level, r->hierarchy->kernels, &r->hierarchy->surface, r->alive, r->pinned, r->live,
-                         blend_of(r));
-}
-
-static const double OVER_RELAXATION = 1.9;
-
-orb_status orb_refiner_sweep(orb_context *ctx, orb_refiner *r, int32_t sweeps, double *gain) {
-  ORB_TRY(need_level(ctx, r));
-  double energy = 1, fall = 0;
-  for (int32_t i = 0; i < sweeps; i++) {
-    ORB_TRY(sweep_once(ctx, r, i == 0 ? 1.0 : OVER_RELAXATION, &energy, &fall));
-  }
-  if (gain) {
-    *gain = energy > 0 ? fall / energy : 0;
-  }
-  return ORB_OK;
-}
-
-/* The sweeps of a level that has just been reached: many on coarse ones, where they cost nothing and decide most. A
- * sweep ends the level early when it gains almost nothing; more are added while each still gains much. */
-static orb_status settle_level(orb_context *ctx, orb_refiner *r) {
-  const orb_newton_settings *set = &r->settings;
-  int32_t n = r->hierarchy->surface.vertex_count;
-  int last = r->live == n;
-  int32_t sweeps = r->live < set->coarse_until ? set->coarse_sweeps : last ? set->final_sweeps : set->level_sweeps;
-  double energy, fall;
-  ORB_TRY(need_level(ctx, r));
-  for (int32_t i = 0; i < sweeps; i++) {
-    ORB_TRY(sweep_once(ctx, r, i == 0 ? 1.0 : OVER_RELAXATION, &energy, &fall));
-    if (last) {
-      orb_progress(ctx, "embed", 0.6 + 0.4 * (i + 1) / sweeps);
-    }
-    if (i > 1 && fall < (last ? set->settled_last : set->settled) * energy) {
-      break;
-    }
-    if (i == sweeps - 1 && fall > (last ? set->converged_last : set->converged) * energy && sweeps < set->most_sweeps) {
-      sweeps++;
-    }
-  }
-  return ORB_OK;
-}
-
 void orb_refiner_one_way(orb_refiner *r) {
   r->one_way = 1;
-}
-
-/* All collapses are undone for good. */
-static void drop_collapses(orb_context *ctx, orb_refiner *r) {
-  orb_hierarchy *h = r->hierarchy;
-  orb_free(ctx, h->log);
-  orb_free(ctx, h->area_log);
-  orb_free(ctx, h->surface.position4);
-  orb_free(ctx, r->crowding);
-  h->log = NULL;
-  h->area_log = h->surface.position4 = r->crowding = NULL;
-}
-
-orb_status orb_refiner_advance(orb_context *ctx, orb_refiner *r, int32_t vertices) {
-  int32_t n = r->hierarchy->surface.vertex_count;
-  vertices = vertices < n ? vertices : n;
-  while (r->live < vertices) {
-    double growth = r->live >= r->settings.fine_from ? r->settings.growth_fine : r->settings.growth;
-    double next = r->live < 8 ? 8 : r->live * growth + 1;
-    next = next > n / 1.3 ? n : next;
-    int32_t stop = next < vertices ? (int32_t)next : vertices;
-    double blend = stop == n ? r->settings.finest : r->settings.blend;
-    while (r->live < stop) {
-      ORB_TRY(orb_refiner_undo_round(ctx, r, blend));
-      orb_progress(ctx, "embed", 0.6 * r->live / n);
-    }
-    if (r->one_way && r->live == n) {
-      drop_collapses(ctx, r);
-    }
-    ORB_TRY(settle_level(ctx, r));
-  }
-  return ORB_OK;
 }
 
 int32_t orb_refiner_live(const orb_refiner *r) {

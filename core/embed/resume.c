@@ -1,6 +1,8 @@
-/* A refiner that starts from an embedding at hand instead of a tetrahedron: for sweeps with pins at full resolution. */
+#include "embed/resume.h"
+
 #include "base/check.h"
 #include "embed/multires.h"
+#include "embed/vector/loops.h"
 
 orb_status orb_refiner_resume(orb_context *ctx, const orb_mesh *mesh, const double *points,
                               const orb_embed_options *options, orb_hierarchy **hierarchy, orb_refiner **out) {
@@ -9,11 +11,11 @@ orb_status orb_refiner_resume(orb_context *ctx, const orb_mesh *mesh, const doub
   if (!h) {
     return ORB_E_NO_MEMORY;
   }
-  h->kernels = orb_kernels_of(orb_context_cpu(ctx));
+  h->loops = orb_vector_loops_of(orb_context_cpu(ctx));
   orb_status status;
   ORB_GO(status, orb_corner_table_create(ctx, mesh, &h->surface), done);
   const orb_corner_table *s = &h->surface;
-  /* Any four vertices about an edge serve as the base: every position is set below. */
+  /* The four vertices around an edge serve as the base: every position is set below. */
   int32_t c = s->vertex_corner[0];
   h->base[0] = s->corner[c];
   h->base[1] = s->corner[orb_corner_next(c)];

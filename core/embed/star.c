@@ -4,17 +4,21 @@
 
 #include "base/check.h"
 #include "embed/kernel.h"
+#include "numeric/frame.h"
 #include "numeric/vec3.h"
 
-enum { FIELDS = 13, TRIES = 8 };
+enum {
+  FIELDS = 13, /* doubles of a ring entry: 3 of ring, 10 others */
+  TRIES = 8    /* lengths of a step, each 0.4 of the one before */
+};
 
-/* Lengths below this, squared, are nothing at the scale of area 4π; keeps equal points from dividing by 0. */
-static const double TINY2 = 1e-30;
-static const double FLAT = 1e-6;       /* least 4·area over the sum of squared edges */
-static const double EIGEN_FLOOR = .05; /* least over greatest eigenvalue of the Hessian */
-static const double EDGE_SHARE = 0.8;  /* a step goes at most so far to the nearest plane */
+/* vector/fill.inc.h and vector/sweep.inc.h have the same constants. */
+static const double TINY2 = 1e-30; /* added to squared edges, at a scale of area 4π: equal points do not divide by 0 */
+static const double FLAT = 1e-6;   /* least 4·area over the sum of squared edges */
+static const double EIGEN_FLOOR = .05; /* least eigenvalue of the Hessian over its greatest */
+static const double EDGE_SHARE = 0.8;  /* a step goes at most this share of the way to the nearest plane */
 
-orb_status orb_star_reserve(orb_context *ctx, orb_star *star, int32_t count) {
+static orb_status reserve(orb_context *ctx, orb_star *star, int32_t count) {
   if (count <= star->capacity) {
     return ORB_OK;
   }
@@ -43,7 +47,7 @@ void orb_star_free(orb_context *ctx, orb_star *star) {
 }
 
 orb_status orb_star_walk(orb_context *ctx, orb_star *star, const orb_corner_table *s, int32_t v, const double *point) {
-  ORB_TRY(orb_star_reserve(ctx, star, s->valence[v]));
+  ORB_TRY(reserve(ctx, star, s->valence[v]));
   int32_t start = s->vertex_corner[v], c = start, k = 0;
   do {
     int32_t u = s->corner[orb_corner_next(c)];
@@ -88,17 +92,7 @@ void orb_star_shape(orb_star *star, const orb_corner_table *s, int32_t v, double
   }
 }
 
-void orb_tangent_frame(const double p[3], double e1[3], double e2[3]) {
-  double s = copysign(1, p[2]), a = -1 / (s + p[2]), b = p[0] * p[1] * a;
-  e1[0] = 1 + s * p[0] * p[0] * a;
-  e1[1] = s * b;
-  e1[2] = -s * p[0];
-  e2[0] = b;
-  e2[1] = s + p[1] * p[1] * a;
-  e2[2] = -p[1];
-}
-
-/* The ring in the frame of p. */
+/* Takes the ring to the frame of p. */
 static void localise(orb_star *star, const double p[3], double e1[3], double e2[3]) {
   orb_tangent_frame(p, e1, e2);
   int32_t k = star->count;
@@ -167,7 +161,7 @@ static quadratic expand(const orb_star *star, double weight) {
   return q;
 }
 
-/* The Newton direction with the Hessian's eigenvalues kept positive; 0 where there is none. */
+/* The Newton direction, with the Hessian's eigenvalues kept positive; 0 if there is none. */
 static int solve_step(quadratic q, double *s, double *t) {
   double middle = 0.5 * (q.hxx + q.hyy), half = 0.5 * (q.hxx - q.hyy), root = sqrt(half * half + q.hxy * q.hxy);
   double floor = EIGEN_FLOOR * fabs(middle + root), least = middle - root;
@@ -180,7 +174,7 @@ static int solve_step(quadratic q, double *s, double *t) {
   return isfinite(*s) && isfinite(*t) && (*s != 0 || *t != 0);
 }
 
-/* How far the step may go: within the kernel and half a radian. */
+/* How much of the step may be taken: within the kernel, and at most half a radian. */
 static double longest_step(const orb_star *star, double s, double t) {
   double tau = 1, length = sqrt(s * s + t * t);
   for (int32_t i = 0; i < star->count; i++) {

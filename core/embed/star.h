@@ -1,6 +1,6 @@
 /* The star of one vertex on the sphere: its ring, the shapes of its triangles, their energy as a function of the
- * centre, and a damped Newton step of it. In plain doubles, for any valence: for placement, relaxation and whatever the
- * vector sweeps leave over.
+ * centre, and a damped Newton step. In plain doubles, for any valence: for placement, relaxation and the vertices that
+ * the vector sweeps leave over.
  *
  * With p the centre and q, r neighbours on the ring, D = ½ Σ cot·|edge|² of the image is affine and d = det(p, q, r)
  * linear in p, so the energy Σ D (w + a²/d²) has a cheap gradient and Hessian in the tangent plane, and it is its own
@@ -22,24 +22,21 @@ typedef struct orb_star {
   double *block;
 } orb_star;
 
-ORB_MUST_CHECK orb_status orb_star_reserve(orb_context *ctx, orb_star *star, int32_t count);
 void orb_star_free(orb_context *ctx, orb_star *star);
 
-/* Walks the ring of v from its vertex_corner on; point holds 4 a vertex. */
+/* Loads the ring of v, from its vertex_corner on. point: 4 a vertex. */
 ORB_MUST_CHECK orb_status orb_star_walk(orb_context *ctx, orb_star *star, const orb_corner_table *s, int32_t v,
                                         const double *point);
 
-/* The shapes and target areas. blend moves them towards equilateral. */
+/* Sets the shapes and target areas. blend (0 to 1) moves the shapes towards equilateral. */
 void orb_star_shape(orb_star *star, const orb_corner_table *s, int32_t v, double blend);
 
 /* Half cotangents at the three vertices, in order, of a triangle whose squared edges are blended. */
 void orb_shape_cotangents(const orb_corner_table *s, int32_t a, int32_t b, int32_t c, double blend, double out[3]);
 
 /* Moves p by at most one damped Newton step that lowers the energy and keeps every triangle exactly positive. Returns
- * the energy after, *before the one before; both infinite where p lies too near the edge of the kernel to tell. */
+ * the energy after the step; *before: the energy before it. Both are infinite where p is too near the edge of the
+ * kernel to tell. */
 double orb_star_newton(orb_star *star, double weight, double p[3], double *before);
-
-/* An orthonormal frame of the tangent plane at a unit vector (Duff et al. 2017). */
-void orb_tangent_frame(const double p[3], double e1[3], double e2[3]);
 
 #endif

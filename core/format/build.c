@@ -1,4 +1,3 @@
-/* See build.h. */
 #include "format/build.h"
 
 #include <math.h>
@@ -12,8 +11,8 @@
 #include "mesh/polygon.h"
 #include "numeric/vec3.h"
 
-enum { MATERIAL_SLOTS = 2 * ORB_MATERIALS_MAX };
-static const int64_t INDEX_MAX = 700000000; /* 3 a vertex or triangle still fits an int32 */
+enum { MATERIAL_SLOTS = 2 * ORB_MATERIALS_MAX }; /* of the hash table: at most half of them are used */
+static const int64_t INDEX_MAX = 700000000;      /* vertices or triangles: 3 numbers for each still fit an int32 */
 
 void orb_build_init(orb_build *build, orb_context *ctx) {
   *build = (orb_build){.ctx = ctx, .material = -1};
@@ -108,7 +107,7 @@ orb_status orb_build_texcoord(orb_build *build, const double texcoord[2]) {
   return ORB_OK;
 }
 
-/* From plain corners to corners with attributes, when the first such corner comes. */
+/* Converts plain corners to corners with attributes when the first corner with attributes arrives. */
 static orb_status widen_corners(orb_build *build) {
   ORB_TRY(orb_build_grow(build->ctx, &build->corner_more, &build->more_room, build->corners + 1, sizeof(orb_corner)));
   for (int64_t i = 0; i < build->corners; i++) {
@@ -156,7 +155,7 @@ orb_status orb_build_face_end(orb_build *build, int64_t corners) {
   ORB_ASSERT(corners >= 3);
   build->triangles += corners - 2;
   if (build->triangles > build->max_triangles || corners > ORB_FACE_CORNERS_MAX) {
-    return orb_fail(build->ctx, ORB_E_TOO_LARGE, "The mesh has more than the %lld triangles that are allowed.",
+    return orb_fail(build->ctx, ORB_E_TOO_LARGE, "The mesh has more than the %lld triangles allowed.",
                     (long long)build->max_triangles);
   }
   if (corners != 3 && !build->face_size) {
@@ -244,7 +243,7 @@ static orb_status check_indices(orb_build *build, int is_text, int64_t end) {
   return ORB_OK;
 }
 
-/* NaN is not. */
+/* False for NaN. */
 static int is_usable(double x) {
   return fabs(x) <= ORB_COORDINATE_MAX;
 }
@@ -274,8 +273,8 @@ static orb_status check_coordinates(orb_build *build, const orb_mesh *mesh) {
       int finite = isfinite(at[0]) && isfinite(at[1]) && isfinite(at[2]);
       (void)orb_fail(build->ctx, ORB_E_NOT_FINITE,
                      finite ? "Vertex %d (counted from 0) has a coordinate beyond 1e30; scale the mesh down."
-                            : "Vertex %d (counted from 0) has a coordinate that is not a finite number; mend it or "
-                              "remove its faces.",
+                            : "Vertex %d (counted from 0) has a coordinate that is not a finite number; correct it "
+                              "or remove its faces.",
                      v);
       error = orb_context_error_edit(build->ctx);
     }
@@ -288,7 +287,7 @@ static orb_status check_coordinates(orb_build *build, const orb_mesh *mesh) {
   return error ? ORB_E_NOT_FINITE : ORB_OK;
 }
 
-/* Where the attributes of a corner lie. */
+/* The indices of a corner's vertex and attributes. */
 static orb_corner corner_of(const orb_build *build, int64_t c) {
   orb_corner corner = build->corner_more ? build->corner_more[c] : (orb_corner){build->corner_vertex[c], -1, -1};
   if (build->by_vertex) {
@@ -302,6 +301,7 @@ static float srgb_to_linear(float c) {
   return c <= 0.04045f ? c / 12.92f : powf((c + 0.055f) / 1.055f, 2.4f);
 }
 
+/* Colours above 1 are taken for bytes, 0 to 255. */
 static void colors_to_linear(orb_build *build) {
   float most = 0;
   for (int64_t i = 0; i < 4 * build->vertices; i++) {
@@ -423,7 +423,7 @@ static orb_status move_materials(orb_build *build, orb_mesh *mesh) {
   if (!build->face_material) {
     return ORB_OK;
   }
-  /* one more, plain, for faces before the first that names a material */
+  /* a plain one more, for the faces before the first that names a material */
   ORB_TRY(orb_build_grow(build->ctx, &build->materials, &build->materials_room, build->material_count + 1,
                          sizeof(orb_material)));
   build->materials[build->material_count] =
@@ -464,7 +464,7 @@ orb_status orb_build_finish(orb_build *build, int is_text, int64_t end, orb_mesh
     goto done;
   }
   if (build->colors) {
-    if (build->color_room < build->vertices) { /* vertices after the last coloured one are white */
+    if (build->color_room < build->vertices) { /* vertices after the last one with a colour are white */
       int64_t before = build->color_room;
       ORB_GO(status, orb_build_grow(ctx, &build->colors, &build->color_room, build->vertices, 4 * sizeof(float)), done);
       for (int64_t i = 4 * before; i < 4 * build->color_room; i++) {

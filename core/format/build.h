@@ -1,14 +1,17 @@
-/* What readers fill while they go through a file, and the mesh that is made of it at the end.
+/* What readers fill while they go through a file, and the mesh that results.
  *
- * Faces may name vertices that come later in a file, so indices are checked and polygons are cut into triangles only
- * in orb_build_finish(). All arrays grow with what was really read: a count in a header reserves nothing.
+ * Faces may name vertices that come later in a file, so only orb_build_finish() checks indices and cuts polygons into
+ * triangles. All arrays grow with what has been read: a count in a header reserves nothing.
  */
 #ifndef ORB_FORMAT_BUILD_H
 #define ORB_FORMAT_BUILD_H
 
 #include "orbmorph/format.h"
 
-enum { ORB_FACE_CORNERS_MAX = 1 << 24, ORB_MATERIALS_MAX = 65536 };
+enum {
+  ORB_FACE_CORNERS_MAX = 1 << 24, /* corners of one face; bounds the scratch memory that cutting it takes */
+  ORB_MATERIALS_MAX = 65536       /* materials of a file; bounds the hash table of their names */
+};
 
 /* One corner of a face, 0-based; −1: none. */
 typedef struct orb_corner {
@@ -20,24 +23,24 @@ typedef struct orb_build {
   int64_t max_triangles;
   double *positions; /* 3 a vertex */
   float *colors;     /* 4 a vertex, as in the file; NULL: none */
-  float *normals;    /* 3 each */
-  float *texcoords;  /* 2 each, v up unless texcoords_v_down */
+  float *normals;    /* 3 a normal */
+  float *texcoords;  /* 2 a texture coordinate, v up unless texcoords_v_down */
   int64_t vertices, vertex_room, color_room, normal_count, normal_room, texcoord_count, texcoord_room;
-  int by_vertex;           /* normals and texcoords are one a vertex */
-  int colors_are_srgb;     /* to be made linear */
-  int texcoords_v_down;    /* as they are to be */
-  int32_t *corner_vertex;  /* corners of all faces in turn */
-  orb_corner *corner_more; /* instead of corner_vertex where corners have texcoords or normals of their own */
+  int by_vertex;           /* normals and texture coordinates belong to vertices, not to corners */
+  int colors_are_srgb;     /* orb_build_finish() converts them to linear */
+  int texcoords_v_down;    /* already in glTF's convention */
+  int32_t *corner_vertex;  /* the corners of all faces, one face after another */
+  orb_corner *corner_more; /* replaces corner_vertex once a corner has a texture coordinate or normal of its own */
   int64_t corners, corner_room, more_room;
   int32_t *face_size; /* NULL while all faces are triangles */
   int32_t *face_material;
   int64_t faces, size_room, material_room, triangles;
   int32_t largest_face;
-  int32_t material; /* of faces to come; −1 before the first one is named */
+  int32_t material; /* of the faces to come; −1 before the file names one */
   orb_material *materials;
   int32_t *material_slots;
   int64_t material_count, materials_room;
-  int64_t highest_vertex, highest_texcoord, highest_normal; /* that a face names */
+  int64_t highest_vertex, highest_texcoord, highest_normal; /* indices that a face names, and where: line or offset */
   int64_t highest_vertex_where, highest_texcoord_where, highest_normal_where;
 } orb_build;
 
@@ -50,20 +53,21 @@ ORB_MUST_CHECK orb_status orb_build_color(orb_build *build, const double *rgba, 
 ORB_MUST_CHECK orb_status orb_build_normal(orb_build *build, const double normal[3]);
 ORB_MUST_CHECK orb_status orb_build_texcoord(orb_build *build, const double texcoord[2]);
 
-/* One more corner of the face that is being read, then its end; where: line or offset, for messages. */
+/* One more corner of the present face, then its end; where: line or offset, for messages. */
 ORB_MUST_CHECK orb_status orb_build_corner(orb_build *build, orb_corner corner, int64_t where);
 ORB_MUST_CHECK orb_status orb_build_face_end(orb_build *build, int64_t corners);
 
-/* Makes the named material that of the faces to come. */
+/* Gives the named material to the faces to come. */
 ORB_MUST_CHECK orb_status orb_build_use_material(orb_build *build, const unsigned char *name, size_t length);
 
-/* Fails with ORB_E_MALFORMED_MESH at a place: a line of a text (is_text) or an offset. */
+/* Fails with ORB_E_MALFORMED_MESH at a line of a text (is_text) or at a byte offset. */
 orb_status orb_build_malformed(orb_context *ctx, int is_text, int64_t where, const char *format, ...) ORB_PRINTF(4, 5);
 
-/* Checks indices, cuts polygons, fills `out`. end: the last line or the size, for a file without faces. */
+/* Checks indices, cuts polygons, fills `out`. end: the last line or the size, where the error of a file without faces
+ * points. */
 ORB_MUST_CHECK orb_status orb_build_finish(orb_build *build, int is_text, int64_t end, orb_mesh *out);
 
-/* Grows an array to hold `need` elements. */
+/* Grows an array (the address of its pointer) to hold `need` elements of `element` bytes; *room: how many it holds. */
 ORB_MUST_CHECK orb_status orb_build_grow(orb_context *ctx, void *array, int64_t *room, int64_t need, size_t element);
 
 #endif

@@ -1,4 +1,4 @@
-/* Numbers from bytes of either order, at any alignment. */
+/* Reading numbers from bytes of either order, at any alignment. */
 #ifndef ORB_FORMAT_BYTES_H
 #define ORB_FORMAT_BYTES_H
 

@@ -1,14 +1,12 @@
-/* Reading glTF and GLB.
+/* glTF and GLB: all triangle primitives of the default scene, positions after node transforms.
  *
- * The document is parsed by cJSON, which copies no buffer and nests no deeper than it allows. Accessors are decoded
- * from the bytes where they lie, after every offset was checked against them.
+ * cJSON parses the document; it copies no buffer and limits how deep values nest. Accessors are decoded in place, after
+ * every offset has been checked against the bytes.
  *
  * Vertices are numbered over the triangle primitives of all meshes in file order, whether the scene shows them or not;
- * a mesh that is shown more than once gets further numbers after all of these. Faults inside are exceptions; all end in
- * orb_gltf_read().
+ * a mesh that is shown more than once gets further numbers after all of these. Errors inside are exceptions; all end in
+ * read_either().
  */
-#include "format/gltf.h"
-
 #include <cjson/cJSON.h>
 #include <algorithm>
 #include <cmath>
@@ -19,9 +17,10 @@
 #include <vector>
 
 extern "C" {
-#include "format/build.h"
 #include "format/bytes.h"
 #include "format/json_check.h"
+#include "format/readers.h"
+#include "format/text.h"
 #include "format/texture.h"
 }
 
@@ -38,8 +37,8 @@ struct Reader {
   std::vector<Bytes> buffers;
   std::vector<std::vector<unsigned char>> decoded;
   orb_build build;
-  std::vector<orb_image> images; /* of the context; handed over or freed */
-  std::vector<int32_t> image_number;
+  std::vector<orb_image> images;     /* owned: the context's memory, passed to the mesh or freed */
+  std::vector<int32_t> image_number; /* of each image of the file: its number in images, −1: none, −2: not yet known */
   size_t image_bytes = 0;
 
   Reader(orb_context *context, size_t size) : ctx(context), file_size(size) { orb_build_init(&build, ctx); }
@@ -93,7 +92,7 @@ struct Reader {
     return Bytes{bytes.at + offset, length};
   }
 
-  /* Reads `count` elements of `width` components from a view into out. */
+  /* Reads `count` elements of `width` components from a view into `out`. */
   void read_elements(int64_t view_index, size_t offset, size_t stride, int64_t type, bool normalized, size_t count,
                      size_t width, std::vector<double> &out) const {
     size_t size = static_cast<size_t>(component_size(type)), packed = size * width;
@@ -102,7 +101,7 @@ struct Reader {
     }
     Bytes bytes = view(view_index);
     stride = stride ? stride : packed;
-    if (offset > bytes.size || packed > bytes.size - offset || stride > (1u << 20) ||
+    if (offset > bytes.size || packed > bytes.size - offset || stride > STRIDE_MAX ||
         (count - 1) > (bytes.size - offset - packed) / stride) {
       malformed("A glTF accessor reaches beyond its buffer view.");
     }
@@ -147,7 +146,7 @@ struct Reader {
     bool normalized = cJSON_IsTrue(member(a, "normalized"));
     std::vector<double> out;
     component_size(type);
-    if (source == NONE) { /* zeros, to be changed by the sparse part */
+    if (source == NONE) { /* zeros, which the sparse part changes */
       if (count > file_size) {
         malformed("A glTF accessor announces more elements than the file could hold.");
       }
@@ -164,7 +163,7 @@ struct Reader {
     return out;
   }
 
-  /* An attribute of a primitive, or nothing. */
+  /* An attribute of a primitive, or an empty list; `low` to `high` components are accepted. */
   std::vector<double> attribute(const cJSON *primitive, const char *name, size_t count, size_t low, size_t high,
                                 size_t *width) const {
     const cJSON *attributes = member(primitive, "attributes");
@@ -217,7 +216,7 @@ struct Reader {
     auto at = [&](size_t i) { return static_cast<int64_t>(index[i]); };
     if (mode == 4) {
       if (index.size() % 3 != 0) {
-        malformed("A glTF primitive of triangles has a number of corners that is no multiple of three.");
+        malformed("A glTF primitive of triangles has a number of corners that is not a multiple of three.");
       }
       for (size_t i = 0; i + 2 < index.size(); i += 3) {
         add_triangle(base, at(i), at(i + 1), at(i + 2), mirrored);
@@ -227,13 +226,13 @@ struct Reader {
     for (size_t i = 0; i + 2 < index.size(); i++) {
       int64_t a = mode == 5 ? at(i) : at(i + 1), b = mode == 5 ? at(i + 1 + i % 2) : at(i + 2),
               c = mode == 5 ? at(i + 2 - i % 2) : at(0);
-      if (a != b && b != c && c != a) { /* strips repeat corners to turn round */
+      if (a != b && b != c && c != a) { /* strips repeat corners to change direction */
         add_triangle(base, a, b, c, mirrored);
       }
     }
   }
 
-  /* The vertices of a primitive, and its faces if it is shown. */
+  /* Adds the vertices of a primitive, and its faces if it is shown. */
   void add_primitive(const cJSON *primitive, const Matrix &matrix, bool shown, bool normals, bool texcoords) {
     int64_t mode = whole(primitive, "mode", 4);
     if (mode < 4 || mode > 6 || whole(member(primitive, "attributes"), "POSITION", NONE) == NONE) {
@@ -247,7 +246,8 @@ struct Reader {
     size_t count = position.size() / 3, color_width = 0;
     if (static_cast<size_t>(build.vertices) + count > 2 * file_size + 1024 ||
         static_cast<size_t>(build.triangles) > 2 * file_size + 1024) {
-      throw Fault{ORB_E_TOO_LARGE, "The glTF file shows its meshes so often that they come to more than the file."};
+      throw Fault{ORB_E_TOO_LARGE,
+                  "The glTF file shows its meshes so often that they need more memory than the file justifies."};
     }
     std::vector<double> normal = attribute(primitive, "NORMAL", count, 3, 3, &width);
     std::vector<double> texcoord = attribute(primitive, "TEXCOORD_0", count, 2, 2, &width);
@@ -275,7 +275,7 @@ struct Reader {
     }
   }
 
-  /* What some triangle primitive has, all get. */
+  /* Whether any triangle primitive has this attribute: then all get it. */
   bool any_has(const char *name) const {
     for (const cJSON *mesh : meshes) {
       for (const cJSON *primitive : array_of(mesh, "primitives")) {
@@ -287,7 +287,7 @@ struct Reader {
     return false;
   }
 
-  /* Mesh number and matrix of each node of the scene that shows one, in the order of a walk from its roots. */
+  /* Mesh number and matrix of each node of the scene that shows a mesh, in depth-first order from the roots. */
   std::vector<std::pair<int64_t, Matrix>> instances() const {
     const List nodes = array_of(doc, "nodes"), scenes = array_of(doc, "scenes");
     std::vector<std::pair<int64_t, Matrix>> stack, out;
@@ -323,7 +323,7 @@ struct Reader {
       stack.pop_back();
       const cJSON *node = element(nodes, index, "node");
       if (seen[static_cast<size_t>(index)]) {
-        malformed("Node " + std::to_string(index) + " of the glTF file hangs below two others, or below itself.");
+        malformed("Node " + std::to_string(index) + " of the glTF file is a child of two nodes, or of itself.");
       }
       seen[static_cast<size_t>(index)] = true;
       Matrix matrix = above * matrix_of(node);
@@ -341,12 +341,12 @@ struct Reader {
 
   static int64_t number_of(const cJSON *value) {
     if (!cJSON_IsNumber(value) || !(value->valuedouble >= 0 && value->valuedouble <= INT32_MAX)) {
-      malformed("A glTF list of nodes has something that is not an index.");
+      malformed("A glTF list of nodes contains something that is not an index.");
     }
     return static_cast<int64_t>(value->valuedouble);
   }
 
-  /* The image in the result for an image of the file, −1 where its bytes are not in the file or are no picture. */
+  /* The number in the result of an image of the file; −1 where its bytes are not in the file, or are not a picture. */
   int32_t use_image(int64_t index) {
     const cJSON *image = element(image_list, index, "image");
     if (image_number[static_cast<size_t>(index)] != -2) {
@@ -505,7 +505,7 @@ struct Reader {
   }
 };
 
-/* Separators outside strings: a bound on how many values the document has. */
+/* Counts the separators outside strings: a bound on how many values the document has. */
 size_t count_values(const unsigned char *text, size_t size) {
   size_t count = 1;
   bool quoted = false;
@@ -529,7 +529,7 @@ Bytes split_glb(const unsigned char *bytes, size_t size, Bytes *chunk) {
   }
   size_t length = orb_read_u32(bytes + 8, 0), text = orb_read_u32(bytes + 12, 0);
   if (orb_read_u32(bytes + 4, 0) != 2 || orb_read_u32(bytes + 16, 0) != 0x4e4f534a) {
-    malformed("The GLB is not of version 2, or does not begin with its JSON.");
+    malformed("The GLB is not version 2, or does not begin with its JSON.");
   }
   if (length > size || length < 20 || text > length - 20) {
     malformed("The GLB announces " + std::to_string(length) + " bytes but has " + std::to_string(size) + ".");
@@ -564,25 +564,23 @@ void read_document(orb_context *ctx, const unsigned char *bytes, size_t size, bo
   }
   if (!doc) {
     int64_t at = end ? reinterpret_cast<const unsigned char *>(end) - bytes : static_cast<int64_t>(size);
-    (void)orb_build_malformed(ctx, 0, at, "The JSON of the glTF file is broken.");
+    (void)orb_build_malformed(ctx, 0, at, "The JSON of the glTF file is not valid.");
     throw Passed{ORB_E_MALFORMED_MESH};
   }
   reader.doc = doc.get();
   reader.read(out);
 }
 
-}  // namespace
-
-extern "C" orb_status orb_gltf_read(orb_context *ctx, const unsigned char *bytes, size_t size, int binary,
-                                    orb_mesh *out) {
-  /* The parser's memory is not of the context; a block of about its size keeps the budget honest, untouched. */
+/* No exception leaves it. */
+orb_status read_either(orb_context *ctx, const unsigned char *bytes, size_t size, bool binary, orb_mesh *out) {
+  /* The parser's memory is not charged to the context; a block of about its size, never touched, stands for it. */
   void *reserve = orb_alloc(ctx, size, binary ? 1 : 4);
   if (!reserve) {
     return ORB_E_NO_MEMORY;
   }
   orb_status status = ORB_OK;
   try {
-    read_document(ctx, bytes, size, binary != 0, out);
+    read_document(ctx, bytes, size, binary, out);
   } catch (const Passed &passed) {
     status = passed.status;
   } catch (const Fault &fault) {
@@ -590,10 +588,33 @@ extern "C" orb_status orb_gltf_read(orb_context *ctx, const unsigned char *bytes
                  ? orb_build_malformed(ctx, 0, static_cast<int64_t>(size), "%s", fault.detail.c_str())
                  : orb_fail(ctx, fault.status, "%s", fault.detail.c_str());
   } catch (const std::bad_alloc &) {
-    status = orb_fail(ctx, ORB_E_NO_MEMORY, "The machine has no memory left for the glTF file.");
+    status = orb_fail(ctx, ORB_E_NO_MEMORY, "The machine is out of memory for the glTF file.");
   } catch (const std::exception &error) {
-    status = orb_build_malformed(ctx, 0, static_cast<int64_t>(size), "The glTF file is broken: %s", error.what());
+    status = orb_build_malformed(ctx, 0, static_cast<int64_t>(size), "The glTF file is not valid: %s", error.what());
   }
   orb_free(ctx, reserve);
   return status;
+}
+
+}  // namespace
+
+extern "C" orb_status orb_gltf_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out) {
+  return read_either(ctx, bytes, size, false, out);
+}
+
+extern "C" orb_status orb_glb_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out) {
+  return read_either(ctx, bytes, size, true, out);
+}
+
+/* A JSON object. */
+extern "C" orb_certainty orb_gltf_is(const unsigned char *bytes, size_t size) {
+  size_t i = orb_bom(bytes, size);
+  while (i < size && (bytes[i] == ' ' || bytes[i] == '\t' || bytes[i] == '\n' || bytes[i] == '\r')) {
+    i++;
+  }
+  return i < size && bytes[i] == '{' ? ORB_LIKELY : ORB_NO;
+}
+
+extern "C" orb_certainty orb_glb_is(const unsigned char *bytes, size_t size) {
+  return size >= 4 && std::memcmp(bytes, "glTF", 4) == 0 ? ORB_SURE : ORB_NO;
 }

@@ -1,5 +1,5 @@
-/* Values of a glTF document: faults, members of objects, arrays, data: URIs, matrices, sizes of components. Only
- * gltf.cc includes this. */
+/* Values of a glTF document: errors, members of objects, arrays, data: URIs, matrices, components. Only gltf.cc
+ * includes this. */
 #ifndef ORB_FORMAT_GLTF_VALUES_HH
 #define ORB_FORMAT_GLTF_VALUES_HH
 
@@ -19,6 +19,7 @@ namespace {
 
 using List = std::vector<const cJSON *>;
 
+/* A document that is refused. */
 struct Fault {
   orb_status status;
   std::string detail;
@@ -28,7 +29,7 @@ struct Fault {
   throw Fault{ORB_E_MALFORMED_MESH, detail};
 }
 
-/* A call of the C side: its status becomes an exception, its error record stays. */
+/* A failed call of the C side: its status becomes an exception, its error record stays. */
 struct Passed {
   orb_status status;
 };
@@ -39,7 +40,8 @@ void must(orb_status status) {
 }
 
 const int64_t NONE = -1;
-const size_t VALUES_MAX = 1000000;
+const size_t VALUES_MAX = 1000000;  /* of a document: cJSON takes 64 bytes or more for each */
+const size_t STRIDE_MAX = 1u << 20; /* bytes between elements that are accepted; glTF itself allows 252 at most */
 
 struct Bytes {
   const unsigned char *at = nullptr;
@@ -62,7 +64,7 @@ List array_of(const cJSON *object, const char *key) {
   return out;
 }
 
-/* A whole number that is not negative, or `fallback` where there is none. */
+/* A whole number that is not negative, or `fallback` where the member is absent. */
 int64_t whole(const cJSON *object, const char *key, int64_t fallback) {
   const cJSON *item = member(object, key);
   if (!item) {
@@ -87,7 +89,7 @@ std::string text_of(const cJSON *object, const char *key) {
   return cJSON_IsString(item) ? std::string(item->valuestring) : std::string();
 }
 
-/* numbers[0 … count) of an array member; false where it is absent. */
+/* Reads an array member of exactly `count` numbers; false where it is absent. */
 bool numbers(const cJSON *object, const char *key, double *out, size_t count) {
   if (!member(object, key)) {
     return false;
@@ -98,7 +100,7 @@ bool numbers(const cJSON *object, const char *key, double *out, size_t count) {
   }
   for (size_t i = 0; i < count; i++) {
     if (!cJSON_IsNumber(items[i])) {
-      malformed(std::string("The glTF member \"") + key + "\" has something that is not a number.");
+      malformed(std::string("The glTF member \"") + key + "\" contains something that is not a number.");
     }
     out[i] = items[i]->valuedouble;
   }
@@ -158,7 +160,7 @@ struct Matrix {
     }
   }
 
-  /* By the cofactors: the inverse transpose up to scale, right for singular matrices too. */
+  /* By the cofactors: the inverse transpose up to scale, defined for singular matrices too. */
   void normal(const double n[3], double out[3]) const {
     double sign = determinant() < 0 ? -1 : 1;
     for (int i = 0; i < 3; i++) {
@@ -229,7 +231,7 @@ int component_size(int64_t type) {
     case 5126:
       return 4;
     default:
-      malformed("A glTF accessor has a component type that is not known.");
+      malformed("A glTF accessor has an unknown component type.");
   }
 }
 

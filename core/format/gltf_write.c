@@ -1,7 +1,7 @@
-/* Writes a described scene as GLB: the JSON as text, its members in alphabetical order, then the binary chunk.
+/* Writes a scene as GLB: the JSON as text, its members in alphabetical order, then the binary chunk.
  *
- * All memory is of the context, so that a budget counts it and an allocation that fails is an error like any other: the
- * JSON library of tinygltf, which could write this too, ends the process then. */
+ * All memory comes from the context, so that the budget counts it and a failed allocation is an error like any other.
+ * (The JSON library of tinygltf, which could write this too, ends the process when an allocation fails.) */
 #include "format/gltf_write.h"
 
 #include <stdio.h>
@@ -23,7 +23,7 @@ enum {
   WRAP_REPEAT = 10497,
 };
 
-/* Text goes through the functions below until one fails; the first failure stays. */
+/* The functions below append text until one fails; the first failure stays. */
 typedef struct writer {
   orb_context *ctx;
   orb_buffer *out;
@@ -40,14 +40,14 @@ static void text(writer *w, const char *literal) {
   put(w, literal, strlen(literal));
 }
 
-/* "key":value, before the first a brace or bracket was written, before the others a comma is. */
+/* before: the text in front of the value, with its comma or bracket and its key. */
 static void integer(writer *w, const char *before, size_t value) {
   char digits[24];
   text(w, before);
   put(w, digits, (size_t)snprintf(digits, sizeof digits, "%zu", value));
 }
 
-/* As few digits as give the number back; a point, whatever the locale writes. */
+/* As few digits as read back as the same number; with a point in every locale. */
 static void number(writer *w, const char *before, double value) {
   char digits[40];
   int length = 0;
@@ -157,7 +157,7 @@ static size_t or_else(int32_t value, size_t fallback) {
   return value ? (size_t)value : fallback;
 }
 
-/* What a sampler says, where the material leaves it open too. */
+/* The members of a sampler, with glTF's usual values where the material gives none. */
 static void sampler_of(const orb_material *m, size_t out[4]) {
   out[0] = or_else(m->mag_filter, FILTER_LINEAR);
   out[1] = or_else(m->min_filter, FILTER_LINEAR_MIPMAP_LINEAR);
@@ -165,8 +165,8 @@ static void sampler_of(const orb_material *m, size_t out[4]) {
   out[3] = or_else(m->wrap_t, WRAP_REPEAT);
 }
 
-/* A texture with a sampler of its own for each image and way to show it: firsts[texture] is the first material that
- * uses it. Returns the number of the material's, −1 where it has no image. */
+/* Each pair of image and sampler becomes one texture: firsts[texture] is the first material that uses it. Returns the
+ * number of the material's texture, −1 where it has no image. O(materials). */
 static int32_t find_texture(const orb_gltf_scene *scene, int32_t material, int32_t *firsts, int32_t *count) {
   const orb_material *m = &scene->materials[material];
   size_t wanted[4], sampler[4];
@@ -300,7 +300,7 @@ static void write_mesh(writer *w, const orb_gltf_scene *scene) {
   text(w, "}]");
 }
 
-/* firsts: room for a number a material. */
+/* firsts: room for material_count numbers. */
 static void write_document(writer *w, const orb_gltf_scene *scene, size_t binary_size, int32_t *firsts) {
   int32_t textures = 0;
   write_accessors(w, scene);

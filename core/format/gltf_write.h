@@ -1,10 +1,10 @@
-/* A binary glTF out: the description is made by core/transfer; this writes it down. */
+/* Writing binary glTF. core/transfer describes the scene; this writes it down. */
 #ifndef ORB_FORMAT_GLTF_WRITE_H
 #define ORB_FORMAT_GLTF_WRITE_H
 
 #include "orbmorph/mesh.h"
 
-/* glTF's numbers. */
+/* Numbers that glTF 2.0 assigns. */
 enum {
   ORB_GLTF_USHORT = 5123,
   ORB_GLTF_UINT = 5125,
@@ -53,13 +53,13 @@ typedef struct orb_gltf_scene {
   const orb_gltf_accessor *accessors;
   const orb_gltf_primitive *primitives;
   const char *const *target_names;
-  const orb_material *materials; /* their image: in images */
+  const orb_material *materials; /* their image numbers index images */
   const orb_gltf_image *images;
   const orb_gltf_extra *extras;
   int32_t times, weights; /* accessors of the animation "morph"; −1: none */
 } orb_gltf_scene;
 
-/* Appends the GLB. Texts that are no UTF-8 have their bad bytes replaced. ORB_E_TOO_LARGE, ORB_E_NO_MEMORY. */
+/* Appends the GLB. In texts that are not UTF-8, U+FFFD replaces the bad bytes. ORB_E_TOO_LARGE, ORB_E_NO_MEMORY. */
 ORB_MUST_CHECK orb_status orb_gltf_write(orb_context *ctx, const orb_gltf_scene *scene, const orb_buffer *binary,
                                          orb_buffer *out);
 #endif

@@ -1,9 +1,9 @@
-/* A bit a level, object or array, instead of recursion. */
+/* A JSON scanner without recursion: one flag for each level says whether it is an object. */
 #include "format/json_check.h"
 
 #include <string.h>
 
-enum { DEPTH_MAX = 1000, NUMBER_MAX = 63 };
+enum { DEPTH_MAX = 1000, NUMBER_MAX = 63 }; /* cJSON's limits: levels, characters of a number */
 
 typedef struct scanner {
   const char *at, *end;
@@ -29,7 +29,7 @@ static int word(scanner *s, const char *text) {
   return there;
 }
 
-/* The code unit of \uXXXX, whose \u was read; −1 if there is none. */
+/* The code unit of \uXXXX, after its \u; −1 if there is none. */
 static int unit(scanner *s) {
   int value = 0;
   for (int i = 0; i < 4; i++, s->at++) {

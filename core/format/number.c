@@ -1,9 +1,10 @@
-/* Decimal to double.
- *
- * Three ways, each exact: (1) at most 15 digits and a power of ten up to 22 are both doubles, so one multiplication or
- * division rounds once (Clinger 1990); (2) up to 19 digits and a power up to 19 fit integers of 64 bits, so a product
- * or quotient of 128 bits with a sticky bit is rounded to 53 by hand; (3) all else goes to strtod() as a string of
- * digits without a point, which no locale reads differently, cut to 800 digits and a sticky one: 768 decide.
+/* Decimal to double, correctly rounded, in one of three ways:
+ *  1. at most 15 digits and a power of ten up to 22 are both doubles, so one multiplication or division rounds once
+ *     (Clinger 1990);
+ *  2. up to 19 digits and a power up to 19 both fit 64 bits, so their product or quotient in 128 bits, with a sticky
+ *     bit, is rounded to 53 bits here;
+ *  3. everything else goes to strtod() as digits without a point, which every locale reads alike, cut to 800 digits and
+ *     a sticky one: 768 digits decide.
  */
 #include "format/number.h"
 
@@ -13,12 +14,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_DIGITS = 800, MAX_EXPONENT = 100000 };
+enum {
+  MAX_DIGITS = 800,     /* see 3. above */
+  MAX_EXPONENT = 100000 /* beyond it every number of MAX_DIGITS digits is 0 or infinite */
+};
 
 static const double POWERS[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                                   1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
-/* mantissa · 2^shift with a sticky bit below, rounded to nearest, ties to even. The result is a normal double. */
+/* mantissa · 2^shift, with a sticky bit below, rounded to nearest, ties to even. The result is a normal double. */
 static double round_to_double(uint64_t mantissa, int shift, int sticky) {
   int drop = 64 - __builtin_clzll(mantissa) - 53;
   if (drop > 0) {
@@ -50,7 +54,7 @@ static double scale_exactly(uint64_t digits, int exponent) {
     if (high == 0) {
       return round_to_double(low, -zeros, 0);
     }
-    int up = __builtin_clzll(high); /* brings all 64 bits of the window to use */
+    int up = __builtin_clzll(high); /* fills all 64 bits of the window */
     uint64_t window = up ? (high << up) | (low >> (64 - up)) : high;
     return round_to_double(window, 64 - up - zeros, (low << up) != 0);
   }
@@ -62,7 +66,7 @@ static double scale_exactly(uint64_t digits, int exponent) {
   return round_to_double(quotient, up - zeros - 63, rest != 0);
 }
 
-/* The general case, from the token's text: digits at [p, end) with perhaps a point among them. */
+/* The general case, from the text of the token: digits at [p, end), perhaps with a point among them. */
 static double convert_long(const unsigned char *p, const unsigned char *end, int64_t exponent) {
   char text[MAX_DIGITS + 32];
   int count = 0, point = 0, sticky = 0;
@@ -111,8 +115,8 @@ static const unsigned char *parse_special(const unsigned char *p, const unsigned
     p += 3;
   } else if (is_word(p, end, "nan")) {
     p += 3;
-    while (p<end && * p> ' ' && *p != '/' && *p != '#') {
-      p++; /* nan(ind) and its like */
+    while ((p < end) && (*p > ' ') && *p != '/' && *p != '#') {
+      p++; /* nan(ind) and the like */
     }
     *out = NAN;
     return p;

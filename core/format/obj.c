@@ -1,4 +1,4 @@
-/* Wavefront OBJ: v (with colours after the place), vt, vn, f, usemtl; everything else is passed over. Indices may be
+/* Wavefront OBJ: v (with colours after the position), vt, vn, f, usemtl; everything else is skipped. Indices may be
  * negative (counted back from the last element) or point forward. */
 #include "base/check.h"
 #include "format/readers.h"
@@ -19,7 +19,7 @@ static orb_status read_vertex(obj_reader *r) {
   while (orb_text_blanks(&r->text)) {
     double number;
     if (!orb_text_number(&r->text, &number)) {
-      return malformed(r, "A vertex has something that is not a number.");
+      return malformed(r, "A vertex contains something that is not a number.");
     }
     if (count < 8) {
       value[count++] = number;
@@ -45,7 +45,7 @@ static orb_status read_direction(obj_reader *r, int wanted, double value[3]) {
       return malformed(r, "A line ends before its numbers are complete.");
     }
     if (!orb_text_number(&r->text, &value[i])) {
-      return malformed(r, "A line has something that is not a number.");
+      return malformed(r, "A line contains something that is not a number.");
     }
   }
   return ORB_OK;
@@ -64,7 +64,7 @@ static orb_status read_index(obj_reader *r, int64_t count, int32_t *out) {
     value = value * 10 + (*p++ - '0');
   }
   if (p == first) {
-    return malformed(r, "A face has something that is not an index.");
+    return malformed(r, "A face contains something that is not an index.");
   }
   int64_t index = negative ? count - value : value - 1;
   if (value == 0 || value > INT32_MAX || index < 0) {
@@ -153,9 +153,9 @@ static orb_status read_line(obj_reader *r) {
     return read_usemtl(r);
   }
   if (*p < ' ' || *p == 127) {
-    return malformed(r, "The file has control characters where text should be.");
+    return malformed(r, "The file contains control characters where text should be.");
   }
-  /* passed over, with the lines it is continued on */
+  /* skipped, with the lines that continue it */
   while (r->text.at < r->text.end && !orb_is_eol(*r->text.at)) {
     if (*r->text.at == '\\' && r->text.at + 1 < r->text.end && orb_is_eol(r->text.at[1])) {
       r->text.at++;
@@ -185,18 +185,19 @@ orb_status orb_obj_read(orb_context *ctx, const unsigned char *bytes, size_t siz
   return status;
 }
 
-int orb_obj_is(const unsigned char *bytes, size_t size) {
+orb_certainty orb_obj_is(const unsigned char *bytes, size_t size) {
   static const char *const words[] = {
       "v",      "vt", "vn",     "vp",     "f",      "fo",         "o",     "g",        "s",        "l",   "p",
       "usemtl", "mg", "mtllib", "usemap", "maplib", "shadow_obj", "bevel", "c_interp", "d_interp", "lod", "cstype"};
   orb_text text = {bytes + orb_bom(bytes, size), bytes + size, 1};
   if (!orb_text_next(&text)) {
-    return bytes[orb_bom(bytes, size) < size ? orb_bom(bytes, size) : 0] == '#'; /* nothing but comments */
+    int is_comments = bytes[orb_bom(bytes, size) < size ? orb_bom(bytes, size) : 0] == '#';
+    return is_comments ? ORB_LIKELY : ORB_NO;
   }
   for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
     if (orb_text_is(&text, words[i])) {
-      return 1;
+      return ORB_LIKELY;
     }
   }
-  return 0;
+  return ORB_NO;
 }

@@ -1,6 +1,6 @@
-/* Object File Format: ASCII and big-endian binary, prefixes ST, C and N; without its keyword too. A vertex stands on
- * a line of its own; plain OFF may carry colours after the three coordinates. Faces of one or two corners (points and
- * lines) are passed over. */
+/* Object File Format: ASCII and big-endian binary, with prefixes ST, C and N, or without its keyword. Each vertex has a
+ * line of its own; plain OFF may have colours after the three coordinates. Faces of one or two corners (points and
+ * lines) are skipped. */
 #include "base/check.h"
 #include "format/bytes.h"
 #include "format/readers.h"
@@ -28,7 +28,7 @@ static int take(off_reader *r, const char *letters) {
   return 1;
 }
 
-/* The keyword with its prefixes; leaves the text where it was if there is none. */
+/* Reads the keyword with its prefixes; leaves the text where it was if there is none. */
 static void read_keyword(off_reader *r) {
   orb_text start = r->text;
   if (!orb_text_next(&r->text)) {
@@ -51,7 +51,7 @@ static void read_keyword(off_reader *r) {
   }
 }
 
-/* Vertices, faces and, perhaps, edges, on one line. */
+/* Reads the counts of vertices, faces and perhaps edges, on one line. */
 static int take_counts(off_reader *r) {
   int64_t edges;
   return orb_text_next(&r->text) && orb_text_integer(&r->text, &r->vertices) && orb_text_blanks(&r->text) &&
@@ -92,7 +92,7 @@ static orb_status read_vertex(off_reader *r) {
     do {
       double number;
       if (!orb_text_number(&r->text, &number)) {
-        return malformed(r, "A vertex has something that is not a number.");
+        return malformed(r, "A vertex contains something that is not a number.");
       }
       if (count < 16) {
         value[count++] = number;
@@ -122,7 +122,7 @@ static orb_status read_face(off_reader *r) {
       ORB_TRY(orb_build_corner(&r->build, (orb_corner){(int32_t)index, -1, -1}, r->text.line));
     }
   }
-  while (r->text.at < r->text.end && !orb_is_eol(*r->text.at)) { /* a colour, perhaps */
+  while (r->text.at < r->text.end && !orb_is_eol(*r->text.at)) { /* perhaps a colour */
     r->text.at++;
   }
   return corners >= 3 ? orb_build_face_end(&r->build, corners) : ORB_OK;
@@ -140,7 +140,7 @@ static int64_t take_i32(off_reader *r) {
 
 static orb_status cut_short(off_reader *r) {
   r->text.at = r->text.end;
-  return malformed(r, "The binary OFF ends before what its header announces.");
+  return malformed(r, "The binary OFF is shorter than its header announces.");
 }
 
 static orb_status read_binary_face(off_reader *r) {
@@ -237,8 +237,8 @@ orb_status orb_off_read(orb_context *ctx, const unsigned char *bytes, size_t siz
   return status;
 }
 
-int orb_off_is(const unsigned char *bytes, size_t size) {
+orb_certainty orb_off_is(const unsigned char *bytes, size_t size) {
   off_reader r = {.text = {bytes + orb_bom(bytes, size), bytes + size, 1}, .begin = bytes};
   read_keyword(&r);
-  return r.has_keyword || take_counts(&r);
+  return r.has_keyword || take_counts(&r) ? ORB_LIKELY : ORB_NO;
 }

@@ -1,11 +1,10 @@
-/* Polygon File Format, ASCII and binary of either order: any scalar types, any further properties and elements;
- * triangle strips too. */
-#include "format/ply.h"
-
+/* Polygon File Format, ASCII and binary of either order: any scalar types, polygons and triangle strips. Properties and
+ * elements without a known meaning are skipped. */
 #include <math.h>
 
 #include "base/check.h"
 #include "format/bytes.h"
+#include "format/ply_header.h"
 #include "format/readers.h"
 
 typedef struct ply_reader {
@@ -21,7 +20,8 @@ static orb_status malformed(ply_reader *r, const char *what) {
   return orb_build_malformed(r->build.ctx, is_text, is_text ? r->text.line : r->text.at - r->begin, "%s", what);
 }
 
-static int64_t place(const ply_reader *r) {
+/* Where the reader is: line or offset. */
+static int64_t where_of(const ply_reader *r) {
   return r->header.encoding == PLY_ASCII ? r->text.line : r->text.at - r->begin;
 }
 
@@ -52,26 +52,27 @@ static double decode(const unsigned char *p, ply_type type, int big) {
 static inline orb_status take_value(ply_reader *r, ply_type type, double *out) {
   if (r->header.encoding == PLY_ASCII) {
     if (!orb_text_next(&r->text)) {
-      return malformed(r, "The file ends before what its header announces.");
+      return malformed(r, "The file is shorter than its header announces.");
     }
-    return orb_text_number(&r->text, out) ? ORB_OK : malformed(r, "The PLY data have something that is not a number.");
+    return orb_text_number(&r->text, out) ? ORB_OK
+                                          : malformed(r, "The PLY data contain something that is not a number.");
   }
   int size = orb_ply_type_size(type);
   if (r->text.end - r->text.at < size) {
     r->text.at = r->text.end;
-    return malformed(r, "The file ends before what its header announces.");
+    return malformed(r, "The file is shorter than its header announces.");
   }
   *out = decode(r->text.at, type, r->header.encoding == PLY_BIG);
   r->text.at += size;
   return ORB_OK;
 }
 
-/* An index of a list as a whole number; −1 is for strips only. */
+/* An index of a list; lowest is −1 for strips, whose −1 ends a strip, and 0 for faces. */
 static orb_status take_index(ply_reader *r, ply_type type, int64_t lowest, int64_t *out) {
   double value = 0;
   ORB_TRY(take_value(r, type, &value));
   if (!(value >= (double)lowest && value <= INT32_MAX) || value != floor(value)) {
-    return malformed(r, "A face names a vertex that cannot be.");
+    return malformed(r, "A face has a vertex index that is not valid.");
   }
   *out = (int64_t)value;
   return ORB_OK;
@@ -79,7 +80,7 @@ static orb_status take_index(ply_reader *r, ply_type type, int64_t lowest, int64
 
 static orb_status take_polygon(ply_reader *r, const ply_property *property, int64_t count) {
   for (int64_t i = 0; i < count; i++) {
-    int64_t index = -1, where = place(r);
+    int64_t index = -1, where = where_of(r);
     ORB_TRY(take_index(r, property->type, 0, &index));
     if (count >= 3) {
       ORB_TRY(orb_build_corner(&r->build, (orb_corner){(int32_t)index, -1, -1}, where));
@@ -92,21 +93,21 @@ static orb_status take_polygon(ply_reader *r, const ply_property *property, int6
 }
 
 static orb_status take_strip(ply_reader *r, const ply_property *property, int64_t count) {
-  int64_t a = -1, b = -1, turn = 0;
+  int64_t a = -1, b = -1, reversed = 0; /* every second triangle of a strip is */
   for (int64_t i = 0; i < count; i++) {
-    int64_t c = -1, where = place(r);
+    int64_t c = -1, where = where_of(r);
     ORB_TRY(take_index(r, property->type, -1, &c));
     if (c < 0) {
       a = b = -1;
-      turn = 0;
+      reversed = 0;
       continue;
     }
     if (a >= 0) {
-      ORB_TRY(orb_build_corner(&r->build, (orb_corner){(int32_t)(turn ? b : a), -1, -1}, where));
-      ORB_TRY(orb_build_corner(&r->build, (orb_corner){(int32_t)(turn ? a : b), -1, -1}, where));
+      ORB_TRY(orb_build_corner(&r->build, (orb_corner){(int32_t)(reversed ? b : a), -1, -1}, where));
+      ORB_TRY(orb_build_corner(&r->build, (orb_corner){(int32_t)(reversed ? a : b), -1, -1}, where));
       ORB_TRY(orb_build_corner(&r->build, (orb_corner){(int32_t)c, -1, -1}, where));
       ORB_TRY(orb_build_face_end(&r->build, 3));
-      turn = !turn;
+      reversed = !reversed;
     }
     a = b;
     b = c;
@@ -120,7 +121,7 @@ static orb_status skip_values(ply_reader *r, const ply_property *property, int64
     int64_t bytes = count * orb_ply_type_size(property->type);
     if (r->text.end - r->text.at < bytes) {
       r->text.at = r->text.end;
-      return malformed(r, "The file ends before what its header announces.");
+      return malformed(r, "The file is shorter than its header announces.");
     }
     r->text.at += bytes;
     return ORB_OK;
@@ -135,7 +136,7 @@ static orb_status take_list(ply_reader *r, const ply_element *element, const ply
   double count = 0;
   ORB_TRY(take_value(r, property->count_type, &count));
   if (!(count >= 0 && count <= INT32_MAX) || count != floor(count)) {
-    return malformed(r, "A list has a length that cannot be.");
+    return malformed(r, "A list has a length that is not valid.");
   }
   int is_indices = property->role == PLY_INDICES;
   if (is_indices && element->kind == PLY_FACES) {
@@ -177,7 +178,7 @@ static orb_status read_element(ply_reader *r, const ply_element *element) {
     }
   }
   if (element->properties == 0) {
-    return ORB_OK; /* rows of nothing */
+    return ORB_OK; /* its rows hold nothing */
   }
   for (int64_t row = 0; row < element->count; row++) {
     for (int i = 0; i < element->properties; i++) {
@@ -209,4 +210,8 @@ orb_status orb_ply_read(orb_context *ctx, const unsigned char *bytes, size_t siz
   }
   orb_build_free(&r.build);
   return status;
+}
+
+orb_certainty orb_ply_is(const unsigned char *bytes, size_t size) {
+  return size >= 4 && memcmp(bytes, "ply", 3) == 0 && bytes[3] <= ' ' ? ORB_SURE : ORB_NO;
 }

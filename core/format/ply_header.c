@@ -1,10 +1,8 @@
-/* See ply.h. */
-#include "format/ply.h"
+#include "format/ply_header.h"
 
 #include <string.h>
 
 #include "base/check.h"
-#include "format/readers.h"
 
 static const struct {
   const char *name;
@@ -52,13 +50,13 @@ static orb_status malformed(orb_context *ctx, const orb_text *text, const char *
   return orb_build_malformed(ctx, 1, text->line, "%s", what);
 }
 
-/* The next word of this line, taken; its length, 0 at the end of the line. A '#' is an ordinary letter here. */
+/* Takes the next word of this line; returns its length, 0 at the end of the line. A '#' is an ordinary letter here. */
 static size_t take_word(orb_text *text, const unsigned char **word) {
   while (text->at < text->end && orb_is_blank(*text->at)) {
     text->at++;
   }
   *word = text->at;
-  while (text->at<text->end && * text->at> ' ') {
+  while ((text->at < text->end) && (*text->at > ' ')) {
     text->at++;
   }
   return (size_t)(text->at - *word);
@@ -89,7 +87,7 @@ static orb_status read_format(orb_context *ctx, orb_text *text, ply_header *head
   } else if (is_word(word, length, "binary_big_endian")) {
     header->encoding = PLY_BIG;
   } else {
-    return malformed(ctx, text, "The PLY format is none of ascii, binary_little_endian, binary_big_endian.");
+    return malformed(ctx, text, "The PLY format is not ascii, binary_little_endian or binary_big_endian.");
   }
   length = take_word(text, &word);
   return is_word(word, length, "1.0") ? ORB_OK : malformed(ctx, text, "The PLY version is not 1.0.");
@@ -137,7 +135,7 @@ static orb_status read_property(orb_context *ctx, orb_text *text, ply_header *he
   }
   property->type = take_type(text);
   if (property->type == PLY_NONE) {
-    return malformed(ctx, text, "A PLY property has a type that is not known.");
+    return malformed(ctx, text, "A PLY property has an unknown type.");
   }
   length = take_word(text, &word);
   if (length == 0) {
@@ -199,7 +197,7 @@ orb_status orb_ply_header(orb_context *ctx, orb_text *text, ply_header *header) 
     } else if (is_word(word, length, "property")) {
       status = read_property(ctx, text, header);
     } else if (length > 0 && !is_word(word, length, "comment") && !is_word(word, length, "obj_info")) {
-      status = malformed(ctx, text, "The PLY header has a line that is not known.");
+      status = malformed(ctx, text, "The PLY header has an unknown line.");
     }
     ORB_TRY(status);
     orb_text_skip_line(text);
@@ -213,8 +211,4 @@ orb_status orb_ply_header(orb_context *ctx, orb_text *text, ply_header *header) 
   ORB_TRY(check_header(ctx, text, header));
   orb_text_skip_line(text);
   return ORB_OK;
-}
-
-int orb_ply_is(const unsigned char *bytes, size_t size) {
-  return size >= 4 && memcmp(bytes, "ply", 3) == 0 && bytes[3] <= ' ';
 }

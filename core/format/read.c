@@ -1,91 +1,75 @@
-/* The front door of the readers: which format, then its reader. */
+/* Mesh files in, GLB and sphere PLY out.
+ *
+ * In: read.c detects the format and calls a reader (obj.c, off.c, ply.c with ply_header.c, stl.c, gltf.cc with
+ * gltf_values.hh). Readers take tokens from text.h and number.h or numbers from bytes.h, and fill an orb_build
+ * (build.h), which becomes an orb_mesh. texture.c and json_check.c serve gltf.cc. Out: gltf_write.c writes the asset,
+ * sphere_ply.c a mesh with its embedding.
+ */
 #include <string.h>
 
 #include "base/check.h"
-#include "format/gltf.h"
 #include "format/readers.h"
 
-static const char *const NAMES[] = {"auto", "obj", "off", "ply", "stl", "gltf", "glb"};
-enum { FORMAT_COUNT = sizeof NAMES / sizeof *NAMES };
+/* One row for each format. Of equally sure detectors the first wins, so the strict ones come first. */
+static const struct {
+  orb_format format;
+  const char *name;
+  orb_certainty (*is)(const unsigned char *bytes, size_t size);
+  orb_status (*read)(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
+} READERS[] = {
+    {ORB_FORMAT_GLB, "glb", orb_glb_is, orb_glb_read},     {ORB_FORMAT_PLY, "ply", orb_ply_is, orb_ply_read},
+    {ORB_FORMAT_GLTF, "gltf", orb_gltf_is, orb_gltf_read}, {ORB_FORMAT_OFF, "off", orb_off_is, orb_off_read},
+    {ORB_FORMAT_STL, "stl", orb_stl_is, orb_stl_read},     {ORB_FORMAT_OBJ, "obj", orb_obj_is, orb_obj_read},
+};
+enum { READER_COUNT = sizeof READERS / sizeof *READERS };
 
 const char *orb_format_name(orb_format format) {
-  return (unsigned)format < FORMAT_COUNT ? NAMES[format] : NAMES[0];
+  for (int i = 0; i < READER_COUNT; i++) {
+    if (READERS[i].format == format) {
+      return READERS[i].name;
+    }
+  }
+  return "auto";
 }
 
 orb_format orb_format_of_name(const char *name) {
-  for (int i = 1; i < FORMAT_COUNT; i++) {
-    if (strcmp(name, NAMES[i]) == 0) {
-      return (orb_format)i;
+  for (int i = 0; i < READER_COUNT; i++) {
+    if (strcmp(name, READERS[i].name) == 0) {
+      return READERS[i].format;
     }
   }
   return ORB_FORMAT_AUTO;
 }
 
-static int is_json_object(const unsigned char *bytes, size_t size) {
-  size_t i = orb_bom(bytes, size);
-  while (i < size && (bytes[i] == ' ' || bytes[i] == '\t' || bytes[i] == '\n' || bytes[i] == '\r')) {
-    i++;
-  }
-  return i < size && bytes[i] == '{';
-}
-
 orb_format orb_format_detect(const unsigned char *bytes, size_t size) {
-  if (size == 0) {
-    return ORB_FORMAT_AUTO;
+  orb_format found = ORB_FORMAT_AUTO;
+  orb_certainty surest = ORB_NO;
+  for (int i = 0; i < READER_COUNT && size > 0 && surest < ORB_SURE; i++) {
+    orb_certainty certainty = READERS[i].is(bytes, size);
+    if (certainty > surest) {
+      surest = certainty;
+      found = READERS[i].format;
+    }
   }
-  if (size >= 4 && memcmp(bytes, "glTF", 4) == 0) {
-    return ORB_FORMAT_GLB;
-  }
-  if (orb_ply_is(bytes, size)) {
-    return ORB_FORMAT_PLY;
-  }
-  if (orb_stl_is_exact(bytes, size)) {
-    return ORB_FORMAT_STL;
-  }
-  if (is_json_object(bytes, size)) {
-    return ORB_FORMAT_GLTF;
-  }
-  if (orb_off_is(bytes, size)) {
-    return ORB_FORMAT_OFF;
-  }
-  if (orb_stl_is_text(bytes, size)) {
-    return ORB_FORMAT_STL;
-  }
-  if (orb_obj_is(bytes, size)) {
-    return ORB_FORMAT_OBJ;
-  }
-  return orb_stl_is_plausible(bytes, size) ? ORB_FORMAT_STL : ORB_FORMAT_AUTO;
+  return found;
 }
 
 orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_format format, orb_mesh *out,
                          orb_format *format_out) {
   memset(out, 0, sizeof *out);
-  if (size == 0) {
-    if (format_out) {
-      *format_out = format;
-    }
-    return orb_build_malformed(ctx, 0, 0, "The file is empty; send the bytes of a mesh file.");
-  }
   if (format == ORB_FORMAT_AUTO) {
     format = orb_format_detect(bytes, size);
   }
   if (format_out) {
     *format_out = format;
   }
-  switch (format) {
-    case ORB_FORMAT_OBJ:
-      return orb_obj_read(ctx, bytes, size, out);
-    case ORB_FORMAT_OFF:
-      return orb_off_read(ctx, bytes, size, out);
-    case ORB_FORMAT_PLY:
-      return orb_ply_read(ctx, bytes, size, out);
-    case ORB_FORMAT_STL:
-      return orb_stl_read(ctx, bytes, size, out);
-    case ORB_FORMAT_GLTF:
-    case ORB_FORMAT_GLB:
-      return orb_gltf_read(ctx, bytes, size, format == ORB_FORMAT_GLB, out);
-    case ORB_FORMAT_AUTO:
-      break;
+  if (size == 0) {
+    return orb_build_malformed(ctx, 0, 0, "The file is empty; send the bytes of a mesh file.");
+  }
+  for (int i = 0; i < READER_COUNT; i++) {
+    if (READERS[i].format == format) {
+      return READERS[i].read(ctx, bytes, size, out);
+    }
   }
   return orb_fail(ctx, ORB_E_UNKNOWN_FORMAT, "The bytes are not OBJ, OFF, PLY, STL, glTF or GLB; send one of these.");
 }

@@ -1,25 +1,38 @@
-/* One reader a format, each in its own file. They fill an orb_build; size is at least 1. */
+/* The readers: for each format a detector and a reader, defined in the file of its name and listed in the table of
+ * read.c. Both get at least one byte. A reader fills an orb_build (build.h) and ends with orb_build_finish(). */
 #ifndef ORB_FORMAT_READERS_H
 #define ORB_FORMAT_READERS_H
 
 #include "format/build.h"
 
+/* How sure a detector is that bytes are of its format. The surest detector wins; of equally sure ones, the first in the
+ * table. */
+typedef enum orb_certainty {
+  ORB_NO,
+  ORB_POSSIBLE, /* nothing speaks against it */
+  ORB_LIKELY,   /* the first words are those of the format */
+  ORB_SURE      /* a signature, or counts that agree with the size */
+} orb_certainty;
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+orb_certainty orb_glb_is(const unsigned char *bytes, size_t size);
+orb_certainty orb_gltf_is(const unsigned char *bytes, size_t size);
+orb_certainty orb_obj_is(const unsigned char *bytes, size_t size);
+orb_certainty orb_off_is(const unsigned char *bytes, size_t size);
+orb_certainty orb_ply_is(const unsigned char *bytes, size_t size);
+orb_certainty orb_stl_is(const unsigned char *bytes, size_t size);
+
+ORB_MUST_CHECK orb_status orb_glb_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
+ORB_MUST_CHECK orb_status orb_gltf_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
 ORB_MUST_CHECK orb_status orb_obj_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
 ORB_MUST_CHECK orb_status orb_off_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
 ORB_MUST_CHECK orb_status orb_ply_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
 ORB_MUST_CHECK orb_status orb_stl_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
 
-/* What the first bytes say. */
-int orb_off_is(const unsigned char *bytes, size_t size);
-int orb_ply_is(const unsigned char *bytes, size_t size);
-int orb_obj_is(const unsigned char *bytes, size_t size);
-int orb_stl_is_text(const unsigned char *bytes, size_t size);
-int orb_stl_is_exact(const unsigned char *bytes, size_t size);     /* binary, and its count fits its size */
-int orb_stl_is_plausible(const unsigned char *bytes, size_t size); /* binary, going by its first facets */
-
-/* Bytes of a UTF-8 byte order mark at the start. */
-static inline size_t orb_bom(const unsigned char *bytes, size_t size) {
-  return size >= 3 && bytes[0] == 0xef && bytes[1] == 0xbb && bytes[2] == 0xbf ? 3 : 0;
+#ifdef __cplusplus
 }
-
+#endif
 #endif

@@ -1,4 +1,4 @@
-/* A mesh and its sphere as binary little-endian PLY. */
+/* A mesh and its sphere as binary little-endian PLY, written in batches of BATCH rows. */
 #include "base/check.h"
 #include "format/bytes.h"
 #include "orbmorph/format.h"

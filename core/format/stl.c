@@ -1,4 +1,4 @@
-/* STL, ASCII and binary. Vertices are numbered 3·facet + corner; facet normals say nothing that the corners do not. */
+/* STL, ASCII and binary. Vertices are numbered 3·facet + corner. Facet normals are ignored: the corners imply them. */
 #include <math.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 #include "format/readers.h"
 #include "format/text.h"
 
-enum { HEADER = 84, FACET = 50 };
+enum { HEADER = 84, FACET = 50 }; /* bytes of a binary file */
 
 static orb_status read_binary(orb_build *build, const unsigned char *bytes, size_t size, orb_mesh *out) {
   if (size < HEADER) {
@@ -100,22 +100,13 @@ static orb_status read_text(orb_build *build, const unsigned char *bytes, size_t
   return orb_build_finish(build, 1, text.line, out);
 }
 
-orb_status orb_stl_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out) {
-  orb_build build;
-  orb_build_init(&build, ctx);
-  orb_status status = !orb_stl_is_exact(bytes, size) && orb_stl_is_text(bytes, size)
-                          ? read_text(&build, bytes, size, out)
-                          : read_binary(&build, bytes, size, out);
-  orb_build_free(&build);
-  return status;
-}
-
-int orb_stl_is_exact(const unsigned char *bytes, size_t size) {
+/* Binary, and its count fits its size. */
+static int is_exact(const unsigned char *bytes, size_t size) {
   return size >= HEADER && (size - HEADER) % FACET == 0 && (size - HEADER) / FACET == orb_read_u32(bytes + 80, 0);
 }
 
-/* "solid", and no byte among the first ones that a text would not have. */
-int orb_stl_is_text(const unsigned char *bytes, size_t size) {
+/* "solid", and among the first bytes none that a text would not have. */
+static int is_text(const unsigned char *bytes, size_t size) {
   orb_text text = {bytes + orb_bom(bytes, size), bytes + size, 1};
   if (!orb_text_next(&text) || !orb_text_is(&text, "solid")) {
     return 0;
@@ -128,7 +119,8 @@ int orb_stl_is_text(const unsigned char *bytes, size_t size) {
   return 1;
 }
 
-int orb_stl_is_plausible(const unsigned char *bytes, size_t size) {
+/* Binary, going by its first facets. */
+static int is_plausible(const unsigned char *bytes, size_t size) {
   if (size < HEADER + FACET || orb_read_u32(bytes + 80, 0) == 0) {
     return size >= 5 && memcmp(bytes, "solid", 5) == 0;
   }
@@ -146,4 +138,21 @@ int orb_stl_is_plausible(const unsigned char *bytes, size_t size) {
     }
   }
   return 1;
+}
+
+orb_status orb_stl_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out) {
+  orb_build build;
+  orb_build_init(&build, ctx);
+  orb_status status = !is_exact(bytes, size) && is_text(bytes, size) ? read_text(&build, bytes, size, out)
+                                                                     : read_binary(&build, bytes, size, out);
+  orb_build_free(&build);
+  return status;
+}
+
+/* A binary STL may begin with "solid" too, so its size decides before its words. */
+orb_certainty orb_stl_is(const unsigned char *bytes, size_t size) {
+  return is_exact(bytes, size)       ? ORB_SURE
+         : is_text(bytes, size)      ? ORB_LIKELY
+         : is_plausible(bytes, size) ? ORB_POSSIBLE
+                                     : ORB_NO;
 }

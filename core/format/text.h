@@ -1,4 +1,4 @@
-/* Going through a text file token by token, with the number of the line. */
+/* Reading a text file token by token, with line numbers. */
 #ifndef ORB_FORMAT_TEXT_H
 #define ORB_FORMAT_TEXT_H
 
@@ -11,6 +11,11 @@ typedef struct orb_text {
   const unsigned char *at, *end;
   int64_t line; /* of `at`, 1-based */
 } orb_text;
+
+/* Bytes of a UTF-8 byte order mark at the start. */
+static inline size_t orb_bom(const unsigned char *bytes, size_t size) {
+  return size >= 3 && bytes[0] == 0xef && bytes[1] == 0xbb && bytes[2] == 0xbf ? 3 : 0;
+}
 
 static inline int orb_is_eol(unsigned char c) {
   return c == '\n' || c == '\r';
@@ -29,8 +34,8 @@ static inline void orb_text_eol(orb_text *text) {
   text->line++;
 }
 
-/* To the next token of this line; a backslash before a line end joins lines. 0 at the end of the line, at a comment
- * and at the end of the file. */
+/* Moves to the next token of this line; a backslash before a line end joins lines. Returns 0 at the end of the line, at
+ * a comment and at the end of the file. */
 static inline int orb_text_blanks(orb_text *text) {
   for (; text->at < text->end; text->at++) {
     unsigned char c = *text->at;
@@ -53,7 +58,7 @@ static inline int orb_text_blanks(orb_text *text) {
   return 0;
 }
 
-/* Past the end of this line. */
+/* Moves past the end of this line. */
 static inline void orb_text_skip_line(orb_text *text) {
   while (text->at < text->end && !orb_is_eol(*text->at)) {
     text->at++;
@@ -63,7 +68,7 @@ static inline void orb_text_skip_line(orb_text *text) {
   }
 }
 
-/* To the next token of the file, over line ends and comments. 0 at the end of the file. */
+/* Moves to the next token of the file, over line ends and comments. Returns 0 at the end of the file. */
 static inline int orb_text_next(orb_text *text) {
   for (;;) {
     if (orb_text_blanks(text)) {
@@ -76,7 +81,7 @@ static inline int orb_text_next(orb_text *text) {
   }
 }
 
-/* The word at `at`: its length, up to a break. */
+/* The length of the word at `at`, up to a break. */
 static inline size_t orb_text_word(const orb_text *text) {
   const unsigned char *p = text->at;
   while (p < text->end && !orb_is_break(*p)) {
@@ -85,7 +90,7 @@ static inline size_t orb_text_word(const orb_text *text) {
   return (size_t)(p - text->at);
 }
 
-/* A number at `at`, a break after it. 0 if there is none. */
+/* Takes the number at `at`, which a break must follow. Returns 0 if there is none. */
 static inline int orb_text_number(orb_text *text, double *out) {
   const unsigned char *p = orb_number_parse(text->at, text->end, out);
   if (!p || (p < text->end && !orb_is_break(*p) && *p != '\\')) {
@@ -95,7 +100,7 @@ static inline int orb_text_number(orb_text *text, double *out) {
   return 1;
 }
 
-/* A decimal integer at `at`, a break after it. 0 if there is none or it does not fit. */
+/* Takes the decimal integer at `at`, which a break must follow. Returns 0 if there is none or it is 2⁵⁸·10 or more. */
 static inline int orb_text_integer(orb_text *text, int64_t *out) {
   const unsigned char *p = text->at;
   int negative = 0;
@@ -118,7 +123,7 @@ static inline int orb_text_integer(orb_text *text, int64_t *out) {
   return 1;
 }
 
-/* The word at `at` is this one, in any case. */
+/* Whether the word at `at` is this one, in upper or lower case. */
 static inline int orb_text_is(const orb_text *text, const char *word) {
   const unsigned char *p = text->at;
   for (; *word; p++, word++) {

@@ -1,9 +1,9 @@
-/* See texture.h.
+/* Which images an asset may hold.
  *
- * Pixels are not decoded here. An image is taken when its headers are whole up to the place where pixels begin: a
- * viewer of the asset, and a validator, then know its size and kind. Sources: PNG (W3C, 3rd edition) 5.3, 11.2; JPEG
- * (ITU-T T.81) B.1, B.2.2. Of JPEG only what viewers of glTF show: baseline, extended or progressive, grey or of three
- * components (four would be inks).
+ * Pixels are not decoded here. An image is accepted when its headers are complete up to the first pixel, which tells a
+ * viewer of the asset, and a validator, its size and kind. Sources: PNG (W3C, 3rd edition) 5.3, 11.2; JPEG (ITU-T T.81)
+ * B.1, B.2.2. Of JPEG only what viewers of glTF show is accepted: baseline, extended or progressive, with one component
+ * or three (four are inks).
  */
 #include "format/texture.h"
 
@@ -13,7 +13,7 @@
 
 enum { PNG_HEADER = 13, PNG_AROUND = 12, PNG_SIZE_MAX = 0x7fffffff };
 
-/* The chunk IHDR, behind its length and type. */
+/* Checks the content of the chunk IHDR. */
 static int is_png_header(const unsigned char *p) {
   uint32_t width = orb_read_u32(p, 1), height = orb_read_u32(p + 4, 1);
   static const unsigned depths[] = {
@@ -23,7 +23,7 @@ static int is_png_header(const unsigned char *p) {
          (depth & (depth - 1)) == 0 && (depth & depths[type]) != 0 && p[10] == 0 && p[11] == 0 && p[12] <= 1;
 }
 
-/* Whether a chunk that PNG gives one length, and that programs read without asking, has it. */
+/* Whether a chunk whose length PNG fixes, and which programs read without a check, has that length. */
 static int has_its_length(const unsigned char *type, size_t length) {
   static const struct {
     char type[5];
@@ -65,7 +65,7 @@ static int is_png(const unsigned char *bytes, size_t size) {
   return 0;
 }
 
-/* The segment of a frame header, from its length on. */
+/* Checks the segment of a frame header, from its length on. */
 static int is_jpeg_frame(const unsigned char *p, size_t length) {
   if (length < 8) {
     return 0;

@@ -1,4 +1,3 @@
-/* See edges.h. */
 #include "mesh/edges.h"
 
 #include "base/check.h"

@@ -1,4 +1,3 @@
-/* See edit.h. */
 #include "mesh/edit.h"
 
 #include <string.h>
@@ -46,7 +45,7 @@ static void swap_floats(float *a, float *b, int count) {
   }
 }
 
-void orb_mesh_turn_face(orb_mesh *mesh, int32_t triangle) {
+void orb_mesh_reverse_face(orb_mesh *mesh, int32_t triangle) {
   size_t t = (size_t)triangle;
   int32_t *c = mesh->triangles + 3 * t, b = c[1];
   c[1] = c[2];
@@ -82,7 +81,7 @@ orb_status orb_mesh_reserve(orb_context *ctx, orb_mesh *mesh, int32_t more_verti
   size_t v = (size_t)mesh->vertex_count + (size_t)more_vertices;
   size_t t = (size_t)mesh->triangle_count + (size_t)more_triangles;
   if (3 * v > INT32_MAX || 3 * t > INT32_MAX) {
-    return orb_fail(ctx, ORB_E_TOO_LARGE, "The mended mesh would be too large.");
+    return orb_fail(ctx, ORB_E_TOO_LARGE, "The repaired mesh would be too large.");
   }
   int good = regrow(ctx, &mesh->positions, 3 * v, sizeof(double), more_vertices) &&
              regrow(ctx, &mesh->source, v, sizeof(int32_t), more_vertices) &&

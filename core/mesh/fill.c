@@ -1,32 +1,34 @@
 /* Filling holes.
  *
- * A loop of up to SMALL edges gets the triangulation of least area (dynamic programming, Barequet & Sharir 1995), a
- * larger one is cut as a polygon. Either may use a diagonal that is an edge of the mesh already; where that happens the
- * loops are closed by fans around a new vertex instead, which cannot clash. A new vertex stands for no vertex of the
- * file: its source is the lowest of its loop. New faces have source_triangle −1; attributes come from the neighbours
- * across the loop.
+ * A loop of up to SMALL edges gets the triangulation of least area (dynamic programming, Barequet & Sharir 1995); a
+ * larger one is cut like a polygon. Either may use a diagonal that is already an edge of the mesh. Where that happens,
+ * all loops are closed by fans around a new vertex each instead, which cannot clash. A new vertex stands for no vertex
+ * of the file: its source is the lowest one of its loop. New faces have source_triangle −1 and take their attributes
+ * from the faces across the loop.
  */
+#include "mesh/fill.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "mesh/edit.h"
 #include "mesh/polygon.h"
-#include "mesh/surface.h"
 #include "numeric/vec3.h"
 
-enum { SMALL = 48 };
+enum { SMALL = 48 }; /* edges; least area takes O(edges³) time and the tables below O(SMALL²) memory */
 
 typedef struct fill {
   orb_surface *s;
   int32_t *loop;   /* open half-edges of the present loop, in the order of the new faces */
   int32_t *vertex; /* their origins */
-  int32_t *cut;
+  int32_t *cut;    /* its triangulation: 3 indices into loop for each triangle */
   orb_polygon polygon;
   double best[SMALL][SMALL];
   int split[SMALL][SMALL];
 } fill;
 
+/* Twice the area of the triangle over three entries of the loop. */
 static double area_of(const fill *f, int32_t a, int32_t b, int32_t c) {
   const double *p = f->s->mesh->positions;
   double u[3], w[3], n[3];
@@ -72,7 +74,7 @@ static void cut_small(fill *f, int32_t count) {
   }
 }
 
-/* Attributes of a new corner as those of corner `like`, of an old face. */
+/* Copies the attributes of corner `like` of an old face to a new corner. */
 static void copy_corner(orb_mesh *mesh, int32_t corner, int32_t like) {
   size_t c = (size_t)corner, l = (size_t)like;
   if (mesh->normals) {
@@ -116,7 +118,7 @@ static void close_with_fan(fill *f, int32_t count) {
   orb_mesh *mesh = f->s->mesh;
   int32_t made = mesh->vertex_count++, lowest = f->vertex[0];
   double *centre = mesh->positions + 3 * (size_t)made, total = 0, sum[3] = {0, 0, 0};
-  for (int32_t i = 0; i < count; i++) { /* the centre of the loop as a wire */
+  for (int32_t i = 0; i < count; i++) { /* the centroid of the loop's edges, weighted by length */
     const double *p = mesh->positions + 3 * (size_t)f->vertex[i];
     const double *q = mesh->positions + 3 * (size_t)f->vertex[i + 1 < count ? i + 1 : 0];
     double length = sqrt(orb_distance2(p, q));
@@ -136,7 +138,7 @@ static void close_with_fan(fill *f, int32_t count) {
   }
 }
 
-/* Collects the loop of h, backwards: new faces run against the old ones. */
+/* Collects the loop of h in reverse: new faces run against the old ones. */
 static int32_t collect_loop(fill *f, int32_t h, unsigned char *seen) {
   int32_t count = 0;
   for (int32_t g = h; !seen[g]; g = orb_surface_next_open(f->s, g)) {
@@ -154,7 +156,7 @@ static int32_t collect_loop(fill *f, int32_t h, unsigned char *seen) {
   return count;
 }
 
-/* Closes all loops in one way. */
+/* Closes all loops, either with fans or with diagonals. */
 static orb_status close_all(fill *f, int fans, int64_t *loops) {
   orb_surface *s = f->s;
   int32_t half_edges = 3 * s->mesh->triangle_count; /* of the old faces */
@@ -182,11 +184,11 @@ static orb_status close_all(fill *f, int fans, int64_t *loops) {
 static orb_status grow_surface(orb_surface *s, int32_t faces) {
   orb_free(s->ctx, s->twin);
   orb_free(s->ctx, s->piece);
-  orb_free(s->ctx, s->turned);
+  orb_free(s->ctx, s->reversed);
   s->twin = ORB_NEW(s->ctx, int32_t, 3 * (size_t)faces);
   s->piece = ORB_NEW(s->ctx, int32_t, faces);
-  s->turned = ORB_NEW(s->ctx, unsigned char, faces);
-  return s->twin && s->piece && s->turned ? ORB_OK : ORB_E_NO_MEMORY;
+  s->reversed = ORB_NEW(s->ctx, unsigned char, faces);
+  return s->twin && s->piece && s->reversed ? ORB_OK : ORB_E_NO_MEMORY;
 }
 
 static orb_status run(fill *f) {

@@ -1,4 +1,10 @@
-/* Meshes as objects: freeing, copying, measuring, places. */
+/* Meshes as objects: free, copy, measure; places.
+ *
+ * In: a mesh as a reader left it. Out: one that can be embedded, or an error with the facts. Reading order of the
+ * folder: repair.c (the sequence of repairs and checks), surface (the mesh with its twins, pieces, fans and loops),
+ * edges (twins), edit (changes that keep attributes), weld, fill and polygon (seams, holes, polygons), refuse (the
+ * errors). topology.c measures any index list, nearest.c finds nearest points, normals computes normals, sort.h sorts.
+ */
 #include <string.h>
 
 #include "base/check.h"
@@ -29,7 +35,7 @@ void orb_mesh_free(orb_context *ctx, orb_mesh *mesh) {
   memset(mesh, 0, sizeof *mesh);
 }
 
-/* A copy of a block that may be absent; clears *good where there is no memory. */
+/* A copy of a block that may be NULL; clears *good where memory runs out. */
 static void *copy_block(orb_context *ctx, const void *block, size_t count, size_t size, int *good) {
   void *copy = block ? orb_alloc(ctx, count, size) : NULL;
   if (copy && count) {
@@ -80,7 +86,7 @@ void orb_mesh_extent(const orb_mesh *mesh, orb_extent *out) {
       out->max[k] = x > out->max[k] ? x : out->max[k];
     }
   }
-  double centre[3]; /* volumes are taken from here, so that a far origin costs no digits */
+  double centre[3]; /* volumes are measured from here, so that a distant origin costs no digits */
   for (int k = 0; k < 3; k++) {
     centre[k] = 0.5 * out->min[k] + 0.5 * out->max[k];
   }

@@ -1,8 +1,8 @@
 /* Nearest point of a triangle set.
  *
- * A binary tree of boxes in one flat array, in depth-first order: the left child of node i is i + 1, the right one is
- * stored. Built top down by the median of the longer axis of the centres (quickselect), leaves of at most LEAF
- * triangles whose corners are copied side by side. A query goes down to the nearer box first, with a fixed stack.
+ * A binary tree of boxes in one array, in depth-first order: the left child of node i is i + 1, the right one is
+ * stored. It is built top down by the median along the longest axis of the centres (quickselect); a leaf holds at most
+ * LEAF triangles, whose corners are copied side by side. A query visits the nearer box first, with a fixed stack.
  */
 #include <math.h>
 #include <string.h>
@@ -11,7 +11,10 @@
 #include "numeric/vec3.h"
 #include "orbmorph/mesh.h"
 
-enum { LEAF = 4, STACK = 64 };
+enum {
+  LEAF = 4,  /* triangles; more make boxes fewer and leaves slower */
+  STACK = 64 /* nodes; halving 2³¹ triangles takes 31 levels, and each level leaves one node on the stack */
+};
 
 typedef struct node {
   double low[3], high[3];
@@ -54,8 +57,8 @@ static void swap(int32_t *order, int32_t i, int32_t j) {
   order[j] = x;
 }
 
-/* Hoare's selection with the median of three: the `middle` smallest come first. After a number of rounds that no
- * honest input needs, what is reached is good enough: any split is a valid tree. */
+/* Hoare's selection with the median of three: the `middle` smallest come first. Gives up after 128 rounds, which only
+ * an adversarial input needs: any split makes a valid tree. */
 static void select_middle(const double *corners, int32_t *order, int32_t count, int32_t middle, int axis) {
   int32_t low = 0, high = count - 1;
   for (int rounds = 0; low < high && rounds < 128; rounds++) {
@@ -109,7 +112,7 @@ static int longest_axis(const double *corners, const int32_t *order, int32_t cou
 }
 
 typedef struct task {
-  int32_t first, count, parent; /* parent: whose right child this is, −1: none */
+  int32_t first, count, parent; /* parent: the node whose right child this is, −1: none */
 } task;
 
 static orb_status build(orb_nearest *tree, const double *corners, int32_t *order) {
@@ -203,7 +206,7 @@ static double box_distance2(const node *n, const double p[3]) {
   return sum;
 }
 
-/* Nearest point of segment a b: its parameter. */
+/* The parameter, 0 to 1, of the point of segment a b that is nearest to p. */
 static double on_segment(const double a[3], const double b[3], const double p[3]) {
   double d[3], e[3];
   orb_sub(b, a, d);
@@ -212,8 +215,7 @@ static double on_segment(const double a[3], const double b[3], const double p[3]
   return !(t > 0) || !(length2 > 0) ? 0 : t < length2 ? t / length2 : 1;
 }
 
-/* Nearest point of a triangle, after Ericson, Real-Time Collision Detection, 5.1.5; a triangle without area by its
- * edges. Returns the squared distance. */
+/* After Ericson, Real-Time Collision Detection, 5.1.5; a triangle without area by its edges. */
 double orb_triangle_nearest(const double *c, const double p[3], double at[3]) {
   double ab[3], ac[3], ap[3], bp[3], cp[3];
   orb_sub(c + 3, c, ab);
@@ -254,7 +256,7 @@ double orb_triangle_nearest(const double *c, const double p[3], double at[3]) {
   return best;
 }
 
-/* Goes on from what *out holds: a place at the squared distance best, or none and best as the bound. */
+/* Continues from *out: a place at the squared distance `best`, or none, with `best` as the bound. */
 static double search(const orb_nearest *tree, const double p[3], double best, orb_place *out) {
   int32_t found = out->triangle;
   struct {
@@ -302,7 +304,7 @@ static double search(const orb_nearest *tree, const double p[3], double best, or
 double orb_nearest_query(const orb_nearest *tree, const double p[3], double max_distance2, orb_place *out) {
   *out = (orb_place){.triangle = -1};
   double distance2 = search(tree, p, max_distance2, out);
-  if (out->triangle < 0 && max_distance2 == INFINITY) { /* no distance is a number: any place is as near */
+  if (out->triangle < 0 && max_distance2 == INFINITY) { /* every distance is NaN or overflows: any place is as near */
     *out = (orb_place){.triangle = 0, .at = {1, 0, 0}};
     return INFINITY;
   }

@@ -6,7 +6,7 @@
 #include "base/check.h"
 #include "numeric/vec3.h"
 
-/* Adds the triangle's normal, weighted by the angle at each corner, to its three vertices. */
+/* Adds the triangle's normal to its three vertices, weighted by the angle at each. */
 static void add_triangle_normal(const double *positions, const int32_t corner[3], double *normals) {
   double edge[3][3], normal[3];
   for (int k = 0; k < 3; k++) {

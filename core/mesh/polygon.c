@@ -1,9 +1,10 @@
 /* Polygons to triangles, in the plane of the mean normal (Newell).
  *
- * A quadrangle takes the shorter of its diagonals that leaves both halves facing the same way. Larger ones are clipped
- * ear by ear, never two neighbours in one round, which cuts a convex polygon into few slivers. The search for points
- * inside an ear has a budget that is linear in the number of corners; when it is spent, or a polygon crosses itself so
- * that no ear is left, the rest becomes a fan: the result always has count − 2 triangles over the given corners.
+ * A quadrangle is cut along a diagonal that leaves both halves facing the same way; of two such diagonals, along the
+ * shorter. Larger polygons lose ear after ear, never two neighbours in one round, which cuts a convex polygon into few
+ * slivers. The search for points inside an ear has a budget that is linear in the number of corners. When it is spent,
+ * or when a polygon crosses itself so that no ear is left, the rest becomes a fan: the result always has count − 2
+ * triangles over the given corners.
  */
 #include "mesh/polygon.h"
 
@@ -65,11 +66,12 @@ static void flatten(orb_polygon *polygon, const double *positions, const int32_t
   }
 }
 
-static double turn(const double *a, const double *b, const double *c) {
+/* Twice the signed area of the triangle: positive for a left turn. */
+static double signed_area2(const double *a, const double *b, const double *c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-static double span2(const double *a, const double *b) {
+static double distance2(const double *a, const double *b) {
   return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]);
 }
 
@@ -81,8 +83,9 @@ static void put(int32_t *out, int32_t a, int32_t b, int32_t c) {
 
 static void cut_quadrangle(const double *flat, int32_t *triangles) {
   const double *a = flat, *b = flat + 2, *c = flat + 4, *d = flat + 6;
-  double ac = fmin(turn(a, b, c), turn(a, c, d)), bd = fmin(turn(a, b, d), turn(b, c, d));
-  int first = ac > 0 && bd > 0 ? span2(a, c) <= span2(b, d) : ac >= bd;
+  double ac = fmin(signed_area2(a, b, c), signed_area2(a, c, d)),
+         bd = fmin(signed_area2(a, b, d), signed_area2(b, c, d));
+  int first = ac > 0 && bd > 0 ? distance2(a, c) <= distance2(b, d) : ac >= bd;
   if (first) {
     put(triangles, 0, 1, 2);
     put(triangles + 3, 0, 2, 3);
@@ -92,7 +95,7 @@ static void cut_quadrangle(const double *flat, int32_t *triangles) {
   }
 }
 
-/* No other corner lies in the ear a b c. */
+/* Whether no other corner lies in the ear a b c. */
 static int ear_is_free(const orb_polygon *polygon, int32_t a, int32_t b, int32_t c, int64_t *budget) {
   const double *flat = polygon->flat, *pa = flat + 2 * a, *pb = flat + 2 * b, *pc = flat + 2 * c;
   for (int32_t i = polygon->next[c]; i != a; i = polygon->next[i]) {
@@ -101,7 +104,7 @@ static int ear_is_free(const orb_polygon *polygon, int32_t a, int32_t b, int32_t
     }
     const double *p = flat + 2 * i;
     int at_corner = (p[0] == pa[0] && p[1] == pa[1]) || (p[0] == pc[0] && p[1] == pc[1]);
-    if (!at_corner && turn(pa, pb, p) >= 0 && turn(pb, pc, p) >= 0 && turn(pc, pa, p) >= 0) {
+    if (!at_corner && signed_area2(pa, pb, p) >= 0 && signed_area2(pb, pc, p) >= 0 && signed_area2(pc, pa, p) >= 0) {
       return 0;
     }
   }
@@ -111,13 +114,13 @@ static int ear_is_free(const orb_polygon *polygon, int32_t a, int32_t b, int32_t
 static int is_convex(const double *flat, int32_t count) {
   for (int32_t i = 0; i < count; i++) {
     int32_t j = i + 1 < count ? i + 1 : 0, k = j + 1 < count ? j + 1 : 0;
-    if (!(turn(flat + 2 * i, flat + 2 * j, flat + 2 * k) > 0)) {
+    if (!(signed_area2(flat + 2 * i, flat + 2 * j, flat + 2 * k) > 0)) {
       return 0;
     }
   }
-  /* all turns left, and once round: the fan from corner 0 never turns back */
+  /* every turn is to the left; the fan from corner 0 never turns back either, so they add up to one turn */
   for (int32_t i = 1; i + 1 < count; i++) {
-    if (!(turn(flat, flat + 2 * i, flat + 2 * i + 2) > 0)) {
+    if (!(signed_area2(flat, flat + 2 * i, flat + 2 * i + 2) > 0)) {
       return 0;
     }
   }
@@ -142,14 +145,14 @@ void orb_polygon_cut(orb_polygon *polygon, const double *positions, const int32_
     polygon->next[i] = i + 1 < count ? i + 1 : 0;
     polygon->prev[i] = i > 0 ? i - 1 : count - 1;
   }
-  int64_t budget = 256 * (int64_t)count + 65536;
+  int64_t budget = 256 * (int64_t)count + 65536; /* points looked at; small polygons get all the tests they need */
   int32_t at = 1, left = count, idle = 0;
   while (left > 3) {
     int32_t a = polygon->prev[at], c = polygon->next[at];
     int hopeless = idle > left || budget < 0;
     const double *flat = polygon->flat;
     if (hopeless || convex ||
-        (turn(flat + 2 * a, flat + 2 * at, flat + 2 * c) > 0 && ear_is_free(polygon, a, at, c, &budget))) {
+        (signed_area2(flat + 2 * a, flat + 2 * at, flat + 2 * c) > 0 && ear_is_free(polygon, a, at, c, &budget))) {
       put(triangles, a, at, c);
       triangles += 3;
       polygon->next[a] = c;

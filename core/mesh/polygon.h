@@ -14,7 +14,8 @@ typedef struct orb_polygon {
 ORB_MUST_CHECK orb_status orb_polygon_reserve(orb_context *ctx, orb_polygon *polygon, int32_t corners);
 void orb_polygon_free(orb_context *ctx, orb_polygon *polygon);
 
-/* Writes count − 2 triangles of corner numbers 0 … count−1, in the polygon's own turn. vertex: count vertex numbers. */
+/* Writes count − 2 triangles over the corners 0 … count − 1, oriented like the polygon. vertex: the vertex of each
+ * corner. O(count) for convex polygons, O(256·count) otherwise. */
 void orb_polygon_cut(orb_polygon *polygon, const double *positions, const int32_t *vertex, int32_t count,
                      int32_t *triangles);
 

@@ -1,4 +1,3 @@
-/* See refuse.h. */
 #include "mesh/refuse.h"
 
 #include <math.h>
@@ -6,7 +5,7 @@
 #include "base/check.h"
 #include "mesh/sort.h"
 
-static const char *of(int64_t count, const char *one, const char *many) {
+static const char *plural(int64_t count, const char *one, const char *many) {
   return count == 1 ? one : many;
 }
 
@@ -63,9 +62,9 @@ orb_status orb_refuse_crowded(orb_surface *s) {
   if (status == ORB_OK) {
     status = orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
                       "%lld %s to more than two faces (or %s from a vertex to itself); a surface has two "
-                      "faces at each edge. Remove the faces that are too many.",
-                      (long long)s->edges.crowded, of(s->edges.crowded, "edge belongs", "edges belong"),
-                      of(s->edges.crowded, "runs", "run"));
+                      "faces at each edge. Remove the surplus faces.",
+                      (long long)s->edges.crowded, plural(s->edges.crowded, "edge belongs", "edges belong"),
+                      plural(s->edges.crowded, "runs", "run"));
     orb_error *error = orb_context_error_edit(s->ctx);
     error->edge_total = s->edges.crowded;
     for (int64_t i = 0; i < count && error->edge_count < ORB_ERROR_ITEMS; i++) {
@@ -85,12 +84,12 @@ orb_status orb_refuse_facing(orb_surface *s) {
   orb_status status =
       s->conflict >= 0
           ? orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
-                     "The surface has one side only, like a Möbius strip: its faces cannot be turned to agree. "
-                     "Following neighbours from face to face comes back turned over at the edge given.")
+                     "The surface has one side only, like a Möbius strip: no facing suits all of its faces. "
+                     "A walk from neighbour to neighbour returns reversed at the edge given.")
           : orb_fail(s->ctx, ORB_E_NOT_ORIENTABLE,
-                     "Faces are turned against their neighbours at %lld %s; send the mesh with repair=safe, or turn "
-                     "them.",
-                     (long long)s->edges.same_way, of(s->edges.same_way, "edge", "edges"));
+                     "Faces are reversed against their neighbours at %lld %s; send the mesh with repair=safe, or "
+                     "reverse them.",
+                     (long long)s->edges.same_way, plural(s->edges.same_way, "edge", "edges"));
   orb_error *error = orb_context_error_edit(s->ctx);
   if (s->conflict >= 0) {
     error->edge_total = 1;
@@ -113,8 +112,8 @@ orb_status orb_refuse_open(orb_surface *s) {
       s->ctx, ORB_E_NOT_CLOSED,
       "The surface is not closed: %lld %s in %lld boundary %s %s a face on one side only. Close %s, or send the "
       "mesh with repair=fill_holes.",
-      (long long)s->edges.open, of(s->edges.open, "edge", "edges"), (long long)loops, of(loops, "loop", "loops"),
-      of(s->edges.open, "has", "have"), of(loops, "the hole", "the holes"));
+      (long long)s->edges.open, plural(s->edges.open, "edge", "edges"), (long long)loops,
+      plural(loops, "loop", "loops"), plural(s->edges.open, "has", "have"), plural(loops, "the hole", "the holes"));
   orb_error *error = orb_context_error_edit(s->ctx);
   error->boundary_loops = loops;
   error->edge_total = s->edges.open;
@@ -152,13 +151,13 @@ orb_status orb_refuse_pinched(orb_surface *s, const orb_fans *fans) {
   ORB_TRY(add_pieces(s, &sizes));
   if (s->piece_count > 1) {
     (void)orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
-                   "%d bodies hang together only at %lld %s, where the surface is not manifold. Join them "
+                   "%d bodies are joined only at %lld %s, where the surface is not manifold. Join them "
                    "properly, or send the mesh with repair=largest_component.",
-                   s->piece_count, (long long)fans->pinched, of(fans->pinched, "vertex", "vertices"));
+                   s->piece_count, (long long)fans->pinched, plural(fans->pinched, "vertex", "vertices"));
   } else {
     (void)orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
                    "At %lld %s several fans of faces touch; send the mesh with repair=safe, or split them.",
-                   (long long)fans->pinched, of(fans->pinched, "vertex", "vertices"));
+                   (long long)fans->pinched, plural(fans->pinched, "vertex", "vertices"));
   }
   if (s->piece_count > 1) {
     list_pieces(s, sizes);
@@ -188,7 +187,7 @@ orb_status orb_refuse_handles(orb_surface *s, int64_t genus) {
   (void)orb_fail(s->ctx, ORB_E_NOT_GENUS_ZERO,
                  "The surface has %lld %s (like a torus or a cup's ear); only surfaces like a sphere can be "
                  "morphed. Fill or cut %s.",
-                 (long long)genus, of(genus, "handle", "handles"), of(genus, "it", "them"));
+                 (long long)genus, plural(genus, "handle", "handles"), plural(genus, "it", "them"));
   orb_context_error_edit(s->ctx)->genus = genus;
   return ORB_E_NOT_GENUS_ZERO;
 }
@@ -218,5 +217,5 @@ orb_status orb_refuse_size(orb_context *ctx, const orb_mesh *mesh) {
 orb_status orb_refuse_few(orb_surface *s) {
   return orb_fail(s->ctx, ORB_E_DEGENERATE,
                   "%d %s left once repeated and degenerate faces are dropped; a closed surface needs four.",
-                  s->mesh->triangle_count, of(s->mesh->triangle_count, "triangle is", "triangles are"));
+                  s->mesh->triangle_count, plural(s->mesh->triangle_count, "triangle is", "triangles are"));
 }

@@ -1,4 +1,5 @@
-/* Refusals of a mesh, with the facts that let its owner find the spot. */
+/* The errors with which a mesh is refused. Each function sets the error record, with the edges, vertices or pieces that
+ * let the owner find the spot in the file, and returns its status. */
 #ifndef ORB_MESH_REFUSE_H
 #define ORB_MESH_REFUSE_H
 
@@ -12,11 +13,11 @@ orb_status orb_refuse_pieces(orb_surface *surface);
 orb_status orb_refuse_handles(orb_surface *surface, int64_t genus);
 orb_status orb_refuse_few(orb_surface *surface);
 
-/* Fails with ORB_E_DEGENERATE where float32 could not show the mesh: tiny, or far from the origin. O(V). */
+/* Fails with ORB_E_DEGENERATE where float32 cannot hold the mesh: tiny, or far from the origin. O(V). */
 ORB_MUST_CHECK orb_status orb_refuse_size(orb_context *ctx, const orb_mesh *mesh);
 
-/* The half-edges whose twin is `kind`, as (larger vertex << 32 | half-edge), by smaller vertex and then that. start:
- * vertex_count + 2 zeros; either may be NULL, which is ORB_E_NO_MEMORY. */
+/* Lists the half-edges whose twin is `kind` as (larger vertex << 32 | half-edge), sorted by smaller vertex and then by
+ * that number. start: vertex_count + 2 zeros. Returns ORB_E_NO_MEMORY if entry or start is NULL. */
 ORB_MUST_CHECK orb_status orb_refuse_sort_edges(const orb_surface *surface, int32_t kind, uint64_t *entry,
                                                 int32_t *start);
 

@@ -1,16 +1,17 @@
 /* Repair and diagnosis.
  *
- * The order in which a mesh is found wanting is that of what its owner must mend first: edges of three faces (nothing
- * else can be told of such a surface), a facing that cannot be made consistent, holes, vertices where fans touch,
- * pieces, handles, too few faces. Under `safe` each of the mends comes just before the diagnosis that it may spare.
+ * Problems are reported in the order in which the owner has to solve them: edges of three faces (such a surface has no
+ * facing, holes or handles to speak of), a facing that cannot be made consistent, holes, vertices where fans touch,
+ * pieces, handles, too few faces. With `safe` each repair comes just before the diagnosis that it can avert.
  *
- * A vertex where fans touch is split unless that would take the mesh apart: two bodies that hang together at one
- * vertex are refused as not manifold there, with the sizes of both, and not called two pieces.
+ * A vertex where fans touch is split unless that takes the mesh apart. Two bodies that are joined at one vertex are
+ * refused as not manifold there, with the sizes of both, rather than as two pieces.
  */
 #include <string.h>
 
 #include "base/check.h"
 #include "mesh/edit.h"
+#include "mesh/fill.h"
 #include "mesh/refuse.h"
 #include "mesh/weld.h"
 
@@ -18,7 +19,7 @@ static int is_safe(unsigned repair) {
   return repair != ORB_REPAIR_NONE;
 }
 
-/* All three neighbours of some face are one face: the two lie over the same vertices. */
+/* Whether two faces lie over the same vertices: all three neighbours of one are the other. */
 static int has_doubled_face(const orb_surface *s) {
   for (int32_t t = 0; t < s->mesh->triangle_count; t++) {
     const int32_t *twin = s->twin + 3 * (size_t)t;
@@ -34,24 +35,23 @@ static orb_status drop_duplicates(orb_surface *s) {
     return ORB_OK;
   }
   int32_t count = 0;
-  ORB_TRY(orb_mesh_flag_duplicates(s->ctx, s->mesh, NULL, NULL, s->turned, NULL, &count));
+  ORB_TRY(orb_mesh_flag_duplicates(s->ctx, s->mesh, NULL, NULL, s->reversed, NULL, &count));
   if (count == 0) {
     return ORB_OK;
   }
-  orb_mesh_note(s->mesh, "duplicate-faces", orb_mesh_drop_faces(s->mesh, s->turned));
+  orb_mesh_note(s->mesh, "duplicate-faces", orb_mesh_drop_faces(s->mesh, s->reversed));
   return orb_surface_rematch(s);
 }
 
 static orb_status drop_degenerate(orb_surface *s) {
-  if (orb_mesh_flag_degenerate(s->mesh, s->turned) == 0) {
+  if (orb_mesh_flag_degenerate(s->mesh, s->reversed) == 0) {
     return ORB_OK;
   }
-  orb_mesh_note(s->mesh, "degenerate-faces", orb_mesh_drop_faces(s->mesh, s->turned));
+  orb_mesh_note(s->mesh, "degenerate-faces", orb_mesh_drop_faces(s->mesh, s->reversed));
   return orb_surface_rematch(s);
 }
 
-/* Pieces over all edges, crowded ones too: a union over the faces of each vertex pair is not needed, because the
- * largest piece is kept before anything is known of crowded edges; faces around one are one piece. */
+/* Unites the pieces that meet at crowded edges: orb_surface_pieces() crosses edges of two faces only. */
 static orb_status join_crowded(orb_surface *s, int32_t *root) {
   const int32_t *triangles = s->mesh->triangles;
   int64_t crowded = 0;
@@ -110,10 +110,10 @@ static orb_status keep_largest(orb_surface *s) {
       dropped += size[i] > 0;
     }
     for (int32_t t = 0; t < s->mesh->triangle_count; t++) {
-      s->turned[t] = root[s->piece[t]] != best;
+      s->reversed[t] = root[s->piece[t]] != best;
     }
     if (dropped > 1) {
-      (void)orb_mesh_drop_faces(s->mesh, s->turned);
+      (void)orb_mesh_drop_faces(s->mesh, s->reversed);
       orb_mesh_note(s->mesh, "largest_component", dropped - 1);
       status = orb_surface_rematch(s);
     }
@@ -123,16 +123,16 @@ static orb_status keep_largest(orb_surface *s) {
   return status;
 }
 
-static void flip_flagged(orb_mesh *mesh, const unsigned char *flag, unsigned char value) {
+static void reverse_flagged(orb_mesh *mesh, const unsigned char *flag, unsigned char value) {
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
     if (flag[t] == value) {
-      orb_mesh_turn_face(mesh, t);
+      orb_mesh_reverse_face(mesh, t);
     }
   }
 }
 
-/* Makes the facing consistent. mended: something had to be turned; the flags stay for face_outward(). */
-static orb_status make_consistent(orb_surface *s, unsigned repair, unsigned char **turned) {
+/* Makes the facing consistent. *reversed: the flags of what had to be reversed, for face_outward(); NULL: nothing. */
+static orb_status make_consistent(orb_surface *s, unsigned repair, unsigned char **reversed) {
   ORB_TRY(orb_surface_pieces(s));
   if (s->conflict >= 0 || (s->edges.same_way > 0 && !is_safe(repair))) {
     return orb_refuse_facing(s);
@@ -140,32 +140,33 @@ static orb_status make_consistent(orb_surface *s, unsigned repair, unsigned char
   if (s->edges.same_way == 0) {
     return ORB_OK;
   }
-  *turned = ORB_NEW(s->ctx, unsigned char, s->mesh->triangle_count);
-  if (!*turned) {
+  *reversed = ORB_NEW(s->ctx, unsigned char, s->mesh->triangle_count);
+  if (!*reversed) {
     return ORB_E_NO_MEMORY;
   }
-  memcpy(*turned, s->turned, (size_t)s->mesh->triangle_count);
-  flip_flagged(s->mesh, *turned, 1);
+  memcpy(*reversed, s->reversed, (size_t)s->mesh->triangle_count);
+  reverse_flagged(s->mesh, *reversed, 1);
   return orb_surface_rematch(s);
 }
 
-/* Last of all: outward by the signed volume. turned: what make_consistent() turned, or NULL. old: faces it knew. */
-static void face_outward(orb_mesh *mesh, const unsigned char *turned, int32_t old) {
+/* Faces the mesh outward, by its signed volume. reversed: from make_consistent(), or NULL. old: the faces it covers;
+ * the others fill holes. */
+static void face_outward(orb_mesh *mesh, const unsigned char *reversed, int32_t old) {
   orb_extent extent;
   orb_mesh_extent(mesh, &extent);
   int inside_out = extent.volume < 0;
   if (inside_out) {
     for (int32_t t = 0; t < mesh->triangle_count; t++) {
-      orb_mesh_turn_face(mesh, t);
+      orb_mesh_reverse_face(mesh, t);
     }
   }
-  if (!turned) {
+  if (!reversed) {
     orb_mesh_note(mesh, "turn-inside-out", inside_out ? mesh->triangle_count : 0);
     return;
   }
   int64_t count = 0;
   for (int32_t t = 0; t < old; t++) {
-    count += turned[t] != inside_out;
+    count += reversed[t] != inside_out;
   }
   orb_mesh_note(mesh, "reorient", count);
 }
@@ -178,7 +179,7 @@ static orb_status close_surface(orb_surface *s, unsigned repair) {
     return orb_refuse_open(s);
   }
   orb_fans fans;
-  ORB_TRY(orb_surface_fans(s, 1, &fans)); /* so that each boundary vertex is on one loop, once */
+  ORB_TRY(orb_surface_fans(s, 1, &fans)); /* so that each boundary vertex lies on one loop, once */
   orb_mesh_note(s->mesh, "split-vertices", fans.pinched);
   ORB_TRY(orb_surface_fill(s));
   return orb_surface_pieces(s);
@@ -204,7 +205,7 @@ static orb_status check_one_sphere(orb_surface *s, unsigned repair) {
   return ORB_OK;
 }
 
-static orb_status mend(orb_surface *s, unsigned repair, unsigned char **turned, int32_t *old) {
+static orb_status repair_surface(orb_surface *s, unsigned repair, unsigned char **reversed, int32_t *old) {
   orb_mesh *mesh = s->mesh;
   int64_t unused = 0;
   int opened_by_dropping = 0;
@@ -227,7 +228,7 @@ static orb_status mend(orb_surface *s, unsigned repair, unsigned char **turned, 
   if (s->edges.crowded > 0) {
     return orb_refuse_crowded(s);
   }
-  ORB_TRY(make_consistent(s, repair, turned));
+  ORB_TRY(make_consistent(s, repair, reversed));
   *old = mesh->triangle_count;
   ORB_TRY(close_surface(s, repair));
   ORB_TRY(check_one_sphere(s, repair));
@@ -241,22 +242,22 @@ static orb_status mend(orb_surface *s, unsigned repair, unsigned char **turned, 
 
 orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair) {
   orb_surface surface = {0};
-  unsigned char *turned = NULL;
+  unsigned char *reversed = NULL;
   int32_t old = 0;
   orb_status status = orb_context_check(ctx);
   if (status == ORB_OK) {
     status = orb_surface_open(ctx, mesh, &surface);
   }
   if (status == ORB_OK) {
-    status = mend(&surface, repair, &turned, &old);
+    status = repair_surface(&surface, repair, &reversed, &old);
   }
   if (status == ORB_OK) {
     status = orb_refuse_size(ctx, mesh);
   }
   if (status == ORB_OK) {
-    face_outward(mesh, turned, old);
+    face_outward(mesh, reversed, old);
   }
-  orb_free(ctx, turned);
+  orb_free(ctx, reversed);
   surface.ctx = ctx;
   orb_surface_close(&surface);
   return status;

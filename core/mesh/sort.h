@@ -1,4 +1,4 @@
-/* Sorting without the C library's memory: short runs by insertion, long ones by heap. */
+/* Sorting in place, as qsort() may allocate: short runs by insertion, long ones by heap. */
 #ifndef ORB_MESH_SORT_H
 #define ORB_MESH_SORT_H
 

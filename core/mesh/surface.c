@@ -1,4 +1,3 @@
-/* See surface.h. */
 #include "mesh/surface.h"
 
 #include <string.h>
@@ -15,8 +14,8 @@ orb_status orb_surface_open(orb_context *ctx, orb_mesh *mesh, orb_surface *s) {
   *s = (orb_surface){.ctx = ctx, .mesh = mesh, .conflict = -1};
   s->twin = ORB_NEW(ctx, int32_t, 3 * (size_t)mesh->triangle_count);
   s->piece = ORB_NEW(ctx, int32_t, mesh->triangle_count);
-  s->turned = ORB_NEW(ctx, unsigned char, mesh->triangle_count);
-  if (!s->twin || !s->piece || !s->turned) {
+  s->reversed = ORB_NEW(ctx, unsigned char, mesh->triangle_count);
+  if (!s->twin || !s->piece || !s->reversed) {
     return ORB_E_NO_MEMORY;
   }
   return orb_surface_rematch(s);
@@ -25,9 +24,9 @@ orb_status orb_surface_open(orb_context *ctx, orb_mesh *mesh, orb_surface *s) {
 void orb_surface_close(orb_surface *s) {
   orb_free(s->ctx, s->twin);
   orb_free(s->ctx, s->piece);
-  orb_free(s->ctx, s->turned);
+  orb_free(s->ctx, s->reversed);
   s->twin = s->piece = NULL;
-  s->turned = NULL;
+  s->reversed = NULL;
 }
 
 orb_status orb_surface_pieces(orb_surface *s) {
@@ -48,7 +47,7 @@ orb_status orb_surface_pieces(orb_surface *s) {
     }
     int32_t head = 0, tail = 0;
     s->piece[seed] = s->piece_count;
-    s->turned[seed] = 0;
+    s->reversed[seed] = 0;
     queue[tail++] = seed;
     while (head < tail) {
       int32_t t = queue[head++];
@@ -58,12 +57,12 @@ orb_status orb_surface_pieces(orb_surface *s) {
           continue;
         }
         int32_t u = g / 3;
-        unsigned char turned = (unsigned char)(s->turned[t] ^ (triangles[h] == triangles[g]));
+        unsigned char reversed = (unsigned char)(s->reversed[t] ^ (triangles[h] == triangles[g]));
         if (s->piece[u] < 0) {
           s->piece[u] = s->piece_count;
-          s->turned[u] = turned;
+          s->reversed[u] = reversed;
           queue[tail++] = u;
-        } else if (s->turned[u] != turned && s->conflict < 0) {
+        } else if (s->reversed[u] != reversed && s->conflict < 0) {
           s->conflict = h;
         }
       }
@@ -74,7 +73,8 @@ orb_status orb_surface_pieces(orb_surface *s) {
   return orb_context_check(s->ctx);
 }
 
-/* The next corner of the same vertex, clockwise (over the edge that comes in) or counter-clockwise; < 0 at the end. */
+/* The next corner of the same vertex, clockwise (over the incoming edge) or counter-clockwise; negative at a boundary.
+ */
 static int32_t corner_clockwise(const int32_t *twin, int32_t h) {
   return twin[orb_prev(h)];
 }
@@ -90,7 +90,7 @@ static int32_t root_of(int32_t *root, int32_t i) {
   return i;
 }
 
-/* Marks the fan of corner h as seen, giving its corners this vertex if it is not negative. */
+/* Marks the fan of corner h as seen; sets the vertex of its corners to `vertex` unless that is negative. */
 static void take_fan(orb_surface *s, int32_t h, int32_t vertex, unsigned char *seen) {
   int32_t *triangles = s->mesh->triangles;
   int32_t c = h;
@@ -111,7 +111,7 @@ static void take_fan(orb_surface *s, int32_t h, int32_t vertex, unsigned char *s
   }
 }
 
-/* A further fan of a vertex: joins pieces, notes the vertex, splits. */
+/* Handles a further fan of a vertex: joins pieces, lists the vertex, splits it. */
 static orb_status further_fan(orb_surface *s, int32_t h, int split, const int32_t *first, int32_t *root, orb_fans *out,
                               unsigned char *seen, unsigned char *listed) {
   orb_mesh *mesh = s->mesh;
@@ -164,11 +164,10 @@ orb_status orb_surface_fans(orb_surface *s, int split, orb_fans *out) {
     int32_t v = mesh->triangles[h];
     if (first[v] < 0) {
       first[v] = h;
-      out->used++;
       take_fan(s, h, -1, seen);
     } else {
       further++;
-      seen[h] = 2; /* come back to it, once room is made */
+      seen[h] = 2; /* the second loop comes back to it, after room is made */
       take_fan(s, h, -1, seen);
       seen[h] = 2;
     }

@@ -1,11 +1,11 @@
-/* The figures of any index list. */
+/* The topology of any index list. */
 #include <string.h>
 
 #include "base/check.h"
 #include "mesh/surface.h"
 
-/* Vertices whose faces form more than one fan. Faces around a vertex hang together over edges that are not open, be
- * they crowded or turned against each other: a union over the corners of each vertex. */
+/* Counts the vertices whose faces form more than one fan. Faces around a vertex are connected over edges of two faces,
+ * whether or not these face the same way: a union over the corners of each vertex. */
 static orb_status count_fans(orb_surface *s, orb_topology *out, int64_t *used) {
   const orb_mesh *mesh = s->mesh;
   int32_t half_edges = 3 * mesh->triangle_count;
@@ -48,8 +48,8 @@ static orb_status count_fans(orb_surface *s, orb_topology *out, int64_t *used) {
   return ORB_OK;
 }
 
-/* Boundary loops of a mesh that need not be consistently faced: components of the boundary where its vertices have one
- * fan each; pieces of boundary that meet at a pinched vertex count as one here. */
+/* Counts boundary loops without a consistent facing: as components of the boundary. Loops that meet at a vertex of
+ * several fans count as one. */
 static orb_status count_loops(orb_surface *s, int64_t *loops) {
   const orb_mesh *mesh = s->mesh;
   int32_t *root = ORB_NEW(s->ctx, int32_t, mesh->vertex_count);

@@ -1,11 +1,11 @@
 /* Welding, edge by edge.
  *
- * Vertices are never welded because they share a place, only because two open edges do: so surfaces that merely touch
- * stay apart, and a closed mesh stays as it is. In this order, each step only while edges are open:
+ * Vertices are welded because two open edges share their positions, never because two vertices do: surfaces that
+ * merely touch stay apart, and a closed mesh stays as it is. In this order, each step only while edges are open:
  *  1. an open edge of no length is collapsed (the row of vertices at the pole of a sphere);
- *  2. of single loose faces over the same three places one is kept (facet soups repeat facets);
- *  3. open edges over the same two places are welded in pairs. Where more than two meet, they are taken in turn around
- *     the edge, so that each pair bounds solid matter: two cubes that touch along an edge stay two cubes.
+ *  2. of isolated faces over the same three positions one is kept (facet soups repeat facets);
+ *  3. open edges over the same two positions are welded in pairs. Where more than two meet, they are paired in order
+ *     around the edge, so that each pair bounds solid matter: two cubes that touch along an edge stay two cubes.
  */
 #include "mesh/weld.h"
 
@@ -16,14 +16,14 @@
 #include "mesh/sort.h"
 #include "numeric/vec3.h"
 
-enum { ROUNDS = 8 };
+enum { ROUNDS = 8 }; /* each round but the last collapses edges or drops faces, which may open the way for the next */
 
 typedef struct weld {
   orb_context *ctx;
   orb_mesh *mesh;
   int32_t *twin;
   int32_t *root;  /* union-find over vertices, the lowest is the root */
-  int32_t *place; /* the lowest vertex on an open edge at the same place; −1: not on an open edge */
+  int32_t *place; /* the lowest vertex on an open edge at the same position; −1: not on an open edge */
   unsigned char *flags;
   int64_t welded;
 } weld;
@@ -64,7 +64,7 @@ static uint64_t hash_place(const double *p) {
   return hash * 0xc4ceb9fe1a85ec53ull >> 20;
 }
 
-/* Fills place[]; *open_count: open half-edges. */
+/* Fills place; *open_count: open half-edges. */
 static orb_status find_places(weld *w, int64_t *open_count) {
   const orb_mesh *mesh = w->mesh;
   int32_t half_edges = 3 * mesh->triangle_count;
@@ -109,7 +109,7 @@ static orb_status find_places(weld *w, int64_t *open_count) {
   return ORB_OK;
 }
 
-/* Carries the unions out and takes the collapsed faces away. */
+/* Applies the unions and removes the collapsed faces. */
 static orb_status apply(weld *w, orb_edges *edges) {
   for (int32_t v = 0; v < w->mesh->vertex_count; v++) {
     w->root[v] = find_root(w, v);
@@ -171,7 +171,7 @@ static void weld_pair(weld *w, int32_t g, int32_t h) {
   unite(w, target(w, g), crossed ? origin(w, h) : target(w, h));
 }
 
-/* The angle of the face of h around the edge from a to b, as the upper half of a sorting key. */
+/* The angle of the face of h around the edge from a to b, as the upper half of a sort key. */
 static uint64_t angle_key(const weld *w, int32_t h, int32_t a, int32_t b) {
   const double *positions = w->mesh->positions;
   const double *pa = positions + 3 * (size_t)a;
@@ -185,18 +185,18 @@ static uint64_t angle_key(const weld *w, int32_t h, int32_t a, int32_t b) {
   orb_cross(across, axis, out); /* out, across: a right-handed frame with the axis */
   orb_sub(positions + 3 * (size_t)w->mesh->triangles[orb_prev(h)], pa, side);
   double angle = atan2(orb_dot(side, across), orb_dot(side, out));
-  return (uint64_t)(uint32_t)((angle + 3.15) * 6.8e8) << 32;
+  return (uint64_t)(uint32_t)((angle + 3.15) * 6.8e8) << 32; /* −π … π spreads over 32 bits */
 }
 
-/* Three or more open edges over the same two places; run: half-edges in the lower halves. */
+/* Welds three or more open edges over the same two positions; run: half-edges in the lower halves. */
 static void weld_crowd(weld *w, uint64_t *run, int32_t count, int32_t *stack) {
   int32_t a = w->place[origin(w, (int32_t)(uint32_t)run[0])], b = w->place[target(w, (int32_t)(uint32_t)run[0])];
   for (int32_t i = 0; i < count; i++) {
     run[i] = angle_key(w, (int32_t)(uint32_t)run[i], a, b) | (uint32_t)run[i];
   }
   orb_sort_u64(run, count);
-  int32_t depth = 0,
-          waiting = 0; /* matter lies from a face that runs b to a, counter-clockwise to one that runs a to b */
+  int32_t depth = 0, waiting = 0;
+  /* Matter lies from a face that runs b to a, counter-clockwise, to one that runs a to b. */
   int32_t *wait = stack + count;
   for (int32_t i = 0; i < count; i++) {
     int32_t h = (int32_t)(uint32_t)run[i];
@@ -212,7 +212,7 @@ static void weld_crowd(weld *w, uint64_t *run, int32_t count, int32_t *stack) {
   while (depth > 0 && next < waiting) {
     weld_pair(w, stack[--depth], wait[next++]);
   }
-  for (; depth > 1; depth -= 2) { /* what is left runs one way only: neighbours turned against each other */
+  for (; depth > 1; depth -= 2) { /* the rest all run in one direction: their faces face against each other */
     weld_pair(w, stack[depth - 1], stack[depth - 2]);
   }
   for (; waiting - next > 1; next += 2) {
@@ -266,7 +266,7 @@ static orb_status weld_edges(weld *w, int64_t open_count) {
   return status;
 }
 
-/* One round: *more says whether another one is worth while. */
+/* One round; *more: whether another one may find something. */
 static orb_status weld_round(weld *w, orb_edges *edges, int *more) {
   int64_t open = 0, dropped = 0;
   ORB_TRY(find_places(w, &open));

@@ -1,9 +1,9 @@
-/* ORB_CLONES before a function: it is compiled for several widths of vectors, and the loader chooses. For loops whose
+/* ORB_CLONES before a function compiles it for several vector widths, of which the loader chooses one. For loops whose
  * results do not depend on the width. */
 #ifndef ORB_NUMERIC_CLONES_H
 #define ORB_NUMERIC_CLONES_H
 
-/* Clones are chosen while the program is loaded, before a sanitizer's runtime is up. */
+/* Not with sanitizers: the loader chooses before their runtime is initialised. */
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 #define ORB_SANITIZED 1
 #elif defined(__has_feature)

@@ -5,7 +5,10 @@
 
 #include "numeric/vec3.h"
 
-enum { BLOCK = 32, SWEEPS = 40 };
+enum {
+  BLOCK = 32, /* columns that are eliminated before the rest of the matrix is updated */
+  SWEEPS = 40 /* of the Jacobi iteration at most; it converges quadratically */
+};
 
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__)
 #define ORB_WIDER __attribute__((target_clones("avx512f", "avx2", "default")))
@@ -13,7 +16,7 @@ enum { BLOCK = 32, SWEEPS = 40 };
 #define ORB_WIDER
 #endif
 
-/* y −= Σ_k factor[k] · row k of x; elementwise and in order of k, so that the width of the vectors changes no bit. */
+/* y −= Σ_k factor[k] · row k of x; elementwise and in order of k, so that the vector width changes no bit. */
 ORB_WIDER static void subtract_rows(double *restrict y, const double *factor, int32_t count, const double *restrict x,
                                     int64_t stride, int32_t length) {
   for (int32_t k = 0; k < count; k++) {
@@ -33,8 +36,7 @@ static void swap_rows(double *a, double *b, int64_t length) {
   }
 }
 
-/* Eliminates the columns first … last − 1 below the diagonal, within the panel; factors stay where the zeros would be.
- */
+/* Eliminates the columns first … last − 1 below the diagonal, within the panel; the factors replace the zeros. */
 static int factor_panel(int64_t n, double *matrix, int32_t columns, double *right, int64_t first, int64_t last) {
   for (int64_t k = first; k < last; k++) {
     int64_t best = k;
@@ -66,7 +68,7 @@ int orb_dense_solve(int32_t size, double *matrix, int32_t columns, double *right
     if (factor_panel(n, matrix, columns, right, first, last) != 0) {
       return -1;
     }
-    for (int64_t i = first + 1; i < n; i++) { /* the block's rows first: those below need them finished */
+    for (int64_t i = first + 1; i < n; i++) { /* the rows of the block come first: those below need them finished */
       int32_t count = (int32_t)(i < last ? i - first : last - first);
       const double *factor = matrix + i * n + first;
       subtract_rows(matrix + i * n + last, factor, count, matrix + first * n + last, n, (int32_t)(n - last));
@@ -83,8 +85,8 @@ int orb_dense_solve(int32_t size, double *matrix, int32_t columns, double *right
   return 0;
 }
 
-/* Turns the rows p and q of both (columns of the matrix) so that those of w are orthogonal; 0 if they were. */
-static int turn(double w[3][3], double v[3][3], int p, int q) {
+/* Rotates the rows p and q of both w and v so that those of w become orthogonal; returns 0 if they were. */
+static int rotate(double w[3][3], double v[3][3], int p, int q) {
   double a = orb_dot(w[p], w[p]), b = orb_dot(w[q], w[q]), c = orb_dot(w[p], w[q]);
   if (!(fabs(c) > 1e-16 * sqrt(a) * sqrt(b))) {
     return 0;
@@ -128,25 +130,25 @@ static void orthogonal_to(const double a[3], double out[3]) {
 }
 
 void orb_svd3(const double a[9], double u[9], double s[3], double v[9]) {
-  double w[3][3], turned[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, left[3][3], greatest = 0;
+  double w[3][3], right[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, left[3][3], greatest = 0;
   for (int i = 0; i < 9; i++) {
     greatest = fmax(greatest, fabs(a[i]));
   }
   int power = 0;
-  (void)frexp(greatest, &power); /* a power of two: scaling loses nothing, and squares neither over- nor underflow */
+  (void)frexp(greatest, &power); /* scaling by a power of two is exact, and keeps squares from over- and underflowing */
   for (int i = 0; i < 3; i++) {
     for (int j = 0; j < 3; j++) {
       w[j][i] = ldexp(a[3 * i + j], -power);
     }
   }
   for (int sweep = 0; sweep < SWEEPS; sweep++) {
-    if (!(turn(w, turned, 0, 1) | turn(w, turned, 0, 2) | turn(w, turned, 1, 2))) {
+    if (!(rotate(w, right, 0, 1) | rotate(w, right, 0, 2) | rotate(w, right, 1, 2))) {
       break;
     }
   }
-  sort_descending(w, turned, s);
+  sort_descending(w, right, s);
   const double axis[3] = {1, 0, 0};
-  for (int k = 0; k < 3; k++) { /* a direction that rounding alone decides is made up */
+  for (int k = 0; k < 3; k++) { /* a direction that only rounding determines is replaced by an orthogonal one */
     memcpy(left[k], w[k], sizeof left[k]);
     if (k == 0 && !(orb_normalize(left[0]) > 0)) {
       memcpy(left[0], axis, sizeof axis);
@@ -166,7 +168,7 @@ void orb_svd3(const double a[9], double u[9], double s[3], double v[9]) {
     s[i] = ldexp(s[i], power);
     for (int k = 0; k < 3; k++) {
       u[3 * i + k] = left[k][i];
-      v[3 * i + k] = turned[k][i];
+      v[3 * i + k] = right[k][i];
     }
   }
 }

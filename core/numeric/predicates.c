@@ -9,9 +9,9 @@
  *
  * Exact. Each double is ±m·2^e with an integer m < 2⁵³. The determinant is a sum of six integers below 2¹⁵⁹, each times
  * a power of two between 2⁻³²²² and 2²⁹¹³. They are added in two's complement in one wide integer whose lowest bit
- * stands for the least of the six exponents: at most (6135 + 159 + 3) bits, that is 99 words of 64 bits. No rounding,
- * no overflow, so the sign is right for all finite doubles. Expansions (Shewchuk 1997) would fail where products under-
- * or overflow; integers do not.
+ * stands for the least of the six exponents: at most (6135 + 159 + 3) bits, that is 99 words of 64 bits. Nothing
+ * rounds or overflows, so the sign is correct for all finite doubles. Expansions (Shewchuk 1997) would fail where
+ * products under- or overflow; integers do not.
  */
 #include "numeric/predicates.h"
 
@@ -19,7 +19,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { WORDS = 104 };
+enum { WORDS = 104 }; /* of 64 bits; at least the 99 derived above */
 
 typedef struct exact_number {
   uint64_t mantissa;
@@ -142,7 +142,7 @@ static int coincide(const double a[3], const double b[3]) {
 int orb_orient_careful(const double a[3], const double b[3], const double c[3]) {
   double size = fabs(a[0]) + fabs(a[1]) + fabs(a[2]) + fabs(b[0]) + fabs(b[1]) + fabs(b[2]) + fabs(c[0]) + fabs(c[1]) +
                 fabs(c[2]);
-  if (size <= 1e100) { /* not where one is not a number */
+  if (size <= 1e100) { /* false if a coordinate is NaN */
     double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2], wx = c[0] - a[0], wy = c[1] - a[1], wz = c[2] - a[2];
     double yz = uy * wz, zy = uz * wy, zx = uz * wx, xz = ux * wz, xy = ux * wy, yx = uy * wx;
     double d = a[0] * (yz - zy) + a[1] * (zx - xz) + a[2] * (xy - yx);
@@ -152,7 +152,8 @@ int orb_orient_careful(const double a[3], const double b[3], const double c[3]) 
       return d > 0 ? 1 : -1;
     }
   }
-  if (coincide(a, b) || coincide(b, c) || coincide(c, a)) { /* what comes here mostly is: points that are vertices */
+  if (coincide(a, b) || coincide(b, c) ||
+      coincide(c, a)) { /* most calls that get this far: both points are the same vertex */
     return 0;
   }
   return decide_exactly(a, b, c);

@@ -4,13 +4,13 @@
 
 #include <math.h>
 
-/* The exact sign (−1, 0, 1) of det(a, b, c): which way the spherical triangle a, b, c turns seen from outside. A static
- * filter decides almost always; else the six products are summed exactly in integers. Right for all finite doubles,
- * subnormal and huge ones included; a coordinate that is not finite gives 0. */
+/* The exact sign (−1, 0, 1) of det(a, b, c): the orientation of the spherical triangle a, b, c seen from outside. A
+ * static filter decides almost always; otherwise the six products are summed exactly in integers. Correct for all
+ * finite doubles, subnormal and huge ones included; 0 if a coordinate is not finite. */
 int orb_orient_careful(const double a[3], const double b[3], const double c[3]);
 
-/* The same, with a coarser and cheaper filter in front: 1e-15 times the product of the 1-norms is no less than the
- * bound that predicates.c derives; where something overflows it does too, and the careful way decides. */
+/* The same, with a coarser and cheaper filter first: 1e-15 times the product of the 1-norms is at least the bound that
+ * predicates.c derives. Where anything overflows, so does the bound, and orb_orient_careful() decides. */
 static inline int orb_orient(const double a[3], const double b[3], const double c[3]) {
   double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2], wx = c[0] - a[0], wy = c[1] - a[1], wz = c[2] - a[2];
   double d = a[0] * (uy * wz - uz * wy) + a[1] * (uz * wx - ux * wz) + a[2] * (ux * wy - uy * wx);

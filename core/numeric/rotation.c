@@ -1,7 +1,8 @@
-/* The rotation nearest to a matrix (Kabsch 1976). */
+#include "numeric/rotation.h"
+
 #include <math.h>
 
-#include "numeric/rotation.h"
+#include "numeric/dense.h"
 #include "numeric/vec3.h"
 
 int orb_nearest_rotation(const double h[9], double r[9]) {

@@ -2,9 +2,8 @@
 #ifndef ORB_NUMERIC_ROTATION_H
 #define ORB_NUMERIC_ROTATION_H
 
-#include "numeric/dense.h"
-
-/* The rotation nearest to a 3×3 matrix, both row-major (Kabsch; reflections turned back). 0: it is not finite. */
+/* Sets r to the rotation nearest to the 3×3 matrix h, both row-major (Kabsch 1976; never a reflection). Returns 0 if h
+ * is not finite. */
 int orb_nearest_rotation(const double h[9], double r[9]);
 
 #endif

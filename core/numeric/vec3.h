@@ -1,4 +1,7 @@
-/* Vectors of three doubles, as plain arrays. */
+/* Vectors of three doubles, as plain arrays.
+ *
+ * The folder depends on nothing: vec3.h, frame (tangent planes), predicates (exact orientations), dense (linear solver,
+ * singular values), rotation (nearest rotation), clones.h (one function for several vector widths). */
 #ifndef ORB_NUMERIC_VEC3_H
 #define ORB_NUMERIC_VEC3_H
 
@@ -31,7 +34,7 @@ static inline double orb_length(const double a[3]) {
   return sqrt(orb_dot(a, a));
 }
 
-/* Scales to unit length; returns the old length. A zero vector stays. */
+/* Scales to unit length; returns the old length. A zero vector stays zero. */
 static inline double orb_normalize(double a[3]) {
   double length = orb_length(a);
   if (length > 0) {
@@ -49,7 +52,7 @@ static inline void orb_add_outer(double h[9], const double y[3], const double x[
   }
 }
 
-/* det(a, b, c), taken from differences to a so that close points lose nothing. */
+/* det(a, b, c), computed from differences to a, so that close points lose no digits. */
 static inline double orb_det(const double a[3], const double b[3], const double c[3]) {
   double u[3], w[3], n[3];
   orb_sub(b, a, u);

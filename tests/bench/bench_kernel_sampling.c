@@ -6,7 +6,7 @@
 
 #include "api/report_codec.h"
 #include "bench.h"
-#include "embed/kernel_sampling.h"
+#include "embed/kernel_sampling/kernel_sampling.h"
 
 static void add_point(void *user, int32_t inserted, double place_seconds, double optimize_seconds) {
   api_text *points = user;

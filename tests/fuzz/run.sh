@@ -11,7 +11,7 @@
 # build-fuzz/sums/TARGET.
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
-all=(obj off ply stl gltf glb json query range config sphere embedding decode http token view client)
+all=(obj off ply stl gltf glb json query range config sphere decode http token view client)
 
 sums() {
   local name

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The embedding on 64-bit Arm, whose NEON the plain kernels compile to: cross-compiled, and run by qemu's user emulation.
+# The embedding on 64-bit Arm, whose NEON the plain vector loops compile to: cross-compiled, and run by qemu's user emulation.
 # Unit tests, adversarial meshes, and the points of both methods compared with those of this machine.
 #
 #   tests/tools/arm.sh [EMBED-DIGEST]    the program built for this machine, build/bin/embed-digest by default

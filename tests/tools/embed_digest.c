@@ -1,4 +1,4 @@
-/* embed-digest: embeds a mesh made of additions, multiplications and square roots only, with the kernels that any
+/* embed-digest: embeds a mesh made of additions, multiplications and square roots only, with the vector loops that any
  * machine has, and prints a digest of the points of each method: to compare processors that both follow IEEE 754. */
 #include <inttypes.h>
 #include <math.h>

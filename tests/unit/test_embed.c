@@ -302,39 +302,6 @@ static void test_bad_requests(void **unused) {
   orb_context_destroy(ctx);
 }
 
-static void test_codec(void **unused) {
-  (void)unused;
-  orb_context *ctx = open_context(2);
-  orb_mesh mesh = shape_globe(ctx, 12, 8), other = shape_globe(ctx, 8, 12);
-  orb_embedding e = embed_with(ctx, &mesh, ORB_PRESET_DEFAULT, 1), back;
-  orb_buffer buffer = {0};
-  assert_int_equal(orb_embedding_encode(ctx, &e, &buffer), ORB_OK);
-  assert_int_equal(orb_embedding_decode(ctx, buffer.data, buffer.size, &mesh, &back), ORB_OK);
-  assert_memory_equal(back.points, e.points, 24 * (size_t)mesh.vertex_count);
-  assert_memory_equal(&back.certificate, &e.certificate, sizeof e.certificate);
-  assert_memory_equal(&back.distortion, &e.distortion, sizeof e.distortion);
-  assert_memory_equal(&back.timings, &e.timings, sizeof e.timings);
-  orb_embedding_free(ctx, &back);
-  for (size_t size = 0; size < buffer.size; size++) {
-    unsigned char *copy = malloc(size ? size : 1); /* exact size: a sanitizer sees a read past it */
-    assert_non_null(copy);
-    memcpy(copy, buffer.data, size);
-    assert_int_equal(orb_embedding_decode(ctx, copy, size, &mesh, &back), ORB_E_CORRUPT);
-    free(copy);
-  }
-  for (size_t at = 0; at < buffer.size; at++) {
-    buffer.data[at] ^= (unsigned char)(1 << at % 8);
-    assert_int_equal(orb_embedding_decode(ctx, buffer.data, buffer.size, &mesh, &back), ORB_E_CORRUPT);
-    buffer.data[at] ^= (unsigned char)(1 << at % 8);
-  }
-  assert_int_equal(orb_embedding_decode(ctx, buffer.data, buffer.size, &other, &back), ORB_E_CORRUPT);
-  orb_buffer_free(ctx, &buffer);
-  orb_embedding_free(ctx, &e);
-  shape_free(ctx, &mesh);
-  shape_free(ctx, &other);
-  orb_context_destroy(ctx);
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_platonic),
                                      cmocka_unit_test(test_ball),
@@ -345,7 +312,6 @@ int main(void) {
                                      cmocka_unit_test(test_cancel_everywhere),
                                      cmocka_unit_test(test_every_allocation),
                                      cmocka_unit_test(test_budget),
-                                     cmocka_unit_test(test_bad_requests),
-                                     cmocka_unit_test(test_codec)};
+                                     cmocka_unit_test(test_bad_requests)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,8 +10,9 @@
 
 #include <cmocka.h>
 
-#include "embed/kernel_sampling.h"
-#include "embed/ks_search.h"
+#include "embed/kernel_sampling/kernel_sampling.h"
+#include "embed/kernel_sampling/search.h"
+#include "embed/kernel_sampling/simplify.h"
 #include "support_exact.h"
 #include "support_failing.h"
 #include "support_shapes.h"

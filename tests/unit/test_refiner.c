@@ -1,4 +1,4 @@
-/* The hierarchy and its refiner, as alignment uses them; and the vector kernels of every instruction set. */
+/* The hierarchy and its refiner, as alignment uses them; and the vector loops of every instruction set. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -9,9 +9,10 @@
 
 #include <cmocka.h>
 
-#include "embed/hierarchy.h"
+#include "embed/advance.h"
 #include "embed/kernel.h"
-#include "embed/multires.h"
+#include "embed/resume.h"
+#include "embed/vector/loops.h"
 #include "support_context.h"
 #include "support_exact.h"
 #include "support_shapes.h"
@@ -150,7 +151,7 @@ static void test_keep_and_pin(void **unused) {
 }
 
 /* Each instruction set embeds validly and to the same quality. */
-static void test_kernels(void **unused) {
+static void test_vector_loops(void **unused) {
   (void)unused;
   orb_mesh mesh = bumpy(5);
   double *points = malloc(24 * (size_t)mesh.vertex_count), first = 0;
@@ -173,7 +174,7 @@ static void test_kernels(void **unused) {
     assert_int_equal(
         orb_distortion_measure(ctx, mesh.positions, points, mesh.triangles, mesh.triangle_count, &distortion), ORB_OK);
     double mean = distortion.symmetric_dirichlet.mean;
-    print_message("%s: %.6f\n", orb_kernels_of(cpu)->name, mean);
+    print_message("%s: %.6f\n", orb_vector_loops_of(cpu)->name, mean);
     first = cpu == ORB_CPU_PLAIN ? mean : first;
     assert_true(fabs(mean - first) < 0.05 * first);
   }
@@ -271,7 +272,7 @@ static void test_distortion(void **unused) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_levels),       cmocka_unit_test(test_again),
-                                     cmocka_unit_test(test_keep_and_pin), cmocka_unit_test(test_kernels),
+                                     cmocka_unit_test(test_keep_and_pin), cmocka_unit_test(test_vector_loops),
                                      cmocka_unit_test(test_kernel_point), cmocka_unit_test(test_distortion)};
   return cmocka_run_group_tests(tests, context_two_threads, context_end);
 }

@@ -60,23 +60,15 @@ static int read_run(void *user, torture_kind kind, long number, int for_ever) {
 }
 
 static orb_status embed_inner(work *w, orb_context *ctx) {
-  orb_embedding e, again;
-  orb_buffer stored = {0}, ply = {0};
+  orb_embedding e;
+  orb_buffer ply = {0};
   orb_status status = orb_embed(ctx, &w->meshes[0], &w->embed, &e);
   if (status != ORB_OK) {
     return status;
   }
   assert_true(e.certificate.valid);
-  status = orb_embedding_encode(ctx, &e, &stored);
-  if (status == ORB_OK) {
-    status = orb_embedding_decode(ctx, stored.data, stored.size, &w->meshes[0], &again);
-  }
-  if (status == ORB_OK) {
-    status = orb_sphere_ply_write(ctx, &w->meshes[0], again.points, &ply);
-    orb_embedding_free(ctx, &again);
-  }
+  status = orb_sphere_ply_write(ctx, &w->meshes[0], e.points, &ply);
   orb_buffer_free(ctx, &ply);
-  orb_buffer_free(ctx, &stored);
   orb_embedding_free(ctx, &e);
   return status;
 }

@@ -28,6 +28,7 @@
 #include "align/map/starts/place.h"
 #include "align/map/twist/untwist.h"
 #include "base/check.h"
+#include "embed/place.h"
 #include "numeric/vec3.h"
 
 enum {

@@ -4,7 +4,8 @@
 #include "align/pin/relax.h"
 #include "align/sheet/thin.h"
 #include "base/check.h"
-#include "embed/hierarchy.h"
+#include "embed/advance.h"
+#include "embed/resume.h"
 
 enum { ROUNDS = 24, ROUND_SWEEPS = 5, SWEEPS = 60 };
 static const double LITTLE = 0.02; /* of the new vertices: not worth another round */

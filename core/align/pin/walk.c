@@ -13,7 +13,7 @@
 #include "align/rotate/procrustes.h"
 #include "align/rotate/rotate.h"
 #include "base/check.h"
-#include "embed/hierarchy.h"
+#include "embed/advance.h"
 #include "numeric/vec3.h"
 
 enum { STEPS_MAX = 160, TRIES = 24, SWEEPS = 3, LEVELS = 3, FINEST_WALK = 4000, SETTLE = 60 };

@@ -20,7 +20,6 @@
 #include "align/sheet/landmarks.h"
 #include "align/sheet/untangle.h"
 #include "base/check.h"
-#include "embed/hierarchy.h"
 #include "numeric/vec3.h"
 
 enum { HALVINGS = 4, RELAXATIONS = 8, RELAX_SWEEPS = 20 };

@@ -20,88 +20,89 @@ typedef struct orb_context orb_context;
 
 enum { ORB_ERROR_ITEMS = 100 };
 
-/* What is known of a failure. Numbers that do not apply are −1, counts 0. Vertex numbers are those of the file. */
+/* The facts of a failure. Numbers that do not apply are −1, counts 0. Vertex numbers are those of the file. */
 typedef struct orb_error {
   orb_status status;
-  char detail[512];       /* plain words that say what is wrong and what to do */
+  char detail[512];       /* a sentence: what is wrong and what to do */
   int64_t line, offset;   /* where in the bytes: 1-based line of a text, byte offset of a binary */
   int64_t boundary_loops; /* not-closed */
   int64_t genus;          /* not-genus-zero */
-  int64_t edge_total;     /* how many edges are at fault, of which `edges` holds the first edge_count */
+  int64_t edge_total;     /* offending edges; `edges` holds the first edge_count of them */
   int32_t edge_count;
   int32_t edges[ORB_ERROR_ITEMS][2];
-  int64_t vertex_total; /* vertices at fault, likewise */
+  int64_t vertex_total; /* offending vertices, likewise */
   int32_t vertex_count;
   int32_t vertices[ORB_ERROR_ITEMS];
   int64_t component_total; /* not-connected: triangles of each piece, largest first */
   int32_t component_count;
   int64_t components[ORB_ERROR_ITEMS];
-  int32_t landmark_count; /* bad-landmarks: which ones, by index in the request */
+  int32_t landmark_count; /* bad-landmarks: their indices in the request */
   int32_t landmarks[ORB_ERROR_ITEMS];
-  int32_t shape; /* the shape at fault, −1 if none in particular */
+  int32_t shape; /* the offending shape, −1 if none in particular */
 } orb_error;
 
-/* Called with the stage ("simplify", "embed", …) and the fraction of that stage that is done, 0 to 1. May be called
- * from any thread of the context, never from two at a time; must return at once. */
+/* Called with the stage ("simplify", "embed", …) and the fraction of that stage that is done, 0 to 1. Any thread of the
+ * context may call it, but never two at a time; it must return at once. */
 typedef void (*orb_progress_fn)(void *user, const char *stage, double fraction);
 
-/* Where memory comes from; both NULL: malloc and free. For tests that fail the n-th allocation. Any thread. */
+/* Where memory comes from; both NULL: malloc and free. For tests that fail the n-th allocation. Called from any thread.
+ */
 typedef struct orb_allocator {
   void *(*alloc)(void *user, size_t size);
   void (*free)(void *user, void *block);
   void *user;
 } orb_allocator;
 
-/* The widest vector instructions that the loops which have several versions may use; at most what the machine has. */
+/* The widest vector instructions that loops with several versions may use; at most those of the machine. */
 typedef enum orb_cpu { ORB_CPU_AUTO = 0, ORB_CPU_PLAIN, ORB_CPU_AVX2, ORB_CPU_AVX512 } orb_cpu;
 
 typedef struct orb_context_options {
-  size_t memory_limit;      /* bytes that live at once; 0: no limit */
-  int threads;              /* threads to use in all; 0: as many as the machine has (at most 64) */
+  size_t memory_limit;      /* bytes allocated at one time; 0: no limit */
+  int threads;              /* with the caller, at most 64; 0: those of the machine */
   int64_t deadline_ms;      /* orb_clock_ms() after which calls end with ORB_E_TIMEOUT; 0: none */
   int64_t max_triangles;    /* refuse larger meshes; 0: 5 million */
   orb_progress_fn progress; /* NULL: none */
   void *progress_user;
   orb_allocator allocator;
-  orb_cpu cpu; /* for measurements and tests; results may differ in the last bits */
+  orb_cpu cpu; /* for measurements and tests; between values the last bits of results may differ */
 } orb_context_options;
 
 /* Makes a context; options NULL: all defaults. Threads start with the first parallel loop. ORB_E_NO_MEMORY. */
 ORB_MUST_CHECK orb_status orb_context_create(const orb_context_options *options, orb_context **out);
 
-/* Ends it: joins its threads. NULL is fine. All that it allocated must have been freed: asserted. */
+/* Joins the threads and frees the context. NULL is fine. Asserts that everything it allocated has been freed. */
 void orb_context_destroy(orb_context *ctx);
 
-/* Asks running calls to end soon (ORB_E_CANCELLED), within 100 ms. Any thread. Stays set. */
+/* Makes running and later calls end with ORB_E_CANCELLED, within 100 ms. Any thread. */
 void orb_context_cancel(orb_context *ctx);
 
-/* ORB_OK, ORB_E_CANCELLED or ORB_E_TIMEOUT, with the error set; cheap, to be asked often. Any thread. */
+/* ORB_OK, ORB_E_CANCELLED or ORB_E_TIMEOUT, with the error set. Cheap: long loops call it often. Any thread. */
 ORB_MUST_CHECK orb_status orb_context_check(orb_context *ctx);
 
 /* The error of the last call that failed. Valid until the next failing call. */
 const orb_error *orb_context_error(const orb_context *ctx);
 
-/* Sets the error with a fresh record (all facts empty) and returns status. Any thread: the first one of a parallel
- * loop wins until orb_error_clear(). */
+/* Sets a new error record (without facts) and returns status. Any thread: in a parallel loop the first failure wins,
+ * until orb_error_clear(). */
 orb_status orb_fail(orb_context *ctx, orb_status status, const char *format, ...) ORB_PRINTF(3, 4);
 
 /* The record, to add facts to it after orb_fail(). */
 orb_error *orb_context_error_edit(orb_context *ctx);
 void orb_error_clear(orb_context *ctx);
 
-/* Reports progress; any thread, may drop calls. */
+/* Reports progress. Any thread; reports that collide with another are dropped. */
 void orb_progress(orb_context *ctx, const char *stage, double fraction);
 
-/* From now on only this stage is reported: what works for one calls functions that have stages of their own. NULL: any.
- * The text is not copied and must last until it is replaced. Returns what held before, to be set again at the end. Not
- * within a parallel loop. */
+/* From now on reports only this stage (NULL: any), for a stage that calls functions with stages of their own. The text
+ * is not copied and must last until it is replaced. Returns the previous value, which the caller restores at the end.
+ * Not within a parallel loop. */
 const char *orb_progress_only(orb_context *ctx, const char *stage);
 
-/* Memory. Blocks are 64-byte aligned. count × size is checked for overflow and against the budget; NULL when it
- * cannot be had, with the error set to ORB_E_NO_MEMORY. A count of 0 gives a valid block. Any thread. */
+/* Memory. Blocks are 64-byte aligned. count × size is checked for overflow and against the budget; on failure the
+ * result is NULL and the error ORB_E_NO_MEMORY. A count of 0 gives a valid block. Any thread. */
 void *orb_alloc(orb_context *ctx, size_t count, size_t size);
 void *orb_calloc(orb_context *ctx, size_t count, size_t size);
-/* Grows or shrinks a block of orb_alloc (or NULL); on failure NULL, the old block stays. */
+/* Grows or shrinks a block of orb_alloc() (or NULL); on failure returns NULL and keeps the old block. */
 void *orb_realloc(orb_context *ctx, void *block, size_t count, size_t size);
 void orb_free(orb_context *ctx, void *block); /* NULL is fine */
 size_t orb_memory_used(const orb_context *ctx);
@@ -111,21 +112,21 @@ size_t orb_memory_peak(const orb_context *ctx);
 #define ORB_NEW(ctx, type, count) ((type *)orb_alloc((ctx), (size_t)(count), sizeof(type)))
 #define ORB_NEW0(ctx, type, count) ((type *)orb_calloc((ctx), (size_t)(count), sizeof(type)))
 
-/* Threads. */
+/* How many threads loops run on, with the caller. */
 int orb_threads(const orb_context *ctx);
 
-/* The version that is used: never ORB_CPU_AUTO. */
+/* The vector instructions in use: never ORB_CPU_AUTO. */
 orb_cpu orb_context_cpu(const orb_context *ctx);
 
-/* The body of a parallel loop: work on [begin, end) as thread number `thread` (0 ≤ thread < orb_threads()). */
+/* The body of a parallel loop: works on [begin, end) as thread number `thread` (0 ≤ thread < orb_threads()). */
 typedef void (*orb_loop_fn)(void *arg, int64_t begin, int64_t end, int thread);
 
-/* Runs body over [0, count) in chunks of `grain` (≥ 1), in parallel; returns when all is done. Chunks begin at
- * multiples of grain whatever the number of threads, so a sum of per-chunk sums taken in order does not depend on it.
- * Which thread takes which chunk is not fixed. Not to be nested. One chunk or one thread: runs in the caller. */
+/* Runs body over [0, count) in chunks of `grain` (≥ 1), in parallel; returns when all are done. Chunks begin at
+ * multiples of grain for any number of threads, so a sum of per-chunk sums taken in order does not depend on it. Which
+ * thread takes which chunk is not fixed. Loops do not nest. One chunk, or one thread, runs in the caller. */
 void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg);
 
-/* Milliseconds of a monotonic clock, and the same in seconds. */
+/* A monotonic clock, in milliseconds and in seconds. */
 int64_t orb_clock_ms(void);
 double orb_clock(void);
 

@@ -13,15 +13,15 @@ extern "C" {
 typedef struct orb_certificate {
   int valid, exact;
   int64_t flipped, degenerate; /* triangles of negative, of zero orientation */
-  int32_t degree;              /* of the map: how often the sphere is covered, with sign */
+  int32_t degree;              /* of the map: how often it covers the sphere, with sign */
   double min_determinant;      /* the smallest det(p,q,r), rounded */
 } orb_certificate;
 
 /* Certifies points (3 a vertex, unit up to rounding) of a closed triangle list. Orientation by a static filter, then
  * exact integers; degree by counting, with signs, the triangles that cover a direction in general position, all decided
  * by exact orientations. (The sum of solid angles / 4π is the same number, but only up to rounding.) Points that are
- * not finite make every triangle at them degenerate. Never fails but for memory and cancel; look at out->valid. O(F).
- */
+ * not finite make every triangle at them degenerate. Fails only without memory or when cancelled: the result is in
+ * out->valid. O(F). */
 ORB_MUST_CHECK orb_status orb_certify(orb_context *ctx, const double *points, int32_t vertex_count,
                                       const int32_t *triangles, int32_t triangle_count, orb_certificate *out);
 
@@ -33,9 +33,9 @@ typedef struct orb_measure {
   double counts[ORB_HISTOGRAM_BINS]; /* triangles in each bin */
 } orb_measure;
 
-/* How a map stretches: both areas scaled equal, the image of a triangle is its flat chord triangle, σ₁ ≥ σ₂ singular
- * values. Source triangles of zero area (to rounding: |U×W| ≤ 1e-13 (U² + W²)) have no weight; where all are such,
- * every number is 0. */
+/* How a map distorts, with both areas scaled to be equal, the flat chord triangle as the image of a triangle, and σ₁ ≥
+ * σ₂ its singular values. Source triangles of zero area (to rounding: |U×W| ≤ 1e-13 (U² + W²)) have no weight; if all
+ * are such, every number is 0. */
 typedef struct orb_distortion {
   orb_measure symmetric_dirichlet; /* ¼(σ₁²+σ₁⁻²+σ₂²+σ₂⁻²), 1 = isometric */
   orb_measure angle;               /* σ₁/σ₂ */
@@ -44,7 +44,7 @@ typedef struct orb_distortion {
   double stretch_efficiency;       /* 1 / mean(½(σ₁⁻²+σ₂⁻²)) */
 } orb_distortion;
 
-/* positions → images, both 3 a vertex, same triangles. For two aligned shapes also their composed map. */
+/* Measures the map from positions to images, both 3 a vertex, over the same triangles. O(F). */
 ORB_MUST_CHECK orb_status orb_distortion_measure(orb_context *ctx, const double *positions, const double *images,
                                                  const int32_t *triangles, int32_t triangle_count, orb_distortion *out);
 
@@ -60,7 +60,7 @@ typedef struct orb_embed_options {
   /* kernel-sampling: Peng & Timalsena 2016, sections 4 to 6 */
   double area_exponent;          /* ϱ of Eq. 3, 3.0 */
   double aspect_exponent;        /* φ of Eq. 3, 12.0 */
-  double step;                   /* stepping of Eq. 2, 0.11 */
+  double step;                   /* step of s and t in Eq. 2, 0.11 */
   double displacement_threshold; /* of Algorithm 1, 1e-6 */
   int32_t max_iterations;        /* of Algorithm 1 */
   int32_t first_optimization;    /* vertices inserted before the first global optimisation, 25 */
@@ -70,7 +70,7 @@ typedef struct orb_embed_options {
 void orb_embed_defaults(orb_embed_options *options);
 
 typedef struct orb_embed_timings {
-  double check, simplify, embed, certify, total; /* seconds; check is 0 here: it is the caller's orb_mesh_repair() */
+  double check, simplify, embed, certify, total; /* seconds; check is 0 here: the caller measures orb_mesh_repair() */
 } orb_embed_timings;
 
 typedef struct orb_embedding {
@@ -81,23 +81,17 @@ typedef struct orb_embedding {
   orb_embed_timings timings;
 } orb_embedding;
 
-/* Embeds a mesh that orb_mesh_repair() accepted. The result is certified, or ORB_E_NOT_CERTIFIED is returned and no
- * embedding. newton takes any valence. kernel-sampling has no limit on it either, but around poles of some hundreds of
- * triangles a kernel may get too narrow for doubles: after three bounded attempts it then refuses with
- * ORB_E_NOT_CERTIFIED and names newton (two poles of valence 200 with one ring between them embed, with five rings
- * between them, or of valence 2,000, they are refused, within seconds). Same bytes for any number of threads on one
+/* Embeds a mesh that orb_mesh_repair() accepted. The result is certified; otherwise the call returns
+ * ORB_E_NOT_CERTIFIED and no embedding. newton takes any valence. kernel-sampling has no limit on it either, but around
+ * poles of some hundreds of triangles a kernel may get too narrow for doubles: after three bounded attempts it fails
+ * with ORB_E_NOT_CERTIFIED and recommends newton (two poles of valence 200 with one ring between them embed; with five
+ * rings between them, or of valence 2,000, they fail within seconds). Same bytes for any number of threads on one
  * machine; between instruction sets (AVX-512, AVX2, none: chosen at run time) the last bits may differ. Stages:
- * "simplify", "embed", "certify". Source: DESIGN in docs/method.md; O(n log n) time, at most 250 bytes a triangle
- * beside the mesh. */
+ * "simplify", "embed", "certify". O(n log n) time, at most 250 bytes a triangle beside the mesh. docs/method.md
+ * describes the method. */
 ORB_MUST_CHECK orb_status orb_embed(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
                                     orb_embedding *out);
 void orb_embedding_free(orb_context *ctx, orb_embedding *embedding);
-
-/* Stored form: header, points, certificate, distortion, timings, checksum. Decoding certifies again against the
- * mesh; any truncation or change is ORB_E_CORRUPT. */
-ORB_MUST_CHECK orb_status orb_embedding_encode(orb_context *ctx, const orb_embedding *embedding, orb_buffer *out);
-ORB_MUST_CHECK orb_status orb_embedding_decode(orb_context *ctx, const unsigned char *bytes, size_t size,
-                                               const orb_mesh *mesh, orb_embedding *out);
 
 #ifdef __cplusplus
 }

@@ -1,7 +1,7 @@
-/* Mesh files: OBJ, OFF, PLY, STL and glTF/GLB from memory, and the binary sphere PLY out.
+/* Mesh files: reading OBJ, OFF, PLY, STL and glTF/GLB from memory, and writing the binary sphere PLY.
  *
- * All readers are linear in the file's size, take the format from the content and never from a name, never trust a
- * count of a header before the bytes are there, and never allocate more than a small multiple of the file.
+ * The content decides the format, never a name. Readers are linear in the size of the file, trust no count of a header
+ * before the bytes are there, and allocate at most a small multiple of the file's size.
  */
 #ifndef ORBMORPH_FORMAT_H
 #define ORBMORPH_FORMAT_H
@@ -27,11 +27,11 @@ const char *orb_format_name(orb_format format); /* "obj", … ; "auto" */
 /* "obj" → ORB_FORMAT_OBJ; ORB_FORMAT_AUTO for an unknown name. */
 orb_format orb_format_of_name(const char *name);
 
-/* What these bytes look like; ORB_FORMAT_AUTO if like nothing known. */
+/* The format of these bytes by their content; ORB_FORMAT_AUTO if it is none of them. */
 orb_format orb_format_detect(const unsigned char *bytes, size_t size);
 
-/* Reads a mesh as it stands in the file: polygons made triangles, nothing else mended (see orb_mesh_repair()).
- * format AUTO: detected; *format_out (may be NULL) says what it was. Errors: ORB_E_UNKNOWN_FORMAT,
+/* Reads a mesh as it is in the file: polygons are cut into triangles, nothing else is repaired (see orb_mesh_repair()).
+ * format AUTO: detected; *format_out (may be NULL): the format that was read. Errors: ORB_E_UNKNOWN_FORMAT,
  * ORB_E_MALFORMED_MESH with line or offset, ORB_E_NOT_FINITE (also beyond ORB_COORDINATE_MAX), ORB_E_TOO_LARGE,
  * ORB_E_NO_MEMORY. */
 ORB_MUST_CHECK orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_format format,

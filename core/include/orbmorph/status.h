@@ -1,7 +1,7 @@
-/* Status codes: the one checked result type of the library.
+/* Status codes: the result type of every function that can fail.
  *
- * Every function that can fail returns an orb_status, and the compiler warns where a caller drops it. ORB_OK is 0.
- * What went wrong in plain words, and the facts (line, edges, genus, …), lie in the context: see orb_context_error().
+ * The compiler warns where a caller ignores one. ORB_OK is 0. The context holds the error: a sentence and the facts
+ * (line, edges, genus, …), see orb_context_error().
  */
 #ifndef ORBMORPH_STATUS_H
 #define ORBMORPH_STATUS_H
@@ -25,31 +25,31 @@ typedef enum orb_status {
   ORB_OK = 0,
   /* The bytes. */
   ORB_E_UNKNOWN_FORMAT, /* no reader knows these bytes */
-  ORB_E_MALFORMED_MESH, /* a reader knows them but they are broken; error has line or offset */
+  ORB_E_MALFORMED_MESH, /* a reader knows them but they are not valid; the error has a line or an offset */
   ORB_E_TOO_LARGE,      /* beyond a limit of the context or of an index type */
   /* The surface. */
   ORB_E_NOT_FINITE,     /* NaN or infinite coordinate, or one too large */
   ORB_E_NOT_CLOSED,     /* boundary edges */
-  ORB_E_NOT_MANIFOLD,   /* an edge of three faces, a vertex of two fans */
+  ORB_E_NOT_MANIFOLD,   /* an edge of three faces, or a vertex of two fans */
   ORB_E_NOT_ORIENTABLE, /* no consistent facing exists (or, without repairs, none is given) */
   ORB_E_NOT_CONNECTED,  /* several pieces */
   ORB_E_NOT_GENUS_ZERO, /* handles */
-  ORB_E_DEGENERATE,     /* fewer than four triangles left, or no size that float32 could show */
+  ORB_E_DEGENERATE,     /* fewer than four triangles left, or a size or position that float32 cannot hold */
   /* The request. */
-  ORB_E_BAD_LANDMARKS, /* contradictory, crossed, out of range; error names which */
+  ORB_E_BAD_LANDMARKS, /* contradictory, crossed or out of range; the error names them */
   ORB_E_BAD_OPTION,    /* an option outside its range */
   ORB_E_UNSUPPORTED,   /* a method that this build does not have */
   /* The run. */
-  ORB_E_NO_MEMORY,     /* the budget of the context, or the machine, is spent */
-  ORB_E_CANCELLED,     /* the cancel flag was set */
+  ORB_E_NO_MEMORY,     /* the budget of the context or the memory of the machine is spent */
+  ORB_E_CANCELLED,     /* orb_context_cancel() was called */
   ORB_E_TIMEOUT,       /* the deadline of the context has passed */
-  ORB_E_NOT_CERTIFIED, /* a result was computed but its certificate does not hold: no result is returned */
+  ORB_E_NOT_CERTIFIED, /* a result was computed but its certificate does not hold; it is not returned */
   ORB_E_CORRUPT,       /* stored bytes do not decode */
-  ORB_E_INTERNAL,      /* a fault of ours */
+  ORB_E_INTERNAL,      /* a bug */
   ORB_STATUS_COUNT
 } orb_status;
 
-/* The name of a status as the wire has it, for example "not-closed"; never NULL. */
+/* The name of a status on the wire, such as "not-closed"; never NULL. */
 const char *orb_status_name(orb_status status);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/* UTF-8 as RFC 3629 has it: no overlong forms, no surrogates, nothing above U+10FFFF. */
+/* UTF-8 as RFC 3629 defines it: no overlong forms, no surrogates, nothing above U+10FFFF. */
 #ifndef ORBMORPH_UTF8_H
 #define ORBMORPH_UTF8_H
 
@@ -8,8 +8,8 @@
 extern "C" {
 #endif
 
-/* The bytes of the character at p, of which at most `most` (≥ 1) may be looked at; 0 if it is none. In a text that ends
- * in NUL `most` may be 4: NUL continues nothing, and is itself a character of one byte. */
+/* The length in bytes of the character at p; 0 if there is no valid one. Reads at most `most` (≥ 1) bytes. In a text
+ * that ends with NUL `most` may be 4: NUL never continues a character, and is itself one of one byte. */
 static inline size_t orb_utf8_length(const unsigned char *p, size_t most) {
   unsigned char c = p[0];
   size_t n = c < 0x80 ? 1 : c < 0xc2 ? 0 : c < 0xe0 ? 2 : c < 0xf0 ? 3 : c < 0xf5 ? 4 : 0;

@@ -3,6 +3,7 @@
 #define ORB_ALIGN_MAP_ENGINE_RUN_H
 
 #include "align/map/engine/packed.h"
+#include "embed/hierarchy.h"
 #include "embed/multires.h"
 
 enum {

@@ -12,7 +12,7 @@
 
 #include "align/map/engine/untangle.h"
 #include "base/check.h"
-#include "embed/star.h"
+#include "numeric/frame.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 

@@ -1,0 +1,23 @@
+/* The inside of a context: only the files of core/base look in. */
+#ifndef ORB_BASE_STATE_H
+#define ORB_BASE_STATE_H
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+#include "orbmorph/context.h"
+
+struct orb_context {
+  uint32_t magic;
+  orb_context_options options;
+  atomic_int cancelled;
+  atomic_size_t memory_used, memory_peak; /* bytes */
+  pthread_mutex_t error_lock;             /* guards error while a parallel loop runs */
+  orb_error error;
+  int in_loop; /* set by orb_parallel_for() around a loop: the first failure wins */
+  pthread_mutex_t progress_lock;
+  const char *stage;     /* the only stage that is reported; NULL: any */
+  struct orb_pool *pool; /* created by the first parallel loop */
+};
+
+#endif
