@@ -39,6 +39,21 @@ static ssize_t listen_in(void *cookie, const char *text, size_t size) {
   return (ssize_t)size;
 }
 
+/* A stream whose writes go to listen_in(); NULL without memory. */
+#if defined(__APPLE__)
+static int listen_in_bsd(void *cookie, const char *text, int size) {
+  return (int)listen_in(cookie, text, (size_t)size);
+}
+
+static FILE *open_listener(listener *l) {
+  return funopen(l, NULL, listen_in_bsd, NULL, NULL);
+}
+#else
+static FILE *open_listener(listener *l) {
+  return fopencookie(l, "w", (cookie_io_functions_t){.write = listen_in});
+}
+#endif
+
 /* Outward as a whole: if most triangles are negative, Qhull's sense of orientation is the other one. */
 static void turn_outward(const double *points, int32_t *triangles, int32_t count) {
   int64_t sum = 0;
@@ -88,7 +103,7 @@ static orb_status run(orb_context *ctx, qhT *qh, double *points, int32_t count, 
                       int32_t *triangle_count) {
   char command[] = "qhull Qt Q12 Pp TF500";
   listener l = {.ctx = ctx, .qh = qh};
-  FILE *messages = fopencookie(&l, "w", (cookie_io_functions_t){.write = listen_in});
+  FILE *messages = open_listener(&l);
   if (!messages) {
     return orb_fail(ctx, ORB_E_NO_MEMORY, "No memory for the convex hull.");
   }

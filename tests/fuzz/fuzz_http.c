@@ -22,7 +22,7 @@ static server srv;
 static config options;
 static struct sockaddr_un address = {.sun_family = AF_UNIX};
 
-/* The token that the corpus sends: 64 zeros. */
+/* The token that the seeds send: 64 zeros. */
 static int add_token(void) {
   static const char token[] = "0000000000000000000000000000000000000000000000000000000000000000";
   token_row row = {.name = "fuzz", .scopes = SCOPE_READ | SCOPE_WRITE};

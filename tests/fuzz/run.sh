@@ -1,14 +1,18 @@
 #!/usr/bin/env bash
 # Builds the libFuzzer targets and runs each for some seconds, as many at once as there are cores.
 #
-#   tests/fuzz/run.sh [--cpu] SECONDS [TARGET…]    with --cpu the seconds are of CPU time, else of wall time
-#                                                  with ORB_FUZZ_SEED all begin with the same inputs each time
-#   tests/fuzz/run.sh --sums                       what all runs in build-fuzz came to, a line a target
-#   tests/fuzz/run.sh --keep BYTES [TARGET…]       adds what covers more to tests/fuzz/corpus, inputs up to BYTES each
+#   tests/fuzz/run.sh [--cpu] SECONDS [TARGET…]    SECONDS of wall time each, with --cpu of CPU time;
+#                                                  with ORB_FUZZ_SEED every run starts with the same inputs
+#   tests/fuzz/run.sh --sums                       totals of all runs in build-fuzz, one line per target
+#   tests/fuzz/run.sh --unpack [TARGET…]           unpacks the seeds: tests/fuzz/corpus/TARGET.tar.gz, one file per
+#                                                  input, into build-fuzz/seeds/TARGET; each run does so first
+#   tests/fuzz/run.sh --pack [TARGET…]             packs them again, after inputs were added to or removed from
+#                                                  build-fuzz/seeds/TARGET; the same inputs give the same bytes
+#   tests/fuzz/run.sh --keep BYTES [TARGET…]       adds the inputs of up to BYTES that cover more, and packs
 #
-# New inputs stay in build-fuzz/corpus/TARGET and are used again; what crashes, hangs or leaks is kept in
-# build-fuzz/found, and the script fails. A line a target: executions, edges covered, time; the same goes to
-# build-fuzz/sums/TARGET.
+# Inputs that a run finds stay in build-fuzz/corpus/TARGET, and later runs use them. Inputs that crash, hang or leak are
+# kept in build-fuzz/found, and the script fails. Each target prints one line: executions, edges covered, time; the
+# same goes to build-fuzz/sums/TARGET. build-fuzz/results has a line "passed TARGET" or "failed TARGET" for each.
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
 all=(obj off ply stl gltf glb json query range config sphere decode http token view client)
@@ -24,6 +28,32 @@ sums() {
   done
 }
 
+# Unpacks seeds whose archive has changed, and leaves the others: they may have edits that are not packed yet.
+unpack() {
+  local name=$1 archive=tests/fuzz/corpus/$1.tar.gz seeds=build-fuzz/seeds/$1 sum
+  sum=$(sha256sum <"$archive")
+  if [ ! -d "$seeds" ] || [ "$sum" != "$(cat "$seeds.sum" 2>/dev/null)" ]; then
+    rm -rf "$seeds"
+    mkdir -p "$seeds"
+    tar -C "$seeds" -xzf "$archive"
+    echo "$sum" >"$seeds.sum"
+  fi
+}
+
+# Packs seeds; an archive that holds the same inputs stays as it is, whichever gzip wrote it.
+pack() {
+  local name=$1 archive=tests/fuzz/corpus/$1.tar.gz seeds=build-fuzz/seeds/$1 packed
+  packed=$(mktemp)
+  (cd "$seeds" && find . -type f -printf '%P\0') | LC_ALL=C sort -z |
+    tar -C "$seeds" --null -T - --format=ustar --mtime=@0 --owner=0 --group=0 --numeric-owner --mode=644 -cf "$packed"
+  if ! gzip -dc "$archive" 2>/dev/null | cmp -s - "$packed"; then
+    gzip -9nc "$packed" >"$archive"
+    echo "packed $(find "$seeds" -type f | wc -l) inputs into $archive"
+  fi
+  rm "$packed"
+  sha256sum <"$archive" >"$seeds.sum"
+}
+
 # CPU time of a process so far, in seconds.
 cpu_of() {
   local stat
@@ -32,7 +62,7 @@ cpu_of() {
   echo $(((${12} + ${13}) / $(getconf CLK_TCK)))
 }
 
-# Runs a target; a fuzzer that has its time is told by SIGUSR1 to end with its statistics.
+# Runs a target; SIGUSR1 makes a fuzzer whose time is up end with its statistics.
 one() {
   local name=$1 seconds=$2 unit=$3 log=build-fuzz/corpus/$1.log status=0 used limit=$2 fuzzer
   mkdir -p "build-fuzz/corpus/$name"
@@ -41,7 +71,7 @@ one() {
   { time {
       build-fuzz/bin/fuzz_"$name" -close_fd_mask=2 -max_total_time="$limit" -rss_limit_mb=2048 -seed="${ORB_FUZZ_SEED:-0}" \
         -timeout=$([ "$unit" = wall ] && echo 60 || echo 1200) -report_slow_units=1200 -print_final_stats=1 \
-        -artifact_prefix="build-fuzz/found/$name-" "build-fuzz/corpus/$name" "tests/fuzz/corpus/$name" &
+        -artifact_prefix="build-fuzz/found/$name-" "build-fuzz/corpus/$name" "build-fuzz/seeds/$name" &
       fuzzer=$!
       if [ "$unit" = cpu ]; then
         while used=$(cpu_of $fuzzer) && [ "$used" -lt "$seconds" ]; do
@@ -58,25 +88,36 @@ one() {
   tail -1 "$log" | awk -v runs="${runs:-0}" -v cov="${cov#cov: }" -v status=$status \
     '{ print $1, $4 + $7, runs, cov, status }' >>"build-fuzz/sums/$name"
   if [ $status -ne 0 ]; then
+    echo "failed $name" >>build-fuzz/results
     tail -50 "$log"
+    return 1
   fi
-  return $status
+  echo "passed $name" >>build-fuzz/results
 }
 
-# Smallest inputs first, those that reach edges that the kept ones do not.
+# Adds the smallest inputs that reach edges that the seeds do not.
 keep() {
   local name=$1 most=$2 small
   small=$(mktemp -d)
   find "build-fuzz/corpus/$name" -type f -size -"$((most + 1))"c -exec cp -t "$small" {} +
-  build-fuzz/bin/fuzz_"$name" -close_fd_mask=2 -merge=1 -use_counters=0 -timeout=1200 "tests/fuzz/corpus/$name" "$small" 2>&1 |
+  build-fuzz/bin/fuzz_"$name" -close_fd_mask=2 -merge=1 -use_counters=0 -timeout=1200 "build-fuzz/seeds/$name" "$small" 2>&1 |
     grep -E 'new files|new features' | tail -1
   rm -r "$small"
+  pack "$name"
 }
 
 unit=wall
 case ${1:?seconds for each target} in
   --sums)
     sums
+    exit
+    ;;
+  --pack | --unpack)
+    work=${1#--}
+    shift
+    for name in "${@:-${all[@]}}"; do
+      "$work" "$name"
+    done
     exit
     ;;
   --cpu)
@@ -90,13 +131,14 @@ case ${1:?seconds for each target} in
 esac
 amount=${1:?a number}
 shift
+targets=("${@:-${all[@]}}")
 cmake --preset fuzz -DORB_TESTS=ON >/dev/null
-targets=("$@")
-if [ ${#targets[@]} -eq 0 ]; then
-  targets=("${all[@]}")
-fi
 cmake --build build-fuzz --target "${targets[@]/#/fuzz_}"
 mkdir -p build-fuzz/found build-fuzz/corpus build-fuzz/sums
+rm -f build-fuzz/results
+for name in "${targets[@]}"; do
+  unpack "$name"
+done
 TMPDIR=$(mktemp -d)
 export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT

@@ -4,7 +4,7 @@ import { spawn } from 'node:child_process';
 import { mkdir, readFile, writeFile, readdir, copyFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
-import { folder, run } from './support/cli.mjs';
+import { folder, quoted, run } from './support/cli.mjs';
 import { binaries, daemon, endless, samples, until } from './support/daemon.mjs';
 import { morphOf } from './support/glb.mjs';
 import * as shapes from './support/shapes.mjs';
@@ -277,11 +277,8 @@ test('an interrupted wait prints how to continue', async (t) => {
 test('a terminal shows progress', async (t) => {
   const d = await daemon(t);
   const at = await folder(t);
-  const line = [binaries.client, 'morph', dog, giraffe, '-l', landmarks, '-o', path.join(at, 'o.glb')].join(' ');
-  const child = spawn('script', ['-qec', line, '/dev/null'], {
-    env: { ...process.env, ORBMORPH_SERVER: d.url, TERM: 'xterm' },
-    stdio: ['ignore', 'pipe', 'inherit'],
-  });
+  const line = [binaries.client, 'morph', dog, giraffe, '-l', landmarks, '-o', path.join(at, 'o.glb')].map(quoted).join(' ');
+  const child = spawn('script', ['-qec', line, '/dev/null'], { env: { ...process.env, ORBMORPH_SERVER: d.url, TERM: 'xterm' }, stdio: ['ignore', 'pipe', 'inherit'] });
   let out = '';
   child.stdout.on('data', (chunk) => (out += chunk));
   const code = await new Promise((resolve) => child.on('close', resolve));

@@ -4,6 +4,7 @@ import net from 'node:net';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { daemon, endless, patience } from './support/daemon.mjs';
+import { preload } from './support/preload.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const library = process.env.ORB_CLOCK;
@@ -12,10 +13,9 @@ test('waits end, and slow callers are sent away, also when the clock was set bac
   skip: library ? false : 'ORB_CLOCK names no library',
 }, async (t) => {
   const ahead = 8000; // by then the job is under way, on a busy machine too
-  const d = await daemon(t, {
-    args: ['--workers', '1', '--header-seconds', '1'],
-    env: { LD_PRELOAD: library, ORB_CLOCK_AHEAD_MS: String(ahead) },
-  });
+  const preloaded = preload([library]);
+  t.after(preloaded.remove);
+  const d = await daemon(t, { args: ['--workers', '1', '--header-seconds', '1'], env: { LD_PRELOAD: preloaded.value, ORB_CLOCK_AHEAD_MS: String(ahead) } });
   const { id } = (await d.upload(shapes.binaryPly(shapes.ball(5)))).json;
   const job = (await d.post('/v1/embeddings', { mesh: id, ...endless })).json;
   const early = Date.parse(job.created);

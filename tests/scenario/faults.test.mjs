@@ -19,17 +19,16 @@ import test from 'node:test';
 import { promisify } from 'node:util';
 import { binaries, Daemon, patience, slow } from './support/daemon.mjs';
 import * as faults from './support/faults.mjs';
+import { preload } from './support/preload.mjs';
 
-const library = process.env.ORB_INTERPOSE;
+const library = process.env.ORB_INTERPOSE, sanitizer = process.env.ORB_INTERPOSE_BEFORE;
 const wanted = process.env.ORB_FAULT_RUNS ?? (slow ? '21' : '48');
 const all = !(Number(wanted) > 0);
 const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? (all ? 6 : 3)); // they wait more than they compute
 const longest = 200_000 * patience; // for an answer, or an end
-// A sanitizer has an allocator of its own: where its library comes after the interposer, that one is asked first.
-const asked = !slow || /interpose\S* /.test(library);
-const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(','))
-  .split(',')
-  .filter((kind) => kind !== 'alloc' || (wanted !== 'few' && asked));
+// A sanitizer has its own allocator; allocations reach the interposer only where it is preloaded before the sanitizer.
+const asked = !slow || sanitizer;
+const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(',')).split(',').filter((kind) => kind !== 'alloc' || (wanted !== 'few' && asked));
 const seed = Number(process.env.ORB_FAULT_SEED ?? 1);
 const arguments_ = ['--workers', '1', '--io-threads', '1', '--drain-seconds', '2', '--max-connections', '64'];
 const base = !process.env.TMPDIR && existsSync('/dev/shm') ? '/dev/shm' : tmpdir();
@@ -37,9 +36,9 @@ const run = promisify(execFile);
 
 /** A data folder, its daemon with the interposer, and a board. */
 class Place {
-  constructor(folder, sites) {
+  constructor(folder, sites, preloaded) {
     mkdirSync(folder);
-    this.sites = sites;
+    Object.assign(this, { sites, preloaded });
     this.board = new faults.Board(folder);
     this.folder = folder;
     this.lives = this.stops = 0;
@@ -47,11 +46,7 @@ class Place {
   }
   fresh() {
     this.data = path.join(this.folder, `data-${++this.lives}`);
-    this.d = new Daemon(this.data, arguments_, {
-      LD_PRELOAD: library,
-      ORB_FAIL_BOARD: this.board.file,
-      ORB_FAIL_SITES: this.sites,
-    });
+    this.d = new Daemon(this.data, arguments_, { LD_PRELOAD: this.preloaded, ORB_FAIL_BOARD: this.board.file, ORB_FAIL_SITES: this.sites });
     this.caller = new faults.Caller(this.d, longest);
   }
   get alive() {
@@ -254,10 +249,8 @@ const skip = library ? false : 'ORB_INTERPOSE names no library';
 test('calls that fail are answered, not died of', { skip }, async (t) => {
   const runner = new Runner();
   const folder = await mkdtemp(path.join(base, 'orbmorph-fault-'));
-  const places = Array.from(
-    { length: side_by_side },
-    (_, i) => new Place(path.join(folder, `${i}`), path.join(folder, 'sites')),
-  );
+  const preloaded = preload([library, sanitizer].filter(Boolean));
+  const places = Array.from({ length: side_by_side }, (_, i) => new Place(path.join(folder, `${i}`), path.join(folder, 'sites'), preloaded.value));
   const tasks = kinds.flatMap((kind) => (all ? ['once', 'ever'] : ['']).map((mode) => [kind, mode]));
   try {
     for (const [kind, mode] of all ? tasks : []) {
@@ -272,6 +265,7 @@ test('calls that fail are answered, not died of', { skip }, async (t) => {
     await Promise.all(places.map(sample));
   } finally {
     for (const place of places) await place.close();
+    preloaded.remove();
     await rm(folder, { recursive: true, force: true });
   }
   const stops = places.reduce((sum, place) => sum + place.stops, 0);

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
-import { folder, run, runProgram } from './support/cli.mjs';
+import { folder, quoted, run, runProgram } from './support/cli.mjs';
 import { binaries, patience, root } from './support/daemon.mjs';
 
 const completions = path.join(root, 'deploy/completions');
@@ -44,11 +44,7 @@ test('bash completes commands, options, choices and operands', async () => {
 test('fish completes commands, options, choices and operands', async (t) => {
   const home = await folder(t);
   const complete = async (line) => {
-    const { code, out, err } = await runProgram(
-      'fish',
-      ['--no-config', '-c', `source ${path.join(completions, files.fish)}; complete -C "${line}"`],
-      { env: { HOME: home } },
-    );
+    const { code, out, err } = await runProgram('fish', ['--no-config', '-c', `source ${quoted(path.join(completions, files.fish))}; complete -C "${line}"`], { env: { HOME: home } });
     assert.equal(code, 0, err);
     assert.equal(err, '');
     return out
@@ -66,7 +62,7 @@ test('zsh completes commands, options and choices as they are typed', async (t) 
   const at = await folder(t);
   const script = `zmodload zsh/zpty
 zpty z zsh -f -i
-zpty -w z 'PS1=; HOME=${at}; fpath=(${completions} $fpath); autoload -Uz compinit; compinit -D -u; print R""EADY'
+zpty -w z 'PS1=; fpath=("$COMPLETIONS" $fpath); autoload -Uz compinit; compinit -D -u; print R""EADY'
 zpty -r z line '*READY*'
 zpty -w -n z $'orbmorph comp\\t\\C-A: \\C-E\\C-J'
 zpty -w -n z $'orbmorph morph --remes\\tover\\tx\\C-A: \\C-E\\C-J'
@@ -74,9 +70,7 @@ zpty -w z 'print D""ONE'
 while zpty -r z line; do print -r -- "$line"; [[ $line == *DONE* ]] && break; done
 `;
   await writeFile(path.join(at, 'type.zsh'), script);
-  const { out, err } = await runProgram('timeout', [String(60 * patience), 'zsh', '-f', path.join(at, 'type.zsh')], {
-    env: { TERM: 'xterm' },
-  });
+  const { out, err } = await runProgram('timeout', [String(60 * patience), 'zsh', '-f', path.join(at, 'type.zsh')], { env: { TERM: 'xterm', HOME: at, COMPLETIONS: completions } });
   assert.match(out, /:? ?orbmorph completions/, err);
   assert.match(out, /orbmorph morph --remesh overlay x/, `${out}${err}`);
 });

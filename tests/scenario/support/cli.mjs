@@ -33,6 +33,9 @@ export function runProgram(program, args, { env = {}, cwd, input } = {}) {
 export const run = (args, { env = {}, ...rest } = {}) =>
   runProgram(binaries.client, args, { env: { ORBMORPH_SERVER: '', ...env }, ...rest });
 
+/** A word as shells read it back. */
+export const quoted = (word) => `'${word.replaceAll("'", "'\\''")}'`;
+
 /** A folder that goes when the test does. */
 export async function folder(t) {
   const made = await mkdtemp(path.join(tmpdir(), 'orbmorph-cli-'));
