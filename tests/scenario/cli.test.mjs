@@ -277,8 +277,13 @@ test('an interrupted wait prints how to continue', async (t) => {
 test('a terminal shows progress', async (t) => {
   const d = await daemon(t);
   const at = await folder(t);
-  const line = [binaries.client, 'morph', dog, giraffe, '-l', landmarks, '-o', path.join(at, 'o.glb')].map(quoted).join(' ');
-  const child = spawn('script', ['-qec', line, '/dev/null'], { env: { ...process.env, ORBMORPH_SERVER: d.url, TERM: 'xterm' }, stdio: ['ignore', 'pipe', 'inherit'] });
+  const line = [binaries.client, 'morph', dog, giraffe, '-l', landmarks, '-o', path.join(at, 'o.glb')]
+    .map(quoted)
+    .join(' ');
+  const child = spawn('script', ['-qec', line, '/dev/null'], {
+    env: { ...process.env, ORBMORPH_SERVER: d.url, TERM: 'xterm' },
+    stdio: ['ignore', 'pipe', 'inherit'],
+  });
   let out = '';
   child.stdout.on('data', (chunk) => (out += chunk));
   const code = await new Promise((resolve) => child.on('close', resolve));

@@ -15,7 +15,10 @@ test('waits end, and slow callers are sent away, also when the clock was set bac
   const ahead = 8000; // by then the job is under way, on a busy machine too
   const preloaded = preload([library]);
   t.after(preloaded.remove);
-  const d = await daemon(t, { args: ['--workers', '1', '--header-seconds', '1'], env: { LD_PRELOAD: preloaded.value, ORB_CLOCK_AHEAD_MS: String(ahead) } });
+  const d = await daemon(t, {
+    args: ['--workers', '1', '--header-seconds', '1'],
+    env: { LD_PRELOAD: preloaded.value, ORB_CLOCK_AHEAD_MS: String(ahead) },
+  });
   const { id } = (await d.upload(shapes.binaryPly(shapes.ball(5)))).json;
   const job = (await d.post('/v1/embeddings', { mesh: id, ...endless })).json;
   const early = Date.parse(job.created);

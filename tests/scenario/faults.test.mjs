@@ -21,14 +21,17 @@ import { binaries, Daemon, patience, slow } from './support/daemon.mjs';
 import * as faults from './support/faults.mjs';
 import { preload } from './support/preload.mjs';
 
-const library = process.env.ORB_INTERPOSE, sanitizer = process.env.ORB_INTERPOSE_BEFORE;
+const library = process.env.ORB_INTERPOSE;
+const sanitizer = process.env.ORB_INTERPOSE_BEFORE;
 const wanted = process.env.ORB_FAULT_RUNS ?? (slow ? '21' : '48');
 const all = !(Number(wanted) > 0);
 const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? (all ? 6 : 3)); // they wait more than they compute
 const longest = 200_000 * patience; // for an answer, or an end
 // A sanitizer has its own allocator; allocations reach the interposer only where it is preloaded before the sanitizer.
 const asked = !slow || sanitizer;
-const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(',')).split(',').filter((kind) => kind !== 'alloc' || (wanted !== 'few' && asked));
+const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(','))
+  .split(',')
+  .filter((kind) => kind !== 'alloc' || (wanted !== 'few' && asked));
 const seed = Number(process.env.ORB_FAULT_SEED ?? 1);
 const arguments_ = ['--workers', '1', '--io-threads', '1', '--drain-seconds', '2', '--max-connections', '64'];
 const base = !process.env.TMPDIR && existsSync('/dev/shm') ? '/dev/shm' : tmpdir();
@@ -46,7 +49,11 @@ class Place {
   }
   fresh() {
     this.data = path.join(this.folder, `data-${++this.lives}`);
-    this.d = new Daemon(this.data, arguments_, { LD_PRELOAD: this.preloaded, ORB_FAIL_BOARD: this.board.file, ORB_FAIL_SITES: this.sites });
+    this.d = new Daemon(this.data, arguments_, {
+      LD_PRELOAD: this.preloaded,
+      ORB_FAIL_BOARD: this.board.file,
+      ORB_FAIL_SITES: this.sites,
+    });
     this.caller = new faults.Caller(this.d, longest);
   }
   get alive() {
@@ -250,7 +257,10 @@ test('calls that fail are answered, not died of', { skip }, async (t) => {
   const runner = new Runner();
   const folder = await mkdtemp(path.join(base, 'orbmorph-fault-'));
   const preloaded = preload([library, sanitizer].filter(Boolean));
-  const places = Array.from({ length: side_by_side }, (_, i) => new Place(path.join(folder, `${i}`), path.join(folder, 'sites'), preloaded.value));
+  const places = Array.from(
+    { length: side_by_side },
+    (_, i) => new Place(path.join(folder, `${i}`), path.join(folder, 'sites'), preloaded.value),
+  );
   const tasks = kinds.flatMap((kind) => (all ? ['once', 'ever'] : ['']).map((mode) => [kind, mode]));
   try {
     for (const [kind, mode] of all ? tasks : []) {

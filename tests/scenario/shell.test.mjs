@@ -44,7 +44,11 @@ test('bash completes commands, options, choices and operands', async () => {
 test('fish completes commands, options, choices and operands', async (t) => {
   const home = await folder(t);
   const complete = async (line) => {
-    const { code, out, err } = await runProgram('fish', ['--no-config', '-c', `source ${quoted(path.join(completions, files.fish))}; complete -C "${line}"`], { env: { HOME: home } });
+    const { code, out, err } = await runProgram(
+      'fish',
+      ['--no-config', '-c', `source ${quoted(path.join(completions, files.fish))}; complete -C "${line}"`],
+      { env: { HOME: home } },
+    );
     assert.equal(code, 0, err);
     assert.equal(err, '');
     return out
@@ -70,7 +74,9 @@ zpty -w z 'print D""ONE'
 while zpty -r z line; do print -r -- "$line"; [[ $line == *DONE* ]] && break; done
 `;
   await writeFile(path.join(at, 'type.zsh'), script);
-  const { out, err } = await runProgram('timeout', [String(60 * patience), 'zsh', '-f', path.join(at, 'type.zsh')], { env: { TERM: 'xterm', HOME: at, COMPLETIONS: completions } });
+  const { out, err } = await runProgram('timeout', [String(60 * patience), 'zsh', '-f', path.join(at, 'type.zsh')], {
+    env: { TERM: 'xterm', HOME: at, COMPLETIONS: completions },
+  });
   assert.match(out, /:? ?orbmorph completions/, err);
   assert.match(out, /orbmorph morph --remesh overlay x/, `${out}${err}`);
 });
