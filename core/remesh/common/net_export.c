@@ -1,7 +1,6 @@
-/* Handing a net over as a supermesh: dead vertices and triangles are left out. */
-#include <string.h>
+#include "remesh/common/net_export.h"
 
-#include "remesh/net_export.h"
+#include <string.h>
 
 orb_status orb_net_export(orb_context *ctx, const orb_net *net, orb_supermesh *out, int32_t *map) {
   int32_t vertices = 0, triangles = 0;

@@ -1,4 +1,4 @@
-#include "remesh/adaptive/edge_queue.h"
+#include "remesh/placed/edge_queue.h"
 
 #include "base/check.h"
 #include "base/grow.h"

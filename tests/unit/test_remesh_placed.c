@@ -9,9 +9,20 @@
 #include <cmocka.h>
 
 #include "numeric/vec3.h"
-#include "remesh/adaptive/match.h"
-#include "remesh/distance.h"
-#include "remesh/net_export.h"
+#include "remesh/adaptive/collapse.h"
+#include "remesh/adaptive/merge.h"
+#include "remesh/adaptive/move.h"
+#include "remesh/adaptive/repair.h"
+#include "remesh/adaptive/resolve.h"
+#include "remesh/adaptive/star.h"
+#include "remesh/adaptive/start.h"
+#include "remesh/common/net_export.h"
+#include "remesh/placed/bound.h"
+#include "remesh/placed/distance.h"
+#include "remesh/placed/export.h"
+#include "remesh/placed/flip.h"
+#include "remesh/placed/form.h"
+#include "remesh/placed/refine.h"
 #include "support_remesh.h"
 
 typedef struct bench {
@@ -22,23 +33,23 @@ typedef struct bench {
   double diagonal[2];
   orb_remesh_options options;
   orb_remesh_job job;
-  orb_match match;
+  orb_placed_net placed;
 } bench;
 
 static const double LIMIT = 0.01;
 
-/* Turns a ball about an axis in space, the more the farther along it, and leaves the sphere's points. */
+/* Twists a ball about an axis in space, and leaves its points on the sphere. */
 static void shear(const orb_aligned_shape *shape, int axis, double most) {
   int x = (axis + 1) % 3, y = (axis + 2) % 3;
   for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
-    double *p = shape->mesh.positions + 3 * v, turn = most * p[axis] / sqrt(orb_dot(p, p));
+    double *p = shape->mesh.positions + 3 * v, angle = most * p[axis] / sqrt(orb_dot(p, p));
     double px = p[x], py = p[y];
-    p[x] = cos(turn) * px - sin(turn) * py;
-    p[y] = sin(turn) * px + cos(turn) * py;
+    p[x] = cos(angle) * px - sin(angle) * py;
+    p[y] = sin(angle) * px + cos(angle) * py;
   }
 }
 
-/* Two rough balls of so many divisions; the second wound up, so that large triangles turn in space. */
+/* Two rough balls of so many divisions; the second is twisted, so that large triangles are inverted. */
 static void set_up_in(bench *b, orb_context *ctx, int size, unsigned seed, double wind) {
   memset(b, 0, sizeof *b);
   b->ctx = ctx;
@@ -70,7 +81,7 @@ static void set_up_in(bench *b, orb_context *ctx, int size, unsigned seed, doubl
                             .twin = b->twin,
                             .locator = b->locator,
                             .diagonal = b->diagonal};
-  assert_int_equal(orb_match_create(b->ctx, &b->job, &b->match), ORB_OK);
+  assert_int_equal(orb_placed_create(b->ctx, &b->job, &b->placed), ORB_OK);
 }
 
 static void set_up(bench *b, unsigned seed, double wind) {
@@ -78,7 +89,7 @@ static void set_up(bench *b, unsigned seed, double wind) {
 }
 
 static void tear_down(bench *b) {
-  orb_match_free(b->ctx, &b->match);
+  orb_placed_free(b->ctx, &b->placed);
   for (int s = 0; s < 2; s++) {
     orb_locator_destroy(b->ctx, b->locator[s]);
     free(b->twin[s]);
@@ -88,108 +99,108 @@ static void tear_down(bench *b) {
 }
 
 static void refine(bench *b) {
-  int64_t strays = 1;
-  for (int i = 0; i < 32 && strays > 0; i++) {
-    assert_int_equal(orb_match_refine(b->ctx, &b->match, LIMIT * LIMIT, &strays), ORB_OK);
+  int64_t deviating = 1;
+  for (int i = 0; i < 32 && deviating > 0; i++) {
+    assert_int_equal(orb_placed_refine(b->ctx, &b->placed, LIMIT * LIMIT, &deviating), ORB_OK);
   }
-  assert_int_equal(strays, 0);
+  assert_int_equal(deviating, 0);
 }
 
 static void assert_within(bench *b) {
   double bound[2];
-  assert_int_equal(orb_match_bounds(b->ctx, &b->match, bound), ORB_OK);
+  assert_int_equal(orb_placed_bounds(b->ctx, &b->placed, bound), ORB_OK);
   for (int s = 0; s < 2; s++) {
     assert_true(bound[s] <= LIMIT * b->diagonal[s] * (1 + 1e-9));
   }
 }
 
 /* T = 2V − 4 and every triangle positive, by the certificate; every vertex of a shape in a live triangle or vertex. */
-static void assert_sound(bench *b) {
-  const orb_match *match = &b->match;
+static void assert_valid(bench *b) {
+  const orb_placed_net *placed = &b->placed;
   orb_supermesh out = {.shape_count = 2};
-  assert_int_equal(orb_net_export(b->ctx, &match->net, &out, NULL), ORB_OK);
+  assert_int_equal(orb_net_export(b->ctx, &placed->net, &out, NULL), ORB_OK);
   assert_int_equal(orb_supermesh_check(b->ctx, &out), ORB_OK);
   orb_supermesh_free(b->ctx, &out);
   int64_t items = 0;
-  for (int32_t v = 0; v < match->net.vertex_count; v++) {
-    for (int32_t i = match->vertex_items[v]; i >= 0; i = match->item_next[i]) {
-      assert_true(match->net.out[v] >= 0);
+  for (int32_t v = 0; v < placed->net.vertex_count; v++) {
+    for (int32_t i = placed->vertex_items[v]; i >= 0; i = placed->item_next[i]) {
+      assert_true(placed->net.out[v] >= 0);
       items++;
     }
   }
-  for (int32_t t = 0; t < match->net.triangle_count; t++) {
-    for (int32_t i = match->triangle_items[t]; i >= 0; i = match->item_next[i]) {
-      assert_true(match->net.triangles[3 * t] >= 0);
+  for (int32_t t = 0; t < placed->net.triangle_count; t++) {
+    for (int32_t i = placed->triangle_items[t]; i >= 0; i = placed->item_next[i]) {
+      assert_true(placed->net.triangles[3 * t] >= 0);
       items++;
     }
   }
-  assert_int_equal(items, match->item_begin[2]);
+  assert_int_equal(items, placed->item_begin[2]);
 }
 
-/* What mends turned triangles leaves no edge and no vertex of a shape beyond the limit. */
-static void mending_leaves_no_stray(void **state) {
+/* The repair of inverted triangles leaves no edge and no vertex of a shape beyond the limit. */
+static void repair_keeps_the_limit(void **state) {
   (void)state;
   for (unsigned seed = 1; seed <= 4; seed++) {
     bench b;
     set_up(&b, seed, 2);
     refine(&b);
     assert_within(&b);
-    int64_t before = orb_match_turned(b.ctx, &b.match);
+    int64_t before = orb_placed_count_inverted(b.ctx, &b.placed);
     assert_true(before > 0);
-    assert_int_equal(orb_match_mend(b.ctx, &b.match, LIMIT * LIMIT), ORB_OK);
-    assert_true(orb_match_turned(b.ctx, &b.match) < before);
+    assert_int_equal(orb_adaptive_repair(b.ctx, &b.placed, LIMIT * LIMIT), ORB_OK);
+    assert_true(orb_placed_count_inverted(b.ctx, &b.placed) < before);
     assert_within(&b);
-    assert_sound(&b);
+    assert_valid(&b);
     tear_down(&b);
   }
 }
 
-/* The overlay of the reduced shapes is smaller than that of the shapes, all of their vertices lie in it, and it needs
- * little to be within the limit. How large the overlay is, is told well enough. */
+/* The overlay of the reduced shapes is smaller than that of the shapes, holds all their vertices, and needs little
+ * refinement to be within the limit. The estimate of the overlay's size is within a fifth. */
 static void reduced_shapes_give_a_start(void **state) {
   (void)state;
   bench b;
   set_up(&b, 3, 2);
-  orb_match_free(b.ctx, &b.match);
-  int64_t told, exact, strays;
-  assert_int_equal(orb_match_overlay_size(b.ctx, &b.job, &told), ORB_OK);
-  assert_int_equal(orb_match_start_from_overlay(b.ctx, &b.job, &b.match), ORB_OK);
-  assert_sound(&b);
-  exact = orb_match_live(&b.match);
-  assert_true(10 * told > 8 * exact && 10 * told < 12 * exact);
-  assert_int_equal(orb_match_start_from_reduced(b.ctx, &b.job, LIMIT * LIMIT, &b.match), ORB_OK);
-  assert_sound(&b);
-  assert_true(orb_match_live(&b.match) < exact);
-  assert_int_equal(orb_match_refine(b.ctx, &b.match, LIMIT * LIMIT, &strays), ORB_OK);
-  assert_true(strays < orb_match_live(&b.match) / 4);
+  orb_placed_free(b.ctx, &b.placed);
+  int64_t estimate, exact, deviating;
+  assert_int_equal(orb_adaptive_overlay_size(b.ctx, &b.job, &estimate), ORB_OK);
+  assert_int_equal(orb_adaptive_start_from_overlay(b.ctx, &b.job, &b.placed), ORB_OK);
+  assert_valid(&b);
+  exact = orb_placed_live(&b.placed);
+  assert_true(10 * estimate > 8 * exact && 10 * estimate < 12 * exact);
+  assert_int_equal(orb_adaptive_start_from_reduced(b.ctx, &b.job, LIMIT * LIMIT, &b.placed), ORB_OK);
+  assert_valid(&b);
+  assert_true(orb_placed_live(&b.placed) < exact);
+  assert_int_equal(orb_placed_refine(b.ctx, &b.placed, LIMIT * LIMIT, &deviating), ORB_OK);
+  assert_true(deviating < orb_placed_live(&b.placed) / 4);
   refine(&b);
   assert_within(&b);
-  assert_sound(&b);
+  assert_valid(&b);
   tear_down(&b);
 }
 
-/* One thread and four tell the same size and come to the same start. */
+/* One thread and four estimate the same size and make the same start. */
 static void starts_do_not_depend_on_threads(void **state) {
   (void)state;
   bench b[2];
-  int64_t told[2];
+  int64_t estimate[2];
   for (int i = 0; i < 2; i++) {
     set_up_in(&b[i], remesh_context(i ? 4 : 1), 4, 3, 2);
-    assert_int_equal(orb_match_overlay_size(b[i].ctx, &b[i].job, &told[i]), ORB_OK);
-    assert_int_equal(orb_match_start_from_reduced(b[i].ctx, &b[i].job, LIMIT * LIMIT, &b[i].match), ORB_OK);
+    assert_int_equal(orb_adaptive_overlay_size(b[i].ctx, &b[i].job, &estimate[i]), ORB_OK);
+    assert_int_equal(orb_adaptive_start_from_reduced(b[i].ctx, &b[i].job, LIMIT * LIMIT, &b[i].placed), ORB_OK);
   }
-  const orb_net *one = &b[0].match.net, *four = &b[1].match.net;
-  assert_int_equal(told[0], told[1]);
+  const orb_net *one = &b[0].placed.net, *four = &b[1].placed.net;
+  assert_int_equal(estimate[0], estimate[1]);
   assert_int_equal(one->vertex_count, four->vertex_count);
   assert_int_equal(one->triangle_count, four->triangle_count);
   assert_memory_equal(one->points, four->points, 3 * (size_t)one->vertex_count * sizeof(double));
   assert_memory_equal(one->triangles, four->triangles, 3 * (size_t)one->triangle_count * sizeof(int32_t));
-  assert_memory_equal(b[0].match.at, b[1].match.at, 6 * (size_t)one->vertex_count * sizeof(double));
+  assert_memory_equal(b[0].placed.at, b[1].placed.at, 6 * (size_t)one->vertex_count * sizeof(double));
   tear_down(&b[0]);
   tear_down(&b[1]);
 }
 
-/* Each allocation of a start from reduced shapes fails once: it says so, and leaves nothing behind. */
+/* Each allocation of a start from reduced shapes fails once: the call reports it and leaks nothing. */
 static void starts_fail_cleanly(void **state) {
   (void)state;
   int64_t left = INT64_MAX;
@@ -199,74 +210,74 @@ static void starts_fail_cleanly(void **state) {
   for (int64_t n = 0; status != ORB_OK; n++) {
     assert_true(n < 3000);
     left = n;
-    status = orb_match_start_from_reduced(b.ctx, &b.job, LIMIT * LIMIT, &b.match);
+    status = orb_adaptive_start_from_reduced(b.ctx, &b.job, LIMIT * LIMIT, &b.placed);
     assert_true(status == ORB_OK || status == ORB_E_NO_MEMORY);
     assert_true(n > 20 || status == ORB_E_NO_MEMORY); /* there are many more than that */
   }
   left = INT64_MAX;
-  assert_sound(&b);
+  assert_valid(&b);
   tear_down(&b);
 }
 
-/* Collapses, merges, turns and moves keep the limit, and turn no triangle. */
+/* Collapses, merges, flips and moves keep the limit and invert no further triangle. */
 static void reducing_keeps_the_limit(void **state) {
   (void)state;
   bench b;
   set_up(&b, 3, 1);
   refine(&b);
-  int64_t turned = orb_match_turned(b.ctx, &b.match), live = orb_match_live(&b.match);
+  int64_t inverted = orb_placed_count_inverted(b.ctx, &b.placed), live = orb_placed_live(&b.placed);
   for (int i = 0; i < 2; i++) {
-    assert_int_equal(orb_match_collapse(b.ctx, &b.match, LIMIT * LIMIT, 0, 1, i), ORB_OK);
+    assert_int_equal(orb_adaptive_collapse(b.ctx, &b.placed, LIMIT * LIMIT, 0, 1, i), ORB_OK);
     assert_within(&b);
-    int64_t collapsed = orb_match_live(&b.match);
+    int64_t collapsed = orb_placed_live(&b.placed);
     assert_true(collapsed < live);
-    assert_int_equal(orb_match_merge_all(b.ctx, &b.match, LIMIT * LIMIT, 0), ORB_OK);
-    live = orb_match_live(&b.match);
+    assert_int_equal(orb_adaptive_merge_all(b.ctx, &b.placed, LIMIT * LIMIT, 0), ORB_OK);
+    live = orb_placed_live(&b.placed);
     assert_true(live < collapsed);
     assert_within(&b);
-    assert_int_equal(orb_match_turn_all(b.ctx, &b.match, LIMIT * LIMIT, 0), ORB_OK);
+    assert_int_equal(orb_placed_flip_all(b.ctx, &b.placed, LIMIT * LIMIT, 0), ORB_OK);
     assert_within(&b);
-    assert_int_equal(orb_match_move_all(b.ctx, &b.match, LIMIT * LIMIT, NULL), ORB_OK);
+    assert_int_equal(orb_adaptive_move_all(b.ctx, &b.placed, LIMIT * LIMIT, NULL), ORB_OK);
     assert_within(&b);
-    assert_sound(&b);
-    assert_true(orb_match_turned(b.ctx, &b.match) <= turned);
-    turned = orb_match_turned(b.ctx, &b.match);
+    assert_valid(&b);
+    assert_true(orb_placed_count_inverted(b.ctx, &b.placed) <= inverted);
+    inverted = orb_placed_count_inverted(b.ctx, &b.placed);
   }
   tear_down(&b);
 }
 
-/* A triangle budget of merges is kept. */
+/* Merges stop at the target number of triangles. */
 static void merges_stop_at_the_target(void **state) {
   (void)state;
   bench b;
   set_up(&b, 5, 0);
   refine(&b);
-  assert_int_equal(orb_match_collapse(b.ctx, &b.match, LIMIT * LIMIT, 0, 1, 0), ORB_OK);
-  int64_t target = orb_match_live(&b.match) - 10;
-  assert_int_equal(orb_match_merge_all(b.ctx, &b.match, LIMIT * LIMIT, target), ORB_OK);
-  assert_true(orb_match_live(&b.match) <= target && orb_match_live(&b.match) > target - 8);
+  assert_int_equal(orb_adaptive_collapse(b.ctx, &b.placed, LIMIT * LIMIT, 0, 1, 0), ORB_OK);
+  int64_t target = orb_placed_live(&b.placed) - 10;
+  assert_int_equal(orb_adaptive_merge_all(b.ctx, &b.placed, LIMIT * LIMIT, target), ORB_OK);
+  assert_true(orb_placed_live(&b.placed) <= target && orb_placed_live(&b.placed) > target - 8);
   tear_down(&b);
 }
 
-/* Around turned triangles the overlay is made: nothing strays there, and what the rest needs refinement gives. */
-static void resolving_can_be_held(void **state) {
+/* Resolving makes the overlay around inverted triangles; refinement then brings everything within the limit. */
+static void resolving_can_be_refined(void **state) {
   (void)state;
   bench b;
   set_up(&b, 2, 2);
   refine(&b);
-  assert_int_equal(orb_match_collapse(b.ctx, &b.match, LIMIT * LIMIT, 0, 1, 0), ORB_OK);
-  int64_t live = orb_match_live(&b.match);
-  assert_true(orb_match_turned(b.ctx, &b.match) > 0);
-  assert_int_equal(orb_match_resolve(b.ctx, &b.match, LIMIT * LIMIT), ORB_OK);
-  assert_true(orb_match_live(&b.match) > live);
-  assert_sound(&b);
+  assert_int_equal(orb_adaptive_collapse(b.ctx, &b.placed, LIMIT * LIMIT, 0, 1, 0), ORB_OK);
+  int64_t live = orb_placed_live(&b.placed);
+  assert_true(orb_placed_count_inverted(b.ctx, &b.placed) > 0);
+  assert_int_equal(orb_adaptive_resolve(b.ctx, &b.placed, LIMIT * LIMIT), ORB_OK);
+  assert_true(orb_placed_live(&b.placed) > live);
+  assert_valid(&b);
   refine(&b);
   assert_within(&b);
-  assert_sound(&b);
+  assert_valid(&b);
   tear_down(&b);
 }
 
-/* Triangles without an inside: their distance is that of their sides, whichever corner is named first. */
+/* A degenerate triangle is as far as its sides, whichever corner comes first. */
 static void flat_triangles_are_as_near_as_their_sides(void **state) {
   (void)state;
   unsigned random = 7;
@@ -291,8 +302,8 @@ static void flat_triangles_are_as_near_as_their_sides(void **state) {
         least = fmin(least, orb_distance2(p, q));
       }
     }
-    for (int turn = 0; turn < 3; turn++) {
-      double d = orb_point_triangle2(p, corner[turn], corner[(turn + 1) % 3], corner[(turn + 2) % 3]);
+    for (int first = 0; first < 3; first++) {
+      double d = orb_point_triangle2(p, corner[first], corner[(first + 1) % 3], corner[(first + 2) % 3]);
       assert_true(d < least + 1e-9 && d > least - 1e-4);
     }
   }
@@ -300,10 +311,10 @@ static void flat_triangles_are_as_near_as_their_sides(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(mending_leaves_no_stray),         cmocka_unit_test(reduced_shapes_give_a_start),
+      cmocka_unit_test(repair_keeps_the_limit),          cmocka_unit_test(reduced_shapes_give_a_start),
       cmocka_unit_test(starts_do_not_depend_on_threads), cmocka_unit_test(starts_fail_cleanly),
       cmocka_unit_test(reducing_keeps_the_limit),        cmocka_unit_test(merges_stop_at_the_target),
-      cmocka_unit_test(resolving_can_be_held),           cmocka_unit_test(flat_triangles_are_as_near_as_their_sides),
+      cmocka_unit_test(resolving_can_be_refined),        cmocka_unit_test(flat_triangles_are_as_near_as_their_sides),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

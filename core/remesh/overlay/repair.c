@@ -1,14 +1,20 @@
-/* Certifying an overlay after rounding. Most turned triangles can be untangled; where vertices of both layers lie
- * within rounding of each other (nearly equal meshes) there is no room between doubles, and the shortest edge of each
- * such triangle is collapsed instead. What that moves is recorded, for the bound on the error. */
+/* Makes an overlay valid after rounding. Most flipped triangles can be untangled. Where vertices of both layers lie
+ * within rounding of each other (nearly equal meshes), there is no room between doubles, and the shortest edge of each
+ * such triangle is collapsed instead. The merged vertices are recorded for the error bound. */
+#include "remesh/overlay/repair.h"
+
 #include <string.h>
 
 #include "base/check.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
-#include "remesh/overlay/overlay.h"
+#include "remesh/overlay/untangle.h"
+#include "sphere/net.h"
 
+/* Edges up to CLOSE · 4^round may collapse, in the last round up to about 1e-9: more than the rounding of points, about
+ * 1e-16, and far less than any edge that a shape should have. */
 enum { ROUNDS = 11 };
+static const double CLOSE = 1e-15;
 
 static int32_t shortest_edge(const orb_net *net, int32_t t) {
   int32_t best = 3 * t;
@@ -21,10 +27,13 @@ static int32_t shortest_edge(const orb_net *net, int32_t t) {
       best = h;
     }
   }
-  return net->triangles[best] > net->triangles[orb_next(best)] ? best : net->twin[best]; /* the older vertex stays */
+  return net->triangles[best] > net->triangles[orb_next(best)]
+             ? best
+             : net->twin[best]; /* the vertex with the lower number stays */
 }
 
-static orb_status merge_turned(orb_context *ctx, orb_overlay *overlay, double longest2) {
+/* Collapses the shortest edge of each flipped triangle, if it is no longer than the root of longest2. */
+static orb_status merge_flipped(orb_context *ctx, orb_overlay *overlay, double longest2) {
   orb_net net;
   ORB_TRY(orb_net_init(ctx, &net, overlay->points, overlay->vertex_count, overlay->triangles, overlay->triangle_count,
                        overlay->vertex_count));
@@ -63,24 +72,24 @@ static orb_status merge_turned(orb_context *ctx, orb_overlay *overlay, double lo
   return status;
 }
 
-orb_status orb_overlay_mend(orb_context *ctx, orb_overlay *overlay) {
+orb_status orb_overlay_repair(orb_context *ctx, orb_overlay *overlay) {
   int32_t first_free = overlay->layer[0].vertex_count + overlay->lone_count;
   size_t size = 3 * (size_t)overlay->vertex_count * sizeof(double);
-  double *rounded = ORB_NEW(ctx, double, 3 * (int64_t)overlay->vertex_count), close = 1e-15;
+  double *rounded = ORB_NEW(ctx, double, 3 * (int64_t)overlay->vertex_count), close = CLOSE;
   orb_status status = rounded ? ORB_OK : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
     return status;
   }
   memcpy(rounded, overlay->points, size);
-  for (int round = 0; round < ROUNDS; round++, close *= 4) { /* to at most about 1e-9 */
+  for (int round = 0; round < ROUNDS; round++, close *= 4) {
     status = orb_overlay_untangle(ctx, overlay->points, overlay->vertex_count, overlay->triangles,
                                   overlay->triangle_count, first_free);
     if (status != ORB_E_NOT_CERTIFIED || round == ROUNDS - 1) {
       break;
     }
     orb_error_clear(ctx);
-    memcpy(overlay->points, rounded, size); /* lengths are to be those of the rounded points */
-    ORB_GO(status, merge_turned(ctx, overlay, close * close), end);
+    memcpy(overlay->points, rounded, size); /* lengths are measured between the rounded points */
+    ORB_GO(status, merge_flipped(ctx, overlay, close * close), end);
   }
 end:
   orb_free(ctx, rounded);

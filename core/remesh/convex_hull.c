@@ -1,29 +1,31 @@
 /* The convex-hull method (Peng & Timalsena 2016, section 8 and Fig. 11), the baseline of the other ones: the hull of
  * all shapes' vertices on the sphere, which is their Delaunay triangulation. It keeps every input vertex, but none of
- * the input edges; how far its surfaces stray from the shapes is proved afterwards (see match.h), not controlled.
+ * the input edges; how far its surfaces deviate from the shapes is proved afterwards (placed/bound.h), not controlled.
  *
- * Points that are equal bit for bit (landmarks) are one. Qhull works with tolerances: points very close to each other
- * or to a facet's plane may be left out, and facets of nearly collinear points may come out degenerate. The corners of
- * facets that are not positive are set aside and the hull is made again of the rest; what was set aside or left out is
- * then inserted by exact location and splitting, and edges are turned to the hull's. The result is certified as every
- * other; where no such start can be had, the method fails and says so. */
-#include "remesh/hull.h"
+ * Points that are equal bit for bit (landmarks) become one. Qhull works with tolerances: it may leave out points very
+ * close to each other or to a facet's plane, and facets of nearly collinear points may come out degenerate. The corners
+ * of facets that are not positive are set aside and the hull is made again from the rest. What was set aside or left
+ * out is then inserted by exact location and splitting, and edges are flipped to those of the hull. The result is
+ * certified like any other; where there is no certified start, the method fails with a message. */
+#include "remesh/convex_hull.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "numeric/predicates.h"
-#include "remesh/adaptive/match.h"
+#include "remesh/placed/export.h"
+#include "remesh/qhull.h"
 #include "sphere/delaunay.h"
 
-enum { ROUNDS = 16 };
+enum { ROUNDS = 16 };        /* hulls made; each round sets more points aside */
+enum { CHECK_EVERY = 4096 }; /* points between two checks for cancellation */
 
 typedef struct hull_points {
   double *points; /* distinct, in the order of the shapes */
   int32_t count;
-  unsigned char *aside; /* a point: not to be given to Qhull (again) */
-  double *given;        /* what Qhull gets, and which points these are */
+  unsigned char *aside; /* per point: not to be given to Qhull (again) */
+  double *given;        /* what Qhull gets, and the numbers of these points */
   int32_t *number;
   int32_t given_count;
 } hull_points;
@@ -34,16 +36,17 @@ static int by_coordinates(const void *a, const void *b) {
   return order ? order : (*p > *q) - (*p < *q);
 }
 
-/* All points, those equal to an earlier one left out. −0 is made 0 first. */
+/* Collects all points except those equal to an earlier one, with −0 replaced by 0. */
 static orb_status take_points(orb_context *ctx, const orb_remesh_job *job, hull_points *h) {
   int64_t total = 0;
   for (int32_t s = 0; s < job->shape_count; s++) {
     total += job->shapes[s].mesh.vertex_count;
   }
-  if (total > ORB_HULL_POINTS_MAX) {
-    return orb_fail(ctx, ORB_E_TOO_LARGE,
-                    "The method convex-hull takes at most %d vertices together, these are %lld; use 'adaptive'.",
-                    ORB_HULL_POINTS_MAX, (long long)total);
+  if (total > ORB_QHULL_POINTS_MAX) {
+    return orb_fail(
+        ctx, ORB_E_TOO_LARGE,
+        "The method 'convex-hull' takes at most %d vertices in all; these shapes have %lld. Use 'adaptive'.",
+        ORB_QHULL_POINTS_MAX, (long long)total);
   }
   h->points = ORB_NEW(ctx, double, 3 * total);
   h->given = ORB_NEW(ctx, double, 3 * total);
@@ -77,7 +80,7 @@ static orb_status take_points(orb_context *ctx, const orb_remesh_job *job, hull_
   return orb_context_check(ctx);
 }
 
-/* Sets the corners of facets aside that are not positive; how many. */
+/* Sets aside the corners of facets that are not positive; returns how many. */
 static int32_t set_aside(hull_points *h, const int32_t *triangles, int32_t triangle_count) {
   int32_t found = 0;
   for (int32_t t = 0; t < triangle_count; t++) {
@@ -92,7 +95,7 @@ static int32_t set_aside(hull_points *h, const int32_t *triangles, int32_t trian
   return found;
 }
 
-/* The certified hull of as many points as Qhull gets right, as a net; all others are then set aside. */
+/* The certified hull of the points that Qhull gets right, as a net; all others are set aside. */
 static orb_status start(orb_context *ctx, hull_points *h, orb_net *net) {
   for (int round = 0; round < ROUNDS; round++) {
     h->given_count = 0;
@@ -106,12 +109,12 @@ static orb_status start(orb_context *ctx, hull_points *h, orb_net *net) {
       break;
     }
     orb_supermesh hull = {.shape_count = 0};
-    ORB_TRY(orb_hull(ctx, h->given, h->given_count, &hull.triangles, &hull.triangle_count));
+    ORB_TRY(orb_qhull(ctx, h->given, h->given_count, &hull.triangles, &hull.triangle_count));
     if (set_aside(h, hull.triangles, hull.triangle_count) > 0) {
       orb_free(ctx, hull.triangles);
       continue;
     }
-    /* Corners are renumbered without the points that Qhull left out; their order stays. */
+    /* Renumber the corners without the points that Qhull left out; their order stays. */
     orb_status status = ORB_E_NO_MEMORY;
     int32_t *compact = ORB_NEW0(ctx, int32_t, h->given_count);
     if (compact) {
@@ -128,7 +131,7 @@ static orb_status start(orb_context *ctx, hull_points *h, orb_net *net) {
       for (int64_t c = 0; c < 3 * (int64_t)hull.triangle_count; c++) {
         hull.triangles[c] = compact[hull.triangles[c]];
       }
-      hull.points = h->given; /* borrowed */
+      hull.points = h->given; /* borrowed, not freed */
       status = orb_supermesh_check(ctx, &hull);
     }
     if (status == ORB_OK) {
@@ -140,7 +143,7 @@ static orb_status start(orb_context *ctx, hull_points *h, orb_net *net) {
   }
   return orb_fail(
       ctx, ORB_E_NOT_CERTIFIED,
-      "The convex hull keeps degenerate facets: vertices lie too close together on the sphere. Use 'adaptive'.");
+      "The convex hull has degenerate facets because vertices lie too close together on the sphere. Use 'adaptive'.");
 }
 
 /* Makes the points that are not in the net yet vertices of it. */
@@ -155,7 +158,7 @@ static orb_status insert_rest(orb_context *ctx, const hull_points *h, orb_net *n
   }
   for (int32_t i = 0; i < h->count && status == ORB_OK; i++) {
     orb_place place;
-    if (h->aside[i]) { /* located before the first split, as the locator is of the unsplit net */
+    if (h->aside[i]) { /* located before the first split, which the locator does not know */
       orb_locate(locator, h->points + 3 * (int64_t)i, -1, &place);
       near[i] = place.triangle;
     }
@@ -166,7 +169,7 @@ static orb_status insert_rest(orb_context *ctx, const hull_points *h, orb_net *n
       (void)orb_net_insert(net, h->points + 3 * (int64_t)i, &near[i]);
       inserted++;
     }
-    if ((i & 4095) == 0) {
+    if (i % CHECK_EVERY == 0) {
       status = orb_context_check(ctx);
     }
   }
@@ -174,10 +177,10 @@ static orb_status insert_rest(orb_context *ctx, const hull_points *h, orb_net *n
   return status == ORB_OK && inserted > 0 ? orb_net_delaunay(ctx, net) : status;
 }
 
-orb_status orb_remesh_hull(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
+orb_status orb_remesh_convex_hull(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
   hull_points h = {0};
   orb_net net = {0};
-  orb_match match = {0};
+  orb_placed_net placed = {0};
   orb_status status;
   ORB_GO(status, take_points(ctx, job, &h), end);
   orb_progress(ctx, "remesh", 0.1);
@@ -191,11 +194,11 @@ orb_status orb_remesh_hull(orb_context *ctx, const orb_remesh_job *job, orb_supe
                       net.triangle_count, (long long)job->options->max_triangles);
     goto end;
   }
-  ORB_GO(status, orb_match_create_on(ctx, job, &net, &match), end);
+  ORB_GO(status, orb_placed_create_on(ctx, job, &net, &placed), end);
   orb_progress(ctx, "remesh", 0.8);
-  ORB_GO(status, orb_match_export(ctx, &match, out), end);
+  ORB_GO(status, orb_placed_export(ctx, &placed, out), end);
 end:
-  orb_match_free(ctx, &match);
+  orb_placed_free(ctx, &placed);
   orb_net_free(ctx, &net);
   orb_free(ctx, h.points);
   orb_free(ctx, h.given);

@@ -1,11 +1,14 @@
-/* Distances in space between simplices: each is that of two points which do lie in the simplices, so it is never too
- * small a bound on what the points of one can be mapped to in the other. */
-#ifndef ORB_REMESH_DISTANCE_H
-#define ORB_REMESH_DISTANCE_H
+/* Distances in space between simplices. Each is the distance of two points that lie in the simplices, so it never
+ * underestimates how far a point of one must move to reach the other. */
+#ifndef ORB_REMESH_PLACED_DISTANCE_H
+#define ORB_REMESH_PLACED_DISTANCE_H
 
 #include <math.h>
 
 #include "numeric/vec3.h"
+
+/* Sine squared between two sides below which a triangle is too flat for coordinates in it. */
+static const double ORB_FLAT = 1e-8;
 
 static inline double orb_clamp01(double x) {
   return x > 0 ? (x < 1 ? x : 1) : 0; /* NaN: 0 */
@@ -54,9 +57,9 @@ static inline double orb_point_triangle2(const double p[3], const double a[3], c
       d[k] = w[k] - s * u[k] - t * v[k];
     }
     inside = orb_dot(d, d);
-    if (det > 1e-8 * uu * vv) {
+    if (det > ORB_FLAT * uu * vv) {
       return inside;
-    } /* else s and t are mostly rounding: the sides may be nearer */
+    } /* else s and t are mostly rounding, and a side may be nearer */
   }
   double best = orb_point_segment2(p, a, b), other = orb_point_segment2(p, b, c);
   best = other < best ? other : best;

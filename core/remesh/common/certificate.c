@@ -2,18 +2,19 @@
  *
  * Closed and manifold: half-edges pair up and the corners of each vertex form one ring. Connected with T = 2V − 4:
  * genus zero. No triangle flipped: every orientation is exactly positive. Then the mesh maps to the sphere by a local
- * homeomorphism away from the vertices, and its degree is the number of triangles that hold any one direction that
- * lies on no edge: counted, with the same exact test, so no solid angle has to be summed. Degree 1: a bijection. */
+ * homeomorphism away from the vertices, and its degree is the number of triangles that hold any one direction on no
+ * edge. They are counted with the same exact test, so no solid angle has to be summed. Degree 1: a bijection. */
 #include "base/check.h"
 #include "numeric/predicates.h"
 #include "orbmorph/remesh.h"
 
 typedef struct orientation_count {
   const orb_supermesh *mesh;
-  int64_t *flipped; /* a chunk */
+  int64_t *flipped; /* per chunk of GRAIN triangles */
 } orientation_count;
 
-enum { GRAIN = 4096 };
+enum { GRAIN = 4096 };    /* triangles a thread takes at a time */
+enum { DIRECTIONS = 16 }; /* tried until one lies on no edge */
 
 static const double *corner(const orb_supermesh *mesh, int64_t h) {
   return mesh->points + 3 * (int64_t)mesh->triangles[h];
@@ -30,7 +31,7 @@ static void count_flipped(void *arg, int64_t begin, int64_t end, int thread) {
   count->flipped[begin / GRAIN] = flipped;
 }
 
-/* Triangles that hold q, or −1 where q lies on the great circle of an edge that matters. */
+/* The number of triangles that hold q; −1 if q lies on the border of one. */
 static int32_t cover(const orb_supermesh *mesh, const double q[3]) {
   int32_t count = 0;
   for (int64_t t = 0; t < mesh->triangle_count; t++) {
@@ -55,7 +56,7 @@ static int32_t cover(const orb_supermesh *mesh, const double q[3]) {
 }
 
 static int32_t degree_of(const orb_supermesh *mesh) {
-  for (int i = 0; i < 16; i++) {
+  for (int i = 0; i < DIRECTIONS; i++) {
     const double q[3] = {0.5377 + 0.0131 * i, -0.3119 + 0.0373 * i, 0.7833 - 0.0577 * i};
     int32_t count = cover(mesh, q);
     if (count >= 0) {
@@ -65,7 +66,7 @@ static int32_t degree_of(const orb_supermesh *mesh) {
   return 0;
 }
 
-/* One ring of corners at every vertex, one component; with T = 2V − 4 that is a sphere. */
+/* One ring of corners at every vertex, and one component; with T = 2V − 4 the mesh is a sphere. */
 static orb_status check_topology(orb_context *ctx, const orb_supermesh *mesh, const int32_t *twin) {
   int32_t half_edges = 3 * mesh->triangle_count, rings = 0, reached = 0, top = 0;
   unsigned char *seen = ORB_NEW0(ctx, unsigned char, half_edges);
@@ -93,8 +94,9 @@ static orb_status check_topology(orb_context *ctx, const orb_supermesh *mesh, co
       }
     }
     if (rings != mesh->vertex_count || reached != mesh->triangle_count) {
-      status = orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The supermesh is not one closed surface (%d rings at %d vertices).",
-                        rings, mesh->vertex_count);
+      status = orb_fail(ctx, ORB_E_NOT_CERTIFIED,
+                        "The supermesh is not one closed surface: %d rings of triangles at %d vertices.", rings,
+                        mesh->vertex_count);
     }
   }
   orb_free(ctx, seen);
@@ -117,7 +119,7 @@ static orb_status check_orientation(orb_context *ctx, orb_supermesh *mesh) {
   orb_free(ctx, count.flipped);
   mesh->degree = mesh->flipped ? 0 : degree_of(mesh);
   if (mesh->flipped || mesh->degree != 1) {
-    return orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The supermesh has %lld flipped triangles on the sphere, degree %d.",
+    return orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The supermesh has %lld flipped triangles on the sphere and degree %d.",
                     (long long)mesh->flipped, mesh->degree);
   }
   return ORB_OK;
@@ -127,7 +129,7 @@ orb_status orb_supermesh_check(orb_context *ctx, orb_supermesh *mesh) {
   mesh->flipped = -1;
   mesh->degree = 0;
   if (mesh->triangle_count < 4 || mesh->triangle_count != 2 * (int64_t)mesh->vertex_count - 4) {
-    return orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The supermesh has %d vertices and %d triangles: not T = 2V - 4.",
+    return orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The supermesh has %d vertices and %d triangles, not T = 2V - 4.",
                     mesh->vertex_count, mesh->triangle_count);
   }
   int32_t *twin = ORB_NEW(ctx, int32_t, 3 * (int64_t)mesh->triangle_count);

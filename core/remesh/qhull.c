@@ -1,9 +1,11 @@
-/* Qhull (Barber, Dobkin & Huhdanpaa 1996) behind orb_hull().
+/* Qhull (Barber, Dobkin & Huhdanpaa 1996) behind orb_qhull().
  *
  * Option Qt triangulates facets that were merged because their points are coplanar up to rounding; points are never
- * joggled. Qhull leaves its calls by longjmp() on errors, but qh_new_qhull() itself catches that and returns a code.
- * Its messages go to a stream that drops them; as it reports every few hundred facets (TF), the same stream is where
- * cancellation is noticed: Qhull is then told to add no further points. */
+ * joggled. Qhull leaves its calls by longjmp() on errors, but qh_new_qhull() catches that itself and returns a code.
+ * Its messages go to a stream that drops them. As Qhull reports every 500 facets (TF500), the stream's write function
+ * also checks for cancellation, and then tells Qhull to add no further points. */
+#include "remesh/qhull.h"
+
 #include <stdio.h>
 
 #if defined(__GNUC__)
@@ -17,9 +19,8 @@
 
 #include "base/check.h"
 #include "numeric/predicates.h"
-#include "remesh/hull.h"
 
-enum { BYTES_A_POINT = 1024 };
+enum { BYTES_A_POINT = 1024 }; /* of the budget, for Qhull's own memory */
 
 typedef struct listener {
   orb_context *ctx;
@@ -39,8 +40,8 @@ static ssize_t listen_in(void *cookie, const char *text, size_t size) {
   return (ssize_t)size;
 }
 
-/* Outward as a whole: if most triangles are negative, Qhull's sense of orientation is the other one. */
-static void turn_outward(const double *points, int32_t *triangles, int32_t count) {
+/* Makes the hull face outward: if most triangles are negative, reverses all. */
+static void orient_outward(const double *points, int32_t *triangles, int32_t count) {
   int64_t sum = 0;
   for (int32_t t = 0; t < count; t++) {
     const int32_t *c = triangles + 3 * (int64_t)t;
@@ -72,14 +73,14 @@ static orb_status take_facets(orb_context *ctx, qhT *qh, const double *points, i
       n++;
     }
     if (n != 3 || count >= qh->num_facets) {
-      return orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The convex hull has a facet that is no triangle; use 'adaptive'.");
+      return orb_fail(ctx, ORB_E_NOT_CERTIFIED, "The convex hull has a facet that is not a triangle; use 'adaptive'.");
     }
     int32_t *c = *triangles + 3 * (int64_t)count++;
     c[0] = corner[0];
     c[1] = corner[facet->toporient ? 1 : 2];
     c[2] = corner[facet->toporient ? 2 : 1];
   }
-  turn_outward(points, *triangles, count);
+  orient_outward(points, *triangles, count);
   *triangle_count = count;
   return ORB_OK;
 }
@@ -90,18 +91,17 @@ static orb_status run(orb_context *ctx, qhT *qh, double *points, int32_t count, 
   listener l = {.ctx = ctx, .qh = qh};
   FILE *messages = fopencookie(&l, "w", (cookie_io_functions_t){.write = listen_in});
   if (!messages) {
-    return orb_fail(ctx, ORB_E_NO_MEMORY, "No memory for the convex hull.");
+    return orb_fail(ctx, ORB_E_NO_MEMORY, "There is not enough memory for the convex hull.");
   }
   (void)setvbuf(messages, NULL, _IONBF, 0);
   qh_zero(qh, messages);
   int code = qh_new_qhull(qh, 3, count, points, False, command, NULL, messages);
   orb_status status = l.status;
   if (status == ORB_OK && code == qh_ERRmem) {
-    status = orb_fail(ctx, ORB_E_NO_MEMORY, "No memory for the convex hull of %d points.", count);
+    status = orb_fail(ctx, ORB_E_NO_MEMORY, "There is not enough memory for the convex hull of %d points.", count);
   } else if (status == ORB_OK && code != 0) {
-    status =
-        orb_fail(ctx, ORB_E_NOT_CERTIFIED,
-                 "The convex hull of the %d points could not be made (Qhull's code %d); use 'adaptive'.", count, code);
+    status = orb_fail(ctx, ORB_E_NOT_CERTIFIED,
+                      "Qhull failed on the convex hull of the %d points (code %d); use 'adaptive'.", count, code);
   }
   if (status == ORB_OK) {
     status = take_facets(ctx, qh, points, triangles, triangle_count);
@@ -113,17 +113,17 @@ static orb_status run(orb_context *ctx, qhT *qh, double *points, int32_t count, 
   return status;
 }
 
-orb_status orb_hull(orb_context *ctx, const double *points, int32_t count, int32_t **triangles,
-                    int32_t *triangle_count) {
+orb_status orb_qhull(orb_context *ctx, const double *points, int32_t count, int32_t **triangles,
+                     int32_t *triangle_count) {
   *triangles = NULL;
   *triangle_count = 0;
-  if (count > ORB_HULL_POINTS_MAX) {
-    return orb_fail(ctx, ORB_E_TOO_LARGE, "A convex hull takes at most %d points, these are %d; use 'adaptive'.",
-                    ORB_HULL_POINTS_MAX, count);
+  if (count > ORB_QHULL_POINTS_MAX) {
+    return orb_fail(ctx, ORB_E_TOO_LARGE, "A convex hull takes at most %d points, not %d; use 'adaptive'.",
+                    ORB_QHULL_POINTS_MAX, count);
   }
-  /* Qhull takes its points by a pointer that is not const; they are copied so that the caller's stay untouched. */
+  /* Qhull takes a pointer that is not const: it gets a copy, so that it cannot change the caller's points. */
   double *copy = ORB_NEW(ctx, double, 3 * (int64_t)count);
-  char *reserve = ORB_NEW(ctx, char, BYTES_A_POINT *(int64_t)count);
+  char *reserve = ORB_NEW(ctx, char, ((int64_t)count * BYTES_A_POINT));
   qhT *qh = ORB_NEW0(ctx, qhT, 1);
   orb_status status = ORB_E_NO_MEMORY;
   if (copy && reserve && qh) {
