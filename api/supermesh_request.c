@@ -10,7 +10,9 @@
 
 static const char *const aligns[] = {"pin", "rbf", "rotate", "auto", NULL};
 static const char *const presets[] = {"default", "fast", "quality", NULL};
-static const char *const remeshes[] = {"adaptive", "overlay", "subdivision", "convex-hull", NULL};
+#define WORD(id, name) name,
+static const char *const remeshes[] = {ORB_REMESH_METHODS(WORD) NULL};
+#undef WORD
 static const char *const animations[] = {"pingpong", "none", NULL};
 static const char *const fits[] = {"none", "rigid", "similarity", NULL};
 static const char *const paths[] = {"linear", "rigid", NULL};

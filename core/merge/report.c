@@ -8,14 +8,16 @@
 #include "numeric/vec3.h"
 #include "transfer/wedge.h"
 
-enum { ALL_PAIRS_UP_TO = 4 };
-static const double SLIVER = 0.02; /* of quality() */
+enum { ALL_PAIRS_UP_TO = 4 }; /* shapes; the pairs of more are only the neighbours, so that their number is linear */
+static const double SLIVER = 0.02; /* quality() below which a triangle's stretch is mostly rounding */
+/* Twice the area, relative to the squared diagonal, up to which a triangle counts as degenerate. */
+static const double DEGENERATE = 1e-12;
 
-/* Landmarks that are no vertex (rotate, rbf inside triangles): where their common point of the sphere, the mean of the
- * shapes' own, lies on each shape. */
+/* A landmark without a supermesh vertex (rotate, or rbf inside triangles) is measured at the mean of its points on the
+ * sphere, one from each shape. */
 
-/* The sphere's point at a point of a shape's surface, through the nearest place of the aligned mesh: the same surface,
- * perhaps with more vertices than the mesh of the request. */
+/* The point on the sphere of a point of a shape's surface, by the nearest place of the aligned mesh: the same surface
+ * as the requested mesh, perhaps with more vertices. */
 static void sphere_point(const orb_aligned_shape *shape, const orb_nearest *tree, const double at[3], double out[3]) {
   orb_place place;
   orb_nearest_query(tree, at, INFINITY, &place);
@@ -29,7 +31,7 @@ static void sphere_point(const orb_aligned_shape *shape, const orb_nearest *tree
   orb_normalize(out);
 }
 
-/* points: landmark_count × shape_count × 3 wanted positions. One shape at a time: adds its sphere points to `mean`. */
+/* Adds shape s's points on the sphere to `mean`. wanted: landmark_count × shape_count × 3 requested positions. */
 static orb_status add_sphere_points(orb_context *ctx, const orb_merge_result *out, int32_t s, const double *wanted,
                                     double *mean) {
   const orb_aligned_shape *shape = &out->alignment.shapes[s];
@@ -87,7 +89,7 @@ orb_status orb_report_landmarks(orb_context *ctx, const orb_align_shape *shapes,
   int32_t count = out->alignment.landmark_count, shape_count = out->alignment.shape_count;
   double *wanted = ORB_NEW(ctx, double, 3 * (int64_t)count * shape_count);
   double *mean = ORB_NEW0(ctx, double, 3 * (int64_t)count);
-  out->landmark_residuals = ORB_NEW(ctx, double, (int64_t)count *shape_count);
+  out->landmark_residuals = ORB_NEW(ctx, double, ((int64_t)count * shape_count));
   orb_status status = wanted && mean && out->landmark_residuals ? ORB_OK : ORB_E_NO_MEMORY;
   if (status != ORB_OK || count == 0) {
     goto done;
@@ -112,7 +114,7 @@ done:
   return status;
 }
 
-/* Where the supermesh has a place of its own surface on shape s. */
+/* The position on shape s of a place of the supermesh. */
 static void supermesh_position(const orb_merge_result *out, int32_t s, const orb_place *on, double position[3]) {
   const orb_supermesh *supermesh = &out->supermesh;
   position[0] = position[1] = position[2] = 0;
@@ -135,7 +137,7 @@ orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb
   if (alignment->found_count == 0) {
     return ORB_OK;
   }
-  out->found_residuals = ORB_NEW(ctx, double, (int64_t)alignment->found_count *shape_count);
+  out->found_residuals = ORB_NEW(ctx, double, ((int64_t)alignment->found_count * shape_count));
   if (!out->found_residuals) {
     return ORB_E_NO_MEMORY;
   }
@@ -171,9 +173,9 @@ static void add_normal(const orb_mesh *mesh, const double *normals, const orb_pl
   }
 }
 
-/* Does a triangle also turn against the input's face at its centre? Where an edge of the input is sharper than a right
- * angle, a triangle within one face of it can turn against the smooth normals although it is the surface itself. The
- * locator is made when first asked for. */
+/* Whether a triangle also faces away from the input's face at its centre. Where an edge of the input is sharper than a
+ * right angle, a triangle within one face can face away from the smooth normals although it is the surface itself.
+ * Creates the locator when it is first needed. */
 static orb_status against_face(orb_context *ctx, const orb_aligned_shape *shape, const double *points,
                                const int32_t *corner, const double normal[3], orb_locator **locator, int *against) {
   const orb_mesh *mesh = &shape->mesh;
@@ -200,7 +202,7 @@ orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh, c
   orb_extent extent;
   orb_mesh_extent(mesh, &extent);
   const orb_place *places = supermesh->places + (int64_t)s * supermesh->vertex_count;
-  double floor = 1e-12 * extent.diagonal * extent.diagonal;
+  double floor = DEGENERATE * extent.diagonal * extent.diagonal;
   orb_locator *locator = NULL;
   double *normals = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
   if (!normals) {
@@ -255,8 +257,8 @@ static double quality(const double *positions, const int32_t *corner) {
   return edges > 0 ? 3.4641016151377544 * orb_length(normal) / edges : 0;
 }
 
-/* The triangles that are no slivers on either shape: a sliver's stretch is that of its rounding, and one can outweigh
- * all the others in a mean. All triangles where hardly any is left. */
+/* Lists the triangles that are no slivers on either shape: a sliver's stretch is mostly rounding, and one sliver can
+ * outweigh all other triangles in a mean. If less than a tenth is left, lists all. */
 static int32_t keep_shapely(const orb_supermesh *supermesh, const double *a, const double *b, int32_t *out) {
   int32_t count = 0;
   for (int64_t t = 0; t < supermesh->triangle_count; t++) {
@@ -275,7 +277,7 @@ static int32_t keep_shapely(const orb_supermesh *supermesh, const double *a, con
 static orb_status measure_pair(orb_context *ctx, const orb_merge_result *out, double *const *positions,
                                unsigned char *const *inverted, orb_pair_report *pair) {
   const orb_supermesh *supermesh = &out->supermesh;
-  int64_t turned = 0;
+  int64_t inverted_count = 0;
   int32_t *shapely = ORB_NEW(ctx, int32_t, 3 * (int64_t)supermesh->triangle_count);
   if (!shapely) {
     return ORB_E_NO_MEMORY;
@@ -288,9 +290,9 @@ static orb_status measure_pair(orb_context *ctx, const orb_merge_result *out, do
     return status;
   }
   for (int64_t t = 0; t < supermesh->triangle_count; t++) {
-    turned += inverted[pair->a][t] | inverted[pair->b][t];
+    inverted_count += inverted[pair->a][t] | inverted[pair->b][t];
   }
-  pair->inverted_fraction = (double)turned / supermesh->triangle_count;
+  pair->inverted_fraction = (double)inverted_count / supermesh->triangle_count;
   return ORB_OK;
 }
 

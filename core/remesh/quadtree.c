@@ -1,7 +1,7 @@
-/* Leaves are kept in one array; a split replaces a leaf by its middle child and appends the other three. Midpoints of
- * edges are shared through a hash of vertex pairs, which also tells which edges of a leaf have a hanging vertex: the
- * tree is balanced when no leaf has an edge whose half has a midpoint of its own. Closure then splits a leaf with one,
- * two or three hanging vertices in two, three or four. */
+/* All leaves are in one array; a split replaces a leaf by its middle child and appends the other three. Midpoints of
+ * edges are shared through a hash table of vertex pairs, which also shows which edges of a leaf have a hanging vertex:
+ * the tree is balanced when no leaf has an edge whose half has a midpoint of its own. Closure then splits a leaf with
+ * one, two or three hanging vertices in two, three or four. */
 #include "remesh/quadtree.h"
 
 #include <string.h>
@@ -10,7 +10,8 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { MAX_DEPTH = 28 }; /* edges of 6e-9: deeper splits would only part points that coincide for all purposes */
+enum { MAX_DEPTH = 28 };     /* edges of 6e-9: deeper splits would only separate points that practically coincide */
+enum { CHECK_EVERY = 4096 }; /* leaves between two checks for cancellation */
 
 typedef struct leaf {
   int32_t v[3];
@@ -31,7 +32,7 @@ typedef struct tree {
   midpoint *table;
   orb_quadtree_item *items, *spare;
   int32_t leaf_count, leaf_capacity, vertex_count, vertex_capacity;
-  int64_t table_size, table_used; /* a power of two */
+  int64_t table_size, table_used; /* the size is a power of two */
 } tree;
 
 static uint64_t edge_key(int32_t a, int32_t b) {
@@ -103,9 +104,9 @@ static orb_status make_midpoint(tree *t, int32_t a, int32_t b, int32_t *out) {
   return ORB_OK;
 }
 
-/* Which of the four children holds p: 0..2 at the corners, 3 the middle. */
+/* The child that holds p: 0 to 2 at the corners, 3 the middle. */
 static int child_of(const tree *t, const int32_t m[3], const double p[3]) {
-  for (int k = 0; k < 3; k++) { /* beyond the edge that cuts off corner k: midpoints of the two edges at it */
+  for (int k = 0; k < 3; k++) { /* beyond the edge between the midpoints of the two edges at corner k */
     const double *from = t->points + 3 * (int64_t)m[k], *to = t->points + 3 * (int64_t)m[(k + 2) % 3];
     if (orb_orient(from, to, p) > 0) {
       return k;
@@ -179,7 +180,7 @@ static orb_status split_crowded(tree *t) {
     while (status == ORB_OK && t->leaves[i].depth < MAX_DEPTH && crowded(t, &t->leaves[i], last_seen, ++stamp)) {
       status = split_leaf(t, i);
     }
-    if ((i & 4095) == 0 && status == ORB_OK) {
+    if (i % CHECK_EVERY == 0 && status == ORB_OK) {
       status = orb_context_check(t->ctx);
     }
   }
@@ -205,7 +206,7 @@ static orb_status balance(tree *t) {
         ORB_TRY(split_leaf(t, i));
         again = 1;
       }
-      if ((i & 4095) == 0) {
+      if (i % CHECK_EVERY == 0) {
         ORB_TRY(orb_context_check(t->ctx));
       }
     }
@@ -213,7 +214,7 @@ static orb_status balance(tree *t) {
   return ORB_OK;
 }
 
-/* The leaf's triangles with its hanging vertices joined in; returns how many. */
+/* The leaf's triangles with its hanging vertices; returns how many. */
 static int close_leaf(const tree *t, const leaf *l, int32_t out[12]) {
   int32_t m[3];
   int hanging = 0, n = 0;
@@ -230,7 +231,7 @@ static int close_leaf(const tree *t, const leaf *l, int32_t out[12]) {
       EMIT(l->v[k], m[k], m[(k + 2) % 3]);
     }
   } else {
-    int k = 0; /* turned so that edge k hangs, and with two, edges k and k + 1 */
+    int k = 0; /* edge k has a hanging vertex, and of two, edges k and k + 1 */
     while (m[k] < 0 || (hanging == 2 && m[(k + 1) % 3] < 0)) {
       k++;
     }
@@ -296,7 +297,7 @@ static orb_status start_tree(tree *t, int64_t items) {
       t->items[n++] = (orb_quadtree_item){s, v, 0};
     }
   }
-  /* All items begin in the first octant's list; hand them to the octant that holds them. */
+  /* Partition the items by the octant that holds them. */
   int32_t begin = 0;
   for (int octant = 0; octant < 8; octant++) {
     int32_t a = octant & 3, b = (a + 1) & 3, pole = octant < 4 ? 4 : 5, end = begin;

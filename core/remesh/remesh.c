@@ -1,47 +1,13 @@
-/* orb_remesh(): checks the request, prepares the shapes, hands over to the method, then finds the landmarks and
- * certifies what came back. A result that fails its certificate is an error, never a result. */
+/* orb_remesh(): checks the request, prepares the shapes, runs the method, then finds the landmarks and certifies the
+ * result. A result that fails its certificate is an error, and is never returned. */
 #include <math.h>
 #include <string.h>
 
 #include "base/check.h"
-#include "remesh/methods.h"
+#include "remesh/registry.h"
 
 void orb_remesh_defaults(orb_remesh_options *options) {
   *options = (orb_remesh_options){.method = ORB_REMESH_ADAPTIVE, .tolerance = 0.001, .max_triangles = 0};
-}
-
-void orb_supermesh_free(orb_context *ctx, orb_supermesh *supermesh) {
-  orb_free(ctx, supermesh->triangles);
-  orb_free(ctx, supermesh->points);
-  orb_free(ctx, supermesh->places);
-  orb_free(ctx, supermesh->landmark_vertices);
-  orb_free(ctx, supermesh->error_bound);
-  memset(supermesh, 0, sizeof *supermesh);
-}
-
-typedef struct places_loop {
-  const orb_remesh_job *job;
-  orb_supermesh *out;
-} places_loop;
-
-static void locate_range(void *arg, int64_t begin, int64_t end, int thread) {
-  (void)thread;
-  places_loop *loop = arg;
-  for (int64_t i = begin; i < end; i++) {
-    int32_t s = (int32_t)(i / loop->out->vertex_count), v = (int32_t)(i % loop->out->vertex_count);
-    orb_locate(loop->job->locator[s], loop->out->points + 3 * (int64_t)v, -1, &loop->out->places[i]);
-  }
-}
-
-orb_status orb_remesh_places(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
-  int64_t count = (int64_t)job->shape_count * out->vertex_count;
-  out->places = ORB_NEW(ctx, orb_place, count);
-  if (!out->places) {
-    return ORB_E_NO_MEMORY;
-  }
-  places_loop loop = {job, out};
-  orb_parallel_for(ctx, count, 1024, locate_range, &loop);
-  return orb_context_check(ctx);
 }
 
 static orb_status check_request(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
@@ -149,29 +115,17 @@ static orb_status find_landmarks(orb_context *ctx, const orb_remesh_job *job, or
   return ORB_OK;
 }
 
-/* What this build has, by method; NULL: not built. */
-typedef orb_status (*method_fn)(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
-static const method_fn methods[] = {
-    [ORB_REMESH_ADAPTIVE] = orb_remesh_adaptive,
-    [ORB_REMESH_OVERLAY] = orb_remesh_overlay,
-    [ORB_REMESH_SUBDIVISION] = orb_remesh_subdivision,
-    [ORB_REMESH_CONVEX_HULL] = orb_remesh_hull,
-};
-enum { METHODS = sizeof methods / sizeof methods[0] };
-
-int orb_remesh_available(orb_remesh_method method) {
-  return (unsigned)method < METHODS && methods[method] != NULL;
-}
-
 static orb_status run_method(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
   orb_remesh_method method = job->options->method;
-  if ((unsigned)method >= METHODS) {
+  const char *name = orb_remesh_method_name(method);
+  if (!name) {
     return orb_fail(ctx, ORB_E_BAD_OPTION, "Unknown remesh method %d.", (int)method);
   }
-  if (!methods[method]) {
-    return orb_fail(ctx, ORB_E_UNSUPPORTED, "The remesh method %d is not in this build; use adaptive.", (int)method);
+  orb_remesh_fn run = orb_remesh_function(method);
+  if (!run) {
+    return orb_fail(ctx, ORB_E_UNSUPPORTED, "This build does not have the remesh method '%s'; use 'adaptive'.", name);
   }
-  return methods[method](ctx, job, out);
+  return run(ctx, job, out);
 }
 
 orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count, int32_t landmark_count,

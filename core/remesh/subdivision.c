@@ -1,20 +1,27 @@
 /* The subdivision method (Peng & Timalsena 2016, section 8), made conforming.
  *
- * The quadtree gives a balanced, closed triangulation of the sphere whose leaves hold at most one vertex of each
- * shape. Then every vertex of every shape becomes a vertex of it: a corner of the leaf moves there where no triangle
- * turns over and none has moved before, else the triangle is split. Turns towards Delaunay even the triangles out, and
- * edges that still stray from a shape are turned or split (see match.h). */
+ * The quadtree gives a balanced, closed triangulation of the sphere whose leaves hold at most one vertex of each shape.
+ * Then every vertex of every shape becomes a vertex of it: a corner of the leaf moves there if that flips no triangle
+ * and the corner has not moved before, else the triangle is split. Delaunay flips make the triangles more even, and
+ * edges that deviate from a shape are flipped or split (placed/refine.h). */
+#include "remesh/subdivision.h"
+
 #include "base/check.h"
 #include "numeric/vec3.h"
-#include "remesh/adaptive/match.h"
-#include "remesh/methods.h"
+#include "remesh/placed/export.h"
+#include "remesh/placed/refine.h"
 #include "remesh/quadtree.h"
 #include "sphere/delaunay.h"
 
-/* Reproduction is within half a percent of the diagonal: the proved bound is kept below. */
+/* Relative to the diagonal. Reproduction must be within half a per cent; the proved bound is kept below that. */
 static const double MOST_ERROR = 0.004;
+/* A corner moves to a vertex only if that is nearer than half the triangle's shortest edge: farther moves would distort
+ * the quadtree's triangles more. */
+static const double SNAP2 = 0.25; /* squared */
+enum { CHECK_EVERY = 4096 };      /* vertices between two checks for cancellation */
 
-/* Moves the nearest corner of p's triangle that is free to p, if that leaves every triangle positive. */
+/* Moves to p the nearest corner of its triangle that is not taken, if that leaves every triangle positive. Returns the
+ * corner, or −1. */
 static int32_t snap(orb_net *net, const unsigned char *taken, int32_t grid_count, int32_t triangle, const double p[3]) {
   int32_t best = -1;
   double best_distance = 0, shortest = 4;
@@ -28,7 +35,7 @@ static int32_t snap(orb_net *net, const unsigned char *taken, int32_t grid_count
       best_distance = distance;
     }
   }
-  return best >= 0 && best_distance < 0.25 * shortest && orb_net_move(net, best, p) ? best : -1;
+  return best >= 0 && best_distance < SNAP2 * shortest && orb_net_move(net, best, p) ? best : -1;
 }
 
 static orb_status take_in_vertices(orb_context *ctx, const orb_remesh_job *job, const orb_quadtree_mesh *grid,
@@ -53,7 +60,7 @@ static orb_status take_in_vertices(orb_context *ctx, const orb_remesh_job *job, 
     if (v < grid->vertex_count) {
       taken[v] = 1;
     }
-    if ((i & 4095) == 0) {
+    if (i % CHECK_EVERY == 0) {
       status = orb_context_check(ctx);
       orb_progress(ctx, "remesh", 0.3 + 0.4 * i / grid->item_count);
     }
@@ -75,17 +82,17 @@ orb_status orb_remesh_subdivision(orb_context *ctx, const orb_remesh_job *job, o
   if (status == ORB_OK) {
     status = orb_net_delaunay(ctx, &net);
   }
-  orb_match match = {0};
+  orb_placed_net placed = {0};
   if (status == ORB_OK) {
-    status = orb_match_create_on(ctx, job, &net, &match);
+    status = orb_placed_create_on(ctx, job, &net, &placed);
   }
   orb_net_free(ctx, &net);
   if (status == ORB_OK) {
-    status = orb_match_refine(ctx, &match, MOST_ERROR * MOST_ERROR, NULL);
+    status = orb_placed_refine(ctx, &placed, MOST_ERROR * MOST_ERROR, NULL);
   }
   if (status == ORB_OK) {
-    status = orb_match_export(ctx, &match, out);
+    status = orb_placed_export(ctx, &placed, out);
   }
-  orb_match_free(ctx, &match);
+  orb_placed_free(ctx, &placed);
   return status;
 }

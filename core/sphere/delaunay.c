@@ -1,10 +1,16 @@
 /* Delaunay edge flips over a whole net (Lawson 1977). */
 #include "sphere/delaunay.h"
+
 #include "numeric/vec3.h"
 
-/* Points on the sphere are Delaunay where the flat triangles form a convex hull: d must not lie beyond plane abc.
- * Only clear cases count, so that rounding cannot make the turns circle. */
-static int not_delaunay(const orb_net *net, int32_t h) {
+/* How far beyond the plane a point must lie, relative to its distance: rounding cannot make the flips cycle. */
+static const double CLEARLY = 1e-9;
+/* Flips per edge after which the loop ends in any case; Lawson's flips are about linear in the number of edges. */
+enum { FLIPS_AN_EDGE = 64 };
+enum { CHECK_EVERY = 8192 }; /* flips between two checks for cancellation */
+
+/* Points on the sphere are Delaunay where the flat triangles form a convex hull: d must not lie beyond plane abc. */
+static int violates_delaunay(const orb_net *net, int32_t h) {
   int32_t g = net->twin[h];
   const double *a = orb_net_point(net, net->triangles[h]), *b = orb_net_point(net, net->triangles[g]);
   const double *c = orb_net_point(net, net->triangles[orb_prev(h)]);
@@ -14,7 +20,7 @@ static int not_delaunay(const orb_net *net, int32_t h) {
   orb_sub(c, a, v);
   orb_sub(d, a, w);
   orb_cross(u, v, n);
-  return orb_dot(n, w) > 1e-9 * orb_length(n) * orb_dot(w, w);
+  return orb_dot(n, w) > CLEARLY * orb_length(n) * orb_dot(w, w);
 }
 
 orb_status orb_net_delaunay(orb_context *ctx, orb_net *net) {
@@ -28,11 +34,11 @@ orb_status orb_net_delaunay(orb_context *ctx, orb_net *net) {
       queued[h] = 1;
     }
   }
-  int64_t turns = 0, limit = 64 * (int64_t)edges; /* a bound in case of rounding; Lawson's turns are about linear */
-  while (status == ORB_OK && top > 0 && turns < limit) {
+  int64_t flips = 0, limit = FLIPS_AN_EDGE * (int64_t)edges;
+  while (status == ORB_OK && top > 0 && flips < limit) {
     int32_t h = stack[--top];
     queued[h] = 0;
-    if (!not_delaunay(net, h) || !orb_net_can_flip(net, h)) {
+    if (!violates_delaunay(net, h) || !orb_net_can_flip(net, h)) {
       continue;
     }
     orb_net_flip(net, h);
@@ -44,7 +50,7 @@ orb_status orb_net_delaunay(orb_context *ctx, orb_net *net) {
         stack[top++] = e;
       }
     }
-    if ((++turns & 8191) == 0) {
+    if (++flips % CHECK_EVERY == 0) {
       status = orb_context_check(ctx);
     }
   }

@@ -4,7 +4,7 @@
 
 #include "sphere/net.h"
 
-/* Turns edges until all are Delaunay (empty circles on the sphere) as far as rounding tells. */
+/* Flips edges until all are Delaunay (empty circles on the sphere) up to rounding. */
 ORB_MUST_CHECK orb_status orb_net_delaunay(orb_context *ctx, orb_net *net);
 
 #endif

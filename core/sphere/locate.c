@@ -1,9 +1,8 @@
-/* The locator: a cube map of start triangles in front of the exact walk.
+/* The locator: a cube map of start triangles for the exact walk.
  *
- * Each of the 6·R² cells of a cube around the sphere knows a triangle near it: that of some vertex in the cell, or of
- * a neighbouring cell that has one. With about four triangles a cell a walk takes a handful of steps. The answer does
- * not depend on where the walk began: on an edge or at a vertex it is the lowest-numbered triangle that holds p.
- */
+ * Each of the 6·R² cells of a cube around the sphere holds a triangle near it: that of some vertex in the cell, or of a
+ * neighbouring cell that has one. With about four triangles a cell, a walk takes a handful of steps. The result does
+ * not depend on where the walk begins: on an edge or at a vertex it is the lowest-numbered triangle that holds p. */
 #include "sphere/locate.h"
 
 #include <math.h>
@@ -42,13 +41,13 @@ static void fill_cells(orb_locator *locator) {
   for (int32_t c = 0; c < cells; c++) {
     locator->cell[c] = -1;
   }
-  for (int32_t t = locator->mesh.triangle_count - 1; t >= 0; t--) { /* the lowest triangle stays */
+  for (int32_t t = locator->mesh.triangle_count - 1; t >= 0; t--) { /* downwards, so that the lowest triangle stays */
     for (int k = 0; k < 3; k++) {
       locator->cell[cell_of(locator, locator->mesh.points + 3 * (int64_t)locator->mesh.triangles[3 * t + k])] = t;
     }
   }
   int32_t row = locator->resolution, last = 0;
-  for (int32_t c = 0; c < cells; c++) { /* empty cells take after the row before, or the last cell */
+  for (int32_t c = 0; c < cells; c++) { /* an empty cell copies the cell in the row before, or the previous cell */
     if (locator->cell[c] < 0) {
       locator->cell[c] = c >= row ? locator->cell[c - row] : last;
     }
@@ -99,7 +98,7 @@ void orb_locator_destroy(orb_context *ctx, orb_locator *locator) {
   }
 }
 
-/* Of all triangles that hold the hit's direction the lowest-numbered: what makes answers independent of the walk. */
+/* The hit in the lowest-numbered of all triangles that hold its direction. */
 static orb_hit lowest(const orb_sphere_view *mesh, const orb_hit *hit) {
   int corner = orb_hit_corner(hit);
   int32_t edge = orb_hit_edge(hit);

@@ -1,11 +1,11 @@
-/* Point location on an embedded mesh, with the exact hit beside the place. */
+/* Point location on an embedded mesh that also returns the exact hit. */
 #ifndef ORB_SPHERE_LOCATE_H
 #define ORB_SPHERE_LOCATE_H
 
 #include "orbmorph/locate.h"
 #include "sphere/walk.h"
 
-/* orb_locate(), and the hit itself: in the triangle of the place. */
+/* As orb_locate(); the hit is in the triangle of the place. */
 orb_hit orb_locate_hit(const orb_locator *locator, const double p[3], int32_t hint, orb_place *out);
 
 #endif

@@ -1,5 +1,4 @@
-/* Storage and the elementary changes of a net. Triangles t keep three corners; half-edge 3t+k runs from corner k to
- * corner k+1. A split of a triangle adds two triangles, of an edge too: T = 2V − 4 holds throughout. */
+/* Splits of a triangle and of an edge each add one vertex and two triangles, so T = 2V − 4 always holds. */
 #include "sphere/net.h"
 
 #include <math.h>
@@ -9,11 +8,14 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
+/* A clearly positive triangle is higher than 1 / CLEARLY of its longest side. */
+static const double CLEARLY = 1e6;
+
 static int32_t origin(const orb_net *net, int32_t h) {
   return net->triangles[h];
 }
 
-static int positive(const orb_net *net, int32_t a, int32_t b, int32_t c) {
+static int is_positive(const orb_net *net, int32_t a, int32_t b, int32_t c) {
   return orb_orient(orb_net_point(net, a), orb_net_point(net, b), orb_net_point(net, c)) > 0;
 }
 
@@ -166,9 +168,9 @@ int32_t orb_net_split_edge(orb_net *net, int32_t h, const double p[3]) {
   return split_edge(net, h, p);
 }
 
-int orb_net_sound(const orb_net *net, int32_t a, int32_t b, int32_t c) {
+int orb_net_clearly_positive(const orb_net *net, int32_t a, int32_t b, int32_t c) {
   const double *p = orb_net_point(net, a), *q = orb_net_point(net, b), *r = orb_net_point(net, c);
-  double height = 1e6 * orb_det(p, q, r);
+  double height = CLEARLY * orb_det(p, q, r);
   return height > orb_distance2(p, q) && height > orb_distance2(q, r) && height > orb_distance2(r, p);
 }
 
@@ -190,11 +192,11 @@ int orb_net_adjacent(const orb_net *net, int32_t a, int32_t b) {
 int orb_net_can_flip(const orb_net *net, int32_t h) {
   int32_t g = net->twin[h];
   int32_t a = origin(net, h), b = origin(net, g), c = origin(net, orb_prev(h)), d = origin(net, orb_prev(g));
-  return c != d && positive(net, c, d, b) && positive(net, d, c, a) && orb_net_sound(net, c, d, b) &&
-         orb_net_sound(net, d, c, a) && !orb_net_adjacent(net, c, d);
+  return c != d && is_positive(net, c, d, b) && is_positive(net, d, c, a) && orb_net_clearly_positive(net, c, d, b) &&
+         orb_net_clearly_positive(net, d, c, a) && !orb_net_adjacent(net, c, d);
 }
 
-/* h = a→b of (a,b,c), twin in (b,a,d). The slots are refilled so that half-edge h stays the turned edge:
+/* h = a→b of (a,b,c), twin in (b,a,d). The corners are set so that half-edge h stays the flipped edge:
  * (c,d,b) with h = c→d and (d,c,a) with twin[h] = d→c. */
 void orb_net_flip(orb_net *net, int32_t h) {
   int32_t g = net->twin[h];

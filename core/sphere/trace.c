@@ -1,6 +1,6 @@
 /* The walk of an arc p→q. A vertex lies left of the arc where orient(p, q, vertex) > 0. An arc leaves a triangle over
  * the half-edge whose origin lies right and whose end lies left, or through a corner that lies on it; it ends in the
- * triangle if q is not strictly beyond that edge. Since arcs are shorter than half a turn, "beyond" is one exact
+ * triangle if q is not strictly beyond that edge. Since arcs are shorter than a half circle, "beyond" is one exact
  * orientation too. */
 #include "sphere/trace.h"
 
@@ -27,7 +27,7 @@ static const double *corner(const orb_arc_tracer *t, int32_t h) {
   return t->mesh->points + 3 * (int64_t)t->mesh->triangles[h];
 }
 
-/* The sign of orient(p, q, origin of h): the filter of orb_orient() with the part of p and q done once. */
+/* The sign of orient(p, q, origin of h), by the filter of orb_orient() with the part of p and q computed once. */
 static int side(const orb_arc_tracer *t, int32_t h) {
   const double *c = corner(t, h);
   double x = c[0] - t->p[0], y = c[1] - t->p[1], z = c[2] - t->p[2];
@@ -38,7 +38,7 @@ static int side(const orb_arc_tracer *t, int32_t h) {
   return orb_orient(t->p, t->q, c);
 }
 
-/* The sign of q against the edge h: negative, q lies beyond it. */
+/* The sign of q against edge h; negative: q lies beyond it. */
 static int within(const orb_arc_tracer *t, int32_t h) {
   return orb_orient(corner(t, h), corner(t, orb_next(h)), t->q);
 }
@@ -65,7 +65,7 @@ void orb_trace_between(orb_arc_tracer *tracer, const orb_sphere_view *mesh, orb_
   }
 }
 
-/* Whether the arc, which has just entered the triangle of h, ends in it: known because q is known to lie there. */
+/* Whether the arc, which has just entered the triangle of h, ends there, if it is known where q lies. */
 static int is_reached(const orb_arc_tracer *t) {
   int32_t triangle = t->h / 3;
   const int32_t *c = t->mesh->triangles + 3 * (int64_t)triangle;
@@ -79,7 +79,7 @@ static int end_at(orb_arc_tracer *t, int32_t h, orb_spot_kind kind) {
   return 0;
 }
 
-/* Over edge h, unless q lies on this side of it. */
+/* Leaves over edge h, unless q lies on this side of it. */
 static int leave_over(orb_arc_tracer *t, int32_t h, orb_crossing *out) {
   int known = t->state == ENTERED && (t->vertex >= 0 || t->target[0] >= 0);
   int sign = known ? -1 : within(t, h);
@@ -92,7 +92,7 @@ static int leave_over(orb_arc_tracer *t, int32_t h, orb_crossing *out) {
   return 1;
 }
 
-/* Through the origin of h, which lies on the arc, unless q comes first. */
+/* Leaves through the origin of h, which lies on the arc, unless q comes first. */
 static int leave_through(orb_arc_tracer *t, int32_t h, orb_crossing *out) {
   int after = within(t, h), before = within(t, orb_prev(h));
   if (after >= 0 && before >= 0) {
@@ -104,7 +104,8 @@ static int leave_through(orb_arc_tracer *t, int32_t h, orb_crossing *out) {
   return 1;
 }
 
-/* Along an edge towards the origin of `to`; `gate` is the edge at that vertex that is not on the arc. */
+/* Runs along an edge to the origin of `to`, unless q comes first; `gate` is the edge at that vertex that is not on the
+ * arc. */
 static int run_along(orb_arc_tracer *t, int32_t edge, int32_t to, int32_t gate, orb_crossing *out) {
   int sign = within(t, gate);
   if (sign >= 0) {

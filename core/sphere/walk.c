@@ -12,7 +12,7 @@ static int side_of(const orb_sphere_view *mesh, int32_t t, int k, const double p
   return orb_orient(corner(mesh, 3 * t + k), corner(mesh, 3 * t + (k + 1) % 3), p);
 }
 
-/* The last resort, O(F): correct whatever the triangulation. */
+/* The last resort, O(F): correct for every triangulation. */
 static orb_hit search_all(const orb_sphere_view *mesh, const double p[3]) {
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
     if (mesh->triangles[3 * t] < 0) {
@@ -92,7 +92,7 @@ void orb_project(const orb_sphere_view *mesh, const orb_hit *hit, const double p
     at[k] = weight > 0 ? weight : 0;
     sum += at[k];
   }
-  if (!(sum > 0)) { /* every weight lost to rounding: the nearest corner is as good as any */
+  if (!(sum > 0)) { /* rounding has lost every weight: take the nearest corner */
     int best = 0;
     for (k = 1; k < 3; k++) {
       if (orb_distance2(p, corner(mesh, 3 * hit->triangle + k)) <

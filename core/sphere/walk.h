@@ -1,11 +1,11 @@
-/* Point location by walking: from a triangle to the one that holds a direction, by exact orientation tests. */
+/* Point location by walking from a triangle to the one that holds a direction, by exact orientation tests. */
 #ifndef ORB_SPHERE_WALK_H
 #define ORB_SPHERE_WALK_H
 
 #include <stdint.h>
 
-/* A certified spherical triangulation, borrowed. Triangles whose first corner is negative are dead and are never
- * reached from a live one. */
+/* A certified spherical triangulation, borrowed. Triangles whose first corner is negative are dead; no live one leads
+ * to them. */
 typedef struct orb_sphere_view {
   const double *points;
   const int32_t *triangles, *twin;
@@ -19,8 +19,8 @@ typedef struct orb_hit {
   int side[3];
 } orb_hit;
 
-/* Walks from `start` to a triangle that holds p (closed). Edges are tried in a pseudo-random order of fixed seed, so
- * that no cycle can hold the walk; should it take longer than the mesh is large, all triangles are tested. */
+/* Walks from `start` to a triangle that holds p, borders included. Tries edges in a pseudo-random order of fixed seed,
+ * so that the walk cannot cycle; a walk of more steps than the mesh has triangles ends with a test of all. */
 orb_hit orb_walk(const orb_sphere_view *mesh, const double p[3], int32_t start);
 
 /* The corner (0..2) of the hit's triangle that p coincides with, or −1. */

@@ -1,17 +1,16 @@
 /* As-rigid-as-possible interpolation, after Alexa, Cohen-Or & Levin 2000 and Sorkine & Alexa 2007, on edges.
  *
- * The rotation of b as a whole against a is taken out first (Horn). Each vertex then has the rotation that best turns
- * its edges on a into those on b, as a rotation vector w; cells are smoothed over their neighbours, which keeps slivers
- * from having a say, and vectors are unwrapped from neighbour to neighbour, so that a limb may turn by more than half a
+ * The rotation of b as a whole against a is removed first (Horn). Each vertex then has the rotation that best maps its
+ * edges on a to those on b, as a rotation vector w. Covariances are smoothed over neighbours, which takes influence
+ * from slivers, and vectors are unwrapped from neighbour to neighbour, so that a limb may rotate by more than half a
  * circle. At t an edge should be
  *
  *   d(t) = (1 − t) exp(t w) e_a + t exp((t − 1) w) e_b,
  *
- * a's edge turned forth blended with b's turned back: both ends are exact, and where b is a turned a nothing shrinks.
- * Positions are the least-squares solution of p_i − p_j = d_ij, weighted by the area at the edge over its squared
- * length (a positive stand-in for cotangents): a graph Laplacian, solved by conjugate gradients from a linear blend.
- * Sums run over fixed chunks, so that threads do not matter.
- */
+ * a's edge rotated forth blended with b's rotated back: both ends are exact, and where b is a rotated a nothing
+ * shrinks. Positions are the least-squares solution of p_i − p_j = d_ij, weighted by the area at the edge over its
+ * squared length (a positive stand-in for cotangents): a graph Laplacian, solved by conjugate gradients from a linear
+ * blend. Sums run over fixed chunks, so that the result does not depend on the number of threads. */
 #include "transfer/arap.h"
 
 #include <math.h>
@@ -22,25 +21,27 @@
 #include "transfer/coarse.h"
 #include "transfer/rotation.h"
 
-enum { GRAIN = 2048, SMOOTHING = 2, MAX_ITERATIONS = 3000 };
-static const double TOLERANCE = 1e-5; /* of the residual, relative; the error this leaves is far below a pixel */
+enum { GRAIN = 2048 };          /* vertices a thread takes at a time; the sums, and so the result, depend on it */
+enum { SMOOTHING = 2 };         /* rounds of smoothing the covariances: more suppress slivers and blur the rotations */
+enum { MAX_ITERATIONS = 3000 }; /* of conjugate gradients, so that they end in any case */
+static const double TOLERANCE = 1e-5; /* of the relative residual; the error that remains is far below a pixel */
 static const double PI = 3.14159265358979323846;
 
 struct orb_arap {
   const double *a;
-  double *b; /* turned back onto a, about the middles */
+  double *b; /* rotated back onto a, about the middles */
   int32_t vertex_count;
-  int32_t *first, *neighbor; /* of each vertex: neighbor[first[v]] … */
-  double *weight;            /* of each neighbour entry; symmetric */
-  double *diagonal;          /* a vertex: the sum of its weights */
-  double *turn;              /* a vertex: its rotation vector */
+  int32_t *first, *neighbor; /* of vertex v: neighbor[first[v]] … neighbor[first[v + 1] − 1] */
+  double *weight;            /* per neighbour entry; symmetric */
+  double *diagonal;          /* per vertex: the sum of its weights */
+  double *rotation;          /* per vertex: its rotation vector */
   orb_coarse coarse;
   double whole[3]; /* rotation vector of b as a whole */
   double middle_a[3], middle_b[3];
 };
 
-/* The vector v turned by t·w (Rodrigues). */
-static void turn_by(const double w[3], double t, const double v[3], double out[3]) {
+/* The vector v rotated by t·w (Rodrigues). */
+static void rotate_by(const double w[3], double t, const double v[3], double out[3]) {
   double angle = orb_length(w) * t, axis[3] = {w[0], w[1], w[2]}, cross[3];
   if (!(orb_normalize(axis) > 1e-12)) {
     memcpy(out, v, 3 * sizeof *out);
@@ -69,7 +70,7 @@ void orb_arap_destroy(orb_context *ctx, orb_arap *path) {
     orb_free(ctx, path->neighbor);
     orb_free(ctx, path->weight);
     orb_free(ctx, path->diagonal);
-    orb_free(ctx, path->turn);
+    orb_free(ctx, path->rotation);
     orb_coarse_free(ctx, &path->coarse);
     orb_free(ctx, path);
   }
@@ -92,7 +93,7 @@ static double total_area(const double *positions, const int32_t *triangles, int3
 }
 
 /* Neighbours of a closed triangle list, each once: the vertex that follows v in each triangle of v. Half the weight of
- * an edge comes from each of its triangles, hence from each of its half-edges, which are then added up both ways. */
+ * an edge comes from each of its triangles, that is from each of its half-edges. */
 static orb_status make_graph(orb_context *ctx, orb_arap *path, const int32_t *triangles, int32_t triangle_count) {
   int32_t n = path->vertex_count;
   int64_t corners = 3 * (int64_t)triangle_count;
@@ -109,7 +110,7 @@ static orb_status make_graph(orb_context *ctx, orb_arap *path, const int32_t *tr
   for (int32_t v = 0; v < n; v++) {
     path->first[v + 1] += path->first[v];
   }
-  for (int64_t h = 0; h < corners; h++) { /* diagonal serves as the fill count */
+  for (int64_t h = 0; h < corners; h++) { /* diagonal counts the entries so far */
     int32_t v = triangles[h], next = triangles[h % 3 == 2 ? h - 2 : h + 1];
     path->neighbor[path->first[v] + (int32_t)path->diagonal[v]] = next;
     path->diagonal[v] += 1;
@@ -123,7 +124,7 @@ static int32_t entry_of(const orb_arap *path, int32_t v, int32_t neighbor) {
       return i;
     }
   }
-  ORB_ASSERT(!"closed");
+  ORB_ASSERT(!"the triangles are closed");
   return -1;
 }
 
@@ -167,8 +168,8 @@ static void middle_of(const double *positions, const int32_t *triangles, int32_t
   }
 }
 
-/* Takes the rotation of b as a whole out of b. */
-static void take_out_whole(orb_arap *path, const double *b, const int32_t *triangles, int32_t triangle_count) {
+/* Removes the rotation of b as a whole from b. */
+static void remove_whole(orb_arap *path, const double *b, const int32_t *triangles, int32_t triangle_count) {
   double h[3][3] = {{0}};
   middle_of(path->a, triangles, triangle_count, path->middle_a);
   middle_of(b, triangles, triangle_count, path->middle_b);
@@ -188,11 +189,11 @@ static void take_out_whole(orb_arap *path, const double *b, const int32_t *trian
   for (int32_t v = 0; v < path->vertex_count; v++) {
     double w[3];
     orb_sub(b + 3 * (int64_t)v, path->middle_b, w);
-    turn_by(path->whole, -1, w, path->b + 3 * (int64_t)v);
+    rotate_by(path->whole, -1, w, path->b + 3 * (int64_t)v);
   }
 }
 
-/* The covariance of each vertex's edges, scaled so that large cells do not drown small ones; then smoothed. */
+/* The covariance of each vertex's edges, scaled so that large cells do not outweigh small ones; then smoothed. */
 static void make_cells(const orb_arap *path, double (*cell)[9], double (*scratch)[9]) {
   for (int32_t v = 0; v < path->vertex_count; v++) {
     double size = 0;
@@ -221,7 +222,7 @@ static void make_cells(const orb_arap *path, double (*cell)[9], double (*scratch
   }
 }
 
-/* w, or the same rotation a full circle further or back, whichever is nearest to `near`. */
+/* Replaces w by the same rotation one full circle more or less, if that is nearer to `near`. */
 static void unwrap(double w[3], const double near[3]) {
   double axis[3] = {w[0], w[1], w[2]}, best[3] = {w[0], w[1], w[2]};
   if (!(orb_normalize(axis) > 1e-9)) {
@@ -239,10 +240,10 @@ static void unwrap(double w[3], const double near[3]) {
   memcpy(w, best, sizeof best);
 }
 
-static orb_status make_turns(orb_context *ctx, orb_arap *path) {
+static orb_status make_rotations(orb_context *ctx, orb_arap *path) {
   int32_t n = path->vertex_count, root = 0, head = 0, tail = 0;
-  double(*cell)[9] = orb_alloc(ctx, (size_t)n, sizeof *cell),
-  (*scratch)[9] = orb_alloc(ctx, (size_t)n, sizeof *scratch);
+  double(*cell)[9] = orb_alloc(ctx, (size_t)n, sizeof *cell);
+  double(*scratch)[9] = orb_alloc(ctx, (size_t)n, sizeof *scratch);
   int32_t *queue = ORB_NEW(ctx, int32_t, n);
   unsigned char *seen = ORB_NEW0(ctx, unsigned char, n);
   orb_status status = cell && scratch && queue && seen ? ORB_OK : ORB_E_NO_MEMORY;
@@ -251,8 +252,8 @@ static orb_status make_turns(orb_context *ctx, orb_arap *path) {
     for (int32_t v = 0; v < n; v++) {
       double h[3][3];
       memcpy(h, cell[v], sizeof h);
-      rotation_vector(h, path->turn + 3 * (int64_t)v);
-      if (orb_length(path->turn + 3 * (int64_t)v) < orb_length(path->turn + 3 * (int64_t)root)) {
+      rotation_vector(h, path->rotation + 3 * (int64_t)v);
+      if (orb_length(path->rotation + 3 * (int64_t)v) < orb_length(path->rotation + 3 * (int64_t)root)) {
         root = v;
       }
     }
@@ -264,7 +265,7 @@ static orb_status make_turns(orb_context *ctx, orb_arap *path) {
         int32_t w = path->neighbor[i];
         if (!seen[w]) {
           seen[w] = 1;
-          unwrap(path->turn + 3 * (int64_t)w, path->turn + 3 * (int64_t)v);
+          unwrap(path->rotation + 3 * (int64_t)w, path->rotation + 3 * (int64_t)v);
           queue[tail++] = w;
         }
       }
@@ -287,9 +288,9 @@ orb_status orb_arap_create(orb_context *ctx, const double *a, const double *b, i
   path->a = a;
   path->vertex_count = vertex_count;
   path->b = ORB_NEW(ctx, double, 3 * (int64_t)vertex_count);
-  path->turn = ORB_NEW(ctx, double, 3 * (int64_t)vertex_count);
-  if (path->b && path->turn) {
-    take_out_whole(path, b, triangles, triangle_count);
+  path->rotation = ORB_NEW(ctx, double, 3 * (int64_t)vertex_count);
+  if (path->b && path->rotation) {
+    remove_whole(path, b, triangles, triangle_count);
     status = make_graph(ctx, path, triangles, triangle_count);
   }
   if (status == ORB_OK) {
@@ -297,7 +298,7 @@ orb_status orb_arap_create(orb_context *ctx, const double *a, const double *b, i
     status = orb_context_check(ctx);
   }
   if (status == ORB_OK) {
-    status = make_turns(ctx, path);
+    status = make_rotations(ctx, path);
   }
   if (status == ORB_OK) {
     status = orb_coarse_create(ctx, path->first, path->neighbor, path->weight, vertex_count, &path->coarse);
@@ -315,7 +316,7 @@ typedef struct solver {
   const orb_arap *path;
   double t;
   double *x, *r, *p, *q;
-  orb_coarse *coarse; /* its sums: the correction of the present r */
+  orb_coarse *coarse; /* its sums are the correction of the present r */
   double (*sums)[6];
   double step[3];
   double beta[3];
@@ -331,14 +332,14 @@ static void begin_body(void *arg, int64_t begin, int64_t end, int thread) {
     double r[3] = {0};
     for (int32_t i = path->first[v]; i < path->first[v + 1]; i++) {
       int64_t u = path->neighbor[i];
-      double turn[3], edge[3], forth[3], back[3];
+      double rotation[3], edge[3], forth[3], back[3];
       for (int c = 0; c < 3; c++) {
-        turn[c] = 0.5 * (path->turn[3 * v + c] + path->turn[3 * u + c]);
+        rotation[c] = 0.5 * (path->rotation[3 * v + c] + path->rotation[3 * u + c]);
       }
       orb_sub(path->a + 3 * v, path->a + 3 * u, edge);
-      turn_by(turn, s->t, edge, forth);
+      rotate_by(rotation, s->t, edge, forth);
       orb_sub(path->b + 3 * v, path->b + 3 * u, edge);
-      turn_by(turn, s->t - 1, edge, back);
+      rotate_by(rotation, s->t - 1, edge, back);
       for (int c = 0; c < 3; c++) {
         double wanted = (1 - s->t) * forth[c] + s->t * back[c];
         r[c] += path->weight[i] * (wanted - (s->x[3 * v + c] - s->x[3 * u + c]));
@@ -452,7 +453,7 @@ static orb_status solve(orb_context *ctx, solver *s) {
   return ORB_OK;
 }
 
-/* Turns the solution by the whole's share and puts its middle on the straight line between the ends' middles. */
+/* Rotates the solution by the whole's share and puts its middle on the straight line between the ends' middles. */
 static void place_whole(const orb_arap *path, double t, double *x, const double *start) {
   double shift[3] = {0};
   for (int32_t v = 0; v < path->vertex_count; v++) { /* the solution is known up to a shift: that of the blend */
@@ -462,7 +463,7 @@ static void place_whole(const orb_arap *path, double t, double *x, const double 
   }
   for (int32_t v = 0; v < path->vertex_count; v++) {
     double *p = x + 3 * (int64_t)v, moved[3] = {p[0] + shift[0], p[1] + shift[1], p[2] + shift[2]};
-    turn_by(path->whole, t, moved, p);
+    rotate_by(path->whole, t, moved, p);
     for (int c = 0; c < 3; c++) {
       p[c] += (1 - t) * path->middle_a[c] + t * path->middle_b[c];
     }
@@ -496,18 +497,18 @@ orb_status orb_arap_at(orb_context *ctx, orb_arap *path, double t, double *out) 
 
 void orb_arap_direction(const orb_arap *path, double t, int32_t v, const float at_a[3], const float at_b[3],
                         float out[3]) {
-  double a[3], b[3], unturned[3], blend[3], forth[3], back[3];
+  double a[3], b[3], unrotated[3], blend[3], forth[3], back[3];
   for (int c = 0; c < 3; c++) {
     a[c] = (double)at_a[c];
     b[c] = (double)at_b[c];
   }
-  turn_by(path->whole, -1, b, unturned);
-  turn_by(path->turn + 3 * (int64_t)v, t, a, forth);
-  turn_by(path->turn + 3 * (int64_t)v, t - 1, unturned, back);
+  rotate_by(path->whole, -1, b, unrotated);
+  rotate_by(path->rotation + 3 * (int64_t)v, t, a, forth);
+  rotate_by(path->rotation + 3 * (int64_t)v, t - 1, unrotated, back);
   for (int c = 0; c < 3; c++) {
     blend[c] = (1 - t) * forth[c] + t * back[c];
   }
-  turn_by(path->whole, t, blend, a);
+  rotate_by(path->whole, t, blend, a);
   if (!(orb_normalize(a) > 1e-6)) {
     memcpy(out, at_a, 3 * sizeof *out);
     return;

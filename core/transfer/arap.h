@@ -11,10 +11,10 @@ ORB_MUST_CHECK orb_status orb_arap_create(orb_context *ctx, const double *a, con
                                           const int32_t *triangles, int32_t triangle_count, orb_arap **out);
 void orb_arap_destroy(orb_context *ctx, orb_arap *path);
 
-/* The positions at t in [0, 1]: a at 0, b at 1. Conjugate gradients, some hundred rounds of O(V). */
+/* The positions at t in [0, 1]: a at 0, b at 1. Conjugate gradients, some hundred iterations of O(V). */
 ORB_MUST_CHECK orb_status orb_arap_at(orb_context *ctx, orb_arap *path, double t, double *out);
 
-/* The direction at vertex v at t that is `at_a` at 0 and `at_b` at 1, turning with the surface; unit. */
+/* The unit direction at vertex v at time t: `at_a` at 0, `at_b` at 1, in between rotating with the surface. */
 void orb_arap_direction(const orb_arap *path, double t, int32_t v, const float at_a[3], const float at_b[3],
                         float out[3]);
 

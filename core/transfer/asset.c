@@ -1,12 +1,15 @@
-/* orb_asset_write(): the steps of draft.h in their order. */
+/* orb_asset_write(): the steps listed in draft.h, in their order. */
 #include "orbmorph/asset.h"
 
 #include <string.h>
 
 #include "base/check.h"
 #include "transfer/distinct.h"
-#include "transfer/draft.h"
 #include "transfer/fit.h"
+#include "transfer/pack.h"
+#include "transfer/path.h"
+#include "transfer/split.h"
+#include "transfer/texcoord.h"
 
 void orb_asset_defaults(orb_asset_options *options) {
   *options = (orb_asset_options){.normals = 1, .path_steps = 3};
@@ -17,7 +20,7 @@ static orb_status check_options(orb_context *ctx, const orb_supermesh *supermesh
     return orb_fail(ctx, ORB_E_BAD_OPTION, "An asset needs two shapes or more.");
   }
   if (options->path == ORB_PATH_RIGID && (options->path_steps < 1 || options->path_steps > 64)) {
-    return orb_fail(ctx, ORB_E_BAD_OPTION, "path_steps is %d; give 1 to 64.", (int)options->path_steps);
+    return orb_fail(ctx, ORB_E_BAD_OPTION, "path_steps is %d; it must be 1 to 64.", (int)options->path_steps);
   }
   return ORB_OK;
 }
@@ -51,7 +54,7 @@ static void draft_free(orb_context *ctx, orb_draft *draft) {
   orb_free(ctx, draft->parts);
 }
 
-static orb_status draft_room(orb_context *ctx, orb_draft *draft) {
+static orb_status allocate_frames(orb_context *ctx, orb_draft *draft) {
   size_t frames = (size_t)draft->frame_count, size = 3 * (size_t)draft->supermesh->vertex_count;
   draft->positions = ORB_NEW0(ctx, double *, frames);
   draft->deltas = ORB_NEW0(ctx, float *, frames);
@@ -71,7 +74,7 @@ static orb_status draft_room(orb_context *ctx, orb_draft *draft) {
   return ORB_OK;
 }
 
-/* Positions and normals of the shapes, the later ones moved onto the first. */
+/* Positions and normals of the shapes; the later ones are moved onto the first. */
 static orb_status make_shapes(orb_context *ctx, orb_draft *draft) {
   const orb_supermesh *supermesh = draft->supermesh;
   for (int32_t s = 0; s < draft->shape_count; s++) {
@@ -85,7 +88,7 @@ static orb_status make_shapes(orb_context *ctx, orb_draft *draft) {
       ORB_TRY(orb_fit_motion(ctx, supermesh, draft->positions[0], draft->positions[s], draft->options->fit, &motion));
       orb_motion_apply(&motion, draft->positions[s], supermesh->vertex_count);
       if (draft->normals) {
-        orb_motion_turn(&motion, draft->normals[s].values, draft->normals[s].value_count);
+        orb_motion_rotate(&motion, draft->normals[s].values, draft->normals[s].value_count);
       }
     }
     orb_progress(ctx, "write", 0.3 * (s + 1) / draft->shape_count);
@@ -113,7 +116,8 @@ static void clamp_colors(orb_wedges *colors) {
   }
 }
 
-/* Colours of the first shape where it has them; of all shapes where asked and any has them, white standing for none. */
+/* Colours of the first shape if it has any; of all shapes if the options ask for that and a later one has any. White
+ * stands for none. */
 static orb_status make_colors(orb_context *ctx, orb_draft *draft) {
   int any = draft->shapes[0].mesh.colors != NULL;
   draft->color_count = any;
@@ -133,7 +137,7 @@ static orb_status make_colors(orb_context *ctx, orb_draft *draft) {
   return ORB_OK;
 }
 
-/* Texture coordinates and the materials' islands, where the first shape has such. */
+/* Texture coordinates, and the triangles that decide the materials, if the first shape has either. */
 static orb_status make_textures(orb_context *ctx, orb_draft *draft) {
   const orb_mesh *mesh = &draft->shapes[0].mesh;
   if (!mesh->texcoords && !(mesh->material && mesh->material_count > 1)) {
@@ -165,7 +169,7 @@ static orb_status round_frames(orb_context *ctx, orb_draft *draft) {
   return status;
 }
 
-/* A part's vertex has the values of a supermesh corner, and so that corner's vertex. */
+/* The supermesh vertex of each vertex of the file: that of the corner whose values it has. */
 static orb_status list_vertices(orb_context *ctx, const orb_draft *draft, int32_t **out) {
   int64_t count = 0;
   for (int32_t p = 0; p < draft->part_count; p++) {
@@ -204,7 +208,7 @@ orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *superme
     draft.frame_count += options->path_steps * (supermesh->shape_count - 1);
   }
   orb_progress(ctx, "write", 0);
-  ORB_GO(status, draft_room(ctx, &draft), done);
+  ORB_GO(status, allocate_frames(ctx, &draft), done);
   ORB_GO(status, make_shapes(ctx, &draft), done);
   ORB_GO(status, make_colors(ctx, &draft), done);
   ORB_GO(status, make_textures(ctx, &draft), done);
@@ -218,5 +222,39 @@ orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *superme
   orb_progress(ctx, "write", 1);
 done:
   draft_free(ctx, &draft);
+  return status;
+}
+
+/* Column-major, as in glTF. */
+static void motion_matrix(const orb_motion *motion, double out[16]) {
+  for (int c = 0; c < 3; c++) {
+    for (int r = 0; r < 3; r++) {
+      out[4 * c + r] = motion->scale * motion->rotation[r][c];
+    }
+    out[4 * c + 3] = 0;
+    out[12 + c] = motion->shift[c];
+  }
+  out[15] = 1;
+}
+
+orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
+                                orb_fit fit, double *out) {
+  int32_t vertices = supermesh->vertex_count;
+  double *fixed = ORB_NEW(ctx, double, 3 * (int64_t)vertices), *moved = ORB_NEW(ctx, double, 3 * (int64_t)vertices);
+  orb_status status = fixed && moved ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int32_t s = 0; status == ORB_OK && s < supermesh->shape_count; s++) {
+    orb_motion motion = {.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .scale = 1};
+    if (fit != ORB_FIT_NONE) {
+      const orb_place *places = supermesh->places + (int64_t)s * vertices;
+      ORB_GO(status, orb_transfer_positions(ctx, &shapes[s], places, vertices, s ? moved : fixed), end);
+      if (s > 0) {
+        ORB_GO(status, orb_fit_motion(ctx, supermesh, fixed, moved, fit, &motion), end);
+      }
+    }
+    motion_matrix(&motion, out + 16 * (int64_t)s);
+  }
+end:
+  orb_free(ctx, fixed);
+  orb_free(ctx, moved);
   return status;
 }

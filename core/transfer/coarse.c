@@ -5,6 +5,8 @@
 
 #include "base/check.h"
 
+/* About so many groups, but of at least so many vertices: more groups make the correction better, and its
+ * factorisation, which is cubic in their number, slower. */
 enum { GROUPS = 384, LEAST_SIZE = 16 };
 
 void orb_coarse_free(orb_context *ctx, orb_coarse *coarse) {
@@ -14,7 +16,7 @@ void orb_coarse_free(orb_context *ctx, orb_coarse *coarse) {
   memset(coarse, 0, sizeof *coarse);
 }
 
-/* Grows groups of `size` vertices by breadth; what is left over in small pieces joins a neighbour's group. */
+/* Grows groups of `size` vertices, breadth first; pieces of less than a quarter of that join a neighbouring group. */
 static void make_groups(orb_coarse *coarse, const int32_t *first, const int32_t *neighbor, int32_t size,
                         int32_t *queue) {
   int32_t *group = coarse->group, count = 0;
@@ -90,7 +92,7 @@ orb_status orb_coarse_create(orb_context *ctx, const int32_t *first, const int32
   if (status == ORB_OK) {
     make_groups(out, first, neighbor, size < LEAST_SIZE ? LEAST_SIZE : size, queue);
     int64_t n = out->group_count;
-    out->factor = ORB_NEW0(ctx, double, n *n);
+    out->factor = ORB_NEW0(ctx, double, (n * n));
     out->sums = ORB_NEW0(ctx, double, 3 * n);
     if (!out->factor || !out->sums) {
       status = ORB_E_NO_MEMORY;
@@ -108,7 +110,8 @@ orb_status orb_coarse_create(orb_context *ctx, const int32_t *first, const int32
         }
       }
     }
-    for (int64_t g = 0; g < n; g++) { /* the constant is in the kernel; a trace of the diagonal takes it out */
+    for (int64_t g = 0; g < n;
+         g++) { /* a constant solves the homogeneous system; a slightly larger diagonal makes the matrix regular */
       out->factor[g * n + g] *= 1 + 1e-8;
       out->factor[g * n + g] += 1e-12;
     }

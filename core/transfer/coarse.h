@@ -1,6 +1,6 @@
-/* A coarse correction for conjugate gradients on a graph Laplacian: vertices lumped into a few hundred groups, whose
- * small system is solved exactly. It carries over long ways what a diagonal preconditioner hands from vertex to vertex
- * (two-level additive Schwarz without overlap). */
+/* A coarse correction for conjugate gradients on a graph Laplacian: vertices are lumped into a few hundred groups,
+ * whose small system is solved exactly. It carries information over long distances, which a diagonal preconditioner
+ * passes from vertex to vertex only (two-level additive Schwarz without overlap). */
 #ifndef ORB_TRANSFER_COARSE_H
 #define ORB_TRANSFER_COARSE_H
 
@@ -8,9 +8,9 @@
 
 typedef struct orb_coarse {
   int32_t vertex_count, group_count;
-  int32_t *group; /* a vertex */
+  int32_t *group; /* per vertex */
   double *factor; /* Cholesky factor, group_count², row-major, lower */
-  double *sums;   /* 3·group_count, scratch */
+  double *sums;   /* 3·group_count: the result of orb_coarse_solve() */
 } orb_coarse;
 
 /* Neighbours of v are neighbor[first[v]] …, with symmetric positive weights. */
@@ -18,7 +18,7 @@ ORB_MUST_CHECK orb_status orb_coarse_create(orb_context *ctx, const int32_t *fir
                                             const double *weight, int32_t vertex_count, orb_coarse *out);
 void orb_coarse_free(orb_context *ctx, orb_coarse *coarse);
 
-/* Solves the groups' system for r (3 a vertex), into coarse->sums: the correction of group g is sums[3g] … */
+/* Solves the groups' system for r (3 a vertex): the correction of group g is coarse->sums[3g] … sums[3g + 2]. */
 void orb_coarse_solve(orb_coarse *coarse, const double *r);
 
 #endif

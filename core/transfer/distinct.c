@@ -1,9 +1,10 @@
-/* Why: a caller who welds a GLB's split vertices by their bits must get the supermesh back. Shapes may hold distinct
- * vertices at one place, and fine supermeshes vertices nearer than float32 can tell apart.
+/* A client that welds a GLB's split vertices by their bits must get the supermesh back. But shapes may have distinct
+ * vertices at one place, and fine supermeshes have vertices closer than float32 can distinguish.
  *
- * Vertices go one by one into a hash table keyed by the float32 positions on every shape, those to keep first, then by
- * number. One that finds its key taken tries base coordinates ±1, ±2, … units in the last place away, the coordinate of
- * the largest magnitude first (a small one may be near zero, where a unit would be lost to flushed denormals).
+ * Vertices enter a hash table one by one, keyed by the float32 positions on every shape: first those to keep, then the
+ * others, each by number. One that finds its key taken tries base coordinates ±1, ±2, … units in the last place away,
+ * the coordinate of largest magnitude first (a small one may be near zero, where a unit would be lost to flushed
+ * denormals).
  */
 #include "transfer/distinct.h"
 
@@ -12,7 +13,10 @@
 
 #include "base/check.h"
 
-enum { MAX_ULPS = 16, GRAIN = 16384 };
+enum { MAX_ULPS = 16 }; /* units in the last place: more find a place in denser meshes and move vertices farther */
+enum { GRAIN = 16384 }; /* vertices a thread takes at a time */
+enum { CHECK_EVERY = 16384 };     /* vertices between two checks for cancellation */
+static const float TINY = 1e-30f; /* smaller coordinates are near the denormals that clients may flush to zero */
 
 typedef struct rounding {
   double *const *positions;
@@ -86,7 +90,7 @@ static int insert(rounding *r, int64_t v) {
   return 1;
 }
 
-/* The coordinates in falling magnitude. */
+/* The axes by falling magnitude of the coordinate. */
 static void axis_order(const float p[3], int order[3]) {
   order[0] = 0, order[1] = 1, order[2] = 2;
   for (int i = 0; i < 2; i++) {
@@ -111,7 +115,7 @@ static int nudge(rounding *r, int64_t v) {
       for (int i = 0; i < 3; i++) {
         int c = order[i];
         moved[side][c] = nextafterf(moved[side][c], side ? INFINITY : -INFINITY);
-        if (i > 0 && fabsf(moved[side][c]) < 1e-30f) {
+        if (i > 0 && fabsf(moved[side][c]) < TINY) {
           continue;
         }
         memcpy(p, from, sizeof from);
@@ -140,7 +144,7 @@ static orb_status keep_apart(orb_context *ctx, rounding *r, const unsigned char 
         }
         (*nudged)++;
       }
-      if ((v & 0x3fff) == 0) {
+      if (v % CHECK_EVERY == 0) {
         ORB_TRY(orb_context_check(ctx));
       }
     }

@@ -7,7 +7,10 @@
 #include "numeric/vec3.h"
 #include "transfer/rotation.h"
 
-/* Weighted points of both shapes: index NULL is all vertices, weight NULL is 1. */
+/* Height over length below which points count as lying on a line: a rotation about it would be arbitrary. */
+static const double FLAT = 1e-3;
+
+/* Weighted points of both shapes. index NULL: all vertices; weight NULL: 1. */
 typedef struct fit_points {
   const double *fixed, *moved, *weight;
   const int32_t *index;
@@ -33,7 +36,8 @@ static void mean_of(const fit_points *points, const double *positions, double ou
   }
 }
 
-/* Whether the chosen points of a shape span more than a line: the largest triangle with the two farthest apart. */
+/* Whether the points of a shape clearly do not lie on a line: tests the largest triangle over point 0 and the point
+ * farthest from it, `widest` being twice its area. */
 static int spans_plane(const fit_points *points, const double *positions) {
   double longest = 0, widest = 0;
   const double *a = positions + 3 * (int64_t)point_of(points, 0), *b = a;
@@ -51,7 +55,7 @@ static int spans_plane(const fit_points *points, const double *positions) {
     orb_cross(u, w, n);
     widest = fmax(widest, orb_length(n));
   }
-  return widest > 1e-3 * longest;
+  return widest > FLAT * longest;
 }
 
 static void add_areas(const orb_supermesh *supermesh, const double *positions, double *weight) {
@@ -142,7 +146,7 @@ void orb_motion_apply(const orb_motion *motion, double *positions, int32_t count
   }
 }
 
-void orb_motion_turn(const orb_motion *motion, float *vectors, int32_t count) {
+void orb_motion_rotate(const orb_motion *motion, float *vectors, int32_t count) {
   for (int32_t i = 0; i < count; i++) {
     float *v = vectors + 3 * (int64_t)i;
     double from[3] = {(double)v[0], (double)v[1], (double)v[2]};
@@ -150,37 +154,4 @@ void orb_motion_turn(const orb_motion *motion, float *vectors, int32_t count) {
       v[c] = (float)orb_dot(motion->rotation[c], from) + 0.0f;
     }
   }
-}
-
-static void motion_matrix(const orb_motion *motion, double out[16]) {
-  for (int c = 0; c < 3; c++) {
-    for (int r = 0; r < 3; r++) {
-      out[4 * c + r] = motion->scale * motion->rotation[r][c];
-    }
-    out[4 * c + 3] = 0;
-    out[12 + c] = motion->shift[c];
-  }
-  out[15] = 1;
-}
-
-orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
-                                orb_fit fit, double *out) {
-  int32_t vertices = supermesh->vertex_count;
-  double *fixed = ORB_NEW(ctx, double, 3 * (int64_t)vertices), *moved = ORB_NEW(ctx, double, 3 * (int64_t)vertices);
-  orb_status status = fixed && moved ? ORB_OK : ORB_E_NO_MEMORY;
-  for (int32_t s = 0; status == ORB_OK && s < supermesh->shape_count; s++) {
-    orb_motion motion = {.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .scale = 1};
-    if (fit != ORB_FIT_NONE) {
-      const orb_place *places = supermesh->places + (int64_t)s * vertices;
-      ORB_GO(status, orb_transfer_positions(ctx, &shapes[s], places, vertices, s ? moved : fixed), end);
-      if (s > 0) {
-        ORB_GO(status, orb_fit_motion(ctx, supermesh, fixed, moved, fit, &motion), end);
-      }
-    }
-    motion_matrix(&motion, out + 16 * (int64_t)s);
-  }
-end:
-  orb_free(ctx, fixed);
-  orb_free(ctx, moved);
-  return status;
 }

@@ -1,4 +1,4 @@
-/* Fitting: a later shape moved onto the first. */
+/* Fitting: moves a later shape onto the first. */
 #ifndef ORB_TRANSFER_FIT_H
 #define ORB_TRANSFER_FIT_H
 
@@ -9,8 +9,8 @@ typedef struct orb_motion {
   double rotation[3][3], scale, shift[3];
 } orb_motion;
 
-/* The motion that brings `moved` nearest to `fixed` in the least-squares sense (both 3 a supermesh vertex), over the
- * landmarks where there are three or more that lie on no line on either shape, else over all vertices weighted by the
+/* The motion that brings `moved` nearest to `fixed` in the least-squares sense (both 3 a supermesh vertex): over the
+ * landmarks if there are at least three that lie on no line on either shape, else over all vertices, weighted by the
  * area around them on both shapes. fit NONE gives the identity. Source: Horn 1987; the scale is the ratio of spreads,
  * so that fitting back is the inverse. */
 ORB_MUST_CHECK orb_status orb_fit_motion(orb_context *ctx, const orb_supermesh *supermesh, const double *fixed,
@@ -18,6 +18,6 @@ ORB_MUST_CHECK orb_status orb_fit_motion(orb_context *ctx, const orb_supermesh *
 
 void orb_motion_apply(const orb_motion *motion, double *positions, int32_t count);
 /* Rotates `count` unit vectors of float. */
-void orb_motion_turn(const orb_motion *motion, float *vectors, int32_t count);
+void orb_motion_rotate(const orb_motion *motion, float *vectors, int32_t count);
 
 #endif

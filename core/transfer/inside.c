@@ -1,11 +1,12 @@
-/* A place names one triangle, but a place on an edge lies in two and a place at a vertex in all around it: the corner
- * that lies in the fewest proposes, the other two are asked by the numbers of the vertices that carry them. No
- * arithmetic, so nothing to round. */
+/* A place names one triangle, but a place on an edge lies in two, and a place at a vertex in all around it. The corner
+ * that lies in the fewest triangles gives the candidates; whether the other two lie in a candidate follows from the
+ * numbers of the vertices that carry them. There is no arithmetic, so nothing is rounded. */
 #include "transfer/inside.h"
 
 #include <string.h>
 
-enum { GRAIN = 2048, RING = 64 }; /* vertices of a higher degree are not walked around to the end */
+enum { GRAIN = 2048 }; /* triangles a thread takes at a time */
+enum { RING = 64 };    /* triangles visited around a vertex: bounds the time at vertices of high degree */
 
 int orb_place_in(const int32_t *triangles, const orb_place *place, int32_t triangle, double at[3]) {
   const int32_t *own = triangles + 3 * (int64_t)place->triangle, *other = triangles + 3 * (int64_t)triangle;

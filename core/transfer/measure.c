@@ -1,17 +1,16 @@
 /* How far a reconstructed shape is from its input.
  *
- * Both surfaces are sampled (vertices, edge midpoints, face centres) and each sample's nearest point on the other is
- * found; the greatest distance of both ways is the sampled Hausdorff distance. The mean square is integrated with the
- * rule of seven points that is exact for cubics (1/20 a corner, 2/15 a midpoint, 9/20 the centre), each surface
- * weighing the same. Supermesh vertices lie on the input by construction and are not looked up. Normals are those of
- * the flat triangles, compared at the face centres and their nearest points.
+ * Both surfaces are sampled (vertices, edge midpoints, face centres), and each sample's nearest point on the other is
+ * found; the greatest distance of both ways is the sampled Hausdorff distance. The mean square is integrated by the
+ * rule of seven points that is exact for cubics (1/20 a corner, 2/15 a midpoint, 9/20 the centre), with equal weight
+ * for both surfaces. Supermesh vertices lie on the input by construction and are not sampled. Normals are those of the
+ * flat triangles, compared at the face centres and their nearest points.
  *
- * Most samples are settled without a search. A supermesh triangle whose corners have their places in one triangle of
- * the input lies on it, and so do its samples, by the mean of the corners' coordinates; the other way, a sample of an
- * input triangle is looked for on the supermesh triangles that lie in it. What is found no farther than SETTLED, which
- * is rounding, counts as it is. Only what remains asks the tree of the other surface, starting from the nearest place
- * known; the tree is made when the first sample needs it, so never for an exact overlay.
- */
+ * Most samples need no search. A supermesh triangle whose corners have their places in one triangle of the input lies
+ * on it, and so do its samples, by interpolation of the corners' coordinates; the other way, a sample of an input
+ * triangle is compared with the supermesh triangles that lie in it. A distance up to SETTLED, which is rounding, is
+ * accepted. Only the remaining samples query the tree of the other surface, starting from the nearest place known. The
+ * tree is built when the first sample needs it, so never for an exact overlay. */
 #include <math.h>
 #include <string.h>
 
@@ -20,23 +19,25 @@
 #include "orbmorph/transfer.h"
 #include "transfer/inside.h"
 
-enum { GRAIN = 256, BINS = 18000 };
+enum { GRAIN = 256 };  /* triangles a thread takes at a time; the sums, and so the result, depend on it */
+enum { BINS = 18000 }; /* of the histogram of angles: a hundredth of a degree each */
 static const double DEGREE = 180 / 3.14159265358979323846;
-static const double SETTLED = 1e-13; /* of the diagonal */
-static const double EXACT = 1e-6;    /* of the square of that: no use in looking for a nearer one */
+static const double SETTLED = 1e-13; /* relative to the diagonal */
+static const double EXACT =
+    1e-6; /* relative to the square of that: a search for a nearer triangle would not change the result */
 
 typedef struct surface {
   const double *positions;
   const int32_t *triangles;
   int32_t triangle_count, vertex_count;
   int32_t *twin;
-  double *area;      /* a triangle */
-  double *ring_area; /* a vertex: of the triangles around it */
-  int32_t *first;    /* a vertex: its lowest half-edge, whose triangle samples it */
+  double *area;      /* per triangle */
+  double *ring_area; /* per vertex: of the triangles around it */
+  int32_t *first;    /* per vertex: its lowest half-edge, whose triangle samples it */
   orb_nearest *tree;
   double total;
   const orb_place *places;  /* of the supermesh's vertices on the input; NULL: this is the input */
-  const orb_inside *inside; /* which triangles of the one lie in which of the other */
+  const orb_inside *inside; /* which triangles of the supermesh lie in which of the input */
 } surface;
 
 typedef struct chunk_sum {
@@ -53,10 +54,10 @@ typedef struct sample {
 typedef struct sample_job {
   orb_context *ctx;
   const surface *from, *to;
-  int vertices;    /* sample those, too */
-  double settled2; /* a squared distance that is rounding */
-  chunk_sum *sums; /* a chunk */
-  float *angle;    /* a triangle of `from`: degrees between the normals; −1: none */
+  int vertices;    /* sample the vertices too */
+  double settled2; /* squared distances up to this are rounding */
+  chunk_sum *sums; /* per chunk of GRAIN triangles */
+  float *angle;    /* per triangle of `from`: degrees between the normals; −1: none */
 } sample_job;
 
 static const double *corner_of(const surface *s, int64_t h) {
@@ -110,7 +111,7 @@ static double distance2_to(const surface *to, int32_t t, const double p[3], doub
   return orb_triangle_nearest(corners, p, at);
 }
 
-/* The distance to where the places of its triangle's corners put the sample. */
+/* The squared distance to the point of the input that the places of its triangle's corners give for the sample. */
 static double known_on_input(const sample_job *job, const sample *s, orb_place *known) {
   const surface *from = job->from, *to = job->to;
   int32_t own = from->inside->of[s->triangle];
@@ -133,7 +134,7 @@ static double known_on_input(const sample_job *job, const sample *s, orb_place *
   return orb_dot(d, d);
 }
 
-/* The nearest of the supermesh's triangles that lie in the sample's own. */
+/* The squared distance to the nearest of the supermesh triangles that lie in the sample's triangle. */
 static double known_on_made(const sample_job *job, const sample *s, orb_place *known) {
   const orb_inside *inside = job->from->inside;
   double best = INFINITY;
@@ -149,7 +150,7 @@ static double known_on_made(const sample_job *job, const sample *s, orb_place *k
   return best;
 }
 
-/* Adds a sample; *near: the place that the last one found, then that of this one. */
+/* Adds a sample. *near: in, the place found for the previous sample; out, for this one. */
 static void add_sample(const sample_job *job, const sample *s, double weight, orb_place *near, chunk_sum *sum) {
   orb_place known = {.triangle = -1};
   double distance2 = job->from->places ? known_on_input(job, s, &known) : known_on_made(job, s, &known);
@@ -169,7 +170,8 @@ static void add_sample(const sample_job *job, const sample *s, double weight, or
   sum->sum2 += weight * distance2;
 }
 
-/* The centre of triangle t, the midpoints of its edges and the corners that are its to sample. */
+/* Samples the centre of triangle t, the midpoints of its edges with the lower half-edge, and the vertices whose lowest
+ * half-edge it has. */
 static void sample_triangle(sample_job *job, int32_t t, orb_place *near, chunk_sum *sum) {
   const surface *from = job->from;
   sample centre = {.at = {1.0 / 3, 1.0 / 3, 1.0 / 3}, .triangle = t};
@@ -213,14 +215,14 @@ static void sample_body(void *arg, int64_t begin, int64_t end, int thread) {
   job->sums[begin / GRAIN] = sum;
 }
 
-/* What both ways add up to. */
+/* The sums of both ways. */
 typedef struct totals {
   double worst2, mean2; /* of the distance */
   double angle_sum, angle_weight;
-  double *bins; /* BINS of a hundredth of a degree */
+  double *bins; /* BINS weights */
 } totals;
 
-/* All samples; where some need the tree, it is made and all are taken again. */
+/* Takes all samples; if some need the tree, builds it and takes all again. */
 static orb_status take_samples(sample_job *job, surface *to, int64_t chunks) {
   orb_context *ctx = job->ctx;
   int32_t count = job->from->triangle_count;

@@ -1,4 +1,4 @@
-// C++ for one reason: what meshoptimizer throws when memory is out must not pass through C.
+// C++ for one reason: the exception that meshoptimizer throws when memory is exhausted must not pass through C.
 #include "transfer/order.h"
 
 #include <meshoptimizer.h>

@@ -1,4 +1,4 @@
-/* The order of a draft's triangles and vertices, by meshoptimizer, whose allocations throw. */
+/* The order of a draft's triangles and vertices, by meshoptimizer. */
 #ifndef ORB_TRANSFER_ORDER_H
 #define ORB_TRANSFER_ORDER_H
 
@@ -8,8 +8,8 @@
 extern "C" {
 #endif
 
-/* Reorders the triangles for the vertex cache, then finds for each vertex its place in the order of first use.
- * indices: index_count, in place; they stay those of the old vertices. ORB_E_NO_MEMORY. */
+/* Reorders the triangles for the vertex cache, in place, and computes remap: for each vertex its number in the order of
+ * first use. The indices keep the old numbers. ORB_E_NO_MEMORY. */
 ORB_MUST_CHECK orb_status orb_order_for_cache(orb_context *ctx, uint32_t *indices, size_t index_count,
                                               size_t vertex_count, uint32_t *remap);
 

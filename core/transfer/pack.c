@@ -1,5 +1,7 @@
-/* Packs a finished draft into glTF accessors: each its own buffer view, all on multiples of four bytes. Bounds are
- * taken from the float32 values that are written. */
+/* Packs a finished draft into glTF accessors: each has its own buffer view, at a multiple of four bytes. Bounds are
+ * computed from the float32 values that are written. */
+#include "transfer/pack.h"
+
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -7,9 +9,8 @@
 
 #include "base/check.h"
 #include "format/gltf_write.h"
-#include "transfer/draft.h"
 
-/* The animation: a shape is held, then moves on to the next. Seconds. */
+/* The animation, in seconds: how long a shape stays, and how long the way to the next one takes. */
 static const double HOLD = 0.5, MOVE = 1.5;
 
 typedef struct packer {
@@ -40,7 +41,7 @@ static orb_status add_accessor(packer *pack, const void *bytes, size_t size, int
   return orb_buffer_append(pack->ctx, &pack->binary, bytes, size);
 }
 
-/* Adds count × components floats; bounded: with their least and greatest. */
+/* Adds count × components floats; bounded: with their minimum and maximum. */
 static orb_status add_floats(packer *pack, const float *values, int32_t count, int32_t components, int32_t target,
                              int bounded, int32_t *out) {
   ORB_TRY(add_accessor(pack, values, (size_t)count * (size_t)components * sizeof *values, count, components,
@@ -87,7 +88,7 @@ static orb_status add_positions(packer *pack, const orb_draft_part *part, const 
   return add_floats(pack, pack->scratch, part->vertex_count, 3, ORB_GLTF_ARRAY_BUFFER, 1, out);
 }
 
-/* The values of a wedged attribute, minus those of another where `from` is given. */
+/* Adds the values of a wedged attribute, minus those of `from` unless it is NULL. */
 static orb_status add_wedges(packer *pack, const orb_draft_part *part, const orb_wedges *wedges, const orb_wedges *from,
                              int32_t *out) {
   const int32_t *triangles = pack->draft->supermesh->triangles;
@@ -133,8 +134,8 @@ static orb_status add_part(packer *pack, const orb_draft_part *part, orb_gltf_pr
   return ORB_OK;
 }
 
-/* The frames that the animation shows one after another, each at its time: shape 0, …, N − 1, …, 0, a shape held
- * before it moves on, in-betweens evenly on the way. Returns how many; frames and times may be NULL. */
+/* The frames of the animation and their times: shapes 0, …, N − 1, …, 0; each shape stays before it moves on, and the
+ * in-betweens are spread evenly over the way. Returns how many there are; frames and times may both be NULL. */
 static int32_t key_frames(const orb_draft *draft, int32_t *frames, double *times) {
   int32_t count = 0, legs = 2 * (draft->shape_count - 1);
   int32_t steps = draft->frame_count > draft->shape_count ? draft->options->path_steps : 0;
@@ -159,7 +160,7 @@ static orb_status add_animation(packer *pack, orb_gltf_scene *scene) {
   int32_t keys = key_frames(draft, NULL, NULL), targets = draft->frame_count - 1;
   int32_t *frames = ORB_NEW(pack->ctx, int32_t, keys);
   double *times = ORB_NEW(pack->ctx, double, keys);
-  float *values = ORB_NEW0(pack->ctx, float, (int64_t)keys *targets);
+  float *values = ORB_NEW0(pack->ctx, float, ((int64_t)keys * targets));
   float *seconds = ORB_NEW(pack->ctx, float, keys);
   orb_status status = frames && times && values && seconds ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
@@ -190,7 +191,7 @@ static const char *image_kind(const orb_image *image) {
                                                                                                           : NULL;
 }
 
-/* Materials with their images; an image that is neither PNG nor JPEG is left out. With none, a plain one. */
+/* Adds the materials with their images, except images that are neither PNG nor JPEG. Without materials: a plain one. */
 static orb_status add_materials(packer *pack, orb_gltf_scene *scene, orb_material *materials, orb_gltf_image *images) {
   const orb_mesh *mesh = &pack->draft->shapes[0].mesh;
   scene->materials = materials;
@@ -236,7 +237,7 @@ static orb_status add_materials(packer *pack, orb_gltf_scene *scene, orb_materia
   return ORB_OK;
 }
 
-/* What mesh.extras says beside targetNames. */
+/* The members of mesh.extras besides targetNames. */
 static int32_t make_extras(const orb_asset_facts *facts, const orb_draft *draft, orb_gltf_extra extras[4]) {
   int32_t count = 0;
   extras[count++] = (orb_gltf_extra){"morphedAttributes", NULL, facts->morphed_attributes};
@@ -283,7 +284,7 @@ static orb_status write_scene(packer *pack, orb_gltf_scene *scene, orb_gltf_prim
   return orb_gltf_write(pack->ctx, scene, &pack->binary, out);
 }
 
-/* The targets' names: the further shapes', made unique, then the in-betweens'. */
+/* The names of the targets: first of the later shapes, made unique, then of the in-betweens. */
 static void make_names(const orb_draft *draft, const char *const *names, char (*texts)[2 * ORB_NAME_MAX + 32],
                        const char **out) {
   int32_t shapes = draft->shape_count, steps = draft->options->path_steps;

@@ -1,11 +1,14 @@
-/* In-between frames along the as-rigid-as-possible path of each pair of neighbours. */
+/* In-between frames along the as-rigid-as-possible path between each two successive shapes. */
+#include "transfer/path.h"
+
 #include <string.h>
 
 #include "base/check.h"
 #include "transfer/arap.h"
-#include "transfer/draft.h"
 
-/* One attribute between shapes a and b at t. path NULL: a straight blend. */
+static const float SAME = 1e-6f; /* values of one vertex that differ by less are one: the rounding of the blend */
+
+/* One attribute between shapes a and b at t. path NULL: a linear blend. */
 typedef struct between {
   const orb_draft *draft;
   const orb_arap *path;
@@ -51,7 +54,7 @@ static orb_status blend_wedges(orb_context *ctx, const between *job, orb_wedges 
     int32_t v = supermesh->triangles[h];
     blend_value(job, v, orb_wedge_of(job->a, supermesh->triangles, h), orb_wedge_of(job->b, supermesh->triangles, h),
                 value);
-    ORB_GO(status, orb_wedges_set(ctx, out, v, h, value, 1e-6f, &chain), done);
+    ORB_GO(status, orb_wedges_set(ctx, out, v, h, value, SAME, &chain), done);
   }
 done:
   orb_free(ctx, chain.next);

@@ -1,7 +1,7 @@
 /* Positions of a shape at the places of a supermesh. */
 #include "orbmorph/transfer.h"
 
-enum { GRAIN = 8192 };
+enum { GRAIN = 8192 }; /* places a thread takes at a time */
 
 typedef struct position_job {
   const orb_mesh *mesh;
@@ -19,7 +19,7 @@ static void position_body(void *arg, int64_t begin, int64_t end, int thread) {
     out[0] = out[1] = out[2] = 0;
     for (int k = 0; k < 3; k++) {
       if (place->at[k] == 0) {
-        continue; /* so that a place at a vertex gives that vertex bit for bit */
+        continue; /* a place at a vertex then gives that vertex bit for bit */
       }
       const double *p = job->mesh->positions + 3 * (int64_t)corner[k];
       for (int c = 0; c < 3; c++) {

@@ -1,13 +1,16 @@
 /* From corners to the vertices of the file: a vertex is a supermesh vertex, a material and one value of each wedged
- * attribute. Corners that agree in all share a vertex, so a smooth mesh of one material keeps the supermesh's vertices.
- */
+ * attribute. Corners that agree in all of these share a vertex, so a smooth mesh of one material keeps the supermesh's
+ * vertices. */
+#include "transfer/split.h"
+
 #include <string.h>
 
 #include "base/check.h"
-#include "transfer/draft.h"
 #include "transfer/order.h"
 
-/* The attributes that can split a vertex. */
+enum { CHECK_EVERY = 16384 }; /* triangles between two checks for cancellation */
+
+/* The attributes that can split a vertex: per corner, the number of its value. */
 typedef struct stream_list {
   int32_t count;
   const int32_t **of_corner;
@@ -53,8 +56,8 @@ static int32_t material_of(const orb_draft *draft, int64_t triangle) {
   return material >= 0 && material < mesh->material_count ? material : 0;
 }
 
-/* Fills a part that has its material and counts' upper bounds. first, next: scratch chains of the part's vertices over
- * one supermesh vertex; first is all −1 before and after. */
+/* Fills a part whose material is set and whose arrays are large enough. first, next: linked lists of the part's
+ * vertices that stand for one supermesh vertex; first is all −1 before and after. */
 static orb_status fill_part(orb_context *ctx, const orb_draft *draft, const stream_list *list, orb_draft_part *part,
                             int32_t *first, int32_t *next) {
   const int32_t *triangles = draft->supermesh->triangles;
@@ -83,7 +86,7 @@ static orb_status fill_part(orb_context *ctx, const orb_draft *draft, const stre
       }
       part->indices[index++] = (uint32_t)found;
     }
-    if ((t & 0x3fff) == 0) {
+    if (t % CHECK_EVERY == 0) {
       ORB_TRY(orb_context_check(ctx));
     }
   }
@@ -99,7 +102,7 @@ static orb_status order_part(orb_context *ctx, orb_draft_part *part) {
   orb_status status = ORB_OK;
   uint32_t *remap = ORB_NEW(ctx, uint32_t, vertex_count);
   int32_t *corners = ORB_NEW(ctx, int32_t, vertex_count);
-  /* meshoptimizer's own scratch lies outside the context: about 60 bytes a triangle, held here meanwhile. */
+  /* meshoptimizer allocates outside the context, about 60 bytes a triangle: reserve as much from its budget. */
   void *held = orb_alloc(ctx, (size_t)part->triangle_count, 60);
   if (!remap || !corners || !held) {
     status = ORB_E_NO_MEMORY;
@@ -124,7 +127,7 @@ done:
   return status;
 }
 
-/* Makes a part for each material that is used, with room for its triangles. */
+/* Allocates a part for each material that is used. */
 static orb_status make_parts(orb_context *ctx, orb_draft *draft) {
   int32_t materials = draft->shapes[0].mesh.material_count > 0 ? draft->shapes[0].mesh.material_count : 1;
   int32_t *used = ORB_NEW0(ctx, int32_t, materials);

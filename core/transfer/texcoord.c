@@ -1,20 +1,21 @@
 /* Texture coordinates at the corners of a supermesh.
  *
  * A triangle that blends coordinates from both sides of a seam shows the whole texture between them, smeared. So each
- * supermesh triangle keeps to the side on which its centre lies: from the centre one walks straight on the sphere, from
- * input triangle to input triangle, to each corner; where that way meets a seam (of coordinates or materials) it ends,
- * and the corner gets the coordinates of the point of the seam. The texture there is squeezed by less than a triangle.
- */
+ * supermesh triangle keeps to the side on which its centre lies: a walk leads straight on the sphere from the centre to
+ * each corner, from input triangle to input triangle. Where it meets a seam (of coordinates or materials) it ends, and
+ * the corner gets the coordinates of that point of the seam. The texture there is squeezed by less than a triangle. */
+#include "transfer/texcoord.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
-#include "transfer/draft.h"
 
-enum { GRAIN = 512, MAX_STEPS = 100000 };
-static const float SAME = 1e-5f; /* coordinates nearer than this are one: a fraction of a texel */
+enum { GRAIN = 512 };            /* triangles a thread takes at a time */
+enum { MAX_STEPS = 100000 };     /* of a walk, so that rounding cannot make it endless */
+static const float SAME = 1e-5f; /* coordinates that differ by less are one: a fraction of a texel */
 
 typedef struct texcoord_job {
   orb_context *ctx;
@@ -84,7 +85,7 @@ static int is_seam(const texcoord_job *job, int32_t h) {
          !same_texcoord(mesh->texcoords, h, orb_next(g)) || !same_texcoord(mesh->texcoords, orb_next(h), g);
 }
 
-/* The edge of triangle t by which the straight way from m to p leaves it, −1 if p lies inside. */
+/* The edge over which the straight way from m to p leaves triangle t; −1 if p lies inside. */
 static int32_t exit_edge(const texcoord_job *job, int32_t t, const double m[3], const double p[3]) {
   int32_t out[3];
   int count = 0;
@@ -99,8 +100,8 @@ static int32_t exit_edge(const texcoord_job *job, int32_t t, const double m[3], 
   if (count == 1) {
     return out[0];
   }
-  /* Beyond two edges: the corner that they share is left or right of the way. Seen from inside, edges run from right to
-   * left, so the edge that ends at the corner lies to its right. */
+  /* p lies beyond two edges, so the corner that they share decides: it is left or right of the way. Seen from inside,
+   * edges run from right to left, so the edge that ends at the corner lies to its right. */
   int32_t ends = orb_next(out[0]) == out[1] ? out[0] : out[1];
   int32_t begins = ends == out[0] ? out[1] : out[0];
   return orb_orient(m, p, point_of(job, begins)) > 0 ? ends : begins;

@@ -1,10 +1,9 @@
 /* Attributes at the corners of a supermesh, for attributes that a triangle may blend: normals and colours.
  *
  * A place strictly inside an input triangle has one value. A place on an input edge or at an input vertex has one value
- * for each side of the seams that run through it; a corner of a supermesh triangle takes the value of the input
- * triangle that its own triangle points into, told by exact orientations on the sphere: on an edge, the side on which
- * the triangle's centroid lies; at a vertex, the sector of the fan that holds the centroid's direction.
- */
+ * for each side of the seams through it. A corner of a supermesh triangle takes the value of the input triangle that
+ * its own triangle points into, by exact orientations on the sphere: on an edge, the side on which the triangle's
+ * centroid lies; at a vertex, the sector of the fan that holds the centroid's direction. */
 #include "transfer/wedge.h"
 
 #include <math.h>
@@ -15,21 +14,27 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { MAX_WIDTH = 4, GRAIN = 4096 };
-static const double ON_EDGE = 1e-9; /* a barycentric coordinate below this counts as zero */
+enum { MAX_WIDTH = 4 };       /* red, green, blue, alpha */
+enum { GRAIN = 4096 };        /* vertices a thread takes at a time */
+enum { CHECK_EVERY = 65536 }; /* corners between two checks for cancellation */
+/* Values of one vertex that differ by less are one: below what 8 bits a channel, or a normal on a screen, can show. */
+static const float SAME = 1e-6f;
+static const double NORMAL_SEAM = 0.01; /* half a degree: rounded normals of one smooth vertex differ by that */
+static const double COLOR_SEAM = 1e-3;  /* a quarter of a step of 8 bits */
+static const double ON_EDGE = 1e-9;     /* a barycentric coordinate below this counts as zero */
 
 typedef struct wedge_job {
   const orb_supermesh *supermesh;
   const orb_aligned_shape *shape;
   const orb_place *places;
   const int32_t *twin;         /* NULL: the attribute has no seam anywhere */
-  const float *corner_values;  /* width a corner of the input, or NULL */
-  const double *vertex_values; /* width a vertex of the input, where corner_values is NULL or is zero */
+  const float *corner_values;  /* `width` numbers per corner of the input, or NULL */
+  const double *vertex_values; /* `width` numbers per vertex of the input, used where corner_values is NULL or zero */
   int32_t width;
-  int unit;         /* a normal: to be scaled to unit length */
-  double tolerance; /* values closer than this are one */
+  int unit;         /* the values are normals, to be scaled to unit length */
+  double tolerance; /* values of the input that differ by at most this make no seam */
   orb_wedges *out;
-  unsigned char *seamed; /* a supermesh vertex: its corners may differ */
+  unsigned char *seamed; /* per supermesh vertex: its corners may differ */
 } wedge_job;
 
 /* The attribute at corner h of the input. */
@@ -87,7 +92,7 @@ static void interpolate(const wedge_job *job, const orb_place *place, float *out
   store(job, sum, place->triangle, out);
 }
 
-/* The corner at which a place sits, −1 if it is at no vertex; *edge the half-edge that it lies on, −1 if on none. */
+/* The corner of its triangle at which a place lies, or −1; *edge: the half-edge that it lies on, or −1. */
 static int place_kind(const orb_place *place, int32_t *edge) {
   int zero[3], zeros = 0;
   for (int k = 0; k < 3; k++) {
@@ -105,7 +110,7 @@ static int place_kind(const orb_place *place, int32_t *edge) {
   return -1;
 }
 
-/* Whether the fan of corner h holds two values. */
+/* Whether the corners at the vertex of corner h have different values. */
 static int fan_differs(const wedge_job *job, int32_t h) {
   int32_t g = job->twin[orb_prev(h)];
   while (g != h) {
@@ -262,7 +267,7 @@ orb_status orb_wedges_set(orb_context *ctx, orb_wedges *out, int32_t vertex, int
   return ORB_OK;
 }
 
-/* The corners, after the vertices: serial, in the order of corners, for only few vertices lie on seams. */
+/* The corners, after the vertices. Serial and in the order of corners; only few vertices lie on seams. */
 static orb_status split_corners(orb_context *ctx, wedge_job *job) {
   const orb_supermesh *supermesh = job->supermesh;
   orb_wedge_chain chain = {0};
@@ -282,8 +287,8 @@ static orb_status split_corners(orb_context *ctx, wedge_job *job) {
     float value[MAX_WIDTH];
     centroid(supermesh, h / 3, m);
     corner_value(job, &job->places[v], m, value);
-    ORB_GO(status, orb_wedges_set(ctx, job->out, v, h, value, 1e-6f, &chain), done);
-    if (h % 65536 == 0) {
+    ORB_GO(status, orb_wedges_set(ctx, job->out, v, h, value, SAME, &chain), done);
+    if (h % CHECK_EVERY == 0) {
       ORB_GO(status, orb_context_check(ctx), done);
     }
   }
@@ -356,7 +361,7 @@ orb_status orb_wedge_normals(orb_context *ctx, const orb_supermesh *supermesh, c
     job.vertex_values = smooth;
     job.width = 3;
     job.unit = 1;
-    job.tolerance = 0.01; /* half a degree: what rounded normals of one smooth vertex differ by */
+    job.tolerance = NORMAL_SEAM;
     status = make_wedges(ctx, &job);
   }
   orb_free(ctx, smooth);
@@ -371,7 +376,7 @@ orb_status orb_wedge_colors(orb_context *ctx, const orb_supermesh *supermesh, co
   }
   job.corner_values = shape->mesh.colors;
   job.width = 4;
-  job.tolerance = 1e-3;
+  job.tolerance = COLOR_SEAM;
   return make_wedges(ctx, &job);
 }
 

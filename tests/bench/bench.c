@@ -8,6 +8,8 @@
 #include "api/json.h"
 #include "bench.h"
 
+#define WORD(id, name) name,
+#define LISTED(id, name) " " name
 static const char usage_text[] =
     "usage: orbmorph-bench embed [options] FILE...\n"
     "       orbmorph-bench merge [options] A B [C...]\n"
@@ -28,7 +30,7 @@ static const char usage_text[] =
     "  --out FILE.glb    merge: write the asset\n"
     "  --align M         pin (default with landmarks), rbf, rotate or auto (default without)\n"
     "  --align-preset P  default, fast (default of landmarks) or quality\n"
-    "  --remesh M        adaptive (default), overlay, subdivision or convex-hull\n"
+    "  --remesh M        one of:" ORB_REMESH_METHODS(LISTED) " (adaptive)\n"
     "  --tolerance X     adaptive: relative to the diagonal (0.001)\n"
     "  --max-triangles N\n"
     "  --landmarks FILE  a landmarks array, alone or as the member \"landmarks\"\n"
@@ -109,7 +111,7 @@ static int interpret(const texts *t, bench_options *o) {
   static const char *const presets[] = {"default", "fast", "quality", NULL};
   static const char *const cpus[] = {"auto", "plain", "avx2", "avx512", NULL};
   static const char *const aligns[] = {"pin", "rbf", "rotate", "auto", NULL};
-  static const char *const remeshes[] = {"adaptive", "overlay", "subdivision", "convex-hull", NULL};
+  static const char *const remeshes[] = {ORB_REMESH_METHODS(WORD) NULL};
   int word = 0;
   long number = 0;
   if (t->options && !read_options(t->options, &o->embed)) {

@@ -211,7 +211,6 @@ static int run_once(orb_context *ctx, const remesh_run *run, int repeat) {
   orb_buffer asset = {0};
   api_text line = {0};
   const char *names[API_SHAPES_MAX];
-  static const char *const methods[] = {"adaptive", "overlay", "subdivision", "convex-hull"};
   int64_t input = 0, largest = 0;
   for (int32_t s = 0; s < run->count; s++) {
     int32_t triangles = run->shape[s].mesh.triangle_count;
@@ -231,7 +230,7 @@ static int run_once(orb_context *ctx, const remesh_run *run, int repeat) {
   }
   double measured = orb_clock();
   api_json_open(&line, '{');
-  api_json_member_string(&line, "remesh", methods[run->options->merge.remesh.method]);
+  api_json_member_string(&line, "remesh", orb_remesh_method_name(run->options->merge.remesh.method));
   api_json_member_integer(&line, "vertices", mesh.vertex_count);
   api_json_member_integer(&line, "triangles", mesh.triangle_count);
   api_json_member_integer(&line, "input_triangles", input);

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "numeric/vec3.h"
-#include "remesh/hull.h"
+#include "remesh/qhull.h"
 #include "support_sphere.h"
 
 static orb_context *make_context(int threads, size_t memory) {
@@ -176,9 +176,9 @@ static void refusals(void **state) {
   int32_t *triangles, count;
   sphere_shape(ctx, SPHERE_ICO, 2, 0, 1, &shape);
   assert_int_equal(hull(ctx, &shape, 1, 100, &m), ORB_E_BAD_OPTION); /* 162 vertices need 320 triangles */
-  assert_int_equal(orb_hull(ctx, shape.points, ORB_HULL_POINTS_MAX + 1, &triangles, &count), ORB_E_TOO_LARGE);
+  assert_int_equal(orb_qhull(ctx, shape.points, ORB_QHULL_POINTS_MAX + 1, &triangles, &count), ORB_E_TOO_LARGE);
   double flat[12] = {1, 0, 0, 0, 1, 0, -1, 0, 0, 0, -1, 0}; /* in one plane */
-  assert_int_equal(orb_hull(ctx, flat, 4, &triangles, &count), ORB_E_NOT_CERTIFIED);
+  assert_int_equal(orb_qhull(ctx, flat, 4, &triangles, &count), ORB_E_NOT_CERTIFIED);
   orb_context_cancel(ctx);
   assert_int_equal(hull(ctx, &shape, 1, 0, &m), ORB_E_CANCELLED);
   sphere_shape_free(ctx, &shape);

@@ -13,12 +13,12 @@ typedef enum orb_animation { ORB_ANIMATION_PINGPONG = 0, ORB_ANIMATION_NONE } or
 typedef enum orb_path { ORB_PATH_LINEAR = 0, ORB_PATH_RIGID } orb_path;
 
 typedef struct orb_asset_options {
-  int normals; /* 1 */
+  int normals; /* write normals; 1 */
   orb_animation animation;
   orb_fit fit;
   orb_path path;
-  int32_t path_steps; /* rigid: in-between targets for each pair of neighbours, 3 */
-  int colors;         /* carry the later shapes' colours as morphed attributes */
+  int32_t path_steps; /* for ORB_PATH_RIGID: in-between targets for each pair of neighbours, 3 */
+  int colors;         /* also write the later shapes' colours, as morphed attributes; 0 */
 } orb_asset_options;
 void orb_asset_defaults(orb_asset_options *options);
 
@@ -26,36 +26,38 @@ void orb_asset_defaults(orb_asset_options *options);
 typedef struct orb_asset_facts {
   int32_t vertex_count; /* after splits for normals, seams and materials */
   int32_t triangle_count;
-  int32_t primitive_count;    /* one a material that is used */
-  int32_t target_count;       /* further shapes, then in-betweens */
-  int32_t morphed_attributes; /* of all targets together; a client need support only 8 at once */
-  int32_t nudged_vertices;    /* moved by units in the last place to keep them apart, see orb_asset_write() */
+  int32_t primitive_count;    /* one for each material that is used */
+  int32_t target_count;       /* later shapes, then in-betweens */
+  int32_t morphed_attributes; /* over all targets; glTF requires clients to support only 8 at once */
+  int32_t nudged_vertices;    /* moved by units in the last place to keep them distinct, see orb_asset_write() */
 } orb_asset_facts;
 
 /* Appends the GLB. names: shape_count names of the morph targets (the first names the mesh); equal names get a number.
- * The base is the first shape; targets are the further shapes in their order, then in-betweens. facts may be NULL.
+ * The base is the first shape; the targets are the later shapes in their order, then the in-betweens. facts may be
+ * NULL.
  *
- * Normals: the file's where it has them, its hard edges kept by splitting vertices; else angle-weighted vertex normals
- * of the input surface, interpolated at each place. Every vertex that is split keeps bit-equal POSITION and deltas.
- * Texture coordinates, materials and their images are those of the first shape.
+ * Normals: those of the file if it has any, with its hard edges kept by splitting vertices; else angle-weighted vertex
+ * normals of the input surface, interpolated at each place. The copies of a split vertex have bit-equal POSITION and
+ * deltas. Texture coordinates, materials and their images are those of the first shape.
  *
- * Two different supermesh vertices that would coincide in every shape after rounding to float32 are kept apart: the
- * later one that is no landmark moves on the first shape by the fewest units in the last place of its largest
- * coordinates (at most 16). ORB_E_NOT_CERTIFIED where that does not suffice.
+ * Two supermesh vertices that would coincide in every shape after rounding to float32 are kept distinct: the later one
+ * that is no landmark moves on the first shape by the fewest units in the last place of its largest coordinates, at
+ * most
+ * 16. ORB_E_NOT_CERTIFIED where that does not suffice.
  *
  * Errors: ORB_E_BAD_OPTION, ORB_E_TOO_LARGE (4 GiB), ORB_E_NO_MEMORY. Stage "write". O(V·N). */
 ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh,
                                           const orb_aligned_shape *shapes, const char *const *names,
                                           const orb_asset_options *options, orb_asset_facts *facts, orb_buffer *out);
 
-/* Where each shape was moved, as orb_asset_write() does: 16 doubles a shape, column-major as in glTF, that take the
- * shape's own coordinates to those of the asset. The identity for the first shape, and for all with ORB_FIT_NONE; else
- * a rotation, a shift and, with ORB_FIT_SIMILARITY, one scale. O(V·N). */
+/* How orb_asset_write() moves each shape: 16 doubles a shape, column-major as in glTF, which take the shape's own
+ * coordinates to those of the asset. The identity for the first shape, and for all with ORB_FIT_NONE; else a rotation,
+ * a translation and, with ORB_FIT_SIMILARITY, a uniform scale. O(V·N). */
 ORB_MUST_CHECK orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh,
                                                const orb_aligned_shape *shapes, orb_fit fit, double *out);
 
-/* The same, and which vertex of the supermesh each vertex of the file stands for: *vertices (of the context, the
- * caller's to free) has facts->vertex_count numbers, the vertices of the primitives one after another. */
+/* As orb_asset_write(), and maps each vertex of the file to its supermesh vertex: *vertices (allocated from the
+ * context, freed by the caller) has facts->vertex_count numbers, the vertices of the primitives one after another. */
 ORB_MUST_CHECK orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *supermesh,
                                                  const orb_aligned_shape *shapes, const char *const *names,
                                                  const orb_asset_options *options, orb_asset_facts *facts,

@@ -1,4 +1,4 @@
-/* The whole way from embedded shapes to the asset and its report: align, remesh, transfer, write. */
+/* From embedded shapes to the asset and its report: align, remesh, transfer, write. */
 #ifndef ORBMORPH_MERGE_H
 #define ORBMORPH_MERGE_H
 
@@ -19,17 +19,17 @@ typedef struct orb_merge_timings {
   double align, remesh, transfer, write, total; /* seconds */
 } orb_merge_timings;
 
-/* Distortion of the composed map from shape a to shape b, on the supermesh's triangles that are no slivers on either (a
- * height above a ninetieth or so of the longest side): a < b, all pairs up to four shapes, else neighbours in their
- * order. */
+/* Distortion of the composed map from shape a to shape b, a < b, on the supermesh's triangles that are no slivers on
+ * either (height at least about a ninetieth of the longest side). Up to four shapes: all pairs; more: neighbours in
+ * their order. */
 typedef struct orb_pair_report {
   int32_t a, b;
-  /* Its means have no bound: one triangle that collapses at one end only can carry them off. median and p99 do not
-   * care, and orb_alignment.energy is the mean with each triangle's value capped. */
+  /* Its means are unbounded: a single triangle that collapses at one end only can dominate them. median and p99 are
+   * robust, and orb_alignment.energy is the mean with each triangle's value capped. */
   orb_distortion distortion;
-  /* Share of the triangles that are turned in space, at either end, against the input surface: its smooth normals at
-   * their corners, and its face at their centre as well. Those of no area to speak of (1e-12 of the squared diagonal)
-   * do not count. */
+  /* Share of the triangles that are inverted on a or b: they face away from the input's smooth normals at their corners
+   * and from its face at their centre. Degenerate ones (twice the area at most 1e-12 of the squared
+   * diagonal) do not count. */
   double inverted_fraction;
 } orb_pair_report;
 
@@ -37,25 +37,25 @@ typedef struct orb_merge_result {
   orb_alignment alignment;
   orb_supermesh supermesh;
   orb_shape_report *shapes; /* shape_count */
-  /* landmark_count × shape_count: from the place asked for to the landmark's supermesh vertex, in
-   * units of each shape's diagonal. A landmark without a vertex: to where the supermesh has the sphere's point. NaN
-   * where the method keeps no vertex. */
+  /* landmark_count × shape_count: distance from the requested place to the landmark's supermesh vertex, in units of
+   * the shape's diagonal. For a landmark without a vertex, the distance to the place of its point of the sphere. */
   double *landmark_residuals;
-  /* found_count × shape_count: from each place that an alignment without landmarks found to where the supermesh has it,
-   * likewise. */
+  /* found_count × shape_count: the same for the landmarks that an alignment without landmarks found, measured to where
+   * the supermesh has their point of the sphere. */
   double *found_residuals;
   int32_t pair_count;
   orb_pair_report *pairs;
   orb_asset_facts asset_facts;
-  int32_t *asset_vertices; /* asset_facts.vertex_count: the supermesh vertex that each vertex of the asset stands for */
+  int32_t *asset_vertices; /* asset_facts.vertex_count: the supermesh vertex of each vertex of the asset */
   double *transforms;      /* shape_count × 16, see orb_asset_transforms() */
   orb_buffer asset;
   orb_merge_timings timings;
 } orb_merge_result;
 
-/* Merges shape_count ≥ 2 embedded shapes. Stages: "align", "remesh", "transfer", "write". Landmark `at` arrays as for
+/* Merges shape_count ≥ 2 embedded shapes. Stages: "align", "remesh", "transfer", "write". Landmark `at` arrays: see
  * orb_align(). names: shape_count names for the morph targets. Errors: those of its parts, and ORB_E_DEGENERATE for a
- * shape without a size that float32 could show, such as one whose vertices all lie in one place. */
+ * shape too small to show in float32, such as one whose vertices all coincide. On an error *out is zeroed; else free it
+ * with orb_merge_result_free(). */
 ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
                                     int32_t shape_count, const orb_landmark *landmarks, int32_t landmark_count,
                                     const orb_merge_options *options, orb_merge_result *out);

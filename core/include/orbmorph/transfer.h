@@ -1,4 +1,4 @@
-/* Transfer: attributes of every shape on the supermesh, and how far each reconstructed shape is from its input. */
+/* Transfer: the positions of every shape on the supermesh, and how far each reconstructed shape is from its input. */
 #ifndef ORBMORPH_TRANSFER_H
 #define ORBMORPH_TRANSFER_H
 
@@ -8,21 +8,21 @@
 extern "C" {
 #endif
 
-/* positions of shape s at every supermesh vertex: 3 a vertex. */
+/* The shape's positions at `count` places on it: 3 a place. */
 ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const orb_aligned_shape *shape,
                                                  const orb_place *places, int32_t count, double *out);
 
 /* How well shape s is reproduced; lengths in its own units. */
 typedef struct orb_shape_report {
-  double hausdorff;               /* proved bound both ways, NaN where none is proved */
-  double hausdorff_sampled;       /* two-sided, vertices, edge midpoints and face samples */
-  double rms;                     /* of the distance over both surfaces, each weighing the same */
-  double normal_mean, normal_p99; /* degrees between the surfaces' normals at matching points */
+  double hausdorff;               /* the supermesh's proved bound, both ways; NaN: none is proved */
+  double hausdorff_sampled;       /* both ways, at vertices, edge midpoints and face centres */
+  double rms;                     /* of the distance, over both surfaces with equal weight */
+  double normal_mean, normal_p99; /* degrees between the surfaces' normals at nearest points */
   double diagonal;
   double min_area_ratio; /* the smallest supermesh triangle on this shape over the mean one */
 } orb_shape_report;
-/* Sampled both ways, in parallel, the same result for any number of threads. hausdorff is the supermesh's error bound.
- * O(F log F) for F triangles of both surfaces. */
+/* Samples both ways, in parallel; the result does not depend on the number of threads. O(F log F) for F triangles of
+ * both surfaces. */
 ORB_MUST_CHECK orb_status orb_shape_measure(orb_context *ctx, const orb_aligned_shape *shape,
                                             const orb_supermesh *supermesh, int32_t shape_index, orb_shape_report *out);
 

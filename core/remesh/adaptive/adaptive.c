@@ -1,53 +1,73 @@
-/* The adaptive method: as few triangles as keep every shape within the tolerance, the bound proved (see match.h).
+/* The adaptive method: as few triangles as keep every shape within the tolerance, the bound proved (placed/bound.h).
  *
- * The start holds every vertex of every shape; edges that stray are turned or split until the bound holds. Where that
- * comes to no end, the overlay of all shapes, which is exact, is the start instead. Where the shapes are wound about
- * each other so much that the overlay is huge, the start is the overlay of reduced shapes (see match_start.c), and
- * edges are only collapsed and turned: what holds the tolerance there has many times the triangles of the shapes in any
- * case, and the rest would take minutes for a few per cent. From then on no step leaves the tolerance. In rounds: edges
- * are collapsed, holes filled anew and neighbours merged, edges turned for well-shaped triangles, and vertices moved to
- * where the edges stray less, which makes room for the next round. Nor does any step leave more triangles turned in
- * space than it found; what the start had of them is mended in the first round, and if that leaves too many, the first
- * round is made again from the overlay, there or everywhere: the other rounds, which take most of the time, are made
- * but once. Where max_triangles asks for fewer triangles, the tolerance is raised step by step until they suffice. */
+ * The start holds every vertex of every shape. Edges that deviate are flipped or split until the bound holds. Where
+ * that does not end, the method starts from the overlay of all shapes instead, which is exact. Where the shapes are
+ * wound about each other so much that the overlay is huge, it starts from the overlay of reduced shapes (start.h), and
+ * only collapses and flips edges: what meets the tolerance there has many times the triangles of the shapes in any
+ * case, and the other steps would take minutes for a few per cent.
+ *
+ * From then on no step leaves the tolerance, and none leaves more inverted triangles than it found. Each round
+ * collapses edges, fills holes anew, merges neighbours, flips edges for well-shaped triangles, and moves vertices to
+ * where the edges deviate less, which makes room for the next round. The first round also repairs the inverted
+ * triangles of the start. If too many remain, the first round is repeated from the overlay, around them or everywhere;
+ * the other rounds, which take most of the time, are made only once. Where max_triangles asks for fewer triangles, the
+ * tolerance is raised step by step until they suffice. */
+#include "remesh/adaptive/adaptive.h"
+
 #include <math.h>
 
 #include "base/check.h"
-#include "remesh/adaptive/match.h"
+#include "remesh/adaptive/collapse.h"
+#include "remesh/adaptive/merge.h"
+#include "remesh/adaptive/move.h"
+#include "remesh/adaptive/repair.h"
+#include "remesh/adaptive/resolve.h"
+#include "remesh/adaptive/start.h"
+#include "remesh/placed/export.h"
+#include "remesh/placed/flip.h"
+#include "remesh/placed/form.h"
+#include "remesh/placed/refine.h"
 
-enum { HOLDS = 32 };
-/* Of how many triangles one may be turned after the first round, and once that is mended; one of how many is many; the
- * most work for a start from the overlay. */
-enum { FEW = 3000, SOME = 1000, MANY = 100, OVERLAY_MOST = 120000 };
-/* The overlay is huge, and the shapes wound about each other: it has so many triangles, and so many times theirs for
- * each shape after the first (shapes that lie well have four or five times theirs for each). */
+enum { REFINEMENTS_MOST = 32 }; /* after so many the net counts as one that refinement cannot finish */
+/* More inverted triangles than one in FEW after the first round are worth a local overlay; if more than one in SOME
+ * remain after it, or there was more than one in MANY, the overlay of everything is. Larger numbers spend more time on
+ * fewer inverted triangles. */
+enum { FEW = 3000, SOME = 1000, MANY = 100 };
+/* Shapes times triangles up to which a second start, from the overlay, is affordable. */
+enum { OVERLAY_MOST = 120000 };
+/* The overlay is huge, and the shapes are wound about each other, if it has more than HUGE_OVERLAY triangles and more
+ * than HUGE_GROWTH times those of all shapes for each shape after the first. Well aligned shapes have four or five
+ * times theirs for each. */
 enum { HUGE_OVERLAY = 600000, HUGE_GROWTH = 12 };
+/* Relative to the diagonal: from this tolerance on, fewer triangles matter more than inverted ones and slivers. */
+static const double STRICT_MOST = 0.05;
+/* Relative to the diagonal: no distance on a shape exceeds 1, so more tolerance would not help. */
+static const double TOLERANCE_MOST = 4;
 
-/* Later rounds gain a few per cent each. Large meshes, or many shapes, do without: their triangles are small against
- * the tolerance, and time counts. */
+/* Later rounds gain a few per cent each and take the most time: the more triangles and shapes, the fewer rounds. */
 static int rounds_for(int64_t triangles, int32_t shapes) {
   int64_t work = triangles * shapes / 2;
   return work < 25000 ? 10 : work < 60000 ? 4 : 2;
 }
 
-/* Collapses, and mends turned triangles while there are vertices left to do it with. */
-static orb_status first_round(orb_context *ctx, orb_match *match, double limit2, int64_t target, int strict) {
-  ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, 0));
-  ORB_TRY(orb_match_compact(ctx, match));
-  ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
-  return strict ? orb_match_mend(ctx, match, limit2) : ORB_OK;
+/* Collapses first, then repairs inverted triangles, while enough vertices are left for that. */
+static orb_status first_round(orb_context *ctx, orb_placed_net *placed, double limit2, int64_t target, int strict) {
+  ORB_TRY(orb_adaptive_collapse(ctx, placed, limit2, target, strict, 0));
+  ORB_TRY(orb_placed_compact(ctx, placed));
+  ORB_TRY(orb_placed_flip_all(ctx, placed, limit2, 0));
+  return strict ? orb_adaptive_repair(ctx, placed, limit2) : ORB_OK;
 }
 
-/* The rounds after it, until they gain little. */
-static orb_status later_rounds(orb_context *ctx, orb_match *match, double limit2, int64_t target, int strict,
+/* The rounds after the first, until one gains less than a per cent. */
+static orb_status later_rounds(orb_context *ctx, orb_placed_net *placed, double limit2, int64_t target, int strict,
                                int rounds) {
-  int64_t before = orb_match_live(match), after = before;
+  int64_t before = orb_placed_live(placed), after = before;
   for (int round = 1; round < rounds && after > target; round++) {
-    ORB_TRY(orb_match_move_all(ctx, match, limit2, NULL));
-    ORB_TRY(orb_match_collapse(ctx, match, limit2, target, strict, 1));
-    ORB_TRY(orb_match_merge_all(ctx, match, limit2, target));
-    ORB_TRY(orb_match_turn_all(ctx, match, limit2, 0));
-    after = orb_match_live(match);
+    ORB_TRY(orb_adaptive_move_all(ctx, placed, limit2, NULL));
+    ORB_TRY(orb_adaptive_collapse(ctx, placed, limit2, target, strict, 1));
+    ORB_TRY(orb_adaptive_merge_all(ctx, placed, limit2, target));
+    ORB_TRY(orb_placed_flip_all(ctx, placed, limit2, 0));
+    after = orb_placed_live(placed);
     if ((before - after) * 100 < before) {
       break;
     }
@@ -56,26 +76,26 @@ static orb_status later_rounds(orb_context *ctx, orb_match *match, double limit2
   return ORB_OK;
 }
 
-/* Refines until nothing strays: splits of edges may leave items of the triangles beside them too far away, and edges
- * that found no room to be split among needles find it once the needles are gone. Where that does not come to an end
- * the overlay is to be the start instead: `crept`. */
-static orb_status hold(orb_context *ctx, orb_match *match, double tolerance) {
+/* Refines until nothing deviates. It takes several calls, because splits may leave items too far from the triangles
+ * beside them, and because edges between needles can be split only once the needles are gone. Sets placed->gave_up
+ * where that does not end: then the method must start from the overlay. */
+static orb_status refine_fully(orb_context *ctx, orb_placed_net *placed, double tolerance) {
   double limit2 = tolerance * tolerance;
-  int64_t strays = 1;
-  for (int i = 0; i < HOLDS && strays > 0 && !match->crept; i++) {
-    ORB_TRY(orb_match_refine(ctx, match, limit2, &strays));
-    if (strays > 0 && i % 4 == 3 && !match->crept) {
-      ORB_TRY(orb_match_turn_all(ctx, match, limit2, 1));
-      ORB_TRY(first_round(ctx, match, limit2, 0, 1));
+  int64_t deviating = 1;
+  for (int i = 0; i < REFINEMENTS_MOST && deviating > 0 && !placed->gave_up; i++) {
+    ORB_TRY(orb_placed_refine(ctx, placed, limit2, &deviating));
+    if (deviating > 0 && i % 4 == 3 && !placed->gave_up) {
+      ORB_TRY(orb_placed_flip_all(ctx, placed, limit2, 1));
+      ORB_TRY(first_round(ctx, placed, limit2, 0, 1));
     }
   }
-  match->crept |= strays > 0;
+  placed->gave_up |= deviating > 0;
   return ORB_OK;
 }
 
-static orb_status begin(orb_context *ctx, orb_match *match, double limit2) {
-  ORB_TRY(orb_match_turn_all(ctx, match, limit2, 1));
-  return first_round(ctx, match, limit2, 0, 1);
+static orb_status begin(orb_context *ctx, orb_placed_net *placed, double limit2) {
+  ORB_TRY(orb_placed_flip_all(ctx, placed, limit2, 1));
+  return first_round(ctx, placed, limit2, 0, 1);
 }
 
 static int64_t triangles_of(const orb_remesh_job *job) {
@@ -86,123 +106,123 @@ static int64_t triangles_of(const orb_remesh_job *job) {
   return inputs;
 }
 
-/* Where the first round leaves too many triangles turned: again from the overlay around them; or from all of the
- * overlay, unless that is too large, if they are very many or that has not helped. */
-static orb_status straighten(orb_context *ctx, const orb_remesh_job *job, orb_match *match, double tolerance,
-                             int is_overlay) {
-  int64_t turned = orb_match_turned(ctx, match), live = orb_match_live(match), inputs = triangles_of(job);
-  if (turned * FEW <= live) {
+/* Where the first round leaves too many triangles inverted, repeats it from the overlay around them; or, unless it is
+ * too large, from the whole overlay, if they are very many or the local overlay has not helped. */
+static orb_status reduce_inverted(orb_context *ctx, const orb_remesh_job *job, orb_placed_net *placed, double tolerance,
+                                  int is_overlay) {
+  int64_t inverted = orb_placed_count_inverted(ctx, placed), live = orb_placed_live(placed), inputs = triangles_of(job);
+  if (inverted * FEW <= live) {
     return ORB_OK;
   }
-  int may = !is_overlay && inputs * job->shape_count <= OVERLAY_MOST, anew = may && turned * MANY > live;
+  int may = !is_overlay && inputs * job->shape_count <= OVERLAY_MOST, anew = may && inverted * MANY > live;
   if (!anew) {
-    ORB_TRY(orb_match_resolve(ctx, match, tolerance * tolerance));
-    ORB_TRY(hold(ctx, match, tolerance));
-    if (!match->crept) {
-      ORB_TRY(begin(ctx, match, tolerance * tolerance));
-      int64_t left = orb_match_turned(ctx, match);
-      anew = may && left * 3 > turned * 2 && left * SOME > live;
+    ORB_TRY(orb_adaptive_resolve(ctx, placed, tolerance * tolerance));
+    ORB_TRY(refine_fully(ctx, placed, tolerance));
+    if (!placed->gave_up) {
+      ORB_TRY(begin(ctx, placed, tolerance * tolerance));
+      int64_t left = orb_placed_count_inverted(ctx, placed);
+      anew = may && left * 3 > inverted * 2 && left * SOME > live;
     }
   }
-  if (!anew && !match->crept) {
+  if (!anew && !placed->gave_up) {
     return ORB_OK;
   }
-  int needed = match->crept;
-  if (needed) { /* of no use: what it holds is room for the overlay */
-    orb_match_free(ctx, match);
+  int needed = placed->gave_up;
+  if (needed) { /* the net is useless: its memory serves the overlay */
+    orb_placed_free(ctx, placed);
   }
-  orb_status status = orb_match_start_from_overlay(ctx, job, match);
+  orb_status status = orb_adaptive_start_from_overlay(ctx, job, placed);
   if (status == ORB_E_NOT_CERTIFIED && !needed) {
-    orb_error_clear(ctx); /* what there is holds the bound, too, with more triangles turned */
+    orb_error_clear(ctx); /* the present net keeps the bound too, with more triangles inverted */
     return ORB_OK;
   }
-  return status == ORB_OK ? begin(ctx, match, tolerance * tolerance) : status;
+  return status == ORB_OK ? begin(ctx, placed, tolerance * tolerance) : status;
 }
 
-/* For shapes that are wound about each other: the whole of it, to a net within the tolerance. */
-static orb_status unwind(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_match *match) {
+/* For shapes that are wound about each other: all steps, to a net within the tolerance. */
+static orb_status remesh_wound(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_placed_net *placed) {
   double limit2 = tolerance * tolerance;
-  ORB_TRY(orb_match_start_from_reduced(ctx, job, limit2, match));
+  ORB_TRY(orb_adaptive_start_from_reduced(ctx, job, limit2, placed));
   orb_progress(ctx, "remesh", 0.3);
-  ORB_TRY(hold(ctx, match, tolerance));
-  if (match->crept) {
-    orb_match_free(ctx, match);
-    ORB_TRY(orb_match_start_from_overlay(ctx, job, match));
+  ORB_TRY(refine_fully(ctx, placed, tolerance));
+  if (placed->gave_up) {
+    orb_placed_free(ctx, placed);
+    ORB_TRY(orb_adaptive_start_from_overlay(ctx, job, placed));
   }
   orb_progress(ctx, "remesh", 0.4);
-  ORB_TRY(orb_match_collapse(ctx, match, limit2, 0, 1, 0));
-  ORB_TRY(orb_match_compact(ctx, match));
-  return orb_match_turn_all(ctx, match, limit2, 0);
+  ORB_TRY(orb_adaptive_collapse(ctx, placed, limit2, 0, 1, 0));
+  ORB_TRY(orb_placed_compact(ctx, placed));
+  return orb_placed_flip_all(ctx, placed, limit2, 0);
 }
 
-/* From a start within the tolerance, by steps none of which leaves it. */
-static orb_status settle(orb_context *ctx, const orb_remesh_job *job, orb_match *match, double tolerance,
-                         int is_overlay) {
+/* All rounds, from a start within the tolerance. */
+static orb_status all_rounds(orb_context *ctx, const orb_remesh_job *job, orb_placed_net *placed, double tolerance,
+                             int is_overlay) {
   double limit2 = tolerance * tolerance;
-  int rounds = rounds_for(orb_match_live(match), match->shape_count);
-  ORB_TRY(begin(ctx, match, limit2));
-  ORB_TRY(straighten(ctx, job, match, tolerance, is_overlay));
+  int rounds = rounds_for(orb_placed_live(placed), placed->shape_count);
+  ORB_TRY(begin(ctx, placed, limit2));
+  ORB_TRY(reduce_inverted(ctx, job, placed, tolerance, is_overlay));
   orb_progress(ctx, "remesh", 0.4);
-  ORB_TRY(later_rounds(ctx, match, limit2, 0, 1, rounds));
+  ORB_TRY(later_rounds(ctx, placed, limit2, 0, 1, rounds));
   orb_progress(ctx, "remesh", 0.8);
-  ORB_TRY(orb_match_mend(ctx, match, limit2));
-  return first_round(ctx, match, limit2, 0, 1);
+  ORB_TRY(orb_adaptive_repair(ctx, placed, limit2));
+  return first_round(ctx, placed, limit2, 0, 1);
 }
 
-/* Fewer triangles than `most`, by as little more tolerance as it takes. */
-static orb_status relax(orb_context *ctx, orb_match *match, double tolerance, int64_t most) {
-  while (orb_match_live(match) > most && tolerance < 4) {
-    tolerance *= 1.25;
+/* Raises the tolerance, in steps of a quarter, until at most `most` triangles live. */
+static orb_status reduce_to(orb_context *ctx, orb_placed_net *placed, double tolerance, int64_t most) {
+  while (orb_placed_live(placed) > most && tolerance < TOLERANCE_MOST) {
+    tolerance *= 1.25; /* smaller steps take longer and end nearer to the least tolerance */
     double limit2 = tolerance * tolerance;
-    int strict = tolerance < 0.05, rounds = rounds_for(orb_match_live(match), match->shape_count);
-    ORB_TRY(first_round(ctx, match, limit2, most, strict));
-    ORB_TRY(later_rounds(ctx, match, limit2, most, strict, rounds));
+    int strict = tolerance < STRICT_MOST, rounds = rounds_for(orb_placed_live(placed), placed->shape_count);
+    ORB_TRY(first_round(ctx, placed, limit2, most, strict));
+    ORB_TRY(later_rounds(ctx, placed, limit2, most, strict, rounds));
   }
-  if (orb_match_live(match) > most) {
+  if (orb_placed_live(placed) > most) {
     return orb_fail(ctx, ORB_E_BAD_OPTION, "The shapes and landmarks need more than max_triangles = %lld; raise it.",
                     (long long)most);
   }
   return ORB_OK;
 }
 
-/* To a net within the tolerance, as small as it can well be made. */
-static orb_status approach(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_match *match) {
+/* Makes the net within the tolerance. */
+static orb_status remesh_within(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_placed_net *placed) {
   int64_t overlay = 0, others = job->shape_count - 1;
-  if (others > 0) { /* one shape alone is its own overlay, and wound about nothing */
-    ORB_TRY(orb_match_overlay_size(ctx, job, &overlay));
+  if (others > 0) { /* a single shape is its own overlay */
+    ORB_TRY(orb_adaptive_overlay_size(ctx, job, &overlay));
   }
   if (overlay > HUGE_OVERLAY && overlay > HUGE_GROWTH * others * triangles_of(job)) {
-    orb_status status = unwind(ctx, job, tolerance, match);
+    orb_status status = remesh_wound(ctx, job, tolerance, placed);
     if (status != ORB_E_NOT_CERTIFIED) {
       return status;
     }
-    orb_error_clear(ctx); /* the other way needs no overlay, perhaps */
-    orb_match_free(ctx, match);
+    orb_error_clear(ctx); /* the other way may do without an overlay */
+    orb_placed_free(ctx, placed);
   }
-  ORB_TRY(orb_match_create(ctx, job, match));
+  ORB_TRY(orb_placed_create(ctx, job, placed));
   orb_progress(ctx, "remesh", 0.15);
-  ORB_TRY(orb_match_turn_all(ctx, match, INFINITY, 1));
-  ORB_TRY(hold(ctx, match, tolerance));
-  int is_overlay = match->crept;
+  ORB_TRY(orb_placed_flip_all(ctx, placed, INFINITY, 1));
+  ORB_TRY(refine_fully(ctx, placed, tolerance));
+  int is_overlay = placed->gave_up;
   if (is_overlay) {
-    orb_match_free(ctx, match);
-    ORB_TRY(orb_match_start_from_overlay(ctx, job, match));
+    orb_placed_free(ctx, placed);
+    ORB_TRY(orb_adaptive_start_from_overlay(ctx, job, placed));
   }
-  return settle(ctx, job, match, tolerance, is_overlay);
+  return all_rounds(ctx, job, placed, tolerance, is_overlay);
 }
 
 orb_status orb_remesh_adaptive(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
-  orb_match match = {0};
-  double tolerance = job->options->tolerance * (1 - 1e-9) - 1e-12; /* so that rounding of the bound finds room */
+  orb_placed_net placed = {0};
+  double tolerance = job->options->tolerance * (1 - 1e-9) - 1e-12; /* leaves room for the rounding of the bound */
   int64_t most = job->options->max_triangles;
-  orb_status status = approach(ctx, job, tolerance, &match);
+  orb_status status = remesh_within(ctx, job, tolerance, &placed);
   if (status == ORB_OK && most > 0) {
-    status = relax(ctx, &match, tolerance, most);
+    status = reduce_to(ctx, &placed, tolerance, most);
   }
   orb_progress(ctx, "remesh", 0.9);
   if (status == ORB_OK) {
-    status = orb_match_export(ctx, &match, out);
+    status = orb_placed_export(ctx, &placed, out);
   }
-  orb_match_free(ctx, &match);
+  orb_placed_free(ctx, &placed);
   return status;
 }

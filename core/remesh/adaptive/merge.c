@@ -1,14 +1,16 @@
-/* Two neighbours become one vertex, between them, with as many turned edges around as it takes (see match_star.c):
- * finds room where neither can move onto the other. */
-#include <string.h>
+/* Two neighbours become one vertex between them, with as many edge flips around as necessary (star.h). Succeeds where
+ * neither can move onto the other. */
+#include "remesh/adaptive/merge.h"
 
 #include "base/check.h"
 #include "numeric/vec3.h"
-#include "remesh/adaptive/match.h"
+#include "remesh/adaptive/star.h"
+#include "remesh/placed/marks.h"
 
-enum { STAR_MAX = 16 };
+enum { STAR_MAX = 16 }; /* vertices with more neighbours do not merge; the size of an array on the stack */
+enum { GRAIN = 64 };    /* vertices a thread takes at a time */
 
-/* The triangles around u, then those around v that are not; 0: too many. */
+/* The triangles around u, then the others around v; returns how many, 0 if too many. */
 static int stars_of(const orb_net *net, int32_t u, int32_t v, int32_t triangles[2 * STAR_MAX]) {
   int n = 0;
   int32_t ends[2] = {u, v};
@@ -29,12 +31,12 @@ static int stars_of(const orb_net *net, int32_t u, int32_t v, int32_t triangles[
   return n;
 }
 
-/* Merges u and v, or with thread ≥ 0 only tells whether they can be. */
-static int try_merge(orb_match *match, int32_t u, int32_t v, double limit2, int thread) {
-  static const double way[] = {0.5, 0.25, 0.75, 0, 1};
+/* Merges u and v if that is possible; thread ≥ 0: only tests it. */
+static int try_merge(orb_placed_net *placed, int32_t u, int32_t v, double limit2, int thread) {
+  static const double way[] = {0.5, 0.25, 0.75, 0, 1}; /* from u to v, tried in this order */
   enum { POINTS = sizeof way / sizeof *way };
-  const orb_star_wish wish = {limit2, 2, 4, ORB_STAR_NOT_WORSE};
-  const double *a = orb_net_point(&match->net, u), *b = orb_net_point(&match->net, v);
+  const orb_star_wish wish = {limit2, 2, 4, ORB_STAR_NOT_WORSE}; /* inside: u, v and at most two more */
+  const double *a = orb_net_point(&placed->net, u), *b = orb_net_point(&placed->net, v);
   int32_t triangles[2 * STAR_MAX];
   double points[POINTS][3];
   for (int i = 0; i < POINTS; i++) {
@@ -43,18 +45,18 @@ static int try_merge(orb_match *match, int32_t u, int32_t v, double limit2, int 
     }
     (void)orb_normalize(points[i]);
   }
-  int n = stars_of(&match->net, u, v, triangles);
+  int n = stars_of(&placed->net, u, v, triangles);
   const double(*all)[3] = (const double(*)[3])points;
-  return n > 0 && (thread < 0 ? orb_match_star(match, triangles, n, all, POINTS, &wish)
-                              : orb_match_can_star(match, triangles, n, all, POINTS, &wish, thread));
+  return n > 0 && (thread < 0 ? orb_adaptive_star(placed, triangles, n, all, POINTS, &wish)
+                              : orb_adaptive_can_star(placed, triangles, n, all, POINTS, &wish, thread));
 }
 
-static int merge_one(orb_match *match, int32_t u, double limit2, int thread) {
-  const orb_net *net = &match->net;
+static int merge_one(orb_placed_net *placed, int32_t u, double limit2, int thread) {
+  const orb_net *net = &placed->net;
   int32_t first = net->out[u], h = first;
   do {
     int32_t v = net->triangles[orb_next(h)];
-    if (u < v && !match->fixed[v] && try_merge(match, u, v, limit2, thread)) {
+    if (u < v && !placed->fixed[v] && try_merge(placed, u, v, limit2, thread)) {
       return 1;
     }
     h = net->twin[orb_prev(h)];
@@ -62,64 +64,48 @@ static int merge_one(orb_match *match, int32_t u, double limit2, int thread) {
   return 0;
 }
 
-uint64_t orb_match_surroundings(const orb_match *match, int32_t v) {
-  const orb_net *net = &match->net;
-  uint64_t sum = 0;
-  int32_t first = net->out[v], h = first;
-  do {
-    int32_t w = net->triangles[orb_next(h)], begin = net->out[w], e = begin;
-    sum += orb_point_mark(orb_net_point(net, w)) * 3;
-    do {
-      sum += orb_point_mark(orb_net_point(net, net->triangles[orb_next(e)]));
-      e = net->twin[orb_prev(e)];
-    } while (e != begin);
-    h = net->twin[orb_prev(h)];
-  } while (h != first);
-  return sum;
-}
-
-/* A mark of what the search depends on, but for what is farther than the neighbours' neighbours. */
-static uint64_t mark_of(const orb_match *match, int32_t u, double limit2) {
-  uint64_t mark = orb_mixed(1, &limit2, sizeof limit2), sum = orb_match_surroundings(match, u);
-  mark = orb_mixed(mark, &sum, sizeof sum);
+/* Covers what the search depends on, except what lies beyond the neighbours' neighbours. */
+static uint64_t mark_of(const orb_placed_net *placed, int32_t u, double limit2) {
+  uint64_t mark = orb_mark_mix(1, &limit2, sizeof limit2), sum = orb_mark_of_surroundings(&placed->net, u);
+  mark = orb_mark_mix(mark, &sum, sizeof sum);
   return mark ? mark : 1;
 }
 
 typedef struct merge_loop {
-  orb_match *match;
+  orb_placed_net *placed;
   double limit2;
-  unsigned char *can; /* a vertex */
+  unsigned char *can; /* per vertex: it can merge with a neighbour */
 } merge_loop;
 
-static void look_range(void *arg, int64_t begin, int64_t end, int thread) {
+static void find_range(void *arg, int64_t begin, int64_t end, int thread) {
   merge_loop *loop = arg;
-  orb_match *match = loop->match;
+  orb_placed_net *placed = loop->placed;
   for (int64_t i = begin; i < end; i++) {
     int32_t u = (int32_t)i;
     loop->can[u] = 0;
-    if (match->net.out[u] < 0 || match->fixed[u]) {
+    if (placed->net.out[u] < 0 || placed->fixed[u]) {
       continue;
     }
-    uint64_t mark = mark_of(match, u, loop->limit2);
-    if (match->alone[u] != mark) {
-      loop->can[u] = (unsigned char)merge_one(match, u, loop->limit2, thread);
-      match->alone[u] = loop->can[u] ? 0 : mark;
+    uint64_t mark = mark_of(placed, u, loop->limit2);
+    if (placed->no_merge[u] != mark) {
+      loop->can[u] = (unsigned char)merge_one(placed, u, loop->limit2, thread);
+      placed->no_merge[u] = loop->can[u] ? 0 : mark;
     }
   }
 }
 
-orb_status orb_match_merge_all(orb_context *ctx, orb_match *match, double limit2, int64_t target) {
-  int32_t n = match->net.vertex_count;
-  int64_t live = orb_match_live(match);
-  merge_loop loop = {match, limit2, ORB_NEW(ctx, unsigned char, n)};
-  orb_status status = loop.can ? orb_match_reserve(ctx, match, orb_threads(ctx)) : ORB_E_NO_MEMORY;
+orb_status orb_adaptive_merge_all(orb_context *ctx, orb_placed_net *placed, double limit2, int64_t target) {
+  int32_t n = placed->net.vertex_count;
+  int64_t live = orb_placed_live(placed);
+  merge_loop loop = {placed, limit2, ORB_NEW(ctx, unsigned char, n)};
+  orb_status status = loop.can ? orb_placed_reserve(ctx, placed, orb_threads(ctx)) : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
-    orb_parallel_for(ctx, n, 64, look_range, &loop);
+    orb_parallel_for(ctx, n, GRAIN, find_range, &loop);
     status = orb_context_check(ctx);
   }
   for (int32_t u = 0; u < n && status == ORB_OK && live > target && live > 4; u++) {
-    if (loop.can[u] && match->net.out[u] >= 0) {
-      live -= 2 * merge_one(match, u, limit2, -1);
+    if (loop.can[u] && placed->net.out[u] >= 0) {
+      live -= 2 * merge_one(placed, u, limit2, -1);
       status = orb_context_check(ctx);
     }
   }

@@ -1,31 +1,42 @@
-/* Vertices that move on the sphere, to where the triangles around them are better shaped and their edges stray less.
+/* Moves vertices on the sphere to where the triangles around them are better shaped and their edges deviate less.
  *
- * A vertex tries points on the way to its neighbours and to their middle. Of those for which every matched distance
- * stays within the limit the one of least cost is taken, if that is below the cost where it stands: the forms of the
- * triangles, and the squared distances of the edges in units of the limit. */
+ * A vertex tries points on the way to its neighbours and to their middle. Of the points for which every matched
+ * distance stays within the limit, it takes the one of least cost, if that is clearly below the present cost: the forms
+ * of the triangles, plus the squared distances of the edges in units of the limit. */
+#include "remesh/adaptive/move.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
-#include "remesh/adaptive/match.h"
+#include "remesh/placed/bound.h"
+#include "remesh/placed/form.h"
+#include "remesh/placed/marks.h"
 
-enum { RING_MAX = 16, SHAPES_KEPT = 16, COLOURS = 64, MOVE_GRAIN = 16 };
-
-static const double LEAST_GAIN = 0.01; /* of the cost: many moves that gain less do not make room for collapses */
+/* Vertices with more neighbours, and all vertices of jobs with more shapes, do not move: arrays on the stack have these
+ * sizes. */
+enum { RING_MAX = 16, SHAPES_MAX = 16 };
+enum { COLOURS = 64 };    /* the bits of a word; a vertex that finds no colour free stays */
+enum { MOVE_GRAIN = 16 }; /* vertices a thread takes at a time */
+/* Of the cost: lower makes many moves that gain little and make no room for collapses. */
+static const double LEAST_GAIN = 0.01;
+/* A moved triangle is at least 1 / FLATNESS times as high as its longest side on the sphere: flatter ones block later
+ * steps. */
+static const double FLATNESS = 1e4;
 
 typedef struct star {
-  orb_match *match;
+  orb_placed_net *placed;
   int32_t v, ring[RING_MAX], slot[RING_MAX];
-  int n, far; /* far: the number of the edge that was last found to stray beyond the limit, on this shape; −1: none */
-  int32_t far_shape;
+  int n, far;        /* far: index of the edge last found beyond the limit; −1: none */
+  int32_t far_shape; /* on which shape */
   double limit2;
 } star;
 
-static int star_of(orb_match *match, int32_t v, double limit2, star *out) {
-  const orb_net *net = &match->net;
-  *out = (star){.match = match, .v = v, .far = -1, .limit2 = limit2};
+static int star_of(orb_placed_net *placed, int32_t v, double limit2, star *out) {
+  const orb_net *net = &placed->net;
+  *out = (star){.placed = placed, .v = v, .far = -1, .limit2 = limit2};
   int32_t first = net->out[v], h = first;
   do {
     if (out->n == RING_MAX) {
@@ -38,33 +49,34 @@ static int star_of(orb_match *match, int32_t v, double limit2, star *out) {
   return 1;
 }
 
-/* Adds up what the forms of the triangles cost. */
+/* The sum of the costs of the triangles' forms, and the forms together in *all. */
 static double form_cost(const star *s, orb_form *all) {
   double cost = 0;
   *all = ORB_FORM_BEST;
   for (int i = 0; i < s->n; i++) {
-    orb_form form = orb_match_form(s->match, s->v, s->ring[i], s->ring[(i + 1) % s->n]);
+    orb_form form = orb_placed_form(s->placed, s->v, s->ring[i], s->ring[(i + 1) % s->n]);
     cost += orb_form_cost(form);
     *all = orb_form_join(*all, form);
   }
   return cost;
 }
 
-/* Places the vertex at p, shape by shape, and adds up the same there: with each shape the forms can only get worse, and
- * once they cost `most`, or are not allowed in place of `before`, the rest need not be known: infinity. */
+/* Places the vertex at p, shape by shape, and returns the cost of the forms there. The forms can only get worse with
+ * each shape: once they cost `most`, or may not replace `before`, the other shapes are skipped and the cost is
+ * infinite. */
 static double place_and_cost(const star *s, const double p[3], double most, orb_form before) {
   orb_form_squares least[RING_MAX];
   double cost = 0;
-  memcpy(s->match->net.points + 3 * (int64_t)s->v, p, 3 * sizeof(double));
+  memcpy(s->placed->net.points + 3 * (int64_t)s->v, p, 3 * sizeof(double));
   for (int i = 0; i < s->n; i++) {
     least[i] = (orb_form_squares){1, 1};
   }
-  for (int32_t k = 0; k < s->match->shape_count; k++) {
+  for (int32_t k = 0; k < s->placed->shape_count; k++) {
     orb_form all = ORB_FORM_BEST;
-    orb_match_place_on(s->match, s->v, k);
+    orb_placed_locate_on(s->placed, s->v, k);
     cost = 0;
     for (int i = 0; i < s->n && cost < most; i++) {
-      orb_match_form_on(s->match, k, s->v, s->ring[i], s->ring[(i + 1) % s->n], &least[i]);
+      orb_placed_form_on(s->placed, k, s->v, s->ring[i], s->ring[(i + 1) % s->n], &least[i]);
       orb_form form = orb_form_of(least[i]);
       cost += orb_form_cost(form);
       all = orb_form_join(all, form);
@@ -77,11 +89,11 @@ static double place_and_cost(const star *s, const double p[3], double most, orb_
 }
 
 static double edge_on(const star *s, int i, int32_t shape) {
-  return orb_match_edge_of_shape2(s->match, shape, s->v, s->ring[i], s->limit2, NULL);
+  return orb_placed_edge_on2(s->placed, shape, s->v, s->ring[i], s->limit2, NULL);
 }
 
-/* Adds up how far the edges stray; infinity beyond the limit, or once the sum is above `most`. The edge that went
- * beyond it for another point is asked first. */
+/* The sum of the edges' squared deviations in units of the limit; infinite if one is beyond the limit. Stops once the
+ * sum is above `most`. Tests first the edge that was beyond the limit for another point. */
 static double edges_cost(star *s, double most) {
   double cost = 0;
   if (s->far >= 0 && edge_on(s, s->far, s->far_shape) > s->limit2) {
@@ -89,7 +101,7 @@ static double edges_cost(star *s, double most) {
   }
   for (int i = 0; i < s->n && cost <= most; i++) {
     double greatest = 0;
-    for (int32_t k = 0; k < s->match->shape_count; k++) {
+    for (int32_t k = 0; k < s->placed->shape_count; k++) {
       double distance2 = edge_on(s, i, k);
       if (!(distance2 <= s->limit2)) {
         s->far = i;
@@ -104,15 +116,15 @@ static double edges_cost(star *s, double most) {
 }
 
 static int list_allows(const star *s, int32_t list) {
-  const orb_match *match = s->match;
-  const double *p = orb_net_point(&match->net, s->v);
-  for (int32_t item = list; item >= 0; item = match->item_next[item]) {
-    const double *x = orb_match_item_point(match, item);
+  const orb_placed_net *placed = s->placed;
+  const double *p = orb_net_point(&placed->net, s->v);
+  for (int32_t item = list; item >= 0; item = placed->item_next[item]) {
+    const double *x = orb_placed_item_point(placed, item);
     for (int i = 0; i < s->n; i++) {
       int32_t a = s->ring[i], b = s->ring[(i + 1) % s->n];
-      const double *q = orb_net_point(&match->net, a), *r = orb_net_point(&match->net, b);
+      const double *q = orb_net_point(&placed->net, a), *r = orb_net_point(&placed->net, b);
       if (orb_orient(p, q, x) >= 0 && orb_orient(q, r, x) >= 0 && orb_orient(r, p, x) >= 0 &&
-          orb_match_item2(match, item, s->v, a, b) > s->limit2) {
+          orb_placed_item2(placed, item, s->v, a, b) > s->limit2) {
         return 0;
       }
     }
@@ -121,18 +133,18 @@ static int list_allows(const star *s, int32_t list) {
 }
 
 static int items_allow(const star *s) {
-  int fine = list_allows(s, s->match->vertex_items[s->v]);
+  int fine = list_allows(s, s->placed->vertex_items[s->v]);
   for (int i = 0; i < s->n && fine; i++) {
-    fine = list_allows(s, s->match->triangle_items[s->slot[i]]);
+    fine = list_allows(s, s->placed->triangle_items[s->slot[i]]);
   }
   return fine;
 }
 
 static int positive_at(const star *s, const double p[3]) {
   for (int i = 0; i < s->n; i++) {
-    const double *q = orb_net_point(&s->match->net, s->ring[i]);
-    const double *r = orb_net_point(&s->match->net, s->ring[(i + 1) % s->n]);
-    double height = 1e4 * orb_det(p, q, r);
+    const double *q = orb_net_point(&s->placed->net, s->ring[i]);
+    const double *r = orb_net_point(&s->placed->net, s->ring[(i + 1) % s->n]);
+    double height = FLATNESS * orb_det(p, q, r);
     if (orb_orient(p, q, r) <= 0 ||
         !(height > orb_distance2(p, q) && height > orb_distance2(q, r) && height > orb_distance2(r, p))) {
       return 0;
@@ -141,104 +153,105 @@ static int positive_at(const star *s, const double p[3]) {
   return 1;
 }
 
-/* What a vertex has where it stands. */
+/* All that a placed net stores of a vertex's position. */
 typedef struct stand {
-  double point[3], at[3 * SHAPES_KEPT], normal[3 * SHAPES_KEPT];
-  orb_spot spot[SHAPES_KEPT];
+  double point[3], at[3 * SHAPES_MAX], normal[3 * SHAPES_MAX];
+  orb_spot spot[SHAPES_MAX];
 } stand;
 
-static void stand_copy(orb_match *match, int32_t v, stand *s, int back) {
-  size_t shapes = (size_t)match->shape_count;
-  int64_t cell = (int64_t)v * match->shape_count;
+static void stand_copy(orb_placed_net *placed, int32_t v, stand *s, int back) {
+  size_t shapes = (size_t)placed->shape_count;
+  int64_t cell = (int64_t)v * placed->shape_count;
   struct {
     void *net, *kept;
     size_t size;
-  } parts[] = {{match->net.points + 3 * (int64_t)v, s->point, sizeof s->point},
-               {match->at + 3 * cell, s->at, 3 * shapes * sizeof(double)},
-               {match->normal + 3 * cell, s->normal, 3 * shapes * sizeof(double)},
-               {match->spot + cell, s->spot, shapes * sizeof(orb_spot)}};
+  } parts[] = {{placed->net.points + 3 * (int64_t)v, s->point, sizeof s->point},
+               {placed->at + 3 * cell, s->at, 3 * shapes * sizeof(double)},
+               {placed->normal + 3 * cell, s->normal, 3 * shapes * sizeof(double)},
+               {placed->spot + cell, s->spot, shapes * sizeof(orb_spot)}};
   for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
     memcpy(back ? parts[i].net : parts[i].kept, back ? parts[i].kept : parts[i].net, parts[i].size);
   }
 }
 
-/* The turned triangles of the star with its vertex where it was; it is left where it is. */
+/* The inverted triangles of the star with its vertex at `old`. Leaves the vertex where it is. */
 static orb_tally tally_at(const star *s, stand *old) {
   stand now;
-  stand_copy(s->match, s->v, &now, 0);
-  stand_copy(s->match, s->v, old, 1);
-  orb_tally tally = orb_match_tally_fan(s->match, s->v, s->ring, s->n, 1);
-  stand_copy(s->match, s->v, &now, 1);
+  stand_copy(s->placed, s->v, &now, 0);
+  stand_copy(s->placed, s->v, old, 1);
+  orb_tally tally = orb_placed_tally_fan(s->placed, s->v, s->ring, s->n, 1);
+  stand_copy(s->placed, s->v, &now, 1);
   return tally;
 }
 
-/* Moves v to p if that costs clearly less than *cost, and sets that; whether it did. The items stay in their lists. */
+/* Moves v to p if that costs clearly less than *cost, and updates that. Returns whether it did. The items stay in their
+ * lists. */
 static int try_point(star *s, const double p[3], orb_form before, double *cost) {
   stand old;
   if (!positive_at(s, p)) {
     return 0;
   }
-  stand_copy(s->match, s->v, &old, 0);
+  stand_copy(s->placed, s->v, &old, 0);
   double now = place_and_cost(s, p, *cost, before);
   if (now < *cost) {
     now += edges_cost(s, *cost - now);
     if (now < *cost * (1 - LEAST_GAIN) && items_allow(s)) {
-      orb_tally tally = orb_match_tally_fan(s->match, s->v, s->ring, s->n, 1);
-      if (tally.turned == 0 || !orb_tally_is_worse(tally, tally_at(s, &old))) {
+      orb_tally tally = orb_placed_tally_fan(s->placed, s->v, s->ring, s->n, 1);
+      if (tally.inverted == 0 || !orb_tally_is_worse(tally, tally_at(s, &old))) {
         *cost = now;
         return 1;
       }
     }
   }
-  stand_copy(s->match, s->v, &old, 1);
+  stand_copy(s->placed, s->v, &old, 1);
   return 0;
 }
 
-static void deal_anew(const star *s) {
-  orb_match *match = s->match;
+static void reassign_items(const star *s) {
+  orb_placed_net *placed = s->placed;
   int32_t lists[RING_MAX + 1];
-  lists[s->n] = match->vertex_items[s->v];
-  match->vertex_items[s->v] = -1;
+  lists[s->n] = placed->vertex_items[s->v];
+  placed->vertex_items[s->v] = -1;
   for (int i = 0; i < s->n; i++) {
-    lists[i] = match->triangle_items[s->slot[i]];
-    match->triangle_items[s->slot[i]] = -1;
+    lists[i] = placed->triangle_items[s->slot[i]];
+    placed->triangle_items[s->slot[i]] = -1;
   }
   for (int i = 0; i <= s->n; i++) {
-    orb_match_deal_among(match, lists[i], s->slot, s->n);
+    orb_placed_assign_among(placed, lists[i], s->slot, s->n);
   }
 }
 
-/* A mark of all that a search for a move depends on: where the vertex and its neighbours are, and the limit. The same
- * search again finds the same: nothing, where it found nothing before. */
+/* Covers all that a search for a move depends on: the points of the vertex and its neighbours, and the limit. */
 static uint64_t mark_of(const star *s) {
-  const orb_net *net = &s->match->net;
-  uint64_t mark = orb_mixed(1, &s->limit2, sizeof s->limit2);
-  mark = orb_mixed(mark, orb_net_point(net, s->v), 3 * sizeof(double));
-  int first = 0; /* the ring may be listed from any neighbour on */
+  const orb_net *net = &s->placed->net;
+  uint64_t mark = orb_mark_mix(1, &s->limit2, sizeof s->limit2);
+  mark = orb_mark_mix(mark, orb_net_point(net, s->v), 3 * sizeof(double));
+  int first = 0; /* the ring may start at any neighbour */
   for (int i = 1; i < s->n; i++) {
     first = s->ring[i] < s->ring[first] ? i : first;
   }
   for (int i = 0; i < s->n; i++) {
-    mark = orb_mixed(mark, orb_net_point(net, s->ring[(first + i) % s->n]), 3 * sizeof(double));
+    mark = orb_mark_mix(mark, orb_net_point(net, s->ring[(first + i) % s->n]), 3 * sizeof(double));
   }
   return mark ? mark : 1;
 }
 
-int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
-  static const double way[] = {0.5, 0.25, 0.1};
+/* Moves v if that pays. Returns whether it did. */
+static int try_move(orb_placed_net *placed, int32_t v, double limit2) {
+  static const double way[] = {0.5, 0.25, 0.1}; /* of the way to a neighbour; more points cost time in proportion */
   star s;
-  if (match->shape_count > SHAPES_KEPT || match->fixed[v] || !star_of(match, v, limit2, &s)) {
+  if (placed->shape_count > SHAPES_MAX || placed->fixed[v] || !star_of(placed, v, limit2, &s)) {
     return 0;
   }
   uint64_t mark = mark_of(&s);
-  if (match->stayed[v] == mark) {
+  if (placed->no_move[v] == mark) {
     return 0;
   }
   double from[3], middle[3] = {0, 0, 0};
-  memcpy(from, orb_net_point(&match->net, v), sizeof from);
+  memcpy(from, orb_net_point(&placed->net, v), sizeof from);
   for (int i = 0; i < s.n; i++) {
     for (int k = 0; k < 3; k++) {
-      middle[k] += orb_net_point(&match->net, s.ring[i])[k] / s.n;
+      middle[k] += orb_net_point(&placed->net, s.ring[i])[k] / s.n;
     }
   }
   orb_form before;
@@ -246,7 +259,7 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
   cost += edges_cost(&s, INFINITY);
   int moved = 0;
   for (int i = 0; i <= s.n; i++) {
-    const double *to = i < s.n ? orb_net_point(&match->net, s.ring[i]) : middle;
+    const double *to = i < s.n ? orb_net_point(&placed->net, s.ring[i]) : middle;
     for (size_t j = 0; j < sizeof way / sizeof way[0]; j++) {
       double p[3];
       for (int k = 0; k < 3; k++) {
@@ -256,15 +269,15 @@ int orb_match_try_move(orb_match *match, int32_t v, double limit2) {
       moved |= try_point(&s, p, before, &cost);
     }
   }
-  match->stayed[v] = moved ? 0 : mark;
+  placed->no_move[v] = moved ? 0 : mark;
   if (moved) {
-    deal_anew(&s);
+    reassign_items(&s);
   }
   return moved;
 }
 
-/* A colour for each of the vertices that `which` (may be NULL: all live ones) says, so that neighbours differ: vertices
- * of one colour have no triangle in common, and can move at the same time. 64: none is left, it stays. */
+/* Gives each vertex of `which` (NULL: all live ones) a colour that no neighbour has: vertices of one colour share no
+ * triangle and can move at the same time. COLOURS: none is free. */
 static void colour(const orb_net *net, const unsigned char *which, unsigned char *colours) {
   memset(colours, 255, (size_t)net->vertex_count);
   for (int32_t v = 0; v < net->vertex_count; v++) {
@@ -287,7 +300,7 @@ static void colour(const orb_net *net, const unsigned char *which, unsigned char
 }
 
 typedef struct move_loop {
-  orb_match *match;
+  orb_placed_net *placed;
   double limit2;
   const int32_t *vertices;
 } move_loop;
@@ -296,17 +309,17 @@ static void move_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   move_loop *loop = arg;
   for (int64_t i = begin; i < end; i++) {
-    (void)orb_match_try_move(loop->match, loop->vertices[i], loop->limit2);
+    (void)try_move(loop->placed, loop->vertices[i], loop->limit2);
   }
 }
 
-orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2, const unsigned char *which) {
-  int32_t n = match->net.vertex_count;
+orb_status orb_adaptive_move_all(orb_context *ctx, orb_placed_net *placed, double limit2, const unsigned char *which) {
+  int32_t n = placed->net.vertex_count;
   unsigned char *colours = ORB_NEW(ctx, unsigned char, n);
   int32_t *vertices = ORB_NEW(ctx, int32_t, n);
   orb_status status = colours && vertices ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
-    colour(&match->net, which, colours);
+    colour(&placed->net, which, colours);
   }
   for (int k = 0; status == ORB_OK && k < COLOURS; k++) {
     int64_t count = 0;
@@ -318,7 +331,7 @@ orb_status orb_match_move_all(orb_context *ctx, orb_match *match, double limit2,
     if (count == 0) {
       break;
     }
-    move_loop loop = {match, limit2, vertices};
+    move_loop loop = {placed, limit2, vertices};
     orb_parallel_for(ctx, count, MOVE_GRAIN, move_range, &loop);
     status = orb_context_check(ctx);
   }

@@ -4,7 +4,7 @@
 
 #include "numeric/vec3.h"
 
-/* x'Ax + 2b'x + c, symmetric A as xx, xy, xz, yy, yz, zz. */
+/* x'Ax + 2b'x + c; the symmetric A is stored as xx, xy, xz, yy, yz, zz. */
 typedef struct orb_quadric {
   double a[6], b[3], c;
 } orb_quadric;
@@ -19,7 +19,7 @@ static inline void orb_quadric_add(orb_quadric *q, const orb_quadric *other) {
   q->c += other->c;
 }
 
-/* The plane of a triangle, weighted by a third of its area; nothing for a degenerate one. */
+/* Adds the plane of a triangle, weighted by a third of its area; a degenerate triangle adds nothing. */
 static inline void orb_quadric_add_plane(orb_quadric *q, const double p0[3], const double p1[3], const double p2[3]) {
   double u[3], v[3], n[3];
   orb_sub(p1, p0, u);

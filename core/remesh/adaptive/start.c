@@ -1,29 +1,37 @@
-/* Starts from the overlay of the shapes, for maps along which splits of edges would creep without end.
+/* Starts from the overlay of the shapes, for maps along which edge splits would creep without end.
  *
  * Where shapes are wound about each other, as by landmarks that lie in another order on each, the overlay has a hundred
- * times their triangles, most of them far smaller than the tolerance asks for. Then each shape is reduced alone first,
- * within the tolerance, and what is left of them is laid over each other: crossings become fewer with the lines of
- * both. The result is linear on both reduced shapes, so that few of its edges stray from the shapes themselves; these
- * are split. What is proved is always the distance from the shapes as they were given. */
+ * times their triangles, most of them far smaller than the tolerance requires. Each shape is then first reduced alone,
+ * within the tolerance, and the reduced shapes are overlaid: the number of crossings falls with the number of edges of
+ * both. The result is linear on both reduced shapes, so few of its edges deviate from the original shapes; these are
+ * split. What is proved is always the distance from the original shapes. */
+#include "remesh/adaptive/start.h"
+
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "base/loops.h"
-#include "remesh/adaptive/match.h"
-#include "remesh/net_export.h"
+#include "remesh/adaptive/collapse.h"
+#include "remesh/common/net_export.h"
+#include "remesh/overlay/overlay.h"
+#include "remesh/placed/flip.h"
 #include "sphere/locate.h"
 
-/* A shape is traced through another: every SAMPLE-th of its edges. A prime, or regular meshes would show one kind of
- * edge only. */
+/* One edge in SAMPLE is traced through the other shapes. A prime, because a regular mesh would otherwise show edges of
+ * one direction only. Larger is faster and less accurate. */
+enum { SAMPLE = 17 };
+/* Rounds of collapses and flips for each shape: more make the overlay smaller and take longer. */
+enum { REDUCTIONS = 4 };
+/* Edges a thread traces at a time, and edges between two checks for cancellation. */
+enum { GRAIN = 64, SLICE = 4096 };
+
 typedef struct crossing_loop {
   const orb_remesh_job *job;
   int32_t own, other;
   atomic_llong count;
 } crossing_loop;
-
-enum { SAMPLE = 17, REDUCTIONS = 4, SLICE = 4096 };
 
 static int64_t crossings_of(const crossing_loop *loop, int32_t h) {
   const orb_remesh_job *job = loop->job;
@@ -55,14 +63,14 @@ static void crossing_range(void *arg, int64_t begin, int64_t end, int thread) {
   atomic_fetch_add(&loop->count, count);
 }
 
-orb_status orb_match_overlay_size(orb_context *ctx, const orb_remesh_job *job, int64_t *triangles) {
+orb_status orb_adaptive_overlay_size(orb_context *ctx, const orb_remesh_job *job, int64_t *triangles) {
   int64_t vertices = 0;
   for (int32_t s = 0; s < job->shape_count; s++) {
     vertices += job->shapes[s].mesh.vertex_count;
     for (int32_t t = 0; t < s; t++) {
       crossing_loop loop = {.job = job, .own = s, .other = t};
       int64_t samples = (3 * (int64_t)job->shapes[s].mesh.triangle_count + SAMPLE - 1) / SAMPLE;
-      ORB_TRY(orb_sliced_by(ctx, samples, SLICE, 64, crossing_range, &loop));
+      ORB_TRY(orb_sliced_by(ctx, samples, SLICE, GRAIN, crossing_range, &loop));
       vertices += SAMPLE * atomic_load(&loop.count);
     }
   }
@@ -70,7 +78,7 @@ orb_status orb_match_overlay_size(orb_context *ctx, const orb_remesh_job *job, i
   return ORB_OK;
 }
 
-/* The reduced shapes in place of the shapes. */
+/* A job whose shapes are the reduced ones. */
 typedef struct reduced {
   orb_remesh_job job;
   orb_aligned_shape *shapes;
@@ -94,11 +102,11 @@ static void reduced_free(orb_context *ctx, reduced *r) {
   memset(r, 0, sizeof *r);
 }
 
-/* What is left of a shape, as another one. */
-static orb_status take_net(orb_context *ctx, const orb_match *match, orb_aligned_shape *out) {
+/* Writes the net, of one shape, as a shape. */
+static orb_status take_net(orb_context *ctx, const orb_placed_net *placed, orb_aligned_shape *out) {
   orb_supermesh net = {0};
-  int32_t *number = ORB_NEW(ctx, int32_t, match->net.vertex_count);
-  orb_status status = number ? orb_net_export(ctx, &match->net, &net, number) : ORB_E_NO_MEMORY;
+  int32_t *number = ORB_NEW(ctx, int32_t, placed->net.vertex_count);
+  orb_status status = number ? orb_net_export(ctx, &placed->net, &net, number) : ORB_E_NO_MEMORY;
   out->points = net.points;
   out->mesh.triangles = net.triangles;
   out->mesh.vertex_count = net.vertex_count;
@@ -107,9 +115,9 @@ static orb_status take_net(orb_context *ctx, const orb_match *match, orb_aligned
     out->mesh.positions = ORB_NEW(ctx, double, 3 * (int64_t)net.vertex_count);
     status = out->mesh.positions ? ORB_OK : ORB_E_NO_MEMORY;
   }
-  for (int32_t v = 0; status == ORB_OK && v < match->net.vertex_count; v++) {
+  for (int32_t v = 0; status == ORB_OK && v < placed->net.vertex_count; v++) {
     if (number[v] >= 0) {
-      memcpy(out->mesh.positions + 3 * (int64_t)number[v], orb_match_at(match, v, 0), 3 * sizeof(double));
+      memcpy(out->mesh.positions + 3 * (int64_t)number[v], orb_placed_position(placed, v, 0), 3 * sizeof(double));
     }
   }
   orb_free(ctx, number);
@@ -123,16 +131,16 @@ static orb_status reduce_shape(orb_context *ctx, const orb_remesh_job *job, int3
   alone.twin += s;
   alone.locator += s;
   alone.diagonal += s;
-  orb_match match;
+  orb_placed_net placed;
   orb_aligned_shape *shape = &out->shapes[s];
   orb_status status;
-  ORB_GO(status, orb_match_create(ctx, &alone, &match), end);
+  ORB_GO(status, orb_placed_create(ctx, &alone, &placed), end);
   for (int i = 0; i < REDUCTIONS; i++) {
-    ORB_GO(status, orb_match_collapse(ctx, &match, limit2, 0, 1, i > 0), end);
-    ORB_GO(status, orb_match_compact(ctx, &match), end);
-    ORB_GO(status, orb_match_turn_all(ctx, &match, limit2, 0), end);
+    ORB_GO(status, orb_adaptive_collapse(ctx, &placed, limit2, 0, 1, i > 0), end);
+    ORB_GO(status, orb_placed_compact(ctx, &placed), end);
+    ORB_GO(status, orb_placed_flip_all(ctx, &placed, limit2, 0), end);
   }
-  ORB_GO(status, take_net(ctx, &match, shape), end);
+  ORB_GO(status, take_net(ctx, &placed, shape), end);
   const orb_mesh *mesh = &shape->mesh;
   out->job.twin[s] = ORB_NEW(ctx, int32_t, 3 * (int64_t)mesh->triangle_count);
   status = out->job.twin[s] ? ORB_OK : ORB_E_NO_MEMORY;
@@ -144,7 +152,7 @@ static orb_status reduce_shape(orb_context *ctx, const orb_remesh_job *job, int3
                                 out->job.twin[s], &out->job.locator[s]);
   }
 end:
-  orb_match_free(ctx, &match);
+  orb_placed_free(ctx, &placed);
   return status;
 }
 
@@ -161,9 +169,9 @@ static orb_status reduce(orb_context *ctx, const orb_remesh_job *job, double lim
   return status;
 }
 
-/* The overlay of `laid`, whose shapes stand for those of `job`. */
+/* A placed net for `job` on the overlay of the shapes of `laid`. */
 static orb_status create_on_overlay(orb_context *ctx, const orb_remesh_job *laid, const orb_remesh_job *job,
-                                    orb_match *match) {
+                                    orb_placed_net *placed) {
   orb_supermesh overlay = {.error_bound = ORB_NEW(ctx, double, job->shape_count)};
   orb_net net = {0};
   orb_status status = overlay.error_bound ? orb_remesh_overlay(ctx, laid, &overlay) : ORB_E_NO_MEMORY;
@@ -173,22 +181,23 @@ static orb_status create_on_overlay(orb_context *ctx, const orb_remesh_job *laid
   }
   orb_supermesh_free(ctx, &overlay);
   if (status == ORB_OK) {
-    orb_match_free(ctx, match);
-    status = orb_match_create_on(ctx, job, &net, match);
+    orb_placed_free(ctx, placed);
+    status = orb_placed_create_on(ctx, job, &net, placed);
   }
   orb_net_free(ctx, &net);
   return status;
 }
 
-orb_status orb_match_start_from_overlay(orb_context *ctx, const orb_remesh_job *job, orb_match *match) {
-  return create_on_overlay(ctx, job, job, match);
+orb_status orb_adaptive_start_from_overlay(orb_context *ctx, const orb_remesh_job *job, orb_placed_net *placed) {
+  return create_on_overlay(ctx, job, job, placed);
 }
 
-orb_status orb_match_start_from_reduced(orb_context *ctx, const orb_remesh_job *job, double limit2, orb_match *match) {
+orb_status orb_adaptive_start_from_reduced(orb_context *ctx, const orb_remesh_job *job, double limit2,
+                                           orb_placed_net *placed) {
   reduced r;
   orb_status status = reduce(ctx, job, limit2, &r);
   if (status == ORB_OK) {
-    status = create_on_overlay(ctx, &r.job, job, match);
+    status = create_on_overlay(ctx, &r.job, job, placed);
   }
   reduced_free(ctx, &r);
   return status;

@@ -1,16 +1,17 @@
 /* The faces of an overlay. Each edge is cut by its events into pieces; a piece has two directed sides, 2p along the
- * edge and 2p + 1 against it. At every overlay vertex the sides that leave it are put into counter-clockwise order,
- * by exact orientations of original vertices only; then the faces can be followed. Where edges of both layers run along
- * each other their pieces coincide: that of layer 0 stays and remembers the half-edge of layer 1. Faces are convex
- * (intersections of two triangles) with at most six corners, none of them straight, and are cut into triangles. */
+ * edge and 2p + 1 against it. At every overlay vertex the sides that leave it are sorted counter-clockwise, by exact
+ * orientations of original vertices only; then the faces can be followed. Where edges of both layers coincide, so do
+ * their pieces: that of layer 0 stays and remembers the half-edge of layer 1. Faces are convex (intersections of two
+ * triangles) with at most six corners, none of them straight, and are cut into triangles. */
+#include "remesh/overlay/faces.h"
+
 #include <string.h>
 
 #include "base/check.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
-#include "remesh/overlay/overlay.h"
 
-/* A side that leaves the vertex at hand: the vertex its edge leads to, and one strictly to the left of it. */
+/* A side that leaves a vertex: the vertex its edge leads to, and one strictly to the left of the edge. */
 typedef struct ray {
   int32_t side, half;
   const double *to, *left;
@@ -20,9 +21,9 @@ typedef struct graph {
   orb_overlay *overlay;
   int32_t first_piece[2]; /* of each layer */
   int32_t piece_count;
-  int32_t *edge_of; /* a piece */
-  int32_t *next;    /* a side: the next one around the face on its left; −1: none, its piece coincides */
-  int32_t *along;   /* a side of layer 0: the half-edge of layer 1 that it coincides with, −1 */
+  int32_t *edge_of; /* per piece */
+  int32_t *next;    /* per side: the next one around the face on its left; −1: its piece was dropped as coinciding */
+  int32_t *along;   /* per side of layer 0: the half-edge of layer 1 that it coincides with; −1: none */
   ray *own, *other, *sector;
 } graph;
 
@@ -85,7 +86,8 @@ static int32_t passing(const graph *g, int l, int32_t e, int32_t id, ray *out) {
   return 2;
 }
 
-/* sides in counter-clockwise order around a vertex: whoever arrives against one leaves by the one before. */
+/* `before` and `side` leave a vertex one after the other, counter-clockwise: the side opposite to `side`, which arrives
+ * there, is followed by `before`. */
 static void link_pair(graph *g, int32_t before, int32_t side) {
   g->next[side ^ 1] = before;
 }
@@ -95,8 +97,8 @@ static void coincide(graph *g, const ray *a, const ray *b) {
   g->along[kept->side] = gone->half;
 }
 
-/* Merges two cyclic orders around x and links the result. Sectors between neighbours in `own` are at most half a turn,
- * so one ray lies in a sector where it is left of its first and right of its second side. */
+/* Merges two cyclic orders around x and links the result. Sectors between neighbours in `own` span at most a half
+ * circle, so a ray lies in a sector if it is left of its first and right of its second side. */
 static void merge_rays(graph *g, const double *x, int32_t own_count, int32_t other_count) {
   int32_t first = -1, last = -1;
   for (int32_t i = 0; i < own_count; i++) {
@@ -104,11 +106,11 @@ static void merge_rays(graph *g, const double *x, int32_t own_count, int32_t oth
     int32_t inside = 0, side = p->side;
     for (int32_t k = 0; k < other_count; k++) {
       const ray *r = &g->other[k];
-      int turn = orb_orient(x, p->to, r->to);
-      if (turn == 0 && orb_orient(x, r->to, p->left) > 0) {
+      int sign = orb_orient(x, p->to, r->to);
+      if (sign == 0 && orb_orient(x, r->to, p->left) > 0) {
         coincide(g, p, r);
         side = layer_of(g, p->side) == 0 ? p->side : r->side;
-      } else if (turn > 0 && orb_orient(x, r->to, q->to) > 0) {
+      } else if (sign > 0 && orb_orient(x, r->to, q->to) > 0) {
         int32_t at = inside++;
         while (at > 0 && orb_orient(x, g->sector[at - 1].to, r->to) < 0) {
           g->sector[at] = g->sector[at - 1];
@@ -192,8 +194,8 @@ static orb_status link_all(orb_context *ctx, graph *g) {
   return status == ORB_OK ? orb_context_check(ctx) : status;
 }
 
-/* How good a triangle is on the sphere; negative if turned over. */
-static double goodness(const orb_overlay *overlay, int32_t a, int32_t b, int32_t c) {
+/* The quality of a triangle on the sphere; negative if flipped. */
+static double quality_of(const orb_overlay *overlay, int32_t a, int32_t b, int32_t c) {
   const double *p = overlay->points + 3 * (int64_t)a, *q = overlay->points + 3 * (int64_t)b,
                *r = overlay->points + 3 * (int64_t)c;
   double edges = orb_distance2(p, q) + orb_distance2(q, r) + orb_distance2(r, p);
@@ -210,16 +212,16 @@ static void emit(orb_overlay *overlay, int32_t a, int32_t b, int32_t c, const in
   overlay->parent[2 * t + 1] = parent[1];
 }
 
-/* Cuts a convex face into triangles: of four corners the better diagonal, else the best ear first. */
+/* Cuts a convex face into triangles: four corners by the better diagonal, more by the best ear first. */
 static void cut_face(orb_overlay *overlay, int32_t *corner, int n, const int32_t parent[2]) {
   while (n > 3) {
     int best = 0;
     double best_value = -4;
     for (int i = 0; i < n; i++) {
       int32_t a = corner[(i + n - 1) % n], b = corner[i], c = corner[(i + 1) % n];
-      double value = goodness(overlay, a, b, c);
+      double value = quality_of(overlay, a, b, c);
       if (n == 4) {
-        double rest = goodness(overlay, a, c, corner[(i + 2) % n]);
+        double rest = quality_of(overlay, a, c, corner[(i + 2) % n]);
         value = rest < value ? rest : value;
       }
       if (value > best_value) {
@@ -234,7 +236,7 @@ static void cut_face(orb_overlay *overlay, int32_t *corner, int n, const int32_t
   emit(overlay, corner[0], corner[1], corner[2], parent);
 }
 
-/* Where a corner that is a vertex of the other layer lies in layer l. */
+/* Where a corner, a vertex of the other layer, lies in layer l. */
 static orb_spot corner_spot(const orb_overlay *overlay, int l, int32_t id) {
   if (l == 1) {
     return overlay->layer[0].spot[id];
@@ -260,8 +262,8 @@ static int holds(const orb_overlay *overlay, int l, int32_t t, const int32_t *co
   return 1;
 }
 
-/* A face with no side of layer l lies in one triangle of it, perhaps touching its border at corners. All corners are
- * vertices of the other layer: their points are exact. */
+/* The triangle of layer l that holds a face without a side of layer l; the face may touch its border at corners. All
+ * corners are vertices of the other layer, so their points are exact. */
 static int32_t parent_of_corners(const orb_overlay *overlay, int l, const int32_t *corner, int n) {
   orb_spot spot = corner_spot(overlay, l, corner[0]);
   for (int i = 1; i < n && spot.kind != ORB_SPOT_FACE; i++) {
@@ -276,7 +278,7 @@ static int32_t parent_of_corners(const orb_overlay *overlay, int l, const int32_
   return h / 3;
 }
 
-enum { MAX_CORNERS = 6 };
+enum { MAX_CORNERS = 6 }; /* of the intersection of two triangles */
 
 static orb_status follow_faces(orb_context *ctx, graph *g) {
   orb_overlay *overlay = g->overlay;

@@ -1,24 +1,28 @@
-/* The overlay method for N shapes: the layers are laid over each other one after another. The overlay of the first
- * shapes, with its crossings rounded and certified, is the first layer of the next. Its triangles map linearly to each
- * of its shapes, so a new vertex inside one has its place on them by interpolation: the result reproduces every shape
- * exactly however often that is done. */
+/* The overlay method for N shapes, which are overlaid one after another. The overlay of the first shapes, with its
+ * crossings rounded and certified, is the first layer of the next overlay. Its triangles map linearly to each of its
+ * shapes, so a new vertex inside one has its place on them by interpolation: the result reproduces every shape exactly,
+ * however many there are. */
+#include "remesh/overlay/overlay.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "numeric/vec3.h"
-#include "remesh/overlay/overlay.h"
+#include "remesh/overlay/build.h"
+#include "remesh/overlay/repair.h"
+#include "remesh/overlay/snap.h"
 
-/* What is known of the shapes so far: one triangulation, places and parents on each of its shapes. */
-typedef struct pile {
+/* The overlay of the first shapes: one triangulation, with places and parents on each of them. */
+typedef struct partial {
   int32_t vertex_count, triangle_count, shapes;
   double *points;
-  int32_t *triangles, *parent; /* parent: triangle major, a shape */
-  orb_place **places;          /* a shape */
-  double *moved;               /* a shape: how far mended rounding may have moved it */
-} pile;
+  int32_t *triangles, *parent; /* parent: per triangle, one a shape */
+  orb_place **places;          /* per shape */
+  double *moved;               /* per shape: how far the repair of rounding may have moved it */
+} partial;
 
-static void pile_free(orb_context *ctx, pile *p) {
+static void partial_free(orb_context *ctx, partial *p) {
   for (int32_t s = 0; p->places && s < p->shapes; s++) {
     orb_free(ctx, p->places[s]);
   }
@@ -30,7 +34,8 @@ static void pile_free(orb_context *ctx, pile *p) {
   memset(p, 0, sizeof *p);
 }
 
-/* Says a place in the corners of triangle `in`, which holds it; 0 if a corner with weight is not one of its. */
+/* Adds weight times a place's coordinates, expressed in the corners of triangle `in`. Returns 0 if a corner of the
+ * place with weight is no corner of that triangle. */
 static int express(const int32_t *triangles, const orb_place *place, int32_t in, double weight, double at[3]) {
   for (int k = 0; k < 3; k++) {
     if (place->at[k] > 0) {
@@ -47,19 +52,20 @@ static int express(const int32_t *triangles, const orb_place *place, int32_t in,
   return 1;
 }
 
-/* The place on a shape of a point of the pile: its triangle lies in one triangle of the shape. */
-static int place_through(const pile *below, const orb_remesh_job *job, int32_t s, const orb_place *on_pile,
+/* The place on shape s of a point of `below`, whose triangle lies in one triangle of the shape. */
+static int place_through(const partial *below, const orb_remesh_job *job, int32_t s, const orb_place *on_partial,
                          orb_place *out) {
   for (int k = 0; k < 3; k++) {
-    if (on_pile->at[k] == 1) {
-      *out = below->places[s][below->triangles[3 * (int64_t)on_pile->triangle + k]];
+    if (on_partial->at[k] == 1) {
+      *out = below->places[s][below->triangles[3 * (int64_t)on_partial->triangle + k]];
       return 1;
     }
   }
-  *out = (orb_place){below->parent[(int64_t)on_pile->triangle * below->shapes + s], {0, 0, 0}};
+  *out = (orb_place){below->parent[(int64_t)on_partial->triangle * below->shapes + s], {0, 0, 0}};
   for (int k = 0; k < 3; k++) {
-    const orb_place *corner = &below->places[s][below->triangles[3 * (int64_t)on_pile->triangle + k]];
-    if (on_pile->at[k] > 0 && !express(job->shapes[s].mesh.triangles, corner, out->triangle, on_pile->at[k], out->at)) {
+    const orb_place *corner = &below->places[s][below->triangles[3 * (int64_t)on_partial->triangle + k]];
+    if (on_partial->at[k] > 0 &&
+        !express(job->shapes[s].mesh.triangles, corner, out->triangle, on_partial->at[k], out->at)) {
       return 0;
     }
   }
@@ -73,7 +79,7 @@ static int place_through(const pile *below, const orb_remesh_job *job, int32_t s
   return 1;
 }
 
-static orb_status pile_start(orb_context *ctx, const orb_remesh_job *job, pile *out) {
+static orb_status partial_start(orb_context *ctx, const orb_remesh_job *job, partial *out) {
   const orb_aligned_shape *shape = &job->shapes[0];
   size_t vertices = (size_t)shape->mesh.vertex_count, triangles = (size_t)shape->mesh.triangle_count;
   out->shapes = 1;
@@ -101,8 +107,8 @@ static orb_status pile_start(orb_context *ctx, const orb_remesh_job *job, pile *
   return ORB_OK;
 }
 
-/* Closes up the numbers of vertices that were merged away. */
-static orb_status drop_unused(orb_context *ctx, pile *p) {
+/* Renumbers the vertices without those that were merged away. */
+static orb_status drop_unused(orb_context *ctx, partial *p) {
   int32_t *number = ORB_NEW0(ctx, int32_t, p->vertex_count), n = 0;
   if (!number) {
     return ORB_E_NO_MEMORY;
@@ -127,9 +133,10 @@ static orb_status drop_unused(orb_context *ctx, pile *p) {
   return ORB_OK;
 }
 
-/* The pile with the overlay's vertices: places on the shapes below through the pile, on the new shape as they are. */
-static orb_status pile_add(orb_context *ctx, const orb_remesh_job *job, const pile *below, orb_overlay *overlay,
-                           pile *out) {
+/* Makes *out of the overlay: places on the earlier shapes through `below`, on the new shape as they are. Takes over
+ * points and triangles. */
+static orb_status partial_add(orb_context *ctx, const orb_remesh_job *job, const partial *below, orb_overlay *overlay,
+                              partial *out) {
   int32_t n = overlay->vertex_count, shapes = below->shapes + 1;
   out->shapes = shapes;
   out->vertex_count = n;
@@ -175,7 +182,7 @@ static orb_status pile_add(orb_context *ctx, const orb_remesh_job *job, const pi
   return overlay->merged_count ? drop_unused(ctx, out) : ORB_OK;
 }
 
-static orb_status lay_over(orb_context *ctx, const orb_remesh_job *job, int32_t s, pile *below, pile *out) {
+static orb_status overlay_shape(orb_context *ctx, const orb_remesh_job *job, int32_t s, partial *below, partial *out) {
   const orb_aligned_shape *shape = &job->shapes[s];
   orb_overlay overlay = {0};
   orb_locator *locator = NULL, *moved = NULL;
@@ -207,8 +214,8 @@ static orb_status lay_over(orb_context *ctx, const orb_remesh_job *job, int32_t 
     overlay.layer[1].locator = moved;
   }
   ORB_GO(status, orb_overlay_build(ctx, &overlay), end);
-  ORB_GO(status, orb_overlay_mend(ctx, &overlay), end);
-  ORB_GO(status, pile_add(ctx, job, below, &overlay, out), end);
+  ORB_GO(status, orb_overlay_repair(ctx, &overlay), end);
+  ORB_GO(status, partial_add(ctx, job, below, &overlay, out), end);
 end:
   orb_overlay_free(ctx, &overlay);
   orb_locator_destroy(ctx, moved);
@@ -227,12 +234,12 @@ static double largest_coordinate(const orb_mesh *mesh) {
 }
 
 orb_status orb_remesh_overlay(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
-  pile now = {0}, next = {0};
+  partial now = {0}, next = {0};
   orb_status status;
-  ORB_GO(status, pile_start(ctx, job, &now), end);
+  ORB_GO(status, partial_start(ctx, job, &now), end);
   for (int32_t s = 1; s < job->shape_count; s++) {
-    ORB_GO(status, lay_over(ctx, job, s, &now, &next), end);
-    pile_free(ctx, &now);
+    ORB_GO(status, overlay_shape(ctx, job, s, &now, &next), end);
+    partial_free(ctx, &now);
     now = next;
     memset(&next, 0, sizeof next);
     orb_progress(ctx, "remesh", (double)s / job->shape_count);
@@ -244,8 +251,9 @@ orb_status orb_remesh_overlay(orb_context *ctx, const orb_remesh_job *job, orb_s
   }
   for (int32_t s = 0; s < job->shape_count; s++) {
     memcpy(out->places + (int64_t)s * now.vertex_count, now.places[s], (size_t)now.vertex_count * sizeof(orb_place));
-    /* Every triangle lies in one triangle of the shape; only places and their positions are rounded, a few units in
-     * the last place for each shape that was laid over. The diagonal's share is for whoever measures it. */
+    /* Every triangle lies in one triangle of the shape; only places and their positions are rounded, by a few units in
+     * the last place for each shape of the overlay. The term with the diagonal covers the rounding of those who measure
+     * the distance. */
     out->error_bound[s] = now.moved[s] + 64 * 2.3e-16 * job->shape_count * largest_coordinate(&job->shapes[s].mesh) +
                           1e-13 * job->diagonal[s];
   }
@@ -256,7 +264,7 @@ orb_status orb_remesh_overlay(orb_context *ctx, const orb_remesh_job *job, orb_s
   now.points = NULL;
   now.triangles = NULL;
 end:
-  pile_free(ctx, &now);
-  pile_free(ctx, &next);
+  partial_free(ctx, &now);
+  partial_free(ctx, &next);
   return status;
 }

@@ -1,15 +1,17 @@
-/* Vertices of a layer that lie within rounding of one of the layer below are put there, bit for bit: a shape over
- * itself, once turned by a rotation that ought to be none, would else cross its own edges a thousand times where no
- * double lies between them. A sphere that is moved so has the same triangles, and none that is not positive; as the
- * overlay is exact for the spheres that it gets, every vertex and edge of the shape is there as before. */
+/* Vertices of a layer that lie within rounding of one of the layer below move there, bit for bit. A shape over a copy
+ * of itself that was rotated by almost nothing would otherwise cross its own edges a thousand times, where no double
+ * lies between them. The moved sphere has the same triangles, all positive; as the overlay is exact for the spheres
+ * that it gets, every vertex and edge of the shape is still there. */
+#include "remesh/overlay/snap.h"
+
 #include <string.h>
 
 #include "base/check.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
-#include "remesh/overlay/overlay.h"
 
-enum { CHECK_EVERY = 4096 };
+enum { CHECK_EVERY = 4096 }; /* vertices between two checks for cancellation */
+/* Distance on the unit sphere: far above the rounding of a rotation, far below the edges of a mesh. */
 static const double ROUNDING = 1e-9;
 
 /* Whether all triangles around the origin of half-edge h are positive. */
@@ -25,7 +27,7 @@ static int is_positive_around(const orb_sphere_view *view, const double *points,
   return 1;
 }
 
-/* The corner of the triangle at p that is within rounding of it, or −1. */
+/* The corner of the triangle at p that lies within rounding of p, or −1. */
 static int32_t corner_near(const orb_layer *below, const double p[3], int32_t *hint) {
   orb_place place;
   orb_locate(below->locator, p, *hint, &place);

@@ -1,25 +1,28 @@
 /* The vertices of an overlay: every edge of each layer is traced through the other one, so that each edge knows in
- * order what it meets. Both traces decide by the same exact orientations, so they name the same crossings; a crossing
- * is numbered by the edge of layer 0 and found again by that of layer 1. Two edges, both shorter than half a turn,
+ * order what it meets. Both traces decide by the same exact orientations, so they find the same crossings; a crossing
+ * is numbered by the edge of layer 0 and found again from that of layer 1. Two edges, both shorter than a half circle,
  * cross at most once. */
+#include "remesh/overlay/trace.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/check.h"
 #include "numeric/vec3.h"
-#include "remesh/overlay/overlay.h"
+
+enum { GRAIN = 512 }; /* vertices or edges a thread takes at a time */
 
 typedef struct layer_loop {
   orb_overlay *overlay;
-  int l;
-  int fill;
+  int l;    /* which layer */
+  int fill; /* 0: count the events of each edge, 1: store them */
 } layer_loop;
 
 static void spot_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   const layer_loop *loop = arg;
   orb_layer *own = &loop->overlay->layer[loop->l], *other = &loop->overlay->layer[1 - loop->l];
-  orb_place *places = loop->overlay->places; /* here: of this layer's vertices on the other */
+  orb_place *places = loop->overlay->places; /* at this stage: of this layer's vertices on the other */
   for (int64_t v = begin; v < end; v++) {
     const double *p = own->view.points + 3 * v;
     orb_locate(other->locator, p, -1, &places[v]);
@@ -73,7 +76,7 @@ static orb_status trace_layer(orb_context *ctx, orb_overlay *overlay, int l) {
   orb_layer *layer = &overlay->layer[l];
   int32_t edges = 3 * layer->view.triangle_count / 2;
   layer_loop loop = {overlay, l, 0};
-  orb_parallel_for(ctx, edges, 512, trace_range, &loop);
+  orb_parallel_for(ctx, edges, GRAIN, trace_range, &loop);
   ORB_TRY(orb_context_check(ctx));
   int64_t total = 0;
   for (int32_t e = 0; e < edges; e++) {
@@ -89,7 +92,7 @@ static orb_status trace_layer(orb_context *ctx, orb_overlay *overlay, int l) {
     return ORB_E_NO_MEMORY;
   }
   loop.fill = 1;
-  orb_parallel_for(ctx, edges, 512, trace_range, &loop);
+  orb_parallel_for(ctx, edges, GRAIN, trace_range, &loop);
   return orb_context_check(ctx);
 }
 
@@ -150,13 +153,12 @@ static void place_on_edge(const orb_layer *layer, int32_t edge, double t, orb_pl
   out->at[orb_next(h) % 3] = t;
 }
 
-static void corner_place(const orb_layer *layer, int32_t h, orb_place *out) {
-  (void)layer;
+static void corner_place(int32_t h, orb_place *out) {
   *out = (orb_place){h / 3, {0, 0, 0}};
   out->at[h % 3] = 1;
 }
 
-/* How far along edge e of `layer` the plane of edge f of `other` cuts it, by central projection onto the chord. */
+/* The parameter along the chord of edge e of `layer` at which the plane of edge f of `other` cuts it. */
 static double cut(const orb_layer *layer, int32_t e, const orb_layer *other, int32_t f) {
   const double *end[4];
   int32_t h[2] = {layer->half[e], other->half[f]};
@@ -169,8 +171,8 @@ static double cut(const orb_layer *layer, int32_t e, const orb_layer *other, int
   return sum > 0 ? from / sum : 0.5;
 }
 
-/* How far along edge e of `layer` the point p lies, which is on it up to rounding, by central projection. Of nearly
- * parallel edges the cut is ill-defined, but a point of one edge still has its one place on the other. */
+/* The parameter along the chord of edge e of `layer` of the point p, which lies on the edge up to rounding. The cut of
+ * nearly parallel edges is ill-conditioned, but the place of a given point on an edge is not. */
 static double foot(const orb_layer *layer, int32_t e, const double p[3]) {
   double weight[2];
   for (int k = 0; k < 2; k++) {
@@ -209,10 +211,10 @@ static orb_status place_vertices(orb_context *ctx, orb_overlay *overlay, orb_pla
     return ORB_E_NO_MEMORY;
   }
   for (int32_t h = 3 * a->view.triangle_count - 1; h >= 0; h--) {
-    corner_place(a, h, &overlay->places[a->view.triangles[h]]);
+    corner_place(h, &overlay->places[a->view.triangles[h]]);
   }
   for (int32_t h = 3 * b->view.triangle_count - 1; h >= 0; h--) {
-    corner_place(b, h, &overlay->places[n + b->id[b->view.triangles[h]]]);
+    corner_place(h, &overlay->places[n + b->id[b->view.triangles[h]]]);
   }
   memcpy(overlay->points, a->view.points, 3 * (size_t)a->vertex_count * sizeof(double));
   for (int32_t v = 0; v < a->vertex_count; v++) {
@@ -245,7 +247,7 @@ orb_status orb_overlay_trace(orb_context *ctx, orb_overlay *overlay) {
   for (int l = 0; l < 2; l++) {
     layer_loop loop = {overlay, l, 0};
     overlay->places = on_other[l];
-    orb_parallel_for(ctx, overlay->layer[l].vertex_count, 512, spot_range, &loop);
+    orb_parallel_for(ctx, overlay->layer[l].vertex_count, GRAIN, spot_range, &loop);
     overlay->places = NULL;
     ORB_GO(status, orb_context_check(ctx), end);
   }
@@ -258,30 +260,4 @@ end:
   orb_free(ctx, on_other[0]);
   orb_free(ctx, on_other[1]);
   return status;
-}
-
-void orb_overlay_free(orb_context *ctx, orb_overlay *overlay) {
-  for (int l = 0; l < 2; l++) {
-    orb_layer *layer = &overlay->layer[l];
-    orb_free(ctx, layer->spot);
-    orb_free(ctx, layer->id);
-    orb_free(ctx, layer->edge);
-    orb_free(ctx, layer->half);
-    orb_free(ctx, layer->begin);
-    orb_free(ctx, layer->event);
-    orb_free(ctx, layer->event_id);
-  }
-  orb_free(ctx, overlay->lone);
-  orb_free(ctx, overlay->cross);
-  orb_free(ctx, overlay->points);
-  orb_free(ctx, overlay->places);
-  orb_free(ctx, overlay->triangles);
-  orb_free(ctx, overlay->parent);
-  orb_free(ctx, overlay->merged);
-  memset(overlay, 0, sizeof *overlay);
-}
-
-orb_status orb_overlay_build(orb_context *ctx, orb_overlay *overlay) {
-  ORB_TRY(orb_overlay_trace(ctx, overlay));
-  return orb_overlay_faces(ctx, overlay);
 }

@@ -1,33 +1,40 @@
-/* Repair of what rounding turned over. Crossings of edges are rounded to doubles; where one lies within rounding of a
- * third edge or of another vertex, a triangle of the exact arrangement can come out flat or turned. Its vertices are
- * moved towards the middle of their rings, by the smallest of halving steps that does best for their worst triangle,
- * until every triangle is positive. Places are not touched: what the supermesh reproduces stays exact, only where a
- * few of its vertices lie on the sphere changes in the last digits. */
+/* Untangles what rounding flipped. Crossings of edges are rounded to doubles; where one lies within rounding of a third
+ * edge or of another vertex, a triangle of the exact arrangement can come out degenerate or flipped. Its vertices move
+ * towards the middle of their rings, each by the step, of a sequence of halved steps, that is best for its worst
+ * triangle, until every triangle is positive. Places are not touched: what the supermesh reproduces stays exact, only
+ * the points of a few vertices on the sphere change in the last digits. */
+#include "remesh/overlay/untangle.h"
+
 #include "base/check.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
-#include "remesh/overlay/overlay.h"
+#include "orbmorph/mesh.h"
 
-enum { ROUNDS = 80, STEPS = 46 };
+enum { ROUNDS = 80 }; /* in the second half, input vertices may move too */
+enum { STEPS = 46 };  /* halvings of the way to the middle: down to 2⁻⁴⁵, about the rounding of a double */
+/* Every so many rounds all triangles are tested, because moves may flip others; every so many, the neighbours of
+ * flipped triangles move too. Smaller numbers cost more time. */
+enum { ALL_EVERY = 20, WIDE_EVERY = 4 };
 
-typedef struct knots {
+typedef struct untangler {
   double *points;
   const int32_t *triangles;
   int32_t triangle_count, first_free;
-  int32_t *begin, *corner; /* a vertex: its corners */
-} knots;
+  int32_t *begin, *corner; /* corners of vertex v: corner[begin[v]] … corner[begin[v + 1] − 1] */
+} untangler;
 
-static double *point(const knots *k, int32_t v) {
+static double *point(const untangler *k, int32_t v) {
   return k->points + 3 * (int64_t)v;
 }
 
-static int is_bad(const knots *k, int32_t t) {
+static int is_flipped(const untangler *k, int32_t t) {
   const int32_t *c = k->triangles + 3 * (int64_t)t;
   return orb_orient(point(k, c[0]), point(k, c[1]), point(k, c[2])) <= 0;
 }
 
-/* The least height-like measure of v's triangles were it at p: determinant over the opposite edge; exact in sign. */
-static double worst_at(const knots *k, int32_t v, const double p[3]) {
+/* The least of a measure like height (determinant over the opposite edge) of v's triangles, with v at p. Its sign is
+ * exact. */
+static double worst_at(const untangler *k, int32_t v, const double p[3]) {
   double worst = 4;
   for (int32_t i = k->begin[v]; i < k->begin[v + 1]; i++) {
     int32_t h = k->corner[i];
@@ -44,7 +51,8 @@ static double worst_at(const knots *k, int32_t v, const double p[3]) {
   return worst;
 }
 
-static int relax(knots *k, int32_t v) {
+/* Moves v to the best point on the way to the middle of its ring. Returns whether it moved. */
+static int relax(untangler *k, int32_t v) {
   if (v < k->first_free) {
     return 0;
   }
@@ -80,7 +88,7 @@ static int relax(knots *k, int32_t v) {
   return 1;
 }
 
-static orb_status index_corners(orb_context *ctx, knots *k, int32_t vertex_count) {
+static orb_status index_corners(orb_context *ctx, untangler *k, int32_t vertex_count) {
   k->begin = ORB_NEW0(ctx, int32_t, vertex_count + 2);
   k->corner = ORB_NEW(ctx, int32_t, 3 * (int64_t)k->triangle_count);
   if (!k->begin || !k->corner) {
@@ -98,11 +106,12 @@ static orb_status index_corners(orb_context *ctx, knots *k, int32_t vertex_count
   return ORB_OK;
 }
 
-/* All triangles near the bad ones get a turn; the bad ones are found anew each round. */
-static int64_t relax_bad(knots *k, int32_t *bad, int64_t count, int wide) {
+/* Moves the corners of the listed triangles, and if `wide` their neighbours. Keeps the triangles that are still flipped
+ * in the list; returns how many. */
+static int64_t relax_flipped(untangler *k, int32_t *flipped, int64_t count, int wide) {
   for (int64_t i = 0; i < count; i++) {
     for (int c = 0; c < 3; c++) {
-      int32_t v = k->triangles[3 * (int64_t)bad[i] + c];
+      int32_t v = k->triangles[3 * (int64_t)flipped[i] + c];
       (void)relax(k, v);
       for (int32_t j = k->begin[v]; wide && j < k->begin[v + 1]; j++) {
         (void)relax(k, k->triangles[orb_next(k->corner[j])]);
@@ -111,8 +120,8 @@ static int64_t relax_bad(knots *k, int32_t *bad, int64_t count, int wide) {
   }
   int64_t left = 0;
   for (int64_t i = 0; i < count; i++) {
-    if (is_bad(k, bad[i])) {
-      bad[left++] = bad[i];
+    if (is_flipped(k, flipped[i])) {
+      flipped[left++] = flipped[i];
     }
   }
   return left;
@@ -120,16 +129,16 @@ static int64_t relax_bad(knots *k, int32_t *bad, int64_t count, int wide) {
 
 orb_status orb_overlay_untangle(orb_context *ctx, double *points, int32_t vertex_count, const int32_t *triangles,
                                 int32_t triangle_count, int32_t first_free) {
-  knots k = {.points = points, .triangles = triangles, .triangle_count = triangle_count, .first_free = first_free};
-  int32_t *bad = ORB_NEW(ctx, int32_t, triangle_count);
-  orb_status status = bad ? ORB_OK : ORB_E_NO_MEMORY;
+  untangler k = {.points = points, .triangles = triangles, .triangle_count = triangle_count, .first_free = first_free};
+  int32_t *flipped = ORB_NEW(ctx, int32_t, triangle_count);
+  orb_status status = flipped ? ORB_OK : ORB_E_NO_MEMORY;
   int64_t left = 0;
   for (int round = 0; status == ORB_OK && round < ROUNDS; round++) {
-    if (left == 0 || round % 20 == 0) { /* moves may have turned others: look at all */
+    if (left == 0 || round % ALL_EVERY == 0) {
       left = 0;
       for (int32_t t = 0; t < triangle_count; t++) {
-        if (is_bad(&k, t)) {
-          bad[left++] = t;
+        if (is_flipped(&k, t)) {
+          flipped[left++] = t;
         }
       }
     }
@@ -140,15 +149,15 @@ orb_status orb_overlay_untangle(orb_context *ctx, double *points, int32_t vertex
       ORB_GO(status, index_corners(ctx, &k, vertex_count), end);
     }
     k.first_free = round < ROUNDS / 2 ? first_free : 0;
-    left = relax_bad(&k, bad, left, round % 4 == 3);
+    left = relax_flipped(&k, flipped, left, round % WIDE_EVERY == WIDE_EVERY - 1);
     status = orb_context_check(ctx);
   }
   if (status == ORB_OK && left > 0) {
-    status = orb_fail(ctx, ORB_E_NOT_CERTIFIED, "Rounding turned %lld triangles of the overlay that cannot be mended.",
-                      (long long)left);
+    status = orb_fail(ctx, ORB_E_NOT_CERTIFIED,
+                      "Rounding flipped %lld triangles of the overlay that cannot be untangled.", (long long)left);
   }
 end:
-  orb_free(ctx, bad);
+  orb_free(ctx, flipped);
   orb_free(ctx, k.begin);
   orb_free(ctx, k.corner);
   return status;

@@ -1,0 +1,21 @@
+/* What every remesh method gets: the shapes and what orb_remesh() has prepared for each. */
+#ifndef ORB_REMESH_COMMON_JOB_H
+#define ORB_REMESH_COMMON_JOB_H
+
+#include "orbmorph/remesh.h"
+
+typedef struct orb_remesh_job {
+  const orb_aligned_shape *shapes;
+  int32_t shape_count;
+  int32_t landmark_count;
+  const orb_remesh_options *options;
+  int32_t **twin;        /* per shape: half-edge pairing */
+  orb_locator **locator; /* per shape */
+  double *diagonal;      /* per shape: of its bounding box */
+} orb_remesh_job;
+
+/* A method fills triangles, points, places and error bounds of `out`, whose error_bound holds shape_count NaN.
+ * orb_remesh() finds the landmarks and certifies the result. */
+typedef orb_status (*orb_remesh_fn)(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
+
+#endif

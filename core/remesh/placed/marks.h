@@ -1,0 +1,34 @@
+/* Marks: 64-bit digests of what a search depends on. A search that found nothing keeps its mark and is skipped while
+ * the mark stays the same. Two states with equal marks, by a chance of about 2⁻⁶⁴, cost a search that is left out; they
+ * cannot falsify a bound, because orb_placed_bounds() uses no marks. */
+#ifndef ORB_REMESH_PLACED_MARKS_H
+#define ORB_REMESH_PLACED_MARKS_H
+
+#include <string.h>
+
+#include "sphere/net.h"
+
+/* Mixes `size` bytes, a multiple of 8, into a mark. */
+static inline uint64_t orb_mark_mix(uint64_t mark, const void *part, size_t size) {
+  uint64_t word;
+  for (const unsigned char *p = part, *end = p + size; p < end; p += sizeof word) {
+    memcpy(&word, p, sizeof word);
+    mark = (mark ^ word) * UINT64_C(0x9E3779B97F4A7C15);
+    mark ^= mark >> 29;
+  }
+  return mark;
+}
+
+static inline uint64_t orb_mark_of_point(const double p[3]) {
+  uint64_t word[3];
+  memcpy(word, p, sizeof word);
+  uint64_t mark = word[0] * UINT64_C(0x9E3779B97F4A7C15) + word[1] * UINT64_C(0xC2B2AE3D27D4EB4F) +
+                  word[2] * UINT64_C(0x165667B19E3779F9);
+  mark = (mark ^ mark >> 32) * UINT64_C(0xD6E8FEB86659FD93);
+  return mark ^ mark >> 29;
+}
+
+/* Covers the points of v's neighbours and of their neighbours. A sum, so independent of the order of the rings. */
+uint64_t orb_mark_of_surroundings(const orb_net *net, int32_t v);
+
+#endif
