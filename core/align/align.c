@@ -7,6 +7,8 @@
 
 #include "align/methods.h"
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
 
 void orb_align_defaults(orb_align_options *options) {
   memset(options, 0, sizeof *options);

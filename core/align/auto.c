@@ -13,6 +13,8 @@
 #include "align/find/guess.h"
 #include "align/methods.h"
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 
 /* Energies below it leave nothing to be won. Between it and ORB_MAP_GOOD_ENERGY shapes may differ so much, or a limb of
  * two nearly equal ones has gone wrong, which other correspondences show. */

@@ -9,6 +9,8 @@
 #include "align/rotate/rotate.h"
 #include "align/sheet/landmarks.h"
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 
 static orb_status run_method(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const orb_landmark *landmarks,
                              int32_t landmark_count, const orb_align_options *options) {

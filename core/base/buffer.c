@@ -3,7 +3,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/buffer.h"
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "orbmorph/context.h"
 
 static orb_status buffer_reserve(orb_context *ctx, orb_buffer *buffer, size_t more) {

@@ -1,8 +1,16 @@
-/* The error record of a context; orb_fail() and its readers are declared in orbmorph/context.h. */
+/* The error record of a context: how core sets it. Callers read it with orb_context_error(). */
 #ifndef ORB_BASE_ERROR_H
 #define ORB_BASE_ERROR_H
 
 #include "orbmorph/context.h"
+
+/* Sets a new error record (without facts) and returns status. Any thread: in a parallel loop the first failure wins,
+ * until orb_error_clear(). */
+orb_status orb_fail(orb_context *ctx, orb_status status, const char *format, ...) ORB_PRINTF(3, 4);
+
+/* The record, to add facts to it after orb_fail(). */
+orb_error *orb_context_error_edit(orb_context *ctx);
+void orb_error_clear(orb_context *ctx);
 
 /* A record without facts: counts 0, numbers that do not apply −1. */
 void orb_error_reset(orb_error *error);

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "base/memory.h"
 #include "orbmorph/context.h"
 
 /* array: the address of the pointer. Returns 0 without memory; the array is then unchanged. */

@@ -1,6 +1,7 @@
 #include "base/loops.h"
 
 #include "base/check.h"
+#include "base/parallel.h"
 
 enum { SLICE = 65536 }; /* iterations between checks for cancellation */
 

@@ -4,6 +4,7 @@
 
 #include <stdatomic.h>
 
+#include "base/parallel.h"
 #include "orbmorph/context.h"
 
 /* orb_parallel_for() in slices of 65,536 iterations, with orb_context_check() between them. Chunks begin at multiples

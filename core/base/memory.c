@@ -11,6 +11,8 @@
 #endif
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "base/state.h"
 
 #if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)

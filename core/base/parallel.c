@@ -13,6 +13,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "base/state.h"
 
 enum {

@@ -1,6 +1,7 @@
 #include "embed/advance.h"
 
 #include "base/check.h"
+#include "base/context.h"
 #include "base/loops.h"
 #include "embed/level.h"
 #include "embed/multires.h"

@@ -14,6 +14,7 @@
 
 #include "base/check.h"
 #include "base/loops.h"
+#include "base/memory.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 #include "orbmorph/embed.h"

@@ -7,6 +7,7 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 
 static const float CARRY_FLOOR = 0.1F; /* share of the mean new area, so that every triangle gets some */
 

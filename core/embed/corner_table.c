@@ -3,7 +3,9 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "base/loops.h"
+#include "base/memory.h"
 
 enum {
   MORTON_BITS = 10, /* of each coordinate; 30 bits sort in three passes */

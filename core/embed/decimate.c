@@ -15,7 +15,10 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
 #include "base/loops.h"
+#include "base/memory.h"
 #include "embed/collapse.h"
 #include "embed/multires.h"
 

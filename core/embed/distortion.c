@@ -13,6 +13,8 @@
 
 #include "base/check.h"
 #include "base/loops.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/vec3.h"
 #include "orbmorph/embed.h"
 

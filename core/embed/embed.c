@@ -10,6 +10,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "embed/kernel_sampling/kernel_sampling.h"
 #include "embed/newton.h"
 

@@ -1,6 +1,7 @@
 #include "embed/hierarchy.h"
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "embed/decimate.h"
 #include "embed/multires.h"
 #include "embed/vector/loops.h"

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/frame.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"

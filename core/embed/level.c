@@ -2,6 +2,7 @@
 
 #include "base/check.h"
 #include "base/loops.h"
+#include "base/memory.h"
 
 enum {
   BINS = ORB_SWEEP_RING_MAX + 1, /* one for each valence */

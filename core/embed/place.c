@@ -12,7 +12,9 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "base/loops.h"
+#include "base/memory.h"
 #include "embed/collapse.h"
 #include "embed/kernel.h"
 #include "embed/multires.h"

@@ -3,6 +3,8 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "embed/collapse.h"
 #include "embed/kernel.h"
 #include "embed/level.h"

@@ -1,6 +1,7 @@
 #include "embed/resume.h"
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "embed/multires.h"
 #include "embed/vector/loops.h"
 

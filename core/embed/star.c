@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "embed/kernel.h"
 #include "numeric/frame.h"
 #include "numeric/vec3.h"

@@ -7,7 +7,9 @@
 
 #include "base/check.h"
 #include "base/context.h"
+#include "base/error.h"
 #include "base/grow.h"
+#include "base/memory.h"
 #include "mesh/polygon.h"
 #include "numeric/vec3.h"
 

@@ -17,6 +17,7 @@
 #include <vector>
 
 extern "C" {
+#include "base/error.h"
 #include "format/bytes.h"
 #include "format/json_check.h"
 #include "format/readers.h"

@@ -9,6 +9,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "orbmorph/utf8.h"
 
 enum {

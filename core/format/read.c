@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "format/readers.h"
 
 /* One row for each format. Of equally sure detectors the first wins, so the strict ones come first. */

@@ -1,4 +1,5 @@
 /* A mesh and its sphere as binary little-endian PLY, written in batches of BATCH rows. */
+#include "base/buffer.h"
 #include "base/check.h"
 #include "format/bytes.h"
 #include "orbmorph/format.h"

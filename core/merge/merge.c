@@ -4,6 +4,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "merge/report.h"
 #include "mesh/refuse.h"
 

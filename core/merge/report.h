@@ -11,13 +11,6 @@ ORB_MUST_CHECK orb_status orb_report_landmarks(orb_context *ctx, const orb_align
 /* Fills out->found_residuals. Needs out->alignment, supermesh and shapes. */
 ORB_MUST_CHECK orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb_merge_result *out);
 
-/* Marks the triangles of the supermesh that are inverted on shape s: they face away from the mean of the input's smooth
- * normals at their corners, and also from its face at their centre on the sphere. positions: 3 a supermesh vertex, on
- * the shape. inverted: receives 1 or 0 for each triangle. */
-ORB_MUST_CHECK orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh,
-                                            const orb_aligned_shape *shape, int32_t s, const double *positions,
-                                            unsigned char *inverted);
-
 /* Fills out->pairs. Needs out->alignment and supermesh. */
 ORB_MUST_CHECK orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out);
 

@@ -1,6 +1,8 @@
 #include "mesh/edges.h"
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "mesh/sort.h"
 
 static void match_run(const uint64_t *entry, int32_t count, const int32_t *triangles, int32_t *twin, orb_edges *out) {

@@ -3,7 +3,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "base/grow.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 static void move_face(orb_mesh *mesh, size_t from, size_t to) {

@@ -12,6 +12,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "mesh/edit.h"
 #include "mesh/polygon.h"
 #include "numeric/vec3.h"

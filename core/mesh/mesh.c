@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "numeric/vec3.h"
 #include "orbmorph/mesh.h"
 

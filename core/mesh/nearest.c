@@ -8,6 +8,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
+#include "mesh/nearest.h"
 #include "numeric/vec3.h"
 #include "orbmorph/mesh.h"
 

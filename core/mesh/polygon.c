@@ -9,6 +9,7 @@
 #include "mesh/polygon.h"
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 orb_status orb_polygon_reserve(orb_context *ctx, orb_polygon *polygon, int32_t corners) {

@@ -3,6 +3,8 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "mesh/sort.h"
 
 static const char *plural(int64_t count, const char *one, const char *many) {

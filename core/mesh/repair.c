@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "mesh/edit.h"
 #include "mesh/fill.h"
 #include "mesh/refuse.h"

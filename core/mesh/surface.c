@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "mesh/edit.h"
 
 orb_status orb_surface_rematch(orb_surface *s) {

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "mesh/surface.h"
 
 /* Counts the vertices whose faces form more than one fan. Faces around a vertex are connected over edges of two faces,

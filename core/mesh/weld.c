@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "mesh/edit.h"
 #include "mesh/sort.h"
 #include "numeric/vec3.h"

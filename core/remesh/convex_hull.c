@@ -13,6 +13,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "numeric/predicates.h"
 #include "remesh/placed/export.h"
 #include "remesh/qhull.h"

@@ -18,6 +18,8 @@
 #endif
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "numeric/predicates.h"
 
 enum { BYTES_A_POINT = 1024 }; /* of the budget, for Qhull's own memory */

@@ -4,6 +4,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "remesh/registry.h"
 
 void orb_remesh_defaults(orb_remesh_options *options) {

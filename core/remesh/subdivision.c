@@ -7,6 +7,8 @@
 #include "remesh/subdivision.h"
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 #include "remesh/placed/export.h"
 #include "remesh/placed/refine.h"

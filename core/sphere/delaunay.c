@@ -1,6 +1,7 @@
 /* Delaunay edge flips over a whole net (Lawson 1977). */
 #include "sphere/delaunay.h"
 
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 /* How far beyond the plane a point must lie, relative to its distance: rounding cannot make the flips cycle. */

@@ -8,6 +8,7 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 struct orb_locator {

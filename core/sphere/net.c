@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 

@@ -17,6 +17,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/vec3.h"
 #include "transfer/coarse.h"
 #include "transfer/rotation.h"

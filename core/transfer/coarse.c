@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 
 /* About so many groups, but of at least so many vertices: more groups make the correction better, and its
  * factorisation, which is cubic in their number, slower. */

@@ -12,6 +12,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 
 enum { MAX_ULPS = 16 }; /* units in the last place: more find a place in denser meshes and move vertices farther */
 enum { GRAIN = 16384 }; /* vertices a thread takes at a time */

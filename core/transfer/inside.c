@@ -5,6 +5,9 @@
 
 #include <string.h>
 
+#include "base/memory.h"
+#include "base/parallel.h"
+
 enum { GRAIN = 2048 }; /* triangles a thread takes at a time */
 enum { RING = 64 };    /* triangles visited around a vertex: bounds the time at vertices of high degree */
 

@@ -15,6 +15,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "mesh/nearest.h"
 #include "numeric/vec3.h"
 #include "orbmorph/transfer.h"
 #include "transfer/inside.h"

@@ -5,6 +5,10 @@
 
 #include <new>
 
+extern "C" {
+#include "base/error.h"
+}
+
 orb_status orb_order_for_cache(orb_context *ctx, uint32_t *indices, size_t index_count, size_t vertex_count,
                                uint32_t *remap) {
   try {

@@ -8,6 +8,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
 #include "format/gltf_write.h"
 
 /* The animation, in seconds: how long a shape stays, and how long the way to the next one takes. */

@@ -4,6 +4,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
 #include "transfer/arap.h"
 
 static const float SAME = 1e-6f; /* values of one vertex that differ by less are one: the rounding of the blend */

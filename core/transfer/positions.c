@@ -1,4 +1,5 @@
 /* Positions of a shape at the places of a supermesh. */
+#include "base/parallel.h"
 #include "orbmorph/transfer.h"
 
 enum { GRAIN = 8192 }; /* places a thread takes at a time */

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "transfer/order.h"
 
 enum { CHECK_EVERY = 16384 }; /* triangles between two checks for cancellation */

@@ -10,6 +10,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "mesh/normals.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"

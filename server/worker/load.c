@@ -33,7 +33,7 @@ static void note_triangles(const orb_mesh *raw, file_triangle *noted, int32_t co
 
 /* Before repairs, a mesh has the file's triangles in the file's order, and `source` has the file's vertex numbers. */
 static int32_t *copy_corners(orb_context *ctx, const orb_mesh *raw) {
-  int32_t *corners = ORB_NEW(ctx, int32_t, 3 * (size_t)raw->triangle_count);
+  int32_t *corners = orb_alloc(ctx, 3 * (size_t)raw->triangle_count, sizeof *corners);
   for (size_t h = 0; corners && h < 3 * (size_t)raw->triangle_count; h++) {
     corners[h] = raw->source[raw->triangles[h]];
   }
@@ -85,7 +85,7 @@ int run_load_points(const run_env *env, orb_context *ctx, const char *embedding,
     return api_refuse(problem, "corrupt", "The stored embedding %s cannot be read or does not match its mesh.",
                       embedding);
   }
-  *points = ORB_NEW(ctx, double, 3 * count);
+  *points = orb_alloc(ctx, 3 * count, sizeof **points);
   for (size_t v = 0; *points && v < count; v++) {
     memcpy(*points + 3 * v, first + v * SPHERE_STRIDE, 3 * sizeof(double));
   }

@@ -27,32 +27,6 @@ struct worker_pool {
   worker workers[];
 };
 
-typedef struct progress_of {
-  queue *q;
-  job *j;
-  char stage[24];
-  double began;
-} progress_of;
-
-/* Ends the time measurement of the current stage and begins the next. */
-static void enter_stage(progress_of *p, const char *stage) {
-  if (strncmp(p->stage, stage, sizeof p->stage - 1) == 0) {
-    return;
-  }
-  double now = orb_clock();
-  if (p->stage[0]) {
-    metrics_stage(job_kind(p->j) == API_JOB_EMBEDDING, p->stage, now - p->began);
-  }
-  snprintf(p->stage, sizeof p->stage, "%s", stage);
-  p->began = now;
-}
-
-static void on_progress(void *user, const char *stage, double fraction) {
-  progress_of *p = user;
-  enter_stage(p, stage);
-  queue_progress(p->q, p->j, stage, fraction);
-}
-
 /* The embeddings that a supermesh lacks, each once: keys, requests and triangles. */
 typedef struct missing {
   char keys[API_SHAPES_MAX][API_ID_SIZE];
@@ -154,13 +128,14 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_prob
 }
 
 static void run_claimed(worker_pool *pool, job *j, int threads) {
-  const run_env *env = &pool->env;
-  progress_of progress = {.q = env->q, .j = j};
+  job_progress progress = {.q = pool->env.q, .j = j};
+  run_env env_of_job = pool->env, *env = &env_of_job;
+  env_of_job.progress = &progress;
   orb_context_options options = {.memory_limit = (size_t)pool->options.job_memory,
                                  .threads = threads,
                                  .deadline_ms = orb_clock_ms() + pool->options.job_ms,
                                  .max_triangles = pool->options.max_triangles,
-                                 .progress = on_progress,
+                                 .progress = progress_report,
                                  .progress_user = &progress};
   orb_context *ctx = NULL;
   api_problem problem = {0};
@@ -178,7 +153,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
   int embedding = job_kind(j) == API_JOB_EMBEDDING;
   int fine = embedding ? run_embedding(env, ctx, j, &out, &problem) : run_supermesh(env, ctx, j, &out, &problem);
   queue_set_context(env->q, j, NULL);
-  enter_stage(&progress, "");
+  progress_enter(&progress, "");
   FAULT_POINT("run-done");
   double seconds = 1e-3 * (double)(orb_clock_ms() - began);
   metrics_job(embedding, fine, seconds);
@@ -245,7 +220,7 @@ worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogu
     return NULL;
   }
   pool->options = *options;
-  pool->env = (run_env){q, cat, store};
+  pool->env = (run_env){.q = q, .cat = cat, .store = store};
   pool->count = lanes;
   for (int i = 0; i < lanes; i++) {
     worker *w = &pool->workers[i];

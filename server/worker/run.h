@@ -6,11 +6,13 @@
 #include "api/problem.h"
 #include "api/supermesh_codec.h"
 #include "queue/queue.h"
+#include "worker/progress.h"
 
 typedef struct run_env {
   queue *q;
   catalogue *cat;
   objects *store;
+  job_progress *progress; /* of the job; NULL outside a run */
 } run_env;
 
 typedef struct run_output {

@@ -46,7 +46,7 @@ int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out,
     resource_free(&known); /* of an earlier attempt or another owner */
     return 1;
   }
-  orb_progress(ctx, "read", 0);
+  progress_report(env->progress, "read", 0);
   double began = orb_clock();
   if (!run_load_mesh(env, ctx, request.mesh, &mesh, NULL, 0, NULL, problem)) {
     goto done;
@@ -59,7 +59,7 @@ int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out,
   metrics_flips(embedding.certificate.flipped);
   embedding.timings.check += checked;
   embedding.timings.total += checked;
-  orb_progress(ctx, "store", 0);
+  progress_report(env->progress, "store", 0);
   objects_hold(env->store);
   out->holds = 1;
   if (!store_sphere(env, ctx, job_key(j), &mesh, &embedding, result, problem)) {

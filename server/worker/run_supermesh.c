@@ -78,7 +78,7 @@ static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int
   if (!api_embedding_request_id(&wanted, embedding)) {
     return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
-  file_triangle *noted = ORB_NEW(ctx, file_triangle, list->count);
+  file_triangle *noted = orb_alloc(ctx, (size_t)list->count, sizeof *noted);
   if (!noted) {
     return 0;
   }
@@ -104,15 +104,16 @@ static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int
 static int load_input(const run_env *env, orb_context *ctx, merge_input *in, api_problem *problem) {
   const api_landmark_list *list = &in->request.landmarks;
   size_t places = (size_t)list->count * (size_t)in->request.shape_count;
-  in->landmarks = ORB_NEW0(ctx, orb_landmark, list->count);
-  in->places = ORB_NEW0(ctx, orb_place, places);
-  in->noted = ORB_NEW0(ctx, file_triangle, places);
+  in->landmarks = orb_alloc(ctx, (size_t)list->count, sizeof *in->landmarks);
+  in->places = orb_alloc(ctx, places, sizeof *in->places);
+  in->noted = orb_alloc(ctx, places, sizeof *in->noted);
   if (!in->landmarks || !in->places || !in->noted) {
     return 0;
   }
+  memset(in->landmarks, 0, (size_t)list->count * sizeof *in->landmarks);
   for (int32_t s = 0; s < in->request.shape_count; s++) {
     in->names[s] = in->request.shapes[s].name;
-    orb_progress(ctx, "read", (double)s / (double)in->request.shape_count);
+    progress_report(env->progress, "read", (double)s / (double)in->request.shape_count);
     if (!load_shape(env, ctx, in, s, problem)) {
       return 0;
     }
@@ -161,7 +162,7 @@ static int store_spheres(const run_env *env, orb_context *ctx, const orb_merge_r
  * added the triangle. NULL if out of memory. */
 static api_place *found_spots(orb_context *ctx, const merge_input *in, const orb_merge_result *merged) {
   size_t shapes = (size_t)in->request.shape_count, count = (size_t)merged->alignment.found_count * shapes;
-  api_place *spots = ORB_NEW(ctx, api_place, count);
+  api_place *spots = orb_alloc(ctx, count, sizeof *spots);
   for (size_t i = 0; spots && i < count; i++) {
     const orb_mesh *mesh = &in->meshes[i % shapes];
     const orb_place *found = &merged->alignment.found[i];
@@ -226,7 +227,7 @@ int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out,
     for (int32_t s = 0; s < in->request.shape_count; s++) {
       metrics_flips(merged.alignment.shapes[s].certificate.flipped);
     }
-    orb_progress(ctx, "store", 0);
+    progress_report(env->progress, "store", 0);
     objects_hold(env->store);
     out->holds = 1;
     fine = store_result_of(env, ctx, j, in, &merged, &out->row, problem);

@@ -100,9 +100,9 @@ int bench_body(orb_context *ctx, int32_t triangles, uint64_t seed, orb_aligned_s
   orb_mesh *mesh = &out->mesh;
   mesh->vertex_count = vertices;
   mesh->triangle_count = 8 * n * n;
-  mesh->positions = ORB_NEW(ctx, double, 3 * (size_t)vertices);
-  mesh->triangles = ORB_NEW(ctx, int32_t, 24 * (size_t)n * (size_t)n);
-  out->points = ORB_NEW(ctx, double, 3 * (size_t)vertices);
+  mesh->positions = orb_alloc(ctx, 3 * (size_t)vertices, sizeof(double));
+  mesh->triangles = orb_alloc(ctx, 24 * (size_t)n * (size_t)n, sizeof(int32_t));
+  out->points = orb_alloc(ctx, 3 * (size_t)vertices, sizeof(double));
   if (!mesh->positions || !mesh->triangles || !out->points) {
     return 0;
   }

@@ -59,7 +59,7 @@ static int run_once(const char *path, int trace) {
     orb_certificate certificate;
     orb_distortion distortion;
     api_json_open(&points, '[');
-    double *sphere = ORB_NEW(ctx, double, 3 * (size_t)m.mesh.vertex_count), cpu = bench_cpu();
+    double *sphere = orb_alloc(ctx, 3 * (size_t)m.mesh.vertex_count, sizeof *sphere), cpu = bench_cpu();
     fine = sphere && orb_kernel_sampling(ctx, &m.mesh, &options, sphere, &report) == ORB_OK;
     cpu = bench_cpu() - cpu;
     fine = fine &&

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "bench.h"
-#include "merge/report.h"
 
 typedef struct remesh_run {
   const bench_options *options;
@@ -179,8 +178,8 @@ static int64_t count_against_centre(orb_context *ctx, const orb_supermesh *mesh,
 
 static int write_shape(orb_context *ctx, api_text *line, const remesh_run *run, const orb_supermesh *mesh, int32_t s,
                        const orb_shape_report *report) {
-  double *positions = ORB_NEW(ctx, double, 3 * (size_t)mesh->vertex_count);
-  unsigned char *inverted = ORB_NEW(ctx, unsigned char, mesh->triangle_count);
+  double *positions = orb_alloc(ctx, 3 * (size_t)mesh->vertex_count, sizeof *positions);
+  unsigned char *inverted = orb_alloc(ctx, (size_t)mesh->triangle_count, sizeof *inverted);
   int fine = positions && inverted &&
              orb_transfer_positions(ctx, &run->shape[s], mesh->places + (int64_t)s * mesh->vertex_count,
                                     mesh->vertex_count, positions) == ORB_OK &&

@@ -32,11 +32,12 @@ static int read_landmarks(const char *path, bench_set *set) {
 
 static int place_landmarks(orb_context *ctx, bench_set *set) {
   size_t shapes = (size_t)set->count;
-  set->landmarks = ORB_NEW0(ctx, orb_landmark, set->list.count);
-  set->places = ORB_NEW0(ctx, orb_place, (size_t)set->list.count * shapes);
+  set->landmarks = orb_alloc(ctx, (size_t)set->list.count, sizeof *set->landmarks);
+  set->places = orb_alloc(ctx, (size_t)set->list.count * shapes, sizeof *set->places);
   if (!set->landmarks || !set->places) {
     return 0;
   }
+  memset(set->landmarks, 0, (size_t)set->list.count * sizeof *set->landmarks);
   for (int32_t s = 0; s < set->count; s++) {
     orb_nearest *tree = NULL;
     for (int32_t l = 0; l < set->list.count; l++) {

@@ -149,7 +149,7 @@ static int same_connectivity(const bench_set *set) {
 static int write_dense(truth_run *run, api_text *line) {
   const orb_mesh *target = &run->set->mesh[1].mesh;
   int32_t count = same_connectivity(run->set) ? target->vertex_count : 0;
-  double *error = ORB_NEW(run->ctx, double, (size_t)count + 1);
+  double *error = orb_alloc(run->ctx, (size_t)count + 1, sizeof *error);
   for (int32_t v = 0; v < count && error; v++) {
     double at[3], d[3];
     surface_at(run, 1, run->result->alignment.shapes[0].points + 3 * v, at, NULL);
@@ -167,7 +167,7 @@ static int write_dense(truth_run *run, api_text *line) {
 static int write_held_out(truth_run *run, api_text *line) {
   const bench_set *set = run->set;
   int32_t count = set->list.count - run->given;
-  double *error = ORB_NEW(run->ctx, double, (size_t)count + 1);
+  double *error = orb_alloc(run->ctx, (size_t)count + 1, sizeof *error);
   orb_nearest *tree = NULL;
   const orb_aligned_shape *source = &run->result->alignment.shapes[0];
   if (!error || orb_nearest_create(run->ctx, source->mesh.positions, source->mesh.triangles,
@@ -298,8 +298,9 @@ static void moved_place(const truth_run *run, int s, size_t v, const double *mat
 static int write_halfway(const truth_run *run, const char *key, orb_fit fit, api_text *line) {
   const orb_supermesh *m = &run->result->supermesh;
   size_t n = (size_t)m->vertex_count;
-  double *x = ORB_NEW(run->ctx, double, 10 * n), area[3][PATCHES] = {{0}}, least = 1, thin = 0, whole = 0, moves[32];
-  int32_t *patch = ORB_NEW(run->ctx, int32_t, n);
+  double *x = orb_alloc(run->ctx, 10 * n, sizeof *x), area[3][PATCHES] = {{0}}, least = 1, thin = 0, whole = 0,
+         moves[32];
+  int32_t *patch = orb_alloc(run->ctx, n, sizeof *patch);
   int fine = x && patch && orb_asset_transforms(run->ctx, m, run->result->alignment.shapes, fit, moves) == ORB_OK;
   for (size_t v = 0; fine && v < n; v++) {
     double *end[2] = {x + 3 * v, x + 3 * (n + v)}, *half = x + 3 * (2 * n + v);

@@ -119,7 +119,7 @@ static orb_status note_corners(orb_context *ctx, bench_mesh *out) {
     int32_t number = out->mesh.source_triangle[t];
     count = number >= 0 && (size_t)number >= count ? (size_t)number + 1 : count;
   }
-  out->raw_corners = ORB_NEW(ctx, int32_t, 3 * count);
+  out->raw_corners = orb_alloc(ctx, 3 * count, sizeof *out->raw_corners);
   if (!out->raw_corners) {
     return ORB_E_NO_MEMORY;
   }

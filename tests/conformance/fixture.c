@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/buffer.h"
+#include "base/memory.h"
 #include "orbmorph/asset.h"
 
 enum { AROUND = 24, ROWS = 12, MAX_SHAPES = 6 };

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "adversarial.h"
+#include "base/memory.h"
 #include "orbmorph/embed.h"
 
 typedef struct extremes {

@@ -1,4 +1,5 @@
 #include "support_shapes.h"
+#include "base/memory.h"
 
 #include <math.h>
 #include <stdlib.h>

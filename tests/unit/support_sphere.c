@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "base/memory.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 

@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include "base/memory.h"
 #include "support_shapes.h"
 
 synthetic synthetic_make(orb_context *ctx, int levels, int32_t shape_count, synthetic_map map) {

@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "base/memory.h"
 #include "numeric/vec3.h"
 #include "support_align.h"
 #include "support_bodies.h"

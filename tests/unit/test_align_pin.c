@@ -13,6 +13,7 @@
 #include <cmocka.h>
 
 #include "align/rbf/warp.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 #include "support_align.h"
 #include "support_bodies.h"

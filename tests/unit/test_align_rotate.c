@@ -11,6 +11,7 @@
 #include "align/rotate/correlate.h"
 #include "align/rotate/procrustes.h"
 #include "align/rotate/rotate.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 #include "support_shapes.h"
 

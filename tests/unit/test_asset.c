@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "base/memory.h"
 #include "support_supermesh.h"
 
 /* Ellipsoids: axis s is 1 + s. Their normals are known: p / axis², scaled. */

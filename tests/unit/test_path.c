@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include "base/memory.h"
 #include "numeric/vec3.h"
 #include "support_shapes.h"
 #include "support_supermesh.h"

@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "base/memory.h"
 #include "numeric/vec3.h"
 #include "support_remesh.h"
 

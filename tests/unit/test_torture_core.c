@@ -11,6 +11,7 @@
 
 #include <cmocka.h>
 
+#include "base/memory.h"
 #include "orbmorph/format.h"
 #include "orbmorph/merge.h"
 #include "support_shapes.h"

@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include "base/memory.h"
 #include "support_shapes.h"
 #include "support_supermesh.h"
 #include "transfer/rotation.h"

@@ -11,6 +11,7 @@
 
 #include "align/find/found.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
 

@@ -26,6 +26,7 @@
 #include "align/rotate/procrustes.h"
 #include "align/rotate/rotate.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "embed/advance.h"
 #include "numeric/dense.h"
 #include "numeric/vec3.h"

@@ -12,6 +12,7 @@
 #include "align/find/tip_choice.h"
 #include "align/rotate/procrustes.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 static const double SAME_WAY = 1;    /* radians between rotations that count as one */

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 enum { SOURCES = 64 };

@@ -28,6 +28,8 @@
 #include "align/map/starts/place.h"
 #include "align/map/twist/untwist.h"
 #include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
 #include "embed/place.h"
 #include "numeric/vec3.h"
 

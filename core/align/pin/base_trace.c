@@ -5,6 +5,7 @@
 #include "align/pin/base_trace.h"
 #include "align/pin/path_tracer.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 typedef struct base_tracer {

@@ -14,6 +14,8 @@
 #include "align/pin/join.h"
 #include "align/pin/path_tracer.h"
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 static const double SLACK = 2, LONGEST = 200;

@@ -6,6 +6,7 @@
 #include "align/pin/patches.h"
 #include "align/pin/relax.h"
 #include "base/check.h"
+#include "base/memory.h"
 
 typedef struct joint {
   orb_sheet *sheets; /* copies that are refined */

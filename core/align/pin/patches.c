@@ -15,6 +15,8 @@
 #include "align/pin/patches.h"
 #include "align/pin/relax.h"
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 

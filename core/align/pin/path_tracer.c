@@ -5,6 +5,7 @@
 #include "align/pin/path_tracer.h"
 #include "align/pin/straighten.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 static const double *point_of(const orb_sheet *s, int32_t v) {

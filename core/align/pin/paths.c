@@ -3,6 +3,7 @@
 
 #include "align/pin/paths.h"
 #include "base/check.h"
+#include "base/memory.h"
 
 void orb_paths_free(orb_context *ctx, orb_paths *paths) {
   orb_free(ctx, paths->path);

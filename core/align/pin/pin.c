@@ -11,6 +11,8 @@
 #include "align/rotate/rotate.h"
 #include "align/sheet/landmarks.h"
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 
 enum { COARSE = 300, COARSE_A_LANDMARK = 6, WALKS = 2 };
 /* How far a sheet may grow: a little for landmarks that merely cross, much for those in quite another order. */

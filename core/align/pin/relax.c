@@ -4,6 +4,7 @@
 #include "align/pin/relax.h"
 #include "align/sheet/thin.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "embed/advance.h"
 #include "embed/resume.h"
 

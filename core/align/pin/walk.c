@@ -13,6 +13,9 @@
 #include "align/rotate/procrustes.h"
 #include "align/rotate/rotate.h"
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "embed/advance.h"
 #include "numeric/vec3.h"
 

@@ -20,6 +20,9 @@
 #include "align/sheet/landmarks.h"
 #include "align/sheet/untangle.h"
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 enum { HALVINGS = 4, RELAXATIONS = 8, RELAX_SWEEPS = 20 };

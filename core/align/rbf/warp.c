@@ -4,6 +4,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 

@@ -12,6 +12,7 @@
 #include "align/rotate/correlate.h"
 #include "align/rotate/procrustes.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 enum { SIDE = 12, CELLS = 6 * SIDE * SIDE, FIELD = 6, AXES = 200, TURNS = 24, STARTS = 12, DEPTH_MAX = 12 };

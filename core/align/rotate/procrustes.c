@@ -5,6 +5,7 @@
 
 #include "align/rotate/procrustes.h"
 #include "base/check.h"
+#include "base/error.h"
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 

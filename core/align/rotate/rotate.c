@@ -8,6 +8,9 @@
 #include "align/rotate/rotate.h"
 #include "align/sheet/landmarks.h"
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 static const double SPREAD = 0.03; /* second singular value of directions that span a plane: 10° to either side */

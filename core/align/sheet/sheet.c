@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 orb_status orb_sheet_create(orb_context *ctx, const orb_mesh *mesh, const double *points, orb_sheet *out) {

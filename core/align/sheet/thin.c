@@ -12,6 +12,7 @@
 #include "align/sheet/collapse.h"
 #include "align/sheet/thin.h"
 #include "base/check.h"
+#include "base/memory.h"
 
 enum { PASSES = 4 };
 static const double THIN = 0.03, KEPT = 0.5;

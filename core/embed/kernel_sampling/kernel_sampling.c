@@ -11,6 +11,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "embed/kernel_sampling/search.h"
 #include "embed/kernel_sampling/simplify.h"
 #include "numeric/predicates.h"

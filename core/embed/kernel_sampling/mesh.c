@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 /* Least area of a triangle, as a share of the mean: Eq. 3 divides by it. */

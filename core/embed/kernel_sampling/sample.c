@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/clones.h"
 #include "numeric/vec3.h"
 

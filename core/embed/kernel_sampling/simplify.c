@@ -14,6 +14,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 static const double MAX_ASPECT = 1e12; /* of a degenerate triangle, so that sums stay finite */

@@ -82,35 +82,14 @@ ORB_MUST_CHECK orb_status orb_context_check(orb_context *ctx);
 /* The error of the last call that failed. Valid until the next failing call. */
 const orb_error *orb_context_error(const orb_context *ctx);
 
-/* Sets a new error record (without facts) and returns status. Any thread: in a parallel loop the first failure wins,
- * until orb_error_clear(). */
-orb_status orb_fail(orb_context *ctx, orb_status status, const char *format, ...) ORB_PRINTF(3, 4);
-
-/* The record, to add facts to it after orb_fail(). */
-orb_error *orb_context_error_edit(orb_context *ctx);
-void orb_error_clear(orb_context *ctx);
-
-/* Reports progress. Any thread; reports that collide with another are dropped. */
-void orb_progress(orb_context *ctx, const char *stage, double fraction);
-
-/* From now on reports only this stage (NULL: any), for a stage that calls functions with stages of their own. The text
- * is not copied and must last until it is replaced. Returns the previous value, which the caller restores at the end.
- * Not within a parallel loop. */
-const char *orb_progress_only(orb_context *ctx, const char *stage);
-
-/* Memory. Blocks are 64-byte aligned. count × size is checked for overflow and against the budget; on failure the
- * result is NULL and the error ORB_E_NO_MEMORY. A count of 0 gives a valid block. Any thread. */
+/* Memory of the context, charged to its budget. Callers need it for the arrays of a mesh that they build themselves:
+ * orb_mesh_free(), orb_mesh_repair() and others free and replace those arrays. Blocks are 64-byte aligned,
+ * uninitialised, and freed by orb_free() alone. count × size is checked for overflow and against the budget; on failure
+ * the result is NULL and the error ORB_E_NO_MEMORY. A count of 0 gives a valid block. Any thread. */
 void *orb_alloc(orb_context *ctx, size_t count, size_t size);
-void *orb_calloc(orb_context *ctx, size_t count, size_t size);
-/* Grows or shrinks a block of orb_alloc() (or NULL); on failure returns NULL and keeps the old block. */
-void *orb_realloc(orb_context *ctx, void *block, size_t count, size_t size);
 void orb_free(orb_context *ctx, void *block); /* NULL is fine */
 size_t orb_memory_used(const orb_context *ctx);
 size_t orb_memory_peak(const orb_context *ctx);
-
-/* Typed allocation: ORB_NEW(ctx, double, 3 * n). */
-#define ORB_NEW(ctx, type, count) ((type *)orb_alloc((ctx), (size_t)(count), sizeof(type)))
-#define ORB_NEW0(ctx, type, count) ((type *)orb_calloc((ctx), (size_t)(count), sizeof(type)))
 
 /* How many threads loops run on, with the caller. */
 int orb_threads(const orb_context *ctx);
@@ -118,27 +97,18 @@ int orb_threads(const orb_context *ctx);
 /* The vector instructions in use: never ORB_CPU_AUTO. */
 orb_cpu orb_context_cpu(const orb_context *ctx);
 
-/* The body of a parallel loop: works on [begin, end) as thread number `thread` (0 ≤ thread < orb_threads()). */
-typedef void (*orb_loop_fn)(void *arg, int64_t begin, int64_t end, int thread);
-
-/* Runs body over [0, count) in chunks of `grain` (≥ 1), in parallel; returns when all are done. Chunks begin at
- * multiples of grain for any number of threads, so a sum of per-chunk sums taken in order does not depend on it. Which
- * thread takes which chunk is not fixed. Loops do not nest. One chunk, or one thread, runs in the caller. */
-void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg);
-
 /* A monotonic clock, in milliseconds and in seconds. */
 int64_t orb_clock_ms(void);
 double orb_clock(void);
 
-/* A growing buffer of bytes with a hard maximum. Zero-initialise all but `max`. */
+/* A growing buffer of bytes with a hard maximum: what writers such as orb_asset_write() append to. Callers append their
+ * own bytes, for example a file that they read in parts, under the same budget. Zero-initialise all but `max`. */
 typedef struct orb_buffer {
   unsigned char *data;
   size_t size, capacity;
   size_t max; /* 0: 4 GiB − 1 */
 } orb_buffer;
 ORB_MUST_CHECK orb_status orb_buffer_append(orb_context *ctx, orb_buffer *buffer, const void *bytes, size_t size);
-ORB_MUST_CHECK orb_status orb_buffer_printf(orb_context *ctx, orb_buffer *buffer, const char *format, ...)
-    ORB_PRINTF(3, 4);
 void orb_buffer_free(orb_context *ctx, orb_buffer *buffer);
 
 #ifdef __cplusplus

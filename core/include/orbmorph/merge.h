@@ -61,6 +61,13 @@ ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *sha
                                     const orb_merge_options *options, orb_merge_result *out);
 void orb_merge_result_free(orb_context *ctx, orb_merge_result *result);
 
+/* Marks the triangles of the supermesh that are inverted on shape s: they face away from the mean of the input's smooth
+ * normals at their corners, and also from its face at their centre on the sphere. positions: 3 a supermesh vertex, on
+ * the shape. inverted: receives 1 or 0 for each triangle. */
+ORB_MUST_CHECK orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh,
+                                            const orb_aligned_shape *shape, int32_t s, const double *positions,
+                                            unsigned char *inverted);
+
 #ifdef __cplusplus
 }
 #endif

@@ -17,6 +17,8 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
 #include "remesh/adaptive/collapse.h"
 #include "remesh/adaptive/merge.h"
 #include "remesh/adaptive/move.h"

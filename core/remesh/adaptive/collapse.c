@@ -17,6 +17,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/predicates.h"
 #include "remesh/adaptive/fill.h"
 #include "remesh/adaptive/quadric.h"

@@ -3,6 +3,8 @@
 #include "remesh/adaptive/merge.h"
 
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/vec3.h"
 #include "remesh/adaptive/star.h"
 #include "remesh/placed/marks.h"

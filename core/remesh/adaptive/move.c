@@ -9,6 +9,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 #include "remesh/placed/bound.h"

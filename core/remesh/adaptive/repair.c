@@ -10,6 +10,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/vec3.h"
 #include "remesh/adaptive/move.h"
 #include "remesh/adaptive/star.h"

@@ -13,6 +13,7 @@
 
 #include "base/check.h"
 #include "base/loops.h"
+#include "base/memory.h"
 #include "remesh/adaptive/collapse.h"
 #include "remesh/common/net_export.h"
 #include "remesh/overlay/overlay.h"

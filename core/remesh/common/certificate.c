@@ -5,6 +5,9 @@
  * homeomorphism away from the vertices, and its degree is the number of triangles that hold any one direction on no
  * edge. They are counted with the same exact test, so no solid angle has to be summed. Degree 1: a bijection. */
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/predicates.h"
 #include "orbmorph/remesh.h"
 

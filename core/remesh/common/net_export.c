@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "base/memory.h"
+
 orb_status orb_net_export(orb_context *ctx, const orb_net *net, orb_supermesh *out, int32_t *map) {
   int32_t vertices = 0, triangles = 0;
   for (int32_t v = 0; v < net->vertex_count; v++) {

@@ -8,6 +8,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 #include "remesh/overlay/build.h"
 #include "remesh/overlay/repair.h"

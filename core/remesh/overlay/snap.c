@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 

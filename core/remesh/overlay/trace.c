@@ -8,6 +8,9 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/vec3.h"
 
 enum { GRAIN = 512 }; /* vertices or edges a thread takes at a time */

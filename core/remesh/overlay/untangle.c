@@ -6,6 +6,8 @@
 #include "remesh/overlay/untangle.h"
 
 #include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 #include "orbmorph/mesh.h"

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/vec3.h"
 #include "remesh/placed/distance.h"
 

@@ -2,6 +2,7 @@
 
 #include "base/check.h"
 #include "base/loops.h"
+#include "base/memory.h"
 #include "remesh/common/net_export.h"
 #include "remesh/placed/bound.h"
 

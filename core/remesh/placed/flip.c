@@ -4,6 +4,8 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/predicates.h"
 #include "remesh/placed/bound.h"
 #include "remesh/placed/form.h"

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdatomic.h>
 
+#include "base/parallel.h"
 #include "numeric/vec3.h"
 #include "remesh/placed/marks.h"
 

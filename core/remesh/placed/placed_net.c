@@ -4,8 +4,10 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "base/grow.h"
 #include "base/loops.h"
+#include "base/memory.h"
 #include "mesh/normals.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"

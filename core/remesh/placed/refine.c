@@ -5,6 +5,8 @@
 #include <math.h>
 
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 #include "remesh/placed/bound.h"

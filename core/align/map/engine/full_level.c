@@ -3,6 +3,7 @@
 
 #include "align/map/engine/full_level.h"
 #include "base/check.h"
+#include "base/memory.h"
 
 orb_status orb_map_full_level(orb_map_run *c, const double *points, const orb_corner_table *s, orb_map_level *level) {
   orb_context *ctx = c->ctx;

@@ -11,6 +11,7 @@
 #include "align/map/engine/rounds.h"
 #include "align/map/engine/untangle.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/predicates.h"
 
 enum { FEW = 30, RELEASE_RINGS = 12, SOUND_RINGS = 4, CLEARINGS = 12, HOME_ROUNDS = 12, HOME_SWEEPS = 20 };

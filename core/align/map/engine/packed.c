@@ -8,6 +8,7 @@
 
 #include "align/map/engine/packed.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "embed/corner_table.h"
 
 void orb_map_packed_free(orb_context *ctx, orb_map_packed *p) {

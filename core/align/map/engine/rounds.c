@@ -6,6 +6,7 @@
 #include "align/map/engine/step.h"
 #include "align/map/engine/untangle.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 enum { SOFT_SWEEPS = 20, DRAW_ROUNDS = 5, DRAW_SWEEPS = 40, CLEARINGS = 8 };

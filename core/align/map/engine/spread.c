@@ -3,6 +3,7 @@
 
 #include "align/map/engine/spread.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 orb_status orb_map_spread(orb_context *ctx, const double *x, int32_t vertex_count, int32_t count, int32_t *out) {

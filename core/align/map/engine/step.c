@@ -9,6 +9,8 @@
 #include "align/map/engine/star.h"
 #include "align/map/engine/step.h"
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/vec3.h"
 
 enum { TRIES = 8, GRAIN = 32 };

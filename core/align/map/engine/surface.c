@@ -4,6 +4,7 @@
 
 #include "align/map/engine/surface.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 void orb_map_surface_free(orb_context *ctx, orb_map_surface *b) {

@@ -12,6 +12,8 @@
 
 #include "align/map/engine/untangle.h"
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/frame.h"
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"

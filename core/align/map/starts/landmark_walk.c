@@ -14,6 +14,7 @@
 #include "align/map/starts/mirror.h"
 #include "align/pin/walk.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 enum { LEVEL = 300, LEVEL_A_PAIR = 6 };

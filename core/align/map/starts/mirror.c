@@ -14,6 +14,8 @@
 #include "align/map/engine/surface.h"
 #include "align/map/starts/mirror.h"
 #include "base/check.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 

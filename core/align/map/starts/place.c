@@ -7,6 +7,8 @@
 #include "align/map/starts/registration.h"
 #include "base/check.h"
 #include "base/loops.h"
+#include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/vec3.h"
 
 typedef struct goal_job {

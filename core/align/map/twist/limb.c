@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 enum { STEPS = 1000, CHECK_EVERY = 64, MAX_CROSSINGS = 8192 };

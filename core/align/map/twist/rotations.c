@@ -5,6 +5,7 @@
 #include "align/map/twist/rotations.h"
 #include "base/check.h"
 #include "base/loops.h"
+#include "base/memory.h"
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 

@@ -16,6 +16,7 @@
 
 #include "align/map/twist/limb.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 

@@ -21,6 +21,7 @@
 #include "align/map/twist/untwist.h"
 #include "base/check.h"
 #include "base/loops.h"
+#include "base/memory.h"
 
 enum {
   MOST_STEPS = 8, /* by which limbs are turned back where one does not do */

@@ -1,0 +1,24 @@
+#include "worker/progress.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "metrics.h"
+
+void progress_enter(job_progress *progress, const char *stage) {
+  if (strncmp(progress->stage, stage, sizeof progress->stage - 1) == 0) {
+    return;
+  }
+  double now = orb_clock();
+  if (progress->stage[0]) {
+    metrics_stage(job_kind(progress->j) == API_JOB_EMBEDDING, progress->stage, now - progress->began);
+  }
+  snprintf(progress->stage, sizeof progress->stage, "%s", stage);
+  progress->began = now;
+}
+
+void progress_report(void *user, const char *stage, double fraction) {
+  job_progress *progress = user;
+  progress_enter(progress, stage);
+  queue_progress(progress->q, progress->j, stage, fraction);
+}
