@@ -10,12 +10,12 @@
 
 int64_t orb_context_max_triangles(const orb_context *ctx);
 
-/* Reports progress; any thread, may drop calls. */
+/* Reports progress. Any thread; reports that collide with another are dropped. */
 void orb_progress(orb_context *ctx, const char *stage, double fraction);
 
-/* From now on only this stage is reported: a function that works for one stage calls functions that have stages of
- * their own. NULL: any. The text is not copied and must last until it is replaced. Returns the previous stage, which
- * the caller restores at the end. Not within a parallel loop. */
+/* From now on reports only this stage (NULL: any), for a stage that calls functions with stages of their own. The text
+ * is not copied and must last until it is replaced. Returns the previous value, which the caller restores at the end.
+ * Not within a parallel loop. */
 const char *orb_progress_only(orb_context *ctx, const char *stage);
 
 #endif

@@ -5,7 +5,7 @@
 #include "orbmorph/context.h"
 
 void *orb_calloc(orb_context *ctx, size_t count, size_t size);
-/* Grows or shrinks a block of orb_alloc (or NULL); on failure NULL, the old block stays. */
+/* Grows or shrinks a block of orb_alloc() (or NULL); on failure returns NULL and keeps the old block. */
 void *orb_realloc(orb_context *ctx, void *block, size_t count, size_t size);
 
 /* Typed allocation: ORB_NEW(ctx, double, 3 * n). ORB_NEW0: zeroed. */

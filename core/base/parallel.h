@@ -4,13 +4,12 @@
 
 #include "orbmorph/context.h"
 
-/* The body of a parallel loop: work on [begin, end) as thread number `thread` (0 ≤ thread < orb_threads()). */
+/* The body of a parallel loop: works on [begin, end) as thread number `thread` (0 ≤ thread < orb_threads()). */
 typedef void (*orb_loop_fn)(void *arg, int64_t begin, int64_t end, int thread);
 
-/* Runs body over [0, count) in chunks of `grain` (≥ 1), in parallel; returns when all is done. Chunks begin at
- * multiples of grain whatever the number of threads, so a sum of per-chunk sums taken in order does not depend on it.
- * Which thread takes which chunk is not fixed. Loops must not be nested. One chunk or one thread: runs in the caller.
- */
+/* Runs body over [0, count) in chunks of `grain` (≥ 1), in parallel; returns when all are done. Chunks begin at
+ * multiples of grain for any number of threads, so a sum of per-chunk sums taken in order does not depend on it. Which
+ * thread takes which chunk is not fixed. Loops do not nest. One chunk, or one thread, runs in the caller. */
 void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg);
 
 /* Joins the threads and frees the pool. Does nothing where no parallel loop has run. */

@@ -4,13 +4,13 @@
 
 #include "orbmorph/mesh.h"
 
-/* The answer of orb_nearest_query() without a bound, bit for bit, but sooner, the nearer `known` is: a place with its
- * squared distance, both as orb_triangle_nearest() gave them, or triangle −1 if there is none. */
+/* The result of orb_nearest_query() without a bound, bit for bit, but faster the nearer `known` is: a place with its
+ * squared distance, both from orb_triangle_nearest(), or triangle −1 if none is known. */
 double orb_nearest_query_from(const orb_nearest *tree, const double p[3], const orb_place *known,
                               double known_distance2, orb_place *out);
 
-/* The nearest point of the triangle of these three corners (9 numbers): its coordinates; returns the squared distance.
- * A triangle without area counts as its edges. */
+/* The nearest point to p of the triangle with these corners (9 numbers): sets its barycentric coordinates, returns the
+ * squared distance. A triangle without area counts as its edges. */
 double orb_triangle_nearest(const double *corners, const double p[3], double at[3]);
 
 #endif

@@ -28,7 +28,7 @@ typedef struct orb_align_options {
   double max_growth; /* pin: a mesh may get so many times its triangles (or 2000 if it has fewer) more, at most 800000,
                         before landmarks are refused; 0: 64 */
 } orb_align_options;
-void orb_align_defaults(orb_align_options *options);
+ORB_API void orb_align_defaults(orb_align_options *options);
 
 typedef struct orb_align_shape {
   const orb_mesh *mesh;
@@ -84,10 +84,10 @@ typedef struct orb_alignment {
  * that cannot be met, the first that cannot be met together with those before it; ORB_E_BAD_OPTION for pin and rbf
  * without landmarks. About O(n log n) in triangles; random far-apart landmarks cost much more than like ones, but no
  * more than a bound: what needs more work than about a minute's is refused as such that cannot be met. */
-ORB_MUST_CHECK orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                                    const orb_landmark *landmarks, int32_t landmark_count,
-                                    const orb_align_options *options, orb_alignment *out);
-void orb_alignment_free(orb_context *ctx, orb_alignment *alignment);
+ORB_API ORB_MUST_CHECK orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                            const orb_landmark *landmarks, int32_t landmark_count,
+                                            const orb_align_options *options, orb_alignment *out);
+ORB_API void orb_alignment_free(orb_context *ctx, orb_alignment *alignment);
 
 #ifdef __cplusplus
 }

@@ -20,7 +20,7 @@ typedef struct orb_asset_options {
   int32_t path_steps; /* for ORB_PATH_RIGID: in-between targets for each pair of neighbours, 3 */
   int colors;         /* also write the later shapes' colours, as morphed attributes; 0 */
 } orb_asset_options;
-void orb_asset_defaults(orb_asset_options *options);
+ORB_API void orb_asset_defaults(orb_asset_options *options);
 
 /* What was written. */
 typedef struct orb_asset_facts {
@@ -46,22 +46,23 @@ typedef struct orb_asset_facts {
  * 16. ORB_E_NOT_CERTIFIED where that does not suffice.
  *
  * Errors: ORB_E_BAD_OPTION, ORB_E_TOO_LARGE (4 GiB), ORB_E_NO_MEMORY. Stage "write". O(V·N). */
-ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh,
-                                          const orb_aligned_shape *shapes, const char *const *names,
-                                          const orb_asset_options *options, orb_asset_facts *facts, orb_buffer *out);
+ORB_API ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh,
+                                                  const orb_aligned_shape *shapes, const char *const *names,
+                                                  const orb_asset_options *options, orb_asset_facts *facts,
+                                                  orb_buffer *out);
 
 /* How orb_asset_write() moves each shape: 16 doubles a shape, column-major as in glTF, which take the shape's own
  * coordinates to those of the asset. The identity for the first shape, and for all with ORB_FIT_NONE; else a rotation,
  * a translation and, with ORB_FIT_SIMILARITY, a uniform scale. O(V·N). */
-ORB_MUST_CHECK orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh,
-                                               const orb_aligned_shape *shapes, orb_fit fit, double *out);
+ORB_API ORB_MUST_CHECK orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh,
+                                                       const orb_aligned_shape *shapes, orb_fit fit, double *out);
 
 /* As orb_asset_write(), and maps each vertex of the file to its supermesh vertex: *vertices (allocated from the
  * context, freed by the caller) has facts->vertex_count numbers, the vertices of the primitives one after another. */
-ORB_MUST_CHECK orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *supermesh,
-                                                 const orb_aligned_shape *shapes, const char *const *names,
-                                                 const orb_asset_options *options, orb_asset_facts *facts,
-                                                 orb_buffer *out, int32_t **vertices);
+ORB_API ORB_MUST_CHECK orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *supermesh,
+                                                         const orb_aligned_shape *shapes, const char *const *names,
+                                                         const orb_asset_options *options, orb_asset_facts *facts,
+                                                         orb_buffer *out, int32_t **vertices);
 
 #ifdef __cplusplus
 }

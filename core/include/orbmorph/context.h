@@ -68,38 +68,38 @@ typedef struct orb_context_options {
 } orb_context_options;
 
 /* Makes a context; options NULL: all defaults. Threads start with the first parallel loop. ORB_E_NO_MEMORY. */
-ORB_MUST_CHECK orb_status orb_context_create(const orb_context_options *options, orb_context **out);
+ORB_API ORB_MUST_CHECK orb_status orb_context_create(const orb_context_options *options, orb_context **out);
 
 /* Joins the threads and frees the context. NULL is fine. Asserts that everything it allocated has been freed. */
-void orb_context_destroy(orb_context *ctx);
+ORB_API void orb_context_destroy(orb_context *ctx);
 
 /* Makes running and later calls end with ORB_E_CANCELLED, within 100 ms. Any thread. */
-void orb_context_cancel(orb_context *ctx);
+ORB_API void orb_context_cancel(orb_context *ctx);
 
 /* ORB_OK, ORB_E_CANCELLED or ORB_E_TIMEOUT, with the error set. Cheap: long loops call it often. Any thread. */
-ORB_MUST_CHECK orb_status orb_context_check(orb_context *ctx);
+ORB_API ORB_MUST_CHECK orb_status orb_context_check(orb_context *ctx);
 
 /* The error of the last call that failed. Valid until the next failing call. */
-const orb_error *orb_context_error(const orb_context *ctx);
+ORB_API const orb_error *orb_context_error(const orb_context *ctx);
 
 /* Memory of the context, charged to its budget. Callers need it for the arrays of a mesh that they build themselves:
  * orb_mesh_free(), orb_mesh_repair() and others free and replace those arrays. Blocks are 64-byte aligned,
  * uninitialised, and freed by orb_free() alone. count × size is checked for overflow and against the budget; on failure
  * the result is NULL and the error ORB_E_NO_MEMORY. A count of 0 gives a valid block. Any thread. */
-void *orb_alloc(orb_context *ctx, size_t count, size_t size);
-void orb_free(orb_context *ctx, void *block); /* NULL is fine */
-size_t orb_memory_used(const orb_context *ctx);
-size_t orb_memory_peak(const orb_context *ctx);
+ORB_API void *orb_alloc(orb_context *ctx, size_t count, size_t size);
+ORB_API void orb_free(orb_context *ctx, void *block); /* NULL is fine */
+ORB_API size_t orb_memory_used(const orb_context *ctx);
+ORB_API size_t orb_memory_peak(const orb_context *ctx);
 
 /* How many threads loops run on, with the caller. */
-int orb_threads(const orb_context *ctx);
+ORB_API int orb_threads(const orb_context *ctx);
 
 /* The vector instructions in use: never ORB_CPU_AUTO. */
-orb_cpu orb_context_cpu(const orb_context *ctx);
+ORB_API orb_cpu orb_context_cpu(const orb_context *ctx);
 
 /* A monotonic clock, in milliseconds and in seconds. */
-int64_t orb_clock_ms(void);
-double orb_clock(void);
+ORB_API int64_t orb_clock_ms(void);
+ORB_API double orb_clock(void);
 
 /* A growing buffer of bytes with a hard maximum: what writers such as orb_asset_write() append to. Callers append their
  * own bytes, for example a file that they read in parts, under the same budget. Zero-initialise all but `max`. */
@@ -108,8 +108,9 @@ typedef struct orb_buffer {
   size_t size, capacity;
   size_t max; /* 0: 4 GiB − 1 */
 } orb_buffer;
-ORB_MUST_CHECK orb_status orb_buffer_append(orb_context *ctx, orb_buffer *buffer, const void *bytes, size_t size);
-void orb_buffer_free(orb_context *ctx, orb_buffer *buffer);
+ORB_API ORB_MUST_CHECK orb_status orb_buffer_append(orb_context *ctx, orb_buffer *buffer, const void *bytes,
+                                                    size_t size);
+ORB_API void orb_buffer_free(orb_context *ctx, orb_buffer *buffer);
 
 #ifdef __cplusplus
 }

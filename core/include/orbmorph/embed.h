@@ -22,8 +22,8 @@ typedef struct orb_certificate {
  * by exact orientations. (The sum of solid angles / 4π is the same number, but only up to rounding.) Points that are
  * not finite make every triangle at them degenerate. Fails only without memory or when cancelled: the result is in
  * out->valid. O(F). */
-ORB_MUST_CHECK orb_status orb_certify(orb_context *ctx, const double *points, int32_t vertex_count,
-                                      const int32_t *triangles, int32_t triangle_count, orb_certificate *out);
+ORB_API ORB_MUST_CHECK orb_status orb_certify(orb_context *ctx, const double *points, int32_t vertex_count,
+                                              const int32_t *triangles, int32_t triangle_count, orb_certificate *out);
 
 enum { ORB_HISTOGRAM_BINS = 64 };
 typedef struct orb_measure {
@@ -45,8 +45,9 @@ typedef struct orb_distortion {
 } orb_distortion;
 
 /* Measures the map from positions to images, both 3 a vertex, over the same triangles. O(F). */
-ORB_MUST_CHECK orb_status orb_distortion_measure(orb_context *ctx, const double *positions, const double *images,
-                                                 const int32_t *triangles, int32_t triangle_count, orb_distortion *out);
+ORB_API ORB_MUST_CHECK orb_status orb_distortion_measure(orb_context *ctx, const double *positions,
+                                                         const double *images, const int32_t *triangles,
+                                                         int32_t triangle_count, orb_distortion *out);
 
 typedef enum orb_embed_method { ORB_EMBED_NEWTON = 0, ORB_EMBED_KERNEL_SAMPLING } orb_embed_method;
 typedef enum orb_preset { ORB_PRESET_DEFAULT = 0, ORB_PRESET_FAST, ORB_PRESET_QUALITY } orb_preset;
@@ -67,7 +68,7 @@ typedef struct orb_embed_options {
   double growth;                 /* of that number after each, 1.25 */
   int32_t qem_until;             /* QEM down to this many vertices, then Eq. 1 (section 9.2) */
 } orb_embed_options;
-void orb_embed_defaults(orb_embed_options *options);
+ORB_API void orb_embed_defaults(orb_embed_options *options);
 
 typedef struct orb_embed_timings {
   double check, simplify, embed, certify, total; /* seconds; check is 0 here: the caller measures orb_mesh_repair() */
@@ -89,9 +90,9 @@ typedef struct orb_embedding {
  * machine; between instruction sets (AVX-512, AVX2, none: chosen at run time) the last bits may differ. Stages:
  * "simplify", "embed", "certify". O(n log n) time, at most 250 bytes a triangle beside the mesh. docs/method.md
  * describes the method. */
-ORB_MUST_CHECK orb_status orb_embed(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
-                                    orb_embedding *out);
-void orb_embedding_free(orb_context *ctx, orb_embedding *embedding);
+ORB_API ORB_MUST_CHECK orb_status orb_embed(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
+                                            orb_embedding *out);
+ORB_API void orb_embedding_free(orb_context *ctx, orb_embedding *embedding);
 
 #ifdef __cplusplus
 }

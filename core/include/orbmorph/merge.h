@@ -13,7 +13,7 @@ typedef struct orb_merge_options {
   orb_remesh_options remesh;
   orb_asset_options asset;
 } orb_merge_options;
-void orb_merge_defaults(orb_merge_options *options);
+ORB_API void orb_merge_defaults(orb_merge_options *options);
 
 typedef struct orb_merge_timings {
   double align, remesh, transfer, write, total; /* seconds */
@@ -56,17 +56,17 @@ typedef struct orb_merge_result {
  * orb_align(). names: shape_count names for the morph targets. Errors: those of its parts, and ORB_E_DEGENERATE for a
  * shape too small to show in float32, such as one whose vertices all coincide. On an error *out is zeroed; else free it
  * with orb_merge_result_free(). */
-ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
-                                    int32_t shape_count, const orb_landmark *landmarks, int32_t landmark_count,
-                                    const orb_merge_options *options, orb_merge_result *out);
-void orb_merge_result_free(orb_context *ctx, orb_merge_result *result);
+ORB_API ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
+                                            int32_t shape_count, const orb_landmark *landmarks, int32_t landmark_count,
+                                            const orb_merge_options *options, orb_merge_result *out);
+ORB_API void orb_merge_result_free(orb_context *ctx, orb_merge_result *result);
 
 /* Marks the triangles of the supermesh that are inverted on shape s: they face away from the mean of the input's smooth
  * normals at their corners, and also from its face at their centre on the sphere. positions: 3 a supermesh vertex, on
  * the shape. inverted: receives 1 or 0 for each triangle. */
-ORB_MUST_CHECK orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh,
-                                            const orb_aligned_shape *shape, int32_t s, const double *positions,
-                                            unsigned char *inverted);
+ORB_API ORB_MUST_CHECK orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh,
+                                                    const orb_aligned_shape *shape, int32_t s, const double *positions,
+                                                    unsigned char *inverted);
 
 #ifdef __cplusplus
 }

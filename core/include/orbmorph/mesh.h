@@ -71,13 +71,13 @@ static inline int32_t orb_prev(int32_t h) {
 }
 
 /* Frees the arrays and zeroes the struct. */
-void orb_mesh_free(orb_context *ctx, orb_mesh *mesh);
+ORB_API void orb_mesh_free(orb_context *ctx, orb_mesh *mesh);
 
 /* Frees normals, texture coordinates, colours, materials and images, which an embedding does not need. */
-void orb_mesh_drop_attributes(orb_context *ctx, orb_mesh *mesh);
+ORB_API void orb_mesh_drop_attributes(orb_context *ctx, orb_mesh *mesh);
 
 /* A deep copy. */
-ORB_MUST_CHECK orb_status orb_mesh_copy(orb_context *ctx, const orb_mesh *mesh, orb_mesh *out);
+ORB_API ORB_MUST_CHECK orb_status orb_mesh_copy(orb_context *ctx, const orb_mesh *mesh, orb_mesh *out);
 
 typedef struct orb_topology {
   int64_t components;
@@ -88,7 +88,7 @@ typedef struct orb_topology {
 } orb_topology;
 
 /* Measures any index list: it need not be a surface. O(V + F) expected. */
-ORB_MUST_CHECK orb_status orb_mesh_topology(orb_context *ctx, const orb_mesh *mesh, orb_topology *out);
+ORB_API ORB_MUST_CHECK orb_status orb_mesh_topology(orb_context *ctx, const orb_mesh *mesh, orb_topology *out);
 
 /* Limits of coordinates: their largest magnitude; the least diagonal of the bounding box; and the least diagonal as a
  * share of the largest coordinate. Assets hold float32, which has about 8 steps over such a share; areas, volumes and
@@ -109,18 +109,18 @@ enum {
  * (otherwise ORB_E_DEGENERATE, see ORB_DIAGONAL_MIN). With ORB_REPAIR_NONE the only change is that a mesh that is
  * wholly inside-out is reversed. On failure the mesh is unspecified but can be freed, and the error carries the facts
  * (edges and vertices in the file's numbers). O(V + F) expected. */
-ORB_MUST_CHECK orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair);
+ORB_API ORB_MUST_CHECK orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair);
 
 /* Fills twin[h] for each of the 3·triangle_count half-edges of a closed oriented manifold; ORB_E_INTERNAL if the list
  * is not one. O(F) expected. */
-ORB_MUST_CHECK orb_status orb_mesh_twins(orb_context *ctx, const int32_t *triangles, int32_t triangle_count,
-                                         int32_t vertex_count, int32_t *twin);
+ORB_API ORB_MUST_CHECK orb_status orb_mesh_twins(orb_context *ctx, const int32_t *triangles, int32_t triangle_count,
+                                                 int32_t vertex_count, int32_t *twin);
 
 /* Surface area, signed enclosed volume, bounding box and its diagonal. */
 typedef struct orb_extent {
   double area, volume, min[3], max[3], diagonal;
 } orb_extent;
-void orb_mesh_extent(const orb_mesh *mesh, orb_extent *out);
+ORB_API void orb_mesh_extent(const orb_mesh *mesh, orb_extent *out);
 
 /* A point of a surface: triangle and barycentric coordinates (≥ 0, sum 1) of its three corners in order. */
 typedef struct orb_place {
@@ -129,20 +129,22 @@ typedef struct orb_place {
 } orb_place;
 
 /* The position of a place in space; exactly that of the vertex where a coordinate is 1. */
-void orb_place_position(const orb_mesh *mesh, const orb_place *place, double out[3]);
+ORB_API void orb_place_position(const orb_mesh *mesh, const orb_place *place, double out[3]);
 
 /* A place at a vertex: its first incident triangle, coordinate 1 there. O(F): meant for landmarks. */
-ORB_MUST_CHECK orb_status orb_place_of_vertex(orb_context *ctx, const orb_mesh *mesh, int32_t vertex, orb_place *out);
+ORB_API ORB_MUST_CHECK orb_status orb_place_of_vertex(orb_context *ctx, const orb_mesh *mesh, int32_t vertex,
+                                                      orb_place *out);
 
 /* Nearest points of a surface, by a bounding-volume tree: O(F log F) to build, O(log F) for a typical query. Any thread
  * may query. The tree copies what it needs of positions and triangles. */
 typedef struct orb_nearest orb_nearest;
-ORB_MUST_CHECK orb_status orb_nearest_create(orb_context *ctx, const double *positions, const int32_t *triangles,
-                                             int32_t triangle_count, orb_nearest **out);
-void orb_nearest_destroy(orb_context *ctx, orb_nearest *tree);
+ORB_API ORB_MUST_CHECK orb_status orb_nearest_create(orb_context *ctx, const double *positions,
+                                                     const int32_t *triangles, int32_t triangle_count,
+                                                     orb_nearest **out);
+ORB_API void orb_nearest_destroy(orb_context *ctx, orb_nearest *tree);
 /* The nearest place to p, closer than max_distance2 (INFINITY: no bound); returns the squared distance, INFINITY and
  * triangle −1 if none is closer. Ties go to the lowest triangle number. */
-double orb_nearest_query(const orb_nearest *tree, const double p[3], double max_distance2, orb_place *out);
+ORB_API double orb_nearest_query(const orb_nearest *tree, const double p[3], double max_distance2, orb_place *out);
 
 #ifdef __cplusplus
 }

@@ -16,14 +16,14 @@ typedef enum orb_remesh_method { ORB_REMESH_METHODS(ORB_REMESH_ENUMERATOR) ORB_R
 #undef ORB_REMESH_ENUMERATOR
 
 /* The method's name, such as "convex-hull"; NULL for a number that is no method. */
-const char *orb_remesh_method_name(orb_remesh_method method);
+ORB_API const char *orb_remesh_method_name(orb_remesh_method method);
 /* Finds the method of a name. Returns 0, and leaves *out, where there is none. */
-int orb_remesh_method_of_name(const char *name, orb_remesh_method *out);
+ORB_API int orb_remesh_method_of_name(const char *name, orb_remesh_method *out);
 /* Whether this build has the method; orb_remesh() returns ORB_E_UNSUPPORTED for one that it has not. */
-int orb_remesh_available(orb_remesh_method method);
+ORB_API int orb_remesh_available(orb_remesh_method method);
 /* Which options the method heeds, as a sum of the bits; it ignores the others. */
 enum { ORB_REMESH_HEEDS_TOLERANCE = 1, ORB_REMESH_HEEDS_MAX_TRIANGLES = 2 };
-unsigned orb_remesh_heeds(orb_remesh_method method);
+ORB_API unsigned orb_remesh_heeds(orb_remesh_method method);
 
 typedef struct orb_remesh_options {
   orb_remesh_method method; /* adaptive */
@@ -32,7 +32,7 @@ typedef struct orb_remesh_options {
   double tolerance;
   int64_t max_triangles; /* 0: no limit. Takes precedence over the tolerance. */
 } orb_remesh_options;
-void orb_remesh_defaults(orb_remesh_options *options);
+ORB_API void orb_remesh_defaults(orb_remesh_options *options);
 
 /* Always closed, manifold, genus zero: T = 2V − 4, and no flipped triangle on the sphere. */
 typedef struct orb_supermesh {
@@ -52,13 +52,14 @@ typedef struct orb_supermesh {
  * baseline of Peng & Timalsena 2016, Fig. 11: the Delaunay triangulation of all vertices, at most 4 million; its error
  * is proved but not controlled. options NULL: defaults. Errors: ORB_E_BAD_OPTION, ORB_E_UNSUPPORTED, ORB_E_TOO_LARGE,
  * ORB_E_NOT_CERTIFIED. Stage "remesh". */
-ORB_MUST_CHECK orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
-                                     int32_t landmark_count, const orb_remesh_options *options, orb_supermesh *out);
-void orb_supermesh_free(orb_context *ctx, orb_supermesh *supermesh);
+ORB_API ORB_MUST_CHECK orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
+                                             int32_t landmark_count, const orb_remesh_options *options,
+                                             orb_supermesh *out);
+ORB_API void orb_supermesh_free(orb_context *ctx, orb_supermesh *supermesh);
 
 /* Certifies triangles and points, exactly: closed, manifold, connected, T = 2V − 4, every triangle positive, degree 1.
  * Sets flipped and degree. ORB_E_NOT_CERTIFIED names what does not hold. orb_remesh() certifies every result. O(T). */
-ORB_MUST_CHECK orb_status orb_supermesh_check(orb_context *ctx, orb_supermesh *supermesh);
+ORB_API ORB_MUST_CHECK orb_status orb_supermesh_check(orb_context *ctx, orb_supermesh *supermesh);
 
 #ifdef __cplusplus
 }

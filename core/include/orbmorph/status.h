@@ -10,6 +10,22 @@
 extern "C" {
 #endif
 
+/* Marks the functions of the library; a shared one exports no others. A program that links the static library on
+ * Windows defines ORB_STATIC. ORB_BUILD is defined while the library itself is compiled. */
+#if defined(_WIN32)
+#if defined(ORB_STATIC)
+#define ORB_API
+#elif defined(ORB_BUILD)
+#define ORB_API __declspec(dllexport)
+#else
+#define ORB_API __declspec(dllimport)
+#endif
+#elif defined(__GNUC__)
+#define ORB_API __attribute__((visibility("default")))
+#else
+#define ORB_API
+#endif
+
 #if defined(__GNUC__)
 #define ORB_MUST_CHECK __attribute__((warn_unused_result))
 #define ORB_PRINTF(fmt, args) __attribute__((format(printf, fmt, args)))
@@ -50,7 +66,7 @@ typedef enum orb_status {
 } orb_status;
 
 /* The name of a status on the wire, such as "not-closed"; never NULL. */
-const char *orb_status_name(orb_status status);
+ORB_API const char *orb_status_name(orb_status status);
 
 #ifdef __cplusplus
 }

@@ -9,8 +9,8 @@ extern "C" {
 #endif
 
 /* The shape's positions at `count` places on it: 3 a place. */
-ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const orb_aligned_shape *shape,
-                                                 const orb_place *places, int32_t count, double *out);
+ORB_API ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const orb_aligned_shape *shape,
+                                                         const orb_place *places, int32_t count, double *out);
 
 /* How well shape s is reproduced; lengths in its own units. */
 typedef struct orb_shape_report {
@@ -23,8 +23,9 @@ typedef struct orb_shape_report {
 } orb_shape_report;
 /* Samples both ways, in parallel; the result does not depend on the number of threads. O(F log F) for F triangles of
  * both surfaces. */
-ORB_MUST_CHECK orb_status orb_shape_measure(orb_context *ctx, const orb_aligned_shape *shape,
-                                            const orb_supermesh *supermesh, int32_t shape_index, orb_shape_report *out);
+ORB_API ORB_MUST_CHECK orb_status orb_shape_measure(orb_context *ctx, const orb_aligned_shape *shape,
+                                                    const orb_supermesh *supermesh, int32_t shape_index,
+                                                    orb_shape_report *out);
 
 #ifdef __cplusplus
 }
