@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The Debian package from nothing: built by cpack, looked at by lintian, installed by apt into a fresh Debian 12, run
-# there as its own user for one merge, removed, and purged. Needs root, debootstrap and the Debian mirror.
+# The Debian packages from nothing: built by cpack, checked by lintian, installed by apt into a fresh Debian 12, removed,
+# and purged. There the daemon runs as its own user for one merge, and a program is built with liborbmorph-dev and run
+# with liborbmorph1 alone. Needs root, debootstrap and the Debian mirror.
 #   tests/long/package.sh [FOLDER]     FOLDER (/tmp/orbmorph-package) keeps the build and the bare Debian
 set -euo pipefail
 cd "$(dirname "$(realpath -- "${BASH_SOURCE[0]}")")/../.."
@@ -10,12 +11,13 @@ debian=$at/debian
 mkdir -p "$at"
 
 bash client/web/build.sh
-cmake -S . -B "$at/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DORB_TESTS=OFF >/dev/null
+cmake -S . -B "$at/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DORB_TESTS=OFF -DCMAKE_INSTALL_PREFIX=/usr >/dev/null
 cmake --build "$at/build"
+rm -f "$at"/build/*.deb
 (cd "$at/build" && cpack -G DEB)
-package=$(ls -t "$at"/build/orbmorph_*.deb | head -1)
+packages=("$at"/build/{orbmorph,liborbmorph1,liborbmorph-dev}_*.deb)
 if command -v lintian >/dev/null; then
-  lintian --allow-root --fail-on error "$package"
+  lintian --allow-root --fail-on error "${packages[@]}"
 fi
 
 if [ ! -f "$at/base/.whole" ]; then
@@ -37,7 +39,10 @@ for node in null urandom; do
   [ -e "$debian/dev/$node" ] || touch "$debian/dev/$node"
   mount --bind "/dev/$node" "$debian/dev/$node"
 done
-cp "$package" "$debian/root/orbmorph.deb"
+for package in "${packages[@]}"; do
+  name=$(basename "$package")
+  cp "$package" "$debian/root/${name%%_*}.deb"
+done
 cp tests/samples/dog.obj tests/samples/giraffe.off "$debian/root/"
 inside() { DEBIAN_FRONTEND=noninteractive LC_ALL=C chroot "$debian" "$@"; }
 inside apt-get update -qq
@@ -77,10 +82,21 @@ wait "$daemon" || true
 daemon=
 inside su -s /bin/sh orbmorph -c 'orbmorphd --check-data --data /var/lib/orbmorph'
 
-inside apt-get remove -qq -y orbmorph >"$at/remove.log" 2>&1
+# The library: a program built with the development package runs where only liborbmorph1 is left.
+[ ! -e "$debian/usr/include/orbmorph" ]
+inside apt-get install -qq -y --no-install-recommends /root/liborbmorph1.deb /root/liborbmorph-dev.deb gcc libc6-dev pkg-config \
+  >"$at/install.log" 2>&1 || { cat "$at/install.log"; exit 1; }
+inside sh -c 'cc -std=c17 /usr/share/doc/liborbmorph-dev/morph.c $(pkg-config --cflags --libs orbmorph) -o /root/morph'
+inside apt-get purge -qq -y liborbmorph-dev libqhull-dev libcjson-dev libmeshoptimizer-dev >"$at/remove.log" 2>&1
+inside apt-get autoremove -qq -y >>"$at/remove.log" 2>&1
+inside /root/morph /root/dog.obj /root/giraffe.off >"$at/library.glb"
+[ "$(head -c 4 "$at/library.glb")" = glTF ]
+inside apt-get purge -qq -y liborbmorph1 >>"$at/remove.log" 2>&1
+
+inside apt-get remove -qq -y orbmorph >>"$at/remove.log" 2>&1
 [ ! -e "$debian/usr/bin/orbmorphd" ] && [ -e "$debian/etc/orbmorph/orbmorphd.conf" ] && [ -e "$debian/var/lib/orbmorph/catalogue.sqlite" ]
 inside apt-get purge -qq -y orbmorph >>"$at/remove.log" 2>&1
 left=$(find "$debian" -xdev -name '*orbmorph*' -not -path '*/root/*' -not -path '*/var/log/*')
 [ -z "$left" ] || { echo "a purge leaves: $left"; exit 1; }
 ! grep -q orbmorph "$debian/etc/passwd" "$debian/etc/group"
-echo "the package installs, runs, and leaves nothing"
+echo "the packages install, run, and leave nothing"
