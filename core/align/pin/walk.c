@@ -312,6 +312,22 @@ static orb_status finish(orb_context *ctx, walker *w, double *points, int *good)
   return ORB_OK;
 }
 
+/* Refines all walked shapes, into points[s] of its own each. *good: all results are certified. Frees the walkers. */
+static orb_status finish_all(orb_context *ctx, walker *walkers, const orb_sheet *sheets, int32_t shape_count,
+                             double **points, int *good) {
+  *good = 1;
+  for (int32_t s = 0; s < shape_count && *good; s++) {
+    points[s] = ORB_NEW(ctx, double, 3 * (size_t)sheets[s].vertex_capacity);
+    if (!points[s]) {
+      return ORB_E_NO_MEMORY;
+    }
+    ORB_TRY(finish(ctx, &walkers[s], points[s], good));
+    walker_free(&walkers[s]);
+    orb_progress(ctx, "align", 0.4 + 0.6 * (s + 1) / shape_count);
+  }
+  return ORB_OK;
+}
+
 orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
                         int32_t count, orb_preset preset, int32_t coarse, int *stuck) {
   orb_status status = ORB_OK;
@@ -340,19 +356,10 @@ orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count
       goto end;
     }
   }
-  for (int32_t s = 0; s < shape_count; s++) {
-    int good = 0;
-    points[s] = ORB_NEW(ctx, double, 3 * (size_t)sheets[s].vertex_capacity);
-    if (!points[s]) {
-      status = ORB_E_NO_MEMORY;
-      goto end;
-    }
-    ORB_GO(status, finish(ctx, &walkers[s], points[s], &good), end);
-    walker_free(&walkers[s]);
-    orb_progress(ctx, "align", 0.4 + 0.6 * (s + 1) / shape_count);
-    if (!good) {
-      goto end;
-    }
+  int good;
+  ORB_GO(status, finish_all(ctx, walkers, sheets, shape_count, points, &good), end);
+  if (!good) {
+    goto end;
   }
   for (int32_t s = 0; s < shape_count; s++) {
     double *old = sheets[s].shape.points;

@@ -11,7 +11,10 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-static const double SNAP = 2e-7; /* barycentric: a landmark this near to an edge or corner counts as on it */
+/* Of barycentric coordinates. */
+static const double SNAP = 2e-7;     /* a landmark this near to an edge or corner counts as on it */
+static const double NEGATIVE = 1e-6; /* rounding below zero that is accepted, */
+static const double OFF_ONE = 1e-5;  /* and of their sum */
 
 /* Vertex `vertex` lies in given triangle `triangle` at `at`. */
 typedef struct anchor {
@@ -193,6 +196,29 @@ static orb_status insert_one(orb_context *ctx, inserter *in, int32_t triangle, c
   return ORB_OK;
 }
 
+/* Checks the place of a landmark, and cleans its coordinates of rounding. */
+static orb_status check_place(orb_context *ctx, const inserter *in, const orb_place *place, int32_t landmark,
+                              int32_t shape, double at[3]) {
+  if (place->triangle < 0 || place->triangle >= in->given_triangles) {
+    return bad_place(ctx, landmark, shape, "its triangle does not exist");
+  }
+  double sum = 0;
+  for (int k = 0; k < 3; k++) {
+    at[k] = place->at[k] > 0 ? place->at[k] : 0;
+    sum += at[k];
+    if (!(place->at[k] >= -NEGATIVE)) {
+      return bad_place(ctx, landmark, shape, "a barycentric coordinate is negative");
+    }
+  }
+  if (!(fabs(sum - 1) <= OFF_ONE)) {
+    return bad_place(ctx, landmark, shape, "its barycentric coordinates do not add up to 1");
+  }
+  for (int k = 0; k < 3; k++) {
+    at[k] /= sum;
+  }
+  return ORB_OK;
+}
+
 orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet *sheet, const orb_landmark *landmarks,
                                       int32_t landmark_count, int32_t shape_index) {
   orb_mesh *mesh = &sheet->shape.mesh;
@@ -212,27 +238,9 @@ orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet *sheet, const 
   memcpy(given, mesh->triangles, corners * sizeof *given);
   for (int32_t i = 0; i < landmark_count; i++) {
     const orb_place *place = &landmarks[i].at[shape_index];
-    if (place->triangle < 0 || place->triangle >= in.given_triangles) {
-      status = bad_place(ctx, i, shape_index, "its triangle does not exist");
-      goto end;
-    }
-    double at[3], sum = 0;
+    double at[3];
     int held;
-    for (int k = 0; k < 3; k++) {
-      at[k] = place->at[k] > 0 ? place->at[k] : 0;
-      sum += at[k];
-      if (!(place->at[k] >= -1e-6)) {
-        status = bad_place(ctx, i, shape_index, "a barycentric coordinate is negative");
-        goto end;
-      }
-    }
-    if (!(fabs(sum - 1) <= 1e-5)) {
-      status = bad_place(ctx, i, shape_index, "its barycentric coordinates do not add up to 1");
-      goto end;
-    }
-    for (int k = 0; k < 3; k++) {
-      at[k] /= sum;
-    }
+    ORB_GO(status, check_place(ctx, &in, place, i, shape_index, at), end);
     ORB_GO(status, insert_one(ctx, &in, place->triangle, at, &vertices[i], &held), end);
     if (!held) {
       status = bad_place(ctx, i, shape_index, "the sphere holds its triangle too small to split; move it to a vertex");

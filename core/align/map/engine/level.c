@@ -163,6 +163,35 @@ static orb_status fill_colours(orb_context *ctx, orb_map_level *l) {
   return ORB_OK;
 }
 
+/* Numbers the live vertices, and lists each live triangle once: at the corner of its lowest vertex. */
+static void gather(orb_map_level *l, const orb_corner_table *s, const unsigned char *alive,
+                   const unsigned char *pinned) {
+  int32_t count = 0, t = 0;
+  for (int32_t v = 0; v < s->vertex_count; v++) {
+    l->local[v] = alive[v] ? count : -1;
+    if (alive[v]) {
+      l->pinned[count] = pinned[v];
+      l->vertex[count++] = v;
+    }
+  }
+  ORB_ASSERT(count == l->count);
+  for (int32_t i = 0; i < l->count; i++) {
+    int32_t v = l->vertex[i], first = s->vertex_corner[v], c = first;
+    do {
+      int32_t q = s->corner[orb_corner_next(c)], r = s->corner[orb_corner_prev(c)];
+      if (v < q && v < r) {
+        ORB_ASSERT(t < l->triangle_count);
+        l->triangle[3 * (size_t)t] = i;
+        l->triangle[3 * (size_t)t + 1] = l->local[q];
+        l->triangle[3 * (size_t)t + 2] = l->local[r];
+        t++;
+      }
+      c = orb_corner_swing(s, c);
+    } while (c != first);
+  }
+  ORB_ASSERT(t == l->triangle_count);
+}
+
 orb_status orb_map_level_create(orb_context *ctx, const orb_map_params *params, const orb_corner_table *s,
                                 const unsigned char *alive, const unsigned char *pinned, const double *position,
                                 int32_t live, int32_t *local, orb_map_level *out) {
@@ -175,31 +204,7 @@ orb_status orb_map_level_create(orb_context *ctx, const orb_map_params *params, 
     status = ORB_E_NO_MEMORY;
     goto done;
   }
-  int32_t count = 0, t = 0;
-  for (int32_t v = 0; v < s->vertex_count; v++) {
-    local[v] = alive[v] ? count : -1;
-    if (alive[v]) {
-      l.pinned[count] = pinned[v];
-      l.vertex[count++] = v;
-    }
-  }
-  ORB_ASSERT(count == live);
-  /* Each live triangle once: at the corner of its lowest vertex. */
-  for (int32_t i = 0; i < live; i++) {
-    int32_t v = l.vertex[i], first = s->vertex_corner[v], c = first;
-    do {
-      int32_t q = s->corner[orb_corner_next(c)], r = s->corner[orb_corner_prev(c)];
-      if (v < q && v < r) {
-        ORB_ASSERT(t < l.triangle_count);
-        l.triangle[3 * (size_t)t] = i;
-        l.triangle[3 * (size_t)t + 1] = local[q];
-        l.triangle[3 * (size_t)t + 2] = local[r];
-        t++;
-      }
-      c = orb_corner_swing(s, c);
-    } while (c != first);
-  }
-  ORB_ASSERT(t == l.triangle_count);
+  gather(&l, s, alive, pinned);
   fill_triangles(&l, position, shape);
   fill_spokes(&l, shape);
   status = fill_colours(ctx, &l);

@@ -220,6 +220,42 @@ static void set_rigid(spline *s, const double r[9], const double t[3]) {
   }
 }
 
+/* Fits a rigid motion to the targets of the first controls and of the anchors; an anchor weighs as much as all controls
+ * together. 0: the rotation is not determined. */
+static int fit_rigid(const targets_run *run, int32_t samples, double r[9], double t[3]) {
+  double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, h[9] = {0}, weight_sum = 0;
+  for (int pass = 0; pass < 2; pass++) {
+    for (int32_t i = -run->anchors->count; i < samples; i++) {
+      const double *target = run->target + 3 * ((size_t)(i + run->anchors->count));
+      const double *p =
+          i < 0 ? run->s.centre + 3 * (size_t)(i + run->anchors->count) : run->x + 3 * (size_t)run->control[i];
+      double w = i < 0 ? (double)samples : 1;
+      for (int k = 0; k < 3; k++) {
+        if (pass == 0) {
+          from[k] += w * p[k];
+          to[k] += w * target[k];
+        } else {
+          for (int j = 0; j < 3; j++) {
+            h[3 * k + j] += w * (target[k] - to[k]) * (p[j] - from[j]);
+          }
+        }
+      }
+      weight_sum += pass == 0 ? w : 0;
+    }
+    for (int k = 0; k < 3 && pass == 0; k++) {
+      from[k] /= weight_sum;
+      to[k] /= weight_sum;
+    }
+  }
+  if (!orb_nearest_rotation(h, r)) {
+    return 0;
+  }
+  for (int k = 0; k < 3; k++) {
+    t[k] = to[k] - orb_dot(r + 3 * k, from);
+  }
+  return 1;
+}
+
 /* Rigid ICP from one rotation, over the first controls and the anchors; leaves the spline at the result. */
 static orb_status rigid_icp(targets_run *run, const double start[9], double *score) {
   const orb_map_params *params = run->params;
@@ -232,36 +268,10 @@ static orb_status rigid_icp(targets_run *run, const double start[9], double *sco
     orb_parallel_for(run->ctx, samples, 8, find_targets, run);
     ORB_TRY(orb_context_check(run->ctx));
     load_anchors(run);
-    double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, h[9] = {0}, total = 0, weight_sum = 0;
-    for (int pass = 0; pass < 2; pass++) {
-      for (int32_t i = -run->anchors->count; i < samples; i++) {
-        const double *target = run->target + 3 * ((size_t)(i + run->anchors->count));
-        const double *p =
-            i < 0 ? run->s.centre + 3 * (size_t)(i + run->anchors->count) : run->x + 3 * (size_t)run->control[i];
-        double w = i < 0 ? (double)samples : 1;
-        for (int k = 0; k < 3; k++) {
-          if (pass == 0) {
-            from[k] += w * p[k];
-            to[k] += w * target[k];
-          } else {
-            for (int j = 0; j < 3; j++) {
-              h[3 * k + j] += w * (target[k] - to[k]) * (p[j] - from[j]);
-            }
-          }
-        }
-        weight_sum += pass == 0 ? w : 0;
-      }
-      for (int k = 0; k < 3 && pass == 0; k++) {
-        from[k] /= weight_sum;
-        to[k] /= weight_sum;
-      }
-    }
-    if (!orb_nearest_rotation(h, r)) {
+    if (!fit_rigid(run, samples, r, t)) {
       break;
     }
-    for (int k = 0; k < 3; k++) {
-      t[k] = to[k] - orb_dot(r + 3 * k, from);
-    }
+    double total = 0;
     for (int32_t i = 0; i < samples; i++) {
       total += fmin(run->distance[i] < 0 ? cap : run->distance[i], cap);
     }
