@@ -3,6 +3,7 @@
 
 #include "align/map/engine/surface.h"
 #include "base/check.h"
+#include "base/memory.h"
 #include "numeric/vec3.h"
 
 enum { CHECK_EVERY = 4096 }; /* vertices between checks for cancellation; a power of two */
