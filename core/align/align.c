@@ -1,5 +1,4 @@
-/* The entry: checks the request, makes a working copy of each shape with the landmarks as vertices, runs the method,
- * certifies what it made, and hands the shapes over. */
+/* The entry: checks the request and chooses between given.c and auto.c. */
 #include "orbmorph/align.h"
 
 #include <math.h>
@@ -43,7 +42,7 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
                      orb_alignment *out) {
   memset(out, 0, sizeof *out);
   ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
-  const char *before = orb_progress_only(ctx, "align"); /* shapes are embedded anew on the way */
+  const char *before = orb_progress_only(ctx, "align"); /* hides the stages of the embeddings that alignment makes */
   orb_status status;
   if (options->method == ORB_ALIGN_AUTO && landmark_count == 0 && shape_count > 1) {
     status = orb_align_auto(ctx, shapes, shape_count, options, out);

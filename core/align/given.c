@@ -1,4 +1,4 @@
-/* Alignment by one method: a working copy of each shape gets the landmarks as vertices, the method runs, the result
+/* Alignment by one method: each shape gets a working copy with the landmarks as vertices, the method runs, the result
  * is certified, and the composed map is improved. */
 #include <math.h>
 #include <string.h>
@@ -50,7 +50,6 @@ static orb_status certify_all(orb_context *ctx, orb_sheet *sheets, int32_t shape
   return ORB_OK;
 }
 
-/* Aligned landmarks are not yet a good morph: the maps from the first shape's surface to the others' are improved. */
 orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from, orb_preset preset) {
   double sum = 0;
   for (int32_t s = 1; s < alignment->shape_count; s++) {

@@ -161,8 +161,8 @@ static orb_context *load_or_skip(const char *name, loaded *l) {
   return ctx;
 }
 
-/* The bent shape is nearly on the other one, but for a few folds about the fingers, at which landmarks hold, and, with
- * 14 and 20, mirror images of landmarks that lie a little beside their true places. */
+/* After registration the shape is nearly on the other one, except for a few folds around the fingers, which landmarks
+ * hold and, with 14 and 20, mirror landmarks that are a little off their true places. */
 static void more_landmarks_do_not_lead_astray(void **state) {
   static const int32_t given[] = {10, 14, 16, 20};
   (void)state;
@@ -182,9 +182,9 @@ static void more_landmarks_do_not_lead_astray(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* Four-legged animals, and in the first map that the starts come to several legs are twisted, some of which cannot be
- * turned back together. All landmarks say no more of the map than the first eight do, so they cost little more. */
-static void twisted_legs_are_turned_back_with_many_landmarks(void **state) {
+/* Four-legged animals: in the first map several legs are twisted, and some of them cannot be untwisted together. All
+ * landmarks say no more about the map than the first eight do, so they cost little more. */
+static void twisted_legs_are_untwisted_with_many_landmarks(void **state) {
   (void)state;
   loaded l;
   orb_context *ctx = load_or_skip("shrec397-shrec393", &l);
@@ -206,6 +206,6 @@ static void twisted_legs_are_turned_back_with_many_landmarks(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(real_pairs_meet),
                                      cmocka_unit_test(more_landmarks_do_not_lead_astray),
-                                     cmocka_unit_test(twisted_legs_are_turned_back_with_many_landmarks)};
+                                     cmocka_unit_test(twisted_legs_are_untwisted_with_many_landmarks)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

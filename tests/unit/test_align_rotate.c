@@ -22,7 +22,7 @@ static orb_context *make_context(int threads) {
   return ctx;
 }
 
-/* v turned by the unit quaternion q: v + 2w (u × v) + 2 u × (u × v). */
+/* v rotated by the unit quaternion q: v + 2w (u × v) + 2 u × (u × v). */
 static void turn(const double q[4], const double v[3], double out[3]) {
   double a[3], b[3];
   orb_cross(q + 1, v, a);
@@ -123,14 +123,14 @@ static orb_mesh make_body(orb_context *ctx, double **points) {
 static void search_finds_the_rotation(void **state) {
   (void)state;
   orb_context *ctx = make_context(1);
-  double *points, *turned;
+  double *points, *rotated;
   orb_mesh mesh = make_body(ctx, &points);
-  turned = ORB_NEW(ctx, double, 3 * (size_t)mesh.vertex_count);
+  rotated = ORB_NEW(ctx, double, 3 * (size_t)mesh.vertex_count);
   for (int32_t v = 0; v < mesh.vertex_count; v++) {
-    turn(QUATERNION, points + 3 * v, turned + 3 * v);
-    orb_normalize(turned + 3 * v);
+    turn(QUATERNION, points + 3 * v, rotated + 3 * v);
+    orb_normalize(rotated + 3 * v);
   }
-  orb_align_shape shapes[2] = {{&mesh, points}, {&mesh, turned}};
+  orb_align_shape shapes[2] = {{&mesh, points}, {&mesh, rotated}};
   orb_align_options options;
   orb_align_defaults(&options);
   options.method = ORB_ALIGN_ROTATE;
@@ -145,7 +145,7 @@ static void search_finds_the_rotation(void **state) {
   assert_true(out.shapes[1].certificate.valid);
   orb_alignment_free(ctx, &out);
   orb_free(ctx, points);
-  orb_free(ctx, turned);
+  orb_free(ctx, rotated);
   shape_free(ctx, &mesh);
   orb_context_destroy(ctx);
 }

@@ -8,9 +8,9 @@
 
 #include <cmocka.h>
 
-#include "align/find/guess.h"
+#include "align/find/candidates.h"
 #include "align/find/tip_choice.h"
-#include "align/find/tip_turns.h"
+#include "align/find/tip_rotations.h"
 #include "support_shapes.h"
 #include "support_shared.h"
 
@@ -20,8 +20,8 @@ enum { LIMBS = 5 };
 static const double limb[LIMBS][3] = {{1, 0, 0}, {-0.6, 0.8, 0}, {0, -0.8, 0.6}, {-0.48, -0.6, -0.64}, {0, 0.28, 0.96}};
 static const double reach[LIMBS] = {4, 3.4, 2.9, 2.5, 2.2};
 
-/* A ball with limbs, turned by thirds about (1, 1, 1) as often as is said. */
-static orb_mesh creature_of(orb_context *ctx, const double far[LIMBS], int levels, int turns) {
+/* A ball with limbs, rotated around (1, 1, 1) by this many thirds of a full turn. */
+static orb_mesh creature_of(orb_context *ctx, const double far[LIMBS], int levels, int thirds) {
   orb_mesh mesh = shape_ball(ctx, levels);
   for (int32_t v = 0; v < mesh.vertex_count; v++) {
     double *p = mesh.positions + 3 * (size_t)v, r = 1, q[3];
@@ -31,21 +31,21 @@ static orb_mesh creature_of(orb_context *ctx, const double far[LIMBS], int level
     }
     memcpy(q, p, sizeof q);
     for (int k = 0; k < 3; k++) {
-      p[(k + turns) % 3] = r * q[k];
+      p[(k + thirds) % 3] = r * q[k];
     }
   }
   return mesh;
 }
 
-static orb_mesh creature(orb_context *ctx, int levels, int turns) {
-  return creature_of(ctx, reach, levels, turns);
+static orb_mesh creature(orb_context *ctx, int levels, int thirds) {
+  return creature_of(ctx, reach, levels, thirds);
 }
 
 /* Which limb a vertex of the creature is the tip of, −1: none. */
-static int limb_at(const orb_mesh *mesh, int32_t v, int turns) {
+static int limb_at(const orb_mesh *mesh, int32_t v, int thirds) {
   double p[3], length = 0;
   for (int k = 0; k < 3; k++) {
-    p[k] = mesh->positions[3 * (size_t)v + (size_t)((k + turns) % 3)];
+    p[k] = mesh->positions[3 * (size_t)v + (size_t)((k + thirds) % 3)];
     length += p[k] * p[k];
   }
   for (int i = 0; i < LIMBS; i++) {
@@ -91,7 +91,7 @@ static void a_ball_has_none(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* The same creature, turned and more finely meshed: limb goes to limb. */
+/* The same creature, rotated and more finely meshed: limb goes to limb. */
 static void limbs_go_to_limbs(void **state) {
   (void)state;
   orb_context *ctx;
@@ -117,10 +117,10 @@ static void limbs_go_to_limbs(void **state) {
 }
 
 /* Does a map carry each limb to the same limb? */
-static int is_limb_to_limb(const orb_mesh *mesh, const orb_tips tips[2], const orb_tip_map *map, int turns) {
+static int is_limb_to_limb(const orb_mesh *mesh, const orb_tips tips[2], const orb_tip_map *map, int thirds) {
   for (int i = 0; i < tips[0].count; i++) {
     if (map->to[i] < 0 ||
-        limb_at(&mesh[1], tips[1].vertex[map->to[i]], turns) != limb_at(&mesh[0], tips[0].vertex[i], 0)) {
+        limb_at(&mesh[1], tips[1].vertex[map->to[i]], thirds) != limb_at(&mesh[0], tips[0].vertex[i], 0)) {
       return 0;
     }
   }
@@ -128,30 +128,30 @@ static int is_limb_to_limb(const orb_mesh *mesh, const orb_tips tips[2], const o
 }
 
 /* Where the longest limb of one creature is the shortest of the other, distances are of no use: what agrees best in
- * them takes the long limbs to the long ones. By turns limb goes to limb, whichever way round the other one stands. */
+ * them takes the long limbs to the long ones. By rotation, limb goes to limb, however the other one is rotated. */
 static void proportions_differ(void **state) {
   (void)state;
   static const double other[LIMBS] = {2.2, 2.5, 2.9, 3.4, 4};
   static orb_tip_map maps[ORB_TIP_MAPS_MAX];
-  orb_tip_map turned[ORB_TIP_TURNS];
-  for (int turns = 0; turns < 3; turns++) {
+  orb_tip_map rotated[ORB_TIP_ROTATIONS];
+  for (int thirds = 0; thirds < 3; thirds++) {
     orb_context *ctx;
     orb_tips tips[2];
     int32_t count;
     assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
-    orb_mesh mesh[2] = {creature(ctx, 4, 0), creature_of(ctx, other, 4, turns)};
+    orb_mesh mesh[2] = {creature(ctx, 4, 0), creature_of(ctx, other, 4, thirds)};
     const orb_mesh *both[2] = {&mesh[0], &mesh[1]};
     for (int s = 0; s < 2; s++) {
       assert_int_equal(orb_tips_find(ctx, &mesh[s], &tips[s]), ORB_OK);
       assert_int_equal(tips[s].count, LIMBS);
     }
     orb_tip_maps(&tips[0], &tips[1], maps, &count);
-    assert_false(is_limb_to_limb(mesh, tips, &maps[0], turns));
-    assert_int_equal(orb_tip_maps_by_turns(ctx, both, tips, turned, &count), ORB_OK);
-    assert_true(count >= 1 && is_limb_to_limb(mesh, tips, &turned[0], turns));
+    assert_false(is_limb_to_limb(mesh, tips, &maps[0], thirds));
+    assert_int_equal(orb_tip_maps_by_rotation(ctx, both, tips, rotated, &count), ORB_OK);
+    assert_true(count >= 1 && is_limb_to_limb(mesh, tips, &rotated[0], thirds));
     for (int32_t i = 0; i < count; i++) {
-      assert_true(i == 0 || turned[i].score <= turned[i - 1].score);
-      assert_true(i == 0 || !is_limb_to_limb(mesh, tips, &turned[i], turns));
+      assert_true(i == 0 || rotated[i].score <= rotated[i - 1].score);
+      assert_true(i == 0 || !is_limb_to_limb(mesh, tips, &rotated[i], thirds));
     }
     shape_free(ctx, &mesh[0]);
     shape_free(ctx, &mesh[1]);
@@ -159,8 +159,8 @@ static void proportions_differ(void **state) {
   }
 }
 
-/* The creature has no symmetry. Its limbs go to those of a finer copy by no turn at all, which is therefore tried
- * first; to those of its mirror image (x negated) they go at the same distances, but by no turn: that is not tried. */
+/* The creature has no symmetry. Its limbs go to those of a finer copy by no rotation at all, which is therefore tried
+ * first; to those of its mirror image (x negated) they go at the same distances, but by no rotation: that is not tried. */
 static void mirror_images_are_left_out(void **state) {
   (void)state;
   enum { MOST = 10 };
@@ -213,23 +213,23 @@ static int nearest_of(const orb_mesh *mesh, const int32_t *list, int count, int3
   return best;
 }
 
-/* What is guessed of two real shapes takes each tip to the landmark that it is at, of those set by hand, at least so
- * many. Skips where the shapes are not there. */
-static void assert_guess(const char *first, const char *second, int marks, const int32_t *mark[2], int least,
+/* The best candidate for two real shapes has at least so many pairs, and takes each tip to the landmark where it
+ * belongs, of those set by hand. Skips if the shapes are missing. */
+static void assert_candidate(const char *first, const char *second, int marks, const int32_t *mark[2], int least,
                          double clear) {
   orb_context *ctx;
   orb_mesh mesh[2];
-  orb_guess guess;
+  orb_candidate best;
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
   int found = shared_mesh(ctx, first, &mesh[0]);
   if (found) {
     assert_true(shared_mesh(ctx, second, &mesh[1]));
-    assert_int_equal(orb_guess_find(ctx, &mesh[0], &mesh[1], &guess), ORB_OK);
-    for (int k = 0; k < guess.count; k++) {
-      assert_int_equal(nearest_of(&mesh[0], mark[0], marks, guess.first[k]),
-                       nearest_of(&mesh[1], mark[1], marks, guess.second[k]));
+    assert_int_equal(orb_candidate_find(ctx, &mesh[0], &mesh[1], &best), ORB_OK);
+    for (int k = 0; k < best.count; k++) {
+      assert_int_equal(nearest_of(&mesh[0], mark[0], marks, best.first[k]),
+                       nearest_of(&mesh[1], mark[1], marks, best.second[k]));
     }
-    assert_true(guess.count >= least && guess.clear >= 0 && guess.clear < clear);
+    assert_true(best.count >= least && best.clear >= 0 && best.clear < clear);
     orb_mesh_free(ctx, &mesh[0]);
     orb_mesh_free(ctx, &mesh[1]);
   }
@@ -241,18 +241,18 @@ static void assert_guess(const char *first, const char *second, int marks, const
 }
 
 /* Feet, hands and nose of a man and an armadillo. Both stand upright and face one way, so that left goes to left,
- * though the map that turns the man about has nearly the same energy. */
+ * though the map that thirds the man about has nearly the same energy. */
 static void man_to_armadillo(void **state) {
   (void)state;
   static const int32_t man[] = {6615, 3218, 5906, 2445, 331}, armadillo[] = {10077, 9912, 14583, 14523, 13173};
-  assert_guess("human_man.obj", "armadillo_29k.obj", 5, (const int32_t *[]){man, armadillo}, 3, 0.9);
+  assert_candidate("human_man.obj", "armadillo_29k.obj", 5, (const int32_t *[]){man, armadillo}, 3, 0.9);
 }
 
 /* Four legs and the nose of a stout cow and a lean animal that faces another way. */
 static void cow_to_animal(void **state) {
   (void)state;
   static const int32_t cow[] = {1759, 439, 1732, 410, 847}, animal[] = {6774, 1910, 6727, 6824, 1590};
-  assert_guess("spot.obj", "shrec381.off", 5, (const int32_t *[]){cow, animal}, 4, 1);
+  assert_candidate("spot.obj", "shrec381.off", 5, (const int32_t *[]){cow, animal}, 4, 1);
 }
 
 int main(void) {

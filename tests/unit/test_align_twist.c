@@ -1,4 +1,4 @@
-/* Limbs that a map has twisted: rings about them, how far they are turned, and back. */
+/* Limbs that a map has twisted: rings around them, the angle of the twist, and undoing it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -91,7 +91,8 @@ static void drop(creature *c) {
 
 static void find(creature *c, const int32_t *held, int32_t held_count, orb_map_twists *out) {
   orb_map_image map = {c->mesh.vertex_count, c->mesh.triangle_count, c->mesh.triangles, c->x, c->image};
-  assert_int_equal(orb_map_twists_find(c->ctx, &c->surface, &map, held, held_count, out), ORB_OK);
+  const orb_map_params params = orb_map_params_of(ORB_PRESET_DEFAULT);
+  assert_int_equal(orb_map_twists_find(c->ctx, &params, &c->surface, &map, held, held_count, out), ORB_OK);
 }
 
 /* To the bit; but not what lies between the members, which is never set. */
@@ -100,9 +101,10 @@ static void assert_same_place(const orb_place *a, const orb_place *b) {
   assert_memory_equal(a->at, b->at, sizeof a->at);
 }
 
-/* About a part that is round, rings are circles, and angles along them those about the axis. */
-static void turns_go_round_the_axis(void **state) {
+/* On a round part, rings are circles, and angles along them are angles around the axis. */
+static void rotations_follow_the_rings(void **state) {
   (void)state;
+  const orb_map_params params = orb_map_params_of(ORB_PRESET_DEFAULT);
   creature c = make(0, 0, 0);
   size_t n = (size_t)c.mesh.vertex_count;
   unsigned char *inside = calloc(n, 1);
@@ -111,7 +113,7 @@ static void turns_go_round_the_axis(void **state) {
   for (size_t v = 0; v < n; v++) {
     inside[v] = from_axis(c.sphere + 3 * v) < FADED;
   }
-  assert_int_equal(orb_map_limb_heights(c.ctx, &c.surface, inside, c.pole, height), ORB_OK);
+  assert_int_equal(orb_map_limb_heights(c.ctx, &params, &c.surface, inside, c.pole, height), ORB_OK);
   for (int i = 0; i < 200; i++) {
     double far = 0.25 + 0.25 * i / 200, at = 0.7 * i, angle = (i % 9 - 4) * 0.8, p[3], q[3], wanted[3];
     for (int k = 0; k < 3; k++) {
@@ -121,7 +123,7 @@ static void turns_go_round_the_axis(void **state) {
     rotate(axis, angle, wanted);
     orb_place place;
     orb_locate(c.surface.locator, p, -1, &place);
-    assert_true(orb_map_limb_turn(&c.surface, height, angle, &place));
+    assert_true(orb_map_limb_rotate(&c.surface, height, angle, &place));
     orb_map_surface_at(&c.surface, &place, NULL, q, NULL);
     assert_true(fabs(place.at[0] + place.at[1] + place.at[2] - 1) < 1e-9);
     assert_true(fabs(from_axis(q) - far) < 0.06 * far);
@@ -133,7 +135,7 @@ static void turns_go_round_the_axis(void **state) {
     outside.triangle = orb_dot(p, axis) < -0.5 ? t : outside.triangle;
   }
   as_it_was.triangle = outside.triangle;
-  assert_false(orb_map_limb_turn(&c.surface, height, 1, &outside));
+  assert_false(orb_map_limb_rotate(&c.surface, height, 1, &outside));
   assert_same_place(&outside, &as_it_was);
   free(inside);
   free(height);
@@ -200,12 +202,12 @@ static void what_is_no_twist_stays(void **state) {
   nothing_is_found(0, 0, 0);
   nothing_is_found(40, 0, 0);
   nothing_is_found(0, 100, 0); /* a limb that is bent, not twisted */
-  nothing_is_found(180, 0, 1); /* two partners on one limb are known: it is not to be turned */
+  nothing_is_found(180, 0, 1); /* two partners on one limb are known: it is not untwisted */
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(turns_go_round_the_axis),
+      cmocka_unit_test(rotations_follow_the_rings),
       cmocka_unit_test(twists_are_measured_and_undone),
       cmocka_unit_test(what_is_no_twist_stays),
   };

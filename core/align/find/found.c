@@ -1,11 +1,12 @@
-/* The landmarks that an alignment without landmarks amounts to: points of the first shape that are far from each other
- * in space, which takes in the tips of its limbs first, and where the aligned spheres put them on the other shapes.
- * They say to a reader what was matched with what, and are places that can be corrected and sent again.
+/* The found landmarks: points of the first shape that are far from each other in space, tips of limbs first, and where
+ * the aligned spheres put them on the other shapes. They show a reader what was matched with what; a client can correct
+ * them and send them as landmarks.
  *
- * The confidence looks at a patch of triangles about the point and at its image on each other shape, both shapes scaled
- * to equal area. Each triangle has the symmetric Dirichlet energy E = (|J|² + |J⁻¹|²)/4 of the linear map J to its
- * image: 1 for a rigid motion, more for any other. The mean of 1/E by area is the confidence on that shape, the least
- * of all shapes that of the landmark. All of them fall where another correspondence is nearly as good. */
+ * The confidence compares a patch of triangles around the point with its image on each other shape, with both shapes
+ * scaled to equal area. Each triangle has the symmetric Dirichlet energy E = (|J|² + |J⁻¹|²)/4 of the linear map J to
+ * its image: 1 for a rigid motion, more for any other map. The mean of 1/E, weighted by area, is the confidence on that
+ * shape; the least over all shapes is that of the landmark. All confidences fall where another candidate is nearly as
+ * good. */
 #include <math.h>
 #include <string.h>
 
@@ -15,8 +16,9 @@
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
 
-enum { PATCH = 64 };
-static const double CLEAR = 0.5; /* a correspondence that is so far ahead of all others takes nothing off */
+/* Chosen by trial on the pairs of docs/bench-truth.md. */
+enum { PATCH = 64 };             /* triangles that a confidence compares: more are less local */
+static const double CLEAR = 0.5; /* a candidate that is this far ahead of all others lowers no confidence */
 
 typedef struct finder {
   const orb_alignment *alignment;
@@ -46,7 +48,7 @@ double orb_triangle_likeness(double p[3][3], double q[3][3], double *area) {
   return isfinite(energy) && energy >= 1 ? 1 / energy : energy < 1 ? 1 : 0; /* below 1 by rounding only; NaN: 0 */
 }
 
-/* The triangles nearest to the first one, over edges. */
+/* The first triangle and those nearest to it over edges. */
 static int32_t take_patch(const finder *f, int32_t first, int32_t patch[PATCH]) {
   int32_t count = 1;
   patch[0] = first;
@@ -123,8 +125,8 @@ static orb_status fill(orb_context *ctx, const finder *f, int32_t v, int32_t i, 
   return orb_context_check(ctx);
 }
 
-/* Farthest points: the first is the vertex farthest from vertex 0, each further one that farthest from all before.
- * Stops early where only vertices at the same positions are left. */
+/* Farthest points: first the vertex farthest from vertex 0, then each time the one farthest from all before it. Stops
+ * early if only vertices at the same positions are left. */
 static orb_status spread(orb_context *ctx, const orb_mesh *mesh, int32_t out[ORB_FOUND_MAX], int32_t *count) {
   double *far = ORB_NEW(ctx, double, mesh->vertex_count);
   if (!far) {

@@ -4,8 +4,8 @@
 
 #include "orbmorph/align.h"
 
-/* Fills found, found_points and confidence of an alignment made without landmarks: its meshes are those given, unsplit.
- * clear, 0 to 1: how far behind other correspondences are (guess.h). See found.c. */
+/* Fills found, found_points and confidence of an alignment made without landmarks; its meshes are the given ones,
+ * unsplit. clear, 0 to 1: how far other candidates are behind (candidates.h). found.c describes the method. */
 ORB_MUST_CHECK orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment, double clear);
 
 /* 1/E of the linear map from triangle p to triangle q, E = (|J|² + |J⁻¹|²)/4: 1 for a rigid motion, 0 where it is

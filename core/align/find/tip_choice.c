@@ -1,10 +1,10 @@
-/* Which maps of tips are worth a trial.
+/* Which tip maps are worth a trial.
  *
- * The maps that agree best in their distances are mostly one map and its small variations: legs change places among
- * themselves, and another map that turns the shape front to back comes only after dozens of them. So they are sorted by
- * the way the second shape would have to be turned in space for its tips to fit, seen from the middle of the surface,
- * and are taken by turns from each such way round, the best first. Of maps about the same way round those count more
- * whose tips fit; maps that a mirror image would fit clearly better turn the surface inside out and are left out.
+ * The maps whose distances agree best are mostly one map and its small variations: legs change places among themselves,
+ * and a map that swaps front and back comes only after dozens of them. So maps are grouped by the rotation in space
+ * that fits the tips of the second shape, as seen from the centre of the surface, and the groups take turns, best map
+ * first. Within a group, maps whose tips fit count more. A map that a mirror image fits clearly better would turn the
+ * surface inside out; it is left out.
  */
 #include <math.h>
 #include <string.h>
@@ -15,21 +15,21 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-static const double SAME_WAY = 1;    /* radians between rotations that count as one */
-static const double MIRRORED = 0.15; /* of the fit: a mirror image that gains more is the better one */
-static const double LEAST_FIT = 0.1;
+static const double SAME_GROUP = 1;  /* radians between rotations that count as one */
+static const double MIRRORED = 0.15; /* of the fit: a map whose mirror image gains more is left out */
+static const double LEAST_FIT = 0.1; /* factor of a map's score, however badly its tips fit */
 
-typedef struct way {
+typedef struct group {
   double rotation[9];
   int32_t taken;
-} way;
+} group;
 
 typedef struct candidate {
   double value;
-  int32_t way; /* −1: left out */
+  int32_t group; /* −1: left out */
 } candidate;
 
-/* By area, of the surface. */
+/* The centre of area of the surface. */
 static void middle_of(const orb_mesh *mesh, double out[3]) {
   double total = 0, sum[3] = {0};
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
@@ -60,8 +60,7 @@ void orb_tips_from_middle(const orb_mesh *mesh, const orb_tips *tips, double (*o
   }
 }
 
-/* The rotation that fits the tips best, and how well: 1 where they are similar. *mirror: how much better a reflection
- * fits. */
+/* The rotation that fits the tips best, and how well: 1 where they are similar. *mirror: the gain of a reflection. */
 static orb_status fit(orb_context *ctx, double (*a)[3], double (*b)[3], int32_t count, const orb_tip_map *map,
                       double rotation[9], double *value, double *mirror) {
   double c[9] = {0}, singular[3], aa = 0, bb = 0;
@@ -80,22 +79,22 @@ static orb_status fit(orb_context *ctx, double (*a)[3], double (*b)[3], int32_t 
   return ORB_OK;
 }
 
-static int is_same_way(const double x[9], const double y[9]) {
+static int is_same_group(const double x[9], const double y[9]) {
   double trace = 0;
   for (int k = 0; k < 9; k++) {
     trace += x[k] * y[k];
   }
-  return trace > 1 + 2 * cos(SAME_WAY);
+  return trace > 1 + 2 * cos(SAME_GROUP);
 }
 
-/* Takes the best of a way that was taken from least; −1: nothing is left. */
-static int32_t take_next(const candidate *list, const way *ways, int32_t count) {
+/* The best map of a group from which the fewest were taken; −1: none is left. */
+static int32_t take_next(const candidate *list, const group *groups, int32_t count) {
   int32_t best = -1;
   for (int32_t i = 0; i < count; i++) {
-    if (list[i].way < 0) {
+    if (list[i].group < 0) {
       continue;
     }
-    int32_t taken = ways[list[i].way].taken, least = best < 0 ? taken : ways[list[best].way].taken;
+    int32_t taken = groups[list[i].group].taken, least = best < 0 ? taken : groups[list[best].group].taken;
     best = best < 0 || taken < least || (taken == least && list[i].value > list[best].value) ? i : best;
   }
   return best;
@@ -106,11 +105,11 @@ orb_status orb_tip_maps_choose(orb_context *ctx, const orb_mesh *const meshes[2]
                                int32_t *chosen_count) {
   double at[2][ORB_TIPS_MAX][3], rotation[9], value, mirror;
   orb_status status = ORB_OK;
-  int32_t way_count = 0;
-  way *ways = ORB_NEW0(ctx, way, (size_t)count + 1);
+  int32_t group_count = 0;
+  group *groups = ORB_NEW0(ctx, group, (size_t)count + 1);
   candidate *list = ORB_NEW0(ctx, candidate, (size_t)count + 1);
   *chosen_count = 0;
-  if (!ways || !list) {
+  if (!groups || !list) {
     status = ORB_E_NO_MEMORY;
     goto end;
   }
@@ -119,26 +118,26 @@ orb_status orb_tip_maps_choose(orb_context *ctx, const orb_mesh *const meshes[2]
   }
   for (int32_t i = 0; i < count; i++) {
     ORB_GO(status, fit(ctx, at[0], at[1], tips[0].count, &maps[i], rotation, &value, &mirror), end);
-    list[i].way = -1;
+    list[i].group = -1;
     if (mirror > MIRRORED || !(maps[i].score > 0)) {
       continue;
     }
     int32_t w = 0;
-    while (w < way_count && !is_same_way(rotation, ways[w].rotation)) {
+    while (w < group_count && !is_same_group(rotation, groups[w].rotation)) {
       w++;
     }
-    if (w == way_count) {
-      memcpy(ways[way_count++].rotation, rotation, sizeof rotation);
+    if (w == group_count) {
+      memcpy(groups[group_count++].rotation, rotation, sizeof rotation);
     }
     list[i] = (candidate){maps[i].score * fmax(value, LEAST_FIT), w};
   }
-  for (int32_t i; *chosen_count < most && (i = take_next(list, ways, count)) >= 0;) {
+  for (int32_t i; *chosen_count < most && (i = take_next(list, groups, count)) >= 0;) {
     chosen[(*chosen_count)++] = i;
-    ways[list[i].way].taken++;
-    list[i].way = -1;
+    groups[list[i].group].taken++;
+    list[i].group = -1;
   }
 end:
-  orb_free(ctx, ways);
+  orb_free(ctx, groups);
   orb_free(ctx, list);
   return status;
 }

@@ -1,13 +1,16 @@
-/* How the tips of two shapes may belong together: all injective partial maps are tried, depth first; with eight tips
- * each that are 1.4 million, fewer where some pairs are ruled out. */
+/* Tip maps: tries all injective partial maps, depth first. With eight tips each there are 1.4 million, fewer where some
+ * pairs are ruled out. */
 #include <math.h>
 #include <string.h>
 
 #include "align/find/tip_maps.h"
 
-enum { LEAST = 3 };
-static const double PAIR_SPREAD = 0.35, FAR_SPREAD = 0.25, WORST = -2; /* of logarithms of quotients */
-static const double PAIR_SHARE = 0.05; /* of a pair's distances, where directions say more */
+/* The weights were chosen by trial on the pairs of docs/bench-truth.md. */
+enum { LEAST = 3 }; /* tips of a map */
+/* Two lengths agree by 1 − r², at least WORST, with r the logarithm of their ratio over the spread: of the distance of
+ * two tips, and of a tip's mean distance from the surface. */
+static const double PAIR_SPREAD = 0.35, FAR_SPREAD = 0.25, WORST = -2;
+static const double PAIR_SHARE = 0.05; /* weight of distances where directions are known, which say more */
 
 typedef struct matcher {
   const orb_tips *a, *b;
@@ -23,7 +26,7 @@ static double agreement(double x, double y, double spread, double worst) {
   return value > worst ? value : worst;
 }
 
-/* Is one a part of the other? */
+/* Is one map a part of the other? */
 static int consistent(const orb_tip_map *x, const orb_tip_map *y, int32_t count) {
   int x_in_y = 1, y_in_x = 1;
   for (int32_t i = 0; i < count; i++) {
@@ -33,7 +36,7 @@ static int consistent(const orb_tip_map *x, const orb_tip_map *y, int32_t count)
   return x_in_y || y_in_x;
 }
 
-/* Into the list, in order, where it is good enough; parts of it leave. */
+/* Inserts a map into the ordered list if it is good enough, and removes maps that are parts of it. */
 static void keep(matcher *m, const orb_tip_map *map) {
   if (m->count == m->capacity && map->score <= m->list[m->count - 1].score) {
     return;
@@ -112,7 +115,7 @@ static void try_all(matcher *m) {
   }
 }
 
-/* What pairs of tips say by their distances, at so much a pair. */
+/* Fills how well the distances of pairs of tips agree, weighted by `share`. */
 static void fill_pairs(matcher *m, double share, double worst) {
   for (int32_t i = 0; i < m->a->count; i++) {
     for (int32_t k = 0; k < m->b->count; k++) {

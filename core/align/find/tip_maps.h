@@ -10,12 +10,12 @@ typedef struct orb_tip_map {
   double score; /* how well distances, or directions, agree, summed over tips and pairs of them */
 } orb_tip_map;
 
-/* The maps of at least three tips whose distances agree best, best first; none is a part of another. Which way round
- * they turn is not looked at: mirror images are among them. */
+/* The maps of at least three tips whose distances agree best, best first; none is a part of another. Distances do not
+ * tell a map from its mirror image, so both are in the list. */
 void orb_tip_maps(const orb_tips *a, const orb_tips *b, orb_tip_map out[ORB_TIP_MAPS_MAX], int32_t *count);
 
-/* The one map of at least three tips of which most tips lie beside each other, with distances that agree. beside: 1
- * at the same place, not positive: not to be matched. 0: there is none. */
+/* The map of at least three tips under which tips lie nearest beside each other and distances agree. beside: 1 at the
+ * same place; pairs that are not positive are not matched. 0: there is no such map. */
 int orb_tip_map_beside(const orb_tips *a, const orb_tips *b, double (*beside)[ORB_TIPS_MAX], orb_tip_map *out);
 
 #endif

@@ -2,8 +2,8 @@
  *
  * The mean distance of a point from the rest of the surface is greatest at the tips of limbs (the integral geodesic of
  * Hilaga et al. 2001, as Zhang et al. 2005 use it). Distances are those of shortest paths over edges and, across each
- * edge, between the two vertices beside it, which makes them nearly independent of how the mesh is laid. Sixty-four
- * sources spread by farthest points stand for all points.
+ * edge, between the two opposite vertices, which makes them nearly independent of the triangulation. A few sources,
+ * spread by farthest points, represent all points.
  */
 #include "align/find/tips.h"
 
@@ -14,9 +14,10 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-enum { SOURCES = 64 };
+/* Chosen by trial on the pairs of docs/bench-truth.md. */
+enum { SOURCES = 64 };             /* each costs one search of the mesh */
 static const double APART = 0.2;   /* of the mean distance: tips nearer to each other count as one */
-static const double FARTHER = 1.1; /* than the mean: what is a tip at all */
+static const double FARTHER = 1.1; /* a tip's distance relative to the mean distance, at least */
 
 typedef struct link_to {
   int32_t vertex;
@@ -43,8 +44,8 @@ static void graph_free(graph *g) {
   orb_free(g->ctx, g->heap);
 }
 
-/* The straight way between the vertices beside edge a–b, both triangles laid flat; INFINITY where it passes the edge
- * outside. */
+/* The length of the straight line between the vertices c and d opposite to edge a–b, with both triangles unfolded into
+ * a plane; INFINITY where it does not cross the edge. */
 static double across(const double *a, const double *b, const double *c, const double *d) {
   double e[3], u[3], w[3], length, cx, cy, dx, dy;
   orb_sub(b, a, e);
@@ -144,7 +145,7 @@ static void distances(graph *g, int32_t from, double *out) {
   }
 }
 
-/* Mean distance of every vertex from the sources; *mean: of all. buffer: two doubles a vertex. */
+/* The mean distance of every vertex from the sources; *mean: over all vertices. buffer: two doubles a vertex. */
 static orb_status mean_distances(graph *g, double *far, double *buffer, double *mean) {
   double *one = buffer, *nearest = buffer + g->vertices;
   int32_t source = 0;
@@ -152,7 +153,7 @@ static orb_status mean_distances(graph *g, double *far, double *buffer, double *
     far[v] = 0;
     nearest[v] = INFINITY;
   }
-  for (int i = -1; i < SOURCES; i++) { /* the first one only finds where to begin */
+  for (int i = -1; i < SOURCES; i++) { /* round −1 only finds the first source */
     distances(g, source, one);
     int32_t next = 0;
     for (int32_t v = 0; v < g->vertices; v++) {
@@ -180,7 +181,7 @@ static int is_peak(const graph *g, const double *far, int32_t v) {
   return 1;
 }
 
-/* The farthest peak below *below that no taken tip is near; −1: none. */
+/* The farthest peak that is beyond `least` and not near another tip; −1: none. */
 static int32_t next_peak(const graph *g, const double *far, const unsigned char *near, double least) {
   int32_t best = -1;
   for (int32_t v = 0; v < g->vertices; v++) {

@@ -1,16 +1,20 @@
-/* Tips of limbs, and how those of two shapes may belong together. */
+/* Tips of limbs. */
 #ifndef ORB_ALIGN_FIND_TIPS_H
 #define ORB_ALIGN_FIND_TIPS_H
 
 #include "orbmorph/mesh.h"
 
-enum { ORB_TIPS_MAX = 8, ORB_TIP_MAPS_MAX = 256, ORB_TIP_TURNS = 24 };
+enum {
+  ORB_TIPS_MAX = 8,       /* all maps of eight tips are 1.4 million (tip_maps.c), more would take too long */
+  ORB_TIP_MAPS_MAX = 256, /* of all maps, the best that are kept */
+  ORB_TIP_ROTATIONS = 24  /* rotations of a cube, from which a search in space starts */
+};
 
-/* Vertices that are farther from the rest of the surface than all about them, farthest first. Distances go along the
- * surface, in units of the mean distance between any two points of it. */
+/* Vertices that are farther from the rest of the surface than all vertices around them, farthest first. Distances run
+ * along the surface, in units of the mean distance between two of its points. */
 typedef struct orb_tips {
   int32_t count, vertex[ORB_TIPS_MAX];
-  double far[ORB_TIPS_MAX]; /* from the rest, in the mean */
+  double far[ORB_TIPS_MAX]; /* mean distance from the rest */
   double distance[ORB_TIPS_MAX][ORB_TIPS_MAX];
 } orb_tips;
 

@@ -1,6 +1,6 @@
-/* The triangulation of the targets: an octahedron, turned so that its corners keep away from the targets, into which
- * the targets are inserted one by one; flips make it nearly Delaunay. Only exact orientations decide what is allowed,
- * so it is valid whatever the points; roundings only cost a little beauty. */
+/* The triangulation of the targets: an octahedron, rotated so that its corners stay away from the targets, into which
+ * the targets are inserted one by one. Edge flips make it nearly Delaunay. Exact orientations alone decide what is
+ * allowed, so it is valid for all points; rounding only makes it a little less Delaunay. */
 #include "align/pin/base.h"
 
 #include <math.h>
@@ -10,7 +10,10 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { TURNS = 40, PASSES = 60 };
+enum {
+  FRAMES = 40, /* rotations of the octahedron that are tried; chosen by trial */
+  PASSES = 60  /* of edge flips; a guard against rounding */
+};
 
 static const int32_t OCTAHEDRON[24] = {0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4, 2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5};
 
@@ -18,11 +21,11 @@ static const double *point_of(const orb_sheet *s, int32_t v) {
   return s->shape.points + 3 * (size_t)v;
 }
 
-/* Frame number `turn`: an orthonormal one from a fixed sequence. */
-static void frame_of(int turn, double axes[3][3]) {
+/* Frame `number` of a fixed sequence of orthonormal frames. */
+static void frame_of(int number, double axes[3][3]) {
   for (int k = 0; k < 3; k++) {
-    axes[0][k] = sin(1.3 * turn + 2.1 * k + 0.4);
-    axes[1][k] = cos(2.7 * turn + 1.7 * k);
+    axes[0][k] = sin(1.3 * number + 2.1 * k + 0.4);
+    axes[1][k] = cos(2.7 * number + 1.7 * k);
   }
   orb_normalize(axes[0]);
   orb_cross(axes[0], axes[1], axes[2]);
@@ -33,9 +36,9 @@ static void frame_of(int turn, double axes[3][3]) {
 /* The octahedron whose corners stay farthest from the targets. */
 static void place_octahedron(const double *targets, int32_t count, double corner[6][3]) {
   double best = -1;
-  for (int turn = 0; turn < TURNS; turn++) {
+  for (int number = 0; number < FRAMES; number++) {
     double axes[3][3], nearest = 4;
-    frame_of(turn, axes);
+    frame_of(number, axes);
     for (int32_t i = 0; i < count; i++) {
       for (int k = 0; k < 3; k++) {
         double d = 2 - 2 * fabs(orb_dot(axes[k], targets + 3 * (size_t)i));
@@ -78,7 +81,7 @@ static void flip(orb_sheet *s, int32_t h) {
   s->corner[b] = q + 1;
 }
 
-/* Would the other diagonal lie higher on the convex hull? And may it? */
+/* Would the other diagonal lie higher on the convex hull, and would both triangles stay positive? */
 static int should_flip(const orb_sheet *s, int32_t h) {
   const int32_t *tri = s->shape.mesh.triangles;
   int32_t g = s->twin[h], a = tri[h], b = tri[g], c = tri[orb_prev(h)], d = tri[orb_prev(g)];
@@ -90,7 +93,7 @@ static int should_flip(const orb_sheet *s, int32_t h) {
   return orb_dot(n, w) > 1e-12 && positive(s, a, d, c) && positive(s, d, b, c);
 }
 
-/* Lawson's flips; ends by itself, the count of passes guards against rounding. */
+/* Lawson's edge flips. They end without the bound on passes, except for rounding. */
 static void improve(orb_sheet *s) {
   int32_t half_edges = 3 * s->shape.mesh.triangle_count;
   for (int pass = 0, flipped = 1; flipped && pass < PASSES; pass++) {
@@ -104,7 +107,7 @@ static void improve(orb_sheet *s) {
   }
 }
 
-/* Puts a target into the triangle or on the edge that holds it. */
+/* Inserts a target into the triangle or on the edge that contains it. */
 static orb_status insert(orb_context *ctx, orb_sheet *s, const double target[3], int *good) {
   const int32_t *tri = s->shape.mesh.triangles;
   for (int32_t t = 0; t < s->shape.mesh.triangle_count; t++) {
@@ -154,7 +157,7 @@ orb_status orb_base_triangulate(orb_context *ctx, const double *targets, int32_t
   memcpy(triangles, OCTAHEDRON, sizeof triangles);
   orb_mesh mesh = {.vertex_count = 6, .triangle_count = 8, .positions = corner[0], .triangles = triangles};
   orb_status status = orb_sheet_create(ctx, &mesh, corner[0], out);
-  orb_free(ctx, out->origin); /* flips leave no triangle in its parent */
+  orb_free(ctx, out->origin); /* after edge flips, triangles do not lie in their parents */
   out->origin = NULL;
   out->given = NULL;
   *good = 1;

@@ -1,4 +1,4 @@
-/* The edges of a base, traced on one sheet: a spanning tree first, then the rest. */
+/* Traces the edges of a base on one sheet: a spanning tree first, then the others. */
 #include <stdlib.h>
 
 #include "align/pin/base.h"
@@ -13,7 +13,7 @@ typedef struct base_tracer {
   const orb_sheet *base;
   const int32_t *at;
   int32_t *base_done;     /* of each base half-edge */
-  int32_t most_triangles; /* the sheet may not grow beyond */
+  int32_t most_triangles; /* of the sheet */
 } base_tracer;
 
 static const double *point_of(const orb_sheet *s, int32_t v) {
@@ -24,8 +24,8 @@ static int32_t edge_name(const orb_sheet *s, int32_t h) {
   return h < s->twin[h] ? h : s->twin[h];
 }
 
-/* Opens (or closes again) the gates about the sheet vertex of base half-edge b's origin: the sector between the traced
- * base edges before and after b. */
+/* Opens or closes the gates around the sheet vertex of base half-edge b's origin: the sector between the traced base
+ * edges before and after b. */
 static int set_gates(base_tracer *t, int32_t b, int open) {
   const orb_sheet *base = t->base;
   int32_t v = t->at[base->shape.mesh.triangles[b]], after = orb_sheet_swing(base, b), before_b = -1;

@@ -5,11 +5,11 @@
 #include "align/pin/paths.h"
 
 /* Traces every edge of the base on the sheet, where base vertex b is sheet vertex at[b], without crossings and in the
- * base's order about each vertex. First a spanning tree, which nothing can block, then the rest: each of them lies
- * inside a disc of which both ends are on the border in the right order, so it exists; edges of the sheet are split
- * where a path crosses them, so that there is always room. Short paths are found by A* over vertices and the midpoints
- * of edges. *good 0 where a path broke, the sheet would grow beyond most_triangles or *work, which falls with every
- * node that is visited, is used up. */
+ * base's order around each vertex. First come the edges of a spanning tree, which nothing can block. Each of the others
+ * lies in a disc with both its ends on the border in the right order, so a path exists; edges of the sheet are split
+ * where a path crosses them, so there is always room. A* over vertices and midpoints of edges finds short paths. *good
+ * 0: a path broke, the sheet would grow beyond most_triangles, or *work is spent, which falls by 1 for each node
+ * visited. */
 ORB_MUST_CHECK orb_status orb_base_trace(orb_context *ctx, orb_sheet *sheet, const orb_sheet *base, const int32_t *at,
                                          orb_paths *paths, int32_t most_triangles, int64_t *work, int *good);
 

@@ -1,12 +1,12 @@
 /* A base that all shapes share.
  *
- * Edges between landmarks are tried in the order of their length, past the paths there are, summed over the shapes:
- * first those that join two trees, which can always be drawn, then all others. An edge is drawn on one shape (they take
- * turns) by the shortest path whatever the sector it leaves and enters by, then on the others through the same sectors,
- * so that the cyclic order about each landmark agrees everywhere. Two landmarks that are no neighbours yet and lie on
- * one face can always be joined through it; when no such pair is left the graph is a maximal planar one, that is, a
- * triangulation without double edges, and such a one has an embedding by great circle arcs (Steinitz), which the
- * library's own embedding finds.
+ * Edges between landmarks are tried in the order of their length, which is the length of a path past the existing ones,
+ * summed over the shapes: first edges that join two trees, which can always be drawn, then all others. An edge is drawn
+ * on one shape (the shapes take turns) by the shortest path through any sectors, then on the others through the same
+ * sectors, so that the cyclic order around each landmark agrees on all shapes. Two landmarks on one face that are not
+ * neighbours can always be joined through the face. When no such pair is left, the graph is maximal planar, that is, a
+ * triangulation without double edges. Such a graph has an embedding by great circle arcs (Steinitz), which orb_embed()
+ * finds.
  */
 #include <math.h>
 #include <string.h>
@@ -18,13 +18,16 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-static const double SLACK = 2, LONGEST = 200;
-enum { MANY = 45 }; /* landmarks from which on one search for all ways from one of them pays */
+/* Chosen by trial. */
+static const double SLACK = 2;     /* a pair is taken although it is longer than the next one by up to this factor */
+static const double LONGEST = 200; /* chords of the unit sphere, summed: longer pairs are taken without a search */
+enum { MANY = 45 };                /* landmarks from which one search for all paths from a landmark is faster */
 
-typedef struct candidate {
+/* A pair of landmarks that an edge may join. */
+typedef struct end_pair {
   double length;
   int32_t a, b;
-} candidate;
+} end_pair;
 
 /* Abstract half-edges 2e and 2e + 1 of edge e, in cyclic order about their origins. */
 typedef struct joiner {
@@ -32,21 +35,22 @@ typedef struct joiner {
   orb_path_tracer *tracers;
   int32_t shapes, count;
   const int32_t *at, *most_triangles;
-  int32_t *origin, *next, *prev; /* of each half-edge; next: counter-clockwise about the origin */
+  int32_t *origin, *next, *prev; /* of each half-edge; next: counter-clockwise around the origin */
   int32_t *first;                /* of each landmark: one half-edge that leaves it, −1 */
   int32_t *face, faces;          /* of each half-edge: the face on its left */
   int32_t *parent;               /* trees of the forest */
   int32_t edges;
   int64_t *work;
-  double *least;       /* shape-major, count × count: lower bounds of the lengths of paths */
-  double *ball_radius; /* shape-major: how far about a landmark they are exact, as of so many edges */
+  double *least; /* shape-major, count × count: lower bounds of the lengths of paths */
+  double
+      *ball_radius; /* shape-major: up to where they were exact around a landmark, when there were ball_edges edges */
   int32_t *ball_edges;
-  int32_t **mark, *marked; /* of each shape: the landmark that a vertex is, −1; of so many vertices */
+  int32_t **mark, *marked; /* of each shape: the landmark at each vertex, −1: none; and the number of these vertices */
 } joiner;
 
 /* A heap of pairs by length, ties by number. */
 typedef struct queue {
-  candidate *pair; /* all of them; lengths only grow */
+  end_pair *pair; /* all of them; lengths only grow */
   int64_t *heap, count;
 } queue;
 
@@ -140,7 +144,7 @@ static int share_face(const joiner *j, int32_t a, int32_t b) {
   return 0;
 }
 
-/* The sector that a freshly laid path leaves v by, named by the half-edge before it; −1: v had none. */
+/* The sector through which a new path leaves v, named by the half-edge before it; −1: no other path ends at v. */
 static int32_t sector_of(const joiner *j, const orb_path_tracer *t, int32_t landmark, int32_t v, int32_t name) {
   int32_t h = orb_path_tracer_outgoing(t, v, name), start = j->first[landmark];
   if (start < 0 || h < 0) {
@@ -154,7 +158,7 @@ static int32_t sector_of(const joiner *j, const orb_path_tracer *t, int32_t land
   return j->origin[2 * e] == landmark ? 2 * e : 2 * e + 1;
 }
 
-/* Opens the gates of sector `sector` (−1: all) about a landmark on one shape. */
+/* Opens or closes the gates of a sector (−1: all) around a landmark on one shape. */
 static int set_gates(const joiner *j, orb_path_tracer *t, int32_t v, int32_t sector, int open) {
   if (sector < 0) {
     orb_path_tracer_gates(t, v, -1, -1, open);
@@ -198,7 +202,7 @@ static void link_after(joiner *j, int32_t h, int32_t landmark, int32_t sector) {
   j->prev[after] = h;
 }
 
-/* Draws edge a–b on every shape and enters it into the order about both ends. */
+/* Draws edge a–b on every shape and inserts it into the order around both ends. */
 static orb_status add_edge(joiner *j, int32_t a, int32_t b, int *good) {
   int32_t lead = j->edges % j->shapes, sector[2] = {-1, -1};
   ORB_TRY(draw(j, lead, a, b, sector, good));
@@ -231,7 +235,7 @@ static double *least_from(const joiner *j, int32_t s, int32_t a) {
   return j->least + ((size_t)s * (size_t)j->count + (size_t)a) * (size_t)j->count;
 }
 
-/* The length that a path from a to b has at least, summed over the shapes. */
+/* A lower bound of the length of a path from a to b, summed over the shapes. */
 static double least_length(const joiner *j, int32_t a, int32_t b) {
   double sum = 0;
   for (int32_t s = 0; s < j->shapes; s++) {
@@ -240,7 +244,7 @@ static double least_length(const joiner *j, int32_t a, int32_t b) {
   return sum;
 }
 
-/* Raises the lower bound of the one way from a to b, as far as the radius. */
+/* Raises the lower bound for the path from a to b, up to the radius. */
 static orb_status measure_one(joiner *j, int32_t s, int32_t a, int32_t b, double radius) {
   orb_path_tracer *t = &j->tracers[s];
   const int32_t *at = j->at + (size_t)s * (size_t)j->count;
@@ -260,7 +264,7 @@ static orb_status measure_one(joiner *j, int32_t s, int32_t a, int32_t b, double
   return status;
 }
 
-/* Those of all ways from a. */
+/* Raises the lower bounds for all paths from a, up to the radius. */
 static orb_status measure_all(joiner *j, int32_t s, int32_t a, double radius) {
   size_t ball = (size_t)s * (size_t)j->count + (size_t)a;
   double *least = least_from(j, s, a);
@@ -277,8 +281,8 @@ static orb_status measure_all(joiner *j, int32_t s, int32_t a, double radius) {
   return ORB_OK;
 }
 
-/* Is the way from a to b, past all paths laid so far and summed over the shapes, at most `most` long? What searches
- * learn of lengths holds for ever, since paths only get in the way. */
+/* Is the path from a to b past all existing paths, summed over the shapes, at most `most` long? Lower bounds that a
+ * search finds stay valid, since further paths only make it longer. */
 static orb_status short_enough(joiner *j, int32_t a, int32_t b, double most, int *yes) {
   *yes = least_length(j, a, b) < most;
   for (int32_t s = 0; s < j->shapes && *yes; s++) {
@@ -298,11 +302,11 @@ static int is_open(joiner *j, int tree, int32_t a, int32_t b) {
   return tree ? root_of(j->parent, a) != root_of(j->parent, b) : !neighbours(j, a, b) && share_face(j, a, b);
 }
 
-/* Adds edges in the order of their true lengths, which grow while paths are laid in their way: a pair whose way has
- * become longer than that of the next one goes back into the queue. */
+/* Adds edges in the order of their true lengths, which grow as paths get in their way: a pair that has become longer
+ * than the next one goes back into the queue. */
 static orb_status join_pass(joiner *j, queue *q, int tree, int *good) {
   while (q->count > 0 && *good && *j->work > 0 && j->edges < 3 * j->count - 6) {
-    candidate *pair = &q->pair[q->heap[0]];
+    end_pair *pair = &q->pair[q->heap[0]];
     int32_t a = pair->a, b = pair->b;
     int taken = 1;
     if (!is_open(j, tree, a, b)) {
@@ -335,7 +339,7 @@ static orb_status join_all(joiner *j, queue *q, int *good) {
       for (int32_t s = 0; s < j->shapes; s++) {
         length += least_from(j, s, a)[b] = least_from(j, s, b)[a] = straight(j, s, a, b);
       }
-      q->pair[pairs++] = (candidate){length, b, a};
+      q->pair[pairs++] = (end_pair){length, b, a};
     }
   }
   *good = 1;
@@ -347,8 +351,7 @@ static orb_status join_all(joiner *j, queue *q, int *good) {
   return ORB_OK;
 }
 
-/* The base as a mesh, laid out by the library's embedding. All its triangles count alike: without positions every
- * triangle is taken for equilateral. */
+/* Lays out the base by orb_embed(). All its triangles count alike: without positions they are taken as equilateral. */
 static orb_status lay_out(joiner *j, orb_sheet *base) {
   orb_context *ctx = j->ctx;
   orb_status status = ORB_OK;
@@ -381,7 +384,7 @@ end:
   return status;
 }
 
-/* Paths get the names of the base's edges: the lesser half-edge. */
+/* Renames paths to the names of the base's edges: the lesser half-edge. */
 static void rename_paths(const joiner *j, const orb_sheet *base, orb_paths *paths, int32_t half_edges) {
   for (int32_t h = 0; h < half_edges; h++) {
     int32_t e = paths->path[h];
@@ -456,7 +459,7 @@ orb_status orb_base_join(orb_context *ctx, orb_sheet *sheets, orb_paths *paths, 
   joiner j = {
       .ctx = ctx, .shapes = shape_count, .count = count, .at = at, .most_triangles = most_triangles, .work = work};
   size_t pairs = (size_t)count * (size_t)(count - 1) / 2;
-  queue q = {.pair = ORB_NEW(ctx, candidate, pairs), .heap = ORB_NEW(ctx, int64_t, pairs)};
+  queue q = {.pair = ORB_NEW(ctx, end_pair, pairs), .heap = ORB_NEW(ctx, int64_t, pairs)};
   *good = 0;
   if (!q.pair || !q.heap) {
     status = ORB_E_NO_MEMORY;

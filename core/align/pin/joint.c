@@ -1,4 +1,4 @@
-/* Pins all shapes on a base that suits them all: for landmarks that lie in quite another order on each shape. */
+/* Pins all shapes on a base that suits them all: for landmarks whose order differs much between the shapes. */
 #include <string.h>
 
 #include "align/pin/join.h"

@@ -1,11 +1,11 @@
-/* The sure way to pin landmarks: patches.
+/* Patches: they pin landmarks wherever these lie.
  *
  * A triangulation of the targets is traced on the shape; its paths cut the surface into one disc for each spherical
- * triangle. Path vertices are spread along the chords of their base edge, and every other vertex becomes a mean of its
- * neighbours with positive weights. That is Tutte's embedding (1963; Floater 1997) of each disc in the flat triangle of
- * its three targets, all in one linear system, and central projection takes the triangles to the sphere. An edge that
- * joins two vertices of the same path would lie on the chord and is split first. Weights are cotangents on the sphere
- * the shape came with, clamped positive: there the shape has no thin limbs that uniform weights would crush.
+ * triangle. The vertices of a path are spread along the chord of their base edge, and every other vertex becomes a mean
+ * of its neighbours with positive weights. That is Tutte's embedding (1963; Floater 1997) of each disc in the flat
+ * triangle of its three targets, all in one linear system; central projection maps the triangles to the sphere. An edge
+ * between two vertices of one path would lie on the chord, so it is split first. Weights are cotangents on the given
+ * sphere, clamped positive: on it the shape has no thin limbs, which uniform weights would crush.
  */
 #include <math.h>
 #include <string.h>
@@ -20,7 +20,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { ITERATIONS = 4000 };
+enum { ITERATIONS = 4000 }; /* most, of conjugate gradients; a guard: the residual ends them before */
 
 typedef struct patcher {
   orb_context *ctx;
@@ -44,7 +44,7 @@ static void patcher_free(patcher *p) {
   orb_free(p->ctx, p->weight);
 }
 
-/* The triangle whose image holds a direction, by exact tests; among all, so that nothing can go wrong. */
+/* The triangle whose image contains a direction: exact tests of all triangles, which cannot miss it. */
 static int32_t triangle_at(const orb_sheet *s, const double p[3]) {
   const int32_t *tri = s->shape.mesh.triangles;
   const double *x = s->shape.points;
@@ -58,7 +58,7 @@ static int32_t triangle_at(const orb_sheet *s, const double p[3]) {
   return 0;
 }
 
-/* Base vertices on the sheet: the landmarks, and for the extra ones a new vertex near their direction. */
+/* The base vertices on the sheet: the landmarks, and for each further point a new vertex near its direction. */
 static orb_status locate_base(patcher *p, const int32_t *landmarks, int32_t count) {
   p->at = ORB_NEW(p->ctx, int32_t, count + ORB_BASE_EXTRA);
   if (!p->at) {
@@ -74,8 +74,8 @@ static orb_status locate_base(patcher *p, const int32_t *landmarks, int32_t coun
   return ORB_OK;
 }
 
-/* Splits the edges that join two vertices of one path beside it. chain: of each vertex the base edge whose inner vertex
- * it is, or −2 − b for base vertex b, else −1. */
+/* Do two vertices belong to one path? chain: of each vertex, the base edge inside whose path it lies, or −2 − b for
+ * base vertex b, else −1. */
 static int same_path(const patcher *p, const int32_t *chain, int32_t u, int32_t v) {
   const int32_t *corners = p->base.shape.mesh.triangles;
   if (chain[u] == -1 || chain[v] == -1) {
@@ -91,6 +91,7 @@ static int same_path(const patcher *p, const int32_t *chain, int32_t u, int32_t 
   return corners[e] == b || corners[orb_next(e)] == b;
 }
 
+/* Splits the edges beside a path that join two of its vertices. */
 static orb_status split_chords(patcher *p) {
   orb_sheet *s = &p->sheet;
   orb_status status = ORB_OK;
@@ -131,7 +132,7 @@ static int32_t path_on(const patcher *p, int32_t h) {
   return g;
 }
 
-/* Spreads the path of base half-edge b along its chord, by length on the old sphere mixed with even spacing. */
+/* Spreads the path of base half-edge b along its chord: half by its lengths on the old sphere, half evenly. */
 static int spread_path(patcher *p, int32_t b) {
   const orb_sheet *s = &p->sheet;
   const int32_t *corners = p->base.shape.mesh.triangles, *tri = s->shape.mesh.triangles;
@@ -271,8 +272,8 @@ static double dot(const double *a, const double *b, size_t n) {
   return sum;
 }
 
-/* Conjugate gradients with the diagonal as preconditioner; the three columns share the steps, which costs a few
- * iterations and saves three walks of the mesh. */
+/* Conjugate gradients with the diagonal as preconditioner. The three columns share the steps, which costs a few
+ * iterations and saves two of three passes over the mesh. */
 static orb_status solve(patcher *p, int *good) {
   orb_context *ctx = p->ctx;
   size_t vertices = (size_t)p->sheet.shape.mesh.vertex_count, n = 3 * vertices;
@@ -325,7 +326,7 @@ end:
   return status;
 }
 
-/* The flat points on the sphere; targets bit for bit. */
+/* Projects the flat points to the sphere; the targets bit for bit. */
 static void project(patcher *p) {
   double *points = p->sheet.shape.points;
   for (int32_t v = 0; v < p->sheet.shape.mesh.vertex_count; v++) {

@@ -109,7 +109,6 @@ int32_t orb_path_tracer_outgoing(const orb_path_tracer *t, int32_t v, int32_t e)
   return -1;
 }
 
-/* Gates of the sector from half-edge `first` counter-clockwise to `last`; first −1: every sector. Both lie on paths. */
 void orb_path_tracer_gates(orb_path_tracer *t, int32_t v, int32_t first, int32_t last, int open) {
   const orb_sheet *s = t->sheet;
   int32_t start = first < 0 ? s->corner[v] : first, end = first < 0 ? start : last, h = start;
@@ -119,7 +118,7 @@ void orb_path_tracer_gates(orb_path_tracer *t, int32_t v, int32_t first, int32_t
   } while (h != end);
 }
 
-/* The end of the search (of a ball: all ends, and their distances), and the node whose neighbours are reached. */
+/* Where a search ends (for a ball: all ends, and their distances), and the node that is being expanded. */
 typedef struct goal {
   int32_t vertex;
   double place[3], from[3];
@@ -128,7 +127,7 @@ typedef struct goal {
   double *distance, radius;
 } goal;
 
-/* A ball came upon a vertex of a path. */
+/* A ball has reached a vertex of a path. */
 static void arrive(const orb_path_tracer *t, int32_t from, int32_t vertex, const goal *g) {
   if (vertex < g->mark_count && g->mark[vertex] >= 0) {
     double *least = &g->distance[g->mark[vertex]],
@@ -216,7 +215,7 @@ static orb_status begin(orb_path_tracer *t, int32_t from) {
   return heap_push(t, (orb_path_node){0, 0, start});
 }
 
-/* Expands nodes in their order until the search is at its end; *last: that node, −1: there is no way. */
+/* Expands nodes in their order until the search reaches its end. *last: that node; −1: there is no path. */
 static orb_status expand_all(orb_path_tracer *t, int32_t start, goal *g, int32_t *last) {
   *last = -1;
   for (int32_t popped = 0; t->heap_count > 0; popped++) {
@@ -237,7 +236,7 @@ static orb_status expand_all(orb_path_tracer *t, int32_t start, goal *g, int32_t
       break;
     }
     if (top.cost > t->cost[node]) {
-      continue; /* a shorter way was found since */
+      continue; /* a shorter way has been found since */
     }
     place_of(t, node, g->from);
     ORB_TRY(node & 1 ? expand_edge(t, node, g) : expand_vertex(t, node, node == start, g));
@@ -283,7 +282,7 @@ end:
   return status;
 }
 
-/* Edges are named by their ends, since splits renumber half-edges. */
+/* Remembers edges by their ends, since splits renumber half-edges. */
 orb_status orb_path_tracer_lay(orb_path_tracer *t, int32_t e, int *good) {
   orb_sheet *s = t->sheet;
   int32_t count = t->chain_count, first = s->shape.mesh.vertex_count, last = -1;

@@ -11,7 +11,6 @@ void orb_paths_free(orb_context *ctx, orb_paths *paths) {
   memset(paths, 0, sizeof *paths);
 }
 
-/* Follows the sheet's capacity. */
 orb_status orb_paths_fit(orb_context *ctx, const orb_sheet *s, orb_paths *paths) {
   if (paths->half_edges < 3 * s->triangle_capacity) {
     int32_t capacity = 3 * s->triangle_capacity, *path = orb_realloc(ctx, paths->path, (size_t)capacity, sizeof *path);

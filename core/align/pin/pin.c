@@ -1,6 +1,6 @@
-/* Method `pin`: landmarks are constraints of the embeddings. The walk on a coarse level does nearly all; what it cannot
- * do, because landmarks would have to pass through each other or a level has too little room, the traced patches can:
- * any distinct points of a sphere can be carried to any others, by a piecewise linear map with enough triangles. */
+/* Method `pin`: landmarks are constraints of the embeddings. The walk on a coarse level nearly always succeeds. Where
+ * it fails, because landmarks would have to pass through each other or a level has too little room, traced patches
+ * succeed: a piecewise linear map with enough triangles carries any distinct points of a sphere to any others. */
 #include "align/pin/pin.h"
 
 #include <string.h>
@@ -14,15 +14,21 @@
 #include "base/error.h"
 #include "base/memory.h"
 
-enum { COARSE = 300, COARSE_A_LANDMARK = 6, WALKS = 2 };
-/* How far a sheet may grow: a little for landmarks that merely cross, much for those in quite another order. */
+/* Chosen by trial. */
+enum {
+  COARSE = 300,          /* least vertices of the level of the first walk, */
+  COARSE_A_LANDMARK = 6, /* and for each landmark */
+  WALKS = 2              /* walks, each on a level of twice as many vertices */
+};
+/* Growth of a sheet, relative to its triangles: little for landmarks that merely cross, much for landmarks whose order
+ * differs much. */
 static const double GROWTH_SMALL = 0.35, GROWTH_MAX = 64;
-/* Visits of nodes and vertices, see orb_pin_room: a minute of them, of which each trial that looks for the landmark to
- * name has a share. A hundred and fifty random landmarks take a few seconds. */
+/* Visits of nodes and vertices, see orb_pin_room: about a minute of them, and the share of each trial in the search for
+ * the landmark to name. A hundred and fifty random landmarks take a few seconds. */
 static const int64_t WORK = 500000000, WORK_OF_TRIAL = 80000000;
 
-/* Shape 0 stays as it is embedded; the others are carried onto its landmarks. *stuck: the first that could not be, 0 if
- * all were. */
+/* Carries all other shapes onto the landmarks of shape 0, whose embedding stays. *stuck: the first shape for which that
+ * failed; 0: none. */
 static orb_status carry_onto_first(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
                                    int32_t count, orb_preset preset, orb_pin_room *room, int32_t *stuck) {
   orb_status status = ORB_OK;
@@ -43,7 +49,8 @@ end:
   return status;
 }
 
-/* The cascade. *held 0: it failed on shape *shape, and sheets may have been turned or refined. */
+/* Tries one way after the other. *held 0: all failed, the last on shape *shape, and sheets may have been rotated or
+ * refined. */
 static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
                        int32_t count, const orb_align_options *options, int64_t work, int *held, int32_t *shape) {
   orb_preset preset = options->preset;
@@ -64,7 +71,7 @@ static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count,
     return ORB_OK;
   }
   *held = 0;
-  room = (orb_pin_room){most, room.work > work / 2 ? room.work : work / 2}; /* the next stage is to have a chance */
+  room = (orb_pin_room){most, room.work > work / 2 ? room.work : work / 2}; /* leaves the next stage a chance */
   if (count >= 4) {
     ORB_TRY(orb_pin_joint(ctx, sheets, shape_count, landmarks, count, preset, &room, held));
   }
@@ -75,7 +82,7 @@ static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count,
   return ORB_OK;
 }
 
-/* The same on copies that are thrown away. */
+/* The same on copies, which are freed. */
 static orb_status could_meet(orb_context *ctx, const orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
                              int32_t count, const orb_align_options *options, int *held) {
   orb_status status = ORB_OK;

@@ -1,4 +1,4 @@
-/* Sweeps over full surfaces with landmarks held, and thinning between them. */
+/* Relaxation, and thinning between its sweeps. */
 #include <string.h>
 
 #include "align/pin/relax.h"
@@ -8,8 +8,15 @@
 #include "embed/advance.h"
 #include "embed/resume.h"
 
-enum { ROUNDS = 24, ROUND_SWEEPS = 5, SWEEPS = 60 };
-static const double LITTLE = 0.02; /* of the new vertices: not worth another round */
+/* Chosen by trial. */
+enum {
+  ROUNDS = 24,       /* most, of thinning */
+  ROUND_SWEEPS = 5,  /* after each, so that the next finds more to remove */
+  SWEEPS = 60,       /* most, at the end */
+  CHECKED_SWEEPS = 5 /* between checks whether to go on */
+};
+static const double LITTLE = 0.02;  /* of the new vertices: a round that removes less is the last */
+static const double SETTLED = 1e-3; /* gain of the energy by CHECKED_SWEEPS sweeps that ends them */
 
 orb_status orb_pin_relax(orb_context *ctx, orb_sheet *sheet, const int32_t *landmarks, int32_t count, orb_preset preset,
                          int32_t sweeps) {
@@ -28,11 +35,11 @@ orb_status orb_pin_relax(orb_context *ctx, orb_sheet *sheet, const int32_t *land
   for (int32_t k = 0; k < count; k++) {
     orb_refiner_pin(refiner, sheet->shape.landmark_vertices[landmarks[k]], 1);
   }
-  for (int32_t done = 0; done < sweeps; done += 5) {
+  for (int32_t done = 0; done < sweeps; done += CHECKED_SWEEPS) {
     double gain;
-    ORB_GO(status, orb_refiner_sweep(ctx, refiner, 5, &gain), end);
+    ORB_GO(status, orb_refiner_sweep(ctx, refiner, CHECKED_SWEEPS, &gain), end);
     ORB_GO(status, orb_context_check(ctx), end);
-    if (gain < 1e-3) {
+    if (gain < SETTLED) {
       break;
     }
   }

@@ -7,10 +7,10 @@
 /* What a pinning may use up. */
 typedef struct orb_pin_room {
   double growth; /* of a sheet, see orb_pin_limit() */
-  int64_t work;  /* visits of nodes and vertices that are left; where it is used up the landmarks count as not met */
+  int64_t work;  /* visits of nodes and vertices that are left; when it is spent, the landmarks count as not met */
 } orb_pin_room;
 
-/* Most triangles of a sheet that may grow by this share of its own number; small ones by more. */
+/* The most triangles of a sheet that may grow by this share of its own number; small sheets may grow by more. */
 int32_t orb_pin_limit(const orb_sheet *sheet, double growth);
 
 #endif

@@ -1,10 +1,9 @@
-/* Paths are straightened as soon as they are laid.
+/* Straightens paths as soon as they are laid.
  *
- * A path crosses every edge in its way, also those that earlier splits left inside a given triangle, and each crossing
- * adds a vertex and two triangles: of paths that run side by side each would cross half as many edges again as the one
- * before it. A vertex of the path that lies inside a given triangle is therefore collapsed along the path where that
- * changes no shape, so that what stays are mostly the crossings of edges of the given mesh, and the sheet grows by the
- * same number from path to path.
+ * A path crosses every edge in its way, also those that earlier splits left within a given triangle, and each crossing
+ * adds a vertex and two triangles: of paths that run side by side, each would cross half as many edges again as the one
+ * before it. So a vertex of the path within a given triangle is collapsed along the path where that changes no shape.
+ * Mostly the crossings of edges of the given mesh remain, and the sheet grows by the same number from path to path.
  */
 #include <math.h>
 #include <string.h>
@@ -12,8 +11,9 @@
 #include "align/pin/straighten.h"
 #include "align/sheet/collapse.h"
 
-enum { PASSES = 2 };
-static const double LEAST = 1e-3; /* fatness on the sphere: thinner stars are left alone */
+/* Chosen by trial. */
+enum { PASSES = 2 };              /* over the new vertices */
+static const double LEAST = 1e-3; /* fatness on the sphere, see orb_fatness(): a collapse must leave more */
 
 static void move_triangle(orb_sheet *s, orb_paths *paths, int32_t from, int32_t to) {
   orb_mesh *mesh = &s->shape.mesh;
@@ -35,7 +35,7 @@ static void move_triangle(orb_sheet *s, orb_paths *paths, int32_t from, int32_t 
   }
 }
 
-/* The last one takes its place; the half-edges behind the end are as new. */
+/* The last triangle takes its place; the half-edges behind the end get no path. */
 static void remove_triangle(orb_sheet *s, orb_paths *paths, int32_t t) {
   int32_t last = --s->shape.mesh.triangle_count;
   if (t != last) {
@@ -67,8 +67,8 @@ static void remove_vertex(orb_sheet *s, orb_paths *paths, int32_t v) {
   paths->on[last] = 0;
 }
 
-/* May half-edge h, on a path, collapse onto its end? The edges that fall together take the name of the one on a path.
- */
+/* May half-edge h, on a path, collapse onto its end? Two edges that merge take the name of the one on a path, so they
+ * must not both lie on paths. */
 static int names_agree(const orb_sheet *s, const orb_paths *paths, int32_t h) {
   int32_t side[2] = {h, s->twin[h]};
   for (int k = 0; k < 2; k++) {

@@ -1,10 +1,10 @@
-/* Landmarks walked to their targets on a coarse level.
+/* The landmark walk.
  *
- * All shapes are decimated with their landmarks kept and embedded up to a level of a few hundred vertices. There the
- * landmarks are gathered by rotations, and their spherical means become targets. Each step takes a landmark as far
- * along the great circle as keeps every triangle about it from shrinking below a share of what it is; sweeps of the
- * other vertices make room between the steps. Where no landmark gets ahead, the level is refined and the walk goes on:
- * more vertices, more freedom. Once all have arrived they are pinned, and the refinement carries the rest.
+ * All shapes are decimated with their landmarks kept, and embedded up to a level of a few hundred vertices. There
+ * rotations bring the landmarks together, and their spherical means become targets. Each step moves a landmark along
+ * the great circle, as far as no triangle around it shrinks below a share of its size; sweeps of the other vertices
+ * make room between the steps. When no landmark advances any more, the level is refined and the walk goes on: more
+ * vertices give more freedom. Once all have arrived they are pinned, and the refinement continues to the full meshes.
  */
 #include <math.h>
 #include <string.h>
@@ -19,8 +19,20 @@
 #include "embed/advance.h"
 #include "numeric/vec3.h"
 
-enum { STEPS_MAX = 160, TRIES = 24, SWEEPS = 3, LEVELS = 3, FINEST_WALK = 4000, SETTLE = 60 };
-static const double LEAST_SHARE = 0.6, SHORTER = 0.6, NO_PROGRESS = 1e-4;
+/* Chosen by trial. */
+enum {
+  STEPS_MAX = 160,    /* of all landmarks on a level */
+  TRIES = 24,         /* lengths of a landmark's step */
+  SWEEPS = 3,         /* between steps */
+  LEVELS = 3,         /* on which landmarks walk, */
+  FINEST_WALK = 4000, /* none beyond this number of vertices */
+  SETTLE = 60         /* most sweeps after all have arrived */
+};
+static const double LEAST_SHARE = 0.6;  /* that a determinant keeps in one step */
+static const double SHORTER = 0.6;      /* a try's length relative to the one before it */
+static const double NO_PROGRESS = 1e-4; /* chords of all landmarks in one step: less ends the level */
+static const double SETTLED = 0.002;    /* gain of the energy by SWEEPS sweeps that ends settling */
+static const double TOO_NEAR = 1e-16;   /* squared chord: nearer targets count as one place */
 
 typedef struct walker {
   orb_context *ctx;
@@ -138,7 +150,7 @@ static void rotate_level(walker *w, const double rotation[9]) {
   }
 }
 
-/* Does landmark k at x keep its share of every determinant that it has at p? */
+/* Does landmark k at x keep the least share of each of its determinants at p? */
 static int may_stand(const walker *w, int32_t k, const double p[3], const double x[3]) {
   for (int32_t i = w->link_start[k]; i < w->link_start[k + 1]; i++) {
     double a[3], b[3];
@@ -151,7 +163,7 @@ static int may_stand(const walker *w, int32_t k, const double p[3], const double
   return 1;
 }
 
-/* One landmark's step; returns how far it came, *arrived whether it stands on its target, bit for bit. */
+/* One step of a landmark; returns its length. *arrived: the landmark is at its target, bit for bit. */
 static double step_one(walker *w, int32_t k, const double target[3], int *arrived) {
   int32_t v = landmark_vertex(w, k);
   double p[3], x[3];
@@ -178,7 +190,7 @@ static double step_one(walker *w, int32_t k, const double target[3], int *arrive
   return 0;
 }
 
-/* Walks all landmarks of one shape; *left of them do not arrive on any level. */
+/* Walks all landmarks of one shape. *left: the number that do not arrive on any level. */
 static orb_status walk(walker *w, const double *targets, int32_t *left) {
   for (int32_t k = 0; k < w->count; k++) {
     orb_refiner_pin(w->refiner, landmark_vertex(w, k), 1);
@@ -197,7 +209,7 @@ static orb_status walk(walker *w, const double *targets, int32_t *left) {
       ORB_TRY(orb_context_check(w->ctx));
       if (*left == 0) {
         double gain = 1;
-        for (int i = 0; i < SETTLE / SWEEPS && gain > 0.002; i++) {
+        for (int i = 0; i < SETTLE / SWEEPS && gain > SETTLED; i++) {
           ORB_TRY(orb_refiner_sweep(w->ctx, w->refiner, SWEEPS, &gain));
         }
         return ORB_OK;
@@ -215,7 +227,7 @@ static orb_status walk(walker *w, const double *targets, int32_t *left) {
   }
 }
 
-/* A level as a shape of its own: positions and triangles are borrowed, points are made. */
+/* A level as a shape: it borrows positions and triangles and owns its points. */
 static orb_status level_shape(const walker *w, orb_aligned_shape *out) {
   const orb_mesh *mesh = &w->sheet->shape.mesh;
   *out = (orb_aligned_shape){.mesh = {.vertex_count = mesh->vertex_count,
@@ -252,7 +264,7 @@ end:
   return status;
 }
 
-/* Gathers the shapes' levels by rotation; fills the common targets. */
+/* Rotates the levels of the shapes so that their landmarks come together; fills the common targets. */
 static orb_status gather(orb_context *ctx, walker *walkers, int32_t shape_count, int32_t count, double *targets) {
   orb_status status = ORB_OK;
   double *points = ORB_NEW(ctx, double, 3 * (size_t)shape_count * (size_t)count),
@@ -277,11 +289,11 @@ end:
   return status;
 }
 
-/* Two targets nearly at one place cannot be told apart by a coarse level. */
+/* Are all targets far enough apart for a coarse level? */
 static int targets_apart(const double *targets, int32_t count) {
   for (int32_t i = 0; i < count; i++) {
     for (int32_t j = 0; j < i; j++) {
-      if (orb_distance2(targets + 3 * (size_t)i, targets + 3 * (size_t)j) < 1e-16) {
+      if (orb_distance2(targets + 3 * (size_t)i, targets + 3 * (size_t)j) < TOO_NEAR) {
         return 0;
       }
     }
@@ -289,7 +301,7 @@ static int targets_apart(const double *targets, int32_t count) {
   return 1;
 }
 
-/* Refines one walked shape to the end; *good: certified. The result goes to `points`. */
+/* Refines one walked shape to its full mesh, into `points`. *good: the result is certified. */
 static orb_status finish(orb_context *ctx, walker *w, double *points, int *good) {
   const orb_mesh *mesh = &w->sheet->shape.mesh;
   orb_certificate certificate;
@@ -297,6 +309,22 @@ static orb_status finish(orb_context *ctx, walker *w, double *points, int *good)
   orb_refiner_points(w->refiner, points);
   ORB_TRY(orb_certify(ctx, points, mesh->vertex_count, mesh->triangles, mesh->triangle_count, &certificate));
   *good = certificate.valid;
+  return ORB_OK;
+}
+
+/* Refines all walked shapes, into points[s] of its own each. *good: all results are certified. Frees the walkers. */
+static orb_status finish_all(orb_context *ctx, walker *walkers, const orb_sheet *sheets, int32_t shape_count,
+                             double **points, int *good) {
+  *good = 1;
+  for (int32_t s = 0; s < shape_count && *good; s++) {
+    points[s] = ORB_NEW(ctx, double, 3 * (size_t)sheets[s].vertex_capacity);
+    if (!points[s]) {
+      return ORB_E_NO_MEMORY;
+    }
+    ORB_TRY(finish(ctx, &walkers[s], points[s], good));
+    walker_free(&walkers[s]);
+    orb_progress(ctx, "align", 0.4 + 0.6 * (s + 1) / shape_count);
+  }
   return ORB_OK;
 }
 
@@ -328,19 +356,10 @@ orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count
       goto end;
     }
   }
-  for (int32_t s = 0; s < shape_count; s++) {
-    int good = 0;
-    points[s] = ORB_NEW(ctx, double, 3 * (size_t)sheets[s].vertex_capacity);
-    if (!points[s]) {
-      status = ORB_E_NO_MEMORY;
-      goto end;
-    }
-    ORB_GO(status, finish(ctx, &walkers[s], points[s], &good), end);
-    walker_free(&walkers[s]);
-    orb_progress(ctx, "align", 0.4 + 0.6 * (s + 1) / shape_count);
-    if (!good) {
-      goto end;
-    }
+  int good;
+  ORB_GO(status, finish_all(ctx, walkers, sheets, shape_count, points, &good), end);
+  if (!good) {
+    goto end;
   }
   for (int32_t s = 0; s < shape_count; s++) {
     double *old = sheets[s].shape.points;
@@ -349,7 +368,7 @@ orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count
   }
   *stuck = 0;
 end:
-  if (status == ORB_E_NOT_CERTIFIED) { /* pinned landmarks left a vertex no room: as good as stuck */
+  if (status == ORB_E_NOT_CERTIFIED) { /* pinned landmarks left a vertex no room: the walk is stuck */
     orb_error_clear(ctx);
     status = ORB_OK;
   }

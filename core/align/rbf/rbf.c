@@ -2,11 +2,11 @@
  * steps.
  *
  * After the rotations each landmark has a target: the spherical mean of its points, or, one-way, its point on the first
- * shape. A step warps the whole sphere so that the landmarks come a share of their way nearer, and projects back. The
- * warp can fold, so each step is certified; a fold is untangled locally with the landmarks held; where that fails the
- * step is halved, and where halving does not help the present embedding is relaxed first, which gives room. What is
- * left then are landmarks that cross on their way: those are carried over by the patches of pin. Landmarks of a later
- * pass move only after those before have met, which then stay.
+ * shape. A step warps the whole sphere so that the landmarks advance by a share of their way, and projects back. The
+ * warp can fold, so each step is certified. A fold is untangled locally with the landmarks held; where that fails, the
+ * step is halved; where halving does not help, the embedding is relaxed before the step, which gives room. If that
+ * fails too, the landmarks cross on their way, and the patches of pin carry them over. Landmarks of a later pass move
+ * only after those of earlier passes have met, and these then stay.
  */
 #include <math.h>
 #include <string.h>
@@ -25,9 +25,15 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-enum { HALVINGS = 4, RELAXATIONS = 8, RELAX_SWEEPS = 20 };
-static const double DEFAULT_RADIUS = 1.0, GROWTH_MAX = 64;
-static const int64_t WORK = 500000000;
+/* Counts were chosen by trial. */
+enum {
+  HALVINGS = 4,     /* of a step before the sphere is relaxed */
+  RELAXATIONS = 8,  /* before the patches of pin take over */
+  RELAX_SWEEPS = 20 /* of a relaxation */
+};
+static const double DEFAULT_RADIUS = 1.0; /* chord on the unit sphere: a sixth of the circumference */
+static const double GROWTH_MAX = 64;      /* orb_align_options.max_growth of pin, whose patches are used */
+static const int64_t WORK = 500000000;    /* visits of nodes and vertices, as in pin: about a minute */
 
 typedef struct rbf_run {
   orb_context *ctx;
@@ -44,7 +50,7 @@ static int32_t vertex_of(const rbf_run *r, int32_t k) {
   return r->sheet->shape.landmark_vertices[r->active[k]];
 }
 
-/* The share `share` of the way left, for each landmark; all of it: the target bit for bit. */
+/* The point of landmark k after `share` of the way left; for all of it, the target bit for bit. */
 static void next_place(const rbf_run *r, int32_t k, double share, double out[3]) {
   const double *p = r->sheet->shape.points + 3 * (size_t)vertex_of(r, k), *target = r->targets + 3 * (size_t)k;
   for (int c = 0; c < 3; c++) {
@@ -55,7 +61,7 @@ static void next_place(const rbf_run *r, int32_t k, double share, double out[3])
   }
 }
 
-/* One step; *good 0: it folded beyond repair and nothing changed. */
+/* One step. *good 0: its fold cannot be untangled, and nothing has changed. */
 static orb_status try_step(rbf_run *r, double share, int *good) {
   orb_sheet *s = r->sheet;
   int32_t vertices = s->shape.mesh.vertex_count;
@@ -130,7 +136,7 @@ static orb_status warp_shape(rbf_run *r, int32_t steps) {
   return ORB_OK;
 }
 
-/* Where the active landmarks of all shapes are to meet. */
+/* Sets where the active landmarks of all shapes will meet. */
 static void set_targets(const orb_sheet *sheets, int32_t shape_count, const int32_t *active, int32_t count, int one_way,
                         double *targets) {
   for (int32_t k = 0; k < count; k++) {

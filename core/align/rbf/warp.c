@@ -10,7 +10,7 @@
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 
-enum { GRAIN = 512 };
+enum { GRAIN = 512 }; /* points of one task */
 
 double orb_warp_phi(double r) {
   if (r >= 1) {
@@ -27,7 +27,7 @@ void orb_warp_free(orb_context *ctx, orb_warp *warp) {
   memset(warp, 0, sizeof *warp);
 }
 
-/* Do the centres span space affinely? The Gram matrix of (1, x, y, z), eliminated with a look at its pivots. */
+/* Do the centres span space affinely? Eliminates the Gram matrix of (1, x, y, z); a pivot near zero says no. */
 static int spans(const double *centres, int32_t count) {
   double g[4][4] = {{0}};
   for (int32_t k = 0; k < count; k++) {

@@ -1,4 +1,4 @@
-/* The interpolating warp of section 7.2. */
+/* The interpolating warp of Peng & Timalsena 2016, section 7.2. */
 #ifndef ORB_ALIGN_RBF_WARP_H
 #define ORB_ALIGN_RBF_WARP_H
 

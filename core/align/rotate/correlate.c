@@ -1,10 +1,11 @@
 /* Rotation search without landmarks.
  *
- * Two embeddings of like shapes differ mostly by a rotation of the sphere. What they share is where each direction of
- * the sphere lies on its shape and how the surface faces there. Both are averaged into the cells of a cube map, and for
- * a rotation R of the sphere the 3×3 cross-covariance M(R) of the two fields is summed. The best orientation in space
- * that goes with R is the Procrustes solution of M(R), and the sum of its singular values says how nearly the map
- * through the sphere is a rigid motion. A grid of rotations, then a shrinking local search about the best few.
+ * The embeddings of two similar shapes differ mostly by a rotation of the sphere: after it, each direction of the
+ * sphere has the same position and normal on both shapes. These are averaged into the cells of a cube map, and for a
+ * rotation R of the sphere the 3×3 cross-covariance M(R) of the two fields is summed. The rotation in space that fits R
+ * best is the Procrustes solution of M(R), and the sum of its singular values says how near the map through the sphere
+ * is to a rigid motion. The search evaluates a grid of rotations, and then refines the best few by a shrinking local
+ * search.
  */
 #include <math.h>
 #include <string.h>
@@ -15,8 +16,16 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-enum { SIDE = 12, CELLS = 6 * SIDE * SIDE, FIELD = 6, AXES = 200, TURNS = 24, STARTS = 12, DEPTH_MAX = 12 };
-static const double APART = 0.8; /* radians between rotations that count as two */
+/* Chosen by trial. */
+enum {
+  SIDE = 12, /* cells along an edge of the cube map: 7.5° each */
+  CELLS = 6 * SIDE * SIDE,
+  FIELD = 6,  /* numbers of a cell: position and normal */
+  AXES = 200, /* poles of the grid of rotations, about 14° apart */
+  SPINS = 24, /* rotations around each pole: 15° apart */
+  STARTS = 12 /* grid points that are refined */
+};
+static const double APART = 0.8; /* radians: rotations this far apart are different candidates */
 
 /* Mean position (centred, unit variance) and half-weighted normal of each cell of the cube map. */
 typedef struct field {
@@ -42,7 +51,7 @@ static void cell_direction(int32_t cell, double out[3]) {
   orb_normalize(out);
 }
 
-/* One triangle into its cells: in n² equal parts, fine enough that no cell is jumped. */
+/* Adds one triangle to its cells, in n² equal parts that are small enough to skip no cell. */
 static void splat(field *f, const orb_aligned_shape *shape, int32_t t) {
   const double *p[3], *x[3];
   for (int k = 0; k < 3; k++) {
@@ -83,7 +92,7 @@ static void field_make(field *f, const orb_aligned_shape *shape) {
   for (int32_t t = 0; t < shape->mesh.triangle_count; t++) {
     splat(f, shape, t);
   }
-  double mean[3] = {0, 0, 0}, variance = 0, turned = 0, total = 0;
+  double mean[3] = {0, 0, 0}, variance = 0, normal_variance = 0, total = 0;
   for (int32_t c = 0; c < CELLS; c++) {
     cell_direction(c, f->direction[c]);
     if (f->weight[c] > 0) {
@@ -100,10 +109,10 @@ static void field_make(field *f, const orb_aligned_shape *shape) {
     for (int k = 0; k < 3; k++) {
       f->value[c][k] -= mean[k] / total;
       variance += f->weight[c] * f->value[c][k] * f->value[c][k];
-      turned += f->weight[c] * f->value[c][3 + k] * f->value[c][3 + k];
+      normal_variance += f->weight[c] * f->value[c][3 + k] * f->value[c][3 + k];
     }
   }
-  double scale = sqrt(total / (variance + 1e-300)), scale_normal = sqrt(0.3 * total / (turned + 1e-300));
+  double scale = sqrt(total / (variance + 1e-300)), scale_normal = sqrt(0.3 * total / (normal_variance + 1e-300));
   for (int32_t c = 0; c < CELLS; c++) {
     f->weight[c] /= total;
     for (int k = 0; k < 3; k++) {
@@ -132,7 +141,7 @@ static double misfit(const search *s, const double r[9]) {
   return s->marks > 0 ? sum / s->marks : 0;
 }
 
-/* Correlation of a with b turned by the rotation: of the common frame, and of the best frame in space. */
+/* Correlation of a with b rotated on the sphere: *upright without, *best with the best rotation in space. */
 static orb_status score_of(const search *s, const double r[9], double *upright, double *best) {
   double m[9] = {0};
   for (int32_t c = 0; c < CELLS; c++) {
@@ -148,8 +157,8 @@ static orb_status score_of(const search *s, const double r[9], double *upright, 
       }
     }
   }
-  double turn[9], singular[3];
-  ORB_TRY(orb_procrustes_covariance(s->ctx, m, turn, singular));
+  double in_space[9], singular[3];
+  ORB_TRY(orb_procrustes_covariance(s->ctx, m, in_space, singular));
   double lost = misfit(s, r);
   *upright = (m[0] + m[4] + m[8]) / 1.3 - lost;
   *best = (singular[0] + singular[1] + singular[2]) / 1.3 - lost;
@@ -179,7 +188,7 @@ static int is_near(const double a[4], const double b[4]) {
   return fabs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]) > cos(APART / 2);
 }
 
-/* Into the list, in order. spaced: among those that are near each other only the best one stays. */
+/* Inserts a rotation into the ordered list. spaced: of rotations that are near each other, only the best stays. */
 static void keep_start(start *list, const double q[4], double score, int spaced) {
   int at = STARTS, left = 0;
   for (int i = 0; spaced && i < STARTS; i++) {
@@ -205,7 +214,7 @@ static void keep_start(start *list, const double q[4], double score, int spaced)
   }
 }
 
-/* A grid over SO(3): directions of a Fibonacci lattice for the pole, turns about it. */
+/* A grid over SO(3): a Fibonacci lattice of poles, and rotations around each. */
 static orb_status coarse(const search *s, start *upright, start *best) {
   for (int i = 0; i < STARTS; i++) {
     upright[i].score = best[i].score = -INFINITY;
@@ -214,9 +223,9 @@ static orb_status coarse(const search *s, start *upright, start *best) {
     double z = 1 - (2 * i + 1.0) / AXES, angle = i * 2.399963229728653;
     double half = sqrt((1 + z) / 2), other = sqrt((1 - z) / 2);
     double tilt[4] = {half, -other * sin(angle), other * cos(angle), 0};
-    for (int j = 0; j < TURNS; j++) {
-      double turn[4] = {cos(M_PI * j / TURNS), 0, 0, sin(M_PI * j / TURNS)}, q[4], r[9], up, any;
-      quaternion_product(tilt, turn, q);
+    for (int j = 0; j < SPINS; j++) {
+      double spin[4] = {cos(M_PI * j / SPINS), 0, 0, sin(M_PI * j / SPINS)}, q[4], r[9], up, any;
+      quaternion_product(tilt, spin, q);
       from_quaternion(q, r);
       ORB_TRY(score_of(s, r, &up, &any));
       keep_start(upright, q, up, s->spaced);
@@ -227,15 +236,15 @@ static orb_status coarse(const search *s, start *upright, start *best) {
   return ORB_OK;
 }
 
-/* Pattern search on the six half-axes of turns, halving. */
+/* Pattern search: small rotations around the three axes in both directions, halved until they are tiny. */
 static orb_status descend(const search *s, start *from, int use_upright) {
   for (double step = 0.12; step > 0.002; step /= 2) {
     for (int moved = 1, rounds = 0; moved && rounds < 8; rounds++) {
       moved = 0;
       for (int k = 0; k < 6; k++) {
-        double turn[4] = {cos(step / 2), 0, 0, 0}, q[4], r[9], up, any;
-        turn[1 + k / 2] = k % 2 ? -sin(step / 2) : sin(step / 2);
-        quaternion_product(turn, from->q, q);
+        double spin[4] = {cos(step / 2), 0, 0, 0}, q[4], r[9], up, any;
+        spin[1 + k / 2] = k % 2 ? -sin(step / 2) : sin(step / 2);
+        quaternion_product(spin, from->q, q);
         from_quaternion(q, r);
         ORB_TRY(score_of(s, r, &up, &any));
         if ((use_upright ? up : any) > from->score) {
@@ -249,7 +258,7 @@ static orb_status descend(const search *s, start *from, int use_upright) {
   return orb_context_check(s->ctx);
 }
 
-/* Both lists of local maxima, descended to the end. */
+/* Both lists of local maxima, refined. */
 static orb_status find_starts(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
                               const double *from, const double *to, int32_t count, int spaced, start *upright,
                               start *best) {
@@ -277,7 +286,7 @@ end:
   return status;
 }
 
-/* The best in a common upright frame, unless one in another frame explains much more. */
+/* The best rotation for shapes in one upright frame, unless another explains much more. */
 static const start *choose(const start *upright, const start *best) {
   const start *top_upright = upright, *top_best = best;
   for (int i = 1; i < STARTS; i++) {

@@ -14,24 +14,24 @@ static inline void orb_rotate_point(const double rotation[9], const double p[3],
   out[2] = q[2];
 }
 
-/* The proper rotation that minimises Σ |to[k] − R from[k]|². A reflection that the data ask for is replaced by the
- * best rotation: the singular vector of the least singular value changes sign (Peng & Timalsena 2016, section 7.1).
- * singular (may be NULL): the singular values, the last one negated where a reflection would fit better. Where the
- * points leave the rotation open (fewer than two directions), one of the best is returned. */
+/* The proper rotation that minimises Σ |to[k] − R from[k]|². Where a reflection fits better, the singular vector of the
+ * least singular value changes sign, which gives the best rotation (Peng & Timalsena 2016, section 7.1). singular (may
+ * be NULL): the singular values, the last one negated where a reflection fits better. Where the points leave the
+ * rotation open (fewer than two directions), returns one of the best. */
 ORB_MUST_CHECK orb_status orb_procrustes(orb_context *ctx, const double *from, const double *to, int32_t count,
                                          double rotation[9], double singular[3]);
 
-/* The same for a cross-covariance that is at hand: maximises trace(R C), C = Σ from toᵀ. */
+/* The same from a cross-covariance: maximises trace(R C), C = Σ from toᵀ. */
 ORB_MUST_CHECK orb_status orb_procrustes_covariance(orb_context *ctx, const double covariance[9], double rotation[9],
                                                     double singular[3]);
 
-/* Generalised Procrustes: rotates shapes 1, 2, … so that landmarks gather; shape 0 stays. points: shape-major, 3 a
- * landmark, not changed. rotations: 9 a shape. means (3 a landmark): the spherical means of the rotated landmarks;
- * where one does not exist, shape 0's point. */
+/* Generalised Procrustes: the rotations of shapes 1, 2, … that bring landmarks together; shape 0 stays. points:
+ * shape-major, 3 a landmark, not changed. rotations: 9 a shape. means (3 a landmark): the spherical means of the
+ * rotated landmarks; where one does not exist, shape 0's point. */
 ORB_MUST_CHECK orb_status orb_procrustes_all(orb_context *ctx, const double *points, int32_t shape_count,
                                              int32_t landmark_count, double *rotations, double *means);
 
-/* The spherical means of landmarks (as for orb_procrustes_all()) under rotations at hand. */
+/* The spherical means of landmarks, as in orb_procrustes_all(), under given rotations. */
 void orb_procrustes_means(const double *points, int32_t shape_count, int32_t landmark_count, const double *rotations,
                           double *means);
 

@@ -1,5 +1,4 @@
-/* Rotations of working copies: by landmarks where these determine them, else by the search; each result is certified.
- */
+/* Rotations of sheets: by landmarks where these determine them, else by the search. Each result is certified. */
 #include <math.h>
 #include <string.h>
 
@@ -13,9 +12,10 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-static const double SPREAD = 0.03; /* second singular value of directions that span a plane: 10° to either side */
+static const double SPREAD = 0.03; /* second singular value of directions that span a plane: 10° off their axis */
+enum { ATTEMPTS = 12 };            /* rotations that are tried until the rounded result is certified */
 
-/* Do the landmarks of a shape, as directions, say how it is turned about any of them? */
+/* Do the landmarks of a shape determine its rotation: do they span a plane as directions? */
 static orb_status spans(orb_context *ctx, const double *points, int32_t count, int *yes) {
   double covariance[9] = {0}, rotation[9], singular[3];
   for (int32_t k = 0; k < count; k++) {
@@ -64,8 +64,8 @@ orb_status orb_sheet_rotate(orb_context *ctx, orb_sheet *sheet, const double rot
   memcpy(old, points, 3 * (size_t)vertices * sizeof *old);
   orb_status status = ORB_OK;
   orb_certificate certificate = {0};
-  for (int attempt = 0; attempt < 12 && !certificate.valid && status == ORB_OK; attempt++) {
-    /* Rounding is another for each of a family of rotations that differ by nanoradians. */
+  for (int attempt = 0; attempt < ATTEMPTS && !certificate.valid && status == ORB_OK; attempt++) {
+    /* Rotations that differ by nanoradians round differently. */
     double angle = 1e-9 * attempt, nudge[9] = {1, -angle, angle / 2, angle, 1, -angle / 3, -angle / 2, angle / 3, 1};
     for (int32_t v = 0; v < vertices; v++) {
       double *p = points + 3 * (size_t)v;

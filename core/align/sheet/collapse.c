@@ -1,4 +1,4 @@
-/* What thinning collapses: a vertex onto a neighbour, with its star. */
+/* The collapse of a vertex onto a neighbour, with its star. */
 #include "align/sheet/collapse.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-/* Coordinates of a vertex in a given triangle; 0: it lies elsewhere. */
+/* The coordinates of a vertex in a given triangle; 0: it lies elsewhere. */
 static int place_in(const orb_sheet *s, int32_t v, int32_t parent, double out[3]) {
   const int32_t *corner = s->given + 3 * (size_t)parent;
   out[0] = out[1] = out[2] = 0;

@@ -1,6 +1,6 @@
 /* Landmarks become vertices. Several may lie in one triangle or on one edge of the given mesh, so each is located among
- * the pieces of its triangle, by barycentric coordinates with respect to that triangle: exact in the corners, and
- * independent of how degenerate the triangle is in space. */
+ * the pieces of its triangle, by barycentric coordinates in that triangle. These are exact at the corners, and do not
+ * depend on whether the triangle is degenerate in space. */
 #include <math.h>
 #include <string.h>
 
@@ -11,7 +11,10 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-static const double SNAP = 2e-7;
+/* Of barycentric coordinates. */
+static const double SNAP = 2e-7;     /* a landmark this near to an edge or corner counts as on it */
+static const double NEGATIVE = 1e-6; /* rounding below zero that is accepted, */
+static const double OFF_ONE = 1e-5;  /* and of their sum */
 
 /* Vertex `vertex` lies in given triangle `triangle` at `at`. */
 typedef struct anchor {
@@ -54,7 +57,7 @@ static void anchor_of(const inserter *in, int32_t vertex, int32_t triangle, doub
   ORB_ASSERT(0 && "a piece of a triangle has only corners that lie in it");
 }
 
-/* Coordinates of `at` in piece t; returns the least of them. */
+/* The coordinates of `at` in piece t; returns the least of them. */
 static double in_piece(const inserter *in, int32_t t, int32_t triangle, const double at[3], double out[3]) {
   double c[3][3];
   for (int k = 0; k < 3; k++) {
@@ -82,7 +85,7 @@ static void remember(inserter *in, int32_t vertex, int32_t triangle, const doubl
   memcpy(a->at, at, sizeof a->at);
 }
 
-/* All triangles about a vertex exactly positive? */
+/* Is the whole star of a vertex exactly positive? */
 static int star_is_positive(const orb_sheet *s, int32_t vertex) {
   int32_t start = s->corner[vertex], h = start;
   do {
@@ -96,7 +99,7 @@ static int star_is_positive(const orb_sheet *s, int32_t vertex) {
   return 1;
 }
 
-/* Where rounding broke a very thin star, moves the new vertex towards the mean of its ring; 0: that does not help. */
+/* Where rounding has broken a very thin star, moves the new vertex towards its ring's mean. 0: that does not help. */
 static int settle(orb_sheet *s, int32_t vertex) {
   if (star_is_positive(s, vertex)) {
     return 1;
@@ -124,7 +127,7 @@ static int settle(orb_sheet *s, int32_t vertex) {
   return 0;
 }
 
-/* The other given triangle of an edge of a piece, and the new vertex's coordinates there, after an edge split. */
+/* After an edge split, stores the new vertex's coordinates in the given triangle on one side of the edge. */
 static void remember_across(inserter *in, int32_t vertex, int32_t across, const int32_t ends[2], double t) {
   int32_t triangle = in->sheet->shape.parent[across];
   for (int32_t i = 0; i < in->anchor_count; i++) {
@@ -141,7 +144,7 @@ static void remember_across(inserter *in, int32_t vertex, int32_t across, const 
   remember(in, vertex, triangle, at);
 }
 
-/* *held 0: the sphere's triangle there is too small for a point of its own. */
+/* *held 0: the triangle there is too small on the sphere to hold the landmark. */
 static orb_status insert_one(orb_context *ctx, inserter *in, int32_t triangle, const double at[3], int32_t *vertex,
                              int *held) {
   orb_sheet *s = in->sheet;
@@ -193,6 +196,29 @@ static orb_status insert_one(orb_context *ctx, inserter *in, int32_t triangle, c
   return ORB_OK;
 }
 
+/* Checks the place of a landmark, and cleans its coordinates of rounding. */
+static orb_status check_place(orb_context *ctx, const inserter *in, const orb_place *place, int32_t landmark,
+                              int32_t shape, double at[3]) {
+  if (place->triangle < 0 || place->triangle >= in->given_triangles) {
+    return bad_place(ctx, landmark, shape, "its triangle does not exist");
+  }
+  double sum = 0;
+  for (int k = 0; k < 3; k++) {
+    at[k] = place->at[k] > 0 ? place->at[k] : 0;
+    sum += at[k];
+    if (!(place->at[k] >= -NEGATIVE)) {
+      return bad_place(ctx, landmark, shape, "a barycentric coordinate is negative");
+    }
+  }
+  if (!(fabs(sum - 1) <= OFF_ONE)) {
+    return bad_place(ctx, landmark, shape, "its barycentric coordinates do not add up to 1");
+  }
+  for (int k = 0; k < 3; k++) {
+    at[k] /= sum;
+  }
+  return ORB_OK;
+}
+
 orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet *sheet, const orb_landmark *landmarks,
                                       int32_t landmark_count, int32_t shape_index) {
   orb_mesh *mesh = &sheet->shape.mesh;
@@ -212,27 +238,9 @@ orb_status orb_sheet_insert_landmarks(orb_context *ctx, orb_sheet *sheet, const 
   memcpy(given, mesh->triangles, corners * sizeof *given);
   for (int32_t i = 0; i < landmark_count; i++) {
     const orb_place *place = &landmarks[i].at[shape_index];
-    if (place->triangle < 0 || place->triangle >= in.given_triangles) {
-      status = bad_place(ctx, i, shape_index, "its triangle does not exist");
-      goto end;
-    }
-    double at[3], sum = 0;
+    double at[3];
     int held;
-    for (int k = 0; k < 3; k++) {
-      at[k] = place->at[k] > 0 ? place->at[k] : 0;
-      sum += at[k];
-      if (!(place->at[k] >= -1e-6)) {
-        status = bad_place(ctx, i, shape_index, "a barycentric coordinate is negative");
-        goto end;
-      }
-    }
-    if (!(fabs(sum - 1) <= 1e-5)) {
-      status = bad_place(ctx, i, shape_index, "its barycentric coordinates do not add up to 1");
-      goto end;
-    }
-    for (int k = 0; k < 3; k++) {
-      at[k] /= sum;
-    }
+    ORB_GO(status, check_place(ctx, &in, place, i, shape_index, at), end);
     ORB_GO(status, insert_one(ctx, &in, place->triangle, at, &vertices[i], &held), end);
     if (!held) {
       status = bad_place(ctx, i, shape_index, "the sphere holds its triangle too small to split; move it to a vertex");
@@ -250,7 +258,7 @@ end:
   return status;
 }
 
-/* On how many shapes landmarks i and j share a vertex; where: the last such shape. */
+/* The number of shapes on which landmarks i and j share a vertex; *where: the last such shape. */
 static int32_t shared(const orb_sheet *sheets, int32_t shape_count, int32_t i, int32_t j, int32_t *where) {
   int32_t same = 0;
   for (int32_t s = 0; s < shape_count; s++) {
@@ -263,7 +271,7 @@ static int32_t shared(const orb_sheet *sheets, int32_t shape_count, int32_t i, i
   return same;
 }
 
-/* Landmarks i and j share a vertex on `shape` but not on every shape: names them and all others of which that holds. */
+/* Landmarks i and j share a vertex on `shape` but not on every shape: names all landmarks of which that is true. */
 static orb_status contradiction(orb_context *ctx, const orb_sheet *sheets, int32_t shape_count, int32_t landmark_count,
                                 int32_t i, int32_t j, int32_t shape) {
   orb_status status = orb_fail(ctx, ORB_E_BAD_LANDMARKS,

@@ -1,5 +1,5 @@
-/* Refinement in place. A split touches a constant number of triangles: the old ones keep their numbers and shrink, new
- * ones are appended, so that numbers handed out before stay valid. Attributes are per corner and are interpolated. */
+/* Refinement in place. A split touches a constant number of triangles: old ones keep their numbers and shrink, new ones
+ * are appended, so numbers that were handed out stay valid. Attributes belong to corners and are interpolated. */
 #include "align/sheet/sheet.h"
 
 #include <string.h>
@@ -105,7 +105,7 @@ orb_status orb_sheet_copy(orb_context *ctx, const orb_sheet *sheet, orb_sheet *o
   return ORB_OK;
 }
 
-/* Grows one array to `capacity` elements; an absent one (NULL) stays absent. */
+/* Grows an array to `capacity` elements; NULL stays NULL. */
 static int grow(orb_context *ctx, void *array, size_t capacity, size_t size) {
   void **slot = array, *block;
   memcpy(&block, slot, sizeof block);
@@ -282,8 +282,8 @@ static void link(orb_sheet *s, int32_t g, int32_t h) {
   s->twin[h] = g;
 }
 
-/* One side of an edge split: triangle of h (a, b, c) becomes (a, m, c), a new triangle (m, b, c). Returns the new
- * triangle's half-edge from m to b. */
+/* One side of an edge split: the triangle (a, b, c) of h becomes (a, m, c), and (m, b, c) is new. Returns the half-edge
+ * of the new triangle from m to b. */
 static int32_t split_side(orb_sheet *s, int32_t h, double t, int32_t m) {
   orb_mesh *mesh = &s->shape.mesh;
   int32_t next = orb_next(h), prev = orb_prev(h), far = s->twin[next];

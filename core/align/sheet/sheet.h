@@ -1,18 +1,28 @@
-/* A surface with its embedding that can be refined in place: edges and triangles are split on the surface and on the
- * sphere at once, without a change of shape. */
+/* The working copy of a shape: a surface with its embedding that can be refined in place. Splits act on the surface and
+ * on the sphere at once and change no shape.
+ *
+ * Comes in: a mesh, its embedding, and landmarks as places on it. Goes out: the refined mesh and its embedding, with
+ * landmarks as vertices. Read in this order:
+ *
+ *   sheet.h      the working copy, and splits
+ *   landmarks.h  landmarks as vertices
+ *   untangle.h   local repair of folds
+ *   collapse.h   collapses of vertices that splits made
+ *   thin.h       removes such vertices where nothing needs them
+ */
 #ifndef ORB_ALIGN_SHEET_SHEET_H
 #define ORB_ALIGN_SHEET_SHEET_H
 
 #include "orbmorph/align.h"
 
-/* Where a new vertex lies: coordinates (sum 1) over three vertices of the given mesh, all of one of its triangles. */
+/* Where a new vertex lies: coordinates (sum 1) on three vertices of one triangle of the given mesh. */
 typedef struct orb_origin {
   int32_t vertex[3]; /* −1: none, weight 0 */
   double weight[3];
 } orb_origin;
 
-/* Owns the aligned shape that it grows, until orb_sheet_release(). Every triangle lies in triangle parent[t] of the
- * mesh it was made from; new vertices have source −1. */
+/* Owns the aligned shape that it refines, until orb_sheet_release(). Triangle t lies in triangle parent[t] of the mesh
+ * it was made from; new vertices have source −1. */
 typedef struct orb_sheet {
   orb_aligned_shape shape;
   int32_t *twin;   /* of each half-edge */
@@ -20,8 +30,8 @@ typedef struct orb_sheet {
   int32_t vertex_capacity, triangle_capacity;
   int32_t landmark_count; /* of shape.landmark_vertices */
   int32_t given_vertices;
-  /* Corners of the triangles of the given mesh, borrowed, and of each new vertex, from given_vertices on, where it lies
-   * (room for vertex_capacity − given_vertices): for orb_sheet_thin(). Both NULL where triangles were flipped. */
+  /* For orb_sheet_thin(): corners of the triangles of the given mesh, borrowed; and where each new vertex lies, from
+   * given_vertices on (room for vertex_capacity − given_vertices). Both NULL after an edge flip. */
   const int32_t *given;
   orb_origin *origin;
 } orb_sheet;
@@ -34,16 +44,16 @@ void orb_sheet_free(orb_context *ctx, orb_sheet *sheet);
 /* A second, independent copy. */
 ORB_MUST_CHECK orb_status orb_sheet_copy(orb_context *ctx, const orb_sheet *sheet, orb_sheet *out);
 
-/* Hands the shape over (its certificate is not touched) and frees the rest. */
+/* Hands over the shape, without touching its certificate, and frees the rest. */
 void orb_sheet_release(orb_context *ctx, orb_sheet *sheet, orb_aligned_shape *out);
 
-/* Splits half-edge h at fraction t of its way (0 < t < 1) and its twin with it: one vertex and two triangles more.
- * Triangle h/3 keeps the part at h's origin. The sphere point lies on the great circle arc, at the same fraction of
- * the chord. O(1) amortised. */
+/* Splits half-edge h at fraction t of its length (0 < t < 1), and its twin with it: adds one vertex and two triangles.
+ * Triangle h/3 keeps the part at h's origin. The sphere point lies on the great circle arc, at the same fraction of the
+ * chord. O(1) amortised. */
 ORB_MUST_CHECK orb_status orb_sheet_split_edge(orb_context *ctx, orb_sheet *sheet, int32_t h, double t,
                                                int32_t *vertex);
 
-/* Splits a triangle at barycentric coordinates (all > 0): one vertex and two triangles more. */
+/* Splits a triangle at barycentric coordinates (all > 0): adds one vertex and two triangles. */
 ORB_MUST_CHECK orb_status orb_sheet_split_triangle(orb_context *ctx, orb_sheet *sheet, int32_t triangle,
                                                    const double at[3], int32_t *vertex);
 
@@ -52,7 +62,7 @@ static inline int32_t orb_sheet_swing(const orb_sheet *sheet, int32_t h) {
   return sheet->twin[orb_prev(h)];
 }
 
-/* The half-edge from vertex a to vertex b, −1 if they are no neighbours. O(valence). */
+/* The half-edge from vertex a to vertex b, −1 if they are not neighbours. O(valence). */
 int32_t orb_sheet_edge(const orb_sheet *sheet, int32_t a, int32_t b);
 
 #endif

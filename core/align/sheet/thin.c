@@ -1,10 +1,10 @@
-/* Thinning: the vertices that paths needed are removed again once the landmarks have met.
+/* Thinning: removes the vertices that paths needed once the landmarks have met.
  *
- * A vertex made by a split lies inside a given triangle, whose plane the surface has there, or inside an edge between
- * two. Collapsing it onto a neighbour changes no shape if every triangle of its star stays in its parent and turns the
- * same way there: decided exactly, on barycentric coordinates in the parent. On the sphere the star must stay positive
- * too, and not become much thinner than it was or than a triangle may be. Sweeps between two rounds straighten what
- * bends about a vertex, so that the next round finds more.
+ * A vertex made by a split lies within a given triangle or on an edge between two. Collapsing it onto a neighbour
+ * changes no shape if every triangle of its star stays in its parent with the same orientation, which is decided
+ * exactly on barycentric coordinates in the parent. On the sphere the star must stay positive too, and become neither
+ * much thinner than it was nor too thin. Sweeps between two calls straighten the edges around a vertex, so that the
+ * next call removes more.
  */
 #include <math.h>
 #include <string.h>
@@ -14,7 +14,9 @@
 #include "base/check.h"
 #include "base/memory.h"
 
-enum { PASSES = 4 };
+/* Chosen by trial. */
+enum { PASSES = 4 }; /* over all vertices */
+/* A collapse must leave this fatness of the star (see orb_fatness()), or this share of what it is if that is less. */
 static const double THIN = 0.03, KEPT = 0.5;
 
 typedef struct thinner {

@@ -1,7 +1,7 @@
-/* Untangling by local moves. The quality of a star is the least, over its triangles, of the height of the centre above
- * the far edge (negative where folded). A vertex tries the mean of its ring, weighted and plain, and points between
- * that and where it is, and pushes away from its worst edge; it takes the best. The measure is maximised star by star,
- * so a fold that reaches over several stars is opened from its border inwards. */
+/* Untangling by local moves. The quality of a star is the least height of its centre above a far edge, over its
+ * triangles (negative where one is flipped). A vertex tries the weighted and the plain mean of its ring, a point away
+ * from its worst edge, and points on the way there, and moves to the best. This maximises the quality star by star, so
+ * a fold that covers several stars opens from its border inwards. */
 #include "align/sheet/untangle.h"
 
 #include <math.h>
@@ -12,9 +12,13 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { RINGS = 6, ROUNDS = 24 };
+/* Chosen by trial. */
+enum {
+  RINGS = 6,  /* around the flips that may move: 0, then one more each time, less than this */
+  ROUNDS = 24 /* of moves for each number of rings, if vertices still move */
+};
 
-static int folded(const orb_sheet *s, int32_t t) {
+static int is_flipped(const orb_sheet *s, int32_t t) {
   const int32_t *tri = s->shape.mesh.triangles + 3 * (size_t)t;
   const double *p = s->shape.points;
   return orb_orient(p + 3 * (size_t)tri[0], p + 3 * (size_t)tri[1], p + 3 * (size_t)tri[2]) <= 0;
@@ -90,12 +94,12 @@ static int improve(orb_sheet *s, int32_t v) {
   return 0;
 }
 
-/* Vertices of folded triangles, and `rings` rings about them, ascending. */
+/* Lists the vertices of flipped triangles and of `rings` rings around them, ascending. */
 static int32_t gather(const orb_sheet *s, const unsigned char *held, int rings, unsigned char *near, int32_t *list) {
   const orb_mesh *mesh = &s->shape.mesh;
   memset(near, 0, (size_t)mesh->vertex_count);
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
-    if (folded(s, t)) {
+    if (is_flipped(s, t)) {
       for (int k = 0; k < 3; k++) {
         near[mesh->triangles[3 * t + k]] = 1;
       }
@@ -118,10 +122,10 @@ static int32_t gather(const orb_sheet *s, const unsigned char *held, int rings, 
   return count;
 }
 
-static int64_t count_folded(const orb_sheet *s) {
+static int64_t count_flipped(const orb_sheet *s) {
   int64_t count = 0;
   for (int32_t t = 0; t < s->shape.mesh.triangle_count; t++) {
-    count += folded(s, t);
+    count += is_flipped(s, t);
   }
   return count;
 }
@@ -135,16 +139,16 @@ orb_status orb_untangle(orb_context *ctx, orb_sheet *sheet, const unsigned char 
     status = ORB_E_NO_MEMORY;
     goto end;
   }
-  *left = count_folded(sheet);
+  *left = count_flipped(sheet);
   for (int rings = 0; *left > 0 && rings < RINGS; rings++) {
     int32_t count = gather(sheet, held, rings, near, list);
-    for (int round = 0, moved = 1; moved && round<ROUNDS && * left> 0; round++) {
+    for (int round = 0, moved = 1; moved && round < ROUNDS && (*left > 0); round++) {
       moved = 0;
       for (int32_t i = 0; i < count; i++) {
         moved |= improve(sheet, list[i]);
       }
       ORB_GO(status, orb_context_check(ctx), end);
-      *left = count_folded(sheet);
+      *left = count_flipped(sheet);
     }
   }
 end:

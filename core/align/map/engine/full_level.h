@@ -4,7 +4,8 @@
 
 #include "align/map/engine/run.h"
 
-/* compose.c. All vertices at these points, the landmarks pinned; s: their order, of the caller. */
+/* A level of all vertices at these points (mesh order), with the landmarks pinned. s: the order of the vertices; it
+ * stays the caller's. */
 ORB_MUST_CHECK orb_status orb_map_full_level(orb_map_run *run, const double *points, const orb_corner_table *s,
                                              orb_map_level *level);
 

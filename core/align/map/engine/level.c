@@ -1,4 +1,4 @@
-/* The level's life: gathering it from the surface, its flips, its energy. */
+/* Gathers a level from the surface, and measures its flips and its energy. */
 #include "align/map/engine/level.h"
 
 #include <math.h>
@@ -10,9 +10,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { MAX_COLOURS = 64, LOCATE_SLICE = 8192, LOCATE_GRAIN = 256 };
-static const double MOLLIFY = 1e-3; /* least slack of a triangle's longest edge, relative to its mean edge */
-static const double CAP = 20;
+enum { LOCATE_SLICE = 8192, LOCATE_GRAIN = 256 }; /* vertices between checks for cancellation, and of one task */
 
 void orb_map_level_free(orb_context *ctx, orb_map_level *l) {
   orb_free(ctx, l->vertex);
@@ -38,7 +36,7 @@ static orb_status reserve(orb_context *ctx, orb_map_level *l) {
   l->y = ORB_NEW0(ctx, double, 15 * n);
   l->pull = ORB_NEW0(ctx, double, n);
   l->pinned = ORB_NEW0(ctx, unsigned char, n);
-  l->colour_start = ORB_NEW0(ctx, int32_t, MAX_COLOURS + 1);
+  l->colour_start = ORB_NEW0(ctx, int32_t, ORB_MAP_COLOURS + 1);
   l->by_colour = ORB_NEW(ctx, int32_t, n);
   if (!l->vertex || !l->start || !l->spoke || !l->triangle || !l->place || !l->y || !l->pull || !l->pinned ||
       !l->colour_start || !l->by_colour) {
@@ -46,7 +44,7 @@ static orb_status reserve(orb_context *ctx, orb_map_level *l) {
   }
   l->n = l->y + 3 * n;
   l->x = l->y + 6 * n;
-  l->goal = l->y + 9 * n;
+  l->target = l->y + 9 * n;
   l->area = l->y + 12 * n;
   l->moved = l->y + 13 * n;
   l->density = l->y + 14 * n;
@@ -56,8 +54,8 @@ static orb_status reserve(orb_context *ctx, orb_map_level *l) {
   return ORB_OK;
 }
 
-/* Cotangents and area of a triangle from its edge lengths, with a little added to all three where they are collinear.
- */
+/* Cotangents and area of a triangle from its edge lengths. Where the edges are nearly collinear, all three lengths grow
+ * until the longest has the slack (intrinsic mollification). */
 static void shape_of(const double length[3], double slack, double cot[3], double *area) {
   double l[3], least = INFINITY;
   for (int k = 0; k < 3; k++) {
@@ -74,7 +72,7 @@ static void shape_of(const double length[3], double slack, double cot[3], double
   }
 }
 
-/* Areas are those of the level's own triangles; the sum stays what it is without the mollification. */
+/* Areas are those of the level's own triangles; their sum stays as it is without mollification. */
 static void fill_triangles(orb_map_level *l, const double *position, double *shape) {
   double mean = 0, raw = 0, total = 0;
   for (int pass = 0; pass < 2; pass++) {
@@ -96,7 +94,7 @@ static void fill_triangles(orb_map_level *l, const double *position, double *sha
         mean += sum / (3.0 * l->triangle_count);
       } else {
         double *out = shape + 4 * (size_t)t;
-        shape_of(length, MOLLIFY * (sum / 3 + 1e-3 * mean), out, out + 3);
+        shape_of(length, l->params->star.mollify * (sum / 3 + 1e-3 * mean), out, out + 3);
         total += out[3];
       }
     }
@@ -132,14 +130,14 @@ static void fill_spokes(orb_map_level *l, const double *shape) {
   at[l->count] = 3 * l->triangle_count;
 }
 
-/* Greedy colours, so that neighbours never move at once. Vertices beyond the last colour stay still. */
+/* Greedy colours, so that neighbours never move at once. Vertices that get no colour do not move. */
 static orb_status fill_colours(orb_context *ctx, orb_map_level *l) {
   signed char *colour = ORB_NEW(ctx, signed char, l->count);
   if (!colour) {
     return ORB_E_NO_MEMORY;
   }
   memset(colour, -1, (size_t)l->count);
-  int32_t count[MAX_COLOURS] = {0};
+  int32_t count[ORB_MAP_COLOURS] = {0};
   for (int32_t v = 0; v < l->count; v++) {
     uint64_t used = 0;
     for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
@@ -151,7 +149,7 @@ static orb_status fill_colours(orb_context *ctx, orb_map_level *l) {
       count[colour[v]]++;
     }
   }
-  for (int c = 0; c < MAX_COLOURS; c++) {
+  for (int c = 0; c < ORB_MAP_COLOURS; c++) {
     l->colour_start[c + 1] = l->colour_start[c] + count[c];
     l->colours = count[c] ? c + 1 : l->colours;
     count[c] = l->colour_start[c];
@@ -165,10 +163,39 @@ static orb_status fill_colours(orb_context *ctx, orb_map_level *l) {
   return ORB_OK;
 }
 
-orb_status orb_map_level_create(orb_context *ctx, const orb_corner_table *s, const unsigned char *alive,
-                                const unsigned char *pinned, const double *position, int32_t live, int32_t *local,
-                                orb_map_level *out) {
-  orb_map_level l = {.count = live, .triangle_count = 2 * live - 4, .local = local};
+/* Numbers the live vertices, and lists each live triangle once: at the corner of its lowest vertex. */
+static void gather(orb_map_level *l, const orb_corner_table *s, const unsigned char *alive,
+                   const unsigned char *pinned) {
+  int32_t count = 0, t = 0;
+  for (int32_t v = 0; v < s->vertex_count; v++) {
+    l->local[v] = alive[v] ? count : -1;
+    if (alive[v]) {
+      l->pinned[count] = pinned[v];
+      l->vertex[count++] = v;
+    }
+  }
+  ORB_ASSERT(count == l->count);
+  for (int32_t i = 0; i < l->count; i++) {
+    int32_t v = l->vertex[i], first = s->vertex_corner[v], c = first;
+    do {
+      int32_t q = s->corner[orb_corner_next(c)], r = s->corner[orb_corner_prev(c)];
+      if (v < q && v < r) {
+        ORB_ASSERT(t < l->triangle_count);
+        l->triangle[3 * (size_t)t] = i;
+        l->triangle[3 * (size_t)t + 1] = l->local[q];
+        l->triangle[3 * (size_t)t + 2] = l->local[r];
+        t++;
+      }
+      c = orb_corner_swing(s, c);
+    } while (c != first);
+  }
+  ORB_ASSERT(t == l->triangle_count);
+}
+
+orb_status orb_map_level_create(orb_context *ctx, const orb_map_params *params, const orb_corner_table *s,
+                                const unsigned char *alive, const unsigned char *pinned, const double *position,
+                                int32_t live, int32_t *local, orb_map_level *out) {
+  orb_map_level l = {.params = params, .count = live, .triangle_count = 2 * live - 4, .local = local};
   double *shape = NULL;
   orb_status status;
   ORB_GO(status, reserve(ctx, &l), done);
@@ -177,31 +204,7 @@ orb_status orb_map_level_create(orb_context *ctx, const orb_corner_table *s, con
     status = ORB_E_NO_MEMORY;
     goto done;
   }
-  int32_t count = 0, t = 0;
-  for (int32_t v = 0; v < s->vertex_count; v++) {
-    local[v] = alive[v] ? count : -1;
-    if (alive[v]) {
-      l.pinned[count] = pinned[v];
-      l.vertex[count++] = v;
-    }
-  }
-  ORB_ASSERT(count == live);
-  /* Each live triangle once: at the corner of its lowest vertex. */
-  for (int32_t i = 0; i < live; i++) {
-    int32_t v = l.vertex[i], first = s->vertex_corner[v], c = first;
-    do {
-      int32_t q = s->corner[orb_corner_next(c)], r = s->corner[orb_corner_prev(c)];
-      if (v < q && v < r) {
-        ORB_ASSERT(t < l.triangle_count);
-        l.triangle[3 * (size_t)t] = i;
-        l.triangle[3 * (size_t)t + 1] = local[q];
-        l.triangle[3 * (size_t)t + 2] = local[r];
-        t++;
-      }
-      c = orb_corner_swing(s, c);
-    } while (c != first);
-  }
-  ORB_ASSERT(t == l.triangle_count);
+  gather(&l, s, alive, pinned);
   fill_triangles(&l, position, shape);
   fill_spokes(&l, shape);
   status = fill_colours(ctx, &l);
@@ -259,6 +262,7 @@ int32_t orb_map_level_flips(const orb_map_level *l) {
 }
 
 double orb_map_level_energy(const orb_map_level *l) {
+  const double cap = l->params->energy.cap;
   double energy = 0, weight = 0;
   for (int32_t v = 0; v < l->count; v++) {
     for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
@@ -279,9 +283,9 @@ double orb_map_level_energy(const orb_map_level *l) {
       double dirichlet = 0.5 * (s->cv * orb_distance2(q, r) + s->cq * orb_dot(w, w) + s->cr * orb_dot(u, u));
       double ratio = signed_area > 0 ? s->area / signed_area : INFINITY;
       double value = dirichlet * (1 + ratio * ratio) / (4 * s->area);
-      energy += s->area * (value < CAP ? value : CAP);
+      energy += s->area * (value < cap ? value : cap);
       weight += s->area;
     }
   }
-  return weight > 0 ? energy / weight : CAP;
+  return weight > 0 ? energy / weight : cap;
 }

@@ -1,8 +1,8 @@
-/* A spatial start that has nearly come to a map: few triangles are still turned over, around vertices that are held.
+/* A spatial start that is nearly a map: few triangles are still flipped, around vertices that are held.
  *
- * The held vertices near them are let go, the flips cleared without them, and the vertices drawn home again while no
- * flip is allowed. Where that fails, what lies some rings away from the flips is sound: samples of it are what a map
- * is walked to (compose_walk.c), better ones than the targets by themselves.
+ * The held vertices near the flips are released, the flips are cleared without them, and the vertices are drawn back
+ * while no flip is allowed. Where that fails, the vertices some rings away from the flips are still usable: the
+ * landmark walk (starts/landmark_walk.c) goes to samples of them, which are better than the spatial targets alone.
  */
 #include <math.h>
 #include <string.h>
@@ -14,18 +14,15 @@
 #include "base/memory.h"
 #include "numeric/predicates.h"
 
-enum { FEW = 30, RELEASE_RINGS = 12, SOUND_RINGS = 4, CLEARINGS = 12, HOME_ROUNDS = 12, HOME_SWEEPS = 20 };
-static const double HOME_PULL = 5;
-
 int orb_map_is_near(const orb_map_level *l, int32_t flips) {
-  return flips <= l->triangle_count / FEW;
+  return flips <= l->triangle_count / l->params->near.few;
 }
 
 static const double *point(const orb_map_level *l, int32_t v) {
   return l->x + 3 * (size_t)v;
 }
 
-/* Holds v at its point again if nothing turns over by that. */
+/* Holds v at its point again if that flips nothing. */
 static int settle(const orb_map_run *c, orb_map_level *l, int32_t v, const double home[3]) {
   double *x = l->x + 3 * (size_t)v, old[3];
   memcpy(old, x, sizeof old);
@@ -42,12 +39,12 @@ static int settle(const orb_map_run *c, orb_map_level *l, int32_t v, const doubl
   return 1;
 }
 
-/* Draws the released vertices to their points, harder from round to round; how many have not come there. */
+/* Draws the released vertices to their points, more strongly from round to round. *count: those that are not back. */
 static orb_status draw_home(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, const double *home,
                             unsigned char *released, int32_t *count) {
-  double pull = HOME_PULL;
+  double pull = c->params.near.home_pull;
   orb_map_set_pull(c, l, to_mesh, 0);
-  for (int round = 0; round < HOME_ROUNDS && *count; round++, pull *= 2) {
+  for (int round = 0; round < c->params.near.home_rounds && *count; round++, pull *= 2) {
     for (int32_t v = 0; v < l->count; v++) {
       if (released[v] && settle(c, l, v, home + 3 * (size_t)v)) {
         released[v] = 0;
@@ -57,7 +54,7 @@ static orb_status draw_home(orb_map_run *c, orb_map_level *l, const int32_t *to_
       }
     }
     if (*count) {
-      ORB_TRY(orb_map_sweeps(c, l, orb_map_hard(), HOME_SWEEPS));
+      ORB_TRY(orb_map_sweeps(c, l, orb_map_hard(&c->params), c->params.near.home_sweeps));
     }
   }
   return ORB_OK;
@@ -73,18 +70,18 @@ orb_status orb_map_release(orb_map_run *c, orb_map_level *l, const int32_t *to_m
   if (status != ORB_OK) {
     goto done;
   }
-  ORB_GO(status, orb_map_level_mark_flips(ctx, l, RELEASE_RINGS, released + n, released + 2 * n), done);
+  ORB_GO(status, orb_map_level_mark_flips(ctx, l, c->params.near.rings, released + n, released + 2 * n), done);
   memcpy(home, l->x, 3 * n * sizeof *home);
   orb_map_set_pull(c, l, to_mesh, 1);
   for (size_t v = 0; v < n; v++) {
     if (released[n + v] && l->pinned[v]) {
       released[v] = 1;
       l->pinned[v] = 0;
-      l->pull[v] = HOME_PULL * l->area[v];
+      l->pull[v] = c->params.near.home_pull * l->area[v];
       count++;
     }
   }
-  ORB_GO(status, orb_map_clear_flips(c, l, CLEARINGS, flips), done);
+  ORB_GO(status, orb_map_clear_flips(c, l, c->params.near.clearings, flips), done);
   if (*flips == 0) {
     ORB_GO(status, draw_home(c, l, to_mesh, home, released, &count), done);
     *flips = count;
@@ -95,22 +92,23 @@ done:
   return status;
 }
 
-orb_status orb_map_keep_sound(orb_map_run *c, const orb_map_level *l, const int32_t *to_mesh) {
+orb_status orb_map_keep_usable(orb_map_run *c, const orb_map_level *l, const int32_t *to_mesh) {
   size_t n = (size_t)l->count;
   unsigned char *mark = ORB_NEW(c->ctx, unsigned char, 2 * n);
-  orb_status status = mark ? orb_map_level_mark_flips(c->ctx, l, SOUND_RINGS, mark, mark + n) : ORB_E_NO_MEMORY;
+  orb_status status =
+      mark ? orb_map_level_mark_flips(c->ctx, l, c->params.near.usable_rings, mark, mark + n) : ORB_E_NO_MEMORY;
   if (status != ORB_OK) {
     goto done;
   }
-  memset(c->sound, 0, (size_t)c->vertex_count);
+  memset(c->usable, 0, (size_t)c->vertex_count);
   for (size_t i = 0; i < n; i++) {
     int32_t v = to_mesh[l->vertex[i]];
     if (!mark[i]) {
-      c->sound[v] = 1;
-      c->goal_place[v] = l->place[i];
+      c->usable[v] = 1;
+      c->target_place[v] = l->place[i];
     }
   }
-  c->has_sound = 1;
+  c->has_usable = 1;
 done:
   orb_free(c->ctx, mark);
   return status;

@@ -1,8 +1,8 @@
 /* The fixed shape along a space-filling curve, for sweeps.
  *
- * Sweeps go over the moving vertices along such a curve, and each reads the fixed shape where it lies on it. In the
- * order of a file what is near on the surface may lie anywhere in memory; scanned and edited meshes are often so, and
- * then much of a step's time is spent on waiting for the surface.
+ * Sweeps visit the moving vertices along such a curve, and each vertex reads the fixed shape at its place. In the order
+ * of a file, neighbours on the surface may lie anywhere in memory, as in many scanned and edited meshes; a step then
+ * spends much of its time waiting for memory.
  */
 #include <string.h>
 
@@ -26,7 +26,7 @@ static int32_t least_corner(const int32_t *triangle, const int32_t *number) {
   return a < c ? a : c;
 }
 
-/* Triangles by their least vertex. number: of each vertex, packed; first: room for vertex_count + 1, zero. */
+/* Orders triangles by their least vertex. number: of each vertex, packed; first: vertex_count + 1 zeros. */
 static void order_triangles(const orb_map_surface *b, const int32_t *number, int32_t *first, orb_map_packed *p) {
   for (int32_t t = 0; t < b->triangle_count; t++) {
     first[least_corner(b->triangles + 3 * (size_t)t, number) + 1]++;
@@ -40,7 +40,7 @@ static void order_triangles(const orb_map_surface *b, const int32_t *number, int
   }
 }
 
-/* Corners keep their places in their triangles. */
+/* Corners keep their order within their triangles. */
 static void copy_surface(const orb_map_surface *b, const orb_corner_table *s, orb_map_packed *p) {
   for (int32_t i = 0; i < b->vertex_count; i++) {
     size_t v = (size_t)s->to_mesh[i], to = 3 * (size_t)i;

@@ -1,4 +1,4 @@
-/* Rounds of sweeps on one level: with and without flips, drawn to targets, and back to none. */
+/* Rounds of sweeps on one level: with flips and without, clearing flips, loosening, and drawing to spatial targets. */
 #include <math.h>
 #include <string.h>
 
@@ -9,33 +9,25 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-enum { SOFT_SWEEPS = 20, DRAW_ROUNDS = 5, DRAW_SWEEPS = 40, CLEARINGS = 8 };
-static const double EPSILON = 0.1;
-static const double FIRST_BARRIER = 1e-4;
-static const double STILL = 1e-3; /* of a mean edge: less does not count as moving */
-static const double OVER = 1.5;   /* over-relaxation, where no flips are allowed */
-static const double GROWING = 1.05;
-static const double DRAW = 20, DRAW_FALL = 0.8;
-
-orb_map_rules orb_map_soft(double barrier) {
-  return (orb_map_rules){.soft = 1, .barrier = barrier, .epsilon = EPSILON, .omega = 1};
+orb_map_rules orb_map_soft(const orb_map_params *params, double barrier) {
+  return (orb_map_rules){.soft = 1, .barrier = barrier, .epsilon = params->star.epsilon, .omega = 1};
 }
 
-orb_map_rules orb_map_hard(void) {
-  return (orb_map_rules){.soft = 0, .barrier = 1, .epsilon = EPSILON, .omega = OVER};
+orb_map_rules orb_map_hard(const orb_map_params *params) {
+  return (orb_map_rules){.soft = 0, .barrier = 1, .epsilon = params->star.epsilon, .omega = params->sweep.over};
 }
 
-/* All vertices take part in the first one. */
+/* In the first sweep no vertex waits. */
 orb_status orb_map_sweeps(orb_map_run *c, orb_map_level *l, orb_map_rules rules, int count) {
   double moved;
   int32_t stepped = l->count;
-  rules.still = STILL * sqrt(4 * M_PI / l->triangle_count);
+  rules.still = c->params.sweep.still * sqrt(4 * M_PI / l->triangle_count);
   for (int32_t v = 0; v < l->count; v++) {
     l->moved[v] = INFINITY;
   }
   orb_status status = ORB_OK;
   orb_map_packed_enter(&c->packed, l);
-  for (int i = 0; i < count && stepped > l->count / 500 && status == ORB_OK; i++) {
+  for (int i = 0; i < count && stepped > l->count / c->params.sweep.still_share && status == ORB_OK; i++) {
     status = orb_map_level_sweep(c->ctx, l, &c->packed.b, &rules, &moved, &stepped);
     c->work -= stepped;
   }
@@ -47,23 +39,24 @@ void orb_map_set_pull(const orb_map_run *c, orb_map_level *l, const int32_t *to_
   for (int32_t v = 0; v < l->count; v++) {
     l->pull[v] = strength * l->area[v];
     if (strength > 0) {
-      memcpy(l->goal + 3 * (size_t)v, c->goal + 3 * (size_t)to_mesh[l->vertex[v]], sizeof(double[3]));
+      memcpy(l->target + 3 * (size_t)v, c->target + 3 * (size_t)to_mesh[l->vertex[v]], sizeof(double[3]));
     }
   }
 }
 
 orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, int rounds, int32_t *flips) {
-  orb_map_rules rules = orb_map_soft(FIRST_BARRIER);
+  const orb_map_params *params = &c->params;
+  orb_map_rules rules = orb_map_soft(params, params->clear.first_barrier);
   double *copy = ORB_NEW(c->ctx, double, 3 * (size_t)l->count);
   orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
   int32_t at_first = *flips = orb_map_level_flips(l);
   for (int round = 0; round < rounds && *flips && c->work > 0 && status == ORB_OK; round++) {
-    ORB_GO(status, orb_map_sweeps(c, l, rules, SOFT_SWEEPS), done);
-    rules.barrier *= 3;
+    ORB_GO(status, orb_map_sweeps(c, l, rules, params->clear.sweeps), done);
+    rules.barrier *= params->clear.barrier_growth;
     *flips = orb_map_level_flips(l);
     at_first = round == 0 ? *flips : at_first;
-    if (round > 1 && *flips > GROWING * at_first) {
-      break; /* the stronger the barrier the more flips: large parts are folded */
+    if (round > 1 && *flips > params->clear.flip_growth * at_first) {
+      break; /* a stronger barrier makes more flips: large parts are folded */
     }
     if (*flips) {
       memcpy(copy, l->x, 3 * (size_t)l->count * sizeof *copy);
@@ -102,11 +95,11 @@ void orb_map_copy_free(orb_map_run *c, orb_map_copy *s) {
   memset(s, 0, sizeof *s);
 }
 
-/* The energy with that of the pull, as the sweeps lower it. */
+/* The energy with that of the pull: what the sweeps lower. */
 static double pulled_energy(const orb_map_level *l) {
   double pull = 0, area = 0;
   for (int32_t v = 0; v < l->count; v++) {
-    pull += l->pull[v] > 0 ? l->pull[v] * orb_distance2(l->y + 3 * (size_t)v, l->goal + 3 * (size_t)v) : 0;
+    pull += l->pull[v] > 0 ? l->pull[v] * orb_distance2(l->y + 3 * (size_t)v, l->target + 3 * (size_t)v) : 0;
     area += l->area[v];
   }
   return orb_map_level_energy(l) + (area > 0 ? pull / (4 * area) : 0);
@@ -118,13 +111,13 @@ orb_status orb_map_loosen(orb_map_run *c, orb_map_level *l, int soft_sweeps, int
   int32_t flips;
   orb_status status = ORB_OK;
   if (c->work <= 0) {
-    return status; /* flips that come could not be cleared */
+    return status; /* no work is left to clear the flips that it would make */
   }
   ORB_GO(status, orb_map_copy_take(c, l, &before), done);
-  ORB_GO(status, orb_map_sweeps(c, l, orb_map_soft(1), soft_sweeps), done);
-  ORB_GO(status, orb_map_clear_flips(c, l, 3, &flips), done);
+  ORB_GO(status, orb_map_sweeps(c, l, orb_map_soft(&c->params, 1), soft_sweeps), done);
+  ORB_GO(status, orb_map_clear_flips(c, l, c->params.clear.loosen_rounds, &flips), done);
   if (!flips) {
-    ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(), hard_sweeps), done);
+    ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), hard_sweeps), done);
   }
   int worse = flips || orb_map_level_flips(l) || pulled_energy(l) >= energy;
   if (worse) {
@@ -135,23 +128,25 @@ done:
   return status;
 }
 
-/* A round lets flips come while the pull is on, drives them out and settles. A round that cannot be untangled is taken
- * back and ends it. */
+/* A round sweeps with flips allowed while the pull is on, clears the flips, and sweeps without flips. A round whose
+ * flips cannot be cleared is undone and is the last. */
 orb_status orb_map_draw(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
-  double pull = DRAW;
+  const orb_map_params *params = &c->params;
+  double pull = params->draw.pull;
   orb_status status = ORB_OK;
-  for (int round = 0; round < DRAW_ROUNDS && status == ORB_OK && c->work > 0; round++, pull *= DRAW_FALL) {
+  int rounds = params->draw.rounds;
+  for (int round = 0; round < rounds && status == ORB_OK && c->work > 0; round++, pull *= params->draw.fall) {
     orb_map_copy before = {0};
     int32_t flips;
     orb_map_set_pull(c, l, to_mesh, pull);
     ORB_GO(status, orb_map_copy_take(c, l, &before), next);
-    ORB_GO(status, orb_map_sweeps(c, l, orb_map_soft(FIRST_BARRIER), DRAW_SWEEPS), next);
-    ORB_GO(status, orb_map_clear_flips(c, l, CLEARINGS, &flips), next);
+    ORB_GO(status, orb_map_sweeps(c, l, orb_map_soft(params, params->clear.first_barrier), params->draw.sweeps), next);
+    ORB_GO(status, orb_map_clear_flips(c, l, params->draw.clearings, &flips), next);
     if (flips) {
       orb_map_copy_restore(&before, l);
-      round = DRAW_ROUNDS;
+      round = rounds;
     }
-    ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(), DRAW_SWEEPS), next);
+    ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(params), params->draw.sweeps), next);
   next:
     orb_map_copy_free(c, &before);
   }

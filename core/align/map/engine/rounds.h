@@ -4,17 +4,20 @@
 
 #include "align/map/engine/run.h"
 
-/* compose_rounds.c. Sweeps until hardly a vertex moves any more, `count` at most. */
+/* Sweeps until hardly a vertex moves any more, `count` times at most. */
 ORB_MUST_CHECK orb_status orb_map_sweeps(orb_map_run *run, orb_map_level *level, orb_map_rules rules, int count);
 
-/* Rules of sweeps: flips allowed against a barrier of that strength, or none. */
-orb_map_rules orb_map_soft(double barrier);
+/* Rules of sweeps that allow flips against a barrier of this strength. */
+orb_map_rules orb_map_soft(const orb_map_params *params, double barrier);
 
-orb_map_rules orb_map_hard(void);
+/* Rules of sweeps that allow no flip. */
+orb_map_rules orb_map_hard(const orb_map_params *params);
 
+/* Pulls every vertex of the level to its spatial target; strength 0: none. */
 void orb_map_set_pull(const orb_map_run *run, orb_map_level *level, const int32_t *to_mesh, double strength);
 
-/* What a level holds of its map, to go back to. Sweeps set the density anew; single steps need it refreshed. */
+/* The map of a level, to go back to. The density is not part of it: sweeps set it, single steps need
+ * orb_map_level_refresh() first. */
 typedef struct orb_map_copy {
   orb_place *place;
   double *y; /* y, n and x, as they lie in the level */
@@ -26,14 +29,15 @@ void orb_map_copy_restore(const orb_map_copy *copy, orb_map_level *level);
 
 void orb_map_copy_free(orb_map_run *run, orb_map_copy *copy);
 
-/* Flips are driven out: sweeps against a growing barrier, then untangling of a copy, until that succeeds. */
+/* Clears flips: sweeps against a growing barrier, then untangling of a copy, until that succeeds. *flips: those left.
+ */
 ORB_MUST_CHECK orb_status orb_map_clear_flips(orb_map_run *run, orb_map_level *level, int rounds, int32_t *flips);
 
-/* Vertices that barriers have locked in get free where flips are allowed for a while. What comes of it is kept if it
- * can be untangled and is better. */
+/* Frees vertices that barriers have locked in: allows flips for a while and clears them. Keeps the result only if no
+ * flip is left and its energy is lower. */
 ORB_MUST_CHECK orb_status orb_map_loosen(orb_map_run *run, orb_map_level *level, int soft_sweeps, int hard_sweeps);
 
-/* Draws a level without flips to its spatial targets, round by round less strongly. */
+/* Draws a level without flips to its spatial targets, less strongly from round to round. */
 ORB_MUST_CHECK orb_status orb_map_draw(orb_map_run *run, orb_map_level *level, const int32_t *to_mesh);
 
 #endif

@@ -1,4 +1,4 @@
-/* What one run of orb_compose() holds, shared by compose.c and compose_guess, _rounds, _walk. */
+/* What one call of orb_compose() holds while it runs; compose.c, starts/ and twist/ share it. */
 #ifndef ORB_ALIGN_MAP_ENGINE_RUN_H
 #define ORB_ALIGN_MAP_ENGINE_RUN_H
 
@@ -6,40 +6,30 @@
 #include "embed/hierarchy.h"
 #include "embed/multires.h"
 
-enum {
-  ORB_MAP_SAMPLES = 150,    /* of a map, from which the moving shape is bent anew */
-  ORB_MAP_STEPS = 25,       /* most samples of the spatial targets that a walk goes by */
-  ORB_MAP_SOUND_STEPS = 100 /* and of a start that was nearly a map */
-};
-
 /* Where a start puts the vertices of its first level. */
 typedef enum orb_map_start {
-  ORB_MAP_GIVEN,   /* where the alignment has them */
+  ORB_MAP_GIVEN,   /* where run->start has them: the alignment as given, or a landmark walk from it */
   ORB_MAP_SPATIAL, /* at their spatial targets */
-  ORB_MAP_DRAWN    /* where the best map has them; they are then drawn to their targets */
+  ORB_MAP_DRAWN    /* where the best map has them; they are then drawn to their spatial targets */
 } orb_map_start;
 
-/* Vertices of the two shapes that belong together: first the landmarks, each once, then guesses of more. */
+/* Vertices of the two shapes that correspond: first the landmarks, each once, then mirror landmarks. */
 typedef struct orb_map_pairs {
   int32_t count, landmarks, capacity;
   int32_t *moving, *fixed;
 } orb_map_pairs;
 
-/* A map that the starts have come to. */
+/* A finished map. */
 typedef struct orb_map_candidate {
   double *points; /* of the moving shape, mesh order; NULL: none */
   double *fixed;  /* the fixed shape's; NULL: as given */
   double energy;
 } orb_map_candidate;
 
-typedef struct orb_map_effort {
-  double growth; /* of the vertices from level to level */
-  int first_sweeps, coarse_sweeps, level_sweeps, final_sweeps;
-} orb_map_effort;
-
 typedef struct orb_map_run {
   orb_context *ctx;
-  orb_map_surface b;
+  orb_map_params params;
+  orb_map_surface b;     /* the fixed shape */
   orb_map_packed packed; /* b, for sweeps */
   const orb_aligned_shape *fixed;
   orb_aligned_shape *moving;
@@ -49,12 +39,12 @@ typedef struct orb_map_run {
   double *fixed_points;   /* what they are now; NULL: as given */
   orb_map_candidate kept; /* the best map from before they changed */
   double *x, *normal;     /* moving shape, area 4π */
-  double *goal;           /* spatial targets, once it was bent */
-  double *goal_normal;
-  orb_place *goal_place; /* on the fixed shape, of every vertex of the moving one */
-  unsigned char *keep;
-  unsigned char *sound; /* vertices whose goal_place is from a start that was nearly a map, mesh order */
-  int has_sound;
+  double *target;         /* spatial targets, once the moving shape is registered */
+  double *target_normal;
+  orb_place *target_place; /* of every vertex of the moving shape, on the fixed one */
+  unsigned char *keep;     /* vertices that stay on every level: those of pairs */
+  unsigned char *usable;   /* vertices whose target_place is from a start that was nearly a map, mesh order */
+  int has_usable;
   orb_hierarchy *hierarchy;
   double *position; /* x in the order of the surface */
   int32_t *local;
@@ -62,12 +52,10 @@ typedef struct orb_map_run {
   double *start;    /* points of a map in which all pairs meet, mesh order: as given, later as walked */
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
-  double hopeless;       /* a start whose guess is above this energy is given up */
-  double twisted_energy; /* of the last map whose limbs were to be turned back */
-  int rough;             /* the alignment as given is only refined to be sampled */
-  int passes;            /* bends through samples of the best map */
-  int64_t work;          /* vertex steps that may still be spent on clearing flips and further starts */
-  orb_map_effort effort;
+  double hopeless;       /* a start whose first map has more energy is given up */
+  double twisted_energy; /* of the last map that was to be untwisted */
+  int passes;            /* registrations through samples of the best map that are left */
+  int64_t work;          /* vertex steps left for clearing flips and for further starts */
 } orb_map_run;
 
 #endif

@@ -4,7 +4,7 @@
 
 #include "orbmorph/context.h"
 
-/* `count` vertices spread over a shape by farthest points; out: their numbers. */
+/* Spreads `count` vertices over a shape by farthest points, and writes their numbers. */
 ORB_MUST_CHECK orb_status orb_map_spread(orb_context *ctx, const double *x, int32_t vertex_count, int32_t count,
                                          int32_t *out);
 

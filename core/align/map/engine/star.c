@@ -2,11 +2,12 @@
  *
  * A triangle of the moving shape with area a has three places on the fixed shape, and its image is the flat triangle of
  * their positions: D = ½ Σ cot·|edge|² is its Dirichlet energy and s its area, signed along the fixed shape's
- * interpolated normals (unsigned areas lock triangles inverted). E = D (1 + a²/χ(s)²) is the symmetric Dirichlet energy
- * with χ(s) = ½(s + √(s² + ε²)), the usual regularised positive part, so that a triangle inverted in space can turn
- * back. On the sphere a hinge barrier holds every determinant above a tenth of what the areas would give it.
+ * interpolated normals (unsigned areas would lock triangles inverted). E = D (1 + a²/χ(s)²) is the symmetric Dirichlet
+ * energy with χ(s) = ½(s + √(s² + ε²)), the usual regularised positive part, with which an inverted triangle can turn
+ * right side out. On the sphere a hinge barrier acts on every determinant below a share (params.star.hinge) of what the
+ * areas would give.
  *
- * Most stars have six triangles or so: the loops run over eight lanes at once, and only the sums go one by one.
+ * Most stars have about six triangles: the loops run over eight lanes at once, and only the sums go one by one.
  */
 #include "align/map/engine/star.h"
 
@@ -16,25 +17,22 @@
 #include "numeric/clones.h"
 #include "numeric/vec3.h"
 
-static const double HINGE = 0.1;       /* where the sphere's barrier begins */
-static const double SOFT_BELOW = 0.05; /* below that the soft barrier goes on as a parabola */
-static const double UPRIGHT = 0.3;     /* length of a sum of three normals that cancel */
-
-/* r − 1 − ln r below 1, with its derivatives; soft: finite. */
-static double barrier(double r, int soft, double *first, double *second) {
-  if (!soft || r >= SOFT_BELOW) {
+/* r − 1 − ln r below 1, with its derivatives; soft: continued by a parabola, which is finite. */
+static double barrier(const orb_map_params *params, double r, int soft, double *first, double *second) {
+  const double r0 = params->star.soft_below;
+  if (!soft || r >= r0) {
     *first = 1 - 1 / r;
     *second = 1 / (r * r);
     return r - 1 - log(r);
   }
-  double r0 = SOFT_BELOW, d = r - r0;
+  double d = r - r0;
   *second = 1 / (r0 * r0);
   *first = 1 - 1 / r0 + d * *second;
-  return r0 - 1 - log(r0) + (1 - 1 / r0) * d + 0.5 * d * d * *second;
+  return params->star.soft_value + (1 - 1 / r0) * d + 0.5 * d * d * *second;
 }
 
-/* From what was gathered, with the vertex at x on the sphere. */
-ORB_CLONES static void derive(orb_map_lanes *l, const double *x) {
+/* Fills the derived members of lanes that were gathered, with the vertex at x on the sphere. */
+ORB_CLONES static void derive(orb_map_lanes *l, const double *x, double hinge) {
   const double x0 = x[0], x1 = x[1], x2 = x[2];
   for (int i = 0; i < ORB_MAP_LANES; i++) {
     double a = l->r[0][i] - l->q[0][i], b = l->r[1][i] - l->q[1][i], c = l->r[2][i] - l->q[2][i];
@@ -57,11 +55,11 @@ ORB_CLONES static void derive(orb_map_lanes *l, const double *x) {
     l->plane[1][i] = p1;
     l->plane[2][i] = p2;
     l->det[i] = p0 * x0 + p1 * x1 + p2 * x2;
-    l->hinge[i] = 1 / (HINGE * 2 * l->area[i] * l->density[i] + 1e-300);
+    l->hinge[i] = 1 / (hinge * 2 * l->area[i] * l->density[i] + 1e-300);
   }
 }
 
-/* Where the normals cancel the triangle's own is taken. */
+/* Where the three normals cancel, the triangle's own normal is used. */
 static void set_upright(orb_map_lanes *l, int i, const double y[3]) {
   const double q[3] = {l->q[0][i], l->q[1][i], l->q[2][i]};
   const double side[3] = {l->r[0][i] - q[0], l->r[1][i] - q[1], l->r[2][i] - q[2]};
@@ -108,6 +106,7 @@ static void pad(orb_map_lanes *l, int i) {
 void orb_map_star_load(orb_map_star *star, const orb_map_level *level, int32_t v) {
   const orb_map_spoke *spoke = level->spoke + level->start[v];
   const double *y = level->y + 3 * (size_t)v, *x = level->x + 3 * (size_t)v;
+  star->params = level->params;
   star->count = level->start[v + 1] - level->start[v];
   star->hinged = 0;
   for (int32_t first = 0; first < star->count; first += ORB_MAP_LANES) {
@@ -119,9 +118,9 @@ void orb_map_star_load(orb_map_star *star, const orb_map_level *level, int32_t v
     for (int i = count; i < ORB_MAP_LANES; i++) {
       pad(l, i);
     }
-    derive(l, x);
+    derive(l, x, star->params->star.hinge);
     for (int i = 0; i < count; i++) {
-      if (l->upright[i] < UPRIGHT) {
+      if (l->upright[i] < star->params->star.upright) {
         set_upright(l, i, y);
       }
       star->hinged |= l->det[i] * l->hinge[i] < 1;
@@ -133,7 +132,7 @@ typedef struct shares {
   double energy[ORB_MAP_LANES], g[2][ORB_MAP_LANES], h[3][ORB_MAP_LANES];
 } shares;
 
-/* What each triangle adds to the system, without the barrier. frame: y, e1, e2. */
+/* The share of each triangle in the system, without the barrier. frame: y, e1, e2. */
 ORB_CLONES static void stretch(orb_map_lanes *restrict l, const double *frame, double epsilon, shares *restrict out) {
   const double y0 = frame[0], y1 = frame[1], y2 = frame[2], a0 = frame[3], a1 = frame[4], a2 = frame[5];
   const double b0 = frame[6], b1 = frame[7], b2 = frame[8];
@@ -151,8 +150,8 @@ ORB_CLONES static void stretch(orb_map_lanes *restrict l, const double *frame, d
     double positive = 0.5 * (s + root), negative = 0.5 * e * e / (root - s) + 1e-300, c = s >= 0 ? positive : negative;
     double c1 = c / root, c2 = 0.5 * e * e / (root * root * root), h = area / c;
     h *= h;
-    double f = 1 + h, fp = -2 * h * c1 / c, bend = 6 * h * c1 * c1 / (c * c) - 2 * h * c2 / c;
-    double fpp = bend > 0 ? bend : 0;
+    double f = 1 + h, fp = -2 * h * c1 / c, curvature = 6 * h * c1 * c1 / (c * c) - 2 * h * c2 / c;
+    double fpp = curvature > 0 ? curvature : 0;
     l->epsilon[i] = e;
     out->energy[i] = d * f;
     out->g[0][i] = f * d1 + d * fp * s1;
@@ -163,15 +162,15 @@ ORB_CLONES static void stretch(orb_map_lanes *restrict l, const double *frame, d
   }
 }
 
-static void add_hinge(const orb_map_lanes *l, int i, const orb_map_rules *rules, const double j1[3], const double j2[3],
-                      orb_map_newton *n) {
+static void add_hinge(const orb_map_star *star, const orb_map_lanes *l, int i, const orb_map_rules *rules,
+                      const double j1[3], const double j2[3], orb_map_newton *n) {
   double r = l->det[i] * l->hinge[i], first, second;
   if (r >= 1) {
     return;
   }
   double q = rules->barrier * l->area[i];
   const double plane[3] = {l->plane[0][i], l->plane[1][i], l->plane[2][i]};
-  n->energy += q * barrier(r, rules->soft, &first, &second);
+  n->energy += q * barrier(star->params, r, rules->soft, &first, &second);
   double g1 = orb_dot(plane, j1) * l->hinge[i], g2 = orb_dot(plane, j2) * l->hinge[i];
   n->g[0] += q * first * g1;
   n->g[1] += q * first * g2;
@@ -197,7 +196,7 @@ void orb_map_star_system(orb_map_star *star, const orb_map_rules *rules, const d
       n->h[1] += share.h[1][i];
       n->h[2] += share.h[2][i];
       if (j1) {
-        add_hinge(l, i, rules, j1, j2, n);
+        add_hinge(star, l, i, rules, j1, j2, n);
       }
     }
   }
@@ -241,7 +240,7 @@ double orb_map_star_energy(const orb_map_star *star, const orb_map_rules *rules,
     for (int i = 0; i < count; i++) {
       sum += energy[i];
       if (det[i] * l->hinge[i] < 1) {
-        sum += rules->barrier * l->area[i] * barrier(det[i] * l->hinge[i], rules->soft, &one, &two);
+        sum += rules->barrier * l->area[i] * barrier(star->params, det[i] * l->hinge[i], rules->soft, &one, &two);
       }
     }
   }

@@ -1,7 +1,7 @@
-/* A damped Newton step of one vertex of a composed map (its energy: compose_star.c), and sweeps of them.
+/* A damped Newton step of one vertex of a composed map (its energy: star.c), and sweeps of such steps.
  *
- * The vertex moves straight over the fixed shape by the 2×2 Newton step; a move may not shrink a determinant on the
- * sphere more than fivefold.
+ * The vertex moves straight over the fixed shape by the 2×2 Newton step. A step that shrinks a determinant on the
+ * sphere too much (params.step.shrink) is shortened.
  */
 #include <math.h>
 #include <string.h>
@@ -13,10 +13,9 @@
 #include "base/parallel.h"
 #include "numeric/vec3.h"
 
-enum { TRIES = 8, GRAIN = 32 };
-static const double SHRINK = 0.2; /* least ratio of a determinant in one move */
+enum { GRAIN = 32 }; /* vertices of a chunk of a sweep */
 
-/* Derivative of the point on the sphere by the two tangents of the place's triangle. */
+/* Derivatives of the point on the sphere with respect to the two tangents of the place's triangle. */
 static void sphere_jacobian(const orb_map_surface *b, const orb_place *place, const double x[3], double j1[3],
                             double j2[3]) {
   const int32_t *v = b->triangles + 3 * (size_t)place->triangle;
@@ -45,11 +44,11 @@ static void sphere_jacobian(const orb_map_surface *b, const orb_place *place, co
   }
 }
 
-/* The Newton direction, with the Hessian made positive definite; 0 where it is no descent worth a try. */
-static int solve(const orb_map_newton *n, double step[2], double *slope) {
+/* The Newton direction, with the Hessian made positive definite; 0 where it descends too little to be tried. */
+static int solve(const orb_map_params *params, const orb_map_newton *n, double step[2], double *slope) {
   double h0 = n->h[0], h1 = n->h[1], h2 = n->h[2], mean = 0.5 * (h0 + h2);
   double root = sqrt(0.25 * (h0 - h2) * (h0 - h2) + h1 * h1), low = mean - root;
-  double floor = 0.05 * fmax(fabs(mean + root), fabs(low));
+  double floor = params->step.convexity * fmax(fabs(mean + root), fabs(low));
   if (low < floor) {
     h0 += floor - low;
     h2 += floor - low;
@@ -58,14 +57,14 @@ static int solve(const orb_map_newton *n, double step[2], double *slope) {
   step[0] = -(h2 * n->g[0] - h1 * n->g[1]) / det;
   step[1] = -(h0 * n->g[1] - h1 * n->g[0]) / det;
   *slope = n->g[0] * step[0] + n->g[1] * step[1];
-  return *slope < 0 && -*slope >= 1e-12 * fabs(n->energy);
+  return *slope < 0 && -*slope >= params->step.least_slope * fabs(n->energy);
 }
 
 static double pull_energy(const orb_map_level *l, int32_t v, const double y[3]) {
-  return l->pull[v] > 0 ? l->pull[v] * orb_distance2(y, l->goal + 3 * (size_t)v) : 0;
+  return l->pull[v] > 0 ? l->pull[v] * orb_distance2(y, l->target + 3 * (size_t)v) : 0;
 }
 
-/* The Newton system of v, with the pull. */
+/* The Newton system of v, with the pull to its spatial target. */
 static void gather_system(const orb_map_level *l, const orb_map_surface *b, const orb_map_rules *rules, int32_t v,
                           orb_map_star *star, orb_map_newton *n) {
   const double *y = l->y + 3 * (size_t)v, *e1 = b->frame + 6 * (size_t)l->place[v].triangle, *e2 = e1 + 3;
@@ -77,7 +76,7 @@ static void gather_system(const orb_map_level *l, const orb_map_surface *b, cons
   orb_map_star_system(star, rules, y, e1, e2, star->hinged ? j1 : NULL, j2, n);
   if (l->pull[v] > 0) {
     double d[3];
-    orb_sub(y, l->goal + 3 * (size_t)v, d);
+    orb_sub(y, l->target + 3 * (size_t)v, d);
     n->energy += l->pull[v] * orb_dot(d, d);
     n->g[0] += 2 * l->pull[v] * orb_dot(d, e1);
     n->g[1] += 2 * l->pull[v] * orb_dot(d, e2);
@@ -113,24 +112,25 @@ static double step_vertex(orb_map_level *l, const orb_map_surface *b, const orb_
   double step[2], slope;
   orb_map_newton n;
   gather_system(l, b, rules, v, star, &n);
-  if (!solve(&n, step, &slope)) {
+  const orb_map_params *params = l->params;
+  if (!solve(params, &n, step, &slope)) {
     return 0;
   }
   double length = sqrt(step[0] * step[0] + step[1] * step[1]), most = longest_side(star), t = rules->omega;
   t = t * length > most ? most / length : t;
-  for (int tries = 0; tries < TRIES; tries++) {
+  for (int tries = 0; tries < params->step.tries; tries++) {
     const double scaled[2] = {t * step[0], t * step[1]};
     orb_place place;
     double y[3], x[3];
     if (orb_map_surface_trace(b, &l->place[v], scaled, &place)) {
       orb_map_surface_at(b, &place, y, x, NULL);
-      double energy = orb_map_star_energy(star, rules, y, x, SHRINK) + pull_energy(l, v, y);
-      if (energy <= n.energy + (t > 1 ? 0 : 1e-4 * t * slope)) {
+      double energy = orb_map_star_energy(star, rules, y, x, params->step.shrink) + pull_energy(l, v, y);
+      if (energy <= n.energy + (t > 1 ? 0 : params->step.sufficient * t * slope)) {
         put(l, b, v, &place, y, x);
         return t * length;
       }
     }
-    t = t > 1 ? 1 : 0.4 * t;
+    t = t > 1 ? 1 : params->step.shorten * t;
   }
   return 0;
 }
@@ -160,7 +160,7 @@ int orb_map_level_try(orb_map_level *l, const orb_map_surface *b, const orb_map_
   return 1;
 }
 
-/* Whether anything around v has moved since it was last optimal. */
+/* Has anything around v moved since v was last optimal? */
 static int is_stirred(const orb_map_level *l, int32_t v, double still) {
   if (l->moved[v] > still) {
     return 1;
@@ -186,7 +186,7 @@ static void fetch(const void *at) {
   __builtin_prefetch(at, 0, 3);
 }
 
-/* What a step of v reads: its neighbours and where it is. */
+/* Prefetches what a step of v reads: its neighbours and its place. */
 static void fetch_star(const orb_map_level *l, const orb_map_surface *b, int32_t v) {
   size_t t = (size_t)l->place[v].triangle;
   fetch(b->triangles + 3 * t);
@@ -205,7 +205,7 @@ static void fetch_star(const orb_map_level *l, const orb_map_surface *b, int32_t
   }
 }
 
-/* And the surface there. */
+/* Prefetches the surface there. */
 static void fetch_surface(const orb_map_level *l, const orb_map_surface *b, int32_t v) {
   const int32_t *corner = b->triangles + 3 * (size_t)l->place[v].triangle;
   for (int k = 0; k < 3; k++) {
@@ -216,8 +216,8 @@ static void fetch_surface(const orb_map_level *l, const orb_map_surface *b, int3
   }
 }
 
-/* Which vertices of a chunk step is settled before any does: no two of them are neighbours. So what a step needs is on
- * its way while the ones before it are computed. */
+/* No two vertices of a chunk are neighbours, so which of them step is known before any does. This lets a step's data
+ * be prefetched while the steps before it are computed. */
 static void sweep_range(void *arg, int64_t begin, int64_t end, int thread) {
   const sweep_job *job = arg;
   orb_map_level *l = job->level;

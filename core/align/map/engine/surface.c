@@ -1,7 +1,8 @@
-/* The fixed shape of a composed map: frames, normals, and straight walks over its triangles. */
+/* The fixed shape of a composed map: frames, normals, and straight lines over its triangles. */
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/params.h"
 #include "align/map/engine/surface.h"
 #include "base/check.h"
 #include "base/memory.h"
@@ -38,7 +39,7 @@ void orb_map_normals(const double *x, int32_t vertex_count, const int32_t *trian
   }
 }
 
-/* Two tangents of a triangle; a flat one gets any that are orthonormal. */
+/* Two orthonormal tangents of a triangle; any two if it is degenerate. */
 static void make_frame(const double *p, const double *q, const double *r, double frame[6]) {
   double *e = frame, *f = frame + 3;
   orb_sub(q, p, e);
@@ -131,7 +132,7 @@ int32_t orb_map_nearest_corner(const int32_t *triangles, const orb_place *place)
   return triangles[3 * (size_t)place->triangle + (size_t)corner];
 }
 
-/* Clamps rounding below zero and makes the sum one. */
+/* Clamps negative coordinates, which come from rounding, and makes the sum 1. */
 static void tidy(double at[3]) {
   double sum = 0;
   for (int k = 0; k < 3; k++) {
@@ -185,7 +186,6 @@ static int rates(const double *const p[3], const double d[3], double rate[3]) {
 }
 
 int orb_map_surface_trace(const orb_map_surface *b, const orb_place *from, const double step[2], orb_place *out) {
-  enum { MAX_CROSSINGS = 400 };
   int32_t t = from->triangle;
   int came = -1; /* the corner opposite to the edge that was crossed */
   double at[3], d[3];
@@ -193,7 +193,7 @@ int orb_map_surface_trace(const orb_map_surface *b, const orb_place *from, const
   for (int k = 0; k < 3; k++) {
     d[k] = step[0] * b->frame[6 * (size_t)t + (size_t)k] + step[1] * b->frame[6 * (size_t)t + 3 + (size_t)k];
   }
-  for (int crossing = 0; crossing < MAX_CROSSINGS; crossing++) {
+  for (int crossing = 0; crossing < ORB_MAP_CROSSINGS; crossing++) {
     const int32_t *v = b->triangles + 3 * (size_t)t;
     const double *const p[3] = {b->x + 3 * (size_t)v[0], b->x + 3 * (size_t)v[1], b->x + 3 * (size_t)v[2]};
     double rate[3], end = 1;

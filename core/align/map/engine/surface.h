@@ -1,11 +1,11 @@
-/* The fixed shape of a composed map: a surface on which places move. */
+/* The fixed shape of a composed map. */
 #ifndef ORB_ALIGN_MAP_ENGINE_SURFACE_H
 #define ORB_ALIGN_MAP_ENGINE_SURFACE_H
 
 #include "orbmorph/align.h"
 #include "orbmorph/locate.h"
 
-/* The fixed shape: a surface on which points move. Scaled to area 4π about its centre. */
+/* A surface on which places move. Scaled to area 4π around its centre. */
 typedef struct orb_map_surface {
   int32_t vertex_count, triangle_count;
   double *x;       /* positions, 3 a vertex */

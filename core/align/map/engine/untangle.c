@@ -1,10 +1,10 @@
-/* Untangling on the sphere: flipped neighbourhoods are optimised until every triangle turns positively.
+/* Untangling on the sphere: the neighbourhoods of flips are optimised until every triangle is positive.
  *
- * Around the flipped triangles, and a growing number of rings about them, vertices take damped Newton steps of
- * Σ D / χ(d): D the Dirichlet energy of the triangle from an equilateral one, d = det(p, q, r), χ(d) = ½(d + √(d² +
- * ε²)) its regularised positive part. ε follows the star's worst determinant down, so that the energy stays finite
- * while there are flips and becomes a barrier as they go (Garanzha et al., Foldover-free maps in 50 lines of code,
- * 2021).
+ * The vertices of flipped triangles, and of a growing number of rings around them, take damped Newton steps of
+ * Σ D / χ(d): D is the Dirichlet energy of the triangle from an equilateral one, d = det(p, q, r), and
+ * χ(d) = ½(d + √(d² + ε²)) is the regularised positive part of d. ε follows the worst determinant of the star down, so
+ * that the energy stays finite while there are flips and becomes a barrier as they disappear (Garanzha et al.,
+ * Foldover-free maps in 50 lines of code, 2021).
  */
 #include <math.h>
 #include <stdlib.h>
@@ -18,16 +18,7 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum {
-  TURN_GRAIN = 1024,
-  FEW = 12,
-  ROUNDS = 60,
-  STALE = 12,
-  PASSES = 6,
-  RINGS_MOST = 5,
-  TRIES = 6,
-  CHECK_EVERY = 4096
-};
+enum { FLIP_GRAIN = 1024, CHECK_EVERY = 4096 }; /* triangles of one task; vertices between checks for cancellation */
 
 static double chi(double d, double e) {
   double root = sqrt(d * d + e * e);
@@ -93,7 +84,7 @@ static void step(orb_map_level *l, int32_t v, double least_epsilon) {
     return;
   }
   double most = fmin(0.5, sqrt(longest)), scale = length > most ? most / length : 1;
-  for (int tries = 0; tries < TRIES; tries++, scale *= 0.4) {
+  for (int tries = 0; tries < l->params->untangle.tries; tries++, scale *= l->params->untangle.shorten) {
     double moved[3];
     for (int k = 0; k < 3; k++) {
       moved[k] = p[k] + scale * (s * e1[k] + t * e2[k]);
@@ -106,31 +97,31 @@ static void step(orb_map_level *l, int32_t v, double least_epsilon) {
   }
 }
 
-typedef struct turn_job {
+typedef struct flip_job {
   const orb_map_level *l;
-  unsigned char *turned; /* of each triangle: does not turn positively */
-} turn_job;
+  unsigned char *flipped; /* of each triangle */
+} flip_job;
 
-static void turn_range(void *arg, int64_t begin, int64_t end, int thread) {
-  const turn_job *job = arg;
+static void flip_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const flip_job *job = arg;
   const orb_map_level *l = job->l;
   (void)thread;
   for (int64_t t = begin; t < end; t++) {
     const int32_t *v = l->triangle + 3 * t;
-    job->turned[t] = orb_orient(point(l, v[0]), point(l, v[1]), point(l, v[2])) <= 0;
+    job->flipped[t] = orb_orient(point(l, v[0]), point(l, v[1]), point(l, v[2])) <= 0;
   }
 }
 
-/* Marks the vertices of triangles that do not turn positively; how many such triangles, and the worst determinant. */
-static int32_t mark_flips(orb_context *ctx, turn_job *job, unsigned char *mark, double *worst) {
+/* Marks the vertices of flipped triangles; returns the number of these, and in *worst the least determinant. */
+static int32_t mark_flips(orb_context *ctx, flip_job *job, unsigned char *mark, double *worst) {
   const orb_map_level *l = job->l;
   int32_t flips = 0;
-  orb_parallel_for(ctx, l->triangle_count, TURN_GRAIN, turn_range, job);
+  orb_parallel_for(ctx, l->triangle_count, FLIP_GRAIN, flip_range, job);
   memset(mark, 0, (size_t)l->count);
   *worst = 0;
   for (int32_t t = 0; t < l->triangle_count; t++) {
     const int32_t *v = l->triangle + 3 * (size_t)t;
-    if (job->turned[t]) {
+    if (job->flipped[t]) {
       mark[v[0]] = mark[v[1]] = mark[v[2]] = 1;
       *worst = fmin(*worst, orb_det(point(l, v[0]), point(l, v[1]), point(l, v[2])));
       flips++;
@@ -155,18 +146,18 @@ static void grow_marks(const orb_map_level *l, int rings, unsigned char *mark, u
 orb_status orb_map_level_mark_flips(orb_context *ctx, const orb_map_level *l, int rings, unsigned char *mark,
                                     unsigned char *next) {
   double worst;
-  turn_job turn = {l, ORB_NEW(ctx, unsigned char, l->triangle_count)};
-  if (!turn.turned) {
+  flip_job job = {l, ORB_NEW(ctx, unsigned char, l->triangle_count)};
+  if (!job.flipped) {
     return ORB_E_NO_MEMORY;
   }
-  (void)mark_flips(ctx, &turn, mark, &worst);
+  (void)mark_flips(ctx, &job, mark, &worst);
   grow_marks(l, rings, mark, next);
-  orb_free(ctx, turn.turned);
+  orb_free(ctx, job.flipped);
   return ORB_OK;
 }
 
-/* Parts of what is marked that no edge joins: steps in one know nothing of another, so each goes on a thread of its
- * own, its vertices in their order, and what comes of it is the same. */
+/* A part of the marked vertices that no edge joins to another part. Steps in one part do not see the others, so each
+ * runs on a thread of its own with its vertices in order, and the result does not depend on the number of threads. */
 typedef struct island {
   int32_t first, size;
 } island;
@@ -177,7 +168,7 @@ typedef struct islands {
   double least_epsilon;
   int32_t count;
   island *list;
-  int32_t *part;   /* union-find; of a vertex that stays: −1 */
+  int32_t *part;   /* union-find; −1: the vertex stays */
   int32_t *order;  /* vertices by island */
   int32_t *number; /* of an island, by its lowest vertex */
 } islands;
@@ -194,7 +185,7 @@ static int by_size(const void *a, const void *b) {
   return x->size != y->size ? (x->size < y->size) - (x->size > y->size) : (x->first > y->first) - (x->first < y->first);
 }
 
-/* Joins the marked vertices that an edge joins; the lowest of each island stands for it. */
+/* Joins the marked vertices that an edge joins; the lowest of each island represents it. */
 static void join_islands(islands *is, const unsigned char *mark) {
   const orb_map_level *l = is->level;
   for (int32_t v = 0; v < l->count; v++) {
@@ -211,7 +202,7 @@ static void join_islands(islands *is, const unsigned char *mark) {
   }
 }
 
-/* Lists the islands, the largest first. Returns how many vertices are to move. */
+/* Lists the islands, the largest first. Returns the number of vertices that will move. */
 static int32_t list_islands(islands *is) {
   int32_t n = is->level->count, total = 0;
   is->count = 0;
@@ -245,10 +236,10 @@ static void untangle_range(void *arg, int64_t begin, int64_t end, int thread) {
   (void)thread;
   for (int64_t k = begin; k < end; k++) {
     const int32_t *vertex = is->order + is->list[k].first;
-    for (int pass = 0; pass < PASSES; pass++) {
+    for (int pass = 0; pass < is->level->params->untangle.passes; pass++) {
       for (int32_t i = 0; i < is->list[k].size; i++) {
         if (i % CHECK_EVERY == 0 && orb_context_check(is->ctx) != ORB_OK) {
-          return; /* as orb_map_level_untangle() will say */
+          return; /* orb_map_level_untangle() reports it */
         }
         step(is->level, vertex[i], is->least_epsilon);
       }
@@ -259,33 +250,35 @@ static void untangle_range(void *arg, int64_t begin, int64_t end, int thread) {
 orb_status orb_map_level_untangle(orb_context *ctx, orb_map_level *l, int32_t *left, int64_t *work) {
   size_t n = (size_t)l->count;
   unsigned char *mark = ORB_NEW(ctx, unsigned char, 2 * n), *next = mark ? mark + n : NULL;
-  turn_job turn = {l, ORB_NEW(ctx, unsigned char, l->triangle_count)};
+  flip_job job = {l, ORB_NEW(ctx, unsigned char, l->triangle_count)};
   islands is = {.ctx = ctx, .level = l, .part = ORB_NEW(ctx, int32_t, 3 * n), .list = ORB_NEW(ctx, island, n)};
-  orb_status status = mark && turn.turned && is.part && is.list ? ORB_OK : ORB_E_NO_MEMORY;
+  const orb_map_params *params = l->params;
+  orb_status status = mark && job.flipped && is.part && is.list ? ORB_OK : ORB_E_NO_MEMORY;
   int32_t fewest = INT32_MAX;
-  int stale = 0; /* rounds since there were fewest flips */
+  int stale = 0; /* rounds since the number of flips last fell */
   is.order = is.part ? is.part + n : NULL;
   is.number = is.part ? is.part + 2 * n : NULL;
   for (int round = 0; status == ORB_OK; round++) {
     double worst;
-    *left = mark_flips(ctx, &turn, mark, &worst);
+    *left = mark_flips(ctx, &job, mark, &worst);
     stale = *left < fewest ? 0 : stale + 1;
     fewest = *left < fewest ? *left : fewest;
-    if (*left == 0 || round == ROUNDS || stale > STALE) {
+    if (*left == 0 || round == params->untangle.rounds || stale > params->untangle.stale) {
       break;
     }
     int rings = 1 + round / 4;
-    grow_marks(l, rings < RINGS_MOST ? rings : RINGS_MOST, mark, next);
-    /* Many flips need one ε for all; the last few hide in stars far smaller than that. */
+    grow_marks(l, rings < params->untangle.rings_most ? rings : params->untangle.rings_most, mark, next);
+    /* Many flips need one ε for all; the last few hide in stars that are far smaller. */
     double scale = 1.0 / l->triangle_count;
-    is.least_epsilon = *left > FEW && round % 3 ? sqrt(1e-8 * scale * scale + 0.04 * worst * worst) : 0;
+    is.least_epsilon =
+        *left > params->untangle.few && round % 3 ? sqrt(1e-8 * scale * scale + 0.04 * worst * worst) : 0;
     join_islands(&is, mark);
-    *work -= PASSES * (int64_t)list_islands(&is);
+    *work -= params->untangle.passes * (int64_t)list_islands(&is);
     orb_parallel_for(ctx, is.count, 1, untangle_range, &is);
     status = orb_context_check(ctx);
   }
   orb_free(ctx, mark);
-  orb_free(ctx, turn.turned);
+  orb_free(ctx, job.flipped);
   orb_free(ctx, is.part);
   orb_free(ctx, is.list);
   return status;

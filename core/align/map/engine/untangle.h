@@ -4,13 +4,13 @@
 
 #include "align/map/engine/level.h"
 
-/* Marks the vertices of such triangles, and so many rings about them; the others' marks are 0. next: room for as many
- * (compose_untangle.c). */
+/* Marks the vertices of flipped triangles and of `rings` rings around them, and clears the other marks. next: room for
+ * as many marks. */
 ORB_MUST_CHECK orb_status orb_map_level_mark_flips(orb_context *ctx, const orb_map_level *level, int rings,
                                                    unsigned char *mark, unsigned char *next);
 
-/* Optimises flipped neighbourhoods on the sphere until no flip is left (compose_untangle.c); *left: how many are;
- * *work: falls by the steps it took. Only x changes, and only near flips. */
+/* Optimises the neighbourhoods of flips on the sphere until no flip is left. Changes only x, and only near flips.
+ * *left: flips that remain; *work falls by the steps taken. */
 ORB_MUST_CHECK orb_status orb_map_level_untangle(orb_context *ctx, orb_map_level *level, int32_t *left, int64_t *work);
 
 #endif

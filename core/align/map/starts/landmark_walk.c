@@ -1,10 +1,10 @@
-/* Guessed pairs, and a first map in which pairs meet.
+/* The pairs, and a first map in which they meet.
  *
- * The alignment as given meets at the landmarks and is each shape's own between them, so limbs may lie elsewhere or be
- * turned; and vertices put straight at their spatial targets fold where limbs are thin. The way between: both shapes
- * are embedded anew with the landmarks, their mirror images and some samples of the spatial targets pinned together
- * (orb_pin_walk). That is certified, near the targets, and cheap. Samples are only steps on the way: they are free to
- * move afterwards.
+ * In the alignment as given the shapes meet only at the landmarks, so limbs may lie elsewhere or be twisted; and
+ * vertices put straight at their spatial targets fold where limbs are thin. Instead both shapes are embedded anew with
+ * the landmarks, the mirror landmarks and some samples of the spatial targets pinned together (orb_pin_walk). The
+ * result is certified, near the spatial targets, and cheap. Samples only guide the walk: they are free to move
+ * afterwards.
  */
 #include <math.h>
 #include <string.h>
@@ -16,11 +16,6 @@
 #include "base/check.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
-
-enum { LEVEL = 300, LEVEL_A_PAIR = 6 };
-static const double OFF_SURFACE = 2; /* mean distances of the samples from the surface: farther is no target */
-static const double FACING = 0.7;    /* least cosine between a sample's normal and the surface's */
-static const double APART = 0.15, SOUND_APART = 0.04; /* least distance of a sample from any pair */
 
 static int is_paired(const orb_map_pairs *p, int32_t moving, int32_t fixed) {
   for (int32_t i = 0; i < p->count; i++) {
@@ -44,11 +39,11 @@ orb_status orb_map_pairs_create(orb_map_run *c) {
   orb_status status = ORB_OK;
   orb_map_pairs *p = &c->pairs;
   size_t n = (size_t)c->landmark_count;
-  int32_t found = 0, *guesses[2] = {ORB_NEW(ctx, int32_t, n + 1), ORB_NEW(ctx, int32_t, n + 1)};
-  p->capacity = 2 * c->landmark_count + ORB_MAP_SOUND_STEPS;
+  int32_t found = 0, *images[2] = {ORB_NEW(ctx, int32_t, n + 1), ORB_NEW(ctx, int32_t, n + 1)};
+  p->capacity = 2 * c->landmark_count + c->params.walk.usable_samples;
   p->moving = ORB_NEW(ctx, int32_t, p->capacity);
   p->fixed = ORB_NEW(ctx, int32_t, p->capacity);
-  if (!guesses[0] || !guesses[1] || !p->moving || !p->fixed) {
+  if (!images[0] || !images[1] || !p->moving || !p->fixed) {
     status = ORB_E_NO_MEMORY;
     goto done;
   }
@@ -59,19 +54,19 @@ orb_status orb_map_pairs_create(orb_map_run *c) {
   if (p->count > 0) {
     const orb_mesh *meshes[2] = {&c->fixed->mesh, &c->moving->mesh};
     const int32_t *landmarks[2] = {p->fixed, p->moving};
-    ORB_GO(status, orb_map_mirror_landmarks(ctx, meshes, landmarks, p->count, guesses, &found), done);
+    ORB_GO(status, orb_map_mirror_landmarks(ctx, &c->params, meshes, landmarks, p->count, images, &found), done);
   }
   for (int32_t i = 0; i < found; i++) {
-    add_pair(p, guesses[1][i], guesses[0][i]);
+    add_pair(p, images[1][i], images[0][i]);
   }
 done:
-  orb_free(ctx, guesses[0]);
-  orb_free(ctx, guesses[1]);
+  orb_free(ctx, images[0]);
+  orb_free(ctx, images[1]);
   return status;
 }
 
 static int is_apart(const orb_map_run *c, int32_t moving, int32_t fixed) {
-  double apart = c->has_sound ? SOUND_APART : APART;
+  double apart = c->has_usable ? c->params.walk.usable_apart : c->params.walk.apart;
   for (int32_t i = 0; i < c->pairs.count; i++) {
     double d = orb_distance2(c->x + 3 * (size_t)moving, c->x + 3 * (size_t)c->pairs.moving[i]);
     double e = orb_distance2(c->b.x + 3 * (size_t)fixed, c->b.x + 3 * (size_t)c->pairs.fixed[i]);
@@ -82,7 +77,8 @@ static int is_apart(const orb_map_run *c, int32_t moving, int32_t fixed) {
   return 1;
 }
 
-/* Adds samples of the spatial targets, where these lie well on the fixed shape, behind the pairs; *count: with them. */
+/* Adds samples of the spatial targets behind the pairs, where the targets lie well on the fixed shape. *count: the
+ * pairs with them. */
 static orb_status sample_targets(orb_map_run *c, int32_t samples, int32_t *count) {
   const orb_map_surface *b = &c->b;
   int32_t held = c->pairs.count, *spread = ORB_NEW(c->ctx, int32_t, samples);
@@ -90,18 +86,18 @@ static orb_status sample_targets(orb_map_run *c, int32_t samples, int32_t *count
   orb_status status = spread && off ? orb_map_spread(c->ctx, c->x, c->vertex_count, samples, spread) : ORB_E_NO_MEMORY;
   for (int32_t i = 0; i < samples && status == ORB_OK; i++) {
     double y[3];
-    orb_map_surface_at(b, &c->goal_place[spread[i]], y, NULL, NULL);
-    off[i] = sqrt(orb_distance2(y, c->goal + 3 * (size_t)spread[i]));
+    orb_map_surface_at(b, &c->target_place[spread[i]], y, NULL, NULL);
+    off[i] = sqrt(orb_distance2(y, c->target + 3 * (size_t)spread[i]));
     mean += off[i] / samples;
   }
   for (int32_t i = 0; i < samples && status == ORB_OK; i++) {
-    const orb_place *place = &c->goal_place[spread[i]];
+    const orb_place *place = &c->target_place[spread[i]];
     double n[3];
     int32_t u = orb_map_nearest_corner(b->triangles, place);
     orb_map_surface_at(b, place, NULL, NULL, n);
-    int fits = c->has_sound
-                   ? c->sound[spread[i]]
-                   : off[i] <= OFF_SURFACE * mean && orb_dot(n, c->goal_normal + 3 * (size_t)spread[i]) >= FACING;
+    int fits = c->has_usable ? c->usable[spread[i]]
+                             : off[i] <= c->params.walk.off_surface * mean &&
+                                   orb_dot(n, c->target_normal + 3 * (size_t)spread[i]) >= c->params.walk.facing;
     if (fits && is_apart(c, spread[i], u)) {
       add_pair(&c->pairs, spread[i], u);
     }
@@ -113,7 +109,7 @@ static orb_status sample_targets(orb_map_run *c, int32_t samples, int32_t *count
   return status;
 }
 
-/* A shape as orb_pin_walk() takes it: only the points are its own. */
+/* A shape as orb_pin_walk() takes it. It owns its points and borrows the rest. */
 static orb_status borrow(orb_context *ctx, const orb_aligned_shape *shape, int32_t *landmarks, int32_t count,
                          orb_sheet *out) {
   size_t n = 3 * (size_t)shape->mesh.vertex_count;
@@ -130,7 +126,7 @@ static orb_status borrow(orb_context *ctx, const orb_aligned_shape *shape, int32
   return ORB_OK;
 }
 
-/* The walked spheres become those of the run; what it had come to before is kept beside. */
+/* The walked spheres become those of the run; c->kept holds the best map from before. */
 static orb_status take_both(orb_map_run *c, orb_sheet *fixed, orb_sheet *moving) {
   orb_map_surface b;
   orb_aligned_shape shape = {.mesh = c->fixed->mesh, .points = fixed->shape.points};
@@ -148,7 +144,7 @@ static orb_status take_both(orb_map_run *c, orb_sheet *fixed, orb_sheet *moving)
   return orb_map_packed_create(c->ctx, &c->fixed->mesh, &c->b, &c->packed);
 }
 
-/* The walked map as one to the fixed shape's own sphere. */
+/* Carries the walked map to the fixed shape's own sphere. */
 static orb_status carry_over(orb_map_run *c, const orb_sheet *fixed, const orb_sheet *moving) {
   orb_locator *locator;
   const orb_map_surface *b = &c->b;
@@ -170,7 +166,8 @@ static orb_status walk_pairs(orb_map_run *c, int32_t count, int *stuck) {
   orb_context *ctx = c->ctx;
   orb_sheet sheets[2] = {0};
   orb_status status = ORB_OK;
-  int32_t coarse = LEVEL_A_PAIR * count > LEVEL ? LEVEL_A_PAIR * count : LEVEL;
+  int32_t coarse = c->params.walk.level_each * count;
+  coarse = coarse > c->params.walk.level ? coarse : c->params.walk.level;
   int32_t *numbers = ORB_NEW(ctx, int32_t, count);
   if (!numbers) {
     return ORB_E_NO_MEMORY;
@@ -194,11 +191,11 @@ done:
 orb_status orb_map_landmark_walk(orb_map_run *c, int32_t samples, int *stuck) {
   int32_t count = c->pairs.count;
   *stuck = 1;
-  if (samples > 0 && c->vertex_count > 8 * samples) {
+  if (samples > 0 && c->vertex_count > c->params.walk.least_each * samples) {
     ORB_TRY(sample_targets(c, samples, &count));
   }
   if (samples > 0 && count == c->pairs.count) {
-    return ORB_OK; /* nothing to sample: as without samples */
+    return ORB_OK; /* no sample fits: the caller walks without samples */
   }
   return walk_pairs(c, count, stuck);
 }

@@ -4,12 +4,12 @@
 
 #include "align/map/engine/run.h"
 
-/* compose_walk.c. The landmarks, and guesses from them. */
+/* Fills run->pairs: the landmarks, then the mirror landmarks. */
 ORB_MUST_CHECK orb_status orb_map_pairs_create(orb_map_run *run);
 
-/* Embeds both shapes anew so that all pairs meet, and with them at most so many samples of the spatial targets, or of
- * what is sound of a start. run->start is what comes of it, and if run->both is set the fixed shape's sphere is
- * replaced, else the map is carried to it. *stuck: nothing came of it, and all is as it was. */
+/* Embeds both shapes anew so that all pairs meet, and with them at most `samples` samples of the spatial targets, or of
+ * the usable part of a start. Sets run->start to the result. If run->both, also replaces the fixed shape's sphere;
+ * else carries the map to it. *stuck: nothing was found, and nothing has changed. */
 ORB_MUST_CHECK orb_status orb_map_landmark_walk(orb_map_run *run, int32_t samples, int *stuck);
 
 #endif

@@ -1,11 +1,11 @@
-/* Landmarks guessed by mirror symmetry.
+/* Mirror landmarks.
  *
- * Many shapes are their own mirror image, nearly, and callers often name the landmarks of one side only. The planes of
- * a shape are found in space: from its principal axes, or else the directions between them, a reflection is refined by
- * iterative closest points (Besl & McKay 1992, with the plane of least squares in place of the rotation); it is one of
- * the shape's where samples of the surface come back to the surface. Of two shapes those planes belong together about
- * which the landmarks lie alike. The mirror image of a landmark, where it lies near the surface on both shapes and no
- * landmark is there yet, is the guess.
+ * Many shapes are nearly symmetric, and requests often name the landmarks of one side only. The mirror planes of a
+ * shape are found in space: a reflection starts from a principal axis, or else from a direction between them, and is
+ * refined by iterative closest points (Besl & McKay 1992, with the plane of least squares in place of the rotation). It
+ * is a symmetry if it brings samples of the surface back to the surface. Two planes of different shapes correspond if
+ * the landmarks lie alike on their sides. The mirror image of a landmark becomes a mirror landmark if it lies near the
+ * surface on both shapes and no landmark is there yet.
  */
 #include <math.h>
 #include <string.h>
@@ -19,28 +19,21 @@
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 
-enum { SAMPLES = 200, FEW_SAMPLES = 50, DIRECTIONS = 13, FIRST_STEPS = 6, STEPS = 12, PLANES = 3 };
-/* All lengths are over the shape's diagonal. */
-static const double SYMMETRIC = 0.02;   /* mean distance of the mirrored samples from the surface */
-static const double HOPELESS = 0.06;    /* the same after the first steps */
-static const double SETTLED = 1e-5;     /* change of that distance by a step */
-static const double ALIKE = 0.9;        /* correlation of the landmarks' distances from the planes */
-static const double MIDDLE = 0.025;     /* so near to the plane a landmark is its own image */
-static const double OFF_SURFACE = 0.04; /* an image farther from the surface is none */
-static const double TAKEN = 0.05;       /* a landmark nearer than that is the image already */
+enum { DIRECTIONS = 13 }; /* three axes, six diagonals between two of them and four between all three */
 
 typedef struct plane {
   double normal[3], offset;
-  double residual; /* mean distance of the mirrored samples from the surface */
+  double residual; /* mean distance of the mirrored samples from the surface, of the diagonal */
 } plane;
 
 typedef struct mirror {
+  const orb_map_params *params;
   const orb_mesh *mesh;
   orb_nearest *tree;
   double diagonal;
-  int32_t count, sample[SAMPLES];
-  double hit[3 * SAMPLES], distance[SAMPLES];
-  plane trial, planes[PLANES];
+  int32_t count, sample[ORB_MAP_MIRROR_SAMPLES];
+  double hit[3 * ORB_MAP_MIRROR_SAMPLES], distance[ORB_MAP_MIRROR_SAMPLES];
+  plane trial, planes[ORB_MAP_MIRROR_PLANES];
   int32_t plane_count;
 } mirror;
 
@@ -82,7 +75,7 @@ static void find_hits(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* One step of closest points from m->trial. Far samples count less: a limb that is posed must not turn the plane. */
+/* One step of closest points from m->trial. Far samples count less: a posed limb must not rotate the plane. */
 static orb_status refine(orb_context *ctx, mirror *m, int32_t samples) {
   plane *p = &m->trial;
   double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, weight = 0, sum = 0, s[9] = {0};
@@ -90,7 +83,7 @@ static orb_status refine(orb_context *ctx, mirror *m, int32_t samples) {
   for (int pass = 0; pass < 2; pass++) {
     for (int32_t i = 0; i < samples; i++) {
       const double *x = position(m, m->sample[i]), *y = m->hit + 3 * (size_t)i;
-      double d = m->distance[i] / SYMMETRIC, w = 1 / (1 + d * d);
+      double d = m->distance[i] / m->params->mirror.symmetric, w = 1 / (1 + d * d);
       if (pass == 0) {
         sum += m->distance[i];
         weight += w;
@@ -143,20 +136,22 @@ static void start_planes(const mirror *m, plane out[DIRECTIONS]) {
 }
 
 static orb_status try_plane(orb_context *ctx, mirror *m, const plane *start) {
-  int32_t few = m->count < FEW_SAMPLES ? m->count : FEW_SAMPLES;
+  const orb_map_params *p = m->params;
+  int32_t few = m->count < p->mirror.few_samples ? m->count : p->mirror.few_samples;
   double last = INFINITY;
   m->trial = *start;
-  for (int step = 0; step < FIRST_STEPS; step++) {
+  for (int step = 0; step < p->mirror.first_steps; step++) {
     ORB_TRY(refine(ctx, m, few));
   }
-  for (int step = 0; step < STEPS && m->trial.residual <= HOPELESS && fabs(last - m->trial.residual) > SETTLED;
+  for (int step = 0; step < p->mirror.steps && m->trial.residual <= p->mirror.hopeless &&
+                     fabs(last - m->trial.residual) > p->mirror.settled;
        step++) {
     last = m->trial.residual;
     ORB_TRY(refine(ctx, m, m->count));
   }
-  int good = m->trial.residual <= SYMMETRIC && m->plane_count < PLANES;
+  int good = m->trial.residual <= p->mirror.symmetric && m->plane_count < ORB_MAP_MIRROR_PLANES;
   for (int32_t j = 0; j < m->plane_count && good; j++) {
-    good = fabs(orb_dot(m->planes[j].normal, m->trial.normal)) < 0.95;
+    good = fabs(orb_dot(m->planes[j].normal, m->trial.normal)) < p->mirror.same;
   }
   if (good) {
     m->planes[m->plane_count++] = m->trial;
@@ -164,14 +159,15 @@ static orb_status try_plane(orb_context *ctx, mirror *m, const plane *start) {
   return ORB_OK;
 }
 
-/* Finds up to PLANES planes; the diagonals are tried where no axis leads to one. */
-static orb_status mirror_create(orb_context *ctx, const orb_mesh *mesh, mirror *m) {
+/* Finds the planes of a shape; tries the diagonals only if no axis leads to a plane. */
+static orb_status mirror_create(orb_context *ctx, const orb_map_params *params, const orb_mesh *mesh, mirror *m) {
   orb_extent extent;
   plane start[DIRECTIONS];
+  m->params = params;
   m->mesh = mesh;
   orb_mesh_extent(mesh, &extent);
   m->diagonal = extent.diagonal > 0 ? extent.diagonal : 1;
-  m->count = mesh->vertex_count < SAMPLES ? mesh->vertex_count : SAMPLES;
+  m->count = mesh->vertex_count < ORB_MAP_MIRROR_SAMPLES ? mesh->vertex_count : ORB_MAP_MIRROR_SAMPLES;
   ORB_TRY(orb_nearest_create(ctx, mesh->positions, mesh->triangles, mesh->triangle_count, &m->tree));
   ORB_TRY(orb_map_spread(ctx, mesh->positions, mesh->vertex_count, m->count, m->sample));
   start_planes(m, start);
@@ -185,9 +181,9 @@ static double off_plane(const mirror *m, const plane *p, int32_t vertex) {
   return (orb_dot(p->normal, position(m, vertex)) - p->offset) / m->diagonal;
 }
 
-/* The two planes about which the landmarks lie most alike, by the correlation of their signed distances. */
+/* The planes of the two shapes from which the signed distances of the landmarks correlate most. */
 static int match_planes(const mirror m[2], const int32_t *const landmarks[2], int32_t count, const plane *out[2]) {
-  double best = ALIKE;
+  double best = m[0].params->mirror.alike;
   int found = 0;
   for (int32_t i = 0; i < m[0].plane_count; i++) {
     for (int32_t j = 0; j < m[1].plane_count; j++) {
@@ -212,7 +208,7 @@ static int match_planes(const mirror m[2], const int32_t *const landmarks[2], in
 
 /* Is one of these vertices at x? */
 static int is_taken(const mirror *m, const double x[3], const int32_t *vertices, int32_t count) {
-  double limit = TAKEN * m->diagonal;
+  double limit = m->params->mirror.taken * m->diagonal;
   for (int32_t i = 0; i < count; i++) {
     if (orb_distance2(position(m, vertices[i]), x) < limit * limit) {
       return 1;
@@ -221,30 +217,30 @@ static int is_taken(const mirror *m, const double x[3], const int32_t *vertices,
   return 0;
 }
 
-/* The vertex at a landmark's mirror image; −1: there is none, or the landmark is its own. */
+/* The vertex at a landmark's mirror image; −1: there is none, or the landmark is its own mirror image. */
 static int32_t image_of(const mirror *m, const plane *p, int32_t landmark) {
   orb_place place;
   double image[3];
   reflect(p, position(m, landmark), image);
   double d = sqrt(orb_nearest_query(m->tree, image, INFINITY, &place));
-  if (fabs(off_plane(m, p, landmark)) < MIDDLE || d > OFF_SURFACE * m->diagonal) {
+  if (fabs(off_plane(m, p, landmark)) < m->params->mirror.middle || d > m->params->mirror.off_surface * m->diagonal) {
     return -1;
   }
   return orb_map_nearest_corner(m->mesh->triangles, &place);
 }
 
-orb_status orb_map_mirror_landmarks(orb_context *ctx, const orb_mesh *const meshes[2],
-                                    const int32_t *const landmarks[2], int32_t count, int32_t *const guesses[2],
-                                    int32_t *guess_count) {
+orb_status orb_map_mirror_landmarks(orb_context *ctx, const orb_map_params *params, const orb_mesh *const meshes[2],
+                                    const int32_t *const landmarks[2], int32_t count, int32_t *const images[2],
+                                    int32_t *image_count) {
   orb_status status = ORB_OK;
   mirror *m = ORB_NEW0(ctx, mirror, 2);
   const plane *planes[2];
-  int32_t n = *guess_count = 0;
+  int32_t n = *image_count = 0;
   if (!m) {
     return ORB_E_NO_MEMORY;
   }
   for (int s = 0; s < 2; s++) {
-    ORB_GO(status, mirror_create(ctx, meshes[s], &m[s]), done);
+    ORB_GO(status, mirror_create(ctx, params, meshes[s], &m[s]), done);
     if (m[s].plane_count == 0) {
       goto done;
     }
@@ -255,13 +251,13 @@ orb_status orb_map_mirror_landmarks(orb_context *ctx, const orb_mesh *const mesh
   for (int32_t i = 0; i < count; i++) {
     int good = 1;
     for (int s = 0; s < 2 && good; s++) {
-      int32_t v = guesses[s][n] = image_of(&m[s], planes[s], landmarks[s][i]);
+      int32_t v = images[s][n] = image_of(&m[s], planes[s], landmarks[s][i]);
       good = v >= 0 && !is_taken(&m[s], position(&m[s], v), landmarks[s], count) &&
-             !is_taken(&m[s], position(&m[s], v), guesses[s], n);
+             !is_taken(&m[s], position(&m[s], v), images[s], n);
     }
     n += good;
   }
-  *guess_count = n;
+  *image_count = n;
 done:
   orb_nearest_destroy(ctx, m[0].tree);
   orb_nearest_destroy(ctx, m[1].tree);

@@ -1,4 +1,4 @@
-/* Guesses of a composed map: where each vertex of the moving shape would lie on the fixed one. */
+/* The spatial targets of a run and their places on the fixed shape, and the first level of a start. */
 #include <math.h>
 #include <string.h>
 
@@ -11,22 +11,23 @@
 #include "base/parallel.h"
 #include "numeric/vec3.h"
 
-typedef struct goal_job {
+typedef struct target_job {
   orb_map_run *c;
   orb_nearest *tree;
-} goal_job;
+} target_job;
 
-enum { SLICE = 1024 }; /* vertices between looks whether to stop: a search may go through the whole surface */
+enum { SLICE = 1024 }; /* vertices between checks for cancellation: each may search the whole surface */
 
-/* The fixed shape's vertex nearest to a target in position and normal. */
+/* The fixed shape's vertex that is nearest to a target in position and normal. */
 static orb_place nearest_with_normal(const orb_map_run *c, int32_t v) {
   const orb_map_surface *b = &c->b;
-  int32_t best = 0, stride = 3 * (1 + b->triangle_count / 40000);
+  int32_t best = 0, stride = 3 * (1 + b->triangle_count / c->params.place.search);
   double least = INFINITY;
   for (int32_t h = 0; h < 3 * b->triangle_count; h += stride) {
     int32_t u = b->triangles[h];
-    double d = orb_distance2(b->x + 3 * (size_t)u, c->goal + 3 * (size_t)v) +
-               0.25 * orb_distance2(b->normal + 3 * (size_t)u, c->goal_normal + 3 * (size_t)v);
+    double d =
+        orb_distance2(b->x + 3 * (size_t)u, c->target + 3 * (size_t)v) +
+        c->params.place.normal_weight * orb_distance2(b->normal + 3 * (size_t)u, c->target_normal + 3 * (size_t)v);
     if (d < least) {
       least = d;
       best = h;
@@ -37,27 +38,26 @@ static orb_place nearest_with_normal(const orb_map_run *c, int32_t v) {
   return place;
 }
 
-/* The nearest point, if the surface faces the right way there; else the best compromise. */
-static void find_goal_places(void *arg, int64_t begin, int64_t end, int thread) {
-  goal_job *job = arg;
+/* The nearest point if the surface faces the right way there; else the nearest vertex in position and normal. */
+static void find_target_places(void *arg, int64_t begin, int64_t end, int thread) {
+  target_job *job = arg;
   orb_map_run *c = job->c;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
     double n[3];
-    (void)orb_nearest_query(job->tree, c->goal + 3 * v, INFINITY, &c->goal_place[v]);
-    orb_map_surface_at(&c->b, &c->goal_place[v], NULL, NULL, n);
-    if (orb_dot(n, c->goal_normal + 3 * v) < 0.5) {
-      c->goal_place[v] = nearest_with_normal(c, (int32_t)v);
+    (void)orb_nearest_query(job->tree, c->target + 3 * v, INFINITY, &c->target_place[v]);
+    orb_map_surface_at(&c->b, &c->target_place[v], NULL, NULL, n);
+    if (orb_dot(n, c->target_normal + 3 * v) < c->params.place.facing) {
+      c->target_place[v] = nearest_with_normal(c, (int32_t)v);
     }
   }
 }
 
-/* The pairs as anchors, and, where a map is known already (c->best), samples of it. Arrays of the caller: room for all
- * pairs and ORB_MAP_SAMPLES. */
-static orb_status gather_anchors(orb_map_run *c, int samples, int32_t *vertex, double *goal, orb_map_anchors *out) {
-  *out = (orb_map_anchors){.vertex = vertex, .goal = goal};
+/* The pairs as anchors, and samples of the best map. vertex and target have room for all pairs and samples. */
+static orb_status gather_anchors(orb_map_run *c, int samples, int32_t *vertex, double *target, orb_map_anchors *out) {
+  *out = (orb_map_anchors){.vertex = vertex, .target = target};
   for (int32_t i = 0; i < c->pairs.count; i++) {
-    memcpy(goal + 3 * (size_t)i, c->b.x + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
+    memcpy(target + 3 * (size_t)i, c->b.x + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
     vertex[i] = c->pairs.moving[i];
   }
   out->count = out->exact = c->pairs.count;
@@ -73,7 +73,7 @@ static orb_status gather_anchors(orb_map_run *c, int samples, int32_t *vertex, d
     if (!paired) {
       orb_place place;
       orb_locate(c->b.locator, c->best + 3 * (size_t)v, -1, &place);
-      orb_map_surface_at(&c->b, &place, goal + 3 * (size_t)out->count, NULL, NULL);
+      orb_map_surface_at(&c->b, &place, target + 3 * (size_t)out->count, NULL, NULL);
       vertex[out->count++] = v;
     }
   }
@@ -84,41 +84,43 @@ orb_status orb_map_register(orb_map_run *c, int samples) {
   orb_context *ctx = c->ctx;
   const orb_mesh *mesh = &c->moving->mesh;
   orb_map_anchors anchors;
-  double fit, *goal = ORB_NEW(ctx, double, 3 * ((size_t)c->pairs.count + ORB_MAP_SAMPLES));
-  int32_t *vertex = ORB_NEW(ctx, int32_t, (size_t)c->pairs.count + ORB_MAP_SAMPLES);
-  goal_job job = {.c = c};
+  size_t most = (size_t)c->pairs.count + (size_t)samples;
+  double fit, *target = ORB_NEW(ctx, double, 3 * most);
+  int32_t *vertex = ORB_NEW(ctx, int32_t, most);
+  target_job job = {.c = c};
   orb_status status = ORB_E_NO_MEMORY;
-  c->has_sound = 0;
-  if (!goal || !vertex) {
+  c->has_usable = 0;
+  if (!target || !vertex) {
     goto done;
   }
-  ORB_GO(status, gather_anchors(c, samples, vertex, goal, &anchors), done);
-  ORB_GO(status, orb_map_register_in_space(ctx, &c->b, c->x, c->normal, c->vertex_count, &anchors, c->goal, &fit),
+  ORB_GO(status, gather_anchors(c, samples, vertex, target, &anchors), done);
+  ORB_GO(status,
+         orb_map_register_in_space(ctx, &c->params, &c->b, c->x, c->normal, c->vertex_count, &anchors, c->target, &fit),
          done);
-  orb_map_normals(c->goal, c->vertex_count, mesh->triangles, mesh->triangle_count, c->goal_normal);
+  orb_map_normals(c->target, c->vertex_count, mesh->triangles, mesh->triangle_count, c->target_normal);
   ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &job.tree), done);
-  status = orb_sliced_by(ctx, c->vertex_count, SLICE, 64, find_goal_places, &job);
+  status = orb_sliced_by(ctx, c->vertex_count, SLICE, 64, find_target_places, &job);
   orb_nearest_destroy(ctx, job.tree);
 done:
-  orb_free(ctx, goal);
+  orb_free(ctx, target);
   orb_free(ctx, vertex);
   return status;
 }
 
-typedef struct guess_job {
+typedef struct place_job {
   orb_map_run *c;
   orb_map_level *l;
   const int32_t *to_mesh;
   const double *points; /* NULL: spatial */
-} guess_job;
+} place_job;
 
-static void guess_range(void *arg, int64_t begin, int64_t end, int thread) {
-  guess_job *job = arg;
+static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
+  place_job *job = arg;
   (void)thread;
   for (int64_t i = begin; i < end; i++) {
     int32_t v = job->to_mesh[job->l->vertex[i]];
     if (!job->points && !job->l->pinned[i]) {
-      job->l->place[i] = job->c->goal_place[v];
+      job->l->place[i] = job->c->target_place[v];
       orb_map_surface_at(&job->c->b, &job->l->place[i], NULL, job->l->x + 3 * i, NULL);
       orb_map_level_refresh(job->l, &job->c->b, (int32_t)i);
     } else {
@@ -129,7 +131,7 @@ static void guess_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* Vertices that share a point cannot be told apart by an untangling: spread them a little inside their places. */
+/* Untangling cannot separate vertices that share a point: move them a little within their triangles. */
 static void spread_out(orb_map_run *c, orb_map_level *l) {
   uint64_t state = 0x9e3779b97f4a7c15u;
   for (int32_t v = 0; v < l->count; v++) {
@@ -139,7 +141,7 @@ static void spread_out(orb_map_run *c, orb_map_level *l) {
     double w[3], sum = 0;
     for (int k = 0; k < 3; k++) {
       state = state * 6364136223846793005u + 1442695040888963407u;
-      w[k] = l->place[v].at[k] + 0.3 * (double)(state >> 40) * 0x1p-24;
+      w[k] = l->place[v].at[k] + c->params.place.jitter * (double)(state >> 40) * 0x1p-24;
       sum += w[k];
     }
     for (int k = 0; k < 3; k++) {
@@ -152,8 +154,8 @@ static void spread_out(orb_map_run *c, orb_map_level *l) {
 
 void orb_map_place(orb_map_run *c, orb_map_level *level, const int32_t *to_mesh, orb_map_start start) {
   const double *points = start == ORB_MAP_SPATIAL ? NULL : start == ORB_MAP_DRAWN ? c->best : c->start;
-  guess_job job = {c, level, to_mesh, points};
-  orb_parallel_for(c->ctx, level->count, 16, guess_range, &job);
+  place_job job = {c, level, to_mesh, points};
+  orb_parallel_for(c->ctx, level->count, 16, place_range, &job);
   if (start == ORB_MAP_SPATIAL) {
     spread_out(c, level);
   }

@@ -1,11 +1,20 @@
-/* Where a start puts the vertices of its first level. */
+/* First maps for the starts of a composed map: where each vertex of the moving shape goes on the fixed one.
+ *
+ * Comes in: a run (engine/run.h) with both shapes and their landmarks. Goes out: its pairs, its spatial targets, and
+ * levels with their vertices placed. Read in this order:
+ *
+ *   mirror.h         mirror landmarks
+ *   registration.h   spatial targets by non-rigid registration
+ *   place.h          their places on the fixed shape, and the vertices of a level at them
+ *   landmark_walk.h  a map in which all pairs meet
+ */
 #ifndef ORB_ALIGN_MAP_STARTS_PLACE_H
 #define ORB_ALIGN_MAP_STARTS_PLACE_H
 
 #include "align/map/engine/run.h"
 
-/* compose_guess.c: spatial targets from the landmarks and so many samples of the best map, with the normals that the
- * bent shape has, and the nearest places to them. */
+/* Sets the spatial targets: from the pairs and `samples` samples of the best map, with the normals of the registered
+ * shape, and with the nearest places on the fixed shape. */
 ORB_MUST_CHECK orb_status orb_map_register(orb_map_run *run, int samples);
 
 /* Puts the vertices of a level where the start has them. to_mesh: of the surface's vertices. */

@@ -1,9 +1,9 @@
-/* Spatial targets of a composed map: the moving shape bent onto the fixed one in space.
+/* Spatial targets of a composed map, by non-rigid registration in space.
  *
- * A spline in space (kernel |r|; Duchon 1977) carries the moving shape away from a similarity. It starts through the
- * anchors, from their similarity, or, where there are fewer than four, from the best of 24 rigid registrations (Besl &
- * McKay 1992). Rounds of iterative closest points refine it: controls spread over the moving shape look for the nearest
- * vertex of the fixed one in position and half-weighted normal; more controls and less stiffness from round to round.
+ * A spline (kernel |r|; Duchon 1977) moves the moving shape away from a similarity. It starts through the anchors, from
+ * their similarity; with fewer than four anchors, from the best of 24 rigid registrations (Besl & McKay 1992). Rounds
+ * of iterative closest points refine it: controls spread over the moving shape look for the vertex of the fixed shape
+ * that is nearest in position and half-weighted normal, with more controls and less stiffness from round to round.
  * Anchors keep their targets throughout. Lengths are those of shapes scaled to area 4π.
  */
 #include <math.h>
@@ -20,17 +20,7 @@
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 
-enum {
-  ROUNDS = 20,
-  FIRST_CONTROLS = 30,
-  LAST_CONTROLS = 300,
-  RIGID_SAMPLES = 150,
-  RIGID_STEPS = 20,
-  FIXED_SEARCH = 50000,
-  SLICE = 8192
-};
-static const double NORMAL_WEIGHT = 0.25; /* of |n − n'|², against |x − x'|² */
-static const double FIRST_STIFFNESS = 1.0, LAST_STIFFNESS = 0.02, LANDMARK_STIFFNESS = 1e-6, SAMPLE_STIFFNESS = 0.1;
+enum { SLICE = 8192 }; /* vertices between checks for cancellation */
 
 typedef struct spline {
   int32_t count;
@@ -40,6 +30,7 @@ typedef struct spline {
 
 typedef struct targets_run {
   orb_context *ctx;
+  const orb_map_params *params;
   const orb_map_surface *b;
   const double *x, *normal;
   int32_t vertex_count;
@@ -47,16 +38,16 @@ typedef struct targets_run {
   int32_t stride;   /* through the fixed shape's vertices */
   int32_t *control; /* farthest points of the moving shape */
   int32_t control_count;
-  double *goal;     /* 3 a control */
+  double *target;   /* 3 a control */
   double *mapped;   /* 6 a control: position and normal under the spline */
-  double *distance; /* of each control to its goal, squared, with the normals' part; negative: left out */
+  double *distance; /* of each control to its target, squared, with the normals' part; negative: faces away */
   spline s;
   double base[12]; /* the similarity that the spline departs from, laid out like its affine part */
   double *matrix;
   double *out; /* targets, 3 a vertex */
 } targets_run;
 
-/* The spline at p, and its Jacobian (row-major, NULL: not wanted). */
+/* The spline at p, and its Jacobian (row-major; NULL: not needed). */
 static void spline_at(const spline *s, const double p[3], double y[3], double *jacobian) {
   const double *affine = s->weight + 3 * (size_t)s->count;
   for (int k = 0; k < 3; k++) {
@@ -91,9 +82,10 @@ static void map_normal(const double j[9], const double n[3], double out[3]) {
   orb_normalize(out);
 }
 
-/* Fits the spline to `count` centres (first the anchors) and goals, with stiffness on the diagonal. Its affine part is
- * the base but for a shift: a free one would be carried far off by anchors that lie on one side of the shape. */
+/* Fits the spline to `count` centres (first the anchors) and targets, with stiffness on the diagonal. Its affine part
+ * is the base plus a shift: anchors on one side of the shape would carry a free affine part far off. */
 static orb_status spline_fit(targets_run *run, int32_t count, double stiffness) {
+  const orb_map_params *params = run->params;
   spline *s = &run->s;
   size_t n = (size_t)count + 1;
   memset(run->matrix, 0, n * n * sizeof *run->matrix);
@@ -102,14 +94,14 @@ static orb_status spline_fit(targets_run *run, int32_t count, double stiffness) 
     for (int32_t j = 0; j < count; j++) {
       run->matrix[(size_t)i * n + (size_t)j] = -sqrt(orb_distance2(p, s->centre + 3 * (size_t)j));
     }
-    run->matrix[(size_t)i * n + (size_t)i] += i < run->anchors->exact   ? LANDMARK_STIFFNESS
-                                              : i < run->anchors->count ? SAMPLE_STIFFNESS
+    run->matrix[(size_t)i * n + (size_t)i] += i < run->anchors->exact   ? params->registration.exact_stiffness
+                                              : i < run->anchors->count ? params->registration.sample_stiffness
                                                                         : stiffness;
     run->matrix[(size_t)i * n + (size_t)count] = run->matrix[(size_t)count * n + (size_t)i] = 1;
     for (int k = 0; k < 3; k++) {
       const double *base = run->base;
-      s->weight[3 * (size_t)i + (size_t)k] =
-          run->goal[3 * (size_t)i + (size_t)k] - base[k] - p[0] * base[3 + k] - p[1] * base[6 + k] - p[2] * base[9 + k];
+      s->weight[3 * (size_t)i + (size_t)k] = run->target[3 * (size_t)i + (size_t)k] - base[k] - p[0] * base[3 + k] -
+                                             p[1] * base[6 + k] - p[2] * base[9 + k];
     }
   }
   double *affine = s->weight + 3 * (size_t)count;
@@ -131,7 +123,7 @@ static int32_t nearest_vertex(const targets_run *run, const double y[3], const d
   double least = INFINITY;
   for (int32_t v = 0; v < b->vertex_count; v += run->stride) {
     const double *p = b->x + 3 * (size_t)v, *m = b->normal + 3 * (size_t)v;
-    double d = orb_distance2(p, y) + NORMAL_WEIGHT * orb_distance2(m, n);
+    double d = orb_distance2(p, y) + run->params->registration.normal_weight * orb_distance2(m, n);
     if (d < least) {
       least = d;
       best = v;
@@ -141,7 +133,7 @@ static int32_t nearest_vertex(const targets_run *run, const double y[3], const d
   return best;
 }
 
-static void find_goals(void *arg, int64_t begin, int64_t end, int thread) {
+static void find_targets(void *arg, int64_t begin, int64_t end, int thread) {
   targets_run *run = arg;
   (void)thread;
   for (int64_t i = begin; i < end; i++) {
@@ -151,15 +143,16 @@ static void find_goals(void *arg, int64_t begin, int64_t end, int thread) {
     spline_at(&run->s, run->x + 3 * (size_t)v, to, jacobian);
     map_normal(jacobian, run->normal + 3 * (size_t)v, to + 3);
     int32_t hit = nearest_vertex(run, to, to + 3, &run->distance[i]);
-    /* Slide along the tangent plane there: closer than the vertex, no farther than the surface bends. */
+    /* Slide in the tangent plane: nearer than the vertex, and not so far that the surface has curved away. */
     const double *p = run->b->x + 3 * (size_t)hit, *n = run->b->normal + 3 * (size_t)hit;
-    double rel[3], *goal = run->goal + 3 * c;
+    double rel[3], *target = run->target + 3 * c;
     orb_sub(to, p, rel);
-    double off = orb_dot(rel, n), slide = sqrt(fmax(0, orb_dot(rel, rel) - off * off)), most = 0.05;
+    double off = orb_dot(rel, n), slide = sqrt(fmax(0, orb_dot(rel, rel) - off * off)),
+           most = run->params->registration.slide;
     for (int k = 0; k < 3; k++) {
-      goal[k] = p[k] + (rel[k] - off * n[k]) * (slide > most ? most / slide : 1);
+      target[k] = p[k] + (rel[k] - off * n[k]) * (slide > most ? most / slide : 1);
     }
-    if (orb_dot(to + 3, n) < 0.2) {
+    if (orb_dot(to + 3, n) < run->params->registration.facing) {
       run->distance[i] = -1;
     }
   }
@@ -168,14 +161,15 @@ static void find_goals(void *arg, int64_t begin, int64_t end, int thread) {
 static void load_anchors(targets_run *run) {
   for (int32_t i = 0; i < run->anchors->count; i++) {
     memcpy(run->s.centre + 3 * (size_t)i, run->x + 3 * (size_t)run->anchors->vertex[i], 3 * sizeof(double));
-    memcpy(run->goal + 3 * (size_t)i, run->anchors->goal + 3 * (size_t)i, 3 * sizeof(double));
+    memcpy(run->target + 3 * (size_t)i, run->anchors->target + 3 * (size_t)i, 3 * sizeof(double));
   }
 }
 
-/* One round with the first `controls` of the order; those that face away or lie far off are left out. */
+/* One round with the first `controls` controls; leaves out those that face away or lie far off. */
 static orb_status icp_round(targets_run *run, int32_t controls, double stiffness, double *fit) {
-  orb_parallel_for(run->ctx, controls, 8, find_goals, run);
+  orb_parallel_for(run->ctx, controls, 8, find_targets, run);
   ORB_TRY(orb_context_check(run->ctx));
+  const double far = run->params->registration.far;
   double sum = 0;
   int32_t facing = 0, near = 0, kept = run->anchors->count;
   for (int32_t i = 0; i < controls; i++) {
@@ -186,16 +180,16 @@ static orb_status icp_round(targets_run *run, int32_t controls, double stiffness
   }
   *fit = facing ? sum / facing : INFINITY;
   for (int32_t i = 0; i < controls; i++) {
-    near += run->distance[i] >= 0 && sqrt(run->distance[i]) <= 3 * *fit;
+    near += run->distance[i] >= 0 && sqrt(run->distance[i]) <= far * *fit;
   }
-  if (near < 8) {
-    return ORB_OK; /* nothing to hold on to: the map stays as it is */
+  if (near < run->params->registration.least_controls) {
+    return ORB_OK; /* too few to fit: the spline stays as it is */
   }
   load_anchors(run);
   for (int32_t i = 0; i < controls; i++) {
-    if (run->distance[i] >= 0 && sqrt(run->distance[i]) <= 3 * *fit) {
+    if (run->distance[i] >= 0 && sqrt(run->distance[i]) <= far * *fit) {
       memcpy(run->s.centre + 3 * (size_t)kept, run->x + 3 * (size_t)run->control[i], 3 * sizeof(double));
-      memmove(run->goal + 3 * (size_t)kept, run->goal + 3 * ((size_t)i + (size_t)run->anchors->count),
+      memmove(run->target + 3 * (size_t)kept, run->target + 3 * ((size_t)i + (size_t)run->anchors->count),
               3 * sizeof(double));
       kept++;
     }
@@ -226,53 +220,65 @@ static void set_rigid(spline *s, const double r[9], const double t[3]) {
   }
 }
 
-/* Rigid ICP from one rotation over the first controls and the landmarks; leaves the spline there. */
-static orb_status rigid_icp(targets_run *run, const double start[9], double *score) {
-  double r[9], t[3] = {0, 0, 0};
-  memcpy(r, start, sizeof r);
-  int32_t samples = run->control_count < RIGID_SAMPLES ? run->control_count : RIGID_SAMPLES;
-  for (int step = 0; step < RIGID_STEPS; step++) {
-    set_rigid(&run->s, r, t);
-    orb_parallel_for(run->ctx, samples, 8, find_goals, run);
-    ORB_TRY(orb_context_check(run->ctx));
-    load_anchors(run);
-    double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, h[9] = {0}, total = 0, weight_sum = 0;
-    for (int pass = 0; pass < 2; pass++) {
-      for (int32_t i = -run->anchors->count; i < samples; i++) {
-        const double *goal = run->goal + 3 * ((size_t)(i + run->anchors->count));
-        const double *p =
-            i < 0 ? run->s.centre + 3 * (size_t)(i + run->anchors->count) : run->x + 3 * (size_t)run->control[i];
-        double w = i < 0 ? (double)samples : 1;
-        for (int k = 0; k < 3; k++) {
-          if (pass == 0) {
-            from[k] += w * p[k];
-            to[k] += w * goal[k];
-          } else {
-            for (int j = 0; j < 3; j++) {
-              h[3 * k + j] += w * (goal[k] - to[k]) * (p[j] - from[j]);
-            }
+/* Fits a rigid motion to the targets of the first controls and of the anchors; an anchor weighs as much as all controls
+ * together. 0: the rotation is not determined. */
+static int fit_rigid(const targets_run *run, int32_t samples, double r[9], double t[3]) {
+  double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, h[9] = {0}, weight_sum = 0;
+  for (int pass = 0; pass < 2; pass++) {
+    for (int32_t i = -run->anchors->count; i < samples; i++) {
+      const double *target = run->target + 3 * ((size_t)(i + run->anchors->count));
+      const double *p =
+          i < 0 ? run->s.centre + 3 * (size_t)(i + run->anchors->count) : run->x + 3 * (size_t)run->control[i];
+      double w = i < 0 ? (double)samples : 1;
+      for (int k = 0; k < 3; k++) {
+        if (pass == 0) {
+          from[k] += w * p[k];
+          to[k] += w * target[k];
+        } else {
+          for (int j = 0; j < 3; j++) {
+            h[3 * k + j] += w * (target[k] - to[k]) * (p[j] - from[j]);
           }
         }
-        weight_sum += pass == 0 ? w : 0;
       }
-      for (int k = 0; k < 3 && pass == 0; k++) {
-        from[k] /= weight_sum;
-        to[k] /= weight_sum;
-      }
+      weight_sum += pass == 0 ? w : 0;
     }
-    if (!orb_nearest_rotation(h, r)) {
+    for (int k = 0; k < 3 && pass == 0; k++) {
+      from[k] /= weight_sum;
+      to[k] /= weight_sum;
+    }
+  }
+  if (!orb_nearest_rotation(h, r)) {
+    return 0;
+  }
+  for (int k = 0; k < 3; k++) {
+    t[k] = to[k] - orb_dot(r + 3 * k, from);
+  }
+  return 1;
+}
+
+/* Rigid ICP from one rotation, over the first controls and the anchors; leaves the spline at the result. */
+static orb_status rigid_icp(targets_run *run, const double start[9], double *score) {
+  const orb_map_params *params = run->params;
+  const double cap = params->registration.rigid_cap;
+  double r[9], t[3] = {0, 0, 0};
+  memcpy(r, start, sizeof r);
+  int32_t most = params->registration.rigid_samples, samples = run->control_count < most ? run->control_count : most;
+  for (int step = 0; step < params->registration.rigid_steps; step++) {
+    set_rigid(&run->s, r, t);
+    orb_parallel_for(run->ctx, samples, 8, find_targets, run);
+    ORB_TRY(orb_context_check(run->ctx));
+    load_anchors(run);
+    if (!fit_rigid(run, samples, r, t)) {
       break;
     }
-    for (int k = 0; k < 3; k++) {
-      t[k] = to[k] - orb_dot(r + 3 * k, from);
-    }
+    double total = 0;
     for (int32_t i = 0; i < samples; i++) {
-      total += fmin(run->distance[i] < 0 ? 4 : run->distance[i], 4);
+      total += fmin(run->distance[i] < 0 ? cap : run->distance[i], cap);
     }
     for (int32_t i = 0; i < run->anchors->count; i++) {
       double y[3];
       spline_at(&run->s, run->s.centre + 3 * (size_t)i, y, NULL);
-      total += samples * fmin(orb_distance2(y, run->goal + 3 * (size_t)i), 4);
+      total += samples * fmin(orb_distance2(y, run->target + 3 * (size_t)i), cap);
     }
     *score = total;
   }
@@ -300,13 +306,13 @@ static orb_status best_rigid(targets_run *run) {
 static void base_of_anchors(targets_run *run) {
   int32_t count = run->anchors->count;
   double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, h[9] = {0}, r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, t[3], spread = 0,
-         turned = 0;
+         matched = 0;
   for (int32_t i = 0; i < 3 * count; i++) {
     from[i % 3] += run->s.centre[i] / count;
-    to[i % 3] += run->goal[i] / count;
+    to[i % 3] += run->target[i] / count;
   }
   for (int32_t i = 0; i < count; i++) {
-    const double *p = run->s.centre + 3 * (size_t)i, *q = run->goal + 3 * (size_t)i;
+    const double *p = run->s.centre + 3 * (size_t)i, *q = run->target + 3 * (size_t)i;
     for (int k = 0; k < 9; k++) {
       h[k] += (q[k / 3] - to[k / 3]) * (p[k % 3] - from[k % 3]);
     }
@@ -314,9 +320,9 @@ static void base_of_anchors(targets_run *run) {
   }
   (void)orb_nearest_rotation(h, r);
   for (int k = 0; k < 9; k++) {
-    turned += r[k] * h[k];
+    matched += r[k] * h[k];
   }
-  double scale = spread > 0 && turned > 0 ? turned / spread : 1;
+  double scale = spread > 0 && matched > 0 ? matched / spread : 1;
   for (int k = 0; k < 9; k++) {
     r[k] *= scale;
   }
@@ -327,7 +333,7 @@ static void base_of_anchors(targets_run *run) {
   memcpy(run->base, run->s.weight, sizeof run->base);
 }
 
-static void bend_range(void *arg, int64_t begin, int64_t end, int thread) {
+static void map_range(void *arg, int64_t begin, int64_t end, int thread) {
   const targets_run *run = arg;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
@@ -336,50 +342,55 @@ static void bend_range(void *arg, int64_t begin, int64_t end, int thread) {
 }
 
 static orb_status targets_compute(targets_run *run, double *out, double *fit) {
-  run->control_count = run->vertex_count < LAST_CONTROLS ? run->vertex_count : LAST_CONTROLS;
+  const orb_map_params *p = run->params;
+  const int32_t first = p->registration.first_controls, last = p->registration.last_controls;
+  run->control_count = run->vertex_count < last ? run->vertex_count : last;
   ORB_TRY(orb_map_spread(run->ctx, run->x, run->vertex_count, run->control_count, run->control));
-  if (run->anchors->count >= 4) {
+  if (run->anchors->count >= p->registration.least_anchors) {
     load_anchors(run);
     base_of_anchors(run);
-    ORB_TRY(spline_fit(run, run->anchors->count, LANDMARK_STIFFNESS));
+    ORB_TRY(spline_fit(run, run->anchors->count, p->registration.exact_stiffness));
   } else {
     ORB_TRY(best_rigid(run));
     memcpy(run->base, run->s.weight, sizeof run->base);
   }
   *fit = INFINITY;
-  for (int round = 0; round < ROUNDS; round++) {
-    double f = (double)round / (ROUNDS - 1);
-    int32_t controls = (int32_t)(FIRST_CONTROLS * pow((double)LAST_CONTROLS / FIRST_CONTROLS, f));
+  for (int round = 0; round < p->registration.rounds; round++) {
+    double f = (double)round / (p->registration.rounds - 1);
+    int32_t controls = (int32_t)(first * pow((double)last / first, f));
     controls = controls < run->control_count ? controls : run->control_count;
-    ORB_TRY(icp_round(run, controls, FIRST_STIFFNESS * pow(LAST_STIFFNESS / FIRST_STIFFNESS, f), fit));
+    double fall = p->registration.last_stiffness / p->registration.first_stiffness;
+    ORB_TRY(icp_round(run, controls, p->registration.first_stiffness * pow(fall, f), fit));
   }
   run->out = out;
-  return orb_sliced_by(run->ctx, run->vertex_count, SLICE, 64, bend_range, run);
+  return orb_sliced_by(run->ctx, run->vertex_count, SLICE, 64, map_range, run);
 }
 
-orb_status orb_map_register_in_space(orb_context *ctx, const orb_map_surface *b, const double *x, const double *normal,
-                                     int32_t vertex_count, const orb_map_anchors *anchors, double *out, double *fit) {
-  size_t most = LAST_CONTROLS + (size_t)anchors->count;
+orb_status orb_map_register_in_space(orb_context *ctx, const orb_map_params *params, const orb_map_surface *b,
+                                     const double *x, const double *normal, int32_t vertex_count,
+                                     const orb_map_anchors *anchors, double *out, double *fit) {
+  size_t most = (size_t)params->registration.last_controls + (size_t)anchors->count;
   targets_run run = {.ctx = ctx,
+                     .params = params,
                      .b = b,
                      .x = x,
                      .normal = normal,
                      .vertex_count = vertex_count,
                      .anchors = anchors,
-                     .stride = 1 + b->vertex_count / FIXED_SEARCH};
+                     .stride = 1 + b->vertex_count / params->registration.fixed_search};
   orb_status status = ORB_E_NO_MEMORY;
-  run.control = ORB_NEW(ctx, int32_t, LAST_CONTROLS);
-  run.goal = ORB_NEW(ctx, double, 3 * most);
+  run.control = ORB_NEW(ctx, int32_t, params->registration.last_controls);
+  run.target = ORB_NEW(ctx, double, 3 * most);
   run.mapped = ORB_NEW(ctx, double, 6 * most);
   run.distance = ORB_NEW(ctx, double, most);
   run.s.centre = ORB_NEW(ctx, double, 3 * most);
   run.s.weight = ORB_NEW(ctx, double, 3 * most + 12);
   run.matrix = ORB_NEW(ctx, double, (most + 4) * (most + 4));
-  if (run.control && run.goal && run.mapped && run.distance && run.s.centre && run.s.weight && run.matrix) {
+  if (run.control && run.target && run.mapped && run.distance && run.s.centre && run.s.weight && run.matrix) {
     status = targets_compute(&run, out, fit);
   }
   orb_free(ctx, run.control);
-  orb_free(ctx, run.goal);
+  orb_free(ctx, run.target);
   orb_free(ctx, run.mapped);
   orb_free(ctx, run.distance);
   orb_free(ctx, run.s.centre);

@@ -1,10 +1,11 @@
 /* Rings around a limb.
  *
- * A limb is a part of the surface that is a disc, with a pole at its end. The function that is harmonic in it, 1 at the
- * pole and 0 at the rim (Laplacian of cotangents, Pinkall & Polthier 1993, none below a floor so that there is no
- * other extremum) has level curves that are closed and run once round the pole; together with its conjugate, whose
- * growth along a level curve is the flux across it, it lays polar coordinates over the limb. So a turn that varies from
- * ring to ring is a one-to-one map of the limb, whatever its shape, and so is one by the same angle.
+ * A limb is a part of the surface that is a disc, with a pole at its end. Its height is the harmonic function that is 1
+ * at the pole and 0 at the rim (cotangent Laplacian, Pinkall & Polthier 1993, with weights clamped from below so that
+ * there is no other extremum). The level curves of the height are closed and run once around the pole. The conjugate of
+ * the height grows along a level curve by the flux across it; both together are polar coordinates of the limb. So a
+ * rotation along the rings, by one angle or by an angle that varies from ring to ring, is a one-to-one map of the limb,
+ * whatever its shape.
  */
 #include "align/map/twist/limb.h"
 
@@ -15,8 +16,7 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-enum { STEPS = 1000, CHECK_EVERY = 64, MAX_CROSSINGS = 8192 };
-static const double LEAST_WEIGHT = 0.05, SETTLED = 1e-9;
+enum { CHECK_EVERY = 64 }; /* steps between checks for cancellation */
 
 typedef struct link_of {
   int32_t a, b;
@@ -32,7 +32,7 @@ static double cotangent(const orb_map_surface *s, int32_t h) {
   return orb_dot(u, w) / (orb_length(n) + 1e-300);
 }
 
-/* The vertices inside that are not the pole, numbered from 2 on; 0 stands for all outside, 1 for the pole. */
+/* The vertices inside except the pole, numbered from 2 on; 0 represents all vertices outside, 1 the pole. */
 typedef struct system_of {
   int32_t count, links;
   int32_t *number; /* by vertex of the surface */
@@ -46,8 +46,9 @@ static void system_free(orb_context *ctx, system_of *s) {
   orb_free(ctx, s->diagonal);
 }
 
-static orb_status system_create(orb_context *ctx, const orb_map_surface *b, const unsigned char *inside, int32_t pole,
-                                system_of *s) {
+static orb_status system_create(orb_context *ctx, const orb_map_params *params, const orb_map_surface *b,
+                                const unsigned char *inside, int32_t pole, system_of *s) {
+  const double least = params->twist.least_weight;
   s->count = 2;
   s->number = ORB_NEW(ctx, int32_t, b->vertex_count);
   for (int32_t v = 0; s->number && v < b->vertex_count; v++) {
@@ -66,7 +67,7 @@ static orb_status system_create(orb_context *ctx, const orb_map_surface *b, cons
     int32_t g = b->twin[h], u = s->number[b->triangles[h]], w = s->number[b->triangles[orb_next(h)]];
     if (h < g && (u > 1 || w > 1)) {
       double weight = 0.5 * (cotangent(b, h) + cotangent(b, g));
-      *link = (link_of){u, w, fmin(fmax(weight, LEAST_WEIGHT), 1 / LEAST_WEIGHT)};
+      *link = (link_of){u, w, fmin(fmax(weight, least), 1 / least)};
       s->diagonal[u] += link->weight;
       s->diagonal[w] += link->weight;
       link++;
@@ -75,7 +76,7 @@ static orb_status system_create(orb_context *ctx, const orb_map_surface *b, cons
   return ORB_OK;
 }
 
-/* The flows out of each vertex; 0 at the two that are fixed. */
+/* The flow out of each vertex; 0 at the two fixed ones. */
 static void apply(const system_of *s, const double *u, double *out) {
   memset(out, 0, (size_t)s->count * sizeof *out);
   for (int32_t i = 0; i < s->links; i++) {
@@ -87,9 +88,9 @@ static void apply(const system_of *s, const double *u, double *out) {
   out[0] = out[1] = 0;
 }
 
-/* Conjugate gradients with the diagonal as preconditioner (Hestenes & Stiefel 1952). work: four doubles a vertex, of
- * which the first holds the solution. */
-static orb_status solve(orb_context *ctx, const system_of *s, double *work) {
+/* Conjugate gradients with the diagonal as preconditioner (Hestenes & Stiefel 1952). work: four arrays, one double for
+ * each vertex; the first receives the solution. */
+static orb_status solve(orb_context *ctx, const orb_map_params *params, const system_of *s, double *work) {
   size_t n = (size_t)s->count;
   double *u = work, *r = work + n, *p = work + 2 * n, *q = work + 3 * n, rho = 0;
   memset(work, 0, 4 * n * sizeof *work);
@@ -100,8 +101,8 @@ static orb_status solve(orb_context *ctx, const system_of *s, double *work) {
     p[v] = r[v] / s->diagonal[v];
     rho += r[v] * p[v];
   }
-  double enough = SETTLED * SETTLED * rho;
-  for (int step = 0; step < STEPS && rho > enough; step++) {
+  double settled = params->twist.solve_settled, enough = settled * settled * rho;
+  for (int step = 0; step < params->twist.solve_steps && rho > enough; step++) {
     double pq = 0, next = 0;
     apply(s, p, q);
     for (size_t v = 2; v < n; v++) {
@@ -123,18 +124,18 @@ static orb_status solve(orb_context *ctx, const system_of *s, double *work) {
   return ORB_OK;
 }
 
-orb_status orb_map_limb_heights(orb_context *ctx, const orb_map_surface *b, const unsigned char *inside, int32_t pole,
-                                double *height) {
+orb_status orb_map_limb_heights(orb_context *ctx, const orb_map_params *params, const orb_map_surface *b,
+                                const unsigned char *inside, int32_t pole, double *height) {
   system_of s = {0};
   double *work = NULL;
   orb_status status;
-  ORB_GO(status, system_create(ctx, b, inside, pole, &s), done);
+  ORB_GO(status, system_create(ctx, params, b, inside, pole, &s), done);
   work = ORB_NEW(ctx, double, 4 * (size_t)s.count);
   if (!work) {
     status = ORB_E_NO_MEMORY;
     goto done;
   }
-  ORB_GO(status, solve(ctx, &s, work), done);
+  ORB_GO(status, solve(ctx, params, &s, work), done);
   for (int32_t v = 0; v < b->vertex_count; v++) {
     height[v] = work[s.number[v]];
   }
@@ -150,8 +151,8 @@ typedef struct crossing {
   double at;         /* share of the way to the half-edge's end */
 } crossing;
 
-/* The ring at `level` through triangle t, with the pole on its left: it leaves where the height rises from below to
- * the level along the triangle's rim. 0: it does not pass. */
+/* Where the ring at `level`, with the pole on its left, leaves triangle t: where the height along the triangle's rim
+ * rises from below the level to it. 0: the ring does not cross t. */
 static int leave(const orb_map_surface *b, const double *height, int32_t t, double level, crossing *out) {
   for (int k = 0; k < 3; k++) {
     int32_t h = 3 * t + k;
@@ -186,12 +187,12 @@ static double slope(const orb_map_surface *b, const double *height, int32_t t) {
   return orb_length(d) / (orb_length(n) + 1e-300);
 }
 
-/* The flux across a ring from one crossing to the next, which leaves triangle t. */
+/* The flux across a ring within triangle t, from one crossing to the next. */
 static double flux(const orb_map_surface *b, const double *height, int32_t t, const double *from, const double *to) {
   return slope(b, height, t) * sqrt(orb_distance2(from, to));
 }
 
-/* The place at `share` of the way through a triangle, from where a ring comes in, in the twin of `in`, to `out`. */
+/* The place at `share` of a ring's way through a triangle, from the twin of `in` to `out`. */
 static void place_between(const orb_map_surface *b, const crossing *in, const crossing *out, double share,
                           orb_place *place) {
   int32_t g = b->twin[in->half_edge], h = out->half_edge;
@@ -202,7 +203,7 @@ static void place_between(const orb_map_surface *b, const crossing *in, const cr
   place->at[orb_next(h) % 3] += share * out->at;
 }
 
-/* A level that passes through the triangle next to the one of the place. */
+/* The height of the place, moved a little if necessary so that its ring crosses the place's triangle. */
 static double level_of(const orb_map_surface *b, const double *height, const orb_place *place) {
   const int32_t *v = b->triangles + 3 * (size_t)place->triangle;
   double level = 0, low = INFINITY, high = -INFINITY;
@@ -215,14 +216,14 @@ static double level_of(const orb_map_surface *b, const double *height, const orb
   return fmin(fmax(level, low + margin), high - margin);
 }
 
-/* Goes round from the crossing that leaves the place's triangle. wanted < 0: the flux of the whole ring, and *last: the
- * crossing by which it comes back in; else the place at that flux from the start. */
-static double go_round(const orb_map_surface *b, const double *height, double level, const crossing *start,
-                       double wanted, crossing *last, orb_place *place) {
+/* Follows a ring from the crossing `start`. wanted < 0: returns the flux of the whole ring, and in *last the crossing
+ * by which it comes back; else finds the place at that flux from the start. −1: the ring does not close. */
+static double follow_ring(const orb_map_surface *b, const double *height, double level, const crossing *start,
+                          double wanted, crossing *last, orb_place *place) {
   crossing in = *start;
   double total = 0, from[3], to[3];
   crossing_position(b, &in, from);
-  for (int i = 0; i < MAX_CROSSINGS; i++) {
+  for (int i = 0; i < ORB_MAP_RING_CROSSINGS; i++) {
     crossing out;
     int32_t t = b->twin[in.half_edge] / 3;
     if (!leave(b, height, t, level, &out)) {
@@ -245,13 +246,13 @@ static double go_round(const orb_map_surface *b, const double *height, double le
   return -1;
 }
 
-int orb_map_limb_turn(const orb_map_surface *b, const double *height, double angle, orb_place *place) {
+int orb_map_limb_rotate(const orb_map_surface *b, const double *height, double angle, orb_place *place) {
   crossing start, last;
   double level = level_of(b, height, place), y[3], end[3];
   if (!(level > 0) || !leave(b, height, place->triangle, level, &start)) {
     return 0;
   }
-  double total = go_round(b, height, level, &start, -1, &last, NULL);
+  double total = follow_ring(b, height, level, &start, -1, &last, NULL);
   if (!(total > 0)) {
     return 0;
   }
@@ -260,7 +261,7 @@ int orb_map_limb_turn(const orb_map_surface *b, const double *height, double ang
   double to_start = flux(b, height, place->triangle, y, end);
   double wanted = fmod(angle / (2 * M_PI) * total - to_start, total);
   orb_place moved;
-  if (go_round(b, height, level, &start, wanted < 0 ? wanted + total : wanted, &last, &moved) < 0) {
+  if (follow_ring(b, height, level, &start, wanted < 0 ? wanted + total : wanted, &last, &moved) < 0) {
     return 0;
   }
   *place = moved;

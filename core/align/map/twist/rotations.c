@@ -1,4 +1,4 @@
-/* How the map turns the surroundings of every vertex of the fixed shape in space, and what that does to a morph. */
+/* How the map rotates the surroundings of every vertex of the fixed shape in space, and how much area a morph keeps. */
 #include <math.h>
 #include <string.h>
 
@@ -9,18 +9,18 @@
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 
-enum { SLICE = 8192 };
+enum { SLICE = 8192 }; /* vertices between checks for cancellation */
 
-typedef struct turns_run {
+typedef struct rotations_run {
   orb_context *ctx;
   const orb_map_surface *b;
   const orb_map_image *map;
-  double *back, *turn;
+  double *back, *angle;
   orb_locator *locator; /* on the map's points */
-} turns_run;
+} rotations_run;
 
 static void trace_range(void *arg, int64_t begin, int64_t end, int thread) {
-  const turns_run *run = arg;
+  const rotations_run *run = arg;
   const orb_map_image *m = run->map;
   orb_place place = {.triangle = -1};
   (void)thread;
@@ -35,8 +35,8 @@ static void trace_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* Where the surface's vertices come from, by the map. */
-static orb_status trace_back(turns_run *run) {
+/* Where the vertices of the surface come from. */
+static orb_status trace_back(rotations_run *run) {
   const orb_map_image *m = run->map;
   ORB_TRY(
       orb_locator_create(run->ctx, m->points, m->vertex_count, m->triangles, m->triangle_count, NULL, &run->locator));
@@ -45,8 +45,8 @@ static orb_status trace_back(turns_run *run) {
   return status;
 }
 
-/* The rotation of the whole: of all triangles' centres, weighted by area. */
-static void whole_rotation(const turns_run *run, double rotation[9]) {
+/* The rotation of the whole shape: of all triangles' centres, weighted by area. */
+static void whole_rotation(const rotations_run *run, double rotation[9]) {
   const orb_map_surface *b = run->b;
   double mean[6] = {0}, total = 0, h[9] = {0};
   for (int pass = 0; pass < 2; pass++) {
@@ -82,9 +82,9 @@ static void whole_rotation(const turns_run *run, double rotation[9]) {
   }
 }
 
-/* How much of the surface's area the mean of both shapes has, of that of both in the mean, when the one is turned as
- * the whole. A limb that is twisted by half a turn has next to none there. */
-static double kept_halfway(const turns_run *run, const double whole[9]) {
+/* The area of the mean of both shapes relative to the mean of their areas, after one shape takes the rotation of the
+ * whole. A limb that is twisted by half a turn has nearly no area in the mean. */
+static double kept_halfway(const rotations_run *run, const double whole[9]) {
   const orb_map_surface *b = run->b;
   double kept = 0, ends = 0;
   for (int32_t t = 0; t < b->triangle_count; t++) {
@@ -107,8 +107,8 @@ static double kept_halfway(const turns_run *run, const double whole[9]) {
   return ends > 0 ? kept / ends : 1;
 }
 
-/* The angle of every vertex's surroundings against the whole: their edges and normals, before and behind the map. */
-static orb_status measure_turns(turns_run *run, double *kept) {
+/* The angle of every vertex's surroundings against the whole, from their edges and normals on both shapes. */
+static orb_status measure_angles(rotations_run *run, double *kept) {
   const orb_map_surface *b = run->b;
   double whole[9], *sum = ORB_NEW0(run->ctx, double, 16 * (size_t)b->vertex_count);
   if (!sum) {
@@ -139,12 +139,12 @@ static orb_status measure_turns(turns_run *run, double *kept) {
     orb_normalize(s + 9);
     orb_normalize(s + 12);
     orb_add_outer(s, s + 9, s + 12, 0.5 * s[15]);
-    run->turn[v] = 0;
+    run->angle[v] = 0;
     if (orb_nearest_rotation(s, r)) {
       for (int k = 0; k < 9; k++) {
         trace += r[k] * whole[k];
       }
-      run->turn[v] = acos(fmin(1, fmax(-1, (trace - 1) / 2)));
+      run->angle[v] = acos(fmin(1, fmax(-1, (trace - 1) / 2)));
     }
   }
   orb_free(run->ctx, sum);
@@ -152,8 +152,8 @@ static orb_status measure_turns(turns_run *run, double *kept) {
 }
 
 orb_status orb_map_rotations_measure(orb_context *ctx, const orb_map_surface *b, const orb_map_image *map, double *back,
-                                     double *turn, double *kept) {
-  turns_run run = {.ctx = ctx, .b = b, .map = map, .back = back, .turn = turn};
+                                     double *angle, double *kept) {
+  rotations_run run = {.ctx = ctx, .b = b, .map = map, .back = back, .angle = angle};
   ORB_TRY(trace_back(&run));
-  return measure_turns(&run, kept);
+  return measure_angles(&run, kept);
 }

@@ -1,12 +1,12 @@
-/* Twisted limbs, found and turned back.
+/* Finds twisted limbs, and undoes a twist.
  *
- * A map can be nearly isometric and yet carry the end of a limb to the limb's other side: a twist by half a turn is
- * spread over a tube at little energy, no landmark at the tip forbids it, and descent does not undo it, since it is a
- * minimum. Halfway of a morph the tube then collapses. Around every vertex of the fixed shape the map turns space by
- * some rotation; where that is far from the one of the whole shape, a limb may be twisted. Such a part is grown towards
- * its root, cut into rings (compose_limb.c), and the rotation of each ring against the one before it, about the axis
- * between their centres, is summed up from the root. If that amounts to a twist and not to a bend, each ring is turned
- * back by what has come together there.
+ * A map can be nearly isometric and yet carry the end of a limb to the limb's other side: a twist by half a turn that
+ * is spread over a tube costs little energy, no landmark at the tip forbids it, and descent does not undo it, since it
+ * is a minimum. Halfway through the morph the tube then collapses. Around every vertex of the fixed shape the map
+ * rotates space; where that rotation is far from the one of the whole shape, a limb may be twisted. Such a part is
+ * grown towards its root and cut into rings (limb.c). The rotation of each ring against the ring before it, around the
+ * axis between their centres, is summed up from the root. If the sum is a twist, each ring is rotated back by the sum
+ * up to it. A limb that is only posed differently has no such sum.
  */
 #include "align/map/twist/twist.h"
 
@@ -20,23 +20,17 @@
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 
-enum { LEAST_BAND = 6, FEWEST_BANDS = 3, GROWTH = 40 };
-static const double TURNED = 80 * M_PI / 180;  /* against the whole: a vertex is looked at */
-static const double TWISTED = 90 * M_PI / 180; /* a limb is turned back */
-static const double SMALL = 5e-4, LARGE = 0.2; /* of the surface: parts beyond are no limbs */
-static const double WIDER = 1.8;               /* than the narrowest ring: the root is reached */
-
 typedef struct twist_run {
   orb_context *ctx;
+  const orb_map_params *params;
   const orb_map_surface *b;
   const orb_map_image *map;
-  double *back;   /* where each vertex of the surface comes from, 3 each */
-  double *height; /* in the limb at hand */
-  double *turn;   /* of every vertex's surroundings against the whole's */
-  int32_t *part;  /* representative of each vertex's part; union-find */
-
+  double *back;    /* where each vertex of the surface comes from, 3 each */
+  double *height;  /* in the present limb */
+  double *rotated; /* angle of every vertex's surroundings against the whole */
+  int32_t *part;   /* representative of each vertex's part; union-find */
   int32_t *corner; /* a half-edge out of each vertex */
-  int32_t *rim;    /* vertices that a dilation goes out from */
+  int32_t *rim;    /* vertices at which a dilation starts */
   int32_t rim_count;
   unsigned char *held, *inside, *next, *taken; /* taken: in or next to an earlier limb */
 } twist_run;
@@ -53,7 +47,7 @@ static int32_t find_part(int32_t *part, int32_t v) {
   return v;
 }
 
-/* Joins neighbours that both have the flag at `value`. */
+/* Joins neighbours whose flags both have this value. */
 static void join_parts(twist_run *run, const unsigned char *flag, int value) {
   const orb_map_surface *b = run->b;
   for (int32_t v = 0; v < b->vertex_count; v++) {
@@ -88,7 +82,7 @@ static double share_inside(const twist_run *run) {
   return area / (4 * M_PI);
 }
 
-/* What the inside closes off from the greatest part of the outside becomes inside. */
+/* Parts of the outside that the inside separates from the greatest one become inside. */
 static orb_status fill_holes(twist_run *run) {
   int32_t n = run->b->vertex_count, most = -1, *count = ORB_NEW0(run->ctx, int32_t, n);
   if (!count) {
@@ -128,8 +122,8 @@ static void find_rim(twist_run *run) {
   memcpy(run->next, run->inside, (size_t)b->vertex_count);
 }
 
-/* Adds the ring of vertices about the rim, to run->next and as the new rim; its length, and whether it takes in a
- * vertex that is held or another limb's. */
+/* Adds the ring of vertices around the rim to run->next, and makes it the new rim. Returns its length. *blocked: the
+ * ring contains a held vertex or one of another limb. */
 static double dilate(twist_run *run, int *blocked) {
   const orb_map_surface *b = run->b;
   double length = 0;
@@ -166,13 +160,13 @@ static double dilate(twist_run *run, int *blocked) {
 static orb_status grow(twist_run *run) {
   const orb_map_surface *b = run->b;
   double narrowest = INFINITY;
-  int rings = (int)(GROWTH * sqrt(fmax(1, b->vertex_count / 1e4)));
+  int rings = (int)(run->params->twist.growth * sqrt(fmax(1, b->vertex_count / 1e4)));
   find_rim(run);
   for (int i = 0; i < rings && run->rim_count > 0; i++) {
     int blocked;
     double length = dilate(run, &blocked);
     narrowest = fmin(narrowest, length);
-    if (blocked || length > WIDER * narrowest) {
+    if (blocked || length > run->params->twist.wider * narrowest) {
       break;
     }
     for (int32_t k = 0; k < run->rim_count; k++) {
@@ -183,7 +177,7 @@ static orb_status grow(twist_run *run) {
   return fill_holes(run);
 }
 
-/* The pole: the only held vertex inside, else the one deepest inside. −1: there are several held. */
+/* The pole: the only held vertex inside, else the vertex deepest inside. −1: several are held. */
 static int32_t find_pole(twist_run *run) {
   const orb_map_surface *b = run->b;
   int32_t pole = -1;
@@ -223,7 +217,7 @@ static int by_height(const void *a, const void *b) {
                                 : (x->vertex > y->vertex) - (x->vertex < y->vertex);
 }
 
-/* Centres and rotation of a band's vertices, the map's other way round from the surface's. */
+/* The centres of a band's vertices on both shapes, and the rotation between them. */
 static int fit_band(const twist_run *run, const ranked *list, int32_t count, band *out) {
   double h[9] = {0};
   memset(out, 0, sizeof *out);
@@ -244,8 +238,8 @@ static int fit_band(const twist_run *run, const ranked *list, int32_t count, ban
   return orb_nearest_rotation(h, out->rotation);
 }
 
-/* The angle by which one band is turned against another, about the axis between them. */
-static double turn_between(const band *low, const band *high) {
+/* The angle by which one band is rotated against another, around the axis between them. */
+static double rotation_between(const band *low, const band *high) {
   double axis[3], e[3], f[3], d[9], cosine = 0, sine = 0;
   const double any[3] = {1, 0, 0}, other[3] = {0, 1, 0};
   orb_sub(high->to, low->to, axis);
@@ -284,15 +278,15 @@ static orb_status measure_twist(twist_run *run, orb_map_twist *out) {
     }
   }
   qsort(list, (size_t)n, sizeof *list, by_height);
-  int32_t wanted = (n - rim) / LEAST_BAND < ORB_MAP_BANDS ? (n - rim) / LEAST_BAND : ORB_MAP_BANDS;
-  int fine = wanted >= FEWEST_BANDS && fit_band(run, list, rim, &low);
+  int32_t bands = (n - rim) / run->params->twist.band_vertices, wanted = bands < ORB_MAP_BANDS ? bands : ORB_MAP_BANDS;
+  int fine = wanted >= run->params->twist.bands && fit_band(run, list, rim, &low);
   out->height[0] = out->angle[0] = 0;
   for (int32_t k = 0; k < wanted && fine; k++) {
     int32_t begin = rim + (int32_t)((int64_t)(n - rim) * k / wanted);
     int32_t end = rim + (int32_t)((int64_t)(n - rim) * (k + 1) / wanted);
     fine = fit_band(run, list + begin, end - begin, &high);
     out->height[k + 1] = high.height;
-    out->angle[k + 1] = out->angle[k] + turn_between(&low, &high);
+    out->angle[k + 1] = out->angle[k] + rotation_between(&low, &high);
     low = high;
   }
   out->count = fine ? (int)wanted + 1 : 0;
@@ -321,20 +315,20 @@ int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, 
   }
   double gap = t->height[k] - t->height[k - 1], f = gap > 0 ? (height - t->height[k - 1]) / gap : 1;
   double angle = t->angle[k - 1] + fmin(1, fmax(0, f)) * (t->angle[k] - t->angle[k - 1]);
-  return orb_map_limb_turn(b, twists->height, -share * angle, place);
+  return orb_map_limb_rotate(b, twists->height, -share * angle, place);
 }
 
-/* The limb at hand joins the list if it is twisted. Limbs keep apart: what is next to it is closed to others. */
+/* Adds the present limb to the list if it is twisted. Limbs stay apart: its neighbours are closed to other limbs. */
 static orb_status add_limb(twist_run *run, int32_t pole, orb_map_twists *out) {
   int32_t n = run->b->vertex_count;
   orb_map_twist limb = {.pole = pole};
   int blocked;
-  ORB_TRY(orb_map_limb_heights(run->ctx, run->b, run->inside, pole, run->height));
+  ORB_TRY(orb_map_limb_heights(run->ctx, run->params, run->b, run->inside, pole, run->height));
   ORB_TRY(measure_twist(run, &limb));
   for (int k = 1; k < limb.count; k++) {
     limb.most = fmax(limb.most, fabs(limb.angle[k]));
   }
-  if (limb.most < TWISTED) {
+  if (limb.most < run->params->twist.twisted) {
     return ORB_OK;
   }
   find_rim(run);
@@ -350,8 +344,8 @@ static orb_status add_limb(twist_run *run, int32_t pole, orb_map_twists *out) {
   return ORB_OK;
 }
 
-/* Looks at the part that vertex `seed` stands for. */
-static orb_status look_at(twist_run *run, const int32_t *part, int32_t seed, orb_map_twists *out) {
+/* Examines the part that vertex `seed` represents. */
+static orb_status examine(twist_run *run, const int32_t *part, int32_t seed, orb_map_twists *out) {
   for (int32_t v = 0; v < run->b->vertex_count; v++) {
     run->inside[v] = part[v] == seed;
   }
@@ -362,7 +356,7 @@ static orb_status look_at(twist_run *run, const int32_t *part, int32_t seed, orb
     }
   }
   double share = share_inside(run);
-  int32_t pole = share < SMALL || share > LARGE ? -1 : find_pole(run);
+  int32_t pole = share < run->params->twist.smallest || share > run->params->twist.largest ? -1 : find_pole(run);
   if (pole < 0) {
     return ORB_OK;
   }
@@ -370,7 +364,8 @@ static orb_status look_at(twist_run *run, const int32_t *part, int32_t seed, orb
   return add_limb(run, pole, out);
 }
 
-static orb_status look_at_all(twist_run *run, orb_map_twists *out) {
+/* Examines the rotated parts of the surface, the largest first. */
+static orb_status examine_all(twist_run *run, orb_map_twists *out) {
   int32_t n = run->b->vertex_count;
   int32_t *count = ORB_NEW0(run->ctx, int32_t, n), *part = ORB_NEW(run->ctx, int32_t, n);
   orb_status status = count && part ? ORB_OK : ORB_E_NO_MEMORY;
@@ -378,7 +373,7 @@ static orb_status look_at_all(twist_run *run, orb_map_twists *out) {
     goto done;
   }
   for (int32_t v = 0; v < n; v++) {
-    run->inside[v] = run->turn[v] > TURNED;
+    run->inside[v] = run->rotated[v] > run->params->twist.rotated;
   }
   join_parts(run, run->inside, 1);
   memcpy(part, run->part, (size_t)n * sizeof *part);
@@ -390,11 +385,11 @@ static orb_status look_at_all(twist_run *run, orb_map_twists *out) {
     for (int32_t v = 0; v < n; v++) {
       best = count[v] > count[best] ? v : best;
     }
-    if (count[best] < LEAST_BAND * FEWEST_BANDS) {
+    if (count[best] < run->params->twist.band_vertices * run->params->twist.bands) {
       break;
     }
     count[best] = 0;
-    ORB_GO(status, look_at(run, part, best, out), done);
+    ORB_GO(status, examine(run, part, best, out), done);
   }
 done:
   orb_free(run->ctx, count);
@@ -408,21 +403,21 @@ void orb_map_twists_free(orb_context *ctx, orb_map_twists *twists) {
   memset(twists, 0, sizeof *twists);
 }
 
-orb_status orb_map_twists_find(orb_context *ctx, const orb_map_surface *b, const orb_map_image *map,
-                               const int32_t *held, int32_t held_count, orb_map_twists *out) {
+orb_status orb_map_twists_find(orb_context *ctx, const orb_map_params *params, const orb_map_surface *b,
+                               const orb_map_image *map, const int32_t *held, int32_t held_count, orb_map_twists *out) {
   size_t n = (size_t)b->vertex_count;
-  twist_run run = {.ctx = ctx, .b = b, .map = map};
+  twist_run run = {.ctx = ctx, .params = params, .b = b, .map = map};
   orb_status status = ORB_E_NO_MEMORY;
   memset(out, 0, sizeof *out);
   out->of = ORB_NEW(ctx, int32_t, n);
   out->height = ORB_NEW0(ctx, double, n);
   run.back = ORB_NEW(ctx, double, 3 * n);
   run.height = ORB_NEW(ctx, double, n);
-  run.turn = ORB_NEW(ctx, double, n);
+  run.rotated = ORB_NEW(ctx, double, n);
   run.part = ORB_NEW(ctx, int32_t, n);
   run.corner = ORB_NEW(ctx, int32_t, 2 * n);
   run.held = ORB_NEW0(ctx, unsigned char, 4 * n);
-  if (!out->of || !out->height || !run.back || !run.height || !run.turn || !run.part || !run.corner || !run.held) {
+  if (!out->of || !out->height || !run.back || !run.height || !run.rotated || !run.part || !run.corner || !run.held) {
     goto done;
   }
   run.inside = run.held + n;
@@ -438,12 +433,12 @@ orb_status orb_map_twists_find(orb_context *ctx, const orb_map_surface *b, const
   for (int32_t i = 0; i < held_count; i++) {
     run.held[held[i]] = 1;
   }
-  ORB_GO(status, orb_map_rotations_measure(ctx, b, map, run.back, run.turn, &out->kept), done);
-  status = look_at_all(&run, out);
+  ORB_GO(status, orb_map_rotations_measure(ctx, b, map, run.back, run.rotated, &out->kept), done);
+  status = examine_all(&run, out);
 done:
   orb_free(ctx, run.back);
   orb_free(ctx, run.height);
-  orb_free(ctx, run.turn);
+  orb_free(ctx, run.rotated);
   orb_free(ctx, run.part);
   orb_free(ctx, run.corner);
   orb_free(ctx, run.held);

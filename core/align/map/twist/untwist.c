@@ -1,15 +1,15 @@
-/* Twisted limbs of the best map, turned back.
+/* Untwists the limbs of the best map.
  *
- * All limbs that orb_map_twists_find() finds are turned back along their rings, whole. As a map of surfaces that is
- * one-to-one; but triangles are straight on the sphere, so some of the small or thin ones flip there, here and there
- * and not in heaps. Untangling clears them, if roughly, and descent, with flips allowed now and then against the
- * barrier (orb_map_loosen), comes down from there. Where triangles are large against the limb, flips are left; then the
- * limbs are turned by smaller steps, each untangled and smoothed before the next, and if that folds too, one limb after
- * the other: those that cannot be turned do not keep the others. Steps without any flip were tried: half of the
+ * All limbs that orb_map_twists_find() finds are rotated back along their rings in one step. That is a one-to-one map
+ * of surfaces, but triangles are straight on the sphere, so some small or thin ones flip there, scattered over the
+ * limb. Untangling clears these flips roughly, and descent, with flips allowed now and then against the barrier
+ * (orb_map_loosen), lowers the energy from there. Where triangles are large compared with the limb, flips remain; then
+ * the limbs are rotated in smaller steps, each untangled and smoothed before the next, and if that folds too, one limb
+ * after the other, so that one that folds does not stop the others. Steps without any flip were tried: half of the
  * vertices get stuck on the way, and the twist stays.
  *
- * What comes of it is kept if its energy is less and if more of the area is left halfway of a linear morph: the energy
- * of a twist that is spread over a long limb is small, so it alone does not tell.
+ * The result is kept if its energy is lower and if more of the area is left halfway through a linear morph. The energy
+ * alone does not decide: a twist that is spread over a long limb costs little.
  */
 #include <math.h>
 #include <string.h>
@@ -23,25 +23,17 @@
 #include "base/loops.h"
 #include "base/memory.h"
 
-enum {
-  MOST_STEPS = 8, /* by which limbs are turned back where one does not do */
-  STEP_SWEEPS = 10,
-  DESCENTS = 6,
-  SLICE = 1024,
-  WORK = 450 /* vertex steps a vertex that loosening may take */
-};
-static const double GAIN = 2e-3;      /* by a descent, for another one */
-static const double KEPT_GAIN = 3e-3; /* of the area halfway: less does not show */
+enum { SLICE = 1024 }; /* vertices between checks for cancellation */
 
-typedef struct unwind {
+typedef struct untwisting {
   orb_map_run *c;
   orb_map_level *l;
   const orb_map_twists *twists;
-  double share; /* of the twists, to turn back at once */
-} unwind;
+  double share; /* of the twists, undone in one step */
+} untwisting;
 
-static void turn_range(void *arg, int64_t begin, int64_t end, int thread) {
-  const unwind *u = arg;
+static void untwist_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const untwisting *u = arg;
   orb_map_level *l = u->l;
   (void)thread;
   for (int64_t v = begin; v < end; v++) {
@@ -52,7 +44,7 @@ static void turn_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* Places are looked for again only if no flip is left: else the level is given up. */
+/* Locates the vertices again only if no flip is left: else the level is given up. */
 static orb_status untangle(orb_map_run *c, orb_map_level *l, int32_t *flips) {
   ORB_TRY(orb_map_level_untangle(c->ctx, l, flips, &c->work));
   return *flips == 0 ? orb_map_level_locate_all(c->ctx, l, &c->b, 0) : ORB_OK;
@@ -61,34 +53,37 @@ static orb_status untangle(orb_map_run *c, orb_map_level *l, int32_t *flips) {
 static orb_status find_twists(orb_map_run *c, const double *points, orb_map_twists *out) {
   const orb_mesh *mesh = &c->moving->mesh;
   orb_map_image map = {c->vertex_count, mesh->triangle_count, mesh->triangles, c->x, points};
-  return orb_map_twists_find(c->ctx, &c->b, &map, c->pairs.fixed, c->pairs.count, out);
+  return orb_map_twists_find(c->ctx, &c->params, &c->b, &map, c->pairs.fixed, c->pairs.count, out);
 }
 
-/* Whether clearly more of the area is left halfway with the level than with the best map. points: what the level is, in
- * the mesh's order. */
-static orb_status keeps_more(const unwind *u, const orb_corner_table *s, double *points, int *more) {
+/* Does the level keep clearly more of the area halfway than the best map? points: receives the level's, in mesh order.
+ */
+static orb_status keeps_more(const untwisting *u, const orb_corner_table *s, double *points, int *more) {
   orb_map_twists left;
   for (int32_t v = 0; v < u->l->count; v++) {
     memcpy(points + 3 * (size_t)s->to_mesh[u->l->vertex[v]], u->l->x + 3 * (size_t)v, sizeof(double[3]));
   }
   ORB_TRY(find_twists(u->c, points, &left));
-  *more = left.kept > u->twists->kept + KEPT_GAIN;
+  *more = left.kept > u->twists->kept + u->c->params.untwist.kept_gain;
   orb_map_twists_free(u->c->ctx, &left);
   return ORB_OK;
 }
 
-/* Comes down from limbs turned back, and takes the best map's place if that is better. Where no more is left halfway
- * after the first descent it is given up: the limbs have gone another way. */
-static orb_status descend(const unwind *u, const orb_corner_table *s) {
+/* Lowers the energy of untwisted limbs; the result replaces the best map if it is better. Gives up if no more area is
+ * left halfway after the first descent: the limbs have gone another way. */
+static orb_status descend(const untwisting *u, const orb_corner_table *s) {
   orb_map_run *c = u->c;
+  const orb_map_params *p = &c->params;
   orb_map_level *l = u->l;
-  int count = c->effort.level_sweeps, more = 1;
+  int count = p->level.level_sweeps, more = 1;
   size_t n = 3 * (size_t)c->vertex_count;
   double last = INFINITY, *points = ORB_NEW(c->ctx, double, n);
   orb_status status = points ? ORB_OK : ORB_E_NO_MEMORY;
-  for (int i = 0; i < DESCENTS && status == ORB_OK && more && orb_map_level_energy(l) < (1 - GAIN) * last; i++) {
+  for (int i = 0;
+       i < p->untwist.descents && status == ORB_OK && more && orb_map_level_energy(l) < (1 - p->untwist.gain) * last;
+       i++) {
     last = orb_map_level_energy(l);
-    ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(), count), done);
+    ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(p), count), done);
     ORB_GO(status, orb_map_loosen(c, l, count / 2, count / 2), done);
     if (i == 0) {
       ORB_GO(status, keeps_more(u, s, points, &more), done);
@@ -97,7 +92,7 @@ static orb_status descend(const unwind *u, const orb_corner_table *s) {
   if (status != ORB_OK || !more) {
     goto done;
   }
-  ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(), c->effort.final_sweeps), done);
+  ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(p), p->level.final_sweeps), done);
   if (orb_map_level_energy(l) < c->best_energy && orb_map_level_flips(l) == 0) {
     ORB_GO(status, keeps_more(u, s, points, &more), done);
     if (more) {
@@ -110,8 +105,8 @@ done:
   return status;
 }
 
-/* Turns back in so many steps, with some descent between them. *flips: what is left and cannot be cleared. */
-static orb_status turn_limbs(unwind *u, const orb_corner_table *s, int steps, int32_t *flips) {
+/* Untwists all limbs in this number of steps, with sweeps between them. *flips: those that cannot be cleared. */
+static orb_status untwist_all(untwisting *u, const orb_corner_table *s, int steps, int32_t *flips) {
   orb_map_run *c = u->c;
   orb_map_level_free(c->ctx, u->l);
   ORB_TRY(orb_map_full_level(c, c->best, s, u->l));
@@ -120,16 +115,16 @@ static orb_status turn_limbs(unwind *u, const orb_corner_table *s, int steps, in
   u->share = 1.0 / steps;
   for (int i = 0; i < steps && *flips == 0; i++) {
     if (i > 0) {
-      ORB_TRY(orb_map_sweeps(c, u->l, orb_map_hard(), STEP_SWEEPS));
+      ORB_TRY(orb_map_sweeps(c, u->l, orb_map_hard(&c->params), c->params.untwist.step_sweeps));
     }
-    ORB_TRY(orb_sliced_by(c->ctx, u->l->count, SLICE, 64, turn_range, u));
+    ORB_TRY(orb_sliced_by(c->ctx, u->l->count, SLICE, 64, untwist_range, u));
     ORB_TRY(untangle(c, u->l, flips));
   }
   return ORB_OK;
 }
 
-/* Turns one limb after the other; those that fold are left out. *flips: 0 if any was turned. */
-static orb_status turn_each(unwind *u, const orb_corner_table *s, int32_t *flips) {
+/* Untwists one limb after the other, and leaves out those that fold. *flips: 0 if any limb was untwisted. */
+static orb_status untwist_each(untwisting *u, const orb_corner_table *s, int32_t *flips) {
   orb_map_run *c = u->c;
   const orb_map_twists *all = u->twists;
   orb_map_copy before = {0};
@@ -147,7 +142,7 @@ static orb_status turn_each(unwind *u, const orb_corner_table *s, int32_t *flips
     }
     u->twists = &one;
     ORB_GO(status, orb_map_copy_take(c, u->l, &before), done);
-    ORB_GO(status, orb_sliced_by(c->ctx, u->l->count, SLICE, 64, turn_range, u), done);
+    ORB_GO(status, orb_sliced_by(c->ctx, u->l->count, SLICE, 64, untwist_range, u), done);
     ORB_GO(status, untangle(c, u->l, &folded), done);
     if (folded) {
       orb_map_copy_restore(&before, u->l);
@@ -162,18 +157,19 @@ done:
   return status;
 }
 
-static orb_status unwind_limbs(orb_map_run *c, const orb_map_twists *twists) {
+static orb_status untwist_limbs(orb_map_run *c, const orb_map_twists *twists) {
   orb_corner_table s = {0};
   orb_map_level level = {0};
-  unwind u = {.c = c, .l = &level, .twists = twists};
+  untwisting u = {.c = c, .l = &level, .twists = twists};
   int32_t flips = 1;
   orb_status status;
   ORB_GO(status, orb_corner_table_create(c->ctx, &c->moving->mesh, &s), done);
-  for (int steps = 1; steps <= MOST_STEPS && flips; steps *= MOST_STEPS) {
-    ORB_GO(status, turn_limbs(&u, &s, steps, &flips), done);
+  const int most = c->params.untwist.steps;
+  for (int steps = 1; steps <= most && flips; steps *= most) {
+    ORB_GO(status, untwist_all(&u, &s, steps, &flips), done);
   }
   if (flips && twists->count > 1) {
-    ORB_GO(status, turn_each(&u, &s, &flips), done);
+    ORB_GO(status, untwist_each(&u, &s, &flips), done);
   }
   if (!flips) {
     status = descend(&u, &s);
@@ -187,15 +183,15 @@ done:
 orb_status orb_map_untwist(orb_map_run *c, double most_kept) {
   orb_map_twists twists;
   if (c->best_energy == c->twisted_energy) {
-    return ORB_OK; /* this map was tried */
+    return ORB_OK; /* this map has been tried */
   }
   ORB_TRY(find_twists(c, c->best, &twists));
   orb_status status = ORB_OK;
   if (twists.count > 0 && twists.kept <= most_kept) {
-    int64_t least = WORK * (int64_t)c->vertex_count;
+    int64_t least = c->params.work.untwist * (int64_t)c->vertex_count;
     c->twisted_energy = c->best_energy;
     c->work = c->work > least ? c->work : least;
-    status = unwind_limbs(c, &twists);
+    status = untwist_limbs(c, &twists);
   }
   orb_map_twists_free(c->ctx, &twists);
   return status;

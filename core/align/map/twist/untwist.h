@@ -1,11 +1,20 @@
-/* Untwisting the limbs of the best map. */
+/* Untwisting the limbs of the best map.
+ *
+ * Comes in: a run (engine/run.h) and its best map. Goes out: the same, with a better best map if untwisting helped.
+ * Read in this order:
+ *
+ *   rotations.h  how a map rotates the surroundings of each vertex in space
+ *   limb.h       rings around a limb, and rotations along them
+ *   twist.h      finds the twisted limbs, and undoes a twist
+ *   untwist.h    applies that to the best map
+ */
 #ifndef ORB_ALIGN_MAP_TWIST_UNTWIST_H
 #define ORB_ALIGN_MAP_TWIST_UNTWIST_H
 
 #include "align/map/engine/run.h"
 
-/* compose_unwind.c. Twisted limbs of the best map are turned back, whole, by steps, or one by one, and what comes of it
- * takes the best map's place if it is better. Nothing is done where more than so much of the area is left halfway. */
+/* Untwists the limbs of the best map: all at once, by steps, or one by one. The result replaces the best map if it is
+ * better. Does nothing if halfway through the morph more than this share of the area is kept. */
 ORB_MUST_CHECK orb_status orb_map_untwist(orb_map_run *run, double most_kept);
 
 #endif

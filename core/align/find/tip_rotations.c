@@ -1,23 +1,24 @@
-/* Maps of tips by turns in space.
+/* Tip maps by rotations in space.
  *
- * Distances along the surface mislead where proportions differ: of a stout animal with a large head and a lean one the
+ * Distances along the surface mislead where proportions differ: in a stout animal with a large head and a lean one, the
  * legs of one side are as far from each other as head and foreleg are, and dozens of wrong maps agree better than the
- * right one. But mostly limbs still point the same way when one shape is turned so that it faces as the other does. So
- * the second shape is seen from each of 24 sides, tips are matched with those in nearly the same direction from the
- * middle of the surface, the turn is fitted to the directions of what was matched, and so on until nothing changes: the
- * iterative closest points of Besl & McKay 1992 on directions. Only turns are tried, so that no map is a mirror image.
+ * right one. But limbs mostly point the same way once one shape is rotated to face like the other. So the search starts
+ * from each of 24 rotations, matches tips whose directions from the centre of the surface are nearly the same, fits the
+ * rotation to the matched directions, and repeats both until nothing changes: iterative closest points (Besl & McKay
+ * 1992) on directions. It tries rotations only, so no map is a mirror image.
  */
 #include <math.h>
 #include <string.h>
 
 #include "align/find/tip_choice.h"
-#include "align/find/tip_turns.h"
+#include "align/find/tip_rotations.h"
 #include "align/rotate/procrustes.h"
 #include "base/check.h"
 #include "numeric/vec3.h"
 
-enum { STEPS = 8 };
-static const double APART = 1.0; /* radians between directions that are not matched */
+/* Chosen by trial on the pairs of docs/bench-truth.md. */
+enum { STEPS = 8 };              /* most, of matching and fitting */
+static const double APART = 1.0; /* radians: directions this far apart are not matched */
 
 /* The i-th of the 24 rotations that map the axes to each other. */
 static void side(int i, double r[9]) {
@@ -74,14 +75,14 @@ static void keep(const orb_tip_map *map, int32_t tip_count, orb_tip_map *list, i
   ++*count;
 }
 
-orb_status orb_tip_maps_by_turns(orb_context *ctx, const orb_mesh *const meshes[2], const orb_tips tips[2],
-                                 orb_tip_map out[ORB_TIP_TURNS], int32_t *count) {
+orb_status orb_tip_maps_by_rotation(orb_context *ctx, const orb_mesh *const meshes[2], const orb_tips tips[2],
+                                    orb_tip_map out[ORB_TIP_ROTATIONS], int32_t *count) {
   double at[2][ORB_TIPS_MAX][3];
   *count = 0;
   for (int s = 0; s < 2; s++) {
     directions(meshes[s], &tips[s], at[s]);
   }
-  for (int i = 0; i < ORB_TIP_TURNS; i++) {
+  for (int i = 0; i < ORB_TIP_ROTATIONS; i++) {
     double rotation[9];
     orb_tip_map map, last;
     side(i, rotation);

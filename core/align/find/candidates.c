@@ -1,22 +1,22 @@
-/* Alignment without landmarks: the trials.
+/* Alignment without landmarks: the search for the best candidate.
  *
- * A shape that is nearly its own mirror image, or whose limbs are like each other, can be matched with another in many
- * ways, and what a correlation of whole spheres finds best may be a wrong one. So both shapes are decimated to some
- * thousand vertices, and correspondences are tried there: rotations that the correlation likes and that differ, and
- * the likeliest maps of tips of limbs (tips.h), each walked to its common targets as pin does. A map that only a
- * reflection could bring about makes the sphere fold over itself on the way and gets stuck or costs much. What a walk
- * comes to says little, right maps and wrong ones cost alike, but some sweeps of the composed energy set them apart and
- * cost no more than the walk. The best that differ are composed in full, and the energy that remains decides. Where
- * shapes are symmetric several energies are nearly alike: then the lesser turn in space counts, since most shapes stand
+ * A shape that is nearly symmetric, or whose limbs are alike, can be matched with another shape in many ways, and the
+ * best correlation of whole spheres may be a wrong one. So both shapes are decimated to about a thousand vertices, and
+ * candidates are tried there: rotations that correlate well and differ, and the likeliest tip maps (tip_maps.h,
+ * tip_rotations.h), each walked to its common targets as in pin. A map that only a reflection could produce folds the
+ * sphere over itself on the way, and gets stuck or costs much. The energy after a walk says little, since right maps
+ * and wrong ones cost alike; but some sweeps of the energy of the composed map separate them, and take no longer than
+ * the walk. The best candidates that differ are composed in full, and their energy decides. Symmetric shapes have
+ * several candidates of nearly the same energy: then the smaller rotation in space wins, since most shapes stand
  * upright and face one way.
  */
-#include "align/find/guess.h"
+#include "align/find/candidates.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "align/find/tip_choice.h"
-#include "align/find/tip_turns.h"
+#include "align/find/tip_rotations.h"
 #include "align/find/tips.h"
 #include "align/map/compose.h"
 #include "align/map/engine/spread.h"
@@ -32,12 +32,21 @@
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
 
-enum { COARSE = 1000, WALK = 300, ROTATIONS = 3, TIP_MAPS = 8, COMPOSED = 3, SAMPLES = 48 };
-static const double TURN = 1;         /* a half turn in space costs so many times the energy beyond 1 */
-static const double DIFFERENT = 0.15; /* of the diagonal: maps that differ by more are others */
-static const double BETTER = 0.95;    /* than the rotation search after its rough sweeps, or it is not worth the work */
+/* Chosen by trial on the pairs of docs/bench-truth.md. */
+enum {
+  COARSE = 1000, /* vertices of a coarse copy */
+  WALK = 300,    /* least vertices of the level on which tips walk */
+  ROTATIONS = 3, /* rotations that are tried */
+  TIP_MAPS = 8,  /* tip maps by distances that are tried, beside those by rotations in space */
+  COMPOSED = 3,  /* candidates that are composed in full */
+  SAMPLES = 48   /* points of the first shape whose images tell candidates apart */
+};
+static const double ROTATION_COST = 1; /* a rotation by π in space costs this many times the energy beyond 1 */
+static const double DIFFERENT = 0.15;  /* of the diagonal: candidates whose images are farther apart differ */
+static const double BETTER = 0.95; /* cost relative to the rotation search's after its rough sweeps: a candidate with
+                                      more is not worth composing on the given meshes */
 
-/* A decimated copy: compact, with an embedding of its own. */
+/* A decimated copy: compact, with its own embedding. */
 typedef struct coarse {
   orb_mesh mesh;
   double *points;
@@ -90,27 +99,27 @@ end:
   return status;
 }
 
-/* One correspondence on the coarse copies. */
-typedef struct trial {
+/* A candidate on the coarse copies. */
+typedef struct candidate {
   int32_t count; /* tips; 0: a rotation */
-  int is_given;  /* the rotation that the spheres are given anyway */
-  int is_stuck;  /* nothing came of composing it in full */
+  int is_given;  /* the rotation that the spheres get without this search */
+  int is_stuck;  /* composing it in full did not improve it */
   double rotation[9];
   int32_t first[ORB_TIPS_MAX], second[ORB_TIPS_MAX];
-  double energy, judge;
+  double energy, cost;      /* the cost ranks candidates: (energy − 1) · (1 + ROTATION_COST · angle / π) */
   double image[SAMPLES][3]; /* where the samples of the first shape go */
-} trial;
+} candidate;
 
-typedef struct trials {
+typedef struct search {
   orb_context *ctx;
   coarse shape[2];
   int32_t sample[SAMPLES];
-  trial list[ROTATIONS + TIP_MAPS + ORB_TIP_TURNS];
-  int32_t rotations, count; /* rotations: where the maps of tips begin */
-} trials;
+  candidate list[ROTATIONS + TIP_MAPS + ORB_TIP_ROTATIONS];
+  int32_t rotations, count; /* rotations come first, then the tip maps */
+} search;
 
-/* Sheets of the coarse copies, carried onto each other by the trial. *held 0: they cannot be. */
-static orb_status carry(trials *t, const trial *one, orb_sheet *sheets, int *held) {
+/* Makes sheets of the coarse copies and aligns them by the candidate. *held 0: its pairs cannot be met. */
+static orb_status carry(search *t, const candidate *one, orb_sheet *sheets, int *held) {
   static const int32_t numbers[ORB_TIPS_MAX] = {0, 1, 2, 3, 4, 5, 6, 7};
   *held = 1;
   for (int s = 0; s < 2; s++) {
@@ -134,7 +143,7 @@ static orb_status carry(trials *t, const trial *one, orb_sheet *sheets, int *hel
   return ORB_OK;
 }
 
-static orb_status sample_images(const trials *t, const orb_sheet *sheets, trial *one) {
+static orb_status sample_images(const search *t, const orb_sheet *sheets, candidate *one) {
   const orb_aligned_shape *a = &sheets[0].shape, *b = &sheets[1].shape;
   orb_locator *locator;
   ORB_TRY(orb_locator_create(t->ctx, b->points, b->mesh.vertex_count, b->mesh.triangles, b->mesh.triangle_count, NULL,
@@ -149,7 +158,7 @@ static orb_status sample_images(const trials *t, const orb_sheet *sheets, trial 
 }
 
 /* The angle of the rotation in space that carries the samples best onto their images, over π. */
-static orb_status turn_of(const trials *t, const trial *one, double *turn) {
+static orb_status rotation_angle(const search *t, const candidate *one, double *angle) {
   double mean[2][3] = {{0}}, c[9] = {0}, r[9];
   const double *x = t->shape[0].mesh.positions;
   for (int i = 0; i < SAMPLES; i++) {
@@ -165,18 +174,18 @@ static orb_status turn_of(const trials *t, const trial *one, double *turn) {
     orb_add_outer(c, p, q, 1);
   }
   ORB_TRY(orb_procrustes_covariance(t->ctx, c, r, NULL));
-  *turn = acos(fmin(1, fmax(-1, (r[0] + r[4] + r[8] - 1) / 2))) / M_PI;
+  *angle = acos(fmin(1, fmax(-1, (r[0] + r[4] + r[8] - 1) / 2))) / M_PI;
   return ORB_OK;
 }
 
-/* The energy of a trial after composing from its map, where it takes the samples, and its judgement. */
-static orb_status run_trial(trials *t, trial *one, orb_map_from from) {
+/* Composes from a candidate's map: fills its energy, the images of the samples, and its cost. */
+static orb_status run_candidate(search *t, candidate *one, orb_map_from from) {
   orb_sheet sheets[2];
   orb_status status;
   int held, improved;
-  double energy[2], turn;
+  double energy[2], angle;
   memset(sheets, 0, sizeof sheets);
-  one->energy = one->judge = INFINITY;
+  one->energy = one->cost = INFINITY;
   ORB_GO(status, carry(t, one, sheets, &held), end);
   if (held) {
     ORB_GO(status,
@@ -184,8 +193,8 @@ static orb_status run_trial(trials *t, trial *one, orb_map_from from) {
            end);
     one->energy = energy[1];
     ORB_GO(status, sample_images(t, sheets, one), end);
-    ORB_GO(status, turn_of(t, one, &turn), end);
-    one->judge = (one->energy - 1) * (1 + TURN * turn);
+    ORB_GO(status, rotation_angle(t, one, &angle), end);
+    one->cost = (one->energy - 1) * (1 + ROTATION_COST * angle);
   }
 end:
   orb_sheet_free(t->ctx, &sheets[0]);
@@ -193,7 +202,7 @@ end:
   return status;
 }
 
-static orb_status list_rotations(trials *t) {
+static orb_status list_rotations(search *t) {
   orb_aligned_shape shape[2];
   double rotation[9 * ROTATIONS];
   memset(shape, 0, sizeof shape);
@@ -209,9 +218,9 @@ static orb_status list_rotations(trials *t) {
   return ORB_OK;
 }
 
-/* A map of tips, unless it is listed already. */
-static void list_tip_map(trials *t, const orb_tips tips[2], const orb_tip_map *map) {
-  trial one = {0};
+/* Lists a tip map unless it is already listed. */
+static void list_tip_map(search *t, const orb_tips tips[2], const orb_tip_map *map) {
+  candidate one = {0};
   for (int32_t k = 0; k < tips[0].count; k++) {
     if (map->to[k] >= 0) {
       one.first[one.count] = tips[0].vertex[k];
@@ -219,7 +228,7 @@ static void list_tip_map(trials *t, const orb_tips tips[2], const orb_tip_map *m
     }
   }
   for (int32_t i = t->rotations; i < t->count; i++) {
-    const trial *other = &t->list[i];
+    const candidate *other = &t->list[i];
     if (other->count == one.count && memcmp(other->first, one.first, sizeof one.first) == 0 &&
         memcmp(other->second, one.second, sizeof one.second) == 0) {
       return;
@@ -228,20 +237,20 @@ static void list_tip_map(trials *t, const orb_tips tips[2], const orb_tip_map *m
   t->list[t->count++] = one;
 }
 
-static orb_status list_tip_maps(trials *t) {
+static orb_status list_tip_maps(search *t) {
   const orb_mesh *meshes[2] = {&t->shape[0].mesh, &t->shape[1].mesh};
   orb_tips tips[2];
   int32_t count, chosen_count, chosen[TIP_MAPS];
-  orb_tip_map turned[ORB_TIP_TURNS], *maps = ORB_NEW(t->ctx, orb_tip_map, ORB_TIP_MAPS_MAX);
+  orb_tip_map rotated[ORB_TIP_ROTATIONS], *maps = ORB_NEW(t->ctx, orb_tip_map, ORB_TIP_MAPS_MAX);
   orb_status status = ORB_E_NO_MEMORY;
   if (!maps) {
     return status;
   }
   ORB_GO(status, orb_tips_find(t->ctx, meshes[0], &tips[0]), end);
   ORB_GO(status, orb_tips_find(t->ctx, meshes[1], &tips[1]), end);
-  ORB_GO(status, orb_tip_maps_by_turns(t->ctx, meshes, tips, turned, &count), end);
+  ORB_GO(status, orb_tip_maps_by_rotation(t->ctx, meshes, tips, rotated, &count), end);
   for (int32_t i = 0; i < count; i++) {
-    list_tip_map(t, tips, &turned[i]);
+    list_tip_map(t, tips, &rotated[i]);
   }
   orb_tip_maps(&tips[0], &tips[1], maps, &count);
   ORB_GO(status, orb_tip_maps_choose(t->ctx, meshes, tips, maps, count, TIP_MAPS, chosen, &chosen_count), end);
@@ -253,7 +262,7 @@ end:
   return status;
 }
 
-static double difference(const trials *t, const trial *x, const trial *y) {
+static double difference(const search *t, const candidate *x, const candidate *y) {
   orb_extent extent;
   double sum = 0;
   orb_mesh_extent(&t->shape[1].mesh, &extent);
@@ -263,10 +272,10 @@ static double difference(const trials *t, const trial *x, const trial *y) {
   return sum / extent.diagonal;
 }
 
-/* Composes a trial in full. Where that does not certify or brings nothing it stays as it is. */
-static orb_status compose_trial(trials *t, trial *one) {
-  trial before = *one;
-  ORB_TRY(run_trial(t, one, ORB_MAP_FROM_MAP));
+/* Composes a candidate in full. If that is not certified or no better, the candidate stays as it is. */
+static orb_status compose_candidate(search *t, candidate *one) {
+  candidate before = *one;
+  ORB_TRY(run_candidate(t, one, ORB_MAP_FROM_MAP));
   if (!(one->energy < before.energy)) {
     *one = before;
     one->is_stuck = 1;
@@ -274,26 +283,26 @@ static orb_status compose_trial(trials *t, trial *one) {
   return ORB_OK;
 }
 
-/* The trial that judges best among those that differ from all of which composing made something, to its place; 0: there
- * is none. */
-static int choose_next(trials *t, int32_t to) {
+/* Moves the candidate of least cost to place `to`, among those that differ from all before it that composing improved.
+ * 0: there is none. */
+static int choose_next(search *t, int32_t to) {
   int32_t best = -1;
   for (int32_t i = to; i < t->count; i++) {
-    int other = t->list[i].judge < INFINITY;
+    int other = t->list[i].cost < INFINITY;
     for (int32_t k = 0; k < to && other; k++) {
       other = t->list[k].is_stuck || difference(t, &t->list[i], &t->list[k]) > DIFFERENT;
     }
-    best = other && (best < 0 || t->list[i].judge < t->list[best].judge) ? i : best;
+    best = other && (best < 0 || t->list[i].cost < t->list[best].cost) ? i : best;
   }
   if (best >= 0) {
-    trial one = t->list[to];
+    candidate one = t->list[to];
     t->list[to] = t->list[best];
     t->list[best] = one;
   }
   return best >= 0;
 }
 
-static void add_pair(orb_guess *out, int32_t first, int32_t second) {
+static void add_pair(orb_candidate *out, int32_t first, int32_t second) {
   for (int32_t k = 0; k < out->count; k++) {
     if (out->first[k] == first || out->second[k] == second) {
       return;
@@ -303,8 +312,8 @@ static void add_pair(orb_guess *out, int32_t first, int32_t second) {
   out->second[out->count++] = second;
 }
 
-/* The winner's tips, or of a rotation its first samples, as vertices of the given meshes. */
-static orb_status write_guess(const trials *t, const trial *winner, const orb_mesh *b, orb_guess *out) {
+/* The pairs of the winner as vertices of the given meshes: its tips, or for a rotation the first samples. */
+static orb_status write_pairs(const search *t, const candidate *winner, const orb_mesh *b, orb_candidate *out) {
   for (int32_t k = 0; k < winner->count; k++) {
     add_pair(out, t->shape[0].vertex[winner->first[k]], t->shape[1].vertex[winner->second[k]]);
   }
@@ -313,7 +322,7 @@ static orb_status write_guess(const trials *t, const trial *winner, const orb_me
   }
   orb_nearest *tree;
   ORB_TRY(orb_nearest_create(t->ctx, b->positions, b->triangles, b->triangle_count, &tree));
-  for (int i = 0; i < ORB_GUESS_MAX; i++) {
+  for (int i = 0; i < ORB_CANDIDATE_PAIRS; i++) {
     orb_place place;
     (void)orb_nearest_query(tree, winner->image[i], INFINITY, &place);
     add_pair(out, t->shape[0].vertex[t->sample[i]], orb_map_nearest_corner(b->triangles, &place));
@@ -322,46 +331,46 @@ static orb_status write_guess(const trials *t, const trial *winner, const orb_me
   return ORB_OK;
 }
 
-/* The trial that judges best, and how far behind the next one is that differs. */
-static int32_t winner_of(const trials *t, double *clear) {
+/* The candidate of least cost. *clear: how far the next one that differs is behind. */
+static int32_t winner_of(const search *t, double *clear) {
   int32_t best = 0;
   double next = INFINITY;
   for (int32_t i = 0; i < t->count; i++) {
-    best = t->list[i].judge < t->list[best].judge ? i : best;
+    best = t->list[i].cost < t->list[best].cost ? i : best;
   }
   for (int32_t i = 0; i < t->count; i++) {
-    if (t->list[i].judge < next && difference(t, &t->list[best], &t->list[i]) > DIFFERENT) {
-      next = t->list[i].judge;
+    if (t->list[i].cost < next && difference(t, &t->list[best], &t->list[i]) > DIFFERENT) {
+      next = t->list[i].cost;
     }
   }
-  *clear = next < INFINITY ? fmax(0, 1 - t->list[best].judge / next) : 1;
+  *clear = next < INFINITY ? fmax(0, 1 - t->list[best].cost / next) : 1;
   return best;
 }
 
-static orb_status run_trials(trials *t, const orb_mesh *b, orb_guess *out) {
+static orb_status run_all(search *t, const orb_mesh *b, orb_candidate *out) {
   ORB_TRY(list_rotations(t));
   ORB_TRY(list_tip_maps(t));
   for (int32_t i = 0; i < t->count; i++) {
-    ORB_TRY(run_trial(t, &t->list[i], ORB_MAP_MAP_ONLY));
+    ORB_TRY(run_candidate(t, &t->list[i], ORB_MAP_MAP_ONLY));
   }
-  double given = t->list[0].judge;
+  double given = t->list[0].cost;
   int32_t to = 0;
   for (; to < COMPOSED && choose_next(t, to); to++) {
-    ORB_TRY(compose_trial(t, &t->list[to]));
+    ORB_TRY(compose_candidate(t, &t->list[to]));
   }
   t->count = to;
   out->clear = 1;
   if (to == 0) {
     return ORB_OK;
   }
-  const trial *best = &t->list[winner_of(t, &out->clear)];
+  const candidate *best = &t->list[winner_of(t, &out->clear)];
   out->energy = best->energy;
-  return !best->is_given && best->judge < BETTER * given ? write_guess(t, best, b, out) : ORB_OK;
+  return !best->is_given && best->cost < BETTER * given ? write_pairs(t, best, b, out) : ORB_OK;
 }
 
-orb_status orb_guess_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_guess *out) {
+orb_status orb_candidate_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_candidate *out) {
   orb_status status;
-  trials *t = ORB_NEW0(ctx, trials, 1);
+  search *t = ORB_NEW0(ctx, search, 1);
   memset(out, 0, sizeof *out);
   if (!t) {
     return ORB_E_NO_MEMORY;
@@ -371,7 +380,7 @@ orb_status orb_guess_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b
   ORB_GO(status, coarse_create(ctx, b, &t->shape[1]), end);
   ORB_GO(status, orb_map_spread(ctx, t->shape[0].mesh.positions, t->shape[0].mesh.vertex_count, SAMPLES, t->sample),
          end);
-  status = run_trials(t, b, out);
+  status = run_all(t, b, out);
 end:
   coarse_free(ctx, &t->shape[0]);
   coarse_free(ctx, &t->shape[1]);

@@ -1,0 +1,243 @@
+/* Every threshold, weight and count of the composed map and its starts; params.c has their values for each preset.
+ *
+ * Units. An energy is the symmetric Dirichlet energy of the composed map, 1 for an isometry. Lengths in space are those
+ * of shapes scaled to area 4π, unless a field says "of the diagonal". A level size is a number of vertices. Work is
+ * counted in steps of single vertices, divided by the number of vertices of the moving shape.
+ *
+ * Origin. A field that names no origin was chosen by trial on the pairs of docs/bench-truth.md. Sizes of parallel
+ * slices stay where they are used: no result depends on them.
+ */
+#ifndef ORB_ALIGN_MAP_ENGINE_PARAMS_H
+#define ORB_ALIGN_MAP_ENGINE_PARAMS_H
+
+#include "orbmorph/embed.h"
+
+/* Sizes of arrays; chosen by trial where no reason is given. */
+enum {
+  ORB_MAP_COLOURS = 64,         /* colours of the vertices of a level: bits of a uint64_t */
+  ORB_MAP_LANES = 8,            /* triangles of a star that are computed at once: doubles of a vector of 512 bits */
+  ORB_MAP_RING_MAX = 256,       /* triangles of a star; a vertex with more does not move */
+  ORB_MAP_MIRROR_SAMPLES = 200, /* samples of a surface that test a mirror plane */
+  ORB_MAP_MIRROR_PLANES = 3,    /* mirror planes of one shape that are kept */
+  ORB_MAP_LIMBS = 12,           /* rotated parts of a surface that are examined for a twist, the largest first */
+  ORB_MAP_BANDS = 16,           /* rings of a limb: more resolve the twist better, fewer have more vertices each */
+  ORB_MAP_CROSSINGS = 400,      /* edges that one step of a vertex crosses at most; a guard against rounding */
+  ORB_MAP_RING_CROSSINGS = 8192 /* the same for a ring around a limb */
+};
+
+typedef struct orb_map_params {
+  /* What the energy of a map says. The last two concern method `auto`, which pins the shapes at the vertex pairs of the
+   * best candidate and composes from there; the pairs can also be held while it composes. */
+  struct {
+    double near_isometry; /* up to here `auto` has nothing to gain and tries no other candidate */
+    double good;          /* up to here the shapes correspond and no further start is tried. Between near_isometry and
+                             this, a limb of two nearly equal shapes may have gone wrong */
+    double poor;          /* above it `auto` also tries to hold the pairs: a map that was only pinned at them may have
+                             been caught on the way */
+    double caught;        /* on the coarse copies; above it thin limbs have caught even the best map, and `auto` holds
+                             the pairs at once */
+    double cap;           /* of one triangle; keeps a few that are nearly degenerate from hiding the others */
+  } energy;
+
+  /* How long to go on: more work finds better maps of shapes that differ, and takes longer. */
+  struct {
+    int all;          /* for clearing flips and for further starts. Default: two meshes of 15,000 triangles align in
+                         about 2 s */
+    int given_up;     /* what a start counts for that is given up at once. Without it the draws would go on for longer
+                         than if the start had run, and gain nothing */
+    int untwisted;    /* least left for registrations after an untwisting that helped */
+    int untwist;      /* least left for loosening while limbs are untwisted */
+    int passes;       /* most registrations through samples of the best map */
+    double pass_gain; /* a pass that does not bring the energy below this share of the last one ends the passes */
+    double far_above; /* a start registered through the best map whose first map has this many times the energy of that
+                         map is given up: in trials none came to a better one */
+    int rough;        /* 1: the alignment as given is only refined far enough to be sampled */
+  } work;
+
+  /* Which shape moves. */
+  struct {
+    double share; /* triangles of the moving shape whose images are inverted, as a share; fewer are no reason to swap */
+    double ratio; /* to the share with the shapes swapped: more are a reason */
+  } swap;
+
+  /* Levels of a start, and sweeps on them. */
+  struct {
+    int32_t spatial;    /* level at which a start from spatial targets begins. Coarser is faster and folds more */
+    int32_t mapped;     /* level at which a start from a map begins: a coarser one would fold it */
+    int32_t last;       /* level beyond which a start gives up untangling */
+    int32_t kept;       /* least vertices of the coarsest level if vertices are kept on it, */
+    int32_t kept_each;  /* and least vertices of it for each kept one */
+    double growth;      /* from level to level; less is more careful */
+    double last_growth; /* a level that all vertices exceed by less than this factor becomes the level of all */
+    int first_sweeps;   /* most sweeps on the first level, */
+    int coarse_sweeps;  /* on a later one of fewer than `coarse` vertices, */
+    int level_sweeps;   /* on a later one, */
+    int final_sweeps;   /* and on the level of all vertices */
+    int rough_sweeps;   /* most sweeps on each level of a rough refinement */
+    int32_t coarse;
+    int new_steps;    /* steps of a vertex that has just come back */
+    double pull;      /* of the spatial targets on the first level, */
+    double pull_fall; /* and its factor from level to level */
+  } level;
+
+  /* Sweeps over a level. */
+  struct {
+    double still;        /* of a mean edge: a vertex that moved less, like its neighbours, waits. More is faster */
+    int32_t still_share; /* sweeps end when at most one vertex in this many does not wait */
+    double over;         /* over-relaxation where no flip is allowed; 1: none */
+  } sweep;
+
+  /* A step of one vertex. */
+  struct {
+    int tries;          /* lengths that a step tries before the vertex stays */
+    double shrink;      /* least ratio of a sphere determinant after a step to before; less allows longer steps and
+                           thinner triangles */
+    double shorten;     /* a try's length relative to the one before it */
+    double sufficient;  /* share of the predicted descent that a step must reach (Armijo) */
+    double convexity;   /* least eigenvalue of the Hessian relative to the greatest; smaller ones are raised to it */
+    double least_slope; /* relative to the energy: a step that promises less is not tried */
+  } step;
+
+  /* The energy of a star. */
+  struct {
+    double epsilon;    /* of the regularised area, relative to the smaller of the area and half the Dirichlet energy:
+                          the larger, the more freely triangles turn right side out, and the less inversions cost */
+    double hinge;      /* the sphere's barrier begins at this share of the determinant that the areas would give */
+    double soft_below; /* of the hinge: below it the soft barrier continues as a parabola, so that it stays finite */
+    double soft_value; /* value of the barrier at soft_below, r − 1 − ln r */
+    double upright;    /* shortest sum of a triangle's three normals: below it the triangle's own normal is used */
+    double mollify;    /* least slack of a triangle's longest edge, relative to its mean edge, for its cotangents
+                          (intrinsic mollification); more blunts the metric of thin triangles */
+  } star;
+
+  /* Clearing flips: rounds of sweeps against a growing barrier, then untangling. */
+  struct {
+    int32_t hopeless;      /* one flip in fewer triangles than this: the start is given up */
+    int rounds;            /* of a start */
+    int sweeps;            /* of a round */
+    double first_barrier;  /* strength in the first round. A weak one lets triangles pass each other */
+    double barrier_growth; /* from round to round */
+    double flip_growth;    /* more flips than after the first round, by this factor, end the rounds: the harder the
+                              barrier the more flips means that large parts are folded */
+    int loosen_rounds;     /* after loosening, where few flips are expected */
+  } clear;
+
+  /* Untangling on the sphere: rounds of steps near the flips. */
+  struct {
+    int rounds;     /* most */
+    int stale;      /* rounds without fewer flips that end it */
+    int passes;     /* over the vertices of a round */
+    int rings_most; /* around the flips that may move; the first round has one ring, each fourth adds one */
+    int32_t few;    /* flips up to which ε belongs to each star: the last few hide in stars that are far smaller
+                       than an ε for all */
+    int tries;      /* lengths of a step */
+    double shorten; /* a try's length relative to the one before it */
+  } untangle;
+
+  /* Drawing a level without flips to its spatial targets. */
+  struct {
+    int rounds;    /* most */
+    int sweeps;    /* with flips allowed, and again without */
+    int clearings; /* rounds of clearing the flips that came */
+    double pull;   /* strength in the first round, relative to the energy of a vertex's area */
+    double fall;   /* its factor from round to round */
+  } draw;
+
+  /* A start that is nearly a map. */
+  struct {
+    int32_t few;      /* at most one flip in so many triangles: the start is nearly a map */
+    int rings;        /* around the flips in which held vertices are released */
+    int usable_rings; /* around the flips whose vertices are not used as samples */
+    int clearings;    /* rounds of clearing with the vertices released */
+    int home_rounds;  /* most, of drawing released vertices back; the pull doubles from round to round */
+    int home_sweeps;  /* of a round */
+    double home_pull; /* in the first round */
+  } near;
+
+  /* The landmark walk. */
+  struct {
+    int32_t samples;        /* of the spatial targets that are walked to; more guide the walk and make it get stuck */
+    int32_t usable_samples; /* the same of what is usable of a start that was nearly a map */
+    int32_t least_each;     /* vertices of the moving shape for each sample; a shape with fewer gets no samples */
+    int32_t level;          /* least vertices of the coarse level, */
+    int32_t level_each;     /* and for each pair */
+    double off_surface;     /* a sample farther from the surface than this many mean distances is not used */
+    double facing;          /* least cosine between the normals of a sample and of the surface there */
+    double apart;           /* least distance of a sample from every pair; */
+    double usable_apart;    /* less for usable samples, which are nearer to the truth */
+  } walk;
+
+  /* Mirror landmarks. Lengths are of the diagonal. */
+  struct {
+    int32_t few_samples;    /* in the first steps of a plane; cheap, to give up early */
+    int first_steps, steps; /* of closest points: with few samples, and then with all */
+    double symmetric;       /* mean distance of mirrored samples from the surface up to which a plane is a symmetry */
+    double hopeless;        /* the same after the first steps: more gives the plane up */
+    double settled;         /* a step that changes that distance by less is the last */
+    double same;            /* cosine of two normals: more is the same plane */
+    double alike;           /* least correlation of the landmarks' distances from two shapes' planes */
+    double middle;          /* a landmark nearer to the plane is its own mirror image */
+    double off_surface;     /* a mirror image farther from the surface is not used */
+    double taken;           /* a landmark nearer than this to the image is already that landmark */
+  } mirror;
+
+  /* Non-rigid registration in space. */
+  struct {
+    int32_t samples;                        /* of the best map that anchor a further registration */
+    int rounds;                             /* of iterative closest points */
+    int32_t first_controls, last_controls;  /* of the spline; interpolated geometrically. Solving is cubic in them */
+    double first_stiffness, last_stiffness; /* likewise; less follows the surface more closely and folds more */
+    double exact_stiffness;                 /* of landmarks, which hold: only keeps the system regular */
+    double sample_stiffness;                /* of samples, which are only roughly right */
+    int32_t least_anchors;  /* that determine a similarity; with fewer, rigid registrations come first */
+    int32_t rigid_samples;  /* controls of a rigid registration */
+    int rigid_steps;        /* of each of the 24 */
+    double rigid_cap;       /* of a squared distance, so that parts without a counterpart do not decide */
+    int32_t fixed_search;   /* vertices of the fixed shape beyond which only every second, third, … is searched */
+    double normal_weight;   /* of |n − n'|² against |x − x'|² */
+    double facing;          /* least cosine of normals; a control with less is left out of the round */
+    double far;             /* mean distances beyond which a control is left out */
+    int32_t least_controls; /* that must be left, or the spline stays as it is */
+    double slide;           /* most that a target slides from a vertex within its tangent plane */
+  } registration;
+
+  /* The place of each spatial target on the fixed shape. */
+  struct {
+    double facing;        /* least cosine between the normals at the nearest point, or vertices compete instead by */
+    double normal_weight; /* distance and this weight of |n − n'|² against |x − x'|² */
+    int32_t search;       /* triangles beyond which only every second, third, … is searched for a vertex */
+    double jitter;        /* of barycentric coordinates: vertices that share a point cannot be untangled */
+  } place;
+
+  /* Twisted limbs: which parts are examined, and when one counts. */
+  struct {
+    double rotated;           /* radians against the rotation of the whole: vertices beyond are examined */
+    double twisted;           /* radians between root and tip: limbs beyond are untwisted */
+    double smallest, largest; /* limb, as a share of the surface */
+    int32_t band_vertices;    /* least of a ring, */
+    int32_t bands;            /* and least rings of a limb: fewer do not show a twist */
+    double growth;            /* most rings that a part grows by, for 10,000 vertices; grows with their square root */
+    double wider;             /* a ring this many times the narrowest is the root */
+    int solve_steps;          /* most steps of conjugate gradients for the heights */
+    double solve_settled;     /* residual, relative to the first, that ends them */
+    double least_weight;      /* of an edge: cotangents are clamped to this and its inverse, so that heights have no
+                                 extremum inside */
+  } twist;
+
+  /* Untwisting them. */
+  struct {
+    double early_energy; /* a rough map with more energy, */
+    double early_kept;   /* and less than this share of the area halfway, is untwisted before it is drawn. Elsewhere
+                            that did not help */
+    int steps;           /* by which limbs are untwisted where one step folds them */
+    int step_sweeps;     /* between these */
+    int descents;        /* most, of sweeps and loosening */
+    double gain;         /* of the energy, relative: a descent that gains less is the last */
+    double kept_gain;    /* of the area halfway: less does not show in a morph */
+  } untwist;
+} orb_map_params;
+
+/* The values for a preset. `fast` composes no map; where a coarse copy is composed it has the values of `default`. */
+orb_map_params orb_map_params_of(orb_preset preset);
+
+#endif
