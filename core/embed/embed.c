@@ -1,11 +1,4 @@
-/* Embedding: a mesh in, a certified embedding out.
- *
- * embed.c runs a method, then certify.c and distortion.c. The method `newton` (newton.c) decimates a corner_table by
- * collapses (hierarchy, decimate, collapse; multires.h holds the structs), then refines it on the sphere (advance,
- * which calls place to undo collapses and sweeps level after level; refiner, relax, star, kernel). vector/ holds the
- * loops that decide its speed. kernel_sampling/ is the method of Peng & Timalsena 2016. Alignment uses the hierarchy
- * and its refiner too, and resume.c.
- */
+/* Embedding: a mesh in, a certified embedding out. README.md of this folder says where what is. */
 #include <math.h>
 #include <string.h>
 
@@ -14,7 +7,7 @@
 #include "base/error.h"
 #include "base/memory.h"
 #include "embed/kernel_sampling/kernel_sampling.h"
-#include "embed/newton.h"
+#include "embed/newton/newton.h"
 
 void orb_embed_defaults(orb_embed_options *options) {
   *options = (orb_embed_options){.method = ORB_EMBED_NEWTON,

@@ -160,7 +160,8 @@ static void proportions_differ(void **state) {
 }
 
 /* The creature has no symmetry. Its limbs go to those of a finer copy by no rotation at all, which is therefore tried
- * first; to those of its mirror image (x negated) they go at the same distances, but by no rotation: that is not tried. */
+ * first; to those of its mirror image (x negated) they go at the same distances, but by no rotation: that is not tried.
+ */
 static void mirror_images_are_left_out(void **state) {
   (void)state;
   enum { MOST = 10 };
@@ -216,7 +217,7 @@ static int nearest_of(const orb_mesh *mesh, const int32_t *list, int count, int3
 /* The best candidate for two real shapes has at least so many pairs, and takes each tip to the landmark where it
  * belongs, of those set by hand. Skips if the shapes are missing. */
 static void assert_candidate(const char *first, const char *second, int marks, const int32_t *mark[2], int least,
-                         double clear) {
+                             double clear) {
   orb_context *ctx;
   orb_mesh mesh[2];
   orb_candidate best;

@@ -9,10 +9,10 @@
 
 #include <cmocka.h>
 
-#include "embed/advance.h"
-#include "embed/kernel.h"
-#include "embed/resume.h"
-#include "embed/vector/loops.h"
+#include "embed/common/kernel.h"
+#include "embed/newton/advance.h"
+#include "embed/newton/resume.h"
+#include "embed/newton/vector/loops.h"
 #include "support_context.h"
 #include "support_exact.h"
 #include "support_shapes.h"

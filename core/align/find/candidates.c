@@ -27,7 +27,7 @@
 #include "align/rotate/rotate.h"
 #include "base/check.h"
 #include "base/memory.h"
-#include "embed/advance.h"
+#include "embed/newton/advance.h"
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"

@@ -37,7 +37,7 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
-#include "embed/place.h"
+#include "embed/newton/place.h"
 #include "numeric/vec3.h"
 
 static void orb_map_run_free(orb_map_run *c) {

@@ -5,8 +5,8 @@
 #include "align/sheet/thin.h"
 #include "base/check.h"
 #include "base/memory.h"
-#include "embed/advance.h"
-#include "embed/resume.h"
+#include "embed/newton/advance.h"
+#include "embed/newton/resume.h"
 
 /* Chosen by trial. */
 enum {

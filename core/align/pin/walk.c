@@ -16,7 +16,7 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "base/memory.h"
-#include "embed/advance.h"
+#include "embed/newton/advance.h"
 #include "numeric/vec3.h"
 
 /* Chosen by trial. */

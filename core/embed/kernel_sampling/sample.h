@@ -2,7 +2,7 @@
 #ifndef ORB_EMBED_KERNEL_SAMPLING_SAMPLE_H
 #define ORB_EMBED_KERNEL_SAMPLING_SAMPLE_H
 
-#include "embed/kernel.h"
+#include "embed/common/kernel.h"
 #include "embed/kernel_sampling/mesh.h"
 
 /* The ring of one vertex: neighbour i and its successor span ring triangle i. Arrays have `capacity` entries. */

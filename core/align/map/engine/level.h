@@ -19,7 +19,7 @@
 
 #include "align/map/engine/params.h"
 #include "align/map/engine/surface.h"
-#include "embed/corner_table.h"
+#include "embed/common/corner_table.h"
 
 /* A triangle of a vertex's star: neighbours q and r (numbers of the level), the cotangents at the vertex, q and r, and
  * the area. */

@@ -9,7 +9,7 @@
 #include "align/map/engine/packed.h"
 #include "base/check.h"
 #include "base/memory.h"
-#include "embed/corner_table.h"
+#include "embed/common/corner_table.h"
 
 void orb_map_packed_free(orb_context *ctx, orb_map_packed *p) {
   orb_map_surface_free(ctx, &p->b);

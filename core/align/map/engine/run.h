@@ -3,8 +3,8 @@
 #define ORB_ALIGN_MAP_ENGINE_RUN_H
 
 #include "align/map/engine/packed.h"
-#include "embed/hierarchy.h"
-#include "embed/multires.h"
+#include "embed/newton/hierarchy.h"
+#include "embed/newton/multires.h"
 
 /* Where a start puts the vertices of its first level. */
 typedef enum orb_map_start {

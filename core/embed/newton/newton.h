@@ -1,0 +1,11 @@
+/* The method `newton` (docs/method.md): decimation with carried areas, undo, level sweeps of a damped Newton method. */
+#ifndef ORB_EMBED_NEWTON_NEWTON_H
+#define ORB_EMBED_NEWTON_NEWTON_H
+
+#include "orbmorph/embed.h"
+
+/* Fills points (3 a vertex of the mesh) and the timings of simplify and embed. The points are not certified yet. */
+ORB_MUST_CHECK orb_status orb_newton_run(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
+                                         double *points, orb_embed_timings *timings);
+
+#endif

@@ -1,0 +1,42 @@
+#include "embed/newton/settings.h"
+
+void orb_newton_settings_of(const orb_embed_options *options, orb_newton_settings *out) {
+  *out = (orb_newton_settings){.growth = 1.5,
+                               .growth_fine = 2.2,
+                               .fine_from = 20000,
+                               .coarse_until = 5000,
+                               .coarse_sweeps = 200,
+                               .level_sweeps = 6,
+                               .final_sweeps = 14,
+                               .most_sweeps = 400,
+                               .converged = 1e-3,
+                               .converged_last = 1e-3,
+                               .settled = 1e-4,
+                               .settled_last = 1e-6,
+                               .weight = options->energy_weight,
+                               .blend = 0.5,
+                               .finest = 1e-7,
+                               .crowded = 40};
+  if (options->preset == ORB_PRESET_FAST) {
+    out->growth_fine = 3;
+    out->fine_from = 10000;
+    out->coarse_until = 2500;
+    out->level_sweeps = 3;
+    out->final_sweeps = 6;
+    out->converged = out->converged_last = 5e-3;
+    out->settled = 5e-4;
+  } else if (options->preset == ORB_PRESET_QUALITY) {
+    out->growth_fine = 1.7;
+    out->coarse_until = 100000;
+    out->coarse_sweeps = 600;
+    out->level_sweeps = 20;
+    out->final_sweeps = 40;
+    out->most_sweeps = 1000;
+    out->converged = out->converged_last = 2e-4;
+    out->settled = 2e-5;
+  }
+  if (options->energy_weight < 1) { /* only the finest level goes below w = 1: see orb_refiner_weight() */
+    out->final_sweeps = out->final_sweeps < 60 ? 60 : out->final_sweeps;
+    out->converged_last *= 0.5;
+  }
+}

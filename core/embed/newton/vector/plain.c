@@ -1,0 +1,10 @@
+/* The vector loops for any machine: two doubles at a time, by SSE2 on x86-64 and by NEON on Arm. */
+#define ORB_LANES 2
+#include "embed/newton/vector/lanes.inc.h"
+
+#include "embed/newton/vector/cost.inc.h"
+#include "embed/newton/vector/fill.inc.h"
+#include "embed/newton/vector/sweep.inc.h"
+
+const orb_vector_loops orb_vector_plain = {
+    .name = "plain", .lanes = ORB_LANES, .costs = cost_range, .fill = fill_range, .sweep = sweep_range};
