@@ -135,6 +135,7 @@ export const SCENES = {
   'use-it': [
     async (page) => {
       await morphed(page);
+      await slide(page, 'Along the morph', 0); // it may be playing
       await button(page, 'Use it').click();
     },
   ],
