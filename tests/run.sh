@@ -6,9 +6,11 @@
 #   packages   installs what the tests need: Debian packages, Node, npm packages
 #   build      builds the studio and the release build, with warnings as errors
 #   asan       unit and scenario tests, in a build with AddressSanitizer and UndefinedBehaviorSanitizer
-#   fuzz       each fuzz target for ORB_FUZZ_SECONDS (10)
 #   release    every test, in the release build
+#   fuzz       each fuzz target for ORB_FUZZ_SECONDS (10)
 #   core       only the library and its unit tests, where the daemon does not build; not part of a full run
+#
+# In a full run the tests in a browser, which run one at a time and mostly wait, run beside asan and release.
 #
 # A step that fails does not keep later steps from running. The last line is "N passed, N failed, N skipped", summed
 # over tests and fuzz targets; a step that fails outside a test counts as one failure. The exit status is 0 only if
@@ -39,13 +41,14 @@ step_build() {
   build_release
 }
 
-# Tests of a build; adds their results to the totals. Two more at a time than there are cores: most wait more than they
-# compute.
+# Tests of a build; adds their results to the totals. Two more at a time than there are cores, the one in a browser
+# included: most wait more than they compute.
 run_tests() {
-  local build=$1 status=0
+  local build=$1 status=0 jobs=$(($(getconf _NPROCESSORS_ONLN) + 2))
   shift
+  [ -z "$browser" ] || jobs=$((jobs - 1))
   rm -f "$build/tests.xml"
-  ctest --test-dir "$build" --output-on-failure -j $(($(getconf _NPROCESSORS_ONLN) + 2)) --output-junit "$PWD/$build/tests.xml" "$@" || status=$?
+  ctest --test-dir "$build" --output-on-failure --output-junit "$PWD/$build/tests.xml" -j $jobs "$@" || status=$?
   count_junit "$build/tests.xml" >>"$totals"
   return $status
 }
@@ -74,7 +77,35 @@ step_fuzz() {
 
 step_release() {
   build_release
-  run_tests build
+  if [ -n "$browser" ]; then
+    run_tests build -LE browser
+  else
+    run_tests build
+  fi
+}
+
+# Starts the release build's tests in a browser beside the steps that follow. They have a folder of their own, as two
+# runs of ctest in one folder overwrite each other's logs.
+browser= browser_began=
+start_browser() {
+  mkdir -p build/browser
+  rm -f build/browser/tests.xml
+  echo "subdirs(\"$PWD/build\")" >build/browser/CTestTestfile.cmake
+  ctest --test-dir build/browser --output-on-failure --output-junit "$PWD/build/browser/tests.xml" -L browser \
+    >build/browser/log 2>&1 &
+  browser=$! browser_began=$SECONDS
+}
+
+# Waits for them, and prints what they printed.
+finish_browser() {
+  local status=0 failures
+  failures=$(sum failed)
+  echo "== browser =="
+  wait "$browser" || status=$?
+  browser=
+  cat build/browser/log
+  count_junit build/browser/tests.xml >>"$totals" || status=1
+  ended browser $status "$browser_began" "$failures"
 }
 
 # Without warnings as errors: it is for compilers that the rest of the tree has not met.
@@ -84,36 +115,60 @@ step_core() {
   run_tests build-core
 }
 
-steps=(packages build asan fuzz release)
-if [ $# -gt 0 ]; then
-  steps=("$@")
-fi
-for step in "${steps[@]}"; do
-  if ! declare -F "step_$step" >/dev/null; then
-    echo "There is no step '$step': packages, build, asan, fuzz, release, core" >&2
+names="packages build asan release fuzz core"
+for step in "$@"; do
+  if [[ " $names " != *" $step "* ]]; then
+    echo "There is no step '$step': $names" >&2
     exit 2
   fi
 done
 
 totals=$(mktemp)
-trap 'rm -f "$totals"' EXIT
+trap 'rm -f "$totals"; [ -z "$browser" ] || kill "$browser"' EXIT
 sum() {
   grep -cx "$1" "$totals" || true
 }
-for step in "${steps[@]}"; do
+
+# Ends a step: one that failed outside a test counts as one failure.
+ended() {
+  local step=$1 status=$2 began=$3 failures=$4
+  if [ "$status" -ne 0 ] && [ "$(sum failed)" -eq "$failures" ]; then
+    echo failed >>"$totals"
+  fi
+  echo "== $step: exit status $status after $((SECONDS - began)) s =="
+}
+
+# Runs a step and leaves its exit status in `status`. Never call it in a condition: bash then ignores set -e in the step.
+run_step() {
+  local step=$1 began=$SECONDS failures
+  failures=$(sum failed)
   echo "== $step =="
-  began=$SECONDS failures=$(sum failed)
-  set +e # the subshell turns it on again; as part of a condition, bash would ignore it inside the function
+  set +e
   (
     set -e
     "step_$step"
   )
   status=$?
   set -e
-  if [ $status -ne 0 ] && [ "$(sum failed)" -eq "$failures" ]; then
-    echo failed >>"$totals"
+  ended "$step" $status "$began" "$failures"
+}
+
+if [ $# -gt 0 ]; then
+  for step in "$@"; do
+    run_step "$step"
+  done
+else
+  run_step packages
+  run_step build
+  if [ $status -eq 0 ]; then
+    start_browser
   fi
-  echo "== $step: exit status $status after $((SECONDS - began)) s =="
-done
+  run_step asan
+  run_step release
+  if [ -n "$browser" ]; then
+    finish_browser
+  fi
+  run_step fuzz
+fi
 echo "$(sum passed) passed, $(sum failed) failed, $(sum skipped) skipped"
 [ "$(sum failed)" -eq 0 ]
