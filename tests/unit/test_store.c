@@ -270,14 +270,18 @@ static int replace_catalogue(stored *s, const char *more, char path[96]) {
   return newest;
 }
 
-/* A catalogue as version 1 of the schema left it, with a mesh and a job, is brought up to date and keeps both; one from
- * a later version than this program knows is not touched. */
+/* A catalogue as version 1 of the schema left it, with a mesh and two jobs, is brought up to date and keeps them. The
+ * request of a waiting job loses the member that no version reads any more. A catalogue from a later version than this
+ * program knows is not touched. */
 static void test_migrations(void **state) {
   stored *s = *state;
   static const char first[] =
       "INSERT INTO resource(kind, id, sha, json, bytes, created, used) VALUES(0, 'old', 'sha', '{}', 7, 1, 1);"
       "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created)"
       " VALUES('oldjob', 'key', 0, 1, 1, 1, 0, 10, '', '{}', 1);"
+      "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created)"
+      " VALUES('oldmorph', 'key2', 1, 0, 0, 1, 0, 10, '',"
+      " '{\"shapes\":[],\"align\":{\"method\":\"pin\",\"options\":{\"preset\":\"fast\",\"seed\":1}}}', 1);"
       "INSERT INTO token VALUES('00', 'old', 1, 100, 0, 1);"
       "PRAGMA user_version=1;";
   char path[96];
@@ -295,6 +299,11 @@ static void test_migrations(void **state) {
   assert_int_equal(catalogue_bytes(s->cat, 1), 0);
   assert_int_equal(catalogue_recover(s->cat, 3, 20, "{}"), STORE_OK);
   assert_int_equal(read_job(s, "oldjob").state, API_JOB_QUEUED);
+  job_row waiting = {0};
+  assert_int_equal(catalogue_job_get(s->cat, "oldmorph", &waiting), STORE_OK);
+  assert_string_equal(waiting.request,
+                      "{\"shapes\":[],\"align\":{\"method\":\"pin\",\"options\":{\"preset\":\"fast\"}}}");
+  job_row_free(&waiting);
   token_row *tokens = catalogue_tokens(s->cat, &count);
   assert_int_equal(count, 1);
   assert_string_equal(tokens[0].name, "old");
