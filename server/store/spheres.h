@@ -10,7 +10,7 @@
 #ifndef ORB_STORE_SPHERES_H
 #define ORB_STORE_SPHERES_H
 
-#include "orbmorph/align.h"
+#include "orbmorph/alignment.h"
 #include "store/objects.h"
 
 /* Writes and publishes the object; *bytes: its size. Holds one sphere in memory at a time. If *status is not ORB_OK,

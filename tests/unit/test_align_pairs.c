@@ -15,6 +15,7 @@
 #include "orbmorph/remesh.h"
 #include "support_align.h"
 #include "support_shared.h"
+#include "orbmorph/align.h"
 
 enum { LANDMARKS_MAX = 64, NAME_MAX_LENGTH = 128 };
 

@@ -18,6 +18,7 @@
 #include "support_align.h"
 #include "support_bodies.h"
 #include "support_shapes.h"
+#include "orbmorph/align.h"
 
 static void like_landmarks_meet(void **state) {
   (void)state;

@@ -13,6 +13,7 @@
 #include "numeric/vec3.h"
 #include "support_align.h"
 #include "support_bodies.h"
+#include "orbmorph/align.h"
 
 enum { COUNT = 14 };
 

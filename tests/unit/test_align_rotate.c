@@ -14,6 +14,7 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 #include "support_shapes.h"
+#include "orbmorph/align.h"
 
 static orb_context *make_context(int threads) {
   orb_context_options options = {.threads = threads};

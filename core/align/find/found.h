@@ -2,7 +2,7 @@
 #ifndef ORB_ALIGN_FIND_FOUND_H
 #define ORB_ALIGN_FIND_FOUND_H
 
-#include "orbmorph/align.h"
+#include "orbmorph/alignment.h"
 
 /* Fills found, found_points and confidence of an alignment made without landmarks; its meshes are the given ones,
  * unsplit. clear, 0 to 1: how far other candidates are behind (candidates.h). found.c describes the method. */

@@ -13,7 +13,7 @@
 #ifndef ORB_ALIGN_MAP_COMPOSE_H
 #define ORB_ALIGN_MAP_COMPOSE_H
 
-#include "orbmorph/align.h"
+#include "orbmorph/alignment.h"
 #include "orbmorph/remesh.h"
 
 /* What the first spatial targets of a composed map follow. */

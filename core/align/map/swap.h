@@ -3,7 +3,7 @@
 #define ORB_ALIGN_MAP_SWAP_H
 
 #include "align/map/engine/params.h"
-#include "orbmorph/align.h"
+#include "orbmorph/alignment.h"
 
 /* Should the shapes change places? The triangles of the shape that moves must be able to follow the other surface.
  * Where that has a limb for which the moving shape has hardly a triangle, the images of triangles are inverted. */

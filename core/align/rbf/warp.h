@@ -2,7 +2,7 @@
 #ifndef ORB_ALIGN_RBF_WARP_H
 #define ORB_ALIGN_RBF_WARP_H
 
-#include "orbmorph/align.h"
+#include "orbmorph/alignment.h"
 
 /* φ(r) = 1 − 30r² − 10r³ + 45r⁴ − 6r⁵ − 60r³ ln r on [0, 1], 0 beyond (de Boer et al. 2007, compact thin-plate C²);
  * φ(1) = 0. */

@@ -13,7 +13,7 @@
 #ifndef ORB_ALIGN_SHEET_SHEET_H
 #define ORB_ALIGN_SHEET_SHEET_H
 
-#include "orbmorph/align.h"
+#include "orbmorph/alignment.h"
 
 /* Where a new vertex lies: coordinates (sum 1) on three vertices of one triangle of the given mesh. */
 typedef struct orb_origin {

@@ -144,7 +144,7 @@ KS_INLINE void measure_depth(const orb_ks_edge *edge, int32_t edges, const float
 }
 
 /* x to the power `kind`: 1, 3 or 12. */
-KS_INLINE float power(float x, int kind) {
+KS_INLINE float raised(float x, int kind) {
   float x3 = x * x * x, x6 = x3 * x3;
   return kind == 1 ? x : kind == 3 ? x3 : x6 * x6;
 }
@@ -199,7 +199,7 @@ KS_INLINE void add_term(const orb_ks_edge *edge, int area_kind, int shape_kind, 
   for (int32_t l = 0; l < count; l++) {
     float angle, area, shape;
     measure(&e, quarter, x[l], y[l], z[l], &angle, &area, &shape);
-    error[l] += angle * power(area, area_kind) * power(shape, shape_kind);
+    error[l] += angle * raised(area, area_kind) * raised(shape, shape_kind);
   }
 }
 

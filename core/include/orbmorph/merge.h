@@ -2,6 +2,7 @@
 #ifndef ORBMORPH_MERGE_H
 #define ORBMORPH_MERGE_H
 
+#include "orbmorph/align.h"
 #include "orbmorph/asset.h"
 
 #ifdef __cplusplus

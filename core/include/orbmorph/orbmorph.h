@@ -3,6 +3,7 @@
 #define ORBMORPH_ORBMORPH_H
 
 #include "orbmorph/align.h"
+#include "orbmorph/alignment.h"
 #include "orbmorph/asset.h"
 #include "orbmorph/context.h"
 #include "orbmorph/embed.h"

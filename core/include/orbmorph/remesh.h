@@ -2,7 +2,7 @@
 #ifndef ORBMORPH_REMESH_H
 #define ORBMORPH_REMESH_H
 
-#include "orbmorph/align.h"
+#include "orbmorph/alignment.h"
 #include "orbmorph/locate.h"
 #include "orbmorph/remesh_methods.h"
 

@@ -2,7 +2,7 @@
 #ifndef ORB_ALIGN_MAP_ENGINE_SURFACE_H
 #define ORB_ALIGN_MAP_ENGINE_SURFACE_H
 
-#include "orbmorph/align.h"
+#include "orbmorph/alignment.h"
 #include "orbmorph/locate.h"
 
 /* A surface on which places move. Scaled to area 4π around its centre. */

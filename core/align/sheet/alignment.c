@@ -1,0 +1,18 @@
+#include "orbmorph/alignment.h"
+
+#include <string.h>
+
+void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
+  for (int32_t s = 0; alignment->shapes && s < alignment->shape_count; s++) {
+    orb_aligned_shape *shape = &alignment->shapes[s];
+    orb_mesh_free(ctx, &shape->mesh);
+    orb_free(ctx, shape->parent);
+    orb_free(ctx, shape->points);
+    orb_free(ctx, shape->landmark_vertices);
+  }
+  orb_free(ctx, alignment->shapes);
+  orb_free(ctx, alignment->found);
+  orb_free(ctx, alignment->confidence);
+  orb_free(ctx, alignment->found_points);
+  memset(alignment, 0, sizeof *alignment);
+}

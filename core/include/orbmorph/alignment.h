@@ -1,0 +1,71 @@
+/* What an alignment takes and gives: landmarks, options, aligned shapes. align.h has the call. */
+#ifndef ORBMORPH_ALIGNMENT_H
+#define ORBMORPH_ALIGNMENT_H
+
+#include "orbmorph/embed.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum orb_align_method { ORB_ALIGN_PIN = 0, ORB_ALIGN_RBF, ORB_ALIGN_ROTATE, ORB_ALIGN_AUTO } orb_align_method;
+
+/* One landmark: a place on each shape, in their order. */
+typedef struct orb_landmark {
+  char name[ORB_NAME_MAX];
+  const orb_place *at; /* shape_count places, on the meshes given to orb_align() */
+  int32_t pass;        /* rbf: order in which landmarks meet: first 0, the major ones, then 1, … */
+  double radius;       /* rbf: of its influence, a chord of the unit sphere; 0: the default */
+  double confidence;   /* of a found landmark, 0 to 1; 1 of a given one */
+} orb_landmark;
+
+typedef struct orb_align_options {
+  orb_align_method method;
+  orb_preset preset; /* fast: no composed map */
+  int32_t rbf_steps; /* of each pass; 10 */
+  int32_t one_way;   /* rbf: move the later shapes only (Peng & Timalsena 2016, Fig. 9) */
+  double rbf_radius; /* of all landmarks without a radius; 0: 1.0 */
+  double max_growth; /* pin: triangles that splits may add to a mesh before landmarks are refused, relative to its own
+                        number (to 2000 if it has fewer), and at most 800000; 0: 64 */
+} orb_align_options;
+
+typedef struct orb_align_shape {
+  const orb_mesh *mesh;
+  const double *points; /* its certified embedding, 3 a vertex */
+} orb_align_shape;
+
+/* A shape after alignment. Its mesh is the same surface, perhaps with more vertices (landmarks within triangles or on
+ * edges, and split edges). Triangle t lies in triangle parent[t] of the given mesh. New vertices have mesh.source −1;
+ * attributes of corners are interpolated. */
+typedef struct orb_aligned_shape {
+  orb_mesh mesh;
+  int32_t *parent;
+  double *points; /* certified on the aligned sphere */
+  orb_certificate certificate;
+  int32_t *landmark_vertices; /* landmark_count: the vertex of each landmark */
+} orb_aligned_shape;
+
+enum { ORB_FOUND_MAX = 12 };
+
+typedef struct orb_alignment {
+  int32_t shape_count, landmark_count;
+  orb_aligned_shape *shapes;
+  /* auto without landmarks: at most ORB_FOUND_MAX found landmarks, which show the correspondence; they are far from
+   * each other on the first shape. A client can correct them and send them as landmarks. They are not vertices. */
+  int32_t found_count;
+  orb_place *found;     /* found_count × shape_count places, on the given meshes */
+  double *found_points; /* found_count × 3: their common points on the aligned sphere */
+  double *confidence; /* found_count, 0 to 1: 1 where the map nearby is rigid up to one scale for all; less the more it
+                         stretches; and less for all if another candidate is nearly as good. It does not say whether
+                         the right parts were matched */
+  double energy;      /* symmetric Dirichlet energy of the composed maps, capped for each triangle and weighted by area;
+                         lower is better; NaN if not measured */
+} orb_alignment;
+
+/* Frees the shapes and the found landmarks, and zeroes the struct. */
+ORB_API void orb_alignment_free(orb_context *ctx, orb_alignment *alignment);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
