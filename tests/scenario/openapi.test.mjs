@@ -280,8 +280,8 @@ test('answers about meshes', async (t) => {
     [shapes.cube],
     [hole, { repair: 'fill_holes' }],
     [two, { repair: 'largest_component' }],
-    [obj(shapes.turned(m, (i) => i % 3 === 0))],
-    [obj(shapes.turned(m))],
+    [obj(shapes.reversed(m, (i) => i % 3 === 0))],
+    [obj(shapes.reversed(m))],
     [`${obj(m)}v 9 9 9\nf 1 1 2\n`],
   ];
   for (const [text, query] of edits) {
@@ -293,7 +293,7 @@ test('answers about meshes', async (t) => {
     ['not-connected', two],
     ['not-genus-zero', obj(shapes.torus())],
     ['not-manifold', along],
-    ['not-orientable', obj(shapes.turned(m, (i) => i === 5)), { repair: 'none' }],
+    ['not-orientable', obj(shapes.reversed(m, (i) => i === 5)), { repair: 'none' }],
     ['not-finite', obj(m).replace('v 1 0 0', 'v nan 0 0')],
     ['degenerate', 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n'],
     ['malformed-mesh', 'OFF\n4 4 0\n0 0 0\n'],
