@@ -1,4 +1,4 @@
-/* Poses: shapes blended, turned to the viewer, framed and drawn. */
+/* Poses: shapes blended, rotated toward the viewer, framed and drawn. */
 #ifndef ORB_CLI_VIEW_POSE_H
 #define ORB_CLI_VIEW_POSE_H
 

@@ -184,9 +184,9 @@ static int write_shape(orb_context *ctx, api_text *line, const remesh_run *run, 
              orb_transfer_positions(ctx, &run->shape[s], mesh->places + (int64_t)s * mesh->vertex_count,
                                     mesh->vertex_count, positions) == ORB_OK &&
              orb_mark_inverted(ctx, mesh, &run->shape[s], s, positions, inverted) == ORB_OK;
-  int64_t turned = 0;
+  int64_t count = 0;
   for (int64_t t = 0; fine && t < mesh->triangle_count; t++) {
-    turned += inverted[t];
+    count += inverted[t];
   }
   orb_extent extent;
   orb_mesh_extent(&run->shape[s].mesh, &extent);
@@ -195,7 +195,7 @@ static int write_shape(orb_context *ctx, api_text *line, const remesh_run *run, 
   api_json_member_number(line, "hausdorff_relative", mesh->error_bound[s] / extent.diagonal);
   api_json_member_number(line, "hausdorff_sampled_relative", report->hausdorff_sampled / extent.diagonal);
   api_json_member_number(line, "rms_relative", report->rms / extent.diagonal);
-  api_json_member_integer(line, "inverted", turned);
+  api_json_member_integer(line, "inverted", count);
   api_json_member_integer(line, "against_centre",
                           fine ? count_against_centre(ctx, mesh, &run->shape[s], positions) : -1);
   api_json_member_integer(line, "slivers", fine ? count_slivers(mesh, positions) : 0);

@@ -3,10 +3,10 @@
  * - dense: where both meshes have the same triangles, vertex i of one belongs to vertex i of the other. The error of a
  *   vertex is the distance from where the map takes it, in % of the second shape's diagonal.
  * - held out: landmarks that the alignment was not given, likewise.
- * - inverted: triangles turned over in space. Of the map: those of either shape whose image on the other turns against
- *   that surface at its centre. Of the supermesh: those that turn against either surface there.
- * - halfway: how much of its area each patch of the surface keeps halfway of the linear morph, against the mean of both
- *   ends. A limb that the map turns by half a turn about its axis is thin there. The least of some 200 patches, and the
+ * - inverted: triangles that face the other way in space. Of the map: those of either shape whose image on the other
+ *   faces away from that surface at its centre. Of the supermesh: those that face away from either surface there.
+ * - halfway: how much of its area each patch of the surface keeps halfway through the linear morph, relative to the
+ *   mean of both ends. A limb that the map twists by half a turn is thin there. The least of some 200 patches, and the
  *   share of the surface in patches that keep less than half. Shapes that face different ways lose area on the straight
  *   way whatever the map is; `halfway_fitted` is the same after the second one was moved onto the first (the asset's
  *   fit `rigid`).
@@ -199,8 +199,8 @@ static int write_held_out(truth_run *run, api_text *line) {
   return 1;
 }
 
-/* Triangles with corners p on the sphere and x in space that turn against the normal of shape s at their centre. */
-static int turned(const truth_run *run, int s, const double *p[3], const double *x[3]) {
+/* Triangles with corners p on the sphere and x in space that face away from the normal of shape s at their centre. */
+static int is_inverted(const truth_run *run, int s, const double *p[3], const double *x[3]) {
   double centre[3], n[3], at[3], normal[3];
   for (int k = 0; k < 3; k++) {
     centre[k] = p[0][k] + p[1][k] + p[2][k];
@@ -225,7 +225,7 @@ static double map_inverted(const truth_run *run, int from) {
       x[k] = image + 3 * k;
       surface_at(run, 1 - from, p[k], image + 3 * k, NULL);
     }
-    count += turned(run, 1 - from, p, x);
+    count += is_inverted(run, 1 - from, p, x);
   }
   return (double)count / shape->mesh.triangle_count;
 }
@@ -243,7 +243,7 @@ static double supermesh_inverted(const truth_run *run, int s) {
       x[k] = corner + 3 * k;
       orb_place_position(mesh, &m->places[(int64_t)s * m->vertex_count + v], corner + 3 * k);
     }
-    count += turned(run, s, p, x);
+    count += is_inverted(run, s, p, x);
   }
   return (double)count / m->triangle_count;
 }

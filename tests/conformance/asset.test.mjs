@@ -85,8 +85,8 @@ function match(mesh, facts) {
   return numbers;
 }
 
-// Triangles up to their order and the corner they begin with.
-function turned([a, b, c]) {
+// The corners of a triangle, beginning with the lowest number.
+function canonical([a, b, c]) {
   return a < b && a < c ? [a, b, c].join() : b < c ? [b, c, a].join() : [c, a, b].join();
 }
 
@@ -109,10 +109,10 @@ for (const name of ['two', 'six', 'dressed', 'colours', 'rigid', 'bare']) {
       const numbers = match(mesh, facts);
       const index = mesh.geometry.index.array;
       for (let i = 0; i < index.length; i += 3) {
-        triangles.push(turned([numbers[index[i]], numbers[index[i + 1]], numbers[index[i + 2]]]));
+        triangles.push(canonical([numbers[index[i]], numbers[index[i + 1]], numbers[index[i + 2]]]));
       }
     }
-    assert.deepEqual(triangles.sort(), facts.triangles.map(turned).sort());
+    assert.deepEqual(triangles.sort(), facts.triangles.map(canonical).sort());
   });
 
   test(`${name}: every target has the same attributes, and bounds hold`, () => {

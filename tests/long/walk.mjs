@@ -50,7 +50,7 @@ async function meshes() {
     await is(200, d.post('/v1/meshes', body, { headers, query: { name: 'egg' } }));
     await is(400, d.post('/v1/meshes', body.subarray(0, body.length - 5), { headers }));
   }
-  for (const bad of [shapes.torus(6, 5), shapes.withoutFace(egg), shapes.turned(egg, (i) => i === 3)])
+  for (const bad of [shapes.torus(6, 5), shapes.withoutFace(egg), shapes.reversed(egg, (i) => i === 3)])
     await is(422, d.upload(shapes.obj(bad), { repair: 'none' }));
   for (const text of ['', 'no mesh', 'v 1 2\nf 1 1 1\n', 'OFF\n1 1 1\n', 'ply\n', 'glTF\x02'])
     await is([400, 415, 422], d.upload(text));

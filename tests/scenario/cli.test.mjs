@@ -199,11 +199,11 @@ test('a refused request exits with 1 and prints the problem on standard error', 
   const open = path.join(at, 'open.obj');
   const two = path.join(at, 'two.obj');
   const ring = path.join(at, 'ring.obj');
-  const turned = path.join(at, 'turned.obj');
+  const reversed = path.join(at, 'reversed.obj');
   await writeFile(open, shapes.obj(shapes.withoutFace(shapes.ball(2))));
   await writeFile(two, shapes.obj(shapes.apart(shapes.ball(2), shapes.ball(1))));
   await writeFile(ring, shapes.obj(shapes.torus()));
-  await writeFile(turned, shapes.obj(shapes.turned(shapes.ball(2))));
+  await writeFile(reversed, shapes.obj(shapes.reversed(shapes.ball(2))));
   const refused = await run(['upload', open], { env });
   assert.equal(refused.code, 1);
   assert.equal(refused.out, '');
@@ -225,13 +225,13 @@ test('a refused request exits with 1 and prints the problem on standard error', 
   assert.equal(healthy.code, 0, healthy.err);
   assert.match(healthy.out, /healthy/);
   assert.equal((await run(['ls'], { env })).out.includes('dog'), true, 'doctor keeps meshes that were there before');
-  const sick = await run(['doctor', open, two, ring, turned], { env });
+  const sick = await run(['doctor', open, two, ring, reversed], { env });
   assert.equal(sick.code, 1);
   assert.match(sick.out, /--repair fill_holes/);
   assert.match(sick.out, /--repair largest_component/);
   assert.match(sick.out, /handles/);
   assert.match(sick.out, /turn-inside-out/);
-  assert.equal((await run(['ls'], { env })).out.includes('turned'), false, 'doctor deletes the meshes it added');
+  assert.equal((await run(['ls'], { env })).out.includes('reversed'), false, 'doctor deletes the meshes it added');
 });
 
 test('a wait survives a restart of the daemon', async (t) => {

@@ -1,4 +1,4 @@
-// Meshes: what is accepted and mended, what is refused and why, and the resource itself.
+// Meshes: what is accepted and repaired, what is refused and why, and the resource itself.
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
 import { readFile } from 'node:fs/promises';
@@ -75,27 +75,27 @@ test('every format is told by its content', async (t) => {
   assert.equal(big.status, 201, big.bytes.toString());
 });
 
-test('safe repairs mend what changes no shape, and say so', async (t) => {
+test('safe repairs change no shape, and the answer lists them', async (t) => {
   const d = await daemon(t);
   const m = ball(2);
   const kinds = (reply) => Object.fromEntries(reply.json.repairs.map((r) => [r.kind, r.count]));
-  const mended = async (mesh, kind, what) => {
+  const repaired = async (mesh, kind, what) => {
     const reply = await d.upload(typeof mesh === 'string' ? mesh : obj(mesh));
     assert.equal(reply.status, 201, `${what}: ${reply.bytes}`);
     assert.ok(kinds(reply)[kind] > 0, `${what}: ${JSON.stringify(reply.json.repairs)}`);
     assert.equal(reply.json.triangles, m.triangles.length, what);
     assert.ok(reply.json.volume > 0, `${what}: the surface faces outwards`);
   };
-  await mended(shapes.soup(m), 'weld', 'vertices at one place');
-  await mended(
-    shapes.turned(m, (i) => i % 5 === 2),
+  await repaired(shapes.soup(m), 'weld', 'vertices at one place');
+  await repaired(
+    shapes.reversed(m, (i) => i % 5 === 2),
     'reorient',
-    'some faces turned',
+    'some faces reversed',
   );
-  await mended(shapes.turned(m), 'turn-inside-out', 'all faces turned');
-  await mended({ ...m, positions: [...m.positions, [9, 9, 9]] }, 'unused-vertices', 'a vertex without faces');
-  await mended({ ...m, triangles: [...m.triangles, m.triangles[3]] }, 'duplicate-faces', 'a face twice');
-  await mended(`${obj(m)}f 1 1 2\n`, 'degenerate-faces', 'a face over one vertex twice');
+  await repaired(shapes.reversed(m), 'turn-inside-out', 'all faces reversed');
+  await repaired({ ...m, positions: [...m.positions, [9, 9, 9]] }, 'unused-vertices', 'a vertex without faces');
+  await repaired({ ...m, triangles: [...m.triangles, m.triangles[3]] }, 'duplicate-faces', 'a face twice');
+  await repaired(`${obj(m)}f 1 1 2\n`, 'degenerate-faces', 'a face over one vertex twice');
   const cube = await d.upload(shapes.cube);
   assert.equal(kinds(cube).triangulate, 6, 'polygons');
 });
@@ -159,7 +159,7 @@ test('bad meshes are refused with what is wrong and where', async (t) => {
     [[0, 1]],
   );
   await refused(
-    shapes.turned(m, (i) => i === 5),
+    shapes.reversed(m, (i) => i === 5),
     422,
     'not-orientable',
     { repair: 'none' },

@@ -1,7 +1,7 @@
 // Holds the API document to what the daemon answers: it must contain every status, header and member.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
-import { readFile } from 'node:fs/promises';
+import { readdir, readFile } from 'node:fs/promises';
 import http from 'node:http';
 import path from 'node:path';
 import test from 'node:test';
@@ -200,6 +200,34 @@ test('every problem has an example whose detail says more than its title', async
   assert.equal(new Set(problems.map((p) => p.detail)).size, problems.length, 'each example has a detail of its own');
 });
 
+// The texts of a source as patterns: adjacent literals are one text, and a conversion such as %lld stands for anything.
+const patternsOf = (source) =>
+  [...source.matchAll(/(?:"(?:[^"\\\n]|\\.)*"\s*)+/g)]
+    .map(([run]) => [...run.matchAll(/"((?:[^"\\\n]|\\.)*)"/g)].map((m) => m[1].replaceAll('\\"', '"')).join(''))
+    .map((text) => text.split(/%[-.*\d]*(?:ll|z)?[a-z]/))
+    .filter((parts) => parts.join('').replace(/[^A-Za-z]/g, '').length > 7)
+    .map((parts) => parts.map((part) => part.replace(/[.*+?^${}()|[\]\\]/g, '\\$&')).join('.+'));
+
+test('every example of a problem has a detail that the sources write', async () => {
+  const files = [];
+  for (const folder of ['api', 'core', 'server'])
+    for (const file of await readdir(path.join(root, folder), { recursive: true }))
+      if (/\.cc?$/.test(file)) files.push(await readFile(path.join(root, folder, file), 'utf8'));
+  const patterns = files.flatMap(patternsOf).map((text) => new RegExp(`^${text}$`));
+  const { examples, schemas } = document.components;
+  const problems = [
+    ...Object.values(examples).map((e) => e.value),
+    ...Object.values(schemas).flatMap((s) => s.examples),
+  ];
+  const details = problems.filter((e) => /^\/problems\//.test(e?.type)).map((e) => e.detail);
+  assert.ok(details.length > 40);
+  for (const detail of details)
+    assert.ok(
+      patterns.some((p) => p.test(detail)),
+      `no source writes: ${detail}`,
+    );
+});
+
 test('the document and the daemon know the same paths and methods', async (t) => {
   const d = await daemon(t);
   const table = await readFile(path.join(root, 'api/routes.h'), 'utf8');
@@ -280,8 +308,8 @@ test('answers about meshes', async (t) => {
     [shapes.cube],
     [hole, { repair: 'fill_holes' }],
     [two, { repair: 'largest_component' }],
-    [obj(shapes.turned(m, (i) => i % 3 === 0))],
-    [obj(shapes.turned(m))],
+    [obj(shapes.reversed(m, (i) => i % 3 === 0))],
+    [obj(shapes.reversed(m))],
     [`${obj(m)}v 9 9 9\nf 1 1 2\n`],
   ];
   for (const [text, query] of edits) {
@@ -293,7 +321,7 @@ test('answers about meshes', async (t) => {
     ['not-connected', two],
     ['not-genus-zero', obj(shapes.torus())],
     ['not-manifold', along],
-    ['not-orientable', obj(shapes.turned(m, (i) => i === 5)), { repair: 'none' }],
+    ['not-orientable', obj(shapes.reversed(m, (i) => i === 5)), { repair: 'none' }],
     ['not-finite', obj(m).replace('v 1 0 0', 'v nan 0 0')],
     ['degenerate', 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n'],
     ['malformed-mesh', 'OFF\n4 4 0\n0 0 0\n'],

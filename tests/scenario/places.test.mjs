@@ -33,7 +33,7 @@ const position = (m, { triangle, weights }) => {
 test('places of a supermesh name triangles of the files', async (t) => {
   const d = await daemon(t);
   const sources = [shapes.egg(3), shapes.bean(3)];
-  // The second file has every triangle turned inside out, and each begun at another corner: the repair turns them back.
+  // The second file lists every triangle reversed and from another corner: the repair reverses them again.
   sources[1] = {
     ...sources[1],
     triangles: sources[1].triangles.map(

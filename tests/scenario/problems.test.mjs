@@ -86,8 +86,8 @@ test('sections name the facts that answers have', async (t) => {
   await upload('not-genus-zero', obj(shapes.torus()));
   const twice = { ...m, triangles: [...m.triangles, [m.triangles[0][0], m.triangles[0][1], m.triangles.at(-1)[2]]] };
   await upload('not-manifold', obj(twice));
-  const turned = { ...m, triangles: m.triangles.map((f, i) => (i ? f : [f[1], f[0], f[2]])) };
-  await upload('not-orientable', obj(turned), { repair: 'none' });
+  const reversed = { ...m, triangles: m.triangles.map((f, i) => (i ? f : [f[1], f[0], f[2]])) };
+  await upload('not-orientable', obj(reversed), { repair: 'none' });
   await upload('degenerate', 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n');
   await upload('too-large', Buffer.alloc(400_000, 'v'));
   await upload('bad-query', obj(m), { repair: 'magic' });

@@ -1,4 +1,4 @@
-// Every real mesh: the good ones embed, the mendable ones are mended, the bad ones are refused for the right reason.
+// Every real mesh: valid ones embed, repairable ones are repaired, the others are refused for the right reason.
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { daemon, slow, assertProblem } from './support/daemon.mjs';
@@ -39,7 +39,7 @@ test('good meshes are accepted as they stand, and embed', { skip }, async (t) =>
   }
 });
 
-test('mendable meshes are mended, with a word on how', { skip }, async (t) => {
+test('repairable meshes are repaired, and the answer lists the repairs', { skip }, async (t) => {
   const d = await daemon(t);
   const kinds = {
     weld: ['weld'],

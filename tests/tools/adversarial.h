@@ -6,7 +6,7 @@
 
 typedef enum adversarial_kind {
   ADV_CYLINDER,   /* a tube 500 times as long as wide */
-  ADV_SPIRAL,     /* a tube wound six times */
+  ADV_SPIRAL,     /* a tube coiled six times */
   ADV_NECK,       /* two balls joined by a thread */
   ADV_URCHIN,     /* a ball with many spikes */
   ADV_NOISE,      /* a ball whose radius jumps at each vertex */

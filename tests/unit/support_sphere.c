@@ -44,10 +44,10 @@ static int32_t add_vertex(builder *b, double x, double y, double z) {
 
 static void add_triangle(builder *b, int32_t i, int32_t j, int32_t k) {
   int32_t *t = b->t + 3 * (size_t)b->nt++;
-  int turned = orb_det(b->p + 3 * (size_t)i, b->p + 3 * (size_t)j, b->p + 3 * (size_t)k) < 0;
+  int reversed = orb_det(b->p + 3 * (size_t)i, b->p + 3 * (size_t)j, b->p + 3 * (size_t)k) < 0;
   t[0] = i;
-  t[1] = turned ? k : j;
-  t[2] = turned ? j : k;
+  t[1] = reversed ? k : j;
+  t[2] = reversed ? j : k;
 }
 
 static void add_hull(builder *b, const double (*p)[3], int n, double edge) {

@@ -8,7 +8,7 @@
 /* Kinds of triangulation. size: icosphere and octasphere the number of four-way splits, uv the number of rings. */
 typedef enum sphere_kind { SPHERE_TETRA, SPHERE_OCTA, SPHERE_ICO, SPHERE_UV } sphere_kind;
 
-/* A shape with points of the given kind, moved by a seeded jitter (0: none) and kept positive, turned by a seeded
+/* A shape with points of the given kind, moved by a seeded jitter (0: none) and kept positive, rotated by a seeded
  * rotation if seed is not 0. Its surface is the bumpy, stretched ball of support_surface(). */
 void sphere_shape(orb_context *ctx, sphere_kind kind, int size, double jitter, unsigned seed, orb_aligned_shape *out);
 void sphere_shape_free(orb_context *ctx, orb_aligned_shape *shape);

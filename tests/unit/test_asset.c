@@ -261,7 +261,7 @@ static void coinciding_vertices_are_kept_apart(void **state) {
   synthetic_free(ctx, &made);
 }
 
-static void turned(int32_t shape, const double p[3], double out[3]) {
+static void moved_copy(int32_t shape, const double p[3], double out[3]) {
   double q[3];
   ellipsoid(0, p, q);
   q[1] *= 1.5; /* no symmetry that a rotation could hide in */
@@ -272,10 +272,10 @@ static void turned(int32_t shape, const double p[3], double out[3]) {
   out[2] = scale * q[2] + shape;
 }
 
-/* A shape and its copy, turned, scaled and shifted: a similarity brings it back, so all deltas vanish. */
+/* A shape and its copy, rotated, scaled and shifted: a similarity undoes that, so all deltas vanish. */
 static void fit_undoes_a_similarity(void **state) {
   orb_context *ctx = *state;
-  synthetic made = synthetic_make(ctx, 3, 2, turned);
+  synthetic made = synthetic_make(ctx, 3, 2, moved_copy);
   orb_asset_options options;
   orb_asset_defaults(&options);
   options.fit = ORB_FIT_SIMILARITY;
@@ -294,10 +294,10 @@ static void fit_undoes_a_similarity(void **state) {
   synthetic_free(ctx, &made);
 }
 
-/* The matrix said of that copy is the inverse of what was done to it; the first shape, and all without a fit, stay. */
+/* The matrix of that copy is the inverse of what was done to it; the first shape, and all without a fit, stay. */
 static void the_transform_is_the_inverse(void **state) {
   orb_context *ctx = *state;
-  synthetic made = synthetic_make(ctx, 3, 2, turned);
+  synthetic made = synthetic_make(ctx, 3, 2, moved_copy);
   double m[32];
   static const double stay[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_NONE, m), ORB_OK);

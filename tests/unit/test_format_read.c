@@ -194,7 +194,7 @@ static size_t binary_glb(unsigned char *out) {
   for (int i = 0; i < 12; i++) {
     p[48 + 2 * i] = FACE[i / 3][i % 3];
   }
-  p[72] = 3; /* … and mended by the sparse part */
+  p[72] = 3; /* … and corrected by the sparse part */
   memcpy(p + 76, PLACE[3], 12);
   return (size_t)(p + 88 - out);
 }

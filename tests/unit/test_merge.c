@@ -170,9 +170,9 @@ static void shapes_of_no_size_are_refused(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* An overlay is both surfaces themselves, however they are crumpled: none of its triangles is turned against them.
+/* An overlay is both surfaces themselves, however they are crumpled: none of its triangles is inverted.
  * Against smooth normals alone two fifths would be. */
-static void an_overlay_of_crumpled_shapes_turns_nothing(void **state) {
+static void an_overlay_of_crumpled_shapes_inverts_nothing(void **state) {
   (void)state;
   orb_context *ctx;
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
@@ -206,6 +206,6 @@ static void an_overlay_of_crumpled_shapes_turns_nothing(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(two_ellipsoids), cmocka_unit_test(one_shape_is_refused),
                                      cmocka_unit_test(shapes_of_no_size_are_refused),
-                                     cmocka_unit_test(an_overlay_of_crumpled_shapes_turns_nothing)};
+                                     cmocka_unit_test(an_overlay_of_crumpled_shapes_inverts_nothing)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -15,7 +15,7 @@
 #include "support_context.h"
 #include "support_shapes.h"
 
-static orb_status mend(const char *text, unsigned repair, orb_mesh *mesh) {
+static orb_status read_repaired(const char *text, unsigned repair, orb_mesh *mesh) {
   assert_int_equal(orb_mesh_read(ctx, (const unsigned char *)text, strlen(text), ORB_FORMAT_OBJ, mesh, NULL), ORB_OK);
   orb_status status = orb_mesh_repair(ctx, mesh, repair);
   if (status != ORB_OK) {
@@ -31,21 +31,21 @@ static void test_safe(void **state) {
   (void)state;
   orb_mesh mesh;
   orb_extent extent;
-  assert_int_equal(mend(TETRA_V TETRA_F, ORB_REPAIR_NONE, &mesh), ORB_OK);
+  assert_int_equal(read_repaired(TETRA_V TETRA_F, ORB_REPAIR_NONE, &mesh), ORB_OK);
   assert_int_equal(mesh.repair_count, 0);
   orb_mesh_free(ctx, &mesh);
 
-  /* inside out: turned, also by none */
-  assert_int_equal(mend(TETRA_V "f 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n", ORB_REPAIR_NONE, &mesh), ORB_OK);
+  /* inside out: reversed, also by none */
+  assert_int_equal(read_repaired(TETRA_V "f 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n", ORB_REPAIR_NONE, &mesh), ORB_OK);
   assert_int_equal(shape_repaired(&mesh, "turn-inside-out"), 4);
   orb_mesh_extent(&mesh, &extent);
   assert_true(fabs(extent.volume - 1.0 / 6) < 1e-15);
   orb_mesh_free(ctx, &mesh);
 
-  /* one face turned, one repeated, one degenerate, one vertex unused (before the others: numbers move) */
+  /* one face reversed, one repeated, one degenerate, one vertex unused (before the others: numbers move) */
   const char *messy = "v 9 9 9\n" TETRA_V "f 2 4 3\nf 2 3 5\nf 2 4 5\nf 3 4 5\nf 5 4 3\nf 2 2 3\n";
-  assert_int_equal(mend(messy, ORB_REPAIR_NONE, &mesh), ORB_E_NOT_MANIFOLD);
-  assert_int_equal(mend(messy, ORB_REPAIR_SAFE, &mesh), ORB_OK);
+  assert_int_equal(read_repaired(messy, ORB_REPAIR_NONE, &mesh), ORB_E_NOT_MANIFOLD);
+  assert_int_equal(read_repaired(messy, ORB_REPAIR_SAFE, &mesh), ORB_OK);
   assert_int_equal(shape_repaired(&mesh, "reorient"), 1);
   assert_int_equal(shape_repaired(&mesh, "duplicate-faces"), 1);
   assert_int_equal(shape_repaired(&mesh, "degenerate-faces"), 1);
@@ -59,7 +59,7 @@ static void test_safe(void **state) {
 
   /* a seam with −0 against 0 */
   const char *seam = TETRA_V "v -0 0 -0\nv 1 -0 0\nf 5 3 6\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
-  assert_int_equal(mend(seam, ORB_REPAIR_SAFE, &mesh), ORB_OK);
+  assert_int_equal(read_repaired(seam, ORB_REPAIR_SAFE, &mesh), ORB_OK);
   assert_int_equal(shape_repaired(&mesh, "weld"), 2);
   assert_int_equal(mesh.vertex_count, 4);
   assert_int_equal(mesh.vertex_of_source[4], 0);
@@ -91,7 +91,7 @@ static void test_welding_of_cubes(void **state) {
   size_t length = 0;
   orb_mesh mesh;
   cube(text, &length, 0, 0, 1, 1);
-  assert_int_equal(mend(text, ORB_REPAIR_SAFE, &mesh), ORB_OK);
+  assert_int_equal(read_repaired(text, ORB_REPAIR_SAFE, &mesh), ORB_OK);
   assert_int_equal(mesh.vertex_count, 8);
   assert_int_equal(mesh.triangle_count, 12);
   assert_int_equal(shape_repaired(&mesh, "weld"), 16);
@@ -99,10 +99,10 @@ static void test_welding_of_cubes(void **state) {
 
   /* two loose cubes that touch along an edge stay two cubes */
   cube(text, &length, 1, 1, 25, 1);
-  assert_int_equal(mend(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CONNECTED);
+  assert_int_equal(read_repaired(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CONNECTED);
   assert_int_equal(orb_context_error(ctx)->component_total, 2);
   assert_int_equal(orb_context_error(ctx)->components[0], 12);
-  assert_int_equal(mend(text, ORB_REPAIR_LARGEST_COMPONENT, &mesh), ORB_OK);
+  assert_int_equal(read_repaired(text, ORB_REPAIR_LARGEST_COMPONENT, &mesh), ORB_OK);
   assert_int_equal(mesh.vertex_count, 8);
   orb_mesh_free(ctx, &mesh);
 
@@ -110,34 +110,36 @@ static void test_welding_of_cubes(void **state) {
   length = 0;
   cube(text, &length, 0, 0, 1, 0);
   cube(text, &length, 1, 0, 9, 0);
-  assert_int_equal(mend(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CONNECTED);
+  assert_int_equal(read_repaired(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CONNECTED);
 }
 
 static void test_refusals(void **state) {
   (void)state;
   orb_mesh mesh;
   const orb_error *error = orb_context_error(ctx);
-  assert_int_equal(mend("v 7 7 7\n" TETRA_V "f 2 4 3\nf 2 3 5\nf 2 5 4\n", ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CLOSED);
+  assert_int_equal(read_repaired("v 7 7 7\n" TETRA_V "f 2 4 3\nf 2 3 5\nf 2 5 4\n", ORB_REPAIR_SAFE, &mesh),
+                   ORB_E_NOT_CLOSED);
   assert_int_equal(error->boundary_loops, 1);
   assert_int_equal(error->edge_count, 3);
   for (int i = 0; i < 3; i++) { /* the rim is 2 3 4, counted from 0 in the file */
     assert_true(error->edges[i][0] >= 2 && error->edges[i][1] >= 2);
   }
   /* two faces back to back: one is left */
-  assert_int_equal(mend(TETRA_V "f 1 2 3\nf 1 3 2\n", ORB_REPAIR_SAFE, &mesh), ORB_E_DEGENERATE);
-  assert_int_equal(mend(TETRA_V "f 1 1 2\n", ORB_REPAIR_SAFE, &mesh), ORB_E_DEGENERATE);
-  assert_int_equal(mend(TETRA_V "f 1 3 2\nf 1 2 4\nf 1 3 4\nf 2 3 4\n", ORB_REPAIR_NONE, &mesh), ORB_E_NOT_ORIENTABLE);
+  assert_int_equal(read_repaired(TETRA_V "f 1 2 3\nf 1 3 2\n", ORB_REPAIR_SAFE, &mesh), ORB_E_DEGENERATE);
+  assert_int_equal(read_repaired(TETRA_V "f 1 1 2\n", ORB_REPAIR_SAFE, &mesh), ORB_E_DEGENERATE);
+  assert_int_equal(read_repaired(TETRA_V "f 1 3 2\nf 1 2 4\nf 1 3 4\nf 2 3 4\n", ORB_REPAIR_NONE, &mesh),
+                   ORB_E_NOT_ORIENTABLE);
   /* an edge of three faces */
-  assert_int_equal(mend(TETRA_V "v 5 5 5\n" TETRA_F "f 1 2 5\n", ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_MANIFOLD);
+  assert_int_equal(read_repaired(TETRA_V "v 5 5 5\n" TETRA_F "f 1 2 5\n", ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_MANIFOLD);
   assert_int_equal(error->edge_count, 1);
   assert_true((error->edges[0][0] == 0 && error->edges[0][1] == 1) ||
               (error->edges[0][0] == 1 && error->edges[0][1] == 0));
   /* two tetrahedra that share vertex 0 only */
   const char *pinched = TETRA_V "v -1 0 0\nv 0 -1 0\nv 0 0 -1\n" TETRA_F "f 1 5 6\nf 1 7 5\nf 1 6 7\nf 5 7 6\n";
-  assert_int_equal(mend(pinched, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_MANIFOLD);
+  assert_int_equal(read_repaired(pinched, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_MANIFOLD);
   assert_int_equal(error->vertices[0], 0);
   assert_int_equal(error->component_total, 2);
-  assert_int_equal(mend(pinched, ORB_REPAIR_LARGEST_COMPONENT, &mesh), ORB_OK);
+  assert_int_equal(read_repaired(pinched, ORB_REPAIR_LARGEST_COMPONENT, &mesh), ORB_OK);
   orb_mesh_free(ctx, &mesh);
 }
 
@@ -180,9 +182,9 @@ static void test_fill(void **state) {
     }
     orb_mesh mesh;
     orb_extent extent;
-    assert_int_equal(mend(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CLOSED);
+    assert_int_equal(read_repaired(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CLOSED);
     assert_int_equal(orb_context_error(ctx)->boundary_loops, 2);
-    assert_int_equal(mend(text, ORB_REPAIR_FILL_HOLES, &mesh), ORB_OK);
+    assert_int_equal(read_repaired(text, ORB_REPAIR_FILL_HOLES, &mesh), ORB_OK);
     assert_int_equal(shape_repaired(&mesh, "fill_holes"), 2);
     assert_int_equal(mesh.triangle_count, 2 * n + 2 * (n - 2));
     orb_mesh_extent(&mesh, &extent);
@@ -263,8 +265,8 @@ static void test_nearest(void **state) {
 static void test_copy(void **state) {
   (void)state;
   orb_mesh mesh, copy;
-  assert_int_equal(mend(TETRA_V "vn 0 0 1\nvt 1 1\nusemtl a\nf 1/1/1 3/1/1 2/1/1\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
-                        ORB_REPAIR_SAFE, &mesh),
+  assert_int_equal(read_repaired(TETRA_V "vn 0 0 1\nvt 1 1\nusemtl a\nf 1/1/1 3/1/1 2/1/1\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+                                 ORB_REPAIR_SAFE, &mesh),
                    ORB_OK);
   assert_int_equal(orb_mesh_copy(ctx, &mesh, &copy), ORB_OK);
   assert_memory_equal(copy.positions, mesh.positions, 12 * sizeof(double));

@@ -92,8 +92,8 @@ static int fits(const char *reason, const orb_error *e) {
   }
 }
 
-static orb_status mend(orb_context *ctx, const unsigned char *bytes, size_t size, unsigned repair, orb_mesh *mesh,
-                       orb_format *format) {
+static orb_status read_repaired(orb_context *ctx, const unsigned char *bytes, size_t size, unsigned repair,
+                                orb_mesh *mesh, orb_format *format) {
   orb_status status = orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, mesh, format);
   if (status == ORB_OK) {
     status = orb_mesh_repair(ctx, mesh, repair);
@@ -143,7 +143,7 @@ static void check_row(orb_context *ctx) {
   assert_int_equal(size, strtoul(bytes_column, NULL, 10));
   orb_mesh mesh;
   orb_format format;
-  orb_status status = mend(ctx, bytes, size, ORB_REPAIR_SAFE, &mesh, &format);
+  orb_status status = read_repaired(ctx, bytes, size, ORB_REPAIR_SAFE, &mesh, &format);
   if (strcmp(folder, "bad") == 0) {
     if (status == ORB_OK || !fits(reason, orb_context_error(ctx))) {
       fail_msg("%s: %s does not fit \"%s\"", name, orb_status_name(status), reason);
@@ -152,7 +152,7 @@ static void check_row(orb_context *ctx) {
     int largest = strcmp(fix, "largest") == 0;
     if (largest) {
       assert_int_equal(status, ORB_E_NOT_CONNECTED);
-      status = mend(ctx, bytes, size, ORB_REPAIR_LARGEST_COMPONENT, &mesh, &format);
+      status = read_repaired(ctx, bytes, size, ORB_REPAIR_LARGEST_COMPONENT, &mesh, &format);
     }
     if (status != ORB_OK) {
       fail_msg("%s: %s: %s", name, orb_status_name(status), orb_context_error(ctx)->detail);
@@ -169,9 +169,9 @@ static void check_row(orb_context *ctx) {
     assert_int_equal(shape_repaired(&mesh, "degenerate-faces"), strstr(fix, "drop200") ? 200 : 0);
     orb_mesh_free(ctx, &mesh);
     if (strcmp(folder, "weldable") == 0) {
-      assert_int_not_equal(mend(ctx, bytes, size, ORB_REPAIR_NONE, &mesh, &format), ORB_OK);
+      assert_int_not_equal(read_repaired(ctx, bytes, size, ORB_REPAIR_NONE, &mesh, &format), ORB_OK);
     } else if (format != ORB_FORMAT_STL) {
-      assert_int_equal(mend(ctx, bytes, size, ORB_REPAIR_NONE, &mesh, &format), ORB_OK);
+      assert_int_equal(read_repaired(ctx, bytes, size, ORB_REPAIR_NONE, &mesh, &format), ORB_OK);
       orb_mesh_free(ctx, &mesh);
     }
   }

@@ -27,8 +27,8 @@ static void turn(double *p, double angle) {
   p[1] = sin(angle) * x + cos(angle) * y;
 }
 
-/* A body turned by 170 degrees and shifted: at each t all edges have their length, and the angle grows evenly. */
-static void a_turned_body_stays_rigid(void **state) {
+/* A body rotated by 170 degrees and shifted: at each t all edges have their length, and the angle grows evenly. */
+static void a_rotated_body_stays_rigid(void **state) {
   orb_context *ctx = *state;
   orb_mesh ball = shape_ball(ctx, 3);
   int32_t n = ball.vertex_count;
@@ -175,7 +175,7 @@ static void in_betweens_have_tent_weights(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test_setup_teardown(a_turned_body_stays_rigid, setup, teardown),
+      cmocka_unit_test_setup_teardown(a_rotated_body_stays_rigid, setup, teardown),
       cmocka_unit_test_setup_teardown(a_bending_limb_keeps_its_length, setup, teardown),
       cmocka_unit_test_setup_teardown(in_betweens_have_tent_weights, setup, teardown),
   };

@@ -151,9 +151,9 @@ static double *normals_of(const orb_mesh *mesh) {
 }
 
 /* How many triangles of the supermesh face away from the shape's normals at their corners. */
-static int turned_on(const orb_supermesh *m, const orb_aligned_shape *shape, int s) {
+static int inverted_on(const orb_supermesh *m, const orb_aligned_shape *shape, int s) {
   double *positions = positions_of(m, shape, s), *normals = normals_of(&shape->mesh);
-  int turned = 0;
+  int inverted = 0;
   for (int32_t t = 0; t < m->triangle_count; t++) {
     const int32_t *c = m->triangles + 3 * t;
     double u[3], v[3], n[3], ground[3] = {0, 0, 0};
@@ -166,14 +166,14 @@ static int turned_on(const orb_supermesh *m, const orb_aligned_shape *shape, int
         ground[i % 3] += place->at[i / 3] * normals[3 * shape->mesh.triangles[3 * place->triangle + i / 3] + i % 3];
       }
     }
-    turned += orb_dot(n, ground) <= 0;
+    inverted += orb_dot(n, ground) <= 0;
   }
   free(positions);
   free(normals);
-  return turned;
+  return inverted;
 }
 
-/* Turns a ball about the axis in space, by `most` at the pole and the more the higher, and leaves the sphere's points:
+/* Rotates each point of a ball in space around the axis, by `most` times its height, and leaves the sphere's points:
  * a map to another ball then shears. */
 static void shear(const orb_aligned_shape *shape, double most) {
   for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
@@ -186,8 +186,8 @@ static void shear(const orb_aligned_shape *shape, double most) {
   }
 }
 
-/* No triangle of the supermesh may come out turned in space. */
-static void sheared_maps_turn_no_triangle(void **state) {
+/* No triangle of the supermesh may be inverted. */
+static void sheared_maps_invert_no_triangle(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(2);
   orb_aligned_shape shapes[2];
@@ -199,7 +199,7 @@ static void sheared_maps_turn_no_triangle(void **state) {
   sphere_assert_valid(&m, shapes, 2);
   assert_within(ctx, &m, shapes, 2, 0.002);
   for (int s = 0; s < 2; s++) {
-    assert_int_equal(turned_on(&m, &shapes[s], s), 0);
+    assert_int_equal(inverted_on(&m, &shapes[s], s), 0);
   }
   orb_supermesh_free(ctx, &m);
   sphere_shape_free(ctx, &shapes[0]);
@@ -207,8 +207,8 @@ static void sheared_maps_turn_no_triangle(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* Rough shapes under a map that shears: triangles turn wherever they are not small. What mends these may not cost the
- * tolerance. */
+/* Rough shapes under a map that shears: triangles are inverted wherever they are not small. Repairing these must keep
+ * the tolerance. */
 static void sheared_maps_keep_the_tolerance(void **state) {
   (void)state;
   for (unsigned seed = 1; seed <= 6; seed++) {
@@ -310,8 +310,8 @@ static void wind_points(const orb_aligned_shape *shape, double turns) {
   }
 }
 
-/* So wound that the overlay has more than twenty times the triangles of both: they are reduced before they are laid
- * over each other, and the bound holds against the shapes themselves. */
+/* The map is wound so much that the overlay has more than twenty times the triangles of both shapes: they are reduced
+ * before they are overlaid, and the bound holds against the shapes themselves. */
 static void huge_overlays_are_not_needed(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(2);
@@ -572,7 +572,7 @@ int main(void) {
       cmocka_unit_test(coincidences_are_handled),
       cmocka_unit_test(unlike_densities),
       cmocka_unit_test(far_unlike_densities),
-      cmocka_unit_test(sheared_maps_turn_no_triangle),
+      cmocka_unit_test(sheared_maps_invert_no_triangle),
       cmocka_unit_test(sheared_maps_keep_the_tolerance),
       cmocka_unit_test(flattened_belts_do_not_creep),
       cmocka_unit_test(wound_maps_keep_the_tolerance),

@@ -339,7 +339,7 @@ export type Supermesh = {
     /** An index into shapes. */
     b: number;
     distortion: Distortion;
-    /** The share of the supermesh's triangles that are inverted on either shape: turned against the smooth normals of the surface at their corners and its face at their centre. */
+    /** The share of the supermesh's triangles that are inverted on either shape: they face away from the smooth normals of the surface at their corners and from its face at their centre. */
     inverted_fraction: number | null;
   }>;
   /** The energy of the alignment; null if it was not measured. */

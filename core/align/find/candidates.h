@@ -8,6 +8,9 @@
  *   tip_rotations.h  tip maps by rotations in space
  *   candidates.h     candidates are tried on coarse copies and ranked by the energy of their composed maps
  *   found.h          the landmarks that an alignment found, and their confidence
+ *
+ * Thresholds are constants at the head of each .c file. auto.c decides by the energy of the first map whether to search
+ * (near_isometry and others in map/engine/params.h).
  */
 #ifndef ORB_ALIGN_FIND_CANDIDATES_H
 #define ORB_ALIGN_FIND_CANDIDATES_H

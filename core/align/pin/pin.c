@@ -115,8 +115,8 @@ static orb_status refuse(orb_context *ctx, const orb_sheet *sheets, int32_t shap
     most = held ? most : middle;
   }
   orb_status status = orb_fail(ctx, ORB_E_BAD_LANDMARKS,
-                               "Landmark %d cannot be met on shape %d together with the ones before it: the surface "
-                               "would have to be wound too tightly. Drop or move it.",
+                               "Landmark %d cannot be met on shape %d together with the landmarks before it: the map "
+                               "would have to wind around them too tightly. Move it or remove it.",
                                landmarks[most - 1], shape);
   orb_error *error = orb_context_error_edit(ctx);
   error->shape = shape;

@@ -14,19 +14,19 @@ typedef enum orb_align_method { ORB_ALIGN_PIN = 0, ORB_ALIGN_RBF, ORB_ALIGN_ROTA
 typedef struct orb_landmark {
   char name[ORB_NAME_MAX];
   const orb_place *at; /* shape_count places, on the meshes given to orb_align() */
-  int32_t pass;        /* rbf: order in which landmarks meet: first 0, the major ones, then 1, … */
-  double radius;       /* rbf: of its influence, a chord of the unit sphere; 0: the default */
-  double confidence;   /* of a found landmark, 0 to 1; 1 of a given one */
+  int32_t pass;        /* rbf: landmarks of pass 0, the major ones, meet first, then those of pass 1, … */
+  double radius;       /* rbf: radius of its influence, as a chord of the unit sphere; 0: rbf_radius */
+  double confidence;   /* of a found landmark, 0 to 1; 1 for a given one */
 } orb_landmark;
 
 typedef struct orb_align_options {
   orb_align_method method;
   orb_preset preset; /* fast: no composed map */
-  int32_t rbf_steps; /* of each pass; 10 */
-  int32_t one_way;   /* rbf: move the later shapes only (Peng & Timalsena 2016, Fig. 9) */
-  double rbf_radius; /* of all landmarks without a radius; 0: 1.0 */
-  double max_growth; /* pin: triangles that splits may add to a mesh before landmarks are refused, relative to its own
-                        number (to 2000 if it has fewer), and at most 800000; 0: 64 */
+  int32_t rbf_steps; /* steps of each pass; 10 */
+  int32_t one_way;   /* rbf: move only the later shapes (Peng & Timalsena 2016, Fig. 9) */
+  double rbf_radius; /* radius of landmarks that have none; 0: 1.0 */
+  double max_growth; /* pin: how many triangles splits may add to a mesh, as a multiple of its own number (of 2000 if it
+                        has fewer), and at most 800000. Landmarks that need more are refused. 0: 64 */
 } orb_align_options;
 
 typedef struct orb_align_shape {
@@ -55,9 +55,9 @@ typedef struct orb_alignment {
   int32_t found_count;
   orb_place *found;     /* found_count × shape_count places, on the given meshes */
   double *found_points; /* found_count × 3: their common points on the aligned sphere */
-  double *confidence; /* found_count, 0 to 1: 1 where the map nearby is rigid up to one scale for all; less the more it
-                         stretches; and less for all if another candidate is nearly as good. It does not say whether
-                         the right parts were matched */
+  double *confidence; /* found_count, 0 to 1. 1: the map nearby is rigid, up to one scale for the whole shape; it falls
+                         with the distortion of the map nearby, and falls for all found landmarks if another candidate
+                         is nearly as good. It does not say whether the right parts were matched */
   double energy;      /* symmetric Dirichlet energy of the composed maps, capped for each triangle and weighted by area;
                          lower is better; NaN if not measured */
 } orb_alignment;

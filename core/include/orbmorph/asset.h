@@ -18,7 +18,7 @@ typedef struct orb_asset_options {
   orb_fit fit;
   orb_path path;
   int32_t path_steps; /* for ORB_PATH_RIGID: in-between targets for each pair of neighbours, 3 */
-  int colors;         /* also write the later shapes' colours, as morphed attributes; 0 */
+  int colors;         /* also write the colours of the later shapes, as morphed attributes; 0 */
 } orb_asset_options;
 ORB_API void orb_asset_defaults(orb_asset_options *options);
 
@@ -36,14 +36,13 @@ typedef struct orb_asset_facts {
  * The base is the first shape; the targets are the later shapes in their order, then the in-betweens. facts may be
  * NULL.
  *
- * Normals: those of the file if it has any, with its hard edges kept by splitting vertices; else angle-weighted vertex
+ * Normals: those of the file if it has any; vertices are split to keep its hard edges. Otherwise angle-weighted vertex
  * normals of the input surface, interpolated at each place. The copies of a split vertex have bit-equal POSITION and
  * deltas. Texture coordinates, materials and their images are those of the first shape.
  *
- * Two supermesh vertices that would coincide in every shape after rounding to float32 are kept distinct: the later one
- * that is no landmark moves on the first shape by the fewest units in the last place of its largest coordinates, at
- * most
- * 16. ORB_E_NOT_CERTIFIED where that does not suffice.
+ * Two supermesh vertices that would coincide in every shape after rounding to float32 are kept distinct: the one that
+ * is not a landmark, or else the one with the higher number, moves on the first shape by the fewest units in the last
+ * place of its largest coordinates, at most 16. ORB_E_NOT_CERTIFIED if that does not suffice.
  *
  * Errors: ORB_E_BAD_OPTION, ORB_E_TOO_LARGE (4 GiB), ORB_E_NO_MEMORY. Stage "write". O(V·N). */
 ORB_API ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh,

@@ -1,8 +1,9 @@
 /* The context of a long call: memory budget, threads, progress, cancellation, and the error with its details.
  *
  * One context serves one job. Calls with the same context must not run at the same time, except those marked
- * "any thread". The library never prints, never exits, and reads neither the environment nor a global. Results belong
- * to the context that made them: free them with it, before it.
+ * "any thread". The library does not print, does not exit, and reads neither the environment nor global variables; only
+ * a broken invariant inside it ends the process, with a message on standard error and abort(). Results belong to the
+ * context that made them: free them with that context, before you destroy it.
  */
 #ifndef ORBMORPH_CONTEXT_H
 #define ORBMORPH_CONTEXT_H
@@ -45,8 +46,8 @@ typedef struct orb_error {
  * context may call it, but never two at a time; it must return at once. */
 typedef void (*orb_progress_fn)(void *user, const char *stage, double fraction);
 
-/* Where memory comes from; both NULL: malloc and free. For tests that fail the n-th allocation. Called from any thread.
- */
+/* Where memory comes from; both NULL: malloc() and free(). Tests use it to fail the n-th allocation. Any thread of the
+ * context may call it. */
 typedef struct orb_allocator {
   void *(*alloc)(void *user, size_t size);
   void (*free)(void *user, void *block);
@@ -58,22 +59,23 @@ typedef enum orb_cpu { ORB_CPU_AUTO = 0, ORB_CPU_PLAIN, ORB_CPU_AVX2, ORB_CPU_AV
 
 typedef struct orb_context_options {
   size_t memory_limit;      /* bytes allocated at one time; 0: no limit */
-  int threads;              /* with the caller, at most 64; 0: those of the machine */
-  int64_t deadline_ms;      /* orb_clock_ms() after which calls end with ORB_E_TIMEOUT; 0: none */
+  int threads;              /* including the caller's, at most 64; 0: one for each processor */
+  int64_t deadline_ms;      /* once orb_clock_ms() is past it, calls return ORB_E_TIMEOUT; 0: none */
   int64_t max_triangles;    /* refuse larger meshes; 0: 5 million */
   orb_progress_fn progress; /* NULL: none */
   void *progress_user;
   orb_allocator allocator;
-  orb_cpu cpu; /* for measurements and tests; between values the last bits of results may differ */
+  orb_cpu cpu; /* for measurements and tests; the last bits of results may differ from value to value */
 } orb_context_options;
 
 /* Makes a context; options NULL: all defaults. Threads start with the first parallel loop. ORB_E_NO_MEMORY. */
 ORB_API ORB_MUST_CHECK orb_status orb_context_create(const orb_context_options *options, orb_context **out);
 
-/* Joins the threads and frees the context. NULL is fine. Asserts that everything it allocated has been freed. */
+/* Joins the threads and frees the context. NULL is fine. Ends the process with a message if a block of the context has
+ * not been freed. */
 ORB_API void orb_context_destroy(orb_context *ctx);
 
-/* Makes running and later calls end with ORB_E_CANCELLED, within 100 ms. Any thread. */
+/* Makes running and later calls return ORB_E_CANCELLED, within 100 ms. Any thread. */
 ORB_API void orb_context_cancel(orb_context *ctx);
 
 /* ORB_OK, ORB_E_CANCELLED or ORB_E_TIMEOUT, with the error set. Cheap: long loops call it often. Any thread. */
@@ -91,7 +93,7 @@ ORB_API void orb_free(orb_context *ctx, void *block); /* NULL is fine */
 ORB_API size_t orb_memory_used(const orb_context *ctx);
 ORB_API size_t orb_memory_peak(const orb_context *ctx);
 
-/* How many threads loops run on, with the caller. */
+/* The number of threads that loops run on, including the caller's. */
 ORB_API int orb_threads(const orb_context *ctx);
 
 /* The vector instructions in use: never ORB_CPU_AUTO. */
@@ -101,8 +103,9 @@ ORB_API orb_cpu orb_context_cpu(const orb_context *ctx);
 ORB_API int64_t orb_clock_ms(void);
 ORB_API double orb_clock(void);
 
-/* A growing buffer of bytes with a hard maximum: what writers such as orb_asset_write() append to. Callers append their
- * own bytes, for example a file that they read in parts, under the same budget. Zero-initialise all but `max`. */
+/* A growing buffer of bytes with a hard maximum, to which writers such as orb_asset_write() append. Callers can append
+ * bytes of their own, for example a file that they read in parts, under the same budget. Zero-initialise all but `max`.
+ */
 typedef struct orb_buffer {
   unsigned char *data;
   size_t size, capacity;

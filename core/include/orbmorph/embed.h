@@ -19,9 +19,9 @@ typedef struct orb_certificate {
 
 /* Certifies points (3 a vertex, unit up to rounding) of a closed triangle list. Orientation by a static filter, then
  * exact integers; degree by counting, with signs, the triangles that cover a direction in general position, all decided
- * by exact orientations. (The sum of solid angles / 4π is the same number, but only up to rounding.) Points that are
- * not finite make every triangle at them degenerate. Fails only without memory or when cancelled: the result is in
- * out->valid. O(F). */
+ * by exact orientations. (The sum of solid angles / 4π is the same number, but only up to rounding.) Every triangle at
+ * a point that is not finite counts as degenerate. The result is in out->valid; the call itself fails only if memory
+ * runs out or it is cancelled. O(F). */
 ORB_API ORB_MUST_CHECK orb_status orb_certify(orb_context *ctx, const double *points, int32_t vertex_count,
                                               const int32_t *triangles, int32_t triangle_count, orb_certificate *out);
 
@@ -33,9 +33,9 @@ typedef struct orb_measure {
   double counts[ORB_HISTOGRAM_BINS]; /* triangles in each bin */
 } orb_measure;
 
-/* How a map distorts, with both areas scaled to be equal, the flat chord triangle as the image of a triangle, and σ₁ ≥
- * σ₂ its singular values. Source triangles of zero area (to rounding: |U×W| ≤ 1e-13 (U² + W²)) have no weight; if all
- * are such, every number is 0. */
+/* How a map distorts triangles, after both surfaces are scaled to the same area. The image of a triangle is the flat
+ * triangle between the images of its corners; σ₁ ≥ σ₂ are the singular values of the map onto it. Source triangles of
+ * zero area (to rounding: |U×W| ≤ 1e-13 (U² + W²)) have no weight; if no other exists, every number is 0. */
 typedef struct orb_distortion {
   orb_measure symmetric_dirichlet; /* ¼(σ₁²+σ₁⁻²+σ₂²+σ₂⁻²), 1 = isometric */
   orb_measure angle;               /* σ₁/σ₂ */
@@ -65,13 +65,13 @@ typedef struct orb_embed_options {
   double displacement_threshold; /* of Algorithm 1, 1e-6 */
   int32_t max_iterations;        /* of Algorithm 1 */
   int32_t first_optimization;    /* vertices inserted before the first global optimisation, 25 */
-  double growth;                 /* of that number after each, 1.25 */
-  int32_t qem_until;             /* QEM down to this many vertices, then Eq. 1 (section 9.2) */
+  double growth;                 /* factor of that number after each global optimisation, 1.25 */
+  int32_t qem_until;             /* simplify by QEM down to this many vertices, then by Eq. 1 (section 9.2) */
 } orb_embed_options;
 ORB_API void orb_embed_defaults(orb_embed_options *options);
 
 typedef struct orb_embed_timings {
-  double check, simplify, embed, certify, total; /* seconds; check is 0 here: the caller measures orb_mesh_repair() */
+  double check, simplify, embed, certify, total; /* seconds; check is 0: the caller measures orb_mesh_repair() */
 } orb_embed_timings;
 
 typedef struct orb_embedding {
@@ -83,13 +83,13 @@ typedef struct orb_embedding {
 } orb_embedding;
 
 /* Embeds a mesh that orb_mesh_repair() accepted. The result is certified; otherwise the call returns
- * ORB_E_NOT_CERTIFIED and no embedding. newton takes any valence. kernel-sampling has no limit on it either, but around
- * poles of some hundreds of triangles a kernel may get too narrow for doubles: after three bounded attempts it fails
- * with ORB_E_NOT_CERTIFIED and recommends newton (two poles of valence 200 with one ring between them embed; with five
- * rings between them, or of valence 2,000, they fail within seconds). Same bytes for any number of threads on one
- * machine; between instruction sets (AVX-512, AVX2, none: chosen at run time) the last bits may differ. Stages:
- * "simplify", "embed", "certify". O(n log n) time, at most 250 bytes a triangle beside the mesh. docs/method.md
- * describes the method. */
+ * ORB_E_NOT_CERTIFIED and no embedding. newton takes vertices of any valence. kernel-sampling has no limit on valence
+ * either, but near vertices with several hundred triangles a kernel may become too narrow for doubles: after three
+ * bounded attempts the call fails with ORB_E_NOT_CERTIFIED and recommends newton. (A mesh with two vertices of valence
+ * 200 and one ring between them embeds; with five rings, or valence 2,000, it fails within seconds.) The result has the
+ * same bytes for any number of threads on one machine; its last bits may depend on the instruction set (AVX-512, AVX2
+ * or neither), which is chosen at run time. Stages: "simplify", "embed", "certify". O(n log n) time, at most 250 bytes
+ * a triangle beside the mesh. docs/method.md describes the method. */
 ORB_API ORB_MUST_CHECK orb_status orb_embed(orb_context *ctx, const orb_mesh *mesh, const orb_embed_options *options,
                                             orb_embedding *out);
 ORB_API void orb_embedding_free(orb_context *ctx, orb_embedding *embedding);

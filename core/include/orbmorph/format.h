@@ -1,7 +1,7 @@
 /* Mesh files: reading OBJ, OFF, PLY, STL and glTF/GLB from memory, and writing the binary sphere PLY.
  *
- * The content decides the format, never a name. Readers are linear in the size of the file, trust no count of a header
- * before the bytes are there, and allocate at most a small multiple of the file's size.
+ * The content decides the format; a file name plays no part. Readers are linear in the size of the file, trust no count
+ * of a header before the bytes are there, and allocate at most a small multiple of the file's size.
  */
 #ifndef ORBMORPH_FORMAT_H
 #define ORBMORPH_FORMAT_H
@@ -31,9 +31,9 @@ ORB_API orb_format orb_format_of_name(const char *name);
 ORB_API orb_format orb_format_detect(const unsigned char *bytes, size_t size);
 
 /* Reads a mesh as it is in the file: polygons are cut into triangles, nothing else is repaired (see orb_mesh_repair()).
- * format AUTO: detected; *format_out (may be NULL): the format that was read. Errors: ORB_E_UNKNOWN_FORMAT,
- * ORB_E_MALFORMED_MESH with line or offset, ORB_E_NOT_FINITE (also beyond ORB_COORDINATE_MAX), ORB_E_TOO_LARGE,
- * ORB_E_NO_MEMORY. */
+ * format AUTO detects the format. *format_out (may be NULL) receives the format that was read. Errors:
+ * ORB_E_UNKNOWN_FORMAT, ORB_E_MALFORMED_MESH with line or offset, ORB_E_NOT_FINITE (also beyond ORB_COORDINATE_MAX),
+ * ORB_E_TOO_LARGE, ORB_E_NO_MEMORY. */
 ORB_API ORB_MUST_CHECK orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t size,
                                                 orb_format format, orb_mesh *out, orb_format *format_out);
 

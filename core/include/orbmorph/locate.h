@@ -8,13 +8,13 @@
 extern "C" {
 #endif
 
-/* Borrows the arrays that it is created with. Any thread may query it. */
+/* Borrows the arrays passed to orb_locator_create(). Any thread may query it. */
 typedef struct orb_locator orb_locator;
 
 ORB_API ORB_MUST_CHECK orb_status orb_locator_create(orb_context *ctx, const double *points, int32_t vertex_count,
                                                      const int32_t *triangles, int32_t triangle_count,
                                                      const int32_t *twin,
-                                                     orb_locator **out); /* twin may be NULL: computed here */
+                                                     orb_locator **out); /* twin NULL: computed here */
 
 ORB_API void orb_locator_destroy(orb_context *ctx, orb_locator *locator);
 

@@ -20,13 +20,13 @@ typedef struct orb_merge_timings {
   double align, remesh, transfer, write, total; /* seconds */
 } orb_merge_timings;
 
-/* Distortion of the composed map from shape a to shape b, a < b, on the supermesh's triangles that are no slivers on
- * either (height at least about a ninetieth of the longest side). Up to four shapes: all pairs; more: neighbours in
- * their order. */
+/* Distortion of the composed map from shape a to shape b, a < b. It leaves out the triangles of the supermesh that are
+ * slivers on a or b (height below about a ninetieth of the longest side), unless nearly all are. There is a report for
+ * each pair of up to four shapes; for more shapes, for each pair of neighbours in their order. */
 typedef struct orb_pair_report {
   int32_t a, b;
-  /* Its means are unbounded: a single triangle that collapses at one end only can dominate them. median and p99 are
-   * robust, and orb_alignment.energy is the mean with each triangle's value capped. */
+  /* Its means are unbounded: a single triangle that collapses on one of the shapes can dominate them. median and p99
+   * are robust, and orb_alignment.energy is the mean with each triangle's value capped. */
   orb_distortion distortion;
   /* Share of the triangles that are inverted on a or b: they face away from the input's smooth normals at their corners
    * and from its face at their centre. Degenerate ones (twice the area at most 1e-12 of the squared
@@ -39,10 +39,11 @@ typedef struct orb_merge_result {
   orb_supermesh supermesh;
   orb_shape_report *shapes; /* shape_count */
   /* landmark_count × shape_count: distance from the requested place to the landmark's supermesh vertex, in units of
-   * the shape's diagonal. For a landmark without a vertex, the distance to the place of its point of the sphere. */
+   * the shape's diagonal. For a landmark without a vertex, the distance to the shape's place at the mean of the
+   * landmark's points on the sphere. */
   double *landmark_residuals;
-  /* found_count × shape_count: the same for the landmarks that an alignment without landmarks found, measured to where
-   * the supermesh has their point of the sphere. */
+  /* found_count × shape_count: the same for found landmarks, measured to the position of the supermesh at their point
+   * of the sphere. */
   double *found_residuals;
   int32_t pair_count;
   orb_pair_report *pairs;
@@ -53,10 +54,10 @@ typedef struct orb_merge_result {
   orb_merge_timings timings;
 } orb_merge_result;
 
-/* Merges shape_count ≥ 2 embedded shapes. Stages: "align", "remesh", "transfer", "write". Landmark `at` arrays: see
- * orb_align(). names: shape_count names for the morph targets. Errors: those of its parts, and ORB_E_DEGENERATE for a
- * shape too small to show in float32, such as one whose vertices all coincide. On an error *out is zeroed; else free it
- * with orb_merge_result_free(). */
+/* Merges shape_count ≥ 2 embedded shapes. Stages: "align", "remesh", "transfer", "write". landmarks: as for
+ * orb_align(). names: as for orb_asset_write(). Errors: those of its parts, and ORB_E_DEGENERATE for a shape too small
+ * to show in float32, such as one whose vertices all coincide. On an error *out is zeroed; otherwise free it with
+ * orb_merge_result_free(). */
 ORB_API ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
                                             int32_t shape_count, const orb_landmark *landmarks, int32_t landmark_count,
                                             const orb_merge_options *options, orb_merge_result *out);

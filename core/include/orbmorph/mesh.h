@@ -87,7 +87,7 @@ typedef struct orb_topology {
   int orientable; /* a consistent facing exists */
 } orb_topology;
 
-/* Measures any index list: it need not be a surface. O(V + F) expected. */
+/* Measures any list of triangles, even if it is not a surface. O(V + F) expected. */
 ORB_API ORB_MUST_CHECK orb_status orb_mesh_topology(orb_context *ctx, const orb_mesh *mesh, orb_topology *out);
 
 /* Limits of coordinates: their largest magnitude; the least diagonal of the bounding box; and the least diagonal as a
@@ -101,14 +101,14 @@ enum {
   ORB_REPAIR_NONE = 0,
   ORB_REPAIR_SAFE = 1,              /* only what is needed and changes no shape; each repair is counted */
   ORB_REPAIR_FILL_HOLES = 2,        /* implies safe */
-  ORB_REPAIR_LARGEST_COMPONENT = 4, /* implies safe; keeps the piece with most triangles */
+  ORB_REPAIR_LARGEST_COMPONENT = 4, /* implies safe; keeps the piece with the most triangles */
 };
 
 /* Prepares a mesh for embedding, in place, or reports why it cannot be embedded. Afterwards it is closed, manifold,
  * oriented outward, connected, of genus zero, has four triangles or more, and a size and position that float32 can hold
- * (otherwise ORB_E_DEGENERATE, see ORB_DIAGONAL_MIN). With ORB_REPAIR_NONE the only change is that a mesh that is
- * wholly inside-out is reversed. On failure the mesh is unspecified but can be freed, and the error carries the facts
- * (edges and vertices in the file's numbers). O(V + F) expected. */
+ * (otherwise ORB_E_DEGENERATE, see ORB_DIAGONAL_MIN). With ORB_REPAIR_NONE the only change is to reverse a
+ * mesh that is wholly inside out. On failure the contents of the mesh are unspecified but can be freed, and the error
+ * has the facts (edges and vertices in the file's numbers). O(V + F) expected. */
 ORB_API ORB_MUST_CHECK orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair);
 
 /* Fills twin[h] for each of the 3·triangle_count half-edges of a closed oriented manifold; ORB_E_INTERNAL if the list
@@ -142,8 +142,8 @@ ORB_API ORB_MUST_CHECK orb_status orb_nearest_create(orb_context *ctx, const dou
                                                      const int32_t *triangles, int32_t triangle_count,
                                                      orb_nearest **out);
 ORB_API void orb_nearest_destroy(orb_context *ctx, orb_nearest *tree);
-/* The nearest place to p, closer than max_distance2 (INFINITY: no bound); returns the squared distance, INFINITY and
- * triangle −1 if none is closer. Ties go to the lowest triangle number. */
+/* Finds the nearest place whose squared distance to p is below max_distance2 (INFINITY: no bound). Returns that squared
+ * distance; INFINITY, with triangle −1, if there is no such place. Ties go to the lowest triangle number. */
 ORB_API double orb_nearest_query(const orb_nearest *tree, const double p[3], double max_distance2, orb_place *out);
 
 #ifdef __cplusplus

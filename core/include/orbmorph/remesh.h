@@ -15,20 +15,20 @@ extern "C" {
 typedef enum orb_remesh_method { ORB_REMESH_METHODS(ORB_REMESH_ENUMERATOR) ORB_REMESH_METHOD_COUNT } orb_remesh_method;
 #undef ORB_REMESH_ENUMERATOR
 
-/* The method's name, such as "convex-hull"; NULL for a number that is no method. */
+/* The method's name, such as "convex-hull"; NULL if the number is not a method. */
 ORB_API const char *orb_remesh_method_name(orb_remesh_method method);
-/* Finds the method of a name. Returns 0, and leaves *out, where there is none. */
+/* Finds the method of a name. Returns 0, and leaves *out unchanged, if there is none. */
 ORB_API int orb_remesh_method_of_name(const char *name, orb_remesh_method *out);
-/* Whether this build has the method; orb_remesh() returns ORB_E_UNSUPPORTED for one that it has not. */
+/* Whether this build has the method; if not, orb_remesh() returns ORB_E_UNSUPPORTED. */
 ORB_API int orb_remesh_available(orb_remesh_method method);
-/* Which options the method heeds, as a sum of the bits; it ignores the others. */
+/* The options that the method uses, as a sum of these bits; it ignores the others. */
 enum { ORB_REMESH_HEEDS_TOLERANCE = 1, ORB_REMESH_HEEDS_MAX_TRIANGLES = 2 };
 ORB_API unsigned orb_remesh_heeds(orb_remesh_method method);
 
 typedef struct orb_remesh_options {
   orb_remesh_method method; /* adaptive */
-  /* Position error relative to each shape's diagonal, 0.001. Always met, by construction, up to rounding (1e-12),
-   * unless max_triangles is too small for it. */
+  /* Largest position error, relative to each shape's diagonal; 0.001. Every method that uses it keeps it, up to
+   * rounding (1e-12), unless max_triangles is too small for that. */
   double tolerance;
   int64_t max_triangles; /* 0: no limit. Takes precedence over the tolerance. */
 } orb_remesh_options;
@@ -46,12 +46,12 @@ typedef struct orb_supermesh {
   int32_t degree;             /* 1 */
 } orb_supermesh;
 
-/* Makes one supermesh for all aligned shapes. Their meshes and points are certified, and the points of landmark
- * vertices to be kept are equal bit for bit. A place is exactly a corner where a supermesh vertex is a vertex of the
- * shape. Overlay, subdivision and convex-hull keep all input vertices, adaptive keeps the landmarks. Convex-hull is the
- * baseline of Peng & Timalsena 2016, Fig. 11: the Delaunay triangulation of all vertices, at most 4 million; its error
- * is proved but not controlled. options NULL: defaults. Errors: ORB_E_BAD_OPTION, ORB_E_UNSUPPORTED, ORB_E_TOO_LARGE,
- * ORB_E_NOT_CERTIFIED. Stage "remesh". */
+/* Makes one supermesh for all aligned shapes, whose meshes and points must be certified; landmark vertices that it is
+ * to keep must have bit-equal points on all shapes. Where a supermesh vertex is a vertex of a shape, its place is
+ * exactly that corner. overlay, subdivision and convex-hull keep all input vertices; adaptive keeps the landmarks.
+ * convex-hull is the baseline of Peng & Timalsena 2016, Fig. 11: the Delaunay triangulation of all vertices, at most 4
+ * million; its error is proved but not controlled. options NULL: defaults. Errors: ORB_E_BAD_OPTION, ORB_E_UNSUPPORTED,
+ * ORB_E_TOO_LARGE, ORB_E_NOT_CERTIFIED. Stage "remesh". */
 ORB_API ORB_MUST_CHECK orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
                                              int32_t landmark_count, const orb_remesh_options *options,
                                              orb_supermesh *out);

@@ -10,7 +10,7 @@
 extern "C" {
 #endif
 
-/* Marks the functions of the library; a shared one exports no others. A program that links the static library on
+/* Marks the functions of the library; the shared library exports no others. A program that links the static library on
  * Windows defines ORB_STATIC. ORB_BUILD is defined while the library itself is compiled. */
 #if defined(_WIN32)
 #if defined(ORB_STATIC)
@@ -34,7 +34,7 @@ extern "C" {
 #define ORB_PRINTF(fmt, args)
 #endif
 
-/* The engine's version; part of the identity of each derived object. */
+/* The version of the algorithms; part of the key of each derived object. */
 #define ORB_ENGINE "orbmorph 1.0.0"
 
 typedef enum orb_status {
@@ -46,7 +46,7 @@ typedef enum orb_status {
   /* The surface. */
   ORB_E_NOT_FINITE,     /* NaN or infinite coordinate, or one too large */
   ORB_E_NOT_CLOSED,     /* boundary edges */
-  ORB_E_NOT_MANIFOLD,   /* an edge of three faces, or a vertex of two fans */
+  ORB_E_NOT_MANIFOLD,   /* an edge with more than two faces, or a vertex with more than one fan */
   ORB_E_NOT_ORIENTABLE, /* no consistent facing exists (or, without repairs, none is given) */
   ORB_E_NOT_CONNECTED,  /* several pieces */
   ORB_E_NOT_GENUS_ZERO, /* handles */

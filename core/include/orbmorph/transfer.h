@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-/* The shape's positions at `count` places on it: 3 a place. */
+/* The positions of `count` places of the shape: 3 a place. */
 ORB_API ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const orb_aligned_shape *shape,
                                                          const orb_place *places, int32_t count, double *out);
 

@@ -9,7 +9,7 @@ extern "C" {
 #endif
 
 /* The length in bytes of the character at p; 0 if there is no valid one. Reads at most `most` (≥ 1) bytes. In a text
- * that ends with NUL `most` may be 4: NUL never continues a character, and is itself one of one byte. */
+ * that ends with NUL, `most` may be 4: NUL never continues a character, and is itself a character of one byte. */
 static inline size_t orb_utf8_length(const unsigned char *p, size_t most) {
   unsigned char c = p[0];
   size_t n = c < 0x80 ? 1 : c < 0xc2 ? 0 : c < 0xe0 ? 2 : c < 0xf0 ? 3 : c < 0xf5 ? 4 : 0;

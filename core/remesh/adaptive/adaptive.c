@@ -1,10 +1,10 @@
 /* The adaptive method: as few triangles as keep every shape within the tolerance, the bound proved (placed/bound.h).
  *
  * The start holds every vertex of every shape. Edges that deviate are flipped or split until the bound holds. Where
- * that does not end, the method starts from the overlay of all shapes instead, which is exact. Where the shapes are
- * wound about each other so much that the overlay is huge, it starts from the overlay of reduced shapes (start.h), and
- * only collapses and flips edges: what meets the tolerance there has many times the triangles of the shapes in any
- * case, and the other steps would take minutes for a few per cent.
+ * that does not end, the method starts from the overlay of all shapes instead, which is exact. Where the map is wound
+ * so much that the overlay is huge, the method starts from the overlay of reduced shapes (start.h), and only collapses
+ * and flips edges: such a supermesh needs many times the triangles of the shapes in any case, and the other steps would
+ * take minutes to save a few per cent.
  *
  * From then on no step leaves the tolerance, and none leaves more inverted triangles than it found. Each round
  * collapses edges, fills holes anew, merges neighbours, flips edges for well-shaped triangles, and moves vertices to
@@ -37,9 +37,8 @@ enum { REFINEMENTS_MOST = 32 }; /* after so many the net counts as one that refi
 enum { FEW = 3000, SOME = 1000, MANY = 100 };
 /* Shapes times triangles up to which a second start, from the overlay, is affordable. */
 enum { OVERLAY_MOST = 120000 };
-/* The overlay is huge, and the shapes are wound about each other, if it has more than HUGE_OVERLAY triangles and more
- * than HUGE_GROWTH times those of all shapes for each shape after the first. Well aligned shapes have four or five
- * times theirs for each. */
+/* The overlay is huge, and the map is wound, if it has more than HUGE_OVERLAY triangles and more than HUGE_GROWTH times
+ * those of all shapes for each shape after the first. Well aligned shapes have four or five times theirs for each. */
 enum { HUGE_OVERLAY = 600000, HUGE_GROWTH = 12 };
 /* Relative to the diagonal: from this tolerance on, fewer triangles matter more than inverted ones and slivers. */
 static const double STRICT_MOST = 0.05;
@@ -141,7 +140,7 @@ static orb_status reduce_inverted(orb_context *ctx, const orb_remesh_job *job, o
   return status == ORB_OK ? begin(ctx, placed, tolerance * tolerance) : status;
 }
 
-/* For shapes that are wound about each other: all steps, to a net within the tolerance. */
+/* For a map that is wound: all steps, to a net within the tolerance. */
 static orb_status remesh_wound(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_placed_net *placed) {
   double limit2 = tolerance * tolerance;
   ORB_TRY(orb_adaptive_start_from_reduced(ctx, job, limit2, placed));

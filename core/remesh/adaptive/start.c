@@ -1,10 +1,10 @@
 /* Starts from the overlay of the shapes, for maps along which edge splits would creep without end.
  *
- * Where shapes are wound about each other, as by landmarks that lie in another order on each, the overlay has a hundred
- * times their triangles, most of them far smaller than the tolerance requires. Each shape is then first reduced alone,
- * within the tolerance, and the reduced shapes are overlaid: the number of crossings falls with the number of edges of
- * both. The result is linear on both reduced shapes, so few of its edges deviate from the original shapes; these are
- * split. What is proved is always the distance from the original shapes. */
+ * Where the map is wound, for example by landmarks that lie in another order on each shape, the overlay has a hundred
+ * times the triangles of the shapes, most of them far smaller than the tolerance requires. Each shape is then first
+ * reduced alone, within the tolerance, and the reduced shapes are overlaid: the number of crossings falls with the
+ * number of edges of both. The result is linear on both reduced shapes, so few of its edges deviate from the original
+ * shapes; these are split. What is proved is always the distance from the original shapes. */
 #include "remesh/adaptive/start.h"
 
 #include <math.h>

@@ -93,7 +93,7 @@ export function soup({ positions, triangles }) {
   };
 }
 
-export const turned = ({ positions, triangles }, which = () => true) => ({
+export const reversed = ({ positions, triangles }, which = () => true) => ({
   positions,
   triangles: triangles.map((t, i) => (which(i) ? [t[0], t[2], t[1]] : t)),
 });

@@ -48,7 +48,7 @@ export function coversOnce({ vertices, triangles }, what) {
   let angle = 0;
   for (const [a, b, c] of triangles) {
     const [p, q, r] = [vertices[a].on, vertices[b].on, vertices[c].on];
-    assert.ok(determinant(p, q, r) > 0, `${what}: a triangle is turned over`);
+    assert.ok(determinant(p, q, r) > 0, `${what}: a triangle is flipped`);
     angle += solidAngle(p, q, r);
   }
   assert.ok(Math.abs(angle - 4 * Math.PI) < 1e-6, `${what}: it covers the sphere once`);
