@@ -66,9 +66,6 @@ static const struct entry *find(const char *name) {
 int api_problem_status(const char *name) {
   return find(name)->status;
 }
-const char *api_problem_title(const char *name) {
-  return find(name)->title;
-}
 
 void api_problem_free(api_problem *problem) {
   api_text_free(&problem->facts);

@@ -13,7 +13,6 @@ typedef struct api_problem {
 } api_problem;
 
 int api_problem_status(const char *name);
-const char *api_problem_title(const char *name);
 void api_problem_free(api_problem *problem);
 
 /* Frees *problem, fills it and returns 0, so that a parser can `return api_refuse(…)`. */

@@ -26,8 +26,8 @@ enum { GRAIN = 256 };  /* triangles a thread takes at a time; the sums, and so t
 enum { BINS = 18000 }; /* of the histogram of angles: a hundredth of a degree each */
 static const double DEGREE = 180 / 3.14159265358979323846;
 static const double SETTLED = 1e-13; /* relative to the diagonal */
-static const double EXACT =
-    1e-6; /* relative to the square of that: a search for a nearer triangle would not change the result */
+/* Relative to the square of SETTLED: a search for a nearer triangle would not change the result. */
+static const double EXACT = 1e-6;
 
 typedef struct surface {
   const double *positions;

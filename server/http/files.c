@@ -74,7 +74,9 @@ static void reply_part(request *r, object_kind kind, const char *id, object_part
   add_headers(r, etag, mime, name);
 }
 
-void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name) {
+/* Responds with an object, with ranges and conditions. */
+static void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime,
+                         const char *name) {
   reply_part(r, kind, id, (object_part){0}, sha, mime, name);
 }
 

@@ -166,9 +166,6 @@ enum MHD_Result reply_send(request *r);
 int is_page(const char *path);
 void handle_page(request *r, const char *path);
 
-/* files.c: responds with an object, with ranges and conditions. */
-void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name);
-
 /* Handlers. server.c calls them when the whole body has arrived; the two of an upload run while it arrives. */
 void handle_mesh_begin(request *r);
 void handle_mesh_bytes(request *r, const char *bytes, size_t size);
@@ -178,8 +175,6 @@ API_ROUTES(DECLARE)
 /* In PHASE_WAIT: keeps waiting, or leaves the response. */
 enum MHD_Result handle_wait(request *r);
 
-/* Reads limit and page_token. 1, or 0 with a response. */
-int read_page(request *r, int *limit, int64_t *before);
 /* A page of a list: space for limit + 1 rows, and the JSON written so far. */
 typedef struct list_page {
   int limit;

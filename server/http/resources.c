@@ -66,7 +66,8 @@ enum MHD_Result handle_get(request *r) {
   return MHD_YES;
 }
 
-int read_page(request *r, int *limit, int64_t *before) {
+/* Reads limit and page_token. 1, or 0 with a response. */
+static int read_page(request *r, int *limit, int64_t *before) {
   const char *why = PARSE_PAGE_TOKEN, *token = query_of(r, "page_token");
   uint64_t sealed;
   int fine = parse_page(query_of(r, "limit"), token, limit, &sealed, &why);

@@ -121,7 +121,9 @@ void keep_event(job *j, int64_t number, const char *type, const char *json) {
   event->type[sizeof event->type - 1] = 0;
 }
 
-void add_event(queue *q, job *j, const char *type, int store) {
+/* Adds an event with the job's current state; `store` also writes it to the catalogue. Not for the final event, which
+ * catalogue_job_finish() writes. */
+static void add_event(queue *q, job *j, const char *type, int store) {
   api_text json = {0};
   int64_t number = prepare_event(j, &json);
   if (!json.failed) {

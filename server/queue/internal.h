@@ -87,9 +87,6 @@ int table_key_taken(const queue *q, const job *by_other);      /* a worker has a
 void job_unref(job *j);
 void job_view(const job *j, api_job_view *view);
 void wake_job(queue *q, job *j, int ended);
-/* Adds an event with the job's current state; `store` also writes it to the catalogue. Not for the final event, which
- * catalogue_job_finish() writes. */
-void add_event(queue *q, job *j, const char *type, int store);
 /* Writes the JSON of the next event and returns its number. */
 int64_t prepare_event(job *j, api_text *json);
 void keep_event(job *j, int64_t number, const char *type, const char *json);

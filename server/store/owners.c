@@ -4,7 +4,8 @@
 
 #include "store/rows.h"
 
-int owner_insert(database *db, const resource *r, const char *tenant, const char *json) {
+/* Adds an owner if absent. json NULL: the owner sees the resource's own description. */
+static int owner_insert(database *db, const resource *r, const char *tenant, const char *json) {
   sqlite3_stmt *st = database_statement(db,
                                         "INSERT INTO owner(kind, id, tenant, json, bytes, created)"
                                         " VALUES(?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING");
@@ -97,15 +98,6 @@ int owner_of_meshes(database *db, const char *request, const char *tenant, int64
   code = sqlite3_step(st);
   sqlite3_reset(st);
   return code == SQLITE_DONE ? SQLITE_OK : code == SQLITE_ROW ? SQLITE_NOTFOUND : code;
-}
-
-static int put_unowned(database *db, void *arg) {
-  int code = resource_insert(db, arg);
-  return code == SQLITE_OK ? owner_insert(db, arg, "", NULL) : code;
-}
-
-store_result catalogue_put(catalogue *cat, const resource *r) {
-  return catalogue_write(cat, put_unowned, (void *)(uintptr_t)r);
 }
 
 static const char owner_exists[] = "SELECT 1 FROM owner WHERE kind=?1 AND id=?2 AND tenant=?3";

@@ -12,16 +12,12 @@
 #include "store/transactions.h"
 
 /* Functions with a database argument run inside a transaction of the writer. */
-/* Adds an owner if absent. json NULL: the owner sees the resource's own description. */
-int owner_insert(database *db, const resource *r, const char *tenant, const char *json);
 /* Makes the owner of a job that succeeded an owner of its result. SQLITE_CONSTRAINT if the result does not exist. */
 int owner_of_job(database *db, const char *job, int64_t now);
 /* Makes the tenant that requests a job an owner of the meshes that it names, so that another owner's DELETE does not
  * remove them. SQLITE_NOTFOUND if `all` is set and a mesh does not exist. */
 int owner_of_meshes(database *db, const char *request, const char *tenant, int64_t now, int all);
 
-/* Adds a row, owned by "", if absent. */
-store_result catalogue_put(catalogue *cat, const resource *r);
 /* Adds a mesh if absent, and makes the tenant an owner. STORE_CONFLICT: the tenant would exceed its quota in bytes (0:
  * no limit); nothing changes. *fresh: the tenant did not own it before. */
 store_result catalogue_put_for(catalogue *cat, const resource *r, const char *tenant, int64_t quota, int *fresh);

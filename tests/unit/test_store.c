@@ -103,11 +103,12 @@ static void test_resources(void **state) {
   stored *s = *state;
   resource row = {.kind = RESOURCE_EMBEDDING, .json = (char *)(uintptr_t) "{\"n\":1}", .bytes = 5, .created = 1000};
   resource got = {0}, page[3];
+  int fresh;
   make_id(row.id, 'd');
   make_id(row.sha, 'e');
-  assert_int_equal(catalogue_put(s->cat, &row), STORE_OK);
+  assert_int_equal(catalogue_put_for(s->cat, &row, "", 0, &fresh), STORE_OK);
   row.json = (char *)(uintptr_t) "{\"n\":2}";
-  assert_int_equal(catalogue_put(s->cat, &row), STORE_OK); /* put if absent: the first stays */
+  assert_int_equal(catalogue_put_for(s->cat, &row, "", 0, &fresh), STORE_OK); /* put if absent: the first stays */
   assert_int_equal(catalogue_get(s->cat, RESOURCE_EMBEDDING, row.id, &got), STORE_OK);
   assert_string_equal(got.json, "{\"n\":1}");
   assert_int_equal(got.created, 1000);
@@ -115,7 +116,7 @@ static void test_resources(void **state) {
   assert_int_equal(catalogue_get(s->cat, RESOURCE_SUPERMESH, row.id, &got), STORE_NOT_FOUND);
   for (char digit = '1'; digit <= '4'; digit++) {
     make_id(row.id, digit);
-    assert_int_equal(catalogue_put(s->cat, &row), STORE_OK);
+    assert_int_equal(catalogue_put_for(s->cat, &row, "", 0, &fresh), STORE_OK);
   }
   assert_int_equal(catalogue_bytes(s->cat, 1), 25);
   assert_int_equal(catalogue_list(s->cat, RESOURCE_EMBEDDING, 0, 3, page), 3); /* newest first, page by page */

@@ -27,8 +27,9 @@ typedef struct finder {
   double *area;          /* a shape */
 } finder;
 
-/* |J|² is Σ cot(angle) |opposite edge's image|² over twice the area. */
-double orb_triangle_likeness(double p[3][3], double q[3][3], double *area) {
+/* 1/E of the linear map from triangle p to triangle q, E = (|J|² + |J⁻¹|²)/4: 1 for a rigid motion, 0 where it is
+ * degenerate. *area: of p. |J|² is Σ cot(angle) |opposite edge's image|² over twice the area. */
+static double likeness(double p[3][3], double q[3][3], double *area) {
   double u[3], v[3], n[3], sum = 0;
   orb_sub(p[1], p[0], u);
   orb_sub(p[2], p[0], v);
@@ -81,7 +82,7 @@ static double confidence_on(const finder *f, int32_t s, const int32_t *patch, in
         q[k][c] /= sqrt(f->area[s]);
       }
     }
-    double like = orb_triangle_likeness(p, q, &area);
+    double like = likeness(p, q, &area);
     sum += like * area;
     total += area;
   }

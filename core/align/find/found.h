@@ -8,8 +8,4 @@
  * unsplit. clear, 0 to 1: how far other candidates are behind (candidates.h). found.c describes the method. */
 ORB_MUST_CHECK orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment, double clear);
 
-/* 1/E of the linear map from triangle p to triangle q, E = (|J|² + |J⁻¹|²)/4: 1 for a rigid motion, 0 where it is
- * degenerate. *area: of p. */
-double orb_triangle_likeness(double p[3][3], double q[3][3], double *area);
-
 #endif

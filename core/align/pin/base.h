@@ -4,7 +4,7 @@
 
 #include "align/sheet/sheet.h"
 
-enum { ORB_BASE_EXTRA = 6 };
+enum { ORB_BASE_EXTRA = 6 }; /* points beside the targets: the corners of an octahedron */
 
 /* Triangulates the sphere on distinct targets (3 each, unit) and ORB_BASE_EXTRA further points, which keep every
  * triangle well below a hemisphere. Vertices 0 … ORB_BASE_EXTRA − 1 of the sheet are the further points; then come the

@@ -23,8 +23,8 @@ enum {
   GRAIN = 4096,   /* triangles of a chunk */
   DIRECTIONS = 64 /* tried before the degree counts as 0; a map that is not degenerate spoils one only by coincidence */
 };
-static const double FAR_SIDE =
-    -1e-9; /* cosine to x of corners that are certainly on the far side; far above rounding */
+/* Cosine to x of corners that are certainly on the far side: well beyond rounding. */
+static const double FAR_SIDE = -1e-9;
 
 typedef struct partial {
   int64_t flipped, degenerate, degree, on_edge;

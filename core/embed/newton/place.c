@@ -24,13 +24,12 @@
 #include "numeric/vec3.h"
 
 enum {
-  GRAIN = 256, /* vertices of a chunk */
-  AHEAD = 8,   /* collapses between a prefetch and its use */
-  PLAIN_ABOVE =
-      4000,         /* with more live vertices, a vertex well inside its kernel makes no step: the sweeps follow soon */
-  RELAX_MOST = 400, /* ring entries relaxed around one crowded vertex: about 60 stars, or one pole */
-  POLE = 100,       /* valence from which on only the sweeps move a vertex */
-  ATTEMPTS = 16     /* at a kernel that doubles have no room for */
+  GRAIN = 256,        /* vertices of a chunk */
+  AHEAD = 8,          /* collapses between a prefetch and its use */
+  PLAIN_ABOVE = 4000, /* live vertices above which one well inside its kernel makes no step: the sweeps follow soon */
+  RELAX_MOST = 400,   /* ring entries relaxed around one crowded vertex: about 60 stars, or one pole */
+  POLE = 100,         /* valence from which on only the sweeps move a vertex */
+  ATTEMPTS = 16       /* at a kernel that doubles have no room for */
 };
 
 static const double WELL_INSIDE = 0.02; /* least determinant of a triangle over its squared edge on the ring */

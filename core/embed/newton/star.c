@@ -62,7 +62,8 @@ orb_status orb_star_walk(orb_context *ctx, orb_star *star, const orb_corner_tabl
   return ORB_OK;
 }
 
-void orb_shape_cotangents(const orb_corner_table *s, int32_t a, int32_t b, int32_t c, double blend, double out[3]) {
+/* Half cotangents at the three vertices, in order, of a triangle whose squared edges are blended. */
+static void shape_cotangents(const orb_corner_table *s, int32_t a, int32_t b, int32_t c, double blend, double out[3]) {
   const double *p = s->position + 3 * (int64_t)a, *q = s->position + 3 * (int64_t)b;
   const double *r = s->position + 3 * (int64_t)c;
   double ab = orb_distance2(p, q), ac = orb_distance2(p, r), bc = orb_distance2(q, r);
@@ -83,7 +84,7 @@ void orb_star_shape(orb_star *star, const orb_corner_table *s, int32_t v, double
   for (int32_t i = 0; i < star->count; i++) {
     int32_t j = i + 1 < star->count ? i + 1 : 0;
     double half[3];
-    orb_shape_cotangents(s, v, star->vertex[i], star->vertex[j], blend, half);
+    shape_cotangents(s, v, star->vertex[i], star->vertex[j], blend, half);
     star->ca[i] = half[2];
     star->cb[i] = half[1];
     star->cc[i] = half[0] * orb_distance2(star->ring[i], star->ring[j]);

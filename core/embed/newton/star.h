@@ -31,9 +31,6 @@ ORB_MUST_CHECK orb_status orb_star_walk(orb_context *ctx, orb_star *star, const 
 /* Sets the shapes and target areas. blend (0 to 1) moves the shapes towards equilateral. */
 void orb_star_shape(orb_star *star, const orb_corner_table *s, int32_t v, double blend);
 
-/* Half cotangents at the three vertices, in order, of a triangle whose squared edges are blended. */
-void orb_shape_cotangents(const orb_corner_table *s, int32_t a, int32_t b, int32_t c, double blend, double out[3]);
-
 /* Moves p by at most one damped Newton step that lowers the energy and keeps every triangle exactly positive. Returns
  * the energy after the step; *before: the energy before it. Both are infinite where p is too near the edge of the
  * kernel to tell. */

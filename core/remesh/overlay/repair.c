@@ -29,9 +29,8 @@ static int32_t shortest_edge(const orb_net *net, int32_t t) {
       best = h;
     }
   }
-  return net->triangles[best] > net->triangles[orb_next(best)]
-             ? best
-             : net->twin[best]; /* the vertex with the lower number stays */
+  /* The vertex with the lower number stays. */
+  return net->triangles[best] > net->triangles[orb_next(best)] ? best : net->twin[best];
 }
 
 /* Collapses the shortest edge of each flipped triangle, if it is no longer than the root of longest2. */

@@ -9,7 +9,8 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-orb_map_rules orb_map_soft(const orb_map_params *params, double barrier) {
+/* Rules of sweeps that allow flips against a barrier of this strength. */
+static orb_map_rules soft_rules(const orb_map_params *params, double barrier) {
   return (orb_map_rules){.soft = 1, .barrier = barrier, .epsilon = params->star.epsilon, .omega = 1};
 }
 
@@ -46,7 +47,7 @@ void orb_map_set_pull(const orb_map_run *c, orb_map_level *l, const int32_t *to_
 
 orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, int rounds, int32_t *flips) {
   const orb_map_params *params = &c->params;
-  orb_map_rules rules = orb_map_soft(params, params->clear.first_barrier);
+  orb_map_rules rules = soft_rules(params, params->clear.first_barrier);
   double *copy = ORB_NEW(c->ctx, double, 3 * (size_t)l->count);
   orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
   int32_t at_first = *flips = orb_map_level_flips(l);
@@ -114,7 +115,7 @@ orb_status orb_map_loosen(orb_map_run *c, orb_map_level *l, int soft_sweeps, int
     return status; /* no work is left to clear the flips that it would make */
   }
   ORB_GO(status, orb_map_copy_take(c, l, &before), done);
-  ORB_GO(status, orb_map_sweeps(c, l, orb_map_soft(&c->params, 1), soft_sweeps), done);
+  ORB_GO(status, orb_map_sweeps(c, l, soft_rules(&c->params, 1), soft_sweeps), done);
   ORB_GO(status, orb_map_clear_flips(c, l, c->params.clear.loosen_rounds, &flips), done);
   if (!flips) {
     ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), hard_sweeps), done);
@@ -140,7 +141,7 @@ orb_status orb_map_draw(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh
     int32_t flips;
     orb_map_set_pull(c, l, to_mesh, pull);
     ORB_GO(status, orb_map_copy_take(c, l, &before), next);
-    ORB_GO(status, orb_map_sweeps(c, l, orb_map_soft(params, params->clear.first_barrier), params->draw.sweeps), next);
+    ORB_GO(status, orb_map_sweeps(c, l, soft_rules(params, params->clear.first_barrier), params->draw.sweeps), next);
     ORB_GO(status, orb_map_clear_flips(c, l, params->draw.clearings, &flips), next);
     if (flips) {
       orb_map_copy_restore(&before, l);

@@ -7,9 +7,6 @@
 /* Sweeps until hardly a vertex moves any more, `count` times at most. */
 ORB_MUST_CHECK orb_status orb_map_sweeps(orb_map_run *run, orb_map_level *level, orb_map_rules rules, int count);
 
-/* Rules of sweeps that allow flips against a barrier of this strength. */
-orb_map_rules orb_map_soft(const orb_map_params *params, double barrier);
-
 /* Rules of sweeps that allow no flip. */
 orb_map_rules orb_map_hard(const orb_map_params *params);
 

@@ -1,4 +1,4 @@
-/* Rings and shapes of a batch of stars, before it is swept: orb_shape_cotangents() (star.h) lane by lane.
+/* Rings and shapes of a batch of stars, before it is swept: shape_cotangents() (star.c) lane by lane.
  *
  * The shapes are computed here, from the positions of the ring, although each triangle lies in three stars: reading
  * them from a table of triangles would miss the cache as often as reading positions does, and the table would cost 16

@@ -10,7 +10,7 @@ enum {
   ORB_COST_RING_MAX = 40, /* neighbours; larger stars cost ORB_COST_LARGE and are collapsed last */
   ORB_SWEEP_RING_MAX = 62 /* neighbours of a vertex that a vector sweep moves; the scalar step takes larger stars */
 };
-#define ORB_COST_LARGE 1e30F
+#define ORB_COST_LARGE 1e30F /* above every cost of a smaller star */
 
 /* Evaluates what it costs to collapse vertices. */
 typedef struct orb_cost_job {
