@@ -136,7 +136,7 @@ def paper_table(bench, report):
                      f"{m['cpu_seconds']:.2f}", rate(60 * m["triangles"] / m["cpu_seconds"])))
     report.table(heads, rows)
     report.add("The rows of orbmorph are *in italics*, in processor seconds. Parameterization includes the sweeps around "
-               "insertions into dense regions (core/embed/kernel_sampling.h), so it takes a larger share than in the paper.",
+               "insertions into dense regions (core/embed/kernel_sampling/kernel_sampling.h), so it takes a larger share than in the paper.",
                *([f"Refused: {', '.join(bench.refused)}."] if bench.refused else []))
     return measured
 

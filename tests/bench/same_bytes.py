@@ -21,7 +21,8 @@ TIMES = {"seconds", "cpu_seconds", "threads", "peak_rss_bytes", "triangles_per_m
 MERGES = [  # alignment, its preset, remeshing; what does not depend on each other is not multiplied
     ("pin", "fast", "adaptive"), ("pin", "default", "adaptive"), ("pin", "fast", "overlay"),
     ("pin", "fast", "subdivision"), ("pin", "fast", "convex-hull"), ("rbf", "fast", "overlay"),
-    ("rotate", "fast", "overlay"), ("auto", "fast", "adaptive"), ("auto", "default", "adaptive")]
+    ("rbf", "default", "overlay"), ("rotate", "fast", "overlay"), ("rotate", "default", "overlay"),
+    ("auto", "fast", "adaptive"), ("auto", "default", "adaptive")]
 
 
 def without_times(value):
