@@ -20,7 +20,9 @@
 #include "numeric/predicates.h"
 #include "numeric/vec3.h"
 
-enum { ITERATIONS = 4000 }; /* most, of conjugate gradients; a guard: the residual ends them before */
+enum { ITERATIONS = 4000 };          /* most, of conjugate gradients; a guard: the residual ends them before */
+static const double SETTLED = 1e-30; /* squared norm of the residual, relative to the first, that ends them */
+static const double WEIGHT_LEAST = 0.1, WEIGHT_MOST = 10; /* cotangent weights are clamped to this range */
 
 typedef struct patcher {
   orb_context *ctx;
@@ -198,7 +200,7 @@ static orb_status set_border(patcher *p, int *good) {
       const double *a = x + 3 * (size_t)tri[h], *b = x + 3 * (size_t)tri[g];
       double w =
           0.5 * (cotangent(x + 3 * (size_t)tri[orb_prev(h)], a, b) + cotangent(x + 3 * (size_t)tri[orb_prev(g)], a, b));
-      p->weight[h] = p->weight[g] = w > 0.1 ? (w < 10 ? w : 10) : 0.1;
+      p->weight[h] = p->weight[g] = w > WEIGHT_LEAST ? (w < WEIGHT_MOST ? w : WEIGHT_MOST) : WEIGHT_LEAST;
     }
   }
   for (int32_t b = 0; b < p->base.shape.mesh.vertex_count; b++) {
@@ -298,7 +300,7 @@ static orb_status solve(patcher *p, int *good) {
     if (i == 0) {
       first = now;
     }
-    if (!(now > 1e-30 * first)) {
+    if (!(now > SETTLED * first)) {
       break;
     }
     for (size_t k = 0; k < n; k++) {

@@ -25,9 +25,14 @@ enum {
   SPINS = 24, /* rotations around each pole: 15° apart */
   STARTS = 12 /* grid points that are refined */
 };
-static const double APART = 0.8; /* radians: rotations this far apart are different candidates */
+static const double APART = 0.8;   /* radians: rotations this far apart are different candidates */
+static const double NORMALS = 0.3; /* variance of the normals where that of the positions is 1 */
+static const double FIRST_STEP = 0.12, LAST_STEP = 0.002; /* radians of the pattern search */
+enum { MOVES = 8 };                                       /* most rounds of it with one step */
+static const double UPRIGHT = 0.15; /* relative: an upright rotation may score less than the best by this share */
+static const double GOLDEN_ANGLE = 2.399963229728653; /* π (3 − √5): between neighbours of a Fibonacci lattice */
 
-/* Mean position (centred, unit variance) and half-weighted normal of each cell of the cube map. */
+/* Mean position (centred, unit variance) and normal (variance NORMALS) of each cell of the cube map. */
 typedef struct field {
   double direction[CELLS][3], weight[CELLS], value[CELLS][FIELD];
 } field;
@@ -112,7 +117,7 @@ static void field_make(field *f, const orb_aligned_shape *shape) {
       normal_variance += f->weight[c] * f->value[c][3 + k] * f->value[c][3 + k];
     }
   }
-  double scale = sqrt(total / (variance + 1e-300)), scale_normal = sqrt(0.3 * total / (normal_variance + 1e-300));
+  double scale = sqrt(total / (variance + 1e-300)), scale_normal = sqrt(NORMALS * total / (normal_variance + 1e-300));
   for (int32_t c = 0; c < CELLS; c++) {
     f->weight[c] /= total;
     for (int k = 0; k < 3; k++) {
@@ -160,8 +165,8 @@ static orb_status score_of(const search *s, const double r[9], double *upright, 
   double in_space[9], singular[3];
   ORB_TRY(orb_procrustes_covariance(s->ctx, m, in_space, singular));
   double lost = misfit(s, r);
-  *upright = (m[0] + m[4] + m[8]) / 1.3 - lost;
-  *best = (singular[0] + singular[1] + singular[2]) / 1.3 - lost;
+  *upright = (m[0] + m[4] + m[8]) / (1 + NORMALS) - lost;
+  *best = (singular[0] + singular[1] + singular[2]) / (1 + NORMALS) - lost;
   return ORB_OK;
 }
 
@@ -220,7 +225,7 @@ static orb_status coarse(const search *s, start *upright, start *best) {
     upright[i].score = best[i].score = -INFINITY;
   }
   for (int i = 0; i < AXES; i++) {
-    double z = 1 - (2 * i + 1.0) / AXES, angle = i * 2.399963229728653;
+    double z = 1 - (2 * i + 1.0) / AXES, angle = i * GOLDEN_ANGLE;
     double half = sqrt((1 + z) / 2), other = sqrt((1 - z) / 2);
     double tilt[4] = {half, -other * sin(angle), other * cos(angle), 0};
     for (int j = 0; j < SPINS; j++) {
@@ -238,8 +243,8 @@ static orb_status coarse(const search *s, start *upright, start *best) {
 
 /* Pattern search: small rotations around the three axes in both directions, halved until they are tiny. */
 static orb_status descend(const search *s, start *from, int use_upright) {
-  for (double step = 0.12; step > 0.002; step /= 2) {
-    for (int moved = 1, rounds = 0; moved && rounds < 8; rounds++) {
+  for (double step = FIRST_STEP; step > LAST_STEP; step /= 2) {
+    for (int moved = 1, rounds = 0; moved && rounds < MOVES; rounds++) {
       moved = 0;
       for (int k = 0; k < 6; k++) {
         double spin[4] = {cos(step / 2), 0, 0, 0}, q[4], r[9], up, any;
@@ -293,7 +298,7 @@ static const start *choose(const start *upright, const start *best) {
     top_upright = upright[i].score > top_upright->score ? &upright[i] : top_upright;
     top_best = best[i].score > top_best->score ? &best[i] : top_best;
   }
-  return top_upright->score > top_best->score - 0.15 * fabs(top_best->score) ? top_upright : top_best;
+  return top_upright->score > top_best->score - UPRIGHT * fabs(top_best->score) ? top_upright : top_best;
 }
 
 orb_status orb_rotation_search_near(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,

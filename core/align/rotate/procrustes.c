@@ -9,6 +9,12 @@
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 
+enum { ROUNDS = 100 };               /* most alternations */
+static const double SETTLED = 1e-12; /* gain of the spread by one, relative to it, that ends them */
+/* Of the mean of unit vectors: shorter, it has no direction (two opposite points), and the first shape's point serves.
+ */
+static const double NO_MEAN = 1e-3;
+
 static double determinant(const double m[9]) {
   return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
 }
@@ -63,7 +69,7 @@ static double gather(const double *points, int32_t shapes, int32_t count, const 
       }
     }
     memcpy(mean, sum, sizeof sum);
-    if (orb_normalize(mean) < 1e-3 * shapes) {
+    if (orb_normalize(mean) < NO_MEAN * shapes) {
       orb_rotate_point(rotations, points + 3 * (size_t)k, mean);
       orb_normalize(mean);
     }
@@ -87,12 +93,12 @@ orb_status orb_procrustes_all(orb_context *ctx, const double *points, int32_t sh
     }
   }
   double spread = gather(points, shape_count, landmark_count, rotations, means);
-  for (int round = 0; shape_count > 2 && round < 100; round++) {
+  for (int round = 0; shape_count > 2 && round < ROUNDS; round++) {
     for (int32_t s = 1; s < shape_count; s++) {
       ORB_TRY(orb_procrustes(ctx, points + (size_t)s * stride, means, landmark_count, rotations + 9 * (size_t)s, NULL));
     }
     double now = gather(points, shape_count, landmark_count, rotations, means);
-    if (spread - now <= 1e-12 * spread) {
+    if (spread - now <= SETTLED * spread) {
       break;
     }
     spread = now;

@@ -132,6 +132,11 @@ typedef struct orb_map_params {
                        than an ε for all */
     int tries;      /* lengths of a step */
     double shorten; /* a try's length relative to the one before it */
+    double star_mean, star_worst; /* ε of a star: these shares of its mean absolute determinant and of its worst one,
+                                     added */
+    double all_mean2, all_worst2; /* ε² for all stars: these shares of the squares of 1 / triangles and of the worst
+                                     determinant, added */
+    double convexity;             /* least eigenvalue of the Hessian relative to the greatest, as in a step */
   } untangle;
 
   /* Drawing a level without flips to its spatial targets. */

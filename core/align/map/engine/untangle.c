@@ -47,7 +47,9 @@ static double star_epsilon(const orb_map_level *l, int32_t v) {
     sum += fabs(det);
     worst = fmin(worst, det);
   }
-  return 0.05 * sum / (l->start[v + 1] - l->start[v]) - 0.2 * worst + 1e-100;
+  const orb_map_params *params = l->params;
+  return params->untangle.star_mean * sum / (l->start[v + 1] - l->start[v]) - params->untangle.star_worst * worst +
+         1e-100;
 }
 
 /* One step of v; the point only changes where the energy falls. */
@@ -77,7 +79,8 @@ static void step(orb_map_level *l, int32_t v, double least_epsilon) {
     longest = fmax(longest, orb_dot(u, u));
   }
   double mean = 0.5 * (h[0] + h[2]), spread = sqrt(0.25 * (h[0] - h[2]) * (h[0] - h[2]) + h[1] * h[1]);
-  double low = mean - spread, floor = 0.05 * fmax(fabs(mean + spread), fabs(low)), lift = low < floor ? floor - low : 0;
+  double low = mean - spread, floor = l->params->untangle.convexity * fmax(fabs(mean + spread), fabs(low)),
+         lift = low < floor ? floor - low : 0;
   double a = h[0] + lift, b = h[1], c = h[2] + lift, det = a * c - b * b;
   double s = -(c * g[0] - b * g[1]) / det, t = -(a * g[1] - b * g[0]) / det, length = sqrt(s * s + t * t);
   if (!(det > 0) || !(length > 0)) {
@@ -271,7 +274,9 @@ orb_status orb_map_level_untangle(orb_context *ctx, orb_map_level *l, int32_t *l
     /* Many flips need one ε for all; the last few hide in stars that are far smaller. */
     double scale = 1.0 / l->triangle_count;
     is.least_epsilon =
-        *left > params->untangle.few && round % 3 ? sqrt(1e-8 * scale * scale + 0.04 * worst * worst) : 0;
+        *left > params->untangle.few && round % 3
+            ? sqrt(params->untangle.all_mean2 * scale * scale + params->untangle.all_worst2 * worst * worst)
+            : 0;
     join_islands(&is, mark);
     *work -= params->untangle.passes * (int64_t)list_islands(&is);
     orb_parallel_for(ctx, is.count, 1, untangle_range, &is);
