@@ -51,8 +51,8 @@ part_valgrind() {
     cat >"$folder/$name" <<END
 #!/bin/sh
 exec valgrind --quiet --fair-sched=try --error-exitcode=9 --leak-check=full --show-leak-kinds=definite,indirect \\
-  --errors-for-leak-kinds=definite --suppressions=$PWD/tests/long/valgrind.supp \\
-  --log-file=$folder/reports/$name.%p "$PWD/build-debug/bin/$name" "\$@"
+  --errors-for-leak-kinds=definite --suppressions="$PWD/tests/long/valgrind.supp" \\
+  --log-file="$folder/reports/$name.%p" "$PWD/build-debug/bin/$name" "\$@"
 END
     chmod +x "$folder/$name"
   done
@@ -83,7 +83,7 @@ part_crash() {
     node --test --test-reporter=spec tests/scenario/crash.test.mjs
 }
 
-# Each call of the daemon that may fail is made to fail, once and for ever: ORB_FAULT_RUNS=few leaves out allocations.
+# Makes each call of the daemon that may fail do so, once and from then on; ORB_FAULT_RUNS=few leaves out allocations.
 # The same under AddressSanitizer and UBSan: tests/long.sh faults_asan.
 part_faults() {
   cmake --preset release -DORB_TESTS=ON >/dev/null

@@ -5,8 +5,8 @@
  * writes there what is to fail, and reads what did. It may do so while the program runs, and again and again.
  * ORB_FAIL_SITES names the list of sites, of 8 SITES bytes, which several programs may share. Kinds:
  * alloc (NULL, ENOMEM), write (ENOSPC, to files only), fsync (EIO), rename (EIO), folder (EIO from mkdir and unlink),
- * open (EMFILE, of files and folders), thread (EAGAIN), sqlite (SQLITE_IOERR from a step, an exec, a prepare). Where a
- * call failed is told on stderr.
+ * open (EMFILE, of files and folders), thread (EAGAIN), sqlite (SQLITE_IOERR from a step, an exec, a prepare). It
+ * prints on stderr where a call failed.
  */
 #include <dirent.h>
 #include <dlfcn.h>

@@ -1,4 +1,4 @@
-// Callers who mean ill: each gets the right status, learns nothing, and leaves the service well.
+// Hostile clients: each gets the right status, learns nothing, and does not harm the service.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';
@@ -54,7 +54,7 @@ test('floods of headers', async (t) => {
   await until(() => descriptors(d) < before + 20, 'connections are given back');
 });
 
-test('paths and ids that are tricks', async (t) => {
+test('hostile paths and ids', async (t) => {
   const d = await daemon(t);
   const hex = 'a'.repeat(64);
   for (const target of [
@@ -149,7 +149,7 @@ test('a gigabyte of zeros, compressed', async (t) => {
   await well(d);
 });
 
-test('tokens that are wrong, and what a token sees', async (t) => {
+test('wrong tokens, and what a token sees', async (t) => {
   const data = mkdtempSync(path.join(tmpdir(), 'orbmorph-abuse-'));
   t.after(() => rmSync(data, { recursive: true, force: true }));
   const add = (name, scope) => {
@@ -183,7 +183,7 @@ test('tokens that are wrong, and what a token sees', async (t) => {
     assert.match(reply.headers.get('www-authenticate') ?? '', /^Bearer/);
     answers.add(reply.bytes.toString());
   }
-  assert.equal(answers.size, 1, 'all wrong tokens are told the same');
+  assert.equal(answers.size, 1, 'all wrong tokens get the same response');
   const upload = (token) =>
     d.post('/v1/meshes', Buffer.from(shapes.cube), { headers: as(token), query: { name: 'secret' } });
   assertProblem(await upload(reader), 403, 'forbidden');

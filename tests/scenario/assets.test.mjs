@@ -114,7 +114,7 @@ test('an asset is immutable, comes in ranges, passes the validator and loads in 
   }
 });
 
-test('assets of unknown supermeshes are not there', async (t) => {
+test('unknown supermeshes have no asset', async (t) => {
   const d = await daemon(t);
   assertProblem(await d.get(`/v1/supermeshes/${'0'.repeat(64)}/asset.glb`), 404, 'not-found');
 });

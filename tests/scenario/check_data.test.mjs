@@ -6,7 +6,7 @@ import path from 'node:path';
 import test from 'node:test';
 import { assertProblem, binaries, daemon, samples } from './support/daemon.mjs';
 
-test('a file that is lost is told as a fault, and who sends the mesh again puts it back', async (t) => {
+test('a lost file is reported, and uploading the mesh again restores it', async (t) => {
   const d = await daemon(t);
   const file = path.join(samples, 'dog.obj');
   const mesh = await d.mesh(file);

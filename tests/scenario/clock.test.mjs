@@ -1,4 +1,4 @@
-// The wall clock is set back by an hour while the daemon runs, as it is at the start of many machines.
+// The wall clock is set back by an hour while the daemon runs, as happens when machines boot.
 import assert from 'node:assert/strict';
 import net from 'node:net';
 import test from 'node:test';
@@ -9,7 +9,7 @@ import * as shapes from './support/shapes.mjs';
 
 const library = process.env.ORB_CLOCK;
 
-test('waits end, and slow callers are sent away, also when the clock was set back', {
+test('waits end and slow clients are disconnected even if the clock is set back', {
   skip: library ? false : 'ORB_CLOCK names no library',
 }, async (t) => {
   const ahead = 8000; // by then the job is under way, on a busy machine too

@@ -1,4 +1,4 @@
-// What a request makes its answer depend on: tags, over several lines and on what is deleted; ranges; preferences.
+// Conditional requests (entity tags, also over several header lines and for DELETE), ranges, preferences.
 import assert from 'node:assert/strict';
 import http from 'node:http';
 import path from 'node:path';
@@ -19,7 +19,7 @@ function lines(d, method, target, headers, body) {
   });
 }
 
-test('nothing is deleted, or given, against the condition of the request', async (t) => {
+test('a request whose condition fails deletes and returns nothing', async (t) => {
   const d = await daemon(t);
   const mesh = await d.mesh(path.join(samples, 'dog.obj'));
   const embedding = await d.made('/v1/embeddings', { mesh: mesh.id });
@@ -48,7 +48,7 @@ test('nothing is deleted, or given, against the condition of the request', async
   }
 });
 
-test('a list may come in several lines', async (t) => {
+test('a list of tags may span several header lines', async (t) => {
   const d = await daemon(t);
   const { url } = await d.mesh(path.join(samples, 'dog.obj'));
   for (const target of [url, `${url}/file`]) {
@@ -69,7 +69,7 @@ test('a list may come in several lines', async (t) => {
   assert.equal(JSON.parse(twice.bytes).type, '/problems/unsupported-encoding');
 });
 
-test('a query that no upload can have is refused before its body is sent', async (t) => {
+test('an invalid query of an upload is refused before its body is sent', async (t) => {
   const d = await daemon(t);
   for (const query of ['repair=glue', 'format=doc', 'name=', 'name=%01', `name=${'x'.repeat(128)}`]) {
     const told = await new Promise((done, reject) => {
@@ -88,7 +88,7 @@ test('a query that no upload can have is refused before its body is sent', async
   }
 });
 
-test('the unit of a range is told in any case', async (t) => {
+test('the unit of a range is case-insensitive', async (t) => {
   const d = await daemon(t);
   const { url, bytes } = await d.mesh(path.join(samples, 'dog.obj'));
   for (const unit of ['bytes', 'Bytes', 'BYTES']) {
@@ -100,7 +100,7 @@ test('the unit of a range is told in any case', async (t) => {
   }
 });
 
-test('a preference is found wherever it stands, and only where it is one', async (t) => {
+test('a preference is recognised anywhere in Prefer, and nothing else is taken for one', async (t) => {
   const d = await daemon(t);
   const { id } = (await d.upload(shapes.obj(shapes.egg(2)))).json;
   const { url } = (await d.post('/v1/embeddings', { mesh: id })).json;

@@ -1,4 +1,4 @@
-// A configuration that cannot work is refused before it is used, with what would.
+// The daemon refuses a configuration that cannot work before it uses it, and says what would work.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
@@ -50,7 +50,7 @@ test('values that no daemon can use are refused by name', () => {
     assert.equal(check(...args).status, 0, args.join(' '));
 });
 
-test('a line of the file without a value is told as one', (t) => {
+test('a line of the file without a value is refused', (t) => {
   const folder = mkdtempSync(path.join(tmpdir(), 'orbmorph-test-'));
   t.after(() => rmSync(folder, { recursive: true }));
   const file = path.join(folder, 'conf');

@@ -28,7 +28,7 @@ const preflight = (d, origin, method, headers, target = '/v1/meshes') =>
   });
 const granted = (reply) => Object.keys(reply.headers).filter((name) => name.startsWith('access-control-'));
 
-test('origins that are named may call, others not', async (t) => {
+test('named origins may call, others may not', async (t) => {
   const d = await daemon(t, { args: ['--cors', `${ours}, ${also}`] });
   const upload = (origin) => send(d, 'POST', '/v1/meshes', origin ? { origin } : {}, shapes.tetrahedron);
   for (const origin of [ours, also]) {
@@ -112,7 +112,7 @@ test('pages may send and read every header of the description', async (t) => {
       assert.ok(listed(reply.headers['access-control-allow-headers']).includes(name), `${name} may be sent`);
     assert.ok(Number(reply.headers['access-control-max-age']) > 0);
   }
-  // Scripts see Cache-Control without being told, and these two are for browsers and proxies.
+  // Scripts may always read Cache-Control; the other two are for browsers and proxies.
   const exposed = listed(
     (await send(d, 'GET', '/v1/meshes', { origin: ours })).headers['access-control-expose-headers'],
   );

@@ -1,5 +1,5 @@
-// kill -9, again and again, at random instants and at every named point of the code, under load. What was accepted
-// must be there afterwards: no job lost, none that ends twice, no torn object, a data folder that --check-data passes.
+// kill -9 under load, repeated, at random instants and at every named point of the code. Afterwards no accepted job is
+// lost or ends twice, no object is torn, and --check-data passes.
 //
 // ORB_KILLS (20) is the number of kills. Named points need a build with ORB_FAULTS (the presets faults and asan); with
 // others, all kills are at random instants. ORB_SEED chooses the instants.
@@ -45,7 +45,7 @@ function newMesh() {
   return shapes.obj(shapes.ball(1, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(n)), y, z + 0.001 * n]));
 }
 
-/** What callers were told: the ledger that the daemon is held to. */
+/** What the daemon has promised to clients: the ledger that it is checked against. */
 class Ledger {
   meshes = new Map(); // url → SHA-256 of its file
   jobs = new Map(); // url → job of a 202 whose end was not seen yet
@@ -234,7 +234,7 @@ test(`${kills} kills under load lose nothing`, async (t) => {
     for (const [name, n] of hit) assert.ok(n > 0, `the point ${name} was never reached`);
 });
 
-test('a poisonous job is given up after three deaths, and holds up no other', {
+test('a job that crashes the daemon three times fails, and other jobs go on', {
   skip: !faults && 'needs a build with ORB_FAULTS',
 }, async (t) => {
   const d = await daemon(t, { args: ['--workers', '2'] });

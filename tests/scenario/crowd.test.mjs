@@ -1,4 +1,4 @@
-// 64 clients at once while jobs run: everybody gets right answers, and no answer waits for a computation.
+// 64 clients at once while jobs run: all responses are right, and none waits for a computation.
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { daemon, endless } from './support/daemon.mjs';

@@ -1,4 +1,4 @@
-// deploy/demo.sh as a stranger calls it: from another folder, with names that have blanks.
+// deploy/demo.sh as a newcomer calls it: from another folder, with blanks in file names.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { copyFile, mkdir, mkdtemp, readFile, readdir, rm, stat, symlink } from 'node:fs/promises';
@@ -45,7 +45,7 @@ test('the demo morphs the samples', { skip }, async () => {
   assert.equal(JSON.parse(await readFile(found(out, 'JSON'), 'utf8')).certificate.landmarks_exact, true);
 });
 
-test('the demo takes the files of its caller', { skip }, async (t) => {
+test('the demo takes files as arguments', { skip }, async (t) => {
   const cwd = await mkdtemp(path.join(tmpdir(), 'orbmorph demo '));
   t.after(() => rm(cwd, { recursive: true, force: true }));
   await mkdir(path.join(cwd, 'sub dir'));

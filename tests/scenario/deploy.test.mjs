@@ -1,4 +1,4 @@
-// What lies in deploy/, by the tools of those who read it: systemd's score of the unit, Prometheus' view of the metrics.
+// The files of deploy/, checked by the tools that read them: systemd scores the unit, Prometheus checks the metrics.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { readFile, writeFile } from 'node:fs/promises';
@@ -14,7 +14,7 @@ const run = (program, args, input) => {
   return { status, text: stdout + stderr };
 };
 
-test('the unit is closed tightly', { skip: lacks('systemd-analyze') }, () => {
+test('the unit is sandboxed', { skip: lacks('systemd-analyze') }, () => {
   const unit = path.join(root, 'deploy/orbmorphd.service');
   const { text } = run('systemd-analyze', ['security', '--offline=true', '--no-pager', unit]);
   const score = Number(/Overall exposure level for orbmorphd\.service: (\d+\.\d+)/.exec(text)?.[1]);

@@ -1,5 +1,5 @@
-// A full disk: 507, reads go on, and with space again it works again. On a small file system in memory, mounted here;
-// where mounting is not allowed the test says so and is skipped.
+// A full disk: writes get 507, reads go on, and everything works again once there is space. The test mounts a small file
+// system in memory; it is skipped where mounting is not allowed.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { closeSync, mkdtempSync, openSync, rmSync, unlinkSync, writeSync } from 'node:fs';
@@ -74,7 +74,7 @@ for (const [reserve, what] of [
   });
 }
 
-test('the reserve is kept also from a body that does not say how long it is', async (t) => {
+test('a body of unknown length leaves the reserve free, too', async (t) => {
   const mount = mkdtempSync(path.join(tmpdir(), 'orbmorph-full-'));
   const mounted = spawnSync('mount', ['-t', 'tmpfs', '-o', 'size=32m', 'tmpfs', mount]);
   if (mounted.status !== 0) {

@@ -1,4 +1,4 @@
-// What was promised is kept: through kill -9, through SIGTERM, through many restarts.
+// Accepted jobs and results survive kill -9, SIGTERM and many restarts.
 import assert from 'node:assert/strict';
 import path from 'node:path';
 import test from 'node:test';
@@ -42,7 +42,7 @@ test('accepted jobs survive kill -9', async (t) => {
   }
 });
 
-test('killed again and again, it comes back and goes on', async (t) => {
+test('after every kill the daemon starts and continues', async (t) => {
   const d = await daemon(t);
   const first = await d.mesh(path.join(samples, 'dog.obj'));
   for (let i = 0; i < kills; i++) {
@@ -57,7 +57,7 @@ test('killed again and again, it comes back and goes on', async (t) => {
   }
 });
 
-test('results stay after an orderly end, and the second run finds them', async (t) => {
+test('results survive an orderly stop', async (t) => {
   const d = await daemon(t, { args: ['--drain-seconds', '3600'] }); // nothing runs: it waits for nothing
   const mesh = await d.mesh(path.join(samples, 'dog.obj'));
   const embedding = await d.made('/v1/embeddings', { mesh: mesh.id });
@@ -69,7 +69,7 @@ test('results stay after an orderly end, and the second run finds them', async (
   assert.equal(again.status, 200);
 });
 
-test('SIGTERM ends it in time while a job runs, and the jobs are kept', async (t) => {
+test('SIGTERM stops the daemon in time while a job runs, and the jobs are kept', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1', '--drain-seconds', '1'] });
   const [large, small] = [
     (await d.upload(shapes.binaryPly(wobble(1, 5)))).json,
@@ -94,7 +94,7 @@ test('SIGTERM ends it in time while a job runs, and the jobs are kept', async (t
   assert.equal(end.state, 'succeeded', JSON.stringify(end.problem));
 });
 
-test('a job that SIGTERM breaks off is done after the next start', async (t) => {
+test('a job that SIGTERM interrupts finishes after the next start', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1', '--drain-seconds', '0'] });
   const { json: mesh } = await d.upload(shapes.binaryPly(wobble(1, slow ? 5 : 7)));
   const { json: job } = await d.post('/v1/embeddings', { mesh: mesh.id });
@@ -104,7 +104,7 @@ test('a job that SIGTERM breaks off is done after the next start', async (t) => 
   assert.equal(end.state, 'succeeded', JSON.stringify(end.problem));
 });
 
-test('a second SIGTERM ends it at once while it drains, and the job is kept', async (t) => {
+test('a second SIGTERM stops a draining daemon at once, and the job is kept', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1', '--drain-seconds', '3600'] });
   const { json: mesh } = await d.upload(shapes.binaryPly(wobble(1, 5)));
   const { json: job } = await d.post('/v1/embeddings', { mesh: mesh.id, ...endless });
@@ -135,7 +135,7 @@ test('a second SIGTERM ends it at once while it drains, and the job is kept', as
   assert.equal((await d.ended(now)).state, 'cancelled');
 });
 
-test('a job that ends the process three times fails, and the queue goes on', async (t) => {
+test('a job that crashes the process three times fails, and the queue goes on', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const { json: mesh } = await d.upload(shapes.binaryPly(wobble(1, 5)), { name: 'poison' });
   const { json: small } = await d.upload(shapes.obj(wobble(2, 2)), { name: 'small' });
@@ -157,7 +157,7 @@ test('a job that ends the process three times fails, and the queue goes on', asy
   assert.match(events.bytes.toString(), /^event: progress$/m);
   assert.equal((await d.ended((await d.get(behind.url)).json)).state, 'succeeded');
   const again = await d.post('/v1/embeddings', { mesh: mesh.id, ...endless });
-  assert.equal(again.status, 202, 'who asks for it again gets another try');
+  assert.equal(again.status, 202, 'repeating the request starts another try');
   assert.notEqual(again.json.id, poison.id);
   await d.delete(again.json.url);
 });

@@ -1,4 +1,4 @@
-// Embeddings: the certificate, the sphere that goes with it, and its cache.
+// Embeddings: the certificate, the sphere, and caching.
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import path from 'node:path';
@@ -7,7 +7,7 @@ import { daemon, samples, assertProblem } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 import { coversOnce, readSphere } from './support/sphere.mjs';
 
-test('an embedding is certified, and its sphere bears it out', async (t) => {
+test('an embedding is certified, and its sphere confirms it', async (t) => {
   const d = await daemon(t);
   for (const file of ['dog.obj', 'giraffe.off', 'elephant.ply']) {
     const mesh = await d.mesh(path.join(samples, file));
@@ -54,7 +54,7 @@ test('the second request costs nothing', async (t) => {
   );
 });
 
-test('what a job made is listed from the moment that its success is told', async (t) => {
+test('a result is listed as soon as its job has succeeded', async (t) => {
   const d = await daemon(t);
   for (let i = 0; i < 20; i++) {
     const mesh = (await d.upload(shapes.obj(shapes.ball(1, ([x, y, z]) => [x, y, z * (1 + i / 50)])))).json;
@@ -69,7 +69,7 @@ test('what a job made is listed from the moment that its success is told', async
   }
 });
 
-test('the smallest and the oddest meshes embed', async (t) => {
+test('the smallest and the strangest meshes embed', async (t) => {
   const d = await daemon(t);
   for (const text of [
     shapes.tetrahedron,

@@ -1,4 +1,4 @@
-// Compressed bodies: gzip and zstd, whole and broken, honest and bombs.
+// Compressed bodies: gzip and zstd, whole, broken, and decompression bombs.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFile, readdir } from 'node:fs/promises';
@@ -42,7 +42,7 @@ function frameOf07(bytes) {
 /** A frame to skip (RFC 8878, 3.1.2). */
 const skipped = Buffer.from([0x5a, 0x2a, 0x4d, 0x18, 3, 0, 0, 0, 1, 2, 3]);
 
-test('compressed uploads and requests are the same as plain ones', async (t) => {
+test('compressed uploads and requests equal plain ones', async (t) => {
   const d = await daemon(t);
   const bytes = await readFile(path.join(samples, 'dog.obj'));
   const plain = await d.upload(bytes, { name: 'dog' });
@@ -118,7 +118,7 @@ test('broken and unknown codings are refused', async (t) => {
   assert.equal((await send(d, 'gzip', packed, {})).status, 201, 'and goes on');
 });
 
-test('the unpacked size counts', async (t) => {
+test('limits apply to the decompressed size', async (t) => {
   const d = await daemon(t, { args: ['--max-body', '100K', '--max-json', '2K'] });
   const text = `${shapes.tetrahedron}${'# padding 0123456789\n'.repeat(6000)}`;
   for (const body of [await gzip(text), zstd(Buffer.from(text))]) {
@@ -131,7 +131,7 @@ test('the unpacked size counts', async (t) => {
   assert.deepEqual(await readdir(path.join(d.data, 'tmp')), [], 'nothing is left');
 });
 
-test('bombs end early', async (t) => {
+test('decompression bombs are refused early', async (t) => {
   const d = await daemon(t);
   assert.equal((await d.get('/livez')).status, 200);
   const gigabyte = [];

@@ -1,4 +1,4 @@
-// Derived objects beyond derived-bytes leave while the daemon runs, by their last use; uploads stay.
+// The running daemon evicts derived objects beyond derived-bytes, least recently used first. Uploads stay.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { readdir, writeFile } from 'node:fs/promises';
@@ -15,7 +15,7 @@ const uploaded = async (d, urls) =>
   (await Promise.all(urls.map(async (url) => (await d.get(`${url}/file`)).bytes.length))).reduce((a, b) => a + b);
 const stored = async (d, kind) => (await d.get(`/v1/${kind}`, { query: { limit: 1000 } })).json[kind];
 
-test('the least used embeddings leave, uploads never', async (t) => {
+test('the least recently used embeddings are evicted, uploads never', async (t) => {
   // A sphere of 8·4^4 triangles takes about 80 kB as PLY: some 13 of them are a megabyte.
   const d = await daemon(t, { args: ['--derived-bytes', '1M'] });
   const meshes = [];
@@ -49,7 +49,7 @@ test('the least used embeddings leave, uploads never', async (t) => {
   assert.equal((await d.made('/v1/embeddings', { mesh })).url, embeddings[2]);
 });
 
-test('what is removed while it is needed is made again', async (t) => {
+test('a derived object that is evicted while a job needs it is computed again', async (t) => {
   const d = await daemon(t, { args: ['--workers', '2', '--derived-bytes', '1M'] });
   const meshes = [];
   for (let i = 0; i < 6; i++)
@@ -158,7 +158,7 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
   assert.ok(derived <= 1 << 20, `${derived} bytes are derived`);
 });
 
-test('ended jobs beyond keep-jobs are forgotten, what is unfinished and what they made stays', async (t) => {
+test('ended jobs beyond keep-jobs are deleted; unfinished jobs and all results stay', async (t) => {
   const d = await daemon(t, { args: ['--keep-jobs', '3', '--workers', '1'] });
   const jobs = async () => (await d.get('/v1/jobs')).json.jobs.map(({ state }) => state);
   const mesh = async (level, i) =>

@@ -1,4 +1,4 @@
-// Who goes next: callers share the workers, small jobs pass large ones, and the urgent go first.
+// The order of jobs: clients share the workers, small jobs pass large ones, and urgent jobs go first.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import test from 'node:test';
@@ -55,7 +55,7 @@ async function occupy(d, options = {}) {
   };
 }
 
-test('callers take turns', async (t) => {
+test('clients take turns', async (t) => {
   const d = await daemon(t, { args: ['--auth', 'on', '--workers', '1'] });
   const [many, few, first] = [
     await bearer(d, 'many'),
@@ -78,7 +78,7 @@ test('callers take turns', async (t) => {
   assert.ok((await started(d, vip, first)) <= soonest, 'a class goes before everything');
 });
 
-test('the urgent jobs of a caller go first', async (t) => {
+test('urgent jobs of a client go first', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const free = await occupy(d);
   const jobs = [];

@@ -253,7 +253,7 @@ class Runner {
 }
 
 const skip = library ? false : 'ORB_INTERPOSE names no library';
-test('calls that fail are answered, not died of', { skip }, async (t) => {
+test('a failing call gives an error response, not a crash', { skip }, async (t) => {
   const runner = new Runner();
   const folder = await mkdtemp(path.join(base, 'orbmorph-fault-'));
   const preloaded = preload([library, sanitizer].filter(Boolean));

@@ -53,7 +53,7 @@ test('a job can be waited for', async (t) => {
   );
 });
 
-test('events tell the progress and the end, and resume', async (t) => {
+test('events report progress and the end, and resume', async (t) => {
   const d = await daemon(t);
   const mesh = await heavy(d);
   const { json: job } = await d.post('/v1/embeddings', { mesh: mesh.id });
@@ -75,7 +75,7 @@ test('events tell the progress and the end, and resume', async (t) => {
   assert.match(resumed.bytes.toString(), /^event: ?succeeded/m);
 });
 
-test('a job is cancelled while it waits and while it runs', async (t) => {
+test('a job can be cancelled while it waits and while it runs', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const [first, second] = [await heavy(d, 1, 5), await heavy(d, 2, 5)];
   const running = (await d.post('/v1/embeddings', { mesh: first.id, ...endless })).json;
@@ -97,7 +97,7 @@ test('a job is cancelled while it waits and while it runs', async (t) => {
   assert.equal((await d.delete(next.json.url)).status, 200);
 });
 
-test('what only a cancelled job needed is cancelled with it, at whatever moment; what others want goes on', async (t) => {
+test('cancelling a job also cancels the jobs that only it needs, at any moment', async (t) => {
   const d = await daemon(t, { args: ['--workers', '2'] });
   const [first, second] = [await heavy(d, 1, 5), await heavy(d, 2, 5)];
   const work = async () =>
@@ -121,7 +121,7 @@ test('what only a cancelled job needed is cancelled with it, at whatever moment;
   assert.equal((await d.delete(asked.url)).status, 200);
 });
 
-test('the same request while its job runs is that same job', async (t) => {
+test('repeating a request while its job runs returns that job', async (t) => {
   const d = await daemon(t);
   const mesh = await heavy(d);
   const replies = await Promise.all(Array.from({ length: 8 }, () => d.post('/v1/embeddings', { mesh: mesh.id })));
@@ -145,7 +145,7 @@ test('jobs are listed by state', async (t) => {
 
 const long = (mesh) => ({ mesh: mesh.id, ...endless });
 
-test('a preference that is not met in time brings the job', async (t) => {
+test('a wait that is too short returns the job', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const mesh = await heavy(d, 1, 5);
   const reply = await d.post('/v1/embeddings', long(mesh), { headers: { prefer: 'wait=1' } });
@@ -191,7 +191,7 @@ test('a full queue refuses new jobs and nothing else', async (t) => {
   for (const job of [jobs[0], third.json]) await d.delete(job.url);
 });
 
-test('the list of a state has the jobs that show it, also those that wait for what runs', async (t) => {
+test('the list of a state has exactly the jobs in it, also those that wait for a running job', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const meshes = [await heavy(d, 1, 5), await heavy(d, 2, 5), await heavy(d, 3, 5)];
   const merge = (

@@ -26,7 +26,7 @@ async function logged(d, wanted) {
   }
 }
 
-test('bytes that were sent are counted', async (t) => {
+test('the counters count the bytes sent', async (t) => {
   const d = await daemon(t);
   const sent = async () =>
     Number(/^orbmorph_sent_bytes_total (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
@@ -147,7 +147,7 @@ test('SIGHUP reads limits and quotas that take effect', async (t) => {
       `UPDATE token SET quota_bytes = ${quota} WHERE name = 'web'`,
     ]);
   await set(1000);
-  assert.equal((await upload(shapes.tetrahedron)).status, 201, 'before it is told, the old quota holds');
+  assert.equal((await upload(shapes.tetrahedron)).status, 201, 'the old quota holds until SIGHUP');
   await hup();
   assertProblem(await upload(`${shapes.tetrahedron}# 2\n`), 429, 'quota-exceeded');
   await set(100_000_000);
@@ -157,7 +157,7 @@ test('SIGHUP reads limits and quotas that take effect', async (t) => {
   assert.match(reply.headers.get('ratelimit-policy'), /"upload";q=100000000;/);
 });
 
-test('workers, and the threads of their jobs, give way by worker-nice', async (t) => {
+test('worker-nice lowers the priority of workers and of the threads of their jobs', async (t) => {
   const levels = async (d) => {
     const found = {};
     for (const thread of await readdir(`/proc/${d.child.pid}/task`)) {
@@ -193,7 +193,7 @@ test('workers, and the threads of their jobs, give way by worker-nice', async (t
   });
 });
 
-test('the counters tell of jobs, stages and the process', async (t) => {
+test('the counters cover jobs, stages and the process', async (t) => {
   const d = await daemon(t);
   const { id } = (await d.upload(shapes.obj(shapes.egg(4)))).json;
   await d.made('/v1/embeddings', { mesh: id });
@@ -228,7 +228,7 @@ test('the counters tell of jobs, stages and the process', async (t) => {
   assert.deepEqual((await d.get('/readyz')).json, { status: 'ready' });
 });
 
-test('the dashboard shows every family of metrics, and none that is not there', async (t) => {
+test('the dashboard shows every metric family and no unknown one', async (t) => {
   const d = await daemon(t);
   const { id } = (await d.upload(shapes.obj(shapes.egg(2)))).json;
   await d.made('/v1/embeddings', { mesh: id });

@@ -1,4 +1,4 @@
-// Behind nginx and Caddy with the configurations of docs/deploy.md, as they stand there but for addresses and folders.
+// Behind nginx and Caddy with the configurations of docs/deploy.md, unchanged except for addresses and folders.
 import assert from 'node:assert/strict';
 import { execFile, spawn, spawnSync } from 'node:child_process';
 import { readFile, writeFile } from 'node:fs/promises';

@@ -1,4 +1,4 @@
-// The shell lines of the documents run as they stand, against a real daemon; its links lead somewhere.
+// Runs the shell lines of the documents against a real daemon, and checks their links.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
@@ -60,11 +60,11 @@ for (const file of await documents()) {
   });
 }
 
-test('the documents with lines that run are there', async () => {
+test('the documents with executable lines exist', async () => {
   for (const file of Object.keys(expected)) assert.ok(await shellLines(file), file);
 });
 
-test('links and pictures are there', async () => {
+test('links and pictures exist', async () => {
   for (const file of await documents()) {
     const text = await readFile(path.join(root, file), 'utf8');
     for (const [, target] of text.replace(/^```[\s\S]*?^```$/gm, '').matchAll(/\]\(([^)]+)\)/g)) {

@@ -1,4 +1,4 @@
-// Requests that are wrong in every way HTTP and JSON allow.
+// Requests that are wrong in every way that HTTP and JSON allow.
 import assert from 'node:assert/strict';
 import net from 'node:net';
 import path from 'node:path';
@@ -65,7 +65,7 @@ test('health, metrics and the description', async (t) => {
   assert.match(openapi.json.openapi, /^3\.1/);
 });
 
-test('JSON that is none', async (t) => {
+test('invalid JSON', async (t) => {
   const d = await daemon(t);
   const mesh = await d.mesh(path.join(samples, 'dog.obj'));
   const body = JSON.stringify({ mesh: mesh.id });
@@ -118,7 +118,7 @@ test('a body that is too large is refused before it is read', async (t) => {
   assert.equal(statusOf(sent), 413, sent.slice(0, 300));
 });
 
-test('a body must say how long it is, or come in chunks', async (t) => {
+test('a body needs a length, or chunks', async (t) => {
   const d = await daemon(t);
   const { host } = new URL(d.url);
   const none = await raw(d, `POST /v1/meshes HTTP/1.1\r\nHost: ${host}\r\nConnection: close\r\n\r\n`);
@@ -135,7 +135,7 @@ test('a body must say how long it is, or come in chunks', async (t) => {
   assert.equal(statusOf(chunked), 201, chunked.slice(0, 300));
 });
 
-test('requests that could mean two things are refused', async (t) => {
+test('ambiguous requests are refused', async (t) => {
   const d = await daemon(t);
   const { host } = new URL(d.url);
   const bad = {

@@ -1,4 +1,4 @@
-// Who follows a job learns of its end, whatever number he comes back with.
+// A client that follows a job receives its end, whichever event number it resumes with.
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { daemon, endless, until } from './support/daemon.mjs';
@@ -9,7 +9,7 @@ const events = (d, job, seen) =>
 const names = (reply) => [...reply.bytes.toString().matchAll(/^event: (\w+)$/gm)].map((m) => m[1]);
 const ids = (reply) => [...reply.bytes.toString().matchAll(/^id: (\d+)$/gm)].map((m) => Number(m[1]));
 
-test('a number of no event counts as none, one of the last event as all; also after a restart', async (t) => {
+test('resuming after an unknown event sends all events, after the last one none; also after a restart', async (t) => {
   const d = await daemon(t);
   const { id } = (await d.upload(shapes.obj(shapes.egg(3)))).json;
   const job = await d.ended((await d.post('/v1/embeddings', { mesh: id })).json);
@@ -31,7 +31,7 @@ test('a number of no event counts as none, one of the last event as all; also af
   }
 });
 
-test('who saw events that a stop lost learns of the end', async (t) => {
+test('a client that saw events that a stop lost still receives the end', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1', '--drain-seconds', '0'] });
   const { id } = (await d.upload(shapes.binaryPly(shapes.ball(4)))).json;
   const job = (await d.post('/v1/embeddings', { mesh: id, ...endless })).json;
@@ -39,7 +39,7 @@ test('who saw events that a stop lost learns of the end', async (t) => {
   await d.stop();
   await d.start();
   await until(async () => (await d.get(job.url)).json.state === 'running', 'it runs again');
-  const followed = events(d, job, 1_900_000); // as if much had been told in the attempt that was broken off
+  const followed = events(d, job, 1_900_000); // as if the interrupted attempt had sent many events
   await until(async () => (await d.get('/readyz?verbose')).json.waiting_connections === 1, 'it is followed');
   assert.equal((await d.delete(job.url)).status, 200);
   assert.equal(names(await followed).at(-1), 'cancelled');

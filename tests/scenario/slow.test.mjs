@@ -1,4 +1,4 @@
-// Clients that are slow on purpose, that never read, that never stop sending; and addresses that ask too much.
+// Clients that are slow on purpose, never read or never stop sending; and addresses that exceed their limits.
 import assert from 'node:assert/strict';
 import net from 'node:net';
 import test from 'node:test';
@@ -26,7 +26,7 @@ const within = (promise, what) =>
   ]);
 const HURRY = ['--header-seconds', '1', '--slow-seconds', '1', '--min-rate', '1000'];
 
-test('headers and bodies that only trickle in', async (t) => {
+test('slow headers and bodies', async (t) => {
   const d = await daemon(t, { args: HURRY });
   const patient = await daemon(t, { args: ['--slow-seconds', '3', '--min-rate', '100'] });
   const trickle = async (c, head, letter) => {
@@ -61,7 +61,7 @@ test('headers and bodies that only trickle in', async (t) => {
   assert.equal((await d.get('/livez')).status, 200);
 });
 
-test('answers that nobody takes, and clients that wait', async (t) => {
+test('responses that nobody reads, and clients that wait', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const size = 60_000_000;
   const head = `${shapes.tetrahedron}`;
@@ -99,7 +99,7 @@ test('answers that nobody takes, and clients that wait', async (t) => {
   for (const job of jobs) await d.delete(job.url);
 });
 
-test('a refusal reaches those who send first and read later', async (t) => {
+test('a refusal reaches clients that send everything before they read', async (t) => {
   const d = await daemon(t, { args: ['--max-body', '1M'] });
   const block = Buffer.alloc(64 * 1024, '#');
   for (const [what, framing, megabytes] of [
@@ -126,7 +126,7 @@ test('a refusal reaches those who send first and read later', async (t) => {
   assert.equal((await d.upload(shapes.tetrahedron)).status, 201);
 });
 
-test('an address has so many requests and connections', async (t) => {
+test('limits of requests and connections for an address', async (t) => {
   const free = await daemon(t);
   assert.equal((await free.get('/v1/meshes')).headers.get('ratelimit'), null, 'on loopback there is no limit');
   const d = await daemon(t, {
@@ -155,7 +155,7 @@ test('an address has so many requests and connections', async (t) => {
   }, 'refused and closed');
   const alive = connect(d, t);
   alive.socket.write('GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n');
-  await within(alive.ended, 'health is always told');
+  await within(alive.ended, 'health checks always get a response');
   assert.match(alive.text, /^HTTP\/1\.1 200 /);
   many.forEach((c) => c.socket.destroy());
   await until(async () => (await d.get('/v1/meshes')).status === 200, 'those that went are forgotten');

@@ -111,7 +111,7 @@ test('landmarks inside triangles become vertices; each shape has its sphere and 
   assertProblem(await d.get(sphere), 404, 'not-found');
 });
 
-test('the check of the data looks at the aligned spheres too', async (t) => {
+test('--check-data checks the aligned spheres, too', async (t) => {
   const d = await daemon(t);
   const list = [];
   for (const m of [shapes.egg(2), shapes.bean(2)]) list.push({ mesh: (await d.upload(shapes.obj(m))).json.id });

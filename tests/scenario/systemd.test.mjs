@@ -1,4 +1,4 @@
-// Unix sockets, and systemd's side of the bargain played by this script: a socket passed on, and notifications taken.
+// Unix sockets, and systemd played by this script: it passes a socket on and receives notifications.
 import assert from 'node:assert/strict';
 import { execFile, spawn } from 'node:child_process';
 import { chmod, lstat, mkdtemp, rm, writeFile } from 'node:fs/promises';
@@ -125,7 +125,7 @@ test('a passed socket that others can reach needs tokens', async (t) => {
   assert.equal((await get({ port, agent: false })).status, 401);
 });
 
-test('systemd is told of start, reload, life and end', async (t) => {
+test('systemd is notified of start, reload, watchdog and stop', async (t) => {
   const home = await folder(t);
   const at = path.join(home, 'notify');
   const log = [];
@@ -160,7 +160,7 @@ test('systemd is told of start, reload, life and end', async (t) => {
   await told(/^STOPPING=1$/);
 });
 
-test('the data folder of another process is left alone', async (t) => {
+test('the daemon does not use the data folder of another process', async (t) => {
   const d = await daemon(t);
   const second = await start(t, ['--data', d.data, '--listen', '127.0.0.1:0']);
   assert.equal((await second.exited).code, 1);

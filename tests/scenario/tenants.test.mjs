@@ -1,4 +1,4 @@
-// Tenants: what one token may see of another's and do to it, though equal bytes and equal requests are stored once.
+// Tenants: what one token may see and change of another's, although equal bytes and equal requests are stored once.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { readdir } from 'node:fs/promises';
@@ -33,7 +33,7 @@ async function tenants(t, ...args) {
   return { d, token, add, upload, list, end };
 }
 
-/** Two answers that cannot be told apart, but for what differs between any two requests. */
+/** Asserts that two responses are equal except for what differs between any two requests. */
 function assertSame(a, b, hide, what) {
   const plain = (reply) => hide.reduce((text, word) => text.replaceAll(word, '*'), reply.bytes.toString());
   assert.equal(a.status, b.status, what);
@@ -126,7 +126,7 @@ test("another tenant's things are not there", async (t) => {
   assert.equal(before.length, 3);
 });
 
-test('the number of a request tells nothing of those of others', async (t) => {
+test('the id of a request reveals nothing about other tenants', async (t) => {
   const { d, add } = await tenants(t);
   const [ann, bob] = [await add('ann', 'read'), await add('bob', 'read')];
   const seen = [];
@@ -138,7 +138,7 @@ test('the number of a request tells nothing of those of others', async (t) => {
   assert.ok(steps.some((step) => step < 0n) && steps.some((step) => step > 0n), 'they do not count');
 });
 
-test('page tokens do not count what others have', async (t) => {
+test('page tokens reveal nothing about other tenants', async (t) => {
   const { d, add, upload } = await tenants(t);
   const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')];
   const tokens = [];
@@ -178,7 +178,7 @@ test('page tokens do not count what others have', async (t) => {
     assertProblem(await page(token), 400, 'bad-query', token);
 });
 
-test('an upload does not tell that others have the same', async (t) => {
+test('an upload does not reveal that another tenant has the same mesh', async (t) => {
   const { d, add, upload } = await tenants(t);
   const [ann, bob] = [await add('ann', 'read,write'), await add('bob', 'read,write')];
   const first = await upload(ann, small, { name: 'secret' });
@@ -254,7 +254,7 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
   assert.deepEqual(await list(ann, 'supermeshes'), []);
 });
 
-test('who deletes gives up its own', async (t) => {
+test('deleting removes only the own tenant from the owners', async (t) => {
   const { d, token, add, upload, list, end } = await tenants(t);
   const quota = ['--quota', String(small.length + other.length)];
   const [ann, bob, admin] = [

@@ -128,7 +128,7 @@ test('a morph over TLS', async (t) => {
   assert.equal(await d.exited, 0, d.log);
 });
 
-test('without a certificate that works it does not start', async (t) => {
+test('the daemon does not start without a valid certificate', async (t) => {
   const { home, key, file } = await certificate(t);
   const data = path.join(home, 'data');
   const broken = path.join(home, 'broken.pem');

@@ -11,7 +11,7 @@ import * as shapes from './support/shapes.mjs';
 const run = (d, ...args) => promisify(execFile)(binaries.daemon, ['token', ...args, '--data', d.data]);
 const bearer = (token) => ({ headers: { authorization: `Bearer ${token}` } });
 
-test('tokens open what their scopes say', async (t) => {
+test('tokens allow what their scopes say', async (t) => {
   const d = await daemon(t, { args: ['--auth', 'on'] });
   for (const open of ['/livez', '/readyz']) assert.equal((await d.get(open)).status, 200);
   assertProblem(await d.get('/v1/meshes'), 401, 'unauthorized');

@@ -1,4 +1,4 @@
-// The pictures that view draws of small GLB files made here.
+// The pictures that `orbmorph view` draws of small GLB files.
 import assert from 'node:assert/strict';
 import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';

@@ -61,7 +61,7 @@ static void test_objects(void **state) {
   assert_int_equal(pread(fd, part, 4, 3), 4); /* a range of it */
   assert_string_equal(part, "3456");
   assert_int_equal(objects_delete(s->store, OBJECT_MESH, id), STORE_OK);
-  assert_int_equal(pread(fd, part, 4, 6), 4); /* who reads it still can */
+  assert_int_equal(pread(fd, part, 4, 6), 4); /* a reader that has it open can go on */
   assert_string_equal(part, "6789");
   close(fd);
   assert_int_equal(objects_delete(s->store, OBJECT_MESH, id), STORE_OK); /* gone is gone */
@@ -150,7 +150,7 @@ static job_row read_job(stored *s, const char *id) {
   return row;
 }
 
-/* Each step holds on (job, attempt): of two workers that believe to have a job, one is told that it has not. */
+/* Each step checks (job, attempt): of two workers that both believe to have a job, one is refused. */
 static void test_attempts(void **state) {
   stored *s = *state;
   job_row job = new_job('1');
@@ -185,8 +185,8 @@ static void test_attempts(void **state) {
   free(events[0].json);
 }
 
-/* Deaths: what ran is queued again, first as a suspect; who ran alone in three of them is failed, with its last event.
- */
+/* Crashes: jobs that ran are queued again, first as suspects. A job that ran alone in three crashes fails, with its
+ * last event. */
 static void test_recovery(void **state) {
   stored *s = *state;
   job_row a = new_job('a'), b = new_job('b'), waiting = new_job('c'), rows[4];

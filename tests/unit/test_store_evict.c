@@ -119,7 +119,7 @@ static void test_needed_rows_fill_pages(void **state) {
 }
 
 int main(void) {
-  log_setup(LOG_WARN, 0); /* each object that leaves is told */
+  log_setup(LOG_WARN, 0); /* each evicted object is logged */
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_needed_rows_fill_pages, setup, teardown),
   };

@@ -37,7 +37,7 @@ static job_row new_job(int64_t number) {
   return row;
 }
 
-/* What a run was told. */
+/* What the calls of a run returned. */
 typedef struct told {
   store_result object, mesh, job, claim, finish, token, gone;
 } told;

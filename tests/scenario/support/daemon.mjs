@@ -15,10 +15,10 @@ export const binaries = {
 };
 // A build with sanitizers is several times slower; tests that do much take less of it there.
 export const slow = process.env.ORB_SLOW === '1';
-// How many times longer than usual is waited for what should come: under memcheck, or on a machine with other work.
+// Factor by which tests wait longer than usual: under memcheck, or on a busy machine.
 export const patience = Number(process.env.ORB_TEST_PATIENCE ?? 1);
 assert.ok(patience >= 1, 'ORB_TEST_PATIENCE is a factor of at least 1');
-// Milliseconds for which a test dawdles after each answer: finds tests that want to see a job before it has ended.
+// Milliseconds that a test pauses after each response: finds tests that depend on seeing a job before it ends.
 const dawdle = Number(process.env.ORB_TEST_DAWDLE ?? 0);
 assert.ok(dawdle >= 0, 'ORB_TEST_DAWDLE is in milliseconds');
 

@@ -1,4 +1,4 @@
-// How far points are from a surface of triangles, by going through them all with bounding balls.
+// Distances of points from a surface, by testing the bounding balls of all triangles.
 
 const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

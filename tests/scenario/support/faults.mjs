@@ -1,5 +1,5 @@
-// What the scenario "faults" is made of: the board on which it says what is to fail (tests/faults/interpose.c), and a
-// caller that goes through a fixed sequence of requests and notes what was promised.
+// Parts of the scenario "faults": the board that tells the interposer what to fail (tests/faults/interpose.c), and a
+// client that sends a fixed sequence of requests and notes what the daemon accepted.
 import assert from 'node:assert/strict';
 import { closeSync, openSync, readSync, writeFileSync, writeSync } from 'node:fs';
 import path from 'node:path';

@@ -1,4 +1,4 @@
-// Real meshes, where their folder is there: an index.csv with the folders good, weldable, bad and pairs beside it.
+// Real meshes, if their folder exists: an index.csv beside the folders good, weldable, bad and pairs.
 import { existsSync, readFileSync, readdirSync } from 'node:fs';
 import path from 'node:path';
 
