@@ -13,10 +13,10 @@
 #include "align/pin/joint.h"
 #include "align/sheet/landmarks.h"
 #include "numeric/vec3.h"
+#include "orbmorph/align.h"
 #include "support_align.h"
 #include "support_bodies.h"
 #include "support_shared.h"
-#include "orbmorph/align.h"
 
 /* The k-th neighbour of vertex v, in the order of the triangles. */
 static int32_t neighbour(const orb_mesh *mesh, int32_t v, int k) {

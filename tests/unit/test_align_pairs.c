@@ -11,11 +11,11 @@
 #include <cmocka.h>
 
 #include "numeric/vec3.h"
+#include "orbmorph/align.h"
 #include "orbmorph/embed.h"
 #include "orbmorph/remesh.h"
 #include "support_align.h"
 #include "support_shared.h"
-#include "orbmorph/align.h"
 
 enum { LANDMARKS_MAX = 64, NAME_MAX_LENGTH = 128 };
 

@@ -15,10 +15,10 @@
 #include "align/rbf/warp.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
+#include "orbmorph/align.h"
 #include "support_align.h"
 #include "support_bodies.h"
 #include "support_shapes.h"
-#include "orbmorph/align.h"
 
 static void like_landmarks_meet(void **state) {
   (void)state;

@@ -11,9 +11,9 @@
 
 #include "align/rbf/warp.h"
 #include "numeric/vec3.h"
+#include "orbmorph/align.h"
 #include "support_align.h"
 #include "support_bodies.h"
-#include "orbmorph/align.h"
 
 enum { COUNT = 14 };
 

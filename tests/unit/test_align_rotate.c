@@ -13,8 +13,8 @@
 #include "align/rotate/rotate.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
-#include "support_shapes.h"
 #include "orbmorph/align.h"
+#include "support_shapes.h"
 
 static orb_context *make_context(int threads) {
   orb_context_options options = {.threads = threads};
