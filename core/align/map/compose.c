@@ -223,7 +223,7 @@ static orb_status place_start(orb_map_run *c, orb_refiner *r, orb_map_start star
 }
 
 /* Clears the flips of a start's first level. *flips: those left; a finer level may clear them, unless *given_up: the
- * start leads nowhere. That is no error: another start or the given alignment stays. */
+ * start is dropped, which is not an error: another start, or the given alignment, remains. */
 static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_start start, orb_map_level *l,
                               int32_t *flips, int *given_up) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;

@@ -20,12 +20,10 @@ enum {
   COARSE_A_LANDMARK = 6, /* and for each landmark */
   WALKS = 2              /* walks, each on a level of twice as many vertices */
 };
-/* Growth of a sheet, relative to its triangles: little for landmarks that merely cross, much for landmarks whose order
- * differs much. */
-static const double GROWTH_SMALL = 0.35, GROWTH_MAX = 64;
-/* Visits of nodes and vertices, see orb_pin_room: about a minute of them, and the share of each trial in the search for
- * the landmark to name. A hundred and fifty random landmarks take a few seconds. */
-static const int64_t WORK = 500000000, WORK_OF_TRIAL = 80000000;
+/* Growth of a sheet, relative to its triangles, that is tried first: enough for landmarks that merely cross. */
+static const double GROWTH_SMALL = 0.35;
+/* Visits of nodes and vertices, see orb_pin_room, of each trial in the search for the landmark to name. */
+static const int64_t WORK_OF_TRIAL = 80000000;
 
 /* Carries all other shapes onto the landmarks of shape 0, whose embedding stays. *stuck: the first shape for which that
  * failed; 0: none. */
@@ -55,7 +53,7 @@ static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count,
                        int32_t count, const orb_align_options *options, int64_t work, int *held, int32_t *shape) {
   orb_preset preset = options->preset;
   int32_t coarse = COARSE_A_LANDMARK * count > COARSE ? COARSE_A_LANDMARK * count : COARSE;
-  double most = options->max_growth > 0 ? options->max_growth : GROWTH_MAX;
+  double most = options->max_growth > 0 ? options->max_growth : ORB_PIN_GROWTH;
   orb_pin_room room = {most < GROWTH_SMALL ? most : GROWTH_SMALL, work};
   int stuck = 1;
   *held = 1;
@@ -129,6 +127,6 @@ orb_status orb_align_pin(orb_context *ctx, orb_sheet *sheets, int32_t shape_coun
                          int32_t count, const orb_align_options *options) {
   int held;
   int32_t shape;
-  ORB_TRY(meet(ctx, sheets, shape_count, landmarks, count, options, WORK, &held, &shape));
+  ORB_TRY(meet(ctx, sheets, shape_count, landmarks, count, options, ORB_PIN_WORK, &held, &shape));
   return held ? ORB_OK : refuse(ctx, sheets, shape_count, landmarks, count, options, shape);
 }

@@ -32,8 +32,6 @@ enum {
   RELAX_SWEEPS = 20 /* of a relaxation */
 };
 static const double DEFAULT_RADIUS = 1.0; /* chord on the unit sphere: a sixth of the circumference */
-static const double GROWTH_MAX = 64;      /* orb_align_options.max_growth of pin, whose patches are used */
-static const int64_t WORK = 500000000;    /* visits of nodes and vertices, as in pin: about a minute */
 
 typedef struct rbf_run {
   orb_context *ctx;
@@ -128,7 +126,7 @@ static orb_status warp_shape(rbf_run *r, int32_t steps) {
       ORB_TRY(orb_pin_relax(r->ctx, r->sheet, r->active, r->count, ORB_PRESET_FAST, RELAX_SWEEPS));
       relaxations++;
     } else {
-      orb_pin_room room = {GROWTH_MAX, WORK};
+      orb_pin_room room = {ORB_PIN_GROWTH, ORB_PIN_WORK};
       ORB_TRY(orb_pin_patches(r->ctx, r->sheet, r->active, r->count, r->targets, ORB_PRESET_FAST, &room, &good));
       return good ? ORB_OK : refuse(r);
     }
