@@ -5,13 +5,11 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "orbmorph/remesh_methods.h"
 #include "program.h"
 #include "text.h"
 
 _Static_assert(OPT_COUNT <= 64, "a command holds its options in 64 bits");
 
-#define WORD(id, name) " " name /* the list skips the first blank */
 const cli_option cli_options[OPT_COUNT] = {
     [OPT_SERVER] = {"server", 's', "URL", NULL,
                     "address of the daemon; default: $ORBMORPH_SERVER or " CLI_DEFAULT_SERVER},
@@ -22,7 +20,7 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_REPORT] = {"report", 0, "FILE", NULL, "also write a report: Markdown if FILE ends in .md, else JSON"},
     [OPT_LANDMARKS] = {"landmarks", 'l', "FILE", NULL, "read landmarks from FILE, or find them with auto"},
     [OPT_ALIGN] = {"align", 0, "METHOD", "pin rbf rotate auto", "alignment method"},
-    [OPT_REMESH] = {"remesh", 0, "METHOD", &(ORB_REMESH_METHODS(WORD))[1], "remeshing method"},
+    [OPT_REMESH] = {"remesh", 0, "METHOD", "adaptive overlay subdivision convex-hull", "remeshing method"},
     [OPT_TOLERANCE] = {"tolerance", 't', "X", NULL, "allowed error, as a fraction of each shape's diagonal"},
     [OPT_MAX_TRIANGLES] = {"max-triangles", 'n', "N", NULL, "make at most N triangles"},
     [OPT_NO_NORMALS] = {"no-normals", 0, NULL, NULL, "write no normals into the asset"},

@@ -142,7 +142,10 @@ def main():
                 print(f"    {one} -> {other}: {', '.join(sorted(arrows[one][other])[:4])}")
     for one in sorted(arrows):
         for other in sorted(arrows[one]):
-            if level(one) is not None and level(other) is not None and level(other) > level(one):
+            if one.startswith("client/") and not other.startswith("client/"):
+                faults += 1
+                print(f"a client knows only HTTP: {one} -> {other}: {', '.join(sorted(arrows[one][other])[:4])}")
+            elif level(one) is not None and level(other) is not None and level(other) > level(one):
                 faults += 1
                 print(f"upward: {one} -> {other}: {', '.join(sorted(arrows[one][other])[:4])}")
     if listing:

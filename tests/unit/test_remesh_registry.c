@@ -145,11 +145,27 @@ static void the_clients_name_every_method(void **state) {
   }
 }
 
+/* The command line knows only HTTP: its words stand in its own table, in the order of the list. */
+static void the_command_line_takes_the_same_words(void **state) {
+  (void)state;
+  char words[256] = "\"";
+  for (int i = 0; i < ORB_REMESH_METHOD_COUNT; i++) {
+    size_t used = strlen(words);
+    snprintf(words + used, sizeof words - used, "%s%s%s", i ? " " : "", orb_remesh_method_name((orb_remesh_method)i),
+             i + 1 < ORB_REMESH_METHOD_COUNT ? "" : "\"");
+  }
+  char *text = read_source("client/cli/options.c");
+  if (!strstr(text, words)) {
+    fail_msg("client/cli/options.c does not have %s", words);
+  }
+  free(text);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(names_and_methods_correspond),        cmocka_unit_test(every_listed_method_is_built),
       cmocka_unit_test(methods_heed_what_the_registry_says), cmocka_unit_test(the_api_document_names_the_same_methods),
-      cmocka_unit_test(the_clients_name_every_method),
+      cmocka_unit_test(the_clients_name_every_method),       cmocka_unit_test(the_command_line_takes_the_same_words),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

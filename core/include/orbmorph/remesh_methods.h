@@ -1,5 +1,5 @@
 /* The list of remesh methods: the identifier in C, and the name in requests, options and reports. The enumeration
- * orb_remesh_method, orb_remesh_method_name() and the word lists of the programs are made from it, in this order.
+ * orb_remesh_method, orb_remesh_method_name() and the words that requests take are made from it, in this order.
  *
  * Use: #define WORD(id, name) name, … ORB_REMESH_METHODS(WORD) */
 #ifndef ORBMORPH_REMESH_METHODS_H
