@@ -18,14 +18,14 @@ static const char usage_text[] =
     "       orbmorph-bench truth [options] --landmarks FILE A B\n"
     "       orbmorph-bench remesh [options] (--bodies N,N... | [--keep FILE] A B [C...])\n"
     "\n"
-    "Measures the library in-process; one JSON object a line for every repeat.\n"
+    "Measures the library in-process and prints one JSON object per repeat, each on its own line.\n"
     "  --method M        newton (default) or kernel-sampling\n"
     "  --preset P        default, fast or quality\n"
-    "  --options JSON    options of the embedding, as in a request: '{\"energy_weight\":0}'\n"
-    "  --repair LIST     safe (default), none, fill_holes, largest_component, as at an upload\n"
-    "  --threads N       threads in all (default: those of the machine)\n"
+    "  --options JSON    embedding options as in a request: '{\"energy_weight\":0}'\n"
+    "  --repair LIST     safe (default), none, fill_holes, largest_component, as for an upload\n"
+    "  --threads N       number of threads (default: one per processor)\n"
     "  --cpu C           auto (default), avx512, avx2 or plain: the widest vector instructions to use\n"
-    "  --repeat N        runs of every file (1)\n"
+    "  --repeat N        runs per file (1)\n"
     "  --out DIR         embed: write DIR/NAME.sphere.ply\n"
     "  --out FILE.glb    merge: write the asset\n"
     "  --align M         pin (default with landmarks), rbf, rotate or auto (default without)\n"
@@ -34,20 +34,20 @@ static const char usage_text[] =
     "  --tolerance X     adaptive: relative to the diagonal (0.001)\n"
     "  --max-triangles N\n"
     "  --landmarks FILE  a landmarks array, alone or as the member \"landmarks\"\n"
-    "landmarks pins sets of random landmarks on pairs of the files, pairs merges every pair of them:\n"
-    "  --sets N          sets of landmarks (100), or pairs (all)\n"
-    "  --first N         number of the first set or pair (0); a set depends on seed and number only\n"
+    "landmarks pins sets of random landmarks on pairs of the files; pairs merges every pair of them:\n"
+    "  --sets N          number of landmark sets (100) or pairs (all)\n"
+    "  --first N         first set or pair (0); a set depends only on the seed and its number\n"
     "  --seed N          (1)\n"
-    "  --sizes LIST      landmarks in a set, by turns (3,10,30,60), or 'awkward'\n"
-    "  --merge-every N   every N-th set is remeshed too (0: none)\n"
-    "  --seconds N       give a set or pair up after so long (0: never)\n"
-    "truth measures how true the map from A to B is:\n"
-    "  --given N         align by the first N landmarks only and measure at the rest (all)\n"
+    "  --sizes LIST      landmarks per set; the sets cycle through the list (3,10,30,60); or 'awkward'\n"
+    "  --merge-every N   also remesh every N-th set (0: none)\n"
+    "  --seconds N       abandon a set or pair after N seconds (0: never)\n"
+    "truth measures how accurate the map from A to B is:\n"
+    "  --given N         align by the first N landmarks and measure at the rest (all)\n"
     "  --methods LIST    of rotate, rbf, fast, default, quality, auto (all of them)\n"
-    "  --bodies N,N,...  remesh: bodies made on the spot, of so many triangles\n"
-    "  --keep FILE       remesh: keeps the alignment there, and takes it from there the next time\n"
+    "  --bodies N,N,...  remesh: generate one body for each number of triangles\n"
+    "  --keep FILE       remesh: save the alignment to FILE, or load it if FILE exists\n"
     "  --version, --help\n"
-    "Exit status 0 done, 1 refused (the reason on standard error), 2 wrong usage.\n";
+    "Exit status: 0 done, 1 refused (the reason is on standard error), 2 wrong usage.\n";
 
 static int wrong(const char *message, const char *what) {
   fprintf(stderr, "orbmorph-bench: %s%s\nTry orbmorph-bench --help.\n", message, what);
@@ -81,7 +81,7 @@ static int read_word(const char *name, const char *text, const char *const *word
   return 0;
 }
 
-/* The table of the wire's embedding options reads them, so that names and ranges are the same. */
+/* Parses the options with the table of the API, so names and ranges are those of a request. */
 static int read_options(const char *text, orb_embed_options *options) {
   api_text request = {0};
   api_problem problem = {0};

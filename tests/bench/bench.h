@@ -17,13 +17,13 @@ typedef struct bench_options {
   orb_embed_options embed;
   orb_merge_options merge;
   int align_given;
-  const char *sizes; /* landmarks: how many in a set, by turns */
+  const char *sizes; /* landmarks: numbers per set; the sets cycle through them */
   long sets, first, merge_every, seconds;
   uint64_t seed;
-  const char *methods; /* truth: a list with commas; NULL: all */
-  long given;          /* truth: landmarks that the alignment gets; −1: all */
-  const char *bodies;  /* remesh: sizes of generated bodies, with commas */
-  const char *keep;    /* remesh: a file for the alignment */
+  const char *methods; /* truth: a comma-separated list; NULL: all */
+  long given;          /* truth: number of landmarks for the alignment; −1: all */
+  const char *bodies;  /* remesh: triangles of each generated body, comma-separated */
+  const char *keep;    /* remesh: the file that stores the alignment */
   char **files;
   int file_count;
 } bench_options;
@@ -35,35 +35,35 @@ int bench_pairs(const bench_options *options);
 int bench_truth(const bench_options *options);
 int bench_remesh(const bench_options *options);
 
-/* A file in memory, of malloc(); 0 with a message on standard error. */
+/* Reads a file into a buffer from malloc(). Prints the reason and returns 0 on failure. */
 int bench_slurp(const char *path, unsigned char **bytes, size_t *size);
-/* Writes a buffer; 0 with a message. */
+/* Writes a buffer to a file. Prints the reason and returns 0 on failure. */
 int bench_spill(const char *path, const unsigned char *bytes, size_t size);
 
 /* "dir/cow.obj" → "cow". */
 void bench_name_of(const char *path, char name[ORB_NAME_MAX]);
 
-/* A context with so many threads; ends the program when there is no memory. */
+/* Creates a context; exits the program when out of memory. */
 orb_context *bench_open(int threads, orb_cpu cpu);
 
-/* Peak of the resident set since the last reset. Where the kernel cannot reset it: since the program began. */
+/* Peak of the resident set in bytes since the last reset, or since the start where the kernel cannot reset it. */
 void bench_reset_peak(void);
 int64_t bench_peak(void);
-/* Processor time of all threads so far, in seconds. */
+/* Processor time of all threads since the program began, in seconds. */
 double bench_cpu(void);
 
-/* Prints why on standard error, `path: detail`. */
+/* Prints the error of the context on standard error as `path: status: detail`. */
 void bench_complain(const char *path, const orb_context *ctx);
 
-/* Ends a line: prints the text and frees it. 0 out of memory. */
+/* Prints the text as one line and frees it. Returns 0 when out of memory or when the write fails. */
 int bench_print(api_text *line);
 
-/* A mesh as the daemon takes it: read, then repaired. */
+/* A mesh that was read and repaired as the daemon does it. */
 typedef struct bench_mesh {
   char name[ORB_NAME_MAX];
   orb_mesh mesh;
   int32_t raw_triangle_count;
-  int32_t *raw_corners; /* 3 a triangle of the file: its vertices in the file */
+  int32_t *raw_corners; /* 3 per triangle of the file: its vertices in the file */
   double read_seconds, check_seconds;
 } bench_mesh;
 int bench_load(orb_context *ctx, const char *path, unsigned repair, int keep_corners, bench_mesh *out);
@@ -78,10 +78,10 @@ typedef struct bench_fleet {
 } bench_fleet;
 int bench_fleet_load(const bench_options *options, bench_fleet *out);
 void bench_fleet_free(bench_fleet *fleet);
-/* A context that gives up after options->seconds (0: never). */
+/* Creates a context whose deadline is options->seconds from now (0: none). */
 orb_context *bench_open_limited(const bench_options *options);
 
-/* The place that a caller names; 0 and why (a literal). */
+/* Finds the place that a landmark names. Returns 0 and the reason (a string literal) in *why on failure. */
 int bench_place(orb_context *ctx, const bench_mesh *mesh, const api_place *spot, orb_nearest **tree, orb_place *out,
                 const char **why);
 
@@ -98,11 +98,11 @@ typedef struct bench_set {
   double read, embed;
 } bench_set;
 
-/* Reads and embeds options->files; 0 with a message. count is set by the caller. */
+/* Reads and embeds options->files. The caller sets count. Prints the reason and returns 0 on failure. */
 int bench_set_load(orb_context *ctx, const bench_options *options, bench_set *set);
 void bench_set_free(orb_context *ctx, bench_set *set);
 
-/* A body with limbs, of at least so many triangles, with a certified embedding; 0 on failure. */
+/* Generates a body with limbs, at least `triangles` triangles and a certified embedding. Returns 0 on failure. */
 int bench_body(orb_context *ctx, int32_t triangles, uint64_t seed, orb_aligned_shape *out);
 
 #endif

@@ -1,4 +1,4 @@
-// orbmorph-bench keeps the contract: fields, arithmetic, exit statuses. Run by ctest with ORB_BIN and ORB_SAMPLES.
+// Tests orbmorph-bench: the members it prints, their arithmetic, exit statuses. ctest sets ORB_BIN and ORB_SAMPLES.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -21,7 +21,7 @@ const bench = (args, env = {}) => {
 const dog = join(samples, 'dog.obj');
 const giraffe = join(samples, 'giraffe.off');
 
-test('embed prints one line a repeat of every file', () => {
+test('embed prints one line per file and repeat', () => {
   const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));
   const r = bench(['embed', '--threads', '2', '--repeat', '2', '--out', dir, dog, giraffe], {
     OPENBLAS_NUM_THREADS: '7',
@@ -46,7 +46,7 @@ test('embed prints one line a repeat of every file', () => {
   rmSync(dir, { recursive: true });
 });
 
-test('both methods, options of a request, and the same sphere for any number of threads', () => {
+test('embed takes both methods and the options of a request; any number of threads gives the same sphere', () => {
   const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));
   const spheres = [1, 3].map((n) => {
     const r = bench(['embed', '--threads', `${n}`, `--out=${dir}`, '--options', '{"energy_weight":0}', dog]);
@@ -62,7 +62,7 @@ test('both methods, options of a request, and the same sphere for any number of 
   assert.ok(paper.lines[0].certificate.valid);
 });
 
-test('merge writes the asset and its report', () => {
+test('merge writes the asset and prints its report', () => {
   const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));
   const out = join(dir, 'out.glb');
   const r = bench([
@@ -88,7 +88,7 @@ test('merge writes the asset and its report', () => {
   rmSync(dir, { recursive: true });
 });
 
-test('landmarks: a set depends on the seed and its number only, and is right', () => {
+test('landmarks: a set depends only on the seed and its number, and is correct', () => {
   const elephant = join(samples, 'elephant.ply');
   const run = (...more) => {
     const r = bench(['landmarks', '--sizes', '3,12', ...more, dog, giraffe, elephant]);
@@ -116,7 +116,7 @@ test('landmarks: a set depends on the seed and its number only, and is right', (
   assert.deepEqual([third.shapes, third.growth], [all[2].shapes, all[2].growth]);
 });
 
-test('pairs: every pair once, certified', () => {
+test('pairs: merges every pair once, certified', () => {
   const r = bench(['pairs', '--align-preset', 'fast', dog, giraffe, join(samples, 'elephant.ply')]);
   assert.equal(r.status, 0, r.error);
   assert.deepEqual(
@@ -146,7 +146,7 @@ test('pairs: every pair once, certified', () => {
   );
 });
 
-test('landmarks: awkward sets meet, and contradictions are refused with both named', () => {
+test('landmarks: meets awkward sets; refuses contradictions and names both landmarks', () => {
   const r = bench(['landmarks', '--sizes', 'awkward', '--sets', '8', dog, giraffe, join(samples, 'elephant.ply')]);
   assert.equal(r.status, 0, r.error);
   assert.deepEqual(
@@ -156,7 +156,7 @@ test('landmarks: awkward sets meet, and contradictions are refused with both nam
   assert.ok(r.lines.every((l) => l.right));
 });
 
-test('truth: a shape mapped to itself is where it was; landmarks not given are measured', () => {
+test('truth: a shape mapped to itself has no error; landmarks not given are measured', () => {
   const marks = JSON.parse(readFileSync(join(samples, 'dog-giraffe.json'))).landmarks;
   const dir = mkdtempSync(join(tmpdir(), 'orb-bench-'));
   const same = join(dir, 'same.json');
@@ -222,5 +222,5 @@ test('exit statuses: 1 refused with the reason, 2 wrong usage', () => {
     assert.equal(r.lines.length, 0);
   }
   assert.match(spawnSync(join(bin, 'orbmorph-bench'), ['--version'], { encoding: 'utf8' }).stdout, /^orbmorph \d/);
-  assert.equal(bench(['embed', join('/nowhere', 'x'), dog]).lines.length, 1); // the others are still done
+  assert.equal(bench(['embed', join('/nowhere', 'x'), dog]).lines.length, 1); // the other file is still embedded
 });

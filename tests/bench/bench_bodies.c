@@ -1,5 +1,5 @@
-/* Bodies of any size for measurements: geodesic spheres whose vertices are shuffled a little and whose radius swells
- * into limbs. They are star-shaped, so the directions of their vertices are a certified embedding as they stand. */
+/* Generates bodies of any size: geodesic spheres with slightly jittered vertices whose radius swells into limbs. The
+ * bodies are star-shaped, so the directions of their vertices are already a valid embedding. */
 #include <math.h>
 #include <string.h>
 
@@ -19,7 +19,7 @@ static void normalize(double p[3]) {
   }
 }
 
-/* The radius in direction p: limbs at fixed directions, the same for all bodies, of lengths that differ by seed. */
+/* The radius in direction p. All bodies have their limbs in the same directions; the seed sets the lengths. */
 static double radius(const double p[3], uint64_t seed) {
   double r = 1;
   uint64_t same = 12345, own = 99 * seed + 7;
@@ -35,8 +35,8 @@ static double radius(const double p[3], uint64_t seed) {
   return r + 0.02 * sin(13 * p[0] + 1.7 * (double)seed) * sin(11 * p[1]) * sin(17 * p[2]);
 }
 
-/* Vertex (i, j) of face f of an octahedron whose faces have n rows: the vertices of all faces are numbered by where
- * they lie, rows of constant height from the north pole down. */
+/* The first vertex of a row. Each face of the octahedron is divided into n rows; the vertices are numbered row by row
+ * from the north pole down, and a row has constant height. */
 static int32_t ring_start(int32_t n, int32_t row) {
   if (row == 0) {
     return 0;
@@ -112,7 +112,7 @@ int bench_body(orb_context *ctx, int32_t triangles, uint64_t seed, orb_aligned_s
     next = row < 2 * n ? join_rows(n, row, next) : next;
   }
   double tilt = 0.1 + 0.37 * (double)seed, c = cos(tilt), s = sin(tilt);
-  for (int32_t v = 0; v < vertices; v++) { /* the grids of two bodies shall not coincide */
+  for (int32_t v = 0; v < vertices; v++) { /* otherwise the grids of two bodies would coincide */
     double *p = out->points + 3 * (size_t)v;
     double q[3] = {c * p[0] - s * p[2], p[1], s * p[0] + c * p[2]};
     double r[3] = {q[0], c * q[1] - s * q[2], s * q[1] + c * q[2]}, size;

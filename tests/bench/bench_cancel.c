@@ -1,6 +1,7 @@
-/* bench-cancel [--method M] [--threads N] [--cancels N] FILE...: how long a running embedding goes on after it is
- * cancelled. Each mesh is embedded once, then again and again, cancelled at moments spread evenly over that time. One
- * JSON object a mesh: the longest and the mean delay, in milliseconds by the clock and of processor time. */
+/* bench-cancel [--method M] [--threads N] [--cancels N] FILE...: measures how long an embedding keeps running after it
+ * is cancelled. Embeds each mesh once, then N more times, each cancelled at a different moment, spread evenly over the
+ * duration of the first run. Prints one JSON object per mesh: the mean and the longest delay, in milliseconds of wall
+ * and processor time. */
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,7 +30,7 @@ static void *embed(void *argument) {
   return NULL;
 }
 
-/* Embeds, cancelled after `wait` seconds; the delays in seconds, 0 where it had ended by itself. */
+/* Embeds and cancels after `wait` seconds. The delays are in seconds, 0 where the embedding had already finished. */
 static int cancel_at(const orb_mesh *mesh, const orb_embed_options *options, int threads, double wait, double *delay,
                      double *cpu) {
   run r = {.ctx = bench_open(threads, ORB_CPU_AUTO), .mesh = mesh, .options = options};

@@ -66,7 +66,7 @@ static int write_sphere(orb_context *ctx, const char *folder, const bench_mesh *
   return fine;
 }
 
-/* One run in a context of its own: nothing is kept warm but the file in the page cache. */
+/* Runs in its own context: only the page cache of the file is warm. */
 static int run_once(const bench_options *options, const char *path, int repeat) {
   bench_mesh m;
   orb_embedding e;

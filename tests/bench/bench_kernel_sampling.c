@@ -1,5 +1,5 @@
-/* bench-kernel-sampling [--trace] FILE...: the columns of the paper's Table 1 as JSON, one line a mesh; with --trace
- * also the points of Fig. 13, [vertices inserted, seconds placing, seconds optimising]. One thread. */
+/* bench-kernel-sampling [--trace] FILE...: prints the columns of the paper's Table 1 as one JSON object per mesh.
+ * --trace adds the points of Fig. 13: [vertices inserted, seconds placing, seconds optimising]. Uses one thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

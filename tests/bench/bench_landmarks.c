@@ -1,9 +1,12 @@
-/* Random landmarks: set number i takes two of the meshes and as many places on each, at random vertices, inside
- * triangles and on edges, in random order, and pins them. A set depends on the seed and its number alone. What comes
- * back is checked here: certificate, T = 2V − 4, landmarks at bit-equal points; a refusal must name its landmarks.
- * Awkward sets are eight landmarks of which the first are, by turns: on adjacent vertices of one shape; of both; three
- * inside a triangle of the one and on an edge of the other; in contradiction, two at one place of one shape only, which
- * is right if it is refused and both are named. */
+/* Random landmarks. Set i chooses two of the meshes and the same number of places on each (at random vertices, inside
+ * triangles and on edges), matches them in random order and pins them. A set depends only on the seed and its number.
+ * Every result is checked: the certificate, T = 2V − 4, and landmarks at bit-equal points; a refusal must name its
+ * landmarks. An awkward set has eight landmarks. The sets cycle through four kinds of first landmarks:
+ *
+ * - two on adjacent vertices of one shape;
+ * - two on adjacent vertices of both shapes;
+ * - three inside one triangle of one shape and on one edge of the other;
+ * - two at one place of one shape only. This is a contradiction: the right answer is a refusal that names both. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +24,7 @@ typedef struct landmark_set {
   orb_landmark landmarks[LANDMARKS_MAX];
 } landmark_set;
 
-/* What one set came to. */
+/* The outcome of one set. */
 typedef struct outcome {
   orb_status status;
   char detail[512];
@@ -48,7 +51,7 @@ static double random_share(uint64_t *state) {
   return 0.05 + 0.9 * (double)(next_random(state) >> 11) / 9007199254740992.0;
 }
 
-/* Three of five are vertices, the others on an edge and inside a triangle. */
+/* Three of five places are vertices, one is on an edge, one inside a triangle. */
 static orb_place random_place(const orb_mesh *mesh, uint64_t *state) {
   orb_place place = {random_below(state, mesh->triangle_count), {0, 0, 0}};
   int kind = random_below(state, 5), corner = random_below(state, 3);
@@ -159,7 +162,7 @@ static void note_failure(orb_context *ctx, orb_status status, outcome *out) {
   snprintf(out->detail, sizeof out->detail, "%s", error->detail);
 }
 
-/* The remesh of what was aligned, for every so manieth set. */
+/* Remeshes the aligned shapes of every merge_every-th set. */
 static void remesh(orb_context *ctx, const bench_options *options, const orb_alignment *a, outcome *out) {
   orb_supermesh super;
   double start = orb_clock();

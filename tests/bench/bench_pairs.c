@@ -1,4 +1,4 @@
-/* Every pair of the meshes, merged in-process; each mesh is read and embedded once. */
+/* Merges every pair of the meshes in-process; reads and embeds each mesh once. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

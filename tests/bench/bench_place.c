@@ -1,4 +1,4 @@
-/* Landmarks as a caller names them, to places on the repaired mesh. */
+/* Converts landmarks, as a request names them, to places on the repaired mesh. */
 #include <math.h>
 #include <stddef.h>
 
@@ -14,7 +14,7 @@ static int place_vertex(orb_context *ctx, const orb_mesh *mesh, int32_t index, o
   return orb_place_of_vertex(ctx, mesh, vertex, out) == ORB_OK;
 }
 
-/* Corners are matched by the vertices of the file that they stand for: a repair may have reversed the triangle. */
+/* Matches corners by their vertices in the file: the repair may have reversed the triangle. */
 static int place_triangle(const bench_mesh *m, const api_place *spot, orb_place *out, const char **why) {
   *why = "the repair dropped or changed this triangle, or the file has fewer";
   int32_t t = 0, taken = 0;

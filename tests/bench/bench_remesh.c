@@ -1,5 +1,5 @@
-/* What follows the alignment, measured by itself: remeshing and the asset, on generated bodies or on files whose
- * alignment is kept from run to run (without attributes). */
+/* Measures the steps after the alignment, remeshing and writing the asset, on generated bodies or on files whose
+ * alignment is stored between runs (without attributes). */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@
 typedef struct remesh_run {
   const bench_options *options;
   int32_t count, landmark_count;
-  double align; /* seconds; 0: it was kept */
+  double align; /* seconds; 0: loaded from the stored alignment */
   orb_aligned_shape shape[API_SHAPES_MAX];
 } remesh_run;
 
@@ -18,7 +18,7 @@ static int bytes_io(FILE *file, void *bytes, size_t size, int write) {
   return size == 0 || (write ? fwrite(bytes, size, 1, file) : fread(bytes, size, 1, file)) == 1;
 }
 
-/* One array of a kept shape, to or from the file. */
+/* Writes one array of a shape to the stored alignment, or reads it back. */
 static int array_io(orb_context *ctx, FILE *file, void *array, size_t count, size_t size, int write) {
   void *block;
   memcpy(&block, array, sizeof block);
@@ -107,7 +107,7 @@ static int align_files(orb_context *ctx, remesh_run *run) {
   return fine && (!run->options->keep || keep_io(ctx, run, 1));
 }
 
-/* Triangles of no shape to speak of (quality below a hundredth: height a ninetieth of the longest side) on shape s. */
+/* Counts slivers on shape s: quality below 1/100, which is a height of 1/90 of the longest side. */
 static int64_t count_slivers(const orb_supermesh *mesh, const double *p) {
   int64_t count = 0;
   for (int64_t t = 0; t < mesh->triangle_count; t++) {
@@ -137,8 +137,8 @@ static void cross_of(const double *a, const double *b, const double *c, double o
   }
 }
 
-/* Triangles that face away from the input's own triangle at their centre (on the sphere): a second view of inversion,
- * which also counts what bends within the tolerance. */
+/* Counts triangles that face away from the input triangle at their centre on the sphere. This second measure of
+ * inversion also counts triangles that bend within the tolerance. */
 static int64_t count_against_centre(orb_context *ctx, const orb_supermesh *mesh, const orb_aligned_shape *shape,
                                     const double *positions) {
   orb_locator *locator = NULL;

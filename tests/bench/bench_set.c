@@ -1,4 +1,4 @@
-/* The shapes of one merge: read, embedded, their landmarks placed. */
+/* Reads and embeds the shapes of one merge and places their landmarks. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-/* bench-subdivide FILE TRIANGLES OUT.ply: splits every triangle four-way, at the middles of its edges, until there are
- * at least so many; the shape stays what it was but for a ripple of a thousandth of an edge. Binary PLY. */
+/* bench-subdivide FILE TRIANGLES OUT.ply: splits every triangle into four at the midpoints of its edges until the mesh
+ * has at least TRIANGLES triangles. The shape changes only by a ripple of 1/1000 of an edge. Writes binary PLY. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,7 +7,7 @@
 
 #include "bench.h"
 
-/* One split. Positions and triangles are of malloc(). */
+/* One split. Positions and triangles are allocated with malloc(). */
 static void split(orb_context *ctx, int32_t *vertices, int32_t *triangles, double **positions, int32_t **corners) {
   int32_t count = *triangles, next = *vertices, *twin = malloc(3 * (size_t)count * sizeof *twin);
   int32_t *middle = malloc(3 * (size_t)count * sizeof *middle), *made = malloc(12 * (size_t)count * sizeof *made);

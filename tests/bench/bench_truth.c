@@ -1,15 +1,16 @@
-/* How true the map from one shape to the other is, for each method of alignment.
+/* Measures how accurate the map from one shape to the other is, for each alignment method.
  *
- * - dense: where both meshes have the same triangles, vertex i of one belongs to vertex i of the other. The error of a
- *   vertex is the distance from where the map takes it, in % of the second shape's diagonal.
- * - held out: landmarks that the alignment was not given, likewise.
- * - inverted: triangles that face the other way in space. Of the map: those of either shape whose image on the other
- *   faces away from that surface at its centre. Of the supermesh: those that face away from either surface there.
+ * - dense: where both meshes have the same triangles, vertex i of one corresponds to vertex i of the other. The error
+ *   of a vertex is the distance between its image and its counterpart, in % of the second shape's diagonal.
+ * - held out: the same error at the landmarks that the alignment did not get.
+ * - inverted: triangles that face the other way in space. For the map, these are the triangles of either shape whose
+ *   image on the other faces away from that surface at its centre. For the supermesh, these are the triangles that face
+ *   away from either surface there.
  * - halfway: how much of its area each patch of the surface keeps halfway through the linear morph, relative to the
- *   mean of both ends. A limb that the map twists by half a turn is thin there. The least of some 200 patches, and the
- *   share of the surface in patches that keep less than half. Shapes that face different ways lose area on the straight
- *   way whatever the map is; `halfway_fitted` is the same after the second one was moved onto the first (the asset's
- *   fit `rigid`).
+ *   mean of both ends. A limb that the map twists by half a turn is thin there. Reports the smallest value of about 200
+ *   patches and the share of the surface in patches that keep less than half. Shapes that face different ways lose area
+ *   on straight paths whatever the map is, so `halfway_fitted` repeats the measurement after the second shape is moved
+ *   onto the first (the asset's fit `rigid`).
  */
 #include <math.h>
 #include <stdio.h>
@@ -99,8 +100,8 @@ static void sphere_point(const orb_aligned_shape *shape, const orb_place *place,
   }
 }
 
-/* Where shape s has a direction of the common sphere; normal may be NULL. The normal is that of the triangle there: one
- * smoothed over the vertices is against the shape's own triangles where it is folded flat. */
+/* The point of shape s in a direction of the common sphere. The normal (may be NULL) is that of the triangle there: a
+ * normal smoothed over the vertices opposes the shape's own triangles where the shape is folded flat. */
 static void surface_at(const truth_run *run, int s, const double p[3], double position[3], double *normal) {
   const orb_mesh *mesh = &run->result->alignment.shapes[s].mesh;
   orb_place place;
@@ -163,7 +164,8 @@ static int write_dense(truth_run *run, api_text *line) {
   return error != NULL;
 }
 
-/* A place on a given mesh, on the sphere: through the nearest place of the aligned mesh, which is the same surface. */
+/* The point on the sphere of a place on the given mesh: that of the nearest place of the aligned mesh, which has the
+ * same surface. */
 static int write_held_out(truth_run *run, api_text *line) {
   const bench_set *set = run->set;
   int32_t count = set->list.count - run->given;
@@ -199,7 +201,7 @@ static int write_held_out(truth_run *run, api_text *line) {
   return 1;
 }
 
-/* Triangles with corners p on the sphere and x in space that face away from the normal of shape s at their centre. */
+/* Counts triangles (corners p on the sphere, x in space) that face away from the normal of shape s at their centre. */
 static int is_inverted(const truth_run *run, int s, const double *p[3], const double *x[3]) {
   double centre[3], n[3], at[3], normal[3];
   for (int k = 0; k < 3; k++) {
@@ -261,8 +263,8 @@ static void write_inverted(const truth_run *run, api_text *line) {
 
 enum { PATCHES = 200 };
 
-/* The patch of each vertex of the supermesh: the nearest of vertices spread by farthest points, at x. far, nearest:
- * room for all vertices. */
+/* The patch of each vertex of the supermesh, at positions x: the nearest of the centres, which farthest-point sampling
+ * spreads. far and nearest have room for all vertices. */
 static void spread_patches(const orb_supermesh *m, const double *x, double *far, int32_t *nearest) {
   for (int32_t i = 0, last = 0; i < PATCHES; i++) {
     int32_t next = 0;
@@ -285,7 +287,7 @@ static double corner_area(const double *x, const int32_t *v) {
   return 0.5 * sqrt(dot(n, n));
 }
 
-/* Where a vertex is on a shape that was moved by a matrix of orb_asset_transforms(). */
+/* The position of a vertex on a shape that a matrix of orb_asset_transforms() moves. */
 static void moved_place(const truth_run *run, int s, size_t v, const double *matrix, double out[3]) {
   const orb_supermesh *m = &run->result->supermesh;
   double p[3];

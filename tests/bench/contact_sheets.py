@@ -3,8 +3,8 @@
 
     tests/bench/contact_sheets.py [--bin build/bin] [--meshes ../shared/meshes] [--out docs/pairs] [--page docs/pairs.md] [PAIR...]
 
-Merges by the defaults, with the pair's landmarks; a pair that is refused or given up is passed over, and the exit
-status is 1 then. One JSON line a pair on standard output, that of orbmorph-bench.
+Merges each pair with its landmarks and the default options, and prints the JSON line of orbmorph-bench. Skips a pair
+that is refused or exceeds the limit; the exit status is then 1.
 Standard library only.
 """
 import argparse
@@ -39,9 +39,9 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, default="build/bin")
     parser.add_argument("--meshes", type=pathlib.Path, default="../shared/meshes")
     parser.add_argument("--out", type=pathlib.Path, default="docs/pairs")
-    parser.add_argument("--limit", type=float, default=60, help="seconds after which a merge is given up")
-    parser.add_argument("--page", type=pathlib.Path, help="put the table of all pairs into this page: docs/pairs.md")
-    parser.add_argument("pairs", nargs="*", help="such as cow-spot; all where none is named")
+    parser.add_argument("--limit", type=float, default=60, help="abandon a merge after this many seconds")
+    parser.add_argument("--page", type=pathlib.Path, help="write the table of all pairs into this page, such as docs/pairs.md")
+    parser.add_argument("pairs", nargs="*", help="such as cow-spot (default: all)")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     refused, rows = 0, []

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""How long a first answer takes, beside an earlier version in the same run; writes docs/bench-first-answer.md.
+"""Compares the time to a first answer with an earlier version in the same run; writes docs/bench-first-answer.md.
 
     tests/bench/first_answer.py [--base REVISION] [--bin build/bin] [--meshes ../shared/meshes] [--repeat 3]
                                 [--threads 2] [--pairs 12] [--out docs/bench-first-answer.md] [ROW...]
 
-Builds the base (8bbd71c) once in a folder of the cache, then runs both versions by turns on every row: two shapes are
-read, embedded, aligned, remeshed and written by `orbmorph-bench merge`, nothing stored. CPU and wall seconds are
-medians of the repeats; a ratio is base / this version, so more than 1 is faster. `cold` rows do the same over HTTP with
-a daemon that has just started: two uploads and one POST that waits for the asset. --pairs N takes that many pairs
-without landmarks from all pairs of the good meshes, spread evenly. Standard library only; needs cmake, git and curl.
+Builds the base (8bbd71c) once in the cache folder, then alternates between both versions on every row: `orbmorph-bench
+merge` reads, embeds, aligns and remeshes two shapes and writes the asset, without a store. CPU and wall seconds are
+medians of the repeats. A ratio is base / this version, so more than 1 is faster. A `cold` row does the same over HTTP
+with a daemon that has just started: two uploads and one POST that waits for the asset. --pairs N adds N pairs without
+landmarks, spread evenly over all pairs of the good meshes. Standard library only; needs cmake, git and curl.
 """
 import argparse
 import csv
@@ -27,17 +27,17 @@ import urllib.request
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 HEAD = """# The first answer
 
-Written by `tests/bench/first_answer.py` beside version {base} in the same run, both by turns, {threads} threads,
-medians of {repeat}. A ratio is {base} / this version: more than 1 is faster. *CPU* and *wall* cover everything from the
-files to the asset; the stages are CPU seconds on one machine with {cores} cores. *Energy* is that of the map, *triangles*
-those of the supermesh, both as base → now.
+Written by `tests/bench/first_answer.py`. It alternates between version {base} and this version in one run with {threads}
+threads; the numbers are medians of {repeat}. A ratio is {base} / this version: more than 1 is faster. *CPU* and *wall*
+cover everything from the files to the asset; the stages are CPU seconds on one machine with {cores} cores. *Energy* is
+that of the map, *triangles* are those of the supermesh, both as base → now.
 
 """
 COLUMNS = ("row", "CPU s", "ratio", "wall s", "ratio", "embed", "align", "remesh", "transfer", "energy", "triangles")
 
 
 def build_base(revision):
-    """The programs of an earlier version, built once."""
+    """The folder of the programs of an earlier version. Builds them once."""
     cache = pathlib.Path(os.environ.get("XDG_CACHE_HOME", pathlib.Path.home() / ".cache")) / "orbmorph-bench"
     sha = subprocess.run(["git", "-C", ROOT, "rev-parse", revision], capture_output=True, text=True,
                          check=True).stdout.strip()
@@ -61,7 +61,7 @@ def marks_of(pair, folder):
 
 
 def rows(options, folder):
-    """Name, arguments of orbmorph-bench merge, files; cold ones have the members of the request instead."""
+    """Yields name, arguments of orbmorph-bench merge and files; a cold row has the members of the request instead."""
     samples, good = ROOT / "tests/samples", options.meshes / "good"
     dog, giraffe = samples / "dog.obj", samples / "giraffe.off"
     marks = samples / "dog-giraffe.json"
@@ -70,7 +70,7 @@ def rows(options, folder):
     yield "dog–giraffe, no landmarks", ["--align", "auto"], [dog, giraffe]
     yield "dog–elephant, no landmarks", ["--align", "auto"], [dog, samples / "elephant.ply"]
     if not good.is_dir():
-        print("skipped: the real meshes are not there", file=sys.stderr)
+        print("skipped: the real meshes are missing", file=sys.stderr)
         return
     for pair in sorted((options.meshes / "pairs").glob("*.json")):
         read = json.loads(pair.read_text())
@@ -100,7 +100,7 @@ def measure(program, arguments, files, threads):
 
 
 def cold(program, members, files):
-    """Seconds from the first upload to the last byte of the asset, by a daemon that has just started."""
+    """Seconds from the first upload to the last byte of the asset, with a daemon that has just started."""
     with tempfile.TemporaryDirectory() as data:
         daemon = subprocess.Popen([program / "orbmorphd", "--listen", "127.0.0.1:0", "--data", data],
                                   stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
@@ -158,7 +158,7 @@ def main():
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--pairs", type=int, default=12)
     parser.add_argument("--out", type=pathlib.Path)
-    parser.add_argument("rows", nargs="*", help="parts of row names; all where none is given")
+    parser.add_argument("rows", nargs="*", help="parts of row names (default: all rows)")
     options = parser.parse_args()
     programs = {"base": build_base(options.base), "now": options.bin}
     text = HEAD.format(base=options.base, threads=options.threads, repeat=options.repeat, cores=os.cpu_count())

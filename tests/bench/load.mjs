@@ -1,9 +1,9 @@
-// The service under load, with nginx beside it in the same run for comparison.
+// Measures the service under load, and nginx in the same run for comparison.
 //
-//   node tests/bench/load.mjs [asset|job|jobs|streams|uploads]…     all of them without arguments
+//   node tests/bench/load.mjs [asset|job|jobs|streams|uploads]…     (default: all)
 //
 // Needs wrk and nginx (Debian packages). ORBMORPHD names the daemon (build/bin/orbmorphd), ORB_LOAD_SECONDS (5) the
-// time of each measurement. Prints a table; docs/bench-service.md explains it. Exit status 1 where a goal is missed.
+// duration of each measurement. Prints a table, explained in docs/bench-service.md. Exit status 1 if a goal is missed.
 import { execFileSync, spawn, spawnSync } from 'node:child_process';
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import http from 'node:http';
@@ -33,7 +33,7 @@ const freePort = () =>
     });
   });
 
-/** nginx with sendfile and as many workers as the daemon has threads for connections, over one folder. */
+/** Starts nginx on one folder, with sendfile and as many workers as the daemon has connection threads. */
 async function nginx(root) {
   const port = await freePort();
   const conf = path.join(scratch, 'nginx.conf');
@@ -73,7 +73,7 @@ function wrk(url, connections) {
 }
 const show = ({ rate, p99 }) => `${rate.toFixed(0)} requests/s, p99 ${p99.toFixed(1)} ms`;
 
-/** In turn, twice, and the better of each, so that a busy moment of the machine does not decide. */
+/** Measures both alternately, twice, and returns the better of each: a busy moment of the machine does not decide. */
 function compare(a, b, connections) {
   const best = (x, y) => (x.rate > y.rate ? x : y);
   const [a1, b1, a2, b2] = [wrk(a, connections), wrk(b, connections), wrk(a, connections), wrk(b, connections)];
@@ -139,7 +139,7 @@ async function job() {
   );
 }
 
-/** Two jobs that take minutes, and one more that waits behind them. */
+/** Submits two jobs that take minutes and one that waits behind them. */
 async function busy(d) {
   const made = [];
   for (let i = 0; i < 3; i++) {
@@ -173,7 +173,7 @@ async function streams() {
   const [first, , last] = await busy(d);
   const before = wrk(d.url + first.url, 16);
   const memory = status(d, 'VmRSS');
-  // The clients live in processes of their own, so that a limit of open files does not stop them.
+  // The clients run in separate processes, so the limit of open files does not stop them.
   const child = spawn(
     process.execPath,
     [new URL(import.meta.url).pathname, '--streams', d.url + last.url + '/events', String(clients)],

@@ -3,10 +3,10 @@
 
     tests/bench/merge_report.py [--bin build/bin] [--meshes ../shared/meshes] [--out docs] [--keep DIR] [--quick]
 
-Repeats Table 2 and Fig. 19 of Peng & Timalsena 2016 on real pairs of like sizes, with its remeshing and its convex hull
-beside ours, and measures speed and growth on generated bodies. Best of the repeats is taken. With --keep alignments are
-kept there from run to run. The page is written after every part, so that a run that is cut short leaves what it has.
---only growth, visual or five measures that alone, and puts it in its place on the page that there is. Standard library only.
+Repeats Table 2 and Fig. 19 of Peng & Timalsena 2016 on real pairs of similar sizes, compares the remeshing methods with
+those of the paper, and measures speed and growth on generated bodies. Reports the best of the repeats. --keep stores
+alignments between runs. Writes the page after every part, so an interrupted run leaves what it has measured. --only
+growth, visual or five measures that part alone and replaces it on the existing page. Standard library only.
 """
 import argparse
 import json
@@ -52,7 +52,7 @@ class Bench:
         return min(lines, key=lambda line: line["seconds"]["remesh"])
 
     def pair(self, name, method, out=None):
-        """One pair by one method; its alignment is made once, and its seconds are remembered."""
+        """Measures one pair by one method. The first call aligns the pair; the alignment and its seconds are reused."""
         about = json.loads((self.meshes / "pairs" / f"{name}.json").read_text())
         marks = self.folder / f"{name}.landmarks.json"
         base = about.get("index_base", 0)
@@ -70,7 +70,7 @@ class Bench:
         """Five shapes in one: generated bodies, unlike real ones rotated onto each other, and animals by landmarks."""
         good, marks = self.meshes / "good", self.folder / "five.json"
         read = lambda name: json.loads((self.meshes / "pairs" / f"{name}.json").read_text())["landmarks"]
-        # one list of features for the whole class: line i of one pair is line i of the next
+        # the landmarks of a class share one list of features: line i of one pair corresponds to line i of the next
         places = [[b[1], a[1], b[0], a[0], c[0]] for a, b, c in
                   zip(read("shrec381-shrec388"), read("shrec397-shrec393"), read("spot-shrec381"))]
         marks.write_text(json.dumps([{"name": f"l{i}", "at": [{"vertex": v} for v in at]}
@@ -85,7 +85,7 @@ class Bench:
                     self.keep / "five-animals.keep", *(good / name for name in animals), repeat=3)}
 
     def poses(self, glb):
-        """The picture of both shapes, side by side."""
+        """Draws both shapes side by side."""
         target = glb.with_suffix(".png")
         subprocess.run([str(self.bin / "orbmorph"), "view", str(glb), "--poses", "2", "--size", "240", "-o",
                         str(target)], check=True, capture_output=True)
@@ -140,7 +140,7 @@ def scale(t):
 
 
 def figure19(bench, name, out):
-    """Rows: the input, then for each method its picture and its difference from the input's, 0 to 64 of 255."""
+    """Rows: the input, then each method's picture and its difference from the input's picture, 0 to 64 of 255."""
     picture = bench_picture(bench, name, "overlay")
     if not picture:
         return []
@@ -198,7 +198,7 @@ def main():
     parser.add_argument("--meshes", default="../shared/meshes")
     parser.add_argument("--out", default="docs")
     parser.add_argument("--keep")
-    parser.add_argument("--limit", type=float, default=60, help="seconds after which a run is given up, and noted")
+    parser.add_argument("--limit", type=float, default=60, help="abandon a run after this many seconds, and note it")
     parser.add_argument("--only", choices=["growth", "visual", "five"])
     parser.add_argument("--quick", action="store_true", help="two pairs and small bodies only")
     options = parser.parse_args()
@@ -265,7 +265,7 @@ def visual_part(pictures):
 
 
 def replace_part(page, part):
-    """Puts the part where the page has one of its heading, or else at the end."""
+    """Replaces the part of the page with the same heading, or appends the part."""
     heading = part[0]
     lines = page.read_text().rstrip().split("\n")
     begin = lines.index(heading) if heading in lines else len(lines)

@@ -1,10 +1,10 @@
-"""Pictures as lists of rows of bytes: PNG in and out, 8 bits a channel. Standard library only."""
+"""Reads and writes PNG, 8 bits per channel; a picture is a list of rows of bytes. Standard library only."""
 import struct
 import zlib
 
 
 def read(path):
-    """(width, height, channels, rows of bytes)"""
+    """Returns (width, height, channels, rows of bytes)."""
     data, at, stored = path.read_bytes(), 8, b""
     while at < len(data):
         size, kind = struct.unpack(">I4s", data[at:at + 8])
@@ -34,7 +34,7 @@ def read(path):
 
 
 def write(path, width, rows):
-    """RGB rows."""
+    """Writes rows of RGB bytes."""
     def chunk(kind, body):
         return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
     raw = b"".join(b"\0" + bytes(row) for row in rows)

@@ -3,9 +3,9 @@
 
     tests/bench/report.py [--bin build/bin] [--meshes ../shared/meshes] [--out docs] [--quick]
 
-Repeats Table 1, Fig. 13, Fig. 16 and Fig. 18 of Peng & Timalsena 2016 on real meshes of like sizes, compares both
-methods, scales over threads and sizes, and prints each goal beside what was measured. Best of the repeats is taken;
-rates are by processor seconds where it says so, for machines that others use too. Standard library only.
+Repeats Table 1, Fig. 13, Fig. 16 and Fig. 18 of Peng & Timalsena 2016 on real meshes of similar sizes, compares both
+methods, measures the scaling with threads and sizes, and prints each goal beside its measurement. Reports the best of
+the repeats. Some rates use processor seconds, for machines with other load; the page says which. Standard library only.
 """
 import argparse
 import hashlib
@@ -33,10 +33,10 @@ PAPER = [  # Table 1: triangles, simplification, parameterization, kernel points
     ("Merman", 86206, 7.35, 23.08, 96.5, 134.93, 23.4, 165.36)]
 TABLE1 = ["busted.stl", "cow.off", "spot.obj", "penguin.obj", "koala_lr.obj", "spheretext.obj", "human_man.obj",
           "human_woman.obj", "shrec381.off", "shrec393.off", "sword.obj", "nefertiti_70k.obj", "armadillo_86k.obj"]
-# Mean symmetric Dirichlet energy of the first prototype, which the default preset must not exceed.
+# Mean symmetric Dirichlet energy of the first prototype. The default preset must not exceed it.
 PROTOTYPE = {"spot.obj": 1.403, "human_man.obj": 4.00, "sword.obj": 8.52, "armadillo_86k.obj": 2.366,
              "koala_100k.obj": 1.614}
-STRETCH = {"armadillo_29k.obj": 0.435, "human_man.obj": 0.257, "spot.obj": 0.718}  # Praun & Hoppe's own library
+STRETCH = {"armadillo_29k.obj": 0.435, "human_man.obj": 0.257, "spot.obj": 0.718}  # measured with Praun & Hoppe's library
 
 
 class Bench:
@@ -55,7 +55,7 @@ class Bench:
         return [json.loads(line) for line in run.stdout.splitlines()]
 
     def embed(self, file, threads=1, repeat=1, method="newton", preset="default", options=None, out=None, cpu="auto"):
-        """The fastest of the repeats, by wall clock; its cpu_seconds are the least, its peak the greatest of all."""
+        """The fastest repeat by wall clock, with the smallest cpu_seconds and the largest peak of all repeats."""
         arguments = ["embed", "--threads", threads, "--repeat", repeat, "--method", method, "--preset", preset]
         arguments += ["--options", json.dumps(options)] if options else []
         arguments += ["--cpu", cpu] if cpu != "auto" else []
@@ -76,7 +76,7 @@ class Bench:
         return None
 
     def shared(self):
-        """Every mesh of the collection that is meant to be usable: its path, and its run by newton or None."""
+        """Every usable mesh of the collection: its path, and its newton run or None."""
         found = [p for kind in ("good", "weldable") for p in sorted((self.meshes / kind).glob("*"))
                  if p.suffix in (".obj", ".off", ".ply", ".stl", ".glb", ".gltf")]
         runs = [(p, self.lines_of("orbmorph-bench", "embed", "--repair", "largest_component", p)) for p in found]
@@ -129,7 +129,7 @@ def paper_table(bench, report):
     measured = bench.lines_of("bench-kernel-sampling", *files, *bench.samples)
     for m in sorted(measured, key=lambda m: m["triangles"]):
         parts = m["simplify_seconds"] + m["place_seconds"] + m["optimize_seconds"]
-        shrink = m["cpu_seconds"] / parts  # wall clock to processor seconds
+        shrink = m["cpu_seconds"] / parts  # converts wall to processor seconds
         s, p, o = (m[k] * shrink for k in ("simplify_seconds", "place_seconds", "optimize_seconds"))
         rows.append((f"*{m['mesh']}*", m["triangles"], share(s, m["cpu_seconds"]), share(p, m["cpu_seconds"]),
                      f"{m['kernel_points']:.1f}", share(o, m["cpu_seconds"]), f"{m['iterations']:.1f}",
@@ -150,7 +150,7 @@ def paper_goals(bench, report, measured):
 
 
 def whole_collection(bench, report):
-    """Both methods over all shared meshes: newton on every one, kernel-sampling up to 15,000 triangles and beyond."""
+    """Runs newton on every shared mesh, kernel-sampling on those up to 15,000 triangles and on those up to 50,000."""
     shared = bench.shared()
     if not shared:
         return
@@ -271,7 +271,7 @@ def newton_goals(bench, report, repeat):
 
 
 def scaling(bench, report, repeat, folder, quick):
-    """One shape at about 100,000, 500,000 and 2 million triangles, with every instruction set at the first."""
+    """Embeds one shape at about 100,000, 500,000 and 2 million triangles, at the first size with each instruction set."""
     source = bench.find("armadillo_29k.obj") or pathlib.Path(bench.samples[0])
     rows, measured, narrow = [], [], {}
     for size in [100000, 400000] if quick else [100000, 400000, 1600000]:
@@ -340,13 +340,13 @@ def threads_table(bench, report, repeat):
 
 def adversarial(bench, report):
     run = subprocess.run([str(bench.bin / "embed-adversarial"), "50", "1", "6000"], capture_output=True, text=True)
-    report.add("## Adversarial meshes", "`embed-adversarial 50 1 6000`; 1,000 of them are in tests/long.sh.",
+    report.add("## Adversarial meshes", "`embed-adversarial 50 1 6000`; `tests/long.sh adversarial` runs 1,000.",
                "```\n" + run.stdout.strip() + "\n```")
     report.goal("50 adversarial meshes certified", "50", run.stdout.split()[0] if run.returncode == 0 else "fewer", run.returncode == 0)
 
 
 def stored_adversarial(report):
-    """The 1,000 take longer than this report may; tests/long.sh adversarial makes the file."""
+    """Adds the stored result for 1,000 meshes, which take too long for this report; tests/long.sh adversarial writes it."""
     stored = ROOT / "docs/bench/adversarial-1000.txt"
     if stored.exists():
         text = stored.read_text().strip()
@@ -357,7 +357,7 @@ def stored_adversarial(report):
 
 
 def certificate_tests(bench, report):
-    """The unit tests that hold the certificate against exact rational arithmetic."""
+    """Runs the unit tests that compare the certificate with exact rational arithmetic."""
     names, failed = [], 0
     for program in ("test_certify", "test_orient"):
         if (bench.bin / program).exists():
@@ -388,7 +388,7 @@ def cancels(bench, report, folder):
     rows = []
     for method, path in runs:
         rows += bench.lines_of("bench-cancel", "--method", method, "--threads", 1, "--cancels", 8, path)
-    report.add("## Cancelling", "Embeddings cancelled at 8 moments spread over the run, one thread; `bench-cancel`.")
+    report.add("## Cancelling", "`bench-cancel` cancels each embedding at 8 moments spread over the run; one thread.")
     report.table(["mesh", "triangles", "method", "whole run, s", "mean delay, ms", "longest, ms", "longest, processor ms"],
                  [(m["mesh"], m["triangles"], m["method"], m["seconds"], m["mean_ms"], m["longest_ms"],
                    m["longest_cpu_ms"]) for m in rows])

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Random landmarks on real meshes, and every pair of them without any; writes docs/robustness.md.
+"""Merges real meshes with random landmarks, and every pair of them without landmarks; writes docs/robustness.md.
 
     tests/bench/robust.py [landmarks|awkward|pairs|all] [--bin build/bin] [--meshes ../shared/meshes] [--jobs 2] [--sets 1000]
                           [--presets fast,default] [--keep DIR] [--out docs/robustness.md] [--kept]
 
-The meshes are those that index.csv calls good and that have 2,000 to 50,000 triangles. Every set and pair that a run
-before left in --keep is taken over, so that a long run can be interrupted at any time; --kept runs nothing more and
-writes what is there. Exit status 1: fewer than 99 % of the sets could be met, a refusal named no landmark, a pair
-failed, or something is still to be run. Standard library only.
+The meshes are the good ones of index.csv with 2,000 to 50,000 triangles. --keep stores the result of every set and
+pair, so an interrupted run can continue; --kept runs nothing and writes the stored results. Exit status 1: fewer than
+99 % of the sets were met, a refusal named no landmark, a pair failed, or some have not run yet. Standard library
+only.
 """
 import argparse
 import concurrent.futures
@@ -20,7 +20,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-CHUNK = 25  # sets or pairs a process
+CHUNK = 25  # sets or pairs per process
 HEAD = """# Random landmarks, and every pair
 
 Written by `tests/bench/robust.py`, on the real meshes of 2,000 to 50,000 triangles.
@@ -72,7 +72,7 @@ def lines_of(path):
 
 
 def run(options, name, command, total, arguments, meshes):
-    """All lines of one command: what is kept, and the rest run in chunks."""
+    """Returns all lines of one command: the stored ones, and the rest, which it runs in chunks."""
     keep = pathlib.Path(options.keep)
     keep.mkdir(parents=True, exist_ok=True)
 
@@ -134,7 +134,7 @@ def pair_cells(line):
 
 
 def pairs_table(runs):
-    """runs: preset -> lines."""
+    """runs maps a preset to its lines."""
     by_name = {preset: {tuple(line["shapes"]): line for line in lines} for preset, lines in runs.items()}
     names = list(dict.fromkeys(tuple(line["shapes"]) for lines in runs.values() for line in lines))
     text = ["| pair |" + "".join(f" {p}: triangles | energy | inverted % | CPU s |" for p in runs),
@@ -163,13 +163,13 @@ def main():
     parser.add_argument("--awkward", type=int, default=100, help="sets of awkward landmarks")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--merge-every", type=int, default=0)
-    parser.add_argument("--seconds", type=int, default=3600, help="after which a set or pair counts as failed")
-    parser.add_argument("--presets", default="fast,default", help="of the alignment of pairs")
+    parser.add_argument("--seconds", type=int, default=3600, help="a set or pair that takes longer counts as failed")
+    parser.add_argument("--presets", default="fast,default", help="alignment presets of the pairs")
     parser.add_argument("--keep", default=pathlib.Path(tempfile.gettempdir()) / "orbmorph-robust")
-    parser.add_argument("--kept", action="store_true", help="run nothing, write what is kept")
+    parser.add_argument("--kept", action="store_true", help="run nothing, write the stored results")
     parser.add_argument("--row", action="append", default=[], help="a further row of the summary: what|run|met|failed")
     parser.add_argument("--note", default="", help="a sentence below the summary")
-    parser.add_argument("--out", help="the Markdown file; else the tables are printed")
+    parser.add_argument("--out", help="the Markdown file (default: print the tables)")
     options = parser.parse_args()
     meshes, summary, text, bad = meshes_of(pathlib.Path(options.meshes)), [], [], False
     if options.what in ("landmarks", "all"):

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Compares what two builds make of the same requests, byte for byte.
+"""Compares the results of two builds for the same requests, byte for byte.
 
     tests/bench/same_bytes.py --base OTHER/build/bin [--bin build/bin] [--meshes ../shared/meshes] [--keep DIR] [CASE...]
 
 Each case runs `orbmorph-bench` of both builds and compares the GLB or sphere PLY and the report without its times. The
-cases are the samples and, where they are there, the pairs of the real meshes: every method of alignment and remeshing,
-presets `fast` and `default`, both embeddings. --keep stores the digests of the base, so that a second run computes only
-the other half. One line a case; exit status 1 if any differs. Standard library only.
+cases are the samples and, if present, the pairs of the real meshes: every alignment and remesh method, the presets
+`fast` and `default`, both embedding methods. --keep stores the digests of the base, so a second run computes only the
+other half. Prints one line per case; exit status 1 if any differs. Standard library only.
 """
 import argparse
 import hashlib
@@ -58,7 +58,7 @@ def landmark_file(pair, folder):
 
 
 def cases(meshes, folder):
-    """Name and arguments of each case; OUT stands for the output."""
+    """Yields the name and the arguments of each case; OUT stands for the output."""
     samples = ROOT / "tests" / "samples"
     pairs = [("samples", [samples / "dog.obj", samples / "giraffe.off"], samples / "dog-giraffe.json")]
     pairs += [(file.stem, [meshes / "good" / mesh for mesh in json.loads(file.read_text())["meshes"]],
@@ -83,8 +83,8 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, default="build/bin")
     parser.add_argument("--meshes", type=pathlib.Path, default=ROOT.parent / "shared" / "meshes")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for the digests of the base")
-    parser.add_argument("--limit", type=float, default=3600, help="seconds after which a run is given up")
-    parser.add_argument("cases", nargs="*", help="such as cow-spot or pin-default; all where none is named")
+    parser.add_argument("--limit", type=float, default=3600, help="abandon a run after this many seconds")
+    parser.add_argument("cases", nargs="*", help="such as cow-spot or pin-default (default: all)")
     options = parser.parse_args()
     known, differ, count = {}, 0, 0
     store = options.keep / "digests.json" if options.keep else None

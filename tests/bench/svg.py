@@ -38,7 +38,7 @@ def frame(body, x_range, y_range, x_name, y_name):
 
 
 def lines(series, x_name, y_name):
-    """series: (name, [(x, y)…]) each."""
+    """Each of series is (name, [(x, y)…])."""
     xs, ys = ([p[k] for _, points in series for p in points] for k in (0, 1))
 
     def body(px, py):

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Measures how true the maps between real pairs are and writes docs/bench-truth.md.
+"""Measures how accurate the maps between real pairs are and writes docs/bench-truth.md.
 
     tests/bench/truth.py [--bin build/bin] [--meshes ../shared/meshes] [--out docs] [--given 8] [--pairs cow-spot ...]
                          [--methods fast,default,rbf,...] [--threads 2]
 
 A pair is a file MESHES/pairs/NAME.json: "meshes" (two files of MESHES/good) and "landmarks" ([vertex of the first,
-vertex of the second], numbered as in the files). The alignment gets the first few landmarks, the error is measured at
-the others and, where the meshes share their triangles, at every vertex: `orbmorph-bench truth`. Without --out nothing
-is written but the lines on standard output. Standard library only.
+vertex of the second], numbered as in the files). `orbmorph-bench truth` aligns by the first few landmarks and measures
+the error at the others and, where the meshes share their triangles, at every vertex. Without --out the script writes
+only to standard output. Standard library only.
 """
 import argparse
 import concurrent.futures
@@ -83,11 +83,11 @@ def main():
     parser.add_argument("--bin", default="build/bin")
     parser.add_argument("--meshes", default="../shared/meshes")
     parser.add_argument("--out")
-    parser.add_argument("--given", default="8", help="numbers with commas; 'all' gives every landmark")
+    parser.add_argument("--given", default="8", help="comma-separated numbers; 'all' uses every landmark")
     parser.add_argument("--pairs", nargs="*")
     parser.add_argument("--methods", default=",".join(NAMES))
     parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--jobs", type=int, default=1, help="pairs at once; the seconds suffer")
+    parser.add_argument("--jobs", type=int, default=1, help="pairs to run at once; more make the seconds larger")
     options = parser.parse_args()
     pairs = sorted((pathlib.Path(options.meshes) / "pairs").glob("*.json"))
     pairs = [p for p in pairs if not options.pairs or p.stem in options.pairs]

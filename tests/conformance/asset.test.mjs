@@ -1,4 +1,4 @@
-// The assets that the fixture writes, before the Khronos validator and as three.js shows them.
+// Checks the assets that the fixture writes with the Khronos validator and with three.js.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import fs from 'node:fs';
@@ -13,7 +13,7 @@ try {
   validator = (await import('gltf-validator')).default;
   three = await import('three');
   globalThis.self ??= globalThis;
-  // Pictures are not looked at: the loader needs only that decoding them succeeds.
+  // The tests ignore pictures; the loader only needs decoding to succeed.
   globalThis.createImageBitmap ??= async () => ({ width: 1, height: 1, close() {} });
   ({ GLTFLoader } = await import('three/addons/loaders/GLTFLoader.js'));
 } catch {
@@ -43,7 +43,7 @@ async function load(name) {
   return { gltf, meshes };
 }
 
-// Positions of all vertices as three.js morphs them, with one target at full weight (−1: the base alone).
+// Positions of all vertices as three.js morphs them, with one target at full weight (−1: only the base).
 function shown(mesh, target) {
   mesh.morphTargetInfluences.fill(0);
   if (target >= 0) mesh.morphTargetInfluences[target] = 1;
@@ -56,7 +56,7 @@ function shown(mesh, target) {
   return out;
 }
 
-// Which supermesh vertex each vertex of the file is, by its place on the first shape; then every shape must agree.
+// Finds the supermesh vertex of each file vertex by its position on the first shape; every other shape must agree.
 function match(mesh, facts) {
   const numberOf = new Map();
   const count = facts.shapes[0].length / 3;
@@ -85,13 +85,13 @@ function match(mesh, facts) {
   return numbers;
 }
 
-// The corners of a triangle, beginning with the lowest number.
+// The corners of a triangle, starting with the lowest number.
 function canonical([a, b, c]) {
   return a < b && a < c ? [a, b, c].join() : b < c ? [b, c, a].join() : [c, a, b].join();
 }
 
 for (const name of ['two', 'six', 'dressed', 'colours', 'rigid', 'bare', 'painted', 'painted-adaptive']) {
-  test(`${name}: the Khronos validator has nothing to say`, async () => {
+  test(`${name}: the Khronos validator reports nothing`, async () => {
     const report = await validator.validateBytes(new Uint8Array(bytesOf(name)), { maxIssues: 100 });
     const serious = report.issues.messages.filter((m) => m.severity < 2);
     assert.deepEqual(serious, []);
@@ -115,7 +115,7 @@ for (const name of ['two', 'six', 'dressed', 'colours', 'rigid', 'bare']) {
     assert.deepEqual(triangles.sort(), facts.triangles.map(canonical).sort());
   });
 
-  test(`${name}: every target has the same attributes, and bounds hold`, () => {
+  test(`${name}: every target has the same attributes, and bounds are correct`, () => {
     const json = jsonOf(bytesOf(name));
     assert.equal(json.meshes.length, 1);
     assert.equal(json.nodes.length, 1);
@@ -150,17 +150,17 @@ test('the animation shows every shape alone, as three.js plays it', async () => 
   assert.deepEqual([...alone].sort(), [-1, 0, 1, 2, 3, 4]);
 });
 
-test('names come through, whatever they hold', async () => {
+test('names are preserved, whatever characters they contain', async () => {
   const { meshes } = await load('six');
   assert.deepEqual(Object.keys(meshes[0].morphTargetDictionary), ['zwei', 'trois', 'four "quoted"', 'five\\', 'six']);
 });
 
-test('more targets than a client must support are told of', () => {
+test('a note in the asset reports more targets than a client must support', () => {
   assert.match(jsonOf(bytesOf('six')).meshes[0].extras.note ?? '', /8 morphed attributes/);
   assert.equal(jsonOf(bytesOf('two')).meshes[0].extras.note, undefined);
 });
 
-test('split vertices have the same bits on every shape, and weld back to the supermesh', () => {
+test('split vertices have the same bits on every shape and weld back to the supermesh', () => {
   const bytes = bytesOf('dressed');
   const json = jsonOf(bytes);
   const binary = bytes.subarray(28 + bytes.readUInt32LE(12));
@@ -180,7 +180,7 @@ test('split vertices have the same bits on every shape, and weld back to the sup
   assert.ok(vertices > distinct.size);
 });
 
-test('materials, image, colours and coordinates of the first shape are there', async () => {
+test('the asset has the materials, image, colours and texture coordinates of the first shape', async () => {
   const json = jsonOf(bytesOf('dressed'));
   assert.equal(json.meshes[0].primitives.length, 2);
   assert.deepEqual(
@@ -199,7 +199,7 @@ test('materials, image, colours and coordinates of the first shape are there', a
       assert.ok(color.getX(i) >= 0 && color.getX(i) <= 1);
       assert.ok(numbers[i] >= 0);
     }
-    // No triangle crosses the seam: coordinates go once round in 24 columns.
+    // No triangle crosses the seam: the coordinates go around once in 24 columns.
     for (let i = 0; i < index.length; i += 3) {
       const u = [0, 1, 2].map((k) => uv.getX(index[i + k]));
       assert.ok(Math.max(...u) - Math.min(...u) < 1.01 / 24);

@@ -1,5 +1,5 @@
-// Written assets in three.js and in Babylon.js, drawn by headless Chromium, against a direct drawing of the shapes that
-// the facts give: the same camera, the same shading (flat normals as colours in three.js; silhouettes in Babylon.js).
+// Draws written assets with three.js and Babylon.js in headless Chromium and compares them with a direct drawing of
+// the shapes in the facts: same camera, same shading (flat normals as colours in three.js; silhouettes in Babylon.js).
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import fs from 'node:fs';
@@ -28,7 +28,7 @@ import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 const HALF = 2.5, EYE = [6, 8, 20], SIZE = ${SIZE};
 
-/** Bytes as base64: as an array of numbers a picture takes seconds on its way out of the browser. */
+/** Encodes bytes as base64: an array of numbers takes seconds to leave the browser. */
 function packed(bytes) {
   let text = "";
   for (let i = 0; i < bytes.length; i += 8192) text += String.fromCharCode(...bytes.subarray(i, i + 8192));
@@ -71,7 +71,7 @@ window.three = async (name, target) => {
   return drawThree(gltf.scene);
 };
 
-// The texture as it is: no light, no conversion of colours.
+// The plain texture: no light, no conversion of colours.
 function plain(map) {
   map.colorSpace = THREE.NoColorSpace;
   map.needsUpdate = true;
@@ -136,7 +136,7 @@ window.babylon = async (name, target, painted) => {
   scene.render();
   const pixels = await engine.readPixels(0, 0, SIZE, SIZE);
   const out = new Uint8Array(pixels.buffer);
-  if (painted) { // Babylon.js gives what the texture holds as linear light
+  if (painted) { // Babylon.js treats the texels as linear light
     for (let i = 0; i < out.length; i++) {
       const light = out[i] / 255;
       if (i % 4 < 3) out[i] = Math.round(255 * (light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055));
@@ -196,7 +196,7 @@ const draw = async (how, ...args) =>
   Buffer.from(await page.evaluate(([how, args]) => window[how](...args), [how, args]), 'base64');
 const covered = (image) => Array.from({ length: SIZE * SIZE }, (_, i) => image[4 * i + 3] > 127);
 
-// Shares of pixels that differ, of those that either image covers.
+// The share of differing pixels among those that either image covers.
 function difference(a, b, tolerance) {
   let either = 0;
   let differ = 0;
@@ -212,7 +212,7 @@ function difference(a, b, tolerance) {
   return differ / either;
 }
 
-// With ORB_SHOTS the pictures are kept there, for a look at them.
+// ORB_SHOTS names a folder that keeps the pictures for inspection.
 function keep(name, image) {
   if (!process.env.ORB_SHOTS) return;
   const rgb = Buffer.alloc(3 * SIZE * SIZE);
@@ -233,18 +233,19 @@ for (const [name, shape] of [
   ['dressed', 2],
   ['six', 1],
 ]) {
-  test(`${name}, shape ${shape}: three.js draws it as it is, Babylon.js its outline`, async () => {
+  test(`${name}, shape ${shape}: three.js draws its shading, Babylon.js its outline`, async () => {
     const wanted = await draw('direct', name, shape);
     assert.ok(difference(wanted, await draw('three', name, shape - 1), 6) < 0.005);
     assert.ok(difference(wanted, await draw('babylon', name, shape - 1), 256) < 0.01);
   });
 }
 
-// Three shapes of unlike triangles; the overlay has every edge of the textured one, so that its texture is exact there.
-// On the others the direct picture interpolates coordinates over other triangles, which moves the tiles' borders.
+// Three shapes with different triangles. The overlay has every edge of the textured shape, so its texture is exact
+// there. On the others the direct picture interpolates coordinates over different triangles, which moves the tiles'
+// borders.
 for (const name of ['painted', 'painted-adaptive']) {
   for (const shape of [0, 1, 2]) {
-    test(`${name}, shape ${shape}: both draw its texture as it is`, async () => {
+    test(`${name}, shape ${shape}: both draw its texture`, async () => {
       const wanted = await draw('paintedDirect', name, shape);
       const most = name === 'painted' && shape === 0 ? 0.01 : 0.08;
       for (const how of ['paintedThree', 'paintedBabylon']) {
@@ -265,4 +266,4 @@ test('the shapes differ by far more than the tolerances', async () => {
   assert.ok(difference(first, await draw('three', 'two', 0), 6) > 0.2);
 });
 
-test('the page had no exception', () => assert.deepEqual(faults, []));
+test('the page threw no exception', () => assert.deepEqual(faults, []));

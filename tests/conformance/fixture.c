@@ -1,4 +1,4 @@
-/* Writes the assets that the conformance tests read, each with the facts they must show: NAME.glb and NAME.json with
+/* Writes the assets that the conformance tests read: NAME.glb, and NAME.json with the expected facts,
  * {"triangles": [[a,b,c]…], "shapes": [[x,y,z, …]…]} in doubles. The shapes are formulas on a globe. */
 #include <math.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@ enum { AROUND = 24, ROWS = 12, MAX_SHAPES = 6 };
 #define VERTICES (AROUND * (ROWS - 1) + 2)
 #define TRIANGLES (2 * AROUND * (ROWS - 1))
 
-/* The smallest PNG there is to be: one red pixel. */
+/* A minimal PNG: one red pixel. */
 static const unsigned char PIXEL[] = {
     0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52, 0x00, 0x00,
     0x00, 0x01, 0x00, 0x00, 0x00, 0x01, 0x08, 0x02, 0x00, 0x00, 0x00, 0x90, 0x77, 0x53, 0xde, 0x00, 0x00, 0x00,
@@ -65,8 +65,8 @@ static void shape_formula(int shape, const double p[3], double out[3]) {
   out[2] = (1 - wave) * p[2] * (2 - 0.3 * shape);
 }
 
-/* The first shape with all that a file can bring: coordinates with a seam, two materials with an image, colours, and
- * hard edges round every tile. */
+/* Gives the first shape everything a file can contain: texture coordinates with a seam, two materials with an image,
+ * colours, and hard edges around every tile. */
 static void dress(orb_context *ctx, orb_mesh *mesh, const double *points) {
   mesh->texcoords = made(ORB_NEW(ctx, float, 6 * TRIANGLES));
   mesh->colors = made(ORB_NEW(ctx, float, 12 * TRIANGLES));
@@ -130,7 +130,7 @@ static unsigned char *put_chunk(unsigned char *at, const char *type, const unsig
   return put32(from + 4 + size, ~crc);
 }
 
-/* A PNG of coloured tiles, each unlike its neighbours, stored without compression. */
+/* A PNG of coloured tiles, each different from its neighbours, without compression. */
 static size_t paint(unsigned char *png) {
   static const unsigned char mark[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
   unsigned char head[13] = {0}, data[STORED + 11], *at = data + 7;
@@ -164,7 +164,7 @@ static size_t paint(unsigned char *png) {
   return (size_t)(put_chunk(end, "IEND", head, 0) - png);
 }
 
-/* Turn and depth on the sphere as coordinates of a texture, with a seam where the turn ends. */
+/* Longitude and depth on the sphere as texture coordinates, with a seam where the longitude wraps around. */
 static void unwrap(const double *points, const int32_t *corner, float out[6]) {
   double middle[3] = {0};
   for (int k = 0; k < 9; k++) {
@@ -264,7 +264,7 @@ static void make(const char *folder, const char *name, int shape_count, int dres
   orb_context_destroy(ctx);
 }
 
-/* Three shapes, each with vertices at places of its own, remeshed; the first has a texture. */
+/* Three shapes with different vertices, remeshed; the first has a texture. */
 static void make_painted(const char *folder, const char *name, orb_remesh_method method) {
   enum { SHAPES = 3 };
   static const char *const names[SHAPES] = {"first", "second", "third"};

@@ -1,5 +1,5 @@
-// The page of docs/tutorial.md in headless Chromium: its lines are run, its page is saved as it stands and opened.
-// With ORB_PICTURES=1 the pictures of the tutorial are made anew.
+// Follows docs/tutorial.md: runs its commands, saves its page unchanged and opens it in headless Chromium.
+// ORB_PICTURES=1 renders the pictures of the tutorial again.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import fs from 'node:fs';
@@ -25,7 +25,7 @@ const { chromium } = await import('playwright-core');
 
 const types = { '.js': 'text/javascript', '.html': 'text/html', '.glb': 'model/gltf-binary' };
 
-/** Serves the folder, and the npm packages of the tests where a reader would have installed them. */
+/** Serves the folder, and the npm packages of the tests at the paths where a reader installs them. */
 function serve(t, folder) {
   const server = http.createServer((request, response) => {
     const where = decodeURIComponent(new URL(request.url, 'http://x').pathname);
@@ -40,7 +40,7 @@ function serve(t, folder) {
   return new Promise((done) => server.listen(0, '127.0.0.1', () => done(`http://127.0.0.1:${server.address().port}/`)));
 }
 
-/** The share of pixels that differ by more than a little. */
+/** The share of pixels that differ noticeably. */
 function difference(a, b) {
   let count = 0;
   for (let i = 0; i < a.length; i += 3) count += Math.max(...[0, 1, 2].map((c) => Math.abs(a[i + c] - b[i + c]))) > 24;

@@ -1,4 +1,4 @@
-/* A wall clock that is an hour ahead until ORB_CLOCK_AHEAD_MS after the first look at it, and then is set right. */
+/* A wall clock that is one hour fast until ORB_CLOCK_AHEAD_MS after the first reading, and correct from then on. */
 #include <stdlib.h>
 #include <sys/syscall.h>
 #include <time.h>

@@ -1,12 +1,11 @@
-/* Makes calls of a program fail from outside: a library for LD_PRELOAD that stands before malloc, write, fsync, rename,
- * open, the calls of SQLite and the starts of threads, whoever calls them: the program, SQLite, the HTTP library, libc.
+/* Makes calls of a program fail from outside: a library for LD_PRELOAD that intercepts malloc, write, fsync, rename,
+ * open, SQLite calls and thread starts by any caller: the program, SQLite, the HTTP library, libc.
  *
- * ORB_FAIL_BOARD names a file of the size of struct board, which the test shares with the program by mapping: the test
- * writes there what is to fail, and reads what did. It may do so while the program runs, and again and again.
- * ORB_FAIL_SITES names the list of sites, of 8 SITES bytes, which several programs may share. Kinds:
- * alloc (NULL, ENOMEM), write (ENOSPC, to files only), fsync (EIO), rename (EIO), folder (EIO from mkdir and unlink),
- * open (EMFILE, of files and folders), thread (EAGAIN), sqlite (SQLITE_IOERR from a step, an exec, a prepare). It
- * prints on stderr where a call failed.
+ * ORB_FAIL_BOARD names a file of the size of struct board, which the test and the program map: the test writes which
+ * call must fail and reads whether it did, as often as it likes while the program runs. ORB_FAIL_SITES names the list
+ * of sites (8 * SITES bytes), which several programs may share. Kinds: alloc (NULL, ENOMEM), write (ENOSPC, to files
+ * only), fsync (EIO), rename (EIO), folder (EIO from mkdir and unlink), open (EMFILE, of files and folders), thread
+ * (EAGAIN), sqlite (SQLITE_IOERR from a step, an exec, a prepare). The library prints on stderr where a call failed.
  */
 #include <dirent.h>
 #include <dlfcn.h>
@@ -29,13 +28,13 @@ enum kind { ALLOC, WRITE, FSYNC, RENAME, FOLDER, OPEN, THREAD, SQLITE };
 enum { DEPTH = 7, SHOWN = 16, SITES = 1 << 16 };
 enum mode { OFF, ONCE, FOR_EVER };
 
-/* What the test and the program share. A site is the chain of the innermost callers, as places in their modules, so
- * that it is the same in each life. */
+/* Shared by the test and the program. A site is the chain of the innermost callers, as offsets in their modules, so
+ * that a restart keeps it. */
 struct board {
   atomic_uint mode; /* written last */
   uint32_t kind;
   uint32_t wanted;    /* the call that fails, counted from 1; 0: the first one at a site not in the list */
-  atomic_uint met;    /* the call has failed; for ever: all later ones of the kind do */
+  atomic_uint met;    /* the call has failed; in mode ever, so do all later calls of the kind */
   atomic_uint passed; /* calls of the kind since the test set this to 0 */
 };
 
@@ -44,7 +43,7 @@ static atomic_uint_fast64_t *sites; /* where a call has failed, open addressing;
 static __thread int inside __attribute__((tls_model("initial-exec")));
 
 static void *next_of(const char *name) {
-  inside++; /* it allocates */
+  inside++; /* dlsym() allocates */
   void *found = dlsym(RTLD_NEXT, name);
   inside--;
   return found;
@@ -63,13 +62,13 @@ __attribute__((constructor)) static void begin(void) {
   void *frames[4];
   inside++;
   backtrace(frames, 4);   /* loads what it needs now */
-  unsetenv("LD_PRELOAD"); /* children are none of our business */
+  unsetenv("LD_PRELOAD"); /* children run without faults */
   sites = map_file(getenv("ORB_FAIL_SITES"), SITES * sizeof *sites);
   board = sites ? map_file(getenv("ORB_FAIL_BOARD"), sizeof *board) : NULL;
   inside--;
 }
 
-/* Not inlined, nor any of its callers into theirs: it counts the frames. */
+/* Counts frames, so neither this function nor its callers may be inlined. */
 __attribute__((noinline)) static uint64_t site_of(void) {
   void *frames[DEPTH + 3];
   int count = backtrace(frames, DEPTH + 3);
@@ -84,7 +83,7 @@ __attribute__((noinline)) static uint64_t site_of(void) {
   return hash ? hash : 1;
 }
 
-/* The site's place in the list, or the free one where it belongs. */
+/* The slot of the site in the list, or the free slot where it belongs. */
 static atomic_uint_fast64_t *place_of(uint64_t site) {
   for (uint64_t i = site;; i++) {
     uint_fast64_t there = atomic_load(&sites[i % SITES]);
@@ -138,7 +137,7 @@ __attribute__((noinline)) static int fail(enum kind kind) {
   return hit;
 }
 
-/* The allocator's own names in glibc serve until dlsym(), which allocates, has found the next one. */
+/* dlsym() allocates, so glibc's internal names serve until it has found the next function. */
 extern void *__libc_malloc(size_t size);
 extern void *__libc_calloc(size_t count, size_t size);
 extern void *__libc_realloc(void *block, size_t size);
@@ -326,7 +325,7 @@ int pthread_getattr_np(pthread_t thread, pthread_attr_t *attributes) {
 
 enum { SQLITE_ERROR_IO = 10 };
 
-/* SQLite's calls of itself do not count: sqlite3_exec() takes its result from the statement, which knows of no fault.
+/* Calls within SQLite do not count: sqlite3_exec() takes its result from the statement, which saw no fault.
  */
 static int is_own(void *caller, void *function) {
   struct dl_find_object from, to;

@@ -1,10 +1,10 @@
-// Mixed work for ORB_SOAK_SECONDS (600), and whether memory, descriptors and threads stay flat.
+// Runs mixed work for ORB_SOAK_SECONDS (600) and checks that memory, descriptors and threads do not grow.
 //
-// Before the clock, 700 small jobs fill what the service keeps of ended ones. The first fifth warms up: caches fill, the
-// allocator finds its size. After it the line of least squares through the
-// samples of a second may not rise by more than a tenth of the level over the rest, and when all callers are gone, no more
-// may be open of anything than at the beginning: but each connection to the catalogue, of which there are as many as
-// ever, opens the file of its log with its first read. Exit status 1 otherwise.
+// First, 700 small jobs fill the list of finished jobs that the service keeps. The first fifth of the time warms up the
+// caches and the allocator. After that, the least-squares line through one sample per second may rise by at most a
+// tenth of the level. When all clients are gone, no kind of descriptor may have more open than at the beginning. The
+// exception is the catalogue's log: the number of connections is constant, but each opens the log with its first read.
+// Exit status 1 otherwise.
 import { mkdtempSync, readdirSync, readFileSync, readlinkSync, rmSync } from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
@@ -25,7 +25,7 @@ const sample = () => {
   };
 };
 
-/** What its descriptors are of: files by name, sockets and the like by kind. */
+/** Counts the open descriptors of the daemon: files by name, sockets and others by kind. */
 function open() {
   const kinds = {};
   for (const fd of readdirSync(`${proc}/fd`)) {
@@ -35,7 +35,7 @@ function open() {
         .replace(data, '')
         .replace(/:\[\d+\]$/, '');
     } catch (error) {
-      if (error.code === 'ENOENT') continue; // closed since the folder was listed
+      if (error.code === 'ENOENT') continue; // closed after readdir
       throw error;
     }
     kinds[what] = (kinds[what] ?? 0) + 1;
@@ -55,7 +55,7 @@ const mesh = () => {
   );
 };
 
-/** One caller after another: uploads, jobs, waits, streams, downloads, errors, cancels, aborted requests, deletions. */
+/** One client: uploads, jobs, waits, streams, downloads, errors, cancels, aborted requests, deletions, in sequence. */
 async function caller() {
   while (!stop) {
     const [a, b] = [(await d.upload(mesh(), { name: 'a' })).json, (await d.upload(mesh(), { name: 'b' })).json];
@@ -71,7 +71,7 @@ async function caller() {
       count('cancelled');
     } else if (reply.status === 202) {
       const events = await d.get(`${reply.json.url}/events`);
-      count(/^event: succeeded/m.test(events.bytes.toString()) ? 'supermeshes' : 'supermeshes that failed');
+      count(/^event: succeeded/m.test(events.bytes.toString()) ? 'supermeshes' : 'failed supermeshes');
       const asset = await d.get(
         `/v1/supermeshes/${(await d.get(reply.json.url)).json.result?.split('/').pop()}/asset.glb`,
       );
@@ -113,7 +113,7 @@ for (const began = Date.now(); Date.now() - began < seconds * 1000; ) {
 stop = true;
 const failed = (await Promise.allSettled(callers)).filter((result) => result.status === 'rejected');
 const idle = ['--', ...failed.map((result) => String(result.reason))];
-await sleep(35_000); // kept connections end after 30 s
+await sleep(35_000); // idle connections close after 30 s
 const last = sample();
 const at_last = open();
 const { code } = await d.stop();

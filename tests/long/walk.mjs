@@ -1,5 +1,5 @@
-// One life of the daemon, a walk through every route and kind of job with the smallest meshes: for memcheck, under which
-// the scenarios take hours. Ends with the daemon's status, and with 1 where an answer was not what it should be.
+// Starts one daemon and calls every route and kind of job with the smallest meshes. Written for memcheck, under which
+// the scenarios take hours. Exits with the daemon's status, or with 1 if an answer is wrong.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';

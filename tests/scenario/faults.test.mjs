@@ -1,14 +1,13 @@
-// Allocations, writes, fsyncs, renames, changes of folders, opens, calls of SQLite and starts of threads of the daemon
-// are made to fail, once or from then on, while it starts, answers a fixed sequence of requests, starts again with what
-// it has, and stops. Each time: an answer, an error answer, or a clean stop; never a crash, never a hang; then, without
-// faults, it is well again, and nothing that was accepted is lost.
+// Injects faults: makes the daemon's allocations, writes, fsyncs, renames, folder changes, opens, SQLite calls and
+// thread starts fail, one call ("once") or all calls from one on ("ever"), while it starts, answers a fixed sequence of
+// requests, restarts with its data, and stops. Every time it must give an answer, an error response or a clean stop;
+// it must never crash or hang. Afterwards, without faults, it must work again and have lost nothing that it accepted.
 //
-// ORB_FAULT_RUNS is the number of faults (48; 21 with sanitizers), a sample; "all" goes on, for each kind, once and for
-// ever, until a run in which nothing failed any more: calls are taken by their number, 1, 2, 3 …, and where there are
-// thousands of them by the site that makes them, the chain of the seven innermost callers. "few" leaves out the
-// allocations. ORB_FAULT_KINDS (all of them) chooses kinds, comma-separated; ORB_FAULT_SEED (1) the sample;
-// ORB_FAULT_PARALLEL how many run side by side. The data lies in memory where TMPDIR does not say otherwise: it saves
-// the time of real fsyncs.
+// ORB_FAULT_RUNS is the number of faults (48; 21 with sanitizers), a sample. "all" continues for each kind and both
+// modes until a run in which no call fails. It numbers the calls 1, 2, 3 …; kinds with thousands of calls it takes by
+// call site, the chain of the seven innermost callers. "few" omits the allocations. ORB_FAULT_KINDS (default: all) is a
+// comma-separated list of kinds; ORB_FAULT_SEED (1) selects the sample; ORB_FAULT_PARALLEL is the number of daemons at
+// once. Unless TMPDIR is set, the data is in memory, which saves the time of real fsyncs.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { existsSync, mkdirSync } from 'node:fs';
@@ -25,9 +24,9 @@ const library = process.env.ORB_INTERPOSE;
 const sanitizer = process.env.ORB_INTERPOSE_BEFORE;
 const wanted = process.env.ORB_FAULT_RUNS ?? (slow ? '21' : '48');
 const all = !(Number(wanted) > 0);
-const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? (all ? 6 : 3)); // they wait more than they compute
-const longest = 200_000 * patience; // for an answer, or an end
-// A sanitizer has its own allocator; allocations reach the interposer only where it is preloaded before the sanitizer.
+const side_by_side = Number(process.env.ORB_FAULT_PARALLEL ?? (all ? 6 : 3)); // the daemons wait more than they compute
+const longest = 200_000 * patience; // milliseconds to wait for an answer or an exit
+// A sanitizer has its own allocator: the interposer sees allocations only if it is preloaded before the sanitizer.
 const asked = !slow || sanitizer;
 const kinds = (process.env.ORB_FAULT_KINDS ?? faults.kinds.join(','))
   .split(',')
@@ -37,7 +36,7 @@ const arguments_ = ['--workers', '1', '--io-threads', '1', '--drain-seconds', '2
 const base = !process.env.TMPDIR && existsSync('/dev/shm') ? '/dev/shm' : tmpdir();
 const run = promisify(execFile);
 
-/** A data folder, its daemon with the interposer, and a board. */
+/** A data folder, its daemon with the interposer, and the board that controls the faults. */
 class Place {
   constructor(folder, sites, preloaded) {
     mkdirSync(folder);
@@ -60,12 +59,12 @@ class Place {
     return this.d.child && this.d.child.exitCode === null && this.d.child.signalCode === null;
   }
 
-  /** Exits by itself, with a status and not by a signal. */
+  /** Waits until the daemon exits. It must exit with a status; a signal fails the test. */
   async stopped(how) {
     const timer = setTimeout(() => this.d.child.kill('SIGABRT'), longest);
     const { code, signal } = await this.d.exited;
     clearTimeout(timer);
-    if (slow) await new Promise((resolve) => setTimeout(resolve, 20)); // for the last of its log
+    if (slow) await new Promise((resolve) => setTimeout(resolve, 20)); // lets the end of its log arrive
     assert.doesNotMatch(this.d.log, /(Address|Leak|Undefined\w*)Sanitizer|runtime error:/, how);
     assert.equal(signal, null, `${how}: it ${signal === 'SIGABRT' ? 'aborted or hung' : 'died'}: ${signal}`);
     return code;
@@ -75,7 +74,7 @@ class Place {
     return this.stopped(how);
   }
 
-  /** Without faults: it starts with what it has and is well. */
+  /** Starts the daemon on its data without faults; everything must work. */
   async revive() {
     this.board.disarm();
     this.d.log = '';
@@ -83,7 +82,7 @@ class Place {
     await this.caller.audit(true);
   }
 
-  /** The end of a data folder: nothing lost, nothing torn. */
+  /** Stops the daemon and checks the data folder: nothing is lost, nothing is torn. Then begins a new folder. */
   async finish() {
     if (!this.alive) await this.revive();
     assert.equal(await this.stop('without faults'), 0);
@@ -98,7 +97,7 @@ class Place {
     this.board.close();
   }
 
-  /** Given up as it is; the next begins anew. */
+  /** Kills the daemon, deletes its data and begins a new folder. */
   async abandon() {
     this.board.disarm();
     if (this.alive) {
@@ -110,16 +109,16 @@ class Place {
   }
 }
 
-/** Each meets its fault, `arm`ed by itself at the right moment, and leaves a place that is well; true if it was met. */
+/** Each calls `arm` at the right moment and leaves a place that works; returns whether the fault happened. */
 const phases = {
-  /** A start: with an empty folder, or with what there is. */
+  /** Starts the daemon, on an empty folder or on existing data. */
   async start(place, arm) {
     arm();
     try {
       await place.d.start();
     } catch {
       const met = place.board.disarm();
-      if (place.alive) place.d.child.kill('SIGTERM'); // it said that it runs, but its line was lost
+      if (place.alive) place.d.child.kill('SIGTERM'); // it runs, but the line that says so was lost
       assert.notEqual(await place.stopped('at its start'), 0, 'a start that failed must say so');
       await place.revive();
       return met;
@@ -159,7 +158,7 @@ const beginnings = {
     await place.caller
       .ask(true, 'POST', '/v1/embeddings', { body: { mesh: mesh.id } })
       .then((reply) => place.caller.jobs.push(reply.json.url));
-    place.d.child.kill('SIGKILL'); // with a job that was accepted and may run
+    place.d.child.kill('SIGKILL'); // with an accepted job that may be running
     await place.d.exited;
   },
   work: async () => {},
@@ -173,7 +172,7 @@ class Runner {
   failed = [];
   told = {};
 
-  /** One fault; whether it was met. */
+  /** Injects one fault; returns whether it happened. */
   async one(place, when, kind, mode, number) {
     this.planned++;
     const what = `${kind} ${number ? `#${number}` : 'at a new site'} ${mode} (${when})`;
@@ -183,7 +182,7 @@ class Runner {
       if (met) {
         this.faults++;
         this.told[`${kind} ${when}`] = (this.told[`${kind} ${when}`] ?? 0) + 1;
-        // It is well again; a start that failed and was repeated needs less to show it, and each of many.
+        // It must work again. A brief check does for a repeated start, and for nine of ten faults by call site.
         const brief = when !== 'work' || (faults.by_site.includes(kind) && this.faults % 10 !== 0);
         await (brief ? place.caller.glance() : place.caller.sequence(true));
         if (this.faults % 100 === 0 && all)
@@ -198,11 +197,11 @@ class Runner {
     }
   }
 
-  /** Until nothing new fails, with all places side by side. */
+  /** Injects faults on all places in parallel until no new call fails. */
   async exhaust(places, kind, mode) {
     const sites = faults.by_site.includes(kind);
     for (const when of Object.keys(phase_of)) {
-      const needed = sites && when !== 'first' ? 2 * places.length : 1; // a site may be passed only now and then
+      const needed = sites && when !== 'first' ? 2 * places.length : 1; // not every run passes every site
       let next = 1;
       let clean = 0;
       const work = async (place) => {
@@ -217,7 +216,7 @@ class Runner {
     }
   }
 
-  /** `count` faults over the phases, by a stride with a seeded start, both ways in turn. */
+  /** Injects `count` faults over the phases, at a stride with a seeded start, alternately once and ever. */
   async sample(place, kind, count) {
     const start = (seed * 0.6180339887498949) % 1;
     for (const [when, share] of [

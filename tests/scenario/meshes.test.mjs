@@ -1,4 +1,4 @@
-// Meshes: what is accepted and repaired, what is refused and why, and the resource itself.
+// Meshes: which ones are accepted, repaired or refused and why; and the resource itself.
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
 import { readFile } from 'node:fs/promises';
@@ -9,7 +9,7 @@ import * as shapes from './support/shapes.mjs';
 
 const { obj, ball } = shapes;
 
-test('a mesh is known by its content', async (t) => {
+test('the content of a mesh determines its id', async (t) => {
   const d = await daemon(t);
   const bytes = await readFile(path.join(samples, 'dog.obj'));
   const first = await d.upload(bytes, { name: 'dog' });
@@ -45,7 +45,7 @@ test('a mesh is known by its content', async (t) => {
   assert.equal(createHash('sha256').update(file.bytes).digest('hex'), createHash('sha256').update(bytes).digest('hex'));
 });
 
-test('area, volume and bounds are those of the surface', async (t) => {
+test('a mesh has the area, volume and bounds of its surface', async (t) => {
   const d = await daemon(t);
   const { json: cube } = await d.upload(shapes.cube.replaceAll('v 1', 'v 2'), { name: 'box' });
   assert.equal(cube.vertices, 8);
@@ -55,7 +55,7 @@ test('area, volume and bounds are those of the surface', async (t) => {
   assert.deepEqual(cube.bounds, { min: [0, 0, 0], max: [2, 1, 1] });
 });
 
-test('every format is told by its content', async (t) => {
+test('every format is detected by its content', async (t) => {
   const d = await daemon(t);
   const m = ball(2);
   const files = {
@@ -75,7 +75,7 @@ test('every format is told by its content', async (t) => {
   assert.equal(big.status, 201, big.bytes.toString());
 });
 
-test('safe repairs change no shape, and the answer lists them', async (t) => {
+test('safe repairs do not change the shape, and the response lists them', async (t) => {
   const d = await daemon(t);
   const m = ball(2);
   const kinds = (reply) => Object.fromEntries(reply.json.repairs.map((r) => [r.kind, r.count]));
@@ -100,7 +100,7 @@ test('safe repairs change no shape, and the answer lists them', async (t) => {
   assert.equal(kinds(cube).triangulate, 6, 'polygons');
 });
 
-test('repairs that change the shape happen by name only', async (t) => {
+test('repairs that change the shape happen only on request', async (t) => {
   const d = await daemon(t);
   const open = obj(shapes.withoutFace(ball(2)));
   assertProblem(await d.upload(open), 422, 'not-closed');
@@ -116,7 +116,7 @@ test('repairs that change the shape happen by name only', async (t) => {
   assert.equal(unknown.status, 400, unknown.bytes.toString());
 });
 
-test('bad meshes are refused with what is wrong and where', async (t) => {
+test('a refusal of a bad mesh says what is wrong and where', async (t) => {
   const d = await daemon(t);
   const m = ball(2);
   const refused = async (body, status, type, query) => {
@@ -142,7 +142,7 @@ test('bad meshes are refused with what is wrong and where', async (t) => {
       [0, 0, 1],
       [0, -1, 0],
       [0, 0, -1],
-    ], // two tetrahedra with an edge in common
+    ], // two tetrahedra that share an edge
     triangles: [
       [0, 2, 1],
       [0, 1, 3],
@@ -185,7 +185,7 @@ test('bad meshes are refused with what is wrong and where', async (t) => {
   assert.deepEqual(list.json.meshes ?? list.json.items, [], 'nothing that was refused is stored');
 });
 
-test('cut and scrambled files never do harm', async (t) => {
+test('truncated and corrupted files never crash the daemon', async (t) => {
   const d = await daemon(t);
   const files = [
     Buffer.from(obj(ball(1))),
@@ -208,7 +208,7 @@ test('cut and scrambled files never do harm', async (t) => {
   assert.equal((await d.get('/livez')).status, 200);
 });
 
-test('lists come in pages; what is deleted is gone', async (t) => {
+test('lists are paged; a deleted mesh is gone', async (t) => {
   const d = await daemon(t);
   const ids = [];
   for (let i = 0; i < 5; i++)
@@ -232,15 +232,15 @@ test('lists come in pages; what is deleted is gone', async (t) => {
   assert.equal((await d.upload(shapes.tetrahedron.replace('v 1 0 0', 'v 3 0 0'))).status, 201, 'it can come back');
 });
 
-test('uploads of many megabytes are checked beside the small ones', async (t) => {
-  // One worker: one thread checks what has more than 16 MB, another the rest.
+test('small uploads are checked while large ones are in progress', async (t) => {
+  // With one worker, one thread checks uploads of more than 16 MB, another the rest.
   const d = await daemon(t, { args: ['--workers', '1'] });
   const shape = shapes.ball(8, ([x, y, z]) => [x, 1.5 * y, z * (1 + 0.2 * x)]);
   const text = shapes.obj(shape);
   assert.ok(text.length > 20 << 20, `${text.length} bytes`);
   let ended = 0;
   const large = (slow ? [0, 1] : [0, 1, 2, 3]).map((i) => d.upload(`# ${i}\n${text}`).finally(() => ended++));
-  // Once the first large one is in, it is being checked and the other waits; each small one is answered all the same.
+  // After the first large upload arrives, it is being checked and the other waits; each small one is still answered.
   const received = async () =>
     Number(/^orbmorph_received_bytes_total (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
   while (ended === 0 && (await received()) < text.length) await new Promise((done) => setTimeout(done, 20));

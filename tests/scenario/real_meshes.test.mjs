@@ -1,11 +1,11 @@
-// Every real mesh: valid ones embed, repairable ones are repaired, the others are refused for the right reason.
+// Uploads every real mesh: good ones embed, repairable ones are repaired, bad ones are refused for the right reason.
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { daemon, slow, assertProblem } from './support/daemon.mjs';
 import * as real from './support/real.mjs';
 
 const skip = real.there ? false : 'no real meshes';
-const large = 20_000; // triangles that a build with sanitizers is spared
+const large = 20_000; // a build with sanitizers skips meshes with more triangles
 
 async function embeds(d, mesh, what) {
   const { certificate, distortion } = await d.made('/v1/embeddings', { mesh: mesh.id });
@@ -17,7 +17,7 @@ async function embeds(d, mesh, what) {
   assert.ok(distortion.symmetric_dirichlet.mean >= 1, what);
 }
 
-test('good meshes are accepted as they stand, and embed', { skip }, async (t) => {
+test('good meshes are accepted without repairs and embed', { skip }, async (t) => {
   const d = await daemon(t);
   for (const row of real.rows('good')) {
     if (slow && Number(row.f) > large) continue;
@@ -39,7 +39,7 @@ test('good meshes are accepted as they stand, and embed', { skip }, async (t) =>
   }
 });
 
-test('repairable meshes are repaired, and the answer lists the repairs', { skip }, async (t) => {
+test('repairable meshes are repaired, and the response lists the repairs', { skip }, async (t) => {
   const d = await daemon(t);
   const kinds = {
     weld: ['weld'],
@@ -51,7 +51,7 @@ test('repairable meshes are repaired, and the answer lists the repairs', { skip 
   };
   for (const row of real.rows('weldable')) {
     await t.test(`${row.name} (${row.fix})`, async () => {
-      assert.ok(kinds[row.fix], `a fix that the test does not know: ${row.fix}`);
+      assert.ok(kinds[row.fix], `the test does not know this fix: ${row.fix}`);
       const largest = row.fix === 'largest';
       if (largest) assertProblem(await d.uploadFile(row.file), 422, 'not-connected');
       else
@@ -66,7 +66,7 @@ test('repairable meshes are repaired, and the answer lists the repairs', { skip 
   }
 });
 
-/** The problem type that fits what the index says of a bad mesh; several where two reasons hold at once. */
+/** The problem types that fit the reason in the index; several if two reasons apply at once. */
 function expected(reason) {
   const list = [
     [
@@ -116,13 +116,13 @@ function expected(reason) {
   return list.find(([pattern]) => pattern.test(reason))?.[1];
 }
 
-test('bad meshes are refused for their reason, with facts', { skip }, async (t) => {
+test('a refusal of a bad mesh names its reason and the facts', { skip }, async (t) => {
   const d = await daemon(t);
   for (const row of real.rows('bad')) {
     await t.test(`${row.name}: ${row.reason}`, async () => {
       const reply = await d.uploadFile(row.file);
       const fits = expected(row.reason);
-      assert.ok(fits, `a reason that the test does not know: ${row.reason}`);
+      assert.ok(fits, `the test does not know this reason: ${row.reason}`);
       const found = fits.find(([status, type]) => status === reply.status && reply.json?.type === `/problems/${type}`);
       assert.ok(found, `${reply.status} ${reply.bytes}`);
       assertProblem(reply, ...found);
