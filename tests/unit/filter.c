@@ -1,6 +1,6 @@
-/* Which tests of a unit's program run: ORB_TEST_ONLY names those that do, by a pattern with * and ?, ORB_TEST_SKIP
-   those that do not. Linked into every such program; some of their tests take an hour under memcheck, the others a
-   minute. */
+/* Selects the tests that a unit test program runs: ORB_TEST_ONLY is a pattern with * and ? of the tests to run,
+ * ORB_TEST_SKIP one of the tests to skip. Every such program links this file, because under memcheck some tests take an
+ * hour and the others a minute. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

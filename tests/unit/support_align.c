@@ -55,8 +55,8 @@ static void area_vector(const orb_mesh *mesh, int32_t t, double out[3]) {
   orb_cross(u, w, out);
 }
 
-/* The pieces of a given triangle face as it does and have its area together, so that they tile it; given vertices are
- * where they were, landmarks where they were asked for. */
+/* The pieces of a given triangle face the same way and their areas add up to its area, so they tile it. Given vertices
+ * keep their positions; landmarks are at the requested places. */
 static void check_surface(const orb_aligned_shape *shape, const orb_mesh *given, const orb_landmark *landmarks,
                           int32_t landmark_count, int32_t s) {
   orb_extent extent;

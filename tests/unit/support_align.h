@@ -1,15 +1,15 @@
-/* Checks of an alignment that do not trust the library's own certificate. */
+/* Checks an alignment independently of the library's certificate. */
 #ifndef SUPPORT_ALIGN_H
 #define SUPPORT_ALIGN_H
 
 #include "orbmorph/align.h"
 
-/* Closed (T = 2V − 4), valid, positive by exact arithmetic on a sample, once round the sphere by solid angles, and
+/* Closed (T = 2V − 4), valid, positive by exact arithmetic on a sample, covers the sphere once by solid angles, and has
  * landmark k at bit-equal points on all shapes. */
 void check_alignment(const orb_alignment *alignment, int landmarks_meet);
 
-/* Runs orb_align() and checks the result, and that each surface is still the one that was given; prints the reason
- * where it fails. Free `out` after. */
+/* Runs orb_align() and checks the result and that no surface has changed. Prints the reason on failure. The caller
+ * frees `out`. */
 void align_and_check(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                      const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
                      orb_alignment *out);

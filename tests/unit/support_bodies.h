@@ -6,8 +6,7 @@
 
 enum { BODIES = 3, BODIES_LANDMARKS_MAX = 150 };
 
-/* Three star-shaped bodies of different triangulation; the central projection of the ball they were made from is their
- * embedding. */
+/* Three star-shaped bodies with different triangulations; their embedding is the ball that they were made from. */
 typedef struct bodies {
   orb_context *ctx;
   orb_mesh mesh[BODIES];
@@ -20,7 +19,7 @@ typedef struct bodies {
 void bodies_open(bodies *b, const orb_context_options *options);
 void bodies_close(bodies *b);
 
-/* The vertex that a place is exactly at, −1. */
+/* The vertex exactly at a place, or −1. */
 int32_t bodies_vertex_at(const orb_mesh *mesh, const orb_place *place);
 
 /* `count` distinct random vertices on each shape, in random order. */

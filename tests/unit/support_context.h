@@ -8,6 +8,6 @@ extern orb_context *ctx;
 
 int context_one_thread(void **unused);
 int context_two_threads(void **unused);
-int context_end(void **unused); /* asserts that nothing was left behind */
+int context_end(void **unused); /* asserts that nothing leaked */
 
 #endif

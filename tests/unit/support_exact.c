@@ -1,4 +1,4 @@
-/* Every finite double is an integer times 2^-1074; so the determinant is an integer times 2^-3222. Digits are 2^32. */
+/* Every finite double is an integer times 2^-1074, so the determinant is an integer times 2^-3222. The base is 2^32. */
 #include "support_exact.h"
 
 #include <math.h>

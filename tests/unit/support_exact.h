@@ -1,4 +1,4 @@
-/* Exact arithmetic of the tests' own: schoolbook integers, nothing shared with the library. */
+/* Exact arithmetic for the tests: schoolbook integers that share no code with the library. */
 #ifndef SUPPORT_EXACT_H
 #define SUPPORT_EXACT_H
 

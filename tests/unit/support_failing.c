@@ -32,7 +32,7 @@ static void free_it(void *user, void *block) {
 
 int failing_embeds(const orb_mesh *mesh, const orb_embed_options *options) {
   int failures = 0;
-  for (int n = 1;; n++) { /* the context itself is the allocation before */
+  for (int n = 1;; n++) { /* the allocation of the context comes before these */
     failing f = {.left = n};
     orb_context_options setup = {.threads = 1, .allocator = {.alloc = alloc_or_fail, .free = free_it, .user = &f}};
     orb_context *ctx;

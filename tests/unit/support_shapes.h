@@ -1,5 +1,5 @@
-/* Closed meshes of genus zero for tests, made on the spot. Arrays are of the context: free with orb_mesh_free() or
- * shape_free(). */
+/* Generates closed meshes of genus zero. The context allocates the arrays: free with orb_mesh_free() or shape_free().
+ */
 #ifndef SUPPORT_SHAPES_H
 #define SUPPORT_SHAPES_H
 
@@ -12,9 +12,9 @@ orb_mesh shape_icosahedron(orb_context *ctx);
 orb_mesh shape_globe(orb_context *ctx, int around, int rows);
 /* The same on a cylinder of radius 1 and the given length, flat caps. */
 orb_mesh shape_cylinder(orb_context *ctx, int around, int rows, double length);
-/* An octahedron split `levels` times four-way, on the unit sphere. */
+/* An octahedron with each face split into four `levels` times, on the unit sphere. */
 orb_mesh shape_ball(orb_context *ctx, int levels);
-/* How many repairs of a kind a mesh tells of. */
+/* The number of repairs of a kind that the mesh reports. */
 int64_t shape_repaired(const orb_mesh *mesh, const char *kind);
 void shape_free(orb_context *ctx, orb_mesh *mesh);
 

@@ -78,7 +78,7 @@ static void split_all(builder *b) {
       mid[h] = add_vertex(b, p[0] + q[0], p[1] + q[1], p[2] + q[2]);
     }
   }
-  /* The twin by brute force over a bucket of each origin. */
+  /* Finds the twin by brute force over the edges of each origin. */
   int32_t *head = malloc((size_t)b->nv * sizeof *head), *next = malloc(3 * (size_t)old * sizeof *next);
   memset(head, -1, (size_t)b->nv * sizeof *head);
   for (int32_t h = 0; h < 3 * old; h++) {
@@ -242,7 +242,7 @@ void sphere_shape_free(orb_context *ctx, orb_aligned_shape *shape) {
   memset(shape, 0, sizeof *shape);
 }
 
-/* The triangle that holds p best and p's central projection on it. */
+/* The triangle that contains p best, and p's central projection onto it. */
 static void project_brute(const double *points, const int32_t *triangles, int32_t count, const double p[3],
                           int32_t *triangle, double at[3]) {
   double best = -INFINITY;

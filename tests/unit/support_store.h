@@ -1,4 +1,4 @@
-/* A store in a folder of its own, made before each test and removed after it. */
+/* A store in its own folder, created before each test and removed after it. */
 #ifndef SUPPORT_STORE_H
 #define SUPPORT_STORE_H
 
@@ -11,10 +11,10 @@ typedef struct stored {
   char data[64];
   objects *store;
   catalogue *cat;
-  int64_t number; /* 0 at first; for a test's own use */
+  int64_t number; /* starts at 0; free for the test to use */
 } stored;
 
-/* For cmocka_unit_test_setup_teardown(): *state is the stored one. */
+/* For cmocka_unit_test_setup_teardown(): *state points to the struct above. */
 int stored_setup(void **state);
 int stored_teardown(void **state);
 

@@ -1,4 +1,4 @@
-/* Supermeshes made on the spot: one triangulated ball stands for the sphere, for every shape and for the supermesh. */
+/* Generates supermeshes: one triangulated ball is the sphere, the surface of every shape and the supermesh. */
 #ifndef SUPPORT_SUPERMESH_H
 #define SUPPORT_SUPERMESH_H
 
@@ -13,14 +13,14 @@ typedef struct synthetic {
   orb_aligned_shape shapes[SYNTHETIC_SHAPES_MAX];
 } synthetic;
 
-/* Where shape s puts the point p of the unit sphere. */
+/* The position on shape s of the point p of the unit sphere. */
 typedef void (*synthetic_map)(int32_t shape, const double p[3], double out[3]);
 
-/* A ball of the given levels; every supermesh vertex is a vertex of every shape. */
+/* A ball with the given number of splits; every supermesh vertex is a vertex of every shape. */
 synthetic synthetic_make(orb_context *ctx, int levels, int32_t shape_count, synthetic_map map);
 void synthetic_free(orb_context *ctx, synthetic *made);
 
-/* A GLB taken apart by the rules of its container, independent of the writer. */
+/* Parses the container of a GLB, independently of the writer. */
 typedef struct glb {
   cJSON *json;
   const unsigned char *binary;

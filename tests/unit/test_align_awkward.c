@@ -1,5 +1,5 @@
-/* Landmarks at awkward places: next to each other, on edges, several in one triangle, the same place said in two ways,
- * sixty of them, and such as contradict each other, which are named. */
+/* Landmarks at awkward places: next to each other, on edges, several in one triangle, the same place named in two ways,
+ * sixty of them, and contradictory ones, which the error names. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -40,8 +40,8 @@ static void meet(bodies *b, int shapes, int count) {
   orb_alignment_free(b->ctx, &out);
 }
 
-/* A vertex and four of its neighbours on one shape; five far from each other on the others; and adjacent on all, in the
- * same order about the vertex and in the opposite one. */
+/* A vertex and four of its neighbours on one shape, five distant vertices on the others; then adjacent vertices on all,
+ * in the same order around the vertex and in the opposite order. */
 static void adjacent_vertices(void **state) {
   (void)state;
   bodies b;
@@ -62,7 +62,7 @@ static void adjacent_vertices(void **state) {
   bodies_close(&b);
 }
 
-/* Both triangles of an edge may name a place on it; it is one place. */
+/* Either triangle of an edge can name a place on it; both name the same place. */
 static void one_place_on_an_edge(void **state) {
   (void)state;
   bodies b;
@@ -113,7 +113,7 @@ static void six_in_one_triangle(void **state) {
   bodies_close(&b);
 }
 
-/* The same vertex twice on all shapes, said by different triangles: one landmark, twice named. */
+/* The same vertex twice on all shapes, named by different triangles: one landmark with two names. */
 static void duplicates_share_a_vertex(void **state) {
   (void)state;
   bodies b;
@@ -153,7 +153,7 @@ static void refused(bodies *b, int shapes, int count, const int *named, int name
   }
 }
 
-/* Landmarks that share a place on some shapes only: exactly those are named, whatever else is there. */
+/* Landmarks that share a place on only some shapes: the error names exactly these, whatever other landmarks exist. */
 static void contradictions_are_named(void **state) {
   (void)state;
   bodies b;
@@ -175,8 +175,8 @@ static void contradictions_are_named(void **state) {
   bodies_close(&b);
 }
 
-/* Where the surfaces may hardly grow, tangled landmarks are refused: one is named, those before it can be met, and with
- * it they cannot. */
+/* If the surfaces may hardly grow, tangled landmarks are refused. The error names one: the landmarks before it can be
+ * met, but not together with it. */
 static void the_first_that_cannot_be_met_is_named(void **state) {
   (void)state;
   bodies b;
@@ -213,8 +213,8 @@ static void sixty(void **state) {
   bodies_close(&b);
 }
 
-/* So many in random order wind about each other in hundreds of strands, side by side: what they cost may not grow from
- * one strand to the next, else the surfaces outgrow their limit. */
+/* This many landmarks in random order wind around each other in hundreds of parallel strands. The cost must not grow
+ * from one strand to the next, or the surfaces exceed their limit. */
 static void a_hundred_and_fifty(void **state) {
   (void)state;
   bodies b;
@@ -224,8 +224,7 @@ static void a_hundred_and_fifty(void **state) {
   bodies_close(&b);
 }
 
-/* Tangled landmarks may take so much work and no more: where it is used up they count as not met, and the shapes are as
- * they were. */
+/* The work for tangled landmarks is limited. When it is used up they count as not met, and the shapes are unchanged. */
 static void work_is_bounded(void **state) {
   (void)state;
   enum { COUNT = 30 };
@@ -267,7 +266,7 @@ static int load(orb_context *ctx, const char *name, orb_mesh *mesh, orb_embeddin
   return 1;
 }
 
-/* Points of the same number, that is, anywhere: twelve on a cow and a man. */
+/* Vertices with equal numbers, which are unrelated places: twelve on a cow and a man. */
 static void cow_to_human(void **state) {
   (void)state;
   orb_context *ctx;

@@ -1,5 +1,5 @@
-/* What an alignment without landmarks says it matched: tips are among it, places agree with the shapes' known
- * correspondence, the confidence is that of maps whose stretch is known from geometry. */
+/* What an alignment without landmarks reports as matched: it includes tips, the places agree with the known
+ * correspondence of the shapes, and the confidence is right for maps whose stretch follows from geometry. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -11,7 +11,7 @@
 #include "orbmorph/merge.h"
 #include "support_shapes.h"
 
-/* Two ellipsoids on the same ball, whose points are the embedding of both. */
+/* Two ellipsoids made from the same ball, whose points are the embedding of both. */
 typedef struct ellipsoids {
   orb_context *ctx;
   orb_mesh ball, mesh[2];
@@ -51,7 +51,7 @@ static void assert_place(const orb_mesh *mesh, const orb_place *place) {
   assert_true(fabs(place->at[0] + place->at[1] + place->at[2] - 1) < 1e-12);
 }
 
-/* Half axes 3, 2, 1 and twice that: the map is a scaling, up to half turns about the axes and the few degrees that a
+/* Semi-axes 3, 2, 1 and twice that: the map is a scaling, up to half turns around the axes and the few degrees that the
  * search leaves. */
 static void scaled_copy(void **state) {
   (void)state;
@@ -79,14 +79,14 @@ static void scaled_copy(void **state) {
   close_ellipsoids(&e);
 }
 
-/* Area of the spheroid of half axes a > 1, 1, 1. */
+/* Area of the spheroid with semi-axes a > 1, 1, 1. */
 static double spheroid_area(double a) {
   double e = sqrt(1 - 1 / (a * a));
   return 2 * M_PI * (1 + a / e * asin(e));
 }
 
-/* At the tips of spheroids the map is a scaling by c in both directions, c² the quotient of the areas: the confidence
- * there is 1/E = 2/(c² + 1/c²). On their sides it stretches by 3/2 one way only. */
+/* At the tips of the spheroids the map scales by c in both directions, where c² is the quotient of the areas: the
+ * confidence there is 1/E = 2/(c² + 1/c²). On their sides the map stretches by 3/2 in one direction only. */
 static void known_stretch(void **state) {
   (void)state;
   ellipsoids e;
@@ -114,7 +114,7 @@ static void known_stretch(void **state) {
   close_ellipsoids(&e);
 }
 
-/* Found places go in again as landmarks; the overlay has each of them where it was found. */
+/* Found places are valid landmarks; the overlay has each of them where it was found. */
 static void found_can_be_sent_again(void **state) {
   (void)state;
   ellipsoids e;

@@ -1,6 +1,8 @@
-/* Few landmarks and many shapes: what one or two landmarks leave open is found by the shapes; three, five and sixteen
- * shapes meet at their landmarks, or turn to each other without any. All bodies are one surface, triangulated in other
- * ways and embedded by the ball that it was made from, so that the true counterpart of every point is known. */
+/* Few landmarks and many shapes: the shapes determine what one or two landmarks leave open; three, five and sixteen
+ * shapes meet at their landmarks, or are rotated onto each other without any. All bodies have the same surface with
+ * different triangulations, embedded by the ball that it was made from, so the true counterpart of every point is
+ * known.
+ */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -28,7 +30,7 @@ typedef struct crowd {
   orb_landmark landmark[MARKS];
 } crowd;
 
-/* Where the surface has the direction p of the ball: lopsided, without any symmetry. */
+/* The point of the surface in direction p of the ball: asymmetric. */
 static void surface(const double p[3], double out[3]) {
   double r = 1 + 0.4 * p[0] + 0.3 * p[1] * p[2] + 0.2 * p[1];
   out[0] = 2 * r * p[0];
@@ -36,7 +38,7 @@ static void surface(const double p[3], double out[3]) {
   out[2] = 0.7 * r * p[2];
 }
 
-/* Turns about an axis that is another for every shape. */
+/* Rotates around an axis that differs for every shape. */
 static void turn(int s, const double p[3], double out[3]) {
   double axis[3] = {sin(1.3 * s), cos(2.1 * s), sin(0.7 * s + 1)}, angle = 1.9 * s, a[3];
   orb_normalize(axis);
@@ -92,8 +94,8 @@ static void mark(crowd *c, int k, const double direction[3]) {
   c->landmark[k].at = c->at[k];
 }
 
-/* The root mean square, over the vertices of later shapes, of the angle between where the first shape has the direction
- * that a vertex was made from and where the vertex is: the first shape's nearest vertex stands for it. */
+/* The root mean square, over the vertices of later shapes, of the angle between a vertex and its counterpart on the
+ * first shape. The counterpart is the first shape's vertex nearest to the direction that the vertex was made from. */
 static double mistake(const crowd *c, const orb_alignment *out) {
   double sum = 0;
   int32_t count = 0;
@@ -122,7 +124,7 @@ static double align(crowd *c, orb_align_method method, int marks) {
   return wrong;
 }
 
-/* A turn left open would be wrong by about 1 on average. */
+/* An undetermined rotation would have an error of about 1 on average. */
 static void few_landmarks(void **state) {
   (void)state;
   static const double axis[2][3] = {{0.6, 0.64, 0.48}, {-0.6, -0.64, -0.48}};
@@ -139,7 +141,7 @@ static void few_landmarks(void **state) {
   crowd_close(&c);
 }
 
-/* The landmarks are the same directions of the same surface, so the maps are nearly the identity. */
+/* The landmarks are equal directions of equal surfaces, so the maps are nearly the identity. */
 static void many_shapes(void **state) {
   (void)state;
   static const int counts[] = {3, 5, MANY};

@@ -75,7 +75,7 @@ static void mirrored_free(orb_context *ctx, mirrored *g) {
   orb_mesh_free(ctx, &g->mesh[1]);
 }
 
-/* Limbs 0 and 2 have mirror images, 1 and 3; limb 4 lies in the plane and is its own. */
+/* Limbs 0 and 2 have the mirror images 1 and 3; limb 4 lies in the plane and is its own image. */
 static void images_are_found_on_both(void **state) {
   (void)state;
   orb_context *ctx;

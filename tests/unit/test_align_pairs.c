@@ -1,4 +1,4 @@
-/* pin and rbf on the real pairs, where their folder is there. */
+/* pin and rbf on the real pairs, if their folder exists. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -36,7 +36,7 @@ typedef struct pair {
   int32_t count, vertices[LANDMARKS_MAX][2];
 } pair;
 
-/* What this test needs of a pair file: "meshes": ["a", "b"] and "landmarks": [[i, j], …]. */
+/* The members of a pair file that this test needs: "meshes": ["a", "b"] and "landmarks": [[i, j], …]. */
 static void read_pair(char *text, pair *out) {
   memset(out, 0, sizeof *out);
   char *at = strstr(text, "\"meshes\"");
@@ -128,7 +128,7 @@ static void real_pairs_meet(void **state) {
   }
 }
 
-/* The mean distance of where the map takes a vertex from where it belongs, in diagonals of the second shape. */
+/* The mean distance between the image of a vertex and its counterpart, in diagonals of the second shape. */
 static double mean_error(orb_context *ctx, const loaded *l, const orb_alignment *a) {
   const orb_mesh *first = &a->shapes[0].mesh, *second = &a->shapes[1].mesh;
   int32_t n = l->meshes[0].vertex_count < first->vertex_count ? l->meshes[0].vertex_count : first->vertex_count;
@@ -150,7 +150,7 @@ static double mean_error(orb_context *ctx, const loaded *l, const orb_alignment 
   return sum / n / extent.diagonal;
 }
 
-/* A pair in a context of its own; skips the test where the shapes are not there. */
+/* Loads a pair into its own context; skips the test if the shapes are missing. */
 static orb_context *load_or_skip(const char *name, loaded *l) {
   orb_context *ctx;
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
@@ -162,8 +162,8 @@ static orb_context *load_or_skip(const char *name, loaded *l) {
   return ctx;
 }
 
-/* After registration the shape is nearly on the other one, except for a few folds around the fingers, which landmarks
- * hold and, with 14 and 20, mirror landmarks that are a little off their true places. */
+/* After registration the shape lies nearly on the other one, except for a few folds around the fingers. There landmarks
+ * hold the surface, and with 14 and 20 landmarks also mirror landmarks, which are slightly off their true places. */
 static void more_landmarks_do_not_lead_astray(void **state) {
   static const int32_t given[] = {10, 14, 16, 20};
   (void)state;
@@ -184,7 +184,7 @@ static void more_landmarks_do_not_lead_astray(void **state) {
 }
 
 /* Four-legged animals: in the first map several legs are twisted, and some of them cannot be untwisted together. All
- * landmarks say no more about the map than the first eight do, so they cost little more. */
+ * landmarks together determine the map no better than the first eight, so they cost little more. */
 static void twisted_legs_are_untwisted_with_many_landmarks(void **state) {
   (void)state;
   loaded l;

@@ -1,6 +1,6 @@
-/* pin and rbf on bodies made here: landmarks meet bit for bit and nothing folds, whatever the landmarks: near, on
- * edges, inside triangles, next to each other, permuted at random; the same bytes for any number of threads; cancel and
- * lack of memory are clean errors. */
+/* pin and rbf on generated bodies: landmarks meet bit for bit and nothing folds, whether the landmarks are near, on
+ * edges, inside triangles, next to each other or randomly permuted; any number of threads gives the same bytes; cancel
+ * and lack of memory are clean errors. */
 #include <limits.h>
 #include <math.h>
 #include <setjmp.h>
@@ -54,8 +54,8 @@ static void random_landmarks_meet(void **state) {
   bodies_close(&b);
 }
 
-/* What splits and thinning leave of a corner's attributes is what the given triangle has there: here texture
- * coordinates and colours that are linear in space. */
+/* After splits and thinning, a corner's attributes are those of the given triangle at that point. Here texture
+ * coordinates and colours are linear in space. */
 static void attributes_stay_linear(void **state) {
   (void)state;
   bodies b;
@@ -103,7 +103,7 @@ static void attributes_stay_linear(void **state) {
   bodies_close(&b);
 }
 
-/* Neighbours on one shape, spread on the other; places inside a triangle and on edges. */
+/* Neighbours on one shape, distant on the other; places inside a triangle and on edges. */
 static void awkward_places_meet(void **state) {
   (void)state;
   bodies b;
@@ -271,8 +271,8 @@ static void lack_of_memory_is_an_error(void **state) {
   }
 }
 
-/* The warp takes each centre where it should go, leaves what lies beyond every radius to the linear part, and its
- * function is what the paper prints. */
+/* The warp moves each centre to its target, applies only the linear part beyond every radius, and uses the function
+ * that the paper states. */
 static void warp_interpolates(void **state) {
   (void)state;
   orb_context *ctx;

@@ -1,5 +1,5 @@
-/* The options of the warp: radii for all landmarks or for each, passes, steps, to the midpoints and one way, on two and
- * three shapes. Landmarks meet bit for bit, nothing folds, and what should not move does not. */
+/* The options of the warp: one radius for all landmarks or one for each, passes, steps, to the midpoints and one way,
+ * on two and three shapes. Landmarks meet bit for bit, nothing folds, and nothing moves that should not. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -17,7 +17,7 @@
 
 enum { COUNT = 14 };
 
-/* Landmarks of a lattice, those of later shapes at the vertex nearest to a direction `shift` away. */
+/* Landmarks on a lattice; on later shapes each is at the vertex nearest to a direction `shift` away. */
 static void shifted(bodies *b, double shift) {
   bodies_like(b, COUNT);
   for (int s = 1; s < BODIES; s++) {
@@ -81,7 +81,7 @@ static void one_way_moves_the_later_shapes_only(void **state) {
   bodies_close(&b);
 }
 
-/* Landmarks that agree already but for one, which moves by an edge: how far the points beyond `beyond` of it move. */
+/* All landmarks but one agree already; that one moves by an edge. Returns how far points farther than `beyond` move. */
 static double moved_beyond(bodies *b, double beyond, double for_all, double own) {
   orb_align_shape shapes[2] = {b->shape[1], b->shape[1]};
   bodies_like(b, 40);
@@ -110,8 +110,8 @@ static double moved_beyond(bodies *b, double beyond, double for_all, double own)
   return most;
 }
 
-/* With small radii what lies beyond the moving one's radius stays, up to the affine part of the warp, which is next to
- * nothing when all others hold it; with a large radius far points move. */
+/* With small radii, points beyond the radius of the moving landmark stay, up to the affine part of the warp, which is
+ * almost zero when all other landmarks stay. With a large radius, distant points move. */
 static void a_radius_bounds_the_influence(void **state) {
   (void)state;
   bodies b;
@@ -122,8 +122,8 @@ static void a_radius_bounds_the_influence(void **state) {
   bodies_close(&b);
 }
 
-/* A landmark's own radius rules its influence, not the one for all: the moving one's reaches as far as it says, beside
- * others that reach nowhere. */
+/* A landmark's own radius overrides the common one: the moving landmark has exactly the reach of its radius, while the
+ * others have almost none. */
 static void a_landmark_has_a_radius_of_its_own(void **state) {
   (void)state;
   bodies b;
@@ -136,8 +136,8 @@ static void a_landmark_has_a_radius_of_its_own(void **state) {
   bodies_close(&b);
 }
 
-/* The points of the landmarks that the second pass takes, where one step of the first has carried them: the paper's
- * warp through the others, from their points after the rotations to the means. */
+/* Where one step of the first pass moves the landmarks of the second pass: the paper's warp through the other
+ * landmarks, from their points after the rotations to the means. */
 static void carry(const bodies *b, const orb_alignment *rotated, int s, double (*carried)[3]) {
   double centres[3 * COUNT], moves[3 * COUNT], radii[COUNT];
   int32_t count = 0;
@@ -164,8 +164,8 @@ static void carry(const bodies *b, const orb_alignment *rotated, int s, double (
   orb_warp_free(b->ctx, &warp);
 }
 
-/* The second pass begins where the first ends: its landmarks meet in the middle of where the others' warp has carried
- * them, and the others stay where they met. */
+/* The second pass starts where the first ends: its landmarks meet halfway between the points to which the first warp
+ * moved them, and the landmarks of the first pass stay where they met. */
 static void later_passes_begin_where_earlier_ones_end(void **state) {
   (void)state;
   bodies b;
@@ -198,13 +198,13 @@ static void later_passes_begin_where_earlier_ones_end(void **state) {
     unlike = fmax(unlike, orb_distance2(wanted, simply));
     assert_true(orb_distance2(out.shapes[0].points + 3 * out.shapes[0].landmark_vertices[k], wanted) < 1e-20);
   }
-  assert_true(unlike > 1e-8); /* not where they would meet in one pass */
+  assert_true(unlike > 1e-8); /* in one pass they would meet elsewhere */
   orb_alignment_free(b.ctx, &rotated);
   orb_alignment_free(b.ctx, &out);
   bodies_close(&b);
 }
 
-/* Landmarks that cross: still met, by the patches of pin. */
+/* Crossing landmarks are still met, by the patches of pin. */
 static void crossed_landmarks_meet(void **state) {
   (void)state;
   bodies b;

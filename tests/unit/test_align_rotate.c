@@ -1,5 +1,5 @@
-/* Rotations: known ones are recovered (made from quaternions here, independently), reflections are refused, shapes with
- * landmarks inside triangles and on edges keep their surface, and contradictory landmarks are named. */
+/* Rotations: known ones (made here from quaternions, independently) are recovered, reflections are refused, shapes with
+ * landmarks inside triangles and on edges keep their surface, and the error names contradictory landmarks. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -68,7 +68,7 @@ static void reflection_gives_the_best_rotation(void **state) {
     orb_rotate_point(rotation, from + 3 * i, p);
     best += orb_distance2(p, to + 3 * i);
   }
-  /* No rotation of a fine family is better. */
+  /* No rotation of a dense sample is better. */
   for (int k = 0; k < 3000; k++) {
     double q[4] = {sin(k * 1.1), sin(k * 1.7 + 1), sin(k * 2.3 + 2), sin(k * 3.1 + 3)}, other = 0;
     double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -106,7 +106,7 @@ static void three_shapes_gather(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* A lopsided star-shaped body: its own central projection is an embedding. */
+/* An asymmetric star-shaped body: its central projection is an embedding. */
 static orb_mesh make_body(orb_context *ctx, double **points) {
   orb_mesh mesh = shape_globe(ctx, 24, 16);
   *points = ORB_NEW(ctx, double, 3 * (size_t)mesh.vertex_count);
@@ -191,7 +191,7 @@ static void landmarks_become_vertices(void **state) {
     orb_place_position(&mesh, &at[k], x);
     assert_true(orb_distance2(x, made->mesh.positions + 3 * made->landmark_vertices[k]) < 1e-24);
   }
-  /* Every piece lies in its parent's plane and box: its corners are mixes of the parent's corners. */
+  /* Every piece lies in its parent's plane and box: its corners are convex combinations of the parent's. */
   for (int32_t t = 0; t < made->mesh.triangle_count; t++) {
     const int32_t *corner = mesh.triangles + 3 * made->parent[t];
     double u[3], w[3], n[3];

@@ -1,4 +1,4 @@
-/* Tips of limbs, how those of two shapes belong together, and whether the trials on real shapes find what is known. */
+/* Finds tips of limbs, matches those of two shapes, and compares the trials on real shapes with known matches. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -16,7 +16,7 @@
 
 enum { LIMBS = 5 };
 
-/* Five directions without any symmetry, and how far the limbs reach. */
+/* Five asymmetric directions, and the lengths of the limbs. */
 static const double limb[LIMBS][3] = {{1, 0, 0}, {-0.6, 0.8, 0}, {0, -0.8, 0.6}, {-0.48, -0.6, -0.64}, {0, 0.28, 0.96}};
 static const double reach[LIMBS] = {4, 3.4, 2.9, 2.5, 2.2};
 
@@ -41,7 +41,7 @@ static orb_mesh creature(orb_context *ctx, int levels, int thirds) {
   return creature_of(ctx, reach, levels, thirds);
 }
 
-/* Which limb a vertex of the creature is the tip of, −1: none. */
+/* The limb whose tip a vertex of the creature is, or −1. */
 static int limb_at(const orb_mesh *mesh, int32_t v, int thirds) {
   double p[3], length = 0;
   for (int k = 0; k < 3; k++) {
@@ -78,7 +78,7 @@ static void tips_are_where_limbs_end(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* On a ball all points are alike: nothing sticks out. */
+/* On a ball nothing sticks out. */
 static void a_ball_has_none(void **state) {
   (void)state;
   orb_context *ctx;
@@ -116,7 +116,7 @@ static void limbs_go_to_limbs(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* Does a map carry each limb to the same limb? */
+/* Whether a map takes each limb to the same limb. */
 static int is_limb_to_limb(const orb_mesh *mesh, const orb_tips tips[2], const orb_tip_map *map, int thirds) {
   for (int i = 0; i < tips[0].count; i++) {
     if (map->to[i] < 0 ||
@@ -127,8 +127,8 @@ static int is_limb_to_limb(const orb_mesh *mesh, const orb_tips tips[2], const o
   return 1;
 }
 
-/* Where the longest limb of one creature is the shortest of the other, distances are of no use: what agrees best in
- * them takes the long limbs to the long ones. By rotation, limb goes to limb, however the other one is rotated. */
+/* If the longest limb of one creature is the shortest of the other, distances mislead: the match that fits them best
+ * takes long limbs to long limbs. The search by rotation takes each limb to its counterpart, for any rotation. */
 static void proportions_differ(void **state) {
   (void)state;
   static const double other[LIMBS] = {2.2, 2.5, 2.9, 3.4, 4};
@@ -159,9 +159,9 @@ static void proportions_differ(void **state) {
   }
 }
 
-/* The creature has no symmetry. Its limbs go to those of a finer copy by no rotation at all, which is therefore tried
- * first; to those of its mirror image (x negated) they go at the same distances, but by no rotation: that is not tried.
- */
+/* The creature has no symmetry. The identity takes its limbs to those of a finer copy, so it is tried first. The limbs
+ * of its mirror image (x negated) have the same distances, but no rotation takes the limbs there: this match is not
+ * tried. */
 static void mirror_images_are_left_out(void **state) {
   (void)state;
   enum { MOST = 10 };
@@ -214,8 +214,8 @@ static int nearest_of(const orb_mesh *mesh, const int32_t *list, int count, int3
   return best;
 }
 
-/* The best candidate for two real shapes has at least so many pairs, and takes each tip to the landmark where it
- * belongs, of those set by hand. Skips if the shapes are missing. */
+/* The best candidate for two real shapes has at least `least` pairs and takes each tip to the matching landmark of
+ * those set by hand. Skips if the shapes are missing. */
 static void assert_candidate(const char *first, const char *second, int marks, const int32_t *mark[2], int least,
                              double clear) {
   orb_context *ctx;
@@ -241,15 +241,15 @@ static void assert_candidate(const char *first, const char *second, int marks, c
   }
 }
 
-/* Feet, hands and nose of a man and an armadillo. Both stand upright and face one way, so that left goes to left,
- * though the map that thirds the man about has nearly the same energy. */
+/* Feet, hands and nose of a man and an armadillo. Both stand upright and face the same way, so left goes to left,
+ * though the map with the man facing backwards has nearly the same energy. */
 static void man_to_armadillo(void **state) {
   (void)state;
   static const int32_t man[] = {6615, 3218, 5906, 2445, 331}, armadillo[] = {10077, 9912, 14583, 14523, 13173};
   assert_candidate("human_man.obj", "armadillo_29k.obj", 5, (const int32_t *[]){man, armadillo}, 3, 0.9);
 }
 
-/* Four legs and the nose of a stout cow and a lean animal that faces another way. */
+/* Four legs and the nose of a stout cow and a lean animal that faces a different way. */
 static void cow_to_animal(void **state) {
   (void)state;
   static const int32_t cow[] = {1759, 439, 1732, 410, 847}, animal[] = {6774, 1910, 6727, 6824, 1590};

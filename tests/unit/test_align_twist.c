@@ -1,4 +1,4 @@
-/* Limbs that a map has twisted: rings around them, the angle of the twist, and undoing it. */
+/* Limbs that a map twists: the rings around them, the angle of the twist, and its removal. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -44,7 +44,7 @@ static void rotate(const double about[3], double angle, double p[3]) {
   }
 }
 
-/* A ball with a limb that reaches so far. twist: of the limb's end, counterclockwise as seen from outside; bend: of the
+/* A ball with one limb. twist: the rotation of the limb's end, counterclockwise as seen from outside; bend: that of the
  * mapped shape's limb. */
 static creature make(double reach, double twist, double bend) {
   creature c = {.pole = 0};
@@ -95,7 +95,7 @@ static void find(creature *c, const int32_t *held, int32_t held_count, orb_map_t
   assert_int_equal(orb_map_twists_find(c->ctx, &params, &c->surface, &map, held, held_count, out), ORB_OK);
 }
 
-/* To the bit; but not what lies between the members, which is never set. */
+/* Compares bit for bit, except for the padding, which is never set. */
 static void assert_same_place(const orb_place *a, const orb_place *b) {
   assert_int_equal(a->triangle, b->triangle);
   assert_memory_equal(a->at, b->at, sizeof a->at);
@@ -142,7 +142,7 @@ static void rotations_follow_the_rings(void **state) {
   drop(&c);
 }
 
-/* A twist is measured with its sign and beyond half a turn, and undone. */
+/* Measures a twist with its sign, beyond half a turn as well, and undoes it. */
 static void twists_are_measured_and_undone(void **state) {
   (void)state;
   const double degrees[] = {180, -180, 110, -150};
@@ -181,7 +181,7 @@ static void nothing_is_found(double twist, double bend, int both_ends_held) {
   creature c = make(REACH, twist / DEGREES, bend / DEGREES);
   orb_map_twists t;
   int32_t held[2] = {c.pole, c.pole};
-  for (int32_t v = 0; v < c.mesh.vertex_count; v++) { /* another one on the limb, where the twist is whole */
+  for (int32_t v = 0; v < c.mesh.vertex_count; v++) { /* a second one on the limb, where the twist is complete */
     held[1] = fabs(from_axis(c.sphere + 3 * (size_t)v) - 0.2) < 0.02 ? v : held[1];
   }
   assert_int_not_equal(held[0], held[1]);

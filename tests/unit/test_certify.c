@@ -1,4 +1,4 @@
-/* Would a fault of the certificate be seen? Valid, flipped, degenerate, doubly covered and nearly flat embeddings. */
+/* The certificate of valid, flipped, degenerate, doubly covered and nearly flat embeddings. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -107,7 +107,7 @@ static void test_all_at_one_place(void **unused) {
   shape_free(ctx, &mesh);
 }
 
-/* Longitudes doubled: every triangle is positive, and the sphere is covered twice. */
+/* Doubled longitudes: every triangle is positive, and the sphere is covered twice. */
 static void test_doubly_wrapped(void **unused) {
   (void)unused;
   for (int times = 2; times <= 3; times++) {

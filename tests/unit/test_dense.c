@@ -1,4 +1,4 @@
-/* The linear solver and the 3 × 3 singular values, against their definitions. */
+/* Compares the linear solver and the 3 × 3 singular values with their definitions. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,7 +19,7 @@ static double uniform(void) { /* −1 … 1 */
   return (double)(int64_t)state / 9.3e18;
 }
 
-/* A · X is put together from a known X; sizes on both sides of the block, and a zero on the first diagonal entry. */
+/* Computes A · X from a known X, for sizes below and above the block size and with a zero as first diagonal entry. */
 static void test_solve(void **unused) {
   (void)unused;
   static const int32_t sizes[] = {1, 2, 3, 31, 32, 33, 64, 65, 150, 300};

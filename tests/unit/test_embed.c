@@ -1,4 +1,4 @@
-/* The newton embedding: always valid, the same for any number of threads, stoppable, within its memory. */
+/* The newton embedding: always valid, equal for any number of threads, cancellable, within its memory limit. */
 #include <math.h>
 #include <pthread.h>
 #include <setjmp.h>
@@ -37,7 +37,7 @@ static orb_embedding embed_with(orb_context *ctx, const orb_mesh *mesh, orb_pres
   return out;
 }
 
-/* Embeds with every preset and weight and checks the promise independently. */
+/* Embeds with every preset and weight and verifies the result independently. */
 static void check_mesh(orb_context *ctx, const orb_mesh *mesh) {
   static const double weights[] = {1, 0, 0.3};
   for (int i = 0; i < 5; i++) {
@@ -50,7 +50,7 @@ static void check_mesh(orb_context *ctx, const orb_mesh *mesh) {
       const double *p = e.points + 3 * v;
       assert_true(fabs(sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - 1) < 1e-12);
     }
-    int32_t step = mesh->triangle_count / 300 + 1; /* exact arithmetic by hand is slow: a sample */
+    int32_t step = mesh->triangle_count / 300 + 1; /* a sample: schoolbook exact arithmetic is slow */
     for (int32_t t = 0; t < mesh->triangle_count; t += step) {
       const int32_t *v = mesh->triangles + 3 * t;
       assert_int_equal(exact_orientation(e.points + 3 * v[0], e.points + 3 * v[1], e.points + 3 * v[2]), 1);
@@ -75,7 +75,7 @@ static void test_platonic(void **unused) {
   orb_context_destroy(ctx);
 }
 
-/* A ball already lies on a sphere: little distortion is possible, so little must come out. */
+/* A ball already lies on a sphere, so the distortion must be small. */
 static void test_ball(void **unused) {
   (void)unused;
   orb_context *ctx = open_context(2);
@@ -101,7 +101,7 @@ static void test_long_and_poles(void **unused) {
   orb_context_destroy(ctx);
 }
 
-/* Positions that mean nothing: the connectivity alone must do. */
+/* Meaningless positions: the connectivity alone must suffice. */
 static void test_degenerate_positions(void **unused) {
   (void)unused;
   orb_context *ctx = open_context(2);
@@ -126,7 +126,7 @@ static void test_degenerate_positions(void **unused) {
           break; /* crumpled at random */
         case 4:
           *x = i % 6 < 3 ? *x : mesh.positions[i - 3];
-          break; /* every second a duplicate */
+          break; /* every second position is a duplicate */
         case 5:
           *x *= 1e-310;
           break; /* subnormal */
@@ -219,8 +219,8 @@ static void cancel_now(void *user, const char *stage, double fraction) {
   }
 }
 
-/* Two poles of valence 20,000: cancelled at every seventh step that is reported, in all stages. What is still done is
- * bounded by processor time, so that a busy machine changes nothing; 100 ms is the promise, a second the bound here,
+/* Two poles of valence 20,000, cancelled at every seventh reported step, in all stages. The bound on the remaining work
+ * is processor time, so a busy machine does not matter. The documented limit is 100 ms; the bound here is one second,
  * for the sanitizers. */
 static void test_cancel_everywhere(void **unused) {
   (void)unused;
@@ -248,7 +248,7 @@ static void test_cancel_everywhere(void **unused) {
   orb_context_destroy(plain);
 }
 
-/* Fail the first, second, third … allocation: an error each time, no leak, no crash. */
+/* Makes the first, second, third … allocation fail: each time an error, no leak, no crash. */
 static void test_every_allocation(void **unused) {
   (void)unused;
   orb_context *plain = open_context(1);

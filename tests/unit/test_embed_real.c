@@ -1,5 +1,4 @@
-/* Real meshes, where the folder is there: every one embeds with a certificate, and as well as is known to be possible.
- */
+/* Every real mesh, if the folder exists, embeds with a certificate and with an energy that is known to be possible. */
 #include <dirent.h>
 #include <math.h>
 #include <setjmp.h>
@@ -16,7 +15,7 @@
 #include "orbmorph/format.h"
 #include "support_shared.h"
 
-enum { LARGEST_FILE = 1700000 }; /* bytes; larger ones only with ORB_TEST_ALL in the environment */
+enum { LARGEST_FILE = 1700000 }; /* bytes; larger files need ORB_TEST_ALL in the environment */
 
 static const struct {
   const char *name;

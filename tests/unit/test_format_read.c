@@ -166,7 +166,8 @@ static size_t binary_off(unsigned char *out) {
   return (size_t)(p - out);
 }
 
-/* Two nested nodes: a turn by 90° about z, a scale, a move, that cancel out: the tetrahedron again. Strip of five. */
+/* Two nested nodes whose rotation by 90° around z, scale and translation cancel out: the tetrahedron again, as a strip
+ * of five. */
 static size_t binary_glb(unsigned char *out) {
   static const char text[] =
       "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[1]}],\"nodes\":[{\"mesh\":0,\"rotation\":[0,0,"
@@ -217,15 +218,15 @@ static void test_binaries(void **state) {
   }
   orb_mesh mesh;
   assert_int_equal(read_bytes(binary[4], binary_size[4], &mesh), ORB_OK);
-  for (int i = 0; i < 12; i++) { /* moved by (1, 2, 3), the turns and scales cancel */
+  for (int i = 0; i < 12; i++) { /* translated by (1, 2, 3); rotations and scales cancel out */
     assert_true(fabs(mesh.positions[i] - ((double)PLACE[i / 3][i % 3] + 1 + i % 3)) < 1e-12);
   }
   orb_mesh_free(ctx, &mesh);
 }
 
-/* Whatever comes out of a damaged file, it is a mesh or an error with its place, and nothing leaks. */
+/* A damaged file gives a mesh or an error with its position, and nothing leaks. */
 static void try_damaged(const unsigned char *bytes, size_t size) {
-  unsigned char *copy = malloc(size ? size : 1); /* so that a sanitizer sees a step too far */
+  unsigned char *copy = malloc(size ? size : 1); /* a sanitizer then sees a read past the end */
   memcpy(copy, bytes, size);
   orb_mesh mesh;
   orb_status status = read_bytes(copy, size, &mesh);

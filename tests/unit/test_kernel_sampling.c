@@ -1,4 +1,5 @@
-/* The paper's method: valid, Eq. 3 falls under optimisation, its exponents do what Fig. 16 says, same bytes again. */
+/* The paper's method: it is valid, optimisation lowers Eq. 3, the exponents act as in Fig. 16, a repeat gives the same
+ * bytes. */
 #include <math.h>
 #include <pthread.h>
 #include <setjmp.h>
@@ -31,7 +32,7 @@ static orb_embed_options sampling(void) {
   return options;
 }
 
-/* A ball with two limbs: what a sphere has to squeeze. */
+/* A ball with two limbs, which the sphere has to compress. */
 static orb_mesh limbed(orb_context *ctx, int levels) {
   orb_mesh mesh = shape_ball(ctx, levels);
   for (int32_t v = 0; v < mesh.vertex_count; v++) {
@@ -78,7 +79,7 @@ static void test_valid(void **unused) {
   orb_context_destroy(ctx);
 }
 
-/* Positions that mean nothing, and vertices at one place, are embedded too. */
+/* Meaningless positions and coincident vertices embed, too. */
 static void test_degenerate(void **unused) {
   (void)unused;
   orb_context *ctx = open_context(1);
@@ -153,7 +154,7 @@ static void test_error(void **unused) {
     present = orb_ks_error_at(&s, p);
     double expected = error_by_definition((const double(*)[3])s.ring.point, s.ring.count, p, edge2, one, carried,
                                           exponents[i][0], exponents[i][1]);
-    /* An angle term without a floor on the mesh's area is what the definition has; the floor changes it by 1 %. */
+    /* The angle term of the definition has no floor on the mesh's area; the floor changes it by 1 %. */
     assert_true(fabs(present / expected - 1) < 0.02);
     for (orb_cpu cpu = ORB_CPU_PLAIN; cpu <= orb_context_cpu(ctx); cpu++) {
       double out[3], e;
@@ -313,7 +314,7 @@ static void test_memory(void **unused) {
   }
 }
 
-/* Each allocation fails in turn: both phases of the simplification, rings that outgrow their room, sweeps. */
+/* Each allocation fails once: both phases of the simplification, rings that outgrow their buffers, sweeps. */
 static void test_every_allocation(void **unused) {
   (void)unused;
   orb_context *plain = open_context(1);

@@ -1,4 +1,4 @@
-/* The locator against a search of every triangle. */
+/* Compares the locator with a search of every triangle. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -32,7 +32,7 @@ static void teardown(fixture *f) {
   orb_context_destroy(f->ctx);
 }
 
-/* The lowest triangle that holds p, by exact tests of all. */
+/* The lowest triangle that contains p, by exact tests of all. */
 static int32_t search(const orb_aligned_shape *shape, const double p[3]) {
   for (int32_t t = 0; t < shape->mesh.triangle_count; t++) {
     const int32_t *c = shape->mesh.triangles + 3 * t;

@@ -1,4 +1,4 @@
-/* The whole way from two embedded shapes to the asset. */
+/* Merges two embedded shapes into the asset. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -99,7 +99,7 @@ static void two_ellipsoids(void **state) {
   assert_true(result.shapes[1].hausdorff_sampled < 0.02 * result.shapes[1].diagonal);
   double parts = result.timings.align + result.timings.remesh + result.timings.transfer + result.timings.write;
   assert_true(fabs(parts - result.timings.total) < 1e-6);
-  assert_string_equal(all.seen, "artw"); /* aligning embeds anew; those stages are not told */
+  assert_string_equal(all.seen, "artw"); /* the alignment embeds again, without reporting those stages */
   /* Each landmark is one vertex of the file, at its place on both shapes up to float32. */
   glb file = glb_open(&result.asset);
   const cJSON *mesh = cJSON_GetArrayItem(cJSON_GetObjectItem(file.json, "meshes"), 0);
@@ -145,7 +145,7 @@ static void one_shape_is_refused(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* All vertices in one place: there is nothing to show, whichever shape it is. */
+/* If all vertices of either shape are at one place, there is nothing to show. */
 static void shapes_of_no_size_are_refused(void **state) {
   (void)state;
   orb_context *ctx;
@@ -170,8 +170,8 @@ static void shapes_of_no_size_are_refused(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* An overlay is both surfaces themselves, however they are crumpled: none of its triangles is inverted.
- * Against smooth normals alone two fifths would be. */
+/* An overlay reproduces both surfaces exactly, however crumpled they are, so none of its triangles is inverted. Judged
+ * by smooth normals alone, two fifths would be. */
 static void an_overlay_of_crumpled_shapes_inverts_nothing(void **state) {
   (void)state;
   orb_context *ctx;

@@ -1,4 +1,4 @@
-/* Repairs and refusals on small solids whose topology is known, and the nearest point against a plain search. */
+/* Repairs and refusals on small solids with known topology; compares the nearest point with a plain search. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -67,7 +67,7 @@ static void test_safe(void **state) {
   orb_mesh_free(ctx, &mesh);
 }
 
-/* Eight corners, six quadrangles; with `loose` each face has corners of its own. */
+/* Eight corners, six quadrangles; with `loose` no two faces share corners. */
 static void cube(char *out, size_t *length, double x, double y, int first, int loose) {
   static const int face[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
   char *p = out + *length;
@@ -193,7 +193,7 @@ static void test_fill(void **state) {
   }
 }
 
-/* A concave polygon: an L of area 3, extruded by nothing: the areas of its triangles must add up to its own. */
+/* A concave polygon, an L of area 3: the areas of its triangles must add up to its area. */
 static void test_concave_polygon(void **state) {
   (void)state;
   const char *text = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5 6\n";
@@ -251,7 +251,7 @@ static void test_nearest(void **state) {
     assert_true(fabs(orb_nearest_query(one, p, INFINITY, &other) - d2) < 1e-13);
     orb_nearest_destroy(ctx, one);
   }
-  for (int k = 0; k < 9 * COUNT; k++) { /* squared distances beyond all numbers: some place all the same */
+  for (int k = 0; k < 9 * COUNT; k++) { /* squared distances overflow: there is still a result */
     positions[k] *= 1e300;
   }
   orb_nearest_destroy(ctx, tree);

@@ -1,5 +1,5 @@
-/* Every real mesh against the figures of index.csv, which were computed by other programs: refused or accepted for the
- * stated reason, vertices and faces after repair, boundary, genus. */
+/* Compares every real mesh with index.csv, whose figures other programs computed: accepted, or refused for the stated
+ * reason; vertices and faces after repair, boundary, genus. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -62,7 +62,7 @@ static int column(const char *name) {
   return 0;
 }
 
-/* What a reason of the index asks for. */
+/* What a reason in the index requires. */
 static int fits(const char *reason, const orb_error *e) {
   switch (e->status) {
     case ORB_E_MALFORMED_MESH:

@@ -1,4 +1,4 @@
-/* orb_orient() against exact integers, where doubles decide wrongly: nearly flat, subnormal, huge, mixed. */
+/* Compares orb_orient() with exact integers where doubles give the wrong sign: nearly flat, subnormal, huge, mixed. */
 #include <float.h>
 #include <math.h>
 #include <setjmp.h>
@@ -92,7 +92,7 @@ static void test_exactly_flat(void **unused) {
   assert_true(counts[1] > 300);
 }
 
-/* Any bit pattern at all; and products that under- or overflow though the sign is plain. */
+/* Arbitrary bit patterns, and products that underflow or overflow though the sign is clear. */
 static void test_extremes(void **unused) {
   (void)unused;
   memset(counts, 0, sizeof counts);

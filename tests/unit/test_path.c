@@ -1,4 +1,4 @@
-/* The as-rigid-as-possible path: ends exact, turns without shrinking, in the asset with tent weights. */
+/* The as-rigid-as-possible path: exact ends, rotations without shrinking, tent weights in the asset. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -34,7 +34,7 @@ static void a_rotated_body_stays_rigid(void **state) {
   int32_t n = ball.vertex_count;
   double *b = ORB_NEW(ctx, double, 3 * n), *at = ORB_NEW(ctx, double, 3 * n), angle = 170 * M_PI / 180;
   for (int32_t v = 0; v < n; v++) {
-    ball.positions[3 * v] *= 3; /* long, so that its turn can be seen */
+    ball.positions[3 * v] *= 3; /* elongated, so that its rotation is visible */
     memcpy(b + 3 * v, ball.positions + 3 * v, 3 * sizeof *b);
     turn(b + 3 * v, angle);
     b[3 * v + 2] += 5;
@@ -61,8 +61,8 @@ static void a_rotated_body_stays_rigid(void **state) {
   shape_free(ctx, &ball);
 }
 
-/* A bar along z whose upper half bends over by 120 degrees round the joint at its middle: half way the tip is still
- * half a bar from the joint (a straight blend brings it to half of that). */
+/* A bar along z whose upper half bends by 120 degrees around the joint at its middle. Halfway, the tip is still half a
+ * bar from the joint (a linear blend halves that distance). */
 static void a_bending_limb_keeps_its_length(void **state) {
   orb_context *ctx = *state;
   orb_mesh bar = shape_cylinder(ctx, 12, 40, 20);
@@ -85,7 +85,7 @@ static void a_bending_limb_keeps_its_length(void **state) {
     double z = p[2] - middle, share = fmin(1, fmax(0, 0.5 + z / 4)); /* bends over a length of 4 */
     double angle = share * 120 * M_PI / 180, arc = 120 * M_PI / 180 / 4, radius = 1 / arc;
     double along = z < -2 ? z + 2 : z > 2 ? z - 2 : 0;
-    /* the middle line: straight, an arc of its own length, straight */
+    /* the centre line: straight, an arc of equal length, straight */
     double x = radius * (1 - cos(angle)) + (z > 2 ? along * sin(angle) : 0);
     double y = radius * sin(angle) + (z > 2 ? along * cos(angle) : z < -2 ? along : 0);
     b[3 * v] = x + p[0] * cos(angle);
@@ -107,7 +107,7 @@ static void a_bending_limb_keeps_its_length(void **state) {
   double blended = sqrt(orb_distance2(straight[0], straight[1]));
   assert_true(fabs(got - wanted) < 0.03 * wanted);
   assert_true(fabs(blended - wanted) > 0.05 * wanted);
-  /* No triangle has lost more than a fifth of the mean of its ends' areas. */
+  /* No triangle loses more than a fifth of the mean of its areas at both ends. */
   for (int32_t t = 0; t < bar.triangle_count; t++) {
     double area[3];
     const double *from[3] = {bar.positions, at, b};
@@ -132,8 +132,8 @@ static void waves(int32_t shape, const double p[3], double out[3]) {
   out[2] = p[2];
 }
 
-/* Three shapes, two in-betweens a gap: 2 + 4 targets; weights are never more than two at a time and sum to at most 1;
- * on the way from shape 0 to 1 the in-betweens come in order. */
+/* Three shapes and two in-betweens per gap give 2 + 4 targets. At most two weights are nonzero at a time and they sum
+ * to at most 1; from shape 0 to shape 1 the in-betweens come in order. */
 static void in_betweens_have_tent_weights(void **state) {
   orb_context *ctx = *state;
   synthetic made = synthetic_make(ctx, 2, 3, waves);

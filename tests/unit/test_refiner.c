@@ -1,4 +1,4 @@
-/* The hierarchy and its refiner, as alignment uses them; and the vector loops of every instruction set. */
+/* The hierarchy and its refiner as the alignment uses them, and the vector loops of every instruction set. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -21,7 +21,7 @@ static void assert_near(double x, double y, double within) {
   assert_true(fabs(x - y) <= within);
 }
 
-/* A ball with bumps, so that nothing is symmetric. */
+/* An asymmetric ball with bumps. */
 static orb_mesh bumpy(int levels) {
   orb_mesh mesh = shape_ball(ctx, levels);
   for (int32_t v = 0; v < mesh.vertex_count; v++) {
@@ -33,7 +33,7 @@ static orb_mesh bumpy(int levels) {
   return mesh;
 }
 
-/* Every triangle of the present level is exactly positive, and there are 2n − 4 of them. */
+/* Every triangle of the current level is exactly positive, and there are 2n − 4 of them. */
 static void check_level(const orb_refiner *refiner) {
   int32_t *vertices, *triangles, vertex_count, triangle_count;
   assert_int_equal(orb_refiner_level(ctx, refiner, &vertices, &vertex_count, &triangles, &triangle_count), ORB_OK);
@@ -76,7 +76,7 @@ static void test_levels(void **unused) {
   shape_free(ctx, &mesh);
 }
 
-/* A hierarchy serves one refiner after another: going back is exact, so the second gives the same points. */
+/* A hierarchy can serve several refiners in sequence: going back is exact, so the second gives the same points. */
 static void test_again(void **unused) {
   (void)unused;
   orb_mesh mesh = bumpy(5);
@@ -102,7 +102,7 @@ static void test_again(void **unused) {
   shape_free(ctx, &mesh);
 }
 
-/* Kept vertices live on the level they were kept for; pinned ones do not move by a bit to the end. */
+/* Kept vertices exist on their level; pinned vertices never move by a bit. */
 static void test_keep_and_pin(void **unused) {
   (void)unused;
   orb_mesh mesh = bumpy(5);
@@ -182,7 +182,7 @@ static void test_vector_loops(void **unused) {
   shape_free(ctx, &mesh);
 }
 
-/* Rings that are a fan from their first point, ever thinner: the search finds a point, and exactly inside. */
+/* Ever thinner rings that are a fan from their first point: the search finds a point, which is exactly inside. */
 static void test_kernel_point(void **unused) {
   (void)unused;
   orb_kernel_room room = {0};
@@ -191,7 +191,7 @@ static void test_kernel_point(void **unused) {
   for (int i = 0; i < 3000; i++) {
     double ring[40][3], thin = pow(10, -(i % 12));
     int count = 3 + i % 37;
-    for (int j = 0; j < count; j++) { /* from ring[0] all others lie ahead, in turning order, at any distance */
+    for (int j = 0; j < count; j++) { /* all other points lie ahead of ring[0], in angular order, at any distance */
       seed = seed * 1664525U + 1013904223U;
       double angle = 3.0 * (j - 1) / count * (i % 3 ? thin : 1), far = 0.01 + seed / 4294967296.0 * 0.4;
       double x = j ? far * cos(angle) : 0, y = j ? far * sin(angle) : 0, length = sqrt(1 + x * x + y * y);

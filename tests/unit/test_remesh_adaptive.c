@@ -1,4 +1,4 @@
-/* The adaptive method: its proved bound against independent distances, landmarks, limits, memory and threads. */
+/* The adaptive method: compares its proved bound with independent distances; landmarks, limits, memory and threads. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -34,7 +34,7 @@ static double *positions_of(const orb_supermesh *m, const orb_aligned_shape *sha
   return out;
 }
 
-/* The farthest of many points of one surface from the other: corners, middles of edges and faces. */
+/* The largest distance of sample points of one surface (corners, midpoints of edges and faces) from the other. */
 static double farthest(orb_context *ctx, const double *from, const int32_t *triangles, int32_t count, const double *to,
                        const int32_t *to_triangles, int32_t to_count) {
   static const double weight[7][3] = {
@@ -58,7 +58,7 @@ static double farthest(orb_context *ctx, const double *from, const int32_t *tria
   return sqrt(most);
 }
 
-/* Sampled distances both ways never exceed the proved bound, nor the bound the tolerance. */
+/* Sampled distances in both directions never exceed the proved bound, and the bound never exceeds the tolerance. */
 static void assert_within(orb_context *ctx, const orb_supermesh *m, const orb_aligned_shape *shapes, int count,
                           double tolerance) {
   for (int s = 0; s < count; s++) {
@@ -173,8 +173,8 @@ static int inverted_on(const orb_supermesh *m, const orb_aligned_shape *shape, i
   return inverted;
 }
 
-/* Rotates each point of a ball in space around the axis, by `most` times its height, and leaves the sphere's points:
- * a map to another ball then shears. */
+/* Rotates each point of a ball in space around the axis by `most` times its height and keeps the sphere's points: a map
+ * to another ball then shears. */
 static void shear(const orb_aligned_shape *shape, double most) {
   for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
     const double *at = shape->points + 3 * v;
@@ -234,7 +234,7 @@ static void sheared_maps_keep_the_tolerance(void **state) {
   }
 }
 
-/* The first ring north of the equator comes to lie at height `flat`, the others spread over the rest. */
+/* Moves the first ring north of the equator to height `flat` and spreads the others over the rest. */
 static void flatten_belt(orb_aligned_shape *shape, double flat) {
   double ring = 1;
   for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
@@ -253,8 +253,8 @@ static void flatten_belt(orb_aligned_shape *shape, double flat) {
   }
 }
 
-/* A map that flattens a belt of large triangles to almost nothing on the sphere: edges that are split where they cross
- * it would creep along it without end. */
+/* A map that flattens a belt of large triangles to almost nothing on the sphere: splitting edges where they cross the
+ * belt would never end. */
 static void flattened_belts_do_not_creep(void **state) {
   (void)state;
   static const double flat[] = {1e-3, 1e-5, 1e-7, 1e-9};
@@ -271,7 +271,7 @@ static void flattened_belts_do_not_creep(void **state) {
   }
 }
 
-/* Turns a ball about an axis in space, the more the farther along it; the sphere's points stay. */
+/* Twists a ball around an axis in space; the sphere's points stay. */
 static void wind(const orb_aligned_shape *shape, int axis, double most) {
   int x = (axis + 1) % 3, y = (axis + 2) % 3;
   for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
@@ -281,8 +281,8 @@ static void wind(const orb_aligned_shape *shape, int axis, double most) {
   }
 }
 
-/* A map that winds one surface about the other, as landmarks in random order do: nearly every triangle is a needle on
- * one of them. The tolerance holds all the same. */
+/* A map that winds one surface around the other, as landmarks in random order do: nearly every triangle is a needle on
+ * one of them. The tolerance still holds. */
 static void wound_maps_keep_the_tolerance(void **state) {
   (void)state;
   static const double tolerance[] = {0.02, 0.002};
@@ -301,7 +301,7 @@ static void wound_maps_keep_the_tolerance(void **state) {
   }
 }
 
-/* Winds the sphere's points about the axis, by so many turns from pole to pole, ring by ring; the surface stays. */
+/* Winds the sphere's points around the axis ring by ring, `turns` times from pole to pole; the surface stays. */
 static void wind_points(const orb_aligned_shape *shape, double turns) {
   for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
     double *p = shape->points + 3 * v, turn = turns * acos(fmax(-1, fmin(1, p[2]))) * 2, x = p[0], y = p[1];
@@ -310,8 +310,8 @@ static void wind_points(const orb_aligned_shape *shape, double turns) {
   }
 }
 
-/* The map is wound so much that the overlay has more than twenty times the triangles of both shapes: they are reduced
- * before they are overlaid, and the bound holds against the shapes themselves. */
+/* The map winds so much that the overlay has more than twenty times the triangles of both shapes. The shapes are
+ * reduced before the overlay, and the bound still holds for the original shapes. */
 static void huge_overlays_are_not_needed(void **state) {
   (void)state;
   orb_context *ctx = remesh_context(2);
@@ -352,7 +352,7 @@ static void four_shapes(void **state) {
   orb_context_destroy(ctx);
 }
 
-/* Gives both shapes the poles and the axes' ends as landmarks: common vertices of both triangulations. */
+/* Gives both shapes the ends of the axes as landmarks, which are vertices of both triangulations. */
 static void axis_landmarks(orb_context *ctx, orb_aligned_shape *shape) {
   static const double axis[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
   shape->landmark_vertices = ORB_NEW(ctx, int32_t, 6);
@@ -454,7 +454,7 @@ static double slanting_area(const orb_supermesh *m, const double *p) {
   return area;
 }
 
-/* A shape beside another one within a tolerance, and its surface as the supermesh has it. */
+/* A shape that is remeshed with another one within a tolerance, and its surface in the supermesh. */
 typedef struct kept {
   orb_context *ctx;
   orb_aligned_shape shapes[2];
@@ -481,8 +481,9 @@ static void kept_free(kept *k) {
   orb_context_destroy(k->ctx);
 }
 
-/* A cube against a ball keeps its edges and corners: each of their points is within the tolerance h, and what slants is
- * no more than chamfers that go h deep: 2h wide along 12 edges of length 2, twice over for corners and slivers. */
+/* A cube remeshed with a ball keeps its edges and corners: each of their points is within the tolerance h, and the
+ * slanted area is at most that of chamfers of depth h: 2h wide along 12 edges of length 2, doubled for corners and
+ * slivers. */
 static void sharp_edges_survive(void **state) {
   (void)state;
   static const double tolerance = 0.002;
@@ -504,8 +505,8 @@ static void sharp_edges_survive(void **state) {
   kept_free(&k);
 }
 
-/* A spike of one vertex, four times as long as the ball that it grows from is thick and a thirtieth as wide as long,
- * where the other shape has nothing: its tip and its flanks stay. */
+/* A spike of one vertex, four times as long as its ball is thick and a thirtieth as wide as it is long, where the other
+ * shape has none: its tip and its flanks stay. */
 static void thin_limbs_survive(void **state) {
   (void)state;
   static const double tolerance = 0.002;

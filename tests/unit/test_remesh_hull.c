@@ -1,5 +1,5 @@
 /* The convex hull: every input vertex is a vertex, no vertex lies beyond a facet's plane, T = 2V − 4; coincident,
- * nearly coincident and cocircular points; the same bytes again; lack of memory is a clean error. */
+ * nearly coincident and cocircular points; a repeat gives the same bytes; lack of memory is a clean error. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -49,8 +49,8 @@ static void assert_all_vertices(const orb_supermesh *m, const orb_aligned_shape 
   }
 }
 
-/* No vertex lies beyond the plane of a facet: by brute force, within the rounding of points on the unit sphere. Needles
- * between nearly coincident points have no plane to speak of. */
+/* No vertex lies beyond the plane of a facet, by brute force, within the rounding of points on the unit sphere. Needles
+ * between nearly coincident points have no meaningful plane. */
 static void assert_convex(const orb_supermesh *m, int every) {
   for (int32_t t = 0; t < m->triangle_count; t += every) {
     double u[3], v[3], n[3], d[3];
@@ -110,7 +110,7 @@ static void general_position(void **state) {
   pair(SPHERE_ICO, 5, 1, SPHERE_ICO, 5, 2, 0.2, 0);
 }
 
-/* The same points twice are there once; an octahedron's 6 lie among the 18 of its four-way split. */
+/* Coincident points become one vertex; the 6 of an octahedron are among the 18 of its four-way split. */
 static void coincident(void **state) {
   (void)state;
   pair(SPHERE_ICO, 3, 4, SPHERE_ICO, 3, 4, 0.2, 642);

@@ -1,4 +1,4 @@
-/* The overlay: the exact common refinement, against brute evaluation of the shapes. */
+/* The overlay: compares the exact common refinement with a brute-force evaluation of the shapes. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -22,9 +22,9 @@ static orb_status overlay(orb_context *ctx, const orb_aligned_shape *shapes, int
   return status;
 }
 
-/* Flat pieces: inside every supermesh triangle each shape is linear, so that the shape in the direction of a mixture of
- * the corners is the mixture of their positions, up to the projective weights of the two flat triangles. Compared by
- * distance to the plane and by the shape's own brute evaluation at three inner directions. */
+/* Each shape is linear inside every supermesh triangle, so its position in the direction of a combination of the
+ * corners is the combination of their positions, up to the projective weights of the two flat triangles. Compares the
+ * distance to the plane with a brute-force evaluation of the shape at three inner directions. */
 static void assert_exact(const orb_supermesh *m, const orb_aligned_shape *shapes, int count, int every) {
   static const double weight[3][3] = {{.4, .3, .3}, {.8, .1, .1}, {.1, .2, .7}};
   for (int s = 0; s < count; s++) {
@@ -59,8 +59,8 @@ static void assert_exact(const orb_supermesh *m, const orb_aligned_shape *shapes
   }
 }
 
-/* Every input vertex is one supermesh vertex, and every input edge a chain of supermesh edges: its length in space is
- * made up by those supermesh edges that lie on it. */
+/* Every input vertex is one supermesh vertex, and every input edge is a chain of supermesh edges: the lengths in space
+ * of the supermesh edges on it add up to its length. */
 static void assert_edges_present(const orb_supermesh *m, const orb_aligned_shape *shape, int s) {
   const orb_mesh *mesh = &shape->mesh;
   double along = 0, length = 0;
@@ -127,7 +127,7 @@ static void general_position(void **state) {
   check_pair(SPHERE_TETRA, 0, 1, SPHERE_TETRA, 0, 3, 0, 1, 7);
 }
 
-/* Identical meshes overlay to themselves; a mesh over its own four-way split to the split: no sliver anywhere. */
+/* The overlay of identical meshes is the mesh; that of a mesh and its four-way split is the split: no slivers. */
 static void coincidences_add_nothing(void **state) {
   (void)state;
   check_pair(SPHERE_UV, 16, 0, SPHERE_UV, 16, 0, 0, 0.5, 0.5);
@@ -136,8 +136,8 @@ static void coincidences_add_nothing(void **state) {
   check_pair(SPHERE_OCTA, 0, 0, SPHERE_OCTA, 1, 0, 0, 32. / 40, 32. / 40);
 }
 
-/* Poles, meridians and edges in common up to rounding, which is the worst case for it: certified all the same, each
- * shape moved by no more than rounding. */
+/* Poles, meridians and edges in common up to rounding, the worst case: the overlay is still certified, and each shape
+ * moves only by rounding. */
 static void partial_coincidences(void **state) {
   (void)state;
   static const struct {
@@ -162,7 +162,7 @@ static void partial_coincidences(void **state) {
   }
 }
 
-/* A shape over itself, moved by rounding or a little more: its own triangles, exactly, and nothing between them. */
+/* The overlay of a shape with itself, moved by rounding or slightly more, has exactly the triangles of the shape. */
 static void the_same_but_for_rounding(void **state) {
   (void)state;
   static const double by[] = {1e-16, 1e-14, 1e-12, 1e-10};

@@ -1,4 +1,4 @@
-/* The steps of the adaptive method one by one: none leaves the limit, whatever the map does. */
+/* The steps of the adaptive method one by one: each stays within the limit, for every map. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -38,7 +38,7 @@ typedef struct bench {
 
 static const double LIMIT = 0.01;
 
-/* Twists a ball about an axis in space, and leaves its points on the sphere. */
+/* Twists a ball around an axis in space and keeps its points on the sphere. */
 static void shear(const orb_aligned_shape *shape, int axis, double most) {
   int x = (axis + 1) % 3, y = (axis + 2) % 3;
   for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
@@ -49,7 +49,7 @@ static void shear(const orb_aligned_shape *shape, int axis, double most) {
   }
 }
 
-/* Two rough balls of so many divisions; the second is twisted, so that large triangles are inverted. */
+/* Two rough balls; the second is twisted, so that large triangles are inverted. */
 static void set_up_in(bench *b, orb_context *ctx, int size, unsigned seed, double wind) {
   memset(b, 0, sizeof *b);
   b->ctx = ctx;
@@ -212,7 +212,7 @@ static void starts_fail_cleanly(void **state) {
     left = n;
     status = orb_adaptive_start_from_reduced(b.ctx, &b.job, LIMIT * LIMIT, &b.placed);
     assert_true(status == ORB_OK || status == ORB_E_NO_MEMORY);
-    assert_true(n > 20 || status == ORB_E_NO_MEMORY); /* there are many more than that */
+    assert_true(n > 20 || status == ORB_E_NO_MEMORY); /* there are many more allocations */
   }
   left = INT64_MAX;
   assert_valid(&b);

@@ -1,4 +1,4 @@
-/* The list of remesh methods and everything that must name the same methods. */
+/* Compares the list of remesh methods with every other list that must name them. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -57,7 +57,7 @@ static void every_listed_method_is_built(void **state) {
   assert_int_equal(orb_remesh_heeds(ORB_REMESH_METHOD_COUNT), 0);
 }
 
-/* Remeshes two rough balls; returns the number of triangles, −1 where the options are refused. */
+/* Remeshes two rough balls. Returns the number of triangles, −1 if the options are refused. */
 static int64_t triangles_with(orb_remesh_method method, double tolerance, int64_t max_triangles) {
   orb_context *ctx = remesh_context(1);
   orb_aligned_shape shapes[2];
@@ -93,7 +93,7 @@ static void methods_heed_what_the_registry_says(void **state) {
   }
 }
 
-/* Compares every enumeration that starts like the list with the list; returns how many there are. */
+/* Compares every enumeration that starts like the list with the list. Returns their number. */
 static int check_enumerations(const cJSON *node) {
   int found = 0;
   if (node->string && strcmp(node->string, "enum") == 0 && cJSON_IsArray(node)) {

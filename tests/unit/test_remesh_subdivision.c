@@ -81,7 +81,7 @@ static void coincident_landmarks_are_one_vertex(void **state) {
         shapes[s].landmark_vertices[0] = v;
       }
     }
-    shapes[s].landmark_vertices[1] = s == 1 ? 5 : 0; /* not at one place: no vertex stands for it */
+    shapes[s].landmark_vertices[1] = s == 1 ? 5 : 0; /* not at one place: no vertex represents it */
   }
   orb_supermesh m;
   run(ctx, shapes, 3, 2, &m);

@@ -1,5 +1,5 @@
-/* The store by itself, in a folder of its own: objects, rows, attempts of jobs, events, and schemas of older versions.
- * What is expected follows from the contracts in server/store. */
+/* The store alone, in its own folder: objects, rows, job attempts, events, and schemas of older versions. The contracts
+ * in server/store state the expected behaviour. */
 #include <fcntl.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -55,13 +55,14 @@ static void test_objects(void **state) {
   assert_int_equal(objects_read(s->store, OBJECT_MESH, id, &fd, &length), STORE_NOT_FOUND);
   assert_int_equal(objects_put(s->store, OBJECT_MESH, id, "0123456789", 10), STORE_OK);
   assert_int_equal(objects_put(s->store, OBJECT_MESH, id, "0123456789", 10), STORE_OK); /* equal ids, equal bytes */
-  assert_int_equal(objects_read(s->store, OBJECT_SPHERE, id, &fd, &length), STORE_NOT_FOUND); /* kinds are apart */
+  assert_int_equal(objects_read(s->store, OBJECT_SPHERE, id, &fd, &length),
+                   STORE_NOT_FOUND); /* each kind has its own ids */
   assert_int_equal(objects_read(s->store, OBJECT_MESH, id, &fd, &length), STORE_OK);
   assert_int_equal(length, 10);
   assert_int_equal(pread(fd, part, 4, 3), 4); /* a range of it */
   assert_string_equal(part, "3456");
   assert_int_equal(objects_delete(s->store, OBJECT_MESH, id), STORE_OK);
-  assert_int_equal(pread(fd, part, 4, 6), 4); /* a reader that has it open can go on */
+  assert_int_equal(pread(fd, part, 4, 6), 4); /* a reader that has it open can continue */
   assert_string_equal(part, "6789");
   close(fd);
   assert_int_equal(objects_delete(s->store, OBJECT_MESH, id), STORE_OK); /* gone is gone */
@@ -90,7 +91,7 @@ static void test_temporaries(void **state) {
   assert_int_equal(temp.fd, -1);
   objects_abandon(&temp); /* does nothing now */
   assert_int_equal(files_in(s, "tmp"), 1);
-  reopen(s); /* as after a death: what was begun is swept, what was published stays */
+  reopen(s); /* as after a crash: unfinished objects are swept, published ones stay */
   assert_int_equal(files_in(s, "tmp"), 0);
   close(abandoned.fd);
   assert_int_equal(objects_load(s->store, OBJECT_ASSET, id, &bytes, &size), STORE_OK);
@@ -108,7 +109,7 @@ static void test_resources(void **state) {
   make_id(row.sha, 'e');
   assert_int_equal(catalogue_put_for(s->cat, &row, "", 0, &fresh), STORE_OK);
   row.json = (char *)(uintptr_t) "{\"n\":2}";
-  assert_int_equal(catalogue_put_for(s->cat, &row, "", 0, &fresh), STORE_OK); /* put if absent: the first stays */
+  assert_int_equal(catalogue_put_for(s->cat, &row, "", 0, &fresh), STORE_OK); /* put-if-absent keeps the first */
   assert_int_equal(catalogue_get(s->cat, RESOURCE_EMBEDDING, row.id, &got), STORE_OK);
   assert_string_equal(got.json, "{\"n\":1}");
   assert_int_equal(got.created, 1000);
@@ -150,7 +151,7 @@ static job_row read_job(stored *s, const char *id) {
   return row;
 }
 
-/* Each step checks (job, attempt): of two workers that both believe to have a job, one is refused. */
+/* Each step checks (job, attempt): if two workers both claim a job, one is refused. */
 static void test_attempts(void **state) {
   stored *s = *state;
   job_row job = new_job('1');
@@ -159,7 +160,7 @@ static void test_attempts(void **state) {
   memcpy(result.id, job.key, sizeof result.id);
   make_id(result.sha, 'f');
   assert_int_equal(catalogue_job_insert(s->cat, &job), STORE_OK);
-  assert_int_equal(catalogue_job_insert(s->cat, &job), STORE_CONFLICT); /* an id is there once */
+  assert_int_equal(catalogue_job_insert(s->cat, &job), STORE_CONFLICT); /* ids are unique */
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 2, 0, 10), STORE_CONFLICT);
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 1, 0, 10), STORE_OK);
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 1, 0, 11), STORE_CONFLICT);
@@ -185,7 +186,7 @@ static void test_attempts(void **state) {
   free(events[0].json);
 }
 
-/* Crashes: jobs that ran are queued again, first as suspects. A job that ran alone in three crashes fails, with its
+/* After a crash, the jobs that ran are queued again as suspects. A job that ran alone in three crashes fails, with a
  * last event. */
 static void test_recovery(void **state) {
   stored *s = *state;
@@ -249,7 +250,7 @@ static const char first_schema[] =
     "CREATE TABLE token(hash TEXT PRIMARY KEY, name TEXT NOT NULL UNIQUE, scopes INTEGER NOT NULL,"
     " quota_bytes INTEGER NOT NULL, quota_jobs INTEGER NOT NULL, created INTEGER NOT NULL);";
 
-/* In place of the catalogue, one of the first schema with more done to it; returns the newest version. */
+/* Replaces the catalogue by one of the first schema and runs the given SQL on it. Returns the newest version. */
 static int replace_catalogue(stored *s, const char *more, char path[96]) {
   static const char *const suffixes[] = {"", "-wal", "-shm"};
   sqlite3 *db = NULL;
@@ -271,9 +272,9 @@ static int replace_catalogue(stored *s, const char *more, char path[96]) {
   return newest;
 }
 
-/* A catalogue as version 1 of the schema left it, with a mesh and two jobs, is brought up to date and keeps them. The
- * request of a waiting job loses the member that no version reads any more. A catalogue from a later version than this
- * program knows is not touched. */
+/* A catalogue of schema version 1 with a mesh and two jobs is migrated and keeps them. The request of a waiting job
+ * loses the member that no version reads any more. A catalogue of a later version than this program knows is left
+ * alone. */
 static void test_migrations(void **state) {
   stored *s = *state;
   static const char first[] =
@@ -330,8 +331,8 @@ static int owns(stored *s, resource_kind kind, const char *id, const char *tenan
   return result == STORE_OK;
 }
 
-/* A catalogue from before owners were noted (version 3): results belong to those whose jobs made them, meshes to those
- * whose jobs named them, and what no job tells of to nobody but the operator. Tokens are tenants of their own names. */
+/* A catalogue without owners (version 3): results belong to the tenants whose jobs made them, meshes to those whose
+ * jobs named them, and everything else only to the operator. A token becomes a tenant of the same name. */
 static void test_migration_to_owners(void **state) {
   stored *s = *state;
   static const char third[] =
@@ -378,7 +379,7 @@ static void test_migration_to_owners(void **state) {
   token_row *tokens = catalogue_tokens(s->cat, &count);
   assert_int_equal(count, 3);
   assert_string_equal(tokens[0].tenant, "ann");
-  assert_int_equal(tokens[0].used, 100); /* what it owns, not what it ever uploaded */
+  assert_int_equal(tokens[0].used, 100); /* what it owns now, not all it ever uploaded */
   assert_int_equal(tokens[0].quota, 100);
   assert_int_equal(tokens[1].used, 130);
   assert_int_equal(tokens[1].priority, 5);
@@ -388,7 +389,7 @@ static void test_migration_to_owners(void **state) {
   assert_true(catalogue_integrity(s->cat));
 }
 
-/* Owners come and go; the last one takes the resource with it, and bytes are counted for each. */
+/* Owners come and go; the resource goes with its last owner, and its bytes count for each owner. */
 static void test_owners(void **state) {
   stored *s = *state;
   resource row = {.kind = RESOURCE_MESH, .json = (char *)(uintptr_t) "{\"of\":\"ann\"}", .bytes = 60, .created = 1000};
@@ -425,7 +426,7 @@ static void test_owners(void **state) {
   assert_true(gone);
   assert_int_equal(catalogue_get(s->cat, RESOURCE_MESH, row.id, &got), STORE_NOT_FOUND);
 
-  /* Deleted by the operator, it is gone for all, and so are the bytes. */
+  /* If the operator deletes it, it is gone for everyone, and so are its bytes. */
   assert_int_equal(catalogue_put_for(s->cat, &row, "ann", 0, &fresh), STORE_OK);
   assert_int_equal(catalogue_put_for(s->cat, &row, "bob", 0, &fresh), STORE_OK);
   assert_int_equal(catalogue_delete(s->cat, RESOURCE_MESH, row.id), STORE_OK);
@@ -434,8 +435,8 @@ static void test_owners(void **state) {
   assert_int_equal(catalogue_mismatches(s->cat), 0);
 }
 
-/* Who asked for a result owns it: the first with its description as it is, others with the time of their own job. A
- * result that is gone before the job has ended is no success. */
+/* Every tenant that requested a result owns it: the first with its original description, others with the time of their
+ * own job. A job whose result is deleted before the job ends does not succeed. */
 static void test_owners_of_results(void **state) {
   stored *s = *state;
   job_row ann = new_job('1'), bob = new_job('2'), eve = new_job('3');
@@ -470,8 +471,8 @@ static void test_owners_of_results(void **state) {
   assert_int_equal(read_job(s, eve.id).state, API_JOB_RUNNING);
 }
 
-/* Who asks for a job owns the meshes that it names, so that the first owner can give them up. One that is gone refuses
- * the job where a caller waits for the answer. */
+/* A tenant that requests a job owns the meshes that the job names, so their first owner can give them up. A missing
+ * mesh refuses the job if a client waits for the answer. */
 static void test_owners_of_meshes(void **state) {
   stored *s = *state;
   resource mesh = {.kind = RESOURCE_MESH,
@@ -505,7 +506,7 @@ static void test_owners_of_meshes(void **state) {
   assert_int_equal(catalogue_mismatches(s->cat), 0);
 }
 
-/* The oldest ended jobs are forgotten with their events, unfinished ones never. */
+/* The oldest finished jobs are deleted with their events, unfinished jobs never. */
 static void test_forgetting(void **state) {
   stored *s = *state;
   job_row jobs[4] = {new_job('1'), new_job('2'), new_job('3'), new_job('4')}, got;
@@ -534,7 +535,7 @@ static void test_forgetting(void **state) {
   assert_int_equal(read_job(s, jobs[0].id).state, API_JOB_RUNNING);
 }
 
-/* There may be any number of tokens; all are read, by name. */
+/* Any number of tokens is possible; all are listed by name. */
 static void test_many_tokens(void **state) {
   stored *s = *state;
   enum { MANY = 1100 };

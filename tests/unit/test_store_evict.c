@@ -1,5 +1,5 @@
-/* Eviction over more rows than are looked at in one go: those that unfinished jobs need stay wherever they stand in the
- * order of use, the others leave from the oldest on, and no more than the budget asks for. */
+/* Eviction over more rows than one page: rows that unfinished jobs need stay wherever they are in the order of use; the
+ * others leave, oldest first, and no more than the budget requires. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -88,7 +88,7 @@ static int is_there(stored *s, int number) {
   return result == STORE_OK;
 }
 
-/* The 150 oldest are needed: more than two pages of them come before the first that may leave. */
+/* Jobs need the 150 oldest: more than two pages come before the first row that may leave. */
 static void test_needed_rows_fill_pages(void **state) {
   stored *s = *state;
   for (int i = 0; i < NEEDED; i++) {
@@ -105,7 +105,7 @@ static void test_needed_rows_fill_pages(void **state) {
     assert_int_equal(is_there(s, i), i < NEEDED || i >= NEEDED + 3);
   }
   assert_int_equal(evict_derived(&s->env, 0, 2000 + FREE - 5),
-                   (NEEDED + 5) * ROW_BYTES); /* what was used since stays */
+                   (NEEDED + 5) * ROW_BYTES); /* rows used since then stay */
   assert_int_equal(evict_derived(&s->env, 0, INT64_MAX), NEEDED * ROW_BYTES);
   for (int i = 0; i < NEEDED + FREE; i++) {
     assert_int_equal(is_there(s, i), i < NEEDED);

@@ -1,4 +1,5 @@
-/* Textures of glTF files: pictures are kept, what only begins like one is left out, and samplers have values of glTF.
+/* Textures of glTF files: valid pictures are kept, data that only starts like one is dropped, samplers have valid
+ * values.
  */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -21,7 +22,7 @@ static const unsigned char PNG[] = {0x89, 'P',  'N',  'G',  0x0d, 0x0a, 0x1a, 0x
                                     0xef, 0,    0,    0,    0,    'I',  'E',  'N',  'D', 0xae, 0x42, 0x60, 0x82};
 enum { PNG_IDAT = 33, PNG_IDAT_END = PNG_IDAT + 12 + 12 };
 
-/* SOI, a comment, a baseline frame of 2×1 in grey, the begin of a scan. */
+/* SOI, a comment, a baseline frame of 2×1 in grey, the start of a scan. */
 static const unsigned char JPEG[] = {0xff, 0xd8, 0xff, 0xfe, 0, 4, 'h', 'i', 0xff, 0xff, 0xc0, 0,
                                      11,   8,    0,    1,    0, 2, 1,   1,   0x11, 0,    0xff, 0xda,
                                      0,    8,    1,    1,    0, 0, 63,  0,   0x2a, 0xff, 0xd9};
@@ -69,7 +70,7 @@ static void test_png(void **state) {
     assert_true(changed_is(PNG, sizeof PNG, wrong[i].at, wrong[i].value, NULL));
   }
   assert_true(changed_is(PNG, sizeof PNG, 24, 16, "image/png"));
-  /* gAMA must be of four bytes; a chunk that is not known may be of any */
+  /* gAMA must have four bytes; an unknown chunk may have any number */
   unsigned char more[sizeof PNG + 17];
   memcpy(more, PNG, PNG_IDAT);
   memcpy(more + PNG_IDAT, "\0\0\0\5gAMA\0\0\xb1\x8f\0crc.", 17);

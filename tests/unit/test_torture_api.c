@@ -1,4 +1,5 @@
-/* Bodies of requests are read and documents written while memory runs out: refused as that, or done right. */
+/* Reads request bodies and writes documents while memory runs out: each ends with an out-of-memory error or correctly.
+ */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,7 +16,7 @@
 #define ID_A "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
 #define ID_B "bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb"
 
-/* Reads a body and writes what was read; 0 with *problem where it is refused. */
+/* Reads a body and writes it back. Returns 0 and *problem if it is refused. */
 typedef struct body {
   const char *text;
   int (*through)(const cJSON *value, api_text *out, api_problem *problem);
@@ -70,7 +71,7 @@ static int read_body(void *user, torture_kind kind, long number, int for_ever) {
   } else if (!read) {
     assert_string_equal(problem.name, "no-memory");
   } else if (!out.failed && strcmp(out.data, b->expected) != 0) {
-    /* A refusal may fall back to the lack of memory, nothing else may come out differently. */
+    /* A refusal may become an out-of-memory error; nothing else may differ. */
     assert_true(b->through == through_refusal && strstr(out.data, "no-memory"));
   }
   assert_true(met || (read && !out.failed));

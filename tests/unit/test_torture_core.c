@@ -1,6 +1,6 @@
-/* The library from the file to the asset, each allocation failing in turn: of the context, of cJSON, of the C++ within.
- * A run that met a failure ends with ORB_E_NO_MEMORY and nothing left; so whether later allocations fail as well can
- * matter only while it cleans up, which is tried where a run is quick. */
+/* Runs the library from the file to the asset while each allocation fails once: those of the context, of cJSON and of
+ * the C++ code. A run with a failure ends with ORB_E_NO_MEMORY and leaks nothing. Whether later allocations fail as
+ * well matters only during cleanup; quick runs try this, too. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -27,7 +27,7 @@ typedef struct work {
   size_t expected; /* size of the result without faults, 0: not known yet */
 } work;
 
-/* A context whose memory is all given back, whatever happened. */
+/* A context that asserts that all its memory is freed. */
 static int in_context(work *w, orb_status (*inner)(work *w, orb_context *ctx), torture_kind kind, long number,
                       int for_ever) {
   orb_context_options setup = {.threads = 1};
@@ -164,7 +164,7 @@ static void test_embed(void **state) {
   all_fail(&f->w, embed_run, "kernel-sampling", 10, 2, 1);
 }
 
-/* To align without landmarks takes long: some of its allocations, all with ORB_TORTURE_ALL=1. */
+/* Alignment without landmarks is slow: fails a sample of the allocations, all of them with ORB_TORTURE_ALL=1. */
 static void test_merge(void **state) {
   int all = getenv("ORB_TORTURE_ALL") != NULL;
   fixture *f = *state;

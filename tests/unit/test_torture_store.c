@@ -1,5 +1,5 @@
-/* The store while memory, files, SQLite and threads fail: what it said was done is there, also after it was opened
- * anew; what it could not do it said; afterwards it works. */
+/* The store while memory, files, SQLite and threads fail: everything that it reported as done exists, also after a
+ * restart; it reports every failure; afterwards it works. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,7 +17,7 @@
 #include "support_store.h"
 #include "torture/torture.h"
 
-/* Every run has a number of its own, stored.number, that names what it makes. */
+/* Every run has a unique number, stored.number, which names what it creates. */
 static void make_id(char *out, size_t size, char kind, int64_t number) {
   snprintf(out, size, "%c%0*llx", kind, (int)size - 2, (unsigned long long)number);
 }
@@ -83,7 +83,7 @@ static void check(stored *s, const told *t, int64_t number) {
   }
 }
 
-/* Lists are whole, or say that they are not. */
+/* A list is complete or reports an error. */
 static void read_lists(stored *s, const told *t) {
   resource rows[8];
   job_row jobs[8];
@@ -137,7 +137,7 @@ static told work(stored *s, int64_t number) {
   return t;
 }
 
-/* The tokens are taken away again: a store has room for so many. */
+/* Removes the tokens: the store limits their number. */
 static void tidy(stored *s, int64_t number) {
   char name[32];
   snprintf(name, sizeof name, "t%lld", (long long)number);
@@ -164,7 +164,7 @@ static int one_work(void *user, torture_kind kind, long number, int for_ever) {
   return met;
 }
 
-/* A start: it is opened and recovers, with a job that ran, one that waits and one that died alone too often. */
+/* Opens a store and recovers it: one job ran, one waits and one crashed alone too often. */
 static int one_start(void *user, torture_kind kind, long number, int for_ever) {
   stored *s = user;
   job_row ran = new_job(++s->number), waits = new_job(++s->number), rows[8];
@@ -181,7 +181,7 @@ static int one_start(void *user, torture_kind kind, long number, int for_ever) {
   for (int i = 0; i < unfinished; i++) {
     job_row_free(&rows[i]);
   }
-  assert_true(unfinished == 1 || (met && unfinished < 0)); /* all, or the word that they cannot be read */
+  assert_true(unfinished == 1 || (met && unfinished < 0)); /* all, or an error */
   if (!opened) {
     s->cat = NULL;
     assert_int_equal(catalogue_open(s->data, &s->cat), STORE_OK);
@@ -212,7 +212,7 @@ static void test_work(void **state) {
   all_ways(*state, one_work, TORTURE_FILE, 1, 4);
 }
 
-/* SQLite allocates much when it is opened: a part of it, all with ORB_TORTURE_ALL=1. */
+/* SQLite allocates a lot when it opens: fails a sample of the allocations, all of them with ORB_TORTURE_ALL=1. */
 static void test_start(void **state) {
   all_ways(*state, one_start, TORTURE_ALLOC, getenv("ORB_TORTURE_ALL") ? 1 : 7, 50);
   all_ways(*state, one_start, TORTURE_SQLITE, 1, 10);
@@ -221,7 +221,7 @@ static void test_start(void **state) {
 
 int main(void) {
   torture_begin();
-  log_setup((log_level)(LOG_ERROR + 1), 0); /* nothing: each failure would say so */
+  log_setup((log_level)(LOG_ERROR + 1), 0); /* silent: every failure would be logged */
   const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_work, stored_setup, stored_teardown),
                                      cmocka_unit_test_setup_teardown(test_start, stored_setup, stored_teardown)};
   return cmocka_run_group_tests(tests, NULL, NULL);

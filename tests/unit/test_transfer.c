@@ -43,8 +43,8 @@ static void places_give_positions(void **state) {
   synthetic_free(ctx, &made);
 }
 
-/* Angle weights make the normal at an octahedron's tip its axis, and a cube's corner normal the diagonal however the
- * faces are cut. */
+/* With angle weights, the normal at an octahedron's tip is its axis, and the normal at a cube's corner is the diagonal,
+ * however the faces are triangulated. */
 static void smooth_normals_are_symmetric(void **state) {
   orb_context *ctx = *state;
   orb_mesh ball = shape_ball(ctx, 0);
@@ -65,8 +65,8 @@ static void smooth_normals_are_symmetric(void **state) {
   }
 }
 
-/* The octants of an octahedron in eight colours, on a ball split once more than its input: each corner has the colour
- * of its own octant, though vertices lie on the input's edges and at its vertices. */
+/* An octahedron whose octants have eight colours, and a supermesh ball with one more split: each corner has the colour
+ * of its octant, though its vertex lies on an edge or at a vertex of the input. */
 static void colours_keep_to_their_side(void **state) {
   orb_context *ctx = *state;
   synthetic fine = synthetic_make(ctx, 1, 1, same), coarse = synthetic_make(ctx, 0, 1, same);
@@ -153,7 +153,7 @@ static void a_shape_on_itself_has_no_error(void **state) {
   synthetic_free(ctx, &made);
 }
 
-/* An octahedron that stands for a fine ball: the ball's farthest points lie over the middles of the faces, 1 − 1/√3
+/* An octahedron that represents a fine ball: the ball's farthest points lie over the centres of the faces, 1 − 1/√3
  * away; the rms lies between what the faces' distances allow; normals differ most at the corners, by acos(1/√3). */
 static void an_octahedron_for_a_ball(void **state) {
   orb_context *ctx = *state;

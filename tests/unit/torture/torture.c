@@ -78,7 +78,7 @@ void torture_begin(void) {
   }
 }
 
-/* The linker gives these the calls, and the true ones as __real_…: -Wl,--wrap. */
+/* The linker redirects the calls to these functions and names the originals __real_…: -Wl,--wrap. */
 #define WRAP(type, name, kind, failed, arguments, names)       \
   type __real_##name arguments;                                \
   type __wrap_##name arguments;                                \

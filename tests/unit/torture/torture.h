@@ -1,4 +1,4 @@
-/* Torture: the first, second, third … call of a kind fails, each in a run of its own, until a run meets no failure.
+/* Torture: the first, second, third … call of a kind fails, each in a separate run, until a run meets no failure.
  *
  * Programs named test_…torture… are linked so that their calls, and those of the project's libraries in them, pass
  * through torture.c; SQLite's allocations do, too, without its per-connection reserve. */
@@ -15,11 +15,12 @@ typedef enum torture_kind {
 /* Before anything else, once: SQLite takes its allocator only then. */
 void torture_begin(void);
 
-/* A run does its work between torture_arm() and torture_disarm(), and checks what came of it. */
+/* A run works between torture_arm() and torture_disarm() and then checks the result. */
 void torture_arm(torture_kind kind, long number, int for_ever);
-int torture_disarm(void); /* whether a call failed */
+int torture_disarm(void); /* returns whether a call failed */
 
-/* run(user, kind, number, for_ever) returns what torture_disarm() said. Returns how many runs met a failure. */
+/* run(user, kind, number, for_ever) returns the result of torture_disarm(). Returns the number of runs with a failure.
+ */
 typedef int (*torture_run)(void *user, torture_kind kind, long number, int for_ever);
 long torture(torture_run run, void *user, torture_kind kind, int for_ever, int step); /* step: of the numbers */
 
