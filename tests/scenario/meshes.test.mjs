@@ -5,6 +5,7 @@ import { readFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
 import { daemon, samples, slow, assertProblem } from './support/daemon.mjs';
+import { writeGlb, writeGltf } from './support/glb_write.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const { obj, ball } = shapes;
@@ -63,6 +64,8 @@ test('every format is detected by its content', async (t) => {
     off: shapes.off(m),
     ply: shapes.binaryPly(m),
     stl: shapes.binaryStl(m),
+    gltf: writeGltf(m),
+    glb: writeGlb(m),
   };
   for (const [format, bytes] of Object.entries(files)) {
     const reply = await d.upload(bytes, { name: 'misleading.xyz' });

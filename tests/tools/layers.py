@@ -16,14 +16,21 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-# Each folder may use those before it, and itself. What a folder holds is said in CONTRIBUTING.md.
+# Each folder may use those before it, and itself. A file that lies beside folders has its own place, without the
+# extension. CONTRIBUTING.md and server/README.md say what a folder holds.
 ORDER = [
     "core/include/orbmorph", "core/base", "core/numeric", "core/mesh", "core/format", "core/embed/common",
     "core/embed/newton/vector", "core/embed/newton", "core/embed/kernel_sampling", "core/embed", "core/sphere",
     "core/align/sheet", "core/align/rotate", "core/align/pin", "core/align/rbf", "core/align/map/engine",
     "core/align/map/starts", "core/align/map/twist", "core/align/map", "core/align/find", "core/align",
     "core/remesh/common", "core/remesh/overlay", "core/remesh/placed", "core/remesh/adaptive", "core/remesh",
-    "core/transfer", "core/merge", "api", "server", "client/cli"]
+    "core/transfer", "core/merge", "api",
+    "server/log", "server/faults", "server/wake", "server/tasks", "server/metrics", "server/pages", "server/studio",
+    "server/config", "server/control", "server/systemd", "server/store", "server/cache", "server/queue", "server/worker",
+    "server/evict", "server/maintain", "server/token_command", "server/http", "server/main",
+    "client/cli", "client/js/src", "client/web/src/mesh", "client/web/src/view", "client/web/src/theme",
+    "client/web/src/state", "client/web/src/player", "client/web/src/actions", "client/web/src/url", "client/web/src/ui",
+    "client/web/src/main"]
 SOURCE = re.compile(r"\.(inc\.h|c|h|cc|hh)$")
 SCRIPT = re.compile(r"\.(d\.ts|tsx|ts|mjs|js)$")
 
@@ -116,10 +123,10 @@ def circles(arrows):
 
 
 def level(name):
-    folder = os.path.dirname(name)
-    while folder and folder not in ORDER:
-        folder = os.path.dirname(folder)
-    return ORDER.index(folder) if folder else None
+    """The place in ORDER of the unit or of the nearest folder around it; None: it has no place."""
+    while name and name not in ORDER:
+        name = os.path.dirname(name)
+    return ORDER.index(name) if name else None
 
 
 def main():
@@ -134,6 +141,10 @@ def main():
         return 1
     add_imports(scripts, arrows)
     faults = 0
+    for one in sorted({*arrows, *(other for ends in arrows.values() for other in ends)}):
+        if level(one) is None:
+            faults += 1
+            print(f"no place in ORDER: {one}")
     for part in circles(arrows):
         faults += 1
         print("circle:", " ".join(part))
@@ -145,7 +156,7 @@ def main():
             if one.startswith("client/") and not other.startswith("client/"):
                 faults += 1
                 print(f"a client knows only HTTP: {one} -> {other}: {', '.join(sorted(arrows[one][other])[:4])}")
-            elif level(one) is not None and level(other) is not None and level(other) > level(one):
+            elif None not in (level(one), level(other)) and level(other) > level(one):
                 faults += 1
                 print(f"upward: {one} -> {other}: {', '.join(sorted(arrows[one][other])[:4])}")
     if listing:

@@ -81,3 +81,12 @@ export function writeGlb({ positions, normals, colors, uv, triangles, moves, ima
   second.write('BIN\0', 4, 'latin1');
   return Buffer.concat([head, json, second, bin]);
 }
+
+/** The same as text, with the buffer in a data URI. */
+export function writeGltf(mesh) {
+  const glb = writeGlb(mesh);
+  const end = 20 + glb.readUInt32LE(12);
+  const json = JSON.parse(glb.subarray(20, end).toString());
+  json.buffers[0].uri = `data:application/octet-stream;base64,${glb.subarray(end + 8).toString('base64')}`;
+  return Buffer.from(JSON.stringify(json));
+}
