@@ -10,7 +10,7 @@
 
 static const char *const aligns[] = {"pin", "rbf", "rotate", "auto", NULL};
 static const char *const presets[] = {"default", "fast", "quality", NULL};
-#define WORD(id, name) name,
+#define WORD(id, function, name, heeds) name,
 static const char *const remeshes[] = {ORB_REMESH_METHODS(WORD) NULL};
 #undef WORD
 static const char *const animations[] = {"pingpong", "none", NULL};

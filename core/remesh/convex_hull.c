@@ -7,7 +7,7 @@
  * of facets that are not positive are set aside and the hull is made again from the rest. What was set aside or left
  * out is then inserted by exact location and splitting, and edges are flipped to those of the hull. The result is
  * certified like any other; where there is no certified start, the method fails with a message. */
-#include "remesh/convex_hull.h"
+#include "remesh/common/job.h"
 
 #include <stdlib.h>
 #include <string.h>

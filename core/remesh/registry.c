@@ -2,25 +2,15 @@
 
 #include <string.h>
 
-#include "remesh/adaptive/adaptive.h"
-#include "remesh/convex_hull.h"
-#include "remesh/overlay/overlay.h"
-#include "remesh/subdivision.h"
-
-/* A method without a line here, or with NULL, is not in this build. */
 static const struct {
   orb_remesh_fn run;
+  const char *name;
   unsigned heeds;
-} methods[ORB_REMESH_METHOD_COUNT] = {
-    [ORB_REMESH_ADAPTIVE] = {orb_remesh_adaptive, ORB_REMESH_HEEDS_TOLERANCE | ORB_REMESH_HEEDS_MAX_TRIANGLES},
-    [ORB_REMESH_OVERLAY] = {orb_remesh_overlay, 0},
-    [ORB_REMESH_SUBDIVISION] = {orb_remesh_subdivision, 0},
-    [ORB_REMESH_CONVEX_HULL] = {orb_remesh_convex_hull, ORB_REMESH_HEEDS_MAX_TRIANGLES},
+} methods[] = {
+#define ROW(id, function, name, heeds) {orb_remesh_##function, name, heeds},
+    ORB_REMESH_METHODS(ROW)
+#undef ROW
 };
-
-#define NAME(id, name) name,
-static const char *const names[] = {ORB_REMESH_METHODS(NAME)};
-#undef NAME
 
 static int is_method(orb_remesh_method method) {
   return (unsigned)method < ORB_REMESH_METHOD_COUNT;
@@ -31,12 +21,12 @@ orb_remesh_fn orb_remesh_function(orb_remesh_method method) {
 }
 
 const char *orb_remesh_method_name(orb_remesh_method method) {
-  return is_method(method) ? names[method] : NULL;
+  return is_method(method) ? methods[method].name : NULL;
 }
 
 int orb_remesh_method_of_name(const char *name, orb_remesh_method *out) {
   for (int i = 0; i < ORB_REMESH_METHOD_COUNT; i++) {
-    if (strcmp(names[i], name) == 0) {
+    if (strcmp(methods[i].name, name) == 0) {
       *out = (orb_remesh_method)i;
       return 1;
     }

@@ -4,7 +4,7 @@
 
 #include "remesh/common/job.h"
 
-/* The function of a method; NULL: not in this build, or no method. */
+/* The function of a method; NULL if the number is not a method. */
 orb_remesh_fn orb_remesh_function(orb_remesh_method method);
 
 #endif

@@ -4,7 +4,7 @@
  * Then every vertex of every shape becomes a vertex of it: a corner of the leaf moves there if that flips no triangle
  * and the corner has not moved before, else the triangle is split. Delaunay flips make the triangles more even, and
  * edges that deviate from a shape are flipped or split (placed/refine.h). */
-#include "remesh/subdivision.h"
+#include "remesh/common/job.h"
 
 #include "base/check.h"
 #include "base/context.h"

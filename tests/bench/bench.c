@@ -8,8 +8,8 @@
 #include "api/json.h"
 #include "bench.h"
 
-#define WORD(id, name) name,
-#define LISTED(id, name) " " name
+#define WORD(id, function, name, heeds) name,
+#define LISTED(id, function, name, heeds) " " name
 static const char usage_text[] =
     "usage: orbmorph-bench embed [options] FILE...\n"
     "       orbmorph-bench merge [options] A B [C...]\n"

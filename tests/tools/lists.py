@@ -16,7 +16,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 SOURCES = {
     "format": ("core/format/read.c", r'\{ORB_FORMAT_\w+, "([\w-]+)"'),
     "alignment method": ("core/include/orbmorph/alignment.h", r"\bORB_ALIGN_(\w+)"),
-    "remesh method": ("core/include/orbmorph/remesh_methods.h", r'METHOD\(\w+, "([\w-]+)"\)'),
+    "remesh method": ("core/include/orbmorph/remesh_methods.h", r'METHOD\(\w+, \w+, "([\w-]+)"'),
 }
 # Measurements and history name what existed at their time.
 LEFT_OUT = re.compile(r"(^|/)(RESULTS\.md|CHANGELOG\.md)$|^docs/bench|\.(png|jpg|glb|gz|xz|zst|stl|obj|off|ply)$|package-lock|tools/lists\.py$")

@@ -11,7 +11,7 @@ extern "C" {
 #endif
 
 /* ORB_REMESH_ADAPTIVE = 0, …: see remesh_methods.h. */
-#define ORB_REMESH_ENUMERATOR(id, name) ORB_REMESH_##id,
+#define ORB_REMESH_ENUMERATOR(id, function, name, heeds) ORB_REMESH_##id,
 typedef enum orb_remesh_method { ORB_REMESH_METHODS(ORB_REMESH_ENUMERATOR) ORB_REMESH_METHOD_COUNT } orb_remesh_method;
 #undef ORB_REMESH_ENUMERATOR
 

@@ -1,14 +1,15 @@
-/* The list of remesh methods: the identifier in C, and the name in requests, options and reports. The enumeration
- * orb_remesh_method, orb_remesh_method_name() and the words that requests take are made from it, in this order.
+/* The remesh methods, a row each: the identifier in C, the end of the name of its function in core, the name in
+ * requests, options and reports, and the options that it uses (bits of orb_remesh_heeds()). The enumeration
+ * orb_remesh_method, the registry in core and the words that requests take are made from this list, in this order.
  *
- * Use: #define WORD(id, name) name, … ORB_REMESH_METHODS(WORD) */
+ * Use: #define WORD(id, function, name, heeds) name, … ORB_REMESH_METHODS(WORD) */
 #ifndef ORBMORPH_REMESH_METHODS_H
 #define ORBMORPH_REMESH_METHODS_H
 
-#define ORB_REMESH_METHODS(METHOD)   \
-  METHOD(ADAPTIVE, "adaptive")       \
-  METHOD(OVERLAY, "overlay")         \
-  METHOD(SUBDIVISION, "subdivision") \
-  METHOD(CONVEX_HULL, "convex-hull")
+#define ORB_REMESH_METHODS(METHOD)                                                                    \
+  METHOD(ADAPTIVE, adaptive, "adaptive", ORB_REMESH_HEEDS_TOLERANCE | ORB_REMESH_HEEDS_MAX_TRIANGLES) \
+  METHOD(OVERLAY, overlay, "overlay", 0)                                                              \
+  METHOD(SUBDIVISION, subdivision, "subdivision", 0)                                                  \
+  METHOD(CONVEX_HULL, convex_hull, "convex-hull", ORB_REMESH_HEEDS_MAX_TRIANGLES)
 
 #endif

@@ -12,7 +12,7 @@
  * triangles of the start. If too many remain, the first round is repeated from the overlay, around them or everywhere;
  * the other rounds, which take most of the time, are made only once. Where max_triangles asks for fewer triangles, the
  * tolerance is raised step by step until they suffice. */
-#include "remesh/adaptive/adaptive.h"
+#include "remesh/common/job.h"
 
 #include <math.h>
 

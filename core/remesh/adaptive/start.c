@@ -16,7 +16,6 @@
 #include "base/memory.h"
 #include "remesh/adaptive/collapse.h"
 #include "remesh/common/net_export.h"
-#include "remesh/overlay/overlay.h"
 #include "remesh/placed/flip.h"
 #include "sphere/locate.h"
 

@@ -18,4 +18,10 @@ typedef struct orb_remesh_job {
  * orb_remesh() finds the landmarks and certifies the result. */
 typedef orb_status (*orb_remesh_fn)(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
 
+/* The function of each method: orb_remesh_adaptive() and so on. */
+#define ORB_REMESH_DECLARATION(id, function, name, heeds) \
+  ORB_MUST_CHECK orb_status orb_remesh_##function(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out);
+ORB_REMESH_METHODS(ORB_REMESH_DECLARATION)
+#undef ORB_REMESH_DECLARATION
+
 #endif

@@ -2,7 +2,7 @@
  * crossings rounded and certified, is the first layer of the next overlay. Its triangles map linearly to each of its
  * shapes, so a new vertex inside one has its place on them by interpolation: the result reproduces every shape exactly,
  * however many there are. */
-#include "remesh/overlay/overlay.h"
+#include "remesh/common/job.h"
 
 #include <math.h>
 #include <string.h>
