@@ -32,19 +32,26 @@
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
 
-/* Chosen by trial on the pairs of docs/bench-truth.md. */
+/* All chosen by trial on the `auto` rows of docs/bench-truth.md. The counts trade time for candidates: each rotation or
+ * tip map costs a walk and some sweeps on coarse copies, each composed candidate a whole composed map of these. */
 enum {
   COARSE = 1000, /* vertices of a coarse copy */
   WALK = 300,    /* least vertices of the level on which tips walk */
-  ROTATIONS = 3, /* rotations that are tried */
+  ROTATIONS = 3, /* rotations of the spheres that are tried: the best of the rotation search */
   TIP_MAPS = 8,  /* tip maps by distances that are tried, beside those by rotations in space */
   COMPOSED = 3,  /* candidates that are composed in full */
   SAMPLES = 48   /* points of the first shape whose images tell candidates apart */
 };
-static const double ROTATION_COST = 1; /* a rotation by π in space costs this many times the energy beyond 1 */
-static const double DIFFERENT = 0.15;  /* of the diagonal: candidates whose images are farther apart differ */
-static const double BETTER = 0.95; /* cost relative to the rotation search's after its rough sweeps: a candidate with
-                                      more is not worth composing on the given meshes */
+/* Factor without unit. A rotation by π in space multiplies the energy beyond 1 by 1 + ROTATION_COST, because files
+ * usually have shapes upright and facing one way: a man matched back to front has nearly the energy of the right map.
+ */
+static const double ROTATION_COST = 1;
+/* Mean distance of the images of the samples, in diagonals of the second shape. Candidates that are nearer to each
+ * other count as one correspondence: only one of them is composed, and they do not lower each other's confidence. */
+static const double DIFFERENT = 0.15;
+/* Ratio of costs, of a candidate to the rotation search after its rough sweeps. Only a candidate
+ * that is clearly better is worth composing on the given meshes. */
+static const double BETTER = 0.95;
 
 /* A decimated copy: compact, with its own embedding. */
 typedef struct coarse {

@@ -16,9 +16,13 @@
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
 
-/* Chosen by trial on the pairs of docs/bench-truth.md. */
-enum { PATCH = 64 };             /* triangles that a confidence compares: more are less local */
-static const double CLEAR = 0.5; /* a candidate that is this far ahead of all others lowers no confidence */
+/* Both chosen by trial on the `auto` rows of docs/bench-truth.md. */
+/* Triangles of the first shape whose distortion gives the confidence of a found landmark. Fewer make it depend on
+ * single triangles, more make it less local. */
+enum { PATCH = 64 };
+/* orb_candidate.clear (0 to 1) from which no confidence falls. Below, all fall in proportion: a second candidate is
+ * then nearly as good. */
+static const double CLEAR = 0.5;
 
 typedef struct finder {
   const orb_alignment *alignment;

@@ -15,9 +15,15 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-static const double SAME_GROUP = 1;  /* radians between rotations that count as one */
-static const double MIRRORED = 0.15; /* of the fit: a map whose mirror image gains more is left out */
-static const double LEAST_FIT = 0.1; /* factor of a map's score, however badly its tips fit */
+/* All chosen by trial on the `auto` rows of docs/bench-truth.md. */
+/* Radians between two rotations that count as one. Maps are taken alternately from each group, because the best maps by
+ * distances alone are often permutations of one map. */
+static const double SAME_GROUP = 1;
+/* Difference of two fits (0 to 1): a map is left out if its mirror image fits better by more than this. */
+static const double MIRRORED = 0.15;
+/* Least factor (0 to 1) of a map's score for how well a rotation fits its tips. A map that no rotation fits keeps this
+ * share of its score, so distances still rank such maps. */
+static const double LEAST_FIT = 0.1;
 
 typedef struct group {
   double rotation[9];

@@ -5,12 +5,16 @@
 
 #include "align/find/tip_maps.h"
 
-/* The weights were chosen by trial on the pairs of docs/bench-truth.md. */
-enum { LEAST = 3 }; /* tips of a map */
-/* Two lengths agree by 1 − r², at least WORST, with r the logarithm of their ratio over the spread: of the distance of
- * two tips, and of a tip's mean distance from the surface. */
+/* The spreads and weights were chosen by trial on the `auto` rows of docs/bench-truth.md. */
+enum { LEAST = 3 }; /* tips of a map: two leave the rotation around their axis open */
+/* Two lengths agree by 1 − r², at least WORST, with r the natural logarithm of their ratio over the spread: 1 for equal
+ * lengths, 0 for lengths that differ by a factor of exp(spread). PAIR_SPREAD (a factor of 1.42) is for the distance of
+ * two tips, FAR_SPREAD (1.28) for a tip's mean distance from the surface. WORST keeps one limb with other proportions
+ * from ruling out a map. */
 static const double PAIR_SPREAD = 0.35, FAR_SPREAD = 0.25, WORST = -2;
-static const double PAIR_SHARE = 0.05; /* weight of distances where directions are known, which say more */
+/* Weight of the distances, relative to that of directions, where a rotation is known. Directions say more: distances
+ * prefer dozens of wrong maps where proportions differ, as for a stout cow and a lean animal. */
+static const double PAIR_SHARE = 0.05;
 
 typedef struct matcher {
   const orb_tips *a, *b;

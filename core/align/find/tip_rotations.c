@@ -16,9 +16,10 @@
 #include "base/check.h"
 #include "numeric/vec3.h"
 
-/* Chosen by trial on the pairs of docs/bench-truth.md. */
-enum { STEPS = 8 };              /* most, of matching and fitting */
-static const double APART = 1.0; /* radians: directions this far apart are not matched */
+/* Both chosen by trial on the `auto` rows of docs/bench-truth.md. */
+enum { STEPS = 8 }; /* most steps of matching and fitting from one rotation; they end when the map stays the same */
+/* Radians: tips are not matched if their directions are farther apart. */
+static const double APART = 1.0;
 
 /* The i-th of the 24 rotations that map the axes to each other. */
 static void side(int i, double r[9]) {

@@ -14,10 +14,11 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
-/* Chosen by trial on the pairs of docs/bench-truth.md. */
-enum { SOURCES = 64 };             /* each costs one search of the mesh */
-static const double APART = 0.2;   /* of the mean distance: tips nearer to each other count as one */
-static const double FARTHER = 1.1; /* a tip's distance relative to the mean distance, at least */
+/* All chosen by trial on the `auto` rows of docs/bench-truth.md. Lengths are along the surface, in units of the mean
+ * distance of two points of it. */
+enum { SOURCES = 64 };             /* points from which distances are averaged; each costs one search of the mesh */
+static const double APART = 0.2;   /* tips nearer to each other count as one */
+static const double FARTHER = 1.1; /* least mean distance of a tip: a ball, where it is 1 everywhere, has no tips */
 
 typedef struct link_to {
   int32_t vertex;
