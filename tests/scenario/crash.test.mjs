@@ -1,5 +1,5 @@
-// kill -9 under load, repeated, at random instants and at every named point of the code. Afterwards no accepted job is
-// lost or ends twice, no object is torn, and --check-data passes.
+// Kills the daemon (kill -9) under load, repeatedly, at random instants and at every named point of the code. Afterwards
+// no accepted job is lost or ends twice, no object is torn, and --check-data passes.
 //
 // ORB_KILLS (20) is the number of kills. Named points need a build with ORB_FAULTS (the presets faults and asan); with
 // others, all kills are at random instants. ORB_SEED chooses the instants.
@@ -45,13 +45,13 @@ function newMesh() {
   return shapes.obj(shapes.ball(1, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(n)), y, z + 0.001 * n]));
 }
 
-/** What the daemon has promised to clients: the ledger that it is checked against. */
+/** Records what the daemon accepted, to check the daemon against it. */
 class Ledger {
   meshes = new Map(); // url → SHA-256 of its file
-  jobs = new Map(); // url → job of a 202 whose end was not seen yet
+  jobs = new Map(); // url → job of a 202 whose end is not yet known
   ends = new Map(); // url → state seen
   gone = new Set(); // urls of deleted meshes and embeddings
-  asked = new Set(); // urls whose deletion was asked for: there or gone, until it is answered
+  asked = new Set(); // urls whose deletion was requested: until the answer, they may exist or not
 
   async upload(d) {
     const text = newMesh();
@@ -77,7 +77,7 @@ class Ledger {
     this.meshes.delete(url);
   }
 
-  /** One caller: uploads, asks, reads, deletes, until the daemon is gone. */
+  /** One client: uploads, requests, reads and deletes until the daemon is gone. */
   async call(d) {
     try {
       for (;;) {
@@ -98,7 +98,7 @@ class Ledger {
         }
       }
     } catch (error) {
-      if (error instanceof assert.AssertionError) throw error; // an answer that was wrong, not a broken connection
+      if (error instanceof assert.AssertionError) throw error; // a wrong answer, not a broken connection
     }
   }
 
@@ -127,7 +127,7 @@ class Ledger {
     }
   }
 
-  /** Everything in the catalogue once, meshes with the bytes that were sent, what was deleted gone. */
+  /** Every resource is listed once, meshes have the uploaded bytes, deleted resources are gone. */
   async audit(d) {
     for (const kind of ['meshes', 'embeddings', 'supermeshes', 'jobs']) {
       const ids = [];
@@ -159,7 +159,7 @@ async function checkData(d) {
 
 const gone = (d) => d.child.exitCode !== null || d.child.signalCode !== null;
 
-/** Waits until it is dead, kills it when the time is up; true when the point did it. */
+/** Waits until the daemon dies, and kills it after `ms`. Returns whether the named point killed it. */
 async function dies(d, ms) {
   const timer = sleep(ms).then(() => false);
   const byPoint = await Promise.race([d.exited.then(() => true), timer]);
@@ -182,11 +182,12 @@ test(`${kills} kills under load lose nothing`, async (t) => {
     const d = new Daemon(data, ['--workers', '2'], {});
     t.after(() => d.child?.kill('SIGKILL'));
     const ledger = new Ledger();
-    const life = Math.min(50, kills - done); // then a fresh folder, so that each start is quick
+    const life = Math.min(50, kills - done); // then a new folder, so that starts stay quick
     for (let i = 0; i < life; i++, done++) {
-      // In a fresh folder while its schema is made; then in turn: an instant after all that waited has ended; then a named point or any instant, also while it
-      // recovers. So no job is alone in three deaths one after another.
-      const least = Math.min(...[...hit].filter(([name]) => name !== 'migrate').map(([, n]) => n)); // those least seen first
+      // The first kill in a new folder comes while the schema is made. Then kills alternate: at an instant after all
+      // waiting jobs have ended, and at a named point or any instant, also during recovery. So no job runs alone in
+      // three crashes in a row.
+      const least = Math.min(...[...hit].filter(([name]) => name !== 'migrate').map(([, n]) => n)); // the points seen least come first
       const point =
         faults && i === 0
           ? 'migrate'
@@ -199,7 +200,7 @@ test(`${kills} kills under load lose nothing`, async (t) => {
         await d.start();
       } catch (error) {
         if (!point || !/exit SIGKILL/.test(error.message)) throw error;
-        hit.set(point, hit.get(point) + 1); // while it started
+        hit.set(point, hit.get(point) + 1); // it died during the start
         continue;
       }
       slowest = Math.max(slowest, d.start_cpu_ms);
@@ -259,7 +260,7 @@ test('a job that crashes the daemon three times fails, and other jobs go on', {
     if (!end) await Promise.race([d.exited, sleep(500)]);
     while (gone(d)) {
       deaths++;
-      await d.start().catch((error) => assert.match(error.message, /exit SIGKILL/)); // again, before it could say so
+      await d.start().catch((error) => assert.match(error.message, /exit SIGKILL/)); // it died again before it could say so
     }
   }
   assert.equal(end?.problem.type, '/problems/crashed');

@@ -268,7 +268,7 @@ adversarial_mesh adversarial_make(adversarial_kind kind, uint64_t seed, int32_t 
       return spiked(&r, triangles, 20 + below(&r, 60), 2 + 8 * unit(&r), 0.06);
     case ADV_LIMBS:
       m = spiked(&r, triangles, 4 + below(&r, 5), 4 + 10 * unit(&r), 0.15);
-      for (int32_t v = 0; v < m.vertex_count; v++) { /* limbs on limbs: side branches that grow with the way out */
+      for (int32_t v = 0; v < m.vertex_count; v++) { /* limbs on limbs: side branches that grow with the distance */
         double *p = m.positions + 3 * (size_t)v, l = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
         double wave = l > 2 ? pow(fmax(0, sin(3 * l)), 6) * fmax(0, sin(9 * atan2(p[1], p[0]))) : 0;
         p[0] *= 1 + 0.6 * wave;

@@ -1,4 +1,4 @@
-/* Meshes made to break an embedding: closed, manifold, genus zero, and otherwise as bad as a seed can make them. */
+/* Meshes made to break an embedding: closed, manifold, genus zero, but otherwise as bad as possible. */
 #ifndef ADVERSARIAL_H
 #define ADVERSARIAL_H
 
@@ -30,8 +30,8 @@ typedef struct adversarial_mesh {
 
 const char *adversarial_name(adversarial_kind kind);
 
-/* The mesh of a kind and a seed, about `triangles` triangles. The same bytes for the same arguments. Memory by malloc;
- * ends the program when there is none. */
+/* Generates a mesh of a kind with about `triangles` triangles. Equal arguments give equal bytes. Allocates with
+ * malloc() and exits the program when out of memory. */
 adversarial_mesh adversarial_make(adversarial_kind kind, uint64_t seed, int32_t triangles);
 void adversarial_free(adversarial_mesh *mesh);
 

@@ -1,6 +1,6 @@
-/* embed-adversarial [COUNT [FIRST-SEED [MOST-TRIANGLES]]]: embeds seeded adversarial meshes with `newton`, all kinds in
- * turn. Each must come out certified; the last words are how extreme the worst ones are. One line for each mesh that
- * failed, on standard output; exit status 0 only if there is none. */
+/* embed-adversarial [COUNT [FIRST-SEED [MOST-TRIANGLES]]]: embeds seeded adversarial meshes with `newton`, cycling
+ * through all kinds. Each must be certified. Prints one line for each mesh that failed, then how extreme the worst ones
+ * are; exit status 0 only if none failed. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

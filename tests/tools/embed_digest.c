@@ -1,5 +1,6 @@
-/* embed-digest: embeds a mesh made of additions, multiplications and square roots only, with the vector loops that any
- * machine has, and prints a digest of the points of each method: to compare processors that both follow IEEE 754. */
+/* embed-digest: embeds a mesh and prints a digest of the points for each method, to compare processors that follow IEEE
+ * 754. The mesh needs only additions, multiplications and square roots; the embedding uses the vector loops that every
+ * machine has. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -9,7 +10,7 @@
 
 enum { SIDE = 40, VERTICES = 6 * SIDE * SIDE + 2, TRIANGLES = 12 * SIDE * SIDE };
 
-/* The vertices of a cube's surface grid get numbers as they are first met. */
+/* Numbers the vertices of a cube's surface grid in the order in which they first occur. */
 static int32_t number[SIDE + 1][SIDE + 1][SIDE + 1];
 static double positions[3 * VERTICES];
 static int32_t triangles[3 * TRIANGLES], vertex_count, triangle_count;

@@ -5,7 +5,7 @@ import { tmpdir } from 'node:os';
 import path from 'node:path';
 import { binaries } from './daemon.mjs';
 
-/** Resolves to {code, bytes, out, err} of a program. */
+/** Runs a program; resolves to {code, bytes, out, err}. */
 export function runProgram(program, args, { env = {}, cwd, input } = {}) {
   return new Promise((resolve, reject) => {
     const child = spawn(program, args, {
@@ -33,10 +33,10 @@ export function runProgram(program, args, { env = {}, cwd, input } = {}) {
 export const run = (args, { env = {}, ...rest } = {}) =>
   runProgram(binaries.client, args, { env: { ORBMORPH_SERVER: '', ...env }, ...rest });
 
-/** A word as shells read it back. */
+/** Quotes a word for a shell. */
 export const quoted = (word) => `'${word.replaceAll("'", "'\\''")}'`;
 
-/** A folder that goes when the test does. */
+/** A folder that is deleted when the test ends. */
 export async function folder(t) {
   const made = await mkdtemp(path.join(tmpdir(), 'orbmorph-cli-'));
   t.after(() => rm(made, { recursive: true, force: true }));

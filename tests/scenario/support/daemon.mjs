@@ -14,7 +14,7 @@ export const binaries = {
   daemon: process.env.ORBMORPHD ?? path.join(root, 'build/bin/orbmorphd'),
   client: process.env.ORBMORPH ?? path.join(root, 'build/bin/orbmorph'),
 };
-// A build with sanitizers is several times slower; tests that do much take less of it there.
+// A build with sanitizers is several times slower; there long tests do less.
 export const slow = process.env.ORB_SLOW === '1';
 // Factor by which tests wait longer than usual: under memcheck, or on a busy machine.
 export const patience = Number(process.env.ORB_TEST_PATIENCE ?? 1);
@@ -41,7 +41,7 @@ export const endless = {
   options: { step: 0.01, growth: 1.01, first_optimization: 1, displacement_threshold: 1e-15, max_iterations: 1000000 },
 };
 
-/** Asks `check` again and again until it gives something true; that. The time is for what never comes. */
+/** Repeats `check` until its result is true, and returns that result. Fails after `seconds`. */
 export async function until(check, what, seconds = 300) {
   for (const end = Date.now() + 1000 * seconds * patience; ; await new Promise((done) => setTimeout(done, 20))) {
     const value = await check();
@@ -105,7 +105,7 @@ export class Daemon {
   async request(method, target, { body, headers, query, signal } = {}) {
     const url = new URL(target, this.url);
     for (const [name, value] of Object.entries(query ?? {})) url.searchParams.set(name, value);
-    // Whoever computed for long before this has not seen yet that the daemon closed an idle connection: it is looked for.
+    // A test that computed for long has not yet seen that the daemon closed an idle connection: let fetch() see it.
     for (let turn = 0; turn < 2; turn++) await new Promise(setImmediate);
     const isJson = body !== undefined && !(body instanceof Uint8Array) && typeof body !== 'string';
     const response = await fetch(url, {
@@ -179,7 +179,7 @@ export class Daemon {
   }
 }
 
-/** A daemon that ends, and loses its data, when the test does. */
+/** Starts a daemon that stops, and whose data is deleted, when the test ends. */
 export async function daemon(t, { args = [], env = {} } = {}) {
   const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
   const made = new Daemon(data, args, env);

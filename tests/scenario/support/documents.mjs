@@ -16,7 +16,7 @@ export const documents = async () => [
 export const blocks = (text, language) =>
   [...text.matchAll(new RegExp(`^\`\`\`${language}\\n([^]*?)^\`\`\`$`, 'gm'))].map((m) => m[1]);
 
-/** The lines of all ```sh blocks of a document as one script in which curl fails when the daemon refuses; "" without. */
+/** The lines of all ```sh blocks of a document as one script in which curl fails if the daemon refuses; "" if there is none. */
 export async function shellLines(file) {
   const text = await readFile(path.join(root, file), 'utf8').catch(() => '');
   return blocks(text, 'sh').join('\n').replaceAll('curl -sS', 'curl -sS --fail-with-body');
@@ -49,7 +49,7 @@ function texturedBox() {
   return writeGlb({ positions, uv, triangles, image });
 }
 
-/** A folder that stands for the root of a checkout, and the environment in which the lines run. */
+/** A folder that acts as the root of a checkout, and the environment in which the lines run. */
 export async function place(t, d) {
   const at = await mkdtemp(path.join(tmpdir(), 'orbmorph-lines-'));
   t.after(() => rm(at, { recursive: true, force: true }));

@@ -7,13 +7,13 @@ import { gzipSync } from 'node:zlib';
 import * as shapes from './shapes.mjs';
 
 export const kinds = ['alloc', 'write', 'fsync', 'rename', 'folder', 'open', 'thread', 'sqlite'];
-/** Called thousands of times: these fail at the first call of each site, the others at each call. */
+/** Kinds with thousands of calls: they fail at the first call of each site, the others at each call. */
 export const by_site = ['alloc', 'folder', 'sqlite'];
 const modes = { once: 1, ever: 2 };
 const at = { mode: 0, kind: 4, wanted: 8, met: 12, passed: 16 };
 const sizes = { board: 20, sites: 8 * 65536 };
 
-/** The list of sites that have failed, shared by daemons that work side by side. */
+/** The list of sites that have failed, shared by daemons that run at the same time. */
 export function makeSites(file) {
   writeFileSync(file, Buffer.alloc(sizes.sites));
   return file;
@@ -36,7 +36,7 @@ export class Board {
     readSync(this.fd, bytes, 0, 4, at[field]);
     return bytes.readUInt32LE();
   }
-  /** From now on call `wanted` fails, 0: the first one at a new site. */
+  /** Makes call number `wanted` fail; 0: the first call at a new site. */
   arm(kind, mode, wanted) {
     this.disarm();
     this.set('kind', kinds.indexOf(kind));
@@ -54,17 +54,17 @@ export class Board {
   }
 }
 
-/** A caller that notes what was promised. In `calm` every answer must be the good one. */
+/** A client that records what the daemon accepted. If `calm`, every request must succeed. */
 export class Caller {
   meshes = [];
   jobs = [];
-  seen = 0; // of the jobs: have ended
+  seen = 0; // the number of jobs that have ended
   made = 0;
   constructor(d, patience) {
     Object.assign(this, { d, patience });
   }
 
-  /** The reply, or null where the connection broke or an error was answered. */
+  /** Returns the reply, or null if the connection broke or the response is an error. */
   async ask(calm, method, target, options = {}) {
     let reply;
     try {
@@ -94,7 +94,7 @@ export class Caller {
     return reply?.json;
   }
 
-  /** Asks for a resource and waits for its job; the resource's URL where all went well. */
+  /** Requests a resource and waits for its job. Returns the URL of the resource on success. */
   async make(calm, target, body) {
     const reply = await this.ask(calm, 'POST', target, { body });
     if (!reply) return null;
@@ -111,7 +111,7 @@ export class Caller {
     return job?.json.result;
   }
 
-  /** Meshes, an embedding, a supermesh, and what there is to read of them. */
+  /** Makes meshes, an embedding and a supermesh, and reads everything about them. */
   async sequence(calm) {
     const a = await this.upload(calm, this.newMesh());
     const b = await this.upload(calm, gzipSync(this.newMesh()), { headers: { 'content-encoding': 'gzip' } });
@@ -137,14 +137,14 @@ export class Caller {
     if (embedding) await this.ask(calm, 'DELETE', embedding);
   }
 
-  /** Well: it takes a mesh, does a job, and lists them. */
+  /** A brief check: uploads a mesh, runs a job, and lists both. */
   async glance() {
     const mesh = await this.upload(true, this.newMesh());
     await this.make(true, '/v1/embeddings', { mesh: mesh.id });
     await this.ask(true, 'GET', '/v1/meshes', { query: { limit: 2 } });
   }
 
-  /** Without faults again: what was promised is there. Of what has ended before, only the meshes where `all` is asked. */
+  /** Without faults: everything that the daemon accepted exists. Checks meshes of earlier phases only if `all`. */
   async audit(all) {
     for (const url of this.jobs.slice(all ? 0 : this.seen)) {
       const reply = await this.d.get(url);

@@ -113,7 +113,7 @@ export function topologyOf({ shapes, deltas, triangles, count }) {
   return { vertices: v, triangles: f, closed: open === 0 && doubled === 0, euler: v - edges.size / 2 + f, weld };
 }
 
-/** The vertex of the asset that is at all these places at once, to float32; −1 if none is. */
+/** The vertex of the asset at these positions on all shapes, to float32; −1 if there is none. */
 export function vertexAt({ shapes, count }, places) {
   let best = -1;
   let least = Infinity;

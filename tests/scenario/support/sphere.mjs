@@ -1,4 +1,4 @@
-// The PLY of a mesh and its sphere: read, and held to what it promises.
+// Reads the PLY of a mesh and its sphere, and checks the sphere.
 import assert from 'node:assert/strict';
 
 export function readSphere(bytes) {
