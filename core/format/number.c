@@ -127,6 +127,28 @@ static const unsigned char *parse_special(const unsigned char *p, const unsigned
   return p;
 }
 
+/* The exponent at p, if there is one: e or d, a sign, digits. Returns its end; NULL if the digits are missing. *given
+ * is limited to about 10^16, so that it cannot overflow. */
+static const unsigned char *parse_exponent(const unsigned char *p, const unsigned char *end, int64_t *given) {
+  int down = 0;
+  *given = 0;
+  if (p == end || ((*p | 32) != 'e' && (*p | 32) != 'd')) {
+    return p;
+  }
+  p++;
+  if (p < end && (*p == '-' || *p == '+')) {
+    down = *p++ == '-';
+  }
+  if (p == end || (unsigned)(*p - '0') >= 10) {
+    return NULL;
+  }
+  for (; p < end && (unsigned)(*p - '0') < 10; p++) {
+    *given = *given < (int64_t)1 << 50 ? *given * 10 + (*p - '0') : *given;
+  }
+  *given = down ? -*given : *given;
+  return p;
+}
+
 const unsigned char *orb_number_parse(const unsigned char *p, const unsigned char *end, double *out) {
   int negative = 0;
   if (p < end && (*p == '-' || *p == '+')) {
@@ -166,21 +188,9 @@ const unsigned char *orb_number_parse(const unsigned char *p, const unsigned cha
     return parse_special(first, end, negative, out);
   }
   const unsigned char *last = p;
-  if (p < end && ((*p | 32) == 'e' || (*p | 32) == 'd')) {
-    const unsigned char *q = p + 1;
-    int down = 0;
-    if (q < end && (*q == '-' || *q == '+')) {
-      down = *q++ == '-';
-    }
-    if (q == end || (unsigned)(*q - '0') >= 10) {
-      return NULL;
-    }
-    while (q < end && (unsigned)(*q - '0') < 10) {
-      given = given < (int64_t)1 << 50 ? given * 10 + (*q - '0') : given;
-      q++;
-    }
-    given = down ? -given : given;
-    p = q;
+  p = parse_exponent(p, end, &given);
+  if (!p) {
+    return NULL;
   }
   exponent += given;
   double value;
