@@ -13,4 +13,8 @@ typedef struct orb_studio_file {
   size_t size;
 } orb_studio_file;
 
+/* The generated table, sorted by path; only studio.c reads it. */
+extern const orb_studio_file orb_studio_table[];
+extern const size_t orb_studio_count;
+
 #endif

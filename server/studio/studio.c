@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "studio/table.h"
-
 static const char missing_page[] =
     "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>orbmorph</title>"
     "<h1>orbmorph</h1><p>This daemon was built without the studio. To include it, run "
