@@ -5,18 +5,18 @@
 #include "store/database.h"
 #include "store/objects.h"
 
-typedef struct catalogue catalogue;
+struct catalogue;
 
 typedef int (*write_fn)(database *db, void *arg); /* returns an SQLite code; SQLITE_CONSTRAINT: a condition failed */
 
 /* Runs fn in the next transaction and waits for its commit. */
-store_result catalogue_write(catalogue *cat, write_fn fn, void *arg);
+store_result catalogue_write(struct catalogue *cat, write_fn fn, void *arg);
 
 /* The same without waiting; frees arg with free(). */
-void catalogue_write_later(catalogue *cat, write_fn fn, void *arg);
+void catalogue_write_later(struct catalogue *cat, write_fn fn, void *arg);
 
-database *catalogue_reader(catalogue *cat); /* waits until one is free */
+database *catalogue_reader(struct catalogue *cat); /* waits until one is free */
 
-void catalogue_reader_done(catalogue *cat, database *db);
+void catalogue_reader_done(struct catalogue *cat, database *db);
 
 #endif
