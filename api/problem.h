@@ -16,7 +16,7 @@ int api_problem_status(const char *name);
 void api_problem_free(api_problem *problem);
 
 /* Frees *problem, fills it and returns 0, so that a parser can `return api_refuse(…)`. */
-int api_refuse(api_problem *problem, const char *name, const char *format, ...) ORB_PRINTF(3, 4);
+int api_refuse(api_problem *problem, const char *name, const char *format, ...) API_PRINTF(3, 4);
 
 /* Fills *problem from an error of the library, with its facts. */
 void api_problem_of_error(const orb_error *error, api_problem *problem);

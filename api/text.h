@@ -10,7 +10,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "orbmorph/status.h"
+/* Lets the compiler check the arguments of a function that formats like printf(). text, first: the numbers of the
+ * format and of its first argument among the parameters, from 1. */
+#if defined(__GNUC__)
+#define API_PRINTF(text, first) __attribute__((format(printf, text, first)))
+#else
+#define API_PRINTF(text, first)
+#endif
 
 typedef struct api_text {
   char *data; /* ends in a NUL that `size` does not count; NULL until something is appended */
@@ -21,7 +27,7 @@ typedef struct api_text {
 void api_text_free(api_text *text);
 void api_text_append(api_text *text, const char *bytes, size_t size);
 void api_text_add(api_text *text, const char *string);
-void api_text_printf(api_text *text, const char *format, ...) ORB_PRINTF(2, 3);
+void api_text_printf(api_text *text, const char *format, ...) API_PRINTF(2, 3);
 
 /* JSON values. `open` is '{' or '[', `close` is '}' or ']'. */
 void api_json_open(api_text *text, char open);

@@ -76,7 +76,7 @@ enum { ENTRIES = sizeof table / sizeof table[0] };
 /* The daemon is running: complain() writes to the log. */
 static int runs;
 
-static void complain(const char *format, ...) ORB_PRINTF(1, 2);
+static void complain(const char *format, ...) API_PRINTF(1, 2);
 static void complain(const char *format, ...) {
   char text[1024];
   va_list args;

@@ -2,6 +2,7 @@
 #ifndef ORB_BASE_ERROR_H
 #define ORB_BASE_ERROR_H
 
+#include "base/printf.h"
 #include "orbmorph/context.h"
 
 /* Sets a new error record (without facts) and returns status. Any thread: in a parallel loop the first failure wins,

@@ -6,6 +6,7 @@
 #ifndef ORB_FORMAT_BUILD_H
 #define ORB_FORMAT_BUILD_H
 
+#include "base/printf.h"
 #include "orbmorph/format.h"
 
 enum {

@@ -148,7 +148,7 @@ int access_has_room(const request *r, int64_t bytes, api_problem *problem);
 /* reply.c: each leaves a response. */
 void reply_json(request *r, unsigned status, api_text *json); /* frees json */
 void reply_problem(request *r, api_problem *problem);         /* frees problem */
-void reply_refuse(request *r, const char *name, const char *format, ...) ORB_PRINTF(3, 4);
+void reply_refuse(request *r, const char *name, const char *format, ...) API_PRINTF(3, 4);
 void reply_store(request *r, store_result result);
 void reply_empty(request *r, unsigned status);
 void reply_bytes(request *r, unsigned status, const char *mime, const void *bytes, size_t size); /* static bytes */

@@ -91,6 +91,7 @@ ORB_API const orb_error *orb_context_error(const orb_context *ctx);
 ORB_API void *orb_alloc(orb_context *ctx, size_t count, size_t size);
 ORB_API void orb_free(orb_context *ctx, void *block); /* NULL is fine */
 ORB_API size_t orb_memory_used(const orb_context *ctx);
+/* The largest use so far, in bytes: a budget for the same work must allow it. */
 ORB_API size_t orb_memory_peak(const orb_context *ctx);
 
 /* The number of threads that loops run on, including the caller's. */

@@ -17,11 +17,13 @@ typedef enum orb_remesh_method { ORB_REMESH_METHODS(ORB_REMESH_ENUMERATOR) ORB_R
 
 /* The method's name, such as "convex-hull"; NULL if the number is not a method. */
 ORB_API const char *orb_remesh_method_name(orb_remesh_method method);
-/* Finds the method of a name. Returns 0, and leaves *out unchanged, if there is none. */
+/* Finds the method of a name, for programs that read it from a command line or a file. Returns 0, and leaves *out
+ * unchanged, if there is none. */
 ORB_API int orb_remesh_method_of_name(const char *name, orb_remesh_method *out);
 /* Whether this build has the method; if not, orb_remesh() returns ORB_E_UNSUPPORTED. */
 ORB_API int orb_remesh_available(orb_remesh_method method);
-/* The options that the method uses, as a sum of these bits; it ignores the others. */
+/* The options that the method uses, as a sum of these bits; it ignores the others, so a user interface can hide them.
+ */
 enum { ORB_REMESH_HEEDS_TOLERANCE = 1, ORB_REMESH_HEEDS_MAX_TRIANGLES = 2 };
 ORB_API unsigned orb_remesh_heeds(orb_remesh_method method);
 

@@ -28,10 +28,8 @@ extern "C" {
 
 #if defined(__GNUC__)
 #define ORB_MUST_CHECK __attribute__((warn_unused_result))
-#define ORB_PRINTF(fmt, args) __attribute__((format(printf, fmt, args)))
 #else
 #define ORB_MUST_CHECK
-#define ORB_PRINTF(fmt, args)
 #endif
 
 /* The version of the algorithms; part of the key of each derived object. */

@@ -1,4 +1,7 @@
-/* UTF-8 as RFC 3629 defines it: no overlong forms, no surrogates, nothing above U+10FFFF. */
+/* UTF-8 as RFC 3629 defines it: no overlong forms, no surrogates, nothing above U+10FFFF.
+ *
+ * Names of shapes and landmarks are UTF-8. An asset gets U+FFFD for each byte that is not; a program that would rather
+ * refuse such a name checks it with this function. */
 #ifndef ORBMORPH_UTF8_H
 #define ORBMORPH_UTF8_H
 
