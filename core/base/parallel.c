@@ -1,11 +1,17 @@
 /* Parallel loops on the context's own threads.
  *
- * One loop runs at a time; the caller takes part as thread 0. It publishes the loop under the lock: it sets `open` and
- * raises `round`. A worker that sees a new round enters under the lock, if the loop is still open, and counts itself in
- * `inside`; it takes chunks from the atomic counter until none is left, and leaves under the lock. When the counter is
- * spent, the caller closes the loop and waits only for workers that are inside: a worker that is too late to enter (the
- * machine is busy) delays nobody. Workers spin for a short while between loops, then sleep on a condition variable. If
- * some threads cannot be started, the loop runs on the others: results do not depend on how many there are.
+ * One loop runs at a time; the caller takes part as thread 0. One atomic word, the ticket, holds the number of the loop
+ * and its next chunk. A thread claims a chunk by raising the ticket, so it cannot take part in a loop that has no chunk
+ * left, and the caller waits for claimed chunks only: a thread that has not begun one delays nobody, however late a
+ * busy machine runs it. No lock is taken on the way, except to sleep and to wake a sleeper.
+ *
+ * A loop is handed out only where that is likely to pay. The pool keeps what an iteration of each body took; a loop
+ * that should end sooner than it takes to wake a thread runs in the caller, which looks at the clock as it goes along
+ * and hands out the rest of a loop that turns out to be long.
+ *
+ * Threads spin for a short while before they sleep. Spinning that was in vain halves the next, so that on a busy
+ * machine, where it would only use up the job's share, there is soon none. If some threads cannot be started, the loop
+ * runs on the others: results do not depend on how many there are.
  */
 #include "base/parallel.h"
 
@@ -19,20 +25,46 @@
 
 enum {
   MAX_WORKERS = 63, /* and the caller: the 64 threads that context.c allows */
-  SPINS = 1000      /* pauses before a thread sleeps: waking it costs more than a short wait for the next loop */
+  SPINS_LEAST = 8,  /* pauses before a thread sleeps */
+  SPINS_MOST = 1024,
+  COSTS = 128,     /* bodies whose cost is kept; a power of two */
+  CACHE_LINE = 64, /* bytes; keeps words apart that different threads write */
+  CLOSED = -1      /* as a chunk: no chunk can be claimed */
 };
+
+/* Seconds that a loop must take to be handed out to threads that spin, and to threads that have to be woken. */
+static const double WORTH_SHARING = 20e-6, WORTH_WAKING = 50e-6;
+
+/* What an iteration of a body took, in seconds; 0: not known. */
+typedef struct loop_cost {
+  orb_loop_fn body;
+  double seconds;
+} loop_cost;
+
+typedef struct parallel_loop {
+  orb_loop_fn body;
+  void *arg;
+  int64_t start, count, grain;
+  uint32_t chunks;
+} parallel_loop;
 
 struct orb_pool {
   pthread_mutex_t lock;
   pthread_cond_t wake, done;
   int workers, stopping;
-  int open;          /* the loop may be entered; guarded by the lock */
-  atomic_int inside; /* workers in the present loop */
-  atomic_uint round;
-  orb_loop_fn body;
-  void *arg;
-  int64_t count, grain;
-  atomic_llong next;
+  int spins;           /* of the caller, before it sleeps */
+  atomic_int sleepers; /* workers that wait to be woken; written under the lock */
+  loop_cost cost[COSTS];
+  char apart_from_ticket[CACHE_LINE];
+  atomic_ullong ticket; /* number of the loop << 32 | next chunk, or CLOSED */
+  /* The loop. Written while the ticket is closed; what is read before a ticket is raised belongs to that ticket. */
+  _Atomic(orb_loop_fn) body;
+  _Atomic(void *) arg;
+  atomic_llong start, count, grain;
+  atomic_uint chunks;
+  char apart_from_finished[CACHE_LINE];
+  atomic_uint finished; /* chunks of this loop that workers have run */
+  atomic_uint wanted;   /* the caller sleeps until so many are finished; UINT32_MAX: it does not sleep */
   struct worker {
     orb_context *ctx;
     pthread_t thread;
@@ -40,11 +72,37 @@ struct orb_pool {
   } worker[MAX_WORKERS];
 };
 
-static void take_chunks(struct orb_pool *pool, int thread) {
-  int64_t begin;
-  while ((begin = atomic_fetch_add_explicit(&pool->next, pool->grain, memory_order_relaxed)) < pool->count) {
-    int64_t end = begin + pool->grain < pool->count ? begin + pool->grain : pool->count;
-    pool->body(pool->arg, begin, end, thread);
+static uint32_t chunk_of(unsigned long long ticket) {
+  return (uint32_t)ticket;
+}
+static uint32_t loop_of(unsigned long long ticket) {
+  return (uint32_t)(ticket >> 32);
+}
+
+static void run_chunk(const parallel_loop *loop, uint32_t chunk, int thread) {
+  int64_t begin = chunk * loop->grain, end = begin + loop->grain < loop->count ? begin + loop->grain : loop->count;
+  loop->body(loop->arg, loop->start + begin, loop->start + end, thread);
+}
+
+/* Claims chunk *chunk of *loop; 0 where none is left. *number: of the loop that was looked at. */
+static int claim(struct orb_pool *pool, parallel_loop *loop, uint32_t *chunk, uint32_t *number) {
+  unsigned long long ticket = atomic_load_explicit(&pool->ticket, memory_order_acquire);
+  for (;;) {
+    *number = loop_of(ticket);
+    *chunk = chunk_of(ticket);
+    loop->chunks = atomic_load_explicit(&pool->chunks, memory_order_acquire);
+    if (*chunk >= loop->chunks) {
+      return 0;
+    }
+    loop->body = atomic_load_explicit(&pool->body, memory_order_acquire);
+    loop->arg = atomic_load_explicit(&pool->arg, memory_order_acquire);
+    loop->start = atomic_load_explicit(&pool->start, memory_order_acquire);
+    loop->count = atomic_load_explicit(&pool->count, memory_order_acquire);
+    loop->grain = atomic_load_explicit(&pool->grain, memory_order_acquire);
+    if (atomic_compare_exchange_weak_explicit(&pool->ticket, &ticket, ticket + 1, memory_order_acq_rel,
+                                              memory_order_acquire)) {
+      return 1;
+    }
   }
 }
 
@@ -56,36 +114,54 @@ static void pause_cpu(void) {
 #endif
 }
 
+/* The spins of the next wait, after one that ended in time or did not. */
+static int adapted(int spins, int in_time) {
+  spins = in_time ? 2 * spins : spins / 2;
+  return spins < SPINS_LEAST ? SPINS_LEAST : spins > SPINS_MOST ? SPINS_MOST : spins;
+}
+
+static void finish_chunk(struct orb_pool *pool) {
+  if (atomic_fetch_add(&pool->finished, 1) + 1 == atomic_load(&pool->wanted)) {
+    pthread_mutex_lock(&pool->lock);
+    pthread_cond_signal(&pool->done);
+    pthread_mutex_unlock(&pool->lock);
+  }
+}
+
+/* Waits for a loop of another number; 0 where the pool stops instead. */
+static int next_loop(struct orb_pool *pool, uint32_t number, int *spins) {
+  for (int i = 0; i < *spins; i++) {
+    if (loop_of(atomic_load_explicit(&pool->ticket, memory_order_acquire)) != number) {
+      *spins = adapted(*spins, 1);
+      return 1;
+    }
+    pause_cpu();
+  }
+  *spins = adapted(*spins, 0);
+  pthread_mutex_lock(&pool->lock);
+  atomic_fetch_add(&pool->sleepers, 1);
+  while (!pool->stopping && loop_of(atomic_load(&pool->ticket)) == number) {
+    pthread_cond_wait(&pool->wake, &pool->lock);
+  }
+  atomic_fetch_sub(&pool->sleepers, 1);
+  int stop = pool->stopping;
+  pthread_mutex_unlock(&pool->lock);
+  return !stop;
+}
+
 static void *worker_main(void *argument) {
   struct worker *self = argument;
   struct orb_pool *pool = self->ctx->pool;
-  unsigned seen = 0;
-  for (;;) {
-    for (int spin = 0; spin < SPINS && atomic_load_explicit(&pool->round, memory_order_acquire) == seen; spin++) {
-      pause_cpu();
+  int spins = SPINS_MOST;
+  uint32_t chunk, number;
+  do {
+    parallel_loop loop;
+    while (claim(pool, &loop, &chunk, &number)) {
+      run_chunk(&loop, chunk, self->index);
+      finish_chunk(pool);
     }
-    pthread_mutex_lock(&pool->lock);
-    while (atomic_load_explicit(&pool->round, memory_order_acquire) == seen && !pool->stopping) {
-      pthread_cond_wait(&pool->wake, &pool->lock);
-    }
-    int stop = pool->stopping, enter = pool->open;
-    seen = atomic_load(&pool->round);
-    if (enter) {
-      atomic_fetch_add(&pool->inside, 1);
-    }
-    pthread_mutex_unlock(&pool->lock);
-    if (stop) {
-      return NULL;
-    }
-    if (enter) {
-      take_chunks(pool, self->index);
-      pthread_mutex_lock(&pool->lock);
-      if (atomic_fetch_sub_explicit(&pool->inside, 1, memory_order_acq_rel) == 1) {
-        pthread_cond_signal(&pool->done);
-      }
-      pthread_mutex_unlock(&pool->lock);
-    }
-  }
+  } while (next_loop(pool, number, &spins));
+  return NULL;
 }
 
 static struct orb_pool *pool_start(orb_context *ctx) {
@@ -97,6 +173,9 @@ static struct orb_pool *pool_start(orb_context *ctx) {
   pthread_mutex_init(&pool->lock, NULL);
   pthread_cond_init(&pool->wake, NULL);
   pthread_cond_init(&pool->done, NULL);
+  pool->spins = SPINS_MOST;
+  atomic_store(&pool->ticket, (uint32_t)CLOSED);
+  atomic_store(&pool->wanted, UINT32_MAX);
   ctx->pool = pool;
   for (int i = 0; i < ctx->options.threads - 1 && i < MAX_WORKERS; i++) {
     pool->worker[i].ctx = ctx;
@@ -128,42 +207,132 @@ void orb_pool_stop(orb_context *ctx) {
   orb_free(ctx, pool);
 }
 
-static void run_alone(int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
-  for (int64_t begin = 0; begin < count; begin += grain) {
-    body(arg, begin, begin + grain < count ? begin + grain : count, 0);
+/* The entry of this body. Another's is taken over where all are in use. */
+static loop_cost *cost_of(struct orb_pool *pool, orb_loop_fn body) {
+  size_t at = ((uintptr_t)body >> 4) * 0x9e3779b1U;
+  loop_cost *cost = NULL;
+  for (int i = 0; i < 8; i++) {
+    cost = &pool->cost[(at + (size_t)i) & (COSTS - 1)];
+    if (cost->body == body || !cost->body) {
+      break;
+    }
+  }
+  if (cost->body != body) {
+    *cost = (loop_cost){.body = body};
+  }
+  return cost;
+}
+
+/* A measurement during which the thread was preempted is far too long: it counts no more than twice the last. */
+static void learn(loop_cost *cost, double seconds) {
+  cost->seconds = cost->seconds > 0 && seconds > 2 * cost->seconds ? 2 * cost->seconds : seconds;
+}
+
+static int is_worth_sharing(struct orb_pool *pool, double seconds) {
+  int awake = atomic_load_explicit(&pool->sleepers, memory_order_relaxed) < pool->workers;
+  return seconds > (awake ? WORTH_SHARING : WORTH_WAKING);
+}
+
+/* Runs chunks in the caller as long as what is left is not worth sharing. Returns how many. The clock is read after 1,
+ * 2, 4, 8 ... chunks. */
+static uint32_t begin_alone(struct orb_pool *pool, const parallel_loop *loop, loop_cost *cost) {
+  double start = orb_clock();
+  for (uint32_t i = 0; i < loop->chunks; i++) {
+    run_chunk(loop, i, 0);
+    uint32_t done = i + 1;
+    if ((done & i) == 0 && done < loop->chunks) {
+      double elapsed = orb_clock() - start;
+      if (elapsed > WORTH_SHARING && is_worth_sharing(pool, elapsed / done * (loop->chunks - done))) {
+        learn(cost, elapsed / (double)(done * loop->grain));
+        return done;
+      }
+    }
+  }
+  learn(cost, (orb_clock() - start) / (double)loop->count);
+  return loop->chunks;
+}
+
+/* Publishes chunk `first` and those after it, and wakes as many threads as can have one. */
+static void hand_out(struct orb_pool *pool, const parallel_loop *loop, uint32_t first) {
+  atomic_store_explicit(&pool->body, loop->body, memory_order_release);
+  atomic_store_explicit(&pool->arg, loop->arg, memory_order_release);
+  atomic_store_explicit(&pool->start, loop->start, memory_order_release);
+  atomic_store_explicit(&pool->count, loop->count, memory_order_release);
+  atomic_store_explicit(&pool->grain, loop->grain, memory_order_release);
+  atomic_store_explicit(&pool->chunks, loop->chunks, memory_order_release);
+  atomic_store_explicit(&pool->finished, 0, memory_order_release);
+  unsigned long long number = loop_of(atomic_load_explicit(&pool->ticket, memory_order_relaxed)) + 1ULL;
+  atomic_store(&pool->ticket, number << 32 | first);
+  if (atomic_load(&pool->sleepers) > 0) {
+    pthread_mutex_lock(&pool->lock); /* until a thread that has looked at the old ticket sleeps */
+    uint32_t sleepers = (uint32_t)atomic_load(&pool->sleepers), useful = loop->chunks - first - 1;
+    pthread_mutex_unlock(&pool->lock);
+    for (uint32_t i = 0; i < sleepers && i < useful; i++) {
+      pthread_cond_signal(&pool->wake);
+    }
   }
 }
 
-void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
-  ORB_ASSERT(grain >= 1);
+/* Waits until workers have finished so many chunks of the loop. */
+static void await(struct orb_pool *pool, uint32_t finished) {
+  int spin = 0;
+  while (spin < pool->spins && atomic_load_explicit(&pool->finished, memory_order_acquire) != finished) {
+    pause_cpu();
+    spin++;
+  }
+  if (spin) {
+    pool->spins = adapted(pool->spins, spin < pool->spins);
+  }
+  if (atomic_load_explicit(&pool->finished, memory_order_acquire) != finished) {
+    atomic_store(&pool->wanted, finished);
+    pthread_mutex_lock(&pool->lock);
+    while (atomic_load(&pool->finished) != finished) {
+      pthread_cond_wait(&pool->done, &pool->lock);
+    }
+    pthread_mutex_unlock(&pool->lock);
+    atomic_store(&pool->wanted, UINT32_MAX);
+  }
+}
+
+/* Shares the loop from chunk `first` on, and returns when all are done. */
+static void run_shared(struct orb_pool *pool, const parallel_loop *loop, uint32_t first, loop_cost *cost) {
+  double start = orb_clock();
+  uint32_t own = 0, chunk, number;
+  hand_out(pool, loop, first);
+  for (parallel_loop claimed; claim(pool, &claimed, &chunk, &number); own++) {
+    run_chunk(&claimed, chunk, 0);
+  }
+  if (own > 0) {
+    learn(cost, (orb_clock() - start) / (double)(own * loop->grain));
+  }
+  await(pool, loop->chunks - first - own);
+  atomic_store(&pool->ticket, (unsigned long long)number << 32 | (uint32_t)CLOSED);
+}
+
+void orb_parallel_slice(orb_context *ctx, int64_t start, int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
+  ORB_ASSERT(grain >= 1 && count / grain < UINT32_MAX - 1);
   struct orb_pool *pool = ctx->pool;
-  if (count <= grain || ctx->options.threads == 1 || (!pool && !(pool = pool_start(ctx))) || pool->workers == 0) {
-    run_alone(count, grain, body, arg);
+  parallel_loop loop = {.body = body, .arg = arg, .start = start, .count = count, .grain = grain};
+  loop.chunks = (uint32_t)((count + grain - 1) / grain);
+  if (loop.chunks < 2 || ctx->options.threads == 1 || (!pool && !(pool = pool_start(ctx))) || pool->workers == 0) {
+    for (uint32_t i = 0; i < loop.chunks; i++) {
+      run_chunk(&loop, i, 0);
+    }
     return;
   }
   ORB_ASSERT(!ctx->in_loop);
   ctx->in_loop = 1;
-  pthread_mutex_lock(&pool->lock);
-  pool->body = body;
-  pool->arg = arg;
-  pool->count = count;
-  pool->grain = grain;
-  atomic_store(&pool->next, 0);
-  pool->open = 1;
-  atomic_fetch_add_explicit(&pool->round, 1, memory_order_release);
-  pthread_cond_broadcast(&pool->wake);
-  pthread_mutex_unlock(&pool->lock);
-  take_chunks(pool, 0);
-  pthread_mutex_lock(&pool->lock);
-  pool->open = 0;
-  pthread_mutex_unlock(&pool->lock);
-  for (int spin = 0; spin < SPINS && atomic_load_explicit(&pool->inside, memory_order_acquire); spin++) {
-    pause_cpu();
+  loop_cost *cost = cost_of(pool, body);
+  uint32_t done = 0;
+  if (cost->seconds > 0 && !is_worth_sharing(pool, cost->seconds * (double)count)) {
+    done = begin_alone(pool, &loop, cost);
   }
-  pthread_mutex_lock(&pool->lock);
-  while (atomic_load_explicit(&pool->inside, memory_order_acquire)) {
-    pthread_cond_wait(&pool->done, &pool->lock);
+  if (done < loop.chunks) {
+    run_shared(pool, &loop, done, cost);
   }
-  pthread_mutex_unlock(&pool->lock);
   ctx->in_loop = 0;
+}
+
+void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg) {
+  orb_parallel_slice(ctx, 0, count, grain, body, arg);
 }

@@ -9,8 +9,11 @@ typedef void (*orb_loop_fn)(void *arg, int64_t begin, int64_t end, int thread);
 
 /* Runs body over [0, count) in chunks of `grain` (≥ 1), in parallel; returns when all are done. Chunks begin at
  * multiples of grain for any number of threads, so a sum of per-chunk sums taken in order does not depend on it. Which
- * thread takes which chunk is not fixed. Loops do not nest. One chunk, or one thread, runs in the caller. */
+ * thread takes which chunk is not fixed. Loops do not nest. A loop that is too short to share runs in the caller. */
 void orb_parallel_for(orb_context *ctx, int64_t count, int64_t grain, orb_loop_fn body, void *arg);
+
+/* The same over [start, start + count): chunks begin at start and at multiples of grain from there. */
+void orb_parallel_slice(orb_context *ctx, int64_t start, int64_t count, int64_t grain, orb_loop_fn body, void *arg);
 
 /* Joins the threads and frees the pool. Does nothing where no parallel loop has run. */
 void orb_pool_stop(orb_context *ctx);
