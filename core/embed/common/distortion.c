@@ -43,7 +43,7 @@ typedef struct measure_job {
   const double *positions, *images;
   const int32_t *triangles;
   int32_t count;
-  double unit;  /* source lengths are divided by it */
+  double unit;  /* source lengths are multiplied by it */
   double ratio; /* image area over source area */
   double *weight, *value[MEASURES];
   measure_chunk *chunk;
@@ -60,8 +60,8 @@ static pair edges_of(const double *points, const int32_t *v, double unit, double
   const double *a = points + 3 * (int64_t)v[0], *b = points + 3 * (int64_t)v[1], *c = points + 3 * (int64_t)v[2];
   double u[3], w[3], n[3];
   for (int k = 0; k < 3; k++) {
-    u[k] = (b[k] - a[k]) / unit;
-    w[k] = (c[k] - a[k]) / unit;
+    u[k] = (b[k] - a[k]) * unit;
+    w[k] = (c[k] - a[k]) * unit;
   }
   orb_cross(u, w, n);
   if (third2) {
@@ -181,14 +181,20 @@ static double fine_edge(int measure, int32_t bin) {
   return x;
 }
 
-static void publish_histogram(orb_measure *out, int measure, const moments *total, const double *counts) {
-  int32_t low = fine_bin(measure, total->least), high = fine_bin(measure, total->most);
+/* The fine bins from `low` to `high`: every value lies in one of them. */
+typedef struct fine_bins {
+  int32_t low, high;
+  double *weight, *count;
+} fine_bins;
+
+static void publish_histogram(orb_measure *out, int measure, const moments *total, const fine_bins *fine) {
+  int32_t low = fine->low, high = fine->high;
   int32_t step = (high - low) / ORB_HISTOGRAM_BINS + 1;
   out->bins = (high - low) / step + 1;
   for (int32_t b = 0; b < out->bins; b++) {
     out->edges[b] = fine_edge(measure, low + b * step);
-    for (int32_t i = 0; i < step && low + b * step + i < FINE; i++) {
-      out->counts[b] += counts[low + b * step + i];
+    for (int32_t i = b * step; i < (b + 1) * step && i <= high - low; i++) {
+      out->counts[b] += fine->count[i];
     }
   }
   out->edges[0] = fmin(out->edges[0], total->least);
@@ -205,17 +211,17 @@ static int compare_weighted(const void *a, const void *b) {
 }
 
 /* The least value whose weight, with that of all smaller ones, reaches `share` of the whole. */
-static orb_status percentile(measure_job *job, int measure, const double *fine, const double *counts, double share,
-                             double *out) {
+static orb_status percentile(measure_job *job, int measure, const fine_bins *fine, double share, double *out) {
   double want = share * job->total[measure].weight, below = 0;
   int32_t bin = 0;
-  while (bin < FINE - 1 && below + fine[bin] < want) {
-    below += fine[bin++];
+  while (bin < fine->high - fine->low && below + fine->weight[bin] < want) {
+    below += fine->weight[bin++];
   }
-  while (counts[bin] == 0 && bin > 0) { /* the sum fell short by rounding */
+  while (fine->count[bin] == 0 && bin > 0) { /* the sum fell short by rounding */
     bin--;
   }
-  int64_t room = (int64_t)counts[bin], found = 0;
+  int64_t room = (int64_t)fine->count[bin], found = 0;
+  bin += fine->low;
   weighted *list = ORB_NEW(job->ctx, weighted, room);
   if (!list) {
     return ORB_E_NO_MEMORY;
@@ -239,26 +245,29 @@ static orb_status percentile(measure_job *job, int measure, const double *fine, 
 static orb_status summarise(measure_job *job, int measure) {
   const moments *total = &job->total[measure];
   orb_measure *out = job->out[measure];
-  double *fine = ORB_NEW0(job->ctx, double, 2 * FINE), *counts = fine + FINE;
-  if (!fine) {
+  fine_bins fine = {.low = fine_bin(measure, total->least), .high = fine_bin(measure, total->most)};
+  int64_t bins = fine.high - fine.low + 1;
+  fine.weight = ORB_NEW0(job->ctx, double, 2 * bins);
+  if (!fine.weight) {
     return ORB_E_NO_MEMORY;
   }
+  fine.count = fine.weight + bins;
   for (int64_t t = 0; t < job->count; t++) {
     if (job->weight[t] > 0) {
-      int32_t bin = fine_bin(measure, job->value[measure][t]);
-      fine[bin] += job->weight[t];
-      counts[bin] += 1;
+      int32_t bin = fine_bin(measure, job->value[measure][t]) - fine.low;
+      fine.weight[bin] += job->weight[t];
+      fine.count[bin] += 1;
     }
   }
   out->mean = total->mean;
   out->std = sqrt(total->square / total->weight);
   out->max = total->most;
-  publish_histogram(out, measure, total, counts);
-  orb_status status = percentile(job, measure, fine, counts, 0.5, &out->median);
+  publish_histogram(out, measure, total, &fine);
+  orb_status status = percentile(job, measure, &fine, 0.5, &out->median);
   if (status == ORB_OK) {
-    status = percentile(job, measure, fine, counts, 0.99, &out->p99);
+    status = percentile(job, measure, &fine, 0.99, &out->p99);
   }
-  orb_free(job->ctx, fine);
+  orb_free(job->ctx, fine.weight);
   return status;
 }
 
@@ -273,8 +282,9 @@ static void summarise_range(void *arg, int64_t begin, int64_t end, int thread) {
   }
 }
 
-/* The longest side of the source's bounding box: a unit in which neither tiny nor huge meshes under- or overflow. */
-static double extent_of(const measure_job *job) {
+/* The reciprocal of the longest side of the source's bounding box, down to a power of two: in this unit neither tiny
+ * nor huge meshes under- or overflow, and scaling rounds nothing. */
+static double unit_of(const measure_job *job) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, extent = 0;
   for (int64_t i = 0; i < 3 * (int64_t)job->count; i++) {
     const double *p = job->positions + 3 * (int64_t)job->triangles[i];
@@ -286,13 +296,17 @@ static double extent_of(const measure_job *job) {
   for (int k = 0; k < 3; k++) {
     extent = fmax(extent, high[k] - low[k]);
   }
-  return extent > 0 && isfinite(extent) ? extent : 1;
+  if (!(extent > 0) || !isfinite(extent)) {
+    return 1;
+  }
+  int exponent = ilogb(extent);
+  return ldexp(1, exponent < -1000 ? 1000 : -exponent);
 }
 
 static orb_status measure_all(measure_job *job, orb_distortion *out) {
   orb_context *ctx = job->ctx;
   int64_t chunks = ((int64_t)job->count + GRAIN - 1) / GRAIN;
-  job->unit = extent_of(job);
+  job->unit = unit_of(job);
   ORB_TRY(orb_sliced_for(ctx, job->count, GRAIN, sum_areas, job));
   double source = 0, image = 0, stretch = 0;
   for (int64_t i = 0; i < chunks; i++) {
