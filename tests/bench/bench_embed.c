@@ -81,7 +81,8 @@ static int run_once(const bench_options *options, const char *path, int repeat) 
     fine = orb_embed(ctx, &m.mesh, &options->embed, &e) == ORB_OK;
     double embed_cpu = bench_cpu() - before;
     if (fine) {
-      embed_times t = {.total = orb_clock() - start, .cpu = bench_cpu() - cpu, .embed_cpu = embed_cpu, .peak = bench_peak()};
+      embed_times t = {
+          .total = orb_clock() - start, .cpu = bench_cpu() - cpu, .embed_cpu = embed_cpu, .peak = bench_peak()};
       fine = print_line(options, &m, &e, &t, repeat, ctx);
       fine = fine && (!options->out || write_sphere(ctx, options->out, &m, &e));
       orb_embedding_free(ctx, &e);

@@ -15,6 +15,7 @@ import os
 import pathlib
 import platform
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -300,8 +301,8 @@ def scaling(bench, report, repeat, folder, quick):
                   for m in (measured[0], *narrow.values())])
     for n, wanted in ((1, 12e6), (2, 20e6)):
         threads = f"{n} thread{'s' * (n > 1)}"
-        got = max(m[n - 1]["triangles_per_minute"] for m in measured)
-        report.goal(f"newton above 100,000 triangles, {threads}", rate(wanted) + "/min", rate(got), got >= wanted)
+        got = statistics.median(m[n - 1]["triangles_per_minute"] for m in measured)
+        report.goal(f"newton above 100,000 triangles, median of the sizes, {threads}", rate(wanted) + "/min", rate(got), got >= wanted)
         got = narrow["avx2"][n - 1]
         report.goal(f"the same with AVX2 only, {threads}", rate(wanted / 2) + "/min", rate(got["triangles_per_minute"]),
                     got["triangles_per_minute"] >= wanted / 2 and got["cpu"] == "avx2")

@@ -1,5 +1,7 @@
 #include "embed/newton/advance.h"
 
+#include <math.h>
+
 #include "base/check.h"
 #include "base/context.h"
 #include "base/loops.h"
@@ -45,6 +47,11 @@ static orb_status relax_left_over(orb_context *ctx, orb_refiner *r, int32_t begi
   return ORB_OK;
 }
 
+/* About the reciprocal of a mean edge on the sphere: a power of two, so that scaling rounds nothing. */
+static double scale_of(const orb_refiner *r) {
+  return exp2(round(0.5 * log2(r->live / 14.5)));
+}
+
 /* One sweep; *energy: of the level before it (each triangle lies in three stars), *fall: by how much it fell. Sums are
  * taken in the order of batches. */
 static orb_status sweep_once(orb_context *ctx, orb_refiner *r, double relax, double *energy, double *fall) {
@@ -54,12 +61,14 @@ static orb_status sweep_once(orb_context *ctx, orb_refiner *r, double relax, dou
                      .job = {.point = r->point,
                              .vertex = level->batch_vertex,
                              .fill = level->batch_fill,
+                             .count = level->lane_valence,
                              .valence = level->batch_valence,
                              .offset = level->batch_offset,
                              .ring = level->ring,
                              .shape = level->shape,
                              .weight = orb_refiner_weight(r),
                              .relax = relax,
+                             .scale = scale_of(r),
                              .energy = level->batch_energy,
                              .fall = level->batch_fall,
                              .stiff = level->batch_stiff}};
@@ -102,8 +111,16 @@ orb_status orb_refiner_sweep(orb_context *ctx, orb_refiner *r, int32_t sweeps, d
   return ORB_OK;
 }
 
+/* The share of the energy that a sweep must gain for another to follow. */
+static double least_gain(const orb_refiner *r) {
+  const orb_newton_settings *set = &r->settings;
+  int64_t n = r->hierarchy->surface.vertex_count;
+  return r->live == n ? set->settled_last : r->live * (int64_t)ORB_NEWTON_FAR < n ? set->settled_far : set->settled;
+}
+
 /* Sweeps a level that has just been reached: often if it is coarse, where sweeps are cheap and decide most. A sweep
- * that gains almost nothing ends the level; sweeps are added while each still gains much. */
+ * that gains almost nothing ends the level; sweeps are added while each still gains much. Over-relaxed sweeps leave
+ * neighbours on either side of their places, so the finest level ends with one that is not. */
 static orb_status settle_level(orb_context *ctx, orb_refiner *r) {
   const orb_newton_settings *set = &r->settings;
   int32_t n = r->hierarchy->surface.vertex_count;
@@ -116,14 +133,14 @@ static orb_status settle_level(orb_context *ctx, orb_refiner *r) {
     if (last) {
       orb_progress(ctx, "embed", 0.6 + 0.4 * (i + 1) / sweeps);
     }
-    if (i > 1 && fall < (last ? set->settled_last : set->settled) * energy) {
+    if (i > 1 && fall < least_gain(r) * energy) {
       break;
     }
     if (i == sweeps - 1 && fall > (last ? set->converged_last : set->converged) * energy && sweeps < set->most_sweeps) {
       sweeps++;
     }
   }
-  return ORB_OK;
+  return last ? sweep_once(ctx, r, 1.0, &energy, &fall) : ORB_OK;
 }
 
 /* Frees what only collapses need, once all are undone for good. */

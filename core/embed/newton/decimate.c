@@ -184,34 +184,34 @@ static orb_status try_collapse(decimation *d, int32_t v, float threshold, int32_
   return collapse_into(d, v, u);
 }
 
-/* The value at index `at` of x, were x sorted (Hoare's selection); rearranges x. */
+static uint32_t bits_of(float x) {
+  uint32_t bits;
+  memcpy(&bits, &x, sizeof bits);
+  return bits;
+}
+
+/* The value at index `at` of x, were x sorted. x is not negative, so its bits order as it does: they are sorted digit
+ * by digit, and only within the digit that holds the value. Rearranges x. */
 static float select_float(float *x, int32_t count, int32_t at) {
-  int32_t low = 0, high = count - 1;
-  while (low < high) {
-    float pivot = x[low + (high - low) / 2];
-    int32_t i = low, j = high;
-    while (i <= j) {
-      while (x[i] < pivot) {
-        i++;
-      }
-      while (x[j] > pivot) {
-        j--;
-      }
-      if (i <= j) {
-        float t = x[i];
-        x[i++] = x[j];
-        x[j--] = t;
-      }
+  enum { DIGIT = 11, TOP = 32 };
+  for (int shift = TOP - DIGIT; count > 1; shift = shift > DIGIT ? shift - DIGIT : 0) {
+    int32_t in[1 << DIGIT] = {0}, digit = 0, kept = 0;
+    for (int32_t i = 0; i < count; i++) {
+      in[bits_of(x[i]) >> shift & ((1U << DIGIT) - 1)]++;
     }
-    if (at <= j) {
-      high = j;
-    } else if (at >= i) {
-      low = i;
-    } else {
+    for (; at >= in[digit]; digit++) {
+      at -= in[digit];
+    }
+    for (int32_t i = 0; i < count; i++) {
+      x[kept] = x[i];
+      kept += (int32_t)(bits_of(x[i]) >> shift & ((1U << DIGIT) - 1)) == digit;
+    }
+    count = kept;
+    if (shift == 0) {
       break;
     }
   }
-  return x[at];
+  return x[0];
 }
 
 /* The cost up to which this round collapses. Larger shares make fewer rounds but worse collapses; many vertices afford

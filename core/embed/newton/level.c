@@ -16,18 +16,17 @@ typedef struct builder {
   orb_level *level;
   const orb_corner_table *s;
   double blend;
-  unsigned char *valence;                     /* of level vertices, capped */
-  int32_t bin[ORB_LEVEL_COLOURS][BINS];       /* vertices of each colour and valence */
-  int32_t bin_batch[ORB_LEVEL_COLOURS][BINS]; /* first batch */
-  int32_t bin_filled[ORB_LEVEL_COLOURS][BINS];
+  unsigned char *valence;                    /* of level vertices, capped */
+  int32_t bin[ORB_LEVEL_COLOURS][BINS];      /* vertices of each colour and valence */
+  int32_t bin_next[ORB_LEVEL_COLOURS][BINS]; /* the lane of the next one, counted through all batches */
   int32_t batches;
-  int64_t entries;
 } builder;
 
 static void free_batches(orb_context *ctx, orb_level *level) {
   orb_free(ctx, level->vertex);
   orb_free(ctx, level->batch_vertex);
   orb_free(ctx, level->batch_valence);
+  orb_free(ctx, level->lane_valence);
   orb_free(ctx, level->batch_fill);
   orb_free(ctx, level->batch_stiff);
   orb_free(ctx, level->batch_offset);
@@ -79,59 +78,62 @@ static orb_status colour_vertices(builder *b) {
   return ORB_OK;
 }
 
+static void count_batches(builder *b) {
+  orb_level *level = b->level;
+  int lanes = level->loops->lanes;
+  b->batches = 0;
+  for (int q = 0; q < level->colours; q++) {
+    int32_t lane = 0;
+    level->batch_start[q] = b->batches;
+    for (int k = 0; k < BINS; k++) {
+      b->bin_next[q][k] = b->batches * lanes + lane;
+      lane += b->bin[q][k];
+    }
+    b->batches += (lane + lanes - 1) / lanes;
+  }
+  level->batch_start[level->colours] = b->batches;
+}
+
 static orb_status lay_out(builder *b) {
   orb_level *level = b->level;
   orb_context *ctx = b->ctx;
   int lanes = level->loops->lanes;
-  b->batches = 0;
-  b->entries = 0;
-  for (int q = 0; q < level->colours; q++) {
-    level->batch_start[q] = b->batches;
-    for (int k = 0; k < BINS; k++) {
-      b->bin_batch[q][k] = b->batches;
-      int32_t more = (b->bin[q][k] + lanes - 1) / lanes;
-      b->batches += more;
-      b->entries += (int64_t)more * k;
-    }
-  }
-  level->batch_start[level->colours] = b->batches;
   level->batch_vertex = ORB_NEW(ctx, int32_t, (int64_t)b->batches * lanes);
-  level->batch_valence = ORB_NEW(ctx, int32_t, b->batches);
-  level->batch_fill = ORB_NEW(ctx, unsigned char, b->batches);
-  level->batch_stiff = ORB_NEW0(ctx, unsigned char, b->batches);
+  level->lane_valence = ORB_NEW(ctx, unsigned char, (int64_t)b->batches *lanes);
+  level->batch_valence = ORB_NEW0(ctx, int32_t, b->batches);
+  level->batch_fill = ORB_NEW0(ctx, unsigned char, b->batches);
+  level->batch_stiff = ORB_NEW0(ctx, uint16_t, b->batches);
   level->batch_offset = ORB_NEW(ctx, int64_t, b->batches);
   level->batch_energy = ORB_NEW(ctx, double, b->batches);
   level->batch_fall = ORB_NEW(ctx, double, b->batches);
-  level->ring = ORB_NEW(ctx, int32_t, b->entries * lanes);
-  level->shape = ORB_NEW(ctx, float, 4 * b->entries * lanes);
-  return level->batch_vertex && level->batch_valence && level->batch_fill && level->batch_stiff &&
-                 level->batch_offset && level->batch_energy && level->batch_fall && level->ring && level->shape
+  return level->batch_vertex && level->lane_valence && level->batch_valence && level->batch_fill &&
+                 level->batch_stiff && level->batch_offset && level->batch_energy && level->batch_fall
              ? ORB_OK
              : ORB_E_NO_MEMORY;
 }
 
-static void assign_lanes(builder *b) {
+/* Gives each vertex its lane, each batch the ring entries that its longest ring needs. */
+static orb_status assign_lanes(builder *b) {
   orb_level *level = b->level;
   int lanes = level->loops->lanes;
-  int64_t offset = 0;
-  for (int q = 0; q < level->colours; q++) {
-    for (int k = 0; k < BINS; k++) {
-      int32_t count = b->bin[q][k];
-      for (int32_t i = 0; i * lanes < count; i++, offset += k) {
-        int32_t at = b->bin_batch[q][k] + i, left = count - i * lanes;
-        level->batch_valence[at] = k;
-        level->batch_offset[at] = offset;
-        level->batch_fill[at] = (unsigned char)(left < lanes ? left : lanes);
-      }
-    }
-  }
   for (int32_t i = 0; i < level->count; i++) {
     int32_t v = level->vertex[i], q = level->colour[v], k = b->s->valence[v];
     if (q >= 0) {
-      int64_t at = (int64_t)b->bin_batch[q][k] * lanes + b->bin_filled[q][k]++;
-      level->batch_vertex[at] = v;
+      int32_t lane = b->bin_next[q][k]++, batch = lane / lanes;
+      level->batch_vertex[lane] = v;
+      level->lane_valence[lane] = (unsigned char)k;
+      level->batch_fill[batch]++;
+      level->batch_valence[batch] = k > level->batch_valence[batch] ? k : level->batch_valence[batch];
     }
   }
+  int64_t entries = 0;
+  for (int32_t i = 0; i < b->batches; i++) {
+    level->batch_offset[i] = entries;
+    entries += level->batch_valence[i];
+  }
+  level->ring = ORB_NEW(b->ctx, int32_t, entries * lanes);
+  level->shape = ORB_NEW(b->ctx, float, 4 * entries * lanes);
+  return level->ring && level->shape ? ORB_OK : ORB_E_NO_MEMORY;
 }
 
 static void fill_batches(void *arg, int64_t begin, int64_t end, int thread) {
@@ -141,6 +143,7 @@ static void fill_batches(void *arg, int64_t begin, int64_t end, int thread) {
   orb_fill_job job = {.surface = b->s,
                       .blend = b->blend,
                       .vertex = level->batch_vertex,
+                      .count = level->lane_valence,
                       .fill = level->batch_fill,
                       .valence = level->batch_valence,
                       .offset = level->batch_offset,
@@ -189,8 +192,9 @@ orb_status orb_level_build(orb_context *ctx, orb_level *level, const orb_vector_
   orb_status status;
   ORB_GO(status, list_vertices(b, alive, pinned, live), done);
   ORB_GO(status, colour_vertices(b), done);
+  count_batches(b);
   ORB_GO(status, lay_out(b), done);
-  assign_lanes(b);
+  ORB_GO(status, assign_lanes(b), done);
   ORB_GO(status, orb_sliced_for(ctx, b->batches, GRAIN, fill_batches, b), done);
   level->valid = 1;
 done:

@@ -1,6 +1,6 @@
 /* One level of the refinement, laid out as batches for the vector sweeps. Its vertices are coloured so that neighbours
- * differ, and grouped by colour and valence, `lanes` to a batch. A batch holds the rings of its vertices and the shapes
- * of their triangles lane by lane. */
+ * differ, and sorted by colour and valence; a batch is `lanes` of them, of one colour. It holds the rings of its
+ * vertices and the shapes of their triangles lane by lane. */
 #ifndef ORB_EMBED_NEWTON_LEVEL_H
 #define ORB_EMBED_NEWTON_LEVEL_H
 
@@ -16,7 +16,8 @@ typedef struct orb_level {
   int colours;
   int32_t batch_start[ORB_LEVEL_COLOURS + 1]; /* first batch of each colour */
   int32_t *batch_vertex, *batch_valence;
-  unsigned char *batch_fill, *batch_stiff;
+  unsigned char *batch_fill, *lane_valence;
+  uint16_t *batch_stiff;
   int64_t *batch_offset;
   double *batch_energy, *batch_fall;
   int32_t *ring;

@@ -26,7 +26,7 @@
 enum {
   GRAIN = 256,        /* vertices of a chunk */
   AHEAD = 8,          /* collapses between a prefetch and its use */
-  PLAIN_ABOVE = 4000, /* live vertices above which one well inside its kernel makes no step: the sweeps follow soon */
+  PLAIN_ABOVE = 1000, /* live vertices above which one well inside its kernel makes no step: the sweeps follow soon */
   RELAX_MOST = 400,   /* ring entries relaxed around one crowded vertex: about 60 stars, or one pole */
   POLE = 100,         /* valence from which on only the sweeps move a vertex */
   ATTEMPTS = 16       /* at a kernel that doubles have no room for */

@@ -11,8 +11,9 @@ void orb_newton_settings_of(const orb_embed_options *options, orb_newton_setting
                                .most_sweeps = 400,
                                .converged = 1e-3,
                                .converged_last = 1e-3,
-                               .settled = 1e-4,
-                               .settled_last = 1e-6,
+                               .settled = 3e-4,
+                               .settled_far = 1e-4,
+                               .settled_last = 1e-5,
                                .weight = options->energy_weight,
                                .blend = 0.5,
                                .finest = 1e-7,
@@ -24,7 +25,7 @@ void orb_newton_settings_of(const orb_embed_options *options, orb_newton_setting
     out->level_sweeps = 3;
     out->final_sweeps = 6;
     out->converged = out->converged_last = 5e-3;
-    out->settled = 5e-4;
+    out->settled = out->settled_far = 5e-4;
   } else if (options->preset == ORB_PRESET_QUALITY) {
     out->growth_fine = 1.7;
     out->coarse_until = 100000;
@@ -33,7 +34,8 @@ void orb_newton_settings_of(const orb_embed_options *options, orb_newton_setting
     out->final_sweeps = 40;
     out->most_sweeps = 1000;
     out->converged = out->converged_last = 2e-4;
-    out->settled = 2e-5;
+    out->settled = out->settled_far = 2e-5;
+    out->settled_last = 1e-6;
   }
   if (options->energy_weight < 1) { /* only the finest level goes below w = 1: see orb_refiner_weight() */
     out->final_sweeps = out->final_sweeps < 60 ? 60 : out->final_sweeps;

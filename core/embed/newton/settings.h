@@ -4,6 +4,8 @@
 
 #include "orbmorph/embed.h"
 
+enum { ORB_NEWTON_FAR = 8 }; /* a level of fewer vertices than this share of all is far from full resolution */
+
 typedef struct orb_newton_settings {
   double growth, growth_fine; /* of the number of vertices from level to level, below and from fine_from vertices on */
   int32_t fine_from;
@@ -12,6 +14,7 @@ typedef struct orb_newton_settings {
   int32_t most_sweeps; /* of one level: sweeps are added while each lowers the energy by more than `converged` of it */
   double converged, converged_last; /* _last: at full resolution */
   double settled, settled_last;     /* a sweep that lowers the energy by less than this share ends the level */
+  double settled_far;               /* the same far from full resolution, where sweeps cost next to nothing */
   double weight;                    /* w of the energy */
   double blend;                     /* of the shapes of coarse triangles towards equilateral, 0 to 1 */
   double finest;  /* the same at full resolution: keeps degenerate triangles finite, changes no other */

@@ -3,12 +3,13 @@
 #define ORB_LANES 8
 #include "embed/newton/vector/lanes.inc.h"
 
+#include "embed/newton/vector/batch.inc.h"
 #include "embed/newton/vector/cost.inc.h"
 #include "embed/newton/vector/fill.inc.h"
 #include "embed/newton/vector/sweep.inc.h"
 
 const orb_vector_loops orb_vector_avx512 = {
-    .name = "avx512", .lanes = ORB_LANES, .costs = cost_range, .fill = fill_range, .sweep = sweep_range};
+    .name = "avx512", .lanes = BATCH, .costs = cost_range, .fill = fill_range, .sweep = sweep_range};
 #else
 typedef int orb_no_avx512;
 #endif

@@ -2,9 +2,10 @@
 #define ORB_LANES 2
 #include "embed/newton/vector/lanes.inc.h"
 
+#include "embed/newton/vector/batch.inc.h"
 #include "embed/newton/vector/cost.inc.h"
 #include "embed/newton/vector/fill.inc.h"
 #include "embed/newton/vector/sweep.inc.h"
 
 const orb_vector_loops orb_vector_plain = {
-    .name = "plain", .lanes = ORB_LANES, .costs = cost_range, .fill = fill_range, .sweep = sweep_range};
+    .name = "plain", .lanes = BATCH, .costs = cost_range, .fill = fill_range, .sweep = sweep_range};
