@@ -1,8 +1,12 @@
 /* Nearest point of a triangle set.
  *
- * A binary tree of boxes in one array, in depth-first order: the left child of node i is i + 1, the right one is
- * stored. It is built top down by the median along the longest axis of the centres (quickselect); a leaf holds at most
- * LEAF triangles, whose corners are copied side by side. A query visits the nearer box first, with a fixed stack.
+ * Triangles are put into an order whose runs are compact: halved again and again, by the median of their centres along
+ * the longest axis. Eight neighbours in this order form a leaf, eight leaves a node, and so on; every node but the last
+ * of a level has eight children. A node keeps their boxes as floats, which a query tests together.
+ *
+ * Boxes only decide which triangles are tested. They are rounded outwards, so that rounding never drops the nearest
+ * triangle; distances to triangles are computed as doubles, from the caller's corners. Box coordinates are relative to
+ * the surface's extent: 0 to 1.
  */
 #include <math.h>
 #include <string.h>
@@ -10,98 +14,87 @@
 #include "base/check.h"
 #include "base/memory.h"
 #include "mesh/nearest.h"
+#include "numeric/clones.h"
 #include "numeric/vec3.h"
 #include "orbmorph/mesh.h"
 
 enum {
-  LEAF = 4,  /* triangles; more make boxes fewer and leaves slower */
-  STACK = 64 /* nodes; halving 2³¹ triangles takes 31 levels, and each level leaves one node on the stack */
+  WIDE = 8,          /* children of a node: a vector of floats on AVX2 */
+  LEVELS = 11,       /* 8¹¹ > 2³¹ triangles */
+  STACK = 8 * LEVELS /* a level leaves at most seven nodes on the stack */
 };
+/* Of the histogram that finds a median: more bins need fewer rounds over many triangles, and more time for few. */
+enum { BINS = 64 };
+/* In units of the extent. A float near 1 is rounded by 3e-8; boxes are widened by four times that, and a query's
+ * coordinates, which may be far from 1, are shifted by four times theirs. */
+static const double BOX_MARGIN = 1.2e-7, QUERY_MARGIN = 2.4e-7;
+/* Relative: more than the rounding of three squares, their sum, and the limit that they are compared with. */
+static const double LIMIT_MARGIN = 2e-6;
+/* Extents. Coordinates farther out are clamped, which only brings a query nearer to a box, and squares stay finite. */
+static const double FAR = 1e15;
+static const float NO_LIMIT = 1e32f;
 
 typedef struct node {
-  double low[3], high[3];
-  int32_t right; /* of an inner node; of a leaf: −1 − its first entry */
-  int32_t count; /* triangles of a leaf, 0: inner */
+  float low[3][WIDE], high[3][WIDE]; /* of the children */
+  int32_t first, count;              /* children: entries for a leaf, else nodes */
 } node;
 
 struct orb_nearest {
-  orb_context *ctx;
-  node *nodes;
+  node *nodes;     /* level by level, leaves first, the root last */
   double *corners; /* 9 an entry */
   int32_t *triangle;
-  int32_t node_count, triangle_count;
+  int32_t node_count, leaf_count, triangle_count;
+  double origin[3], scale; /* box coordinates: (x − origin) · scale */
 };
 
-static void box_of(const double *corners, const int32_t *order, int32_t count, node *out) {
-  for (int k = 0; k < 3; k++) {
-    out->low[k] = INFINITY;
-    out->high[k] = -INFINITY;
-  }
-  for (int32_t i = 0; i < count; i++) {
-    const double *c = corners + 9 * (size_t)order[i];
-    for (int k = 0; k < 9; k++) {
-      out->low[k % 3] = c[k] < out->low[k % 3] ? c[k] : out->low[k % 3];
-      out->high[k % 3] = c[k] > out->high[k % 3] ? c[k] : out->high[k % 3];
-    }
-  }
+/* A triangle to be put into order. */
+typedef struct item {
+  uint32_t centre[3]; /* 0 to 2³¹ over the extent */
+  int32_t triangle;
+} item;
+
+static double clamped(double x) {
+  return !(x > -FAR) ? -FAR : x < FAR ? x : FAR; /* NaN too becomes −FAR */
 }
 
-/* Thrice the centre of a triangle along an axis, ties by number: a strict order. */
-static int comes_before(const double *corners, int32_t a, int32_t b, int axis) {
-  const double *p = corners + 9 * (size_t)a + axis, *q = corners + 9 * (size_t)b + axis;
-  double x = p[0] + p[3] + p[6], y = q[0] + q[3] + q[6];
-  return x < y || (x == y && a < b);
-}
-
-static void swap(int32_t *order, int32_t i, int32_t j) {
-  int32_t x = order[i];
-  order[i] = order[j];
-  order[j] = x;
-}
-
-/* Hoare's selection with the median of three: the `middle` smallest come first. Gives up after 128 rounds, which only
- * an adversarial input needs: any split makes a valid tree. */
-static void select_middle(const double *corners, int32_t *order, int32_t count, int32_t middle, int axis) {
-  int32_t low = 0, high = count - 1;
-  for (int rounds = 0; low < high && rounds < 128; rounds++) {
-    int32_t mid = low + (high - low) / 2;
-    if (comes_before(corners, order[mid], order[low], axis)) {
-      swap(order, mid, low);
-    }
-    if (comes_before(corners, order[high], order[low], axis)) {
-      swap(order, high, low);
-    }
-    if (comes_before(corners, order[high], order[mid], axis)) {
-      swap(order, high, mid);
-    }
-    int32_t pivot = order[mid], i = low, j = high;
-    while (i <= j) {
-      while (comes_before(corners, order[i], pivot, axis)) {
-        i++;
-      }
-      while (comes_before(corners, pivot, order[j], axis)) {
-        j--;
-      }
-      if (i <= j) {
-        swap(order, i++, j--);
-      }
-    }
-    if (middle <= j) {
-      high = j;
-    } else if (middle >= i) {
-      low = i;
-    } else {
-      return;
-    }
-  }
-}
-
-static int longest_axis(const double *corners, const int32_t *order, int32_t count) {
-  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  for (int32_t i = 0; i < count; i++) {
-    const double *c = corners + 9 * (size_t)order[i];
+static void find_extent(orb_nearest *tree, const double *positions, const int32_t *triangles) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, extent = 0;
+  for (int64_t i = 0; i < 3 * (int64_t)tree->triangle_count; i++) {
+    const double *p = positions + 3 * (int64_t)triangles[i];
     for (int k = 0; k < 3; k++) {
-      double x = c[k] + c[k + 3] + c[k + 6];
+      low[k] = p[k] < low[k] ? p[k] : low[k];
+      high[k] = p[k] > high[k] ? p[k] : high[k];
+    }
+  }
+  for (int k = 0; k < 3; k++) {
+    extent = high[k] - low[k] > extent ? high[k] - low[k] : extent;
+    tree->origin[k] = isfinite(low[k]) ? low[k] : 0;
+  }
+  tree->scale = extent > 0 && isfinite(1 / extent) ? 1 / extent : 0; /* 0: every box holds everything */
+}
+
+static item item_of(const orb_nearest *tree, const double *positions, const int32_t *triangles, int32_t t) {
+  const int32_t *corner = triangles + 3 * (int64_t)t;
+  const double UNITS = (1u << 31) / 3.0;
+  item out = {.triangle = t};
+  for (int k = 0; k < 3; k++) {
+    double sum = 0;
+    for (int i = 0; i < 3; i++) {
+      sum += (positions[3 * (int64_t)corner[i] + k] - tree->origin[k]) * tree->scale;
+    }
+    out.centre[k] = sum > 0 && sum < 4 ? (uint32_t)(sum * UNITS) : 0; /* NaN becomes 0 */
+  }
+  return out;
+}
+
+/* The axis along which the centres spread farthest, and their range there. */
+static int longest_axis(const item *items, int32_t count, uint32_t range[2]) {
+  uint32_t low[3], high[3];
+  memcpy(low, items[0].centre, sizeof low);
+  memcpy(high, low, sizeof high);
+  for (int32_t i = 1; i < count; i++) {
+    for (int k = 0; k < 3; k++) {
+      uint32_t x = items[i].centre[k];
       low[k] = x < low[k] ? x : low[k];
       high[k] = x > high[k] ? x : high[k];
     }
@@ -110,42 +103,165 @@ static int longest_axis(const double *corners, const int32_t *order, int32_t cou
   for (int k = 1; k < 3; k++) {
     axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
   }
+  range[0] = low[axis];
+  range[1] = high[axis];
   return axis;
 }
 
-typedef struct task {
-  int32_t first, count, parent; /* parent: the node whose right child this is, −1: none */
-} task;
+/* Brings the items below `limit` to the front, in their order, without branches that the data decide: half of those
+ * would be mispredicted. Returns their number. scratch: count items. */
+static int32_t bring_forward(item *items, int32_t count, int axis, uint32_t limit, item *scratch) {
+  int32_t below = 0, rest = 0;
+  for (int32_t i = 0; i < count; i++) {
+    item x = items[i];
+    int comes_first = x.centre[axis] < limit;
+    items[below] = x;
+    scratch[rest] = x;
+    below += comes_first;
+    rest += !comes_first;
+  }
+  memcpy(items + below, scratch, (size_t)rest * sizeof *items);
+  return below;
+}
 
-static orb_status build(orb_nearest *tree, const double *corners, int32_t *order) {
-  task stack[STACK];
-  int depth = 0;
-  stack[depth++] = (task){0, tree->triangle_count, -1};
-  while (depth > 0) {
-    task todo = stack[--depth];
-    int32_t at = tree->node_count++;
-    node *n = &tree->nodes[at];
-    box_of(corners, order + todo.first, todo.count, n);
-    if (todo.parent >= 0) {
-      tree->nodes[todo.parent].right = at;
+/* Selection: the `middle` smallest come first. A histogram of the range shows in which bin the last of them lies, and
+ * only that bin is left to select from. A round leaves at most 1/32 of the range: six are enough for 31 bits. */
+static void select_middle(item *items, int32_t count, int32_t middle, int axis, uint32_t range[2], item *scratch) {
+  uint32_t low = range[0], high = range[1];
+  while (low < high && middle > 0 && middle < count) {
+    int32_t bins[BINS] = {0}, below = 0;
+    uint32_t bin = 0;
+    int shift = 0;
+    while ((high - low) >> shift >= BINS) {
+      shift++;
     }
-    if (todo.count <= LEAF) {
-      n->count = todo.count;
-      n->right = -1 - todo.first;
+    for (int32_t i = 0; i < count; i++) {
+      bins[(items[i].centre[axis] - low) >> shift]++;
+    }
+    for (; below + bins[bin] < middle; bin++) {
+      below += bins[bin];
+    }
+    low += bin << shift;
+    high = low + (1u << shift) - 1;
+    below = bring_forward(items, count, axis, low, scratch);
+    items += below;
+    middle -= below;
+    count = bring_forward(items, count - below, axis, high + 1, scratch);
+  }
+}
+
+/* Puts triangles into the order of the leaves. Runs are cut at multiples of a power of eight, so that nodes and leaves
+ * but the last of a level are full. items: `total`, and as many more for scratch. */
+static orb_status arrange(orb_context *ctx, item *items, int32_t total) {
+  struct {
+    int32_t first, count;
+  } stack[3 * LEVELS]; /* a level of nodes takes three cuts, and each leaves one run on the stack */
+  int depth = 0;
+  stack[depth].first = 0;
+  stack[depth++].count = total;
+  while (depth > 0) {
+    int32_t first = stack[--depth].first, count = stack[depth].count;
+    if (count <= WIDE) {
       continue;
     }
-    int32_t half = todo.count / 2;
-    int axis = longest_axis(corners, order + todo.first, todo.count);
-    select_middle(corners, order + todo.first, todo.count, half, axis);
-    n->count = 0;
-    ORB_ASSERT(depth + 2 <= STACK);
-    stack[depth++] = (task){todo.first + half, todo.count - half, at};
-    stack[depth++] = (task){todo.first, half, -1};
-    if (todo.count > 4096) {
-      ORB_TRY(orb_context_check(tree->ctx));
+    int64_t child = WIDE; /* triangles of a full child */
+    while (child * WIDE < count) {
+      child *= WIDE;
+    }
+    int64_t children = (count + child - 1) / child;
+    int32_t left = (int32_t)(children / 2 * child);
+    uint32_t range[2];
+    int axis = longest_axis(items + first, count, range);
+    select_middle(items + first, count, left, axis, range, items + total);
+    if (count > 4096) {
+      ORB_TRY(orb_context_check(ctx));
+    }
+    ORB_ASSERT(depth + 2 <= 3 * LEVELS);
+    stack[depth].first = first;
+    stack[depth++].count = left;
+    stack[depth].first = first + left;
+    stack[depth++].count = count - left;
+  }
+  return ORB_OK;
+}
+
+static void reset_boxes(node *n) {
+  for (int k = 0; k < 3; k++) {
+    for (int i = 0; i < WIDE; i++) {
+      n->low[k][i] = (float)FAR;
+      n->high[k][i] = (float)-FAR;
+    }
+  }
+}
+
+static void box_of_entry(const orb_nearest *tree, int32_t entry, node *n, int child) {
+  for (int i = 0; i < 9; i++) {
+    int k = i % 3;
+    double x = (tree->corners[9 * (size_t)entry + (size_t)i] - tree->origin[k]) * tree->scale;
+    double below = !(x > -FAR) ? -FAR : x - BOX_MARGIN, above = !(x < FAR) ? FAR : x + BOX_MARGIN;
+    n->low[k][child] = (float)below < n->low[k][child] ? (float)below : n->low[k][child];
+    n->high[k][child] = (float)above > n->high[k][child] ? (float)above : n->high[k][child];
+  }
+}
+
+static void box_of_node(const node *from, node *n, int child) {
+  for (int k = 0; k < 3; k++) {
+    for (int i = 0; i < from->count; i++) {
+      n->low[k][child] = from->low[k][i] < n->low[k][child] ? from->low[k][i] : n->low[k][child];
+      n->high[k][child] = from->high[k][i] > n->high[k][child] ? from->high[k][i] : n->high[k][child];
+    }
+  }
+}
+
+/* Adds the nodes over `count` children, the first of which is `first`. */
+static orb_status add_level(orb_context *ctx, orb_nearest *tree, int32_t first, int32_t count) {
+  int leaves = tree->node_count == 0;
+  for (int32_t done = 0; done < count; done += WIDE) {
+    node *n = &tree->nodes[tree->node_count++];
+    reset_boxes(n);
+    n->first = first + done;
+    n->count = count - done < WIDE ? count - done : WIDE;
+    for (int32_t i = 0; i < n->count; i++) {
+      if (leaves) {
+        box_of_entry(tree, n->first + i, n, i);
+      } else {
+        box_of_node(&tree->nodes[n->first + i], n, i);
+      }
+    }
+    if (tree->node_count % 4096 == 0) {
+      ORB_TRY(orb_context_check(ctx));
     }
   }
   return ORB_OK;
+}
+
+static orb_status build(orb_context *ctx, orb_nearest *tree) {
+  ORB_TRY(add_level(ctx, tree, 0, tree->triangle_count));
+  tree->leaf_count = tree->node_count;
+  for (int32_t first = 0; tree->node_count - first > 1;) {
+    int32_t count = tree->node_count - first;
+    ORB_TRY(add_level(ctx, tree, first, count));
+    first += count;
+  }
+  return ORB_OK;
+}
+
+static orb_status fill(orb_context *ctx, orb_nearest *tree, const double *positions, const int32_t *triangles,
+                       item *items) {
+  int32_t count = tree->triangle_count;
+  find_extent(tree, positions, triangles);
+  for (int32_t t = 0; t < count; t++) {
+    items[t] = item_of(tree, positions, triangles, t);
+  }
+  ORB_TRY(arrange(ctx, items, count));
+  for (int32_t i = 0; i < count; i++) {
+    tree->triangle[i] = items[i].triangle;
+    for (int64_t k = 0; k < 3; k++) {
+      int32_t v = triangles[3 * (int64_t)items[i].triangle + k];
+      memcpy(tree->corners + 9 * (int64_t)i + 3 * k, positions + 3 * (int64_t)v, 3 * sizeof(double));
+    }
+  }
+  return build(ctx, tree);
 }
 
 orb_status orb_nearest_create(orb_context *ctx, const double *positions, const int32_t *triangles,
@@ -155,32 +271,17 @@ orb_status orb_nearest_create(orb_context *ctx, const double *positions, const i
   if (!tree) {
     return ORB_E_NO_MEMORY;
   }
-  tree->ctx = ctx;
   tree->triangle_count = triangle_count;
-  size_t count = (size_t)triangle_count;
-  double *corners = ORB_NEW(ctx, double, 9 * count);
-  tree->nodes = ORB_NEW(ctx, node, count + 1);
+  int64_t count = triangle_count;
+  item *items = ORB_NEW(ctx, item, 2 * count);
+  tree->nodes = ORB_NEW(ctx, node, (count + 6) / 7 + LEVELS); /* Σ ⌈count / 8ⁱ⌉ */
   tree->corners = ORB_NEW(ctx, double, 9 * count);
   tree->triangle = ORB_NEW(ctx, int32_t, count);
-  orb_status status = ORB_E_NO_MEMORY;
-  if (!corners || !tree->nodes || !tree->corners || !tree->triangle) {
-    goto done;
+  orb_status status = items && tree->nodes && tree->corners && tree->triangle ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK && count > 0) {
+    status = fill(ctx, tree, positions, triangles, items);
   }
-  for (size_t t = 0; t < count; t++) {
-    tree->triangle[t] = (int32_t)t;
-    for (size_t k = 0; k < 3; k++) {
-      memcpy(corners + 9 * t + 3 * k, positions + 3 * (size_t)triangles[3 * t + k], 3 * sizeof(double));
-    }
-  }
-  status = ORB_OK;
-  if (count > 0) {
-    ORB_GO(status, build(tree, corners, tree->triangle), done);
-  }
-  for (size_t i = 0; i < count; i++) {
-    memcpy(tree->corners + 9 * i, corners + 9 * (size_t)tree->triangle[i], 9 * sizeof(double));
-  }
-done:
-  orb_free(ctx, corners);
+  orb_free(ctx, items);
   if (status != ORB_OK) {
     orb_nearest_destroy(ctx, tree);
   } else {
@@ -196,16 +297,6 @@ void orb_nearest_destroy(orb_context *ctx, orb_nearest *tree) {
     orb_free(ctx, tree->triangle);
     orb_free(ctx, tree);
   }
-}
-
-static double box_distance2(const node *n, const double p[3]) {
-  double sum = 0;
-  for (int k = 0; k < 3; k++) {
-    double below = n->low[k] - p[k], above = p[k] - n->high[k];
-    double d = fmax(fmax(below, above), 0);
-    sum += d * d;
-  }
-  return sum;
 }
 
 /* The parameter, 0 to 1, of the point of segment a b that is nearest to p. */
@@ -258,46 +349,94 @@ double orb_triangle_nearest(const double *c, const double p[3], double at[3]) {
   return best;
 }
 
+typedef struct query {
+  float below[3], above[3]; /* the point, shifted down and up by more than its rounding */
+  float limit;              /* squared distance to a box beyond which nothing in it matters */
+} query;
+
+typedef struct visit {
+  int32_t at; /* node, or entry in a leaf */
+  float distance2;
+} visit;
+
+static float limit_of(const orb_nearest *tree, double best) {
+  double limit = best * tree->scale * tree->scale * (1 + LIMIT_MARGIN);
+  return limit < (double)NO_LIMIT ? (float)limit : NO_LIMIT; /* NaN too becomes NO_LIMIT */
+}
+
+/* How far x lies outside low … high. */
+static inline float outside(float low, float high, float x_below, float x_above) {
+  float under = low - x_above, over = x_below - high, most = under > over ? under : over;
+  return most > 0 ? most : 0;
+}
+
+/* The squared distance to each child's box, never more than the true one by a relative 1e-6. Returns the bits of those
+ * within the limit. */
+ORB_CLONES static uint32_t box_distances(const node *restrict n, const query *restrict q, float *restrict out) {
+  uint32_t near = 0;
+  for (int i = 0; i < WIDE; i++) {
+    float x = outside(n->low[0][i], n->high[0][i], q->below[0], q->above[0]);
+    float y = outside(n->low[1][i], n->high[1][i], q->below[1], q->above[1]);
+    float z = outside(n->low[2][i], n->high[2][i], q->below[2], q->above[2]);
+    out[i] = x * x + y * y + z * z;
+  }
+  for (int i = 0; i < WIDE; i++) {
+    near |= (uint32_t)(out[i] <= q->limit) << i;
+  }
+  return near;
+}
+
+/* Lists the children within the limit, farthest first. Returns how many. */
+static int children_near(const node *n, const query *q, visit out[WIDE]) {
+  float distance2[WIDE];
+  int found = 0;
+  uint32_t near = box_distances(n, q, distance2) & ((1u << n->count) - 1);
+  for (; near; near &= near - 1) {
+    int i = __builtin_ctz(near), at = found++;
+    for (; at > 0 && out[at - 1].distance2 < distance2[i]; at--) {
+      out[at] = out[at - 1];
+    }
+    out[at] = (visit){n->first + i, distance2[i]};
+  }
+  return found;
+}
+
 /* Continues from *out: a place at the squared distance `best`, or none, with `best` as the bound. */
 static double search(const orb_nearest *tree, const double p[3], double best, orb_place *out) {
   int32_t found = out->triangle;
-  struct {
-    int32_t node;
-    double distance2;
-  } stack[STACK];
+  query q = {.limit = limit_of(tree, best)};
+  for (int k = 0; k < 3; k++) {
+    double x = clamped((p[k] - tree->origin[k]) * tree->scale);
+    q.below[k] = (float)(x - QUERY_MARGIN * fabs(x));
+    q.above[k] = (float)(x + QUERY_MARGIN * fabs(x));
+  }
+  visit stack[STACK];
   int depth = 0;
-  int32_t at = tree->triangle_count > 0 ? 0 : -1;
-  double distance2 = at < 0 ? INFINITY : box_distance2(&tree->nodes[0], p);
-  while (at >= 0) {
-    const node *n = &tree->nodes[at];
-    int worth = distance2 < best || (found >= 0 && distance2 <= best);
-    if (worth && n->count == 0) {
-      int32_t near = at + 1, far = n->right;
-      double a = box_distance2(&tree->nodes[near], p), b = box_distance2(&tree->nodes[far], p);
-      if (b < a) {
-        double x = a;
-        a = b;
-        b = x;
-        near = n->right;
-        far = at + 1;
-      }
-      stack[depth].node = far;
-      stack[depth++].distance2 = b;
-      at = near;
-      distance2 = a;
+  if (tree->node_count > 0) {
+    stack[depth++] = (visit){tree->node_count - 1, 0};
+  }
+  while (depth > 0) {
+    visit next = stack[--depth];
+    if (!(next.distance2 <= q.limit)) {
       continue;
     }
-    for (int32_t i = 0; worth && i < n->count; i++) {
-      int32_t entry = -1 - n->right + i, t = tree->triangle[entry];
+    if (next.at >= tree->leaf_count) {
+      ORB_ASSERT(depth + WIDE <= STACK);
+      depth += children_near(&tree->nodes[next.at], &q, stack + depth);
+      continue;
+    }
+    visit entries[WIDE];
+    for (int i = children_near(&tree->nodes[next.at], &q, entries) - 1; i >= 0 && entries[i].distance2 <= q.limit;
+         i--) {
+      int32_t entry = entries[i].at, t = tree->triangle[entry];
       double place[3], d2 = orb_triangle_nearest(tree->corners + 9 * (size_t)entry, p, place);
       if (d2 < best || (d2 == best && found >= 0 && t < found)) {
         best = d2;
         found = t;
+        q.limit = limit_of(tree, best);
         memcpy(out->at, place, sizeof place);
       }
     }
-    at = depth > 0 ? stack[--depth].node : -1;
-    distance2 = at >= 0 ? stack[depth].distance2 : 0;
   }
   out->triangle = found;
   return found >= 0 ? best : INFINITY;

@@ -1,4 +1,4 @@
-/* Repairs and refusals on small solids with known topology; compares the nearest point with a plain search. */
+/* Repairs and refusals on small solids whose topology is known. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -67,7 +67,7 @@ static void test_safe(void **state) {
   orb_mesh_free(ctx, &mesh);
 }
 
-/* Eight corners, six quadrangles; with `loose` no two faces share corners. */
+/* Eight corners, six quadrangles; with `loose` each face has corners of its own. */
 static void cube(char *out, size_t *length, double x, double y, int first, int loose) {
   static const int face[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
   char *p = out + *length;
@@ -193,7 +193,7 @@ static void test_fill(void **state) {
   }
 }
 
-/* A concave polygon, an L of area 3: the areas of its triangles must add up to its area. */
+/* A concave polygon: an L of area 3, extruded by nothing: the areas of its triangles must add up to its own. */
 static void test_concave_polygon(void **state) {
   (void)state;
   const char *text = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5 6\n";
@@ -204,62 +204,6 @@ static void test_concave_polygon(void **state) {
   orb_mesh_extent(&mesh, &extent);
   assert_true(fabs(extent.area - 3) < 1e-15);
   orb_mesh_free(ctx, &mesh);
-}
-
-static double uniform(uint64_t *seed) {
-  *seed = *seed * 6364136223846793005ull + 1442695040888963407ull;
-  return (double)(*seed >> 11) * 0x1p-53;
-}
-
-static void test_nearest(void **state) {
-  (void)state;
-  enum { COUNT = 500 };
-  static double positions[9 * COUNT];
-  static int32_t triangles[3 * COUNT];
-  uint64_t seed = 5;
-  for (int t = 0; t < COUNT; t++) {
-    double centre[3] = {uniform(&seed), uniform(&seed), uniform(&seed)};
-    for (int k = 0; k < 9; k++) {
-      positions[9 * t + k] = centre[k % 3] + 0.1 * uniform(&seed);
-    }
-    for (int k = 0; k < 3; k++) {
-      triangles[3 * t + k] = 3 * t + k;
-    }
-  }
-  orb_mesh mesh = {.positions = positions, .triangles = triangles, .vertex_count = 3 * COUNT, .triangle_count = COUNT};
-  orb_nearest *tree, *one;
-  assert_int_equal(orb_nearest_create(ctx, positions, triangles, COUNT, &tree), ORB_OK);
-  for (int q = 0; q < 300; q++) {
-    double p[3] = {3 * uniform(&seed) - 1, 3 * uniform(&seed) - 1, 3 * uniform(&seed) - 1}, at[3], best = INFINITY;
-    orb_place place, other;
-    double d2 = orb_nearest_query(tree, p, INFINITY, &place);
-    orb_place_position(&mesh, &place, at);
-    assert_true(fabs(orb_distance2(p, at) - d2) < 1e-12);
-    assert_true(fabs(place.at[0] + place.at[1] + place.at[2] - 1) < 1e-14);
-    for (int t = 0; t < COUNT; t++) { /* no point of a fine grid on any triangle is nearer */
-      for (int i = 0; i <= 8; i++) {
-        for (int j = 0; i + j <= 8; j++) {
-          orb_place grid = {t, {i / 8.0, j / 8.0, (8 - i - j) / 8.0}};
-          orb_place_position(&mesh, &grid, at);
-          best = fmin(best, orb_distance2(p, at));
-        }
-      }
-    }
-    assert_true(d2 <= best + 1e-12);
-    assert_true(orb_nearest_query(tree, p, d2 * 0.999, &other) == INFINITY && other.triangle == -1);
-    assert_int_equal(orb_nearest_create(ctx, positions, triangles + 3 * place.triangle, 1, &one), ORB_OK);
-    assert_true(fabs(orb_nearest_query(one, p, INFINITY, &other) - d2) < 1e-13);
-    orb_nearest_destroy(ctx, one);
-  }
-  for (int k = 0; k < 9 * COUNT; k++) { /* squared distances overflow: there is still a result */
-    positions[k] *= 1e300;
-  }
-  orb_nearest_destroy(ctx, tree);
-  assert_int_equal(orb_nearest_create(ctx, positions, triangles, COUNT, &tree), ORB_OK);
-  orb_place far;
-  assert_true(orb_nearest_query(tree, (double[3]){-1e300, 0, 1e300}, INFINITY, &far) == INFINITY);
-  assert_true(far.triangle >= 0 && far.triangle < COUNT);
-  orb_nearest_destroy(ctx, tree);
 }
 
 static void test_copy(void **state) {
@@ -280,6 +224,6 @@ int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_safe),     cmocka_unit_test(test_welding_of_cubes),
                                      cmocka_unit_test(test_refusals), cmocka_unit_test(test_torus),
                                      cmocka_unit_test(test_fill),     cmocka_unit_test(test_concave_polygon),
-                                     cmocka_unit_test(test_nearest),  cmocka_unit_test(test_copy)};
+                                     cmocka_unit_test(test_copy)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }
