@@ -5,14 +5,10 @@
 
 #include "base/check.h"
 #include "base/memory.h"
-#include "mesh/normals.h"
 #include "numeric/vec3.h"
-#include "transfer/wedge.h"
 
 enum { ALL_PAIRS_UP_TO = 4 }; /* shapes; the pairs of more are only the neighbours, so that their number is linear */
 static const double SLIVER = 0.02; /* quality() below which a triangle's stretch is mostly rounding */
-/* Twice the area, relative to the squared diagonal, up to which a triangle counts as degenerate. */
-static const double DEGENERATE = 1e-12;
 
 /* A landmark without a supermesh vertex (rotate, or rbf inside triangles) is measured at the mean of its points on the
  * sphere, one from each shape. */
@@ -157,78 +153,6 @@ orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb
   }
   orb_locator_destroy(ctx, locator);
   return ORB_OK;
-}
-
-/* Adds the input's smooth normal at a place. */
-static void add_normal(const orb_mesh *mesh, const double *normals, const orb_place *place, double sum[3]) {
-  double normal[3] = {0};
-  for (int k = 0; k < 3; k++) {
-    const double *n = normals + 3 * (int64_t)mesh->triangles[3 * (int64_t)place->triangle + k];
-    for (int c = 0; c < 3; c++) {
-      normal[c] += place->at[k] * n[c];
-    }
-  }
-  orb_normalize(normal);
-  for (int c = 0; c < 3; c++) {
-    sum[c] += normal[c];
-  }
-}
-
-/* Whether a triangle also faces away from the input's face at its centre. Where an edge of the input is sharper than a
- * right angle, a triangle within one face can face away from the smooth normals although it is the surface itself.
- * Creates the locator when it is first needed. */
-static orb_status against_face(orb_context *ctx, const orb_aligned_shape *shape, const double *points,
-                               const int32_t *corner, const double normal[3], orb_locator **locator, int *against) {
-  const orb_mesh *mesh = &shape->mesh;
-  if (!*locator) {
-    ORB_TRY(orb_locator_create(ctx, shape->points, mesh->vertex_count, mesh->triangles, mesh->triangle_count, NULL,
-                               locator));
-  }
-  double centre[3], face[3];
-  for (int c = 0; c < 3; c++) {
-    centre[c] =
-        points[3 * (int64_t)corner[0] + c] + points[3 * (int64_t)corner[1] + c] + points[3 * (int64_t)corner[2] + c];
-  }
-  orb_normalize(centre);
-  orb_place place;
-  orb_locate(*locator, centre, -1, &place);
-  orb_face_normal(mesh, place.triangle, face);
-  *against = orb_dot(normal, face) < 0;
-  return ORB_OK;
-}
-
-orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shape,
-                             int32_t s, const double *positions, unsigned char *inverted) {
-  const orb_mesh *mesh = &shape->mesh;
-  orb_extent extent;
-  orb_mesh_extent(mesh, &extent);
-  const orb_place *places = supermesh->places + (int64_t)s * supermesh->vertex_count;
-  double floor = DEGENERATE * extent.diagonal * extent.diagonal;
-  orb_locator *locator = NULL;
-  double *normals = ORB_NEW(ctx, double, 3 * (int64_t)mesh->vertex_count);
-  if (!normals) {
-    return ORB_E_NO_MEMORY;
-  }
-  orb_status status =
-      orb_smooth_normals(ctx, mesh->positions, mesh->vertex_count, mesh->triangles, mesh->triangle_count, normals);
-  for (int64_t t = 0; status == ORB_OK && t < supermesh->triangle_count; t++) {
-    const int32_t *corner = supermesh->triangles + 3 * t;
-    double u[3], w[3], normal[3], ground[3] = {0};
-    orb_sub(positions + 3 * (int64_t)corner[1], positions + 3 * (int64_t)corner[0], u);
-    orb_sub(positions + 3 * (int64_t)corner[2], positions + 3 * (int64_t)corner[0], w);
-    orb_cross(u, w, normal);
-    for (int k = 0; k < 3; k++) {
-      add_normal(mesh, normals, &places[corner[k]], ground);
-    }
-    int against = orb_length(normal) > floor && orb_dot(normal, ground) < 0;
-    if (against) {
-      status = against_face(ctx, shape, supermesh->points, corner, normal, &locator, &against);
-    }
-    inverted[t] = (unsigned char)against;
-  }
-  orb_locator_destroy(ctx, locator);
-  orb_free(ctx, normals);
-  return status;
 }
 
 static int32_t list_pairs(int32_t shape_count, orb_pair_report *pairs) {
