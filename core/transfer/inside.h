@@ -5,15 +5,16 @@
 #include "orbmorph/remesh.h"
 
 typedef struct orb_inside {
-  int32_t *of;    /* per supermesh triangle: the input triangle that holds all three places; −1: none does */
-  int32_t *first; /* per input triangle, and one more: where its part of `held` begins */
-  int32_t *held;  /* supermesh triangles, grouped by the input triangle they lie in, ascending in each group */
+  int32_t *of;         /* per supermesh triangle: the input triangle that holds all three places; −1: none does */
+  int32_t *first;      /* per input triangle, and one more: where its part of `held` begins */
+  int32_t *held;       /* supermesh triangles, grouped by the input triangle they lie in, ascending in each group */
+  int32_t *ring_first; /* per input vertex, and one more: where its part of `ring` begins */
+  int32_t *ring;       /* half-edges of the input, grouped by the vertex they start at, ascending in each group */
 } orb_inside;
 
-/* twin: of the input mesh. O(F) of both. */
-ORB_MUST_CHECK orb_status orb_inside_make(orb_context *ctx, const orb_mesh *input, const int32_t *twin,
-                                          const int32_t *triangles, int32_t triangle_count, const orb_place *places,
-                                          orb_inside *out);
+/* O(F) of both meshes. */
+ORB_MUST_CHECK orb_status orb_inside_make(orb_context *ctx, const orb_mesh *input, const int32_t *triangles,
+                                          int32_t triangle_count, const orb_place *places, orb_inside *out);
 void orb_inside_free(orb_context *ctx, orb_inside *inside);
 
 /* The place's coordinates in another triangle of its mesh. Returns 0 if it does not lie there. Exact. */

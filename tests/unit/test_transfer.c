@@ -43,8 +43,8 @@ static void places_give_positions(void **state) {
   synthetic_free(ctx, &made);
 }
 
-/* With angle weights, the normal at an octahedron's tip is its axis, and the normal at a cube's corner is the diagonal,
- * however the faces are triangulated. */
+/* Angle weights make the normal at an octahedron's tip its axis, and a cube's corner normal the diagonal however the
+ * faces are cut. */
 static void smooth_normals_are_symmetric(void **state) {
   orb_context *ctx = *state;
   orb_mesh ball = shape_ball(ctx, 0);
@@ -65,8 +65,8 @@ static void smooth_normals_are_symmetric(void **state) {
   }
 }
 
-/* An octahedron whose octants have eight colours, and a supermesh ball with one more split: each corner has the colour
- * of its octant, though its vertex lies on an edge or at a vertex of the input. */
+/* The octants of an octahedron in eight colours, on a ball split once more than its input: each corner has the colour
+ * of its own octant, though vertices lie on the input's edges and at its vertices. */
 static void colours_keep_to_their_side(void **state) {
   orb_context *ctx = *state;
   synthetic fine = synthetic_make(ctx, 1, 1, same), coarse = synthetic_make(ctx, 0, 1, same);
@@ -153,7 +153,7 @@ static void a_shape_on_itself_has_no_error(void **state) {
   synthetic_free(ctx, &made);
 }
 
-/* An octahedron that represents a fine ball: the ball's farthest points lie over the centres of the faces, 1 − 1/√3
+/* An octahedron that stands for a fine ball: the ball's farthest points lie over the middles of the faces, 1 − 1/√3
  * away; the rms lies between what the faces' distances allow; normals differ most at the corners, by acos(1/√3). */
 static void an_octahedron_for_a_ball(void **state) {
   orb_context *ctx = *state;
@@ -176,6 +176,58 @@ static void an_octahedron_for_a_ball(void **state) {
   synthetic_free(ctx, &coarse);
 }
 
+static void bumpy(int32_t shape, const double p[3], double out[3]) {
+  (void)shape;
+  double r = 1 + 0.2 * sin(5 * p[0]) * cos(4 * p[1]) + 0.01 * sin(60 * p[2]);
+  for (int c = 0; c < 3; c++) {
+    out[c] = r * p[c];
+  }
+}
+
+/* Where a bound is proved, samples are fewer: the figures stay within a few per cent of those of all samples, and the
+ * sampled distance stays below that of all. */
+static void a_bound_needs_fewer_samples(void **state) {
+  orb_context *ctx = *state;
+  synthetic fine = synthetic_make(ctx, 6, 1, bumpy), coarse = synthetic_make(ctx, 4, 1, bumpy);
+  orb_shape_report all, some;
+  for (int v = 0; v < coarse.supermesh.vertex_count; v++) { /* finer balls keep the vertices of coarse ones, in order */
+    coarse.supermesh.places[v] = fine.supermesh.places[v];
+  }
+  coarse.supermesh.error_bound[0] = NAN;
+  assert_int_equal(orb_shape_measure(ctx, &fine.shapes[0], &coarse.supermesh, 0, &all), ORB_OK);
+  coarse.supermesh.error_bound[0] = 1.001 * all.hausdorff_sampled;
+  assert_int_equal(orb_shape_measure(ctx, &fine.shapes[0], &coarse.supermesh, 0, &some), ORB_OK);
+  assert_true(all.hausdorff_sampled > 0.01 && isnan(all.hausdorff));
+  assert_true(some.hausdorff_sampled <= all.hausdorff_sampled && some.hausdorff_sampled > 0.9 * all.hausdorff_sampled);
+  assert_true(some.rms != all.rms && fabs(some.rms / all.rms - 1) < 0.04);
+  assert_true(fabs(some.normal_mean / all.normal_mean - 1) < 0.04);
+  assert_true(fabs(some.normal_p99 / all.normal_p99 - 1) < 0.04);
+  assert_true(some.min_area_ratio == all.min_area_ratio);
+  synthetic_free(ctx, &fine);
+  synthetic_free(ctx, &coarse);
+}
+
+static void threads_change_no_bit(void **state) {
+  (void)state;
+  orb_shape_report report[2];
+  memset(report, 0, sizeof report);
+  for (int i = 0; i < 2; i++) {
+    orb_context *ctx;
+    orb_context_options options = {.threads = i ? 3 : 1};
+    assert_int_equal(orb_context_create(&options, &ctx), ORB_OK);
+    synthetic fine = synthetic_make(ctx, 5, 1, bumpy), coarse = synthetic_make(ctx, 3, 1, bumpy);
+    for (int v = 0; v < coarse.supermesh.vertex_count; v++) {
+      coarse.supermesh.places[v] = fine.supermesh.places[v];
+    }
+    assert_int_equal(orb_shape_measure(ctx, &fine.shapes[0], &coarse.supermesh, 0, &report[i]), ORB_OK);
+    synthetic_free(ctx, &fine);
+    synthetic_free(ctx, &coarse);
+    orb_context_destroy(ctx);
+  }
+  assert_true(report[0].rms > 0);
+  assert_memory_equal(&report[0], &report[1], sizeof *report);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(places_give_positions, setup, teardown),
@@ -184,6 +236,8 @@ int main(void) {
       cmocka_unit_test(rotations_are_found),
       cmocka_unit_test_setup_teardown(a_shape_on_itself_has_no_error, setup, teardown),
       cmocka_unit_test_setup_teardown(an_octahedron_for_a_ball, setup, teardown),
+      cmocka_unit_test_setup_teardown(a_bound_needs_fewer_samples, setup, teardown),
+      cmocka_unit_test(threads_change_no_bit),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

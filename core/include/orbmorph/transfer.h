@@ -12,10 +12,11 @@ extern "C" {
 ORB_API ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const orb_aligned_shape *shape,
                                                          const orb_place *places, int32_t count, double *out);
 
-/* How well shape s is reproduced; lengths in its own units. */
+/* How well shape s is reproduced; lengths in its own units. Samples are face centres, edge midpoints and vertices: all
+ * where no bound is proved, else at most 4096 of each kind and surface, which settle rms and angles to some 2 %. */
 typedef struct orb_shape_report {
   double hausdorff;               /* the supermesh's proved bound, both ways; NaN: none is proved */
-  double hausdorff_sampled;       /* both ways, at vertices, edge midpoints and face centres */
+  double hausdorff_sampled;       /* both ways, at the samples; apart from rounding, never above the true distance */
   double rms;                     /* of the distance, over both surfaces with equal weight */
   double normal_mean, normal_p99; /* degrees between the surfaces' normals at nearest points */
   double diagonal;
