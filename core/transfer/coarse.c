@@ -6,9 +6,15 @@
 #include "base/check.h"
 #include "base/memory.h"
 
-/* About so many groups, but of at least so many vertices: more groups make the correction better, and its
+/* Around so many groups, but of at least LEAST_SIZE vertices: more groups make the correction better, and its
  * factorisation, which is cubic in their number, slower. */
 enum { GROUPS = 384, LEAST_SIZE = 16 };
+enum { LEAST_SHARE = 4 }; /* a group of less than this fraction of the usual size joins a neighbour */
+/* A constant solves the homogeneous system. A diagonal larger by a relative 1e-8, which a preconditioner does not feel,
+ * makes the matrix regular; the absolute part serves a group without neighbours. */
+static const double REGULAR = 1e-8, ALONE = 1e-12;
+/* Square of a pivot: keeps its inverse finite where rounding leaves nothing. */
+static const double LEAST_PIVOT = 1e-300;
 
 void orb_coarse_free(orb_context *ctx, orb_coarse *coarse) {
   orb_free(ctx, coarse->group);
@@ -17,7 +23,7 @@ void orb_coarse_free(orb_context *ctx, orb_coarse *coarse) {
   memset(coarse, 0, sizeof *coarse);
 }
 
-/* Grows groups of `size` vertices, breadth first; pieces of less than a quarter of that join a neighbouring group. */
+/* Grows groups of `size` vertices, breadth first; smaller pieces join a neighbouring group. */
 static void make_groups(orb_coarse *coarse, const int32_t *first, const int32_t *neighbor, int32_t size,
                         int32_t *queue) {
   int32_t *group = coarse->group, count = 0;
@@ -43,7 +49,7 @@ static void make_groups(orb_coarse *coarse, const int32_t *first, const int32_t 
         }
       }
     }
-    if (tail < size / 4 && beside >= 0) {
+    if (tail < size / LEAST_SHARE && beside >= 0) {
       for (int32_t i = 0; i < tail; i++) {
         group[queue[i]] = beside;
       }
@@ -73,7 +79,7 @@ static orb_status factorise(orb_context *ctx, double *m, int32_t n) {
     for (int32_t j = 0; j <= i; j++) {
       double rest = m[(int64_t)i * n + j] - dot(m + (int64_t)i * n, m + (int64_t)j * n, j);
       if (i == j) {
-        m[(int64_t)i * n + i] = sqrt(rest > 1e-300 ? rest : 1e-300);
+        m[(int64_t)i * n + i] = sqrt(rest > LEAST_PIVOT ? rest : LEAST_PIVOT);
       } else {
         m[(int64_t)i * n + j] = rest / m[(int64_t)j * n + j];
       }
@@ -111,10 +117,9 @@ orb_status orb_coarse_create(orb_context *ctx, const int32_t *first, const int32
         }
       }
     }
-    for (int64_t g = 0; g < n;
-         g++) { /* a constant solves the homogeneous system; a slightly larger diagonal makes the matrix regular */
-      out->factor[g * n + g] *= 1 + 1e-8;
-      out->factor[g * n + g] += 1e-12;
+    for (int64_t g = 0; g < n; g++) {
+      out->factor[g * n + g] *= 1 + REGULAR;
+      out->factor[g * n + g] += ALONE;
     }
     status = factorise(ctx, out->factor, out->group_count);
   }

@@ -1,6 +1,16 @@
 #include "transfer/rotation.h"
 
 #include <math.h>
+#include <string.h>
+
+#include "numeric/vec3.h"
+
+enum { SWEEPS = 24 }; /* of Jacobi rotations: they converge quadratically, so that a few are usual */
+/* Sum of the squares off the diagonal, in units of the largest entry's square: eigenvectors are then exact to rounding.
+ */
+static const double CONVERGED = 1e-30;
+static const double NO_ANGLE = 1e-12; /* radians: such a rotation moves a unit vector by rounding only */
+static const double NO_SINE = 1e-15;  /* of half the angle: below it, the axis is rounding */
 
 /* One Jacobi rotation that makes m[p][q] zero; v collects the eigenvectors in its columns. */
 static void jacobi_rotate(double m[4][4], double v[4][4], int p, int q) {
@@ -44,14 +54,14 @@ void orb_rotation_fit(double h[3][3], double q[4]) {
                     {zx - xz, xy + yx, yy - xx - zz, yz + zy},
                     {xy - yx, zx + xz, yz + zy, zz - xx - yy}};
   double v[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
-  for (int sweep = 0; sweep < 24; sweep++) {
+  for (int sweep = 0; sweep < SWEEPS; sweep++) {
     double off = 0;
     for (int i = 0; i < 4; i++) {
       for (int j = i + 1; j < 4; j++) {
         off += m[i][j] * m[i][j];
       }
     }
-    if (off < 1e-30) {
+    if (off < CONVERGED) {
       break;
     }
     for (int i = 0; i < 4; i++) {
@@ -71,6 +81,28 @@ void orb_rotation_fit(double h[3][3], double q[4]) {
   }
   for (int i = 0; i < 4; i++) {
     q[i] /= sqrt(length);
+  }
+}
+
+void orb_rotation_vector(double h[3][3], double out[3]) {
+  double q[4];
+  orb_rotation_fit(h, q);
+  double sine = sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), angle = 2 * atan2(sine, q[0]);
+  for (int k = 0; k < 3; k++) {
+    out[k] = sine > NO_SINE ? angle * q[k + 1] / sine : 0;
+  }
+}
+
+void orb_rotate_by(const double w[3], double t, const double v[3], double out[3]) {
+  double angle = orb_length(w) * t, axis[3] = {w[0], w[1], w[2]}, cross[3];
+  if (!(orb_normalize(axis) > NO_ANGLE)) {
+    memcpy(out, v, 3 * sizeof *out);
+    return;
+  }
+  double s = sin(angle), c = cos(angle), along = orb_dot(axis, v) * (1 - c);
+  orb_cross(axis, v, cross);
+  for (int k = 0; k < 3; k++) {
+    out[k] = c * v[k] + s * cross[k] + along * axis[k];
   }
 }
 
