@@ -169,6 +169,7 @@ try {
   await step('open the morph', page, async () => {
     await page.getByRole('button', { name: /^Morph 2/ }).click();
     await until(() => page.getByRole('button', { name: 'Pause' }).count(), 'plays');
+    await until(() => page.getByText('Shown: the default morph.').count(), 'the default morph plays');
     await page.waitForTimeout(500);
     await page.getByRole('button', { name: 'Pause' }).click();
     await page.waitForTimeout(500);

@@ -10,6 +10,7 @@ import {
   button,
   clickView,
   hideToasts,
+  defaultShown,
   openPage,
   root,
   sample,
@@ -44,6 +45,7 @@ async function morphed(page) {
   await landmarked(page);
   await button(page, /^Morph 2 shapes$/).click();
   await until(() => button(page, 'Pause').count(), 'the morph plays');
+  await defaultShown(page);
   await button(page, 'Pause').click();
 }
 const slide = (page, name, value) =>

@@ -7,6 +7,7 @@ import {
   addFiles,
   button,
   difference,
+  defaultShown,
   openPage,
   sample,
   settled,
@@ -99,6 +100,7 @@ for (const colorScheme of ['light', 'dark'])
     found.landmarks = await findings(page);
     await button(page, /^Morph 2 shapes$/).click();
     await until(() => button(page, 'Pause').count(), 'the morph plays');
+    await defaultShown(page);
     await button(page, 'Pause').click();
     found.morph = await findings(page);
     await button(page, 'Use it').click();

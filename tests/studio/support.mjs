@@ -149,6 +149,10 @@ export async function addFiles(page, ...files) {
   await settled(page);
 }
 
+/** Waits until the default morph has replaced the fast one. */
+export const defaultShown = (page) =>
+  until(() => page.getByText('Shown: the default morph.').count(), 'the default morph');
+
 /** Counts the pixels in a screenshot of `selector` that `test(r, g, b)` accepts. */
 export async function countPixels(page, selector, test) {
   const png = await page.locator(selector).first().screenshot();

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { readFile } from 'node:fs/promises';
 import { promisify } from 'node:util';
-import { addFiles, button, openPage, sample, startBrowser, startDaemon, until } from './support.mjs';
+import { addFiles, button, defaultShown, openPage, sample, startBrowser, startDaemon, until } from './support.mjs';
 
 let daemon;
 let browser;
@@ -63,6 +63,7 @@ test('with a token everything works; the token stays in the tab and out of URLs'
   await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
   await button(page, /^Morph 2 shapes$/).click();
   await until(() => button(page, 'Pause').count(), 'the morph plays');
+  await defaultShown(page);
   await button(page, 'Pause').click();
   const [download] = await Promise.all([
     page.waitForEvent('download'),

@@ -16,11 +16,12 @@ import {
   difference,
   hideToasts,
   json,
+  defaultShown,
   openPage,
   root,
-  shownToasts,
   sample,
   settled,
+  shownToasts,
   startBrowser,
   startDaemon,
   until,
@@ -77,6 +78,7 @@ async function pickThree(page) {
 async function morph(page) {
   await button(page, /^Morph \d shapes$/).click();
   await until(() => button(page, 'Pause').count(), 'the morph plays');
+  await defaultShown(page);
 }
 
 test('from the empty page to a playing morph in at most five clicks', async () => {

@@ -72,6 +72,8 @@ export interface Running {
   purpose: 'morph' | 'find';
   job: Job | null;
   abort: AbortController;
+  /** the fast morph that is shown until this one is done; `ended` never rejects */
+  fast: { job: Job | null; abort: AbortController; ended: Promise<void> } | null;
 }
 
 export interface Result {
@@ -81,6 +83,13 @@ export interface Result {
   main: Model;
   each: Model[];
 }
+
+export const presetOf = (result: Result) =>
+  (result.supermesh.request ?? result.request)?.align?.options?.preset ?? 'default';
+export const isFast = (result: Result) => presetOf(result) === 'fast';
+
+/** Whether the default morph is still to come: what is shown is not what a download gives. */
+export const isWaiting = () => !!state.result && isFast(state.result) && state.running?.purpose === 'morph';
 
 export const PAINTS = ['direction', 'checker', 'symmetric_dirichlet', 'angle', 'area', 'aspect'] as const;
 export type SpherePaint = 'direction' | 'checker' | MeasureName;

@@ -1,6 +1,20 @@
-/** Sends the merge request, follows its job, loads the asset and plays it. */
+/**
+ * Sends the merge request, follows its job, loads the asset and plays it. A morph is requested twice: with the fast
+ * preset, whose result is shown at once, and as the options say, which replaces it.
+ */
 import { CancelledError, ProblemError, type Job, type Supermesh, type SupermeshRequest } from 'orbmorph';
-import { client, readyShapes, set, state, tint, toast, wireLandmarks, type Result, type Running } from '../state';
+import {
+  client,
+  isFast,
+  readyShapes,
+  set,
+  state,
+  tint,
+  toast,
+  wireLandmarks,
+  type Result,
+  type Running,
+} from '../state';
 import { work } from '../mesh/work';
 import { morphModels } from '../view/models';
 import { player } from '../player';
@@ -22,11 +36,20 @@ export function buildRequest(find = false): SupermeshRequest {
   return request;
 }
 
+/** The same request with the fast preset; null where the method has none. */
+function fastRequest(request: SupermeshRequest): SupermeshRequest | null {
+  const method = request.align?.method;
+  if (method === 'rbf' || method === 'rotate') return null;
+  return { ...request, align: { ...request.align, options: { preset: 'fast' } } };
+}
+
 export async function startMerge(purpose: Running['purpose'] = 'morph') {
   if (state.running || readyShapes().length < 2) return;
-  const running: Running = { purpose, job: null, abort: new AbortController() };
+  const running: Running = { purpose, job: null, abort: new AbortController(), fast: null };
   set({ running, problem: null });
   const request = buildRequest(purpose === 'find');
+  const fast = purpose === 'morph' ? fastRequest(request) : null;
+  if (fast) await showFast(running, fast);
   await follow(
     running,
     () =>
@@ -35,9 +58,39 @@ export async function startMerge(purpose: Running['purpose'] = 'morph') {
   );
 }
 
+/** Shows the fast morph when it is done. Resolves once the daemon has its job, which then comes first in the queue. */
+function showFast(running: Running, request: SupermeshRequest): Promise<void> {
+  const abort = new AbortController();
+  const { signal } = abort;
+  return new Promise((accepted) => {
+    const show = async () => {
+      try {
+        const onProgress = (job: Job) => {
+          running.fast!.job = job;
+          set();
+        };
+        const supermesh = await client
+          .merge(request, { signal, onJob: () => accepted(), onProgress })
+          .finally(() => accepted());
+        await openResult(supermesh, request, { signal });
+        if (signal.aborted) return;
+        set({ tab: 'morph', show: 'morph' });
+        player.play();
+      } catch {
+        // the default morph does not need it, and reports what is wrong with the request
+      } finally {
+        running.fast!.job = null;
+        set();
+      }
+    };
+    running.fast = { job: null, abort, ended: Promise.resolve() };
+    running.fast.ended = show();
+  });
+}
+
 /** Follows a job that an earlier visit started. */
 export async function resumeJob(id: string) {
-  const running: Running = { purpose: 'morph', job: null, abort: new AbortController() };
+  const running: Running = { purpose: 'morph', job: null, abort: new AbortController(), fast: null };
   set({ running });
   const { signal } = running.abort;
   await follow(
@@ -62,8 +115,11 @@ const progress = (running: Running) => (job: Job) => {
 async function follow(running: Running, get: () => Promise<Supermesh>, request: SupermeshRequest | null) {
   try {
     const supermesh = await get();
+    running.fast?.abort.abort();
     if (running.purpose === 'find') await takeFound(supermesh);
-    else {
+    else if (state.result && isFast(state.result)) {
+      await openResult(supermesh, request ?? supermesh.request ?? null, { keep: true });
+    } else {
       await openResult(supermesh, request ?? supermesh.request ?? null);
       set({ tab: 'morph', show: 'morph' });
       player.play();
@@ -72,6 +128,7 @@ async function follow(running: Running, get: () => Promise<Supermesh>, request: 
     if (running.abort.signal.aborted || error instanceof CancelledError) toast('Cancelled.');
     else set({ problem: describe(error) });
   } finally {
+    await running.fast?.ended;
     if (state.running === running) set({ running: null });
   }
 }
@@ -99,15 +156,29 @@ async function takeFound(supermesh: Supermesh) {
 }
 
 export function cancelMerge() {
+  state.running?.fast?.abort.abort();
   state.running?.abort.abort();
 }
 
-export async function openResult(supermesh: Supermesh, request: SupermeshRequest | null) {
-  set({ loading: 'Loading the morph' });
+/**
+ * Shows a morph. `keep`: in place of the shown one, with its time, mixture and view. `signal`: if aborted meanwhile,
+ * nothing changes.
+ */
+export async function openResult(
+  supermesh: Supermesh,
+  request: SupermeshRequest | null,
+  { keep = false, signal }: { keep?: boolean; signal?: AbortSignal } = {},
+) {
+  if (!keep) set({ loading: 'Loading the morph' });
   try {
-    const buffer = await client.asset(supermesh.id);
+    const buffer = await client.asset(supermesh.id, { signal });
     const data = await work('morph', supermesh.id, buffer, supermesh.shapes.length);
+    if (signal?.aborted) return;
+    const { playing, mix, show, side, result: before } = state;
+    const { time } = player;
+    keep &&= !!before;
     clearResult();
+    if (before && before.supermesh.id !== supermesh.id) void work('close', before.supermesh.id);
     const models = morphModels(data, supermesh.shapes.length + 1, tint(0));
     const result: Result = {
       supermesh,
@@ -129,8 +200,13 @@ export async function openResult(supermesh: Supermesh, request: SupermeshRequest
     });
     set({ result, mix: null });
     player.load(result);
+    if (!keep) return;
+    set({ show, side });
+    player.seek(time);
+    if (mix) player.mix(mix);
+    else if (playing) player.play();
   } finally {
-    set({ loading: null });
+    if (!keep) set({ loading: null });
   }
 }
 

@@ -1,5 +1,6 @@
 /** The main action, always in the same place: the Morph button, or the progress of a morph. */
-import { readyShapes, set, state, wireLandmarks } from '../state';
+import type { Job } from 'orbmorph';
+import { isWaiting, readyShapes, set, state, wireLandmarks, type Running } from '../state';
 import { cancelMerge, startMerge } from '../actions/merge';
 import { Bar, Button, Icon } from './parts';
 
@@ -14,6 +15,34 @@ const STAGES: Record<string, string> = {
   transfer: 'Transferring the shapes',
   write: 'Writing the asset',
 };
+
+const stageOf = (job: Job | null) =>
+  (job && (STAGES[job.state === 'queued' ? 'queued' : (job.stage ?? '')] ?? job.stage)) || 'Starting';
+
+/** The job that the page waits for, and what to call it: the fast morph, then the default one. */
+function waitedFor({ fast, job }: Running): { job: Job | null; text: string } {
+  if (fast?.job) return { job: fast.job, text: `Fast morph: ${stageOf(fast.job)}` };
+  return { job, text: fast && (job || isWaiting()) ? `Default morph: ${stageOf(job)}` : stageOf(job) };
+}
+
+function Progress({ running }: { running: Running }) {
+  const { job, text } = waitedFor(running);
+  return (
+    <div class="progress">
+      <div class="progress-text" role="status">
+        <span>{text}</span>
+        <span class="number">{job?.progress ? `${Math.round(job.progress * 100)} %` : ''}</span>
+      </div>
+      <Bar label={running.purpose === 'find' ? 'Finding landmarks' : 'Morphing'} value={job?.progress ?? null} />
+      <div class="row spread">
+        <span class="hint">You may close the page; the job continues.</span>
+        <Button kind="quiet" onClick={cancelMerge}>
+          Cancel
+        </Button>
+      </div>
+    </div>
+  );
+}
 
 export function Action() {
   const ready = readyShapes().length;
@@ -34,26 +63,7 @@ export function Action() {
         </div>
       )}
       {running ? (
-        <div class="progress">
-          <div class="progress-text" role="status">
-            <span>
-              {(running.job &&
-                (STAGES[running.job.state === 'queued' ? 'queued' : (running.job.stage ?? '')] ?? running.job.stage)) ||
-                'Starting'}
-            </span>
-            <span class="number">{running.job?.progress ? `${Math.round(running.job.progress * 100)} %` : ''}</span>
-          </div>
-          <Bar
-            label={running.purpose === 'find' ? 'Finding landmarks' : 'Morphing'}
-            value={running.job?.progress ?? null}
-          />
-          <div class="row spread">
-            <span class="hint">You may close the page; the job continues.</span>
-            <Button kind="quiet" onClick={cancelMerge}>
-              Cancel
-            </Button>
-          </div>
-        </div>
+        <Progress running={running} />
       ) : (
         <>
           <Button

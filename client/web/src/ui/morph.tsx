@@ -1,6 +1,6 @@
 /** The Morph tab: playing, scrubbing and mixing; the common mesh on each shape; the error; downloads. */
 import { useEffect, useRef } from 'preact/hooks';
-import { set, state, tint, toast, type Result } from '../state';
+import { isFast, isWaiting, presetOf, set, state, tint, toast, type Result } from '../state';
 import { save } from '../actions/landmarks';
 import { explain } from '../actions/token';
 import { measureErrors } from '../actions/merge';
@@ -169,7 +169,48 @@ function Transport({ result }: { result: Result }) {
 export const switchWire = () =>
   set(state.tab === 'morph' && state.show === 'each' ? { meshWire: !state.meshWire } : { wire: !state.wire });
 
+/** Which morph is shown, and what becomes of it. */
+function Shown({ result }: { result: Result }) {
+  return (
+    <p class="hint" role="status" aria-label="Which morph is shown">
+      {!isFast(result)
+        ? `Shown: the ${presetOf(result)} morph.`
+        : isWaiting()
+          ? 'Shown: the fast morph. The default one replaces it when it is done; then you can download it.'
+          : 'Shown: the fast morph. “Morph again” makes the default one.'}
+    </p>
+  );
+}
+
 const assetName = ({ supermesh }: Result) => `${supermesh.shapes.map((s) => s.name).join('-')}.glb`;
+
+function Download({ result }: { result: Result }) {
+  const { supermesh } = result;
+  if (isWaiting())
+    return (
+      <Button icon="download" disabled onClick={() => {}}>
+        Download GLB
+      </Button>
+    );
+  return (
+    <a
+      class="button primary"
+      href={client.url(supermesh.asset)}
+      download={assetName(result)}
+      onClick={(event) => {
+        if (!client.token) return;
+        event.preventDefault(); // a link cannot send the token
+        void client.asset(supermesh.id).then(
+          (glb) => save(new Blob([glb], { type: 'model/gltf-binary' }), assetName(result)),
+          (error) => toast(explain(error), 'error'),
+        );
+      }}
+    >
+      <Icon name="download" />
+      <span>Download GLB</span>
+    </a>
+  );
+}
 
 export function MorphInspector() {
   const { result } = state;
@@ -185,6 +226,7 @@ export function MorphInspector() {
   return (
     <>
       <h2>Morph</h2>
+      <Shown result={result} />
       <Segments
         label="What is shown"
         value={state.show}
@@ -204,23 +246,8 @@ export function MorphInspector() {
         <Switch label="Wireframe" on={state.show === 'each' ? state.meshWire : state.wire} onChange={switchWire} />
       </div>
       <div class="row wrap gap-top">
-        <a
-          class="button primary"
-          href={client.url(supermesh.asset)}
-          download={assetName(result)}
-          onClick={(event) => {
-            if (!client.token) return;
-            event.preventDefault(); // a link cannot send the token
-            void client.asset(supermesh.id).then(
-              (glb) => save(new Blob([glb], { type: 'model/gltf-binary' }), assetName(result)),
-              (error) => toast(explain(error), 'error'),
-            );
-          }}
-        >
-          <Icon name="download" />
-          <span>Download GLB</span>
-        </a>
-        <Button icon="code" onClick={() => set({ drawer: 'share' })}>
+        <Download result={result} />
+        <Button icon="code" disabled={isWaiting()} onClick={() => set({ drawer: 'share' })}>
           Use it
         </Button>
       </div>

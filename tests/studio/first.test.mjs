@@ -1,0 +1,169 @@
+// The fast morph is shown first, and the default one replaces it.
+import { after, before, test } from 'node:test';
+import assert from 'node:assert/strict';
+import {
+  addFiles,
+  button,
+  defaultShown,
+  openPage,
+  sample,
+  shownToasts,
+  startBrowser,
+  startDaemon,
+  until,
+} from './support.mjs';
+
+let daemon;
+let browser;
+before(async () => {
+  daemon = await startDaemon();
+  browser = await startBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await daemon?.stop();
+});
+
+const isFast = (request) => request.postDataJSON().align?.options?.preset === 'fast';
+const refuse = (route, title) =>
+  route.fulfill({
+    status: 422,
+    contentType: 'application/problem+json',
+    body: JSON.stringify({ type: 'about:blank', title, status: 422, detail: 'As the test wants.' }),
+  });
+
+/**
+ * A page with two shapes whose POST of a morph goes to `answer(kind, route)`; kind: fast or default. Returns the kinds in
+ * the order of their requests, too.
+ */
+async function pageWith(answer) {
+  const opened = await openPage(browser, daemon.url);
+  const posted = [];
+  await opened.page.route('**/v1/supermeshes', async (route) => {
+    if (route.request().method() !== 'POST') return route.continue();
+    const kind = isFast(route.request()) ? 'fast' : 'default';
+    posted.push(kind);
+    return answer(kind, route);
+  });
+  await addFiles(opened.page, sample('dog.obj'), sample('giraffe.off'));
+  await button(opened.page, 'Landmarks').click();
+  await opened.page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
+  await opened.page.locator('.marks li').first().waitFor();
+  return { ...opened, posted };
+}
+
+/** A promise and the function that resolves it. */
+function gate() {
+  let open;
+  const opened = new Promise((resolve) => (open = resolve));
+  return { opened, open };
+}
+
+const shown = (page) => page.getByRole('status', { name: 'Which morph is shown' });
+const slider = (page) => page.getByRole('slider', { name: 'Along the morph' });
+const camera = (page) => new URL(page.url()).hash.match(/cam=([^&]*)/)?.[1];
+test('the default morph replaces the fast one and keeps time, camera and view', async () => {
+  const { opened, open } = gate();
+  const { page, posted, done } = await pageWith(async (kind, route) => {
+    if (kind === 'default') await opened;
+    await route.continue();
+  });
+  await button(page, /^Morph 2 shapes$/).click();
+  await until(() => button(page, 'Pause').count(), 'the fast morph plays');
+  assert.deepEqual(posted, ['fast', 'default']);
+  assert.match(await shown(page).innerText(), /^Shown: the fast morph\. The default one replaces it/);
+  assert.ok(await button(page, 'Download GLB').isDisabled(), 'only the default morph is downloaded');
+  assert.ok(await button(page, 'Use it').isDisabled());
+  assert.ok(await button(page, 'Cancel').isVisible());
+
+  await slider(page).fill('0.3');
+  await page.locator('.pane-view').first().focus();
+  for (let i = 0; i < 4; i++) await page.keyboard.press('ArrowLeft');
+  await page.getByRole('switch', { name: 'Wireframe' }).check();
+  const turned = await until(() => camera(page), 'the address names the camera');
+  const fast = page.url().match(/[#&]r=([0-9a-f]+)/)[1];
+  open();
+  await defaultShown(page);
+  assert.equal(await slider(page).inputValue(), '0.3');
+  assert.ok(await button(page, 'Play').isVisible(), 'still paused');
+  assert.ok(await page.getByRole('switch', { name: 'Wireframe' }).isChecked());
+  assert.equal(await page.locator('.progress').count(), 0);
+  const now = await until(() => {
+    const id = page.url().match(/[#&]r=([0-9a-f]+)/)?.[1];
+    return id !== fast && id;
+  }, 'the address names the default morph');
+  assert.equal(camera(page), turned);
+  const waiting = page.waitForEvent('download');
+  await page.getByRole('link', { name: 'Download GLB' }).click();
+  assert.ok((await waiting).url().includes(now), 'the default morph is downloaded');
+  await done();
+});
+
+test('a fast morph that fails does not hide the default one', async () => {
+  const { page, posted, done } = await pageWith((kind, route) =>
+    kind === 'fast' ? refuse(route, 'No fast morph') : route.continue(),
+  );
+  await button(page, /^Morph 2 shapes$/).click();
+  await defaultShown(page);
+  await until(() => button(page, 'Pause').count(), 'the default morph plays');
+  assert.deepEqual(posted, ['fast', 'default']);
+  assert.equal(await page.getByRole('alert').count(), 0);
+  await done();
+});
+
+test('the fast morph stays if the default one fails', async () => {
+  const { opened, open } = gate();
+  const { page, done } = await pageWith(async (kind, route) => {
+    if (kind === 'fast') return route.continue();
+    await opened;
+    return refuse(route, 'No default morph');
+  });
+  await button(page, /^Morph 2 shapes$/).click();
+  await until(() => button(page, 'Pause').count(), 'the fast morph plays');
+  open();
+  await page.getByRole('alert').getByText('No default morph').waitFor();
+  assert.match(await shown(page).innerText(), /^Shown: the fast morph\. “Morph again”/);
+  assert.ok(await page.getByRole('link', { name: 'Download GLB' }).isVisible(), 'there is no other to download');
+  await done();
+});
+
+test('cancelling keeps the fast morph and stops the default one', async () => {
+  const { page, done } = await pageWith((kind, route) => (kind === 'fast' ? route.continue() : undefined));
+  await button(page, /^Morph 2 shapes$/).click();
+  await until(() => button(page, 'Pause').count(), 'the fast morph plays');
+  await button(page, 'Cancel').click();
+  await until(() => shownToasts(page).then((list) => list.includes('Cancelled.')), 'the page says so');
+  assert.match(await shown(page).innerText(), /^Shown: the fast morph\. “Morph again”/);
+  assert.equal(await page.locator('.progress').count(), 0);
+  await button(page, 'Morph again').waitFor();
+  await done();
+});
+
+test('progress names the morph and its stage', async () => {
+  const { page, done } = await pageWith((_kind, route) => route.continue());
+  await page.evaluate(() => {
+    globalThis.stages = new Set();
+    new MutationObserver(() => {
+      const text = document.querySelector('.progress-text span')?.textContent;
+      if (text) globalThis.stages.add(text);
+    }).observe(document.body, { subtree: true, childList: true, characterData: true });
+  });
+  await button(page, 'Shapes', { exact: true }).click();
+  await page.getByText('Options', { exact: true }).click();
+  await page.getByRole('slider', { name: /^Tolerance/ }).evaluate((input) => {
+    input.value = '-3.5';
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+  });
+  await button(page, /^Morph 2 shapes$/).click();
+  await defaultShown(page);
+  const seen = await page.evaluate(() => [...globalThis.stages]);
+  assert.ok(
+    seen.some((text) => /^Fast morph: \S/.test(text)),
+    seen.join(', '),
+  );
+  assert.ok(
+    seen.some((text) => /^Default morph: \S/.test(text)),
+    seen.join(', '),
+  );
+  await done();
+});
