@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define ROW(id, method, path, body, scope, handler) {id, method, path, body, scope},
+#define ROW(id, method, path, body, scope, query, handler) {id, method, path, body, scope, query},
 static const route table[ROUTE_COUNT] = {API_ROUTES(ROW)};
 #undef ROW
 

@@ -63,6 +63,8 @@ static const entry table[] = {
      "bytes of embeddings and supermeshes to keep, most recently used ones first; 0: all"},
     {"keep-jobs", NUMBER(keep_jobs, 0, INT64_C(1) << 40), "100000",
      "ended jobs to keep in the catalogue, newest first; 0: all"},
+    {"hosts", TEXT(hosts), "",
+     "names besides localhost and its address that the service has where no token is needed, comma-separated, or *"},
     {"cors", TEXT(cors), "", "origins that browsers may call from, comma-separated, or *"},
     {"log-level", TEXT(log_level), "info", "debug, info, warn or error"},
     {"log-format", TEXT(log_format), "json", "json or text"},
@@ -322,6 +324,20 @@ static int are_origins(const char *list) {
   return 1;
 }
 
+/* Whether all are hosts with an optional port, and not URLs. */
+static int are_hosts(const char *list) {
+  for (const char *at = list + strspn(list, ", "); *at; at += strspn(at, ", ")) {
+    size_t length = strcspn(at, ", ");
+    if (memchr(at, '/', length) || memchr(at, '@', length)) {
+      complain("hosts must be *, or a list of names such as morph.example.org or 192.0.2.7:8080, not \"%.*s\"",
+               (int)length, at);
+      return 0;
+    }
+    at += length;
+  }
+  return 1;
+}
+
 static int is_readable(const char *name, const char *path) {
   int fine = !*path || access(path, R_OK) == 0;
   if (!fine) {
@@ -357,7 +373,7 @@ static int consistent(config *out) {
   }
   return is_address(out->listen) && is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) &&
          is_one_of("auth", out->auth, auth) && is_one_of("log-level", out->log_level, levels) &&
-         is_one_of("log-format", out->log_format, formats) && are_origins(out->cors) &&
+         is_one_of("log-format", out->log_format, formats) && are_origins(out->cors) && are_hosts(out->hosts) &&
          is_readable("tls-certificate", out->tls_certificate) && is_readable("tls-key", out->tls_key);
 }
 

@@ -10,7 +10,8 @@ typedef struct config {
   char listen[256]; /* ADDR:PORT or unix:PATH */
   char data[PATH_MAX / 2];
   char file[PATH_MAX / 2];
-  char cors[512]; /* origins, comma-separated, or * */
+  char hosts[512]; /* names in Host, comma-separated, or * */
+  char cors[512];  /* origins, comma-separated, or * */
   char log_level[16], log_format[16];
   char tls_certificate[PATH_MAX / 2], tls_key[PATH_MAX / 2];
   char auth[16];       /* loopback, on, off */

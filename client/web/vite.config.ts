@@ -65,6 +65,12 @@ export default defineConfig({
   server: {
     host: '127.0.0.1',
     fs: { allow: [here('../..')] },
-    proxy: { '/v1': process.env.ORBMORPH_SERVER ?? 'http://127.0.0.1:8080' },
+    proxy: {
+      '/v1': {
+        target: process.env.ORBMORPH_SERVER ?? 'http://127.0.0.1:8080',
+        // The daemon refuses the origin of this server; to the daemon, the proxy is no page.
+        configure: (proxy) => proxy.on('proxyReq', (request) => request.removeHeader('origin')),
+      },
+    },
   },
 });

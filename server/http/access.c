@@ -14,13 +14,12 @@ static caller *find_caller(const server *srv, const char *header) {
   return callers_find(srv->callers, hash);
 }
 
-/* Health checks need no token and have no limits. */
-static int is_open(const char *path) {
+int access_is_open(const char *path) {
   return strcmp(path, "/livez") == 0 || strcmp(path, "/readyz") == 0;
 }
 
 int access_within_limits(request *r, const char *path) {
-  if (is_open(path)) {
+  if (access_is_open(path)) {
     return 1;
   }
   watched_take_request(r->watched, &r->allowance);
@@ -63,7 +62,7 @@ void access_headers(request *r) {
 
 /* Pages and the API document contain no user data; the studio asks its user for a token. */
 static int is_public(const request *r, const char *path) {
-  return is_open(path) || (r->route ? r->route->scope == SCOPE_NONE : is_page(path));
+  return access_is_open(path) || (r->route ? r->route->scope == SCOPE_NONE : is_page(path));
 }
 
 int access_check(request *r, const char *path, api_problem *problem) {

@@ -10,6 +10,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/socket.h>
 
 #include "metrics.h"
@@ -43,7 +44,25 @@ static int account(request *r) {
   return 1;
 }
 
+/* A form would have to be taken apart; a body that is the file itself streams to the disk as it is. */
+static void refuse_form(request *r) {
+  if (r->route->body == ROUTE_MESH_BODY) {
+    reply_refuse(
+        r, "unsupported-media-type",
+        "A form cannot be uploaded. Send the bytes of the file as the body, and name, format and repair in the "
+        "query: curl --data-binary @FILE 'URL/v1/meshes?name=NAME', or fetch(url, {method: 'POST', body: file}).");
+  } else {
+    reply_refuse(r, "unsupported-media-type",
+                 "A form cannot be read. Send the JSON as the body, with Content-Type: application/json.");
+  }
+}
+
 void body_begin(request *r) {
+  const char *type = header_of(r, "Content-Type");
+  if (type && strncasecmp(type, "multipart/", 10) == 0) {
+    refuse_form(r);
+    return;
+  }
   coding which = coding_of(header_of(r, "Content-Encoding"));
   if (which != CODING_NONE) {
     r->decoder = decoder_create(which);

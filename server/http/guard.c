@@ -86,9 +86,6 @@ int guard_headers(request *r, const char *version, api_problem *problem) {
 const char *header_of(const request *r, const char *name) {
   return MHD_lookup_connection_value(r->connection, MHD_HEADER_KIND, name);
 }
-const char *query_of(const request *r, const char *name) {
-  return MHD_lookup_connection_value(r->connection, MHD_GET_ARGUMENT_KIND, name);
-}
 
 typedef struct lines {
   const char *name, **out;
@@ -108,20 +105,4 @@ int header_lines(const request *r, const char *name, const char *out[HEADER_LINE
   lines found = {.name = name, .out = out};
   MHD_get_connection_values(r->connection, MHD_HEADER_KIND, gather, &found);
   return found.count;
-}
-
-static enum MHD_Result compare_name(void *user, enum MHD_ValueKind kind, const char *name, const char *value) {
-  const char **wanted = user;
-  (void)kind;
-  (void)value;
-  if (strcmp(name, *wanted) == 0) {
-    *wanted = NULL;
-    return MHD_NO;
-  }
-  return MHD_YES;
-}
-
-int query_has(const request *r, const char *name) {
-  MHD_get_connection_values(r->connection, MHD_GET_ARGUMENT_KIND, compare_name, &name);
-  return name == NULL;
 }

@@ -3,7 +3,8 @@
  * Reading order:
  *   server.c     the life of a request: answer() is called for headers, body and response; handlers[] maps each route
  *                of api/routes.h to its handler
- *   guard.c, access.c, body.c   what is checked before a handler runs: headers; limits, token, tenant; body
+ *   guard.c, access.c, browser.c, query.c, body.c   what is checked before a handler runs: headers; limits, token,
+ *                tenant; foreign pages (hosts.c: names in Host and Origin); query; body
  *   request.c    how a handler leaves the HTTP thread
  *   meshes.c     POST /v1/meshes          create.c      POST /v1/embeddings, POST /v1/supermeshes
  *   resources.c  GET, DELETE and lists of meshes, embeddings and supermeshes
@@ -122,13 +123,21 @@ const char *header_of(const request *r, const char *name);
 /* All lines of a header that is a list (RFC 9110 section 5.3), at most HEADER_LINES; returns their number. */
 enum { HEADER_LINES = 16 };
 int header_lines(const request *r, const char *name, const char *out[HEADER_LINES]);
-const char *query_of(const request *r, const char *name);
-int query_has(const request *r, const char *name); /* also without a value */
+
+/* query.c */
+/* Whether the route takes all parameters of the query: 1, or 0 with the problem. */
+int query_check(const request *r, api_problem *problem);
+const char *query_of(const request *r, const char *name); /* NULL: absent */
+int query_has(const request *r, const char *name);        /* also without a value */
+
+/* browser.c: 1, or 0 with the problem if a page may have sent the request that is not allowed to. */
+int browser_check(const request *r, const char *url, const char *path, api_problem *problem);
 
 /* access.c: 1, or 0 with a response. */
 int access_within_limits(request *r, const char *path);
 /* Adds RateLimit and RateLimit-Policy (draft-ietf-httpapi-ratelimit-headers) with the limits of the caller. */
 void access_headers(request *r);
+int access_is_open(const char *path); /* health checks: no token, no limits, any host */
 /* 1, or 0 with the problem. */
 int access_check(request *r, const char *path, api_problem *problem);
 /* The priority of the caller's jobs: first the token's class, then the urgency of the Priority header (RFC 9218,
@@ -169,7 +178,7 @@ void handle_page(request *r, const char *path);
 /* Handlers. server.c calls them when the whole body has arrived; the two of an upload run while it arrives. */
 void handle_mesh_begin(request *r);
 void handle_mesh_bytes(request *r, const char *bytes, size_t size);
-#define DECLARE(id, method, path, body, scope, handler) enum MHD_Result handler(request *r);
+#define DECLARE(id, method, path, body, scope, query, handler) enum MHD_Result handler(request *r);
 API_ROUTES(DECLARE)
 #undef DECLARE
 /* In PHASE_WAIT: keeps waiting, or leaves the response. */

@@ -2,21 +2,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "http/hosts.h"
 #include "http/http.h"
-
-/* Whether the list, separated by commas or spaces, names the origin. */
-static int is_listed(const char *list, const char *origin) {
-  size_t n = strlen(origin);
-  for (const char *at = list; *at;) {
-    at += strspn(at, ", ");
-    size_t length = strcspn(at, ", ");
-    if (length == n && n > 0 && strncmp(at, origin, n) == 0) {
-      return 1;
-    }
-    at += length;
-  }
-  return 0;
-}
 
 /* Adds the CORS headers. If they depend on the origin, every response carries Vary, even one to an origin that is not
  * allowed or not named, so that a cache does not mix them up (Fetch, "CORS protocol and HTTP caches"). */
@@ -29,7 +16,7 @@ static void add_cors(request *r) {
   if (!any) {
     reply_header(r, "Vary", "Origin");
   }
-  if (!origin || (!any && !is_listed(allowed, origin))) {
+  if (!origin || (!any && !origin_is_listed(allowed, origin))) {
     return;
   }
   reply_header(r, "Access-Control-Allow-Origin", any ? "*" : origin);

@@ -13,7 +13,7 @@
 
 enum { CONNECTION_MEMORY = 16 * 1024 };
 
-#define HANDLER(id, method, path, body, scope, handler) [id] = handler,
+#define HANDLER(id, method, path, body, scope, query, handler) [id] = handler,
 static enum MHD_Result (*const handlers[ROUTE_COUNT])(request *) = {API_ROUTES(HANDLER)};
 #undef HANDLER
 
@@ -70,7 +70,8 @@ static request *request_create(server *srv, struct MHD_Connection *connection, c
 }
 
 /* The first call of a request, with its headers. Leaves a response if the headers alone decide it. */
-static void request_begin(request *r, const char *path, const char *version) {
+static void request_begin(request *r, const char *url, const char *version) {
+  const char *path = parse_target(url);
   char allow[64];
   api_problem problem = {0};
   r->route = route_find(r->method, path, r->id, allow);
@@ -82,10 +83,12 @@ static void request_begin(request *r, const char *path, const char *version) {
     reply_problem(r, &problem);
   } else if (!access_within_limits(r, path)) {
     return;
-  } else if (!access_check(r, path, &problem)) {
+  } else if (!browser_check(r, url, path, &problem) || !access_check(r, path, &problem)) {
     reply_problem(r, &problem);
   } else if (!r->route) {
     answer_unrouted(r, path, allow);
+  } else if (!query_check(r, &problem)) {
+    reply_problem(r, &problem);
   } else if (r->route->body != ROUTE_NO_BODY) {
     body_begin(r);
   }
@@ -106,7 +109,7 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
     if (!r) {
       return MHD_NO;
     }
-    request_begin(r, parse_target(url), version);
+    request_begin(r, url, version);
     if (!r->has_body) {
       watched_work(r->watched);
     }

@@ -40,9 +40,9 @@ int LLVMFuzzerInitialize(int *argc, char ***argv) {
   }
   snprintf(address.sun_path, sizeof address.sun_path, "%s/socket", folder);
   snprintf(listen, sizeof listen, "unix:%s", address.sun_path);
-  char *words[] = {"orbmorphd",         "--listen", listen,           "--data", folder,     "--max-body", "1M",
-                   "--max-json",        "64K",      "--disk-reserve", "0",      "--limits", "off",        "--cors",
-                   "https://a.example", NULL};
+  char *words[] = {
+      "orbmorphd",      "--listen", listen,     "--data", folder,    "--max-body", "1M",     "--max-json",        "64K",
+      "--disk-reserve", "0",        "--limits", "off",    "--hosts", "*",          "--cors", "https://a.example", NULL};
   queue_options queued = {.workers = 1, .cores = 1, .limit = QUEUED_MOST, .memory = INT64_C(1) << 40};
   if (config_read(&options, (int)(sizeof words / sizeof *words) - 1, words) != CONFIG_RUN) {
     abort();

@@ -175,7 +175,7 @@ test('decoders share a budget of memory', async (t) => {
       socket
         .on('error', () => {})
         .write(
-          `POST /v1/meshes HTTP/1.1\r\nHost: x\r\nContent-Encoding: gzip\r\nContent-Length: ${begin.length}\r\n\r\n`,
+          `POST /v1/meshes HTTP/1.1\r\nHost: localhost\r\nContent-Encoding: gzip\r\nContent-Length: ${begin.length}\r\n\r\n`,
           done,
         ),
     );

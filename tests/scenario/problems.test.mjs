@@ -96,6 +96,10 @@ test('sections name the facts that answers have', async (t) => {
   meets('length-required', await bare(d.url, 'POST', '/v1/meshes', {}));
   meets('bad-request', await bare(d.url, 'GET', '/livez', { 'content-length': '2' }, 'xx'));
   meets('method-not-allowed', await d.request('PUT', '/v1/meshes'));
+  meets('foreign-host', await bare(d.url, 'GET', '/v1/meshes', { host: 'attacker.example' }));
+  meets('foreign-origin', await bare(d.url, 'GET', '/v1/meshes', { origin: 'https://attacker.example' }));
+  await upload('unsupported-media-type', '--x', {}, { 'content-type': 'multipart/form-data; boundary=x' });
+  await upload('bad-query', obj(m), { repare: 'safe' });
   meets('not-found', await d.get(`/v1/meshes/${'0'.repeat(64)}`));
 
   const a = await d.mesh(path.join(samples, 'dog.obj'));

@@ -150,7 +150,8 @@ test('ambiguous requests are refused', async (t) => {
   for (const [target, status] of [
     [`http://${host}/v1/meshes?limit=1`, 200],
     [`HTTP://${host}`, 200],
-    ['http://other/nothing', 404],
+    [`http://${host}/nothing`, 404],
+    ['http://other/nothing', 403],
   ])
     assert.equal(
       statusOf(await raw(d, `GET ${target} HTTP/1.1\r\nHost: ${host}\r\nConnection: close\r\n\r\n`)),

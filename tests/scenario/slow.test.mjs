@@ -38,17 +38,21 @@ test('slow headers and bodies', async (t) => {
   };
   const slow = [connect(d, t), connect(d, t), connect(d, t), connect(d, t)];
   const all = Promise.all([
-    trickle(slow[0], 'GET /livez HTTP/1.1\r\nHost: x\r\nX-Long: ', 'a'),
+    trickle(slow[0], 'GET /livez HTTP/1.1\r\nHost: localhost\r\nX-Long: ', 'a'),
     trickle(slow[1], 'G', 'E'),
-    trickle(slow[2], 'POST /v1/meshes HTTP/1.1\r\nHost: x\r\nContent-Length: 1000000\r\n\r\n', '#'),
-    trickle(slow[3], 'POST /v1/embeddings HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n', '1\r\n \r\n'),
+    trickle(slow[2], 'POST /v1/meshes HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000000\r\n\r\n', '#'),
+    trickle(
+      slow[3],
+      'POST /v1/embeddings HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n',
+      '1\r\n \r\n',
+    ),
   ]);
   // Slow, but not too slow: 4 kB/s over more than two looks, where 100 would do.
   const fine = connect(patient, t);
   const text = `${shapes.tetrahedron}${'#'.repeat(27_000)}\n`;
   const began = Date.now();
   fine.socket.write(
-    `POST /v1/meshes HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: ${text.length}\r\n\r\n`,
+    `POST /v1/meshes HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: ${text.length}\r\n\r\n`,
   );
   for (let at = 0; at < text.length; await sleep(100)) {
     const due = Math.min(text.length, 4 * (Date.now() - began));
@@ -75,7 +79,7 @@ test('responses that nobody reads, and clients that wait', async (t) => {
   await d.start();
   const stuck = connect(d, t);
   stuck.socket.pause();
-  stuck.socket.write(`GET ${url}/file HTTP/1.1\r\nHost: x\r\n\r\n`);
+  stuck.socket.write(`GET ${url}/file HTTP/1.1\r\nHost: localhost\r\n\r\n`);
   // A stream, a poll and a kept connection, all silent for as long, are not slow.
   const jobs = [];
   for (const area of [2, 3])
@@ -85,13 +89,13 @@ test('responses that nobody reads, and clients that wait', async (t) => {
     );
   const stream = connect(d, t);
   const kept = connect(d, t);
-  stream.socket.write(`GET ${jobs[1].url}/events HTTP/1.1\r\nHost: x\r\n\r\n`);
-  kept.socket.write('GET /livez HTTP/1.1\r\nHost: x\r\n\r\n');
+  stream.socket.write(`GET ${jobs[1].url}/events HTTP/1.1\r\nHost: localhost\r\n\r\n`);
+  kept.socket.write('GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n');
   const polled = await d.get(jobs[1].url, { query: { wait: 5 } });
   assert.equal(polled.status, 200);
   assert.equal(polled.json.state, 'queued', 'the first keeps the worker');
   assert.ok(!stream.closed && /retry: 2000/.test(stream.text), 'the stream is still there');
-  kept.socket.write('GET /livez HTTP/1.1\r\nHost: x\r\n\r\n');
+  kept.socket.write('GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n');
   await until(() => /200 OK[\s\S]*200 OK/.test(kept.text), 'an answer on the connection that was kept');
   stuck.socket.resume();
   await within(stuck.ended, 'the stuck one is closed');
@@ -111,7 +115,7 @@ test('a refusal reaches clients that send everything before they read', async (t
     const c = connect(d, t);
     const chunked = /chunked/.test(framing);
     c.socket.pause();
-    c.socket.write(`POST /v1/meshes HTTP/1.1\r\nHost: x\r\n${framing}\r\n\r\n`);
+    c.socket.write(`POST /v1/meshes HTTP/1.1\r\nHost: localhost\r\n${framing}\r\n\r\n`);
     for (let sent = 0; sent < megabytes * 16 && !c.closed; sent++) {
       const part = chunked ? Buffer.concat([Buffer.from('10000\r\n'), block, Buffer.from('\r\n')]) : block;
       await within(new Promise((done) => c.socket.write(part, done)), `${what}: the server takes it`);
@@ -149,12 +153,12 @@ test('limits of requests and connections for an address', async (t) => {
   await Promise.all(many.map((c) => new Promise((done) => c.socket.on('connect', done))));
   await until(async () => {
     const late = connect(d, t);
-    late.socket.write('GET /v1/meshes HTTP/1.1\r\nHost: x\r\n\r\n');
+    late.socket.write('GET /v1/meshes HTTP/1.1\r\nHost: localhost\r\n\r\n');
     await Promise.race([late.ended, sleep(2000)]); // answered: it came before some of the many were seen
     return late.closed && /^HTTP\/1\.1 429 [\s\S]*more than 20 open connections/.test(late.text);
   }, 'refused and closed');
   const alive = connect(d, t);
-  alive.socket.write('GET /livez HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n');
+  alive.socket.write('GET /livez HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n');
   await within(alive.ended, 'health checks always get a response');
   assert.match(alive.text, /^HTTP\/1\.1 200 /);
   many.forEach((c) => c.socket.destroy());

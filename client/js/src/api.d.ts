@@ -450,6 +450,8 @@ export type ProblemBadQuery = {
   status: 400;
   /** What is wrong and what to do. */
   detail: string;
+  /** The parameter that is unknown, given twice or without a value. */
+  parameter?: string;
 };
 
 export type ProblemMalformedJson = {
@@ -501,6 +503,26 @@ export type ProblemForbidden = {
   detail: string;
   /** The required scope. */
   scope: 'read' | 'write' | 'admin';
+};
+
+export type ProblemForeignHost = {
+  type: '/problems/foreign-host';
+  title: 'The request came under a foreign name';
+  status: 403;
+  /** What is wrong and what to do. */
+  detail: string;
+  /** The host that the request names. */
+  host: string;
+};
+
+export type ProblemForeignOrigin = {
+  type: '/problems/foreign-origin';
+  title: 'The request came from a foreign page';
+  status: 403;
+  /** What is wrong and what to do. */
+  detail: string;
+  /** The Origin header; absent where the browser sent none. */
+  origin?: string;
 };
 
 export type ProblemNotFound = {
@@ -575,6 +597,14 @@ export type ProblemUnknownFormat = {
   line?: number;
   /** The offset in bytes. */
   offset?: number;
+};
+
+export type ProblemUnsupportedMediaType = {
+  type: '/problems/unsupported-media-type';
+  title: 'The media type is not supported';
+  status: 415;
+  /** What is wrong and what to do. */
+  detail: string;
 };
 
 export type ProblemUnsupportedEncoding = {
@@ -861,4 +891,4 @@ export type ProblemStorageFull = {
 };
 
 /** A problem document of RFC 9457; `type` identifies the problem. */
-export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedEncoding | ProblemPreconditionFailed | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemTimeout | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;
+export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemForeignHost | ProblemForeignOrigin | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedMediaType | ProblemUnsupportedEncoding | ProblemPreconditionFailed | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemTimeout | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;
