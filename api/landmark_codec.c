@@ -203,3 +203,47 @@ void api_place_write(api_text *out, const api_place *spot) {
   }
   api_json_close(out, '}');
 }
+
+void api_landmarks_write(const api_landmark_list *list, api_text *out) {
+  api_json_open(out, '[');
+  for (int32_t l = 0; l < list->count; l++) {
+    const api_landmark_spec *spec = &list->items[l];
+    api_json_open(out, '{');
+    api_json_member_string(out, "name", spec->name);
+    api_json_key(out, "at");
+    api_json_open(out, '[');
+    for (int32_t s = 0; s < list->shape_count; s++) {
+      api_place_write(out, &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s]);
+    }
+    api_json_close(out, ']');
+    api_json_member_integer(out, "pass", spec->pass);
+    api_json_member_number(out, "radius", spec->radius);
+    api_json_member_number(out, "confidence", spec->confidence);
+    api_json_close(out, '}');
+  }
+  api_json_close(out, ']');
+}
+
+int api_landmarks_id(const api_landmark_list *list, char id[API_ID_SIZE]) {
+  api_text text = {0};
+  api_landmarks_write(list, &text);
+  int fine = !text.failed;
+  if (fine) {
+    api_id_of_text(text.data, text.size, id);
+  }
+  api_text_free(&text);
+  return fine;
+}
+
+void api_landmarks_describe(const char *id, const api_landmark_list *list, int64_t created, api_text *out) {
+  api_json_open(out, '{');
+  api_json_member_string(out, "id", id);
+  api_json_key(out, "url");
+  api_text_printf(out, "\"/v1/landmarks/%s\"", id);
+  api_json_member_integer(out, "count", list->count);
+  api_json_member_integer(out, "shapes", list->shape_count);
+  api_json_member_instant(out, "created", created);
+  api_json_key(out, "landmarks");
+  api_landmarks_write(list, out);
+  api_json_close(out, '}');
+}

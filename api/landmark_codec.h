@@ -2,6 +2,7 @@
 #ifndef ORB_API_LANDMARK_CODEC_H
 #define ORB_API_LANDMARK_CODEC_H
 
+#include "api/ids.h"
 #include "api/json.h"
 #include "api/problem.h"
 #include "api/text.h"
@@ -35,6 +36,15 @@ typedef struct api_landmark_list {
 int api_landmarks_read(const cJSON *value, int32_t shape_count, api_landmark_list *out, api_problem *problem);
 
 void api_landmarks_free(api_landmark_list *list);
+
+/* Appends the canonical array, which reads back as the same list. */
+void api_landmarks_write(const api_landmark_list *list, api_text *out);
+
+/* The id of a list: the SHA-256 of its canonical array. Returns 1, or 0 if memory runs out. */
+int api_landmarks_id(const api_landmark_list *list, char id[API_ID_SIZE]);
+/* Appends the resource: id, url, count, shapes, created, and last `landmarks`, so that a list of resources can leave
+ * them out. */
+void api_landmarks_describe(const char *id, const api_landmark_list *list, int64_t created, api_text *out);
 
 /* Appends {"vertex":i}, {"point":[…]} or {"triangle":t,"barycentric":[…]}. */
 void api_place_write(api_text *out, const api_place *spot);

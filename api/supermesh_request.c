@@ -142,7 +142,7 @@ int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, ap
   const cJSON *remesh = cJSON_GetObjectItemCaseSensitive(body, "remesh");
   const cJSON *asset = cJSON_GetObjectItemCaseSensitive(body, "asset");
   if (landmarks && cJSON_IsObject(landmarks)) {
-    return api_refuse(problem, "bad-landmarks", "\"landmarks\" must be an array, or \"auto\".");
+    return api_refuse(problem, "bad-landmarks", "\"landmarks\" must be an array, \"auto\" or {\"id\": ID}.");
   }
   if (landmarks && !api_landmarks_read(landmarks, out->shape_count, &out->landmarks, problem)) {
     return 0;
@@ -184,31 +184,6 @@ int api_supermesh_request_resolve(api_supermesh_request *request, const api_mesh
   return 1;
 }
 
-static void write_landmarks(api_text *out, const api_landmark_list *list) {
-  api_json_key(out, "landmarks");
-  if (list->count == 0) {
-    api_json_string(out, "auto");
-    return;
-  }
-  api_json_open(out, '[');
-  for (int32_t l = 0; l < list->count; l++) {
-    const api_landmark_spec *spec = &list->items[l];
-    api_json_open(out, '{');
-    api_json_member_string(out, "name", spec->name);
-    api_json_key(out, "at");
-    api_json_open(out, '[');
-    for (int32_t s = 0; s < list->shape_count; s++) {
-      api_place_write(out, &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s]);
-    }
-    api_json_close(out, ']');
-    api_json_member_integer(out, "pass", spec->pass);
-    api_json_member_number(out, "radius", spec->radius);
-    api_json_member_number(out, "confidence", spec->confidence);
-    api_json_close(out, '}');
-  }
-  api_json_close(out, ']');
-}
-
 void api_supermesh_request_write(const api_supermesh_request *request, api_text *out) {
   api_json_open(out, '{');
   api_json_key(out, "shapes");
@@ -220,7 +195,12 @@ void api_supermesh_request_write(const api_supermesh_request *request, api_text 
     api_json_close(out, '}');
   }
   api_json_close(out, ']');
-  write_landmarks(out, &request->landmarks);
+  api_json_key(out, "landmarks");
+  if (request->landmarks.count) {
+    api_landmarks_write(&request->landmarks, out);
+  } else {
+    api_json_string(out, "auto");
+  }
   api_json_key(out, "embedding");
   api_json_open(out, '{');
   api_embedding_options_members(&request->embedding, out);

@@ -231,6 +231,10 @@ static void print_help(void) {
       "                                 manage tokens, also while the service runs; give the same --data.\n"
       "                                 --tenant: the owner of what the token makes, by default NAME;\n"
       "                                 --quota: bytes of its meshes; --quota-jobs: its unfinished jobs\n"
+      "  orbmorphd key add NAME [--tenant NAME] [--origin URL]… [--requests-per-day N] [--cpu-seconds-per-day N]\n"
+      "  orbmorphd key rotate NAME [--overlap 7d]\n"
+      "  orbmorphd key list | key remove NAME\n"
+      "                                 manage the keys of signed URLs, likewise\n"
       "  orbmorphd --version, --help\n\n"
       "Each NAME is also an environment variable (ORBMORPH_NAME) and a line of the config file. A flag overrides the\n"
       "environment, which overrides the file, which overrides the default in brackets.\n");

@@ -12,7 +12,7 @@
 
 #include "log.h"
 
-enum { LINE_MOST = 512, PATIENCE_S = 10 };
+enum { LINE_MOST = 1024, PATIENCE_S = 10 };
 static const char name[] = "control";
 
 /* The path of a data folder may be too long for a socket address, so the address goes through its descriptor. */

@@ -14,6 +14,7 @@
 #include "control.h"
 #include "evict.h"
 #include "http/http.h"
+#include "key_command.h"
 #include "log.h"
 #include "maintain.h"
 #include "systemd.h"
@@ -175,11 +176,11 @@ static void on_change(const char *name, int taken) {
 }
 
 static int reload_callers(server *srv) {
-  int fine = callers_reload(srv->callers);
+  int fine = callers_reload(srv->callers) & signers_reload(srv->signers);
   if (fine) {
-    queue_wake_once(srv->q); /* ends streams and waits whose token has been removed */
+    queue_wake_once(srv->q); /* ends streams and waits whose token or key has been removed */
   } else {
-    log_error("the tokens could not be read again; the previous ones stay valid");
+    log_error("the tokens and keys could not be read again; the previous ones stay valid");
   }
   return fine;
 }
@@ -187,12 +188,16 @@ static int reload_callers(server *srv) {
 /* A command from the control socket. */
 static int on_command(void *user, const char *line, api_text *reply) {
   server *srv = user;
-  int status = token_command_apply(srv->cat, line, reply);
-  if (status == 0 && strncmp(line, "token list ", 11) != 0) {
-    char name[64] = "", verb[8] = "";
+  char what[8] = "", verb[8] = "", name[64] = "";
+  sscanf(line, "%7s %7s %63s", what, verb, name);
+  int keys = strcmp(what, "key") == 0, lists = strcmp(verb, "list") == 0;
+  if (keys && lists) {
+    signers_store_use(srv->signers);
+  }
+  int status = keys ? key_command_apply(srv->cat, line, reply) : token_command_apply(srv->cat, line, reply);
+  if (status == 0 && !lists) {
     status = !reload_callers(srv);
-    sscanf(line, "token %7s %63s", verb, name);
-    log_info("token %s: %s", verb, name);
+    log_info("%s %s: %s", keys ? "key" : "token", verb, name);
   }
   return status;
 }
@@ -246,6 +251,7 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
     if (now - kept >= TICK_MS) {
       kept = now;
       keep_budget(srv, &seen, &over);
+      signers_store_use(srv->signers);
       keep_jobs(srv, &jobs);
     }
     if (ready > 0 && wait[1].revents) {
@@ -293,10 +299,10 @@ static int start(server *srv, worker_pool **workers) {
   int listens = listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
   return listens && objects_open(o->data, &srv->store) == STORE_OK && catalogue_open(o->data, &srv->cat) == STORE_OK &&
-         (srv->callers = callers_open(srv->cat)) && (srv->q = queue_create(&queued, srv->cat)) &&
-         queue_recover(srv->q) == STORE_OK && (srv->descriptions = cache_create(CACHE_BYTES)) &&
-         (srv->io = tasks_start((int)o->io_threads)) && (srv->checks = tasks_start((int)o->workers)) &&
-         (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&
+         (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
+         (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q) == STORE_OK &&
+         (srv->descriptions = cache_create(CACHE_BYTES)) && (srv->io = tasks_start((int)o->io_threads)) &&
+         (srv->checks = tasks_start((int)o->workers)) && (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&
          (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) && http_start(srv);
 }
 
@@ -316,11 +322,15 @@ static void stop(server *srv, worker_pool *workers) {
   tasks_stop(srv->io);
   http_stop(srv);
   listen_remove(&srv->at);
+  if (srv->signers) {
+    signers_store_use(srv->signers);
+  }
   queue_destroy(srv->q);
   catalogue_close(srv->cat);
   objects_close(srv->store);
   cache_destroy(srv->descriptions);
   callers_close(srv->callers);
+  signers_close(srv->signers);
 }
 
 static int serve(server *srv, const command_line *line, int signals, const sigset_t *set) {
@@ -363,11 +373,35 @@ static int run(const command_line *line) {
   return result;
 }
 
+/* A command for tokens or keys, or none. */
+typedef struct admin_command {
+  int is_token, is_key;
+  token_command tokens;
+  key_command keys;
+} admin_command;
+
+static int ask(const admin_command *admin, const config *options) {
+  return admin->is_token ? token_command_ask(&admin->tokens, options)
+         : admin->is_key ? key_command_ask(&admin->keys, options)
+                         : -1;
+}
+
+/* What needs the lock of the data folder: a command that no running daemon took, --check-data, --gc. */
+static int work_alone(const admin_command *admin, config_action action, const config *options) {
+  return admin->is_token               ? token_command_run(&admin->tokens, options)
+         : admin->is_key               ? key_command_run(&admin->keys, options)
+         : action == CONFIG_CHECK_DATA ? maintain_check(options)
+         : action == CONFIG_GC         ? maintain_gc(options)
+                                       : 2;
+}
+
 int main(int argc, char **argv) {
   static config options;
-  static token_command tokens;
-  int is_token = argc > 1 && strcmp(argv[1], "token") == 0;
-  if (is_token && !token_command_read(&tokens, &argc, argv)) {
+  static admin_command admin;
+  admin.is_token = argc > 1 && strcmp(argv[1], "token") == 0;
+  admin.is_key = argc > 1 && strcmp(argv[1], "key") == 0;
+  if ((admin.is_token && !token_command_read(&admin.tokens, &argc, argv)) ||
+      (admin.is_key && !key_command_read(&admin.keys, &argc, argv))) {
     return 2;
   }
   config_action action = config_read(&options, argc, argv);
@@ -385,17 +419,17 @@ int main(int argc, char **argv) {
       puts("the configuration is valid");
       return 0;
     case CONFIG_RUN:
-      if (!is_token) {
+      if (!admin.is_token && !admin.is_key) {
         return run(&(command_line){argc, argv, &options});
       }
       break;
     default:
       break;
   }
-  int asked = is_token ? token_command_ask(&tokens, &options) : -1;
+  int asked = ask(&admin, &options);
   int lock = asked < 0 ? lock_data(options.data) : -1;
   if (lock < 0 && asked < 0) { /* the daemon may have just been starting */
-    asked = is_token ? token_command_ask(&tokens, &options) : -1;
+    asked = ask(&admin, &options);
     if (asked < 0) {
       say_locked(options.data);
       return 1;
@@ -404,10 +438,7 @@ int main(int argc, char **argv) {
   if (asked >= 0) {
     return asked;
   }
-  int result = is_token                      ? token_command_run(&tokens, &options)
-               : action == CONFIG_CHECK_DATA ? maintain_check(&options)
-               : action == CONFIG_GC         ? maintain_gc(&options)
-                                             : 2;
+  int result = work_alone(&admin, action, &options);
   close(lock);
   return result;
 }

@@ -14,6 +14,7 @@ int cli_run_get(cli *c);
 int cli_run_rm(cli *c);
 int cli_run_doctor(cli *c);
 int cli_run_view(cli *c);
+int cli_run_sign(cli *c);
 int cli_run_completions(cli *c);
 
 #endif

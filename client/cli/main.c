@@ -40,6 +40,9 @@ static const cli_command command_list[] = {
      CLI_BIT(OPT_HELP) | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_POSES) | CLI_BIT(OPT_SIZE) | CLI_BIT(OPT_UP) |
          CLI_BIT(OPT_YAW) | CLI_BIT(OPT_PITCH) | CLI_BIT(OPT_WIRE) | CLI_BIT(OPT_INSIDE) | CLI_BIT(OPT_FRAMES),
      NULL, "out.glb --frames 60 -o out.png", cli_run_view},
+    {"sign", "URL", "Sign the URL of a morph, so that a browser can load it without a token", 1, 1,
+     CLI_BIT(OPT_HELP) | CLI_BIT(OPT_KEY) | CLI_BIT(OPT_EXPIRES), NULL,
+     "'https://morph.example.org/v1/morph.glb?shapes=ID,ID' --expires 30d", cli_run_sign},
     {"completions", "bash|zsh|fish", "Print the completion script of a shell", 1, 1, CLI_BIT(OPT_HELP), "bash zsh fish",
      "bash > /etc/bash_completion.d/orbmorph", cli_run_completions},
 };

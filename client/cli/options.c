@@ -49,6 +49,8 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_WIRE] = {"wire", 0, NULL, NULL, "draw the edges of the triangles"},
     [OPT_INSIDE] = {"inside", 0, NULL, NULL, "paint triangles seen from inside red"},
     [OPT_FRAMES] = {"frames", 0, "N", NULL, "draw an animated PNG of N frames, 20 per second, instead of a sheet"},
+    [OPT_KEY] = {"key", 'k', "KEY:SECRET", NULL, "signing key; default: $ORBMORPH_KEY"},
+    [OPT_EXPIRES] = {"expires", 0, "TIME", NULL, "time until the signature expires, such as 30d, 12h or 90m"},
 };
 
 static int find_long(const cli_command *command, const char *text, size_t length) {

@@ -42,6 +42,8 @@ typedef enum cli_option_id {
   OPT_WIRE,
   OPT_INSIDE,
   OPT_FRAMES,
+  OPT_KEY,
+  OPT_EXPIRES,
   OPT_COUNT
 } cli_option_id;
 

@@ -2,7 +2,7 @@
 _orbmorph() {
   local current="${COMP_WORDS[COMP_CWORD]}" previous="${COMP_WORDS[COMP_CWORD-1]}" words="" operands="" choices=""
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "morph upload embed merge job ls get rm doctor view completions --help --version" -- "$current"))
+    COMPREPLY=($(compgen -W "morph upload embed merge job ls get rm doctor view sign completions --help --version" -- "$current"))
     return
   fi
   case "$previous" in
@@ -54,6 +54,9 @@ _orbmorph() {
       ;;
     view)
       words="--help --output --poses --size --up --yaw --pitch --wire --inside --frames "
+      ;;
+    sign)
+      words="--help --key --expires "
       ;;
     completions)
       words="--help "

@@ -67,7 +67,7 @@ static int is_public(const request *r, const char *path) {
 
 int access_check(request *r, const char *path, api_problem *problem) {
   /* Browsers send CORS preflight requests without a token; the response lists only methods. */
-  if (!r->srv->needs_token || is_public(r, path) || strcmp(r->method, "OPTIONS") == 0) {
+  if (!r->srv->needs_token || r->signer || is_public(r, path) || strcmp(r->method, "OPTIONS") == 0) {
     return 1;
   }
   r->caller = find_caller(r->srv, header_of(r, "Authorization"));
@@ -102,10 +102,13 @@ int access_is_operator(const request *r) {
 }
 
 const char *access_tenant(const request *r) {
-  return r->caller ? r->caller->row.tenant : "";
+  return r->caller ? r->caller->row.tenant : r->signer && r->srv->needs_token ? r->signer->row.tenant : "";
 }
 
 const char *access_view(const request *r) {
+  if (r->signer) {
+    return access_tenant(r);
+  }
   int all = !r->caller || (__atomic_load_n(&r->caller->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN);
   return all ? "" : r->caller->row.tenant;
 }

@@ -186,3 +186,15 @@ void body_free(request *r) {
   }
   api_text_free(&r->body);
 }
+
+cJSON *read_json(request *r, api_problem *problem) {
+  api_json_error error;
+  cJSON *body = api_json_parse(r->body.data ? r->body.data : "", r->body.size, &error);
+  if (!body && !error.why) {
+    api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  } else if (!body) {
+    api_refuse(problem, "malformed-json", "The body is not valid JSON: %s (at byte %zu).", error.why, error.offset);
+    api_json_member_integer(&problem->facts, "offset", (int64_t)error.offset);
+  }
+  return body;
+}

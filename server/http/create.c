@@ -5,16 +5,9 @@
 
 #include "api/json.h"
 #include "api/supermesh_codec.h"
+#include "http/body.h"
 #include "http/http.h"
 #include "log.h"
-
-/* A request that was read and validated. */
-typedef struct wanted {
-  resource_kind kind;
-  char id[API_ID_SIZE];
-  api_text canonical;
-  int64_t cost;
-} wanted;
 
 static int summary_of(request *r, const char *mesh, api_mesh_summary *out, api_problem *problem) {
   server *srv = r->srv;
@@ -34,7 +27,7 @@ static int no_memory(api_problem *problem) {
   return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
 }
 
-static int read_embedding(request *r, const cJSON *body, wanted *out, api_problem *problem) {
+static int read_embedding(request *r, const cJSON *body, wanted_result *out, api_problem *problem) {
   api_embedding_request wish;
   api_mesh_summary mesh;
   if (!api_embedding_request_read(body, &wish, problem) || !summary_of(r, wish.mesh, &mesh, problem)) {
@@ -46,7 +39,7 @@ static int read_embedding(request *r, const cJSON *body, wanted *out, api_proble
   return (api_embedding_request_id(&wish, out->id) && !out->canonical.failed) || no_memory(problem);
 }
 
-static int read_supermesh(request *r, const cJSON *body, wanted *out, api_problem *problem) {
+int wanted_supermesh(request *r, const cJSON *body, wanted_result *out, api_problem *problem) {
   api_supermesh_request wish;
   api_mesh_summary meshes[API_SHAPES_MAX];
   int fine = api_supermesh_request_read(body, &wish, problem);
@@ -64,19 +57,14 @@ static int read_supermesh(request *r, const cJSON *body, wanted *out, api_proble
   return fine;
 }
 
-static int read_wish(request *r, wanted *out, api_problem *problem) {
-  api_json_error error;
-  cJSON *body = api_json_parse(r->body.data ? r->body.data : "", r->body.size, &error);
+static int read_wish(request *r, wanted_result *out, api_problem *problem) {
+  cJSON *body = read_json(r, problem);
   if (!body) {
-    if (!error.why) {
-      return no_memory(problem);
-    }
-    api_refuse(problem, "malformed-json", "The body is not valid JSON: %s (at byte %zu).", error.why, error.offset);
-    api_json_member_integer(&problem->facts, "offset", (int64_t)error.offset);
     return 0;
   }
-  int fine = r->route->id == ROUTE_EMBEDDING_CREATE ? read_embedding(r, body, out, problem)
-                                                    : read_supermesh(r, body, out, problem);
+  int fine = r->route->id == ROUTE_EMBEDDING_CREATE
+                 ? read_embedding(r, body, out, problem)
+                 : resolve_landmarks(r, body, problem) && wanted_supermesh(r, body, out, problem);
   cJSON_Delete(body);
   return fine;
 }
@@ -123,17 +111,23 @@ static void refuse_submit(request *r, queue_result result, int64_t owner_limit) 
   }
 }
 
-static void submit(request *r, const wanted *wish) {
+void submit_wanted(request *r, const wanted_result *wish) {
   queue_request wanted_job = {.kind = wish->kind == RESOURCE_EMBEDDING ? API_JOB_EMBEDDING : API_JOB_SUPERMESH,
                               .key = wish->id,
                               .request = wish->canonical.data,
                               .owner = access_tenant(r),
+                              .charged = r->signer ? r->signer->row.name : NULL,
                               .owner_limit = r->caller ? __atomic_load_n(&r->caller->row.jobs, __ATOMIC_RELAXED) : 0,
                               .priority = access_priority(r),
                               .cost = wish->cost,
                               .listed = 1};
   job *j = NULL;
   int fresh = 0;
+  api_problem problem = {0};
+  if (!sign_may_work(r, &problem)) {
+    reply_problem(r, &problem);
+    return;
+  }
   queue_result result = queue_submit(r->srv->q, &wanted_job, &j, &fresh);
   if (result != QUEUE_OK) {
     refuse_submit(r, result, wanted_job.owner_limit);
@@ -144,9 +138,8 @@ static void submit(request *r, const wanted *wish) {
     callers_recount(r->srv->callers, access_tenant(r)); /* the job may have made it an owner of further meshes */
   }
   log_submitted(r, j, fresh);
-  if (r->wait_until > orb_clock_ms()) {
+  if (r->waits_for_what == WAIT_ASSET || r->wait_until > orb_clock_ms()) {
     r->waits_for = j;
-    r->wait_for_result = 1;
     r->phase = PHASE_WAIT;
     return;
   }
@@ -155,7 +148,7 @@ static void submit(request *r, const wanted *wish) {
 }
 
 static void create_away(request *r) {
-  wanted wish = {0};
+  wanted_result wish = {0};
   api_problem problem = {0};
   store_result result;
   if (!read_wish(r, &wish, &problem)) {
@@ -167,7 +160,7 @@ static void create_away(request *r) {
     } else if (result != STORE_NOT_FOUND) {
       reply_store(r, result);
     } else {
-      submit(r, &wish);
+      submit_wanted(r, &wish);
     }
   }
   api_text_free(&wish.canonical);
@@ -179,5 +172,6 @@ enum MHD_Result handle_create(request *r) {
     return MHD_YES;
   }
   r->wait_until = wait ? orb_clock_ms() + wait : 0;
+  r->waits_for_what = WAIT_RESULT;
   return request_go_away(r, r->srv->io, create_away);
 }

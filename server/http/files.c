@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "http/http.h"
@@ -10,12 +11,22 @@
 #include "metrics.h"
 #include "store/spheres.h"
 
+enum { YEAR_S = 31536000 };
+
 static void add_headers(request *r, const char *etag, const char *mime, const char *name) {
   char disposition[160];
+  char control[64];
+  int64_t left = r->expires - (int64_t)time(NULL);
   reply_header(r, "ETag", etag);
-  /* A shared cache must not keep what only one token may see. */
-  reply_header(r, "Cache-Control",
-               r->caller ? "private, max-age=31536000, immutable" : "public, max-age=31536000, immutable");
+  if (r->signer) { /* whoever has the URL may see it until it expires */
+    snprintf(control, sizeof control, "public, max-age=%lld",
+             (long long)(left < 0        ? 0
+                         : left < YEAR_S ? left
+                                         : YEAR_S));
+  } else { /* a shared cache must not keep what only one token may see */
+    snprintf(control, sizeof control, "%s, max-age=%d, immutable", r->caller ? "private" : "public", YEAR_S);
+  }
+  reply_header(r, "Cache-Control", control);
   reply_header(r, "Accept-Ranges", "bytes");
   if (r->status != 304) {
     reply_header(r, "Content-Type", mime);
@@ -93,6 +104,17 @@ static void reply_sphere(request *r) {
   reply_part(r, OBJECT_SPHERES, r->id, part, r->id, "application/octet-stream", name);
 }
 
+void reply_asset(request *r, const cached *entry) {
+  char link[128];
+  memcpy(r->id, entry->row.id, sizeof r->id);
+  reply_object(r, OBJECT_ASSET, r->id, entry->row.sha, "model/gltf-binary", "asset.glb");
+  if (r->route->id == ROUTE_MORPH && r->status < 400) {
+    snprintf(link, sizeof link, "</v1/supermeshes/%s>; rel=\"describedby\"", r->id);
+    reply_header(r, "Link", link);
+  }
+  cache_release(r->srv->descriptions, entry);
+}
+
 static void file_of(request *r, const cached *entry) {
   char name[100], format[8] = "bin";
   switch (r->route->id) {
@@ -116,7 +138,8 @@ static void file_of(request *r, const cached *entry) {
       reply_sphere(r);
       break;
     default:
-      reply_object(r, OBJECT_ASSET, r->id, entry->row.sha, "model/gltf-binary", "asset.glb");
+      reply_asset(r, entry);
+      return;
   }
   cache_release(r->srv->descriptions, entry);
 }
@@ -133,8 +156,7 @@ static int is_lost(const request *r) {
   return r->status == 404 && r->route->id != ROUTE_SUPERMESH_PLACES && r->route->id != ROUTE_SUPERMESH_SPHERE;
 }
 
-/* Distinguishes an object that has just been deleted from one that is lost. */
-static void lost_away(request *r) {
+void reply_lost(request *r) {
   resource row = {0};
   if (catalogue_get(r->srv->cat, kind_of(r), r->id, &row) == STORE_OK) {
     log_error("the file of %s %s is lost: --check-data lists all damage", r->route->path, r->id);
@@ -154,7 +176,7 @@ static void file_away(request *r) {
   }
   file_of(r, entry);
   if (is_lost(r)) {
-    lost_away(r);
+    reply_lost(r);
   }
 }
 
@@ -169,5 +191,5 @@ enum MHD_Result handle_file(request *r) {
   metrics_cache(1);
   note_use(r->srv, entry);
   file_of(r, entry);
-  return is_lost(r) ? request_go_away(r, r->srv->io, lost_away) : MHD_YES;
+  return is_lost(r) ? request_go_away(r, r->srv->io, reply_lost) : MHD_YES;
 }

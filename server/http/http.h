@@ -7,7 +7,9 @@
  *                tenant; foreign pages (hosts.c: names in Host and Origin); query; body
  *   request.c    how a handler leaves the HTTP thread
  *   meshes.c     POST /v1/meshes          create.c      POST /v1/embeddings, POST /v1/supermeshes
- *   resources.c  GET, DELETE and lists of meshes, embeddings and supermeshes
+ *   landmarks.c  POST /v1/landmarks
+ *   morph.c      GET /v1/morph.glb        sign.c, signers.c   signed URLs
+ *   resources.c  GET, DELETE and lists of meshes, embeddings, supermeshes and landmarks
  *   files.c      GET of stored objects    jobs.c        GET, DELETE and lists of jobs; waiting for a job
  *   events.c     GET /v1/jobs/{job}/events
  *   system.c     /livez, /readyz, /metrics              pages.c       the studio, /openapi.json, /docs
@@ -33,6 +35,7 @@
 #include <microhttpd.h>
 #include <pthread.h>
 
+#include "api/json.h"
 #include "api/problem.h"
 #include "api/routes.h"
 #include "cache.h"
@@ -41,6 +44,7 @@
 #include "http/decode.h"
 #include "http/listen.h"
 #include "http/parse.h"
+#include "http/signers.h"
 #include "http/watch.h"
 #include "queue/queue.h"
 #include "tasks.h"
@@ -60,11 +64,19 @@ typedef struct server {
   int64_t started;
   int needs_token;
   callers *callers;
+  signers *signers;
   int control; /* the descriptor of the control socket */
   unsigned char secret[CATALOGUE_SECRET];
 } server;
 
 typedef enum request_phase { PHASE_BODY, PHASE_AWAY, PHASE_WAIT, PHASE_SEND } request_phase;
+
+/* What a request that waits for a job gets when the job succeeds in time; until then and otherwise, the job. */
+typedef enum wait_for {
+  WAIT_JOB,
+  WAIT_RESULT,
+  WAIT_ASSET, /* the asset; otherwise a problem */
+} wait_for;
 
 typedef struct request request;
 struct request {
@@ -80,6 +92,10 @@ struct request {
   int shape;       /* {k} of the path; −1: none */
   char number[24]; /* of the request, for the log and X-Request-Id */
   caller *caller;  /* referenced; NULL where no token is needed */
+  signer *signer;  /* referenced; NULL: the URL is not signed */
+  int64_t expires; /* of the signature, Unix time in seconds */
+  int64_t retry_s; /* for Retry-After; 0: the usual */
+  int begun;       /* the headers have arrived */
   int has_body, head;
   int closes; /* the connection closes after this response */
   request_phase phase;
@@ -98,13 +114,14 @@ struct request {
   job *waits_for;
   int64_t wait_until;
   int64_t preferred_ms; /* from a Prefer header */
-  int wait_for_result;  /* respond with the result if the job succeeds in time, else with the job */
-  int cancels;          /* the request cancels waits_for; refused if the job ends in another way */
+  wait_for waits_for_what;
+  int cancels; /* the request cancels waits_for; refused if the job ends in another way */
 
   unsigned status;
   int64_t sends;          /* bytes of the response's body; event streams count theirs as they send */
   char trace[TRACE_SIZE]; /* traceparent, if the caller sent a well-formed one */
   struct MHD_Response *response;
+  char target[]; /* of the request line, as sent */
 };
 
 /* server.c */
@@ -129,6 +146,12 @@ int header_lines(const request *r, const char *name, const char *out[HEADER_LINE
 int query_check(const request *r, api_problem *problem);
 const char *query_of(const request *r, const char *name); /* NULL: absent */
 int query_has(const request *r, const char *name);        /* also without a value */
+
+/* sign.c */
+/* Checks the signature of the URL, if the route takes one and the URL has one: 1, or 0 with the problem. */
+int sign_check(request *r, const char *path, api_problem *problem);
+/* Whether the key of the URL may cause more work today: 1, or 0 with the problem. Blocks. */
+int sign_may_work(request *r, api_problem *problem);
 
 /* browser.c: 1, or 0 with the problem if a page may have sent the request that is not allowed to. */
 int browser_check(const request *r, const char *url, const char *path, api_problem *problem);
@@ -195,7 +218,28 @@ int list_begin(request *r, const char *name, size_t row_size, list_page *page); 
 /* Frees the page and leaves a response. last: sequence number of the page's last row; count: rows found, −1 if they
  * could not be read. */
 void list_end(request *r, list_page *page, int64_t last, int count);
+/* A request for an embedding or supermesh that was read and validated. The caller frees canonical. */
+typedef struct wanted_result {
+  resource_kind kind;
+  char id[API_ID_SIZE];
+  api_text canonical;
+  int64_t cost;
+} wanted_result;
+/* Reads the body of a request for a supermesh. Blocks. 1, or 0 with the problem. */
+int wanted_supermesh(request *r, const cJSON *body, wanted_result *out, api_problem *problem);
+/* Submits the job; leaves a response, or PHASE_WAIT. Blocks. */
+void submit_wanted(request *r, const wanted_result *wish);
+/* The asset of a supermesh at any URL, with ranges and conditions; releases the description. */
+void reply_asset(request *r, const cached *entry);
+/* After a 404 for an object: distinguishes one that has just been deleted from one that is lost. Blocks. */
+void reply_lost(request *r);
+/* The problem document of a job. */
+void reply_job_problem(request *r, const char *json);
+/* A request may name stored landmarks by {"id": ID}: replaces that member with their array. Blocks. 1, or 0 with the
+ * problem. */
+int resolve_landmarks(request *r, cJSON *body, api_problem *problem);
 /* How long to wait by ?wait= or Prefer: wait=, in ms, at most 60 s; 0: do not wait; −1: malformed, with a response. */
+enum { WAIT_MOST_MS = 60000 };
 int64_t read_wait_ms(request *r);
 /* The description as a tenant sees it (view "": any), from the cache or the catalogue; blocks. NULL with *result. */
 const cached *find_description(server *srv, resource_kind kind, const char *id, const char *view, store_result *result);

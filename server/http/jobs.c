@@ -67,21 +67,46 @@ static void result_away(request *r) {
   job *j = r->waits_for;
   resource_kind kind = job_kind(j) == API_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
   const cached *entry = find_description(r->srv, kind, job_key(j), access_tenant(r), &result);
-  if (entry) {
+  if (entry && r->waits_for_what == WAIT_ASSET) {
+    reply_asset(r, entry);
+  } else if (entry) {
     reply_cached(r, 200, entry);
   } else {
     reply_store(r, result);
   }
 }
 
+/* The job has not made the asset: its problem, or when to ask again. */
+static void refuse_asset(request *r, job *j, api_job_state state) {
+  api_problem problem = {0};
+  char *why = queue_job_problem(r->srv->q, j), url[64];
+  snprintf(url, sizeof url, "/v1/jobs/%s", job_id(j));
+  if (why) {
+    reply_job_problem(r, why);
+  } else if (state == API_JOB_CANCELLED) {
+    reply_refuse(r, "cancelled", "A client cancelled the job that computes this morph; request it again.");
+  } else {
+    api_refuse(&problem, "not-ready", "The morph is still being computed; request it again after Retry-After seconds.");
+    api_json_member_string(&problem.facts, "url", url);
+    reply_problem(r, &problem);
+  }
+  free(why);
+}
+
 static enum MHD_Result waited_enough(request *r) {
   job *j = r->waits_for;
-  if (!r->wait_for_result) {
+  if (r->waits_for_what == WAIT_JOB) {
     reply_job(r, j);
     return MHD_YES;
   }
   api_text json = {0};
-  if (queue_job_write(r->srv->q, j, &json) == API_JOB_SUCCEEDED) {
+  api_job_state state = queue_job_write(r->srv->q, j, &json);
+  if (state != API_JOB_SUCCEEDED && r->waits_for_what == WAIT_ASSET) {
+    api_text_free(&json);
+    refuse_asset(r, j, state);
+    return MHD_YES;
+  }
+  if (state == API_JOB_SUCCEEDED) {
     api_text_free(&json);
     return request_go_away(r, r->srv->io, result_away);
   }
@@ -96,7 +121,7 @@ static enum MHD_Result waited_enough(request *r) {
 enum MHD_Result handle_wait(request *r) {
   int64_t now = orb_clock_ms();
   if (now < r->wait_until) {
-    if (peer_is_gone(r) || caller_revoked(r->caller)) {
+    if (peer_is_gone(r) || caller_revoked(r->caller) || signer_revoked(r->signer)) {
       return MHD_NO;
     }
     r->waiter.wake = resume;

@@ -52,7 +52,9 @@ void reply_problem(request *r, api_problem *problem) {
   reply_text(r, status, "application/problem+json", &text);
   reply_header(r, "Cache-Control", "no-store");
   if (status == 429 || status == 503) {
-    reply_header(r, "Retry-After", "2");
+    char seconds[24];
+    snprintf(seconds, sizeof seconds, "%lld", r->retry_s > 0 ? (long long)r->retry_s : 2);
+    reply_header(r, "Retry-After", seconds);
   }
   if (strcmp(problem->name, "unsupported-encoding") == 0) {
     reply_header(r, "Accept-Encoding", "gzip, zstd");
@@ -72,6 +74,18 @@ void reply_refuse(request *r, const char *name, const char *format, ...) {
   va_end(args);
   api_refuse(&problem, name, "%s", detail);
   reply_problem(r, &problem);
+}
+
+void reply_job_problem(request *r, const char *json) {
+  const char *at = strstr(json, "\"status\":");
+  int status = 0;
+  if (!at || sscanf(at, "\"status\":%d", &status) != 1 || status < 400 || status > 599) {
+    status = 500;
+  }
+  api_text text = {0};
+  api_text_add(&text, json);
+  reply_text(r, (unsigned)status, "application/problem+json", &text);
+  reply_header(r, "Cache-Control", "no-store");
 }
 
 void reply_store(request *r, store_result result) {
@@ -124,7 +138,7 @@ int reply_conditions(request *r, const char *etag) {
 }
 
 void reply_cached(request *r, unsigned status, const cached *entry) {
-  static const char *const paths[RESOURCE_KINDS] = {"meshes", "embeddings", "supermeshes"};
+  static const char *const paths[RESOURCE_KINDS] = {"meshes", "embeddings", "supermeshes", "landmarks"};
   char location[128];
   int decided = r->route->method[0] == 'G' && reply_conditions(r, entry->etag);
   if (decided && r->status != 304) {

@@ -1,4 +1,4 @@
-/* Lists, descriptions and deletion of meshes, embeddings and supermeshes. */
+/* Lists, descriptions and deletion of meshes, embeddings, supermeshes and landmarks. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,11 +12,12 @@
 static resource_kind kind_of(const request *r) {
   return strncmp(r->route->path, "/v1/meshes", 10) == 0       ? RESOURCE_MESH
          : strncmp(r->route->path, "/v1/embeddings", 14) == 0 ? RESOURCE_EMBEDDING
+         : strncmp(r->route->path, "/v1/landmarks", 13) == 0  ? RESOURCE_LANDMARKS
                                                               : RESOURCE_SUPERMESH;
 }
 
 void note_use(server *srv, const cached *entry) {
-  if (__atomic_load_n(&srv->options->derived_bytes, __ATOMIC_RELAXED) > 0 && entry->row.kind != RESOURCE_MESH &&
+  if (__atomic_load_n(&srv->options->derived_bytes, __ATOMIC_RELAXED) > 0 && resource_is_derived(entry->row.kind) &&
       cache_note_use(srv->descriptions, entry, orb_clock_ms())) {
     catalogue_touch(srv->cat, entry->row.kind, entry->row.id);
   }
@@ -37,7 +38,7 @@ const cached *find_description(server *srv, resource_kind kind, const char *id, 
   if (*result != STORE_OK) {
     return NULL;
   }
-  if (kind != RESOURCE_MESH) {
+  if (resource_is_derived(kind)) {
     catalogue_touch(srv->cat, kind, id);
   }
   entry = cache_add(srv->descriptions, &row, view, since);
@@ -115,7 +116,7 @@ void list_end(request *r, list_page *page, int64_t last, int count) {
 }
 
 static void list_away(request *r) {
-  static const char *const names[RESOURCE_KINDS] = {"meshes", "embeddings", "supermeshes"};
+  static const char *const names[RESOURCE_KINDS] = {"meshes", "embeddings", "supermeshes", "landmarks"};
   resource_kind kind = kind_of(r);
   list_page page;
   int64_t last = 0;
@@ -165,9 +166,9 @@ static void delete_away(request *r) {
   const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions};
   store_result result = view[0] ? evict_owned(&env, kind, r->id, view) : evict_one(&env, kind, r->id);
   if (result == STORE_OK) {
-    if (kind == RESOURCE_MESH && view[0]) {
+    if (!resource_is_derived(kind) && view[0]) {
       callers_recount(srv->callers, view);
-    } else if (kind == RESOURCE_MESH && r->caller) {
+    } else if (!resource_is_derived(kind) && r->caller) {
       callers_reload(srv->callers); /* updates the used bytes of all its owners */
     }
     reply_empty(r, 204);

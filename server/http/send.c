@@ -8,7 +8,10 @@
 /* Adds the CORS headers. If they depend on the origin, every response carries Vary, even one to an origin that is not
  * allowed or not named, so that a cache does not mix them up (Fetch, "CORS protocol and HTTP caches"). */
 static void add_cors(request *r) {
-  const char *allowed = r->srv->options->cors, *origin = header_of(r, "Origin");
+  const char *allowed = r->signer ? r->signer->row.origins : r->srv->options->cors, *origin = header_of(r, "Origin");
+  if (r->signer && !allowed[0]) {
+    allowed = "*";
+  }
   if (!allowed[0]) {
     return;
   }
@@ -16,13 +19,17 @@ static void add_cors(request *r) {
   if (!any) {
     reply_header(r, "Vary", "Origin");
   }
-  if (!origin || (!any && !origin_is_listed(allowed, origin))) {
+  if (!r->signer && !origin) {
+    return;
+  }
+  if (!any && (!origin || !origin_is_listed(allowed, origin))) {
     return;
   }
   reply_header(r, "Access-Control-Allow-Origin", any ? "*" : origin);
-  reply_header(r, "Access-Control-Expose-Headers",
-               "Location, Content-Location, Retry-After, ETag, Accept-Ranges, Content-Range, Content-Disposition, "
-               "Accept-Encoding, WWW-Authenticate, X-Request-Id, RateLimit, RateLimit-Policy, Preference-Applied");
+  reply_header(
+      r, "Access-Control-Expose-Headers",
+      "Location, Content-Location, Retry-After, ETag, Accept-Ranges, Content-Range, Content-Disposition, "
+      "Accept-Encoding, WWW-Authenticate, X-Request-Id, RateLimit, RateLimit-Policy, Preference-Applied, Link");
   if (strcmp(r->method, "OPTIONS") == 0) {
     reply_header(r, "Access-Control-Allow-Methods", "GET, HEAD, POST, DELETE");
     reply_header(r, "Access-Control-Allow-Headers",

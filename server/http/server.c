@@ -53,13 +53,15 @@ static void make_number(char *out, size_t size) {
   snprintf(out, size, "%016llx", (unsigned long long)hashed);
 }
 
-static request *request_create(server *srv, struct MHD_Connection *connection, const char *method) {
-  request *r = calloc(1, sizeof *r);
+/* Called with the target of the request line, before any header has arrived. The library keeps no copy of the target
+ * as sent, which signatures cover. */
+static void *request_create(void *user, const char *target, struct MHD_Connection *connection) {
+  size_t size = strlen(target) + 1;
+  request *r = calloc(1, sizeof *r + size);
   if (r) {
-    r->srv = srv;
+    r->srv = user;
     r->connection = connection;
-    r->method = method;
-    r->head = strcmp(method, "HEAD") == 0;
+    memcpy(r->target, target, size);
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
     r->watched = info ? info->socket_context : NULL;
     r->temp.fd = -1;
@@ -69,11 +71,14 @@ static request *request_create(server *srv, struct MHD_Connection *connection, c
   return r;
 }
 
-/* The first call of a request, with its headers. Leaves a response if the headers alone decide it. */
-static void request_begin(request *r, const char *url, const char *version) {
+/* The first call of answer() for a request, with its headers. Leaves a response if the headers alone decide it. */
+static void request_begin(request *r, const char *method, const char *url, const char *version) {
   const char *path = parse_target(url);
   char allow[64];
   api_problem problem = {0};
+  r->begun = 1;
+  r->method = method;
+  r->head = strcmp(method, "HEAD") == 0;
   r->route = route_find(r->method, path, r->id, allow);
   watched_headers(r->watched);
   r->shape = r->route ? route_number(r->route, path) : -1;
@@ -83,7 +88,8 @@ static void request_begin(request *r, const char *url, const char *version) {
     reply_problem(r, &problem);
   } else if (!access_within_limits(r, path)) {
     return;
-  } else if (!browser_check(r, url, path, &problem) || !access_check(r, path, &problem)) {
+  } else if (!sign_check(r, path, &problem) || !browser_check(r, url, path, &problem) ||
+             !access_check(r, path, &problem)) {
     reply_problem(r, &problem);
   } else if (!r->route) {
     answer_unrouted(r, path, allow);
@@ -104,12 +110,13 @@ static size_t unescape(void *user, struct MHD_Connection *connection, char *text
 static enum MHD_Result answer(void *user, struct MHD_Connection *connection, const char *url, const char *method,
                               const char *version, const char *upload, size_t *upload_size, void **state) {
   request *r = *state;
-  if (!r) {
-    r = *state = request_create(user, connection, method);
-    if (!r) {
-      return MHD_NO;
-    }
-    request_begin(r, url, version);
+  (void)user;
+  (void)connection;
+  if (!r) { /* out of memory */
+    return MHD_NO;
+  }
+  if (!r->begun) {
+    request_begin(r, method, url, version);
     if (!r->has_body) {
       watched_work(r->watched);
     }
@@ -147,6 +154,11 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
     return;
   }
   int64_t took = clock_us() - r->began;
+  if (!r->begun) { /* the connection broke before the headers were complete */
+    free(r);
+    *state = NULL;
+    return;
+  }
   int waited = r->waits_for != NULL || (r->route && r->route->id == ROUTE_JOB_EVENTS);
   metrics_request((int)r->status, waited ? -1 : 1e-6 * (double)took);
   if (code == MHD_REQUEST_TERMINATED_COMPLETED_OK && !r->head) {
@@ -172,6 +184,7 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
     MHD_destroy_response(r->response);
   }
   caller_release(r->caller);
+  signer_release(r->signer);
   free(r);
   *state = NULL;
 }
@@ -256,9 +269,9 @@ int http_start(server *srv) {
                                      {MHD_OPTION_HTTPS_MEM_KEY, 0, key},
                                      {MHD_OPTION_HTTPS_PRIORITIES, 0, (void *)(uintptr_t)TLS_VERSIONS},
                                      {MHD_OPTION_END, 0, NULL}};
-  srv->daemon =
-      MHD_start_daemon(flags, 0, NULL, NULL, answer, srv, MHD_OPTION_EXTERNAL_LOGGER, on_mhd_log, NULL,
-                       MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL, MHD_OPTION_ARRAY, options, MHD_OPTION_END);
+  srv->daemon = MHD_start_daemon(flags, 0, NULL, NULL, answer, srv, MHD_OPTION_EXTERNAL_LOGGER, on_mhd_log, NULL,
+                                 MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL, MHD_OPTION_URI_LOG_CALLBACK,
+                                 request_create, srv, MHD_OPTION_ARRAY, options, MHD_OPTION_END);
   free(certificate); /* the daemon has parsed them */
   free(key);
   if (!srv->daemon) {

@@ -17,6 +17,7 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const c
                              .key = keys[i],
                              .request = requests[i],
                              .owner = j->row.owner,
+                             .charged = j->row.charged,
                              .cost = costs[i],
                              .priority = j->row.priority};
     result = queue_submit(q, &request, &needed, NULL);

@@ -75,6 +75,7 @@ void queue_wake_once(queue *q);
 typedef struct queue_request {
   api_job_kind kind;
   const char *key, *request, *owner;
+  const char *charged; /* the signing key that its work counts for; NULL: none */
   int64_t cost;
   int priority, listed;
   int64_t owner_limit; /* of the owner's listed unfinished jobs; 0: no limit */
@@ -99,9 +100,16 @@ const char *job_id(const job *j);
 const char *job_key(const job *j);
 api_job_kind job_kind(const job *j);
 const char *job_request(const job *j);
-const char *job_owner(const job *j); /* the tenant that requested it; "" if no token was needed */
+const char *job_charged(const job *j); /* the signing key that its work counts for; "": none */
+const char *job_owner(const job *j);   /* the tenant that requested it; "" if no token was needed */
 /* Appends the job as JSON; returns its state. */
 api_job_state queue_job_write(queue *q, job *j, api_text *out);
+
+/* The problem of a failed job that this process remembers, allocated with malloc(): of the newest with this key and
+ * owner that ended after a Unix time in ms. NULL: none. O(ended jobs in memory). */
+char *queue_failure(queue *q, const char *key, const char *owner, int64_t since);
+/* The problem of a failed job, allocated with malloc(); NULL if it has none. */
+char *queue_job_problem(queue *q, job *j);
 
 /* 1: the connection must wait; `suspend` was called under the lock and the waiter is listed. 0: the job has ended, or
  * w->events is set and the job has an event after `after`. */

@@ -62,6 +62,7 @@ static queue_result submit_locked(queue *q, const queue_request *request, job **
   api_random_id(j->row.id);
   copy_text(j->row.key, sizeof j->row.key, request->key);
   copy_text(j->row.owner, sizeof j->row.owner, request->owner);
+  copy_text(j->row.charged, sizeof j->row.charged, request->charged ? request->charged : "");
   table_add(q, j);
   *out = j;
   *fresh = 1;

@@ -131,6 +131,9 @@ const char *job_key(const job *j) {
 api_job_kind job_kind(const job *j) {
   return j->row.kind;
 }
+const char *job_charged(const job *j) {
+  return j->row.charged;
+}
 const char *job_owner(const job *j) {
   return j->row.owner;
 }
@@ -208,4 +211,25 @@ int64_t queue_ended(queue *q, api_job_state state) {
   int64_t ended = q->ended[state];
   pthread_mutex_unlock(&q->lock);
   return ended;
+}
+
+char *queue_failure(queue *q, const char *key, const char *owner, int64_t since) {
+  const job *newest = NULL;
+  pthread_mutex_lock(&q->lock);
+  for (const job *j = q->oldest_ended; j; j = j->newer_ended) {
+    if (is_for(j, key, owner) && j->row.finished > since) {
+      newest = j;
+    }
+  }
+  char *problem =
+      newest && newest->row.state == API_JOB_FAILED && newest->row.problem ? strdup(newest->row.problem) : NULL;
+  pthread_mutex_unlock(&q->lock);
+  return problem;
+}
+
+char *queue_job_problem(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  char *problem = j->row.state == API_JOB_FAILED && j->row.problem ? strdup(j->row.problem) : NULL;
+  pthread_mutex_unlock(&q->lock);
+  return problem;
 }

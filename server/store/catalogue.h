@@ -30,14 +30,26 @@ typedef struct catalogue catalogue;
 store_result catalogue_open(const char *data, catalogue **out);
 void catalogue_close(catalogue *cat); /* completes all waiting writes, then stops the writer */
 
-typedef enum resource_kind { RESOURCE_MESH, RESOURCE_EMBEDDING, RESOURCE_SUPERMESH, RESOURCE_KINDS } resource_kind;
+/* The catalogue stores these numbers. */
+typedef enum resource_kind {
+  RESOURCE_MESH,
+  RESOURCE_EMBEDDING,
+  RESOURCE_SUPERMESH,
+  RESOURCE_LANDMARKS, /* a row alone, without an object */
+  RESOURCE_KINDS
+} resource_kind;
 
-/* A row of a mesh, embedding or supermesh. json is allocated with malloc(). */
+/* Embeddings and supermeshes: a job can make them again, so they may be evicted. */
+static inline int resource_is_derived(resource_kind kind) {
+  return kind == RESOURCE_EMBEDDING || kind == RESOURCE_SUPERMESH;
+}
+
+/* A row of a mesh, embedding, supermesh or list of landmarks. json is allocated with malloc(). */
 typedef struct resource {
   int64_t seq;
   resource_kind kind;
   char id[API_ID_SIZE];
-  char sha[API_ID_SIZE];    /* SHA-256 of its object */
+  char sha[API_ID_SIZE];    /* SHA-256 of its object; landmarks: their id */
   char places[API_ID_SIZE]; /* SHA-256 of its places object; "": none, or stored before this column existed */
   char *json;               /* its description */
   int64_t bytes;            /* of its objects */
@@ -48,7 +60,7 @@ void resource_free(resource *r);
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out);
 store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id);
 /* Functions that list return the number of rows filled, or −1, and fill nothing, if the rows cannot be read. */
-/* Newest first, only those before sequence number `before` (0: all). */
+/* Newest first, landmarks without their places, only those before sequence number `before` (0: all). */
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out);
 /* Embeddings and supermeshes last used before a Unix time in ms, least recently used first, without the first `skip`;
  * for eviction. */
@@ -73,8 +85,9 @@ typedef struct job_row {
   int alone;   /* the current attempt runs alone */
   int listed;  /* a caller requested it, as opposed to another job that needs it */
   int priority;
-  int64_t cost;   /* triangles */
-  char owner[64]; /* the tenant that requested it */
+  int64_t cost;     /* triangles */
+  char owner[64];   /* the tenant that requested it */
+  char charged[64]; /* the signing key that its work counts for; "": none */
   char *request, *problem;
   int64_t created, started, finished;
 } job_row;

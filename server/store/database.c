@@ -69,6 +69,15 @@ static const char *const migrations[] = {
     /* No alignment reads `seed` any more, and a request with it would be refused: jobs that still wait lose it. */
     "UPDATE job SET request=json_remove(request, '$.align.options.seed')"
     " WHERE kind=1 AND state IN (0, 1) AND json_valid(request);",
+    /* Landmarks. */
+    "INSERT INTO total(kind, bytes) VALUES(3, 0);",
+    /* Signing keys, and the key that the work of a job counts for. */
+    "CREATE TABLE signing_key(name TEXT PRIMARY KEY, tenant TEXT NOT NULL, secret TEXT NOT NULL,"
+    " old_secret TEXT NOT NULL DEFAULT '', old_until INTEGER NOT NULL DEFAULT 0, origins TEXT NOT NULL,"
+    " requests INTEGER NOT NULL, cpu_seconds INTEGER NOT NULL, created INTEGER NOT NULL,"
+    " day INTEGER NOT NULL DEFAULT 0, used_requests INTEGER NOT NULL DEFAULT 0, used_ms INTEGER NOT NULL DEFAULT 0)"
+    " WITHOUT ROWID;"
+    "ALTER TABLE job ADD COLUMN charged TEXT NOT NULL DEFAULT '';",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

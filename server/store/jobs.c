@@ -6,7 +6,7 @@
 
 #define COLUMNS                                                                                                   \
   "seq, id, key, kind, state, attempt, crashes, suspect, alone, listed, priority, cost, owner, request, problem," \
-  " created, started, finished"
+  " created, started, finished, charged"
 
 void job_row_free(job_row *row) {
   free(row->request);
@@ -18,8 +18,8 @@ static int insert(database *db, void *arg) {
   job_row *r = arg;
   sqlite3_stmt *st = database_statement(
       db,
-      "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created)"
-      " VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9)");
+      "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created,"
+      " charged) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10)");
   if (!st) {
     return SQLITE_ERROR;
   }
@@ -32,6 +32,7 @@ static int insert(database *db, void *arg) {
   sqlite3_bind_text(st, 7, r->owner, -1, SQLITE_STATIC);
   sqlite3_bind_text(st, 8, r->request, -1, SQLITE_STATIC);
   sqlite3_bind_int64(st, 9, r->created);
+  sqlite3_bind_text(st, 10, r->charged, -1, SQLITE_STATIC);
   int code = database_run(db, st);
   r->seq = sqlite3_last_insert_rowid(db->handle);
   return code == SQLITE_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
@@ -174,6 +175,7 @@ static int read_row(sqlite3_stmt *st, void *to) {
   out->created = sqlite3_column_int64(st, 15);
   out->started = sqlite3_column_int64(st, 16);
   out->finished = sqlite3_column_int64(st, 17);
+  row_text(st, 18, out->charged, sizeof out->charged);
   return out->request != NULL && !row_lacks(st, 14, out->problem);
 }
 static void release_row(void *row) {

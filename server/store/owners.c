@@ -16,7 +16,7 @@ static int owner_insert(database *db, const resource *r, const char *tenant, con
   sqlite3_bind_text(st, 2, r->id, -1, SQLITE_STATIC);
   sqlite3_bind_text(st, 3, tenant, -1, SQLITE_STATIC);
   sqlite3_bind_text(st, 4, json, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 5, r->kind == RESOURCE_MESH ? r->bytes : 0);
+  sqlite3_bind_int64(st, 5, resource_is_derived(r->kind) ? 0 : r->bytes);
   sqlite3_bind_int64(st, 6, r->created);
   return database_run(db, st);
 }
@@ -155,6 +155,8 @@ store_result catalogue_put_for(catalogue *cat, const resource *r, const char *te
 }
 
 #define COLUMNS "o.seq, r.kind, r.id, r.sha, coalesce(o.json, r.json), r.bytes, o.created, r.places"
+#define LIST_COLUMNS \
+  "o.seq, r.kind, r.id, r.sha, " ROW_SUMMARY("r.kind", "coalesce(o.json, r.json)") ", r.bytes, o.created, r.places"
 #define OWNED " FROM owner o JOIN resource r ON r.kind=o.kind AND r.id=o.id"
 
 store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id, const char *tenant, resource *out) {
@@ -171,7 +173,7 @@ store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id
 int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, int64_t before, int limit,
                       resource *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS OWNED
+  sqlite3_stmt *st = database_statement(db, "SELECT " LIST_COLUMNS OWNED
                                             " WHERE o.tenant=?1 AND o.kind=?2 AND o.seq<?3"
                                             " ORDER BY o.seq DESC LIMIT ?4");
   if (st) {

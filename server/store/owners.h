@@ -18,8 +18,8 @@ int owner_of_job(database *db, const char *job, int64_t now);
  * remove them. SQLITE_NOTFOUND if `all` is set and a mesh does not exist. */
 int owner_of_meshes(database *db, const char *request, const char *tenant, int64_t now, int all);
 
-/* Adds a mesh if absent, and makes the tenant an owner. STORE_CONFLICT: the tenant would exceed its quota in bytes (0:
- * no limit); nothing changes. *fresh: the tenant did not own it before. */
+/* Adds a mesh or landmarks if absent, and makes the tenant an owner. STORE_CONFLICT: the tenant would exceed its quota
+ * in bytes (0: no limit); nothing changes. *fresh: the tenant did not own it before. */
 store_result catalogue_put_for(catalogue *cat, const resource *r, const char *tenant, int64_t quota, int *fresh);
 /* The row with the description that this owner sees; STORE_NOT_FOUND if the tenant does not own it. */
 store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id, const char *tenant, resource *out);
@@ -27,7 +27,7 @@ store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id
 int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, int64_t before, int limit, resource *out);
 /* Removes an owner. *gone: it was the last one and the row is deleted. STORE_NOT_FOUND: the tenant did not own it. */
 store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id, const char *tenant, int *gone);
-/* Bytes of the meshes that a tenant owns; −1: they cannot be read. */
+/* Bytes of the meshes and landmarks that a tenant owns; −1: they cannot be read. */
 int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant);
 /* For --check-data: the number of resources without an owner, owners without a resource, and stored sums that differ
  * from the sums of the rows; −1: they cannot be read. */

@@ -6,6 +6,7 @@
 #include "store/rows.h"
 
 #define COLUMNS "seq, kind, id, sha, json, bytes, created, places"
+#define LIST_COLUMNS(json) "seq, kind, id, sha, " ROW_SUMMARY("kind", json) ", bytes, created, places"
 
 void resource_free(resource *r) {
   free(r->json);
@@ -59,8 +60,8 @@ store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, r
 
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st =
-      database_statement(db, "SELECT " COLUMNS " FROM resource WHERE kind=?1 AND seq<?2 ORDER BY seq DESC LIMIT ?3");
+  sqlite3_stmt *st = database_statement(
+      db, "SELECT " LIST_COLUMNS("json") " FROM resource WHERE kind=?1 AND seq<?2 ORDER BY seq DESC LIMIT ?3");
   if (st) {
     sqlite3_bind_int(st, 1, (int)kind);
     sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);
@@ -72,7 +73,7 @@ int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit
 int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resource *out) {
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st = database_statement(
-      db, "SELECT " COLUMNS " FROM resource WHERE kind>0 AND used<?2 ORDER BY used, seq LIMIT ?1 OFFSET ?3");
+      db, "SELECT " COLUMNS " FROM resource WHERE kind IN (1, 2) AND used<?2 ORDER BY used, seq LIMIT ?1 OFFSET ?3");
   if (st) {
     sqlite3_bind_int(st, 3, skip);
     sqlite3_bind_int(st, 1, limit);
@@ -133,7 +134,7 @@ void catalogue_touch(catalogue *cat, resource_kind kind, const char *id) {
 
 int64_t catalogue_bytes(catalogue *cat, int derived_only) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "SELECT sum(bytes) FROM total WHERE kind>=?1");
+  sqlite3_stmt *st = database_statement(db, "SELECT sum(bytes) FROM total WHERE ?1=0 OR kind IN (1, 2)");
   if (st) {
     sqlite3_bind_int(st, 1, derived_only ? 1 : 0);
   }

@@ -5,12 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "api/json.h"
 #include "faults.h"
 #include "log.h"
 #include "metrics.h"
+#include "store/keys.h"
 #include "store/owners.h"
 #include "worker/run.h"
 
@@ -156,6 +158,9 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
   progress_enter(&progress, "");
   FAULT_POINT("run-done");
   double seconds = 1e-3 * (double)(orb_clock_ms() - began);
+  if (job_charged(j)[0]) {
+    catalogue_key_use(env->cat, job_charged(j), (int64_t)time(NULL) / 86400, 0, (int64_t)(1e3 * seconds * threads));
+  }
   metrics_job(embedding, fine, seconds);
   char fields[128];
   snprintf(fields, sizeof fields, "\"job\":\"%s\",\"seconds\":%.3f", job_id(j), seconds);

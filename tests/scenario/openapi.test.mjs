@@ -489,6 +489,45 @@ test('answers about embeddings, supermeshes and jobs', async (t) => {
   }
 });
 
+test('answers about landmarks and morphs by URL', async (t) => {
+  const d = await daemon(t);
+  const { ask, upload } = held(d);
+  const ids = [];
+  for (const shape of [shapes.egg(2), shapes.bean(2)]) ids.push((await upload(shapes.obj(shape))).json.id);
+  const at = [{ vertex: 0 }, { vertex: 0 }];
+  const body = { landmarks: [{ at }, { at: [{ point: [0, 0, 1] }, { triangle: 3, barycentric: [1, 0, 0] }] }] };
+  const { id } = (await ask('POST', '/v1/landmarks', { body })).json;
+  assert.equal((await ask('POST', '/v1/landmarks', { body })).status, 200);
+  const { headers } = await ask('GET', '/v1/landmarks/{id}', { id });
+  const etag = headers.get('etag');
+  assert.equal((await ask('GET', '/v1/landmarks/{id}', { id, headers: { 'if-none-match': etag } })).status, 304);
+  assert.equal((await ask('GET', '/v1/landmarks', { query: { limit: 1 } })).json.landmarks.length, 1);
+  for (const broken of [[], { landmark: [] }, [{ at: [] }]])
+    assert.equal((await ask('POST', '/v1/landmarks', { body: broken })).status, 422);
+  const shared = { shapes: ids.join(), align: 'rotate', tolerance: 0.05 };
+  const morph = (query, more) => ask('GET', '/v1/morph.glb', { query: { ...shared, ...query }, ...more });
+  assert.equal((await morph({ wait: 0 })).status, 503);
+  const made = await morph();
+  assert.equal(made.status, 200);
+  for (const [more, status] of [
+    [{ range: 'bytes=0-9' }, 206],
+    [{ 'if-none-match': made.headers.get('etag') }, 304],
+    [{ 'if-match': '"other"' }, 412],
+    [{ range: 'bytes=999999999-' }, 416],
+  ])
+    assert.equal((await morph({}, { headers: more })).status, status);
+  for (const [query, status] of [
+    [{ shapes: ids[0] }, 400],
+    [{ shapes: `${ids[0]},${'0'.repeat(64)}` }, 404],
+    [{ landmarks: '0'.repeat(64) }, 404],
+    [{ tolerance: 7 }, 422],
+    [{ remesh: 'none' }, 422],
+  ])
+    assert.equal((await morph(query)).status, status);
+  assert.equal((await ask('DELETE', '/v1/landmarks/{id}', { id })).status, 204);
+  assert.equal((await ask('DELETE', '/v1/landmarks/{id}', { id })).status, 404);
+});
+
 test('answers about the daemon itself', async (t) => {
   const d = await daemon(t);
   const { ask } = held(d);

@@ -169,6 +169,30 @@ export type Landmark = {
   confidence?: number;
 };
 
+/** Stored landmarks, without their places. */
+export type LandmarksSummary = {
+  id: Id;
+  url: string;
+  /** The number of landmarks. */
+  count: number;
+  /** The number of places of each landmark. */
+  shapes: number;
+  created: Instant;
+};
+
+/** Stored landmarks. The id is the hash of the canonical array. */
+export type Landmarks = {
+  id: Id;
+  url: string;
+  /** The number of landmarks. */
+  count: number;
+  /** The number of places of each landmark. */
+  shapes: number;
+  created: Instant;
+  /** The canonical array, with every member. */
+  landmarks: Landmark[];
+};
+
 /** Unknown members are refused by name. Members that a method does not use are accepted and are part of the id. */
 export type SupermeshRequest = {
   shapes: Array<{
@@ -177,7 +201,9 @@ export type SupermeshRequest = {
     name?: string;
   }>;
   /** If "auto", omitted or empty, the alignment finds the correspondence itself. */
-  landmarks?: 'auto' | Landmark[];
+  landmarks?: 'auto' | Landmark[] | {
+    id: Id;
+  };
   embedding?: {
     method?: EmbeddingMethod;
     options?: EmbeddingOptions;
@@ -399,6 +425,12 @@ export type SupermeshPage = {
   next_page_token: string | null;
 };
 
+export type LandmarksPage = {
+  landmarks: LandmarksSummary[];
+  /** The value of page_token for the next page; null on the last page. */
+  next_page_token: string | null;
+};
+
 export type JobPage = {
   /** Newest first. */
   jobs: Job[];
@@ -505,6 +537,24 @@ export type ProblemForbidden = {
   scope: 'read' | 'write' | 'admin';
 };
 
+export type ProblemBadSignature = {
+  type: '/problems/bad-signature';
+  title: 'The signature is not valid';
+  status: 403;
+  /** What is wrong and what to do. */
+  detail: string;
+};
+
+export type ProblemExpiredSignature = {
+  type: '/problems/expired-signature';
+  title: 'The signature has expired';
+  status: 403;
+  /** What is wrong and what to do. */
+  detail: string;
+  /** Unix time in seconds. */
+  expires: number;
+};
+
 export type ProblemForeignHost = {
   type: '/problems/foreign-host';
   title: 'The request came under a foreign name';
@@ -531,8 +581,10 @@ export type ProblemNotFound = {
   status: 404;
   /** What is wrong and what to do. */
   detail: string;
-  /** The unknown id, if the request names it in the body. */
+  /** The unknown mesh, if the request names one. */
   mesh?: string;
+  /** The unknown landmarks, if the request names some. */
+  landmarks?: string;
 };
 
 export type ProblemMethodNotAllowed = {
@@ -554,6 +606,14 @@ export type ProblemInUse = {
 export type ProblemJobEnded = {
   type: '/problems/job-ended';
   title: 'The job has already ended';
+  status: 409;
+  /** What is wrong and what to do. */
+  detail: string;
+};
+
+export type ProblemCancelled = {
+  type: '/problems/cancelled';
+  title: 'The job was cancelled';
   status: 409;
   /** What is wrong and what to do. */
   detail: string;
@@ -794,7 +854,7 @@ export type ProblemQuotaExceeded = {
   status: 429;
   /** What is wrong and what to do. */
   detail: string;
-  /** The bytes of meshes that the token's tenant may own, or the unfinished jobs that it may have. */
+  /** The bytes of meshes and landmarks that the token's tenant may own, the unfinished jobs that it may have, or what the key of a signed URL may use in a day. */
   quota: number;
 };
 
@@ -862,6 +922,16 @@ export type ProblemTimeout = {
   shape?: number;
 };
 
+export type ProblemNotReady = {
+  type: '/problems/not-ready';
+  title: 'The result is not ready';
+  status: 503;
+  /** What is wrong and what to do. */
+  detail: string;
+  /** The job that computes it. */
+  url: string;
+};
+
 export type ProblemNoMemory = {
   type: '/problems/no-memory';
   title: 'Out of memory';
@@ -891,4 +961,4 @@ export type ProblemStorageFull = {
 };
 
 /** A problem document of RFC 9457; `type` identifies the problem. */
-export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemForeignHost | ProblemForeignOrigin | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedMediaType | ProblemUnsupportedEncoding | ProblemPreconditionFailed | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemTimeout | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;
+export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemBadSignature | ProblemExpiredSignature | ProblemForeignHost | ProblemForeignOrigin | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemCancelled | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedMediaType | ProblemUnsupportedEncoding | ProblemPreconditionFailed | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemTimeout | ProblemNotReady | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;

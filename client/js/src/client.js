@@ -116,6 +116,21 @@ export class Orbmorph {
     return this.json(`/v1/embeddings/${id}`, { ...options, method: 'DELETE' });
   }
 
+  // ---- landmarks
+
+  /** Stores landmarks. `landmarks`: an array, or an object with that member. -> {id, url, count, shapes, …} */
+  createLandmarks(landmarks, options) {
+    return this.json('/v1/landmarks', { ...options, method: 'POST', json: landmarks });
+  }
+
+  getLandmarks(id, options) {
+    return this.json(`/v1/landmarks/${id}`, options);
+  }
+
+  deleteLandmarks(id, options) {
+    return this.json(`/v1/landmarks/${id}`, { ...options, method: 'DELETE' });
+  }
+
   // ---- supermeshes
 
   getSupermesh(id, options) {
@@ -262,6 +277,18 @@ export class Orbmorph {
   }
 
   // ---- morphs
+
+  /**
+   * The URL of a morph: its GET computes the morph if nobody has. `recipe`: `shapes` (ids of meshes), and optionally
+   * `names`, `landmarks` (an id, or "auto"), `align`, `preset`, `remesh`, `tolerance`, `max_triangles`, `fit`, `path`,
+   * `animation`, `normals` and `wait`.
+   */
+  morphUrl(recipe) {
+    const query = Object.entries(clean(recipe)).map(
+      ([name, value]) => `${name}=${[].concat(value).map(encodeURIComponent).join(',')}`,
+    );
+    return this.url(`/v1/morph.glb?${query.join('&')}`);
+  }
 
   /**
    * Uploads files, merges them and waits for the job. Options: the members of POST /v1/supermeshes (`landmarks`,

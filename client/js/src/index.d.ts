@@ -1,5 +1,14 @@
 /** The types of the client. api.d.ts, generated from the OpenAPI document, has those of the daemon's responses. */
-import type { Embedding, Job, Landmark, Mesh, Supermesh, SupermeshRequest } from './api.js';
+import type {
+  Embedding,
+  Job,
+  Landmark,
+  Landmarks,
+  LandmarksSummary,
+  Mesh,
+  Supermesh,
+  SupermeshRequest,
+} from './api.js';
 
 export type Repair = 'none' | 'safe' | 'fill_holes' | 'largest_component';
 export type Source =
@@ -10,7 +19,19 @@ export type Source =
   | URL
   | { source: Blob | ArrayBuffer | ArrayBufferView | string; name?: string };
 
-export type { Distortion, Embedding, Job, Landmark, Measure, Mesh, Place, Supermesh, SupermeshRequest } from './api.js';
+export type {
+  Distortion,
+  Embedding,
+  Job,
+  Landmark,
+  Landmarks,
+  LandmarksSummary,
+  Measure,
+  Mesh,
+  Place,
+  Supermesh,
+  SupermeshRequest,
+} from './api.js';
 /** A problem of a known type; `type` discriminates. */
 export type { Problem as KnownProblem } from './api.js';
 
@@ -65,9 +86,35 @@ export interface ConnectOptions {
   fetch?: typeof fetch;
 }
 
+/** The parameters of GET /v1/morph.glb. */
+export interface Recipe {
+  shapes: string[];
+  names?: string[];
+  landmarks?: string;
+  align?: 'pin' | 'rbf' | 'rotate' | 'auto';
+  preset?: 'fast' | 'default' | 'quality';
+  remesh?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull';
+  tolerance?: number;
+  max_triangles?: number;
+  fit?: 'none' | 'rigid' | 'similarity';
+  path?: 'linear' | 'rigid';
+  animation?: 'pingpong' | 'none';
+  normals?: boolean;
+  wait?: number;
+}
+
+export interface SignOptions {
+  /** KEY and SECRET of the KEY:SECRET that `orbmorphd key add` prints. */
+  key: string;
+  secret: string;
+  /** A Date, a Unix time in seconds, or a span from now such as '30d', '12h' or '90m'. */
+  expires: Date | number | string;
+}
+
 interface Kinds {
   meshes: Mesh;
   embeddings: Embedding;
+  landmarks: LandmarksSummary;
   supermeshes: Supermesh;
   jobs: Job;
 }
@@ -99,6 +146,9 @@ export class Orbmorph {
   getEmbedding(id: string, options?: RequestOptions): Promise<Embedding>;
   sphere(id: string, options?: RequestOptions): Promise<ArrayBuffer>;
   deleteEmbedding(id: string, options?: RequestOptions): Promise<void>;
+  createLandmarks(landmarks: Landmark[] | { landmarks: Landmark[] }, options?: RequestOptions): Promise<Landmarks>;
+  getLandmarks(id: string, options?: RequestOptions): Promise<Landmarks>;
+  deleteLandmarks(id: string, options?: RequestOptions): Promise<void>;
   merge(request: SupermeshRequest, options?: WatchOptions): Promise<Supermesh>;
   getSupermesh(id: string, options?: RequestOptions): Promise<Supermesh>;
   asset(id: string, options?: RequestOptions): Promise<ArrayBuffer>;
@@ -111,6 +161,7 @@ export class Orbmorph {
   result<T = Supermesh | Embedding>(job: string | Job, options?: WatchOptions): Promise<T>;
   page<K extends keyof Kinds>(kind: K, options?: ListOptions): Promise<{ items: Kinds[K][]; next: string | null }>;
   list<K extends keyof Kinds>(kind: K, options?: ListOptions): AsyncGenerator<Kinds[K]>;
+  morphUrl(recipe: Recipe): string;
   morph(sources: (Source | Mesh)[], options?: MorphOptions): Promise<Morph>;
 }
 
@@ -129,11 +180,13 @@ export class CancelledError extends Error {
   readonly job: Job;
 }
 
+export function signUrl(url: string | URL, options: SignOptions): Promise<string>;
 export function morph(sources: (Source | Mesh)[], options?: MorphOptions & ConnectOptions): Promise<Morph>;
 
 declare const orbmorph: {
   Orbmorph: typeof Orbmorph;
   morph: typeof morph;
+  signUrl: typeof signUrl;
   connect(server: string, options?: ConnectOptions): Orbmorph;
 };
 export default orbmorph;

@@ -9,9 +9,11 @@
  * (http://127.0.0.1:8080). `new Orbmorph({server, token})` uses any other daemon.
  */
 import { Orbmorph } from './client.js';
+import { signUrl } from './sign.js';
 
 export { Orbmorph } from './client.js';
 export { CancelledError, ProblemError, UnreachableError } from './errors.js';
+export { signUrl } from './sign.js';
 
 export const morph = (sources, { server, token, ...options } = {}) =>
   new Orbmorph({ server, token }).morph(sources, options);
@@ -19,5 +21,6 @@ export const morph = (sources, { server, token, ...options } = {}) =>
 export default {
   Orbmorph,
   morph,
+  signUrl,
   connect: (server, options) => new Orbmorph({ server, ...options }),
 };

@@ -1,0 +1,166 @@
+#include "store/keys.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "store/rows.h"
+
+static int add_row(database *db, void *arg) {
+  const key_row *row = arg;
+  sqlite3_stmt *st = database_statement(db,
+                                        "INSERT INTO signing_key(name, tenant, secret, origins, requests, cpu_seconds,"
+                                        " created) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7) ON CONFLICT DO NOTHING");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, row->name, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 2, row->tenant, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 3, row->secret, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 4, row->origins, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 5, row->requests);
+  sqlite3_bind_int64(st, 6, row->cpu_seconds);
+  sqlite3_bind_int64(st, 7, row->created);
+  int code = database_run(db, st);
+  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_CONSTRAINT : code;
+}
+
+store_result catalogue_key_add(catalogue *cat, const key_row *row) {
+  return catalogue_write(cat, add_row, (void *)(uintptr_t)row);
+}
+
+static int rotate_row(database *db, void *arg) {
+  const key_row *row = arg;
+  sqlite3_stmt *st =
+      database_statement(db, "UPDATE signing_key SET old_secret=secret, old_until=?3, secret=?2 WHERE name=?1");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, row->name, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 2, row->secret, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 3, row->old_until);
+  int code = database_run(db, st);
+  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+}
+
+store_result catalogue_key_rotate(catalogue *cat, const char *name, const char *secret, int64_t old_until) {
+  key_row row = {.old_until = old_until};
+  snprintf(row.name, sizeof row.name, "%s", name);
+  snprintf(row.secret, sizeof row.secret, "%s", secret);
+  return catalogue_write(cat, rotate_row, &row);
+}
+
+static int remove_row(database *db, void *arg) {
+  sqlite3_stmt *st = database_statement(db, "DELETE FROM signing_key WHERE name=?1");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, arg, -1, SQLITE_STATIC);
+  int code = database_run(db, st);
+  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+}
+
+store_result catalogue_key_remove(catalogue *cat, const char *name) {
+  return catalogue_write(cat, remove_row, (void *)(uintptr_t)name);
+}
+
+static void read_row(sqlite3_stmt *st, key_row *row) {
+  row_text(st, 0, row->name, sizeof row->name);
+  row_text(st, 1, row->tenant, sizeof row->tenant);
+  row_text(st, 2, row->secret, sizeof row->secret);
+  row_text(st, 3, row->old_secret, sizeof row->old_secret);
+  row->old_until = sqlite3_column_int64(st, 4);
+  row_text(st, 5, row->origins, sizeof row->origins);
+  row->requests = sqlite3_column_int64(st, 6);
+  row->cpu_seconds = sqlite3_column_int64(st, 7);
+  row->created = sqlite3_column_int64(st, 8);
+  row->day = sqlite3_column_int64(st, 9);
+  row->used_requests = sqlite3_column_int64(st, 10);
+  row->used_ms = sqlite3_column_int64(st, 11);
+}
+
+key_row *catalogue_keys(catalogue *cat, int *count) {
+  size_t room = 16, found = 0;
+  key_row *rows = calloc(room, sizeof *rows);
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st =
+      rows ? database_statement(db,
+                                "SELECT name, tenant, secret, old_secret, old_until, origins, requests, cpu_seconds,"
+                                " created, day, used_requests, used_ms FROM signing_key ORDER BY name")
+           : NULL;
+  int code = SQLITE_ERROR;
+  while (st && (code = sqlite3_step(st)) == SQLITE_ROW) {
+    if (found == room) {
+      key_row *more = found < INT32_MAX / 2 ? reallocarray(rows, 2 * room, sizeof *rows) : NULL;
+      if (!more) {
+        break;
+      }
+      rows = more;
+      room *= 2;
+    }
+    memset(&rows[found], 0, sizeof *rows);
+    read_row(st, &rows[found++]);
+  }
+  if (st) {
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  *count = (int)found;
+  if (code != SQLITE_DONE) {
+    free(rows);
+    *count = -1;
+    return NULL;
+  }
+  return rows;
+}
+
+typedef struct use_arg {
+  char name[KEY_NAME];
+  int64_t day, requests, ms;
+} use_arg;
+
+static int add_use(database *db, void *arg) {
+  const use_arg *u = arg;
+  sqlite3_stmt *st = database_statement(db,
+                                        "UPDATE signing_key SET used_requests=iif(day=?2, used_requests, 0)+?3,"
+                                        " used_ms=iif(day=?2, used_ms, 0)+?4, day=?2 WHERE name=?1 AND day<=?2");
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, u->name, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 2, u->day);
+  sqlite3_bind_int64(st, 3, u->requests);
+  sqlite3_bind_int64(st, 4, u->ms);
+  return database_run(db, st);
+}
+
+void catalogue_key_use(catalogue *cat, const char *name, int64_t day, int64_t requests, int64_t ms) {
+  use_arg *u = calloc(1, sizeof *u);
+  if (u) {
+    snprintf(u->name, sizeof u->name, "%s", name);
+    u->day = day;
+    u->requests = requests;
+    u->ms = ms;
+    catalogue_write_later(cat, add_use, u);
+  }
+}
+
+static int nothing(database *db, void *arg) {
+  (void)db;
+  (void)arg;
+  return SQLITE_OK;
+}
+
+void catalogue_key_settle(catalogue *cat) {
+  (void)catalogue_write(cat, nothing, NULL); /* the writer keeps the order of writes */
+}
+
+int64_t catalogue_key_ms(catalogue *cat, const char *name, int64_t day) {
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st =
+      database_statement(db, "SELECT coalesce((SELECT used_ms FROM signing_key WHERE name=?1 AND day=?2), 0)");
+  if (st) {
+    sqlite3_bind_text(st, 1, name, -1, SQLITE_STATIC);
+    sqlite3_bind_int64(st, 2, day);
+  }
+  return rows_integer(cat, db, st);
+}
