@@ -1,0 +1,129 @@
+// A signed URL on a page of another origin, in headless Chromium, with a daemon that requires tokens: three.js and
+// <model-viewer> show a morph that nobody has computed before, with one request, and later take it from the HTTP cache.
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import http from 'node:http';
+import path from 'node:path';
+import { after, before, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import { signUrl } from '../../client/js/src/index.js';
+import { runProgram } from '../scenario/support/cli.mjs';
+import { binaries, daemon } from '../scenario/support/daemon.mjs';
+import * as shapes from '../scenario/support/shapes.mjs';
+
+const modules = fileURLToPath(new URL('../node_modules/', import.meta.url));
+const executablePath = process.env.ORB_CHROMIUM ?? '/usr/bin/chromium';
+const needed = ['three', '@google/model-viewer', 'playwright-core'].map((name) => path.join(modules, name));
+if (![...needed, executablePath].every((file) => fs.existsSync(file))) {
+  console.log('Chromium or the npm packages are missing: npm ci in tests/');
+  process.exit(0);
+}
+const { chromium } = await import('playwright-core');
+
+const three = `<!doctype html><title>three</title>
+<script type="importmap">{"imports":{"three":"/npm/three/build/three.module.js","three/addons/":"/npm/three/examples/jsm/"}}</script>
+<script type="module">
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+const src = new URLSearchParams(location.search).get("src");
+new GLTFLoader().load(src, ({ scene, animations }) => {
+  const names = [];
+  scene.traverse((o) => o.morphTargetDictionary && names.push(...Object.keys(o.morphTargetDictionary)));
+  window.result = { names, animations: animations.length };
+}, undefined, (error) => (window.result = { error: String(error) }));
+</script>`;
+const viewer = `<!doctype html><title>model-viewer</title>
+<script type="module" src="/npm/@google/model-viewer/dist/model-viewer.min.js"></script>
+<script type="module">
+const element = document.createElement("model-viewer");
+element.addEventListener("load", () => (window.result = { loaded: element.loaded, animations: element.availableAnimations.length }));
+element.addEventListener("error", (event) => (window.result = { error: String(event.detail?.sourceError ?? event.type) }));
+element.src = new URLSearchParams(location.search).get("src");
+element.style.width = element.style.height = "200px";
+document.body.append(element);
+</script>`;
+
+let browser;
+let server;
+let origin;
+before(async () => {
+  server = http.createServer((request, response) => {
+    const at = new URL(request.url, 'http://x').pathname;
+    const page = { '/three': three, '/viewer': viewer }[at];
+    const file = path.join(modules, at.slice(5));
+    if (page) return response.writeHead(200, { 'content-type': 'text/html' }).end(page);
+    if (!at.startsWith('/npm/') || !fs.existsSync(file)) return response.writeHead(404).end();
+    response.writeHead(200, { 'content-type': 'text/javascript' });
+    fs.createReadStream(file).pipe(response);
+  });
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
+  origin = `http://localhost:${server.address().port}`;
+  browser = await chromium.launch({
+    timeout: 180_000,
+    executablePath,
+    args: [
+      '--no-sandbox',
+      '--headless=new',
+      '--use-gl=angle',
+      '--use-angle=swiftshader',
+      '--enable-unsafe-swiftshader',
+    ],
+  });
+});
+after(async () => {
+  await browser?.close();
+  server.close();
+});
+
+async function admin(d, ...words) {
+  const ran = await runProgram(binaries.daemon, [...words, '--data', d.data]);
+  assert.equal(ran.code, 0, ran.err);
+  return ran.out.trim();
+}
+
+test('a page of another origin shows signed morphs', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on'] });
+  const token = await admin(d, 'token', 'add', 'shop', '--scope', 'read,write');
+  const [name, secret] = (await admin(d, 'key', 'add', 'web', '--tenant', 'shop', '--origin', origin)).split(':');
+  const ids = [];
+  for (const [called, shape] of Object.entries({ egg: shapes.egg(2), bean: shapes.bean(2) })) {
+    const body = Buffer.from(shapes.obj(shape));
+    const headers = { authorization: `Bearer ${token}` };
+    ids.push((await d.request('POST', `/v1/meshes?name=${called}`, { body, headers })).json.id);
+  }
+  // The daemon counts what reaches it.
+  const requests = async () => Number(/requests=(\d+)/.exec(await admin(d, 'key', 'list'))[1]);
+  const jobs = async () =>
+    (await d.get('/v1/jobs', { headers: { authorization: `Bearer ${token}` } })).json.jobs.length;
+  const signed = (tolerance) =>
+    signUrl(`${d.url}/v1/morph.glb?shapes=${ids}&align=rotate&tolerance=${tolerance}`, {
+      key: name,
+      secret,
+      expires: '1d',
+    });
+  const context = await browser.newContext();
+  t.after(() => context.close());
+  const show = async (page, src) => {
+    const tab = await context.newPage();
+    await tab.goto(`${origin}/${page}?src=${encodeURIComponent(src)}`);
+    await tab.waitForFunction(() => window.result, null, { timeout: 120_000 });
+    const result = await tab.evaluate(() => window.result);
+    await tab.close();
+    return result;
+  };
+
+  for (const [page, tolerance, expected] of [
+    ['three', 0.05, { names: ['bean'], animations: 1 }],
+    ['viewer', 0.04, { loaded: true, animations: 1 }],
+  ]) {
+    const [before, made] = [await requests(), await jobs()];
+    const src = await signed(tolerance);
+    assert.deepEqual(await show(page, src), expected);
+    assert.equal(await requests(), before + 1, `${page}: one request`);
+    assert.equal(await jobs(), made + 1, `${page}: nobody had computed it`);
+    assert.deepEqual(await show(page, src), expected);
+    assert.equal(await requests(), before + 1, `${page}: the second time it comes from the HTTP cache`);
+    // What was changed, or is not signed at all, shows nothing.
+    for (const bad of [src.replace('tolerance=0.0', 'tolerance=0.1'), src.split('&key=')[0]])
+      assert.match((await show(page, bad)).error, /\S/);
+  }
+});
