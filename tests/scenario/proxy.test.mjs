@@ -9,8 +9,9 @@ import path from 'node:path';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
+import { signUrl } from '../../client/js/src/index.js';
 import { folder } from './support/cli.mjs';
-import { daemon, endless, patience, root } from './support/daemon.mjs';
+import { binaries, daemon, endless, patience, root } from './support/daemon.mjs';
 import { parseGlb } from './support/glb.mjs';
 import * as shapes from './support/shapes.mjs';
 
@@ -260,4 +261,59 @@ test('nginx keeps an address within its limits', { skip: !programs.nginx && 'ngi
   const answers = await Promise.all(Array.from({ length: 30 }, () => ask('/livez').then(({ status }) => status)));
   assert.ok(answers.includes(200) && answers.includes(429), `${answers}`);
   assert.ok(answers.every((status) => [200, 429].includes(status)));
+});
+
+test('nginx keeps signed morphs', { skip: !programs.nginx && 'nginx is not installed' }, async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on'] });
+  const admin = async (...words) =>
+    (await promisify(execFile)(binaries.daemon, [...words, '--data', d.data])).stdout.trim();
+  const headers = { authorization: `Bearer ${await admin('token', 'add', 'shop', '--scope', 'read,write')}` };
+  const [key, secret] = (await admin('key', 'add', 'web', '--tenant', 'shop')).split(':');
+  const ids = [];
+  for (const shape of [shapes.egg(2), shapes.bean(2)])
+    ids.push((await d.request('POST', '/v1/meshes', { body: Buffer.from(shapes.obj(shape)), headers })).json.id);
+  const page_of_assets = await readFile(path.join(root, 'docs/assets-by-url.md'), 'utf8');
+  const home = await folder(t);
+  const port = await freePort();
+  // Its workers must be able to write the folder of the test.
+  const asRoot = process.getuid() === 0 ? 'user root; ' : '';
+  const [cache, location] = replaced(/```nginx\n([\s\S]*?)```/.exec(page_of_assets)[1], [
+    ['127.0.0.1:8080', new URL(d.url).host],
+    ['/var/cache/nginx/orbmorph', `${home}/cache`],
+  ]).split(/(?=^location)/m);
+  const temps = ['client_body', 'proxy', 'fastcgi', 'uwsgi', 'scgi']
+    .map((name) => `${name}_temp_path ${home}/${name};`)
+    .join(' ');
+  await writeFile(
+    `${home}/nginx.conf`,
+    `${asRoot}daemon off; pid ${home}/pid; error_log stderr; events {} http { access_log off; ${temps}\n${cache}\nserver { listen 127.0.0.1:${port};\n${location} } }`,
+  );
+  const child = spawn(programs.nginx, ['-p', home, '-c', `${home}/nginx.conf`], {
+    stdio: ['ignore', 'ignore', 'pipe'],
+  });
+  let log = '';
+  child.stderr.on('data', (chunk) => (log += chunk));
+  const exited = new Promise((done) => child.once('exit', done));
+  t.after(async () => {
+    child.kill('SIGTERM');
+    await exited;
+  });
+  const ask = (target, more) => fetch(`http://127.0.0.1:${port}${target}`, { headers: more });
+  for (const until = Date.now() + 60_000 * patience; !(await ask('/').catch(() => null)); await sleep(50))
+    assert.ok(Date.now() < until, log);
+  const requests = async () => Number(/requests=(\d+)/.exec(await admin('key', 'list'))[1]);
+  const url = await signUrl(`/v1/morph.glb?shapes=${ids}&align=rotate&tolerance=0.05`, { key, secret, expires: '1d' });
+  // Many visitors at once, of a morph that nobody has computed: one request reaches the daemon.
+  const answers = await Promise.all(Array.from({ length: 16 }, () => ask(url)));
+  const bodies = await Promise.all(answers.map(async (reply) => Buffer.from(await reply.arrayBuffer())));
+  for (const [i, body] of bodies.entries()) {
+    assert.equal(answers[i].status, 200, log);
+    assert.ok(body.equals(bodies[0]));
+  }
+  assert.equal(await requests(), 1);
+  const part = await ask(url, { range: 'bytes=0-3' });
+  assert.deepEqual([part.status, await part.text()], [206, 'glTF']);
+  assert.equal((await ask(url, { 'if-none-match': answers[0].headers.get('etag') })).status, 304);
+  assert.equal(await requests(), 1, 'what is stored never reaches the daemon again');
+  assert.equal((await ask(url.replace('0.05', '0.06'))).status, 403);
 });
