@@ -19,7 +19,7 @@ typedef struct config {
   char socket_mode[8]; /* octal */
   int64_t workers, worker_nice, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;
   int64_t requests_per_second, header_seconds, slow_seconds, min_rate, slow_ms;
-  int64_t max_body, max_json, max_ratio, decode_memory, max_triangles, queue_limit;
+  int64_t max_body, max_json, max_ratio, decode_memory, encoded_bytes, max_triangles, queue_limit;
   int64_t job_memory, job_seconds, disk_reserve, drain_seconds, derived_bytes, keep_jobs;
 } config;
 

@@ -13,11 +13,14 @@
 
 enum { YEAR_S = 31536000 };
 
-static void add_headers(request *r, const char *etag, const char *mime, const char *name) {
+static void add_headers(request *r, const char *mime, const char *name, int varies) {
   char disposition[160];
   char control[64];
   int64_t left = r->expires - (int64_t)time(NULL);
-  reply_header(r, "ETag", etag);
+  reply_header(r, "ETag", r->etag);
+  if (varies && (!r->coded || r->status == 304)) {
+    reply_header(r, "Vary", "Accept-Encoding");
+  }
   if (r->signer) { /* whoever has the URL may see it until it expires */
     snprintf(control, sizeof control, "public, max-age=%lld",
              (long long)(left < 0        ? 0
@@ -29,7 +32,9 @@ static void add_headers(request *r, const char *etag, const char *mime, const ch
   reply_header(r, "Cache-Control", control);
   reply_header(r, "Accept-Ranges", "bytes");
   if (r->status != 304) {
-    reply_header(r, "Content-Type", mime);
+    if (!r->coded) {
+      reply_header(r, "Content-Type", mime);
+    }
     snprintf(disposition, sizeof disposition, "inline; filename=\"%s\"", name);
     reply_header(r, "Content-Disposition", disposition);
   }
@@ -40,22 +45,72 @@ typedef struct object_part {
   uint64_t start, length;
 } object_part;
 
-static void reply_part(request *r, object_kind kind, const char *id, object_part part, const char *sha,
-                       const char *mime, const char *name) {
-  char etag[40], content_range[80];
+/* Reads a part of an object into memory of malloc(); NULL on failure. */
+static void *read_part(const request *r, object_kind kind, const char *id, object_part part, size_t *size) {
   int fd;
+  uint64_t whole;
+  *size = 0;
+  if (objects_read(r->srv->store, kind, id, &fd, &whole) != STORE_OK) {
+    return NULL;
+  }
+  uint64_t wanted = part.length ? part.length : whole;
+  char *bytes = wanted >= ENCODE_LEAST && wanted <= ENCODE_MOST ? malloc((size_t)wanted) : NULL;
+  for (ssize_t n = 1; bytes && n > 0 && *size<wanted; *size += n> 0 ? (size_t)n : 0) {
+    n = pread(fd, bytes + *size, (size_t)wanted - *size, (off_t)(part.start + *size));
+  }
+  close(fd);
+  if (*size < wanted) {
+    free(bytes);
+    bytes = NULL;
+  }
+  return bytes;
+}
+
+/* Chooses the form of an object, and compresses it if that has not been done. 0: only a task may do that. */
+static int choose_form(request *r, object_kind kind, const char *id, object_part part, const char *etag) {
+  char key[96];
+  size_t size;
+  snprintf(key, sizeof key, "object %d %d %s %s", (int)kind, r->shape, id, etag);
+  if (reply_choose(r, key, etag, NULL, ENCODE_LEAST)) {
+    return 1;
+  }
+  if (r->phase != PHASE_AWAY) {
+    return 0;
+  }
+  void *bytes = read_part(r, kind, id, part, &size);
+  if (bytes) {
+    reply_choose(r, key, etag, bytes, size);
+  }
+  free(bytes);
+  return 1;
+}
+
+/* 0 without a response outside a task, if one is needed to compress the object. */
+static int reply_part(request *r, object_kind kind, const char *id, object_part part, const char *sha, const char *mime,
+                      const char *name) {
+  char etag[40], content_range[80];
+  int fd, compresses = kind == OBJECT_ASSET || kind == OBJECT_SPHERE || kind == OBJECT_SPHERES;
   uint64_t size, first = 0, length;
   snprintf(etag, sizeof etag, "\"%.32s\"", sha);
-  if (reply_conditions(r, etag)) {
+  snprintf(r->etag, sizeof r->etag, "%s", etag);
+  if (compresses && !choose_form(r, kind, id, part, etag)) {
+    return 0;
+  }
+  if (reply_conditions(r, r->etag)) {
     if (r->status == 304) {
-      add_headers(r, etag, mime, name);
+      add_headers(r, mime, name, compresses);
     }
-    return;
+    return 1;
+  }
+  if (r->encoded) {
+    reply_encoded(r, 200, mime);
+    add_headers(r, mime, name, 1);
+    return 1;
   }
   store_result found = objects_read(r->srv->store, kind, id, &fd, &size);
   if (found != STORE_OK) {
     reply_store(r, found);
-    return;
+    return 1;
   }
   size = part.length ? part.length : size;
   length = size;
@@ -67,7 +122,7 @@ static void reply_part(request *r, object_kind kind, const char *id, object_part
     reply_refuse(r, "range-not-satisfiable", "The file has only %llu bytes.", (unsigned long long)size);
     snprintf(content_range, sizeof content_range, "bytes */%llu", (unsigned long long)size);
     reply_header(r, "Content-Range", content_range);
-    return;
+    return 1;
   }
   struct MHD_Response *response = MHD_create_response_from_fd_at_offset64(length, fd, part.start + first);
   if (!response) {
@@ -82,13 +137,14 @@ static void reply_part(request *r, object_kind kind, const char *id, object_part
              (unsigned long long)(first + length - 1), (unsigned long long)size);
     reply_header(r, "Content-Range", content_range);
   }
-  add_headers(r, etag, mime, name);
+  add_headers(r, mime, name, compresses);
+  return 1;
 }
 
 /* Responds with an object, with ranges and conditions. */
-static void reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime,
-                         const char *name) {
-  reply_part(r, kind, id, (object_part){0}, sha, mime, name);
+static int reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime,
+                        const char *name) {
+  return reply_part(r, kind, id, (object_part){0}, sha, mime, name);
 }
 
 /* Blocks: reads the object's table. */
@@ -104,19 +160,22 @@ static void reply_sphere(request *r) {
   reply_part(r, OBJECT_SPHERES, r->id, part, r->id, "application/octet-stream", name);
 }
 
-void reply_asset(request *r, const cached *entry) {
+int reply_asset(request *r, const cached *entry) {
   char link[128];
   memcpy(r->id, entry->row.id, sizeof r->id);
-  reply_object(r, OBJECT_ASSET, r->id, entry->row.sha, "model/gltf-binary", "asset.glb");
-  if (r->route->id == ROUTE_MORPH && r->status < 400) {
+  int done = reply_object(r, OBJECT_ASSET, r->id, entry->row.sha, "model/gltf-binary", "asset.glb");
+  if (done && r->route->id == ROUTE_MORPH && r->status < 400) {
     snprintf(link, sizeof link, "</v1/supermeshes/%s>; rel=\"describedby\"", r->id);
     reply_header(r, "Link", link);
   }
   cache_release(r->srv->descriptions, entry);
+  return done;
 }
 
-static void file_of(request *r, const cached *entry) {
+/* 0 without a response outside a task, if one is needed to compress the object; releases the description. */
+static int file_of(request *r, const cached *entry) {
   char name[100], format[8] = "bin";
+  int done = 1;
   switch (r->route->id) {
     case ROUTE_MESH_FILE: {
       const char *at = strstr(entry->row.json, "\"format\":\"");
@@ -129,7 +188,7 @@ static void file_of(request *r, const cached *entry) {
       break;
     }
     case ROUTE_EMBEDDING_SPHERE:
-      reply_object(r, OBJECT_SPHERE, r->id, entry->row.sha, "application/octet-stream", "sphere.ply");
+      done = reply_object(r, OBJECT_SPHERE, r->id, entry->row.sha, "application/octet-stream", "sphere.ply");
       break;
     case ROUTE_SUPERMESH_PLACES:
       reply_object(r, OBJECT_PLACES, r->id, r->id, "application/octet-stream", "places.bin");
@@ -138,10 +197,10 @@ static void file_of(request *r, const cached *entry) {
       reply_sphere(r);
       break;
     default:
-      reply_asset(r, entry);
-      return;
+      return reply_asset(r, entry);
   }
   cache_release(r->srv->descriptions, entry);
+  return done;
 }
 
 static resource_kind kind_of(const request *r) {
@@ -190,6 +249,8 @@ enum MHD_Result handle_file(request *r) {
   }
   metrics_cache(1);
   note_use(r->srv, entry);
-  file_of(r, entry);
+  if (!file_of(r, entry)) {
+    return request_go_away(r, r->srv->checks, file_away);
+  }
   return is_lost(r) ? request_go_away(r, r->srv->io, reply_lost) : MHD_YES;
 }

@@ -13,7 +13,7 @@
  *   files.c      GET of stored objects    jobs.c        GET, DELETE and lists of jobs; waiting for a job
  *   events.c     GET /v1/jobs/{job}/events
  *   system.c     /livez, /readyz, /metrics              pages.c       the studio, /openapi.json, /docs
- *   reply.c, send.c   responses; the headers that every response carries
+ *   reply.c, send.c   responses; the headers that every response carries; encode.c, encoded.c   compressed responses
  *   listen.c (the socket), watch.c and addresses.c (slow and too many connections), callers.c (tokens in memory),
  *   decode.c (gzip, zstd), parse.c (texts of requests), paging.c (page tokens)
  *
@@ -42,6 +42,7 @@
 #include "config.h"
 #include "http/callers.h"
 #include "http/decode.h"
+#include "http/encoded.h"
 #include "http/listen.h"
 #include "http/parse.h"
 #include "http/signers.h"
@@ -65,6 +66,7 @@ typedef struct server {
   int needs_token;
   callers *callers;
   signers *signers;
+  encoded_cache *encoded;
   int control; /* the descriptor of the control socket */
   unsigned char secret[CATALOGUE_SECRET];
 } server;
@@ -118,6 +120,9 @@ struct request {
   int cancels; /* the request cancels waits_for; refused if the job ends in another way */
 
   unsigned status;
+  coding coded;           /* of the answer */
+  const encoded *encoded; /* the compressed answer, referenced; NULL once a response holds it */
+  char etag[48];          /* of the form that reply_choose() has chosen */
   int64_t sends;          /* bytes of the response's body; event streams count theirs as they send */
   char trace[TRACE_SIZE]; /* traceparent, if the caller sent a well-formed one */
   struct MHD_Response *response;
@@ -185,6 +190,13 @@ void reply_store(request *r, store_result result);
 void reply_empty(request *r, unsigned status);
 void reply_bytes(request *r, unsigned status, const char *mime, const void *bytes, size_t size); /* static bytes */
 void reply_text(request *r, unsigned status, const char *mime, api_text *text);                  /* frees text */
+/* Chooses the form of an answer that never changes: as it is or, if the client accepts that, compressed. Sets r->etag,
+ * and r->coded and r->encoded if it is compressed. key: names the bytes among all answers. bytes NULL: only looks
+ * whether it is compressed already; 0 if not, and then nothing is chosen. Ranges are of what is not compressed. */
+enum { ENCODE_LEAST = 1024, ENCODE_MOST = 64 << 20 };
+int reply_choose(request *r, const char *key, const char *etag, const void *bytes, size_t size);
+/* Sends what reply_choose() has compressed. */
+void reply_encoded(request *r, unsigned status, const char *mime);
 /* The description, with ETag and 304; releases the reference. */
 void reply_cached(request *r, unsigned status, const cached *entry);
 void reply_header(request *r, const char *name, const char *value);
@@ -229,8 +241,9 @@ typedef struct wanted_result {
 int wanted_supermesh(request *r, const cJSON *body, wanted_result *out, api_problem *problem);
 /* Submits the job; leaves a response, or PHASE_WAIT. Blocks. */
 void submit_wanted(request *r, const wanted_result *wish);
-/* The asset of a supermesh at any URL, with ranges and conditions; releases the description. */
-void reply_asset(request *r, const cached *entry);
+/* The asset of a supermesh at any URL, with ranges and conditions; releases the description. 0 without a response
+ * outside a task, if one is needed to compress it. */
+int reply_asset(request *r, const cached *entry);
 /* After a 404 for an object: distinguishes one that has just been deleted from one that is lost. Blocks. */
 void reply_lost(request *r);
 /* The problem document of a job. */

@@ -219,8 +219,7 @@ enum MHD_Result handle_morph(request *r) {
   if (known) {
     metrics_cache(1);
     note_use(r->srv, known);
-    reply_asset(r, known);
-    if (r->status != 404) {
+    if (reply_asset(r, known) && r->status != 404) {
       return MHD_YES;
     }
   }

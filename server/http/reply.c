@@ -21,8 +21,76 @@ void reply_header(request *r, const char *name, const char *value) {
   }
 }
 
+/* The coding that the client accepts. */
+static coding accepted(const request *r) {
+  const char *lines[HEADER_LINES];
+  int count = r->srv->options->encoded_bytes > 0 ? header_lines(r, "Accept-Encoding", lines) : 0;
+  return coding_accepted(lines, count);
+}
+
+/* Marks an answer as one whose form depends on Accept-Encoding, whatever the form of this one. */
+static void add_coding(request *r, coding which) {
+  if (which != CODING_NONE) {
+    reply_header(r, "Content-Encoding", coding_name(which));
+  }
+  reply_header(r, "Vary", "Accept-Encoding");
+}
+
+int reply_choose(request *r, const char *key, const char *etag, const void *bytes, size_t size) {
+  coding which = header_of(r, "Range") || size < ENCODE_LEAST || size > ENCODE_MOST ? CODING_NONE : accepted(r);
+  snprintf(r->etag, sizeof r->etag, "%s", etag);
+  r->coded = CODING_NONE;
+  if (which == CODING_NONE) {
+    return 1;
+  }
+  const encoded *found =
+      bytes ? encoded_make(r->srv->encoded, key, which, bytes, size) : encoded_find(r->srv->encoded, key, which);
+  if (!found || !found->bytes) {
+    encoded_release(found);
+    return bytes || found;
+  }
+  encoded_release(r->encoded);
+  r->encoded = found;
+  r->coded = which;
+  if (*etag) {
+    snprintf(r->etag, sizeof r->etag, "%.*s-%s\"", (int)strlen(etag) - 1, etag, coding_name(which));
+  }
+  return 1;
+}
+
+static void free_encoded(void *user) {
+  encoded_release(user);
+}
+
+void reply_encoded(request *r, unsigned status, const char *mime) {
+  const encoded *e = r->encoded;
+  take(r, status,
+       MHD_create_response_from_buffer_with_free_callback_cls(e->size, e->bytes, free_encoded, (void *)(uintptr_t)e),
+       e->size);
+  if (r->response) {
+    r->encoded = NULL;
+  }
+  reply_header(r, "Content-Type", mime);
+  add_coding(r, r->coded);
+}
+
+/* Replaces a text by its compressed form if the client accepts that. */
+static coding squeeze(const request *r, api_text *text) {
+  coding which = text->failed || text->size < ENCODE_LEAST ? CODING_NONE : accepted(r);
+  void *bytes;
+  size_t size;
+  if (which == CODING_NONE || !encode_bytes(which, text->data, text->size, 1, &bytes, &size)) {
+    return CODING_NONE;
+  }
+  api_text_free(text);
+  *text = (api_text){.data = bytes, .size = size, .capacity = size};
+  return which;
+}
+
 void reply_text(request *r, unsigned status, const char *mime, api_text *text) {
   struct MHD_Response *response = NULL;
+  int large = text->size >= ENCODE_LEAST;
+  coding which = squeeze(r, text);
   size_t size = text->size;
   if (!text->failed) {
     response = text->data ? MHD_create_response_from_buffer(text->size, text->data, MHD_RESPMEM_MUST_FREE)
@@ -35,6 +103,9 @@ void reply_text(request *r, unsigned status, const char *mime, api_text *text) {
   }
   take(r, status, response, size);
   reply_header(r, "Content-Type", mime);
+  if (large) {
+    add_coding(r, which);
+  }
 }
 
 void reply_json(request *r, unsigned status, api_text *json) {
@@ -118,14 +189,29 @@ static int names_tag(const request *r, const char *header, const char *etag, int
   return named;
 }
 
+/* Whether a header names the tag of this form or, for what it does to the resource, of any form. */
+static int names_any(const request *r, const char *header, const char *etag, int (*matches)(const char *, const char *),
+                     int *lines) {
+  char form[48];
+  int named = names_tag(r, header, etag, matches, lines);
+  for (coding which = CODING_GZIP; which <= CODING_ZSTD; which++) {
+    int plain = (int)strcspn(etag + 1, "-\"") + 1;
+    snprintf(form, sizeof form, "%.*s-%s\"", plain, etag, coding_name(which));
+    named |= names_tag(r, header, form, matches, lines);
+    snprintf(form, sizeof form, "%.*s\"", plain, etag);
+    named |= names_tag(r, header, form, matches, lines);
+  }
+  return named;
+}
+
 int reply_conditions(request *r, const char *etag) {
   int lines, reads = r->route->method[0] == 'G';
-  if (!names_tag(r, "If-Match", etag, parse_tag_matches_strong, &lines) && lines > 0) {
+  if (!names_any(r, "If-Match", etag, parse_tag_matches_strong, &lines) && lines > 0) {
     reply_refuse(r, "precondition-failed", "The current ETag is %s, which If-Match does not name. Nothing was done.",
                  etag);
     return 1;
   }
-  if (!names_tag(r, "If-None-Match", etag, parse_tag_matches, &lines)) {
+  if (!(reads ? names_tag : names_any)(r, "If-None-Match", etag, parse_tag_matches, &lines)) {
     return 0;
   }
   if (reads) {
@@ -139,19 +225,27 @@ int reply_conditions(request *r, const char *etag) {
 
 void reply_cached(request *r, unsigned status, const cached *entry) {
   static const char *const paths[RESOURCE_KINDS] = {"meshes", "embeddings", "supermeshes", "landmarks"};
-  char location[128];
-  int decided = r->route->method[0] == 'G' && reply_conditions(r, entry->etag);
+  char location[128], key[64];
+  int reads = r->route->method[0] == 'G';
+  snprintf(key, sizeof key, "json %s", entry->etag);
+  reply_choose(r, key, entry->etag, entry->row.json, entry->json_size);
+  int decided = reads && reply_conditions(r, r->etag);
   if (decided && r->status != 304) {
     cache_release(r->srv->descriptions, entry);
     return;
   }
   snprintf(location, sizeof location, "/v1/%s/%s", paths[entry->row.kind], entry->row.id);
-  if (!decided) {
+  if (!decided && r->encoded) {
+    reply_encoded(r, status, "application/json");
+  } else if (!decided) {
     take(r, status, MHD_create_response_from_buffer(entry->json_size, entry->row.json, MHD_RESPMEM_MUST_COPY),
          entry->json_size);
     reply_header(r, "Content-Type", "application/json");
+    add_coding(r, CODING_NONE);
+  } else {
+    add_coding(r, CODING_NONE);
   }
-  reply_header(r, "ETag", entry->etag);
+  reply_header(r, "ETag", r->etag);
   reply_header(r, "Cache-Control", "no-cache");
   if (r->route->method[0] == 'P') {
     reply_header(r, "Location", location);

@@ -185,6 +185,7 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
   }
   caller_release(r->caller);
   signer_release(r->signer);
+  encoded_release(r->encoded);
   free(r);
   *state = NULL;
 }
@@ -249,7 +250,8 @@ int http_start(server *srv) {
     free(key);
     return 0;
   }
-  srv->connections = watch_start(o, srv->needs_token);
+  srv->encoded = encoded_open((size_t)o->encoded_bytes);
+  srv->connections = srv->encoded ? watch_start(o, srv->needs_token) : NULL;
   if (!srv->connections) {
     log_error("the thread that watches connections cannot be started");
     free(certificate);
@@ -287,4 +289,6 @@ void http_stop(server *srv) {
   }
   watch_stop(srv->connections);
   srv->connections = NULL;
+  encoded_close(srv->encoded);
+  srv->encoded = NULL;
 }
