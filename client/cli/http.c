@@ -133,9 +133,24 @@ static void set_body(CURL *curl, const cli_request *request) {
   }
 }
 
+/* The path of a server unix:PATH; NULL for a URL. */
+static const char *socket_of(const cli *c) {
+  return !strncmp(c->server, "unix:", 5) ? c->server + 5 : NULL;
+}
+
+static char *url_of(const cli *c, const char *path) {
+  size_t length = strlen(c->server);
+  return socket_of(c) ? cli_text("http://localhost%s", path)
+                      : cli_text("%.*s%s", (int)(length - (c->server[length - 1] == '/')), c->server, path);
+}
+
 static CURLcode perform(transfer *t, const char *url) {
   CURL *curl = t->c->curl;
   curl_easy_reset(curl);
+  if (socket_of(t->c)) {
+    curl_easy_setopt(curl, CURLOPT_UNIX_SOCKET_PATH, socket_of(t->c));
+    curl_easy_setopt(curl, CURLOPT_PROXY, ""); /* whatever the environment says */
+  }
   struct curl_slist *headers = headers_of(t->c, t->request);
   curl_easy_setopt(curl, CURLOPT_URL, url);
   curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
@@ -174,8 +189,7 @@ static int answered(CURLcode code, const cli_reply *reply) {
 }
 
 int cli_send(cli *c, const cli_request *request, cli_reply *out) {
-  char *url = cli_text("%.*s%s", (int)(strlen(c->server) - (c->server[strlen(c->server) - 1] == '/')), c->server,
-                       request->path);
+  char *url = url_of(c, request->path);
   time_t give_up = time(NULL) + PATIENCE_SECONDS;
   int rc = CLI_UNREACHABLE;
   for (int attempt = 0;; attempt++) {

@@ -12,7 +12,7 @@ _Static_assert(OPT_COUNT <= 64, "a command holds its options in 64 bits");
 
 const cli_option cli_options[OPT_COUNT] = {
     [OPT_SERVER] = {"server", 's', "URL", NULL,
-                    "address of the daemon; default: $ORBMORPH_SERVER or " CLI_DEFAULT_SERVER},
+                    "address of the daemon, or unix:PATH; default: $ORBMORPH_SERVER or " CLI_DEFAULT_SERVER},
     [OPT_JSON] = {"json", 0, NULL, NULL, "print the daemon's JSON"},
     [OPT_QUIET] = {"quiet", 'q', NULL, NULL, "print no progress and no notes"},
     [OPT_HELP] = {"help", 'h', NULL, NULL, "show this help"},

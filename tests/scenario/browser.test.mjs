@@ -197,6 +197,7 @@ test('unknown parameters of a query are refused by name, on every route', async 
       assert.equal(reply.json.parameter, 'vertices');
       // What the document describes is known, once, and with a value.
       for (const p of (item[verb].parameters ?? []).map(resolve).filter((p) => p.in === 'query')) {
+        if (p.name === 'signature') continue; // an invalid one is refused before the query is read
         const twice = await ask(`${p.name}=1&${p.name}=1`);
         assertProblem(twice, 400, 'bad-query', `${verb} ${target} ${p.name}`);
         assert.match(twice.json.detail, /given twice/);

@@ -198,3 +198,28 @@ test('with tokens, a recipe is made for the tenant that asks', async (t) => {
   const d = await daemon(t, { args: ['--auth', 'on'] });
   assertProblem(await d.get(small(`${'0'.repeat(64)},${'1'.repeat(64)}`)), 401, 'unauthorized');
 });
+
+test('a download is named after its shapes', async (t) => {
+  const d = await daemon(t);
+  const url = small(await pair(d));
+  const named = async (target) =>
+    /^inline; filename="([^"]*)"$/.exec((await d.get(target)).headers.get('content-disposition'))[1];
+  assert.equal(await named(url), 'egg-bean.glb');
+  for (const [names, file] of [
+    ['Hund,Kätzchen', 'Hund-K_tzchen.glb'],
+    ['../../etc/passwd,x"y\\z', '_._.._etc_passwd-x_y_z.glb'],
+    [`${'a'.repeat(120)},b`, `${'a'.repeat(80)}.glb`],
+  ])
+    assert.equal(await named(`${url}&names=${encodeURIComponent(names)}`), file, names);
+  // A name that looks like the JSON around it is only a name.
+  const [a, b] = /shapes=(\w+),(\w+)/.exec(url).slice(1);
+  const { asset } = await d.made('/v1/supermeshes', {
+    shapes: [
+      { mesh: a, name: '"],"landmarks":[' },
+      { mesh: b, name: '{"mesh":"' },
+    ],
+    align: { method: 'rotate' },
+    remesh: { tolerance: 0.05 },
+  });
+  assert.equal(await named(asset), '____landmarks___-__mesh___.glb');
+});

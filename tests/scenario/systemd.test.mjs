@@ -8,7 +8,8 @@ import path from 'node:path';
 import test from 'node:test';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
-import { binaries, daemon, patience } from './support/daemon.mjs';
+import { runProgram } from './support/cli.mjs';
+import { binaries, daemon, patience, samples } from './support/daemon.mjs';
 
 async function folder(t) {
   const made = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
@@ -70,6 +71,14 @@ test('a Unix socket', async (t) => {
   d = await start(t, args);
   assert.equal((await lstat(at)).mode & 0o777, 0o660);
   assert.equal((await get({ socketPath: at })).status, 200);
+  // The command line reaches it, whatever proxy the environment names.
+  const client = (...args) => runProgram(binaries.client, [...args], { env: { http_proxy: 'http://127.0.0.1:9' } });
+  const ran = await client('upload', '-s', `unix:${at}`, path.join(samples, 'dog.obj'));
+  assert.equal(ran.code, 0, ran.err);
+  assert.match((await client('-s', `unix:${at}`, 'ls')).out, /dog/);
+  const away = await client('-s', `unix:${at}x`, 'ls');
+  assert.equal(away.code, 3);
+  assert.ok(away.err.includes(`unix:${at}x`), away.err);
   d.child.kill('SIGTERM');
   assert.equal((await d.exited).code, 0, d.log);
   await assert.rejects(lstat(at), { code: 'ENOENT' }, 'it is removed at the end');

@@ -1,9 +1,10 @@
 /** The daemon's resources as methods. Every method that can take long accepts `signal` and `onProgress`. */
-import { CancelledError, ProblemError, UnreachableError, abortError, isAbort } from './errors.js';
+import { CancelledError, ProblemError, UnreachableError, abortError, isAbort, unreachable } from './errors.js';
 import { readEvents } from './events.js';
 import { openSource, parse, sendBody } from './upload.js';
 
 const ENDED = new Set(['succeeded', 'failed', 'cancelled']);
+const LONGEST_WAIT_S = 60;
 const sleep = (ms, signal) =>
   new Promise((resolve, reject) => {
     if (signal?.aborted) return reject(abortError(signal));
@@ -25,10 +26,11 @@ function defaultServer() {
 }
 
 export class Orbmorph {
-  constructor({ server, token, fetch } = {}) {
+  constructor({ server, token, fetch, retries = 4 } = {}) {
     this.server = String(server ?? defaultServer()).replace(/\/+$/, '');
     this.token = token ?? (typeof process !== 'undefined' ? process.env?.ORBMORPH_TOKEN : undefined);
     this.fetch = fetch ?? ((...args) => globalThis.fetch(...args));
+    this.retries = retries;
   }
 
   /** The full URL of a path of the daemon, for example of `supermesh.asset`. */
@@ -40,8 +42,30 @@ export class Orbmorph {
     return { ...(this.token ? { Authorization: `Bearer ${this.token}` } : {}), ...more };
   }
 
+  /**
+   * Repeats what the daemon is too busy for (429 and 503), at most `retries` times, after as many seconds as it says. Equal
+   * requests have one effect, so POST is repeated too. A used-up quota and a wait of more than a minute are not waited for.
+   */
+  async patient(send, signal) {
+    for (let turn = 0; ; turn++) {
+      try {
+        return await send();
+      } catch (error) {
+        const busy =
+          error instanceof ProblemError && [429, 503].includes(error.status) && error.kind !== 'quota-exceeded';
+        const seconds = Math.max(error.retryAfter ?? 0, 0.25 * 2 ** turn);
+        if (!busy || turn >= this.retries || seconds > LONGEST_WAIT_S) throw error;
+        await sleep(1000 * seconds, signal);
+      }
+    }
+  }
+
   /** Sends a request. Throws ProblemError if the daemon refuses it. -> Response */
-  async request(path, { method = 'GET', json, headers, signal } = {}) {
+  request(path, options = {}) {
+    return this.patient(() => this.send(path, options), options.signal);
+  }
+
+  async send(path, { method = 'GET', json, headers, signal }) {
     const init = { method, signal, headers: this.headers(headers) };
     if (json !== undefined) {
       init.body = JSON.stringify(json);
@@ -52,11 +76,12 @@ export class Orbmorph {
       response = await this.fetch(this.url(path), init);
     } catch (error) {
       if (signal?.aborted) throw abortError(signal);
-      throw new UnreachableError(this.url(path), error);
+      throw await unreachable(this.url(path), error, this.fetch);
     }
     if (!response.ok) {
       const problem = parse(await response.text().catch(() => ''));
-      throw new ProblemError(problem ?? { title: response.statusText, status: response.status }, response.status);
+      const { status, statusText: title, headers: sent } = response;
+      throw new ProblemError(problem ?? { title, status }, status, sent);
     }
     return response;
   }
@@ -74,13 +99,14 @@ export class Orbmorph {
     const query = new URLSearchParams({ name: file.name });
     if (format) query.set('format', format);
     if (repair) query.set('repair', Array.isArray(repair) ? repair.join(',') : repair);
-    const { json } = await sendBody(this.url(`/v1/meshes?${query}`), file.body, file.size, {
-      headers: this.headers({ 'Content-Type': 'application/octet-stream' }),
-      onProgress,
-      signal,
-      fetch: this.fetch,
-    });
-    return json;
+    const send = () =>
+      sendBody(this.url(`/v1/meshes?${query}`), file.body, file.size, {
+        headers: this.headers({ 'Content-Type': 'application/octet-stream' }),
+        onProgress,
+        signal,
+        fetch: this.fetch,
+      });
+    return (await this.patient(send, signal)).json;
   }
 
   getMesh(id, options) {

@@ -84,6 +84,8 @@ export interface ConnectOptions {
   server?: string;
   token?: string;
   fetch?: typeof fetch;
+  /** How often a request is repeated while the daemon is busy (429, 503); 4 by default. */
+  retries?: number;
 }
 
 /** The parameters of GET /v1/morph.glb. */
@@ -172,10 +174,16 @@ export class ProblemError extends Error {
   readonly title: string;
   readonly detail: string;
   readonly status: number;
+  /** Seconds after which to try again. */
+  readonly retryAfter: number | null;
+  /** The number of the request in the daemon's log. */
+  readonly requestId: string | null;
 }
 export class UnreachableError extends Error {
   readonly url: string;
 }
+/** The daemon is running, but does not let pages of this origin in. */
+export class CorsError extends UnreachableError {}
 export class CancelledError extends Error {
   readonly job: Job;
 }

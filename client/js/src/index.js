@@ -12,7 +12,7 @@ import { Orbmorph } from './client.js';
 import { signUrl } from './sign.js';
 
 export { Orbmorph } from './client.js';
-export { CancelledError, ProblemError, UnreachableError } from './errors.js';
+export { CancelledError, CorsError, ProblemError, UnreachableError } from './errors.js';
 export { signUrl } from './sign.js';
 
 export const morph = (sources, { server, token, ...options } = {}) =>

@@ -1,5 +1,5 @@
 /** Turns a source (File, Blob, bytes, path) into a request body and sends it with progress. */
-import { ProblemError, UnreachableError, abortError } from './errors.js';
+import { ProblemError, abortError, unreachable } from './errors.js';
 
 const isNode = typeof process !== 'undefined' && !!process.versions?.node;
 
@@ -30,11 +30,11 @@ export const stem = (file) => file.replace(/\.[A-Za-z0-9]{1,5}$/, '') || 'mesh';
 /** Posts `body`; calls `onProgress(sent, total)`. Only XMLHttpRequest reports progress in browsers. -> {status, json} */
 export function sendBody(url, body, size, { headers, onProgress, signal, fetch }) {
   if (typeof XMLHttpRequest !== 'undefined' && onProgress)
-    return sendXhr(url, body, size, { headers, onProgress, signal });
+    return sendXhr(url, body, size, { headers, onProgress, signal, fetch });
   return sendFetch(url, body, size, { headers, onProgress, signal, fetch });
 }
 
-function sendXhr(url, body, size, { headers, onProgress, signal }) {
+function sendXhr(url, body, size, { headers, onProgress, signal, fetch }) {
   return new Promise((resolve, reject) => {
     if (signal?.aborted) return reject(abortError(signal));
     const xhr = new XMLHttpRequest();
@@ -47,11 +47,16 @@ function sendXhr(url, body, size, { headers, onProgress, signal }) {
       end();
       const answer = { status: xhr.status, json: parse(xhr.responseText) };
       if (xhr.status >= 200 && xhr.status < 300) resolve(answer);
-      else reject(new ProblemError(answer.json ?? { title: xhr.statusText }, xhr.status));
+      else
+        reject(
+          new ProblemError(answer.json ?? { title: xhr.statusText }, xhr.status, {
+            get: (n) => xhr.getResponseHeader(n),
+          }),
+        );
     };
     xhr.onerror = () => {
       end();
-      reject(new UnreachableError(url));
+      unreachable(url, undefined, fetch).then(reject);
     };
     xhr.onabort = () => {
       end();
@@ -74,10 +79,10 @@ async function sendFetch(url, body, size, { headers, onProgress, signal, fetch }
     response = await fetch(url, init);
   } catch (error) {
     if (signal?.aborted) throw abortError(signal);
-    throw new UnreachableError(url, error);
+    throw await unreachable(url, error, fetch);
   }
   const json = parse(await response.text());
-  if (!response.ok) throw new ProblemError(json ?? { title: response.statusText }, response.status);
+  if (!response.ok) throw new ProblemError(json ?? { title: response.statusText }, response.status, response.headers);
   return { status: response.status, json };
 }
 

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { mkdtemp, writeFile, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import orbmorph, { Orbmorph, ProblemError, UnreachableError } from '../src/index.js';
+import orbmorph, { CorsError, Orbmorph, ProblemError, UnreachableError } from '../src/index.js';
 import { readEvents } from '../src/events.js';
 import { startDaemon } from './support/daemon.mjs';
 
@@ -183,4 +183,82 @@ test('events: line ends, comments and multi-line data, split anywhere', async ()
       { event: 'message', data: '{"ü":1}', id: '7' },
     ]);
   }
+});
+
+/** Answers a list of [status, headers, body] one after another, and counts. */
+function answering(list) {
+  const asked = [];
+  const fetch = async (url, init) => {
+    const [status, headers, body = {}] = list[Math.min(asked.length, list.length - 1)];
+    asked.push({ url, init });
+    return new Response(JSON.stringify(body), { status, headers });
+  };
+  return { asked, fetch };
+}
+const busy = (status, name, headers = {}) => [status, headers, { type: `/problems/${name}`, status, detail: 'Busy.' }];
+
+test('what the daemon is too busy for is asked for again, as often and as late as it says', async () => {
+  const { asked, fetch } = answering([
+    busy(503, 'unavailable', { 'Retry-After': '0' }),
+    busy(429, 'queue-full', { 'Retry-After': '1' }),
+    [200, {}, { id: 'x' }],
+  ]);
+  const client = new Orbmorph({ server: 'http://busy', fetch });
+  const began = Date.now();
+  assert.deepEqual(await client.getMesh('x'), { id: 'x' });
+  assert.equal(asked.length, 3);
+  assert.ok(Date.now() - began >= 1200, 'a quarter of a second, then the second that the daemon asked for');
+
+  const full = answering([busy(503, 'unavailable', { 'X-Request-Id': 'abc', 'Retry-After': '0' })]);
+  const error = await new Orbmorph({ server: 'http://busy', fetch: full.fetch, retries: 1 })
+    .getMesh('x')
+    .catch((e) => e);
+  assert.ok(error instanceof ProblemError);
+  assert.deepEqual([full.asked.length, error.retryAfter, error.requestId], [2, 0, 'abc']);
+
+  for (const once of [
+    busy(429, 'quota-exceeded', { 'Retry-After': '1' }),
+    busy(503, 'not-ready', { 'Retry-After': '3600' }),
+    busy(500, 'internal'),
+    busy(404, 'not-found'),
+  ]) {
+    const { asked: times, fetch: refusing } = answering([once]);
+    await assert.rejects(new Orbmorph({ server: 'http://busy', fetch: refusing }).getMesh('x'), ProblemError);
+    assert.equal(times.length, 1, once[2].type);
+  }
+  const stop = new AbortController();
+  const never = answering([busy(503, 'unavailable', { 'Retry-After': '30' })]);
+  const waiting = new Orbmorph({ server: 'http://busy', fetch: never.fetch }).getMesh('x', { signal: stop.signal });
+  setTimeout(() => stop.abort(), 50);
+  await assert.rejects(waiting, { name: 'AbortError' });
+});
+
+test('an upload is repeated as well', async () => {
+  const { asked, fetch } = answering([busy(503, 'unavailable', { 'Retry-After': '0' }), [201, {}, { id: 'x' }]]);
+  const mesh = await new Orbmorph({ server: 'http://busy', fetch }).uploadMesh(bytes('v 0 0 0'));
+  assert.deepEqual([mesh.id, asked.length], ['x', 2]);
+});
+
+test('a daemon that does not let the page in is told apart from one that is away', async (t) => {
+  t.after(() => delete globalThis.location);
+  globalThis.location = { origin: 'https://page.example', protocol: 'https:' };
+  const failing = (livez) => async (url, init) => {
+    if (livez && url.endsWith('/livez') && init.mode === 'no-cors') return new Response('', { status: 200 });
+    throw new TypeError('Failed to fetch');
+  };
+  const there = await new Orbmorph({ server: 'http://there', fetch: failing(true) }).getMesh('x').catch((e) => e);
+  assert.ok(there instanceof CorsError && there instanceof UnreachableError);
+  assert.match(there.message, /--cors https:\/\/page\.example/);
+  const away = await new Orbmorph({ server: 'http://away', fetch: failing(false) }).getMesh('x').catch((e) => e);
+  assert.ok(away instanceof UnreachableError && !(away instanceof CorsError));
+});
+
+test('the URL of a recipe', () => {
+  const url = new Orbmorph({ server: 'http://x' }).morphUrl({
+    shapes: ['a', 'b'],
+    names: ['x & y', 'ü'],
+    tolerance: 0.01,
+    fit: undefined,
+  });
+  assert.equal(url, 'http://x/v1/morph.glb?shapes=a,b&names=x%20%26%20y,%C3%BC&tolerance=0.01');
 });
