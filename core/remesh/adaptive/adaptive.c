@@ -21,7 +21,6 @@
 #include "base/error.h"
 #include "remesh/adaptive/collapse.h"
 #include "remesh/adaptive/merge.h"
-#include "remesh/adaptive/move.h"
 #include "remesh/adaptive/repair.h"
 #include "remesh/adaptive/resolve.h"
 #include "remesh/adaptive/start.h"
@@ -35,6 +34,8 @@ enum { REFINEMENTS_MOST = 32 }; /* after so many the net counts as one that refi
  * remain after it, or there was more than one in MANY, the overlay of everything is. Larger numbers spend more time on
  * fewer inverted triangles. */
 enum { FEW = 3000, SOME = 1000, MANY = 100 };
+/* More inverted triangles than one in WOUND of the refined net: the overlay of everything is worth it at once. */
+enum { WOUND = 14 };
 /* Shapes times triangles up to which a second start, from the overlay, is affordable. */
 enum { OVERLAY_MOST = 120000 };
 /* The overlay is huge, and the map is wound, if it has more than HUGE_OVERLAY triangles and more than HUGE_GROWTH times
@@ -45,12 +46,6 @@ static const double STRICT_MOST = 0.05;
 /* Relative to the diagonal: no distance on a shape exceeds 1, so more tolerance would not help. */
 static const double TOLERANCE_MOST = 4;
 
-/* Later rounds gain a few per cent each and take the most time: the more triangles and shapes, the fewer rounds. */
-static int rounds_for(int64_t triangles, int32_t shapes) {
-  int64_t work = triangles * shapes / 2;
-  return work < 25000 ? 10 : work < 60000 ? 4 : 2;
-}
-
 /* Collapses first, then repairs inverted triangles, while enough vertices are left for that. */
 static orb_status first_round(orb_context *ctx, orb_placed_net *placed, double limit2, int64_t target, int strict) {
   ORB_TRY(orb_adaptive_collapse(ctx, placed, limit2, target, strict, 0));
@@ -59,22 +54,10 @@ static orb_status first_round(orb_context *ctx, orb_placed_net *placed, double l
   return strict ? orb_adaptive_repair(ctx, placed, limit2) : ORB_OK;
 }
 
-/* The rounds after the first, until one gains less than a per cent. */
-static orb_status later_rounds(orb_context *ctx, orb_placed_net *placed, double limit2, int64_t target, int strict,
-                               int rounds) {
-  int64_t before = orb_placed_live(placed), after = before;
-  for (int round = 1; round < rounds && after > target; round++) {
-    ORB_TRY(orb_adaptive_move_all(ctx, placed, limit2, NULL));
-    ORB_TRY(orb_adaptive_collapse(ctx, placed, limit2, target, strict, 1));
-    ORB_TRY(orb_adaptive_merge_all(ctx, placed, limit2, target));
-    ORB_TRY(orb_placed_flip_all(ctx, placed, limit2, 0));
-    after = orb_placed_live(placed);
-    if ((before - after) * 100 < before) {
-      break;
-    }
-    before = after;
-  }
-  return ORB_OK;
+/* Merges neighbours, which removes what collapses cannot, and flips edges for well-shaped triangles. */
+static orb_status second_round(orb_context *ctx, orb_placed_net *placed, double limit2, int64_t target) {
+  ORB_TRY(orb_adaptive_merge_all(ctx, placed, limit2, target));
+  return orb_placed_flip_all(ctx, placed, limit2, 0);
 }
 
 /* Refines until nothing deviates. It takes several calls, because splits may leave items too far from the triangles
@@ -107,15 +90,25 @@ static int64_t triangles_of(const orb_remesh_job *job) {
   return inputs;
 }
 
+/* Whether a start from the overlay is affordable. */
+static int may_overlay(const orb_remesh_job *job) {
+  return triangles_of(job) * job->shape_count <= OVERLAY_MOST;
+}
+
+/* Whether the refined net has so many inverted triangles that the first round would leave too many of them. */
+static int expects_many_inverted(orb_context *ctx, const orb_remesh_job *job, orb_placed_net *placed) {
+  return may_overlay(job) && orb_placed_count_inverted(ctx, placed) * WOUND > orb_placed_live(placed);
+}
+
 /* Where the first round leaves too many triangles inverted, repeats it from the overlay around them; or, unless it is
  * too large, from the whole overlay, if they are very many or the local overlay has not helped. */
 static orb_status reduce_inverted(orb_context *ctx, const orb_remesh_job *job, orb_placed_net *placed, double tolerance,
                                   int is_overlay) {
-  int64_t inverted = orb_placed_count_inverted(ctx, placed), live = orb_placed_live(placed), inputs = triangles_of(job);
+  int64_t inverted = orb_placed_count_inverted(ctx, placed), live = orb_placed_live(placed);
   if (inverted * FEW <= live) {
     return ORB_OK;
   }
-  int may = !is_overlay && inputs * job->shape_count <= OVERLAY_MOST, anew = may && inverted * MANY > live;
+  int may = !is_overlay && may_overlay(job), anew = may && inverted * MANY > live;
   if (!anew) {
     ORB_TRY(orb_adaptive_resolve(ctx, placed, tolerance * tolerance));
     ORB_TRY(refine_fully(ctx, placed, tolerance));
@@ -160,11 +153,10 @@ static orb_status remesh_wound(orb_context *ctx, const orb_remesh_job *job, doub
 static orb_status all_rounds(orb_context *ctx, const orb_remesh_job *job, orb_placed_net *placed, double tolerance,
                              int is_overlay) {
   double limit2 = tolerance * tolerance;
-  int rounds = rounds_for(orb_placed_live(placed), placed->shape_count);
   ORB_TRY(begin(ctx, placed, limit2));
   ORB_TRY(reduce_inverted(ctx, job, placed, tolerance, is_overlay));
   orb_progress(ctx, "remesh", 0.4);
-  ORB_TRY(later_rounds(ctx, placed, limit2, 0, 1, rounds));
+  ORB_TRY(second_round(ctx, placed, limit2, 0));
   orb_progress(ctx, "remesh", 0.8);
   ORB_TRY(orb_adaptive_repair(ctx, placed, limit2));
   return first_round(ctx, placed, limit2, 0, 1);
@@ -175,9 +167,8 @@ static orb_status reduce_to(orb_context *ctx, orb_placed_net *placed, double tol
   while (orb_placed_live(placed) > most && tolerance < TOLERANCE_MOST) {
     tolerance *= 1.25; /* smaller steps take longer and end nearer to the least tolerance */
     double limit2 = tolerance * tolerance;
-    int strict = tolerance < STRICT_MOST, rounds = rounds_for(orb_placed_live(placed), placed->shape_count);
-    ORB_TRY(first_round(ctx, placed, limit2, most, strict));
-    ORB_TRY(later_rounds(ctx, placed, limit2, most, strict, rounds));
+    ORB_TRY(first_round(ctx, placed, limit2, most, tolerance < STRICT_MOST));
+    ORB_TRY(second_round(ctx, placed, limit2, most));
   }
   if (orb_placed_live(placed) > most) {
     return orb_fail(ctx, ORB_E_BAD_OPTION, "The shapes and landmarks need more than max_triangles = %lld; raise it.",
@@ -204,7 +195,7 @@ static orb_status remesh_within(orb_context *ctx, const orb_remesh_job *job, dou
   orb_progress(ctx, "remesh", 0.15);
   ORB_TRY(orb_placed_flip_all(ctx, placed, INFINITY, 1));
   ORB_TRY(refine_fully(ctx, placed, tolerance));
-  int is_overlay = placed->gave_up;
+  int is_overlay = placed->gave_up || expects_many_inverted(ctx, job, placed);
   if (is_overlay) {
     orb_placed_free(ctx, placed);
     ORB_TRY(orb_adaptive_start_from_overlay(ctx, job, placed));

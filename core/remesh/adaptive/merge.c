@@ -1,116 +1,444 @@
-/* Two neighbours become one vertex between them, with as many edge flips around as necessary (star.h). Succeeds where
- * neither can move onto the other. */
+/* Two neighbours become one vertex between them: the triangles around both are replaced by the star of a point on the
+ * edge. Succeeds where neither can move onto the other.
+ *
+ * A merge is proved before it is made, but most pairs cannot merge, so what costs little decides first: a guess of the
+ * new edges' deviations from the normals at the vertices alone drops half of the pairs, and the proof begins with the
+ * edges that are the likeliest to fail. A pass searches all pairs in parallel, then merges those that can, the least
+ * deviating first, one after another; the next pass searches the pairs beside them. */
 #include "remesh/adaptive/merge.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "base/check.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "numeric/predicates.h"
 #include "numeric/vec3.h"
-#include "remesh/adaptive/star.h"
-#include "remesh/placed/marks.h"
+#include "remesh/placed/bound.h"
+#include "remesh/placed/form.h"
 
-enum { STAR_MAX = 16 }; /* vertices with more neighbours do not merge; the size of an array on the stack */
-enum { GRAIN = 64 };    /* vertices a thread takes at a time */
+enum { MOST = ORB_STAR_MOST }; /* sides of the star of a merged vertex: pairs with more stay apart */
+/* Points tried, as shares of the way from u to v: more find a few more merges and take longer. */
+static const double WAY[] = {0.5, 0.25, 0.75, 0, 1};
+enum { POINTS = sizeof WAY / sizeof *WAY };
+/* Squared guesses and deviations in units of the squared limit. A pair is dropped if the greatest guess is above
+ * GUESS_PAIR at its middle, above GUESS_POINT at a point, or above GUESS_SPOT once the point is located; a point is
+ * dropped if an edge deviates by more than FAR_MOST. Higher values find a few more merges and take longer. */
+static const double GUESS_PAIR = 3, GUESS_POINT = 2, GUESS_SPOT = 2.5, FAR_MOST = 2.5;
+/* A point from which an edge is beyond the limit is pulled along it, up to PULLS times, by the share of its length that
+ * brings a circular arc within the limit and by PULL_MORE, at most PULL_MOST: without PULL_MORE pulls creep, and long
+ * ones leave the room that the other edges have. */
+enum { PULLS = 3 };
+static const double PULL_MORE = 0.03, PULL_MOST = 0.3;
+enum { LIKELY = 3 }; /* edges tested before the others: most points fail at one of them */
+enum { PASSES = 4 }; /* the fourth finds less than a hundredth of all merges */
+enum { GRAIN = 64 }; /* vertices a thread takes at a time */
 
-/* The triangles around u, then the others around v; returns how many, 0 if too many. */
-static int stars_of(const orb_net *net, int32_t u, int32_t v, int32_t triangles[2 * STAR_MAX]) {
-  int n = 0;
-  int32_t ends[2] = {u, v};
-  for (int i = 0; i < 2; i++) {
-    int32_t first = net->out[ends[i]], h = first;
-    int count = 0;
-    do {
-      if (++count > STAR_MAX) {
+/* Two neighbours and the triangles around both. */
+typedef struct pair {
+  orb_placed_net *placed;
+  double limit2;
+  int32_t u, v, p; /* p: the vertex that stands for the merged one, a number beyond the last vertex */
+  int32_t ring[MOST], side[MOST], triangle[MOST + 2]; /* side i, a half-edge, leads from ring i to the next */
+  int n, count;
+  orb_tally now; /* the inverted triangles around both; inverted −1: not counted yet */
+  int far;       /* the ring vertex to which an edge was last found beyond the limit; −1: none */
+  int32_t far_shape;
+  double far2; /* and by how much, in units of the squared limit */
+} pair;
+
+/* An edge of the star on a shape. */
+typedef struct spoke {
+  double guess2;
+  int to;
+  int32_t shape;
+} spoke;
+
+/* Appends the triangles around the origin of h from that after h to that before the twin of h, or all, and their outer
+ * sides. Returns 0 if there are too many. */
+static int take_fan(pair *s, int32_t h, int shared) {
+  const orb_net *net = &s->placed->net;
+  int32_t last = net->twin[h], e = h;
+  do {
+    int inside = e / 3 == h / 3 || e / 3 == last / 3;
+    if (!inside || shared) {
+      if (s->count == MOST + 2) {
         return 0;
       }
-      const int32_t *c = net->triangles + (h - h % 3);
-      if (i == 0 || (c[0] != u && c[1] != u && c[2] != u)) {
-        triangles[n++] = h / 3;
+      s->triangle[s->count++] = e / 3;
+    }
+    if (!inside) {
+      if (s->n == MOST) {
+        return 0;
       }
-      h = net->twin[orb_prev(h)];
-    } while (h != first);
-  }
-  return n;
+      s->side[s->n] = orb_next(e);
+      s->ring[s->n++] = net->triangles[orb_next(e)];
+    }
+    e = net->twin[orb_prev(e)];
+  } while (e != h);
+  return 1;
 }
 
-/* Merges u and v if that is possible; thread ≥ 0: only tests it. */
-static int try_merge(orb_placed_net *placed, int32_t u, int32_t v, double limit2, int thread) {
-  static const double way[] = {0.5, 0.25, 0.75, 0, 1}; /* from u to v, tried in this order */
-  enum { POINTS = sizeof way / sizeof *way };
-  const orb_star_wish wish = {limit2, 2, 4, ORB_STAR_NOT_WORSE}; /* inside: u, v and at most two more */
-  const double *a = orb_net_point(&placed->net, u), *b = orb_net_point(&placed->net, v);
-  int32_t triangles[2 * STAR_MAX];
-  double points[POINTS][3];
-  for (int i = 0; i < POINTS; i++) {
+/* Whether the ends have exactly two neighbours in common, given how many of the ring belong to u. */
+static int is_disc(const pair *s, int of_u) {
+  for (int i = 1; i < of_u; i++) { /* ring[0] and ring[of_u] are the two in common */
+    for (int k = of_u + 1; k < s->n; k++) {
+      if (s->ring[i] == s->ring[k]) {
+        return 0;
+      }
+    }
+  }
+  return s->n >= 3;
+}
+
+/* Gathers the pair of h = u→v; 0: it cannot merge. */
+static int take_pair(orb_placed_net *placed, int32_t h, int32_t p, double limit2, pair *s) {
+  s->placed = placed;
+  s->limit2 = limit2;
+  s->u = placed->net.triangles[h];
+  s->v = placed->net.triangles[orb_next(h)];
+  s->p = p;
+  s->n = s->count = 0;
+  s->now.inverted = -1;
+  s->far = -1;
+  if (!take_fan(s, h, 1)) {
+    return 0;
+  }
+  int of_u = s->n;
+  return take_fan(s, placed->net.twin[h], 0) && is_disc(s, of_u);
+}
+
+/* The greatest guess over the edges of the star of the point at `way`, in units of the squared limit, from the
+ * positions and normals at u and v alone. */
+static double guess_at(const pair *s, double way) {
+  const orb_placed_net *placed = s->placed;
+  double greatest = 0;
+  for (int32_t shape = 0; shape < placed->shape_count; shape++) {
+    const double *a = orb_placed_position(placed, s->u, shape), *b = orb_placed_position(placed, s->v, shape);
+    const double *m = orb_placed_normal(placed, s->u, shape), *n = orb_placed_normal(placed, s->v, shape);
+    double at[3], normal[3];
     for (int k = 0; k < 3; k++) {
-      points[i][k] = a[k] + way[i] * (b[k] - a[k]);
+      at[k] = a[k] + way * (b[k] - a[k]);
+      normal[k] = m[k] + way * (n[k] - m[k]);
     }
-    (void)orb_normalize(points[i]);
+    (void)orb_normalize(normal);
+    for (int i = 0; i < s->n; i++) {
+      const double *c = orb_placed_position(placed, s->ring[i], shape);
+      const double *o = orb_placed_normal(placed, s->ring[i], shape);
+      double height8 = (c[0] - at[0]) * (o[0] - normal[0]) + (c[1] - at[1]) * (o[1] - normal[1]) +
+                       (c[2] - at[2]) * (o[2] - normal[2]);
+      greatest = height8 * height8 > greatest ? height8 * height8 : greatest;
+    }
   }
-  int n = stars_of(&placed->net, u, v, triangles);
-  const double(*all)[3] = (const double(*)[3])points;
-  return n > 0 && (thread < 0 ? orb_adaptive_star(placed, triangles, n, all, POINTS, &wish)
-                              : orb_adaptive_can_star(placed, triangles, n, all, POINTS, &wish, thread));
+  return greatest / (64 * s->limit2);
 }
 
-static int merge_one(orb_placed_net *placed, int32_t u, double limit2, int thread) {
-  const orb_net *net = &placed->net;
-  int32_t first = net->out[u], h = first;
-  do {
-    int32_t v = net->triangles[orb_next(h)];
-    if (u < v && !placed->fixed[v] && try_merge(placed, u, v, limit2, thread)) {
-      return 1;
+static int is_positive(const pair *s) {
+  const orb_net *net = &s->placed->net;
+  const double *p = orb_net_point(net, s->p);
+  for (int i = 0; i < s->n; i++) {
+    int32_t a = s->ring[i], b = s->ring[(i + 1) % s->n];
+    if (orb_orient(p, orb_net_point(net, a), orb_net_point(net, b)) <= 0 ||
+        !orb_net_clearly_positive(net, s->p, a, b)) {
+      return 0;
     }
-    h = net->twin[orb_prev(h)];
-  } while (h != first);
+  }
+  return 1;
+}
+
+static orb_tally count_now(pair *s) {
+  if (s->now.inverted < 0) {
+    s->now = (orb_tally){0, 0};
+    for (int i = 0; i < s->count; i++) {
+      const int32_t *c = s->placed->net.triangles + 3 * (int64_t)s->triangle[i];
+      orb_tally_add(&s->now, orb_placed_inverted_extent(s->placed, c[0], c[1], c[2]));
+    }
+  }
+  return s->now;
+}
+
+/* Whether the star has no more inverted triangles than the pair, and no larger ones. */
+static int keeps_upright(pair *s, double (*extent)(const orb_placed_net *, int32_t, int32_t, int32_t)) {
+  orb_tally star = {0, 0};
+  for (int i = 0; i < s->n; i++) {
+    orb_tally_add(&star, extent(s->placed, s->p, s->ring[i], s->ring[(i + 1) % s->n]));
+  }
+  return star.inverted == 0 || !orb_tally_is_worse(star, count_now(s));
+}
+
+/* Lists the LIKELY edges of the star that are the likeliest to be beyond the limit. Returns the greatest guess. */
+static double likely_far(const pair *s, spoke likely[LIKELY]) {
+  for (int i = 0; i < LIKELY; i++) {
+    likely[i] = (spoke){-1, 0, 0};
+  }
+  for (int i = 0; i < s->n; i++) {
+    for (int32_t shape = 0; shape < s->placed->shape_count; shape++) {
+      spoke next = {orb_placed_edge_guess2(s->placed, shape, s->p, s->ring[i]), i, shape};
+      for (int k = 0; k < LIKELY && next.guess2 > likely[LIKELY - 1].guess2; k++) {
+        if (next.guess2 > likely[k].guess2) {
+          spoke moved = likely[k];
+          likely[k] = next;
+          next = moved;
+        }
+      }
+    }
+  }
+  return likely[0].guess2;
+}
+
+static int edge_allows(pair *s, int to, int32_t shape) {
+  double distance2 = orb_placed_edge_on2(s->placed, shape, s->p, s->ring[to], s->limit2, NULL);
+  if (distance2 <= s->limit2) {
+    return 1;
+  }
+  s->far2 = distance2 / s->limit2;
+  s->far = to;
+  s->far_shape = shape;
   return 0;
 }
 
-/* Covers what the search depends on, except what lies beyond the neighbours' neighbours. */
-static uint64_t mark_of(const orb_placed_net *placed, int32_t u, double limit2) {
-  uint64_t mark = orb_mark_mix(1, &limit2, sizeof limit2), sum = orb_mark_of_surroundings(&placed->net, u);
-  mark = orb_mark_mix(mark, &sum, sizeof sum);
-  return mark ? mark : 1;
+static int edges_allow(pair *s, const spoke likely[LIKELY]) {
+  if (s->far >= 0 && !edge_allows(s, s->far, s->far_shape)) {
+    return 0;
+  }
+  for (int i = 0; i < LIKELY; i++) {
+    if (!edge_allows(s, likely[i].to, likely[i].shape)) {
+      return 0;
+    }
+  }
+  for (int i = 0; i < s->n; i++) {
+    for (int32_t shape = 0; shape < s->placed->shape_count; shape++) {
+      if (!edge_allows(s, i, shape)) {
+        return 0;
+      }
+    }
+  }
+  return 1;
 }
+
+/* Whether the listed items are within the limit of the star's triangles that hold them. */
+static int list_allows(const pair *s, int32_t list) {
+  const orb_placed_net *placed = s->placed;
+  const double *p = orb_net_point(&placed->net, s->p);
+  for (int32_t item = list; item >= 0; item = placed->item_next[item]) {
+    const double *x = orb_placed_item_point(placed, item);
+    for (int i = 0; i < s->n; i++) {
+      int32_t a = s->ring[i], b = s->ring[(i + 1) % s->n];
+      const double *q = orb_net_point(&placed->net, a), *r = orb_net_point(&placed->net, b);
+      if (orb_orient(p, q, x) >= 0 && orb_orient(r, p, x) >= 0 && orb_orient(q, r, x) >= 0 &&
+          orb_placed_item2(placed, item, s->p, a, b) > s->limit2) {
+        return 0;
+      }
+    }
+  }
+  return 1;
+}
+
+static int items_allow(const pair *s) {
+  int fine = list_allows(s, s->placed->vertex_items[s->u]) && list_allows(s, s->placed->vertex_items[s->v]);
+  for (int i = 0; i < s->count && fine; i++) {
+    fine = list_allows(s, s->placed->triangle_items[s->triangle[i]]);
+  }
+  return fine;
+}
+
+/* Places p on the way from u to v. */
+static void place(pair *s, double way) {
+  const double *a = orb_net_point(&s->placed->net, s->u), *b = orb_net_point(&s->placed->net, s->v);
+  double *p = s->placed->net.points + 3 * (int64_t)s->p;
+  for (int k = 0; k < 3; k++) {
+    p[k] = a[k] + way * (b[k] - a[k]);
+  }
+  (void)orb_normalize(p);
+}
+
+/* Moves p towards the far end of the edge that was beyond the limit. The deviation of an arc grows with the square of
+ * its length. */
+static void pull(pair *s) {
+  double way = fmin(PULL_MOST, PULL_MORE + 1 - 1 / sqrt(sqrt(s->far2)));
+  const double *b = orb_net_point(&s->placed->net, s->ring[s->far]);
+  double *p = s->placed->net.points + 3 * (int64_t)s->p;
+  for (int k = 0; k < 3; k++) {
+    p[k] += way * (b[k] - p[k]);
+  }
+  (void)orb_normalize(p);
+}
+
+enum { ALLOWED, FAR, NOT_ALLOWED };
+/* Tests everything that a merge at p must keep. */
+static int test(pair *s) {
+  orb_placed_net *placed = s->placed;
+  if (!is_positive(s)) {
+    return NOT_ALLOWED;
+  }
+  for (int32_t shape = 0; shape < placed->shape_count; shape++) {
+    orb_placed_locate_on(placed, s->p, shape);
+  }
+  spoke likely[LIKELY];
+  if (likely_far(s, likely) > GUESS_SPOT * s->limit2) {
+    return NOT_ALLOWED;
+  }
+  if (!edges_allow(s, likely)) {
+    return s->far2 < FAR_MOST ? FAR : NOT_ALLOWED;
+  }
+  return keeps_upright(s, orb_placed_inverted_by_corners) && items_allow(s) &&
+                 keeps_upright(s, orb_placed_inverted_extent)
+             ? ALLOWED
+             : NOT_ALLOWED;
+}
+
+/* Whether there is a point at which the pair may merge, the most promising first, and its guess; −1: none. */
+static int find_point(pair *s, double *guess) {
+  double at[POINTS];
+  for (int i = 0; i < POINTS; i++) {
+    at[i] = guess_at(s, WAY[i]);
+    if (i == 0 && at[i] > GUESS_PAIR) {
+      return -1;
+    }
+  }
+  orb_placed_copy_vertex(s->placed, s->p, s->u); /* hints for locating it */
+  for (int starts = 0; starts < POINTS; starts++) {
+    int best = 0;
+    for (int i = 1; i < POINTS; i++) {
+      best = at[i] < at[best] ? i : best;
+    }
+    if (!(at[best] <= GUESS_POINT)) {
+      return -1;
+    }
+    place(s, WAY[best]);
+    int result = test(s);
+    for (int k = 0; k < PULLS && result == FAR; k++) {
+      pull(s);
+      result = test(s);
+    }
+    if (result == ALLOWED) {
+      *guess = at[best];
+      return best;
+    }
+    at[best] = INFINITY;
+  }
+  return -1;
+}
+
+static void merge(pair *s) {
+  orb_placed_net *placed = s->placed;
+  int32_t lists[MOST + 4], inner[2] = {s->u, s->v};
+  int count = 0;
+  for (int i = 0; i < s->count; i++) {
+    lists[count++] = placed->triangle_items[s->triangle[i]];
+    placed->triangle_items[s->triangle[i]] = -1;
+  }
+  for (int i = 0; i < 2; i++) {
+    lists[count++] = placed->vertex_items[inner[i]];
+    placed->vertex_items[inner[i]] = -1;
+  }
+  orb_placed_copy_vertex(placed, s->u, s->p);
+  placed->no_move[s->u] = 0;
+  (void)orb_net_star(&placed->net, s->triangle, s->count, s->side, s->n, inner, 2, s->u);
+  for (int i = 0; i < count; i++) {
+    orb_placed_assign_among(placed, lists[i], s->triangle, s->n);
+  }
+}
+
+typedef struct candidate {
+  double guess;
+  int32_t u, v;
+} candidate;
 
 typedef struct merge_loop {
   orb_placed_net *placed;
   double limit2;
-  unsigned char *can; /* per vertex: it can merge with a neighbour */
+  unsigned char *changed; /* per vertex: a triangle at it is new since its pairs were searched */
+  candidate *found;       /* per vertex: the best pair that it is the lower number of; v −1: none */
 } merge_loop;
+
+/* The best neighbour of a greater number to merge with. */
+static candidate find_best(const merge_loop *loop, int32_t u, int32_t p) {
+  orb_placed_net *placed = loop->placed;
+  const orb_net *net = &placed->net;
+  candidate best = {INFINITY, u, -1};
+  int32_t first = net->out[u], h = first;
+  if (first < 0 || placed->fixed[u]) {
+    return best;
+  }
+  do {
+    int32_t v = net->triangles[orb_next(h)];
+    double guess;
+    pair s;
+    if (u < v && !placed->fixed[v] && (loop->changed[u] || loop->changed[v]) &&
+        take_pair(placed, h, p, loop->limit2, &s) && find_point(&s, &guess) >= 0 && guess < best.guess) {
+      best = (candidate){guess, u, v};
+    }
+    h = net->twin[orb_prev(h)];
+  } while (h != first);
+  return best;
+}
 
 static void find_range(void *arg, int64_t begin, int64_t end, int thread) {
   merge_loop *loop = arg;
+  for (int64_t u = begin; u < end; u++) {
+    loop->found[u] = find_best(loop, (int32_t)u, loop->placed->net.vertex_count + thread);
+  }
+}
+
+static int compare(const void *one, const void *other) {
+  const candidate *a = one, *b = other;
+  return a->guess != b->guess ? (a->guess < b->guess ? -1 : 1) : (a->u > b->u) - (a->u < b->u);
+}
+
+/* Merges u and v if that is still possible. */
+static int try_merge(merge_loop *loop, int32_t u, int32_t v) {
   orb_placed_net *placed = loop->placed;
-  for (int64_t i = begin; i < end; i++) {
-    int32_t u = (int32_t)i;
-    loop->can[u] = 0;
-    if (placed->net.out[u] < 0 || placed->fixed[u]) {
-      continue;
-    }
-    uint64_t mark = mark_of(placed, u, loop->limit2);
-    if (placed->no_merge[u] != mark) {
-      loop->can[u] = (unsigned char)merge_one(placed, u, loop->limit2, thread);
-      placed->no_merge[u] = loop->can[u] ? 0 : mark;
+  const orb_net *net = &placed->net;
+  int32_t h = net->out[u] >= 0 && net->out[v] >= 0 ? orb_net_edge(net, u, v) : -1;
+  double guess;
+  pair s;
+  if (h < 0 || !take_pair(placed, h, net->vertex_count, loop->limit2, &s) || find_point(&s, &guess) < 0) {
+    return 0;
+  }
+  merge(&s);
+  loop->changed[u] = 1;
+  for (int i = 0; i < s.n; i++) {
+    loop->changed[s.ring[i]] = 1;
+  }
+  return 1;
+}
+
+static orb_status pass(orb_context *ctx, merge_loop *loop, int64_t most, int64_t *merged) {
+  int64_t n = loop->placed->net.vertex_count, count = 0;
+  *merged = 0;
+  orb_parallel_for(ctx, n, GRAIN, find_range, loop);
+  ORB_TRY(orb_context_check(ctx));
+  for (int64_t u = 0; u < n; u++) {
+    loop->changed[u] = 0;
+    if (loop->found[u].v >= 0) {
+      loop->found[count++] = loop->found[u];
     }
   }
+  qsort(loop->found, (size_t)count, sizeof *loop->found, compare);
+  for (int64_t i = 0; i < count && *merged < most; i++) {
+    *merged += try_merge(loop, loop->found[i].u, loop->found[i].v);
+    ORB_TRY(orb_context_check(ctx));
+  }
+  return ORB_OK;
 }
 
 orb_status orb_adaptive_merge_all(orb_context *ctx, orb_placed_net *placed, double limit2, int64_t target) {
   int32_t n = placed->net.vertex_count;
-  int64_t live = orb_placed_live(placed);
-  merge_loop loop = {placed, limit2, ORB_NEW(ctx, unsigned char, n)};
-  orb_status status = loop.can ? orb_placed_reserve(ctx, placed, orb_threads(ctx)) : ORB_E_NO_MEMORY;
+  int64_t live = orb_placed_live(placed), merged = 1;
+  merge_loop loop = {placed, limit2, ORB_NEW(ctx, unsigned char, n), ORB_NEW(ctx, candidate, n)};
+  orb_status status = loop.changed && loop.found ? orb_placed_reserve(ctx, placed, orb_threads(ctx)) : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
-    orb_parallel_for(ctx, n, GRAIN, find_range, &loop);
-    status = orb_context_check(ctx);
+    memset(loop.changed, 1, (size_t)n);
   }
-  for (int32_t u = 0; u < n && status == ORB_OK && live > target && live > 4; u++) {
-    if (loop.can[u] && placed->net.out[u] >= 0) {
-      live -= 2 * merge_one(placed, u, limit2, -1);
-      status = orb_context_check(ctx);
-    }
+  for (int i = 0; i < PASSES && merged > 0 && live > target && live > 4 && status == ORB_OK; i++) {
+    int64_t most = (live - (target > 4 ? target : 4) + 1) / 2;
+    status = pass(ctx, &loop, most, &merged);
+    live -= 2 * merged;
   }
-  orb_free(ctx, loop.can);
+  orb_free(ctx, loop.changed);
+  orb_free(ctx, loop.found);
   return status;
 }

@@ -34,7 +34,6 @@ typedef struct disc {
   side side[MOST]; /* counter-clockwise */
   int count, n, inner_count;
   int located;      /* p is located on the shapes, which is done when first needed */
-  int rough;        /* triangles are judged by their corners only, until everything else is allowed */
   double own[DISC]; /* the inverted extent of each present triangle; −1: not known yet */
   int32_t far_end,
       far_shape; /* the edge to this vertex was beyond the limit for another point, on this shape; −1: none */
@@ -166,8 +165,7 @@ static double judge(const disc *d, side *over) {
   if (!over->judged) {
     int32_t a = net->triangles[over->h], b = net->triangles[orb_next(over->h)];
     over->judged = 1;
-    over->extent = d->rough ? orb_placed_inverted_by_corners(d->placed, d->p, a, b)
-                            : orb_placed_inverted_extent(d->placed, d->p, a, b);
+    over->extent = orb_placed_inverted_extent(d->placed, d->p, a, b);
   }
   return over->extent;
 }
@@ -268,8 +266,12 @@ static int edges_allow(disc *d, double limit2) {
   return 1;
 }
 
+/* The edges are tested first: where an item is beyond the limit, an edge almost always is too. */
 static int is_within(disc *d, double limit2) {
   const orb_placed_net *placed = d->placed;
+  if (!edges_allow(d, limit2)) {
+    return 0;
+  }
   for (int i = 0; i < d->count; i++) {
     if (!list_allows(d, placed->triangle_items[d->triangle[i]], limit2)) {
       return 0;
@@ -280,7 +282,7 @@ static int is_within(disc *d, double limit2) {
       return 0;
     }
   }
-  return edges_allow(d, limit2);
+  return 1;
 }
 
 static void commit(orb_placed_net *placed, const disc *d) {
@@ -311,28 +313,9 @@ static void commit(orb_placed_net *placed, const disc *d) {
 }
 
 static int is_better(disc *d, orb_tally star, orb_star_goal goal) {
-  if (goal == ORB_STAR_NOT_WORSE && star.inverted == 0) {
-    return 1;
-  }
   orb_tally now = inverted_in(d);
-  switch (goal) {
-    case ORB_STAR_NOT_WORSE:
-      return !orb_tally_is_worse(star, now);
-    case ORB_STAR_FEWER:
-      return star.inverted < now.inverted;
-    default:
-      return star.inverted <= now.inverted && star.extent < MUCH_SMALLER * now.extent;
-  }
-}
-
-/* The same judged by the centres of the star's triangles too. */
-static int is_better_at_centres(disc *d, orb_star_goal goal) {
-  orb_tally star = {0, 0};
-  for (int i = 0; i < d->n; i++) {
-    int32_t a = d->placed->net.triangles[d->side[i].h], b = d->placed->net.triangles[orb_next(d->side[i].h)];
-    orb_tally_add(&star, orb_placed_inverted_extent(d->placed, d->p, a, b));
-  }
-  return is_better(d, star, goal);
+  return goal == ORB_STAR_FEWER ? star.inverted < now.inverted
+                                : star.inverted <= now.inverted && star.extent < MUCH_SMALLER * now.extent;
 }
 
 /* Grows the disc until it has a star of p; 0: there is none. */
@@ -344,8 +327,7 @@ static int plan(disc *d, const double p[3], const orb_star_wish *wish) {
     int next = impossible_side(d);
     if (next < 0) {
       next = inverted_side(d, wish->goal, &star);
-      if (d->inner_count >= wish->least_inner && is_better(d, star, wish->goal) && is_within(d, wish->limit2) &&
-          (!d->rough || is_better_at_centres(d, wish->goal))) {
+      if (d->inner_count >= wish->least_inner && is_better(d, star, wish->goal) && is_within(d, wish->limit2)) {
         return 1;
       }
     }
@@ -361,7 +343,7 @@ static int plan(disc *d, const double p[3], const orb_star_wish *wish) {
 /* Plans in *d the star of the first point that has one; 0: none has. */
 static int plan_first(disc *d, orb_placed_net *placed, int32_t vertex, const int32_t *triangles, int count,
                       const double (*points)[3], int point_count, const orb_star_wish *wish) {
-  disc start = {.placed = placed, .p = vertex, .far_end = -1, .rough = wish->goal == ORB_STAR_NOT_WORSE};
+  disc start = {.placed = placed, .p = vertex, .far_end = -1};
   ORB_ASSERT(vertex < placed->capacity);
   for (int i = 0; i < count && count <= DISC; i++) {
     add_triangle(&start, triangles[i]);

@@ -4,9 +4,8 @@
 
 #include "remesh/placed/placed_net.h"
 
-/* What a star must achieve for inverted triangles: no more of them and no larger ones; fewer of them; or no more of
- * them and much smaller ones. */
-typedef enum orb_star_goal { ORB_STAR_NOT_WORSE, ORB_STAR_FEWER, ORB_STAR_SMALLER } orb_star_goal;
+/* What a star must achieve for inverted triangles: fewer of them, or no more of them and much smaller ones. */
+typedef enum orb_star_goal { ORB_STAR_FEWER, ORB_STAR_SMALLER } orb_star_goal;
 typedef struct orb_star_wish {
   double limit2;               /* relative, squared */
   int least_inner, most_inner; /* vertices inside the disc: the star has 2 − 2 · inner triangles more than the disc */

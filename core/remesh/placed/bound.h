@@ -30,6 +30,18 @@ double orb_placed_edge2(const orb_placed_net *placed, int32_t v, int32_t w, doub
 double orb_placed_edge_on2(const orb_placed_net *placed, int32_t s, int32_t v, int32_t w, double limit2,
                            orb_deviation *worst);
 
+/* A guess of the same on shape s that takes no tracing: the height over its chord of the arc of a circle that has the
+ * smooth normals at both ends. It tells which edge of many to test first, and bounds nothing. */
+static inline double orb_placed_edge_guess2(const orb_placed_net *placed, int32_t s, int32_t v, int32_t w) {
+  const double *a = orb_placed_position(placed, v, s), *b = orb_placed_position(placed, w, s);
+  const double *m = orb_placed_normal(placed, v, s), *n = orb_placed_normal(placed, w, s);
+  double height8 = 0;
+  for (int k = 0; k < 3; k++) {
+    height8 += (b[k] - a[k]) * (n[k] - m[k]);
+  }
+  return height8 * height8 / 64;
+}
+
 /* The point of the sphere at which net edge v w meets the edge or vertex of the shape. */
 void orb_placed_crossing_point(const orb_placed_net *placed, int32_t v, int32_t w, const orb_deviation *at,
                                double out[3]);

@@ -43,7 +43,6 @@ void orb_placed_free(orb_context *ctx, orb_placed_net *placed) {
   orb_free(ctx, placed->spot);
   orb_free(ctx, placed->fixed);
   orb_free(ctx, placed->no_move);
-  orb_free(ctx, placed->no_merge);
   orb_free(ctx, placed->no_collapse);
   orb_free(ctx, placed->no_repair);
   orb_free(ctx, placed->not_inverted);
@@ -67,7 +66,6 @@ orb_status orb_placed_reserve(orb_context *ctx, orb_placed_net *placed, int64_t 
       !orb_regrow(ctx, &placed->normal, 3 * cells, sizeof(double)) ||
       !orb_regrow(ctx, &placed->spot, cells, sizeof(orb_spot)) || !orb_regrow(ctx, &placed->fixed, n, 1) ||
       !orb_regrow(ctx, &placed->no_move, n, sizeof(uint64_t)) ||
-      !orb_regrow(ctx, &placed->no_merge, n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &placed->no_collapse, n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &placed->no_repair, 4 * n, sizeof(uint64_t)) ||
       !orb_regrow(ctx, &placed->not_inverted, 2 * n, sizeof(uint64_t)) ||
@@ -78,7 +76,7 @@ orb_status orb_placed_reserve(orb_context *ctx, orb_placed_net *placed, int64_t 
   }
   for (size_t i = (size_t)placed->capacity; i < n; i++) {
     placed->fixed[i] = 0;
-    placed->no_move[i] = placed->no_merge[i] = placed->no_collapse[i] = 0;
+    placed->no_move[i] = placed->no_collapse[i] = 0;
     placed->vertex_items[i] = -1;
     placed->triangle_items[2 * i] = placed->triangle_items[2 * i + 1] = -1;
     memset(placed->no_repair + 4 * i, 0, 4 * sizeof *placed->no_repair);
@@ -363,7 +361,6 @@ static void renumber(orb_placed_net *placed, const int32_t *vertex, const int32_
     net->out[vertex[v]] = 3 * triangle[h / 3] + h % 3;
     placed->fixed[vertex[v]] = placed->fixed[v];
     placed->no_move[vertex[v]] = placed->no_move[v];
-    placed->no_merge[vertex[v]] = placed->no_merge[v];
     placed->no_collapse[vertex[v]] = placed->no_collapse[v];
     placed->vertex_items[vertex[v]] = placed->vertex_items[v];
   }
@@ -385,7 +382,7 @@ static void renumber(orb_placed_net *placed, const int32_t *vertex, const int32_
   }
   for (int32_t v = vertices; v < net->vertex_count; v++) {
     placed->fixed[v] = 0;
-    placed->no_move[v] = placed->no_merge[v] = placed->no_collapse[v] = 0;
+    placed->no_move[v] = placed->no_collapse[v] = 0;
     placed->vertex_items[v] = -1;
   }
   for (int32_t t = triangles; t < net->triangle_count; t++) {

@@ -22,11 +22,10 @@ typedef struct orb_placed_net {
   orb_spot *spot;                /* per net vertex, one a shape: where it lies */
   unsigned char *fixed;          /* per net vertex: it is a landmark and must stay */
   uint64_t *no_move;             /* per net vertex: mark of the star in which no better point was found */
-  uint64_t *no_merge;     /* per net vertex: mark of the surroundings in which it could merge with no neighbour */
-  uint64_t *no_collapse;  /* per net vertex: mark of the surroundings in which it could not be removed */
-  uint64_t *no_repair;    /* per triangle, two: marks of the surroundings in which no repair was found */
-  uint64_t *not_inverted; /* per triangle: mark of the corners with which it was found not to be inverted */
-  uint64_t *within;       /* per half-edge: mark of the edge that was proved to stay within the limit */
+  uint64_t *no_collapse;         /* per net vertex: mark of the surroundings in which it could not be removed */
+  uint64_t *no_repair;           /* per triangle, two: marks of the surroundings in which no repair was found */
+  uint64_t *not_inverted;        /* per triangle: mark of the corners with which it was found not to be inverted */
+  uint64_t *within;              /* per half-edge: mark of the edge that was proved to stay within the limit */
   /* Items: the vertices of all shapes, shape after shape. Each is in the list of one net vertex or triangle. */
   int32_t *item_begin; /* shape_count + 1: the first item of each shape */
   int32_t *item_next;
