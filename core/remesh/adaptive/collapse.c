@@ -248,7 +248,7 @@ static int is_allowed(const collapser *c, int32_t u, const int32_t *ring, int n)
     h = net->twin[orb_prev(h)];
   } while (h != first);
   for (int i = 2; i + 1 < n; i++) {
-    if (orb_placed_edge2(placed, ring[0], ring[i], c->limit2, NULL) > c->limit2) {
+    if (!orb_placed_edge_is_within(placed, ring[0], ring[i], c->limit2)) {
       return 0;
     }
   }

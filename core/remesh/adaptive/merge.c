@@ -32,7 +32,9 @@ static const double GUESS_PAIR = 3, GUESS_POINT = 2, GUESS_SPOT = 2.5, FAR_MOST 
  * ones leave the room that the other edges have. */
 enum { PULLS = 3 };
 static const double PULL_MORE = 0.03, PULL_MOST = 0.3;
-enum { LIKELY = 3 }; /* edges tested before the others: most points fail at one of them */
+/* Pulls end once an edge is beyond the limit by more than PROGRESS times what the last one was. */
+static const double PROGRESS = 1.1;
+enum { LIKELY = 2 }; /* edges on each shape tested before the others: most points fail at one of them */
 enum { PASSES = 4 }; /* the fourth finds less than a hundredth of all merges */
 enum { GRAIN = 64 }; /* vertices a thread takes at a time */
 
@@ -49,11 +51,10 @@ typedef struct pair {
   double far2; /* and by how much, in units of the squared limit */
 } pair;
 
-/* An edge of the star on a shape. */
+/* An edge of the star, to a ring vertex. */
 typedef struct spoke {
   double guess2;
   int to;
-  int32_t shape;
 } spoke;
 
 /* Appends the triangles around the origin of h from that after h to that before the twin of h, or all, and their outer
@@ -168,20 +169,19 @@ static int keeps_upright(pair *s, double (*extent)(const orb_placed_net *, int32
   return star.inverted == 0 || !orb_tally_is_worse(star, count_now(s));
 }
 
-/* Lists the LIKELY edges of the star that are the likeliest to be beyond the limit. Returns the greatest guess. */
-static double likely_far(const pair *s, spoke likely[LIKELY]) {
+/* Lists the LIKELY edges of the star that are the likeliest to be beyond the limit on the shape. Returns the greatest
+ * guess. */
+static double likely_far(const pair *s, int32_t shape, spoke likely[LIKELY]) {
   for (int i = 0; i < LIKELY; i++) {
-    likely[i] = (spoke){-1, 0, 0};
+    likely[i] = (spoke){-1, 0};
   }
   for (int i = 0; i < s->n; i++) {
-    for (int32_t shape = 0; shape < s->placed->shape_count; shape++) {
-      spoke next = {orb_placed_edge_guess2(s->placed, shape, s->p, s->ring[i]), i, shape};
-      for (int k = 0; k < LIKELY && next.guess2 > likely[LIKELY - 1].guess2; k++) {
-        if (next.guess2 > likely[k].guess2) {
-          spoke moved = likely[k];
-          likely[k] = next;
-          next = moved;
-        }
+    spoke next = {orb_placed_edge_guess2(s->placed, shape, s->p, s->ring[i]), i};
+    for (int k = 0; k < LIKELY && next.guess2 > likely[LIKELY - 1].guess2; k++) {
+      if (next.guess2 > likely[k].guess2) {
+        spoke moved = likely[k];
+        likely[k] = next;
+        next = moved;
       }
     }
   }
@@ -189,7 +189,7 @@ static double likely_far(const pair *s, spoke likely[LIKELY]) {
 }
 
 static int edge_allows(pair *s, int to, int32_t shape) {
-  double distance2 = orb_placed_edge_on2(s->placed, shape, s->p, s->ring[to], s->limit2, NULL);
+  double distance2 = orb_placed_edge_within2(s->placed, shape, s->p, s->ring[to], s->limit2);
   if (distance2 <= s->limit2) {
     return 1;
   }
@@ -199,23 +199,42 @@ static int edge_allows(pair *s, int to, int32_t shape) {
   return 0;
 }
 
-static int edges_allow(pair *s, const spoke likely[LIKELY]) {
-  if (s->far >= 0 && !edge_allows(s, s->far, s->far_shape)) {
-    return 0;
+enum { ALLOWED, FAR, NOT_ALLOWED };
+/* Places p on the shape and tests the edges that are the likeliest to be beyond the limit there, first the one that was
+ * for the last point. */
+static int test_likely(pair *s, int32_t shape) {
+  spoke likely[LIKELY];
+  orb_placed_locate_on(s->placed, s->p, shape);
+  if (s->far >= 0 && s->far_shape == shape && !edge_allows(s, s->far, shape)) {
+    return FAR;
+  }
+  if (likely_far(s, shape, likely) > GUESS_SPOT * s->limit2) {
+    return NOT_ALLOWED;
   }
   for (int i = 0; i < LIKELY; i++) {
-    if (!edge_allows(s, likely[i].to, likely[i].shape)) {
-      return 0;
+    if (!edge_allows(s, likely[i].to, shape)) {
+      return FAR;
     }
   }
-  for (int i = 0; i < s->n; i++) {
-    for (int32_t shape = 0; shape < s->placed->shape_count; shape++) {
+  return ALLOWED;
+}
+
+static int test_edges(pair *s) {
+  int32_t shapes = s->placed->shape_count, first = s->far >= 0 ? s->far_shape : 0;
+  for (int32_t k = 0; k < shapes; k++) {
+    int result = test_likely(s, (first + k) % shapes);
+    if (result != ALLOWED) {
+      return result;
+    }
+  }
+  for (int32_t shape = 0; shape < shapes; shape++) {
+    for (int i = 0; i < s->n; i++) {
       if (!edge_allows(s, i, shape)) {
-        return 0;
+        return FAR;
       }
     }
   }
-  return 1;
+  return ALLOWED;
 }
 
 /* Whether the listed items are within the limit of the star's triangles that hold them. */
@@ -266,22 +285,11 @@ static void pull(pair *s) {
   (void)orb_normalize(p);
 }
 
-enum { ALLOWED, FAR, NOT_ALLOWED };
 /* Tests everything that a merge at p must keep. */
 static int test(pair *s) {
-  orb_placed_net *placed = s->placed;
-  if (!is_positive(s)) {
-    return NOT_ALLOWED;
-  }
-  for (int32_t shape = 0; shape < placed->shape_count; shape++) {
-    orb_placed_locate_on(placed, s->p, shape);
-  }
-  spoke likely[LIKELY];
-  if (likely_far(s, likely) > GUESS_SPOT * s->limit2) {
-    return NOT_ALLOWED;
-  }
-  if (!edges_allow(s, likely)) {
-    return s->far2 < FAR_MOST ? FAR : NOT_ALLOWED;
+  int result = is_positive(s) ? test_edges(s) : NOT_ALLOWED;
+  if (result != ALLOWED) {
+    return result == FAR && s->far2 < FAR_MOST ? FAR : NOT_ALLOWED;
   }
   return keeps_upright(s, orb_placed_inverted_by_corners) && items_allow(s) &&
                  keeps_upright(s, orb_placed_inverted_extent)
@@ -310,8 +318,12 @@ static int find_point(pair *s, double *guess) {
     place(s, WAY[best]);
     int result = test(s);
     for (int k = 0; k < PULLS && result == FAR; k++) {
+      double before = s->far2;
       pull(s);
       result = test(s);
+      if (result == FAR && s->far2 > PROGRESS * before) {
+        break;
+      }
     }
     if (result == ALLOWED) {
       *guess = at[best];

@@ -91,7 +91,7 @@ static double place_and_cost(const star *s, const double p[3], double most, orb_
 }
 
 static double edge_on(const star *s, int i, int32_t shape) {
-  return orb_placed_edge_on2(s->placed, shape, s->v, s->ring[i], s->limit2, NULL);
+  return orb_placed_edge_within2(s->placed, shape, s->v, s->ring[i], s->limit2);
 }
 
 /* The sum of the edges' squared deviations in units of the limit; infinite if one is beyond the limit. Stops once the

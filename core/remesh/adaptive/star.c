@@ -250,13 +250,13 @@ static int edges_allow(disc *d, double limit2) {
   const orb_placed_net *placed = d->placed;
   for (int i = 0; i < d->n && d->far_end >= 0; i++) {
     if (placed->net.triangles[d->side[i].h] == d->far_end &&
-        orb_placed_edge_on2(placed, d->far_shape, d->p, d->far_end, limit2, NULL) > limit2) {
+        orb_placed_edge_within2(placed, d->far_shape, d->p, d->far_end, limit2) > limit2) {
       return 0;
     }
   }
   for (int i = 0; i < d->n; i++) {
     for (int32_t s = 0; s < placed->shape_count; s++) {
-      if (orb_placed_edge_on2(placed, s, d->p, placed->net.triangles[d->side[i].h], limit2, NULL) > limit2) {
+      if (orb_placed_edge_within2(placed, s, d->p, placed->net.triangles[d->side[i].h], limit2) > limit2) {
         d->far_end = placed->net.triangles[d->side[i].h];
         d->far_shape = s;
         return 0;

@@ -88,7 +88,7 @@ static int can_flip(const orb_placed_net *placed, int32_t h, double limit2) {
     return 0;
   }
   return limit2 == INFINITY ||
-         (orb_placed_edge2(placed, c, d, limit2, NULL) <= limit2 && orb_placed_flip_items2(placed, h) <= limit2);
+         (orb_placed_edge_is_within(placed, c, d, limit2) && orb_placed_flip_items2(placed, h) <= limit2);
 }
 
 int orb_placed_try_flip(orb_placed_net *placed, int32_t h, double limit2) {

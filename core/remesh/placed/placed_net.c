@@ -35,6 +35,11 @@ void orb_placed_free(orb_context *ctx, orb_placed_net *placed) {
   for (int32_t s = 0; s < placed->shape_count && placed->vertex_normal; s++) {
     orb_free(ctx, placed->vertex_normal[s]);
   }
+  for (int32_t s = 0; s < placed->shape_count && placed->pack; s++) {
+    orb_free(ctx, placed->pack[s].step);
+    orb_free(ctx, placed->pack[s].vertex);
+  }
+  orb_free(ctx, placed->pack);
   orb_free(ctx, placed->position);
   orb_free(ctx, placed->vertex_normal);
   orb_free(ctx, placed->view);
@@ -87,14 +92,33 @@ orb_status orb_placed_reserve(orb_context *ctx, orb_placed_net *placed, int64_t 
   return ORB_OK;
 }
 
+static orb_status pack_shape(orb_context *ctx, const orb_sphere_view *view, const double *position,
+                             int32_t vertex_count, orb_pack *out) {
+  int64_t half_edges = 3 * (int64_t)view->triangle_count;
+  out->step = ORB_NEW(ctx, orb_pack_step, half_edges);
+  out->vertex = ORB_NEW(ctx, orb_pack_vertex, vertex_count);
+  if (!out->step || !out->vertex) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t h = 0; h < half_edges; h++) {
+    out->step[h] = (orb_pack_step){view->triangles[orb_prev(h)], {view->twin[orb_next(h)], view->twin[orb_prev(h)]}, 0};
+  }
+  for (int64_t v = 0; v < vertex_count; v++) {
+    memcpy(out->vertex[v].point, view->points + 3 * v, sizeof out->vertex[v].point);
+    memcpy(out->vertex[v].position, position + 3 * v, sizeof out->vertex[v].position);
+  }
+  return orb_context_check(ctx);
+}
+
 static orb_status take_shapes(orb_context *ctx, orb_placed_net *placed) {
   const orb_remesh_job *job = placed->job;
   int32_t shapes = placed->shape_count = job->shape_count;
   placed->position = ORB_NEW0(ctx, double *, shapes);
   placed->vertex_normal = ORB_NEW0(ctx, double *, shapes);
   placed->view = ORB_NEW(ctx, orb_sphere_view, shapes);
+  placed->pack = ORB_NEW0(ctx, orb_pack, shapes);
   placed->item_begin = ORB_NEW0(ctx, int32_t, shapes + 1);
-  if (!placed->position || !placed->vertex_normal || !placed->view || !placed->item_begin) {
+  if (!placed->position || !placed->vertex_normal || !placed->view || !placed->pack || !placed->item_begin) {
     return ORB_E_NO_MEMORY;
   }
   int64_t items = 0;
@@ -117,6 +141,7 @@ static orb_status take_shapes(orb_context *ctx, orb_placed_net *placed) {
     for (int64_t i = 0; i < 3 * (int64_t)mesh->vertex_count; i++) {
       placed->position[s][i] = mesh->positions[i] * scale;
     }
+    ORB_TRY(pack_shape(ctx, &placed->view[s], placed->position[s], mesh->vertex_count, &placed->pack[s]));
   }
   placed->item_next = ORB_NEW(ctx, int32_t, items);
   placed->item_shape = ORB_NEW(ctx, int32_t, items);

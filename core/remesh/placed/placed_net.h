@@ -5,6 +5,7 @@
 #define ORB_REMESH_PLACED_PLACED_NET_H
 
 #include "remesh/common/job.h"
+#include "remesh/placed/pack.h"
 #include "sphere/net.h"
 #include "sphere/trace.h"
 
@@ -15,6 +16,7 @@ typedef struct orb_placed_net {
   orb_net net;
   int32_t shape_count, capacity; /* capacity: of the arrays below, in net vertices */
   orb_sphere_view *view;         /* per shape */
+  orb_pack *pack;                /* per shape: the same and its positions, for tracing */
   double **position;             /* per shape: its vertices, divided by its diagonal */
   double **vertex_normal;        /* per shape: smooth unit normals of its vertices */
   double *at;                    /* per net vertex, 3 a shape: its position, divided by the shape's diagonal */

@@ -57,7 +57,7 @@ static int repair_by_flip(orb_placed_net *placed, int32_t h, double limit2) {
   orb_form before, after;
   forms_of_flip(placed, v, w, c, d, &before, &after);
   if (!orb_net_can_flip(net, h) || !orb_form_allows(before, after) ||
-      orb_placed_edge2(placed, c, d, limit2, NULL) > limit2 || orb_placed_flip_items2(placed, h) > limit2) {
+      !orb_placed_edge_is_within(placed, c, d, limit2) || orb_placed_flip_items2(placed, h) > limit2) {
     return 0;
   }
   orb_placed_flip(placed, h);
@@ -183,7 +183,7 @@ static void deviation_range(void *arg, int64_t begin, int64_t end, int thread) {
     int32_t v = net->triangles[h], w = net->triangles[net->twin[h]];
     uint64_t mark = mark_of_edge(placed, v, w, loop->limit2);
     if (placed->within[h] != mark) {
-      loop->deviating[h] = orb_placed_edge2(placed, v, w, loop->limit2, NULL) > loop->limit2;
+      loop->deviating[h] = !orb_placed_edge_is_within(placed, v, w, loop->limit2);
       placed->within[h] = loop->deviating[h] ? 0 : mark;
     }
   }
