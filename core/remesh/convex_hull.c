@@ -138,7 +138,7 @@ static orb_status start(orb_context *ctx, hull_points *h, orb_net *net) {
       status = orb_supermesh_check(ctx, &hull);
     }
     if (status == ORB_OK) {
-      status = orb_net_init(ctx, net, h->given, hull.vertex_count, hull.triangles, hull.triangle_count, h->count);
+      status = orb_net_init(ctx, net, h->given, hull.vertex_count, hull.triangles, hull.triangle_count, NULL, h->count);
     }
     orb_free(ctx, compact);
     orb_free(ctx, hull.triangles);

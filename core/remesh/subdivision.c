@@ -75,7 +75,7 @@ orb_status orb_remesh_subdivision(orb_context *ctx, const orb_remesh_job *job, o
   orb_quadtree_mesh grid;
   orb_net net = {0};
   ORB_TRY(orb_quadtree_build(ctx, job, &grid));
-  orb_status status = orb_net_init(ctx, &net, grid.points, grid.vertex_count, grid.triangles, grid.triangle_count,
+  orb_status status = orb_net_init(ctx, &net, grid.points, grid.vertex_count, grid.triangles, grid.triangle_count, NULL,
                                    (int64_t)grid.vertex_count + grid.item_count);
   if (status == ORB_OK) {
     status = take_in_vertices(ctx, job, &grid, &net);

@@ -54,10 +54,13 @@ orb_status orb_net_reserve(orb_context *ctx, orb_net *net, int64_t more) {
 }
 
 orb_status orb_net_init(orb_context *ctx, orb_net *net, const double *points, int32_t vertex_count,
-                        const int32_t *triangles, int32_t triangle_count, int64_t vertex_capacity) {
+                        const int32_t *triangles, int32_t triangle_count, const int32_t *twin,
+                        int64_t vertex_capacity) {
   memset(net, 0, sizeof *net);
   orb_status status = orb_net_reserve(ctx, net, vertex_capacity > vertex_count ? vertex_capacity : vertex_count);
-  if (status == ORB_OK) {
+  if (status == ORB_OK && twin) {
+    memcpy(net->twin, twin, 3 * (size_t)triangle_count * sizeof *twin);
+  } else if (status == ORB_OK) {
     status = orb_mesh_twins(ctx, triangles, triangle_count, vertex_count, net->twin);
   }
   if (status != ORB_OK) {

@@ -15,9 +15,10 @@ typedef struct orb_net {
   int32_t *out;       /* per vertex: a half-edge that leaves it; −1: dead */
 } orb_net;
 
-/* Copies a certified triangulation, with room for vertex_capacity vertices. */
+/* Copies a certified triangulation, with room for vertex_capacity vertices. twin: its half-edge pairing, or NULL. */
 ORB_MUST_CHECK orb_status orb_net_init(orb_context *ctx, orb_net *net, const double *points, int32_t vertex_count,
-                                       const int32_t *triangles, int32_t triangle_count, int64_t vertex_capacity);
+                                       const int32_t *triangles, int32_t triangle_count, const int32_t *twin,
+                                       int64_t vertex_capacity);
 void orb_net_free(orb_context *ctx, orb_net *net);
 
 /* Makes room for `more` further vertices. */

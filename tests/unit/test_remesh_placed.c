@@ -37,6 +37,7 @@ typedef struct bench {
 } bench;
 
 static const double LIMIT = 0.01;
+static const double WIDE = 0.02; /* for thinning: what it drops beyond the limit, refinement brings back */
 
 /* Twists a ball around an axis in space and keeps its points on the sphere. */
 static void shear(const orb_aligned_shape *shape, int axis, double most) {
@@ -164,7 +165,7 @@ static void reduced_shapes_give_a_start(void **state) {
   orb_placed_free(b.ctx, &b.placed);
   int64_t estimate, exact, deviating;
   assert_int_equal(orb_adaptive_overlay_size(b.ctx, &b.job, &estimate), ORB_OK);
-  assert_int_equal(orb_adaptive_start_from_overlay(b.ctx, &b.job, &b.placed), ORB_OK);
+  assert_int_equal(orb_adaptive_start_from_overlay(b.ctx, &b.job, 0, &b.placed), ORB_OK);
   assert_valid(&b);
   exact = orb_placed_live(&b.placed);
   assert_true(10 * estimate > 8 * exact && 10 * estimate < 12 * exact);
@@ -177,6 +178,39 @@ static void reduced_shapes_give_a_start(void **state) {
   assert_within(&b);
   assert_valid(&b);
   tear_down(&b);
+}
+
+/* Thinned shapes and a thinned overlay have fewer vertices, and can be refined to the limit with the landmarks kept. */
+static void thinned_shapes_give_a_start(void **state) {
+  (void)state;
+  for (int overlay = 0; overlay < 2; overlay++) {
+    bench b;
+    set_up_in(&b, remesh_context(2), 4, 3, 0);
+    int32_t landmarks[2] = {5, 17};
+    b.job.landmark_count = 2;
+    b.shape[0].landmark_vertices = b.shape[1].landmark_vertices = landmarks;
+    int64_t all = orb_placed_live(&b.placed);
+    orb_placed_free(b.ctx, &b.placed);
+    if (overlay) {
+      assert_int_equal(orb_adaptive_start_from_overlay(b.ctx, &b.job, 0, &b.placed), ORB_OK);
+      all = orb_placed_live(&b.placed);
+      assert_int_equal(orb_adaptive_start_from_overlay(b.ctx, &b.job, WIDE * WIDE, &b.placed), ORB_OK);
+    } else {
+      assert_int_equal(orb_adaptive_start_from_thinned(b.ctx, &b.job, WIDE * WIDE, &b.placed), ORB_OK);
+    }
+    assert_valid(&b);
+    assert_true(orb_placed_live(&b.placed) < all);
+    int fixed = 0;
+    for (int32_t v = 0; v < b.placed.net.vertex_count; v++) {
+      fixed += b.placed.fixed[v];
+    }
+    assert_int_equal(fixed, 4);
+    refine(&b);
+    assert_within(&b);
+    assert_valid(&b);
+    b.shape[0].landmark_vertices = b.shape[1].landmark_vertices = NULL;
+    tear_down(&b);
+  }
 }
 
 /* One thread and four estimate the same size and make the same start. */
@@ -200,9 +234,19 @@ static void starts_do_not_depend_on_threads(void **state) {
   tear_down(&b[1]);
 }
 
-/* Each allocation of a start from reduced shapes fails once: the call reports it and leaks nothing. */
-static void starts_fail_cleanly(void **state) {
-  (void)state;
+static orb_status start(bench *b, int way) {
+  if (way == 0) {
+    return orb_adaptive_start_from_reduced(b->ctx, &b->job, LIMIT * LIMIT, &b->placed);
+  }
+  if (way == 1) {
+    return orb_adaptive_start_from_overlay(b->ctx, &b->job, LIMIT * LIMIT, &b->placed);
+  }
+  orb_placed_free(b->ctx, &b->placed);
+  return orb_adaptive_start_from_thinned(b->ctx, &b->job, LIMIT * LIMIT, &b->placed);
+}
+
+/* Each allocation of a start fails once: the call reports it and leaks nothing. */
+static void start_fails_cleanly(int way) {
   int64_t left = INT64_MAX;
   bench b;
   set_up_in(&b, remesh_failing_context(&left), 1, 3, 1);
@@ -210,13 +254,20 @@ static void starts_fail_cleanly(void **state) {
   for (int64_t n = 0; status != ORB_OK; n++) {
     assert_true(n < 3000);
     left = n;
-    status = orb_adaptive_start_from_reduced(b.ctx, &b.job, LIMIT * LIMIT, &b.placed);
+    status = start(&b, way);
     assert_true(status == ORB_OK || status == ORB_E_NO_MEMORY);
     assert_true(n > 20 || status == ORB_E_NO_MEMORY); /* there are many more allocations */
   }
   left = INT64_MAX;
   assert_valid(&b);
   tear_down(&b);
+}
+
+static void starts_fail_cleanly(void **state) {
+  (void)state;
+  for (int way = 0; way < 3; way++) {
+    start_fails_cleanly(way);
+  }
 }
 
 /* Collapses, merges, flips and moves keep the limit and invert no further triangle. */
@@ -231,7 +282,7 @@ static void reducing_keeps_the_limit(void **state) {
     assert_within(&b);
     int64_t collapsed = orb_placed_live(&b.placed);
     assert_true(collapsed < live);
-    assert_int_equal(orb_adaptive_merge_all(b.ctx, &b.placed, LIMIT * LIMIT, 0), ORB_OK);
+    assert_int_equal(orb_adaptive_merge_all(b.ctx, &b.placed, LIMIT * LIMIT, 0, 0), ORB_OK);
     live = orb_placed_live(&b.placed);
     assert_true(live < collapsed);
     assert_within(&b);
@@ -254,7 +305,7 @@ static void merges_stop_at_the_target(void **state) {
   refine(&b);
   assert_int_equal(orb_adaptive_collapse(b.ctx, &b.placed, LIMIT * LIMIT, 0, 1, 0), ORB_OK);
   int64_t target = orb_placed_live(&b.placed) - 10;
-  assert_int_equal(orb_adaptive_merge_all(b.ctx, &b.placed, LIMIT * LIMIT, target), ORB_OK);
+  assert_int_equal(orb_adaptive_merge_all(b.ctx, &b.placed, LIMIT * LIMIT, target, 0), ORB_OK);
   assert_true(orb_placed_live(&b.placed) <= target && orb_placed_live(&b.placed) > target - 8);
   tear_down(&b);
 }
@@ -311,10 +362,15 @@ static void flat_triangles_are_as_near_as_their_sides(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(repair_keeps_the_limit),          cmocka_unit_test(reduced_shapes_give_a_start),
-      cmocka_unit_test(starts_do_not_depend_on_threads), cmocka_unit_test(starts_fail_cleanly),
-      cmocka_unit_test(reducing_keeps_the_limit),        cmocka_unit_test(merges_stop_at_the_target),
-      cmocka_unit_test(resolving_can_be_refined),        cmocka_unit_test(flat_triangles_are_as_near_as_their_sides),
+      cmocka_unit_test(repair_keeps_the_limit),
+      cmocka_unit_test(reduced_shapes_give_a_start),
+      cmocka_unit_test(starts_do_not_depend_on_threads),
+      cmocka_unit_test(starts_fail_cleanly),
+      cmocka_unit_test(reducing_keeps_the_limit),
+      cmocka_unit_test(merges_stop_at_the_target),
+      cmocka_unit_test(thinned_shapes_give_a_start),
+      cmocka_unit_test(resolving_can_be_refined),
+      cmocka_unit_test(flat_triangles_are_as_near_as_their_sides),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

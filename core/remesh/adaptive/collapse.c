@@ -237,6 +237,11 @@ static int is_allowed(const collapser *c, int32_t u, const int32_t *ring, int n)
   if (c->strict && !shape_allows(placed, u, ring, n)) {
     return 0;
   }
+  for (int i = 2; i + 1 < n; i++) {
+    if (!orb_placed_edge_is_within(placed, ring[0], ring[i], c->limit2)) {
+      return 0;
+    }
+  }
   if (items_in_fan2(placed, placed->vertex_items[u], ring, n, c->limit2) > c->limit2) {
     return 0;
   }
@@ -247,11 +252,6 @@ static int is_allowed(const collapser *c, int32_t u, const int32_t *ring, int n)
     }
     h = net->twin[orb_prev(h)];
   } while (h != first);
-  for (int i = 2; i + 1 < n; i++) {
-    if (!orb_placed_edge_is_within(placed, ring[0], ring[i], c->limit2)) {
-      return 0;
-    }
-  }
   if (!c->strict) {
     return 1;
   }

@@ -2,7 +2,7 @@
  * edge. Succeeds where neither can move onto the other.
  *
  * A merge is proved before it is made, but most pairs cannot merge, so what costs little decides first: a guess of the
- * new edges' deviations from the normals at the vertices alone drops half of the pairs, and the proof begins with the
+ * new edges' deviations from the normals at the vertices alone drops hopeless pairs, and the proof begins with the
  * edges that are the likeliest to fail. A pass searches all pairs in parallel, then merges those that can, the least
  * deviating first, one after another; the next pass searches the pairs beside them. */
 #include "remesh/adaptive/merge.h"
@@ -23,10 +23,18 @@ enum { MOST = ORB_STAR_MOST }; /* sides of the star of a merged vertex: pairs wi
 /* Points tried, as shares of the way from u to v: more find a few more merges and take longer. */
 static const double WAY[] = {0.5, 0.25, 0.75, 0, 1};
 enum { POINTS = sizeof WAY / sizeof *WAY };
-/* Squared guesses and deviations in units of the squared limit. A pair is dropped if the greatest guess is above
- * GUESS_PAIR at its middle, above GUESS_POINT at a point, or above GUESS_SPOT once the point is located; a point is
- * dropped if an edge deviates by more than FAR_MOST. Higher values find a few more merges and take longer. */
-static const double GUESS_PAIR = 3, GUESS_POINT = 2, GUESS_SPOT = 2.5, FAR_MOST = 2.5;
+/* How much is tried. Squared guesses and deviations are in units of the squared limit; higher values find a few more
+ * merges and take longer. */
+typedef struct effort {
+  double pair;  /* a pair is dropped if the greatest guess at its middle is above this */
+  double point; /* a point is dropped if the greatest guess is above this */
+  double far;   /* a point is dropped if an edge deviates by more */
+  int points;   /* points tried for a pair */
+  int passes;   /* over all pairs; the fourth finds a hundredth of the merges */
+} effort;
+static const effort THOROUGH = {3, 2, 2.5, POINTS, 4}, QUICK = {1.5, 1.1, 2, 3, 2};
+/* A point is dropped too if the greatest guess from the normals at its places is above this. */
+static const double GUESS_SPOT = 2.5;
 /* A point from which an edge is beyond the limit is pulled along it, up to PULLS times, by the share of its length that
  * brings a circular arc within the limit and by PULL_MORE, at most PULL_MOST: without PULL_MORE pulls creep, and long
  * ones leave the room that the other edges have. */
@@ -38,10 +46,24 @@ enum { LIKELY = 2 }; /* edges on each shape tested before the others: most point
 enum { PASSES = 4 }; /* the fourth finds less than a hundredth of all merges */
 enum { GRAIN = 64 }; /* vertices a thread takes at a time */
 
+typedef struct candidate {
+  double guess;
+  int32_t u, v;
+} candidate;
+
+typedef struct merge_loop {
+  orb_placed_net *placed;
+  double limit2;
+  const effort *effort;
+  unsigned char *changed; /* per vertex: a triangle at it is new since its pairs were searched */
+  candidate *found;       /* per vertex: the best pair that it is the lower number of; v −1: none */
+} merge_loop;
+
 /* Two neighbours and the triangles around both. */
 typedef struct pair {
   orb_placed_net *placed;
   double limit2;
+  const effort *effort;
   int32_t u, v, p; /* p: the vertex that stands for the merged one, a number beyond the last vertex */
   int32_t ring[MOST], side[MOST], triangle[MOST + 2]; /* side i, a half-edge, leads from ring i to the next */
   int n, count;
@@ -95,9 +117,11 @@ static int is_disc(const pair *s, int of_u) {
 }
 
 /* Gathers the pair of h = u→v; 0: it cannot merge. */
-static int take_pair(orb_placed_net *placed, int32_t h, int32_t p, double limit2, pair *s) {
+static int take_pair(const merge_loop *loop, int32_t h, int32_t p, pair *s) {
+  orb_placed_net *placed = loop->placed;
   s->placed = placed;
-  s->limit2 = limit2;
+  s->limit2 = loop->limit2;
+  s->effort = loop->effort;
   s->u = placed->net.triangles[h];
   s->v = placed->net.triangles[orb_next(h)];
   s->p = p;
@@ -289,7 +313,7 @@ static void pull(pair *s) {
 static int test(pair *s) {
   int result = is_positive(s) ? test_edges(s) : NOT_ALLOWED;
   if (result != ALLOWED) {
-    return result == FAR && s->far2 < FAR_MOST ? FAR : NOT_ALLOWED;
+    return result == FAR && s->far2 < s->effort->far ? FAR : NOT_ALLOWED;
   }
   return keeps_upright(s, orb_placed_inverted_by_corners) && items_allow(s) &&
                  keeps_upright(s, orb_placed_inverted_extent)
@@ -302,17 +326,17 @@ static int find_point(pair *s, double *guess) {
   double at[POINTS];
   for (int i = 0; i < POINTS; i++) {
     at[i] = guess_at(s, WAY[i]);
-    if (i == 0 && at[i] > GUESS_PAIR) {
+    if (i == 0 && at[i] > s->effort->pair) {
       return -1;
     }
   }
   orb_placed_copy_vertex(s->placed, s->p, s->u); /* hints for locating it */
-  for (int starts = 0; starts < POINTS; starts++) {
+  for (int starts = 0; starts < s->effort->points; starts++) {
     int best = 0;
     for (int i = 1; i < POINTS; i++) {
       best = at[i] < at[best] ? i : best;
     }
-    if (!(at[best] <= GUESS_POINT)) {
+    if (!(at[best] <= s->effort->point)) {
       return -1;
     }
     place(s, WAY[best]);
@@ -354,18 +378,6 @@ static void merge(pair *s) {
   }
 }
 
-typedef struct candidate {
-  double guess;
-  int32_t u, v;
-} candidate;
-
-typedef struct merge_loop {
-  orb_placed_net *placed;
-  double limit2;
-  unsigned char *changed; /* per vertex: a triangle at it is new since its pairs were searched */
-  candidate *found;       /* per vertex: the best pair that it is the lower number of; v −1: none */
-} merge_loop;
-
 /* The best neighbour of a greater number to merge with. */
 static candidate find_best(const merge_loop *loop, int32_t u, int32_t p) {
   orb_placed_net *placed = loop->placed;
@@ -379,8 +391,8 @@ static candidate find_best(const merge_loop *loop, int32_t u, int32_t p) {
     int32_t v = net->triangles[orb_next(h)];
     double guess;
     pair s;
-    if (u < v && !placed->fixed[v] && (loop->changed[u] || loop->changed[v]) &&
-        take_pair(placed, h, p, loop->limit2, &s) && find_point(&s, &guess) >= 0 && guess < best.guess) {
+    if (u < v && !placed->fixed[v] && (loop->changed[u] || loop->changed[v]) && take_pair(loop, h, p, &s) &&
+        find_point(&s, &guess) >= 0 && guess < best.guess) {
       best = (candidate){guess, u, v};
     }
     h = net->twin[orb_prev(h)];
@@ -407,7 +419,7 @@ static int try_merge(merge_loop *loop, int32_t u, int32_t v) {
   int32_t h = net->out[u] >= 0 && net->out[v] >= 0 ? orb_net_edge(net, u, v) : -1;
   double guess;
   pair s;
-  if (h < 0 || !take_pair(placed, h, net->vertex_count, loop->limit2, &s) || find_point(&s, &guess) < 0) {
+  if (h < 0 || !take_pair(loop, h, net->vertex_count, &s) || find_point(&s, &guess) < 0) {
     return 0;
   }
   merge(&s);
@@ -437,15 +449,16 @@ static orb_status pass(orb_context *ctx, merge_loop *loop, int64_t most, int64_t
   return ORB_OK;
 }
 
-orb_status orb_adaptive_merge_all(orb_context *ctx, orb_placed_net *placed, double limit2, int64_t target) {
+orb_status orb_adaptive_merge_all(orb_context *ctx, orb_placed_net *placed, double limit2, int64_t target, int quick) {
   int32_t n = placed->net.vertex_count;
   int64_t live = orb_placed_live(placed), merged = 1;
-  merge_loop loop = {placed, limit2, ORB_NEW(ctx, unsigned char, n), ORB_NEW(ctx, candidate, n)};
+  merge_loop loop = {placed, limit2, quick ? &QUICK : &THOROUGH, ORB_NEW(ctx, unsigned char, n),
+                     ORB_NEW(ctx, candidate, n)};
   orb_status status = loop.changed && loop.found ? orb_placed_reserve(ctx, placed, orb_threads(ctx)) : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
     memset(loop.changed, 1, (size_t)n);
   }
-  for (int i = 0; i < PASSES && merged > 0 && live > target && live > 4 && status == ORB_OK; i++) {
+  for (int i = 0; i < loop.effort->passes && merged > 0 && live > target && live > 4 && status == ORB_OK; i++) {
     int64_t most = (live - (target > 4 ? target : 4) + 1) / 2;
     status = pass(ctx, &loop, most, &merged);
     live -= 2 * merged;

@@ -15,6 +15,7 @@
 #include "base/loops.h"
 #include "base/memory.h"
 #include "remesh/adaptive/collapse.h"
+#include "remesh/adaptive/thin.h"
 #include "remesh/common/net_export.h"
 #include "remesh/placed/flip.h"
 #include "sphere/locate.h"
@@ -169,15 +170,34 @@ static orb_status reduce(orb_context *ctx, const orb_remesh_job *job, double lim
   return status;
 }
 
-/* A placed net for `job` on the overlay of the shapes of `laid`. */
+/* Thins the overlay and drops what has died. */
+static orb_status take_thinned(orb_context *ctx, const orb_remesh_job *job, const orb_supermesh *overlay, double limit2,
+                               orb_net *net) {
+  orb_net thin;
+  orb_supermesh kept = {0};
+  orb_status status = orb_adaptive_thin_overlay(ctx, job, overlay, limit2, &thin);
+  if (status == ORB_OK) {
+    status = orb_net_export(ctx, &thin, &kept, NULL);
+  }
+  orb_net_free(ctx, &thin);
+  if (status == ORB_OK) {
+    status = orb_net_init(ctx, net, kept.points, kept.vertex_count, kept.triangles, kept.triangle_count, NULL,
+                          kept.vertex_count);
+  }
+  orb_supermesh_free(ctx, &kept);
+  return status;
+}
+
+/* A placed net for `job` on the overlay of the shapes of `laid`, thinned out if limit2 is above 0. */
 static orb_status create_on_overlay(orb_context *ctx, const orb_remesh_job *laid, const orb_remesh_job *job,
-                                    orb_placed_net *placed) {
+                                    double limit2, orb_placed_net *placed) {
   orb_supermesh overlay = {.error_bound = ORB_NEW(ctx, double, job->shape_count)};
   orb_net net = {0};
   orb_status status = overlay.error_bound ? orb_remesh_overlay(ctx, laid, &overlay) : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
-    status = orb_net_init(ctx, &net, overlay.points, overlay.vertex_count, overlay.triangles, overlay.triangle_count,
-                          overlay.vertex_count);
+    status = limit2 > 0 ? take_thinned(ctx, laid, &overlay, limit2, &net)
+                        : orb_net_init(ctx, &net, overlay.points, overlay.vertex_count, overlay.triangles,
+                                       overlay.triangle_count, NULL, overlay.vertex_count);
   }
   orb_supermesh_free(ctx, &overlay);
   if (status == ORB_OK) {
@@ -188,8 +208,81 @@ static orb_status create_on_overlay(orb_context *ctx, const orb_remesh_job *laid
   return status;
 }
 
-orb_status orb_adaptive_start_from_overlay(orb_context *ctx, const orb_remesh_job *job, orb_placed_net *placed) {
-  return create_on_overlay(ctx, job, job, placed);
+/* Inserts the live vertices of a thinned shape. */
+static orb_status insert_all(orb_context *ctx, const orb_net *thin, const orb_locator *locator, orb_net *net) {
+  for (int32_t v = 0; v < thin->vertex_count; v++) {
+    if (thin->out[v] >= 0) {
+      orb_place near;
+      orb_locate(locator, orb_net_point(thin, v), -1, &near);
+      (void)orb_net_insert(net, orb_net_point(thin, v), &near.triangle);
+    }
+    if (v % SLICE == 0) {
+      ORB_TRY(orb_context_check(ctx));
+    }
+  }
+  return ORB_OK;
+}
+
+static int64_t live_vertices(const orb_net *net) {
+  int64_t live = 0;
+  for (int32_t v = 0; v < net->vertex_count; v++) {
+    live += net->out[v] >= 0;
+  }
+  return live;
+}
+
+/* A net of the live vertices of all thinned shapes: the one with the most is kept, the others' are inserted. */
+static orb_status join_thinned(orb_context *ctx, const orb_net *thin, int32_t shapes, orb_net *net) {
+  int32_t base = 0;
+  int64_t all = 0;
+  for (int32_t s = 0; s < shapes; s++) {
+    base = live_vertices(&thin[s]) > live_vertices(&thin[base]) ? s : base;
+    all += live_vertices(&thin[s]);
+  }
+  orb_supermesh kept = {0};
+  orb_locator *locator = NULL;
+  orb_status status;
+  ORB_GO(status, orb_net_export(ctx, &thin[base], &kept, NULL), end);
+  ORB_GO(status, orb_net_init(ctx, net, kept.points, kept.vertex_count, kept.triangles, kept.triangle_count, NULL, all),
+         end);
+  ORB_GO(status,
+         orb_locator_create(ctx, kept.points, kept.vertex_count, kept.triangles, kept.triangle_count, NULL, &locator),
+         end);
+  for (int32_t s = 0; s < shapes; s++) {
+    if (s != base) {
+      ORB_GO(status, insert_all(ctx, &thin[s], locator, net), end);
+    }
+  }
+end:
+  orb_locator_destroy(ctx, locator);
+  orb_supermesh_free(ctx, &kept);
+  return status;
+}
+
+orb_status orb_adaptive_start_from_thinned(orb_context *ctx, const orb_remesh_job *job, double limit2,
+                                           orb_placed_net *placed) {
+  orb_net *thin = ORB_NEW0(ctx, orb_net, job->shape_count), net = {0};
+  orb_status status = thin ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int32_t s = 0; s < job->shape_count && status == ORB_OK; s++) {
+    status = orb_adaptive_thin_shape(ctx, job, s, limit2, &thin[s]);
+  }
+  if (status == ORB_OK) {
+    status = join_thinned(ctx, thin, job->shape_count, &net);
+  }
+  for (int32_t s = 0; s < job->shape_count && thin; s++) {
+    orb_net_free(ctx, &thin[s]);
+  }
+  orb_free(ctx, thin);
+  if (status == ORB_OK) {
+    status = orb_placed_create_on(ctx, job, &net, placed);
+  }
+  orb_net_free(ctx, &net);
+  return status;
+}
+
+orb_status orb_adaptive_start_from_overlay(orb_context *ctx, const orb_remesh_job *job, double limit2,
+                                           orb_placed_net *placed) {
+  return create_on_overlay(ctx, job, job, limit2, placed);
 }
 
 orb_status orb_adaptive_start_from_reduced(orb_context *ctx, const orb_remesh_job *job, double limit2,
@@ -197,7 +290,7 @@ orb_status orb_adaptive_start_from_reduced(orb_context *ctx, const orb_remesh_jo
   reduced r;
   orb_status status = reduce(ctx, job, limit2, &r);
   if (status == ORB_OK) {
-    status = create_on_overlay(ctx, &r.job, job, placed);
+    status = create_on_overlay(ctx, &r.job, job, 0, placed);
   }
   reduced_free(ctx, &r);
   return status;

@@ -236,7 +236,7 @@ orb_status orb_placed_create(orb_context *ctx, const orb_remesh_job *job, orb_pl
   int64_t items = placed->item_begin[placed->shape_count];
   ORB_GO(status,
          orb_net_init(ctx, &placed->net, shape->points, shape->mesh.vertex_count, shape->mesh.triangles,
-                      shape->mesh.triangle_count, items + items / 4),
+                      shape->mesh.triangle_count, job->twin[base], items + items / 4),
          fail);
   ORB_GO(status, orb_placed_reserve(ctx, placed, items - placed->net.vertex_count), fail);
   for (int32_t v = 0; v < shape->mesh.vertex_count; v++) {
@@ -289,6 +289,41 @@ void orb_placed_assign_among(orb_placed_net *placed, int32_t list, const int32_t
   }
 }
 
+typedef struct item_loop {
+  const orb_placed_net *placed;
+  const orb_locator *locator; /* of the net */
+  int32_t *at;                /* per item: the half-edge that leaves its vertex, or minus its triangle, less 1 */
+} item_loop;
+
+static void item_range(void *arg, int64_t begin, int64_t end, int thread) {
+  (void)thread;
+  item_loop *loop = arg;
+  for (int64_t i = begin; i < end; i++) {
+    orb_place place;
+    orb_hit hit = orb_locate_hit(loop->locator, orb_placed_item_point(loop->placed, (int32_t)i), -1, &place);
+    int corner = orb_hit_corner(&hit);
+    loop->at[i] = corner >= 0 ? 3 * hit.triangle + corner : -1 - hit.triangle;
+  }
+}
+
+/* Lists every item at the net vertex or triangle that holds it. */
+static orb_status place_items(orb_context *ctx, orb_placed_net *placed, const orb_locator *locator) {
+  int32_t items = placed->item_begin[placed->shape_count];
+  item_loop loop = {placed, locator, ORB_NEW(ctx, int32_t, items)};
+  orb_status status = loop.at ? orb_sliced_by(ctx, items, SLICE, GRAIN, item_range, &loop) : ORB_E_NO_MEMORY;
+  for (int32_t i = 0; i < items && status == ORB_OK; i++) {
+    if (loop.at[i] >= 0) {
+      put_item_at(placed, i, placed->net.triangles[loop.at[i]]);
+    } else {
+      int32_t *list = &placed->triangle_items[-1 - loop.at[i]];
+      placed->item_next[i] = *list;
+      *list = i;
+    }
+  }
+  orb_free(ctx, loop.at);
+  return status;
+}
+
 orb_status orb_placed_create_on(orb_context *ctx, const orb_remesh_job *job, const orb_net *net,
                                 orb_placed_net *placed) {
   memset(placed, 0, sizeof *placed);
@@ -296,7 +331,7 @@ orb_status orb_placed_create_on(orb_context *ctx, const orb_remesh_job *job, con
   orb_status status;
   ORB_GO(status, take_shapes(ctx, placed), fail);
   ORB_GO(status,
-         orb_net_init(ctx, &placed->net, net->points, net->vertex_count, net->triangles, net->triangle_count,
+         orb_net_init(ctx, &placed->net, net->points, net->vertex_count, net->triangles, net->triangle_count, net->twin,
                       net->vertex_count),
          fail);
   ORB_GO(status, orb_placed_reserve(ctx, placed, 64), fail);
@@ -305,20 +340,7 @@ orb_status orb_placed_create_on(orb_context *ctx, const orb_remesh_job *job, con
          orb_locator_create(ctx, placed->net.points, placed->net.vertex_count, placed->net.triangles,
                             placed->net.triangle_count, placed->net.twin, &locator),
          fail);
-  orb_sphere_view view = orb_net_view(&placed->net);
-  for (int32_t i = 0; i < placed->item_begin[placed->shape_count] && status == ORB_OK; i++) {
-    orb_place place;
-    status = i % CHECK_EVERY == 0 ? orb_context_check(ctx) : ORB_OK;
-    orb_locate(locator, orb_placed_item_point(placed, i), -1, &place);
-    orb_hit hit = orb_walk(&view, orb_placed_item_point(placed, i), place.triangle);
-    int corner = orb_hit_corner(&hit);
-    if (corner >= 0) {
-      put_item_at(placed, i, placed->net.triangles[3 * hit.triangle + corner]);
-    } else {
-      placed->item_next[i] = placed->triangle_items[hit.triangle];
-      placed->triangle_items[hit.triangle] = i;
-    }
-  }
+  status = place_items(ctx, placed, locator);
   orb_locator_destroy(ctx, locator);
   if (status != ORB_OK) {
     goto fail;
