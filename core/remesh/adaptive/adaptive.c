@@ -37,7 +37,7 @@ enum { REFINEMENTS_MOST = 32 }; /* after so many the net counts as one that refi
  * fewer inverted triangles. */
 enum { FEW = 3000, SOME = 1000, MANY = 100 };
 /* More inverted triangles than one in WOUND of the refined net: the overlay of everything is worth it at once. */
-enum { WOUND = 14 };
+enum { WOUND = 7 };
 /* Shapes times triangles up to which a second start, from the overlay, is affordable. */
 enum { OVERLAY_MOST = 120000 };
 /* The same from which merges are tried less. */

@@ -24,8 +24,8 @@ static const double MARGIN = 0.1;
 enum { LONGER_MOST = 64 };
 /* Edges of the queue whose deviations are found at once: more keep the threads busy, fewer are found in vain. */
 enum { AHEAD = 1024 };
-/* Refinement gives up after examining each edge of the start four times, and this many more, which lets tiny nets grow.
- */
+/* Refinement gives up after examining each edge of the start, or of a net of all vertices, four times, and this many
+ * more, which lets tiny nets grow. */
 enum { EDGES_FREE = 20000 };
 
 /* Flips the edge, whatever that does to the form, if all triangles stay positive on the sphere. */
@@ -276,7 +276,8 @@ orb_status orb_placed_refine(orb_context *ctx, orb_placed_net *placed, double li
   if (deviating) {
     *deviating = queue.count;
   }
-  int64_t limit = 2 * half_edges + EDGES_FREE;
+  int64_t all = 6 * (int64_t)placed->item_begin[placed->shape_count]; /* half-edges of a net of all vertices */
+  int64_t limit = 2 * (half_edges > all ? half_edges : all) + EDGES_FREE;
   if (status == ORB_OK) {
     status = repair_edges(ctx, placed, limit2, limit, &queue);
   }
