@@ -1,0 +1,18 @@
+/* What ranks maps in eigenfunctions. */
+#ifndef ORB_ALIGN_SPECTRAL_COST_H
+#define ORB_ALIGN_SPECTRAL_COST_H
+
+#include "align/spectral/zoom.h"
+
+/* The measures of orb_spectral_candidate, see there. */
+typedef struct orb_zoom_cost {
+  double cost, distortion, relief, facing;
+} orb_zoom_cost;
+
+/* O(samples²). Any thread. */
+void orb_zoom_measure(const orb_zoom_pair *pair, const orb_zoom *map, orb_zoom_cost *out);
+
+/* How far apart two maps take the samples of the first shape, in the mean, along the second, whose area is 1. */
+double orb_zoom_difference(const orb_zoom_pair *pair, const orb_zoom *map, const orb_zoom *other);
+
+#endif

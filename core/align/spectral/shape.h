@@ -1,0 +1,35 @@
+/* What the spectral search knows of one shape: its lowest eigenfunctions and a few samples. */
+#ifndef ORB_ALIGN_SPECTRAL_SHAPE_H
+#define ORB_ALIGN_SPECTRAL_SHAPE_H
+
+#include "orbmorph/mesh.h"
+
+enum {
+  ORB_SPECTRAL_FUNCTIONS = 31, /* eigenfunctions, the constant one included */
+  ORB_SPECTRAL_SAMPLES = 160,
+  ORB_SPECTRAL_TURNING = 6, /* functions whose gradients are compared */
+  ORB_SPECTRAL_TURNS = ORB_SPECTRAL_TURNING * (ORB_SPECTRAL_TURNING - 1) / 2 /* pairs of them */
+};
+
+/* In units in which the area is 1. Functions are orthonormal under the lumped mass. Samples are spread by farthest
+ * points, so the first few are spread too, and tips of limbs come first. */
+typedef struct orb_spectral_shape {
+  const orb_mesh *mesh; /* borrowed */
+  int is_usable;        /* 0: too few vertices, or the eigenproblem was not solved; nothing else is filled then */
+  double value[ORB_SPECTRAL_FUNCTIONS];
+  double *function; /* function k at vertex v: [k · vertices + v] */
+  int32_t sample[ORB_SPECTRAL_SAMPLES];
+  double at[ORB_SPECTRAL_FUNCTIONS][ORB_SPECTRAL_SAMPLES]; /* the functions at the samples */
+  double share[ORB_SPECTRAL_SAMPLES];                      /* of the area, nearest to each sample; the sum is 1 */
+  /* normal · (gradient of i × gradient of k) at each sample, i < k, row by row: changes sign under a mirror image */
+  double turn[ORB_SPECTRAL_SAMPLES][ORB_SPECTRAL_TURNS];
+  float *distance; /* along the surface, samples × samples */
+  float *height;   /* of sample k over the tangent plane at sample i: [i · samples + k] */
+} orb_spectral_shape;
+
+/* `out` is to be freed in any case; the mesh must outlive it. mirrored: as if the surface were its mirror image. */
+ORB_MUST_CHECK orb_status orb_spectral_shape_create(orb_context *ctx, const orb_mesh *mesh, int mirrored,
+                                                    orb_spectral_shape *out);
+void orb_spectral_shape_free(orb_context *ctx, orb_spectral_shape *shape);
+
+#endif

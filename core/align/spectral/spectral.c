@@ -1,0 +1,137 @@
+/* The starts: each of the first eigenfunctions after the constant one goes to the same one of the other shape, as it is
+ * or negated, which makes 32 maps. Each is refined roughly; those that differ are ranked, and the best are refined
+ * fully, ranked again, and listed. */
+#include "align/spectral/spectral.h"
+
+#include <string.h>
+
+#include "align/spectral/cost.h"
+#include "base/check.h"
+#include "base/loops.h"
+#include "base/memory.h"
+
+/* Chosen by trial on the pairs of posed people with even numbers. */
+enum {
+  STARTS = 1 << (ORB_ZOOM_START - 1),
+  REFINED = 12 /* maps that are refined fully */
+};
+static const double SAME = 0.05;       /* mean distance of the images, √area being 1: maps nearer than this are one */
+static const double ROUND_TRIP = 0.12; /* a pair whose image comes back farther away is not listed */
+
+typedef struct search {
+  orb_context *ctx;
+  orb_spectral_shape shape[2];
+  orb_zoom_pair pair;
+  int from, to; /* levels of the present loop */
+  int32_t count;
+  int32_t order[STARTS];
+  orb_zoom map[STARTS];
+  orb_zoom_cost cost[STARTS];
+} search;
+
+static void refine(void *arg, int64_t begin, int64_t end, int thread) {
+  search *s = arg;
+  (void)thread;
+  for (int64_t i = begin; i < end; i++) {
+    int32_t at = s->order[i];
+    orb_zoom_refine(&s->pair, s->from, s->to, &s->map[at]);
+    orb_zoom_measure(&s->pair, &s->map[at], &s->cost[at]);
+  }
+}
+
+static orb_status refine_all(search *s, int from, int to) {
+  s->from = from;
+  s->to = to;
+  return orb_sliced_by(s->ctx, s->count, s->count, 1, refine, s);
+}
+
+/* Orders the maps by cost, best first, and keeps at most `most`, without those that are like a better one. */
+static void keep_best(search *s, int32_t most) {
+  for (int32_t i = 1; i < s->count; i++) {
+    int32_t one = s->order[i], k = i;
+    for (; k > 0 && s->cost[s->order[k - 1]].cost > s->cost[one].cost; k--) {
+      s->order[k] = s->order[k - 1];
+    }
+    s->order[k] = one;
+  }
+  int32_t kept = 0;
+  for (int32_t i = 0; i < s->count && kept < most; i++) {
+    int is_new = 1;
+    for (int32_t k = 0; k < kept && is_new; k++) {
+      is_new = orb_zoom_difference(&s->pair, &s->map[s->order[i]], &s->map[s->order[k]]) > SAME;
+    }
+    if (is_new) {
+      s->order[kept++] = s->order[i];
+    }
+  }
+  s->count = kept;
+}
+
+static void add_pair(orb_spectral_candidate *out, int32_t first, int32_t second) {
+  for (int32_t k = 0; k < out->count; k++) {
+    if (out->first[k] == first || out->second[k] == second) {
+      return;
+    }
+  }
+  if (out->count < ORB_SPECTRAL_PAIRS) {
+    out->first[out->count] = first;
+    out->second[out->count++] = second;
+  }
+}
+
+/* Samples of both shapes by turns, in their order, where the map and the map back agree. */
+static void write_candidate(const search *s, int32_t at, orb_spectral_candidate *out) {
+  const orb_zoom *map = &s->map[at];
+  const orb_zoom_cost *cost = &s->cost[at];
+  int32_t forth[ORB_SPECTRAL_SAMPLES], back[ORB_SPECTRAL_SAMPLES];
+  *out = (orb_spectral_candidate){
+      .cost = cost->cost, .distortion = cost->distortion, .relief = cost->relief, .facing = cost->facing};
+  orb_zoom_images(&s->pair, map, forth, back);
+  for (int32_t i = 0; i < ORB_SPECTRAL_SAMPLES; i++) {
+    const orb_spectral_shape *a = &s->shape[0], *b = &s->shape[1];
+    if (a->distance[i * ORB_SPECTRAL_SAMPLES + map->back[map->forth[i]]] < ROUND_TRIP) {
+      add_pair(out, a->sample[i], forth[i]);
+    }
+    if (b->distance[i * ORB_SPECTRAL_SAMPLES + map->forth[map->back[i]]] < ROUND_TRIP) {
+      add_pair(out, back[i], b->sample[i]);
+    }
+  }
+}
+
+static orb_status run(search *s, orb_spectral_list *out) {
+  ORB_TRY(orb_zoom_pair_create(s->ctx, &s->shape[0], &s->shape[1], &s->pair));
+  for (s->count = 0; s->count < STARTS; s->count++) {
+    s->order[s->count] = s->count;
+    orb_zoom_start((uint32_t)s->count, &s->map[s->count]);
+  }
+  ORB_TRY(refine_all(s, 0, ORB_ZOOM_ROUGH));
+  keep_best(s, REFINED);
+  ORB_TRY(refine_all(s, ORB_ZOOM_ROUGH, ORB_ZOOM_LEVELS));
+  keep_best(s, ORB_SPECTRAL_MAX);
+  for (int32_t i = 0; i < s->count; i++) {
+    write_candidate(s, s->order[i], &out->candidate[out->count++]);
+  }
+  return ORB_OK;
+}
+
+orb_status orb_spectral_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int mirrored,
+                             orb_spectral_list *out) {
+  orb_status status;
+  search *s = ORB_NEW0(ctx, search, 1);
+  memset(out, 0, sizeof *out);
+  if (!s) {
+    return ORB_E_NO_MEMORY;
+  }
+  s->ctx = ctx;
+  ORB_GO(status, orb_spectral_shape_create(ctx, a, 0, &s->shape[0]), end);
+  ORB_GO(status, orb_spectral_shape_create(ctx, b, mirrored, &s->shape[1]), end);
+  if (s->shape[0].is_usable && s->shape[1].is_usable) {
+    status = run(s, out);
+  }
+end:
+  orb_zoom_pair_free(ctx, &s->pair);
+  orb_spectral_shape_free(ctx, &s->shape[0]);
+  orb_spectral_shape_free(ctx, &s->shape[1]);
+  orb_free(ctx, s);
+  return status;
+}

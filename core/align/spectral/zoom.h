@@ -1,0 +1,42 @@
+/* Refinement of a map between two shapes in their eigenfunctions. */
+#ifndef ORB_ALIGN_SPECTRAL_ZOOM_H
+#define ORB_ALIGN_SPECTRAL_ZOOM_H
+
+#include "align/spectral/shape.h"
+
+enum { ORB_ZOOM_START = 6, ORB_ZOOM_LEVELS = 7, ORB_ZOOM_ROUGH = 4 };
+
+/* A map between shapes a and b: a linear map of their functions, and where the samples go. */
+typedef struct orb_zoom {
+  int32_t size; /* functions of each shape that it relates */
+  /* Function i of b, brought to a, is the sum over k of matrix[i][k] · function k of a; orthogonal, nearly. */
+  double matrix[ORB_SPECTRAL_FUNCTIONS][ORB_SPECTRAL_FUNCTIONS];
+  int32_t forth[ORB_SPECTRAL_SAMPLES]; /* the sample of b that each sample of a goes to, and the other way */
+  int32_t back[ORB_SPECTRAL_SAMPLES];
+} orb_zoom;
+
+/* What all refinements of a pair share. */
+typedef struct orb_zoom_pair {
+  const orb_spectral_shape *shape[2];
+  double *fit[2][ORB_ZOOM_LEVELS]; /* from values at samples to coefficients: functions × samples */
+} orb_zoom_pair;
+
+/* `out` is to be freed in any case. The shapes must be usable and outlive it. */
+ORB_MUST_CHECK orb_status orb_zoom_pair_create(orb_context *ctx, const orb_spectral_shape *a,
+                                               const orb_spectral_shape *b, orb_zoom_pair *out);
+void orb_zoom_pair_free(orb_context *ctx, orb_zoom_pair *pair);
+
+/* Starts from ± each of the first functions: bit k of signs set flips function k + 1. */
+void orb_zoom_start(uint32_t signs, orb_zoom *out);
+
+/* Refines a map over levels [from, to). Any thread. */
+void orb_zoom_refine(const orb_zoom_pair *pair, int from, int to, orb_zoom *map);
+
+/* The vertices of b that samples of a go to, and of a that samples of b go to: nearest over all vertices. */
+void orb_zoom_images(const orb_zoom_pair *pair, const orb_zoom *map, int32_t forth[ORB_SPECTRAL_SAMPLES],
+                     int32_t back[ORB_SPECTRAL_SAMPLES]);
+
+/* How much of shape a keeps its orientation under the map, by the turns: −1 to 1. */
+double orb_zoom_facing(const orb_zoom_pair *pair, const orb_zoom *map);
+
+#endif
