@@ -13,16 +13,21 @@ static const double LEAST = 1e-6; /* distortion and relief are at least this: a 
 
 enum { S = ORB_SPECTRAL_SAMPLES };
 
+static const double *share_of(const orb_spectral_shape *shape, int32_t samples) {
+  return samples == S ? shape->share : shape->share_of_few;
+}
+
 /* Adds the measures in one direction, from a shape whose samples go to those of another. */
-static void add_direction(const orb_spectral_shape *from, const orb_spectral_shape *to, const int32_t *image,
-                          orb_zoom_cost *out) {
+static void add_direction(const orb_spectral_shape *from, const orb_spectral_shape *to, int32_t samples,
+                          const int32_t *image, orb_zoom_cost *out) {
+  const double *shares = share_of(from, samples);
   double stretched = 0, mean = 0, moved = 0, heights = 0;
-  for (int i = 0; i < S; i++) {
+  for (int i = 0; i < samples; i++) {
     const float *near = from->distance + i * S, *there = to->distance + image[i] * S;
     const float *height = from->height + i * S, *image_height = to->height + image[i] * S;
     double row_stretched = 0, row_mean = 0, row_moved = 0, row_heights = 0;
-    for (int k = 0; k < S; k++) {
-      double share = from->share[k];
+    for (int k = 0; k < samples; k++) {
+      double share = shares[k];
       row_stretched += share * fabsf(near[k] - there[image[k]]);
       row_mean += share * near[k];
       if (near[k] < NEAR) {
@@ -30,10 +35,10 @@ static void add_direction(const orb_spectral_shape *from, const orb_spectral_sha
         row_heights += share * fabsf(height[k]);
       }
     }
-    stretched += from->share[i] * row_stretched;
-    mean += from->share[i] * row_mean;
-    moved += from->share[i] * row_moved;
-    heights += from->share[i] * row_heights;
+    stretched += shares[i] * row_stretched;
+    mean += shares[i] * row_mean;
+    moved += shares[i] * row_moved;
+    heights += shares[i] * row_heights;
   }
   out->distortion += mean > 0 ? stretched / mean / 2 : 0;
   out->relief += heights > 0 ? moved / heights / 2 : 0;
@@ -41,16 +46,16 @@ static void add_direction(const orb_spectral_shape *from, const orb_spectral_sha
 
 void orb_zoom_measure(const orb_zoom_pair *pair, const orb_zoom *map, orb_zoom_cost *out) {
   *out = (orb_zoom_cost){0};
-  add_direction(pair->shape[0], pair->shape[1], map->forth, out);
-  add_direction(pair->shape[1], pair->shape[0], map->back, out);
+  add_direction(pair->shape[0], pair->shape[1], map->samples, map->forth, out);
+  add_direction(pair->shape[1], pair->shape[0], map->samples, map->back, out);
   out->facing = orb_zoom_facing(pair, map);
   out->cost = log(fmax(LEAST, out->distortion)) + log(fmax(LEAST, out->relief)) - FACING * out->facing;
 }
 
 double orb_zoom_difference(const orb_zoom_pair *pair, const orb_zoom *map, const orb_zoom *other) {
   double sum = 0;
-  for (int s = 0; s < S; s++) {
-    sum += pair->shape[0]->share[s] * pair->shape[1]->distance[map->forth[s] * S + other->forth[s]];
+  for (int s = 0; s < map->samples; s++) {
+    sum += share_of(pair->shape[0], map->samples)[s] * pair->shape[1]->distance[map->forth[s] * S + other->forth[s]];
   }
   return sum;
 }

@@ -78,8 +78,20 @@ static void assemble(work *w) {
   }
 }
 
+/* The share of the area that each of the samples so far owns. */
+static void fill_shares(const work *w, const int32_t *owner, int32_t count, double *share) {
+  double sum = 0;
+  for (int32_t v = 0; v < w->vertices; v++) {
+    share[owner[v]] += w->mass[v];
+    sum += w->mass[v];
+  }
+  for (int i = 0; i < count; i++) {
+    share[i] /= sum;
+  }
+}
+
 /* Samples by farthest points along the surface, from the point farthest from vertex 0, and the distances between them.
- * far: room for two doubles a vertex. */
+ * buffer: two doubles a vertex. */
 static void spread(const work *w, orb_distances *distances, double *buffer, int32_t *owner, orb_spectral_shape *out) {
   double *far = buffer, *one = buffer + w->vertices;
   orb_distances_from(distances, 0, far);
@@ -101,15 +113,11 @@ static void spread(const work *w, orb_distances *distances, double *buffer, int3
       out->distance[i * ORB_SPECTRAL_SAMPLES + k] = out->distance[k * ORB_SPECTRAL_SAMPLES + i] =
           (float)one[out->sample[k]];
     }
+    if (i + 1 == ORB_SPECTRAL_FEW) {
+      fill_shares(w, owner, ORB_SPECTRAL_FEW, out->share_of_few);
+    }
   }
-  double sum = 0;
-  for (int32_t v = 0; v < w->vertices; v++) {
-    out->share[owner[v]] += w->mass[v];
-    sum += w->mass[v];
-  }
-  for (int i = 0; i < ORB_SPECTRAL_SAMPLES; i++) {
-    out->share[i] /= sum;
-  }
+  fill_shares(w, owner, ORB_SPECTRAL_SAMPLES, out->share);
 }
 
 static void fill_samples(const work *w, orb_spectral_shape *out) {

@@ -7,6 +7,7 @@
 enum {
   ORB_SPECTRAL_FUNCTIONS = 31, /* eigenfunctions, the constant one included */
   ORB_SPECTRAL_SAMPLES = 160,
+  ORB_SPECTRAL_FEW = 80,    /* samples that represent the shape where little detail is needed: the first */
   ORB_SPECTRAL_TURNING = 6, /* functions whose gradients are compared */
   ORB_SPECTRAL_TURNS = ORB_SPECTRAL_TURNING * (ORB_SPECTRAL_TURNING - 1) / 2 /* pairs of them */
 };
@@ -21,6 +22,7 @@ typedef struct orb_spectral_shape {
   int32_t sample[ORB_SPECTRAL_SAMPLES];
   double at[ORB_SPECTRAL_FUNCTIONS][ORB_SPECTRAL_SAMPLES]; /* the functions at the samples */
   double share[ORB_SPECTRAL_SAMPLES];                      /* of the area, nearest to each sample; the sum is 1 */
+  double share_of_few[ORB_SPECTRAL_FEW];                   /* the same among the first few */
   /* normal · (gradient of i × gradient of k) at each sample, i < k, row by row: changes sign under a mirror image */
   double turn[ORB_SPECTRAL_SAMPLES][ORB_SPECTRAL_TURNS];
   float *distance; /* along the surface, samples × samples */

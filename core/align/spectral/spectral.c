@@ -67,34 +67,39 @@ static void keep_best(search *s, int32_t most) {
   s->count = kept;
 }
 
-static void add_pair(orb_spectral_candidate *out, int32_t first, int32_t second) {
-  for (int32_t k = 0; k < out->count; k++) {
-    if (out->first[k] == first || out->second[k] == second) {
-      return;
+static int is_listed(const int32_t *list, int32_t count, int32_t vertex) {
+  for (int32_t k = 0; k < count; k++) {
+    if (list[k] == vertex) {
+      return 1;
     }
   }
-  if (out->count < ORB_SPECTRAL_PAIRS) {
-    out->first[out->count] = first;
-    out->second[out->count++] = second;
+  return 0;
+}
+
+/* Adds a sample of one shape and its image, if the map and the map back agree there. */
+static void add_pair(const search *s, const orb_zoom *map, int32_t i, int back, orb_spectral_candidate *out) {
+  const orb_spectral_shape *from = &s->shape[back];
+  const int32_t *there = back ? map->back : map->forth, *again = back ? map->forth : map->back;
+  int32_t *own = back ? out->second : out->first, *other = back ? out->first : out->second;
+  if (out->count == ORB_SPECTRAL_PAIRS || is_listed(own, out->count, from->sample[i]) ||
+      from->distance[i * ORB_SPECTRAL_SAMPLES + again[there[i]]] > ROUND_TRIP) {
+    return;
+  }
+  int32_t image = orb_zoom_image(&s->pair, map, i, back);
+  if (!is_listed(other, out->count, image)) {
+    own[out->count] = from->sample[i];
+    other[out->count++] = image;
   }
 }
 
-/* Samples of both shapes by turns, in their order, where the map and the map back agree. */
+/* Samples of both shapes by turns, in their order. */
 static void write_candidate(const search *s, int32_t at, orb_spectral_candidate *out) {
-  const orb_zoom *map = &s->map[at];
   const orb_zoom_cost *cost = &s->cost[at];
-  int32_t forth[ORB_SPECTRAL_SAMPLES], back[ORB_SPECTRAL_SAMPLES];
   *out = (orb_spectral_candidate){
       .cost = cost->cost, .distortion = cost->distortion, .relief = cost->relief, .facing = cost->facing};
-  orb_zoom_images(&s->pair, map, forth, back);
-  for (int32_t i = 0; i < ORB_SPECTRAL_SAMPLES; i++) {
-    const orb_spectral_shape *a = &s->shape[0], *b = &s->shape[1];
-    if (a->distance[i * ORB_SPECTRAL_SAMPLES + map->back[map->forth[i]]] < ROUND_TRIP) {
-      add_pair(out, a->sample[i], forth[i]);
-    }
-    if (b->distance[i * ORB_SPECTRAL_SAMPLES + map->forth[map->back[i]]] < ROUND_TRIP) {
-      add_pair(out, back[i], b->sample[i]);
-    }
+  for (int32_t i = 0; i < s->map[at].samples; i++) {
+    add_pair(s, &s->map[at], i, 0, out);
+    add_pair(s, &s->map[at], i, 1, out);
   }
 }
 

@@ -18,6 +18,9 @@
 /* Chosen by trial on the pairs of posed people with even numbers. */
 static const int level_size[ORB_ZOOM_LEVELS] = {7, 9, 12, 16, 20, 25, 31};
 static const float level_turn[ORB_ZOOM_LEVELS] = {2, 2, 2, 2, 1, 1, 0}; /* weight of the turns */
+static const int level_samples[ORB_ZOOM_LEVELS] = {ORB_SPECTRAL_FEW,    ORB_SPECTRAL_FEW,     ORB_SPECTRAL_FEW,
+                                                   ORB_SPECTRAL_FEW,    ORB_SPECTRAL_SAMPLES, ORB_SPECTRAL_SAMPLES,
+                                                   ORB_SPECTRAL_SAMPLES};
 
 enum {
   S = ORB_SPECTRAL_SAMPLES,
@@ -33,22 +36,24 @@ typedef struct features {
 } features;
 
 /* The matrix that takes values at samples to the coefficients of the first `size` functions: weighted least squares. */
-static orb_status fit_create(orb_context *ctx, const orb_spectral_shape *shape, int size, double **out) {
+static orb_status fit_create(orb_context *ctx, const orb_spectral_shape *shape, int level, double **out) {
+  int size = level_size[level], samples = level_samples[level];
+  const double *share = samples == S ? shape->share : shape->share_of_few;
   double gram[K * K] = {0}, *fit = ORB_NEW(ctx, double, (size_t)size *S);
   if (!fit) {
     return ORB_E_NO_MEMORY;
   }
   *out = fit;
-  for (int s = 0; s < S; s++) {
+  for (int s = 0; s < samples; s++) {
     for (int i = 0; i < size; i++) {
-      fit[i * S + s] = shape->share[s] * shape->at[i][s];
+      fit[i * samples + s] = share[s] * shape->at[i][s];
       for (int k = 0; k < size; k++) {
-        gram[i * size + k] += fit[i * S + s] * shape->at[k][s];
+        gram[i * size + k] += fit[i * samples + s] * shape->at[k][s];
       }
     }
   }
-  if (orb_dense_solve(size, gram, S, fit) != 0) {
-    memset(fit, 0, (size_t)size * S * sizeof *fit);
+  if (orb_dense_solve(size, gram, samples, fit) != 0) {
+    memset(fit, 0, (size_t)size * (size_t)samples * sizeof *fit);
   }
   return ORB_OK;
 }
@@ -58,7 +63,7 @@ orb_status orb_zoom_pair_create(orb_context *ctx, const orb_spectral_shape *a, c
   *out = (orb_zoom_pair){.shape = {a, b}};
   for (int s = 0; s < 2; s++) {
     for (int level = 0; level < ORB_ZOOM_LEVELS; level++) {
-      orb_status status = fit_create(ctx, out->shape[s], level_size[level], &out->fit[s][level]);
+      orb_status status = fit_create(ctx, out->shape[s], level, &out->fit[s][level]);
       if (status != ORB_OK) {
         return status;
       }
@@ -133,7 +138,7 @@ static double length_of(const double turn[ORB_SPECTRAL_TURNS]) {
 static void fill_features(const orb_zoom_pair *pair, const orb_zoom *map, float weight, features *f) {
   const orb_spectral_shape *a = pair->shape[0], *b = pair->shape[1];
   f->count = map->size + (weight > 0 ? ORB_SPECTRAL_TURNS : 0);
-  for (int s = 0; s < S; s++) {
+  for (int s = 0; s < map->samples; s++) {
     for (int i = 0; i < map->size; i++) {
       double sum = 0;
       for (int k = 0; k < map->size; k++) {
@@ -157,24 +162,25 @@ static void fill_features(const orb_zoom_pair *pair, const orb_zoom *map, float 
 
 /* The nearest sample of the other shape for each sample of both. */
 static void match_samples(const features *f, orb_zoom *map) {
+  const int samples = map->samples;
   float half[S] = {0}, nearest[S], value[S];
   for (int d = 0; d < f->count; d++) {
-    for (int s = 0; s < S; s++) {
+    for (int s = 0; s < samples; s++) {
       half[s] += f->column[d][s] * f->column[d][s] / 2;
     }
   }
-  for (int r = 0; r < S; r++) {
+  for (int r = 0; r < samples; r++) {
     float own = 0;
     memcpy(value, half, sizeof value);
     for (int d = 0; d < f->count; d++) {
       float x = f->row[r][d];
       own += x * x / 2;
-      for (int s = 0; s < S; s++) {
+      for (int s = 0; s < samples; s++) {
         value[s] -= x * f->column[d][s];
       }
     }
     int best = 0;
-    for (int s = 0; s < S; s++) {
+    for (int s = 0; s < samples; s++) {
       best = value[s] < value[best] ? s : best;
       if (r == 0 || value[s] + own < nearest[s]) {
         nearest[s] = value[s] + own;
@@ -183,6 +189,17 @@ static void match_samples(const features *f, orb_zoom *map) {
     }
     map->forth[r] = best;
   }
+}
+
+/* A sum in four parts, so that the compiler may use vectors; `count` is a multiple of four. */
+static double product(const double *x, const double *y, int count) {
+  double sum[4] = {0};
+  for (int i = 0; i < count; i += 4) {
+    for (int k = 0; k < 4; k++) {
+      sum[k] += x[i + k] * y[i + k];
+    }
+  }
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
 /* The nearest orthogonal matrix of one whose singular values are near 1: X ← 1.5 X − 0.5 X Xᵀ X (Newton and Schulz),
@@ -233,79 +250,82 @@ static void make_orthogonal(double (*x)[K], int size) {
   }
 }
 
-/* Fits a matrix of `size` functions to both maps of samples. */
+/* Fits a matrix of more functions to both maps of samples. */
 static void fit_matrix(const orb_zoom_pair *pair, int level, orb_zoom *map) {
   const orb_spectral_shape *a = pair->shape[0], *b = pair->shape[1];
-  int size = level_size[level];
+  const double *fit_a = pair->fit[0][level], *fit_b = pair->fit[1][level];
+  int size = level_size[level], samples = level_samples[level];
+  double there[S];
+  memset(map->matrix, 0, sizeof map->matrix);
   map->size = size;
-  for (int i = 0; i < size; i++) {
-    for (int k = 0; k < size; k++) {
-      double sum = 0;
-      for (int s = 0; s < S; s++) {
-        sum += pair->fit[1][level][i * S + s] * a->at[k][map->back[s]] +
-               pair->fit[0][level][k * S + s] * b->at[i][map->forth[s]];
-      }
-      map->matrix[i][k] = sum / 2;
+  for (int k = 0; k < size; k++) {
+    for (int s = 0; s < samples; s++) {
+      there[s] = a->at[k][map->back[s]] / 2;
+    }
+    for (int i = 0; i < size; i++) {
+      map->matrix[i][k] += product(fit_b + i * samples, there, samples);
+    }
+    for (int s = 0; s < samples; s++) {
+      there[s] = b->at[k][map->forth[s]] / 2;
+    }
+    for (int i = 0; i < size; i++) {
+      map->matrix[k][i] += product(fit_a + i * samples, there, samples);
     }
   }
   make_orthogonal(map->matrix, size);
 }
 
-void orb_zoom_refine(const orb_zoom_pair *pair, int from, int to, orb_zoom *map) {
+static void match(const orb_zoom_pair *pair, int level, orb_zoom *map) {
   features f;
-  for (int level = from; level < to; level++) {
-    fill_features(pair, map, level_turn[level], &f);
-    match_samples(&f, map);
-    fit_matrix(pair, level, map);
-  }
-  fill_features(pair, map, level_turn[to - 1], &f);
+  map->samples = level_samples[level];
+  fill_features(pair, map, level_turn[level], &f);
   match_samples(&f, map);
 }
 
-/* The vertex of shape `of` nearest to each of `count` points, in the map's functions. */
-static void nearest_vertices(const orb_spectral_shape *of, int size, double (*points)[K], int32_t *out) {
-  size_t n = (size_t)of->mesh->vertex_count;
-  for (int s = 0; s < S; s++) {
-    double best = INFINITY;
-    for (size_t v = 0; v < n; v++) {
-      double sum = 0;
-      for (int k = 0; k < size && sum < best; k++) {
-        double d = points[s][k] - of->function[(size_t)k * n + v];
-        sum += d * d;
-      }
-      if (sum < best) {
-        best = sum;
-        out[s] = (int32_t)v;
-      }
-    }
+void orb_zoom_refine(const orb_zoom_pair *pair, int from, int to, orb_zoom *map) {
+  for (int level = from; level < to; level++) {
+    match(pair, level, map);
+    fit_matrix(pair, level, map);
   }
+  match(pair, to - 1, map);
 }
 
-void orb_zoom_images(const orb_zoom_pair *pair, const orb_zoom *map, int32_t forth[S], int32_t back[S]) {
-  double points[2][S][K] = {{{0}}};
-  for (int s = 0; s < S; s++) {
-    for (int i = 0; i < map->size; i++) {
-      for (int k = 0; k < map->size; k++) {
-        points[0][s][i] += map->matrix[i][k] * pair->shape[0]->at[k][s];
-        points[1][s][k] += map->matrix[i][k] * pair->shape[1]->at[i][s];
-      }
+int32_t orb_zoom_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t sample, int back) {
+  const orb_spectral_shape *from = pair->shape[back ? 1 : 0], *to = pair->shape[back ? 0 : 1];
+  size_t n = (size_t)to->mesh->vertex_count;
+  double point[K] = {0}, best = INFINITY;
+  int32_t nearest = 0;
+  for (int i = 0; i < map->size; i++) {
+    for (int k = 0; k < map->size; k++) {
+      point[i] += (back ? map->matrix[k][i] : map->matrix[i][k]) * from->at[k][sample];
     }
   }
-  nearest_vertices(pair->shape[1], map->size, points[0], forth);
-  nearest_vertices(pair->shape[0], map->size, points[1], back);
+  for (size_t v = 0; v < n; v++) {
+    double sum = 0;
+    for (int k = 0; k < map->size && sum < best; k++) {
+      double d = point[k] - to->function[(size_t)k * n + v];
+      sum += d * d;
+    }
+    if (sum < best) {
+      best = sum;
+      nearest = (int32_t)v;
+    }
+  }
+  return nearest;
 }
 
 double orb_zoom_facing(const orb_zoom_pair *pair, const orb_zoom *map) {
+  const double *share = map->samples == S ? pair->shape[0]->share : pair->shape[0]->share_of_few;
   double sum = 0;
-  for (int s = 0; s < S; s++) {
-    double brought[ORB_SPECTRAL_TURNS], product = 0;
+  for (int s = 0; s < map->samples; s++) {
+    double brought[ORB_SPECTRAL_TURNS], same = 0;
     const double *there = pair->shape[1]->turn[map->forth[s]];
     bring_turns(map, pair->shape[0]->turn[s], brought);
     for (int i = 0; i < ORB_SPECTRAL_TURNS; i++) {
-      product += brought[i] * there[i];
+      same += brought[i] * there[i];
     }
     double length = length_of(brought) * length_of(there);
-    sum += length > 0 ? pair->shape[0]->share[s] * product / length : 0;
+    sum += length > 0 ? share[s] * same / length : 0;
   }
   return sum;
 }

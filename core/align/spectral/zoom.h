@@ -8,7 +8,8 @@ enum { ORB_ZOOM_START = 6, ORB_ZOOM_LEVELS = 7, ORB_ZOOM_ROUGH = 4 };
 
 /* A map between shapes a and b: a linear map of their functions, and where the samples go. */
 typedef struct orb_zoom {
-  int32_t size; /* functions of each shape that it relates */
+  int32_t size;    /* functions of each shape that it relates */
+  int32_t samples; /* of each shape that it relates, the first so many */
   /* Function i of b, brought to a, is the sum over k of matrix[i][k] · function k of a; orthogonal, nearly. */
   double matrix[ORB_SPECTRAL_FUNCTIONS][ORB_SPECTRAL_FUNCTIONS];
   int32_t forth[ORB_SPECTRAL_SAMPLES]; /* the sample of b that each sample of a goes to, and the other way */
@@ -32,9 +33,9 @@ void orb_zoom_start(uint32_t signs, orb_zoom *out);
 /* Refines a map over levels [from, to). Any thread. */
 void orb_zoom_refine(const orb_zoom_pair *pair, int from, int to, orb_zoom *map);
 
-/* The vertices of b that samples of a go to, and of a that samples of b go to: nearest over all vertices. */
-void orb_zoom_images(const orb_zoom_pair *pair, const orb_zoom *map, int32_t forth[ORB_SPECTRAL_SAMPLES],
-                     int32_t back[ORB_SPECTRAL_SAMPLES]);
+/* The vertex of b that a sample of a goes to, or with `back` that of a that a sample of b goes to: nearest over all
+ * vertices. O(n). */
+int32_t orb_zoom_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t sample, int back);
 
 /* How much of shape a keeps its orientation under the map, by the turns: −1 to 1. */
 double orb_zoom_facing(const orb_zoom_pair *pair, const orb_zoom *map);
