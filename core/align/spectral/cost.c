@@ -13,14 +13,11 @@ static const double LEAST = 1e-6; /* distortion and relief are at least this: a 
 
 enum { S = ORB_SPECTRAL_SAMPLES };
 
-static const double *share_of(const orb_spectral_shape *shape, int32_t samples) {
-  return samples == S ? shape->share : shape->share_of_few;
-}
-
 /* Adds the measures in one direction, from a shape whose samples go to those of another. */
-static void add_direction(const orb_spectral_shape *from, const orb_spectral_shape *to, int32_t samples,
+static void add_direction(const orb_spectral_shape *from, const orb_spectral_shape *to, int detail,
                           const int32_t *image, orb_zoom_cost *out) {
-  const double *shares = share_of(from, samples);
+  const double *shares = from->share[detail];
+  int32_t samples = orb_spectral_samples(detail);
   double stretched = 0, mean = 0, moved = 0, heights = 0;
   for (int i = 0; i < samples; i++) {
     const float *near = from->distance + i * S, *there = to->distance + image[i] * S;
@@ -46,16 +43,16 @@ static void add_direction(const orb_spectral_shape *from, const orb_spectral_sha
 
 void orb_zoom_measure(const orb_zoom_pair *pair, const orb_zoom *map, orb_zoom_cost *out) {
   *out = (orb_zoom_cost){0};
-  add_direction(pair->shape[0], pair->shape[1], map->samples, map->forth, out);
-  add_direction(pair->shape[1], pair->shape[0], map->samples, map->back, out);
+  add_direction(pair->shape[0], pair->shape[1], map->detail, map->forth, out);
+  add_direction(pair->shape[1], pair->shape[0], map->detail, map->back, out);
   out->facing = orb_zoom_facing(pair, map);
   out->cost = log(fmax(LEAST, out->distortion)) + log(fmax(LEAST, out->relief)) - FACING * out->facing;
 }
 
 double orb_zoom_difference(const orb_zoom_pair *pair, const orb_zoom *map, const orb_zoom *other) {
   double sum = 0;
-  for (int s = 0; s < map->samples; s++) {
-    sum += share_of(pair->shape[0], map->samples)[s] * pair->shape[1]->distance[map->forth[s] * S + other->forth[s]];
+  for (int s = 0; s < orb_spectral_samples(map->detail); s++) {
+    sum += pair->shape[0]->share[map->detail][s] * pair->shape[1]->distance[map->forth[s] * S + other->forth[s]];
   }
   return sum;
 }

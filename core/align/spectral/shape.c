@@ -113,11 +113,12 @@ static void spread(const work *w, orb_distances *distances, double *buffer, int3
       out->distance[i * ORB_SPECTRAL_SAMPLES + k] = out->distance[k * ORB_SPECTRAL_SAMPLES + i] =
           (float)one[out->sample[k]];
     }
-    if (i + 1 == ORB_SPECTRAL_FEW) {
-      fill_shares(w, owner, ORB_SPECTRAL_FEW, out->share_of_few);
+    for (int detail = 0; detail < ORB_SPECTRAL_DETAILS; detail++) {
+      if (i + 1 == orb_spectral_samples(detail)) {
+        fill_shares(w, owner, i + 1, out->share[detail]);
+      }
     }
   }
-  fill_shares(w, owner, ORB_SPECTRAL_SAMPLES, out->share);
 }
 
 static void fill_samples(const work *w, orb_spectral_shape *out) {

@@ -7,7 +7,7 @@
 enum {
   ORB_SPECTRAL_FUNCTIONS = 31, /* eigenfunctions, the constant one included */
   ORB_SPECTRAL_SAMPLES = 160,
-  ORB_SPECTRAL_FEW = 80,    /* samples that represent the shape where little detail is needed: the first */
+  ORB_SPECTRAL_DETAILS = 3, /* the first 40, the first 80, or all samples represent the shape */
   ORB_SPECTRAL_TURNING = 6, /* functions whose gradients are compared */
   ORB_SPECTRAL_TURNS = ORB_SPECTRAL_TURNING * (ORB_SPECTRAL_TURNING - 1) / 2 /* pairs of them */
 };
@@ -21,13 +21,17 @@ typedef struct orb_spectral_shape {
   double *function; /* function k at vertex v: [k · vertices + v] */
   int32_t sample[ORB_SPECTRAL_SAMPLES];
   double at[ORB_SPECTRAL_FUNCTIONS][ORB_SPECTRAL_SAMPLES]; /* the functions at the samples */
-  double share[ORB_SPECTRAL_SAMPLES];                      /* of the area, nearest to each sample; the sum is 1 */
-  double share_of_few[ORB_SPECTRAL_FEW];                   /* the same among the first few */
+  /* Of the area, nearest to each sample among the first orb_spectral_samples(detail); the sum is 1. */
+  double share[ORB_SPECTRAL_DETAILS][ORB_SPECTRAL_SAMPLES];
   /* normal · (gradient of i × gradient of k) at each sample, i < k, row by row: changes sign under a mirror image */
   double turn[ORB_SPECTRAL_SAMPLES][ORB_SPECTRAL_TURNS];
   float *distance; /* along the surface, samples × samples */
   float *height;   /* of sample k over the tangent plane at sample i: [i · samples + k] */
 } orb_spectral_shape;
+
+static inline int32_t orb_spectral_samples(int detail) {
+  return ORB_SPECTRAL_SAMPLES >> (ORB_SPECTRAL_DETAILS - 1 - detail);
+}
 
 /* `out` is to be freed in any case; the mesh must outlive it. mirrored: as if the surface were its mirror image. */
 ORB_MUST_CHECK orb_status orb_spectral_shape_create(orb_context *ctx, const orb_mesh *mesh, int mirrored,

@@ -10,11 +10,21 @@
 #include "base/loops.h"
 #include "base/memory.h"
 
+enum { ORDERS = 14, SIGNS = 1 << (ORB_ZOOM_START - 1), STARTS = ORDERS * SIGNS };
+
+/* Which function of the second shape each of the first five after the constant one goes to. Other proportions change
+ * the order of eigenvalues that lie close together. */
+static const int order_of_functions[ORDERS][ORB_ZOOM_START - 1] = {
+    {1, 2, 3, 4, 5}, {2, 1, 3, 4, 5}, {1, 3, 2, 4, 5}, {1, 2, 4, 3, 5}, {1, 2, 3, 5, 4},
+    {2, 1, 4, 3, 5}, {2, 1, 3, 5, 4}, {1, 3, 2, 5, 4}, {2, 3, 1, 4, 5}, {3, 1, 2, 4, 5},
+    {1, 3, 4, 2, 5}, {1, 4, 2, 3, 5}, {1, 2, 4, 5, 3}, {1, 2, 5, 3, 4}};
+
 /* Chosen by trial on the pairs of posed people with even numbers. */
-enum {
-  STARTS = 1 << (ORB_ZOOM_START - 1),
-  REFINED = 12 /* maps that are refined fully */
-};
+enum { STAGES = 3 };
+static const struct {
+  int levels;   /* that the maps are refined to */
+  int32_t kept; /* maps, of those that differ */
+} stage[STAGES] = {{2, 64}, {4, 12}, {ORB_ZOOM_LEVELS, ORB_SPECTRAL_MAX}};
 static const double SAME = 0.05;       /* mean distance of the images, √area being 1: maps nearer than this are one */
 static const double ROUND_TRIP = 0.12; /* a pair whose image comes back farther away is not listed */
 
@@ -97,7 +107,7 @@ static void write_candidate(const search *s, int32_t at, orb_spectral_candidate 
   const orb_zoom_cost *cost = &s->cost[at];
   *out = (orb_spectral_candidate){
       .cost = cost->cost, .distortion = cost->distortion, .relief = cost->relief, .facing = cost->facing};
-  for (int32_t i = 0; i < s->map[at].samples; i++) {
+  for (int32_t i = 0; i < orb_spectral_samples(s->map[at].detail); i++) {
     add_pair(s, &s->map[at], i, 0, out);
     add_pair(s, &s->map[at], i, 1, out);
   }
@@ -107,12 +117,12 @@ static orb_status run(search *s, orb_spectral_list *out) {
   ORB_TRY(orb_zoom_pair_create(s->ctx, &s->shape[0], &s->shape[1], &s->pair));
   for (s->count = 0; s->count < STARTS; s->count++) {
     s->order[s->count] = s->count;
-    orb_zoom_start((uint32_t)s->count, &s->map[s->count]);
+    orb_zoom_start(order_of_functions[s->count / SIGNS], (uint32_t)s->count % SIGNS, &s->map[s->count]);
   }
-  ORB_TRY(refine_all(s, 0, ORB_ZOOM_ROUGH));
-  keep_best(s, REFINED);
-  ORB_TRY(refine_all(s, ORB_ZOOM_ROUGH, ORB_ZOOM_LEVELS));
-  keep_best(s, ORB_SPECTRAL_MAX);
+  for (int i = 0; i < STAGES; i++) {
+    ORB_TRY(refine_all(s, i ? stage[i - 1].levels : 0, stage[i].levels));
+    keep_best(s, stage[i].kept);
+  }
   for (int32_t i = 0; i < s->count; i++) {
     write_candidate(s, s->order[i], &out->candidate[out->count++]);
   }

@@ -18,9 +18,7 @@
 /* Chosen by trial on the pairs of posed people with even numbers. */
 static const int level_size[ORB_ZOOM_LEVELS] = {7, 9, 12, 16, 20, 25, 31};
 static const float level_turn[ORB_ZOOM_LEVELS] = {2, 2, 2, 2, 1, 1, 0}; /* weight of the turns */
-static const int level_samples[ORB_ZOOM_LEVELS] = {ORB_SPECTRAL_FEW,    ORB_SPECTRAL_FEW,     ORB_SPECTRAL_FEW,
-                                                   ORB_SPECTRAL_FEW,    ORB_SPECTRAL_SAMPLES, ORB_SPECTRAL_SAMPLES,
-                                                   ORB_SPECTRAL_SAMPLES};
+static const int level_detail[ORB_ZOOM_LEVELS] = {0, 0, 1, 1, 2, 2, 2};
 
 enum {
   S = ORB_SPECTRAL_SAMPLES,
@@ -37,8 +35,8 @@ typedef struct features {
 
 /* The matrix that takes values at samples to the coefficients of the first `size` functions: weighted least squares. */
 static orb_status fit_create(orb_context *ctx, const orb_spectral_shape *shape, int level, double **out) {
-  int size = level_size[level], samples = level_samples[level];
-  const double *share = samples == S ? shape->share : shape->share_of_few;
+  int size = level_size[level], samples = orb_spectral_samples(level_detail[level]);
+  const double *share = shape->share[level_detail[level]];
   double gram[K * K] = {0}, *fit = ORB_NEW(ctx, double, (size_t)size *S);
   if (!fit) {
     return ORB_E_NO_MEMORY;
@@ -81,12 +79,12 @@ void orb_zoom_pair_free(orb_context *ctx, orb_zoom_pair *pair) {
   }
 }
 
-void orb_zoom_start(uint32_t signs, orb_zoom *out) {
+void orb_zoom_start(const int to[ORB_ZOOM_START - 1], uint32_t signs, orb_zoom *out) {
   memset(out, 0, sizeof *out);
   out->size = ORB_ZOOM_START;
   out->matrix[0][0] = 1;
-  for (int k = 1; k < ORB_ZOOM_START; k++) {
-    out->matrix[k][k] = signs >> (k - 1) & 1 ? -1 : 1;
+  for (int k = 0; k < ORB_ZOOM_START - 1; k++) {
+    out->matrix[to[k]][k + 1] = signs >> k & 1 ? -1 : 1;
   }
 }
 
@@ -138,7 +136,7 @@ static double length_of(const double turn[ORB_SPECTRAL_TURNS]) {
 static void fill_features(const orb_zoom_pair *pair, const orb_zoom *map, float weight, features *f) {
   const orb_spectral_shape *a = pair->shape[0], *b = pair->shape[1];
   f->count = map->size + (weight > 0 ? ORB_SPECTRAL_TURNS : 0);
-  for (int s = 0; s < map->samples; s++) {
+  for (int s = 0; s < orb_spectral_samples(map->detail); s++) {
     for (int i = 0; i < map->size; i++) {
       double sum = 0;
       for (int k = 0; k < map->size; k++) {
@@ -162,7 +160,7 @@ static void fill_features(const orb_zoom_pair *pair, const orb_zoom *map, float 
 
 /* The nearest sample of the other shape for each sample of both. */
 static void match_samples(const features *f, orb_zoom *map) {
-  const int samples = map->samples;
+  const int samples = orb_spectral_samples(map->detail);
   float half[S] = {0}, nearest[S], value[S];
   for (int d = 0; d < f->count; d++) {
     for (int s = 0; s < samples; s++) {
@@ -254,7 +252,7 @@ static void make_orthogonal(double (*x)[K], int size) {
 static void fit_matrix(const orb_zoom_pair *pair, int level, orb_zoom *map) {
   const orb_spectral_shape *a = pair->shape[0], *b = pair->shape[1];
   const double *fit_a = pair->fit[0][level], *fit_b = pair->fit[1][level];
-  int size = level_size[level], samples = level_samples[level];
+  int size = level_size[level], samples = orb_spectral_samples(level_detail[level]);
   double there[S];
   memset(map->matrix, 0, sizeof map->matrix);
   map->size = size;
@@ -277,7 +275,7 @@ static void fit_matrix(const orb_zoom_pair *pair, int level, orb_zoom *map) {
 
 static void match(const orb_zoom_pair *pair, int level, orb_zoom *map) {
   features f;
-  map->samples = level_samples[level];
+  map->detail = level_detail[level];
   fill_features(pair, map, level_turn[level], &f);
   match_samples(&f, map);
 }
@@ -315,9 +313,9 @@ int32_t orb_zoom_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t s
 }
 
 double orb_zoom_facing(const orb_zoom_pair *pair, const orb_zoom *map) {
-  const double *share = map->samples == S ? pair->shape[0]->share : pair->shape[0]->share_of_few;
+  const double *share = pair->shape[0]->share[map->detail];
   double sum = 0;
-  for (int s = 0; s < map->samples; s++) {
+  for (int s = 0; s < orb_spectral_samples(map->detail); s++) {
     double brought[ORB_SPECTRAL_TURNS], same = 0;
     const double *there = pair->shape[1]->turn[map->forth[s]];
     bring_turns(map, pair->shape[0]->turn[s], brought);

@@ -4,12 +4,12 @@
 
 #include "align/spectral/shape.h"
 
-enum { ORB_ZOOM_START = 6, ORB_ZOOM_LEVELS = 7, ORB_ZOOM_ROUGH = 4 };
+enum { ORB_ZOOM_START = 6, ORB_ZOOM_LEVELS = 7 };
 
 /* A map between shapes a and b: a linear map of their functions, and where the samples go. */
 typedef struct orb_zoom {
-  int32_t size;    /* functions of each shape that it relates */
-  int32_t samples; /* of each shape that it relates, the first so many */
+  int32_t size;   /* functions of each shape that it relates */
+  int32_t detail; /* which samples it relates: the first orb_spectral_samples(detail) of each shape */
   /* Function i of b, brought to a, is the sum over k of matrix[i][k] · function k of a; orthogonal, nearly. */
   double matrix[ORB_SPECTRAL_FUNCTIONS][ORB_SPECTRAL_FUNCTIONS];
   int32_t forth[ORB_SPECTRAL_SAMPLES]; /* the sample of b that each sample of a goes to, and the other way */
@@ -27,8 +27,9 @@ ORB_MUST_CHECK orb_status orb_zoom_pair_create(orb_context *ctx, const orb_spect
                                                const orb_spectral_shape *b, orb_zoom_pair *out);
 void orb_zoom_pair_free(orb_context *ctx, orb_zoom_pair *pair);
 
-/* Starts from ± each of the first functions: bit k of signs set flips function k + 1. */
-void orb_zoom_start(uint32_t signs, orb_zoom *out);
+/* Starts from a map of the first functions after the constant one: function k + 1 of a goes to function to[k] of b,
+ * negated where bit k of signs is set. */
+void orb_zoom_start(const int to[ORB_ZOOM_START - 1], uint32_t signs, orb_zoom *out);
 
 /* Refines a map over levels [from, to). Any thread. */
 void orb_zoom_refine(const orb_zoom_pair *pair, int from, int to, orb_zoom *map);
