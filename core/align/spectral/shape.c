@@ -124,7 +124,7 @@ static void spread(const work *w, orb_distances *distances, double *buffer, int3
 static void fill_samples(const work *w, orb_spectral_shape *out) {
   for (int k = 0; k < ORB_SPECTRAL_FUNCTIONS; k++) {
     for (int s = 0; s < ORB_SPECTRAL_SAMPLES; s++) {
-      out->at[k][s] = out->function[(size_t)k * (size_t)w->vertices + (size_t)out->sample[s]];
+      out->at[k][s] = (float)out->function[(size_t)k * (size_t)w->vertices + (size_t)out->sample[s]];
     }
   }
 }
@@ -177,7 +177,7 @@ static void fill_turns(const work *w, double *gradient, int mirrored, orb_spectr
     for (int i = 0, at = 0; i < ORB_SPECTRAL_TURNING; i++) {
       for (int k = i + 1; k < ORB_SPECTRAL_TURNING; k++, at++) {
         double turn = orb_det(w->normal + v, gradient + (size_t)i * n + v, gradient + (size_t)k * n + v);
-        out->turn[s][at] = mirrored ? -turn : turn;
+        out->turn[at][s] = (float)(mirrored ? -turn : turn);
       }
     }
   }

@@ -20,11 +20,11 @@ typedef struct orb_spectral_shape {
   double value[ORB_SPECTRAL_FUNCTIONS];
   double *function; /* function k at vertex v: [k · vertices + v] */
   int32_t sample[ORB_SPECTRAL_SAMPLES];
-  double at[ORB_SPECTRAL_FUNCTIONS][ORB_SPECTRAL_SAMPLES]; /* the functions at the samples */
+  float at[ORB_SPECTRAL_FUNCTIONS][ORB_SPECTRAL_SAMPLES]; /* the functions at the samples */
   /* Of the area, nearest to each sample among the first orb_spectral_samples(detail); the sum is 1. */
   double share[ORB_SPECTRAL_DETAILS][ORB_SPECTRAL_SAMPLES];
   /* normal · (gradient of i × gradient of k) at each sample, i < k, row by row: changes sign under a mirror image */
-  double turn[ORB_SPECTRAL_SAMPLES][ORB_SPECTRAL_TURNS];
+  float turn[ORB_SPECTRAL_TURNS][ORB_SPECTRAL_SAMPLES];
   float *distance; /* along the surface, samples × samples */
   float *height;   /* of sample k over the tangent plane at sample i: [i · samples + k] */
 } orb_spectral_shape;

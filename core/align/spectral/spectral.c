@@ -3,6 +3,7 @@
  * fully, ranked again, and listed. */
 #include "align/spectral/spectral.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "align/spectral/cost.h"
@@ -24,8 +25,9 @@ enum { STAGES = 3 };
 static const struct {
   int levels;   /* that the maps are refined to */
   int32_t kept; /* maps, of those that differ */
-} stage[STAGES] = {{2, 64}, {4, 12}, {ORB_ZOOM_LEVELS, ORB_SPECTRAL_MAX}};
-static const double SAME = 0.05;       /* mean distance of the images, √area being 1: maps nearer than this are one */
+} stage[STAGES] = {{1, 80}, {4, 12}, {ORB_ZOOM_LEVELS, ORB_SPECTRAL_MAX}};
+static const double SAME = 0.05;  /* mean distance of the images, √area being 1: maps nearer than this are one */
+static const float APART = 0.03F; /* pairs are at least this far from each other, as the distances of samples say */
 static const double ROUND_TRIP = 0.12; /* a pair whose image comes back farther away is not listed */
 
 typedef struct search {
@@ -77,40 +79,63 @@ static void keep_best(search *s, int32_t most) {
   s->count = kept;
 }
 
-static int is_listed(const int32_t *list, int32_t count, int32_t vertex) {
-  for (int32_t k = 0; k < count; k++) {
-    if (list[k] == vertex) {
-      return 1;
+/* A sample of one shape and the sample nearest to its image. */
+typedef struct match {
+  int32_t sample[2];
+  int back;   /* sample[1] is the one that was taken to the other shape */
+  float away; /* from the nearest pair listed so far, on the shape where that is less */
+} match;
+
+/* The samples of both shapes where the map and the map back agree. */
+static int32_t gather(const search *s, const orb_zoom *map, match *out) {
+  int32_t count = 0;
+  for (int back = 0; back < 2; back++) {
+    const int32_t *there = back ? map->back : map->forth, *again = back ? map->forth : map->back;
+    for (int32_t i = 0; i < orb_spectral_samples(map->detail); i++) {
+      if (s->shape[back].distance[i * ORB_SPECTRAL_SAMPLES + again[there[i]]] < ROUND_TRIP) {
+        out[count++] = (match){{back ? there[i] : i, back ? i : there[i]}, back, INFINITY};
+      }
     }
   }
-  return 0;
+  return count;
 }
 
-/* Adds a sample of one shape and its image, if the map and the map back agree there. */
-static void add_pair(const search *s, const orb_zoom *map, int32_t i, int back, orb_spectral_candidate *out) {
-  const orb_spectral_shape *from = &s->shape[back];
-  const int32_t *there = back ? map->back : map->forth, *again = back ? map->forth : map->back;
-  int32_t *own = back ? out->second : out->first, *other = back ? out->first : out->second;
-  if (out->count == ORB_SPECTRAL_PAIRS || is_listed(own, out->count, from->sample[i]) ||
-      from->distance[i * ORB_SPECTRAL_SAMPLES + again[there[i]]] > ROUND_TRIP) {
-    return;
+static void add_pair(const search *s, const orb_zoom *map, const match *one, orb_spectral_candidate *out) {
+  int own = one->back;
+  int32_t *list[2] = {out->first, out->second};
+  list[own][out->count] = s->shape[own].sample[one->sample[own]];
+  list[1 - own][out->count] = orb_zoom_image(&s->pair, map, one->sample[own], own);
+  for (int32_t k = 0; k < out->count; k++) {
+    if (list[0][k] == list[0][out->count] || list[1][k] == list[1][out->count]) {
+      return;
+    }
   }
-  int32_t image = orb_zoom_image(&s->pair, map, i, back);
-  if (!is_listed(other, out->count, image)) {
-    own[out->count] = from->sample[i];
-    other[out->count++] = image;
+  out->count++;
+}
+
+/* Takes pairs that are far from those before them, on both shapes. */
+static void spread_pairs(const search *s, const orb_zoom *map, match *list, int32_t count,
+                         orb_spectral_candidate *out) {
+  int32_t next = 0;
+  while (out->count < ORB_SPECTRAL_PAIRS && count > 0 && list[next].away > APART) {
+    match one = list[next];
+    add_pair(s, map, &one, out);
+    for (int32_t i = 0; i < count; i++) {
+      for (int k = 0; k < 2; k++) {
+        float d = s->shape[k].distance[one.sample[k] * ORB_SPECTRAL_SAMPLES + list[i].sample[k]];
+        list[i].away = d < list[i].away ? d : list[i].away;
+      }
+      next = list[i].away > list[next].away ? i : next;
+    }
   }
 }
 
-/* Samples of both shapes by turns, in their order. */
 static void write_candidate(const search *s, int32_t at, orb_spectral_candidate *out) {
   const orb_zoom_cost *cost = &s->cost[at];
+  match list[2 * ORB_SPECTRAL_SAMPLES];
   *out = (orb_spectral_candidate){
       .cost = cost->cost, .distortion = cost->distortion, .relief = cost->relief, .facing = cost->facing};
-  for (int32_t i = 0; i < orb_spectral_samples(s->map[at].detail); i++) {
-    add_pair(s, &s->map[at], i, 0, out);
-    add_pair(s, &s->map[at], i, 1, out);
-  }
+  spread_pairs(s, &s->map[at], list, gather(s, &s->map[at], list), out);
 }
 
 static orb_status run(search *s, orb_spectral_list *out) {

@@ -20,17 +20,19 @@ static const int level_size[ORB_ZOOM_LEVELS] = {7, 9, 12, 16, 20, 25, 31};
 static const float level_turn[ORB_ZOOM_LEVELS] = {2, 2, 2, 2, 1, 1, 0}; /* weight of the turns */
 static const int level_detail[ORB_ZOOM_LEVELS] = {0, 0, 1, 1, 2, 2, 2};
 
+static const double ORTHOGONAL = 1e-3; /* a matrix times its transpose is nearer than this to the identity */
+
 enum {
   S = ORB_SPECTRAL_SAMPLES,
   K = ORB_SPECTRAL_FUNCTIONS,
   COORDINATES = K + ORB_SPECTRAL_TURNS,
-  POLAR = 16 /* steps to the nearest orthogonal matrix */
+  POLAR = 10 /* most steps to the nearest orthogonal matrix */
 };
 
-/* Samples of a as rows, samples of b as columns: one is nearest to another by the products of rows with columns. */
+/* Samples of a, brought to b, and samples of b: one is nearest to another by their products. */
 typedef struct features {
   int count; /* coordinates */
-  float row[S][COORDINATES], column[COORDINATES][S];
+  float brought[COORDINATES][S], there[COORDINATES][S];
 } features;
 
 /* The matrix that takes values at samples to the coefficients of the first `size` functions: weighted least squares. */
@@ -88,157 +90,201 @@ void orb_zoom_start(const int to[ORB_ZOOM_START - 1], uint32_t signs, orb_zoom *
   }
 }
 
-/* The turns of a at a sample, brought to b: those of the functions Σ matrix · function. */
-static void bring_turns(const orb_zoom *map, const double turn[ORB_SPECTRAL_TURNS], double out[ORB_SPECTRAL_TURNS]) {
+/* The turns of shape a as those of the functions of b that the map brings to it: they are 2 × 2 minors, so the second
+ * compound matrix of the map takes them there. Turns of functions beyond the map's are 0. */
+static void bring_turns(const orb_zoom_pair *pair, const orb_zoom *map, float (*out)[S]) {
   enum { N = ORB_SPECTRAL_TURNING };
-  int known = map->size - 1 < N ? map->size - 1 : N;
-  double full[N][N] = {{0}}, half[N][N] = {{0}};
-  for (int i = 0, at = 0; i < N; i++) {
-    for (int k = i + 1; k < N; k++, at++) {
-      full[i][k] = turn[at];
-      full[k][i] = -turn[at];
-    }
-  }
-  for (int i = 0; i < known; i++) {
-    for (int p = 0; p < known; p++) {
-      for (int k = 0; k < known; k++) {
-        half[i][k] += map->matrix[i + 1][p + 1] * full[p][k];
-      }
-    }
-  }
-  for (int i = 0, at = 0; i < N; i++) {
-    for (int k = i + 1; k < N; k++, at++) {
-      out[at] = 0;
-      for (int p = 0; p < known && k < known; p++) {
-        out[at] += half[i][p] * map->matrix[k + 1][p + 1];
+  const double(*m)[K] = map->matrix;
+  int known = map->size - 1 < N ? map->size - 1 : N, samples = orb_spectral_samples(map->detail), row = 0;
+  for (int i = 0; i < N; i++) {
+    for (int k = i + 1; k < N; k++, row++) {
+      memset(out[row], 0, sizeof out[row]);
+      for (int p = 0, column = 0; p < N; p++) {
+        for (int q = p + 1; q < N; q++, column++) {
+          const float *turn = pair->shape[0]->turn[column];
+          float minor = (float)(m[i + 1][p + 1] * m[k + 1][q + 1] - m[i + 1][q + 1] * m[k + 1][p + 1]);
+          for (int s = 0; s < samples && k < known && q < known && minor != 0; s++) {
+            out[row][s] += minor * turn[s];
+          }
+        }
       }
     }
   }
 }
 
-/* Turns that functions beyond the map's would need count as 0. */
-static void drop_turns(const orb_zoom *map, const double turn[ORB_SPECTRAL_TURNS], double out[ORB_SPECTRAL_TURNS]) {
-  for (int i = 0, at = 0; i < ORB_SPECTRAL_TURNING; i++) {
-    for (int k = i + 1; k < ORB_SPECTRAL_TURNING; k++, at++) {
-      out[at] = k < map->size - 1 ? turn[at] : 0;
+/* The turns of shape b; those of functions beyond the map's are 0. */
+static void copy_turns(const orb_zoom_pair *pair, const orb_zoom *map, float (*out)[S]) {
+  for (int i = 0, row = 0; i < ORB_SPECTRAL_TURNING; i++) {
+    for (int k = i + 1; k < ORB_SPECTRAL_TURNING; k++, row++) {
+      if (k < map->size - 1) {
+        memcpy(out[row], pair->shape[1]->turn[row], sizeof out[row]);
+      } else {
+        memset(out[row], 0, sizeof out[row]);
+      }
     }
   }
 }
 
-static double length_of(const double turn[ORB_SPECTRAL_TURNS]) {
-  double sum = 0;
+/* Scales the turns at each sample to this length. */
+static void scale_turns(float (*turn)[S], int samples, float length) {
+  float sum[S] = {0};
   for (int i = 0; i < ORB_SPECTRAL_TURNS; i++) {
-    sum += turn[i] * turn[i];
+    for (int s = 0; s < samples; s++) {
+      sum[s] += turn[i][s] * turn[i][s];
+    }
   }
-  return sqrt(sum);
+  for (int s = 0; s < samples; s++) {
+    sum[s] = sum[s] > 0 ? length / sqrtf(sum[s]) : 0;
+  }
+  for (int i = 0; i < ORB_SPECTRAL_TURNS; i++) {
+    for (int s = 0; s < samples; s++) {
+      turn[i][s] *= sum[s];
+    }
+  }
 }
 
 static void fill_features(const orb_zoom_pair *pair, const orb_zoom *map, float weight, features *f) {
-  const orb_spectral_shape *a = pair->shape[0], *b = pair->shape[1];
+  int samples = orb_spectral_samples(map->detail);
   f->count = map->size + (weight > 0 ? ORB_SPECTRAL_TURNS : 0);
-  for (int s = 0; s < orb_spectral_samples(map->detail); s++) {
-    for (int i = 0; i < map->size; i++) {
-      double sum = 0;
-      for (int k = 0; k < map->size; k++) {
-        sum += map->matrix[i][k] * a->at[k][s];
-      }
-      f->row[s][i] = (float)sum;
-      f->column[i][s] = (float)b->at[i][s];
-    }
-    if (weight > 0) {
-      double one[ORB_SPECTRAL_TURNS], other[ORB_SPECTRAL_TURNS];
-      bring_turns(map, a->turn[s], one);
-      drop_turns(map, b->turn[s], other);
-      double x = length_of(one), y = length_of(other);
-      for (int i = 0; i < ORB_SPECTRAL_TURNS; i++) {
-        f->row[s][map->size + i] = x > 0 ? weight * (float)(one[i] / x) : 0;
-        f->column[map->size + i][s] = y > 0 ? weight * (float)(other[i] / y) : 0;
+  for (int i = 0; i < map->size; i++) {
+    memset(f->brought[i], 0, sizeof f->brought[i]);
+    memcpy(f->there[i], pair->shape[1]->at[i], sizeof f->there[i]);
+    for (int k = 0; k < map->size; k++) {
+      float factor = (float)map->matrix[i][k];
+      for (int s = 0; s < samples && factor != 0; s++) {
+        f->brought[i][s] += factor * pair->shape[0]->at[k][s];
       }
     }
   }
+  if (weight > 0) {
+    bring_turns(pair, map, f->brought + map->size);
+    copy_turns(pair, map, f->there + map->size);
+    scale_turns(f->brought + map->size, samples, weight);
+    scale_turns(f->there + map->size, samples, weight);
+  }
+}
+
+/* Half the squared length of each sample. */
+static void half_squares(float (*x)[S], int count, int samples, float *out) {
+  memset(out, 0, S * sizeof *out);
+  for (int d = 0; d < count; d++) {
+    for (int s = 0; s < samples; s++) {
+      out[s] += x[d][s] * x[d][s] / 2;
+    }
+  }
+}
+
+enum { ROWS = 4 }; /* samples of a that are compared with all of b in one pass */
+
+/* Half the squared distances of ROWS samples of a from all of b, less half the squares of the former. */
+static void compare(const features *f, const float *half, int row, int samples, float (*restrict out)[S]) {
+  for (int r = 0; r < ROWS; r++) {
+    memcpy(out[r], half, S * sizeof *half);
+  }
+  for (int d = 0; d < f->count; d++) {
+    const float *restrict x = f->brought[d] + row, *restrict y = f->there[d];
+    for (int s = 0; s < samples; s++) {
+      out[0][s] -= x[0] * y[s];
+      out[1][s] -= x[1] * y[s];
+      out[2][s] -= x[2] * y[s];
+      out[3][s] -= x[3] * y[s];
+    }
+  }
+}
+
+/* The first of the least values; in four lanes, so that the compiler may use vectors. */
+static int least_of(const float *value, int count) {
+  float least[4];
+  int32_t at[4] = {0, 1, 2, 3};
+  memcpy(least, value, sizeof least);
+  for (int s = 4; s < count; s += 4) {
+    for (int k = 0; k < 4; k++) {
+      int is_less = value[s + k] < least[k];
+      at[k] = is_less ? s + k : at[k];
+      least[k] = is_less ? value[s + k] : least[k];
+    }
+  }
+  int best = 0;
+  for (int k = 1; k < 4; k++) {
+    best = least[k] < least[best] || (least[k] == least[best] && at[k] < at[best]) ? k : best;
+  }
+  return at[best];
 }
 
 /* The nearest sample of the other shape for each sample of both. */
-static void match_samples(const features *f, orb_zoom *map) {
-  const int samples = orb_spectral_samples(map->detail);
-  float half[S] = {0}, nearest[S], value[S];
-  for (int d = 0; d < f->count; d++) {
-    for (int s = 0; s < samples; s++) {
-      half[s] += f->column[d][s] * f->column[d][s] / 2;
-    }
+static void match_samples(features *f, int samples, orb_zoom *map) {
+  float half[S], own[S], nearest[S], value[ROWS][S];
+  half_squares(f->there, f->count, samples, half);
+  half_squares(f->brought, f->count, samples, own);
+  for (int s = 0; s < samples; s++) {
+    nearest[s] = INFINITY;
+    map->back[s] = 0;
   }
-  for (int r = 0; r < samples; r++) {
-    float own = 0;
-    memcpy(value, half, sizeof value);
-    for (int d = 0; d < f->count; d++) {
-      float x = f->row[r][d];
-      own += x * x / 2;
+  for (int row = 0; row < samples; row += ROWS) {
+    compare(f, half, row, samples, value);
+    for (int r = 0; r < ROWS; r++) {
+      const float *restrict x = value[r];
+      int32_t *restrict back = map->back;
+      float mine = own[row + r];
+      map->forth[row + r] = least_of(x, samples);
       for (int s = 0; s < samples; s++) {
-        value[s] -= x * f->column[d][s];
+        int is_nearer = x[s] + mine < nearest[s];
+        back[s] = is_nearer ? row + r : back[s];
+        nearest[s] = is_nearer ? x[s] + mine : nearest[s];
       }
     }
-    int best = 0;
-    for (int s = 0; s < samples; s++) {
-      best = value[s] < value[best] ? s : best;
-      if (r == 0 || value[s] + own < nearest[s]) {
-        nearest[s] = value[s] + own;
-        map->back[s] = r;
-      }
-    }
-    map->forth[r] = best;
   }
 }
 
-/* A sum in four parts, so that the compiler may use vectors; `count` is a multiple of four. */
+/* A sum in four parts, so that the compiler may use vectors. */
 static double product(const double *x, const double *y, int count) {
   double sum[4] = {0};
-  for (int i = 0; i < count; i += 4) {
+  int i = 0;
+  for (; i + 4 <= count; i += 4) {
     for (int k = 0; k < 4; k++) {
       sum[k] += x[i + k] * y[i + k];
     }
   }
+  for (; i < count; i++) {
+    sum[0] += x[i] * y[i];
+  }
   return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
+/* X Xᵀ. Returns how far it is from the identity at most. *bound: at least the square of the greatest singular value. */
+static double multiply_transpose(double (*x)[K], int size, double (*out)[K], double *bound) {
+  double off = 0;
+  *bound = 0;
+  for (int i = 0; i < size; i++) {
+    for (int k = 0; k <= i; k++) {
+      out[i][k] = out[k][i] = product(x[i], x[k], size);
+      off = fmax(off, fabs(out[i][k] - (i == k)));
+    }
+  }
+  for (int i = 0; i < size; i++) {
+    double row = 0;
+    for (int k = 0; k < size; k++) {
+      row += fabs(out[i][k]);
+    }
+    *bound = fmax(*bound, row);
+  }
+  return off;
+}
+
 /* The nearest orthogonal matrix of one whose singular values are near 1: X ← 1.5 X − 0.5 X Xᵀ X (Newton and Schulz),
- * after a scaling that makes the iteration converge. Singular values near 0 stay small. */
+ * which converges from singular values below √3; greater ones are scaled down. Those near 0 stay small. */
 static void make_orthogonal(double (*x)[K], int size) {
-  double most_row = 0, most_column = 0, square[K][K], next[K][K];
-  for (int i = 0; i < size; i++) {
-    double row = 0, column = 0;
-    for (int k = 0; k < size; k++) {
-      row += fabs(x[i][k]);
-      column += fabs(x[k][i]);
-    }
-    most_row = fmax(most_row, row);
-    most_column = fmax(most_column, column);
-  }
-  double bound = sqrt(most_row * most_column); /* at least the greatest singular value */
-  if (!(bound > 0)) {
-    return;
-  }
-  for (int i = 0; i < size; i++) {
-    for (int k = 0; k < size; k++) {
-      x[i][k] *= 1.5 / bound;
-    }
-  }
-  for (int step = 0; step < POLAR; step++) {
-    for (int i = 0; i < size; i++) {
-      for (int k = 0; k <= i; k++) {
-        double sum = 0;
-        for (int p = 0; p < size; p++) {
-          sum += x[i][p] * x[k][p];
-        }
-        square[i][k] = square[k][i] = sum;
-      }
-    }
+  double square[K][K], next[K][K], bound;
+  for (int step = 0; step < POLAR && multiply_transpose(x, size, square, &bound) > ORTHOGONAL; step++) {
+    double scale = bound > 2.5 ? sqrt(2.5 / bound) : 1;
     for (int i = 0; i < size; i++) {
       for (int k = 0; k < size; k++) {
-        next[i][k] = 1.5 * x[i][k];
+        next[i][k] = 1.5 * scale * x[i][k];
       }
       for (int p = 0; p < size; p++) {
+        double factor = 0.5 * scale * scale * scale * square[i][p];
         for (int k = 0; k < size; k++) {
-          next[i][k] -= 0.5 * square[i][p] * x[p][k];
+          next[i][k] -= factor * x[p][k];
         }
       }
     }
@@ -277,7 +323,7 @@ static void match(const orb_zoom_pair *pair, int level, orb_zoom *map) {
   features f;
   map->detail = level_detail[level];
   fill_features(pair, map, level_turn[level], &f);
-  match_samples(&f, map);
+  match_samples(&f, orb_spectral_samples(map->detail), map);
 }
 
 void orb_zoom_refine(const orb_zoom_pair *pair, int from, int to, orb_zoom *map) {
@@ -313,17 +359,18 @@ int32_t orb_zoom_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t s
 }
 
 double orb_zoom_facing(const orb_zoom_pair *pair, const orb_zoom *map) {
+  features f;
   const double *share = pair->shape[0]->share[map->detail];
+  int samples = orb_spectral_samples(map->detail);
   double sum = 0;
-  for (int s = 0; s < orb_spectral_samples(map->detail); s++) {
-    double brought[ORB_SPECTRAL_TURNS], same = 0;
-    const double *there = pair->shape[1]->turn[map->forth[s]];
-    bring_turns(map, pair->shape[0]->turn[s], brought);
-    for (int i = 0; i < ORB_SPECTRAL_TURNS; i++) {
-      same += brought[i] * there[i];
+  bring_turns(pair, map, f.brought);
+  copy_turns(pair, map, f.there);
+  scale_turns(f.brought, samples, 1);
+  scale_turns(f.there, samples, 1);
+  for (int i = 0; i < ORB_SPECTRAL_TURNS; i++) {
+    for (int s = 0; s < samples; s++) {
+      sum += share[s] * (double)(f.brought[i][s] * f.there[i][map->forth[s]]);
     }
-    double length = length_of(brought) * length_of(there);
-    sum += length > 0 ? share[s] * same / length : 0;
   }
   return sum;
 }
