@@ -8,7 +8,7 @@
 
 /* Chosen by trial on the pairs of posed people with even numbers. */
 static const float NEAR = 0.25F;  /* of √area: points whose heights are compared */
-static const double FACING = 2;   /* weight of orientation beside the logarithms of the others */
+static const double RELIEF = 2, FACING = 0.5;   /* weights beside the logarithm of the distortion */
 static const double LEAST = 1e-6; /* distortion and relief are at least this: a shape on itself */
 
 enum { S = ORB_SPECTRAL_SAMPLES };
@@ -46,7 +46,7 @@ void orb_zoom_measure(const orb_zoom_pair *pair, const orb_zoom *map, orb_zoom_c
   add_direction(pair->shape[0], pair->shape[1], map->detail, map->forth, out);
   add_direction(pair->shape[1], pair->shape[0], map->detail, map->back, out);
   out->facing = orb_zoom_facing(pair, map);
-  out->cost = log(fmax(LEAST, out->distortion)) + log(fmax(LEAST, out->relief)) - FACING * out->facing;
+  out->cost = log(fmax(LEAST, out->distortion)) + RELIEF * log(fmax(LEAST, out->relief)) - FACING * out->facing;
 }
 
 double orb_zoom_difference(const orb_zoom_pair *pair, const orb_zoom *map, const orb_zoom *other) {
