@@ -17,6 +17,11 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "numeric/vec3.h"
+#include "orbmorph/locate.h"
+
+/* Of the diagonal: where a map takes matched vertices farther from their partners in the mean, it is another one. */
+static const double WRONG = 0.1;
 
 /* The best candidates of all later shapes, and the vertices that they match. */
 typedef struct matches {
@@ -25,6 +30,7 @@ typedef struct matches {
   int32_t *vertex;   /* ORB_CANDIDATE_PAIRS a shape */
   double energy;     /* mean over the shapes, on the coarse copies */
   double clear;      /* least over the shapes, see orb_candidate */
+  int is_certain;    /* for all shapes, see orb_candidate */
 } matches;
 
 /* Gathers the vertices of the first shape that every candidate matches, and their partners. */
@@ -46,6 +52,7 @@ static void gather(matches *m, int32_t shape_count) {
 
 static orb_status find_candidates(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, matches *m) {
   m->clear = 1;
+  m->is_certain = 1;
   m->of = ORB_NEW0(ctx, orb_candidate, shape_count);
   m->vertex = ORB_NEW(ctx, int32_t, ORB_CANDIDATE_PAIRS * (size_t)shape_count);
   if (!m->of || !m->vertex) {
@@ -54,6 +61,7 @@ static orb_status find_candidates(orb_context *ctx, const orb_align_shape *shape
   for (int32_t s = 1; s < shape_count; s++) {
     ORB_TRY(orb_candidate_find(ctx, shapes[0].mesh, shapes[s].mesh, &m->of[s]));
     m->clear = fmin(m->clear, m->of[s].clear);
+    m->is_certain = m->is_certain && m->of[s].is_certain;
     m->energy += m->of[s].energy / (shape_count - 1);
   }
   gather(m, shape_count);
@@ -153,18 +161,47 @@ static orb_status align_matched_best(orb_context *ctx, const orb_align_shape *sh
   return status;
 }
 
+/* How far the matched vertices go from their partners under an alignment, in the mean, in diagonals. */
+static orb_status measure_away(orb_context *ctx, const orb_alignment *alignment, const matches *m, double *away) {
+  *away = 0;
+  for (int32_t s = 1; s < alignment->shape_count; s++) {
+    const orb_aligned_shape *shape = &alignment->shapes[s];
+    orb_locator *locator;
+    orb_extent extent;
+    orb_mesh_extent(&shape->mesh, &extent);
+    ORB_TRY(orb_locator_create(ctx, shape->points, shape->mesh.vertex_count, shape->mesh.triangles,
+                               shape->mesh.triangle_count, NULL, &locator));
+    for (int32_t k = 0; k < m->count; k++) {
+      orb_place place;
+      double image[3];
+      const int32_t partner = m->vertex[(size_t)s * ORB_CANDIDATE_PAIRS + (size_t)k];
+      orb_locate(locator, alignment->shapes[0].points + 3 * (size_t)m->vertex[k], -1, &place);
+      orb_place_position(&shape->mesh, &place, image);
+      *away += sqrt(orb_distance2(image, shape->mesh.positions + 3 * (size_t)partner)) / extent.diagonal /
+               (m->count * (alignment->shape_count - 1));
+    }
+    orb_locator_destroy(ctx, locator);
+  }
+  return ORB_OK;
+}
+
 /* Aligns by the best candidates. *held 0: they are no better than the rotation search or than the energy reached so
- * far, or their pairs cannot be met; `out` is empty. */
+ * far, or their pairs cannot be met; `out` is empty. *forced: `reached` is that of a map that is certainly wrong. */
 static orb_status try_candidates(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                                 const orb_align_options *options, double reached, double *clear, orb_alignment *out,
-                                 int *held) {
+                                 const orb_align_options *options, const orb_alignment *reached, double *clear,
+                                 orb_alignment *out, int *held, int *forced) {
   matches m = {0};
   orb_status status;
-  *held = 0;
+  double away = 0;
+  *held = *forced = 0;
   ORB_GO(status, find_candidates(ctx, shapes, shape_count, &m), end);
   *clear = m.clear;
-  if (m.count >= 3 && m.energy < reached) {
-    ORB_GO(status, align_matched_best(ctx, shapes, shape_count, &m, options, reached, out, held), end);
+  if (m.count >= 3 && m.is_certain) {
+    ORB_GO(status, measure_away(ctx, reached, &m, &away), end);
+    *forced = away > WRONG;
+  }
+  if (m.count >= 3 && (m.energy < reached->energy || *forced)) {
+    ORB_GO(status, align_matched_best(ctx, shapes, shape_count, &m, options, reached->energy, out, held), end);
   }
 end:
   orb_free(ctx, m.of);
@@ -177,8 +214,13 @@ end:
 static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                           const orb_align_options *options, orb_alignment *alignment, double *clear) {
   orb_alignment other;
-  int held;
-  ORB_TRY(try_candidates(ctx, shapes, shape_count, options, alignment->energy, clear, &other, &held));
+  int held, forced;
+  ORB_TRY(try_candidates(ctx, shapes, shape_count, options, alignment, clear, &other, &held, &forced));
+  if (held && forced) {
+    orb_alignment_free(ctx, alignment);
+    *alignment = other;
+    return ORB_OK;
+  }
   int taken = held && keep_better(ctx, alignment, &other);
   if (!taken && options->preset != ORB_PRESET_QUALITY &&
       alignment->energy > orb_map_params_of(options->preset).energy.good) {

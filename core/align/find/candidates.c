@@ -25,6 +25,7 @@
 #include "align/rotate/correlate.h"
 #include "align/rotate/procrustes.h"
 #include "align/rotate/rotate.h"
+#include "align/spectral/spectral.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "embed/newton/advance.h"
@@ -39,6 +40,7 @@ enum {
   WALK = 300,    /* least vertices of the level on which tips walk */
   ROTATIONS = 3, /* rotations of the spheres that are tried: the best of the rotation search */
   TIP_MAPS = 8,  /* tip maps by distances that are tried, beside those by rotations in space */
+  SPECTRAL = 4,  /* maps from eigenfunctions that are tried */
   COMPOSED = 3,  /* candidates that are composed in full */
   SAMPLES = 48   /* points of the first shape whose images tell candidates apart */
 };
@@ -52,6 +54,12 @@ static const double DIFFERENT = 0.15;
 /* Ratio of costs, of a candidate to the rotation search after its rough sweeps. Only a candidate
  * that is clearly better is worth composing on the given meshes. */
 static const double BETTER = 0.95;
+/* Sum of two distances in diagonals, each on its shape: a tip of each shape are a pair of a spectral map if both are
+ * near the same pair of it. */
+static const double BESIDE = 0.15;
+/* Mean distance of the images of the samples from where a spectral map takes them, in diagonals: a candidate that is
+ * nearer is the same correspondence. */
+static const double AGREES = 0.1;
 
 /* A decimated copy: compact, with its own embedding. */
 typedef struct coarse {
@@ -110,6 +118,7 @@ end:
 typedef struct candidate {
   int32_t count; /* tips; 0: a rotation */
   int is_given;  /* the rotation that the spheres get without this search */
+  int is_near;   /* its pairs are only near each other, as those of a spectral map; tips are exact */
   int is_stuck;  /* composing it in full did not improve it */
   double rotation[9];
   int32_t first[ORB_TIPS_MAX], second[ORB_TIPS_MAX];
@@ -121,8 +130,9 @@ typedef struct search {
   orb_context *ctx;
   coarse shape[2];
   int32_t sample[SAMPLES];
-  candidate list[ROTATIONS + TIP_MAPS + ORB_TIP_ROTATIONS];
-  int32_t rotations, count; /* rotations come first, then the tip maps */
+  candidate list[ROTATIONS + TIP_MAPS + ORB_TIP_ROTATIONS + 2 * SPECTRAL];
+  orb_spectral_list spectral;
+  int32_t rotations, count; /* rotations come first, then tip maps, then spectral maps */
 } search;
 
 /* Makes sheets of the coarse copies and aligns them by the candidate. *held 0: its pairs cannot be met. */
@@ -185,6 +195,33 @@ static orb_status rotation_angle(const search *t, const candidate *one, double *
   return ORB_OK;
 }
 
+/* How far a candidate takes the samples from where the first spectral map does, judged by its nearest pairs. */
+static double away_from_first(const search *t, const candidate *one) {
+  const orb_spectral_candidate *map = &t->spectral.candidate[0];
+  const double *x = t->shape[0].mesh.positions, *y = t->shape[1].mesh.positions;
+  orb_extent extent[2];
+  double sum = 0;
+  for (int s = 0; s < 2; s++) {
+    orb_mesh_extent(&t->shape[s].mesh, &extent[s]);
+  }
+  for (int i = 0; i < SAMPLES; i++) {
+    int32_t nearest = 0;
+    double least = INFINITY;
+    for (int32_t k = 0; k < map->count; k++) {
+      double d = sqrt(orb_distance2(x + 3 * (size_t)t->sample[i], x + 3 * (size_t)map->first[k]));
+      nearest = d < least ? k : nearest;
+      least = fmin(d, least);
+    }
+    double away = sqrt(orb_distance2(one->image[i], y + 3 * (size_t)map->second[nearest]));
+    sum += fmax(0, away / extent[1].diagonal - least / extent[0].diagonal) / SAMPLES;
+  }
+  return sum;
+}
+
+static int is_certain(const search *t) {
+  return t->spectral.count > 0 && t->spectral.clear > ORB_SPECTRAL_CLEAR;
+}
+
 /* Composes from a candidate's map: fills its energy, the images of the samples, and its cost. */
 static orb_status run_candidate(search *t, candidate *one, orb_map_from from) {
   orb_sheet sheets[2];
@@ -202,6 +239,9 @@ static orb_status run_candidate(search *t, candidate *one, orb_map_from from) {
     ORB_GO(status, sample_images(t, sheets, one), end);
     ORB_GO(status, rotation_angle(t, one, &angle), end);
     one->cost = (one->energy - 1) * (1 + ROTATION_COST * angle);
+    if (is_certain(t) && away_from_first(t, one) > AGREES) {
+      one->energy = one->cost = INFINITY;
+    }
   }
 end:
   orb_sheet_free(t->ctx, &sheets[0]);
@@ -244,17 +284,14 @@ static void list_tip_map(search *t, const orb_tips tips[2], const orb_tip_map *m
   t->list[t->count++] = one;
 }
 
-static orb_status list_tip_maps(search *t) {
+static orb_status list_tip_maps(search *t, const orb_tips tips[2]) {
   const orb_mesh *meshes[2] = {&t->shape[0].mesh, &t->shape[1].mesh};
-  orb_tips tips[2];
   int32_t count, chosen_count, chosen[TIP_MAPS];
   orb_tip_map rotated[ORB_TIP_ROTATIONS], *maps = ORB_NEW(t->ctx, orb_tip_map, ORB_TIP_MAPS_MAX);
   orb_status status = ORB_E_NO_MEMORY;
   if (!maps) {
     return status;
   }
-  ORB_GO(status, orb_tips_find(t->ctx, meshes[0], &tips[0]), end);
-  ORB_GO(status, orb_tips_find(t->ctx, meshes[1], &tips[1]), end);
   ORB_GO(status, orb_tip_maps_by_rotation(t->ctx, meshes, tips, rotated, &count), end);
   for (int32_t i = 0; i < count; i++) {
     list_tip_map(t, tips, &rotated[i]);
@@ -267,6 +304,70 @@ static orb_status list_tip_maps(search *t) {
 end:
   orb_free(t->ctx, maps);
   return status;
+}
+
+/* How far two tips are from being a pair of a spectral map: the sum of their distances from a pair, in diagonals. */
+static double away_from_map(const search *t, const orb_spectral_candidate *map, int32_t first, int32_t second) {
+  double least = INFINITY;
+  for (int32_t i = 0; i < map->count; i++) {
+    double sum = 0;
+    for (int s = 0; s < 2; s++) {
+      const double *x = t->shape[s].mesh.positions;
+      orb_extent extent;
+      orb_mesh_extent(&t->shape[s].mesh, &extent);
+      sum += sqrt(orb_distance2(x + 3 * (size_t)(s ? second : first),
+                                x + 3 * (size_t)(s ? map->second[i] : map->first[i]))) /
+             extent.diagonal;
+    }
+    least = fmin(least, sum);
+  }
+  return least;
+}
+
+/* The tip map that is nearest to a spectral map: tips that are each other's nearest under it. */
+static void list_tips_of_map(search *t, const orb_tips tips[2], const orb_spectral_candidate *map) {
+  double away[ORB_TIPS_MAX][ORB_TIPS_MAX];
+  orb_tip_map out = {0};
+  for (int32_t i = 0; i < tips[0].count; i++) {
+    for (int32_t k = 0; k < tips[1].count; k++) {
+      away[i][k] = away_from_map(t, map, tips[0].vertex[i], tips[1].vertex[k]);
+    }
+  }
+  for (int32_t i = 0; i < ORB_TIPS_MAX; i++) {
+    out.to[i] = -1;
+    for (int32_t k = 0; i < tips[0].count && k < tips[1].count; k++) {
+      int is_pair = away[i][k] < BESIDE;
+      for (int32_t j = 0; j < tips[0].count; j++) {
+        is_pair = is_pair && away[j][k] >= away[i][k];
+      }
+      for (int32_t j = 0; j < tips[1].count; j++) {
+        is_pair = is_pair && away[i][j] >= away[i][k];
+      }
+      if (is_pair && out.to[i] < 0) {
+        out.to[i] = k;
+        out.count++;
+      }
+    }
+  }
+  if (out.count >= 3) {
+    list_tip_map(t, tips, &out);
+  }
+}
+
+/* Maps from eigenfunctions: as tip maps, and by the places that they match. */
+static orb_status list_spectral_maps(search *t, const orb_tips tips[2]) {
+  ORB_TRY(orb_spectral_find(t->ctx, &t->shape[0].mesh, &t->shape[1].mesh, 0, &t->spectral));
+  for (int32_t i = 0; i < t->spectral.count && i < SPECTRAL; i++) {
+    const orb_spectral_candidate *map = &t->spectral.candidate[i];
+    candidate one = {.count = map->count < ORB_TIPS_MAX ? map->count : ORB_TIPS_MAX, .is_near = 1};
+    list_tips_of_map(t, tips, map);
+    memcpy(one.first, map->first, (size_t)one.count * sizeof *one.first);
+    memcpy(one.second, map->second, (size_t)one.count * sizeof *one.second);
+    if (one.count >= 3) {
+      t->list[t->count++] = one;
+    }
+  }
+  return ORB_OK;
 }
 
 static double difference(const search *t, const candidate *x, const candidate *y) {
@@ -319,12 +420,13 @@ static void add_pair(orb_candidate *out, int32_t first, int32_t second) {
   out->second[out->count++] = second;
 }
 
-/* The pairs of the winner as vertices of the given meshes: its tips, or for a rotation the first samples. */
+/* The pairs of the winner as vertices of the given meshes: its tips, or the first samples and their images. */
 static orb_status write_pairs(const search *t, const candidate *winner, const orb_mesh *b, orb_candidate *out) {
-  for (int32_t k = 0; k < winner->count; k++) {
+  int exact = winner->count && !winner->is_near;
+  for (int32_t k = 0; k < winner->count && exact; k++) {
     add_pair(out, t->shape[0].vertex[winner->first[k]], t->shape[1].vertex[winner->second[k]]);
   }
-  if (winner->count) {
+  if (exact) {
     return ORB_OK;
   }
   orb_nearest *tree;
@@ -355,8 +457,15 @@ static int32_t winner_of(const search *t, double *clear) {
 }
 
 static orb_status run_all(search *t, const orb_mesh *b, orb_candidate *out) {
+  orb_tips tips[2];
   ORB_TRY(list_rotations(t));
-  ORB_TRY(list_tip_maps(t));
+  for (int s = 0; s < 2; s++) {
+    ORB_TRY(orb_tips_find(t->ctx, &t->shape[s].mesh, &tips[s]));
+  }
+  ORB_TRY(list_spectral_maps(t, tips));
+  if (!is_certain(t)) {
+    ORB_TRY(list_tip_maps(t, tips));
+  }
   for (int32_t i = 0; i < t->count; i++) {
     ORB_TRY(run_candidate(t, &t->list[i], ORB_MAP_MAP_ONLY));
   }
@@ -372,6 +481,7 @@ static orb_status run_all(search *t, const orb_mesh *b, orb_candidate *out) {
   }
   const candidate *best = &t->list[winner_of(t, &out->clear)];
   out->energy = best->energy;
+  out->is_certain = is_certain(t);
   return !best->is_given && best->cost < BETTER * given ? write_pairs(t, best, b, out) : ORB_OK;
 }
 

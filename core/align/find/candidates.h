@@ -6,8 +6,8 @@
  *   tip_maps.h       tip maps whose distances agree
  *   tip_choice.h     which of these are worth a trial
  *   tip_rotations.h  tip maps by rotations in space
- *   candidates.h     candidates are tried on coarse copies and ranked by the energy of their composed maps
- *   found.h          the landmarks that an alignment found, and their confidence
+ *   candidates.h     these and spectral maps (align/spectral) are tried on coarse copies and ranked by the energy of
+ * their composed maps found.h          the landmarks that an alignment found, and their confidence
  *
  * Thresholds are constants at the head of each .c file. auto.c decides by the energy of the first map whether to search
  * (near_isometry and others in map/engine/params.h).
@@ -24,7 +24,8 @@ typedef struct orb_candidate {
   int32_t count; /* of pairs; 0: no candidate is better than the rotation search */
   int32_t first[ORB_CANDIDATE_PAIRS], second[ORB_CANDIDATE_PAIRS]; /* vertices of the meshes that correspond */
   double energy;                                                   /* of its map, composed on the coarse copies */
-  double clear; /* 0 to 1: how far the next best candidate that differs is behind */
+  double clear;   /* 0 to 1: how far the next best candidate that differs is behind */
+  int is_certain; /* 1: it is the map that the eigenfunctions single out; energies do not count against it */
 } orb_candidate;
 
 ORB_MUST_CHECK orb_status orb_candidate_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,

@@ -1,6 +1,6 @@
-/* The starts: each of the first eigenfunctions after the constant one goes to the same one of the other shape, as it is
- * or negated, which makes 32 maps. Each is refined roughly; those that differ are ranked, and the best are refined
- * fully, ranked again, and listed. */
+/* The starts: each of the first five eigenfunctions after the constant one goes to one of the same five of the other
+ * shape, as it is or negated. 14 orders of them, each with 32 choices of signs, make 448 maps. They are refined in
+ * stages; after each stage the best that differ go on. */
 #include "align/spectral/spectral.h"
 
 #include <math.h>
@@ -151,6 +151,7 @@ static orb_status run(search *s, orb_spectral_list *out) {
   for (int32_t i = 0; i < s->count; i++) {
     write_candidate(s, s->order[i], &out->candidate[out->count++]);
   }
+  out->clear = out->count > 1 ? out->candidate[1].cost - out->candidate[0].cost : out->count;
   return ORB_OK;
 }
 
