@@ -2,13 +2,14 @@
  *
  * A shape that is nearly symmetric, or whose limbs are alike, can be matched with another shape in many ways, and the
  * best correlation of whole spheres may be a wrong one. So both shapes are decimated to about a thousand vertices, and
- * candidates are tried there: rotations that correlate well and differ, and the likeliest tip maps (tip_maps.h,
- * tip_rotations.h), each walked to its common targets as in pin. A map that only a reflection could produce folds the
- * sphere over itself on the way, and gets stuck or costs much. The energy after a walk says little, since right maps
- * and wrong ones cost alike; but some sweeps of the energy of the composed map separate them, and take no longer than
- * the walk. The best candidates that differ are composed in full, and their energy decides. Symmetric shapes have
- * several candidates of nearly the same energy: then the smaller rotation in space wins, since most shapes stand
- * upright and face one way.
+ * candidates are tried there: rotations that correlate well and differ, the likeliest tip maps (tip_maps.h,
+ * tip_rotations.h), and spectral maps (align/spectral), each walked to its common targets as in pin. If a spectral map
+ * stands out among its kind, it is right, whatever its energy: then only candidates that agree with it count. A map
+ * that only a reflection could produce folds the sphere over itself on the way, and gets stuck or costs much. The
+ * energy after a walk says little, since right maps and wrong ones cost alike; but some sweeps of the energy of the
+ * composed map separate them, and take no longer than the walk. The best candidates that differ are composed in full,
+ * and their energy decides. Symmetric shapes have several candidates of nearly the same energy: then the smaller
+ * rotation in space wins, since most shapes stand upright and face one way.
  */
 #include "align/find/candidates.h"
 
