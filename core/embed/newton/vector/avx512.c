@@ -1,7 +1,9 @@
 /* The vector loops for AVX-512; CMake compiles this file with those flags where the processor family has them. */
 #if defined(__x86_64__)
 #define ORB_LANES 8
-#include "embed/newton/vector/lanes.inc.h"
+#include "numeric/lanes.inc.h"
+
+#include "embed/newton/vector/jobs.h"
 
 #include "embed/newton/vector/batch.inc.h"
 #include "embed/newton/vector/cost.inc.h"

@@ -1,6 +1,8 @@
 /* The vector loops for any machine: two doubles at a time, by SSE2 on x86-64 and by NEON on Arm. */
 #define ORB_LANES 2
-#include "embed/newton/vector/lanes.inc.h"
+#include "numeric/lanes.inc.h"
+
+#include "embed/newton/vector/jobs.h"
 
 #include "embed/newton/vector/batch.inc.h"
 #include "embed/newton/vector/cost.inc.h"

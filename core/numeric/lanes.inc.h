@@ -1,14 +1,12 @@
-/* Short vectors: ORB_LANES doubles (vd) and as many 64-bit masks (vm), up to 8 floats (wf) and 32-bit masks (wm).
- * plain.c, avx2.c and avx512.c each include this once, after setting ORB_LANES, and are compiled for their instruction
- * set. Arithmetic is the compilers' vector extension; what that lacks (square root, choice) is an intrinsic or a
- * loop. */
+/* Short vectors: ORB_LANES doubles (vd) and as many 64-bit masks (vm), up to 8 floats (wf) and 32-bit masks (wm). A
+ * source file of vector loops includes this once, after setting ORB_LANES, and is compiled for its instruction set.
+ * Arithmetic is the compilers' vector extension; what that lacks (square root, choice) is an intrinsic or a loop. */
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 #if defined(__AVX__)
 #include <immintrin.h>
 #endif
-
-#include "embed/newton/vector/jobs.h"
 
 #define ORB_WIDE (ORB_LANES > 4 ? 8 : 2 * ORB_LANES) /* a ring has about six vertices: of 16 floats most would idle */
 enum { LANES = ORB_LANES, WIDE = ORB_WIDE };
@@ -45,6 +43,15 @@ static inline vd vd_choose(vm mask, vd yes, vd no) {
 static inline wf wf_choose(wm mask, wf yes, wf no) {
   return (wf)((mask & (wm)yes) | (~mask & (wm)no));
 }
+#if ORB_LANES == 8 && defined(__AVX512F__)
+static inline int vm_any(vm mask) {
+  return _mm512_test_epi64_mask((__m512i)mask, (__m512i)mask) != 0;
+}
+#elif ORB_LANES == 4 && defined(__AVX__)
+static inline int vm_any(vm mask) {
+  return !_mm256_testz_si256((__m256i)mask, (__m256i)mask);
+}
+#else
 static inline int vm_any(vm mask) {
   int64_t any = 0;
   for (int i = 0; i < LANES; i++) {
@@ -52,6 +59,7 @@ static inline int vm_any(vm mask) {
   }
   return any != 0;
 }
+#endif
 static inline double vd_sum(vd x) {
   double sum = 0;
   for (int i = 0; i < LANES; i++) {
@@ -143,5 +151,75 @@ static inline void vd_gather3(const double *point, const int32_t *id, vd out[3])
   for (int k = 0; k < 3; k++) {
     memcpy(&out[k], lane[k], sizeof out[k]);
   }
+}
+#endif
+
+/* Lane l gets the four doubles at row[l], and the four floats. Loads and shuffles are faster than gathers. */
+#if ORB_LANES == 8 && defined(__AVX512F__)
+static inline __m512d lanes_two_rows(const double *low, const double *high) {
+  return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(low)), _mm256_loadu_pd(high), 1);
+}
+static inline void vd_rows4(const double *const row[ORB_LANES], vd out[4]) {
+  __m512d a = lanes_two_rows(row[0], row[4]), b = lanes_two_rows(row[1], row[5]);
+  __m512d c = lanes_two_rows(row[2], row[6]), d = lanes_two_rows(row[3], row[7]);
+  __m512d xz0 = _mm512_unpacklo_pd(a, b), yw0 = _mm512_unpackhi_pd(a, b);
+  __m512d xz1 = _mm512_unpacklo_pd(c, d), yw1 = _mm512_unpackhi_pd(c, d);
+  const __m512i even = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), odd = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+  out[0] = (vd)_mm512_permutex2var_pd(xz0, even, xz1);
+  out[1] = (vd)_mm512_permutex2var_pd(yw0, even, yw1);
+  out[2] = (vd)_mm512_permutex2var_pd(xz0, odd, xz1);
+  out[3] = (vd)_mm512_permutex2var_pd(yw0, odd, yw1);
+}
+static inline void vd_float_rows4(const float *const row[ORB_LANES], vd out[4]) {
+  __m256 r[4];
+  for (int l = 0; l < 4; l++) {
+    r[l] = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(row[l])), _mm_loadu_ps(row[l + 4]), 1);
+  }
+  __m256 xy0 = _mm256_unpacklo_ps(r[0], r[1]), zw0 = _mm256_unpackhi_ps(r[0], r[1]);
+  __m256 xy1 = _mm256_unpacklo_ps(r[2], r[3]), zw1 = _mm256_unpackhi_ps(r[2], r[3]);
+  out[0] = (vd)_mm512_cvtps_pd(_mm256_shuffle_ps(xy0, xy1, _MM_SHUFFLE(1, 0, 1, 0)));
+  out[1] = (vd)_mm512_cvtps_pd(_mm256_shuffle_ps(xy0, xy1, _MM_SHUFFLE(3, 2, 3, 2)));
+  out[2] = (vd)_mm512_cvtps_pd(_mm256_shuffle_ps(zw0, zw1, _MM_SHUFFLE(1, 0, 1, 0)));
+  out[3] = (vd)_mm512_cvtps_pd(_mm256_shuffle_ps(zw0, zw1, _MM_SHUFFLE(3, 2, 3, 2)));
+}
+#elif ORB_LANES == 4 && defined(__AVX__)
+static inline void vd_rows4(const double *const row[ORB_LANES], vd out[4]) {
+  __m256d a = _mm256_loadu_pd(row[0]), b = _mm256_loadu_pd(row[1]);
+  __m256d c = _mm256_loadu_pd(row[2]), d = _mm256_loadu_pd(row[3]);
+  __m256d xz0 = _mm256_unpacklo_pd(a, b), yw0 = _mm256_unpackhi_pd(a, b);
+  __m256d xz1 = _mm256_unpacklo_pd(c, d), yw1 = _mm256_unpackhi_pd(c, d);
+  out[0] = (vd)_mm256_permute2f128_pd(xz0, xz1, 0x20);
+  out[1] = (vd)_mm256_permute2f128_pd(yw0, yw1, 0x20);
+  out[2] = (vd)_mm256_permute2f128_pd(xz0, xz1, 0x31);
+  out[3] = (vd)_mm256_permute2f128_pd(yw0, yw1, 0x31);
+}
+static inline void vd_float_rows4(const float *const row[ORB_LANES], vd out[4]) {
+  __m128 r[4];
+  for (int l = 0; l < 4; l++) {
+    r[l] = _mm_loadu_ps(row[l]);
+  }
+  _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
+  for (int k = 0; k < 4; k++) {
+    out[k] = (vd)_mm256_cvtps_pd(r[k]);
+  }
+}
+#else
+static inline void vd_rows4(const double *const row[ORB_LANES], vd out[4]) {
+  double lane[4][ORB_LANES];
+  for (int l = 0; l < LANES; l++) {
+    for (int k = 0; k < 4; k++) {
+      lane[k][l] = row[l][k];
+    }
+  }
+  memcpy(out, lane, sizeof lane);
+}
+static inline void vd_float_rows4(const float *const row[ORB_LANES], vd out[4]) {
+  double lane[4][ORB_LANES];
+  for (int l = 0; l < LANES; l++) {
+    for (int k = 0; k < 4; k++) {
+      lane[k][l] = row[l][k];
+    }
+  }
+  memcpy(out, lane, sizeof lane);
 }
 #endif
