@@ -128,6 +128,18 @@ static void fill_spokes(orb_map_level *l, const double *shape) {
     at[v] = at[v + 1];
   }
   at[l->count] = 3 * l->triangle_count;
+  for (int32_t v = 0; v < l->count; v++) {
+    for (int32_t i = at[v]; i + 1 < at[v + 1]; i++) {
+      for (int32_t j = i + 1; j < at[v + 1]; j++) {
+        if (l->spoke[j].q == l->spoke[i].r) {
+          orb_map_spoke other = l->spoke[i + 1];
+          l->spoke[i + 1] = l->spoke[j];
+          l->spoke[j] = other;
+          break;
+        }
+      }
+    }
+  }
 }
 
 /* Greedy colours, so that neighbours never move at once. Vertices that get no colour do not move. */

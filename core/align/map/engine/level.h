@@ -7,8 +7,10 @@
  *   params.h            every threshold and weight of map/
  *   surface.h           the fixed shape, on which places move
  *   level.h             the moving vertices of one resolution
- *   star.h, step.h      the energy around one vertex, its Newton step, and sweeps
+ *   star.h, step.h      the energy around one vertex, and its Newton step
  *   packed.h            the fixed shape in the order in which sweeps read it
+ *   vector/             the step for several vertices at once
+ *   sweep.h             sweeps of such steps
  *   untangle.h          clearing flips on the sphere
  *   run.h               what one call of orb_compose() holds
  *   rounds.h, near.h    rounds of sweeps and untangling; levels that are nearly a map

@@ -4,17 +4,23 @@
  * of a file, neighbours on the surface may lie anywhere in memory, as in many scanned and edited meshes; a step then
  * spends much of its time waiting for memory.
  */
+#include "align/map/engine/packed.h"
+
+#include <math.h>
 #include <string.h>
 
-#include "align/map/engine/packed.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "embed/common/corner_table.h"
+#include "numeric/vec3.h"
 
 void orb_map_packed_free(orb_context *ctx, orb_map_packed *p) {
   orb_map_surface_free(ctx, &p->b);
   orb_free(ctx, p->s);
   orb_free(ctx, p->triangles);
+  orb_free(ctx, p->vertex_row);
+  orb_free(ctx, p->triangle_row);
+  orb_free(ctx, p->rotation);
   orb_free(ctx, p->to);
   orb_free(ctx, p->from);
   memset(p, 0, sizeof *p);
@@ -60,24 +66,78 @@ static void copy_surface(const orb_map_surface *b, const orb_corner_table *s, or
   }
 }
 
+static void fill_vertex_row(const orb_map_surface *b, size_t v, double *row) {
+  memcpy(row, b->x + 3 * v, sizeof(double[3]));
+  memcpy(row + 3, b->s + 3 * v, sizeof(double[3]));
+  memcpy(row + 6, b->normal + 3 * v, sizeof(double[3]));
+}
+
+static void fill_triangle_row(const orb_map_surface *b, size_t t, double *row) {
+  const int32_t *v = b->triangles + 3 * t;
+  const double *x0 = b->x + 3 * (size_t)v[0], *e1 = b->frame + 6 * t, *e2 = e1 + 3;
+  double u[3], w[3];
+  orb_sub(b->x + 3 * (size_t)v[1], x0, u);
+  orb_sub(b->x + 3 * (size_t)v[2], x0, w);
+  double u1 = orb_dot(u, e1), u2 = orb_dot(u, e2), w1 = orb_dot(w, e1), w2 = orb_dot(w, e2), det = u1 * w2 - u2 * w1;
+  double inverse = det * det > ORB_MAP_FLAT * orb_dot(u, u) * orb_dot(w, w) ? 1 / det : NAN;
+  row[0] = w2 * inverse;
+  row[1] = -w1 * inverse;
+  row[2] = -u2 * inverse;
+  row[3] = u1 * inverse;
+  memcpy(row + 4, e1, sizeof(double[6]));
+  row[10] = b->density[t];
+}
+
+/* Unfolding over the edge keeps the angle to it, so the tangents differ by a rotation of the plane. */
+static void fill_rotation(const orb_map_surface *b, size_t t, int k, double rotation[2]) {
+  const int32_t *v = b->triangles + 3 * t;
+  const double *e = b->frame + 6 * t, *f = b->frame + 6 * ((size_t)b->twin[3 * t + (size_t)k] / 3);
+  double edge[3];
+  orb_sub(b->x + 3 * (size_t)v[(k + 1) % 3], b->x + 3 * (size_t)v[k], edge);
+  orb_normalize(edge);
+  double c = orb_dot(edge, e), s = orb_dot(edge, e + 3), twin_c = orb_dot(edge, f), twin_s = orb_dot(edge, f + 3);
+  rotation[0] = c * twin_c + s * twin_s;
+  rotation[1] = c * twin_s - s * twin_c;
+}
+
+static void fill_rows(orb_map_packed *p) {
+  for (size_t v = 0; v < (size_t)p->b.vertex_count; v++) {
+    fill_vertex_row(&p->b, v, p->vertex_row + ORB_MAP_ROW * v);
+  }
+  for (size_t t = 0; t < (size_t)p->b.triangle_count; t++) {
+    fill_triangle_row(&p->b, t, p->triangle_row + ORB_MAP_ROW * t);
+    for (int k = 0; k < 3; k++) {
+      fill_rotation(&p->b, t, k, p->rotation + 2 * (3 * t + (size_t)k));
+    }
+  }
+}
+
+/* Rows have room that nothing fills: zeroed, so that whole vectors can be read. */
+static int reserve(orb_context *ctx, orb_map_packed *p) {
+  size_t n = (size_t)p->b.vertex_count, m = (size_t)p->b.triangle_count;
+  p->b.x = ORB_NEW(ctx, double, 3 * n);
+  p->b.normal = ORB_NEW(ctx, double, 3 * n);
+  p->b.twin = ORB_NEW(ctx, int32_t, 3 * m);
+  p->b.frame = ORB_NEW(ctx, double, 6 * m);
+  p->b.density = ORB_NEW(ctx, double, m);
+  p->s = ORB_NEW(ctx, double, 3 * n);
+  p->triangles = ORB_NEW(ctx, int32_t, 3 * m);
+  p->vertex_row = ORB_NEW0(ctx, double, ORB_MAP_ROW *n);
+  p->triangle_row = ORB_NEW0(ctx, double, ORB_MAP_ROW *m);
+  p->rotation = ORB_NEW(ctx, double, 6 * m);
+  p->to = ORB_NEW(ctx, int32_t, m);
+  p->from = ORB_NEW(ctx, int32_t, m);
+  return p->b.x && p->b.normal && p->b.twin && p->b.frame && p->b.density && p->s && p->triangles && p->vertex_row &&
+         p->triangle_row && p->rotation && p->to && p->from;
+}
+
 orb_status orb_map_packed_create(orb_context *ctx, const orb_mesh *mesh, const orb_map_surface *b,
                                  orb_map_packed *out) {
-  size_t n = (size_t)b->vertex_count, m = (size_t)b->triangle_count;
   orb_map_packed p = {.b = {.vertex_count = b->vertex_count, .triangle_count = b->triangle_count}};
   orb_corner_table s = {0};
-  int32_t *first = ORB_NEW0(ctx, int32_t, n + 1);
+  int32_t *first = ORB_NEW0(ctx, int32_t, (size_t)b->vertex_count + 1);
   orb_status status = ORB_E_NO_MEMORY;
-  p.b.x = ORB_NEW(ctx, double, 3 * n);
-  p.b.normal = ORB_NEW(ctx, double, 3 * n);
-  p.b.twin = ORB_NEW(ctx, int32_t, 3 * m);
-  p.b.frame = ORB_NEW(ctx, double, 6 * m);
-  p.b.density = ORB_NEW(ctx, double, m);
-  p.s = ORB_NEW(ctx, double, 3 * n);
-  p.triangles = ORB_NEW(ctx, int32_t, 3 * m);
-  p.to = ORB_NEW(ctx, int32_t, m);
-  p.from = ORB_NEW(ctx, int32_t, m);
-  if (!first || !p.b.x || !p.b.normal || !p.b.twin || !p.b.frame || !p.b.density || !p.s || !p.triangles || !p.to ||
-      !p.from) {
+  if (!reserve(ctx, &p) || !first) {
     goto done;
   }
   ORB_GO(status, orb_corner_table_create(ctx, mesh, &s), done);
@@ -85,6 +145,7 @@ orb_status orb_map_packed_create(orb_context *ctx, const orb_mesh *mesh, const o
   copy_surface(b, &s, &p);
   p.b.s = p.s;
   p.b.triangles = p.triangles;
+  fill_rows(&p);
 done:
   orb_free(ctx, first);
   orb_corner_table_free(ctx, &s);

@@ -5,11 +5,17 @@
 
 #include "align/map/engine/level.h"
 
+enum { ORB_MAP_ROW = 12 }; /* doubles of a vertex or triangle that steps read together, with room for whole vectors */
+
 typedef struct orb_map_packed {
-  orb_map_surface b;  /* the same surface; without a locator */
-  double *s;          /* what it borrows */
-  int32_t *triangles; /* likewise */
-  int32_t *to, *from; /* triangle numbers of the surface → packed ones, and back */
+  orb_map_surface b;    /* the same surface; without a locator */
+  double *s;            /* what it borrows */
+  int32_t *triangles;   /* likewise */
+  double *vertex_row;   /* ORB_MAP_ROW a vertex: position, point on the sphere, normal */
+  double *triangle_row; /* ORB_MAP_ROW a triangle: derivatives of its second barycentric coordinate along both tangents,
+                           and of the third; the tangents; the density. Without area the derivatives are NAN */
+  double *rotation;     /* 2 a half-edge: cosine and sine from the tangents of its triangle to those of its twin's */
+  int32_t *to, *from;   /* triangle numbers of the surface → packed ones, and back */
 } orb_map_packed;
 
 /* mesh: that of the surface. O(n). */

@@ -17,6 +17,7 @@ enum {
   ORB_MAP_COLOURS = 64,         /* colours of the vertices of a level: bits of a uint64_t */
   ORB_MAP_LANES = 8,            /* triangles of a star that are computed at once: doubles of a vector of 512 bits */
   ORB_MAP_RING_MAX = 256,       /* triangles of a star; a vertex with more does not move */
+  ORB_MAP_STEP_RING_MAX = 62,   /* triangles of a star that the vector loops step; step.c steps larger ones */
   ORB_MAP_MIRROR_SAMPLES = 200, /* samples of a surface that test a mirror plane */
   ORB_MAP_MIRROR_PLANES = 3,    /* mirror planes of one shape that are kept */
   ORB_MAP_LIMBS = 12,           /* rotated parts of a surface that are examined for a twist, the largest first */
@@ -102,6 +103,7 @@ typedef struct orb_map_params {
   struct {
     double epsilon;    /* of the regularised area, relative to the smaller of the area and half the Dirichlet energy:
                           the larger, the more freely triangles turn right side out, and the less inversions cost */
+    double flat;       /* share of the area that is added to the smaller of the two, so that ε is never 0 */
     double hinge;      /* the sphere's barrier begins at this share of the determinant that the areas would give */
     double soft_below; /* of the hinge: below it the soft barrier continues as a parabola, so that it stays finite */
     double soft_value; /* value of the barrier at soft_below, r − 1 − ln r */

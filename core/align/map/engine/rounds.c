@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "align/map/engine/rounds.h"
-#include "align/map/engine/step.h"
+#include "align/map/engine/sweep.h"
 #include "align/map/engine/untangle.h"
 #include "base/check.h"
 #include "base/memory.h"
@@ -20,18 +20,13 @@ orb_map_rules orb_map_hard(const orb_map_params *params) {
 
 /* In the first sweep no vertex waits. */
 orb_status orb_map_sweeps(orb_map_run *c, orb_map_level *l, orb_map_rules rules, int count) {
-  double moved;
-  int32_t stepped = l->count;
   rules.still = c->params.sweep.still * sqrt(4 * M_PI / l->triangle_count);
   for (int32_t v = 0; v < l->count; v++) {
     l->moved[v] = INFINITY;
   }
-  orb_status status = ORB_OK;
   orb_map_packed_enter(&c->packed, l);
-  for (int i = 0; i < count && stepped > l->count / c->params.sweep.still_share && status == ORB_OK; i++) {
-    status = orb_map_level_sweep(c->ctx, l, &c->packed.b, &rules, &moved, &stepped);
-    c->work -= stepped;
-  }
+  orb_status status =
+      orb_map_level_sweeps(c->ctx, l, &c->packed, &rules, count, l->count / c->params.sweep.still_share, &c->work);
   orb_map_packed_leave(&c->packed, l);
   return status;
 }

@@ -133,7 +133,8 @@ typedef struct shares {
 } shares;
 
 /* The share of each triangle in the system, without the barrier. frame: y, e1, e2. */
-ORB_CLONES static void stretch(orb_map_lanes *restrict l, const double *frame, double epsilon, shares *restrict out) {
+ORB_CLONES static void stretch(orb_map_lanes *restrict l, const double *frame, double epsilon, double flat,
+                               shares *restrict out) {
   const double y0 = frame[0], y1 = frame[1], y2 = frame[2], a0 = frame[3], a1 = frame[4], a2 = frame[5];
   const double b0 = frame[6], b1 = frame[7], b2 = frame[8];
   for (int i = 0; i < ORB_MAP_LANES; i++) {
@@ -146,7 +147,7 @@ ORB_CLONES static void stretch(orb_map_lanes *restrict l, const double *frame, d
     double d1 = cq * (z0 * a0 + z1 * a1 + z2 * a2) + cr * (u0 * a0 + u1 * a1 + u2 * a2);
     double d2 = cq * (z0 * b0 + z1 * b1 + z2 * b2) + cr * (u0 * b0 + u1 * b1 + u2 * b2);
     double dd = cq + cr, half = 0.5 * d < area ? 0.5 * d : area;
-    double e = epsilon * (half + 1e-4 * area), root = sqrt(s * s + e * e);
+    double e = epsilon * (half + flat * area), root = sqrt(s * s + e * e);
     double positive = 0.5 * (s + root), negative = 0.5 * e * e / (root - s) + 1e-300, c = s >= 0 ? positive : negative;
     double c1 = c / root, c2 = 0.5 * e * e / (root * root * root), h = area / c;
     h *= h;
@@ -187,7 +188,7 @@ void orb_map_star_system(orb_map_star *star, const orb_map_rules *rules, const d
     orb_map_lanes *l = &star->lanes[first / ORB_MAP_LANES];
     int count = star->count - first < ORB_MAP_LANES ? (int)(star->count - first) : ORB_MAP_LANES;
     shares share;
-    stretch(l, frame, rules->epsilon, &share);
+    stretch(l, frame, rules->epsilon, star->params->star.flat, &share);
     for (int i = 0; i < count; i++) {
       n->energy += share.energy[i];
       n->g[0] += share.g[0][i];

@@ -175,7 +175,7 @@ static int rates(const double *const p[3], const double d[3], double rate[3]) {
   orb_sub(p[1], p[0], e1);
   orb_sub(p[2], p[0], e2);
   double a11 = orb_dot(e1, e1), a12 = orb_dot(e1, e2), a22 = orb_dot(e2, e2), det = a11 * a22 - a12 * a12;
-  if (!(det > 1e-14 * a11 * a22)) {
+  if (!(det > ORB_MAP_FLAT * a11 * a22)) {
     return 0;
   }
   double b1 = orb_dot(e1, d), b2 = orb_dot(e2, d);

@@ -5,6 +5,9 @@
 #include "orbmorph/alignment.h"
 #include "orbmorph/locate.h"
 
+/* Squared sine of a triangle's angle below which no path leads over it. */
+#define ORB_MAP_FLAT 1e-14
+
 /* A surface on which places move. Scaled to area 4π around its centre. */
 typedef struct orb_map_surface {
   int32_t vertex_count, triangle_count;

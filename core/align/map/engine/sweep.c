@@ -1,0 +1,201 @@
+/* Sweeps of a level by the vector loops: what steps read is laid out once for all sweeps of a round.
+ *
+ * A sweep goes from colour to colour. No two vertices of a colour are neighbours, so their steps are independent: the
+ * stirred ones, near which something has moved, are listed first and stepped then, both in parallel. The list has the
+ * same order for any number of threads, so the batches and the results are the same. */
+#include "align/map/engine/sweep.h"
+
+#include <string.h>
+
+#include "align/map/engine/step.h"
+#include "align/map/engine/vector/loops.h"
+#include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+
+enum { LIST_GRAIN = 1024, STEP_GRAIN = 32 }; /* vertices of a chunk; the latter is a multiple of all lanes */
+
+typedef struct sweep_run {
+  const orb_map_loops *loops;
+  orb_map_step_job job;
+  int32_t *large; /* where by_colour has vertices with more than ORB_MAP_STEP_RING_MAX spokes */
+  int32_t large_count;
+  int32_t first;   /* of the vertices of a colour in by_colour */
+  int32_t *listed; /* of each chunk of them: how many are stirred. These begin the chunk's part of the list */
+} sweep_run;
+
+static void run_free(orb_context *ctx, sweep_run *s) {
+  orb_free(ctx, s->job.row);
+  orb_free(ctx, s->job.at);
+  orb_free(ctx, s->job.triangle);
+  orb_free(ctx, s->job.ring);
+  orb_free(ctx, s->job.list);
+  orb_free(ctx, s->job.spoke);
+  orb_free(ctx, s->large);
+  orb_free(ctx, s->listed);
+}
+
+static void put_vertex(const orb_map_step_job *j, int32_t v) {
+  const orb_map_level *l = j->level;
+  double *row = j->row + ORB_MAP_ROW * (size_t)v;
+  memcpy(row, l->y + 3 * (size_t)v, sizeof(double[3]));
+  memcpy(row + 3, l->x + 3 * (size_t)v, sizeof(double[3]));
+  memcpy(row + 6, l->n + 3 * (size_t)v, sizeof(double[3]));
+  row[9] = l->density[v];
+  j->triangle[v] = l->place[v].triangle;
+  memcpy(j->at + 3 * (size_t)v, l->place[v].at, sizeof(double[3]));
+}
+
+static void take_vertex(const orb_map_step_job *j, int32_t v) {
+  orb_map_level *l = j->level;
+  const double *row = j->row + ORB_MAP_ROW * (size_t)v;
+  memcpy(l->y + 3 * (size_t)v, row, sizeof(double[3]));
+  memcpy(l->x + 3 * (size_t)v, row + 3, sizeof(double[3]));
+  memcpy(l->n + 3 * (size_t)v, row + 6, sizeof(double[3]));
+  l->density[v] = row[9];
+  l->place[v].triangle = j->triangle[v];
+  memcpy(l->place[v].at, j->at + 3 * (size_t)v, sizeof(double[3]));
+}
+
+static int32_t valence(const orb_map_level *l, int32_t v) {
+  return l->start[v + 1] - l->start[v];
+}
+
+/* Pinned vertices do not move, and so do not stir their neighbours. */
+static void fill(sweep_run *s) {
+  orb_map_step_job *j = &s->job;
+  orb_map_level *l = j->level;
+  for (int32_t v = 0; v < l->count; v++) {
+    put_vertex(j, v);
+    j->pulled |= l->pull[v] > 0;
+    l->moved[v] = l->pinned[v] ? 0 : l->moved[v];
+  }
+  for (size_t i = 0; i < 3 * (size_t)l->triangle_count; i++) {
+    const orb_map_spoke *from = &l->spoke[i];
+    const float shape[4] = {(float)from->cv, (float)from->cq, (float)from->cr, (float)from->area};
+    j->ring[i] = from->q;
+    memcpy(j->spoke + 4 * i, shape, sizeof shape);
+  }
+  for (int32_t i = 0; i < l->colour_start[l->colours]; i++) {
+    if (valence(l, l->by_colour[i]) > ORB_MAP_STEP_RING_MAX) {
+      s->large[s->large_count++] = i;
+    }
+  }
+}
+
+static orb_status reserve(orb_context *ctx, sweep_run *s) {
+  orb_map_step_job *j = &s->job;
+  size_t n = (size_t)j->level->count, m = 3 * (size_t)j->level->triangle_count;
+  j->row = ORB_NEW0(ctx, double, ORB_MAP_ROW *n); /* zeroed: whole vectors are read */
+  j->at = ORB_NEW(ctx, double, 3 * n);
+  j->triangle = ORB_NEW(ctx, int32_t, n);
+  j->ring = ORB_NEW(ctx, int32_t, m);
+  j->list = ORB_NEW(ctx, int32_t, n);
+  j->spoke = ORB_NEW(ctx, float, 4 * m);
+  s->large = ORB_NEW(ctx, int32_t, m / ORB_MAP_STEP_RING_MAX);
+  s->listed = ORB_NEW(ctx, int32_t, n / LIST_GRAIN + 1);
+  return j->row && j->at && j->triangle && j->ring && j->list && j->spoke && s->large && s->listed ? ORB_OK
+                                                                                                   : ORB_E_NO_MEMORY;
+}
+
+/* Has anything around v moved since v was last optimal? */
+static int is_stirred(const orb_map_step_job *j, int32_t v) {
+  const orb_map_level *l = j->level;
+  int stirred = l->moved[v] > j->rules->still;
+  for (int32_t i = l->start[v]; i < l->start[v + 1] && !stirred; i++) {
+    stirred = l->moved[j->ring[i]] > j->rules->still;
+  }
+  return stirred;
+}
+
+static void list_chunk(void *arg, int64_t begin, int64_t end, int thread) {
+  const sweep_run *s = arg;
+  orb_map_level *l = s->job.level;
+  int32_t *list = s->job.list + begin, count = 0;
+  (void)thread;
+  for (int64_t i = begin; i < end; i++) {
+    int32_t v = l->by_colour[s->first + i];
+    if (valence(l, v) > ORB_MAP_STEP_RING_MAX) {
+      continue;
+    }
+    if (is_stirred(&s->job, v)) {
+      list[count++] = v;
+    } else {
+      l->moved[v] = 0;
+    }
+  }
+  s->listed[begin / LIST_GRAIN] = count;
+}
+
+/* Lists the stirred vertices of colour c; returns how many. */
+static int32_t list_colour(orb_context *ctx, sweep_run *s, int c) {
+  const orb_map_level *l = s->job.level;
+  int32_t total = 0, count = l->colour_start[c + 1] - l->colour_start[c], *list = s->job.list;
+  s->first = l->colour_start[c];
+  orb_parallel_for(ctx, count, LIST_GRAIN, list_chunk, s);
+  for (int32_t begin = 0; begin < count; begin += LIST_GRAIN) {
+    int32_t listed = s->listed[begin / LIST_GRAIN];
+    memmove(list + total, list + begin, (size_t)listed * sizeof *list);
+    total += listed;
+  }
+  return total;
+}
+
+static void step_chunk(void *arg, int64_t begin, int64_t end, int thread) {
+  const sweep_run *s = arg;
+  (void)thread;
+  s->loops->steps(&s->job, begin, end);
+}
+
+/* The step of step.c, which works on the level itself. */
+static void step_large(const orb_map_step_job *j, int32_t v) {
+  orb_map_level *l = j->level;
+  for (int32_t i = l->start[v]; i < l->start[v + 1]; i++) {
+    take_vertex(j, j->ring[i]);
+  }
+  take_vertex(j, v);
+  l->moved[v] = orb_map_level_step(l, &j->fixed->b, j->rules, v);
+  put_vertex(j, v);
+}
+
+/* Returns the number of steps. next: of s->large, the first that is not yet swept. */
+static int32_t sweep_colour(orb_context *ctx, sweep_run *s, int c, int32_t *next) {
+  orb_map_level *l = s->job.level;
+  int32_t stepped = list_colour(ctx, s, c);
+  orb_parallel_for(ctx, stepped, STEP_GRAIN, step_chunk, s);
+  for (; *next < s->large_count && s->large[*next] < l->colour_start[c + 1]; (*next)++) {
+    int32_t v = l->by_colour[s->large[*next]];
+    if (is_stirred(&s->job, v)) {
+      step_large(&s->job, v);
+      stepped++;
+    } else {
+      l->moved[v] = 0;
+    }
+  }
+  return stepped;
+}
+
+orb_status orb_map_level_sweeps(orb_context *ctx, orb_map_level *l, const orb_map_packed *packed,
+                                const orb_map_rules *rules, int count, int32_t enough, int64_t *work) {
+  sweep_run s = {.loops = orb_map_loops_of(orb_context_cpu(ctx)), .job = {.fixed = packed, .rules = rules, .level = l}};
+  int32_t stepped = l->count;
+  orb_status status;
+  ORB_GO(status, reserve(ctx, &s), done);
+  fill(&s);
+  for (int i = 0; i < count && stepped > enough && status == ORB_OK; i++) {
+    int32_t next = 0;
+    stepped = 0;
+    for (int c = 0; c < l->colours && status == ORB_OK; c++) {
+      stepped += sweep_colour(ctx, &s, c, &next);
+      status = orb_context_check(ctx);
+    }
+    *work -= stepped;
+  }
+  for (int32_t v = 0; v < l->count; v++) {
+    take_vertex(&s.job, v);
+  }
+done:
+  run_free(ctx, &s);
+  return status;
+}

@@ -1,0 +1,11 @@
+/* The loop for AVX-512; CMake compiles this file with those flags where the processor family has them. */
+#if defined(__x86_64__)
+#define ORB_LANES 8
+#include "numeric/lanes.inc.h"
+
+#include "align/map/engine/vector/sweep.inc.h"
+
+const orb_map_loops orb_map_loops_avx512 = {"avx512", ORB_LANES, step_range};
+#else
+typedef int orb_map_no_avx512;
+#endif
