@@ -156,7 +156,7 @@ static orb_status carry(search *t, const candidate *one, orb_sheet *sheets, int 
     return orb_sheet_rotate(t->ctx, &sheets[1], one->rotation);
   }
   int stuck;
-  ORB_TRY(orb_pin_walk(t->ctx, sheets, 2, numbers, one->count, ORB_PRESET_FAST, WALK, &stuck));
+  ORB_TRY(orb_pin_walk(t->ctx, sheets, 2, numbers, one->count, ORB_PRESET_FAST, WALK, NULL, &stuck));
   *held = !stuck;
   return ORB_OK;
 }

@@ -9,7 +9,8 @@
  * Mirror landmarks join the landmarks where both shapes are symmetric (starts/mirror.c). They are held like landmarks,
  * unless a start is nearly a map with them and a better map without them.
  *
- * There are three kinds of starts:
+ * With landmarks, the quick way comes first (walked.c): a landmark walk, optimised on a coarse level. If that map is
+ * that of shapes that correspond, it is refined and nothing else is tried. Else there are three kinds of starts:
  * - From spatial targets: the moving shape after non-rigid registration in space (starts/registration.c). This is good
  *   where it folds little. Flips are allowed against a growing barrier until untangling clears them all. The usable
  *   part of a start that is nearly a map serves a later walk (engine/near.c).
@@ -30,10 +31,12 @@
 #include "align/map/engine/near.h"
 #include "align/map/engine/rounds.h"
 #include "align/map/engine/step.h"
+#include "align/map/levels.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/place.h"
 #include "align/map/swap.h"
 #include "align/map/twist/untwist.h"
+#include "align/map/walked.h"
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
@@ -98,130 +101,6 @@ static orb_status prepare(orb_map_run *c) {
   return ORB_OK;
 }
 
-/* The levels, on all of which the vertices of pairs stay. The pairs meet in c->start. */
-static orb_status prepare_levels(orb_map_run *c) {
-  memset(c->keep, 0, (size_t)c->vertex_count);
-  for (int32_t i = 0; i < c->pairs.count; i++) {
-    int32_t v = c->pairs.moving[i];
-    c->keep[v] = 1;
-    memcpy(c->start + 3 * (size_t)v, c->b.s + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
-  }
-  int32_t kept = c->params.level.kept_each * c->pairs.count;
-  int32_t keep_until = c->pairs.count ? (kept > c->params.level.kept ? kept : c->params.level.kept) : 4;
-  orb_hierarchy_destroy(c->ctx, c->hierarchy);
-  c->hierarchy = NULL;
-  ORB_TRY(orb_hierarchy_create(c->ctx, &c->moving->mesh, c->keep, keep_until, &c->hierarchy));
-  for (int32_t v = 0; v < c->vertex_count; v++) {
-    memcpy(c->position + 3 * (size_t)v, c->x + 3 * (size_t)c->hierarchy->surface.to_mesh[v], sizeof(double[3]));
-  }
-  return ORB_OK;
-}
-
-/* Writes a level back into the refiner, and its places into c->place. */
-static void store_level(orb_map_run *c, const orb_map_level *l, orb_refiner *r) {
-  for (int32_t v = 0; v < l->count; v++) {
-    memcpy(r->point + 4 * (size_t)l->vertex[v], l->x + 3 * (size_t)v, sizeof(double[3]));
-    c->place[l->vertex[v]] = l->place[v];
-  }
-}
-
-/* A level of the vertices that are alive now. Those in `known` keep their places; new ones are located. */
-static orb_status load_level(orb_map_run *c, const orb_refiner *r, const unsigned char *known, orb_map_level *l) {
-  ORB_TRY(orb_map_level_create(c->ctx, &c->params, &c->hierarchy->surface, r->alive, r->pinned, c->position, r->live,
-                               c->local, l));
-  int32_t hint = -1;
-  for (int32_t v = 0; v < l->count; v++) {
-    int32_t u = l->vertex[v];
-    memcpy(l->x + 3 * (size_t)v, r->point + 4 * (size_t)u, sizeof(double[3]));
-    if (known && known[u]) {
-      l->place[v] = c->place[u];
-      orb_map_level_refresh(l, &c->b, v);
-    } else {
-      orb_map_level_locate(l, &c->b, v, hint);
-    }
-    hint = l->place[v].triangle;
-  }
-  return ORB_OK;
-}
-
-/* The most sweeps on a level of the refinement. */
-static int sweeps_of(const orb_map_run *c, const orb_refiner *r, int first, int rough) {
-  const orb_map_params *p = &c->params;
-  int count = r->live == c->vertex_count  ? p->level.final_sweeps
-              : first                     ? p->level.first_sweeps
-              : r->live < p->level.coarse ? p->level.coarse_sweeps
-                                          : p->level.level_sweeps;
-  return rough && count > p->level.rough_sweeps ? p->level.rough_sweeps : count;
-}
-
-/* Undoes collapses up to the next level. New vertices take some steps at once; with a pull, all vertices try their
- * spatial targets. known: room for a flag of each vertex. */
-static orb_status next_level(orb_map_run *c, orb_refiner *r, orb_map_level *l, unsigned char *known, double pull) {
-  const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
-  const orb_map_rules hard = orb_map_hard(&c->params);
-  memcpy(known, r->alive, (size_t)c->vertex_count);
-  double wanted = c->params.level.growth * r->live;
-  wanted = wanted > c->vertex_count / c->params.level.last_growth ? c->vertex_count : wanted;
-  while (r->live < c->vertex_count && r->live < wanted) {
-    ORB_TRY(orb_refiner_undo_round(c->ctx, r, r->settings.blend));
-  }
-  orb_map_level_free(c->ctx, l);
-  ORB_TRY(load_level(c, r, known, l));
-  for (int32_t v = 0; v < l->count; v++) {
-    if (pull > 0) {
-      (void)orb_map_level_try(l, &c->b, &hard, v, &c->target_place[to_mesh[l->vertex[v]]]);
-    }
-    for (int i = 0; i < c->params.level.new_steps && !known[l->vertex[v]]; i++) {
-      orb_map_level_step(l, &c->b, &hard, v);
-    }
-  }
-  orb_progress(c->ctx, "align", (double)r->live / c->vertex_count);
-  return ORB_OK;
-}
-
-/* Refines a level without flips up to all vertices. rough: only so far that samples of the map are of use. */
-static orb_status refine(orb_map_run *c, orb_refiner *r, orb_map_level *l, double pull, int rough, int *failed) {
-  const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
-  unsigned char *known = ORB_NEW(c->ctx, unsigned char, c->vertex_count);
-  orb_status status = known ? ORB_OK : ORB_E_NO_MEMORY;
-  for (int first = 1; status == ORB_OK; first = 0) {
-    int last = r->live == c->vertex_count, count = sweeps_of(c, r, first, rough);
-    orb_map_set_pull(c, l, to_mesh, last ? 0 : pull);
-    pull *= c->params.level.pull_fall;
-    ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), count), done);
-    if (!rough) {
-      ORB_GO(status, orb_map_loosen(c, l, count / 2, count / 2), done);
-    }
-    *failed = orb_map_level_flips(l) > 0;
-    if (*failed) {
-      break;
-    }
-    store_level(c, l, r);
-    if (last) {
-      break;
-    }
-    ORB_GO(status, next_level(c, r, l, known, pull), done);
-  }
-done:
-  orb_free(c->ctx, known);
-  return status;
-}
-
-/* The first level of a start, of about `size` vertices, with its vertices placed. */
-static orb_status place_start(orb_map_run *c, orb_refiner *r, orb_map_start start, int32_t size, orb_map_level *l) {
-  const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
-  ORB_TRY(orb_refiner_skip(c->ctx, r, size < c->vertex_count ? size : c->vertex_count));
-  for (int32_t v = 0; v < c->vertex_count; v++) {
-    r->pinned[v] = c->keep[to_mesh[v]];
-  }
-  orb_map_level_free(c->ctx, l);
-  ORB_TRY(orb_map_level_create(c->ctx, &c->params, &c->hierarchy->surface, r->alive, r->pinned, c->position, r->live,
-                               c->local, l));
-  orb_map_place(c, l, to_mesh, start);
-  orb_map_set_pull(c, l, to_mesh, start == ORB_MAP_SPATIAL ? 1 : 0);
-  return ORB_OK;
-}
-
 /* Clears the flips of a start's first level. *flips: those left; a finer level may clear them, unless *given_up: the
  * start is dropped, which is not an error: another start, or the given alignment, remains. */
 static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_start start, orb_map_level *l,
@@ -259,7 +138,7 @@ static orb_status run_start(orb_map_run *c, orb_map_start start) {
   ORB_GO(status, orb_refiner_create(ctx, c->hierarchy, &options, &r), done);
   r->settings.crowded = INFINITY;
   while (flips) {
-    ORB_GO(status, place_start(c, r, start, size, &level), done);
+    ORB_GO(status, orb_map_level_place(c, r, start, size, &level), done);
     ORB_GO(status, clear_start(c, r, start, &level, &flips, &given_up), done);
     if (given_up) {
       goto done;
@@ -272,8 +151,10 @@ static orb_status run_start(orb_map_run *c, orb_map_start start) {
   if (start == ORB_MAP_DRAWN) {
     ORB_GO(status, orb_map_draw(c, &level, c->hierarchy->surface.to_mesh), done);
   }
-  store_level(c, &level, r);
-  ORB_GO(status, refine(c, r, &level, is_given ? 0 : c->params.level.pull, is_given && c->params.work.rough, &failed),
+  orb_map_level_store(c, &level, r);
+  ORB_GO(status,
+         orb_map_levels_refine(c, r, &level, is_given ? 0 : c->params.level.pull, is_given && c->params.work.rough,
+                               &failed),
          done);
   if (!failed) {
     double energy = orb_map_level_energy(&level);
@@ -328,7 +209,7 @@ static orb_status meet_pairs(orb_map_run *c) {
     memcpy(c->start, c->moving->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
   }
   ORB_TRY(orb_map_register(c, 0));
-  return prepare_levels(c);
+  return orb_map_levels_prepare(c);
 }
 
 /* Untwists limbs before the moving shape is registered again through samples of the best map: spatial targets that
@@ -372,14 +253,14 @@ static orb_status start_without_mirror_landmarks(orb_map_run *c) {
   memcpy(place, c->target_place, n * sizeof *place);
   c->pairs.count = c->pairs.landmarks;
   ORB_GO(status, orb_map_register(c, 0), done);
-  ORB_GO(status, prepare_levels(c), done);
+  ORB_GO(status, orb_map_levels_prepare(c), done);
   ORB_GO(status, run_start(c, ORB_MAP_SPATIAL), done);
   if (c->best_energy < before) {
     goto done; /* the mirror landmarks stay dropped */
   }
   c->pairs.count = count;
   ORB_GO(status, orb_map_register(c, 0), done);
-  ORB_GO(status, prepare_levels(c), done);
+  ORB_GO(status, orb_map_levels_prepare(c), done);
   memcpy(c->usable, usable, n);
   memcpy(c->target_place, place, n * sizeof *place);
   c->has_usable = 1;
@@ -392,13 +273,24 @@ done:
 /* Runs the starts, until they bring no improvement or the work is spent. */
 static orb_status run_starts(orb_map_run *c, orb_map_from from, orb_preset preset) {
   if (from == ORB_MAP_MAP_ONLY) {
+    ORB_TRY(orb_map_levels_prepare(c));
     return run_start(c, ORB_MAP_GIVEN);
   }
   double good = c->params.energy.good;
   if (c->pairs.landmarks == 0 && c->best_energy <= good) {
     /* Keep a good map rather than find another that is as good, which symmetric shapes have. */
+    ORB_TRY(orb_map_levels_prepare(c));
     return run_start(c, ORB_MAP_GIVEN);
   }
+  if (from == ORB_MAP_FROM_SPACE && c->both && c->pairs.count > 0 && preset != ORB_PRESET_QUALITY) {
+    int found;
+    ORB_TRY(orb_map_try_walked(c, &found));
+    if (found) {
+      return ORB_OK;
+    }
+  }
+  ORB_TRY(orb_map_register(c, from == ORB_MAP_FROM_MAP ? c->params.registration.samples : 0));
+  ORB_TRY(orb_map_levels_prepare(c));
   if (from != ORB_MAP_SPACE_DONE) {
     ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
     if (c->has_usable && c->pairs.count > c->pairs.landmarks && c->best_energy > good) {
@@ -484,10 +376,6 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
   ORB_GO(status, orb_map_pairs_create(&c), done);
-  if (from != ORB_MAP_MAP_ONLY) {
-    ORB_GO(status, orb_map_register(&c, from == ORB_MAP_FROM_MAP ? c.params.registration.samples : 0), done);
-  }
-  ORB_GO(status, prepare_levels(&c), done);
   ORB_GO(status, run_starts(&c, from, preset), done);
   if (from != ORB_MAP_MAP_ONLY) {
     ORB_GO(status, orb_map_untwist(&c, INFINITY), done);

@@ -59,7 +59,7 @@ static orb_status meet(orb_context *ctx, orb_sheet *sheets, int32_t shape_count,
   *held = 1;
   *shape = 0;
   for (int attempt = 0; attempt < WALKS && stuck; attempt++, coarse *= 2) {
-    ORB_TRY(orb_pin_walk(ctx, sheets, shape_count, landmarks, count, preset, coarse, &stuck));
+    ORB_TRY(orb_pin_walk(ctx, sheets, shape_count, landmarks, count, preset, coarse, NULL, &stuck));
   }
   if (!stuck) {
     return ORB_OK;

@@ -312,11 +312,39 @@ static orb_status finish(orb_context *ctx, walker *w, double *points, int *good)
   return ORB_OK;
 }
 
-/* Refines all walked shapes, into points[s] of its own each. *good: all results are certified. Frees the walkers. */
+void orb_walk_level_free(orb_context *ctx, orb_walk_level *level) {
+  orb_hierarchy_destroy(ctx, level->hierarchy);
+  orb_free(ctx, level->points);
+  memset(level, 0, sizeof *level);
+}
+
+/* Moves the level of a walker to *out. */
+static orb_status hand_over(walker *w, orb_walk_level *out) {
+  out->points = ORB_NEW0(w->ctx, double, 3 * (size_t)w->sheet->shape.mesh.vertex_count);
+  if (!out->points) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < w->vertex_count; i++) {
+    orb_refiner_point(w->refiner, w->vertices[i], out->points + 3 * (size_t)w->vertices[i]);
+  }
+  out->live = w->vertex_count;
+  orb_refiner_destroy(w->ctx, w->refiner);
+  w->refiner = NULL;
+  out->hierarchy = w->hierarchy;
+  w->hierarchy = NULL;
+  return ORB_OK;
+}
+
+/* Refines all walked shapes, into points[s] of its own each, except one whose level is handed over. *good: all results
+ * are certified. Frees the walkers. */
 static orb_status finish_all(orb_context *ctx, walker *walkers, const orb_sheet *sheets, int32_t shape_count,
-                             double **points, int *good) {
+                             orb_walk_level *last, double **points, int *good) {
   *good = 1;
   for (int32_t s = 0; s < shape_count && *good; s++) {
+    if (last && s == shape_count - 1) {
+      ORB_TRY(hand_over(&walkers[s], last));
+      continue;
+    }
     points[s] = ORB_NEW(ctx, double, 3 * (size_t)sheets[s].vertex_capacity);
     if (!points[s]) {
       return ORB_E_NO_MEMORY;
@@ -329,7 +357,7 @@ static orb_status finish_all(orb_context *ctx, walker *walkers, const orb_sheet 
 }
 
 orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count, const int32_t *landmarks,
-                        int32_t count, orb_preset preset, int32_t coarse, int *stuck) {
+                        int32_t count, orb_preset preset, int32_t coarse, orb_walk_level *last, int *stuck) {
   orb_status status = ORB_OK;
   walker *walkers = ORB_NEW0(ctx, walker, shape_count);
   double *targets = ORB_NEW(ctx, double, 3 * (size_t)count), **points = ORB_NEW0(ctx, double *, shape_count);
@@ -357,11 +385,11 @@ orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count
     }
   }
   int good;
-  ORB_GO(status, finish_all(ctx, walkers, sheets, shape_count, points, &good), end);
+  ORB_GO(status, finish_all(ctx, walkers, sheets, shape_count, last, points, &good), end);
   if (!good) {
     goto end;
   }
-  for (int32_t s = 0; s < shape_count; s++) {
+  for (int32_t s = 0; s < shape_count - (last != NULL); s++) {
     double *old = sheets[s].shape.points;
     sheets[s].shape.points = points[s];
     points[s] = old;

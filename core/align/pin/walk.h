@@ -3,12 +3,23 @@
 #define ORB_ALIGN_PIN_WALK_H
 
 #include "align/sheet/sheet.h"
+#include "embed/newton/hierarchy.h"
+
+/* The level on which the landmarks of a shape arrived. */
+typedef struct orb_walk_level {
+  orb_hierarchy *hierarchy; /* at its tetrahedron; its landmarks, and no other vertices, were kept */
+  int32_t live;             /* vertices of the level */
+  double *points;           /* of those, 3 a vertex of the mesh */
+} orb_walk_level;
+
+void orb_walk_level_free(orb_context *ctx, orb_walk_level *level);
 
 /* Embeds the shapes anew, together: on a coarse level the landmarks walk to their spherical means and are pinned there,
  * and the level is refined to the full meshes. *stuck 0: all arrived and every embedding is certified; 1: the sheets
- * are unchanged. preset: of the embeddings. coarse: least vertices of the level. */
+ * are unchanged. preset: of the embeddings. coarse: least vertices of the level. last: NULL, or receives the level of
+ * the last shape, which then is not refined: its sheet is unchanged too. */
 ORB_MUST_CHECK orb_status orb_pin_walk(orb_context *ctx, orb_sheet *sheets, int32_t shape_count,
                                        const int32_t *landmarks, int32_t count, orb_preset preset, int32_t coarse,
-                                       int *stuck);
+                                       orb_walk_level *last, int *stuck);
 
 #endif

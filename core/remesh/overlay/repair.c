@@ -36,8 +36,8 @@ static int32_t shortest_edge(const orb_net *net, int32_t t) {
 /* Collapses the shortest edge of each flipped triangle, if it is no longer than the root of longest2. */
 static orb_status merge_flipped(orb_context *ctx, orb_overlay *overlay, double longest2) {
   orb_net net;
-  ORB_TRY(orb_net_init(ctx, &net, overlay->points, overlay->vertex_count, overlay->triangles, overlay->triangle_count, NULL,
-                       overlay->vertex_count));
+  ORB_TRY(orb_net_init(ctx, &net, overlay->points, overlay->vertex_count, overlay->triangles, overlay->triangle_count,
+                       NULL, overlay->vertex_count));
   orb_status status = ORB_OK;
   for (int32_t t = 0; t < net.triangle_count && status == ORB_OK; t++) {
     const int32_t *c = net.triangles + 3 * (int64_t)t;

@@ -5,7 +5,7 @@
 
 static const orb_map_params DEFAULTS = {
     .energy = {.near_isometry = 1.05, .good = 1.2, .poor = 1.45, .caught = 2, .cap = 20},
-    .work = {.all = 550,
+    .work = {.all = 800,
              .given_up = 90,
              .untwisted = 250,
              .untwist = 450,
@@ -30,6 +30,7 @@ static const orb_map_params DEFAULTS = {
               .new_steps = 3,
               .pull = 0.5,
               .pull_fall = 0.5},
+    .walked = {.size = 1000, .sweeps = 15, .last_sweeps = 100, .loosen = 30, .hopeless = 1.5},
     .sweep = {.still = 1e-3, .still_share = 500, .over = 1.5},
     .step = {.tries = 8, .shrink = 0.2, .shorten = 0.4, .sufficient = 1e-4, .convexity = 0.05, .least_slope = 1e-12},
     .star = {.epsilon = 0.1, .flat = 1e-4, .hinge = 0.1, .upright = 0.3, .mollify = 1e-3},

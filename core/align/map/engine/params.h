@@ -81,6 +81,15 @@ typedef struct orb_map_params {
     double pull_fall; /* and its factor from level to level */
   } level;
 
+  /* The quick way: a landmark walk optimised on a coarse level. */
+  struct {
+    int32_t size;    /* least vertices of that level */
+    int sweeps;      /* most sweeps on the levels before it, */
+    int last_sweeps; /* and on it */
+    int loosen;      /* sweeps with flips allowed, and again without, on the first level and the last */
+    double hopeless; /* energy of a level above which the walk has twisted limbs, and no finer level helps */
+  } walked;
+
   /* Sweeps over a level. */
   struct {
     double still;        /* of a mean edge: a vertex that moved less, like its neighbours, waits. More is faster */

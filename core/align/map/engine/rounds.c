@@ -46,7 +46,8 @@ orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, int rounds, int
   double *copy = ORB_NEW(c->ctx, double, 3 * (size_t)l->count);
   orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
   int32_t at_first = *flips = orb_map_level_flips(l);
-  for (int round = 0; round < rounds && *flips && c->work > 0 && status == ORB_OK; round++) {
+  int most = rounds;
+  for (int round = 0; round < most && *flips && c->work > 0 && status == ORB_OK; round++) {
     ORB_GO(status, orb_map_sweeps(c, l, rules, params->clear.sweeps), done);
     rules.barrier *= params->clear.barrier_growth;
     *flips = orb_map_level_flips(l);
@@ -58,6 +59,7 @@ orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, int rounds, int
       memcpy(copy, l->x, 3 * (size_t)l->count * sizeof *copy);
       ORB_GO(status, orb_map_level_untangle(c->ctx, l, flips, &c->work), done);
       if (*flips) {
+        most = *flips <= params->untangle.few ? 2 * rounds : rounds; /* too near to give up */
         memcpy(l->x, copy, 3 * (size_t)l->count * sizeof *copy);
       } else {
         ORB_GO(status, orb_map_level_locate_all(c->ctx, l, &c->b, 0), done);

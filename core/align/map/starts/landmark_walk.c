@@ -12,7 +12,6 @@
 #include "align/map/engine/spread.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/mirror.h"
-#include "align/pin/walk.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
@@ -162,9 +161,9 @@ static orb_status carry_over(orb_map_run *c, const orb_sheet *fixed, const orb_s
   return ORB_OK;
 }
 
-static orb_status walk_pairs(orb_map_run *c, int32_t count, int *stuck) {
+/* Embeds both shapes anew so that the first `count` pairs meet, into sheets; last: see orb_pin_walk(). */
+static orb_status walk_sheets(orb_map_run *c, int32_t count, orb_sheet sheets[2], orb_walk_level *last, int *stuck) {
   orb_context *ctx = c->ctx;
-  orb_sheet sheets[2] = {0};
   orb_status status = ORB_OK;
   int32_t coarse = c->params.walk.level_each * count;
   coarse = coarse > c->params.walk.level ? coarse : c->params.walk.level;
@@ -177,14 +176,39 @@ static orb_status walk_pairs(orb_map_run *c, int32_t count, int *stuck) {
   }
   ORB_GO(status, borrow(ctx, c->fixed, c->pairs.fixed, count, &sheets[0]), done);
   ORB_GO(status, borrow(ctx, c->moving, c->pairs.moving, count, &sheets[1]), done);
-  ORB_GO(status, orb_pin_walk(ctx, sheets, 2, numbers, count, ORB_PRESET_FAST, coarse, stuck), done);
+  status = orb_pin_walk(ctx, sheets, 2, numbers, count, ORB_PRESET_FAST, coarse, last, stuck);
+done:
+  orb_free(ctx, numbers);
+  return status;
+}
+
+static void free_sheets(orb_map_run *c, orb_sheet sheets[2]) {
+  orb_free(c->ctx, sheets[0].shape.points);
+  orb_free(c->ctx, sheets[1].shape.points);
+}
+
+static orb_status walk_pairs(orb_map_run *c, int32_t count, int *stuck) {
+  orb_sheet sheets[2] = {0};
+  orb_status status;
+  ORB_GO(status, walk_sheets(c, count, sheets, NULL, stuck), done);
   if (!*stuck) {
     status = c->both ? take_both(c, &sheets[0], &sheets[1]) : carry_over(c, &sheets[0], &sheets[1]);
   }
 done:
-  orb_free(ctx, sheets[0].shape.points);
-  orb_free(ctx, sheets[1].shape.points);
-  orb_free(ctx, numbers);
+  free_sheets(c, sheets);
+  return status;
+}
+
+orb_status orb_map_walk_level(orb_map_run *c, orb_walk_level *level, double **fixed, int *stuck) {
+  orb_sheet sheets[2] = {0};
+  orb_status status;
+  ORB_GO(status, walk_sheets(c, c->pairs.count, sheets, level, stuck), done);
+  if (!*stuck) {
+    *fixed = sheets[0].shape.points;
+    sheets[0].shape.points = NULL;
+  }
+done:
+  free_sheets(c, sheets);
   return status;
 }
 

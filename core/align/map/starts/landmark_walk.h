@@ -3,6 +3,7 @@
 #define ORB_ALIGN_MAP_STARTS_LANDMARK_WALK_H
 
 #include "align/map/engine/run.h"
+#include "align/pin/walk.h"
 
 /* Fills run->pairs: the landmarks, then the mirror landmarks. */
 ORB_MUST_CHECK orb_status orb_map_pairs_create(orb_map_run *run);
@@ -11,5 +12,9 @@ ORB_MUST_CHECK orb_status orb_map_pairs_create(orb_map_run *run);
  * the usable part of a start. Sets run->start to the result. If run->both, also replaces the fixed shape's sphere;
  * else carries the map to it. *stuck: nothing was found, and nothing has changed. */
 ORB_MUST_CHECK orb_status orb_map_landmark_walk(orb_map_run *run, int32_t samples, int *stuck);
+
+/* The same without samples, for the level of the moving shape on which the pairs meet, and new points of the fixed
+ * shape (3 a vertex). The run does not change. The caller frees both. */
+ORB_MUST_CHECK orb_status orb_map_walk_level(orb_map_run *run, orb_walk_level *level, double **fixed, int *stuck);
 
 #endif

@@ -16,11 +16,15 @@
 #include "base/loops.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "numeric/clones.h"
 #include "numeric/dense.h"
 #include "numeric/rotation.h"
 #include "numeric/vec3.h"
 
-enum { SLICE = 8192 }; /* vertices between checks for cancellation */
+enum {
+  SLICE = 8192, /* vertices between checks for cancellation */
+  BLOCK = 256   /* vertices of the fixed shape that are measured at once */
+};
 
 typedef struct spline {
   int32_t count;
@@ -35,6 +39,8 @@ typedef struct targets_run {
   const double *x, *normal;
   int32_t vertex_count;
   const orb_map_anchors *anchors;
+  float *searched;  /* of the fixed shape's vertices: positions and weighted normals, six columns of `columns` each */
+  int32_t columns;  /* a multiple of BLOCK */
   int32_t stride;   /* through the fixed shape's vertices */
   int32_t *control; /* farthest points of the moving shape */
   int32_t control_count;
@@ -116,21 +122,54 @@ static orb_status spline_fit(targets_run *run, int32_t count, double stiffness) 
   return ORB_OK;
 }
 
-/* The vertex of the fixed shape nearest in position and normal; its score. */
-static int32_t nearest_vertex(const targets_run *run, const double y[3], const double n[3], double *score) {
+/* Squared distances in position and normal of BLOCK vertices. */
+ORB_CLONES static void measure(const float *at, int32_t columns, const float q[6], float *out) {
+  for (int i = 0; i < BLOCK; i++) {
+    float sum = 0;
+    for (int k = 0; k < 6; k++) {
+      float d = at[k * (ptrdiff_t)columns + i] - q[k];
+      sum += d * d;
+    }
+    out[i] = sum;
+  }
+}
+
+/* Lays the fixed shape out for searches; empty columns lie at infinity. */
+static orb_status lay_out(targets_run *run) {
   const orb_map_surface *b = run->b;
-  int32_t best = 0;
-  double least = INFINITY;
-  for (int32_t v = 0; v < b->vertex_count; v += run->stride) {
-    const double *p = b->x + 3 * (size_t)v, *m = b->normal + 3 * (size_t)v;
-    double d = orb_distance2(p, y) + run->params->registration.normal_weight * orb_distance2(m, n);
-    if (d < least) {
-      least = d;
-      best = v;
+  const float weight = (float)sqrt(run->params->registration.normal_weight);
+  int32_t count = (b->vertex_count + run->stride - 1) / run->stride;
+  run->columns = (count + BLOCK - 1) / BLOCK * BLOCK;
+  run->searched = ORB_NEW(run->ctx, float, 6 * (size_t)run->columns);
+  if (!run->searched) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < run->columns; i++) {
+    for (int k = 0; k < 6; k++) {
+      size_t v = 3 * (size_t)i * (size_t)run->stride + (size_t)(k % 3);
+      float x = i >= count ? INFINITY : k < 3 ? (float)b->x[v] : weight * (float)b->normal[v];
+      run->searched[(size_t)k * (size_t)run->columns + (size_t)i] = x;
     }
   }
-  *score = least;
-  return best;
+  return ORB_OK;
+}
+
+/* The vertex of the fixed shape nearest in position and normal; its score. */
+static int32_t nearest_vertex(const targets_run *run, const double y[3], const double n[3], double *score) {
+  const float weight = (float)sqrt(run->params->registration.normal_weight);
+  const float q[6] = {(float)y[0],          (float)y[1],          (float)y[2],
+                      weight * (float)n[0], weight * (float)n[1], weight * (float)n[2]};
+  float least = INFINITY, block[BLOCK];
+  int32_t best = 0;
+  for (int32_t first = 0; first < run->columns; first += BLOCK) {
+    measure(run->searched + first, run->columns, q, block);
+    for (int i = 0; i < BLOCK; i++) {
+      best = block[i] < least ? first + i : best;
+      least = block[i] < least ? block[i] : least;
+    }
+  }
+  *score = (double)least;
+  return best * run->stride;
 }
 
 static void find_targets(void *arg, int64_t begin, int64_t end, int thread) {
@@ -387,8 +426,12 @@ orb_status orb_map_register_in_space(orb_context *ctx, const orb_map_params *par
   run.s.weight = ORB_NEW(ctx, double, 3 * most + 12);
   run.matrix = ORB_NEW(ctx, double, (most + 4) * (most + 4));
   if (run.control && run.target && run.mapped && run.distance && run.s.centre && run.s.weight && run.matrix) {
+    status = lay_out(&run);
+  }
+  if (status == ORB_OK) {
     status = targets_compute(&run, out, fit);
   }
+  orb_free(ctx, run.searched);
   orb_free(ctx, run.control);
   orb_free(ctx, run.target);
   orb_free(ctx, run.mapped);

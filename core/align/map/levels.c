@@ -1,0 +1,131 @@
+#include "align/map/levels.h"
+
+#include <string.h>
+
+#include "align/map/engine/rounds.h"
+#include "align/map/engine/step.h"
+#include "align/map/starts/place.h"
+#include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
+#include "embed/newton/place.h"
+#include "numeric/vec3.h"
+
+orb_status orb_map_levels_prepare(orb_map_run *c) {
+  memset(c->keep, 0, (size_t)c->vertex_count);
+  for (int32_t i = 0; i < c->pairs.count; i++) {
+    int32_t v = c->pairs.moving[i];
+    c->keep[v] = 1;
+    memcpy(c->start + 3 * (size_t)v, c->b.s + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
+  }
+  int32_t kept = c->params.level.kept_each * c->pairs.count;
+  int32_t keep_until = c->pairs.count ? (kept > c->params.level.kept ? kept : c->params.level.kept) : 4;
+  orb_hierarchy_destroy(c->ctx, c->hierarchy);
+  c->hierarchy = NULL;
+  ORB_TRY(orb_hierarchy_create(c->ctx, &c->moving->mesh, c->keep, keep_until, &c->hierarchy));
+  for (int32_t v = 0; v < c->vertex_count; v++) {
+    memcpy(c->position + 3 * (size_t)v, c->x + 3 * (size_t)c->hierarchy->surface.to_mesh[v], sizeof(double[3]));
+  }
+  return ORB_OK;
+}
+
+void orb_map_level_store(orb_map_run *c, const orb_map_level *l, orb_refiner *r) {
+  for (int32_t v = 0; v < l->count; v++) {
+    memcpy(r->point + 4 * (size_t)l->vertex[v], l->x + 3 * (size_t)v, sizeof(double[3]));
+    c->place[l->vertex[v]] = l->place[v];
+  }
+}
+
+/* A level of the vertices that are alive now. Those in `known` keep their places; new ones are located. */
+static orb_status load_level(orb_map_run *c, const orb_refiner *r, const unsigned char *known, orb_map_level *l) {
+  ORB_TRY(orb_map_level_create(c->ctx, &c->params, &c->hierarchy->surface, r->alive, r->pinned, c->position, r->live,
+                               c->local, l));
+  int32_t hint = -1;
+  for (int32_t v = 0; v < l->count; v++) {
+    int32_t u = l->vertex[v];
+    memcpy(l->x + 3 * (size_t)v, r->point + 4 * (size_t)u, sizeof(double[3]));
+    if (known && known[u]) {
+      l->place[v] = c->place[u];
+      orb_map_level_refresh(l, &c->b, v);
+    } else {
+      orb_map_level_locate(l, &c->b, v, hint);
+    }
+    hint = l->place[v].triangle;
+  }
+  return ORB_OK;
+}
+
+/* The most sweeps on a level of the refinement. */
+static int sweeps_of(const orb_map_run *c, const orb_refiner *r, int first, int rough) {
+  const orb_map_params *p = &c->params;
+  int count = r->live == c->vertex_count  ? p->level.final_sweeps
+              : first                     ? p->level.first_sweeps
+              : r->live < p->level.coarse ? p->level.coarse_sweeps
+                                          : p->level.level_sweeps;
+  return rough && count > p->level.rough_sweeps ? p->level.rough_sweeps : count;
+}
+
+orb_status orb_map_level_next(orb_map_run *c, orb_refiner *r, orb_map_level *l, unsigned char *known, double pull) {
+  const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
+  const orb_map_rules hard = orb_map_hard(&c->params);
+  memcpy(known, r->alive, (size_t)c->vertex_count);
+  double wanted = c->params.level.growth * r->live;
+  wanted = wanted > c->vertex_count / c->params.level.last_growth ? c->vertex_count : wanted;
+  while (r->live < c->vertex_count && r->live < wanted) {
+    ORB_TRY(orb_refiner_undo_round(c->ctx, r, r->settings.blend));
+  }
+  orb_map_level_free(c->ctx, l);
+  ORB_TRY(load_level(c, r, known, l));
+  for (int32_t v = 0; v < l->count; v++) {
+    if (pull > 0) {
+      (void)orb_map_level_try(l, &c->b, &hard, v, &c->target_place[to_mesh[l->vertex[v]]]);
+    }
+    for (int i = 0; i < c->params.level.new_steps && !known[l->vertex[v]]; i++) {
+      orb_map_level_step(l, &c->b, &hard, v);
+    }
+  }
+  orb_progress(c->ctx, "align", (double)r->live / c->vertex_count);
+  return ORB_OK;
+}
+
+orb_status orb_map_levels_refine(orb_map_run *c, orb_refiner *r, orb_map_level *l, double pull, int rough,
+                                 int *failed) {
+  const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
+  unsigned char *known = ORB_NEW(c->ctx, unsigned char, c->vertex_count);
+  orb_status status = known ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int first = 1; status == ORB_OK; first = 0) {
+    int last = r->live == c->vertex_count, count = sweeps_of(c, r, first, rough);
+    orb_map_set_pull(c, l, to_mesh, last ? 0 : pull);
+    pull *= c->params.level.pull_fall;
+    ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), count), done);
+    if (!rough) {
+      ORB_GO(status, orb_map_loosen(c, l, count / 2, count / 2), done);
+    }
+    *failed = orb_map_level_flips(l) > 0;
+    if (*failed) {
+      break;
+    }
+    orb_map_level_store(c, l, r);
+    if (last) {
+      break;
+    }
+    ORB_GO(status, orb_map_level_next(c, r, l, known, pull), done);
+  }
+done:
+  orb_free(c->ctx, known);
+  return status;
+}
+
+orb_status orb_map_level_place(orb_map_run *c, orb_refiner *r, orb_map_start start, int32_t size, orb_map_level *l) {
+  const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
+  ORB_TRY(orb_refiner_skip(c->ctx, r, size < c->vertex_count ? size : c->vertex_count));
+  for (int32_t v = 0; v < c->vertex_count; v++) {
+    r->pinned[v] = c->keep[to_mesh[v]];
+  }
+  orb_map_level_free(c->ctx, l);
+  ORB_TRY(orb_map_level_create(c->ctx, &c->params, &c->hierarchy->surface, r->alive, r->pinned, c->position, r->live,
+                               c->local, l));
+  orb_map_place(c, l, to_mesh, start);
+  orb_map_set_pull(c, l, to_mesh, start == ORB_MAP_SPATIAL ? 1 : 0);
+  return ORB_OK;
+}

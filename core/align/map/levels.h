@@ -1,0 +1,29 @@
+/* Levels of the moving shape, from the first of a start up to all vertices. */
+#ifndef ORB_ALIGN_MAP_LEVELS_H
+#define ORB_ALIGN_MAP_LEVELS_H
+
+#include "align/map/engine/run.h"
+#include "embed/newton/multires.h"
+#include "embed/newton/refiner.h"
+
+/* Makes run->hierarchy, on all of whose levels the vertices of pairs stay; the pairs meet in run->start. */
+ORB_MUST_CHECK orb_status orb_map_levels_prepare(orb_map_run *run);
+
+/* The first level of a start, of at least `size` vertices (or all), with its vertices placed. */
+ORB_MUST_CHECK orb_status orb_map_level_place(orb_map_run *run, orb_refiner *refiner, orb_map_start start, int32_t size,
+                                              orb_map_level *level);
+
+/* Writes a level back into the refiner, and its places into run->place. */
+void orb_map_level_store(orb_map_run *run, const orb_map_level *level, orb_refiner *refiner);
+
+/* Undoes collapses up to the next level. New vertices take some steps at once; with a pull, all vertices try their
+ * spatial targets. known: room for a flag of each vertex. */
+ORB_MUST_CHECK orb_status orb_map_level_next(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
+                                             unsigned char *known, double pull);
+
+/* Refines a level without flips up to all vertices. rough: only so far that samples of the map are of use. *failed: a
+ * level has flips. */
+ORB_MUST_CHECK orb_status orb_map_levels_refine(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
+                                                double pull, int rough, int *failed);
+
+#endif
