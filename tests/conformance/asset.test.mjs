@@ -119,7 +119,7 @@ for (const name of ['two', 'six', 'dressed', 'colours', 'rigid', 'bare']) {
     const json = jsonOf(bytesOf(name));
     assert.equal(json.meshes.length, 1);
     assert.equal(json.nodes.length, 1);
-    assert.equal(json.asset.generator, 'orbmorph 1.0.0');
+    assert.equal(json.asset.generator, 'orbmorph 1.0.0-2');
     for (const primitive of json.meshes[0].primitives) {
       assert.equal(primitive.mode, 4);
       const kinds = primitive.targets.map((t) => Object.keys(t).sort().join());
