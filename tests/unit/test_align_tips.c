@@ -214,8 +214,21 @@ static int nearest_of(const orb_mesh *mesh, const int32_t *list, int count, int3
   return best;
 }
 
-/* The best candidate for two real shapes has at least `least` pairs and takes each tip to the matching landmark of
- * those set by hand. Skips if the shapes are missing. */
+/* Is v at the landmark: nearer than an eighth of the diagonal? */
+static int is_at(const orb_mesh *mesh, int32_t landmark, int32_t v) {
+  orb_extent extent;
+  double d = 0;
+  orb_mesh_extent(mesh, &extent);
+  for (size_t k = 0; k < 3; k++) {
+    double e = mesh->positions[3 * (size_t)landmark + k] - mesh->positions[3 * (size_t)v + k];
+    d += e * e;
+  }
+  return d < extent.diagonal * extent.diagonal / 64;
+}
+
+/* The best candidate for two real shapes takes what lies at the tips of the first, as landmarks set by hand name them,
+ * to the matching tips of the second, and has at least `least` such pairs. Pairs elsewhere, which a spectral map has,
+ * belong to no landmark. Skips if the shapes are missing. */
 static void assert_candidate(const char *first, const char *second, int marks, const int32_t *mark[2], int least,
                              double clear) {
   orb_context *ctx;
@@ -226,11 +239,15 @@ static void assert_candidate(const char *first, const char *second, int marks, c
   if (found) {
     assert_true(shared_mesh(ctx, second, &mesh[1]));
     assert_int_equal(orb_candidate_find(ctx, &mesh[0], &mesh[1], &best), ORB_OK);
+    int tips = 0;
     for (int k = 0; k < best.count; k++) {
-      assert_int_equal(nearest_of(&mesh[0], mark[0], marks, best.first[k]),
-                       nearest_of(&mesh[1], mark[1], marks, best.second[k]));
+      int at = nearest_of(&mesh[0], mark[0], marks, best.first[k]);
+      if (is_at(&mesh[0], mark[0][at], best.first[k])) {
+        assert_int_equal(nearest_of(&mesh[1], mark[1], marks, best.second[k]), at);
+        tips++;
+      }
     }
-    assert_true(best.count >= least && best.clear >= 0 && best.clear < clear);
+    assert_true(tips >= least && best.clear >= 0 && best.clear < clear);
     orb_mesh_free(ctx, &mesh[0]);
     orb_mesh_free(ctx, &mesh[1]);
   }
