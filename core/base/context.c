@@ -17,18 +17,6 @@ enum {
 };
 static const int64_t DEFAULT_MAX_TRIANGLES = 5000000; /* as its header says */
 
-double orb_clock(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-int64_t orb_clock_ms(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
-
 static int default_threads(void) {
   long online = sysconf(_SC_NPROCESSORS_ONLN);
   return online < 1 ? 1 : online > MAX_THREADS ? MAX_THREADS : (int)online;
