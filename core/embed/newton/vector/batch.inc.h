@@ -1,5 +1,5 @@
 /* What a sweep works on: a batch of ORB_BATCH vertices, as one vector of floats (bf, masks bm) or, half by half, as
- * doubles (vd). Included after lanes.inc.h. */
+ * doubles (vd). Included after numeric/lanes.inc.h. */
 
 enum { BATCH = 2 * ORB_LANES, HALVES = 2 };
 
