@@ -18,6 +18,13 @@ const server = createServer(async (req, res) => {
   const path = new URL(req.url, daemon).pathname;
   if (path.startsWith('/v1/')) {
     const { connection, ...headers } = req.headers;
+    // The daemon refuses foreign origins. This page's own is not foreign: the page and the daemon share this server.
+    if (
+      [`http://127.0.0.1:${server.address().port}`, `http://localhost:${server.address().port}`].includes(
+        headers.origin,
+      )
+    )
+      delete headers.origin;
     const onward = request(
       new URL(req.url, daemon),
       { method: req.method, headers: { ...headers, host: daemon.host } },
