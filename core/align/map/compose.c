@@ -101,6 +101,19 @@ static orb_status prepare(orb_map_run *c) {
   return ORB_OK;
 }
 
+/* A second attempt at a start that was nearly cleared: from its places, against a barrier that begins harder. Which few
+ * flips remain is close to chance, and a start that is nearly a map is worth more than all others. */
+static orb_status clear_again(orb_map_run *c, orb_map_start start, orb_map_level *l, const int32_t *to_mesh,
+                              int32_t *flips) {
+  double barrier = c->params.clear.first_barrier;
+  orb_map_place(c, l, to_mesh, start);
+  orb_map_set_pull(c, l, to_mesh, 1);
+  c->params.clear.first_barrier = barrier * c->params.clear.again;
+  orb_status status = orb_map_clear_flips(c, l, c->params.clear.rounds, flips);
+  c->params.clear.first_barrier = barrier;
+  return status;
+}
+
 /* Clears the flips of a start's first level. *flips: those left; a finer level may clear them, unless *given_up: the
  * start is dropped, which is not an error: another start, or the given alignment, remains. */
 static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_start start, orb_map_level *l,
@@ -115,6 +128,9 @@ static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_star
       return ORB_OK;
     }
     ORB_TRY(orb_map_clear_flips(c, l, c->params.clear.rounds, flips));
+    if (*flips && start == ORB_MAP_SPATIAL && orb_map_is_near(l, *flips)) {
+      ORB_TRY(clear_again(c, start, l, to_mesh, flips));
+    }
   }
   int last = r->live == c->vertex_count || r->live > c->params.level.last;
   if (*flips && last && start == ORB_MAP_SPATIAL && c->pairs.count > 0 && orb_map_is_near(l, *flips)) {

@@ -38,6 +38,7 @@ static const orb_map_params DEFAULTS = {
               .rounds = 8,
               .sweeps = 20,
               .first_barrier = 1e-4,
+              .again = 10,
               .barrier_growth = 3,
               .flip_growth = 1.05,
               .loosen_rounds = 3},

@@ -127,6 +127,7 @@ typedef struct orb_map_params {
     int rounds;            /* of a start */
     int sweeps;            /* of a round */
     double first_barrier;  /* strength in the first round. A weak one lets triangles pass each other */
+    double again;          /* factor on it in a second attempt */
     double barrier_growth; /* from round to round */
     double flip_growth;    /* more flips than after the first round, by this factor, end the rounds: the harder the
                               barrier the more flips means that large parts are folded */
