@@ -105,13 +105,10 @@ static orb_status prepare(orb_map_run *c) {
  * flips remain is close to chance, and a start that is nearly a map is worth more than all others. */
 static orb_status clear_again(orb_map_run *c, orb_map_start start, orb_map_level *l, const int32_t *to_mesh,
                               int32_t *flips) {
-  double barrier = c->params.clear.first_barrier;
   orb_map_place(c, l, to_mesh, start);
   orb_map_set_pull(c, l, to_mesh, 1);
-  c->params.clear.first_barrier = barrier * c->params.clear.again;
-  orb_status status = orb_map_clear_flips(c, l, c->params.clear.rounds, flips);
-  c->params.clear.first_barrier = barrier;
-  return status;
+  return orb_map_clear_flips(c, l, c->params.clear.first_barrier * c->params.clear.again, c->params.clear.rounds,
+                             flips);
 }
 
 /* Clears the flips of a start's first level. *flips: those left; a finer level may clear them, unless *given_up: the
@@ -127,7 +124,7 @@ static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_star
       c->work -= c->params.work.given_up * (int64_t)c->vertex_count;
       return ORB_OK;
     }
-    ORB_TRY(orb_map_clear_flips(c, l, c->params.clear.rounds, flips));
+    ORB_TRY(orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.clear.rounds, flips));
     if (*flips && start == ORB_MAP_SPATIAL && orb_map_is_near(l, *flips)) {
       ORB_TRY(clear_again(c, start, l, to_mesh, flips));
     }
@@ -144,15 +141,12 @@ static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_star
 /* Runs one start; keeps its points if they are the best so far. */
 static orb_status run_start(orb_map_run *c, orb_map_start start) {
   orb_context *ctx = c->ctx;
-  orb_embed_options options;
-  orb_embed_defaults(&options);
   orb_refiner *r = NULL;
   orb_map_level level = {0};
   int32_t flips = 1, size = start == ORB_MAP_SPATIAL ? c->params.level.spatial : c->params.level.mapped;
   int failed = 0, given_up = 0, is_given = start == ORB_MAP_GIVEN;
   orb_status status;
-  ORB_GO(status, orb_refiner_create(ctx, c->hierarchy, &options, &r), done);
-  r->settings.crowded = INFINITY;
+  ORB_GO(status, orb_map_levels_begin(c, &r), done);
   while (flips) {
     ORB_GO(status, orb_map_level_place(c, r, start, size, &level), done);
     ORB_GO(status, clear_start(c, r, start, &level, &flips, &given_up), done);

@@ -1,5 +1,6 @@
 #include "align/map/levels.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "align/map/engine/rounds.h"
@@ -11,21 +12,47 @@
 #include "embed/newton/place.h"
 #include "numeric/vec3.h"
 
-orb_status orb_map_levels_prepare(orb_map_run *c) {
+/* The vertices of pairs stay on every level, and there is no hierarchy yet. */
+static void reset(orb_map_run *c) {
+  orb_hierarchy_destroy(c->ctx, c->hierarchy);
+  c->hierarchy = NULL;
   memset(c->keep, 0, (size_t)c->vertex_count);
   for (int32_t i = 0; i < c->pairs.count; i++) {
-    int32_t v = c->pairs.moving[i];
-    c->keep[v] = 1;
-    memcpy(c->start + 3 * (size_t)v, c->b.s + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
+    c->keep[c->pairs.moving[i]] = 1;
+  }
+}
+
+static void take(orb_map_run *c, orb_hierarchy *hierarchy) {
+  c->hierarchy = hierarchy;
+  for (int32_t v = 0; v < c->vertex_count; v++) {
+    memcpy(c->position + 3 * (size_t)v, c->x + 3 * (size_t)hierarchy->surface.to_mesh[v], sizeof(double[3]));
+  }
+}
+
+orb_status orb_map_levels_prepare(orb_map_run *c) {
+  orb_hierarchy *hierarchy = NULL;
+  reset(c);
+  for (int32_t i = 0; i < c->pairs.count; i++) {
+    memcpy(c->start + 3 * (size_t)c->pairs.moving[i], c->b.s + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
   }
   int32_t kept = c->params.level.kept_each * c->pairs.count;
   int32_t keep_until = c->pairs.count ? (kept > c->params.level.kept ? kept : c->params.level.kept) : 4;
-  orb_hierarchy_destroy(c->ctx, c->hierarchy);
-  c->hierarchy = NULL;
-  ORB_TRY(orb_hierarchy_create(c->ctx, &c->moving->mesh, c->keep, keep_until, &c->hierarchy));
-  for (int32_t v = 0; v < c->vertex_count; v++) {
-    memcpy(c->position + 3 * (size_t)v, c->x + 3 * (size_t)c->hierarchy->surface.to_mesh[v], sizeof(double[3]));
-  }
+  ORB_TRY(orb_hierarchy_create(c->ctx, &c->moving->mesh, c->keep, keep_until, &hierarchy));
+  take(c, hierarchy);
+  return ORB_OK;
+}
+
+void orb_map_levels_adopt(orb_map_run *c, orb_hierarchy **hierarchy) {
+  reset(c);
+  take(c, *hierarchy);
+  *hierarchy = NULL;
+}
+
+orb_status orb_map_levels_begin(orb_map_run *c, orb_refiner **out) {
+  orb_embed_options options;
+  orb_embed_defaults(&options);
+  ORB_TRY(orb_refiner_create(c->ctx, c->hierarchy, &options, out));
+  (*out)->settings.crowded = INFINITY;
   return ORB_OK;
 }
 

@@ -9,6 +9,12 @@
 /* Makes run->hierarchy, on all of whose levels the vertices of pairs stay; the pairs meet in run->start. */
 ORB_MUST_CHECK orb_status orb_map_levels_prepare(orb_map_run *run);
 
+/* Makes a hierarchy run->hierarchy in which the vertices of pairs were kept; *hierarchy becomes NULL. */
+void orb_map_levels_adopt(orb_map_run *run, orb_hierarchy **hierarchy);
+
+/* A refiner of run->hierarchy, at its tetrahedron. */
+ORB_MUST_CHECK orb_status orb_map_levels_begin(orb_map_run *run, orb_refiner **out);
+
 /* The first level of a start, of at least `size` vertices (or all), with its vertices placed. */
 ORB_MUST_CHECK orb_status orb_map_level_place(orb_map_run *run, orb_refiner *refiner, orb_map_start start, int32_t size,
                                               orb_map_level *level);

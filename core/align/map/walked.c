@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/fixed_sphere.h"
 #include "align/map/engine/rounds.h"
-#include "align/map/fixed_sphere.h"
 #include "align/map/levels.h"
 #include "align/map/starts/landmark_walk.h"
 #include "base/check.h"
@@ -17,19 +17,9 @@ typedef struct trial {
 } trial;
 
 /* The level on which the walk ended, at the points that it ended at. */
-static orb_status begin(orb_map_run *c, const orb_walk_level *walked, trial *t) {
-  orb_embed_options options;
-  orb_embed_defaults(&options);
-  memcpy(c->start, walked->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
-  memset(c->keep, 0, (size_t)c->vertex_count);
-  for (int32_t i = 0; i < c->pairs.count; i++) {
-    c->keep[c->pairs.moving[i]] = 1;
-  }
-  for (int32_t v = 0; v < c->vertex_count; v++) {
-    memcpy(c->position + 3 * (size_t)v, c->x + 3 * (size_t)c->hierarchy->surface.to_mesh[v], sizeof(double[3]));
-  }
-  ORB_TRY(orb_refiner_create(c->ctx, c->hierarchy, &options, &t->refiner));
-  t->refiner->settings.crowded = INFINITY;
+static orb_status begin(orb_map_run *c, orb_walk_level *walked, trial *t) {
+  orb_map_levels_adopt(c, &walked->hierarchy);
+  ORB_TRY(orb_map_levels_begin(c, &t->refiner));
   return orb_map_level_place(c, t->refiner, ORB_MAP_GIVEN, walked->live, &t->level);
 }
 
@@ -59,7 +49,7 @@ done:
   return status;
 }
 
-/* Refines to all vertices; the result becomes the best map if it is better. */
+/* Refines to all vertices; the result becomes the best map if it is good. */
 static orb_status refine(orb_map_run *c, trial *t, int *good) {
   int failed = 0;
   ORB_TRY(orb_map_levels_refine(c, t->refiner, &t->level, 0, 0, &failed));
@@ -83,10 +73,8 @@ orb_status orb_map_try_walked(orb_map_run *c, int *good) {
   if (stuck) {
     goto done;
   }
-  orb_hierarchy_destroy(c->ctx, c->hierarchy);
-  c->hierarchy = walked.hierarchy;
-  walked.hierarchy = NULL;
-  ORB_GO(status, orb_map_take_sphere(c, fixed), done);
+  memcpy(c->start, walked.points, 3 * (size_t)c->vertex_count * sizeof *c->start);
+  ORB_GO(status, orb_map_take_sphere(c, &fixed), done);
   ORB_GO(status, begin(c, &walked, &t), done);
   if (orb_map_level_flips(&t.level) == 0) {
     ORB_GO(status, optimise(c, &t, &energy), done);

@@ -13,6 +13,7 @@
  *   sweep.h             sweeps of such steps
  *   untangle.h          clearing flips on the sphere
  *   run.h               what one call of orb_compose() holds
+ *   fixed_sphere.h      which points on the sphere the fixed shape has
  *   rounds.h, near.h    rounds of sweeps and untangling; levels that are nearly a map
  *   full_level.h, spread.h  the level of all vertices; samples
  */

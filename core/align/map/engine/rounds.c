@@ -40,9 +40,9 @@ void orb_map_set_pull(const orb_map_run *c, orb_map_level *l, const int32_t *to_
   }
 }
 
-orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, int rounds, int32_t *flips) {
+orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, double barrier, int rounds, int32_t *flips) {
   const orb_map_params *params = &c->params;
-  orb_map_rules rules = soft_rules(params, params->clear.first_barrier);
+  orb_map_rules rules = soft_rules(params, barrier);
   double *copy = ORB_NEW(c->ctx, double, 3 * (size_t)l->count);
   orb_status status = copy ? ORB_OK : ORB_E_NO_MEMORY;
   int32_t at_first = *flips = orb_map_level_flips(l);
@@ -113,7 +113,7 @@ orb_status orb_map_loosen(orb_map_run *c, orb_map_level *l, int soft_sweeps, int
   }
   ORB_GO(status, orb_map_copy_take(c, l, &before), done);
   ORB_GO(status, orb_map_sweeps(c, l, soft_rules(&c->params, 1), soft_sweeps), done);
-  ORB_GO(status, orb_map_clear_flips(c, l, c->params.clear.loosen_rounds, &flips), done);
+  ORB_GO(status, orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.clear.loosen_rounds, &flips), done);
   if (!flips) {
     ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), hard_sweeps), done);
   }
@@ -139,7 +139,7 @@ orb_status orb_map_draw(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh
     orb_map_set_pull(c, l, to_mesh, pull);
     ORB_GO(status, orb_map_copy_take(c, l, &before), next);
     ORB_GO(status, orb_map_sweeps(c, l, soft_rules(params, params->clear.first_barrier), params->draw.sweeps), next);
-    ORB_GO(status, orb_map_clear_flips(c, l, params->draw.clearings, &flips), next);
+    ORB_GO(status, orb_map_clear_flips(c, l, params->clear.first_barrier, params->draw.clearings, &flips), next);
     if (flips) {
       orb_map_copy_restore(&before, l);
       round = rounds;

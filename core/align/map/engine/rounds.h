@@ -26,9 +26,10 @@ void orb_map_copy_restore(const orb_map_copy *copy, orb_map_level *level);
 
 void orb_map_copy_free(orb_map_run *run, orb_map_copy *copy);
 
-/* Clears flips: sweeps against a growing barrier, then untangling of a copy, until that succeeds. *flips: those left.
- */
-ORB_MUST_CHECK orb_status orb_map_clear_flips(orb_map_run *run, orb_map_level *level, int rounds, int32_t *flips);
+/* Clears flips: sweeps against a barrier that grows from `barrier`, then untangling of a copy, until that succeeds.
+ * *flips: those left. */
+ORB_MUST_CHECK orb_status orb_map_clear_flips(orb_map_run *run, orb_map_level *level, double barrier, int rounds,
+                                              int32_t *flips);
 
 /* Frees vertices that barriers have locked in: allows flips for a while and clears them. Keeps the result only if no
  * flip is left and its energy is lower. */

@@ -9,6 +9,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/fixed_sphere.h"
 #include "align/map/engine/spread.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/mirror.h"
@@ -125,22 +126,10 @@ static orb_status borrow(orb_context *ctx, const orb_aligned_shape *shape, int32
   return ORB_OK;
 }
 
-/* The walked spheres become those of the run; c->kept holds the best map from before. */
-static orb_status take_both(orb_map_run *c, orb_sheet *fixed, orb_sheet *moving) {
-  orb_map_surface b;
-  orb_aligned_shape shape = {.mesh = c->fixed->mesh, .points = fixed->shape.points};
-  ORB_TRY(orb_map_surface_create(c->ctx, &shape, &b));
-  orb_map_surface_free(c->ctx, &c->b);
-  orb_map_packed_free(c->ctx, &c->packed);
-  c->b = b;
-  c->kept = (orb_map_candidate){c->best, c->fixed_points, c->best_energy};
-  c->fixed_points = fixed->shape.points;
-  fixed->shape.points = NULL;
+/* The walked spheres become those of the run. */
+static orb_status take_both(orb_map_run *c, orb_sheet *fixed, const orb_sheet *moving) {
   memcpy(c->start, moving->shape.points, 3 * (size_t)c->vertex_count * sizeof *c->start);
-  c->best = moving->shape.points;
-  c->best_energy = INFINITY;
-  moving->shape.points = NULL;
-  return orb_map_packed_create(c->ctx, &c->fixed->mesh, &c->b, &c->packed);
+  return orb_map_take_sphere(c, &fixed->shape.points);
 }
 
 /* Carries the walked map to the fixed shape's own sphere. */
