@@ -1,6 +1,6 @@
-/* The control socket: a Unix socket in the data folder through which `orbmorphd token` reaches a running daemon. Only
- * the daemon's user and root may use it. A client sends one line; the daemon replies with a digit, the exit status,
- * then text, and closes the connection.
+/* The control socket: a Unix socket in the data folder through which `orbmorphd token` and `orbmorphd key` reach a
+ * running daemon. Only the daemon's user and root may use it. A client sends one line; the daemon replies with a digit,
+ * the exit status, then text, and closes the connection.
  */
 #ifndef ORB_CONTROL_H
 #define ORB_CONTROL_H

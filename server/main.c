@@ -11,17 +11,18 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "admin/kinds.h"
 #include "control.h"
 #include "evict.h"
 #include "http/http.h"
-#include "key_command.h"
 #include "log.h"
 #include "maintain.h"
 #include "systemd.h"
-#include "token_command.h"
 #include "worker/pool.h"
 
 enum { CACHE_BYTES = 64 << 20 };
+
+static const admin_kind *const admin_kinds[] = {&admin_token, &admin_key, NULL};
 
 static void raise_descriptor_limit(void) {
   struct rlimit limit;
@@ -190,14 +191,19 @@ static int on_command(void *user, const char *line, api_text *reply) {
   server *srv = user;
   char what[8] = "", verb[8] = "", name[64] = "";
   sscanf(line, "%7s %7s %63s", what, verb, name);
-  int keys = strcmp(what, "key") == 0, lists = strcmp(verb, "list") == 0;
-  if (keys && lists) {
+  const admin_kind *kind = admin_kind_named(admin_kinds, what);
+  int lists = strcmp(verb, "list") == 0;
+  if (!kind) {
+    api_text_add(reply, "unknown command\n");
+    return 2;
+  }
+  if (kind == &admin_key && lists) {
     signers_store_use(srv->signers);
   }
-  int status = keys ? key_command_apply(srv->cat, line, reply) : token_command_apply(srv->cat, line, reply);
+  int status = kind->apply(srv->cat, line, reply);
   if (status == 0 && !lists) {
     status = !reload_callers(srv);
-    log_info("%s %s: %s", keys ? "key" : "token", verb, name);
+    log_info("%s %s: %s", kind->name, verb, name);
   }
   return status;
 }
@@ -373,23 +379,9 @@ static int run(const command_line *line) {
   return result;
 }
 
-/* A command for tokens or keys, or none. */
-typedef struct admin_command {
-  int is_token, is_key;
-  token_command tokens;
-  key_command keys;
-} admin_command;
-
-static int ask(const admin_command *admin, const config *options) {
-  return admin->is_token ? token_command_ask(&admin->tokens, options)
-         : admin->is_key ? key_command_ask(&admin->keys, options)
-                         : -1;
-}
-
 /* What needs the lock of the data folder: a command that no running daemon took, --check-data, --gc. */
 static int work_alone(const admin_command *admin, config_action action, const config *options) {
-  return admin->is_token               ? token_command_run(&admin->tokens, options)
-         : admin->is_key               ? key_command_run(&admin->keys, options)
+  return admin->kind                   ? admin_command_run(admin, options)
          : action == CONFIG_CHECK_DATA ? maintain_check(options)
          : action == CONFIG_GC         ? maintain_gc(options)
                                        : 2;
@@ -398,10 +390,8 @@ static int work_alone(const admin_command *admin, config_action action, const co
 int main(int argc, char **argv) {
   static config options;
   static admin_command admin;
-  admin.is_token = argc > 1 && strcmp(argv[1], "token") == 0;
-  admin.is_key = argc > 1 && strcmp(argv[1], "key") == 0;
-  if ((admin.is_token && !token_command_read(&admin.tokens, &argc, argv)) ||
-      (admin.is_key && !key_command_read(&admin.keys, &argc, argv))) {
+  const admin_kind *kind = argc > 1 ? admin_kind_named(admin_kinds, argv[1]) : NULL;
+  if (kind && !admin_command_read(&admin, kind, &argc, argv)) {
     return 2;
   }
   config_action action = config_read(&options, argc, argv);
@@ -419,17 +409,17 @@ int main(int argc, char **argv) {
       puts("the configuration is valid");
       return 0;
     case CONFIG_RUN:
-      if (!admin.is_token && !admin.is_key) {
+      if (!admin.kind) {
         return run(&(command_line){argc, argv, &options});
       }
       break;
     default:
       break;
   }
-  int asked = ask(&admin, &options);
+  int asked = admin_command_ask(&admin, &options);
   int lock = asked < 0 ? lock_data(options.data) : -1;
   if (lock < 0 && asked < 0) { /* the daemon may have just been starting */
-    asked = ask(&admin, &options);
+    asked = admin_command_ask(&admin, &options);
     if (asked < 0) {
       say_locked(options.data);
       return 1;

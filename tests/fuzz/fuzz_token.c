@@ -5,7 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "token_command.h"
+#include "admin/kinds.h"
+#include "store/tokens.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 int LLVMFuzzerInitialize(int *argc, char ***argv);
@@ -47,7 +48,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   for (char *line; at && (line = strsep(&at, "\n"));) {
     unsigned char hash[TOKEN_BYTES];
     api_text reply = {0};
-    int status = token_command_apply(cat, line, &reply);
+    int status = admin_token.apply(cat, line, &reply);
     if (status < 0 || status > 2 || (status == 2 && reply.size == 0)) {
       abort();
     }

@@ -1,0 +1,165 @@
+#include "admin/command.h"
+
+#include <inttypes.h>
+#include <sodium.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "control.h"
+
+enum { ADMIN_LINE = 1024 }; /* as long as a line that control.c reads */
+
+const admin_kind *admin_kind_named(const admin_kind *const *kinds, const char *name) {
+  while (*kinds && strcmp((*kinds)->name, name) != 0) {
+    kinds++;
+  }
+  return *kinds;
+}
+
+int admin_read_name(const char *value, char word[ADMIN_WORD]) {
+  static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
+  snprintf(word, ADMIN_WORD, "%s", value);
+  return *value && *value != '-' && strlen(value) < 64 && value[strspn(value, letters)] == 0;
+}
+
+int admin_read_number(const char *value, char word[ADMIN_WORD]) {
+  int64_t number;
+  int fine = config_number(value, &number);
+  if (fine) {
+    snprintf(word, ADMIN_WORD, "%" PRId64, number);
+  }
+  return fine;
+}
+
+static int wrong(const admin_kind *kind, const char *subject, const char *why) {
+  fprintf(stderr, "orbmorphd %s: %s%s\n%s", kind->name, subject, why, kind->usage);
+  return 0;
+}
+
+static int wrong_verb(const admin_kind *kind) {
+  char why[128] = "the command must be ";
+  for (const admin_verb *verb = kind->verbs; verb->name; verb++) {
+    size_t n = strlen(why);
+    snprintf(why + n, sizeof why - n, "%s%s", verb == kind->verbs ? "" : verb[1].name ? ", " : " or ", verb->name);
+  }
+  return wrong(kind, "", why);
+}
+
+/* The row of a flag that the verb takes, or −1. */
+static int find_flag(const admin_command *command, const char *name) {
+  const admin_flag *flags = command->kind->flags;
+  unsigned verb = 1U << (command->verb - command->kind->verbs);
+  for (int i = 0; i < ADMIN_FLAGS && flags[i].name; i++) {
+    if (*name && strcmp(flags[i].name, name) == 0 && flags[i].taken & verb) {
+      return i;
+    }
+  }
+  return -1;
+}
+
+/* Words of flags that were not given. 0: one of them is needed. */
+static int fill_words(admin_command *command) {
+  const admin_flag *flags = command->kind->flags;
+  unsigned verb = 1U << (command->verb - command->kind->verbs);
+  for (int i = 0; i < ADMIN_FLAGS && flags[i].name; i++) {
+    if (!command->words[i][0] && flags[i].needed & verb) {
+      return wrong(command->kind, flags[i].name, " is required");
+    }
+    if (!command->words[i][0] && *flags[i].name) {
+      snprintf(command->words[i], ADMIN_WORD, "%s", flags[i].standard);
+    }
+  }
+  return 1;
+}
+
+int admin_command_read(admin_command *out, const admin_kind *kind, int *argc, char **argv) {
+  const admin_verb *verb = kind->verbs;
+  char word[ADMIN_WORD];
+  int kept = 1, from = 3;
+  while (verb->name && (*argc < 3 || strcmp(argv[2], verb->name) != 0)) {
+    verb++;
+  }
+  if (!verb->name) {
+    return wrong_verb(kind);
+  }
+  *out = (admin_command){.kind = kind, .verb = verb, .name = "-"};
+  if (verb->named) {
+    out->name = *argc > from ? argv[from++] : "";
+    if (!admin_read_name(out->name, word)) {
+      return wrong(kind, "NAME", " must have 1 to 63 letters, digits, '-', '_' and '.', and not begin with '-'");
+    }
+  }
+  for (int i = from; i < *argc; i++) {
+    int flag = find_flag(out, argv[i]);
+    if (flag < 0) {
+      argv[kept++] = argv[i];
+    } else if (++i == *argc || !kind->flags[flag].read(argv[i], out->words[flag])) {
+      return wrong(kind, "", kind->values);
+    }
+  }
+  *argc = kept;
+  return fill_words(out);
+}
+
+/* Every line has a new secret; only verbs that show it use it. */
+static void write_line(const admin_command *command, char line[ADMIN_LINE], char shown[ADMIN_WORD]) {
+  const admin_flag *flags = command->kind->flags;
+  char secret[ADMIN_SECRET];
+  command->kind->make_secret(command->name, shown, secret);
+  int n = snprintf(line, ADMIN_LINE, "%s %s %s", command->kind->name, command->verb->name, command->name);
+  for (int i = 0; i < ADMIN_FLAGS && flags[i].name && n < ADMIN_LINE; i++) {
+    n += snprintf(line + n, (size_t)(ADMIN_LINE - n), " %s", *flags[i].name ? command->words[i] : secret);
+  }
+  sodium_memzero(secret, sizeof secret);
+}
+
+static int show(const admin_command *command, int status, const api_text *reply, const char *shown) {
+  if (status != 0) {
+    fprintf(stderr, "orbmorphd: %s", reply->data ? reply->data : "the command failed; the log says why\n");
+  } else if (command->verb->shows_secret) {
+    puts(shown);
+  } else {
+    fputs(reply->data ? reply->data : "", stdout);
+  }
+  return status;
+}
+
+int admin_command_ask(const admin_command *command, const config *options) {
+  char line[ADMIN_LINE], shown[ADMIN_WORD];
+  api_text reply = {0};
+  if (!command->kind) {
+    return -1;
+  }
+  write_line(command, line, shown);
+  int status = control_ask(options->data, line, &reply);
+  if (status >= 0) {
+    show(command, status, &reply, shown);
+  }
+  api_text_free(&reply);
+  return status;
+}
+
+int admin_command_run(const admin_command *command, const config *options) {
+  char line[ADMIN_LINE], shown[ADMIN_WORD];
+  catalogue *cat = NULL;
+  api_text reply = {0};
+  if (catalogue_open(options->data, &cat) != STORE_OK) {
+    return 1;
+  }
+  write_line(command, line, shown);
+  int status = show(command, command->kind->apply(cat, line, &reply), &reply, shown);
+  api_text_free(&reply);
+  catalogue_close(cat);
+  return status;
+}
+
+int admin_answer(store_result result, const admin_kind *kind, const char *name, const char *instead, api_text *reply) {
+  if (result == STORE_CONFLICT) {
+    api_text_printf(reply, "a %s \"%s\" already exists; %s\n", kind->name, name, instead);
+  } else if (result == STORE_NOT_FOUND) {
+    api_text_printf(reply, "%s \"%s\" does not exist\n", kind->name, name);
+  } else if (result != STORE_OK) {
+    api_text_add(reply, "the catalogue could not be written; the log says why\n");
+  }
+  return result != STORE_OK;
+}

@@ -1,0 +1,121 @@
+#include <sodium.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "admin/kinds.h"
+#include "api/routes.h"
+#include "store/tokens.h"
+
+static const struct {
+  const char *name;
+  int scope;
+} scopes[] = {{"read", SCOPE_READ}, {"write", SCOPE_WRITE}, {"admin", SCOPE_ADMIN}};
+enum { SCOPES = sizeof scopes / sizeof scopes[0] };
+
+static int read_scopes(const char *value, char word[ADMIN_WORD]) {
+  int found = 0;
+  for (const char *at = value; *at;) {
+    size_t n = strcspn(at, ","), i = 0;
+    while (i < SCOPES && (strlen(scopes[i].name) != n || strncmp(scopes[i].name, at, n) != 0)) {
+      i++;
+    }
+    if (i == SCOPES) {
+      return 0;
+    }
+    found |= scopes[i].scope;
+    at += n + (at[n] == ',');
+  }
+  snprintf(word, ADMIN_WORD, "%d", found);
+  return found != 0;
+}
+
+static int read_priority(const char *value, char word[ADMIN_WORD]) {
+  return admin_read_number(value, word) && strtoll(word, NULL, 10) <= 9;
+}
+
+static int list(catalogue *cat, api_text *reply) {
+  int count;
+  token_row *rows = catalogue_tokens(cat, &count);
+  for (int i = 0; i < count; i++) {
+    char names[32] = "";
+    for (size_t k = 0; k < SCOPES; k++) {
+      if (rows[i].scopes & scopes[k].scope) {
+        size_t n = strlen(names);
+        snprintf(names + n, sizeof names - n, "%s%s", n ? "," : "", scopes[k].name);
+      }
+    }
+    int other = strcmp(rows[i].tenant, rows[i].name) != 0;
+    api_text_printf(reply, "%s %s uploaded=%lld quota=%lld quota-jobs=%lld priority=%d%s%s\n", rows[i].name, names,
+                    (long long)rows[i].used, (long long)rows[i].quota, (long long)rows[i].jobs, rows[i].priority,
+                    other ? " tenant=" : "", other ? rows[i].tenant : "");
+  }
+  free(rows);
+  return count < 0;
+}
+
+static int apply(catalogue *cat, const char *line, api_text *reply) {
+  char verb[8], hash[TOKEN_TEXT];
+  long long quota, jobs;
+  token_row row = {.created = (int64_t)time(NULL) * 1000};
+  if (sscanf(line, "token %7s %63s %d %lld %lld %d %63s %64s", verb, row.name, &row.scopes, &quota, &jobs,
+             &row.priority, row.tenant, hash) != 8) {
+    api_text_add(reply, "unknown command\n");
+    return 2;
+  }
+  row.quota = quota;
+  row.jobs = jobs;
+  if (strcmp(row.tenant, "-") == 0) {
+    memcpy(row.tenant, row.name, sizeof row.tenant);
+  }
+  if (strcmp(verb, "list") == 0) {
+    return list(cat, reply);
+  }
+  store_result result = STORE_ERROR;
+  if (strcmp(verb, "add") == 0) {
+    row.quota = quota > 0 ? quota : 0;
+    row.jobs = jobs > 0 ? jobs : 0;
+    row.priority = row.priority > 0 ? row.priority : 0;
+    if (sodium_hex2bin(row.hash, sizeof row.hash, hash, strlen(hash), NULL, NULL, NULL) == 0) {
+      result = catalogue_token_add(cat, &row);
+    }
+  } else if (strcmp(verb, "set") == 0) {
+    result = catalogue_token_set(cat, &row);
+  } else if (strcmp(verb, "remove") == 0) {
+    result = catalogue_token_remove(cat, row.name);
+  }
+  return admin_answer(result, &admin_token, row.name, "change it with set, or remove it", reply);
+}
+
+/* Only the hash of the token leaves the process that makes it. */
+static void make_token(const char *name, char shown[ADMIN_WORD], char word[ADMIN_SECRET]) {
+  unsigned char token[TOKEN_BYTES], hashed[TOKEN_BYTES];
+  (void)name;
+  randombytes_buf(token, sizeof token);
+  crypto_hash_sha256(hashed, token, sizeof token);
+  sodium_bin2hex(shown, ADMIN_WORD, token, sizeof token);
+  sodium_bin2hex(word, ADMIN_SECRET, hashed, sizeof hashed);
+  sodium_memzero(token, sizeof token);
+}
+
+enum { ADD = 1, SET = 2 }; /* bits of verbs */
+
+const admin_kind admin_token = {
+    .name = "token",
+    .usage =
+        "  orbmorphd token add NAME --scope read,write,admin [--tenant NAME] [--quota BYTES]"
+        " [--quota-jobs N] [--priority 0..9]\n"
+        "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-jobs …] [--priority …]\n"
+        "  orbmorphd token list | token remove NAME\n",
+    .values = "--scope takes read, write and admin, comma-separated; --tenant takes a name; the others a number",
+    .verbs = {{"add", 1, 1}, {"set", 1, 0}, {"list", 0, 0}, {"remove", 1, 0}},
+    .flags = {{"--scope", ADD | SET, ADD, "-1", read_scopes},
+              {"--quota", ADD | SET, 0, "-1", admin_read_number},
+              {"--quota-jobs", ADD | SET, 0, "-1", admin_read_number},
+              {"--priority", ADD | SET, 0, "-1", read_priority},
+              {"--tenant", ADD, 0, "-", admin_read_name},
+              {.name = ADMIN_SECRET_WORD}},
+    .make_secret = make_token,
+    .apply = apply,
+};
