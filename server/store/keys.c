@@ -63,7 +63,8 @@ store_result catalogue_key_remove(catalogue *cat, const char *name) {
   return catalogue_write(cat, remove_row, (void *)(uintptr_t)name);
 }
 
-static void read_row(sqlite3_stmt *st, key_row *row) {
+static int read_row(sqlite3_stmt *st, void *out) {
+  key_row *row = out;
   row_text(st, 0, row->name, sizeof row->name);
   row_text(st, 1, row->tenant, sizeof row->tenant);
   row_text(st, 2, row->secret, sizeof row->secret);
@@ -76,41 +77,17 @@ static void read_row(sqlite3_stmt *st, key_row *row) {
   row->day = sqlite3_column_int64(st, 9);
   row->used_requests = sqlite3_column_int64(st, 10);
   row->used_ms = sqlite3_column_int64(st, 11);
+  return 1;
 }
 
 key_row *catalogue_keys(catalogue *cat, int *count) {
-  size_t room = 16, found = 0;
-  key_row *rows = calloc(room, sizeof *rows);
+  static const row_kind kind = {.read = read_row, .size = sizeof(key_row)};
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st =
-      rows ? database_statement(db,
-                                "SELECT name, tenant, secret, old_secret, old_until, origins, requests, cpu_seconds,"
-                                " created, day, used_requests, used_ms FROM signing_key ORDER BY name")
-           : NULL;
-  int code = SQLITE_ERROR;
-  while (st && (code = sqlite3_step(st)) == SQLITE_ROW) {
-    if (found == room) {
-      key_row *more = found < INT32_MAX / 2 ? reallocarray(rows, 2 * room, sizeof *rows) : NULL;
-      if (!more) {
-        break;
-      }
-      rows = more;
-      room *= 2;
-    }
-    memset(&rows[found], 0, sizeof *rows);
-    read_row(st, &rows[found++]);
-  }
-  if (st) {
-    sqlite3_reset(st);
-  }
-  catalogue_reader_done(cat, db);
-  *count = (int)found;
-  if (code != SQLITE_DONE) {
-    free(rows);
-    *count = -1;
-    return NULL;
-  }
-  return rows;
+      database_statement(db,
+                         "SELECT name, tenant, secret, old_secret, old_until, origins, requests, cpu_seconds,"
+                         " created, day, used_requests, used_ms FROM signing_key ORDER BY name");
+  return rows_all(cat, db, st, &kind, count);
 }
 
 typedef struct use_arg {

@@ -1,5 +1,13 @@
 #include "store/rows.h"
 
+#include <stdlib.h>
+
+static void release(const row_kind *kind, void *row) {
+  if (kind->release) {
+    kind->release(row);
+  }
+}
+
 /* SQLite returns NULL for a text that it has no memory to convert; only its error code distinguishes that from SQL
  * NULL. */
 static int fill(database *db, sqlite3_stmt *st, const row_kind *kind, void *out) {
@@ -7,7 +15,7 @@ static int fill(database *db, sqlite3_stmt *st, const row_kind *kind, void *out)
     return 1;
   }
   log_error("catalogue: out of memory for a row");
-  kind->release(out);
+  release(kind, out);
   return 0;
 }
 
@@ -42,9 +50,45 @@ int rows_many(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *ki
   }
   log_error("catalogue: rows cannot be read: %s", sqlite3_errstr(code));
   while (count > 0) {
-    kind->release((char *)out + (size_t)--count * kind->size);
+    release(kind, (char *)out + (size_t)--count * kind->size);
   }
   return -1;
+}
+
+void *rows_all(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, int *count) {
+  size_t room = 16, found = 0;
+  char *rows = calloc(room, kind->size);
+  int code = SQLITE_ERROR;
+  while (st && rows && (code = sqlite3_step(st)) == SQLITE_ROW) {
+    if (found == room) {
+      char *more = found < INT32_MAX / 2 ? reallocarray(rows, 2 * room, kind->size) : NULL;
+      if (!more) {
+        break;
+      }
+      rows = more;
+      room *= 2;
+    }
+    char *row = rows + found * kind->size;
+    memset(row, 0, kind->size);
+    if (!fill(db, st, kind, row)) {
+      break;
+    }
+    found++;
+  }
+  if (st) {
+    sqlite3_reset(st);
+  }
+  catalogue_reader_done(cat, db);
+  if (code == SQLITE_DONE) {
+    *count = (int)found;
+    return rows;
+  }
+  while (found > 0) {
+    release(kind, rows + --found * kind->size);
+  }
+  free(rows);
+  *count = -1;
+  return NULL;
 }
 
 int64_t rows_integer(catalogue *cat, database *db, sqlite3_stmt *st) {

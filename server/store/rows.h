@@ -1,4 +1,4 @@
-/* Reading rows, shared by resources.c, owners.c, jobs.c and tokens.c. */
+/* Reading rows, shared by resources.c, owners.c, jobs.c, keys.c and tokens.c. */
 #ifndef ORB_STORE_ROWS_H
 #define ORB_STORE_ROWS_H
 
@@ -13,7 +13,8 @@
 int resource_insert(database *db, const resource *r);                  /* keeps an existing row */
 int resource_remove(database *db, resource_kind kind, const char *id); /* SQLITE_NOTFOUND: no such row */
 
-/* read fills one row and returns 0 if out of memory; release frees a row, also one that was filled in part. */
+/* read fills one row and returns 0 if out of memory; release frees a row, also one that was filled in part (NULL: a row
+ * owns no memory). */
 typedef struct row_kind {
   int (*read)(sqlite3_stmt *st, void *out);
   void (*release)(void *row);
@@ -24,11 +25,13 @@ typedef struct row_kind {
   "iif(" kind "=3, substr(" json ", 1, instr(" json ", ',\"landmarks\":')-1)||'}', " json ")"
 extern const row_kind resource_rows; /* columns: seq, kind, id, sha, json, bytes, created, places */
 
-/* These three run a bound query on a reader from catalogue_reader() (st NULL: it could not be prepared) and release
- * the reader. */
+/* These run a bound query on a reader from catalogue_reader() (st NULL: it could not be prepared) and release the
+ * reader. */
 store_result rows_one(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out);
 /* The number of rows filled, or −1, and no rows, if one of them could not be read. */
 int rows_many(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out, int limit);
+/* All rows, allocated with malloc(); NULL with *count −1 if one of them could not be read. */
+void *rows_all(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, int *count);
 /* The integer in the query's only row; −1 if it cannot be read. */
 int64_t rows_integer(catalogue *cat, database *db, sqlite3_stmt *st);
 

@@ -80,7 +80,8 @@ store_result catalogue_token_remove(catalogue *cat, const char *name) {
   return catalogue_write(cat, remove_row, (void *)(uintptr_t)name);
 }
 
-static void read_row(sqlite3_stmt *st, token_row *row) {
+static int read_row(sqlite3_stmt *st, void *out) {
+  token_row *row = out;
   char hash[TOKEN_TEXT];
   row_text(st, 0, hash, sizeof hash);
   sodium_hex2bin(row->hash, sizeof row->hash, hash, strlen(hash), NULL, NULL, NULL);
@@ -92,40 +93,15 @@ static void read_row(sqlite3_stmt *st, token_row *row) {
   row->jobs = sqlite3_column_int64(st, 6);
   row->priority = sqlite3_column_int(st, 7);
   row_text(st, 8, row->tenant, sizeof row->tenant);
+  return 1;
 }
 
 token_row *catalogue_tokens(catalogue *cat, int *count) {
-  size_t room = 64, found = 0;
-  token_row *rows = calloc(room, sizeof *rows);
+  static const row_kind kind = {.read = read_row, .size = sizeof(token_row)};
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st =
-      rows ? database_statement(db,
-                                "SELECT hash, token.name, scopes, quota_bytes, coalesce(bytes, 0), created,"
-                                " quota_jobs, priority, tenant FROM token"
-                                " LEFT JOIN tenant ON tenant.name=token.tenant ORDER BY token.name")
-           : NULL;
-  int code = SQLITE_ERROR;
-  while (st && (code = sqlite3_step(st)) == SQLITE_ROW) {
-    if (found == room) {
-      token_row *more = found < INT32_MAX / 2 ? reallocarray(rows, 2 * room, sizeof *rows) : NULL;
-      if (!more) {
-        break;
-      }
-      rows = more;
-      room *= 2;
-    }
-    memset(&rows[found], 0, sizeof *rows);
-    read_row(st, &rows[found++]);
-  }
-  if (st) {
-    sqlite3_reset(st);
-  }
-  catalogue_reader_done(cat, db);
-  *count = (int)found;
-  if (code != SQLITE_DONE) {
-    free(rows);
-    *count = -1;
-    return NULL;
-  }
-  return rows;
+  sqlite3_stmt *st = database_statement(db,
+                                        "SELECT hash, token.name, scopes, quota_bytes, coalesce(bytes, 0), created,"
+                                        " quota_jobs, priority, tenant FROM token"
+                                        " LEFT JOIN tenant ON tenant.name=token.tenant ORDER BY token.name");
+  return rows_all(cat, db, st, &kind, count);
 }
