@@ -2,7 +2,9 @@
  * notation of ../star.h. sweep.inc.h includes this twice, for floats and for doubles, after naming
  *   STAR(x)      x with the suffix of the type
  *   SV, SM       vectors of numbers and of masks
- *   SV_SET, SV_SQRT, SV_MAX, SV_MIN, SV_CHOOSE, SV_ROW   operations; SV_ROW loads one row of shapes
+ *   SV_SET, SV_SQRT, SV_RECIPROCAL, SV_MAX, SV_MIN, SV_CHOOSE   operations
+ *   SV_ROW       loads one row of shapes
+ * and undefines these names at its end.
  *
  * Lengths on the sphere are multiplied by `scale`, so that floats have room for small triangles; areas, energies and
  * determinants by its square. Everything is computed from differences to the centre, never from products near 1.
@@ -140,3 +142,14 @@ static inline void STAR(sweep_try)(STAR(sweep_star) * q, const float *shape, SV 
 static inline SM STAR(sweep_todo)(const STAR(sweep_star) * q) {
   return (SM)(q->tau > SV_SET(0)) & (SM)((q->s * q->s + q->t * q->t) > SV_SET(0));
 }
+
+#undef STAR
+#undef SV
+#undef SM
+#undef SV_SET
+#undef SV_SQRT
+#undef SV_RECIPROCAL
+#undef SV_MAX
+#undef SV_MIN
+#undef SV_CHOOSE
+#undef SV_ROW

@@ -27,19 +27,7 @@ static const float SWEEP_FLAT = 1e-5F;
 #define SV_MIN bf_min
 #define SV_CHOOSE bf_choose
 #define SV_ROW bf_load
-#define SM_ANY bm_any
 #include "embed/newton/vector/star.inc.h"
-#undef STAR
-#undef SV
-#undef SM
-#undef SV_SET
-#undef SV_SQRT
-#undef SV_RECIPROCAL
-#undef SV_MAX
-#undef SV_MIN
-#undef SV_CHOOSE
-#undef SV_ROW
-#undef SM_ANY
 
 #define STAR(x) x##_doubles
 #define SV vd
@@ -51,19 +39,7 @@ static const float SWEEP_FLAT = 1e-5F;
 #define SV_MIN vd_min
 #define SV_CHOOSE vd_choose
 #define SV_ROW vd_load_floats
-#define SM_ANY vm_any
 #include "embed/newton/vector/star.inc.h"
-#undef STAR
-#undef SV
-#undef SM
-#undef SV_SET
-#undef SV_SQRT
-#undef SV_RECIPROCAL
-#undef SV_MAX
-#undef SV_MIN
-#undef SV_CHOOSE
-#undef SV_ROW
-#undef SM_ANY
 
 /* Centre and frame (Duff et al. 2017) of half a batch. */
 typedef struct sweep_frame {
