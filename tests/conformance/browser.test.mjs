@@ -3,20 +3,12 @@
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import fs from 'node:fs';
-import http from 'node:http';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
-import { fileURLToPath } from 'node:url';
+import { need, npmFile, serve, startBrowser } from './pages.mjs';
 
-const modules = fileURLToPath(new URL('../node_modules/', import.meta.url));
-const executablePath = process.env.ORB_CHROMIUM ?? '/usr/bin/chromium';
-const needed = ['three', 'babylonjs', 'babylonjs-loaders', 'playwright-core'].map((name) => path.join(modules, name));
-if (![...needed, executablePath].every((file) => fs.existsSync(file))) {
-  console.log('Chromium or the npm packages are missing: npm ci in tests/');
-  process.exit(0);
-}
-const { chromium } = await import('playwright-core');
+need('three', 'babylonjs', 'babylonjs-loaders');
 
 const SIZE = 256;
 const PAGE = `<!doctype html><title>asset</title>
@@ -156,34 +148,14 @@ const faults = [];
 before(async () => {
   folder = fs.mkdtempSync(path.join(os.tmpdir(), 'orbmorph-browser-'));
   execFileSync(process.env.ORB_ASSET_FIXTURE, [folder], { stdio: 'inherit' });
-  const types = { '.js': 'text/javascript', '.json': 'application/json', '.glb': 'model/gltf-binary' };
-  server = http.createServer((request, response) => {
-    const [, kind, ...rest] = decodeURIComponent(new URL(request.url, 'http://x').pathname).split('/');
-    const root = kind === 'npm' ? modules : folder;
-    const file = path.join(root, ...rest);
-    if (kind !== 'npm' && kind !== 'asset') return response.writeHead(200, { 'Content-Type': 'text/html' }).end(PAGE);
-    if (!file.startsWith(root) || !fs.existsSync(file)) return response.writeHead(404).end();
-    response.writeHead(200, { 'Content-Type': types[path.extname(file)] ?? 'application/octet-stream' });
-    fs.createReadStream(file).pipe(response);
+  server = await serve((at) => {
+    const [, kind, ...rest] = at.split('/');
+    return kind === 'npm' ? npmFile(rest.join('/')) : kind === 'asset' ? path.join(folder, ...rest) : { html: PAGE };
   });
-  await new Promise((done) => server.listen(0, '127.0.0.1', done));
-  browser = await chromium.launch({
-    timeout: 180_000,
-    executablePath,
-    args: [
-      '--no-sandbox',
-      '--headless=new',
-      '--use-gl=angle',
-      '--use-angle=swiftshader',
-      '--enable-unsafe-swiftshader',
-      '--disable-background-networking',
-      '--disable-component-update',
-      '--no-first-run',
-    ],
-  });
+  browser = await startBrowser();
   page = await browser.newPage();
   page.on('pageerror', (error) => faults.push(String(error)));
-  await page.goto(`http://127.0.0.1:${server.address().port}/`);
+  await page.goto(`http://127.0.0.1:${server.port}/`);
   await page.waitForFunction(() => window.ready, null, { timeout: 180_000 });
 });
 after(async () => {

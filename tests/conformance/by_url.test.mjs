@@ -1,24 +1,14 @@
 // A signed URL on a page of another origin, in headless Chromium, with a daemon that requires tokens: three.js and
 // <model-viewer> show a morph that nobody has computed before, with one request, and later take it from the HTTP cache.
 import assert from 'node:assert/strict';
-import fs from 'node:fs';
-import http from 'node:http';
-import path from 'node:path';
 import { after, before, test } from 'node:test';
-import { fileURLToPath } from 'node:url';
 import { signUrl } from '../../client/js/src/index.js';
 import { runProgram } from '../scenario/support/cli.mjs';
 import { binaries, daemon } from '../scenario/support/daemon.mjs';
 import * as shapes from '../scenario/support/shapes.mjs';
+import { need, npmFile, serve, startBrowser } from './pages.mjs';
 
-const modules = fileURLToPath(new URL('../node_modules/', import.meta.url));
-const executablePath = process.env.ORB_CHROMIUM ?? '/usr/bin/chromium';
-const needed = ['three', '@google/model-viewer', 'playwright-core'].map((name) => path.join(modules, name));
-if (![...needed, executablePath].every((file) => fs.existsSync(file))) {
-  console.log('Chromium or the npm packages are missing: npm ci in tests/');
-  process.exit(0);
-}
-const { chromium } = await import('playwright-core');
+need('three', '@google/model-viewer');
 
 const three = `<!doctype html><title>three</title>
 <script type="importmap">{"imports":{"three":"/npm/three/build/three.module.js","three/addons/":"/npm/three/examples/jsm/"}}</script>
@@ -46,32 +36,14 @@ let browser;
 let server;
 let origin;
 before(async () => {
-  server = http.createServer((request, response) => {
-    const at = new URL(request.url, 'http://x').pathname;
-    const page = { '/three': three, '/viewer': viewer }[at];
-    const file = path.join(modules, at.slice(5));
-    if (page) return response.writeHead(200, { 'content-type': 'text/html' }).end(page);
-    if (!at.startsWith('/npm/') || !fs.existsSync(file)) return response.writeHead(404).end();
-    response.writeHead(200, { 'content-type': 'text/javascript' });
-    fs.createReadStream(file).pipe(response);
-  });
-  await new Promise((done) => server.listen(0, '127.0.0.1', done));
-  origin = `http://localhost:${server.address().port}`;
-  browser = await chromium.launch({
-    timeout: 180_000,
-    executablePath,
-    args: [
-      '--no-sandbox',
-      '--headless=new',
-      '--use-gl=angle',
-      '--use-angle=swiftshader',
-      '--enable-unsafe-swiftshader',
-    ],
-  });
+  const pages = { '/three': { html: three }, '/viewer': { html: viewer } };
+  server = await serve((at) => pages[at] ?? (at.startsWith('/npm/') && npmFile(at.slice(5))));
+  origin = `http://localhost:${server.port}`;
+  browser = await startBrowser();
 });
 after(async () => {
   await browser?.close();
-  server.close();
+  server?.close();
 });
 
 async function admin(d, ...words) {

@@ -3,42 +3,14 @@
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import fs from 'node:fs';
-import http from 'node:http';
 import path from 'node:path';
 import test from 'node:test';
-import { fileURLToPath } from 'node:url';
 import { daemon, root } from '../scenario/support/daemon.mjs';
 import { blocks, place, shellLines } from '../scenario/support/documents.mjs';
 import { readPng } from '../scenario/support/png.mjs';
+import { need, npmFile, serve, startBrowser } from './pages.mjs';
 
-const modules = fileURLToPath(new URL('../node_modules/', import.meta.url));
-const executablePath = process.env.ORB_CHROMIUM ?? '/usr/bin/chromium';
-if (
-  ![path.join(modules, 'three'), path.join(modules, 'playwright-core'), executablePath].every((file) =>
-    fs.existsSync(file),
-  )
-) {
-  console.log('Chromium or the npm packages are missing: npm ci in tests/');
-  process.exit(0);
-}
-const { chromium } = await import('playwright-core');
-
-const types = { '.js': 'text/javascript', '.html': 'text/html', '.glb': 'model/gltf-binary' };
-
-/** Serves the folder, and the npm packages of the tests at the paths where a reader installs them. */
-function serve(t, folder) {
-  const server = http.createServer((request, response) => {
-    const where = decodeURIComponent(new URL(request.url, 'http://x').pathname);
-    const file = where.startsWith('/node_modules/')
-      ? path.join(modules, where.slice(14))
-      : path.join(folder, where === '/' ? 'index.html' : where);
-    if (!fs.existsSync(file)) return response.writeHead(404).end();
-    response.writeHead(200, { 'Content-Type': types[path.extname(file)] ?? 'application/octet-stream' });
-    fs.createReadStream(file).pipe(response);
-  });
-  t.after(() => server.close());
-  return new Promise((done) => server.listen(0, '127.0.0.1', () => done(`http://127.0.0.1:${server.address().port}/`)));
-}
+need('three');
 
 /** The share of pixels that differ noticeably. */
 function difference(a, b) {
@@ -62,21 +34,15 @@ test('the tutorial ends with a page that morphs', async (t) => {
   const [page_html] = blocks(text, 'html');
   fs.writeFileSync(path.join(at, 'page/index.html'), page_html);
 
-  const url = await serve(t, path.join(at, 'page'));
-  const browser = await chromium.launch({
-    timeout: 180_000,
-    executablePath,
-    args: [
-      '--no-sandbox',
-      '--headless=new',
-      '--use-gl=angle',
-      '--use-angle=swiftshader',
-      '--enable-unsafe-swiftshader',
-      '--disable-background-networking',
-      '--disable-component-update',
-      '--no-first-run',
-    ],
-  });
+  // The npm packages of the tests, at the paths where a reader installs them.
+  const server = await serve((where) =>
+    where.startsWith('/node_modules/')
+      ? npmFile(where.slice(14))
+      : path.join(at, 'page', where === '/' ? 'index.html' : where),
+  );
+  t.after(() => server.close());
+  const url = `http://127.0.0.1:${server.port}/`;
+  const browser = await startBrowser();
   t.after(() => browser.close());
   const page = await browser.newPage({ viewport: { width: 640, height: 400 } });
   const faults = [];

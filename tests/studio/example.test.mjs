@@ -3,15 +3,12 @@ import { after, before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { join } from 'node:path';
-import { difference, openPage, root, sample, startBrowser, startDaemon, until } from './support.mjs';
+import { browser, daemon } from './started.mjs';
+import { difference, openPage, root, sample, until } from './support.mjs';
 
-let daemon;
-let browser;
 let server;
 let url;
 before(async () => {
-  daemon = await startDaemon();
-  browser = await startBrowser();
   server = spawn(process.execPath, [join(root, 'client/js/example/serve.mjs')], {
     env: { ...process.env, ORBMORPH_SERVER: daemon.url, PORT: '0' },
     stdio: ['ignore', 'pipe', 'inherit'],
@@ -20,8 +17,6 @@ before(async () => {
 });
 after(async () => {
   server?.kill();
-  await browser?.close();
-  await daemon?.stop();
 });
 
 test('the example plays a morph of two files', async () => {

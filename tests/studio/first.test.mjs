@@ -1,28 +1,8 @@
 // The fast morph is shown first, and the default one replaces it.
-import { after, before, test } from 'node:test';
+import { test } from 'node:test';
 import assert from 'node:assert/strict';
-import {
-  addFiles,
-  button,
-  defaultShown,
-  openPage,
-  sample,
-  shownToasts,
-  startBrowser,
-  startDaemon,
-  until,
-} from './support.mjs';
-
-let daemon;
-let browser;
-before(async () => {
-  daemon = await startDaemon();
-  browser = await startBrowser();
-});
-after(async () => {
-  await browser?.close();
-  await daemon?.stop();
-});
+import { browser, daemon } from './started.mjs';
+import { addFiles, button, defaultShown, openPage, sample, shownToasts, until } from './support.mjs';
 
 const isFast = (request) => request.postDataJSON().align?.options?.preset === 'fast';
 const refuse = (route, title) =>

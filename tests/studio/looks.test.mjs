@@ -1,23 +1,12 @@
 // Compares the studio with the reference pictures. node tests/studio/looks.mjs retakes them; look at them afterwards.
-import { after, before, test } from 'node:test';
+import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { apart, folder, look, SCENES } from './looks.mjs';
-import { startBrowser, startDaemon } from './support.mjs';
-
-let daemon;
-let browser;
-before(async () => {
-  daemon = await startDaemon();
-  browser = await startBrowser();
-});
-after(async () => {
-  await browser?.close();
-  await daemon?.stop();
-});
+import { browser, daemon } from './started.mjs';
 
 for (const name of Object.keys(SCENES))
   test(name, async () => {

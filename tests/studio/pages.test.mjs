@@ -1,32 +1,14 @@
 // Checks every page: no request to other origins, a strict policy, named controls, keys, no drawing at rest.
-import { after, before, test } from 'node:test';
+import { before, test } from 'node:test';
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { readFile } from 'node:fs/promises';
-import {
-  addFiles,
-  button,
-  difference,
-  defaultShown,
-  openPage,
-  sample,
-  settled,
-  startBrowser,
-  startDaemon,
-  until,
-} from './support.mjs';
+import { browser, daemon } from './started.mjs';
+import { addFiles, button, difference, defaultShown, openPage, sample, settled, until } from './support.mjs';
 
-let daemon;
-let browser;
 let axe;
 before(async () => {
   axe = await readFile(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
-  daemon = await startDaemon();
-  browser = await startBrowser();
-});
-after(async () => {
-  await browser?.close();
-  await daemon?.stop();
 });
 
 /** Serious and critical findings of axe. `evaluate` is exempt from the page's policy, so the policy stays as it is. */

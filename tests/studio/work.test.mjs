@@ -1,5 +1,5 @@
 // The work of a modeller, from the empty page to the file on disk.
-import { after, before, test } from 'node:test';
+import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { mkdtemp, readFile, rm } from 'node:fs/promises';
@@ -8,6 +8,7 @@ import { join } from 'node:path';
 import { promisify } from 'node:util';
 import { endless } from '../scenario/support/daemon.mjs';
 import { ball, obj } from '../scenario/support/shapes.mjs';
+import { browser, daemon } from './started.mjs';
 import {
   addFiles,
   button,
@@ -22,21 +23,9 @@ import {
   sample,
   settled,
   shownToasts,
-  startBrowser,
   startDaemon,
   until,
 } from './support.mjs';
-
-let daemon;
-let browser;
-before(async () => {
-  daemon = await startDaemon();
-  browser = await startBrowser();
-});
-after(async () => {
-  await browser?.close();
-  await daemon?.stop();
-});
 
 const scrubber = (page) => page.getByRole('slider', { name: 'Along the morph' });
 const time = (page) => scrubber(page).evaluate((input) => Number(input.value));
