@@ -12,6 +12,7 @@
 
 #include "align/find/candidates.h"
 #include "align/find/found.h"
+#include "align/find/params.h"
 #include "align/map/engine/params.h"
 #include "align/methods.h"
 #include "base/check.h"
@@ -19,9 +20,6 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 #include "orbmorph/locate.h"
-
-/* Of the diagonal: where a map takes matched vertices farther from their partners in the mean, it is another one. */
-static const double WRONG = 0.1;
 
 /* The best candidates of all later shapes, and the vertices that they match. */
 typedef struct matches {
@@ -198,7 +196,7 @@ static orb_status try_candidates(orb_context *ctx, const orb_align_shape *shapes
   *clear = m.clear;
   if (m.count >= 3 && m.is_certain) {
     ORB_GO(status, measure_away(ctx, reached, &m, &away), end);
-    *forced = away > WRONG;
+    *forced = away > ORB_FIND_AGREES;
   }
   if (m.count >= 3 && (m.energy < reached->energy || *forced)) {
     ORB_GO(status, align_matched_best(ctx, shapes, shape_count, &m, options, reached->energy, out, held), end);

@@ -16,6 +16,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/params.h"
 #include "align/find/tip_choice.h"
 #include "align/find/tip_rotations.h"
 #include "align/find/tips.h"
@@ -33,34 +34,6 @@
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
-
-/* All chosen by trial on the `auto` rows of docs/bench-truth.md. The counts trade time for candidates: each rotation or
- * tip map costs a walk and some sweeps on coarse copies, each composed candidate a whole composed map of these. */
-enum {
-  COARSE = 1000, /* vertices of a coarse copy */
-  WALK = 300,    /* least vertices of the level on which tips walk */
-  ROTATIONS = 3, /* rotations of the spheres that are tried: the best of the rotation search */
-  TIP_MAPS = 8,  /* tip maps by distances that are tried, beside those by rotations in space */
-  SPECTRAL = 4,  /* maps from eigenfunctions that are tried */
-  COMPOSED = 3,  /* candidates that are composed in full */
-  SAMPLES = 48   /* points of the first shape whose images tell candidates apart */
-};
-/* Factor without unit. A rotation by π in space multiplies the energy beyond 1 by 1 + ROTATION_COST, because files
- * usually have shapes upright and facing one way: a man matched back to front has nearly the energy of the right map.
- */
-static const double ROTATION_COST = 1;
-/* Mean distance of the images of the samples, in diagonals of the second shape. Candidates that are nearer to each
- * other count as one correspondence: only one of them is composed, and they do not lower each other's confidence. */
-static const double DIFFERENT = 0.15;
-/* Ratio of costs, of a candidate to the rotation search after its rough sweeps. Only a candidate
- * that is clearly better is worth composing on the given meshes. */
-static const double BETTER = 0.95;
-/* Sum of two distances in diagonals, each on its shape: a tip of each shape are a pair of a spectral map if both are
- * near the same pair of it. */
-static const double BESIDE = 0.15;
-/* Mean distance of the images of the samples from where a spectral map takes them, in diagonals: a candidate that is
- * nearer is the same correspondence. */
-static const double AGREES = 0.1;
 
 /* A decimated copy: compact, with its own embedding. */
 typedef struct coarse {
@@ -88,7 +61,9 @@ static orb_status coarse_create(orb_context *ctx, const orb_mesh *mesh, coarse *
   }
   ORB_GO(status, orb_hierarchy_create(ctx, mesh, NULL, 4, &hierarchy), end);
   ORB_GO(status, orb_refiner_create(ctx, hierarchy, &options, &refiner), end);
-  ORB_GO(status, orb_refiner_advance(ctx, refiner, mesh->vertex_count < COARSE ? mesh->vertex_count : COARSE), end);
+  ORB_GO(status,
+         orb_refiner_advance(ctx, refiner, mesh->vertex_count < ORB_FIND_COARSE ? mesh->vertex_count : ORB_FIND_COARSE),
+         end);
   ORB_GO(status,
          orb_refiner_level(ctx, refiner, &out->vertex, &out->mesh.vertex_count, &out->mesh.triangles,
                            &out->mesh.triangle_count),
@@ -123,15 +98,15 @@ typedef struct candidate {
   int is_stuck;  /* composing it in full did not improve it */
   double rotation[9];
   int32_t first[ORB_TIPS_MAX], second[ORB_TIPS_MAX];
-  double energy, cost;      /* the cost ranks candidates: (energy − 1) · (1 + ROTATION_COST · angle / π) */
-  double image[SAMPLES][3]; /* where the samples of the first shape go */
+  double energy, cost; /* the cost ranks candidates: (energy − 1) · (1 + ORB_FIND_ROTATION_COST · angle / π) */
+  double image[ORB_FIND_SAMPLES][3]; /* where the samples of the first shape go */
 } candidate;
 
 typedef struct search {
   orb_context *ctx;
   coarse shape[2];
-  int32_t sample[SAMPLES];
-  candidate list[ROTATIONS + TIP_MAPS + ORB_TIP_ROTATIONS + 2 * SPECTRAL];
+  int32_t sample[ORB_FIND_SAMPLES];
+  candidate list[ORB_FIND_ROTATIONS + ORB_FIND_TIP_MAPS + ORB_TIP_ROTATIONS + 2 * ORB_FIND_SPECTRAL];
   orb_spectral_list spectral;
   int32_t rotations, count; /* rotations come first, then tip maps, then spectral maps */
 } search;
@@ -156,7 +131,7 @@ static orb_status carry(search *t, const candidate *one, orb_sheet *sheets, int 
     return orb_sheet_rotate(t->ctx, &sheets[1], one->rotation);
   }
   int stuck;
-  ORB_TRY(orb_pin_walk(t->ctx, sheets, 2, numbers, one->count, ORB_PRESET_FAST, WALK, NULL, &stuck));
+  ORB_TRY(orb_pin_walk(t->ctx, sheets, 2, numbers, one->count, ORB_PRESET_FAST, ORB_FIND_WALK, NULL, &stuck));
   *held = !stuck;
   return ORB_OK;
 }
@@ -166,7 +141,7 @@ static orb_status sample_images(const search *t, const orb_sheet *sheets, candid
   orb_locator *locator;
   ORB_TRY(orb_locator_create(t->ctx, b->points, b->mesh.vertex_count, b->mesh.triangles, b->mesh.triangle_count, NULL,
                              &locator));
-  for (int i = 0; i < SAMPLES; i++) {
+  for (int i = 0; i < ORB_FIND_SAMPLES; i++) {
     orb_place place;
     orb_locate(locator, a->points + 3 * (size_t)t->sample[i], -1, &place);
     orb_place_position(&b->mesh, &place, one->image[i]);
@@ -179,13 +154,13 @@ static orb_status sample_images(const search *t, const orb_sheet *sheets, candid
 static orb_status rotation_angle(const search *t, const candidate *one, double *angle) {
   double mean[2][3] = {{0}}, c[9] = {0}, r[9];
   const double *x = t->shape[0].mesh.positions;
-  for (int i = 0; i < SAMPLES; i++) {
+  for (int i = 0; i < ORB_FIND_SAMPLES; i++) {
     for (int k = 0; k < 3; k++) {
-      mean[0][k] += x[3 * (size_t)t->sample[i] + (size_t)k] / SAMPLES;
-      mean[1][k] += one->image[i][k] / SAMPLES;
+      mean[0][k] += x[3 * (size_t)t->sample[i] + (size_t)k] / ORB_FIND_SAMPLES;
+      mean[1][k] += one->image[i][k] / ORB_FIND_SAMPLES;
     }
   }
-  for (int i = 0; i < SAMPLES; i++) {
+  for (int i = 0; i < ORB_FIND_SAMPLES; i++) {
     double p[3], q[3];
     orb_sub(x + 3 * (size_t)t->sample[i], mean[0], p);
     orb_sub(one->image[i], mean[1], q);
@@ -205,7 +180,7 @@ static double away_from_first(const search *t, const candidate *one) {
   for (int s = 0; s < 2; s++) {
     orb_mesh_extent(&t->shape[s].mesh, &extent[s]);
   }
-  for (int i = 0; i < SAMPLES; i++) {
+  for (int i = 0; i < ORB_FIND_SAMPLES; i++) {
     int32_t nearest = 0;
     double least = INFINITY;
     for (int32_t k = 0; k < map->count; k++) {
@@ -214,13 +189,13 @@ static double away_from_first(const search *t, const candidate *one) {
       least = fmin(d, least);
     }
     double away = sqrt(orb_distance2(one->image[i], y + 3 * (size_t)map->second[nearest]));
-    sum += fmax(0, away / extent[1].diagonal - least / extent[0].diagonal) / SAMPLES;
+    sum += fmax(0, away / extent[1].diagonal - least / extent[0].diagonal) / ORB_FIND_SAMPLES;
   }
   return sum;
 }
 
 static int is_certain(const search *t) {
-  return t->spectral.count > 0 && t->spectral.clear > ORB_SPECTRAL_CLEAR;
+  return t->spectral.count > 0 && t->spectral.clear > ORB_FIND_CERTAIN;
 }
 
 /* Composes from a candidate's map: fills its energy, the images of the samples, and its cost. */
@@ -239,8 +214,8 @@ static orb_status run_candidate(search *t, candidate *one, orb_map_from from) {
     one->energy = energy[1];
     ORB_GO(status, sample_images(t, sheets, one), end);
     ORB_GO(status, rotation_angle(t, one, &angle), end);
-    one->cost = (one->energy - 1) * (1 + ROTATION_COST * angle);
-    if (is_certain(t) && away_from_first(t, one) > AGREES) {
+    one->cost = (one->energy - 1) * (1 + ORB_FIND_ROTATION_COST * angle);
+    if (is_certain(t) && away_from_first(t, one) > ORB_FIND_AGREES) {
       one->energy = one->cost = INFINITY;
     }
   }
@@ -252,13 +227,13 @@ end:
 
 static orb_status list_rotations(search *t) {
   orb_aligned_shape shape[2];
-  double rotation[9 * ROTATIONS];
+  double rotation[9 * ORB_FIND_ROTATIONS];
   memset(shape, 0, sizeof shape);
   for (int s = 0; s < 2; s++) {
     shape[s].mesh = t->shape[s].mesh;
     shape[s].points = t->shape[s].points;
   }
-  ORB_TRY(orb_rotation_candidates(t->ctx, &shape[0], &shape[1], ROTATIONS, rotation, &t->rotations));
+  ORB_TRY(orb_rotation_candidates(t->ctx, &shape[0], &shape[1], ORB_FIND_ROTATIONS, rotation, &t->rotations));
   for (t->count = 0; t->count < t->rotations; t->count++) {
     memcpy(t->list[t->count].rotation, rotation + 9 * t->count, sizeof(double[9]));
     t->list[t->count].is_given = t->count == 0;
@@ -287,7 +262,7 @@ static void list_tip_map(search *t, const orb_tips tips[2], const orb_tip_map *m
 
 static orb_status list_tip_maps(search *t, const orb_tips tips[2]) {
   const orb_mesh *meshes[2] = {&t->shape[0].mesh, &t->shape[1].mesh};
-  int32_t count, chosen_count, chosen[TIP_MAPS];
+  int32_t count, chosen_count, chosen[ORB_FIND_TIP_MAPS];
   orb_tip_map rotated[ORB_TIP_ROTATIONS], *maps = ORB_NEW(t->ctx, orb_tip_map, ORB_TIP_MAPS_MAX);
   orb_status status = ORB_E_NO_MEMORY;
   if (!maps) {
@@ -298,7 +273,7 @@ static orb_status list_tip_maps(search *t, const orb_tips tips[2]) {
     list_tip_map(t, tips, &rotated[i]);
   }
   orb_tip_maps(&tips[0], &tips[1], maps, &count);
-  ORB_GO(status, orb_tip_maps_choose(t->ctx, meshes, tips, maps, count, TIP_MAPS, chosen, &chosen_count), end);
+  ORB_GO(status, orb_tip_maps_choose(t->ctx, meshes, tips, maps, count, ORB_FIND_TIP_MAPS, chosen, &chosen_count), end);
   for (int32_t i = 0; i < chosen_count; i++) {
     list_tip_map(t, tips, &maps[chosen[i]]);
   }
@@ -337,7 +312,7 @@ static void list_tips_of_map(search *t, const orb_tips tips[2], const orb_spectr
   for (int32_t i = 0; i < ORB_TIPS_MAX; i++) {
     out.to[i] = -1;
     for (int32_t k = 0; i < tips[0].count && k < tips[1].count; k++) {
-      int is_pair = away[i][k] < BESIDE;
+      int is_pair = away[i][k] < ORB_FIND_BESIDE;
       for (int32_t j = 0; j < tips[0].count; j++) {
         is_pair = is_pair && away[j][k] >= away[i][k];
       }
@@ -358,7 +333,7 @@ static void list_tips_of_map(search *t, const orb_tips tips[2], const orb_spectr
 /* Maps from eigenfunctions: as tip maps, and by the places that they match. */
 static orb_status list_spectral_maps(search *t, const orb_tips tips[2]) {
   ORB_TRY(orb_spectral_find(t->ctx, &t->shape[0].mesh, &t->shape[1].mesh, 0, &t->spectral));
-  for (int32_t i = 0; i < t->spectral.count && i < SPECTRAL; i++) {
+  for (int32_t i = 0; i < t->spectral.count && i < ORB_FIND_SPECTRAL; i++) {
     const orb_spectral_candidate *map = &t->spectral.candidate[i];
     candidate one = {.count = map->count < ORB_TIPS_MAX ? map->count : ORB_TIPS_MAX, .is_near = 1};
     list_tips_of_map(t, tips, map);
@@ -375,8 +350,8 @@ static double difference(const search *t, const candidate *x, const candidate *y
   orb_extent extent;
   double sum = 0;
   orb_mesh_extent(&t->shape[1].mesh, &extent);
-  for (int i = 0; i < SAMPLES; i++) {
-    sum += sqrt(orb_distance2(x->image[i], y->image[i])) / SAMPLES;
+  for (int i = 0; i < ORB_FIND_SAMPLES; i++) {
+    sum += sqrt(orb_distance2(x->image[i], y->image[i])) / ORB_FIND_SAMPLES;
   }
   return sum / extent.diagonal;
 }
@@ -399,7 +374,7 @@ static int choose_next(search *t, int32_t to) {
   for (int32_t i = to; i < t->count; i++) {
     int other = t->list[i].cost < INFINITY;
     for (int32_t k = 0; k < to && other; k++) {
-      other = t->list[k].is_stuck || difference(t, &t->list[i], &t->list[k]) > DIFFERENT;
+      other = t->list[k].is_stuck || difference(t, &t->list[i], &t->list[k]) > ORB_FIND_DIFFERENT;
     }
     best = other && (best < 0 || t->list[i].cost < t->list[best].cost) ? i : best;
   }
@@ -449,7 +424,7 @@ static int32_t winner_of(const search *t, double *clear) {
     best = t->list[i].cost < t->list[best].cost ? i : best;
   }
   for (int32_t i = 0; i < t->count; i++) {
-    if (t->list[i].cost < next && difference(t, &t->list[best], &t->list[i]) > DIFFERENT) {
+    if (t->list[i].cost < next && difference(t, &t->list[best], &t->list[i]) > ORB_FIND_DIFFERENT) {
       next = t->list[i].cost;
     }
   }
@@ -472,7 +447,7 @@ static orb_status run_all(search *t, const orb_mesh *b, orb_candidate *out) {
   }
   double given = t->list[0].cost;
   int32_t to = 0;
-  for (; to < COMPOSED && choose_next(t, to); to++) {
+  for (; to < ORB_FIND_COMPOSED && choose_next(t, to); to++) {
     ORB_TRY(compose_candidate(t, &t->list[to]));
   }
   t->count = to;
@@ -483,7 +458,7 @@ static orb_status run_all(search *t, const orb_mesh *b, orb_candidate *out) {
   const candidate *best = &t->list[winner_of(t, &out->clear)];
   out->energy = best->energy;
   out->is_certain = is_certain(t);
-  return !best->is_given && best->cost < BETTER * given ? write_pairs(t, best, b, out) : ORB_OK;
+  return !best->is_given && best->cost < ORB_FIND_BETTER * given ? write_pairs(t, best, b, out) : ORB_OK;
 }
 
 orb_status orb_candidate_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_candidate *out) {
@@ -496,7 +471,8 @@ orb_status orb_candidate_find(orb_context *ctx, const orb_mesh *a, const orb_mes
   t->ctx = ctx;
   ORB_GO(status, coarse_create(ctx, a, &t->shape[0]), end);
   ORB_GO(status, coarse_create(ctx, b, &t->shape[1]), end);
-  ORB_GO(status, orb_map_spread(ctx, t->shape[0].mesh.positions, t->shape[0].mesh.vertex_count, SAMPLES, t->sample),
+  ORB_GO(status,
+         orb_map_spread(ctx, t->shape[0].mesh.positions, t->shape[0].mesh.vertex_count, ORB_FIND_SAMPLES, t->sample),
          end);
   status = run_all(t, b, out);
 end:

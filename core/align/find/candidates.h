@@ -7,10 +7,11 @@
  *   tip_choice.h     which of these are worth a trial
  *   tip_rotations.h  tip maps by rotations in space
  *   candidates.h     these and spectral maps (align/spectral) are tried on coarse copies and ranked by the energy of
- * their composed maps found.h          the landmarks that an alignment found, and their confidence
+ *                    their composed maps
+ *   found.h          the landmarks that an alignment found, and their confidence
  *
- * Thresholds are constants at the head of each .c file. auto.c decides by the energy of the first map whether to search
- * (near_isometry and others in map/engine/params.h).
+ * params.h has all thresholds. auto.c decides by the energy of the first map whether to search (near_isometry and
+ * others in map/engine/params.h).
  */
 #ifndef ORB_ALIGN_FIND_CANDIDATES_H
 #define ORB_ALIGN_FIND_CANDIDATES_H

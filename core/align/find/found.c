@@ -11,18 +11,11 @@
 #include <string.h>
 
 #include "align/find/found.h"
+#include "align/find/params.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
-
-/* Both chosen by trial on the `auto` rows of docs/bench-truth.md. */
-/* Triangles of the first shape whose distortion gives the confidence of a found landmark. Fewer make it depend on
- * single triangles, more make it less local. */
-enum { PATCH = 64 };
-/* orb_candidate.clear (0 to 1) from which no confidence falls. Below, all fall in proportion: a second candidate is
- * then nearly as good. */
-static const double CLEAR = 0.5;
 
 typedef struct finder {
   const orb_alignment *alignment;
@@ -54,11 +47,11 @@ static double likeness(double p[3][3], double q[3][3], double *area) {
 }
 
 /* The first triangle and those nearest to it over edges. */
-static int32_t take_patch(const finder *f, int32_t first, int32_t patch[PATCH]) {
+static int32_t take_patch(const finder *f, int32_t first, int32_t patch[ORB_FIND_PATCH]) {
   int32_t count = 1;
   patch[0] = first;
   for (int32_t i = 0; i < count; i++) {
-    for (int k = 0; k < 3 && count < PATCH; k++) {
+    for (int k = 0; k < 3 && count < ORB_FIND_PATCH; k++) {
       int32_t t = f->twin[3 * patch[i] + k] / 3, j = 0;
       while (j < count && patch[j] != t) {
         j++;
@@ -118,7 +111,7 @@ static orb_status prepare(orb_context *ctx, finder *f) {
 static orb_status fill(orb_context *ctx, const finder *f, int32_t v, int32_t i, orb_alignment *out) {
   orb_place *at = out->found + (int64_t)i * out->shape_count;
   const double *p = out->shapes[0].points + 3 * (int64_t)v;
-  int32_t patch[PATCH];
+  int32_t patch[ORB_FIND_PATCH];
   ORB_TRY(orb_place_of_vertex(ctx, &out->shapes[0].mesh, v, &at[0]));
   int32_t count = take_patch(f, at[0].triangle, patch);
   memcpy(out->found_points + 3 * (int64_t)i, p, 3 * sizeof *p);
@@ -173,7 +166,7 @@ orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment, double cle
   ORB_GO(status, spread(ctx, &alignment->shapes[0].mesh, vertices, &count), end);
   for (int32_t i = 0; i < count; i++) {
     ORB_GO(status, fill(ctx, &f, vertices[i], i, alignment), end);
-    alignment->confidence[i] *= fmin(1, clear / CLEAR);
+    alignment->confidence[i] *= fmin(1, clear / ORB_FIND_CLEAR);
     alignment->found_count++;
   }
 end:

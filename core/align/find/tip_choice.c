@@ -9,21 +9,12 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/params.h"
 #include "align/find/tip_choice.h"
 #include "align/rotate/procrustes.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
-
-/* All chosen by trial on the `auto` rows of docs/bench-truth.md. */
-/* Radians between two rotations that count as one. Maps are taken alternately from each group, because the best maps by
- * distances alone are often permutations of one map. */
-static const double SAME_GROUP = 1;
-/* Difference of two fits (0 to 1): a map is left out if its mirror image fits better by more than this. */
-static const double MIRRORED = 0.15;
-/* Least factor (0 to 1) of a map's score for how well a rotation fits its tips. A map that no rotation fits keeps this
- * share of its score, so distances still rank such maps. */
-static const double LEAST_FIT = 0.1;
 
 typedef struct group {
   double rotation[9];
@@ -90,7 +81,7 @@ static int is_same_group(const double x[9], const double y[9]) {
   for (int k = 0; k < 9; k++) {
     trace += x[k] * y[k];
   }
-  return trace > 1 + 2 * cos(SAME_GROUP);
+  return trace > 1 + 2 * cos(ORB_FIND_SAME_GROUP);
 }
 
 /* The best map of a group from which the fewest were taken; −1: none is left. */
@@ -125,7 +116,7 @@ orb_status orb_tip_maps_choose(orb_context *ctx, const orb_mesh *const meshes[2]
   for (int32_t i = 0; i < count; i++) {
     ORB_GO(status, fit(ctx, at[0], at[1], tips[0].count, &maps[i], rotation, &value, &mirror), end);
     list[i].group = -1;
-    if (mirror > MIRRORED || !(maps[i].score > 0)) {
+    if (mirror > ORB_FIND_MIRRORED || !(maps[i].score > 0)) {
       continue;
     }
     int32_t w = 0;
@@ -135,7 +126,7 @@ orb_status orb_tip_maps_choose(orb_context *ctx, const orb_mesh *const meshes[2]
     if (w == group_count) {
       memcpy(groups[group_count++].rotation, rotation, sizeof rotation);
     }
-    list[i] = (candidate){maps[i].score * fmax(value, LEAST_FIT), w};
+    list[i] = (candidate){maps[i].score * fmax(value, ORB_FIND_LEAST_FIT), w};
   }
   for (int32_t i; *chosen_count < most && (i = take_next(list, groups, count)) >= 0;) {
     chosen[(*chosen_count)++] = i;

@@ -3,18 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/params.h"
 #include "align/find/tip_maps.h"
-
-/* The spreads and weights were chosen by trial on the `auto` rows of docs/bench-truth.md. */
-enum { LEAST = 3 }; /* tips of a map: two leave the rotation around their axis open */
-/* Two lengths agree by 1 − r², at least WORST, with r the natural logarithm of their ratio over the spread: 1 for equal
- * lengths, 0 for lengths that differ by a factor of exp(spread). PAIR_SPREAD (a factor of 1.42) is for the distance of
- * two tips, FAR_SPREAD (1.28) for a tip's mean distance from the surface. WORST keeps one limb with other proportions
- * from ruling out a map. */
-static const double PAIR_SPREAD = 0.35, FAR_SPREAD = 0.25, WORST = -2;
-/* Weight of the distances, relative to that of directions, where a rotation is known. Directions say more: distances
- * prefer dozens of wrong maps where proportions differ, as for a stout cow and a lean animal. */
-static const double PAIR_SHARE = 0.05;
 
 typedef struct matcher {
   const orb_tips *a, *b;
@@ -93,7 +83,7 @@ static void try_all(matcher *m) {
   }
   while (depth >= 0) {
     if (depth == n) {
-      if (at[n].count >= LEAST) {
+      if (at[n].count >= ORB_FIND_TIPS_LEAST) {
         keep(m, &at[n]);
       }
       depth--;
@@ -125,8 +115,9 @@ static void fill_pairs(matcher *m, double share, double worst) {
     for (int32_t k = 0; k < m->b->count; k++) {
       for (int32_t j = 0; j < m->a->count; j++) {
         for (int32_t l = 0; l < m->b->count; l++) {
-          m->pair[i][j][k][l] =
-              i != j && k != l ? share * agreement(m->a->distance[i][j], m->b->distance[k][l], PAIR_SPREAD, worst) : 0;
+          m->pair[i][j][k][l] = i != j && k != l ? share * agreement(m->a->distance[i][j], m->b->distance[k][l],
+                                                                     ORB_FIND_PAIR_SPREAD, worst)
+                                                 : 0;
         }
       }
     }
@@ -137,10 +128,10 @@ void orb_tip_maps(const orb_tips *a, const orb_tips *b, orb_tip_map out[ORB_TIP_
   matcher m = {.a = a, .b = b, .list = out, .capacity = ORB_TIP_MAPS_MAX};
   for (int32_t i = 0; i < a->count; i++) {
     for (int32_t k = 0; k < b->count; k++) {
-      m.single[i][k] = agreement(a->far[i], b->far[k], FAR_SPREAD, WORST);
+      m.single[i][k] = agreement(a->far[i], b->far[k], ORB_FIND_FAR_SPREAD, ORB_FIND_WORST);
     }
   }
-  fill_pairs(&m, 1, WORST);
+  fill_pairs(&m, 1, ORB_FIND_WORST);
   try_all(&m);
   *count = m.count;
 }
@@ -153,7 +144,7 @@ int orb_tip_map_beside(const orb_tips *a, const orb_tips *b, double (*beside)[OR
       m.ruled_out[i][k] = beside[i][k] <= 0;
     }
   }
-  fill_pairs(&m, PAIR_SHARE, -1);
+  fill_pairs(&m, ORB_FIND_PAIR_SHARE, -1);
   try_all(&m);
   return m.count > 0;
 }

@@ -10,16 +10,12 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/params.h"
 #include "align/find/tip_choice.h"
 #include "align/find/tip_rotations.h"
 #include "align/rotate/procrustes.h"
 #include "base/check.h"
 #include "numeric/vec3.h"
-
-/* Both chosen by trial on the `auto` rows of docs/bench-truth.md. */
-enum { STEPS = 8 }; /* most steps of matching and fitting from one rotation; they end when the map stays the same */
-/* Radians: tips are not matched if their directions are farther apart. */
-static const double APART = 1.0;
 
 /* The i-th of the 24 rotations that map the axes to each other. */
 static void side(int i, double r[9]) {
@@ -45,7 +41,7 @@ static int match(const orb_tips tips[2], double (*at)[ORB_TIPS_MAX][3], const do
     double p[3];
     orb_rotate_point(rotation, at[0][i], p);
     for (int32_t k = 0; k < tips[1].count; k++) {
-      double angle = acos(fmin(1, fmax(-1, orb_dot(p, at[1][k])))) / APART;
+      double angle = acos(fmin(1, fmax(-1, orb_dot(p, at[1][k])))) / ORB_FIND_DIRECTIONS_APART;
       beside[i][k] = 1 - angle * angle;
     }
   }
@@ -88,7 +84,7 @@ orb_status orb_tip_maps_by_rotation(orb_context *ctx, const orb_mesh *const mesh
     orb_tip_map map, last;
     side(i, rotation);
     int found = match(tips, at, rotation, &map), same = 0;
-    for (int step = 0; step < STEPS && found && !same; step++) {
+    for (int step = 0; step < ORB_FIND_STEPS && found && !same; step++) {
       ORB_TRY(orb_context_check(ctx)); /* matching tries up to 1.4 million maps */
       last = map;
       ORB_TRY(fit(ctx, at, tips[0].count, &map, rotation));

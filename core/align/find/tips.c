@@ -8,15 +8,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/params.h"
 #include "align/spectral/distances.h"
 #include "base/check.h"
 #include "base/memory.h"
-
-/* All chosen by trial on the `auto` rows of docs/bench-truth.md. Lengths are along the surface, in units of the mean
- * distance of two points of it. */
-enum { SOURCES = 64 };             /* points from which distances are averaged; each costs one search of the mesh */
-static const double APART = 0.2;   /* tips nearer to each other count as one */
-static const double FARTHER = 1.1; /* least mean distance of a tip: a ball, where it is 1 everywhere, has no tips */
 
 /* The mean distance of every vertex from the sources; *mean: over all vertices. buffer: two doubles a vertex. */
 static orb_status mean_distances(orb_context *ctx, orb_distances *g, double *far, double *buffer, double *mean) {
@@ -26,11 +21,11 @@ static orb_status mean_distances(orb_context *ctx, orb_distances *g, double *far
     far[v] = 0;
     nearest[v] = INFINITY;
   }
-  for (int i = -1; i < SOURCES; i++) { /* round −1 only finds the first source */
+  for (int i = -1; i < ORB_FIND_SOURCES; i++) { /* round −1 only finds the first source */
     orb_distances_from(g, source, one);
     int32_t next = 0;
     for (int32_t v = 0; v < g->vertices; v++) {
-      far[v] += i < 0 ? 0 : one[v] / SOURCES;
+      far[v] += i < 0 ? 0 : one[v] / ORB_FIND_SOURCES;
       nearest[v] = i < 1 || one[v] < nearest[v] ? one[v] : nearest[v];
       next = nearest[v] > nearest[next] ? v : next;
     }
@@ -68,11 +63,11 @@ static int32_t next_peak(const orb_distances *g, const double *far, const unsign
 static orb_status find(orb_context *ctx, orb_distances *g, double *buffer, unsigned char *near, orb_tips *out) {
   double *far = buffer, *one = buffer + g->vertices, mean;
   ORB_TRY(mean_distances(ctx, g, far, one, &mean));
-  for (int32_t v; out->count < ORB_TIPS_MAX && (v = next_peak(g, far, near, FARTHER * mean)) >= 0;) {
+  for (int32_t v; out->count < ORB_TIPS_MAX && (v = next_peak(g, far, near, ORB_FIND_TIP_LEAST * mean)) >= 0;) {
     int is_highest = 1;
     orb_distances_from(g, v, one);
     for (int32_t u = 0; u < g->vertices; u++) {
-      if (one[u] < APART * mean) {
+      if (one[u] < ORB_FIND_TIPS_APART * mean) {
         near[u] = 1;
         is_highest = is_highest && far[u] <= far[v];
       }
