@@ -151,11 +151,11 @@ static void add_gradients(const work *w, const double *function, double *gradien
     }
     (void)orb_normalize(normal);
     for (int k = 0; k < 3; k++) {
-      double edge[3], turned[3];
+      double edge[3], rotated[3];
       orb_sub(w->x + 3 * (size_t)v[(k + 2) % 3], w->x + 3 * (size_t)v[(k + 1) % 3], edge);
-      orb_cross(normal, edge, turned);
+      orb_cross(normal, edge, rotated);
       for (int i = 0; i < 3; i++) {
-        sum[i] += function[v[k]] * turned[i];
+        sum[i] += function[v[k]] * rotated[i];
       }
     }
     for (int k = 0; k < 3; k++) {
@@ -166,18 +166,18 @@ static void add_gradients(const work *w, const double *function, double *gradien
   }
 }
 
-static void fill_turns(const work *w, double *gradient, int mirrored, orb_spectral_shape *out) {
+static void fill_triples(const work *w, double *gradient, int mirrored, orb_spectral_shape *out) {
   size_t n = 3 * (size_t)w->vertices;
-  memset(gradient, 0, ORB_SPECTRAL_TURNING * n * sizeof *gradient);
-  for (int k = 0; k < ORB_SPECTRAL_TURNING; k++) {
+  memset(gradient, 0, ORB_SPECTRAL_GRADIENTS * n * sizeof *gradient);
+  for (int k = 0; k < ORB_SPECTRAL_GRADIENTS; k++) {
     add_gradients(w, out->function + (size_t)(k + 1) * (size_t)w->vertices, gradient + (size_t)k * n);
   }
   for (int s = 0; s < ORB_SPECTRAL_SAMPLES; s++) {
     size_t v = 3 * (size_t)out->sample[s];
-    for (int i = 0, at = 0; i < ORB_SPECTRAL_TURNING; i++) {
-      for (int k = i + 1; k < ORB_SPECTRAL_TURNING; k++, at++) {
-        double turn = orb_det(w->normal + v, gradient + (size_t)i * n + v, gradient + (size_t)k * n + v);
-        out->turn[at][s] = (float)(mirrored ? -turn : turn);
+    for (int i = 0, at = 0; i < ORB_SPECTRAL_GRADIENTS; i++) {
+      for (int k = i + 1; k < ORB_SPECTRAL_GRADIENTS; k++, at++) {
+        double triple = orb_det(w->normal + v, gradient + (size_t)i * n + v, gradient + (size_t)k * n + v);
+        out->triple[at][s] = (float)(mirrored ? -triple : triple);
       }
     }
   }
@@ -188,7 +188,7 @@ static orb_status fill(work *w, const orb_mesh *mesh, int mirrored, orb_spectral
   size_t n = (size_t)w->vertices;
   orb_distances distances = {0};
   orb_mesh scaled = *mesh;
-  double *buffer = ORB_NEW(w->ctx, double, 3 * ORB_SPECTRAL_TURNING * n);
+  double *buffer = ORB_NEW(w->ctx, double, 3 * ORB_SPECTRAL_GRADIENTS * n);
   int32_t *owner = ORB_NEW(w->ctx, int32_t, n);
   if (!buffer || !owner) {
     goto end;
@@ -204,7 +204,7 @@ static orb_status fill(work *w, const orb_mesh *mesh, int mirrored, orb_spectral
     spread(w, &distances, buffer, owner, out);
     fill_samples(w, out);
     fill_heights(w, out);
-    fill_turns(w, buffer, mirrored, out);
+    fill_triples(w, buffer, mirrored, out);
   }
 end:
   orb_distances_free(w->ctx, &distances);

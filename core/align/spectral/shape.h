@@ -7,9 +7,9 @@
 enum {
   ORB_SPECTRAL_FUNCTIONS = 31, /* eigenfunctions, the constant one included */
   ORB_SPECTRAL_SAMPLES = 160,
-  ORB_SPECTRAL_DETAILS = 3, /* the first 40, the first 80, or all samples represent the shape */
-  ORB_SPECTRAL_TURNING = 6, /* functions whose gradients are compared */
-  ORB_SPECTRAL_TURNS = ORB_SPECTRAL_TURNING * (ORB_SPECTRAL_TURNING - 1) / 2 /* pairs of them */
+  ORB_SPECTRAL_DETAILS = 3,   /* the first 40, the first 80, or all samples represent the shape */
+  ORB_SPECTRAL_GRADIENTS = 6, /* functions whose gradients are compared */
+  ORB_SPECTRAL_TRIPLES = ORB_SPECTRAL_GRADIENTS * (ORB_SPECTRAL_GRADIENTS - 1) / 2 /* pairs of them */
 };
 
 /* In units in which the area is 1. Functions are orthonormal under the lumped mass. Samples are spread by farthest
@@ -24,7 +24,7 @@ typedef struct orb_spectral_shape {
   /* Of the area, nearest to each sample among the first orb_spectral_samples(detail); the sum is 1. */
   double share[ORB_SPECTRAL_DETAILS][ORB_SPECTRAL_SAMPLES];
   /* normal · (gradient of i × gradient of k) at each sample, i < k, row by row: changes sign under a mirror image */
-  float turn[ORB_SPECTRAL_TURNS][ORB_SPECTRAL_SAMPLES];
+  float triple[ORB_SPECTRAL_TRIPLES][ORB_SPECTRAL_SAMPLES];
   float *distance; /* along the surface, samples × samples */
   float *height;   /* of sample k over the tangent plane at sample i: [i · samples + k] */
 } orb_spectral_shape;

@@ -1,11 +1,11 @@
-/* ZoomOut (Melzi et al. 2019) in both directions, that minds orientation.
+/* ZoomOut (Melzi et al. 2019) in both directions, which also compares orientation.
  *
  * Each step brings the functions of one shape to the other by the present matrix, takes the nearest sample there for
  * every sample, in both directions, and fits a matrix of more functions to both maps of samples; the nearest orthogonal
- * matrix is the next one. Functions alone do not tell left from right, nor front from back; but the gradients of two
- * functions turn one way on one side and the other way on the other, seen from outside. So the turns of the first
- * functions, brought over like these and scaled to unit length, are further coordinates. Once the matrix says which
- * side is left, they tell front from back at once, so that mirror images are not found at all.
+ * matrix is the next one. Functions alone do not tell left from right, nor front from back. But the triple product of
+ * the normal and the gradients of two functions has one sign on one side and the other sign on the other. So the triple
+ * products of the first functions, brought over like the functions and scaled to unit length, are further coordinates.
+ * Once the matrix says which side is left, they tell front from back, and no mirror image is found.
  */
 #include "align/spectral/zoom.h"
 
@@ -17,7 +17,7 @@
 
 /* Chosen by trial on the pairs of posed people with even numbers (tests/bench/correspond.py --half tune). */
 static const int level_size[ORB_ZOOM_LEVELS] = {7, 9, 12, 16, 20, 25, 31};
-static const float level_turn[ORB_ZOOM_LEVELS] = {2, 2, 2, 2, 1, 1, 0}; /* weight of the turns */
+static const float level_triple[ORB_ZOOM_LEVELS] = {2, 2, 2, 2, 1, 1, 0}; /* weight of the triple products */
 static const int level_detail[ORB_ZOOM_LEVELS] = {0, 0, 1, 1, 2, 2, 2};
 
 static const double ORTHOGONAL = 1e-3; /* a matrix times its transpose is nearer than this to the identity */
@@ -25,7 +25,7 @@ static const double ORTHOGONAL = 1e-3; /* a matrix times its transpose is nearer
 enum {
   S = ORB_SPECTRAL_SAMPLES,
   K = ORB_SPECTRAL_FUNCTIONS,
-  COORDINATES = K + ORB_SPECTRAL_TURNS,
+  COORDINATES = K + ORB_SPECTRAL_TRIPLES,
   POLAR = 10 /* most steps to the nearest orthogonal matrix */
 };
 
@@ -90,10 +90,10 @@ void orb_zoom_start(const int to[ORB_ZOOM_START - 1], uint32_t signs, orb_zoom *
   }
 }
 
-/* The turns of shape a as those of the functions of b that the map brings to it: they are 2 × 2 minors, so the second
- * compound matrix of the map takes them there. Turns of functions beyond the map's are 0. */
-static void bring_turns(const orb_zoom_pair *pair, const orb_zoom *map, float (*out)[S]) {
-  enum { N = ORB_SPECTRAL_TURNING };
+/* The triple products of shape a as those of the functions of b that the map brings to it: they are 2 × 2 minors, so
+ * the second compound matrix of the map takes them there. Those of functions beyond the map's are 0. */
+static void bring_triples(const orb_zoom_pair *pair, const orb_zoom *map, float (*out)[S]) {
+  enum { N = ORB_SPECTRAL_GRADIENTS };
   const double(*m)[K] = map->matrix;
   int known = map->size - 1 < N ? map->size - 1 : N, samples = orb_spectral_samples(map->detail), row = 0;
   for (int i = 0; i < N; i++) {
@@ -101,10 +101,10 @@ static void bring_turns(const orb_zoom_pair *pair, const orb_zoom *map, float (*
       memset(out[row], 0, sizeof out[row]);
       for (int p = 0, column = 0; p < N; p++) {
         for (int q = p + 1; q < N; q++, column++) {
-          const float *turn = pair->shape[0]->turn[column];
+          const float *triple = pair->shape[0]->triple[column];
           float minor = (float)(m[i + 1][p + 1] * m[k + 1][q + 1] - m[i + 1][q + 1] * m[k + 1][p + 1]);
           for (int s = 0; s < samples && k < known && q < known && minor != 0; s++) {
-            out[row][s] += minor * turn[s];
+            out[row][s] += minor * triple[s];
           }
         }
       }
@@ -112,12 +112,12 @@ static void bring_turns(const orb_zoom_pair *pair, const orb_zoom *map, float (*
   }
 }
 
-/* The turns of shape b; those of functions beyond the map's are 0. */
-static void copy_turns(const orb_zoom_pair *pair, const orb_zoom *map, float (*out)[S]) {
-  for (int i = 0, row = 0; i < ORB_SPECTRAL_TURNING; i++) {
-    for (int k = i + 1; k < ORB_SPECTRAL_TURNING; k++, row++) {
+/* The triple products of shape b; those of functions beyond the map's are 0. */
+static void copy_triples(const orb_zoom_pair *pair, const orb_zoom *map, float (*out)[S]) {
+  for (int i = 0, row = 0; i < ORB_SPECTRAL_GRADIENTS; i++) {
+    for (int k = i + 1; k < ORB_SPECTRAL_GRADIENTS; k++, row++) {
       if (k < map->size - 1) {
-        memcpy(out[row], pair->shape[1]->turn[row], sizeof out[row]);
+        memcpy(out[row], pair->shape[1]->triple[row], sizeof out[row]);
       } else {
         memset(out[row], 0, sizeof out[row]);
       }
@@ -125,27 +125,27 @@ static void copy_turns(const orb_zoom_pair *pair, const orb_zoom *map, float (*o
   }
 }
 
-/* Scales the turns at each sample to this length. */
-static void scale_turns(float (*turn)[S], int samples, float length) {
+/* Scales the triple products at each sample to this length. */
+static void scale_triples(float (*triple)[S], int samples, float length) {
   float sum[S] = {0};
-  for (int i = 0; i < ORB_SPECTRAL_TURNS; i++) {
+  for (int i = 0; i < ORB_SPECTRAL_TRIPLES; i++) {
     for (int s = 0; s < samples; s++) {
-      sum[s] += turn[i][s] * turn[i][s];
+      sum[s] += triple[i][s] * triple[i][s];
     }
   }
   for (int s = 0; s < samples; s++) {
     sum[s] = sum[s] > 0 ? length / sqrtf(sum[s]) : 0;
   }
-  for (int i = 0; i < ORB_SPECTRAL_TURNS; i++) {
+  for (int i = 0; i < ORB_SPECTRAL_TRIPLES; i++) {
     for (int s = 0; s < samples; s++) {
-      turn[i][s] *= sum[s];
+      triple[i][s] *= sum[s];
     }
   }
 }
 
 static void fill_features(const orb_zoom_pair *pair, const orb_zoom *map, float weight, features *f) {
   int samples = orb_spectral_samples(map->detail);
-  f->count = map->size + (weight > 0 ? ORB_SPECTRAL_TURNS : 0);
+  f->count = map->size + (weight > 0 ? ORB_SPECTRAL_TRIPLES : 0);
   for (int i = 0; i < map->size; i++) {
     memset(f->brought[i], 0, sizeof f->brought[i]);
     memcpy(f->there[i], pair->shape[1]->at[i], sizeof f->there[i]);
@@ -157,10 +157,10 @@ static void fill_features(const orb_zoom_pair *pair, const orb_zoom *map, float 
     }
   }
   if (weight > 0) {
-    bring_turns(pair, map, f->brought + map->size);
-    copy_turns(pair, map, f->there + map->size);
-    scale_turns(f->brought + map->size, samples, weight);
-    scale_turns(f->there + map->size, samples, weight);
+    bring_triples(pair, map, f->brought + map->size);
+    copy_triples(pair, map, f->there + map->size);
+    scale_triples(f->brought + map->size, samples, weight);
+    scale_triples(f->there + map->size, samples, weight);
   }
 }
 
@@ -322,7 +322,7 @@ static void fit_matrix(const orb_zoom_pair *pair, int level, orb_zoom *map) {
 static void match(const orb_zoom_pair *pair, int level, orb_zoom *map) {
   features f;
   map->detail = level_detail[level];
-  fill_features(pair, map, level_turn[level], &f);
+  fill_features(pair, map, level_triple[level], &f);
   match_samples(&f, orb_spectral_samples(map->detail), map);
 }
 
@@ -363,11 +363,11 @@ double orb_zoom_facing(const orb_zoom_pair *pair, const orb_zoom *map) {
   const double *share = pair->shape[0]->share[map->detail];
   int samples = orb_spectral_samples(map->detail);
   double sum = 0;
-  bring_turns(pair, map, f.brought);
-  copy_turns(pair, map, f.there);
-  scale_turns(f.brought, samples, 1);
-  scale_turns(f.there, samples, 1);
-  for (int i = 0; i < ORB_SPECTRAL_TURNS; i++) {
+  bring_triples(pair, map, f.brought);
+  copy_triples(pair, map, f.there);
+  scale_triples(f.brought, samples, 1);
+  scale_triples(f.there, samples, 1);
+  for (int i = 0; i < ORB_SPECTRAL_TRIPLES; i++) {
     for (int s = 0; s < samples; s++) {
       sum += share[s] * (double)(f.brought[i][s] * f.there[i][map->forth[s]]);
     }
