@@ -5,19 +5,18 @@
  * shapes share one sphere and are all certified. docs/method.md describes the methods and docs/glossary.md the terms.
  * Read in this order; a file calls only files and folders before it:
  *
- *   sheet/     the working copy of a shape, which can be refined, and landmarks as its vertices
- *   rotate/    method `rotate`: rotations of whole spheres, by landmarks or by search
- *   pin/       method `pin`: landmarks as constraints of the embeddings
- *   rbf/       method `rbf`: the warp of Peng & Timalsena 2016
- *   map/       the composed map, from one shape through the sphere to the other, and its optimiser
- *   given.c    one method with the given landmarks, then the composed map
- *   spectral/  maps from eigenfunctions, as candidates
- *   find/      candidates, where no landmarks are given
- *   auto.c     method `auto`: given.c with the best candidate from find/
- *   align.c    orb_align(): checks the request and chooses between given.c and auto.c
+ *   sheet/   the working copy of a shape, which can be refined, and landmarks as its vertices
+ *   rotate/  method `rotate`: rotations of whole spheres, by landmarks or by search
+ *   pin/     method `pin`: landmarks as constraints of the embeddings
+ *   rbf/     method `rbf`: the warp of Peng & Timalsena 2016
+ *   map/     the composed map, from one shape through the sphere to the other, and its optimiser
+ *   given.c  one method with the given landmarks, then the composed map
+ *   find/    candidates, where no landmarks are given
+ *   auto.c   method `auto`: given.c with the best candidate from find/
+ *   align.c  orb_align(): checks the request and chooses between given.c and auto.c
  *
  * The main header of each folder says what comes in, what goes out, and in which order to read its files:
- * sheet/sheet.h, rotate/rotate.h, pin/pin.h, rbf/rbf.h, map/compose.h, spectral/spectral.h, find/candidates.h.
+ * sheet/sheet.h, rotate/rotate.h, pin/pin.h, rbf/rbf.h, map/compose.h, find/candidates.h.
  */
 #ifndef ORB_ALIGN_METHODS_H
 #define ORB_ALIGN_METHODS_H

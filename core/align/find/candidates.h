@@ -6,8 +6,9 @@
  *   tip_maps.h       tip maps whose distances agree
  *   tip_choice.h     which of these are worth a trial
  *   tip_rotations.h  tip maps by rotations in space
- *   candidates.h     these and spectral maps (align/spectral) are tried on coarse copies and ranked by the energy of
- *                    their composed maps
+ *   spectral/        spectral maps; spectral.h has their order
+ *   candidates.h     tip maps and spectral maps are tried on coarse copies and ranked by the energy of their composed
+ *                    maps
  *   found.h          the landmarks that an alignment found, and their confidence
  *
  * params.h has all thresholds. auto.c decides by the energy of the first map whether to search (near_isometry and

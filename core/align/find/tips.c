@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "align/find/params.h"
-#include "align/spectral/distances.h"
+#include "align/find/spectral/distances.h"
 #include "base/check.h"
 #include "base/memory.h"
 

@@ -1,12 +1,12 @@
 /* The Laplace–Beltrami operator of linear finite elements: cotangent weights (Pinkall & Polthier 1993) and lumped
  * mass, a third of the area around each vertex. */
-#include "align/spectral/shape.h"
+#include "align/find/spectral/shape.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "align/spectral/distances.h"
-#include "align/spectral/eigen.h"
+#include "align/find/spectral/distances.h"
+#include "align/find/spectral/eigen.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"

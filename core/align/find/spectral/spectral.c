@@ -1,12 +1,12 @@
 /* The starts: each of the first five eigenfunctions after the constant one goes to one of the same five of the other
  * shape, as it is or negated. 14 orders of them, each with 32 choices of signs, make 448 maps. They are refined in
  * stages; after each stage the best that differ go on. */
-#include "align/spectral/spectral.h"
+#include "align/find/spectral/spectral.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "align/spectral/cost.h"
+#include "align/find/spectral/cost.h"
 #include "base/check.h"
 #include "base/loops.h"
 #include "base/memory.h"

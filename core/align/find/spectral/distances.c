@@ -1,4 +1,4 @@
-#include "align/spectral/distances.h"
+#include "align/find/spectral/distances.h"
 
 #include <math.h>
 
