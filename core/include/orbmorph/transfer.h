@@ -13,7 +13,7 @@ ORB_API ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const
                                                          const orb_place *places, int32_t count, double *out);
 
 /* How well shape s is reproduced; lengths in its own units. Samples are face centres, edge midpoints and vertices: all
- * where no bound is proved, else at most 4096 of each kind and surface, which settle rms and angles to some 2 %. */
+ * where no bound is proved, else at most 4096 of each kind and surface, which give rms and angles to about 2 %. */
 typedef struct orb_shape_report {
   double hausdorff;               /* the supermesh's proved bound, both ways; NaN: none is proved */
   double hausdorff_sampled;       /* both ways, at the samples; apart from rounding, never above the true distance */
