@@ -236,7 +236,7 @@ static void print_help(void) {
       "  orbmorphd key add NAME [--tenant NAME] [--origin URL]… [--requests-per-day N] [--cpu-seconds-per-day N]\n"
       "  orbmorphd key rotate NAME [--overlap 7d]\n"
       "  orbmorphd key list | key remove NAME\n"
-      "                                 manage the keys of signed URLs, likewise\n"
+      "                                 manage the keys of signed URLs\n"
       "  orbmorphd --version, --help\n\n"
       "Each NAME is also an environment variable (ORBMORPH_NAME) and a line of the config file. A flag overrides the\n"
       "environment, which overrides the file, which overrides the default in brackets.\n");

@@ -12,7 +12,7 @@ typedef struct ply_reader {
   orb_text text;
   const unsigned char *begin;
   ply_header header;
-  double color_scale; /* of the present element */
+  double color_scale; /* of the current element */
 } ply_reader;
 
 static orb_status malformed(ply_reader *r, const char *what) {

@@ -22,7 +22,7 @@ enum { SMALL = 48 }; /* edges; least area takes O(edges³) time and the tables b
 
 typedef struct fill {
   orb_surface *s;
-  int32_t *loop;   /* open half-edges of the present loop, in the order of the new faces */
+  int32_t *loop;   /* open half-edges of the current loop, in the order of the new faces */
   int32_t *vertex; /* their origins */
   int32_t *cut;    /* its triangulation: 3 indices into loop for each triangle */
   orb_polygon polygon;

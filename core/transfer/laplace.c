@@ -14,7 +14,7 @@ enum { MAX_ITERATIONS = 3000 }; /* some hundred are usual; rounding must not kee
 typedef struct solver {
   const orb_edge_graph *graph;
   double *x, *r, *p, *q;
-  orb_coarse *coarse; /* its sums are the correction of the present r */
+  orb_coarse *coarse; /* its sums are the correction of the current r */
   double (*sums)[3];  /* per chunk */
   double step[3];
   double beta[3];

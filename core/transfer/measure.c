@@ -28,8 +28,8 @@
 #include "transfer/inside.h"
 
 enum { GRAIN = 256 }; /* samples a thread takes at a time; the sums, and so the result, depend on it */
-/* Samples of a kind on a surface with a proved bound. Other samples of that number change the rms and the mean angle by
- * some 2 %. */
+/* Samples of a kind on a surface with a proved bound. As many other samples change the rms and the mean angle by about
+ * 2 %. */
 enum { ENOUGH = 4096 };
 enum { AREA_GRAIN = 4096 }; /* triangles; the mean area depends on it */
 enum { BINS = 18000 };      /* of the histogram of angles: a hundredth of a degree each */

@@ -21,7 +21,7 @@ static void add_headers(request *r, const char *mime, const char *name, int vari
   if (varies && (!r->coded || r->status == 304)) {
     reply_header(r, "Vary", "Accept-Encoding");
   }
-  if (r->signer) { /* whoever has the URL may see it until it expires */
+  if (r->signer) { /* anyone with the URL may read it until it expires */
     snprintf(control, sizeof control, "public, max-age=%lld",
              (long long)(left < 0        ? 0
                          : left < YEAR_S ? left

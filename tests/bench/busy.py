@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""What a job's wall time is on a busy machine, beside its CPU time.
+"""Measures the wall time and the CPU time of a job on a busy machine.
 
     tests/bench/busy.py [--bin build/bin] [--base BIN] [--loops 8] [--threads 2] [--repeat 5] [--job JOB]... [FILE...]
 
-Runs each job, by turns with every program given, at rest and beside so many busy loops. A loop gets what the scheduler
+Runs each job with --base and --bin alternately, at rest and beside --loops busy loops. A loop gets what the scheduler
 gives a thread that always wants to run, so the share of a job of T threads is T times what the loops get on average,
-measured while it runs. The best it can do is to take CPU / share of wall time; `stretch` is its wall time over that.
+measured while it runs. At best the job takes CPU / share of wall time; `stretch` is its wall time over that.
 At rest the share is T cores. Jobs are `embed`, one shape ten times, and `merge`, two shapes (both unless --job names
 one). Standard library only; Linux.
 """

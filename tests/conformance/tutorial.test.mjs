@@ -82,7 +82,7 @@ test('the tutorial ends with a page that morphs', async (t) => {
     } = readPng(dog);
     shown = difference(rgb, Buffer.from(Array.from({ length: rgb.length }, (_, k) => rgb[k % 3])));
   }
-  assert.ok(shown > 0.02, 'an animal is to be seen');
+  assert.ok(shown > 0.02, 'an animal is visible');
   const half = await shot(0.5);
   const elephant = await shot(1);
   assert.ok(difference(readPng(dog).frames[0], readPng(elephant).frames[0]) > 0.03, 'the shapes differ');

@@ -60,7 +60,7 @@ test('the default morph replaces the fast one and keeps time, camera and view', 
   await page.locator('.pane-view').first().focus();
   for (let i = 0; i < 4; i++) await page.keyboard.press('ArrowLeft');
   await page.getByRole('switch', { name: 'Wireframe' }).check();
-  const turned = await until(() => camera(page), 'the address names the camera');
+  const rotated = await until(() => camera(page), 'the address names the camera');
   const fast = page.url().match(/[#&]r=([0-9a-f]+)/)[1];
   open();
   await defaultShown(page);
@@ -72,7 +72,7 @@ test('the default morph replaces the fast one and keeps time, camera and view', 
     const id = page.url().match(/[#&]r=([0-9a-f]+)/)?.[1];
     return id !== fast && id;
   }, 'the address names the default morph');
-  assert.equal(camera(page), turned);
+  assert.equal(camera(page), rotated);
   const waiting = page.waitForEvent('download');
   await page.getByRole('link', { name: 'Download GLB' }).click();
   assert.ok((await waiting).url().includes(now), 'the default morph is downloaded');

@@ -41,7 +41,7 @@ typedef struct walker {
   orb_refiner *refiner;
   const int32_t *landmarks; /* which of the request */
   int32_t count;
-  int32_t *vertices, *triangles; /* of the present level */
+  int32_t *vertices, *triangles; /* of the current level */
   int32_t vertex_count, triangle_count;
   int32_t *link_start, *link; /* for each landmark the far edges of its triangles, two vertices each */
 } walker;

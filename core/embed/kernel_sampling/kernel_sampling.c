@@ -44,7 +44,7 @@ typedef struct orb_ks_run {
   orb_kernel_room kernel_room;
   double *x;                                        /* positions, total area 4π */
   double *P;                                        /* the result: 3 a vertex */
-  double *displacement;                             /* of each active vertex in the present iteration */
+  double *displacement;                             /* of each active vertex in the current iteration */
   int32_t *active, *next, active_count, next_count; /* vertices of this iteration, and of the next one */
   int32_t *stamp, stamp_value;
   int32_t *recent, recent_count; /* inserted since the last optimisation */

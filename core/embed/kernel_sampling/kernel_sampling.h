@@ -19,7 +19,7 @@
  *   optimised at once, in 3 sweeps. Where doubles still cannot hold a kernel, its surroundings are optimised with φ = 1
  *   and the insertion is tried again; as a last resort everything is done again with more sweeps.
  * - A ring squeezed to 1e-4 of its area is measured with φ = 1: shape alone can no longer repair its triangles.
- * - In Algorithm 1 the present point of the vertex competes with the samples, so the error never rises. A vertex takes
+ * - In Algorithm 1 the current point of the vertex competes with the samples, so the error never rises. A vertex takes
  *   part in an iteration if it or a neighbour moved in the one before: any other would find what it found then. neiDisp
  *   is the sum of those displacements, as in lines 4 and 12. The paper does not give max_iterations; here it is 25,
  *   while Table 1 has 10 to 24 on average.

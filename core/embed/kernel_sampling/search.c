@@ -2,9 +2,9 @@
  *
  * `kernel-sampling` spends most of its time here. Three things make it fast. Coordinates are relative to the vertex and
  * divided by the ring's radius, so that floats serve small rings as well as large ones. All terms of Eq. 3 are
- * positive, so a candidate is dropped as soon as its sum reaches the present error: high exponents drop most of them
- * after one or two triangles. And the sum is scaled so that the present error is 1: what overflows is worse than the
- * present point, and what underflows does not count.
+ * positive, so a candidate is dropped as soon as its sum reaches the current error: high exponents drop most of them
+ * after one or two triangles. And the sum is scaled so that the current error is 1: what overflows is worse than the
+ * current point, and what underflows does not count.
  *
  * The winner is measured again in double precision, and its signs are decided exactly. Loops run over candidates; the
  * same source is compiled for several vector widths, without contraction, so that all give the same bits.

@@ -8,7 +8,7 @@
  * vertices stay where they are, bit for bit. */
 ORB_MUST_CHECK orb_status orb_refiner_advance(orb_context *ctx, orb_refiner *refiner, int32_t vertices);
 
-/* `sweeps` Gauss–Seidel sweeps over the present level; *gain (may be NULL): by what share the last lowers the energy.
+/* `sweeps` Gauss–Seidel sweeps over the current level; *gain (may be NULL): by what share the last lowers the energy.
  */
 ORB_MUST_CHECK orb_status orb_refiner_sweep(orb_context *ctx, orb_refiner *refiner, int32_t sweeps, double *gain);
 

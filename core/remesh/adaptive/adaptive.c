@@ -169,7 +169,7 @@ static orb_status reduce_inverted(orb_context *ctx, const orb_remesh_job *job, o
   }
   orb_status status = start_from_overlay(ctx, job, tolerance, placed);
   if (status == ORB_E_NOT_CERTIFIED && !needed) {
-    orb_error_clear(ctx); /* the present net keeps the bound too, with more triangles inverted */
+    orb_error_clear(ctx); /* the current net keeps the bound too, with more triangles inverted */
     return ORB_OK;
   }
   return status == ORB_OK ? begin(ctx, placed, tolerance * tolerance) : status;

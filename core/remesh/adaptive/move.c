@@ -1,7 +1,7 @@
 /* Moves vertices on the sphere to where the triangles around them are better shaped and their edges deviate less.
  *
  * A vertex tries points on the way to its neighbours and to their middle. Of the points for which every matched
- * distance stays within the limit, it takes the one of least cost, if that is clearly below the present cost: the forms
+ * distance stays within the limit, it takes the one of least cost, if that is clearly below the current cost: the forms
  * of the triangles, plus the squared distances of the edges in units of the limit. */
 #include "remesh/adaptive/move.h"
 

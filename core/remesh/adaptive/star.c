@@ -34,7 +34,7 @@ typedef struct disc {
   side side[MOST]; /* counter-clockwise */
   int count, n, inner_count;
   int located;      /* p is located on the shapes, which is done when first needed */
-  double own[DISC]; /* the inverted extent of each present triangle; −1: not known yet */
+  double own[DISC]; /* the inverted extent of each current triangle; −1: not known yet */
   int32_t far_end,
       far_shape; /* the edge to this vertex was beyond the limit for another point, on this shape; −1: none */
 } disc;

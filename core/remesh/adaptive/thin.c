@@ -20,7 +20,7 @@
 enum { RING_MAX = 14 }; /* vertices with more neighbours stay, and no collapse makes one */
 /* Thresholds of the sweeps, in units of the squared limit: more sweeps come nearer to the order of cost. */
 static const double SWEEP[] = {0.01, 0.1, 0.4, 1, 1, 1};
-/* A triangle may get thinner until its quality is LEAST_QUALITY, and turn until its facing is LEAST_FACING (form.h says
+/* A triangle may get thinner until its quality is LEAST_QUALITY, and tilt until its facing is LEAST_FACING (form.h says
  * what they are): lower values leave needles and inverted triangles to the start, higher ones more triangles. */
 static const double LEAST_QUALITY = 0.02, LEAST_FACING = 0.2;
 
@@ -88,8 +88,8 @@ static void take_form(const thinner *t, int32_t v, int32_t a, int32_t b, form *l
   }
 }
 
-/* Whether the fan of v over the ring may replace the star of u: no triangle is thinner, or turned farther from the
- * shape's normals, than is fine and than the worst so far. */
+/* Whether the fan of v over the ring may replace the star of u: no triangle is thinner, or tilted farther from the
+ * shape's normals, than both the threshold and the worst triangle of the star. */
 static int forms_allow(const thinner *t, int32_t u, int32_t v, const int32_t *edge, int n) {
   const int32_t *corner = t->net->triangles;
   form after = {1, 1}, before = {1, 1};

@@ -33,7 +33,7 @@ static inline int32_t orb_spectral_samples(int detail) {
   return ORB_SPECTRAL_SAMPLES >> (ORB_SPECTRAL_DETAILS - 1 - detail);
 }
 
-/* `out` is to be freed in any case; the mesh must outlive it. mirrored: as if the surface were its mirror image. */
+/* Free `out` in any case; the mesh must outlive it. mirrored: as if the surface were its mirror image. */
 ORB_MUST_CHECK orb_status orb_spectral_shape_create(orb_context *ctx, const orb_mesh *mesh, int mirrored,
                                                     orb_spectral_shape *out);
 void orb_spectral_shape_free(orb_context *ctx, orb_spectral_shape *shape);

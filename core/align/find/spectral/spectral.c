@@ -34,7 +34,7 @@ typedef struct search {
   orb_context *ctx;
   orb_spectral_shape shape[2];
   orb_zoom_pair pair;
-  int from, to; /* levels of the present loop */
+  int from, to; /* levels of the current loop */
   int32_t count;
   int32_t order[STARTS];
   orb_zoom map[STARTS];

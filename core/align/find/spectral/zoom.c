@@ -1,6 +1,6 @@
 /* ZoomOut (Melzi et al. 2019) in both directions, which also compares orientation.
  *
- * Each step brings the functions of one shape to the other by the present matrix, takes the nearest sample there for
+ * Each step brings the functions of one shape to the other by the current matrix, takes the nearest sample there for
  * every sample, in both directions, and fits a matrix of more functions to both maps of samples; the nearest orthogonal
  * matrix is the next one. Functions alone do not tell left from right, nor front from back. But the triple product of
  * the normal and the gradients of two functions has one sign on one side and the other sign on the other. So the triple

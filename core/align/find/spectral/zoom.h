@@ -22,7 +22,7 @@ typedef struct orb_zoom_pair {
   double *fit[2][ORB_ZOOM_LEVELS]; /* from values at samples to coefficients: functions × samples */
 } orb_zoom_pair;
 
-/* `out` is to be freed in any case. The shapes must be usable and outlive it. */
+/* Free `out` in any case. The shapes must be usable and outlive it. */
 ORB_MUST_CHECK orb_status orb_zoom_pair_create(orb_context *ctx, const orb_spectral_shape *a,
                                                const orb_spectral_shape *b, orb_zoom_pair *out);
 void orb_zoom_pair_free(orb_context *ctx, orb_zoom_pair *pair);

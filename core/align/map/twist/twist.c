@@ -26,7 +26,7 @@ typedef struct twist_run {
   const orb_map_surface *b;
   const orb_map_image *map;
   double *back;    /* where each vertex of the surface comes from, 3 each */
-  double *height;  /* in the present limb */
+  double *height;  /* in the current limb */
   double *rotated; /* angle of every vertex's surroundings against the whole */
   int32_t *part;   /* representative of each vertex's part; union-find */
   int32_t *corner; /* a half-edge out of each vertex */
@@ -318,7 +318,7 @@ int orb_map_twists_undo(const orb_map_twists *twists, const orb_map_surface *b, 
   return orb_map_limb_rotate(b, twists->height, -share * angle, place);
 }
 
-/* Adds the present limb to the list if it is twisted. Limbs stay apart: its neighbours are closed to other limbs. */
+/* Adds the current limb to the list if it is twisted. Limbs stay apart: its neighbours are closed to other limbs. */
 static orb_status add_limb(twist_run *run, int32_t pole, orb_map_twists *out) {
   int32_t n = run->b->vertex_count;
   orb_map_twist limb = {.pole = pole};
