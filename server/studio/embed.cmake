@@ -58,7 +58,7 @@ function(orb_embed_studio target dist)
     math(EXPR number "${number} + 1")
   endforeach()
 
-  set(text "/* Generated from client/web/dist. */\n#include \"studio/file.h\"\n\n")
+  set(text "/* Generated from client/web/dist. */\n#include \"studio/studio.h\"\n\n")
   if(number EQUAL 0)
     string(APPEND text "const orb_studio_file orb_studio_table[1] = {{0}};\nconst size_t orb_studio_count = 0;\n")
   else()

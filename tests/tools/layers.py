@@ -6,7 +6,7 @@
 A unit is a source file together with the header of its name. An arrow runs from unit A to unit B where A includes B's
 header, or an object file of A uses a symbol that B defines (nm). In TypeScript and JavaScript an arrow is an import.
 --list prints the arrows between folders. Exit status 1: a circle or an upward arrow; each is printed with its cause.
-Standard library only; needs nm and git.
+It also counts the entries of folders in MOST_ENTRIES. Standard library only; needs nm and git.
 """
 import collections
 import os
@@ -32,6 +32,7 @@ ORDER = [
     "client/cli", "client/js/src", "client/web/src/mesh", "client/web/src/view", "client/web/src/theme",
     "client/web/src/state", "client/web/src/player", "client/web/src/actions", "client/web/src/url", "client/web/src/ui",
     "client/web/src/main"]
+MOST_ENTRIES = {"core/align": 10}  # files and folders directly in a folder: its parts are seen at once
 SOURCE = re.compile(r"\.(inc\.h|c|h|cc|hh)$")
 SCRIPT = re.compile(r"\.(d\.ts|tsx|ts|mjs|js)$")
 
@@ -160,6 +161,11 @@ def main():
             elif None not in (level(one), level(other)) and level(other) > level(one):
                 faults += 1
                 print(f"upward: {one} -> {other}: {', '.join(sorted(arrows[one][other])[:4])}")
+    for folder, most in MOST_ENTRIES.items():
+        entries = {file[len(folder) + 1:].split("/")[0] for file in tracked(folder)}
+        if len(entries) > most:
+            faults += 1
+            print(f"{folder} has {len(entries)} entries, at most {most}: {' '.join(sorted(entries))}")
     if listing:
         folders = collections.defaultdict(set)
         for one in arrows:

@@ -11,7 +11,7 @@
 
 #include "embed/common/kernel.h"
 #include "embed/newton/advance.h"
-#include "embed/newton/resume.h"
+#include "embed/newton/refiner.h"
 #include "embed/newton/vector/loops.h"
 #include "support_context.h"
 #include "support_exact.h"

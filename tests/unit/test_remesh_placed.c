@@ -16,7 +16,7 @@
 #include "remesh/adaptive/resolve.h"
 #include "remesh/adaptive/star.h"
 #include "remesh/adaptive/start.h"
-#include "remesh/common/net_export.h"
+#include "remesh/common/supermesh.h"
 #include "remesh/placed/bound.h"
 #include "remesh/placed/distance.h"
 #include "remesh/placed/export.h"

@@ -10,7 +10,6 @@ const folders = { '/orbmorph/': join(here, '../src'), '/three/': join(here, '../
 const types = {
   '.html': 'text/html; charset=utf-8',
   '.js': 'text/javascript; charset=utf-8',
-  '.css': 'text/css; charset=utf-8',
 };
 const daemon = new URL(process.env.ORBMORPH_SERVER ?? 'http://127.0.0.1:8080');
 

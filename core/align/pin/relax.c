@@ -6,7 +6,7 @@
 #include "base/check.h"
 #include "base/memory.h"
 #include "embed/newton/advance.h"
-#include "embed/newton/resume.h"
+#include "embed/newton/refiner.h"
 
 /* Chosen by trial. */
 enum {

@@ -1,5 +1,5 @@
-/* The refiner of a hierarchy: the points on the sphere of the vertices that live at present. Vertex numbers here are
- * those of the mesh. */
+/* The refiner of a hierarchy: the points on the sphere of the vertices that are currently alive. Vertex numbers here
+ * are those of the mesh. */
 #ifndef ORB_EMBED_NEWTON_REFINER_H
 #define ORB_EMBED_NEWTON_REFINER_H
 
@@ -11,6 +11,12 @@ typedef struct orb_refiner orb_refiner;
 /* A refiner at the tetrahedron. A hierarchy serves one refiner at a time. */
 ORB_MUST_CHECK orb_status orb_refiner_create(orb_context *ctx, orb_hierarchy *hierarchy,
                                              const orb_embed_options *options, orb_refiner **out);
+
+/* A refiner at full resolution with these points (3 a vertex, every triangle positive), and a hierarchy that holds no
+ * collapses: for sweeps with pins. Destroy the refiner, then the hierarchy. O(n). */
+ORB_MUST_CHECK orb_status orb_refiner_resume(orb_context *ctx, const orb_mesh *mesh, const double *points,
+                                             const orb_embed_options *options, orb_hierarchy **hierarchy,
+                                             orb_refiner **out);
 
 /* Takes the hierarchy back to its tetrahedron, for the next refiner, and frees this one. NULL is fine. */
 void orb_refiner_destroy(orb_context *ctx, orb_refiner *refiner);
@@ -25,7 +31,7 @@ void orb_refiner_abandon(orb_context *ctx, orb_refiner *refiner);
 /* How many vertices live. */
 int32_t orb_refiner_live(const orb_refiner *refiner);
 
-/* The present level, in fresh arrays that the caller frees: live vertices, and triangles. */
+/* The current level, in fresh arrays that the caller frees: live vertices, and triangles. */
 ORB_MUST_CHECK orb_status orb_refiner_level(orb_context *ctx, const orb_refiner *refiner, int32_t **vertices,
                                             int32_t *vertex_count, int32_t **triangles, int32_t *triangle_count);
 
@@ -37,7 +43,7 @@ void orb_refiner_pin(orb_refiner *refiner, int32_t vertex, int pinned);
 /* The points of all vertices (3 a vertex), once all live. */
 void orb_refiner_points(const orb_refiner *refiner, double *points);
 
-/* The w of the energy that holds at the present level. */
+/* The w of the energy that holds at the current level. */
 double orb_refiner_weight(const orb_refiner *refiner);
 
 #endif

@@ -16,7 +16,7 @@
 #include "base/memory.h"
 #include "remesh/adaptive/collapse.h"
 #include "remesh/adaptive/thin.h"
-#include "remesh/common/net_export.h"
+#include "remesh/common/supermesh.h"
 #include "remesh/placed/flip.h"
 #include "sphere/locate.h"
 

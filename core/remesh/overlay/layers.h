@@ -9,7 +9,7 @@ typedef struct orb_layer {
   orb_sphere_view view;
   int32_t vertex_count;
   const orb_locator *locator;
-  /* Filled by orb_overlay_build(). */
+  /* Filled by orb_overlay_trace() and orb_overlay_faces(). */
   orb_spot *spot;      /* per vertex: where it lies in the other layer */
   int32_t *id;         /* per vertex: its number in the overlay */
   int32_t *edge;       /* per half-edge: its edge */

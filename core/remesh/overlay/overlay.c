@@ -12,9 +12,10 @@
 #include "base/error.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
-#include "remesh/overlay/build.h"
+#include "remesh/overlay/faces.h"
 #include "remesh/overlay/repair.h"
 #include "remesh/overlay/snap.h"
+#include "remesh/overlay/trace.h"
 
 /* The overlay of the first shapes: one triangulation, with places and parents on each of them. */
 typedef struct partial {
@@ -35,6 +36,28 @@ static void partial_free(orb_context *ctx, partial *p) {
   orb_free(ctx, p->places);
   orb_free(ctx, p->moved);
   memset(p, 0, sizeof *p);
+}
+
+/* Frees what orb_overlay_trace() and orb_overlay_faces() have filled; views and locators stay. */
+static void overlay_free(orb_context *ctx, orb_overlay *overlay) {
+  for (int l = 0; l < 2; l++) {
+    orb_layer *layer = &overlay->layer[l];
+    orb_free(ctx, layer->spot);
+    orb_free(ctx, layer->id);
+    orb_free(ctx, layer->edge);
+    orb_free(ctx, layer->half);
+    orb_free(ctx, layer->begin);
+    orb_free(ctx, layer->event);
+    orb_free(ctx, layer->event_id);
+  }
+  orb_free(ctx, overlay->lone);
+  orb_free(ctx, overlay->cross);
+  orb_free(ctx, overlay->points);
+  orb_free(ctx, overlay->places);
+  orb_free(ctx, overlay->triangles);
+  orb_free(ctx, overlay->parent);
+  orb_free(ctx, overlay->merged);
+  memset(overlay, 0, sizeof *overlay);
 }
 
 /* Adds weight times a place's coordinates, expressed in the corners of triangle `in`. Returns 0 if a corner of the
@@ -216,11 +239,12 @@ static orb_status overlay_shape(orb_context *ctx, const orb_remesh_job *job, int
     overlay.layer[1].view.points = points;
     overlay.layer[1].locator = moved;
   }
-  ORB_GO(status, orb_overlay_build(ctx, &overlay), end);
+  ORB_GO(status, orb_overlay_trace(ctx, &overlay), end);
+  ORB_GO(status, orb_overlay_faces(ctx, &overlay), end);
   ORB_GO(status, orb_overlay_repair(ctx, &overlay), end);
   ORB_GO(status, partial_add(ctx, job, below, &overlay, out), end);
 end:
-  orb_overlay_free(ctx, &overlay);
+  overlay_free(ctx, &overlay);
   orb_locator_destroy(ctx, moved);
   orb_locator_destroy(ctx, locator);
   orb_free(ctx, points);

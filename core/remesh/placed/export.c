@@ -3,7 +3,7 @@
 #include "base/check.h"
 #include "base/loops.h"
 #include "base/memory.h"
-#include "remesh/common/net_export.h"
+#include "remesh/common/supermesh.h"
 #include "remesh/placed/bound.h"
 
 /* Vertices a thread locates at a time, and vertices between two checks for cancellation. */

@@ -1,6 +1,6 @@
-/* Writes a net as a supermesh. */
-#ifndef ORB_REMESH_COMMON_NET_EXPORT_H
-#define ORB_REMESH_COMMON_NET_EXPORT_H
+/* A net as a supermesh. */
+#ifndef ORB_REMESH_COMMON_SUPERMESH_H
+#define ORB_REMESH_COMMON_SUPERMESH_H
 
 #include "orbmorph/remesh.h"
 #include "sphere/net.h"
