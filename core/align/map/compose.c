@@ -27,9 +27,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/map/engine/full_level.h"
 #include "align/map/engine/near.h"
 #include "align/map/engine/rounds.h"
+#include "align/map/engine/run.h"
 #include "align/map/engine/step.h"
 #include "align/map/levels.h"
 #include "align/map/starts/landmark_walk.h"

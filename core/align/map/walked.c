@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/map/engine/fixed_sphere.h"
 #include "align/map/engine/rounds.h"
+#include "align/map/engine/run.h"
 #include "align/map/levels.h"
 #include "align/map/starts/landmark_walk.h"
 #include "base/check.h"

@@ -4,18 +4,17 @@
  * vertex. Goes out: the same level, with less energy and without flips where it had none or they could be cleared. Read
  * in this order:
  *
- *   params.h            every threshold and weight of map/
- *   surface.h           the fixed shape, on which places move
- *   level.h             the moving vertices of one resolution
- *   star.h, step.h      the energy around one vertex, and its Newton step
- *   packed.h            the fixed shape in the order in which sweeps read it
- *   vector/             the step for several vertices at once
- *   sweep.h             sweeps of such steps
- *   untangle.h          clearing flips on the sphere
- *   run.h               what one call of orb_compose() holds
- *   fixed_sphere.h      which points on the sphere the fixed shape has
- *   rounds.h, near.h    rounds of sweeps and untangling; levels that are nearly a map
- *   full_level.h, spread.h  the level of all vertices; samples
+ *   params.h          every threshold and weight of map/
+ *   surface.h         the fixed shape, on which places move
+ *   level.h           the moving vertices of one resolution
+ *   star.h, step.h    the energy around one vertex, and its Newton step
+ *   packed.h          the fixed shape in the order in which sweeps read it
+ *   vector/           the step for several vertices at once
+ *   sweep.h           sweeps of such steps
+ *   untangle.h        clearing flips on the sphere
+ *   run.h             what one call of orb_compose() holds, and the points that the fixed shape has on the sphere
+ *   rounds.h, near.h  rounds of sweeps and untangling; levels that are nearly a map
+ *   spread.h          samples
  */
 #ifndef ORB_ALIGN_MAP_ENGINE_LEVEL_H
 #define ORB_ALIGN_MAP_ENGINE_LEVEL_H

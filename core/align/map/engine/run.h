@@ -58,4 +58,17 @@ typedef struct orb_map_run {
   int64_t work;          /* vertex steps left for clearing flips and for further starts */
 } orb_map_run;
 
+/* A level of all vertices at these points (mesh order), with the landmarks pinned. s: the order of the vertices; it
+ * stays the caller's. */
+ORB_MUST_CHECK orb_status orb_map_full_level(orb_map_run *run, const double *points, const orb_corner_table *s,
+                                             orb_map_level *level);
+
+/* Gives the fixed shape other points, 3 a vertex; the run takes *points over and sets it to NULL. Places on the shape
+ * stay what they are. The best map so far is set aside as run->kept, which must be empty; run->best becomes run->start,
+ * of no energy yet. */
+ORB_MUST_CHECK orb_status orb_map_take_sphere(orb_map_run *run, double **points);
+
+/* Makes the better of run->best and run->kept run->best, with its points of the fixed shape. */
+ORB_MUST_CHECK orb_status orb_map_take_best(orb_map_run *run);
+
 #endif

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/map/engine/fixed_sphere.h"
+#include "align/map/engine/run.h"
 #include "align/map/engine/spread.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/mirror.h"

@@ -14,8 +14,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/map/engine/full_level.h"
 #include "align/map/engine/rounds.h"
+#include "align/map/engine/run.h"
 #include "align/map/engine/untangle.h"
 #include "align/map/twist/twist.h"
 #include "align/map/twist/untwist.h"
