@@ -23,7 +23,7 @@ struct orb_hierarchy {
   orb_corner_table surface;
   orb_collapse *log; /* in the order of decimation */
   int32_t log_count; /* vertex_count − 4 in all */
-  int32_t undone;    /* how many of them, from the end, are undone at present */
+  int32_t undone;    /* how many of them, from the end, are currently undone */
   float *area_log;
   int64_t area_count, area_capacity;
   int32_t *round_start; /* first collapse of each independent round; round_count + 1 */
@@ -45,7 +45,7 @@ struct orb_refiner {
   int32_t star_count;
   int32_t live;
   int one_way;
-  orb_level level; /* batches of the present level, if level.valid */
+  orb_level level; /* batches of the current level, if level.valid */
 };
 
 #endif
