@@ -17,7 +17,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-TIMES = {"seconds", "cpu_seconds", "threads", "peak_rss_bytes", "triangles_per_minute", "mesh"}
+TIMES = {"seconds", "cpu_seconds", "embed_cpu_seconds", "threads", "peak_rss_bytes", "triangles_per_minute", "mesh"}
 MERGES = [  # alignment, its preset, remeshing; what does not depend on each other is not multiplied
     ("pin", "fast", "adaptive"), ("pin", "default", "adaptive"), ("pin", "fast", "overlay"),
     ("pin", "fast", "subdivision"), ("pin", "fast", "convex-hull"), ("rbf", "fast", "overlay"),
