@@ -28,67 +28,13 @@
 #include "align/rotate/correlate.h"
 #include "align/rotate/procrustes.h"
 #include "align/rotate/rotate.h"
+#include "align/sheet/copy.h"
 #include "base/check.h"
 #include "base/memory.h"
-#include "embed/newton/advance.h"
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
 
-/* A decimated copy: compact, with its own embedding. */
-typedef struct coarse {
-  orb_mesh mesh;
-  double *points;
-  int32_t *vertex; /* numbers in the given mesh */
-} coarse;
-
-static void coarse_free(orb_context *ctx, coarse *c) {
-  orb_mesh_free(ctx, &c->mesh);
-  orb_free(ctx, c->points);
-  orb_free(ctx, c->vertex);
-}
-
-static orb_status coarse_create(orb_context *ctx, const orb_mesh *mesh, coarse *out) {
-  orb_status status;
-  orb_hierarchy *hierarchy = NULL;
-  orb_refiner *refiner = NULL;
-  orb_embed_options options;
-  int32_t *number = ORB_NEW(ctx, int32_t, mesh->vertex_count);
-  orb_embed_defaults(&options);
-  options.preset = ORB_PRESET_FAST;
-  if (!number) {
-    return ORB_E_NO_MEMORY;
-  }
-  ORB_GO(status, orb_hierarchy_create(ctx, mesh, NULL, 4, &hierarchy), end);
-  ORB_GO(status, orb_refiner_create(ctx, hierarchy, &options, &refiner), end);
-  ORB_GO(status,
-         orb_refiner_advance(ctx, refiner, mesh->vertex_count < ORB_FIND_COARSE ? mesh->vertex_count : ORB_FIND_COARSE),
-         end);
-  ORB_GO(status,
-         orb_refiner_level(ctx, refiner, &out->vertex, &out->mesh.vertex_count, &out->mesh.triangles,
-                           &out->mesh.triangle_count),
-         end);
-  out->mesh.positions = ORB_NEW(ctx, double, 3 * (size_t)out->mesh.vertex_count);
-  out->points = ORB_NEW(ctx, double, 3 * (size_t)out->mesh.vertex_count);
-  if (!out->mesh.positions || !out->points) {
-    status = ORB_E_NO_MEMORY;
-    goto end;
-  }
-  for (int32_t i = 0; i < out->mesh.vertex_count; i++) {
-    int32_t v = out->vertex[i];
-    number[v] = i;
-    memcpy(out->mesh.positions + 3 * (size_t)i, mesh->positions + 3 * (size_t)v, 3 * sizeof(double));
-    orb_refiner_point(refiner, v, out->points + 3 * (size_t)i);
-  }
-  for (int32_t h = 0; h < 3 * out->mesh.triangle_count; h++) {
-    out->mesh.triangles[h] = number[out->mesh.triangles[h]];
-  }
-end:
-  orb_free(ctx, number);
-  orb_refiner_destroy(ctx, refiner);
-  orb_hierarchy_destroy(ctx, hierarchy);
-  return status;
-}
 
 /* A candidate on the coarse copies. */
 typedef struct candidate {
@@ -104,7 +50,7 @@ typedef struct candidate {
 
 typedef struct search {
   orb_context *ctx;
-  coarse shape[2];
+  orb_coarse_copy shape[2];
   int32_t sample[ORB_FIND_SAMPLES];
   candidate list[ORB_FIND_ROTATIONS + ORB_FIND_TIP_MAPS + ORB_TIP_ROTATIONS + 2 * ORB_FIND_SPECTRAL];
   orb_spectral_list spectral;
@@ -469,15 +415,15 @@ orb_status orb_candidate_find(orb_context *ctx, const orb_mesh *a, const orb_mes
     return ORB_E_NO_MEMORY;
   }
   t->ctx = ctx;
-  ORB_GO(status, coarse_create(ctx, a, &t->shape[0]), end);
-  ORB_GO(status, coarse_create(ctx, b, &t->shape[1]), end);
+  ORB_GO(status, orb_coarse_copy_create(ctx, a, ORB_FIND_COARSE, &t->shape[0]), end);
+  ORB_GO(status, orb_coarse_copy_create(ctx, b, ORB_FIND_COARSE, &t->shape[1]), end);
   ORB_GO(status,
          orb_map_spread(ctx, t->shape[0].mesh.positions, t->shape[0].mesh.vertex_count, ORB_FIND_SAMPLES, t->sample),
          end);
   status = run_all(t, b, out);
 end:
-  coarse_free(ctx, &t->shape[0]);
-  coarse_free(ctx, &t->shape[1]);
+  orb_coarse_copy_free(ctx, &t->shape[0]);
+  orb_coarse_copy_free(ctx, &t->shape[1]);
   orb_free(ctx, t);
   return status;
 }

@@ -9,6 +9,7 @@
  *   untangle.h   local repair of folds
  *   collapse.h   collapses of vertices that splits made
  *   thin.h       removes such vertices where nothing needs them
+ *   copy.h       decimated copies of shapes
  */
 #ifndef ORB_ALIGN_SHEET_SHEET_H
 #define ORB_ALIGN_SHEET_SHEET_H

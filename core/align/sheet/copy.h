@@ -1,0 +1,19 @@
+/* Decimated copies of shapes, on which a search costs little. */
+#ifndef ORB_ALIGN_SHEET_COPY_H
+#define ORB_ALIGN_SHEET_COPY_H
+
+#include "orbmorph/mesh.h"
+
+/* A level of a shape as a mesh of its own, compact, with its own embedding. */
+typedef struct orb_coarse_copy {
+  orb_mesh mesh;
+  double *points;  /* on the sphere, 3 a vertex of the copy */
+  int32_t *vertex; /* of each vertex of the copy, its number in the given mesh */
+} orb_coarse_copy;
+
+/* Decimates to `size` vertices, or few more. `out` is to be freed in any case. O(n log n). */
+ORB_MUST_CHECK orb_status orb_coarse_copy_create(orb_context *ctx, const orb_mesh *mesh, int32_t size,
+                                                 orb_coarse_copy *out);
+void orb_coarse_copy_free(orb_context *ctx, orb_coarse_copy *copy);
+
+#endif
