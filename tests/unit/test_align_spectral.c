@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
-#include "align/find/spectral/shape.h"
-#include "align/find/spectral/spectral.h"
+#include "spectral/shape.h"
+#include "spectral/spectral.h"
 #include "support_context.h"
 #include "support_shapes.h"
 

@@ -3,7 +3,7 @@
  * A shape that is nearly symmetric, or whose limbs are alike, can be matched with another shape in many ways, and the
  * best correlation of whole spheres may be a wrong one. So both shapes are decimated to about a thousand vertices, and
  * candidates are tried there: rotations that correlate well and differ, the likeliest tip maps (tip_maps.h,
- * tip_rotations.h), and spectral maps (align/find/spectral), each walked to its common targets as in pin. If a spectral
+ * tip_rotations.h), and spectral maps (spectral), each walked to its common targets as in pin. If a spectral
  * map stands out among its kind, it is right, whatever its energy: then only candidates that agree with it count. A map
  * that only a reflection could produce folds the sphere over itself on the way, and gets stuck or costs much. The
  * energy after a walk says little, since right maps and wrong ones cost alike; but some sweeps of the energy of the
@@ -17,7 +17,6 @@
 #include <string.h>
 
 #include "align/find/params.h"
-#include "align/find/spectral/spectral.h"
 #include "align/find/tip_choice.h"
 #include "align/find/tip_rotations.h"
 #include "align/find/tips.h"
@@ -34,7 +33,7 @@
 #include "numeric/dense.h"
 #include "numeric/vec3.h"
 #include "orbmorph/remesh.h"
-
+#include "spectral/spectral.h"
 
 /* A candidate on the coarse copies. */
 typedef struct candidate {

@@ -6,7 +6,6 @@
  *   tip_maps.h       tip maps whose distances agree
  *   tip_choice.h     which of these are worth a trial
  *   tip_rotations.h  tip maps by rotations in space
- *   spectral/        spectral maps; spectral.h has their order
  *   candidates.h     tip maps and spectral maps are tried on coarse copies and ranked by the energy of their composed
  *                    maps
  *   found.h          the landmarks that an alignment found, and their confidence

@@ -9,9 +9,9 @@
 #include <string.h>
 
 #include "align/find/params.h"
-#include "align/find/spectral/distances.h"
 #include "base/check.h"
 #include "base/memory.h"
+#include "spectral/distances.h"
 
 /* The mean distance of every vertex from the sources; *mean: over all vertices. buffer: two doubles a vertex. */
 static orb_status mean_distances(orb_context *ctx, orb_distances *g, double *far, double *buffer, double *mean) {

@@ -10,10 +10,14 @@
  * unless a start is nearly a map with them and a better map without them.
  *
  * With landmarks, the quick way comes first (walked.c): a landmark walk, optimised on a coarse level. If that map is
- * that of shapes that correspond, it is refined and nothing else is tried. Else there are three kinds of starts:
- * - From spatial targets: the moving shape after non-rigid registration in space (starts/registration.c). This is good
- *   where it folds little. Flips are allowed against a growing barrier until untangling clears them all. The usable
- *   part of a start that is nearly a map serves a later walk (engine/near.c).
+ * that of shapes that correspond, it is refined and nothing else is tried. If it is not, but no limb is twisted, it is
+ * refined as well, and only starts from spatial targets that hardly fold are tried beside it. Where limbs are twisted,
+ * or the shapes are one in two poses, there are three kinds of starts:
+ * - From spatial targets: the moving shape after non-rigid registration in space (starts/registration.c), which
+ *   samples by eigenfunctions guide where they agree with the landmarks (starts/spectral_samples.c). This is good where
+ *   it folds little. Flips are allowed against a growing barrier until untangling clears nearly all; collapses clear
+ *   the last ones (engine/unfold.c). The usable part of a start that is nearly a map serves a later walk
+ *   (engine/near.c).
  * - As given, or after a landmark walk of the landmarks, mirror landmarks and some samples of the spatial targets
  *   (starts/landmark_walk.c). It has no flips from the beginning.
  * - From the best map so far, drawn to the spatial targets (engine/rounds.c).
@@ -34,6 +38,7 @@
 #include "align/map/levels.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/place.h"
+#include "align/map/starts/spectral_samples.h"
 #include "align/map/swap.h"
 #include "align/map/twist/untwist.h"
 #include "align/map/walked.h"
@@ -116,7 +121,7 @@ static orb_status clear_again(orb_map_run *c, orb_map_start start, orb_map_level
 static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_start start, orb_map_level *l,
                               int32_t *flips, int *given_up) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
-  int32_t hopeless = l->triangle_count / c->params.clear.hopeless;
+  int32_t hopeless = l->triangle_count / c->hopeless_flips;
   *flips = orb_map_level_flips(l);
   if (*flips <= hopeless) {
     *given_up = orb_map_level_energy(l) > c->hopeless;
@@ -280,32 +285,59 @@ done:
   return status;
 }
 
-/* Runs the starts, until they bring no improvement or the work is spent. */
-static orb_status run_starts(orb_map_run *c, orb_map_from from, orb_preset preset) {
-  if (from == ORB_MAP_MAP_ONLY) {
-    ORB_TRY(orb_map_levels_prepare(c));
-    return run_start(c, ORB_MAP_GIVEN);
+/* Registers the moving shape through samples of the best map and starts from there, as long as that helps. */
+static orb_status run_passes(orb_map_run *c, int draws) {
+  double last = INFINITY;
+  while (c->best_energy < c->params.work.pass_gain * last && c->passes-- > 0 && c->work > 0) {
+    last = c->best_energy;
+    ORB_TRY(orb_map_register(c, c->params.registration.samples));
+    if (!c->hierarchy) {
+      ORB_TRY(orb_map_levels_prepare(c));
+    }
+    c->hopeless = c->params.work.far_above * c->best_energy;
+    ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
+    c->hopeless = INFINITY;
+    if (draws && !(c->best_energy < last)) {
+      ORB_TRY(run_start(c, ORB_MAP_DRAWN));
+    }
   }
+  return ORB_OK;
+}
+
+/* From spatial targets, where they are promising. */
+static orb_status run_spatial(orb_map_run *c) {
+  ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
+  if (c->has_usable && c->pairs.count > c->pairs.landmarks && c->best_energy > c->params.energy.good) {
+    ORB_TRY(start_without_mirror_landmarks(c));
+  }
+  return ORB_OK;
+}
+
+/* A walked map, and beside it only starts from spatial targets that hardly fold. *done 0: a level has flips. */
+static orb_status finish_walked(orb_map_run *c, orb_map_walked *w, int *done) {
   double good = c->params.energy.good;
-  if (c->pairs.landmarks == 0 && c->best_energy <= good) {
-    /* Keep a good map rather than find another that is as good, which symmetric shapes have. */
+  *done = 1;
+  if (w->energy > good) {
+    c->hopeless_flips = c->params.walked.promising;
+    ORB_TRY(orb_map_register(c, 0));
     ORB_TRY(orb_map_levels_prepare(c));
-    return run_start(c, ORB_MAP_GIVEN);
-  }
-  if (from == ORB_MAP_FROM_SPACE && c->both && c->pairs.count > 0 && preset != ORB_PRESET_QUALITY) {
-    int found;
-    ORB_TRY(orb_map_try_walked(c, &found));
-    if (found) {
+    ORB_TRY(run_spatial(c));
+    if (c->best_energy <= good) {
       return ORB_OK;
     }
   }
+  ORB_TRY(orb_map_walked_refine(c, w));
+  *done = w->energy < INFINITY;
+  return *done && c->best_energy > good ? run_passes(c, 0) : ORB_OK;
+}
+
+/* Runs the starts, until they bring no improvement or the work is spent. */
+static orb_status run_starts(orb_map_run *c, orb_map_from from, orb_preset preset) {
+  double good = c->params.energy.good;
   ORB_TRY(orb_map_register(c, from == ORB_MAP_FROM_MAP ? c->params.registration.samples : 0));
   ORB_TRY(orb_map_levels_prepare(c));
   if (from != ORB_MAP_SPACE_DONE) {
-    ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
-    if (c->has_usable && c->pairs.count > c->pairs.landmarks && c->best_energy > good) {
-      ORB_TRY(start_without_mirror_landmarks(c));
-    }
+    ORB_TRY(run_spatial(c));
   }
   if (from == ORB_MAP_SPACE_ONLY || (preset != ORB_PRESET_QUALITY && c->best_energy <= good)) {
     return ORB_OK;
@@ -315,18 +347,46 @@ static orb_status run_starts(orb_map_run *c, orb_map_from from, orb_preset prese
   ORB_TRY(untwist_first(c));
   ORB_TRY(run_start(c, ORB_MAP_DRAWN));
   ORB_TRY(untwist_early(c, INFINITY));
-  double last = INFINITY;
-  while (c->best_energy < c->params.work.pass_gain * last && c->passes-- > 0 && c->work > 0) {
-    last = c->best_energy;
-    ORB_TRY(orb_map_register(c, c->params.registration.samples));
-    c->hopeless = c->params.work.far_above * c->best_energy;
-    ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
-    c->hopeless = INFINITY;
-    if (!(c->best_energy < last)) {
-      ORB_TRY(run_start(c, ORB_MAP_DRAWN));
-    }
+  return run_passes(c, 1);
+}
+
+/* The quick way, and all starts where it does not suffice: where the walk has twisted limbs, and where the shapes are
+ * one in two poses, as samples by eigenfunctions show. */
+static orb_status run_walked(orb_map_run *c, orb_map_walked *w, orb_preset preset) {
+  int done = 0;
+  ORB_TRY(orb_map_walked_create(c, w));
+  if (w->energy > c->params.energy.good) {
+    ORB_TRY(orb_map_spectral_samples(c));
   }
-  return ORB_OK;
+  if (w->energy < INFINITY && c->samples.count == 0) {
+    ORB_TRY(finish_walked(c, w, &done));
+    c->hopeless_flips = c->params.clear.hopeless;
+  }
+  if (done) {
+    return ORB_OK;
+  }
+  ORB_TRY(run_starts(c, ORB_MAP_FROM_SPACE, preset));
+  ORB_TRY(orb_map_take_best(c));
+  return w->energy < c->best_energy ? orb_map_walked_refine(c, w) : ORB_OK;
+}
+
+/* Chooses the starts by what is known of the map as given. */
+static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
+  /* A good map without landmarks is kept: symmetric shapes have others that are as good. */
+  if (from == ORB_MAP_MAP_ONLY || (c->pairs.landmarks == 0 && c->best_energy <= c->params.energy.good)) {
+    ORB_TRY(orb_map_levels_prepare(c));
+    return run_start(c, ORB_MAP_GIVEN);
+  }
+  if (from == ORB_MAP_FROM_SPACE && c->both && c->pairs.count > 0 && preset != ORB_PRESET_QUALITY) {
+    orb_map_walked walked;
+    orb_status status = run_walked(c, &walked, preset);
+    orb_map_walked_free(c, &walked);
+    return status;
+  }
+  if (from == ORB_MAP_FROM_SPACE) {
+    ORB_TRY(orb_map_spectral_samples(c));
+  }
+  return run_starts(c, from, preset);
 }
 
 /* Writes the best map back if it is better than the alignment as given and certified. */
@@ -377,6 +437,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   }
   c.fixed = fixed;
   c.moving = moving;
+  c.hopeless_flips = c.params.clear.hopeless;
   c.passes = c.params.work.passes;
   c.work = c.params.work.all * (int64_t)moving->mesh.vertex_count;
   c.work = from == ORB_MAP_SPACE_DONE ? c.work / 2 : c.work; /* ORB_MAP_SPACE_ONLY has spent the other half */
@@ -386,7 +447,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
   ORB_GO(status, orb_map_pairs_create(&c), done);
-  ORB_GO(status, run_starts(&c, from, preset), done);
+  ORB_GO(status, run(&c, from, preset), done);
   if (from != ORB_MAP_MAP_ONLY) {
     ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
   }

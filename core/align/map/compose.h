@@ -9,7 +9,7 @@
  *   twist/    limbs that a map has twisted, and untwisting them
  *   swap.h    which of two shapes moves
  *   levels.h  from the first level of a start to all vertices
- *   walked.h  the quick way: one landmark walk, optimised on a coarse level
+ *   walked.h  the quick way: a landmark walk, optimised on a coarse level
  *   compose.c the order of the starts
  */
 #ifndef ORB_ALIGN_MAP_COMPOSE_H

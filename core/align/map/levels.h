@@ -28,7 +28,7 @@ ORB_MUST_CHECK orb_status orb_map_level_next(orb_map_run *run, orb_refiner *refi
                                              unsigned char *known, double pull);
 
 /* Refines a level without flips up to all vertices. rough: only so far that samples of the map are of use. *failed: a
- * level has flips. */
+ * level has flips, or covers the sphere twice. */
 ORB_MUST_CHECK orb_status orb_map_levels_refine(orb_map_run *run, orb_refiner *refiner, orb_map_level *level,
                                                 double pull, int rough, int *failed);
 

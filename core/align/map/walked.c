@@ -4,92 +4,116 @@
 #include <string.h>
 
 #include "align/map/engine/rounds.h"
-#include "align/map/engine/run.h"
-#include "align/map/levels.h"
 #include "align/map/starts/landmark_walk.h"
 #include "base/check.h"
 #include "base/memory.h"
 
-/* A map on a level of the moving shape. */
-typedef struct trial {
-  orb_refiner *refiner;
-  orb_map_level level;
-} trial;
-
-/* The level on which the walk ended, at the points that it ended at. */
-static orb_status begin(orb_map_run *c, orb_walk_level *walked, trial *t) {
-  orb_map_levels_adopt(c, &walked->hierarchy);
-  ORB_TRY(orb_map_levels_begin(c, &t->refiner));
-  return orb_map_level_place(c, t->refiner, ORB_MAP_GIVEN, walked->live, &t->level);
+/* Frees what the barriers have locked in, until that brings nothing any more. */
+static orb_status loosen(orb_map_run *c, orb_map_level *l, int most) {
+  const orb_map_params *p = &c->params;
+  for (int i = 0, idle = 0; i < most && idle < 2; i++) {
+    double before = orb_map_level_energy(l);
+    ORB_TRY(orb_map_loosen(c, l, p->walked.barriers[idle], p->walked.loosen, p->walked.loosen));
+    idle = orb_map_level_energy(l) < (1 - p->walked.gain) * before ? 0 : idle + 1;
+  }
+  return ORB_OK;
 }
 
-/* Optimises the levels up to the coarse one. *energy: there; INFINITY where the first level's is hopeless. */
-static orb_status optimise(orb_map_run *c, trial *t, double *energy) {
+/* Optimises the levels up to the coarse one. The energy becomes INFINITY where limbs are twisted. */
+static orb_status optimise(orb_map_run *c, orb_map_walked *w) {
   const orb_map_params *p = &c->params;
   const int32_t n = c->vertex_count;
   int32_t size = p->walked.size < n ? p->walked.size : n;
   unsigned char *known = ORB_NEW(c->ctx, unsigned char, n);
   orb_status status = known ? ORB_OK : ORB_E_NO_MEMORY;
-  for (int first = 1; status == ORB_OK; first = 0) {
-    int last = t->refiner->live >= size;
-    ORB_GO(status, orb_map_sweeps(c, &t->level, orb_map_hard(p), last ? p->walked.last_sweeps : p->walked.sweeps),
+  for (int first = 1, last = 0; !last && status == ORB_OK; first = 0) {
+    last = w->refiner->live >= size;
+    ORB_GO(status, orb_map_sweeps(c, &w->level, orb_map_hard(p), last ? p->walked.last_sweeps : p->walked.sweeps),
            done);
-    if (first || last) {
-      ORB_GO(status, orb_map_loosen(c, &t->level, p->walked.loosen, p->walked.loosen), done);
-    }
-    orb_map_level_store(c, &t->level, t->refiner);
-    *energy = orb_map_level_energy(&t->level);
-    if (last || *energy > p->walked.hopeless) {
+    double before = orb_map_level_energy(&w->level);
+    if (before > p->walked.hopeless) {
+      w->energy = INFINITY;
       break;
     }
-    ORB_GO(status, orb_map_level_next(c, t->refiner, &t->level, known, 0), done);
+    if (first || last) {
+      ORB_GO(status, loosen(c, &w->level, last ? p->walked.loosen_most : 1), done);
+    }
+    orb_map_level_store(c, &w->level, w->refiner);
+    w->energy = orb_map_level_energy(&w->level);
+    if (w->energy > (last ? p->walked.twisted : p->walked.hopeless)) {
+      w->energy = INFINITY;
+      break;
+    }
+    if (!last) {
+      ORB_GO(status, orb_map_level_next(c, w->refiner, &w->level, known, 0), done);
+    }
   }
 done:
   orb_free(c->ctx, known);
   return status;
 }
 
-/* Refines to all vertices; the result becomes the best map if it is good. */
-static orb_status refine(orb_map_run *c, trial *t, int *good) {
-  int failed = 0;
-  ORB_TRY(orb_map_levels_refine(c, t->refiner, &t->level, 0, 0, &failed));
-  double energy = orb_map_level_energy(&t->level);
-  *good = !failed && energy <= c->params.energy.good;
-  if (*good) {
-    c->best_energy = energy;
-    orb_refiner_points(t->refiner, c->best);
+/* Gives the run this map's sphere and hierarchy. */
+static orb_status enter(orb_map_run *c, orb_map_walked *w) {
+  double *fixed = ORB_NEW(c->ctx, double, 3 * (size_t)c->fixed->mesh.vertex_count);
+  if (!fixed) {
+    return ORB_E_NO_MEMORY;
   }
-  return ORB_OK;
+  memcpy(fixed, w->fixed, 3 * (size_t)c->fixed->mesh.vertex_count * sizeof *fixed);
+  orb_status status = orb_map_take_sphere(c, &fixed);
+  orb_map_levels_adopt(c, &w->hierarchy);
+  return status;
 }
 
-orb_status orb_map_try_walked(orb_map_run *c, int *good) {
-  orb_walk_level walked = {0};
-  trial t = {0};
-  double *fixed = NULL, energy = INFINITY;
+/* Takes them back. */
+static orb_status leave(orb_map_run *c, orb_map_walked *w) {
+  w->hierarchy = c->hierarchy;
+  c->hierarchy = NULL;
+  return orb_map_take_best(c);
+}
+
+orb_status orb_map_walked_create(orb_map_run *c, orb_map_walked *w) {
+  orb_walk_level level = {0};
   int stuck;
   orb_status status;
-  *good = 0;
-  ORB_GO(status, orb_map_walk_level(c, &walked, &fixed, &stuck), done);
+  memset(w, 0, sizeof *w);
+  w->energy = INFINITY;
+  ORB_GO(status, orb_map_walk_level(c, &level, &w->fixed, &stuck), done);
   if (stuck) {
     goto done;
   }
-  memcpy(c->start, walked.points, 3 * (size_t)c->vertex_count * sizeof *c->start);
-  ORB_GO(status, orb_map_take_sphere(c, &fixed), done);
-  ORB_GO(status, begin(c, &walked, &t), done);
-  if (orb_map_level_flips(&t.level) == 0) {
-    ORB_GO(status, optimise(c, &t, &energy), done);
+  memcpy(c->start, level.points, 3 * (size_t)c->vertex_count * sizeof *c->start);
+  w->hierarchy = level.hierarchy;
+  level.hierarchy = NULL;
+  ORB_GO(status, enter(c, w), done);
+  ORB_GO(status, orb_map_levels_begin(c, &w->refiner), done);
+  ORB_GO(status, orb_map_level_place(c, w->refiner, ORB_MAP_GIVEN, level.live, &w->level), done);
+  if (orb_map_level_flips(&w->level) == 0) {
+    ORB_GO(status, optimise(c, w), done);
   }
-  if (energy <= c->params.energy.good) {
-    ORB_GO(status, refine(c, &t, good), done);
-  }
-  if (!*good) {
-    memcpy(c->start, c->moving->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
-    status = orb_map_take_best(c);
-  }
+  memcpy(c->start, c->moving->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
+  status = leave(c, w);
 done:
-  orb_map_level_free(c->ctx, &t.level);
-  orb_refiner_destroy(c->ctx, t.refiner);
-  orb_walk_level_free(c->ctx, &walked);
-  orb_free(c->ctx, fixed);
+  orb_walk_level_free(c->ctx, &level);
   return status;
+}
+
+orb_status orb_map_walked_refine(orb_map_run *c, orb_map_walked *w) {
+  int failed = 0;
+  ORB_TRY(enter(c, w));
+  ORB_TRY(orb_map_levels_refine(c, w->refiner, &w->level, 0, 0, &failed));
+  w->energy = failed ? INFINITY : orb_map_level_energy(&w->level);
+  if (!failed) {
+    c->best_energy = w->energy;
+    orb_refiner_points(w->refiner, c->best);
+  }
+  return leave(c, w);
+}
+
+void orb_map_walked_free(orb_map_run *c, orb_map_walked *w) {
+  orb_map_level_free(c->ctx, &w->level);
+  orb_refiner_destroy(c->ctx, w->refiner);
+  orb_hierarchy_destroy(c->ctx, w->hierarchy);
+  orb_free(c->ctx, w->fixed);
+  memset(w, 0, sizeof *w);
 }

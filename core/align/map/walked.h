@@ -1,13 +1,26 @@
-/* The quick way to a map: one landmark walk, optimised on a coarse level. */
+/* The quick way to a map: a landmark walk, optimised on a coarse level and then refined to all vertices. */
 #ifndef ORB_ALIGN_MAP_WALKED_H
 #define ORB_ALIGN_MAP_WALKED_H
 
-#include "align/map/engine/run.h"
+#include "align/map/levels.h"
 
-/* Walks the pairs together on a level of a few hundred vertices, where nothing is flipped and a map takes milliseconds
- * to optimise, and optimises up to a coarse level (params.walked). *good 1: the energy there is that of shapes that
- * correspond; the map is refined to all vertices and is run->best. 0: the run is as it was. The fixed shape must be
- * allowed to change (run->both). Sets run->hierarchy. */
-ORB_MUST_CHECK orb_status orb_map_try_walked(orb_map_run *run, int *good);
+/* A map on a coarse level of the moving shape. It has a sphere of the fixed shape and a hierarchy of its own, which the
+ * run has only while it works on this map. */
+typedef struct orb_map_walked {
+  orb_hierarchy *hierarchy; /* NULL: the run has it */
+  orb_refiner *refiner;
+  orb_map_level level;
+  double *fixed; /* points of the fixed shape, 3 a vertex */
+  double energy; /* INFINITY: there is no map, or it is hopeless */
+} orb_map_walked;
+
+/* Walks, and optimises the levels up to the coarse one. Afterwards the run is as it was. `out` is to be freed in any
+ * case. */
+ORB_MUST_CHECK orb_status orb_map_walked_create(orb_map_run *run, orb_map_walked *out);
+void orb_map_walked_free(orb_map_run *run, orb_map_walked *walked);
+
+/* Refines to all vertices; the result becomes the best map if it is better. Its energy is INFINITY if a level has
+ * flips. `walked` is spent otherwise. */
+ORB_MUST_CHECK orb_status orb_map_walked_refine(orb_map_run *run, orb_map_walked *walked);
 
 #endif

@@ -12,6 +12,7 @@
  *   vector/           the step for several vertices at once
  *   sweep.h           sweeps of such steps
  *   untangle.h        clearing flips on the sphere
+ *   unfold.h          clearing the last ones for certain
  *   run.h             what one call of orb_compose() holds, and the points that the fixed shape has on the sphere
  *   rounds.h, near.h  rounds of sweeps and untangling; levels that are nearly a map
  *   spread.h          samples
@@ -77,6 +78,10 @@ ORB_MUST_CHECK orb_status orb_map_level_locate_all(orb_context *ctx, orb_map_lev
 
 /* The number of flipped triangles. */
 int32_t orb_map_level_flips(const orb_map_level *level);
+
+/* Does a level without flips cover the sphere once? A fold that clearing has drawn over half of the sphere covers it
+ * twice, with every triangle positive. */
+int orb_map_level_covers_once(const orb_map_level *level);
 
 /* Symmetric Dirichlet energy of the composed map, capped for each triangle and weighted by area; 1: isometric. */
 double orb_map_level_energy(const orb_map_level *level);

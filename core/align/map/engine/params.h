@@ -14,16 +14,17 @@
 
 /* Sizes of arrays; chosen by trial where no reason is given. */
 enum {
-  ORB_MAP_COLOURS = 64,         /* colours of the vertices of a level: bits of a uint64_t */
-  ORB_MAP_LANES = 8,            /* triangles of a star that are computed at once: doubles of a vector of 512 bits */
-  ORB_MAP_RING_MAX = 256,       /* triangles of a star; a vertex with more does not move */
-  ORB_MAP_STEP_RING_MAX = 62,   /* triangles of a star that the vector loops step; step.c steps larger ones */
-  ORB_MAP_MIRROR_SAMPLES = 200, /* samples of a surface that test a mirror plane */
-  ORB_MAP_MIRROR_PLANES = 3,    /* mirror planes of one shape that are kept */
-  ORB_MAP_LIMBS = 12,           /* rotated parts of a surface that are examined for a twist, the largest first */
-  ORB_MAP_BANDS = 16,           /* rings of a limb: more resolve the twist better, fewer have more vertices each */
-  ORB_MAP_CROSSINGS = 400,      /* edges that one step of a vertex crosses at most; a guard against rounding */
-  ORB_MAP_RING_CROSSINGS = 8192 /* the same for a ring around a limb */
+  ORB_MAP_COLOURS = 64,          /* colours of the vertices of a level: bits of a uint64_t */
+  ORB_MAP_LANES = 8,             /* triangles of a star that are computed at once: doubles of a vector of 512 bits */
+  ORB_MAP_RING_MAX = 256,        /* triangles of a star; a vertex with more does not move */
+  ORB_MAP_STEP_RING_MAX = 62,    /* triangles of a star that the vector loops step; step.c steps larger ones */
+  ORB_MAP_MIRROR_SAMPLES = 200,  /* samples of a surface that test a mirror plane */
+  ORB_MAP_MIRROR_PLANES = 3,     /* mirror planes of one shape that are kept */
+  ORB_MAP_SPECTRAL_SAMPLES = 48, /* at most; as many as orb_spectral_find() has */
+  ORB_MAP_LIMBS = 12,            /* rotated parts of a surface that are examined for a twist, the largest first */
+  ORB_MAP_BANDS = 16,            /* rings of a limb: more resolve the twist better, fewer have more vertices each */
+  ORB_MAP_CROSSINGS = 400,       /* edges that one step of a vertex crosses at most; a guard against rounding */
+  ORB_MAP_RING_CROSSINGS = 8192  /* the same for a ring around a limb */
 };
 
 typedef struct orb_map_params {
@@ -76,8 +77,10 @@ typedef struct orb_map_params {
     int final_sweeps;   /* and on the level of all vertices */
     int rough_sweeps;   /* most sweeps on each level of a rough refinement */
     int32_t coarse;
-    int new_steps;    /* steps of a vertex that has just come back */
-    double pull;      /* of the spatial targets on the first level, */
+    int new_steps; /* steps of a vertex that has just come back */
+    double loosen; /* strength of the barrier while a level is loosened */
+    double rigid;  /* energy of a level up to which nothing has locked and it is not loosened, unless it is the last */
+    double pull;   /* of the spatial targets on the first level, */
     double pull_fall; /* and its factor from level to level */
   } level;
 
@@ -86,8 +89,15 @@ typedef struct orb_map_params {
     int32_t size;    /* least vertices of that level */
     int sweeps;      /* most sweeps on the levels before it, */
     int last_sweeps; /* and on it */
-    int loosen;      /* sweeps with flips allowed, and again without, on the first level and the last */
-    double hopeless; /* energy of a level above which the walk has twisted limbs, and no finer level helps */
+    int loosen;      /* sweeps with flips allowed, and again without, of one loosening */
+    int loosen_most; /* loosenings of the last level. A level costs a tenth of all vertices: what is freed here is not
+                        left for them */
+    double gain;     /* of the energy, relative: a loosening that gains less is idle */
+    double
+        barriers[2];   /* of a loosening, and of the one after an idle one: a weak barrier frees more, and folds more */
+    double hopeless;   /* energy of the first level above which the walk has twisted limbs, and no finer level helps */
+    double twisted;    /* the same of the last level */
+    int32_t promising; /* a spatial start is tried beside a walked map if at most one in so many triangles flips */
   } walked;
 
   /* Sweeps over a level. */
@@ -124,6 +134,8 @@ typedef struct orb_map_params {
   /* Clearing flips: rounds of sweeps against a growing barrier, then untangling. */
   struct {
     int32_t hopeless;      /* one flip in fewer triangles than this: the start is given up */
+    int32_t unfold;        /* at most one flip in so many triangles is unfolded where untangling has left it. More are
+                              large folds, and unfolding them loses the map */
     int rounds;            /* of a start */
     int sweeps;            /* of a round */
     double first_barrier;  /* strength in the first round. A weak one lets triangles pass each other */
@@ -158,6 +170,7 @@ typedef struct orb_map_params {
     int clearings; /* rounds of clearing the flips that came */
     double pull;   /* strength in the first round, relative to the energy of a vertex's area */
     double fall;   /* its factor from round to round */
+    double leap;   /* ratio of a round's energy to the last one's from which on clearing its flips has folded a limb */
   } draw;
 
   /* A start that is nearly a map. */
@@ -197,6 +210,13 @@ typedef struct orb_map_params {
     double off_surface;     /* a mirror image farther from the surface is not used */
     double taken;           /* a landmark nearer than this to the image is already that landmark */
   } mirror;
+
+  /* Samples by eigenfunctions. */
+  struct {
+    int32_t size;            /* vertices of the copies that vibrate */
+    int32_t least_landmarks; /* with fewer, nothing tells whether a spectral map is right */
+    double agrees;           /* mean distance of landmarks from where the map takes them, up to which it is used */
+  } spectral;
 
   /* Non-rigid registration in space. */
   struct {

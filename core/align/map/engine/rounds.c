@@ -4,6 +4,7 @@
 
 #include "align/map/engine/rounds.h"
 #include "align/map/engine/sweep.h"
+#include "align/map/engine/unfold.h"
 #include "align/map/engine/untangle.h"
 #include "base/check.h"
 #include "base/memory.h"
@@ -58,6 +59,9 @@ orb_status orb_map_clear_flips(orb_map_run *c, orb_map_level *l, double barrier,
     if (*flips) {
       memcpy(copy, l->x, 3 * (size_t)l->count * sizeof *copy);
       ORB_GO(status, orb_map_level_untangle(c->ctx, l, flips, &c->work), done);
+      if (*flips && *flips <= l->triangle_count / params->clear.unfold) {
+        ORB_GO(status, orb_map_level_unfold(c->ctx, l, flips), done);
+      }
       if (*flips) {
         most = *flips <= params->untangle.few ? 2 * rounds : rounds; /* too near to give up */
         memcpy(l->x, copy, 3 * (size_t)l->count * sizeof *copy);
@@ -103,7 +107,7 @@ static double pulled_energy(const orb_map_level *l) {
   return orb_map_level_energy(l) + (area > 0 ? pull / (4 * area) : 0);
 }
 
-orb_status orb_map_loosen(orb_map_run *c, orb_map_level *l, int soft_sweeps, int hard_sweeps) {
+orb_status orb_map_loosen(orb_map_run *c, orb_map_level *l, double barrier, int soft_sweeps, int hard_sweeps) {
   orb_map_copy before = {0};
   double energy = pulled_energy(l);
   int32_t flips;
@@ -112,7 +116,7 @@ orb_status orb_map_loosen(orb_map_run *c, orb_map_level *l, int soft_sweeps, int
     return status; /* no work is left to clear the flips that it would make */
   }
   ORB_GO(status, orb_map_copy_take(c, l, &before), done);
-  ORB_GO(status, orb_map_sweeps(c, l, soft_rules(&c->params, 1), soft_sweeps), done);
+  ORB_GO(status, orb_map_sweeps(c, l, soft_rules(&c->params, barrier), soft_sweeps), done);
   ORB_GO(status, orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.clear.loosen_rounds, &flips), done);
   if (!flips) {
     ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(&c->params), hard_sweeps), done);
@@ -126,27 +130,51 @@ done:
   return status;
 }
 
-/* A round sweeps with flips allowed while the pull is on, clears the flips, and sweeps without flips. A round whose
- * flips cannot be cleared is undone and is the last. */
+/* One round: sweeps with flips allowed while the pull is on, clears the flips, and sweeps without flips. *held 0: the
+ * flips cannot be cleared, and the level is as it was but for the last sweeps. */
+static orb_status draw_round(orb_map_run *c, orb_map_level *l, int *held) {
+  const orb_map_params *params = &c->params;
+  orb_map_copy before = {0};
+  int32_t flips;
+  orb_status status;
+  ORB_GO(status, orb_map_copy_take(c, l, &before), done);
+  ORB_GO(status, orb_map_sweeps(c, l, soft_rules(params, params->clear.first_barrier), params->draw.sweeps), done);
+  ORB_GO(status, orb_map_clear_flips(c, l, params->clear.first_barrier, params->draw.clearings, &flips), done);
+  *held = flips == 0;
+  if (flips) {
+    orb_map_copy_restore(&before, l);
+  }
+  status = orb_map_sweeps(c, l, orb_map_hard(params), params->draw.sweeps);
+done:
+  orb_map_copy_free(c, &before);
+  return status;
+}
+
+/* Rounds whose flips cannot be cleared, or whose energy leaps because clearing has folded a limb another way, are the
+ * last; the map of least energy stays. */
 orb_status orb_map_draw(orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
   const orb_map_params *params = &c->params;
-  double pull = params->draw.pull;
-  orb_status status = ORB_OK;
-  int rounds = params->draw.rounds;
-  for (int round = 0; round < rounds && status == ORB_OK && c->work > 0; round++, pull *= params->draw.fall) {
-    orb_map_copy before = {0};
-    int32_t flips;
+  orb_map_copy best = {0};
+  double pull = params->draw.pull, least = orb_map_level_energy(l), last = INFINITY;
+  orb_status status;
+  int held = 1;
+  ORB_GO(status, orb_map_copy_take(c, l, &best), done);
+  for (int round = 0; round < params->draw.rounds && held && c->work > 0; round++, pull *= params->draw.fall) {
     orb_map_set_pull(c, l, to_mesh, pull);
-    ORB_GO(status, orb_map_copy_take(c, l, &before), next);
-    ORB_GO(status, orb_map_sweeps(c, l, soft_rules(params, params->clear.first_barrier), params->draw.sweeps), next);
-    ORB_GO(status, orb_map_clear_flips(c, l, params->clear.first_barrier, params->draw.clearings, &flips), next);
-    if (flips) {
-      orb_map_copy_restore(&before, l);
-      round = rounds;
+    ORB_GO(status, draw_round(c, l, &held), done);
+    double energy = orb_map_level_energy(l);
+    if (energy < least) {
+      least = energy;
+      orb_map_copy_free(c, &best);
+      ORB_GO(status, orb_map_copy_take(c, l, &best), done);
     }
-    ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(params), params->draw.sweeps), next);
-  next:
-    orb_map_copy_free(c, &before);
+    held = held && energy < params->draw.leap * last;
+    last = energy;
   }
+  if (orb_map_level_energy(l) > least) {
+    orb_map_copy_restore(&best, l);
+  }
+done:
+  orb_map_copy_free(c, &best);
   return status;
 }

@@ -68,7 +68,13 @@ orb_status orb_map_take_sphere(orb_map_run *c, double **points) {
 }
 
 orb_status orb_map_take_best(orb_map_run *c) {
-  if (!c->kept.points || c->kept.energy > c->best_energy) {
+  if (!c->kept.points) {
+    return ORB_OK;
+  }
+  if (c->kept.energy > c->best_energy) {
+    orb_free(c->ctx, c->kept.points);
+    orb_free(c->ctx, c->kept.fixed);
+    c->kept = (orb_map_candidate){0};
     return ORB_OK;
   }
   orb_free(c->ctx, c->best);

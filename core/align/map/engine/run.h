@@ -19,6 +19,11 @@ typedef struct orb_map_pairs {
   int32_t *moving, *fixed;
 } orb_map_pairs;
 
+/* Vertices that correspond roughly. */
+typedef struct orb_map_samples {
+  int32_t count, moving[ORB_MAP_SPECTRAL_SAMPLES], fixed[ORB_MAP_SPECTRAL_SAMPLES];
+} orb_map_samples;
+
 /* A finished map. */
 typedef struct orb_map_candidate {
   double *points; /* of the moving shape, mesh order; NULL: none */
@@ -35,11 +40,12 @@ typedef struct orb_map_run {
   orb_aligned_shape *moving;
   int32_t vertex_count, landmark_count;
   orb_map_pairs pairs;
-  int both;               /* the fixed shape's points on the sphere may change too */
-  double *fixed_points;   /* what they are now; NULL: as given */
-  orb_map_candidate kept; /* the best map from before they changed */
-  double *x, *normal;     /* moving shape, area 4π */
-  double *target;         /* spatial targets, once the moving shape is registered */
+  orb_map_samples samples; /* by eigenfunctions */
+  int both;                /* the fixed shape's points on the sphere may change too */
+  double *fixed_points;    /* what they are now; NULL: as given */
+  orb_map_candidate kept;  /* the best map from before they changed */
+  double *x, *normal;      /* moving shape, area 4π */
+  double *target;          /* spatial targets, once the moving shape is registered */
   double *target_normal;
   orb_place *target_place; /* of every vertex of the moving shape, on the fixed one */
   unsigned char *keep;     /* vertices that stay on every level: those of pairs */
@@ -52,10 +58,11 @@ typedef struct orb_map_run {
   double *start;    /* points of a map in which all pairs meet, mesh order: as given, later as walked */
   double *best;     /* points of the best start, mesh order; at first the alignment as given */
   double best_energy;
-  double hopeless;       /* a start whose first map has more energy is given up */
-  double twisted_energy; /* of the last map that was to be untwisted */
-  int passes;            /* registrations through samples of the best map that are left */
-  int64_t work;          /* vertex steps left for clearing flips and for further starts */
+  double hopeless;        /* a start whose first map has more energy is given up */
+  int32_t hopeless_flips; /* a start with more than one flip in so many triangles is given up */
+  double twisted_energy;  /* of the last map that was to be untwisted */
+  int passes;             /* registrations through samples of the best map that are left */
+  int64_t work;           /* vertex steps left for clearing flips and for further starts */
 } orb_map_run;
 
 /* A level of all vertices at these points (mesh order), with the landmarks pinned. s: the order of the vertices; it

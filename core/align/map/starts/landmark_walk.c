@@ -150,12 +150,14 @@ static orb_status carry_over(orb_map_run *c, const orb_sheet *fixed, const orb_s
   return ORB_OK;
 }
 
-/* Embeds both shapes anew so that the first `count` pairs meet, into sheets; last: see orb_pin_walk(). */
-static orb_status walk_sheets(orb_map_run *c, int32_t count, orb_sheet sheets[2], orb_walk_level *last, int *stuck) {
+/* Embeds both shapes anew so that the first `count` pairs meet, into sheets. finer: factor on the coarse level; last:
+ * see orb_pin_walk(). */
+static orb_status walk_sheets(orb_map_run *c, int32_t count, int32_t finer, orb_sheet sheets[2], orb_walk_level *last,
+                              int *stuck) {
   orb_context *ctx = c->ctx;
   orb_status status = ORB_OK;
   int32_t coarse = c->params.walk.level_each * count;
-  coarse = coarse > c->params.walk.level ? coarse : c->params.walk.level;
+  coarse = finer * (coarse > c->params.walk.level ? coarse : c->params.walk.level);
   int32_t *numbers = ORB_NEW(ctx, int32_t, count);
   if (!numbers) {
     return ORB_E_NO_MEMORY;
@@ -179,7 +181,7 @@ static void free_sheets(orb_map_run *c, orb_sheet sheets[2]) {
 static orb_status walk_pairs(orb_map_run *c, int32_t count, int *stuck) {
   orb_sheet sheets[2] = {0};
   orb_status status;
-  ORB_GO(status, walk_sheets(c, count, sheets, NULL, stuck), done);
+  ORB_GO(status, walk_sheets(c, count, 1, sheets, NULL, stuck), done);
   if (!*stuck) {
     status = c->both ? take_both(c, &sheets[0], &sheets[1]) : carry_over(c, &sheets[0], &sheets[1]);
   }
@@ -191,12 +193,15 @@ done:
 orb_status orb_map_walk_level(orb_map_run *c, orb_walk_level *level, double **fixed, int *stuck) {
   orb_sheet sheets[2] = {0};
   orb_status status;
-  ORB_GO(status, walk_sheets(c, c->pairs.count, sheets, level, stuck), done);
-  if (!*stuck) {
+  status = walk_sheets(c, c->pairs.count, 1, sheets, level, stuck);
+  if (status == ORB_OK && *stuck) {
+    free_sheets(c, sheets);
+    status = walk_sheets(c, c->pairs.landmarks, 2, sheets, level, stuck);
+  }
+  if (status == ORB_OK && !*stuck) {
     *fixed = sheets[0].shape.points;
     sheets[0].shape.points = NULL;
   }
-done:
   free_sheets(c, sheets);
   return status;
 }

@@ -53,7 +53,16 @@ static void find_target_places(void *arg, int64_t begin, int64_t end, int thread
   }
 }
 
-/* The pairs as anchors, and samples of the best map. vertex and target have room for all pairs and samples. */
+static int is_paired(const orb_map_run *c, int32_t moving) {
+  int paired = 0;
+  for (int32_t k = 0; k < c->pairs.count; k++) {
+    paired |= c->pairs.moving[k] == moving;
+  }
+  return paired;
+}
+
+/* The pairs as anchors, and samples: of the best map, or else by eigenfunctions. vertex and target have room for all
+ * pairs and samples. */
 static orb_status gather_anchors(orb_map_run *c, int samples, int32_t *vertex, double *target, orb_map_anchors *out) {
   *out = (orb_map_anchors){.vertex = vertex, .target = target};
   for (int32_t i = 0; i < c->pairs.count; i++) {
@@ -61,16 +70,19 @@ static orb_status gather_anchors(orb_map_run *c, int samples, int32_t *vertex, d
     vertex[i] = c->pairs.moving[i];
   }
   out->count = out->exact = c->pairs.count;
+  for (int32_t i = 0; samples == 0 && i < c->samples.count; i++) {
+    if (!is_paired(c, c->samples.moving[i])) {
+      memcpy(target + 3 * (size_t)out->count, c->b.x + 3 * (size_t)c->samples.fixed[i], sizeof(double[3]));
+      vertex[out->count++] = c->samples.moving[i];
+    }
+  }
   samples = samples < c->vertex_count / 2 ? samples : c->vertex_count / 2;
   if (samples > 0) {
     ORB_TRY(orb_map_spread(c->ctx, c->x, c->vertex_count, samples, vertex + out->count));
   }
   for (int i = 0; i < samples; i++) {
-    int32_t v = vertex[out->exact + i], paired = 0;
-    for (int32_t k = 0; k < c->pairs.count; k++) {
-      paired |= c->pairs.moving[k] == v;
-    }
-    if (!paired) {
+    int32_t v = vertex[out->exact + i];
+    if (!is_paired(c, v)) {
       orb_place place;
       orb_locate(c->b.locator, c->best + 3 * (size_t)v, -1, &place);
       orb_map_surface_at(&c->b, &place, target + 3 * (size_t)out->count, NULL, NULL);
@@ -84,7 +96,7 @@ orb_status orb_map_register(orb_map_run *c, int samples) {
   orb_context *ctx = c->ctx;
   const orb_mesh *mesh = &c->moving->mesh;
   orb_map_anchors anchors;
-  size_t most = (size_t)c->pairs.count + (size_t)samples;
+  size_t most = (size_t)c->pairs.count + (size_t)(samples > 0 ? samples : c->samples.count);
   double fit, *target = ORB_NEW(ctx, double, 3 * most);
   int32_t *vertex = ORB_NEW(ctx, int32_t, most);
   target_job job = {.c = c};

@@ -4,6 +4,7 @@
  * levels with their vertices placed. Read in this order:
  *
  *   mirror.h         mirror landmarks
+ *   spectral_samples.h  samples that correspond by eigenfunctions
  *   registration.h   spatial targets by non-rigid registration
  *   place.h          their places on the fixed shape, and the vertices of a level at them
  *   landmark_walk.h  a map in which all pairs meet

@@ -84,7 +84,7 @@ static orb_status descend(const untwisting *u, const orb_corner_table *s) {
        i++) {
     last = orb_map_level_energy(l);
     ORB_GO(status, orb_map_sweeps(c, l, orb_map_hard(p), count), done);
-    ORB_GO(status, orb_map_loosen(c, l, count / 2, count / 2), done);
+    ORB_GO(status, orb_map_loosen(c, l, p->level.loosen, count / 2, count / 2), done);
     if (i == 0) {
       ORB_GO(status, keeps_more(u, s, points, &more), done);
     }

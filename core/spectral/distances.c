@@ -1,4 +1,4 @@
-#include "align/find/spectral/distances.h"
+#include "spectral/distances.h"
 
 #include <math.h>
 

@@ -1,15 +1,15 @@
 /* The starts: each of the first five eigenfunctions after the constant one goes to one of the same five of the other
  * shape, as it is or negated. 14 orders of them, each with 32 choices of signs, make 448 maps. They are refined in
  * stages; after each stage the best that differ go on. */
-#include "align/find/spectral/spectral.h"
+#include "spectral/spectral.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "align/find/spectral/cost.h"
 #include "base/check.h"
 #include "base/loops.h"
 #include "base/memory.h"
+#include "spectral/cost.h"
 
 enum { ORDERS = 14, SIGNS = 1 << (ORB_ZOOM_START - 1), STARTS = ORDERS * SIGNS };
 

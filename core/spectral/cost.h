@@ -1,8 +1,8 @@
 /* What ranks maps in eigenfunctions. */
-#ifndef ORB_ALIGN_FIND_SPECTRAL_COST_H
-#define ORB_ALIGN_FIND_SPECTRAL_COST_H
+#ifndef ORB_SPECTRAL_COST_H
+#define ORB_SPECTRAL_COST_H
 
-#include "align/find/spectral/zoom.h"
+#include "spectral/zoom.h"
 
 /* The measures of orb_spectral_candidate, see there. */
 typedef struct orb_zoom_cost {

@@ -7,7 +7,7 @@
  * products of the first functions, brought over like the functions and scaled to unit length, are further coordinates.
  * Once the matrix says which side is left, they tell front from back, and no mirror image is found.
  */
-#include "align/find/spectral/zoom.h"
+#include "spectral/zoom.h"
 
 #include <math.h>
 #include <string.h>

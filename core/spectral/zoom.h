@@ -1,8 +1,8 @@
 /* Refinement of a map between two shapes in their eigenfunctions. */
-#ifndef ORB_ALIGN_FIND_SPECTRAL_ZOOM_H
-#define ORB_ALIGN_FIND_SPECTRAL_ZOOM_H
+#ifndef ORB_SPECTRAL_ZOOM_H
+#define ORB_SPECTRAL_ZOOM_H
 
-#include "align/find/spectral/shape.h"
+#include "spectral/shape.h"
 
 enum { ORB_ZOOM_START = 6, ORB_ZOOM_LEVELS = 7 };
 

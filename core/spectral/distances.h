@@ -1,7 +1,7 @@
 /* Distances along a surface: shortest paths over edges and, across each edge, between the two opposite vertices, which
  * makes them nearly independent of the triangulation. For meshes of a few thousand vertices. */
-#ifndef ORB_ALIGN_FIND_SPECTRAL_DISTANCES_H
-#define ORB_ALIGN_FIND_SPECTRAL_DISTANCES_H
+#ifndef ORB_SPECTRAL_DISTANCES_H
+#define ORB_SPECTRAL_DISTANCES_H
 
 #include "orbmorph/mesh.h"
 

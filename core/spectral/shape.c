@@ -1,15 +1,15 @@
 /* The Laplace–Beltrami operator of linear finite elements: cotangent weights (Pinkall & Polthier 1993) and lumped
  * mass, a third of the area around each vertex. */
-#include "align/find/spectral/shape.h"
+#include "spectral/shape.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "align/find/spectral/distances.h"
-#include "align/find/spectral/eigen.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
+#include "spectral/distances.h"
+#include "spectral/eigen.h"
 
 enum { LEAST = 4 * ORB_SPECTRAL_FUNCTIONS }; /* vertices of a shape that is used */
 

@@ -14,8 +14,8 @@
  * Where the true map is in the list, it is often not the first: a body whose front and back are alike has a twin that
  * swaps left with right and front with back, and their costs lie close together. So try several of the list.
  */
-#ifndef ORB_ALIGN_FIND_SPECTRAL_SPECTRAL_H
-#define ORB_ALIGN_FIND_SPECTRAL_SPECTRAL_H
+#ifndef ORB_SPECTRAL_SPECTRAL_H
+#define ORB_SPECTRAL_SPECTRAL_H
 
 #include "orbmorph/mesh.h"
 

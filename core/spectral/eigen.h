@@ -1,6 +1,6 @@
 /* The lowest eigenpairs of a symmetric sparse matrix, by Spectra and Eigen, which are templates: nothing is linked. */
-#ifndef ORB_ALIGN_FIND_SPECTRAL_EIGEN_H
-#define ORB_ALIGN_FIND_SPECTRAL_EIGEN_H
+#ifndef ORB_SPECTRAL_EIGEN_H
+#define ORB_SPECTRAL_EIGEN_H
 
 #include "orbmorph/context.h"
 

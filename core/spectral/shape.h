@@ -1,6 +1,6 @@
 /* What the spectral search knows of one shape: its lowest eigenfunctions and a few samples. */
-#ifndef ORB_ALIGN_FIND_SPECTRAL_SHAPE_H
-#define ORB_ALIGN_FIND_SPECTRAL_SHAPE_H
+#ifndef ORB_SPECTRAL_SHAPE_H
+#define ORB_SPECTRAL_SHAPE_H
 
 #include "orbmorph/mesh.h"
 

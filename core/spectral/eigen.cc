@@ -2,7 +2,7 @@
 // below 0, where the matrix is positive definite, has them in reverse order and well apart.
 #define EIGEN_MPL2_ONLY  // of Eigen only what is under the MPL 2.0
 
-#include "align/find/spectral/eigen.h"
+#include "spectral/eigen.h"
 
 #include <cmath>
 #include <exception>

@@ -2,7 +2,7 @@
  * They hardly tell a map from its twin, left and right swapped with front and back: there the local relief does, the
  * heights of points over the tangent planes of others nearby, which know bulges from hollows, and which bending changes
  * at joints only. And a map that takes one limb as it is and another as its mirror image shows in the orientation. */
-#include "align/find/spectral/cost.h"
+#include "spectral/cost.h"
 
 #include <math.h>
 

@@ -1,0 +1,331 @@
+/* Unfolding by collapses.
+ *
+ * A vertex may be collapsed onto a neighbour if the neighbour sees the whole ring: then the ring is a fan of positive
+ * triangles from a vertex of its own, its kernel is not empty, and the collapsed vertex can always come back into it.
+ * So vertices of flipped triangles are collapsed until no flip is left; then they come back in reverse order. Where no
+ * collapse lowers the number of flips, one that keeps it removes a vertex of the fold all the same. Nothing moves but
+ * the vertices that were collapsed, and of those only the ones that have left their kernels.
+ *
+ * An optimiser (untangle.h) leaves better triangles, but it can end with a few flips that it never clears.
+ */
+#include "align/map/engine/unfold.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "base/memory.h"
+#include "embed/common/kernel.h"
+#include "numeric/predicates.h"
+#include "numeric/vec3.h"
+
+enum {
+  RING_MOST = 64, /* neighbours of a vertex that is collapsed; larger stars stay */
+};
+/* Which collapses are allowed. */
+enum allowed {
+  FEWER, /* those that lower the number of flips */
+  EQUAL, /* of vertices of flipped triangles, those that do not raise it */
+  THIN   /* of all vertices: where fewer are left, folds are simpler */
+};
+static const double WELL_INSIDE = 0.02; /* least determinant of a triangle over its squared edge on the ring */
+
+typedef struct collapse {
+  int32_t vertex, first, count; /* its ring: entries of `ring` */
+} collapse;
+
+typedef struct unfolding {
+  orb_context *ctx;
+  orb_map_level *l;
+  int32_t *triangle, *twin, *corner; /* half-edge 3t + k leaves triangle[3t + k]; corner: one that leaves a vertex */
+  unsigned char *gone;               /* of each triangle */
+  int32_t *queue, queue_count;       /* vertices to look at */
+  unsigned char *queued;
+  collapse *done;
+  int32_t done_count;
+  int32_t *ring, ring_count, ring_capacity;
+  int32_t flips;
+} unfolding;
+
+static int32_t next(int32_t h) {
+  return h % 3 == 2 ? h - 2 : h + 1;
+}
+
+static int32_t prev(int32_t h) {
+  return h % 3 == 0 ? h + 2 : h - 1;
+}
+
+static const double *at(const unfolding *u, int32_t v) {
+  return u->l->x + 3 * (size_t)v;
+}
+
+static int is_flipped(const unfolding *u, int32_t a, int32_t b, int32_t c) {
+  return orb_orient(at(u, a), at(u, b), at(u, c)) <= 0;
+}
+
+/* The half-edges that leave v, counter-clockwise; 0: there are too many. */
+static int star_of(const unfolding *u, int32_t v, int32_t star[RING_MOST]) {
+  int count = 0;
+  int32_t h = u->corner[v];
+  do {
+    if (count == RING_MOST) {
+      return 0;
+    }
+    star[count++] = h;
+    h = u->twin[prev(h)];
+  } while (h != u->corner[v]);
+  return count;
+}
+
+static int32_t end_of(const unfolding *u, int32_t h) {
+  return u->triangle[next(h)];
+}
+
+/* Are the two vertices opposite to the edge from v to its neighbour k the only common neighbours? */
+static int link_is_clean(const unfolding *u, const int32_t *star, int count, int k) {
+  int32_t around[RING_MOST];
+  int n = star_of(u, end_of(u, star[k]), around), common = 0;
+  for (int i = 0; i < n; i++) {
+    for (int j = 0; j < count; j++) {
+      common += end_of(u, around[i]) == end_of(u, star[j]);
+    }
+  }
+  return n > 0 && common == 2 && n + count - 4 < RING_MOST;
+}
+
+/* Flipped triangles of the fan that neighbour k makes of the ring. *least: the least fatness of a triangle of it. */
+static int fan_flips(const unfolding *u, const int32_t *star, int count, int k, double *least) {
+  int flips = 0;
+  int32_t c = end_of(u, star[k]);
+  *least = INFINITY;
+  for (int i = 1; i + 1 < count; i++) {
+    int32_t a = end_of(u, star[(k + i) % count]), b = end_of(u, star[(k + i + 1) % count]);
+    double longest = fmax(orb_distance2(at(u, a), at(u, b)),
+                          fmax(orb_distance2(at(u, a), at(u, c)), orb_distance2(at(u, b), at(u, c))));
+    *least = fmin(*least, orb_det(at(u, c), at(u, a), at(u, b)) / longest);
+    flips += is_flipped(u, c, a, b);
+  }
+  return flips;
+}
+
+static int star_flips(const unfolding *u, int32_t v, const int32_t *star, int count) {
+  int flips = 0;
+  for (int i = 0; i < count; i++) {
+    flips += is_flipped(u, v, end_of(u, star[i]), end_of(u, star[(i + 1) % count]));
+  }
+  return flips;
+}
+
+static void ask(unfolding *u, int32_t v) {
+  if (!u->queued[v]) {
+    u->queued[v] = 1;
+    u->queue[u->queue_count++] = v;
+  }
+}
+
+static void join(unfolding *u, int32_t g, int32_t h) {
+  u->twin[g] = h;
+  u->twin[h] = g;
+}
+
+/* Collapses v onto its neighbour k. */
+static void apply(unfolding *u, int32_t v, const int32_t *star, int count, int k) {
+  int32_t onto = end_of(u, star[k]), first = star[k], last = star[(k + count - 1) % count];
+  u->done[u->done_count++] = (collapse){v, u->ring_count, count};
+  for (int i = 0; i < count; i++) {
+    int32_t a = end_of(u, star[(k + i) % count]);
+    u->ring[u->ring_count++] = a;
+    ask(u, a);
+  }
+  /* Triangle of `first` is (v, onto, a1), that of `last` is (v, a(n-1), onto): both go. */
+  int32_t a1 = end_of(u, star[(k + 1) % count]), an = end_of(u, last);
+  for (int i = 1; i + 1 < count; i++) {
+    u->triangle[star[(k + i) % count]] = onto;
+  }
+  int32_t right_out = u->twin[next(first)], right_in = u->twin[prev(first)];
+  int32_t left_out = u->twin[next(last)], left_in = u->twin[last];
+  join(u, right_out, right_in);
+  join(u, left_out, left_in);
+  u->gone[first / 3] = u->gone[last / 3] = 1;
+  u->corner[onto] = right_in;
+  u->corner[a1] = right_out;
+  u->corner[an] = left_in;
+  u->corner[v] = -1;
+}
+
+/* Collapses v if `allowed`. Returns whether it did. */
+static int try_vertex(unfolding *u, int32_t v, enum allowed allowed) {
+  int32_t star[RING_MOST];
+  if (u->l->pinned[v] || u->corner[v] < 0) {
+    return 0;
+  }
+  int count = star_of(u, v, star), best = -1, least_flips = 0;
+  int before = star_flips(u, v, star, count);
+  double fattest = -INFINITY;
+  if (count < 3 || (before == 0 && allowed != THIN) || u->ring_count + count > u->ring_capacity) {
+    return 0;
+  }
+  for (int k = 0; k < count; k++) {
+    double fat;
+    int flips = fan_flips(u, star, count, k, &fat);
+    if ((flips < before || (allowed != FEWER && flips == before)) &&
+        (best < 0 || flips < least_flips || (flips == least_flips && fat > fattest)) &&
+        link_is_clean(u, star, count, k)) {
+      best = k;
+      least_flips = flips;
+      fattest = fat;
+    }
+  }
+  if (best < 0) {
+    return 0;
+  }
+  apply(u, v, star, count, best);
+  u->flips += least_flips - before;
+  return 1;
+}
+
+/* Looks at the queued vertices until no collapse lowers the number of flips. */
+static void run_queue(unfolding *u) {
+  while (u->queue_count > 0) {
+    int32_t v = u->queue[--u->queue_count];
+    u->queued[v] = 0;
+    (void)try_vertex(u, v, FEWER);
+  }
+}
+
+/* Collapses one vertex near a flipped triangle: of its own, or a neighbour of these. Returns whether it did. */
+static int try_triangle(unfolding *u, int32_t t, enum allowed allowed) {
+  for (int k = 0; k < 3; k++) {
+    int32_t star[RING_MOST], v = u->triangle[3 * (size_t)t + (size_t)k];
+    if (try_vertex(u, v, allowed)) {
+      return 1;
+    }
+    int count = allowed == THIN ? star_of(u, v, star) : 0;
+    for (int i = 0; i < count; i++) {
+      if (try_vertex(u, end_of(u, star[i]), THIN)) {
+        return 1;
+      }
+    }
+  }
+  return 0;
+}
+
+/* One collapse near each flipped triangle. Returns whether there was any. */
+static int collapse_some(unfolding *u, enum allowed allowed) {
+  int any = 0;
+  for (int32_t t = 0; t < u->l->triangle_count && u->flips > 0; t++) {
+    const int32_t *v = u->triangle + 3 * (size_t)t;
+    if (!u->gone[t] && is_flipped(u, v[0], v[1], v[2]) && try_triangle(u, t, allowed)) {
+      any = 1;
+      run_queue(u);
+    }
+  }
+  return any;
+}
+
+/* Every collapse removes a vertex, so this ends. */
+static void collapse_all(unfolding *u) {
+  int any = 1;
+  run_queue(u);
+  while (u->flips > 0 && any) {
+    any = collapse_some(u, EQUAL) || collapse_some(u, THIN);
+  }
+}
+
+/* Does the ring see the point well? */
+static int is_inside(const double (*ring)[3], int32_t count, const double p[3]) {
+  for (int32_t i = 0; i < count; i++) {
+    const double *a = ring[i], *b = ring[i + 1 < count ? i + 1 : 0];
+    if (!(orb_det(p, a, b) > WELL_INSIDE * orb_distance2(a, b))) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* The collapsed vertices come back, the last one first. */
+static orb_status bring_back(unfolding *u, int *all) {
+  orb_kernel_room room = {0};
+  orb_status status = ORB_OK;
+  *all = 1;
+  for (int32_t i = u->done_count - 1; i >= 0 && *all && status == ORB_OK; i--) {
+    const collapse *c = &u->done[i];
+    double ring[RING_MOST][3], p[3];
+    for (int32_t k = 0; k < c->count; k++) {
+      memcpy(ring[k], at(u, u->ring[c->first + k]), sizeof ring[k]);
+    }
+    memcpy(p, at(u, c->vertex), sizeof p);
+    if (!is_inside((const double(*)[3])ring, c->count, p)) {
+      status = orb_kernel_point(u->ctx, &room, (const double(*)[3])ring, c->count, p, all);
+    }
+    if (status == ORB_OK && *all) {
+      memcpy(u->l->x + 3 * (size_t)c->vertex, p, sizeof p);
+    }
+  }
+  orb_kernel_room_free(u->ctx, &room);
+  return status;
+}
+
+/* Half-edges of the level. Its triangles are a closed surface. */
+static orb_status build(unfolding *u) {
+  const orb_map_level *l = u->l;
+  size_t h = 3 * (size_t)l->triangle_count, n = (size_t)l->count;
+  u->triangle = ORB_NEW(u->ctx, int32_t, h);
+  u->twin = ORB_NEW(u->ctx, int32_t, h);
+  u->corner = ORB_NEW(u->ctx, int32_t, n);
+  u->gone = ORB_NEW0(u->ctx, unsigned char, l->triangle_count);
+  u->queue = ORB_NEW(u->ctx, int32_t, n);
+  u->queued = ORB_NEW0(u->ctx, unsigned char, n);
+  u->done = ORB_NEW(u->ctx, collapse, n);
+  u->ring_capacity = 16 * l->count;
+  u->ring = ORB_NEW(u->ctx, int32_t, u->ring_capacity);
+  if (!u->triangle || !u->twin || !u->corner || !u->gone || !u->queue || !u->queued || !u->done || !u->ring) {
+    return ORB_E_NO_MEMORY;
+  }
+  memcpy(u->triangle, l->triangle, h * sizeof *u->triangle);
+  ORB_TRY(orb_mesh_twins(u->ctx, u->triangle, l->triangle_count, l->count, u->twin));
+  for (size_t i = 0; i < h; i++) {
+    u->corner[u->triangle[i]] = (int32_t)i;
+  }
+  return ORB_OK;
+}
+
+orb_status orb_map_level_unfold(orb_context *ctx, orb_map_level *l, int32_t *left) {
+  unfolding u = {.ctx = ctx, .l = l};
+  size_t size = 3 * (size_t)l->count * sizeof(double);
+  double *before = ORB_NEW(ctx, double, 3 * (size_t)l->count);
+  int all = 0;
+  orb_status status = before ? ORB_OK : ORB_E_NO_MEMORY;
+  *left = u.flips = orb_map_level_flips(l);
+  if (status != ORB_OK || !*left) {
+    goto done;
+  }
+  memcpy(before, l->x, size);
+  ORB_GO(status, build(&u), done);
+  for (int32_t t = 0; t < l->triangle_count; t++) {
+    const int32_t *v = u.triangle + 3 * (size_t)t;
+    for (int k = 0; k < 3 && is_flipped(&u, v[0], v[1], v[2]); k++) {
+      ask(&u, v[k]);
+    }
+  }
+  collapse_all(&u);
+  if (u.flips == 0) {
+    ORB_GO(status, bring_back(&u, &all), done);
+  }
+  if (all) {
+    *left = 0;
+  } else {
+    memcpy(l->x, before, size);
+  }
+done:
+  orb_free(ctx, before);
+  orb_free(ctx, u.triangle);
+  orb_free(ctx, u.twin);
+  orb_free(ctx, u.corner);
+  orb_free(ctx, u.gone);
+  orb_free(ctx, u.queue);
+  orb_free(ctx, u.queued);
+  orb_free(ctx, u.done);
+  orb_free(ctx, u.ring);
+  return status;
+}

@@ -1,0 +1,13 @@
+/* Clearing the last flips for certain: vertices around them are collapsed until nothing is flipped, and come back
+ * inside their kernels. */
+#ifndef ORB_ALIGN_MAP_ENGINE_UNFOLD_H
+#define ORB_ALIGN_MAP_ENGINE_UNFOLD_H
+
+#include "align/map/engine/level.h"
+
+/* Moves vertices around flipped triangles so that no triangle of the level is flipped. Pinned vertices stay. Only x
+ * changes; the caller locates the vertices again. *left: 0, or flips that remain, and then nothing has changed: pinned
+ * vertices are folded among themselves, or doubles have no room. O(n + size of the folds). */
+ORB_MUST_CHECK orb_status orb_map_level_unfold(orb_context *ctx, orb_map_level *level, int32_t *left);
+
+#endif
