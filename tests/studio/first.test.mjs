@@ -60,7 +60,8 @@ test('the default morph replaces the fast one and keeps time, camera and view', 
   await page.locator('.pane-view').first().focus();
   for (let i = 0; i < 4; i++) await page.keyboard.press('ArrowLeft');
   await page.getByRole('switch', { name: 'Wireframe' }).check();
-  const rotated = await until(() => camera(page), 'the address names the camera');
+  // The address follows with a delay. A press rotates by 0.12, from 0.55.
+  const rotated = await until(() => camera(page)?.startsWith('1.03,') && camera(page), 'the address names the camera');
   const fast = page.url().match(/[#&]r=([0-9a-f]+)/)[1];
   open();
   await defaultShown(page);
