@@ -6,6 +6,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "http/disposition.h"
 #include "http/http.h"
 #include "log.h"
 #include "metrics.h"
@@ -14,7 +15,7 @@
 enum { YEAR_S = 31536000 };
 
 static void add_headers(request *r, const char *mime, const char *name, int varies) {
-  char disposition[160];
+  char disposition[DISPOSITION_SIZE];
   char control[64];
   int64_t left = r->expires - (int64_t)time(NULL);
   reply_header(r, "ETag", r->etag);
@@ -35,7 +36,7 @@ static void add_headers(request *r, const char *mime, const char *name, int vari
     if (!r->coded) {
       reply_header(r, "Content-Type", mime);
     }
-    snprintf(disposition, sizeof disposition, "inline; filename=\"%s\"", name);
+    disposition_write(name, disposition);
     reply_header(r, "Content-Disposition", disposition);
   }
 }
@@ -160,37 +161,9 @@ static void reply_sphere(request *r) {
   reply_part(r, OBJECT_SPHERES, r->id, part, r->id, "application/octet-stream", name);
 }
 
-/* Names the download after the shapes, such as dog-giraffe.glb; of a name, letters, digits, "-", "_" and "." of ASCII
- * stay. The description begins with its shapes, and in JSON no name can contain the unescaped mark. */
-static void name_asset(const cached *entry, char out[100]) {
-  static const char mark[] = "{\"mesh\":\"", after[] = "\",\"name\":\"";
-  static const char kept[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
-  const char *end = strstr(entry->row.json, "],\"landmarks\":"), *at = entry->row.json;
-  size_t n = 0;
-  while (end && (at = strstr(at, mark)) && at < end) {
-    at += sizeof mark - 1 + API_ID_SIZE - 1;
-    if (strncmp(at, after, sizeof after - 1) != 0) {
-      continue;
-    }
-    if (n > 0 && n < 80) {
-      out[n++] = '-';
-    }
-    for (at += sizeof after - 1; *at && *at != '"' && n < 80; at += *at == '\\' && at[1] ? 2 : 1) {
-      unsigned char c = (unsigned char)*at;
-      if ((c & 0xC0) != 0x80) { /* one "_" for a character of several bytes */
-        out[n++] = strchr(kept, c) ? (char)c : '_';
-      }
-    }
-  }
-  if (n > 0 && (out[0] == '.' || out[0] == '-')) { /* no hidden file, and no option of a command */
-    out[0] = '_';
-  }
-  memcpy(out + n, n ? ".glb" : "asset.glb", n ? 5 : 10);
-}
-
 int reply_asset(request *r, const cached *entry) {
-  char link[128], name[100];
-  name_asset(entry, name);
+  char link[128], name[DISPOSITION_NAME];
+  disposition_name(entry->row.json, name);
   memcpy(r->id, entry->row.id, sizeof r->id);
   int done = reply_object(r, OBJECT_ASSET, r->id, entry->row.sha, "model/gltf-binary", name);
   if (done && r->route->id == ROUTE_MORPH && r->status < 400) {
