@@ -223,7 +223,8 @@ enum MHD_Result handle_wait(request *r);
 typedef struct list_page {
   int limit;
   int64_t before;
-  void *rows; /* of malloc() */
+  const char *prefix; /* of the ids; NULL: any */
+  void *rows;         /* of malloc() */
   api_text json;
 } list_page;
 int list_begin(request *r, const char *name, size_t row_size, list_page *page); /* 0 with a response */

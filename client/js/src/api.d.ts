@@ -390,6 +390,25 @@ export type Supermesh = {
   created: Instant;
 };
 
+/** A supermesh without its report and request. */
+export type SupermeshSummary = {
+  id: Id;
+  url: string;
+  asset: string;
+  asset_bytes: number;
+  vertices: number;
+  triangles: number;
+  /** The shapes, in request order. */
+  shapes: Array<{
+    mesh: Id;
+    /** 1 to 127 bytes of UTF-8. */
+    name: string;
+  }>;
+  /** The name and version of the engine. */
+  engine: string;
+  created: Instant;
+};
+
 export type Job = {
   id: JobId;
   url: string;
@@ -427,6 +446,13 @@ export type EmbeddingPage = {
 export type SupermeshPage = {
   /** Newest first. */
   supermeshes: Supermesh[];
+  /** The value of page_token for the next page; null on the last page. */
+  next_page_token: string | null;
+};
+
+export type SupermeshSummaryPage = {
+  /** Newest first. */
+  supermeshes: SupermeshSummary[];
   /** The value of page_token for the next page; null on the last page. */
   next_page_token: string | null;
 };
