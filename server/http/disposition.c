@@ -9,8 +9,7 @@
 enum { NAMES_MOST = DISPOSITION_NAME - 10 }; /* bytes of the shapes' names; ".glb" follows */
 
 static int is_plain(unsigned char c) {
-  static const char kept[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
-  return c && strchr(kept, c);
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
 }
 
 /* Whether a byte continues a character of UTF-8. */

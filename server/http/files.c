@@ -46,8 +46,9 @@ typedef struct object_part {
   uint64_t start, length;
 } object_part;
 
-/* Reads a part of an object into memory of malloc(); NULL on failure. */
-static void *read_part(const request *r, object_kind kind, const char *id, object_part part, size_t *size) {
+/* Reads a part of an object into memory of malloc(); NULL on failure, or if it is larger than `most`. */
+static void *read_part(const request *r, object_kind kind, const char *id, object_part part, size_t most,
+                       size_t *size) {
   int fd;
   uint64_t whole;
   *size = 0;
@@ -55,7 +56,7 @@ static void *read_part(const request *r, object_kind kind, const char *id, objec
     return NULL;
   }
   uint64_t wanted = part.length ? part.length : whole;
-  char *bytes = wanted >= ENCODE_LEAST && wanted <= ENCODE_MOST ? malloc((size_t)wanted) : NULL;
+  char *bytes = wanted >= ENCODE_LEAST && wanted <= most ? malloc((size_t)wanted) : NULL;
   for (ssize_t n = 1; bytes && n > 0 && *size<wanted; *size += n> 0 ? (size_t)n : 0) {
     n = pread(fd, bytes + *size, (size_t)wanted - *size, (off_t)(part.start + *size));
   }
@@ -67,23 +68,49 @@ static void *read_part(const request *r, object_kind kind, const char *id, objec
   return bytes;
 }
 
+/* Sending an asset of this size from memory takes two system calls, from its file eight. Beyond it, copying the bytes
+ * costs more than that. */
+enum { MEMORY_MOST = 512 << 10 };
+
+/* Takes a small asset from memory, and reads it there if it is not. 0: only a task may do that. */
+static int choose_memory(request *r, object_kind kind, const char *id, const char *key) {
+  size_t size;
+  if (kind != OBJECT_ASSET || r->srv->options->encoded_bytes == 0 || header_of(r, "Range")) {
+    return 1;
+  }
+  const encoded *found = encoded_find(r->srv->encoded, key, CODING_NONE);
+  if (!found && r->phase != PHASE_AWAY) {
+    return 0;
+  }
+  if (!found) {
+    void *bytes = read_part(r, kind, id, (object_part){0}, MEMORY_MOST, &size);
+    found = encoded_make(r->srv->encoded, key, CODING_NONE, bytes, size);
+    free(bytes);
+  }
+  if (found && found->bytes) {
+    r->encoded = found;
+  } else {
+    encoded_release(found);
+  }
+  return 1;
+}
+
 /* Chooses the form of an object, and compresses it if that has not been done. 0: only a task may do that. */
 static int choose_form(request *r, object_kind kind, const char *id, object_part part, const char *etag) {
   char key[96];
   size_t size;
-  snprintf(key, sizeof key, "object %d %d %s %s", (int)kind, r->shape, id, etag);
-  if (reply_choose(r, key, etag, NULL, ENCODE_LEAST)) {
-    return 1;
+  snprintf(key, sizeof key, "object %d %d %.16s %s", (int)kind, r->shape, id, etag);
+  if (!reply_choose(r, key, etag, NULL, ENCODE_LEAST)) {
+    if (r->phase != PHASE_AWAY) {
+      return 0;
+    }
+    void *bytes = read_part(r, kind, id, part, ENCODE_MOST, &size);
+    if (bytes) {
+      reply_choose(r, key, etag, bytes, size);
+    }
+    free(bytes);
   }
-  if (r->phase != PHASE_AWAY) {
-    return 0;
-  }
-  void *bytes = read_part(r, kind, id, part, &size);
-  if (bytes) {
-    reply_choose(r, key, etag, bytes, size);
-  }
-  free(bytes);
-  return 1;
+  return r->encoded || choose_memory(r, kind, id, key);
 }
 
 /* 0 without a response outside a task, if one is needed to compress the object. */
@@ -104,7 +131,11 @@ static int reply_part(request *r, object_kind kind, const char *id, object_part 
     return 1;
   }
   if (r->encoded) {
-    reply_encoded(r, 200, mime);
+    if (r->coded) {
+      reply_encoded(r, 200, mime);
+    } else {
+      reply_memory(r, 200);
+    }
     add_headers(r, mime, name, 1);
     return 1;
   }

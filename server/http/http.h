@@ -121,7 +121,7 @@ struct request {
 
   unsigned status;
   coding coded;           /* of the answer */
-  const encoded *encoded; /* the compressed answer, referenced; NULL once a response holds it */
+  const encoded *encoded; /* the answer in memory, referenced; NULL once a response holds it */
   char etag[48];          /* of the form that reply_choose() has chosen */
   int64_t sends;          /* bytes of the response's body; event streams count theirs as they send */
   char trace[TRACE_SIZE]; /* traceparent, if the caller sent a well-formed one */
@@ -197,6 +197,8 @@ enum { ENCODE_LEAST = 1024, ENCODE_MOST = 64 << 20 };
 int reply_choose(request *r, const char *key, const char *etag, const void *bytes, size_t size);
 /* Sends what reply_choose() has compressed. */
 void reply_encoded(request *r, unsigned status, const char *mime);
+/* Likewise, without headers: sends the bytes of r->encoded. */
+void reply_memory(request *r, unsigned status);
 /* The description, with ETag and 304; releases the reference. */
 void reply_cached(request *r, unsigned status, const cached *entry);
 void reply_header(request *r, const char *name, const char *value);
