@@ -16,21 +16,22 @@ enum { YEAR_S = 31536000 };
 
 static void add_headers(request *r, const char *mime, const char *name, int varies) {
   char disposition[DISPOSITION_SIZE];
-  char control[64];
-  int64_t left = r->expires - (int64_t)time(NULL);
   reply_header(r, "ETag", r->etag);
   if (varies && (!r->coded || r->status == 304)) {
     reply_header(r, "Vary", "Accept-Encoding");
   }
   if (r->signer) { /* anyone with the URL may read it until it expires */
+    char control[64];
+    int64_t left = r->expires - (int64_t)time(NULL);
     snprintf(control, sizeof control, "public, max-age=%lld",
              (long long)(left < 0        ? 0
                          : left < YEAR_S ? left
                                          : YEAR_S));
+    reply_header(r, "Cache-Control", control);
   } else { /* a shared cache must not keep what only one token may see */
-    snprintf(control, sizeof control, "%s, max-age=%d, immutable", r->caller ? "private" : "public", YEAR_S);
+    reply_header(r, "Cache-Control",
+                 r->caller ? "private, max-age=31536000, immutable" : "public, max-age=31536000, immutable");
   }
-  reply_header(r, "Cache-Control", control);
   reply_header(r, "Accept-Ranges", "bytes");
   if (r->status != 304) {
     if (!r->coded) {
