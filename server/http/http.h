@@ -10,7 +10,8 @@
  *   landmarks.c  POST /v1/landmarks
  *   morph.c      GET /v1/morph.glb        sign.c, signers.c   signed URLs
  *   resources.c  GET, DELETE and lists of meshes, embeddings, supermeshes and landmarks
- *   files.c      GET of stored objects    jobs.c        GET, DELETE and lists of jobs; waiting for a job
+ *   files.c, disposition.c   GET of stored objects, the names of downloads
+ *   jobs.c        GET, DELETE and lists of jobs; waiting for a job
  *   events.c     GET /v1/jobs/{job}/events
  *   system.c     /livez, /readyz, /metrics              pages.c       the studio, /openapi.json, /docs
  *   reply.c, send.c   responses; the headers that every response carries; encode.c, encoded.c   compressed responses
