@@ -6,6 +6,8 @@
 
 /* The parameters that end a signed URL. */
 #define API_SIGNED "key expires signature"
+/* The parameters of every list. */
+#define API_LISTED "limit page_token id_prefix"
 /* The parameters of a recipe, see server/http/morph.c. */
 #define API_RECIPE "shapes names landmarks align preset remesh tolerance max_triangles fit path animation normals wait "
 
@@ -21,21 +23,22 @@
 #define API_ROUTES(ROUTE)                                                                                             \
   ROUTE(ROUTE_MESH_UPLOAD, "POST", "/v1/meshes", ROUTE_MESH_BODY, SCOPE_WRITE, "name format repair",                  \
         handle_mesh_upload)                                                                                           \
-  ROUTE(ROUTE_MESH_LIST, "GET", "/v1/meshes", ROUTE_NO_BODY, SCOPE_READ, "limit page_token", handle_list)             \
+  ROUTE(ROUTE_MESH_LIST, "GET", "/v1/meshes", ROUTE_NO_BODY, SCOPE_READ, API_LISTED, handle_list)                     \
   ROUTE(ROUTE_MESH_GET, "GET", "/v1/meshes/{id}", ROUTE_NO_BODY, SCOPE_READ, "", handle_get)                          \
   ROUTE(ROUTE_MESH_DELETE, "DELETE", "/v1/meshes/{id}", ROUTE_NO_BODY, SCOPE_WRITE, "", handle_delete)                \
   ROUTE(ROUTE_MESH_FILE, "GET", "/v1/meshes/{id}/file", ROUTE_NO_BODY, SCOPE_READ, "", handle_file)                   \
   ROUTE(ROUTE_EMBEDDING_CREATE, "POST", "/v1/embeddings", ROUTE_JSON_BODY, SCOPE_WRITE, "wait", handle_create)        \
-  ROUTE(ROUTE_EMBEDDING_LIST, "GET", "/v1/embeddings", ROUTE_NO_BODY, SCOPE_READ, "limit page_token", handle_list)    \
+  ROUTE(ROUTE_EMBEDDING_LIST, "GET", "/v1/embeddings", ROUTE_NO_BODY, SCOPE_READ, API_LISTED, handle_list)            \
   ROUTE(ROUTE_EMBEDDING_GET, "GET", "/v1/embeddings/{id}", ROUTE_NO_BODY, SCOPE_READ, "", handle_get)                 \
   ROUTE(ROUTE_EMBEDDING_DELETE, "DELETE", "/v1/embeddings/{id}", ROUTE_NO_BODY, SCOPE_WRITE, "", handle_delete)       \
   ROUTE(ROUTE_EMBEDDING_SPHERE, "GET", "/v1/embeddings/{id}/sphere.ply", ROUTE_NO_BODY, SCOPE_READ, "", handle_file)  \
   ROUTE(ROUTE_LANDMARKS_CREATE, "POST", "/v1/landmarks", ROUTE_JSON_BODY, SCOPE_WRITE, "", handle_landmarks_create)   \
-  ROUTE(ROUTE_LANDMARKS_LIST, "GET", "/v1/landmarks", ROUTE_NO_BODY, SCOPE_READ, "limit page_token", handle_list)     \
+  ROUTE(ROUTE_LANDMARKS_LIST, "GET", "/v1/landmarks", ROUTE_NO_BODY, SCOPE_READ, API_LISTED, handle_list)             \
   ROUTE(ROUTE_LANDMARKS_GET, "GET", "/v1/landmarks/{id}", ROUTE_NO_BODY, SCOPE_READ, "", handle_get)                  \
   ROUTE(ROUTE_LANDMARKS_DELETE, "DELETE", "/v1/landmarks/{id}", ROUTE_NO_BODY, SCOPE_WRITE, "", handle_delete)        \
   ROUTE(ROUTE_SUPERMESH_CREATE, "POST", "/v1/supermeshes", ROUTE_JSON_BODY, SCOPE_WRITE, "wait", handle_create)       \
-  ROUTE(ROUTE_SUPERMESH_LIST, "GET", "/v1/supermeshes", ROUTE_NO_BODY, SCOPE_READ, "limit page_token", handle_list)   \
+  ROUTE(ROUTE_SUPERMESH_LIST, "GET", "/v1/supermeshes", ROUTE_NO_BODY, SCOPE_READ, API_LISTED " mesh name view",      \
+        handle_list)                                                                                                  \
   ROUTE(ROUTE_SUPERMESH_GET, "GET", "/v1/supermeshes/{id}", ROUTE_NO_BODY, SCOPE_READ, API_SIGNED, handle_get)        \
   ROUTE(ROUTE_SUPERMESH_DELETE, "DELETE", "/v1/supermeshes/{id}", ROUTE_NO_BODY, SCOPE_WRITE, "", handle_delete)      \
   ROUTE(ROUTE_SUPERMESH_ASSET, "GET", "/v1/supermeshes/{id}/asset.glb", ROUTE_NO_BODY, SCOPE_READ, API_SIGNED,        \
@@ -45,7 +48,7 @@
   ROUTE(ROUTE_SUPERMESH_SPHERE, "GET", "/v1/supermeshes/{id}/spheres/{k}.ply", ROUTE_NO_BODY, SCOPE_READ, API_SIGNED, \
         handle_file)                                                                                                  \
   ROUTE(ROUTE_MORPH, "GET", "/v1/morph.glb", ROUTE_NO_BODY, SCOPE_READ, API_RECIPE API_SIGNED, handle_morph)          \
-  ROUTE(ROUTE_JOB_LIST, "GET", "/v1/jobs", ROUTE_NO_BODY, SCOPE_READ, "limit page_token state", handle_job_list)      \
+  ROUTE(ROUTE_JOB_LIST, "GET", "/v1/jobs", ROUTE_NO_BODY, SCOPE_READ, API_LISTED " state", handle_job_list)           \
   ROUTE(ROUTE_JOB_GET, "GET", "/v1/jobs/{job}", ROUTE_NO_BODY, SCOPE_READ, "wait", handle_job_get)                    \
   ROUTE(ROUTE_JOB_CANCEL, "DELETE", "/v1/jobs/{job}", ROUTE_NO_BODY, SCOPE_WRITE, "", handle_job_cancel)              \
   ROUTE(ROUTE_JOB_EVENTS, "GET", "/v1/jobs/{job}/events", ROUTE_NO_BODY, SCOPE_READ, "last_event_id",                 \

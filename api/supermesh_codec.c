@@ -2,7 +2,9 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
+#include "api/json.h"
 #include "api/report_codec.h"
 
 static int landmarks_exact(const orb_merge_result *result) {
@@ -162,4 +164,41 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   api_json_member_instant(out, "created", created);
   api_json_close(out, '}');
   api_text_free(&canonical);
+}
+
+/* Appends members that are texts or whole numbers, as far as the object has them. */
+static void copy_members(const cJSON *from, const char *const *names, api_text *out) {
+  for (; *names; names++) {
+    const cJSON *member = cJSON_GetObjectItemCaseSensitive(from, *names);
+    if (cJSON_IsString(member)) {
+      api_json_member_string(out, *names, member->valuestring);
+    } else if (cJSON_IsNumber(member)) {
+      api_json_member_integer(out, *names, (int64_t)member->valuedouble);
+    }
+  }
+}
+
+int api_supermesh_summary(const char *description, api_text *out) {
+  static const char *const first[] = {"id", "url", "asset", "asset_bytes", "vertices", "triangles", NULL};
+  static const char *const of_shape[] = {"mesh", "name", NULL}, *const last[] = {"engine", "created", NULL};
+  cJSON *whole = cJSON_Parse(description);
+  const cJSON *shape;
+  if (!cJSON_IsObject(whole)) {
+    cJSON_Delete(whole);
+    return 0;
+  }
+  api_json_open(out, '{');
+  copy_members(whole, first, out);
+  api_json_key(out, "shapes");
+  api_json_open(out, '[');
+  cJSON_ArrayForEach(shape, cJSON_GetObjectItemCaseSensitive(whole, "shapes")) {
+    api_json_open(out, '{');
+    copy_members(shape, of_shape, out);
+    api_json_close(out, '}');
+  }
+  api_json_close(out, ']');
+  copy_members(whole, last, out);
+  api_json_close(out, '}');
+  cJSON_Delete(whole);
+  return 1;
 }

@@ -51,7 +51,7 @@ static const entry table[] = {
     {"max-ratio", NUMBER(max_ratio, 2, 1000000), "200",
      "limit on the compression ratio of a body that decompresses to more than 1M"},
     {"encoded-bytes", NUMBER(encoded_bytes, 0, INT64_C(1) << 40), "128M",
-     "bytes of compressed answers to keep in memory; 0: answers are not compressed"},
+     "bytes of compressed answers and small assets to keep in memory; 0: none, and answers are not compressed"},
     {"decode-memory", NUMBER(decode_memory, 1 << 20, INT64_C(1) << 40), "256M",
      "bytes for decompressing all bodies at once"},
     {"max-triangles", NUMBER(max_triangles, 4, 500000000), "5000000", "limit on the triangles of a mesh"},

@@ -21,6 +21,9 @@ int cli_run_upload(cli *c) {
     return CLI_USAGE;
   }
   for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
+    rc = cli_check_mesh(c, c->args.operands[i]);
+  }
+  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
     cli_reply reply;
     rc = cli_upload(c, c->args.operands[i], name, c->args.value[OPT_REPAIR], &reply);
     if (rc == CLI_DONE && !cli_ok(&reply)) {
@@ -35,25 +38,29 @@ int cli_run_upload(cli *c) {
   return rc;
 }
 
-static int embed_one(cli *c, const char *operand) {
-  cli_mesh mesh;
-  cli_reply reply = {0};
-  int rc = cli_mesh_of(c, operand, &mesh);
-  if (rc != CLI_DONE) {
-    return rc;
-  }
+/* The request of an embedding but for the mesh. Runs before any upload, so that a usage error is reported at once. */
+static int embedding_request(cli *c, cJSON **out) {
   cJSON *request = cJSON_CreateObject();
-  cJSON_AddStringToObject(request, "mesh", mesh.id);
+  *out = request;
   if (c->args.value[OPT_METHOD]) {
     cJSON_AddStringToObject(request, "method", c->args.value[OPT_METHOD]);
   }
   if (c->args.value[OPT_PRESET]) {
     cJSON_AddStringToObject(cJSON_AddObjectToObject(request, "options"), "preset", c->args.value[OPT_PRESET]);
   }
-  rc = cli_apply_sets(c, request);
-  if (rc == CLI_DONE) {
-    rc = cli_make(c, "/v1/embeddings", request, &reply);
+  return cli_apply_sets(c, request);
+}
+
+static int embed_one(cli *c, const char *operand, const cJSON *settings) {
+  cli_mesh mesh;
+  cli_reply reply = {0};
+  int rc = cli_mesh_of(c, operand, &mesh);
+  if (rc != CLI_DONE) {
+    return rc;
   }
+  cJSON *request = cJSON_Duplicate(settings, 1);
+  cli_set_member(request, "mesh", cJSON_CreateString(mesh.id));
+  rc = cli_make(c, "/v1/embeddings", request, &reply);
   if (rc == CLI_DONE && reply.json) {
     if (c->json) {
       puts(reply.body);
@@ -73,22 +80,34 @@ static int embed_one(cli *c, const char *operand) {
 }
 
 int cli_run_embed(cli *c) {
-  int rc = CLI_DONE;
+  cJSON *settings = NULL;
   if (c->args.value[OPT_OUTPUT] && c->args.operand_count > 1) {
     cli_error(c, "--output needs exactly one mesh");
     return CLI_USAGE;
   }
-  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
-    rc = embed_one(c, c->args.operands[i]);
+  int rc = cli_can_write(c, c->args.value[OPT_OUTPUT]);
+  if (rc == CLI_DONE) {
+    rc = embedding_request(c, &settings);
   }
+  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
+    rc = cli_check_mesh(c, c->args.operands[i]);
+  }
+  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
+    rc = embed_one(c, c->args.operands[i], settings);
+  }
+  cJSON_Delete(settings);
   return rc;
 }
 
 int cli_run_job(cli *c) {
-  char *path = cli_resource_path("jobs", c->args.operands[0]), *result = NULL;
+  char *path = NULL, *result = NULL;
   cli_reply reply = {0};
+  int rc = cli_locate(c, "jobs", c->args.operands[0], &path);
+  if (rc != CLI_DONE) {
+    return rc;
+  }
   cli_request request = {.method = c->args.value[OPT_CANCEL] ? "DELETE" : "GET", .path = path};
-  int rc = cli_send(c, &request, &reply);
+  rc = cli_send(c, &request, &reply);
   if (rc == CLI_DONE && !cli_ok(&reply)) {
     rc = cli_not_found(c, "job", c->args.operands[0], &reply);
   }
@@ -147,8 +166,10 @@ static int list(cli *c, const char *collection, long limit) {
   int rc = CLI_DONE;
   do {
     char *wanted = state ? cli_escape(state) : NULL, *from = token ? cli_escape(token) : NULL;
-    char *path = cli_text("/v1/%s?limit=%ld%s%s%s%s", collection, limit < 100 ? limit : 100, wanted ? "&state=" : "",
-                          wanted ? wanted : "", from ? "&page_token=" : "", from ? from : "");
+    int brief = !c->json && !strcmp(collection, "supermeshes");
+    char *path =
+        cli_text("/v1/%s?limit=%ld%s%s%s%s%s", collection, limit < 100 ? limit : 100, brief ? "&view=summary" : "",
+                 wanted ? "&state=" : "", wanted ? wanted : "", from ? "&page_token=" : "", from ? from : "");
     cli_reply reply = {0};
     rc = cli_get(c, path, &reply);
     free(path);
@@ -228,10 +249,10 @@ int cli_run_get(cli *c) {
     return CLI_USAGE;
   }
   if (part || output) {
-    char *base = part ? cli_resource_path(home, c->args.operands[0]) : NULL;
-    rc = CLI_DONE;
-    if (!part) {
-      rc = cli_find(c, c->args.operands[0], &base, &reply);
+    char *base = NULL;
+    rc = cli_can_write(c, output);
+    if (rc == CLI_DONE) {
+      rc = part ? cli_locate(c, home, c->args.operands[0], &base) : cli_find(c, c->args.operands[0], &base, &reply);
     }
     path = cli_text("%s%s", base ? base : "", tail);
     if (rc == CLI_DONE) {

@@ -1,8 +1,6 @@
 /* morph and merge: build the request, wait, download. */
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "commands.h"
 #include "http.h"
@@ -29,8 +27,8 @@ static int add_options(const cli *c, cJSON *request) {
   set_text(c, request, OPT_FIT, "asset.fit");
   set_text(c, request, OPT_PATH, "asset.path");
   if (tolerance) {
-    if (!cli_decimal(tolerance, &x) || x <= 0) {
-      cli_error(c, "--tolerance takes a number above 0, not '%s'", tolerance);
+    if (!cli_decimal(tolerance, &x) || !(x >= 1e-9 && x <= 1)) {
+      cli_error(c, "--tolerance takes a number from 1e-9 to 1, not '%s'", tolerance);
       return CLI_USAGE;
     }
     cli_set_member(request, "remesh.tolerance", cJSON_CreateNumber(x));
@@ -48,6 +46,23 @@ static int add_options(const cli *c, cJSON *request) {
   return cli_apply_sets(c, request);
 }
 
+/* Whether each landmark has a place on each shape. What else is wrong with a landmark, the daemon says. */
+static int have_all_shapes(const cli *c, const char *file, const cJSON *list) {
+  const cJSON *item;
+  int number = 0;
+  cJSON_ArrayForEach(item, list) {
+    const cJSON *at = cJSON_GetObjectItemCaseSensitive(item, "at");
+    int places = cJSON_GetArraySize(at);
+    if (cJSON_IsArray(at) && places != c->args.operand_count) {
+      cli_error(c, "%s: landmark %d has %d places, but the command names %d shapes", file, number, places,
+                c->args.operand_count);
+      return 0;
+    }
+    number++;
+  }
+  return 1;
+}
+
 /* Everything but the shapes. Runs before any upload, so that a usage error is reported at once. */
 static int make_request(cli *c, cJSON **out) {
   const char *landmarks = c->args.value[OPT_LANDMARKS];
@@ -62,6 +77,9 @@ static int make_request(cli *c, cJSON **out) {
       return CLI_USAGE;
     }
     cJSON_AddItemToObject(request, "landmarks", list);
+    if (!have_all_shapes(c, landmarks, list)) {
+      return CLI_USAGE;
+    }
   }
   return add_options(c, request);
 }
@@ -108,30 +126,18 @@ static int finish(cli *c, const cli_reply *supermesh, const char *output) {
   return CLI_DONE;
 }
 
-/* Checks before any work that the folder of an output file is writable. */
-static int can_write(const cli *c, const char *file) {
-  if (!file || !strcmp(file, "-")) {
-    return CLI_DONE;
-  }
-  const char *slash = strrchr(file, '/');
-  char *folder = slash ? cli_text("%.*s", (int)(slash - file + 1), file) : cli_text(".");
-  int fine = access(folder, W_OK | X_OK) == 0;
-  if (!fine) {
-    cli_error(c, "cannot write %s: folder %s: %s", file, folder, strerror(errno));
-  }
-  free(folder);
-  return fine ? CLI_DONE : CLI_USAGE;
-}
-
 static int merge(cli *c, const char *output) {
   cJSON *request = NULL;
   cli_reply supermesh = {0};
-  int rc = can_write(c, output);
+  int rc = cli_can_write(c, output);
   if (rc == CLI_DONE) {
-    rc = can_write(c, c->args.value[OPT_REPORT]);
+    rc = cli_can_write(c, c->args.value[OPT_REPORT]);
   }
   if (rc == CLI_DONE) {
     rc = make_request(c, &request);
+  }
+  for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
+    rc = cli_check_mesh(c, c->args.operands[i]);
   }
   if (rc == CLI_DONE) {
     rc = add_shapes(c, request);

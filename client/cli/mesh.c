@@ -6,9 +6,29 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "prefix.h"
 #include "problem.h"
+#include "resource.h"
 #include "terminal.h"
 #include "text.h"
+
+/* An operand that names a file is that file, even if its name could be an id. */
+static int is_stored(const char *operand) {
+  return (cli_is_id(operand) || cli_is_prefix(operand)) && access(operand, F_OK) != 0;
+}
+
+int cli_check_mesh(const cli *c, const char *operand) {
+  struct stat info;
+  if (is_stored(operand)) {
+    return CLI_DONE;
+  }
+  int there = stat(operand, &info) == 0, folder = there && S_ISDIR(info.st_mode);
+  if (!folder && access(operand, R_OK) == 0) {
+    return CLI_DONE;
+  }
+  cli_error(c, "%s: %s", operand, folder ? "not a regular file" : strerror(errno));
+  return CLI_USAGE;
+}
 
 int cli_upload(cli *c, const char *path, const char *name, const char *repair, cli_reply *reply) {
   memset(reply, 0, sizeof *reply);
@@ -56,11 +76,14 @@ static void note_mesh(const cli *c, const char *operand, const cli_reply *reply)
 
 int cli_mesh_of(cli *c, const char *operand, cli_mesh *out) {
   cli_reply reply = {0};
-  int rc, known = cli_is_id(operand) && access(operand, F_OK) != 0;
+  int rc, known = is_stored(operand);
   memset(out, 0, sizeof *out);
   if (known) {
-    char *path = cli_text("/v1/meshes/%s", operand);
-    rc = cli_get(c, path, &reply);
+    char *path = NULL;
+    rc = cli_locate(c, "meshes", operand, &path);
+    if (rc == CLI_DONE) {
+      rc = cli_get(c, path, &reply);
+    }
     free(path);
   } else {
     rc = cli_upload(c, operand, NULL, c->args.value[OPT_REPAIR], &reply);

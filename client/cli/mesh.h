@@ -8,7 +8,11 @@ typedef struct cli_mesh {
   char *id, *name;
 } cli_mesh;
 
-/* Looks an id up, or uploads a file. */
+/* Checks before any upload that an operand is an id or a file that can be read. CLI_DONE, or CLI_USAGE after printing
+ * why. */
+int cli_check_mesh(const cli *c, const char *operand);
+
+/* Looks an id up, which may be given by its first digits, or uploads a file. */
 int cli_mesh_of(cli *c, const char *operand, cli_mesh *out);
 void cli_mesh_free(cli_mesh *mesh);
 

@@ -77,6 +77,37 @@ static int usage_error(const cli_command *command, const char *what, const char 
   return CLI_USAGE;
 }
 
+/* Whether each item of a comma list is one of the words. */
+static int are_choices(const char *words, const char *list) {
+  for (const char *item = list;; item++) {
+    size_t length = strcspn(item, ",");
+    int found = 0;
+    for (const char *word = words; *word && !found; word += strspn(word, " ")) {
+      size_t size = strcspn(word, " ");
+      found = size == length && !strncmp(word, item, size);
+      word += size;
+    }
+    item += length;
+    if (!found || !*item) {
+      return found;
+    }
+  }
+}
+
+/* Whether the value is one that the option takes. The daemon knows the same values, but it sees them only after the
+ * uploads. */
+static int check_choice(const cli_command *command, int id, const char *value) {
+  const cli_option *o = &cli_options[id];
+  if (!o->choices || (are_choices(o->choices, value) && (id == OPT_REPAIR || !strchr(value, ',')))) {
+    return CLI_DONE;
+  }
+  char *text = cli_text("'%s'; choose from: %s", value, o->choices), *what = cli_text("option --%s cannot be", o->name);
+  int rc = usage_error(command, what, text);
+  free(what);
+  free(text);
+  return rc;
+}
+
 static int store(cli_args *out, int id, const char *value) {
   if (id != OPT_SET) {
     out->value[id] = value;
@@ -137,7 +168,8 @@ static int parse_option(const cli_command *command, int argc, char **argv, int *
     }
     value = argv[++*i];
   }
-  return store(out, id, value) ? CLI_DONE : usage_error(command, "too many options:", text);
+  int rc = check_choice(command, id, value);
+  return rc != CLI_DONE ? rc : store(out, id, value) ? CLI_DONE : usage_error(command, "too many options:", text);
 }
 
 int cli_parse(const cli_command *command, int argc, char **argv, int first, cli_args *out) {

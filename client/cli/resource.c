@@ -3,9 +3,11 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "job.h"
+#include "prefix.h"
 #include "problem.h"
 #include "terminal.h"
 #include "text.h"
@@ -27,9 +29,21 @@ int cli_not_found(cli *c, const char *kind, const char *operand, const cli_reply
   return CLI_REFUSED;
 }
 
+int cli_locate(cli *c, const char *collection, const char *operand, char **path) {
+  if (cli_is_prefix(operand)) {
+    return cli_resolve(c, operand, (const char *const[]){collection, NULL}, path);
+  }
+  *path = cli_resource_path(collection, operand);
+  return CLI_DONE;
+}
+
 int cli_find(cli *c, const char *operand, char **path, cli_reply *reply) {
-  static const char *const collections[] = {"supermeshes", "meshes", "embeddings", "jobs"};
+  static const char *const collections[] = {"supermeshes", "meshes", "embeddings", "jobs", NULL};
   int rc = CLI_DONE;
+  if (cli_is_prefix(operand)) {
+    rc = cli_resolve(c, operand, collections, path);
+    return rc == CLI_DONE ? cli_get(c, *path, reply) : rc;
+  }
   for (size_t i = 0; i < 4; i++) {
     *path = cli_resource_path(collections[i], operand);
     rc = cli_get(c, *path, reply);
@@ -45,10 +59,57 @@ int cli_find(cli *c, const char *operand, char **path, cli_reply *reply) {
   return rc;
 }
 
+/* A device or a pipe is written to; a file is replaced by one that was written beside it. */
+static int is_stream(const char *file) {
+  struct stat info;
+  return !strcmp(file, "-") || (stat(file, &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode));
+}
+
+static char *part_of(const char *file) {
+  return cli_text("%s.part-%ld", file, (long)getpid());
+}
+
+int cli_can_write(const cli *c, const char *file) {
+  struct stat info;
+  if (!file || is_stream(file)) {
+    return CLI_DONE;
+  }
+  char *part = part_of(file);
+  FILE *out = NULL;
+  if (stat(file, &info) == 0 && S_ISDIR(info.st_mode)) {
+    errno = EISDIR;
+  } else {
+    out = fopen(part, "wb");
+  }
+  if (out) {
+    fclose(out);
+    unlink(part);
+  } else {
+    cli_error(c, "cannot write %s: %s", file, strerror(errno));
+  }
+  free(part);
+  return out ? CLI_DONE : CLI_USAGE;
+}
+
+/* Copies a downloaded file to a device or a pipe, "-" for standard output. 0 on failure. */
+static int copy_to(FILE *from, const char *file) {
+  char block[1 << 16];
+  FILE *to = strcmp(file, "-") ? fopen(file, "wb") : stdout;
+  int fine = to != NULL;
+  rewind(from);
+  for (size_t got; fine && (got = fread(block, 1, sizeof block, from)) > 0;) {
+    fine = fwrite(block, 1, got, to) == got;
+  }
+  if (to && to != stdout) {
+    fine &= fclose(to) == 0;
+  }
+  return fine || to == stdout; /* main() checks standard output */
+}
+
 int cli_download(cli *c, const char *path, const char *file) {
-  int to_stdout = !strcmp(file, "-");
-  char *part = to_stdout ? NULL : cli_text("%s.part-%ld", file, (long)getpid());
-  FILE *out = to_stdout ? tmpfile() : fopen(part, "w+b");
+  int streams = is_stream(file);
+  char *part = streams ? NULL : part_of(file);
+  FILE *out = streams ? tmpfile() : fopen(part, "w+b");
   cli_reply reply = {0};
   if (!out) {
     cli_error(c, "%s: %s", file, strerror(errno));
@@ -61,12 +122,9 @@ int cli_download(cli *c, const char *path, const char *file) {
   if (rc == CLI_DONE && !cli_ok(&reply)) {
     rc = cli_refused(c, path, &reply);
   }
-  if (rc == CLI_DONE && to_stdout) {
-    char block[1 << 16];
-    rewind(out);
-    for (size_t got; (got = fread(block, 1, sizeof block, out)) > 0;) {
-      fwrite(block, 1, got, stdout);
-    }
+  if (rc == CLI_DONE && streams && !copy_to(out, file)) {
+    cli_error(c, "%s: %s", file, strerror(errno));
+    rc = CLI_USAGE;
   }
   int closed = fclose(out) == 0;
   if (part && rc == CLI_DONE && (!closed || rename(part, file) != 0)) {

@@ -7,6 +7,11 @@
 /* The path of an operand: "/v1/jobs/ID" for an id, the path of a URL, or a path as it is. The caller frees it. */
 char *cli_resource_path(const char *collection, const char *operand);
 
+/* Likewise, and an id may be given by its first digits. Returns CLI_DONE, or else after printing why; *path is NULL
+ * then.
+ */
+int cli_locate(cli *c, const char *collection, const char *operand, char **path);
+
 /* Finds the collection that holds an id; fetches the resource into reply. The caller frees *path and the reply. */
 int cli_find(cli *c, const char *operand, char **path, cli_reply *reply);
 
@@ -17,6 +22,10 @@ int cli_not_found(cli *c, const char *kind, const char *operand, const cli_reply
 /* Posts a request, waits for its job and fetches the resource into `resource`. With --no-wait it prints the job, and
  * resource->json stays NULL. */
 int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource);
+
+/* Tries whether a file can be written, before work that would be lost: NULL and "-" can. CLI_DONE, or CLI_USAGE after
+ * printing why. */
+int cli_can_write(const cli *c, const char *file);
 
 /* Downloads a resource into a file ("-": standard output); a temporary file beside it receives the bytes first. */
 int cli_download(cli *c, const char *path, const char *file);

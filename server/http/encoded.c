@@ -102,8 +102,16 @@ const encoded *encoded_make(encoded_cache *c, const char *tag, coding which, con
   if (!it) {
     return NULL;
   }
-  if (!encode_bytes(which, bytes, size, 0, &it->entry.bytes, &it->entry.size)) {
-    it->entry = (encoded){NULL, 0};
+  if (bytes && which == CODING_NONE) {
+    it->entry = (encoded){malloc(size), size};
+    if (it->entry.bytes) {
+      memcpy(it->entry.bytes, bytes, size);
+    }
+  } else if (bytes) {
+    encode_bytes(which, bytes, size, 0, &it->entry.bytes, &it->entry.size);
+  }
+  if (!it->entry.bytes) {
+    it->entry.size = 0;
   }
   snprintf(it->tag, sizeof it->tag, "%s", tag);
   it->which = which;

@@ -6,6 +6,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "http/disposition.h"
 #include "http/http.h"
 #include "log.h"
 #include "metrics.h"
@@ -14,28 +15,29 @@
 enum { YEAR_S = 31536000 };
 
 static void add_headers(request *r, const char *mime, const char *name, int varies) {
-  char disposition[160];
-  char control[64];
-  int64_t left = r->expires - (int64_t)time(NULL);
+  char disposition[DISPOSITION_SIZE];
   reply_header(r, "ETag", r->etag);
   if (varies && (!r->coded || r->status == 304)) {
     reply_header(r, "Vary", "Accept-Encoding");
   }
   if (r->signer) { /* anyone with the URL may read it until it expires */
+    char control[64];
+    int64_t left = r->expires - (int64_t)time(NULL);
     snprintf(control, sizeof control, "public, max-age=%lld",
              (long long)(left < 0        ? 0
                          : left < YEAR_S ? left
                                          : YEAR_S));
+    reply_header(r, "Cache-Control", control);
   } else { /* a shared cache must not keep what only one token may see */
-    snprintf(control, sizeof control, "%s, max-age=%d, immutable", r->caller ? "private" : "public", YEAR_S);
+    reply_header(r, "Cache-Control",
+                 r->caller ? "private, max-age=31536000, immutable" : "public, max-age=31536000, immutable");
   }
-  reply_header(r, "Cache-Control", control);
   reply_header(r, "Accept-Ranges", "bytes");
   if (r->status != 304) {
     if (!r->coded) {
       reply_header(r, "Content-Type", mime);
     }
-    snprintf(disposition, sizeof disposition, "inline; filename=\"%s\"", name);
+    disposition_write(name, disposition);
     reply_header(r, "Content-Disposition", disposition);
   }
 }
@@ -45,8 +47,9 @@ typedef struct object_part {
   uint64_t start, length;
 } object_part;
 
-/* Reads a part of an object into memory of malloc(); NULL on failure. */
-static void *read_part(const request *r, object_kind kind, const char *id, object_part part, size_t *size) {
+/* Reads a part of an object into memory of malloc(); NULL on failure, or if it is larger than `most`. */
+static void *read_part(const request *r, object_kind kind, const char *id, object_part part, size_t most,
+                       size_t *size) {
   int fd;
   uint64_t whole;
   *size = 0;
@@ -54,7 +57,7 @@ static void *read_part(const request *r, object_kind kind, const char *id, objec
     return NULL;
   }
   uint64_t wanted = part.length ? part.length : whole;
-  char *bytes = wanted >= ENCODE_LEAST && wanted <= ENCODE_MOST ? malloc((size_t)wanted) : NULL;
+  char *bytes = wanted >= ENCODE_LEAST && wanted <= most ? malloc((size_t)wanted) : NULL;
   for (ssize_t n = 1; bytes && n > 0 && *size<wanted; *size += n> 0 ? (size_t)n : 0) {
     n = pread(fd, bytes + *size, (size_t)wanted - *size, (off_t)(part.start + *size));
   }
@@ -66,23 +69,49 @@ static void *read_part(const request *r, object_kind kind, const char *id, objec
   return bytes;
 }
 
+/* Sending an asset of this size from memory takes two system calls, from its file eight. Beyond it, copying the bytes
+ * costs more than that. */
+enum { MEMORY_MOST = 512 << 10 };
+
+/* Takes a small asset from memory, and reads it there if it is not. 0: only a task may do that. */
+static int choose_memory(request *r, object_kind kind, const char *id, const char *key) {
+  size_t size;
+  if (kind != OBJECT_ASSET || r->srv->options->encoded_bytes == 0 || header_of(r, "Range")) {
+    return 1;
+  }
+  const encoded *found = encoded_find(r->srv->encoded, key, CODING_NONE);
+  if (!found && r->phase != PHASE_AWAY) {
+    return 0;
+  }
+  if (!found) {
+    void *bytes = read_part(r, kind, id, (object_part){0}, MEMORY_MOST, &size);
+    found = encoded_make(r->srv->encoded, key, CODING_NONE, bytes, size);
+    free(bytes);
+  }
+  if (found && found->bytes) {
+    r->encoded = found;
+  } else {
+    encoded_release(found);
+  }
+  return 1;
+}
+
 /* Chooses the form of an object, and compresses it if that has not been done. 0: only a task may do that. */
 static int choose_form(request *r, object_kind kind, const char *id, object_part part, const char *etag) {
   char key[96];
   size_t size;
-  snprintf(key, sizeof key, "object %d %d %s %s", (int)kind, r->shape, id, etag);
-  if (reply_choose(r, key, etag, NULL, ENCODE_LEAST)) {
-    return 1;
+  snprintf(key, sizeof key, "object %d %d %.16s %s", (int)kind, r->shape, id, etag);
+  if (!reply_choose(r, key, etag, NULL, ENCODE_LEAST)) {
+    if (r->phase != PHASE_AWAY) {
+      return 0;
+    }
+    void *bytes = read_part(r, kind, id, part, ENCODE_MOST, &size);
+    if (bytes) {
+      reply_choose(r, key, etag, bytes, size);
+    }
+    free(bytes);
   }
-  if (r->phase != PHASE_AWAY) {
-    return 0;
-  }
-  void *bytes = read_part(r, kind, id, part, &size);
-  if (bytes) {
-    reply_choose(r, key, etag, bytes, size);
-  }
-  free(bytes);
-  return 1;
+  return r->encoded || choose_memory(r, kind, id, key);
 }
 
 /* 0 without a response outside a task, if one is needed to compress the object. */
@@ -103,7 +132,11 @@ static int reply_part(request *r, object_kind kind, const char *id, object_part 
     return 1;
   }
   if (r->encoded) {
-    reply_encoded(r, 200, mime);
+    if (r->coded) {
+      reply_encoded(r, 200, mime);
+    } else {
+      reply_memory(r, 200);
+    }
     add_headers(r, mime, name, 1);
     return 1;
   }
@@ -160,37 +193,9 @@ static void reply_sphere(request *r) {
   reply_part(r, OBJECT_SPHERES, r->id, part, r->id, "application/octet-stream", name);
 }
 
-/* Names the download after the shapes, such as dog-giraffe.glb; of a name, letters, digits, "-", "_" and "." of ASCII
- * stay. The description begins with its shapes, and in JSON no name can contain the unescaped mark. */
-static void name_asset(const cached *entry, char out[100]) {
-  static const char mark[] = "{\"mesh\":\"", after[] = "\",\"name\":\"";
-  static const char kept[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
-  const char *end = strstr(entry->row.json, "],\"landmarks\":"), *at = entry->row.json;
-  size_t n = 0;
-  while (end && (at = strstr(at, mark)) && at < end) {
-    at += sizeof mark - 1 + API_ID_SIZE - 1;
-    if (strncmp(at, after, sizeof after - 1) != 0) {
-      continue;
-    }
-    if (n > 0 && n < 80) {
-      out[n++] = '-';
-    }
-    for (at += sizeof after - 1; *at && *at != '"' && n < 80; at += *at == '\\' && at[1] ? 2 : 1) {
-      unsigned char c = (unsigned char)*at;
-      if ((c & 0xC0) != 0x80) { /* one "_" for a character of several bytes */
-        out[n++] = strchr(kept, c) ? (char)c : '_';
-      }
-    }
-  }
-  if (n > 0 && (out[0] == '.' || out[0] == '-')) { /* no hidden file, and no option of a command */
-    out[0] = '_';
-  }
-  memcpy(out + n, n ? ".glb" : "asset.glb", n ? 5 : 10);
-}
-
 int reply_asset(request *r, const cached *entry) {
-  char link[128], name[100];
-  name_asset(entry, name);
+  char link[128], name[DISPOSITION_NAME];
+  disposition_name(entry->row.json, name);
   memcpy(r->id, entry->row.id, sizeof r->id);
   int done = reply_object(r, OBJECT_ASSET, r->id, entry->row.sha, "model/gltf-binary", name);
   if (done && r->route->id == ROUTE_MORPH && r->status < 400) {

@@ -10,7 +10,8 @@
  *   landmarks.c  POST /v1/landmarks
  *   morph.c      GET /v1/morph.glb        sign.c, signers.c   signed URLs
  *   resources.c  GET, DELETE and lists of meshes, embeddings, supermeshes and landmarks
- *   files.c      GET of stored objects    jobs.c        GET, DELETE and lists of jobs; waiting for a job
+ *   files.c, disposition.c   GET of stored objects, the names of downloads
+ *   jobs.c        GET, DELETE and lists of jobs; waiting for a job
  *   events.c     GET /v1/jobs/{job}/events
  *   system.c     /livez, /readyz, /metrics              pages.c       the studio, /openapi.json, /docs
  *   reply.c, send.c   responses; the headers that every response carries; encode.c, encoded.c   compressed responses
@@ -121,7 +122,7 @@ struct request {
 
   unsigned status;
   coding coded;           /* of the answer */
-  const encoded *encoded; /* the compressed answer, referenced; NULL once a response holds it */
+  const encoded *encoded; /* the answer in memory, referenced; NULL once a response holds it */
   char etag[48];          /* of the form that reply_choose() has chosen */
   int64_t sends;          /* bytes of the response's body; event streams count theirs as they send */
   char trace[TRACE_SIZE]; /* traceparent, if the caller sent a well-formed one */
@@ -197,6 +198,8 @@ enum { ENCODE_LEAST = 1024, ENCODE_MOST = 64 << 20 };
 int reply_choose(request *r, const char *key, const char *etag, const void *bytes, size_t size);
 /* Sends what reply_choose() has compressed. */
 void reply_encoded(request *r, unsigned status, const char *mime);
+/* Likewise, without headers: sends the bytes of r->encoded. */
+void reply_memory(request *r, unsigned status);
 /* The description, with ETag and 304; releases the reference. */
 void reply_cached(request *r, unsigned status, const cached *entry);
 void reply_header(request *r, const char *name, const char *value);
@@ -223,7 +226,8 @@ enum MHD_Result handle_wait(request *r);
 typedef struct list_page {
   int limit;
   int64_t before;
-  void *rows; /* of malloc() */
+  const char *prefix; /* of the ids; NULL: any */
+  void *rows;         /* of malloc() */
   api_text json;
 } list_page;
 int list_begin(request *r, const char *name, size_t row_size, list_page *page); /* 0 with a response */

@@ -285,7 +285,7 @@ static void list_away(request *r) {
   int64_t before = page.before;
   int found = 0, count;
   do {
-    count = catalogue_job_list(r->srv->cat, view[0] ? view : NULL, asked, before, page.limit + 1, rows);
+    count = catalogue_job_list(r->srv->cat, view[0] ? view : NULL, page.prefix, asked, before, page.limit + 1, rows);
     for (int i = 0; i < count; i++) {
       before = rows[i].seq;
       if (found <= page.limit && add_to_list(r, &rows[i], state, found < page.limit, &page.json)) {

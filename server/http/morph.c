@@ -12,11 +12,12 @@
 #include "http/http.h"
 #include "metrics.h"
 
-enum { RECIPES = 4096, FAILURE_MS = 600000 };
+enum { RECIPES = 4096, RECIPE_MOST = 1024, FAILURE_MS = 600000 };
 
 typedef struct recipe {
-  unsigned char hash[crypto_hash_sha256_BYTES]; /* of tenant and query */
-  char id[API_ID_SIZE];                         /* "": empty */
+  char *text; /* the tenant, a NUL, and the query up to the signature; NULL: empty */
+  size_t size;
+  char id[API_ID_SIZE];
   unsigned long long drops;
 } recipe;
 
@@ -25,29 +26,37 @@ static struct {
   recipe all[RECIPES];
 } recipes = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
-/* The signature changes each time that a page is made, and is no part of the recipe. */
-static void hash_recipe(const request *r, unsigned char hash[crypto_hash_sha256_BYTES]) {
-  crypto_hash_sha256_state state;
+/* The text of a request's recipe; returns its size, 0 if it is too long to be remembered. The signature changes each
+ * time that a page is made, and is no part of the recipe. */
+static size_t text_of(const request *r, char out[RECIPE_MOST]) {
   const char *query = strchr(r->target, '?'), *tenant = access_tenant(r);
   const char *end = query ? strstr(query, "&key=") : NULL;
-  size_t size = !query ? 0 : r->signer && end ? (size_t)(end - query) : strlen(query);
-  crypto_hash_sha256_init(&state);
-  crypto_hash_sha256_update(&state, (const unsigned char *)tenant, strlen(tenant) + 1);
-  crypto_hash_sha256_update(&state, (const unsigned char *)query, size);
-  crypto_hash_sha256_final(&state, hash);
+  size_t size = !query ? 0 : r->signer && end ? (size_t)(end - query) : strlen(query), before = strlen(tenant) + 1;
+  if (before + size > RECIPE_MOST) {
+    return 0;
+  }
+  memcpy(out, tenant, before);
+  memcpy(out + before, query ? query : "", size);
+  return before + size;
 }
 
-static recipe *slot_of(const unsigned char hash[crypto_hash_sha256_BYTES]) {
-  return &recipes.all[(hash[0] | hash[1] << 8) % RECIPES];
+static recipe *slot_of(const request *r, const char *text, size_t size) {
+  uint64_t hash;
+  _Static_assert(crypto_shorthash_BYTES == sizeof hash && crypto_shorthash_KEYBYTES == CATALOGUE_SECRET, "SipHash");
+  crypto_shorthash((unsigned char *)&hash, (const unsigned char *)text, size, r->srv->secret);
+  return &recipes.all[hash % RECIPES];
 }
 
 static int recall(const request *r, char id[API_ID_SIZE]) {
-  unsigned char hash[crypto_hash_sha256_BYTES];
+  char text[RECIPE_MOST];
+  size_t size = text_of(r, text);
+  if (size == 0) {
+    return 0;
+  }
   unsigned long long drops = cache_drops(r->srv->descriptions);
-  hash_recipe(r, hash);
+  const recipe *at = slot_of(r, text, size);
   pthread_mutex_lock(&recipes.lock);
-  const recipe *at = slot_of(hash);
-  int known = at->id[0] && at->drops == drops && memcmp(at->hash, hash, sizeof hash) == 0;
+  int known = at->text && at->drops == drops && at->size == size && memcmp(at->text, text, size) == 0;
   if (known) {
     memcpy(id, at->id, API_ID_SIZE);
   }
@@ -56,14 +65,20 @@ static int recall(const request *r, char id[API_ID_SIZE]) {
 }
 
 static void remember(const request *r, const char *id, unsigned long long drops) {
-  unsigned char hash[crypto_hash_sha256_BYTES];
-  hash_recipe(r, hash);
+  char text[RECIPE_MOST];
+  size_t size = text_of(r, text);
+  char *copy = size > 0 ? malloc(size) : NULL;
+  if (!copy) {
+    return;
+  }
+  memcpy(copy, text, size);
+  recipe *at = slot_of(r, text, size);
   pthread_mutex_lock(&recipes.lock);
-  recipe *at = slot_of(hash);
-  memcpy(at->hash, hash, sizeof hash);
+  char *old = at->text;
+  *at = (recipe){.text = copy, .size = size, .drops = drops};
   memcpy(at->id, id, API_ID_SIZE);
-  at->drops = drops;
   pthread_mutex_unlock(&recipes.lock);
+  free(old);
 }
 
 /* The parameters that become a member of the request as they are. */

@@ -175,6 +175,11 @@ int parse_page(const char *limit_text, const char *token, int *limit, uint64_t *
   return 1;
 }
 
+int parse_id_prefix(const char *text) {
+  size_t length = strlen(text);
+  return length > 0 && length < API_ID_SIZE && strspn(text, "0123456789abcdef") == length;
+}
+
 int parse_upload(const char *name, const char *repair, const char *format, upload_query *out, api_problem *problem) {
   memset(out, 0, sizeof *out);
   if (name && (!*name || strlen(name) >= sizeof out->name || !api_utf8_valid(name, strlen(name)))) {

@@ -36,6 +36,9 @@ enum { PAGE_MOST = 1000, PAGE_STANDARD = 100 };
 int parse_page(const char *limit_text, const char *token, int *limit, uint64_t *sealed, const char **why);
 extern const char PARSE_PAGE_TOKEN[]; /* the sentence for an invalid page token */
 
+/* Whether a text can begin an id: 1 to 64 lower-case hexadecimal digits. */
+int parse_id_prefix(const char *text);
+
 /* The query of an upload. 1, or 0 with the problem. */
 typedef struct upload_query {
   char name[ORB_NAME_MAX], repair[API_REPAIR_TEXT];

@@ -62,7 +62,7 @@ static void free_encoded(void *user) {
   encoded_release(user);
 }
 
-void reply_encoded(request *r, unsigned status, const char *mime) {
+void reply_memory(request *r, unsigned status) {
   const encoded *e = r->encoded;
   take(r, status,
        MHD_create_response_from_buffer_with_free_callback_cls(e->size, e->bytes, free_encoded, (void *)(uintptr_t)e),
@@ -70,6 +70,10 @@ void reply_encoded(request *r, unsigned status, const char *mime) {
   if (r->response) {
     r->encoded = NULL;
   }
+}
+
+void reply_encoded(request *r, unsigned status, const char *mime) {
+  reply_memory(r, status);
   reply_header(r, "Content-Type", mime);
   add_coding(r, r->coded);
 }
@@ -194,7 +198,7 @@ static int names_any(const request *r, const char *header, const char *etag, int
                      int *lines) {
   char form[48];
   int named = names_tag(r, header, etag, matches, lines);
-  for (coding which = CODING_GZIP; which <= CODING_ZSTD; which++) {
+  for (coding which = CODING_GZIP; *lines > 0 && which <= CODING_ZSTD; which++) {
     int plain = (int)strcspn(etag + 1, "-\"") + 1;
     snprintf(form, sizeof form, "%.*s-%s\"", plain, etag, coding_name(which));
     named |= names_tag(r, header, form, matches, lines);

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/supermesh_codec.h"
 #include "evict.h"
 #include "http/http.h"
 #include "http/paging.h"
@@ -67,13 +68,18 @@ enum MHD_Result handle_get(request *r) {
   return MHD_YES;
 }
 
-/* Reads limit and page_token. 1, or 0 with a response. */
-static int read_page(request *r, int *limit, int64_t *before) {
+/* Reads limit, page_token and id_prefix. 1, or 0 with a response. */
+static int read_page(request *r, list_page *page) {
   const char *why = PARSE_PAGE_TOKEN, *token = query_of(r, "page_token");
   uint64_t sealed;
-  int fine = parse_page(query_of(r, "limit"), token, limit, &sealed, &why);
-  *before = fine && token ? paging_open(r->srv->secret, sealed) : 0;
-  fine &= !token || *before > 0;
+  page->prefix = query_of(r, "id_prefix");
+  int fine = parse_page(query_of(r, "limit"), token, &page->limit, &sealed, &why);
+  page->before = fine && token ? paging_open(r->srv->secret, sealed) : 0;
+  fine &= !token || page->before > 0;
+  if (fine && page->prefix && !parse_id_prefix(page->prefix)) {
+    why = "\"id_prefix\" must be 1 to 64 lower-case hexadecimal digits.";
+    fine = 0;
+  }
   if (!fine) {
     reply_refuse(r, "bad-query", "%s", why);
   }
@@ -82,7 +88,7 @@ static int read_page(request *r, int *limit, int64_t *before) {
 
 int list_begin(request *r, const char *name, size_t row_size, list_page *page) {
   memset(page, 0, sizeof *page);
-  if (!read_page(r, &page->limit, &page->before)) {
+  if (!read_page(r, page)) {
     return 0;
   }
   page->rows = calloc((size_t)page->limit + 1, row_size);
@@ -115,21 +121,53 @@ void list_end(request *r, list_page *page, int64_t last, int count) {
   reply_json(r, 200, &page->json);
 }
 
+/* Reads the parameters of a list of supermeshes. 1, or 0 with a response. */
+static int read_filter(request *r, list_filter *filter, int *summary) {
+  const char *form = query_of(r, "view"), *why = NULL;
+  filter->mesh = query_of(r, "mesh");
+  filter->name = query_of(r, "name");
+  *summary = form && strcmp(form, "summary") == 0;
+  if (form && !*summary && strcmp(form, "full") != 0) {
+    why = "\"view\" must be full or summary.";
+  } else if (filter->mesh && !api_id_valid(filter->mesh, strlen(filter->mesh))) {
+    why = "\"mesh\" must be the id of a mesh, 64 lower-case hexadecimal digits.";
+  } else if (filter->name && (strlen(filter->name) >= ORB_NAME_MAX || !*filter->name)) {
+    why = "\"name\" must be the name of a shape, of 1 to 127 bytes.";
+  }
+  if (why) {
+    reply_refuse(r, "bad-query", "%s", why);
+  }
+  return why == NULL;
+}
+
+static int list_rows(const request *r, resource_kind kind, const list_page *page, const list_filter *filter) {
+  const char *view = access_view(r);
+  if (filter->prefix || filter->mesh || filter->name) {
+    return catalogue_list_some(r->srv->cat, kind, view, filter, page->before, page->limit + 1, page->rows);
+  }
+  return view[0] ? catalogue_list_of(r->srv->cat, kind, view, page->before, page->limit + 1, page->rows)
+                 : catalogue_list(r->srv->cat, kind, page->before, page->limit + 1, page->rows);
+}
+
 static void list_away(request *r) {
   static const char *const names[RESOURCE_KINDS] = {"meshes", "embeddings", "supermeshes", "landmarks"};
   resource_kind kind = kind_of(r);
+  list_filter filter = {0};
   list_page page;
   int64_t last = 0;
-  if (!list_begin(r, names[kind], sizeof(resource), &page)) {
+  int summary = 0;
+  if ((kind == RESOURCE_SUPERMESH && !read_filter(r, &filter, &summary)) ||
+      !list_begin(r, names[kind], sizeof(resource), &page)) {
     return;
   }
+  filter.prefix = page.prefix;
   resource *rows = page.rows;
-  const char *view = access_view(r);
-  int count = view[0] ? catalogue_list_of(r->srv->cat, kind, view, page.before, page.limit + 1, rows)
-                      : catalogue_list(r->srv->cat, kind, page.before, page.limit + 1, rows);
+  int count = list_rows(r, kind, &page, &filter);
   for (int i = 0; i < count; i++) {
     if (i < page.limit) {
-      api_json_raw(&page.json, rows[i].json);
+      if (!summary || !api_supermesh_summary(rows[i].json, &page.json)) {
+        api_json_raw(&page.json, rows[i].json);
+      }
       last = rows[i].seq;
     }
     resource_free(&rows[i]);

@@ -44,13 +44,14 @@ static void make_number_key(void) {
 
 /* Sixteen hexadecimal digits, different for each request: a keyed hash of a counter, so that a caller cannot tell how
  * many requests others make. */
-static void make_number(char *out, size_t size) {
+static void make_number(char out[2 * sizeof(uint64_t) + 1]) {
   static pthread_once_t once = PTHREAD_ONCE_INIT;
   static uint64_t numbers;
-  uint64_t number = __atomic_add_fetch(&numbers, 1, __ATOMIC_RELAXED), hashed;
+  uint64_t number = __atomic_add_fetch(&numbers, 1, __ATOMIC_RELAXED);
+  unsigned char hashed[crypto_shorthash_BYTES];
   pthread_once(&once, make_number_key);
-  crypto_shorthash((unsigned char *)&hashed, (const unsigned char *)&number, sizeof number, number_key);
-  snprintf(out, size, "%016llx", (unsigned long long)hashed);
+  crypto_shorthash(hashed, (const unsigned char *)&number, sizeof number, number_key);
+  sodium_bin2hex(out, 2 * sizeof hashed + 1, hashed, sizeof hashed);
 }
 
 /* Called with the target of the request line, before any header has arrived. The library keeps no copy of the target
@@ -66,7 +67,7 @@ static void *request_create(void *user, const char *target, struct MHD_Connectio
     r->watched = info ? info->socket_context : NULL;
     r->temp.fd = -1;
     r->began = clock_us();
-    make_number(r->number, sizeof r->number);
+    make_number(r->number);
   }
   return r;
 }

@@ -7,7 +7,7 @@
  *   database.c    connections, the schema and its migrations
  *   catalogue.c   the writer thread with group commit, the pool of readers
  *   rows.c        reading rows of any kind
- *   resources.c, owners.c, jobs.c, tokens.c   the SQL of each kind of row
+ *   resources.c, owners.c, jobs.c, tokens.c   the SQL of each kind of row; lists.c   lists with a filter
  *   objects.c     publishing, reading and deleting files; spheres.c   the file of aligned spheres
  *
  * Contract. ONE connection writes and checkpoints, and one thread owns it (SQLite before 3.51.3 can lose a WAL reset
@@ -62,6 +62,15 @@ store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id
 /* Functions that list return the number of rows filled, or −1, and fill nothing, if the rows cannot be read. */
 /* Newest first, landmarks without their places, only those before sequence number `before` (0: all). */
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out);
+/* What a list is limited to; NULL: not limited. */
+typedef struct list_filter {
+  const char *prefix;      /* of the id: hexadecimal digits */
+  const char *mesh, *name; /* supermeshes with a shape of this mesh, and with one of this name */
+} list_filter;
+/* Like catalogue_list(), only what the filter lets through and, unless view is "", what this tenant owns. Reads only
+ * matching rows, through an index; with a mesh and a name, the rows of that mesh. */
+int catalogue_list_some(catalogue *cat, resource_kind kind, const char *view, const list_filter *filter, int64_t before,
+                        int limit, resource *out);
 /* Embeddings and supermeshes last used before a Unix time in ms, least recently used first, without the first `skip`;
  * for eviction. */
 int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resource *out);
@@ -108,9 +117,10 @@ store_result catalogue_job_release(catalogue *cat, const char *id, int attempt);
 store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, api_job_state state, const char *problem,
                                   int64_t now, const resource *result, int64_t event, const char *event_json);
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out);
-/* owner NULL, state −1: any. */
+/* owner NULL, prefix of the id NULL, state −1: any. */
 enum { CATALOGUE_UNFINISHED = -2 }; /* as a state: queued or running */
-int catalogue_job_list(catalogue *cat, const char *owner, int state, int64_t before, int limit, job_row *out);
+int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, int state, int64_t before, int limit,
+                       job_row *out);
 /* After a crash: queues jobs that were running again, as suspects, and fails those that crashed alone `most_crashes`
  * times. */
 store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem);

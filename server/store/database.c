@@ -78,6 +78,27 @@ static const char *const migrations[] = {
     " day INTEGER NOT NULL DEFAULT 0, used_requests INTEGER NOT NULL DEFAULT 0, used_ms INTEGER NOT NULL DEFAULT 0)"
     " WITHOUT ROWID;"
     "ALTER TABLE job ADD COLUMN charged TEXT NOT NULL DEFAULT '';",
+    /* For lists of supermeshes by the mesh or the name of a shape: "mesh:ID" and "name:NAME" of each shape in each
+     * view. seq is that of the list: of the owner's row, or for the view "" of all, of the resource's. */
+    "CREATE VIEW shape_of(seq, key) AS SELECT r.seq, k.column1 || ':' || (s.value->>k.column1)"
+    " FROM resource r, json_each(iif(json_valid(r.json), r.json, '{}'), '$.shapes') s, (VALUES('mesh'), ('name')) k"
+    " WHERE r.kind=2 AND s.value->>k.column1 NOTNULL;"
+    "CREATE TABLE shape(view TEXT NOT NULL, key TEXT NOT NULL, seq INTEGER NOT NULL, PRIMARY KEY(view, key, seq))"
+    " WITHOUT ROWID;"
+    "CREATE INDEX shape_seq ON shape(view, seq);"
+    "CREATE TRIGGER shape_added AFTER INSERT ON resource WHEN NEW.kind=2 BEGIN"
+    " INSERT OR IGNORE INTO shape(view, key, seq) SELECT '', key, seq FROM shape_of WHERE seq=NEW.seq; END;"
+    "CREATE TRIGGER shape_removed AFTER DELETE ON resource WHEN OLD.kind=2 BEGIN"
+    " DELETE FROM shape WHERE view='' AND seq=OLD.seq; END;"
+    "CREATE TRIGGER shape_owned AFTER INSERT ON owner WHEN NEW.kind=2 AND NEW.tenant!='' BEGIN"
+    " INSERT INTO shape(view, key, seq) SELECT NEW.tenant, s.key, NEW.seq"
+    "  FROM resource r JOIN shape s ON s.view='' AND s.seq=r.seq WHERE r.kind=NEW.kind AND r.id=NEW.id; END;"
+    "CREATE TRIGGER shape_disowned AFTER DELETE ON owner WHEN OLD.kind=2 AND OLD.tenant!='' BEGIN"
+    " DELETE FROM shape WHERE view=OLD.tenant AND seq=OLD.seq; END;"
+    "INSERT OR IGNORE INTO shape(view, key, seq) SELECT '', key, seq FROM shape_of;"
+    "INSERT INTO shape(view, key, seq) SELECT o.tenant, s.key, o.seq FROM owner o"
+    " JOIN resource r ON r.kind=o.kind AND r.id=o.id JOIN shape s ON s.view='' AND s.seq=r.seq"
+    " WHERE o.kind=2 AND o.tenant!='';",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

@@ -193,14 +193,24 @@ store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
 }
 
 /* Listed jobs of state ?1 (−1: any, −2: queued or running) with a sequence number below ?2. */
-#define LISTED " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND seq<?2"
+#define LISTED " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND "
+/* Those whose id begins with ?5, through the index of ids; a "+" keeps SQLite from using another index. */
+#define NAMED "id>=?5 AND id<?5 || 'g' AND +seq<?2"
 
-int catalogue_job_list(catalogue *cat, const char *owner, int state, int64_t before, int limit, job_row *out) {
+int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, int state, int64_t before, int limit,
+                       job_row *out) {
+  static const char *const queries[2][2] = {
+      {"SELECT " COLUMNS LISTED "seq<?2 ORDER BY seq DESC LIMIT ?3",
+       "SELECT " COLUMNS LISTED "seq<?2 AND owner=?4 ORDER BY seq DESC LIMIT ?3"},
+      {"SELECT " COLUMNS LISTED NAMED " ORDER BY +seq DESC LIMIT ?3",
+       "SELECT " COLUMNS LISTED NAMED " AND +owner=?4 ORDER BY +seq DESC LIMIT ?3"}};
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = owner ? database_statement(db, "SELECT " COLUMNS LISTED " AND owner=?4 ORDER BY seq DESC LIMIT ?3")
-                           : database_statement(db, "SELECT " COLUMNS LISTED " ORDER BY seq DESC LIMIT ?3");
+  sqlite3_stmt *st = database_statement(db, queries[prefix != NULL][owner != NULL]);
   if (st && owner) {
     sqlite3_bind_text(st, 4, owner, -1, SQLITE_STATIC);
+  }
+  if (st && prefix) {
+    sqlite3_bind_text(st, 5, prefix, -1, SQLITE_STATIC);
   }
   if (st) {
     sqlite3_bind_int(st, 1, state);

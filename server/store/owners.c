@@ -232,6 +232,10 @@ int64_t catalogue_mismatches(catalogue *cat) {
                                         " + (SELECT count(*) FROM tenant t WHERE t.bytes !="
                                         "  (SELECT coalesce(sum(o.bytes), 0) FROM owner o WHERE o.tenant=t.name))"
                                         " + (SELECT count(*) FROM total t WHERE t.bytes !="
-                                        "  (SELECT coalesce(sum(r.bytes), 0) FROM resource r WHERE r.kind=t.kind))");
+                                        "  (SELECT coalesce(sum(r.bytes), 0) FROM resource r WHERE r.kind=t.kind))"
+                                        " + (SELECT count(*) FROM (SELECT seq, key FROM shape_of EXCEPT"
+                                        "  SELECT seq, key FROM shape WHERE view=''))"
+                                        " + (SELECT count(*) FROM (SELECT seq, key FROM shape WHERE view='' EXCEPT"
+                                        "  SELECT seq, key FROM shape_of))");
   return rows_integer(cat, db, st);
 }

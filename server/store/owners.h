@@ -29,8 +29,9 @@ int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, in
 store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id, const char *tenant, int *gone);
 /* Bytes of the meshes and landmarks that a tenant owns; −1: they cannot be read. */
 int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant);
-/* For --check-data: the number of resources without an owner, owners without a resource, and stored sums that differ
- * from the sums of the rows; −1: they cannot be read. */
+/* For --check-data: the number of resources without an owner, owners without a resource, stored sums that differ from
+ * the sums of the rows, and shapes of supermeshes that the filter of lists lacks or invents; −1: they cannot be read.
+ */
 int64_t catalogue_mismatches(catalogue *cat);
 
 #endif

@@ -1,10 +1,11 @@
 // The command line with a real daemon: its output, its files and its exit status.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { mkdir, readFile, writeFile, readdir, copyFile } from 'node:fs/promises';
+import { createHash } from 'node:crypto';
+import { mkdir, readFile, writeFile, readdir, copyFile, stat } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
-import { folder, quoted, run } from './support/cli.mjs';
+import { folder, quoted, run, runProgram } from './support/cli.mjs';
 import { binaries, daemon, endless, samples, until } from './support/daemon.mjs';
 import { morphOf } from './support/glb.mjs';
 import * as shapes from './support/shapes.mjs';
@@ -20,6 +21,9 @@ async function occupy(d) {
   );
   return (await d.post('/v1/embeddings', { mesh: mesh.id, ...endless })).json;
 }
+
+/** The id of a mesh that is uploaded without options. */
+const meshId = (text) => createHash('sha256').update(text).update('\0repair=safe').digest('hex');
 
 test('wrong usage exits with 2 and explains the error', async () => {
   for (const args of [
@@ -44,6 +48,24 @@ test('wrong usage exits with 2 and explains the error', async () => {
     ['upload', '/nowhere/mesh.obj'],
     ['morph', dog, giraffe, '--landmarks', '/nowhere.json'],
     ['upload', '--name', 'n', dog, giraffe],
+    ['morph', dog, giraffe, '--align', 'bend'],
+    ['morph', dog, giraffe, '--remesh', 'magic'],
+    ['morph', dog, giraffe, '--fit', 'none,rigid'],
+    ['morph', dog, giraffe, '--path', ''],
+    ['morph', dog, giraffe, '--animation', 'loop'],
+    ['morph', dog, giraffe, '--repair', 'safe,magic'],
+    ['morph', dog, giraffe, '--tolerance', '2'],
+    ['morph', dog, '/nowhere/mesh.obj'],
+    ['morph', dog, path.dirname(dog)],
+    ['morph', dog, giraffe, '-o', path.dirname(dog)],
+    ['morph', dog, giraffe, dog, '-l', landmarks, '-o', '/dev/null'],
+    ['embed', dog, '--method', 'magic'],
+    ['embed', dog, '--set', 'x'],
+    ['embed', dog, '-o', '/nowhere/out.ply'],
+    ['upload', dog, '--format', 'fbx'],
+    ['upload', dog, '/nowhere/mesh.obj'],
+    ['ls', '--state', 'lost'],
+    ['get', '0'.repeat(64), '-o', '/nowhere/x'],
   ]) {
     const { code, err, out } = await run(args, { env: { ORBMORPH_SERVER: 'http://127.0.0.1:9' } });
     assert.equal(code, 2, `${args}: ${code} ${err}`);
@@ -164,6 +186,94 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
     assert.match(err, /has this id/);
   }
   assert.equal(JSON.parse((await run(['get', id, '--json'], { env })).err).type, '/problems/not-found');
+});
+
+test('nothing is uploaded before the options were checked and the output was tried', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  await writeFile(path.join(at, 'one.json'), '[{"at":[{"vertex":1}]}]');
+  for (const more of [
+    ['--align', 'bend'],
+    ['--tolerance', '7'],
+    ['--set', 'x'],
+    ['-l', path.join(at, 'one.json')],
+    ['-o', path.join(at, 'none/out.glb')],
+    ['-o', at],
+    ['--report', path.join(at, 'none/report.md')],
+    [path.join(at, 'none.obj')],
+  ]) {
+    const { code, err } = await run(['morph', dog, giraffe, ...more], { env, cwd: at });
+    assert.equal(code, 2, `${more}: ${err}`);
+  }
+  assert.equal((await run(['embed', dog, '-o', path.join(at, 'none/x.ply')], { env })).code, 2);
+  assert.deepEqual((await d.get('/v1/meshes')).json.meshes, []);
+  assert.deepEqual(await readdir(at), ['one.json'], 'trying leaves nothing behind');
+  // An output that exists keeps its bytes until the new ones are there; a device is written to, and stays one.
+  const kept = path.join(at, 'kept.glb');
+  await writeFile(kept, 'old');
+  const ring = path.join(at, 'ring.obj');
+  await writeFile(ring, shapes.obj(shapes.torus()));
+  assert.equal((await run(['morph', dog, ring, '-o', kept], { env })).code, 1);
+  assert.equal(await readFile(kept, 'utf8'), 'old');
+  const get = [binaries.client, 'get', (await d.mesh(dog)).id, '--part', 'file', '-o', '/dev/stdout'].map(quoted);
+  const device = await runProgram('sh', ['-c', `${get.join(' ')} | cat`], { env });
+  assert.equal(device.code, 0, device.err);
+  assert.ok(device.bytes.equals(await readFile(dog)));
+  assert.ok((await stat('/dev/null')).isCharacterDevice());
+});
+
+test('ids may be given by their first digits', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  const a = await d.mesh(dog);
+  const b = await d.mesh(giraffe);
+  const ask = (...args) => run(args, { env, cwd: at });
+  const seen = async (digits, ...args) => JSON.parse((await ask(...args, digits, '--json')).out).id;
+  assert.equal(await seen(a.id.slice(0, 8), 'get'), a.id);
+  const glb = path.join(at, 'out.glb');
+  const made = await ask('morph', a.id.slice(0, 10), b.id.slice(0, 10), '-l', landmarks, '-o', glb);
+  assert.equal(made.code, 0, made.err);
+  const [supermesh] = (await d.get('/v1/supermeshes')).json.supermeshes;
+  assert.equal(await seen(supermesh.id.slice(0, 12), 'get'), supermesh.id);
+  const asset = await ask('get', supermesh.id.slice(0, 12), '--part', 'asset');
+  assert.ok(asset.bytes.equals(await readFile(glb)));
+  const [job] = (await d.get('/v1/jobs')).json.jobs;
+  assert.equal(await seen(job.id.slice(0, 8), 'job'), job.id);
+  const embedded = await ask('embed', a.id.slice(0, 10), '--json');
+  assert.equal(JSON.parse(embedded.out).mesh, a.id);
+
+  // A file of that name is the file.
+  await copyFile(giraffe, path.join(at, a.id.slice(0, 8)));
+  assert.equal(JSON.parse((await ask('embed', a.id.slice(0, 8), '--json')).out).mesh, b.id);
+
+  // Several entries begin with the same four digits: the message lists them, and nothing is deleted.
+  const twins = [];
+  for (let i = 0, heads = new Map(); twins.length === 0; i++) {
+    const text = `OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 ${i + 1}\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n`;
+    const head = meshId(text).slice(0, 4);
+    if (heads.has(head)) twins.push(heads.get(head), text);
+    heads.set(head, text);
+  }
+  const ids = [];
+  for (const [i, text] of twins.entries()) ids.push((await d.upload(text, { name: `twin${i}` })).json.id);
+  assert.equal(ids[0].slice(0, 4), ids[1].slice(0, 4));
+  for (const command of ['get', 'rm', 'embed']) {
+    const { code, out, err } = await ask(command, ids[0].slice(0, 4));
+    assert.equal(code, 1, err);
+    assert.equal(out, '');
+    for (const [i, id] of ids.entries()) assert.match(err, new RegExp(`${id} +mesh twin${i}`), command);
+  }
+  assert.equal((await d.get(`/v1/meshes/${ids[0]}`)).status, 200);
+  const unique = [...ids[0]].findIndex((digit, i) => digit !== ids[1][i]) + 1;
+  assert.equal((await ask('rm', ids[0].slice(0, unique))).code, 0);
+  assert.equal((await d.get(`/v1/meshes/${ids[0]}`)).status, 404);
+  assert.equal((await d.get(`/v1/meshes/${ids[1]}`)).status, 200);
+  const none = await ask('get', '0123456789');
+  assert.equal(none.code, 1);
+  assert.match(none.err, /0123456789: not-found/);
+  assert.equal((await ask('get', 'abc')).code, 1, 'three digits are too few');
 });
 
 test('landmark files: an array, an object with one, and plain vertex numbers', async (t) => {

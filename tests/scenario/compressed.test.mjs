@@ -164,6 +164,37 @@ test('small answers, and a daemon without room for them, are not compressed', as
     }
 });
 
+test('an asset from memory is the same answer as from its file', async (t) => {
+  const daemons = [await daemon(t), await daemon(t, { args: ['--encoded-bytes', '0'] })];
+  const answers = [];
+  for (const d of daemons) {
+    const { supermesh, morph } = await made(d);
+    const seen = [];
+    for (const target of [morph, supermesh.asset])
+      for (let turn = 0; turn < 2; turn++)
+        for (const [headers, method] of [
+          [{}, 'GET'],
+          [{}, 'HEAD'],
+          [{ range: 'bytes=4-99' }, 'GET'],
+          [{ 'if-none-match': '*' }, 'GET'],
+        ]) {
+          const reply = await send(d, target, headers, method);
+          for (const name of ['date', 'x-request-id']) delete reply.headers[name];
+          seen.push(reply);
+        }
+    answers.push(seen);
+    // Headers come once: a repeated one would be joined here.
+    assert.equal(seen[0].headers['content-type'], 'model/gltf-binary');
+    assert.equal(seen[0].headers.vary, 'Accept-Encoding');
+    assert.equal(seen[0].bytes.length, supermesh.asset_bytes);
+  }
+  for (const [i, reply] of answers[0].entries()) {
+    assert.deepEqual(reply.headers, answers[1][i].headers);
+    assert.equal(reply.status, answers[1][i].status);
+    assert.ok(reply.bytes.equals(answers[1][i].bytes));
+  }
+});
+
 test('an asset is compressed once, for many clients at a time', async (t) => {
   const d = await daemon(t);
   const { supermesh } = await made(d);

@@ -202,15 +202,35 @@ test('with tokens, a recipe is made for the tenant that asks', async (t) => {
 test('a download is named after its shapes', async (t) => {
   const d = await daemon(t);
   const url = small(await pair(d));
-  const named = async (target) =>
-    /^inline; filename="([^"]*)"$/.exec((await d.get(target)).headers.get('content-disposition'))[1];
+  const header = async (target) => (await d.get(target)).headers.get('content-disposition');
+  const named = async (target) => /^inline; filename="([^"]*)"$/.exec(await header(target))[1];
   assert.equal(await named(url), 'egg-bean.glb');
   for (const [names, file] of [
-    ['Hund,Kätzchen', 'Hund-K_tzchen.glb'],
     ['../../etc/passwd,x"y\\z', '_._.._etc_passwd-x_y_z.glb'],
-    [`${'a'.repeat(120)},b`, `${'a'.repeat(80)}.glb`],
+    [`${'a'.repeat(120)},b`, `${'a'.repeat(120)}-b.glb`],
+    [`${'a'.repeat(120)},${'b'.repeat(120)}`, `${'a'.repeat(120)}-${'b'.repeat(29)}.glb`],
   ])
     assert.equal(await named(`${url}&names=${encodeURIComponent(names)}`), file, names);
+  // What ASCII cannot say comes a second time, encoded by RFC 8187: only attr-char and %XX of UTF-8.
+  for (const [names, plain, whole] of [
+    ['Hund,Kätzchen', 'Hund-K_tzchen.glb', 'Hund-Kätzchen.glb'],
+    ["my dog,it's 100 %", 'my_dog-it_s_100__.glb', "my dog-it's 100 %.glb"],
+    ['a/b,c:d é', 'a_b-c_d__.glb', 'a_b-c_d é.glb'],
+    ['犬,🦒', '_-_.glb', '犬-🦒.glb'],
+    [
+      `${'é'.repeat(63)},${'é'.repeat(63)}`,
+      `${'_'.repeat(63)}-${'_'.repeat(11)}.glb`,
+      `${'é'.repeat(63)}-${'é'.repeat(11)}.glb`,
+    ],
+  ]) {
+    const value = await header(`${url}&names=${encodeURIComponent(names)}`);
+    const [, ascii, coded] =
+      /^inline; filename="([A-Za-z0-9._-]+)"; filename\*=UTF-8''((?:[A-Za-z0-9!#$&+.^_`|~-]|%[0-9A-F]{2})+)$/.exec(
+        value,
+      ) ?? assert.fail(value);
+    assert.equal(ascii, plain);
+    assert.equal(decodeURIComponent(coded), whole);
+  }
   // A name that looks like the JSON around it is only a name.
   const [a, b] = /shapes=(\w+),(\w+)/.exec(url).slice(1);
   const { asset } = await d.made('/v1/supermeshes', {
@@ -221,5 +241,5 @@ test('a download is named after its shapes', async (t) => {
     align: { method: 'rotate' },
     remesh: { tolerance: 0.05 },
   });
-  assert.equal(await named(asset), '____landmarks___-__mesh___.glb');
+  assert.match(await header(asset), /^inline; filename="____landmarks___-__mesh___.glb"; filename\*=/);
 });

@@ -165,6 +165,112 @@ test('every reference leads somewhere, and every component is used', () => {
   assert.deepEqual([...used].sort(), named.sort());
 });
 
+/** Every object of the document with its place in it. */
+function* objects(value, at = '#') {
+  if (!value || typeof value !== 'object') return;
+  if (!Array.isArray(value)) yield [at, value];
+  for (const [key, item] of Object.entries(value)) yield* objects(item, `${at}/${key}`);
+}
+const operations = Object.entries(document.paths).flatMap(([target, item]) =>
+  VERBS.filter((v) => item[v]).map((verb) => ({ target, verb, ...item[verb] })),
+);
+
+/** The names of all members of a value that a schema allows. */
+function membersOf(schema, seen = new Set()) {
+  for (const [, { properties, $ref }] of objects(schema ?? {})) {
+    for (const name of Object.keys(properties ?? {})) seen.add(name);
+    if ($ref && !seen.has($ref)) membersOf(resolve({ $ref }), seen.add($ref));
+  }
+  return seen;
+}
+
+test('a response that several operations share is a component', () => {
+  const written = new Map();
+  const note = (at, response) => {
+    const text = JSON.stringify(response);
+    assert.ok(!written.has(text), `${at} repeats ${written.get(text)}`);
+    written.set(text, at);
+  };
+  for (const { target, verb, responses } of operations)
+    for (const [status, response] of Object.entries(responses))
+      if (response.$ref) assert.match(response.$ref, /^#\/components\/responses\/\w+$/);
+      else {
+        assert.ok(status < 400, `${verb} ${target}: the problem ${status} is not a component`);
+        note(`${verb} ${target} ${status}`, response);
+      }
+  for (const [name, response] of Object.entries(document.components.responses)) note(name, response);
+});
+
+test('no schema holds what generators of types read as something else', () => {
+  for (const [at, schema] of objects(document.components.schemas)) {
+    for (const [name, member] of Object.entries(schema.properties ?? {}))
+      assert.equal(member.default, undefined, `${at}/${name}: a default makes an optional member mandatory`);
+    for (const kind of ['anyOf', 'oneOf', 'allOf'])
+      for (const part of schema[kind] ?? [])
+        assert.notDeepEqual(Object.keys(part), ['required'], `${at}/${kind} says only what is required`);
+  }
+});
+
+test('every operation says which security it needs', () => {
+  const schemes = Object.keys(document.components.securitySchemes);
+  for (const { target, verb, security, description } of operations) {
+    assert.ok(Array.isArray(security), `${verb} ${target}`);
+    assert.equal(security.length > 0, /scope (read|write|admin)/.test(description), `${verb} ${target}`);
+    for (const name of security.flatMap(Object.keys)) assert.ok(schemes.includes(name));
+  }
+});
+
+test('the example of a problem is about a request of its operation', async () => {
+  const table = await readFile(path.join(root, 'api/routes.h'), 'utf8');
+  const define = (name) => table.match(new RegExp(`#define ${name} "([^"]*)"`))[1];
+  const rows = [...table.matchAll(/ROUTE\(ROUTE_\w+, "(\w+)", "([^"]+)", \w+, SCOPE_(\w+), ([^)]*?),\s*\\?\s*handle/g)];
+  const routes = new Map(
+    rows.map(([, method, target, scope, query]) => [
+      `${method.toLowerCase()} ${target}`,
+      {
+        scope: scope.toLowerCase(),
+        query: query
+          .replace(/API_\w+/g, (name) => `"${define(name)}"`)
+          .replace(/[?"\\]/g, '')
+          .split(/\s+/)
+          .filter(Boolean),
+      },
+    ]),
+  );
+  let examined = 0;
+  for (const { target, verb, responses, requestBody } of operations) {
+    const what = `${verb} ${target}`;
+    const { scope, query } = routes.get(what);
+    const body = membersOf(requestBody);
+    const examples = Object.values(responses)
+      .map(resolve)
+      .flatMap((r) => Object.values(r.content?.['application/problem+json']?.examples ?? {}))
+      .map((e) => resolve(e).value);
+    for (const problem of examples) {
+      const { type, detail } = problem;
+      const [, unknown, known] = /no query parameter "(\w+)" on this route, which takes (.*?)\./.exec(detail) ?? [];
+      if (unknown) {
+        assert.deepEqual(known, query.join(', ') || 'none', `${what}: ${detail}`);
+        assert.ok(!query.includes(unknown), `${what}: ${detail}`);
+      } else if (type === '/problems/bad-query') {
+        const named = problem.parameter ?? /"(\w+)" must/.exec(detail)?.[1] ?? (/repair/.test(detail) && 'repair');
+        assert.ok(query.includes(named), `${what}: ${detail}`);
+      } else if (type === '/problems/forbidden') {
+        assert.equal(problem.scope, scope, `${what}: ${detail}`);
+        assert.ok(detail.includes(`"${scope}"`), `${what}: ${detail}`);
+      } else if (/takes no body/.test(detail)) {
+        assert.equal(requestBody, undefined, `${what}: ${detail}`);
+      } else if (type === '/problems/bad-landmarks' && target === '/v1/landmarks') {
+        assert.doesNotMatch(detail, /the file has/, `${what} knows no meshes: ${detail}`);
+      } else if (type === '/problems/bad-option') {
+        assert.ok([...body, ...query].includes(problem.member), `${what}: ${detail}`);
+      } else continue;
+      examined += 1;
+    }
+  }
+  assert.ok(examined > 80, String(examined));
+});
+
 test('every problem has an example whose detail says more than its title', async () => {
   const table = (await readFile(path.join(root, 'api/problem.c'), 'utf8')).match(/table\[\] = \{\n([\s\S]*?)\n\};/)[1];
   const titles = new Map(
@@ -179,7 +285,7 @@ test('every problem has an example whose detail says more than its title', async
     ...Object.values(schemas).flatMap((s) => s.examples ?? []),
   ];
   const problems = examples.filter((e) => /^\/problems\//.test(e.type));
-  const known = schemas.Problem.oneOf.map((s) => resolve(s).properties);
+  const known = schemas.Problem.oneOf.map((s) => (resolve(s).oneOf?.[0] ?? resolve(s)).properties);
   for (const { type, title, status } of known) {
     assert.deepEqual({ title: title.const, status: status.const }, titles.get(type.const), type.const);
     assert.ok(
@@ -568,7 +674,7 @@ test('answers to callers without the right token', async (t) => {
     for (const verb of VERBS.filter((v) => item[v])) {
       const id = target.includes('{job}') ? '0'.repeat(32) : '0'.repeat(64);
       const body = verb === 'post' ? Buffer.from('{}') : undefined;
-      const guarded = Boolean(item[verb].security);
+      const guarded = item[verb].security.length > 0;
       const scope = /scope (\w+)/.exec(item[verb].description)?.[1];
       assert.equal((await ask(verb.toUpperCase(), target, { id, body })).status === 401, guarded, `${verb} ${target}`);
       for (const [name, headers] of [

@@ -26,6 +26,40 @@ async function findings(page) {
     );
 }
 
+test('/docs renders the API document', async (t) => {
+  const document = await (await fetch(`${daemon.url}/openapi.json`)).json();
+  const page = await browser.newPage();
+  t.after(() => page.close());
+  const errors = [];
+  page.on('pageerror', (error) => errors.push(String(error)));
+  await page.goto(`${daemon.url}/docs#listSupermeshes`);
+  await page.waitForSelector('#listSupermeshes[open]');
+  const shown = await page.evaluate(() => ({
+    operations: [...globalThis.document.querySelectorAll('summary:has(.method)')].map((s) => [
+      s.querySelector('.method').textContent.toLowerCase(),
+      s.querySelector('code').textContent,
+    ]),
+    open: globalThis.document.querySelector('#listSupermeshes').innerText,
+    dead: [...globalThis.document.querySelectorAll('a[href^="#"]')]
+      .map((a) => a.hash.slice(1))
+      .filter((name) => !globalThis.document.getElementById(name)),
+    missing: globalThis.document.body.textContent.match(/undefined|\[object/g),
+  }));
+  const operations = Object.entries(document.paths).flatMap(([path, item]) =>
+    Object.keys(item)
+      .filter((key) => item[key].responses)
+      .map((method) => [method, path]),
+  );
+  assert.deepEqual(shown.operations.map(String).sort(), operations.map(String).sort());
+  for (const text of ['id_prefix', 'full, summary; default: full', 'SupermeshSummaryPage', '"view" must be full'])
+    assert.ok(shown.open.includes(text), text);
+  assert.deepEqual([shown.dead, shown.missing, errors], [[], null, []]);
+  // A link to a schema opens it.
+  await page.click('#listSupermeshes a[href="#SupermeshSummaryPage"]');
+  await page.waitForSelector('#SupermeshSummaryPage[open]');
+  assert.deepEqual(await findings(page), []);
+});
+
 test('the files have types, validators and a policy without unsafe-inline', async () => {
   const page = await fetch(`${daemon.url}/`);
   assert.equal(page.status, 200);

@@ -331,6 +331,17 @@ static int owns(stored *s, resource_kind kind, const char *id, const char *tenan
   return result == STORE_OK;
 }
 
+/* How many supermeshes the filter finds; each must be "both". */
+static int found(stored *s, const char *view, const char *mesh, const char *name) {
+  resource rows[2];
+  int n = catalogue_list_some(s->cat, RESOURCE_SUPERMESH, view, &(list_filter){.mesh = mesh, .name = name}, 0, 2, rows);
+  for (int i = 0; i < n; i++) {
+    assert_string_equal(rows[i].id, "both");
+    resource_free(&rows[i]);
+  }
+  return n;
+}
+
 /* A catalogue without owners (version 3): results belong to the tenants whose jobs made them, meshes to those whose
  * jobs named them, and everything else only to the operator. A token becomes a tenant of the same name. */
 static void test_migration_to_owners(void **state) {
@@ -340,7 +351,9 @@ static void test_migration_to_owners(void **state) {
       "ALTER TABLE token ADD COLUMN priority INTEGER NOT NULL DEFAULT 0;"
       "INSERT INTO resource(kind, id, sha, json, bytes, created, used) VALUES"
       " (0, 'cow', 's', '{}', 100, 1, 1), (0, 'dog', 's', '{}', 30, 2, 2), (0, 'unused', 's', '{}', 7, 3, 3),"
-      " (1, 'cow-sphere', 's', '{}', 5, 4, 4), (1, 'dog-sphere', 's', '{}', 5, 5, 5), (2, 'both', 's', '{}', 9, 6, 6);"
+      " (1, 'cow-sphere', 's', '{}', 5, 4, 4), (1, 'dog-sphere', 's', '{}', 5, 5, 5), (2, 'both', 's', "
+      "  '{\"shapes\":[{\"mesh\":\"cow\",\"name\":\"Kuh\"},{\"mesh\":\"dog\",\"name\":\"Hund\"}]}', 9, 6, 6),"
+      " (2, 'broken', 's', 'not JSON', 9, 7, 7);"
       "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created) VALUES"
       " ('j1', 'cow-sphere', 0, 2, 1, 1, 0, 10, 'ann', '{\"mesh\":\"cow\",\"options\":{}}', 1),"
       " ('j2', 'both', 1, 2, 1, 1, 0, 10, 'bob', '{\"shapes\":[{\"mesh\":\"cow\"},{\"mesh\":\"dog\"}]}', 2),"
@@ -376,6 +389,11 @@ static void test_migration_to_owners(void **state) {
   assert_string_equal(page[1].id, "cow");
   resource_free(&page[0]);
   resource_free(&page[1]);
+  /* The shapes of supermeshes are found, by the tenants that own them. */
+  assert_int_equal(found(s, "", "cow", NULL), 1);
+  assert_int_equal(found(s, "bob", NULL, "Hund"), 1);
+  assert_int_equal(found(s, "bob", "cow", "Hund"), 1);
+  assert_int_equal(found(s, "bob", "Hund", NULL) + found(s, "bob", NULL, "cow") + found(s, "ann", "cow", NULL), 0);
   token_row *tokens = catalogue_tokens(s->cat, &count);
   assert_int_equal(count, 3);
   assert_string_equal(tokens[0].tenant, "ann");

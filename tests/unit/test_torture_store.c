@@ -96,7 +96,7 @@ static void read_lists(stored *s, const told *t) {
     assert_int_equal(strlen(rows[i].id), API_ID_SIZE - 1);
     resource_free(&rows[i]);
   }
-  n = catalogue_job_list(s->cat, "me", -1, 0, 8, jobs);
+  n = catalogue_job_list(s->cat, "me", NULL, -1, 0, 8, jobs);
   assert_true(n < 0 || t->job != STORE_OK || n > 0);
   for (int i = 0; i < n; i++) {
     assert_string_equal(jobs[i].request, "{\"r\":1}");

@@ -54,29 +54,30 @@ export type Mesh = {
   created: Instant;
 };
 
-/** newton: progressive embedding that minimises the symmetric Dirichlet energy. kernel-sampling: Peng and Timalsena, 2016. */
+/** newton: progressive embedding that minimises the symmetric Dirichlet energy. kernel-sampling: Peng and Timalsena, 2016. Default: "newton". */
 export type EmbeddingMethod = 'newton' | 'kernel-sampling';
 
 /** Members that the method does not use are accepted and are part of the id. Responses contain the members that differ from their defaults. */
 export type EmbeddingOptions = {
+  /** Default: "default". */
   preset?: 'default' | 'fast' | 'quality';
-  /** The weight w of the energy: 1 is symmetric Dirichlet, 0 is stretch alone. */
+  /** The weight w of the energy: 1 is symmetric Dirichlet, 0 is stretch alone. Default: 1. */
   energy_weight?: number;
-  /** For kernel-sampling. */
+  /** For kernel-sampling. Default: 3. */
   area_exponent?: number;
-  /** For kernel-sampling. */
+  /** For kernel-sampling. Default: 12. */
   aspect_exponent?: number;
-  /** For kernel-sampling. */
+  /** For kernel-sampling. Default: 0.11. */
   step?: number;
-  /** For kernel-sampling. */
+  /** For kernel-sampling. Default: 1e-06. */
   displacement_threshold?: number;
-  /** For kernel-sampling. */
+  /** For kernel-sampling. Default: 25. */
   max_iterations?: number;
-  /** For kernel-sampling: how many vertices are inserted before the first optimisation of all vertices. */
+  /** For kernel-sampling: how many vertices are inserted before the first optimisation of all vertices. Default: 25. */
   first_optimization?: number;
-  /** For kernel-sampling: the factor by which first_optimization grows after each optimisation. */
+  /** For kernel-sampling: the factor by which first_optimization grows after each optimisation. Default: 1.25. */
   growth?: number;
-  /** For kernel-sampling: quadrics are used down to this many vertices. */
+  /** For kernel-sampling: quadrics are used down to this many vertices. Default: 6000. */
   qem_until?: number;
 };
 
@@ -162,10 +163,11 @@ export type Landmark = {
   name?: string;
   /** One place for each shape, in request order. */
   at: Place[];
-  /** For rbf: the pass that moves this landmark; pass 0 runs first. */
+  /** For rbf: the pass that moves this landmark; pass 0 runs first. Default: 0. */
   pass?: number;
-  /** For rbf: the radius of influence, as a chord length on the unit sphere; 0 selects the default. */
+  /** For rbf: the radius of influence, as a chord length on the unit sphere. Default: 0, which leaves it to the method. */
   radius?: number;
+  /** Default: 1. */
   confidence?: number;
 };
 
@@ -212,32 +214,36 @@ export type SupermeshRequest = {
     /** Default: pin with landmarks, auto without. pin and rbf require landmarks. */
     method?: 'pin' | 'rbf' | 'rotate' | 'auto';
     options?: {
+      /** Default: "default". */
       preset?: 'default' | 'fast' | 'quality';
-      /** For rbf: the number of steps of a pass. */
+      /** For rbf: the number of steps of a pass. Default: 10. */
       steps?: number;
-      /** For rbf: move only the later shapes, not the first. */
+      /** For rbf: move only the later shapes, not the first. Default: false. */
       one_way?: boolean;
-      /** For rbf: the radius of influence of landmarks that set none; 0 selects the default. */
+      /** For rbf: the radius of influence of landmarks that set none. Default: 0, which leaves it to the method. */
       radius?: number;
     };
   };
   remesh?: {
+    /** Default: "adaptive". */
     method?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull';
-    /** The largest deviation, relative to the diagonal of the bounding box. */
+    /** The largest deviation, relative to the diagonal of the bounding box. Default: 0.001. */
     tolerance?: number;
-    /** The largest number of triangles; 0 sets no limit. It takes precedence over tolerance. */
+    /** The largest number of triangles; 0 sets no limit. It takes precedence over tolerance. Default: 0. */
     max_triangles?: number;
   };
   asset?: {
+    /** Default: true. */
     normals?: boolean;
+    /** Default: "pingpong". */
     animation?: 'pingpong' | 'none';
-    /** Move the later shapes onto the first by their landmarks. */
+    /** Move the later shapes onto the first by their landmarks. Default: "none". */
     fit?: 'none' | 'rigid' | 'similarity';
-    /** rigid adds in-between targets that preserve lengths. */
+    /** rigid adds in-between targets that preserve lengths. Default: "linear". */
     path?: 'linear' | 'rigid';
-    /** For rigid: the number of targets between two consecutive shapes. */
+    /** For rigid: the number of targets between two consecutive shapes. Default: 3. */
     path_steps?: number;
-    /** Store the colours of later shapes as morphed attributes. */
+    /** Store the colours of later shapes as morphed attributes. Default: false. */
     colors?: boolean;
   };
 };
@@ -384,6 +390,25 @@ export type Supermesh = {
   created: Instant;
 };
 
+/** A supermesh without its report and request. */
+export type SupermeshSummary = {
+  id: Id;
+  url: string;
+  asset: string;
+  asset_bytes: number;
+  vertices: number;
+  triangles: number;
+  /** The shapes, in request order. */
+  shapes: Array<{
+    mesh: Id;
+    /** 1 to 127 bytes of UTF-8. */
+    name: string;
+  }>;
+  /** The name and version of the engine. */
+  engine: string;
+  created: Instant;
+};
+
 export type Job = {
   id: JobId;
   url: string;
@@ -421,6 +446,13 @@ export type EmbeddingPage = {
 export type SupermeshPage = {
   /** Newest first. */
   supermeshes: Supermesh[];
+  /** The value of page_token for the next page; null on the last page. */
+  next_page_token: string | null;
+};
+
+export type SupermeshSummaryPage = {
+  /** Newest first. */
+  supermeshes: SupermeshSummary[];
   /** The value of page_token for the next page; null on the last page. */
   next_page_token: string | null;
 };
@@ -496,7 +528,7 @@ export type ProblemMalformedJson = {
   offset: number;
 };
 
-/** Has line or offset. */
+/** A text file gives the line, a binary file the offset. */
 export type ProblemMalformedMesh = {
   type: '/problems/malformed-mesh';
   title: 'The mesh file is malformed';
@@ -504,9 +536,15 @@ export type ProblemMalformedMesh = {
   /** What is wrong and what to do. */
   detail: string;
   /** The line of a text file, from 1; the last line if something is missing. */
-  line?: number;
+  line: number;
+} | {
+  type: '/problems/malformed-mesh';
+  title: 'The mesh file is malformed';
+  status: 400;
+  /** What is wrong and what to do. */
+  detail: string;
   /** The offset in bytes. */
-  offset?: number;
+  offset: number;
 };
 
 export type ProblemMalformedEncoding = {

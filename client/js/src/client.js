@@ -278,13 +278,14 @@ export class Orbmorph {
 
   // ---- lists
 
-  /** Fetches a page of a list. `kind`: meshes, embeddings, supermeshes or jobs. -> {items, next} */
-  async page(kind, { limit, pageToken, state, signal } = {}) {
-    const query = new URLSearchParams();
-    if (limit) query.set('limit', limit);
-    if (pageToken) query.set('page_token', pageToken);
-    if (state) query.set('state', state);
-    const text = query.toString();
+  /**
+   * Fetches a page of a list. `kind`: meshes, embeddings, landmarks, supermeshes or jobs. `idPrefix` limits it to ids that
+   * begin so, `state` to jobs in a state, `mesh` and `name` to supermeshes with a shape of this mesh or name. The `view`
+   * "summary" lists supermeshes without report and request. -> {items, next}
+   */
+  async page(kind, { limit, pageToken, idPrefix, state, mesh, name, view, signal } = {}) {
+    const given = clean({ limit, page_token: pageToken, id_prefix: idPrefix, state, mesh, name, view });
+    const text = new URLSearchParams(Object.entries(given).filter(([, value]) => value)).toString();
     const body = await this.json(`/v1/${kind}${text ? `?${text}` : ''}`, { signal });
     return {
       items: body[kind] ?? body.items ?? Object.values(body).find(Array.isArray) ?? [],

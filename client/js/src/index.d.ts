@@ -8,6 +8,7 @@ import type {
   Mesh,
   Supermesh,
   SupermeshRequest,
+  SupermeshSummary,
 } from './api.js';
 
 export type Repair = 'none' | 'safe' | 'fill_holes' | 'largest_component';
@@ -31,6 +32,7 @@ export type {
   Place,
   Supermesh,
   SupermeshRequest,
+  SupermeshSummary,
 } from './api.js';
 /** A problem of a known type; `type` discriminates. */
 export type { Problem as KnownProblem } from './api.js';
@@ -124,8 +126,23 @@ interface Kinds {
 export interface ListOptions extends RequestOptions {
   limit?: number;
   pageToken?: string;
+  /** Only entries whose id begins with these digits. */
+  idPrefix?: string;
+  /** Only jobs in this state. */
   state?: Job['state'];
+  /** Only supermeshes with a shape of this mesh. */
+  mesh?: string;
+  /** Only supermeshes with a shape of this name. */
+  name?: string;
+  /** For supermeshes: "summary" leaves out report and request. */
+  view?: 'full' | 'summary';
 }
+/** An entry of a list. */
+type Entry<K extends keyof Kinds, O> = K extends 'supermeshes'
+  ? O extends { view: 'summary' }
+    ? SupermeshSummary
+    : Supermesh
+  : Kinds[K];
 
 export class Orbmorph {
   constructor(options?: ConnectOptions);
@@ -161,8 +178,11 @@ export class Orbmorph {
   cancelJob(job: string | Job, options?: RequestOptions): Promise<Job | null>;
   watchJob(job: string | Job, options?: WatchOptions): Promise<Job>;
   result<T = Supermesh | Embedding>(job: string | Job, options?: WatchOptions): Promise<T>;
-  page<K extends keyof Kinds>(kind: K, options?: ListOptions): Promise<{ items: Kinds[K][]; next: string | null }>;
-  list<K extends keyof Kinds>(kind: K, options?: ListOptions): AsyncGenerator<Kinds[K]>;
+  page<K extends keyof Kinds, const O extends ListOptions>(
+    kind: K,
+    options?: O,
+  ): Promise<{ items: Entry<K, O>[]; next: string | null }>;
+  list<K extends keyof Kinds, const O extends ListOptions>(kind: K, options?: O): AsyncGenerator<Entry<K, O>>;
   morphUrl(recipe: Recipe): string;
   morph(sources: (Source | Mesh)[], options?: MorphOptions): Promise<Morph>;
 }

@@ -31,7 +31,14 @@ export async function usage(a: File, b: Uint8Array) {
   const signed: string = await orbmorph.signUrl(url, { key: 'web', secret: 'secret', expires: '30d' });
   const sphere: ArrayBuffer = await client.alignedSphere(supermesh.id, 0);
   for await (const job of client.list('jobs', { state: 'running' })) job.progress?.toFixed(2);
-  return [glb, mean, sphere, signed];
+  const names: string[] = [];
+  for await (const made of client.list('supermeshes', { view: 'summary', mesh: mesh.id, name: 'dog' })) {
+    names.push(...made.shapes.map(({ name }) => name));
+    // @ts-expect-error a summary has no report
+    void made.pairs;
+  }
+  for await (const made of client.list('supermeshes', { limit: 10 })) made.pairs.length.toFixed();
+  return [glb, mean, sphere, signed, names];
 }
 
 export function describe(error: unknown) {
