@@ -78,6 +78,9 @@ static const char *const migrations[] = {
     " day INTEGER NOT NULL DEFAULT 0, used_requests INTEGER NOT NULL DEFAULT 0, used_ms INTEGER NOT NULL DEFAULT 0)"
     " WITHOUT ROWID;"
     "ALTER TABLE job ADD COLUMN charged TEXT NOT NULL DEFAULT '';",
+    /* The hashes of the profiles of a supermesh's asset. */
+    "ALTER TABLE resource ADD COLUMN quantized TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE resource ADD COLUMN meshopt TEXT NOT NULL DEFAULT '';",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 
