@@ -45,6 +45,20 @@ int cli_find(cli *c, const char *operand, char **path, cli_reply *reply) {
   return rc;
 }
 
+int cli_check_profile(cli *c) {
+  const char *profile = c->args.value[OPT_PROFILE];
+  int fine = !profile || !strcmp(profile, "float") || !strcmp(profile, "quantized") || !strcmp(profile, "meshopt");
+  if (!fine) {
+    cli_error(c, "--profile is float, quantized or meshopt");
+  }
+  return fine;
+}
+
+char *cli_asset_path(const cli *c, const char *path) {
+  const char *profile = c->args.value[OPT_PROFILE];
+  return profile ? cli_text("%s?profile=%s", path, profile) : cli_text("%s", path);
+}
+
 int cli_download(cli *c, const char *path, const char *file) {
   int to_stdout = !strcmp(file, "-");
   char *part = to_stdout ? NULL : cli_text("%s.part-%ld", file, (long)getpid());

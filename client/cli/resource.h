@@ -18,6 +18,11 @@ int cli_not_found(cli *c, const char *kind, const char *operand, const cli_reply
  * resource->json stays NULL. */
 int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource);
 
+/* Whether --profile is a known one; prints the error. */
+int cli_check_profile(cli *c);
+/* The path of an asset in the profile that --profile names. The caller frees it. */
+char *cli_asset_path(const cli *c, const char *path);
+
 /* Downloads a resource into a file ("-": standard output); a temporary file beside it receives the bytes first. */
 int cli_download(cli *c, const char *path, const char *file);
 
