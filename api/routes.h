@@ -9,7 +9,8 @@
 /* The parameters of every list. */
 #define API_LISTED "limit page_token id_prefix"
 /* The parameters of a recipe, see server/http/morph.c. */
-#define API_RECIPE "shapes names landmarks align preset remesh tolerance max_triangles fit path animation normals wait "
+#define API_RECIPE \
+  "shapes names landmarks align preset remesh tolerance max_triangles fit path animation normals wait profile "
 
 /* The route table: one row for each method of each path, with what its body holds, the scope that a token needs, the
  * query parameters that it takes, and the function of server/http that handles it. Adding a row is all that routing
@@ -41,8 +42,8 @@
         handle_list)                                                                                                  \
   ROUTE(ROUTE_SUPERMESH_GET, "GET", "/v1/supermeshes/{id}", ROUTE_NO_BODY, SCOPE_READ, API_SIGNED, handle_get)        \
   ROUTE(ROUTE_SUPERMESH_DELETE, "DELETE", "/v1/supermeshes/{id}", ROUTE_NO_BODY, SCOPE_WRITE, "", handle_delete)      \
-  ROUTE(ROUTE_SUPERMESH_ASSET, "GET", "/v1/supermeshes/{id}/asset.glb", ROUTE_NO_BODY, SCOPE_READ, API_SIGNED,        \
-        handle_file)                                                                                                  \
+  ROUTE(ROUTE_SUPERMESH_ASSET, "GET", "/v1/supermeshes/{id}/asset.glb", ROUTE_NO_BODY, SCOPE_READ,                    \
+        "profile " API_SIGNED, handle_file)                                                                           \
   ROUTE(ROUTE_SUPERMESH_PLACES, "GET", "/v1/supermeshes/{id}/places", ROUTE_NO_BODY, SCOPE_READ, API_SIGNED,          \
         handle_file)                                                                                                  \
   ROUTE(ROUTE_SUPERMESH_SPHERE, "GET", "/v1/supermeshes/{id}/spheres/{k}.ply", ROUTE_NO_BODY, SCOPE_READ, API_SIGNED, \

@@ -137,6 +137,30 @@ static void write_timings(const orb_merge_timings *t, double embed_ms, api_text 
   api_json_close(out, '}');
 }
 
+static void write_bounds(double relative, double degrees, api_text *out) {
+  api_json_member_number(out, "quantization_relative", relative);
+  api_json_member_number(out, "normal_degrees", degrees);
+}
+
+/* The bounds that hold for every profile, then those of each. */
+static void write_profiles(const orb_profile_facts *profiles, api_text *out) {
+  api_json_key(out, "profiles");
+  api_json_open(out, '{');
+  double relative = 0, degrees = 0;
+  for (int p = ORB_PROFILE_FLOAT; p < ORB_PROFILES; p++) {
+    relative = fmax(relative, profiles[p].position_relative);
+    degrees = fmax(degrees, profiles[p].normal_degrees);
+  }
+  write_bounds(relative, degrees, out);
+  for (int p = ORB_PROFILE_QUANTIZED; p < ORB_PROFILES; p++) {
+    api_json_key(out, orb_profile_name((orb_profile)p));
+    api_json_open(out, '{');
+    write_bounds(profiles[p].position_relative, profiles[p].normal_degrees, out);
+    api_json_close(out, '}');
+  }
+  api_json_close(out, '}');
+}
+
 void api_supermesh_write(const char *id, const api_supermesh_request *request, const orb_merge_result *result,
                          const api_place *found, double embed_ms, int64_t created, api_text *out) {
   api_text canonical = {0};
@@ -149,6 +173,7 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   api_json_key(out, "asset");
   api_text_printf(out, "\"/v1/supermeshes/%s/asset.glb\"", id);
   api_json_member_integer(out, "asset_bytes", (int64_t)result->asset.size);
+  write_profiles(result->profiles, out);
   api_json_member_integer(out, "vertices", result->supermesh.vertex_count);
   api_json_member_integer(out, "triangles", result->supermesh.triangle_count);
   write_shapes(id, request, result, out);

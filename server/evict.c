@@ -30,6 +30,9 @@ static store_result evict(const evict_env *env, resource_kind kind, const char *
   if (result == STORE_OK && gone && kind == RESOURCE_SUPERMESH) {
     result = objects_delete(env->store, OBJECT_SPHERES, id);
   }
+  for (int p = 0; result == STORE_OK && gone && kind == RESOURCE_SUPERMESH && p < PROFILES_STORED; p++) {
+    result = objects_delete(env->store, object_of_profile(p), id);
+  }
   objects_let_go(env->store);
   return result;
 }

@@ -101,14 +101,14 @@ static int take_signals(sigset_t *set) {
 
 enum { TICK_MS = 1000, EVICT_GRACE_MS = 5000 };
 
-/* Evicts derived objects beyond derived-bytes, after jobs succeeded or when the last round could not evict enough.
- * Objects made or used in the last EVICT_GRACE_MS stay, so that a waiting client can fetch them. */
+/* Evicts derived objects beyond derived-bytes, after jobs succeeded, profiles were made, or when the last round could
+ * not evict enough. Objects made or used in the last EVICT_GRACE_MS stay, so that a waiting client can fetch them. */
 static void keep_budget(const server *srv, int64_t *seen, int *over) {
   const int64_t budget = srv->options->derived_bytes;
   if (budget <= 0) {
     return;
   }
-  int64_t succeeded = queue_ended(srv->q, API_JOB_SUCCEEDED);
+  int64_t succeeded = queue_ended(srv->q, API_JOB_SUCCEEDED) + __atomic_load_n(&srv->profiles_made, __ATOMIC_RELAXED);
   if (succeeded != *seen || *over) {
     const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
     struct timespec now;
@@ -323,9 +323,9 @@ static void stop(server *srv, worker_pool *workers) {
   if (srv->daemon) {
     MHD_quiesce_daemon(srv->daemon);
   }
-  tasks_stop(srv->checks); /* runs the remaining tasks, which resume their connections */
+  tasks_stop(srv->io); /* runs the remaining tasks, which resume their connections or go on in `checks` */
+  tasks_stop(srv->checks);
   tasks_stop(srv->large_checks);
-  tasks_stop(srv->io);
   http_stop(srv);
   listen_remove(&srv->at);
   if (srv->signers) {

@@ -53,6 +53,12 @@ static void verify(tally *t, const resource *row) {
     printf("supermesh %s: its aligned spheres are missing or damaged\n", row->id);
     t->wrong++;
   }
+  for (int p = 0; p < PROFILES_STORED; p++) {
+    if (row->profiles[p][0]) {
+      verify_object(t, row, object_of_profile(p), p == 0 ? "its profile \"quantized\"" : "its profile \"meshopt\"",
+                    row->profiles[p]);
+    }
+  }
 }
 
 static void each_row(tally *t, resource_kind kind) {
@@ -80,7 +86,11 @@ static void each_object(void *user, object_kind kind, const char *id, uint64_t s
                         : kind == OBJECT_SPHERE ? RESOURCE_EMBEDDING
                                                 : RESOURCE_SUPERMESH;
   t->objects++;
-  if (catalogue_get(t->cat, owner, id, &row) == STORE_NOT_FOUND) {
+  int unknown = catalogue_get(t->cat, owner, id, &row) == STORE_NOT_FOUND;
+  for (int p = 0; p < PROFILES_STORED; p++) { /* a profile is the row's only once the row has its hash */
+    unknown |= kind == object_of_profile(p) && row.id[0] && !row.profiles[p][0];
+  }
+  if (unknown) {
     t->orphans++;
     if (t->remove_orphans && objects_delete(t->store, kind, id) == STORE_OK) {
       printf("deleted object %s (%llu bytes), which has no row\n", id, (unsigned long long)size);

@@ -2,7 +2,7 @@
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
 #   tests/long.sh [PART…]    all of them without arguments:
-#   tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy
+#   tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy blender
 #
 # ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills, ORB_TEST_PATIENCE how many
 # times longer than usual scenarios wait for what should come: 4 with tsan, 20 with valgrind.
@@ -109,6 +109,17 @@ part_soak() {
   node tests/long/soak.mjs
 }
 
+# Blender loads the profile quantized of the conformance assets.
+part_blender() {
+  local folder
+  cmake --preset release -DORB_TESTS=ON >/dev/null
+  cmake --build build --target asset_fixture
+  folder=$(mktemp -d)
+  build/bin/asset_fixture "$folder"
+  blender -b --python-exit-code 1 --python tests/long/blender.py -- "$folder"
+  rm -r "$folder"
+}
+
 part_load() {
   cmake --preset release >/dev/null
   cmake --build build --target orbmorphd
@@ -152,7 +163,7 @@ part_deploy() {
 }
 
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy
+  set -- tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy blender
 fi
 for part in "$@"; do
   echo "== $part =="

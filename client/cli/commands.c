@@ -244,6 +244,13 @@ int cli_run_get(cli *c) {
   char *path = NULL;
   cli_reply reply = {0};
   int rc;
+  if (!cli_check_profile(c)) {
+    return CLI_USAGE;
+  }
+  if (c->args.value[OPT_PROFILE] && (!part || strcmp(part, "asset") != 0)) {
+    cli_error(c, "--profile needs --part asset");
+    return CLI_USAGE;
+  }
   if (!tail) {
     cli_error(c, "--part is file (of a mesh), asset (of a supermesh) or sphere (of an embedding)");
     return CLI_USAGE;
@@ -254,7 +261,9 @@ int cli_run_get(cli *c) {
     if (rc == CLI_DONE) {
       rc = part ? cli_locate(c, home, c->args.operands[0], &base) : cli_find(c, c->args.operands[0], &base, &reply);
     }
-    path = cli_text("%s%s", base ? base : "", tail);
+    char *whole = cli_text("%s%s", base ? base : "", tail);
+    path = cli_asset_path(c, whole);
+    free(whole);
     if (rc == CLI_DONE) {
       rc = cli_download(c, path, output ? output : "-");
     }

@@ -12,7 +12,7 @@
   (COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_REPORT) | CLI_BIT(OPT_LANDMARKS) | CLI_BIT(OPT_ALIGN) | \
    CLI_BIT(OPT_REMESH) | CLI_BIT(OPT_TOLERANCE) | CLI_BIT(OPT_MAX_TRIANGLES) | CLI_BIT(OPT_NO_NORMALS) |      \
    CLI_BIT(OPT_ANIMATION) | CLI_BIT(OPT_FIT) | CLI_BIT(OPT_PATH) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_NO_WAIT) |  \
-   CLI_BIT(OPT_REPAIR))
+   CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_PROFILE))
 
 static const cli_command command_list[] = {
     {"morph", "FILE FILE…", "Upload meshes, merge them and download a GLB that morphs between them", 2, -1,
@@ -32,8 +32,8 @@ static const cli_command command_list[] = {
      COMMON_OPTIONS | CLI_BIT(OPT_STATE) | CLI_BIT(OPT_LIMIT), "meshes embeddings supermeshes jobs",
      "jobs --state running", cli_run_ls},
     {"get", "ID|PATH", "Show a resource, or download its data", 1, 1,
-     COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_PART), NULL, "/v1/supermeshes/ID --part asset -o out.glb",
-     cli_run_get},
+     COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_PART) | CLI_BIT(OPT_PROFILE), NULL,
+     "/v1/supermeshes/ID --part asset -o out.glb", cli_run_get},
     {"rm", "ID|PATH…", "Delete resources", 1, -1, COMMON_OPTIONS, NULL, "/v1/supermeshes/ID", cli_run_rm},
     {"doctor", "FILE…", "Check meshes and suggest repairs", 1, -1, COMMON_OPTIONS, NULL, "scan.stl", cli_run_doctor},
     {"view", "FILE.glb", "Draw poses of a morph into a PNG file, without the daemon", 1, 1,

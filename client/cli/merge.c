@@ -105,7 +105,7 @@ static int finish(cli *c, const cli_reply *supermesh, const char *output) {
   const char *report = c->args.value[OPT_REPORT];
   int rc = CLI_DONE;
   if (output) {
-    char *asset = cli_text("%s", cli_string(supermesh->json, "asset", ""));
+    char *asset = cli_asset_path(c, cli_string(supermesh->json, "asset", ""));
     rc = cli_download(c, asset, output);
     free(asset);
   }
@@ -129,7 +129,7 @@ static int finish(cli *c, const cli_reply *supermesh, const char *output) {
 static int merge(cli *c, const char *output) {
   cJSON *request = NULL;
   cli_reply supermesh = {0};
-  int rc = cli_can_write(c, output);
+  int rc = cli_check_profile(c) ? cli_can_write(c, output) : CLI_USAGE;
   if (rc == CLI_DONE) {
     rc = cli_can_write(c, c->args.value[OPT_REPORT]);
   }

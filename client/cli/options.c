@@ -51,6 +51,7 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_FRAMES] = {"frames", 0, "N", NULL, "draw an animated PNG of N frames, 20 per second, instead of a sheet"},
     [OPT_KEY] = {"key", 'k', "KEY:SECRET", NULL, "signing key; default: $ORBMORPH_KEY"},
     [OPT_EXPIRES] = {"expires", 0, "TIME", NULL, "time until the signature expires, such as 30d, 12h or 90m"},
+    [OPT_PROFILE] = {"profile", 0, "PROFILE", "float quantized meshopt", "profile of the downloaded asset"},
 };
 
 static int find_long(const cli_command *command, const char *text, size_t length) {

@@ -44,6 +44,7 @@ typedef enum cli_option_id {
   OPT_FRAMES,
   OPT_KEY,
   OPT_EXPIRES,
+  OPT_PROFILE,
   OPT_COUNT
 } cli_option_id;
 

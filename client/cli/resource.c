@@ -106,6 +106,20 @@ static int copy_to(FILE *from, const char *file) {
   return fine || to == stdout; /* main() checks standard output */
 }
 
+int cli_check_profile(cli *c) {
+  const char *profile = c->args.value[OPT_PROFILE];
+  int fine = !profile || !strcmp(profile, "float") || !strcmp(profile, "quantized") || !strcmp(profile, "meshopt");
+  if (!fine) {
+    cli_error(c, "--profile is float, quantized or meshopt");
+  }
+  return fine;
+}
+
+char *cli_asset_path(const cli *c, const char *path) {
+  const char *profile = c->args.value[OPT_PROFILE];
+  return profile ? cli_text("%s?profile=%s", path, profile) : cli_text("%s", path);
+}
+
 int cli_download(cli *c, const char *path, const char *file) {
   int streams = is_stream(file);
   char *part = streams ? NULL : part_of(file);

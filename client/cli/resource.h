@@ -26,6 +26,10 @@ int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource);
 /* Tries whether a file can be written, before work that would be lost: NULL and "-" can. CLI_DONE, or CLI_USAGE after
  * printing why. */
 int cli_can_write(const cli *c, const char *file);
+/* Whether --profile is a known one; prints the error. */
+int cli_check_profile(cli *c);
+/* The path of an asset in the profile that --profile names. The caller frees it. */
+char *cli_asset_path(const cli *c, const char *path);
 
 /* Downloads a resource into a file ("-": standard output); a temporary file beside it receives the bytes first. */
 int cli_download(cli *c, const char *path, const char *file);

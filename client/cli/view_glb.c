@@ -46,6 +46,11 @@ int glb_load(glb_file *r, const char *path) {
   if (!r->json || r->binary_size > r->size - 28 - json_size) {
     return glb_refuse(r, "%s is truncated or damaged", path);
   }
+  const cJSON *needed = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(r->json, "extensionsRequired"), 0);
+  if (cJSON_IsString(needed)) {
+    return glb_refuse(r, "%s needs %.60s, which view does not know; download the asset with --profile float", path,
+                      needed->valuestring);
+  }
   return 0;
 }
 

@@ -91,6 +91,10 @@ orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char
   }
   ORB_GO(status, orb_asset_transforms(ctx, &out->supermesh, out->alignment.shapes, options->asset.fit, out->transforms),
          fail);
+  for (int p = ORB_PROFILE_QUANTIZED; p < ORB_PROFILES; p++) {
+    ORB_GO(status, orb_profile_write(ctx, out->asset.data, out->asset.size, (orb_profile)p, &out->profiles[p], NULL),
+           fail);
+  }
   out->timings.write = (now = orb_clock()) - mark;
   out->timings.total = now - start;
   return ORB_OK;

@@ -18,6 +18,7 @@ _orbmorph() {
     --state) choices="queued running succeeded failed cancelled" ;;
     --part) choices="file asset sphere" ;;
     --up) choices="y z" ;;
+    --profile) choices="float quantized meshopt" ;;
   esac
   if [ -n "$choices" ]; then
     COMPREPLY=($(compgen -W "$choices" -- "$current"))
@@ -25,7 +26,7 @@ _orbmorph() {
   fi
   case "${COMP_WORDS[1]}" in
     morph)
-      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair "
+      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair --profile "
       ;;
     upload)
       words="--server --json --quiet --help --name --repair --format "
@@ -34,7 +35,7 @@ _orbmorph() {
       words="--server --json --quiet --help --output --set --no-wait --repair --method --preset "
       ;;
     merge)
-      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair "
+      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair --profile "
       ;;
     job)
       words="--server --json --quiet --help --wait --cancel "
@@ -44,7 +45,7 @@ _orbmorph() {
       operands="meshes embeddings supermeshes jobs"
       ;;
     get)
-      words="--server --json --quiet --help --output --part "
+      words="--server --json --quiet --help --output --part --profile "
       ;;
     rm)
       words="--server --json --quiet --help "

@@ -10,8 +10,9 @@
  *   landmarks.c  POST /v1/landmarks
  *   morph.c      GET /v1/morph.glb        sign.c, signers.c   signed URLs
  *   resources.c  GET, DELETE and lists of meshes, embeddings, supermeshes and landmarks
- *   files.c, disposition.c   GET of stored objects, the names of downloads
- *   jobs.c        GET, DELETE and lists of jobs; waiting for a job
+ *   object.c     sending stored objects   profile.c     profiles of an asset
+ *   files.c      GET of stored objects    disposition.c the names of downloads
+ *   jobs.c       GET, DELETE and lists of jobs; waiting for a job
  *   events.c     GET /v1/jobs/{job}/events
  *   system.c     /livez, /readyz, /metrics              pages.c       the studio, /openapi.json, /docs
  *   reply.c, send.c   responses; the headers that every response carries; encode.c, encoded.c   compressed responses
@@ -68,7 +69,8 @@ typedef struct server {
   callers *callers;
   signers *signers;
   encoded_cache *encoded;
-  int control; /* the descriptor of the control socket */
+  int control;           /* the descriptor of the control socket */
+  int64_t profiles_made; /* since the start; __atomic */
   unsigned char secret[CATALOGUE_SECRET];
 } server;
 
@@ -85,6 +87,7 @@ typedef struct request request;
 struct request {
   task away_task; /* first: a task is the request */
   void (*away)(request *r);
+  tasks *next_pool; /* where the request goes on after this task; NULL: nowhere */
   server *srv;
   struct MHD_Connection *connection;
   watched *watched; /* the connection; may be NULL */
@@ -92,13 +95,15 @@ struct request {
   const route *route;
   const char *method;
   char id[API_ID_SIZE];
-  int shape;       /* {k} of the path; −1: none */
-  char number[24]; /* of the request, for the log and X-Request-Id */
-  caller *caller;  /* referenced; NULL where no token is needed */
-  signer *signer;  /* referenced; NULL: the URL is not signed */
-  int64_t expires; /* of the signature, Unix time in seconds */
-  int64_t retry_s; /* for Retry-After; 0: the usual */
-  int begun;       /* the headers have arrived */
+  int shape;             /* {k} of the path; −1: none */
+  int profile;           /* of the asset, an orb_profile */
+  request *next_waiting; /* see profile.c */
+  char number[24];       /* of the request, for the log and X-Request-Id */
+  caller *caller;        /* referenced; NULL where no token is needed */
+  signer *signer;        /* referenced; NULL: the URL is not signed */
+  int64_t expires;       /* of the signature, Unix time in seconds */
+  int64_t retry_s;       /* for Retry-After; 0: the usual */
+  int begun;             /* the headers have arrived */
   int has_body, head;
   int closes; /* the connection closes after this response */
   request_phase phase;
@@ -139,6 +144,10 @@ void http_stop(server *srv);
  * REQUEST_AWAY, which the handler returns in turn: the task owns the request now, and the handler must not touch it. */
 #define REQUEST_AWAY ((enum MHD_Result)2)
 enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r));
+/* Within a task, without a response: the request goes on in another pool as soon as this task has returned. */
+void request_go_on(request *r, tasks *pool, void (*fn)(request *r));
+/* Within a task: another thread owns the request from now on, and adds the task again or resumes the connection. */
+void request_handed_over(void);
 
 /* guard.c: 1, or 0 with the problem. */
 int guard_headers(request *r, const char *version, api_problem *problem);
@@ -245,11 +254,28 @@ typedef struct wanted_result {
 int wanted_supermesh(request *r, const cJSON *body, wanted_result *out, api_problem *problem);
 /* Submits the job; leaves a response, or PHASE_WAIT. Blocks. */
 void submit_wanted(request *r, const wanted_result *wish);
-/* The asset of a supermesh at any URL, with ranges and conditions; releases the description. 0 without a response
- * outside a task, if one is needed to compress it. */
-int reply_asset(request *r, const cached *entry);
+/* object.c */
+/* A part of an object, served like a file of its own; length 0: the whole object. */
+typedef struct object_part {
+  uint64_t start, length;
+} object_part;
+/* Respond with an object of this SHA-256, with ranges and conditions. 0 without a response outside a task, if one is
+ * needed to compress the object. */
+int reply_part(request *r, object_kind kind, const char *id, object_part part, const char *sha, const char *mime,
+               const char *name);
+int reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name);
+/* The asset of a supermesh in the profile of the request, if that is stored; releases the description. 0 without a
+ * response if it is not, or a task is needed to compress it. */
+int reply_stored_asset(request *r, const cached *entry);
+/* The kind of the resource whose file the route serves. */
+resource_kind object_owner(const request *r);
 /* After a 404 for an object: distinguishes one that has just been deleted from one that is lost. Blocks. */
 void reply_lost(request *r);
+/* profile.c: reads ?profile=. 1, or 0 with a response. */
+int profile_read(request *r);
+/* The same as reply_stored_asset() for every caller: if the profile is not stored, a request in a task goes on to make
+ * it, and has a response or goes on when this returns 1. 0: outside a task. */
+int reply_asset(request *r, const cached *entry);
 /* The problem document of a job. */
 void reply_job_problem(request *r, const char *json);
 /* A request may name stored landmarks by {"id": ID}: replaces that member with their array. Blocks. 1, or 0 with the

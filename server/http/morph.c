@@ -226,7 +226,7 @@ static void morph_away(request *r) {
 enum MHD_Result handle_morph(request *r) {
   char id[API_ID_SIZE];
   int64_t wait = query_of(r, "wait") ? read_wait_ms(r) : WAIT_MOST_MS;
-  if (wait < 0) {
+  if (wait < 0 || !profile_read(r)) {
     return MHD_YES;
   }
   const cached *known =

@@ -17,14 +17,36 @@ void request_fields(const request *r, char out[REQUEST_FIELDS]) {
            r->route ? r->route->method : "", r->route ? r->route->path : "");
 }
 
+static _Thread_local int handed_over;
+
+void request_handed_over(void) {
+  handed_over = 1;
+}
+
 static void run_away(task *t) {
   request *r = (request *)(void *)t;
+  handed_over = 0;
   r->away(r);
+  if (handed_over) {
+    return;
+  }
+  if (r->next_pool) {
+    tasks *pool = r->next_pool;
+    r->next_pool = NULL;
+    tasks_add(pool, t);
+    return;
+  }
   FAULT_POINT("before-reply");
   if (r->phase == PHASE_AWAY) {
     r->phase = PHASE_SEND; /* the task could not make a response: reply_send() closes the connection */
   }
   MHD_resume_connection(r->connection);
+}
+
+void request_go_on(request *r, tasks *pool, void (*fn)(request *r)) {
+  r->away = fn;
+  r->next_pool = pool;
+  r->phase = PHASE_AWAY;
 }
 
 enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r)) {

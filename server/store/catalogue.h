@@ -44,6 +44,12 @@ static inline int resource_is_derived(resource_kind kind) {
   return kind == RESOURCE_EMBEDDING || kind == RESOURCE_SUPERMESH;
 }
 
+/* Profiles of an asset that are objects of their own, in the order of orb_profile. */
+enum { PROFILES_STORED = 2 };
+static inline object_kind object_of_profile(int profile) { /* 0 to PROFILES_STORED − 1 */
+  return profile == 0 ? OBJECT_QUANTIZED : OBJECT_MESHOPT;
+}
+
 /* A row of a mesh, embedding, supermesh or list of landmarks. json is allocated with malloc(). */
 typedef struct resource {
   int64_t seq;
@@ -51,8 +57,9 @@ typedef struct resource {
   char id[API_ID_SIZE];
   char sha[API_ID_SIZE];    /* SHA-256 of its object; landmarks: their id */
   char places[API_ID_SIZE]; /* SHA-256 of its places object; "": none, or stored before this column existed */
-  char *json;               /* its description */
-  int64_t bytes;            /* of its objects */
+  char profiles[PROFILES_STORED][API_ID_SIZE]; /* SHA-256 of the profiles of its asset; "": not made */
+  char *json;                                  /* its description */
+  int64_t bytes;                               /* of its objects */
   int64_t created;
 } resource;
 void resource_free(resource *r);
@@ -75,7 +82,10 @@ int catalogue_list_some(catalogue *cat, resource_kind kind, const char *view, co
  * for eviction. */
 int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resource *out);
 void catalogue_touch(catalogue *cat, resource_kind kind, const char *id); /* does not wait for the commit */
-int64_t catalogue_bytes(catalogue *cat, int derived_only);                /* −1: cannot be read */
+/* Notes that a profile of a supermesh's asset has become an object, and adds its bytes to the row's. STORE_NOT_FOUND:
+ * the supermesh has been deleted. */
+store_result catalogue_add_profile(catalogue *cat, const char *id, int profile, const char *sha, int64_t bytes);
+int64_t catalogue_bytes(catalogue *cat, int derived_only); /* −1: cannot be read */
 
 /* Random bytes of this data folder, fixed when its catalogue is created. */
 enum { CATALOGUE_SECRET = 16 };

@@ -99,6 +99,9 @@ static const char *const migrations[] = {
     "INSERT INTO shape(view, key, seq) SELECT o.tenant, s.key, o.seq FROM owner o"
     " JOIN resource r ON r.kind=o.kind AND r.id=o.id JOIN shape s ON s.view='' AND s.seq=r.seq"
     " WHERE o.kind=2 AND o.tenant!='';",
+    /* The hashes of the profiles of a supermesh's asset. */
+    "ALTER TABLE resource ADD COLUMN quantized TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE resource ADD COLUMN meshopt TEXT NOT NULL DEFAULT '';",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

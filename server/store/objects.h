@@ -17,7 +17,9 @@ typedef enum object_kind {
   OBJECT_SPHERE,
   OBJECT_ASSET,
   OBJECT_PLACES,
-  OBJECT_SPHERES, /* aligned spheres of a supermesh, see store/spheres.h */
+  OBJECT_SPHERES,   /* aligned spheres of a supermesh, see store/spheres.h */
+  OBJECT_QUANTIZED, /* profiles of an asset */
+  OBJECT_MESHOPT,
   OBJECT_KINDS
 } object_kind;
 

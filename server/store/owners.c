@@ -154,9 +154,11 @@ store_result catalogue_put_for(catalogue *cat, const resource *r, const char *te
   return result;
 }
 
-#define COLUMNS "o.seq, r.kind, r.id, r.sha, coalesce(o.json, r.json), r.bytes, o.created, r.places"
-#define LIST_COLUMNS \
-  "o.seq, r.kind, r.id, r.sha, " ROW_SUMMARY("r.kind", "coalesce(o.json, r.json)") ", r.bytes, o.created, r.places"
+#define COLUMNS \
+  "o.seq, r.kind, r.id, r.sha, coalesce(o.json, r.json), r.bytes, o.created, r.places, r.quantized, r.meshopt"
+#define LIST_COLUMNS                          \
+  "o.seq, r.kind, r.id, r.sha, " ROW_SUMMARY( \
+      "r.kind", "coalesce(o.json, r.json)") ", r.bytes, o.created, r.places, r.quantized, r.meshopt"
 #define OWNED " FROM owner o JOIN resource r ON r.kind=o.kind AND r.id=o.id"
 
 store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id, const char *tenant, resource *out) {

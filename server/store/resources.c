@@ -5,8 +5,9 @@
 
 #include "store/rows.h"
 
-#define COLUMNS "seq, kind, id, sha, json, bytes, created, places"
-#define LIST_COLUMNS(json) "seq, kind, id, sha, " ROW_SUMMARY("kind", json) ", bytes, created, places"
+#define COLUMNS "seq, kind, id, sha, json, bytes, created, places, quantized, meshopt"
+#define LIST_COLUMNS(json) \
+  "seq, kind, id, sha, " ROW_SUMMARY("kind", json) ", bytes, created, places, quantized, meshopt"
 
 void resource_free(resource *r) {
   free(r->json);
@@ -41,6 +42,9 @@ static int read_row(sqlite3_stmt *st, void *to) {
   out->bytes = sqlite3_column_int64(st, 5);
   out->created = sqlite3_column_int64(st, 6);
   row_text(st, 7, out->places, sizeof out->places);
+  for (int p = 0; p < PROFILES_STORED; p++) {
+    row_text(st, 8 + p, out->profiles[p], sizeof out->profiles[p]);
+  }
   return out->json != NULL;
 }
 static void release_row(void *row) {
@@ -130,6 +134,34 @@ void catalogue_touch(catalogue *cat, resource_kind kind, const char *id) {
     key->now = (int64_t)time(NULL) * 1000;
     catalogue_write_later(cat, touch_row, key);
   }
+}
+
+typedef struct profile_arg {
+  const char *id, *sha;
+  int profile;
+  int64_t bytes;
+} profile_arg;
+
+/* A profile that was lost and is made again has been counted already. */
+static int add_profile(database *db, void *arg) {
+  static const char *const updates[PROFILES_STORED] = {
+      "UPDATE resource SET bytes=bytes+iif(quantized='', ?3, 0), quantized=?2 WHERE kind=2 AND id=?1",
+      "UPDATE resource SET bytes=bytes+iif(meshopt='', ?3, 0), meshopt=?2 WHERE kind=2 AND id=?1"};
+  const profile_arg *p = arg;
+  sqlite3_stmt *st = database_statement(db, updates[p->profile]);
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, p->id, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 2, p->sha, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 3, p->bytes);
+  int code = database_run(db, st);
+  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+}
+
+store_result catalogue_add_profile(catalogue *cat, const char *id, int profile, const char *sha, int64_t bytes) {
+  profile_arg arg = {.id = id, .sha = sha, .profile = profile, .bytes = bytes};
+  return catalogue_write(cat, add_profile, &arg);
 }
 
 int64_t catalogue_bytes(catalogue *cat, int derived_only) {

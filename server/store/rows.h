@@ -23,7 +23,8 @@ typedef struct row_kind {
 /* A description for a list: that of landmarks, which ends with them, without them. */
 #define ROW_SUMMARY(kind, json) \
   "iif(" kind "=3, substr(" json ", 1, instr(" json ", ',\"landmarks\":')-1)||'}', " json ")"
-extern const row_kind resource_rows; /* columns: seq, kind, id, sha, json, bytes, created, places */
+extern const row_kind resource_rows; /* columns: seq, kind, id, sha, json, bytes, created,
+                                      * places, quantized, meshopt */
 
 /* These run a bound query on a reader from catalogue_reader() (st NULL: it could not be prepared) and release the
  * reader. */

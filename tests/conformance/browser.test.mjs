@@ -18,6 +18,8 @@ const PAGE = `<!doctype html><title>asset</title>
 <script type="module">
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { MeshoptDecoder } from "three/addons/libs/meshopt_decoder.module.js";
+BABYLON.MeshoptCompression.Configuration = { decoder: { url: "/decoder.js" } };
 const HALF = 2.5, EYE = [6, 8, 20], SIZE = ${SIZE};
 
 /** Encodes bytes as base64: an array of numbers takes seconds to leave the browser. */
@@ -53,7 +55,7 @@ window.direct = async (name, shape) => {
 };
 
 window.three = async (name, target) => {
-  const gltf = await new GLTFLoader().loadAsync("/asset/" + name + ".glb");
+  const gltf = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).loadAsync("/asset/" + name + ".glb");
   gltf.scene.traverse((object) => {
     if (!object.isMesh) return;
     object.material = new THREE.MeshNormalMaterial({ flatShading: true });
@@ -83,7 +85,7 @@ window.paintedDirect = async (name, shape) => {
 };
 
 window.paintedThree = async (name, target) => {
-  const gltf = await new GLTFLoader().loadAsync("/asset/" + name + ".glb");
+  const gltf = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).loadAsync("/asset/" + name + ".glb");
   gltf.scene.traverse((object) => {
     if (!object.isMesh) return;
     object.material = plain(object.material.map);
@@ -140,6 +142,12 @@ window.babylon = async (name, target, painted) => {
 window.ready = true;
 </script>`;
 
+/** The decoder of meshoptimizer as Babylon.js expects it: a script that defines a global name. */
+function decoderScript() {
+  const decoder = npmFile('three/examples/jsm/libs/meshopt_decoder.module.js');
+  return fs.readFileSync(decoder, 'utf8').replace('export { MeshoptDecoder };', '');
+}
+
 let folder;
 let server;
 let browser;
@@ -150,6 +158,7 @@ before(async () => {
   execFileSync(process.env.ORB_ASSET_FIXTURE, [folder], { stdio: 'inherit' });
   server = await serve((at) => {
     const [, kind, ...rest] = at.split('/');
+    if (kind === 'decoder.js') return { script: decoderScript() };
     return kind === 'npm' ? npmFile(rest.join('/')) : kind === 'asset' ? path.join(folder, ...rest) : { html: PAGE };
   });
   browser = await startBrowser();
@@ -204,9 +213,12 @@ for (const [name, shape] of [
   ['two', 1],
   ['dressed', 2],
   ['six', 1],
+  ['two.quantized', 1],
+  ['two.meshopt', 1],
+  ['dressed.meshopt', 2],
 ]) {
   test(`${name}, shape ${shape}: three.js draws its shading, Babylon.js its outline`, async () => {
-    const wanted = await draw('direct', name, shape);
+    const wanted = await draw('direct', name.split('.')[0], shape);
     assert.ok(difference(wanted, await draw('three', name, shape - 1), 6) < 0.005);
     assert.ok(difference(wanted, await draw('babylon', name, shape - 1), 256) < 0.01);
   });
@@ -215,11 +227,11 @@ for (const [name, shape] of [
 // Three shapes with different triangles. The overlay has every edge of the textured shape, so its texture is exact
 // there. On the others the direct picture interpolates coordinates over different triangles, which moves the tiles'
 // borders.
-for (const name of ['painted', 'painted-adaptive']) {
-  for (const shape of [0, 1, 2]) {
+for (const name of ['painted', 'painted-adaptive', 'painted.quantized', 'painted.meshopt']) {
+  for (const shape of name.includes('.') ? [0] : [0, 1, 2]) {
     test(`${name}, shape ${shape}: both draw its texture`, async () => {
-      const wanted = await draw('paintedDirect', name, shape);
-      const most = name === 'painted' && shape === 0 ? 0.01 : 0.08;
+      const wanted = await draw('paintedDirect', name.split('.')[0], shape);
+      const most = name !== 'painted-adaptive' && shape === 0 ? 0.01 : 0.08;
       for (const how of ['paintedThree', 'paintedBabylon']) {
         const got = await draw(how, name, shape - 1);
         keep(`${name}-${shape}-${how}`, got);

@@ -14,14 +14,16 @@ const three = `<!doctype html><title>three</title>
 <script type="importmap">{"imports":{"three":"/npm/three/build/three.module.js","three/addons/":"/npm/three/examples/jsm/"}}</script>
 <script type="module">
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { MeshoptDecoder } from "three/addons/libs/meshopt_decoder.module.js";
 const src = new URLSearchParams(location.search).get("src");
-new GLTFLoader().load(src, ({ scene, animations }) => {
+new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).load(src, ({ scene, animations }) => {
   const names = [];
   scene.traverse((o) => o.morphTargetDictionary && names.push(...Object.keys(o.morphTargetDictionary)));
   window.result = { names, animations: animations.length };
 }, undefined, (error) => (window.result = { error: String(error) }));
 </script>`;
 const viewer = `<!doctype html><title>model-viewer</title>
+<script>self.ModelViewerElement = { meshoptDecoderLocation: "data:text/javascript," };</script>
 <script type="module" src="/npm/@google/model-viewer/dist/model-viewer.min.js"></script>
 <script type="module">
 const element = document.createElement("model-viewer");
@@ -86,6 +88,7 @@ test('a page of another origin shows signed morphs', async (t) => {
   for (const [page, tolerance, expected] of [
     ['three', 0.05, { names: ['bean'], animations: 1 }],
     ['viewer', 0.04, { loaded: true, animations: 1 }],
+    ['viewer', '0.03&profile=meshopt', { loaded: true, animations: 1 }],
   ]) {
     const [before, made] = [await requests(), await jobs()];
     const src = await signed(tolerance);

@@ -1,5 +1,6 @@
 /* Writes the assets that the conformance tests read: NAME.glb, and NAME.json with the expected facts,
- * {"triangles": [[a,b,c]…], "shapes": [[x,y,z, …]…]} in doubles. The shapes are formulas on a globe. */
+ * {"triangles": [[a,b,c]…], "shapes": [[x,y,z, …]…]} in doubles. Also NAME.quantized.glb and NAME.meshopt.glb, each
+ * with a .json of the bounds on what it changes. The shapes are formulas on a globe. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,6 +9,7 @@
 #include "base/buffer.h"
 #include "base/memory.h"
 #include "orbmorph/asset.h"
+#include "orbmorph/profile.h"
 
 enum { AROUND = 24, ROWS = 12, MAX_SHAPES = 6 };
 #define VERTICES (AROUND * (ROWS - 1) + 2)
@@ -214,6 +216,27 @@ static void write_facts(orb_context *ctx, const char *folder, const char *name, 
   orb_buffer_free(ctx, &text);
 }
 
+static void write_asset(orb_context *ctx, const char *folder, const char *name, const orb_buffer *glb) {
+  char ending[32], text[160];
+  orb_profile_facts facts;
+  write_file(folder, name, ".glb", glb->data, glb->size);
+  for (int p = ORB_PROFILE_QUANTIZED; p < ORB_PROFILES; p++) {
+    const char *profile = orb_profile_name((orb_profile)p);
+    orb_buffer out = {0};
+    if (orb_profile_write(ctx, glb->data, glb->size, (orb_profile)p, &facts, &out) != ORB_OK) {
+      fprintf(stderr, "fixture: %s: %s\n", name, orb_context_error(ctx)->detail);
+      exit(1);
+    }
+    snprintf(ending, sizeof ending, ".%s.glb", profile);
+    write_file(folder, name, ending, out.data, out.size);
+    orb_buffer_free(ctx, &out);
+    int size = snprintf(text, sizeof text, "{\"position_error\":%.17g,\"normal_degrees\":%.17g}", facts.position_error,
+                        facts.normal_degrees);
+    snprintf(ending, sizeof ending, ".%s.json", profile);
+    write_file(folder, name, ending, text, (size_t)size);
+  }
+}
+
 static void make(const char *folder, const char *name, int shape_count, int dressed, const orb_asset_options *options) {
   static const char *const names[MAX_SHAPES] = {"Ähre", "zwei", "trois", "four \"quoted\"", "five\\", "six"};
   orb_context *ctx;
@@ -252,7 +275,7 @@ static void make(const char *folder, const char *name, int shape_count, int dres
     fprintf(stderr, "fixture: %s: %s\n", name, orb_context_error(ctx)->detail);
     exit(1);
   }
-  write_file(folder, name, ".glb", glb.data, glb.size);
+  write_asset(ctx, folder, name, &glb);
   write_facts(ctx, folder, name, &supermesh, shapes);
   orb_buffer_free(ctx, &glb);
   for (int s = 0; s < shape_count; s++) {
@@ -327,7 +350,7 @@ static void make_painted(const char *folder, const char *name, orb_remesh_method
     fprintf(stderr, "fixture: %s: %s\n", name, orb_context_error(ctx)->detail);
     exit(1);
   }
-  write_file(folder, name, ".glb", glb.data, glb.size);
+  write_asset(ctx, folder, name, &glb);
   write_file(folder, name, ".json", text.data, text.size);
   write_file(folder, name, ".png", png, size);
   orb_buffer_free(ctx, &glb);

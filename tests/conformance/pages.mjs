@@ -24,11 +24,12 @@ export function need(...packages) {
   }
 }
 
-/** Serves what `find(path)` returns: { html }, the path of a file, or nothing. Returns the port and `close`. */
+/** Serves what `find(path)` returns: { html }, { script }, the path of a file, or nothing. Returns the port and `close`. */
 export async function serve(find) {
   const server = http.createServer((request, response) => {
     const found = find(decodeURIComponent(new URL(request.url, 'http://x').pathname));
     if (found?.html) return response.writeHead(200, { 'Content-Type': types['.html'] }).end(found.html);
+    if (found?.script) return response.writeHead(200, { 'Content-Type': types['.js'] }).end(found.script);
     if (!found || !fs.existsSync(found)) return response.writeHead(404).end();
     response.writeHead(200, { 'Content-Type': types[path.extname(found)] ?? 'application/octet-stream' });
     fs.createReadStream(found).pipe(response);

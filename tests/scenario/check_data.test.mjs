@@ -38,11 +38,13 @@ test('a lost file is reported, and uploading the mesh again restores it', async 
 test('damage to any object, and to any kind of row, is found', async (t) => {
   const d = await daemon(t);
   const [a, b] = [await d.mesh(path.join(samples, 'dog.obj')), await d.mesh(path.join(samples, 'giraffe.off'))];
-  await d.made('/v1/supermeshes', {
+  const { asset } = await d.made('/v1/supermeshes', {
     shapes: [{ mesh: a.id }, { mesh: b.id }],
     align: { method: 'rotate' },
     remesh: { max_triangles: 4000 },
   });
+  for (const profile of ['quantized', 'meshopt'])
+    assert.equal((await d.get(`${asset}?profile=${profile}`)).status, 200);
   assert.equal((await d.stop()).code, 0, d.log);
   const check = () => spawnSync(binaries.daemon, ['--check-data', '--data', d.data], { encoding: 'utf8' });
   const clean = (what) =>
@@ -55,7 +57,15 @@ test('damage to any object, and to any kind of row, is found', async (t) => {
       readdirSync(path.join(objects, kind, shard)).map((name) => [kind, path.join(objects, kind, shard, name)]),
     ),
   );
-  assert.deepEqual([...new Set(files.map(([kind]) => kind))].sort(), ['asset', 'mesh', 'places', 'sphere', 'spheres']);
+  assert.deepEqual([...new Set(files.map(([kind]) => kind))].sort(), [
+    'asset',
+    'mesh',
+    'meshopt',
+    'places',
+    'quantized',
+    'sphere',
+    'spheres',
+  ]);
   const found = (what) => {
     const { status, stdout } = check();
     assert.equal(status, 1, `${what}\n${stdout}`);

@@ -37,6 +37,9 @@ test('wrong usage exits with 2 and explains the error', async () => {
     ['morph', 'a', 'b', '--json=yes'],
     ['ls', 'shoes'],
     ['get', 'x', '--part', 'wing'],
+    ['get', 'x', '--profile', 'meshopt'],
+    ['get', 'x', '--part', 'asset', '--profile', 'draco'],
+    ['morph', dog, giraffe, '--profile', 'draco'],
     ['completions', 'tcsh'],
     ['morph', dog, giraffe, '--tolerance', 'much'],
     ['morph', dog, giraffe, '--max-triangles', '1e4'],
@@ -169,6 +172,30 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
   const asset = await run(['get', id, '--part', 'asset', '-o', path.join(at, 'x.glb')], { env });
   assert.equal(asset.code, 0, asset.err);
   assert.equal(morphOf(await readFile(path.join(at, 'x.glb'))).gltf.animations, undefined, '--set reached the daemon');
+  const packed = await run(['get', id, '--part', 'asset', '--profile', 'meshopt'], { env });
+  assert.ok(packed.bytes.equals((await d.get(`/v1/supermeshes/${id}/asset.glb?profile=meshopt`)).bytes), packed.err);
+  const made = path.join(at, 'q.glb');
+  const again = await run(
+    [
+      'merge',
+      meshes[0].id,
+      meshes[1].id,
+      '-l',
+      landmarks,
+      '--set',
+      'asset.animation=none',
+      '--profile',
+      'quantized',
+      '-o',
+      made,
+    ],
+    { env },
+  );
+  assert.equal(again.code, 0, again.err);
+  const quantized = await readFile(made);
+  assert.ok(quantized.equals((await d.get(`/v1/supermeshes/${id}/asset.glb?profile=quantized`)).bytes));
+  const drawn = await run(['view', made, '-o', path.join(at, 'q.png')]);
+  assert.deepEqual([drawn.code, /KHR_mesh_quantization.*--profile float/.test(drawn.err)], [2, true], drawn.err);
   const file = await run(['get', meshes[0].id, '--part', 'file'], { env });
   assert.ok(file.bytes.equals(await readFile(dog)));
   assert.match((await run(['ls', 'jobs', '--state', 'succeeded'], { env })).out, /supermesh/);

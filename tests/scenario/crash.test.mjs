@@ -88,6 +88,10 @@ class Ledger {
           align: { method: 'rotate' },
           remesh: { method: 'overlay' },
         });
+        const merged = await d.get(
+          `/v1/morph.glb?shapes=${a.id},${b.id}&align=rotate&remesh=overlay&profile=meshopt&wait=1`,
+        );
+        assert.ok([200, 503].includes(merged.status), merged.bytes.toString());
         await d.get('/v1/jobs', { query: { limit: 5 } });
         const c = await this.upload(d);
         const embedding = await this.ask(d, '/v1/embeddings', { mesh: c.id });

@@ -531,8 +531,14 @@ test('answers about embeddings, supermeshes and jobs', async (t) => {
         [{ 'if-none-match': '*' }, 304],
       ])
         assert.equal((await ask('GET', file, { id, headers })).status, status);
-    if (kind === 'supermeshes')
+    if (kind === 'supermeshes') {
+      for (const [profile, status] of [
+        ['meshopt', 200],
+        ['draco', 400],
+      ])
+        assert.equal((await ask('GET', '/v1/supermeshes/{id}/asset.glb', { id, query: { profile } })).status, status);
       assert.equal((await create(kind, made.json.request)).json.id, id, 'the request of the answer names the same');
+    }
   }
 
   const [kept] = wanted[0].slice(1);
@@ -626,6 +632,8 @@ test('answers about landmarks and morphs by URL', async (t) => {
     [{ shapes: ids[0] }, 400],
     [{ shapes: `${ids[0]},${'0'.repeat(64)}` }, 404],
     [{ landmarks: '0'.repeat(64) }, 404],
+    [{ profile: 'quantized' }, 200],
+    [{ profile: 'zip' }, 400],
     [{ tolerance: 7 }, 422],
     [{ remesh: 'none' }, 422],
   ])

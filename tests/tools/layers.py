@@ -25,7 +25,7 @@ ORDER = [
     "core/align/map/starts", "core/align/map/twist", "core/align/map",
     "core/align/find", "core/align",
     "core/remesh/common", "core/remesh/overlay", "core/remesh/placed", "core/remesh/adaptive", "core/remesh",
-    "core/transfer", "core/merge", "api",
+    "core/transfer", "core/profile", "core/merge", "api",
     "server/log", "server/faults", "server/wake", "server/tasks", "server/metrics", "server/pages", "server/studio",
     "server/config", "server/control", "server/systemd", "server/store", "server/cache", "server/queue", "server/worker",
     "server/evict", "server/maintain", "server/admin", "server/http", "server/main",

@@ -118,10 +118,43 @@ static void test_needed_rows_fill_pages(void **state) {
   }
 }
 
+/* A profile becomes part of its supermesh: its bytes count, and its object leaves with the row. */
+static void test_profiles_belong_to_the_supermesh(void **state) {
+  stored *s = *state;
+  char json[] = "{}", sha[API_ID_SIZE], lost[API_ID_SIZE];
+  int fresh;
+  unsigned char *bytes = NULL;
+  size_t size;
+  resource row = {.kind = RESOURCE_SUPERMESH, .json = json, .bytes = ROW_BYTES, .created = 1}, got = {0};
+  number_id(row.id, 'e', 1);
+  number_id(row.sha, 'f', 1);
+  number_id(sha, 'd', 1);
+  number_id(lost, 'c', 1);
+  assert_int_equal(catalogue_put_for(s->env.cat, &row, "", 0, &fresh), STORE_OK);
+  for (int p = 0; p < PROFILES_STORED; p++) {
+    assert_int_equal(objects_put(s->env.store, object_of_profile(p), row.id, "0123456", 7), STORE_OK);
+    assert_int_equal(catalogue_add_profile(s->env.cat, row.id, p, sha, 7), STORE_OK);
+    assert_int_equal(catalogue_add_profile(s->env.cat, row.id, p, sha, 7), STORE_OK); /* again: counted once */
+  }
+  assert_int_equal(catalogue_bytes(s->env.cat, 1), ROW_BYTES + 14);
+  assert_int_equal(catalogue_mismatches(s->env.cat), 0);
+  assert_int_equal(catalogue_get(s->env.cat, RESOURCE_SUPERMESH, row.id, &got), STORE_OK);
+  assert_string_equal(got.profiles[0], sha);
+  assert_string_equal(got.profiles[1], sha);
+  assert_int_equal(got.bytes, ROW_BYTES + 14);
+  resource_free(&got);
+  assert_int_equal(catalogue_add_profile(s->env.cat, lost, 0, sha, 7), STORE_NOT_FOUND);
+  assert_int_equal(evict_derived(&s->env, ROW_BYTES, INT64_MAX), 0);
+  for (int p = 0; p < PROFILES_STORED; p++) {
+    assert_int_equal(objects_load(s->env.store, object_of_profile(p), row.id, &bytes, &size), STORE_NOT_FOUND);
+  }
+}
+
 int main(void) {
   log_setup(LOG_WARN, 0); /* each evicted object is logged */
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(test_needed_rows_fill_pages, setup, teardown),
+      cmocka_unit_test_setup_teardown(test_profiles_belong_to_the_supermesh, setup, teardown),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

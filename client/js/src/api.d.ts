@@ -299,11 +299,27 @@ export type CanonicalRequest = {
   };
 };
 
+export type ProfileBounds = {
+  /** The largest distance between a vertex and its place in the float asset, at every weight from 0 to 1 of one target, divided by the smallest diagonal of the bounding boxes of the shapes in the asset: a proved bound, to be added to hausdorff_relative. */
+  quantization_relative: number | null;
+  /** The largest angle between a normal and that of the float asset, at every weight from 0 to 1 of one target: a proved bound, below 1. 0 without normals. */
+  normal_degrees: number | null;
+};
+
 export type Supermesh = {
   id: Id;
   url: string;
   asset: string;
   asset_bytes: number;
+  /** What the profiles quantized and meshopt change: the bounds that hold for both, and those of each. Absent if an older engine made the supermesh. */
+  profiles?: {
+    /** The largest distance between a vertex and its place in the float asset, at every weight from 0 to 1 of one target, divided by the smallest diagonal of the bounding boxes of the shapes in the asset: a proved bound, to be added to hausdorff_relative. */
+    quantization_relative: number | null;
+    /** The largest angle between a normal and that of the float asset, at every weight from 0 to 1 of one target: a proved bound, below 1. 0 without normals. */
+    normal_degrees: number | null;
+    quantized: ProfileBounds;
+    meshopt: ProfileBounds;
+  };
   vertices: number;
   triangles: number;
   /** The shapes, in request order. */

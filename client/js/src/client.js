@@ -168,9 +168,10 @@ export class Orbmorph {
     return this.make('/v1/supermeshes', request, watch);
   }
 
-  /** The GLB. -> ArrayBuffer */
-  async asset(id, options) {
-    return (await this.request(`/v1/supermeshes/${id}/asset.glb`, options)).arrayBuffer();
+  /** The GLB, in the profile `profile`: 'float' (the default), 'quantized' or 'meshopt'. -> ArrayBuffer */
+  async asset(id, { profile, ...options } = {}) {
+    const query = profile ? `?profile=${encodeURIComponent(profile)}` : '';
+    return (await this.request(`/v1/supermeshes/${id}/asset.glb${query}`, options)).arrayBuffer();
   }
 
   /** The binary PLY of the aligned embedding of shape `k`. -> ArrayBuffer */
@@ -308,7 +309,7 @@ export class Orbmorph {
   /**
    * The URL of a morph: its GET computes the morph if nobody has. `recipe`: `shapes` (ids of meshes), and optionally
    * `names`, `landmarks` (an id, or "auto"), `align`, `preset`, `remesh`, `tolerance`, `max_triangles`, `fit`, `path`,
-   * `animation`, `normals` and `wait`.
+   * `animation`, `normals`, `profile` and `wait`.
    */
   morphUrl(recipe) {
     const query = Object.entries(clean(recipe)).map(
@@ -320,7 +321,7 @@ export class Orbmorph {
   /**
    * Uploads files, merges them and waits for the job. Options: the members of POST /v1/supermeshes (`landmarks`,
    * `align`, `remesh`, `asset`), `repair`, `names`, `onProgress({step, file, job, progress})` and `signal`.
-   * -> the supermesh with `meshes`, `assetUrl` and `glb()`
+   * -> the supermesh with `meshes`, `assetUrl` and `glb()`, which takes `profile` like `asset()`
    */
   async morph(sources, { landmarks, align, remesh, asset, repair, names, onProgress, signal } = {}) {
     const meshes = [];

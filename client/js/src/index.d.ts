@@ -79,7 +79,7 @@ export interface MorphOptions extends RequestOptions, Omit<SupermeshRequest, 'sh
 export interface Morph extends Supermesh {
   meshes: Mesh[];
   assetUrl: string;
-  glb(options?: RequestOptions): Promise<ArrayBuffer>;
+  glb(options?: AssetOptions): Promise<ArrayBuffer>;
 }
 
 export interface ConnectOptions {
@@ -88,6 +88,13 @@ export interface ConnectOptions {
   fetch?: typeof fetch;
   /** How often a request is repeated while the daemon is busy (429, 503); 4 by default. */
   retries?: number;
+}
+
+/** How an asset is stored: `quantized` and `meshopt` are smaller, and a renderer needs a decoder for `meshopt`. */
+export type Profile = 'float' | 'quantized' | 'meshopt';
+
+export interface AssetOptions extends RequestOptions {
+  profile?: Profile;
 }
 
 /** The parameters of GET /v1/morph.glb. */
@@ -104,6 +111,7 @@ export interface Recipe {
   path?: 'linear' | 'rigid';
   animation?: 'pingpong' | 'none';
   normals?: boolean;
+  profile?: Profile;
   wait?: number;
 }
 
@@ -170,7 +178,7 @@ export class Orbmorph {
   deleteLandmarks(id: string, options?: RequestOptions): Promise<void>;
   merge(request: SupermeshRequest, options?: WatchOptions): Promise<Supermesh>;
   getSupermesh(id: string, options?: RequestOptions): Promise<Supermesh>;
-  asset(id: string, options?: RequestOptions): Promise<ArrayBuffer>;
+  asset(id: string, options?: AssetOptions): Promise<ArrayBuffer>;
   alignedSphere(id: string, k: number, options?: RequestOptions): Promise<ArrayBuffer>;
   places(id: string, options?: RequestOptions): Promise<ArrayBuffer>;
   deleteSupermesh(id: string, options?: RequestOptions): Promise<void>;

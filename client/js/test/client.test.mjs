@@ -253,6 +253,16 @@ test('a daemon that does not let the page in is told apart from one that is away
   assert.ok(away instanceof UnreachableError && !(away instanceof CorsError));
 });
 
+test(
+  'an asset in a profile',
+  using({}, async (daemon, client) => {
+    const text = async (options) => Buffer.from(await client.asset('1', options)).toString();
+    assert.deepEqual([await text(), await text({ profile: 'meshopt' })], ['glTF', 'glTF?profile=meshopt']);
+    const url = client.morphUrl({ shapes: ['a', 'b'], profile: 'quantized' });
+    assert.equal(url, `${daemon.url}/v1/morph.glb?shapes=a,b&profile=quantized`);
+  }),
+);
+
 test('the URL of a recipe', () => {
   const url = new Orbmorph({ server: 'http://x' }).morphUrl({
     shapes: ['a', 'b'],

@@ -16,6 +16,7 @@ export async function usage(a: File, b: Uint8Array) {
     onProgress: ({ step, progress }) => `${step} ${progress}`,
   });
   const glb: ArrayBuffer = await morph.glb();
+  const packed: ArrayBuffer = await morph.glb({ profile: 'meshopt' });
   const client = new Orbmorph({ server: 'http://127.0.0.1:8080', token: 'secret' });
   client.token = undefined;
   const mesh: Mesh = await client.uploadMesh(a, { repair: ['safe', 'fill_holes'] });
@@ -26,6 +27,7 @@ export async function usage(a: File, b: Uint8Array) {
     landmarks: 'auto',
     align: { method: 'auto' },
   });
+  const off: number | null | undefined = supermesh.profiles?.meshopt.quantization_relative;
   const { id: landmarks_id } = await client.createLandmarks({ landmarks });
   const url: string = client.morphUrl({ shapes: [mesh.id, mesh.id], landmarks: landmarks_id, tolerance: 0.01 });
   const signed: string = await orbmorph.signUrl(url, { key: 'web', secret: 'secret', expires: '30d' });
@@ -38,7 +40,7 @@ export async function usage(a: File, b: Uint8Array) {
     void made.pairs;
   }
   for await (const made of client.list('supermeshes', { limit: 10 })) made.pairs.length.toFixed();
-  return [glb, mean, sphere, signed, names];
+  return [glb, packed, off, mean, sphere, signed, names];
 }
 
 export function describe(error: unknown) {

@@ -4,6 +4,7 @@
 
 #include "orbmorph/align.h"
 #include "orbmorph/asset.h"
+#include "orbmorph/profile.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -51,6 +52,7 @@ typedef struct orb_merge_result {
   int32_t *asset_vertices; /* asset_facts.vertex_count: the supermesh vertex of each vertex of the asset */
   double *transforms;      /* shape_count × 16, see orb_asset_transforms() */
   orb_buffer asset;
+  orb_profile_facts profiles[ORB_PROFILES]; /* what the profiles of the asset change; that of float is 0 */
   orb_merge_timings timings;
 } orb_merge_result;
 

@@ -11,6 +11,7 @@
 #include "orbmorph/locate.h"
 #include "orbmorph/merge.h"
 #include "orbmorph/mesh.h"
+#include "orbmorph/profile.h"
 #include "orbmorph/remesh.h"
 #include "orbmorph/remesh_methods.h"
 #include "orbmorph/status.h"

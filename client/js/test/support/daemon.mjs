@@ -83,7 +83,7 @@ export async function startDaemon({ jobSteps = 3, breakStream = false, noEvents 
     }
     if (parts[1] === 'supermeshes' && parts[3] === 'asset.glb') {
       res.writeHead(200, { 'Content-Type': 'model/gltf-binary' });
-      return res.end('glTF');
+      return res.end(`glTF${url.search}`);
     }
     if (parts[1] === 'supermeshes')
       return send(res, 200, {

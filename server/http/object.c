@@ -1,0 +1,205 @@
+/* Sending stored objects, with conditions, ranges and sendfile. A request for several ranges gets the whole file, as
+ * RFC 9110 section 14.2 allows. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "http/disposition.h"
+#include "http/http.h"
+#include "log.h"
+
+enum { YEAR_S = 31536000 };
+
+static void add_headers(request *r, const char *mime, const char *name, int varies) {
+  char disposition[DISPOSITION_SIZE];
+  char control[64];
+  int64_t left = r->expires - (int64_t)time(NULL);
+  reply_header(r, "ETag", r->etag);
+  if (varies && (!r->coded || r->status == 304)) {
+    reply_header(r, "Vary", "Accept-Encoding");
+  }
+  if (r->signer) { /* anyone with the URL may read it until it expires */
+    snprintf(control, sizeof control, "public, max-age=%lld",
+             (long long)(left < 0        ? 0
+                         : left < YEAR_S ? left
+                                         : YEAR_S));
+  } else { /* a shared cache must not keep what only one token may see */
+    snprintf(control, sizeof control, "%s, max-age=%d, immutable", r->caller ? "private" : "public", YEAR_S);
+  }
+  reply_header(r, "Cache-Control", control);
+  reply_header(r, "Accept-Ranges", "bytes");
+  if (r->status != 304) {
+    if (!r->coded) {
+      reply_header(r, "Content-Type", mime);
+    }
+    disposition_write(name, disposition);
+    reply_header(r, "Content-Disposition", disposition);
+  }
+}
+
+/* Reads a part of an object into memory of malloc(); NULL on failure, or if it is larger than `most`. */
+static void *read_part(const request *r, object_kind kind, const char *id, object_part part, size_t most,
+                       size_t *size) {
+  int fd;
+  uint64_t whole;
+  *size = 0;
+  if (objects_read(r->srv->store, kind, id, &fd, &whole) != STORE_OK) {
+    return NULL;
+  }
+  uint64_t wanted = part.length ? part.length : whole;
+  char *bytes = wanted >= ENCODE_LEAST && wanted <= most ? malloc((size_t)wanted) : NULL;
+  for (ssize_t n = 1; bytes && n > 0 && *size<wanted; *size += n> 0 ? (size_t)n : 0) {
+    n = pread(fd, bytes + *size, (size_t)wanted - *size, (off_t)(part.start + *size));
+  }
+  close(fd);
+  if (*size < wanted) {
+    free(bytes);
+    bytes = NULL;
+  }
+  return bytes;
+}
+
+/* Sending an asset of this size from memory takes two system calls, from its file eight. Beyond it, copying the bytes
+ * costs more than that. */
+enum { MEMORY_MOST = 512 << 10 };
+
+/* Takes a small asset from memory, and reads it there if it is not. 0: only a task may do that. */
+static int choose_memory(request *r, object_kind kind, const char *id, const char *key) {
+  size_t size;
+  if ((kind != OBJECT_ASSET && kind != OBJECT_QUANTIZED) || r->srv->options->encoded_bytes == 0 ||
+      header_of(r, "Range")) {
+    return 1;
+  }
+  const encoded *found = encoded_find(r->srv->encoded, key, CODING_NONE);
+  if (!found && r->phase != PHASE_AWAY) {
+    return 0;
+  }
+  if (!found) {
+    void *bytes = read_part(r, kind, id, (object_part){0}, MEMORY_MOST, &size);
+    found = encoded_make(r->srv->encoded, key, CODING_NONE, bytes, size);
+    free(bytes);
+  }
+  if (found && found->bytes) {
+    r->encoded = found;
+  } else {
+    encoded_release(found);
+  }
+  return 1;
+}
+
+/* Chooses the form of an object, and compresses it if that has not been done. 0: only a task may do that. */
+static int choose_form(request *r, object_kind kind, const char *id, object_part part, const char *etag) {
+  char key[96];
+  size_t size;
+  snprintf(key, sizeof key, "object %d %d %.16s %s", (int)kind, r->shape, id, etag);
+  if (!reply_choose(r, key, etag, NULL, ENCODE_LEAST)) {
+    if (r->phase != PHASE_AWAY) {
+      return 0;
+    }
+    void *bytes = read_part(r, kind, id, part, ENCODE_MOST, &size);
+    if (bytes) {
+      reply_choose(r, key, etag, bytes, size);
+    }
+    free(bytes);
+  }
+  return r->encoded || choose_memory(r, kind, id, key);
+}
+
+int reply_part(request *r, object_kind kind, const char *id, object_part part, const char *sha, const char *mime,
+               const char *name) {
+  char etag[40], content_range[80];
+  int fd,
+      compresses = kind == OBJECT_ASSET || kind == OBJECT_QUANTIZED || kind == OBJECT_SPHERE || kind == OBJECT_SPHERES;
+  uint64_t size, first = 0, length;
+  snprintf(etag, sizeof etag, "\"%.32s\"", sha);
+  snprintf(r->etag, sizeof r->etag, "%s", etag);
+  if (compresses && !choose_form(r, kind, id, part, etag)) {
+    return 0;
+  }
+  if (reply_conditions(r, r->etag)) {
+    if (r->status == 304) {
+      add_headers(r, mime, name, compresses);
+    }
+    return 1;
+  }
+  if (r->encoded) {
+    if (r->coded) {
+      reply_encoded(r, 200, mime);
+    } else {
+      reply_memory(r, 200);
+    }
+    add_headers(r, mime, name, 1);
+    return 1;
+  }
+  store_result found = objects_read(r->srv->store, kind, id, &fd, &size);
+  if (found != STORE_OK) {
+    reply_store(r, found);
+    return 1;
+  }
+  size = part.length ? part.length : size;
+  length = size;
+  const char *if_range = header_of(r, "If-Range");
+  int usable = !r->head && (!if_range || strcmp(if_range, etag) == 0);
+  int ranged = usable ? parse_range(header_of(r, "Range"), size, &first, &length) : 0;
+  if (ranged < 0) {
+    close(fd);
+    reply_refuse(r, "range-not-satisfiable", "The file has only %llu bytes.", (unsigned long long)size);
+    snprintf(content_range, sizeof content_range, "bytes */%llu", (unsigned long long)size);
+    reply_header(r, "Content-Range", content_range);
+    return 1;
+  }
+  struct MHD_Response *response = MHD_create_response_from_fd_at_offset64(length, fd, part.start + first);
+  if (!response) {
+    close(fd);
+  }
+  r->response = response;
+  r->status = ranged ? 206 : 200;
+  r->sends = (int64_t)length;
+  r->phase = PHASE_SEND;
+  if (ranged) {
+    snprintf(content_range, sizeof content_range, "bytes %llu-%llu/%llu", (unsigned long long)first,
+             (unsigned long long)(first + length - 1), (unsigned long long)size);
+    reply_header(r, "Content-Range", content_range);
+  }
+  add_headers(r, mime, name, compresses);
+  return 1;
+}
+
+int reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name) {
+  return reply_part(r, kind, id, (object_part){0}, sha, mime, name);
+}
+
+int reply_stored_asset(request *r, const cached *entry) {
+  char link[128], name[DISPOSITION_NAME];
+  int stored = r->profile - 1; /* −1: the asset itself */
+  const char *sha = stored < 0 ? entry->row.sha : entry->row.profiles[stored];
+  disposition_name(entry->row.json, name);
+  memcpy(r->id, entry->row.id, sizeof r->id);
+  int done = sha[0] && reply_object(r, stored < 0 ? OBJECT_ASSET : object_of_profile(stored), r->id, sha,
+                                    "model/gltf-binary", name);
+  if (done && r->route->id == ROUTE_MORPH && r->status < 400) {
+    snprintf(link, sizeof link, "</v1/supermeshes/%s>; rel=\"describedby\"", r->id);
+    reply_header(r, "Link", link);
+  }
+  cache_release(r->srv->descriptions, entry);
+  return done;
+}
+
+resource_kind object_owner(const request *r) {
+  return r->route->id == ROUTE_MESH_FILE          ? RESOURCE_MESH
+         : r->route->id == ROUTE_EMBEDDING_SPHERE ? RESOURCE_EMBEDDING
+                                                  : RESOURCE_SUPERMESH;
+}
+
+void reply_lost(request *r) {
+  resource row = {0};
+  if (catalogue_get(r->srv->cat, object_owner(r), r->id, &row) == STORE_OK) {
+    log_error("the file of %s %s is lost: --check-data lists all damage", r->route->path, r->id);
+    reply_refuse(r, "internal", "The server has lost this file. DELETE the resource, then upload or request it again.");
+  } else {
+    reply_store(r, STORE_NOT_FOUND);
+  }
+  resource_free(&row);
+}

@@ -1,0 +1,215 @@
+/* Profiles of an asset: made from the stored asset on the first request, once, and kept as objects beside it. */
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "faults.h"
+#include "http/http.h"
+#include "log.h"
+#include "orbmorph/profile.h"
+#include "store/keys.h"
+#include "store/owners.h"
+
+/* A profile that a thread makes, and the requests that wait for it. */
+typedef struct flight {
+  struct flight *next;
+  char id[API_ID_SIZE];
+  int profile;
+  request *waiting; /* linked by next_waiting */
+} flight;
+
+static struct {
+  pthread_mutex_t lock;
+  flight *first;
+} flights = {.lock = PTHREAD_MUTEX_INITIALIZER};
+
+int profile_read(request *r) {
+  const char *name = query_of(r, "profile");
+  api_problem problem = {0};
+  r->profile = ORB_PROFILE_FLOAT;
+  while (name && r->profile < ORB_PROFILES && strcmp(orb_profile_name((orb_profile)r->profile), name) != 0) {
+    r->profile++;
+  }
+  if (r->profile < ORB_PROFILES) {
+    return 1;
+  }
+  api_refuse(&problem, "bad-query", "\"profile\" must be float, quantized or meshopt.");
+  api_json_member_string(&problem.facts, "parameter", "profile");
+  reply_problem(r, &problem);
+  return 0;
+}
+
+/* The description as it is in the catalogue now; the one in memory may be older than the profile. */
+static const cached *read_again(request *r, store_result *result) {
+  resource row = {0};
+  const char *view = r->route->id == ROUTE_MORPH ? access_tenant(r) : access_view(r);
+  unsigned long long since = cache_drops(r->srv->descriptions);
+  *result = view[0] ? catalogue_get_of(r->srv->cat, RESOURCE_SUPERMESH, r->id, view, &row)
+                    : catalogue_get(r->srv->cat, RESOURCE_SUPERMESH, r->id, &row);
+  const cached *entry = *result == STORE_OK ? cache_add(r->srv->descriptions, &row, view, since) : NULL;
+  *result = *result == STORE_OK && !entry ? STORE_ERROR : *result;
+  return entry;
+}
+
+/* Converts the asset. *out belongs to the context. 1, or 0 with the problem. */
+static int convert(request *r, orb_context *ctx, orb_buffer *out, api_problem *problem) {
+  int fd;
+  uint64_t size;
+  store_result found = objects_read(r->srv->store, OBJECT_ASSET, r->id, &fd, &size);
+  if (found != STORE_OK) {
+    return api_refuse(problem, found == STORE_NOT_FOUND ? "not-found" : "internal",
+                      found == STORE_NOT_FOUND ? "Nothing has this id; it may have been deleted."
+                                               : "The store could not be read; the server's log says why.");
+  }
+  void *bytes = size > 0 ? mmap(NULL, (size_t)size, PROT_READ, MAP_PRIVATE, fd, 0) : MAP_FAILED;
+  close(fd);
+  if (bytes == MAP_FAILED) {
+    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  }
+  orb_status status = orb_profile_write(ctx, bytes, (size_t)size, (orb_profile)r->profile, NULL, out);
+  munmap(bytes, (size_t)size);
+  if (status != ORB_OK) {
+    api_problem_of_error(orb_context_error(ctx), problem);
+  }
+  return status == ORB_OK;
+}
+
+/* Publishes the object before the row names it. */
+static store_result store_profile(request *r, const orb_buffer *bytes) {
+  server *srv = r->srv;
+  char sha[API_ID_SIZE];
+  object_kind kind = object_of_profile(r->profile - 1);
+  if (objects_free_bytes(srv->store) < (uint64_t)bytes->size + (uint64_t)srv->options->disk_reserve) {
+    return STORE_FULL;
+  }
+  api_id_of_text((const char *)bytes->data, bytes->size, sha);
+  objects_hold(srv->store);
+  store_result stored = objects_put(srv->store, kind, r->id, bytes->data, bytes->size);
+  FAULT_POINT("profile-published");
+  if (stored == STORE_OK) {
+    stored = catalogue_add_profile(srv->cat, r->id, r->profile - 1, sha, (int64_t)bytes->size);
+  }
+  if (stored == STORE_NOT_FOUND) { /* no other thread can have published it: this one has the flight */
+    objects_delete(srv->store, kind, r->id);
+  }
+  objects_let_go(srv->store);
+  return stored;
+}
+
+/* 1, or 0 with a response. */
+static int make(request *r) {
+  const config *options = r->srv->options;
+  orb_context_options limits = {.memory_limit = (size_t)options->job_memory,
+                                .threads = 1,
+                                .deadline_ms = orb_clock_ms() + 1000 * options->job_seconds};
+  orb_context *ctx = NULL;
+  orb_buffer out = {0};
+  api_problem problem = {0};
+  int64_t began = orb_clock_ms();
+  if (!sign_may_work(r, &problem)) {
+    reply_problem(r, &problem);
+    return 0;
+  }
+  if (orb_context_create(&limits, &ctx) != ORB_OK) {
+    reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
+    return 0;
+  }
+  int fine = convert(r, ctx, &out, &problem);
+  store_result stored = fine ? store_profile(r, &out) : STORE_OK;
+  int64_t took = orb_clock_ms() - began;
+  if (r->signer) {
+    catalogue_key_use(r->srv->cat, r->signer->row.name, (int64_t)time(NULL) / 86400, 0, took);
+  }
+  if (fine && stored == STORE_OK) {
+    char fields[REQUEST_FIELDS + 160];
+    request_fields(r, fields);
+    size_t n = strlen(fields);
+    snprintf(fields + n, sizeof fields - n, ",\"id\":\"%s\",\"bytes\":%zu,\"ms\":%lld", r->id, out.size,
+             (long long)took);
+    log_write(LOG_INFO, fields, "profile %s made", orb_profile_name((orb_profile)r->profile));
+    __atomic_add_fetch(&r->srv->profiles_made, 1, __ATOMIC_RELAXED);
+  } else if (fine) {
+    reply_store(r, stored);
+  } else {
+    reply_problem(r, &problem);
+  }
+  orb_buffer_free(ctx, &out);
+  orb_context_destroy(ctx);
+  return fine && stored == STORE_OK;
+}
+
+/* Takes the flight of this profile, or waits for the thread that has it. 0: another thread owns the request now. */
+static int take_flight(request *r, flight *mine) {
+  pthread_mutex_lock(&flights.lock);
+  flight *at = flights.first;
+  while (at && (at->profile != r->profile || strcmp(at->id, r->id) != 0)) {
+    at = at->next;
+  }
+  if (at) {
+    r->next_waiting = at->waiting;
+    at->waiting = r;
+    request_handed_over();
+  } else {
+    *mine = (flight){.next = flights.first, .profile = r->profile};
+    memcpy(mine->id, r->id, sizeof mine->id);
+    flights.first = mine;
+  }
+  pthread_mutex_unlock(&flights.lock);
+  return at == NULL;
+}
+
+/* Ends the flight. The requests that waited look again: they find the profile, or one of them tries next. */
+static void land(request *r, flight *mine) {
+  pthread_mutex_lock(&flights.lock);
+  flight **at = &flights.first;
+  while (*at != mine) {
+    at = &(*at)->next;
+  }
+  *at = mine->next;
+  pthread_mutex_unlock(&flights.lock);
+  for (request *next, *w = mine->waiting; w; w = next) {
+    next = w->next_waiting;
+    tasks_add(r->srv->checks, &w->away_task);
+  }
+}
+
+/* Sends the profile if it is stored. 1 with a response, also if there is no supermesh; 0: it has to be made. */
+static int send_if_stored(request *r) {
+  store_result result;
+  const cached *entry = read_again(r, &result);
+  if (!entry) {
+    reply_store(r, result);
+    return 1;
+  }
+  r->phase = PHASE_AWAY; /* also after a first answer that the object is lost */
+  return reply_stored_asset(r, entry) && r->status != 404;
+}
+
+/* Makes the profile of the supermesh r->id unless it exists, and sends it. Blocks. */
+static void profile_away(request *r) {
+  flight mine;
+  if (send_if_stored(r) || !take_flight(r, &mine)) {
+    return;
+  }
+  if (!send_if_stored(r) && make(r) && !send_if_stored(r)) {
+    reply_lost(r);
+  }
+  land(r, &mine);
+}
+
+int reply_asset(request *r, const cached *entry) {
+  int in_task = r->phase == PHASE_AWAY;
+  int done = reply_stored_asset(r, entry);
+  if (r->profile == ORB_PROFILE_FLOAT || (done && r->status != 404)) {
+    return done;
+  }
+  if (in_task) { /* not made, or lost */
+    r->status = 0;
+    request_go_on(r, r->srv->checks, profile_away);
+  }
+  return in_task;
+}
