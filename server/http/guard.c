@@ -46,7 +46,7 @@ static int check_length(request *r, const seen *s, api_problem *problem) {
   if (!s->lengths && !s->encodings) {
     return api_refuse(problem, "length-required", "Send a Content-Length, or use chunked Transfer-Encoding.");
   }
-  int64_t most = kind == ROUTE_JSON_BODY ? options->max_json : options->max_body;
+  int64_t most = kind == ROUTE_JSON_BODY || is_fetch(r) ? options->max_json : options->max_body;
   if (length > most) {
     api_refuse(problem, "too-large", "The body has %lld bytes; the limit of this route is %lld.", (long long)length,
                (long long)most);

@@ -137,13 +137,16 @@ const char *job_charged(const job *j) {
 const char *job_owner(const job *j) {
   return j->row.owner;
 }
+const char *job_result(const job *j) {
+  return j->row.result[0] ? j->row.result : j->row.key;
+}
 const char *job_request(const job *j) {
   return j->row.request;
 }
 
 void job_view(const job *j, api_job_view *view) {
   *view = (api_job_view){.id = j->row.id,
-                         .key = j->row.key,
+                         .result = j->row.result[0] ? j->row.result : j->row.key,
                          .stage = j->stage,
                          .problem = j->row.problem,
                          .kind = j->row.kind,

@@ -125,11 +125,15 @@ static told work(stored *s, int64_t number) {
   memcpy(token.hash, &number, sizeof number);
   t.object = objects_put(s->store, OBJECT_MESH, mesh.id, "hello", 5);
   t.mesh = catalogue_put_for(s->cat, &mesh, "me", 1000000000, &fresh);
-  t.job = catalogue_job_insert(s->cat, &job);
+  t.job = catalogue_job_insert(s->cat, &job, NULL);
   t.claim = catalogue_job_claim(s->cat, job.id, 1, 0, 10);
   catalogue_event(s->cat, job.id, 3, "progress", "{}");
-  t.finish =
-      catalogue_job_finish(s->cat, job.id, 1, API_JOB_SUCCEEDED, NULL, 20, &result, 4, "{\"state\":\"succeeded\"}");
+  t.finish = catalogue_job_finish(s->cat, job.id, 1,
+                                  &(job_end){.state = API_JOB_SUCCEEDED,
+                                             .result = &result,
+                                             .now = 20,
+                                             .event = 4,
+                                             .event_json = "{\"state\":\"succeeded\"}"});
   t.token = catalogue_token_add(s->cat, &token);
   read_lists(s, &t);
   t.gone = catalogue_disown(s->cat, RESOURCE_EMBEDDING, result.id, "me", &gone);
@@ -168,9 +172,9 @@ static int one_work(void *user, torture_kind kind, long number, int for_ever) {
 static int one_start(void *user, torture_kind kind, long number, int for_ever) {
   stored *s = user;
   job_row ran = new_job(++s->number), waits = new_job(++s->number), rows[8];
-  assert_int_equal(catalogue_job_insert(s->cat, &ran), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &ran, NULL), STORE_OK);
   assert_int_equal(catalogue_job_claim(s->cat, ran.id, 1, 1, 10), STORE_OK);
-  assert_int_equal(catalogue_job_insert(s->cat, &waits), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &waits, NULL), STORE_OK);
   catalogue_close(s->cat);
   s->cat = NULL;
   torture_arm(kind, number, for_ever);
@@ -193,7 +197,10 @@ static int one_start(void *user, torture_kind kind, long number, int for_ever) {
   assert_string_equal(got.problem, "{\"why\":1}");
   job_row_free(&got);
   assert_int_equal(catalogue_job_claim(s->cat, waits.id, 1, 0, 10), STORE_OK);
-  assert_int_equal(catalogue_job_finish(s->cat, waits.id, 1, API_JOB_CANCELLED, NULL, 20, NULL, 4, "{}"), STORE_OK);
+  assert_int_equal(
+      catalogue_job_finish(s->cat, waits.id, 1,
+                           &(job_end){.state = API_JOB_CANCELLED, .now = 20, .event = 4, .event_json = "{}"}),
+      STORE_OK);
   return met;
 }
 
