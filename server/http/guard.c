@@ -36,6 +36,13 @@ static int bad(api_problem *problem, const char *why) {
   return api_refuse(problem, "bad-request", "%s", why);
 }
 
+int is_fetch(const request *r) {
+  static const char json[] = "application/json";
+  const char *type = r->route->id == ROUTE_MESH_UPLOAD ? header_of(r, "Content-Type") : NULL;
+  size_t length = type ? strcspn(type, "; \t") : 0;
+  return length == sizeof json - 1 && strncasecmp(type, json, length) == 0;
+}
+
 static int check_length(request *r, const seen *s, api_problem *problem) {
   const config *options = r->srv->options;
   route_body kind = r->route ? r->route->body : ROUTE_NO_BODY;

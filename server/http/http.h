@@ -7,6 +7,7 @@
  *                tenant; foreign pages (hosts.c: names in Host and Origin); query; body
  *   request.c    how a handler leaves the HTTP thread
  *   meshes.c     POST /v1/meshes          create.c      POST /v1/embeddings, POST /v1/supermeshes
+ *   fetch.c      POST /v1/meshes with a URL
  *   deliveries.c GET and retry of the deliveries of a job's webhooks
  *   landmarks.c  POST /v1/landmarks
  *   morph.c      GET /v1/morph.glb        sign.c, signers.c   signed URLs
@@ -147,6 +148,7 @@ enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r))
 /* guard.c: 1, or 0 with the problem. */
 int guard_headers(request *r, const char *version, api_problem *problem);
 const char *header_of(const request *r, const char *name);
+int is_fetch(const request *r); /* POST /v1/meshes with a URL in JSON instead of a file */
 /* All lines of a header that is a list (RFC 9110 section 5.3), at most HEADER_LINES; returns their number. */
 enum { HEADER_LINES = 16 };
 int header_lines(const request *r, const char *name, const char *out[HEADER_LINES]);
@@ -216,9 +218,9 @@ int is_page(const char *path);
 void handle_page(request *r, const char *path);
 
 /* Handlers. server.c calls them when the whole body has arrived; the two of an upload run while it arrives. */
-int is_fetch(const request *r); /* POST /v1/meshes with a URL in JSON instead of a file */
 void handle_mesh_begin(request *r);
 void handle_mesh_bytes(request *r, const char *bytes, size_t size);
+enum MHD_Result handle_mesh_file(request *r); /* when all of it has arrived */
 #define DECLARE(id, method, path, body, scope, query, handler) enum MHD_Result handler(request *r);
 API_ROUTES(DECLARE)
 #undef DECLARE

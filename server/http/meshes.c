@@ -1,12 +1,7 @@
 /* POST /v1/meshes. The body streams into a temporary file and a hash. Then a thread for checks reads the mesh, repairs
- * it, checks its topology and stores it (intake.h). A body of the type application/json names a URL instead: a job
- * downloads it (worker/run_fetch.c). */
+ * it, checks its topology and stores it (intake.h). fetch.c has the form with a URL. */
 #include <stdlib.h>
-#include <string.h>
-#include <strings.h>
 
-#include "api/fetch_codec.h"
-#include "http/body.h"
 #include "http/http.h"
 #include "intake.h"
 
@@ -14,13 +9,6 @@ enum { LARGE_UPLOAD = 16 << 20, LOOK_BYTES = 1 << 20 };
 
 static void refuse_full(request *r) {
   reply_refuse(r, "storage-full", "The server's disk has no room for this file. Free some space and try again.");
-}
-
-int is_fetch(const request *r) {
-  static const char json[] = "application/json";
-  const char *type = r->route->id == ROUTE_MESH_UPLOAD ? header_of(r, "Content-Type") : NULL;
-  size_t length = type ? strcspn(type, "; \t") : 0;
-  return length == sizeof json - 1 && strncasecmp(type, json, length) == 0;
 }
 
 void handle_mesh_begin(request *r) {
@@ -140,64 +128,6 @@ static void upload_away(request *r) {
   intake_close(&file);
 }
 
-/* The URL of a request as the job keeps it. 1, or 0 with the problem. */
-static int check_url(request *r, api_fetch_request *wish, api_problem *problem) {
-  const char *why;
-  net_url url;
-  net_verdict verdict = net_url_read(wish->url, &r->srv->fetch_allowed, &url, &why);
-  if (verdict != NET_URL_FINE) {
-    api_refuse(problem, verdict == NET_URL_FORBIDDEN ? "forbidden-address" : "invalid-request", "\"url\": %s", why);
-    api_json_member_string(&problem->facts, "url", wish->url);
-    return 0;
-  }
-  strcpy(wish->url, url.text);
-  return 1;
-}
-
-/* The name, format and repair of a download are members of its body. */
-static int check_query(request *r, api_problem *problem) {
-  static const char *const members[] = {"name", "format", "repair"};
-  for (int i = 0; i < 3; i++) {
-    if (query_has(r, members[i])) {
-      api_refuse(problem, "bad-query", "With \"url\", \"%s\" is a member of the body. Move it there.", members[i]);
-      api_json_member_string(&problem->facts, "parameter", members[i]);
-      return 0;
-    }
-  }
-  return 1;
-}
-
-static void fetch_away(request *r) {
-  api_fetch_request wish;
-  wanted_result wanted = {.kind = RESOURCE_MESH};
-  api_problem problem = {0};
-  cJSON *body = check_query(r, &problem) ? read_json(r, &problem) : NULL;
-  int fine = body && read_webhook(r, body, &wanted, &problem) && api_fetch_request_read(body, &wish, &problem) &&
-             check_url(r, &wish, &problem);
-  cJSON_Delete(body);
-  if (fine) {
-    wish.quota = r->caller ? __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED) : 0;
-    api_fetch_request_write(&wish, &wanted.canonical);
-    fine = (api_fetch_request_key(&wish, wanted.id) && !wanted.canonical.failed) ||
-           api_refuse(&problem, "no-memory", "The server has no memory left; try again later.");
-  }
-  if (fine && access_has_room(r, 1, &problem)) {
-    submit_wanted(r, &wanted);
-  } else {
-    reply_problem(r, &problem);
-  }
-  api_text_free(&wanted.canonical);
-}
-
-enum MHD_Result handle_mesh_upload(request *r) {
-  if (!is_fetch(r)) {
-    return request_go_away(r, r->received > LARGE_UPLOAD ? r->srv->large_checks : r->srv->checks, upload_away);
-  }
-  int64_t wait = read_wait_ms(r);
-  if (wait < 0) {
-    return MHD_YES;
-  }
-  r->wait_until = wait ? orb_clock_ms() + wait : 0;
-  r->waits_for_what = WAIT_RESULT;
-  return request_go_away(r, r->srv->io, fetch_away);
+enum MHD_Result handle_mesh_file(request *r) {
+  return request_go_away(r, r->received > LARGE_UPLOAD ? r->srv->large_checks : r->srv->checks, upload_away);
 }

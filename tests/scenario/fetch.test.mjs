@@ -87,9 +87,13 @@ test('addresses that are not public are refused, also after a redirect', async (
   const secret = await origin(t);
   const port = secret.url.split(':').pop();
   const d = await daemon(t, { args: allow });
-  const away = await origin(t, (request, response) => {
-    response.writeHead(307, { location: decodeURIComponent(request.url.slice(1)) }).end();
-  }, listed);
+  const away = await origin(
+    t,
+    (request, response) => {
+      response.writeHead(307, { location: decodeURIComponent(request.url.slice(1)) }).end();
+    },
+    listed,
+  );
   for (const url of [
     secret.url,
     `http://localhost:${port}/`,
@@ -135,7 +139,15 @@ test('a tenant owns what it has fetched, within its quota', async (t) => {
   const d = await daemon(t, { args: [...allow, '--auth', 'on'] });
   const { url } = await serve(t);
   const token = async (...words) => {
-    const ran = await runProgram(binaries.daemon, ['token', 'add', ...words, '--scope', 'read,write', '--data', d.data]);
+    const ran = await runProgram(binaries.daemon, [
+      'token',
+      'add',
+      ...words,
+      '--scope',
+      'read,write',
+      '--data',
+      d.data,
+    ]);
     assert.equal(ran.code, 0, ran.err);
     return { authorization: `Bearer ${ran.out.trim()}` };
   };

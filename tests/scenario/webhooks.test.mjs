@@ -38,7 +38,8 @@ const deliveries = async (d, job, options) => {
 };
 /** The message of a request, with its signature verified. */
 const verified = (secret, { body, headers }) => new Webhook(secret).verify(body, headers);
-const endings = (d, job) => until(async () => (await deliveries(d, job)).every((x) => x.state !== 'pending'), 'the ends');
+const endings = (d, job) =>
+  until(async () => (await deliveries(d, job)).every((x) => x.state !== 'pending'), 'the ends');
 
 test('the end of a job is announced to the webhook that the request names', async (t) => {
   const d = await daemon(t, { args: allow });
@@ -230,8 +231,7 @@ test('a receiver that fails is asked again and delays no other', async (t) => {
   await until(() => ill.requests.length >= 3, 'three attempts');
   const waits = [1, 2].map((i) => ill.requests[i].at - ill.requests[i - 1].at);
   assert.ok(waits[0] >= 900 && waits[1] >= 1800, `${waits} ms`);
-  for (const { headers } of ill.requests)
-    assert.equal(headers['webhook-id'], ill.requests[0].headers['webhook-id']);
+  for (const { headers } of ill.requests) assert.equal(headers['webhook-id'], ill.requests[0].headers['webhook-id']);
   const state = Object.fromEntries((await deliveries(d, job)).map((x) => [x.webhook, x]));
   assert.equal(state.fine.state, 'delivered');
   assert.equal(state.gone.state, 'failed', '410 is final');
@@ -298,8 +298,7 @@ test(`${kills} kills -9 lose no message`, async (t) => {
   t.diagnostic(`${kills} kills, ${accepted.size} accepted jobs, all announced; ${repeated} messages repeated`);
   await until(async () => {
     const { json } = await d.get('/v1/jobs', { query: { limit: 1000 } });
-    for (const job of json.jobs)
-      if ((await deliveries(d, job)).some((x) => x.state === 'pending')) return false;
+    for (const job of json.jobs) if ((await deliveries(d, job)).some((x) => x.state === 'pending')) return false;
     return true;
   }, 'nothing is pending');
 });
