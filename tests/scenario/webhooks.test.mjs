@@ -1,10 +1,13 @@
 // Webhooks by Standard Webhooks: what a receiver gets, its signatures by the package standardwebhooks, retries, and that
 // kill -9 loses no message. ORB_HOOK_KILLS is the number of kills.
 import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import path from 'node:path';
 import test from 'node:test';
 import { Webhook } from 'standardwebhooks';
+import { verifyWebhook } from '../../client/js/src/index.js';
 import { runProgram } from './support/cli.mjs';
-import { assertProblem, binaries, daemon, endless, slow, until } from './support/daemon.mjs';
+import { assertProblem, binaries, daemon, endless, root, slow, until } from './support/daemon.mjs';
 import { origin } from './support/origin.mjs';
 import * as shapes from './support/shapes.mjs';
 
@@ -251,6 +254,47 @@ test('a receiver that fails is asked again and delays no other', async (t) => {
   const removed = (await deliveries(d, job)).find((x) => x.webhook === 'silent');
   assert.equal(removed.state, 'failed');
   assert.match(removed.error, /removed/);
+});
+
+test('what the documents say verifies messages, in JavaScript and Python', async () => {
+  const secret = 'whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw';
+  const old = 'whsec_C2FVsBQIhrscChlQIMV+b5sSYspob7oD';
+  const now = new Date();
+  const body = '{"type":"job.succeeded","data":{"name":"Bär"}}';
+  const sign = (key, at = now) => new Webhook(key).sign('msg_a_1', at, body);
+  const headers = (signature, at = now) => ({
+    'webhook-id': 'msg_a_1',
+    'webhook-timestamp': `${Math.floor(at / 1000)}`,
+    'webhook-signature': signature,
+  });
+  const both = headers(`${sign(secret)} ${sign(old)}`);
+  for (const key of [secret, old]) {
+    assert.equal((await verifyWebhook(body, both, key)).data.name, 'Bär');
+    assert.equal((await verifyWebhook(Buffer.from(body), new Headers(both), key)).type, 'job.succeeded');
+  }
+  const before = new Date(now - 400_000);
+  for (const wrong of [
+    [`${body} `, both, secret],
+    [body, headers(sign(secret)), old],
+    [body, headers(sign(secret).replace('v1,', 'v2,')), secret],
+    [body, { ...both, 'webhook-id': 'msg_a_2' }, secret],
+    [body, { ...both, 'webhook-timestamp': `${Math.floor(now / 1000) - 1}` }, secret],
+    [body, headers(sign(secret, before), before), secret],
+    [body, {}, secret],
+    [body, both, 'secret'],
+  ])
+    await assert.rejects(verifyWebhook(...wrong), JSON.stringify(wrong));
+  const page = await readFile(path.join(root, 'docs/webhooks.md'), 'utf8');
+  const [, lines] = /```python\n([\s\S]*?)```/.exec(page);
+  for (const [key, genuine] of [
+    [secret, 'True'],
+    [old, 'True'],
+    ['whsec_AAAA', 'False'],
+  ]) {
+    const given = `headers = ${JSON.stringify(both)}\nbody = ${JSON.stringify(body)}.encode()\nsecret = "${key}"\n`;
+    const ran = await runProgram('python3', ['-c', `${given}${lines}print(genuine)`]);
+    assert.equal(ran.out.trim(), genuine, ran.err);
+  }
 });
 
 test(`${kills} kills -9 lose no message`, async (t) => {
