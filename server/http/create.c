@@ -59,17 +59,24 @@ int wanted_supermesh(request *r, const cJSON *body, wanted_result *out, api_prob
   return fine;
 }
 
-int read_webhook(request *r, cJSON *body, wanted_result *out, api_problem *problem) {
+int check_url(const char *where, const char *url, const networks *allowed, net_url *out, api_problem *problem) {
   const char *why;
+  net_verdict verdict = net_url_read(url, allowed, out, &why);
+  if (verdict == NET_URL_FORBIDDEN) {
+    api_refuse(problem, "forbidden-address", "%s: %s", where, why);
+    api_json_member_string(&problem->facts, "url", url);
+  } else if (verdict != NET_URL_FINE) {
+    api_refuse(problem, "invalid-request", "%s: %s", where, why);
+  }
+  return verdict == NET_URL_FINE;
+}
+
+int read_webhook(request *r, cJSON *body, wanted_result *out, api_problem *problem) {
   api_webhook hook;
   if (!api_webhook_take(body, &hook, problem) || !hook.url[0]) {
     return !problem->name;
   }
-  net_verdict verdict = net_url_read(hook.url, &r->srv->webhook_allowed, &out->webhook, &why);
-  if (verdict != NET_URL_FINE) {
-    api_refuse(problem, verdict == NET_URL_FORBIDDEN ? "forbidden-address" : "invalid-request",
-               "\"url\" of \"webhook\": %s", why);
-    api_json_member_string(&problem->facts, "url", hook.url);
+  if (!check_url("\"url\" of \"webhook\"", hook.url, &r->srv->webhook_allowed, &out->webhook, problem)) {
     return 0;
   }
   out->events = hook.events;

@@ -5,20 +5,6 @@
 #include "http/body.h"
 #include "http/http.h"
 
-/* The URL of a request as the job keeps it. 1, or 0 with the problem. */
-static int check_url(request *r, api_fetch_request *wish, api_problem *problem) {
-  const char *why;
-  net_url url;
-  net_verdict verdict = net_url_read(wish->url, &r->srv->fetch_allowed, &url, &why);
-  if (verdict != NET_URL_FINE) {
-    api_refuse(problem, verdict == NET_URL_FORBIDDEN ? "forbidden-address" : "invalid-request", "\"url\": %s", why);
-    api_json_member_string(&problem->facts, "url", wish->url);
-    return 0;
-  }
-  strcpy(wish->url, url.text);
-  return 1;
-}
-
 /* The name, format and repair of a download are members of its body. */
 static int check_query(request *r, api_problem *problem) {
   static const char *const members[] = {"name", "format", "repair"};
@@ -36,11 +22,13 @@ static void fetch_away(request *r) {
   api_fetch_request wish;
   wanted_result wanted = {.kind = RESOURCE_MESH};
   api_problem problem = {0};
+  net_url url;
   cJSON *body = check_query(r, &problem) ? read_json(r, &problem) : NULL;
   int fine = body && read_webhook(r, body, &wanted, &problem) && api_fetch_request_read(body, &wish, &problem) &&
-             check_url(r, &wish, &problem);
+             check_url("\"url\"", wish.url, &r->srv->fetch_allowed, &url, &problem);
   cJSON_Delete(body);
   if (fine) {
+    strcpy(wish.url, url.text);
     wish.quota = r->caller ? __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED) : 0;
     api_fetch_request_write(&wish, &wanted.canonical);
     fine = (api_fetch_request_key(&wish, wanted.id) && !wanted.canonical.failed) ||

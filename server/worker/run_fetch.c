@@ -4,6 +4,7 @@
  * suspect. If the process dies between the commit of the mesh and the end of the job, the job runs again and finds the
  * mesh.
  */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -45,25 +46,36 @@ static int continues(void *user) {
   return orb_context_check(((download *)user)->ctx) == ORB_OK;
 }
 
-static int refuse(const download *d, const api_fetch_request *wish, const net_answer *answer, api_problem *problem) {
-  if (d->stored != STORE_OK) {
-    run_problem_of_store(d->stored, problem);
-  } else if (answer->end == NET_STOPPED) {
-    return 0; /* cancelled: the context has the error */
-  } else if (answer->end == NET_FORBIDDEN) {
-    api_refuse(problem, "forbidden-address", "The file was not fetched: %s.", answer->why);
-  } else if (answer->end == NET_TOO_LARGE) {
-    api_refuse(problem, "too-large", "The file has more than %lld bytes, the limit of an upload.",
-               (long long)d->options->most);
-    api_json_member_integer(&problem->facts, "limit", d->options->most);
-  } else if (answer->end != NET_ANSWERED) {
-    api_refuse(problem, "fetch-failed", "The file could not be fetched: %s.", answer->why);
-  } else {
-    api_refuse(problem, "fetch-failed", "The file could not be fetched: its server answered %d.", answer->status);
-    api_json_member_integer(&problem->facts, "answer", answer->status);
-  }
+static int refuse_url(const api_fetch_request *wish, const char *name, const char *why, api_problem *problem) {
+  api_refuse(problem, name, "The file was not fetched: %s.", why);
   api_json_member_string(&problem->facts, "url", wish->url);
   return 0;
+}
+
+static int refuse(const download *d, const api_fetch_request *wish, const net_answer *answer, api_problem *problem) {
+  char why[64];
+  if (d->stored != STORE_OK) {
+    run_problem_of_store(d->stored, problem);
+    return 0;
+  }
+  switch (answer->end) {
+    case NET_STOPPED: /* cancelled: the context has the error */
+      return 0;
+    case NET_FORBIDDEN:
+      return refuse_url(wish, "forbidden-address", answer->why, problem);
+    case NET_TOO_LARGE:
+      api_refuse(problem, "too-large", "The file has more than %lld bytes, the limit of an upload.",
+                 (long long)d->options->most);
+      api_json_member_integer(&problem->facts, "limit", d->options->most);
+      return 0;
+    case NET_ANSWERED:
+      snprintf(why, sizeof why, "its server answered %d", answer->status);
+      refuse_url(wish, "fetch-failed", why, problem);
+      api_json_member_integer(&problem->facts, "answer", answer->status);
+      return 0;
+    default:
+      return refuse_url(wish, "fetch-failed", answer->why, problem);
+  }
 }
 
 static int get(download *d, const api_fetch_request *wish, api_problem *problem) {
@@ -72,7 +84,8 @@ static int get(download *d, const api_fetch_request *wish, api_problem *problem)
   net_answer answer = {0};
   net_verdict verdict = net_url_read(wish->url, &d->options->allowed, &url, &why);
   if (verdict != NET_URL_FINE) { /* the configuration has changed since the request */
-    return api_refuse(problem, verdict == NET_URL_FORBIDDEN ? "forbidden-address" : "fetch-failed", "%s", why);
+    return refuse_url(wish, verdict == NET_URL_FORBIDDEN ? "forbidden-address" : "fetch-failed",
+                      "its URL is refused now", problem);
   }
   d->stored = objects_begin(d->env->store, &d->temp);
   if (d->stored != STORE_OK) {
