@@ -6,7 +6,7 @@ import path from 'node:path';
 import test from 'node:test';
 import { Webhook } from 'standardwebhooks';
 import { verifyWebhook } from '../../client/js/src/index.js';
-import { runProgram } from './support/cli.mjs';
+import { folder, runProgram } from './support/cli.mjs';
 import { assertProblem, binaries, daemon, endless, root, slow, until } from './support/daemon.mjs';
 import { origin } from './support/origin.mjs';
 import * as shapes from './support/shapes.mjs';
@@ -217,6 +217,30 @@ test('webhooks of a tenant: added, rotated with overlap, removed, in a running d
   const { job } = await run(ann);
   await until(async () => (await d.get(job.url, ann)).json.state === 'succeeded', 'the job');
   assert.deepEqual(await deliveries(d, job, ann), []);
+});
+
+test('https trusts the authorities of tls-authorities, and no others', async (t) => {
+  const at = await folder(t);
+  const [key, cert] = ['key.pem', 'cert.pem'].map((name) => path.join(at, name));
+  const subject = ['-subj', '/CN=localhost', '-addext', 'subjectAltName=IP:127.0.0.1'];
+  const kind = ['-newkey', 'ec', '-pkeyopt', 'ec_paramgen_curve:prime256v1', '-nodes', '-days', '2'];
+  const made = ['req', '-x509', ...kind, ...subject, '-keyout', key, '-out', cert];
+  assert.equal((await runProgram('openssl', made)).code, 0);
+  const tls = { key: await readFile(key), cert: await readFile(cert) };
+  const { url, requests } = await origin(t, undefined, '127.0.0.1', tls);
+  for (const trusted of [false, true]) {
+    const d = await daemon(t, { args: [...allow, ...(trusted ? ['--tls-authorities', cert] : [])] });
+    const body = { mesh: await mesh(d), webhook: { url } };
+    const job = await d.ended((await embed(d, body)).json);
+    const [end] = await until(async () => {
+      const list = await deliveries(d, job);
+      return list[0].attempts > 0 && list;
+    }, 'an attempt');
+    assert.equal(end.state, trusted ? 'delivered' : 'pending');
+    if (!trusted) assert.match(end.error, /certificate/i);
+    assert.equal(requests.length, trusted ? 1 : 0);
+    await d.stop();
+  }
 });
 
 test('a receiver that fails is asked again and delays no other', async (t) => {
