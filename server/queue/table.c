@@ -193,9 +193,10 @@ void queue_count(queue *q, queue_numbers *out) {
   pthread_mutex_lock(&q->lock);
   int64_t now = unix_ms();
   for (job *j = q->first; j; j = j->next) {
-    int queued = !j->running && j->waits_for == 0;
+    int runs = j->running || (j->taken && j->row.kind == API_JOB_FETCH); /* a download comes before the claim */
+    int queued = !runs && j->waits_for == 0;
     out->queued += queued;
-    if (j->running) {
+    if (runs) {
       count_stage(out, j->stage[0] ? j->stage : "start");
     }
     out->waiting += j->waits_for > 0;

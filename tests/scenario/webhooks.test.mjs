@@ -324,18 +324,19 @@ test('what the documents say verifies messages, in JavaScript and Python', async
 test(`${kills} kills -9 lose no message`, async (t) => {
   let count = 0;
   const got = new Map(); // job → messages
+  let secret;
   const receiver = await origin(t, (request, response, body) => {
     const behaviour = count++ % 8;
     if (behaviour === 0) response.writeHead(503).end();
     else if (behaviour === 1) request.socket.destroy();
     else {
-      const message = JSON.parse(body);
+      const message = verified(secret, { body, headers: request.headers }); // now: later it is too old
       got.set(message.data.id, [...(got.get(message.data.id) ?? []), { body, headers: request.headers }]);
       setTimeout(() => response.writeHead(204).end(), behaviour === 2 ? 30 : 0);
     }
   });
   const d = await daemon(t, { args: [...allow, '--workers', '2'] });
-  const secret = await add(d, 'hook', '--url', `${receiver.url}/tenant`);
+  secret = await add(d, 'hook', '--url', `${receiver.url}/tenant`);
   const accepted = new Set();
   d.killed = true;
   for (let kill = 0; kill < kills; kill++) {
@@ -360,7 +361,6 @@ test(`${kills} kills -9 lose no message`, async (t) => {
   for (const [id, messages] of got) {
     assert.equal(new Set(messages.map((m) => m.headers['webhook-id'])).size, 1, `${id}: one id`);
     assert.equal(new Set(messages.map((m) => m.body)).size, 1, `${id}: one body`);
-    for (const message of messages) assert.equal(verified(secret, message).data.id, id);
     repeated += messages.length - 1;
   }
   t.diagnostic(`${kills} kills, ${accepted.size} accepted jobs, all announced; ${repeated} messages repeated`);
