@@ -9,6 +9,7 @@
 #include "store/keys.h"
 
 enum { DAY_S = 86400 };
+
 /* Appends an origin as browsers send it: http or https, a host, optionally a port. */
 static int read_origin(const char *value, char word[ADMIN_WORD]) {
   size_t used = strlen(word), size = strlen(value);

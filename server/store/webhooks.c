@@ -1,6 +1,5 @@
 #include "store/webhooks.h"
 
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
@@ -140,7 +139,8 @@ store_result catalogue_webhook_secret(catalogue *cat, const char *tenant, char o
   return catalogue_write(cat, own_secret, &own);
 }
 
-static void read_row(sqlite3_stmt *st, webhook_row *row) {
+static int read_row(sqlite3_stmt *st, void *to) {
+  webhook_row *row = to;
   memset(row, 0, sizeof *row);
   row_text(st, 0, row->name, sizeof row->name);
   row_text(st, 1, row->tenant, sizeof row->tenant);
@@ -148,37 +148,15 @@ static void read_row(sqlite3_stmt *st, webhook_row *row) {
   row->events = (unsigned)sqlite3_column_int(st, 3);
   row->old_until = sqlite3_column_int64(st, 4);
   row->created = sqlite3_column_int64(st, 5);
+  return 1;
 }
 
 webhook_row *catalogue_webhooks(catalogue *cat, int *count) {
-  size_t room = 16, found = 0;
-  webhook_row *rows = calloc(room, sizeof *rows);
+  static const row_kind kind = {.read = read_row, .size = sizeof(webhook_row)};
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = rows ? database_statement(db,
-                                               "SELECT name, tenant, url, events, old_until, created FROM webhook"
-                                               " WHERE url<>'' ORDER BY name")
-                          : NULL;
-  int code = SQLITE_ERROR;
-  while (st && (code = sqlite3_step(st)) == SQLITE_ROW) {
-    if (found == room) {
-      webhook_row *more = found < INT32_MAX / 2 ? reallocarray(rows, 2 * room, sizeof *rows) : NULL;
-      if (!more) {
-        break;
-      }
-      rows = more;
-      room *= 2;
-    }
-    read_row(st, &rows[found++]);
-  }
-  if (st) {
-    sqlite3_reset(st);
-  }
-  catalogue_reader_done(cat, db);
-  *count = (int)found;
-  if (code != SQLITE_DONE) {
-    free(rows);
-    *count = -1;
-    return NULL;
-  }
-  return rows;
+  return rows_all(cat, db,
+                  database_statement(db,
+                                     "SELECT name, tenant, url, events, old_until, created FROM webhook"
+                                     " WHERE url<>'' ORDER BY name"),
+                  &kind, count);
 }
