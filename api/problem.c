@@ -21,7 +21,7 @@ static const struct entry {
     {"expired-signature", 403, "The signature has expired"},
     {"foreign-host", 403, "The request came under a foreign name"},
     {"foreign-origin", 403, "The request came from a foreign page"},
-    {"forbidden-address", 403, "The service does not go to this address"},
+    {"forbidden-address", 403, "The service does not connect to this address"},
     {"not-found", 404, "Not found"},
     {"method-not-allowed", 405, "Method not allowed"},
     {"in-use", 409, "Unfinished jobs use this mesh"},

@@ -247,7 +247,7 @@ typedef struct wanted_result {
   net_url webhook; /* text "": none */
   unsigned events; /* that the webhook receives, see api/webhook_codec.h */
 } wanted_result;
-/* Whether the service goes to a URL of the request: 1, or 0 with the problem. where: names the member. */
+/* Whether the service may connect to a URL of the request: 1, or 0 with the problem. where: names the member. */
 int check_url(const char *where, const char *url, const networks *allowed, net_url *out, api_problem *problem);
 /* Takes the member "webhook" out of the body: 1, or 0 with the problem. */
 int read_webhook(request *r, cJSON *body, wanted_result *out, api_problem *problem);

@@ -1,8 +1,8 @@
 /* An HTTP client for URLs that callers name, on libcurl.
  *
- * It decides about each address at the moment of the connection: libcurl asks it for the socket and connects that
- * socket to the address that was checked. So neither a name that resolves to something else the second time (DNS
- * rebinding) nor a redirect leads to another address. Time and size are bounded. It uses no proxy, no cookies, no
+ * It checks each address when it connects: libcurl asks it for the socket, and connects that socket to the address
+ * that was checked. So a name that resolves to another address the second time (DNS rebinding) or a redirect does not
+ * get past the check. Time and size are bounded. It uses no proxy, no cookies, no
  * stored credentials, no connection of an earlier request, and follows no redirect by itself.
  */
 #ifndef ORB_NET_CLIENT_H
@@ -16,7 +16,7 @@
 
 typedef struct net_request {
   const net_url *url;
-  const networks *allowed;    /* besides public addresses; http:// leads only to these */
+  const networks *allowed;    /* besides public addresses; the only ones for http:// */
   const char *authorities;    /* PEM file of certificate authorities; "": those of the system */
   const char *const *headers; /* "Name: value", NULL-terminated; NULL: none */
   const char *body;           /* of a POST; NULL: GET */
@@ -31,7 +31,7 @@ typedef struct net_request {
 
 typedef enum net_end {
   NET_ANSWERED,  /* with any status */
-  NET_FORBIDDEN, /* the host has no address that the daemon goes to */
+  NET_FORBIDDEN, /* the host has no address that the daemon connects to */
   NET_TOO_LARGE,
   NET_TIMED_OUT,
   NET_STOPPED, /* by take() or continues() */

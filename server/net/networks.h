@@ -1,8 +1,9 @@
 /* Which addresses the daemon may connect to when a caller names the URL.
  *
- * A caller must not reach what only the daemon's host can reach (server-side request forgery): loopback, private
- * networks, cloud metadata. So a connection goes to public addresses only, and to the networks that the operator lists.
- * Sources: the IANA special-purpose address registries (RFC 6890) and the cloud providers' metadata addresses.
+ * A caller must not reach, through the daemon, what only its host can reach (server-side request forgery): loopback,
+ * private networks, cloud metadata. So the daemon connects to public addresses only, and to the networks that the
+ * operator lists. Sources: the IANA special-purpose address registries (RFC 6890) and the cloud providers' metadata
+ * addresses.
  */
 #ifndef ORB_NET_NETWORKS_H
 #define ORB_NET_NETWORKS_H

@@ -8,9 +8,8 @@
 #include <strings.h>
 
 static const char plain_only[] =
-    "http:// leads only to addresses that the operator has listed; use https://, or ask the operator.";
-static const char not_public[] =
-    "The host is not a public address. The operator may list further networks that the service goes to.";
+    "http:// is accepted only for addresses that the operator has listed. Use https://, or ask the operator.";
+static const char not_public[] = "The host is not a public address. The operator can allow further networks.";
 
 /* The address of a host that is one, in any form that the C library's resolver takes without a query: also decimal,
  * octal, hexadecimal and shortened IPv4. 0: the host is a name. */
@@ -64,7 +63,7 @@ static net_verdict judge(CURLU *parts, const networks *allowed, net_url *out, co
       curl_url_get(parts, CURLUPART_SCHEME, &scheme, 0) == CURLUE_OK) {
     out->plain = strcasecmp(scheme, "http") == 0;
     if (!out->plain && strcasecmp(scheme, "https") != 0) {
-      *why = "The service goes to https:// only, and to http:// where the operator allows it.";
+      *why = "The URL must begin with https://, or with http:// if the operator has listed its address.";
       verdict = NET_URL_FORBIDDEN;
     } else if (curl_url_get(parts, CURLUPART_HOST, &host, 0) == CURLUE_OK && *host &&
                curl_url_get(parts, CURLUPART_PORT, &port, CURLU_DEFAULT_PORT) == CURLUE_OK &&

@@ -632,7 +632,7 @@ export type ProblemForeignOrigin = {
 
 export type ProblemForbiddenAddress = {
   type: '/problems/forbidden-address';
-  title: 'The service does not go to this address';
+  title: 'The service does not connect to this address';
   status: 403;
   /** What is wrong and what to do. */
   detail: string;
