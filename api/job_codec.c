@@ -5,7 +5,8 @@
 static const char *const states[] = {"queued", "running", "succeeded", "failed", "cancelled"};
 
 const char *api_job_kind_name(api_job_kind kind) {
-  return kind == API_JOB_EMBEDDING ? "embedding" : "supermesh";
+  static const char *const names[API_JOB_KINDS] = {"embedding", "supermesh", "fetch"};
+  return names[kind];
 }
 const char *api_job_state_name(api_job_state state) {
   return states[state];
@@ -35,7 +36,8 @@ void api_job_write(const api_job_view *job, api_text *out) {
   api_json_member_number(out, "progress", job->progress);
   api_json_key(out, "result");
   if (job->state == API_JOB_SUCCEEDED) {
-    api_text_printf(out, "\"/v1/%s/%s\"", job->kind == API_JOB_EMBEDDING ? "embeddings" : "supermeshes", job->key);
+    static const char *const results[API_JOB_KINDS] = {"embeddings", "supermeshes", "meshes"};
+    api_text_printf(out, "\"/v1/%s/%s\"", results[job->kind], job->result);
   } else {
     api_json_null(out);
   }

@@ -4,7 +4,8 @@
 
 #include "api/text.h"
 
-typedef enum api_job_kind { API_JOB_EMBEDDING = 0, API_JOB_SUPERMESH } api_job_kind;
+/* The catalogue stores these numbers. */
+typedef enum api_job_kind { API_JOB_EMBEDDING = 0, API_JOB_SUPERMESH, API_JOB_FETCH, API_JOB_KINDS } api_job_kind;
 typedef enum api_job_state {
   API_JOB_QUEUED = 0,
   API_JOB_RUNNING,
@@ -14,7 +15,8 @@ typedef enum api_job_state {
 } api_job_state;
 
 typedef struct api_job_view {
-  const char *id, *key, *stage;
+  const char *id, *stage;
+  const char *result;  /* the id of the result, read only if the job has succeeded */
   const char *problem; /* its JSON document, or NULL */
   api_job_kind kind;
   api_job_state state;

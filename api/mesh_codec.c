@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "api/json.h"
+
 static const struct {
   const char *name;
   unsigned flag;
@@ -42,6 +44,26 @@ int api_repair_parse(const char *list, unsigned *flags, char canonical[API_REPAI
            all & ORB_REPAIR_FILL_HOLES ? ",fill_holes" : "",
            all & ORB_REPAIR_LARGEST_COMPONENT ? ",largest_component" : "");
   return 1;
+}
+
+int api_upload_read(const char *name, const char *repair, const char *format, api_upload *out, api_problem *problem) {
+  memset(out, 0, sizeof *out);
+  if (name && (!*name || strlen(name) >= sizeof out->name || !api_utf8_valid(name, strlen(name)))) {
+    return api_refuse(problem, "bad-query", "\"name\" must be UTF-8 of 1 to 127 bytes.");
+  }
+  snprintf(out->name, sizeof out->name, "%s", name ? name : "mesh");
+  for (const unsigned char *c = (const unsigned char *)out->name; *c; c++) {
+    if (*c < 0x20 || *c == 0x7f) {
+      return api_refuse(problem, "bad-query", "\"name\" must not contain control characters.");
+    }
+  }
+  if (format) {
+    out->hint = orb_format_of_name(format);
+    if (out->hint == ORB_FORMAT_AUTO) {
+      return api_refuse(problem, "bad-query", "\"format\" must be obj, off, ply, stl, gltf or glb, or be omitted.");
+    }
+  }
+  return api_repair_parse(repair ? repair : "safe", &out->flags, out->repair, problem);
 }
 
 static void write_vector(api_text *out, const char *name, const double v[3]) {

@@ -11,6 +11,15 @@
 enum { API_REPAIR_TEXT = 64 };
 int api_repair_parse(const char *list, unsigned *flags, char canonical[API_REPAIR_TEXT], api_problem *problem);
 
+/* What an upload says about its file: name, repair and format, of which each may be absent (NULL). Returns 1, or 0 with
+ * *problem filled. */
+typedef struct api_upload {
+  char name[ORB_NAME_MAX], repair[API_REPAIR_TEXT];
+  unsigned flags;
+  orb_format hint;
+} api_upload;
+int api_upload_read(const char *name, const char *repair, const char *format, api_upload *out, api_problem *problem);
+
 typedef struct api_mesh_facts {
   const char *id, *name, *format, *repair;
   int64_t bytes, created; /* ms since 1970 */

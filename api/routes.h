@@ -54,6 +54,9 @@
   ROUTE(ROUTE_JOB_CANCEL, "DELETE", "/v1/jobs/{job}", ROUTE_NO_BODY, SCOPE_WRITE, "", handle_job_cancel)              \
   ROUTE(ROUTE_JOB_EVENTS, "GET", "/v1/jobs/{job}/events", ROUTE_NO_BODY, SCOPE_READ, "last_event_id",                 \
         handle_job_events)                                                                                            \
+  ROUTE(ROUTE_DELIVERY_LIST, "GET", "/v1/jobs/{job}/deliveries", ROUTE_NO_BODY, SCOPE_READ, "", handle_delivery_list) \
+  ROUTE(ROUTE_DELIVERY_RETRY, "POST", "/v1/jobs/{job}/deliveries/{k}/retry", ROUTE_NO_BODY, SCOPE_WRITE, "",          \
+        handle_delivery_retry)                                                                                        \
   ROUTE(ROUTE_LIVEZ, "GET", "/livez", ROUTE_NO_BODY, SCOPE_NONE, "", handle_system)                                   \
   ROUTE(ROUTE_READYZ, "GET", "/readyz", ROUTE_NO_BODY, SCOPE_NONE, "verbose?", handle_system)                         \
   ROUTE(ROUTE_METRICS, "GET", "/metrics", ROUTE_NO_BODY, SCOPE_ADMIN, "", handle_system)                              \

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "log.h"
+#include "net/networks.h"
 #include "orbmorph/status.h"
 
 typedef struct entry {
@@ -67,11 +68,19 @@ static const entry table[] = {
      "ended jobs to keep in the catalogue, newest first; 0: all"},
     {"hosts", TEXT(hosts), "",
      "names besides localhost and its address that the service has where no token is needed, comma-separated, or *"},
+    {"webhook-allow", TEXT(webhook_allow), "",
+     "networks besides public addresses that webhooks may go to, such as 10.1.0.0/16, comma-separated; also by http"},
+    {"webhook-retry-seconds", NUMBER(webhook_retry_seconds, 1, 3600), "5",
+     "wait after the first failed attempt at a webhook; it doubles with each further one"},
+    {"fetch-allow", TEXT(fetch_allow), "", "likewise for meshes that are fetched from a URL"},
+    {"fetch-seconds", NUMBER(fetch_seconds, 1, 3600), "60", "time limit for fetching a mesh from a URL"},
     {"cors", TEXT(cors), "", "origins that browsers may call from, comma-separated, or *"},
     {"log-level", TEXT(log_level), "info", "debug, info, warn or error"},
     {"log-format", TEXT(log_format), "json", "json or text"},
     {"tls-certificate", TEXT(tls_certificate), "", "PEM file; with tls-key, the service speaks https"},
     {"tls-key", TEXT(tls_key), "", "PEM file"},
+    {"tls-authorities", TEXT(tls_authorities), "",
+     "PEM file of the authorities that webhooks and fetches trust; without it, those of the system"},
     {"auth", TEXT(auth), "loopback",
      "loopback: tokens are needed unless the service listens on loopback; on: always; off: never, a proxy checks"},
 };
@@ -237,6 +246,12 @@ static void print_help(void) {
       "  orbmorphd key rotate NAME [--overlap 7d]\n"
       "  orbmorphd key list | key remove NAME\n"
       "                                 manage the keys of signed URLs\n"
+      "  orbmorphd webhook add NAME --url URL [--events succeeded,failed,cancelled] [--tenant NAME]\n"
+      "  orbmorphd webhook rotate NAME [--overlap 7d]\n"
+      "  orbmorphd webhook list | webhook remove NAME\n"
+      "  orbmorphd webhook secret [--tenant NAME]\n"
+      "                                 manage the webhooks that announce the ends of jobs; secret: prints the secret\n"
+      "                                 of webhooks that requests name\n"
       "  orbmorphd --version, --help\n\n"
       "Each NAME is also an environment variable (ORBMORPH_NAME) and a line of the config file. A flag overrides the\n"
       "environment, which overrides the file, which overrides the default in brackets.\n");
@@ -362,6 +377,17 @@ static int is_mode(const char *text) {
   return fine;
 }
 
+static int are_networks(const char *name, const char *list) {
+  networks set;
+  char wrong[NETWORKS_WRONG];
+  int fine = networks_read(list, &set, wrong);
+  if (!fine) {
+    complain("%s must be networks such as 10.1.0.0/16 or fd00::/8, comma-separated, at most %d; \"%s\" is not valid",
+             name, NETWORKS_MOST, wrong);
+  }
+  return fine;
+}
+
 static int consistent(config *out) {
   static const char *const limits[] = {"remote", "all", "off", NULL}, *const auth[] = {"loopback", "on", "off", NULL},
                            *const levels[] = {"debug", "info", "warn", "error", NULL},
@@ -380,7 +406,9 @@ static int consistent(config *out) {
   return is_address(out->listen) && is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) &&
          is_one_of("auth", out->auth, auth) && is_one_of("log-level", out->log_level, levels) &&
          is_one_of("log-format", out->log_format, formats) && are_origins(out->cors) && are_hosts(out->hosts) &&
-         is_readable("tls-certificate", out->tls_certificate) && is_readable("tls-key", out->tls_key);
+         is_readable("tls-certificate", out->tls_certificate) && is_readable("tls-key", out->tls_key) &&
+         is_readable("tls-authorities", out->tls_authorities) && are_networks("webhook-allow", out->webhook_allow) &&
+         are_networks("fetch-allow", out->fetch_allow);
 }
 
 config_action config_read(config *out, int argc, char **argv) {

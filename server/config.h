@@ -13,7 +13,8 @@ typedef struct config {
   char hosts[512]; /* names in Host, comma-separated, or * */
   char cors[512];  /* origins, comma-separated, or * */
   char log_level[16], log_format[16];
-  char tls_certificate[PATH_MAX / 2], tls_key[PATH_MAX / 2];
+  char webhook_allow[1024], fetch_allow[1024]; /* networks, comma-separated */
+  char tls_certificate[PATH_MAX / 2], tls_key[PATH_MAX / 2], tls_authorities[PATH_MAX / 2];
   char auth[16];       /* loopback, on, off */
   char limits[16];     /* remote, all, off */
   char socket_mode[8]; /* octal */
@@ -21,6 +22,7 @@ typedef struct config {
   int64_t requests_per_second, header_seconds, slow_seconds, min_rate, slow_ms;
   int64_t max_body, max_json, max_ratio, decode_memory, encoded_bytes, max_triangles, queue_limit;
   int64_t job_memory, job_seconds, disk_reserve, drain_seconds, derived_bytes, keep_jobs;
+  int64_t webhook_retry_seconds, fetch_seconds;
 } config;
 
 typedef enum config_action {

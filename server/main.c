@@ -17,12 +17,13 @@
 #include "http/http.h"
 #include "log.h"
 #include "maintain.h"
+#include "net/client.h"
 #include "systemd.h"
 #include "worker/pool.h"
 
 enum { CACHE_BYTES = 64 << 20 };
 
-static const admin_kind *const admin_kinds[] = {&admin_token, &admin_key, NULL};
+static const admin_kind *const admin_kinds[] = {&admin_token, &admin_key, &admin_webhook, NULL};
 
 static void raise_descriptor_limit(void) {
   struct rlimit limit;
@@ -192,7 +193,7 @@ static int on_command(void *user, const char *line, api_text *reply) {
   char what[8] = "", verb[8] = "", name[64] = "";
   sscanf(line, "%7s %7s %63s", what, verb, name);
   const admin_kind *kind = admin_kind_named(admin_kinds, what);
-  int lists = strcmp(verb, "list") == 0;
+  int lists = strcmp(verb, "list") == 0 || strcmp(verb, "secret") == 0;
   if (!kind) {
     api_text_add(reply, "unknown command\n");
     return 2;
@@ -286,6 +287,14 @@ static void wait_for_stop(server *srv, const command_line *line, int signals) {
   queue_stop(srv->q, 1);
 }
 
+static int start_outbox(server *srv, const deliver_options *options) {
+  srv->outbox = deliver_start(options, srv->cat);
+  if (srv->outbox) {
+    queue_on_end(srv->q, deliver_wake, srv->outbox);
+  }
+  return srv->outbox != NULL;
+}
+
 /* Starts all parts in order; 0 if one of them failed. */
 static int start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
@@ -298,7 +307,17 @@ static int start(server *srv, worker_pool **workers) {
                            .nice = (int)o->worker_nice,
                            .job_memory = o->job_memory,
                            .job_ms = 1000 * o->job_seconds,
-                           .max_triangles = o->max_triangles};
+                           .max_triangles = o->max_triangles,
+                           .fetch = {.authorities = o->tls_authorities,
+                                     .total_ms = 1000 * o->fetch_seconds,
+                                     .most = o->max_body,
+                                     .disk_reserve = o->disk_reserve}};
+  deliver_options delivered = {.authorities = o->tls_authorities, .retry_ms = 1000 * o->webhook_retry_seconds};
+  char wrong[NETWORKS_WRONG];
+  networks_read(o->webhook_allow, &srv->webhook_allowed, wrong); /* config.c has checked them */
+  networks_read(o->fetch_allow, &srv->fetch_allowed, wrong);
+  delivered.allowed = srv->webhook_allowed;
+  limits.fetch.allowed = srv->fetch_allowed;
   if (queued.cores < queued.workers) {
     queued.cores = queued.workers;
   }
@@ -309,6 +328,7 @@ static int start(server *srv, worker_pool **workers) {
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q) == STORE_OK &&
          (srv->descriptions = cache_create(CACHE_BYTES)) && (srv->io = tasks_start((int)o->io_threads)) &&
          (srv->checks = tasks_start((int)o->workers)) && (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&
+         net_start() && start_outbox(srv, &delivered) &&
          (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) && http_start(srv);
 }
 
@@ -332,6 +352,7 @@ static void stop(server *srv, worker_pool *workers) {
     signers_store_use(srv->signers);
   }
   queue_destroy(srv->q);
+  deliver_stop(srv->outbox); /* nothing wakes it any more */
   catalogue_close(srv->cat);
   objects_close(srv->store);
   cache_destroy(srv->descriptions);

@@ -12,13 +12,15 @@ typedef struct histogram {
 } histogram;
 
 /* The stages that jobs report. */
-static const char *const stages[] = {"read",  "check",  "simplify", "embed", "certify",
-                                     "align", "remesh", "transfer", "write", "store"};
+static const char *const stages[] = {"read",   "check",    "simplify", "embed", "certify", "align",
+                                     "remesh", "transfer", "write",    "store", "download"};
 enum { STAGES = sizeof stages / sizeof stages[0] };
 
-static histogram jobs[2], requests, staged[2][STAGES];
-static const char *const kinds[2] = {"embedding", "supermesh"};
-static atomic_llong job_failed[2], cache[2], flips, statuses[6], received_bytes, sent_bytes, connections;
+enum { KINDS = 3 };
+static histogram jobs[KINDS], requests, staged[KINDS][STAGES];
+static const char *const kinds[KINDS] = {"embedding", "supermesh", "fetch"}; /* by api_job_kind */
+static atomic_llong job_failed[KINDS], cache[2], flips, statuses[6], received_bytes, sent_bytes, connections,
+    webhooks[2];
 
 static void observe(histogram *h, double seconds) {
   int i = 0;
@@ -29,18 +31,21 @@ static void observe(histogram *h, double seconds) {
   atomic_fetch_add(&h->micros, (long long)(seconds * 1e6));
 }
 
-void metrics_job(int embedding, int succeeded, double seconds) {
-  observe(&jobs[embedding ? 0 : 1], seconds);
+void metrics_job(int kind, int succeeded, double seconds) {
+  observe(&jobs[kind], seconds);
   if (!succeeded) {
-    atomic_fetch_add(&job_failed[embedding ? 0 : 1], 1);
+    atomic_fetch_add(&job_failed[kind], 1);
   }
 }
-void metrics_stage(int embedding, const char *stage, double seconds) {
+void metrics_stage(int kind, const char *stage, double seconds) {
   for (int i = 0; i < STAGES; i++) {
     if (strcmp(stages[i], stage) == 0) {
-      observe(&staged[embedding ? 0 : 1][i], seconds);
+      observe(&staged[kind][i], seconds);
     }
   }
+}
+void metrics_webhook(int delivered) {
+  atomic_fetch_add(&webhooks[delivered ? 1 : 0], 1);
 }
 void metrics_cache(int hit) {
   atomic_fetch_add(&cache[hit ? 1 : 0], 1);
@@ -94,10 +99,13 @@ void metrics_family(api_text *out, const char *name, const char *type, const cha
 
 void metrics_write(api_text *out) {
   metrics_family(out, "orbmorph_job_seconds", "histogram", "Time of attempts at jobs, by kind.");
-  write_histogram(out, "orbmorph_job_seconds", "kind=\"embedding\"", &jobs[0]);
-  write_histogram(out, "orbmorph_job_seconds", "kind=\"supermesh\"", &jobs[1]);
+  for (int kind = 0; kind < KINDS; kind++) {
+    char label[32];
+    snprintf(label, sizeof label, "kind=\"%s\"", kinds[kind]);
+    write_histogram(out, "orbmorph_job_seconds", label, &jobs[kind]);
+  }
   metrics_family(out, "orbmorph_stage_seconds", "histogram", "Time of stages of jobs.");
-  for (int kind = 0; kind < 2; kind++) {
+  for (int kind = 0; kind < KINDS; kind++) {
     for (int i = 0; i < STAGES; i++) {
       char labels[64];
       snprintf(labels, sizeof labels, "kind=\"%s\",stage=\"%s\"", kinds[kind], stages[i]);
@@ -107,8 +115,13 @@ void metrics_write(api_text *out) {
     }
   }
   metrics_family(out, "orbmorph_job_failures_total", "counter", "Attempts that did not succeed.");
-  api_text_printf(out, "orbmorph_job_failures_total{kind=\"embedding\"} %lld\n", atomic_load(&job_failed[0]));
-  api_text_printf(out, "orbmorph_job_failures_total{kind=\"supermesh\"} %lld\n", atomic_load(&job_failed[1]));
+  for (int kind = 0; kind < KINDS; kind++) {
+    api_text_printf(out, "orbmorph_job_failures_total{kind=\"%s\"} %lld\n", kinds[kind],
+                    atomic_load(&job_failed[kind]));
+  }
+  metrics_family(out, "orbmorph_webhook_attempts_total", "counter", "Attempts to deliver messages to webhooks.");
+  api_text_printf(out, "orbmorph_webhook_attempts_total{result=\"delivered\"} %lld\n", atomic_load(&webhooks[1]));
+  api_text_printf(out, "orbmorph_webhook_attempts_total{result=\"failed\"} %lld\n", atomic_load(&webhooks[0]));
   metrics_family(out, "orbmorph_http_request_seconds", "histogram",
                  "Time of requests, except those that wait for a job.");
   write_histogram(out, "orbmorph_http_request_seconds", "", &requests);

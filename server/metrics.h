@@ -6,8 +6,10 @@
 
 #include "api/text.h"
 
-void metrics_job(int embedding, int succeeded, double seconds);
-void metrics_stage(int embedding, const char *stage, double seconds); /* after the stage has ended */
+/* kind: an api_job_kind. */
+void metrics_job(int kind, int succeeded, double seconds);
+void metrics_stage(int kind, const char *stage, double seconds); /* after the stage has ended */
+void metrics_webhook(int delivered);                             /* after an attempt */
 void metrics_cache(int hit);
 void metrics_flips(int64_t flips);
 void metrics_request(int status, double seconds); /* seconds < 0: it waited for a job; its time is not counted */

@@ -75,12 +75,14 @@ part_fuzz() {
   tests/fuzz/run.sh --cpu $((60 * ${ORB_MINUTES:-5}))
 }
 
-# kill -9 at random instants and at every named point of the code.
+# kill -9 at random instants and at every named point of the code, and while webhooks are pending.
 part_crash() {
   cmake --preset faults -DORB_TESTS=ON >/dev/null
   cmake --build build-faults --target orbmorphd
   ORB_KILLS=${ORB_KILLS:-1000} ORB_FAULTS=1 ORBMORPHD=build-faults/bin/orbmorphd \
     node --test --test-reporter=spec tests/scenario/crash.test.mjs
+  ORB_HOOK_KILLS=${ORB_KILLS:-1000} ORBMORPHD=build-faults/bin/orbmorphd \
+    node --test --test-reporter=spec tests/scenario/webhooks.test.mjs
 }
 
 # Makes each call of the daemon that may fail do so, once and from then on; ORB_FAULT_RUNS=few leaves out allocations.

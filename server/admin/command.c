@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <sodium.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "control.h"
@@ -29,6 +30,17 @@ int admin_read_number(const char *value, char word[ADMIN_WORD]) {
     snprintf(word, ADMIN_WORD, "%" PRId64, number);
   }
   return fine;
+}
+
+int admin_read_span(const char *value, char word[ADMIN_WORD]) {
+  char *end;
+  long long number = *value >= '0' && *value <= '9' ? strtoll(value, &end, 10) : -1;
+  if (number < 0 || number > 36500) {
+    return 0;
+  }
+  int64_t unit = strcmp(end, "d") == 0 ? 86400 : strcmp(end, "h") == 0 ? 3600 : strcmp(end, "m") == 0 ? 60 : 1;
+  snprintf(word, ADMIN_WORD, "%lld", number * unit);
+  return unit > 1 || strcmp(end, "s") == 0 || *end == 0;
 }
 
 static int wrong(const admin_kind *kind, const char *subject, const char *why) {

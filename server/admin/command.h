@@ -67,6 +67,9 @@ int admin_command_run(const admin_command *command, const config *options);
 /* For admin_flag.read. A name has 1 to 63 letters, digits, '-', '_' and '.', and does not begin with '-'. */
 int admin_read_name(const char *value, char word[ADMIN_WORD]);
 int admin_read_number(const char *value, char word[ADMIN_WORD]);
+/* A time in seconds, or in minutes, hours or days with m, h or d; the word is in seconds. */
+int admin_read_span(const char *value, char word[ADMIN_WORD]);
+#define ADMIN_OVERLAP "604800" /* for which an old secret stays valid: 7 days */
 
 /* For admin_kind.apply: the exit status of a result, and the reason in *reply. `instead` says what to do where the name
  * is taken. */

@@ -9,19 +9,6 @@
 #include "store/keys.h"
 
 enum { DAY_S = 86400 };
-#define OVERLAP_STANDARD "604800" /* seconds: 7 days */
-
-/* A number of seconds, or of minutes, hours or days with m, h or d. */
-static int read_span(const char *value, char word[ADMIN_WORD]) {
-  char *end;
-  long long number = *value >= '0' && *value <= '9' ? strtoll(value, &end, 10) : -1;
-  if (number < 0 || number > 36500) {
-    return 0;
-  }
-  int64_t unit = strcmp(end, "d") == 0 ? DAY_S : strcmp(end, "h") == 0 ? 3600 : strcmp(end, "m") == 0 ? 60 : 1;
-  snprintf(word, ADMIN_WORD, "%" PRId64, (int64_t)number * unit);
-  return unit > 1 || strcmp(end, "s") == 0 || *end == 0;
-}
 
 /* Appends an origin as browsers send it: http or https, a host, optionally a port. */
 static int read_origin(const char *value, char word[ADMIN_WORD]) {
@@ -118,7 +105,7 @@ const admin_kind admin_key = {
     .verbs = {{"add", 1, 1}, {"rotate", 1, 1}, {"list", 0, 0}, {"remove", 1, 0}},
     .flags = {{"--requests-per-day", ADD, 0, "0", admin_read_number},
               {"--cpu-seconds-per-day", ADD, 0, "0", admin_read_number},
-              {"--overlap", ROTATE, 0, OVERLAP_STANDARD, read_span},
+              {"--overlap", ROTATE, 0, ADMIN_OVERLAP, admin_read_span},
               {"--tenant", ADD, 0, "-", admin_read_name},
               {.name = ADMIN_SECRET_WORD},
               {"--origin", ADD, 0, "-", read_origin}},

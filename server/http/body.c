@@ -19,7 +19,7 @@ enum { MEBIBYTE = 1 << 20, DROP_MOST = 64 << 20 };
 
 static int64_t limit_of(const request *r) {
   const config *options = r->srv->options;
-  return r->route->body == ROUTE_JSON_BODY ? options->max_json : options->max_body;
+  return r->route->body == ROUTE_JSON_BODY || is_fetch(r) ? options->max_json : options->max_body;
 }
 
 static void refuse_size(request *r) {
@@ -74,7 +74,7 @@ void body_begin(request *r) {
       return;
     }
   }
-  if (r->route->id == ROUTE_MESH_UPLOAD) {
+  if (r->route->id == ROUTE_MESH_UPLOAD && !is_fetch(r)) {
     handle_mesh_begin(r);
   }
 }
@@ -91,7 +91,7 @@ static int take_plain(void *user, const char *bytes, size_t size) {
                (long long)r->srv->options->max_ratio);
     api_json_member_integer(&problem.facts, "ratio_limit", r->srv->options->max_ratio);
     reply_problem(r, &problem);
-  } else if (r->route->body == ROUTE_MESH_BODY) {
+  } else if (r->route->body == ROUTE_MESH_BODY && !is_fetch(r)) {
     handle_mesh_bytes(r, bytes, size);
   } else {
     api_text_append(&r->body, bytes, size);

@@ -5,9 +5,11 @@
 
 #include "api/json.h"
 #include "api/supermesh_codec.h"
+#include "api/webhook_codec.h"
 #include "http/body.h"
 #include "http/http.h"
 #include "log.h"
+#include "store/deliveries.h"
 
 static int summary_of(request *r, const char *mesh, api_mesh_summary *out, api_problem *problem) {
   server *srv = r->srv;
@@ -57,14 +59,41 @@ int wanted_supermesh(request *r, const cJSON *body, wanted_result *out, api_prob
   return fine;
 }
 
+int check_url(const char *where, const char *url, const networks *allowed, net_url *out, api_problem *problem) {
+  const char *why;
+  net_verdict verdict = net_url_read(url, allowed, out, &why);
+  if (verdict == NET_URL_FORBIDDEN) {
+    api_refuse(problem, "forbidden-address", "%s: %s", where, why);
+    api_json_member_string(&problem->facts, "url", url);
+  } else if (verdict != NET_URL_FINE) {
+    api_refuse(problem, "invalid-request", "%s: %s", where, why);
+  }
+  return verdict == NET_URL_FINE;
+}
+
+int read_webhook(request *r, cJSON *body, wanted_result *out, api_problem *problem) {
+  api_webhook hook;
+  if (!api_webhook_take(body, &hook, problem) || !hook.url[0]) {
+    return !problem->name;
+  }
+  if (!check_url("\"url\" of \"webhook\"", hook.url, &r->srv->webhook_allowed, &out->webhook, problem)) {
+    return 0;
+  }
+  out->events = hook.events;
+  return 1;
+}
+
 static int read_wish(request *r, wanted_result *out, api_problem *problem) {
   cJSON *body = read_json(r, problem);
   if (!body) {
     return 0;
   }
-  int fine = r->route->id == ROUTE_EMBEDDING_CREATE
-                 ? read_embedding(r, body, out, problem)
-                 : resolve_landmarks(r, body, problem) && wanted_supermesh(r, body, out, problem);
+  int fine = read_webhook(r, body, out, problem);
+  if (fine) {
+    fine = r->route->id == ROUTE_EMBEDDING_CREATE
+               ? read_embedding(r, body, out, problem)
+               : resolve_landmarks(r, body, problem) && wanted_supermesh(r, body, out, problem);
+  }
   cJSON_Delete(body);
   return fine;
 }
@@ -103,6 +132,9 @@ static void refuse_submit(request *r, queue_result result, int64_t owner_limit) 
     case QUEUE_STOPPING:
       reply_refuse(r, "unavailable", "The service is stopping; try again soon.");
       break;
+    case QUEUE_WEBHOOKS:
+      reply_refuse(r, "invalid-request", "The job has %d webhooks already, and may not have more.", JOB_WEBHOOKS);
+      break;
     case QUEUE_MESH_GONE:
       reply_refuse(r, "not-found", "A mesh of this request has just been deleted: upload it again.");
       break;
@@ -111,8 +143,13 @@ static void refuse_submit(request *r, queue_result result, int64_t owner_limit) 
   }
 }
 
+static api_job_kind kind_of_job(resource_kind result) {
+  return result == RESOURCE_EMBEDDING ? API_JOB_EMBEDDING : result == RESOURCE_MESH ? API_JOB_FETCH : API_JOB_SUPERMESH;
+}
+
 void submit_wanted(request *r, const wanted_result *wish) {
-  queue_request wanted_job = {.kind = wish->kind == RESOURCE_EMBEDDING ? API_JOB_EMBEDDING : API_JOB_SUPERMESH,
+  job_webhook hook = {.url = wish->webhook.text, .origin = wish->webhook.origin, .events = wish->events};
+  queue_request wanted_job = {.kind = kind_of_job(wish->kind),
                               .key = wish->id,
                               .request = wish->canonical.data,
                               .owner = access_tenant(r),
@@ -120,7 +157,8 @@ void submit_wanted(request *r, const wanted_result *wish) {
                               .owner_limit = r->caller ? __atomic_load_n(&r->caller->row.jobs, __ATOMIC_RELAXED) : 0,
                               .priority = access_priority(r),
                               .cost = wish->cost,
-                              .listed = 1};
+                              .listed = 1,
+                              .hook = hook.url[0] ? &hook : NULL};
   job *j = NULL;
   int fresh = 0;
   api_problem problem = {0};

@@ -36,6 +36,13 @@ static int bad(api_problem *problem, const char *why) {
   return api_refuse(problem, "bad-request", "%s", why);
 }
 
+int is_fetch(const request *r) {
+  static const char json[] = "application/json";
+  const char *type = r->route->id == ROUTE_MESH_UPLOAD ? header_of(r, "Content-Type") : NULL;
+  size_t length = type ? strcspn(type, "; \t") : 0;
+  return length == sizeof json - 1 && strncasecmp(type, json, length) == 0;
+}
+
 static int check_length(request *r, const seen *s, api_problem *problem) {
   const config *options = r->srv->options;
   route_body kind = r->route ? r->route->body : ROUTE_NO_BODY;
@@ -46,7 +53,7 @@ static int check_length(request *r, const seen *s, api_problem *problem) {
   if (!s->lengths && !s->encodings) {
     return api_refuse(problem, "length-required", "Send a Content-Length, or use chunked Transfer-Encoding.");
   }
-  int64_t most = kind == ROUTE_JSON_BODY ? options->max_json : options->max_body;
+  int64_t most = kind == ROUTE_JSON_BODY || is_fetch(r) ? options->max_json : options->max_body;
   if (length > most) {
     api_refuse(problem, "too-large", "The body has %lld bytes; the limit of this route is %lld.", (long long)length,
                (long long)most);

@@ -7,6 +7,8 @@
  *                tenant; foreign pages (hosts.c: names in Host and Origin); query; body
  *   request.c    how a handler leaves the HTTP thread
  *   meshes.c     POST /v1/meshes          create.c      POST /v1/embeddings, POST /v1/supermeshes
+ *   fetch.c      POST /v1/meshes with a URL
+ *   deliveries.c GET and retry of the deliveries of a job's webhooks
  *   landmarks.c  POST /v1/landmarks
  *   morph.c      GET /v1/morph.glb        sign.c, signers.c   signed URLs
  *   resources.c  GET, DELETE and lists of meshes, embeddings, supermeshes and landmarks
@@ -42,6 +44,7 @@
 #include "api/routes.h"
 #include "cache.h"
 #include "config.h"
+#include "deliver/deliver.h"
 #include "http/callers.h"
 #include "http/decode.h"
 #include "http/encoded.h"
@@ -49,6 +52,7 @@
 #include "http/parse.h"
 #include "http/signers.h"
 #include "http/watch.h"
+#include "net/url.h"
 #include "queue/queue.h"
 #include "tasks.h"
 
@@ -66,6 +70,8 @@ typedef struct server {
   int64_t decoding;    /* bytes held by the decoders of bodies; __atomic */
   int64_t started;
   int needs_token;
+  deliverer *outbox;
+  networks webhook_allowed, fetch_allowed; /* besides public addresses */
   callers *callers;
   signers *signers;
   encoded_cache *encoded;
@@ -152,6 +158,7 @@ void request_handed_over(void);
 /* guard.c: 1, or 0 with the problem. */
 int guard_headers(request *r, const char *version, api_problem *problem);
 const char *header_of(const request *r, const char *name);
+int is_fetch(const request *r); /* POST /v1/meshes with a URL in JSON instead of a file */
 /* All lines of a header that is a list (RFC 9110 section 5.3), at most HEADER_LINES; returns their number. */
 enum { HEADER_LINES = 16 };
 int header_lines(const request *r, const char *name, const char *out[HEADER_LINES]);
@@ -225,6 +232,7 @@ void handle_page(request *r, const char *path);
 /* Handlers. server.c calls them when the whole body has arrived; the two of an upload run while it arrives. */
 void handle_mesh_begin(request *r);
 void handle_mesh_bytes(request *r, const char *bytes, size_t size);
+enum MHD_Result handle_mesh_file(request *r); /* when all of it has arrived */
 #define DECLARE(id, method, path, body, scope, query, handler) enum MHD_Result handler(request *r);
 API_ROUTES(DECLARE)
 #undef DECLARE
@@ -243,13 +251,19 @@ int list_begin(request *r, const char *name, size_t row_size, list_page *page); 
 /* Frees the page and leaves a response. last: sequence number of the page's last row; count: rows found, −1 if they
  * could not be read. */
 void list_end(request *r, list_page *page, int64_t last, int count);
-/* A request for an embedding or supermesh that was read and validated. The caller frees canonical. */
+/* A request for a job that was read and validated. The caller frees canonical. */
 typedef struct wanted_result {
   resource_kind kind;
-  char id[API_ID_SIZE];
+  char id[API_ID_SIZE]; /* of the result; of a mesh from a URL: the job's key */
   api_text canonical;
   int64_t cost;
+  net_url webhook; /* text "": none */
+  unsigned events; /* that the webhook receives, see api/webhook_codec.h */
 } wanted_result;
+/* Whether the service may connect to a URL of the request: 1, or 0 with the problem. where: names the member. */
+int check_url(const char *where, const char *url, const networks *allowed, net_url *out, api_problem *problem);
+/* Takes the member "webhook" out of the body: 1, or 0 with the problem. */
+int read_webhook(request *r, cJSON *body, wanted_result *out, api_problem *problem);
 /* Reads the body of a request for a supermesh. Blocks. 1, or 0 with the problem. */
 int wanted_supermesh(request *r, const cJSON *body, wanted_result *out, api_problem *problem);
 /* Submits the job; leaves a response, or PHASE_WAIT. Blocks. */

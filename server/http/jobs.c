@@ -65,8 +65,8 @@ static int peer_is_gone(const request *r) {
 static void result_away(request *r) {
   store_result result;
   job *j = r->waits_for;
-  resource_kind kind = job_kind(j) == API_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
-  const cached *entry = find_description(r->srv, kind, job_key(j), access_tenant(r), &result);
+  static const resource_kind kinds[API_JOB_KINDS] = {RESOURCE_EMBEDDING, RESOURCE_SUPERMESH, RESOURCE_MESH};
+  const cached *entry = find_description(r->srv, kinds[job_kind(j)], job_result(j), access_tenant(r), &result);
   if (entry && r->waits_for_what == WAIT_ASSET) {
     reply_asset(r, entry);
   } else if (entry) {
@@ -136,7 +136,7 @@ enum MHD_Result handle_wait(request *r) {
 
 static void write_row(const job_row *row, api_text *out) {
   api_job_view view = {.id = row->id,
-                       .key = row->key,
+                       .result = row->result[0] ? row->result : row->key,
                        .stage = NULL,
                        .problem = row->problem,
                        .kind = row->kind,

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "api/ids.h"
 #include "api/json.h"
 
 int parse_range(const char *text, uint64_t size, uint64_t *first, uint64_t *length) {
@@ -178,26 +179,6 @@ int parse_page(const char *limit_text, const char *token, int *limit, uint64_t *
 int parse_id_prefix(const char *text) {
   size_t length = strlen(text);
   return length > 0 && length < API_ID_SIZE && strspn(text, "0123456789abcdef") == length;
-}
-
-int parse_upload(const char *name, const char *repair, const char *format, upload_query *out, api_problem *problem) {
-  memset(out, 0, sizeof *out);
-  if (name && (!*name || strlen(name) >= sizeof out->name || !api_utf8_valid(name, strlen(name)))) {
-    return api_refuse(problem, "bad-query", "\"name\" must be UTF-8 of 1 to 127 bytes.");
-  }
-  snprintf(out->name, sizeof out->name, "%s", name ? name : "mesh");
-  for (const unsigned char *c = (const unsigned char *)out->name; *c; c++) {
-    if (*c < 0x20 || *c == 0x7f) {
-      return api_refuse(problem, "bad-query", "\"name\" must not contain control characters.");
-    }
-  }
-  if (format) {
-    out->hint = orb_format_of_name(format);
-    if (out->hint == ORB_FORMAT_AUTO) {
-      return api_refuse(problem, "bad-query", "\"format\" must be obj, off, ply, stl, gltf or glb, or be omitted.");
-    }
-  }
-  return api_repair_parse(repair ? repair : "safe", &out->flags, out->repair, problem);
 }
 
 int parse_trace(const char *text, char out[TRACE_SIZE]) {

@@ -1,13 +1,11 @@
-/* Parsers for the texts of a request: ranges, waits, pages, tags, the query of an upload. They need no connection, so
- * tests can call them directly. A text is NULL if the request has none.
+/* Parsers for the texts of a request: ranges, waits, pages, tags. They need no connection, so tests can call them
+ * directly. A text is NULL if the request has none.
  */
 #ifndef ORB_HTTP_PARSE_H
 #define ORB_HTTP_PARSE_H
 
 #include <stddef.h>
 #include <stdint.h>
-
-#include "api/mesh_codec.h"
 
 /* A Range header for a file of `size` bytes. −1: outside the file; 0: ignored, respond with the whole file (RFC 9110
  * section 14.2); 1: [*first, *first + *length). */
@@ -38,14 +36,6 @@ extern const char PARSE_PAGE_TOKEN[]; /* the sentence for an invalid page token 
 
 /* Whether a text can begin an id: 1 to 64 lower-case hexadecimal digits. */
 int parse_id_prefix(const char *text);
-
-/* The query of an upload. 1, or 0 with the problem. */
-typedef struct upload_query {
-  char name[ORB_NAME_MAX], repair[API_REPAIR_TEXT];
-  unsigned flags;
-  orb_format hint;
-} upload_query;
-int parse_upload(const char *name, const char *repair, const char *format, upload_query *out, api_problem *problem);
 
 /* A traceparent of W3C Trace Context, version 00. 0 for any other text. */
 enum { TRACE_SIZE = 56 };

@@ -6,6 +6,7 @@
 
 #include "http/http.h"
 #include "metrics.h"
+#include "store/deliveries.h"
 
 static void gauge(api_text *out, const char *name, const char *help, double value) {
   metrics_family(out, name, "gauge", help);
@@ -49,6 +50,10 @@ static void metrics_away(request *r) {
   int64_t stored = catalogue_bytes(srv->cat, 0);
   if (stored >= 0) {
     gauge(&text, "orbmorph_stored_bytes", "Bytes of stored objects.", (double)stored);
+  }
+  int64_t pending = catalogue_deliveries_pending(srv->cat);
+  if (pending >= 0) {
+    gauge(&text, "orbmorph_webhook_pending", "Messages to webhooks that are still to be delivered.", (double)pending);
   }
   gauge(&text, "orbmorph_disk_free_bytes", "Free bytes of the file system that holds the data folder.",
         (double)objects_free_bytes(srv->store));

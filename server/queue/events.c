@@ -198,7 +198,8 @@ static double overall(const job *j, const char *stage, double fraction) {
                {API_JOB_EMBEDDING, "certify", 0.9, 0.97}, {API_JOB_EMBEDDING, "store", 0.97, 1},
                {API_JOB_SUPERMESH, "read", 0.6, 0.62},    {API_JOB_SUPERMESH, "align", 0.62, 0.75},
                {API_JOB_SUPERMESH, "remesh", 0.75, 0.9},  {API_JOB_SUPERMESH, "transfer", 0.9, 0.94},
-               {API_JOB_SUPERMESH, "write", 0.94, 0.98},  {API_JOB_SUPERMESH, "store", 0.98, 1}};
+               {API_JOB_SUPERMESH, "write", 0.94, 0.98},  {API_JOB_SUPERMESH, "store", 0.98, 1},
+               {API_JOB_FETCH, "download", 0, 0.7},       {API_JOB_FETCH, "check", 0.7, 1}};
   for (size_t i = 0; i < sizeof spans / sizeof spans[0]; i++) {
     if (spans[i].kind == j->row.kind && strcmp(spans[i].stage, stage) == 0) {
       return spans[i].from + fraction * (spans[i].to - spans[i].from);

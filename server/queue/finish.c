@@ -41,31 +41,35 @@ static void publish_end(queue *q, job *j, int64_t number, const char *json) {
 
 /* Commits the end of a taken job, then shows it. worked: a worker has taken the job; it leaves the job in the same step
  * in which others see that it has ended. */
-static store_result end_job(queue *q, job *j, api_job_state state, const char *problem, const resource *result,
-                            int worked) {
-  int64_t now = unix_ms();
+static store_result end_job(queue *q, job *j, job_end *end, int worked) {
+  api_job_state state = end->state;
+  end->now = unix_ms();
   pthread_mutex_lock(&q->lock);
   job shown = *j;
   shown.row.state = state;
-  shown.row.finished = now;
-  shown.row.problem = (char *)(uintptr_t)problem;
+  shown.row.finished = end->now;
+  shown.row.problem = (char *)(uintptr_t)end->problem;
+  copy_text(shown.row.result, sizeof shown.row.result, end->mesh ? end->mesh : "");
   shown.progress = state == API_JOB_SUCCEEDED ? 1 : j->progress;
   api_text json = {0};
-  int64_t number = prepare_event(&shown, &json) + 1000; /* above any event that is added before the commit */
+  end->event = prepare_event(&shown, &json) + 1000; /* above any event that is added before the commit */
+  end->event_json = json.data;
   pthread_mutex_unlock(&q->lock);
   FAULT_POINT("before-finish");
-  store_result stored = json.failed ? STORE_ERROR
-                                    : catalogue_job_finish(q->cat, j->row.id, j->row.attempt, state, problem, now,
-                                                           result, number, json.data);
+  store_result stored = json.failed ? STORE_ERROR : catalogue_job_finish(q->cat, j->row.id, j->row.attempt, end);
   FAULT_POINT("after-finish");
   if (stored == STORE_OK) {
     pthread_mutex_lock(&q->lock);
-    ended_locked(q, j, state, problem, now);
+    copy_text(j->row.result, sizeof j->row.result, end->mesh ? end->mesh : "");
+    ended_locked(q, j, state, end->problem, end->now);
     if (worked) {
       schedule_leave(q, j);
     }
-    publish_end(q, j, number, json.data);
+    publish_end(q, j, end->event, json.data);
     pthread_mutex_unlock(&q->lock);
+    if (q->on_end) {
+      q->on_end(q->on_end_user);
+    }
   }
   api_text_free(&json);
   return stored;
@@ -83,7 +87,7 @@ static int cancel_locked(job *j) {
 }
 
 static store_result end_cancelled(queue *q, job *j) {
-  store_result stored = end_job(q, j, API_JOB_CANCELLED, NULL, NULL, 0);
+  store_result stored = end_job(q, j, &(job_end){.state = API_JOB_CANCELLED}, 0);
   if (stored != STORE_OK) {
     pthread_mutex_lock(&q->lock);
     j->taken = 0;
@@ -122,8 +126,8 @@ static void cancel_needless(queue *q, job *of) {
   }
 }
 
-void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result) {
-  store_result stored = end_job(q, j, state, problem, result, 1);
+static void finish_as(queue *q, job *j, job_end *end) {
+  store_result stored = end_job(q, j, end, 1);
   if (stored != STORE_OK) {
     log_error("the end of job %s could not be stored; the job will run again", j->row.id);
     pthread_mutex_lock(&q->lock);
@@ -132,12 +136,28 @@ void queue_finish(queue *q, job *j, api_job_state state, const char *problem, co
     queue_give_back(q, j);
     return;
   }
-  if (state == API_JOB_CANCELLED) {
+  if (end->state == API_JOB_CANCELLED) {
     cancel_needless(q, j);
   }
   pthread_mutex_lock(&q->lock);
   job_unref(j);
   pthread_mutex_unlock(&q->lock);
+}
+
+void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result) {
+  finish_as(q, j, &(job_end){.state = state, .problem = problem, .result = result});
+}
+
+void queue_finish_mesh(queue *q, job *j, const char *mesh) {
+  finish_as(q, j, &(job_end){.state = API_JOB_SUCCEEDED, .mesh = mesh});
+}
+
+/* Takes back queue_show_running(). */
+static void show_queued(job *j) {
+  if (j->row.kind == API_JOB_FETCH && !j->running) {
+    j->row.state = API_JOB_QUEUED;
+    j->stage[0] = 0;
+  }
 }
 
 void queue_give_back(queue *q, job *j) {
@@ -152,6 +172,7 @@ void queue_give_back(queue *q, job *j) {
       j->retry_at = orb_clock_ms() + 5000;
     }
   }
+  show_queued(j);
   schedule_leave(q, j);
   job_unref(j);
   pthread_mutex_unlock(&q->lock);
@@ -159,6 +180,7 @@ void queue_give_back(queue *q, job *j) {
 
 void queue_put_off(queue *q, job *j) {
   pthread_mutex_lock(&q->lock);
+  show_queued(j);
   j->retry_at = orb_clock_ms() + 1000;
   schedule_leave(q, j);
   job_unref(j);

@@ -55,13 +55,13 @@ struct queue {
   job *first, *last;
   job *oldest_ended, *newest_ended;
   int ended_count, unfinished;
-  int running, running_large, exclusive;
+  int running, running_large, fetching, exclusive; /* fetching: of those that run */
   int64_t running_cost;
   int stopping, waking;
   struct {
     char name[64];
     double service; /* work done for this owner: triangles, plus 1000 a job */
-    int unfinished;
+    int unfinished, fetching;
   } owners[OWNERS];
   int owner_count;
   waiter *waiters;
@@ -69,6 +69,8 @@ struct queue {
   pthread_t timer;
   int timer_started, timer_stop;
   int64_t ended[API_JOB_CANCELLED + 1];
+  void (*on_end)(void *user);
+  void *on_end_user;
 };
 
 int64_t unix_ms(void);

@@ -29,6 +29,11 @@ queue *queue_create(const queue_options *options, catalogue *cat) {
   return q;
 }
 
+void queue_on_end(queue *q, void (*ended)(void *user), void *user) {
+  q->on_end = ended;
+  q->on_end_user = user;
+}
+
 void queue_destroy(queue *q) {
   if (!q) {
     return;

@@ -58,6 +58,8 @@ typedef struct queue_options {
 } queue_options;
 
 queue *queue_create(const queue_options *options, catalogue *cat);
+/* Sets a function that is called after each end of a job. Before the workers start; not under the queue's lock. */
+void queue_on_end(queue *q, void (*ended)(void *user), void *user);
 void queue_destroy(queue *q);
 void queue_set_limit(queue *q, int limit);
 /* Recovers from a crash and loads the unfinished jobs of the catalogue. */
@@ -78,7 +80,8 @@ typedef struct queue_request {
   const char *charged; /* the signing key that its work counts for; NULL: none */
   int64_t cost;
   int priority, listed;
-  int64_t owner_limit; /* of the owner's listed unfinished jobs; 0: no limit */
+  int64_t owner_limit;            /* of the owner's listed unfinished jobs; 0: no limit */
+  const struct job_webhook *hook; /* that the request names; NULL: none */
 } queue_request;
 typedef enum queue_result {
   QUEUE_OK,
@@ -87,6 +90,7 @@ typedef enum queue_result {
   QUEUE_STOPPING,
   QUEUE_STORE_FULL,
   QUEUE_MESH_GONE, /* a mesh that the request names has been deleted */
+  QUEUE_WEBHOOKS,  /* the job has as many webhooks as it may have */
   QUEUE_ERROR
 } queue_result;
 /* Blocks for the commit. Adds a reference to *out. *fresh (may be NULL): 1 for a new job, 0 for one that existed. */
@@ -99,6 +103,7 @@ void queue_release(queue *q, job *j);
 const char *job_id(const job *j);
 const char *job_key(const job *j);
 api_job_kind job_kind(const job *j);
+const char *job_result(const job *j); /* the id of the result of a job that has succeeded */
 const char *job_request(const job *j);
 const char *job_charged(const job *j); /* the signing key that its work counts for; "": none */
 const char *job_owner(const job *j);   /* the tenant that requested it; "" if no token was needed */
@@ -128,9 +133,15 @@ int queue_needs_mesh(queue *q, const char *mesh, const char *owner);
 
 /* For the workers. A worker takes a job, then ends it with queue_finish(), or returns it with queue_wait_for(),
  * queue_put_off() or queue_give_back(). Each of these releases the worker's reference. */
-/* Waits for a job; 0 when the queue stops. small_only: for the worker that takes only small jobs. *threads: the job's
- * share of the cores. */
-int queue_take(queue *q, int small_only, job **out, int *threads);
+/* Which jobs a worker takes: those that compute, only the small ones of them, or those that fetch. */
+typedef enum queue_lane { QUEUE_COMPUTES, QUEUE_COMPUTES_SMALL, QUEUE_FETCHES } queue_lane;
+/* Waits for a job; 0 when the queue stops. *threads: the job's share of the cores. At most QUEUE_FETCHES_OF_OWNER jobs
+ * of an owner fetch at once. */
+enum { QUEUE_FETCHES_OF_OWNER = 4 };
+int queue_take(queue *q, queue_lane lane, job **out, int *threads);
+/* Shows a taken job as running before it is claimed: a job that downloads. If the process dies, the job is not suspect.
+ */
+void queue_show_running(queue *q, job *j);
 /* Returns a taken job to wait until the jobs of these keys have ended; submits those jobs. */
 queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const char *const *requests,
                             const int64_t *costs, int count);
@@ -145,6 +156,8 @@ void queue_add_embed_ms(queue *q, job *j, double ms);
 double queue_embed_ms(queue *q, job *j);
 /* Ends a taken job with its result or problem. If the store fails, the job is queued again and retried later. */
 void queue_finish(queue *q, job *j, api_job_state state, const char *problem, const resource *result);
+/* Ends a taken job that fetched a mesh, which is stored. */
+void queue_finish_mesh(queue *q, job *j, const char *mesh);
 /* Returns a taken job that was not claimed; it is retried after a second. For a store that fails. */
 void queue_put_off(queue *q, job *j);
 /* Returns a taken job; its attempt does not count. */

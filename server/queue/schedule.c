@@ -19,10 +19,14 @@ static int runnable(const queue *q, const job *j, int64_t now) {
   return j->committed && !j->taken && j->waits_for == 0 && j->retry_at <= now && !table_key_taken(q, j);
 }
 
+static int fetches(const job *j) {
+  return j->row.kind == API_JOB_FETCH;
+}
+
 /* The next job for a worker, or NULL. */
-static job *choose(queue *q, int small_only) {
+static job *choose(queue *q, queue_lane lane) {
   int64_t now = orb_clock_ms();
-  int most_large = q->options.workers > 1 ? q->options.workers - 1 : 1;
+  int most_large = q->options.workers > 1 ? q->options.workers - 1 : 1, small_only = lane == QUEUE_COMPUTES_SMALL;
   job *best = NULL;
   if (q->exclusive || (small_only && q->running_large < most_large)) {
     return NULL;
@@ -31,8 +35,12 @@ static job *choose(queue *q, int small_only) {
     if (!runnable(q, j, now)) {
       continue;
     }
+    int mine = fetches(j) == (lane == QUEUE_FETCHES);
     if (j->row.suspect) {
-      return q->running == 0 ? j : NULL;
+      return q->running == 0 && mine ? j : NULL;
+    }
+    if (!mine || (fetches(j) && q->owners[j->owner].fetching >= QUEUE_FETCHES_OF_OWNER)) {
+      continue;
     }
     int large = j->row.cost > LARGE;
     int64_t memory = (q->running_cost + j->row.cost) * BYTES_A_TRIANGLE;
@@ -46,19 +54,19 @@ static job *choose(queue *q, int small_only) {
   return best;
 }
 
-int queue_take(queue *q, int small_only, job **out, int *threads) {
+int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
   pthread_mutex_lock(&q->lock);
   job *j = NULL;
-  while (!q->stopping && !(j = choose(q, small_only))) {
+  while (!q->stopping && !(j = choose(q, lane))) {
     pthread_cond_wait(&q->work, &q->lock);
   }
   if (j && !q->stopping) {
     int beside = 0;
     int64_t now = orb_clock_ms();
     for (job *other = q->first; other; other = other->next) {
-      beside += other != j && runnable(q, other, now);
+      beside += other != j && !fetches(other) && runnable(q, other, now);
     }
-    int wanted = q->running + 1 + beside;
+    int wanted = q->running - q->fetching + 1 + beside;
     int share = wanted < q->options.workers ? wanted : q->options.workers;
     *threads = q->options.cores / share > 0 ? q->options.cores / share : 1;
     j->taken = 1;
@@ -67,6 +75,8 @@ int queue_take(queue *q, int small_only, job **out, int *threads) {
     q->running_large += j->row.cost > LARGE;
     q->running_cost += j->row.cost;
     q->exclusive = j->row.suspect;
+    q->fetching += fetches(j);
+    q->owners[j->owner].fetching += fetches(j);
     q->owners[j->owner].service += (double)j->row.cost + 1000;
     *out = j;
   } else {
@@ -80,6 +90,8 @@ void schedule_leave(queue *q, job *j) {
   q->running--;
   q->running_large -= j->row.cost > LARGE;
   q->running_cost -= j->row.cost;
+  q->fetching -= fetches(j);
+  q->owners[j->owner].fetching -= fetches(j);
   q->exclusive = 0;
   j->taken = 0;
   j->running = 0;
@@ -101,6 +113,13 @@ store_result queue_claim(queue *q, job *j) {
   }
   pthread_mutex_unlock(&q->lock);
   return result;
+}
+
+void queue_show_running(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  j->row.state = API_JOB_RUNNING;
+  j->row.started = j->row.started ? j->row.started : unix_ms();
+  pthread_mutex_unlock(&q->lock);
 }
 
 void queue_set_context(queue *q, job *j, orb_context *ctx) {

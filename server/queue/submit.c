@@ -4,6 +4,7 @@
 
 #include "faults.h"
 #include "queue/internal.h"
+#include "store/deliveries.h"
 
 /* The owner's unfinished job with the same key, with a reference; or NULL, and *mine is the number of the owner's
  * listed jobs. Skips cancelled jobs, also one that is cancelled while this waits for its commit. */
@@ -89,17 +90,24 @@ queue_result queue_submit(queue *q, const queue_request *request, job **out, int
     pthread_mutex_unlock(&q->lock);
     result = stored == STORE_OK ? QUEUE_OK : stored == STORE_FULL ? QUEUE_STORE_FULL : QUEUE_ERROR;
   }
+  if (!is_fresh && result == QUEUE_OK && request->hook) {
+    store_result stored = catalogue_job_subscribe(q->cat, (*out)->row.id, request->hook);
+    result = stored == STORE_OK         ? QUEUE_OK
+             : stored == STORE_CONFLICT ? QUEUE_WEBHOOKS
+             : stored == STORE_FULL     ? QUEUE_STORE_FULL
+                                        : QUEUE_ERROR;
+  }
   if (!is_fresh) {
     return result;
   }
   job *j = *out;
   FAULT_POINT("before-accept");
-  store_result stored = catalogue_job_insert(q->cat, &j->row);
+  store_result stored = catalogue_job_insert(q->cat, &j->row, request->hook);
   FAULT_POINT("after-accept");
   pthread_mutex_lock(&q->lock);
   if (stored == STORE_OK) {
     j->committed = 1;
-    pthread_cond_signal(&q->work);
+    pthread_cond_broadcast(&q->work); /* only some of those that wait may take it */
   } else {
     j->dead = 1;
     j->row.state = API_JOB_FAILED;

@@ -137,13 +137,16 @@ const char *job_charged(const job *j) {
 const char *job_owner(const job *j) {
   return j->row.owner;
 }
+const char *job_result(const job *j) {
+  return j->row.result[0] ? j->row.result : j->row.key;
+}
 const char *job_request(const job *j) {
   return j->row.request;
 }
 
 void job_view(const job *j, api_job_view *view) {
   *view = (api_job_view){.id = j->row.id,
-                         .key = j->row.key,
+                         .result = j->row.result[0] ? j->row.result : j->row.key,
                          .stage = j->stage,
                          .problem = j->row.problem,
                          .kind = j->row.kind,
@@ -190,9 +193,10 @@ void queue_count(queue *q, queue_numbers *out) {
   pthread_mutex_lock(&q->lock);
   int64_t now = unix_ms();
   for (job *j = q->first; j; j = j->next) {
-    int queued = !j->running && j->waits_for == 0;
+    int runs = j->running || (j->taken && j->row.kind == API_JOB_FETCH); /* a download comes before the claim */
+    int queued = !runs && j->waits_for == 0;
     out->queued += queued;
-    if (j->running) {
+    if (runs) {
       count_stage(out, j->stage[0] ? j->stage : "start");
     }
     out->waiting += j->waits_for > 0;

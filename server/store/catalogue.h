@@ -7,8 +7,9 @@
  *   database.c    connections, the schema and its migrations
  *   catalogue.c   the writer thread with group commit, the pool of readers
  *   rows.c        reading rows of any kind
- *   resources.c, owners.c, jobs.c, tokens.c   the SQL of each kind of row; lists.c   lists with a filter
- *   objects.c     publishing, reading and deleting files; spheres.c   the file of aligned spheres
+ *   resources.c, owners.c, jobs.c, tokens.c, keys.c, webhooks.c   the SQL of each kind of row; lists.c   lists with a
+ * filter deliveries.c  the outbox: what is still to be sent to webhooks objects.c     publishing, reading and deleting
+ * files; spheres.c   the file of aligned spheres
  *
  * Contract. ONE connection writes and checkpoints, and one thread owns it (SQLite before 3.51.3 can lose a WAL reset
  * with two). Writes are passed to it as functions. It runs all waiting writes in one transaction (group commit), each
@@ -104,17 +105,19 @@ typedef struct job_row {
   int alone;   /* the current attempt runs alone */
   int listed;  /* a caller requested it, as opposed to another job that needs it */
   int priority;
-  int64_t cost;     /* triangles */
-  char owner[64];   /* the tenant that requested it */
-  char charged[64]; /* the signing key that its work counts for; "": none */
+  int64_t cost;             /* triangles */
+  char owner[64];           /* the tenant that requested it */
+  char charged[64];         /* the signing key that its work counts for; "": none */
+  char result[API_ID_SIZE]; /* of a mesh from a URL that is stored; "": the key is the id of the result */
   char *request, *problem;
   int64_t created, started, finished;
 } job_row;
 void job_row_free(job_row *row);
 
 /* Fills seq, and makes the job's owner an owner of the meshes that the request names. STORE_NOT_FOUND if the job is
- * listed and one of the meshes does not exist. */
-store_result catalogue_job_insert(catalogue *cat, job_row *row);
+ * listed and one of the meshes does not exist. hook: the webhook that the request names, or NULL. */
+struct job_webhook;
+store_result catalogue_job_insert(catalogue *cat, job_row *row, const struct job_webhook *hook);
 store_result catalogue_job_list_it(catalogue *cat, const char *id); /* sets `listed` */
 /* queued → running with the next attempt. There is no heartbeat: the lock of the data folder ensures that only one
  * process runs jobs, so any job that is running in the catalogue at the start belongs to a dead process
@@ -122,10 +125,18 @@ store_result catalogue_job_list_it(catalogue *cat, const char *id); /* sets `lis
 store_result catalogue_job_claim(catalogue *cat, const char *id, int attempt, int alone, int64_t now);
 /* running → queued again; its attempt does not count. */
 store_result catalogue_job_release(catalogue *cat, const char *id, int attempt);
-/* Ends a job and stores its result (NULL: none) in the same transaction. STORE_CONFLICT if `attempt` is no longer the
- * job's current one. */
-store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, api_job_state state, const char *problem,
-                                  int64_t now, const resource *result, int64_t event, const char *event_json);
+/* How a job ends. */
+typedef struct job_end {
+  api_job_state state;
+  const char *problem;    /* NULL: none */
+  const resource *result; /* to be stored; NULL: it is stored, or there is none */
+  const char *mesh;       /* of a mesh from a URL: its id; NULL: none */
+  int64_t now, event;     /* event: the number of the last event */
+  const char *event_json; /* of the last event: the job */
+} job_end;
+/* Ends a job, stores its result and announces it to its webhooks in the same transaction. STORE_CONFLICT if `attempt`
+ * is no longer the job's current one. */
+store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, const job_end *end);
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out);
 /* owner NULL, prefix of the id NULL, state −1: any. */
 enum { CATALOGUE_UNFINISHED = -2 }; /* as a state: queued or running */

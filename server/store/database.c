@@ -102,6 +102,23 @@ static const char *const migrations[] = {
     /* The hashes of the profiles of a supermesh's asset. */
     "ALTER TABLE resource ADD COLUMN quantized TEXT NOT NULL DEFAULT '';"
     "ALTER TABLE resource ADD COLUMN meshopt TEXT NOT NULL DEFAULT '';",
+    /* Meshes from URLs, whose ids only the end of the job knows; webhooks and their outbox. */
+    "ALTER TABLE job ADD COLUMN result TEXT NOT NULL DEFAULT '';"
+    "CREATE TABLE webhook(name TEXT PRIMARY KEY, tenant TEXT NOT NULL, url TEXT NOT NULL, origin TEXT NOT NULL,"
+    " events INTEGER NOT NULL, secret TEXT NOT NULL, old_secret TEXT NOT NULL DEFAULT '',"
+    " old_until INTEGER NOT NULL DEFAULT 0, created INTEGER NOT NULL) WITHOUT ROWID;"
+    "CREATE INDEX webhook_tenant ON webhook(tenant);"
+    "CREATE TABLE job_webhook(job TEXT NOT NULL, url TEXT NOT NULL, origin TEXT NOT NULL, events INTEGER NOT NULL,"
+    " PRIMARY KEY(job, url)) WITHOUT ROWID;"
+    "CREATE TABLE delivery(seq INTEGER PRIMARY KEY AUTOINCREMENT, job TEXT NOT NULL, number INTEGER NOT NULL,"
+    " webhook TEXT NOT NULL, receiver TEXT NOT NULL, url TEXT NOT NULL, type TEXT NOT NULL, body TEXT NOT NULL,"
+    " state INTEGER NOT NULL DEFAULT 0, attempts INTEGER NOT NULL DEFAULT 0, tried INTEGER NOT NULL DEFAULT 0,"
+    " status INTEGER NOT NULL DEFAULT 0, error TEXT NOT NULL DEFAULT '', next INTEGER NOT NULL,"
+    " created INTEGER NOT NULL, ended INTEGER NOT NULL DEFAULT 0, UNIQUE(job, number));"
+    "CREATE INDEX delivery_pending ON delivery(receiver, next) WHERE state=0;"
+    "CREATE INDEX delivery_webhook ON delivery(webhook) WHERE state=0;"
+    "CREATE TABLE receiver(name TEXT PRIMARY KEY, tenant TEXT NOT NULL, next INTEGER NOT NULL) WITHOUT ROWID;"
+    "CREATE INDEX receiver_next ON receiver(next);",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

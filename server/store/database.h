@@ -4,7 +4,7 @@
 
 #include <sqlite3.h>
 
-enum { DATABASE_STATEMENTS = 64, DATABASE_READERS = 6 };
+enum { DATABASE_STATEMENTS = 96, DATABASE_READERS = 6 };
 
 /* A connection, for one thread at a time. Statements are cached by the address of their text. */
 typedef struct database {

@@ -1,12 +1,13 @@
 /* Rows of jobs and events. */
 #include <stdlib.h>
 
+#include "store/deliveries.h"
 #include "store/owners.h"
 #include "store/rows.h"
 
 #define COLUMNS                                                                                                   \
   "seq, id, key, kind, state, attempt, crashes, suspect, alone, listed, priority, cost, owner, request, problem," \
-  " created, started, finished, charged"
+  " created, started, finished, charged, result"
 
 void job_row_free(job_row *row) {
   free(row->request);
@@ -14,8 +15,14 @@ void job_row_free(job_row *row) {
   row->request = row->problem = NULL;
 }
 
+typedef struct insert_arg {
+  job_row *row;
+  const job_webhook *hook;
+} insert_arg;
+
 static int insert(database *db, void *arg) {
-  job_row *r = arg;
+  job_row *r = ((insert_arg *)arg)->row;
+  const job_webhook *hook = ((insert_arg *)arg)->hook;
   sqlite3_stmt *st = database_statement(
       db,
       "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created,"
@@ -35,18 +42,19 @@ static int insert(database *db, void *arg) {
   sqlite3_bind_text(st, 10, r->charged, -1, SQLITE_STATIC);
   int code = database_run(db, st);
   r->seq = sqlite3_last_insert_rowid(db->handle);
-  return code == SQLITE_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
+  code = code == SQLITE_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
+  return code == SQLITE_OK && hook ? delivery_subscribe(db, r->id, hook) : code;
 }
 
-store_result catalogue_job_insert(catalogue *cat, job_row *row) {
-  return catalogue_write(cat, insert, row);
+store_result catalogue_job_insert(catalogue *cat, job_row *row, const job_webhook *hook) {
+  return catalogue_write(cat, insert, &(insert_arg){row, hook});
 }
 
 typedef struct change {
-  const char *id, *problem, *event_json;
-  int attempt, alone, state;
-  int64_t now, event;
-  const resource *result;
+  const char *id, *problem;
+  int attempt, alone;
+  int64_t now;
+  const job_end *end;
 } change;
 
 /* Runs an update that must change exactly one row. */
@@ -118,39 +126,36 @@ static int write_event(database *db, const char *job, int64_t number, const char
 
 static int finish(database *db, void *arg) {
   const change *c = arg;
+  const job_end *end = c->end;
   sqlite3_stmt *st = database_statement(db,
-                                        "UPDATE job SET state=?3, problem=?4, finished=?5, suspect=0, alone=0"
-                                        " WHERE id=?1 AND attempt=?2 AND state<2");
+                                        "UPDATE job SET state=?3, problem=?4, finished=?5, suspect=0, alone=0,"
+                                        " result=?6 WHERE id=?1 AND attempt=?2 AND state<2");
   if (st) {
     sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
     sqlite3_bind_int(st, 2, c->attempt);
-    sqlite3_bind_int(st, 3, c->state);
-    sqlite3_bind_text(st, 4, c->problem, -1, SQLITE_STATIC);
-    sqlite3_bind_int64(st, 5, c->now);
+    sqlite3_bind_int(st, 3, (int)end->state);
+    sqlite3_bind_text(st, 4, end->problem, -1, SQLITE_STATIC);
+    sqlite3_bind_int64(st, 5, end->now);
+    sqlite3_bind_text(st, 6, end->mesh ? end->mesh : "", -1, SQLITE_STATIC);
   }
   int code = must_change(db, st);
-  if (code == SQLITE_OK && c->result) {
-    code = resource_insert(db, c->result);
+  if (code == SQLITE_OK && end->result) {
+    code = resource_insert(db, end->result);
   }
-  if (code == SQLITE_OK && c->state == API_JOB_SUCCEEDED) {
-    code = owner_of_job(db, c->id, c->now);
+  if (code == SQLITE_OK && end->state == API_JOB_SUCCEEDED && !end->mesh) {
+    code = owner_of_job(db, c->id, end->now);
   }
-  if (code == SQLITE_OK && c->event_json) {
-    code = write_event(db, c->id, c->event, api_job_state_name((api_job_state)c->state), c->event_json);
+  if (code == SQLITE_OK && end->event_json) {
+    code = write_event(db, c->id, end->event, api_job_state_name(end->state), end->event_json);
+  }
+  if (code == SQLITE_OK && end->event_json) {
+    code = delivery_announce(db, c->id, end->state, end->event_json, end->now);
   }
   return code;
 }
 
-store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, api_job_state state, const char *problem,
-                                  int64_t now, const resource *result, int64_t event, const char *event_json) {
-  change c = {.id = id,
-              .attempt = attempt,
-              .state = (int)state,
-              .problem = problem,
-              .now = now,
-              .result = result,
-              .event = event,
-              .event_json = event_json};
+store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, const job_end *end) {
+  change c = {.id = id, .attempt = attempt, .end = end};
   return catalogue_write(cat, finish, &c);
 }
 
@@ -176,6 +181,7 @@ static int read_row(sqlite3_stmt *st, void *to) {
   out->started = sqlite3_column_int64(st, 16);
   out->finished = sqlite3_column_int64(st, 17);
   row_text(st, 18, out->charged, sizeof out->charged);
+  row_text(st, 19, out->result, sizeof out->result);
   return out->request != NULL && !row_lacks(st, 14, out->problem);
 }
 static void release_row(void *row) {
@@ -237,7 +243,7 @@ static int give_up(database *db, job_row *row, const change *c) {
   int64_t number = 0;
   row->state = API_JOB_FAILED;
   api_job_write(&(api_job_view){.id = row->id,
-                                .key = row->key,
+                                .result = row->key,
                                 .problem = c->problem,
                                 .kind = row->kind,
                                 .state = row->state,
@@ -256,6 +262,7 @@ static int give_up(database *db, job_row *row, const change *c) {
   number = code == SQLITE_ROW ? sqlite3_column_int64(st, 0) : 0;
   sqlite3_reset(st);
   code = code == SQLITE_ROW ? write_event(db, row->id, number, api_job_state_name(row->state), json.data) : code;
+  code = code == SQLITE_OK ? delivery_announce(db, row->id, row->state, json.data, c->now) : code;
   api_text_free(&json);
   if (code == SQLITE_OK) {
     st = database_statement(db, "UPDATE job SET state=3, problem=?1, finished=?2 WHERE id=?3");
@@ -324,9 +331,10 @@ int64_t catalogue_jobs_ended(catalogue *cat) {
 
 static int forget(database *db, void *arg) {
   static const char *const steps[] = {"DELETE FROM event WHERE job IN (SELECT id" OLDEST_ENDED,
+                                      "DELETE FROM delivery WHERE state<>0 AND job IN (SELECT id" OLDEST_ENDED,
                                       "DELETE FROM job WHERE seq IN (SELECT seq" OLDEST_ENDED};
   int code = SQLITE_OK;
-  for (int i = 0; i < 2 && code == SQLITE_OK; i++) {
+  for (int i = 0; i < 3 && code == SQLITE_OK; i++) {
     sqlite3_stmt *st = database_statement(db, steps[i]);
     if (st) {
       sqlite3_bind_int(st, 1, *(const int *)arg);

@@ -196,7 +196,7 @@ int64_t catalogue_damaged(catalogue *cat) {
   sqlite3_stmt *st = database_statement(
       db, "SELECT (SELECT count(*) FROM resource WHERE NOT " DESCRIBES
           ") + (SELECT count(*) FROM owner WHERE json NOTNULL AND NOT " DESCRIBES
-          ") + (SELECT count(*) FROM job WHERE kind NOT IN (0, 1) OR state NOT BETWEEN 0 AND 4"
+          ") + (SELECT count(*) FROM job WHERE kind NOT IN (0, 1, 2) OR state NOT BETWEEN 0 AND 4"
           "  OR NOT json_valid(request)) + ((SELECT count(*) FROM secret WHERE length(bytes)=16) != 1)");
   return rows_integer(cat, db, st);
 }

@@ -1,6 +1,7 @@
 #include "worker/pool.h"
 
 #include <pthread.h>
+#include <semaphore.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,15 +17,19 @@
 #include "store/owners.h"
 #include "worker/run.h"
 
+enum { FETCHERS = 8 };
+
 typedef struct worker {
   worker_pool *pool;
   pthread_t thread;
-  int small_only, started;
+  queue_lane lane;
+  int started;
 } worker;
 
 struct worker_pool {
   worker_options options;
   run_env env;
+  sem_t checks; /* see fetch_options */
   int count;
   worker workers[];
 };
@@ -129,27 +134,72 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_prob
   api_text_free(&text);
 }
 
-static void run_claimed(worker_pool *pool, job *j, int threads) {
-  job_progress progress = {.q = pool->env.q, .j = j};
-  run_env env_of_job = pool->env, *env = &env_of_job;
-  env_of_job.progress = &progress;
+/* The context of a job; NULL after ending the job. */
+static orb_context *begin(worker_pool *pool, job *j, int threads, job_progress *progress) {
   orb_context_options options = {.memory_limit = (size_t)pool->options.job_memory,
                                  .threads = threads,
                                  .deadline_ms = orb_clock_ms() + pool->options.job_ms,
                                  .max_triangles = pool->options.max_triangles,
                                  .progress = progress_report,
-                                 .progress_user = &progress};
+                                 .progress_user = progress};
   orb_context *ctx = NULL;
+  api_problem problem = {0};
+  if (orb_context_create(&options, &ctx) != ORB_OK) {
+    api_refuse(&problem, "no-memory", "The server has no memory left; try again later.");
+    finish_failed(&pool->env, j, NULL, &problem);
+    api_problem_free(&problem);
+    return NULL;
+  }
+  queue_set_context(pool->env.q, j, ctx);
+  return ctx;
+}
+
+static void report(const job *j, int fine, double seconds) {
+  char fields[128];
+  metrics_job((int)job_kind(j), fine, seconds);
+  snprintf(fields, sizeof fields, "\"job\":\"%s\",\"seconds\":%.3f", job_id(j), seconds);
+  log_write(LOG_INFO, fields, "%s job %s", api_job_kind_name(job_kind(j)), fine ? "done" : "did not succeed");
+}
+
+static void fetch_one(worker_pool *pool, job *j) {
+  job_progress progress = {.q = pool->env.q, .j = j};
+  run_env env = pool->env;
+  char mesh[API_ID_SIZE];
+  int claimed;
+  api_problem problem = {0};
+  int64_t began = orb_clock_ms();
+  env.progress = &progress;
+  queue_show_running(env.q, j);
+  orb_context *ctx = begin(pool, j, 1, &progress);
+  if (!ctx) {
+    return;
+  }
+  int fine = run_fetch(&env, &pool->options.fetch, ctx, j, mesh, &claimed, &problem);
+  queue_set_context(env.q, j, NULL);
+  progress_enter(&progress, "");
+  report(j, fine, 1e-3 * (double)(orb_clock_ms() - began));
+  if (!claimed) {
+    queue_put_off(env.q, j);
+  } else if (fine) {
+    queue_finish_mesh(env.q, j, mesh);
+  } else {
+    finish_failed(&env, j, ctx, &problem);
+  }
+  api_problem_free(&problem);
+  orb_context_destroy(ctx);
+}
+
+static void run_claimed(worker_pool *pool, job *j, int threads) {
+  job_progress progress = {.q = pool->env.q, .j = j};
+  run_env env_of_job = pool->env, *env = &env_of_job;
+  env_of_job.progress = &progress;
   api_problem problem = {0};
   run_output out = {0};
   int64_t began = orb_clock_ms();
-  if (orb_context_create(&options, &ctx) != ORB_OK) {
-    api_refuse(&problem, "no-memory", "The server has no memory left; try again later.");
-    finish_failed(env, j, NULL, &problem);
-    api_problem_free(&problem);
+  orb_context *ctx = begin(pool, j, threads, &progress);
+  if (!ctx) {
     return;
   }
-  queue_set_context(env->q, j, ctx);
   FAULT_POINT("run-begun");
   FAULT_POINT(job_key(j));
   int embedding = job_kind(j) == API_JOB_EMBEDDING;
@@ -161,10 +211,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
   if (job_charged(j)[0]) {
     catalogue_key_use(env->cat, job_charged(j), (int64_t)time(NULL) / 86400, 0, (int64_t)(1e3 * seconds * threads));
   }
-  metrics_job(embedding, fine, seconds);
-  char fields[128];
-  snprintf(fields, sizeof fields, "\"job\":\"%s\",\"seconds\":%.3f", job_id(j), seconds);
-  log_write(LOG_INFO, fields, "%s job %s", api_job_kind_name(job_kind(j)), fine ? "done" : "did not succeed");
+  report(j, fine, seconds);
   if (fine) {
     if (embedding) {
       queue_add_embed_ms(env->q, j, 1e3 * seconds);
@@ -187,6 +234,10 @@ static void run_one(worker_pool *pool, job *j, int threads) {
   const run_env *env = &pool->env;
   if (queue_cancel_wanted(env->q, j)) {
     queue_finish(env->q, j, API_JOB_CANCELLED, NULL, NULL);
+    return;
+  }
+  if (job_kind(j) == API_JOB_FETCH) {
+    fetch_one(pool, j);
     return;
   }
   char *reason = queue_dependency_problem(env->q, j);
@@ -212,14 +263,15 @@ static void *worker_main(void *argument) {
   int threads;
   /* Gives requests precedence over jobs; threads that a job starts inherit the value. Failure is harmless. */
   (void)setpriority(PRIO_PROCESS, (id_t)gettid(), self->pool->options.nice);
-  while (queue_take(self->pool->env.q, self->small_only, &j, &threads)) {
+  while (queue_take(self->pool->env.q, self->lane, &j, &threads)) {
     run_one(self->pool, j, threads);
   }
   return NULL;
 }
 
 worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogue *cat, objects *store) {
-  int lanes = options->workers + (options->workers == 1); /* a single worker gets a second one for small jobs */
+  int computing = options->workers + (options->workers == 1); /* a single worker gets a second one for small jobs */
+  int lanes = computing + FETCHERS;
   worker_pool *pool = calloc(1, sizeof *pool + (size_t)lanes * sizeof(worker));
   if (!pool) {
     return NULL;
@@ -227,10 +279,12 @@ worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogu
   pool->options = *options;
   pool->env = (run_env){.q = q, .cat = cat, .store = store};
   pool->count = lanes;
+  sem_init(&pool->checks, 0, (unsigned)options->workers);
+  pool->options.fetch.checks = &pool->checks;
   for (int i = 0; i < lanes; i++) {
     worker *w = &pool->workers[i];
     w->pool = pool;
-    w->small_only = i >= options->workers;
+    w->lane = i >= computing ? QUEUE_FETCHES : i >= options->workers ? QUEUE_COMPUTES_SMALL : QUEUE_COMPUTES;
     w->started = pthread_create(&w->thread, NULL, worker_main, w) == 0;
     if (!w->started && i == 0) {
       free(pool);

@@ -11,7 +11,7 @@ void progress_enter(job_progress *progress, const char *stage) {
   }
   double now = orb_clock();
   if (progress->stage[0]) {
-    metrics_stage(job_kind(progress->j) == API_JOB_EMBEDDING, progress->stage, now - progress->began);
+    metrics_stage((int)job_kind(progress->j), progress->stage, now - progress->began);
   }
   snprintf(progress->stage, sizeof progress->stage, "%s", stage);
   progress->began = now;

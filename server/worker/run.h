@@ -2,9 +2,12 @@
 #ifndef ORB_WORKER_RUN_H
 #define ORB_WORKER_RUN_H
 
+#include <semaphore.h>
+
 #include "api/mesh_codec.h"
 #include "api/problem.h"
 #include "api/supermesh_codec.h"
+#include "net/networks.h"
 #include "queue/queue.h"
 #include "worker/progress.h"
 
@@ -25,6 +28,18 @@ typedef struct run_output {
  * error. */
 int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem);
 int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem);
+
+typedef struct fetch_options {
+  networks allowed;        /* besides public addresses */
+  const char *authorities; /* PEM file of certificate authorities; "": those of the system */
+  int64_t total_ms, most;  /* limits on the time and the bytes of a download */
+  int64_t disk_reserve;    /* bytes that it leaves free */
+  sem_t *checks;           /* limits how many check a mesh at once */
+} fetch_options;
+/* Downloads and stores the mesh of a taken job, and claims the job in between. 1 with the mesh; 0 with the problem as
+ * above, or with *claimed 0: the claim could not be stored. */
+int run_fetch(const run_env *env, const fetch_options *options, orb_context *ctx, job *j, char mesh[API_ID_SIZE],
+              int *claimed, api_problem *problem);
 
 /* A triangle of the file and its vertices in the file, recorded before the repair. */
 typedef struct file_triangle {

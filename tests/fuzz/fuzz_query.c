@@ -43,9 +43,9 @@ static void read_query(char *query, const char *prefer) {
   if (ms < -1 || ms > 60000 || preferred < 0 || preferred > 60000) {
     abort();
   }
-  upload_query upload;
+  api_upload upload;
   api_problem problem = {0};
-  if (parse_upload(name, repair, format, &upload, &problem)) {
+  if (api_upload_read(name, repair, format, &upload, &problem)) {
     char again[API_REPAIR_TEXT];
     unsigned flags;
     if (!api_repair_parse(upload.repair, &flags, again, &problem) || flags != upload.flags ||

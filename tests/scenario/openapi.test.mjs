@@ -8,7 +8,8 @@ import test from 'node:test';
 import { promisify } from 'node:util';
 import { gzipSync } from 'node:zlib';
 import Ajv2020 from 'ajv/dist/2020.js';
-import { binaries, daemon, endless, root, samples } from './support/daemon.mjs';
+import { binaries, daemon, endless, root, samples, until } from './support/daemon.mjs';
+import { origin } from './support/origin.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const document = JSON.parse(await readFile(path.join(root, 'api/openapi.json'), 'utf8'));
@@ -90,9 +91,9 @@ function hold(reply, method, target) {
 
 /** Requests to a daemon, each answer of which is checked against the document. */
 function held(d) {
-  const ask = async (method, target, { id, body, query, headers } = {}) =>
+  const ask = async (method, target, { id, k = 0, body, query, headers } = {}) =>
     hold(
-      await d.request(method, target.replace(/\{k\}/, 0).replace(/\{\w+\}/, id), { body, query, headers }),
+      await d.request(method, target.replace(/\{k\}/, k).replace(/\{\w+\}/, id), { body, query, headers }),
       method,
       target,
     );
@@ -458,6 +459,60 @@ test('answers about meshes', async (t) => {
     assert.equal((await ask(method, target, { id })).status, 404);
 });
 
+test('answers about meshes from a URL, and about webhooks', async (t) => {
+  const mesh = shapes.obj(shapes.egg(1));
+  const files = { '/egg.obj': mesh, '/open.obj': shapes.obj(shapes.withoutFace(shapes.egg(1))) };
+  const { url, requests } = await origin(t, (request, response) => {
+    response.statusCode = request.url in files || request.method === 'POST' ? 200 : 404;
+    response.end(files[request.url]);
+  });
+  const listed = ['--fetch-allow', '127.0.0.1', '--webhook-allow', '127.0.0.1'];
+  const d = await daemon(t, { args: listed });
+  const { ask } = held(d);
+  const end = async (reply) => {
+    assert.equal(reply.status, 202, reply.bytes.toString());
+    let job = reply.json;
+    while (job.finished === null) job = (await ask('GET', '/v1/jobs/{job}', { id: job.id, query: { wait: 20 } })).json;
+    return job;
+  };
+  const post = (body, headers) => ask('POST', '/v1/meshes', { body, headers });
+  const job = await end(await post({ url: `${url}/egg.obj`, name: 'egg', webhook: { url: `${url}/hook` } }));
+  assert.equal(job.state, 'succeeded');
+  for (const name of ['open.obj', 'none.obj', '%20'])
+    assert.equal((await end(await post({ url: `${url}/${name}` }))).state, 'failed');
+  assert.equal((await post({ url: `${url}/egg.obj` }, { prefer: 'wait=60' })).status, 200);
+  assert.equal((await post({ url: 'https://10.0.0.1/' })).status, 403);
+  assert.equal((await post({ link: url })).status, 422);
+  assert.equal((await post({ url: 'nowhere' })).status, 422);
+  assert.equal(
+    (await ask('POST', '/v1/meshes', { body: '{', headers: { 'content-type': 'application/json' } })).status,
+    400,
+  );
+  const id = job.result.split('/').pop();
+  const webhook = { url: 'https://10.0.0.1/' };
+  assert.equal((await ask('POST', '/v1/embeddings', { body: { mesh: id, webhook } })).status, 403);
+  const both = [{ mesh: id }, { mesh: id }];
+  assert.equal((await ask('POST', '/v1/supermeshes', { body: { shapes: both, webhook } })).status, 403);
+
+  await until(() => requests.some((r) => r.method === 'POST'), 'the message');
+  const { body, headers } = requests.find((r) => r.method === 'POST');
+  const sent = document.webhooks.jobEnded.post;
+  validate(sent.requestBody.content['application/json'].schema, JSON.parse(body), 'message');
+  for (const { name, schema, example } of sent.parameters) {
+    validate(schema, headers[name], name);
+    validate(schema, example, name);
+  }
+  await until(async () => {
+    const { json } = await ask('GET', '/v1/jobs/{job}/deliveries', { id: job.id });
+    return json.deliveries[0].state === 'delivered';
+  }, 'the delivery');
+  const again = (more) => ask('POST', '/v1/jobs/{job}/deliveries/{k}/retry', { id: job.id, ...more });
+  assert.equal((await again({ k: 1 })).status, 202);
+  assert.equal((await again({ k: 2 })).status, 404);
+  const unknown = { id: '0'.repeat(32) };
+  assert.equal((await ask('GET', '/v1/jobs/{job}/deliveries', unknown)).status, 404);
+});
+
 test('answers about embeddings, supermeshes and jobs', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const { ask } = held(d);
@@ -681,7 +736,7 @@ test('answers to callers without the right token', async (t) => {
   for (const [target, item] of Object.entries(document.paths))
     for (const verb of VERBS.filter((v) => item[v])) {
       const id = target.includes('{job}') ? '0'.repeat(32) : '0'.repeat(64);
-      const body = verb === 'post' ? Buffer.from('{}') : undefined;
+      const body = item[verb].requestBody ? Buffer.from('{}') : undefined;
       const guarded = item[verb].security.length > 0;
       const scope = /scope (\w+)/.exec(item[verb].description)?.[1];
       assert.equal((await ask(verb.toUpperCase(), target, { id, body })).status === 401, guarded, `${verb} ${target}`);

@@ -62,7 +62,8 @@ function bare(url, method, target, headers, body) {
 }
 
 test('sections name the facts that answers have', async (t) => {
-  const d = await daemon(t, { args: ['--max-body', '300K', '--queue-limit', '1', '--workers', '1'] });
+  const own = ['--fetch-allow', '127.0.0.1'];
+  const d = await daemon(t, { args: ['--max-body', '300K', '--queue-limit', '1', '--workers', '1', ...own] });
   const { obj, ball } = shapes;
   const met = new Set();
   const missing = [];
@@ -101,6 +102,9 @@ test('sections name the facts that answers have', async (t) => {
   await upload('unsupported-media-type', '--x', {}, { 'content-type': 'multipart/form-data; boundary=x' });
   await upload('bad-query', obj(m), { repare: 'safe' });
   meets('not-found', await d.get(`/v1/meshes/${'0'.repeat(64)}`));
+  meets('forbidden-address', await d.post('/v1/meshes', { url: 'https://10.0.0.1/' }));
+  const lost = await d.post('/v1/meshes', { url: `${d.url}/v1/meshes/${'0'.repeat(64)}/file` });
+  meets('fetch-failed', { json: (await d.ended(lost.json)).problem });
 
   const a = await d.mesh(path.join(samples, 'dog.obj'));
   const b = await d.mesh(path.join(samples, 'giraffe.off'));

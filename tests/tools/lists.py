@@ -25,7 +25,7 @@ SEPARATOR = r"[^\w]{1,12}(?:(?:or|and)[^\w]{1,6})?"  # between two words of a li
 # What a file writes for each word; ? is the word.
 PLACES = {
     "format": {
-        "api/openapi.json": '"?"', "server/http/parse.c": "?", "client/cli/options.c": "?", "deploy/man/orbmorph.1": " ? ",
+        "api/openapi.json": '"?"', "api/mesh_codec.c": "?", "client/cli/options.c": "?", "deploy/man/orbmorph.1": " ? ",
         "client/js/src/api.d.ts": "'?'", "client/js/example/index.html": ".?", "client/web/vite.config.ts": "?",
         "client/web/src/ui/shapes.tsx": ".?", "tests/bench/report.py": '".?"', "tests/fuzz/CMakeLists.txt": "?",
         "tests/fuzz/run.sh": "?", "tests/scenario/meshes.test.mjs": " ?: "},

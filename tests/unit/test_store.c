@@ -159,8 +159,8 @@ static void test_attempts(void **state) {
   event_row events[4];
   memcpy(result.id, job.key, sizeof result.id);
   make_id(result.sha, 'f');
-  assert_int_equal(catalogue_job_insert(s->cat, &job), STORE_OK);
-  assert_int_equal(catalogue_job_insert(s->cat, &job), STORE_CONFLICT); /* ids are unique */
+  assert_int_equal(catalogue_job_insert(s->cat, &job, NULL), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &job, NULL), STORE_CONFLICT); /* ids are unique */
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 2, 0, 10), STORE_CONFLICT);
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 1, 0, 10), STORE_OK);
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 1, 0, 11), STORE_CONFLICT);
@@ -170,12 +170,22 @@ static void test_attempts(void **state) {
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 1, 0, 20), STORE_OK);
   assert_int_equal(read_job(s, job.id).started, 10);
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 2, 0, 30), STORE_OK); /* taken over */
-  assert_int_equal(catalogue_job_finish(s->cat, job.id, 1, API_JOB_SUCCEEDED, NULL, 40, &result, 5, "{}"),
-                   STORE_CONFLICT);
+  assert_int_equal(
+      catalogue_job_finish(
+          s->cat, job.id, 1,
+          &(job_end){.state = API_JOB_SUCCEEDED, .result = &result, .now = 40, .event = 5, .event_json = "{}"}),
+      STORE_CONFLICT);
   assert_int_equal(catalogue_get(s->cat, RESOURCE_EMBEDDING, result.id, &got), STORE_NOT_FOUND); /* nor its result */
   assert_int_equal(catalogue_events(s->cat, job.id, 0, 4, events), 0);
-  assert_int_equal(catalogue_job_finish(s->cat, job.id, 2, API_JOB_SUCCEEDED, NULL, 50, &result, 6, "{}"), STORE_OK);
-  assert_int_equal(catalogue_job_finish(s->cat, job.id, 2, API_JOB_FAILED, "{}", 60, NULL, 7, "{}"), STORE_CONFLICT);
+  assert_int_equal(
+      catalogue_job_finish(
+          s->cat, job.id, 2,
+          &(job_end){.state = API_JOB_SUCCEEDED, .result = &result, .now = 50, .event = 6, .event_json = "{}"}),
+      STORE_OK);
+  assert_int_equal(catalogue_job_finish(
+                       s->cat, job.id, 2,
+                       &(job_end){.state = API_JOB_FAILED, .problem = "{}", .now = 60, .event = 7, .event_json = "{}"}),
+                   STORE_CONFLICT);
   assert_int_equal(catalogue_job_claim(s->cat, job.id, 3, 0, 70), STORE_CONFLICT);
   assert_int_equal(read_job(s, job.id).state, API_JOB_SUCCEEDED);
   assert_int_equal(catalogue_get(s->cat, RESOURCE_EMBEDDING, result.id, &got), STORE_OK);
@@ -192,9 +202,9 @@ static void test_recovery(void **state) {
   stored *s = *state;
   job_row a = new_job('a'), b = new_job('b'), waiting = new_job('c'), rows[4];
   event_row events[4];
-  assert_int_equal(catalogue_job_insert(s->cat, &a), STORE_OK);
-  assert_int_equal(catalogue_job_insert(s->cat, &b), STORE_OK);
-  assert_int_equal(catalogue_job_insert(s->cat, &waiting), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &a, NULL), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &b, NULL), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &waiting, NULL), STORE_OK);
   assert_int_equal(catalogue_job_claim(s->cat, a.id, 1, 0, 10), STORE_OK);
   assert_int_equal(catalogue_job_claim(s->cat, b.id, 1, 0, 10), STORE_OK);
   catalogue_event(s->cat, a.id, 3, "progress", "{}");
@@ -472,12 +482,19 @@ static void test_owners_of_results(void **state) {
   strcpy(eve.owner, "eve");
   job_row *jobs[] = {&ann, &bob, &eve};
   for (int i = 0; i < 3; i++) {
-    assert_int_equal(catalogue_job_insert(s->cat, jobs[i]), STORE_OK);
+    assert_int_equal(catalogue_job_insert(s->cat, jobs[i], NULL), STORE_OK);
     assert_int_equal(catalogue_job_claim(s->cat, jobs[i]->id, 1, 0, 10), STORE_OK);
   }
-  assert_int_equal(catalogue_job_finish(s->cat, ann.id, 1, API_JOB_SUCCEEDED, NULL, 50, &result, 5, "{}"), STORE_OK);
+  assert_int_equal(
+      catalogue_job_finish(
+          s->cat, ann.id, 1,
+          &(job_end){.state = API_JOB_SUCCEEDED, .result = &result, .now = 50, .event = 5, .event_json = "{}"}),
+      STORE_OK);
   assert_false(owns(s, RESOURCE_EMBEDDING, result.id, "bob"));
-  assert_int_equal(catalogue_job_finish(s->cat, bob.id, 1, API_JOB_SUCCEEDED, NULL, 86400123, NULL, 5, "{}"), STORE_OK);
+  assert_int_equal(
+      catalogue_job_finish(s->cat, bob.id, 1,
+                           &(job_end){.state = API_JOB_SUCCEEDED, .now = 86400123, .event = 5, .event_json = "{}"}),
+      STORE_OK);
   assert_int_equal(catalogue_get_of(s->cat, RESOURCE_EMBEDDING, result.id, "ann", &got), STORE_OK);
   assert_string_equal(got.json, result.json);
   resource_free(&got);
@@ -485,7 +502,10 @@ static void test_owners_of_results(void **state) {
   assert_string_equal(got.json, "{\"w\":1.50,\"created\":\"1970-01-02T00:00:00.123Z\"}");
   resource_free(&got);
   assert_int_equal(catalogue_delete(s->cat, RESOURCE_EMBEDDING, result.id), STORE_OK);
-  assert_int_equal(catalogue_job_finish(s->cat, eve.id, 1, API_JOB_SUCCEEDED, NULL, 70, NULL, 5, "{}"), STORE_CONFLICT);
+  assert_int_equal(
+      catalogue_job_finish(s->cat, eve.id, 1,
+                           &(job_end){.state = API_JOB_SUCCEEDED, .now = 70, .event = 5, .event_json = "{}"}),
+      STORE_CONFLICT);
   assert_int_equal(read_job(s, eve.id).state, API_JOB_RUNNING);
 }
 
@@ -509,7 +529,7 @@ static void test_owners_of_meshes(void **state) {
   job.listed = second.listed = 1;
   job.created = 86400123;
   strcpy(job.owner, "root");
-  assert_int_equal(catalogue_job_insert(s->cat, &job), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &job, NULL), STORE_OK);
   assert_int_equal(catalogue_get_of(s->cat, RESOURCE_MESH, mesh.id, "root", &got), STORE_OK);
   assert_string_equal(got.json, "{\"name\":\"\",\"created\":\"1970-01-02T00:00:00.123Z\"}");
   resource_free(&got);
@@ -518,7 +538,7 @@ static void test_owners_of_meshes(void **state) {
   assert_false(gone);
   assert_int_equal(catalogue_disown(s->cat, RESOURCE_MESH, mesh.id, "root", &gone), STORE_OK);
   assert_true(gone);
-  assert_int_equal(catalogue_job_insert(s->cat, &second), STORE_NOT_FOUND);
+  assert_int_equal(catalogue_job_insert(s->cat, &second, NULL), STORE_NOT_FOUND);
   job_row absent;
   assert_int_equal(catalogue_job_get(s->cat, second.id, &absent), STORE_NOT_FOUND);
   assert_int_equal(catalogue_mismatches(s->cat), 0);
@@ -530,11 +550,15 @@ static void test_forgetting(void **state) {
   job_row jobs[4] = {new_job('1'), new_job('2'), new_job('3'), new_job('4')}, got;
   event_row event;
   for (int i = 0; i < 4; i++) { /* the oldest is not ended */
-    assert_int_equal(catalogue_job_insert(s->cat, &jobs[i]), STORE_OK);
+    assert_int_equal(catalogue_job_insert(s->cat, &jobs[i], NULL), STORE_OK);
     assert_int_equal(catalogue_job_claim(s->cat, jobs[i].id, 1, 0, 10), STORE_OK);
     catalogue_event(s->cat, jobs[i].id, 1, "progress", "{}");
     if (i > 0) {
-      assert_int_equal(catalogue_job_finish(s->cat, jobs[i].id, 1, API_JOB_FAILED, "{}", 50, NULL, 5, "{}"), STORE_OK);
+      assert_int_equal(
+          catalogue_job_finish(
+              s->cat, jobs[i].id, 1,
+              &(job_end){.state = API_JOB_FAILED, .problem = "{}", .now = 50, .event = 5, .event_json = "{}"}),
+          STORE_OK);
     }
   }
   assert_int_equal(catalogue_jobs_ended(s->cat), 3);

@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "log.h"
+#include "store/deliveries.h"
 #include "store/owners.h"
 #include "store/tokens.h"
 #include "support_store.h"
@@ -37,9 +38,11 @@ static job_row new_job(int64_t number) {
   return row;
 }
 
+static const job_webhook webhook = {.url = "https://a.example/", .origin = "https://a.example:443", .events = 7};
+
 /* What the calls of a run returned. */
 typedef struct told {
-  store_result object, mesh, job, claim, finish, token, gone;
+  store_result object, mesh, job, claim, finish, record, token, gone;
 } told;
 
 static void check_resource(stored *s, const resource *wanted) {
@@ -80,6 +83,10 @@ static void check(stored *s, const told *t, int64_t number) {
     assert_int_equal(catalogue_events(s->cat, job.id, 3, 1, &event), 1);
     assert_int_equal(event.number, 4);
     free(event.json);
+    delivery_row announced;
+    assert_int_equal(catalogue_deliveries_of(s->cat, job.id, 1, &announced), 1);
+    assert_int_equal(announced.number, 1);
+    assert_true(t->record == STORE_OK ? announced.state == API_DELIVERY_DELIVERED : announced.attempts <= 1);
   }
 }
 
@@ -115,6 +122,23 @@ static void read_lists(stored *s, const told *t) {
   free(tokens);
 }
 
+/* Sends what is due, all to one receiver: STORE_OK if the job's message was among it and is recorded. */
+static store_result deliver(stored *s, const char *job) {
+  store_result result = STORE_NOT_FOUND;
+  for (int turn = 0; turn < 8 && result == STORE_NOT_FOUND; turn++) {
+    delivery_row due;
+    if (catalogue_deliveries_due(s->cat, 30, 8, 1, &due) < 1) {
+      return STORE_ERROR;
+    }
+    assert_true(due.body[0] == '{' && due.secret[0] == 'w');
+    due.state = API_DELIVERY_DELIVERED;
+    store_result recorded = catalogue_deliveries_record(s->cat, &due, 1, 40);
+    result = recorded != STORE_OK || strcmp(due.job, job) == 0 ? recorded : STORE_NOT_FOUND;
+    delivery_row_free(&due);
+  }
+  return result;
+}
+
 static told work(stored *s, int64_t number) {
   told t;
   int fresh, gone;
@@ -125,11 +149,16 @@ static told work(stored *s, int64_t number) {
   memcpy(token.hash, &number, sizeof number);
   t.object = objects_put(s->store, OBJECT_MESH, mesh.id, "hello", 5);
   t.mesh = catalogue_put_for(s->cat, &mesh, "me", 1000000000, &fresh);
-  t.job = catalogue_job_insert(s->cat, &job);
+  t.job = catalogue_job_insert(s->cat, &job, &webhook);
   t.claim = catalogue_job_claim(s->cat, job.id, 1, 0, 10);
   catalogue_event(s->cat, job.id, 3, "progress", "{}");
-  t.finish =
-      catalogue_job_finish(s->cat, job.id, 1, API_JOB_SUCCEEDED, NULL, 20, &result, 4, "{\"state\":\"succeeded\"}");
+  t.finish = catalogue_job_finish(s->cat, job.id, 1,
+                                  &(job_end){.state = API_JOB_SUCCEEDED,
+                                             .result = &result,
+                                             .now = 20,
+                                             .event = 4,
+                                             .event_json = "{\"state\":\"succeeded\"}"});
+  t.record = deliver(s, job.id);
   t.token = catalogue_token_add(s->cat, &token);
   read_lists(s, &t);
   t.gone = catalogue_disown(s->cat, RESOURCE_EMBEDDING, result.id, "me", &gone);
@@ -153,12 +182,13 @@ static int one_work(void *user, torture_kind kind, long number, int for_ever) {
   check(s, &t, s->number);
   if (!met) {
     assert_true(t.object == STORE_OK && t.mesh == STORE_OK && t.job == STORE_OK && t.claim == STORE_OK &&
-                t.finish == STORE_OK && t.token == STORE_OK && t.gone == STORE_OK);
+                t.finish == STORE_OK && t.record == STORE_OK && t.token == STORE_OK && t.gone == STORE_OK);
     assert_int_equal(catalogue_mismatches(s->cat), 0);
   }
   s->number++;
   told well = work(s, s->number);
-  assert_true(well.object == STORE_OK && well.mesh == STORE_OK && well.finish == STORE_OK && well.token == STORE_OK);
+  assert_true(well.object == STORE_OK && well.mesh == STORE_OK && well.finish == STORE_OK && well.record == STORE_OK &&
+              well.token == STORE_OK);
   tidy(s, s->number - 1);
   tidy(s, s->number);
   return met;
@@ -168,9 +198,9 @@ static int one_work(void *user, torture_kind kind, long number, int for_ever) {
 static int one_start(void *user, torture_kind kind, long number, int for_ever) {
   stored *s = user;
   job_row ran = new_job(++s->number), waits = new_job(++s->number), rows[8];
-  assert_int_equal(catalogue_job_insert(s->cat, &ran), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &ran, NULL), STORE_OK);
   assert_int_equal(catalogue_job_claim(s->cat, ran.id, 1, 1, 10), STORE_OK);
-  assert_int_equal(catalogue_job_insert(s->cat, &waits), STORE_OK);
+  assert_int_equal(catalogue_job_insert(s->cat, &waits, NULL), STORE_OK);
   catalogue_close(s->cat);
   s->cat = NULL;
   torture_arm(kind, number, for_ever);
@@ -193,7 +223,10 @@ static int one_start(void *user, torture_kind kind, long number, int for_ever) {
   assert_string_equal(got.problem, "{\"why\":1}");
   job_row_free(&got);
   assert_int_equal(catalogue_job_claim(s->cat, waits.id, 1, 0, 10), STORE_OK);
-  assert_int_equal(catalogue_job_finish(s->cat, waits.id, 1, API_JOB_CANCELLED, NULL, 20, NULL, 4, "{}"), STORE_OK);
+  assert_int_equal(
+      catalogue_job_finish(s->cat, waits.id, 1,
+                           &(job_end){.state = API_JOB_CANCELLED, .now = 20, .event = 4, .event_json = "{}"}),
+      STORE_OK);
   return met;
 }
 

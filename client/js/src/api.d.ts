@@ -85,6 +85,7 @@ export type EmbeddingRequest = {
   mesh: Id;
   method?: EmbeddingMethod;
   options?: EmbeddingOptions;
+  webhook?: WebhookRequest;
 };
 
 export type Certificate = {
@@ -246,6 +247,7 @@ export type SupermeshRequest = {
     /** Store the colours of later shapes as morphed attributes. Default: false. */
     colors?: boolean;
   };
+  webhook?: WebhookRequest;
 };
 
 /** The request with every member written out; of the embedding options, those that are not default. Sending it again names the same supermesh. */
@@ -428,9 +430,9 @@ export type SupermeshSummary = {
 export type Job = {
   id: JobId;
   url: string;
-  kind: 'embedding' | 'supermesh';
+  kind: 'embedding' | 'supermesh' | 'fetch';
   state: 'queued' | 'running' | 'succeeded' | 'failed' | 'cancelled';
-  /** The current step: read, simplify, embed, certify, align, remesh, transfer, write or store. */
+  /** The current step: download, check, read, simplify, embed, certify, align, remesh, transfer, write or store. */
   stage: string | null;
   /** The progress of the whole job. */
   progress: number;
@@ -443,6 +445,59 @@ export type Job = {
   created: Instant;
   started: Instant | null;
   finished: Instant | null;
+};
+
+/** Where the end of the job is announced. Part of the job, not of the id of its result. */
+export type WebhookRequest = {
+  /** https://, or http:// to an address that the operator has listed. */
+  url: string;
+  /** What is announced. Default: all of them. */
+  events?: Array<'succeeded' | 'failed' | 'cancelled'>;
+};
+
+export type FetchRequest = {
+  /** Where the file is: https://, or http:// to an address that the operator has listed. */
+  url: string;
+  /** 1 to 127 bytes of UTF-8 without control characters. Default: "mesh". */
+  name?: string;
+  /** The format to assume if the content does not determine it. */
+  format?: 'obj' | 'off' | 'ply' | 'stl' | 'gltf' | 'glb';
+  /** As of an upload. Default: "safe". */
+  repair?: string;
+  webhook?: WebhookRequest;
+};
+
+/** The message about the end of a job to one webhook. */
+export type Delivery = {
+  /** Among the deliveries of the job, from 1. */
+  number: number;
+  /** The webhook-id of the message, the same in every attempt. */
+  id: string;
+  /** The name of a webhook of the tenant; null: the request named the URL. */
+  webhook: string | null;
+  url: string;
+  type: 'job.succeeded' | 'job.failed' | 'job.cancelled';
+  state: 'pending' | 'delivered' | 'failed';
+  attempts: number;
+  /** Of the last answer. */
+  status: number | null;
+  /** Of the last attempt. */
+  error: string | null;
+  created: Instant;
+  /** Of a pending delivery. */
+  next_attempt: Instant | null;
+  finished: Instant | null;
+};
+
+export type DeliveryList = {
+  /** By number. */
+  deliveries: Delivery[];
+};
+
+export type WebhookMessage = {
+  type: 'job.succeeded' | 'job.failed' | 'job.cancelled';
+  timestamp: Instant;
+  data: Job;
 };
 
 export type MeshPage = {
@@ -627,6 +682,16 @@ export type ProblemForeignOrigin = {
   detail: string;
   /** The Origin header; absent where the browser sent none. */
   origin?: string;
+};
+
+export type ProblemForbiddenAddress = {
+  type: '/problems/forbidden-address';
+  title: 'The service does not connect to this address';
+  status: 403;
+  /** What is wrong and what to do. */
+  detail: string;
+  /** The URL of the request. */
+  url: string;
 };
 
 export type ProblemNotFound = {
@@ -920,6 +985,18 @@ export type ProblemQueueFull = {
   detail: string;
 };
 
+export type ProblemFetchFailed = {
+  type: '/problems/fetch-failed';
+  title: 'The file could not be fetched';
+  status: 502;
+  /** What is wrong and what to do. */
+  detail: string;
+  /** The URL of the request. */
+  url: string;
+  /** The status with which its server answered, if it did. */
+  answer?: number;
+};
+
 export type ProblemInternal = {
   type: '/problems/internal';
   title: 'Internal server error';
@@ -1015,4 +1092,4 @@ export type ProblemStorageFull = {
 };
 
 /** A problem document of RFC 9457; `type` identifies the problem. */
-export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemBadSignature | ProblemExpiredSignature | ProblemForeignHost | ProblemForeignOrigin | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemCancelled | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedMediaType | ProblemUnsupportedEncoding | ProblemPreconditionFailed | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemTimeout | ProblemNotReady | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;
+export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemBadSignature | ProblemExpiredSignature | ProblemForeignHost | ProblemForeignOrigin | ProblemForbiddenAddress | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemCancelled | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedMediaType | ProblemUnsupportedEncoding | ProblemPreconditionFailed | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemFetchFailed | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemTimeout | ProblemNotReady | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;

@@ -216,6 +216,19 @@ export class CancelledError extends Error {
   readonly job: Job;
 }
 
+/** What a webhook receives. */
+export interface WebhookMessage {
+  type: 'job.succeeded' | 'job.failed' | 'job.cancelled';
+  timestamp: string;
+  data: Job;
+}
+/** Throws unless the message is genuine and at most `tolerance` (300) seconds old. `body`: as it came. */
+export function verifyWebhook(
+  body: string | ArrayBuffer | ArrayBufferView,
+  headers: Headers | Record<string, string | string[] | undefined>,
+  secret: string,
+  options?: { tolerance?: number },
+): Promise<WebhookMessage>;
 export function signUrl(url: string | URL, options: SignOptions): Promise<string>;
 export function morph(sources: (Source | Mesh)[], options?: MorphOptions & ConnectOptions): Promise<Morph>;
 
@@ -223,6 +236,7 @@ declare const orbmorph: {
   Orbmorph: typeof Orbmorph;
   morph: typeof morph;
   signUrl: typeof signUrl;
+  verifyWebhook: typeof verifyWebhook;
   connect(server: string, options?: ConnectOptions): Orbmorph;
 };
 export default orbmorph;

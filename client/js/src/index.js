@@ -10,10 +10,12 @@
  */
 import { Orbmorph } from './client.js';
 import { signUrl } from './sign.js';
+import { verifyWebhook } from './webhook.js';
 
 export { Orbmorph } from './client.js';
 export { CancelledError, CorsError, ProblemError, UnreachableError } from './errors.js';
 export { signUrl } from './sign.js';
+export { verifyWebhook } from './webhook.js';
 
 export const morph = (sources, { server, token, ...options } = {}) =>
   new Orbmorph({ server, token }).morph(sources, options);
@@ -22,5 +24,6 @@ export default {
   Orbmorph,
   morph,
   signUrl,
+  verifyWebhook,
   connect: (server, options) => new Orbmorph({ server, ...options }),
 };

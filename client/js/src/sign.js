@@ -1,4 +1,6 @@
 /** Signed URLs. Only WebCrypto and URL are needed, so this runs in browsers, Deno and Node. */
+import { hmac, utf8 } from './hmac.js';
+
 const SPANS = { d: 86400, h: 3600, m: 60, s: 1 };
 
 /** Unix time in seconds of a Date, of a Unix time, or of a span from now such as "30d", "12h" or "90m". */
@@ -9,12 +11,6 @@ function moment(expires) {
   if (!Number.isSafeInteger(time) || time <= 0)
     throw new TypeError('expires must be a Date, a Unix time in seconds or a span such as "30d".');
   return time;
-}
-
-async function webCrypto() {
-  if (globalThis.crypto?.subtle) return globalThis.crypto;
-  const module = 'node:crypto'; // a variable, so that bundlers do not resolve it; Node 18 has no global crypto
-  return (await import(/* @vite-ignore */ module)).webcrypto;
 }
 
 /**
@@ -29,10 +25,7 @@ export async function signUrl(url, { key, secret, expires }) {
   if (['key', 'expires', 'signature'].some((name) => parsed.searchParams.has(name)))
     throw new TypeError('The URL is signed already.');
   const query = `${parsed.search ? `${parsed.search}&` : '?'}key=${key}&expires=${moment(expires)}`;
-  const { subtle } = await webCrypto();
-  const bytes = (s) => new TextEncoder().encode(s);
-  const hmac = await subtle.importKey('raw', bytes(secret), { name: 'HMAC', hash: 'SHA-256' }, false, ['sign']);
-  const mac = new Uint8Array(await subtle.sign('HMAC', hmac, bytes(parsed.pathname + query)));
+  const mac = await hmac(utf8(secret), utf8(parsed.pathname + query));
   const hex = Array.from(mac, (byte) => byte.toString(16).padStart(2, '0')).join('');
   const origin = parsed.host === 'orbmorph.invalid' ? '' : parsed.origin;
   return `${origin}${parsed.pathname}${query}&signature=${hex}${parsed.hash}`;

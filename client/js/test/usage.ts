@@ -31,6 +31,8 @@ export async function usage(a: File, b: Uint8Array) {
   const { id: landmarks_id } = await client.createLandmarks({ landmarks });
   const url: string = client.morphUrl({ shapes: [mesh.id, mesh.id], landmarks: landmarks_id, tolerance: 0.01 });
   const signed: string = await orbmorph.signUrl(url, { key: 'web', secret: 'secret', expires: '30d' });
+  const message = await orbmorph.verifyWebhook('{}', new Headers(), 'whsec_');
+  if (message.type === 'job.failed') console.log(message.data.problem?.detail);
   const sphere: ArrayBuffer = await client.alignedSphere(supermesh.id, 0);
   for await (const job of client.list('jobs', { state: 'running' })) job.progress?.toFixed(2);
   const names: string[] = [];

@@ -1,0 +1,35 @@
+/* A file that came by upload or by download becomes a stored mesh: http/meshes.c and worker/run_fetch.c do this in the
+ * same way.
+ *
+ * The mesh is checked even if another tenant already owns it: neither the answer nor its time may reveal that.
+ */
+#ifndef ORB_INTAKE_H
+#define ORB_INTAKE_H
+
+#include "api/mesh_codec.h"
+#include "store/catalogue.h"
+
+typedef struct intake_file {
+  object_temp *temp;
+  int64_t size;
+  const unsigned char *bytes; /* mapped */
+  const api_upload *upload;
+  orb_format format; /* as which the file is read */
+  char id[API_ID_SIZE], sha[API_ID_SIZE];
+} intake_file;
+
+/* Maps a complete temporary file and computes the id of its mesh. hash: of its bytes. 0: no memory. The file keeps
+ * pointers to temp and upload. */
+int intake_open(intake_file *file, object_temp *temp, const api_hash *hash, int64_t size, const api_upload *upload);
+void intake_close(intake_file *file); /* also deletes the temporary file if it is left */
+
+/* Reads, repairs and checks the mesh, publishes the file and makes the tenant an owner. `*fresh`: the tenant did not
+ * own it before. STORE_CONFLICT: the tenant's quota in bytes (0: no limit) has no room, and nothing is stored. A mesh
+ * that is refused leaves its problem, and STORE_OK. */
+store_result intake_store(const intake_file *file, catalogue *cat, objects *store, orb_context *ctx, const char *tenant,
+                          int64_t quota, int *fresh, api_problem *problem);
+
+/* Restores the object of a known mesh from this file if it is lost or truncated. */
+void intake_restore(const intake_file *file, objects *store);
+
+#endif

@@ -1,0 +1,166 @@
+/* A mesh from a URL: downloads the file, then takes it in as an upload is taken in (intake.h).
+ *
+ * The download comes before the claim, so that a crash of the process while it waits for a server does not make the job
+ * suspect. If the process dies between the commit of the mesh and the end of the job, the job runs again and finds the
+ * mesh.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "api/fetch_codec.h"
+#include "intake.h"
+#include "net/client.h"
+#include "store/owners.h"
+#include "worker/run.h"
+
+enum { REDIRECTS = 5, LOOK_BYTES = 1 << 20 };
+
+typedef struct download {
+  const run_env *env;
+  const fetch_options *options;
+  orb_context *ctx;
+  object_temp temp;
+  api_hash hash;
+  int64_t size;
+  store_result stored;
+} download;
+
+static int take(void *user, const char *bytes, size_t size) {
+  download *d = user;
+  int64_t before = d->size / LOOK_BYTES;
+  d->size += (int64_t)size;
+  if (d->size / LOOK_BYTES != before) {
+    progress_report(d->env->progress, "download", (double)d->size / (double)d->options->most);
+    if (objects_free_bytes(d->env->store) < (uint64_t)d->options->disk_reserve) {
+      d->stored = STORE_FULL;
+      return 0;
+    }
+  }
+  d->stored = objects_append(&d->temp, bytes, size);
+  api_hash_add(&d->hash, bytes, size);
+  return d->stored == STORE_OK;
+}
+
+static int continues(void *user) {
+  return orb_context_check(((download *)user)->ctx) == ORB_OK;
+}
+
+static int refuse_url(const api_fetch_request *wish, const char *name, const char *why, api_problem *problem) {
+  api_refuse(problem, name, "The file was not fetched: %s.", why);
+  api_json_member_string(&problem->facts, "url", wish->url);
+  return 0;
+}
+
+static int refuse(const download *d, const api_fetch_request *wish, const net_answer *answer, api_problem *problem) {
+  char why[64];
+  if (d->stored != STORE_OK) {
+    run_problem_of_store(d->stored, problem);
+    return 0;
+  }
+  switch (answer->end) {
+    case NET_STOPPED: /* cancelled: the context has the error */
+      return 0;
+    case NET_FORBIDDEN:
+      return refuse_url(wish, "forbidden-address", answer->why, problem);
+    case NET_TOO_LARGE:
+      api_refuse(problem, "too-large", "The file has more than %lld bytes, the limit of an upload.",
+                 (long long)d->options->most);
+      api_json_member_integer(&problem->facts, "limit", d->options->most);
+      return 0;
+    case NET_ANSWERED:
+      snprintf(why, sizeof why, "its server answered %d", answer->status);
+      refuse_url(wish, "fetch-failed", why, problem);
+      api_json_member_integer(&problem->facts, "answer", answer->status);
+      return 0;
+    default:
+      return refuse_url(wish, "fetch-failed", answer->why, problem);
+  }
+}
+
+static int get(download *d, const api_fetch_request *wish, api_problem *problem) {
+  const char *why;
+  net_url url;
+  net_answer answer = {0};
+  net_verdict verdict = net_url_read(wish->url, &d->options->allowed, &url, &why);
+  if (verdict != NET_URL_FINE) { /* the configuration has changed since the request */
+    return refuse_url(wish, verdict == NET_URL_FORBIDDEN ? "forbidden-address" : "fetch-failed",
+                      "its URL is refused now", problem);
+  }
+  d->stored = objects_begin(d->env->store, &d->temp);
+  if (d->stored != STORE_OK) {
+    return refuse(d, wish, &answer, problem);
+  }
+  api_hash_begin(&d->hash);
+  progress_report(d->env->progress, "download", 0);
+  net_get(&(net_request){.url = &url,
+                         .allowed = &d->options->allowed,
+                         .authorities = d->options->authorities,
+                         .total_ms = d->options->total_ms,
+                         .most = d->options->most,
+                         .take = take,
+                         .continues = continues,
+                         .user = d},
+          REDIRECTS, &answer);
+  int fine = answer.end == NET_ANSWERED && answer.status == 200 && d->stored == STORE_OK;
+  return fine || refuse(d, wish, &answer, problem);
+}
+
+/* The mesh if the tenant owns it already. */
+static store_result known(const run_env *env, const job *j, const char *id) {
+  resource row = {0};
+  const char *tenant = job_owner(j);
+  store_result found = tenant[0] ? catalogue_get_of(env->cat, RESOURCE_MESH, id, tenant, &row)
+                                 : catalogue_get(env->cat, RESOURCE_MESH, id, &row);
+  resource_free(&row);
+  return found;
+}
+
+static int store(download *d, const job *j, const api_fetch_request *wish, char mesh[API_ID_SIZE],
+                 api_problem *problem) {
+  const run_env *env = d->env;
+  intake_file file;
+  int fresh;
+  progress_report(env->progress, "check", 0);
+  if (!intake_open(&file, &d->temp, &d->hash, d->size, &wish->upload)) {
+    return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  }
+  memcpy(mesh, file.id, API_ID_SIZE);
+  store_result stored = known(env, j, file.id);
+  if (stored == STORE_OK) {
+    intake_restore(&file, env->store);
+  } else if (stored == STORE_NOT_FOUND) {
+    while (sem_wait(d->options->checks) != 0) { /* interrupted by a signal */
+    }
+    stored = intake_store(&file, env->cat, env->store, d->ctx, job_owner(j), wish->quota, &fresh, problem);
+    sem_post(d->options->checks);
+  }
+  intake_close(&file);
+  if (stored == STORE_CONFLICT) {
+    api_refuse(
+        problem, "quota-exceeded",
+        "The tenant may store %lld bytes of meshes, which leaves no room for this one: delete some meshes, or ask "
+        "the operator for a larger quota.",
+        (long long)wish->quota);
+    api_json_member_integer(&problem->facts, "quota", wish->quota);
+  } else if (stored != STORE_OK) {
+    run_problem_of_store(stored, problem);
+  }
+  return stored == STORE_OK && !problem->name && orb_context_check(d->ctx) == ORB_OK;
+}
+
+int run_fetch(const run_env *env, const fetch_options *options, orb_context *ctx, job *j, char mesh[API_ID_SIZE],
+              int *claimed, api_problem *problem) {
+  download d = {.env = env, .options = options, .ctx = ctx, .temp.fd = -1};
+  api_fetch_request *wish = malloc(sizeof *wish);
+  *claimed = 1;
+  int fine = wish ? api_fetch_request_load(job_request(j), wish, problem) && get(&d, wish, problem)
+                  : api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+  if (fine) {
+    *claimed = queue_claim(env->q, j) == STORE_OK;
+    fine = *claimed && store(&d, j, wish, mesh, problem);
+  }
+  objects_abandon(&d.temp);
+  free(wish);
+  return fine;
+}
