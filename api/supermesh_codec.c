@@ -125,6 +125,19 @@ static void write_landmarks(const api_supermesh_request *request, const orb_merg
   api_json_close(out, ']');
 }
 
+static void write_dropped(const orb_merge_result *result, api_text *out) {
+  api_json_key(out, "dropped");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < result->dropped_count; i++) {
+    api_json_open(out, '{');
+    api_json_member_string(out, "what", result->dropped[i].what);
+    api_json_member_string(out, "where", result->dropped[i].where);
+    api_json_member_string(out, "why", result->dropped[i].why);
+    api_json_close(out, '}');
+  }
+  api_json_close(out, ']');
+}
+
 static void write_timings(const orb_merge_timings *t, double embed_ms, api_text *out) {
   api_json_key(out, "timings_ms");
   api_json_open(out, '{');
@@ -158,6 +171,7 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   api_json_key(out, "pairs");
   api_pairs_write(result, out);
   api_json_member_number(out, "energy", result->alignment.energy);
+  write_dropped(result, out);
   write_timings(&result->timings, embed_ms, out);
   api_json_member_raw(out, "request", canonical.data);
   api_json_member_string(out, "engine", ORB_ENGINE);

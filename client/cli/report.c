@@ -101,7 +101,37 @@ void cli_print_supermesh(const cJSON *supermesh) {
     printf("  %d landmarks, %s (distance at most %s)\n", landmarks,
            cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "exact" : "not exact", error);
   }
+  int dropped = cJSON_GetArraySize(member(supermesh, "dropped"));
+  if (dropped) {
+    printf("  not in the asset: %d %s of the files, which a report names (--report)\n", dropped,
+           dropped == 1 ? "part" : "parts");
+  }
   printf("  time: %.3g s\n", cli_number(member(supermesh, "timings_ms"), "total") / 1000);
+}
+
+/* A text from a file, in a cell of a table. */
+static void markdown_text(FILE *out, const char *text) {
+  for (; *text; text++) {
+    if (strchr("|\\`*_<>[]", *text)) {
+      fputc('\\', out);
+    }
+    fputc((unsigned char)*text < ' ' ? ' ' : *text, out);
+  }
+}
+
+static void markdown_dropped(FILE *out, const cJSON *supermesh) {
+  const cJSON *entry, *list = member(supermesh, "dropped");
+  if (!cJSON_GetArraySize(list)) {
+    return;
+  }
+  fputs("\n## Not in the asset\n\n| what | where | why |\n|---|---|---|\n", out);
+  cJSON_ArrayForEach(entry, list) {
+    fputs("| ", out);
+    markdown_text(out, cli_string(entry, "what", "?"));
+    fputs(" | ", out);
+    markdown_text(out, cli_string(entry, "where", ""));
+    fprintf(out, " | %s |\n", cli_string(entry, "why", ""));
+  }
 }
 
 static void markdown_shapes(FILE *out, const cJSON *supermesh) {
@@ -166,6 +196,7 @@ static void markdown(FILE *out, const cJSON *supermesh) {
       fputs(" |\n", out);
     }
   }
+  markdown_dropped(out, supermesh);
   fputs("\n## Time\n", out);
   markdown_numbers(out, "Milliseconds", member(supermesh, "timings_ms"));
 }

@@ -26,6 +26,7 @@ void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
   orb_free(ctx, result->pairs);
   orb_free(ctx, result->transforms);
   orb_free(ctx, result->asset_vertices);
+  orb_free(ctx, result->dropped);
   orb_buffer_free(ctx, &result->asset);
   memset(result, 0, sizeof *result);
 }
@@ -84,6 +85,10 @@ orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char
          orb_asset_write_mapped(ctx, &out->supermesh, out->alignment.shapes, names, &options->asset, &out->asset_facts,
                                 &out->asset, &out->asset_vertices),
          fail);
+  ORB_GO(
+      status,
+      orb_asset_dropped(ctx, out->alignment.shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count),
+      fail);
   out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
   if (!out->transforms) {
     status = ORB_E_NO_MEMORY;

@@ -12,6 +12,7 @@
 #include "transfer/pack.h"
 #include "transfer/path.h"
 #include "transfer/split.h"
+#include "transfer/tangent.h"
 #include "transfer/texcoord.h"
 
 void orb_asset_defaults(orb_asset_options *options) {
@@ -42,6 +43,10 @@ static void draft_free(orb_context *ctx, orb_draft *draft) {
     if (draft->colors) {
       orb_wedges_free(ctx, &draft->colors[f]);
     }
+    if (draft->tangents) {
+      draft->tangents[f].of_corner = f ? NULL : draft->tangents[f].of_corner; /* that of the first frame */
+      orb_wedges_free(ctx, &draft->tangents[f]);
+    }
   }
   for (int32_t p = 0; p < draft->part_count; p++) {
     orb_free(ctx, draft->parts[p].indices);
@@ -53,6 +58,7 @@ static void draft_free(orb_context *ctx, orb_draft *draft) {
   orb_free(ctx, draft->deltas);
   orb_free(ctx, draft->normals);
   orb_free(ctx, draft->colors);
+  orb_free(ctx, draft->tangents);
   orb_free(ctx, draft->home);
   orb_free(ctx, draft->parts);
 }
@@ -216,6 +222,7 @@ orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *superme
   ORB_GO(status, make_colors(ctx, &draft), done);
   ORB_GO(status, make_textures(ctx, &draft), done);
   ORB_GO(status, orb_draft_path(ctx, &draft), done);
+  ORB_GO(status, orb_draft_tangents(ctx, &draft), done);
   ORB_GO(status, round_frames(ctx, &draft), done);
   ORB_GO(status, orb_draft_split(ctx, &draft), done);
   ORB_GO(status, orb_draft_write(ctx, &draft, names, facts ? facts : &unused, out), done);

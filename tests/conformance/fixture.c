@@ -82,7 +82,7 @@ static void dress(orb_context *ctx, orb_mesh *mesh, const double *points) {
   snprintf(mesh->images[0].mime, sizeof mesh->images[0].mime, "image/png");
   for (int m = 0; m < 2; m++) {
     mesh->materials[m] =
-        (orb_material){.base_color = {1, 0.5f, 0.25f * (float)m, 1}, .roughness = 0.5f, .image = m - 1};
+        (orb_material){.base_color = {1, 0.5f, 0.25f * (float)m, 1}, .roughness = 0.5f, .base_texture.image = m - 1};
     snprintf(mesh->materials[m].name, sizeof mesh->materials[m].name, "paint %d", m);
   }
   for (int t = 0; t < TRIANGLES; t++) {
@@ -309,8 +309,10 @@ static void make_painted(const char *folder, const char *name, orb_remesh_method
   first->materials = made(ORB_NEW0(ctx, orb_material, 1));
   first->images = made(ORB_NEW0(ctx, orb_image, 1));
   first->material_count = first->image_count = 1;
-  first->materials[0] = (orb_material){
-      .name = "tiles", .base_color = {1, 1, 1, 1}, .roughness = 1, .mag_filter = 9728, .min_filter = 9728};
+  first->materials[0] = (orb_material){.name = "tiles",
+                                       .base_color = {1, 1, 1, 1},
+                                       .roughness = 1,
+                                       .base_texture = {.mag_filter = 9728, .min_filter = 9728}};
   first->images[0].bytes = made(ORB_NEW(ctx, unsigned char, size));
   memcpy(first->images[0].bytes, png, size);
   first->images[0].size = size;

@@ -357,7 +357,7 @@ static void paint(orb_context *ctx, orb_mesh *mesh, const double *points) {
   mesh->material = ORB_NEW0(ctx, int32_t, mesh->triangle_count);
   mesh->materials = ORB_NEW0(ctx, orb_material, 2);
   mesh->material_count = 2;
-  mesh->materials[0].image = mesh->materials[1].image = -1;
+  mesh->materials[0].base_texture.image = mesh->materials[1].base_texture.image = -1;
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
     double x = 0, y = 0, z = 0;
     for (int k = 0; k < 3; k++) {

@@ -38,7 +38,8 @@ typedef struct orb_asset_facts {
  *
  * Normals: those of the file if it has any; vertices are split to keep its hard edges. Otherwise angle-weighted vertex
  * normals of the input surface, interpolated at each place. The copies of a split vertex have bit-equal POSITION and
- * deltas. Texture coordinates, materials and their images are those of the first shape.
+ * deltas. Texture coordinates, materials and their images are those of the first shape. Parts whose material has a
+ * texture that bends normals get tangents, which morph like normals.
  *
  * Two supermesh vertices that would coincide in every shape after rounding to float32 are kept distinct: the one that
  * is not a landmark, or else the one with the higher number, moves on the first shape by the fewest units in the last
@@ -49,6 +50,12 @@ ORB_API ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_su
                                                   const orb_aligned_shape *shapes, const char *const *names,
                                                   const orb_asset_options *options, orb_asset_facts *facts,
                                                   orb_buffer *out);
+
+/* Lists what the asset lacks of the files of its shapes: *list (allocated from the context, freed by the caller; NULL
+ * if empty) has *count entries, at most ORB_DROPPED_MAX. On an error *list is to be freed, too. */
+ORB_API ORB_MUST_CHECK orb_status orb_asset_dropped(orb_context *ctx, const orb_aligned_shape *shapes,
+                                                    int32_t shape_count, const orb_asset_options *options,
+                                                    orb_dropped **list, int32_t *count);
 
 /* How orb_asset_write() moves each shape: 16 doubles a shape, column-major as in glTF, which take the shape's own
  * coordinates to those of the asset. The identity for the first shape, and for all with ORB_FIT_NONE; else a rotation,
