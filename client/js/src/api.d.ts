@@ -376,6 +376,15 @@ export type Supermesh = {
   }>;
   /** The energy of the alignment; null if it was not measured. */
   energy: number | null;
+  /** What the files have and the asset lacks: parts of the first shape's materials, and data that no asset has, such as skins. The last entry of a long list counts the rest. */
+  dropped: Array<{
+    /** The part. */
+    what: string;
+    /** Its place in the file of the first shape, or the shape; empty for the whole file. */
+    where: string;
+    /** The reason. */
+    why: string;
+  }>;
   timings_ms: {
     embed: number;
     align: number;
