@@ -79,6 +79,20 @@ static int were_found(const cJSON *supermesh) {
   return member(cJSON_GetArrayItem(member(supermesh, "landmarks"), 0), "vertex") == NULL;
 }
 
+/* A line for each shape that the asset has moved. */
+static void print_fits(const cJSON *supermesh) {
+  const cJSON *shape;
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    const cJSON *fit = member(shape, "fit");
+    double up = cli_number(fit, "up_degrees");
+    if (fit && strcmp(cli_string(fit, "kind", "none"), "none") != 0) {
+      printf("  %-16s moved onto the first shape: scaled by %.3g, rotated by %.0f°, moved by %.2g diagonals%s\n",
+             cli_string(shape, "name", "?"), cli_number(fit, "scale"), cli_number(fit, "rotation_degrees"),
+             cli_number(fit, "translation_relative"), up > 60 ? "; its y axis turns over" : "");
+    }
+  }
+}
+
 void cli_print_supermesh(const cJSON *supermesh) {
   char vertices[32], triangles[32], error[32], rms[32];
   const cJSON *shape, *certificate = member(supermesh, "certificate");
@@ -93,6 +107,7 @@ void cli_print_supermesh(const cJSON *supermesh) {
     printf("  %-16s distance to its input: at most %s of the diagonal, RMS %s\n", cli_string(shape, "name", "?"), error,
            rms);
   }
+  print_fits(supermesh);
   if (landmarks && were_found(supermesh)) {
     printf("  %d landmarks found; 'orbmorph get %s --json' prints them\n", landmarks,
            cli_string(supermesh, "url", "?"));

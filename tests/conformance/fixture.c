@@ -322,6 +322,7 @@ static void make_painted(const char *folder, const char *name, orb_remesh_method
   orb_asset_options options;
   orb_remesh_defaults(&remesh);
   orb_asset_defaults(&options);
+  options.fit = ORB_FIT_NONE;
   remesh.method = method;
   if (status != ORB_OK || orb_buffer_printf(ctx, &text, "]}") != ORB_OK ||
       orb_remesh(ctx, shapes, SHAPES, 0, &remesh, &supermesh) != ORB_OK ||
@@ -349,6 +350,7 @@ int main(int argc, char **argv) {
   }
   orb_asset_options options;
   orb_asset_defaults(&options);
+  options.fit = ORB_FIT_NONE; /* the facts are in the coordinates of each shape */
   make(argv[1], "two", 2, 0, &options);
   make(argv[1], "six", 6, 0, &options);
   make(argv[1], "dressed", 3, 1, &options);
@@ -359,6 +361,7 @@ int main(int argc, char **argv) {
   options.path = ORB_PATH_RIGID;
   make(argv[1], "rigid", 3, 1, &options);
   orb_asset_defaults(&options);
+  options.fit = ORB_FIT_NONE;
   options.normals = 0;
   options.animation = ORB_ANIMATION_NONE;
   make(argv[1], "bare", 2, 0, &options);
