@@ -72,6 +72,19 @@ static void write_numbers(const char *name, const double *numbers, int32_t count
   api_json_close(out, ']');
 }
 
+/* What asset.fit did to a shape. */
+static void write_fit(const orb_fit_report *fit, api_text *out) {
+  static const char *const kinds[] = {"none", "rigid", "similarity"};
+  api_json_key(out, "fit");
+  api_json_open(out, '{');
+  api_json_member_string(out, "kind", kinds[fit->kind]);
+  api_json_member_number(out, "scale", fit->scale);
+  api_json_member_number(out, "rotation_degrees", fit->rotation_degrees);
+  api_json_member_number(out, "translation_relative", fit->translation_relative);
+  api_json_member_number(out, "up_degrees", fit->up_degrees);
+  api_json_close(out, '}');
+}
+
 static void write_shapes(const char *id, const api_supermesh_request *request, const orb_merge_result *result,
                          api_text *out) {
   api_json_key(out, "shapes");
@@ -83,6 +96,7 @@ static void write_shapes(const char *id, const api_supermesh_request *request, c
     api_json_key(out, "sphere");
     api_text_printf(out, "\"/v1/supermeshes/%s/spheres/%d.ply\"", id, s);
     api_shape_report_members(out, &result->shapes[s]);
+    write_fit(&result->fits[s], out);
     write_numbers("transform", result->transforms + 16 * (size_t)s, 16, out);
     api_json_close(out, '}');
   }
@@ -122,6 +136,19 @@ static void write_landmarks(const api_supermesh_request *request, const orb_merg
     api_json_close(out, '}');
   }
   write_found(result, found, out);
+  api_json_close(out, ']');
+}
+
+static void write_dropped(const orb_merge_result *result, api_text *out) {
+  api_json_key(out, "dropped");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < result->dropped_count; i++) {
+    api_json_open(out, '{');
+    api_json_member_string(out, "what", result->dropped[i].what);
+    api_json_member_string(out, "where", result->dropped[i].where);
+    api_json_member_string(out, "why", result->dropped[i].why);
+    api_json_close(out, '}');
+  }
   api_json_close(out, ']');
 }
 
@@ -183,6 +210,7 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   api_json_key(out, "pairs");
   api_pairs_write(result, out);
   api_json_member_number(out, "energy", result->alignment.energy);
+  write_dropped(result, out);
   write_timings(&result->timings, embed_ms, out);
   api_json_member_raw(out, "request", canonical.data);
   api_json_member_string(out, "engine", ORB_ENGINE);

@@ -14,7 +14,7 @@ static const char *const presets[] = {"default", "fast", "quality", NULL};
 static const char *const remeshes[] = {ORB_REMESH_METHODS(WORD) NULL};
 #undef WORD
 static const char *const animations[] = {"pingpong", "none", NULL};
-static const char *const fits[] = {"none", "rigid", "similarity", NULL};
+static const char *const fits[] = {"none", "rigid", "similarity", "auto", NULL};
 static const char *const paths[] = {"linear", "rigid", NULL};
 
 #define ALIGN(field) offsetof(orb_align_options, field)

@@ -25,7 +25,7 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_MAX_TRIANGLES] = {"max-triangles", 'n', "N", NULL, "make at most N triangles"},
     [OPT_NO_NORMALS] = {"no-normals", 0, NULL, NULL, "write no normals into the asset"},
     [OPT_ANIMATION] = {"animation", 0, "KIND", "pingpong none", "animation in the asset"},
-    [OPT_FIT] = {"fit", 0, "KIND", "none rigid similarity", "move the other shapes onto the first"},
+    [OPT_FIT] = {"fit", 0, "KIND", "auto none rigid similarity", "move the other shapes onto the first"},
     [OPT_PATH] = {"path", 0, "KIND", "linear rigid", "path of the vertices between shapes"},
     [OPT_SET] = {"set", 0, "NAME=VALUE", NULL, "set any member of the request, such as align.options.radius=0.5"},
     [OPT_NO_WAIT] = {"no-wait", 0, NULL, NULL, "print the job and do not wait for it"},

@@ -79,6 +79,20 @@ static int were_found(const cJSON *supermesh) {
   return member(cJSON_GetArrayItem(member(supermesh, "landmarks"), 0), "vertex") == NULL;
 }
 
+/* A line for each shape that the asset has moved. */
+static void print_fits(const cJSON *supermesh) {
+  const cJSON *shape;
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    const cJSON *fit = member(shape, "fit");
+    double up = cli_number(fit, "up_degrees");
+    if (fit && strcmp(cli_string(fit, "kind", "none"), "none") != 0) {
+      printf("  %-16s moved onto the first shape: scaled by %.3g, rotated by %.0f°, moved by %.2g diagonals%s\n",
+             cli_string(shape, "name", "?"), cli_number(fit, "scale"), cli_number(fit, "rotation_degrees"),
+             cli_number(fit, "translation_relative"), up > 60 ? "; its y axis turns over" : "");
+    }
+  }
+}
+
 void cli_print_supermesh(const cJSON *supermesh) {
   char vertices[32], triangles[32], error[32], rms[32];
   const cJSON *shape, *certificate = member(supermesh, "certificate");
@@ -93,6 +107,7 @@ void cli_print_supermesh(const cJSON *supermesh) {
     printf("  %-16s distance to its input: at most %s of the diagonal, RMS %s\n", cli_string(shape, "name", "?"), error,
            rms);
   }
+  print_fits(supermesh);
   if (landmarks && were_found(supermesh)) {
     printf("  %d landmarks found; 'orbmorph get %s --json' prints them\n", landmarks,
            cli_string(supermesh, "url", "?"));
@@ -101,7 +116,37 @@ void cli_print_supermesh(const cJSON *supermesh) {
     printf("  %d landmarks, %s (distance at most %s)\n", landmarks,
            cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "exact" : "not exact", error);
   }
+  int dropped = cJSON_GetArraySize(member(supermesh, "dropped"));
+  if (dropped) {
+    printf("  not in the asset: %d %s of the files, which a report names (--report)\n", dropped,
+           dropped == 1 ? "part" : "parts");
+  }
   printf("  time: %.3g s\n", cli_number(member(supermesh, "timings_ms"), "total") / 1000);
+}
+
+/* A text from a file, in a cell of a table. */
+static void markdown_text(FILE *out, const char *text) {
+  for (; *text; text++) {
+    if (strchr("|\\`*_<>[]", *text)) {
+      fputc('\\', out);
+    }
+    fputc((unsigned char)*text < ' ' ? ' ' : *text, out);
+  }
+}
+
+static void markdown_dropped(FILE *out, const cJSON *supermesh) {
+  const cJSON *entry, *list = member(supermesh, "dropped");
+  if (!cJSON_GetArraySize(list)) {
+    return;
+  }
+  fputs("\n## Not in the asset\n\n| what | where | why |\n|---|---|---|\n", out);
+  cJSON_ArrayForEach(entry, list) {
+    fputs("| ", out);
+    markdown_text(out, cli_string(entry, "what", "?"));
+    fputs(" | ", out);
+    markdown_text(out, cli_string(entry, "where", ""));
+    fprintf(out, " | %s |\n", cli_string(entry, "why", ""));
+  }
 }
 
 static void markdown_shapes(FILE *out, const cJSON *supermesh) {
@@ -166,6 +211,7 @@ static void markdown(FILE *out, const cJSON *supermesh) {
       fputs(" |\n", out);
     }
   }
+  markdown_dropped(out, supermesh);
   fputs("\n## Time\n", out);
   markdown_numbers(out, "Milliseconds", member(supermesh, "timings_ms"));
 }

@@ -72,6 +72,7 @@ static int read_primitive(glb_file *r, const cJSON *primitive, view_mesh *out, u
       glb_copy(r, attributes, "TEXCOORD_0", count, 2, out->texcoords + 2 * (size_t)*vertex) != 0) {
     return -1;
   }
+  view_material_move(&out->materials.list[material], out->texcoords + 2 * (size_t)*vertex, count);
   const cJSON *target = cJSON_GetObjectItemCaseSensitive(primitive, "targets");
   target = target ? target->child : NULL;
   for (uint32_t k = 0; k < out->target_count && target; k++, target = target->next) {

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/grow.h"
 #include "base/memory.h"
+#include "mesh/dropped.h"
 #include "mesh/polygon.h"
 #include "numeric/vec3.h"
 
@@ -23,9 +24,9 @@ void orb_build_init(orb_build *build, orb_context *ctx) {
 }
 
 void orb_build_free(orb_build *build) {
-  void *blocks[] = {build->positions,     build->colors,        build->normals,   build->texcoords,
-                    build->corner_vertex, build->corner_more,   build->face_size, build->face_material,
-                    build->materials,     build->material_slots};
+  void *blocks[] = {build->positions,     build->colors,         build->normals,         build->texcoords,
+                    build->corner_vertex, build->corner_more,    build->face_size,       build->face_material,
+                    build->materials,     build->material_slots, build->material_values, build->dropped};
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
     orb_free(build->ctx, blocks[i]);
   }
@@ -216,11 +217,15 @@ orb_status orb_build_use_material(orb_build *build, const unsigned char *name, s
   ORB_TRY(orb_build_grow(build->ctx, &build->materials, &build->materials_room, build->material_count + 1,
                          sizeof(orb_material)));
   orb_material *made = &build->materials[build->material_count];
-  *made = (orb_material){.base_color = {1, 1, 1, 1}, .metallic = 0, .roughness = 1, .image = -1};
+  *made = (orb_material){.base_color = {1, 1, 1, 1}, .metallic = 0, .roughness = 1, .base_texture.image = -1};
   memcpy(made->name, key, sizeof key);
   build->material = (int32_t)build->material_count++;
   slots[slot] = build->material + 1;
   return ORB_OK;
+}
+
+orb_status orb_build_drop(orb_build *build, const char *what, const char *where, const char *why) {
+  return orb_dropped_add(build->ctx, &build->dropped, &build->dropped_count, what, where, why);
 }
 
 static orb_status check_indices(orb_build *build, int is_text, int64_t end) {
@@ -422,6 +427,9 @@ static int32_t *identity(orb_context *ctx, int64_t count) {
 }
 
 static orb_status move_materials(orb_build *build, orb_mesh *mesh) {
+  mesh->dropped = build->dropped;
+  mesh->dropped_count = build->dropped_count;
+  build->dropped = NULL;
   if (!build->face_material) {
     return ORB_OK;
   }
@@ -429,7 +437,7 @@ static orb_status move_materials(orb_build *build, orb_mesh *mesh) {
   ORB_TRY(orb_build_grow(build->ctx, &build->materials, &build->materials_room, build->material_count + 1,
                          sizeof(orb_material)));
   build->materials[build->material_count] =
-      (orb_material){.base_color = {1, 1, 1, 1}, .metallic = 0, .roughness = 1, .image = -1};
+      (orb_material){.base_color = {1, 1, 1, 1}, .metallic = 0, .roughness = 1, .base_texture.image = -1};
   int plain = 0;
   for (int64_t f = 0; f < build->faces; f++) {
     plain |= build->face_material[f] < 0;
@@ -437,6 +445,9 @@ static orb_status move_materials(orb_build *build, orb_mesh *mesh) {
   mesh->materials = build->materials;
   mesh->material_count = (int32_t)build->material_count + plain;
   build->materials = NULL;
+  mesh->material_values = build->material_values;
+  mesh->material_value_count = (int32_t)build->value_count;
+  build->material_values = NULL;
   return ORB_OK;
 }
 

@@ -41,6 +41,10 @@ typedef struct orb_build {
   orb_material *materials;
   int32_t *material_slots;
   int64_t material_count, materials_room;
+  orb_material_value *material_values; /* those of one material after another */
+  int64_t value_count, value_room;
+  orb_dropped *dropped;
+  int32_t dropped_count;
   int64_t highest_vertex, highest_texcoord, highest_normal; /* indices that a face names, and where: line or offset */
   int64_t highest_vertex_where, highest_texcoord_where, highest_normal_where;
 } orb_build;
@@ -60,6 +64,9 @@ ORB_MUST_CHECK orb_status orb_build_face_end(orb_build *build, int64_t corners);
 
 /* Gives the named material to the faces to come. */
 ORB_MUST_CHECK orb_status orb_build_use_material(orb_build *build, const unsigned char *name, size_t length);
+
+/* Notes what the file has and the mesh does not; see orb_dropped_add(). */
+ORB_MUST_CHECK orb_status orb_build_drop(orb_build *build, const char *what, const char *where, const char *why);
 
 /* Fails with ORB_E_MALFORMED_MESH at a line of a text (is_text) or at a byte offset. */
 orb_status orb_build_malformed(orb_context *ctx, int is_text, int64_t where, const char *format, ...) ORB_PRINTF(4, 5);

@@ -13,6 +13,7 @@
 #include <cstring>
 #include <memory>
 #include <new>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,163 +23,33 @@ extern "C" {
 #include "format/json_check.h"
 #include "format/readers.h"
 #include "format/text.h"
-#include "format/texture.h"
 }
 
-#include "format/gltf_values.hh"
+#include "format/gltf_material.hh"
+#include "format/gltf_scene.hh"
+
+namespace gltf {
 
 namespace {
+
+const size_t VALUES_MAX = 1000000; /* of a document: cJSON takes 64 bytes or more for each */
 
 struct Reader {
   orb_context *ctx;
   size_t file_size;
-  const cJSON *doc = nullptr;
-  List accessors, views, meshes, image_list, textures, samplers;
-  Bytes chunk; /* of a GLB */
-  std::vector<Bytes> buffers;
-  std::vector<std::vector<unsigned char>> decoded;
+  const cJSON *doc;
+  List meshes;
+  Buffers buffers;
   orb_build build;
-  std::vector<orb_image> images;     /* owned: the context's memory, passed to the mesh or freed */
-  std::vector<int32_t> image_number; /* of each image of the file: its number in images, −1: none, −2: not yet known */
-  size_t image_bytes = 0;
+  Materials materials;
 
-  Reader(orb_context *context, size_t size) : ctx(context), file_size(size) { orb_build_init(&build, ctx); }
-  ~Reader() {
-    orb_build_free(&build);
-    for (orb_image &image : images) {
-      orb_free(ctx, image.bytes);
-    }
+  Reader(orb_context *context, size_t size, const cJSON *document)
+      : ctx(context), file_size(size), doc(document), materials(context, &build, &buffers, size) {
+    orb_build_init(&build, ctx);
   }
+  ~Reader() { orb_build_free(&build); }
   Reader(const Reader &) = delete;
   Reader &operator=(const Reader &) = delete;
-
-  void load_buffers() {
-    for (const cJSON *buffer : array_of(doc, "buffers")) {
-      if (!cJSON_IsObject(buffer)) {
-        malformed("A glTF buffer is not an object.");
-      }
-      size_t length = static_cast<size_t>(whole(buffer, "byteLength", 0));
-      std::string uri = text_of(buffer, "uri");
-      Bytes bytes;
-      if (uri.empty()) {
-        bytes = buffers.empty() ? chunk : Bytes();
-      } else if (uri.compare(0, 5, "data:") == 0) {
-        decoded.push_back(decode_uri(uri));
-        bytes = Bytes{decoded.back().data(), decoded.back().size()};
-      } else {
-        malformed("The glTF file keeps its data in another file (" + uri.substr(0, 80) +
-                  "); send a GLB, or a glTF file with embedded data.");
-      }
-      if (bytes.size < length) {
-        malformed("A glTF buffer announces " + std::to_string(length) + " bytes but has " + std::to_string(bytes.size) +
-                  ".");
-      }
-      bytes.size = length;
-      buffers.push_back(bytes);
-    }
-  }
-
-  Bytes view(int64_t index) const {
-    const cJSON *v = element(views, index, "buffer view");
-    int64_t buffer = whole(v, "buffer", NONE);
-    if (buffer < 0 || buffer >= static_cast<int64_t>(buffers.size())) {
-      malformed("A glTF buffer view refers to a missing buffer.");
-    }
-    const Bytes &bytes = buffers[static_cast<size_t>(buffer)];
-    size_t offset = static_cast<size_t>(whole(v, "byteOffset", 0));
-    size_t length = static_cast<size_t>(whole(v, "byteLength", 0));
-    if (offset > bytes.size || length > bytes.size - offset) {
-      malformed("A glTF buffer view reaches beyond its buffer.");
-    }
-    return Bytes{bytes.at + offset, length};
-  }
-
-  /* Reads `count` elements of `width` components from a view into `out`. */
-  void read_elements(int64_t view_index, size_t offset, size_t stride, int64_t type, bool normalized, size_t count,
-                     size_t width, std::vector<double> &out) const {
-    size_t size = static_cast<size_t>(component_size(type)), packed = size * width;
-    if (count == 0) {
-      return;
-    }
-    Bytes bytes = view(view_index);
-    stride = stride ? stride : packed;
-    if (offset > bytes.size || packed > bytes.size - offset || stride > STRIDE_MAX ||
-        (count - 1) > (bytes.size - offset - packed) / stride) {
-      malformed("A glTF accessor reaches beyond its buffer view.");
-    }
-    out.resize(count * width);
-    for (size_t i = 0; i < count; i++) {
-      const unsigned char *p = bytes.at + offset + i * stride;
-      for (size_t k = 0; k < width; k++) {
-        out[i * width + k] = component(p + k * size, type, normalized);
-      }
-    }
-  }
-
-  void apply_sparse(const cJSON *sparse, int64_t type, bool normalized, size_t count, size_t width,
-                    std::vector<double> &out) const {
-    const cJSON *indices = member(sparse, "indices"), *values = member(sparse, "values");
-    size_t changed = static_cast<size_t>(whole(sparse, "count", 0));
-    std::vector<double> where, what;
-    read_elements(whole(indices, "bufferView", NONE), static_cast<size_t>(whole(indices, "byteOffset", 0)), 0,
-                  whole(indices, "componentType", 0), false, changed, 1, where);
-    read_elements(whole(values, "bufferView", NONE), static_cast<size_t>(whole(values, "byteOffset", 0)), 0, type,
-                  normalized, changed, width, what);
-    for (size_t i = 0; i < changed; i++) {
-      if (!(where[i] >= 0 && where[i] < static_cast<double>(count))) {
-        malformed("A sparse glTF accessor changes an element that it does not have.");
-      }
-      for (size_t k = 0; k < width; k++) {
-        out[static_cast<size_t>(where[i]) * width + k] = what[i * width + k];
-      }
-    }
-  }
-
-  /* All elements of an accessor as doubles, `width` components each; *width is set. */
-  std::vector<double> accessor(int64_t index, size_t *width) const {
-    const cJSON *a = element(accessors, index, "accessor");
-    std::string shape = text_of(a, "type");
-    *width = shape == "SCALAR" ? 1 : shape == "VEC2" ? 2 : shape == "VEC3" ? 3 : shape == "VEC4" ? 4 : 0;
-    if (*width == 0) {
-      malformed("A glTF accessor of a mesh has the type \"" + shape.substr(0, 16) + "\".");
-    }
-    int64_t type = whole(a, "componentType", 0), source = whole(a, "bufferView", NONE);
-    size_t count = static_cast<size_t>(whole(a, "count", 0));
-    bool normalized = cJSON_IsTrue(member(a, "normalized"));
-    std::vector<double> out;
-    component_size(type);
-    if (source == NONE) { /* zeros, which the sparse part changes */
-      if (count > file_size) {
-        malformed("A glTF accessor announces more elements than the file could hold.");
-      }
-      out.assign(count * *width, 0);
-    } else {
-      const cJSON *v = element(views, source, "buffer view");
-      read_elements(source, static_cast<size_t>(whole(a, "byteOffset", 0)),
-                    static_cast<size_t>(whole(v, "byteStride", 0)), type, normalized, count, *width, out);
-    }
-    const cJSON *sparse = member(a, "sparse");
-    if (sparse) {
-      apply_sparse(sparse, type, normalized, count, *width, out);
-    }
-    return out;
-  }
-
-  /* An attribute of a primitive, or an empty list; `low` to `high` components are accepted. */
-  std::vector<double> attribute(const cJSON *primitive, const char *name, size_t count, size_t low, size_t high,
-                                size_t *width) const {
-    const cJSON *attributes = member(primitive, "attributes");
-    int64_t index = whole(attributes, name, NONE);
-    std::vector<double> out;
-    if (index == NONE) {
-      return out;
-    }
-    out = accessor(index, width);
-    if (*width < low || *width > high || out.size() != count * *width) {
-      malformed(std::string("The glTF attribute ") + name + " does not fit its POSITION.");
-    }
-    return out;
-  }
 
   void add_triangle(int64_t base, int64_t a, int64_t b, int64_t c, bool mirrored) {
     int64_t corner[3] = {a, mirrored ? c : b, mirrored ? b : c};
@@ -199,7 +70,7 @@ struct Reader {
       return out;
     }
     size_t width = 0;
-    out = accessor(index, &width);
+    out = buffers.accessor(index, &width);
     for (double value : out) {
       if (width != 1 || !(value >= 0 && value < static_cast<double>(vertices)) || value != std::floor(value)) {
         malformed("A glTF primitive names vertex " + std::to_string(value) + " of " + std::to_string(vertices) + ".");
@@ -240,7 +111,7 @@ struct Reader {
       return;
     }
     size_t width = 0;
-    std::vector<double> position = accessor(whole(member(primitive, "attributes"), "POSITION", NONE), &width);
+    std::vector<double> position = buffers.accessor(whole(member(primitive, "attributes"), "POSITION", NONE), &width);
     if (width != 3) {
       malformed("The glTF attribute POSITION does not have three components.");
     }
@@ -250,9 +121,9 @@ struct Reader {
       throw Fault{ORB_E_TOO_LARGE,
                   "The glTF file shows its meshes so often that they need more memory than the file justifies."};
     }
-    std::vector<double> normal = attribute(primitive, "NORMAL", count, 3, 3, &width);
-    std::vector<double> texcoord = attribute(primitive, "TEXCOORD_0", count, 2, 2, &width);
-    std::vector<double> color = attribute(primitive, "COLOR_0", count, 3, 4, &color_width);
+    std::vector<double> normal = buffers.attribute(primitive, "NORMAL", count, 3, 3, &width);
+    std::vector<double> texcoord = buffers.attribute(primitive, texcoord_of(primitive).c_str(), count, 2, 2, &width);
+    std::vector<double> color = buffers.attribute(primitive, "COLOR_0", count, 3, 4, &color_width);
     int64_t base = build.vertices;
     for (size_t i = 0; i < count; i++) {
       double p[3], n[3] = {0, 0, 0}, uv[2] = {0, 0};
@@ -276,156 +147,18 @@ struct Reader {
     }
   }
 
-  /* Whether any triangle primitive has this attribute: then all get it. */
-  bool any_has(const char *name) const {
+  /* The attribute whose texture coordinates the mesh gets. */
+  std::string texcoord_of(const cJSON *primitive) const {
+    return "TEXCOORD_" + std::to_string(materials.set_of(index_of(primitive, "material")));
+  }
+
+  /* Calls use(primitive) for all primitives of all meshes. */
+  template <typename Use>
+  void for_primitives(Use use) const {
     for (const cJSON *mesh : meshes) {
       for (const cJSON *primitive : array_of(mesh, "primitives")) {
-        if (member(member(primitive, "attributes"), name)) {
-          return true;
-        }
+        use(primitive);
       }
-    }
-    return false;
-  }
-
-  /* Mesh number and matrix of each node of the scene that shows a mesh, in depth-first order from the roots. */
-  std::vector<std::pair<int64_t, Matrix>> instances() const {
-    const List nodes = array_of(doc, "nodes"), scenes = array_of(doc, "scenes");
-    std::vector<std::pair<int64_t, Matrix>> stack, out;
-    if (!scenes.empty()) {
-      const cJSON *scene = element(scenes, whole(doc, "scene", 0), "scene");
-      for (const cJSON *root : array_of(scene, "nodes")) {
-        stack.emplace_back(number_of(root), Matrix());
-      }
-    } else if (!nodes.empty()) {
-      std::vector<bool> is_child(nodes.size(), false);
-      for (const cJSON *node : nodes) {
-        for (const cJSON *child : array_of(node, "children")) {
-          int64_t index = number_of(child);
-          if (index < static_cast<int64_t>(nodes.size())) {
-            is_child[static_cast<size_t>(index)] = true;
-          }
-        }
-      }
-      for (size_t i = 0; i < nodes.size(); i++) {
-        if (!is_child[i]) {
-          stack.emplace_back(static_cast<int64_t>(i), Matrix());
-        }
-      }
-    } else {
-      for (size_t i = 0; i < meshes.size(); i++) {
-        out.emplace_back(static_cast<int64_t>(i), Matrix());
-      }
-    }
-    std::vector<bool> seen(nodes.size(), false);
-    std::reverse(stack.begin(), stack.end());
-    while (!stack.empty()) {
-      auto [index, above] = stack.back();
-      stack.pop_back();
-      const cJSON *node = element(nodes, index, "node");
-      if (seen[static_cast<size_t>(index)]) {
-        malformed("Node " + std::to_string(index) + " of the glTF file is a child of two nodes, or of itself.");
-      }
-      seen[static_cast<size_t>(index)] = true;
-      Matrix matrix = above * matrix_of(node);
-      int64_t mesh = whole(node, "mesh", NONE);
-      if (mesh != NONE) {
-        out.emplace_back(mesh, matrix);
-      }
-      const List children = array_of(node, "children");
-      for (size_t i = children.size(); i-- > 0;) {
-        stack.emplace_back(number_of(children[i]), matrix);
-      }
-    }
-    return out;
-  }
-
-  static int64_t number_of(const cJSON *value) {
-    if (!cJSON_IsNumber(value) || !(value->valuedouble >= 0 && value->valuedouble <= INT32_MAX)) {
-      malformed("A glTF list of nodes contains something that is not an index.");
-    }
-    return static_cast<int64_t>(value->valuedouble);
-  }
-
-  /* The number in the result of an image of the file; −1 where its bytes are not in the file, or are not a picture. */
-  int32_t use_image(int64_t index) {
-    const cJSON *image = element(image_list, index, "image");
-    if (image_number[static_cast<size_t>(index)] != -2) {
-      return image_number[static_cast<size_t>(index)];
-    }
-    image_number[static_cast<size_t>(index)] = -1;
-    std::vector<unsigned char> own;
-    Bytes bytes;
-    std::string uri = text_of(image, "uri");
-    if (uri.compare(0, 5, "data:") == 0) {
-      own = decode_uri(uri);
-      bytes = Bytes{own.data(), own.size()};
-    } else if (member(image, "bufferView")) {
-      bytes = view(whole(image, "bufferView", NONE));
-    }
-    const char *type = orb_image_type(bytes.at, bytes.size);
-    image_bytes += bytes.size;
-    if (!type || image_bytes > 2 * file_size) {
-      return -1;
-    }
-    orb_image kept = {};
-    kept.bytes = static_cast<unsigned char *>(orb_alloc(ctx, bytes.size, 1));
-    if (!kept.bytes) {
-      throw Passed{ORB_E_NO_MEMORY};
-    }
-    std::memcpy(kept.bytes, bytes.at, bytes.size);
-    kept.size = bytes.size;
-    std::strcpy(kept.mime, type);
-    images.push_back(kept);
-    return image_number[static_cast<size_t>(index)] = static_cast<int32_t>(images.size() - 1);
-  }
-
-  void load_texture(const cJSON *pbr, orb_material *out) {
-    const cJSON *reference = member(pbr, "baseColorTexture");
-    int64_t index = whole(reference, "index", NONE);
-    if (index == NONE || whole(reference, "texCoord", 0) != 0) {
-      return;
-    }
-    const cJSON *texture = element(textures, index, "texture");
-    int64_t source = whole(texture, "source", NONE), sampler = whole(texture, "sampler", NONE);
-    out->image = source == NONE ? -1 : use_image(source);
-    if (sampler != NONE) {
-      const cJSON *s = element(samplers, sampler, "sampler");
-      out->wrap_s = orb_sampler_wrap(whole(s, "wrapS", 0));
-      out->wrap_t = orb_sampler_wrap(whole(s, "wrapT", 0));
-      out->mag_filter = orb_sampler_magnify(whole(s, "magFilter", 0));
-      out->min_filter = orb_sampler_minify(whole(s, "minFilter", 0));
-    }
-  }
-
-  void load_materials() {
-    const List materials = array_of(doc, "materials");
-    image_number.assign(image_list.size(), -2);
-    if (materials.size() > ORB_MATERIALS_MAX) {
-      throw Fault{ORB_E_TOO_LARGE, "The glTF file has too many materials."};
-    }
-    must(orb_build_grow(ctx, &build.materials, &build.materials_room, static_cast<int64_t>(materials.size()) + 1,
-                        sizeof(orb_material)));
-    for (const cJSON *material : materials) {
-      orb_material out = {};
-      double color[4] = {1, 1, 1, 1};
-      const cJSON *pbr = member(material, "pbrMetallicRoughness");
-      numbers(pbr, "baseColorFactor", color, 4);
-      for (int i = 0; i < 4; i++) {
-        out.base_color[i] = static_cast<float>(std::fmin(std::fmax(color[i], 0), 1));
-      }
-      auto factor = [&](const char *key) {
-        const cJSON *it = member(pbr, key);
-        double value = cJSON_IsNumber(it) ? it->valuedouble : 1;
-        return static_cast<float>(std::fmin(std::fmax(value, 0), 1));
-      };
-      out.metallic = factor("metallicFactor");
-      out.roughness = factor("roughnessFactor");
-      out.image = -1;
-      std::string name = text_of(material, "name");
-      std::memcpy(out.name, name.c_str(), std::min(name.size(), sizeof out.name - 1));
-      load_texture(pbr, &out);
-      build.materials[build.material_count++] = out;
     }
   }
 
@@ -439,29 +172,29 @@ struct Reader {
     }
   }
 
-  void read(orb_mesh *out) {
+  void read(Bytes chunk, orb_mesh *out) {
     if (!cJSON_IsObject(doc) || text_of(member(doc, "asset"), "version").compare(0, 2, "2.") != 0) {
       malformed("The file is not glTF 2.0.");
     }
     check_extensions();
-    accessors = array_of(doc, "accessors");
-    views = array_of(doc, "bufferViews");
     meshes = array_of(doc, "meshes");
-    image_list = array_of(doc, "images");
-    textures = array_of(doc, "textures");
-    samplers = array_of(doc, "samplers");
-    load_buffers();
-    load_materials();
+    buffers.load(doc, chunk, file_size);
+    materials.load(doc);
     build.by_vertex = 1;
     build.texcoords_v_down = 1;
-    std::vector<std::pair<int64_t, Matrix>> shown = instances();
+    std::vector<std::pair<int64_t, Matrix>> shown = shown_meshes(doc, meshes.size());
     std::vector<int64_t> first(meshes.size(), NONE);
     for (size_t i = 0; i < shown.size(); i++) {
       (void)element(meshes, shown[i].first, "mesh");
       int64_t &at = first[static_cast<size_t>(shown[i].first)];
       at = at == NONE ? static_cast<int64_t>(i) : at;
     }
-    bool normals = any_has("NORMAL"), texcoords = any_has("TEXCOORD_0");
+    bool normals = false, texcoords = false; /* if any triangle primitive has them, all get them */
+    for_primitives([&](const cJSON *primitive) {
+      const cJSON *attributes = member(primitive, "attributes");
+      normals |= member(attributes, "NORMAL") != nullptr;
+      texcoords |= member(attributes, texcoord_of(primitive).c_str()) != nullptr;
+    });
     auto add = [&](size_t mesh, const Matrix &matrix, bool visible) {
       for (const cJSON *primitive : array_of(meshes[mesh], "primitives")) {
         if (!cJSON_IsObject(primitive)) {
@@ -479,30 +212,45 @@ struct Reader {
         add(static_cast<size_t>(shown[i].first), shown[i].second, true);
       }
     }
-    finish(out);
+    note_dropped();
+    must(orb_build_finish(&build, 0, static_cast<int64_t>(file_size), out));
+    materials.finish(out);
   }
 
-  void finish(orb_mesh *out) {
-    orb_image *kept = nullptr;
-    if (!images.empty()) {
-      kept = static_cast<orb_image *>(orb_alloc(ctx, images.size(), sizeof(orb_image)));
-      if (!kept) {
-        throw Passed{ORB_E_NO_MEMORY};
+  /* Notes what a file may have besides a surface and its materials. */
+  void note_dropped() {
+    static const struct {
+      const char *what, *why;
+    } lists[] = {{"animations", "The only animation of the asset is the morph."},
+                 {"skins", "The asset has no skeleton."}};
+    auto drop = [&](const std::string &what, const char *why) { must(orb_build_drop(&build, what.c_str(), "", why)); };
+    for (const auto &list : lists) {
+      if (cJSON_GetArraySize(member(doc, list.what)) > 0) {
+        drop(list.what, list.why);
       }
     }
-    orb_status status = orb_build_finish(&build, 0, static_cast<int64_t>(file_size), out);
-    if (status != ORB_OK || !kept || !out->materials) {
-      orb_free(ctx, kept);
-      for (int32_t i = 0; status == ORB_OK && i < out->material_count; i++) {
-        out->materials[i].image = -1;
-      }
-      must(status);
-      return;
+    if (member(member(doc, "extensions"), "KHR_materials_variants")) {
+      drop("KHR_materials_variants", "The asset has one variant, the default one.");
     }
-    std::copy(images.begin(), images.end(), kept);
-    out->images = kept;
-    out->image_count = static_cast<int32_t>(images.size());
-    images.clear();
+    std::set<std::string> sets;
+    bool has_targets = false;
+    for_primitives([&](const cJSON *primitive) {
+      const cJSON *attributes = member(primitive, "attributes");
+      has_targets |= cJSON_GetArraySize(member(primitive, "targets")) > 0;
+      std::string kept = texcoord_of(primitive);
+      for (const cJSON *item = cJSON_IsObject(attributes) ? attributes->child : nullptr; item; item = item->next) {
+        bool is_set = std::strncmp(item->string, "TEXCOORD_", 9) == 0 || std::strncmp(item->string, "COLOR_", 6) == 0;
+        if (is_set && kept != item->string && std::strcmp(item->string, "COLOR_0") != 0 && sets.size() < 16) {
+          sets.insert(std::string(item->string).substr(0, 32));
+        }
+      }
+    });
+    for (const std::string &set : sets) {
+      drop(set, "The asset has one set of texture coordinates and one of colours.");
+    }
+    if (has_targets) {
+      drop("targets", "The targets of the asset are the other shapes.");
+    }
   }
 };
 
@@ -555,8 +303,6 @@ void read_document(orb_context *ctx, const unsigned char *bytes, size_t size, bo
   if (values > VALUES_MAX) {
     throw Fault{ORB_E_TOO_LARGE, "The JSON of the glTF file has too many values."};
   }
-  Reader reader(ctx, size);
-  reader.chunk = chunk;
   const char *end = nullptr;
   std::unique_ptr<cJSON, void (*)(cJSON *)> doc(
       cJSON_ParseWithLengthOpts(reinterpret_cast<const char *>(text.at), text.size, &end, 0), cJSON_Delete);
@@ -568,8 +314,8 @@ void read_document(orb_context *ctx, const unsigned char *bytes, size_t size, bo
     (void)orb_build_malformed(ctx, 0, at, "The JSON of the glTF file is not valid.");
     throw Passed{ORB_E_MALFORMED_MESH};
   }
-  reader.doc = doc.get();
-  reader.read(out);
+  Reader reader(ctx, size, doc.get());
+  reader.read(chunk, out);
 }
 
 /* No exception leaves it. */
@@ -599,12 +345,14 @@ orb_status read_either(orb_context *ctx, const unsigned char *bytes, size_t size
 
 }  // namespace
 
+}  // namespace gltf
+
 extern "C" orb_status orb_gltf_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out) {
-  return read_either(ctx, bytes, size, false, out);
+  return gltf::read_either(ctx, bytes, size, false, out);
 }
 
 extern "C" orb_status orb_glb_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out) {
-  return read_either(ctx, bytes, size, true, out);
+  return gltf::read_either(ctx, bytes, size, true, out);
 }
 
 /* A JSON object. */

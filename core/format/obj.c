@@ -1,5 +1,7 @@
 /* Wavefront OBJ: v (with colours after the position), vt, vn, f, usemtl; everything else is skipped. Indices may be
  * negative (counted back from the last element) or point forward. */
+#include <string.h>
+
 #include "base/check.h"
 #include "format/readers.h"
 #include "format/text.h"
@@ -125,6 +127,24 @@ static orb_status read_usemtl(obj_reader *r) {
   return orb_build_use_material(&r->build, first, (size_t)(last - first));
 }
 
+/* The file that holds the materials; an upload has only one file. */
+static orb_status note_library(obj_reader *r) {
+  char name[100] = "";
+  size_t length = 0;
+  orb_text text = r->text;
+  text.at += strlen("mtllib");
+  (void)orb_text_blanks(&text);
+  while (text.at < text.end && !orb_is_eol(*text.at) && length < sizeof name - 1) {
+    name[length++] = (char)*text.at++;
+  }
+  while (length > 0 && orb_is_blank((unsigned char)name[length - 1])) {
+    length--;
+  }
+  name[length] = 0;
+  return orb_build_drop(&r->build, "mtllib", name,
+                        "Materials of an OBJ are in another file. Export a GLB, which holds them.");
+}
+
 static orb_status read_line(obj_reader *r) {
   double value[3];
   const unsigned char *p = r->text.at;
@@ -151,6 +171,9 @@ static orb_status read_line(obj_reader *r) {
   if (orb_text_is(&r->text, "usemtl")) {
     r->text.at += length;
     return read_usemtl(r);
+  }
+  if (orb_text_is(&r->text, "mtllib") && r->build.dropped_count == 0) {
+    ORB_TRY(note_library(r));
   }
   if (*p < ' ' || *p == 127) {
     return malformed(r, "The file contains control characters where text should be.");

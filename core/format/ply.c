@@ -204,6 +204,10 @@ orb_status orb_ply_read(orb_context *ctx, const unsigned char *bytes, size_t siz
   for (int i = 0; i < r.header.elements && status == ORB_OK; i++) {
     status = read_element(&r, &r.header.element[i]);
   }
+  if (status == ORB_OK && r.header.names_texture) {
+    status = orb_build_drop(&r.build, "TextureFile", "",
+                            "The texture of a PLY is another file. Export a GLB, which holds it.");
+  }
   if (status == ORB_OK) {
     int is_text = r.header.encoding == PLY_ASCII;
     status = orb_build_finish(&r.build, is_text, is_text ? r.text.line : (int64_t)size, out);

@@ -196,7 +196,10 @@ orb_status orb_ply_header(orb_context *ctx, orb_text *text, ply_header *header) 
       status = read_element(ctx, text, header);
     } else if (is_word(word, length, "property")) {
       status = read_property(ctx, text, header);
-    } else if (length > 0 && !is_word(word, length, "comment") && !is_word(word, length, "obj_info")) {
+    } else if (is_word(word, length, "comment")) {
+      length = take_word(text, &word);
+      header->names_texture |= is_word(word, length, "TextureFile");
+    } else if (length > 0 && !is_word(word, length, "obj_info")) {
       status = malformed(ctx, text, "The PLY header has an unknown line.");
     }
     ORB_TRY(status);

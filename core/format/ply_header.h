@@ -43,6 +43,7 @@ typedef struct ply_element {
 typedef struct ply_header {
   enum { PLY_ASCII, PLY_LITTLE, PLY_BIG } encoding;
   int elements, properties;
+  int names_texture; /* a comment says "TextureFile" */
   ply_element element[PLY_ELEMENTS_MAX];
   ply_property property[PLY_PROPERTIES_MAX];
 } ply_header;

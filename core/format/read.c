@@ -1,9 +1,12 @@
 /* Mesh files in, GLB and sphere PLY out.
  *
- * In: read.c detects the format and calls a reader (obj.c, off.c, ply.c with ply_header.c, stl.c, gltf.cc with
- * gltf_values.hh). Readers take tokens from text.h and number.h or numbers from bytes.h, and fill an orb_build
- * (build.h), which becomes an orb_mesh. texture.c and json_check.c serve gltf.cc. Out: gltf_write.c writes the asset,
- * sphere_ply.c a mesh with its embedding.
+ * In: read.c detects the format and calls a reader (obj.c, off.c, ply.c with ply_header.c, stl.c, gltf.cc). Readers
+ * take tokens from text.h and number.h or numbers from bytes.h, and fill an orb_build (build.h), which becomes an
+ * orb_mesh. gltf.cc reads primitives; gltf_accessor.cc has their data, gltf_scene.cc the nodes, gltf_material.cc the
+ * materials (with texture.c), gltf_values.hh the JSON (with json_check.c).
+ *
+ * Out: gltf_write.c writes the asset, with gltf_write_material.c, and glb_text.c for the text; material_table.c says
+ * what materials may have. sphere_ply.c writes a mesh with its embedding.
  */
 #include <string.h>
 

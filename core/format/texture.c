@@ -114,6 +114,57 @@ const char *orb_image_type(const unsigned char *bytes, size_t size) {
   return is_png(bytes, size) ? "image/png" : is_jpeg(bytes, size) ? "image/jpeg" : NULL;
 }
 
+static int is_color_chunk(const unsigned char *chunk) {
+  static const char types[][5] = {"iCCP", "sRGB", "gAMA", "cHRM", "cICP", "mDCV", "cLLI"};
+  for (size_t i = 0; i < sizeof types / sizeof *types; i++) {
+    if (memcmp(chunk + 4, types[i], 4) == 0) {
+      return 1;
+    }
+  }
+  return memcmp(chunk + 4, "pHYs", 4) == 0 && memcmp(chunk + 8, chunk + 12, 4) != 0;
+}
+
+/* Moves the bytes from `from` to the end back to `to`; returns the new size. */
+static size_t close_gap(unsigned char *bytes, size_t size, size_t to, size_t from) {
+  memmove(bytes + to, bytes + from, size - from);
+  return size - (from - to);
+}
+
+static size_t strip_png(unsigned char *bytes, size_t size) {
+  size_t out = 8, at = 8;
+  while (memcmp(bytes + at + 4, "IDAT", 4) != 0) {
+    size_t length = PNG_AROUND + orb_read_u32(bytes + at, 1);
+    if (!is_color_chunk(bytes + at)) {
+      memmove(bytes + out, bytes + at, length);
+      out += length;
+    }
+    at += length;
+  }
+  return close_gap(bytes, size, out, at);
+}
+
+static size_t strip_jpeg(unsigned char *bytes, size_t size) {
+  enum { SOS = 0xda, APP2 = 0xe2 };
+  size_t out = 2, at = 2;
+  while (bytes[at + 1] != SOS) {
+    if (bytes[at + 1] == 0xff) { /* fill */
+      bytes[out++] = bytes[at++];
+      continue;
+    }
+    size_t length = 2 + (size_t)orb_read_u16(bytes + at + 2, 1);
+    if (bytes[at + 1] != APP2) {
+      memmove(bytes + out, bytes + at, length);
+      out += length;
+    }
+    at += length;
+  }
+  return close_gap(bytes, size, out, at);
+}
+
+size_t orb_image_strip(unsigned char *bytes, size_t size) {
+  return bytes[0] == 0xff ? strip_jpeg(bytes, size) : strip_png(bytes, size);
+}
+
 /* CLAMP_TO_EDGE, MIRRORED_REPEAT, REPEAT */
 int32_t orb_sampler_wrap(int64_t value) {
   return value == 33071 || value == 33648 || value == 10497 ? (int32_t)value : 0;

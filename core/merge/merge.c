@@ -25,7 +25,9 @@ void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
   orb_free(ctx, result->found_residuals);
   orb_free(ctx, result->pairs);
   orb_free(ctx, result->transforms);
+  orb_free(ctx, result->fits);
   orb_free(ctx, result->asset_vertices);
+  orb_free(ctx, result->dropped);
   orb_buffer_free(ctx, &result->asset);
   memset(result, 0, sizeof *result);
 }
@@ -84,13 +86,20 @@ orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char
          orb_asset_write_mapped(ctx, &out->supermesh, out->alignment.shapes, names, &options->asset, &out->asset_facts,
                                 &out->asset, &out->asset_vertices),
          fail);
+  ORB_GO(
+      status,
+      orb_asset_dropped(ctx, out->alignment.shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count),
+      fail);
   out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
-  if (!out->transforms) {
+  out->fits = ORB_NEW(ctx, orb_fit_report, shape_count);
+  if (!out->transforms || !out->fits) {
     status = ORB_E_NO_MEMORY;
     goto fail;
   }
-  ORB_GO(status, orb_asset_transforms(ctx, &out->supermesh, out->alignment.shapes, options->asset.fit, out->transforms),
-         fail);
+  ORB_GO(
+      status,
+      orb_asset_transforms(ctx, &out->supermesh, out->alignment.shapes, options->asset.fit, out->transforms, out->fits),
+      fail);
   for (int p = ORB_PROFILE_QUANTIZED; p < ORB_PROFILES; p++) {
     ORB_GO(status, orb_profile_write(ctx, out->asset.data, out->asset.size, (orb_profile)p, &out->profiles[p], NULL),
            fail);

@@ -16,15 +16,18 @@ void orb_mesh_drop_attributes(orb_context *ctx, orb_mesh *mesh) {
   for (int32_t i = 0; mesh->images && i < mesh->image_count; i++) {
     orb_free(ctx, mesh->images[i].bytes);
   }
-  void *blocks[] = {mesh->normals, mesh->texcoords, mesh->colors, mesh->material, mesh->materials, mesh->images};
+  void *blocks[] = {mesh->normals,   mesh->texcoords,       mesh->colors, mesh->material,
+                    mesh->materials, mesh->material_values, mesh->images, mesh->dropped};
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
     orb_free(ctx, blocks[i]);
   }
   mesh->normals = mesh->texcoords = mesh->colors = NULL;
   mesh->material = NULL;
   mesh->materials = NULL;
+  mesh->material_values = NULL;
   mesh->images = NULL;
-  mesh->material_count = mesh->image_count = 0;
+  mesh->dropped = NULL;
+  mesh->material_count = mesh->material_value_count = mesh->image_count = mesh->dropped_count = 0;
 }
 
 void orb_mesh_free(orb_context *ctx, orb_mesh *mesh) {
@@ -61,6 +64,9 @@ orb_status orb_mesh_copy(orb_context *ctx, const orb_mesh *mesh, orb_mesh *out) 
   copy.colors = copy_block(ctx, mesh->colors, 12 * t, sizeof(float), &good);
   copy.material = copy_block(ctx, mesh->material, t, sizeof(int32_t), &good);
   copy.materials = copy_block(ctx, mesh->materials, (size_t)mesh->material_count, sizeof(orb_material), &good);
+  copy.material_values =
+      copy_block(ctx, mesh->material_values, (size_t)mesh->material_value_count, sizeof(orb_material_value), &good);
+  copy.dropped = copy_block(ctx, mesh->dropped, (size_t)mesh->dropped_count, sizeof(orb_dropped), &good);
   copy.images = copy_block(ctx, mesh->images, (size_t)mesh->image_count, sizeof(orb_image), &good);
   for (int32_t i = 0; copy.images && i < copy.image_count; i++) {
     copy.images[i].bytes = good ? copy_block(ctx, mesh->images[i].bytes, mesh->images[i].size, 1, &good) : NULL;

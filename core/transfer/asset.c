@@ -1,6 +1,7 @@
 /* orb_asset_write(): the steps listed in draft.h, in their order. */
 #include "orbmorph/asset.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/check.h"
@@ -12,10 +13,11 @@
 #include "transfer/pack.h"
 #include "transfer/path.h"
 #include "transfer/split.h"
+#include "transfer/tangent.h"
 #include "transfer/texcoord.h"
 
 void orb_asset_defaults(orb_asset_options *options) {
-  *options = (orb_asset_options){.normals = 1, .path_steps = 3};
+  *options = (orb_asset_options){.normals = 1, .fit = ORB_FIT_AUTO, .path_steps = 3};
 }
 
 static orb_status check_options(orb_context *ctx, const orb_supermesh *supermesh, const orb_asset_options *options) {
@@ -42,6 +44,10 @@ static void draft_free(orb_context *ctx, orb_draft *draft) {
     if (draft->colors) {
       orb_wedges_free(ctx, &draft->colors[f]);
     }
+    if (draft->tangents) {
+      draft->tangents[f].of_corner = f ? NULL : draft->tangents[f].of_corner; /* that of the first frame */
+      orb_wedges_free(ctx, &draft->tangents[f]);
+    }
   }
   for (int32_t p = 0; p < draft->part_count; p++) {
     orb_free(ctx, draft->parts[p].indices);
@@ -53,6 +59,7 @@ static void draft_free(orb_context *ctx, orb_draft *draft) {
   orb_free(ctx, draft->deltas);
   orb_free(ctx, draft->normals);
   orb_free(ctx, draft->colors);
+  orb_free(ctx, draft->tangents);
   orb_free(ctx, draft->home);
   orb_free(ctx, draft->parts);
 }
@@ -89,8 +96,10 @@ static orb_status make_shapes(orb_context *ctx, orb_draft *draft) {
     if (s > 0 && draft->options->fit != ORB_FIT_NONE) {
       orb_motion motion;
       ORB_TRY(orb_fit_motion(ctx, supermesh, draft->positions[0], draft->positions[s], draft->options->fit, &motion));
-      orb_motion_apply(&motion, draft->positions[s], supermesh->vertex_count);
-      if (draft->normals) {
+      if (motion.kind != ORB_FIT_NONE) {
+        orb_motion_apply(&motion, draft->positions[s], supermesh->vertex_count);
+      }
+      if (draft->normals && motion.kind != ORB_FIT_NONE) {
         orb_motion_rotate(&motion, draft->normals[s].values, draft->normals[s].value_count);
       }
     }
@@ -216,6 +225,7 @@ orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *superme
   ORB_GO(status, make_colors(ctx, &draft), done);
   ORB_GO(status, make_textures(ctx, &draft), done);
   ORB_GO(status, orb_draft_path(ctx, &draft), done);
+  ORB_GO(status, orb_draft_tangents(ctx, &draft), done);
   ORB_GO(status, round_frames(ctx, &draft), done);
   ORB_GO(status, orb_draft_split(ctx, &draft), done);
   ORB_GO(status, orb_draft_write(ctx, &draft, names, facts ? facts : &unused, out), done);
@@ -240,8 +250,16 @@ static void motion_matrix(const orb_motion *motion, double out[16]) {
   out[15] = 1;
 }
 
+static orb_fit_report report_of(const orb_motion *motion, double diagonal) {
+  return (orb_fit_report){.kind = motion->kind,
+                          .scale = motion->scale,
+                          .rotation_degrees = orb_motion_degrees(motion),
+                          .translation_relative = motion->moves > 0 ? motion->moves / diagonal : 0,
+                          .up_degrees = acos(fmax(-1, fmin(1, motion->rotation[1][1]))) * 180 / M_PI};
+}
+
 orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
-                                orb_fit fit, double *out) {
+                                orb_fit fit, double *out, orb_fit_report *reports) {
   int32_t vertices = supermesh->vertex_count;
   double *fixed = ORB_NEW(ctx, double, 3 * (int64_t)vertices), *moved = ORB_NEW(ctx, double, 3 * (int64_t)vertices);
   orb_status status = fixed && moved ? ORB_OK : ORB_E_NO_MEMORY;
@@ -255,6 +273,10 @@ orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh
       }
     }
     motion_matrix(&motion, out + 16 * (int64_t)s);
+    if (reports) {
+      double diagonal = fit != ORB_FIT_NONE ? orb_fit_diagonal(fixed, vertices) : 0;
+      reports[s] = report_of(&motion, diagonal);
+    }
   }
 end:
   orb_free(ctx, fixed);

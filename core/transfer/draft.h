@@ -2,9 +2,9 @@
  *
  *   frames:  the shapes, fitted, and in-betweens, as doubles    (asset.c, path.c)
  *   rounded: base and deltas as float32, vertices kept distinct (distinct.c)
- *   wedges:  normals, texture coordinates, colours at corners   (wedge.c, texcoord.c)
+ *   wedges:  normals, texture coordinates, colours at corners   (wedge.c, texcoord.c, tangent.c)
  *   split:   the vertices of the file, by material              (split.c)
- *   packed:  the binary chunk and its accessors                 (pack.c)
+ *   packed:  the binary chunk and its accessors                 (pack.c, materials.c)
  */
 #ifndef ORB_TRANSFER_DRAFT_H
 #define ORB_TRANSFER_DRAFT_H
@@ -31,6 +31,7 @@ typedef struct orb_draft {
   orb_wedges *normals;  /* frame_count; NULL: none */
   orb_wedges *colors;   /* shape_count; width 0: none */
   orb_wedges texcoords; /* of the first shape; width 0: none */
+  orb_wedges *tangents; /* frame_count; NULL: no material needs them */
   int32_t color_count;  /* frames whose colours are written: 0, 1 or all */
   int32_t *home;        /* per supermesh triangle: the first shape's triangle that holds its centre; NULL: not needed */
   int32_t part_count;

@@ -10,6 +10,9 @@
 
 /* Height over length below which points count as lying on a line: a rotation about it would be arbitrary. */
 static const double FLAT = 1e-3;
+/* AUTO: frames clearly differ beyond any of these. Units (of powers of ten, inches) differ by 2.54 or more and axes by
+ * 90°; shapes that were modelled in one frame rarely differ by this much. */
+static const double SCALE_DIFFERS = 1.5, DEGREES_DIFFER = 30, DIAGONALS_DIFFER = 0.5;
 
 /* Weighted points of both shapes. index NULL: all vertices; weight NULL: 1. */
 typedef struct fit_points {
@@ -99,16 +102,36 @@ static void solve(const fit_points *points, orb_fit fit, orb_motion *out) {
   orb_rotation_fit(h, q);
   orb_rotation_matrix(q, rotation);
   memcpy(out->rotation, rotation, sizeof rotation);
-  out->scale =
-      fit == ORB_FIT_SIMILARITY && spread_moved > 0 && spread_fixed > 0 ? sqrt(spread_fixed / spread_moved) : 1;
+  out->moves = sqrt(orb_distance2(fixed, moved));
+  out->scale = fit != ORB_FIT_RIGID && spread_moved > 0 && spread_fixed > 0 ? sqrt(spread_fixed / spread_moved) : 1;
   for (int c = 0; c < 3; c++) {
     out->shift[c] = fixed[c] - out->scale * orb_dot(out->rotation[c], moved);
   }
 }
 
+double orb_motion_degrees(const orb_motion *motion) {
+  double trace = motion->rotation[0][0] + motion->rotation[1][1] + motion->rotation[2][2];
+  return acos(fmax(-1, fmin(1, (trace - 1) / 2))) * 180 / M_PI;
+}
+
+double orb_fit_diagonal(const double *positions, int32_t count) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  for (int64_t i = 0; i < 3 * (int64_t)count; i++) {
+    low[i % 3] = fmin(low[i % 3], positions[i]);
+    high[i % 3] = fmax(high[i % 3], positions[i]);
+  }
+  return sqrt(orb_distance2(low, high));
+}
+
+static int frames_differ(const orb_motion *motion, double diagonal) {
+  return motion->scale > SCALE_DIFFERS || motion->scale < 1 / SCALE_DIFFERS ||
+         orb_motion_degrees(motion) > DEGREES_DIFFER || motion->moves > DIAGONALS_DIFFER * diagonal;
+}
+
 orb_status orb_fit_motion(orb_context *ctx, const orb_supermesh *supermesh, const double *fixed, const double *moved,
                           orb_fit fit, orb_motion *out) {
-  *out = (orb_motion){.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .scale = 1};
+  const orb_motion stay = {.rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .scale = 1};
+  *out = stay;
   if (fit == ORB_FIT_NONE) {
     return ORB_OK;
   }
@@ -131,7 +154,11 @@ orb_status orb_fit_motion(orb_context *ctx, const orb_supermesh *supermesh, cons
       add_areas(supermesh, moved, weight);
       points.weight = weight;
     }
+    out->kind = fit == ORB_FIT_RIGID ? ORB_FIT_RIGID : ORB_FIT_SIMILARITY;
     solve(&points, fit, out);
+    if (fit == ORB_FIT_AUTO && !frames_differ(out, orb_fit_diagonal(fixed, supermesh->vertex_count))) {
+      *out = stay;
+    }
   }
   orb_free(ctx, index);
   orb_free(ctx, weight);

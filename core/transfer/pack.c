@@ -11,6 +11,7 @@
 #include "base/context.h"
 #include "base/memory.h"
 #include "format/gltf_write.h"
+#include "transfer/materials.h"
 
 /* The animation, in seconds: how long a shape stays, and how long the way to the next one takes. */
 static const double HOLD = 0.5, MOVE = 1.5;
@@ -109,12 +110,16 @@ static orb_status add_part(packer *pack, const orb_draft_part *part, orb_gltf_pr
                            orb_gltf_attributes *targets) {
   const orb_draft *draft = pack->draft;
   primitive->material = draft->shapes[0].mesh.material_count > 0 ? part->material : 0;
-  primitive->base = (orb_gltf_attributes){-1, -1, -1, -1};
+  primitive->base = (orb_gltf_attributes){-1, -1, -1, -1, -1};
   primitive->targets = targets;
   ORB_TRY(add_indices(pack, part, &primitive->indices));
   ORB_TRY(add_positions(pack, part, draft->base, &primitive->base.position));
   if (draft->normals) {
     ORB_TRY(add_wedges(pack, part, &draft->normals[0], NULL, &primitive->base.normal));
+  }
+  int has_tangents = draft->tangents && orb_material_tangents(&draft->shapes[0].mesh, part->material, draft->options);
+  if (has_tangents) {
+    ORB_TRY(add_wedges(pack, part, &draft->tangents[0], NULL, &primitive->base.tangent));
   }
   if (draft->texcoords.width) {
     ORB_TRY(add_wedges(pack, part, &draft->texcoords, NULL, &primitive->base.texcoord));
@@ -123,10 +128,13 @@ static orb_status add_part(packer *pack, const orb_draft_part *part, orb_gltf_pr
     ORB_TRY(add_wedges(pack, part, &draft->colors[0], NULL, &primitive->base.color));
   }
   for (int32_t f = 1; f < draft->frame_count; f++) {
-    targets[f - 1] = (orb_gltf_attributes){-1, -1, -1, -1};
+    targets[f - 1] = (orb_gltf_attributes){-1, -1, -1, -1, -1};
     ORB_TRY(add_positions(pack, part, draft->deltas[f - 1], &targets[f - 1].position));
     if (draft->normals) {
       ORB_TRY(add_wedges(pack, part, &draft->normals[f], &draft->normals[0], &targets[f - 1].normal));
+    }
+    if (has_tangents) {
+      ORB_TRY(add_wedges(pack, part, &draft->tangents[f], NULL, &targets[f - 1].tangent));
     }
     if (draft->color_count > 1) {
       ORB_TRY(add_wedges(pack, part, &draft->colors[f], &draft->colors[0], &targets[f - 1].color));
@@ -184,61 +192,6 @@ done:
   return status;
 }
 
-static const char *image_kind(const orb_image *image) {
-  static const unsigned char png[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-  if (image->size > 24 && memcmp(image->bytes, png, sizeof png) == 0) {
-    return "image/png";
-  }
-  return image->size > 4 && image->bytes[0] == 0xff && image->bytes[1] == 0xd8 && image->bytes[2] == 0xff ? "image/jpeg"
-                                                                                                          : NULL;
-}
-
-/* Adds the materials with their images, except images that are neither PNG nor JPEG. Without materials: a plain one. */
-static orb_status add_materials(packer *pack, orb_gltf_scene *scene, orb_material *materials, orb_gltf_image *images) {
-  const orb_mesh *mesh = &pack->draft->shapes[0].mesh;
-  scene->materials = materials;
-  scene->images = images;
-  scene->material_count = mesh->material_count > 0 ? mesh->material_count : 1;
-  if (mesh->material_count == 0) {
-    float tone = pack->draft->color_count > 0 ? 1.0f : 0.8f;
-    materials[0] = (orb_material){
-        .name = "plain", .base_color = {tone, tone, tone, 1}, .metallic = 0, .roughness = 0.6f, .image = -1};
-    return ORB_OK;
-  }
-  for (int32_t m = 0; m < mesh->material_count; m++) {
-    materials[m] = mesh->materials[m];
-    materials[m].image = -1;
-    for (int c = 0; c < 4; c++) {
-      float value = materials[m].base_color[c];
-      materials[m].base_color[c] = value >= 0 && value <= 1 ? value : value > 1 ? 1 : 0;
-    }
-    materials[m].metallic = materials[m].metallic >= 0 && materials[m].metallic <= 1 ? materials[m].metallic : 0;
-    materials[m].roughness = materials[m].roughness >= 0 && materials[m].roughness <= 1 ? materials[m].roughness : 1;
-  }
-  for (int32_t i = 0; pack->draft->texcoords.width && i < mesh->image_count; i++) {
-    const char *mime = image_kind(&mesh->images[i]);
-    if (!mime) {
-      continue;
-    }
-    ORB_TRY(align_binary(pack));
-    images[scene->image_count] = (orb_gltf_image){pack->binary.size, mesh->images[i].size, mime};
-    ORB_TRY(orb_buffer_append(pack->ctx, &pack->binary, mesh->images[i].bytes, mesh->images[i].size));
-    int used = 0;
-    for (int32_t m = 0; m < mesh->material_count; m++) {
-      if (mesh->materials[m].image == i) {
-        materials[m].image = scene->image_count;
-        used = 1;
-      }
-    }
-    if (used) {
-      scene->image_count++;
-    } else {
-      pack->binary.size = images[scene->image_count].offset;
-    }
-  }
-  return ORB_OK;
-}
-
 /* The members of mesh.extras besides targetNames. */
 static int32_t make_extras(const orb_asset_facts *facts, const orb_draft *draft, orb_gltf_extra extras[4]) {
   int32_t count = 0;
@@ -270,7 +223,7 @@ static orb_status write_scene(packer *pack, orb_gltf_scene *scene, orb_gltf_prim
     facts->vertex_count += draft->parts[p].vertex_count;
     orb_progress(pack->ctx, "write", 0.5 + 0.4 * (p + 1) / draft->part_count);
   }
-  int per_target = 1 + (draft->normals ? 1 : 0) + (draft->color_count > 1 ? 1 : 0);
+  int per_target = 1 + (draft->normals ? 1 : 0) + (draft->tangents ? 1 : 0) + (draft->color_count > 1 ? 1 : 0);
   facts->morphed_attributes = per_target * facts->target_count;
   scene->primitives = primitives;
   scene->primitive_count = draft->part_count;
@@ -308,8 +261,7 @@ static void make_names(const orb_draft *draft, const char *const *names, char (*
 
 orb_status orb_draft_write(orb_context *ctx, const orb_draft *draft, const char *const *names, orb_asset_facts *facts,
                            orb_buffer *out) {
-  const orb_mesh *mesh = &draft->shapes[0].mesh;
-  packer pack = {.ctx = ctx, .draft = draft, .accessor_capacity = 2 + draft->part_count * (5 + 3 * draft->frame_count)};
+  packer pack = {.ctx = ctx, .draft = draft, .accessor_capacity = 2 + draft->part_count * (6 + 4 * draft->frame_count)};
   orb_gltf_scene scene = {.times = -1, .weights = -1};
   int32_t widest = 0;
   for (int32_t p = 0; p < draft->part_count; p++) {
@@ -320,16 +272,15 @@ orb_status orb_draft_write(orb_context *ctx, const orb_draft *draft, const char 
   orb_gltf_primitive *primitives = ORB_NEW(ctx, orb_gltf_primitive, draft->part_count);
   orb_gltf_attributes *targets =
       ORB_NEW(ctx, orb_gltf_attributes, (int64_t)draft->part_count * (draft->frame_count - 1));
-  orb_material *materials = ORB_NEW(ctx, orb_material, mesh->material_count + 1);
-  orb_gltf_image *images = ORB_NEW(ctx, orb_gltf_image, mesh->image_count + 1);
+  orb_draft_materials materials = {0};
   char(*texts)[2 * ORB_NAME_MAX + 32] = orb_calloc(ctx, (size_t)draft->frame_count, sizeof *texts);
   const char **all_names = ORB_NEW(ctx, const char *, draft->frame_count);
   orb_status status = ORB_E_NO_MEMORY;
-  if (pack.accessors && pack.scratch && primitives && targets && materials && images && texts && all_names) {
+  if (pack.accessors && pack.scratch && primitives && targets && texts && all_names) {
     make_names(draft, names, texts, all_names);
     scene.name = all_names[0];
     scene.target_names = all_names + 1;
-    status = add_materials(&pack, &scene, materials, images);
+    status = orb_draft_materials_add(ctx, draft, &pack.binary, &materials, &scene);
     if (status == ORB_OK) {
       status = write_scene(&pack, &scene, primitives, targets, facts, out);
     }
@@ -339,8 +290,7 @@ orb_status orb_draft_write(orb_context *ctx, const orb_draft *draft, const char 
   orb_free(ctx, pack.scratch);
   orb_free(ctx, primitives);
   orb_free(ctx, targets);
-  orb_free(ctx, materials);
-  orb_free(ctx, images);
+  orb_draft_materials_free(ctx, &materials);
   orb_free(ctx, texts);
   orb_free(ctx, all_names);
   return status;

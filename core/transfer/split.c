@@ -25,7 +25,7 @@ static void add_stream(stream_list *list, const orb_wedges *wedges) {
 
 static orb_status collect_streams(orb_context *ctx, const orb_draft *draft, stream_list *list) {
   list->count = 0;
-  list->of_corner = ORB_NEW(ctx, const int32_t *, 2 * (int64_t)draft->frame_count + 1);
+  list->of_corner = ORB_NEW(ctx, const int32_t *, 2 * (int64_t)draft->frame_count + 2);
   if (!list->of_corner) {
     return ORB_E_NO_MEMORY;
   }
@@ -36,6 +36,9 @@ static orb_status collect_streams(orb_context *ctx, const orb_draft *draft, stre
     add_stream(list, &draft->colors[f]);
   }
   add_stream(list, &draft->texcoords);
+  if (draft->tangents) {
+    add_stream(list, &draft->tangents[0]); /* the frames share their corners */
+  }
   return ORB_OK;
 }
 
@@ -48,7 +51,7 @@ static int same_corner(const stream_list *list, int64_t a, int64_t b) {
   return 1;
 }
 
-static int32_t material_of(const orb_draft *draft, int64_t triangle) {
+int32_t orb_draft_material(const orb_draft *draft, int64_t triangle) {
   const orb_mesh *mesh = &draft->shapes[0].mesh;
   if (!mesh->material || !draft->home) {
     return 0;
@@ -65,7 +68,7 @@ static orb_status fill_part(orb_context *ctx, const orb_draft *draft, const stre
   int32_t made = 0;
   int64_t index = 0;
   for (int32_t t = 0; t < draft->supermesh->triangle_count; t++) {
-    if (material_of(draft, t) != part->material) {
+    if (orb_draft_material(draft, t) != part->material) {
       continue;
     }
     for (int k = 0; k < 3; k++) {
@@ -135,7 +138,7 @@ static orb_status make_parts(orb_context *ctx, orb_draft *draft) {
   draft->parts = ORB_NEW0(ctx, orb_draft_part, materials);
   orb_status status = used && draft->parts ? ORB_OK : ORB_E_NO_MEMORY;
   for (int32_t t = 0; status == ORB_OK && t < draft->supermesh->triangle_count; t++) {
-    used[material_of(draft, t)]++;
+    used[orb_draft_material(draft, t)]++;
   }
   for (int32_t m = 0; status == ORB_OK && m < materials; m++) {
     if (used[m] == 0) {

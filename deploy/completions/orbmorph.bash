@@ -9,7 +9,7 @@ _orbmorph() {
     --align) choices="pin rbf rotate auto" ;;
     --remesh) choices="adaptive overlay subdivision convex-hull" ;;
     --animation) choices="pingpong none" ;;
-    --fit) choices="none rigid similarity" ;;
+    --fit) choices="auto none rigid similarity" ;;
     --path) choices="linear rigid" ;;
     --repair) choices="safe none fill_holes largest_component" ;;
     --format) choices="obj off ply stl gltf glb" ;;

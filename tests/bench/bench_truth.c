@@ -303,7 +303,7 @@ static int write_halfway(const truth_run *run, const char *key, orb_fit fit, api
   double *x = orb_alloc(run->ctx, 10 * n, sizeof *x), area[3][PATCHES] = {{0}}, least = 1, thin = 0, whole = 0,
          moves[32];
   int32_t *patch = orb_alloc(run->ctx, n, sizeof *patch);
-  int fine = x && patch && orb_asset_transforms(run->ctx, m, run->result->alignment.shapes, fit, moves) == ORB_OK;
+  int fine = x && patch && orb_asset_transforms(run->ctx, m, run->result->alignment.shapes, fit, moves, NULL) == ORB_OK;
   for (size_t v = 0; fine && v < n; v++) {
     double *end[2] = {x + 3 * v, x + 3 * (n + v)}, *half = x + 3 * (2 * n + v);
     for (int s = 0; s < 2; s++) {

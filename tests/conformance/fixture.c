@@ -84,7 +84,7 @@ static void dress(orb_context *ctx, orb_mesh *mesh, const double *points) {
   snprintf(mesh->images[0].mime, sizeof mesh->images[0].mime, "image/png");
   for (int m = 0; m < 2; m++) {
     mesh->materials[m] =
-        (orb_material){.base_color = {1, 0.5f, 0.25f * (float)m, 1}, .roughness = 0.5f, .image = m - 1};
+        (orb_material){.base_color = {1, 0.5f, 0.25f * (float)m, 1}, .roughness = 0.5f, .base_texture.image = m - 1};
     snprintf(mesh->materials[m].name, sizeof mesh->materials[m].name, "paint %d", m);
   }
   for (int t = 0; t < TRIANGLES; t++) {
@@ -332,8 +332,10 @@ static void make_painted(const char *folder, const char *name, orb_remesh_method
   first->materials = made(ORB_NEW0(ctx, orb_material, 1));
   first->images = made(ORB_NEW0(ctx, orb_image, 1));
   first->material_count = first->image_count = 1;
-  first->materials[0] = (orb_material){
-      .name = "tiles", .base_color = {1, 1, 1, 1}, .roughness = 1, .mag_filter = 9728, .min_filter = 9728};
+  first->materials[0] = (orb_material){.name = "tiles",
+                                       .base_color = {1, 1, 1, 1},
+                                       .roughness = 1,
+                                       .base_texture = {.mag_filter = 9728, .min_filter = 9728}};
   first->images[0].bytes = made(ORB_NEW(ctx, unsigned char, size));
   memcpy(first->images[0].bytes, png, size);
   first->images[0].size = size;
@@ -343,6 +345,7 @@ static void make_painted(const char *folder, const char *name, orb_remesh_method
   orb_asset_options options;
   orb_remesh_defaults(&remesh);
   orb_asset_defaults(&options);
+  options.fit = ORB_FIT_NONE;
   remesh.method = method;
   if (status != ORB_OK || orb_buffer_printf(ctx, &text, "]}") != ORB_OK ||
       orb_remesh(ctx, shapes, SHAPES, 0, &remesh, &supermesh) != ORB_OK ||
@@ -370,6 +373,7 @@ int main(int argc, char **argv) {
   }
   orb_asset_options options;
   orb_asset_defaults(&options);
+  options.fit = ORB_FIT_NONE; /* the facts are in the coordinates of each shape */
   make(argv[1], "two", 2, 0, &options);
   make(argv[1], "six", 6, 0, &options);
   make(argv[1], "dressed", 3, 1, &options);
@@ -380,6 +384,7 @@ int main(int argc, char **argv) {
   options.path = ORB_PATH_RIGID;
   make(argv[1], "rigid", 3, 1, &options);
   orb_asset_defaults(&options);
+  options.fit = ORB_FIT_NONE;
   options.normals = 0;
   options.animation = ORB_ANIMATION_NONE;
   make(argv[1], "bare", 2, 0, &options);

@@ -85,6 +85,7 @@ test('every parameter is the member that POST has', async (t) => {
     ['remesh=subdivision', { remesh: { method: 'subdivision', tolerance } }],
     ['max_triangles=2000', { remesh: { max_triangles: 2000, tolerance } }],
     ['fit=similarity&path=rigid', { asset: { fit: 'similarity', path: 'rigid' } }],
+    ['fit=auto', {}],
     ['animation=none&normals=false', { asset: { animation: 'none', normals: false } }],
     ['normals=true', { asset: { normals: true } }],
   ]) {

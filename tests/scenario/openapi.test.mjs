@@ -223,7 +223,10 @@ test('every operation says which security it needs', () => {
 
 test('the example of a problem is about a request of its operation', async () => {
   const table = await readFile(path.join(root, 'api/routes.h'), 'utf8');
-  const define = (name) => table.match(new RegExp(`#define ${name} "([^"]*)"`))[1];
+  const define = (name) => {
+    const [, text] = table.match(new RegExp(`#define ${name} *((?:\\\\?\\s*"[^"]*")+)`));
+    return [...text.matchAll(/"([^"]*)"/g)].map(([, part]) => part).join('');
+  };
   const rows = [...table.matchAll(/ROUTE\(ROUTE_\w+, "(\w+)", "([^"]+)", \w+, SCOPE_(\w+), ([^)]*?),\s*\\?\s*handle/g)];
   const routes = new Map(
     rows.map(([, method, target, scope, query]) => [

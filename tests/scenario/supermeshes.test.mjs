@@ -297,3 +297,50 @@ test('bad landmarks and bad requests are refused with what is wrong', async (t) 
   assert.match((await refused({ remesh: { sharpness: 2 } }, [400, 422])).detail, /sharpness/);
   await refused({ shapes: [pair[0], { mesh: 'f'.repeat(64) }] }, [404, 422]);
 });
+
+test('files in other units, axes and places are moved onto the first shape by default, and the answer says how', async (t) => {
+  const d = await daemon(t);
+  const bean = shapes.bean(2);
+  const landmarks = [0, 1, 2, 4].map((vertex) => ({ at: [{ vertex }, { vertex }] }));
+  const merged = async (change, asset) => {
+    const meshes = [bean, { ...bean, positions: bean.positions.map(change) }].map((shape) =>
+      Buffer.from(shapes.obj(shape)),
+    );
+    const list = [];
+    for (const bytes of meshes) list.push({ mesh: (await d.upload(bytes)).json.id });
+    const made = await d.made('/v1/supermeshes', { shapes: list, landmarks, remesh: { method: 'overlay' }, asset });
+    return { made, morph: morphOf((await d.get(made.asset)).bytes) };
+  };
+  // An overlay has every vertex of both shapes, so their boxes are exact.
+  const box = (flat) =>
+    [0, 1, 2].flatMap((k) => {
+      const line = flat.filter((_, i) => i % 3 === k);
+      return [Math.min(...line), Math.max(...line)];
+    });
+  const apart = ({ shapes: [a, b] }) => {
+    const other = box(b);
+    return Math.max(...box(a).map((x, i) => Math.abs(x - other[i])));
+  };
+  const same = await merged(([x, y, z]) => [1.2 * x, 1.2 * y, 1.2 * z]);
+  assert.deepEqual(
+    same.made.shapes.map((shape) => shape.fit.kind),
+    ['none', 'none'],
+  );
+  assert.ok(apart(same.morph) > 0.15);
+  assert.equal(same.made.request.asset.fit, 'auto');
+  // Centimetres with z up, instead of metres with y up.
+  const other = ([x, y, z]) => [100 * x, -100 * z, 100 * y];
+  const moved = await merged(other);
+  const { kind, scale, rotation_degrees, up_degrees } = moved.made.shapes[1].fit;
+  assert.equal(kind, 'similarity');
+  for (const [value, wanted] of [
+    [scale, 0.01],
+    [rotation_degrees, 90],
+    [up_degrees, 90],
+  ])
+    assert.ok(Math.abs(value - wanted) < 1e-6 * wanted, `${value} ${wanted}`);
+  assert.ok(apart(moved.morph) < 1e-5);
+  assert.ok(apart((await merged(other, { fit: 'none' })).morph) > 50);
+  const away = await merged(([x, y, z]) => [x + 20, y, z]);
+  assert.ok(away.made.shapes[1].fit.translation_relative > 5 && apart(away.morph) < 1e-5);
+});

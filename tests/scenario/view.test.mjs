@@ -76,6 +76,19 @@ test('textures repeat or clamp as their sampler says, and are averaged when mini
   assert.equal(mainly(at(repeat, 0.32, 0.12)), 'r', 'the first quarter repeats');
   const clamp = await draw(t, square({ uv: twice, image: quarters, wrap: 33071 }), '--poses', '2', '--size', '64');
   assert.equal(mainly(at(clamp, 0.38, 0.12)), 'g', 'the edge continues');
+  // Half a turn and a shift by (1,1): the opposite quarter. Half a width more, against that turn: its neighbour.
+  for (const [offset, expected] of [
+    [[1, 1], 'b'],
+    [[0.5, 1], 'gray'],
+  ]) {
+    const edit = ({ materials: [{ pbrMetallicRoughness: surface }] }) => {
+      surface.baseColorTexture.extensions = { KHR_texture_transform: { offset, rotation: Math.PI } };
+    };
+    const moved = await draw(t, square({ uv: corners, image: quarters, edit }), '--poses', '2', '--size', '64');
+    const [r, g, b] = at(moved, 0.38, 0.25);
+    const seen = r === g && g === b && r > 100 ? 'gray' : mainly([r, g, b]);
+    assert.equal(seen, expected, `moved by ${offset}`);
+  }
   const stripes = writePng(256, 256, (x) => (x % 2 ? [255, 255, 255] : [0, 0, 0]));
   const fine = await draw(
     t,

@@ -294,17 +294,59 @@ static void fit_undoes_a_similarity(void **state) {
   synthetic_free(ctx, &made);
 }
 
+/* A ball that is scaled, rotated about y or z and shifted. */
+static double copy_scale, copy_turn, copy_shift;
+static int copy_axis;
+static void placed_copy(int32_t shape, const double p[3], double out[3]) {
+  double scale = shape ? copy_scale : 1, turn = shape ? copy_turn * M_PI / 180 : 0;
+  int a = (copy_axis + 1) % 3, b = (copy_axis + 2) % 3;
+  double q[3] = {2 * p[0], 1.5 * p[1], p[2]};
+  out[a] = scale * (cos(turn) * q[a] - sin(turn) * q[b]);
+  out[b] = scale * (sin(turn) * q[a] + cos(turn) * q[b]);
+  out[copy_axis] = scale * q[copy_axis];
+  out[0] += shape ? copy_shift * 2 * sqrt(4 + 2.25 + 1) : 0; /* diagonals of the first shape */
+}
+
+/* auto moves a shape only beyond 1.5 times, 30° or half a diagonal, and reports what it did. */
+static void auto_fits_what_clearly_differs(void **state) {
+  orb_context *ctx = *state;
+  static const struct {
+    double scale, turn, shift;
+    int axis, moved;
+    double up;
+  } cases[] = {{1, 0, 0, 2, 0, 0},       {1.45, 25, 0.1, 2, 0, 0}, {1.6, 0, 0, 2, 1, 0},  {1 / 1.45, 0, 0, 2, 0, 0},
+               {1 / 1.6, 0, 0, 2, 1, 0}, {1, 29, 0, 2, 0, 0},      {1, 31, 0, 2, 1, 31},  {1, 90, 0, 0, 1, 90},
+               {1, 90, 0, 1, 1, 0},      {1, 0, 0.45, 2, 0, 0},    {1, 0, 0.55, 2, 1, 0}, {100, 180, 3, 0, 1, 180}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    copy_scale = cases[i].scale;
+    copy_turn = cases[i].turn;
+    copy_shift = cases[i].shift;
+    copy_axis = cases[i].axis;
+    synthetic made = synthetic_make(ctx, 3, 2, placed_copy);
+    orb_fit_report reports[2];
+    double m[32];
+    assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_AUTO, m, reports), ORB_OK);
+    assert_int_equal(reports[0].kind, ORB_FIT_NONE);
+    assert_int_equal(reports[1].kind, cases[i].moved ? ORB_FIT_SIMILARITY : ORB_FIT_NONE);
+    assert_true(fabs(reports[1].scale - (cases[i].moved ? 1 / copy_scale : 1)) < 1e-9);
+    assert_true(fabs(reports[1].rotation_degrees - (cases[i].moved ? copy_turn : 0)) < 1e-5);
+    assert_true(fabs(reports[1].translation_relative - (cases[i].moved ? copy_shift : 0)) < 1e-6 * fmax(1, copy_scale));
+    assert_true(fabs(reports[1].up_degrees - cases[i].up) < 1e-5);
+    synthetic_free(ctx, &made);
+  }
+}
+
 /* The matrix of that copy is the inverse of what was done to it; the first shape, and all without a fit, stay. */
 static void the_transform_is_the_inverse(void **state) {
   orb_context *ctx = *state;
   synthetic made = synthetic_make(ctx, 3, 2, moved_copy);
   double m[32];
   static const double stay[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_NONE, m), ORB_OK);
+  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_NONE, m, NULL), ORB_OK);
   for (int i = 0; i < 32; i++) {
     assert_true(m[i] == stay[i % 16]);
   }
-  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_SIMILARITY, m), ORB_OK);
+  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_SIMILARITY, m, NULL), ORB_OK);
   double c = cos(2.1) / 3, d = sin(2.1) / 3, shift[3] = {5, -7, 1};
   double turn[3][3] = {{c, d, 0}, {-d, c, 0}, {0, 0, 1.0 / 3}};
   for (int i = 0; i < 16; i++) {
@@ -320,7 +362,7 @@ static void the_transform_is_the_inverse(void **state) {
     assert_true(m[16 + 4 * row + 3] == 0);
   }
   assert_true(m[31] == 1);
-  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_RIGID, m), ORB_OK);
+  assert_int_equal(orb_asset_transforms(ctx, &made.supermesh, made.shapes, ORB_FIT_RIGID, m, NULL), ORB_OK);
   for (int column = 0; column < 3; column++) {
     const double *a = m + 16 + 4 * column;
     assert_true(fabs(a[0] * a[0] + a[1] * a[1] + a[2] * a[2] - 1) < 1e-12);
@@ -357,7 +399,7 @@ static void paint(orb_context *ctx, orb_mesh *mesh, const double *points) {
   mesh->material = ORB_NEW0(ctx, int32_t, mesh->triangle_count);
   mesh->materials = ORB_NEW0(ctx, orb_material, 2);
   mesh->material_count = 2;
-  mesh->materials[0].image = mesh->materials[1].image = -1;
+  mesh->materials[0].base_texture.image = mesh->materials[1].base_texture.image = -1;
   for (int32_t t = 0; t < mesh->triangle_count; t++) {
     double x = 0, y = 0, z = 0;
     for (int k = 0; k < 3; k++) {
@@ -499,6 +541,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(coinciding_vertices_are_kept_apart, setup, teardown),
       cmocka_unit_test_setup_teardown(fit_undoes_a_similarity, setup, teardown),
       cmocka_unit_test_setup_teardown(the_transform_is_the_inverse, setup, teardown),
+      cmocka_unit_test_setup_teardown(auto_fits_what_clearly_differs, setup, teardown),
       cmocka_unit_test_setup_teardown(texture_seams_are_not_crossed, setup, teardown),
       cmocka_unit_test(threads_do_not_matter),
       cmocka_unit_test(running_out_of_memory_is_an_error),

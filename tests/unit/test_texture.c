@@ -113,6 +113,49 @@ static void test_jpeg(void **state) {
   assert_true(type_is(junk, sizeof junk, NULL));
 }
 
+/* A copy of an image with a part put in at `at`, and what remains of it once it is stripped. */
+static size_t stripped(const unsigned char *image, size_t size, size_t at, const char *part, size_t length,
+                       unsigned char *out) {
+  memcpy(out, image, at);
+  memcpy(out + at, part, length);
+  memcpy(out + at + length, image + at, size - at);
+  assert_non_null(orb_image_type(out, size + length));
+  return orb_image_strip(out, size + length);
+}
+
+/* Colour chunks go, others stay, and so does an image without any. The sums of chunks are not read here. */
+static void test_profiles_are_stripped(void **state) {
+  (void)state;
+  static const struct {
+    const char *bytes;
+    size_t length;
+    int stays;
+  } chunks[] = {{"\0\0\0\1sRGB\0crc.", 13, 0},
+                {"\0\0\0\4gAMA\0\0\xb1\x8f"
+                 "crc.",
+                 16, 0},
+                {"\0\0\0\40cHRM01234567890123456789012345678901crc.", 44, 0},
+                {"\0\0\0\5iCCPname\0crc.", 17, 0},
+                {"\0\0\0\11pHYs\0\0\0\1\0\0\0\2\1crc.", 21, 0},
+                {"\0\0\0\11pHYs\0\0\0\2\0\0\0\2\1crc.", 21, 1},
+                {"\0\0\0\4tEXtabcdcrc.", 16, 1}};
+  unsigned char out[sizeof PNG + sizeof JPEG + 64];
+  for (size_t i = 0; i < sizeof chunks / sizeof *chunks; i++) {
+    size_t size = stripped(PNG, sizeof PNG, PNG_IDAT, chunks[i].bytes, chunks[i].length, out);
+    assert_int_equal(size, sizeof PNG + (chunks[i].stays ? chunks[i].length : 0));
+    if (chunks[i].stays) {
+      assert_memory_equal(out + PNG_IDAT, chunks[i].bytes, chunks[i].length);
+    } else {
+      assert_memory_equal(out, PNG, sizeof PNG);
+    }
+  }
+  assert_int_equal(stripped(PNG, sizeof PNG, 0, "", 0, out), sizeof PNG);
+  assert_int_equal(stripped(JPEG, sizeof JPEG, 2, "\xff\xe2\0\20ICC_PROFILE\0\1\1", 18, out), sizeof JPEG);
+  assert_memory_equal(out, JPEG, sizeof JPEG);
+  assert_int_equal(stripped(JPEG, sizeof JPEG, 2, "\xff\xee\0\16Adobe\0d\0\0\0\0\1", 16, out), sizeof JPEG + 16);
+  assert_int_equal(stripped(JPEG, sizeof JPEG, 2, "\xff\xff\xe2\0\6MPF\0", 9, out), sizeof JPEG + 1); /* fill stays */
+}
+
 static void base64(const unsigned char *bytes, size_t size, char *out) {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   for (size_t i = 0; i < size; i += 3) {
@@ -154,7 +197,7 @@ static void test_junk_is_left_out(void **state) {
   orb_mesh mesh;
   read_textured(PNG, sizeof PNG, "{}", &mesh);
   assert_int_equal(mesh.image_count, 1);
-  assert_int_equal(mesh.materials[0].image, 0);
+  assert_int_equal(mesh.materials[0].base_texture.image, 0);
   assert_memory_equal(mesh.images[0].bytes, PNG, sizeof PNG);
   assert_string_equal(mesh.images[0].mime, "image/png");
   orb_mesh_free(ctx, &mesh);
@@ -164,7 +207,7 @@ static void test_junk_is_left_out(void **state) {
   read_textured(PNG, PNG_IDAT, "{}", &mesh);
   assert_int_equal(mesh.image_count, 0);
   assert_int_equal(mesh.material_count, 1);
-  assert_int_equal(mesh.materials[0].image, -1);
+  assert_int_equal(mesh.materials[0].base_texture.image, -1);
   orb_mesh_free(ctx, &mesh);
 }
 
@@ -172,23 +215,24 @@ static void test_samplers(void **state) {
   (void)state;
   orb_mesh mesh;
   read_textured(PNG, sizeof PNG, "{\"wrapS\":33071,\"wrapT\":33648,\"magFilter\":9728,\"minFilter\":9987}", &mesh);
-  assert_int_equal(mesh.materials[0].wrap_s, 33071);
-  assert_int_equal(mesh.materials[0].wrap_t, 33648);
-  assert_int_equal(mesh.materials[0].mag_filter, 9728);
-  assert_int_equal(mesh.materials[0].min_filter, 9987);
+  assert_int_equal(mesh.materials[0].base_texture.wrap_s, 33071);
+  assert_int_equal(mesh.materials[0].base_texture.wrap_t, 33648);
+  assert_int_equal(mesh.materials[0].base_texture.mag_filter, 9728);
+  assert_int_equal(mesh.materials[0].base_texture.min_filter, 9987);
   orb_mesh_free(ctx, &mesh);
   /* 98607 is 33071 + 65536; a filter with mipmaps is none for magnification */
   read_textured(PNG, sizeof PNG, "{\"wrapS\":5,\"wrapT\":98607,\"magFilter\":9984,\"minFilter\":77}", &mesh);
   assert_int_equal(mesh.image_count, 1);
-  assert_int_equal(mesh.materials[0].wrap_s, 0);
-  assert_int_equal(mesh.materials[0].wrap_t, 0);
-  assert_int_equal(mesh.materials[0].mag_filter, 0);
-  assert_int_equal(mesh.materials[0].min_filter, 0);
+  assert_int_equal(mesh.materials[0].base_texture.wrap_s, 0);
+  assert_int_equal(mesh.materials[0].base_texture.wrap_t, 0);
+  assert_int_equal(mesh.materials[0].base_texture.mag_filter, 0);
+  assert_int_equal(mesh.materials[0].base_texture.min_filter, 0);
   orb_mesh_free(ctx, &mesh);
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_png), cmocka_unit_test(test_jpeg),
+                                     cmocka_unit_test(test_profiles_are_stripped),
                                      cmocka_unit_test(test_junk_is_left_out), cmocka_unit_test(test_samplers)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

@@ -209,7 +209,18 @@ static void test_read(void **state) {
        "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 0 1\nendloop\nendfacet\n"
        "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 0 1 0\nendloop\nendfacet\n"
        "facet normal 0 0 0\nouter loop\nvertex 1 0 0\nvertex 0 1 0\nvertex 0 0 1\nendloop\nendfacet\n"
-       "endsolid t\n"}};
+       "endsolid t\n"},
+      {"gltf with a material",
+       "{\"asset\":{\"version\":\"2.0\"},\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":"
+       "0},\"indices\":1,\"material\":0}]}],\"accessors\":[{\"bufferView\":0,\"componentType\":5"
+       "126,\"count\":4,\"type\":\"VEC3\"},{\"bufferView\":1,\"componentType\":5121,\"count\":12,\""
+       "type\":\"SCALAR\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":48},{\"buffer\":0,\"byte"
+       "Offset\":48,\"byteLength\":12}],\"buffers\":[{\"byteLength\":60,\"uri\":\"data:;base64,A"
+       "AAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAIBAAEDAAMCAQI"
+       "D\"}],\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"data:;base64,iVBORw0KGgoAAAAN"
+       "SUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC\"}"
+       "],\"materials\":[{\"normalTexture\":{\"index\":0},\"extensions\":{\"A\":{},\"KHR_material"
+       "s_ior\":{\"ior\":2}}}]}"}};
   for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
     put(&f->w.file, texts[i][1], strlen(texts[i][1]), f->ctx);
     all_fail(&f->w, read_run, texts[i][0], 5, 2, 1);

@@ -238,8 +238,8 @@ export type SupermeshRequest = {
     normals?: boolean;
     /** Default: "pingpong". */
     animation?: 'pingpong' | 'none';
-    /** Move the later shapes onto the first by their landmarks. Default: "none". */
-    fit?: 'none' | 'rigid' | 'similarity';
+    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto does similarity where a frame clearly differs from the first shape's (scale beyond 1.5, rotated by more than 30°, apart by more than half a diagonal), else none; `shapes[].fit` of the supermesh says which. Default: "auto". */
+    fit?: 'auto' | 'none' | 'rigid' | 'similarity';
     /** rigid adds in-between targets that preserve lengths. Default: "linear". */
     path?: 'linear' | 'rigid';
     /** For rigid: the number of targets between two consecutive shapes. Default: 3. */
@@ -290,8 +290,8 @@ export type CanonicalRequest = {
   asset: {
     normals: boolean;
     animation: 'pingpong' | 'none';
-    /** Move the later shapes onto the first by their landmarks. */
-    fit: 'none' | 'rigid' | 'similarity';
+    /** Move the later shapes onto the first, by their landmarks or else by their surfaces: not at all, rigidly, or by a similarity. auto does similarity where a frame clearly differs from the first shape's (scale beyond 1.5, rotated by more than 30°, apart by more than half a diagonal), else none; `shapes[].fit` of the supermesh says which. */
+    fit: 'auto' | 'none' | 'rigid' | 'similarity';
     /** rigid adds in-between targets that preserve lengths. */
     path: 'linear' | 'rigid';
     /** For rigid: the number of targets between two consecutive shapes. */
@@ -346,6 +346,17 @@ export type Supermesh = {
     diagonal: number | null;
     /** The area of the smallest triangle divided by the mean area. */
     min_area_ratio: number | null;
+    /** What `asset.fit` did to the shape. Absent if an older engine made the supermesh. */
+    fit?: {
+      kind: 'none' | 'rigid' | 'similarity';
+      /** 1 if it kept the size. */
+      scale: number;
+      rotation_degrees: number;
+      /** How far the shape moved: the mean of its fitted points, by the first shape's diagonal. */
+      translation_relative: number;
+      /** The angle by which the y axis turned. Beyond 60° the shape lay down or stood up. */
+      up_degrees: number;
+    };
     /** The 4×4 matrix, column-major as in glTF, from the shape's own coordinates to those of the asset: the identity, or the result of `asset.fit`. Absent if an older engine made the supermesh. */
     transform?: number[];
   }>;
@@ -394,6 +405,15 @@ export type Supermesh = {
   }>;
   /** The energy of the alignment; null if it was not measured. */
   energy: number | null;
+  /** What the files have and the asset lacks: parts of the first shape's materials, and data that no asset has, such as skins. The last entry of a long list counts the rest. */
+  dropped: Array<{
+    /** The part. */
+    what: string;
+    /** Its place in the file of the first shape, or the shape; empty for the whole file. */
+    where: string;
+    /** The reason. */
+    why: string;
+  }>;
   timings_ms: {
     embed: number;
     align: number;

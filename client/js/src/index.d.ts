@@ -107,7 +107,7 @@ export interface Recipe {
   remesh?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull';
   tolerance?: number;
   max_triangles?: number;
-  fit?: 'none' | 'rigid' | 'similarity';
+  fit?: 'auto' | 'none' | 'rigid' | 'similarity';
   path?: 'linear' | 'rigid';
   animation?: 'pingpong' | 'none';
   normals?: boolean;

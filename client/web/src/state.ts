@@ -54,7 +54,7 @@ export interface Options {
   tolerance: number;
   maxTriangles: number | null;
   path: 'linear' | 'rigid';
-  fit: 'none' | 'rigid' | 'similarity';
+  fit: 'auto' | 'none' | 'rigid' | 'similarity';
   repair: string;
 }
 
@@ -64,7 +64,7 @@ export const DEFAULTS: Options = {
   tolerance: 0.001,
   maxTriangles: null,
   path: 'linear',
-  fit: 'similarity',
+  fit: 'auto',
   repair: 'safe',
 };
 

@@ -51,7 +51,7 @@ function decodeOptions(text: string): Options {
     tolerance: Number(tolerance) > 0 ? Number(tolerance) : DEFAULTS.tolerance,
     maxTriangles: Number(most) >= 4 ? Number(most) : null,
     path: from(path, ['linear', 'rigid'], DEFAULTS.path),
-    fit: from(fit, ['none', 'rigid', 'similarity'], DEFAULTS.fit),
+    fit: from(fit, ['auto', 'none', 'rigid', 'similarity'], DEFAULTS.fit),
     align: from(align, ['default', 'pin', 'rbf', 'rotate', 'auto'], DEFAULTS.align),
   };
 }

@@ -8,14 +8,16 @@
 extern "C" {
 #endif
 
-typedef enum orb_fit { ORB_FIT_NONE = 0, ORB_FIT_RIGID, ORB_FIT_SIMILARITY } orb_fit;
+/* AUTO: SIMILARITY for the shapes whose frame clearly differs from the first one's: larger or smaller by more than 1.5,
+ * rotated by more than 30°, or farther away than half the diagonal of the first shape; NONE for the others. */
+typedef enum orb_fit { ORB_FIT_NONE = 0, ORB_FIT_RIGID, ORB_FIT_SIMILARITY, ORB_FIT_AUTO } orb_fit;
 typedef enum orb_animation { ORB_ANIMATION_PINGPONG = 0, ORB_ANIMATION_NONE } orb_animation;
 typedef enum orb_path { ORB_PATH_LINEAR = 0, ORB_PATH_RIGID } orb_path;
 
 typedef struct orb_asset_options {
   int normals; /* write normals; 1 */
   orb_animation animation;
-  orb_fit fit;
+  orb_fit fit; /* AUTO */
   orb_path path;
   int32_t path_steps; /* for ORB_PATH_RIGID: in-between targets for each pair of neighbours, 3 */
   int colors;         /* also write the colours of the later shapes, as morphed attributes; 0 */
@@ -38,7 +40,8 @@ typedef struct orb_asset_facts {
  *
  * Normals: those of the file if it has any; vertices are split to keep its hard edges. Otherwise angle-weighted vertex
  * normals of the input surface, interpolated at each place. The copies of a split vertex have bit-equal POSITION and
- * deltas. Texture coordinates, materials and their images are those of the first shape.
+ * deltas. Texture coordinates, materials and their images are those of the first shape. Parts whose material has a
+ * texture that bends normals get tangents, which morph like normals.
  *
  * Two supermesh vertices that would coincide in every shape after rounding to float32 are kept distinct: the one that
  * is not a landmark, or else the one with the higher number, moves on the first shape by the fewest units in the last
@@ -50,11 +53,25 @@ ORB_API ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_su
                                                   const orb_asset_options *options, orb_asset_facts *facts,
                                                   orb_buffer *out);
 
+/* Lists what the asset lacks of the files of its shapes: *list (allocated from the context, freed by the caller; NULL
+ * if empty) has *count entries, at most ORB_DROPPED_MAX. On an error *list is to be freed, too. */
+ORB_API ORB_MUST_CHECK orb_status orb_asset_dropped(orb_context *ctx, const orb_aligned_shape *shapes,
+                                                    int32_t shape_count, const orb_asset_options *options,
+                                                    orb_dropped **list, int32_t *count);
+
+typedef struct orb_fit_report {
+  orb_fit kind; /* what was done: never AUTO; NONE for the first shape */
+  double scale, rotation_degrees;
+  double translation_relative; /* how far the mean of the shape's fitted points moves, by the first shape's diagonal */
+  double up_degrees;           /* angle by which the y axis turns */
+} orb_fit_report;
+
 /* How orb_asset_write() moves each shape: 16 doubles a shape, column-major as in glTF, which take the shape's own
  * coordinates to those of the asset. The identity for the first shape, and for all with ORB_FIT_NONE; else a rotation,
- * a translation and, with ORB_FIT_SIMILARITY, a uniform scale. O(V·N). */
+ * a translation and, with ORB_FIT_SIMILARITY, a uniform scale. reports: one a shape, or NULL. O(V·N). */
 ORB_API ORB_MUST_CHECK orb_status orb_asset_transforms(orb_context *ctx, const orb_supermesh *supermesh,
-                                                       const orb_aligned_shape *shapes, orb_fit fit, double *out);
+                                                       const orb_aligned_shape *shapes, orb_fit fit, double *out,
+                                                       orb_fit_report *reports);
 
 /* As orb_asset_write(), and maps each vertex of the file to its supermesh vertex: *vertices (allocated from the
  * context, freed by the caller) has facts->vertex_count numbers, the vertices of the primitives one after another. */

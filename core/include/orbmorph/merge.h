@@ -51,6 +51,9 @@ typedef struct orb_merge_result {
   orb_asset_facts asset_facts;
   int32_t *asset_vertices; /* asset_facts.vertex_count: the supermesh vertex of each vertex of the asset */
   double *transforms;      /* shape_count × 16, see orb_asset_transforms() */
+  orb_fit_report *fits;    /* shape_count */
+  int32_t dropped_count;
+  orb_dropped *dropped; /* see orb_asset_dropped() */
   orb_buffer asset;
   orb_profile_facts profiles[ORB_PROFILES]; /* what the profiles of the asset change; that of float is 0 */
   orb_merge_timings timings;

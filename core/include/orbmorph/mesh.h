@@ -7,12 +7,13 @@
 #define ORBMORPH_MESH_H
 
 #include "orbmorph/context.h"
+#include "orbmorph/material.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-enum { ORB_REPAIR_KINDS_MAX = 16, ORB_NAME_MAX = 128 };
+enum { ORB_REPAIR_KINDS_MAX = 16 };
 
 /* One kind of repair. kind: "triangulate", "weld", "unused-vertices", "duplicate-faces", "degenerate-faces",
  * "reorient", "turn-inside-out", "split-vertices", "fill_holes", "largest_component". */
@@ -20,21 +21,6 @@ typedef struct orb_repair {
   const char *kind; /* a literal */
   int64_t count;    /* faces, vertices, holes or pieces that it changed, depending on the kind */
 } orb_repair;
-
-/* A base-colour image, byte for byte as in the file. */
-typedef struct orb_image {
-  unsigned char *bytes;
-  size_t size;
-  char mime[32]; /* "image/png" or "image/jpeg" */
-} orb_image;
-
-typedef struct orb_material {
-  char name[ORB_NAME_MAX];
-  float base_color[4]; /* linear RGBA; 1,1,1,1 if the file gives none */
-  float metallic, roughness;
-  int32_t image;                                  /* in images, −1: none */
-  int32_t wrap_s, wrap_t, mag_filter, min_filter; /* glTF sampler enums, 0: not given */
-} orb_material;
 
 /* A mesh. The context owns all arrays; optional ones are NULL where the file has none. */
 typedef struct orb_mesh {
@@ -55,9 +41,12 @@ typedef struct orb_mesh {
   float *texcoords;  /* 2 a corner, glTF's convention (v down) */
   float *colors;     /* 4 a corner, linear RGBA */
   int32_t *material; /* of each triangle; NULL: all 0 */
-  int32_t material_count, image_count;
+  int32_t material_count, material_value_count, image_count, dropped_count;
   orb_material *materials;
+  orb_material_value *material_values;
   orb_image *images;
+  orb_dropped
+      *dropped; /* what the file has and the mesh does not; at most ORB_DROPPED_MAX, the last one counts the rest */
 
   int32_t repair_count;
   orb_repair repairs[ORB_REPAIR_KINDS_MAX];

@@ -9,6 +9,8 @@
 #include "orbmorph/embed.h"
 #include "orbmorph/format.h"
 #include "orbmorph/locate.h"
+#include "orbmorph/material.h"
+#include "orbmorph/material_members.h"
 #include "orbmorph/merge.h"
 #include "orbmorph/mesh.h"
 #include "orbmorph/profile.h"

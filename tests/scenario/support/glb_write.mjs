@@ -1,7 +1,10 @@
 // A writer of binary glTF, against the specification: one mesh, one primitive, at most one morph target and one texture.
 
-/** positions, normals, colors, moves: [x,y,z] a vertex; uv: [u,v]; triangles; image: a PNG; factor: base colour. */
-export function writeGlb({ positions, normals, colors, uv, triangles, moves, image, factor, wrap = 10497 }) {
+/**
+ * positions, normals, colors, moves: [x,y,z] a vertex; uv, uv1: [u,v]; triangles; image: a PNG; factor: base colour.
+ * edit(gltf, push): changes the document before it is written; push(bytes) adds a buffer view and returns its number.
+ */
+export function writeGlb({ positions, normals, colors, uv, uv1, triangles, moves, image, factor, wrap = 10497, edit }) {
   const parts = [];
   const bufferViews = [];
   const accessors = [];
@@ -28,6 +31,7 @@ export function writeGlb({ positions, normals, colors, uv, triangles, moves, ima
   if (normals) attributes.NORMAL = floats(normals, 3);
   if (colors) attributes.COLOR_0 = floats(colors, 3);
   if (uv) attributes.TEXCOORD_0 = floats(uv, 2);
+  if (uv1) attributes.TEXCOORD_1 = floats(uv1, 2);
   const corners = triangles.flat();
   const indices =
     accessors.push({
@@ -68,8 +72,10 @@ export function writeGlb({ positions, normals, colors, uv, triangles, moves, ima
       images: [{ bufferView: push(image), mimeType: 'image/png' }],
     });
   }
+  Object.assign(gltf, { accessors, bufferViews });
+  edit?.(gltf, push);
   const bin = Buffer.concat(parts);
-  Object.assign(gltf, { accessors, bufferViews, buffers: [{ byteLength: bin.length }] });
+  gltf.buffers = [{ byteLength: bin.length }];
   const text = Buffer.from(JSON.stringify(gltf));
   const json = Buffer.concat([text, Buffer.alloc((4 - (text.length % 4)) % 4, ' ')]);
   const head = Buffer.alloc(20);

@@ -20,7 +20,8 @@ function chunk(name, bytes) {
   return out;
 }
 
-export function writePng(width, height, pixel) {
+/** pixel(x, y): red, green, blue; before: [name, bytes] of further chunks, after the header. */
+export function writePng(width, height, pixel, before = []) {
   const head = Buffer.alloc(13);
   head.writeUInt32BE(width, 0);
   head.writeUInt32BE(height, 4);
@@ -31,6 +32,7 @@ export function writePng(width, height, pixel) {
   return Buffer.concat([
     Buffer.from('\x89PNG\r\n\x1a\n', 'latin1'),
     chunk('IHDR', head),
+    ...before.map(([name, bytes]) => chunk(name, bytes)),
     chunk('IDAT', deflateSync(rows)),
     chunk('IEND', Buffer.alloc(0)),
   ]);

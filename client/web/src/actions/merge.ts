@@ -222,18 +222,25 @@ export function clearResult() {
   set({ result: null, mix: null, playing: false, show: 'morph', side: 'before' });
 }
 
+const isFitted = (shape: Supermesh['shapes'][number]) => (shape.fit?.kind ?? 'none') !== 'none';
+
 /** Measures the supermesh's error on every shape and paints it on the original surface. */
 export async function measureErrors() {
   const { result } = state;
   if (!result) return;
   const shapes = readyShapes();
-  const fit = (result.supermesh.request ?? result.request)?.asset?.fit ?? 'none';
   for (const [index, shape] of shapes.entries()) {
     if (shape.error?.result === result.supermesh.id || shape.mesh?.id !== result.supermesh.shapes[index]?.mesh)
       continue;
     set({ loading: `Measuring the error on ${shape.name}` });
     try {
-      const found = await work('error', shape.key, result.supermesh.id, index, index > 0 && fit !== 'none');
+      const found = await work(
+        'error',
+        shape.key,
+        result.supermesh.id,
+        index,
+        isFitted(result.supermesh.shapes[index]),
+      );
       const model = shape.model!.copy();
       model.attribute('value', found.values);
       model.paint({ kind: 'value', ramp: 'heat', low: 0, high: Math.max(found.max, 1e-9) });

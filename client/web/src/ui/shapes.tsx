@@ -333,6 +333,11 @@ export function OptionsFold() {
           onChange={(fit) => change({ fit })}
           items={[
             {
+              value: 'auto',
+              label: 'Auto',
+              hint: 'Fit the other shapes where their size, axes or place clearly differ',
+            },
+            {
               value: 'similarity',
               label: 'Fit size',
               hint: 'Translate, rotate and scale the other shapes to fit the first',

@@ -1,0 +1,111 @@
+#include "format/gltf_scene.hh"
+
+namespace gltf {
+
+namespace {
+
+Matrix operator*(const Matrix &a, const Matrix &b) {
+  if (a.identity) {
+    return b;
+  }
+  if (b.identity) {
+    return a;
+  }
+  Matrix out;
+  out.identity = false;
+  for (int column = 0; column < 4; column++) {
+    for (int row = 0; row < 4; row++) {
+      double sum = 0;
+      for (int k = 0; k < 4; k++) {
+        sum += a.at(row, k) * b.at(k, column);
+      }
+      out.m[4 * column + row] = sum;
+    }
+  }
+  return out;
+}
+
+Matrix matrix_of(const cJSON *node) {
+  Matrix out;
+  if (!numbers(node, "matrix", out.m, 16)) {
+    double t[3] = {0, 0, 0}, q[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1};
+    numbers(node, "translation", t, 3);
+    numbers(node, "rotation", q, 4);
+    numbers(node, "scale", s, 3);
+    double x = q[0], y = q[1], z = q[2], w = q[3];
+    const double r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y + z * w),     2 * (x * z - y * w),
+                         2 * (x * y - z * w),     1 - 2 * (x * x + z * z), 2 * (y * z + x * w),
+                         2 * (x * z + y * w),     2 * (y * z - x * w),     1 - 2 * (x * x + y * y)};
+    for (int column = 0; column < 3; column++) {
+      for (int row = 0; row < 3; row++) {
+        out.m[4 * column + row] = r[3 * column + row] * s[column];
+      }
+      out.m[12 + column] = t[column];
+    }
+  }
+  const Matrix one;
+  out.identity = std::memcmp(out.m, one.m, sizeof out.m) == 0;
+  return out;
+}
+
+int64_t number_of(const cJSON *value) {
+  if (!cJSON_IsNumber(value) || !(value->valuedouble >= 0 && value->valuedouble <= INT32_MAX)) {
+    malformed("A glTF list of nodes contains something that is not an index.");
+  }
+  return static_cast<int64_t>(value->valuedouble);
+}
+
+}  // namespace
+
+std::vector<std::pair<int64_t, Matrix>> shown_meshes(const cJSON *doc, size_t mesh_count) {
+  const List nodes = array_of(doc, "nodes"), scenes = array_of(doc, "scenes");
+  std::vector<std::pair<int64_t, Matrix>> stack, out;
+  if (!scenes.empty()) {
+    const cJSON *scene = element(scenes, whole(doc, "scene", 0), "scene");
+    for (const cJSON *root : array_of(scene, "nodes")) {
+      stack.emplace_back(number_of(root), Matrix());
+    }
+  } else if (!nodes.empty()) {
+    std::vector<bool> is_child(nodes.size(), false);
+    for (const cJSON *node : nodes) {
+      for (const cJSON *child : array_of(node, "children")) {
+        int64_t index = number_of(child);
+        if (index < static_cast<int64_t>(nodes.size())) {
+          is_child[static_cast<size_t>(index)] = true;
+        }
+      }
+    }
+    for (size_t i = 0; i < nodes.size(); i++) {
+      if (!is_child[i]) {
+        stack.emplace_back(static_cast<int64_t>(i), Matrix());
+      }
+    }
+  } else {
+    for (size_t i = 0; i < mesh_count; i++) {
+      out.emplace_back(static_cast<int64_t>(i), Matrix());
+    }
+  }
+  std::vector<bool> seen(nodes.size(), false);
+  std::reverse(stack.begin(), stack.end());
+  while (!stack.empty()) {
+    auto [index, above] = stack.back();
+    stack.pop_back();
+    const cJSON *node = element(nodes, index, "node");
+    if (seen[static_cast<size_t>(index)]) {
+      malformed("Node " + std::to_string(index) + " of the glTF file is a child of two nodes, or of itself.");
+    }
+    seen[static_cast<size_t>(index)] = true;
+    Matrix matrix = above * matrix_of(node);
+    int64_t mesh = whole(node, "mesh", NONE);
+    if (mesh != NONE) {
+      out.emplace_back(mesh, matrix);
+    }
+    const List children = array_of(node, "children");
+    for (size_t i = children.size(); i-- > 0;) {
+      stack.emplace_back(number_of(children[i]), matrix);
+    }
+  }
+  return out;
+}
+
+}  // namespace gltf
