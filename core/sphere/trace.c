@@ -74,7 +74,7 @@ static int is_reached(const orb_arc_tracer *t) {
 }
 
 static int end_at(orb_arc_tracer *t, int32_t h, orb_spot_kind kind) {
-  t->end = (orb_spot){h, kind};
+  t->end = (orb_spot){h, (int32_t)kind};
   t->state = ENDED;
   return 0;
 }
@@ -146,7 +146,7 @@ static int from_face(orb_arc_tracer *t, orb_crossing *out) {
       return leave_through(t, first + k, out);
     }
   }
-  ORB_ASSERT(!"an arc leaves the triangle it starts in");
+  ORB_ASSERT(0 && "an arc leaves the triangle it starts in");
   return 0;
 }
 
@@ -180,7 +180,7 @@ static int from_vertex(orb_arc_tracer *t, orb_crossing *out) {
     s = next;
     h = t->mesh->twin[orb_prev(h)];
   } while (h != first);
-  ORB_ASSERT(!"some wedge of a vertex holds every arc from it");
+  ORB_ASSERT(0 && "some wedge of a vertex holds every arc from it");
   return 0;
 }
 

@@ -24,7 +24,7 @@ static orb_hit search_all(const orb_sphere_view *mesh, const double p[3]) {
       return hit;
     }
   }
-  ORB_ASSERT(!"a certified triangulation covers every direction");
+  ORB_ASSERT(0 && "a certified triangulation covers every direction");
   return (orb_hit){-1, {0, 0, 0}};
 }
 

@@ -59,7 +59,7 @@ static int32_t entry_of(const orb_edge_graph *graph, int32_t v, int32_t neighbor
       return i;
     }
   }
-  ORB_ASSERT(!"the triangles are closed");
+  ORB_ASSERT(0 && "the triangles are closed");
   return -1;
 }
 
