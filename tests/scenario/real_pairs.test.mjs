@@ -18,7 +18,11 @@ test('every pair merges', { skip }, async (t) => {
     await t.test(pair.name, async (u) => {
       const meshes = [];
       for (const file of pair.files) meshes.push(await d.mesh(file));
-      const request = { shapes: meshes.map((m) => ({ mesh: m.id, name: m.name })), landmarks: pair.landmarks };
+      const request = {
+        shapes: meshes.map((m) => ({ mesh: m.id, name: m.name })),
+        landmarks: pair.landmarks,
+        asset: { fit: 'none' }, // landmarks are looked up where the files have them
+      };
       const result = await d.make('/v1/supermeshes', request);
       assert.ok(result.resource, JSON.stringify(result.problem));
       const s = result.resource;
