@@ -94,7 +94,7 @@ test('pages may send and read every header of the description', async (t) => {
     if (value.headers && !Array.isArray(value.headers)) Object.keys(value.headers).forEach((name) => replied.add(name));
     Object.values(value).forEach(walk);
   };
-  walk(document);
+  walk({ ...document, webhooks: undefined }); // those requests the daemon sends itself
   const names = [...wanted].map((name) => name.toLowerCase());
   assert.ok(names.includes('prefer') && names.includes('range') && replied.has('ETag'));
   const { url } = (await d.upload(shapes.tetrahedron)).json;
