@@ -401,12 +401,11 @@ test('a file without a mesh is refused with an explanation', async () => {
 test('a morph is cancelled before it is done', async () => {
   // Another job occupies the only worker, so the morph cannot finish before it is cancelled.
   const busy = await startDaemon({ args: ['--workers', '1'] });
-  const post = async (path, body) =>
-    (await fetch(busy.url + path, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body })).json();
-  const other = await post(
-    '/v1/embeddings',
-    JSON.stringify({ mesh: (await post('/v1/meshes', obj(ball(5)))).id, ...endless }),
-  );
+  const post = async (path, body, headers) => (await fetch(busy.url + path, { method: 'POST', headers, body })).json();
+  const { id: mesh } = await post('/v1/meshes', obj(ball(5)));
+  const other = await post('/v1/embeddings', JSON.stringify({ mesh, ...endless }), {
+    'Content-Type': 'application/json',
+  });
   const { page, done } = await openPage(browser, busy.url);
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await page.getByText('Options', { exact: true }).click();
