@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/mesh_codec.h"
 #include "api/routes.h"
 #include "http/decode.h"
 #include "http/parse.h"
