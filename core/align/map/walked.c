@@ -30,8 +30,8 @@ static orb_status optimise(orb_map_run *c, orb_map_walked *w) {
     last = w->refiner->live >= size;
     ORB_GO(status, orb_map_sweeps(c, &w->level, orb_map_hard(p), last ? p->walked.last_sweeps : p->walked.sweeps),
            done);
-    double before = orb_map_level_energy(&w->level);
-    if (before > p->walked.hopeless) {
+    w->energy = orb_map_level_energy(&w->level);
+    if (w->energy > p->walked.hopeless) {
       w->energy = INFINITY;
       break;
     }
@@ -40,12 +40,10 @@ static orb_status optimise(orb_map_run *c, orb_map_walked *w) {
     }
     orb_map_level_store(c, &w->level, w->refiner);
     w->energy = orb_map_level_energy(&w->level);
-    if (w->energy > (last ? p->walked.twisted : p->walked.hopeless)) {
-      w->energy = INFINITY;
-      break;
-    }
     if (!last) {
       ORB_GO(status, orb_map_level_next(c, w->refiner, &w->level, known, 0), done);
+    } else if (w->energy > p->walked.twisted) {
+      w->energy = INFINITY;
     }
   }
 done:
@@ -61,6 +59,7 @@ static orb_status enter(orb_map_run *c, orb_map_walked *w) {
   }
   memcpy(fixed, w->fixed, 3 * (size_t)c->fixed->mesh.vertex_count * sizeof *fixed);
   orb_status status = orb_map_take_sphere(c, &fixed);
+  orb_free(c->ctx, fixed); /* NULL once it is taken */
   orb_map_levels_adopt(c, &w->hierarchy);
   return status;
 }

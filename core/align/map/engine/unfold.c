@@ -13,6 +13,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/sheet/collapse.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "embed/common/kernel.h"
@@ -47,14 +48,6 @@ typedef struct unfolding {
   int32_t flips;
 } unfolding;
 
-static int32_t next(int32_t h) {
-  return h % 3 == 2 ? h - 2 : h + 1;
-}
-
-static int32_t prev(int32_t h) {
-  return h % 3 == 0 ? h + 2 : h - 1;
-}
-
 static const double *at(const unfolding *u, int32_t v) {
   return u->l->x + 3 * (size_t)v;
 }
@@ -72,13 +65,13 @@ static int star_of(const unfolding *u, int32_t v, int32_t star[RING_MOST]) {
       return 0;
     }
     star[count++] = h;
-    h = u->twin[prev(h)];
+    h = u->twin[orb_prev(h)];
   } while (h != u->corner[v]);
   return count;
 }
 
 static int32_t end_of(const unfolding *u, int32_t h) {
-  return u->triangle[next(h)];
+  return u->triangle[orb_next(h)];
 }
 
 /* Are the two vertices opposite to the edge from v to its neighbour k the only common neighbours? */
@@ -100,9 +93,7 @@ static int fan_flips(const unfolding *u, const int32_t *star, int count, int k, 
   *least = INFINITY;
   for (int i = 1; i + 1 < count; i++) {
     int32_t a = end_of(u, star[(k + i) % count]), b = end_of(u, star[(k + i + 1) % count]);
-    double longest = fmax(orb_distance2(at(u, a), at(u, b)),
-                          fmax(orb_distance2(at(u, a), at(u, c)), orb_distance2(at(u, b), at(u, c))));
-    *least = fmin(*least, orb_det(at(u, c), at(u, a), at(u, b)) / longest);
+    *least = fmin(*least, orb_fatness(at(u, c), at(u, a), at(u, b)));
     flips += is_flipped(u, c, a, b);
   }
   return flips;
@@ -142,8 +133,8 @@ static void apply(unfolding *u, int32_t v, const int32_t *star, int count, int k
   for (int i = 1; i + 1 < count; i++) {
     u->triangle[star[(k + i) % count]] = onto;
   }
-  int32_t right_out = u->twin[next(first)], right_in = u->twin[prev(first)];
-  int32_t left_out = u->twin[next(last)], left_in = u->twin[last];
+  int32_t right_out = u->twin[orb_next(first)], right_in = u->twin[orb_prev(first)];
+  int32_t left_out = u->twin[orb_next(last)], left_in = u->twin[last];
   join(u, right_out, right_in);
   join(u, left_out, left_in);
   u->gone[first / 3] = u->gone[last / 3] = 1;
