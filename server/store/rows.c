@@ -102,3 +102,26 @@ int64_t rows_integer(catalogue *cat, database *db, sqlite3_stmt *st) {
   catalogue_reader_done(cat, db);
   return value;
 }
+
+typedef struct rotation {
+  const char *sql, *name, *secret;
+  int64_t old_until;
+} rotation;
+
+static int rotate(database *db, void *arg) {
+  const rotation *r = arg;
+  sqlite3_stmt *st = database_statement(db, r->sql);
+  if (!st) {
+    return SQLITE_ERROR;
+  }
+  sqlite3_bind_text(st, 1, r->name, -1, SQLITE_STATIC);
+  sqlite3_bind_text(st, 2, r->secret, -1, SQLITE_STATIC);
+  sqlite3_bind_int64(st, 3, r->old_until);
+  int code = database_run(db, st);
+  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+}
+
+store_result rows_rotate(catalogue *cat, const char *sql, const char *name, const char *secret, int64_t old_until) {
+  rotation r = {sql, name, secret, old_until};
+  return catalogue_write(cat, rotate, &r);
+}

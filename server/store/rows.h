@@ -36,6 +36,10 @@ void *rows_all(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *k
 /* The integer in the query's only row; −1 if it cannot be read. */
 int64_t rows_integer(catalogue *cat, database *db, sqlite3_stmt *st);
 
+/* Gives a row another secret by an UPDATE of ?1 name, ?2 secret and ?3 until when the old one is valid.
+ * STORE_NOT_FOUND: no row has the name. */
+store_result rows_rotate(catalogue *cat, const char *sql, const char *name, const char *secret, int64_t old_until);
+
 static inline void row_text(sqlite3_stmt *st, int column, char *out, size_t size) {
   const unsigned char *text = sqlite3_column_text(st, column);
   snprintf(out, size, "%s", text ? (const char *)text : "");

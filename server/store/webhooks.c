@@ -55,27 +55,9 @@ int webhook_ensure_secret(database *db, const char *tenant) {
   return code == SQLITE_CONSTRAINT ? SQLITE_OK : code; /* it exists */
 }
 
-static int rotate_row(database *db, void *arg) {
-  const webhook_row *row = arg;
-  sqlite3_stmt *st =
-      database_statement(db, "UPDATE webhook SET old_secret=secret, old_until=?3, secret=?2 WHERE name=?1");
-  if (!st) {
-    return SQLITE_ERROR;
-  }
-  sqlite3_bind_text(st, 1, row->name, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 2, row->secret, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 3, row->old_until);
-  int code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
-}
-
 store_result catalogue_webhook_rotate(catalogue *cat, const char *name, const char *secret, int64_t old_until) {
-  webhook_row row = {.old_until = old_until};
-  snprintf(row.name, sizeof row.name, "%s", name);
-  snprintf(row.secret, sizeof row.secret, "%s", secret);
-  store_result result = catalogue_write(cat, rotate_row, &row);
-  sodium_memzero(row.secret, sizeof row.secret);
-  return result;
+  return rows_rotate(cat, "UPDATE webhook SET old_secret=secret, old_until=?3, secret=?2 WHERE name=?1", name, secret,
+                     old_until);
 }
 
 static int remove_row(database *db, void *arg) {
