@@ -340,6 +340,20 @@ static int write_halfway(const truth_run *run, const char *key, orb_fit fit, api
   return fine;
 }
 
+/* The mean of the confidences of the found landmarks; null where none were searched. */
+static void write_confidence(const orb_alignment *alignment, api_text *line) {
+  double sum = 0;
+  for (int32_t i = 0; i < alignment->found_count; i++) {
+    sum += alignment->confidence[i];
+  }
+  api_json_key(line, "confidence");
+  if (alignment->found_count == 0) {
+    api_text_add(line, "null");
+  } else {
+    api_json_number(line, sum / alignment->found_count);
+  }
+}
+
 static int write_measures(truth_run *run, api_text *line) {
   const orb_alignment *alignment = &run->result->alignment;
   int fine = 1;
@@ -353,6 +367,7 @@ static int write_measures(truth_run *run, api_text *line) {
                             alignment->shapes[0].certificate.flipped + alignment->shapes[1].certificate.flipped +
                                 run->result->supermesh.flipped);
     api_json_member_number(line, "energy", alignment->energy);
+    write_confidence(alignment, line);
     api_json_member_number(line, "distortion_median", run->result->pairs[0].distortion.symmetric_dirichlet.median);
     write_inverted(run, line);
     fine = write_dense(run, line) && write_held_out(run, line) && write_halfway(run, "halfway", ORB_FIT_NONE, line) &&

@@ -1,13 +1,18 @@
 #!/usr/bin/env python3
-"""Measures the maps of `auto` against dense truth, and writes docs/bench-correspond.md.
+"""Measures maps against dense truth, and writes docs/bench-correspond.md.
 
-    tests/bench/correspond.py [--bin build/bin] [--base REVISION] [--meshes ../shared/meshes] [--half tune|report|all]
-                              [--given 0,8] [--threads 1] [--jobs 1] [--out docs/bench-correspond.md] [A-B ...]
+    tests/bench/correspond.py [--bin build/bin] [--base DIR-OR-REVISION] [--set people,animals,real] [--half choose|report|all]
+                              [--given 0,8] [--preset default] [--sample K] [--pairs A-B,…] [--swap] [--jobs 1]
+                              [--store DIR] [--fresh] [--out FILE.md] [--json FILE.json]
 
-The pairs are those of MESHES/posed: people in poses, each triangulated by itself, with true places of the same points
-on all of them. Pairs with an even number in pairs.csv are the half that constants are chosen on (`tune`); the others
-are only for the report. --base measures an earlier version in the same run. --given N pins the first N true places by
-`default`; 0 runs `auto`.
+Sets: `people` are the pairs of MESHES/posed, `animals` those that `orbmorph-posed` generates, `real` those of
+docs/bench-truth.md. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half that is
+only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
+--base measures another version beside this one: its folder of programs, or a revision to build. --sample K takes K
+pairs of each set, spread evenly. --swap maps the second shape to the first.
+
+Every result is a file in the store, by version, pair and options: an interrupted run continues, and a finished one is
+printed again at once. --fresh measures again. The version is the hash of the program, so a new build has new results.
 
 `orbmorph-bench truth` gives distances in space only, so each place is stated with four different targets: the four
 distances yield the image, and the error is measured along the surface. Any version's program will do. Standard library
@@ -15,165 +20,33 @@ only.
 """
 import argparse
 import concurrent.futures
-import csv
-import heapq
+import functools
+import hashlib
 import json
 import math
+import os
 import pathlib
 import statistics
 import subprocess
 import sys
 import tempfile
 
-from first_answer import build_base
+import correspond_pairs
+from correspond_pairs import PLACES
+from first_answer import ROOT, build_base
+from surface import Surface, cross, dot, minus
 
-PLACES = 250  # of the 400; with four targets each they stay below the 1,024 landmarks of a request
 RIGHT = 10
+FORMAT = 1  # of the files of the store: a change measures all again
 CURVE = (1, 2, 3, 4, 5, 7.5, 10, 15, 20, 30, 50)
-HEAD = """# The map without landmarks, against dense truth
-
-Written by `tests/bench/correspond.py` on bodies of six people in poses, each triangulated by itself ({half}). An error
-is 100 · (length along the second surface between the image of a place and its true place) / √(its area), at {places}
-places a pair. A pair is *right* if its mean is at most {right}. Constants are chosen on pairs with even numbers (`tune`)
-only; the others (`report`) are for this page. Lengths are those of shortest paths over edges and across pairs of
-triangles, which are up to a few percent long.
-"""
+PAIR_COLUMNS = ["set", "pair", "kind", "half", "version", "given", "mean", "median", "95 %", "right", "% diagonal",
+                "energy", "confidence", "thin %", "CPU s"]
+SUM_COLUMNS = ["set", "half", "version", "given", "pairs", "failed", "mean", "median", "right", "95 %", "% diagonal",
+               "energy", "CPU s", "median"]
 
 
-def read_mesh(file):
-    """Positions and triangles of an OBJ or OFF file of triangles."""
-    lines = [line.split() for line in file.read_text().splitlines() if line.strip() and line[0] != "#"]
-    if file.suffix == ".off":
-        vertices, triangles = int(lines[1][0]), int(lines[1][1])
-        return ([tuple(map(float, row[:3])) for row in lines[2:2 + vertices]],
-                [tuple(map(int, row[1:4])) for row in lines[2 + vertices:2 + vertices + triangles]])
-    return ([tuple(map(float, row[1:4])) for row in lines if row[0] == "v"],
-            [tuple(int(x.split("/")[0]) - 1 for x in row[1:4]) for row in lines if row[0] == "f"])
-
-
-def minus(p, q):
-    return (p[0] - q[0], p[1] - q[1], p[2] - q[2])
-
-
-def dot(p, q):
-    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
-
-
-def cross(p, q):
-    return (p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0])
-
-
-def closest(p, a, b, c):
-    """The point of a triangle nearest to p (Ericson, Real-Time Collision Detection, 5.1.5)."""
-    ab, ac, ap = minus(b, a), minus(c, a), minus(p, a)
-    d1, d2 = dot(ab, ap), dot(ac, ap)
-    bp, cp = minus(p, b), minus(p, c)
-    d3, d4, d5, d6 = dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp)
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-    if d1 <= 0 and d2 <= 0:
-        v, w = 0, 0
-    elif d3 >= 0 and d4 <= d3:
-        v, w = 1, 0
-    elif d6 >= 0 and d5 <= d6:
-        v, w = 0, 1
-    elif vc <= 0 <= d1 and d3 <= 0:
-        v, w = d1 / (d1 - d3), 0
-    elif vb <= 0 <= d2 and d6 <= 0:
-        v, w = 0, d2 / (d2 - d6)
-    elif va <= 0 and d4 >= d3 and d5 >= d6:
-        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        v = 1 - w
-    else:
-        v, w = vb / (va + vb + vc), vc / (va + vb + vc)
-    return tuple(a[k] + v * ab[k] + w * ac[k] for k in range(3))
-
-
-class Surface:
-    """A mesh with its true places, and shortest paths on it."""
-
-    def __init__(self, file):
-        self.file = file
-        self.positions, self.triangles = read_mesh(file)
-        with file.with_name(file.stem + ".truth.csv").open() as rows:
-            self.places = [(int(r["triangle"]), tuple(float(r[f"b{k}"]) for k in range(3))) for r in csv.DictReader(rows)]
-        corners = [[self.positions[v] for v in t] for t in self.triangles]
-        self.area = sum(math.hypot(*cross(minus(b, a), minus(c, a))) / 2 for a, b, c in corners)
-        low, high = (tuple(f(p[k] for p in self.positions) for k in range(3)) for f in (min, max))
-        self.diagonal = math.dist(low, high)
-        self.link_vertices()
-        self.fill_cells()
-
-    def link_vertices(self):
-        self.links = [[] for _ in self.positions]
-        opposite = {}
-        for a, b, c in self.triangles:
-            opposite[a, b], opposite[b, c], opposite[c, a] = c, a, b
-        for (a, b), c in opposite.items():
-            self.links[a].append((b, math.dist(self.positions[a], self.positions[b])))
-            d = opposite[b, a]
-            length = self.across(a, b, c, d)
-            if length:
-                self.links[c].append((d, length))
-
-    def across(self, a, b, c, d):
-        """The straight way from c to d over edge a–b, both triangles in one plane; None where it misses the edge."""
-        edge, u, w = (minus(self.positions[v], self.positions[a]) for v in (b, c, d))
-        length = math.hypot(*edge)
-        cx, dx = dot(u, edge) / length, dot(w, edge) / length
-        cy, dy = (math.sqrt(max(0, dot(p, p) - x * x)) for p, x in ((u, cx), (w, dx)))
-        at = (cx * dy + dx * cy) / (cy + dy) if cy + dy else -1
-        return math.hypot(cx - dx, cy + dy) if 0 < at < length else None
-
-    def cell(self, p):
-        return tuple(math.floor(x / self.size) for x in p)
-
-    def fill_cells(self):
-        self.size, self.cells = self.diagonal / 60, {}
-        for t, corners in enumerate(self.triangles):
-            ends = [self.cell(f(self.positions[v][k] for v in corners) for k in range(3)) for f in (min, max)]
-            for x in range(ends[0][0], ends[1][0] + 1):
-                for y in range(ends[0][1], ends[1][1] + 1):
-                    for z in range(ends[0][2], ends[1][2] + 1):
-                        self.cells.setdefault((x, y, z), []).append(t)
-
-    def triangle_at(self, p):
-        """The triangle that p lies on, p being on the surface but for rounding."""
-        x, y, z = self.cell(p)
-        near = {t for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)
-                for t in self.cells.get((x + i, y + j, z + k), ())} or range(len(self.triangles))
-        return min(near, key=lambda t: math.dist(p, closest(p, *(self.positions[v] for v in self.triangles[t]))))
-
-    def position(self, place):
-        corners = [self.positions[v] for v in self.triangles[place[0]]]
-        return tuple(sum(w * corner[k] for w, corner in zip(place[1], corners)) for k in range(3))
-
-    def error(self, place, image):
-        """100 · length of the way from a place to an image / √area: A*, the straight line being the bound."""
-        start, end = self.position(place), self.triangle_at(image)
-        if set(self.triangles[place[0]]) & set(self.triangles[end]):
-            return 100 * math.dist(start, image) / math.sqrt(self.area)
-        last = {v: math.dist(self.positions[v], image) for v in self.triangles[end]}
-        best, done, length = math.inf, set(), {}
-        heap = []
-        for v in self.triangles[place[0]]:
-            length[v] = math.dist(start, self.positions[v])
-            heapq.heappush(heap, (length[v] + math.dist(self.positions[v], image), v))
-        while heap and heap[0][0] < best:
-            v = heapq.heappop(heap)[1]
-            if v in done:
-                continue
-            done.add(v)
-            best = min(best, length[v] + last.get(v, math.inf))
-            for u, step in self.links[v]:
-                if length[v] + step < length.get(u, math.inf):
-                    length[u] = length[v] + step
-                    heapq.heappush(heap, (length[u] + math.dist(self.positions[u], image), u))
-        return 100 * best / math.sqrt(self.area)
-
-
-def anchors(surface):
-    """Four places that span a large tetrahedron."""
-    points = [surface.position(place) for place in surface.places]
+def anchors(points):
+    """Four of the points that span a large tetrahedron."""
     chosen = [0, max(range(len(points)), key=lambda i: math.dist(points[i], points[0]))]
     a, b = (points[i] for i in chosen)
     chosen.append(max(range(len(points)), key=lambda i: math.hypot(*cross(minus(b, a), minus(points[i], a)))))
@@ -192,41 +65,118 @@ def solve(points, distances):
     return tuple(sum(r * side[k] for r, side in zip(right, sides)) / determinant for k in range(3))
 
 
-def measure(program, first, second, given, threads):
-    """Errors at the places, CPU seconds and energy of one map."""
-    chosen = anchors(second)
-    at = [{"triangle": t, "barycentric": list(w)} for t, w in first.places]
-    to = [{"triangle": t, "barycentric": list(w)} for t, w in second.places]
-    numbers = range(given, PLACES)
-    marks = [{"name": str(i), "at": [at[i], to[i]]} for i in range(given)]
-    marks += [{"name": f"{i} {k}", "at": [at[i], to[k]]} for i in numbers for k in chosen]
+def run_child(command, limit):
+    """Standard output, CPU seconds of the process with its threads, and None or why it failed."""
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as complaint:
+        child = subprocess.Popen(["timeout", "--signal=KILL", str(limit), *command], stdout=out, stderr=complaint)
+        _, status, usage = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        out.seek(0)
+        complaint.seek(0)
+        failed = (complaint.read().strip() or f"exit status {child.returncode}") if child.returncode else None
+        return out.read(), usage.ru_utime + usage.ru_stime, failed
+
+
+@functools.lru_cache(maxsize=24)
+def surface_of(file):
+    return Surface(file)
+
+
+def measure(program, pair, given, options):
+    """What is stored of one map."""
+    first, second = surface_of(pair.first), surface_of(pair.second)
+    places = pair.places()
+    if options.swap:
+        first, second, places = second, first, [(b, a, part) for a, b, part in places]
+    if len(places) <= given:
+        return None  # nothing is left to measure at
+    places = places[:given] + spread(places[given:], PLACES)
+    targets = [second.position(place[1]) for place in places]
+    chosen = anchors(targets)
+    at = [[{"triangle": p[0], "barycentric": list(p[1])} for p in place[:2]] for place in places]
+    held = range(given, len(places))
+    marks = [{"name": str(i), "at": at[i]} for i in range(given)]
+    marks += [{"name": f"{i} {k}", "at": [at[i][0], at[k][1]]} for i in held for k in chosen]
     with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
         json.dump(marks, file)
         file.flush()
-        run = subprocess.run([program, "truth", "--threads", str(threads), "--methods", "default" if given else "auto",
-                              "--given", str(given), "--landmarks", file.name, first.file, second.file],
-                             capture_output=True, text=True)
-    if run.returncode != 0:
-        sys.exit(f"{first.file.name} – {second.file.name}: {run.stderr}")
-    line = json.loads(run.stdout)
-    points = [second.position(second.places[k]) for k in chosen]
-    held = [d * second.diagonal / 100 for d in line["held_out"]]
-    images = [solve(points, held[4 * i:4 * i + 4]) for i in range(len(numbers))]
-    errors = [second.error(second.places[i], image) for i, image in zip(numbers, images)]
-    return {"errors": errors, "cpu": line["cpu_seconds"], "energy": line["energy"]}
+        method = options.preset if given else "auto"
+        text, cpu, failed = run_child([program, "truth", "--threads", str(options.threads), "--methods", method,
+                                       "--given", str(given), "--landmarks", file.name, first.file, second.file],
+                                      options.limit)
+    if failed:
+        return {"failed": failed, "cpu": cpu}
+    line = json.loads(text)
+    distances = [d * second.diagonal / 100 for d in line["held_out"]]
+    points = [targets[k] for k in chosen]
+    images = [solve(points, distances[4 * i:4 * i + 4]) for i in range(len(held))]
+    scale = 100 / math.sqrt(second.area)
+    return {"errors": [round(scale * second.length(places[i][1], image), 3) for i, image in zip(held, images)],
+            "diagonal": [round(100 * math.dist(targets[i], image) / second.diagonal, 3)
+                         for i, image in zip(held, images)],
+            "parts": [places[i][2] for i in held], "cpu": round(cpu, 2), "energy": line["energy"],
+            "confidence": line.get("confidence"), "halfway": line["halfway_fitted"]}
 
 
-def summary(name, given, results):
-    means = [statistics.mean(r["errors"]) for r in results]
-    whole = sorted(e for r in results for e in r["errors"])
-    return [name, str(given), str(len(results)), f"{statistics.mean(means):.1f}", f"{statistics.median(means):.1f}",
-            f"{sum(m <= RIGHT for m in means)} of {len(means)}", f"{whole[len(whole) * 95 // 100]:.1f}",
-            f"{statistics.mean(r['cpu'] for r in results):.1f}"]
+def spread(places, count):
+    """At most `count` of the places, evenly over the list."""
+    return places if len(places) <= count else [places[i * len(places) // count] for i in range(count)]
 
 
-def curve(name, given, results):
-    errors = [e for r in results for e in r["errors"]]
-    return [name, str(given)] + [f"{100 * sum(e <= x for e in errors) / len(errors):.0f}" for x in CURVE]
+def stored(program, version, pair, given, options):
+    """The result of one map, from the store if it is there."""
+    kind = f"{given}-{options.preset if given else 'auto'}{'-swapped' if options.swap else ''}"
+    inputs = hashlib.sha256(b"".join([str(FORMAT).encode(), pair.first.read_bytes(), pair.second.read_bytes()]))
+    file = options.store / version / f"{pair.set}-{pair.name}-{kind}-{inputs.hexdigest()[:8]}.json"
+    if file.exists() and not options.fresh:
+        return json.loads(file.read_text())
+    result = measure(program, pair, given, options)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_suffix(".part")
+    part.write_text(json.dumps(result))
+    part.rename(file)
+    return result
+
+
+def quantile(values, share):
+    return sorted(values)[min(len(values) - 1, int(len(values) * share))]
+
+
+def number(value, digits=1):
+    return "–" if value is None or value != value else f"{value:.{digits}f}"
+
+
+def pair_row(pair, name, given, r):
+    head = [pair.set, pair.name, pair.kind, pair.half, name, str(given)]
+    if "failed" in r:
+        return head + ["failed"] + ["–"] * 7 + [number(r["cpu"])]
+    mean = statistics.mean(r["errors"])
+    return head + [number(mean), number(statistics.median(r["errors"])), number(quantile(r["errors"], 0.95)),
+                   "yes" if mean <= RIGHT else "no", number(statistics.mean(r["diagonal"]), 2), number(r["energy"], 2),
+                   number(r["confidence"], 2), number(100 * r["halfway"]["thin_fraction"]), number(r["cpu"])]
+
+
+def sum_row(head, results):
+    good = [r for r in results if "failed" not in r]
+    cpu = [r["cpu"] for r in results]
+    head = head + [str(len(results)), str(len(results) - len(good))]
+    if not good:
+        return head + ["–"] * 6 + [number(statistics.mean(cpu)), number(statistics.median(cpu))]
+    means = [statistics.mean(r["errors"]) for r in good]
+    right = sum(m <= RIGHT for m in means)
+    return head + [number(statistics.mean(means)), number(statistics.median(means)),
+                   f"{right} ({100 * right / len(results):.0f} %)",
+                   number(quantile([e for r in good for e in r["errors"]], 0.95)),
+                   number(statistics.mean(statistics.mean(r["diagonal"]) for r in good), 2),
+                   number(statistics.median(r["energy"] for r in good), 3), number(statistics.mean(cpu)),
+                   number(statistics.median(cpu))]
+
+
+def curve_row(head, results):
+    """A pair that failed has no place within any limit."""
+    good = [r["errors"] for r in results if "failed" not in r]
+    return head + [f"{100 * sum(sum(e <= x for e in errors) / len(errors) for errors in good) / len(results):.0f}"
+                   for x in CURVE]
 
 
 def table(columns, rows):
@@ -234,60 +184,128 @@ def table(columns, rows):
     return "\n".join([lines[0], "|" + "---|" * len(columns)] + lines[1:]) + "\n"
 
 
-def read_pairs(folder, half, names):
-    with (folder / "pairs.csv").open() as rows:
-        pairs = [(i, r["A"], r["B"], r["kind"]) for i, r in enumerate(csv.DictReader(rows))]
-    pairs = [p for p in pairs if half == "all" or p[0] % 2 == (half == "report")]
-    return [p for p in pairs if not names or f"{pathlib.Path(p[1]).stem}-{pathlib.Path(p[2]).stem}" in names]
+def groups(results):
+    """Results by set, half, version and number of landmarks; each set once more as a whole, and all sets together."""
+    found = {}
+    for pair, name, given, result in results:
+        for key in ((pair.set, pair.half), (pair.set, "both"), ("all", pair.half), ("all", "both")):
+            found.setdefault((*key, name, str(given)), []).append(result)
+    halves = {(key[0], key[2], key[3]): set() for key in found}
+    for key in found:
+        halves[key[0], key[2], key[3]].add(key[1])
+    sets = {key[0] for key in found}
+    return {key: found[key] for key in sorted(found, key=lambda k: (k[0] == "all", k[0], k[1] == "both", k[1], k[3]))
+            if not (key[0] == "all" and len(sets) == 2)
+            and not (key[1] == "both" and len(halves[key[0], key[2], key[3]]) == 2)}
+
+
+def confidence_rows(results):
+    """Of the maps whose confidence lies in a range: how many are right."""
+    rows = []
+    for name in dict.fromkeys(r[1] for r in results):
+        known = [(r[3]["confidence"], statistics.mean(r[3]["errors"]) <= RIGHT) for r in results
+                 if r[1] == name and r[2] == 0 and "failed" not in r[3] and r[3]["confidence"] is not None]
+        for low in range(0, 10):
+            inside = [right for value, right in known if low / 10 <= value < low / 10 + 0.1 or value == 1 and low == 9]
+            if inside:
+                rows.append([name, f"{low / 10:.1f}–{low / 10 + 0.1:.1f}", str(len(inside)), str(sum(inside))])
+    return rows
+
+
+def report(results):
+    head = (ROOT / "tests/bench/correspond_head.md").read_text()
+    found = groups(results)
+    text = head + "\n## Summary\n\n" + table(SUM_COLUMNS, [sum_row(list(k), v) for k, v in found.items()])
+    text += "\n## Curve\n\nThe share of the places, in %, with an error of at most:\n\n"
+    text += table(["set", "half", "version", "given"] + [str(x) for x in CURVE],
+                  [curve_row(list(k), v) for k, v in found.items()])
+    confidence = confidence_rows(results)
+    if confidence:
+        text += "\n## Confidence\n\n" + table(["version", "confidence", "pairs", "right"], confidence)
+    return text + "\n## Pairs\n\n" + table(PAIR_COLUMNS, [pair_row(*r) for r in results])
+
+
+def as_json(results):
+    return {"pairs": [dict(zip(["set", "pair", "kind", "half", "version", "given"], pair_row(*r)[:6]), **r[3],
+                           **({} if "failed" in r[3] else {"mean": statistics.mean(r[3]["errors"])}))
+                      for r in results],
+            "summary": [dict(zip(["set", "half", "version", "given"], k)) | {
+                "pairs": len(v), "means": [statistics.mean(r["errors"]) for r in v if "failed" not in r],
+                "curve": dict(zip(map(str, CURVE), curve_row([], v)))} for k, v in groups(results).items()]}
+
+
+def list_pairs(options):
+    meshes, wanted = pathlib.Path(options.meshes), options.set.split(",")
+    sets = {"people": correspond_pairs.posed(meshes),
+            "animals": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store / "animals"),
+            "real": correspond_pairs.real(meshes, surface_of)}
+    unknown = set(wanted) - set(sets)
+    if unknown:
+        sys.exit(f"correspond.py: there is no set '{unknown.pop()}'")
+    chosen = []
+    for name in wanted:
+        pairs = [p for p in sets[name] if options.half in (p.half, "all")]
+        if options.pairs:
+            pairs = [p for p in pairs if p.name in options.pairs.split(",")]
+        chosen += spread(pairs, options.sample or len(pairs)) if pairs else []
+    return chosen
+
+
+def version_of(folder):
+    return hashlib.sha256((folder / "orbmorph-bench").read_bytes()).hexdigest()[:12]
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bin", default="build/bin")
-    parser.add_argument("--base")
-    parser.add_argument("--meshes", default="../shared/meshes")
-    parser.add_argument("--half", choices=("tune", "report", "all"), default="all")
+    parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build/bin")
+    parser.add_argument("--base", help="a folder of programs, or a revision")
+    parser.add_argument("--meshes", default=ROOT / "../shared/meshes")
+    parser.add_argument("--set", default="people,animals,real")
+    parser.add_argument("--half", choices=("choose", "report", "all"), default="all")
     parser.add_argument("--given", default="0", help="numbers with commas")
+    parser.add_argument("--preset", choices=("fast", "default", "quality"), default="default")
+    parser.add_argument("--sample", type=int, help="so many pairs of each set")
+    parser.add_argument("--pairs", help="names with commas")
+    parser.add_argument("--swap", action="store_true")
+    parser.add_argument("--list", action="store_true", help="print the pairs and end")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="maps at once")
-    parser.add_argument("--out")
-    parser.add_argument("pairs", nargs="*")
+    parser.add_argument("--limit", type=int, default=900, help="wall seconds that a map may take")
+    parser.add_argument("--store", type=pathlib.Path, default=ROOT / "build/correspond")
+    parser.add_argument("--fresh", action="store_true")
+    parser.add_argument("--out", type=pathlib.Path)
+    parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
-    folder = pathlib.Path(options.meshes) / "posed"
-    programs = {"now": pathlib.Path(options.bin)}
-    if options.base:
-        programs[options.base] = build_base(options.base)
-    pairs = read_pairs(folder, options.half, options.pairs)
+    pairs = list_pairs(options)
     if not pairs:
         sys.exit("correspond.py: there is no such pair")
-    surfaces = {name: Surface(folder / name) for name in {p[k] for p in pairs for k in (1, 2)}}
-    given = [int(n) for n in options.given.split(",")]
-    work = [(pair, number, name) for pair in pairs for number in given for name in programs]
-    results, rows = {}, []
+    if options.list:
+        for pair in pairs:
+            print(pair.set, pair.half, pair.name, pair.kind, sep="\t")
+        return
+    programs = {"now": options.bin}
+    if options.base:
+        is_folder = pathlib.Path(options.base, "orbmorph-bench").exists()
+        programs = {"before": pathlib.Path(options.base) if is_folder else build_base(options.base)} | programs
+    versions = {name: version_of(folder) for name, folder in programs.items()}
+    work = [(pair, name, int(n)) for pair in pairs for n in options.given.split(",") for name in programs]
 
     def one(item):
-        (_, first, second, _), number, name = item
-        return measure(programs[name] / "orbmorph-bench", surfaces[first], surfaces[second], number, options.threads)
+        pair, name, given = item
+        return stored(programs[name] / "orbmorph-bench", versions[name], pair, given, options)
 
+    results = []
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        for (pair, number, name), result in zip(work, pool.map(one, work)):
-            results.setdefault((name, number), []).append(result)
-            errors = sorted(result["errors"])
-            rows.append([str(pair[0]), pathlib.Path(pair[1]).stem, pathlib.Path(pair[2]).stem, pair[3], name, str(number),
-                         f"{statistics.mean(errors):.1f}", f"{errors[len(errors) // 2]:.1f}",
-                         f"{errors[len(errors) * 95 // 100]:.1f}", f"{result['energy']:.2f}", f"{result['cpu']:.1f}"])
-            print("  ".join(rows[-1]), flush=True)
-    text = HEAD.format(half={"tune": "the half that constants are chosen on", "report": "the half that nothing is "
-                             "chosen on", "all": "all pairs"}[options.half], places=PLACES, right=RIGHT)
-    text += "\n" + table(["version", "given", "pairs", "mean", "median", "right", "95th percentile", "CPU s"],
-                         [summary(*key, value) for key, value in results.items()])
-    text += "\nShare of the places, in %, with an error of at most:\n\n" + table(
-        ["version", "given"] + [str(x) for x in CURVE], [curve(*key, value) for key, value in results.items()])
-    text += "\n" + table(["pair", "first", "second", "kind", "version", "given", "mean", "median", "95th percentile",
-                          "energy", "CPU s"], rows)
-    print("\n" + text)
+        for (pair, name, given), result in zip(work, pool.map(one, work)):
+            if result:
+                results.append((pair, name, given, result))
+                print("  ".join(pair_row(*results[-1])), flush=True)
+    text = report(results)
+    print("\n" + text[text.index("## Summary"):text.index("## Pairs")])
     if options.out:
-        pathlib.Path(options.out).write_text(text)
+        options.out.write_text(text)
+    if options.json:
+        options.json.write_text(json.dumps(as_json(results)))
 
 
 if __name__ == "__main__":

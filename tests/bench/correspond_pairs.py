@@ -1,0 +1,93 @@
+"""The pairs of tests/bench/correspond.py: files, true places, and the half that each pair belongs to."""
+import csv
+import dataclasses
+import hashlib
+import json
+import pathlib
+import random
+import subprocess
+
+PLACES = 250  # measured a pair; with four targets each and 24 landmarks these are the 1,024 landmarks of a request
+
+
+@dataclasses.dataclass
+class Pair:
+    set: str
+    name: str
+    kind: str
+    half: str  # choose or report
+    first: pathlib.Path
+    second: pathlib.Path
+    places: object  # a function: the true places as a list of (place on the first, on the second, part)
+
+
+def half_of(name):
+    return ("choose", "report")[hashlib.sha256(name.encode()).digest()[0] & 1]
+
+
+def read_truth(file):
+    """The places of a truth file by sample. A sample that the body lacks has no row or a negative triangle."""
+    with file.with_name(file.stem + ".truth.csv").open() as rows:
+        return {int(r["sample"]): (int(r["triangle"]), tuple(float(r[f"b{k}"]) for k in range(3)))
+                for r in csv.DictReader(rows) if int(r["triangle"]) >= 0}
+
+
+def places_of(folder, first, second):
+    """The samples that both have, in their order: the first are tips and joints, the others spread over the body."""
+    a, b = read_truth(folder / first), read_truth(folder / second)
+    with (folder / "samples.csv").open() as rows:
+        parts = {int(r["sample"]): r["part"] for r in csv.DictReader(rows)}
+    return [(a[i], b[i], parts[i]) for i in parts if i in a and i in b]
+
+
+def folder_pairs(name, folder, half):
+    with (folder / "pairs.csv").open() as rows:
+        for i, row in enumerate(csv.DictReader(rows)):
+            first, second = row["A"], row["B"]
+            title = f"{pathlib.Path(first).stem}-{pathlib.Path(second).stem}"
+            yield Pair(name, title, row["kind"], half(i, title), folder / first, folder / second,
+                       lambda first=first, second=second: places_of(folder, first, second))
+
+
+def posed(meshes):
+    """People in poses. Constants were first chosen on even rows of pairs.csv, so these stay the half `choose`."""
+    if (meshes / "posed").is_dir():
+        yield from folder_pairs("people", meshes / "posed", lambda i, _: ("choose", "report")[i % 2])
+
+
+def animals(program, folder):
+    """Generated animals. The program writes them if they are not there, or if it is newer."""
+    pairs = folder / "pairs.csv"
+    if not program.exists():
+        return
+    if not pairs.exists() or pairs.stat().st_mtime < program.stat().st_mtime:
+        folder.mkdir(parents=True, exist_ok=True)
+        subprocess.run([program, folder], check=True, stdout=subprocess.DEVNULL)
+    yield from folder_pairs("animals", folder, lambda _, title: half_of(title))
+
+
+def vertex_place(surface, v, of):
+    if not of:
+        of.update((corner, (t, k)) for t, corners in enumerate(surface.triangles) for k, corner in enumerate(corners))
+    t, k = of[v]
+    return (t, tuple(float(i == k) for i in range(3)))
+
+
+def landmark_places(file, surfaces):
+    """The landmarks of a pair and, where both meshes share their triangles, vertices drawn by a fixed seed."""
+    read = json.loads(file.read_text())
+    first, second = surfaces
+    base, tables = read.get("index_base", 0), ({}, {})
+    rows = [[v - base for v in at] + ["landmark"] for at in read["landmarks"]]
+    if first.triangles == second.triangles:
+        drawn = random.Random(1).sample(range(len(first.positions)), 2 * PLACES)
+        rows += [[v, v, "vertex"] for v in drawn if v not in {row[0] for row in rows}]
+    return [(vertex_place(first, a, tables[0]), vertex_place(second, b, tables[1]), part) for a, b, part in rows]
+
+
+def real(meshes, surface_of):
+    """The pairs of docs/bench-truth.md: true only at their landmarks, save where both meshes share their triangles."""
+    for file in sorted((meshes / "pairs").glob("*.json")):
+        first, second = (meshes / "good" / name for name in json.loads(file.read_text())["meshes"])
+        yield Pair("real", file.stem, "landmarks", half_of(file.stem), first, second,
+                   lambda file=file, a=first, b=second: landmark_places(file, (surface_of(a), surface_of(b))))
