@@ -126,6 +126,7 @@ def spread(places, count):
 def stored(program, version, pair, given, options):
     """The result of one map, from the store if it is there."""
     kind = f"{given}-{options.preset if given else 'auto'}{'-swapped' if options.swap else ''}"
+    pair.make()
     inputs = hashlib.sha256(b"".join([str(FORMAT).encode(), pair.first.read_bytes(), pair.second.read_bytes()]))
     file = options.store / version / f"{pair.set}-{pair.name}-{kind}-{inputs.hexdigest()[:8]}.json"
     if file.exists() and not options.fresh:
@@ -237,7 +238,7 @@ def as_json(results):
 def list_pairs(options):
     meshes, wanted = pathlib.Path(options.meshes), options.set.split(",")
     sets = {"people": correspond_pairs.posed(meshes),
-            "animals": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store / "animals"),
+            "animals": correspond_pairs.animals(options.bin / "orbmorph-posed", options.store),
             "real": correspond_pairs.real(meshes, surface_of)}
     unknown = set(wanted) - set(sets)
     if unknown:

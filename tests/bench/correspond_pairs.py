@@ -6,6 +6,7 @@ import json
 import pathlib
 import random
 import subprocess
+import tempfile
 
 PLACES = 250  # measured a pair; with four targets each and 24 landmarks these are the 1,024 landmarks of a request
 
@@ -19,6 +20,7 @@ class Pair:
     first: pathlib.Path
     second: pathlib.Path
     places: object  # a function: the true places as a list of (place on the first, on the second, part)
+    make: object = lambda: None  # a function that writes the files if they are not there
 
 
 def half_of(name):
@@ -40,13 +42,14 @@ def places_of(folder, first, second):
     return [(a[i], b[i], parts[i]) for i in parts if i in a and i in b]
 
 
-def folder_pairs(name, folder, half):
+def folder_pairs(name, folder, half, make=lambda *_: None):
     with (folder / "pairs.csv").open() as rows:
         for i, row in enumerate(csv.DictReader(rows)):
             first, second = row["A"], row["B"]
             title = f"{pathlib.Path(first).stem}-{pathlib.Path(second).stem}"
             yield Pair(name, title, row["kind"], half(i, title), folder / first, folder / second,
-                       lambda first=first, second=second: places_of(folder, first, second))
+                       lambda first=first, second=second: places_of(folder, first, second),
+                       lambda first=first, second=second: make(first, second))
 
 
 def posed(meshes):
@@ -55,15 +58,25 @@ def posed(meshes):
         yield from folder_pairs("people", meshes / "posed", lambda i, _: ("choose", "report")[i % 2])
 
 
-def animals(program, folder):
-    """Generated animals. The program writes them if they are not there, or if it is newer."""
-    pairs = folder / "pairs.csv"
+def animals(program, store):
+    """Generated animals, in a folder for each build of the program. A body is written when it is first needed."""
     if not program.exists():
         return
-    if not pairs.exists() or pairs.stat().st_mtime < program.stat().st_mtime:
+    folder = store / f"animals-{hashlib.sha256(program.read_bytes()).hexdigest()[:8]}"
+    if not (folder / "pairs.csv").exists():
         folder.mkdir(parents=True, exist_ok=True)
-        subprocess.run([program, folder], check=True, stdout=subprocess.DEVNULL)
-    yield from folder_pairs("animals", folder, lambda _, title: half_of(title))
+        subprocess.run([program, folder], check=True)
+
+    def make(*names):
+        missing = [name for name in names if not (folder / name).exists()]
+        for name in missing:
+            with tempfile.TemporaryDirectory(dir=store) as made:
+                stem = pathlib.Path(name).stem
+                subprocess.run([program, made, stem], check=True, stdout=subprocess.DEVNULL)
+                for file in (f"{stem}.truth.csv", name):  # the body last: it stands for both
+                    pathlib.Path(made, file).rename(folder / file)
+
+    yield from folder_pairs("animals", folder, lambda _, title: half_of(title), make)
 
 
 def vertex_place(surface, v, of):

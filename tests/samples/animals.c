@@ -1,34 +1,5 @@
 /* The animals: x runs forward, y up, z to the right; lengths are about those of the body. */
-#include "sample.h"
-
-#define COUNT(array) (sizeof(array) / sizeof((array)[0]))
-/* PART(k, …) begins a part that joins the body over k; CONE(k, …) continues a part. */
-#define PART(k, ax, ay, az, ra, bx, by, bz, rb)              \
-  {                                                          \
-    SAMPLE_CONE, 1, k, {ax, ay, az}, {bx, by, bz}, ra, rb, { \
-      { 0 }                                                  \
-    }                                                        \
-  }
-#define CONE(k, ax, ay, az, ra, bx, by, bz, rb)              \
-  {                                                          \
-    SAMPLE_CONE, 0, k, {ax, ay, az}, {bx, by, bz}, ra, rb, { \
-      { 0 }                                                  \
-    }                                                        \
-  }
-#define BALL(k, ax, ay, az, r)                         \
-  {                                                    \
-    SAMPLE_ELLIPSOID, 1, k, {ax, ay, az}, {0}, 0, 0, { \
-      {r, 0, 0}, {0, r, 0}, {                          \
-        0, 0, r                                        \
-      }                                                \
-    }                                                  \
-  }
-#define ELLIPSOID(begins, k, ax, ay, az, ...)               \
-  {                                                         \
-    SAMPLE_ELLIPSOID, begins, k, {ax, ay, az}, {0}, 0, 0, { \
-      __VA_ARGS__                                           \
-    }                                                       \
-  }
+#include "primitives.h"
 
 static const orb_primitive dog_primitives[] = {
     PART(0, -0.52, 0.80, 0.00, 0.20, -0.10, 0.79, 0.00, 0.19), /* torso, with a waist */

@@ -52,11 +52,15 @@ static double smooth_union(double a, double b, double blend) {
   return low - h * h * blend / 4;
 }
 
+double sample_distance(const orb_primitive *primitive, const double p[3]) {
+  return primitive->kind == SAMPLE_CONE ? cone(primitive, p) : ellipsoid(primitive, p);
+}
+
 double sample_field(const orb_animal *animal, const double p[3]) {
   double whole = 1e9, part = 1e9, part_blend = 0;
   for (size_t i = 0; i < animal->primitive_count; i++) {
     const orb_primitive *o = &animal->primitives[i];
-    double d = o->kind == SAMPLE_CONE ? cone(o, p) : ellipsoid(o, p);
+    double d = sample_distance(o, p);
     if (o->begins_part) {
       whole = smooth_union(whole, part, part_blend);
       part = d;

@@ -38,7 +38,9 @@ extern const orb_animal sample_dog, sample_giraffe, sample_elephant;
 
 /* Signed distance, roughly: negative inside. */
 double sample_field(const orb_animal *animal, const double p[3]);
-/* Its gradient by central differences. */
+/* The signed distance to one primitive, roughly. */
+double sample_distance(const orb_primitive *primitive, const double p[3]);
+/* The field's gradient by central differences. */
 void sample_gradient(const orb_animal *animal, const double p[3], double out[3]);
 /* Moves p onto the surface along the gradient. */
 void sample_project(const orb_animal *animal, double p[3]);
