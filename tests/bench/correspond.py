@@ -37,7 +37,7 @@ from first_answer import ROOT, build_base
 from surface import Surface, cross, dot, minus
 
 RIGHT = 10
-FORMAT = 1  # of the files of the store: a change measures all again
+FORMAT = 2  # of the files of the store: a change measures all again
 CURVE = (1, 2, 3, 4, 5, 7.5, 10, 15, 20, 30, 50)
 PAIR_COLUMNS = ["set", "pair", "kind", "half", "version", "given", "mean", "median", "95 %", "right", "% diagonal",
                 "energy", "confidence", "thin %", "CPU s"]

@@ -27,11 +27,15 @@ def half_of(name):
     return ("choose", "report")[hashlib.sha256(name.encode()).digest()[0] & 1]
 
 
+def read_place(row):
+    weights = [float(row[f"b{k}"]) for k in range(3)]  # rounded
+    return int(row["triangle"]), tuple(w / sum(weights) for w in weights)
+
+
 def read_truth(file):
-    """The places of a truth file by sample. A sample that the body lacks has no row or a negative triangle."""
+    """The places of a truth file by sample. A sample that the body lacks has no row."""
     with file.with_name(file.stem + ".truth.csv").open() as rows:
-        return {int(r["sample"]): (int(r["triangle"]), tuple(float(r[f"b{k}"]) for k in range(3)))
-                for r in csv.DictReader(rows) if int(r["triangle"]) >= 0}
+        return {int(row["sample"]): read_place(row) for row in csv.DictReader(rows)}
 
 
 def places_of(folder, first, second):

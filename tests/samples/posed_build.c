@@ -23,7 +23,7 @@ static factors factors_of(posed_limb limb, const char *variant) {
     case HEAD:
     case SNOUT:
     case FACE:
-      return slim ? (factors){1.15, 0.92} : (factors){0.95, 1.08};
+      return slim ? (factors){1.15, 0.92} : (factors){0.95, 1.00};
     case TAIL:
     case EAR_R:
     case EAR_L:
@@ -101,12 +101,13 @@ unsigned posed_random(unsigned *state, unsigned limit) {
 
 void posed_polygonise(const posed_rest *rest, unsigned seed, orb_sample *out) {
   static const double details[] = {1, 3, 6, 10};
-  for (int attempt = 0; attempt < 20; attempt++) {
+  for (int attempt = 0; attempt < 14; attempt++) {
     orb_animal animal = rest->animal;
     double largest = 0, cell;
     for (int k = 0; k < 3; k++)
       largest = fmax(largest, animal.high[k] - animal.low[k]);
-    cell = (0.95 + 0.002 * posed_random(&seed, 100)) * (largest > 2.6 ? 0.042 : 0.038);
+    cell = (0.95 + 0.002 * posed_random(&seed, 100) - 0.05 * (attempt / 2)) *
+           /* finer if parts touch */ (largest > 2.6 ? 0.042 : 0.038);
     for (int k = 0; k < 3; k++)
       animal.low[k] -= 0.01 * cell * posed_random(&seed, 100);
     const int triangles = 5200 + 200 * (int)posed_random(&seed, 20);
