@@ -184,6 +184,19 @@ int api_supermesh_request_resolve(api_supermesh_request *request, const api_mesh
   return 1;
 }
 
+static void write_embedding_and_align(const api_supermesh_request *request, api_text *out) {
+  api_json_key(out, "embedding");
+  api_json_open(out, '{');
+  api_embedding_options_members(&request->embedding, out);
+  api_json_close(out, '}');
+  api_json_key(out, "align");
+  api_json_open(out, '{');
+  api_json_member_string(out, "method", aligns[request->merge.align.method]);
+  api_json_key(out, "options");
+  api_options_write(out, align_table, COUNT(align_table), &request->merge.align, NULL);
+  api_json_close(out, '}');
+}
+
 void api_supermesh_request_write(const api_supermesh_request *request, api_text *out) {
   api_json_open(out, '{');
   api_json_key(out, "shapes");
@@ -201,16 +214,7 @@ void api_supermesh_request_write(const api_supermesh_request *request, api_text 
   } else {
     api_json_string(out, "auto");
   }
-  api_json_key(out, "embedding");
-  api_json_open(out, '{');
-  api_embedding_options_members(&request->embedding, out);
-  api_json_close(out, '}');
-  api_json_key(out, "align");
-  api_json_open(out, '{');
-  api_json_member_string(out, "method", aligns[request->merge.align.method]);
-  api_json_key(out, "options");
-  api_options_write(out, align_table, COUNT(align_table), &request->merge.align, NULL);
-  api_json_close(out, '}');
+  write_embedding_and_align(request, out);
   api_json_key(out, "remesh");
   api_options_write(out, remesh_table, COUNT(remesh_table), &request->merge.remesh, NULL);
   api_json_key(out, "asset");
@@ -218,14 +222,53 @@ void api_supermesh_request_write(const api_supermesh_request *request, api_text 
   api_json_close(out, '}');
 }
 
-int api_supermesh_request_id(const api_supermesh_request *request, char id[API_ID_SIZE]) {
+/* Names of shapes and landmarks are no part of it. */
+static void write_alignment(const api_supermesh_request *request, api_text *out) {
+  const api_landmark_list *list = &request->landmarks;
+  api_json_open(out, '{');
+  api_json_key(out, "meshes");
+  api_json_open(out, '[');
+  for (int32_t s = 0; s < request->shape_count; s++) {
+    api_json_string(out, request->shapes[s].mesh);
+  }
+  api_json_close(out, ']');
+  api_json_key(out, "landmarks");
+  api_json_open(out, '[');
+  for (int32_t l = 0; l < list->count; l++) {
+    api_json_open(out, '{');
+    api_json_member_integer(out, "pass", list->items[l].pass);
+    api_json_member_number(out, "radius", list->items[l].radius);
+    api_json_member_number(out, "confidence", list->items[l].confidence);
+    api_json_key(out, "at");
+    api_json_open(out, '[');
+    for (int32_t s = 0; s < list->shape_count; s++) {
+      api_place_write(out, &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s]);
+    }
+    api_json_close(out, ']');
+    api_json_close(out, '}');
+  }
+  api_json_close(out, ']');
+  write_embedding_and_align(request, out);
+  api_json_close(out, '}');
+}
+
+static int id_of(const char *kind, void (*write)(const api_supermesh_request *request, api_text *out),
+                 const api_supermesh_request *request, char id[API_ID_SIZE]) {
   api_text text = {0};
-  api_text_add(&text, ORB_ENGINE " supermesh");
-  api_supermesh_request_write(request, &text);
+  api_text_add(&text, kind);
+  write(request, &text);
   int fine = !text.failed;
   if (fine) {
     api_id_of_text(text.data, text.size, id);
   }
   api_text_free(&text);
   return fine;
+}
+
+int api_alignment_id(const api_supermesh_request *request, char id[API_ID_SIZE]) {
+  return id_of(ORB_ENGINE " alignment", write_alignment, request, id);
+}
+
+int api_supermesh_request_id(const api_supermesh_request *request, char id[API_ID_SIZE]) {
+  return id_of(ORB_ENGINE " supermesh", api_supermesh_request_write, request, id);
 }

@@ -32,4 +32,8 @@ void api_supermesh_request_write(const api_supermesh_request *request, api_text 
 
 int api_supermesh_request_id(const api_supermesh_request *request, char id[API_ID_SIZE]);
 
+/* The id of the request's alignment: the hash of all that it depends on, which are the meshes in their order, the
+ * options of their embeddings, the landmarks without their names, the options of the alignment, and the engine. */
+int api_alignment_id(const api_supermesh_request *request, char id[API_ID_SIZE]);
+
 #endif

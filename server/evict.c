@@ -11,7 +11,8 @@ enum { PAGE = 64 };
 
 /* Deletes the row first: a crash in between then leaves an object without a row, which --gc deletes. */
 static store_result evict(const evict_env *env, resource_kind kind, const char *id, const char *tenant) {
-  static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_KINDS};
+  static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_KINDS,
+                                                    OBJECT_ALIGNMENT};
   FAULT_POINT("evict");
   objects_exclude(env->store);
   int gone = 1;
@@ -57,7 +58,7 @@ static int is_needed(const evict_env *env, const resource *row) {
 }
 
 int64_t evict_derived(const evict_env *env, int64_t budget, int64_t before) {
-  static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks"};
+  static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks", "alignment"};
   resource rows[PAGE];
   int64_t total = catalogue_bytes(env->cat, 1);
   int kept = 0; /* of the oldest, because jobs need them */

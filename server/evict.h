@@ -1,5 +1,5 @@
-/* Eviction: deletes derived objects (embeddings, supermeshes) beyond a budget, least recently used first. Never deletes
- * uploads. */
+/* Eviction: deletes derived objects (embeddings, alignments, supermeshes) beyond a budget, least recently used first.
+ * Never deletes uploads. */
 #ifndef ORB_EVICT_H
 #define ORB_EVICT_H
 

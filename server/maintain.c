@@ -17,8 +17,9 @@ typedef struct tally {
   int remove_orphans;
 } tally;
 
-static const object_kind object_of[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_KINDS};
-static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks"};
+static const object_kind object_of[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_KINDS,
+                                                      OBJECT_ALIGNMENT};
+static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks", "alignment"};
 
 /* Verifies an object against its hash. wanted "": the row is of an older engine and has no hash; the object must only
  * exist. */
@@ -82,9 +83,10 @@ static void each_row(tally *t, resource_kind kind) {
 static void each_object(void *user, object_kind kind, const char *id, uint64_t size) {
   tally *t = user;
   resource row = {0};
-  resource_kind owner = kind == OBJECT_MESH     ? RESOURCE_MESH
-                        : kind == OBJECT_SPHERE ? RESOURCE_EMBEDDING
-                                                : RESOURCE_SUPERMESH;
+  resource_kind owner = kind == OBJECT_MESH        ? RESOURCE_MESH
+                        : kind == OBJECT_SPHERE    ? RESOURCE_EMBEDDING
+                        : kind == OBJECT_ALIGNMENT ? RESOURCE_ALIGNMENT
+                                                   : RESOURCE_SUPERMESH;
   t->objects++;
   int unknown = catalogue_get(t->cat, owner, id, &row) == STORE_NOT_FOUND;
   for (int p = 0; p < PROFILES_STORED; p++) { /* a profile is the row's only once the row has its hash */
@@ -137,8 +139,9 @@ int maintain_check(const config *options) {
          t.rows, t.objects, t.wrong, t.orphans);
   if (t.wrong) {
     puts(
-        "start the service, DELETE the resources named above, and upload or request them again; if the catalogue "
-        "itself is damaged, restore a backup of the data folder");
+        "start the service, DELETE the resources named above, and upload or request them again (not alignments: the "
+        "service computes a damaged one again); if the catalogue itself is damaged, restore a backup of the data "
+        "folder");
   }
   close_both(&t);
   return t.wrong != 0;

@@ -51,27 +51,47 @@ static orb_status transfer_reports(orb_context *ctx, const orb_align_shape *shap
   return ORB_OK;
 }
 
-orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names, int32_t shape_count,
-                     const orb_landmark *landmarks, int32_t landmark_count, const orb_merge_options *options,
-                     orb_merge_result *out) {
-  double start = orb_clock(), mark = start, now;
-  orb_status status;
-  memset(out, 0, sizeof *out);
+static orb_status check_shapes(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count) {
   if (shape_count < 2) {
     return orb_fail(ctx, ORB_E_BAD_OPTION, "A merge needs two shapes or more.");
   }
   for (int32_t s = 0; s < shape_count; s++) {
-    status = orb_refuse_size(ctx, shapes[s].mesh);
+    orb_status status = orb_refuse_size(ctx, shapes[s].mesh);
     if (status != ORB_OK) {
       orb_context_error_edit(ctx)->shape = s;
       return status;
     }
   }
-  orb_progress(ctx, "align", 0);
-  ORB_GO(status, orb_align(ctx, shapes, shape_count, landmarks, landmark_count, &options->align, &out->alignment),
-         fail);
-  out->timings.align = (now = orb_clock()) - mark;
-  mark = now;
+  return ORB_OK;
+}
+
+static orb_status write_asset(orb_context *ctx, int32_t shape_count, const char *const *names,
+                              const orb_merge_options *options, orb_merge_result *out) {
+  const orb_aligned_shape *shapes = out->alignment.shapes;
+  ORB_TRY(orb_asset_write_mapped(ctx, &out->supermesh, shapes, names, &options->asset, &out->asset_facts, &out->asset,
+                                 &out->asset_vertices));
+  ORB_TRY(orb_asset_dropped(ctx, shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count));
+  out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
+  out->fits = ORB_NEW(ctx, orb_fit_report, shape_count);
+  if (!out->transforms || !out->fits) {
+    return ORB_E_NO_MEMORY;
+  }
+  ORB_TRY(orb_asset_transforms(ctx, &out->supermesh, shapes, options->asset.fit, out->transforms, out->fits));
+  for (int p = ORB_PROFILE_QUANTIZED; p < ORB_PROFILES; p++) {
+    ORB_TRY(orb_profile_write(ctx, out->asset.data, out->asset.size, (orb_profile)p, &out->profiles[p], NULL));
+  }
+  return ORB_OK;
+}
+
+orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
+                             int32_t shape_count, const orb_landmark *landmarks, orb_alignment *alignment,
+                             const orb_merge_options *options, orb_merge_result *out) {
+  double start = orb_clock(), mark = start, now;
+  orb_status status;
+  memset(out, 0, sizeof *out);
+  out->alignment = *alignment;
+  memset(alignment, 0, sizeof *alignment);
+  ORB_GO(status, check_shapes(ctx, shapes, shape_count), fail);
   orb_progress(ctx, "remesh", 0);
   ORB_GO(status,
          orb_remesh(ctx, out->alignment.shapes, shape_count, out->alignment.landmark_count, &options->remesh,
@@ -82,32 +102,27 @@ orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char
   ORB_GO(status, transfer_reports(ctx, shapes, landmarks, out), fail);
   out->timings.transfer = (now = orb_clock()) - mark;
   mark = now;
-  ORB_GO(status,
-         orb_asset_write_mapped(ctx, &out->supermesh, out->alignment.shapes, names, &options->asset, &out->asset_facts,
-                                &out->asset, &out->asset_vertices),
-         fail);
-  ORB_GO(
-      status,
-      orb_asset_dropped(ctx, out->alignment.shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count),
-      fail);
-  out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
-  out->fits = ORB_NEW(ctx, orb_fit_report, shape_count);
-  if (!out->transforms || !out->fits) {
-    status = ORB_E_NO_MEMORY;
-    goto fail;
-  }
-  ORB_GO(
-      status,
-      orb_asset_transforms(ctx, &out->supermesh, out->alignment.shapes, options->asset.fit, out->transforms, out->fits),
-      fail);
-  for (int p = ORB_PROFILE_QUANTIZED; p < ORB_PROFILES; p++) {
-    ORB_GO(status, orb_profile_write(ctx, out->asset.data, out->asset.size, (orb_profile)p, &out->profiles[p], NULL),
-           fail);
-  }
+  ORB_GO(status, write_asset(ctx, shape_count, names, options, out), fail);
   out->timings.write = (now = orb_clock()) - mark;
   out->timings.total = now - start;
   return ORB_OK;
 fail:
   orb_merge_result_free(ctx, out);
   return status;
+}
+
+orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names, int32_t shape_count,
+                     const orb_landmark *landmarks, int32_t landmark_count, const orb_merge_options *options,
+                     orb_merge_result *out) {
+  const double start = orb_clock();
+  orb_alignment alignment;
+  memset(out, 0, sizeof *out);
+  ORB_TRY(check_shapes(ctx, shapes, shape_count));
+  orb_progress(ctx, "align", 0);
+  ORB_TRY(orb_align(ctx, shapes, shape_count, landmarks, landmark_count, &options->align, &alignment));
+  const double seconds = orb_clock() - start;
+  ORB_TRY(orb_merge_aligned(ctx, shapes, names, shape_count, landmarks, &alignment, options, out));
+  out->timings.align = seconds;
+  out->timings.total += seconds;
+  return ORB_OK;
 }

@@ -6,7 +6,8 @@
 #include "queue/internal.h"
 #include "wake.h"
 
-enum { TIMER_MS = 100 };
+enum { TIMER_MS = 100, MOVE_MS = 300 }; /* how often waiters, and the progress of silent stages, are looked at */
+#define DEPENDENCIES_SHARE 0.25         /* of the progress of a supermesh whose embeddings are made first */
 
 static void unlist(queue *q, waiter *w) {
   *(w->previous ? &w->previous->next : &w->of->waiters) = w->next;
@@ -75,24 +76,6 @@ int queue_wait(queue *q, job *j, waiter *w, int64_t after, void (*suspend)(waite
   }
   pthread_mutex_unlock(&q->lock);
   return !ready;
-}
-
-void *timer_main(void *argument) {
-  queue *q = argument;
-  pthread_mutex_lock(&q->lock);
-  while (!q->timer_stop) {
-    wake_wait_ms(&q->timer_wake, &q->lock, TIMER_MS);
-    int64_t now = orb_clock_ms();
-    for (waiter *w = q->waiters, *next; w; w = next) {
-      next = w->all_next;
-      if (w->deadline <= now) {
-        wake(q, w);
-      }
-    }
-    pthread_cond_broadcast(&q->work); /* the retry_at of a job may have passed */
-  }
-  pthread_mutex_unlock(&q->lock);
-  return NULL;
 }
 
 int64_t prepare_event(job *j, api_text *json) {
@@ -165,7 +148,7 @@ int64_t queue_events_after(queue *q, job *j, int64_t seen, int *over) {
   return after;
 }
 
-/* A job that waits shows the progress of the jobs that it needs as the first 60 % of its own. */
+/* A job that waits shows the progress of the jobs that it needs as the first share of its own. */
 static void show_to_dependents(queue *q, const job *of, const char *stage, double fraction) {
   for (job *j = q->first; j; j = j->next) {
     for (int d = 0; j->waits_for && d < j->dependency_count; d++) {
@@ -175,7 +158,7 @@ static void show_to_dependents(queue *q, const job *of, const char *stage, doubl
           j->row.started = unix_ms();
         }
         double base = (double)(j->dependency_count - j->waits_for);
-        double shown = 0.6 * (base + fraction) / (double)j->dependency_count;
+        double shown = DEPENDENCIES_SHARE * (base + fraction) / (double)j->dependency_count;
         int stage_changed = strcmp(j->stage, stage) != 0;
         j->progress = shown > j->progress ? shown : j->progress;
         copy_text(j->stage, sizeof j->stage, stage);
@@ -187,30 +170,82 @@ static void show_to_dependents(queue *q, const job *of, const char *stage, doubl
   }
 }
 
-/* The progress of the whole job at a fraction of a stage. */
-static double overall(const job *j, const char *stage, double fraction) {
-  static const struct {
-    api_job_kind kind;
-    const char *stage;
-    double from, to;
-  } spans[] = {{API_JOB_EMBEDDING, "read", 0, 0.05},      {API_JOB_EMBEDDING, "check", 0.05, 0.1},
-               {API_JOB_EMBEDDING, "simplify", 0.1, 0.3}, {API_JOB_EMBEDDING, "embed", 0.3, 0.9},
-               {API_JOB_EMBEDDING, "certify", 0.9, 0.97}, {API_JOB_EMBEDDING, "store", 0.97, 1},
-               {API_JOB_SUPERMESH, "read", 0.6, 0.62},    {API_JOB_SUPERMESH, "align", 0.62, 0.75},
-               {API_JOB_SUPERMESH, "remesh", 0.75, 0.9},  {API_JOB_SUPERMESH, "transfer", 0.9, 0.94},
-               {API_JOB_SUPERMESH, "write", 0.94, 0.98},  {API_JOB_SUPERMESH, "store", 0.98, 1},
-               {API_JOB_FETCH, "download", 0, 0.7},       {API_JOB_FETCH, "check", 0.7, 1}};
+/* The part of a job's progress that a stage covers. Alignment is by far the longest stage of a supermesh. */
+typedef struct stage_span {
+  api_job_kind kind;
+  const char *stage;
+  double from, to;
+} stage_span;
+
+static const stage_span *span_of(const job *j, const char *stage) {
+  static const stage_span spans[] = {
+      {API_JOB_EMBEDDING, "read", 0, 0.05},
+      {API_JOB_EMBEDDING, "check", 0.05, 0.1},
+      {API_JOB_EMBEDDING, "simplify", 0.1, 0.3},
+      {API_JOB_EMBEDDING, "embed", 0.3, 0.9},
+      {API_JOB_EMBEDDING, "certify", 0.9, 0.97},
+      {API_JOB_EMBEDDING, "store", 0.97, 1},
+      {API_JOB_SUPERMESH, "read", DEPENDENCIES_SHARE, 0.27},
+      {API_JOB_SUPERMESH, "align", 0.27, 0.85},
+      {API_JOB_SUPERMESH, "remesh", 0.85, 0.93},
+      {API_JOB_SUPERMESH, "transfer", 0.93, 0.96},
+      {API_JOB_SUPERMESH, "write", 0.96, 0.98},
+      {API_JOB_SUPERMESH, "store", 0.98, 1},
+      {API_JOB_FETCH, "download", 0, 0.7},
+      {API_JOB_FETCH, "check", 0.7, 1},
+  };
   for (size_t i = 0; i < sizeof spans / sizeof spans[0]; i++) {
     if (spans[i].kind == j->row.kind && strcmp(spans[i].stage, stage) == 0) {
-      return spans[i].from + fraction * (spans[i].to - spans[i].from);
+      return &spans[i];
     }
   }
-  return j->progress;
+  return NULL;
+}
+
+/* Core reports a stage at points that may lie minutes apart. In between, progress approaches the end of the stage, the
+ * more slowly the larger the job, and never reaches it. */
+static void move_on(queue *q, job *j, int64_t now) {
+  enum { SILENCE_MS = 600 };
+  const stage_span *span = j->running ? span_of(j, j->stage) : NULL;
+  const double seconds = 1e-3 * (double)(now - j->last_event_ms);
+  if (!span || span->kind == API_JOB_FETCH || j->progress >= span->to || seconds < 1e-3 * SILENCE_MS) {
+    return;
+  }
+  const double expected = 2 + 1e-3 * (double)j->row.cost; /* seconds, by triangles */
+  j->progress += (span->to - j->progress) * seconds / (seconds + expected);
+  add_event(q, j, "progress", 0);
+  if (j->row.kind == API_JOB_EMBEDDING) {
+    show_to_dependents(q, j, j->stage, j->progress);
+  }
+}
+
+void *timer_main(void *argument) {
+  queue *q = argument;
+  int64_t moved = 0;
+  pthread_mutex_lock(&q->lock);
+  while (!q->timer_stop) {
+    wake_wait_ms(&q->timer_wake, &q->lock, TIMER_MS);
+    int64_t now = orb_clock_ms();
+    for (waiter *w = q->waiters, *next; w; w = next) {
+      next = w->all_next;
+      if (w->deadline <= now) {
+        wake(q, w);
+      }
+    }
+    for (job *j = now - moved >= MOVE_MS ? q->first : NULL; j; j = j->next) {
+      moved = now;
+      move_on(q, j, now);
+    }
+    pthread_cond_broadcast(&q->work); /* the retry_at of a job may have passed */
+  }
+  pthread_mutex_unlock(&q->lock);
+  return NULL;
 }
 
 void queue_progress(queue *q, job *j, const char *stage, double fraction) {
   pthread_mutex_lock(&q->lock);
-  double shown = overall(j, stage, fraction);
+  const stage_span *span = span_of(j, stage);
+  double shown = span ? span->from + fraction * (span->to - span->from) : 0;
   int stage_changed = strncmp(j->stage, stage, sizeof j->stage - 1) != 0;
   j->progress = shown > j->progress ? shown : j->progress; /* never decreases */
   copy_text(j->stage, sizeof j->stage, stage);

@@ -9,7 +9,7 @@
  *   rows.c        reading rows of any kind
  *   resources.c, owners.c, jobs.c, tokens.c, keys.c, webhooks.c   the SQL of each kind of row; lists.c   lists with a
  * filter deliveries.c  the outbox: what is still to be sent to webhooks objects.c     publishing, reading and deleting
- * files; spheres.c   the file of aligned spheres
+ * files; spheres.c   the file of aligned spheres; alignments.c   kept alignments
  *
  * Contract. ONE connection writes and checkpoints, and one thread owns it (SQLite before 3.51.3 can lose a WAL reset
  * with two). Writes are passed to it as functions. It runs all waiting writes in one transaction (group commit), each
@@ -37,12 +37,13 @@ typedef enum resource_kind {
   RESOURCE_EMBEDDING,
   RESOURCE_SUPERMESH,
   RESOURCE_LANDMARKS, /* a row alone, without an object */
+  RESOURCE_ALIGNMENT, /* no caller sees it, and it has no owner */
   RESOURCE_KINDS
 } resource_kind;
 
-/* Embeddings and supermeshes: a job can make them again, so they may be evicted. */
+/* Embeddings, supermeshes and alignments: a job can make them again, so they may be evicted. */
 static inline int resource_is_derived(resource_kind kind) {
-  return kind == RESOURCE_EMBEDDING || kind == RESOURCE_SUPERMESH;
+  return kind == RESOURCE_EMBEDDING || kind == RESOURCE_SUPERMESH || kind == RESOURCE_ALIGNMENT;
 }
 
 /* Profiles of an asset that are objects of their own, in the order of orb_profile. */
@@ -51,7 +52,7 @@ static inline object_kind object_of_profile(int profile) { /* 0 to PROFILES_STOR
   return profile == 0 ? OBJECT_QUANTIZED : OBJECT_MESHOPT;
 }
 
-/* A row of a mesh, embedding, supermesh or list of landmarks. json is allocated with malloc(). */
+/* A row of a resource. json is allocated with malloc(). */
 typedef struct resource {
   int64_t seq;
   resource_kind kind;
@@ -66,6 +67,8 @@ typedef struct resource {
 void resource_free(resource *r);
 
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out);
+/* Adds the row of an alignment, or replaces it. */
+store_result catalogue_put_alignment(catalogue *cat, const resource *row);
 store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id);
 /* Functions that list return the number of rows filled, or −1, and fill nothing, if the rows cannot be read. */
 /* Newest first, landmarks without their places, only those before sequence number `before` (0: all). */
@@ -79,7 +82,7 @@ typedef struct list_filter {
  * matching rows, through an index; with a mesh and a name, the rows of that mesh. */
 int catalogue_list_some(catalogue *cat, resource_kind kind, const char *view, const list_filter *filter, int64_t before,
                         int limit, resource *out);
-/* Embeddings and supermeshes last used before a Unix time in ms, least recently used first, without the first `skip`;
+/* Derived resources last used before a Unix time in ms, least recently used first, without the first `skip`;
  * for eviction. */
 int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resource *out);
 void catalogue_touch(catalogue *cat, resource_kind kind, const char *id); /* does not wait for the commit */

@@ -119,6 +119,8 @@ static const char *const migrations[] = {
     "CREATE INDEX delivery_webhook ON delivery(webhook) WHERE state=0;"
     "CREATE TABLE receiver(name TEXT PRIMARY KEY, tenant TEXT NOT NULL, next INTEGER NOT NULL) WITHOUT ROWID;"
     "CREATE INDEX receiver_next ON receiver(next);",
+    /* Alignments. */
+    "INSERT INTO total(kind, bytes) VALUES(4, 0);",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

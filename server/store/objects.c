@@ -14,8 +14,8 @@
 #include "faults.h"
 #include "log.h"
 
-static const char *const folders[OBJECT_KINDS] = {"mesh",    "sphere",    "asset",  "places",
-                                                  "spheres", "quantized", "meshopt"};
+static const char *const folders[OBJECT_KINDS] = {"mesh",    "sphere",    "asset",   "places",
+                                                  "spheres", "quantized", "meshopt", "alignment"};
 
 struct objects {
   pthread_rwlock_t publishing;

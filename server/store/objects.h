@@ -20,6 +20,7 @@ typedef enum object_kind {
   OBJECT_SPHERES,   /* aligned spheres of a supermesh, see store/spheres.h */
   OBJECT_QUANTIZED, /* profiles of an asset */
   OBJECT_MESHOPT,
+  OBJECT_ALIGNMENT, /* see store/alignments.h */
   OBJECT_KINDS
 } object_kind;
 

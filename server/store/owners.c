@@ -227,7 +227,7 @@ int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant) {
 int64_t catalogue_mismatches(catalogue *cat) {
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st = database_statement(db,
-                                        "SELECT (SELECT count(*) FROM resource r WHERE NOT EXISTS"
+                                        "SELECT (SELECT count(*) FROM resource r WHERE r.kind!=4 AND NOT EXISTS"
                                         "  (SELECT 1 FROM owner o WHERE o.kind=r.kind AND o.id=r.id))"
                                         " + (SELECT count(*) FROM owner o WHERE NOT EXISTS"
                                         "  (SELECT 1 FROM resource r WHERE r.kind=o.kind AND r.id=o.id))"

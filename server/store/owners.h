@@ -1,6 +1,7 @@
 /* Which tenant owns which mesh, embedding and supermesh. Equal uploads and equal requests are stored once; every tenant
  * that sent them owns the result and sees nothing else. When the last owner deletes it, it is removed. The tenant is ""
- * where no token was needed. Every row has an owner: rows older than ownership that no job names belong to "".
+ * where no token was needed. Every row but an alignment's has an owner: rows older than ownership that no job names
+ * belong to "".
  *
  * The first owner sees the resource's own description. Another owner gets a copy where the original would reveal
  * something about the first owner: the name it chose, and the time.
@@ -29,8 +30,9 @@ int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, in
 store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id, const char *tenant, int *gone);
 /* Bytes of the meshes and landmarks that a tenant owns; −1: they cannot be read. */
 int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant);
-/* For --check-data: the number of resources without an owner, owners without a resource, stored sums that differ from
- * the sums of the rows, and shapes of supermeshes that the filter of lists lacks or invents; −1: they cannot be read.
+/* For --check-data: the number of resources without an owner (alignments have none), owners without a resource, stored
+ * sums that differ from the sums of the rows, and shapes of supermeshes that the filter of lists lacks or invents; −1:
+ * they cannot be read.
  */
 int64_t catalogue_mismatches(catalogue *cat);
 

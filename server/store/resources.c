@@ -1,4 +1,4 @@
-/* Rows of meshes, embeddings and supermeshes. */
+/* Rows of resources. */
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -77,7 +77,7 @@ int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit
 int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resource *out) {
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st = database_statement(
-      db, "SELECT " COLUMNS " FROM resource WHERE kind IN (1, 2) AND used<?2 ORDER BY used, seq LIMIT ?1 OFFSET ?3");
+      db, "SELECT " COLUMNS " FROM resource WHERE kind IN (1, 2, 4) AND used<?2 ORDER BY used, seq LIMIT ?1 OFFSET ?3");
   if (st) {
     sqlite3_bind_int(st, 3, skip);
     sqlite3_bind_int(st, 1, limit);
@@ -136,6 +136,17 @@ void catalogue_touch(catalogue *cat, resource_kind kind, const char *id) {
   }
 }
 
+static int put_alignment(database *db, void *arg) {
+  const resource *row = arg;
+  int code = resource_remove(db, RESOURCE_ALIGNMENT, row->id);
+  return code == SQLITE_OK || code == SQLITE_NOTFOUND ? resource_insert(db, row) : code;
+}
+
+store_result catalogue_put_alignment(catalogue *cat, const resource *row) {
+  resource copy = *row;
+  return catalogue_write(cat, put_alignment, &copy);
+}
+
 typedef struct profile_arg {
   const char *id, *sha;
   int profile;
@@ -166,7 +177,7 @@ store_result catalogue_add_profile(catalogue *cat, const char *id, int profile, 
 
 int64_t catalogue_bytes(catalogue *cat, int derived_only) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "SELECT sum(bytes) FROM total WHERE ?1=0 OR kind IN (1, 2)");
+  sqlite3_stmt *st = database_statement(db, "SELECT sum(bytes) FROM total WHERE ?1=0 OR kind IN (1, 2, 4)");
   if (st) {
     sqlite3_bind_int(st, 1, derived_only ? 1 : 0);
   }

@@ -5,6 +5,7 @@
 
 #include "api/json.h"
 #include "metrics.h"
+#include "store/alignments.h"
 #include "store/spheres.h"
 #include "worker/places.h"
 #include "worker/run.h"
@@ -208,6 +209,42 @@ static int store_result_of(const run_env *env, orb_context *ctx, job *j, const m
   return 1;
 }
 
+/* Takes the kept alignment, or computes one and keeps it. *seconds: how long computing took, 0 if it was kept. */
+static int align_shapes(const run_env *env, orb_context *ctx, const merge_input *in, orb_alignment *out,
+                        double *seconds) {
+  const api_supermesh_request *request = &in->request;
+  char id[API_ID_SIZE];
+  const int named = api_alignment_id(request, id);
+  progress_report(env->progress, "align", 0);
+  *seconds = 0;
+  if (named && alignments_get(env->cat, env->store, ctx, id, in->shapes, request->shape_count, out)) {
+    return 1;
+  }
+  const double began = orb_clock();
+  if (orb_align(ctx, in->shapes, request->shape_count, in->landmarks, request->landmarks.count, &request->merge.align,
+                out) != ORB_OK) {
+    return 0;
+  }
+  *seconds = orb_clock() - began;
+  if (named) {
+    alignments_put(env->cat, env->store, ctx, id, in->shapes, out);
+  }
+  return 1;
+}
+
+static int merge(const run_env *env, orb_context *ctx, const merge_input *in, orb_merge_result *out) {
+  orb_alignment alignment;
+  double seconds;
+  if (!align_shapes(env, ctx, in, &alignment, &seconds) ||
+      orb_merge_aligned(ctx, in->shapes, in->names, in->request.shape_count, in->landmarks, &alignment,
+                        &in->request.merge, out) != ORB_OK) {
+    return 0;
+  }
+  out->timings.align = seconds;
+  out->timings.total += seconds;
+  return 1;
+}
+
 int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem) {
   resource known = {0};
   orb_merge_result merged;
@@ -220,9 +257,8 @@ int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out,
     return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
   }
   memset(&merged, 0, sizeof merged);
-  int fine = read_request(j, &in->request, problem) && load_input(env, ctx, in, problem) &&
-             orb_merge(ctx, in->shapes, in->names, in->request.shape_count, in->landmarks, in->request.landmarks.count,
-                       &in->request.merge, &merged) == ORB_OK;
+  int fine =
+      read_request(j, &in->request, problem) && load_input(env, ctx, in, problem) && merge(env, ctx, in, &merged);
   if (fine) {
     for (int32_t s = 0; s < in->request.shape_count; s++) {
       metrics_flips(merged.alignment.shapes[s].certificate.flipped);

@@ -2,7 +2,8 @@
 import assert from 'node:assert/strict';
 import path from 'node:path';
 import test from 'node:test';
-import { daemon, endless, samples, assertProblem, until } from './support/daemon.mjs';
+import { setTimeout as sleep } from 'node:timers/promises';
+import { daemon, endless, samples, assertProblem, patience, until } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 /** A mesh that takes a while to embed, different for every seed. */
@@ -73,6 +74,25 @@ test('events report progress and the end, and resume', async (t) => {
   assert.ok(ids.every(Boolean) && new Set(ids).size === ids.length, `ids: ${ids}`);
   const resumed = await d.get(`${job.url}/events`, { headers: { 'last-event-id': ids.at(-2) ?? '0' } });
   assert.match(resumed.bytes.toString(), /^event: ?succeeded/m);
+});
+
+test('progress moves at least once a second while a job runs, and never back', async (t) => {
+  const d = await daemon(t);
+  const mesh = await heavy(d, 1, 5);
+  const job = (await d.post('/v1/embeddings', { mesh: mesh.id, ...endless })).json;
+  await until(async () => (await d.get(job.url)).json.state === 'running', 'it runs');
+  const seen = [];
+  for (const end = Date.now() + 6000 * patience; Date.now() < end; await sleep(50)) {
+    const { progress, stage } = (await d.get(job.url)).json;
+    assert.ok(stage && progress < 1);
+    if (progress !== seen.at(-1)) seen.push(progress);
+  }
+  assert.ok(seen.length >= 6, `${seen}`);
+  assert.deepEqual(
+    seen,
+    [...seen].sort((a, b) => a - b),
+  );
+  assert.equal((await d.delete(job.url)).status, 200);
 });
 
 test('a job can be cancelled while it waits and while it runs', async (t) => {

@@ -416,6 +416,7 @@ export type Supermesh = {
   }>;
   timings_ms: {
     embed: number;
+    /** 0 if the alignment was kept. */
     align: number;
     remesh: number;
     transfer: number;

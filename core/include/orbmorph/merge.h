@@ -4,6 +4,7 @@
 
 #include "orbmorph/align.h"
 #include "orbmorph/asset.h"
+#include "orbmorph/kept.h"
 #include "orbmorph/profile.h"
 
 #ifdef __cplusplus
@@ -66,6 +67,12 @@ typedef struct orb_merge_result {
 ORB_API ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
                                             int32_t shape_count, const orb_landmark *landmarks, int32_t landmark_count,
                                             const orb_merge_options *options, orb_merge_result *out);
+/* The same with an alignment of these shapes and landmarks, as orb_align() or orb_alignment_read() gave it, so that the
+ * result is that of orb_merge(), with timings.align 0. Takes *alignment over and zeroes it, also on an error. */
+ORB_API ORB_MUST_CHECK orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes,
+                                                    const char *const *names, int32_t shape_count,
+                                                    const orb_landmark *landmarks, orb_alignment *alignment,
+                                                    const orb_merge_options *options, orb_merge_result *out);
 ORB_API void orb_merge_result_free(orb_context *ctx, orb_merge_result *result);
 
 /* Marks the triangles of the supermesh that are inverted on shape s: they face away from the mean of the input's smooth

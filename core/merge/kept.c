@@ -1,0 +1,371 @@
+/* Alignments as bytes. An aligned shape differs from the given mesh by splits and edge flips, if at all: vertices of
+ * the given mesh keep their numbers, positions and sources, and most triangles are the same.
+ *
+ *   char[8] "ORBALIGN", uint32 version, uint32 0x01020304 (byte order)
+ *   int32 shapes, landmarks, found; double energy
+ *   found × shapes places (int32 triangle, double[3]), found × double[3] points, found × double confidence
+ *   for each shape: int32 vertices, triangles, changed; double[3] point of each vertex; position and int32 source of
+ * each added vertex; the changed triangles, each with its number, corners, parent, source_triangle, material and the
+ *   attributes of its corners, where the mesh has them; int32 1 and the vertex of each landmark, or 0
+ *
+ * A triangle that is not listed is that of the given mesh, with itself as parent. */
+#include "orbmorph/kept.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "base/error.h"
+#include "base/memory.h"
+
+enum { VERSION = 1, BYTE_ORDER_MARK = 0x01020304 };
+static const char magic[8] = {'O', 'R', 'B', 'A', 'L', 'I', 'G', 'N'};
+
+/* A new member of the alignment must be written and read here, with a new VERSION. */
+_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 56, "write and read the new member");
+_Static_assert(sizeof(void *) != 8 || sizeof(orb_aligned_shape) == sizeof(orb_mesh) + sizeof(orb_certificate) + 24,
+               "write and read the new member");
+
+/* One array of a mesh with a fixed number of bytes a triangle. */
+typedef struct column {
+  void *data; /* NULL: the mesh has none */
+  size_t size;
+} column;
+
+enum { COLUMNS = 5 };
+static void columns_of(const orb_mesh *mesh, column out[COLUMNS]) {
+  const column columns[COLUMNS] = {{mesh->source_triangle, sizeof(int32_t)},
+                                   {mesh->material, sizeof(int32_t)},
+                                   {mesh->normals, 9 * sizeof(float)},
+                                   {mesh->texcoords, 6 * sizeof(float)},
+                                   {mesh->colors, 12 * sizeof(float)}};
+  memcpy(out, columns, sizeof columns);
+}
+
+/* Whether triangle t of the aligned shape is that of the given mesh. */
+static int is_same(const orb_mesh *given, const orb_aligned_shape *shape, int32_t t) {
+  const orb_mesh *mesh = &shape->mesh;
+  column before[COLUMNS], now[COLUMNS];
+  const size_t at = (size_t)t;
+  if (t >= given->triangle_count || shape->parent[t] != t ||
+      memcmp(given->triangles + 3 * at, mesh->triangles + 3 * at, 3 * sizeof(int32_t)) != 0) {
+    return 0;
+  }
+  columns_of(given, before);
+  columns_of(mesh, now);
+  for (int c = 0; c < COLUMNS; c++) {
+    if (now[c].data && memcmp((char *)before[c].data + at * before[c].size, (char *)now[c].data + at * now[c].size,
+                              now[c].size) != 0) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* Whether the aligned shape keeps the vertices of the given mesh, and has the same arrays. */
+static int keeps(const orb_mesh *given, const orb_mesh *mesh) {
+  const size_t n = (size_t)given->vertex_count;
+  column before[COLUMNS], now[COLUMNS];
+  columns_of(given, before);
+  columns_of(mesh, now);
+  int same = mesh->vertex_count >= given->vertex_count && mesh->triangle_count >= given->triangle_count &&
+             !mesh->source == !given->source &&
+             memcmp(mesh->positions, given->positions, 3 * n * sizeof(double)) == 0 &&
+             (!mesh->source || memcmp(mesh->source, given->source, n * sizeof(int32_t)) == 0);
+  for (int c = 0; c < COLUMNS; c++) {
+    same = same && !now[c].data == !before[c].data;
+  }
+  return same;
+}
+
+/* Appends to a buffer until the first failure. */
+typedef struct writer {
+  orb_context *ctx;
+  orb_buffer *out;
+  orb_status status;
+} writer;
+
+static void put(writer *w, const void *bytes, size_t size) {
+  if (w->status == ORB_OK && size > 0) {
+    w->status = orb_buffer_append(w->ctx, w->out, bytes, size);
+  }
+}
+
+static void put_integer(writer *w, int32_t value) {
+  put(w, &value, sizeof value);
+}
+
+static void put_triangle(writer *w, const orb_aligned_shape *shape, int32_t t) {
+  column columns[COLUMNS];
+  columns_of(&shape->mesh, columns);
+  put_integer(w, t);
+  put(w, shape->mesh.triangles + 3 * (size_t)t, 3 * sizeof(int32_t));
+  put_integer(w, shape->parent[t]);
+  for (int c = 0; c < COLUMNS; c++) {
+    if (columns[c].data) {
+      put(w, (char *)columns[c].data + (size_t)t * columns[c].size, columns[c].size);
+    }
+  }
+}
+
+static void put_shape(writer *w, const orb_mesh *given, const orb_aligned_shape *shape, int32_t landmarks) {
+  const orb_mesh *mesh = &shape->mesh;
+  const size_t vertices = (size_t)mesh->vertex_count, first = (size_t)given->vertex_count;
+  int32_t changed = 0;
+  for (int32_t t = 0; t < mesh->triangle_count; t++) {
+    changed += !is_same(given, shape, t);
+  }
+  put_integer(w, mesh->vertex_count);
+  put_integer(w, mesh->triangle_count);
+  put_integer(w, changed);
+  put(w, shape->points, 3 * vertices * sizeof(double));
+  put(w, mesh->positions + 3 * first, 3 * (vertices - first) * sizeof(double));
+  if (mesh->source) {
+    put(w, mesh->source + first, (vertices - first) * sizeof(int32_t));
+  }
+  for (int32_t t = 0; t < mesh->triangle_count; t++) {
+    if (!is_same(given, shape, t)) {
+      put_triangle(w, shape, t);
+    }
+  }
+  put_integer(w, shape->landmark_vertices != NULL);
+  put(w, shape->landmark_vertices, shape->landmark_vertices ? (size_t)landmarks * sizeof(int32_t) : 0);
+}
+
+static void put_found(writer *w, const orb_alignment *a) {
+  const size_t found = (size_t)a->found_count;
+  for (size_t i = 0; i < found * (size_t)a->shape_count; i++) {
+    put_integer(w, a->found[i].triangle);
+    put(w, a->found[i].at, sizeof a->found[i].at);
+  }
+  put(w, a->found_points, 3 * found * sizeof(double));
+  put(w, a->confidence, found * sizeof(double));
+}
+
+orb_status orb_alignment_write(orb_context *ctx, const orb_align_shape *shapes, const orb_alignment *alignment,
+                               orb_buffer *out) {
+  writer w = {ctx, out, ORB_OK};
+  memset(out, 0, sizeof *out);
+  for (int32_t s = 0; s < alignment->shape_count; s++) {
+    if (!keeps(shapes[s].mesh, &alignment->shapes[s].mesh)) {
+      return orb_fail(ctx, ORB_E_BAD_OPTION, "Shape %d of the alignment does not extend the given mesh.", s);
+    }
+  }
+  put(&w, magic, sizeof magic);
+  put_integer(&w, VERSION);
+  put_integer(&w, BYTE_ORDER_MARK);
+  put_integer(&w, alignment->shape_count);
+  put_integer(&w, alignment->landmark_count);
+  put_integer(&w, alignment->found_count);
+  put(&w, &alignment->energy, sizeof alignment->energy);
+  put_found(&w, alignment);
+  for (int32_t s = 0; s < alignment->shape_count; s++) {
+    put_shape(&w, shapes[s].mesh, &alignment->shapes[s], alignment->landmark_count);
+  }
+  if (w.status != ORB_OK) {
+    orb_buffer_free(ctx, out);
+  }
+  return w.status;
+}
+
+/* Takes bytes from the front. bad: something was wrong, and all later reads give zeros. */
+typedef struct reader {
+  const unsigned char *at;
+  size_t left;
+  int bad;
+} reader;
+
+static void take(reader *r, void *out, size_t size) {
+  if (r->bad || size > r->left) {
+    r->bad = 1;
+    memset(out, 0, size);
+    return;
+  }
+  memcpy(out, r->at, size);
+  r->at += size;
+  r->left -= size;
+}
+
+/* An integer from low to high. */
+static int32_t take_integer(reader *r, int32_t low, int32_t high) {
+  int32_t value;
+  take(r, &value, sizeof value);
+  r->bad |= value < low || value > high;
+  return r->bad ? low : value;
+}
+
+/* Room for `count` elements, which are in the bytes; NULL with bad set if the bytes are too few. */
+static void *take_array(orb_context *ctx, reader *r, size_t count, size_t size) {
+  void *block = r->bad || count > r->left / size ? NULL : orb_alloc(ctx, count, size);
+  if (!block) {
+    r->bad = 1;
+    return NULL;
+  }
+  take(r, block, count * size);
+  return block;
+}
+
+/* Grows an array of the mesh, where there is one, to `count` elements. */
+static int grow(orb_context *ctx, void *array, size_t count, size_t size) {
+  void *block;
+  memcpy(&block, array, sizeof block);
+  if (block) {
+    block = orb_realloc(ctx, block, count, size);
+    if (!block) {
+      return 0;
+    }
+    memcpy(array, &block, sizeof block);
+  }
+  return 1;
+}
+
+static int grow_mesh(orb_context *ctx, orb_mesh *mesh, int32_t vertices, int32_t triangles) {
+  const size_t v = (size_t)vertices, t = (size_t)triangles;
+  const int grown =
+      grow(ctx, &mesh->positions, 3 * v, sizeof(double)) && grow(ctx, &mesh->source, v, sizeof(int32_t)) &&
+      grow(ctx, &mesh->triangles, 3 * t, sizeof(int32_t)) && grow(ctx, &mesh->source_triangle, t, sizeof(int32_t)) &&
+      grow(ctx, &mesh->material, t, sizeof(int32_t)) && grow(ctx, &mesh->normals, 9 * t, sizeof(float)) &&
+      grow(ctx, &mesh->texcoords, 6 * t, sizeof(float)) && grow(ctx, &mesh->colors, 12 * t, sizeof(float));
+  mesh->vertex_count = vertices;
+  mesh->triangle_count = triangles;
+  return grown;
+}
+
+/* Triangles in rising order; those beyond the given mesh must all be there. */
+static void take_triangles(reader *r, const orb_mesh *given, orb_aligned_shape *shape, int32_t changed) {
+  orb_mesh *mesh = &shape->mesh;
+  column columns[COLUMNS];
+  columns_of(mesh, columns);
+  int32_t last = -1, added = 0;
+  for (int32_t i = 0; i < changed && !r->bad; i++) {
+    const int32_t t = take_integer(r, last + 1, mesh->triangle_count - 1);
+    for (size_t k = 0; k < 3; k++) {
+      mesh->triangles[3 * (size_t)t + k] = take_integer(r, 0, mesh->vertex_count - 1);
+    }
+    shape->parent[t] = take_integer(r, 0, given->triangle_count - 1);
+    for (int c = 0; c < COLUMNS; c++) {
+      if (columns[c].data) {
+        take(r, (char *)columns[c].data + (size_t)t * columns[c].size, columns[c].size);
+      }
+    }
+    r->bad |= mesh->material &&
+              (mesh->material[t] < 0 || mesh->material[t] >= (mesh->material_count | !mesh->material_count));
+    added += t >= given->triangle_count;
+    last = t;
+  }
+  r->bad |= added != mesh->triangle_count - given->triangle_count;
+}
+
+/* Points are unit vectors. */
+static int are_points(const double *points, int32_t count) {
+  for (int32_t v = 0; v < count; v++) {
+    const double *p = points + 3 * (size_t)v;
+    if (!(fabs(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - 1) <= 1e-9)) { /* also NaN */
+      return 0;
+    }
+  }
+  return 1;
+}
+
+static orb_status take_shape(orb_context *ctx, reader *r, const orb_mesh *given, int32_t landmarks,
+                             orb_aligned_shape *out) {
+  enum { MOST = 400 * 1000 * 1000 };
+  const int32_t vertices = take_integer(r, given->vertex_count, MOST);
+  const int32_t triangles = take_integer(r, given->triangle_count, MOST);
+  const int32_t changed = take_integer(r, 0, triangles);
+  if (r->bad || (size_t)vertices > r->left / (3 * sizeof(double)) || triangles - given->triangle_count > changed ||
+      (size_t)changed > r->left / (5 * sizeof(int32_t))) {
+    r->bad = 1;
+    return ORB_OK;
+  }
+  ORB_TRY(orb_mesh_copy(ctx, given, &out->mesh));
+  out->points = take_array(ctx, r, 3 * (size_t)vertices, sizeof(double));
+  out->parent = ORB_NEW(ctx, int32_t, triangles);
+  if (!grow_mesh(ctx, &out->mesh, vertices, triangles) || !out->points || !out->parent) {
+    return r->bad && out->parent ? ORB_OK : ORB_E_NO_MEMORY;
+  }
+  const size_t first = (size_t)given->vertex_count, added = (size_t)vertices - first;
+  take(r, out->mesh.positions + 3 * first, 3 * added * sizeof(double));
+  if (out->mesh.source) {
+    take(r, out->mesh.source + first, added * sizeof(int32_t));
+  }
+  for (int32_t t = 0; t < triangles; t++) {
+    out->parent[t] = t;
+  }
+  take_triangles(r, given, out, changed);
+  if (take_integer(r, 0, 1)) {
+    out->landmark_vertices = take_array(ctx, r, (size_t)landmarks, sizeof(int32_t));
+  }
+  for (int32_t l = 0; out->landmark_vertices && l < landmarks; l++) {
+    r->bad |= out->landmark_vertices[l] < -1 || out->landmark_vertices[l] >= vertices;
+  }
+  for (size_t v = first; out->mesh.source && v < (size_t)vertices && !r->bad; v++) {
+    r->bad |= out->mesh.source[v] < -1 || out->mesh.source[v] >= given->file_vertex_count;
+  }
+  if (r->bad || !are_points(out->points, vertices)) {
+    r->bad = 1;
+    return ORB_OK;
+  }
+  ORB_TRY(orb_certify(ctx, out->points, vertices, out->mesh.triangles, triangles, &out->certificate));
+  r->bad |= !out->certificate.valid;
+  return ORB_OK;
+}
+
+static orb_status take_found(orb_context *ctx, reader *r, const orb_align_shape *shapes, orb_alignment *out) {
+  const size_t found = (size_t)out->found_count, places = found * (size_t)out->shape_count;
+  out->found = ORB_NEW0(ctx, orb_place, places);
+  if (!out->found) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (size_t i = 0; i < places; i++) {
+    out->found[i].triangle = take_integer(r, 0, shapes[i % (size_t)out->shape_count].mesh->triangle_count - 1);
+    take(r, out->found[i].at, sizeof out->found[i].at);
+  }
+  out->found_points = take_array(ctx, r, 3 * found, sizeof(double));
+  out->confidence = take_array(ctx, r, found, sizeof(double));
+  return ORB_OK;
+}
+
+static orb_status take_all(orb_context *ctx, reader *r, const orb_align_shape *shapes, int32_t shape_count,
+                           orb_alignment *out) {
+  char head[sizeof magic];
+  take(r, head, sizeof head);
+  r->bad |= memcmp(head, magic, sizeof magic) != 0;
+  (void)take_integer(r, VERSION, VERSION);
+  (void)take_integer(r, BYTE_ORDER_MARK, BYTE_ORDER_MARK);
+  (void)take_integer(r, shape_count, shape_count);
+  const int32_t landmarks = take_integer(r, 0, 1 << 20), found = take_integer(r, 0, ORB_FOUND_MAX);
+  take(r, &out->energy, sizeof out->energy);
+  if (r->bad) {
+    return ORB_OK;
+  }
+  out->shapes = ORB_NEW0(ctx, orb_aligned_shape, shape_count);
+  if (!out->shapes) {
+    return ORB_E_NO_MEMORY;
+  }
+  out->shape_count = shape_count;
+  out->landmark_count = landmarks;
+  out->found_count = found;
+  if (found > 0) {
+    ORB_TRY(take_found(ctx, r, shapes, out));
+  }
+  for (int32_t s = 0; s < shape_count && !r->bad; s++) {
+    ORB_TRY(take_shape(ctx, r, shapes[s].mesh, landmarks, &out->shapes[s]));
+  }
+  r->bad |= r->left != 0;
+  return ORB_OK;
+}
+
+orb_status orb_alignment_read(orb_context *ctx, const void *bytes, size_t size, const orb_align_shape *shapes,
+                              int32_t shape_count, orb_alignment *out) {
+  reader r = {bytes, size, 0};
+  memset(out, 0, sizeof *out);
+  orb_status status = take_all(ctx, &r, shapes, shape_count, out);
+  if (status == ORB_OK && r.bad) {
+    status = orb_fail(ctx, ORB_E_BAD_OPTION, "The bytes are not an alignment of these shapes.");
+  }
+  if (status != ORB_OK) {
+    orb_alignment_free(ctx, out);
+  }
+  return status;
+}

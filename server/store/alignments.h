@@ -1,0 +1,20 @@
+/* Kept alignments: an object (the bytes of orb_alignment_write()) and a row with its hash, named by all that the
+ * alignment depends on (api_alignment_id()). A request that differs in remeshing or in the asset only takes it from
+ * here. Nothing depends on them: they are evicted like embeddings, and one that is damaged is computed again. */
+#ifndef ORB_STORE_ALIGNMENTS_H
+#define ORB_STORE_ALIGNMENTS_H
+
+#include "orbmorph/kept.h"
+#include "store/catalogue.h"
+
+/* 1 with the alignment, verified against its hash and certified again; 0: none is kept, or it cannot be used. Blocks.
+ */
+int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const char *id,
+                   const orb_align_shape *shapes, int32_t shape_count, orb_alignment *out);
+
+/* Keeps an alignment of these shapes, unless the disk is nearly full. Failures are logged and have no consequence but
+ * the time of another alignment. Blocks for a commit. */
+void alignments_put(catalogue *cat, objects *store, orb_context *ctx, const char *id, const orb_align_shape *shapes,
+                    const orb_alignment *alignment);
+
+#endif
