@@ -236,6 +236,7 @@ static void take_triangles(reader *r, const orb_mesh *given, orb_aligned_shape *
   orb_mesh *mesh = &shape->mesh;
   column columns[COLUMNS];
   columns_of(mesh, columns);
+  const int32_t materials = mesh->material_count > 0 ? mesh->material_count : 1;
   int32_t last = -1, added = 0;
   for (int32_t i = 0; i < changed && !r->bad; i++) {
     const int32_t t = take_integer(r, last + 1, mesh->triangle_count - 1);
@@ -248,8 +249,8 @@ static void take_triangles(reader *r, const orb_mesh *given, orb_aligned_shape *
         take(r, (char *)columns[c].data + (size_t)t * columns[c].size, columns[c].size);
       }
     }
-    r->bad |= mesh->material &&
-              (mesh->material[t] < 0 || mesh->material[t] >= (mesh->material_count | !mesh->material_count));
+    const int32_t material = mesh->material ? mesh->material[t] : 0;
+    r->bad |= material < 0 || material >= materials;
     added += t >= given->triangle_count;
     last = t;
   }

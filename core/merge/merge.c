@@ -92,6 +92,10 @@ orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes, co
   out->alignment = *alignment;
   memset(alignment, 0, sizeof *alignment);
   ORB_GO(status, check_shapes(ctx, shapes, shape_count), fail);
+  if (out->alignment.shape_count != shape_count) {
+    status = orb_fail(ctx, ORB_E_BAD_OPTION, "The alignment is of %d shapes.", out->alignment.shape_count);
+    goto fail;
+  }
   orb_progress(ctx, "remesh", 0);
   ORB_GO(status,
          orb_remesh(ctx, out->alignment.shapes, shape_count, out->alignment.landmark_count, &options->remesh,

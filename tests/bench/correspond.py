@@ -2,14 +2,15 @@
 """Measures maps against dense truth, and writes docs/bench-correspond.md.
 
     tests/bench/correspond.py [--bin build/bin] [--base DIR-OR-REVISION] [--set people,animals,real] [--half choose|report|all]
-                              [--given 0,8] [--preset default] [--sample K] [--pairs A-B,…] [--swap] [--jobs 1]
+                              [--given 0,8] [--preset default] [--change none,swapped,turned,refined] [--sample K] [--pairs A-B,…] [--jobs 1]
                               [--store DIR] [--fresh] [--out FILE.md] [--json FILE.json]
 
 Sets: `people` are the pairs of MESHES/posed, `animals` those that `orbmorph-posed` generates, `real` those of
 docs/bench-truth.md. Every pair belongs to the half that constants may be chosen on (`choose`) or to the half that is
 only reported. --given 0 finds the correspondence (`auto`); --given N pins the first N true places with the preset.
 --base measures another version beside this one: its folder of programs, or a revision to build. --sample K takes K
-pairs of each set, spread evenly. --swap maps the second shape to the first.
+pairs of each set, spread evenly. --change measures after changes that should not matter as well: first and second
+shape swapped, the second one turned and its vertices and triangles shuffled, its triangles cut into four.
 
 Every result is a file in the store, by version, pair and options: an interrupted run continues, and a finished one is
 printed again at once. --fresh measures again. The version is the hash of the program, so a new build has new results.
@@ -31,6 +32,7 @@ import subprocess
 import sys
 import tempfile
 
+import correspond_changes
 import correspond_pairs
 from correspond_pairs import PLACES
 from first_answer import ROOT, build_base
@@ -82,12 +84,10 @@ def surface_of(file):
     return Surface(file)
 
 
-def measure(program, pair, given, options):
+def measure(program, pair, given, change, options):
     """What is stored of one map."""
     first, second = surface_of(pair.first), surface_of(pair.second)
-    places = pair.places()
-    if options.swap:
-        first, second, places = second, first, [(b, a, part) for a, b, part in places]
+    first, second, places = correspond_changes.change(change, first, second, pair.places(), options.store / "changed")
     if len(places) <= given:
         return None  # nothing is left to measure at
     places = places[:given] + spread(places[given:], PLACES)
@@ -123,15 +123,15 @@ def spread(places, count):
     return places if len(places) <= count else [places[i * len(places) // count] for i in range(count)]
 
 
-def stored(program, version, pair, given, options):
+def stored(program, version, pair, given, change, options):
     """The result of one map, from the store if it is there."""
-    kind = f"{given}-{options.preset if given else 'auto'}{'-swapped' if options.swap else ''}"
+    kind = f"{given}-{options.preset if given else 'auto'}{'' if change == 'none' else '-' + change}"
     pair.make()
     inputs = hashlib.sha256(b"".join([str(FORMAT).encode(), pair.first.read_bytes(), pair.second.read_bytes()]))
     file = options.store / version / f"{pair.set}-{pair.name}-{kind}-{inputs.hexdigest()[:8]}.json"
     if file.exists() and not options.fresh:
         return json.loads(file.read_text())
-    result = measure(program, pair, given, options)
+    result = measure(program, pair, given, change, options)
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_suffix(".part")
     part.write_text(json.dumps(result))
@@ -213,6 +213,22 @@ def confidence_rows(results):
     return rows
 
 
+def is_right(result):
+    return "failed" not in result and statistics.mean(result["errors"]) <= RIGHT
+
+
+def verdict_rows(results):
+    """How many pairs have the verdict of the unchanged pair, and how many are right in both."""
+    plain = {(r[0].name, r[1], r[2]): is_right(r[3]) for r in results}
+    rows = {}
+    for pair, name, given, result in results:
+        before = plain.get((pair.name, name.split(", ")[0], given))
+        if ", " in name and before is not None:
+            rows.setdefault((name, str(given)), []).append((before, is_right(result)))
+    return [[*key, str(len(value)), str(sum(a == b for a, b in value)), str(sum(a and b for a, b in value))]
+            for key, value in rows.items()]
+
+
 def report(results):
     head = (ROOT / "tests/bench/correspond_head.md").read_text()
     found = groups(results)
@@ -223,6 +239,9 @@ def report(results):
     confidence = confidence_rows(results)
     if confidence:
         text += "\n## Confidence\n\n" + table(["version", "confidence", "pairs", "right"], confidence)
+    verdicts = verdict_rows(results)
+    if verdicts:
+        text += "\n## Changes\n\n" + table(["version", "given", "pairs", "same verdict", "right in both"], verdicts)
     return text + "\n## Pairs\n\n" + table(PAIR_COLUMNS, [pair_row(*r) for r in results])
 
 
@@ -267,7 +286,7 @@ def main():
     parser.add_argument("--preset", choices=("fast", "default", "quality"), default="default")
     parser.add_argument("--sample", type=int, help="so many pairs of each set")
     parser.add_argument("--pairs", help="names with commas")
-    parser.add_argument("--swap", action="store_true")
+    parser.add_argument("--change", default="none", help="names with commas")
     parser.add_argument("--list", action="store_true", help="print the pairs and end")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="maps at once")
@@ -289,17 +308,21 @@ def main():
         is_folder = pathlib.Path(options.base, "orbmorph-bench").exists()
         programs = {"before": pathlib.Path(options.base) if is_folder else build_base(options.base)} | programs
     versions = {name: version_of(folder) for name, folder in programs.items()}
-    work = [(pair, name, int(n)) for pair in pairs for n in options.given.split(",") for name in programs]
+    changes = options.change.split(",")
+    if set(changes) - {"none", "swapped", *correspond_changes.CHANGES}:
+        sys.exit("correspond.py: --change: none, swapped, " + ", ".join(correspond_changes.CHANGES))
+    work = [(pair, name, int(n), change) for pair in pairs for n in options.given.split(",") for name in programs
+            for change in changes]
 
     def one(item):
-        pair, name, given = item
-        return stored(programs[name] / "orbmorph-bench", versions[name], pair, given, options)
+        pair, name, given, change = item
+        return stored(programs[name] / "orbmorph-bench", versions[name], pair, given, change, options)
 
     results = []
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        for (pair, name, given), result in zip(work, pool.map(one, work)):
+        for (pair, name, given, change), result in zip(work, pool.map(one, work)):
             if result:
-                results.append((pair, name, given, result))
+                results.append((pair, name if change == "none" else f"{name}, {change}", given, result))
                 print("  ".join(pair_row(*results[-1])), flush=True)
     text = report(results)
     print("\n" + text[text.index("## Summary"):text.index("## Pairs")])

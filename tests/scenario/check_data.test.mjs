@@ -58,6 +58,7 @@ test('damage to any object, and to any kind of row, is found', async (t) => {
     ),
   );
   assert.deepEqual([...new Set(files.map(([kind]) => kind))].sort(), [
+    'alignment',
     'asset',
     'mesh',
     'meshopt',

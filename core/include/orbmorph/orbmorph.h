@@ -8,6 +8,7 @@
 #include "orbmorph/context.h"
 #include "orbmorph/embed.h"
 #include "orbmorph/format.h"
+#include "orbmorph/kept.h"
 #include "orbmorph/locate.h"
 #include "orbmorph/material.h"
 #include "orbmorph/material_members.h"
