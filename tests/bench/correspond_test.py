@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+"""Tests the measuring of maps: correspond_test.py BIN. The truth of two poses of one body, changes, and images."""
+import math
+import pathlib
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import correspond
+import correspond_changes
+import correspond_pairs
+from surface import Surface
+
+BODIES = ("cat-stand", "cat-turn")
+
+
+class Correspond(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        path = pathlib.Path(cls.folder.name)
+        program = pathlib.Path(sys.argv[1], "orbmorph-posed")
+        subprocess.run([program, path], check=True)
+        subprocess.run([program, path, *BODIES], check=True, stdout=subprocess.DEVNULL)
+        cls.surfaces = [Surface(path / f"{body}.obj") for body in BODIES]
+        cls.places = correspond_pairs.places_of(path, *(surface.file.name for surface in cls.surfaces))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def test_bodies_are_closed_and_of_their_own_triangles(self):
+        for surface in self.surfaces:
+            edges = {(t[k], t[(k + 1) % 3]) for t in surface.triangles for k in range(3)}
+            self.assertEqual(len(edges), 3 * len(surface.triangles))
+            self.assertTrue(all((b, a) in edges for a, b in edges))
+            self.assertEqual(len(surface.triangles), 2 * len(surface.positions) - 4)
+        self.assertNotEqual(*(len(surface.triangles) for surface in self.surfaces))
+
+    def test_lengths_between_true_places_are_those_of_the_other_pose(self):
+        """Skinning bends a surface, and changes lengths along it little."""
+        self.assertGreater(len(self.places), 300)
+        draw, ratios = random.Random(1), []
+        for _ in range(60):
+            p, q = draw.sample(self.places, 2)
+            lengths = [surface.length(p[s], surface.position(q[s])) for s, surface in enumerate(self.surfaces)]
+            scaled = [length / math.sqrt(surface.area) for length, surface in zip(lengths, self.surfaces)]
+            if scaled[0] > 0.3:
+                ratios.append(scaled[1] / scaled[0])
+        self.assertGreater(len(ratios), 40)
+        self.assertLess(max(abs(math.log(r)) for r in ratios), 0.35)
+        self.assertLess(abs(math.log(statistics.median(ratios))), 0.05)
+
+    def test_right_and_left_are_not_exchanged(self):
+        """The determinant of nose, tail, right and left ear's places has one sign in both poses."""
+        signs = []
+        for s, surface in enumerate(self.surfaces):
+            nose, _, _, _, _, tail, right, left = (surface.position(place[s]) for place in self.places[:8])
+            rows = [[b - a for a, b in zip(tail, p)] for p in (nose, right, left)]
+            signs.append(correspond.dot(rows[0], correspond.cross(rows[1], rows[2])) > 0)
+        self.assertEqual(*signs)
+
+    def test_changes_keep_places(self):
+        first, second = self.surfaces
+        for name in correspond_changes.CHANGES:
+            a, b, places = correspond_changes.change(name, first, second, self.places, second.file.parent)
+            self.assertIs(a, first)
+            self.assertAlmostEqual(b.area / second.area, 1, 5)
+            for (_, before, _), (_, after, _) in zip(self.places[:40], places[:40]):
+                distances = [[math.dist(surface.position(x), surface.position(y[1])) for y in other[40:60]]
+                             for surface, x, other in ((second, before, self.places), (b, after, places))]
+                for d, e in zip(*distances):
+                    self.assertAlmostEqual(d / second.diagonal, e / second.diagonal, 5)
+        self.assertEqual(len(b.triangles), 4 * len(second.triangles))
+        a, b, places = correspond_changes.change("swapped", first, second, self.places, None)
+        self.assertEqual((a, b, places[3][:2]), (second, first, self.places[3][1::-1]))
+
+    def test_images_follow_from_four_distances(self):
+        points = [self.surfaces[0].position(place[0]) for place in self.places[:80]]
+        chosen = [points[i] for i in correspond.anchors(points)]
+        for point in points:
+            self.assertLess(math.dist(point, correspond.solve(chosen, [math.dist(point, c) for c in chosen])), 1e-6)
+
+    def test_a_map_is_measured(self):
+        """The program maps a body to itself almost exactly."""
+        pair = correspond_pairs.Pair("animals", "self", "", "choose", self.surfaces[0].file, self.surfaces[0].file,
+                                     lambda: [(a, a, part) for a, _, part in self.places])
+        options = type("Options", (), {"preset": "fast", "threads": 1, "limit": 600, "store": pathlib.Path(self.folder.name)})
+        result = correspond.measure(pathlib.Path(sys.argv[1], "orbmorph-bench"), pair, 8, "none", options)
+        self.assertNotIn("failed", result)
+        self.assertEqual(len(result["errors"]), 250)
+        self.assertLess(statistics.mean(result["errors"]), 0.2)
+        self.assertGreater(result["cpu"], 0.1)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
