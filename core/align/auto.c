@@ -12,6 +12,7 @@
 
 #include "align/find/candidates.h"
 #include "align/find/found.h"
+#include "align/find/match.h"
 #include "align/find/params.h"
 #include "align/map/engine/params.h"
 #include "align/methods.h"
@@ -86,16 +87,16 @@ static int keep_better(orb_context *ctx, orb_alignment *one, orb_alignment *othe
   return better;
 }
 
-/* Pins the shapes at the matches and composes the map without them; `twice`: composes it first with the matches held.
+/* Pins the shapes at the matches; `composed`: and composes the map with the matches held. The result has no landmarks.
  * *held 0: the matches cannot be met on the meshes as they are, and `out` is empty. */
-static orb_status align_matched(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, const matches *m,
-                                const orb_align_options *options, int twice, orb_alignment *out, int *held) {
+static orb_status pin_matched(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, const matches *m,
+                              const orb_align_options *options, int composed, orb_alignment *out, int *held) {
   orb_status status = ORB_E_NO_MEMORY;
   orb_align_options pin = *options;
   orb_place *at = ORB_NEW(ctx, orb_place, (size_t)m->count * (size_t)shape_count);
   orb_landmark landmarks[ORB_CANDIDATE_PAIRS];
   pin.method = ORB_ALIGN_PIN;
-  pin.preset = twice ? options->preset : ORB_PRESET_FAST;
+  pin.preset = composed ? options->preset : ORB_PRESET_FAST;
   pin.max_growth = 1e-9; /* practically none: 0 would mean the default */
   memset(out, 0, sizeof *out);
   memset(landmarks, 0, sizeof landmarks);
@@ -126,11 +127,26 @@ static orb_status align_matched(orb_context *ctx, const orb_align_shape *shapes,
     orb_free(ctx, out->shapes[s].landmark_vertices);
     out->shapes[s].landmark_vertices = NULL;
   }
-  ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_MAP, options->preset), end);
   *held = 1;
 end:
   orb_free(ctx, at);
   if (!*held) {
+    orb_alignment_free(ctx, out);
+  }
+  return status;
+}
+
+/* Pins the shapes at the matches and composes the map without them; `twice`: composes it first with the matches held.
+ * *held 0: the matches cannot be met on the meshes as they are, and `out` is empty. */
+static orb_status align_matched(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, const matches *m,
+                                const orb_align_options *options, int twice, orb_alignment *out, int *held) {
+  ORB_TRY(pin_matched(ctx, shapes, shape_count, m, options, twice, out, held));
+  if (!*held) {
+    return ORB_OK;
+  }
+  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_MAP, NULL, options->preset);
+  if (status != ORB_OK) {
+    *held = 0;
     orb_alignment_free(ctx, out);
   }
   return status;
@@ -222,9 +238,81 @@ static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, int32
   int taken = held && keep_better(ctx, alignment, &other);
   if (!taken && options->preset != ORB_PRESET_QUALITY &&
       alignment->energy > orb_map_params_of(options->preset).energy.good) {
-    return orb_compose_all(ctx, alignment, ORB_MAP_SPACE_DONE, options->preset);
+    return orb_compose_all(ctx, alignment, ORB_MAP_SPACE_DONE, NULL, options->preset);
   }
   return ORB_OK;
+}
+
+/* The matches of all later shapes with the first. */
+typedef struct found {
+  orb_match *of;          /* of each later shape, from 1 on */
+  const double **targets; /* likewise */
+  int32_t shape_count;
+  int all; /* a match was found for each */
+} found;
+
+static void found_free(orb_context *ctx, found *f) {
+  for (int32_t s = 1; f->of && s < f->shape_count; s++) {
+    orb_match_free(ctx, &f->of[s]);
+  }
+  orb_free(ctx, f->of);
+  orb_free(ctx, f->targets);
+}
+
+static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count, found *f,
+                               matches *m) {
+  f->of = ORB_NEW0(ctx, orb_match, shape_count);
+  f->targets = ORB_NEW0(ctx, const double *, shape_count);
+  m->of = ORB_NEW0(ctx, orb_candidate, shape_count);
+  m->vertex = ORB_NEW(ctx, int32_t, ORB_CANDIDATE_PAIRS * (size_t)shape_count);
+  if (!f->of || !f->targets || !m->of || !m->vertex) {
+    return ORB_E_NO_MEMORY;
+  }
+  f->shape_count = shape_count;
+  f->all = 1;
+  m->clear = 1;
+  for (int32_t s = 1; s < shape_count; s++) {
+    orb_match *one = &f->of[s];
+    ORB_TRY(orb_match_find(ctx, shapes[0].mesh, shapes[s].mesh, one));
+    f->targets[s] = one->target;
+    f->all = f->all && one->is_found;
+    m->clear = fmin(m->clear, one->clear);
+    m->of[s].count = one->count;
+    memcpy(m->of[s].first, one->first, sizeof one->first);
+    memcpy(m->of[s].second, one->second, sizeof one->second);
+  }
+  gather(m, shape_count);
+  return ORB_OK;
+}
+
+/* Composes a rotated alignment towards the matches. Where that has led to no good map, their pairs are pinned and
+ * composed from there, and the better of both stays. *matched 0: a shape has no match, and nothing has changed. */
+static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                                 const orb_align_options *options, orb_alignment *alignment, double *clear,
+                                 int *matched) {
+  found f = {0};
+  matches m = {0};
+  orb_alignment other;
+  int held;
+  orb_status status;
+  ORB_GO(status, find_matches(ctx, shapes, shape_count, &f, &m), end);
+  *matched = f.all;
+  if (!f.all) {
+    goto end;
+  }
+  *clear = m.clear;
+  ORB_GO(status, orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, f.targets, options->preset), end);
+  if (m.count >= 3 && alignment->energy > orb_map_params_of(options->preset).energy.poor) {
+    ORB_GO(status, align_matched(ctx, shapes, shape_count, &m, options, 1, &other, &held), end);
+    if (held) {
+      (void)keep_better(ctx, alignment, &other);
+    }
+  }
+end:
+  found_free(ctx, &f);
+  orb_free(ctx, m.of);
+  orb_free(ctx, m.vertex);
+  return status;
 }
 
 orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
@@ -232,11 +320,15 @@ orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32
   orb_status status;
   orb_align_options rotated = *options;
   double clear = 1;
+  int matched = 0;
   rotated.preset = ORB_PRESET_FAST;
   ORB_TRY(orb_align_given(ctx, shapes, shape_count, NULL, 0, &rotated, out));
   if (options->preset != ORB_PRESET_FAST) {
+    ORB_GO(status, follow_matches(ctx, shapes, shape_count, options, out, &clear, &matched), failed);
+  }
+  if (options->preset != ORB_PRESET_FAST && !matched) {
     orb_map_from from = options->preset == ORB_PRESET_QUALITY ? ORB_MAP_FROM_SPACE : ORB_MAP_SPACE_ONLY;
-    ORB_GO(status, orb_compose_all(ctx, out, from, options->preset), failed);
+    ORB_GO(status, orb_compose_all(ctx, out, from, NULL, options->preset), failed);
     if (out->energy > orb_map_params_of(options->preset).energy.near_isometry) {
       ORB_GO(status, improve(ctx, shapes, shape_count, options, out, &clear), failed);
     }

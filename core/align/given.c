@@ -50,14 +50,15 @@ static orb_status certify_all(orb_context *ctx, orb_sheet *sheets, int32_t shape
   return ORB_OK;
 }
 
-orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from, orb_preset preset) {
+orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from,
+                           const double *const *targets, orb_preset preset) {
   double sum = 0;
   for (int32_t s = 1; s < alignment->shape_count; s++) {
     double energy[2];
     int improved;
     int both = alignment->shape_count == 2 && alignment->landmark_count > 0;
     ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, from,
-                        preset, energy, &improved));
+                        targets ? targets[s] : NULL, preset, energy, &improved));
     sum += energy[1];
   }
   alignment->energy = sum / (alignment->shape_count - 1);
@@ -88,7 +89,7 @@ orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int3
     orb_sheet_release(ctx, &sheets[s], &out->shapes[s]);
   }
   if (options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO)) {
-    ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, options->preset), end);
+    ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, options->preset), end);
   }
 end:
   for (int32_t s = 0; sheets && s < shape_count; s++) {

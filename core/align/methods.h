@@ -29,9 +29,9 @@ ORB_MUST_CHECK orb_status orb_align_given(orb_context *ctx, const orb_align_shap
                                           const orb_align_options *options, orb_alignment *out);
 
 /* Improves the maps from the first shape to the others (orb_compose()), since aligned landmarks alone do not make a
- * good morph. Fills alignment->energy. */
+ * good morph. Fills alignment->energy. targets: NULL, or for each shape but the first what orb_compose() takes. */
 ORB_MUST_CHECK orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from,
-                                          orb_preset preset);
+                                          const double *const *targets, orb_preset preset);
 
 /* Method `auto` without landmarks; auto.c describes it. */
 ORB_MUST_CHECK orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,

@@ -155,8 +155,39 @@ static orb_status run(search *s, orb_spectral_list *out) {
   return ORB_OK;
 }
 
-orb_status orb_spectral_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int mirrored,
-                             orb_spectral_list *out) {
+typedef struct dense_job {
+  const search *s;
+  const orb_zoom *map;
+  int32_t *out;
+  int back;
+} dense_job;
+
+static void fill_dense(void *arg, int64_t begin, int64_t end, int thread) {
+  dense_job *job = arg;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    job->out[v] = orb_zoom_vertex_image(&job->s->pair, job->map, (int32_t)v, job->back);
+  }
+}
+
+static orb_status write_dense(search *s, int32_t most, const orb_mesh *a, const orb_mesh *b, orb_spectral_dense *out) {
+  size_t n[2] = {(size_t)a->vertex_count, (size_t)b->vertex_count};
+  out->forth = ORB_NEW(s->ctx, int32_t, ORB_SPECTRAL_MAX * n[0]);
+  out->back = ORB_NEW(s->ctx, int32_t, ORB_SPECTRAL_MAX * n[1]);
+  if (!out->forth || !out->back) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < s->count && i < most; i++) {
+    for (int back = 0; back < 2; back++) {
+      dense_job job = {s, &s->map[s->order[i]], (back ? out->back : out->forth) + (size_t)i * n[back], back};
+      ORB_TRY(orb_sliced_by(s->ctx, (int64_t)n[back], 4096, 64, fill_dense, &job));
+    }
+  }
+  return ORB_OK;
+}
+
+static orb_status find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int mirrored, int32_t most,
+                       orb_spectral_list *out, orb_spectral_dense *dense) {
   orb_status status;
   search *s = ORB_NEW0(ctx, search, 1);
   memset(out, 0, sizeof *out);
@@ -167,7 +198,10 @@ orb_status orb_spectral_find(orb_context *ctx, const orb_mesh *a, const orb_mesh
   ORB_GO(status, orb_spectral_shape_create(ctx, a, 0, &s->shape[0]), end);
   ORB_GO(status, orb_spectral_shape_create(ctx, b, mirrored, &s->shape[1]), end);
   if (s->shape[0].is_usable && s->shape[1].is_usable) {
-    status = run(s, out);
+    ORB_GO(status, run(s, out), end);
+    if (dense) {
+      status = write_dense(s, most, a, b, dense);
+    }
   }
 end:
   orb_zoom_pair_free(ctx, &s->pair);
@@ -175,4 +209,15 @@ end:
   orb_spectral_shape_free(ctx, &s->shape[1]);
   orb_free(ctx, s);
   return status;
+}
+
+orb_status orb_spectral_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int mirrored,
+                             orb_spectral_list *out) {
+  return find(ctx, a, b, mirrored, 0, out, NULL);
+}
+
+orb_status orb_spectral_find_dense(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int32_t most,
+                                   orb_spectral_list *out, orb_spectral_dense *dense) {
+  dense->forth = dense->back = NULL;
+  return find(ctx, a, b, 0, most, out, dense);
 }

@@ -44,6 +44,15 @@ typedef struct orb_spectral_list {
 /* mirrored: the maps that reverse orientation. Of a shape to itself these are its mirror symmetries, which tell which
  * of its parts are twins. The same bytes for any number of threads; about 0.1 s for two meshes of a thousand
  * vertices. */
+/* Where each candidate of a list takes every vertex of either mesh, as vertices of the other; the caller frees both. */
+typedef struct orb_spectral_dense {
+  int32_t *forth; /* candidates × vertices of a */
+  int32_t *back;  /* candidates × vertices of b */
+} orb_spectral_dense;
+
+ORB_MUST_CHECK orb_status orb_spectral_find_dense(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int32_t most,
+                                                  orb_spectral_list *out, orb_spectral_dense *dense);
+
 ORB_MUST_CHECK orb_status orb_spectral_find(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, int mirrored,
                                             orb_spectral_list *out);
 

@@ -335,13 +335,17 @@ void orb_zoom_refine(const orb_zoom_pair *pair, int from, int to, orb_zoom *map)
 }
 
 int32_t orb_zoom_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t sample, int back) {
+  return orb_zoom_vertex_image(pair, map, pair->shape[back ? 1 : 0]->sample[sample], back);
+}
+
+int32_t orb_zoom_vertex_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t vertex, int back) {
   const orb_spectral_shape *from = pair->shape[back ? 1 : 0], *to = pair->shape[back ? 0 : 1];
-  size_t n = (size_t)to->mesh->vertex_count;
+  size_t n = (size_t)to->mesh->vertex_count, m = (size_t)from->mesh->vertex_count;
   double point[K] = {0}, best = INFINITY;
   int32_t nearest = 0;
   for (int i = 0; i < map->size; i++) {
     for (int k = 0; k < map->size; k++) {
-      point[i] += (back ? map->matrix[k][i] : map->matrix[i][k]) * from->at[k][sample];
+      point[i] += (back ? map->matrix[k][i] : map->matrix[i][k]) * from->function[(size_t)k * m + (size_t)vertex];
     }
   }
   for (size_t v = 0; v < n; v++) {

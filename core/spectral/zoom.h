@@ -38,6 +38,9 @@ void orb_zoom_refine(const orb_zoom_pair *pair, int from, int to, orb_zoom *map)
  * vertices. O(n). */
 int32_t orb_zoom_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t sample, int back);
 
+/* The same for any vertex. */
+int32_t orb_zoom_vertex_image(const orb_zoom_pair *pair, const orb_zoom *map, int32_t vertex, int back);
+
 /* How much of shape a keeps its orientation under the map, by the triple products: −1 to 1. */
 double orb_zoom_facing(const orb_zoom_pair *pair, const orb_zoom *map);
 

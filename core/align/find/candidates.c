@@ -154,7 +154,7 @@ static orb_status run_candidate(search *t, candidate *one, orb_map_from from) {
   ORB_GO(status, carry(t, one, sheets, &held), end);
   if (held) {
     ORB_GO(status,
-           orb_compose(t->ctx, &sheets[0].shape, &sheets[1].shape, 1, 0, from, ORB_PRESET_DEFAULT, energy, &improved),
+           orb_compose(t->ctx, &sheets[0].shape, &sheets[1].shape, 1, 0, from, NULL, ORB_PRESET_DEFAULT, energy, &improved),
            end);
     one->energy = energy[1];
     ORB_GO(status, sample_images(t, sheets, one), end);

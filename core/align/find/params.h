@@ -21,6 +21,7 @@ enum {
   ORB_FIND_TIP_MAPS = 8,  /* tip maps by distances that are tried, beside those by rotations in space */
   ORB_FIND_SPECTRAL = 4,  /* spectral maps that are tried */
   ORB_FIND_COMPOSED = 3,  /* candidates that are composed in full */
+  ORB_FIND_FINE = 4000,   /* vertices of the finer copies on which the best match is settled (match.c) */
   ORB_FIND_SAMPLES = 48   /* points of the first shape whose images tell candidates apart */
 };
 
@@ -46,6 +47,19 @@ static const double ORB_FIND_CERTAIN = 0.2;
  * that is farther away is another correspondence: as a candidate it does not count, and as the map reached so far it is
  * replaced whatever its energy. */
 static const double ORB_FIND_AGREES = 0.1;
+
+/* Matches (match.c). */
+
+/* A rotation by π in space multiplies how much a map bends by 1 + this, for the same reason as ROTATION_COST. Less than
+ * that: bends differ more than energies, and files do lie in any direction. */
+static const double ORB_FIND_TURN_COST = 0.5;
+/* Of the pairs of posed people, no spectral map that costs so much more than the first was the right one. */
+static const double ORB_FIND_SPECTRAL_BEHIND = 0.8;
+/* A map that bends this many times as much as the best one in one direction does not win by the other direction: these
+ * differ by a factor of 1.5 where the map is right. */
+static const double ORB_FIND_BEHIND = 2;
+/* What `clear` is where all other maps were dropped or are the same. */
+static const double ORB_FIND_CLEAR_ALONE = 0.5;
 
 /* Tips (tips.c). */
 enum { ORB_FIND_SOURCES = 64 };                /* points from which distances are averaged; each costs one search */

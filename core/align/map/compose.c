@@ -350,6 +350,27 @@ static orb_status run_starts(orb_map_run *c, orb_map_from from, orb_preset prese
   return run_passes(c, 1);
 }
 
+/* Starts from targets that are given: on the usual level, and where that leads to nothing on a coarser one, since which
+ * flips cannot be cleared is close to chance. A map of shapes that correspond is then drawn to the targets; a worse one
+ * is left to the caller, who has other ways. */
+static orb_status run_given_targets(orb_map_run *c) {
+  const orb_map_params *p = &c->params;
+  ORB_TRY(orb_map_register(c, 0));
+  ORB_TRY(orb_map_levels_prepare(c));
+  ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
+  if (c->best_energy > p->energy.poor) {
+    c->params.level.spatial = p->level.given;
+    ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
+    c->params.level.spatial = orb_map_params_of(ORB_PRESET_DEFAULT).level.spatial;
+  }
+  if (c->best_energy <= p->energy.good || c->best_energy > p->energy.poor) {
+    return ORB_OK;
+  }
+  ORB_TRY(run_start(c, ORB_MAP_DRAWN));
+  ORB_TRY(untwist_early(c, INFINITY));
+  return run_passes(c, 1);
+}
+
 /* The quick way, and all starts where it does not suffice: where the walk has twisted limbs, and where the shapes are
  * one in two poses, as samples by eigenfunctions show. */
 static orb_status run_walked(orb_map_run *c, orb_map_walked *w, orb_preset preset) {
@@ -376,6 +397,9 @@ static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
   if (from == ORB_MAP_MAP_ONLY || (c->pairs.landmarks == 0 && c->best_energy <= c->params.energy.good)) {
     ORB_TRY(orb_map_levels_prepare(c));
     return run_start(c, ORB_MAP_GIVEN);
+  }
+  if (c->given_target) {
+    return run_given_targets(c);
   }
   if (from == ORB_MAP_FROM_SPACE && c->both && c->pairs.count > 0 && preset != ORB_PRESET_QUALITY) {
     orb_map_walked walked;
@@ -418,11 +442,13 @@ static orb_status take_best(orb_map_run *c, orb_aligned_shape *fixed, double ene
 }
 
 orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
-                       int32_t landmark_count, orb_map_from from, orb_preset preset, double energy[2], int *improved) {
+                       int32_t landmark_count, orb_map_from from, const double *target, orb_preset preset, double energy[2],
+                       int *improved) {
   orb_map_run c = {.ctx = ctx,
                    .params = orb_map_params_of(preset),
                    .both = both,
                    .landmark_count = landmark_count,
+                   .given_target = target,
                    .hopeless = INFINITY,
                    .twisted_energy = INFINITY};
   int swap = 0;

@@ -32,9 +32,10 @@ typedef enum orb_map_from {
  * shape's points may change too, which leaves more room, and the shapes may change places; else they stay as they are,
  * for further shapes. The result is certified and better than what was given; otherwise all points stay as they are and
  * *improved is 0. energy[2]: symmetric Dirichlet energy of the composed map, capped at 20 for each triangle and
- * weighted by area, before and after. Stage "align". */
+ * weighted by area, before and after. target: NULL, or where each vertex of `moving` lies on the fixed shape, 3 a
+ * vertex in its space; replaces registration in space with ORB_MAP_FROM_SPACE, and needs `both` 0. Stage "align". */
 ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
-                                      int32_t landmark_count, orb_map_from from, orb_preset preset, double energy[2],
-                                      int *improved);
+                                      int32_t landmark_count, orb_map_from from, const double *target,
+                                      orb_preset preset, double energy[2], int *improved);
 
 #endif

@@ -65,6 +65,7 @@ typedef struct orb_map_params {
   /* Levels of a start, and sweeps on them. */
   struct {
     int32_t spatial;    /* level at which a start from spatial targets begins. Coarser is faster and folds more */
+    int32_t given;      /* the same for a second attempt at targets that are given */
     int32_t mapped;     /* level at which a start from a map begins: a coarser one would fold it */
     int32_t last;       /* level beyond which a start gives up untangling */
     int32_t kept;       /* least vertices of the coarsest level if vertices are kept on it, */
@@ -246,6 +247,7 @@ typedef struct orb_map_params {
     double normal_weight; /* distance and this weight of |n − n'|² against |x − x'|² */
     int32_t search;       /* triangles beyond which only every second, third, … is searched for a vertex */
     double jitter;        /* of barycentric coordinates: vertices that share a point cannot be untangled */
+    double given_jitter;  /* the same for targets that are given: few of them share a point */
   } place;
 
   /* Twisted limbs: which parts are examined, and when one counts. */

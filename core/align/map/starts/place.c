@@ -105,10 +105,17 @@ orb_status orb_map_register(orb_map_run *c, int samples) {
   if (!target || !vertex) {
     goto done;
   }
-  ORB_GO(status, gather_anchors(c, samples, vertex, target, &anchors), done);
-  ORB_GO(status,
-         orb_map_register_in_space(ctx, &c->params, &c->b, c->x, c->normal, c->vertex_count, &anchors, c->target, &fit),
-         done);
+  if (c->given_target && samples == 0) {
+    for (size_t i = 0; i < 3 * (size_t)c->vertex_count; i++) {
+      c->target[i] = (c->given_target[i] - c->b.centre[i % 3]) * c->b.scale;
+    }
+  } else {
+    ORB_GO(status, gather_anchors(c, samples, vertex, target, &anchors), done);
+    ORB_GO(
+        status,
+        orb_map_register_in_space(ctx, &c->params, &c->b, c->x, c->normal, c->vertex_count, &anchors, c->target, &fit),
+        done);
+  }
   orb_map_normals(c->target, c->vertex_count, mesh->triangles, mesh->triangle_count, c->target_normal);
   ORB_GO(status, orb_nearest_create(ctx, c->b.x, c->b.triangles, c->b.triangle_count, &job.tree), done);
   status = orb_sliced_by(ctx, c->vertex_count, SLICE, 64, find_target_places, &job);
@@ -145,6 +152,7 @@ static void place_range(void *arg, int64_t begin, int64_t end, int thread) {
 
 /* Untangling cannot separate vertices that share a point: move them a little within their triangles. */
 static void spread_out(orb_map_run *c, orb_map_level *l) {
+  const double jitter = c->given_target ? c->params.place.given_jitter : c->params.place.jitter;
   uint64_t state = 0x9e3779b97f4a7c15u;
   for (int32_t v = 0; v < l->count; v++) {
     if (l->pinned[v]) {
@@ -153,7 +161,7 @@ static void spread_out(orb_map_run *c, orb_map_level *l) {
     double w[3], sum = 0;
     for (int k = 0; k < 3; k++) {
       state = state * 6364136223846793005u + 1442695040888963407u;
-      w[k] = l->place[v].at[k] + c->params.place.jitter * (double)(state >> 40) * 0x1p-24;
+      w[k] = l->place[v].at[k] + jitter * (double)(state >> 40) * 0x1p-24;
       sum += w[k];
     }
     for (int k = 0; k < 3; k++) {

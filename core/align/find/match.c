@@ -1,0 +1,366 @@
+#include "align/find/match.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "align/find/params.h"
+#include "align/map/engine/spread.h"
+#include "align/map/engine/surface.h"
+#include "align/rotate/correlate.h"
+#include "align/rotate/procrustes.h"
+#include "align/sheet/copy.h"
+#include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "elastic/elastic.h"
+#include "numeric/rotation.h"
+#include "numeric/vec3.h"
+#include "orbmorph/locate.h"
+#include "spectral/spectral.h"
+
+enum { TRIALS = ORB_FIND_SPECTRAL + ORB_FIND_ROTATIONS };
+
+/* A rough map and what registering along it has given. Pose s is of copy s on the other one. */
+typedef struct trial {
+  orb_rough_map map[2];
+  orb_elastic_pose pose[2];
+  double bend[2];
+  double cost; /* INFINITY: dropped */
+} trial;
+
+/* How a shape is scaled: to area 4π, around the middle of its box. */
+typedef struct scaling {
+  double middle[3], scale;
+} scaling;
+
+typedef struct search {
+  orb_context *ctx;
+  const orb_mesh *mesh[2];
+  scaling scaling[2];
+  orb_coarse_copy copy[2]; /* scaled */
+  orb_spectral_dense dense;
+  int32_t *rotated[2]; /* the rotations' maps, one after the other: as those of `dense` */
+  trial trial[TRIALS];
+  int32_t count;
+  /* of the loop that registers */
+  int32_t task[2 * TRIALS]; /* 2 · trial + direction */
+  orb_status status[2 * TRIALS];
+} search;
+
+static void scaling_of(const orb_mesh *mesh, scaling *out) {
+  orb_extent extent;
+  orb_mesh_extent(mesh, &extent);
+  out->scale = extent.area > 0 ? sqrt(4 * M_PI / extent.area) : 1;
+  for (int k = 0; k < 3; k++) {
+    out->middle[k] = 0.5 * extent.min[k] + 0.5 * extent.max[k];
+  }
+}
+
+/* A decimated copy of a shape, scaled like it. */
+static orb_status copy_create(const search *t, int s, int32_t size, orb_coarse_copy *out) {
+  ORB_TRY(orb_coarse_copy_create(t->ctx, t->mesh[s], size, out));
+  for (size_t i = 0; i < 3 * (size_t)out->mesh.vertex_count; i++) {
+    out->mesh.positions[i] = (out->mesh.positions[i] - t->scaling[s].middle[i % 3]) * t->scaling[s].scale;
+  }
+  return ORB_OK;
+}
+
+/* Poses of a trial, both of its maps in both directions. */
+static orb_status add_trial(search *t, const int32_t *forth, const int32_t *back) {
+  trial *one = &t->trial[t->count++];
+  one->map[0] = (orb_rough_map){forth, back};
+  one->map[1] = (orb_rough_map){back, forth};
+  for (int s = 0; s < 2; s++) {
+    size_t n = (size_t)t->copy[s].mesh.vertex_count;
+    one->pose[s].position = ORB_NEW(t->ctx, double, 3 * n);
+    one->pose[s].rotation = ORB_NEW(t->ctx, double, 9 * n);
+    if (!one->pose[s].position || !one->pose[s].rotation) {
+      return ORB_E_NO_MEMORY;
+    }
+  }
+  return ORB_OK;
+}
+
+static orb_status add_spectral(search *t) {
+  orb_spectral_list list;
+  ORB_TRY(orb_spectral_find_dense(t->ctx, &t->copy[0].mesh, &t->copy[1].mesh, ORB_FIND_SPECTRAL, &list, &t->dense));
+  for (int32_t i = 0; i < list.count && i < ORB_FIND_SPECTRAL; i++) {
+    if (list.candidate[i].cost <= list.candidate[0].cost + ORB_FIND_SPECTRAL_BEHIND) {
+      ORB_TRY(add_trial(t, t->dense.forth + (size_t)i * (size_t)t->copy[0].mesh.vertex_count,
+                        t->dense.back + (size_t)i * (size_t)t->copy[1].mesh.vertex_count));
+    }
+  }
+  return ORB_OK;
+}
+
+/* Where each vertex of copy s goes if the sphere of copy 1 is rotated, as vertices of the other copy. */
+static orb_status rotated_map(const search *t, int s, const double rotation[9], int32_t *out) {
+  const orb_coarse_copy *from = &t->copy[s], *to = &t->copy[1 - s];
+  double r[9];
+  orb_locator *locator;
+  for (int k = 0; k < 9; k++) {
+    r[k] = s ? rotation[k] : rotation[3 * (k % 3) + k / 3];
+  }
+  ORB_TRY(orb_locator_create(t->ctx, to->points, to->mesh.vertex_count, to->mesh.triangles, to->mesh.triangle_count,
+                             NULL, &locator));
+  for (int32_t v = 0; v < from->mesh.vertex_count; v++) {
+    double p[3];
+    orb_place place;
+    orb_rotate_point(r, from->points + 3 * (size_t)v, p);
+    orb_locate(locator, p, -1, &place);
+    out[v] = orb_map_nearest_corner(to->mesh.triangles, &place);
+  }
+  orb_locator_destroy(t->ctx, locator);
+  return ORB_OK;
+}
+
+static orb_status add_rotations(search *t) {
+  orb_aligned_shape shape[2];
+  double rotation[9 * ORB_FIND_ROTATIONS];
+  int32_t count;
+  memset(shape, 0, sizeof shape);
+  for (int s = 0; s < 2; s++) {
+    shape[s].mesh = t->copy[s].mesh;
+    shape[s].points = t->copy[s].points;
+    t->rotated[s] = ORB_NEW(t->ctx, int32_t, ORB_FIND_ROTATIONS * (size_t)t->copy[s].mesh.vertex_count);
+    if (!t->rotated[s]) {
+      return ORB_E_NO_MEMORY;
+    }
+  }
+  ORB_TRY(orb_rotation_candidates(t->ctx, &shape[0], &shape[1], ORB_FIND_ROTATIONS, rotation, &count));
+  for (int32_t i = 0; i < count; i++) {
+    int32_t *map[2];
+    for (int s = 0; s < 2; s++) {
+      map[s] = t->rotated[s] + (size_t)i * (size_t)t->copy[s].mesh.vertex_count;
+      ORB_TRY(rotated_map(t, s, rotation + 9 * (size_t)i, map[s]));
+    }
+    ORB_TRY(add_trial(t, map[0], map[1]));
+  }
+  return ORB_OK;
+}
+
+static void register_tasks(void *arg, int64_t begin, int64_t end, int thread) {
+  search *t = arg;
+  (void)thread;
+  for (int64_t i = begin; i < end; i++) {
+    trial *one = &t->trial[t->task[i] / 2];
+    int s = t->task[i] % 2;
+    t->status[i] = orb_elastic_register(t->ctx, &t->copy[s].mesh, &t->copy[1 - s].mesh, &one->map[s], &one->pose[s],
+                                        &one->bend[s]);
+  }
+}
+
+/* Registers the trials that are not dropped in one direction, side by side. */
+static orb_status register_all(search *t, int direction) {
+  int32_t count = 0;
+  for (int32_t i = 0; i < t->count; i++) {
+    if (t->trial[i].cost < INFINITY) {
+      t->task[count++] = 2 * i + direction;
+    }
+  }
+  ORB_TRY(orb_context_check(t->ctx));
+  orb_parallel_for(t->ctx, count, 1, register_tasks, t);
+  for (int32_t i = 0; i < count; i++) {
+    if (t->status[i] != ORB_OK) {
+      return t->status[i];
+    }
+  }
+  return orb_context_check(t->ctx);
+}
+
+/* The angle of the rotation that carries copy s best onto its pose, over π. */
+static double turn_of(const search *t, const trial *one, int s) {
+  const orb_mesh *mesh = &t->copy[s].mesh;
+  const double *x = mesh->positions, *y = one->pose[s].position;
+  double mean[2][3] = {{0}}, h[9] = {0}, r[9];
+  for (int32_t v = 0; v < mesh->vertex_count; v++) {
+    for (int k = 0; k < 3; k++) {
+      mean[0][k] += x[3 * (size_t)v + (size_t)k] / mesh->vertex_count;
+      mean[1][k] += y[3 * (size_t)v + (size_t)k] / mesh->vertex_count;
+    }
+  }
+  for (int32_t v = 0; v < mesh->vertex_count; v++) {
+    double p[3], q[3];
+    orb_sub(x + 3 * (size_t)v, mean[0], p);
+    orb_sub(y + 3 * (size_t)v, mean[1], q);
+    orb_add_outer(h, q, p, 1);
+  }
+  (void)orb_nearest_rotation(h, r);
+  return acos(fmin(1, fmax(-1, (r[0] + r[4] + r[8] - 1) / 2))) / M_PI;
+}
+
+static void fill_cost(const search *t, trial *one, int directions) {
+  double bend = 0;
+  for (int s = 0; s < directions; s++) {
+    bend += one->bend[s] / directions;
+  }
+  one->cost = bend * (1 + ORB_FIND_TURN_COST * turn_of(t, one, 0));
+}
+
+static int32_t best_of(const search *t) {
+  int32_t best = 0;
+  for (int32_t i = 1; i < t->count; i++) {
+    best = t->trial[i].cost < t->trial[best].cost ? i : best;
+  }
+  return best;
+}
+
+/* Registers all in one direction, drops those that are too far behind to win, and registers the others back. */
+static orb_status rank(search *t) {
+  for (int direction = 0; direction < 2; direction++) {
+    ORB_TRY(register_all(t, direction));
+    for (int32_t i = 0; i < t->count; i++) {
+      if (t->trial[i].cost < INFINITY) {
+        fill_cost(t, &t->trial[i], direction + 1);
+      }
+    }
+    double most = ORB_FIND_BEHIND * t->trial[best_of(t)].cost;
+    for (int32_t i = 0; i < t->count && direction == 0; i++) {
+      t->trial[i].cost = t->trial[i].cost > most ? INFINITY : t->trial[i].cost;
+    }
+  }
+  return ORB_OK;
+}
+
+/* How far apart two trials take the vertices of the first copy, in the mean, in diagonals. */
+static double difference(const search *t, const trial *x, const trial *y) {
+  int32_t n = t->copy[0].mesh.vertex_count;
+  orb_extent extent;
+  double sum = 0;
+  orb_mesh_extent(&t->copy[1].mesh, &extent);
+  for (int32_t v = 0; v < n; v++) {
+    sum += sqrt(orb_distance2(x->pose[0].position + 3 * (size_t)v, y->pose[0].position + 3 * (size_t)v)) / n;
+  }
+  return sum / extent.diagonal;
+}
+
+static double clear_of(const search *t, int32_t best) {
+  double next = INFINITY;
+  for (int32_t i = 0; i < t->count; i++) {
+    const trial *one = &t->trial[i];
+    if (one->cost < next && difference(t, one, &t->trial[best]) > ORB_FIND_DIFFERENT) {
+      next = one->cost;
+    }
+  }
+  return next < INFINITY ? 1 - t->trial[best].cost / next : ORB_FIND_CLEAR_ALONE;
+}
+
+/* Vertices spread over the first shape, and those nearest to where they go. */
+static orb_status write_pairs(const search *t, const trial *best, orb_match *out) {
+  const orb_coarse_copy *copy = t->copy;
+  int32_t sample[ORB_CANDIDATE_PAIRS];
+  orb_nearest *tree;
+  ORB_TRY(orb_map_spread(t->ctx, copy[0].mesh.positions, copy[0].mesh.vertex_count, ORB_CANDIDATE_PAIRS, sample));
+  ORB_TRY(
+      orb_nearest_create(t->ctx, copy[1].mesh.positions, copy[1].mesh.triangles, copy[1].mesh.triangle_count, &tree));
+  for (int i = 0; i < ORB_CANDIDATE_PAIRS; i++) {
+    orb_place place;
+    (void)orb_nearest_query(tree, best->pose[0].position + 3 * (size_t)sample[i], INFINITY, &place);
+    int32_t first = copy[0].vertex[sample[i]];
+    int32_t second = copy[1].vertex[orb_map_nearest_corner(copy[1].mesh.triangles, &place)];
+    int is_new = 1;
+    for (int32_t k = 0; k < out->count; k++) {
+      is_new = is_new && out->first[k] != first && out->second[k] != second;
+    }
+    if (is_new) {
+      out->first[out->count] = first;
+      out->second[out->count++] = second;
+    }
+  }
+  orb_nearest_destroy(t->ctx, tree);
+  return ORB_OK;
+}
+
+static void pose_free(orb_context *ctx, orb_elastic_pose *pose) {
+  orb_free(ctx, pose->position);
+  orb_free(ctx, pose->rotation);
+}
+
+/* Settles a finer copy of the second shape on one of the first, and carries its pose to all vertices. */
+static orb_status write_targets(const search *t, const trial *best, orb_match *out) {
+  orb_coarse_copy fine[2] = {{{0}, NULL, NULL}, {{0}, NULL, NULL}};
+  orb_elastic_pose pose = {NULL, NULL}, all = {NULL, NULL};
+  size_t count = 3 * (size_t)t->mesh[1]->vertex_count;
+  double *points = ORB_NEW(t->ctx, double, count);
+  orb_status status = ORB_E_NO_MEMORY;
+  all.position = out->target = ORB_NEW(t->ctx, double, count);
+  if (!points || !all.position) {
+    goto end;
+  }
+  for (int s = 0; s < 2; s++) {
+    ORB_GO(status, copy_create(t, s, ORB_FIND_FINE, &fine[s]), end);
+  }
+  size_t n = (size_t)fine[1].mesh.vertex_count;
+  pose.position = ORB_NEW(t->ctx, double, 3 * n);
+  pose.rotation = ORB_NEW(t->ctx, double, 9 * n);
+  if (!pose.position || !pose.rotation) {
+    status = ORB_E_NO_MEMORY;
+    goto end;
+  }
+  ORB_GO(status, orb_elastic_carry(t->ctx, &t->copy[1].mesh, &best->pose[1], fine[1].mesh.positions, (int32_t)n, &pose),
+         end);
+  ORB_GO(status, orb_elastic_settle(t->ctx, &fine[1].mesh, &fine[0].mesh, &pose), end);
+  for (size_t i = 0; i < count; i++) {
+    points[i] = (t->mesh[1]->positions[i] - t->scaling[1].middle[i % 3]) * t->scaling[1].scale;
+  }
+  ORB_GO(status, orb_elastic_carry(t->ctx, &fine[1].mesh, &pose, points, t->mesh[1]->vertex_count, &all), end);
+  for (size_t i = 0; i < count; i++) {
+    out->target[i] = out->target[i] / t->scaling[0].scale + t->scaling[0].middle[i % 3];
+  }
+end:
+  orb_free(t->ctx, points);
+  pose_free(t->ctx, &pose);
+  for (int s = 0; s < 2; s++) {
+    orb_coarse_copy_free(t->ctx, &fine[s]);
+  }
+  return status;
+}
+
+static orb_status run(search *t, orb_match *out) {
+  for (int s = 0; s < 2; s++) {
+    scaling_of(t->mesh[s], &t->scaling[s]);
+    ORB_TRY(copy_create(t, s, ORB_FIND_COARSE, &t->copy[s]));
+  }
+  ORB_TRY(add_spectral(t));
+  ORB_TRY(add_rotations(t));
+  ORB_TRY(rank(t));
+  int32_t best = best_of(t);
+  if (t->count == 0 || !(t->trial[best].cost < INFINITY)) {
+    return ORB_OK;
+  }
+  out->is_found = 1;
+  out->cost = t->trial[best].cost;
+  out->clear = clear_of(t, best);
+  ORB_TRY(write_pairs(t, &t->trial[best], out));
+  return write_targets(t, &t->trial[best], out);
+}
+
+orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, orb_match *out) {
+  memset(out, 0, sizeof *out);
+  search *t = ORB_NEW0(ctx, search, 1);
+  if (!t) {
+    return ORB_E_NO_MEMORY;
+  }
+  t->ctx = ctx;
+  t->mesh[0] = first;
+  t->mesh[1] = second;
+  orb_status status = run(t, out);
+  for (int32_t i = 0; i < t->count; i++) {
+    pose_free(ctx, &t->trial[i].pose[0]);
+    pose_free(ctx, &t->trial[i].pose[1]);
+  }
+  for (int s = 0; s < 2; s++) {
+    orb_coarse_copy_free(ctx, &t->copy[s]);
+    orb_free(ctx, t->rotated[s]);
+  }
+  orb_free(ctx, t->dense.forth);
+  orb_free(ctx, t->dense.back);
+  orb_free(ctx, t);
+  return status;
+}
+
+void orb_match_free(orb_context *ctx, orb_match *match) {
+  orb_free(ctx, match->target);
+  memset(match, 0, sizeof *match);
+}

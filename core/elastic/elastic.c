@@ -1,0 +1,366 @@
+/* A round adds up pulls on the vertices of mesh a: of the rough map, and of the nearest places both ways. Then
+ * rotations and positions take turns: each vertex takes the rotation that fits its edges best, and all positions
+ * together solve a linear system in which edges want to be what these rotations make of them. From round to round pulls
+ * grow stronger.
+ *
+ * The first rotations come from the rough map: what it does with the surroundings of each vertex. From the rotation of
+ * the whole instead, an arm that is raised by 150° stays wrung, since rotations of neighbours hold each other. */
+#include "elastic/elastic.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
+#include "elastic/body.h"
+#include "elastic/factor.h"
+#include "numeric/rotation.h"
+#include "numeric/vec3.h"
+
+/* Lengths are those of surfaces of area 4π. Chosen by trial on the pairs of the half `choose` of
+ * tests/bench/correspond.py, unless a line gives another reason. */
+enum {
+  MAP_ROUNDS = 4,    /* along the rough map alone; more change little */
+  PLACE_ROUNDS = 10, /* to the nearest places; 30 rank maps no better */
+  SETTLE_ROUNDS = 6, /* of a pose that is near already */
+  TURNS = 2,         /* of rotations and positions in a round */
+  SURROUNDINGS = 60  /* vertices whose images give a first rotation: a limb's girth and as much of its length */
+};
+/* Distance at which a pull is as strong as the edges. A rough map is off by 0.2 or more at the ends of limbs. */
+static const double MAP_REACH = 0.6, FIRST_REACH = 0.6, LAST_REACH = 0.06;
+static const double SETTLE_FIRST_REACH = 0.15, SETTLE_LAST_REACH = 0.03;
+/* The rough map goes on to pull beside the places, with this share of its strength at first and nothing from FADED of
+ * the rounds on: without it a limb slides to the nearest other one. */
+static const double MAP_SHARE = 0.3, FADED = 0.7;
+/* Distances at which a vertex of the rough map is an outlier and counts a quarter: at first, in the first rounds, and
+ * beside places. */
+static const double OUTLIER_FIRST = 10, OUTLIER_MAP = 0.6, OUTLIER_PLACE = 0.4;
+static const double NORMAL_SHARE = 0.05; /* of normals beside positions in a first rotation: a limb is nearly a line */
+static const double FACING = 0.2;        /* least cosine of two normals: with less the place does not pull */
+static const double HELD = 0.2;          /* weight with which such a vertex is held where it is, relative to a pull */
+static const double SLIDE = 0.1;         /* most that a place slides from a vertex within its tangent plane */
+static const double LEAST_DIAGONAL = 1e-9; /* keeps the matrix regular where nothing pulls */
+
+typedef struct registration {
+  orb_context *ctx;
+  orb_body a, b;
+  const orb_rough_map *map; /* NULL: none */
+  orb_factor *factor;
+  orb_elastic_pose *pose;
+  double *normal; /* of a in its pose */
+  orb_searched searched;
+  double *diagonal, *right; /* the system */
+  double *pull, *target;    /* on each vertex of a: the weight, and the weighted target (3) */
+} registration;
+
+static void fit_rotations(registration *r) {
+  const orb_body *a = &r->a;
+  for (int32_t v = 0; v < a->count; v++) {
+    double h[9] = {0};
+    for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
+      double p[3], q[3];
+      orb_sub(a->mesh->positions + 3 * (size_t)a->next[i], a->mesh->positions + 3 * (size_t)v, p);
+      orb_sub(r->pose->position + 3 * (size_t)a->next[i], r->pose->position + 3 * (size_t)v, q);
+      orb_add_outer(h, q, p, a->weight[i]);
+    }
+    (void)orb_nearest_rotation(h, r->pose->rotation + 9 * (size_t)v);
+  }
+}
+
+/* What the rotations at both ends make of the edge that arrives at v, summed over its edges. */
+static void add_edges(const registration *r, int32_t v, double sum[3]) {
+  const orb_body *a = &r->a;
+  const double *here = r->pose->rotation + 9 * (size_t)v;
+  for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
+    const double *there = r->pose->rotation + 9 * (size_t)a->next[i];
+    double e[3];
+    orb_sub(a->mesh->positions + 3 * (size_t)v, a->mesh->positions + 3 * (size_t)a->next[i], e);
+    for (int k = 0; k < 3; k++) {
+      sum[k] += a->weight[i] / 2 * (orb_dot(here + 3 * k, e) + orb_dot(there + 3 * k, e));
+    }
+  }
+}
+
+/* Positions for the rotations and pulls as they are. again: the pulls have other weights than last time. */
+static orb_status solve(registration *r, int again) {
+  const orb_body *a = &r->a;
+  for (int32_t v = 0; v < a->count; v++) {
+    double *right = r->right + 3 * (size_t)v;
+    memcpy(right, r->target + 3 * (size_t)v, sizeof(double[3]));
+    add_edges(r, v, right);
+    r->diagonal[v] = r->pull[v] + LEAST_DIAGONAL;
+    for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
+      r->diagonal[v] += a->weight[i];
+    }
+  }
+  if (again) {
+    ORB_TRY(orb_factor_compute(r->factor, r->diagonal));
+  }
+  orb_factor_solve3(r->factor, r->right, r->pose->position);
+  return ORB_OK;
+}
+
+static void clear_pulls(registration *r) {
+  memset(r->pull, 0, (size_t)r->a.count * sizeof *r->pull);
+  memset(r->target, 0, 3 * (size_t)r->a.count * sizeof *r->target);
+}
+
+static void add_pull(registration *r, int32_t v, const double target[3], double weight) {
+  r->pull[v] += weight;
+  for (int k = 0; k < 3; k++) {
+    r->target[3 * (size_t)v + (size_t)k] += weight * target[k];
+  }
+}
+
+static void pull_by_map(registration *r, double weight, double outlier) {
+  for (int back = 0; back < 2; back++) {
+    const orb_body *from = back ? &r->b : &r->a;
+    const int32_t *to = back ? r->map->back : r->map->forth;
+    for (int32_t i = 0; i < from->count; i++) {
+      int32_t v = back ? to[i] : i, u = back ? i : to[i];
+      const double *y = r->b.mesh->positions + 3 * (size_t)u;
+      double far = orb_distance2(y, r->pose->position + 3 * (size_t)v), share = 1 / (1 + far / (outlier * outlier));
+      add_pull(r, v, y, weight * from->mass[i] * share * share);
+    }
+  }
+}
+
+/* The point of the tangent plane of p that is nearest to x, or SLIDE from p on the way to it. */
+static void slide(const double p[3], const double n[3], const double x[3], double out[3]) {
+  double away[3];
+  orb_sub(x, p, away);
+  double off = orb_dot(away, n), along = sqrt(fmax(0, orb_dot(away, away) - off * off));
+  for (int k = 0; k < 3; k++) {
+    out[k] = p[k] + (away[k] - off * n[k]) * (along > SLIDE ? SLIDE / along : 1);
+  }
+}
+
+/* Each vertex of a is pulled to the nearest place of b, and each vertex of b pulls the nearest one of a. */
+static void pull_by_place(registration *r, double weight) {
+  const double *position = r->pose->position;
+  double target[3];
+  orb_body_normals(r->a.mesh, position, r->normal, NULL);
+  orb_searched_fill(position, r->normal, r->a.count, &r->searched);
+  for (int32_t v = 0; v < r->a.count; v++) {
+    const double *x = position + 3 * (size_t)v, *n = r->normal + 3 * (size_t)v;
+    size_t u = 3 * (size_t)orb_searched_nearest(&r->b.searched, x, n);
+    int faces = orb_dot(n, r->b.normal + u) > FACING;
+    slide(r->b.mesh->positions + u, r->b.normal + u, x, target);
+    add_pull(r, v, faces ? target : x, weight * r->a.mass[v] * (faces ? 1 : HELD));
+  }
+  for (int32_t u = 0; u < r->b.count; u++) {
+    const double *x = r->b.mesh->positions + 3 * (size_t)u, *n = r->b.normal + 3 * (size_t)u;
+    int32_t v = orb_searched_nearest(&r->searched, x, n);
+    if (orb_dot(n, r->normal + 3 * (size_t)v) > FACING) {
+      slide(x, n, position + 3 * (size_t)v, target);
+      add_pull(r, v, target, weight * r->b.mass[u]);
+    }
+  }
+}
+
+/* The vertices around v, nearest rings first. mark: a number a vertex. */
+static int list_surroundings(const orb_body *a, int32_t v, int32_t *mark, int32_t list[SURROUNDINGS]) {
+  int count = 1;
+  list[0] = v;
+  mark[v] = v + 1;
+  for (int k = 0; k < count; k++) {
+    for (int32_t i = a->start[list[k]]; i < a->start[list[k] + 1] && count < SURROUNDINGS; i++) {
+      if (mark[a->next[i]] != v + 1) {
+        mark[a->next[i]] = v + 1;
+        list[count++] = a->next[i];
+      }
+    }
+  }
+  return count;
+}
+
+/* The rotation that carries these vertices best onto their images under the rough map. */
+static void rotation_of_map(const registration *r, const int32_t *list, int count, double rotation[9]) {
+  double mean[2][3] = {{0}}, all = 0, h[9] = {0};
+  const double *x = r->a.mesh->positions, *y = r->b.mesh->positions;
+  for (int k = 0; k < count; k++) {
+    for (size_t i = 0; i < 3; i++) {
+      mean[0][i] += r->a.mass[list[k]] * x[3 * (size_t)list[k] + i];
+      mean[1][i] += r->a.mass[list[k]] * y[3 * (size_t)r->map->forth[list[k]] + i];
+    }
+    all += r->a.mass[list[k]];
+  }
+  for (int i = 0; i < 6; i++) {
+    mean[i / 3][i % 3] /= all;
+  }
+  for (int k = 0; k < count; k++) {
+    size_t v = 3 * (size_t)list[k], u = 3 * (size_t)r->map->forth[list[k]];
+    double p[3], q[3];
+    orb_sub(x + v, mean[0], p);
+    orb_sub(y + u, mean[1], q);
+    orb_add_outer(h, q, p, r->a.mass[list[k]]);
+    orb_add_outer(h, r->b.normal + u, r->a.normal + v, NORMAL_SHARE * r->a.mass[list[k]]);
+  }
+  (void)orb_nearest_rotation(h, rotation);
+}
+
+/* The pose that the rough map gives at once. */
+static orb_status begin_from_map(registration *r) {
+  int32_t list[SURROUNDINGS], *mark = ORB_NEW0(r->ctx, int32_t, r->a.count);
+  if (!mark) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t v = 0; v < r->a.count; v++) {
+    int count = list_surroundings(&r->a, v, mark, list);
+    rotation_of_map(r, list, count, r->pose->rotation + 9 * (size_t)v);
+    memcpy(r->pose->position + 3 * (size_t)v, r->b.mesh->positions + 3 * (size_t)r->map->forth[v], sizeof(double[3]));
+  }
+  orb_free(r->ctx, mark);
+  return ORB_OK;
+}
+
+static orb_status follow_map(registration *r) {
+  ORB_TRY(begin_from_map(r));
+  for (int i = 0; i < MAP_ROUNDS; i++) {
+    clear_pulls(r);
+    pull_by_map(r, 1 / (MAP_REACH * MAP_REACH), i == 0 ? OUTLIER_FIRST : OUTLIER_MAP);
+    ORB_TRY(solve(r, 1));
+    fit_rotations(r);
+  }
+  return ORB_OK;
+}
+
+static orb_status follow_places(registration *r, int rounds, double first, double last) {
+  for (int i = 0; i < rounds; i++) {
+    double done = (double)i / (rounds - 1), reach = first * pow(last / first, done);
+    clear_pulls(r);
+    if (r->map && done < FADED) {
+      pull_by_map(r, MAP_SHARE / (MAP_REACH * MAP_REACH) * (1 - done / FADED), OUTLIER_PLACE);
+    }
+    pull_by_place(r, 1 / (reach * reach));
+    for (int k = 0; k < TURNS; k++) {
+      ORB_TRY(solve(r, k == 0));
+      fit_rotations(r);
+    }
+  }
+  return ORB_OK;
+}
+
+static double bend_of(const registration *r) {
+  const orb_body *a = &r->a;
+  double bend = 0, length = 0;
+  for (int32_t v = 0; v < a->count; v++) {
+    const double *rotation = r->pose->rotation + 9 * (size_t)v;
+    for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
+      double p[3], q[3];
+      orb_sub(a->mesh->positions + 3 * (size_t)a->next[i], a->mesh->positions + 3 * (size_t)v, p);
+      orb_sub(r->pose->position + 3 * (size_t)a->next[i], r->pose->position + 3 * (size_t)v, q);
+      for (int k = 0; k < 3; k++) {
+        double d = q[k] - orb_dot(rotation + 3 * k, p);
+        bend += a->weight[i] * d * d;
+      }
+      length += a->weight[i] * orb_dot(p, p);
+    }
+  }
+  return length > 0 ? bend / length : 0;
+}
+
+static void registration_free(registration *r) {
+  orb_factor_destroy(r->factor);
+  orb_body_free(r->ctx, &r->a);
+  orb_body_free(r->ctx, &r->b);
+  orb_free(r->ctx, r->normal);
+  orb_free(r->ctx, r->searched.at);
+  orb_free(r->ctx, r->diagonal);
+  orb_free(r->ctx, r->right);
+  orb_free(r->ctx, r->pull);
+  orb_free(r->ctx, r->target);
+}
+
+static orb_status factor_create(registration *r) {
+  const orb_body *a = &r->a;
+  int64_t count = 0;
+  orb_coupling *couplings = ORB_NEW(r->ctx, orb_coupling, 3 * (size_t)a->mesh->triangle_count);
+  if (!couplings) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t v = 0; v < a->count; v++) {
+    for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
+      if (a->next[i] > v) {
+        couplings[count++] = (orb_coupling){v, a->next[i], -a->weight[i]};
+      }
+    }
+  }
+  orb_status status = orb_factor_create(a->count, couplings, count, &r->factor);
+  orb_free(r->ctx, couplings);
+  return status;
+}
+
+static orb_status registration_create(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, registration *r) {
+  size_t n = (size_t)a->vertex_count;
+  ORB_TRY(orb_body_create(ctx, a, &r->a));
+  ORB_TRY(orb_body_create(ctx, b, &r->b));
+  ORB_TRY(orb_searched_create(ctx, a->vertex_count, &r->searched));
+  r->normal = ORB_NEW(ctx, double, 3 * n);
+  r->diagonal = ORB_NEW(ctx, double, n);
+  r->right = ORB_NEW(ctx, double, 3 * n);
+  r->pull = ORB_NEW(ctx, double, n);
+  r->target = ORB_NEW(ctx, double, 3 * n);
+  if (!r->normal || !r->diagonal || !r->right || !r->pull || !r->target) {
+    return ORB_E_NO_MEMORY;
+  }
+  return factor_create(r);
+}
+
+orb_status orb_elastic_register(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, const orb_rough_map *map,
+                                orb_elastic_pose *pose, double *bend) {
+  registration r = {.ctx = ctx, .map = map, .pose = pose};
+  orb_status status;
+  ORB_GO(status, registration_create(ctx, a, b, &r), end);
+  ORB_GO(status, follow_map(&r), end);
+  ORB_GO(status, follow_places(&r, PLACE_ROUNDS, FIRST_REACH, LAST_REACH), end);
+  *bend = bend_of(&r);
+end:
+  registration_free(&r);
+  return status;
+}
+
+orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_elastic_pose *pose) {
+  registration r = {.ctx = ctx, .pose = pose};
+  orb_status status;
+  ORB_GO(status, registration_create(ctx, a, b, &r), end);
+  status = follow_places(&r, SETTLE_ROUNDS, SETTLE_FIRST_REACH, SETTLE_LAST_REACH);
+end:
+  registration_free(&r);
+  return status;
+}
+
+/* Where one point goes: the mean, by barycentric coordinates, of what the corners of its place make of it. */
+static void carry_point(const orb_mesh *coarse, const orb_elastic_pose *pose, const orb_place *place, const double p[3],
+                        double out[3]) {
+  memset(out, 0, sizeof(double[3]));
+  for (int k = 0; k < 3; k++) {
+    size_t u = (size_t)coarse->triangles[3 * (size_t)place->triangle + (size_t)k];
+    double e[3];
+    orb_sub(p, coarse->positions + 3 * u, e);
+    for (int i = 0; i < 3; i++) {
+      out[i] += place->at[k] * (pose->position[3 * u + (size_t)i] + orb_dot(pose->rotation + 9 * u + 3 * i, e));
+    }
+  }
+}
+
+orb_status orb_elastic_carry(orb_context *ctx, const orb_mesh *coarse, const orb_elastic_pose *pose,
+                             const double *points, int32_t count, orb_elastic_pose *out) {
+  orb_nearest *tree;
+  ORB_TRY(orb_nearest_create(ctx, coarse->positions, coarse->triangles, coarse->triangle_count, &tree));
+  for (int32_t v = 0; v < count; v++) {
+    orb_place place;
+    const double *p = points + 3 * (size_t)v;
+    (void)orb_nearest_query(tree, p, INFINITY, &place);
+    carry_point(coarse, pose, &place, p, out->position + 3 * (size_t)v);
+    if (out->rotation) {
+      int most = place.at[1] > place.at[0] ? 1 : 0;
+      most = place.at[2] > place.at[most] ? 2 : most;
+      int32_t u = coarse->triangles[3 * (size_t)place.triangle + (size_t)most];
+      memcpy(out->rotation + 9 * (size_t)v, pose->rotation + 9 * (size_t)u, sizeof(double[9]));
+    }
+  }
+  orb_nearest_destroy(ctx, tree);
+  return ORB_OK;
+}

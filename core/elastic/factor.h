@@ -1,0 +1,34 @@
+/* A symmetric positive definite sparse matrix that is factorised again and again with other values on its diagonal, by
+ * Eigen's templates: nothing is linked. */
+#ifndef ORB_ELASTIC_FACTOR_H
+#define ORB_ELASTIC_FACTOR_H
+
+#include "orbmorph/context.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct orb_factor orb_factor;
+
+/* One entry below or above the diagonal. The matrix has `value` at both of its places. */
+typedef struct orb_coupling {
+  int32_t row, column;
+  double value;
+} orb_coupling;
+
+/* Orders the unknowns and finds the pattern of the factor. Entries of one place add up. */
+ORB_MUST_CHECK orb_status orb_factor_create(int32_t n, const orb_coupling *couplings, int64_t count, orb_factor **out);
+void orb_factor_destroy(orb_factor *factor);
+
+/* Factorises with this diagonal, in which every row's sum is positive. O(n^1.5) for a surface. */
+ORB_MUST_CHECK orb_status orb_factor_compute(orb_factor *factor, const double *diagonal);
+
+/* Solves for three right sides at once: x and right are 3 an unknown. O(n log n) for a surface. */
+void orb_factor_solve3(const orb_factor *factor, const double *right, double *x);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
