@@ -1,0 +1,248 @@
+/* Registration as rigid as possible, where the answer is known, and matches of shapes without landmarks. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "align/find/match.h"
+#include "elastic/elastic.h"
+#include "support_context.h"
+#include "support_shapes.h"
+
+enum { LIMBS = 5 };
+
+/* Five directions without any symmetry, and how far the limbs reach. */
+static const double limb[LIMBS][3] = {{1, 0, 0}, {-0.6, 0.8, 0}, {0, -0.8, 0.6}, {-0.48, -0.6, -0.64}, {0, 0.28, 0.96}};
+static const double reach[LIMBS] = {4, 3.4, 2.9, 2.5, 2.2};
+
+/* The radius of the creature in a direction of length 1. */
+static double radius(const double p[3]) {
+  double r = 1;
+  for (int i = 0; i < LIMBS; i++) {
+    r += (reach[i] - 1) * exp(-20 * (1 - p[0] * limb[i][0] - p[1] * limb[i][1] - p[2] * limb[i][2]));
+  }
+  return r;
+}
+
+static orb_mesh creature(int levels) {
+  orb_mesh mesh = shape_ball(ctx, levels);
+  for (int32_t v = 0; v < mesh.vertex_count; v++) {
+    double *p = mesh.positions + 3 * (size_t)v, r = radius(p);
+    for (int k = 0; k < 3; k++) {
+      p[k] *= r;
+    }
+  }
+  return mesh;
+}
+
+static void scale_to_sphere(orb_mesh *mesh) {
+  orb_extent extent;
+  orb_mesh_extent(mesh, &extent);
+  for (int32_t i = 0; i < 3 * mesh->vertex_count; i++) {
+    mesh->positions[i] *= sqrt(4 * M_PI / extent.area);
+  }
+}
+
+static orb_elastic_pose pose_of(const orb_mesh *mesh) {
+  orb_elastic_pose pose = {orb_alloc(ctx, 3 * (size_t)mesh->vertex_count, sizeof(double)),
+                           orb_alloc(ctx, 9 * (size_t)mesh->vertex_count, sizeof(double))};
+  assert_non_null(pose.position);
+  assert_non_null(pose.rotation);
+  return pose;
+}
+
+static void pose_free(orb_elastic_pose *pose) {
+  orb_free(ctx, pose->position);
+  orb_free(ctx, pose->rotation);
+}
+
+static double distance(const double *x, const double *y) {
+  return sqrt((x[0] - y[0]) * (x[0] - y[0]) + (x[1] - y[1]) * (x[1] - y[1]) + (x[2] - y[2]) * (x[2] - y[2]));
+}
+
+/* For each vertex, one beside it: a map that is nowhere exact. */
+static int32_t *neighbours(const orb_mesh *mesh) {
+  int32_t *next = orb_alloc(ctx, (size_t)mesh->vertex_count, sizeof *next);
+  assert_non_null(next);
+  for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
+    next[mesh->triangles[h]] = mesh->triangles[h % 3 == 2 ? h - 2 : h + 1];
+  }
+  return next;
+}
+
+/* A shape goes to itself, rotated, along a rough map: it hardly bends, and its rotations are the rotation. */
+static void a_rotation_is_found(void **state) {
+  (void)state;
+  orb_mesh a = creature(3), b = creature(3);
+  double bend, worst = 0;
+  for (int32_t v = 0; v < b.vertex_count; v++) { /* x, y, z → y, z, x */
+    double *p = b.positions + 3 * (size_t)v, x = p[0];
+    p[0] = p[1];
+    p[1] = p[2];
+    p[2] = x;
+  }
+  scale_to_sphere(&a);
+  scale_to_sphere(&b);
+  int32_t *next = neighbours(&a);
+  orb_rough_map map = {next, next};
+  orb_elastic_pose pose = pose_of(&a);
+  assert_int_equal(orb_elastic_register(ctx, &a, &b, &map, &pose, &bend), ORB_OK);
+  assert_true(bend >= 0 && bend < 0.02);
+  for (int32_t v = 0; v < a.vertex_count; v++) {
+    worst = fmax(worst, distance(pose.position + 3 * (size_t)v, b.positions + 3 * (size_t)v));
+  }
+  assert_true(worst < 0.15); /* a third of a mean edge at the limbs' roots, where edges are longest */
+  const double *r = pose.rotation;
+  assert_true(r[1] > 0.9 && r[5] > 0.9 && r[6] > 0.9);
+  pose_free(&pose);
+  orb_free(ctx, next);
+  shape_free(ctx, &a);
+  shape_free(ctx, &b);
+}
+
+/* A tube and the same tube bent by a half turn along its axis: the bend is found from a rough map. */
+static void a_bent_tube_is_found(void **state) {
+  (void)state;
+  orb_mesh a = shape_ball(ctx, 3), b = shape_ball(ctx, 3);
+  double bend, sum = 0;
+  const double half = 3, turn = M_PI / 2 / half; /* radians a unit of length */
+  for (int32_t v = 0; v < a.vertex_count; v++) {
+    double *p = a.positions + 3 * (size_t)v, *q = b.positions + 3 * (size_t)v;
+    p[0] *= 0.5;
+    p[1] *= 0.5;
+    p[2] = half * asin(fmax(-1, fmin(1, p[2]))) / (M_PI / 2);
+    q[0] = (p[0] + 1 / turn) * cos(turn * p[2]);
+    q[1] = p[1];
+    q[2] = (p[0] + 1 / turn) * sin(turn * p[2]);
+  }
+  scale_to_sphere(&a);
+  scale_to_sphere(&b);
+  int32_t *next = neighbours(&a);
+  orb_rough_map map = {next, next};
+  orb_elastic_pose pose = pose_of(&a);
+  assert_int_equal(orb_elastic_register(ctx, &a, &b, &map, &pose, &bend), ORB_OK);
+  for (int32_t v = 0; v < a.vertex_count; v++) {
+    sum += distance(pose.position + 3 * (size_t)v, b.positions + 3 * (size_t)v) / a.vertex_count;
+  }
+  assert_true(sum < 0.05);
+  assert_true(bend < 0.1);
+  pose_free(&pose);
+  orb_free(ctx, next);
+  shape_free(ctx, &a);
+  shape_free(ctx, &b);
+}
+
+/* A map of the wrong limbs bends more. */
+static void wrong_limbs_bend(void **state) {
+  (void)state;
+  orb_mesh a = creature(3), ball = shape_ball(ctx, 3);
+  double right, wrong;
+  scale_to_sphere(&a);
+  int32_t *same = orb_alloc(ctx, (size_t)a.vertex_count, sizeof *same), *forth = neighbours(&a), *back = neighbours(&a);
+  for (int32_t v = 0; v < a.vertex_count; v++) {
+    same[v] = v;
+    double best[2] = {-2, -2};
+    for (int32_t u = 0; u < a.vertex_count; u++) { /* x, y, z → y, z, x and back */
+      const double *p = ball.positions + 3 * (size_t)v, *q = ball.positions + 3 * (size_t)u;
+      double there = p[1] * q[0] + p[2] * q[1] + p[0] * q[2], here = q[1] * p[0] + q[2] * p[1] + q[0] * p[2];
+      forth[v] = there > best[0] ? u : forth[v];
+      back[v] = here > best[1] ? u : back[v];
+      best[0] = fmax(best[0], there);
+      best[1] = fmax(best[1], here);
+    }
+  }
+  orb_rough_map identity = {same, same}, turned = {forth, back};
+  orb_elastic_pose pose = pose_of(&a);
+  assert_int_equal(orb_elastic_register(ctx, &a, &a, &identity, &pose, &right), ORB_OK);
+  assert_int_equal(orb_elastic_register(ctx, &a, &a, &turned, &pose, &wrong), ORB_OK);
+  assert_true(right < 0.01);
+  assert_true(wrong > 0.1);
+  pose_free(&pose);
+  orb_free(ctx, same);
+  orb_free(ctx, forth);
+  orb_free(ctx, back);
+  shape_free(ctx, &a);
+  shape_free(ctx, &ball);
+}
+
+/* The same creature, rotated, larger and more finely meshed: each vertex goes to its place. */
+static void a_copy_is_matched(void **state) {
+  (void)state;
+  orb_mesh a = creature(3), b = creature(4);
+  orb_match match;
+  orb_extent extent;
+  double sum = 0;
+  for (int32_t v = 0; v < b.vertex_count; v++) {
+    double *p = b.positions + 3 * (size_t)v, x = p[0];
+    p[0] = 10 * p[1] + 5;
+    p[1] = 10 * p[2];
+    p[2] = 10 * x;
+  }
+  orb_mesh_extent(&a, &extent);
+  assert_int_equal(orb_match_find(ctx, &a, &b, &match), ORB_OK);
+  assert_true(match.is_found);
+  assert_true(match.cost < 0.1);
+  assert_true(match.count >= 6);
+  for (int32_t v = 0; v < b.vertex_count; v++) {
+    const double *p = b.positions + 3 * (size_t)v;
+    const double truth[3] = {p[2] / 10, (p[0] - 5) / 10, p[1] / 10};
+    sum += distance(match.target + 3 * (size_t)v, truth) / b.vertex_count;
+  }
+  assert_true(sum < 0.02 * extent.diagonal);
+  for (int32_t k = 0; k < match.count; k++) {
+    const double *p = b.positions + 3 * (size_t)match.second[k];
+    const double truth[3] = {p[2] / 10, (p[0] - 5) / 10, p[1] / 10};
+    assert_true(distance(a.positions + 3 * (size_t)match.first[k], truth) < 0.08 * extent.diagonal);
+  }
+  orb_match_free(ctx, &match);
+  shape_free(ctx, &a);
+  shape_free(ctx, &b);
+}
+
+static void threads_change_nothing(void **state) {
+  (void)state;
+  orb_mesh a = creature(3), b = creature(3);
+  orb_match one, other;
+  orb_context_options options = {.threads = 3};
+  orb_context *three;
+  assert_int_equal(orb_context_create(&options, &three), ORB_OK);
+  assert_int_equal(orb_match_find(ctx, &a, &b, &one), ORB_OK);
+  assert_int_equal(orb_match_find(three, &a, &b, &other), ORB_OK);
+  assert_true(one.is_found && other.is_found);
+  assert_int_equal(one.count, other.count);
+  assert_memory_equal(&one.cost, &other.cost, sizeof one.cost);
+  assert_memory_equal(&one.clear, &other.clear, sizeof one.clear);
+  assert_memory_equal(one.target, other.target, 3 * (size_t)b.vertex_count * sizeof *one.target);
+  orb_match_free(ctx, &one);
+  orb_match_free(three, &other);
+  orb_context_destroy(three);
+  shape_free(ctx, &a);
+  shape_free(ctx, &b);
+}
+
+/* A ball and an icosahedron have a match only by rotations; no failure. */
+static void few_vertices_are_matched_by_rotations(void **state) {
+  (void)state;
+  orb_mesh a = shape_icosahedron(ctx), b = shape_ball(ctx, 2);
+  orb_match match;
+  assert_int_equal(orb_match_find(ctx, &a, &b, &match), ORB_OK);
+  assert_true(match.is_found);
+  for (int32_t i = 0; i < 3 * b.vertex_count; i++) {
+    assert_true(isfinite(match.target[i]));
+  }
+  orb_match_free(ctx, &match);
+  shape_free(ctx, &a);
+  shape_free(ctx, &b);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(a_rotation_is_found),    cmocka_unit_test(a_bent_tube_is_found),
+      cmocka_unit_test(wrong_limbs_bend),       cmocka_unit_test(a_copy_is_matched),
+      cmocka_unit_test(threads_change_nothing), cmocka_unit_test(few_vertices_are_matched_by_rotations)};
+  return cmocka_run_group_tests(tests, context_one_thread, context_end);
+}
