@@ -105,7 +105,8 @@ static void request_begin(request *r, const char *method, const char *url, const
 static size_t unescape(void *user, struct MHD_Connection *connection, char *text) {
   (void)user;
   (void)connection;
-  return strstr(text, "%00") ? strlen(text) : MHD_http_unescape(text);
+  const char *escape = strchr(text, '%');
+  return !escape || strstr(escape, "%00") ? strlen(text) : MHD_http_unescape(text);
 }
 
 static enum MHD_Result answer(void *user, struct MHD_Connection *connection, const char *url, const char *method,
