@@ -25,7 +25,7 @@ int cli_run_upload(cli *c) {
   }
   for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
     cli_reply reply;
-    rc = cli_upload(c, c->args.operands[i], name, c->args.value[OPT_REPAIR], &reply);
+    rc = cli_take_in(c, c->args.operands[i], name, c->args.value[OPT_REPAIR], &reply);
     if (rc == CLI_DONE && !cli_ok(&reply)) {
       rc = cli_refused(c, c->args.operands[i], &reply);
     } else if (rc == CLI_DONE && c->json) {

@@ -29,7 +29,7 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_PATH] = {"path", 0, "KIND", "linear rigid", "path of the vertices between shapes"},
     [OPT_SET] = {"set", 0, "NAME=VALUE", NULL, "set any member of the request, such as align.options.radius=0.5"},
     [OPT_NO_WAIT] = {"no-wait", 0, NULL, NULL, "print the job and do not wait for it"},
-    [OPT_NAME] = {"name", 0, "NAME", NULL, "name of the mesh; default: the file name"},
+    [OPT_NAME] = {"name", 0, "NAME", NULL, "name of the mesh; default: the name of the file"},
     [OPT_REPAIR] = {"repair", 0, "LIST", "safe none fill_holes largest_component",
                     "allowed repairs, separated by commas"},
     [OPT_FORMAT] = {"format", 0, "FORMAT", "obj off ply stl gltf glb",

@@ -153,8 +153,23 @@ int cli_download(cli *c, const char *path, const char *file) {
   return rc;
 }
 
+int cli_await(cli *c, cli_reply *reply) {
+  char *result = NULL;
+  int rc = cli_wait(c, reply->json, &result);
+  cli_reply_free(reply);
+  if (rc == CLI_DONE) {
+    cli_request get = {.method = "GET", .path = result, .patient = 1};
+    rc = cli_send(c, &get, reply);
+    if (rc == CLI_DONE && !cli_ok(reply)) {
+      rc = cli_refused(c, NULL, reply);
+    }
+  }
+  free(result);
+  return rc;
+}
+
 int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource) {
-  char *text = cJSON_PrintUnformatted(body), *result = NULL;
+  char *text = cJSON_PrintUnformatted(body);
   cli_request request = {.method = "POST", .path = path, .json = text};
   int rc = cli_send(c, &request, resource);
   if (rc == CLI_DONE && !cli_ok(resource)) {
@@ -167,17 +182,8 @@ int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource) {
     }
     cli_reply_free(resource);
   } else if (rc == CLI_DONE && resource->status == 202) {
-    rc = cli_wait(c, resource->json, &result);
-    cli_reply_free(resource);
-    if (rc == CLI_DONE) {
-      cli_request get = {.method = "GET", .path = result, .patient = 1};
-      rc = cli_send(c, &get, resource);
-      if (rc == CLI_DONE && !cli_ok(resource)) {
-        rc = cli_refused(c, NULL, resource);
-      }
-    }
+    rc = cli_await(c, resource);
   }
-  free(result);
   free(text);
   return rc;
 }

@@ -23,6 +23,9 @@ int cli_not_found(cli *c, const char *kind, const char *operand, const cli_reply
  * resource->json stays NULL. */
 int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource);
 
+/* Waits for the job in a reply and fetches what it made in place of the job. */
+int cli_await(cli *c, cli_reply *reply);
+
 /* Tries whether a file can be written, before work that would be lost: NULL and "-" can. CLI_DONE, or CLI_USAGE after
  * printing why. */
 int cli_can_write(const cli *c, const char *file);
