@@ -623,3 +623,26 @@ test('the error of the common mesh is measured and below the tolerance', async (
   }
   await done();
 });
+
+test('the report names what the files have and the asset lacks', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const shape = (name, map) => ({
+    name: `${name}.obj`,
+    mimeType: 'text/plain',
+    buffer: Buffer.from(`mtllib ${name}.mtl\nusemtl paint\n${obj(ball(2, map))}`),
+  });
+  const input = page.locator('input[type=file]').first();
+  await input.setInputFiles([
+    shape('plum', ([x, y, z]) => [x, 1.1 * y, z]),
+    shape('pear', ([x, y, z]) => [x, 1.5 * y, z]),
+  ]);
+  await until(async () => (await page.locator('.card.ready').count()) === 2, 'both are taken');
+  await morph(page);
+  const left = page.locator('details.dropped');
+  assert.match(await left.locator('summary').innerText(), /^Not in the asset: \d part/);
+  await left.locator('summary').click();
+  const text = await left.innerText();
+  assert.match(text, /mtllib plum\.mtl/);
+  assert.match(text, /Materials of an OBJ are in another file/);
+  await done();
+});

@@ -309,8 +309,30 @@ export function MorphInspector() {
           ))}
         </tbody>
       </table>
+      <Dropped entries={supermesh.dropped} />
       <OptionsFold />
     </>
+  );
+}
+
+/** What the files have and the asset lacks. */
+function Dropped({ entries }: { entries: Result['supermesh']['dropped'] }) {
+  if (!entries?.length) return null;
+  return (
+    <details class="dropped">
+      <summary>
+        Not in the asset: {entries.length} {entries.length === 1 ? 'part' : 'parts'} of the files
+      </summary>
+      <ul>
+        {entries.map((entry, i) => (
+          <li key={i}>
+            <strong>{entry.what}</strong> {entry.where && <span class="muted">{entry.where}</span>}
+            <br />
+            {entry.why}
+          </li>
+        ))}
+      </ul>
+    </details>
   );
 }
 
