@@ -50,8 +50,8 @@ checked against. With *two jobs running*, two embeddings take every core that is
 
 The daemon keeps assets of at most 512 KB in memory that the kernel sends without a copy (`server/http/regions.h`); larger ones
 it sends from their files. In the rows of *64 visitors* each of 64 connections sends a request, reads the answer and pauses
-for {pause} ms, so that neither server is saturated. The table was made on a virtual machine with other load, at the highest
-priority; ratios of single runs differ by 0.1 to 0.3.
+for {pause} ms, so that neither server is saturated. The load average of the machine at the end was {load:.0f}:
+with other load, rates and times say little, and processor time says more.
 
 | what | daemon | nginx | ratio | processor time | goal | |
 |---|---|---|---|---|---|---|
@@ -269,7 +269,7 @@ def main():
         finally:
             daemon.stop()
     options.out.write_text(HEAD.format(cores=os.cpu_count(), repeat=options.repeat, seconds=options.seconds,
-                                       pause=round(1000 * CROWD_PAUSE_S)) +
+                                       pause=round(1000 * CROWD_PAUSE_S), load=os.getloadavg()[0]) +
                            "".join(table.lines), encoding="utf-8")
     sys.exit(1 if table.missed else 0)
 
