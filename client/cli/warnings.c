@@ -64,17 +64,31 @@ static int warn_of_landmarks(FILE *out, const char *bullet, const cJSON *superme
   return count > 0;
 }
 
-static int warn_of_shapes(FILE *out, const char *bullet, const cJSON *supermesh) {
+/* One line names all shapes that are farther from their files than the tolerance allows: --max-triangles wins. */
+static int warn_of_errors(FILE *out, const char *bullet, const cJSON *supermesh) {
   double tolerance = cli_number(member(member(supermesh, "request"), "remesh"), "tolerance");
   const cJSON *shape;
   int count = 0;
   cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
-    double error = cli_number(shape, "hausdorff_relative"), up = cli_number(member(shape, "fit"), "up_degrees");
+    double error = cli_number(shape, "hausdorff_relative");
     if (error > tolerance * TOLERANCE_ROUNDING) {
-      fprintf(out, "%s%s is up to %.3g %% of its diagonal away from its file; the tolerance was %.3g %%.\n", bullet,
-              cli_string(shape, "name", "?"), 100 * error, 100 * tolerance);
+      fprintf(out, "%s%s%s by up to %.3g %%", count ? ", " : bullet,
+              count ? "" : "The morph differs from the files by more than the tolerance, in percent of the diagonal: ",
+              cli_string(shape, "name", "?"), 100 * error);
       count++;
     }
+  }
+  if (count) {
+    fprintf(out, " (tolerance %.3g %%).\n", 100 * tolerance);
+  }
+  return count > 0;
+}
+
+static int warn_of_fits(FILE *out, const char *bullet, const cJSON *supermesh) {
+  const cJSON *shape;
+  int count = 0;
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    double up = cli_number(member(shape, "fit"), "up_degrees");
     if (up > TURNED_OVER) {
       fprintf(out, "%sThe fit turned the y axis of %s by %.0f degrees; with --fit none it stays as in its file.\n",
               bullet, cli_string(shape, "name", "?"), up);
@@ -86,5 +100,5 @@ static int warn_of_shapes(FILE *out, const char *bullet, const cJSON *supermesh)
 
 int cli_warnings(FILE *out, const char *bullet, const cJSON *supermesh) {
   return warn_of_pairs(out, bullet, supermesh) + warn_of_landmarks(out, bullet, supermesh) +
-         warn_of_shapes(out, bullet, supermesh);
+         warn_of_errors(out, bullet, supermesh) + warn_of_fits(out, bullet, supermesh);
 }

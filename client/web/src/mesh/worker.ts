@@ -94,6 +94,21 @@ const ops = {
     return display;
   },
 
+  /** Each shape of a morph as the text of an OBJ file. */
+  shapesOf(buffer: ArrayBuffer, count: number): string[] {
+    const { position, targets, index, shapes } = decodeMorph(buffer, count);
+    const faces: string[] = [];
+    for (let c = 0; c < index.length; c += 3) faces.push(`f ${index[c] + 1} ${index[c + 1] + 1} ${index[c + 2] + 1}\n`);
+    return shapes.map((weights) => {
+      const points: string[] = [];
+      for (let i = 0; i < position.length; i += 3) {
+        const at = (k: number) => targets.reduce((x, t, n) => x + weights[n] * t.position[i + k], position[i + k]);
+        points.push(`v ${at(0)} ${at(1)} ${at(2)}\n`);
+      }
+      return points.concat(faces).join('');
+    });
+  },
+
   close(key: string) {
     held.delete(key);
     morphs.delete(key);
