@@ -258,3 +258,61 @@ test('pictures and films: PNG, GIF, WebP and video, named after the shapes', asy
   await other.close();
   await done();
 });
+
+/** A closed surface as one triangle strip a ring, which only the daemon reads. */
+function strips() {
+  const [rings, around] = [9, 16];
+  const points = [[0, 1.4, 0]];
+  for (let i = 1; i < rings; i++)
+    for (let j = 0; j < around; j++) {
+      const [v, h] = [(Math.PI * i) / rings, (2 * Math.PI * j) / around];
+      points.push([Math.sin(v) * Math.cos(h), 1.4 * Math.cos(v), Math.sin(v) * Math.sin(h)]);
+    }
+  const last = points.push([0, -1.4, 0]) - 1;
+  const at = (i, j) => (i === 0 ? 0 : i === rings ? last : 1 + (i - 1) * around + (j % around));
+  const strip = [];
+  for (let i = 1; i < rings - 1; i++) {
+    for (let j = 0; j <= around; j++) strip.push(at(i, j), at(i + 1, j));
+    strip.push(-1);
+  }
+  for (let j = 0; j < around; j++)
+    strip.push(0, at(1, j + 1), at(1, j), -1, last, at(rings - 1, j), at(rings - 1, j + 1), -1);
+  const head = `ply\nformat ascii 1.0\nelement vertex ${points.length}\nproperty float x\nproperty float y\nproperty float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n`;
+  const text = `${head}${points.map((p) => `${p.join(' ')}\n`).join('')}${strip.length} ${strip.join(' ')}\n`;
+  return { name: 'strips.ply', mimeType: 'text/plain', buffer: Buffer.from(text), triangles: 2 * around * (rings - 1) };
+}
+
+test('what only the daemon can read is shown as the daemon has it', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const { triangles, ...file } = strips();
+  await page.locator('input[type=file]').first().setInputFiles([file]);
+  await until(() => page.locator('.card.ready').count(), 'the daemon accepts it');
+  await until(
+    async () => (await page.locator('.caption').innerText()).includes(`${triangles} triangles`),
+    'its triangles',
+  );
+  assert.equal(await page.getByRole('alert').count(), 0);
+  await settled(page);
+  const tinted = (r, g, b) => r - b > 40 && r > g;
+  await until(async () => (await countPixels(page, '.pane-view', tinted)) > 5000, 'it is drawn');
+  await done();
+});
+
+test('after a repair, picture and counts are those of the repaired mesh', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  let left = 60;
+  const lines = (await readFile(sample('dog.obj'), 'utf8')).split('\n');
+  const open = lines.filter((line) => !(line.startsWith('f ') && left-- > 0)).join('\n');
+  const file = { name: 'open.obj', mimeType: 'text/plain', buffer: Buffer.from(open) };
+  await page.locator('input[type=file]').first().setInputFiles([file]);
+  await button(page, 'Fill the holes').click();
+  await until(() => page.locator('.card.ready').count(), 'the daemon accepts it');
+  const [mesh] = (await (await fetch(`${daemon.url}/v1/meshes?limit=100`)).json()).meshes.filter(
+    (m) => m.name === 'open',
+  );
+  const said = async () =>
+    Number((await page.locator('.caption').innerText()).match(/([\d\s]+) triangles/)[1].replace(/\D/g, ''));
+  assert.ok(mesh.triangles > 5600 - 60, String(mesh.triangles));
+  await until(async () => (await said()) === mesh.triangles, `${mesh.triangles} triangles`);
+  await done();
+});

@@ -27,7 +27,9 @@ export function Caption({ shape, index }: { shape: Shape; index: number }) {
       <strong>{shape.name}</strong>
       {shape.facts && <span class="muted">{count(shape.facts.triangles)} triangles</span>}
       {shape.state === 'refused' && <span class="badge bad">refused</span>}
-      {!shape.model && !shape.message && <span class="muted">reading…</span>}
+      {!shape.model && !shape.message && shape.state !== 'refused' && shape.state !== 'failed' && (
+        <span class="muted">reading…</span>
+      )}
     </div>
   );
 }
