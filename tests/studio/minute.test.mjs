@@ -316,3 +316,19 @@ test('after a repair, picture and counts are those of the repaired mesh', async 
   await until(async () => (await said()) === mesh.triangles, `${mesh.triangles} triangles`);
   await done();
 });
+
+test('a link whose morph or shapes are gone says so', async () => {
+  const none = (digit) => digit.repeat(64);
+  for (const [hash, expected] of [
+    [`#m=${none('a')},${none('b')}&tab=morph&r=${none('c')}`, /This link is dead\s+Its 2 shapes are not on the server/],
+    [`#r=${none('c')}`, /This link is dead\s+Its morph is not on the server/],
+  ]) {
+    const { page, done } = await openPage(browser, daemon.url, { hash });
+    const alert = page.getByRole('alert');
+    await alert.waitFor();
+    assert.match(await alert.innerText(), expected);
+    await button(page, 'Dismiss').click();
+    assert.equal(await alert.count(), 0);
+    await done();
+  }
+});

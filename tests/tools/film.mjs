@@ -1,7 +1,17 @@
 // Makes docs/morph.webp, the film of the README, with the studio: node tests/tools/film.mjs
 import { copyFile } from 'node:fs/promises';
 import { join } from 'node:path';
-import { addFiles, button, defaultShown, openPage, root, sample, startBrowser, startDaemon, until } from '../studio/support.mjs';
+import {
+  addFiles,
+  button,
+  defaultShown,
+  openPage,
+  root,
+  sample,
+  startBrowser,
+  startDaemon,
+  until,
+} from '../studio/support.mjs';
 
 const daemon = await startDaemon();
 const browser = await startBrowser();

@@ -1,9 +1,10 @@
 /** The main action, always in the same place: the Morph button, or the progress of a morph. */
 import { useEffect, useRef, useState } from 'preact/hooks';
 import type { Job } from 'orbmorph';
-import { isWaiting, readyShapes, set, state, wireLandmarks, type Running } from '../state';
+import { isWaiting, readyShapes, state, wireLandmarks, type Running } from '../state';
 import { cancelMerge, startMerge } from '../actions/merge';
-import { Bar, Button, Icon } from './parts';
+import { Notice } from './notice';
+import { Bar, Button } from './parts';
 
 /** The stages of a morph in their order, with the number of the step each belongs to. */
 const STAGES: Record<string, [string, number]> = {
@@ -96,22 +97,13 @@ function Progress({ running }: { running: Running }) {
 
 export function Action() {
   const ready = readyShapes().length;
-  const { running, problem } = state;
+  const { running } = state;
   const busy = state.shapes.some((shape) => shape.state === 'reading' || shape.state === 'uploading');
   const again = state.tab === 'morph' && !!state.result;
   const landmarks = wireLandmarks().length;
   return (
     <div class="action">
-      {problem && (
-        <div class="notice error" role="alert">
-          <Icon name="alert" />
-          <div>
-            <strong>{problem.title}</strong>
-            <p>{problem.detail}</p>
-          </div>
-          <Button kind="quiet" icon="close" label="Dismiss" onClick={() => set({ problem: null })} />
-        </div>
-      )}
+      <Notice />
       {running ? (
         <Progress running={running} />
       ) : (

@@ -7,6 +7,7 @@ import { stage } from '../view/shared';
 import { Button, Segments } from './parts';
 import { Pane } from './pane';
 import { FilePicker } from './files';
+import { Notice } from './notice';
 
 /** Whether the user asks for less motion: then the morph stands still until it is played. */
 const calm = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
@@ -54,6 +55,7 @@ export function Welcome() {
         />
       </div>
       <div class="welcome-text">
+        <Notice />
         <div class="row center wrap">
           <Segments
             label="Sample morphs"
