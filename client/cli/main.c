@@ -43,6 +43,9 @@ static const cli_command command_list[] = {
     {"sign", "URL", "Sign the URL of a morph, so that a browser can load it without a token", 1, 1,
      CLI_BIT(OPT_HELP) | CLI_BIT(OPT_KEY) | CLI_BIT(OPT_EXPIRES), NULL,
      "'https://morph.example.org/v1/morph.glb?shapes=ID,ID' --expires 30d", cli_run_sign},
+    {"studio", "[FILE…]", "Start a daemon on a free port and open the studio in the browser", 0, -1,
+     CLI_BIT(OPT_HELP) | CLI_BIT(OPT_QUIET) | CLI_BIT(OPT_DATA) | CLI_BIT(OPT_NO_OPEN) | CLI_BIT(OPT_REPAIR), NULL,
+     "dog.obj giraffe.off", cli_run_studio},
     {"completions", "bash|zsh|fish", "Print the completion script of a shell", 1, 1, CLI_BIT(OPT_HELP), "bash zsh fish",
      "bash > /etc/bash_completion.d/orbmorph", cli_run_completions},
 };

@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -69,10 +70,30 @@ static char *part_of(const char *file) {
   return cli_text("%s.part-%ld", file, (long)getpid());
 }
 
-int cli_can_write(const cli *c, const char *file) {
+/* Whether the name has no ending, or one of these. */
+static int fits(const char *file, const char *endings) {
+  const char *slash = strrchr(file, '/'), *name = slash ? slash + 1 : file, *dot = strrchr(name, '.');
+  for (const char *word = endings; word && dot && dot > name && *word; word += strspn(word, " ")) {
+    size_t length = strcspn(word, " ");
+    if (strlen(dot + 1) == length && !strncasecmp(dot + 1, word, length)) {
+      return 1;
+    }
+    word += length;
+  }
+  return !endings || !dot || dot == name;
+}
+
+int cli_can_write(const cli *c, const char *file, const char *endings) {
   struct stat info;
   if (!file || is_stream(file)) {
     return CLI_DONE;
+  }
+  if (!fits(file, endings)) {
+    char *base = cli_base_name(file);
+    cli_error(c, "%s: this command cannot write that format; name the file %s.%.*s", file, base,
+              (int)strcspn(endings, " "), endings);
+    free(base);
+    return CLI_USAGE;
   }
   char *part = part_of(file);
   FILE *out = NULL;

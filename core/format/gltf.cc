@@ -162,21 +162,10 @@ struct Reader {
     }
   }
 
-  void check_extensions() const {
-    for (const cJSON *name : array_of(doc, "extensionsRequired")) {
-      for (const char *packed : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}) {
-        if (cJSON_IsString(name) && std::strcmp(name->valuestring, packed) == 0) {
-          malformed(std::string("The glTF file is compressed with ") + packed + "; export it without compression.");
-        }
-      }
-    }
-  }
-
   void read(Bytes chunk, orb_mesh *out) {
     if (!cJSON_IsObject(doc) || text_of(member(doc, "asset"), "version").compare(0, 2, "2.") != 0) {
       malformed("The file is not glTF 2.0.");
     }
-    check_extensions();
     meshes = array_of(doc, "meshes");
     buffers.load(doc, chunk, file_size);
     materials.load(doc);

@@ -69,6 +69,10 @@ void Buffers::load(const cJSON *doc, Bytes chunk, size_t file_size) {
       malformed("The glTF file keeps its data in another file (" + uri.substr(0, 80) +
                 "); send a GLB, or a glTF file with embedded data.");
     }
+    if (uri.empty() && is_fallback(buffer)) {
+      buffers_.push_back(Bytes()); /* its views are compressed */
+      continue;
+    }
     if (bytes.size < length) {
       malformed("A glTF buffer announces " + std::to_string(length) + " bytes but has " + std::to_string(bytes.size) +
                 ".");
@@ -76,10 +80,18 @@ void Buffers::load(const cJSON *doc, Bytes chunk, size_t file_size) {
     bytes.size = length;
     buffers_.push_back(bytes);
   }
+  auto buffer = [&](int64_t index) {
+    return index >= 0 && index < static_cast<int64_t>(buffers_.size()) ? buffers_[static_cast<size_t>(index)] : Bytes();
+  };
+  packed_.load(
+      doc, buffer, [&](int64_t index) { return view(index); }, file_size);
 }
 
 Bytes Buffers::view(int64_t index) const {
   const cJSON *v = element(views_, index, "buffer view");
+  if (const std::vector<unsigned char> *bytes = packed_.view(index)) {
+    return Bytes{bytes->data(), bytes->size()};
+  }
   int64_t buffer = whole(v, "buffer", NONE);
   if (buffer < 0 || buffer >= static_cast<int64_t>(buffers_.size())) {
     malformed("A glTF buffer view refers to a missing buffer.");
@@ -136,6 +148,10 @@ void Buffers::apply_sparse(const cJSON *sparse, int64_t type, bool normalized, s
 
 std::vector<double> Buffers::accessor(int64_t index, size_t *width) const {
   const cJSON *a = element(accessors_, index, "accessor");
+  if (const Packed::Values *values = packed_.accessor(index)) {
+    *width = values->width;
+    return values->list;
+  }
   std::string shape = text_of(a, "type");
   *width = shape == "SCALAR" ? 1 : shape == "VEC2" ? 2 : shape == "VEC3" ? 3 : shape == "VEC4" ? 4 : 0;
   if (*width == 0) {

@@ -2,7 +2,7 @@
 #ifndef ORB_FORMAT_GLTF_ACCESSOR_HH
 #define ORB_FORMAT_GLTF_ACCESSOR_HH
 
-#include "format/gltf_values.hh"
+#include "format/gltf_packed.hh"
 
 namespace gltf {
 
@@ -30,6 +30,7 @@ class Buffers {
   List accessors_, views_;
   std::vector<Bytes> buffers_;
   std::vector<std::vector<unsigned char>> decoded_;
+  Packed packed_;
 };
 
 }  // namespace gltf
