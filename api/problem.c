@@ -53,6 +53,7 @@ static const struct entry {
     {"not-certified", 500, "The result could not be certified"},
     {"corrupt", 500, "Stored data is corrupt"},
     {"crashed", 500, "The job crashed the server repeatedly"},
+    {"job-crashed", 500, "The process of the job died repeatedly"},
     {"fetch-failed", 502, "The file could not be fetched"},
     {"timeout", 503, "The time limit was reached"},
     {"not-ready", 503, "The result is not ready"},
@@ -69,6 +70,10 @@ static const struct entry *find(const char *name) {
     }
   }
   return find("internal");
+}
+
+const char *api_problem_name(const char *name) {
+  return find(name)->name;
 }
 
 int api_problem_status(const char *name) {

@@ -52,7 +52,7 @@ store_result catalogue_job_insert(catalogue *cat, job_row *row, const job_webhoo
 
 typedef struct change {
   const char *id, *problem;
-  int attempt, alone;
+  int attempt, alone, counts;
   int64_t now;
   const job_end *end;
 } change;
@@ -109,6 +109,24 @@ static int release(database *db, void *arg) {
 store_result catalogue_job_release(catalogue *cat, const char *id, int attempt) {
   change c = {.id = id, .attempt = attempt};
   return catalogue_write(cat, release, &c);
+}
+
+static int crashed(database *db, void *arg) {
+  const change *c = arg;
+  sqlite3_stmt *st = database_statement(
+      db, "UPDATE job SET state=0, alone=0, crashes=crashes+?3, suspect=?4 WHERE id=?1 AND state=1 AND attempt=?2");
+  if (st) {
+    sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
+    sqlite3_bind_int(st, 2, c->attempt);
+    sqlite3_bind_int(st, 3, c->counts);
+    sqlite3_bind_int(st, 4, c->alone);
+  }
+  return must_change(db, st);
+}
+
+store_result catalogue_job_crashed(catalogue *cat, const char *id, int attempt, int counts, int suspect) {
+  change c = {.id = id, .attempt = attempt, .counts = counts, .alone = suspect};
+  return catalogue_write(cat, crashed, &c);
 }
 
 static int write_event(database *db, const char *job, int64_t number, const char *type, const char *json) {
@@ -281,6 +299,9 @@ static int give_up(database *db, job_row *row, const change *c) {
  * alone, on purpose or because no other job was running. */
 static int recover(database *db, void *arg) {
   const change *c = arg;
+  if (c->attempt == 0) {
+    return database_run(db, database_statement(db, "UPDATE job SET state=0, alone=0 WHERE state=1"));
+  }
   sqlite3_stmt *st = database_statement(db,
                                         "UPDATE job SET crashes=crashes+1 WHERE state=1 AND"
                                         " (alone=1 OR (SELECT count(*) FROM job WHERE state=1)=1)");

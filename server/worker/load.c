@@ -14,6 +14,10 @@ void run_problem_of_store(store_result result, api_problem *problem) {
   }
 }
 
+store_result run_get(const run_env *env, resource_kind kind, const char *id, resource *out) {
+  return env->get ? env->get(env->user, kind, id, out) : catalogue_get(env->cat, kind, id, out);
+}
+
 static void note_triangles(const orb_mesh *raw, file_triangle *noted, int32_t count) {
   for (int32_t i = 0; i < count; i++) {
     int32_t t = noted[i].index;
@@ -49,7 +53,7 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
   unsigned char *bytes = NULL;
   size_t size;
   memset(mesh, 0, sizeof *mesh);
-  store_result found = catalogue_get(env->cat, RESOURCE_MESH, id, &row);
+  store_result found = run_get(env, RESOURCE_MESH, id, &row);
   if (found == STORE_NOT_FOUND) {
     return api_refuse(problem, "not-found", "Mesh %s was deleted before the job could use it.", id);
   }
@@ -90,7 +94,9 @@ int run_load_points(const run_env *env, orb_context *ctx, const char *embedding,
     memcpy(*points + 3 * v, first + v * SPHERE_STRIDE, 3 * sizeof(double));
   }
   free(bytes);
-  catalogue_touch(env->cat, RESOURCE_EMBEDDING, embedding);
+  if (env->cat) {
+    catalogue_touch(env->cat, RESOURCE_EMBEDDING, embedding);
+  }
   return *points != NULL;
 }
 
