@@ -1,15 +1,18 @@
 #include "intake.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "faults.h"
 #include "log.h"
+#include "store/crashes.h"
 #include "store/owners.h"
 
 int intake_open(intake_file *file, object_temp *temp, const api_hash *hash, int64_t size, const api_upload *upload) {
@@ -103,7 +106,7 @@ static int ask(isolated *process, const task_head *task, int fd, api_text *json,
 
 /* Checks the mesh in a process of its own. */
 static int check_isolated(const intake_file *file, const task_head *task, orb_context *ctx, const intake_limits *limits,
-                          api_text *json, api_problem *problem) {
+                          api_text *json, api_problem *problem, int *died) {
   isolated process;
   char path[40], why[100];
   snprintf(path, sizeof path, "/proc/self/fd/%d", file->temp->fd);
@@ -127,13 +130,14 @@ static int check_isolated(const intake_file *file, const task_head *task, orb_co
     return 0;
   }
   isolate_status_text(status, why, sizeof why);
+  *died = status != -1 && !(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL); /* or memory was short */
   log_error("the process that checked mesh %s %s", file->id, why);
   return api_refuse(problem, "job-crashed",
                     "The process that read the file died. Please report this as a bug, with the file.");
 }
 
-static int describe(const intake_file *file, orb_context *ctx, const intake_limits *limits, int64_t created,
-                    api_text *json, api_problem *problem) {
+static int describe(const intake_file *file, catalogue *cat, orb_context *ctx, const intake_limits *limits,
+                    int64_t created, api_text *json, api_problem *problem, int *died) {
   task_head task = {.kind = TASK_CHECK,
                     .threads = 1,
                     .memory = limits->memory,
@@ -148,7 +152,12 @@ static int describe(const intake_file *file, orb_context *ctx, const intake_limi
   memcpy(task.key, file->id, sizeof task.key);
   memcpy(task.name, file->upload->name, sizeof task.name);
   memcpy(task.repair, file->upload->repair, sizeof task.repair);
-  return isolate_is_on() ? check_isolated(file, &task, ctx, limits, json, problem)
+  if (catalogue_crashed(cat, file->id)) {
+    return api_refuse(problem, "job-crashed",
+                      "Three processes that read this file have died, so it is refused until an administrator clears "
+                      "it (orbmorphd crash clear). Please report this as a bug, with the file.");
+  }
+  return isolate_is_on() ? check_isolated(file, &task, ctx, limits, json, problem, died)
                          : check(&task, file->bytes, ctx, json, problem);
 }
 
@@ -168,8 +177,12 @@ store_result intake_store(const intake_file *file, catalogue *cat, objects *stor
                           api_problem *problem) {
   api_text json = {0};
   resource row = {.kind = RESOURCE_MESH, .bytes = file->size, .created = (int64_t)time(NULL) * 1000};
+  int died = 0;
   *fresh = 0;
-  if (!describe(file, ctx, limits, row.created, &json, problem)) {
+  if (!describe(file, cat, ctx, limits, row.created, &json, problem, &died)) {
+    if (died) {
+      catalogue_crash_of_mesh(cat, file->id, tenant, row.created);
+    }
     api_text_free(&json);
     return STORE_OK;
   }

@@ -25,7 +25,7 @@
 
 enum { CACHE_BYTES = 64 << 20 };
 
-static const admin_kind *const admin_kinds[] = {&admin_token, &admin_key, &admin_webhook, NULL};
+static const admin_kind *const admin_kinds[] = {&admin_token, &admin_key, &admin_webhook, &admin_crash, NULL};
 
 static void raise_descriptor_limit(void) {
   struct rlimit limit;

@@ -182,7 +182,7 @@ int queue_crashed(queue *q, job *j, int is_sure) {
   pthread_mutex_lock(&q->lock);
   int crashes = j->row.crashes + is_sure;
   pthread_mutex_unlock(&q->lock);
-  store_result stored = catalogue_job_crashed(q->cat, j->row.id, j->row.attempt, is_sure, !is_sure);
+  store_result stored = catalogue_job_crashed(q->cat, &j->row, is_sure, !is_sure, unix_ms());
   if (crashes >= MOST_CRASHES) {
     return 1;
   }

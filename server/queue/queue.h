@@ -93,6 +93,7 @@ typedef enum queue_result {
   QUEUE_STOPPING,
   QUEUE_STORE_FULL,
   QUEUE_MESH_GONE, /* a mesh that the request names has been deleted */
+  QUEUE_CRASHED,   /* processes that did this work died, see store/crashes.h */
   QUEUE_WEBHOOKS,  /* the job has as many webhooks as it may have */
   QUEUE_ERROR
 } queue_result;

@@ -129,7 +129,7 @@ store_result catalogue_job_claim(catalogue *cat, const char *id, int attempt, in
 /* running → queued again; its attempt does not count. */
 store_result catalogue_job_release(catalogue *cat, const char *id, int attempt);
 /* running → queued again: its process died. counts: its crash, see queue_crashed(). */
-store_result catalogue_job_crashed(catalogue *cat, const char *id, int attempt, int counts, int suspect);
+store_result catalogue_job_crashed(catalogue *cat, const job_row *row, int counts, int suspect, int64_t now);
 /* How a job ends. */
 typedef struct job_end {
   api_job_state state;

@@ -1,6 +1,7 @@
 /* Rows of jobs and events. */
 #include <stdlib.h>
 
+#include "store/crashes.h"
 #include "store/deliveries.h"
 #include "store/owners.h"
 #include "store/rows.h"
@@ -40,7 +41,8 @@ static int insert(database *db, void *arg) {
   sqlite3_bind_text(st, 8, r->request, -1, SQLITE_STATIC);
   sqlite3_bind_int64(st, 9, r->created);
   sqlite3_bind_text(st, 10, r->charged, -1, SQLITE_STATIC);
-  int code = database_run(db, st);
+  int code = crash_check(db, r->key);
+  code = code == SQLITE_OK ? database_run(db, st) : code;
   r->seq = sqlite3_last_insert_rowid(db->handle);
   code = code == SQLITE_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
   return code == SQLITE_OK && hook ? delivery_subscribe(db, r->id, hook) : code;
@@ -53,6 +55,7 @@ store_result catalogue_job_insert(catalogue *cat, job_row *row, const job_webhoo
 typedef struct change {
   const char *id, *problem;
   int attempt, alone, counts;
+  const job_row *row;
   int64_t now;
   const job_end *end;
 } change;
@@ -121,11 +124,12 @@ static int crashed(database *db, void *arg) {
     sqlite3_bind_int(st, 3, c->counts);
     sqlite3_bind_int(st, 4, c->alone);
   }
-  return must_change(db, st);
+  int code = must_change(db, st);
+  return code == SQLITE_OK && c->counts ? crash_note(db, c->row->key, c->row->request, c->row->owner, c->now) : code;
 }
 
-store_result catalogue_job_crashed(catalogue *cat, const char *id, int attempt, int counts, int suspect) {
-  change c = {.id = id, .attempt = attempt, .counts = counts, .alone = suspect};
+store_result catalogue_job_crashed(catalogue *cat, const job_row *row, int counts, int suspect, int64_t now) {
+  change c = {.id = row->id, .attempt = row->attempt, .counts = counts, .alone = suspect, .row = row, .now = now};
   return catalogue_write(cat, crashed, &c);
 }
 

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "api/json.h"
+#include "faults.h"
 #include "isolate/task.h"
 #include "log.h"
 #include "store/alignments.h"
@@ -124,6 +125,7 @@ static store_result copy(const run_env *env, orb_context *ctx, const object_head
     } else if (orb_context_check(ctx) != ORB_OK) {
       stored = STORE_ERROR;
     }
+    FAULT_POINT("temp-written");
   }
   if (stored == STORE_OK) {
     stored = objects_publish(env->store, &temp, head->kind, head->id);
