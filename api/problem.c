@@ -29,6 +29,7 @@ static const struct entry {
     {"length-required", 411, "The length of the body is required"},
     {"precondition-failed", 412, "A precondition failed"},
     {"too-large", 413, "The input is too large"},
+    {"uri-too-long", 414, "The target of the request is too long"},
     {"unknown-format", 415, "The mesh format is not recognised"},
     {"unsupported-media-type", 415, "The media type is not supported"},
     {"unsupported-encoding", 415, "The content encoding is not supported"},
