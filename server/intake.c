@@ -203,18 +203,38 @@ store_result intake_store(const intake_file *file, catalogue *cat, objects *stor
   return stored;
 }
 
-void intake_restore(const intake_file *file, objects *store) {
+/* Whether the stored object has the bytes of this file. */
+static store_result compare(const intake_file *file, objects *store, int *same) {
   int fd;
   uint64_t size = 0;
+  char sha[API_ID_SIZE] = "";
   store_result found = objects_read(store, OBJECT_MESH, file->id, &fd, &size);
-  if (found == STORE_OK) {
-    close(fd);
+  if (found != STORE_OK) {
+    return found;
   }
-  if (found == STORE_NOT_FOUND || (found == STORE_OK && size != (uint64_t)file->size)) {
+  if (size == (uint64_t)file->size) {
+    api_hash hash;
+    unsigned char part[65536];
+    ssize_t n;
+    api_hash_begin(&hash);
+    while ((n = read(fd, part, sizeof part)) > 0) {
+      api_hash_add(&hash, part, (size_t)n);
+    }
+    api_hash_end(&hash, sha);
+  }
+  close(fd);
+  *same = strcmp(sha, file->sha) == 0;
+  return STORE_OK;
+}
+
+void intake_restore(const intake_file *file, objects *store) {
+  int same = 0;
+  store_result found = compare(file, store, &same);
+  if (found == STORE_NOT_FOUND || (found == STORE_OK && !same)) {
     objects_hold(store);
     found = objects_publish(store, file->temp, OBJECT_MESH, file->id);
     objects_let_go(store);
-    log_warn("the file of mesh %s was lost or truncated and %s", file->id,
+    log_warn("the file of mesh %s was lost or altered and %s", file->id,
              found == STORE_OK ? "is restored" : "could not be restored");
   }
 }

@@ -42,7 +42,7 @@ store_result intake_store(const intake_file *file, catalogue *cat, objects *stor
  * problem. */
 int intake_check_here(const task_head *task, int fd, orb_context *ctx, api_text *json, api_problem *problem);
 
-/* Restores the object of a known mesh from this file if it is lost or truncated. */
+/* Restores the object of a known mesh from this file if it is lost or has other bytes. O(size). */
 void intake_restore(const intake_file *file, objects *store);
 
 #endif

@@ -29,7 +29,7 @@ typedef struct task_head {
 typedef struct input_head {
   resource_kind row;
   object_kind object;
-  char id[API_ID_SIZE];
+  char id[API_ID_SIZE], sha[API_ID_SIZE]; /* sha: of the object, by its row */
 } input_head;
 
 /* FRAME_PROGRESS. */

@@ -13,7 +13,8 @@
  *
  * The retry of a job: if the store fails, queue_finish(), queue_give_back() and queue_put_off() in finish.c set
  * retry_at, before which schedule.c does not choose the job. After a crash, queue_recover() in lifecycle.c queues what
- * was running again; catalogue_recover() in store/jobs.c counts the crashes and fails a job after MOST_CRASHES.
+ * was running again; with isolate = off, catalogue_recover() in store/jobs.c counts the crashes and fails a job after
+ * MOST_CRASHES. Otherwise jobs have processes of their own, and queue_crashed() in finish.c counts the deaths of those.
  *
  * Contract. One lock guards all of it; it is held for short steps only, never during input or output. The catalogue is
  * authoritative: a job is taken, shown as accepted, or shown as ended only after its row was committed, so everything

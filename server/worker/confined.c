@@ -32,6 +32,7 @@ static store_result get(void *user, resource_kind kind, const char *id, resource
     if (c->inputs[i].head.row == kind && strcmp(c->inputs[i].head.id, id) == 0) {
       *out = (resource){.kind = kind, .json = strdup(c->inputs[i].json)};
       memcpy(out->id, c->inputs[i].head.id, sizeof out->id);
+      memcpy(out->sha, c->inputs[i].head.sha, sizeof out->sha);
       return out->json ? STORE_OK : STORE_ERROR;
     }
   }

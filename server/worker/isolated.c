@@ -39,6 +39,7 @@ static void collect(const run_env *env, collected *all, resource_kind kind, obje
   }
   all->heads[at] = (input_head){.row = kind, .object = object};
   memcpy(all->heads[at].id, row.id, sizeof row.id);
+  memcpy(all->heads[at].sha, row.sha, sizeof row.sha);
   all->json[at] = row.json;
   row.json = NULL;
   resource_free(&row);
