@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "hash.h"
+
 enum { BUCKETS = 4096 };
 
 typedef struct item {
@@ -31,11 +33,7 @@ cache *cache_create(size_t max_bytes) {
 }
 
 static item **bucket(cache *c, resource_kind kind, const char *id) {
-  unsigned hash = (unsigned)kind + 1;
-  for (int i = 0; i < 16 && id[i]; i++) {
-    hash = hash * 31 + (unsigned char)id[i];
-  }
-  return &c->buckets[hash % BUCKETS];
+  return &c->buckets[(keyed_hash(id, strlen(id)) + (uint64_t)kind) % BUCKETS];
 }
 
 static void unref(item *it) {

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "hash.h"
 #include "http/regions.h"
 
 enum { BUCKETS = 1024, TAG_ROOM = 96, OVERHEAD = 256 };
@@ -35,11 +36,7 @@ encoded_cache *encoded_open(size_t max_bytes) {
 }
 
 static item **bucket(encoded_cache *c, const char *tag, coding which) {
-  unsigned hash = (unsigned)which;
-  for (const char *at = tag; *at; at++) {
-    hash = hash * 31 + (unsigned char)*at;
-  }
-  return &c->buckets[hash % BUCKETS];
+  return &c->buckets[(keyed_hash(tag, strlen(tag)) + (uint64_t)which) % BUCKETS];
 }
 
 static void unref(item *it) {

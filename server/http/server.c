@@ -8,6 +8,7 @@
 #include "faults.h"
 #include "http/body.h"
 #include "http/http.h"
+#include "http/target.h"
 #include "log.h"
 #include "metrics.h"
 
@@ -68,6 +69,7 @@ static void *request_create(void *user, const char *target, struct MHD_Connectio
     r->temp.fd = -1;
     r->began = clock_us();
     make_number(r->number);
+    r->refused = target_refused(target, r->number, r->srv->options->tls_key[0] != 0, connection);
   }
   return r;
 }
@@ -114,7 +116,7 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
   request *r = *state;
   (void)user;
   (void)connection;
-  if (!r) { /* out of memory */
+  if (!r || r->refused) { /* out of memory, or answered past the library */
     return MHD_NO;
   }
   if (!r->begun) {
