@@ -29,6 +29,7 @@ static const struct entry {
     {"length-required", 411, "The length of the body is required"},
     {"precondition-failed", 412, "A precondition failed"},
     {"too-large", 413, "The input is too large"},
+    {"uri-too-long", 414, "The target of the request is too long"},
     {"unknown-format", 415, "The mesh format is not recognised"},
     {"unsupported-media-type", 415, "The media type is not supported"},
     {"unsupported-encoding", 415, "The content encoding is not supported"},
@@ -53,6 +54,7 @@ static const struct entry {
     {"not-certified", 500, "The result could not be certified"},
     {"corrupt", 500, "Stored data is corrupt"},
     {"crashed", 500, "The job crashed the server repeatedly"},
+    {"job-crashed", 500, "The process of the job died repeatedly"},
     {"fetch-failed", 502, "The file could not be fetched"},
     {"timeout", 503, "The time limit was reached"},
     {"not-ready", 503, "The result is not ready"},
@@ -69,6 +71,10 @@ static const struct entry *find(const char *name) {
     }
   }
   return find("internal");
+}
+
+const char *api_problem_name(const char *name) {
+  return find(name)->name;
 }
 
 int api_problem_status(const char *name) {

@@ -13,6 +13,8 @@ typedef struct api_problem {
 } api_problem;
 
 int api_problem_status(const char *name);
+/* The literal of this name; "internal" where no problem has it. */
+const char *api_problem_name(const char *name);
 void api_problem_free(api_problem *problem);
 
 /* Frees *problem, fills it and returns 0, so that a parser can `return api_refuse(…)`. */

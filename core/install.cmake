@@ -8,7 +8,7 @@ add_library(orbmorph_shared SHARED $<TARGET_OBJECTS:orbmorph_objects>)
 set_target_properties(orbmorph_shared PROPERTIES OUTPUT_NAME orbmorph EXPORT_NAME orbmorph
   VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
 target_include_directories(orbmorph_shared INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-target_link_libraries(orbmorph_shared PRIVATE PkgConfig::QHULL PkgConfig::CJSON ${ORB_MESHOPT} Threads::Threads m)
+target_link_libraries(orbmorph_shared PRIVATE PkgConfig::QHULL PkgConfig::CJSON ${ORB_MESHOPT} ${ORB_DRACO} Threads::Threads m)
 # Names of the C++ library that the compiler defines in our objects are visible by default; the map hides them.
 set(map ${CMAKE_CURRENT_SOURCE_DIR}/orbmorph.map)
 check_linker_flag(C "-Wl,--version-script=${map}" ORB_HAS_VERSION_SCRIPT)
@@ -42,7 +42,7 @@ endif()
 set_target_properties(orbmorph_static PROPERTIES OUTPUT_NAME orbmorph EXPORT_NAME static LINKER_LANGUAGE CXX)
 target_compile_definitions(orbmorph_static INTERFACE ORB_STATIC)
 target_include_directories(orbmorph_static INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-target_link_libraries(orbmorph_static INTERFACE qhull_r cjson meshoptimizer Threads::Threads m)
+target_link_libraries(orbmorph_static INTERFACE qhull_r cjson meshoptimizer draco Threads::Threads m)
 
 # orbmorph.pc finds its folders relative to itself: the files may be installed anywhere.
 set(libraries ${CMAKE_INSTALL_FULL_LIBDIR})

@@ -76,7 +76,23 @@ build() {
   [ -f "$root/build/build.ninja" ] || cmake -S "$root" --preset release -DORB_TESTS=OFF
   cmake --build "$root/build" --target orbmorphd orbmorph
 }
-if ! (cd "$root" && build) >"$log" 2>&1; then
+# What the build does, every few seconds: Ninja writes [done/all] before each step.
+say_progress() {
+  local step last=
+  while sleep 5; do
+    step=$(grep -aoE '^\[[0-9]+/[0-9]+\]' "$log" | tail -n 1 | tr -d '[]') || true
+    [ -n "$step" ] || step='preparing'
+    [ "$step" = "$last" ] || echo "  building: ${step/\// of } (${SECONDS} s)"
+    last=$step
+  done
+}
+say_progress &
+reporter=$!
+built=yes
+(cd "$root" && build) >"$log" 2>&1 || built=no
+kill "$reporter" 2>/dev/null || true
+wait "$reporter" 2>/dev/null || true
+if [ "$built" = no ]; then
   tail -n 40 "$log" >&2
   echo "demo.sh: the build failed; all of its output is in $log" >&2
   exit 1
@@ -95,18 +111,23 @@ trap finish EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
-: >"$data/out"
-setsid "$root/build/bin/orbmorphd" --listen 127.0.0.1:0 --data "$data/store" >"$data/out" 2>"$data/log" </dev/null &
-daemon=$!
 address=
-for _ in $(seq 150); do
-  address=$(sed -n 's/^orbmorphd listening on //p' "$data/out")
-  [ -z "$address" ] || break
-  if ! kill -0 "$daemon" 2>/dev/null; then
-    break
-  fi
-  sleep 0.1
-done
+start_daemon() {
+  : >"$data/out"
+  setsid "$root/build/bin/orbmorphd" --listen "127.0.0.1:$1" --data "$data/store" >"$data/out" 2>"$data/log" </dev/null &
+  daemon=$!
+  for _ in $(seq 150); do
+    address=$(sed -n 's/^orbmorphd listening on //p' "$data/out")
+    [ -z "$address" ] || return 0
+    if ! kill -0 "$daemon" 2>/dev/null; then
+      break
+    fi
+    sleep 0.1
+  done
+  return 1
+}
+# the port of all examples, or any where another program has it
+start_daemon 8080 || start_daemon 0 || true
 if [ -z "$address" ]; then
   cat "$data/log" >&2
   echo "demo.sh: the daemon did not start" >&2
@@ -121,6 +142,7 @@ for mesh in "${meshes[@]}"; do
 done
 stem=$(printf %s "$stem" | tr -c 'A-Za-z0-9._-' _ | cut -c1-100)
 
+echo "morphing $(basename -- "${meshes[0]}") and $((${#meshes[@]} - 1)) more at $address"
 export ORBMORPH_SERVER=$address
 options=(-o "$output/$stem.glb" --report "$output/$stem.md")
 if [ -n "$landmarks" ]; then
@@ -134,6 +156,7 @@ echo "Report: $output/$stem.md"
 echo "JSON:   $output/$stem.json"
 if [ "$serve" = yes ]; then
   echo "Server: $address (its data in $data; stop it with: kill $daemon)"
+  echo "Open $address/ in a browser, and drop your own files there."
   daemon=
   trap - EXIT
 fi

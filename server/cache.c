@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "hash.h"
+
 enum { BUCKETS = 4096 };
 
 typedef struct item {
@@ -31,16 +33,13 @@ cache *cache_create(size_t max_bytes) {
 }
 
 static item **bucket(cache *c, resource_kind kind, const char *id) {
-  unsigned hash = (unsigned)kind + 1;
-  for (int i = 0; i < 16 && id[i]; i++) {
-    hash = hash * 31 + (unsigned char)id[i];
-  }
-  return &c->buckets[hash % BUCKETS];
+  return &c->buckets[(keyed_hash(id, strlen(id)) + (uint64_t)kind) % BUCKETS];
 }
 
 static void unref(item *it) {
   if (--it->refs == 0) {
     free(it->entry.row.json);
+    free(it->entry.header);
     free(it);
   }
 }
@@ -145,6 +144,20 @@ int cache_note_use(cache *c, const cached *entry, int64_t now) {
   }
   pthread_mutex_unlock(&c->lock);
   return due;
+}
+
+const char *cache_header(const cached *entry) {
+  return __atomic_load_n(&entry->header, __ATOMIC_ACQUIRE);
+}
+
+const char *cache_keep_header(const cached *entry, const char *text) {
+  item *it = (item *)(uintptr_t)entry;
+  char *copy = strdup(text), *there = NULL;
+  if (copy && !__atomic_compare_exchange_n(&it->entry.header, &there, copy, 0, __ATOMIC_ACQ_REL, __ATOMIC_ACQUIRE)) {
+    free(copy);
+    copy = there;
+  }
+  return copy;
 }
 
 void cache_release(cache *c, const cached *entry) {

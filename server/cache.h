@@ -11,6 +11,7 @@ typedef struct cached {
   char tenant[64]; /* the owner whose view this is; "": the resource's own description */
   size_t json_size;
   char etag[40]; /* of the description, with quotes */
+  char *header;  /* __atomic, set once: see cache_keep_header(); NULL: none yet */
 } cached;
 
 cache *cache_create(size_t max_bytes);
@@ -25,6 +26,10 @@ const cached *cache_add(cache *c, resource *row, const char *tenant, unsigned lo
 /* 1 if the last recorded use is at least a second ago; then records this one. now: orb_clock_ms(). */
 int cache_note_use(cache *c, const cached *entry, int64_t now);
 void cache_release(cache *c, const cached *entry);
+/* Keeps a header that is derived from the description for as long as the entry lives. The first text is kept; returns
+ * that, or NULL if out of memory. */
+const char *cache_keep_header(const cached *entry, const char *text);
+const char *cache_header(const cached *entry);                 /* NULL: none is kept */
 void cache_drop(cache *c, resource_kind kind, const char *id); /* for all tenants */
 
 #endif

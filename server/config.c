@@ -60,6 +60,10 @@ static const entry table[] = {
     {"job-memory", NUMBER(job_memory, 1 << 20, INT64_C(1) << 46), "0",
      "memory limit of one job in bytes; 0: half of the machine's memory"},
     {"job-seconds", NUMBER(job_seconds, 1, 864000), "3600", "time limit of one job"},
+    {"check-seconds", NUMBER(check_seconds, 1, 864000), "30", "time limit of the check of one upload"},
+    {"isolate", TEXT(isolate), "on",
+     "on: meshes are read and jobs run in confined processes of their own; strict: refuse to start where the kernel "
+     "cannot confine them; off: within the service, for debugging"},
     {"disk-reserve", NUMBER(disk_reserve, 0, INT64_C(1) << 46), "64M", "bytes that uploads leave free on the disk"},
     {"drain-seconds", NUMBER(drain_seconds, 0, 3600), "8", "on SIGTERM, time for running jobs to end"},
     {"derived-bytes", NUMBER(derived_bytes, 1 << 20, INT64_C(1) << 50), "0",
@@ -390,6 +394,7 @@ static int are_networks(const char *name, const char *list) {
 
 static int consistent(config *out) {
   static const char *const limits[] = {"remote", "all", "off", NULL}, *const auth[] = {"loopback", "on", "off", NULL},
+                           *const isolate[] = {"on", "off", "strict", NULL},
                            *const levels[] = {"debug", "info", "warn", "error", NULL},
                            *const formats[] = {"json", "text", NULL};
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
@@ -404,11 +409,11 @@ static int consistent(config *out) {
     return 0;
   }
   return is_address(out->listen) && is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) &&
-         is_one_of("auth", out->auth, auth) && is_one_of("log-level", out->log_level, levels) &&
-         is_one_of("log-format", out->log_format, formats) && are_origins(out->cors) && are_hosts(out->hosts) &&
-         is_readable("tls-certificate", out->tls_certificate) && is_readable("tls-key", out->tls_key) &&
-         is_readable("tls-authorities", out->tls_authorities) && are_networks("webhook-allow", out->webhook_allow) &&
-         are_networks("fetch-allow", out->fetch_allow);
+         is_one_of("auth", out->auth, auth) && is_one_of("isolate", out->isolate, isolate) &&
+         is_one_of("log-level", out->log_level, levels) && is_one_of("log-format", out->log_format, formats) &&
+         are_origins(out->cors) && are_hosts(out->hosts) && is_readable("tls-certificate", out->tls_certificate) &&
+         is_readable("tls-key", out->tls_key) && is_readable("tls-authorities", out->tls_authorities) &&
+         are_networks("webhook-allow", out->webhook_allow) && are_networks("fetch-allow", out->fetch_allow);
 }
 
 config_action config_read(config *out, int argc, char **argv) {

@@ -18,10 +18,11 @@ typedef struct config {
   char auth[16];       /* loopback, on, off */
   char limits[16];     /* remote, all, off */
   char socket_mode[8]; /* octal */
+  char isolate[16];    /* on, off, strict */
   int64_t workers, worker_nice, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;
   int64_t requests_per_second, header_seconds, slow_seconds, min_rate, slow_ms;
   int64_t max_body, max_json, max_ratio, decode_memory, encoded_bytes, max_triangles, queue_limit;
-  int64_t job_memory, job_seconds, disk_reserve, drain_seconds, derived_bytes, keep_jobs;
+  int64_t job_memory, job_seconds, check_seconds, disk_reserve, drain_seconds, derived_bytes, keep_jobs;
   int64_t webhook_retry_seconds, fetch_seconds;
 } config;
 

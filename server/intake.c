@@ -1,12 +1,18 @@
 #include "intake.h"
 
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "faults.h"
 #include "log.h"
+#include "store/crashes.h"
 #include "store/owners.h"
 
 int intake_open(intake_file *file, object_temp *temp, const api_hash *hash, int64_t size, const api_upload *upload) {
@@ -36,18 +42,20 @@ void intake_close(intake_file *file) {
   objects_abandon(file->temp);
 }
 
-static int describe(const intake_file *file, orb_context *ctx, int64_t created, api_text *json, api_problem *problem) {
+/* Checks the mesh in these bytes. */
+static int check(const task_head *task, const unsigned char *bytes, orb_context *ctx, api_text *json,
+                 api_problem *problem) {
   orb_mesh mesh;
-  api_mesh_facts facts = {.id = file->id,
-                          .name = file->upload->name,
-                          .repair = file->upload->repair,
-                          .bytes = file->size,
-                          .created = created,
+  api_mesh_facts facts = {.id = task->key,
+                          .name = task->name,
+                          .repair = task->repair,
+                          .bytes = task->bytes,
+                          .created = task->created,
                           .mesh = &mesh};
   memset(&mesh, 0, sizeof mesh);
-  orb_format found = file->format;
-  int fine = orb_mesh_read(ctx, file->bytes, (size_t)file->size, file->format, &mesh, &found) == ORB_OK &&
-             orb_mesh_repair(ctx, &mesh, file->upload->flags) == ORB_OK &&
+  orb_format found = task->format;
+  int fine = orb_mesh_read(ctx, bytes, (size_t)task->bytes, task->format, &mesh, &found) == ORB_OK &&
+             orb_mesh_repair(ctx, &mesh, task->flags) == ORB_OK &&
              orb_mesh_topology(ctx, &mesh, &facts.topology) == ORB_OK;
   if (fine) {
     orb_mesh_extent(&mesh, &facts.extent);
@@ -61,6 +69,98 @@ static int describe(const intake_file *file, orb_context *ctx, int64_t created, 
   return fine;
 }
 
+int intake_check_here(const task_head *task, int fd, orb_context *ctx, api_text *json, api_problem *problem) {
+  const void *bytes = "";
+  if (task->bytes > 0) {
+    bytes = mmap(NULL, (size_t)task->bytes, PROT_READ, MAP_PRIVATE, fd, 0);
+    if (bytes == MAP_FAILED) {
+      return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");
+    }
+  }
+  return check(task, bytes, ctx, json, problem); /* the end of the process unmaps them */
+}
+
+/* 1 with the description, 0 with the problem, −1: the process died or was stopped. */
+static int ask(isolated *process, const task_head *task, int fd, api_text *json, api_problem *problem) {
+  const struct iovec begin = {(void *)(uintptr_t)task, sizeof *task};
+  input_head head = {.object = OBJECT_MESH};
+  const struct iovec input = {&head, sizeof head};
+  frame f;
+  done_head done;
+  char *text = NULL;
+  if (isolate_send(process, FRAME_TASK, &begin, 1, -1) != CHANNEL_OK ||
+      isolate_send(process, FRAME_INPUT, &input, 1, fd) != CHANNEL_OK ||
+      isolate_send(process, FRAME_GO, NULL, 0, -1) != CHANNEL_OK ||
+      isolate_receive(process, CHANNEL_MOST, &f) != CHANNEL_OK) {
+    return -1;
+  }
+  int fine = f.type == FRAME_DONE && task_read_done(&f, &done, &text, problem) && (!done.fine || text);
+  frame_free(&f);
+  if (fine && done.fine) {
+    api_text_add(json, text);
+    fine = !json->failed;
+  }
+  free(text);
+  return fine ? done.fine : -1;
+}
+
+/* Checks the mesh in a process of its own. */
+static int check_isolated(const intake_file *file, const task_head *task, orb_context *ctx, const intake_limits *limits,
+                          api_text *json, api_problem *problem, int *died) {
+  isolated process;
+  char path[40], why[100];
+  snprintf(path, sizeof path, "/proc/self/fd/%d", file->temp->fd);
+  int fd = open(path, O_RDONLY | O_CLOEXEC);
+  if (fd < 0 || !isolate_open(&process, ctx)) {
+    if (fd >= 0) {
+      close(fd);
+    }
+    return api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
+  }
+  process.wanted = limits->wanted;
+  process.user = limits->user;
+  int result = ask(&process, task, fd, json, problem);
+  int status = isolate_close(&process);
+  close(fd);
+  if (result >= 0) {
+    return result;
+  }
+  if (orb_context_check(ctx) != ORB_OK) {
+    api_problem_of_error(orb_context_error(ctx), problem);
+    return 0;
+  }
+  isolate_status_text(status, why, sizeof why);
+  *died = status != -1 && !(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL); /* or memory was short */
+  log_error("the process that checked mesh %s %s", file->id, why);
+  return api_refuse(problem, "job-crashed",
+                    "The process that read the file died. Please report this as a bug, with the file.");
+}
+
+static int describe(const intake_file *file, catalogue *cat, orb_context *ctx, const intake_limits *limits,
+                    int64_t created, api_text *json, api_problem *problem, int *died) {
+  task_head task = {.kind = TASK_CHECK,
+                    .threads = 1,
+                    .memory = limits->memory,
+                    .inputs = file->size,
+                    .deadline_ms = limits->deadline_ms,
+                    .cpu_seconds = task_cpu_seconds(limits->deadline_ms, 1),
+                    .max_triangles = limits->max_triangles,
+                    .flags = file->upload->flags,
+                    .format = file->format,
+                    .bytes = file->size,
+                    .created = created};
+  memcpy(task.key, file->id, sizeof task.key);
+  memcpy(task.name, file->upload->name, sizeof task.name);
+  memcpy(task.repair, file->upload->repair, sizeof task.repair);
+  if (catalogue_crashed(cat, file->id)) {
+    return api_refuse(problem, "job-crashed",
+                      "Three processes that read this file have died, so it is refused until an administrator clears "
+                      "it (orbmorphd crash clear). Please report this as a bug, with the file.");
+  }
+  return isolate_is_on() ? check_isolated(file, &task, ctx, limits, json, problem, died)
+                         : check(&task, file->bytes, ctx, json, problem);
+}
+
 /* Deletes an object that got no row. */
 static void drop_unused(catalogue *cat, objects *store, const char *id) {
   resource row = {0};
@@ -72,12 +172,17 @@ static void drop_unused(catalogue *cat, objects *store, const char *id) {
   resource_free(&row);
 }
 
-store_result intake_store(const intake_file *file, catalogue *cat, objects *store, orb_context *ctx, const char *tenant,
-                          int64_t quota, int *fresh, api_problem *problem) {
+store_result intake_store(const intake_file *file, catalogue *cat, objects *store, orb_context *ctx,
+                          const intake_limits *limits, const char *tenant, int64_t quota, int *fresh,
+                          api_problem *problem) {
   api_text json = {0};
   resource row = {.kind = RESOURCE_MESH, .bytes = file->size, .created = (int64_t)time(NULL) * 1000};
+  int died = 0;
   *fresh = 0;
-  if (!describe(file, ctx, row.created, &json, problem)) {
+  if (!describe(file, cat, ctx, limits, row.created, &json, problem, &died)) {
+    if (died) {
+      catalogue_crash_of_mesh(cat, file->id, tenant, row.created);
+    }
     api_text_free(&json);
     return STORE_OK;
   }
@@ -98,18 +203,38 @@ store_result intake_store(const intake_file *file, catalogue *cat, objects *stor
   return stored;
 }
 
-void intake_restore(const intake_file *file, objects *store) {
+/* Whether the stored object has the bytes of this file. */
+static store_result compare(const intake_file *file, objects *store, int *same) {
   int fd;
   uint64_t size = 0;
+  char sha[API_ID_SIZE] = "";
   store_result found = objects_read(store, OBJECT_MESH, file->id, &fd, &size);
-  if (found == STORE_OK) {
-    close(fd);
+  if (found != STORE_OK) {
+    return found;
   }
-  if (found == STORE_NOT_FOUND || (found == STORE_OK && size != (uint64_t)file->size)) {
+  if (size == (uint64_t)file->size) {
+    api_hash hash;
+    unsigned char part[65536];
+    ssize_t n;
+    api_hash_begin(&hash);
+    while ((n = read(fd, part, sizeof part)) > 0) {
+      api_hash_add(&hash, part, (size_t)n);
+    }
+    api_hash_end(&hash, sha);
+  }
+  close(fd);
+  *same = strcmp(sha, file->sha) == 0;
+  return STORE_OK;
+}
+
+void intake_restore(const intake_file *file, objects *store) {
+  int same = 0;
+  store_result found = compare(file, store, &same);
+  if (found == STORE_NOT_FOUND || (found == STORE_OK && !same)) {
     objects_hold(store);
     found = objects_publish(store, file->temp, OBJECT_MESH, file->id);
     objects_let_go(store);
-    log_warn("the file of mesh %s was lost or truncated and %s", file->id,
+    log_warn("the file of mesh %s was lost or altered and %s", file->id,
              found == STORE_OK ? "is restored" : "could not be restored");
   }
 }

@@ -7,6 +7,7 @@
 #define ORB_INTAKE_H
 
 #include "api/mesh_codec.h"
+#include "isolate/task.h"
 #include "store/catalogue.h"
 
 typedef struct intake_file {
@@ -23,13 +24,25 @@ typedef struct intake_file {
 int intake_open(intake_file *file, object_temp *temp, const api_hash *hash, int64_t size, const api_upload *upload);
 void intake_close(intake_file *file); /* also deletes the temporary file if it is left */
 
+/* Limits on a check; the context has the same. */
+typedef struct intake_limits {
+  int64_t memory, deadline_ms, max_triangles;
+  int (*wanted)(void *user); /* asked many times a second while a process checks: 0 ends it; NULL: always */
+  void *user;
+} intake_limits;
+
 /* Reads, repairs and checks the mesh, publishes the file and makes the tenant an owner. `*fresh`: the tenant did not
  * own it before. STORE_CONFLICT: the tenant's quota in bytes (0: no limit) has no room, and nothing is stored. A mesh
  * that is refused leaves its problem, and STORE_OK. */
-store_result intake_store(const intake_file *file, catalogue *cat, objects *store, orb_context *ctx, const char *tenant,
-                          int64_t quota, int *fresh, api_problem *problem);
+store_result intake_store(const intake_file *file, catalogue *cat, objects *store, orb_context *ctx,
+                          const intake_limits *limits, const char *tenant, int64_t quota, int *fresh,
+                          api_problem *problem);
 
-/* Restores the object of a known mesh from this file if it is lost or truncated. */
+/* Within a process of its own: checks the mesh in this file (isolate/task.h). 1 with its description, or 0 with the
+ * problem. */
+int intake_check_here(const task_head *task, int fd, orb_context *ctx, api_text *json, api_problem *problem);
+
+/* Restores the object of a known mesh from this file if it is lost or has other bytes. O(size). */
 void intake_restore(const intake_file *file, objects *store);
 
 #endif

@@ -15,15 +15,17 @@
 #include "control.h"
 #include "evict.h"
 #include "http/http.h"
+#include "isolate/isolate.h"
 #include "log.h"
 #include "maintain.h"
 #include "net/client.h"
 #include "systemd.h"
+#include "worker/confined.h"
 #include "worker/pool.h"
 
 enum { CACHE_BYTES = 64 << 20 };
 
-static const admin_kind *const admin_kinds[] = {&admin_token, &admin_key, &admin_webhook, NULL};
+static const admin_kind *const admin_kinds[] = {&admin_token, &admin_key, &admin_webhook, &admin_crash, NULL};
 
 static void raise_descriptor_limit(void) {
   struct rlimit limit;
@@ -309,6 +311,9 @@ static int start(server *srv, worker_pool **workers) {
                            .job_ms = 1000 * o->job_seconds,
                            .max_triangles = o->max_triangles,
                            .fetch = {.authorities = o->tls_authorities,
+                                     .check_ms = 1000 * o->check_seconds,
+                                     .memory = o->job_memory,
+                                     .max_triangles = o->max_triangles,
                                      .total_ms = 1000 * o->fetch_seconds,
                                      .most = o->max_body,
                                      .disk_reserve = o->disk_reserve}};
@@ -325,7 +330,7 @@ static int start(server *srv, worker_pool **workers) {
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
   return listens && objects_open(o->data, &srv->store) == STORE_OK && catalogue_open(o->data, &srv->cat) == STORE_OK &&
          (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
-         (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q) == STORE_OK &&
+         (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
          (srv->descriptions = cache_create(CACHE_BYTES)) && (srv->io = tasks_start((int)o->io_threads)) &&
          (srv->checks = tasks_start((int)o->workers)) && (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&
          net_start() && start_outbox(srv, &delivered) &&
@@ -393,7 +398,11 @@ static int run(const command_line *line) {
   if (signals >= 0 && lock < 0) {
     say_locked(options->data);
   }
-  int result = lock < 0 ? 1 : serve(&srv, line, signals, &set);
+  isolate_mode mode = strcmp(options->isolate, "off") == 0      ? ISOLATE_OFF
+                      : strcmp(options->isolate, "strict") == 0 ? ISOLATE_STRICT
+                                                                : ISOLATE_ON;
+  int result = lock < 0 || !isolate_start(mode) ? 1 : serve(&srv, line, signals, &set);
+  isolate_stop();
   if (lock >= 0) {
     close(lock);
   }
@@ -411,6 +420,9 @@ static int work_alone(const admin_command *admin, config_action action, const co
 int main(int argc, char **argv) {
   static config options;
   static admin_command admin;
+  if (argc == 2 && strcmp(argv[1], ISOLATE_FLAG) == 0) {
+    return sodium_init() < 0 ? 1 : (isolate_zygote(confined_work), 0);
+  }
   const admin_kind *kind = argc > 1 ? admin_kind_named(admin_kinds, argv[1]) : NULL;
   if (kind && !admin_command_read(&admin, kind, &argc, argv)) {
     return 2;

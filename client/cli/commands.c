@@ -25,7 +25,7 @@ int cli_run_upload(cli *c) {
   }
   for (int i = 0; i < c->args.operand_count && rc == CLI_DONE; i++) {
     cli_reply reply;
-    rc = cli_upload(c, c->args.operands[i], name, c->args.value[OPT_REPAIR], &reply);
+    rc = cli_take_in(c, c->args.operands[i], name, c->args.value[OPT_REPAIR], &reply);
     if (rc == CLI_DONE && !cli_ok(&reply)) {
       rc = cli_refused(c, c->args.operands[i], &reply);
     } else if (rc == CLI_DONE && c->json) {
@@ -85,7 +85,7 @@ int cli_run_embed(cli *c) {
     cli_error(c, "--output needs exactly one mesh");
     return CLI_USAGE;
   }
-  int rc = cli_can_write(c, c->args.value[OPT_OUTPUT]);
+  int rc = cli_can_write(c, c->args.value[OPT_OUTPUT], "ply");
   if (rc == CLI_DONE) {
     rc = embedding_request(c, &settings);
   }
@@ -257,7 +257,11 @@ int cli_run_get(cli *c) {
   }
   if (part || output) {
     char *base = NULL;
-    rc = cli_can_write(c, output);
+    rc = cli_can_write(c, output,
+                       !part                     ? "json"
+                       : !strcmp(part, "asset")  ? "glb"
+                       : !strcmp(part, "sphere") ? "ply"
+                                                 : NULL);
     if (rc == CLI_DONE) {
       rc = part ? cli_locate(c, home, c->args.operands[0], &base) : cli_find(c, c->args.operands[0], &base, &reply);
     }

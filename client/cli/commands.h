@@ -15,6 +15,7 @@ int cli_run_rm(cli *c);
 int cli_run_doctor(cli *c);
 int cli_run_view(cli *c);
 int cli_run_sign(cli *c);
+int cli_run_studio(cli *c);
 int cli_run_completions(cli *c);
 
 #endif

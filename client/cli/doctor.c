@@ -20,14 +20,35 @@ static void forget(cli *c, const cli_reply *reply) {
   free(path);
 }
 
+/* A repair that keeps less than this part of the triangles makes another shape. */
+static const double KEPT_LEAST = 0.5;
+
+/* Says what a repair would leave of the mesh. Returns whether that is most of it. */
+static int leaves_most(const cJSON *mesh, const char *path, const char *repair) {
+  double left = cli_number(mesh, "triangles"), all = cli_number(mesh, "file_triangles"), kept = left / all;
+  int removes = strstr(repair, "largest_component") != NULL;
+  char some[32], whole[32];
+  cli_count(left, some);
+  cli_count(all, whole);
+  if (removes && kept < KEPT_LEAST) {
+    printf("  --repair %s keeps only %s of %s triangles (%.0f %%): join the pieces instead, or send them one by one.\n",
+           repair, some, whole, 100 * kept);
+    return 0;
+  }
+  printf("  helps: orbmorph upload --repair %s %s\n", repair, path);
+  printf("  left: %s triangles; the file has %s\n", some, whole);
+  return 1;
+}
+
 /* Uploads the file with a repair. Returns 1 and prints the command if the daemon accepts the mesh. */
 static int try_repair(cli *c, const char *path, const char *repair) {
   cli_reply reply;
   int helps = 0;
   if (cli_upload(c, path, NULL, repair, &reply) == CLI_DONE && cli_ok(&reply)) {
-    helps = 1;
-    printf("  helps: orbmorph upload --repair %s %s\n", repair, path);
-    cli_print_repairs(reply.json);
+    helps = 1; /* or at least nothing else would be better */
+    if (leaves_most(reply.json, path, repair)) {
+      cli_print_repairs(reply.json);
+    }
     forget(c, &reply);
   }
   cli_reply_free(&reply);

@@ -21,14 +21,19 @@ static int add_options(const cli *c, cJSON *request) {
   const char *tolerance = c->args.value[OPT_TOLERANCE], *triangles = c->args.value[OPT_MAX_TRIANGLES];
   double x;
   long n;
+  const char *align = c->args.value[OPT_ALIGN];
+  if (align && !c->args.value[OPT_LANDMARKS] && (!strcmp(align, "pin") || !strcmp(align, "rbf"))) {
+    cli_error(c, "--align %s needs --landmarks", align);
+    return CLI_USAGE;
+  }
   set_text(c, request, OPT_ALIGN, "align.method");
   set_text(c, request, OPT_REMESH, "remesh.method");
   set_text(c, request, OPT_ANIMATION, "asset.animation");
   set_text(c, request, OPT_FIT, "asset.fit");
   set_text(c, request, OPT_PATH, "asset.path");
   if (tolerance) {
-    if (!cli_decimal(tolerance, &x) || !(x >= 1e-9 && x <= 1)) {
-      cli_error(c, "--tolerance takes a number from 1e-9 to 1, not '%s'", tolerance);
+    if (!cli_fraction(tolerance, &x) || !(x >= 1e-9 && x <= 1)) {
+      cli_error(c, "--tolerance takes a number from 1e-9 to 1, or a percentage such as 0.1%%, not '%s'", tolerance);
       return CLI_USAGE;
     }
     cli_set_member(request, "remesh.tolerance", cJSON_CreateNumber(x));
@@ -129,9 +134,9 @@ static int finish(cli *c, const cli_reply *supermesh, const char *output) {
 static int merge(cli *c, const char *output) {
   cJSON *request = NULL;
   cli_reply supermesh = {0};
-  int rc = cli_check_profile(c) ? cli_can_write(c, output) : CLI_USAGE;
+  int rc = cli_check_profile(c) ? cli_can_write(c, output, "glb") : CLI_USAGE;
   if (rc == CLI_DONE) {
-    rc = cli_can_write(c, c->args.value[OPT_REPORT]);
+    rc = cli_can_write(c, c->args.value[OPT_REPORT], "md json");
   }
   if (rc == CLI_DONE) {
     rc = make_request(c, &request);

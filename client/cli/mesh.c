@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -17,9 +18,14 @@ static int is_stored(const char *operand) {
   return (cli_is_id(operand) || cli_is_prefix(operand)) && access(operand, F_OK) != 0;
 }
 
+/* No file has such a name, unless a folder is called "http:". */
+static int is_url(const char *operand) {
+  return strncasecmp(operand, "http://", 7) == 0 || strncasecmp(operand, "https://", 8) == 0;
+}
+
 int cli_check_mesh(const cli *c, const char *operand) {
   struct stat info;
-  if (is_stored(operand)) {
+  if (is_stored(operand) || is_url(operand)) {
     return CLI_DONE;
   }
   int there = stat(operand, &info) == 0, folder = there && S_ISDIR(info.st_mode);
@@ -62,6 +68,31 @@ int cli_upload(cli *c, const char *path, const char *name, const char *repair, c
   return rc;
 }
 
+static int fetch(cli *c, const char *url, const char *name, const char *repair, cli_reply *reply) {
+  const char *const members[][2] = {
+      {"url", url}, {"name", name}, {"repair", repair}, {"format", c->args.value[OPT_FORMAT]}};
+  cJSON *body = cJSON_CreateObject();
+  for (size_t i = 0; i < sizeof members / sizeof members[0]; i++) {
+    if (members[i][1]) {
+      cJSON_AddStringToObject(body, members[i][0], members[i][1]);
+    }
+  }
+  char *text = cJSON_PrintUnformatted(body);
+  cli_request request = {.method = "POST", .path = "/v1/meshes", .json = text};
+  int rc = cli_send(c, &request, reply);
+  if (rc == CLI_DONE && reply->status == 202) {
+    rc = cli_await(c, reply);
+  }
+  cJSON_free(text);
+  cJSON_Delete(body);
+  return rc;
+}
+
+int cli_take_in(cli *c, const char *operand, const char *name, const char *repair, cli_reply *reply) {
+  memset(reply, 0, sizeof *reply);
+  return is_url(operand) ? fetch(c, operand, name, repair, reply) : cli_upload(c, operand, name, repair, reply);
+}
+
 static void note_mesh(const cli *c, const char *operand, const cli_reply *reply) {
   char triangles[32];
   cli_count(cli_number(reply->json, "triangles"), triangles);
@@ -76,7 +107,7 @@ static void note_mesh(const cli *c, const char *operand, const cli_reply *reply)
 
 int cli_mesh_of(cli *c, const char *operand, cli_mesh *out) {
   cli_reply reply = {0};
-  int rc, known = is_stored(operand);
+  int rc, known = is_stored(operand), named = known || is_url(operand);
   memset(out, 0, sizeof *out);
   if (known) {
     char *path = NULL;
@@ -86,7 +117,7 @@ int cli_mesh_of(cli *c, const char *operand, cli_mesh *out) {
     }
     free(path);
   } else {
-    rc = cli_upload(c, operand, NULL, c->args.value[OPT_REPAIR], &reply);
+    rc = cli_take_in(c, operand, NULL, c->args.value[OPT_REPAIR], &reply);
   }
   if (rc == CLI_DONE && !cli_ok(&reply)) {
     rc = cli_refused(c, operand, &reply);
@@ -100,7 +131,7 @@ int cli_mesh_of(cli *c, const char *operand, cli_mesh *out) {
       note_mesh(c, operand, &reply);
     }
     out->id = cli_text("%s", cli_string(reply.json, "id", ""));
-    out->name = known ? cli_text("%s", cli_string(reply.json, "name", "")) : cli_base_name(operand);
+    out->name = named ? cli_text("%s", cli_string(reply.json, "name", "")) : cli_base_name(operand);
   }
   cli_reply_free(&reply);
   return rc;

@@ -16,12 +16,14 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_JSON] = {"json", 0, NULL, NULL, "print the daemon's JSON"},
     [OPT_QUIET] = {"quiet", 'q', NULL, NULL, "print no progress and no notes"},
     [OPT_HELP] = {"help", 'h', NULL, NULL, "show this help"},
-    [OPT_OUTPUT] = {"output", 'o', "FILE", NULL, "write the result to FILE; - is standard output"},
+    [OPT_OUTPUT] = {"output", 'o', "FILE", NULL,
+                    "write the result to FILE, whose ending must fit; - is standard output"},
     [OPT_REPORT] = {"report", 0, "FILE", NULL, "also write a report: Markdown if FILE ends in .md, else JSON"},
     [OPT_LANDMARKS] = {"landmarks", 'l', "FILE", NULL, "read landmarks from FILE, or find them with auto"},
     [OPT_ALIGN] = {"align", 0, "METHOD", "pin rbf rotate auto", "alignment method"},
     [OPT_REMESH] = {"remesh", 0, "METHOD", "adaptive overlay subdivision convex-hull", "remeshing method"},
-    [OPT_TOLERANCE] = {"tolerance", 't', "X", NULL, "allowed error, as a fraction of each shape's diagonal"},
+    [OPT_TOLERANCE] = {"tolerance", 't', "X", NULL,
+                       "allowed error as a fraction of each shape's diagonal, such as 0.001 or 0.1%"},
     [OPT_MAX_TRIANGLES] = {"max-triangles", 'n', "N", NULL, "make at most N triangles"},
     [OPT_NO_NORMALS] = {"no-normals", 0, NULL, NULL, "write no normals into the asset"},
     [OPT_ANIMATION] = {"animation", 0, "KIND", "pingpong none", "animation in the asset"},
@@ -29,7 +31,7 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_PATH] = {"path", 0, "KIND", "linear rigid", "path of the vertices between shapes"},
     [OPT_SET] = {"set", 0, "NAME=VALUE", NULL, "set any member of the request, such as align.options.radius=0.5"},
     [OPT_NO_WAIT] = {"no-wait", 0, NULL, NULL, "print the job and do not wait for it"},
-    [OPT_NAME] = {"name", 0, "NAME", NULL, "name of the mesh; default: the file name"},
+    [OPT_NAME] = {"name", 0, "NAME", NULL, "name of the mesh; default: the name of the file"},
     [OPT_REPAIR] = {"repair", 0, "LIST", "safe none fill_holes largest_component",
                     "allowed repairs, separated by commas"},
     [OPT_FORMAT] = {"format", 0, "FORMAT", "obj off ply stl gltf glb",
@@ -43,8 +45,8 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_PART] = {"part", 0, "PART", "file asset sphere", "download the data of a mesh, a supermesh or an embedding"},
     [OPT_POSES] = {"poses", 0, "N", NULL, "poses in each row; default: 5"},
     [OPT_SIZE] = {"size", 0, "PIXELS", NULL, "width and height of a pose; default: 320"},
-    [OPT_UP] = {"up", 0, "AXIS", "y z", "axis that points up; default: y"},
-    [OPT_YAW] = {"yaw", 0, "DEGREES", NULL, "turn around the up axis; default: 30"},
+    [OPT_UP] = {"up", 0, "AXIS", "auto y z x -y -z -x", "axis that points up; default: auto"},
+    [OPT_YAW] = {"yaw", 0, "DEGREES", NULL, "turn around the up axis; default: where the largest side shows"},
     [OPT_PITCH] = {"pitch", 0, "DEGREES", NULL, "look from above; default: 15"},
     [OPT_WIRE] = {"wire", 0, NULL, NULL, "draw the edges of the triangles"},
     [OPT_INSIDE] = {"inside", 0, NULL, NULL, "paint triangles seen from inside red"},
@@ -52,6 +54,8 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_KEY] = {"key", 'k', "KEY:SECRET", NULL, "signing key; default: $ORBMORPH_KEY"},
     [OPT_EXPIRES] = {"expires", 0, "TIME", NULL, "time until the signature expires, such as 30d, 12h or 90m"},
     [OPT_PROFILE] = {"profile", 0, "PROFILE", "float quantized meshopt", "profile of the downloaded asset"},
+    [OPT_DATA] = {"data", 0, "DIR", NULL, "data folder; default: ~/.local/share/orbmorph"},
+    [OPT_NO_OPEN] = {"no-open", 0, NULL, NULL, "print the address and open no browser"},
 };
 
 static int find_long(const cli_command *command, const char *text, size_t length) {
@@ -247,6 +251,7 @@ void cli_help(FILE *out, const cli_commands *commands) {
       "  $ orbmorph morph dog.obj giraffe.off --landmarks dog-giraffe.json -o out.glb\n"
       "  $ orbmorph view out.glb --frames 60 -o out.png\n"
       "  $ orbmorph doctor scan.stl\n"
+      "  $ orbmorph studio\n"
       "\n'orbmorph COMMAND --help' lists the options of a command; 'orbmorph --version' prints the version.\n"
       "Environment: ORBMORPH_SERVER (address of the daemon), ORBMORPH_TOKEN (token, if the daemon requires one).\n"
       "Exit status: 0 success, 1 refused by the daemon or failed job, 2 usage or file error, 3 daemon unreachable.\n",

@@ -45,6 +45,8 @@ typedef enum cli_option_id {
   OPT_KEY,
   OPT_EXPIRES,
   OPT_PROFILE,
+  OPT_DATA,
+  OPT_NO_OPEN,
   OPT_COUNT
 } cli_option_id;
 

@@ -2,11 +2,13 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "problem.h"
 #include "terminal.h"
 #include "text.h"
+#include "warnings.h"
 
 static const cJSON *member(const cJSON *object, const char *name) {
   return cJSON_GetObjectItemCaseSensitive(object, name);
@@ -121,6 +123,7 @@ void cli_print_supermesh(const cJSON *supermesh) {
     printf("  not in the asset: %d %s of the files, which a report names (--report)\n", dropped,
            dropped == 1 ? "part" : "parts");
   }
+  cli_warnings(stdout, "  warning: ", supermesh);
   printf("  time: %.3g s\n", cli_number(member(supermesh, "timings_ms"), "total") / 1000);
 }
 
@@ -179,6 +182,18 @@ static void markdown_numbers(FILE *out, const char *title, const cJSON *object) 
   fputc('\n', out);
 }
 
+/* A section of the warnings, if there are any; collected first, to know that. */
+static void markdown_warnings(FILE *out, const cJSON *supermesh) {
+  char *text = NULL;
+  size_t size = 0;
+  FILE *memory = open_memstream(&text, &size);
+  int count = memory ? cli_warnings(memory, "* ", supermesh) : 0;
+  if (memory && fclose(memory) == 0 && count) {
+    fprintf(out, "## Warnings\n\n%s\n", text);
+  }
+  free(text);
+}
+
 static void markdown(FILE *out, const cJSON *supermesh) {
   char vertices[32], triangles[32];
   const cJSON *shape, *landmark, *certificate = member(supermesh, "certificate");
@@ -191,6 +206,7 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   fprintf(out, "One mesh of %s vertices and %s triangles, %s, genus %.0f. Resource `%s`, made by %s.\n\n", vertices,
           triangles, cJSON_IsTrue(member(certificate, "closed")) ? "closed" : "not closed",
           cli_number(certificate, "genus"), cli_string(supermesh, "url", "?"), cli_string(supermesh, "engine", "?"));
+  markdown_warnings(out, supermesh);
   markdown_shapes(out, supermesh);
   if (cJSON_GetArraySize(member(supermesh, "landmarks"))) {
     const char *exact = cJSON_IsTrue(member(certificate, "landmarks_exact"))

@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -69,10 +70,30 @@ static char *part_of(const char *file) {
   return cli_text("%s.part-%ld", file, (long)getpid());
 }
 
-int cli_can_write(const cli *c, const char *file) {
+/* Whether the name has no ending, or one of these. */
+static int fits(const char *file, const char *endings) {
+  const char *slash = strrchr(file, '/'), *name = slash ? slash + 1 : file, *dot = strrchr(name, '.');
+  for (const char *word = endings; word && dot && dot > name && *word; word += strspn(word, " ")) {
+    size_t length = strcspn(word, " ");
+    if (strlen(dot + 1) == length && !strncasecmp(dot + 1, word, length)) {
+      return 1;
+    }
+    word += length;
+  }
+  return !endings || !dot || dot == name;
+}
+
+int cli_can_write(const cli *c, const char *file, const char *endings) {
   struct stat info;
   if (!file || is_stream(file)) {
     return CLI_DONE;
+  }
+  if (!fits(file, endings)) {
+    char *base = cli_base_name(file);
+    cli_error(c, "%s: this command cannot write that format; name the file %s.%.*s", file, base,
+              (int)strcspn(endings, " "), endings);
+    free(base);
+    return CLI_USAGE;
   }
   char *part = part_of(file);
   FILE *out = NULL;
@@ -153,8 +174,23 @@ int cli_download(cli *c, const char *path, const char *file) {
   return rc;
 }
 
+int cli_await(cli *c, cli_reply *reply) {
+  char *result = NULL;
+  int rc = cli_wait(c, reply->json, &result);
+  cli_reply_free(reply);
+  if (rc == CLI_DONE) {
+    cli_request get = {.method = "GET", .path = result, .patient = 1};
+    rc = cli_send(c, &get, reply);
+    if (rc == CLI_DONE && !cli_ok(reply)) {
+      rc = cli_refused(c, NULL, reply);
+    }
+  }
+  free(result);
+  return rc;
+}
+
 int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource) {
-  char *text = cJSON_PrintUnformatted(body), *result = NULL;
+  char *text = cJSON_PrintUnformatted(body);
   cli_request request = {.method = "POST", .path = path, .json = text};
   int rc = cli_send(c, &request, resource);
   if (rc == CLI_DONE && !cli_ok(resource)) {
@@ -167,17 +203,8 @@ int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource) {
     }
     cli_reply_free(resource);
   } else if (rc == CLI_DONE && resource->status == 202) {
-    rc = cli_wait(c, resource->json, &result);
-    cli_reply_free(resource);
-    if (rc == CLI_DONE) {
-      cli_request get = {.method = "GET", .path = result, .patient = 1};
-      rc = cli_send(c, &get, resource);
-      if (rc == CLI_DONE && !cli_ok(resource)) {
-        rc = cli_refused(c, NULL, resource);
-      }
-    }
+    rc = cli_await(c, resource);
   }
-  free(result);
   free(text);
   return rc;
 }

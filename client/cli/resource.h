@@ -23,9 +23,13 @@ int cli_not_found(cli *c, const char *kind, const char *operand, const cli_reply
  * resource->json stays NULL. */
 int cli_make(cli *c, const char *path, cJSON *body, cli_reply *resource);
 
-/* Tries whether a file can be written, before work that would be lost: NULL and "-" can. CLI_DONE, or CLI_USAGE after
- * printing why. */
-int cli_can_write(const cli *c, const char *file);
+/* Waits for the job in a reply and fetches what it made in place of the job. */
+int cli_await(cli *c, cli_reply *reply);
+
+/* Checks before any work that a file can be written and that its name fits what will be in it: it ends in one of the
+ * `endings`, such as "glb" or "md json" (NULL: any), or has no ending. NULL, "-", devices and pipes pass. Returns
+ * CLI_DONE, or CLI_USAGE after printing the error. */
+int cli_can_write(const cli *c, const char *file, const char *endings);
 /* Whether --profile is a known one; prints the error. */
 int cli_check_profile(cli *c);
 /* The path of an asset in the profile that --profile names. The caller frees it. */

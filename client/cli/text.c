@@ -133,3 +133,13 @@ int cli_decimal(const char *text, double *out) {
   *out = strtod(text, &end);
   return *text && !*end && isfinite(*out);
 }
+
+int cli_fraction(const char *text, double *out) {
+  char *end;
+  *out = strtod(text, &end);
+  if (end > text && !strcmp(end, "%")) {
+    *out /= 100;
+    end++;
+  }
+  return *text && !*end && isfinite(*out);
+}

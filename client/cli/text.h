@@ -22,5 +22,6 @@ void cli_count(double value, char out[32]);               /* 12345 → 12,345 */
 /* Parse the whole text; 0 if it is not a number, or not in the range. */
 int cli_whole_number(const char *text, long least, long most, long *out);
 int cli_decimal(const char *text, double *out);
+int cli_fraction(const char *text, double *out); /* "0.05" or "5%" */
 
 #endif

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "view_aim.h"
 #include "view_canvas.h"
 #include "view_mesh.h"
 #include "view_movie.h"
@@ -14,7 +15,7 @@ enum { MAX_SIDE = 16384, FRAME_MILLISECONDS = 50 };
 #define MAX_MOVIE_BYTES ((size_t)1 << 30)
 
 void view_defaults(view_options *options) {
-  *options = (view_options){.poses = 5, .size = 320, .up = 'y', .yaw = 30, .pitch = 15};
+  *options = (view_options){.poses = 5, .size = 320, .yaw = NAN, .pitch = 15};
 }
 
 static int no_memory(char *error, size_t error_size) {
@@ -110,7 +111,10 @@ int view_file(const char *glb, const char *png, const view_options *options, cha
   if (view_mesh_read(glb, &mesh, error, error_size) != 0) {
     return -1;
   }
+  view_options aimed = *options;
   view_vertex *vertices = malloc(mesh.vertex_count * sizeof *vertices);
+  view_aim(&mesh, &aimed);
+  options = &aimed;
   int rc = !vertices         ? no_memory(error, error_size)
            : options->frames ? draw_movie(&mesh, png, options, vertices, error, error_size)
                              : draw_sheet(&mesh, png, options, vertices, error, error_size);

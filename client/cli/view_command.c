@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "commands.h"
+#include "resource.h"
 #include "terminal.h"
 #include "text.h"
 #include "view.h"
@@ -35,8 +36,7 @@ int cli_run_view(cli *c) {
   char error[512] = "";
   view_options options;
   view_defaults(&options);
-  if (up && strcmp(up, "y") != 0 && strcmp(up, "z") != 0) {
-    cli_error(c, "--up is y or z, not '%s'", up);
+  if (cli_can_write(c, output, "png apng") != CLI_DONE) {
     return CLI_USAGE;
   }
   if (!whole(c, OPT_POSES, 2, 100, &options.poses) || !whole(c, OPT_SIZE, 16, 4096, &options.size) ||
@@ -44,7 +44,9 @@ int cli_run_view(cli *c) {
       !angle(c, OPT_PITCH, &options.pitch)) {
     return CLI_USAGE;
   }
-  options.up = up ? up[0] : options.up;
+  if (up && strcmp(up, "auto") != 0) {
+    options.up = up[0] == '-' ? (char)(up[1] - 'a' + 'A') : up[0];
+  }
   options.wire = c->args.value[OPT_WIRE] != NULL;
   options.inside = c->args.value[OPT_INSIDE] != NULL;
   char *base = cli_base_name(glb), *png = output ? cli_text("%s", output) : cli_text("%s.png", base);

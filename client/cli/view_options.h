@@ -6,8 +6,8 @@ typedef struct view_options {
   int poses;    /* columns of a sheet: evenly spaced weights from one shape to the next, both included */
   int frames;   /* 0: a sheet; else the number of frames of an animated PNG that loops */
   int size;     /* width and height of a pose in pixels */
-  char up;      /* 'y' as in glTF, or 'z' */
-  double yaw;   /* degrees around the up axis */
+  char up;      /* the axis that points up: 'x', 'y' or 'z', or in capitals its opposite; 0: view_aim() decides */
+  double yaw;   /* degrees around the up axis; NAN: view_aim() decides */
   double pitch; /* degrees from above */
   int wire;     /* draw the edges of the triangles */
   int inside;   /* paint triangles seen from inside red */

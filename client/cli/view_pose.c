@@ -1,6 +1,23 @@
 #include "view_pose.h"
 
 #include <math.h>
+#include <string.h>
+
+void view_upright(char up, view_turn out) {
+  static const struct {
+    char up;
+    view_turn turn;
+  } turns[] = {
+      {'y', {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},  {'Y', {{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}},
+      {'z', {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}}, {'Z', {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}}},
+      {'x', {{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}}, {'X', {{0, 1, 0}, {-1, 0, 0}, {0, 0, 1}}},
+  };
+  for (size_t i = 0; i < sizeof turns / sizeof turns[0]; i++) {
+    if (i == 0 || turns[i].up == up) {
+      memcpy(out, turns[i].turn, sizeof(view_turn));
+    }
+  }
+}
 
 /* The rows of out: right, up, towards the viewer. */
 static void view_axes(const view_options *options, double out[3][3]) {
@@ -9,9 +26,11 @@ static void view_axes(const view_options *options, double out[3][3]) {
   double to[3] = {sin(yaw) * cos(pitch), sin(pitch), cos(yaw) * cos(pitch)};
   double up[3] = {-sin(yaw) * sin(pitch), cos(pitch), -cos(yaw) * sin(pitch)};
   const double *rows[3] = {right, up, to};
+  view_turn turn;
+  view_upright(options->up, turn);
   for (int r = 0; r < 3; r++) {
-    for (int c = 0; c < 3; c++) { /* z up: x stays, y ↦ −z, z ↦ y */
-      out[r][c] = options->up == 'z' ? (c == 0 ? rows[r][0] : c == 1 ? -rows[r][2] : rows[r][1]) : rows[r][c];
+    for (int c = 0; c < 3; c++) {
+      out[r][c] = rows[r][0] * turn[0][c] + rows[r][1] * turn[1][c] + rows[r][2] * turn[2][c];
     }
   }
 }

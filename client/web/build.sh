@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 stamp=dist/.built
-if [ -f "$stamp" ] && [ -z "$(find src public index.html package-lock.json vite.config.ts tsconfig.json ../js/src \
+if [ -f "$stamp" ] && [ -z "$(find src public welcome index.html package-lock.json vite.config.ts tsconfig.json ../js/src \
     ../../tests/samples -newer "$stamp" -print -quit 2>/dev/null)" ]; then
   exit 0
 fi

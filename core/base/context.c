@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "base/hash.h"
 #include "base/parallel.h"
 #include "base/state.h"
 
@@ -43,6 +44,7 @@ orb_status orb_context_create(const orb_context_options *options, orb_context **
   if (ctx->options.threads > MAX_THREADS) {
     ctx->options.threads = MAX_THREADS;
   }
+  orb_hash_key(ctx->hash_key);
   orb_error_reset(&ctx->error);
   pthread_mutex_init(&ctx->error_lock, NULL);
   pthread_mutex_init(&ctx->progress_lock, NULL);

@@ -18,6 +18,7 @@ struct orb_context {
   pthread_mutex_t progress_lock;
   const char *stage;     /* the only stage that is reported; NULL: any */
   struct orb_pool *pool; /* created by the first parallel loop */
+  uint64_t hash_key[2];  /* of orb_hash() */
 };
 
 #endif

@@ -9,6 +9,7 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "base/grow.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "mesh/dropped.h"
 #include "mesh/polygon.h"
@@ -199,12 +200,8 @@ orb_status orb_build_use_material(orb_build *build, const unsigned char *name, s
   }
   char key[ORB_NAME_MAX] = {0};
   memcpy(key, name, length < sizeof key - 1 ? length : sizeof key - 1);
-  uint32_t hash = 2166136261u; /* FNV-1a */
-  for (const char *c = key; *c; c++) {
-    hash = (hash ^ (unsigned char)*c) * 16777619u;
-  }
   int32_t *slots = build->material_slots;
-  uint32_t slot = hash % MATERIAL_SLOTS;
+  uint64_t slot = orb_hash(build->ctx, key, strlen(key)) % MATERIAL_SLOTS;
   for (; slots[slot]; slot = (slot + 1) % MATERIAL_SLOTS) {
     if (strcmp(build->materials[slots[slot] - 1].name, key) == 0) {
       build->material = slots[slot] - 1;

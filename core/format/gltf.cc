@@ -32,7 +32,12 @@ namespace gltf {
 
 namespace {
 
-const size_t VALUES_MAX = 1000000; /* of a document: cJSON takes 64 bytes or more for each */
+const size_t VALUES_MAX = 1000000; /* of a document */
+const size_t VALUE_BYTES = 96;     /* that cJSON takes for each, with the overhead of malloc(), and a list of them */
+const int MEMBERS_MAX = 256;       /* of an object: each look-up passes all of them */
+
+/* Looking up the members of a primitive and of its accessors, in components decoded; a mesh may be shown often. */
+const size_t WORK_OF_PRIMITIVE = 1024;
 
 struct Reader {
   orb_context *ctx;
@@ -44,7 +49,7 @@ struct Reader {
   Materials materials;
 
   Reader(orb_context *context, size_t size, const cJSON *document)
-      : ctx(context), file_size(size), doc(document), materials(context, &build, &buffers, size) {
+      : ctx(context), file_size(size), doc(document), buffers(context), materials(context, &build, &buffers, size) {
     orb_build_init(&build, ctx);
   }
   ~Reader() { orb_build_free(&build); }
@@ -59,10 +64,11 @@ struct Reader {
     must(orb_build_face_end(&build, 3));
   }
 
-  std::vector<double> indices_of(const cJSON *primitive, size_t vertices) const {
+  Numbers indices_of(const cJSON *primitive, size_t vertices) const {
     int64_t index = whole(primitive, "indices", NONE);
-    std::vector<double> out;
+    Numbers out{Charged<double>(ctx)};
     if (index == NONE) {
+      buffers.spend(vertices);
       out.resize(vertices);
       for (size_t i = 0; i < vertices; i++) {
         out[i] = static_cast<double>(i);
@@ -80,7 +86,7 @@ struct Reader {
   }
 
   void add_faces(const cJSON *primitive, int64_t mode, int64_t base, size_t vertices, bool mirrored) {
-    std::vector<double> index = indices_of(primitive, vertices);
+    Numbers index = indices_of(primitive, vertices);
     build.material = static_cast<int32_t>(whole(primitive, "material", NONE));
     if (build.material >= static_cast<int32_t>(build.material_count)) {
       malformed("A glTF primitive refers to a missing material.");
@@ -111,7 +117,7 @@ struct Reader {
       return;
     }
     size_t width = 0;
-    std::vector<double> position = buffers.accessor(whole(member(primitive, "attributes"), "POSITION", NONE), &width);
+    Numbers position = buffers.accessor(whole(member(primitive, "attributes"), "POSITION", NONE), &width);
     if (width != 3) {
       malformed("The glTF attribute POSITION does not have three components.");
     }
@@ -121,9 +127,9 @@ struct Reader {
       throw Fault{ORB_E_TOO_LARGE,
                   "The glTF file shows its meshes so often that they need more memory than the file justifies."};
     }
-    std::vector<double> normal = buffers.attribute(primitive, "NORMAL", count, 3, 3, &width);
-    std::vector<double> texcoord = buffers.attribute(primitive, texcoord_of(primitive).c_str(), count, 2, 2, &width);
-    std::vector<double> color = buffers.attribute(primitive, "COLOR_0", count, 3, 4, &color_width);
+    Numbers normal = buffers.attribute(primitive, "NORMAL", count, 3, 3, &width);
+    Numbers texcoord = buffers.attribute(primitive, texcoord_of(primitive).c_str(), count, 2, 2, &width);
+    Numbers color = buffers.attribute(primitive, "COLOR_0", count, 3, 4, &color_width);
     int64_t base = build.vertices;
     for (size_t i = 0; i < count; i++) {
       double p[3], n[3] = {0, 0, 0}, uv[2] = {0, 0};
@@ -162,21 +168,10 @@ struct Reader {
     }
   }
 
-  void check_extensions() const {
-    for (const cJSON *name : array_of(doc, "extensionsRequired")) {
-      for (const char *packed : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}) {
-        if (cJSON_IsString(name) && std::strcmp(name->valuestring, packed) == 0) {
-          malformed(std::string("The glTF file is compressed with ") + packed + "; export it without compression.");
-        }
-      }
-    }
-  }
-
   void read(Bytes chunk, orb_mesh *out) {
     if (!cJSON_IsObject(doc) || text_of(member(doc, "asset"), "version").compare(0, 2, "2.") != 0) {
       malformed("The file is not glTF 2.0.");
     }
-    check_extensions();
     meshes = array_of(doc, "meshes");
     buffers.load(doc, chunk, file_size);
     materials.load(doc);
@@ -200,6 +195,7 @@ struct Reader {
         if (!cJSON_IsObject(primitive)) {
           malformed("A glTF primitive is not an object.");
         }
+        buffers.spend(WORK_OF_PRIMITIVE);
         add_primitive(primitive, matrix, visible, normals, texcoords);
         must(orb_context_check(ctx));
       }
@@ -271,6 +267,28 @@ size_t count_values(const unsigned char *text, size_t size) {
   return count;
 }
 
+/* Refuses objects whose look-ups would cost too much. Nobody looks into "extras", and into "extensions" only once. */
+void check_members(const cJSON *doc) {
+  std::vector<const cJSON *> above; /* at most as deep as cJSON parses, 1,000 */
+  auto is = [](const cJSON *item, const char *name) { return item->string && std::strcmp(item->string, name) == 0; };
+  for (const cJSON *item = doc->child; item;) {
+    if (item->child && !is(item, "extras") && !is(item, "extensions")) {
+      if (cJSON_IsObject(item) && cJSON_GetArraySize(item) > MEMBERS_MAX) {
+        throw Fault{ORB_E_TOO_LARGE,
+                    "An object of the glTF file has more than " + std::to_string(MEMBERS_MAX) + " members."};
+      }
+      above.push_back(item);
+      item = item->child;
+      continue;
+    }
+    while (!item->next && !above.empty()) {
+      item = above.back();
+      above.pop_back();
+    }
+    item = item->next;
+  }
+}
+
 /* The JSON text and the binary chunk of a GLB. */
 Bytes split_glb(const unsigned char *bytes, size_t size, Bytes *chunk) {
   if (size < 20) {
@@ -303,6 +321,10 @@ void read_document(orb_context *ctx, const unsigned char *bytes, size_t size, bo
   if (values > VALUES_MAX) {
     throw Fault{ORB_E_TOO_LARGE, "The JSON of the glTF file has too many values."};
   }
+  /* The parser's memory is not charged to the context; a block of that size, never touched, stands for it. A text may
+   * be there three times and a half: as parsed, as a data: URI and, decoded, as a buffer and as an image. */
+  std::vector<char, Charged<char>> reserve{Charged<char>(ctx)};
+  reserve.reserve(4 * text.size + VALUE_BYTES * values);
   const char *end = nullptr;
   std::unique_ptr<cJSON, void (*)(cJSON *)> doc(
       cJSON_ParseWithLengthOpts(reinterpret_cast<const char *>(text.at), text.size, &end, 0), cJSON_Delete);
@@ -314,17 +336,13 @@ void read_document(orb_context *ctx, const unsigned char *bytes, size_t size, bo
     (void)orb_build_malformed(ctx, 0, at, "The JSON of the glTF file is not valid.");
     throw Passed{ORB_E_MALFORMED_MESH};
   }
+  check_members(doc.get());
   Reader reader(ctx, size, doc.get());
   reader.read(chunk, out);
 }
 
 /* No exception leaves it. */
 orb_status read_either(orb_context *ctx, const unsigned char *bytes, size_t size, bool binary, orb_mesh *out) {
-  /* The parser's memory is not charged to the context; a block of about its size, never touched, stands for it. */
-  void *reserve = orb_alloc(ctx, size, binary ? 1 : 4);
-  if (!reserve) {
-    return ORB_E_NO_MEMORY;
-  }
   orb_status status = ORB_OK;
   try {
     read_document(ctx, bytes, size, binary, out);
@@ -339,7 +357,6 @@ orb_status read_either(orb_context *ctx, const unsigned char *bytes, size_t size
   } catch (const std::exception &error) {
     status = orb_build_malformed(ctx, 0, static_cast<int64_t>(size), "The glTF file is not valid: %s", error.what());
   }
-  orb_free(ctx, reserve);
   return status;
 }
 

@@ -8,7 +8,11 @@ namespace gltf {
 
 namespace {
 
-const size_t STRIDE_MAX = 1u << 20; /* bytes between elements that are accepted; glTF itself allows 252 at most */
+const size_t STRIDE_MAX = 1u << 20;  /* bytes between elements that are accepted; glTF itself allows 252 at most */
+const size_t CHECK_EVERY = 1u << 20; /* elements between two checks for cancellation */
+
+/* Components that may be decoded in all: exporters let 50 primitives share an accessor, not a thousand. */
+const size_t WORK_PER_BYTE = 32, WORK_OF_ANY = 4u << 20;
 
 int component_size(int64_t type) {
   switch (type) {
@@ -49,8 +53,18 @@ double component(const unsigned char *p, int64_t type, bool normalized) {
 
 }  // namespace
 
+void Buffers::spend(size_t work) const {
+  if (work > work_left_) {
+    throw Fault{ORB_E_TOO_LARGE,
+                "The glTF file uses its accessors so often that reading it takes more work than its "
+                "size justifies; export each mesh once."};
+  }
+  work_left_ -= work;
+}
+
 void Buffers::load(const cJSON *doc, Bytes chunk, size_t file_size) {
   file_size_ = file_size;
+  work_left_ = WORK_PER_BYTE * file_size + WORK_OF_ANY;
   accessors_ = array_of(doc, "accessors");
   views_ = array_of(doc, "bufferViews");
   for (const cJSON *buffer : array_of(doc, "buffers")) {
@@ -69,6 +83,10 @@ void Buffers::load(const cJSON *doc, Bytes chunk, size_t file_size) {
       malformed("The glTF file keeps its data in another file (" + uri.substr(0, 80) +
                 "); send a GLB, or a glTF file with embedded data.");
     }
+    if (uri.empty() && is_fallback(buffer)) {
+      buffers_.push_back(Bytes()); /* its views are compressed */
+      continue;
+    }
     if (bytes.size < length) {
       malformed("A glTF buffer announces " + std::to_string(length) + " bytes but has " + std::to_string(bytes.size) +
                 ".");
@@ -76,10 +94,18 @@ void Buffers::load(const cJSON *doc, Bytes chunk, size_t file_size) {
     bytes.size = length;
     buffers_.push_back(bytes);
   }
+  auto buffer = [&](int64_t index) {
+    return index >= 0 && index < static_cast<int64_t>(buffers_.size()) ? buffers_[static_cast<size_t>(index)] : Bytes();
+  };
+  packed_.load(
+      doc, buffer, [&](int64_t index) { return view(index); }, file_size);
 }
 
 Bytes Buffers::view(int64_t index) const {
   const cJSON *v = element(views_, index, "buffer view");
+  if (const std::vector<unsigned char> *bytes = packed_.view(index)) {
+    return Bytes{bytes->data(), bytes->size()};
+  }
   int64_t buffer = whole(v, "buffer", NONE);
   if (buffer < 0 || buffer >= static_cast<int64_t>(buffers_.size())) {
     malformed("A glTF buffer view refers to a missing buffer.");
@@ -95,7 +121,7 @@ Bytes Buffers::view(int64_t index) const {
 
 /* Reads `count` elements of `width` components from a view into `out`. */
 void Buffers::read_elements(int64_t view_index, size_t offset, size_t stride, int64_t type, bool normalized,
-                            size_t count, size_t width, std::vector<double> &out) const {
+                            size_t count, size_t width, Numbers &out) const {
   size_t size = static_cast<size_t>(component_size(type)), packed = size * width;
   if (count == 0) {
     return;
@@ -106,8 +132,12 @@ void Buffers::read_elements(int64_t view_index, size_t offset, size_t stride, in
       (count - 1) > (bytes.size - offset - packed) / stride) {
     malformed("A glTF accessor reaches beyond its buffer view.");
   }
+  spend(count * width);
   out.resize(count * width);
   for (size_t i = 0; i < count; i++) {
+    if (i % CHECK_EVERY == 0) {
+      must(orb_context_check(ctx_));
+    }
     const unsigned char *p = bytes.at + offset + i * stride;
     for (size_t k = 0; k < width; k++) {
       out[i * width + k] = component(p + k * size, type, normalized);
@@ -116,10 +146,10 @@ void Buffers::read_elements(int64_t view_index, size_t offset, size_t stride, in
 }
 
 void Buffers::apply_sparse(const cJSON *sparse, int64_t type, bool normalized, size_t count, size_t width,
-                           std::vector<double> &out) const {
+                           Numbers &out) const {
   const cJSON *indices = member(sparse, "indices"), *values = member(sparse, "values");
   size_t changed = static_cast<size_t>(whole(sparse, "count", 0));
-  std::vector<double> where, what;
+  Numbers where{Charged<double>(ctx_)}, what{Charged<double>(ctx_)};
   read_elements(whole(indices, "bufferView", NONE), static_cast<size_t>(whole(indices, "byteOffset", 0)), 0,
                 whole(indices, "componentType", 0), false, changed, 1, where);
   read_elements(whole(values, "bufferView", NONE), static_cast<size_t>(whole(values, "byteOffset", 0)), 0, type,
@@ -134,8 +164,12 @@ void Buffers::apply_sparse(const cJSON *sparse, int64_t type, bool normalized, s
   }
 }
 
-std::vector<double> Buffers::accessor(int64_t index, size_t *width) const {
+Numbers Buffers::accessor(int64_t index, size_t *width) const {
   const cJSON *a = element(accessors_, index, "accessor");
+  if (const Packed::Values *values = packed_.accessor(index)) {
+    *width = values->width;
+    return values->list;
+  }
   std::string shape = text_of(a, "type");
   *width = shape == "SCALAR" ? 1 : shape == "VEC2" ? 2 : shape == "VEC3" ? 3 : shape == "VEC4" ? 4 : 0;
   if (*width == 0) {
@@ -144,12 +178,13 @@ std::vector<double> Buffers::accessor(int64_t index, size_t *width) const {
   int64_t type = whole(a, "componentType", 0), source = whole(a, "bufferView", NONE);
   size_t count = static_cast<size_t>(whole(a, "count", 0));
   bool normalized = cJSON_IsTrue(member(a, "normalized"));
-  std::vector<double> out;
+  Numbers out{Charged<double>(ctx_)};
   component_size(type);
   if (source == NONE) { /* zeros, which the sparse part changes */
     if (count > file_size_) {
       malformed("A glTF accessor announces more elements than the file could hold.");
     }
+    spend(count * *width);
     out.assign(count * *width, 0);
   } else {
     const cJSON *v = element(views_, source, "buffer view");
@@ -163,11 +198,11 @@ std::vector<double> Buffers::accessor(int64_t index, size_t *width) const {
   return out;
 }
 
-std::vector<double> Buffers::attribute(const cJSON *primitive, const char *name, size_t count, size_t low, size_t high,
-                                       size_t *width) const {
+Numbers Buffers::attribute(const cJSON *primitive, const char *name, size_t count, size_t low, size_t high,
+                           size_t *width) const {
   const cJSON *attributes = member(primitive, "attributes");
   int64_t index = whole(attributes, name, NONE);
-  std::vector<double> out;
+  Numbers out{Charged<double>(ctx_)};
   if (index == NONE) {
     return out;
   }

@@ -362,7 +362,7 @@ const char *Materials::load_texture(const cJSON *reference, bool is_base, orb_te
     if (is_base) {
       throw;
     }
-    return "Its image is damaged.";
+    return image_fault_[static_cast<size_t>(source)] = "Its image is damaged.";
   }
 }
 

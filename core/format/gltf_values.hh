@@ -11,6 +11,7 @@
 #include <memory>
 #include <new>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "orbmorph/context.h"
@@ -38,6 +39,33 @@ inline void must(orb_status status) {
     throw Passed{status};
   }
 }
+
+/* Memory of the context for standard containers: what they take counts in the job's budget. */
+template <typename T>
+struct Charged {
+  using value_type = T;
+  using propagate_on_container_move_assignment = std::true_type;
+  using propagate_on_container_swap = std::true_type;
+
+  orb_context *ctx;
+
+  explicit Charged(orb_context *context) : ctx(context) {}
+  template <typename U>
+  explicit Charged(const Charged<U> &other) : ctx(other.ctx) {}
+
+  T *allocate(size_t count) {
+    void *block = orb_alloc(ctx, count, sizeof(T));
+    if (!block) {
+      throw Passed{ORB_E_NO_MEMORY};
+    }
+    return static_cast<T *>(block);
+  }
+  void deallocate(T *block, size_t) { orb_free(ctx, block); }
+  bool operator==(const Charged &other) const { return ctx == other.ctx; }
+  bool operator!=(const Charged &other) const { return ctx != other.ctx; }
+};
+
+using Numbers = std::vector<double, Charged<double>>;
 
 const int64_t NONE = -1;
 

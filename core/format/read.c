@@ -3,7 +3,8 @@
  * In: read.c detects the format and calls a reader (obj.c, off.c, ply.c with ply_header.c, stl.c, gltf.cc). Readers
  * take tokens from text.h and number.h or numbers from bytes.h, and fill an orb_build (build.h), which becomes an
  * orb_mesh. gltf.cc reads primitives; gltf_accessor.cc has their data, gltf_scene.cc the nodes, gltf_material.cc the
- * materials (with texture.c), gltf_values.hh the JSON (with json_check.c).
+ * materials (with texture.c), gltf_packed.cc what is compressed, gltf_values.hh the JSON (with json_check.c). other.c
+ * names files of other kinds.
  *
  * Out: gltf_write.c writes the asset, with gltf_write_material.c, and glb_text.c for the text; material_table.c says
  * what materials may have. sphere_ply.c writes a mesh with its embedding.
@@ -12,6 +13,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "format/other.h"
 #include "format/readers.h"
 
 /* One row for each format. Of equally sure detectors the first wins, so the strict ones come first. */
@@ -60,6 +62,7 @@ orb_format orb_format_detect(const unsigned char *bytes, size_t size) {
 
 orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_format format, orb_mesh *out,
                          orb_format *format_out) {
+  int automatic = format == ORB_FORMAT_AUTO;
   memset(out, 0, sizeof *out);
   if (format == ORB_FORMAT_AUTO) {
     format = orb_format_detect(bytes, size);
@@ -69,6 +72,10 @@ orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t si
   }
   if (size == 0) {
     return orb_build_malformed(ctx, 0, 0, "The file is empty; send the bytes of a mesh file.");
+  }
+  const char *other = automatic ? orb_format_other(bytes, size) : NULL;
+  if (other) {
+    return orb_fail(ctx, ORB_E_UNKNOWN_FORMAT, "This is %s.", other);
   }
   for (int i = 0; i < READER_COUNT; i++) {
     if (READERS[i].format == format) {

@@ -2,7 +2,8 @@
  *
  * A quadrangle is cut along a diagonal that leaves both halves facing the same way; of two such diagonals, along the
  * shorter. Larger polygons lose ear after ear, never two neighbours in one round, which cuts a convex polygon into few
- * slivers. The search for points inside an ear has a budget that is linear in the number of corners. When it is spent,
+ * slivers. The search for points inside an ear has a budget that is linear in the number of corners, of this polygon
+ * and of all polygons that share the scratch. When it is spent,
  * or when a polygon crosses itself so that no ear is left, the rest becomes a fan: the result always has count − 2
  * triangles over the given corners.
  */
@@ -12,6 +13,10 @@
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
+/* Tests of a point against an ear. */
+enum { TESTS_A_CORNER = 256, TESTS_AT_LEAST = 65536 }; /* of one polygon: a small one gets all that it needs */
+static const int64_t FILE_TESTS_A_CORNER = 32, FILE_TESTS_AT_LEAST = 4 << 20; /* of all together */
+
 orb_status orb_polygon_reserve(orb_context *ctx, orb_polygon *polygon, int32_t corners) {
   if (corners <= polygon->room) {
     return ORB_OK;
@@ -20,7 +25,8 @@ orb_status orb_polygon_reserve(orb_context *ctx, orb_polygon *polygon, int32_t c
   polygon->flat = ORB_NEW(ctx, double, 2 * (size_t)corners);
   polygon->next = ORB_NEW(ctx, int32_t, corners);
   polygon->prev = ORB_NEW(ctx, int32_t, corners);
-  if (!polygon->flat || !polygon->next || !polygon->prev) {
+  polygon->turned = ORB_NEW(ctx, int32_t, corners);
+  if (!polygon->flat || !polygon->next || !polygon->prev || !polygon->turned) {
     orb_polygon_free(ctx, polygon);
     return ORB_E_NO_MEMORY;
   }
@@ -32,6 +38,7 @@ void orb_polygon_free(orb_context *ctx, orb_polygon *polygon) {
   orb_free(ctx, polygon->flat);
   orb_free(ctx, polygon->next);
   orb_free(ctx, polygon->prev);
+  orb_free(ctx, polygon->turned);
   *polygon = (orb_polygon){0};
 }
 
@@ -96,20 +103,39 @@ static void cut_quadrangle(const double *flat, int32_t *triangles) {
   }
 }
 
-/* Whether no other corner lies in the ear a b c. */
-static int ear_is_free(const orb_polygon *polygon, int32_t a, int32_t b, int32_t c, int64_t *budget) {
+/* Whether no other corner lies in the ear a b c. If one does, so does one where the outline turns to the right. */
+static int ear_is_free(orb_polygon *polygon, int32_t a, int32_t b, int32_t c, int64_t *budget) {
   const double *flat = polygon->flat, *pa = flat + 2 * a, *pb = flat + 2 * b, *pc = flat + 2 * c;
-  for (int32_t i = polygon->next[c]; i != a; i = polygon->next[i]) {
+  for (int32_t n = 0; n < polygon->turned_count;) {
+    int32_t i = polygon->turned[n];
     if (--*budget < 0) {
       return 0;
     }
+    if (polygon->next[i] < 0) {
+      polygon->turned[n] = polygon->turned[--polygon->turned_count];
+      continue;
+    }
     const double *p = flat + 2 * i;
-    int at_corner = (p[0] == pa[0] && p[1] == pa[1]) || (p[0] == pc[0] && p[1] == pc[1]);
+    int at_corner = i == b || (p[0] == pa[0] && p[1] == pa[1]) || (p[0] == pc[0] && p[1] == pc[1]);
     if (!at_corner && signed_area2(pa, pb, p) >= 0 && signed_area2(pb, pc, p) >= 0 && signed_area2(pc, pa, p) >= 0) {
       return 0;
     }
+    n++;
   }
   return 1;
+}
+
+/* Links the corners and lists those that turn to the right. */
+static void link_corners(orb_polygon *polygon, int32_t count) {
+  const double *flat = polygon->flat;
+  polygon->turned_count = 0;
+  for (int32_t i = 0; i < count; i++) {
+    polygon->next[i] = i + 1 < count ? i + 1 : 0;
+    polygon->prev[i] = i > 0 ? i - 1 : count - 1;
+    if (!(signed_area2(flat + 2 * polygon->prev[i], flat + 2 * i, flat + 2 * polygon->next[i]) > 0)) {
+      polygon->turned[polygon->turned_count++] = i;
+    }
+  }
 }
 
 static int is_convex(const double *flat, int32_t count) {
@@ -142,15 +168,14 @@ void orb_polygon_cut(orb_polygon *polygon, const double *positions, const int32_
     return;
   }
   int convex = is_convex(polygon->flat, count);
-  for (int32_t i = 0; i < count; i++) {
-    polygon->next[i] = i + 1 < count ? i + 1 : 0;
-    polygon->prev[i] = i > 0 ? i - 1 : count - 1;
-  }
-  int64_t budget = 256 * (int64_t)count + 65536; /* points looked at; small polygons get all the tests they need */
+  link_corners(polygon, count);
+  int64_t own = TESTS_A_CORNER * (int64_t)count + TESTS_AT_LEAST;
+  int64_t shared = FILE_TESTS_AT_LEAST + polygon->saved + FILE_TESTS_A_CORNER * (int64_t)count;
+  int64_t given = own < shared ? own : shared, budget = given;
   int32_t at = 1, left = count, idle = 0;
   while (left > 3) {
     int32_t a = polygon->prev[at], c = polygon->next[at];
-    int hopeless = idle > left || budget < 0;
+    int hopeless = idle > left || --budget < 0; /* a corner that is no ear costs a test, too */
     const double *flat = polygon->flat;
     if (hopeless || convex ||
         (signed_area2(flat + 2 * a, flat + 2 * at, flat + 2 * c) > 0 && ear_is_free(polygon, a, at, c, &budget))) {
@@ -158,6 +183,7 @@ void orb_polygon_cut(orb_polygon *polygon, const double *positions, const int32_
       triangles += 3;
       polygon->next[a] = c;
       polygon->prev[c] = a;
+      polygon->next[at] = -1;
       left--;
       idle = 0;
       at = hopeless ? c : polygon->next[c];
@@ -167,4 +193,5 @@ void orb_polygon_cut(orb_polygon *polygon, const double *positions, const int32_
     }
   }
   put(triangles, polygon->prev[at], at, polygon->next[at]);
+  polygon->saved += FILE_TESTS_A_CORNER * (int64_t)count - (given - (budget > 0 ? budget : 0));
 }

@@ -9,9 +9,8 @@
  */
 #include "mesh/weld.h"
 
-#include <string.h>
-
 #include "base/check.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "mesh/edit.h"
 #include "mesh/sort.h"
@@ -53,16 +52,9 @@ static int32_t target(const weld *w, int32_t h) {
   return w->mesh->triangles[orb_next(h)];
 }
 
-static uint64_t hash_place(const double *p) {
-  uint64_t hash = 0x9e3779b97f4a7c15ull;
-  for (int k = 0; k < 3; k++) {
-    double x = p[k] + 0.0; /* −0 becomes 0 */
-    uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    hash = (hash ^ bits) * 0xff51afd7ed558ccdull;
-    hash ^= hash >> 32;
-  }
-  return hash * 0xc4ceb9fe1a85ec53ull >> 20;
+static uint64_t hash_place(const weld *w, const double *p) {
+  const double place[3] = {p[0] + 0.0, p[1] + 0.0, p[2] + 0.0}; /* −0 becomes 0 */
+  return orb_hash(w->ctx, place, sizeof place);
 }
 
 /* Fills place; *open_count: open half-edges. */
@@ -88,12 +80,17 @@ static orb_status find_places(weld *w, int64_t *open_count) {
   if (!table) {
     return ORB_E_NO_MEMORY;
   }
-  for (int32_t v = 0; v < mesh->vertex_count; v++) { /* in order, so that the lowest vertex comes first */
+  orb_status status = ORB_OK;
+  /* in order, so that the lowest vertex comes first */
+  for (int32_t v = 0; v < mesh->vertex_count && status == ORB_OK; v++) {
+    if ((v & 0xffff) == 0) {
+      status = orb_context_check(w->ctx);
+    }
     if (w->place[v] < 0) {
       continue;
     }
     const double *p = mesh->positions + 3 * (size_t)v;
-    uint64_t slot = hash_place(p) & (size - 1);
+    uint64_t slot = hash_place(w, p) & (size - 1);
     for (;; slot = (slot + 1) & (size - 1)) {
       if (!table[slot]) {
         table[slot] = v + 1;
@@ -107,7 +104,7 @@ static orb_status find_places(weld *w, int64_t *open_count) {
     w->place[v] = table[slot] - 1;
   }
   orb_free(w->ctx, table);
-  return ORB_OK;
+  return status;
 }
 
 /* Applies the unions and removes the collapsed faces. */
@@ -246,6 +243,9 @@ static orb_status weld_edges(weld *w, int64_t open_count) {
     }
   }
   for (int32_t v = 0; v < mesh->vertex_count && status == ORB_OK; v++) {
+    if ((v & 0xffff) == 0) {
+      status = orb_context_check(w->ctx);
+    }
     int32_t first = start[v], last = start[v + 1];
     orb_sort_u64(entry + first, last - first);
     while (first < last) {

@@ -1,6 +1,8 @@
-/* Why floats for the targets: the delta of two unit vectors is up to 2 long, but glTF has only integers up to 1 for it,
- * and its base must have length 1. The filter EXPONENTIAL stores a float as mantissa · 2^exponent in four bytes: a
- * mantissa of eight bits, placed in its topmost byte, leaves two bytes zero, which cost next to nothing.
+/* Why floats for most targets: the delta of two unit vectors is up to 2 long, but glTF has only integers up to 1 for
+ * it, and its base must have length 1. A target takes integers if no delta of it has a larger component, so if no
+ * normal turns far. Compressed, floats of few digits are no larger than such integers. The filter EXPONENTIAL stores a
+ * float as mantissa · 2^exponent in four bytes: a mantissa of eight bits, placed in its topmost byte, leaves two bytes
+ * zero, which cost next to nothing.
  *
  * The bound. Let a and b be a normal of the floats on the base and at full weight, e and f the errors of the decoded
  * ones. At weight w the normal is n(w) = (1 − w)·a + w·b and its error (1 − w)·e + w·f, so the sine of the angle
@@ -16,7 +18,7 @@
 #include "format/gltf_write.h"
 #include "profile/codec.h"
 
-enum { SHORT = 5122, BASE_STRIDE = 8, FLOAT_STRIDE = 12, CHECK_EVERY = 4096 };
+enum { BYTE = 5120, SHORT = 5122, BYTE_STRIDE = 4, SHORT_STRIDE = 8, FLOAT_STRIDE = 12, CHECK_EVERY = 4096 };
 
 /* Sine of the largest angle: 0.97°, which leaves room for the rounding of a renderer. */
 static const double MOST = 0.016929;
@@ -24,8 +26,12 @@ static const double MOST = 0.016929;
 static const double OCTAHEDRAL_SLACK = 1.7320508 / 32767;
 
 /* How the base is stored. The first for which every vertex keeps the bound is taken; the later ones serve normals that
- * turn by nearly 180°, where n(w) nearly vanishes. */
-typedef enum precision { OCTAHEDRAL_9 = 0, OCTAHEDRAL_13, DIGITS_24, EXACT, PRECISIONS } precision;
+ * turn by nearly 180°, where n(w) nearly vanishes. BYTES or OCTAHEDRAL_9 is the first, the smaller of the two without
+ * and with compression. */
+typedef enum precision { BYTES = 0, OCTAHEDRAL_9, OCTAHEDRAL_13, DIGITS_24, EXACT, PRECISIONS } precision;
+
+/* How far from 1 the length of a normal in bytes may be. Validators accept 0.00674. */
+static const double LENGTH_SLACK = 0.0066;
 
 /* Exponents of the filter: values below 1 and below 2 in 24 bits with a sign. */
 enum { BELOW_ONE = -23, BELOW_TWO = -22 };
@@ -108,13 +114,14 @@ typedef struct encoder {
   orb_context *ctx;
   const float *base;
   int32_t count;
+  int compressed;
   double slack;
   float *shown; /* the decoded base, 3 a vertex */
 } encoder;
 
 static orb_status encode_octahedra(encoder *self, int bits, orb_stream *out) {
   *out = (orb_stream){.count = self->count,
-                      .stride = BASE_STRIDE,
+                      .stride = SHORT_STRIDE,
                       .components = 3,
                       .component_type = SHORT,
                       .normalized = 1,
@@ -134,6 +141,50 @@ static orb_status encode_octahedra(encoder *self, int bits, orb_stream *out) {
     self->shown[i] = (float)values[4 * (i / 3) + i % 3] / 32767.0f;
   }
   self->slack = OCTAHEDRAL_SLACK;
+  return ORB_OK;
+}
+
+static orb_status begin_integers(orb_context *ctx, int32_t count, int type, orb_stream *out) {
+  *out = (orb_stream){.count = count,
+                      .stride = type == BYTE ? BYTE_STRIDE : SHORT_STRIDE,
+                      .components = 3,
+                      .component_type = type,
+                      .normalized = 1};
+  return orb_stream_allocate(ctx, out, 0);
+}
+
+/* The bytes of a unit vector: of the eight points of the grid around it the nearest whose length is nearly 1. */
+static void round_to_bytes(const float unit[3], signed char out[3]) {
+  double least = INFINITY;
+  for (int corner = 0; corner < 8; corner++) {
+    double v[3], error = 0, square = 0;
+    for (int c = 0; c < 3; c++) {
+      double below = floor(127 * (double)unit[c]);
+      v[c] = fmin(fmax(below + (corner >> c & 1), -127), 127) / 127;
+      error += (v[c] - (double)unit[c]) * (v[c] - (double)unit[c]);
+      square += v[c] * v[c];
+    }
+    double off = fabs(sqrt(square) - 1);
+    error += off > LENGTH_SLACK ? 1 + off : 0;
+    if (error < least) {
+      least = error;
+      for (int c = 0; c < 3; c++) {
+        out[c] = (signed char)lrint(127 * v[c]);
+      }
+    }
+  }
+}
+
+static orb_status encode_bytes(encoder *self, orb_stream *out) {
+  ORB_TRY(begin_integers(self->ctx, self->count, BYTE, out));
+  signed char *bytes = (signed char *)out->bytes;
+  for (size_t i = 0; i < (size_t)self->count; i++) {
+    round_to_bytes(self->base + 3 * i, bytes + BYTE_STRIDE * i);
+    for (size_t c = 0; c < 3; c++) {
+      self->shown[3 * i + c] = (float)bytes[BYTE_STRIDE * i + c] / 127.0f;
+    }
+  }
+  self->slack = 0;
   return ORB_OK;
 }
 
@@ -171,6 +222,50 @@ static double try_digits(const encoder *self, size_t i, const double a[3], const
   return bound_of(a, b, e, f, self->slack);
 }
 
+/* Stores the delta of a vertex as integers, aimed at its end. Returns the bound; infinite if the delta is too large. */
+static double encode_integer_delta(const encoder *self, size_t i, const float *deltas, double units, int stored[3]) {
+  double a[3], b[3], e[3], f[3];
+  for (size_t c = 0; c < 3; c++) {
+    double from = (double)self->shown[3 * i + c];
+    a[c] = (double)self->base[3 * i + c];
+    b[c] = a[c] + (double)deltas[3 * i + c];
+    double value = floor(units * (b[c] - from) + 0.5);
+    if (fabs(value) > units) {
+      return INFINITY;
+    }
+    stored[c] = (int)value;
+    e[c] = from - a[c];
+    f[c] = from + value / units - b[c];
+  }
+  return bound_of(a, b, e, f, self->slack);
+}
+
+/* One target as integers. Leaves no stream if a vertex breaks the bound or does not fit. */
+static orb_status encode_integers(const encoder *self, const float *deltas, int type, orb_stream *out, double *bound) {
+  double most = *bound, units = type == BYTE ? 127 : 32767;
+  ORB_TRY(begin_integers(self->ctx, self->count, type, out));
+  for (size_t i = 0; i < (size_t)self->count && most <= MOST; i++) {
+    int stored[3] = {0};
+    most = fmax(most, encode_integer_delta(self, i, deltas, units, stored));
+    for (size_t c = 0; c < 3; c++) {
+      if (type == BYTE) {
+        out->bytes[BYTE_STRIDE * i + c] = (unsigned char)stored[c];
+      } else {
+        ((int16_t *)(void *)out->bytes)[SHORT_STRIDE / 2 * i + c] = (int16_t)stored[c];
+      }
+    }
+    if (i % CHECK_EVERY == 0) {
+      ORB_TRY(orb_context_check(self->ctx));
+    }
+  }
+  if (most > MOST) {
+    orb_stream_free(self->ctx, out);
+  } else {
+    *bound = most;
+  }
+  return ORB_OK;
+}
+
 /* The delta of one vertex, with as few digits as the bound allows. Returns the bound. */
 static double encode_delta(const encoder *self, size_t i, const float *deltas, int exponent, float shown[3],
                            uint32_t stored[3]) {
@@ -181,7 +276,7 @@ static double encode_delta(const encoder *self, size_t i, const float *deltas, i
     b[c] = a[c] + (double)deltas[3 * i + c];
     mirrored[c] = b[c] + a[c] - (double)self->shown[3 * i + c]; /* opposite errors cancel halfway */
   }
-  for (size_t k = 0; k < sizeof bits / sizeof bits[0]; k++) {
+  for (size_t k = self->compressed ? 0 : 2; k < sizeof bits / sizeof bits[0]; k++) {
     bound = try_digits(self, i, a, b, b, bits[k], exponent, shown, stored);
     if (bound > MOST && k > 0) {
       bound = try_digits(self, i, a, b, mirrored, bits[k], exponent, shown, stored);
@@ -211,6 +306,12 @@ static int common_exponent(const float *deltas, int32_t count) {
 
 /* One target. *bound: raised; above MOST where a vertex needs a finer base. */
 static orb_status encode_target(const encoder *self, const float *deltas, int exact, orb_stream *out, double *bound) {
+  for (int type = BYTE; !self->compressed && !exact && type <= SHORT; type += SHORT - BYTE) {
+    ORB_TRY(encode_integers(self, deltas, type, out, bound));
+    if (out->bytes) {
+      return ORB_OK;
+    }
+  }
   ORB_TRY(begin_floats(self->ctx, self->count, !exact, out));
   if (exact) {
     memcpy(out->bytes, deltas, 3 * (size_t)self->count * sizeof(float));
@@ -246,7 +347,9 @@ static double base_bound(const encoder *self) {
 static orb_status encode_all(encoder *self, precision level, const float *const *deltas, int32_t target_count,
                              orb_stream *base_stream, orb_stream *targets, double *bound) {
   *bound = 0;
-  if (level <= OCTAHEDRAL_13) {
+  if (level == BYTES) {
+    ORB_TRY(encode_bytes(self, base_stream));
+  } else if (level <= OCTAHEDRAL_13) {
     ORB_TRY(encode_octahedra(self, level == OCTAHEDRAL_9 ? 9 : 13, base_stream));
   } else {
     ORB_TRY(encode_floats(self, level == DIGITS_24, base_stream));
@@ -261,11 +364,16 @@ static orb_status encode_all(encoder *self, precision level, const float *const 
 }
 
 orb_status orb_normals_encode(orb_context *ctx, const float *base, int32_t count, const float *const *deltas,
-                              int32_t target_count, orb_stream *base_stream, orb_stream *targets, double *degrees) {
-  encoder self = {.ctx = ctx, .base = base, .count = count, .shown = ORB_NEW(ctx, float, 3 * (size_t)count)};
+                              int32_t target_count, int compressed, orb_stream *base_stream, orb_stream *targets,
+                              double *degrees) {
+  encoder self = {.ctx = ctx,
+                  .base = base,
+                  .count = count,
+                  .compressed = compressed,
+                  .shown = ORB_NEW(ctx, float, 3 * (size_t)count)};
   orb_status status = self.shown ? ORB_OK : ORB_E_NO_MEMORY;
   double bound = INFINITY;
-  for (int level = OCTAHEDRAL_9; status == ORB_OK && level < PRECISIONS && bound > MOST; level++) {
+  for (int level = compressed ? OCTAHEDRAL_9 : BYTES; status == ORB_OK && level < PRECISIONS && bound > MOST; level++) {
     orb_stream_free(ctx, base_stream);
     for (int32_t k = 0; k < target_count; k++) {
       orb_stream_free(ctx, &targets[k]);

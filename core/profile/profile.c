@@ -143,7 +143,7 @@ static orb_status make_normals(maker *m, part *p) {
   if (status == ORB_OK) {
     orb_source_floats(&m->source, p->normal, p->order, base);
     status = orb_normals_encode(m->ctx, base, p->vertex_count, (const float *const *)p->deltas, p->target_count,
-                                &m->streams[p->normal], targets, &m->degrees);
+                                m->rounding == ORB_ROUNDING_DIGITS, &m->streams[p->normal], targets, &m->degrees);
   }
   for (int32_t k = 0; targets && k < p->target_count; k++) {
     if (status == ORB_OK && !m->streams[numbers[k]].bytes) {

@@ -13,6 +13,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 
@@ -22,6 +23,7 @@ enum { CHECK_EVERY = 16384 };     /* vertices between two checks for cancellatio
 static const float TINY = 1e-30f; /* smaller coordinates are near the denormals that clients may flush to zero */
 
 typedef struct rounding {
+  const orb_context *ctx;
   double *const *positions;
   float *base, *const *deltas;
   int32_t frame_count, shapes, vertex_count;
@@ -56,15 +58,13 @@ static float shown(const rounding *r, int64_t v, int32_t f, int c) {
 }
 
 static uint64_t hash_of(const rounding *r, int64_t v) {
-  uint64_t hash = 0x9e3779b97f4a7c15u;
-  for (int32_t f = 0; f < r->shapes; f++) {
-    for (int c = 0; c < 3; c++) {
-      float value = shown(r, v, f, c);
-      uint32_t bits;
-      memcpy(&bits, &value, sizeof bits);
-      hash = (hash ^ bits) * 0xff51afd7ed558ccdu;
-      hash ^= hash >> 32;
-    }
+  uint64_t hash = 0;
+  for (int32_t f = 0; f < r->shapes; f++) { /* the hash of the shapes before goes into that of the next */
+    struct {
+      uint64_t before;
+      float at[4];
+    } key = {hash, {shown(r, v, f, 0), shown(r, v, f, 1), shown(r, v, f, 2), 0}};
+    hash = orb_hash(r->ctx, &key, sizeof key);
   }
   return hash;
 }
@@ -173,7 +173,7 @@ static orb_status check_range(orb_context *ctx, const rounding *r) {
 orb_status orb_round_distinct(orb_context *ctx, double *const *positions, int32_t frame_count, int32_t shapes,
                               int32_t vertex_count, const unsigned char *keep, float *base, float *const *deltas,
                               int32_t *nudged) {
-  rounding r = {positions, base, deltas, frame_count, shapes, vertex_count, NULL, 0};
+  rounding r = {ctx, positions, base, deltas, frame_count, shapes, vertex_count, NULL, 0};
   uint64_t size = 64;
   while (size < 2 * (uint64_t)vertex_count) {
     size *= 2;

@@ -2,7 +2,7 @@
 _orbmorph() {
   local current="${COMP_WORDS[COMP_CWORD]}" previous="${COMP_WORDS[COMP_CWORD-1]}" words="" operands="" choices=""
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "morph upload embed merge job ls get rm doctor view sign completions --help --version" -- "$current"))
+    COMPREPLY=($(compgen -W "morph upload embed merge job ls get rm doctor view sign studio completions --help --version" -- "$current"))
     return
   fi
   case "$previous" in
@@ -17,7 +17,7 @@ _orbmorph() {
     --preset) choices="fast default quality" ;;
     --state) choices="queued running succeeded failed cancelled" ;;
     --part) choices="file asset sphere" ;;
-    --up) choices="y z" ;;
+    --up) choices="auto y z x -y -z -x" ;;
     --profile) choices="float quantized meshopt" ;;
   esac
   if [ -n "$choices" ]; then
@@ -58,6 +58,9 @@ _orbmorph() {
       ;;
     sign)
       words="--help --key --expires "
+      ;;
+    studio)
+      words="--quiet --help --repair --data --no-open "
       ;;
     completions)
       words="--help "

@@ -113,11 +113,14 @@ int admin_command_read(admin_command *out, const admin_kind *kind, int *argc, ch
   return fill_words(out);
 }
 
-/* Every line has a new secret; only verbs that show it use it. */
+/* Every line of a kind that has secrets has a new one; only verbs that show it use it. */
 static void write_line(const admin_command *command, char line[ADMIN_LINE], char shown[ADMIN_WORD]) {
   const admin_flag *flags = command->kind->flags;
-  char secret[ADMIN_SECRET];
-  command->kind->make_secret(command->name, shown, secret);
+  char secret[ADMIN_SECRET] = "";
+  shown[0] = 0;
+  if (command->kind->make_secret) {
+    command->kind->make_secret(command->name, shown, secret);
+  }
   int n = snprintf(line, ADMIN_LINE, "%s %s %s", command->kind->name, command->verb->name, command->name);
   for (int i = 0; i < ADMIN_FLAGS && flags[i].name && n < ADMIN_LINE; i++) {
     n += snprintf(line + n, (size_t)(ADMIN_LINE - n), " %s", *flags[i].name ? command->words[i] : secret);

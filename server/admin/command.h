@@ -40,7 +40,7 @@ typedef struct admin_kind {
   const char *values; /* the values that the flags take */
   admin_verb verbs[ADMIN_VERBS];
   admin_flag flags[ADMIN_FLAGS];
-  /* Makes a secret: what is shown, and the word that stands for it in the line. */
+  /* Makes a secret: what is shown, and the word that stands for it in the line. NULL: the kind has none. */
   void (*make_secret)(const char *name, char shown[ADMIN_WORD], char word[ADMIN_SECRET]);
   /* Executes a line. Returns the exit status, with the text to show in *reply. */
   int (*apply)(catalogue *cat, const char *line, api_text *reply);

@@ -4,6 +4,6 @@
 
 #include "admin/command.h"
 
-extern const admin_kind admin_key, admin_token, admin_webhook;
+extern const admin_kind admin_crash, admin_key, admin_token, admin_webhook;
 
 #endif

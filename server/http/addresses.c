@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "hash.h"
+
 enum { BUCKETS = 4096, KEY_BYTES = 8 };
 
 struct address_entry {
@@ -63,11 +65,7 @@ int address_is_local(const struct sockaddr *address) {
 }
 
 static unsigned bucket_of(const unsigned char key[KEY_BYTES]) {
-  unsigned hash = 2166136261u;
-  for (int i = 0; i < KEY_BYTES; i++) {
-    hash = (hash ^ key[i]) * 16777619u;
-  }
-  return hash % BUCKETS;
+  return (unsigned)(keyed_hash(key, KEY_BYTES) % BUCKETS);
 }
 
 address_entry *addresses_enter(addresses *a, const struct sockaddr *address, int64_t now) {

@@ -135,6 +135,11 @@ static void refuse_submit(request *r, queue_result result, int64_t owner_limit) 
     case QUEUE_WEBHOOKS:
       reply_refuse(r, "invalid-request", "The job has %d webhooks already, and may not have more.", JOB_WEBHOOKS);
       break;
+    case QUEUE_CRASHED:
+      reply_refuse(r, "job-crashed",
+                   "Three processes that did this work have died, so it is refused until an administrator clears it "
+                   "(orbmorphd crash clear). Please report this as a bug, with the meshes.");
+      break;
     case QUEUE_MESH_GONE:
       reply_refuse(r, "not-found", "A mesh of this request has just been deleted: upload it again.");
       break;

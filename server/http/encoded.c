@@ -6,6 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "hash.h"
+#include "http/regions.h"
+
 enum { BUCKETS = 1024, TAG_ROOM = 96, OVERHEAD = 256 };
 
 typedef struct item {
@@ -33,16 +36,14 @@ encoded_cache *encoded_open(size_t max_bytes) {
 }
 
 static item **bucket(encoded_cache *c, const char *tag, coding which) {
-  unsigned hash = (unsigned)which;
-  for (const char *at = tag; *at; at++) {
-    hash = hash * 31 + (unsigned char)*at;
-  }
-  return &c->buckets[hash % BUCKETS];
+  return &c->buckets[(keyed_hash(tag, strlen(tag)) + (uint64_t)which) % BUCKETS];
 }
 
 static void unref(item *it) {
   if (--it->refs == 0) {
-    free(it->entry.bytes);
+    if (!region_free(it->entry.bytes)) {
+      free(it->entry.bytes);
+    }
     free(it);
   }
 }
@@ -93,6 +94,25 @@ const encoded *encoded_find(encoded_cache *c, const char *tag, coding which) {
   return found;
 }
 
+/* Leaves entry->bytes NULL if out of memory. */
+static void fill(encoded *entry, coding which, const void *bytes, size_t size) {
+  void *packed = NULL;
+  if (which != CODING_NONE && encode_bytes(which, bytes, size, 0, &packed, &size)) {
+    bytes = packed;
+  } else if (which != CODING_NONE) {
+    return;
+  }
+  *entry = (encoded){region_make(bytes, size), size};
+  if (!entry->bytes && packed) {
+    entry->bytes = packed;
+    return;
+  }
+  if (!entry->bytes && (entry->bytes = malloc(size))) {
+    memcpy(entry->bytes, bytes, size);
+  }
+  free(packed);
+}
+
 const encoded *encoded_make(encoded_cache *c, const char *tag, coding which, const void *bytes, size_t size) {
   const encoded *found = encoded_find(c, tag, which);
   if (found) {
@@ -102,13 +122,8 @@ const encoded *encoded_make(encoded_cache *c, const char *tag, coding which, con
   if (!it) {
     return NULL;
   }
-  if (bytes && which == CODING_NONE) {
-    it->entry = (encoded){malloc(size), size};
-    if (it->entry.bytes) {
-      memcpy(it->entry.bytes, bytes, size);
-    }
-  } else if (bytes) {
-    encode_bytes(which, bytes, size, 0, &it->entry.bytes, &it->entry.size);
+  if (bytes) {
+    fill(&it->entry, which, bytes, size);
   }
   if (!it->entry.bytes) {
     it->entry.size = 0;

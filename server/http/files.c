@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "http/disposition.h"
 #include "http/http.h"
 #include "metrics.h"
 #include "store/spheres.h"
@@ -9,19 +10,20 @@
 /* Blocks: reads the object's table. */
 static void reply_sphere(request *r) {
   object_part part;
-  char name[32];
+  char name[32], disposition[DISPOSITION_SIZE];
   store_result found = spheres_find(r->srv->store, r->id, r->shape, &part.start, &part.length);
   if (found != STORE_OK) {
     reply_store(r, found);
     return;
   }
   snprintf(name, sizeof name, "sphere-%d.ply", r->shape);
-  reply_part(r, OBJECT_SPHERES, r->id, part, r->id, "application/octet-stream", name);
+  disposition_write(name, disposition);
+  reply_part(r, OBJECT_SPHERES, r->id, part, r->id, "application/octet-stream", disposition);
 }
 
 /* 0 without a response outside a task, if one is needed to make or compress the object; releases the description. */
 static int file_of(request *r, const cached *entry) {
-  char name[100], format[8] = "bin";
+  char name[100], format[8] = "bin", disposition[DISPOSITION_SIZE];
   int done = 1;
   switch (r->route->id) {
     case ROUTE_MESH_FILE: {
@@ -30,15 +32,18 @@ static int file_of(request *r, const cached *entry) {
         sscanf(at, "\"format\":\"%7[a-z]", format);
       }
       snprintf(name, sizeof name, "%.16s.%s", r->id, format);
+      disposition_write(name, disposition);
       reply_object(r, OBJECT_MESH, r->id, r->id,
-                   strcmp(format, "glb") == 0 ? "model/gltf-binary" : "application/octet-stream", name);
+                   strcmp(format, "glb") == 0 ? "model/gltf-binary" : "application/octet-stream", disposition);
       break;
     }
     case ROUTE_EMBEDDING_SPHERE:
-      done = reply_object(r, OBJECT_SPHERE, r->id, entry->row.sha, "application/octet-stream", "sphere.ply");
+      disposition_write("sphere.ply", disposition);
+      done = reply_object(r, OBJECT_SPHERE, r->id, entry->row.sha, "application/octet-stream", disposition);
       break;
     case ROUTE_SUPERMESH_PLACES:
-      reply_object(r, OBJECT_PLACES, r->id, r->id, "application/octet-stream", "places.bin");
+      disposition_write("places.bin", disposition);
+      reply_object(r, OBJECT_PLACES, r->id, r->id, "application/octet-stream", disposition);
       break;
     case ROUTE_SUPERMESH_SPHERE:
       reply_sphere(r);

@@ -111,7 +111,8 @@ struct request {
   int64_t retry_s;       /* for Retry-After; 0: the usual */
   int begun;             /* the headers have arrived */
   int has_body, head;
-  int closes; /* the connection closes after this response */
+  int refused; /* see target.h */
+  int closes;  /* the connection closes after this response */
   request_phase phase;
   int64_t began; /* µs */
 
@@ -273,11 +274,12 @@ void submit_wanted(request *r, const wanted_result *wish);
 typedef struct object_part {
   uint64_t start, length;
 } object_part;
-/* Respond with an object of this SHA-256, with ranges and conditions. 0 without a response outside a task, if one is
- * needed to compress the object. */
+/* Respond with an object of this SHA-256, with ranges and conditions. disposition: the value of that header. 0 without
+ * a response outside a task, if one is needed to compress the object. */
 int reply_part(request *r, object_kind kind, const char *id, object_part part, const char *sha, const char *mime,
-               const char *name);
-int reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name);
+               const char *disposition);
+int reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime,
+                 const char *disposition);
 /* The asset of a supermesh in the profile of the request, if that is stored; releases the description. 0 without a
  * response if it is not, or a task is needed to compress it. */
 int reply_stored_asset(request *r, const cached *entry);

@@ -1,11 +1,13 @@
 /* POST /v1/meshes. The body streams into a temporary file and a hash. Then a thread for checks reads the mesh, repairs
  * it, checks its topology and stores it (intake.h). fetch.c has the form with a URL. */
+#include <poll.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "http/http.h"
 #include "intake.h"
 
-enum { LARGE_UPLOAD = 16 << 20, LOOK_BYTES = 1 << 20 };
+enum { LARGE_UPLOAD = 16 << 20, LOOK_BYTES = 1 << 20, HALF_OPEN_MS = 1000 };
 
 static void refuse_full(request *r) {
   reply_refuse(r, "storage-full", "The server's disk has no room for this file. Free some space and try again.");
@@ -50,13 +52,25 @@ void handle_mesh_bytes(request *r, const char *bytes, size_t size) {
   }
 }
 
-static orb_context *context_for_check(const config *options) {
-  orb_context_options limits = {.memory_limit = (size_t)options->job_memory,
-                                .threads = 1,
-                                .deadline_ms = orb_clock_ms() + 1000 * options->job_seconds,
-                                .max_triangles = options->max_triangles};
+static orb_context *context_for_check(const intake_limits *limits) {
+  orb_context_options options = {.memory_limit = (size_t)limits->memory,
+                                 .threads = 1,
+                                 .deadline_ms = limits->deadline_ms,
+                                 .max_triangles = limits->max_triangles};
   orb_context *ctx = NULL;
-  return orb_context_create(&limits, &ctx) == ORB_OK ? ctx : NULL;
+  return orb_context_create(&options, &ctx) == ORB_OK ? ctx : NULL;
+}
+
+/* Whether the service runs on and the client is there. A client that has closed its end for writing only still gets the
+ * answer of a check that takes less than HALF_OPEN_MS. */
+static int is_wanted(void *user) {
+  const request *r = user;
+  const union MHD_ConnectionInfo *fd = MHD_get_connection_info(r->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+  struct pollfd look = {.fd = fd ? fd->connect_fd : -1, .events = POLLRDHUP};
+  if (__atomic_load_n(&r->srv->stopping, __ATOMIC_ACQUIRE)) {
+    return 0;
+  }
+  return poll(&look, 1, 0) <= 0 || clock_us() - r->began < 1000 * (int64_t)HALF_OPEN_MS;
 }
 
 /* Other uploads of this tenant have used up the quota. */
@@ -75,16 +89,24 @@ static void store_mesh(request *r, const intake_file *file) {
   const char *tenant = access_tenant(r);
   int fresh = 0;
   api_problem problem = {0};
-  orb_context *ctx = context_for_check(srv->options);
+  const intake_limits limits = {.memory = srv->options->job_memory,
+                                .deadline_ms = orb_clock_ms() + 1000 * srv->options->check_seconds,
+                                .max_triangles = srv->options->max_triangles,
+                                .wanted = is_wanted,
+                                .user = r};
+  orb_context *ctx = context_for_check(&limits);
   if (!ctx) {
     reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
     return;
   }
   int64_t quota = r->caller ? __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED) : 0;
-  store_result stored = intake_store(file, srv->cat, srv->store, ctx, tenant, quota, &fresh, &problem);
+  store_result stored = intake_store(file, srv->cat, srv->store, ctx, &limits, tenant, quota, &fresh, &problem);
   orb_context_destroy(ctx);
   if (fresh && r->caller) {
     callers_recount(srv->callers, tenant);
+  }
+  if (problem.name && strcmp(problem.name, "cancelled") == 0) {
+    api_refuse(&problem, "unavailable", "The server is stopping, or you are gone; try again soon.");
   }
   if (problem.name) {
     reply_problem(r, &problem);

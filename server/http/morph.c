@@ -81,10 +81,12 @@ static void remember(const request *r, const char *id, unsigned long long drops)
   free(old);
 }
 
+enum kind { TEXT, NUMBER, BOOL };
+
 /* The parameters that become a member of the request as they are. */
 static const struct member {
   const char *parameter, *object, *name;
-  enum { TEXT, NUMBER, BOOL } kind;
+  enum kind kind;
 } members[] = {
     {"align", "align", "method", TEXT},
     {"remesh", "remesh", "method", TEXT},
@@ -102,7 +104,7 @@ static cJSON *object_of(cJSON *body, const char *name) {
 }
 
 /* The value as JSON. What is not a number or boolean stays text, which the reader of requests refuses by name. */
-static cJSON *value_of(const char *text, int kind) {
+static cJSON *value_of(const char *text, enum kind kind) {
   char *end;
   size_t plain = strspn(text, "0123456789.eE+-");
   double number = strtod(text, &end);

@@ -11,30 +11,29 @@
 #include "log.h"
 
 enum { YEAR_S = 31536000 };
+#define YEAR_LONG ", max-age=31536000, immutable"
 
-static void add_headers(request *r, const char *mime, const char *name, int varies) {
-  char disposition[DISPOSITION_SIZE];
-  char control[64];
-  int64_t left = r->expires - (int64_t)time(NULL);
+static void add_headers(request *r, const char *mime, const char *disposition, int varies) {
   reply_header(r, "ETag", r->etag);
   if (varies && (!r->coded || r->status == 304)) {
     reply_header(r, "Vary", "Accept-Encoding");
   }
   if (r->signer) { /* anyone with the URL may read it until it expires */
+    char control[64];
+    int64_t left = r->expires - (int64_t)time(NULL);
     snprintf(control, sizeof control, "public, max-age=%lld",
              (long long)(left < 0        ? 0
                          : left < YEAR_S ? left
                                          : YEAR_S));
+    reply_header(r, "Cache-Control", control);
   } else { /* a shared cache must not keep what only one token may see */
-    snprintf(control, sizeof control, "%s, max-age=%d, immutable", r->caller ? "private" : "public", YEAR_S);
+    reply_header(r, "Cache-Control", r->caller ? "private" YEAR_LONG : "public" YEAR_LONG);
   }
-  reply_header(r, "Cache-Control", control);
   reply_header(r, "Accept-Ranges", "bytes");
   if (r->status != 304) {
     if (!r->coded) {
       reply_header(r, "Content-Type", mime);
     }
-    disposition_write(name, disposition);
     reply_header(r, "Content-Disposition", disposition);
   }
 }
@@ -89,11 +88,18 @@ static int choose_memory(request *r, object_kind kind, const char *id, const cha
   return 1;
 }
 
+/* The name of an object in the cache of encoded answers. A known asset is sent in 40 µs, so neither this nor its
+ * headers go through printf(), which takes 0.3 µs a call. */
+static void key_of(const request *r, object_kind kind, const char *id, const char *etag, char out[96]) {
+  const char form[] = {(char)('a' + kind), (char)('0' + r->shape), ' ', 0}; /* shape: −1 to 99 */
+  stpcpy(stpncpy(stpcpy(stpcpy(out, "object "), form), id, 16), etag);
+}
+
 /* Chooses the form of an object, and compresses it if that has not been done. 0: only a task may do that. */
 static int choose_form(request *r, object_kind kind, const char *id, object_part part, const char *etag) {
   char key[96];
   size_t size;
-  snprintf(key, sizeof key, "object %d %d %.16s %s", (int)kind, r->shape, id, etag);
+  key_of(r, kind, id, etag, key);
   if (!reply_choose(r, key, etag, NULL, ENCODE_LEAST)) {
     if (r->phase != PHASE_AWAY) {
       return 0;
@@ -108,19 +114,19 @@ static int choose_form(request *r, object_kind kind, const char *id, object_part
 }
 
 int reply_part(request *r, object_kind kind, const char *id, object_part part, const char *sha, const char *mime,
-               const char *name) {
+               const char *disposition) {
   char etag[40], content_range[80];
   int fd,
       compresses = kind == OBJECT_ASSET || kind == OBJECT_QUANTIZED || kind == OBJECT_SPHERE || kind == OBJECT_SPHERES;
   uint64_t size, first = 0, length;
-  snprintf(etag, sizeof etag, "\"%.32s\"", sha);
-  snprintf(r->etag, sizeof r->etag, "%s", etag);
+  stpcpy(stpncpy(stpcpy(etag, "\""), sha, 32), "\"");
+  stpcpy(r->etag, etag);
   if (compresses && !choose_form(r, kind, id, part, etag)) {
     return 0;
   }
   if (reply_conditions(r, r->etag)) {
     if (r->status == 304) {
-      add_headers(r, mime, name, compresses);
+      add_headers(r, mime, disposition, compresses);
     }
     return 1;
   }
@@ -130,7 +136,7 @@ int reply_part(request *r, object_kind kind, const char *id, object_part part, c
     } else {
       reply_memory(r, 200);
     }
-    add_headers(r, mime, name, 1);
+    add_headers(r, mime, disposition, 1);
     return 1;
   }
   store_result found = objects_read(r->srv->store, kind, id, &fd, &size);
@@ -163,24 +169,35 @@ int reply_part(request *r, object_kind kind, const char *id, object_part part, c
              (unsigned long long)(first + length - 1), (unsigned long long)size);
     reply_header(r, "Content-Range", content_range);
   }
-  add_headers(r, mime, name, compresses);
+  add_headers(r, mime, disposition, compresses);
   return 1;
 }
 
-int reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime, const char *name) {
-  return reply_part(r, kind, id, (object_part){0}, sha, mime, name);
+int reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime,
+                 const char *disposition) {
+  return reply_part(r, kind, id, (object_part){0}, sha, mime, disposition);
+}
+
+static const char *disposition_of(const cached *entry) {
+  const char *known = cache_header(entry);
+  if (!known) {
+    char name[DISPOSITION_NAME], value[DISPOSITION_SIZE];
+    disposition_name(entry->row.json, name);
+    disposition_write(name, value);
+    known = cache_keep_header(entry, value);
+  }
+  return known ? known : "inline";
 }
 
 int reply_stored_asset(request *r, const cached *entry) {
-  char link[128], name[DISPOSITION_NAME];
+  char link[128];
   int stored = r->profile - 1; /* −1: the asset itself */
   const char *sha = stored < 0 ? entry->row.sha : entry->row.profiles[stored];
-  disposition_name(entry->row.json, name);
   memcpy(r->id, entry->row.id, sizeof r->id);
   int done = sha[0] && reply_object(r, stored < 0 ? OBJECT_ASSET : object_of_profile(stored), r->id, sha,
-                                    "model/gltf-binary", name);
+                                    "model/gltf-binary", disposition_of(entry));
   if (done && r->route->id == ROUTE_MORPH && r->status < 400) {
-    snprintf(link, sizeof link, "</v1/supermeshes/%s>; rel=\"describedby\"", r->id);
+    stpcpy(stpcpy(stpcpy(link, "</v1/supermeshes/"), r->id), ">; rel=\"describedby\"");
     reply_header(r, "Link", link);
   }
   cache_release(r->srv->descriptions, entry);

@@ -38,7 +38,7 @@ static void add_coding(request *r, coding which) {
 
 int reply_choose(request *r, const char *key, const char *etag, const void *bytes, size_t size) {
   coding which = header_of(r, "Range") || size < ENCODE_LEAST || size > ENCODE_MOST ? CODING_NONE : accepted(r);
-  snprintf(r->etag, sizeof r->etag, "%s", etag);
+  stpncpy(r->etag, etag, sizeof r->etag - 1);
   r->coded = CODING_NONE;
   if (which == CODING_NONE) {
     return 1;

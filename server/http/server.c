@@ -8,6 +8,7 @@
 #include "faults.h"
 #include "http/body.h"
 #include "http/http.h"
+#include "http/target.h"
 #include "log.h"
 #include "metrics.h"
 
@@ -68,6 +69,7 @@ static void *request_create(void *user, const char *target, struct MHD_Connectio
     r->temp.fd = -1;
     r->began = clock_us();
     make_number(r->number);
+    r->refused = target_refused(target, r->number, r->srv->options->tls_key[0] != 0, connection);
   }
   return r;
 }
@@ -105,7 +107,8 @@ static void request_begin(request *r, const char *method, const char *url, const
 static size_t unescape(void *user, struct MHD_Connection *connection, char *text) {
   (void)user;
   (void)connection;
-  return strstr(text, "%00") ? strlen(text) : MHD_http_unescape(text);
+  const char *escape = strchr(text, '%');
+  return !escape || strstr(escape, "%00") ? strlen(text) : MHD_http_unescape(text);
 }
 
 static enum MHD_Result answer(void *user, struct MHD_Connection *connection, const char *url, const char *method,
@@ -113,7 +116,7 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
   request *r = *state;
   (void)user;
   (void)connection;
-  if (!r) { /* out of memory */
+  if (!r || r->refused) { /* out of memory, or answered past the library */
     return MHD_NO;
   }
   if (!r->begun) {

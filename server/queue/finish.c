@@ -178,6 +178,35 @@ void queue_give_back(queue *q, job *j) {
   pthread_mutex_unlock(&q->lock);
 }
 
+int queue_crashed(queue *q, job *j, int is_sure) {
+  pthread_mutex_lock(&q->lock);
+  int crashes = j->row.crashes + is_sure;
+  pthread_mutex_unlock(&q->lock);
+  store_result stored = catalogue_job_crashed(q->cat, &j->row, is_sure, !is_sure, unix_ms());
+  if (crashes >= MOST_CRASHES) {
+    return 1;
+  }
+  pthread_mutex_lock(&q->lock);
+  j->row.state = API_JOB_QUEUED;
+  j->row.crashes = crashes;
+  j->row.suspect = !is_sure;
+  j->stage[0] = 0;
+  if (stored != STORE_OK) { /* the row still says that it runs: the next claim corrects it */
+    j->retry_at = orb_clock_ms() + 5000;
+  }
+  schedule_leave(q, j);
+  job_unref(j);
+  pthread_mutex_unlock(&q->lock);
+  return 0;
+}
+
+int queue_runs_alone(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  int alone = j->row.suspect;
+  pthread_mutex_unlock(&q->lock);
+  return alone;
+}
+
 void queue_put_off(queue *q, job *j) {
   pthread_mutex_lock(&q->lock);
   show_queued(j);

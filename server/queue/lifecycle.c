@@ -8,7 +8,7 @@
 #include "queue/internal.h"
 #include "wake.h"
 
-enum { MOST_CRASHES = 3, BATCH = 64 };
+enum { BATCH = 64 };
 
 queue *queue_create(const queue_options *options, catalogue *cat) {
   queue *q = calloc(1, sizeof *q);
@@ -87,13 +87,14 @@ static store_result load(queue *q, job_row *row) {
   return STORE_OK;
 }
 
-store_result queue_recover(queue *q) {
+store_result queue_recover(queue *q, int isolated) {
   api_problem problem = {0};
   api_text text = {0};
   api_refuse(&problem, "crashed", "The service crashed %d times while this job ran alone; the job is not retried.",
              MOST_CRASHES);
   api_problem_write(&problem, &text);
-  store_result result = text.failed ? STORE_ERROR : catalogue_recover(q->cat, MOST_CRASHES, unix_ms(), text.data);
+  store_result result =
+      text.failed ? STORE_ERROR : catalogue_recover(q->cat, isolated ? 0 : MOST_CRASHES, unix_ms(), text.data);
   api_text_free(&text);
   api_problem_free(&problem);
   FAULT_POINT("recovered");

@@ -13,7 +13,8 @@
  *
  * The retry of a job: if the store fails, queue_finish(), queue_give_back() and queue_put_off() in finish.c set
  * retry_at, before which schedule.c does not choose the job. After a crash, queue_recover() in lifecycle.c queues what
- * was running again; catalogue_recover() in store/jobs.c counts the crashes and fails a job after MOST_CRASHES.
+ * was running again; with isolate = off, catalogue_recover() in store/jobs.c counts the crashes and fails a job after
+ * MOST_CRASHES. Otherwise jobs have processes of their own, and queue_crashed() in finish.c counts the deaths of those.
  *
  * Contract. One lock guards all of it; it is held for short steps only, never during input or output. The catalogue is
  * authoritative: a job is taken, shown as accepted, or shown as ended only after its row was committed, so everything
@@ -40,6 +41,8 @@
  * jobs of one owner. */
 enum { QUEUE_URGENCIES = 8 };
 
+enum { MOST_CRASHES = 3 }; /* of a job, alone */
+
 typedef struct queue queue;
 typedef struct job job;
 
@@ -62,8 +65,9 @@ queue *queue_create(const queue_options *options, catalogue *cat);
 void queue_on_end(queue *q, void (*ended)(void *user), void *user);
 void queue_destroy(queue *q);
 void queue_set_limit(queue *q, int limit);
-/* Recovers from a crash and loads the unfinished jobs of the catalogue. */
-store_result queue_recover(queue *q);
+/* Recovers from a crash and loads the unfinished jobs of the catalogue. isolated: jobs had processes of their own, so
+ * the end of the service is not their crash. */
+store_result queue_recover(queue *q, int isolated);
 /* Stops handing out jobs and wakes the workers. With `now`, also interrupts the running jobs, which their workers then
  * give back. */
 void queue_stop(queue *q, int now);
@@ -90,6 +94,7 @@ typedef enum queue_result {
   QUEUE_STOPPING,
   QUEUE_STORE_FULL,
   QUEUE_MESH_GONE, /* a mesh that the request names has been deleted */
+  QUEUE_CRASHED,   /* processes that did this work died, see store/crashes.h */
   QUEUE_WEBHOOKS,  /* the job has as many webhooks as it may have */
   QUEUE_ERROR
 } queue_result;
@@ -162,6 +167,11 @@ void queue_finish_mesh(queue *q, job *j, const char *mesh);
 void queue_put_off(queue *q, job *j);
 /* Returns a taken job; its attempt does not count. */
 void queue_give_back(queue *q, job *j);
+/* The process of a claimed job died. Its attempt counts. Returns 0 if the job is queued again; the worker's reference
+ * is released. 1: it has died MOST_CRASHES times; the worker must end it. is_sure: the job alone can be the cause; else
+ * it runs alone next time. */
+int queue_crashed(queue *q, job *j, int is_sure);
+int queue_runs_alone(queue *q, job *j);
 
 /* Numbers for /metrics and /readyz?verbose. */
 typedef struct queue_numbers {

@@ -116,7 +116,10 @@ queue_result queue_submit(queue *q, const queue_request *request, job **out, int
     table_ended(q, j);
     job_unref(j);
     *out = NULL;
-    result = stored == STORE_FULL ? QUEUE_STORE_FULL : stored == STORE_NOT_FOUND ? QUEUE_MESH_GONE : QUEUE_ERROR;
+    result = stored == STORE_FULL        ? QUEUE_STORE_FULL
+             : stored == STORE_NOT_FOUND ? QUEUE_MESH_GONE
+             : stored == STORE_CONFLICT  ? QUEUE_CRASHED
+                                         : QUEUE_ERROR;
   }
   pthread_cond_broadcast(&q->committed);
   pthread_mutex_unlock(&q->lock);

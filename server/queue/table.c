@@ -3,6 +3,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "hash.h"
 #include "log.h"
 #include "queue/internal.h"
 
@@ -13,11 +14,7 @@ int64_t unix_ms(void) {
 }
 
 static unsigned bucket(const char *hex) {
-  unsigned hash = 2166136261u;
-  for (; *hex; hex++) {
-    hash = (hash ^ (unsigned char)*hex) * 16777619u;
-  }
-  return hash % BUCKETS;
+  return (unsigned)(keyed_hash(hex, strlen(hex)) % BUCKETS);
 }
 
 void table_add(queue *q, job *j) {

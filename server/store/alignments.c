@@ -10,40 +10,36 @@
 /* The free bytes that must be left, as a multiple of an alignment's: the result that follows needs them more. */
 enum { ROOM = 16 };
 
-int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const char *id,
+int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const resource *row,
                    const orb_align_shape *shapes, int32_t shape_count, orb_alignment *out) {
-  resource row = {0};
+  const char *id = row->id;
   unsigned char *bytes = NULL;
   char sha[API_ID_SIZE];
   size_t size = 0;
-  if (catalogue_get(cat, RESOURCE_ALIGNMENT, id, &row) != STORE_OK) {
-    return 0;
-  }
   int fine = objects_load(store, OBJECT_ALIGNMENT, id, &bytes, &size) == STORE_OK;
   if (fine) {
     api_id_of_text((const char *)bytes, size, sha);
-    fine = strcmp(sha, row.sha) == 0 && orb_alignment_read(ctx, bytes, size, shapes, shape_count, out) == ORB_OK;
+    fine = strcmp(sha, row->sha) == 0 && orb_alignment_read(ctx, bytes, size, shapes, shape_count, out) == ORB_OK;
   }
-  if (fine) {
+  if (fine && cat) {
     catalogue_touch(cat, RESOURCE_ALIGNMENT, id);
-  } else {
+  } else if (!fine) {
     log_warn("the kept alignment %s cannot be used; it is computed again", id);
   }
   free(bytes);
-  resource_free(&row);
   return fine;
 }
 
-static store_result publish(catalogue *cat, objects *store, const char *id, const orb_buffer *bytes) {
+store_result alignments_publish(catalogue *cat, objects *store, const char *id, const void *bytes, size_t size) {
   char json[API_ID_SIZE + 16];
   resource row = {
-      .kind = RESOURCE_ALIGNMENT, .json = json, .bytes = (int64_t)bytes->size, .created = (int64_t)time(NULL) * 1000};
+      .kind = RESOURCE_ALIGNMENT, .json = json, .bytes = (int64_t)size, .created = (int64_t)time(NULL) * 1000};
   snprintf(json, sizeof json, "{\"id\":\"%s\"}", id);
   memcpy(row.id, id, sizeof row.id);
-  api_id_of_text((const char *)bytes->data, bytes->size, row.sha);
+  api_id_of_text((const char *)bytes, size, row.sha);
   objects_hold(store);
-  store_result result = objects_put(store, OBJECT_ALIGNMENT, id, bytes->data, bytes->size);
-  if (result == STORE_OK) {
+  store_result result = objects_put(store, OBJECT_ALIGNMENT, id, bytes, size);
+  if (result == STORE_OK && cat) {
     result = catalogue_put_alignment(cat, &row);
   }
   objects_let_go(store);
@@ -54,7 +50,8 @@ void alignments_put(catalogue *cat, objects *store, orb_context *ctx, const char
                     const orb_alignment *alignment) {
   orb_buffer bytes = {0};
   if (orb_alignment_write(ctx, shapes, alignment, &bytes) != ORB_OK ||
-      (objects_free_bytes(store) / ROOM >= bytes.size && publish(cat, store, id, &bytes) != STORE_OK)) {
+      (objects_free_bytes(store) / ROOM >= bytes.size &&
+       alignments_publish(cat, store, id, bytes.data, bytes.size) != STORE_OK)) {
     log_warn("the alignment %s could not be kept", id);
   }
   orb_buffer_free(ctx, &bytes);

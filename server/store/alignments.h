@@ -7,10 +7,13 @@
 #include "orbmorph/kept.h"
 #include "store/catalogue.h"
 
-/* 1 with the alignment, verified against its hash and certified again; 0: none is kept, or it cannot be used. Blocks.
- */
-int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const char *id,
+/* 1 with the alignment of this row, verified against its hash and certified again; 0: it cannot be used. Blocks. cat:
+ * NULL in a process of its own, here and below: the daemon notes the use and writes the row. */
+int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const resource *row,
                    const orb_align_shape *shapes, int32_t shape_count, orb_alignment *out);
+
+/* Stores the bytes of an alignment, and its row. Blocks for a commit. */
+store_result alignments_publish(catalogue *cat, objects *store, const char *id, const void *bytes, size_t size);
 
 /* Keeps an alignment of these shapes, unless the disk is nearly full. Failures are logged and have no consequence but
  * the time of another alignment. Blocks for a commit. */

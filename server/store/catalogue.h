@@ -128,6 +128,8 @@ store_result catalogue_job_list_it(catalogue *cat, const char *id); /* sets `lis
 store_result catalogue_job_claim(catalogue *cat, const char *id, int attempt, int alone, int64_t now);
 /* running → queued again; its attempt does not count. */
 store_result catalogue_job_release(catalogue *cat, const char *id, int attempt);
+/* running → queued again: its process died. counts: its crash, see queue_crashed(). */
+store_result catalogue_job_crashed(catalogue *cat, const job_row *row, int counts, int suspect, int64_t now);
 /* How a job ends. */
 typedef struct job_end {
   api_job_state state;
@@ -146,7 +148,7 @@ enum { CATALOGUE_UNFINISHED = -2 }; /* as a state: queued or running */
 int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, int state, int64_t before, int limit,
                        job_row *out);
 /* After a crash: queues jobs that were running again, as suspects, and fails those that crashed alone `most_crashes`
- * times. */
+ * times. most_crashes 0: the crash was not theirs; they are queued as they were. */
 store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, const char *crash_problem);
 /* Unfinished jobs, oldest first, only those after sequence number `after`. */
 int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out);

@@ -121,6 +121,9 @@ static const char *const migrations[] = {
     "CREATE INDEX receiver_next ON receiver(next);",
     /* Alignments. */
     "INSERT INTO total(kind, bytes) VALUES(4, 0);",
+    /* Deaths of processes, by the key of their work. */
+    "CREATE TABLE crash(key TEXT PRIMARY KEY, mesh TEXT NOT NULL, tenant TEXT NOT NULL, count INTEGER NOT NULL,"
+    " last INTEGER NOT NULL) WITHOUT ROWID;",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

@@ -1,6 +1,7 @@
 /* Rows of jobs and events. */
 #include <stdlib.h>
 
+#include "store/crashes.h"
 #include "store/deliveries.h"
 #include "store/owners.h"
 #include "store/rows.h"
@@ -40,7 +41,8 @@ static int insert(database *db, void *arg) {
   sqlite3_bind_text(st, 8, r->request, -1, SQLITE_STATIC);
   sqlite3_bind_int64(st, 9, r->created);
   sqlite3_bind_text(st, 10, r->charged, -1, SQLITE_STATIC);
-  int code = database_run(db, st);
+  int code = crash_check(db, r->key);
+  code = code == SQLITE_OK ? database_run(db, st) : code;
   r->seq = sqlite3_last_insert_rowid(db->handle);
   code = code == SQLITE_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
   return code == SQLITE_OK && hook ? delivery_subscribe(db, r->id, hook) : code;
@@ -52,7 +54,8 @@ store_result catalogue_job_insert(catalogue *cat, job_row *row, const job_webhoo
 
 typedef struct change {
   const char *id, *problem;
-  int attempt, alone;
+  int attempt, alone, counts;
+  const job_row *row;
   int64_t now;
   const job_end *end;
 } change;
@@ -109,6 +112,25 @@ static int release(database *db, void *arg) {
 store_result catalogue_job_release(catalogue *cat, const char *id, int attempt) {
   change c = {.id = id, .attempt = attempt};
   return catalogue_write(cat, release, &c);
+}
+
+static int crashed(database *db, void *arg) {
+  const change *c = arg;
+  sqlite3_stmt *st = database_statement(
+      db, "UPDATE job SET state=0, alone=0, crashes=crashes+?3, suspect=?4 WHERE id=?1 AND state=1 AND attempt=?2");
+  if (st) {
+    sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
+    sqlite3_bind_int(st, 2, c->attempt);
+    sqlite3_bind_int(st, 3, c->counts);
+    sqlite3_bind_int(st, 4, c->alone);
+  }
+  int code = must_change(db, st);
+  return code == SQLITE_OK && c->counts ? crash_note(db, c->row->key, c->row->request, c->row->owner, c->now) : code;
+}
+
+store_result catalogue_job_crashed(catalogue *cat, const job_row *row, int counts, int suspect, int64_t now) {
+  change c = {.id = row->id, .attempt = row->attempt, .counts = counts, .alone = suspect, .row = row, .now = now};
+  return catalogue_write(cat, crashed, &c);
 }
 
 static int write_event(database *db, const char *job, int64_t number, const char *type, const char *json) {
@@ -281,6 +303,9 @@ static int give_up(database *db, job_row *row, const change *c) {
  * alone, on purpose or because no other job was running. */
 static int recover(database *db, void *arg) {
   const change *c = arg;
+  if (c->attempt == 0) {
+    return database_run(db, database_statement(db, "UPDATE job SET state=0, alone=0 WHERE state=1"));
+  }
   sqlite3_stmt *st = database_statement(db,
                                         "UPDATE job SET crashes=crashes+1 WHERE state=1 AND"
                                         " (alone=1 OR (SELECT count(*) FROM job WHERE state=1)=1)");

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -20,6 +21,7 @@ static const char *const folders[OBJECT_KINDS] = {"mesh",    "sphere",    "asset
 struct objects {
   pthread_rwlock_t publishing;
   char root[PATH_MAX - 256];
+  objects_remote remote; /* publish NULL: the store has files */
 };
 
 static store_result failed(const char *what, const char *path) {
@@ -110,6 +112,17 @@ store_result objects_open(const char *data, objects **out) {
   return STORE_OK;
 }
 
+store_result objects_open_remote(const objects_remote *remote, objects **out) {
+  objects *store = calloc(1, sizeof *store);
+  if (!store) {
+    return STORE_ERROR;
+  }
+  pthread_rwlock_init(&store->publishing, NULL);
+  store->remote = *remote;
+  *out = store;
+  return STORE_OK;
+}
+
 void objects_close(objects *store) {
   if (store) {
     pthread_rwlock_destroy(&store->publishing);
@@ -129,6 +142,10 @@ void objects_let_go(objects *store) {
 
 store_result objects_begin(objects *store, object_temp *temp) {
   char path[PATH_MAX];
+  if (store->remote.publish) {
+    *temp = (object_temp){.fd = memfd_create("object", MFD_CLOEXEC), .store = store};
+    return temp->fd >= 0 ? STORE_OK : failed("create", "an object in memory");
+  }
   snprintf(path, sizeof path, "%s/tmp/put-XXXXXX", store->root);
   temp->fd = mkostemp(path, O_CLOEXEC);
   temp->store = store;
@@ -149,7 +166,9 @@ store_result objects_append(object_temp *temp, const void *bytes, size_t size) {
     }
     at += n;
     size -= (size_t)n;
-    FAULT_POINT("temp-written");
+    if (!temp->store->remote.publish) {
+      FAULT_POINT("temp-written");
+    }
   }
   return STORE_OK;
 }
@@ -162,14 +181,21 @@ void objects_abandon(object_temp *temp) {
   char path[PATH_MAX];
   if (temp->fd >= 0) {
     close(temp->fd);
-    temp_path(temp, path);
-    unlink(path);
     temp->fd = -1;
+    if (!temp->store->remote.publish) {
+      temp_path(temp, path);
+      unlink(path);
+    }
   }
 }
 
 store_result objects_publish(objects *store, object_temp *temp, object_kind kind, const char *id) {
   char path[PATH_MAX], from[PATH_MAX];
+  if (store->remote.publish) {
+    store_result status = store->remote.publish(store->remote.user, kind, id, temp->fd);
+    objects_abandon(temp);
+    return status;
+  }
   path_of(store, kind, id, path);
   FAULT_POINT("publish-written");
   if (fsync(temp->fd) != 0) {
@@ -209,6 +235,9 @@ store_result objects_put(objects *store, object_kind kind, const char *id, const
 store_result objects_read(const objects *store, object_kind kind, const char *id, int *fd, uint64_t *size) {
   char path[PATH_MAX];
   struct stat info;
+  if (store->remote.read) {
+    return store->remote.read(store->remote.user, kind, id, fd, size);
+  }
   path_of(store, kind, id, path);
   *fd = open(path, O_RDONLY | O_CLOEXEC);
   if (*fd < 0) {
@@ -260,6 +289,9 @@ store_result objects_delete(const objects *store, object_kind kind, const char *
 }
 
 uint64_t objects_free_bytes(const objects *store) {
+  if (store->remote.publish) {
+    return UINT64_MAX; /* the daemon looks */
+  }
   struct statvfs info;
   return statvfs(store->root, &info) == 0 ? (uint64_t)info.f_bavail * info.f_frsize : UINT64_MAX;
 }

@@ -37,6 +37,15 @@ typedef struct objects objects;
 
 /* Creates the folders under data and deletes temporary files. */
 store_result objects_open(const char *data, objects **out);
+
+/* A store for a process that has no files: temporary files lie in memory, and these functions take what is published
+ * and give what is read. publish: the descriptor stays the caller's. */
+typedef struct objects_remote {
+  store_result (*publish)(void *user, object_kind kind, const char *id, int fd);
+  store_result (*read)(void *user, object_kind kind, const char *id, int *fd, uint64_t *size);
+  void *user;
+} objects_remote;
+store_result objects_open_remote(const objects_remote *remote, objects **out);
 void objects_close(objects *store);
 
 typedef struct object_temp {

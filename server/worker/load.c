@@ -14,6 +14,26 @@ void run_problem_of_store(store_result result, api_problem *problem) {
   }
 }
 
+store_result run_get(const run_env *env, resource_kind kind, const char *id, resource *out) {
+  return env->get ? env->get(env->user, kind, id, out) : catalogue_get(env->cat, kind, id, out);
+}
+
+/* Loads an object whose bytes have this hash. */
+static int load_verified(const run_env *env, object_kind kind, const char *id, const char *sha, unsigned char **bytes,
+                         size_t *size) {
+  char found[API_ID_SIZE];
+  if (objects_load(env->store, kind, id, bytes, size) != STORE_OK) {
+    return 0;
+  }
+  api_id_of_text((const char *)*bytes, *size, found);
+  if (strcmp(found, sha) == 0) {
+    return 1;
+  }
+  free(*bytes);
+  *bytes = NULL;
+  return 0;
+}
+
 static void note_triangles(const orb_mesh *raw, file_triangle *noted, int32_t count) {
   for (int32_t i = 0; i < count; i++) {
     int32_t t = noted[i].index;
@@ -49,15 +69,16 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
   unsigned char *bytes = NULL;
   size_t size;
   memset(mesh, 0, sizeof *mesh);
-  store_result found = catalogue_get(env->cat, RESOURCE_MESH, id, &row);
+  store_result found = run_get(env, RESOURCE_MESH, id, &row);
   if (found == STORE_NOT_FOUND) {
     return api_refuse(problem, "not-found", "Mesh %s was deleted before the job could use it.", id);
   }
   int fine = found == STORE_OK && api_mesh_summarise(row.json, &summary) &&
              api_repair_parse(summary.repair, &repair, canonical, problem);
+  fine = fine && load_verified(env, OBJECT_MESH, id, row.sha, &bytes, &size);
   resource_free(&row);
-  if (!fine || objects_load(env->store, OBJECT_MESH, id, &bytes, &size) != STORE_OK) {
-    return api_refuse(problem, "corrupt", "The stored mesh %s cannot be read.", id);
+  if (!fine) {
+    return api_refuse(problem, "corrupt", "The stored mesh %s cannot be read or was altered; upload it again.", id);
   }
   orb_status status = orb_mesh_read(ctx, bytes, size, orb_format_of_name(summary.format), mesh, NULL);
   free(bytes);
@@ -76,10 +97,12 @@ int run_load_points(const run_env *env, orb_context *ctx, const char *embedding,
   unsigned char *bytes = NULL;
   size_t size = 0;
   *points = NULL;
-  store_result found = objects_load(env->store, OBJECT_SPHERE, embedding, &bytes, &size);
+  resource row = {0};
+  int fine = run_get(env, RESOURCE_EMBEDDING, embedding, &row) == STORE_OK &&
+             load_verified(env, OBJECT_SPHERE, embedding, row.sha, &bytes, &size);
+  resource_free(&row);
   size_t count = (size_t)mesh->vertex_count;
-  const unsigned char *first =
-      found == STORE_OK ? sphere_points(bytes, size, mesh->vertex_count, mesh->triangle_count) : NULL;
+  const unsigned char *first = fine ? sphere_points(bytes, size, mesh->vertex_count, mesh->triangle_count) : NULL;
   if (!first) {
     free(bytes);
     return api_refuse(problem, "corrupt", "The stored embedding %s cannot be read or does not match its mesh.",
@@ -90,7 +113,9 @@ int run_load_points(const run_env *env, orb_context *ctx, const char *embedding,
     memcpy(*points + 3 * v, first + v * SPHERE_STRIDE, 3 * sizeof(double));
   }
   free(bytes);
-  catalogue_touch(env->cat, RESOURCE_EMBEDDING, embedding);
+  if (env->cat) {
+    catalogue_touch(env->cat, RESOURCE_EMBEDDING, embedding);
+  }
   return *points != NULL;
 }
 

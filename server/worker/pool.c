@@ -2,20 +2,23 @@
 
 #include <pthread.h>
 #include <semaphore.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "api/json.h"
 #include "faults.h"
+#include "isolate/isolate.h"
 #include "log.h"
 #include "metrics.h"
 #include "store/keys.h"
 #include "store/owners.h"
-#include "worker/run.h"
+#include "worker/isolated.h"
 
 enum { FETCHERS = 8 };
 
@@ -189,6 +192,47 @@ static void fetch_one(worker_pool *pool, job *j) {
   orb_context_destroy(ctx);
 }
 
+/* Runs the job in a process of its own, or within this one. */
+static int run_somewhere(worker_pool *pool, const run_env *env, orb_context *ctx, job *j, int threads, run_output *out,
+                         api_problem *problem, isolated_end *end) {
+  const run_job task = {job_key(j), job_request(j), queue_embed_ms(env->q, j)};
+  if (isolate_is_on()) {
+    const isolated_limits limits = {.memory = pool->options.job_memory,
+                                    .deadline_ms = orb_clock_ms() + pool->options.job_ms,
+                                    .max_triangles = pool->options.max_triangles,
+                                    .threads = threads,
+                                    .nice = pool->options.nice};
+    return isolated_run(env, ctx, job_kind(j), &task, &limits, out, problem, end);
+  }
+  FAULT_POINT(job_key(j));
+  return job_kind(j) == API_JOB_EMBEDDING ? run_embedding(env, ctx, &task, out, problem)
+                                          : run_supermesh(env, ctx, &task, out, problem);
+}
+
+/* The process of the job died. The kernel sends SIGKILL where memory is short, which another job may have caused: such
+ * a job runs alone next time, and its crash counts then. */
+static void crashed(const run_env *env, job *j, const isolated_end *end) {
+  int may_be_memory = end->status == -1 || (WIFSIGNALED(end->status) && WTERMSIG(end->status) == SIGKILL);
+  int counts = !may_be_memory || queue_runs_alone(env->q, j);
+  char fields[128];
+  snprintf(fields, sizeof fields, "\"job\":\"%s\"", job_id(j));
+  log_write(LOG_ERROR, fields, "the process of the job %s", end->why);
+  if (!queue_crashed(env->q, j, counts)) {
+    return;
+  }
+  api_problem problem = {0};
+  api_text text = {0};
+  api_refuse(
+      &problem, "job-crashed",
+      "The process of this job died %d times, the last time because it %s; the job is not retried. Please report "
+      "this as a bug, with its meshes.",
+      MOST_CRASHES, end->why);
+  api_problem_write(&problem, &text);
+  queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data, NULL);
+  api_text_free(&text);
+  api_problem_free(&problem);
+}
+
 static void run_claimed(worker_pool *pool, job *j, int threads) {
   job_progress progress = {.q = pool->env.q, .j = j};
   run_env env_of_job = pool->env, *env = &env_of_job;
@@ -201,9 +245,10 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
     return;
   }
   FAULT_POINT("run-begun");
-  FAULT_POINT(job_key(j));
   int embedding = job_kind(j) == API_JOB_EMBEDDING;
-  int fine = embedding ? run_embedding(env, ctx, j, &out, &problem) : run_supermesh(env, ctx, j, &out, &problem);
+  isolated_end end = {0};
+  int fine = run_somewhere(pool, env, ctx, j, threads, &out, &problem, &end);
+  metrics_flips(out.flips);
   queue_set_context(env->q, j, NULL);
   progress_enter(&progress, "");
   FAULT_POINT("run-done");
@@ -212,7 +257,9 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
     catalogue_key_use(env->cat, job_charged(j), (int64_t)time(NULL) / 86400, 0, (int64_t)(1e3 * seconds * threads));
   }
   report(j, fine, seconds);
-  if (fine) {
+  if (end.died) {
+    crashed(env, j, &end);
+  } else if (fine) {
     if (embedding) {
       queue_add_embed_ms(env->q, j, 1e3 * seconds);
     }

@@ -19,6 +19,10 @@ void progress_enter(job_progress *progress, const char *stage) {
 
 void progress_report(void *user, const char *stage, double fraction) {
   job_progress *progress = user;
+  if (progress->show) {
+    progress->show(progress->user, stage, fraction);
+    return;
+  }
   progress_enter(progress, stage);
   queue_progress(progress->q, progress->j, stage, fraction);
 }

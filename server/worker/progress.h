@@ -5,8 +5,10 @@
 #include "queue/queue.h"
 
 typedef struct job_progress {
-  queue *q;
+  queue *q; /* NULL: show() */
   job *j;
+  void (*show)(void *user, const char *stage, double fraction);
+  void *user;
   char stage[24];
   double began;
 } job_progress;

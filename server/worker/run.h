@@ -12,29 +12,43 @@
 #include "worker/progress.h"
 
 typedef struct run_env {
-  queue *q;
+  queue *q; /* NULL in a process of its own, as is the catalogue */
   catalogue *cat;
   objects *store;
   job_progress *progress; /* of the job; NULL outside a run */
+  /* In place of catalogue_get(), in a process of its own. */
+  store_result (*get)(void *user, resource_kind kind, const char *id, resource *out);
+  void *user;
 } run_env;
 
+/* What a run needs to know of its job. */
+typedef struct run_job {
+  const char *key, *request;
+  double embed_ms; /* that its embeddings took */
+} run_job;
+
 typedef struct run_output {
-  resource row; /* json is allocated with malloc(); NULL: the result existed already */
-  int holds;    /* objects_hold() was called; let go after the row is committed */
-  int gone;     /* an embedding that the job needs was deleted after planning */
+  resource row;  /* json is allocated with malloc(); NULL: the result existed already */
+  int holds;     /* objects_hold() was called; let go after the row is committed */
+  int gone;      /* an embedding that the job needs was deleted after planning */
+  int64_t flips; /* that certificates of the result count */
 } run_output;
 
 /* Each runs a claimed job: 1 with *out filled, or 0 with the problem. A problem without a name: the context holds the
  * error. */
-int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem);
-int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem);
+int run_embedding(const run_env *env, orb_context *ctx, const run_job *j, run_output *out, api_problem *problem);
+int run_supermesh(const run_env *env, orb_context *ctx, const run_job *j, run_output *out, api_problem *problem);
+
+/* A row of the catalogue. */
+store_result run_get(const run_env *env, resource_kind kind, const char *id, resource *out);
 
 typedef struct fetch_options {
-  networks allowed;        /* besides public addresses */
-  const char *authorities; /* PEM file of certificate authorities; "": those of the system */
-  int64_t total_ms, most;  /* limits on the time and the bytes of a download */
-  int64_t disk_reserve;    /* bytes that it leaves free */
-  sem_t *checks;           /* limits how many check a mesh at once */
+  networks allowed;                        /* besides public addresses */
+  const char *authorities;                 /* PEM file of certificate authorities; "": those of the system */
+  int64_t total_ms, most;                  /* limits on the time and the bytes of a download */
+  int64_t disk_reserve;                    /* bytes that it leaves free */
+  int64_t check_ms, memory, max_triangles; /* limits on the check */
+  sem_t *checks;                           /* limits how many check a mesh at once */
 } fetch_options;
 /* Downloads and stores the mesh of a taken job, and claims the job in between. 1 with the mesh; 0 with the problem as
  * above, or with *claimed 0: the claim could not be stored. */

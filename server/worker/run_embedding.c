@@ -3,12 +3,11 @@
 #include <time.h>
 
 #include "api/json.h"
-#include "metrics.h"
 #include "worker/run.h"
 
-static int read_request(const job *j, api_embedding_request *request, api_problem *problem) {
+static int read_request(const run_job *j, api_embedding_request *request, api_problem *problem) {
   api_json_error error;
-  cJSON *body = api_json_parse(job_request(j), strlen(job_request(j)), &error);
+  cJSON *body = api_json_parse(j->request, strlen(j->request), &error);
   int fine = body ? api_embedding_request_read(body, request, problem)
                   : api_refuse(problem, "corrupt", "The stored request of the job does not decode.");
   cJSON_Delete(body);
@@ -32,7 +31,7 @@ static int store_sphere(const run_env *env, orb_context *ctx, const char *key, c
   return fine;
 }
 
-int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem) {
+int run_embedding(const run_env *env, orb_context *ctx, const run_job *j, run_output *out, api_problem *problem) {
   resource *result = &out->row;
   api_embedding_request request;
   orb_mesh mesh = {0};
@@ -42,7 +41,7 @@ int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out,
   if (!read_request(j, &request, problem)) {
     return 0;
   }
-  if (catalogue_get(env->cat, RESOURCE_EMBEDDING, job_key(j), &known) == STORE_OK) {
+  if (run_get(env, RESOURCE_EMBEDDING, j->key, &known) == STORE_OK) {
     resource_free(&known); /* of an earlier attempt or another owner */
     return 1;
   }
@@ -56,19 +55,19 @@ int run_embedding(const run_env *env, orb_context *ctx, job *j, run_output *out,
   if (orb_embed(ctx, &mesh, &request.options, &embedding) != ORB_OK) {
     goto done;
   }
-  metrics_flips(embedding.certificate.flipped);
+  out->flips += embedding.certificate.flipped;
   embedding.timings.check += checked;
   embedding.timings.total += checked;
   progress_report(env->progress, "store", 0);
   objects_hold(env->store);
   out->holds = 1;
-  if (!store_sphere(env, ctx, job_key(j), &mesh, &embedding, result, problem)) {
+  if (!store_sphere(env, ctx, j->key, &mesh, &embedding, result, problem)) {
     goto done;
   }
   api_text json = {0};
   result->kind = RESOURCE_EMBEDDING;
   result->created = (int64_t)time(NULL) * 1000;
-  memcpy(result->id, job_key(j), sizeof result->id);
+  memcpy(result->id, j->key, sizeof result->id);
   api_embedding_write(result->id, &request, &embedding, result->created, &json);
   result->json = json.data;
   fine = !json.failed;

@@ -132,7 +132,10 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
   } else if (stored == STORE_NOT_FOUND) {
     while (sem_wait(d->options->checks) != 0) { /* interrupted by a signal */
     }
-    stored = intake_store(&file, env->cat, env->store, d->ctx, job_owner(j), wish->quota, &fresh, problem);
+    const intake_limits limits = {.memory = d->options->memory,
+                                  .deadline_ms = orb_clock_ms() + d->options->check_ms,
+                                  .max_triangles = d->options->max_triangles};
+    stored = intake_store(&file, env->cat, env->store, d->ctx, &limits, job_owner(j), wish->quota, &fresh, problem);
     sem_post(d->options->checks);
   }
   intake_close(&file);

@@ -4,7 +4,6 @@
 #include <time.h>
 
 #include "api/json.h"
-#include "metrics.h"
 #include "store/alignments.h"
 #include "store/spheres.h"
 #include "worker/places.h"
@@ -36,9 +35,9 @@ static void free_input(orb_context *ctx, merge_input *in) {
   api_supermesh_request_free(&in->request);
 }
 
-static int read_request(const job *j, api_supermesh_request *request, api_problem *problem) {
+static int read_request(const run_job *j, api_supermesh_request *request, api_problem *problem) {
   api_json_error error;
-  cJSON *body = api_json_parse(job_request(j), strlen(job_request(j)), &error);
+  cJSON *body = api_json_parse(j->request, strlen(j->request), &error);
   int fine = body ? api_supermesh_request_read(body, request, problem)
                   : api_refuse(problem, "corrupt", "The stored request of the job does not decode.");
   cJSON_Delete(body);
@@ -94,7 +93,7 @@ static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int
   orb_free(ctx, noted);
   if (fine && !run_load_points(env, ctx, embedding, &in->meshes[s], &in->points[s], problem)) {
     resource known = {0};
-    in->gone = catalogue_get(env->cat, RESOURCE_EMBEDDING, embedding, &known) == STORE_NOT_FOUND;
+    in->gone = run_get(env, RESOURCE_EMBEDDING, embedding, &known) == STORE_NOT_FOUND;
     resource_free(&known);
     fine = 0;
   }
@@ -179,14 +178,14 @@ static api_place *found_spots(orb_context *ctx, const merge_input *in, const orb
   return spots;
 }
 
-static int store_result_of(const run_env *env, orb_context *ctx, job *j, const merge_input *in,
+static int store_result_of(const run_env *env, orb_context *ctx, const run_job *j, const merge_input *in,
                            const orb_merge_result *merged, resource *result, api_problem *problem) {
   api_text json = {0};
   api_id_of_text((const char *)merged->asset.data, merged->asset.size, result->sha);
   result->kind = RESOURCE_SUPERMESH;
   result->bytes = (int64_t)merged->asset.size;
   result->created = (int64_t)time(NULL) * 1000;
-  memcpy(result->id, job_key(j), sizeof result->id);
+  memcpy(result->id, j->key, sizeof result->id);
   store_result stored = objects_put(env->store, OBJECT_ASSET, result->id, merged->asset.data, merged->asset.size);
   if (stored != STORE_OK) {
     run_problem_of_store(stored, problem);
@@ -199,7 +198,7 @@ static int store_result_of(const run_env *env, orb_context *ctx, job *j, const m
   if (!found) {
     return 0;
   }
-  api_supermesh_write(result->id, &in->request, merged, found, queue_embed_ms(env->q, j), result->created, &json);
+  api_supermesh_write(result->id, &in->request, merged, found, j->embed_ms, result->created, &json);
   orb_free(ctx, found);
   if (json.failed) {
     api_text_free(&json);
@@ -217,8 +216,13 @@ static int align_shapes(const run_env *env, orb_context *ctx, const merge_input 
   const int named = api_alignment_id(request, id);
   progress_report(env->progress, "align", 0);
   *seconds = 0;
-  if (named && alignments_get(env->cat, env->store, ctx, id, in->shapes, request->shape_count, out)) {
-    return 1;
+  resource row = {0};
+  if (named && run_get(env, RESOURCE_ALIGNMENT, id, &row) == STORE_OK) {
+    int kept = alignments_get(env->cat, env->store, ctx, &row, in->shapes, request->shape_count, out);
+    resource_free(&row);
+    if (kept) {
+      return 1;
+    }
   }
   const double began = orb_clock();
   if (orb_align(ctx, in->shapes, request->shape_count, in->landmarks, request->landmarks.count, &request->merge.align,
@@ -245,10 +249,10 @@ static int merge(const run_env *env, orb_context *ctx, const merge_input *in, or
   return 1;
 }
 
-int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out, api_problem *problem) {
+int run_supermesh(const run_env *env, orb_context *ctx, const run_job *j, run_output *out, api_problem *problem) {
   resource known = {0};
   orb_merge_result merged;
-  if (catalogue_get(env->cat, RESOURCE_SUPERMESH, job_key(j), &known) == STORE_OK) {
+  if (run_get(env, RESOURCE_SUPERMESH, j->key, &known) == STORE_OK) {
     resource_free(&known); /* of an earlier attempt or another owner */
     return 1;
   }
@@ -261,7 +265,7 @@ int run_supermesh(const run_env *env, orb_context *ctx, job *j, run_output *out,
       read_request(j, &in->request, problem) && load_input(env, ctx, in, problem) && merge(env, ctx, in, &merged);
   if (fine) {
     for (int32_t s = 0; s < in->request.shape_count; s++) {
-      metrics_flips(merged.alignment.shapes[s].certificate.flipped);
+      out->flips += merged.alignment.shapes[s].certificate.flipped;
     }
     progress_report(env->progress, "store", 0);
     objects_hold(env->store);

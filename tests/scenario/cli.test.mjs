@@ -69,6 +69,17 @@ test('wrong usage exits with 2 and explains the error', async () => {
     ['upload', dog, '/nowhere/mesh.obj'],
     ['ls', '--state', 'lost'],
     ['get', '0'.repeat(64), '-o', '/nowhere/x'],
+    ['morph', dog, giraffe, '-o', 'x.gltf'],
+    ['merge', dog, giraffe, '-o', 'a.jpg'],
+    ['morph', dog, giraffe, '--report', 'report.html'],
+    ['embed', dog, '-o', 'sphere.obj'],
+    ['get', '0'.repeat(64), '--part', 'asset', '-o', 'a.ply'],
+    ['view', 'out.glb', '-o', 'a.jpg'],
+    ['view', 'out.glb', '--up', 'w'],
+    ['morph', dog, giraffe, '--align', 'pin'],
+    ['morph', dog, giraffe, '-t', '500%'],
+    ['morph', dog, giraffe, '-t', '%'],
+    ['studio', '/nowhere/mesh.obj'],
   ]) {
     const { code, err, out } = await run(args, { env: { ORBMORPH_SERVER: 'http://127.0.0.1:9' } });
     assert.equal(code, 2, `${args}: ${code} ${err}`);
@@ -76,7 +87,7 @@ test('wrong usage exits with 2 and explains the error', async () => {
   }
   const help = await run(['--help']);
   assert.equal(help.code, 0);
-  for (const name of ['morph', 'upload', 'embed', 'merge', 'job', 'ls', 'get', 'rm', 'doctor', 'view']) {
+  for (const name of ['morph', 'upload', 'embed', 'merge', 'job', 'ls', 'get', 'rm', 'doctor', 'view', 'studio']) {
     assert.match(help.out, new RegExp(`^  ${name} `, 'm'));
     assert.equal((await run([name, '--help'])).code, 0);
   }
@@ -354,7 +365,9 @@ test('a refused request exits with 1 and prints the problem on standard error', 
   assert.equal(morph.code, 1);
   assert.match(morph.err, /not-genus-zero/);
   assert.ok(!(await readdir(at)).includes('never.glb'));
-  const pin = await run(['morph', dog, giraffe, '--align', 'pin', '-o', path.join(at, 'never.glb')], { env });
+  const pin = await run(['morph', dog, giraffe, '--set', 'align.method=pin', '-o', path.join(at, 'never.glb')], {
+    env,
+  });
   assert.equal(pin.code, 1);
   assert.match(pin.err, /bad-landmarks/);
 
@@ -442,4 +455,79 @@ test('view draws a picture of a morph', async (t) => {
   assert.equal(png.toString('latin1', 1, 4), 'PNG');
   assert.deepEqual([png.readUInt32BE(16), png.readUInt32BE(20)], [192, 64]);
   assert.equal((await run(['view', dog], { cwd: at })).code, 2);
+});
+
+test('a tolerance may be a percentage', async (t) => {
+  const d = await daemon(t);
+  const at = await folder(t);
+  const args = ['--json', '-q', '-o', path.join(at, 'x.glb'), '-l', landmarks];
+  const env = { ORBMORPH_SERVER: d.url };
+  const { code, out, err } = await run(['morph', dog, giraffe, '-t', '5%', ...args], { env });
+  assert.equal(code, 0, err);
+  assert.equal(JSON.parse(out).request.remesh.tolerance, 0.05);
+});
+
+test('a report warns of what is worse than asked, and only of that', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  const report = path.join(at, 'report.md');
+  const morph = async (...args) => {
+    const made = await run(['morph', dog, giraffe, '-l', landmarks, '-o', path.join(at, 'x.glb'), ...args], { env });
+    assert.equal(made.code, 0, made.err);
+    return made.out;
+  };
+  assert.doesNotMatch(await morph('--report', report), /warning/);
+  assert.doesNotMatch(await readFile(report, 'utf8'), /## Warnings/);
+  assert.match(
+    await morph('-n', '100', '--report', report),
+    /warning: The morph differs .*: dog by up to [\d.]+ %, giraffe by/,
+  );
+  assert.match(await readFile(report, 'utf8'), /## Warnings\n\n(.*\n)*\* The morph differs .* \(tolerance 0\.1 %\)/);
+});
+
+test('studio starts a daemon of its own on a free port, uploads files and opens the browser', async (t) => {
+  const at = await folder(t);
+  const seen = path.join(at, 'seen');
+  const browser = path.join(at, 'browser');
+  await writeFile(browser, `#!/bin/sh\necho "$1" > ${quoted(seen)}.part && mv ${quoted(seen)}.part ${quoted(seen)}\n`, {
+    mode: 0o755,
+  });
+  const child = spawn(binaries.client, ['studio', '--data', path.join(at, 'data'), dog], {
+    env: { ...process.env, BROWSER: browser },
+    stdio: ['ignore', 'pipe', 'inherit'],
+  });
+  t.after(() => child.kill('SIGKILL'));
+  let out = '';
+  child.stdout.on('data', (chunk) => (out += chunk));
+  await until(() => out.includes('\n') && stat(seen).catch(() => null), 'the browser');
+  const url = out.trim();
+  assert.equal((await readFile(seen, 'utf8')).trim(), url);
+  const [, address, id] = url.match(/^(http:\/\/127\.0\.0\.1:\d+)\/#m=([0-9a-f]{64})$/);
+  assert.match(await (await fetch(`${address}/`)).text(), /<title>/);
+  assert.equal((await (await fetch(`${address}/v1/meshes/${id}`)).json()).name, 'dog');
+  const ended = new Promise((resolve) => child.on('exit', (code, signal) => resolve(code ?? signal)));
+  child.kill('SIGINT');
+  assert.equal(await ended, 0);
+  await assert.rejects(fetch(`${address}/livez`), 'its daemon is gone, too');
+});
+
+test('doctor says what a repair would leave, and calls none helpful that takes most of the mesh', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  const crumb = path.join(at, 'crumb.obj');
+  const herd = path.join(at, 'herd.obj');
+  await writeFile(crumb, shapes.obj(shapes.apart(shapes.ball(3), shapes.ball(1))));
+  const three = shapes.apart(shapes.ball(2), shapes.apart(shapes.ball(2), shapes.ball(2), 20), 10);
+  await writeFile(herd, shapes.obj(three));
+  const helps = await run(['doctor', crumb], { env });
+  assert.equal(helps.code, 1);
+  assert.match(
+    helps.out,
+    /helps: orbmorph upload --repair largest_component .*\n {2}left: 512 triangles; the file has 544/,
+  );
+  const worse = await run(['doctor', herd], { env });
+  assert.doesNotMatch(worse.out, /helps/);
+  assert.match(worse.out, /largest_component keeps only 128 of 384 triangles \(33 %\)/);
 });

@@ -43,6 +43,7 @@ test('the demo morphs the samples', { skip }, async () => {
   await clean(found(out, 'GLB'));
   assert.match(await readFile(found(out, 'Report'), 'utf8'), /^# Morph of dog, giraffe/);
   assert.equal(JSON.parse(await readFile(found(out, 'JSON'), 'utf8')).certificate.landmarks_exact, true);
+  assert.match(out, /^morphing dog\.obj and 1 more at http/m, 'it says what it does');
 });
 
 test('the demo takes files as arguments', { skip }, async (t) => {

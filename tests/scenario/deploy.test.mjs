@@ -25,6 +25,18 @@ test('the unit is sandboxed', { skip: lacks('systemd-analyze') }, () => {
   assert.doesNotMatch(verified, /Unknown|Failed to parse|Invalid|ignoring/i);
 });
 
+test('the unit denies what the daemon refuses: all but public addresses', async () => {
+  const unit = await readFile(path.join(root, 'deploy/orbmorphd.service'), 'utf8');
+  const source = await readFile(path.join(root, 'server/net/networks.c'), 'utf8');
+  const denied = [...unit.matchAll(/^IPAddressDeny=(.*)$/gm)].flatMap(([, list]) => list.split(' '));
+  const refused = [...source.matchAll(/"([0-9a-f.:]+\/\d+),?"/g)].map(([, network]) => network);
+  assert.ok(refused.length > 15, refused.join());
+  // Of IPv6 the daemon takes 2000::/3 without exceptions; the rest are three networks.
+  const others = ['::/3', '4000::/2', '8000::/1'];
+  assert.deepEqual(denied.toSorted(), [...refused.filter((network) => network !== '2000::/3'), ...others].toSorted());
+  assert.match(unit, /^IPAddressAllow=localhost$/m);
+});
+
 test('Prometheus takes the metrics, and the queries of the dashboard', { skip: lacks('promtool') }, async (t) => {
   const d = await daemon(t);
   await d.made('/v1/embeddings', { mesh: (await d.upload(shapes.obj(shapes.egg(2)))).json.id });

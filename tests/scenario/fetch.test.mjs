@@ -1,7 +1,7 @@
 // Meshes from a URL: POST /v1/meshes with {"url": …} is a job that downloads the file and takes it in as an upload.
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { runProgram } from './support/cli.mjs';
+import { folder, run, runProgram } from './support/cli.mjs';
 import { assertProblem, binaries, daemon, until } from './support/daemon.mjs';
 import { origin } from './support/origin.mjs';
 import * as shapes from './support/shapes.mjs';
@@ -208,4 +208,35 @@ test('a stop does not wait for a server that does not answer', async (t) => {
   assert.ok(Date.now() - began < 10_000, `${Date.now() - began} ms`);
   await d.start();
   assert.notEqual((await d.get(job.url)).json.state, 'failed');
+});
+
+test('the command line takes URLs where it takes files', async (t) => {
+  const d = await daemon(t, { args: allow });
+  const { url, requests } = await serve(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const cwd = await folder(t);
+  const uploaded = await run(['upload', `${url}/egg.obj`, '--name', 'ovum', '--json'], { env, cwd });
+  assert.equal(uploaded.code, 0, uploaded.err);
+  const mesh = JSON.parse(uploaded.out);
+  assert.equal(mesh.name, 'ovum');
+  assert.deepEqual((await d.upload(egg, { name: 'ovum' })).json, mesh);
+  assert.equal(requests.length, 1);
+  const plain = await run(['upload', `${url}/moved`], { env, cwd });
+  assert.equal(plain.code, 0, plain.err);
+  assert.match(plain.out, new RegExp(mesh.id));
+  const { id: other } = (await d.upload(shapes.obj(shapes.egg(3)), { name: 'long' })).json;
+  const merged = await run(['merge', `${url}/egg.obj`, other, '-o', 'out.glb', '--json'], { env, cwd });
+  assert.equal(merged.code, 0, merged.err);
+  assert.deepEqual(
+    JSON.parse(merged.out).shapes.map((shape) => shape.mesh),
+    [mesh.id, other],
+  );
+  const closed = await run(['upload', `${url}/open.obj`], { env, cwd });
+  assert.equal(closed.code, 1, closed.out);
+  assert.match(closed.err, /not closed/i);
+  const refused = await run(['upload', 'http://127.0.0.1:9/egg.obj'], { env, cwd });
+  assert.equal(refused.code, 1);
+  assert.match(refused.err, /forbidden-address|address/);
+  // doctor deletes what it uploads, and takes files only.
+  assert.equal((await run(['doctor', `${url}/egg.obj`], { env, cwd })).code, 2);
 });

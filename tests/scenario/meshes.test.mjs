@@ -23,7 +23,7 @@ test('the content of a mesh determines its id', async (t) => {
   assert.equal(mesh.format, 'obj');
   assert.equal(mesh.bytes, bytes.length);
   assert.equal(mesh.triangles, 2 * mesh.vertices - 4);
-  assert.equal(mesh.triangles, 5600);
+  assert.equal(mesh.triangles, bytes.toString().match(/^f /gm).length);
   assert.deepEqual(mesh.topology, {
     ...mesh.topology,
     components: 1,

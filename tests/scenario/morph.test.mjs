@@ -157,7 +157,7 @@ test('the problem of the job is the answer, and a recipe that fails is not compu
   const d = await daemon(t);
   const ids = await animals(d);
   const place = (i) => ({ vertex: i });
-  const contradiction = [{ at: [place(100), place(100)] }, { at: [place(100), place(2000)] }];
+  const contradiction = [{ at: [place(100), place(100)] }, { at: [place(100), place(600)] }];
   const { id } = (await d.post('/v1/landmarks', contradiction)).json;
   const url = `${plain(ids)}&landmarks=${id}`;
   const first = await d.get(url);

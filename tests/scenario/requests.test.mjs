@@ -20,6 +20,18 @@ function raw(d, text, { wait = 60_000 } = {}) {
 }
 const statusOf = (text) => Number(/^HTTP\/1\.[01] (\d+)/.exec(text)?.[1]);
 
+test('a query of very many parameters gets one clear answer', async (t) => {
+  const d = await daemon(t);
+  for (const count of [129, 250, 1000]) {
+    const query = Array.from({ length: count }, (_, i) => `a${i}=1`).join('&');
+    const reply = await raw(d, `GET /v1/meshes?${query} HTTP/1.1\r\nHost: localhost\r\n\r\n`);
+    assert.equal(statusOf(reply), 414, `${count}: ${reply}`);
+    assert.equal(reply.split('HTTP/1.1 ').length, 2, reply);
+    assert.match(reply, /"type":"\/problems\/uri-too-long"/);
+  }
+  assert.equal((await d.get('/livez')).status, 200);
+});
+
 test('unknown paths, unknown ids, wrong methods', async (t) => {
   const d = await daemon(t);
   for (const target of [

@@ -7,6 +7,7 @@ import { folder, run } from './support/cli.mjs';
 import { writeGlb } from './support/glb_write.mjs';
 import { readPng, writePng } from './support/png.mjs';
 import { samples } from './support/daemon.mjs';
+import { ball, parse } from './support/shapes.mjs';
 
 /** A GLB of one square in the plane z = 0, from (−1,−1) to (1,1), moved by one morph target. */
 function square({ move = [0, 0, 0], ...rest }) {
@@ -159,4 +160,75 @@ test('view explains why it cannot draw a file', async (t) => {
     assert.equal(code, 2, err);
     assert.match(err, why);
   }
+});
+
+/** A GLB of a mesh whose points are rotated; it does not move. */
+function still({ positions, triangles }, turn = (p) => p) {
+  const points = positions.map(turn);
+  return writeGlb({
+    positions: points,
+    normals: points.map(() => turn([0, 0, 1])),
+    triangles,
+    moves: points.map(() => [0, 0, 0]),
+  });
+}
+/** How many pixels of the left half are not background, and how wide and high they reach. */
+function outline(png) {
+  const rows = [];
+  const columns = [];
+  for (let y = 0; y < png.height; y++)
+    for (let x = 0; x < png.width / 2; x++) {
+      const [r, g, b] = at(png, (x + 0.5) / png.width, (y + 0.5) / png.height);
+      if (Math.min(r, g, b) < 215) rows.push(y) && columns.push(x);
+    }
+  const reach = (list) => list.reduce((m, v) => Math.max(m, v), 0) - list.reduce((m, v) => Math.min(m, v), 1e9) + 1;
+  return { pixels: rows.length, width: reach(columns), height: reach(rows) };
+}
+async function drawAsIs(t, glb, ...options) {
+  const where = await folder(t);
+  await writeFile(path.join(where, 'in.glb'), glb);
+  const args = ['view', 'in.glb', '-o', 'out.png', '--poses', '2', '--size', '120', ...options];
+  const { code, err } = await run(args, { cwd: where });
+  assert.equal(code, 0, err);
+  return readPng(await readFile(path.join(where, 'out.png')));
+}
+
+test('view looks at the largest side, whichever way a shape faces', async (t) => {
+  // three times as long as wide
+  const long = ball(4, ([x, y, z]) => [x, y, 3 * z]);
+  for (const angle of [0, 37, 90, 200]) {
+    const [c, s] = [Math.cos((angle * Math.PI) / 180), Math.sin((angle * Math.PI) / 180)];
+    const { width, height } = outline(
+      await drawAsIs(
+        t,
+        still(long, ([x, y, z]) => [c * x + s * z, y, c * z - s * x]),
+      ),
+    );
+    assert.ok(width > 2.3 * height, `turned by ${angle}: ${width} × ${height}`);
+  }
+});
+
+test('view shows animals upright whatever axis points up in their file', async (t) => {
+  const dog = parse(await readFile(path.join(samples, 'dog.obj'), 'utf8'));
+  const upright = outline(await drawAsIs(t, still(dog), '--up', 'y'));
+  for (const [name, turn] of Object.entries({
+    'y up': (p) => p,
+    'z up': ([x, y, z]) => [x, -z, y],
+    'z up, sideways': ([x, y, z]) => [z, x, y],
+    'z down': ([x, y, z]) => [x, z, -y],
+  })) {
+    const seen = outline(await drawAsIs(t, still(dog, turn)));
+    for (const key of ['pixels', 'width', 'height'])
+      assert.ok(
+        Math.abs(seen[key] - upright[key]) < 0.08 * upright[key],
+        `${name}: ${JSON.stringify([seen, upright])}`,
+      );
+  }
+  const flipped = await drawAsIs(
+    t,
+    still(dog, ([x, y, z]) => [x, -y, -z]),
+    '--up',
+    '-y',
+  );
+  assert.deepEqual(outline(flipped), upright);
 });

@@ -9,6 +9,7 @@ import {
   adopt,
   button,
   clickView,
+  countPixels,
   hideToasts,
   defaultShown,
   openPage,
@@ -34,6 +35,11 @@ const open = () =>
     let left = 60;
     return (line) => !(line.startsWith('f ') && left-- > 0);
   });
+
+/** The sample of the first page stands still. */
+const STILL = { reducedMotion: 'reduce' };
+const welcome = (page) =>
+  until(async () => (await countPixels(page, '.hero', (r, _g, b) => r - b > 70)) > 4000, 'the sample is drawn');
 
 async function landmarked(page) {
   await addFiles(page, ...pair);
@@ -69,8 +75,8 @@ async function spheres(page) {
 
 /** name: [steps that lead to the scene, options of the page] */
 export const SCENES = {
-  empty: [async () => {}],
-  'empty-dark': [async () => {}, { colorScheme: 'dark' }],
+  empty: [welcome, STILL],
+  'empty-dark': [welcome, { colorScheme: 'dark', ...STILL }],
   shapes: [(page) => addFiles(page, ...pair)],
   'shapes-dark': [
     async (page) => {

@@ -568,19 +568,20 @@ test('the offered commands and pages show this morph', async () => {
 
   const folder = await mkdtemp(join(tmpdir(), 'orbmorph-curl-'));
   const { stdout } = await promisify(execFile)('bash', ['-e', '-c', await text('curl')], { cwd: folder });
-  assert.deepEqual(await readFile(join(folder, 'morph.glb')), asset, 'curl downloads the same bytes');
+  assert.deepEqual(await readFile(join(folder, 'dog-giraffe.glb')), asset, 'curl downloads the same bytes');
   assert.equal(`${daemon.url}${JSON.parse(stdout).asset}`, await text('Asset'), 'the request names the same morph');
   await rm(folder, { recursive: true });
 
-  // Serves the page as from another site; requests to the CDN are answered from the npm packages here.
+  // Serves the page from another site, with the asset beside it; the npm packages here answer for the CDN.
   const html = await text('three.js');
   const context = await browser.newContext({ viewport: { width: 400, height: 300 } });
   const other = await context.newPage();
   const faults = [];
   other.on('pageerror', (error) => faults.push(error.stack));
-  const site = `${daemon.url}/page-of-somebody`;
+  const site = 'http://somebody.example/page.html';
   await context.route('https://cdn.jsdelivr.net/npm/three@*/**', (route) =>
     route.fulfill({
+      headers: { 'Access-Control-Allow-Origin': '*' },
       path: join(
         root,
         'client/web/node_modules/three',
@@ -589,6 +590,7 @@ test('the offered commands and pages show this morph', async () => {
     }),
   );
   await context.route(site, (route) => route.fulfill({ contentType: 'text/html', body: html }));
+  await context.route('http://somebody.example/dog-giraffe.glb', (route) => route.fulfill({ body: asset }));
   await other.goto(site);
   await other.locator('canvas').waitFor();
   const ground = (r, g, b) => Math.abs(r - 0xf3) + Math.abs(g - 0xf1) + Math.abs(b - 0xec) > 60 && r + g + b > 60;
@@ -597,7 +599,7 @@ test('the offered commands and pages show this morph', async () => {
   await until(async () => (await difference(browser, first, await other.screenshot())) > 0.01, 'and moves');
   assert.deepEqual(faults, []);
   await context.close();
-  assert.match(await text('model-viewer'), new RegExp(`<model-viewer src="${await text('Asset')}"`));
+  assert.match(await text('model-viewer'), /<model-viewer src="dog-giraffe\.glb"/);
   await done();
 });
 
@@ -621,5 +623,28 @@ test('the error of the common mesh is measured and below the tolerance', async (
     const percent = Number(text.match(/largest ([\d.e+-]+) %/)[1]);
     assert.ok(percent <= 0.1 * 1.05 + 1e-6, `${percent} % is within the tolerance of 0.1 %`);
   }
+  await done();
+});
+
+test('the report names what the files have and the asset lacks', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const shape = (name, map) => ({
+    name: `${name}.obj`,
+    mimeType: 'text/plain',
+    buffer: Buffer.from(`mtllib ${name}.mtl\nusemtl paint\n${obj(ball(2, map))}`),
+  });
+  const input = page.locator('input[type=file]').first();
+  await input.setInputFiles([
+    shape('plum', ([x, y, z]) => [x, 1.1 * y, z]),
+    shape('pear', ([x, y, z]) => [x, 1.5 * y, z]),
+  ]);
+  await until(async () => (await page.locator('.card.ready').count()) === 2, 'both are taken');
+  await morph(page);
+  const left = page.locator('details.dropped');
+  assert.match(await left.locator('summary').innerText(), /^Not in the asset: \d part/);
+  await left.locator('summary').click();
+  const text = await left.innerText();
+  assert.match(text, /mtllib plum\.mtl/);
+  assert.match(text, /Materials of an OBJ are in another file/);
   await done();
 });

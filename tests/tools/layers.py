@@ -26,11 +26,12 @@ ORDER = [
     "core/align/find", "core/align",
     "core/remesh/common", "core/remesh/overlay", "core/remesh/placed", "core/remesh/adaptive", "core/remesh",
     "core/transfer", "core/profile", "core/merge", "api",
-    "server/log", "server/faults", "server/wake", "server/tasks", "server/metrics", "server/pages", "server/studio",
-    "server/net", "server/config", "server/control", "server/systemd", "server/store", "server/intake", "server/deliver", "server/cache", "server/queue", "server/worker",
+    "server/log", "server/hash", "server/faults", "server/wake", "server/tasks", "server/metrics", "server/pages", "server/studio",
+    "server/net", "server/config", "server/control", "server/systemd", "server/store", "server/isolate", "server/intake", "server/deliver", "server/cache", "server/queue", "server/worker",
     "server/evict", "server/maintain", "server/admin", "server/http", "server/main",
     "client/cli", "client/js/src", "client/web/src/mesh", "client/web/src/view", "client/web/src/theme",
-    "client/web/src/state", "client/web/src/player", "client/web/src/actions", "client/web/src/url", "client/web/src/ui",
+    "client/web/src/take", "client/web/src/welcome", "client/web/src/state", "client/web/src/player",
+    "client/web/src/actions", "client/web/src/url", "client/web/src/ui",
     "client/web/src/main"]
 MOST_ENTRIES = {"core/align": 10}  # files and folders directly in a folder: its parts are seen at once
 SOURCE = re.compile(r"\.(inc\.h|c|h|cc|hh)$")

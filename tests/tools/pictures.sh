@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes the pictures of the documents anew, from the samples, with the programs of build/bin:
-#   docs/morph.png                     the animation of the README
+#   docs/morph.webp                    the film of the README, made in the studio
 #   docs/studio.png                    the studio, in Chromium
 #   docs/tutorial.png, tutorial-sheet  the tutorial's page in Chromium and its sheet (they need tests/node_modules)
 set -euo pipefail
@@ -20,8 +20,6 @@ ORBMORPH_SERVER=$(sed -n 's/^orbmorphd listening on //p' "$work/out")
 export ORBMORPH_SERVER
 
 samples=tests/samples
-"$bin/orbmorph" morph "$samples/dog.obj" "$samples/giraffe.off" "$samples/elephant.ply" \
-  --landmarks "$samples/dog-giraffe-elephant.json" -o "$work/morph.glb"
-"$bin/orbmorph" view "$work/morph.glb" --frames 60 --size 360 --yaw 35 -o docs/morph.png
+node tests/tools/film.mjs
 ORB_PICTURE=docs/studio.png node tests/studio/looks.mjs landmarks
 ORB_PICTURES=1 node --test tests/conformance/tutorial.test.mjs

@@ -1061,6 +1061,15 @@ export type ProblemCrashed = {
   detail: string;
 };
 
+/** For jobs, for requests whose processes have died three times, and for the check of an upload. */
+export type ProblemJobCrashed = {
+  type: '/problems/job-crashed';
+  title: 'The process of the job died repeatedly';
+  status: 500;
+  /** What is wrong and what to do. */
+  detail: string;
+};
+
 /** For jobs, and for the check of an upload. */
 export type ProblemTimeout = {
   type: '/problems/timeout';
@@ -1113,4 +1122,4 @@ export type ProblemStorageFull = {
 };
 
 /** A problem document of RFC 9457; `type` identifies the problem. */
-export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemBadSignature | ProblemExpiredSignature | ProblemForeignHost | ProblemForeignOrigin | ProblemForbiddenAddress | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemCancelled | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedMediaType | ProblemUnsupportedEncoding | ProblemPreconditionFailed | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemFetchFailed | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemTimeout | ProblemNotReady | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;
+export type Problem = ProblemBadRequest | ProblemBadQuery | ProblemMalformedJson | ProblemMalformedMesh | ProblemMalformedEncoding | ProblemUnauthorized | ProblemForbidden | ProblemBadSignature | ProblemExpiredSignature | ProblemForeignHost | ProblemForeignOrigin | ProblemForbiddenAddress | ProblemNotFound | ProblemMethodNotAllowed | ProblemInUse | ProblemJobEnded | ProblemCancelled | ProblemLengthRequired | ProblemTooLarge | ProblemUnknownFormat | ProblemUnsupportedMediaType | ProblemUnsupportedEncoding | ProblemPreconditionFailed | ProblemRangeNotSatisfiable | ProblemNotClosed | ProblemNotManifold | ProblemNotOrientable | ProblemNotConnected | ProblemNotGenusZero | ProblemDegenerate | ProblemNotFinite | ProblemBadLandmarks | ProblemBadOption | ProblemUnknownMember | ProblemInvalidRequest | ProblemUnsupportedMethod | ProblemTooManyRequests | ProblemQuotaExceeded | ProblemQueueFull | ProblemFetchFailed | ProblemInternal | ProblemNotCertified | ProblemCorrupt | ProblemCrashed | ProblemJobCrashed | ProblemTimeout | ProblemNotReady | ProblemNoMemory | ProblemUnavailable | ProblemStorageFull;

@@ -6,8 +6,8 @@ import { set, state, tint, type Result } from './state';
 import { stage } from './view/shared';
 import { weightsAt } from './mesh/morph';
 import { mixed } from './view/colors';
+import { EASINGS } from './take/player.js';
 
-const SECONDS_A_SHAPE = 2.2;
 const HOLD = 0.18;
 
 class Player {
@@ -98,13 +98,31 @@ class Player {
     this.result?.main.color(mixed([tint(i), tint(i + 1)], [1 - at + i, at - i]));
   }
 
-  /** The time of a phase: back and forth, with a short rest at each shape. */
+  /** How far a leg is done, with a short rest at each of its shapes. */
+  private eased(part: number): number {
+    const s = Math.max(0, Math.min(1, (part - HOLD / 2) / (1 - HOLD)));
+    return EASINGS[state.motion.easing](s);
+  }
+
+  /** The time of a phase: back and forth, or forth only. */
   private timeOf(phase: number): number {
     const there = phase % (2 * this.legs);
     const at = there <= this.legs ? there : 2 * this.legs - there;
     const leg = Math.min(Math.floor(at), this.legs - 1);
-    const s = Math.max(0, Math.min(1, (at - leg - HOLD / 2) / (1 - HOLD)));
-    return (leg + s * s * (3 - 2 * s)) / this.legs;
+    return (leg + this.eased(at - leg)) / this.legs;
+  }
+
+  /** Shows a phase of a loop, whose last leg leads straight from the last shape to the first. */
+  private round(phase: number) {
+    const there = phase % (this.legs + 1);
+    if (there <= this.legs) return this.seek(this.timeOf(there));
+    const { result, legs } = this;
+    const t = this.eased(there - legs);
+    const [last, first] = [result!.data.shapes[legs], result!.data.shapes[0]];
+    this.time = 1 - t;
+    this.setWeights(last.map((w, k) => (1 - t) * w + t * first[k]));
+    result!.main.color(mixed([tint(legs), tint(0)], [1 - t, t]));
+    for (const listener of this.listeners) listener(this.time);
   }
 
   private phaseOf(time: number): number {
@@ -121,8 +139,9 @@ class Player {
   private tick = (now: number) => {
     const passed = this.last ? Math.min((now - this.last) / 1000, 0.1) : 0;
     this.last = now;
-    this.phase += passed / SECONDS_A_SHAPE;
-    this.seek(this.timeOf(this.phase));
+    this.phase += passed / state.motion.seconds;
+    if (state.motion.loop === 'loop') this.round(this.phase);
+    else this.seek(this.timeOf(this.phase));
     this.frame = requestAnimationFrame(this.tick);
   };
 }

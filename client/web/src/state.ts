@@ -68,6 +68,14 @@ export const DEFAULTS: Options = {
   repair: 'safe',
 };
 
+/** How a morph plays, here and in what is taken away. */
+export const MOTION = { easing: ['smooth', 'linear', 'slow', 'bounce'], loop: ['pingpong', 'loop'] } as const;
+export interface Motion {
+  seconds: number;
+  easing: (typeof MOTION.easing)[number];
+  loop: (typeof MOTION.loop)[number];
+}
+
 export interface Running {
   purpose: 'morph' | 'find';
   job: Job | null;
@@ -107,6 +115,7 @@ export interface State {
   loading: string | null;
   result: Result | null;
   playing: boolean;
+  motion: Motion;
   mix: number[] | null;
   show: 'morph' | 'each' | 'error';
   wire: boolean;
@@ -138,6 +147,7 @@ export const state: State = {
   loading: null,
   result: null,
   playing: false,
+  motion: { seconds: 2.2, easing: 'smooth', loop: 'pingpong' },
   mix: null,
   show: 'morph',
   wire: false,

@@ -83,6 +83,16 @@ function encode(): string {
   return parts.join('&');
 }
 
+/** Says that nothing of a link is left. what: "its morph is" */
+const dead = (what: string) =>
+  set({
+    problem: {
+      title: 'This link is dead',
+      detail: `${what[0].toUpperCase()}${what.slice(1)} not on the server ${location.host}: deleted, or the link is from another server. Drop the files here to make the morph again.`,
+      facts: null,
+    },
+  });
+
 let timer = 0;
 function save() {
   if (restoring || timer) return;
@@ -115,7 +125,8 @@ export async function restore() {
       await Promise.all(meshes.flatMap((m) => (m.status === 'fulfilled' ? [addFromServer(m.value)] : [])));
       set({ loading: null });
       const lost = meshes.filter((m) => m.status === 'rejected').length;
-      if (lost)
+      if (lost === ids.length) dead(`its ${lost > 1 ? `${lost} shapes are` : 'shape is'}`);
+      else if (lost)
         set({
           problem: {
             title: 'Some shapes are missing',
@@ -138,11 +149,20 @@ export async function restore() {
     if (result && ids.length) {
       const supermesh = await client.getSupermesh(result).catch(() => null);
       if (supermesh) await openResult(supermesh, supermesh.request ?? null);
-    } else if (result) await openSupermesh(result, false);
+      else if (!state.problem)
+        set({
+          problem: {
+            title: 'The morph of this link is gone',
+            detail: 'It was deleted from the server. Its shapes are here: press Morph to make it again.',
+            facts: null,
+          },
+        });
+    } else if (result && (await client.getSupermesh(result).catch(() => null))) await openSupermesh(result, false);
+    else if (result) dead('its morph is');
     const time = Number(query.get('t'));
     if (state.result && query.has('t') && Number.isFinite(time)) player.seek(time);
     if (state.result && query.get('side') === 'after') set({ side: 'after' });
-    if (TABS.includes(tab)) set({ tab });
+    if (TABS.includes(tab) && state.shapes.length) set({ tab });
     const show = query.get('show');
     if (state.result && (show === 'each' || show === 'error')) set({ show });
   } finally {

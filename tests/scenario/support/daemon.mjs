@@ -9,7 +9,8 @@ import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 export const root = path.resolve(path.dirname(fileURLToPath(import.meta.url)), '../../..');
-export const samples = path.join(root, 'tests/samples');
+// Coarser animals with sanitizers, under the same names.
+export const samples = process.env.ORB_SAMPLES ?? path.join(root, 'tests/samples');
 export const binaries = {
   daemon: process.env.ORBMORPHD ?? path.join(root, 'build/bin/orbmorphd'),
   client: process.env.ORBMORPH ?? path.join(root, 'build/bin/orbmorph'),

@@ -1,8 +1,8 @@
 // The documents and the shell lines in them.
-import { mkdtemp, readFile, readdir, rm, symlink, writeFile } from 'node:fs/promises';
+import { mkdir, mkdtemp, readFile, readdir, rm, symlink, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
-import { binaries, root } from './daemon.mjs';
+import { binaries, root, samples } from './daemon.mjs';
 import { writeGlb } from './glb_write.mjs';
 import { writePng } from './png.mjs';
 
@@ -53,7 +53,8 @@ function texturedBox() {
 export async function place(t, d) {
   const at = await mkdtemp(path.join(tmpdir(), 'orbmorph-lines-'));
   t.after(() => rm(at, { recursive: true, force: true }));
-  await symlink(path.join(root, 'tests'), path.join(at, 'tests'));
+  await mkdir(path.join(at, 'tests'));
+  await symlink(samples, path.join(at, 'tests/samples'));
   await writeFile(path.join(at, 'textured.glb'), texturedBox());
   const env = {
     ...process.env,

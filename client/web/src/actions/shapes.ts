@@ -36,8 +36,35 @@ async function draw(shape: Shape, buffer: ArrayBuffer) {
       model,
       facts: { vertices: display.vertices, triangles: display.triangles, format: display.format },
     });
+  } catch {
+    // the daemon may read it: showRepaired() then shows its mesh
+  }
+}
+
+/** Repairs after which the surface is another one than that of the file. */
+const RESHAPING = ['fill_holes', 'largest_component', 'close_handles', 'split_nonmanifold', 'part'];
+
+/**
+ * Shows what the daemon made of a file where that differs from the file, or where only the daemon can read it. The mesh
+ * comes with its embedding, which the morph needs anyway.
+ */
+async function showRepaired(shape: Shape) {
+  const mesh = shape.mesh!;
+  await drawn.get(shape.key);
+  if (shape.model && !mesh.repairs?.some(({ kind, count }) => count > 0 && RESHAPING.includes(kind))) return;
+  try {
+    const embedding = await client.embed(mesh.id);
+    const display = await work('openRepaired', shape.key, await client.sphere(embedding.id));
+    if (shapeOf(shape.key) !== shape || shape.mesh !== mesh) return;
+    shape.model?.dispose();
+    patch(shape, {
+      model: shapeModel(display, tint(state.shapes.indexOf(shape))),
+      facts: { vertices: mesh.vertices, triangles: mesh.triangles, format: mesh.format },
+      message: undefined,
+    });
   } catch (error) {
-    patch(shape, { message: (error as Error).message });
+    // the file stays on show if it could be read; a morph would report the same problem
+    if (!shape.model) patch(shape, { message: explain(error) });
   }
 }
 
@@ -51,6 +78,7 @@ async function send(shape: Shape, repair = state.options.repair) {
       onProgress: (sent, total) => patch(shape, { progress: total ? sent / total : 1 }),
     });
     patch(shape, { state: 'ready', mesh, progress: 1 });
+    void showRepaired(shape);
   } catch (error) {
     if (!(error instanceof ProblemError) || error.status === 401 || error.status === 403)
       return patch(shape, { state: 'failed', message: explain(error) });
@@ -116,6 +144,7 @@ export async function addFromServer(mesh: Mesh): Promise<Shape> {
   try {
     await draw(shape, await client.meshFile(mesh.id));
     patch(shape, { state: 'ready', progress: 1 });
+    void showRepaired(shape);
   } catch (error) {
     patch(shape, { state: 'failed', message: explain(error) });
   }

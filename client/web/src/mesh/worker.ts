@@ -15,6 +15,8 @@ interface Held {
   raw: RawMesh;
   frame: Frame;
   bvh?: Bvh;
+  /** vertices from this number on are not in the file: a repair added them */
+  added: number;
 }
 
 const held = new Map<string, Held>();
@@ -67,7 +69,8 @@ function spotOn(mesh: Held, t: number, u: number, v: number): Spot {
   const at = 3 * vertex;
   const p = raw.positions;
   const away = Math.hypot(p[at] - point[0], p[at + 1] - point[1], p[at + 2] - point[2]);
-  if (away <= 0.02 * frame.radius) return { position: toView(frame, p, at), normal, place: { vertex } };
+  if (away <= 0.02 * frame.radius && vertex < mesh.added)
+    return { position: toView(frame, p, at), normal, place: { vertex } };
   return { position: toView(frame, point), normal, place: { point } };
 }
 
@@ -90,8 +93,43 @@ const ops = {
     const raw = parseMesh(buffer);
     if (!raw.corners.length) throw new Error('The file has no triangles.');
     const display = buildDisplay(raw);
-    held.set(key, { raw, frame: display.frame });
+    held.set(key, { raw, frame: display.frame, added: Infinity });
     return display;
+  },
+
+  /** Replaces a mesh by what the daemon made of its file: sphere.ply has it, with the numbers of the file. */
+  openRepaired(key: string, buffer: ArrayBuffer): Display {
+    const repaired = parseMesh(buffer);
+    const source = repaired.properties?.get('source');
+    if (!source) throw new Error('The daemon did not say which vertices the mesh has.');
+    const added = source.reduce((most, s) => Math.max(most, s + 1), 0);
+    const number = new Uint32Array(source.length);
+    let next = added;
+    source.forEach((s, i) => (number[i] = s >= 0 ? s : next++));
+    const raw: RawMesh = {
+      format: repaired.format,
+      positions: new Float64Array(3 * next),
+      corners: repaired.corners.map((v) => number[v]),
+    };
+    number.forEach((to, i) => raw.positions.set(repaired.positions.subarray(3 * i, 3 * i + 3), 3 * to));
+    const display = buildDisplay(raw);
+    held.set(key, { raw, frame: display.frame, added });
+    return display;
+  },
+
+  /** Each shape of a morph as the text of an OBJ file. */
+  shapesOf(buffer: ArrayBuffer, count: number): string[] {
+    const { position, targets, index, shapes } = decodeMorph(buffer, count);
+    const faces: string[] = [];
+    for (let c = 0; c < index.length; c += 3) faces.push(`f ${index[c] + 1} ${index[c + 1] + 1} ${index[c + 2] + 1}\n`);
+    return shapes.map((weights) => {
+      const points: string[] = [];
+      for (let i = 0; i < position.length; i += 3) {
+        const at = (k: number) => targets.reduce((x, t, n) => x + weights[n] * t.position[i + k], position[i + k]);
+        points.push(`v ${at(0)} ${at(1)} ${at(2)}\n`);
+      }
+      return points.concat(faces).join('');
+    });
   },
 
   close(key: string) {

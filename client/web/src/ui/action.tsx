@@ -1,23 +1,29 @@
 /** The main action, always in the same place: the Morph button, or the progress of a morph. */
+import { useEffect, useRef, useState } from 'preact/hooks';
 import type { Job } from 'orbmorph';
-import { isWaiting, readyShapes, set, state, wireLandmarks, type Running } from '../state';
+import { isWaiting, readyShapes, state, wireLandmarks, type Running } from '../state';
 import { cancelMerge, startMerge } from '../actions/merge';
-import { Bar, Button, Icon } from './parts';
+import { Notice } from './notice';
+import { Bar, Button } from './parts';
 
-const STAGES: Record<string, string> = {
-  queued: 'Queued',
-  check: 'Checking',
-  simplify: 'Simplifying',
-  embed: 'Mapping to the sphere',
-  certify: 'Certifying',
-  align: 'Matching the shapes',
-  remesh: 'Building the common mesh',
-  transfer: 'Transferring the shapes',
-  write: 'Writing the asset',
+/** The stages of a morph in their order, with the number of the step each belongs to. */
+const STAGES: Record<string, [string, number]> = {
+  queued: ['Waiting for its turn', 1],
+  check: ['Checking the shapes', 1],
+  simplify: ['Mapping to the sphere', 1],
+  embed: ['Mapping to the sphere', 1],
+  certify: ['Mapping to the sphere', 1],
+  align: ['Matching the shapes', 2],
+  remesh: ['Building the common mesh', 3],
+  transfer: ['Placing the shapes', 4],
+  write: ['Writing the asset', 5],
 };
+const STEPS = 5;
 
-const stageOf = (job: Job | null) =>
-  (job && (STAGES[job.state === 'queued' ? 'queued' : (job.stage ?? '')] ?? job.stage)) || 'Starting';
+const stageOf = (job: Job | null) => {
+  const [text, step] = (job && STAGES[job.state === 'queued' ? 'queued' : (job.stage ?? '')]) || ['Starting', 1];
+  return `${text} (${step} of ${STEPS})`;
+};
 
 /** The job that the page waits for, and what to call it: the fast morph, then the default one. */
 function waitedFor({ fast, job }: Running): { job: Job | null; text: string } {
@@ -25,43 +31,79 @@ function waitedFor({ fast, job }: Running): { job: Job | null; text: string } {
   return { job, text: fast && (job || isWaiting()) ? `Default morph: ${stageOf(job)}` : stageOf(job) };
 }
 
+const TICK = 250; // ms
+/** A stage can be long. Until the daemon reports again, the bar creeps towards this much more than it reported. */
+const CREEP = 0.12;
+const CREEP_SECONDS = 12;
+
+/** What is known of the job that is waited for, so that the bar moves and the time left is estimated between reports. */
+interface Pace {
+  id: string | null;
+  since: number;
+  reported: number;
+  at: number;
+  shown: number;
+}
+
+function paced(pace: Pace, job: Job | null, now: number): Pace {
+  const reported = job?.progress ?? 0;
+  const next = job && job.id !== pace.id ? { id: job.id, since: now, reported, at: now, shown: 0 } : { ...pace };
+  if (reported > next.reported) Object.assign(next, { reported, at: now });
+  const creep = CREEP * (1 - Math.exp(-(now - next.at) / 1000 / CREEP_SECONDS));
+  next.shown = Math.max(next.shown, Math.min(next.reported + creep, 0.99));
+  return next;
+}
+
+/** The time that is left if the rest runs as the part that is done; null as long as that is a guess. */
+function left({ since, shown }: Pace, now: number): string | null {
+  const passed = (now - since) / 1000;
+  if (passed < 1.5 || shown < 0.08) return null;
+  const seconds = Math.max(1, Math.round((passed * (1 - shown)) / shown));
+  return seconds < 90 ? `about ${seconds} s left` : `about ${Math.round(seconds / 60)} min left`;
+}
+
 function Progress({ running }: { running: Running }) {
   const { job, text } = waitedFor(running);
+  const [now, setNow] = useState(() => performance.now());
+  const pace = useRef<Pace>({ id: null, since: now, reported: 0, at: now, shown: 0 });
+  const begun = useRef(now);
+  useEffect(() => {
+    const timer = setInterval(() => setNow(performance.now()), TICK);
+    return () => clearInterval(timer);
+  }, []);
+  pace.current = paced(pace.current, job, now);
+  const seconds = Math.floor(Math.max(0, now - begun.current) / 1000);
+  const clock = `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, '0')}`;
   return (
     <div class="progress">
-      <div class="progress-text" role="status">
-        <span>{text}</span>
-        <span class="number">{job?.progress ? `${Math.round(job.progress * 100)} %` : ''}</span>
+      <div class="progress-text">
+        <span role="status">{text}</span>
+        <span class="number">{pace.current.shown ? `${Math.round(pace.current.shown * 100)} %` : ''}</span>
       </div>
-      <Bar label={running.purpose === 'find' ? 'Finding landmarks' : 'Morphing'} value={job?.progress ?? null} />
+      <Bar label={running.purpose === 'find' ? 'Finding landmarks' : 'Morphing'} value={pace.current.shown || null} />
       <div class="row spread">
-        <span class="hint">You may close the page; the job continues.</span>
+        <span class="hint number" data-varies>
+          {clock}
+          {job ? `, ${left(pace.current, now) ?? 'estimating what is left'}` : ''}
+        </span>
         <Button kind="quiet" onClick={cancelMerge}>
           Cancel
         </Button>
       </div>
+      <p class="hint">You may close the page; the job continues.</p>
     </div>
   );
 }
 
 export function Action() {
   const ready = readyShapes().length;
-  const { running, problem } = state;
+  const { running } = state;
   const busy = state.shapes.some((shape) => shape.state === 'reading' || shape.state === 'uploading');
   const again = state.tab === 'morph' && !!state.result;
   const landmarks = wireLandmarks().length;
   return (
     <div class="action">
-      {problem && (
-        <div class="notice error" role="alert">
-          <Icon name="alert" />
-          <div>
-            <strong>{problem.title}</strong>
-            <p>{problem.detail}</p>
-          </div>
-          <Button kind="quiet" icon="close" label="Dismiss" onClick={() => set({ problem: null })} />
-        </div>
-      )}
+      <Notice />
       {running ? (
         <Progress running={running} />
       ) : (

@@ -4,7 +4,9 @@ import type { Job } from 'orbmorph';
 import { client, set, state } from '../state';
 import { addMesh, cancelJob, loadServer, openSupermesh, remove, watchJob } from '../actions/server';
 import { buildRequest } from '../actions/merge';
+import { escaped } from '../take/page';
 import { Bar, Button, count } from './parts';
+import { fileName, TakeAway } from './take';
 
 const TITLES = { server: 'On the server', share: 'Use this morph', help: 'Help' };
 
@@ -172,10 +174,6 @@ function Snippet({ title, text }: { title: string; text: string }) {
 /** Quotes text for a POSIX shell. */
 const quoted = (text: string) => `'${text.replace(/'/g, "'\\''")}'`;
 
-/** Escapes text for HTML. */
-const escaped = (text: string) =>
-  text.replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]!);
-
 const viewerPage = (asset: string, names: string[]) => `<!doctype html>
 <meta charset="utf-8">
 <title>${escaped(names.join(' to '))}</title>
@@ -228,20 +226,22 @@ function Share() {
   const asset = new URL(client.url(result.supermesh.asset), origin).href;
   const request = result.request ?? buildRequest();
   const names = result.supermesh.shapes.map((s) => s.name);
+  const file = fileName(result, 'glb');
   const secret = client.token ? ` -H "Authorization: Bearer $ORBMORPH_TOKEN"` : '';
-  const curl = `curl -sS${secret} ${origin}/v1/supermeshes -H 'Content-Type: application/json' -H 'Prefer: wait=60' \\\n  -d ${quoted(JSON.stringify(request))}\ncurl -sS${secret} -o morph.glb ${asset}`;
-  // a page must not contain the token, so it loads the file that the curl command downloads
-  const shown = client.token ? 'morph.glb' : asset;
+  const curl = `curl -sS${secret} ${origin}/v1/supermeshes -H 'Content-Type: application/json' -H 'Prefer: wait=60' \\\n  -d ${quoted(JSON.stringify(request))}\ncurl -sS${secret} -o ${quoted(file)} ${asset}`;
+  // a page of another site may not read from the daemon, and must not contain the token
+  const shown = encodeURIComponent(file);
   return (
     <>
+      <TakeAway result={result} />
+      <h3>For developers</h3>
       <p class="hint">The URL of an asset never changes, so it can be cached forever.</p>
       <Snippet title="Asset" text={asset} />
       <Snippet title="curl" text={curl} />
-      {client.token && (
-        <p class="hint">
-          The pages below load <code>morph.glb</code>, which the second command downloads. Put it beside them.
-        </p>
-      )}
+      <p class="hint">
+        The pages below load <code>{file}</code>. Put it beside them, and serve their folder, for example with{' '}
+        <code>python3 -m http.server</code>: browsers load no models from pages opened as files.
+      </p>
       <Snippet title="three.js" text={threePage(shown, names)} />
       <Snippet title="model-viewer" text={viewerPage(shown, names)} />
     </>

@@ -10,6 +10,7 @@ import { type RAMPS, rampCss } from '../view/colors';
 import { Button, count, Icon, relative, Segments, Switch } from './parts';
 import { Pane } from './pane';
 import { OptionsFold } from './shapes';
+import { fileName } from './take';
 
 export function MorphStage() {
   const { result, show } = state;
@@ -182,8 +183,6 @@ function Shown({ result }: { result: Result }) {
   );
 }
 
-const assetName = ({ supermesh }: Result) => `${supermesh.shapes.map((s) => s.name).join('-')}.glb`;
-
 function Download({ result }: { result: Result }) {
   const { supermesh } = result;
   if (isWaiting())
@@ -196,12 +195,12 @@ function Download({ result }: { result: Result }) {
     <a
       class="button primary"
       href={client.url(supermesh.asset)}
-      download={assetName(result)}
+      download={fileName(result, 'glb')}
       onClick={(event) => {
         if (!client.token) return;
         event.preventDefault(); // a link cannot send the token
         void client.asset(supermesh.id).then(
-          (glb) => save(new Blob([glb], { type: 'model/gltf-binary' }), assetName(result)),
+          (glb) => save(new Blob([glb], { type: 'model/gltf-binary' }), fileName(result, 'glb')),
           (error) => toast(explain(error), 'error'),
         );
       }}
@@ -309,8 +308,30 @@ export function MorphInspector() {
           ))}
         </tbody>
       </table>
+      <Dropped entries={supermesh.dropped} />
       <OptionsFold />
     </>
+  );
+}
+
+/** What the files have and the asset lacks. */
+function Dropped({ entries }: { entries: Result['supermesh']['dropped'] }) {
+  if (!entries?.length) return null;
+  return (
+    <details class="dropped">
+      <summary>
+        Not in the asset: {entries.length} {entries.length === 1 ? 'part' : 'parts'} of the files
+      </summary>
+      <ul>
+        {entries.map((entry, i) => (
+          <li key={i}>
+            <strong>{entry.what}</strong> {entry.where && <span class="muted">{entry.where}</span>}
+            <br />
+            {entry.why}
+          </li>
+        ))}
+      </ul>
+    </details>
   );
 }
 

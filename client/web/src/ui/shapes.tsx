@@ -1,103 +1,14 @@
-/** Shapes: the empty page, the views side by side, the list with uploads and refusals, the options. */
-import { useRef } from 'preact/hooks';
+/** Shapes: the views side by side, the list with uploads and refusals, the options. */
 import { set, state, tint, type Options, type Shape } from '../state';
-import {
-  addFiles,
-  addSamples,
-  uploadAgain,
-  moveShape,
-  repairsFor,
-  removeShape,
-  sampleList,
-  samplePair,
-} from '../actions/shapes';
+import { addSamples, uploadAgain, moveShape, repairsFor, removeShape, sampleList } from '../actions/shapes';
 import { stage } from '../view/shared';
 import { Bar, Button, count, Field, Icon, Segments, Switch } from './parts';
+import { FilePicker } from './files';
 import { Pane } from './pane';
-
-const ACCEPT = '.obj,.off,.ply,.stl,.gltf,.glb';
-
-function FilePicker({ label, kind = 'plain' }: { label: string; kind?: 'plain' | 'primary' }) {
-  const input = useRef<HTMLInputElement>(null);
-  return (
-    <>
-      <Button kind={kind} icon="plus" onClick={() => input.current!.click()}>
-        {label}
-      </Button>
-      <input
-        ref={input}
-        class="hidden"
-        type="file"
-        multiple
-        accept={ACCEPT}
-        aria-label="Mesh files"
-        tabIndex={-1}
-        onChange={(event) => {
-          void addFiles(event.currentTarget.files ?? []);
-          event.currentTarget.value = '';
-        }}
-      />
-    </>
-  );
-}
-
-function Empty() {
-  const pair = samplePair();
-  return (
-    <div class="welcome">
-      <div class="welcome-art">
-        <svg viewBox="0 0 360 120" aria-hidden="true">
-          <defs>
-            <linearGradient id="g1" x1="0" y1="0" x2="1" y2="1">
-              <stop offset="0" stop-color="#f2c3aa" />
-              <stop offset="1" stop-color="#d98761" />
-            </linearGradient>
-            <linearGradient id="g2" x1="0" y1="0" x2="1" y2="1">
-              <stop offset="0" stop-color="#d9c3d3" />
-              <stop offset="1" stop-color="#9b7fae" />
-            </linearGradient>
-            <linearGradient id="g3" x1="0" y1="0" x2="1" y2="1">
-              <stop offset="0" stop-color="#bcd0f3" />
-              <stop offset="1" stop-color="#5d7fd6" />
-            </linearGradient>
-          </defs>
-          <path
-            fill="url(#g1)"
-            d="M24 62c0-26 14-46 38-46 20 0 24 16 42 18 14 2 16 18 8 30-10 14-6 42-44 42-30 0-44-18-44-44z"
-          />
-          <circle fill="url(#g2)" cx="180" cy="60" r="44" />
-          <path
-            fill="url(#g3)"
-            d="M250 40c4-22 26-26 38-14 8 8 18 0 28 6 16 10 20 40 8 56-10 14-26 20-40 10-10-8-22 2-30-10-8-14-8-30-4-48z"
-          />
-          <path class="flow" d="M122 60h10m6 0h0M228 60h10" />
-        </svg>
-      </div>
-      <h1>Drop two shapes. Get a morph.</h1>
-      <p class="lead">
-        Any closed meshes: OBJ, OFF, PLY, STL or glTF. The result is one GLB that blends between all of them, ready for
-        three.js, Blender, Unity and the web.
-      </p>
-      <div class="row center">
-        <FilePicker label="Choose files" kind={pair.length ? 'plain' : 'primary'} />
-        {pair.length > 1 && (
-          <Button kind="primary" icon="wand" onClick={() => void addSamples(pair)}>
-            Try with samples
-          </Button>
-        )}
-      </div>
-      <p class="hint">
-        or{' '}
-        <button type="button" class="link" onClick={() => set({ drawer: 'server' })}>
-          open what is on the server
-        </button>
-      </p>
-    </div>
-  );
-}
+import { Welcome } from './welcome';
 
 export function ShapesStage() {
-  if (!state.shapes.length) return <Empty />;
+  if (!state.shapes.length) return <Welcome />;
   return (
     <div class="grid" data-count={state.shapes.length}>
       {state.shapes.map((shape, index) => (
@@ -116,7 +27,9 @@ export function Caption({ shape, index }: { shape: Shape; index: number }) {
       <strong>{shape.name}</strong>
       {shape.facts && <span class="muted">{count(shape.facts.triangles)} triangles</span>}
       {shape.state === 'refused' && <span class="badge bad">refused</span>}
-      {!shape.model && !shape.message && <span class="muted">reading…</span>}
+      {!shape.model && !shape.message && shape.state !== 'refused' && shape.state !== 'failed' && (
+        <span class="muted">reading…</span>
+      )}
     </div>
   );
 }

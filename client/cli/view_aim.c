@@ -1,0 +1,190 @@
+#include "view_aim.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "view_pose.h"
+
+enum {
+  CELLS = 24,     /* of the grid along each axis of the bounding box */
+  SAMPLES = 8,    /* points of a triangle along each edge */
+  YAW_STEP = 5,   /* degrees */
+  DEPTH_TURN = 22 /* degrees away from the largest side */
+};
+/* A mirror image has to fill this much more of the same cells along one axis than along the others. */
+static const double CLEARLY_MIRRORED = 0.15;
+static const double MIRRORED = 0.35;
+/* Flatter than this, relative to the largest extent, a shape has no cells to count. */
+static const double FLAT = 0.02;
+
+typedef struct grid {
+  unsigned char cell[CELLS][CELLS][CELLS]; /* x, y, z: the surface passes through */
+} grid;
+
+static int fill(const view_mesh *mesh, grid *out) {
+  float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, most = 0;
+  memset(out, 0, sizeof *out);
+  for (uint32_t i = 0; i < mesh->index_count; i++) {
+    for (int k = 0; k < 3; k++) {
+      float x = mesh->positions[3 * (size_t)mesh->indices[i] + (size_t)k];
+      low[k] = fminf(low[k], x);
+      high[k] = fmaxf(high[k], x);
+      most = fmaxf(most, high[k] - low[k]);
+    }
+  }
+  for (int k = 0; k < 3; k++) {
+    if (!(high[k] - low[k] > (float)FLAT * most)) {
+      return 0;
+    }
+  }
+  for (uint32_t i = 0; i + 2 < mesh->index_count; i += 3) {
+    for (int a = 0; a <= SAMPLES; a++) {
+      for (int b = 0; a + b <= SAMPLES; b++) {
+        int at[3];
+        for (int k = 0; k < 3; k++) {
+          const float *p = mesh->positions + k;
+          float x = ((float)a * p[3 * (size_t)mesh->indices[i]] + (float)b * p[3 * (size_t)mesh->indices[i + 1]] +
+                     (float)(SAMPLES - a - b) * p[3 * (size_t)mesh->indices[i + 2]]) /
+                    SAMPLES;
+          int cell = (int)((x - low[k]) / (high[k] - low[k]) * CELLS);
+          at[k] = cell < 0 ? 0 : cell >= CELLS ? CELLS - 1 : cell;
+        }
+        out->cell[at[0]][at[1]][at[2]] = 1;
+      }
+    }
+  }
+  return 1;
+}
+
+static int full(const grid *g, const int at[3]) {
+  return g->cell[at[0]][at[1]][at[2]];
+}
+
+/* The cells that the shape and its mirror image along an axis share, as a fraction of those that either fills. */
+static double mirrored(const grid *g, int axis) {
+  int both = 0, either = 0;
+  for (int i = 0; i < CELLS * CELLS * CELLS; i++) {
+    int at[3] = {i / (CELLS * CELLS), i / CELLS % CELLS, i % CELLS}, other[3];
+    memcpy(other, at, sizeof at);
+    other[axis] = CELLS - 1 - at[axis];
+    both += full(g, at) && full(g, other);
+    either += full(g, at) || full(g, other);
+  }
+  return either ? (double)both / either : 0;
+}
+
+/* On how many feet the shape stands if this end of the axis is down: separate spots beside the plane in which `across`
+ * mirrors it. 0 if it touches the ground on that plane, as a shape does that lies. */
+static int feet(const grid *g, int axis, int high_end, int across) {
+  unsigned char floor[CELLS][CELLS] = {{0}};
+  int stack[CELLS * CELLS], count = 0;
+  for (int u = 0; u < CELLS; u++) {
+    for (int v = 0; v < CELLS; v++) {
+      int at[3];
+      at[axis] = high_end ? CELLS - 1 : 0;
+      at[(axis + 1) % 3] = u;
+      at[(axis + 2) % 3] = v;
+      floor[u][v] = (unsigned char)full(g, at);
+      if (floor[u][v] && (at[across] == CELLS / 2 - 1 || at[across] == CELLS / 2)) {
+        return 0;
+      }
+    }
+  }
+  for (int i = 0; i < CELLS * CELLS; i++) {
+    int height = 0;
+    if (!floor[i / CELLS][i % CELLS]) {
+      continue;
+    }
+    count++;
+    floor[i / CELLS][i % CELLS] = 0;
+    for (stack[height++] = i; height;) {
+      int at = stack[--height];
+      for (int d = 0; d < 9; d++) {
+        int u = at / CELLS + d / 3 - 1, v = at % CELLS + d % 3 - 1;
+        if (u >= 0 && u < CELLS && v >= 0 && v < CELLS && floor[u][v]) {
+          floor[u][v] = 0;
+          stack[height++] = u * CELLS + v;
+        }
+      }
+    }
+  }
+  return count;
+}
+
+static char find_up(const view_mesh *mesh) {
+  static const struct {
+    char up;
+    int axis, high_end;
+  } ways[] = {{'z', 2, 0}, {'Z', 2, 1}, {'x', 0, 0}, {'X', 0, 1}};
+  grid g;
+  if (!fill(mesh, &g)) {
+    return 'y';
+  }
+  double mirror[3] = {mirrored(&g, 0), mirrored(&g, 1), mirrored(&g, 2)};
+  int sideways = mirror[1] > mirror[0] + CLEARLY_MIRRORED && mirror[1] > mirror[2] + CLEARLY_MIRRORED;
+  int across = sideways ? 1 : mirror[0] >= mirror[2] ? 0 : 2;
+  if (mirror[across] < MIRRORED || (!sideways && (feet(&g, 1, 0, across) || feet(&g, 1, 1, across)))) {
+    return 'y';
+  }
+  for (int legs = 4; legs >= 2; legs -= 2) {
+    for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
+      if (ways[i].axis != across && feet(&g, ways[i].axis, ways[i].high_end, across) == legs) {
+        return ways[i].up;
+      }
+    }
+  }
+  return 'y';
+}
+
+/* The area that the shapes show from a direction, twice: of a closed surface half faces the viewer. */
+static double shown(const view_mesh *mesh, const double to[3]) {
+  double sum = 0;
+  for (int shape = 0; shape < view_shape_count(mesh); shape++) {
+    const float *delta = shape ? mesh->delta_positions + 3 * (size_t)mesh->vertex_count * (size_t)(shape - 1) : NULL;
+    for (uint32_t i = 0; i + 2 < mesh->index_count; i += 3) {
+      double p[3][3], cross = 0;
+      for (int c = 0; c < 3; c++) {
+        for (int k = 0; k < 3; k++) {
+          size_t at = 3 * (size_t)mesh->indices[i + (uint32_t)c] + (size_t)k;
+          p[c][k] = (double)mesh->positions[at] + (delta ? (double)delta[at] : 0);
+        }
+      }
+      for (int k = 0; k < 3; k++) {
+        int u = (k + 1) % 3, v = (k + 2) % 3;
+        cross += to[k] * ((p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]));
+      }
+      sum += fabs(cross);
+    }
+  }
+  return sum;
+}
+
+static double find_yaw(const view_mesh *mesh, char up) {
+  view_turn turn;
+  double best = 0, yaw = 0;
+  view_upright(up, turn);
+  for (int degrees = -90; degrees < 90; degrees += YAW_STEP) {
+    double angle = degrees * 3.14159265358979 / 180, to[3];
+    for (int k = 0; k < 3; k++) {
+      to[k] = sin(angle) * turn[0][k] + cos(angle) * turn[2][k];
+    }
+    double area = shown(mesh, to);
+    /* of sides of nearly the same area, the one nearer to the front */
+    if (area > 1.001 * best || (area > 0.999 * best && abs(degrees) < fabs(yaw))) {
+      best = fmax(area, best);
+      yaw = degrees;
+    }
+  }
+  return yaw > 0 ? yaw - DEPTH_TURN : yaw + DEPTH_TURN;
+}
+
+void view_aim(const view_mesh *mesh, view_options *options) {
+  if (!options->up) {
+    options->up = find_up(mesh);
+  }
+  if (isnan(options->yaw)) {
+    options->yaw = find_yaw(mesh, options->up);
+  }
+}

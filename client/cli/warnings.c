@@ -1,0 +1,104 @@
+#include "warnings.h"
+
+#include <math.h>
+
+#include "text.h"
+
+/* A good map of two whole animals is below; docs/bench-truth.md has the energies of many. */
+static const double ENERGY_MOST = 2, MEDIAN_MOST = 1.5;
+static const double INVERTED_MOST = 0.005;     /* of the triangles */
+static const double CONFIDENCE_LEAST = 0.3;    /* of a found landmark */
+static const double TOLERANCE_ROUNDING = 1.01; /* a proved bound may exceed the tolerance by rounding */
+static const double TURNED_OVER = 60;          /* degrees of the y axis */
+
+static const cJSON *member(const cJSON *object, const char *name) {
+  return cJSON_GetObjectItemCaseSensitive(object, name);
+}
+
+static const char *name_of(const cJSON *supermesh, double index) {
+  return cli_string(cJSON_GetArrayItem(member(supermesh, "shapes"), (int)index), "name", "?");
+}
+
+static int warn_of_pairs(FILE *out, const char *bullet, const cJSON *supermesh) {
+  const cJSON *pair;
+  int count = 0;
+  cJSON_ArrayForEach(pair, member(supermesh, "pairs")) {
+    const char *a = name_of(supermesh, cli_number(pair, "a")), *b = name_of(supermesh, cli_number(pair, "b"));
+    double inverted = cli_number(pair, "inverted_fraction");
+    double median = cli_number(member(member(pair, "distortion"), "symmetric_dirichlet"), "median");
+    if (inverted > INVERTED_MOST) {
+      fprintf(out,
+              "%s%.2g %% of the triangles between %s and %s are inside out on one of them. Look there with '%s'.\n",
+              bullet, 100 * inverted, a, b, "orbmorph view --inside");
+      count++;
+    }
+    if (median > MEDIAN_MOST) {
+      fprintf(out, "%sThe map from %s to %s stretches half of the surface (median %.3g; a good map is below %.2g).\n",
+              bullet, a, b, median, MEDIAN_MOST);
+      count++;
+    }
+  }
+  if (!count && cli_number(supermesh, "energy") > ENERGY_MOST) {
+    fprintf(out,
+            "%sThe maps stretch much in places (energy %.3g; a good map is below %.2g). A landmark on each limb that "
+            "morphs badly helps.\n",
+            bullet, cli_number(supermesh, "energy"), ENERGY_MOST);
+    count++;
+  }
+  return count;
+}
+
+static int warn_of_landmarks(FILE *out, const char *bullet, const cJSON *supermesh) {
+  const cJSON *landmark;
+  int count = 0;
+  cJSON_ArrayForEach(landmark, member(supermesh, "landmarks")) {
+    double confidence = cli_number(landmark, "confidence");
+    if (confidence < CONFIDENCE_LEAST) { /* not if it is NAN: landmarks of the request have none */
+      fprintf(out, "%s%s%s (%.2g)", count ? ", " : bullet,
+              count ? "" : "The map is bad around these found landmarks; set them by hand: ",
+              cli_string(landmark, "name", "?"), confidence);
+      count++;
+    }
+  }
+  fputs(count ? ".\n" : "", out);
+  return count > 0;
+}
+
+/* One line names all shapes that are farther from their files than the tolerance allows: --max-triangles wins. */
+static int warn_of_errors(FILE *out, const char *bullet, const cJSON *supermesh) {
+  double tolerance = cli_number(member(member(supermesh, "request"), "remesh"), "tolerance");
+  const cJSON *shape;
+  int count = 0;
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    double error = cli_number(shape, "hausdorff_relative");
+    if (error > tolerance * TOLERANCE_ROUNDING) {
+      fprintf(out, "%s%s%s by up to %.3g %%", count ? ", " : bullet,
+              count ? "" : "The morph differs from the files by more than the tolerance, in percent of the diagonal: ",
+              cli_string(shape, "name", "?"), 100 * error);
+      count++;
+    }
+  }
+  if (count) {
+    fprintf(out, " (tolerance %.3g %%).\n", 100 * tolerance);
+  }
+  return count > 0;
+}
+
+static int warn_of_fits(FILE *out, const char *bullet, const cJSON *supermesh) {
+  const cJSON *shape;
+  int count = 0;
+  cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
+    double up = cli_number(member(shape, "fit"), "up_degrees");
+    if (up > TURNED_OVER) {
+      fprintf(out, "%sThe fit turned the y axis of %s by %.0f degrees; with --fit none it stays as in its file.\n",
+              bullet, cli_string(shape, "name", "?"), up);
+      count++;
+    }
+  }
+  return count;
+}
+
+int cli_warnings(FILE *out, const char *bullet, const cJSON *supermesh) {
+  return warn_of_pairs(out, bullet, supermesh) + warn_of_landmarks(out, bullet, supermesh) +
+         warn_of_errors(out, bullet, supermesh) + warn_of_fits(out, bullet, supermesh);
+}

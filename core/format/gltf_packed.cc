@@ -1,0 +1,156 @@
+#include "format/gltf_packed.hh"
+
+#include <draco/compression/decode.h>
+#include <meshoptimizer.h>
+
+namespace gltf {
+
+namespace {
+
+const char MESHOPT[] = "EXT_meshopt_compression", DRACO[] = "KHR_draco_mesh_compression";
+/* Compressed meshes are 3 to 30 times smaller; a run of equal bytes may be much more. */
+const size_t GROWTH_MAX = 200, SMALL = 1u << 20;
+
+const cJSON *extension_of(const cJSON *object, const char *name) {
+  return member(member(object, "extensions"), name);
+}
+
+Bytes part_of(const Bytes &bytes, size_t offset, size_t length) {
+  if (offset > bytes.size || length > bytes.size - offset) {
+    malformed("A compressed glTF buffer view reaches beyond its buffer.");
+  }
+  return Bytes{bytes.at + offset, length};
+}
+
+}  // namespace
+
+bool is_fallback(const cJSON *buffer) {
+  return cJSON_IsTrue(member(extension_of(buffer, MESHOPT), "fallback"));
+}
+
+const std::vector<unsigned char> *Packed::view(int64_t index) const {
+  auto found = views_.find(index);
+  return found == views_.end() ? nullptr : &found->second;
+}
+
+const Packed::Values *Packed::accessor(int64_t index) const {
+  auto found = accessors_.find(index);
+  return found == accessors_.end() ? nullptr : &found->second;
+}
+
+void Packed::charge(size_t bytes) {
+  if (bytes > left_) {
+    throw Fault{ORB_E_TOO_LARGE, "The compressed glTF file holds more than its size justifies."};
+  }
+  left_ -= bytes;
+}
+
+/* https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Vendor/EXT_meshopt_compression */
+void Packed::load_view(int64_t index, const cJSON *extension, Bytes bytes) {
+  size_t count = static_cast<size_t>(whole(extension, "count", 0));
+  size_t stride = static_cast<size_t>(whole(extension, "byteStride", 0));
+  std::string mode = text_of(extension, "mode"), filter = text_of(extension, "filter");
+  bool attributes = mode == "ATTRIBUTES";
+  if (stride == 0 || stride > 256 || (attributes ? stride % 4 != 0 : stride != 2 && stride != 4) ||
+      count > SIZE_MAX / 256) {
+    malformed("A compressed glTF buffer view has a stride that is not valid.");
+  }
+  charge(count * stride);
+  std::vector<unsigned char> out(count * stride);
+  int failed = 1;
+  if (attributes) {
+    failed = meshopt_decodeVertexBuffer(out.data(), count, stride, bytes.at, bytes.size);
+  } else if (mode == "TRIANGLES" && count % 3 == 0) {
+    failed = meshopt_decodeIndexBuffer(out.data(), count, stride, bytes.at, bytes.size);
+  } else if (mode == "INDICES") {
+    failed = meshopt_decodeIndexSequence(out.data(), count, stride, bytes.at, bytes.size);
+  }
+  if (failed) {
+    malformed("A compressed glTF buffer view (EXT_meshopt_compression) cannot be decoded.");
+  }
+  if (attributes && filter == "OCTAHEDRAL" && (stride == 4 || stride == 8)) {
+    meshopt_decodeFilterOct(out.data(), count, stride);
+  } else if (attributes && filter == "QUATERNION" && stride == 8) {
+    meshopt_decodeFilterQuat(out.data(), count, stride);
+  } else if (attributes && filter == "EXPONENTIAL") {
+    meshopt_decodeFilterExp(out.data(), count, stride);
+  } else if (!filter.empty() && filter != "NONE") {
+    malformed("A compressed glTF buffer view has an unknown filter (\"" + filter.substr(0, 16) + "\").");
+  }
+  views_[index] = std::move(out);
+}
+
+/* https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_draco_mesh_compression */
+void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSON *extension, Bytes bytes) {
+  draco::DecoderBuffer buffer;
+  buffer.Init(reinterpret_cast<const char *>(bytes.at), bytes.size);
+  draco::Decoder decoder;
+  auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
+  if (!decoded.ok()) {
+    malformed("A glTF primitive (KHR_draco_mesh_compression) cannot be decoded: " +
+              decoded.status().error_msg_string().substr(0, 80));
+  }
+  const draco::Mesh &mesh = *decoded.value();
+  const List accessors = array_of(doc, "accessors");
+  const cJSON *attributes = member(primitive, "attributes"), *ids = member(extension, "attributes");
+  for (const cJSON *id = cJSON_IsObject(ids) ? ids->child : nullptr; id; id = id->next) {
+    int64_t index = whole(attributes, id->string, NONE);
+    const draco::PointAttribute *attribute =
+        mesh.GetAttributeByUniqueId(static_cast<uint32_t>(whole(ids, id->string, 0)));
+    if (index == NONE || !attribute) {
+      malformed("A compressed glTF primitive lacks an attribute that it names.");
+    }
+    const cJSON *accessor = element(accessors, index, "accessor");
+    size_t width = static_cast<size_t>(attribute->num_components()), points = mesh.num_points();
+    if (static_cast<size_t>(whole(accessor, "count", 0)) != points || width < 1 || width > 4) {
+      malformed("A compressed glTF primitive does not fit its accessors.");
+    }
+    charge(points * width * sizeof(double));
+    Values values{std::vector<double>(points * width), width};
+    for (size_t i = 0; i < points; i++) {
+      float value[4] = {0, 0, 0, 0};
+      auto at = attribute->mapped_index(draco::PointIndex(static_cast<uint32_t>(i)));
+      if (!attribute->ConvertValue<float>(at, static_cast<int8_t>(width), value)) {
+        malformed("A compressed glTF primitive has an attribute that is not numbers.");
+      }
+      std::copy(value, value + width, values.list.begin() + static_cast<std::ptrdiff_t>(i * width));
+    }
+    accessors_[index] = std::move(values);
+  }
+  int64_t indices = whole(primitive, "indices", NONE);
+  if (indices == NONE) {
+    malformed("A compressed glTF primitive has no indices.");
+  }
+  charge(static_cast<size_t>(mesh.num_faces()) * 3 * sizeof(double));
+  Values corners{{}, 1};
+  corners.list.reserve(static_cast<size_t>(mesh.num_faces()) * 3);
+  for (uint32_t f = 0; f < mesh.num_faces(); f++) {
+    for (draco::PointIndex corner : mesh.face(draco::FaceIndex(f))) {
+      corners.list.push_back(corner.value());
+    }
+  }
+  accessors_[indices] = std::move(corners);
+}
+
+void Packed::load(const cJSON *doc, const std::function<Bytes(int64_t)> &buffer,
+                  const std::function<Bytes(int64_t)> &view, size_t file_size) {
+  left_ = SMALL + GROWTH_MAX * file_size;
+  const List views = array_of(doc, "bufferViews");
+  for (size_t i = 0; i < views.size(); i++) {
+    if (const cJSON *extension = extension_of(views[i], MESHOPT)) {
+      Bytes whole_buffer = buffer(whole(extension, "buffer", NONE));
+      Bytes bytes = part_of(whole_buffer, static_cast<size_t>(whole(extension, "byteOffset", 0)),
+                            static_cast<size_t>(whole(extension, "byteLength", 0)));
+      load_view(static_cast<int64_t>(i), extension, bytes);
+    }
+  }
+  for (const cJSON *mesh : array_of(doc, "meshes")) {
+    for (const cJSON *primitive : array_of(mesh, "primitives")) {
+      if (const cJSON *extension = extension_of(primitive, DRACO)) {
+        load_primitive(doc, primitive, extension, view(whole(extension, "bufferView", NONE)));
+      }
+    }
+  }
+}
+
+}  // namespace gltf

@@ -1,0 +1,45 @@
+/* Compressed parts of a glTF document: EXT_meshopt_compression (buffer views) and KHR_draco_mesh_compression
+ * (primitives). */
+#ifndef ORB_FORMAT_GLTF_PACKED_HH
+#define ORB_FORMAT_GLTF_PACKED_HH
+
+#include <functional>
+#include <map>
+
+#include "format/gltf_values.hh"
+
+namespace gltf {
+
+class Packed {
+ public:
+  /* What an accessor of a compressed primitive holds. */
+  struct Values {
+    std::vector<double> list;
+    size_t width;
+  };
+
+  /* Decodes everything that is compressed. view(i) gives the bytes of a buffer view that is not; buffer(i) those of a
+   * buffer. file_size bounds what is decoded. */
+  void load(const cJSON *doc, const std::function<Bytes(int64_t)> &buffer, const std::function<Bytes(int64_t)> &view,
+            size_t file_size);
+
+  /* NULL if the view or accessor is not compressed. */
+  const std::vector<unsigned char> *view(int64_t index) const;
+  const Values *accessor(int64_t index) const;
+
+ private:
+  void load_view(int64_t index, const cJSON *extension, Bytes bytes);
+  void load_primitive(const cJSON *doc, const cJSON *primitive, const cJSON *extension, Bytes bytes);
+  void charge(size_t bytes);
+
+  std::map<int64_t, std::vector<unsigned char>> views_;
+  std::map<int64_t, Values> accessors_;
+  size_t left_ = 0; /* bytes that may still be decoded */
+};
+
+/* Whether a buffer stands for the uncompressed data only and has no bytes. */
+bool is_fallback(const cJSON *buffer);
+
+}  // namespace gltf
+
+#endif

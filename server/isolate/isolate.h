@@ -1,0 +1,51 @@
+/* Processes of their own for what reads callers' bytes: the check of an upload, and jobs.
+ *
+ * channel.h   the frames that both sides exchange
+ * sandbox.h   what such a process cannot do
+ * zygote.c    the small process that forks them
+ *
+ * The daemon starts this program again in an internal mode, as the zygote: a process with one thread and without
+ * sockets, files or data of callers. For each piece of work the zygote forks a process, which confines itself, gets its
+ * inputs as descriptors for reading over the channel, and sends back progress and results. It dies after one piece of
+ * work. The daemon alone touches catalogue and store. When the daemon dies, the zygote sees the end of its socket and
+ * exits, and the kernel kills the others.
+ */
+#ifndef ORB_ISOLATE_H
+#define ORB_ISOLATE_H
+
+#include <sys/types.h>
+
+#include "isolate/channel.h"
+#include "orbmorph/context.h"
+
+typedef enum isolate_mode { ISOLATE_OFF, ISOLATE_ON, ISOLATE_STRICT } isolate_mode;
+
+/* The daemon's side. Starts the zygote; 0 with the reason logged: it cannot, or strict and the kernel lacks landlock or
+ * seccomp. */
+int isolate_start(isolate_mode mode);
+void isolate_stop(void);
+int isolate_is_on(void);
+
+/* One process. */
+typedef struct isolated {
+  int channel, status, pidfd; /* −1: none */
+  orb_context *ctx;           /* of the job: its cancel flag and deadline end the process */
+  int (*wanted)(void *user);  /* 0: cancel the context; NULL: nobody is asked */
+  void *user;
+} isolated;
+
+/* Forks a process; 0 with the reason logged. Starts a new zygote if it has died. Blocks for about a millisecond. */
+int isolate_open(isolated *p, orb_context *ctx);
+channel_result isolate_send(isolated *p, frame_type type, const struct iovec *parts, int count, int passed);
+channel_result isolate_receive(isolated *p, size_t most, frame *out);
+/* Kills the process unless it has ended. Returns its status as of waitpid(); −1: unknown. */
+int isolate_close(isolated *p);
+/* Describes a status that is not 0: "was killed by signal 11 (Segmentation fault)". */
+void isolate_status_text(int status, char *out, size_t room);
+
+/* The zygote's side: never returns. work: runs in each forked process, with its channel. */
+enum { ISOLATE_FD = 3 };
+#define ISOLATE_FLAG "--isolated-processes"
+_Noreturn void isolate_zygote(void (*work)(int channel));
+
+#endif

@@ -1,0 +1,69 @@
+#include "isolate/task.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "api/json.h"
+#include "isolate/sandbox.h"
+
+void task_confine(const task_head *task) {
+  sandbox_limits limits = {.memory = task->memory + task->inputs,
+                           .cpu_seconds = task->cpu_seconds,
+                           .threads = task->threads,
+                           .nice = task->nice};
+  sandbox_enter(&limits);
+}
+
+void task_end(int channel, done_head *done, const char *json, const api_problem *problem) {
+  const char *text = done->fine ? json : problem && problem->name ? problem->facts.data : NULL;
+  if (!done->fine && problem && problem->name) {
+    snprintf(done->problem, sizeof done->problem, "%s", problem->name);
+    snprintf(done->detail, sizeof done->detail, "%s", problem->detail);
+  }
+  const struct iovec parts[2] = {{done, sizeof *done}, {(void *)(uintptr_t)text, text ? strlen(text) : 0}};
+  _exit(channel_send(channel, FRAME_DONE, parts, 2, -1, NULL, NULL) == CHANNEL_OK ? 0 : 1);
+}
+
+static int is_json(const char *before, const char *text, const char *after) {
+  api_json_error error;
+  api_text whole = {0};
+  api_text_printf(&whole, "%s%s%s", before, text, after);
+  cJSON *read = whole.failed ? NULL : api_json_parse(whole.data, whole.size, &error);
+  int fine = read != NULL;
+  cJSON_Delete(read);
+  api_text_free(&whole);
+  return fine;
+}
+
+int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem) {
+  *json = NULL;
+  if (f->size < sizeof *done) {
+    return 0;
+  }
+  memcpy(done, f->bytes, sizeof *done);
+  done->sha[sizeof done->sha - 1] = done->places[sizeof done->places - 1] = 0;
+  done->problem[sizeof done->problem - 1] = done->detail[sizeof done->detail - 1] = 0;
+  const char *text = (const char *)f->bytes + sizeof *done;
+  int is_empty = f->size == sizeof *done;
+  if (!done->fine) {
+    if (!done->problem[0] || (!is_empty && !is_json("{", text, "}"))) {
+      return 0;
+    }
+    api_refuse(problem, api_problem_name(done->problem), "%s", done->detail);
+    if (!is_empty) {
+      api_text_add(&problem->facts, text);
+    }
+    return 1;
+  }
+  if (!is_empty) {
+    *json = is_json("", text, "") ? strdup(text) : NULL;
+  }
+  return is_empty || *json;
+}
+
+int64_t task_cpu_seconds(int64_t deadline_ms, int threads) {
+  int64_t left = deadline_ms - orb_clock_ms();
+  return (left > 0 ? left / 1000 + 2 : 2) * (threads > 0 ? threads : 1);
+}

@@ -1,0 +1,65 @@
+/* What travels in the frames of channel.h. Texts in these structs are ended by a zero byte, on both sides by force. */
+#ifndef ORB_ISOLATE_TASK_H
+#define ORB_ISOLATE_TASK_H
+
+#include "api/mesh_codec.h"
+#include "api/problem.h"
+#include "isolate/isolate.h"
+#include "store/catalogue.h"
+#include "store/objects.h"
+
+typedef enum task_kind { TASK_CHECK, TASK_EMBEDDING, TASK_SUPERMESH } task_kind;
+
+/* FRAME_TASK; the request of a job follows it. */
+typedef struct task_head {
+  task_kind kind;
+  int threads, nice;
+  int64_t memory, inputs; /* bytes: the budget, and of all inputs together */
+  int64_t deadline_ms;    /* orb_clock_ms() */
+  int64_t cpu_seconds, max_triangles;
+  char key[API_ID_SIZE]; /* of the job, or the id of the mesh to check */
+  double embed_ms;
+  char name[ORB_NAME_MAX], repair[API_REPAIR_TEXT]; /* of the mesh to check, as the three below */
+  unsigned flags;
+  orb_format format;
+  int64_t bytes, created;
+} task_head;
+
+/* FRAME_INPUT, with the descriptor of the object; the row's description follows. */
+typedef struct input_head {
+  resource_kind row;
+  object_kind object;
+  char id[API_ID_SIZE], sha[API_ID_SIZE]; /* sha: of the object, by its row */
+} input_head;
+
+/* FRAME_PROGRESS. */
+typedef struct progress_head {
+  char stage[24];
+  double fraction;
+} progress_head;
+
+/* FRAME_OBJECT, with the descriptor. */
+typedef struct object_head {
+  object_kind kind;
+  char id[API_ID_SIZE];
+} object_head;
+
+/* FRAME_DONE; the description of the result or the facts of the problem follow. */
+typedef struct done_head {
+  int fine, gone;
+  int64_t flips, bytes, created;
+  char sha[API_ID_SIZE], places[API_ID_SIZE];
+  char problem[40], detail[512];
+} done_head;
+
+/* The process's side. Confines the calling process to the limits of the task. */
+void task_confine(const task_head *task);
+/* Sends FRAME_DONE and ends the process. json, problem: may be NULL. */
+_Noreturn void task_end(int channel, done_head *done, const char *json, const api_problem *problem);
+
+/* The daemon's side. Reads FRAME_DONE: json is of malloc() or NULL; a result that does not fit together is 0. */
+int task_read_done(const frame *f, done_head *done, char **json, api_problem *problem);
+/* A limit on the processor time of a job with this many threads until its deadline. */
+int64_t task_cpu_seconds(int64_t deadline_ms, int threads);
+
+#endif

@@ -1,0 +1,381 @@
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "isolate/isolate.h"
+#include "isolate/sandbox.h"
+#include "log.h"
+
+enum { PASSED_MOST = 2, HELLO_MS = 20000, PROCESSES = 1024, STATUS_MS = 2000 };
+
+extern char **environ;
+
+/* Small messages over a socket of packets: a number and up to two descriptors. */
+static int tell(int fd, int number, const int *passed, int count) {
+  char control[CMSG_SPACE(PASSED_MOST * sizeof(int))] = {0};
+  struct iovec part = {&number, sizeof number};
+  struct msghdr message = {.msg_iov = &part, .msg_iovlen = 1};
+  if (count) {
+    message.msg_control = control;
+    message.msg_controllen = CMSG_SPACE((size_t)count * sizeof(int));
+    struct cmsghdr *item = CMSG_FIRSTHDR(&message);
+    item->cmsg_level = SOL_SOCKET;
+    item->cmsg_type = SCM_RIGHTS;
+    item->cmsg_len = CMSG_LEN((size_t)count * sizeof(int));
+    memcpy(CMSG_DATA(item), passed, (size_t)count * sizeof(int));
+  }
+  ssize_t sent;
+  do {
+    sent = sendmsg(fd, &message, MSG_NOSIGNAL);
+  } while (sent < 0 && errno == EINTR);
+  return sent == (ssize_t)sizeof number;
+}
+
+/* Returns the number of descriptors; −1: the other end is gone. */
+static int hear(int fd, int *number, int passed[PASSED_MOST]) {
+  char control[CMSG_SPACE(PASSED_MOST * sizeof(int))];
+  struct iovec part = {number, sizeof *number};
+  struct msghdr message = {.msg_iov = &part, .msg_iovlen = 1, .msg_control = control, .msg_controllen = sizeof control};
+  ssize_t got;
+  do {
+    got = recvmsg(fd, &message, MSG_CMSG_CLOEXEC);
+  } while (got < 0 && errno == EINTR);
+  if (got != (ssize_t)sizeof *number) {
+    return -1;
+  }
+  struct cmsghdr *item = CMSG_FIRSTHDR(&message);
+  if (!item || item->cmsg_level != SOL_SOCKET || item->cmsg_type != SCM_RIGHTS) {
+    return 0;
+  }
+  int count = (int)((item->cmsg_len - CMSG_LEN(0)) / sizeof(int));
+  memcpy(passed, CMSG_DATA(item), (size_t)count * sizeof(int));
+  return count;
+}
+
+/* ---- the zygote ---- */
+
+static struct process {
+  pid_t pid; /* 0: unused */
+  int status;
+} processes[PROCESSES];
+static int deaths[2]; /* a pipe that the handler of SIGCHLD writes to */
+
+static void on_death(int number) {
+  int saved = errno;
+  ssize_t written = write(deaths[1], "", 1);
+  (void)number;
+  (void)written; /* if the pipe is full, the loop looks anyway */
+  errno = saved;
+}
+
+/* Reports the statuses of the dead to those who wait for them. */
+static void bury(void) {
+  int status;
+  for (pid_t pid; (pid = waitpid(-1, &status, WNOHANG)) > 0;) {
+    for (int i = 0; i < PROCESSES; i++) {
+      if (processes[i].pid == pid) {
+        ssize_t written = write(processes[i].status, &status, sizeof status);
+        (void)written;
+        close(processes[i].status);
+        processes[i].pid = 0;
+      }
+    }
+  }
+}
+
+_Noreturn static void become_process(int channel, pid_t zygote, void (*work)(int channel)) {
+  int kept = fcntl(channel, F_DUPFD_CLOEXEC, 64);
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (kept < 0 || getppid() != zygote || dup2(kept, ISOLATE_FD) != ISOLATE_FD) {
+    _exit(1);
+  }
+  signal(SIGCHLD, SIG_DFL);
+  (void)syscall(SYS_close_range, ISOLATE_FD + 1, ~0u, 0); /* those of other processes */
+  int score = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
+  if (score >= 0) { /* where memory is short, this process dies before the daemon */
+    ssize_t written = write(score, "800", 3);
+    (void)written;
+    close(score);
+  }
+  work(ISOLATE_FD);
+  _exit(0);
+}
+
+static void fork_one(int passed[PASSED_MOST], void (*work)(int channel)) {
+  int slot = 0, pidfd = -1;
+  pid_t zygote = getpid(), pid = -1;
+  while (slot < PROCESSES && processes[slot].pid) {
+    slot++;
+  }
+  if (slot < PROCESSES) {
+    pid = fork();
+    if (pid == 0) {
+      become_process(passed[0], zygote, work);
+    }
+  }
+  close(passed[0]);
+  if (pid > 0) {
+    pidfd = (int)syscall(SYS_pidfd_open, pid, 0);
+    processes[slot] = (struct process){pid, passed[1]};
+  } else {
+    close(passed[1]);
+  }
+  tell(ISOLATE_FD, pid > 0 ? (int)pid : -errno, &pidfd, pidfd >= 0);
+  if (pidfd >= 0) {
+    close(pidfd);
+  }
+}
+
+/* What holds here, tried in a process that ends at once. */
+static int try_sandbox(void) {
+  int status = 0;
+  pid_t pid = fork();
+  if (pid == 0) {
+    _exit(sandbox_enter(&(sandbox_limits){.memory = 64 << 20, .cpu_seconds = 10, .threads = 1}));
+  }
+  return pid > 0 && waitpid(pid, &status, 0) == pid && WIFEXITED(status) ? WEXITSTATUS(status) : 0;
+}
+
+_Noreturn void isolate_zygote(void (*work)(int channel)) {
+  static const int ignored[] = {SIGTERM, SIGINT, SIGHUP, SIGPIPE}; /* the daemon decides when its processes end */
+  for (size_t i = 0; i < sizeof ignored / sizeof *ignored; i++) {
+    signal(ignored[i], SIG_IGN);
+  }
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, NULL);
+  prctl(PR_SET_NAME, "orbmorph-fork");
+  sandbox_prepare();
+  int holds = try_sandbox();
+  if (pipe2(deaths, O_CLOEXEC | O_NONBLOCK) != 0) {
+    _exit(1);
+  }
+  sigaction(SIGCHLD, &(struct sigaction){.sa_handler = on_death, .sa_flags = SA_NOCLDSTOP}, NULL);
+  if (!tell(ISOLATE_FD, holds, NULL, 0)) {
+    _exit(0);
+  }
+  for (;;) {
+    struct pollfd wait[2] = {{.fd = ISOLATE_FD, .events = POLLIN}, {.fd = deaths[0], .events = POLLIN}};
+    if (poll(wait, 2, -1) < 0 && errno != EINTR) {
+      _exit(1);
+    }
+    char drained[64];
+    while (read(deaths[0], drained, sizeof drained) > 0) {
+    }
+    bury();
+    if (!(wait[0].revents & (POLLIN | POLLHUP))) {
+      continue;
+    }
+    int number, passed[PASSED_MOST];
+    int count = hear(ISOLATE_FD, &number, passed);
+    if (count < 0) {
+      _exit(0); /* the daemon has ended */
+    }
+    if (count == PASSED_MOST) {
+      fork_one(passed, work);
+    }
+  }
+}
+
+/* ---- the daemon ---- */
+
+static struct {
+  pthread_mutex_t lock;
+  isolate_mode mode;
+  int fd; /* to the zygote; −1: none */
+  pid_t pid;
+} own = {.lock = PTHREAD_MUTEX_INITIALIZER, .fd = -1};
+
+static pid_t spawn(int fd) {
+  char *arguments[] = {(char *)(uintptr_t) "orbmorphd", (char *)(uintptr_t)ISOLATE_FLAG, NULL};
+  posix_spawn_file_actions_t actions;
+  pid_t pid = -1;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, fd, ISOLATE_FD);
+  int code = posix_spawn(&pid, "/proc/self/exe", &actions, NULL, arguments, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (code != 0) {
+    log_error("the process that forks isolated processes cannot be started: %s", strerror(code));
+    return -1;
+  }
+  return pid;
+}
+
+static void end_zygote(void) {
+  if (own.fd >= 0) {
+    close(own.fd);
+    own.fd = -1;
+    waitpid(own.pid, NULL, 0);
+  }
+}
+
+/* Under the lock. */
+static int start_zygote(int *holds) {
+  int ends[2], passed[PASSED_MOST];
+  if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) {
+    return 0;
+  }
+  int theirs = fcntl(ends[1], F_DUPFD_CLOEXEC, 16); /* not ISOLATE_FD itself: adddup2() would leave it close-on-exec */
+  close(ends[1]);
+  own.pid = theirs >= 0 ? spawn(theirs) : -1;
+  if (theirs >= 0) {
+    close(theirs);
+  }
+  own.fd = ends[0];
+  struct pollfd hello = {.fd = own.fd, .events = POLLIN};
+  if (own.pid > 0 && poll(&hello, 1, HELLO_MS) > 0 && hear(own.fd, holds, passed) >= 0) {
+    return 1;
+  }
+  if (own.pid > 0) {
+    kill(own.pid, SIGKILL);
+    end_zygote();
+  } else {
+    close(own.fd);
+    own.fd = -1;
+  }
+  return 0;
+}
+
+int isolate_start(isolate_mode mode) {
+  int holds = 0;
+  if (mode == ISOLATE_OFF) {
+    return 1;
+  }
+  pthread_mutex_lock(&own.lock);
+  int fine = start_zygote(&holds);
+  own.mode = fine ? mode : ISOLATE_OFF;
+  pthread_mutex_unlock(&own.lock);
+  if (!fine) {
+    log_error("meshes and jobs cannot have processes of their own; isolate = off runs them within the service");
+    return 0;
+  }
+  if (holds != SANDBOX_ALL) {
+    const char *missing = holds == SANDBOX_LANDLOCK  ? "seccomp"
+                          : holds == SANDBOX_SECCOMP ? "landlock"
+                                                     : "landlock and seccomp";
+    log_write(mode == ISOLATE_STRICT ? LOG_ERROR : LOG_WARN, NULL,
+              "%s missing here: the processes of jobs are limited, but less confined%s", missing,
+              mode == ISOLATE_STRICT ? "; isolate = strict does not start without" : "");
+    if (mode == ISOLATE_STRICT) {
+      isolate_stop();
+      return 0;
+    }
+  }
+  return 1;
+}
+
+void isolate_stop(void) {
+  pthread_mutex_lock(&own.lock);
+  end_zygote();
+  own.mode = ISOLATE_OFF;
+  pthread_mutex_unlock(&own.lock);
+}
+
+int isolate_is_on(void) {
+  return __atomic_load_n(&own.mode, __ATOMIC_RELAXED) != ISOLATE_OFF;
+}
+
+static int fork_process(isolated *p, int channel, int status) {
+  int number = 0, holds, got[PASSED_MOST], passed[PASSED_MOST] = {channel, status};
+  for (int tries = 0; tries < 2; tries++) {
+    if (own.fd < 0 && !start_zygote(&holds)) {
+      return 0;
+    }
+    int count = tell(own.fd, 1, passed, PASSED_MOST) ? hear(own.fd, &number, got) : -1;
+    if (count >= 0) {
+      p->pidfd = count > 0 ? got[0] : -1;
+      return number > 0 && count > 0;
+    }
+    log_warn("the process that forks isolated processes has died and is started again");
+    kill(own.pid, SIGKILL);
+    end_zygote();
+  }
+  return 0;
+}
+
+int isolate_open(isolated *p, orb_context *ctx) {
+  int channel[2], status[2];
+  *p = (isolated){.channel = -1, .status = -1, .pidfd = -1, .ctx = ctx};
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, channel) != 0) {
+    return 0;
+  }
+  if (pipe2(status, O_CLOEXEC) != 0) {
+    close(channel[0]);
+    close(channel[1]);
+    return 0;
+  }
+  pthread_mutex_lock(&own.lock);
+  int fine = fork_process(p, channel[1], status[1]);
+  pthread_mutex_unlock(&own.lock);
+  close(channel[1]);
+  close(status[1]);
+  p->channel = channel[0];
+  p->status = status[0];
+  if (!fine) {
+    log_error("no process could be forked for a job");
+    isolate_close(p);
+  }
+  return fine;
+}
+
+static int continues(void *user) {
+  isolated *p = user;
+  if (p->wanted && !p->wanted(p->user)) {
+    orb_context_cancel(p->ctx);
+  }
+  return orb_context_check(p->ctx) == ORB_OK;
+}
+
+channel_result isolate_send(isolated *p, frame_type type, const struct iovec *parts, int count, int passed) {
+  return channel_send(p->channel, type, parts, count, passed, continues, p);
+}
+
+channel_result isolate_receive(isolated *p, size_t most, frame *out) {
+  return channel_receive(p->channel, most, out, continues, p);
+}
+
+int isolate_close(isolated *p) {
+  int status = -1;
+  if (p->channel >= 0) {
+    close(p->channel);
+  }
+  if (p->status >= 0) {
+    /* It has ended, or ends within moments of its last frame; else it is killed. */
+    struct pollfd end = {.fd = p->status, .events = POLLIN};
+    if (p->pidfd >= 0 && poll(&end, 1, 0) <= 0) {
+      (void)syscall(SYS_pidfd_send_signal, p->pidfd, SIGKILL, NULL, 0);
+    }
+    if (p->pidfd >= 0 && (poll(&end, 1, STATUS_MS) <= 0 || read(p->status, &status, sizeof status) != sizeof status)) {
+      status = -1;
+    }
+    close(p->status);
+  }
+  if (p->pidfd >= 0) {
+    close(p->pidfd);
+  }
+  *p = (isolated){.channel = -1, .status = -1, .pidfd = -1};
+  return status;
+}
+
+void isolate_status_text(int status, char *out, size_t room) {
+  if (status != -1 && WIFSIGNALED(status)) {
+    snprintf(out, room, "was killed by signal %d (%s)", WTERMSIG(status), strsignal(WTERMSIG(status)));
+  } else if (status != -1 && WIFEXITED(status)) {
+    snprintf(out, room, "exited with status %d", WEXITSTATUS(status));
+  } else {
+    snprintf(out, room, "ended for an unknown reason");
+  }
+}

@@ -1,0 +1,26 @@
+/* Deaths of processes that ran alone in what they did, by the key of their work: of a job, or of a mesh that was
+ * checked. They outlive the jobs, so that a file which kills its process cannot do so over and over. */
+#ifndef ORB_STORE_CRASHES_H
+#define ORB_STORE_CRASHES_H
+
+#include "api/text.h"
+#include "store/catalogue.h"
+#include "store/database.h"
+
+enum { CRASHES_MOST = 3 }; /* of a key; then its work is refused until an administrator clears it */
+
+/* Counts one, within a write. request: of the job; NULL: the key is a mesh's. */
+int crash_note(database *db, const char *key, const char *request, const char *tenant, int64_t now);
+/* SQLITE_OK, or SQLITE_CONSTRAINT if the work of this key is refused. */
+int crash_check(database *db, const char *key);
+
+/* Counts the death of a process that checked a mesh. Returns without waiting for the commit. */
+void catalogue_crash_of_mesh(catalogue *cat, const char *mesh, const char *tenant, int64_t now);
+/* Whether the work of this key is refused. */
+int catalogue_crashed(catalogue *cat, const char *key);
+/* Forgets the crashes of all keys that begin so, or of this tenant, or of work on this mesh. STORE_NOT_FOUND: none. */
+store_result catalogue_crash_clear(catalogue *cat, const char *name);
+/* Appends a line for each key, the latest first; −1: it cannot be read. */
+int catalogue_crash_list(catalogue *cat, api_text *out);
+
+#endif

@@ -1,0 +1,164 @@
+#include "worker/confined.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "faults.h"
+#include "intake.h"
+#include "isolate/task.h"
+#include "worker/run.h"
+
+enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 1, PROGRESS_MS = 20 };
+
+typedef struct input {
+  input_head head;
+  char *json;
+  int fd;
+} input;
+
+typedef struct confined {
+  int channel, count;
+  task_head task;
+  char *request;
+  input inputs[INPUTS_MOST];
+  char stage[24];
+  int64_t shown; /* orb_clock_ms() of the last progress sent */
+} confined;
+
+static store_result get(void *user, resource_kind kind, const char *id, resource *out) {
+  const confined *c = user;
+  for (int i = 0; i < c->count; i++) {
+    if (c->inputs[i].head.row == kind && strcmp(c->inputs[i].head.id, id) == 0) {
+      *out = (resource){.kind = kind, .json = strdup(c->inputs[i].json)};
+      memcpy(out->id, c->inputs[i].head.id, sizeof out->id);
+      memcpy(out->sha, c->inputs[i].head.sha, sizeof out->sha);
+      return out->json ? STORE_OK : STORE_ERROR;
+    }
+  }
+  return STORE_NOT_FOUND;
+}
+
+/* Two shapes of one mesh read it twice, so the descriptor stays here. */
+static store_result read_object(void *user, object_kind kind, const char *id, int *fd, uint64_t *size) {
+  const confined *c = user;
+  for (int i = 0; i < c->count; i++) {
+    const input *in = &c->inputs[i];
+    if (in->fd >= 0 && in->head.object == kind && strcmp(in->head.id, id) == 0) {
+      off_t end = lseek(in->fd, 0, SEEK_END);
+      *fd = lseek(in->fd, 0, SEEK_SET) == 0 ? dup(in->fd) : -1;
+      *size = (uint64_t)end;
+      return *fd >= 0 && end >= 0 ? STORE_OK : STORE_ERROR;
+    }
+  }
+  return STORE_NOT_FOUND;
+}
+
+static store_result publish(void *user, object_kind kind, const char *id, int fd) {
+  const confined *c = user;
+  object_head head = {.kind = kind};
+  strncpy(head.id, id, sizeof head.id - 1);
+  const struct iovec part = {&head, sizeof head};
+  return channel_send(c->channel, FRAME_OBJECT, &part, 1, fd, NULL, NULL) == CHANNEL_OK ? STORE_OK : STORE_ERROR;
+}
+
+static void show(void *user, const char *stage, double fraction) {
+  confined *c = user;
+  int64_t now = orb_clock_ms();
+  if (strncmp(c->stage, stage, sizeof c->stage - 1) == 0 && now - c->shown < PROGRESS_MS) {
+    return;
+  }
+  progress_head head = {.fraction = fraction};
+  strncpy(head.stage, stage, sizeof head.stage - 1);
+  memcpy(c->stage, head.stage, sizeof c->stage);
+  c->shown = now;
+  const struct iovec part = {&head, sizeof head};
+  if (channel_send(c->channel, FRAME_PROGRESS, &part, 1, -1, NULL, NULL) != CHANNEL_OK) {
+    _exit(1); /* the daemon has let go of this process */
+  }
+}
+
+static orb_context *make_context(confined *c, job_progress *progress) {
+  orb_context_options options = {.memory_limit = (size_t)c->task.memory,
+                                 .threads = c->task.threads,
+                                 .deadline_ms = c->task.deadline_ms,
+                                 .max_triangles = c->task.max_triangles,
+                                 .progress = progress_report,
+                                 .progress_user = progress};
+  orb_context *ctx = NULL;
+  return orb_context_create(&options, &ctx) == ORB_OK ? ctx : NULL;
+}
+
+static _Noreturn void run_job_task(confined *c) {
+  const objects_remote remote = {publish, read_object, c};
+  job_progress progress = {.show = show, .user = c};
+  run_env env = {.progress = &progress, .get = get, .user = c};
+  const run_job task = {c->task.key, c->request, c->task.embed_ms};
+  run_output out = {0};
+  api_problem problem = {0};
+  orb_context *ctx = make_context(c, &progress);
+  if (!ctx || objects_open_remote(&remote, &env.store) != STORE_OK) {
+    _exit(1);
+  }
+  FAULT_POINT(c->task.key);
+  int fine = c->task.kind == TASK_EMBEDDING ? run_embedding(&env, ctx, &task, &out, &problem)
+                                            : run_supermesh(&env, ctx, &task, &out, &problem);
+  if (!fine && !problem.name) {
+    api_problem_of_error(orb_context_error(ctx), &problem);
+  }
+  done_head done = {
+      .fine = fine, .gone = out.gone, .flips = out.flips, .bytes = out.row.bytes, .created = out.row.created};
+  memcpy(done.sha, out.row.sha, sizeof done.sha);
+  memcpy(done.places, out.row.places, sizeof done.places);
+  task_end(c->channel, &done, out.row.json, &problem);
+}
+
+static _Noreturn void run_check_task(confined *c) {
+  api_problem problem = {0};
+  api_text json = {0};
+  done_head done = {0};
+  orb_context *ctx = make_context(c, NULL);
+  if (!ctx || c->count != 1) {
+    _exit(1);
+  }
+  FAULT_POINT("check-begun");
+  done.fine = intake_check_here(&c->task, c->inputs[0].fd, ctx, &json, &problem);
+  task_end(c->channel, &done, json.data, &problem);
+}
+
+/* The daemon sent these frames, so what does not fit is a bug: the process ends. */
+static void take_input(confined *c, frame *f) {
+  input *in = &c->inputs[c->count++];
+  if (c->count > INPUTS_MOST || f->size < sizeof in->head) {
+    _exit(1);
+  }
+  memcpy(&in->head, f->bytes, sizeof in->head);
+  in->fd = f->fd;
+  f->fd = -1;
+  in->json = strdup((const char *)f->bytes + sizeof in->head);
+}
+
+void confined_work(int channel) {
+  confined c = {.channel = channel};
+  frame f;
+  if (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) != CHANNEL_OK || f.type != FRAME_TASK ||
+      f.size < sizeof c.task) {
+    _exit(1);
+  }
+  memcpy(&c.task, f.bytes, sizeof c.task);
+  c.request = strdup((const char *)f.bytes + sizeof c.task);
+  frame_free(&f);
+  task_confine(&c.task);
+  while (channel_receive(channel, CHANNEL_MOST, &f, NULL, NULL) == CHANNEL_OK && f.type == FRAME_INPUT) {
+    take_input(&c, &f);
+    frame_free(&f);
+  }
+  if (f.type != FRAME_GO) {
+    _exit(1);
+  }
+  frame_free(&f);
+  if (c.task.kind == TASK_CHECK) {
+    run_check_task(&c);
+  }
+  run_job_task(&c);
+}

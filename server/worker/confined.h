@@ -1,0 +1,8 @@
+/* A job within a process of its own: what run_embedding.c and run_supermesh.c do there with inputs from the channel. */
+#ifndef ORB_WORKER_CONFINED_H
+#define ORB_WORKER_CONFINED_H
+
+/* Runs the task that the channel brings: a job, or the check of an upload. Ends the process. */
+void confined_work(int channel);
+
+#endif

@@ -1,0 +1,274 @@
+#include "worker/isolated.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/sendfile.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "api/json.h"
+#include "faults.h"
+#include "isolate/task.h"
+#include "log.h"
+#include "store/alignments.h"
+
+enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 1, COPY_BYTES = 16 << 20 };
+
+typedef struct collected {
+  input_head heads[INPUTS_MOST];
+  char *json[INPUTS_MOST];
+  int fds[INPUTS_MOST], count;
+  char alignment[API_ID_SIZE]; /* the id of the one that the job takes or keeps; "": none */
+  int64_t bytes;
+} collected;
+
+/* Adds a row and its object; what is not there stays out, and the process reports what it lacks. */
+static void collect(const run_env *env, collected *all, resource_kind kind, object_kind object, const char *id) {
+  resource row = {0};
+  uint64_t size;
+  int at = all->count;
+  for (int i = 0; i < at; i++) {
+    if (all->heads[i].row == kind && strcmp(all->heads[i].id, id) == 0) {
+      return;
+    }
+  }
+  if (at == INPUTS_MOST || catalogue_get(env->cat, kind, id, &row) != STORE_OK) {
+    return;
+  }
+  all->heads[at] = (input_head){.row = kind, .object = object};
+  memcpy(all->heads[at].id, row.id, sizeof row.id);
+  memcpy(all->heads[at].sha, row.sha, sizeof row.sha);
+  all->json[at] = row.json;
+  row.json = NULL;
+  resource_free(&row);
+  all->fds[at] = -1;
+  if (objects_read(env->store, object, id, &all->fds[at], &size) == STORE_OK) {
+    all->bytes += (int64_t)size;
+  }
+  all->count++;
+}
+
+static void let_go(collected *all) {
+  for (int i = 0; i < all->count; i++) {
+    free(all->json[i]);
+    if (all->fds[i] >= 0) {
+      close(all->fds[i]);
+    }
+  }
+}
+
+/* The inputs that the request names. A request that does not decode has none: the process reports that. */
+static void collect_all(const run_env *env, api_job_kind kind, const char *text, collected *all) {
+  api_json_error error;
+  api_problem ignored = {0};
+  cJSON *body = api_json_parse(text, strlen(text), &error);
+  api_supermesh_request merge;
+  api_embedding_request one;
+  memset(&merge, 0, sizeof merge);
+  if (body && kind == API_JOB_EMBEDDING && api_embedding_request_read(body, &one, &ignored)) {
+    collect(env, all, RESOURCE_MESH, OBJECT_MESH, one.mesh);
+  } else if (body && kind == API_JOB_SUPERMESH && api_supermesh_request_read(body, &merge, &ignored)) {
+    for (int32_t s = 0; s < merge.shape_count; s++) {
+      api_embedding_request wanted = {.options = merge.embedding};
+      char embedding[API_ID_SIZE];
+      memcpy(wanted.mesh, merge.shapes[s].mesh, sizeof wanted.mesh);
+      collect(env, all, RESOURCE_MESH, OBJECT_MESH, wanted.mesh);
+      if (api_embedding_request_id(&wanted, embedding)) {
+        collect(env, all, RESOURCE_EMBEDDING, OBJECT_SPHERE, embedding);
+        catalogue_touch(env->cat, RESOURCE_EMBEDDING, embedding);
+      }
+    }
+    if (api_alignment_id(&merge, all->alignment)) {
+      collect(env, all, RESOURCE_ALIGNMENT, OBJECT_ALIGNMENT, all->alignment);
+      catalogue_touch(env->cat, RESOURCE_ALIGNMENT, all->alignment);
+    } else {
+      all->alignment[0] = 0;
+    }
+  }
+  api_supermesh_request_free(&merge);
+  api_problem_free(&ignored);
+  cJSON_Delete(body);
+}
+
+static channel_result send_all(isolated *p, const task_head *task, const char *request, const collected *all) {
+  const struct iovec begin[2] = {{(void *)(uintptr_t)task, sizeof *task},
+                                 {(void *)(uintptr_t)request, strlen(request)}};
+  channel_result result = isolate_send(p, FRAME_TASK, begin, 2, -1);
+  for (int i = 0; i < all->count && result == CHANNEL_OK; i++) {
+    const struct iovec parts[2] = {{(void *)(uintptr_t)&all->heads[i], sizeof all->heads[i]},
+                                   {all->json[i], strlen(all->json[i])}};
+    result = isolate_send(p, FRAME_INPUT, parts, 2, all->fds[i]);
+  }
+  return result == CHANNEL_OK ? isolate_send(p, FRAME_GO, NULL, 0, -1) : result;
+}
+
+/* What a job of this kind may make. */
+static int may_make(api_job_kind kind, object_kind object) {
+  return kind == API_JOB_EMBEDDING ? object == OBJECT_SPHERE
+                                   : object == OBJECT_ASSET || object == OBJECT_PLACES || object == OBJECT_SPHERES;
+}
+
+static store_result copy(const run_env *env, orb_context *ctx, const object_head *head, int from) {
+  struct stat info;
+  object_temp temp;
+  if (fstat(from, &info) != 0) {
+    return STORE_ERROR;
+  }
+  store_result stored = objects_begin(env->store, &temp);
+  off_t at = 0;
+  while (stored == STORE_OK && at < info.st_size) {
+    off_t left = info.st_size - at;
+    ssize_t n = sendfile(temp.fd, from, &at, (size_t)(left < COPY_BYTES ? left : COPY_BYTES));
+    if (n <= 0 && errno != EINTR) {
+      stored = errno == ENOSPC || errno == EDQUOT || errno == EFBIG ? STORE_FULL : STORE_ERROR;
+    } else if (orb_context_check(ctx) != ORB_OK) {
+      stored = STORE_ERROR;
+    }
+    FAULT_POINT("temp-written");
+  }
+  if (stored == STORE_OK) {
+    stored = objects_publish(env->store, &temp, head->kind, head->id);
+  }
+  objects_abandon(&temp);
+  return stored;
+}
+
+/* Keeps an alignment, whose row has the hash of its bytes. The process could still write to the descriptor, so they are
+ * copied first. */
+static void take_alignment(const run_env *env, const char *id, int fd) {
+  struct stat info;
+  size_t size = fstat(fd, &info) == 0 && info.st_size > 0 ? (size_t)info.st_size : 0;
+  void *bytes = size ? malloc(size) : NULL;
+  if (!bytes || pread(fd, bytes, size, 0) != (ssize_t)size ||
+      alignments_publish(env->cat, env->store, id, bytes, size) != STORE_OK) {
+    log_warn("the alignment %s could not be kept", id);
+  }
+  free(bytes);
+}
+
+/* Stores an object that the process has made: 1, 0 with the problem, −1: it may not make that. */
+static int take_object(const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j, const char *alignment,
+                       const frame *f, run_output *out, api_problem *problem) {
+  object_head head;
+  if (f->size != sizeof head || f->fd < 0) {
+    return -1;
+  }
+  memcpy(&head, f->bytes, sizeof head);
+  if (head.kind == OBJECT_ALIGNMENT && kind == API_JOB_SUPERMESH) {
+    if (!alignment[0] || memcmp(head.id, alignment, sizeof head.id) != 0 || out->holds) {
+      return -1;
+    }
+    take_alignment(env, alignment, f->fd);
+    return 1;
+  }
+  if (!may_make(kind, head.kind) || memcmp(head.id, j->key, sizeof head.id) != 0) {
+    return -1;
+  }
+  if (!out->holds) {
+    objects_hold(env->store);
+    out->holds = 1;
+  }
+  store_result stored = copy(env, ctx, &head, f->fd);
+  if (stored != STORE_OK && orb_context_check(ctx) == ORB_OK) {
+    run_problem_of_store(stored, problem);
+  }
+  return stored == STORE_OK;
+}
+
+static int take_done(const run_job *j, api_job_kind kind, const frame *f, run_output *out, api_problem *problem) {
+  done_head done;
+  char *json;
+  if (!task_read_done(f, &done, &json, problem) || (done.fine && !json)) {
+    free(json);
+    api_problem_free(problem);
+    return -1;
+  }
+  out->gone = done.gone;
+  out->flips = done.flips;
+  out->row.kind = kind == API_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
+  out->row.bytes = done.bytes;
+  out->row.created = done.created;
+  out->row.json = json;
+  memcpy(out->row.id, j->key, sizeof out->row.id);
+  memcpy(out->row.sha, done.sha, sizeof done.sha);
+  memcpy(out->row.places, done.places, sizeof done.places);
+  return done.fine;
+}
+
+static void take_progress(const run_env *env, const frame *f) {
+  progress_head head;
+  if (f->size == sizeof head) {
+    memcpy(&head, f->bytes, sizeof head);
+    head.stage[sizeof head.stage - 1] = 0;
+    progress_report(env->progress, head.stage, head.fraction >= 0 && head.fraction <= 1 ? head.fraction : 0);
+  }
+}
+
+/* Takes frames until the end: as take_done(), or −1 with the result of the channel. */
+static int listen_to(isolated *p, const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j,
+                     const char *alignment, run_output *out, api_problem *problem, channel_result *why) {
+  frame f;
+  for (int taken = 1;;) {
+    *why = isolate_receive(p, CHANNEL_MOST, &f);
+    if (*why != CHANNEL_OK) {
+      return -1;
+    }
+    if (f.type == FRAME_PROGRESS) {
+      take_progress(env, &f);
+    } else if (f.type == FRAME_OBJECT) {
+      taken = take_object(env, ctx, kind, j, alignment, &f, out, problem);
+    } else if (f.type == FRAME_DONE) {
+      taken = take_done(j, kind, &f, out, problem);
+    } else {
+      taken = -1;
+    }
+    int over = f.type == FRAME_DONE;
+    frame_free(&f);
+    if (taken < 0) {
+      *why = CHANNEL_BAD;
+    }
+    if (taken <= 0 || over) {
+      return taken;
+    }
+  }
+}
+
+int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j,
+                 const isolated_limits *limits, run_output *out, api_problem *problem, isolated_end *end) {
+  resource known = {0};
+  isolated process;
+  collected inputs = {.alignment = ""};
+  *end = (isolated_end){.status = -1};
+  resource_kind made = kind == API_JOB_EMBEDDING ? RESOURCE_EMBEDDING : RESOURCE_SUPERMESH;
+  if (catalogue_get(env->cat, made, j->key, &known) == STORE_OK) {
+    resource_free(&known); /* of an earlier attempt or another owner */
+    return 1;
+  }
+  if (!isolate_open(&process, ctx)) {
+    return api_refuse(problem, "no-memory", "The server cannot start another process; try again later.");
+  }
+  collect_all(env, kind, j->request, &inputs);
+  task_head task = {.kind = kind == API_JOB_EMBEDDING ? TASK_EMBEDDING : TASK_SUPERMESH,
+                    .threads = limits->threads,
+                    .nice = limits->nice,
+                    .memory = limits->memory,
+                    .inputs = inputs.bytes,
+                    .deadline_ms = limits->deadline_ms,
+                    .cpu_seconds = task_cpu_seconds(limits->deadline_ms, limits->threads),
+                    .max_triangles = limits->max_triangles,
+                    .embed_ms = j->embed_ms};
+  memcpy(task.key, j->key, sizeof task.key);
+  channel_result why = send_all(&process, &task, j->request, &inputs);
+  let_go(&inputs);
+  int fine = why == CHANNEL_OK ? listen_to(&process, env, ctx, kind, j, inputs.alignment, out, problem, &why) : -1;
+  int status = isolate_close(&process);
+  if (fine >= 0 || why == CHANNEL_STOPPED) {
+    return fine > 0; /* stopped: the context has the error */
+  }
+  end->died = 1;
+  end->status = status;
+  isolate_status_text(status, end->why, sizeof end->why);
+  return 0;
+}

@@ -1,0 +1,184 @@
+// Meshes are read and jobs run in processes of their own: what kills one takes its own work only, and nothing that hangs
+// in one holds anything else up. A process that is stopped with SIGSTOP stands for a reader or a job that never ends.
+import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
+import { readdirSync, readFileSync, readlinkSync } from 'node:fs';
+import test from 'node:test';
+import { promisify } from 'node:util';
+import { assertProblem, binaries, daemon, endless, patience, slow, until } from './support/daemon.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const run = promisify(execFile);
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+const wobble = (n, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(n)), y, z + 0.001 * n]);
+
+/** The processes whose parent is `pid`. */
+function children(pid) {
+  return readdirSync('/proc')
+    .filter((name) => /^\d+$/.test(name))
+    .map(Number)
+    .filter((each) => {
+      try {
+        const fields = readFileSync(`/proc/${each}/stat`, 'latin1').split(') ').pop().split(' ');
+        return Number(fields[1]) === pid && fields[0] !== 'Z';
+      } catch {
+        return false; // it has ended
+      }
+    });
+}
+/** The processes that check meshes and run jobs. */
+const workers = (d) => children(d.child.pid).flatMap(children);
+const status = (pid, name) =>
+  new RegExp(`^${name}:\\s+(\\d+)`, 'm').exec(readFileSync(`/proc/${pid}/status`, 'latin1'))?.[1];
+
+const one = (d) => until(() => workers(d).length === 1 && workers(d)[0], 'one process that works', 60);
+const running = (d, job) => until(async () => (await d.get(job.url)).json.stage === 'embed', 'the job runs', 120);
+
+async function slowJob(d, n) {
+  const { json: mesh } = await d.upload(shapes.binaryPly(wobble(n, 5)), { name: `slow${n}` });
+  const reply = await d.post('/v1/embeddings', { mesh: mesh.id, ...endless });
+  assert.equal(reply.status, 202, reply.bytes.toString());
+  return { mesh, job: reply.json };
+}
+
+test('a job runs confined', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1', '--isolate', slow ? 'on' : 'strict', '--job-memory', '512M'] });
+  const { job } = await slowJob(d, 1);
+  await running(d, job);
+  const pid = await one(d);
+  const files = readdirSync(`/proc/${pid}/fd`)
+    .filter((fd) => fd !== '2') // where the daemon logs
+    .map((fd) => readlinkSync(`/proc/${pid}/fd/${fd}`));
+  assert.equal(files.filter((to) => to.startsWith('socket:')).length, 1, `only its channel: ${files}`);
+  for (const to of files) assert.doesNotMatch(to, /catalogue|lock|\/tmp\/put-/, `${files}`);
+  if (!slow) {
+    assert.equal(status(pid, 'Seccomp'), '2');
+    assert.equal(status(pid, 'NoNewPrivs'), '1');
+    const limits = readFileSync(`/proc/${pid}/limits`, 'latin1');
+    const memory = Number(/^Max address space\s+(\d+)/m.exec(limits)[1]);
+    assert.ok(memory > 512 << 20 && memory < (512 + 1024) * 2 ** 20, limits);
+    assert.match(limits, /^Max cpu time\s+\d+/m);
+  }
+  assert.equal((await d.delete(job.url)).status, 200);
+  await until(() => workers(d).length === 0, 'cancelling ends the process', 10);
+});
+
+test('a process that dies takes its own job, and after three deaths that job is refused until it is cleared', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '2'] });
+  const bad = await slowJob(d, 1);
+  await running(d, bad.job);
+  const [poison] = workers(d);
+  const other = await slowJob(d, 2);
+  await running(d, other.job);
+  const signals = ['SIGSEGV', 'SIGBUS', 'SIGABRT'];
+  let pid = poison;
+  for (let death = 1; death <= 3; death++) {
+    const before = workers(d).filter((each) => each !== pid);
+    process.kill(pid, signals[death - 1]);
+    if (death === 3) break;
+    await until(
+      async () => {
+        const now = (await d.get(bad.job.url)).json;
+        return now.attempt === death + 1 && now.stage === 'embed';
+      },
+      'the job runs again',
+      60,
+    );
+    [pid] = workers(d).filter((each) => !before.includes(each));
+  }
+  const end = await d.ended((await d.get(bad.job.url)).json);
+  assert.equal(end.state, 'failed');
+  assert.equal(end.problem.type, '/problems/job-crashed');
+  assert.match(end.problem.detail, /died 3 times.*signal 6/);
+  const kept = (await d.get(other.job.url)).json;
+  assert.deepEqual([kept.state, kept.attempt], ['running', 1], 'the other job went on');
+  assertProblem(await d.post('/v1/embeddings', { mesh: bad.mesh.id, ...endless }), 500, 'job-crashed');
+  const admin = async (...args) => (await run(binaries.daemon, ['crash', ...args, '--data', d.data])).stdout;
+  assert.match(await admin('list'), new RegExp(`^[0-9a-f]{64} crashes=3 refused mesh=${bad.mesh.id} tenant= last=`));
+  await admin('clear', bad.mesh.id.slice(0, 20));
+  assert.equal(await admin('list'), '');
+  const again = await d.post('/v1/embeddings', { mesh: bad.mesh.id, ...endless });
+  assert.equal(again.status, 202);
+  for (const job of [again.json, other.job]) assert.equal((await d.delete(job.url)).status, 200);
+});
+
+test('the end of the daemon is no crash of the jobs that run', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1'] });
+  const { job } = await slowJob(d, 1);
+  for (let death = 1; death <= 4; death++) {
+    await running(d, job);
+    const pid = await one(d);
+    d.child.kill('SIGKILL');
+    await d.exited;
+    await until(() => !children(pid) || !readdirSync('/proc').includes(String(pid)), 'its process ends with it', 10);
+    await d.start();
+  }
+  const now = (await d.get(job.url)).json;
+  assert.ok(['queued', 'running'].includes(now.state), JSON.stringify(now));
+  assert.equal((await d.delete(job.url)).status, 200);
+});
+
+test('a job that hangs ends at its time limit', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '1', '--job-seconds', String(4 * patience)] });
+  const { job } = await slowJob(d, 1);
+  process.kill(await one(d), 'SIGSTOP');
+  const end = await d.ended((await d.get(job.url)).json, { seconds: 60 });
+  assert.equal(end.problem?.type, '/problems/timeout', JSON.stringify(end));
+  assert.equal(workers(d).length, 0);
+});
+
+test('a check that hangs delays nobody, and ends with its client, at check-seconds, and with the service', async (t) => {
+  const d = await daemon(t, { args: ['--workers', '2', '--check-seconds', String(6 * patience)] });
+  const file = Buffer.from(shapes.binaryPly(wobble(3, 6)));
+  /** Uploads a file whose check is stopped as soon as it begins. */
+  async function hang(signal) {
+    for (let n = 0; ; n++) {
+      const bytes = Buffer.concat([file, Buffer.from(' '.repeat(n))]);
+      const reply = d.post('/v1/meshes', bytes, { signal }).catch((error) => error);
+      for (let over = false; !over; ) {
+        const [pid] = workers(d);
+        if (pid) {
+          process.kill(pid, 'SIGSTOP');
+          const ended = await Promise.race([reply.then(() => true), sleep(300)]);
+          if (!ended) return { pid, reply };
+        }
+        over = await Promise.race([reply.then(() => true), sleep(1)]);
+      }
+    }
+  }
+  const client = new AbortController();
+  const first = await hang(client.signal);
+  const began = Date.now();
+  assert.equal((await d.upload(shapes.tetrahedron)).status, 201);
+  assert.ok(Date.now() - began < 2000 * patience, 'another upload is answered');
+  client.abort();
+  await first.reply;
+  await until(() => !workers(d).includes(first.pid), 'the check ends with its client', 4);
+
+  const second = await hang();
+  assertProblem(await second.reply, 503, 'timeout');
+
+  const third = await hang();
+  const asked = Date.now();
+  d.child.kill('SIGTERM');
+  await third.reply;
+  assert.equal((await d.exited).code, 0, d.log);
+  assert.ok(Date.now() - asked < 5000 * patience, `it took ${Date.now() - asked} ms to stop`);
+});
+
+test('within the service, as isolate = off asks, no process is forked', async (t) => {
+  const d = await daemon(t, { args: ['--isolate', 'off'] });
+  const { json: mesh } = await d.upload(shapes.tetrahedron);
+  assert.equal((await d.made('/v1/embeddings', { mesh: mesh.id })).certificate.valid, true);
+  assert.deepEqual(children(d.child.pid), []);
+});
+
+test('the process that forks is started again', async (t) => {
+  const d = await daemon(t);
+  const [zygote] = children(d.child.pid);
+  process.kill(zygote, 'SIGKILL');
+  const { status: code, json: mesh } = await d.upload(shapes.tetrahedron);
+  assert.equal(code, 201);
+  assert.equal((await d.made('/v1/embeddings', { mesh: mesh.id })).certificate.valid, true);
+  assert.equal(children(d.child.pid).length, 1);
+});

@@ -1,0 +1,334 @@
+// The first minute: a page that moves, progress that moves, and what a visitor takes away.
+import { test } from 'node:test';
+import assert from 'node:assert/strict';
+import { readFile, writeFile } from 'node:fs/promises';
+import { pathToFileURL } from 'node:url';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { browser, daemon } from './started.mjs';
+import {
+  addFiles,
+  button,
+  countPixels,
+  defaultShown,
+  difference,
+  openPage,
+  sample,
+  settled,
+  until,
+} from './support.mjs';
+import { morphOf } from '../scenario/support/glb.mjs';
+
+/** Pixels of a shape on the first page: they are more saturated than its background. */
+const vivid = (r, g, b) => Math.max(r, g, b) - Math.min(r, g, b) > 70;
+const hero = (page) => page.locator('.hero').screenshot();
+
+test('the first page plays a morph without a click, and offers three more', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await until(async () => (await countPixels(page, '.hero', vivid)) > 4000, 'a shape is drawn');
+  const first = await hero(page);
+  await until(async () => (await difference(browser, first, await hero(page))) > 0.02, 'it moves');
+  const others = page.getByRole('group', { name: 'Sample morphs' }).getByRole('button');
+  assert.equal(await others.count(), 4);
+  await button(page, 'Pause the sample').click();
+  await settled(page);
+  const still = await hero(page);
+  await page.waitForTimeout(700);
+  assert.ok((await difference(browser, still, await hero(page))) < 0.001, 'paused');
+  for (const name of ['Star', 'Fruit', 'Vase']) {
+    const before = await hero(page);
+    await button(page, name).click();
+    await until(async () => (await difference(browser, before, await hero(page))) > 0.02, `${name} appears`);
+  }
+  assert.equal((await (await fetch(`${daemon.url}/v1/jobs`)).json()).jobs.length, 0, 'the daemon computed nothing');
+  // the shapes that play can be opened, and are accepted
+  await button(page, 'Try with samples').click();
+  await until(
+    () =>
+      page
+        .locator('.card.ready')
+        .count()
+        .then((n) => n === 3),
+    'its shapes are open',
+  );
+  await done();
+});
+
+test('whoever asks for less motion gets a still picture that can be played', async () => {
+  const { page, done } = await openPage(browser, daemon.url, { reducedMotion: 'reduce' });
+  await until(async () => (await countPixels(page, '.hero', vivid)) > 4000, 'a shape is drawn');
+  const first = await hero(page);
+  await page.waitForTimeout(900);
+  assert.ok((await difference(browser, first, await hero(page))) < 0.001);
+  await button(page, 'Play the sample').click();
+  await until(async () => (await difference(browser, first, await hero(page))) > 0.02, 'it moves');
+  await done();
+});
+
+test('progress names the stage, says what is left, moves each second, and can be cancelled', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  // A job that reports once and then says nothing for long, as a long stage does.
+  const job = { id: '1'.repeat(32), url: `/v1/jobs/${'1'.repeat(32)}`, kind: 'supermesh', state: 'running' };
+  Object.assign(job, { stage: 'align', progress: 0.4, result: null, problem: null, attempt: 1 });
+  let cancelled = false;
+  await page.route('**/v1/supermeshes', (route) =>
+    route.request().postDataJSON().align?.options?.preset === 'fast'
+      ? route.fulfill({ status: 422, contentType: 'application/problem+json', body: '{"status":422}' })
+      : route.fulfill({ status: 202, headers: { Location: job.url }, json: job }),
+  );
+  await page.route(`**${job.url}**`, (route) => {
+    if (route.request().method() === 'DELETE') cancelled = true;
+    if (route.request().url().endsWith('/events'))
+      return route.fulfill({
+        contentType: 'text/event-stream',
+        body: `event: progress\ndata: ${JSON.stringify(job)}\n\n`,
+      });
+    return route.fulfill({ json: { ...job, state: cancelled ? 'cancelled' : 'running' } });
+  });
+  await button(page, /^Morph 2 shapes$/).click();
+  const status = page.locator('.progress').getByRole('status');
+  await until(async () => /Matching the shapes \(2 of 5\)/.test(await status.innerText()), 'the stage');
+  const text = () => page.locator('.progress').innerText();
+  await until(async () => /about \d+ s left/.test(await text()), 'what is left');
+  const bar = () => page.locator('.progress [role=progressbar]').getAttribute('aria-valuenow').then(Number);
+  const [begin, seen] = [await bar(), new Set()];
+  for (let i = 0; i < 4; i++) {
+    seen.add((await text()).match(/\d+:\d\d/)[0]);
+    await page.waitForTimeout(1100);
+  }
+  assert.equal(seen.size, 4, `the clock moves each second: ${[...seen]}`);
+  assert.ok((await bar()) > begin && (await bar()) < 100, 'and the bar between reports');
+  await button(page, 'Cancel').click();
+  await until(
+    () =>
+      page
+        .locator('.progress')
+        .count()
+        .then((n) => n === 0),
+    'the progress is gone',
+  );
+  assert.ok(cancelled);
+  await done();
+});
+
+/** A page with a morph of three animals that is ready to be taken away. */
+async function taking(options) {
+  const opened = await openPage(browser, daemon.url, options);
+  const { page } = opened;
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await button(page, 'Landmarks').click();
+  await page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
+  await page.locator('.marks li').first().waitFor();
+  await button(page, /^Morph 2 shapes$/).click();
+  await until(() => button(page, 'Pause').count(), 'the morph plays');
+  await defaultShown(page);
+  await button(page, 'Use it').click();
+  const take = page.getByRole('region', { name: 'Take it away' });
+  const download = async (name) => {
+    const waiting = page.waitForEvent('download');
+    await take.getByRole('button', { name, exact: true }).click();
+    const file = await waiting;
+    return { name: file.suggestedFilename(), bytes: await readFile(await file.path()) };
+  };
+  return { ...opened, take, download };
+}
+
+test('the downloaded page plays the morph from a file, without a network', async (t) => {
+  const { page, take, download, done } = await taking();
+  await take.getByRole('slider', { name: /seconds a shape/ }).fill('1');
+  await take.getByLabel('Easing').selectOption('linear');
+  const { name, bytes } = await download('Web page');
+  assert.equal(name, 'dog-giraffe.html');
+  const html = bytes.toString();
+  assert.doesNotMatch(html, /https?:\/\/|<link|\bimport\b/, 'nothing is loaded');
+  const folder = mkdtempSync(join(tmpdir(), 'orbmorph-page-'));
+  t.after(() => rmSync(folder, { recursive: true }));
+  const context = await browser.newContext({
+    viewport: { width: 500, height: 400 },
+    colorScheme: 'light',
+    offline: true,
+  });
+  const other = await context.newPage();
+  const faults = [];
+  other.on('pageerror', (error) => faults.push(error.stack));
+  other.on('console', (message) => message.type() === 'error' && faults.push(message.text()));
+  other.on('request', (request) => /^https?:/.test(request.url()) && faults.push(request.url()));
+  const file = join(folder, name);
+  await writeFile(file, bytes);
+  await other.goto(pathToFileURL(file).href);
+  await other.locator('body[data-ready]').waitFor();
+  const shape = (r, _g, b) => r - b > 25 || b - r > 25;
+  await until(async () => (await countPixels(other, 'canvas', shape)) > 3000, 'the morph appears');
+  const first = await other.screenshot();
+  await until(async () => (await difference(browser, first, await other.screenshot())) > 0.02, 'it plays');
+  await other.getByRole('button', { name: 'Pause' }).click();
+  const slider = other.getByRole('slider', { name: 'Along the morph' });
+  await slider.fill('0');
+  await other.waitForTimeout(200);
+  const dog = await other.screenshot();
+  await slider.fill('1');
+  await other.waitForTimeout(200);
+  assert.ok((await difference(browser, dog, await other.screenshot())) > 0.02, 'the other end is another shape');
+  assert.match(await slider.getAttribute('aria-valuetext'), /giraffe/);
+  const box = await other.locator('canvas').boundingBox();
+  const before = await other.screenshot();
+  await other.mouse.move(box.width / 2, box.height / 2);
+  await other.mouse.down();
+  await other.mouse.move(box.width / 2 + 90, box.height / 2, { steps: 4 });
+  await other.mouse.up();
+  await other.waitForTimeout(200);
+  assert.ok((await difference(browser, before, await other.screenshot())) > 0.02, 'dragging rotates it');
+  assert.deepEqual(faults, []);
+  await context.close();
+  await page.keyboard.press('Escape');
+  await done();
+});
+
+/** Decodes an animated picture in the browser: its frames' sizes, durations in ms, and how much they differ. */
+const decode = (page, bytes, type) =>
+  page.evaluate(
+    async ({ data, type }) => {
+      const raw = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+      const decoder = new ImageDecoder({ data: raw, type });
+      await decoder.tracks.ready;
+      await decoder.completed;
+      const { frameCount, repetitionCount } = decoder.tracks.selectedTrack;
+      const frames = [];
+      let first = null;
+      for (let frameIndex = 0; frameIndex < frameCount; frameIndex++) {
+        const { image } = await decoder.decode({ frameIndex });
+        const canvas = new OffscreenCanvas(image.displayWidth, image.displayHeight);
+        const context = canvas.getContext('2d');
+        context.drawImage(image, 0, 0);
+        const pixels = context.getImageData(0, 0, canvas.width, canvas.height).data;
+        first ??= pixels;
+        let other = 0;
+        for (let i = 0; i < pixels.length; i += 4) if (Math.abs(pixels[i + 2] - first[i + 2]) > 40) other++;
+        frames.push({ width: canvas.width, ms: image.duration / 1000, other: (4 * other) / pixels.length });
+        image.close();
+      }
+      return { frames, repetitionCount };
+    },
+    { data: bytes.toString('base64'), type },
+  );
+
+test('pictures and films: PNG, GIF, WebP and video, named after the shapes', async () => {
+  const { page, take, download, done } = await taking();
+  await take.getByRole('slider', { name: /seconds a shape/ }).fill('0.5');
+  await take.getByRole('button', { name: '360 × 360' }).click();
+  const png = await download('Picture');
+  assert.equal(png.name, 'dog-giraffe.png');
+  assert.deepEqual([png.bytes.readUInt32BE(16), png.bytes.readUInt32BE(20)], [1600, 1200]);
+  const glb = await download('GLB');
+  assert.equal(glb.name, 'dog-giraffe.glb');
+  assert.deepEqual(morphOf(glb.bytes).names, ['giraffe']);
+  for (const [label, type, rate] of [
+    ['GIF', 'image/gif', 20],
+    ['WebP', 'image/webp', 25],
+  ]) {
+    const { name, bytes } = await download(label);
+    assert.equal(name, `dog-giraffe.${label.toLowerCase()}`);
+    const { frames, repetitionCount } = await decode(page, bytes, type);
+    assert.equal(frames.length, rate, `${label}: a second there and back`);
+    assert.equal(repetitionCount, Infinity);
+    assert.ok(frames.every((f) => f.width === 360 && Math.abs(f.ms - 1000 / rate) < 1));
+    assert.ok(frames[Math.floor(rate / 2)].other > 0.02, `${label}: halfway is the other shape`);
+    assert.ok(frames[rate - 1].other < 0.01, `${label}: the end meets the beginning`);
+  }
+  const video = take.getByRole('button', { name: /^(MP4|WebM)$/ });
+  const { name, bytes } = await download(await video.innerText());
+  assert.match(name, /^dog-giraffe\.(mp4|webm)$/);
+  const other = await browser.newPage(); // the studio's policy allows no video
+  const size = await other.evaluate(
+    async ([data, type]) => {
+      const element = document.createElement('video');
+      const raw = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+      element.src = URL.createObjectURL(new Blob([raw], { type }));
+      await new Promise((resolve, reject) => {
+        element.onloadedmetadata = resolve;
+        element.onerror = () => reject(new Error(element.error.message));
+      });
+      return [element.videoWidth, element.videoHeight];
+    },
+    [bytes.toString('base64'), name.endsWith('mp4') ? 'video/mp4' : 'video/webm'],
+  );
+  assert.deepEqual(size, [360, 360]);
+  await other.close();
+  await done();
+});
+
+/** A closed surface as one triangle strip a ring, which only the daemon reads. */
+function strips() {
+  const [rings, around] = [9, 16];
+  const points = [[0, 1.4, 0]];
+  for (let i = 1; i < rings; i++)
+    for (let j = 0; j < around; j++) {
+      const [v, h] = [(Math.PI * i) / rings, (2 * Math.PI * j) / around];
+      points.push([Math.sin(v) * Math.cos(h), 1.4 * Math.cos(v), Math.sin(v) * Math.sin(h)]);
+    }
+  const last = points.push([0, -1.4, 0]) - 1;
+  const at = (i, j) => (i === 0 ? 0 : i === rings ? last : 1 + (i - 1) * around + (j % around));
+  const strip = [];
+  for (let i = 1; i < rings - 1; i++) {
+    for (let j = 0; j <= around; j++) strip.push(at(i, j), at(i + 1, j));
+    strip.push(-1);
+  }
+  for (let j = 0; j < around; j++)
+    strip.push(0, at(1, j + 1), at(1, j), -1, last, at(rings - 1, j), at(rings - 1, j + 1), -1);
+  const head = `ply\nformat ascii 1.0\nelement vertex ${points.length}\nproperty float x\nproperty float y\nproperty float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n`;
+  const text = `${head}${points.map((p) => `${p.join(' ')}\n`).join('')}${strip.length} ${strip.join(' ')}\n`;
+  return { name: 'strips.ply', mimeType: 'text/plain', buffer: Buffer.from(text), triangles: 2 * around * (rings - 1) };
+}
+
+test('what only the daemon can read is shown as the daemon has it', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const { triangles, ...file } = strips();
+  await page.locator('input[type=file]').first().setInputFiles([file]);
+  await until(() => page.locator('.card.ready').count(), 'the daemon accepts it');
+  await until(
+    async () => (await page.locator('.caption').innerText()).includes(`${triangles} triangles`),
+    'its triangles',
+  );
+  assert.equal(await page.getByRole('alert').count(), 0);
+  await settled(page);
+  const tinted = (r, g, b) => r - b > 40 && r > g;
+  await until(async () => (await countPixels(page, '.pane-view', tinted)) > 5000, 'it is drawn');
+  await done();
+});
+
+test('after a repair, picture and counts are those of the repaired mesh', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  let left = 60;
+  const lines = (await readFile(sample('dog.obj'), 'utf8')).split('\n');
+  const open = lines.filter((line) => !(line.startsWith('f ') && left-- > 0)).join('\n');
+  const file = { name: 'open.obj', mimeType: 'text/plain', buffer: Buffer.from(open) };
+  await page.locator('input[type=file]').first().setInputFiles([file]);
+  await button(page, 'Fill the holes').click();
+  await until(() => page.locator('.card.ready').count(), 'the daemon accepts it');
+  const [mesh] = (await (await fetch(`${daemon.url}/v1/meshes?limit=100`)).json()).meshes.filter(
+    (m) => m.name === 'open',
+  );
+  const said = async () =>
+    Number((await page.locator('.caption').innerText()).match(/([\d\s]+) triangles/)[1].replace(/\D/g, ''));
+  assert.ok(mesh.triangles > 5600 - 60, String(mesh.triangles));
+  await until(async () => (await said()) === mesh.triangles, `${mesh.triangles} triangles`);
+  await done();
+});
+
+test('a link whose morph or shapes are gone says so', async () => {
+  const none = (digit) => digit.repeat(64);
+  for (const [hash, expected] of [
+    [`#m=${none('a')},${none('b')}&tab=morph&r=${none('c')}`, /This link is dead\s+Its 2 shapes are not on the server/],
+    [`#r=${none('c')}`, /This link is dead\s+Its morph is not on the server/],
+  ]) {
+    const { page, done } = await openPage(browser, daemon.url, { hash });
+    const alert = page.getByRole('alert');
+    await alert.waitFor();
+    assert.match(await alert.innerText(), expected);
+    await button(page, 'Dismiss').click();
+    assert.equal(await alert.count(), 0);
+    await done();
+  }
+});
