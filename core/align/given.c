@@ -50,8 +50,8 @@ static orb_status certify_all(orb_context *ctx, orb_sheet *sheets, int32_t shape
   return ORB_OK;
 }
 
-orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from,
-                           const double *const *targets, orb_preset preset) {
+orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_from from, const double *const *targets,
+                           orb_preset preset) {
   double sum = 0;
   for (int32_t s = 1; s < alignment->shape_count; s++) {
     double energy[2];

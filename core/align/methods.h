@@ -11,12 +11,12 @@
  *   rbf/     method `rbf`: the warp of Peng & Timalsena 2016
  *   map/     the composed map, from one shape through the sphere to the other, and its optimiser
  *   given.c  one method with the given landmarks, then the composed map
- *   find/    candidates, where no landmarks are given
- *   auto.c   method `auto`: given.c with the best candidate from find/
+ *   find/    matches, where no landmarks are given
+ *   auto.c   method `auto`: the rotation search, composed towards the matches of find/
  *   align.c  orb_align(): checks the request and chooses between given.c and auto.c
  *
  * The main header of each folder says what comes in, what goes out, and in which order to read its files:
- * sheet/sheet.h, rotate/rotate.h, pin/pin.h, rbf/rbf.h, map/compose.h, find/candidates.h.
+ * sheet/sheet.h, rotate/rotate.h, pin/pin.h, rbf/rbf.h, map/compose.h, find/match.h.
  */
 #ifndef ORB_ALIGN_METHODS_H
 #define ORB_ALIGN_METHODS_H

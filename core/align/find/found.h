@@ -5,7 +5,7 @@
 #include "orbmorph/alignment.h"
 
 /* Fills found, found_points and confidence of an alignment made without landmarks; its meshes are the given ones,
- * unsplit. clear, 0 to 1: how far other candidates are behind (candidates.h). found.c describes the method. */
+ * unsplit. clear, 0 to 1: how far other candidates are behind (match.h). found.c describes the method. */
 ORB_MUST_CHECK orb_status orb_align_find(orb_context *ctx, orb_alignment *alignment, double clear);
 
 #endif

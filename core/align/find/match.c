@@ -249,12 +249,12 @@ static double clear_of(const search *t, int32_t best) {
 /* Vertices spread over the first shape, and those nearest to where they go. */
 static orb_status write_pairs(const search *t, const trial *best, orb_match *out) {
   const orb_coarse_copy *copy = t->copy;
-  int32_t sample[ORB_CANDIDATE_PAIRS];
+  int32_t sample[ORB_MATCH_PAIRS];
   orb_nearest *tree;
-  ORB_TRY(orb_map_spread(t->ctx, copy[0].mesh.positions, copy[0].mesh.vertex_count, ORB_CANDIDATE_PAIRS, sample));
+  ORB_TRY(orb_map_spread(t->ctx, copy[0].mesh.positions, copy[0].mesh.vertex_count, ORB_MATCH_PAIRS, sample));
   ORB_TRY(
       orb_nearest_create(t->ctx, copy[1].mesh.positions, copy[1].mesh.triangles, copy[1].mesh.triangle_count, &tree));
-  for (int i = 0; i < ORB_CANDIDATE_PAIRS; i++) {
+  for (int i = 0; i < ORB_MATCH_PAIRS; i++) {
     orb_place place;
     (void)orb_nearest_query(tree, best->pose[0].position + 3 * (size_t)sample[i], INFINITY, &place);
     int32_t first = copy[0].vertex[sample[i]];

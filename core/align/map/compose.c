@@ -336,10 +336,8 @@ static orb_status run_starts(orb_map_run *c, orb_map_from from, orb_preset prese
   double good = c->params.energy.good;
   ORB_TRY(orb_map_register(c, from == ORB_MAP_FROM_MAP ? c->params.registration.samples : 0));
   ORB_TRY(orb_map_levels_prepare(c));
-  if (from != ORB_MAP_SPACE_DONE) {
-    ORB_TRY(run_spatial(c));
-  }
-  if (from == ORB_MAP_SPACE_ONLY || (preset != ORB_PRESET_QUALITY && c->best_energy <= good)) {
+  ORB_TRY(run_spatial(c));
+  if (preset != ORB_PRESET_QUALITY && c->best_energy <= good) {
     return ORB_OK;
   }
   ORB_TRY(meet_pairs(c));
@@ -394,7 +392,7 @@ static orb_status run_walked(orb_map_run *c, orb_map_walked *w, orb_preset prese
 /* Chooses the starts by what is known of the map as given. */
 static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
   /* A good map without landmarks is kept: symmetric shapes have others that are as good. */
-  if (from == ORB_MAP_MAP_ONLY || (c->pairs.landmarks == 0 && c->best_energy <= c->params.energy.good)) {
+  if (c->pairs.landmarks == 0 && c->best_energy <= c->params.energy.good) {
     ORB_TRY(orb_map_levels_prepare(c));
     return run_start(c, ORB_MAP_GIVEN);
   }
@@ -442,8 +440,8 @@ static orb_status take_best(orb_map_run *c, orb_aligned_shape *fixed, double ene
 }
 
 orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
-                       int32_t landmark_count, orb_map_from from, const double *target, orb_preset preset, double energy[2],
-                       int *improved) {
+                       int32_t landmark_count, orb_map_from from, const double *target, orb_preset preset,
+                       double energy[2], int *improved) {
   orb_map_run c = {.ctx = ctx,
                    .params = orb_map_params_of(preset),
                    .both = both,
@@ -466,7 +464,6 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   c.hopeless_flips = c.params.clear.hopeless;
   c.passes = c.params.work.passes;
   c.work = c.params.work.all * (int64_t)moving->mesh.vertex_count;
-  c.work = from == ORB_MAP_SPACE_DONE ? c.work / 2 : c.work; /* ORB_MAP_SPACE_ONLY has spent the other half */
   orb_status status;
   ORB_GO(status, prepare(&c), done);
   ORB_GO(status, given_energy(&c, &energy[0]), done);
@@ -474,9 +471,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
   ORB_GO(status, orb_map_pairs_create(&c), done);
   ORB_GO(status, run(&c, from, preset), done);
-  if (from != ORB_MAP_MAP_ONLY) {
-    ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
-  }
+  ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
   status = take_best(&c, fixed, energy, improved);
 done:
   orb_map_run_free(&c);

@@ -21,10 +21,7 @@
 /* What the first spatial targets of a composed map follow. */
 typedef enum orb_map_from {
   ORB_MAP_FROM_SPACE, /* what fits best in space */
-  ORB_MAP_FROM_MAP,   /* the map as given, which is roughly right */
-  ORB_MAP_SPACE_ONLY, /* what fits best in space; if that leads to nothing, no more is tried */
-  ORB_MAP_SPACE_DONE, /* what fits best in space, without the starts that ORB_MAP_SPACE_ONLY has tried already */
-  ORB_MAP_MAP_ONLY    /* none: the map as given is improved where it is, roughly and at little cost */
+  ORB_MAP_FROM_MAP    /* the map as given, which is roughly right */
 } orb_map_from;
 
 /* Improves the points of `moving` on the sphere so that the map moving → sphere → fixed comes as near to an isometry as

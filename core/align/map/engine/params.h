@@ -28,17 +28,11 @@ enum {
 };
 
 typedef struct orb_map_params {
-  /* What the energy of a map says. The last two concern method `auto`, which pins the shapes at the vertex pairs of the
-   * best candidate and composes from there; the pairs can also be held while it composes. */
+  /* What the energy of a map says. */
   struct {
-    double near_isometry; /* up to here `auto` has nothing to gain and tries no other candidate */
-    double good;          /* up to here the shapes correspond and no further start is tried. Between near_isometry and
-                             this, a limb of two nearly equal shapes may have gone wrong */
-    double poor;          /* above it `auto` also tries to hold the pairs: a map that was only pinned at them may have
-                             been caught on the way */
-    double caught;        /* on the coarse copies; above it thin limbs have caught even the best map, and `auto` holds
-                             the pairs at once */
-    double cap;           /* of one triangle; keeps a few that are nearly degenerate from hiding the others */
+    double good; /* up to here the shapes correspond and no further start is tried */
+    double poor; /* above it a start has been caught on the way, and `auto` also pins pairs of its match */
+    double cap;  /* of one triangle; keeps a few that are nearly degenerate from hiding the others */
   } energy;
 
   /* How long to go on: more work finds better maps of shapes that differ, and takes longer. */
