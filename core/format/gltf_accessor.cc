@@ -103,7 +103,7 @@ void Buffers::load(const cJSON *doc, Bytes chunk, size_t file_size) {
 
 Bytes Buffers::view(int64_t index) const {
   const cJSON *v = element(views_, index, "buffer view");
-  if (const std::vector<unsigned char> *bytes = packed_.view(index)) {
+  if (const Packed::Octets *bytes = packed_.view(index)) {
     return Bytes{bytes->data(), bytes->size()};
   }
   int64_t buffer = whole(v, "buffer", NONE);

@@ -8,7 +8,7 @@ namespace gltf {
 
 class Buffers {
  public:
-  explicit Buffers(orb_context *ctx) : ctx_(ctx) {}
+  explicit Buffers(orb_context *ctx) : ctx_(ctx), packed_(ctx) {}
 
   /* chunk: the binary chunk of a GLB, which must outlive this; file_size: bounds what sparse accessors may announce,
    * and the work. */

@@ -28,7 +28,7 @@ bool is_fallback(const cJSON *buffer) {
   return cJSON_IsTrue(member(extension_of(buffer, MESHOPT), "fallback"));
 }
 
-const std::vector<unsigned char> *Packed::view(int64_t index) const {
+const Packed::Octets *Packed::view(int64_t index) const {
   auto found = views_.find(index);
   return found == views_.end() ? nullptr : &found->second;
 }
@@ -56,7 +56,7 @@ void Packed::load_view(int64_t index, const cJSON *extension, Bytes bytes) {
     malformed("A compressed glTF buffer view has a stride that is not valid.");
   }
   charge(count * stride);
-  std::vector<unsigned char> out(count * stride);
+  Octets out(count * stride, 0, Charged<unsigned char>(ctx_));
   int failed = 1;
   if (attributes) {
     failed = meshopt_decodeVertexBuffer(out.data(), count, stride, bytes.at, bytes.size);
@@ -77,7 +77,7 @@ void Packed::load_view(int64_t index, const cJSON *extension, Bytes bytes) {
   } else if (!filter.empty() && filter != "NONE") {
     malformed("A compressed glTF buffer view has an unknown filter (\"" + filter.substr(0, 16) + "\").");
   }
-  views_[index] = std::move(out);
+  views_.insert_or_assign(index, std::move(out));
 }
 
 /* https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_draco_mesh_compression */
@@ -106,7 +106,7 @@ void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSO
       malformed("A compressed glTF primitive does not fit its accessors.");
     }
     charge(points * width * sizeof(double));
-    Values values{std::vector<double>(points * width), width};
+    Values values{Numbers(points * width, 0, Charged<double>(ctx_)), width};
     for (size_t i = 0; i < points; i++) {
       float value[4] = {0, 0, 0, 0};
       auto at = attribute->mapped_index(draco::PointIndex(static_cast<uint32_t>(i)));
@@ -115,21 +115,21 @@ void Packed::load_primitive(const cJSON *doc, const cJSON *primitive, const cJSO
       }
       std::copy(value, value + width, values.list.begin() + static_cast<std::ptrdiff_t>(i * width));
     }
-    accessors_[index] = std::move(values);
+    accessors_.insert_or_assign(index, std::move(values));
   }
   int64_t indices = whole(primitive, "indices", NONE);
   if (indices == NONE) {
     malformed("A compressed glTF primitive has no indices.");
   }
   charge(static_cast<size_t>(mesh.num_faces()) * 3 * sizeof(double));
-  Values corners{{}, 1};
+  Values corners{Numbers(Charged<double>(ctx_)), 1};
   corners.list.reserve(static_cast<size_t>(mesh.num_faces()) * 3);
   for (uint32_t f = 0; f < mesh.num_faces(); f++) {
     for (draco::PointIndex corner : mesh.face(draco::FaceIndex(f))) {
       corners.list.push_back(corner.value());
     }
   }
-  accessors_[indices] = std::move(corners);
+  accessors_.insert_or_assign(indices, std::move(corners));
 }
 
 void Packed::load(const cJSON *doc, const std::function<Bytes(int64_t)> &buffer,

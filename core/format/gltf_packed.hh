@@ -12,11 +12,16 @@ namespace gltf {
 
 class Packed {
  public:
+  using Octets = std::vector<unsigned char, Charged<unsigned char>>;
+
   /* What an accessor of a compressed primitive holds. */
   struct Values {
-    std::vector<double> list;
+    Numbers list;
     size_t width;
   };
+
+  /* What is decoded counts in the budget of the context. */
+  explicit Packed(orb_context *ctx) : ctx_(ctx) {}
 
   /* Decodes everything that is compressed. view(i) gives the bytes of a buffer view that is not; buffer(i) those of a
    * buffer. file_size bounds what is decoded. */
@@ -24,7 +29,7 @@ class Packed {
             size_t file_size);
 
   /* NULL if the view or accessor is not compressed. */
-  const std::vector<unsigned char> *view(int64_t index) const;
+  const Octets *view(int64_t index) const;
   const Values *accessor(int64_t index) const;
 
  private:
@@ -32,7 +37,8 @@ class Packed {
   void load_primitive(const cJSON *doc, const cJSON *primitive, const cJSON *extension, Bytes bytes);
   void charge(size_t bytes);
 
-  std::map<int64_t, std::vector<unsigned char>> views_;
+  orb_context *ctx_;
+  std::map<int64_t, Octets> views_;
   std::map<int64_t, Values> accessors_;
   size_t left_ = 0; /* bytes that may still be decoded */
 };
