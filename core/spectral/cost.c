@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-/* Chosen by trial on the pairs of posed people with even numbers (tests/bench/correspond.py --half tune). */
+/* Chosen by trial on the pairs of posed people with even numbers (tests/bench/correspond.py --half choose). */
 static const float NEAR = 0.25F;              /* of √area: points whose heights are compared */
 static const double RELIEF = 2, FACING = 0.5; /* weights beside the logarithm of the distortion */
 static const double LEAST = 1e-6;             /* distortion and relief are at least this: a shape on itself */

@@ -20,7 +20,7 @@ static const int order_of_functions[ORDERS][ORB_ZOOM_START - 1] = {
     {2, 1, 4, 3, 5}, {2, 1, 3, 5, 4}, {1, 3, 2, 5, 4}, {2, 3, 1, 4, 5}, {3, 1, 2, 4, 5},
     {1, 3, 4, 2, 5}, {1, 4, 2, 3, 5}, {1, 2, 4, 5, 3}, {1, 2, 5, 3, 4}};
 
-/* Chosen by trial on the pairs of posed people with even numbers (tests/bench/correspond.py --half tune). */
+/* Chosen by trial on the pairs of posed people with even numbers (tests/bench/correspond.py --half choose). */
 enum { STAGES = 3 };
 static const struct {
   int levels;   /* that the maps are refined to */

@@ -15,7 +15,7 @@
 #include "base/memory.h"
 #include "numeric/dense.h"
 
-/* Chosen by trial on the pairs of posed people with even numbers (tests/bench/correspond.py --half tune). */
+/* Chosen by trial on the pairs of posed people with even numbers (tests/bench/correspond.py --half choose). */
 static const int level_size[ORB_ZOOM_LEVELS] = {7, 9, 12, 16, 20, 25, 31};
 static const float level_triple[ORB_ZOOM_LEVELS] = {2, 2, 2, 2, 1, 1, 0}; /* weight of the triple products */
 static const int level_detail[ORB_ZOOM_LEVELS] = {0, 0, 1, 1, 2, 2, 2};
