@@ -33,6 +33,8 @@ ORDER = [
     "client/web/src/take", "client/web/src/welcome", "client/web/src/state", "client/web/src/player",
     "client/web/src/actions", "client/web/src/url", "client/web/src/ui",
     "client/web/src/main"]
+# server/http/regions.c defines these in place of libc's for libmicrohttpd; other callers mean libc's.
+IN_PLACE_OF_LIBC = {"sendmsg"}
 MOST_ENTRIES = {"core/align": 10}  # files and folders directly in a folder: its parts are seen at once
 SOURCE = re.compile(r"\.(inc\.h|c|h|cc|hh)$")
 SCRIPT = re.compile(r"\.(d\.ts|tsx|ts|mjs|js)$")
@@ -71,6 +73,8 @@ def add_calls(build, arrows):
         names = subprocess.run(["nm", item], capture_output=True, text=True, check=True).stdout
         for line in names.splitlines():
             kind, name = line.split()[-2:]
+            if name in IN_PLACE_OF_LIBC:
+                continue
             if kind in "TDBRVWC":
                 defined.setdefault(name, unit(file))
             elif kind == "U":
