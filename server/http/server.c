@@ -59,17 +59,22 @@ static void make_number(char out[2 * sizeof(uint64_t) + 1]) {
  * as sent, which signatures cover. */
 static void *request_create(void *user, const char *target, struct MHD_Connection *connection) {
   size_t size = strlen(target) + 1;
+  server *srv = user;
+  char number[sizeof((request *)NULL)->number];
+  make_number(number);
+  if (target_refused(target, number, srv->options->tls_key[0] != 0, connection)) {
+    return NULL; /* the library may drop the connection without another call, so nothing is allocated */
+  }
   request *r = calloc(1, sizeof *r + size);
   if (r) {
-    r->srv = user;
+    r->srv = srv;
     r->connection = connection;
     memcpy(r->target, target, size);
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
     r->watched = info ? info->socket_context : NULL;
     r->temp.fd = -1;
     r->began = clock_us();
-    make_number(r->number);
-    r->refused = target_refused(target, r->number, r->srv->options->tls_key[0] != 0, connection);
+    memcpy(r->number, number, sizeof number);
   }
   return r;
 }
@@ -116,7 +121,7 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
   request *r = *state;
   (void)user;
   (void)connection;
-  if (!r || r->refused) { /* out of memory, or answered past the library */
+  if (!r) { /* out of memory, or answered past the library */
     return MHD_NO;
   }
   if (!r->begun) {

@@ -126,13 +126,13 @@ static double *values_of(const glb *file, int accessor) {
     int16_t i16;
     uint32_t u32;
     float f32;
-    memcpy(&u16, p + 2 * (i % components), sizeof u16);
-    memcpy(&i16, p + 2 * (i % components), sizeof i16);
     if (kind == 5120) {
       out[i] = (double)(signed char)p[i % components] / 127;
       assert_true(normalized);
       continue;
     }
+    memcpy(&u16, p + 2 * (i % components), sizeof u16);
+    memcpy(&i16, p + 2 * (i % components), sizeof i16);
     if (kind == 5122 || kind == 5123) {
       out[i] = kind == 5122 ? i16 / (normalized ? 32767.0 : 1) : u16 / (normalized ? 65535.0 : 1);
       continue;
