@@ -111,7 +111,7 @@ struct request {
   int64_t retry_s;       /* for Retry-After; 0: the usual */
   int begun;             /* the headers have arrived */
   int has_body, head;
-  int closes;  /* the connection closes after this response */
+  int closes; /* the connection closes after this response */
   request_phase phase;
   int64_t began; /* µs */
 
