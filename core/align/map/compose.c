@@ -22,24 +22,26 @@
  *   (starts/landmark_walk.c). It has no flips from the beginning.
  * - From the best map so far, drawn to the spatial targets (engine/rounds.c).
  *
- * Each start is then refined up to all vertices, and no flip is allowed again. The map of least energy wins if it is
- * better than the alignment as given. Limbs that it has twisted are untwisted (twist/untwist.c) before the moving shape
- * is registered again through samples of it, and at the end.
+ * Where spatial targets are given, there are other starts (targets.h).
+ *
+ * Each start (start.h) is then refined up to all vertices, and no flip is allowed again. The map of least energy wins
+ * if it is better than the alignment as given. Limbs that it has twisted are untwisted (twist/untwist.c) before the
+ * moving shape is registered again through samples of it, and at the end.
  */
 #include "align/map/compose.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "align/map/engine/near.h"
-#include "align/map/engine/rounds.h"
 #include "align/map/engine/run.h"
 #include "align/map/engine/step.h"
 #include "align/map/levels.h"
+#include "align/map/start.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/place.h"
 #include "align/map/starts/spectral_samples.h"
 #include "align/map/swap.h"
+#include "align/map/targets.h"
 #include "align/map/twist/untwist.h"
 #include "align/map/walked.h"
 #include "base/check.h"
@@ -104,84 +106,6 @@ static orb_status prepare(orb_map_run *c) {
   orb_map_normals(c->x, mesh->vertex_count, mesh->triangles, mesh->triangle_count, c->normal);
   memcpy(c->start, c->moving->points, 3 * n * sizeof *c->start);
   return ORB_OK;
-}
-
-/* A second attempt at a start that was nearly cleared: from its places, against a barrier that begins harder. Which few
- * flips remain is close to chance, and a start that is nearly a map is worth more than all others. */
-static orb_status clear_again(orb_map_run *c, orb_map_start start, orb_map_level *l, const int32_t *to_mesh,
-                              int32_t *flips) {
-  orb_map_place(c, l, to_mesh, start);
-  orb_map_set_pull(c, l, to_mesh, 1);
-  return orb_map_clear_flips(c, l, c->params.clear.first_barrier * c->params.clear.again, c->params.clear.rounds,
-                             flips);
-}
-
-/* Clears the flips of a start's first level. *flips: those left; a finer level may clear them, unless *given_up: the
- * start is dropped, which is not an error: another start, or the given alignment, remains. */
-static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_start start, orb_map_level *l,
-                              int32_t *flips, int *given_up) {
-  const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
-  int32_t hopeless = l->triangle_count / c->hopeless_flips;
-  *flips = orb_map_level_flips(l);
-  if (*flips <= hopeless) {
-    *given_up = orb_map_level_energy(l) > c->hopeless;
-    if (*given_up) {
-      c->work -= c->params.work.given_up * (int64_t)c->vertex_count;
-      return ORB_OK;
-    }
-    ORB_TRY(orb_map_clear_flips(c, l, c->params.clear.first_barrier, c->params.clear.rounds, flips));
-    if (*flips && start == ORB_MAP_SPATIAL && orb_map_is_near(l, *flips)) {
-      ORB_TRY(clear_again(c, start, l, to_mesh, flips));
-    }
-  }
-  int last = r->live == c->vertex_count || r->live > c->params.level.last;
-  if (*flips && last && start == ORB_MAP_SPATIAL && c->pairs.count > 0 && orb_map_is_near(l, *flips)) {
-    ORB_TRY(orb_map_keep_usable(c, l, to_mesh));
-    ORB_TRY(orb_map_release(c, l, to_mesh, flips));
-  }
-  *given_up = *flips && (last || *flips > hopeless);
-  return ORB_OK;
-}
-
-/* Runs one start; keeps its points if they are the best so far. */
-static orb_status run_start(orb_map_run *c, orb_map_start start) {
-  orb_context *ctx = c->ctx;
-  orb_refiner *r = NULL;
-  orb_map_level level = {0};
-  int32_t flips = 1, size = start == ORB_MAP_SPATIAL ? c->params.level.spatial : c->params.level.mapped;
-  int failed = 0, given_up = 0, is_given = start == ORB_MAP_GIVEN;
-  orb_status status;
-  ORB_GO(status, orb_map_levels_begin(c, &r), done);
-  while (flips) {
-    ORB_GO(status, orb_map_level_place(c, r, start, size, &level), done);
-    ORB_GO(status, clear_start(c, r, start, &level, &flips, &given_up), done);
-    if (given_up) {
-      goto done;
-    }
-    if (flips) {
-      memset(r->pinned, 0, (size_t)c->vertex_count);
-    }
-    size = r->live * 2;
-  }
-  if (start == ORB_MAP_DRAWN) {
-    ORB_GO(status, orb_map_draw(c, &level, c->hierarchy->surface.to_mesh), done);
-  }
-  orb_map_level_store(c, &level, r);
-  ORB_GO(status,
-         orb_map_levels_refine(c, r, &level, is_given ? 0 : c->params.level.pull, is_given && c->params.work.rough,
-                               &failed),
-         done);
-  if (!failed) {
-    double energy = orb_map_level_energy(&level);
-    if (energy < c->best_energy) {
-      c->best_energy = energy;
-      orb_refiner_points(r, c->best);
-    }
-  }
-done:
-  orb_map_level_free(ctx, &level);
-  orb_refiner_destroy(ctx, r);
-  return status;
 }
 
 /* The energy of the alignment as given. */
@@ -269,7 +193,7 @@ static orb_status start_without_mirror_landmarks(orb_map_run *c) {
   c->pairs.count = c->pairs.landmarks;
   ORB_GO(status, orb_map_register(c, 0), done);
   ORB_GO(status, orb_map_levels_prepare(c), done);
-  ORB_GO(status, run_start(c, ORB_MAP_SPATIAL), done);
+  ORB_GO(status, orb_map_run_start(c, ORB_MAP_SPATIAL), done);
   if (c->best_energy < before) {
     goto done; /* the mirror landmarks stay dropped */
   }
@@ -285,28 +209,9 @@ done:
   return status;
 }
 
-/* Registers the moving shape through samples of the best map and starts from there, as long as that helps. */
-static orb_status run_passes(orb_map_run *c, int draws) {
-  double last = INFINITY;
-  while (c->best_energy < c->params.work.pass_gain * last && c->passes-- > 0 && c->work > 0) {
-    last = c->best_energy;
-    ORB_TRY(orb_map_register(c, c->params.registration.samples));
-    if (!c->hierarchy) {
-      ORB_TRY(orb_map_levels_prepare(c));
-    }
-    c->hopeless = c->params.work.far_above * c->best_energy;
-    ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
-    c->hopeless = INFINITY;
-    if (draws && !(c->best_energy < last)) {
-      ORB_TRY(run_start(c, ORB_MAP_DRAWN));
-    }
-  }
-  return ORB_OK;
-}
-
 /* From spatial targets, where they are promising. */
 static orb_status run_spatial(orb_map_run *c) {
-  ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
+  ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));
   if (c->has_usable && c->pairs.count > c->pairs.landmarks && c->best_energy > c->params.energy.good) {
     ORB_TRY(start_without_mirror_landmarks(c));
   }
@@ -328,7 +233,7 @@ static orb_status finish_walked(orb_map_run *c, orb_map_walked *w, int *done) {
   }
   ORB_TRY(orb_map_walked_refine(c, w));
   *done = w->energy < INFINITY;
-  return *done && c->best_energy > good ? run_passes(c, 0) : ORB_OK;
+  return *done && c->best_energy > good ? orb_map_run_passes(c, 0) : ORB_OK;
 }
 
 /* Runs the starts, until they bring no improvement or the work is spent. */
@@ -341,32 +246,12 @@ static orb_status run_starts(orb_map_run *c, orb_map_from from, orb_preset prese
     return ORB_OK;
   }
   ORB_TRY(meet_pairs(c));
-  ORB_TRY(run_start(c, ORB_MAP_GIVEN)); /* without flips and cheap; the better it is, the better the later ones are */
+  ORB_TRY(orb_map_run_start(
+      c, ORB_MAP_GIVEN)); /* without flips and cheap; the better it is, the better the later ones are */
   ORB_TRY(untwist_first(c));
-  ORB_TRY(run_start(c, ORB_MAP_DRAWN));
+  ORB_TRY(orb_map_run_start(c, ORB_MAP_DRAWN));
   ORB_TRY(untwist_early(c, INFINITY));
-  return run_passes(c, 1);
-}
-
-/* Starts from targets that are given: on the usual level, and where that leads to nothing on a coarser one, since which
- * flips cannot be cleared is close to chance. A map of shapes that correspond is then drawn to the targets; a worse one
- * is left to the caller, who has other ways. */
-static orb_status run_given_targets(orb_map_run *c) {
-  const orb_map_params *p = &c->params;
-  ORB_TRY(orb_map_register(c, 0));
-  ORB_TRY(orb_map_levels_prepare(c));
-  ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
-  if (c->best_energy > p->energy.poor) {
-    c->params.level.spatial = p->level.given;
-    ORB_TRY(run_start(c, ORB_MAP_SPATIAL));
-    c->params.level.spatial = orb_map_params_of(ORB_PRESET_DEFAULT).level.spatial;
-  }
-  if (c->best_energy <= p->energy.good || c->best_energy > p->energy.poor) {
-    return ORB_OK;
-  }
-  ORB_TRY(run_start(c, ORB_MAP_DRAWN));
-  ORB_TRY(untwist_early(c, INFINITY));
-  return run_passes(c, 1);
+  return orb_map_run_passes(c, 1);
 }
 
 /* The quick way, and all starts where it does not suffice: where the walk has twisted limbs, and where the shapes are
@@ -394,10 +279,10 @@ static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
   /* A good map without landmarks is kept: symmetric shapes have others that are as good. */
   if (c->pairs.landmarks == 0 && c->best_energy <= c->params.energy.good) {
     ORB_TRY(orb_map_levels_prepare(c));
-    return run_start(c, ORB_MAP_GIVEN);
+    return orb_map_run_start(c, ORB_MAP_GIVEN);
   }
   if (c->given_target) {
-    return run_given_targets(c);
+    return orb_map_follow_targets(c);
   }
   if (from == ORB_MAP_FROM_SPACE && c->both && c->pairs.count > 0 && preset != ORB_PRESET_QUALITY) {
     orb_map_walked walked;

@@ -59,7 +59,7 @@ typedef struct orb_map_params {
   /* Levels of a start, and sweeps on them. */
   struct {
     int32_t spatial;    /* level at which a start from spatial targets begins. Coarser is faster and folds more */
-    int32_t given;      /* the same for a second attempt at targets that are given */
+    int32_t given;      /* the same for the last attempt at targets that are given */
     int32_t mapped;     /* level at which a start from a map begins: a coarser one would fold it */
     int32_t last;       /* level beyond which a start gives up untangling */
     int32_t kept;       /* least vertices of the coarsest level if vertices are kept on it, */
@@ -78,6 +78,15 @@ typedef struct orb_map_params {
     double pull;   /* of the spatial targets on the first level, */
     double pull_fall; /* and its factor from level to level */
   } level;
+
+  /* From targets that are given. */
+  struct {
+    int work;        /* least that each step after the first has, as work.all: a start that is given up takes some */
+    double hopeless; /* energy of a start above which nothing else is tried */
+    double drawn;    /* above which the map is not drawn: it stays caught */
+    double gain;     /* a draw below this share of the energy before it opens the way for one more pass, */
+    double enough;   /* unless the energy is below this, where a pass gains 1 % or less */
+  } targets;
 
   /* The quick way: a landmark walk optimised on a coarse level. */
   struct {

@@ -46,6 +46,7 @@ typedef struct orb_map_run {
   orb_map_candidate kept;     /* the best map from before they changed */
   double *x, *normal;         /* moving shape, area 4π */
   const double *given_target; /* of the first registration, in the fixed shape's space; NULL: it is computed */
+  int samples_follow_target;  /* samples of a registration have their targets from there, not from the best map */
   double *target;             /* spatial targets, once the moving shape is registered */
   double *target_normal;
   orb_place *target_place; /* of every vertex of the moving shape, on the fixed one */

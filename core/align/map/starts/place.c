@@ -61,6 +61,24 @@ static int is_paired(const orb_map_run *c, int32_t moving) {
   return paired;
 }
 
+/* Where vertex v goes by the given targets, in the scale of the fixed shape. */
+static void scaled_target(const orb_map_run *c, int32_t v, double out[3]) {
+  for (size_t k = 0; k < 3; k++) {
+    out[k] = (c->given_target[3 * (size_t)v + k] - c->b.centre[k]) * c->b.scale;
+  }
+}
+
+/* Where a sample goes. */
+static void sample_target(const orb_map_run *c, int32_t v, double out[3]) {
+  orb_place place;
+  if (c->samples_follow_target) {
+    scaled_target(c, v, out);
+    return;
+  }
+  orb_locate(c->b.locator, c->best + 3 * (size_t)v, -1, &place);
+  orb_map_surface_at(&c->b, &place, out, NULL, NULL);
+}
+
 /* The pairs as anchors, and samples: of the best map, or else by eigenfunctions. vertex and target have room for all
  * pairs and samples. */
 static orb_status gather_anchors(orb_map_run *c, int samples, int32_t *vertex, double *target, orb_map_anchors *out) {
@@ -83,9 +101,7 @@ static orb_status gather_anchors(orb_map_run *c, int samples, int32_t *vertex, d
   for (int i = 0; i < samples; i++) {
     int32_t v = vertex[out->exact + i];
     if (!is_paired(c, v)) {
-      orb_place place;
-      orb_locate(c->b.locator, c->best + 3 * (size_t)v, -1, &place);
-      orb_map_surface_at(&c->b, &place, target + 3 * (size_t)out->count, NULL, NULL);
+      sample_target(c, v, target + 3 * (size_t)out->count);
       vertex[out->count++] = v;
     }
   }
@@ -106,8 +122,8 @@ orb_status orb_map_register(orb_map_run *c, int samples) {
     goto done;
   }
   if (c->given_target && samples == 0) {
-    for (size_t i = 0; i < 3 * (size_t)c->vertex_count; i++) {
-      c->target[i] = (c->given_target[i] - c->b.centre[i % 3]) * c->b.scale;
+    for (int32_t v = 0; v < c->vertex_count; v++) {
+      scaled_target(c, v, c->target + 3 * (size_t)v);
     }
   } else {
     ORB_GO(status, gather_anchors(c, samples, vertex, target, &anchors), done);

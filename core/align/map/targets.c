@@ -1,0 +1,78 @@
+/* Which few flips of a start cannot be cleared is close to chance, so there are three starts, one after the other,
+ * until one is a map of shapes that correspond: from the targets, from a registration in space through samples of them,
+ * which is smoother, and from the targets on a coarser level. Then passes through samples of the best map, and a draw,
+ * bring the energy down. Passes come first: they find a better basin, and a draw only the bottom of one. Where no pass
+ * helps, the map is drawn to the given targets. */
+#include "align/map/targets.h"
+
+#include "align/map/levels.h"
+#include "align/map/start.h"
+#include "align/map/starts/place.h"
+#include "base/check.h"
+
+/* Each step gets work of its own: a start that is given up must not starve the next. */
+static void allow(orb_map_run *c) {
+  int64_t least = c->params.targets.work * (int64_t)c->vertex_count;
+  c->work = c->work > least ? c->work : least;
+}
+
+static orb_status start_through_samples(orb_map_run *c) {
+  allow(c);
+  c->samples_follow_target = 1;
+  orb_status status = orb_map_register(c, c->params.registration.samples);
+  c->samples_follow_target = 0;
+  return status == ORB_OK ? orb_map_run_start(c, ORB_MAP_SPATIAL) : status;
+}
+
+static orb_status start_coarser(orb_map_run *c) {
+  int32_t usual = c->params.level.spatial;
+  allow(c);
+  ORB_TRY(orb_map_register(c, 0));
+  c->params.level.spatial = c->params.level.given;
+  orb_status status = orb_map_run_start(c, ORB_MAP_SPATIAL);
+  c->params.level.spatial = usual;
+  return status;
+}
+
+static orb_status run_starts(orb_map_run *c) {
+  ORB_TRY(orb_map_register(c, 0));
+  ORB_TRY(orb_map_levels_prepare(c));
+  ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));
+  if (c->best_energy > c->params.energy.poor) {
+    ORB_TRY(start_through_samples(c));
+  }
+  return c->best_energy > c->params.energy.poor ? start_coarser(c) : ORB_OK;
+}
+
+static orb_status draw(orb_map_run *c) {
+  allow(c);
+  return orb_map_run_start(c, ORB_MAP_DRAWN);
+}
+
+static orb_status run_passes(orb_map_run *c) {
+  allow(c);
+  return orb_map_run_passes(c, 0);
+}
+
+orb_status orb_map_follow_targets(orb_map_run *c) {
+  const orb_map_params *p = &c->params;
+  ORB_TRY(run_starts(c));
+  double started = c->best_energy;
+  if (started <= p->energy.good || started > p->targets.hopeless) {
+    return ORB_OK;
+  }
+  ORB_TRY(run_passes(c));
+  if (c->best_energy <= p->energy.good || c->best_energy > p->targets.drawn) {
+    return ORB_OK;
+  }
+  if (!(c->best_energy < started)) {
+    ORB_TRY(orb_map_register(c, 0));
+  }
+  double before = c->best_energy;
+  ORB_TRY(draw(c));
+  if (c->best_energy < p->targets.gain * before && c->best_energy > p->targets.enough) {
+    c->passes = 1;
+    ORB_TRY(run_passes(c));
+  }
+  return ORB_OK;
+}
