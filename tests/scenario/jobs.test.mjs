@@ -80,11 +80,13 @@ test('progress moves at least once a second while a job runs, and never back', a
   const d = await daemon(t);
   const mesh = await heavy(d, 1, 5);
   const job = (await d.post('/v1/embeddings', { mesh: mesh.id, ...endless })).json;
-  await until(async () => (await d.get(job.url)).json.state === 'running', 'it runs');
+  const now = async () => (await d.get(job.url)).json;
+  await until(async () => (await now()).stage, 'it has read its mesh and reports a stage');
   const seen = [];
   for (const end = Date.now() + 6000 * patience; Date.now() < end; await sleep(50)) {
-    const { progress, stage } = (await d.get(job.url)).json;
-    assert.ok(stage && progress < 1);
+    const { progress, stage, state } = await now();
+    assert.equal(state, 'running');
+    assert.ok(stage && progress < 1, `${stage} ${progress}`);
     if (progress !== seen.at(-1)) seen.push(progress);
   }
   assert.ok(seen.length >= 6, `${seen}`);
