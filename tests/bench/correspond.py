@@ -115,7 +115,7 @@ def measure(program, pair, given, change, options):
             "diagonal": [round(100 * math.dist(targets[i], image) / second.diagonal, 3)
                          for i, image in zip(held, images)],
             "parts": [places[i][2] for i in held], "cpu": round(cpu, 2), "energy": line["energy"],
-            "confidence": line.get("confidence"), "halfway": line["halfway_fitted"]}
+            "confidence": line.get("confidence"), "match": line.get("match"), "halfway": line["halfway_fitted"]}
 
 
 def spread(places, count):

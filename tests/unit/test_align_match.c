@@ -79,6 +79,35 @@ static void limbs_go_to_limbs(void **state) {
   }
 }
 
+/* Further maps of a creature with five unlike limbs come by rising cost, and no two of all maps pair the same
+ * vertices. */
+static void others_differ(void **state) {
+  (void)state;
+  orb_context *ctx;
+  orb_match match;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh a = creature_of(ctx, reach, 3, 0), b = creature_of(ctx, reach, 4, 1);
+  assert_int_equal(orb_match_find(ctx, &a, &b, &match), ORB_OK);
+  assert_in_range(match.other_count, 1, ORB_MATCH_OTHERS);
+  double before = 1;
+  for (int i = 0; i < match.other_count; i++) {
+    const orb_match_other *other = &match.other[i];
+    assert_true(other->cost >= before);
+    before = other->cost;
+    assert_true(other->pairs.count >= 3);
+    assert_memory_not_equal(&other->pairs, &match.pairs, sizeof match.pairs);
+    for (int k = 0; k < i; k++) {
+      assert_memory_not_equal(&other->pairs, &match.other[k].pairs, sizeof match.pairs);
+    }
+  }
+  /* The next one is dropped, or `clear` says how far behind it is. */
+  assert_true(match.clear == 0.5 || fabs(match.clear - (1 - 1 / match.other[0].cost)) < 1e-12);
+  orb_match_free(ctx, &match);
+  shape_free(ctx, &a);
+  shape_free(ctx, &b);
+  orb_context_destroy(ctx);
+}
+
 /* The landmark of a list of vertices that is nearest in space. */
 static int nearest_of(const orb_mesh *mesh, const int32_t *list, int count, int32_t v) {
   int best = 0;
@@ -123,10 +152,10 @@ static void assert_match(const char *first, const char *second, int marks, const
     assert_true(shared_mesh(ctx, second, &mesh[1]));
     assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], &best), ORB_OK);
     int tips = 0;
-    for (int k = 0; k < best.count; k++) {
-      int at = nearest_of(&mesh[0], mark[0], marks, best.first[k]);
-      if (is_at(&mesh[0], mark[0][at], best.first[k])) {
-        assert_int_equal(nearest_of(&mesh[1], mark[1], marks, best.second[k]), at);
+    for (int k = 0; k < best.pairs.count; k++) {
+      int at = nearest_of(&mesh[0], mark[0], marks, best.pairs.first[k]);
+      if (is_at(&mesh[0], mark[0][at], best.pairs.first[k])) {
+        assert_int_equal(nearest_of(&mesh[1], mark[1], marks, best.pairs.second[k]), at);
         tips++;
       }
     }
@@ -158,7 +187,7 @@ static void cow_to_animal(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs), cmocka_unit_test(man_to_armadillo),
-                                     cmocka_unit_test(cow_to_animal)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs), cmocka_unit_test(others_differ),
+                                     cmocka_unit_test(man_to_armadillo), cmocka_unit_test(cow_to_animal)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,4 +46,7 @@ enum { ORB_FIND_PATCH = 64 };
  * then nearly as good. */
 static const double ORB_FIND_CLEAR = 0.5;
 
+/* Confidence in a match (match.c): logistic in these. */
+static const double ORB_FIND_SURE = 0, ORB_FIND_SURE_CLEAR = 4, ORB_FIND_SURE_BEND = 0, ORB_FIND_SURE_ENERGY = 0;
+
 #endif
