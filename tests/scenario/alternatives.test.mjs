@@ -1,7 +1,10 @@
 // Without landmarks the answer says how sure the match is, and lists other matches as requests that can be sent.
 import assert from 'node:assert/strict';
+import { readFile, writeFile } from 'node:fs/promises';
+import path from 'node:path';
 import test from 'node:test';
-import { daemon } from './support/daemon.mjs';
+import { folder, run } from './support/cli.mjs';
+import { daemon, samples } from './support/daemon.mjs';
 import { morphOf } from './support/glb.mjs';
 import { ball, egg, obj } from './support/shapes.mjs';
 
@@ -97,4 +100,28 @@ test('three shapes have a verdict and no alternatives; rotations alone have neit
   const fast = await d.made('/v1/supermeshes', { shapes: shapes.slice(0, 2), remesh, align });
   assert.equal(fast.match, undefined);
   assert.deepEqual(fast.alternatives, []);
+});
+
+test('the client says where a match is not sure, and calls only given landmarks exact', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  const [out, md, marks] = ['morph.glb', 'report.md', 'landmarks.json'].map((name) => path.join(at, name));
+  const morph = async (...args) => {
+    const files = ['dog.obj', 'elephant.ply'].map((name) => path.join(samples, name));
+    const done = await run(['morph', ...files, '-o', out, '--report', md, '-t', '0.01', ...args], { env });
+    assert.equal(done.code, 0, done.err);
+    return done.out + (await readFile(md, 'utf8'));
+  };
+  const said = await morph();
+  assert.match(said, /match: unsure \(confidence 0\.[0-4]\d\)/);
+  assert.equal(said.match(/Not sure: the shapes may be matched wrongly/g).length, 2, 'printed and in the report');
+  assert.doesNotMatch(said, /exact/);
+  const [{ id }] = (await d.get('/v1/supermeshes')).json.supermeshes;
+  const { alternatives } = (await d.get(`/v1/supermeshes/${id}`)).json;
+  await writeFile(marks, JSON.stringify(alternatives[0].request.landmarks));
+  const guessed = await morph('--landmarks', marks);
+  assert.match(guessed, /landmarks, from a found match/);
+  assert.match(guessed, /The landmarks coincide\. They come from a match that orbmorph found\./);
+  assert.doesNotMatch(guessed, /exact|Not sure/);
 });

@@ -384,7 +384,7 @@ export type Supermesh = {
     confidence: number;
     /** `sure` from a confidence of 0.8 on, `likely` from 0.5 on, else `unsure`. */
     verdict: 'sure' | 'likely' | 'unsure';
-    /** From 0 to 1: how far the next best rough map that differs is behind; 0.5 if none is near. */
+    /** From 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs. */
     clear: number;
     /** How much the best rough map bends the shapes: 0 for a rigid motion. */
     bend: number;

@@ -304,18 +304,14 @@ static orb_status write_ranking(const search *t, orb_match *out) {
   double cost = 1;
   out->cost = best->cost;
   out->bend = (best->bend[0] + best->bend[1]) / 2;
-  out->clear = ORB_FIND_CLEAR_ALONE;
   for (int32_t i = 1; i < count; i++) {
     const trial *one = &t->trial[list[i]];
     orb_match_other *other = &out->other[out->other_count++];
-    int is_dropped = !(one->cost < INFINITY);
-    cost = fmax(cost, is_dropped ? one->rough / best->rough : one->cost / best->cost);
+    cost = fmax(cost, one->cost < INFINITY ? one->cost / best->cost : one->rough / best->rough);
     other->cost = cost;
-    if (i == 1 && !is_dropped) {
-      out->clear = 1 - best->cost / one->cost;
-    }
     ORB_TRY(write_pairs(t, one, &other->pairs));
   }
+  out->clear = count > 1 ? 1 - 1 / out->other[0].cost : ORB_FIND_CLEAR_ALONE;
   return write_pairs(t, best, &out->pairs);
 }
 
@@ -411,7 +407,10 @@ void orb_match_free(orb_context *ctx, orb_match *match) {
 }
 
 double orb_match_confidence(double bend, double clear, double energy) {
-  double odds = ORB_FIND_SURE + ORB_FIND_SURE_CLEAR * clear - ORB_FIND_SURE_BEND * bend -
-                ORB_FIND_SURE_ENERGY * (isfinite(energy) ? energy : 10);
+  if (!(energy >= 1) || !isfinite(energy)) { /* rounding of an isometry, or not measured: as if the map were bad */
+    energy = energy < 1 ? 1 : ORB_FIND_SURE_UNMEASURED;
+  }
+  double odds = ORB_FIND_SURE + ORB_FIND_SURE_CLEAR * fmin(clear, ORB_FIND_CLEAR) - ORB_FIND_SURE_BEND * bend -
+                ORB_FIND_SURE_ENERGY * log(energy);
   return 1 / (1 + exp(-odds));
 }

@@ -59,7 +59,7 @@ typedef struct orb_alternative {
 typedef struct orb_match_facts {
   int32_t is_measured; /* 0: landmarks were given, the preset is fast, or no rough map was found */
   double bend;         /* of the best rough map: 0 for a rigid motion */
-  double clear;        /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if there is none */
+  double clear;        /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs */
   double confidence; /* 0 to 1: the share of right matches among calibrated ones like this (docs/bench-confidence.md) */
 } orb_match_facts;
 
