@@ -46,10 +46,10 @@ enum { ORB_FIND_PATCH = 64 };
  * then nearly as good. */
 static const double ORB_FIND_CLEAR = 0.5;
 
-/* Confidence in a match (match.c): 1 / (1 + exp(−odds)), where the odds, a natural logarithm, are these weights of 1, of
- * orb_match.clear (at most ORB_FIND_CLEAR), of orb_match.bend and of ln(energy of the composed map); the last two lower
- * them. Fitted by logistic regression with a weak ridge to 21 pairs of the half `choose`, 3 of them wrong, people and
- * animals, and rounded. docs/bench-confidence.md has the pairs, and the half `report`. */
+/* Confidence in a match (match.c): 1 / (1 + exp(−odds)), where the odds, a natural logarithm, are these weights of 1,
+ * of orb_match.clear (at most ORB_FIND_CLEAR), of orb_match.bend and of ln(energy of the composed map); the last two
+ * lower them. Fitted by logistic regression with a weak ridge to 21 pairs of people and animals of the half `choose`, 3
+ * of them wrong, and rounded. docs/bench-confidence.md has the pairs, and the half `report`. */
 static const double ORB_FIND_SURE = 3, ORB_FIND_SURE_CLEAR = 3, ORB_FIND_SURE_BEND = 7, ORB_FIND_SURE_ENERGY = 10;
 /* The energy that a map whose energy is not known is taken to have: a bad one's. */
 static const double ORB_FIND_SURE_UNMEASURED = 10;
