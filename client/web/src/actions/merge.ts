@@ -198,11 +198,7 @@ export function cancelMerge() {
 export async function openResult(
   supermesh: Supermesh,
   request: SupermeshRequest | null,
-  {
-    keep = false,
-    signal,
-    matches = null,
-  }: { keep?: boolean; signal?: AbortSignal; matches?: Matches | null } = {},
+  { keep = false, signal, matches = null }: { keep?: boolean; signal?: AbortSignal; matches?: Matches | null } = {},
 ) {
   if (!keep) set({ loading: 'Loading the morph' });
   try {
