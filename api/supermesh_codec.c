@@ -139,6 +139,60 @@ static void write_landmarks(const api_supermesh_request *request, const orb_merg
   api_json_close(out, ']');
 }
 
+/* From these confidences on a match is likely, and sure. docs/bench-confidence.md says how often each holds. */
+static const double LIKELY = 0.5, SURE = 0.8;
+
+/* How far the correspondence that was found may be relied on; nothing where none was searched. */
+static void write_match(const orb_match_facts *match, api_text *out) {
+  if (!match->is_measured) {
+    return;
+  }
+  api_json_key(out, "match");
+  api_json_open(out, '{');
+  api_json_member_number(out, "confidence", match->confidence);
+  api_json_member_string(out, "verdict",
+                         match->confidence >= SURE     ? "sure"
+                         : match->confidence >= LIKELY ? "likely"
+                                                       : "unsure");
+  api_json_member_number(out, "clear", match->clear);
+  api_json_member_number(out, "bend", match->bend);
+  api_json_close(out, '}');
+}
+
+/* The same request with the pairs of an alternative as landmarks, which the default method pins. Each landmark has the
+ * confidence 1 / cost, since it was found, not given. */
+static void write_alternative_request(const api_supermesh_request *request, const orb_alternative *alternative,
+                                      const api_place *spots, api_text *out) {
+  api_landmark_spec items[ORB_ALTERNATIVE_PAIRS];
+  api_place places[2 * ORB_ALTERNATIVE_PAIRS];
+  api_supermesh_request changed = *request;
+  memset(items, 0, sizeof items);
+  memcpy(places, spots, 2 * (size_t)alternative->count * sizeof *spots);
+  for (int32_t i = 0; i < alternative->count; i++) {
+    snprintf(items[i].name, sizeof items[i].name, "pair %d", i + 1);
+    items[i].confidence = fmin(1, 1 / alternative->cost);
+  }
+  changed.landmarks = (api_landmark_list){alternative->count, 2, items, places};
+  changed.merge.align.method = ORB_ALIGN_PIN;
+  api_supermesh_request_write(&changed, out);
+}
+
+static void write_alternatives(const api_supermesh_request *request, const orb_alignment *alignment,
+                               const api_place *spots, api_text *out) {
+  api_json_key(out, "alternatives");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < alignment->alternative_count; i++) {
+    const orb_alternative *one = &alignment->alternatives[i];
+    api_json_open(out, '{');
+    api_json_member_number(out, "cost", one->cost);
+    api_json_key(out, "request");
+    write_alternative_request(request, one, spots, out);
+    api_json_close(out, '}');
+    spots += 2 * (size_t)one->count;
+  }
+  api_json_close(out, ']');
+}
+
 static void write_dropped(const orb_merge_result *result, api_text *out) {
   api_json_key(out, "dropped");
   api_json_open(out, '[');
@@ -189,7 +243,8 @@ static void write_profiles(const orb_profile_facts *profiles, api_text *out) {
 }
 
 void api_supermesh_write(const char *id, const api_supermesh_request *request, const orb_merge_result *result,
-                         const api_place *found, double embed_ms, int64_t created, api_text *out) {
+                         const api_place *found, const api_place *others, double embed_ms, int64_t created,
+                         api_text *out) {
   api_text canonical = {0};
   api_supermesh_request_write(request, &canonical);
   out->failed |= canonical.failed;
@@ -205,6 +260,8 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   api_json_member_integer(out, "triangles", result->supermesh.triangle_count);
   write_shapes(id, request, result, out);
   write_landmarks(request, result, found, out);
+  write_match(&result->alignment.match, out);
+  write_alternatives(request, &result->alignment, others, out);
   api_json_key(out, "certificate");
   api_merge_certificate_write(result, out);
   api_json_key(out, "pairs");

@@ -81,6 +81,17 @@ static int were_found(const cJSON *supermesh) {
   return member(cJSON_GetArrayItem(member(supermesh, "landmarks"), 0), "vertex") == NULL;
 }
 
+/* The landmarks of the request came from a match that was found: "exact" is said only of places that someone set. */
+static int were_guessed(const cJSON *supermesh) {
+  const cJSON *landmark;
+  cJSON_ArrayForEach(landmark, member(member(supermesh, "request"), "landmarks")) {
+    if (cli_number(landmark, "confidence") < 1) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
 /* A line for each shape that the asset has moved. */
 static void print_fits(const cJSON *supermesh) {
   const cJSON *shape;
@@ -116,12 +127,19 @@ void cli_print_supermesh(const cJSON *supermesh) {
   } else if (landmarks) {
     percent(worst_residual(supermesh), error);
     printf("  %d landmarks, %s (distance at most %s)\n", landmarks,
-           cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "exact" : "not exact", error);
+           were_guessed(supermesh)                                ? "from a found match"
+           : cJSON_IsTrue(member(certificate, "landmarks_exact")) ? "exact"
+                                                                  : "not exact",
+           error);
   }
   int dropped = cJSON_GetArraySize(member(supermesh, "dropped"));
   if (dropped) {
     printf("  not in the asset: %d %s of the files, which a report names (--report)\n", dropped,
            dropped == 1 ? "part" : "parts");
+  }
+  if (member(supermesh, "match")) {
+    const cJSON *match = member(supermesh, "match");
+    printf("  match: %s (confidence %.2f)\n", cli_string(match, "verdict", "?"), cli_number(match, "confidence"));
   }
   cli_warnings(stdout, "  warning: ", supermesh);
   printf("  time: %.3g s\n", cli_number(member(supermesh, "timings_ms"), "total") / 1000);
@@ -206,11 +224,18 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   fprintf(out, "One mesh of %s vertices and %s triangles, %s, genus %.0f. Resource `%s`, made by %s.\n\n", vertices,
           triangles, cJSON_IsTrue(member(certificate, "closed")) ? "closed" : "not closed",
           cli_number(certificate, "genus"), cli_string(supermesh, "url", "?"), cli_string(supermesh, "engine", "?"));
+  if (member(supermesh, "match")) {
+    const cJSON *match = member(supermesh, "match");
+    fprintf(out, "The correspondence was found without landmarks; verdict: %s (confidence %.2f).\n\n",
+            cli_string(match, "verdict", "?"), cli_number(match, "confidence"));
+  }
   markdown_warnings(out, supermesh);
   markdown_shapes(out, supermesh);
   if (cJSON_GetArraySize(member(supermesh, "landmarks"))) {
     const char *exact = cJSON_IsTrue(member(certificate, "landmarks_exact"))
-                            ? "All landmarks coincide exactly."
+                            ? were_guessed(supermesh)
+                                  ? "The landmarks coincide. They come from a match that orbmorph found."
+                                  : "All landmarks coincide exactly."
                             : "The landmarks coincide only approximately.";
     fprintf(out, "\n## Landmarks\n\n%s\n\n| landmark | distance on each shape |\n|---|---|\n",
             were_found(supermesh)

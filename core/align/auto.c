@@ -26,6 +26,7 @@ typedef struct matches {
   int32_t count;          /* vertices of the first shape that all matches pair */
   int32_t *vertex;        /* these, and their partners: ORB_MATCH_PAIRS a shape */
   double clear;           /* least over the shapes */
+  double bend;            /* most over the shapes */
   int are_found;          /* all of them */
 } matches;
 
@@ -40,13 +41,13 @@ static void matches_free(orb_context *ctx, matches *m) {
 
 /* Gathers the vertices of the first shape that every match pairs, and their partners. */
 static void gather(matches *m) {
-  for (int32_t i = 0; m->shape_count > 1 && i < m->of[1].count; i++) {
+  for (int32_t i = 0; m->shape_count > 1 && i < m->of[1].pairs.count; i++) {
     int32_t found = 1;
-    m->vertex[m->count] = m->of[1].first[i];
+    m->vertex[m->count] = m->of[1].pairs.first[i];
     for (int32_t s = 1; s < m->shape_count; s++) {
-      for (int32_t k = 0; k < m->of[s].count; k++) {
-        if (m->of[s].first[k] == m->of[1].first[i]) {
-          m->vertex[(size_t)s * ORB_MATCH_PAIRS + (size_t)m->count] = m->of[s].second[k];
+      for (int32_t k = 0; k < m->of[s].pairs.count; k++) {
+        if (m->of[s].pairs.first[k] == m->of[1].pairs.first[i]) {
+          m->vertex[(size_t)s * ORB_MATCH_PAIRS + (size_t)m->count] = m->of[s].pairs.second[k];
           found++;
         }
       }
@@ -68,6 +69,7 @@ static orb_status find_matches(orb_context *ctx, const orb_align_shape *shapes, 
     m->targets[s] = m->of[s].target;
     m->are_found = m->are_found && m->of[s].is_found;
     m->clear = fmin(m->clear, m->of[s].clear);
+    m->bend = fmax(m->bend, m->of[s].bend);
   }
   gather(m);
   return ORB_OK;
@@ -158,6 +160,39 @@ static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes
   return ORB_OK;
 }
 
+/* Lists the other maps of the only match as places. */
+static orb_status write_alternatives(orb_context *ctx, const orb_align_shape *shapes, const orb_match *match,
+                                     orb_alignment *out) {
+  out->alternatives = ORB_NEW0(ctx, orb_alternative, ORB_ALTERNATIVES_MAX);
+  if (!out->alternatives) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t i = 0; i < match->other_count; i++) {
+    const orb_match_pairs *pairs = &match->other[i].pairs;
+    orb_alternative *one = &out->alternatives[out->alternative_count++];
+    one->cost = match->other[i].cost;
+    one->count = pairs->count;
+    for (int32_t k = 0; k < pairs->count; k++) {
+      ORB_TRY(orb_place_of_vertex(ctx, shapes[0].mesh, pairs->first[k], &one->at[2 * k]));
+      ORB_TRY(orb_place_of_vertex(ctx, shapes[1].mesh, pairs->second[k], &one->at[2 * k + 1]));
+    }
+  }
+  return ORB_OK;
+}
+
+/* What a caller may know of the matches: how sure the best ones are, and the next ones. */
+static orb_status describe_matches(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
+                                   orb_alignment *out) {
+  if (!m->are_found) {
+    return ORB_OK;
+  }
+  out->match.is_measured = 1;
+  out->match.bend = m->bend;
+  out->match.clear = m->clear;
+  out->match.confidence = orb_match_confidence(m->bend, m->clear, out->energy);
+  return m->shape_count == 2 ? write_alternatives(ctx, shapes, &m->of[1], out) : ORB_OK;
+}
+
 orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                           const orb_align_options *options, orb_alignment *out) {
   matches m = {.clear = 1};
@@ -168,6 +203,7 @@ orb_status orb_align_auto(orb_context *ctx, const orb_align_shape *shapes, int32
   if (options->preset != ORB_PRESET_FAST) {
     ORB_GO(status, find_matches(ctx, shapes, shape_count, &m), end);
     ORB_GO(status, follow_matches(ctx, shapes, &m, options, out), end);
+    ORB_GO(status, describe_matches(ctx, shapes, &m, out), end);
   }
   status = orb_align_find(ctx, out, m.clear);
 end:

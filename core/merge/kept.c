@@ -3,7 +3,9 @@
  *
  *   char[8] "ORBALIGN", uint32 version, uint32 0x01020304 (byte order)
  *   int32 shapes, landmarks, found; double energy
- *   found × shapes places (int32 triangle, double[3]), found × double[3] points, found × double confidence
+ *   int32 1 and double bend, clear, confidence of the match, or 0
+ *   int32 alternatives; for each double cost, int32 count, count × 2 places (int32 triangle, double[3])
+ *   found × shapes places, found × double[3] points, found × double confidence
  *   for each shape: int32 vertices, triangles, changed; double[3] point of each vertex; position and int32 source of
  * each added vertex; the changed triangles, each with its number, corners, parent, source_triangle, material and the
  *   attributes of its corners, where the mesh has them; int32 1 and the vertex of each landmark, or 0
@@ -18,11 +20,11 @@
 #include "base/error.h"
 #include "base/memory.h"
 
-enum { VERSION = 1, BYTE_ORDER_MARK = 0x01020304 };
+enum { VERSION = 2, BYTE_ORDER_MARK = 0x01020304 };
 static const char magic[8] = {'O', 'R', 'B', 'A', 'L', 'I', 'G', 'N'};
 
 /* A new member of the alignment must be written and read here, with a new VERSION. */
-_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 56, "write and read the new member");
+_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 104, "write and read the new member");
 _Static_assert(sizeof(void *) != 8 || sizeof(orb_aligned_shape) == sizeof(orb_mesh) + sizeof(orb_certificate) + 24,
                "write and read the new member");
 
@@ -132,12 +134,32 @@ static void put_shape(writer *w, const orb_mesh *given, const orb_aligned_shape 
   put(w, shape->landmark_vertices, shape->landmark_vertices ? (size_t)landmarks * sizeof(int32_t) : 0);
 }
 
+static void put_places(writer *w, const orb_place *places, size_t count) {
+  for (size_t i = 0; i < count; i++) {
+    put_integer(w, places[i].triangle);
+    put(w, places[i].at, sizeof places[i].at);
+  }
+}
+
+static void put_match(writer *w, const orb_alignment *a) {
+  put_integer(w, a->match.is_measured);
+  if (a->match.is_measured) {
+    put(w, &a->match.bend, sizeof a->match.bend);
+    put(w, &a->match.clear, sizeof a->match.clear);
+    put(w, &a->match.confidence, sizeof a->match.confidence);
+  }
+  put_integer(w, a->alternative_count);
+  for (int32_t i = 0; i < a->alternative_count; i++) {
+    const orb_alternative *one = &a->alternatives[i];
+    put(w, &one->cost, sizeof one->cost);
+    put_integer(w, one->count);
+    put_places(w, one->at, 2 * (size_t)one->count);
+  }
+}
+
 static void put_found(writer *w, const orb_alignment *a) {
   const size_t found = (size_t)a->found_count;
-  for (size_t i = 0; i < found * (size_t)a->shape_count; i++) {
-    put_integer(w, a->found[i].triangle);
-    put(w, a->found[i].at, sizeof a->found[i].at);
-  }
+  put_places(w, a->found, found * (size_t)a->shape_count);
   put(w, a->found_points, 3 * found * sizeof(double));
   put(w, a->confidence, found * sizeof(double));
 }
@@ -158,6 +180,7 @@ orb_status orb_alignment_write(orb_context *ctx, const orb_align_shape *shapes, 
   put_integer(&w, alignment->landmark_count);
   put_integer(&w, alignment->found_count);
   put(&w, &alignment->energy, sizeof alignment->energy);
+  put_match(&w, alignment);
   put_found(&w, alignment);
   for (int32_t s = 0; s < alignment->shape_count; s++) {
     put_shape(&w, shapes[s].mesh, &alignment->shapes[s], alignment->landmark_count);
@@ -312,16 +335,46 @@ static orb_status take_shape(orb_context *ctx, reader *r, const orb_mesh *given,
   return ORB_OK;
 }
 
+/* Places on the shapes, one shape after the other. */
+static void take_places(reader *r, const orb_align_shape *shapes, size_t shape_count, orb_place *out, size_t count) {
+  for (size_t i = 0; i < count; i++) {
+    out[i].triangle = take_integer(r, 0, shapes[i % shape_count].mesh->triangle_count - 1);
+    take(r, out[i].at, sizeof out[i].at);
+  }
+}
+
+static orb_status take_match(orb_context *ctx, reader *r, const orb_align_shape *shapes, orb_alignment *out) {
+  out->match.is_measured = take_integer(r, 0, 1);
+  if (out->match.is_measured) {
+    take(r, &out->match.bend, sizeof out->match.bend);
+    take(r, &out->match.clear, sizeof out->match.clear);
+    take(r, &out->match.confidence, sizeof out->match.confidence);
+  }
+  const int32_t count = take_integer(r, 0, out->shape_count == 2 ? ORB_ALTERNATIVES_MAX : 0);
+  if (count == 0) {
+    return ORB_OK;
+  }
+  out->alternatives = ORB_NEW0(ctx, orb_alternative, ORB_ALTERNATIVES_MAX);
+  if (!out->alternatives) {
+    return ORB_E_NO_MEMORY;
+  }
+  out->alternative_count = count;
+  for (int32_t i = 0; i < count; i++) {
+    orb_alternative *one = &out->alternatives[i];
+    take(r, &one->cost, sizeof one->cost);
+    one->count = take_integer(r, 0, ORB_ALTERNATIVE_PAIRS);
+    take_places(r, shapes, 2, one->at, 2 * (size_t)one->count);
+  }
+  return ORB_OK;
+}
+
 static orb_status take_found(orb_context *ctx, reader *r, const orb_align_shape *shapes, orb_alignment *out) {
   const size_t found = (size_t)out->found_count, places = found * (size_t)out->shape_count;
   out->found = ORB_NEW0(ctx, orb_place, places);
   if (!out->found) {
     return ORB_E_NO_MEMORY;
   }
-  for (size_t i = 0; i < places; i++) {
-    out->found[i].triangle = take_integer(r, 0, shapes[i % (size_t)out->shape_count].mesh->triangle_count - 1);
-    take(r, out->found[i].at, sizeof out->found[i].at);
-  }
+  take_places(r, shapes, (size_t)out->shape_count, out->found, places);
   out->found_points = take_array(ctx, r, 3 * found, sizeof(double));
   out->confidence = take_array(ctx, r, found, sizeof(double));
   return ORB_OK;
@@ -347,6 +400,7 @@ static orb_status take_all(orb_context *ctx, reader *r, const orb_align_shape *s
   out->shape_count = shape_count;
   out->landmark_count = landmarks;
   out->found_count = found;
+  ORB_TRY(take_match(ctx, r, shapes, out));
   if (found > 0) {
     ORB_TRY(take_found(ctx, r, shapes, out));
   }

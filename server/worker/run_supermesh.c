@@ -158,21 +158,37 @@ static int store_spheres(const run_env *env, orb_context *ctx, const orb_merge_r
   return stored == STORE_OK;
 }
 
-/* The found landmarks in the form in which a request names places: by a triangle of the file, or as a point if a repair
- * added the triangle. NULL if out of memory. */
+/* A place in the form in which a request names it: by a triangle of the file, or as a point if a repair added the
+ * triangle. */
+static void write_spot(const merge_input *in, size_t shape, const orb_place *place, api_place *out) {
+  orb_place file;
+  places_to_file(&in->meshes[shape], in->corners[shape], place, &file);
+  out->kind = file.triangle >= 0 ? API_PLACE_TRIANGLE : API_PLACE_POINT;
+  out->index = file.triangle;
+  memcpy(out->at, file.at, sizeof file.at);
+  if (file.triangle < 0) {
+    orb_place_position(&in->meshes[shape], place, out->at);
+  }
+}
+
+/* Places of the found landmarks. NULL if out of memory. */
 static api_place *found_spots(orb_context *ctx, const merge_input *in, const orb_merge_result *merged) {
   size_t shapes = (size_t)in->request.shape_count, count = (size_t)merged->alignment.found_count * shapes;
   api_place *spots = orb_alloc(ctx, count, sizeof *spots);
   for (size_t i = 0; spots && i < count; i++) {
-    const orb_mesh *mesh = &in->meshes[i % shapes];
-    const orb_place *found = &merged->alignment.found[i];
-    orb_place file;
-    places_to_file(mesh, in->corners[i % shapes], found, &file);
-    spots[i].kind = file.triangle >= 0 ? API_PLACE_TRIANGLE : API_PLACE_POINT;
-    spots[i].index = file.triangle;
-    memcpy(spots[i].at, file.at, sizeof file.at);
-    if (file.triangle < 0) {
-      orb_place_position(mesh, found, spots[i].at);
+    write_spot(in, i % shapes, &merged->alignment.found[i], &spots[i]);
+  }
+  return spots;
+}
+
+/* Places of all alternatives, one after the other. NULL if out of memory. */
+static api_place *other_spots(orb_context *ctx, const merge_input *in, const orb_alignment *alignment) {
+  enum { MOST = 2 * ORB_ALTERNATIVE_PAIRS };
+  api_place *spots = orb_alloc(ctx, (size_t)ORB_ALTERNATIVES_MAX * MOST, sizeof *spots), *next = spots;
+  for (int32_t a = 0; spots && a < alignment->alternative_count; a++) {
+    const orb_alternative *one = &alignment->alternatives[a];
+    for (size_t i = 0; i < 2 * (size_t)one->count; i++) {
+      write_spot(in, i % 2, &one->at[i], next++);
     }
   }
   return spots;
@@ -194,12 +210,16 @@ static int store_result_of(const run_env *env, orb_context *ctx, const run_job *
   if (!store_places(env, ctx, in, merged, result, problem) || !store_spheres(env, ctx, merged, result, problem)) {
     return 0;
   }
-  api_place *found = found_spots(ctx, in, merged);
-  if (!found) {
+  api_place *found = found_spots(ctx, in, merged), *others = other_spots(ctx, in, &merged->alignment);
+  const int complete = found && others;
+  if (complete) {
+    api_supermesh_write(result->id, &in->request, merged, found, others, j->embed_ms, result->created, &json);
+  }
+  orb_free(ctx, found);
+  orb_free(ctx, others);
+  if (!complete) {
     return 0;
   }
-  api_supermesh_write(result->id, &in->request, merged, found, j->embed_ms, result->created, &json);
-  orb_free(ctx, found);
   if (json.failed) {
     api_text_free(&json);
     return api_refuse(problem, "no-memory", "The server has no memory left; try again later.");

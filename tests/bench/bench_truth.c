@@ -354,6 +354,21 @@ static void write_confidence(const orb_alignment *alignment, api_text *line) {
   }
 }
 
+/* What the match of the shapes is judged by; null where none was searched. */
+static void write_match(const orb_alignment *alignment, api_text *line) {
+  api_json_key(line, "match");
+  if (!alignment->match.is_measured) {
+    api_text_add(line, "null");
+    return;
+  }
+  api_json_open(line, '{');
+  api_json_member_number(line, "bend", alignment->match.bend);
+  api_json_member_number(line, "clear", alignment->match.clear);
+  api_json_member_number(line, "confidence", alignment->match.confidence);
+  api_json_member_integer(line, "alternatives", alignment->alternative_count);
+  api_json_close(line, '}');
+}
+
 static int write_measures(truth_run *run, api_text *line) {
   const orb_alignment *alignment = &run->result->alignment;
   int fine = 1;
@@ -368,6 +383,7 @@ static int write_measures(truth_run *run, api_text *line) {
                                 run->result->supermesh.flipped);
     api_json_member_number(line, "energy", alignment->energy);
     write_confidence(alignment, line);
+    write_match(alignment, line);
     api_json_member_number(line, "distortion_median", run->result->pairs[0].distortion.symmetric_dirichlet.median);
     write_inverted(run, line);
     fine = write_dense(run, line) && write_held_out(run, line) && write_halfway(run, "halfway", ORB_FIT_NONE, line) &&

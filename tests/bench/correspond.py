@@ -115,7 +115,7 @@ def measure(program, pair, given, change, options):
             "diagonal": [round(100 * math.dist(targets[i], image) / second.diagonal, 3)
                          for i, image in zip(held, images)],
             "parts": [places[i][2] for i in held], "cpu": round(cpu, 2), "energy": line["energy"],
-            "confidence": line.get("confidence"), "halfway": line["halfway_fitted"]}
+            "confidence": line.get("confidence"), "match": line.get("match"), "halfway": line["halfway_fitted"]}
 
 
 def spread(places, count):
@@ -201,11 +201,13 @@ def groups(results):
 
 
 def confidence_rows(results):
-    """Of the maps whose confidence lies in a range: how many are right."""
+    """Of the maps whose confidence lies in a range: how many are right. Versions without a confidence of the match have
+    the mean of the found landmarks."""
     rows = []
     for name in dict.fromkeys(r[1] for r in results):
-        known = [(r[3]["confidence"], statistics.mean(r[3]["errors"]) <= RIGHT) for r in results
-                 if r[1] == name and r[2] == 0 and "failed" not in r[3] and r[3]["confidence"] is not None]
+        good = [r[3] for r in results if r[1] == name and r[2] == 0 and "failed" not in r[3]]
+        pairs = [((r.get("match") or r)["confidence"], statistics.mean(r["errors"]) <= RIGHT) for r in good]
+        known = [pair for pair in pairs if pair[0] is not None]
         for low in range(0, 10):
             inside = [right for value, right in known if low / 10 <= value < low / 10 + 0.1 or value == 1 and low == 9]
             if inside:

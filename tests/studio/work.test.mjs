@@ -437,6 +437,34 @@ test('landmarks are found', async () => {
   await done();
 });
 
+test('a match that is not sure is called so, and the next one is another morph', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
+  await morph(page);
+  await page.getByText('Shown: the default morph.').waitFor();
+  const shown = () => page.url().match(/r=([0-9a-f]{64})/)?.[1];
+  const first = await json(daemon.url, `/v1/supermeshes/${shown()}`);
+  const said = page.getByRole('status', { name: 'How sure the match is' });
+  assert.equal(first.match.verdict, 'unsure');
+  assert.match(await said.textContent(), /^Not sure: /);
+  assert.doesNotMatch(await page.locator('.report').first().textContent(), /exact/, 'no landmarks were given');
+  const { id } = await fetch(`${daemon.url}/v1/supermeshes`, {
+    method: 'POST',
+    headers: { 'content-type': 'application/json', prefer: 'wait=60' },
+    body: JSON.stringify(first.alternatives[0].request),
+  }).then((reply) => reply.json());
+  await button(page, 'Next match').click();
+  await until(() => shown() === id, 'the first alternative is shown');
+  await until(async () => /^Match 2 of /.test(await said.textContent()), 'it is called the second');
+  assert.doesNotMatch(await page.locator('.report').first().textContent(), /exact/, 'its landmarks were found');
+  for (let i = 0; i < first.alternatives.length; i++) {
+    await button(page, 'Next match').click();
+    await until(async () => !(await button(page, 'Next match').isDisabled()), 'the next one is shown');
+  }
+  await until(() => shown() === first.id, 'after the last comes the first');
+  await done();
+});
+
 test('a job continues when the page is closed, and is found again', async () => {
   const first = await openPage(browser, daemon.url);
   await addFiles(first.page, sample('giraffe.off'), sample('elephant.ply'));

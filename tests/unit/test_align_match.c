@@ -79,6 +79,46 @@ static void limbs_go_to_limbs(void **state) {
   }
 }
 
+/* Further maps of a creature with five unlike limbs come by rising cost, and no two of all maps pair the same
+ * vertices. */
+static void others_differ(void **state) {
+  (void)state;
+  orb_context *ctx;
+  orb_match match;
+  assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
+  orb_mesh a = creature_of(ctx, reach, 3, 0), b = creature_of(ctx, reach, 4, 1);
+  assert_int_equal(orb_match_find(ctx, &a, &b, &match), ORB_OK);
+  assert_in_range(match.other_count, 1, ORB_MATCH_OTHERS);
+  double before = 1;
+  for (int i = 0; i < match.other_count; i++) {
+    const orb_match_other *other = &match.other[i];
+    assert_true(other->cost >= before);
+    before = other->cost;
+    assert_true(other->pairs.count >= 3);
+    assert_memory_not_equal(&other->pairs, &match.pairs, sizeof match.pairs);
+    for (int k = 0; k < i; k++) {
+      assert_memory_not_equal(&other->pairs, &match.other[k].pairs, sizeof match.pairs);
+    }
+  }
+  assert_true(fabs(match.clear - (1 - 1 / match.other[0].cost)) < 1e-12);
+  orb_match_free(ctx, &match);
+  shape_free(ctx, &a);
+  shape_free(ctx, &b);
+  orb_context_destroy(ctx);
+}
+
+/* Confidence rises with the lead of the best map and falls with its bend and its energy. The odds of 3 + 1.5 are those
+ * of a rigid match far ahead. */
+static void confidence_is_monotone(void **state) {
+  (void)state;
+  assert_true(fabs(orb_match_confidence(0, 0.9, 1) - 1 / (1 + exp(-4.5))) < 1e-12);
+  assert_true(orb_match_confidence(0.05, 0.3, 1.1) > orb_match_confidence(0.05, 0.1, 1.1));
+  assert_true(orb_match_confidence(0.05, 0.3, 1.1) > orb_match_confidence(0.1, 0.3, 1.1));
+  assert_true(orb_match_confidence(0.05, 0.3, 1.1) > orb_match_confidence(0.05, 0.3, 1.2));
+  assert_true(orb_match_confidence(0.05, 0.3, NAN) < 0.01);
+  assert_true(orb_match_confidence(0.05, 0.3, INFINITY) < 0.01);
+}
+
 /* The landmark of a list of vertices that is nearest in space. */
 static int nearest_of(const orb_mesh *mesh, const int32_t *list, int count, int32_t v) {
   int best = 0;
@@ -123,10 +163,10 @@ static void assert_match(const char *first, const char *second, int marks, const
     assert_true(shared_mesh(ctx, second, &mesh[1]));
     assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], &best), ORB_OK);
     int tips = 0;
-    for (int k = 0; k < best.count; k++) {
-      int at = nearest_of(&mesh[0], mark[0], marks, best.first[k]);
-      if (is_at(&mesh[0], mark[0][at], best.first[k])) {
-        assert_int_equal(nearest_of(&mesh[1], mark[1], marks, best.second[k]), at);
+    for (int k = 0; k < best.pairs.count; k++) {
+      int at = nearest_of(&mesh[0], mark[0], marks, best.pairs.first[k]);
+      if (is_at(&mesh[0], mark[0][at], best.pairs.first[k])) {
+        assert_int_equal(nearest_of(&mesh[1], mark[1], marks, best.pairs.second[k]), at);
         tips++;
       }
     }
@@ -158,7 +198,8 @@ static void cow_to_animal(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs), cmocka_unit_test(man_to_armadillo),
+  const struct CMUnitTest tests[] = {cmocka_unit_test(limbs_go_to_limbs), cmocka_unit_test(others_differ),
+                                     cmocka_unit_test(confidence_is_monotone), cmocka_unit_test(man_to_armadillo),
                                      cmocka_unit_test(cow_to_animal)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -186,17 +186,17 @@ static void a_copy_is_matched(void **state) {
   assert_int_equal(orb_match_find(ctx, &a, &b, &match), ORB_OK);
   assert_true(match.is_found);
   assert_true(match.cost < 0.1);
-  assert_true(match.count >= 6);
+  assert_true(match.pairs.count >= 6);
   for (int32_t v = 0; v < b.vertex_count; v++) {
     const double *p = b.positions + 3 * (size_t)v;
     const double truth[3] = {p[2] / 10, (p[0] - 5) / 10, p[1] / 10};
     sum += distance(match.target + 3 * (size_t)v, truth) / b.vertex_count;
   }
   assert_true(sum < 0.02 * extent.diagonal);
-  for (int32_t k = 0; k < match.count; k++) {
-    const double *p = b.positions + 3 * (size_t)match.second[k];
+  for (int32_t k = 0; k < match.pairs.count; k++) {
+    const double *p = b.positions + 3 * (size_t)match.pairs.second[k];
     const double truth[3] = {p[2] / 10, (p[0] - 5) / 10, p[1] / 10};
-    assert_true(distance(a.positions + 3 * (size_t)match.first[k], truth) < 0.08 * extent.diagonal);
+    assert_true(distance(a.positions + 3 * (size_t)match.pairs.first[k], truth) < 0.08 * extent.diagonal);
   }
   orb_match_free(ctx, &match);
   shape_free(ctx, &a);
@@ -213,7 +213,9 @@ static void threads_change_nothing(void **state) {
   assert_int_equal(orb_match_find(ctx, &a, &b, &one), ORB_OK);
   assert_int_equal(orb_match_find(three, &a, &b, &other), ORB_OK);
   assert_true(one.is_found && other.is_found);
-  assert_int_equal(one.count, other.count);
+  assert_memory_equal(&one.pairs, &other.pairs, sizeof one.pairs);
+  assert_int_equal(one.other_count, other.other_count);
+  assert_memory_equal(one.other, other.other, sizeof one.other);
   assert_memory_equal(&one.cost, &other.cost, sizeof one.cost);
   assert_memory_equal(&one.clear, &other.clear, sizeof one.clear);
   assert_memory_equal(one.target, other.target, 3 * (size_t)b.vertex_count * sizeof *one.target);

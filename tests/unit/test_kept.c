@@ -42,6 +42,11 @@ static void check_same(const orb_alignment *a, const orb_alignment *b) {
   assert_int_equal(a->landmark_count, b->landmark_count);
   assert_int_equal(a->found_count, b->found_count);
   assert_memory_equal(&a->energy, &b->energy, sizeof a->energy); /* also NaN */
+  assert_memory_equal(&a->match, &b->match, sizeof a->match);
+  assert_int_equal(a->alternative_count, b->alternative_count);
+  if (a->alternative_count > 0) {
+    check_equal(a->alternatives, b->alternatives, (size_t)a->alternative_count, sizeof(orb_alternative));
+  }
   for (size_t i = 0; i < found * shapes; i++) {
     assert_int_equal(a->found[i].triangle, b->found[i].triangle);
     assert_memory_equal(a->found[i].at, b->found[i].at, sizeof a->found[i].at);

@@ -378,6 +378,23 @@ export type Supermesh = {
     /** From 0 to 1. */
     confidence: number | null;
   }>;
+  /** How far the correspondence that orbmorph found may be relied on; of several shapes, the worst. Absent if the request gives landmarks or its alignment only rotates. docs/bench-confidence.md says how it is calibrated. */
+  match?: {
+    /** From 0 to 1: of the calibrated matches like this one, the share that was right. */
+    confidence: number;
+    /** `sure` from a confidence of 0.8 on, `likely` from 0.5 on, else `unsure`. */
+    verdict: 'sure' | 'likely' | 'unsure';
+    /** From 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs. */
+    clear: number;
+    /** How much the best rough map bends the shapes: 0 for a rigid motion. */
+    bend: number;
+  };
+  /** Other correspondences that the search considered, the best first; empty unless a correspondence of two shapes was found. Absent if an older engine made the supermesh. */
+  alternatives?: Array<{
+    /** How much its rough map bends the shapes, as a multiple of the chosen one's. */
+    cost: number;
+    request: CanonicalRequest;
+  }>;
   certificate: {
     closed: boolean;
     genus: number;

@@ -84,9 +84,16 @@ export interface Running {
   fast: { job: Job | null; abort: AbortController; ended: Promise<void> } | null;
 }
 
+/** The requests of a morph that was matched without landmarks and of its alternatives, and which of them is shown. */
+export interface Matches {
+  requests: SupermeshRequest[];
+  at: number;
+}
+
 export interface Result {
   supermesh: Supermesh;
   request: SupermeshRequest | null;
+  matches: Matches | null;
   data: Pick<MorphData, 'times' | 'weights' | 'shapes' | 'names' | 'vertices' | 'triangles'>;
   main: Model;
   each: Model[];

@@ -26,7 +26,8 @@ typedef struct trial {
   orb_rough_map map[2];
   orb_elastic_pose pose[2];
   double bend[2];
-  double cost; /* INFINITY: dropped */
+  double rough; /* cost in the first direction alone */
+  double cost;  /* INFINITY: dropped, since its rough cost is too far behind */
 } trial;
 
 /* How a shape is scaled: to area 4π, around the middle of its box. */
@@ -213,6 +214,7 @@ static orb_status rank(search *t) {
     for (int32_t i = 0; i < t->count; i++) {
       if (t->trial[i].cost < INFINITY) {
         fill_cost(t, &t->trial[i], direction + 1);
+        t->trial[i].rough = direction == 0 ? t->trial[i].cost : t->trial[i].rough;
       }
     }
     double most = ORB_FIND_BEHIND * t->trial[best_of(t)].cost;
@@ -235,19 +237,42 @@ static double difference(const search *t, const trial *x, const trial *y) {
   return sum / extent.diagonal;
 }
 
-static double clear_of(const search *t, int32_t best) {
-  double next = INFINITY;
-  for (int32_t i = 0; i < t->count; i++) {
-    const trial *one = &t->trial[i];
-    if (one->cost < next && difference(t, one, &t->trial[best]) > ORB_FIND_DIFFERENT) {
-      next = one->cost;
+/* Whether a trial takes the first copy elsewhere than all trials of the list. */
+static int is_different(const search *t, const trial *one, const int32_t *list, int32_t count) {
+  for (int32_t i = 0; i < count; i++) {
+    if (!(difference(t, one, &t->trial[list[i]]) > ORB_FIND_DIFFERENT)) {
+      return 0;
     }
   }
-  return next < INFINITY ? 1 - t->trial[best].cost / next : ORB_FIND_CLEAR_ALONE;
+  return 1;
 }
 
-/* Vertices spread over the first shape, and those nearest to where they go. */
-static orb_status write_pairs(const search *t, const trial *best, orb_match *out) {
+/* Dropped trials come last, by their rough cost. */
+static int is_before(const trial *x, const trial *y) {
+  return x->cost < INFINITY || y->cost < INFINITY ? x->cost < y->cost : x->rough < y->rough;
+}
+
+/* The best trial and, in order, those that differ from it and from each other. Returns how many. */
+static int32_t list_different(const search *t, int32_t out[1 + ORB_MATCH_OTHERS]) {
+  int32_t count = 1;
+  out[0] = best_of(t);
+  while (count < 1 + ORB_MATCH_OTHERS) {
+    int32_t next = -1;
+    for (int32_t i = 0; i < t->count; i++) {
+      if ((next < 0 || is_before(&t->trial[i], &t->trial[next])) && is_different(t, &t->trial[i], out, count)) {
+        next = i;
+      }
+    }
+    if (next < 0) {
+      break;
+    }
+    out[count++] = next;
+  }
+  return count;
+}
+
+/* Vertices spread over the first shape, and those nearest to where a trial takes them. */
+static orb_status write_pairs(const search *t, const trial *one, orb_match_pairs *out) {
   const orb_coarse_copy *copy = t->copy;
   int32_t sample[ORB_MATCH_PAIRS];
   orb_nearest *tree;
@@ -256,7 +281,7 @@ static orb_status write_pairs(const search *t, const trial *best, orb_match *out
       orb_nearest_create(t->ctx, copy[1].mesh.positions, copy[1].mesh.triangles, copy[1].mesh.triangle_count, &tree));
   for (int i = 0; i < ORB_MATCH_PAIRS; i++) {
     orb_place place;
-    (void)orb_nearest_query(tree, best->pose[0].position + 3 * (size_t)sample[i], INFINITY, &place);
+    (void)orb_nearest_query(tree, one->pose[0].position + 3 * (size_t)sample[i], INFINITY, &place);
     int32_t first = copy[0].vertex[sample[i]];
     int32_t second = copy[1].vertex[orb_map_nearest_corner(copy[1].mesh.triangles, &place)];
     int is_new = 1;
@@ -270,6 +295,24 @@ static orb_status write_pairs(const search *t, const trial *best, orb_match *out
   }
   orb_nearest_destroy(t->ctx, tree);
   return ORB_OK;
+}
+
+/* The best trial and the others, but not the targets. */
+static orb_status write_ranking(const search *t, orb_match *out) {
+  int32_t list[1 + ORB_MATCH_OTHERS], count = list_different(t, list);
+  const trial *best = &t->trial[list[0]];
+  double cost = 1;
+  out->cost = best->cost;
+  out->bend = (best->bend[0] + best->bend[1]) / 2;
+  for (int32_t i = 1; i < count; i++) {
+    const trial *one = &t->trial[list[i]];
+    orb_match_other *other = &out->other[out->other_count++];
+    cost = fmax(cost, one->cost < INFINITY ? one->cost / best->cost : one->rough / best->rough);
+    other->cost = cost;
+    ORB_TRY(write_pairs(t, one, &other->pairs));
+  }
+  out->clear = count > 1 ? 1 - 1 / out->other[0].cost : ORB_FIND_CLEAR_ALONE;
+  return write_pairs(t, best, &out->pairs);
 }
 
 static void pose_free(orb_context *ctx, orb_elastic_pose *pose) {
@@ -330,9 +373,7 @@ static orb_status run(search *t, orb_match *out) {
     return ORB_OK;
   }
   out->is_found = 1;
-  out->cost = t->trial[best].cost;
-  out->clear = clear_of(t, best);
-  ORB_TRY(write_pairs(t, &t->trial[best], out));
+  ORB_TRY(write_ranking(t, out));
   return write_targets(t, &t->trial[best], out);
 }
 
@@ -363,4 +404,13 @@ orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mes
 void orb_match_free(orb_context *ctx, orb_match *match) {
   orb_free(ctx, match->target);
   memset(match, 0, sizeof *match);
+}
+
+double orb_match_confidence(double bend, double clear, double energy) {
+  if (!(energy >= 1) || !isfinite(energy)) { /* rounding of an isometry, or not measured: as if the map were bad */
+    energy = energy < 1 ? 1 : ORB_FIND_SURE_UNMEASURED;
+  }
+  double odds = ORB_FIND_SURE + ORB_FIND_SURE_CLEAR * fmin(clear, ORB_FIND_CLEAR) - ORB_FIND_SURE_BEND * bend -
+                ORB_FIND_SURE_ENERGY * log(energy);
+  return 1 / (1 + exp(-odds));
 }

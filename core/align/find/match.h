@@ -21,14 +21,30 @@
 
 #include "orbmorph/mesh.h"
 
-enum { ORB_MATCH_PAIRS = 12 }; /* most pairs of a match */
+enum {
+  ORB_MATCH_PAIRS = 12, /* most pairs of a match */
+  ORB_MATCH_OTHERS = 4  /* most maps that are listed beside the best one */
+};
+
+/* Pairs of vertices that correspond roughly; the ends of limbs come first. */
+typedef struct orb_match_pairs {
+  int32_t count;
+  int32_t first[ORB_MATCH_PAIRS], second[ORB_MATCH_PAIRS];
+} orb_match_pairs;
+
+typedef struct orb_match_other {
+  double cost; /* as a multiple of the best map's: at least 1. From one direction alone where that dropped the map */
+  orb_match_pairs pairs;
+} orb_match_other;
 
 typedef struct orb_match {
-  int is_found;  /* 0: a shape has too few vertices, or no map was found; nothing else is filled then */
-  double cost;   /* of the best map: how much it bends, times 1 to 1 + ORB_FIND_TURN_COST for its rotation in space */
-  double clear;  /* 0 to 1: how far the next best map that differs is behind */
-  int32_t count; /* of pairs of vertices that correspond roughly; the ends of limbs come first */
-  int32_t first[ORB_MATCH_PAIRS], second[ORB_MATCH_PAIRS];
+  int is_found; /* 0: a shape has too few vertices, or no map was found; nothing else is filled then */
+  double bend;  /* how much the best map bends, the mean of both directions: 0 for a rigid motion */
+  double cost;  /* its bend, times 1 to 1 + ORB_FIND_TURN_COST for its rotation in space */
+  double clear; /* 0 to 1: how far the next best map that differs is behind */
+  orb_match_pairs pairs;
+  int32_t other_count; /* maps that differ from the best one and from each other by more than ORB_FIND_DIFFERENT */
+  orb_match_other other[ORB_MATCH_OTHERS]; /* by rising cost */
   double *target; /* where each vertex of the second shape lies on the first one, in its space: 3 a vertex */
 } orb_match;
 
@@ -36,6 +52,9 @@ typedef struct orb_match {
  * same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          orb_match *out);
+/* The confidence in a match, 0 to 1, from its bend, its `clear` and the energy of the map that followed it: the share
+ * of right ones among calibrated matches like it (docs/bench-confidence.md). */
+double orb_match_confidence(double bend, double clear, double energy);
 void orb_match_free(orb_context *ctx, orb_match *match);
 
 #endif

@@ -30,7 +30,7 @@ static const double ORB_FIND_SPECTRAL_BEHIND = 0.8;
 /* A map that bends this many times as much as the best one in one direction does not win by the other direction: these
  * differ by a factor of 1.5 where the map is right. */
 static const double ORB_FIND_BEHIND = 2;
-/* What `clear` is where all other maps were dropped or are the same. */
+/* What `clear` is where all other maps are the same. */
 static const double ORB_FIND_CLEAR_ALONE = 0.5;
 
 /* Of the diagonal: mean distance of the images of vertices under two maps. Nearer ones count as one correspondence and
@@ -45,5 +45,13 @@ enum { ORB_FIND_PATCH = 64 };
 /* orb_match.clear (0 to 1) from which no confidence falls. Below, all fall in proportion: a second candidate is
  * then nearly as good. */
 static const double ORB_FIND_CLEAR = 0.5;
+
+/* Confidence in a match (match.c): 1 / (1 + exp(−odds)), where the odds, a natural logarithm, are these weights of 1,
+ * of orb_match.clear (at most ORB_FIND_CLEAR), of orb_match.bend and of ln(energy of the composed map); the last two
+ * lower them. Fitted by logistic regression with a weak ridge to 21 pairs of people and animals of the half `choose`, 3
+ * of them wrong, and rounded. docs/bench-confidence.md has the pairs, and the half `report`. */
+static const double ORB_FIND_SURE = 3, ORB_FIND_SURE_CLEAR = 3, ORB_FIND_SURE_BEND = 7, ORB_FIND_SURE_ENERGY = 10;
+/* The energy that a map whose energy is not known is taken to have: a bad one's. */
+static const double ORB_FIND_SURE_UNMEASURED = 10;
 
 #endif

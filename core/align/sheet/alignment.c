@@ -14,5 +14,6 @@ void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
   orb_free(ctx, alignment->found);
   orb_free(ctx, alignment->confidence);
   orb_free(ctx, alignment->found_points);
+  orb_free(ctx, alignment->alternatives);
   memset(alignment, 0, sizeof *alignment);
 }

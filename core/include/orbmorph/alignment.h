@@ -45,7 +45,23 @@ typedef struct orb_aligned_shape {
   int32_t *landmark_vertices; /* landmark_count: the vertex of each landmark */
 } orb_aligned_shape;
 
-enum { ORB_FOUND_MAX = 12 };
+enum { ORB_FOUND_MAX = 12, ORB_ALTERNATIVES_MAX = 4, ORB_ALTERNATIVE_PAIRS = 12 };
+
+/* Another correspondence of two shapes that the search without landmarks considered. Its places lead to it if they are
+ * given as landmarks. They are found, so they are only roughly at the same features. */
+typedef struct orb_alternative {
+  double cost; /* how much its rough map bends the shapes, as a multiple of the best one's: at least 1 */
+  int32_t count;
+  orb_place at[2 * ORB_ALTERNATIVE_PAIRS]; /* count × 2 places, on the given meshes */
+} orb_alternative;
+
+/* What the search without landmarks knows of the correspondence that it chose; of several shapes, the worst. */
+typedef struct orb_match_facts {
+  int32_t is_measured; /* 0: landmarks were given, the preset is fast, or no rough map was found */
+  double bend;         /* of the best rough map: 0 for a rigid motion */
+  double clear;        /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs */
+  double confidence; /* 0 to 1: the share of right matches among calibrated ones like this (docs/bench-confidence.md) */
+} orb_match_facts;
 
 typedef struct orb_alignment {
   int32_t shape_count, landmark_count;
@@ -60,9 +76,12 @@ typedef struct orb_alignment {
                          is nearly as good. It does not say whether the right parts were matched */
   double energy;      /* symmetric Dirichlet energy of the composed maps, capped for each triangle and weighted by area;
                          lower is better; NaN if not measured */
+  orb_match_facts match;
+  int32_t alternative_count; /* at most ORB_ALTERNATIVES_MAX, by rising cost; none unless there are two shapes */
+  orb_alternative *alternatives;
 } orb_alignment;
 
-/* Frees the shapes and the found landmarks, and zeroes the struct. */
+/* Frees the shapes, the found landmarks and the alternatives, and zeroes the struct. */
 ORB_API void orb_alignment_free(orb_context *ctx, orb_alignment *alignment);
 
 #ifdef __cplusplus

@@ -12,6 +12,7 @@ import {
   tint,
   toast,
   wireLandmarks,
+  type Matches,
   type Result,
   type Running,
 } from '../state';
@@ -56,6 +57,31 @@ export async function startMerge(purpose: Running['purpose'] = 'morph') {
       client.merge(request, { signal: running.abort.signal, onJob: progress(running), onProgress: progress(running) }),
     request,
   );
+}
+
+/** Sends the next match of the shown morph, after the last one the first again. */
+export async function nextMatch() {
+  const matches = state.result?.matches;
+  if (state.running || !matches) return;
+  const next = { ...matches, at: (matches.at + 1) % matches.requests.length };
+  const running: Running = { purpose: 'morph', job: null, abort: new AbortController(), fast: null };
+  set({ running, problem: null });
+  const request = next.requests[next.at];
+  await follow(
+    running,
+    () =>
+      client.merge(request, { signal: running.abort.signal, onJob: progress(running), onProgress: progress(running) }),
+    request,
+    next,
+  );
+}
+
+/** The requests of a morph that was matched without landmarks, and of its alternatives. */
+function matchesOf(supermesh: Supermesh): Matches | null {
+  const others = supermesh.alternatives ?? [];
+  return others.length && supermesh.request
+    ? { requests: [supermesh.request, ...others.map(({ request }) => request)], at: 0 }
+    : null;
 }
 
 /** Shows the fast morph when it is done. Resolves once the daemon has its job, which then comes first in the queue. */
@@ -112,7 +138,12 @@ const progress = (running: Running) => (job: Job) => {
   set();
 };
 
-async function follow(running: Running, get: () => Promise<Supermesh>, request: SupermeshRequest | null) {
+async function follow(
+  running: Running,
+  get: () => Promise<Supermesh>,
+  request: SupermeshRequest | null,
+  matches: Matches | null = null,
+) {
   try {
     const supermesh = await get();
     running.fast?.abort.abort();
@@ -120,7 +151,7 @@ async function follow(running: Running, get: () => Promise<Supermesh>, request: 
     else if (state.result && isFast(state.result)) {
       await openResult(supermesh, request ?? supermesh.request ?? null, { keep: true });
     } else {
-      await openResult(supermesh, request ?? supermesh.request ?? null);
+      await openResult(supermesh, request ?? supermesh.request ?? null, { matches });
       set({ tab: 'morph', show: 'morph' });
       player.play();
     }
@@ -162,12 +193,12 @@ export function cancelMerge() {
 
 /**
  * Shows a morph. `keep`: in place of the shown one, with its time, mixture and view. `signal`: if aborted meanwhile,
- * nothing changes.
+ * nothing changes. `matches`: those among which it is one; by default those that its answer lists.
  */
 export async function openResult(
   supermesh: Supermesh,
   request: SupermeshRequest | null,
-  { keep = false, signal }: { keep?: boolean; signal?: AbortSignal } = {},
+  { keep = false, signal, matches = null }: { keep?: boolean; signal?: AbortSignal; matches?: Matches | null } = {},
 ) {
   if (!keep) set({ loading: 'Loading the morph' });
   try {
@@ -183,6 +214,7 @@ export async function openResult(
     const result: Result = {
       supermesh,
       request,
+      matches: matches ?? matchesOf(supermesh),
       main: models[0],
       each: models.slice(1),
       data: {

@@ -3,7 +3,7 @@ import { useEffect, useRef } from 'preact/hooks';
 import { isFast, isWaiting, presetOf, set, state, tint, toast, type Result } from '../state';
 import { save } from '../actions/landmarks';
 import { explain } from '../actions/token';
-import { measureErrors } from '../actions/merge';
+import { measureErrors, nextMatch } from '../actions/merge';
 import { player } from '../player';
 import { client } from '../state';
 import { type RAMPS, rampCss } from '../view/colors';
@@ -183,6 +183,41 @@ function Shown({ result }: { result: Result }) {
   );
 }
 
+/** Whether the landmarks of a morph were set, not found. */
+function wereGiven({ supermesh }: Result) {
+  const given = supermesh.request?.landmarks;
+  return Array.isArray(given) && given.every((landmark) => landmark.confidence === 1);
+}
+
+/** How sure the match of the shapes is, and a way to the next one. */
+function Match({ result }: { result: Result }) {
+  const { matches, supermesh } = result;
+  const verdict = supermesh.match?.verdict;
+  const said =
+    verdict === 'unsure'
+      ? 'Not sure: the shapes may be matched wrongly. Look at it, try the next match, or set landmarks.'
+      : verdict === 'likely'
+        ? 'The shapes are likely matched rightly. Look at it before you rely on it.'
+        : matches && matches.at > 0
+          ? `Match ${matches.at + 1} of ${matches.requests.length}; the first one was the best.`
+          : '';
+  if (!said && !matches) return null;
+  return (
+    <div class="match">
+      {said && (
+        <p class="hint" role="status" aria-label="How sure the match is">
+          {said}
+        </p>
+      )}
+      {matches && (
+        <Button disabled={!!state.running} onClick={() => void nextMatch()}>
+          Next match
+        </Button>
+      )}
+    </div>
+  );
+}
+
 function Download({ result }: { result: Result }) {
   const { supermesh } = result;
   if (isWaiting())
@@ -221,11 +256,12 @@ export function MorphInspector() {
       </>
     );
   const { supermesh } = result;
-  const exact = supermesh.certificate?.landmarks_exact;
+  const exact = supermesh.certificate?.landmarks_exact && wereGiven(result);
   return (
     <>
       <h2>Morph</h2>
       <Shown result={result} />
+      <Match result={result} />
       <Segments
         label="What is shown"
         value={state.show}

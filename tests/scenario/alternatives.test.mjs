@@ -1,0 +1,127 @@
+// Without landmarks the answer says how sure the match is, and lists other matches as requests that can be sent.
+import assert from 'node:assert/strict';
+import { readFile, writeFile } from 'node:fs/promises';
+import path from 'node:path';
+import test from 'node:test';
+import { folder, run } from './support/cli.mjs';
+import { daemon, samples } from './support/daemon.mjs';
+import { morphOf } from './support/glb.mjs';
+import { ball, egg, obj } from './support/shapes.mjs';
+
+// A ball with three unlike knobs.
+const knobs = [
+  [[1, 0, 0], 1.6],
+  [[-0.6, 0.8, 0], 1.2],
+  [[0, -0.8, 0.6], 0.9],
+];
+const knobbed = (levels, by) =>
+  ball(levels, (p) => {
+    const r = knobs.reduce(
+      (sum, [q, far]) => sum + by * far * Math.exp(-15 * (1 - p.reduce((s, x, k) => s + x * q[k], 0))),
+      1,
+    );
+    return p.map((x) => r * x);
+  });
+
+async function upload(d, ...bodies) {
+  const replies = [];
+  for (const body of bodies) replies.push(await d.upload(obj(body)));
+  return replies.map((reply, i) => ({ mesh: reply.json.id, name: `body ${i}` }));
+}
+
+const along = (triangle, weights, positions) =>
+  [0, 1, 2].map((k) => triangle.reduce((sum, v, i) => sum + weights[i] * positions[v][k], 0));
+const place = ({ triangle, barycentric }, { triangles, positions }) =>
+  along(triangles[triangle], barycentric, positions);
+
+/** How far apart a morph takes a place on the first shape and a place on the second, from the vertex next to the first. */
+async function gap(d, supermesh, from, to) {
+  const { shapes, count } = morphOf((await d.get(supermesh.asset)).bytes);
+  const at = (s, v) => shapes[s].slice(3 * v, 3 * v + 3);
+  const apart = (p, q) => Math.hypot(...p.map((x, k) => x - q[k]));
+  let best = 0;
+  for (let v = 1; v < count; v++) if (apart(at(0, v), from) < apart(at(0, best), from)) best = v;
+  return apart(at(1, best), to);
+}
+
+test('the request of an alternative is answered, with another map', async (t) => {
+  const d = await daemon(t);
+  const bodies = [knobbed(3, 1), knobbed(3, 0.8)];
+  const shapes = await upload(d, ...bodies);
+  const remesh = { method: 'adaptive', tolerance: 0.02 };
+  const asset = { fit: 'none', animation: 'none' };
+  const first = await d.made('/v1/supermeshes', { shapes, remesh, asset });
+  const { match, alternatives } = first;
+  assert.ok(match.confidence >= 0 && match.confidence <= 1);
+  assert.equal(match.verdict, match.confidence >= 0.8 ? 'sure' : match.confidence >= 0.5 ? 'likely' : 'unsure');
+  assert.ok(alternatives.length >= 1 && alternatives.length <= 4, `${alternatives.length}`);
+  let before = 1;
+  for (const { cost, request } of alternatives) {
+    assert.ok(cost >= before);
+    before = cost;
+    // the same request, but for the landmarks and the method that meets them
+    const { landmarks, align, ...others } = request;
+    const { landmarks: none, align: auto, ...asked } = first.request;
+    assert.deepEqual(others, asked);
+    assert.deepEqual([none, auto.method, align.method], ['auto', 'auto', 'pin']);
+    assert.ok(landmarks.length >= 3);
+    for (const l of landmarks) assert.ok(Math.abs(l.confidence - 1 / cost) < 1e-9, `${l.confidence} ${cost}`);
+  }
+  const reply = await d.post('/v1/supermeshes', alternatives[0].request, { headers: { prefer: 'wait=60' } });
+  assert.equal(reply.status, 200, reply.bytes.toString());
+  const other = reply.json;
+  assert.notEqual(other.id, first.id);
+  assert.equal(other.match, undefined);
+  assert.deepEqual(other.alternatives, []);
+  // The landmarks are met, and the first map takes one of them elsewhere.
+  assert.equal(other.landmarks.length, alternatives[0].request.landmarks.length);
+  for (const l of other.landmarks) for (const r of l.residual_relative) assert.ok(r < 1e-6, `${l.name}: ${r}`);
+  // A kept alignment has the same verdict and alternatives.
+  const kept = await d.made('/v1/supermeshes', { shapes, remesh: { ...remesh, tolerance: 0.03 }, asset });
+  assert.equal(kept.timings_ms.align, 0);
+  assert.deepEqual([kept.match, kept.alternatives.map((a) => a.cost)], [match, alternatives.map((a) => a.cost)]);
+  const places = alternatives[0].request.landmarks.map(({ at }) => at.map((p, s) => place(p, bodies[s])));
+  let most = 0;
+  for (const [from, to] of places) {
+    assert.ok((await gap(d, other, from, to)) < 0.05);
+    most = Math.max(most, await gap(d, first, from, to));
+  }
+  assert.ok(most > 0.5, `${most}`);
+});
+
+test('three shapes have a verdict and no alternatives; rotations alone have neither', async (t) => {
+  const d = await daemon(t);
+  const shapes = await upload(d, knobbed(2, 1), knobbed(2, 0.8), egg(2));
+  const remesh = { method: 'adaptive', tolerance: 0.05 };
+  const three = await d.made('/v1/supermeshes', { shapes, remesh });
+  assert.ok(three.match.confidence >= 0);
+  assert.deepEqual(three.alternatives, []);
+  const align = { method: 'auto', options: { preset: 'fast' } };
+  const fast = await d.made('/v1/supermeshes', { shapes: shapes.slice(0, 2), remesh, align });
+  assert.equal(fast.match, undefined);
+  assert.deepEqual(fast.alternatives, []);
+});
+
+test('the client says where a match is not sure, and calls only given landmarks exact', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const at = await folder(t);
+  const [out, md, marks] = ['morph.glb', 'report.md', 'landmarks.json'].map((name) => path.join(at, name));
+  const morph = async (...args) => {
+    const files = ['dog.obj', 'elephant.ply'].map((name) => path.join(samples, name));
+    const done = await run(['morph', ...files, '-o', out, '--report', md, '-t', '0.01', ...args], { env });
+    assert.equal(done.code, 0, done.err);
+    return done.out + (await readFile(md, 'utf8'));
+  };
+  const said = await morph();
+  assert.match(said, /match: unsure \(confidence 0\.[0-4]\d\)/);
+  assert.equal(said.match(/Not sure: the shapes may be matched wrongly/g).length, 2, 'printed and in the report');
+  assert.doesNotMatch(said, /exact/);
+  const [{ id }] = (await d.get('/v1/supermeshes')).json.supermeshes;
+  const { alternatives } = (await d.get(`/v1/supermeshes/${id}`)).json;
+  await writeFile(marks, JSON.stringify(alternatives[0].request.landmarks));
+  const guessed = await morph('--landmarks', marks);
+  assert.match(guessed, /landmarks, from a found match/);
+  assert.match(guessed, /The landmarks coincide\. They come from a match that orbmorph found\./);
+  assert.doesNotMatch(guessed, /exact|Not sure/);
+});
