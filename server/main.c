@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "admin/kinds.h"
+#include "backup.h"
 #include "control.h"
 #include "evict.h"
 #include "http/http.h"
@@ -104,16 +105,18 @@ static int take_signals(sigset_t *set) {
 
 enum { TICK_MS = 1000, EVICT_GRACE_MS = 5000 };
 
-/* Evicts derived objects beyond derived-bytes, after jobs succeeded, profiles were made, or when the last round could
- * not evict enough. Objects made or used in the last EVICT_GRACE_MS stay, so that a waiting client can fetch them. */
+/* Deletes what a backup kept. Evicts derived objects beyond derived-bytes, after jobs succeeded, profiles were made, or
+ * when the last round could not evict enough. Objects made or used in the last EVICT_GRACE_MS stay, so that a waiting
+ * client can fetch them. */
 static void keep_budget(const server *srv, int64_t *seen, int *over) {
   const int64_t budget = srv->options->derived_bytes;
+  const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
+  evict_held(&env);
   if (budget <= 0) {
     return;
   }
   int64_t succeeded = queue_ended(srv->q, API_JOB_SUCCEEDED) + __atomic_load_n(&srv->profiles_made, __ATOMIC_RELAXED);
   if (succeeded != *seen || *over) {
-    const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     *seen = succeeded;
@@ -424,7 +427,8 @@ int main(int argc, char **argv) {
     return sodium_init() < 0 ? 1 : (isolate_zygote(confined_work), 0);
   }
   const admin_kind *kind = argc > 1 ? admin_kind_named(admin_kinds, argv[1]) : NULL;
-  if (kind && !admin_command_read(&admin, kind, &argc, argv)) {
+  backup_command backup = {0};
+  if ((kind && !admin_command_read(&admin, kind, &argc, argv)) || !backup_command_read(&backup, &argc, argv)) {
     return 2;
   }
   config_action action = config_read(&options, argc, argv);
@@ -442,6 +446,9 @@ int main(int argc, char **argv) {
       puts("the configuration is valid");
       return 0;
     case CONFIG_RUN:
+      if (backup.run) {
+        return backup.run(backup.folder, &options);
+      }
       if (!admin.kind) {
         return run(&(command_line){argc, argv, &options});
       }

@@ -14,6 +14,37 @@ void resource_free(resource *r) {
   r->json = NULL;
 }
 
+resource_kind resource_of_object(object_kind kind) {
+  return kind == OBJECT_MESH        ? RESOURCE_MESH
+         : kind == OBJECT_SPHERE    ? RESOURCE_EMBEDDING
+         : kind == OBJECT_ALIGNMENT ? RESOURCE_ALIGNMENT
+                                    : RESOURCE_SUPERMESH;
+}
+
+int resource_objects(const resource *row, named_object out[RESOURCE_OBJECTS]) {
+  static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_KINDS,
+                                                    OBJECT_ALIGNMENT};
+  static const char *const profiles[PROFILES_STORED] = {"its profile \"quantized\"", "its profile \"meshopt\""};
+  int count = 0;
+  if (kinds[row->kind] != OBJECT_KINDS) {
+    out[count++] = (named_object){kinds[row->kind], "its object", row->sha};
+  }
+  /* Supermeshes of older engines have no aligned spheres; their descriptions do not name any. */
+  int spheres = row->kind == RESOURCE_SUPERMESH && strstr(row->json, "\"sphere\":") != NULL;
+  if (row->kind == RESOURCE_SUPERMESH && (row->places[0] || spheres)) {
+    out[count++] = (named_object){OBJECT_PLACES, "its places file", row->places};
+  }
+  if (spheres) {
+    out[count++] = (named_object){OBJECT_SPHERES, "its file of aligned spheres", ""};
+  }
+  for (int p = 0; p < PROFILES_STORED; p++) {
+    if (row->profiles[p][0]) {
+      out[count++] = (named_object){object_of_profile(p), profiles[p], row->profiles[p]};
+    }
+  }
+  return count;
+}
+
 int resource_insert(database *db, const resource *r) {
   sqlite3_stmt *st = database_statement(db,
                                         "INSERT INTO resource(kind, id, sha, json, bytes, created, used, places)"
