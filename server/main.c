@@ -300,6 +300,22 @@ static int start_outbox(server *srv, const deliver_options *options) {
   return srv->outbox != NULL;
 }
 
+/* A damaged catalogue would answer some requests and lose others: the service does not start on one. */
+static int check_catalogue(const server *srv) {
+  char why[512];
+  if (catalogue_quick_check(srv->cat, why, sizeof why)) {
+    return 1;
+  }
+  why[strcspn(why, "\n")] = 0;
+  log_error(
+      "the catalogue %s/catalogue.sqlite is damaged: %s. Restore a backup into a new folder (orbmorphd restore DIR "
+      "--data "
+      "NEW). Without a backup, keep a copy of the folder and save the readable rows with sqlite3 and its command "
+      ".recover",
+      srv->options->data, why);
+  return 0;
+}
+
 /* Starts all parts in order; 0 if one of them failed. */
 static int start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
@@ -332,7 +348,7 @@ static int start(server *srv, worker_pool **workers) {
   int listens = listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
   return listens && objects_open(o->data, &srv->store) == STORE_OK && catalogue_open(o->data, &srv->cat) == STORE_OK &&
-         (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
+         check_catalogue(srv) && (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
          (srv->descriptions = cache_create(CACHE_BYTES)) && (srv->io = tasks_start((int)o->io_threads)) &&
          (srv->checks = tasks_start((int)o->workers)) && (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&

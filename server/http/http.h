@@ -279,6 +279,9 @@ int reply_part(request *r, object_kind kind, const char *id, object_part part, c
                const char *disposition);
 int reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime,
                  const char *disposition);
+/* Whether the object may be sent: 1 once it has been verified, or found wrong and moved out of the store, where sending
+ * it answers 404. 0 outside a task: it has to be read. sha: see store/verify.h. */
+int object_is_ready(const request *r, object_kind kind, const char *sha);
 /* The asset of a supermesh in the profile of the request, if that is stored; releases the description. 0 without a
  * response if it is not, or a task is needed to compress it. */
 int reply_stored_asset(request *r, const cached *entry);

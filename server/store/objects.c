@@ -11,10 +11,14 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "faults.h"
+#include "hash.h"
 #include "log.h"
+#include "metrics.h"
+#include "store/marks.h"
 
 static const char *const folders[OBJECT_KINDS] = {"mesh",    "sphere",    "asset",   "places",
                                                   "spheres", "quantized", "meshopt", "alignment"};
@@ -31,6 +35,7 @@ struct objects {
   pthread_mutex_t deleting;
   int backup_lock; /* −1: none */
   held_object *held;
+  marks *verified;
   char root[PATH_MAX - 256];
   objects_remote remote; /* publish NULL: the store has files */
 };
@@ -104,7 +109,9 @@ static store_result make_folders(const objects *store) {
  */
 static objects *create(const char *data) {
   objects *store = calloc(1, sizeof *store);
-  if (!store || (data && snprintf(store->root, sizeof store->root, "%s", data) >= (int)sizeof store->root)) {
+  if (!store || !(store->verified = marks_create()) ||
+      (data && snprintf(store->root, sizeof store->root, "%s", data) >= (int)sizeof store->root)) {
+    marks_destroy(store ? store->verified : NULL);
     free(store);
     return NULL;
   }
@@ -171,6 +178,7 @@ void objects_close(objects *store) {
   if (store->backup_lock >= 0) {
     close(store->backup_lock);
   }
+  marks_destroy(store->verified);
   pthread_mutex_destroy(&store->deleting);
   pthread_rwlock_destroy(&store->publishing);
   free(store);
@@ -392,6 +400,55 @@ void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind
     }
     objects_let_go(store);
   }
+}
+
+static uint64_t hash_of(object_kind kind, const char *id) {
+  char text[80];
+  int n = snprintf(text, sizeof text, "%d %s", (int)kind, id);
+  return keyed_hash(text, n < (int)sizeof text ? (size_t)n : sizeof text - 1);
+}
+
+void objects_mark(objects *store, object_kind kind, const char *id) {
+  marks_add(store->verified, hash_of(kind, id));
+}
+
+int objects_is_marked(const objects *store, object_kind kind, const char *id) {
+  return marks_have(store->verified, hash_of(kind, id));
+}
+
+/* Moves the file aside if it still has the name: it may have been replaced since it was read. */
+static store_result move_aside(const char *path, const char *aside, int fd) {
+  struct stat read, named;
+  if (stat(path, &named) != 0 || fstat(fd, &read) != 0) {
+    return STORE_NOT_FOUND;
+  }
+  if (read.st_ino != named.st_ino) {
+    return STORE_OK;
+  }
+  return rename(path, aside) == 0 ? STORE_NOT_FOUND : failed("rename to", aside);
+}
+
+store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd) {
+  char path[PATH_MAX], aside[PATH_MAX], fields[160];
+  if (store->remote.publish) {
+    return STORE_NOT_FOUND; /* the daemon does it */
+  }
+  objects_path(store, kind, id, path);
+  snprintf(aside, sizeof aside, "%s/quarantine", store->root);
+  store_result result = make_folder(aside);
+  size_t n = strlen(aside);
+  snprintf(aside + n, sizeof aside - n, "/%s-%s-%lld", folders[kind], id, (long long)time(NULL));
+  if (result == STORE_OK) {
+    objects_exclude(store);
+    result = move_aside(path, aside, fd);
+    objects_let_go(store);
+  }
+  if (result == STORE_NOT_FOUND) {
+    metrics_quarantined();
+    snprintf(fields, sizeof fields, "\"object\":\"%s\",\"id\":\"%s\"", folders[kind], id);
+    log_write(LOG_ERROR, fields, "a stored file does not match its hash and was moved to %s", aside);
+  }
+  return result;
 }
 
 uint64_t objects_free_bytes(const objects *store) {

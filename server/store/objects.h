@@ -91,6 +91,13 @@ void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind
 int objects_backup_lock(const char *data);
 int objects_backup_runs(objects *store);
 
+/* For store/verify.h: marks of verified objects, in memory. */
+void objects_mark(objects *store, object_kind kind, const char *id);
+int objects_is_marked(const objects *store, object_kind kind, const char *id);
+/* Moves a wrong object, which was read through fd, out of the store. STORE_NOT_FOUND: done; STORE_OK: it has been
+ * replaced meanwhile. */
+store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd);
+
 /* Free bytes of the file system, for disk-reserve. */
 uint64_t objects_free_bytes(const objects *store);
 

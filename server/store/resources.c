@@ -243,13 +243,26 @@ int64_t catalogue_damaged(catalogue *cat) {
   return rows_integer(cat, db, st);
 }
 
-int catalogue_integrity(catalogue *cat) {
+/* The pragma's first row is "ok", or the first finding. */
+static int check_with(catalogue *cat, const char *pragma, char *why, size_t size) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "PRAGMA integrity_check");
-  int fine = st && sqlite3_step(st) == SQLITE_ROW && strcmp((const char *)sqlite3_column_text(st, 0), "ok") == 0;
+  sqlite3_stmt *st = database_statement(db, pragma);
+  snprintf(why, size, "it cannot be read");
   if (st) {
+    if (sqlite3_step(st) == SQLITE_ROW) {
+      row_text(st, 0, why, size);
+    }
     sqlite3_reset(st);
   }
   catalogue_reader_done(cat, db);
-  return fine;
+  return strcmp(why, "ok") == 0;
+}
+
+int catalogue_integrity(catalogue *cat) {
+  char why[256];
+  return check_with(cat, "PRAGMA integrity_check(1)", why, sizeof why);
+}
+
+int catalogue_quick_check(catalogue *cat, char *why, size_t size) {
+  return check_with(cat, "PRAGMA quick_check(1)", why, size);
 }
