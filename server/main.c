@@ -209,7 +209,7 @@ static int on_command(void *user, const char *line, api_text *reply) {
   int status = kind->apply(srv->cat, line, reply);
   if (status == 0 && !lists) {
     status = !reload_callers(srv);
-    log_info("%s %s: %s", kind->name, verb, name);
+    log_write(LOG_INFO, "\"audit\":\"command\"", "%s %s: %s", kind->name, verb, name);
   }
   return status;
 }
