@@ -78,3 +78,22 @@ int64_t evict_derived(const evict_env *env, int64_t budget, int64_t before) {
   }
   return total;
 }
+
+int evict_is_named(catalogue *cat, object_kind kind, const char *id) {
+  resource row = {0};
+  store_result found = catalogue_get(cat, resource_of_object(kind), id, &row);
+  int named = found != STORE_NOT_FOUND;
+  for (int p = 0; found == STORE_OK && p < PROFILES_STORED; p++) { /* a row names a profile by its hash */
+    named &= kind != object_of_profile(p) || row.profiles[p][0];
+  }
+  resource_free(&row);
+  return named;
+}
+
+static int is_named(void *cat, object_kind kind, const char *id) {
+  return evict_is_named(cat, kind, id);
+}
+
+void evict_held(const evict_env *env) {
+  objects_delete_held(env->store, is_named, env->cat);
+}

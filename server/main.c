@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "admin/kinds.h"
+#include "backup.h"
 #include "control.h"
 #include "evict.h"
 #include "http/http.h"
@@ -104,16 +105,18 @@ static int take_signals(sigset_t *set) {
 
 enum { TICK_MS = 1000, EVICT_GRACE_MS = 5000 };
 
-/* Evicts derived objects beyond derived-bytes, after jobs succeeded, profiles were made, or when the last round could
- * not evict enough. Objects made or used in the last EVICT_GRACE_MS stay, so that a waiting client can fetch them. */
+/* Deletes what a backup kept. Evicts derived objects beyond derived-bytes, after jobs succeeded, profiles were made, or
+ * when the last round could not evict enough. Objects made or used in the last EVICT_GRACE_MS stay, so that a waiting
+ * client can fetch them. */
 static void keep_budget(const server *srv, int64_t *seen, int *over) {
   const int64_t budget = srv->options->derived_bytes;
+  const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
+  evict_held(&env);
   if (budget <= 0) {
     return;
   }
   int64_t succeeded = queue_ended(srv->q, API_JOB_SUCCEEDED) + __atomic_load_n(&srv->profiles_made, __ATOMIC_RELAXED);
   if (succeeded != *seen || *over) {
-    const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     *seen = succeeded;
@@ -206,7 +209,7 @@ static int on_command(void *user, const char *line, api_text *reply) {
   int status = kind->apply(srv->cat, line, reply);
   if (status == 0 && !lists) {
     status = !reload_callers(srv);
-    log_info("%s %s: %s", kind->name, verb, name);
+    log_write(LOG_INFO, "\"audit\":\"command\"", "%s %s: %s", kind->name, verb, name);
   }
   return status;
 }
@@ -297,6 +300,22 @@ static int start_outbox(server *srv, const deliver_options *options) {
   return srv->outbox != NULL;
 }
 
+/* A damaged catalogue would answer some requests and lose others: the service does not start on one. */
+static int check_catalogue(const server *srv) {
+  char why[512];
+  if (catalogue_quick_check(srv->cat, why, sizeof why)) {
+    return 1;
+  }
+  why[strcspn(why, "\n")] = 0;
+  log_error(
+      "the catalogue %s/catalogue.sqlite is damaged: %s. Restore a backup into a new folder (orbmorphd restore DIR "
+      "--data "
+      "NEW). Without a backup, keep a copy of the folder and save the readable rows with sqlite3 and its command "
+      ".recover",
+      srv->options->data, why);
+  return 0;
+}
+
 /* Starts all parts in order; 0 if one of them failed. */
 static int start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
@@ -329,7 +348,7 @@ static int start(server *srv, worker_pool **workers) {
   int listens = listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
   return listens && objects_open(o->data, &srv->store) == STORE_OK && catalogue_open(o->data, &srv->cat) == STORE_OK &&
-         (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
+         check_catalogue(srv) && (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
          (srv->descriptions = cache_create(CACHE_BYTES)) && (srv->io = tasks_start((int)o->io_threads)) &&
          (srv->checks = tasks_start((int)o->workers)) && (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&
@@ -424,7 +443,8 @@ int main(int argc, char **argv) {
     return sodium_init() < 0 ? 1 : (isolate_zygote(confined_work), 0);
   }
   const admin_kind *kind = argc > 1 ? admin_kind_named(admin_kinds, argv[1]) : NULL;
-  if (kind && !admin_command_read(&admin, kind, &argc, argv)) {
+  backup_command backup = {0};
+  if ((kind && !admin_command_read(&admin, kind, &argc, argv)) || !backup_command_read(&backup, &argc, argv)) {
     return 2;
   }
   config_action action = config_read(&options, argc, argv);
@@ -442,6 +462,9 @@ int main(int argc, char **argv) {
       puts("the configuration is valid");
       return 0;
     case CONFIG_RUN:
+      if (backup.run) {
+        return backup.run(backup.folder, &options);
+      }
       if (!admin.kind) {
         return run(&(command_line){argc, argv, &options});
       }

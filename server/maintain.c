@@ -17,8 +17,6 @@ typedef struct tally {
   int remove_orphans;
 } tally;
 
-static const object_kind object_of[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_KINDS,
-                                                      OBJECT_ALIGNMENT};
 static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks", "alignment"};
 
 /* Verifies an object against its hash. wanted "": the row is of an older engine and has no hash; the object must only
@@ -41,23 +39,15 @@ static void verify_object(tally *t, const resource *row, object_kind kind, const
 }
 
 static void verify(tally *t, const resource *row) {
+  named_object named[RESOURCE_OBJECTS];
+  int count = resource_objects(row, named);
   t->rows++;
-  if (row->kind != RESOURCE_LANDMARKS) {
-    verify_object(t, row, object_of[row->kind], "its object", row->sha);
-  }
-  if (row->kind == RESOURCE_SUPERMESH && (row->places[0] || strstr(row->json, "\"sphere\":"))) {
-    verify_object(t, row, OBJECT_PLACES, "its places file", row->places);
-  }
-  /* Supermeshes of older engines have no aligned spheres; their descriptions do not name any. */
-  if (row->kind == RESOURCE_SUPERMESH && strstr(row->json, "\"sphere\":") &&
-      spheres_check(t->store, row->id) != STORE_OK) {
-    printf("supermesh %s: its aligned spheres are missing or damaged\n", row->id);
-    t->wrong++;
-  }
-  for (int p = 0; p < PROFILES_STORED; p++) {
-    if (row->profiles[p][0]) {
-      verify_object(t, row, object_of_profile(p), p == 0 ? "its profile \"quantized\"" : "its profile \"meshopt\"",
-                    row->profiles[p]);
+  for (int i = 0; i < count; i++) {
+    if (named[i].kind != OBJECT_SPHERES) {
+      verify_object(t, row, named[i].kind, named[i].what, named[i].sha);
+    } else if (spheres_check(t->store, row->id) != STORE_OK) {
+      printf("supermesh %s: its aligned spheres are missing or damaged\n", row->id);
+      t->wrong++;
     }
   }
 }
@@ -82,23 +72,13 @@ static void each_row(tally *t, resource_kind kind) {
 /* An object without a row is harmless: a crash between publishing and commit leaves one. */
 static void each_object(void *user, object_kind kind, const char *id, uint64_t size) {
   tally *t = user;
-  resource row = {0};
-  resource_kind owner = kind == OBJECT_MESH        ? RESOURCE_MESH
-                        : kind == OBJECT_SPHERE    ? RESOURCE_EMBEDDING
-                        : kind == OBJECT_ALIGNMENT ? RESOURCE_ALIGNMENT
-                                                   : RESOURCE_SUPERMESH;
   t->objects++;
-  int unknown = catalogue_get(t->cat, owner, id, &row) == STORE_NOT_FOUND;
-  for (int p = 0; p < PROFILES_STORED; p++) { /* a profile is the row's only once the row has its hash */
-    unknown |= kind == object_of_profile(p) && row.id[0] && !row.profiles[p][0];
-  }
-  if (unknown) {
+  if (!evict_is_named(t->cat, kind, id)) {
     t->orphans++;
     if (t->remove_orphans && objects_delete(t->store, kind, id) == STORE_OK) {
       printf("deleted object %s (%llu bytes), which has no row\n", id, (unsigned long long)size);
     }
   }
-  resource_free(&row);
 }
 
 static int open_both(const config *options, tally *t) {
@@ -163,6 +143,10 @@ static int forget_jobs(catalogue *cat, int64_t keep) {
 int maintain_gc(const config *options) {
   tally t = {.remove_orphans = 1};
   int fine = open_both(options, &t);
+  if (fine && objects_backup_runs(t.store)) {
+    puts("a backup of the data folder runs; run --gc after it");
+    fine = 0;
+  }
   if (fine) {
     fine = objects_each(t.store, each_object, &t) == STORE_OK && forget_jobs(t.cat, options->keep_jobs);
     if (options->derived_bytes > 0) {

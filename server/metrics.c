@@ -19,8 +19,8 @@ enum { STAGES = sizeof stages / sizeof stages[0] };
 enum { KINDS = 3 };
 static histogram jobs[KINDS], requests, staged[KINDS][STAGES];
 static const char *const kinds[KINDS] = {"embedding", "supermesh", "fetch"}; /* by api_job_kind */
-static atomic_llong job_failed[KINDS], cache[2], flips, statuses[6], received_bytes, sent_bytes, connections,
-    webhooks[2];
+static atomic_llong job_failed[KINDS], cache[2], flips, quarantined, statuses[6], received_bytes, sent_bytes,
+    connections, webhooks[2];
 
 static void observe(histogram *h, double seconds) {
   int i = 0;
@@ -52,6 +52,9 @@ void metrics_cache(int hit) {
 }
 void metrics_flips(int64_t n) {
   atomic_fetch_add(&flips, n);
+}
+void metrics_quarantined(void) {
+  atomic_fetch_add(&quarantined, 1);
 }
 void metrics_request(int status, double seconds) {
   atomic_fetch_add(&statuses[status / 100 < 6 ? status / 100 : 0], 1);
@@ -136,6 +139,8 @@ void metrics_write(api_text *out) {
       {"orbmorph_cache_hits_total", "counter", "Descriptions found in memory.", atomic_load(&cache[1])},
       {"orbmorph_cache_misses_total", "counter", "Descriptions read from the catalogue.", atomic_load(&cache[0])},
       {"orbmorph_flips_total", "counter", "Flipped triangles found in results; always 0.", atomic_load(&flips)},
+      {"orbmorph_objects_quarantined_total", "counter", "Stored files that did not match their hash.",
+       atomic_load(&quarantined)},
       {"orbmorph_received_bytes_total", "counter", "Bytes of bodies received.", atomic_load(&received_bytes)},
       {"orbmorph_sent_bytes_total", "counter", "Bytes of bodies sent.", atomic_load(&sent_bytes)},
       {"orbmorph_connections", "gauge", "Open connections.", atomic_load(&connections)},

@@ -35,6 +35,25 @@ static int read_priority(const char *value, char word[ADMIN_WORD]) {
   return admin_read_number(value, word) && strtoll(word, NULL, 10) <= 9;
 }
 
+/* A span from now, a day (UTC) on which it ends, or "never". */
+static int read_expires(const char *value, char word[ADMIN_WORD]) {
+  struct tm day = {0};
+  if (strcmp(value, "never") == 0) {
+    snprintf(word, ADMIN_WORD, "0");
+    return 1;
+  }
+  const char *end = strptime(value, "%Y-%m-%d", &day);
+  if (end && !*end) {
+    snprintf(word, ADMIN_WORD, "%lld", (long long)timegm(&day));
+    return 1;
+  }
+  if (!admin_read_span(value, word)) {
+    return 0;
+  }
+  snprintf(word, ADMIN_WORD, "%lld", (long long)time(NULL) + strtoll(word, NULL, 10));
+  return 1;
+}
+
 static int list(catalogue *cat, api_text *reply) {
   int count;
   token_row *rows = catalogue_tokens(cat, &count);
@@ -47,9 +66,13 @@ static int list(catalogue *cat, api_text *reply) {
       }
     }
     int other = strcmp(rows[i].tenant, rows[i].name) != 0;
-    api_text_printf(reply, "%s %s uploaded=%lld quota=%lld quota-jobs=%lld priority=%d%s%s\n", rows[i].name, names,
+    char expires[TOKEN_INSTANT] = "";
+    if (rows[i].expires) {
+      token_instant(rows[i].expires, expires);
+    }
+    api_text_printf(reply, "%s %s uploaded=%lld quota=%lld quota-jobs=%lld priority=%d%s%s%s%s\n", rows[i].name, names,
                     (long long)rows[i].used, (long long)rows[i].quota, (long long)rows[i].jobs, rows[i].priority,
-                    other ? " tenant=" : "", other ? rows[i].tenant : "");
+                    other ? " tenant=" : "", other ? rows[i].tenant : "", expires[0] ? " expires=" : "", expires);
   }
   free(rows);
   return count < 0;
@@ -57,15 +80,16 @@ static int list(catalogue *cat, api_text *reply) {
 
 static int apply(catalogue *cat, const char *line, api_text *reply) {
   char verb[8], hash[TOKEN_TEXT];
-  long long quota, jobs;
+  long long quota, jobs, expires;
   token_row row = {.created = (int64_t)time(NULL) * 1000};
-  if (sscanf(line, "token %7s %63s %d %lld %lld %d %63s %64s", verb, row.name, &row.scopes, &quota, &jobs,
-             &row.priority, row.tenant, hash) != 8) {
+  if (sscanf(line, "token %7s %63s %d %lld %lld %d %63s %lld %64s", verb, row.name, &row.scopes, &quota, &jobs,
+             &row.priority, row.tenant, &expires, hash) != 9) {
     api_text_add(reply, "unknown command\n");
     return 2;
   }
   row.quota = quota;
   row.jobs = jobs;
+  row.expires = expires;
   if (strcmp(row.tenant, "-") == 0) {
     memcpy(row.tenant, row.name, sizeof row.tenant);
   }
@@ -77,6 +101,7 @@ static int apply(catalogue *cat, const char *line, api_text *reply) {
     row.quota = quota > 0 ? quota : 0;
     row.jobs = jobs > 0 ? jobs : 0;
     row.priority = row.priority > 0 ? row.priority : 0;
+    row.expires = expires > 0 ? expires : 0;
     if (sodium_hex2bin(row.hash, sizeof row.hash, hash, strlen(hash), NULL, NULL, NULL) == 0) {
       result = catalogue_token_add(cat, &row);
     }
@@ -106,15 +131,20 @@ const admin_kind admin_token = {
     .usage =
         "  orbmorphd token add NAME --scope read,write,admin [--tenant NAME] [--quota BYTES]"
         " [--quota-jobs N] [--priority 0..9]\n"
-        "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-jobs …] [--priority …]\n"
+        "                      [--expires 30d|YYYY-MM-DD|never]\n"
+        "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-jobs …] [--priority …] [--expires …]\n"
         "  orbmorphd token list | token remove NAME\n",
-    .values = "--scope takes read, write and admin, comma-separated; --tenant takes a name; the others a number",
+    .values =
+        "--scope takes read, write and admin, comma-separated; --tenant takes a name; --expires takes a time such as "
+        "30d, a day "
+        "such as 2027-01-31, or never; the others a number",
     .verbs = {{"add", 1, 1}, {"set", 1, 0}, {"list", 0, 0}, {"remove", 1, 0}},
     .flags = {{"--scope", ADD | SET, ADD, "-1", read_scopes},
               {"--quota", ADD | SET, 0, "-1", admin_read_number},
               {"--quota-jobs", ADD | SET, 0, "-1", admin_read_number},
               {"--priority", ADD | SET, 0, "-1", read_priority},
               {"--tenant", ADD, 0, "-", admin_read_name},
+              {"--expires", ADD | SET, 0, "-1", read_expires},
               {.name = ADMIN_SECRET_WORD}},
     .make_secret = make_token,
     .apply = apply,

@@ -1,10 +1,13 @@
 /* Who may call, how often, and what a caller sees: tokens, scopes, tenants, limits and quotas. */
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 #include "http/http.h"
+#include "log.h"
 
 static caller *find_caller(const server *srv, const char *header) {
   unsigned char hash[TOKEN_BYTES];
@@ -65,6 +68,15 @@ static int is_public(const request *r, const char *path) {
   return access_is_open(path) || (r->route ? r->route->scope == SCOPE_NONE : is_page(path));
 }
 
+static int refuse_expired(request *r, api_problem *problem) {
+  char when[TOKEN_INSTANT];
+  token_instant(__atomic_load_n(&r->caller->row.expires, __ATOMIC_RELAXED), when);
+  return api_refuse(problem, "unauthorized",
+                    "The token \"%s\" expired at %s. The operator makes it valid again with orbmorphd token set %s "
+                    "--expires TIME, or replaces it.",
+                    r->caller->row.name, when, r->caller->row.name);
+}
+
 int access_check(request *r, const char *path, api_problem *problem) {
   /* Browsers send CORS preflight requests without a token; the response lists only methods. */
   if (!r->srv->needs_token || r->signer || is_public(r, path) || strcmp(r->method, "OPTIONS") == 0) {
@@ -75,6 +87,9 @@ int access_check(request *r, const char *path, api_problem *problem) {
     return api_refuse(problem, "unauthorized",
                       "The request needs a valid token: Authorization: Bearer TOKEN. The operator creates one with "
                       "orbmorphd token add.");
+  }
+  if (caller_expired(r->caller)) {
+    return refuse_expired(r, problem);
   }
   static const struct {
     int scope;
@@ -96,7 +111,7 @@ int access_check(request *r, const char *path, api_problem *problem) {
 
 int access_is_operator(const request *r) {
   caller *who = r->srv->needs_token ? find_caller(r->srv, header_of(r, "Authorization")) : NULL;
-  int admin = who && (__atomic_load_n(&who->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN);
+  int admin = who && !caller_expired(who) && (__atomic_load_n(&who->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN);
   caller_release(who);
   return !r->srv->needs_token || admin;
 }
@@ -136,4 +151,34 @@ int access_has_room(const request *r, int64_t bytes, api_problem *problem) {
 int access_priority(const request *r) {
   int class = r->caller ? __atomic_load_n(&r->caller->row.priority, __ATOMIC_RELAXED) : 0;
   return QUEUE_URGENCIES * class + QUEUE_URGENCIES - 1 - parse_urgency(header_of(r, "Priority"));
+}
+
+/* Unless who calls is refused, or may see what others own, the log says nothing of a request that succeeds. */
+static const char *audited(const request *r) {
+  int admin = r->caller && (__atomic_load_n(&r->caller->row.scopes, __ATOMIC_RELAXED) & SCOPE_ADMIN);
+  return r->status == 401 || r->status == 403                                         ? "refused"
+         : r->status >= 400 || !r->route                                              ? NULL
+         : strcmp(r->route->method, "DELETE") == 0                                    ? "delete"
+         : admin && (r->route->scope == SCOPE_READ || r->route->scope == SCOPE_ADMIN) ? "admin-read"
+                                                                                      : NULL;
+}
+
+void access_audit(const request *r, const struct sockaddr *address) {
+  const char *what = audited(r);
+  char host[INET6_ADDRSTRLEN] = "local", fields[REQUEST_FIELDS + 400];
+  if (!what) {
+    return;
+  }
+  if (address && address->sa_family == AF_INET) {
+    inet_ntop(AF_INET, &((const struct sockaddr_in *)(const void *)address)->sin_addr, host, sizeof host);
+  } else if (address && address->sa_family == AF_INET6) {
+    inet_ntop(AF_INET6, &((const struct sockaddr_in6 *)(const void *)address)->sin6_addr, host, sizeof host);
+  }
+  request_fields(r, fields);
+  size_t n = strlen(fields);
+  snprintf(fields + n, sizeof fields - n,
+           ",\"audit\":\"%s\",\"token\":\"%s\",\"tenant\":\"%s\",\"address\":\"%s\",\"id\":\"%s\",\"status\":%u", what,
+           r->caller ? r->caller->row.name : "", r->caller ? r->caller->row.tenant : "", host,
+           r->status < 400 ? r->id : "", r->status); /* the id of a refused request has not been checked */
+  log_write(strcmp(what, "refused") == 0 ? LOG_WARN : LOG_INFO, fields, "audit");
 }

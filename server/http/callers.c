@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "store/owners.h"
 
@@ -20,8 +21,13 @@ void caller_release(caller *who) {
   }
 }
 
+int caller_expired(const caller *who) {
+  int64_t expires = who ? __atomic_load_n(&who->row.expires, __ATOMIC_RELAXED) : 0;
+  return expires > 0 && (int64_t)time(NULL) >= expires;
+}
+
 int caller_revoked(const caller *who) {
-  return who && __atomic_load_n(&who->revoked, __ATOMIC_ACQUIRE);
+  return who && (__atomic_load_n(&who->revoked, __ATOMIC_ACQUIRE) || caller_expired(who));
 }
 
 static caller *take_known(callers *c, const unsigned char hash[TOKEN_BYTES]) {
@@ -51,6 +57,7 @@ static void update(caller *who, const token_row *row) {
   __atomic_store_n(&who->row.quota, row->quota, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.jobs, row->jobs, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.priority, row->priority, __ATOMIC_RELAXED);
+  __atomic_store_n(&who->row.expires, row->expires, __ATOMIC_RELAXED);
 }
 
 static int reload(callers *c) {

@@ -24,6 +24,7 @@ int callers_count(callers *c);
 /* Finds a token by its hash, in constant time; adds a reference. NULL: unknown. */
 caller *callers_find(callers *c, const unsigned char hash[TOKEN_BYTES]);
 void caller_release(caller *who);
-int caller_revoked(const caller *who); /* NULL: no */
+int caller_expired(const caller *who); /* its time has passed; NULL: no */
+int caller_revoked(const caller *who); /* it was removed, or has expired; NULL: no */
 
 #endif

@@ -11,6 +11,7 @@
 static void reply_sphere(request *r) {
   object_part part;
   char name[32], disposition[DISPOSITION_SIZE];
+  object_is_ready(r, OBJECT_SPHERES, "");
   store_result found = spheres_find(r->srv->store, r->id, r->shape, &part.start, &part.length);
   if (found != STORE_OK) {
     reply_store(r, found);
@@ -21,7 +22,8 @@ static void reply_sphere(request *r) {
   reply_part(r, OBJECT_SPHERES, r->id, part, r->id, "application/octet-stream", disposition);
 }
 
-/* 0 without a response outside a task, if one is needed to make or compress the object; releases the description. */
+/* 0 without a response outside a task, if one is needed to verify, make or compress the object; releases the
+ * description. */
 static int file_of(request *r, const cached *entry) {
   char name[100], format[8] = "bin", disposition[DISPOSITION_SIZE];
   int done = 1;
@@ -33,17 +35,20 @@ static int file_of(request *r, const cached *entry) {
       }
       snprintf(name, sizeof name, "%.16s.%s", r->id, format);
       disposition_write(name, disposition);
-      reply_object(r, OBJECT_MESH, r->id, r->id,
-                   strcmp(format, "glb") == 0 ? "model/gltf-binary" : "application/octet-stream", disposition);
+      done = object_is_ready(r, OBJECT_MESH, entry->row.sha) &&
+             reply_object(r, OBJECT_MESH, r->id, r->id,
+                          strcmp(format, "glb") == 0 ? "model/gltf-binary" : "application/octet-stream", disposition);
       break;
     }
     case ROUTE_EMBEDDING_SPHERE:
       disposition_write("sphere.ply", disposition);
-      done = reply_object(r, OBJECT_SPHERE, r->id, entry->row.sha, "application/octet-stream", disposition);
+      done = object_is_ready(r, OBJECT_SPHERE, entry->row.sha) &&
+             reply_object(r, OBJECT_SPHERE, r->id, entry->row.sha, "application/octet-stream", disposition);
       break;
     case ROUTE_SUPERMESH_PLACES:
       disposition_write("places.bin", disposition);
-      reply_object(r, OBJECT_PLACES, r->id, r->id, "application/octet-stream", disposition);
+      done = object_is_ready(r, OBJECT_PLACES, entry->row.places) &&
+             reply_object(r, OBJECT_PLACES, r->id, r->id, "application/octet-stream", disposition);
       break;
     case ROUTE_SUPERMESH_SPHERE:
       reply_sphere(r);

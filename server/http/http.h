@@ -190,6 +190,9 @@ int access_check(request *r, const char *path, api_problem *problem);
 int access_priority(const request *r);
 /* 1 with the scope admin, or where no token is needed: the caller may see the numbers of the whole service. */
 int access_is_operator(const request *r);
+/* Writes a line for the audit log if the request was refused for who calls, deleted something, or read with the scope
+ * admin. After the answer; address: NULL, or the client's. */
+void access_audit(const request *r, const struct sockaddr *address);
 /* The tenant that owns what the caller makes; "" where no token is needed. */
 const char *access_tenant(const request *r);
 /* The tenant whose resources the caller sees; "" means all of them (scope admin, or no token needed). */
@@ -279,6 +282,9 @@ int reply_part(request *r, object_kind kind, const char *id, object_part part, c
                const char *disposition);
 int reply_object(request *r, object_kind kind, const char *id, const char *sha, const char *mime,
                  const char *disposition);
+/* Whether the object may be sent: 1 once it has been verified, or found wrong and moved out of the store, where sending
+ * it answers 404. 0 outside a task: it has to be read. sha: see store/verify.h. */
+int object_is_ready(const request *r, object_kind kind, const char *sha);
 /* The asset of a supermesh in the profile of the request, if that is stored; releases the description. 0 without a
  * response if it is not, or a task is needed to compress it. */
 int reply_stored_asset(request *r, const cached *entry);

@@ -9,6 +9,7 @@
 #include "http/disposition.h"
 #include "http/http.h"
 #include "log.h"
+#include "store/verify.h"
 
 enum { YEAR_S = 31536000 };
 #define YEAR_LONG ", max-age=31536000, immutable"
@@ -113,6 +114,16 @@ static int choose_form(request *r, object_kind kind, const char *id, object_part
   return r->encoded || choose_memory(r, kind, id, key);
 }
 
+int object_is_ready(const request *r, object_kind kind, const char *sha) {
+  if (!verify_is_done(r->srv->store, kind, r->id)) {
+    if (r->phase != PHASE_AWAY) {
+      return 0;
+    }
+    verify_once(r->srv->store, kind, r->id, sha);
+  }
+  return 1;
+}
+
 int reply_part(request *r, object_kind kind, const char *id, object_part part, const char *sha, const char *mime,
                const char *disposition) {
   char etag[40], content_range[80];
@@ -194,8 +205,9 @@ int reply_stored_asset(request *r, const cached *entry) {
   int stored = r->profile - 1; /* −1: the asset itself */
   const char *sha = stored < 0 ? entry->row.sha : entry->row.profiles[stored];
   memcpy(r->id, entry->row.id, sizeof r->id);
-  int done = sha[0] && reply_object(r, stored < 0 ? OBJECT_ASSET : object_of_profile(stored), r->id, sha,
-                                    "model/gltf-binary", disposition_of(entry));
+  object_kind kind = stored < 0 ? OBJECT_ASSET : object_of_profile(stored);
+  int done = sha[0] && object_is_ready(r, kind, sha) &&
+             reply_object(r, kind, r->id, sha, "model/gltf-binary", disposition_of(entry));
   if (done && r->route->id == ROUTE_MORPH && r->status < 400) {
     stpcpy(stpcpy(stpcpy(link, "</v1/supermeshes/"), r->id), ">; rel=\"describedby\"");
     reply_header(r, "Link", link);

@@ -13,6 +13,7 @@
 #include "orbmorph/profile.h"
 #include "store/keys.h"
 #include "store/owners.h"
+#include "store/verify.h"
 
 /* A profile that a thread makes, and the requests that wait for it. */
 typedef struct flight {
@@ -59,7 +60,11 @@ static const cached *read_again(request *r, store_result *result) {
 static int convert(request *r, orb_context *ctx, orb_buffer *out, api_problem *problem) {
   int fd;
   uint64_t size;
-  store_result found = objects_read(r->srv->store, OBJECT_ASSET, r->id, &fd, &size);
+  resource row = {0};
+  store_result found = catalogue_get(r->srv->cat, RESOURCE_SUPERMESH, r->id, &row);
+  found = found == STORE_OK ? verify_once(r->srv->store, OBJECT_ASSET, r->id, row.sha) : found;
+  resource_free(&row);
+  found = found == STORE_OK ? objects_read(r->srv->store, OBJECT_ASSET, r->id, &fd, &size) : found;
   if (found != STORE_OK) {
     return api_refuse(problem, found == STORE_NOT_FOUND ? "not-found" : "internal",
                       found == STORE_NOT_FOUND ? "Nothing has this id; it may have been deleted."

@@ -158,7 +158,6 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
                       enum MHD_RequestTerminationCode code) {
   request *r = *state;
   (void)user;
-  (void)connection;
   if (!r) {
     return;
   }
@@ -181,6 +180,8 @@ static void completed(void *user, struct MHD_Connection *connection, void **stat
     snprintf(fields + n, sizeof fields - n, ",\"status\":%u,\"ms\":%lld", r->status, (long long)(took / 1000));
     log_write(slow || r->status >= 500 ? LOG_WARN : LOG_DEBUG, fields, "%s", slow ? "slow request" : "request");
   }
+  const union MHD_ConnectionInfo *client = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+  access_audit(r, client ? client->client_addr : NULL);
   if (r->has_body && !r->body_done && (r->closes || r->status >= 400)) {
     watched_linger(r->watched);
   }

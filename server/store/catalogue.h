@@ -10,6 +10,7 @@
  *   resources.c, owners.c, jobs.c, tokens.c, keys.c, webhooks.c   the SQL of each kind of row; lists.c   lists with a
  * filter deliveries.c  the outbox: what is still to be sent to webhooks objects.c     publishing, reading and deleting
  * files; spheres.c   the file of aligned spheres; alignments.c   kept alignments
+ *   snapshot.c    a copy of the catalogue for a backup; transfer.c   objects from one folder to another
  *
  * Contract. ONE connection writes and checkpoints, and one thread owns it (SQLite before 3.51.3 can lose a WAL reset
  * with two). Writes are passed to it as functions. It runs all waiting writes in one transaction (group commit), each
@@ -65,6 +66,18 @@ typedef struct resource {
   int64_t created;
 } resource;
 void resource_free(resource *r);
+
+/* The kind of the row that names an object. */
+resource_kind resource_of_object(object_kind kind);
+/* An object that a row names. */
+typedef struct named_object {
+  object_kind kind;
+  const char *what; /* for messages: "its object" */
+  const char *sha;  /* of the row; "": the row has no hash of it */
+} named_object;
+enum { RESOURCE_OBJECTS = 3 + PROFILES_STORED };
+/* The number of objects that a row names. */
+int resource_objects(const resource *row, named_object out[RESOURCE_OBJECTS]);
 
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out);
 /* Adds the row of an alignment, or replaces it. */
@@ -170,6 +183,8 @@ int catalogue_events(catalogue *cat, const char *job, int64_t after, int limit, 
 
 /* For --check-data. */
 int catalogue_integrity(catalogue *cat);
+/* PRAGMA quick_check, at the start: reads the whole catalogue. 0 with the first finding in `why`. */
+int catalogue_quick_check(catalogue *cat, char *why, size_t size);
 /* The number of rows with invalid values; −1 if they cannot be read. */
 int64_t catalogue_damaged(catalogue *cat);
 

@@ -124,6 +124,8 @@ static const char *const migrations[] = {
     /* Deaths of processes, by the key of their work. */
     "CREATE TABLE crash(key TEXT PRIMARY KEY, mesh TEXT NOT NULL, tenant TEXT NOT NULL, count INTEGER NOT NULL,"
     " last INTEGER NOT NULL) WITHOUT ROWID;",
+    /* Until when a token is valid, as a Unix time in seconds; 0: always. */
+    "ALTER TABLE token ADD COLUMN expires INTEGER NOT NULL DEFAULT 0;",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

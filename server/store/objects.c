@@ -7,19 +7,35 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "faults.h"
+#include "hash.h"
 #include "log.h"
+#include "metrics.h"
+#include "store/marks.h"
 
 static const char *const folders[OBJECT_KINDS] = {"mesh",    "sphere",    "asset",   "places",
                                                   "spheres", "quantized", "meshopt", "alignment"};
 
+/* An object whose file is to be deleted when no backup runs. */
+typedef struct held_object {
+  struct held_object *next;
+  object_kind kind;
+  char id[80];
+} held_object;
+
 struct objects {
   pthread_rwlock_t publishing;
+  pthread_mutex_t deleting;
+  int backup_lock; /* −1: none */
+  held_object *held;
+  marks *verified;
   char root[PATH_MAX - 256];
   objects_remote remote; /* publish NULL: the store has files */
 };
@@ -30,7 +46,7 @@ static store_result failed(const char *what, const char *path) {
   return code == ENOSPC || code == EDQUOT || code == EFBIG ? STORE_FULL : STORE_ERROR;
 }
 
-static void path_of(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]) {
+void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]) {
   snprintf(out, PATH_MAX, "%s/objects/%s/%.2s/%s", store->root, folders[kind], id, id);
 }
 
@@ -89,22 +105,46 @@ static store_result make_folders(const objects *store) {
   return status == STORE_OK ? sync_folder(store->root) : status;
 }
 
-store_result objects_open(const char *data, objects **out) {
+/* A store without files of its own so far; data NULL: it will have none. NULL: out of memory, or the path is too long.
+ */
+static objects *create(const char *data) {
   objects *store = calloc(1, sizeof *store);
-  if (!store || snprintf(store->root, sizeof store->root, "%s", data) >= (int)sizeof store->root) {
+  if (!store || !(store->verified = marks_create()) ||
+      (data && snprintf(store->root, sizeof store->root, "%s", data) >= (int)sizeof store->root)) {
+    marks_destroy(store ? store->verified : NULL);
     free(store);
-    return STORE_ERROR;
-  }
-  store_result status = make_folders(store);
-  if (status != STORE_OK) {
-    free(store);
-    return status;
+    return NULL;
   }
   pthread_rwlockattr_t attributes;
   pthread_rwlockattr_init(&attributes);
   pthread_rwlockattr_setkind_np(&attributes, PTHREAD_RWLOCK_PREFER_WRITER_NONRECURSIVE_NP);
   pthread_rwlock_init(&store->publishing, &attributes);
   pthread_rwlockattr_destroy(&attributes);
+  pthread_mutex_init(&store->deleting, NULL);
+  store->backup_lock = -1;
+  return store;
+}
+
+int objects_backup_lock(const char *data) {
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/backup.lock", data);
+  int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (fd < 0) {
+    failed("open", path);
+  }
+  return fd;
+}
+
+store_result objects_open(const char *data, objects **out) {
+  objects *store = create(data);
+  store_result status = store ? make_folders(store) : STORE_ERROR;
+  if (status == STORE_OK && (store->backup_lock = objects_backup_lock(data)) < 0) {
+    status = STORE_ERROR;
+  }
+  if (status != STORE_OK) {
+    objects_close(store);
+    return status;
+  }
   char path[PATH_MAX];
   snprintf(path, sizeof path, "%s/tmp", store->root);
   sweep(path);
@@ -112,21 +152,35 @@ store_result objects_open(const char *data, objects **out) {
   return STORE_OK;
 }
 
+store_result objects_open_read_only(const char *data, objects **out) {
+  *out = create(data);
+  return *out ? STORE_OK : STORE_ERROR;
+}
+
 store_result objects_open_remote(const objects_remote *remote, objects **out) {
-  objects *store = calloc(1, sizeof *store);
+  objects *store = create(NULL);
   if (!store) {
     return STORE_ERROR;
   }
-  pthread_rwlock_init(&store->publishing, NULL);
   store->remote = *remote;
   *out = store;
   return STORE_OK;
 }
 
 void objects_close(objects *store) {
-  if (store) {
-    pthread_rwlock_destroy(&store->publishing);
+  if (!store) {
+    return;
   }
+  for (held_object *one; (one = store->held);) {
+    store->held = one->next;
+    free(one);
+  }
+  if (store->backup_lock >= 0) {
+    close(store->backup_lock);
+  }
+  marks_destroy(store->verified);
+  pthread_mutex_destroy(&store->deleting);
+  pthread_rwlock_destroy(&store->publishing);
   free(store);
 }
 
@@ -196,7 +250,7 @@ store_result objects_publish(objects *store, object_temp *temp, object_kind kind
     objects_abandon(temp);
     return status;
   }
-  path_of(store, kind, id, path);
+  objects_path(store, kind, id, path);
   FAULT_POINT("publish-written");
   if (fsync(temp->fd) != 0) {
     store_result status = failed("fsync", temp->name);
@@ -238,7 +292,7 @@ store_result objects_read(const objects *store, object_kind kind, const char *id
   if (store->remote.read) {
     return store->remote.read(store->remote.user, kind, id, fd, size);
   }
-  path_of(store, kind, id, path);
+  objects_path(store, kind, id, path);
   *fd = open(path, O_RDONLY | O_CLOEXEC);
   if (*fd < 0) {
     return errno == ENOENT ? STORE_NOT_FOUND : failed("open", path);
@@ -281,11 +335,120 @@ store_result objects_load(const objects *store, object_kind kind, const char *id
   return STORE_OK;
 }
 
-store_result objects_delete(const objects *store, object_kind kind, const char *id) {
+/* While this process shares the lock, no backup begins. 0: a backup runs. The caller holds `deleting`. */
+static int begin_deleting(const objects *store) {
+  return store->backup_lock < 0 || flock(store->backup_lock, LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+}
+static void end_deleting(const objects *store) {
+  if (store->backup_lock >= 0) {
+    flock(store->backup_lock, LOCK_UN);
+  }
+}
+
+static store_result unlink_object(const objects *store, object_kind kind, const char *id) {
   char path[PATH_MAX];
-  path_of(store, kind, id, path);
+  objects_path(store, kind, id, path);
   FAULT_POINT("before-unlink");
   return unlink(path) == 0 || errno == ENOENT ? STORE_OK : failed("unlink", path);
+}
+
+store_result objects_delete(objects *store, object_kind kind, const char *id) {
+  store_result result = STORE_OK;
+  pthread_mutex_lock(&store->deleting);
+  if (begin_deleting(store)) {
+    result = unlink_object(store, kind, id);
+    end_deleting(store);
+  } else {
+    held_object *one = calloc(1, sizeof *one); /* without memory the file stays until --gc */
+    if (one) {
+      *one = (held_object){.next = store->held, .kind = kind};
+      snprintf(one->id, sizeof one->id, "%s", id);
+      store->held = one;
+    }
+  }
+  pthread_mutex_unlock(&store->deleting);
+  return result;
+}
+
+int objects_backup_runs(objects *store) {
+  pthread_mutex_lock(&store->deleting);
+  int runs = !begin_deleting(store);
+  if (!runs) {
+    end_deleting(store);
+  }
+  pthread_mutex_unlock(&store->deleting);
+  return runs;
+}
+
+static held_object *take_held(objects *store) {
+  held_object *one = NULL;
+  pthread_mutex_lock(&store->deleting);
+  if (store->held && begin_deleting(store)) {
+    one = store->held;
+    store->held = one->next;
+    end_deleting(store);
+  }
+  pthread_mutex_unlock(&store->deleting);
+  return one;
+}
+
+void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind kind, const char *id), void *user) {
+  for (held_object *one; (one = take_held(store)); free(one)) {
+    objects_exclude(store);
+    if (!is_named(user, one->kind, one->id)) {
+      objects_delete(store, one->kind, one->id);
+    }
+    objects_let_go(store);
+  }
+}
+
+static uint64_t hash_of(object_kind kind, const char *id) {
+  char text[80];
+  int n = snprintf(text, sizeof text, "%d %s", (int)kind, id);
+  return keyed_hash(text, n < (int)sizeof text ? (size_t)n : sizeof text - 1);
+}
+
+void objects_mark(objects *store, object_kind kind, const char *id) {
+  marks_add(store->verified, hash_of(kind, id));
+}
+
+int objects_is_marked(const objects *store, object_kind kind, const char *id) {
+  return marks_have(store->verified, hash_of(kind, id));
+}
+
+/* Moves the file aside if it still has the name: it may have been replaced since it was read. */
+static store_result move_aside(const char *path, const char *aside, int fd) {
+  struct stat read, named;
+  if (stat(path, &named) != 0 || fstat(fd, &read) != 0) {
+    return STORE_NOT_FOUND;
+  }
+  if (read.st_ino != named.st_ino) {
+    return STORE_OK;
+  }
+  return rename(path, aside) == 0 ? STORE_NOT_FOUND : failed("rename to", aside);
+}
+
+store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd) {
+  char path[PATH_MAX], aside[PATH_MAX], fields[160];
+  if (store->remote.publish) {
+    return STORE_NOT_FOUND; /* the daemon does it */
+  }
+  objects_path(store, kind, id, path);
+  snprintf(aside, sizeof aside, "%s/quarantine", store->root);
+  store_result result = make_folder(aside);
+  size_t n = strlen(aside);
+  snprintf(aside + n, sizeof aside - n, "/%s-%s-%lld", folders[kind], id, (long long)time(NULL));
+  if (result == STORE_OK) {
+    objects_exclude(store);
+    result = move_aside(path, aside, fd);
+    objects_let_go(store);
+  }
+  if (result == STORE_NOT_FOUND) {
+    metrics_quarantined();
+    snprintf(fields, sizeof fields, "\"object\":\"%s\",\"id\":\"%s\"", folders[kind], id);
+    log_write(LOG_ERROR, fields, "a stored file does not match its hash and was moved to %s", aside);
+  }
+  return result;
 }
 
 uint64_t objects_free_bytes(const objects *store) {

@@ -37,6 +37,8 @@ typedef struct objects objects;
 
 /* Creates the folders under data and deletes temporary files. */
 store_result objects_open(const char *data, objects **out);
+/* For reading objects only; changes nothing. */
+store_result objects_open_read_only(const char *data, objects **out);
 
 /* A store for a process that has no files: temporary files lie in memory, and these functions take what is published
  * and give what is read. publish: the descriptor stays the caller's. */
@@ -76,7 +78,25 @@ void objects_let_go(objects *store);
 store_result objects_read(const objects *store, object_kind kind, const char *id, int *fd, uint64_t *size);
 /* Reads a whole object into memory allocated with malloc(). */
 store_result objects_load(const objects *store, object_kind kind, const char *id, unsigned char **bytes, size_t *size);
-store_result objects_delete(const objects *store, object_kind kind, const char *id);
+/* The path of an object's file, which may not exist. */
+void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]);
+
+/* Deletes an object that no row names. While a backup runs, the file stays until objects_delete_held(). */
+store_result objects_delete(objects *store, object_kind kind, const char *id);
+/* Deletes what objects_delete() left, once no backup runs. is_named: whether a row names the object again; called
+ * while other threads are excluded. After a restart of the process the files stay until --gc. */
+void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind kind, const char *id), void *user);
+/* Opens the lock file of backups. A backup holds it exclusively (flock()), so the kernel releases it with the process;
+ * whoever deletes an object shares it for that moment. −1 with the reason logged. */
+int objects_backup_lock(const char *data);
+int objects_backup_runs(objects *store);
+
+/* For store/verify.h: marks of verified objects, in memory. */
+void objects_mark(objects *store, object_kind kind, const char *id);
+int objects_is_marked(const objects *store, object_kind kind, const char *id);
+/* Moves a wrong object, which was read through fd, out of the store. STORE_NOT_FOUND: done; STORE_OK: it has been
+ * replaced meanwhile. */
+store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd);
 
 /* Free bytes of the file system, for disk-reserve. */
 uint64_t objects_free_bytes(const objects *store);

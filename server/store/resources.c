@@ -14,6 +14,37 @@ void resource_free(resource *r) {
   r->json = NULL;
 }
 
+resource_kind resource_of_object(object_kind kind) {
+  return kind == OBJECT_MESH        ? RESOURCE_MESH
+         : kind == OBJECT_SPHERE    ? RESOURCE_EMBEDDING
+         : kind == OBJECT_ALIGNMENT ? RESOURCE_ALIGNMENT
+                                    : RESOURCE_SUPERMESH;
+}
+
+int resource_objects(const resource *row, named_object out[RESOURCE_OBJECTS]) {
+  static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_KINDS,
+                                                    OBJECT_ALIGNMENT};
+  static const char *const profiles[PROFILES_STORED] = {"its profile \"quantized\"", "its profile \"meshopt\""};
+  int count = 0;
+  if (kinds[row->kind] != OBJECT_KINDS) {
+    out[count++] = (named_object){kinds[row->kind], "its object", row->sha};
+  }
+  /* Supermeshes of older engines have no aligned spheres; their descriptions do not name any. */
+  int spheres = row->kind == RESOURCE_SUPERMESH && strstr(row->json, "\"sphere\":") != NULL;
+  if (row->kind == RESOURCE_SUPERMESH && (row->places[0] || spheres)) {
+    out[count++] = (named_object){OBJECT_PLACES, "its places file", row->places};
+  }
+  if (spheres) {
+    out[count++] = (named_object){OBJECT_SPHERES, "its file of aligned spheres", ""};
+  }
+  for (int p = 0; p < PROFILES_STORED; p++) {
+    if (row->profiles[p][0]) {
+      out[count++] = (named_object){object_of_profile(p), profiles[p], row->profiles[p]};
+    }
+  }
+  return count;
+}
+
 int resource_insert(database *db, const resource *r) {
   sqlite3_stmt *st = database_statement(db,
                                         "INSERT INTO resource(kind, id, sha, json, bytes, created, used, places)"
@@ -212,13 +243,26 @@ int64_t catalogue_damaged(catalogue *cat) {
   return rows_integer(cat, db, st);
 }
 
-int catalogue_integrity(catalogue *cat) {
+/* The pragma's first row is "ok", or the first finding. */
+static int check_with(catalogue *cat, const char *pragma, char *why, size_t size) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "PRAGMA integrity_check");
-  int fine = st && sqlite3_step(st) == SQLITE_ROW && strcmp((const char *)sqlite3_column_text(st, 0), "ok") == 0;
+  sqlite3_stmt *st = database_statement(db, pragma);
+  snprintf(why, size, "it cannot be read");
   if (st) {
+    if (sqlite3_step(st) == SQLITE_ROW) {
+      row_text(st, 0, why, size);
+    }
     sqlite3_reset(st);
   }
   catalogue_reader_done(cat, db);
-  return fine;
+  return strcmp(why, "ok") == 0;
+}
+
+int catalogue_integrity(catalogue *cat) {
+  char why[256];
+  return check_with(cat, "PRAGMA integrity_check(1)", why, sizeof why);
+}
+
+int catalogue_quick_check(catalogue *cat, char *why, size_t size) {
+  return check_with(cat, "PRAGMA quick_check(1)", why, size);
 }

@@ -15,13 +15,18 @@ typedef struct token_row {
   int64_t jobs;        /* limit on unfinished jobs; 0: no limit */
   int priority;        /* 0 to 9: jobs of a higher priority go first */
   int64_t created;
+  int64_t expires; /* Unix time in seconds from which it is refused; 0: never */
 } token_row;
 
 /* The hash of a token as callers send it, 64 hexadecimal digits. 0 if the text is not a token. */
 int token_hash(const char *text, unsigned char hash[TOKEN_BYTES]);
 
+/* A Unix time in seconds as 2027-01-31T00:00:00Z. */
+enum { TOKEN_INSTANT = 32 };
+void token_instant(int64_t seconds, char out[TOKEN_INSTANT]);
+
 store_result catalogue_token_add(catalogue *cat, const token_row *row); /* STORE_CONFLICT: the name is taken */
-/* Changes scopes, quota, jobs and priority; −1 keeps the old value. */
+/* Changes scopes, quota, jobs, priority and expires; −1 keeps the old value. */
 store_result catalogue_token_set(catalogue *cat, const token_row *row);
 store_result catalogue_token_remove(catalogue *cat, const char *name);
 /* All tokens by name, allocated with malloc(); NULL with *count −1 on error. */

@@ -13,6 +13,7 @@
 #include "isolate/task.h"
 #include "log.h"
 #include "store/alignments.h"
+#include "store/verify.h"
 
 enum { INPUTS_MOST = 2 * API_SHAPES_MAX + 1, COPY_BYTES = 16 << 20 };
 
@@ -235,6 +236,15 @@ static int listen_to(isolated *p, const run_env *env, orb_context *ctx, api_job_
   }
 }
 
+/* The process found an input that does not match its hash. */
+static void quarantine_inputs(const run_env *env, const collected *all) {
+  for (int i = 0; i < all->count; i++) {
+    if (all->heads[i].object != OBJECT_ALIGNMENT) { /* a wrong one is computed again */
+      verify_again(env->store, all->heads[i].object, all->heads[i].id, all->heads[i].sha);
+    }
+  }
+}
+
 int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j,
                  const isolated_limits *limits, run_output *out, api_problem *problem, isolated_end *end) {
   resource known = {0};
@@ -264,6 +274,9 @@ int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const 
   let_go(&inputs);
   int fine = why == CHANNEL_OK ? listen_to(&process, env, ctx, kind, j, inputs.alignment, out, problem, &why) : -1;
   int status = isolate_close(&process);
+  if (fine == 0 && problem->name && strcmp(problem->name, "corrupt") == 0) {
+    quarantine_inputs(env, &inputs);
+  }
   if (fine >= 0 || why == CHANNEL_STOPPED) {
     return fine > 0; /* stopped: the context has the error */
   }

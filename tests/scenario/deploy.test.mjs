@@ -1,11 +1,12 @@
 // The files of deploy/, checked by the tools that read them: systemd scores the unit, Prometheus checks the metrics.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
 import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
 import { folder } from './support/cli.mjs';
-import { daemon, root } from './support/daemon.mjs';
+import { binaries, daemon, root, slow } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const lacks = (program) => spawnSync(program, ['--version']).error !== undefined && `${program} is not installed`;
@@ -23,6 +24,23 @@ test('the unit is sandboxed', { skip: lacks('systemd-analyze') }, () => {
   assert.equal(run('systemd-analyze', ['security', '--offline=true', '--no-pager', '--threshold=20', unit]).status, 0);
   const verified = run('systemd-analyze', ['verify', unit, path.join(root, 'deploy/orbmorphd.socket')]).text;
   assert.doesNotMatch(verified, /Unknown|Failed to parse|Invalid|ignoring/i);
+  assert.match(readFileSync(unit, 'utf8'), /^StartLimitBurst=\d+$[\s\S]*^MemoryMax=\d+%$/m);
+});
+
+test('the programs are hardened', {
+  skip: (slow && 'sanitizers take the place of hardening') || lacks('readelf'),
+}, () => {
+  for (const program of [binaries.daemon, binaries.client]) {
+    const read = (...args) => run('readelf', [...args, '--wide', program]).text;
+    assert.match(read('--file-header'), /Type:\s+DYN/, 'position-independent');
+    const dynamic = read('--dynamic');
+    assert.match(dynamic, /FLAGS_1.*NOW.*PIE/, 'all symbols are bound at the start');
+    assert.match(read('--segments'), /GNU_RELRO/, 'and then read-only');
+    assert.match(read('--segments'), /GNU_STACK.* RW /, 'the stack is not executable');
+    const symbols = read('--dyn-syms');
+    assert.match(symbols, /__stack_chk_fail@/, 'stack protector');
+    assert.match(symbols, /__(snprintf|vsnprintf|memcpy)_chk@/, 'fortified calls');
+  }
 });
 
 test('the unit denies what the daemon refuses: all but public addresses', async () => {

@@ -1,9 +1,9 @@
 // Stored bytes that are no longer what was stored: no result is computed from them, and sending them again heals them.
 import assert from 'node:assert/strict';
-import { readFileSync, writeFileSync } from 'node:fs';
+import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import test from 'node:test';
-import { daemon } from './support/daemon.mjs';
+import { assertProblem, daemon } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 /** Changes one digit of a stored mesh, so that it is still a mesh of the same size. */
@@ -28,4 +28,87 @@ for (const isolate of ['on', 'off'])
     assert.equal((await d.get(`${mesh.url}/file`)).bytes.toString(), text);
     assert.equal((await d.made('/v1/embeddings', { mesh: mesh.id })).certificate.valid, true);
     assert.match(d.log, /was lost or altered and is restored/);
+    assert.equal(await quarantined(d), 1);
   });
+
+/** Flips one bit in the middle of a stored file, which keeps its size. */
+function flip(d, kind, id) {
+  const file = path.join(d.data, 'objects', kind, id.slice(0, 2), id);
+  const bytes = readFileSync(file);
+  bytes[bytes.length >> 1] ^= 1;
+  writeFileSync(file, bytes);
+  return bytes;
+}
+
+const quarantined = async (d) =>
+  Number(/^orbmorph_objects_quarantined_total (\d+)$/m.exec((await d.get('/metrics')).bytes.toString())[1]);
+
+test('a flipped bit is found when an object is first served after a start', async (t) => {
+  const d = await daemon(t);
+  const texts = [shapes.obj(shapes.egg(2)), shapes.obj(shapes.bean(2))];
+  const meshes = [(await d.upload(texts[0])).json, (await d.upload(texts[1])).json];
+  const request = { shapes: meshes.map(({ id }) => ({ mesh: id })), align: { method: 'rotate' } };
+  const morph = await d.made('/v1/supermeshes', request);
+  const [embedding] = (await d.get('/v1/embeddings')).json.embeddings;
+  const made = [
+    ['asset', morph.asset, morph.url],
+    ['places', `${morph.url}/places`, morph.url],
+    ['spheres', `${morph.url}/spheres/1.ply`, morph.url],
+    ['quantized', `${morph.asset}?profile=quantized`, morph.url],
+    ['sphere', embedding.sphere, embedding.url],
+  ];
+  const right = new Map();
+  for (const [, url] of made) right.set(url, (await d.get(url)).bytes);
+  assert.equal(await quarantined(d), 0);
+
+  // A mesh is healed by sending it again.
+  await d.stop();
+  const bad = flip(d, 'mesh', meshes[0].id);
+  await d.start();
+  for (let turn = 0; turn < 2; turn++) assertProblem(await d.get(`${meshes[0].url}/file`), 500, 'internal');
+  assert.equal(await quarantined(d), 1, 'counted once');
+  const [aside] = readdirSync(path.join(d.data, 'quarantine'));
+  assert.ok(aside.startsWith(`mesh-${meshes[0].id}-`), aside);
+  assert.deepEqual(readFileSync(path.join(d.data, 'quarantine', aside)), bad, 'nothing is deleted');
+  assert.match(d.log, /"level":"error","message":"a stored file does not match its hash and was moved to /);
+  assert.equal((await d.get(`${meshes[1].url}/file`)).bytes.toString(), texts[1], 'no other is');
+  assert.equal((await d.upload(texts[0])).status, 200);
+  assert.equal((await d.get(`${meshes[0].url}/file`)).bytes.toString(), texts[0]);
+
+  // Each kind of derived object: never served wrong; a profile is made again, all else by another request.
+  for (const [kind, url, resource] of made) {
+    await d.stop();
+    flip(d, kind, resource.split('/').pop());
+    await d.start();
+    const reply = await d.get(url);
+    if (kind === 'quantized') assert.deepEqual(reply.bytes, right.get(url), kind);
+    else assert.ok(reply.status >= 400, `${kind}: ${reply.status}`);
+    assert.equal(await quarantined(d), 1, kind);
+    if (kind === 'quantized') continue;
+    assert.equal((await d.delete(resource)).status, 204, kind);
+    if (kind === 'sphere') await d.made('/v1/embeddings', { mesh: embedding.mesh });
+    else await d.made('/v1/supermeshes', request);
+    assert.deepEqual((await d.get(url)).bytes, right.get(url), kind);
+    for (const [, other] of made) assert.equal((await d.get(other)).status, 200, other);
+  }
+});
+
+test('the daemon does not start on a damaged catalogue, and says what to do', async (t) => {
+  const d = await daemon(t);
+  for (let k = 0; k < 30; k++)
+    assert.equal((await d.upload(shapes.obj(shapes.ball(1, (p) => [p[0] + k, p[1], p[2]])))).status, 201);
+  await d.stop();
+  const file = path.join(d.data, 'catalogue.sqlite');
+  const bytes = readFileSync(file);
+  const page = bytes.readUInt16BE(16);
+  const row = bytes.lastIndexOf('"vertices":'); // in the description of a mesh
+  const start = row - (row % page);
+  assert.ok(start > 0);
+  const whole = readFileSync(file);
+  bytes.fill(0xa5, start, start + 64); // the head of its page
+  writeFileSync(file, bytes);
+  await assert.rejects(d.start(), /the daemon did not start/);
+  assert.match(d.log, /the catalogue \S*catalogue.sqlite is damaged: .*orbmorphd restore/);
+  writeFileSync(file, whole);
+  await d.start();
+});

@@ -156,3 +156,62 @@ test('tokens change while the daemon runs', async (t) => {
   assert.equal((await d.get('/v1/meshes', bearer(late))).status, 200);
   assert.match((await run(d, 'list')).stdout, /^late read uploaded=0 quota=0 quota-jobs=1 priority=0$/m);
 });
+
+test('a token is valid until it expires, and the audit log names who was refused', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on'] });
+  const add = async (name, ...words) => (await run(d, 'add', name, ...words)).stdout.trim();
+  const soon = await add('soon', '--scope', 'read', '--expires', '2s');
+  const day = await add('day', '--scope', 'read', '--expires', '2099-12-31');
+  const past = await add('past', '--scope', 'write', '--expires', '2020-01-01', '--tenant', 'shop');
+  const root = await add('root', '--scope', 'admin');
+  for (const wrong of ['tomorrow', '2027-13-01', '2027-01-01x', '-1'])
+    await assert.rejects(run(d, 'add', 'x', '--scope', 'read', '--expires', wrong), { code: 2 }, wrong);
+  assert.match((await run(d, 'list')).stdout, /^day read .* expires=2099-12-31T00:00:00Z$/m);
+
+  assert.equal((await d.get('/v1/meshes', bearer(soon))).status, 200);
+  assert.equal((await d.get('/v1/meshes', bearer(day))).status, 200);
+  const refused = await d.post('/v1/meshes', Buffer.from('v'), bearer(past));
+  assertProblem(refused, 401, 'unauthorized');
+  assert.match(refused.json.detail, /^The token "past" expired at 2020-01-01T00:00:00Z\./);
+  await new Promise((done) => setTimeout(done, 2100));
+  assertProblem(await d.get('/v1/meshes', bearer(soon)), 401, 'unauthorized');
+  await run(d, 'set', 'soon', '--expires', 'never');
+  assert.equal((await d.get('/v1/meshes', bearer(soon))).status, 200);
+  await d.stop();
+  await d.start();
+  assertProblem(await d.get('/v1/meshes', bearer(past)), 401, 'unauthorized');
+
+  assertProblem(await d.get('/v1/meshes'), 401, 'unauthorized');
+  assertProblem(await d.get('/metrics', bearer(day)), 403, 'forbidden');
+  const { id } = (await d.post('/v1/meshes', Buffer.from(shapes.tetrahedron), bearer(root))).json;
+  const gone = await d.delete(`/v1/meshes/${id}`, bearer(root));
+  assert.equal(gone.status, 204);
+  assert.equal((await d.get('/metrics', bearer(root))).status, 200);
+  await d.stop();
+  const lines = d.log
+    .split('\n')
+    .filter((line) => line.includes('"audit":'))
+    .map((line) => JSON.parse(line));
+  const has = (wanted) =>
+    assert.ok(
+      lines.some((line) => Object.entries(wanted).every(([key, value]) => line[key] === value)),
+      `${JSON.stringify(wanted)}\n${JSON.stringify(lines, null, 1)}`,
+    );
+  const address = '127.0.0.1';
+  has({ audit: 'command', message: 'token add: past' });
+  has({ audit: 'command', message: 'token set: soon' });
+  has({
+    audit: 'refused',
+    token: 'past',
+    tenant: 'shop',
+    address,
+    status: 401,
+    request: refused.headers.get('x-request-id'),
+  });
+  has({ audit: 'refused', token: '', address, status: 401 });
+  has({ audit: 'refused', token: 'day', address, status: 403, route: '/metrics' });
+  has({ audit: 'delete', token: 'root', tenant: 'root', id, address, request: gone.headers.get('x-request-id') });
+  has({ audit: 'admin-read', token: 'root', route: '/metrics', address });
+  assert.ok(!lines.some(({ token, audit }) => token === 'soon' && audit !== 'refused'), 'ordinary reads are not in it');
+  for (const secret of [soon, day, past, root]) assert.ok(!d.log.includes(secret));
+});

@@ -1,0 +1,247 @@
+#include "backup.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "log.h"
+#include "store/snapshot.h"
+#include "store/transfer.h"
+
+static const char mark[] = "backup";
+
+/* Brings the objects of a catalogue from one folder to another. */
+typedef struct haul {
+  objects *from, *to;
+  snapshot *rows;
+  int links;
+  long objects, made, wrong, deleted;
+  int full;
+} haul;
+
+static int complain(const char *folder, const char *why) {
+  fprintf(stderr, "orbmorphd: %s %s\n", folder, why);
+  return 0;
+}
+
+static int has(const char *folder, const char *name) {
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/%s", folder, name);
+  return access(path, F_OK) == 0;
+}
+
+/* Whether the folder is empty; creates it. */
+static int is_empty(const char *folder) {
+  int empty = 1;
+  DIR *dir = mkdir(folder, 0700) == 0 || errno == EEXIST ? opendir(folder) : NULL;
+  if (!dir) {
+    return complain(folder, strerror(errno));
+  }
+  for (struct dirent *entry; (entry = readdir(dir));) {
+    empty &= strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0;
+  }
+  closedir(dir);
+  return empty;
+}
+
+/* Locks the folder as a daemon does; −1 if a process uses it. */
+static int lock_folder(const char *folder) {
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/lock", folder);
+  int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (fd >= 0 && flock(fd, LOCK_EX | LOCK_NB) == 0) {
+    return fd;
+  }
+  complain(folder, fd < 0 ? strerror(errno) : "is in use by another process");
+  if (fd >= 0) {
+    close(fd);
+  }
+  return -1;
+}
+
+static int put_mark(const char *folder) {
+  static const char text[] = "orbmorph backup, format 1\n";
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/%s", folder, mark);
+  int fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  int fine = fd >= 0 && write(fd, text, sizeof text - 1) == (ssize_t)sizeof text - 1 && fsync(fd) == 0;
+  if (fd >= 0) {
+    close(fd);
+  }
+  return fine || complain(path, strerror(errno));
+}
+
+/* Gives the new catalogue its name, after all that it names is on the disk. */
+static int commit(const char *folder) {
+  char from[PATH_MAX], to[PATH_MAX];
+  snprintf(from, sizeof from, "%s/catalogue.new", folder);
+  snprintf(to, sizeof to, "%s/catalogue.sqlite", folder);
+  int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  int fine = fd >= 0 && syncfs(fd) == 0 && rename(from, to) == 0 && fsync(fd) == 0;
+  if (fd >= 0) {
+    close(fd);
+  }
+  return fine || complain(to, strerror(errno));
+}
+
+static void bring_row(void *user, const resource *row) {
+  static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks", "alignment"};
+  haul *h = user;
+  named_object named[RESOURCE_OBJECTS];
+  int count = resource_objects(row, named);
+  for (int i = 0; i < count && !h->full; i++) {
+    int made;
+    store_result result = transfer_object(h->from, h->to, row->id, &named[i], h->links, &made);
+    h->objects++;
+    h->made += made;
+    h->full = result == STORE_FULL;
+    if (result != STORE_OK && !h->full) {
+      h->wrong++;
+      printf("%s %s: %s %s\n", names[row->kind], row->id, named[i].what,
+             result == STORE_NOT_FOUND  ? "is missing"
+             : result == STORE_CONFLICT ? "does not match its hash"
+                                        : "cannot be read");
+    }
+  }
+}
+
+/* Opens the rows of folder/catalogue.new and brings their objects. */
+static int bring_objects(haul *h, const char *folder) {
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/catalogue.new", folder);
+  if (snapshot_open(path, &h->rows) != STORE_OK || snapshot_each(h->rows, bring_row, h) != STORE_OK) {
+    return 0;
+  }
+  return !h->full || complain(folder, "has no space left");
+}
+
+static void sweep_one(void *user, object_kind kind, const char *id, uint64_t size) {
+  haul *h = user;
+  (void)size;
+  if (!snapshot_names(h->rows, kind, id)) {
+    h->deleted += objects_delete(h->to, kind, id) == STORE_OK;
+  }
+}
+
+static void end(haul *h) {
+  snapshot_close(h->rows);
+  objects_close(h->from);
+  objects_close(h->to);
+}
+
+/* The lock that keeps a daemon from deleting objects; waits for the deletion in progress. */
+static int hold_deletions(const char *data) {
+  int fd = objects_backup_lock(data);
+  if (fd >= 0 && flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    puts("waiting for another backup to end");
+    fflush(stdout);
+  }
+  while (fd >= 0 && flock(fd, LOCK_EX) != 0 && errno == EINTR) {
+  }
+  return fd;
+}
+
+static int take(const char *folder, const char *data) {
+  char path[PATH_MAX];
+  haul h = {.links = 1};
+  snprintf(path, sizeof path, "%s/catalogue.new", folder);
+  int fine = snapshot_take(data, path) == STORE_OK && objects_open_read_only(data, &h.from) == STORE_OK &&
+             objects_open(folder, &h.to) == STORE_OK && bring_objects(&h, folder) && commit(folder) &&
+             objects_each(h.to, sweep_one, &h) == STORE_OK;
+  if (fine) {
+    printf("%ld objects in the backup: %ld new, %ld deleted that the last backup had, %ld damaged or missing\n",
+           h.objects - h.wrong, h.made, h.deleted, h.wrong);
+  }
+  if (h.wrong) {
+    puts(
+        "the service lacks what is named above: upload or request it again, then repeat the backup; an earlier backup "
+        "in this folder keeps its copy");
+  }
+  end(&h);
+  return !fine || h.wrong;
+}
+
+static int run_backup(const char *folder, const config *options) {
+  umask(077);
+  if (!has(options->data, "catalogue.sqlite")) {
+    complain(options->data, "is no data folder: give that of the service with --data");
+    return 1;
+  }
+  if (!is_empty(folder) && !has(folder, mark)) {
+    complain(folder, "is neither empty nor a backup");
+    return 1;
+  }
+  int lock = lock_folder(folder);
+  int held = lock >= 0 && put_mark(folder) ? hold_deletions(options->data) : -1;
+  int status = held >= 0 ? take(folder, options->data) : 1;
+  if (held >= 0) {
+    close(held);
+  }
+  if (lock >= 0) {
+    close(lock);
+  }
+  return status;
+}
+
+static int put_back(const char *folder, const char *data) {
+  char path[PATH_MAX];
+  haul h = {0};
+  snprintf(path, sizeof path, "%s/catalogue.new", data);
+  int fine = snapshot_take(folder, path) == STORE_OK && snapshot_requeue(path) == STORE_OK &&
+             objects_open_read_only(folder, &h.from) == STORE_OK && objects_open(data, &h.to) == STORE_OK &&
+             bring_objects(&h, data) && commit(data);
+  if (fine) {
+    printf("%ld objects restored, %ld damaged or missing\n", h.made, h.wrong);
+  }
+  if (h.wrong) {
+    puts("all else is restored: start the service, DELETE what is named above, and upload or request it again");
+  }
+  end(&h);
+  return !fine || h.wrong;
+}
+
+static int run_restore(const char *folder, const config *options) {
+  umask(077);
+  if (!has(folder, mark) || !has(folder, "catalogue.sqlite")) {
+    complain(folder, "is no complete backup");
+    return 1;
+  }
+  if (!is_empty(options->data)) {
+    complain(options->data, "is not empty: restore into a new folder");
+    return 1;
+  }
+  int lock = lock_folder(options->data);
+  int status = lock >= 0 ? put_back(folder, options->data) : 1;
+  if (lock >= 0) {
+    close(lock);
+  }
+  return status;
+}
+
+int backup_command_read(backup_command *out, int *argc, char **argv) {
+  out->run = *argc < 2                         ? NULL
+             : strcmp(argv[1], "backup") == 0  ? run_backup
+             : strcmp(argv[1], "restore") == 0 ? run_restore
+                                               : NULL;
+  if (!out->run) {
+    return 1;
+  }
+  if (*argc < 3 || argv[2][0] == '-') {
+    fprintf(stderr,
+            "orbmorphd %s: the folder is missing\n"
+            "  orbmorphd backup DIR [--data DATA]\n"
+            "  orbmorphd restore DIR --data NEW\n",
+            argv[1]);
+    return 0;
+  }
+  out->folder = argv[2];
+  memmove(argv + 1, argv + 3, (size_t)(*argc - 2) * sizeof *argv); /* with the NULL at the end */
+  *argc -= 2;
+  return 1;
+}
