@@ -15,6 +15,7 @@
 #include "backup.h"
 #include "control.h"
 #include "evict.h"
+#include "http/certificate.h"
 #include "http/http.h"
 #include "isolate/isolate.h"
 #include "log.h"
@@ -220,6 +221,9 @@ static void reload(server *srv, const command_line *line) {
     set_log(line->options);
     queue_set_limit(srv->q, (int)line->options->queue_limit);
     reload_callers(srv);
+    if (certificate_is_loaded() && !certificate_load(line->options->tls_certificate, line->options->tls_key)) {
+      log_error("SIGHUP: the previous certificate stays in use");
+    }
     log_info("SIGHUP: the configuration was read again");
   } else {
     log_error("SIGHUP: the new configuration is not valid; the previous one stays in effect");

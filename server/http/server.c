@@ -7,6 +7,7 @@
 
 #include "faults.h"
 #include "http/body.h"
+#include "http/certificate.h"
 #include "http/http.h"
 #include "http/target.h"
 #include "log.h"
@@ -222,70 +223,41 @@ static void on_mhd_log(void *user, const char *format, va_list args) {
   log_write(LOG_DEBUG, NULL, "http: %s", text);
 }
 
-/* A small text file, allocated with malloc(); NULL with the reason logged. */
-static char *read_text(const char *path) {
-  enum { MOST = 1 << 20 };
-  FILE *file = fopen(path, "rb");
-  char *text = file ? malloc(MOST) : NULL;
-  size_t size = text ? fread(text, 1, MOST - 1, file) : 0;
-  if (text) {
-    text[size] = 0;
-  }
-  if (file) {
-    fclose(file);
-  }
-  if (!text || size == 0) {
-    log_error("%s cannot be read", path);
-    free(text);
-    return NULL;
-  }
-  return text;
-}
-
 /* GnuTLS would also offer TLS 1.0 and 1.1, which RFC 8996 forbids. */
 static const char TLS_VERSIONS[] = "NORMAL:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2";
 
 int http_start(server *srv) {
   const config *o = srv->options;
   int tls = o->tls_key[0] != 0;
-  char *certificate = tls ? read_text(o->tls_certificate) : NULL, *key = tls ? read_text(o->tls_key) : NULL;
-  if (tls && (!certificate || !key)) {
-    free(certificate);
-    free(key);
+  if (tls && !certificate_load(o->tls_certificate, o->tls_key)) {
     return 0;
   }
   if (catalogue_secret(srv->cat, srv->secret) != STORE_OK) {
     log_error("the catalogue has no secret for page tokens");
-    free(certificate);
-    free(key);
     return 0;
   }
   srv->encoded = encoded_open((size_t)o->encoded_bytes);
   srv->connections = srv->encoded ? watch_start(o, srv->needs_token) : NULL;
   if (!srv->connections) {
     log_error("the thread that watches connections cannot be started");
-    free(certificate);
-    free(key);
     return 0;
   }
   unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ITC | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG |
                    (unsigned)(tls ? MHD_USE_TLS : MHD_USE_TURBO);
-  struct MHD_OptionItem options[] = {{MHD_OPTION_THREAD_POOL_SIZE, (intptr_t)o->http_threads, NULL},
-                                     {MHD_OPTION_LISTEN_SOCKET, srv->at.fd, NULL},
-                                     {MHD_OPTION_CONNECTION_MEMORY_LIMIT, CONNECTION_MEMORY, NULL},
-                                     {MHD_OPTION_CONNECTION_LIMIT, (intptr_t)o->max_connections, NULL},
-                                     {MHD_OPTION_CONNECTION_TIMEOUT, (intptr_t)o->idle_seconds, NULL},
-                                     {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)completed, srv},
-                                     {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, srv},
-                                     {tls ? MHD_OPTION_HTTPS_MEM_CERT : MHD_OPTION_END, 0, certificate},
-                                     {MHD_OPTION_HTTPS_MEM_KEY, 0, key},
-                                     {MHD_OPTION_HTTPS_PRIORITIES, 0, (void *)(uintptr_t)TLS_VERSIONS},
-                                     {MHD_OPTION_END, 0, NULL}};
+  struct MHD_OptionItem options[] = {
+      {MHD_OPTION_THREAD_POOL_SIZE, (intptr_t)o->http_threads, NULL},
+      {MHD_OPTION_LISTEN_SOCKET, srv->at.fd, NULL},
+      {MHD_OPTION_CONNECTION_MEMORY_LIMIT, CONNECTION_MEMORY, NULL},
+      {MHD_OPTION_CONNECTION_LIMIT, (intptr_t)o->max_connections, NULL},
+      {MHD_OPTION_CONNECTION_TIMEOUT, (intptr_t)o->idle_seconds, NULL},
+      {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)completed, srv},
+      {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, srv},
+      {tls ? MHD_OPTION_HTTPS_CERT_CALLBACK2 : MHD_OPTION_END, 0, certificate_callback()},
+      {MHD_OPTION_HTTPS_PRIORITIES, 0, (void *)(uintptr_t)TLS_VERSIONS},
+      {MHD_OPTION_END, 0, NULL}};
   srv->daemon = MHD_start_daemon(flags, 0, NULL, NULL, answer, srv, MHD_OPTION_EXTERNAL_LOGGER, on_mhd_log, NULL,
                                  MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL, MHD_OPTION_URI_LOG_CALLBACK,
                                  request_create, srv, MHD_OPTION_ARRAY, options, MHD_OPTION_END);
-  free(certificate); /* the daemon has parsed them */
-  free(key);
   if (!srv->daemon) {
     log_error("the HTTP service cannot be started on %s", srv->at.text);
   }
@@ -297,6 +269,7 @@ void http_stop(server *srv) {
     MHD_stop_daemon(srv->daemon);
     srv->daemon = NULL;
   }
+  certificate_free();
   watch_stop(srv->connections);
   srv->connections = NULL;
   encoded_close(srv->encoded);

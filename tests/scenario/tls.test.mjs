@@ -6,6 +6,7 @@ import http from 'node:http';
 import https from 'node:https';
 import path from 'node:path';
 import test from 'node:test';
+import { setTimeout as sleep } from 'node:timers/promises';
 import tls from 'node:tls';
 import { promisify } from 'node:util';
 import { folder } from './support/cli.mjs';
@@ -128,6 +129,35 @@ test('a morph over TLS', async (t) => {
   assert.equal(await d.exited, 0, d.log);
 });
 
+test('SIGHUP reads a renewed certificate, and keeps the old one where the new one is not valid', async (t) => {
+  const { home, key, file, ca } = await certificate(t);
+  const renewed = await certificate(t);
+  const d = await start(t, path.join(home, 'data'), '--tls-certificate', file, '--tls-key', key);
+  const hangUp = async (logged) => {
+    const before = d.log.length;
+    d.child.kill('SIGHUP');
+    for (const end = Date.now() + 20_000 * patience; !logged.test(d.log.slice(before)); await sleep(20))
+      assert.ok(Date.now() < end, d.log);
+  };
+  const agent = new https.Agent({ keepAlive: true, ca });
+  t.after(() => agent.destroy());
+  assert.equal((await send(d.url, '/livez', { agent })).status, 200);
+
+  await writeFile(file, renewed.ca); // its key is not there yet
+  await hangUp(/the previous certificate stays in use/);
+  assert.equal((await send(d.url, '/livez', { ca })).status, 200);
+
+  await writeFile(key, await readFile(renewed.key));
+  await hangUp(/the configuration was read again/);
+  assert.equal((await send(d.url, '/livez', { ca: renewed.ca })).status, 200);
+  await assert.rejects(send(d.url, '/livez', { ca }), { code: 'DEPTH_ZERO_SELF_SIGNED_CERT' });
+  assert.equal((await send(d.url, '/livez', { agent })).status, 200, 'an open connection goes on');
+  await hangUp(/the configuration was read again/); // nothing new
+  assert.equal((await send(d.url, '/livez', { ca: renewed.ca })).status, 200);
+  d.child.kill('SIGTERM');
+  assert.equal(await d.exited, 0, d.log);
+});
+
 test('the daemon does not start without a valid certificate', async (t) => {
   const { home, key, file } = await certificate(t);
   const data = path.join(home, 'data');
@@ -145,7 +175,7 @@ test('the daemon does not start without a valid certificate', async (t) => {
     assert.ok([1, 2].includes(await d.exited), `${args}: ${await d.exited}`);
     assert.match(
       d.log,
-      /tls-certificate and tls-key must both be set|cannot be read|cannot be started/,
+      /tls-certificate and tls-key must both be set|cannot be read|are no certificate with its key/,
       args.join(' '),
     );
   }
