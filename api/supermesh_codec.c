@@ -139,7 +139,8 @@ static void write_landmarks(const api_supermesh_request *request, const orb_merg
   api_json_close(out, ']');
 }
 
-/* From these confidences on a match is likely, and sure. docs/bench-confidence.md says how often each holds. */
+/* From these confidences on a match is likely, and sure. docs/bench-confidence.md says how often a sure one is right;
+ * no lower one is promised. */
 static const double LIKELY = 0.5, SURE = 0.8;
 
 /* How far the correspondence that was found may be relied on; nothing where none was searched. */

@@ -16,7 +16,10 @@
 #include "base/error.h"
 #include "base/memory.h"
 
-enum { LEAST_PAIRS = 3 }; /* that are pinned: two leave a rotation open */
+enum { LEAST_PAIRS = 3 };            /* that are pinned: two leave a rotation open */
+static const double MOST_COST = 1e9; /* of an alternative, where the best rough map does not bend the shapes at all */
+_Static_assert((int)ORB_MATCH_OTHERS <= (int)ORB_ALTERNATIVES_MAX, "all other maps fit");
+_Static_assert((int)ORB_MATCH_PAIRS <= (int)ORB_ALTERNATIVE_PAIRS, "all pairs fit");
 
 /* The matches of all later shapes with the first. */
 typedef struct matches {
@@ -169,8 +172,11 @@ static orb_status write_alternatives(orb_context *ctx, const orb_align_shape *sh
   }
   for (int32_t i = 0; i < match->other_count; i++) {
     const orb_match_pairs *pairs = &match->other[i].pairs;
+    if (pairs->count < LEAST_PAIRS) {
+      continue;
+    }
     orb_alternative *one = &out->alternatives[out->alternative_count++];
-    one->cost = match->other[i].cost;
+    one->cost = fmin(match->other[i].cost, MOST_COST);
     one->count = pairs->count;
     for (int32_t k = 0; k < pairs->count; k++) {
       ORB_TRY(orb_place_of_vertex(ctx, shapes[0].mesh, pairs->first[k], &one->at[2 * k]));

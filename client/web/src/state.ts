@@ -87,7 +87,8 @@ export interface Running {
 /** The requests of a morph that was matched without landmarks and of its alternatives, and which of them is shown. */
 export interface Matches {
   requests: SupermeshRequest[];
-  at: number;
+  at: number; // the shown one
+  tried?: number; // the last one that was sent
 }
 
 export interface Result {

@@ -52,8 +52,8 @@ typedef struct orb_match {
  * same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
                                          orb_match *out);
-/* The confidence in a match, 0 to 1, from its bend, its `clear` and the energy of the map that followed it: the share
- * of right ones among calibrated matches like it (docs/bench-confidence.md). */
+/* The confidence in a match, 0 to 1, from its bend, its `clear` and the energy of the map that followed it: calibrated
+ * from 0.8 on (docs/bench-confidence.md). */
 double orb_match_confidence(double bend, double clear, double energy);
 void orb_match_free(orb_context *ctx, orb_match *match);
 

@@ -22,7 +22,7 @@
  *   (starts/landmark_walk.c). It has no flips from the beginning.
  * - From the best map so far, drawn to the spatial targets (engine/rounds.c).
  *
- * Where spatial targets are given, there are other starts (targets.h).
+ * Where spatial targets are given, there are other starts, and limbs are untwisted only at the end (targets.h).
  *
  * Each start (start.h) is then refined up to all vertices, and no flip is allowed again. The map of least energy wins
  * if it is better than the alignment as given. Limbs that it has twisted are untwisted (twist/untwist.c) before the

@@ -9,6 +9,8 @@
  *   twist/    limbs that a map has twisted, and untwisting them
  *   swap.h    which of two shapes moves
  *   levels.h  from the first level of a start to all vertices
+ *   start.h   one start, and passes of starts through samples of the best map
+ *   targets.h the order of the starts where targets are given
  *   walked.h  the quick way: a landmark walk, optimised on a coarse level
  *   compose.c the order of the starts
  */

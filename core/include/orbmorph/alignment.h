@@ -55,12 +55,14 @@ typedef struct orb_alternative {
   orb_place at[2 * ORB_ALTERNATIVE_PAIRS]; /* count × 2 places, on the given meshes */
 } orb_alternative;
 
-/* What the search without landmarks knows of the correspondence that it chose; of several shapes, the worst. */
+/* What the search without landmarks knows of its best rough map; of several shapes, the worst of each member. Where a
+ * rotation of the spheres alone is a good map already, the alignment is that one instead. */
 typedef struct orb_match_facts {
   int32_t is_measured; /* 0: landmarks were given, the preset is fast, or no rough map was found */
   double bend;         /* of the best rough map: 0 for a rigid motion */
   double clear;        /* 0 to 1: how far the next best rough map that differs is behind; 0.5 if none differs */
-  double confidence; /* 0 to 1: the share of right matches among calibrated ones like this (docs/bench-confidence.md) */
+  double confidence;   /* 0 to 1, with the mean energy; calibrated on two shapes and from 0.8 on
+                          (docs/bench-confidence.md) */
 } orb_match_facts;
 
 typedef struct orb_alignment {

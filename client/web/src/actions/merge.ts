@@ -63,7 +63,9 @@ export async function startMerge(purpose: Running['purpose'] = 'morph') {
 export async function nextMatch() {
   const matches = state.result?.matches;
   if (state.running || !matches) return;
-  const next = { ...matches, at: (matches.at + 1) % matches.requests.length };
+  const at = ((matches.tried ?? matches.at) + 1) % matches.requests.length;
+  matches.tried = at; // one that fails is passed over next time
+  const next = { requests: matches.requests, at };
   const running: Running = { purpose: 'morph', job: null, abort: new AbortController(), fast: null };
   set({ running, problem: null });
   const request = next.requests[next.at];

@@ -197,7 +197,7 @@ function Match({ result }: { result: Result }) {
     verdict === 'unsure'
       ? 'Not sure: the shapes may be matched wrongly. Look at it, try the next match, or set landmarks.'
       : verdict === 'likely'
-        ? 'The shapes are likely matched rightly. Look at it before you rely on it.'
+        ? 'The match looks plausible, but check it before you rely on it.'
         : matches && matches.at > 0
           ? `Match ${matches.at + 1} of ${matches.requests.length}; the first one was the best.`
           : '';

@@ -79,8 +79,8 @@ static void sample_target(const orb_map_run *c, int32_t v, double out[3]) {
   orb_map_surface_at(&c->b, &place, out, NULL, NULL);
 }
 
-/* The pairs as anchors, and samples: of the best map, or else by eigenfunctions. vertex and target have room for all
- * pairs and samples. */
+/* The pairs as anchors, and samples: of the best map or the given targets, or else by eigenfunctions. vertex and target
+ * have room for all pairs and samples. */
 static orb_status gather_anchors(orb_map_run *c, int samples, int32_t *vertex, double *target, orb_map_anchors *out) {
   *out = (orb_map_anchors){.vertex = vertex, .target = target};
   for (int32_t i = 0; i < c->pairs.count; i++) {
