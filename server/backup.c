@@ -22,7 +22,7 @@ typedef struct haul {
   snapshot *rows;
   int links;
   long objects, made, wrong, deleted;
-  int full;
+  const char *stopped; /* why nothing more can be written; NULL: it can */
 } haul;
 
 static int complain(const char *folder, const char *why) {
@@ -36,15 +36,16 @@ static int has(const char *folder, const char *name) {
   return access(path, F_OK) == 0;
 }
 
-/* Whether the folder is empty; creates it. */
+/* Whether the folder is empty but for a lock; creates it. −1 with the reason printed: it cannot be used. */
 static int is_empty(const char *folder) {
   int empty = 1;
   DIR *dir = mkdir(folder, 0700) == 0 || errno == EEXIST ? opendir(folder) : NULL;
   if (!dir) {
-    return complain(folder, strerror(errno));
+    complain(folder, strerror(errno));
+    return -1;
   }
   for (struct dirent *entry; (entry = readdir(dir));) {
-    empty &= strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0;
+    empty &= strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0 || strcmp(entry->d_name, "lock") == 0;
   }
   closedir(dir);
   return empty;
@@ -95,18 +96,16 @@ static void bring_row(void *user, const resource *row) {
   haul *h = user;
   named_object named[RESOURCE_OBJECTS];
   int count = resource_objects(row, named);
-  for (int i = 0; i < count && !h->full; i++) {
+  for (int i = 0; i < count && !h->stopped; i++) {
     int made;
     store_result result = transfer_object(h->from, h->to, row->id, &named[i], h->links, &made);
     h->objects++;
     h->made += made;
-    h->full = result == STORE_FULL;
-    if (result != STORE_OK && !h->full) {
+    h->stopped = result == STORE_FULL ? "has no space left" : result == STORE_ERROR ? "cannot be written" : NULL;
+    if (result != STORE_OK && !h->stopped) {
       h->wrong++;
       printf("%s %s: %s %s\n", names[row->kind], row->id, named[i].what,
-             result == STORE_NOT_FOUND  ? "is missing"
-             : result == STORE_CONFLICT ? "does not match its hash"
-                                        : "cannot be read");
+             result == STORE_NOT_FOUND ? "is missing" : "does not match its hash");
     }
   }
 }
@@ -116,9 +115,9 @@ static int bring_objects(haul *h, const char *folder) {
   char path[PATH_MAX];
   snprintf(path, sizeof path, "%s/catalogue.new", folder);
   if (snapshot_open(path, &h->rows) != STORE_OK || snapshot_each(h->rows, bring_row, h) != STORE_OK) {
-    return 0;
+    return complain(path, "cannot be read");
   }
-  return !h->full || complain(folder, "has no space left");
+  return !h->stopped || complain(folder, h->stopped);
 }
 
 static void sweep_one(void *user, object_kind kind, const char *id, uint64_t size) {
@@ -139,7 +138,7 @@ static void end(haul *h) {
 static int hold_deletions(const char *data) {
   int fd = objects_backup_lock(data);
   if (fd >= 0 && flock(fd, LOCK_EX | LOCK_NB) != 0) {
-    puts("waiting for another backup to end");
+    puts("waiting for a deletion or another backup to end");
     fflush(stdout);
   }
   while (fd >= 0 && flock(fd, LOCK_EX) != 0 && errno == EINTR) {
@@ -158,7 +157,7 @@ static int take(const char *folder, const char *data) {
     printf("%ld objects in the backup: %ld new, %ld deleted that the last backup had, %ld damaged or missing\n",
            h.objects - h.wrong, h.made, h.deleted, h.wrong);
   }
-  if (h.wrong) {
+  if (fine && h.wrong) {
     puts(
         "the service lacks what is named above: upload or request it again, then repeat the backup; an earlier backup "
         "in this folder keeps its copy");
@@ -173,8 +172,11 @@ static int run_backup(const char *folder, const config *options) {
     complain(options->data, "is no data folder: give that of the service with --data");
     return 1;
   }
-  if (!is_empty(folder) && !has(folder, mark)) {
+  int empty = is_empty(folder);
+  if (empty == 0 && !has(folder, mark)) {
     complain(folder, "is neither empty nor a backup");
+  }
+  if (empty < 0 || (empty == 0 && !has(folder, mark))) {
     return 1;
   }
   int lock = lock_folder(folder);
@@ -189,6 +191,14 @@ static int run_backup(const char *folder, const config *options) {
   return status;
 }
 
+/* Keeps backups out of the folder until the process ends. A folder that cannot be written needs no lock. */
+static int hold_backup(const char *folder) {
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/lock", folder);
+  int fd = open(path, O_RDONLY | O_CLOEXEC);
+  return fd < 0 || flock(fd, LOCK_SH | LOCK_NB) == 0 || complain(folder, "is in use by a backup: repeat later");
+}
+
 static int put_back(const char *folder, const char *data) {
   char path[PATH_MAX];
   haul h = {0};
@@ -199,7 +209,7 @@ static int put_back(const char *folder, const char *data) {
   if (fine) {
     printf("%ld objects restored, %ld damaged or missing\n", h.made, h.wrong);
   }
-  if (h.wrong) {
+  if (fine && h.wrong) {
     puts("all else is restored: start the service, DELETE what is named above, and upload or request it again");
   }
   end(&h);
@@ -212,11 +222,11 @@ static int run_restore(const char *folder, const config *options) {
     complain(folder, "is no complete backup");
     return 1;
   }
-  if (!is_empty(options->data)) {
-    complain(options->data, "is not empty: restore into a new folder");
-    return 1;
+  int empty = is_empty(options->data), reading = hold_backup(folder);
+  if (empty == 0) {
+    complain(options->data, "is not empty: restore into a new folder; delete it if a restore was killed");
   }
-  int lock = lock_folder(options->data);
+  int lock = empty == 1 && reading ? lock_folder(options->data) : -1;
   int status = lock >= 0 ? put_back(folder, options->data) : 1;
   if (lock >= 0) {
     close(lock);

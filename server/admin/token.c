@@ -44,6 +44,10 @@ static int read_expires(const char *value, char word[ADMIN_WORD]) {
   }
   const char *end = strptime(value, "%Y-%m-%d", &day);
   if (end && !*end) {
+    struct tm given = day;
+    if (timegm(&day) <= 0 || day.tm_mday != given.tm_mday || day.tm_mon != given.tm_mon) {
+      return 0; /* before 1970, or a day that does not exist */
+    }
     snprintf(word, ADMIN_WORD, "%lld", (long long)timegm(&day));
     return 1;
   }

@@ -109,6 +109,7 @@ struct request {
   signer *signer;        /* referenced; NULL: the URL is not signed */
   int64_t expires;       /* of the signature, Unix time in seconds */
   int64_t retry_s;       /* for Retry-After; 0: the usual */
+  int is_unverified;     /* the file to send could not be compared with its hash, or not be moved away */
   int begun;             /* the headers have arrived */
   int has_body, head;
   int closes; /* the connection closes after this response */
@@ -284,7 +285,7 @@ int reply_object(request *r, object_kind kind, const char *id, const char *sha, 
                  const char *disposition);
 /* Whether the object may be sent: 1 once it has been verified, or found wrong and moved out of the store, where sending
  * it answers 404. 0 outside a task: it has to be read. sha: see store/verify.h. */
-int object_is_ready(const request *r, object_kind kind, const char *sha);
+int object_is_ready(request *r, object_kind kind, const char *sha);
 /* The asset of a supermesh in the profile of the request, if that is stored; releases the description. 0 without a
  * response if it is not, or a task is needed to compress it. */
 int reply_stored_asset(request *r, const cached *entry);

@@ -114,12 +114,13 @@ static int choose_form(request *r, object_kind kind, const char *id, object_part
   return r->encoded || choose_memory(r, kind, id, key);
 }
 
-int object_is_ready(const request *r, object_kind kind, const char *sha) {
+int object_is_ready(request *r, object_kind kind, const char *sha) {
   if (!verify_is_done(r->srv->store, kind, r->id)) {
     if (r->phase != PHASE_AWAY) {
       return 0;
     }
-    verify_once(r->srv->store, kind, r->id, sha);
+    store_result result = verify_once(r->srv->store, kind, r->id, sha);
+    r->is_unverified = result != STORE_OK && result != STORE_NOT_FOUND;
   }
   return 1;
 }
@@ -130,6 +131,10 @@ int reply_part(request *r, object_kind kind, const char *id, object_part part, c
   int fd,
       compresses = kind == OBJECT_ASSET || kind == OBJECT_QUANTIZED || kind == OBJECT_SPHERE || kind == OBJECT_SPHERES;
   uint64_t size, first = 0, length;
+  if (r->is_unverified) {
+    reply_store(r, STORE_ERROR);
+    return 1;
+  }
   stpcpy(stpncpy(stpcpy(etag, "\""), sha, 32), "\"");
   stpcpy(r->etag, etag);
   if (compresses && !choose_form(r, kind, id, part, etag)) {

@@ -127,5 +127,5 @@ store_result spheres_check(const objects *store, const char *id) {
     fine = memcmp(hash, bytes + size - TAIL_BYTES, HASH_BYTES) == 0;
   }
   free(bytes);
-  return fine ? STORE_OK : STORE_ERROR;
+  return fine ? STORE_OK : STORE_CONFLICT;
 }

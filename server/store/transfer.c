@@ -45,7 +45,7 @@ static store_result read_source(const transfer *t, object_temp *copy, char sha[A
     }
     if (n <= 0) {
       log_error("object %s cannot be read: %s", t->id, n < 0 ? strerror(errno) : "it is too short");
-      result = STORE_ERROR;
+      result = STORE_CONFLICT;
       break;
     }
     crypto_hash_sha256_update(&state, block, (unsigned long long)n);
@@ -60,11 +60,12 @@ static store_result read_source(const transfer *t, object_temp *copy, char sha[A
   return result;
 }
 
-static int matches(const transfer *t, const objects *from, const char *sha) {
+/* STORE_CONFLICT: the object has another hash than it should have. */
+static store_result compare(const transfer *t, const objects *from, const char *sha) {
   if (t->object->kind == OBJECT_SPHERES) { /* the file itself has its hash */
-    return spheres_check(from, t->id) == STORE_OK;
+    return spheres_check(from, t->id);
   }
-  return !t->object->sha[0] || strcmp(sha, t->object->sha) == 0;
+  return !t->object->sha[0] || strcmp(sha, t->object->sha) == 0 ? STORE_OK : STORE_CONFLICT;
 }
 
 /* 1: linked; 0: the file systems do not allow it, or it failed. A backup deletes a name that a killed one left. */
@@ -92,8 +93,8 @@ static store_result copy_to(const transfer *t, const objects *from, objects *to)
   store_result result = objects_begin(to, &copy);
   if (result == STORE_OK) {
     result = read_source(t, &copy, sha);
-    if (result == STORE_OK && !matches(t, from, sha)) {
-      result = STORE_CONFLICT;
+    if (result == STORE_OK) {
+      result = compare(t, from, sha);
     }
     if (result == STORE_OK) {
       futimens(copy.fd, times); /* by which the next backup recognises it */
@@ -120,8 +121,8 @@ store_result transfer_object(const objects *from, objects *to, const char *id, c
   } else if (!is_there(&t)) {
     FAULT_POINT("transfer");
     result = links ? read_source(&t, NULL, sha) : STORE_OK;
-    if (result == STORE_OK && links && !matches(&t, from, sha)) {
-      result = STORE_CONFLICT;
+    if (result == STORE_OK && links) {
+      result = compare(&t, from, sha);
     }
     if (result == STORE_OK && !(links && link_to(&t))) {
       result = copy_to(&t, from, to);

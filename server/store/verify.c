@@ -41,7 +41,12 @@ store_result verify_again(objects *store, object_kind kind, const char *id, cons
     return result;
   }
   if (kind == OBJECT_SPHERES) {
-    wrong = spheres_check(store, id) != STORE_OK;
+    result = spheres_check(store, id);
+    wrong = result == STORE_CONFLICT;
+    if (result != STORE_OK && !wrong) {
+      close(fd);
+      return result;
+    }
   } else if (hash_file(fd, found)) {
     wrong = sha[0] && strcmp(found, sha) != 0;
   } else {

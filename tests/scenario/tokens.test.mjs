@@ -164,7 +164,7 @@ test('a token is valid until it expires, and the audit log names who was refused
   const day = await add('day', '--scope', 'read', '--expires', '2099-12-31');
   const past = await add('past', '--scope', 'write', '--expires', '2020-01-01', '--tenant', 'shop');
   const root = await add('root', '--scope', 'admin');
-  for (const wrong of ['tomorrow', '2027-13-01', '2027-01-01x', '-1'])
+  for (const wrong of ['tomorrow', '2027-13-01', '2027-02-31', '1960-01-01', '2027-01-01x', '-1'])
     await assert.rejects(run(d, 'add', 'x', '--scope', 'read', '--expires', wrong), { code: 2 }, wrong);
   assert.match((await run(d, 'list')).stdout, /^day read .* expires=2099-12-31T00:00:00Z$/m);
 
