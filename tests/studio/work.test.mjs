@@ -70,6 +70,14 @@ async function morph(page) {
   await defaultShown(page);
 }
 
+/** The id of the morph that is shown. The address follows a moment later: it may still name the fast one. */
+async function shownId(page) {
+  const link = await page.getByRole('link', { name: 'Download GLB' }).getAttribute('href');
+  const id = link.match(/[0-9a-f]{64}/)[0];
+  await until(() => page.url().includes(`r=${id}`), 'the URL names the morph');
+  return id;
+}
+
 test('from the empty page to a playing morph in at most five clicks', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   let clicks = 0;
@@ -168,10 +176,7 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
   const count = await landmarks(page).count();
   await morph(page);
   await button(page, 'Pause').click();
-  // the address follows what is shown a moment later: it may still name the fast morph
-  const link = await page.getByRole('link', { name: 'Download GLB' }).getAttribute('href');
-  const id = link.match(/[0-9a-f]{64}/)[0];
-  await until(() => page.url().includes(`r=${id}`), 'the URL names the morph');
+  const id = await shownId(page);
   const supermesh = await json(daemon.url, `/v1/supermeshes/${id}`);
   assert.equal(supermesh.landmarks.length, count);
   assert.equal(supermesh.certificate.landmarks_exact, true);
@@ -442,9 +447,8 @@ test('a match that is not sure is called so, and the next one is another morph',
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await morph(page);
-  await page.getByText('Shown: the default morph.').waitFor();
   const shown = () => page.url().match(/r=([0-9a-f]{64})/)?.[1];
-  const first = await json(daemon.url, `/v1/supermeshes/${shown()}`);
+  const first = await json(daemon.url, `/v1/supermeshes/${await shownId(page)}`);
   const said = page.getByRole('status', { name: 'How sure the match is' });
   assert.equal(first.match.verdict, 'unsure');
   assert.match(await said.textContent(), /^Not sure: /);
