@@ -57,7 +57,7 @@ void orb_searched_fill(const double *position, const double *normal, int32_t cou
 }
 
 /* Squared distances in position and normal of BLOCK vertices; returns the least. */
-ORB_CLONES static float measure(const float *at, int32_t columns, const float q[6], float *out) {
+ORB_CLONES static float measure_block(const float *at, int32_t columns, const float q[6], float *out) {
   float lane[LANES];
   for (int i = 0; i < BLOCK; i++) {
     float sum = 0;
@@ -87,7 +87,7 @@ int32_t orb_searched_nearest(const orb_searched *s, const double x[3], const dou
   float least = INFINITY, block[BLOCK];
   int32_t best = 0;
   for (int32_t first = 0; first < s->columns; first += BLOCK) {
-    if (measure(s->at + first, s->columns, q, block) < least) {
+    if (measure_block(s->at + first, s->columns, q, block) < least) {
       for (int i = 0; i < BLOCK; i++) {
         best = block[i] < least ? first + i : best;
         least = block[i] < least ? block[i] : least;
