@@ -175,8 +175,9 @@ static int run_backup(const char *folder, const config *options) {
   int empty = is_empty(folder);
   if (empty == 0 && !has(folder, mark)) {
     complain(folder, "is neither empty nor a backup");
+    return 1;
   }
-  if (empty < 0 || (empty == 0 && !has(folder, mark))) {
+  if (empty < 0) {
     return 1;
   }
   int lock = lock_folder(folder);

@@ -137,8 +137,8 @@ void cli_print_supermesh(const cJSON *supermesh) {
     printf("  not in the asset: %d %s of the files, which a report names (--report)\n", dropped,
            dropped == 1 ? "part" : "parts");
   }
-  if (member(supermesh, "match")) {
-    const cJSON *match = member(supermesh, "match");
+  const cJSON *match = member(supermesh, "match");
+  if (match) {
     printf("  match: %s (confidence %.2f)\n", cli_string(match, "verdict", "?"), cli_number(match, "confidence"));
   }
   cli_warnings(stdout, "  warning: ", supermesh);
@@ -224,8 +224,8 @@ static void markdown(FILE *out, const cJSON *supermesh) {
   fprintf(out, "One mesh of %s vertices and %s triangles, %s, genus %.0f. Resource `%s`, made by %s.\n\n", vertices,
           triangles, cJSON_IsTrue(member(certificate, "closed")) ? "closed" : "not closed",
           cli_number(certificate, "genus"), cli_string(supermesh, "url", "?"), cli_string(supermesh, "engine", "?"));
-  if (member(supermesh, "match")) {
-    const cJSON *match = member(supermesh, "match");
+  const cJSON *match = member(supermesh, "match");
+  if (match) {
     fprintf(out, "The correspondence was found without landmarks; verdict: %s (confidence %.2f).\n\n",
             cli_string(match, "verdict", "?"), cli_number(match, "confidence"));
   }

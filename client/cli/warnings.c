@@ -1,6 +1,7 @@
 #include "warnings.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "text.h"
 
@@ -8,7 +9,6 @@
 static const double ENERGY_MOST = 2, MEDIAN_MOST = 1.5;
 static const double INVERTED_MOST = 0.005;     /* of the triangles */
 static const double CONFIDENCE_LEAST = 0.3;    /* of a found landmark */
-static const double MATCH_LEAST = 0.5;         /* of the match of all shapes: below, the verdict is "unsure" */
 static const double TOLERANCE_ROUNDING = 1.01; /* a proved bound may exceed the tolerance by rounding */
 static const double TURNED_OVER = 60;          /* degrees of the y axis */
 
@@ -50,13 +50,13 @@ static int warn_of_pairs(FILE *out, const char *bullet, const cJSON *supermesh) 
 }
 
 static int warn_of_match(FILE *out, const char *bullet, const cJSON *supermesh) {
-  double confidence = cli_number(member(supermesh, "match"), "confidence");
+  const cJSON *match = member(supermesh, "match");
   int others = cJSON_GetArraySize(member(supermesh, "alternatives"));
-  if (!(confidence < MATCH_LEAST)) { /* also if it is NAN: landmarks were given */
+  if (strcmp(cli_string(match, "verdict", ""), "unsure") != 0) { /* also where there is none: landmarks were given */
     return 0;
   }
   fprintf(out, "%sNot sure: the shapes may be matched wrongly, such as a left leg with a right one (confidence %.2f). ",
-          bullet, confidence);
+          bullet, cli_number(match, "confidence"));
   if (others) {
     fprintf(out, "Set landmarks, or send one of the %d request%s in `alternatives`.\n", others, others == 1 ? "" : "s");
   } else {

@@ -1,12 +1,12 @@
 #include "http/certificate.h"
 
 #include <gnutls/abstract.h>
-#include <gnutls/crypto.h>
 #include <gnutls/gnutls.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "api/ids.h"
 #include "log.h"
 
 enum { CHAIN_MOST = 16, FILE_MOST = 1 << 20 }; /* certificates of a chain; bytes of a file */
@@ -18,7 +18,7 @@ typedef struct certificate {
   gnutls_pcert_st chain[CHAIN_MOST];
   unsigned count;
   gnutls_privkey_t key;
-  unsigned char id[64]; /* of the bytes of both files */
+  char id[API_ID_SIZE]; /* of the bytes of both files */
 } certificate;
 
 static certificate *newest; /* __atomic: handshakes read it on other threads */
@@ -40,9 +40,12 @@ static gnutls_datum_t read_file(const char *path) {
 }
 
 /* A hash of both files: a reload without a renewal changes nothing. */
-static void identify(const gnutls_datum_t *chain, const gnutls_datum_t *key, unsigned char id[64]) {
-  (void)gnutls_hash_fast(GNUTLS_DIG_SHA256, chain->data, chain->size, id);
-  (void)gnutls_hash_fast(GNUTLS_DIG_SHA256, key->data, key->size, id + 32);
+static void identify(const gnutls_datum_t *chain, const gnutls_datum_t *key, char id[API_ID_SIZE]) {
+  api_hash hash;
+  api_hash_begin(&hash);
+  api_hash_add(&hash, chain->data, chain->size);
+  api_hash_add(&hash, key->data, key->size);
+  api_hash_end(&hash, id);
 }
 
 /* GnuTLS itself tests whether the key belongs to the certificate only where it holds both. */
@@ -93,7 +96,7 @@ int certificate_load(const char *chain_path, const char *key_path) {
   if (chain.size && key.size && code < 0) {
     log_error("%s and %s are no certificate with its key, in PEM: %s", chain_path, key_path, gnutls_strerror(code));
   }
-  if (code < 0 || (last && memcmp(last->id, made->id, sizeof made->id) == 0)) {
+  if (code < 0 || (last && strcmp(last->id, made->id) == 0)) {
     free_one(made);
   } else {
     made->older = last;

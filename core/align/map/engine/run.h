@@ -40,15 +40,14 @@ typedef struct orb_map_run {
   orb_aligned_shape *moving;
   int32_t vertex_count, landmark_count;
   orb_map_pairs pairs;
-  orb_map_samples samples; /* by eigenfunctions */
-  int both;                /* the fixed shape's points on the sphere may change too */
-  double *fixed_points;    /* what they are now; NULL: as given */
-  orb_map_candidate kept;  /* the best map from before they changed */
-  double *x, *normal;      /* moving shape, area 4π */
-  const double
-      *given_target;         /* of registrations without samples, in the fixed shape's space; NULL: they are computed */
-  int samples_follow_target; /* samples of a registration have their targets from there, not from the best map */
-  double *target;            /* spatial targets, once the moving shape is registered */
+  orb_map_samples samples;    /* by eigenfunctions */
+  int both;                   /* the fixed shape's points on the sphere may change too */
+  double *fixed_points;       /* what they are now; NULL: as given */
+  orb_map_candidate kept;     /* the best map from before they changed */
+  double *x, *normal;         /* moving shape, area 4π */
+  const double *given_target; /* for registrations without samples, in the fixed shape's space; NULL: computed */
+  int samples_follow_target;  /* samples of a registration have their targets from there, not from the best map */
+  double *target;             /* spatial targets, once the moving shape is registered */
   double *target_normal;
   orb_place *target_place; /* of every vertex of the moving shape, on the fixed one */
   unsigned char *keep;     /* vertices that stay on every level: those of pairs */

@@ -14,9 +14,8 @@
 
 #include "align/map/engine/run.h"
 
-/* Sets the spatial targets: from the pairs and `samples` samples of the best map or of the given
- * targets, with the normals of the registered
- * shape, and with the nearest places on the fixed shape. */
+/* Sets the spatial targets: from the pairs and `samples` samples of the best map or of the given targets, with the
+ * normals of the registered shape, and with the nearest places on the fixed shape. */
 ORB_MUST_CHECK orb_status orb_map_register(orb_map_run *run, int samples);
 
 /* Puts the vertices of a level where the start has them. to_mesh: of the surface's vertices. */
