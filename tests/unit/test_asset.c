@@ -116,7 +116,7 @@ static void two_shapes_are_base_and_target(void **state) {
   check_positions(&file, &made, 2);
   check_normals(&file, 2);
   const cJSON *asset = cJSON_GetObjectItem(file.json, "asset");
-  assert_string_equal(cJSON_GetObjectItem(asset, "generator")->valuestring, "orbmorph 1.0.0-2");
+  assert_string_equal(cJSON_GetObjectItem(asset, "generator")->valuestring, ORB_ENGINE);
   assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(file.json, "materials")), 1);
   glb_close(&file);
   orb_buffer_free(ctx, &bytes);
