@@ -4,8 +4,9 @@
  * sphere has the same position and normal on both shapes. These are averaged into the cells of a cube map, and for a
  * rotation R of the sphere the 3×3 cross-covariance M(R) of the two fields is summed. The rotation in space that fits R
  * best is the Procrustes solution of M(R), and the sum of its singular values says how near the map through the sphere
- * is to a rigid motion. The search evaluates a grid of rotations, and then refines the best few by a shrinking local
- * search.
+ * is to a rigid motion. The search evaluates a grid of rotations on a coarse cube map, whose cells are as far apart as
+ * the rotations of the grid, and then refines the best few by a shrinking local search on a fine one. Both run on all
+ * threads; what is kept is decided in the order of the grid.
  */
 #include <math.h>
 #include <string.h>
@@ -13,17 +14,22 @@
 #include "align/rotate/correlate.h"
 #include "align/rotate/procrustes.h"
 #include "base/check.h"
+#include "base/context.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "numeric/vec3.h"
 
 /* Chosen by trial. */
 enum {
-  SIDE = 12, /* cells along an edge of the cube map: 7.5° each */
+  SIDE = 12,       /* cells along an edge of the cube map: 7.5° each, */
+  COARSE_SIDE = 6, /* and of the one on which the grid is evaluated: 15°, as the rotations of the grid */
   CELLS = 6 * SIDE * SIDE,
   FIELD = 6,  /* numbers of a cell: position and normal */
   AXES = 200, /* poles of the grid of rotations, about 14° apart */
   SPINS = 24, /* rotations around each pole: 15° apart */
-  STARTS = 12 /* grid points that are refined */
+  GRID = AXES * SPINS,
+  STARTS = 12,    /* grid points that are refined, of each list */
+  GRID_GRAIN = 96 /* rotations of one task */
 };
 static const double APART = 0.8;   /* radians: rotations this far apart are different candidates */
 static const double NORMALS = 0.3; /* variance of the normals where that of the positions is 1 */
@@ -34,25 +40,30 @@ static const double GOLDEN_ANGLE = 2.399963229728653; /* π (3 − √5): betwee
 
 /* Mean position (centred, unit variance) and normal (variance NORMALS) of each cell of the cube map. */
 typedef struct field {
+  int side; /* cells along an edge: at most SIDE */
   double direction[CELLS][3], weight[CELLS], value[CELLS][FIELD];
 } field;
 
-static int32_t cell_of(const double p[3]) {
+static int32_t cell_count(const field *f) {
+  return 6 * f->side * f->side;
+}
+
+static int32_t cell_of(int side, const double p[3]) {
   double x = fabs(p[0]), y = fabs(p[1]), z = fabs(p[2]);
   int axis = x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
   double m = fabs(p[axis]), inverse = m > 0 ? 1 / m : 0;
   double u = p[(axis + 1) % 3] * inverse, v = p[(axis + 2) % 3] * inverse;
-  int i = (int)((u + 1) * 0.5 * SIDE), j = (int)((v + 1) * 0.5 * SIDE);
-  i = i < 0 ? 0 : i >= SIDE ? SIDE - 1 : i;
-  j = j < 0 ? 0 : j >= SIDE ? SIDE - 1 : j;
-  return ((2 * axis + (p[axis] < 0)) * SIDE + i) * SIDE + j;
+  int i = (int)((u + 1) * 0.5 * side), j = (int)((v + 1) * 0.5 * side);
+  i = i < 0 ? 0 : i >= side ? side - 1 : i;
+  j = j < 0 ? 0 : j >= side ? side - 1 : j;
+  return ((2 * axis + (p[axis] < 0)) * side + i) * side + j;
 }
 
-static void cell_direction(int32_t cell, double out[3]) {
-  int j = cell % SIDE, i = cell / SIDE % SIDE, side = cell / (SIDE * SIDE), axis = side / 2;
-  out[axis] = side % 2 ? -1 : 1;
-  out[(axis + 1) % 3] = (2 * i + 1.0) / SIDE - 1;
-  out[(axis + 2) % 3] = (2 * j + 1.0) / SIDE - 1;
+static void cell_direction(int side, int32_t cell, double out[3]) {
+  int j = cell % side, i = cell / side % side, face = cell / (side * side), axis = face / 2;
+  out[axis] = face % 2 ? -1 : 1;
+  out[(axis + 1) % 3] = (2 * i + 1.0) / side - 1;
+  out[(axis + 2) % 3] = (2 * j + 1.0) / side - 1;
   orb_normalize(out);
 }
 
@@ -73,7 +84,7 @@ static void splat(field *f, const orb_aligned_shape *shape, int32_t t) {
     double d = orb_distance2(p[k], p[(k + 1) % 3]);
     longest = d > longest ? d : longest;
   }
-  int n = 1 + (int)(sqrt(longest) * 2 * SIDE);
+  int n = 1 + (int)(sqrt(longest) * 2 * f->side);
   double area = orb_det(p[0], p[1], p[2]) / (n * n);
   for (int i = 0; i < n; i++) {
     for (int j = 0; j < 2 * (n - i) - 1; j++) {
@@ -82,7 +93,7 @@ static void splat(field *f, const orb_aligned_shape *shape, int32_t t) {
         q[k] = c * p[0][k] + a * p[1][k] + b * p[2][k];
       }
       double r2 = orb_dot(q, q), density = area / (r2 * sqrt(r2) + 1e-9);
-      int32_t cell = cell_of(q);
+      int32_t cell = cell_of(f->side, q);
       f->weight[cell] += density;
       for (int k = 0; k < 3; k++) {
         f->value[cell][k] += density * (c * x[0][k] + a * x[1][k] + b * x[2][k]);
@@ -92,14 +103,15 @@ static void splat(field *f, const orb_aligned_shape *shape, int32_t t) {
   }
 }
 
-static void field_make(field *f, const orb_aligned_shape *shape) {
+static void field_make(field *f, int side, const orb_aligned_shape *shape) {
   memset(f, 0, sizeof *f);
+  f->side = side;
   for (int32_t t = 0; t < shape->mesh.triangle_count; t++) {
     splat(f, shape, t);
   }
   double mean[3] = {0, 0, 0}, variance = 0, normal_variance = 0, total = 0;
-  for (int32_t c = 0; c < CELLS; c++) {
-    cell_direction(c, f->direction[c]);
+  for (int32_t c = 0; c < cell_count(f); c++) {
+    cell_direction(side, c, f->direction[c]);
     if (f->weight[c] > 0) {
       for (int k = 0; k < FIELD; k++) {
         f->value[c][k] /= f->weight[c];
@@ -110,7 +122,7 @@ static void field_make(field *f, const orb_aligned_shape *shape) {
       total += f->weight[c];
     }
   }
-  for (int32_t c = 0; c < CELLS; c++) {
+  for (int32_t c = 0; c < cell_count(f); c++) {
     for (int k = 0; k < 3; k++) {
       f->value[c][k] -= mean[k] / total;
       variance += f->weight[c] * f->value[c][k] * f->value[c][k];
@@ -118,7 +130,7 @@ static void field_make(field *f, const orb_aligned_shape *shape) {
     }
   }
   double scale = sqrt(total / (variance + 1e-300)), scale_normal = sqrt(NORMALS * total / (normal_variance + 1e-300));
-  for (int32_t c = 0; c < CELLS; c++) {
+  for (int32_t c = 0; c < cell_count(f); c++) {
     f->weight[c] /= total;
     for (int k = 0; k < 3; k++) {
       f->value[c][k] *= f->weight[c] > 0 ? scale : 0;
@@ -127,12 +139,23 @@ static void field_make(field *f, const orb_aligned_shape *shape) {
   }
 }
 
+typedef struct start {
+  double q[4], score;
+} start;
+
+/* Grid points of the highest scores: without a rotation in space, and with the best one. */
+typedef struct starts {
+  start upright[STARTS], best[STARTS];
+} starts;
+
 typedef struct search {
-  const field *a, *b;
   orb_context *ctx;
-  const double *from, *to; /* landmarks that should meet */
+  field fine[2], coarse[2]; /* of both shapes */
+  const double *from, *to;  /* landmarks that should meet */
   int32_t marks;
-  int spaced; /* starts that are far from each other are wanted */
+  double upright[GRID], best[GRID];         /* scores of the grid */
+  starts kept;                              /* the highest ones; those that are refined */
+  orb_status status[GRID / GRID_GRAIN + 1]; /* of each task */
 } search;
 
 /* The mean squared distance that a rotation leaves between the landmarks. */
@@ -147,15 +170,16 @@ static double misfit(const search *s, const double r[9]) {
 }
 
 /* Correlation of a with b rotated on the sphere: *upright without, *best with the best rotation in space. */
-static orb_status score_of(const search *s, const double r[9], double *upright, double *best) {
+static orb_status score_of(const search *s, const field of[2], const double r[9], double *upright, double *best) {
+  const field *a = &of[0], *b = &of[1];
   double m[9] = {0};
-  for (int32_t c = 0; c < CELLS; c++) {
-    const double *d = s->a->direction[c];
+  for (int32_t c = 0; c < cell_count(a); c++) {
+    const double *d = a->direction[c];
     /* what R carries to d lies at Rᵀ d */
     double q[3] = {r[0] * d[0] + r[3] * d[1] + r[6] * d[2], r[1] * d[0] + r[4] * d[1] + r[7] * d[2],
                    r[2] * d[0] + r[5] * d[1] + r[8] * d[2]};
-    const double *fa = s->a->value[c], *fb = s->b->value[cell_of(q)];
-    double w = s->a->weight[c];
+    const double *fa = a->value[c], *fb = b->value[cell_of(b->side, q)];
+    double w = a->weight[c];
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {
         m[3 * i + j] += w * (fb[i] * fa[j] + fb[3 + i] * fa[3 + j]);
@@ -184,10 +208,6 @@ static void quaternion_product(const double a[4], const double b[4], double out[
       a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
   memcpy(out, q, sizeof q);
 }
-
-typedef struct start {
-  double q[4], score;
-} start;
 
 static int is_near(const double a[4], const double b[4]) {
   return fabs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]) > cos(APART / 2);
@@ -219,39 +239,53 @@ static void keep_start(start *list, const double q[4], double score, int spaced)
   }
 }
 
-/* A grid over SO(3): a Fibonacci lattice of poles, and rotations around each. */
-static orb_status coarse(const search *s, start *upright, start *best) {
-  for (int i = 0; i < STARTS; i++) {
-    upright[i].score = best[i].score = -INFINITY;
+/* Point i of a grid over SO(3): a Fibonacci lattice of poles, and rotations around each. */
+static void grid_point(int32_t i, double q[4]) {
+  int pole = i / SPINS, j = i % SPINS;
+  double z = 1 - (2 * pole + 1.0) / AXES, angle = pole * GOLDEN_ANGLE;
+  double half = sqrt((1 + z) / 2), other = sqrt((1 - z) / 2);
+  double tilt[4] = {half, -other * sin(angle), other * cos(angle), 0};
+  double spin[4] = {cos(M_PI * j / SPINS), 0, 0, sin(M_PI * j / SPINS)};
+  quaternion_product(tilt, spin, q);
+}
+
+static void score_grid(void *arg, int64_t begin, int64_t end, int thread) {
+  search *s = arg;
+  orb_status *status = &s->status[begin / GRID_GRAIN];
+  (void)thread;
+  *status = ORB_OK;
+  for (int64_t i = begin; i < end && *status == ORB_OK; i++) {
+    double q[4], r[9];
+    grid_point((int32_t)i, q);
+    from_quaternion(q, r);
+    *status = score_of(s, s->coarse, r, &s->upright[i], &s->best[i]);
   }
-  for (int i = 0; i < AXES; i++) {
-    double z = 1 - (2 * i + 1.0) / AXES, angle = i * GOLDEN_ANGLE;
-    double half = sqrt((1 + z) / 2), other = sqrt((1 - z) / 2);
-    double tilt[4] = {half, -other * sin(angle), other * cos(angle), 0};
-    for (int j = 0; j < SPINS; j++) {
-      double spin[4] = {cos(M_PI * j / SPINS), 0, 0, sin(M_PI * j / SPINS)}, q[4], r[9], up, any;
-      quaternion_product(tilt, spin, q);
-      from_quaternion(q, r);
-      ORB_TRY(score_of(s, r, &up, &any));
-      keep_start(upright, q, up, s->spaced);
-      keep_start(best, q, any, s->spaced);
-    }
-    ORB_TRY(orb_context_check(s->ctx));
+}
+
+/* Evaluates the grid. */
+static orb_status coarse(search *s) {
+  orb_parallel_for(s->ctx, GRID, GRID_GRAIN, score_grid, s);
+  for (int i = 0; i < GRID / GRID_GRAIN; i++) {
+    ORB_TRY(s->status[i]);
   }
-  return ORB_OK;
+  return orb_context_check(s->ctx);
 }
 
 /* Pattern search: small rotations around the three axes in both directions, halved until they are tiny. */
 static orb_status descend(const search *s, start *from, int use_upright) {
+  double r[9], up, any;
+  from_quaternion(from->q, r);
+  ORB_TRY(score_of(s, s->fine, r, &up, &any));
+  from->score = use_upright ? up : any;
   for (double step = FIRST_STEP; step > LAST_STEP; step /= 2) {
     for (int moved = 1, rounds = 0; moved && rounds < MOVES; rounds++) {
       moved = 0;
       for (int k = 0; k < 6; k++) {
-        double spin[4] = {cos(step / 2), 0, 0, 0}, q[4], r[9], up, any;
+        double spin[4] = {cos(step / 2), 0, 0, 0}, q[4];
         spin[1 + k / 2] = k % 2 ? -sin(step / 2) : sin(step / 2);
         quaternion_product(spin, from->q, q);
         from_quaternion(q, r);
-        ORB_TRY(score_of(s, r, &up, &any));
+        ORB_TRY(score_of(s, s->fine, r, &up, &any));
         if ((use_upright ? up : any) > from->score) {
           from->score = use_upright ? up : any;
           memcpy(from->q, q, sizeof q);
@@ -260,43 +294,60 @@ static orb_status descend(const search *s, start *from, int use_upright) {
       }
     }
   }
+  return ORB_OK;
+}
+
+static void descend_range(void *arg, int64_t begin, int64_t end, int thread) {
+  search *s = arg;
+  (void)thread;
+  for (int64_t i = begin; i < end; i++) {
+    start *one = i < STARTS ? &s->kept.upright[i] : &s->kept.best[i - STARTS];
+    s->status[i] = one->score > -INFINITY ? descend(s, one, i < STARTS) : ORB_OK;
+  }
+}
+
+/* Keeps the highest points of the grid and refines them. spaced: starts that are far from each other are wanted. */
+static orb_status refine(search *s, int spaced) {
+  for (int i = 0; i < STARTS; i++) {
+    s->kept.upright[i].score = s->kept.best[i].score = -INFINITY;
+  }
+  for (int32_t i = 0; i < GRID; i++) {
+    double q[4];
+    grid_point(i, q);
+    keep_start(s->kept.upright, q, s->upright[i], spaced);
+    keep_start(s->kept.best, q, s->best[i], spaced);
+  }
+  orb_parallel_for(s->ctx, 2 * STARTS, 1, descend_range, s);
+  for (int i = 0; i < 2 * STARTS; i++) {
+    ORB_TRY(s->status[i]);
+  }
   return orb_context_check(s->ctx);
 }
 
-/* Both lists of local maxima, refined. */
-static orb_status find_starts(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
-                              const double *from, const double *to, int32_t count, int spaced, start *upright,
-                              start *best) {
-  orb_status status = ORB_OK;
-  field *fa = ORB_NEW(ctx, field, 1), *fb = ORB_NEW(ctx, field, 1);
-  if (!fa || !fb) {
-    status = ORB_E_NO_MEMORY;
-    goto end;
+/* A search whose grid is evaluated. */
+static orb_status search_create(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
+                                const double *from, const double *to, int32_t count, search **out) {
+  search *s = *out = ORB_NEW0(ctx, search, 1);
+  if (!s) {
+    return ORB_E_NO_MEMORY;
   }
-  field_make(fa, a);
-  field_make(fb, b);
-  search s = {.a = fa, .b = fb, .ctx = ctx, .from = from, .to = to, .marks = count, .spaced = spaced};
-  ORB_GO(status, coarse(&s, upright, best), end);
-  for (int i = 0; i < STARTS; i++) {
-    if (upright[i].score > -INFINITY) {
-      ORB_GO(status, descend(&s, &upright[i], 1), end);
-    }
-    if (best[i].score > -INFINITY) {
-      ORB_GO(status, descend(&s, &best[i], 0), end);
-    }
+  s->ctx = ctx;
+  s->from = from;
+  s->to = to;
+  s->marks = count;
+  for (int k = 0; k < 2; k++) {
+    field_make(&s->fine[k], SIDE, k ? b : a);
+    field_make(&s->coarse[k], COARSE_SIDE, k ? b : a);
   }
-end:
-  orb_free(ctx, fa);
-  orb_free(ctx, fb);
-  return status;
+  return coarse(s);
 }
 
 /* The best rotation for shapes in one upright frame, unless another explains much more. */
-static const start *choose(const start *upright, const start *best) {
-  const start *top_upright = upright, *top_best = best;
+static const start *choose(const starts *list) {
+  const start *top_upright = list->upright, *top_best = list->best;
   for (int i = 1; i < STARTS; i++) {
-    top_upright = upright[i].score > top_upright->score ? &upright[i] : top_upright;
-    top_best = best[i].score > top_best->score ? &best[i] : top_best;
+    top_upright = list->upright[i].score > top_upright->score ? &list->upright[i] : top_upright;
+    top_best = list->best[i].score > top_best->score ? &list->best[i] : top_best;
   }
   return top_upright->score > top_best->score - UPRIGHT * fabs(top_best->score) ? top_upright : top_best;
 }
@@ -304,38 +355,52 @@ static const start *choose(const start *upright, const start *best) {
 orb_status orb_rotation_search_near(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
                                     const double *from, const double *to, int32_t count, double rotation[9],
                                     double *score) {
-  start upright[STARTS], best[STARTS];
-  ORB_TRY(find_starts(ctx, a, b, from, to, count, 0, upright, best));
-  const start *chosen = choose(upright, best);
+  search *s = NULL;
+  orb_status status;
+  ORB_GO(status, search_create(ctx, a, b, from, to, count, &s), end);
+  ORB_GO(status, refine(s, 0), end);
+  const start *chosen = choose(&s->kept);
   from_quaternion(chosen->q, rotation);
   if (score) {
     *score = chosen->score;
   }
-  return ORB_OK;
+end:
+  orb_free(ctx, s);
+  return status;
+}
+
+/* The highest start of both lists that is far from all that are taken; NULL: none. */
+static const start *next_start(const starts *list, const start *taken, int32_t count) {
+  const start *top = NULL;
+  for (int i = 0; i < 2 * STARTS; i++) {
+    const start *one = i < STARTS ? &list->upright[i] : &list->best[i - STARTS];
+    int known = 0;
+    for (int32_t k = 0; k < count; k++) {
+      known |= is_near(one->q, taken[k].q);
+    }
+    top = !known && one->score > -INFINITY && (!top || one->score > top->score) ? one : top;
+  }
+  return top;
 }
 
 orb_status orb_rotation_candidates(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
                                    int32_t most, double *rotations, int32_t *count) {
-  start list[2 * STARTS], taken[2 * STARTS];
-  ORB_TRY(find_starts(ctx, a, b, NULL, NULL, 0, 0, list, list + STARTS));
-  taken[0] = *choose(list, list + STARTS);
-  ORB_TRY(find_starts(ctx, a, b, NULL, NULL, 0, 1, list, list + STARTS));
-  for (*count = 0; *count < most && *count < 2 * STARTS; ++*count) {
-    const start *top = *count ? NULL : taken;
-    for (int i = 0; *count && i < 2 * STARTS; i++) {
-      int known = 0;
-      for (int k = 0; k < *count; k++) {
-        known |= is_near(list[i].q, taken[k].q);
-      }
-      top = !known && list[i].score > -INFINITY && (!top || list[i].score > top->score) ? &list[i] : top;
-    }
-    if (!top) {
-      break;
-    }
+  search *s = NULL;
+  start taken[2 * STARTS];
+  orb_status status;
+  *count = 0;
+  ORB_GO(status, search_create(ctx, a, b, NULL, NULL, 0, &s), end);
+  ORB_GO(status, refine(s, 0), end);
+  taken[0] = *choose(&s->kept);
+  ORB_GO(status, refine(s, 1), end);
+  for (const start *top = taken; top && *count < most && *count < 2 * STARTS;) {
     taken[*count] = *top;
-    from_quaternion(top->q, rotations + 9 * *count);
+    from_quaternion(top->q, rotations + 9 * (*count)++);
+    top = next_start(&s->kept, taken, *count);
   }
-  return ORB_OK;
+end:
+  orb_free(ctx, s);
+  return status;
 }
 
 orb_status orb_rotation_search(orb_context *ctx, const orb_aligned_shape *a, const orb_aligned_shape *b,
