@@ -13,6 +13,7 @@
 #include "base/check.h"
 #include "base/context.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "elastic/body.h"
 #include "elastic/factor.h"
 #include "numeric/rotation.h"
@@ -25,7 +26,8 @@ enum {
   PLACE_ROUNDS = 10, /* to the nearest places; 30 rank maps no better */
   SETTLE_ROUNDS = 6, /* of a pose that is near already */
   TURNS = 2,         /* of rotations and positions in a round */
-  SURROUNDINGS = 60  /* vertices whose images give a first rotation: a limb's girth and as much of its length */
+  SURROUNDINGS = 60, /* vertices whose images give a first rotation: a limb's girth and as much of its length */
+  GRAIN = 128        /* vertices of one task */
 };
 /* Distance at which a pull is as strong as the edges. A rough map is off by 0.2 or more at the ends of limbs. */
 static const double MAP_REACH = 0.6, FIRST_REACH = 0.6, LAST_REACH = 0.06;
@@ -52,11 +54,24 @@ typedef struct registration {
   orb_searched searched;
   double *diagonal, *right; /* the system */
   double *pull, *target;    /* on each vertex of a: the weight, and the weighted target (3) */
+  int32_t *place, *visit;   /* of each vertex of a: the nearest one of b; of each vertex of b: the nearest one of a */
+  int is_alone;             /* no other registration runs beside this one: its loops run on all threads */
 } registration;
 
-static void fit_rotations(registration *r) {
+/* Runs body over the vertices [0, count). */
+static void for_vertices(registration *r, int32_t count, orb_loop_fn body) {
+  if (r->is_alone) {
+    orb_parallel_for(r->ctx, count, GRAIN, body, r);
+  } else {
+    body(r, 0, count, 0);
+  }
+}
+
+static void fit_range(void *arg, int64_t begin, int64_t end, int thread) {
+  registration *r = arg;
   const orb_body *a = &r->a;
-  for (int32_t v = 0; v < a->count; v++) {
+  (void)thread;
+  for (int32_t v = (int32_t)begin; v < end; v++) {
     double h[9] = {0};
     for (int32_t i = a->start[v]; i < a->start[v + 1]; i++) {
       double p[3], q[3];
@@ -66,6 +81,10 @@ static void fit_rotations(registration *r) {
     }
     (void)orb_nearest_rotation(h, r->pose->rotation + 9 * (size_t)v);
   }
+}
+
+static void fit_rotations(registration *r) {
+  for_vertices(r, r->a.count, fit_range);
 }
 
 /* What the rotations at both ends make of the edge that arrives at v, summed over its edges. */
@@ -82,10 +101,11 @@ static void add_edges(const registration *r, int32_t v, double sum[3]) {
   }
 }
 
-/* Positions for the rotations and pulls as they are. again: the pulls have other weights than last time. */
-static orb_status solve(registration *r, int again) {
+static void fill_system(void *arg, int64_t begin, int64_t end, int thread) {
+  registration *r = arg;
   const orb_body *a = &r->a;
-  for (int32_t v = 0; v < a->count; v++) {
+  (void)thread;
+  for (int32_t v = (int32_t)begin; v < end; v++) {
     double *right = r->right + 3 * (size_t)v;
     memcpy(right, r->target + 3 * (size_t)v, sizeof(double[3]));
     add_edges(r, v, right);
@@ -94,6 +114,11 @@ static orb_status solve(registration *r, int again) {
       r->diagonal[v] += a->weight[i];
     }
   }
+}
+
+/* Positions for the rotations and pulls as they are. again: the pulls have other weights than last time. */
+static orb_status solve(registration *r, int again) {
+  for_vertices(r, r->a.count, fill_system);
   if (again) {
     ORB_TRY(orb_factor_compute(r->factor, r->diagonal));
   }
@@ -136,22 +161,40 @@ static void slide(const double p[3], const double n[3], const double x[3], doubl
   }
 }
 
+static void find_places(void *arg, int64_t begin, int64_t end, int thread) {
+  registration *r = arg;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
+    r->place[v] = orb_searched_nearest(&r->b.searched, r->pose->position + 3 * v, r->normal + 3 * v);
+  }
+}
+
+static void find_visits(void *arg, int64_t begin, int64_t end, int thread) {
+  registration *r = arg;
+  (void)thread;
+  for (int64_t u = begin; u < end; u++) {
+    r->visit[u] = orb_searched_nearest(&r->searched, r->b.mesh->positions + 3 * u, r->b.normal + 3 * u);
+  }
+}
+
 /* Each vertex of a is pulled to the nearest place of b, and each vertex of b pulls the nearest one of a. */
 static void pull_by_place(registration *r, double weight) {
   const double *position = r->pose->position;
   double target[3];
   orb_body_normals(r->a.mesh, position, r->normal, NULL);
   orb_searched_fill(position, r->normal, r->a.count, &r->searched);
+  for_vertices(r, r->a.count, find_places);
+  for_vertices(r, r->b.count, find_visits);
   for (int32_t v = 0; v < r->a.count; v++) {
     const double *x = position + 3 * (size_t)v, *n = r->normal + 3 * (size_t)v;
-    size_t u = 3 * (size_t)orb_searched_nearest(&r->b.searched, x, n);
+    size_t u = 3 * (size_t)r->place[v];
     int faces = orb_dot(n, r->b.normal + u) > FACING;
     slide(r->b.mesh->positions + u, r->b.normal + u, x, target);
     add_pull(r, v, faces ? target : x, weight * r->a.mass[v] * (faces ? 1 : HELD));
   }
   for (int32_t u = 0; u < r->b.count; u++) {
     const double *x = r->b.mesh->positions + 3 * (size_t)u, *n = r->b.normal + 3 * (size_t)u;
-    int32_t v = orb_searched_nearest(&r->searched, x, n);
+    int32_t v = r->visit[u];
     if (orb_dot(n, r->normal + 3 * (size_t)v) > FACING) {
       slide(x, n, position + 3 * (size_t)v, target);
       add_pull(r, v, target, weight * r->b.mass[u]);
@@ -271,6 +314,8 @@ static void registration_free(registration *r) {
   orb_free(r->ctx, r->right);
   orb_free(r->ctx, r->pull);
   orb_free(r->ctx, r->target);
+  orb_free(r->ctx, r->place);
+  orb_free(r->ctx, r->visit);
 }
 
 static orb_status factor_create(registration *r) {
@@ -302,7 +347,9 @@ static orb_status registration_create(orb_context *ctx, const orb_mesh *a, const
   r->right = ORB_NEW(ctx, double, 3 * n);
   r->pull = ORB_NEW(ctx, double, n);
   r->target = ORB_NEW(ctx, double, 3 * n);
-  if (!r->normal || !r->diagonal || !r->right || !r->pull || !r->target) {
+  r->place = ORB_NEW(ctx, int32_t, n);
+  r->visit = ORB_NEW(ctx, int32_t, b->vertex_count);
+  if (!r->normal || !r->diagonal || !r->right || !r->pull || !r->target || !r->place || !r->visit) {
     return ORB_E_NO_MEMORY;
   }
   return factor_create(r);
@@ -322,7 +369,7 @@ end:
 }
 
 orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b, orb_elastic_pose *pose) {
-  registration r = {.ctx = ctx, .pose = pose};
+  registration r = {.ctx = ctx, .pose = pose, .is_alone = 1};
   orb_status status;
   ORB_GO(status, registration_create(ctx, a, b, &r), end);
   status = follow_places(&r, SETTLE_ROUNDS, SETTLE_FIRST_REACH, SETTLE_LAST_REACH);
@@ -345,22 +392,36 @@ static void carry_point(const orb_mesh *coarse, const orb_elastic_pose *pose, co
   }
 }
 
-orb_status orb_elastic_carry(orb_context *ctx, const orb_mesh *coarse, const orb_elastic_pose *pose,
-                             const double *points, int32_t count, orb_elastic_pose *out) {
+typedef struct carrying {
+  const orb_mesh *coarse;
+  const orb_elastic_pose *pose;
+  const double *points;
   orb_nearest *tree;
-  ORB_TRY(orb_nearest_create(ctx, coarse->positions, coarse->triangles, coarse->triangle_count, &tree));
-  for (int32_t v = 0; v < count; v++) {
+  orb_elastic_pose *out;
+} carrying;
+
+static void carry_range(void *arg, int64_t begin, int64_t end, int thread) {
+  const carrying *c = arg;
+  (void)thread;
+  for (int64_t v = begin; v < end; v++) {
     orb_place place;
-    const double *p = points + 3 * (size_t)v;
-    (void)orb_nearest_query(tree, p, INFINITY, &place);
-    carry_point(coarse, pose, &place, p, out->position + 3 * (size_t)v);
-    if (out->rotation) {
+    const double *p = c->points + 3 * v;
+    (void)orb_nearest_query(c->tree, p, INFINITY, &place);
+    carry_point(c->coarse, c->pose, &place, p, c->out->position + 3 * v);
+    if (c->out->rotation) {
       int most = place.at[1] > place.at[0] ? 1 : 0;
       most = place.at[2] > place.at[most] ? 2 : most;
-      int32_t u = coarse->triangles[3 * (size_t)place.triangle + (size_t)most];
-      memcpy(out->rotation + 9 * (size_t)v, pose->rotation + 9 * (size_t)u, sizeof(double[9]));
+      int32_t u = c->coarse->triangles[3 * (size_t)place.triangle + (size_t)most];
+      memcpy(c->out->rotation + 9 * v, c->pose->rotation + 9 * (size_t)u, sizeof(double[9]));
     }
   }
-  orb_nearest_destroy(ctx, tree);
+}
+
+orb_status orb_elastic_carry(orb_context *ctx, const orb_mesh *coarse, const orb_elastic_pose *pose,
+                             const double *points, int32_t count, orb_elastic_pose *out) {
+  carrying c = {.coarse = coarse, .pose = pose, .points = points, .out = out};
+  ORB_TRY(orb_nearest_create(ctx, coarse->positions, coarse->triangles, coarse->triangle_count, &c.tree));
+  orb_parallel_for(ctx, count, GRAIN, carry_range, &c);
+  orb_nearest_destroy(ctx, c.tree);
   return ORB_OK;
 }

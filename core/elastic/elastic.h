@@ -32,16 +32,16 @@ typedef struct orb_elastic_pose {
 /* Moves mesh a to mesh b along a rough map, then to the nearest places. Both meshes are scaled to the same area, near
  * 4π, and have no vertex without triangles. Fills the pose. *bend: mean squared change of the edges of a against the
  * rotations of their ends, relative to their squared lengths. O(n · m) a round, 14 rounds: about 0.05 s for two meshes
- * of a thousand vertices. One thread; may run beside others in contexts' loops. */
+ * of a thousand vertices. One thread; may run beside others in loops of the context. */
 ORB_MUST_CHECK orb_status orb_elastic_register(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
                                                const orb_rough_map *map, orb_elastic_pose *pose, double *bend);
 
-/* Moves mesh a to the nearest places of mesh b from a pose near them. Changes the pose. */
+/* Moves mesh a to the nearest places of mesh b from a pose near them. Changes the pose. On all threads. */
 ORB_MUST_CHECK orb_status orb_elastic_settle(orb_context *ctx, const orb_mesh *a, const orb_mesh *b,
                                              orb_elastic_pose *pose);
 
 /* Carries a pose of a coarse mesh to points beside it: each point moves with the corners of its nearest triangle.
- * points: 3 each. out->rotation may be NULL. O(count log n). */
+ * points: 3 each. out->rotation may be NULL. O(count log n), on all threads. */
 ORB_MUST_CHECK orb_status orb_elastic_carry(orb_context *ctx, const orb_mesh *coarse, const orb_elastic_pose *pose,
                                             const double *points, int32_t count, orb_elastic_pose *out);
 
