@@ -20,7 +20,8 @@ static orb_status clear_again(orb_map_run *c, orb_map_start start, orb_map_level
 }
 
 /* Clears the flips of a start's first level. *flips: those left; a finer level may clear them, unless *given_up: the
- * start is dropped, which is not an error: another start, or the given alignment, remains. */
+ * start is dropped, which is not an error: another start, or the given alignment, remains. One that covers the sphere
+ * twice is dropped here: sweeps without flips keep it so. */
 static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_start start, orb_map_level *l,
                               int32_t *flips, int *given_up) {
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
@@ -42,7 +43,7 @@ static orb_status clear_start(orb_map_run *c, const orb_refiner *r, orb_map_star
     ORB_TRY(orb_map_keep_usable(c, l, to_mesh));
     ORB_TRY(orb_map_release(c, l, to_mesh, flips));
   }
-  *given_up = *flips && (last || *flips > hopeless);
+  *given_up = *flips ? last || *flips > hopeless : !orb_map_level_covers_once(l);
   return ORB_OK;
 }
 
