@@ -2,6 +2,7 @@
 #include "base/error.h"
 
 #include <stdarg.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -9,7 +10,7 @@
 #include "base/state.h"
 
 void orb_error_reset(orb_error *error) {
-  memset(error, 0, sizeof *error);
+  memset(error, 0, offsetof(orb_error, loop_vertices)); /* these are as many as loop_start says */
   error->line = error->offset = error->boundary_loops = error->genus = -1;
   error->shape = -1;
 }

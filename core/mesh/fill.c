@@ -193,7 +193,7 @@ static orb_status grow_surface(orb_surface *s, int32_t faces) {
   return s->twin && s->piece && s->reversed ? ORB_OK : ORB_E_NO_MEMORY;
 }
 
-static orb_status run(fill *f) {
+static orb_status run(fill *f, int fans, int64_t *count) {
   orb_surface *s = f->s;
   orb_mesh *mesh = s->mesh;
   int64_t loops = 0, open = s->edges.open, before = s->edges.crowded;
@@ -210,7 +210,7 @@ static orb_status run(fill *f) {
   }
   ORB_TRY(orb_polygon_reserve(s->ctx, &f->polygon, (int32_t)open));
   ORB_TRY(orb_mesh_reserve(s->ctx, mesh, (int32_t)loops, (int32_t)open));
-  ORB_TRY(close_all(f, 0, &loops));
+  ORB_TRY(close_all(f, fans, &loops));
   ORB_TRY(grow_surface(s, faces + (int32_t)open));
   ORB_TRY(orb_surface_rematch(s));
   if (s->edges.crowded > before || s->edges.open > 0) {
@@ -219,17 +219,17 @@ static orb_status run(fill *f) {
     ORB_TRY(close_all(f, 1, &loops));
     ORB_TRY(orb_surface_rematch(s));
   }
-  orb_mesh_note(mesh, "fill_holes", loops);
+  *count = loops;
   return ORB_OK;
 }
 
-orb_status orb_surface_fill(orb_surface *s) {
+orb_status orb_surface_fill(orb_surface *s, int fans, int64_t *loops) {
   fill *f = orb_calloc(s->ctx, 1, sizeof *f);
   if (!f) {
     return ORB_E_NO_MEMORY;
   }
   f->s = s;
-  orb_status status = run(f);
+  orb_status status = run(f, fans, loops);
   orb_polygon_free(s->ctx, &f->polygon);
   orb_free(s->ctx, f->loop);
   orb_free(s->ctx, f->vertex);

@@ -2,7 +2,8 @@
  *
  * In: a mesh as a reader left it. Out: one that can be embedded, or an error with the facts. Reading order of the
  * folder: repair.c (the sequence of repairs and checks), surface (the mesh with its twins, pieces, fans and loops),
- * edges (twins), edit (changes that keep attributes), weld, fill and polygon (seams, holes, polygons), refuse (the
+ * edges (twins), edit (changes that keep attributes), weld, fill and polygon (seams, holes, polygons),
+ * cycles and handles (handles: their loops, and how they are closed), refuse (the
  * errors). topology.c measures any index list, nearest.c finds nearest points, normals computes normals, sort.h sorts.
  */
 #include <string.h>
@@ -31,7 +32,8 @@ void orb_mesh_drop_attributes(orb_context *ctx, orb_mesh *mesh) {
 }
 
 void orb_mesh_free(orb_context *ctx, orb_mesh *mesh) {
-  void *blocks[] = {mesh->positions, mesh->triangles, mesh->source, mesh->vertex_of_source, mesh->source_triangle};
+  void *blocks[] = {mesh->positions,       mesh->triangles, mesh->source,       mesh->vertex_of_source,
+                    mesh->source_triangle, mesh->handles,   mesh->loop_vertices};
   orb_mesh_drop_attributes(ctx, mesh);
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
     orb_free(ctx, blocks[i]);
@@ -59,6 +61,8 @@ orb_status orb_mesh_copy(orb_context *ctx, const orb_mesh *mesh, orb_mesh *out) 
   copy.vertex_of_source =
       copy_block(ctx, mesh->vertex_of_source, (size_t)mesh->file_vertex_count, sizeof(int32_t), &good);
   copy.source_triangle = copy_block(ctx, mesh->source_triangle, t, sizeof(int32_t), &good);
+  copy.handles = copy_block(ctx, mesh->handles, (size_t)mesh->handle_count, sizeof(orb_handle), &good);
+  copy.loop_vertices = copy_block(ctx, mesh->loop_vertices, (size_t)mesh->loop_vertex_count, sizeof(int32_t), &good);
   copy.normals = copy_block(ctx, mesh->normals, 9 * t, sizeof(float), &good);
   copy.texcoords = copy_block(ctx, mesh->texcoords, 6 * t, sizeof(float), &good);
   copy.colors = copy_block(ctx, mesh->colors, 12 * t, sizeof(float), &good);

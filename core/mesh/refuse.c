@@ -1,10 +1,12 @@
 #include "mesh/refuse.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/check.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "mesh/handles.h"
 #include "mesh/sort.h"
 
 static const char *plural(int64_t count, const char *one, const char *many) {
@@ -185,12 +187,37 @@ orb_status orb_refuse_pieces(orb_surface *s) {
   return ORB_E_NOT_CONNECTED;
 }
 
-orb_status orb_refuse_handles(orb_surface *s, int64_t genus) {
-  (void)orb_fail(s->ctx, ORB_E_NOT_GENUS_ZERO,
-                 "The surface has %lld %s (like a torus or a cup's ear); only surfaces like a sphere can be "
-                 "morphed. Fill or cut %s.",
-                 (long long)genus, plural(genus, "handle", "handles"), plural(genus, "it", "them"));
-  orb_context_error_edit(s->ctx)->genus = genus;
+orb_status orb_refuse_handles(orb_surface *s, int64_t genus, double limit) {
+  orb_loops loops = {0};
+  orb_status status = orb_surface_list_handles(s, genus, &loops);
+  if (status != ORB_OK) {
+    orb_loops_free(s->ctx, &loops);
+    return status;
+  }
+  if (limit > 0) {
+    (void)orb_fail(s->ctx, ORB_E_NOT_GENUS_ZERO,
+                   "The surface has %lld %s that no loop of up to %.3g of its diagonal goes around. Allow more with "
+                   "handle_size, or fill or cut %s.",
+                   (long long)genus, plural(genus, "handle", "handles"), limit, plural(genus, "it", "them"));
+  } else {
+    (void)orb_fail(s->ctx, ORB_E_NOT_GENUS_ZERO,
+                   "The surface has %lld %s (like a torus or a cup's ear); only surfaces like a sphere can be "
+                   "morphed. Fill or cut %s, or send the mesh with repair=close_handles if %s small.",
+                   (long long)genus, plural(genus, "handle", "handles"), plural(genus, "it", "them"),
+                   plural(genus, "it is", "they are"));
+  }
+  orb_error *error = orb_context_error_edit(s->ctx);
+  error->genus = genus;
+  for (int32_t i = 0; i < loops.count && i < ORB_ERROR_ITEMS; i++) {
+    int32_t at = error->loop_start[error->loop_count], count = loops.loop[i].count;
+    if (count > ORB_ERROR_LOOP_VERTICES - at) {
+      continue; /* a shorter one may fit */
+    }
+    memcpy(error->loop_vertices + at, loops.vertices + loops.loop[i].start, (size_t)count * sizeof(int32_t));
+    error->loop_length_relative[error->loop_count++] = loops.loop[i].length_relative;
+    error->loop_start[error->loop_count] = at + count;
+  }
+  orb_loops_free(s->ctx, &loops);
   return ORB_E_NOT_GENUS_ZERO;
 }
 

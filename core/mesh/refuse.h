@@ -10,7 +10,9 @@ orb_status orb_refuse_facing(orb_surface *surface);
 orb_status orb_refuse_open(orb_surface *surface);
 orb_status orb_refuse_pinched(orb_surface *surface, const orb_fans *fans);
 orb_status orb_refuse_pieces(orb_surface *surface);
-orb_status orb_refuse_handles(orb_surface *surface, int64_t genus);
+/* With a loop for each handle; changes the surface. limit: the longest loop that close_handles was allowed to cut
+ * along, relative to the diagonal; 0: the repair was not allowed. */
+orb_status orb_refuse_handles(orb_surface *surface, int64_t genus, double limit);
 orb_status orb_refuse_few(orb_surface *surface);
 
 /* Fails with ORB_E_DEGENERATE where float32 cannot hold the mesh: tiny, or far from the origin. O(V). */

@@ -13,6 +13,7 @@
 #include "base/memory.h"
 #include "mesh/edit.h"
 #include "mesh/fill.h"
+#include "mesh/handles.h"
 #include "mesh/refuse.h"
 #include "mesh/weld.h"
 
@@ -182,11 +183,14 @@ static orb_status close_surface(orb_surface *s, unsigned repair) {
   orb_fans fans;
   ORB_TRY(orb_surface_fans(s, 1, &fans)); /* so that each boundary vertex lies on one loop, once */
   orb_mesh_note(s->mesh, "split-vertices", fans.pinched);
-  ORB_TRY(orb_surface_fill(s));
+  int64_t loops;
+  ORB_TRY(orb_surface_fill(s, 0, &loops));
+  orb_mesh_note(s->mesh, "fill_holes", loops);
   return orb_surface_pieces(s);
 }
 
-static orb_status check_one_sphere(orb_surface *s, unsigned repair) {
+static orb_status check_one_sphere(orb_surface *s, const orb_repair_options *options) {
+  unsigned repair = options->repair;
   orb_fans fans;
   ORB_TRY(orb_surface_fans(s, 0, &fans));
   if (fans.pinched > 0 && (!is_safe(repair) || (s->piece_count > 1 && s->piece_count - fans.joins == 1))) {
@@ -201,12 +205,19 @@ static orb_status check_one_sphere(orb_surface *s, unsigned repair) {
   }
   int64_t euler = fans.fans - s->edges.edges + s->mesh->triangle_count;
   if (euler != 2) {
-    return orb_refuse_handles(s, 1 - euler / 2);
+    int64_t genus = 1 - euler / 2;
+    double limit = repair & ORB_REPAIR_CLOSE_HANDLES ? options->handle_size : 0;
+    if (limit > 0) {
+      ORB_TRY(orb_surface_close_handles(s, limit, &genus));
+    }
+    return genus > 0 ? orb_refuse_handles(s, genus, limit) : ORB_OK;
   }
   return ORB_OK;
 }
 
-static orb_status repair_surface(orb_surface *s, unsigned repair, unsigned char **reversed, int32_t *old) {
+static orb_status repair_surface(orb_surface *s, const orb_repair_options *options, unsigned char **reversed,
+                                 int32_t *old) {
+  unsigned repair = options->repair;
   orb_mesh *mesh = s->mesh;
   int64_t unused = 0;
   int opened_by_dropping = 0;
@@ -232,7 +243,7 @@ static orb_status repair_surface(orb_surface *s, unsigned repair, unsigned char 
   ORB_TRY(make_consistent(s, repair, reversed));
   *old = mesh->triangle_count;
   ORB_TRY(close_surface(s, repair));
-  ORB_TRY(check_one_sphere(s, repair));
+  ORB_TRY(check_one_sphere(s, options));
   if (mesh->triangle_count < 4) {
     return orb_refuse_few(s);
   }
@@ -242,6 +253,12 @@ static orb_status repair_surface(orb_surface *s, unsigned repair, unsigned char 
 }
 
 orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair) {
+  return orb_mesh_repair_with(ctx, mesh, &(orb_repair_options){.repair = repair});
+}
+
+orb_status orb_mesh_repair_with(orb_context *ctx, orb_mesh *mesh, const orb_repair_options *options) {
+  orb_repair_options own = *options;
+  own.handle_size = own.handle_size > 0 ? own.handle_size : ORB_HANDLE_SIZE;
   orb_surface surface = {0};
   unsigned char *reversed = NULL;
   int32_t old = 0;
@@ -250,7 +267,7 @@ orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair) {
     status = orb_surface_open(ctx, mesh, &surface);
   }
   if (status == ORB_OK) {
-    status = repair_surface(&surface, repair, &reversed, &old);
+    status = repair_surface(&surface, &own, &reversed, &old);
   }
   if (status == ORB_OK) {
     status = orb_refuse_size(ctx, mesh);

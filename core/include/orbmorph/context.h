@@ -19,7 +19,7 @@ extern "C" {
 
 typedef struct orb_context orb_context;
 
-enum { ORB_ERROR_ITEMS = 100 };
+enum { ORB_ERROR_ITEMS = 100, ORB_ERROR_LOOP_VERTICES = 16384 };
 
 /* The facts of a failure. Numbers that do not apply are −1, counts 0. Vertex numbers are those of the file. */
 typedef struct orb_error {
@@ -40,6 +40,11 @@ typedef struct orb_error {
   int32_t landmark_count; /* bad-landmarks: their indices in the request */
   int32_t landmarks[ORB_ERROR_ITEMS];
   int32_t shape; /* the offending shape, −1 if none in particular */
+  /* not-genus-zero: closed walks along edges of the file, one for each handle as far as there is room. Loop i has the
+   * vertices loop_vertices[loop_start[i]] … loop_vertices[loop_start[i + 1] − 1], each once. */
+  int32_t loop_count, loop_start[ORB_ERROR_ITEMS + 1];
+  double loop_length_relative[ORB_ERROR_ITEMS]; /* to the diagonal */
+  int32_t loop_vertices[ORB_ERROR_LOOP_VERTICES];
 } orb_error;
 
 /* Called with the stage ("simplify", "embed", …) and the fraction of that stage that is done, 0 to 1. Any thread of the

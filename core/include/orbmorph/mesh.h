@@ -16,11 +16,20 @@ extern "C" {
 enum { ORB_REPAIR_KINDS_MAX = 16 };
 
 /* One kind of repair. kind: "triangulate", "weld", "unused-vertices", "duplicate-faces", "degenerate-faces",
- * "reorient", "turn-inside-out", "split-vertices", "fill_holes", "largest_component". */
+ * "reorient", "turn-inside-out", "split-vertices", "fill_holes", "largest_component". Handles that were closed are
+ * listed one by one: orb_handle. */
 typedef struct orb_repair {
   const char *kind; /* a literal */
   int64_t count;    /* faces, vertices, holes or pieces that it changed, depending on the kind */
 } orb_repair;
+
+/* A handle that ORB_REPAIR_CLOSE_HANDLES closed: the surface is cut along a loop, and a patch covers each of the two
+ * rims. Around the handle this cuts the handle; around its tunnel it fills the tunnel. */
+typedef struct orb_handle {
+  int32_t start, count; /* the loop: mesh.loop_vertices[start] …, numbers of the file, in order; it is closed */
+  double length_relative, area_relative; /* of the loop, to the diagonal; of both patches, to its square */
+  int filled;                            /* whether the loop ran around the tunnel */
+} orb_handle;
 
 /* A mesh. The context owns all arrays; optional ones are NULL where the file has none. */
 typedef struct orb_mesh {
@@ -34,7 +43,7 @@ typedef struct orb_mesh {
   int32_t file_vertex_count, file_triangle_count;
   int32_t *source;           /* of each vertex: the lowest-numbered vertex of the file that it stands for */
   int32_t *vertex_of_source; /* file_vertex_count: the vertex that stands for it, −1 if dropped */
-  int32_t *source_triangle;  /* of each triangle: its number in the file, −1: made by fill_holes */
+  int32_t *source_triangle;  /* of each triangle: its number in the file, −1: made by fill_holes or close_handles */
 
   /* Attributes of corners (corner h belongs to vertex triangles[h]). */
   float *normals;    /* 3 a corner, unit */
@@ -50,6 +59,9 @@ typedef struct orb_mesh {
 
   int32_t repair_count;
   orb_repair repairs[ORB_REPAIR_KINDS_MAX];
+  int32_t handle_count, loop_vertex_count;
+  orb_handle *handles; /* in the order in which they were closed */
+  int32_t *loop_vertices;
 } orb_mesh;
 
 static inline int32_t orb_next(int32_t h) {
@@ -91,6 +103,7 @@ enum {
   ORB_REPAIR_SAFE = 1,              /* only what is needed and changes no shape; each repair is counted */
   ORB_REPAIR_FILL_HOLES = 2,        /* implies safe */
   ORB_REPAIR_LARGEST_COMPONENT = 4, /* implies safe; keeps the piece with the most triangles */
+  ORB_REPAIR_CLOSE_HANDLES = 8,     /* implies safe; see orb_repair_options.handle_size */
 };
 
 /* Prepares a mesh for embedding, in place, or reports why it cannot be embedded. Afterwards it is closed, manifold,
@@ -99,6 +112,17 @@ enum {
  * mesh that is wholly inside out. On failure the contents of the mesh are unspecified but can be freed, and the error
  * has the facts (edges and vertices in the file's numbers). O(V + F) expected. */
 ORB_API ORB_MUST_CHECK orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *mesh, unsigned repair);
+
+#define ORB_HANDLE_SIZE 0.05
+
+typedef struct orb_repair_options {
+  unsigned repair;
+  double handle_size; /* handles are closed along loops of at most this length, relative to the diagonal; 0: 0.05 */
+} orb_repair_options;
+
+/* The same with options. */
+ORB_API ORB_MUST_CHECK orb_status orb_mesh_repair_with(orb_context *ctx, orb_mesh *mesh,
+                                                       const orb_repair_options *options);
 
 /* Fills twin[h] for each of the 3·triangle_count half-edges of a closed oriented manifold; ORB_E_INTERNAL if the list
  * is not one. O(F) expected. */

@@ -1,0 +1,30 @@
+/* Short closed walks along the edges of a closed surface that do not divide it: one for each handle. */
+#ifndef ORB_MESH_CYCLES_H
+#define ORB_MESH_CYCLES_H
+
+#include "mesh/surface.h"
+
+typedef struct orb_cycle {
+  double length;
+  uint64_t label;       /* of its homology class, not 0: see cycles.c */
+  int32_t start, count; /* its half-edges, in order: half_edges[start] … */
+} orb_cycle;
+
+/* Cycles that share no vertex and that together leave the surface connected, shortest first. */
+typedef struct orb_cycles {
+  orb_cycle *cycle;
+  int32_t *half_edges;
+  int32_t count;
+} orb_cycles;
+
+/* Finds cycles of at most `limit`; INFINITY: of any length, and at least one on a surface with handles, unless it runs
+ * over faces that repairs made. Only edges with a face of the file are used. The surface is closed, consistent and in
+ * one piece, and its vertices have one fan each. The shortest cycle of the surface is among the result where its
+ * length is below a finite limit. most: how many to return. The caller frees the result also on failure.
+ *
+ * O(F log F), and for each vertex of O(√F · genus) seeds a search within limit / 2; with no limit, a few whole
+ * searches. */
+ORB_MUST_CHECK orb_status orb_cycles_find(orb_surface *surface, double limit, int32_t most, orb_cycles *out);
+void orb_cycles_free(orb_context *ctx, orb_cycles *cycles);
+
+#endif

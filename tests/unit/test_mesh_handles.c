@@ -1,0 +1,292 @@
+/* Closing handles: what is cut, what stays, and the loops of what is refused. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "numeric/vec3.h"
+#include "orbmorph/format.h"
+#include "support_context.h"
+#include "support_handles.h"
+#include "support_shapes.h"
+
+static orb_mesh read_text(char *text, size_t size) {
+  orb_mesh mesh;
+  assert_int_equal(orb_mesh_read(ctx, (unsigned char *)text, size, ORB_FORMAT_OBJ, &mesh, NULL), ORB_OK);
+  free(text);
+  return mesh;
+}
+
+/* A loop is closed and simple, runs along edges of the mesh as read, and leaves its faces connected: such a curve
+ * cannot bound a disc. */
+static void check_loop(const orb_mesh *raw, const int32_t *loop, int count) {
+  assert_true(count >= 3);
+  int32_t faces = raw->triangle_count, *next = malloc((size_t)raw->vertex_count * sizeof *next), edges = 0;
+  int32_t *root = malloc((size_t)faces * sizeof *root), pieces = faces;
+  int32_t *twin = malloc(3 * (size_t)faces * sizeof *twin);
+  assert_int_equal(orb_mesh_twins(ctx, raw->triangles, faces, raw->vertex_count, twin), ORB_OK);
+  memset(next, 0xff, (size_t)raw->vertex_count * sizeof *next);
+  for (int i = 0; i < count; i++) {
+    assert_in_range(loop[i], 0, raw->vertex_count - 1);
+    assert_int_equal(next[loop[i]], -1);
+    next[loop[i]] = loop[(i + 1) % count];
+  }
+  for (int32_t t = 0; t < faces; t++) {
+    root[t] = t;
+  }
+  for (int32_t h = 0; h < 3 * faces; h++) {
+    int32_t a = raw->triangles[h], b = raw->triangles[orb_next(h)], s = h / 3, t = twin[h] / 3;
+    if (next[a] == b || next[b] == a) {
+      edges += next[a] == b;
+      continue;
+    }
+    while (root[s] != s) {
+      s = root[s] = root[root[s]];
+    }
+    while (root[t] != t) {
+      t = root[t] = root[root[t]];
+    }
+    pieces -= s != t;
+    root[s] = t;
+  }
+  assert_int_equal(edges, count);
+  assert_int_equal(pieces, 1);
+  free(next);
+  free(root);
+  free(twin);
+}
+
+/* The area of the fan over a loop around its centre. */
+static double disc_of(const orb_mesh *raw, const int32_t *loop, int count) {
+  double centre[3] = {0, 0, 0}, area = 0;
+  for (int i = 0; i < count; i++) {
+    for (int k = 0; k < 3; k++) {
+      centre[k] += raw->positions[3 * loop[i] + k] / count;
+    }
+  }
+  for (int i = 0; i < count; i++) {
+    double u[3], w[3], n[3];
+    orb_sub(raw->positions + 3 * loop[i], centre, u);
+    orb_sub(raw->positions + 3 * loop[(i + 1) % count], centre, w);
+    orb_cross(u, w, n);
+    area += 0.5 * orb_length(n);
+  }
+  return area;
+}
+
+/* How often the surface surrounds the centre of a loop: its solid angle (Van Oosterom and Strackee 1983) over 4π. */
+static double winding(const orb_mesh *raw, const int32_t *loop, int count) {
+  double centre[3] = {0, 0, 0}, total = 0;
+  for (int i = 0; i < count; i++) {
+    for (int k = 0; k < 3; k++) {
+      centre[k] += raw->positions[3 * loop[i] + k] / count;
+    }
+  }
+  for (int32_t t = 0; t < raw->triangle_count; t++) {
+    double p[3][3], l[3], n[3];
+    for (int k = 0; k < 3; k++) {
+      orb_sub(raw->positions + 3 * raw->triangles[3 * t + k], centre, p[k]);
+      l[k] = orb_length(p[k]);
+    }
+    orb_cross(p[1], p[2], n);
+    total += 2 * atan2(orb_dot(p[0], n), l[0] * l[1] * l[2] + orb_dot(p[0], p[1]) * l[2] + orb_dot(p[1], p[2]) * l[0] +
+                                             orb_dot(p[2], p[0]) * l[1]);
+  }
+  return total / (4 * M_PI);
+}
+
+/* Every face of the file is still there with its corners' places; the others are patches. */
+static void check_faces_stay(const orb_mesh *raw, const orb_mesh *mesh) {
+  int32_t kept = 0;
+  for (int32_t t = 0; t < mesh->triangle_count; t++) {
+    int32_t from = mesh->source_triangle[t];
+    if (from < 0) {
+      continue;
+    }
+    assert_int_equal(from, kept++);
+    for (int k = 0; k < 3; k++) {
+      assert_memory_equal(mesh->positions + 3 * mesh->triangles[3 * t + k],
+                          raw->positions + 3 * raw->triangles[3 * from + k], 3 * sizeof(double));
+    }
+  }
+  assert_int_equal(kept, raw->triangle_count);
+}
+
+/* tell: whether the body is so thick that tubes do not pierce it, and `filled` says on which side of it a loop lies. */
+static void close_all(orb_mesh *plain, int count, unsigned seed, double size, int tell) {
+  size_t length;
+  int made;
+  char *text = handles_stitch(plain, count, seed, &length, &made);
+  assert_int_equal(made, count);
+  orb_mesh raw = read_text(text, length), mesh;
+  orb_topology topology;
+  orb_extent extent;
+  assert_int_equal(orb_mesh_copy(ctx, &raw, &mesh), ORB_OK);
+  assert_int_equal(orb_mesh_topology(ctx, &raw, &topology), ORB_OK);
+  assert_true(topology.genus == count);
+  orb_mesh_extent(&raw, &extent);
+  const orb_repair_options options = {.repair = ORB_REPAIR_CLOSE_HANDLES, .handle_size = size};
+  assert_int_equal(orb_mesh_repair_with(ctx, &mesh, &options), ORB_OK);
+  assert_int_equal(orb_mesh_topology(ctx, &mesh, &topology), ORB_OK);
+  assert_true(topology.genus == 0 && topology.components == 1 && topology.boundary_loops == 0);
+  assert_true(topology.nonmanifold_edges == 0 && topology.nonmanifold_vertices == 0 && topology.consistent);
+  assert_int_equal(mesh.handle_count, count);
+  check_faces_stay(&raw, &mesh);
+  double changed = 0, made_area = 0;
+  for (int i = 0; i < count; i++) {
+    const orb_handle *handle = &mesh.handles[i];
+    const int32_t *loop = mesh.loop_vertices + handle->start;
+    double around = 0, area = handle->area_relative * extent.diagonal * extent.diagonal;
+    check_loop(&raw, loop, handle->count);
+    for (int k = 0; k < handle->count; k++) {
+      around += sqrt(orb_distance2(raw.positions + 3 * loop[k], raw.positions + 3 * loop[(k + 1) % handle->count]));
+    }
+    assert_true(fabs(around / extent.diagonal - handle->length_relative) < 1e-12);
+    assert_true(handle->length_relative <= (size > 0 ? size : ORB_HANDLE_SIZE));
+    assert_true(area > 0 && area <= 3 * disc_of(&raw, loop, handle->count));
+    assert_true(!tell || fabs(winding(&raw, loop, handle->count) - !handle->filled) < 1e-6);
+    changed += area;
+  }
+  for (int32_t t = 0; t < mesh.triangle_count; t++) {
+    if (mesh.source_triangle[t] < 0) {
+      double u[3], w[3], n[3];
+      const int32_t *c = mesh.triangles + 3 * t;
+      orb_sub(mesh.positions + 3 * c[1], mesh.positions + 3 * c[0], u);
+      orb_sub(mesh.positions + 3 * c[2], mesh.positions + 3 * c[0], w);
+      orb_cross(u, w, n);
+      made_area += 0.5 * orb_length(n);
+    }
+  }
+  assert_true(fabs(changed - made_area) < 1e-12 * extent.diagonal * extent.diagonal);
+  orb_mesh_free(ctx, &mesh);
+  orb_mesh_free(ctx, &raw);
+}
+
+static void test_spheres(void **state) {
+  (void)state;
+  static const struct {
+    int levels, count;
+    double size;
+  } cases[] = {{4, 1, 0.2}, {5, 2, 0.1}, {5, 12, 0.1}, {6, 50, 0}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    orb_mesh ball = shape_ball(ctx, cases[i].levels);
+    close_all(&ball, cases[i].count, 7, cases[i].size, 1);
+    shape_free(ctx, &ball);
+  }
+}
+
+static void test_animals(void **state) {
+  (void)state;
+  static const char *const names[] = {"dog.obj", "elephant.ply", "giraffe.off"};
+  for (int i = 0; i < 3; i++) {
+    char path[512];
+    snprintf(path, sizeof path, ORB_SOURCES "/tests/samples/%s", names[i]);
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    static unsigned char bytes[8 << 20];
+    size_t size = fread(bytes, 1, sizeof bytes, file);
+    fclose(file);
+    orb_mesh mesh;
+    assert_int_equal(orb_mesh_read(ctx, bytes, size, ORB_FORMAT_AUTO, &mesh, NULL), ORB_OK);
+    close_all(&mesh, 4 + i, 3, 0.2, 0);
+    orb_mesh_free(ctx, &mesh);
+  }
+}
+
+static void check_refused(orb_mesh *mesh, const orb_repair_options *options, int genus) {
+  orb_mesh raw;
+  assert_int_equal(orb_mesh_copy(ctx, mesh, &raw), ORB_OK);
+  assert_int_equal(orb_mesh_repair_with(ctx, mesh, options), ORB_E_NOT_GENUS_ZERO);
+  const orb_error *error = orb_context_error(ctx);
+  assert_int_equal(error->genus, genus);
+  assert_int_equal(error->loop_count, genus);
+  for (int i = 0; i < genus; i++) {
+    check_loop(&raw, error->loop_vertices + error->loop_start[i], error->loop_start[i + 1] - error->loop_start[i]);
+  }
+  orb_mesh_free(ctx, &raw);
+  orb_mesh_free(ctx, mesh);
+}
+
+static orb_mesh torus(int n, double thin) {
+  char *text = malloc((size_t)(n * n) * 100), *p = text;
+  for (int i = 0; i < n * n; i++) {
+    double a = 2 * M_PI * (i / n) / n, b = 2 * M_PI * (i % n) / n;
+    p += sprintf(p, "v %.9f %.9f %.9f\n", (3 + thin * cos(b)) * cos(a), (3 + thin * cos(b)) * sin(a), thin * sin(b));
+  }
+  for (int i = 0; i < n * n; i++) {
+    int r = i / n, c = i % n, d = (r + 1) % n, e = (c + 1) % n;
+    p += sprintf(p, "f %d %d %d %d\n", r * n + c + 1, d * n + c + 1, d * n + e + 1, r * n + e + 1);
+  }
+  return read_text(text, (size_t)(p - text));
+}
+
+static void test_refused(void **state) {
+  (void)state;
+  const orb_repair_options safe = {.repair = ORB_REPAIR_SAFE}, close = {.repair = ORB_REPAIR_CLOSE_HANDLES};
+  for (int i = 0; i < 2; i++) {
+    orb_mesh ring = torus(24, 1);
+    check_refused(&ring, i ? &close : &safe, 1);
+    size_t size;
+    for (int holes = 1; holes <= 5; holes += 2) {
+      char *text = handles_plate(holes, &size);
+      orb_mesh plate = read_text(text, size);
+      check_refused(&plate, i ? &close : &safe, holes);
+    }
+  }
+  assert_non_null(strstr(orb_context_error(ctx)->detail, "handle_size"));
+}
+
+/* The shortest loop of a torus goes around its tube, and is cut where it is allowed. The caps of a tube of n sides have
+ * the area of a polygon each. */
+static void test_torus(void **state) {
+  (void)state;
+  enum { N = 24 };
+  const double diagonal = sqrt(2 * 8 * 8 + 2 * 2), around = 2 * N * sin(M_PI / N);
+  orb_mesh ring = torus(N, 1);
+  orb_repair_options options = {.repair = ORB_REPAIR_CLOSE_HANDLES, .handle_size = 0.999 * around / diagonal};
+  check_refused(&ring, &options, 1);
+  const orb_error *error = orb_context_error(ctx);
+  assert_int_equal(error->loop_start[1], N);
+  assert_true(fabs(error->loop_length_relative[0] - around / diagonal) < 1e-8);
+  ring = torus(N, 1);
+  options.handle_size = 1.001 * around / diagonal;
+  assert_int_equal(orb_mesh_repair_with(ctx, &ring, &options), ORB_OK);
+  assert_int_equal(ring.handle_count, 1);
+  assert_int_equal(ring.handles[0].filled, 0);
+  assert_true(fabs(ring.handles[0].area_relative - N * sin(2 * M_PI / N) / (diagonal * diagonal)) < 1e-8);
+  assert_int_equal(ring.triangle_count, 2 * N * N + 2 * (N - 2));
+  orb_mesh_free(ctx, &ring);
+  ring = torus(N, 2.5); /* a small hole of radius 0.5: its tunnel is filled */
+  options.handle_size = 0.3;
+  assert_int_equal(orb_mesh_repair_with(ctx, &ring, &options), ORB_OK);
+  assert_int_equal(ring.handle_count, 1);
+  assert_int_equal(ring.handles[0].filled, 1);
+  orb_mesh_free(ctx, &ring);
+}
+
+/* Small handles are closed and a large one is left, whose loop is shown. */
+static void test_mixed(void **state) {
+  (void)state;
+  orb_mesh ring = torus(80, 1);
+  size_t size;
+  int made;
+  char *text = handles_stitch(&ring, 5, 11, &size, &made);
+  assert_int_equal(made, 5);
+  orb_mesh_free(ctx, &ring);
+  ring = read_text(text, size);
+  const orb_repair_options options = {.repair = ORB_REPAIR_CLOSE_HANDLES, .handle_size = 0.2};
+  check_refused(&ring, &options, 1);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_spheres), cmocka_unit_test(test_animals),
+                                     cmocka_unit_test(test_refused), cmocka_unit_test(test_torus),
+                                     cmocka_unit_test(test_mixed)};
+  return cmocka_run_group_tests(tests, context_one_thread, context_end);
+}
