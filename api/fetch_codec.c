@@ -1,5 +1,6 @@
 #include "api/fetch_codec.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "api/json.h"
@@ -18,6 +19,16 @@ static int read_members(const cJSON *body, api_fetch_request *out, api_problem *
   int fine = 1;
   const char *url = text_of(body, "url", &fine, problem), *name = text_of(body, "name", &fine, problem);
   const char *format = text_of(body, "format", &fine, problem), *repair = text_of(body, "repair", &fine, problem);
+  const char *part = text_of(body, "part", &fine, problem);
+  char size[40] = "";
+  const cJSON *handle_size = cJSON_GetObjectItemCaseSensitive(body, "handle_size");
+  if (handle_size && !cJSON_IsNumber(handle_size)) {
+    fine = api_refuse(problem, "invalid-request", "\"handle_size\" must be a number.");
+  } else if (handle_size) {
+    snprintf(size, sizeof size, "%.9g", handle_size->valuedouble);
+  }
+  const api_upload_query query = {
+      .name = name, .repair = repair, .handle_size = handle_size ? size : NULL, .part = part, .format = format};
   if (!fine) {
     return 0;
   }
@@ -25,7 +36,7 @@ static int read_members(const cJSON *body, api_fetch_request *out, api_problem *
     return api_refuse(problem, "invalid-request", "\"url\" must be a URL of at most %d bytes.", API_URL - 1);
   }
   strcpy(out->url, url);
-  if (!api_upload_read(name, repair, format, &out->upload, problem)) {
+  if (!api_upload_read(&query, &out->upload, problem)) {
     problem->name = "invalid-request"; /* these are no query parameters */
     return 0;
   }
@@ -33,7 +44,7 @@ static int read_members(const cJSON *body, api_fetch_request *out, api_problem *
 }
 
 int api_fetch_request_read(const cJSON *body, api_fetch_request *out, api_problem *problem) {
-  static const char *const known[] = {"url", "name", "format", "repair", NULL};
+  static const char *const known[] = {"url", "name", "format", "repair", "handle_size", "part", NULL};
   memset(out, 0, sizeof *out);
   if (!cJSON_IsObject(body)) {
     return api_refuse(problem, "invalid-request", "The request must be a JSON object.");

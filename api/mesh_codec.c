@@ -2,6 +2,7 @@
 
 #include <cjson/cJSON.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "api/json.h"
@@ -12,41 +13,123 @@ static const struct {
 } kinds[] = {{"none", ORB_REPAIR_NONE},
              {"safe", ORB_REPAIR_SAFE},
              {"fill_holes", ORB_REPAIR_FILL_HOLES},
-             {"largest_component", ORB_REPAIR_LARGEST_COMPONENT}};
+             {"largest_component", ORB_REPAIR_LARGEST_COMPONENT},
+             {"close_handles", ORB_REPAIR_CLOSE_HANDLES}};
 enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
-int api_repair_parse(const char *list, unsigned *flags, char canonical[API_REPAIR_TEXT], api_problem *problem) {
-  unsigned all = 0;
-  int none = 0;
-  for (const char *at = list;; at++) {
-    size_t n = strcspn(at, ","), k = 0;
-    while (k < KINDS && !(strlen(kinds[k].name) == n && strncmp(kinds[k].name, at, n) == 0)) {
-      k++;
-    }
-    if (k == KINDS) {
-      return api_refuse(problem, "bad-query",
-                        "There is no repair \"%.*s\". Use none, safe, fill_holes or largest_component.",
-                        (int)(n < 60 ? n : 60), at);
-    }
-    none |= k == 0;
-    all |= kinds[k].flag;
-    at += n;
-    if (!*at) {
-      break;
-    }
+/* A handle can be no longer than this: a path from end to end and back, with room for detours. */
+static const double HANDLE_SIZE_MOST = 10;
+
+static int read_handle_size(const char *text, size_t length, orb_repair_options *out, api_problem *problem) {
+  char digits[40], *end = digits;
+  double size = 0;
+  if (length > 0 && length < sizeof digits && text[0] >= '.' && text[0] <= '9' && text[0] != '/') {
+    memcpy(digits, text, length);
+    digits[length] = 0;
+    size = strtod(digits, &end);
   }
-  if (none && all) {
-    return api_refuse(problem, "bad-query", "The repair \"none\" excludes all others. Remove it or the others.");
+  if (end == digits || *end || !(size > 0 && size <= HANDLE_SIZE_MOST)) {
+    return api_refuse(
+        problem, "bad-query",
+        "\"handle_size\" must be a number above 0 and up to 10, such as 0.05: the length of a loop around "
+        "a handle relative to the diagonal.");
   }
-  all |= all ? ORB_REPAIR_SAFE : 0;
-  *flags = all;
-  snprintf(canonical, API_REPAIR_TEXT, "%s%s%s", all ? "safe" : "none",
-           all & ORB_REPAIR_FILL_HOLES ? ",fill_holes" : "",
-           all & ORB_REPAIR_LARGEST_COMPONENT ? ",largest_component" : "");
+  snprintf(digits, sizeof digits, "%.9g", size); /* as in the canonical list */
+  out->handle_size = strtod(digits, NULL);
   return 1;
 }
 
-int api_upload_read(const char *name, const char *repair, const char *format, api_upload *out, api_problem *problem) {
+static int read_part(const char *text, orb_repair_options *out, api_problem *problem) {
+  size_t length = strlen(text);
+  int is_number = length < 10 && strspn(text, "0123456789") == length;
+  out->repair |= ORB_REPAIR_PART;
+  if (length == 0 || length >= sizeof out->part_name || !api_utf8_valid(text, length)) {
+    return api_refuse(problem, "bad-query", "\"part\" must be a number or a name of 1 to 127 bytes in UTF-8.");
+  }
+  for (const unsigned char *c = (const unsigned char *)text; *c; c++) {
+    if (*c < 0x20 || *c == 0x7f) {
+      return api_refuse(problem, "bad-query", "\"part\" must not contain control characters.");
+    }
+  }
+  out->part = is_number ? (int32_t)strtol(text, NULL, 10) : 0;
+  snprintf(out->part_name, sizeof out->part_name, "%s", is_number ? "" : text);
+  return 1;
+}
+
+static void write_canonical(const orb_repair_options *options, char canonical[API_REPAIR_TEXT]) {
+  unsigned all = options->repair;
+  char size[48] = "", part[16] = "";
+  if (options->handle_size != ORB_HANDLE_SIZE) {
+    snprintf(size, sizeof size, ":%.9g", options->handle_size);
+  }
+  snprintf(part, sizeof part, "%d", options->part);
+  snprintf(canonical, API_REPAIR_TEXT, "%s%s%s%s%s%s%s", all ? "safe" : "none",
+           all & ORB_REPAIR_FILL_HOLES ? ",fill_holes" : "",
+           all & ORB_REPAIR_LARGEST_COMPONENT ? ",largest_component" : "",
+           all & ORB_REPAIR_CLOSE_HANDLES ? ",close_handles" : "", all & ORB_REPAIR_CLOSE_HANDLES ? size : "",
+           all & ORB_REPAIR_PART ? ",part:" : "",
+           !(all & ORB_REPAIR_PART) ? ""
+           : options->part_name[0]  ? options->part_name
+                                    : part);
+}
+
+/* Parses the list, in which "close_handles:SIZE" and, at the end, "part:NAME" stand for the parameters. */
+static int read_list(const char *list, orb_repair_options *out, int *none, api_problem *problem) {
+  static const char handles[] = "close_handles:", part[] = "part:";
+  for (const char *at = list;; at++) {
+    size_t n = strcspn(at, ","), k = 0;
+    if (strncmp(at, part, strlen(part)) == 0) {
+      return read_part(at + strlen(part), out, problem);
+    }
+    if (strncmp(at, handles, strlen(handles)) == 0) {
+      if (!read_handle_size(at + strlen(handles), n - strlen(handles), out, problem)) {
+        return 0;
+      }
+      out->repair |= ORB_REPAIR_CLOSE_HANDLES;
+    } else {
+      while (k < KINDS && !(strlen(kinds[k].name) == n && strncmp(kinds[k].name, at, n) == 0)) {
+        k++;
+      }
+      if (k == KINDS) {
+        return api_refuse(
+            problem, "bad-query",
+            "There is no repair \"%.*s\". Use none, safe, fill_holes, largest_component or close_handles.",
+            (int)(n < 60 ? n : 60), at);
+      }
+      *none |= k == 0;
+      out->repair |= kinds[k].flag;
+    }
+    at += n;
+    if (!*at) {
+      return 1;
+    }
+  }
+}
+
+int api_repair_parse(const char *list, const char *handle_size, const char *part, orb_repair_options *out,
+                     char canonical[API_REPAIR_TEXT], api_problem *problem) {
+  int none = 0;
+  *out = (orb_repair_options){.handle_size = ORB_HANDLE_SIZE};
+  if (!read_list(list, out, &none, problem) || (part && !read_part(part, out, problem)) ||
+      (handle_size && !read_handle_size(handle_size, strlen(handle_size), out, problem))) {
+    return 0;
+  }
+  if (none && out->repair) {
+    return api_refuse(problem, "bad-query", "The repair \"none\" excludes all others. Remove it or the others.");
+  }
+  if (handle_size && !(out->repair & ORB_REPAIR_CLOSE_HANDLES)) {
+    return api_refuse(problem, "bad-query", "\"handle_size\" needs repair=close_handles. Add it or remove the size.");
+  }
+  if (out->repair & ORB_REPAIR_PART) { /* says which piece to keep */
+    out->repair &= ~(unsigned)ORB_REPAIR_LARGEST_COMPONENT;
+  }
+  out->repair |= out->repair ? ORB_REPAIR_SAFE : 0;
+  write_canonical(out, canonical);
+  return 1;
+}
+
+int api_upload_read(const api_upload_query *query, api_upload *out, api_problem *problem) {
+  const char *name = query->name;
   memset(out, 0, sizeof *out);
   if (name && (!*name || strlen(name) >= sizeof out->name || !api_utf8_valid(name, strlen(name)))) {
     return api_refuse(problem, "bad-query", "\"name\" must be UTF-8 of 1 to 127 bytes.");
@@ -57,13 +140,14 @@ int api_upload_read(const char *name, const char *repair, const char *format, ap
       return api_refuse(problem, "bad-query", "\"name\" must not contain control characters.");
     }
   }
-  if (format) {
-    out->hint = orb_format_of_name(format);
+  if (query->format) {
+    out->hint = orb_format_of_name(query->format);
     if (out->hint == ORB_FORMAT_AUTO) {
       return api_refuse(problem, "bad-query", "\"format\" must be obj, off, ply, stl, gltf or glb, or be omitted.");
     }
   }
-  return api_repair_parse(repair ? repair : "safe", &out->flags, out->repair, problem);
+  return api_repair_parse(query->repair ? query->repair : "safe", query->handle_size, query->part, &out->options,
+                          out->repair, problem);
 }
 
 static void write_vector(api_text *out, const char *name, const double v[3]) {
@@ -86,6 +170,22 @@ static void write_topology(const orb_topology *topology, api_text *out) {
   api_json_close(out, '}');
 }
 
+static void write_handle(const orb_mesh *mesh, const orb_handle *handle, api_text *out) {
+  api_json_open(out, '{');
+  api_json_member_string(out, "kind", "close_handles");
+  api_json_member_integer(out, "count", 1);
+  api_json_key(out, "loop");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < handle->count; i++) {
+    api_json_integer(out, mesh->loop_vertices[handle->start + i]);
+  }
+  api_json_close(out, ']');
+  api_json_member_number(out, "length_relative", handle->length_relative);
+  api_json_member_string(out, "how", handle->filled ? "fill" : "cut");
+  api_json_member_number(out, "area_relative", handle->area_relative);
+  api_json_close(out, '}');
+}
+
 static void write_lists(const orb_mesh *mesh, api_text *out) {
   api_json_key(out, "repairs");
   api_json_open(out, '[');
@@ -94,6 +194,9 @@ static void write_lists(const orb_mesh *mesh, api_text *out) {
     api_json_member_string(out, "kind", mesh->repairs[i].kind);
     api_json_member_integer(out, "count", mesh->repairs[i].count);
     api_json_close(out, '}');
+  }
+  for (int32_t i = 0; i < mesh->handle_count; i++) {
+    write_handle(mesh, &mesh->handles[i], out);
   }
   api_json_close(out, ']');
   api_json_key(out, "attributes");

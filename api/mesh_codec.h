@@ -6,19 +6,25 @@
 #include "api/problem.h"
 #include "orbmorph/format.h"
 
-/* Parses a list such as "safe" or "fill_holes,largest_component" into flags and the canonical list. Returns 1, or 0
- * with *problem filled. */
-enum { API_REPAIR_TEXT = 64 };
-int api_repair_parse(const char *list, unsigned *flags, char canonical[API_REPAIR_TEXT], api_problem *problem);
-
-/* What an upload says about its file: name, repair and format, of which each may be absent (NULL). Returns 1, or 0 with
+/* Parses a list such as "safe" or "fill_holes,close_handles" and the parameters beside it, which may be NULL, into
+ * options and a canonical list, which holds the parameters too and parses to the same options. Returns 1, or 0 with
  * *problem filled. */
+enum { API_REPAIR_TEXT = 256 };
+int api_repair_parse(const char *list, const char *handle_size, const char *part, orb_repair_options *out,
+                     char canonical[API_REPAIR_TEXT], api_problem *problem);
+
+/* What an upload says about its file, as text; each may be absent (NULL). */
+typedef struct api_upload_query {
+  const char *name, *repair, *handle_size, *part, *format;
+} api_upload_query;
+
+/* The same, checked. Returns 1, or 0 with *problem filled. */
 typedef struct api_upload {
   char name[ORB_NAME_MAX], repair[API_REPAIR_TEXT];
-  unsigned flags;
+  orb_repair_options options;
   orb_format hint;
 } api_upload;
-int api_upload_read(const char *name, const char *repair, const char *format, api_upload *out, api_problem *problem);
+int api_upload_read(const api_upload_query *query, api_upload *out, api_problem *problem);
 
 typedef struct api_mesh_facts {
   const char *id, *name, *format, *repair;

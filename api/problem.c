@@ -117,6 +117,25 @@ static void integers(api_text *out, const char *name, const int32_t *values, int
   api_json_close(out, ']');
 }
 
+static void loops(const orb_error *error, api_text *out) {
+  api_json_key(out, "loops");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < error->loop_count; i++) {
+    api_json_open(out, '[');
+    for (int32_t k = error->loop_start[i]; k < error->loop_start[i + 1]; k++) {
+      api_json_integer(out, error->loop_vertices[k]);
+    }
+    api_json_close(out, ']');
+  }
+  api_json_close(out, ']');
+  api_json_key(out, "loop_lengths_relative");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < error->loop_count; i++) {
+    api_json_number(out, error->loop_length_relative[i]);
+  }
+  api_json_close(out, ']');
+}
+
 static void topology_facts(const orb_error *error, api_text *out) {
   int open = error->status == ORB_E_NOT_CLOSED;
   if (error->boundary_loops >= 0) {
@@ -124,6 +143,9 @@ static void topology_facts(const orb_error *error, api_text *out) {
   }
   if (error->genus >= 0) {
     api_json_member_integer(out, "genus", error->genus);
+  }
+  if (error->status == ORB_E_NOT_GENUS_ZERO) {
+    loops(error, out);
   }
   if (error->edge_total > 0 || open) {
     api_json_member_integer(out, open ? "boundary_edge_count" : "edge_count", error->edge_total);
@@ -139,6 +161,18 @@ static void topology_facts(const orb_error *error, api_text *out) {
     api_json_open(out, '[');
     for (int32_t i = 0; i < error->component_count; i++) {
       api_json_integer(out, error->components[i]);
+    }
+    api_json_close(out, ']');
+    api_json_key(out, "parts");
+    api_json_open(out, '[');
+    for (int32_t i = 0; i < error->component_count; i++) {
+      api_json_open(out, '{');
+      api_json_member_integer(out, "part", i);
+      api_json_member_integer(out, "triangles", error->components[i]);
+      if (error->component_names[i][0]) {
+        api_json_member_string(out, "name", error->component_names[i]);
+      }
+      api_json_close(out, '}');
     }
     api_json_close(out, ']');
   }

@@ -22,7 +22,7 @@
  *
  * Paths contain {id} for 64 hexadecimal digits or {job} for a job's id, and after either {k} for a small number. */
 #define API_ROUTES(ROUTE)                                                                                             \
-  ROUTE(ROUTE_MESH_UPLOAD, "POST", "/v1/meshes", ROUTE_MESH_BODY, SCOPE_WRITE, "name format repair",                  \
+  ROUTE(ROUTE_MESH_UPLOAD, "POST", "/v1/meshes", ROUTE_MESH_BODY, SCOPE_WRITE, "name format repair handle_size part", \
         handle_mesh_upload)                                                                                           \
   ROUTE(ROUTE_MESH_LIST, "GET", "/v1/meshes", ROUTE_NO_BODY, SCOPE_READ, API_LISTED, handle_list)                     \
   ROUTE(ROUTE_MESH_GET, "GET", "/v1/meshes/{id}", ROUTE_NO_BODY, SCOPE_READ, "", handle_get)                          \

@@ -55,7 +55,7 @@ static int check(const task_head *task, const unsigned char *bytes, orb_context 
   memset(&mesh, 0, sizeof mesh);
   orb_format found = task->format;
   int fine = orb_mesh_read(ctx, bytes, (size_t)task->bytes, task->format, &mesh, &found) == ORB_OK &&
-             orb_mesh_repair(ctx, &mesh, task->flags) == ORB_OK &&
+             orb_mesh_repair_with(ctx, &mesh, &task->options) == ORB_OK &&
              orb_mesh_topology(ctx, &mesh, &facts.topology) == ORB_OK;
   if (fine) {
     orb_mesh_extent(&mesh, &facts.extent);
@@ -145,7 +145,7 @@ static int describe(const intake_file *file, catalogue *cat, orb_context *ctx, c
                     .deadline_ms = limits->deadline_ms,
                     .cpu_seconds = task_cpu_seconds(limits->deadline_ms, 1),
                     .max_triangles = limits->max_triangles,
-                    .flags = file->upload->flags,
+                    .options = file->upload->options,
                     .format = file->format,
                     .bytes = file->size,
                     .created = created};

@@ -55,6 +55,21 @@ static int try_repair(cli *c, const char *path, const char *repair) {
   return helps;
 }
 
+/* Lists the pieces, which --take-part names, or the loops around the handles. */
+static void list(const cJSON *problem) {
+  const cJSON *item, *lengths = cJSON_GetObjectItemCaseSensitive(problem, "loop_lengths_relative");
+  cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(problem, "parts")) {
+    char triangles[32];
+    cli_count(cli_number(item, "triangles"), triangles);
+    printf("  part %.0f: %s triangles  %s\n", cli_number(item, "part"), triangles, cli_string(item, "name", ""));
+  }
+  int i = 0;
+  cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(problem, "loops")) {
+    printf("  handle: a loop of %d vertices, %.2g of the diagonal, at vertex %.0f\n", cJSON_GetArraySize(item),
+           cJSON_GetNumberValue(cJSON_GetArrayItem(lengths, i++)), cJSON_GetNumberValue(cJSON_GetArrayItem(item, 0)));
+  }
+}
+
 static int suggest(cli *c, const char *path, const char *type) {
   if (!strcmp(type, "not-closed") && try_repair(c, path, "fill_holes")) {
     return 1;
@@ -62,8 +77,12 @@ static int suggest(cli *c, const char *path, const char *type) {
   if (!strcmp(type, "not-connected") && try_repair(c, path, "largest_component")) {
     return 1;
   }
+  if (!strcmp(type, "not-genus-zero")) {
+    return try_repair(c, path, "close_handles");
+  }
   if (!strcmp(type, "not-closed") || !strcmp(type, "not-connected")) {
-    return try_repair(c, path, "largest_component,fill_holes");
+    return try_repair(c, path, "largest_component,fill_holes") ||
+           try_repair(c, path, "largest_component,fill_holes,close_handles");
   }
   return 0;
 }
@@ -93,6 +112,9 @@ static int examine(cli *c, const char *path) {
     const char *type = reply.json ? cli_problem_type(reply.json) : "", *advice = cli_advice(type);
     if (advice) {
       printf("  %s\n", advice);
+    }
+    if (reply.json) {
+      list(reply.json);
     }
     if (reply.json && !suggest(c, path, type) && (!strcmp(type, "not-closed") || !strcmp(type, "not-connected"))) {
       printf("  None of the daemon's repairs fixes this mesh.\n");

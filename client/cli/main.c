@@ -7,22 +7,23 @@
 #include "terminal.h"
 #include "text.h"
 
+#define CLI_REPAIRS (CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_HANDLE_SIZE) | CLI_BIT(OPT_TAKE_PART))
 #define COMMON_OPTIONS (CLI_BIT(OPT_SERVER) | CLI_BIT(OPT_JSON) | CLI_BIT(OPT_QUIET) | CLI_BIT(OPT_HELP))
 #define MERGE_OPTIONS                                                                                         \
   (COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_REPORT) | CLI_BIT(OPT_LANDMARKS) | CLI_BIT(OPT_ALIGN) | \
    CLI_BIT(OPT_REMESH) | CLI_BIT(OPT_TOLERANCE) | CLI_BIT(OPT_MAX_TRIANGLES) | CLI_BIT(OPT_NO_NORMALS) |      \
    CLI_BIT(OPT_ANIMATION) | CLI_BIT(OPT_FIT) | CLI_BIT(OPT_PATH) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_NO_WAIT) |  \
-   CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_PROFILE))
+   CLI_REPAIRS | CLI_BIT(OPT_PROFILE))
 
 static const cli_command command_list[] = {
     {"morph", "FILE FILE…", "Upload meshes, merge them and download a GLB that morphs between them", 2, -1,
      MERGE_OPTIONS, NULL, "dog.obj giraffe.off --landmarks dog-giraffe.json -o out.glb", cli_run_morph},
     {"upload", "FILE|URL…", "Upload meshes; the daemon fetches URLs", 1, -1,
-     COMMON_OPTIONS | CLI_BIT(OPT_NAME) | CLI_BIT(OPT_REPAIR) | CLI_BIT(OPT_FORMAT), NULL,
-     "--repair fill_holes scan.stl", cli_run_upload},
+     COMMON_OPTIONS | CLI_BIT(OPT_NAME) | CLI_REPAIRS | CLI_BIT(OPT_FORMAT), NULL, "--repair fill_holes scan.stl",
+     cli_run_upload},
     {"embed", "MESH…", "Embed meshes (ids, files or URLs) on the sphere", 1, -1,
      COMMON_OPTIONS | CLI_BIT(OPT_METHOD) | CLI_BIT(OPT_PRESET) | CLI_BIT(OPT_SET) | CLI_BIT(OPT_OUTPUT) |
-         CLI_BIT(OPT_NO_WAIT) | CLI_BIT(OPT_REPAIR),
+         CLI_BIT(OPT_NO_WAIT) | CLI_REPAIRS,
      NULL, "dog.obj --preset quality -o sphere.ply", cli_run_embed},
     {"merge", "MESH MESH…", "Merge meshes (ids, files or URLs); with -o, also download the GLB", 2, -1, MERGE_OPTIONS,
      NULL, "--tolerance 0.0005 -o walk.glb 'frames/*.ply'", cli_run_merge},
@@ -44,7 +45,7 @@ static const cli_command command_list[] = {
      CLI_BIT(OPT_HELP) | CLI_BIT(OPT_KEY) | CLI_BIT(OPT_EXPIRES), NULL,
      "'https://morph.example.org/v1/morph.glb?shapes=ID,ID' --expires 30d", cli_run_sign},
     {"studio", "[FILE…]", "Start a daemon on a free port and open the studio in the browser", 0, -1,
-     CLI_BIT(OPT_HELP) | CLI_BIT(OPT_QUIET) | CLI_BIT(OPT_DATA) | CLI_BIT(OPT_NO_OPEN) | CLI_BIT(OPT_REPAIR), NULL,
+     CLI_BIT(OPT_HELP) | CLI_BIT(OPT_QUIET) | CLI_BIT(OPT_DATA) | CLI_BIT(OPT_NO_OPEN) | CLI_REPAIRS, NULL,
      "dog.obj giraffe.off", cli_run_studio},
     {"completions", "bash|zsh|fish", "Print the completion script of a shell", 1, 1, CLI_BIT(OPT_HELP), "bash zsh fish",
      "bash > /etc/bash_completion.d/orbmorph", cli_run_completions},

@@ -36,6 +36,17 @@ int cli_check_mesh(const cli *c, const char *operand) {
   return CLI_USAGE;
 }
 
+/* The parameters of repairs, ready to follow a query. */
+static char *repair_parameters(const cli *c) {
+  const char *size = c->args.value[OPT_HANDLE_SIZE], *part = c->args.value[OPT_TAKE_PART];
+  char *sizes = size ? cli_escape(size) : NULL, *parts = part ? cli_escape(part) : NULL;
+  char *text =
+      cli_text("%s%s%s%s", sizes ? "&handle_size=" : "", sizes ? sizes : "", parts ? "&part=" : "", parts ? parts : "");
+  free(sizes);
+  free(parts);
+  return text;
+}
+
 int cli_upload(cli *c, const char *path, const char *name, const char *repair, cli_reply *reply) {
   memset(reply, 0, sizeof *reply);
   FILE *file = fopen(path, "rb");
@@ -51,8 +62,10 @@ int cli_upload(cli *c, const char *path, const char *name, const char *repair, c
   char *repairs = repair ? cli_escape(repair) : NULL;
   const char *format = c->args.value[OPT_FORMAT];
   char *kind = format ? cli_escape(format) : NULL;
-  target = cli_text("/v1/meshes?name=%s%s%s%s%s", escaped, repairs ? "&repair=" : "", repairs ? repairs : "",
-                    kind ? "&format=" : "", kind ? kind : "");
+  char *more = repair_parameters(c);
+  target = cli_text("/v1/meshes?name=%s%s%s%s%s%s", escaped, repairs ? "&repair=" : "", repairs ? repairs : "",
+                    kind ? "&format=" : "", kind ? kind : "", more);
+  free(more);
   char *label = cli_text("upload %s", base);
   cli_request request = {
       .method = "POST", .path = target, .upload = file, .upload_size = (curl_off_t)info.st_size, .label = label};
@@ -69,13 +82,19 @@ int cli_upload(cli *c, const char *path, const char *name, const char *repair, c
 }
 
 static int fetch(cli *c, const char *url, const char *name, const char *repair, cli_reply *reply) {
-  const char *const members[][2] = {
-      {"url", url}, {"name", name}, {"repair", repair}, {"format", c->args.value[OPT_FORMAT]}};
+  const char *const members[][2] = {{"url", url},
+                                    {"name", name},
+                                    {"repair", repair},
+                                    {"format", c->args.value[OPT_FORMAT]},
+                                    {"part", c->args.value[OPT_TAKE_PART]}};
   cJSON *body = cJSON_CreateObject();
   for (size_t i = 0; i < sizeof members / sizeof members[0]; i++) {
     if (members[i][1]) {
       cJSON_AddStringToObject(body, members[i][0], members[i][1]);
     }
+  }
+  if (c->args.value[OPT_HANDLE_SIZE]) {
+    cJSON_AddNumberToObject(body, "handle_size", strtod(c->args.value[OPT_HANDLE_SIZE], NULL));
   }
   char *text = cJSON_PrintUnformatted(body);
   cli_request request = {.method = "POST", .path = "/v1/meshes", .json = text};

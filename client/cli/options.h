@@ -26,6 +26,8 @@ typedef enum cli_option_id {
   OPT_NO_WAIT,
   OPT_NAME,
   OPT_REPAIR,
+  OPT_HANDLE_SIZE,
+  OPT_TAKE_PART,
   OPT_FORMAT,
   OPT_METHOD,
   OPT_PRESET,

@@ -78,10 +78,10 @@ const char *cli_advice(const char *type) {
        "are not consistently oriented. Recalculate the normals, or upload with --repair safe."},
       {"not-connected",
        "The file holds several pieces. Join them into one closed surface, upload each piece by itself, or "
-       "keep only the largest with --repair largest_component."},
+       "keep one: --repair largest_component keeps the largest, --take-part another."},
       {"not-genus-zero",
-       "The surface has handles, like a ring or a cup. Cut each handle and close both ends: only surfaces "
-       "without handles can be embedded on the sphere."},
+       "The surface has handles, like a ring or a cup. Only surfaces without handles can be embedded on the "
+       "sphere: cut each handle and close both ends, or let --repair close_handles do so with small ones."},
       {"degenerate",
        "Too few triangles remain after repair, or the mesh is tiny or far from the origin. Check that you exported "
        "the right object; scale it or move it to the origin."},

@@ -19,6 +19,13 @@ void cli_print_repairs(const cJSON *mesh) {
   cJSON_ArrayForEach(repair, member(mesh, "repairs")) {
     char count[32];
     cli_count(cli_number(repair, "count"), count);
+    const cJSON *loop = member(repair, "loop");
+    if (loop) {
+      printf("  repaired: close_handles (%s along a loop of %d vertices, %.2g of the diagonal, at vertex %.0f)\n",
+             cli_string(repair, "how", "?"), cJSON_GetArraySize(loop), cli_number(repair, "length_relative"),
+             cJSON_GetNumberValue(cJSON_GetArrayItem(loop, 0)));
+      continue;
+    }
     printf("  repaired: %s (%s)\n", cli_string(repair, "kind", "?"), count);
   }
 }

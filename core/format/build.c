@@ -27,7 +27,8 @@ void orb_build_init(orb_build *build, orb_context *ctx) {
 void orb_build_free(orb_build *build) {
   void *blocks[] = {build->positions,     build->colors,         build->normals,         build->texcoords,
                     build->corner_vertex, build->corner_more,    build->face_size,       build->face_material,
-                    build->materials,     build->material_slots, build->material_values, build->dropped};
+                    build->materials,     build->material_slots, build->material_values, build->dropped,
+                    build->objects};
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
     orb_free(build->ctx, blocks[i]);
   }
@@ -223,6 +224,54 @@ orb_status orb_build_use_material(orb_build *build, const unsigned char *name, s
 
 orb_status orb_build_drop(orb_build *build, const char *what, const char *where, const char *why) {
   return orb_dropped_add(build->ctx, &build->dropped, &build->dropped_count, what, where, why);
+}
+
+/* The length of the UTF-8 sequence at p, 0 where there is none. */
+static size_t sequence(const unsigned char *p, size_t left) {
+  size_t n = *p < 0x80                 ? 1
+             : *p >= 0xc2 && *p < 0xe0 ? 2
+             : *p >= 0xe0 && *p < 0xf0 ? 3
+             : *p >= 0xf0 && *p < 0xf5 ? 4
+                                       : 0;
+  if (n == 0 || n > left) {
+    return 0;
+  }
+  for (size_t i = 1; i < n; i++) {
+    if ((p[i] & 0xc0) != 0x80) {
+      return 0;
+    }
+  }
+  int bad = (p[0] == 0xe0 && p[1] < 0xa0) || (p[0] == 0xed && p[1] > 0x9f) || (p[0] == 0xf0 && p[1] < 0x90) ||
+            (p[0] == 0xf4 && p[1] > 0x8f);
+  return bad ? 0 : n;
+}
+
+orb_status orb_build_object(orb_build *build, const unsigned char *name, size_t length) {
+  if (build->object_count > 0 && build->objects[build->object_count - 1].first_triangle == build->triangles) {
+    build->object_count--; /* it has no faces */
+  }
+  if (build->object_count == ORB_MATERIALS_MAX) {
+    return ORB_OK;
+  }
+  ORB_TRY(
+      orb_build_grow(build->ctx, &build->objects, &build->object_room, build->object_count + 1, sizeof(orb_object)));
+  orb_object *object = &build->objects[build->object_count++];
+  *object = (orb_object){.first_triangle = (int32_t)build->triangles};
+  for (size_t at = 0, out = 0; at < length;) {
+    size_t n = sequence(name + at, length - at);
+    if (out + (n ? n : 1) >= sizeof object->name) {
+      break;
+    }
+    if (n == 0 || name[at] < 0x20 || name[at] == 0x7f) {
+      object->name[out++] = '?';
+      at++;
+      continue;
+    }
+    memcpy(object->name + out, name + at, n);
+    out += n;
+    at += n;
+  }
+  return ORB_OK;
 }
 
 static orb_status check_indices(orb_build *build, int is_text, int64_t end) {
@@ -427,6 +476,9 @@ static orb_status move_materials(orb_build *build, orb_mesh *mesh) {
   mesh->dropped = build->dropped;
   mesh->dropped_count = build->dropped_count;
   build->dropped = NULL;
+  mesh->objects = build->objects;
+  mesh->object_count = (int32_t)build->object_count;
+  build->objects = NULL;
   if (!build->face_material) {
     return ORB_OK;
   }

@@ -45,6 +45,8 @@ typedef struct orb_build {
   int64_t value_count, value_room;
   orb_dropped *dropped;
   int32_t dropped_count;
+  orb_object *objects; /* first_triangle counts triangles, as polygons are cut later into size − 2 each */
+  int64_t object_count, object_room;
   int64_t highest_vertex, highest_texcoord, highest_normal; /* indices that a face names, and where: line or offset */
   int64_t highest_vertex_where, highest_texcoord_where, highest_normal_where;
 } orb_build;
@@ -64,6 +66,9 @@ ORB_MUST_CHECK orb_status orb_build_face_end(orb_build *build, int64_t corners);
 
 /* Gives the named material to the faces to come. */
 ORB_MUST_CHECK orb_status orb_build_use_material(orb_build *build, const unsigned char *name, size_t length);
+
+/* The faces to come belong to an object of this name. */
+ORB_MUST_CHECK orb_status orb_build_object(orb_build *build, const unsigned char *name, size_t length);
 
 /* Notes what the file has and the mesh does not; see orb_dropped_add(). */
 ORB_MUST_CHECK orb_status orb_build_drop(orb_build *build, const char *what, const char *where, const char *why);

@@ -191,6 +191,8 @@ struct Reader {
       texcoords |= member(attributes, texcoord_of(primitive).c_str()) != nullptr;
     });
     auto add = [&](size_t mesh, const Matrix &matrix, bool visible) {
+      std::string name = text_of(meshes[mesh], "name");
+      must(orb_build_object(&build, reinterpret_cast<const unsigned char *>(name.data()), name.size()));
       for (const cJSON *primitive : array_of(meshes[mesh], "primitives")) {
         if (!cJSON_IsObject(primitive)) {
           malformed("A glTF primitive is not an object.");

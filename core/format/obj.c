@@ -9,6 +9,7 @@
 typedef struct obj_reader {
   orb_build build;
   orb_text text;
+  int has_objects; /* an "o" has been read */
 } obj_reader;
 
 static orb_status malformed(obj_reader *r, const char *what) {
@@ -117,14 +118,33 @@ static orb_status read_face(obj_reader *r) {
   return orb_build_face_end(&r->build, corners);
 }
 
-static orb_status read_usemtl(obj_reader *r) {
+/* The rest of the line, without blanks around it. */
+static const unsigned char *read_name(obj_reader *r, size_t *length) {
   (void)orb_text_blanks(&r->text);
   const unsigned char *first = r->text.at, *last = first;
   while (r->text.at < r->text.end && !orb_is_eol(*r->text.at)) {
     last = orb_is_blank(*r->text.at) ? last : r->text.at + 1;
     r->text.at++;
   }
-  return orb_build_use_material(&r->build, first, (size_t)(last - first));
+  *length = (size_t)(last - first);
+  return first;
+}
+
+static orb_status read_usemtl(obj_reader *r) {
+  size_t length;
+  const unsigned char *name = read_name(r, &length);
+  return orb_build_use_material(&r->build, name, length);
+}
+
+/* Objects have names; groups name parts only in files without objects. */
+static orb_status read_object(obj_reader *r, int is_object) {
+  size_t length;
+  const unsigned char *name = read_name(r, &length);
+  if (!is_object && r->has_objects) {
+    return ORB_OK;
+  }
+  r->has_objects = is_object;
+  return orb_build_object(&r->build, name, length);
 }
 
 /* The file that holds the materials; an upload has only one file. */
@@ -168,6 +188,11 @@ static orb_status read_line(obj_reader *r) {
     return read_face(r);
   }
   r->text.at = p;
+  if (length == 1 && (p[0] == 'o' || p[0] == 'g')) {
+    r->text.at += length;
+    ORB_TRY(read_object(r, p[0] == 'o'));
+    r->text.at = p;
+  }
   if (orb_text_is(&r->text, "usemtl")) {
     r->text.at += length;
     return read_usemtl(r);

@@ -3,7 +3,7 @@
  * In: a mesh as a reader left it. Out: one that can be embedded, or an error with the facts. Reading order of the
  * folder: repair.c (the sequence of repairs and checks), surface (the mesh with its twins, pieces, fans and loops),
  * edges (twins), edit (changes that keep attributes), weld, fill and polygon (seams, holes, polygons),
- * cycles and handles (handles: their loops, and how they are closed), refuse (the
+ * parts (pieces by size and name), cycles and handles (handles: their loops, and how they are closed), refuse (the
  * errors). topology.c measures any index list, nearest.c finds nearest points, normals computes normals, sort.h sorts.
  */
 #include <string.h>
@@ -32,8 +32,8 @@ void orb_mesh_drop_attributes(orb_context *ctx, orb_mesh *mesh) {
 }
 
 void orb_mesh_free(orb_context *ctx, orb_mesh *mesh) {
-  void *blocks[] = {mesh->positions,       mesh->triangles, mesh->source,       mesh->vertex_of_source,
-                    mesh->source_triangle, mesh->handles,   mesh->loop_vertices};
+  void *blocks[] = {mesh->positions,       mesh->triangles, mesh->source,        mesh->vertex_of_source,
+                    mesh->source_triangle, mesh->handles,   mesh->loop_vertices, mesh->objects};
   orb_mesh_drop_attributes(ctx, mesh);
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
     orb_free(ctx, blocks[i]);
@@ -61,6 +61,7 @@ orb_status orb_mesh_copy(orb_context *ctx, const orb_mesh *mesh, orb_mesh *out) 
   copy.vertex_of_source =
       copy_block(ctx, mesh->vertex_of_source, (size_t)mesh->file_vertex_count, sizeof(int32_t), &good);
   copy.source_triangle = copy_block(ctx, mesh->source_triangle, t, sizeof(int32_t), &good);
+  copy.objects = copy_block(ctx, mesh->objects, (size_t)mesh->object_count, sizeof(orb_object), &good);
   copy.handles = copy_block(ctx, mesh->handles, (size_t)mesh->handle_count, sizeof(orb_handle), &good);
   copy.loop_vertices = copy_block(ctx, mesh->loop_vertices, (size_t)mesh->loop_vertex_count, sizeof(int32_t), &good);
   copy.normals = copy_block(ctx, mesh->normals, 9 * t, sizeof(float), &good);

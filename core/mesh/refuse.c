@@ -1,6 +1,7 @@
 #include "mesh/refuse.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/check.h"
@@ -129,30 +130,32 @@ orb_status orb_refuse_open(orb_surface *s) {
   return ORB_E_NOT_CLOSED;
 }
 
-/* The sizes of the pieces, largest first. */
-static orb_status add_pieces(orb_surface *s, uint64_t **sizes) {
-  *sizes = ORB_NEW0(s->ctx, uint64_t, s->piece_count);
-  if (!*sizes) {
-    return ORB_E_NO_MEMORY;
+static void list_parts(orb_surface *s, const orb_parts *parts) {
+  orb_error *error = orb_context_error_edit(s->ctx);
+  error->component_total = parts->count;
+  for (int32_t i = 0; i < parts->count && i < ORB_ERROR_ITEMS; i++) {
+    snprintf(error->component_names[error->component_count], ORB_PART_NAME, "%s",
+             orb_part_name(s->mesh, &parts->part[i]));
+    error->components[error->component_count++] = parts->part[i].triangles;
   }
-  for (int32_t t = 0; t < s->mesh->triangle_count; t++) {
-    (*sizes)[s->piece[t]]++;
-  }
-  orb_sort_u64(*sizes, s->piece_count);
-  return ORB_OK;
 }
 
-static void list_pieces(orb_surface *s, const uint64_t *sizes) {
-  orb_error *error = orb_context_error_edit(s->ctx);
-  error->component_total = s->piece_count;
-  for (int32_t i = 0; i < s->piece_count && i < ORB_ERROR_ITEMS; i++) {
-    error->components[error->component_count++] = (int64_t)sizes[s->piece_count - 1 - i];
+orb_status orb_refuse_part(orb_surface *s, const orb_parts *parts, const orb_repair_options *options) {
+  if (options->part_name[0]) {
+    (void)orb_fail(s->ctx, ORB_E_NOT_CONNECTED,
+                   "The mesh has no part of the name \"%s\". Use a name or number of the list, or correct the name.",
+                   options->part_name);
+  } else {
+    (void)orb_fail(s->ctx, ORB_E_NOT_CONNECTED, "The mesh has no part %d, but %d %s, numbered from 0 by size.",
+                   options->part, parts->count, plural(parts->count, "part", "parts"));
   }
+  list_parts(s, parts);
+  return ORB_E_NOT_CONNECTED;
 }
 
 orb_status orb_refuse_pinched(orb_surface *s, const orb_fans *fans) {
-  uint64_t *sizes = NULL;
-  ORB_TRY(add_pieces(s, &sizes));
+  orb_parts parts = {0};
+  ORB_TRY(orb_parts_list(s, &parts));
   if (s->piece_count > 1) {
     (void)orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
                    "%d bodies are joined only at %lld %s, where the surface is not manifold. Join them "
@@ -164,26 +167,26 @@ orb_status orb_refuse_pinched(orb_surface *s, const orb_fans *fans) {
                    (long long)fans->pinched, plural(fans->pinched, "vertex", "vertices"));
   }
   if (s->piece_count > 1) {
-    list_pieces(s, sizes);
+    list_parts(s, &parts);
   }
   orb_error *error = orb_context_error_edit(s->ctx);
   error->vertex_total = fans->pinched;
   for (int32_t i = 0; i < fans->pinched_count; i++) {
     error->vertices[error->vertex_count++] = s->mesh->source[fans->pinched_vertices[i]];
   }
-  orb_free(s->ctx, sizes);
+  orb_free(s->ctx, parts.part);
   return ORB_E_NOT_MANIFOLD;
 }
 
 orb_status orb_refuse_pieces(orb_surface *s) {
-  uint64_t *sizes = NULL;
-  ORB_TRY(add_pieces(s, &sizes));
+  orb_parts parts = {0};
+  ORB_TRY(orb_parts_list(s, &parts));
   (void)orb_fail(s->ctx, ORB_E_NOT_CONNECTED,
                  "The mesh has %d pieces that do not touch; send one of them, or the mesh with "
-                 "repair=largest_component.",
+                 "repair=largest_component, or with part=K to keep another one.",
                  s->piece_count);
-  list_pieces(s, sizes);
-  orb_free(s->ctx, sizes);
+  list_parts(s, &parts);
+  orb_free(s->ctx, parts.part);
   return ORB_E_NOT_CONNECTED;
 }
 

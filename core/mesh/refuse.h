@@ -3,7 +3,7 @@
 #ifndef ORB_MESH_REFUSE_H
 #define ORB_MESH_REFUSE_H
 
-#include "mesh/surface.h"
+#include "mesh/parts.h"
 
 orb_status orb_refuse_crowded(orb_surface *surface);
 orb_status orb_refuse_facing(orb_surface *surface);
@@ -13,6 +13,7 @@ orb_status orb_refuse_pieces(orb_surface *surface);
 /* With a loop for each handle; changes the surface. limit: the longest loop that close_handles was allowed to cut
  * along, relative to the diagonal; 0: the repair was not allowed. */
 orb_status orb_refuse_handles(orb_surface *surface, int64_t genus, double limit);
+orb_status orb_refuse_part(orb_surface *surface, const orb_parts *parts, const orb_repair_options *options);
 orb_status orb_refuse_few(orb_surface *surface);
 
 /* Fails with ORB_E_DEGENERATE where float32 cannot hold the mesh: tiny, or far from the origin. O(V). */

@@ -14,6 +14,7 @@
 #include "mesh/edit.h"
 #include "mesh/fill.h"
 #include "mesh/handles.h"
+#include "mesh/parts.h"
 #include "mesh/refuse.h"
 #include "mesh/weld.h"
 
@@ -83,45 +84,46 @@ static orb_status join_crowded(orb_surface *s, int32_t *root) {
   return status;
 }
 
-static orb_status keep_largest(orb_surface *s) {
+/* Keeps one piece: the largest, or the one that the options name. */
+static orb_status keep_piece(orb_surface *s, const orb_repair_options *options) {
   ORB_TRY(orb_surface_pieces(s));
-  if (s->piece_count < 2) {
+  if (s->piece_count < 2 && !(options->repair & ORB_REPAIR_PART)) {
     return ORB_OK;
   }
   int32_t *root = ORB_NEW(s->ctx, int32_t, s->piece_count);
-  int32_t *size = ORB_NEW0(s->ctx, int32_t, s->piece_count);
-  orb_status status = root && size ? ORB_OK : ORB_E_NO_MEMORY;
+  orb_parts parts = {0};
+  orb_status status = root ? ORB_OK : ORB_E_NO_MEMORY;
   for (int32_t i = 0; i < s->piece_count && status == ORB_OK; i++) {
     root[i] = i;
   }
   if (status == ORB_OK && s->edges.crowded > 0) {
     status = join_crowded(s, root);
   }
+  for (int32_t i = 0; i < s->piece_count && status == ORB_OK; i++) {
+    while (root[i] != root[root[i]]) {
+      root[i] = root[root[i]];
+    }
+  }
+  for (int32_t t = 0; t < s->mesh->triangle_count && status == ORB_OK; t++) {
+    s->piece[t] = root[s->piece[t]];
+  }
   if (status == ORB_OK) {
-    int32_t best = 0, dropped = 0;
-    for (int32_t i = 0; i < s->piece_count; i++) {
-      while (root[i] != root[root[i]]) {
-        root[i] = root[root[i]];
+    status = orb_parts_list(s, &parts);
+  }
+  if (status == ORB_OK) {
+    int32_t kept = options->repair & ORB_REPAIR_PART ? orb_parts_find(s->mesh, &parts, options) : 0;
+    status = kept < 0 ? orb_refuse_part(s, &parts, options) : ORB_OK;
+    if (status == ORB_OK && parts.count > 1) {
+      for (int32_t t = 0; t < s->mesh->triangle_count; t++) {
+        s->reversed[t] = s->piece[t] != parts.part[kept].piece;
       }
-    }
-    for (int32_t t = 0; t < s->mesh->triangle_count; t++) {
-      size[root[s->piece[t]]]++;
-    }
-    for (int32_t i = 0; i < s->piece_count; i++) {
-      best = size[i] > size[best] ? i : best;
-      dropped += size[i] > 0;
-    }
-    for (int32_t t = 0; t < s->mesh->triangle_count; t++) {
-      s->reversed[t] = root[s->piece[t]] != best;
-    }
-    if (dropped > 1) {
       (void)orb_mesh_drop_faces(s->mesh, s->reversed);
-      orb_mesh_note(s->mesh, "largest_component", dropped - 1);
+      orb_mesh_note(s->mesh, options->repair & ORB_REPAIR_PART ? "part" : "largest_component", parts.count - 1);
       status = orb_surface_rematch(s);
     }
   }
   orb_free(s->ctx, root);
-  orb_free(s->ctx, size);
+  orb_free(s->ctx, parts.part);
   return status;
 }
 
@@ -234,8 +236,8 @@ static orb_status repair_surface(orb_surface *s, const orb_repair_options *optio
   if (mesh->triangle_count == 0 || opened_by_dropping) {
     return orb_refuse_few(s);
   }
-  if (repair & ORB_REPAIR_LARGEST_COMPONENT) {
-    ORB_TRY(keep_largest(s));
+  if (repair & (ORB_REPAIR_LARGEST_COMPONENT | ORB_REPAIR_PART)) {
+    ORB_TRY(keep_piece(s, options));
   }
   if (s->edges.crowded > 0) {
     return orb_refuse_crowded(s);

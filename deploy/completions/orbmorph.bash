@@ -11,7 +11,7 @@ _orbmorph() {
     --animation) choices="pingpong none" ;;
     --fit) choices="auto none rigid similarity" ;;
     --path) choices="linear rigid" ;;
-    --repair) choices="safe none fill_holes largest_component" ;;
+    --repair) choices="safe none fill_holes largest_component close_handles" ;;
     --format) choices="obj off ply stl gltf glb" ;;
     --method) choices="newton kernel-sampling" ;;
     --preset) choices="fast default quality" ;;
@@ -26,16 +26,16 @@ _orbmorph() {
   fi
   case "${COMP_WORDS[1]}" in
     morph)
-      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair --profile "
+      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair --handle-size --take-part --profile "
       ;;
     upload)
-      words="--server --json --quiet --help --name --repair --format "
+      words="--server --json --quiet --help --name --repair --handle-size --take-part --format "
       ;;
     embed)
-      words="--server --json --quiet --help --output --set --no-wait --repair --method --preset "
+      words="--server --json --quiet --help --output --set --no-wait --repair --handle-size --take-part --method --preset "
       ;;
     merge)
-      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair --profile "
+      words="--server --json --quiet --help --output --report --landmarks --align --remesh --tolerance --max-triangles --no-normals --animation --fit --path --set --no-wait --repair --handle-size --take-part --profile "
       ;;
     job)
       words="--server --json --quiet --help --wait --cancel "
@@ -60,7 +60,7 @@ _orbmorph() {
       words="--help --key --expires "
       ;;
     studio)
-      words="--quiet --help --repair --data --no-open "
+      words="--quiet --help --repair --handle-size --take-part --data --no-open "
       ;;
     completions)
       words="--help "

@@ -7,8 +7,8 @@
 
 /* The name, format and repair of a download are members of its body. */
 static int check_query(request *r, api_problem *problem) {
-  static const char *const members[] = {"name", "format", "repair"};
-  for (int i = 0; i < 3; i++) {
+  static const char *const members[] = {"name", "format", "repair", "handle_size", "part"};
+  for (size_t i = 0; i < sizeof members / sizeof members[0]; i++) {
     if (query_has(r, members[i])) {
       api_refuse(problem, "bad-query", "With \"url\", \"%s\" is a member of the body. Move it there.", members[i]);
       api_json_member_string(&problem->facts, "parameter", members[i]);

@@ -13,11 +13,20 @@ static void refuse_full(request *r) {
   reply_refuse(r, "storage-full", "The server's disk has no room for this file. Free some space and try again.");
 }
 
+static int read_upload(const request *r, api_upload *out, api_problem *problem) {
+  const api_upload_query query = {.name = query_of(r, "name"),
+                                  .repair = query_of(r, "repair"),
+                                  .handle_size = query_of(r, "handle_size"),
+                                  .part = query_of(r, "part"),
+                                  .format = query_of(r, "format")};
+  return api_upload_read(&query, out, problem);
+}
+
 void handle_mesh_begin(request *r) {
   server *srv = r->srv;
   api_upload query;
   api_problem problem = {0};
-  if (!api_upload_read(query_of(r, "name"), query_of(r, "repair"), query_of(r, "format"), &query, &problem)) {
+  if (!read_upload(r, &query, &problem)) {
     reply_problem(r, &problem); /* now, before the client sends the whole file */
     return;
   }
@@ -130,7 +139,7 @@ static void upload_away(request *r) {
   api_problem problem = {0};
   intake_file file;
   store_result result;
-  if (!api_upload_read(query_of(r, "name"), query_of(r, "repair"), query_of(r, "format"), &query, &problem)) {
+  if (!read_upload(r, &query, &problem)) {
     reply_problem(r, &problem);
     return;
   }

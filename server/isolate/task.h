@@ -20,7 +20,7 @@ typedef struct task_head {
   char key[API_ID_SIZE]; /* of the job, or the id of the mesh to check */
   double embed_ms;
   char name[ORB_NAME_MAX], repair[API_REPAIR_TEXT]; /* of the mesh to check, as the three below */
-  unsigned flags;
+  orb_repair_options options;
   orb_format format;
   int64_t bytes, created;
 } task_head;

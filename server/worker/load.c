@@ -66,7 +66,7 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
                   int32_t noted_count, int32_t **corners, api_problem *problem) {
   resource row = {0};
   api_mesh_summary summary;
-  unsigned repair;
+  orb_repair_options repair;
   char canonical[API_REPAIR_TEXT];
   unsigned char *bytes = NULL;
   size_t size;
@@ -76,7 +76,7 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
     return api_refuse(problem, "not-found", "Mesh %s was deleted before the job could use it.", id);
   }
   int fine = found == STORE_OK && api_mesh_summarise(row.json, &summary) &&
-             api_repair_parse(summary.repair, &repair, canonical, problem);
+             api_repair_parse(summary.repair, NULL, NULL, &repair, canonical, problem);
   fine = fine && load_verified(env, OBJECT_MESH, id, row.sha, &bytes, &size);
   resource_free(&row);
   if (!fine) {
@@ -89,7 +89,7 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
     if (corners && !(*corners = copy_corners(ctx, mesh))) {
       return 0;
     }
-    status = orb_mesh_repair(ctx, mesh, repair);
+    status = orb_mesh_repair_with(ctx, mesh, &repair);
   }
   return status == ORB_OK;
 }

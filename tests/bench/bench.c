@@ -22,7 +22,8 @@ static const char usage_text[] =
     "  --method M        newton (default) or kernel-sampling\n"
     "  --preset P        default, fast or quality\n"
     "  --options JSON    embedding options as in a request: '{\"energy_weight\":0}'\n"
-    "  --repair LIST     safe (default), none, fill_holes, largest_component, as for an upload\n"
+    "  --repair LIST     safe (default), none, fill_holes, largest_component, close_handles, as for an\n"
+    "                    upload\n"
     "  --threads N       number of threads (default: one per processor)\n"
     "  --cpu C           auto (default), avx512, avx2 or plain: the widest vector instructions to use\n"
     "  --repeat N        runs per file (1)\n"
@@ -120,7 +121,8 @@ static int interpret(const texts *t, bench_options *o) {
   if (t->repair) {
     api_problem problem = {0};
     char canonical[API_REPAIR_TEXT];
-    int fine = api_repair_parse(t->repair, &o->repair, canonical, &problem) || wrong("--repair: ", problem.detail);
+    int fine =
+        api_repair_parse(t->repair, NULL, NULL, &o->repair, canonical, &problem) || wrong("--repair: ", problem.detail);
     api_problem_free(&problem);
     if (!fine) {
       return 0;
@@ -303,7 +305,7 @@ int main(int argc, char **argv) {
     return BENCH_USAGE;
   }
   bench_options options = {.repeat = 1,
-                           .repair = ORB_REPAIR_SAFE,
+                           .repair = {.repair = ORB_REPAIR_SAFE},
                            .sizes = "3,10,30,60",
                            .sets = 1 << command == PAIRS ? 1000000 : 100,
                            .seed = 1,

@@ -12,7 +12,7 @@ enum { BENCH_DONE = 0, BENCH_REFUSED = 1, BENCH_USAGE = 2 };
 typedef struct bench_options {
   int threads, repeat;
   orb_cpu cpu;
-  unsigned repair;
+  orb_repair_options repair;
   const char *out, *landmarks;
   orb_embed_options embed;
   orb_merge_options merge;
@@ -66,7 +66,7 @@ typedef struct bench_mesh {
   int32_t *raw_corners; /* 3 per triangle of the file: its vertices in the file */
   double read_seconds, check_seconds;
 } bench_mesh;
-int bench_load(orb_context *ctx, const char *path, unsigned repair, int keep_corners, bench_mesh *out);
+int bench_load(orb_context *ctx, const char *path, orb_repair_options repair, int keep_corners, bench_mesh *out);
 void bench_unload(orb_context *ctx, bench_mesh *mesh);
 
 /* Many meshes, each read and embedded once. */

@@ -56,7 +56,7 @@ static int cancel_at(const orb_mesh *mesh, const orb_embed_options *options, int
 static int measure(const char *path, const orb_embed_options *options, const char *method, int threads, int cancels) {
   orb_context *ctx = bench_open(threads, ORB_CPU_AUTO);
   bench_mesh m;
-  if (!bench_load(ctx, path, ORB_REPAIR_SAFE, 0, &m)) {
+  if (!bench_load(ctx, path, (orb_repair_options){.repair = ORB_REPAIR_SAFE}, 0, &m)) {
     orb_context_destroy(ctx);
     return 0;
   }

@@ -50,7 +50,7 @@ static int print_line(const bench_mesh *m, const orb_ks_report *r, const orb_cer
 static int run_once(const char *path, int trace) {
   orb_context *ctx = bench_open(1, ORB_CPU_AUTO);
   bench_mesh m;
-  int fine = bench_load(ctx, path, ORB_REPAIR_SAFE, 0, &m);
+  int fine = bench_load(ctx, path, (orb_repair_options){.repair = ORB_REPAIR_SAFE}, 0, &m);
   if (fine) {
     orb_embed_options options;
     orb_embed_defaults(&options);

@@ -68,7 +68,7 @@ int main(int argc, char **argv) {
     return BENCH_USAGE;
   }
   orb_context *ctx = bench_open(1, ORB_CPU_AUTO);
-  int fine = bench_load(ctx, argv[1], ORB_REPAIR_SAFE, 0, &m);
+  int fine = bench_load(ctx, argv[1], (orb_repair_options){.repair = ORB_REPAIR_SAFE}, 0, &m);
   if (fine) {
     int32_t vertices = m.mesh.vertex_count, triangles = m.mesh.triangle_count;
     double *positions = malloc(3 * (size_t)vertices * sizeof *positions);

@@ -134,7 +134,7 @@ static orb_status note_corners(orb_context *ctx, bench_mesh *out) {
   return ORB_OK;
 }
 
-int bench_load(orb_context *ctx, const char *path, unsigned repair, int keep_corners, bench_mesh *out) {
+int bench_load(orb_context *ctx, const char *path, orb_repair_options repair, int keep_corners, bench_mesh *out) {
   memset(out, 0, sizeof *out);
   bench_name_of(path, out->name);
   unsigned char *bytes;
@@ -151,7 +151,7 @@ int bench_load(orb_context *ctx, const char *path, unsigned repair, int keep_cor
   }
   start = orb_clock();
   if (status == ORB_OK) {
-    status = orb_mesh_repair(ctx, &out->mesh, repair);
+    status = orb_mesh_repair_with(ctx, &out->mesh, &repair);
   }
   out->check_seconds = orb_clock() - start;
   if (status != ORB_OK) {

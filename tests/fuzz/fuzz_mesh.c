@@ -23,12 +23,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
       abort();
     }
     static const unsigned repairs[] = {ORB_REPAIR_NONE, ORB_REPAIR_SAFE,
-                                       ORB_REPAIR_FILL_HOLES | ORB_REPAIR_LARGEST_COMPONENT};
-    for (int i = 0; i < 3; i++) {
+                                       ORB_REPAIR_FILL_HOLES | ORB_REPAIR_LARGEST_COMPONENT,
+                                       ORB_REPAIR_FILL_HOLES | ORB_REPAIR_PART | ORB_REPAIR_CLOSE_HANDLES};
+    for (int i = 0; i < 4; i++) {
       if (orb_mesh_copy(ctx, &mesh, &copy) != ORB_OK) {
         abort();
       }
-      if (orb_mesh_repair(ctx, &copy, repairs[i]) == ORB_OK &&
+      if (orb_mesh_repair_with(ctx, &copy, &(orb_repair_options){.repair = repairs[i], .handle_size = 10}) == ORB_OK &&
           (orb_mesh_topology(ctx, &copy, &topology) != ORB_OK || topology.components != 1 || topology.genus != 0 ||
            topology.boundary_edges || topology.nonmanifold_edges || topology.nonmanifold_vertices ||
            !topology.consistent || copy.triangle_count < 4)) {

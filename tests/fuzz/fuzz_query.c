@@ -34,6 +34,7 @@ static char *value_of(char *query, const char *name) {
 static void read_query(char *query, const char *prefer) {
   char *limit = value_of(query, "limit"), *token = value_of(query, "page_token"), *wait = value_of(query, "wait");
   char *name = value_of(query, "name"), *repair = value_of(query, "repair"), *format = value_of(query, "format");
+  char *handle_size = value_of(query, "handle_size"), *part = value_of(query, "part");
   int most;
   uint64_t sealed;
   const char *why = NULL;
@@ -46,10 +47,12 @@ static void read_query(char *query, const char *prefer) {
   }
   api_upload upload;
   api_problem problem = {0};
-  if (api_upload_read(name, repair, format, &upload, &problem)) {
+  const api_upload_query parameters = {name, repair, handle_size, part, format};
+  if (api_upload_read(&parameters, &upload, &problem)) {
     char again[API_REPAIR_TEXT];
-    unsigned flags;
-    if (!api_repair_parse(upload.repair, &flags, again, &problem) || flags != upload.flags ||
+    orb_repair_options options;
+    if (!api_repair_parse(upload.repair, NULL, NULL, &options, again, &problem) ||
+        options.repair != upload.options.repair || options.part != upload.options.part ||
         strcmp(again, upload.repair) != 0) {
       abort(); /* the canonical list of repairs does not read back */
     }
@@ -63,6 +66,8 @@ static void read_query(char *query, const char *prefer) {
   free(name);
   free(repair);
   free(format);
+  free(handle_size);
+  free(part);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

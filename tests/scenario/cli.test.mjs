@@ -530,4 +530,23 @@ test('doctor says what a repair would leave, and calls none helpful that takes m
   const worse = await run(['doctor', herd], { env });
   assert.doesNotMatch(worse.out, /helps/);
   assert.match(worse.out, /largest_component keeps only 128 of 384 triangles \(33 %\)/);
+  assert.match(helps.out, /part 0: 512 triangles.*\n {2}part 1: 32 triangles/);
+  const other = await run(['upload', crumb, '--take-part', '1'], { env });
+  assert.equal(other.code, 0, other.err);
+  assert.match(other.out, /32 triangles\n {2}repaired: part \(1\)/);
+});
+
+test('doctor lists handles, and upload closes them', async (t) => {
+  const d = await daemon(t);
+  const env = { ORBMORPH_SERVER: d.url };
+  const ring = path.join(await folder(t), 'ring.obj');
+  await writeFile(ring, shapes.obj(shapes.torus()));
+  const sick = await run(['doctor', ring], { env });
+  assert.equal(sick.code, 1);
+  const found = sick.out.match(/handle: a loop of (\d+) vertices, ([\d.]+) of the diagonal, at vertex \d+/);
+  assert.ok(found, sick.out);
+  const size = String(Number(found[2]) * 1.1);
+  const closed = await run(['upload', ring, '--repair', 'close_handles', '--handle-size', size], { env });
+  assert.equal(closed.code, 0, closed.err);
+  assert.match(closed.out, new RegExp(`repaired: close_handles \\(cut along a loop of ${found[1]} vertices`));
 });

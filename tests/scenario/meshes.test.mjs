@@ -115,8 +115,52 @@ test('repairs that change the shape happen only on request', async (t) => {
   const largest = await d.upload(two, { repair: 'largest_component' });
   assert.equal(largest.status, 201, largest.bytes.toString());
   assert.equal(largest.json.triangles, 128);
+  const named = two.replace(/^f/m, 'o one\nf').replace(/^((?:f.*\n){128})/m, '$1o two\n');
+  const pieces = await d.upload(named);
+  assertProblem(pieces, 422, 'not-connected');
+  assert.deepEqual(pieces.json.parts, [
+    { part: 0, triangles: 128, name: 'one' },
+    { part: 1, triangles: 32, name: 'two' },
+  ]);
+  for (const part of [1, 'two']) {
+    const other = await d.upload(named, { repair: 'largest_component', part });
+    assert.equal(other.status, 201, other.bytes.toString());
+    assert.equal(other.json.triangles, 32);
+    assert.equal(other.json.repair, `safe,part:${part}`);
+    assert.ok(other.json.repairs.some((r) => r.kind === 'part' && r.count === 1));
+  }
+  assertProblem(await d.upload(named, { part: 'three' }), 422, 'not-connected');
+  assertProblem(await d.upload(named, { part: 'two', repair: 'none' }), 400, 'bad-query');
   const unknown = await d.upload(open, { repair: 'magic' });
   assert.equal(unknown.status, 400, unknown.bytes.toString());
+});
+
+test('handles are closed up to a size, and shown beyond it', async (t) => {
+  const d = await daemon(t);
+  const ring = obj(shapes.torus());
+  const refused = await d.upload(ring);
+  assertProblem(refused, 422, 'not-genus-zero');
+  const { loops, loop_lengths_relative: lengths, genus } = refused.json;
+  assert.equal(genus, 1);
+  assert.equal(loops.length, 1);
+  assert.equal(new Set(loops[0]).size, loops[0].length);
+  assertProblem(await d.upload(ring, { repair: 'close_handles' }), 422, 'not-genus-zero');
+  const size = 1.001 * lengths[0];
+  const closed = await d.upload(ring, { repair: 'close_handles', handle_size: size });
+  assert.equal(closed.status, 201, closed.bytes.toString());
+  assert.equal(closed.json.topology.genus, 0);
+  const [handle, ...more] = closed.json.repairs.filter((r) => r.kind === 'close_handles');
+  assert.equal(more.length, 0);
+  assert.equal(handle.how, 'cut');
+  assert.equal(handle.loop.length, loops[0].length);
+  assert.ok(Math.abs(handle.length_relative - lengths[0]) < 1e-12 && handle.area_relative > 0);
+  const again = await d.upload(ring, { repair: 'close_handles', handle_size: size });
+  assert.equal(again.status, 200);
+  assert.equal(again.json.id, closed.json.id);
+  const embedded = (await d.post('/v1/embeddings?wait=30', { mesh: closed.json.id })).json;
+  assert.equal(embedded.certificate.valid, true);
+  assertProblem(await d.upload(ring, { handle_size: 0.1 }), 400, 'bad-query');
+  assertProblem(await d.upload(ring, { repair: 'close_handles', handle_size: 0 }), 400, 'bad-query');
 });
 
 test('a refusal of a bad mesh says what is wrong and where', async (t) => {

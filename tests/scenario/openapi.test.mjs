@@ -418,6 +418,8 @@ test('answers about meshes', async (t) => {
     [shapes.cube],
     [hole, { repair: 'fill_holes' }],
     [two, { repair: 'largest_component' }],
+    [two, { part: 1 }],
+    [obj(shapes.torus()), { repair: 'close_handles', handle_size: 1 }],
     [obj(shapes.reversed(m, (i) => i % 3 === 0))],
     [obj(shapes.reversed(m))],
     [`${obj(m)}v 9 9 9\nf 1 1 2\n`],

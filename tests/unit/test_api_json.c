@@ -113,15 +113,36 @@ static void test_ids(void **state) {
 
 static void test_repairs(void **state) {
   (void)state;
-  unsigned flags;
-  char text[API_REPAIR_TEXT];
+  orb_repair_options options, again;
+  char text[API_REPAIR_TEXT], canonical[API_REPAIR_TEXT];
   api_problem problem = {0};
-  assert_true(api_repair_parse("largest_component,fill_holes", &flags, text, &problem));
-  assert_int_equal(flags, ORB_REPAIR_SAFE | ORB_REPAIR_FILL_HOLES | ORB_REPAIR_LARGEST_COMPONENT);
+  assert_true(api_repair_parse("largest_component,fill_holes", NULL, NULL, &options, text, &problem));
+  assert_int_equal(options.repair, ORB_REPAIR_SAFE | ORB_REPAIR_FILL_HOLES | ORB_REPAIR_LARGEST_COMPONENT);
   assert_string_equal(text, "safe,fill_holes,largest_component");
-  assert_false(api_repair_parse("none,safe", &flags, text, &problem));
-  assert_false(api_repair_parse("", &flags, text, &problem));
-  assert_false(api_repair_parse("safe,", &flags, text, &problem));
+  assert_true(api_repair_parse("close_handles", "0.050", NULL, &options, text, &problem));
+  assert_int_equal(options.repair, ORB_REPAIR_SAFE | ORB_REPAIR_CLOSE_HANDLES);
+  assert_string_equal(text, "safe,close_handles");
+  assert_true(api_repair_parse("close_handles,largest_component", "0.1", "a, b", &options, text, &problem));
+  assert_string_equal(text, "safe,close_handles:0.1,part:a, b");
+  assert_string_equal(options.part_name, "a, b");
+  assert_true(api_repair_parse(text, NULL, NULL, &again, canonical, &problem));
+  assert_memory_equal(&again, &options, sizeof again);
+  assert_string_equal(canonical, text);
+  assert_true(api_repair_parse("safe", NULL, "2", &options, text, &problem));
+  assert_string_equal(text, "safe,part:2");
+  assert_int_equal(options.part, 2);
+  static const char *const sizes[] = {"", "0", "-1", "nan", "inf", "1e", "0.1x", "11", " 1", "0x1p-3,"};
+  for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+    assert_false(api_repair_parse("close_handles", sizes[i], NULL, &options, text, &problem));
+    assert_string_equal(problem.name, "bad-query");
+  }
+  assert_false(api_repair_parse("safe", "0.1", NULL, &options, text, &problem));
+  assert_false(api_repair_parse("safe", NULL, "", &options, text, &problem));
+  assert_false(api_repair_parse("safe", NULL, "a\nb", &options, text, &problem));
+  assert_false(api_repair_parse("none", NULL, "1", &options, text, &problem));
+  assert_false(api_repair_parse("none,safe", NULL, NULL, &options, text, &problem));
+  assert_false(api_repair_parse("", NULL, NULL, &options, text, &problem));
+  assert_false(api_repair_parse("safe,", NULL, NULL, &options, text, &problem));
   api_problem_free(&problem);
 }
 

@@ -143,6 +143,49 @@ static void test_refusals(void **state) {
   orb_mesh_free(ctx, &mesh);
 }
 
+/* Pieces by number and by name; the first two have names in the file. */
+static void test_parts(void **state) {
+  (void)state;
+  char text[8192], *p = text;
+  size_t length = 0;
+  p += sprintf(p, "o head of it\n" TETRA_V TETRA_F "g ignored\no body\n");
+  cube(p, &length, 10, 0, 5, 0);
+  p += length;
+  p +=
+      sprintf(p, "o caf\xe9\nv 20 0 0\nv 21 0 0\nv 20 1 0\nv 20 0 1\nf 13 15 14\nf 13 14 16\nf 13 16 15\nf 14 15 16\n");
+  orb_mesh mesh;
+  const orb_error *error = orb_context_error(ctx);
+  assert_int_equal(read_repaired(text, ORB_REPAIR_SAFE, &mesh), ORB_E_NOT_CONNECTED);
+  assert_int_equal(error->component_count, 3);
+  assert_string_equal(error->component_names[0], "body");
+  assert_string_equal(error->component_names[1], "head of it");
+  assert_string_equal(error->component_names[2], "caf?");
+  static const struct {
+    const char *name;
+    int part, triangles, first;
+  } cases[] = {{"", 0, 12, 4}, {"", 1, 4, 0}, {"", 2, 4, 12}, {"head of it", 0, 4, 0}, {"body", 7, 12, 4}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    orb_repair_options options = {.repair = ORB_REPAIR_PART, .part = cases[i].part};
+    strcpy(options.part_name, cases[i].name);
+    assert_int_equal(orb_mesh_read(ctx, (const unsigned char *)text, strlen(text), ORB_FORMAT_OBJ, &mesh, NULL),
+                     ORB_OK);
+    assert_int_equal(orb_mesh_repair_with(ctx, &mesh, &options), ORB_OK);
+    assert_int_equal(mesh.triangle_count, cases[i].triangles);
+    assert_int_equal(mesh.source[0], cases[i].first);
+    assert_int_equal(shape_repaired(&mesh, "part"), 2);
+    orb_mesh_free(ctx, &mesh);
+  }
+  for (int i = 0; i < 2; i++) {
+    orb_repair_options options = {.repair = ORB_REPAIR_PART, .part = 3};
+    strcpy(options.part_name, i ? "ignored" : "");
+    assert_int_equal(orb_mesh_read(ctx, (const unsigned char *)text, strlen(text), ORB_FORMAT_OBJ, &mesh, NULL),
+                     ORB_OK);
+    assert_int_equal(orb_mesh_repair_with(ctx, &mesh, &options), ORB_E_NOT_CONNECTED);
+    assert_non_null(strstr(error->detail, i ? "\"ignored\"" : "no part 3, but 3 parts"));
+    orb_mesh_free(ctx, &mesh);
+  }
+}
+
 /* A torus of n × n quadrangles: genus one. */
 static void test_torus(void **state) {
   (void)state;
@@ -221,9 +264,13 @@ static void test_copy(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_safe),     cmocka_unit_test(test_welding_of_cubes),
-                                     cmocka_unit_test(test_refusals), cmocka_unit_test(test_torus),
-                                     cmocka_unit_test(test_fill),     cmocka_unit_test(test_concave_polygon),
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_safe),
+                                     cmocka_unit_test(test_welding_of_cubes),
+                                     cmocka_unit_test(test_refusals),
+                                     cmocka_unit_test(test_parts),
+                                     cmocka_unit_test(test_torus),
+                                     cmocka_unit_test(test_fill),
+                                     cmocka_unit_test(test_concave_polygon),
                                      cmocka_unit_test(test_copy)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

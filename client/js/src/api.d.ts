@@ -47,8 +47,16 @@ export type Mesh = {
   repair: string;
   /** The repairs that were made, in order; empty if the file needed none. */
   repairs: Array<{
-    kind: 'triangulate' | 'weld' | 'unused-vertices' | 'duplicate-faces' | 'degenerate-faces' | 'reorient' | 'turn-inside-out' | 'split-vertices' | 'fill_holes' | 'largest_component';
+    kind: 'triangulate' | 'weld' | 'unused-vertices' | 'duplicate-faces' | 'degenerate-faces' | 'reorient' | 'turn-inside-out' | 'split-vertices' | 'fill_holes' | 'largest_component' | 'part' | 'close_handles';
     count: number;
+    /** Of a handle: the vertices of the file that the cut goes through, in order; the last is joined to the first. */
+    loop?: number[];
+    /** The length of the loop, relative to the diagonal. */
+    length_relative?: number;
+    /** cut: the loop went around the handle. fill: it went around the tunnel. */
+    how?: 'cut' | 'fill';
+    /** The area of the patches on both sides of the loop, relative to the square of the diagonal. */
+    area_relative?: number;
   }>;
   attributes: Array<'normal' | 'texcoord' | 'color'>;
   created: Instant;
@@ -502,6 +510,10 @@ export type FetchRequest = {
   format?: 'obj' | 'off' | 'ply' | 'stl' | 'gltf' | 'glb';
   /** As of an upload. Default: "safe". */
   repair?: string;
+  /** As of an upload. */
+  handle_size?: number;
+  /** As of an upload. */
+  part?: string;
   webhook?: WebhookRequest;
 };
 
@@ -861,6 +873,7 @@ export type ProblemNotClosed = {
   component_count?: number;
   /** The number of triangles of each component, largest first. */
   components?: number[];
+  parts?: Parts;
 };
 
 /** edges: edges of more than two faces; vertices: vertices where two fans of faces touch. */
@@ -879,6 +892,7 @@ export type ProblemNotManifold = {
   component_count?: number;
   /** The number of triangles of each component, largest first. */
   components?: number[];
+  parts?: Parts;
 };
 
 export type ProblemNotOrientable = {
@@ -893,6 +907,7 @@ export type ProblemNotOrientable = {
   component_count?: number;
   /** The number of triangles of each component, largest first. */
   components?: number[];
+  parts?: Parts;
 };
 
 export type ProblemNotConnected = {
@@ -904,7 +919,16 @@ export type ProblemNotConnected = {
   component_count: number;
   /** The number of triangles of each component, largest first. */
   components: number[];
+  parts?: Parts;
 };
+
+/** The pieces of a mesh, largest first; up to 100. Each can be kept with the parameter `part`. */
+export type Parts = Array<{
+  part: number;
+  triangles: number;
+  /** Of the object of the file that most of its triangles belong to. */
+  name?: string;
+}>;
 
 export type ProblemNotGenusZero = {
   type: '/problems/not-genus-zero';
@@ -913,6 +937,10 @@ export type ProblemNotGenusZero = {
   /** What is wrong and what to do. */
   detail: string;
   genus: number;
+  /** A loop for each handle, up to 100: vertices of the file, each once, joined by edges; the last is joined to the first. A cut along it leaves the surface in one piece. */
+  loops: number[][];
+  /** The length of each loop, relative to the diagonal. */
+  loop_lengths_relative: number[];
 };
 
 export type ProblemDegenerate = {

@@ -94,11 +94,13 @@ export class Orbmorph {
   // ---- meshes
 
   /** Uploads a mesh. `source`: a File, Blob, ArrayBuffer, typed array or, in Node, a path. -> the mesh */
-  async uploadMesh(source, { name, format, repair, onProgress, signal } = {}) {
+  async uploadMesh(source, { name, format, repair, handleSize, part, onProgress, signal } = {}) {
     const file = await openSource(source, name);
     const query = new URLSearchParams({ name: file.name });
     if (format) query.set('format', format);
     if (repair) query.set('repair', Array.isArray(repair) ? repair.join(',') : repair);
+    if (handleSize !== undefined) query.set('handle_size', handleSize);
+    if (part !== undefined) query.set('part', part);
     const send = () =>
       sendBody(this.url(`/v1/meshes?${query}`), file.body, file.size, {
         headers: this.headers({ 'Content-Type': 'application/octet-stream' }),

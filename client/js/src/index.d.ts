@@ -11,7 +11,7 @@ import type {
   SupermeshSummary,
 } from './api.js';
 
-export type Repair = 'none' | 'safe' | 'fill_holes' | 'largest_component';
+export type Repair = 'none' | 'safe' | 'fill_holes' | 'largest_component' | 'close_handles';
 export type Source =
   | Blob
   | ArrayBuffer
@@ -54,6 +54,10 @@ export interface UploadOptions extends RequestOptions {
   name?: string;
   format?: Mesh['format'];
   repair?: Repair | Repair[] | string;
+  /** With close_handles: the longest loop to cut along, relative to the diagonal. Default: 0.05. */
+  handleSize?: number;
+  /** The piece to keep: a number from 0 by size, or a name. */
+  part?: number | string;
   onProgress?: (sent: number, total: number) => void;
 }
 

@@ -16,8 +16,8 @@ extern "C" {
 enum { ORB_REPAIR_KINDS_MAX = 16 };
 
 /* One kind of repair. kind: "triangulate", "weld", "unused-vertices", "duplicate-faces", "degenerate-faces",
- * "reorient", "turn-inside-out", "split-vertices", "fill_holes", "largest_component". Handles that were closed are
- * listed one by one: orb_handle. */
+ * "reorient", "turn-inside-out", "split-vertices", "fill_holes", "largest_component", "part". Handles that were closed
+ * are listed one by one: orb_handle. */
 typedef struct orb_repair {
   const char *kind; /* a literal */
   int64_t count;    /* faces, vertices, holes or pieces that it changed, depending on the kind */
@@ -30,6 +30,13 @@ typedef struct orb_handle {
   double length_relative, area_relative; /* of the loop, to the diagonal; of both patches, to its square */
   int filled;                            /* whether the loop ran around the tunnel */
 } orb_handle;
+
+/* An object of the file that has a name: its triangles run to the first one of the next object. */
+enum { ORB_PART_NAME = 128 };
+typedef struct orb_object {
+  int32_t first_triangle;   /* numbers of the file */
+  char name[ORB_PART_NAME]; /* UTF-8 without control characters; longer names are cut */
+} orb_object;
 
 /* A mesh. The context owns all arrays; optional ones are NULL where the file has none. */
 typedef struct orb_mesh {
@@ -59,7 +66,8 @@ typedef struct orb_mesh {
 
   int32_t repair_count;
   orb_repair repairs[ORB_REPAIR_KINDS_MAX];
-  int32_t handle_count, loop_vertex_count;
+  int32_t object_count, handle_count, loop_vertex_count;
+  orb_object *objects; /* OBJ: o, or g where there is no o; glTF: meshes; NULL: the file names none */
   orb_handle *handles; /* in the order in which they were closed */
   int32_t *loop_vertices;
 } orb_mesh;
@@ -103,6 +111,7 @@ enum {
   ORB_REPAIR_SAFE = 1,              /* only what is needed and changes no shape; each repair is counted */
   ORB_REPAIR_FILL_HOLES = 2,        /* implies safe */
   ORB_REPAIR_LARGEST_COMPONENT = 4, /* implies safe; keeps the piece with the most triangles */
+  ORB_REPAIR_PART = 16,             /* implies safe; keeps the piece that orb_repair_options names */
   ORB_REPAIR_CLOSE_HANDLES = 8,     /* implies safe; see orb_repair_options.handle_size */
 };
 
@@ -118,6 +127,9 @@ ORB_API ORB_MUST_CHECK orb_status orb_mesh_repair(orb_context *ctx, orb_mesh *me
 typedef struct orb_repair_options {
   unsigned repair;
   double handle_size; /* handles are closed along loops of at most this length, relative to the diagonal; 0: 0.05 */
+  int32_t part;       /* with ORB_REPAIR_PART: pieces are numbered by their triangles, the largest is 0 */
+  char part_name[ORB_PART_NAME]; /* unless "": the largest piece with this name, instead of a number. A piece has the
+                                  * name of the object that most of its triangles belong to */
 } orb_repair_options;
 
 /* The same with options. */

@@ -93,9 +93,20 @@ const numbers = (value: unknown): number[] =>
 const pairs = (value: unknown): number[][] =>
   Array.isArray(value) ? value.filter((x) => Array.isArray(x) && x.length === 2) : [];
 
+/** The edges of closed loops of vertices. */
+const rims = (value: unknown): number[][] =>
+  Array.isArray(value)
+    ? value.flatMap((loop) => numbers(loop).map((v, i, all) => [v, all[(i + 1) % all.length]!]))
+    : [];
+
 async function showDefects(shape: Shape, error: ProblemError) {
   const { problem } = error;
-  const edges = [...pairs(problem.boundary_edges), ...pairs(problem.nonmanifold_edges), ...pairs(problem.edges)];
+  const edges = [
+    ...pairs(problem.boundary_edges),
+    ...pairs(problem.nonmanifold_edges),
+    ...pairs(problem.edges),
+    ...rims(problem.loops),
+  ];
   const vertices = [...numbers(problem.nonmanifold_vertices), ...numbers(problem.vertices)];
   const defects = await work('defects', shape.key, error.kind, edges, vertices);
   shape.model?.defects(defects);
@@ -181,11 +192,31 @@ export function uploadAgain(key: string, repair: string) {
   if (shape?.file) void send(shape, repair);
 }
 
+/** The pieces after the largest, as many as there is room for. */
+function otherParts(parts: unknown): { repair: string; label: string }[] {
+  if (!Array.isArray(parts)) return [];
+  return parts.slice(1, 5).map(({ part, triangles, name }) => ({
+    repair: `safe,part:${part}`,
+    label: `Keep ${name ? `“${name}”` : `piece ${part}`} (${triangles.toLocaleString('en')} triangles)`,
+  }));
+}
+
+/** The loops on show can be cut along once `handle_size` allows the longest of them. */
+function handleRepairs(lengths: number[], genus: number): { repair: string; label: string }[] {
+  const longest = Math.max(0, ...lengths);
+  if (lengths.length < genus || longest === 0 || longest > 9) return [];
+  const label = genus === 1 ? 'Close the handle' : `Close ${genus} handles`;
+  if (longest <= 0.05) return [{ repair: 'safe,close_handles', label }];
+  const size = Number((longest * 1.01).toPrecision(3));
+  return [{ repair: `safe,close_handles:${size}`, label: `${label} along the loops in red` }];
+}
+
 /** The repairs that the page offers for a refusal. */
 export function repairsFor(problem: Problem): { repair: string; label: string }[] {
   const kind = problem.type.split('/').pop();
   if (kind === 'not-closed') return [{ repair: 'safe,fill_holes', label: 'Fill the holes' }];
   if (kind === 'not-connected' || (kind === 'not-manifold' && problem.components))
-    return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }];
+    return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }, ...otherParts(problem.parts)];
+  if (kind === 'not-genus-zero') return handleRepairs(numbers(problem.loop_lengths_relative), Number(problem.genus));
   return [];
 }
