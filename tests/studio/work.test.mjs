@@ -7,7 +7,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { promisify } from 'node:util';
 import { endless } from '../scenario/support/daemon.mjs';
-import { ball, obj } from '../scenario/support/shapes.mjs';
+import { ball, obj, torus } from '../scenario/support/shapes.mjs';
 import { browser, daemon } from './started.mjs';
 import {
   addFiles,
@@ -329,6 +329,19 @@ test('loose pieces are shown in red, and the largest can be kept', async () => {
   await settled(page);
   assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 150 && g < 110 && b < 110)) > 50, 'red is drawn');
   await button(page, 'Keep the largest piece').click();
+  await until(() => page.locator('.card.ready').count(), 'it is repaired');
+  await done();
+});
+
+test('the loop around a handle is shown in red, and the handle can be closed', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const file = { name: 'ring.obj', mimeType: 'text/plain', buffer: Buffer.from(obj(torus())) };
+  await page.locator('input[type=file]').first().setInputFiles(file);
+  await page.locator('.card.refused').waitFor();
+  await until(() => page.getByText('Shown in red on the model.').count(), 'the loop is found');
+  await settled(page);
+  assert.ok((await countPixels(page, '.stage-area', (r, g, b) => r > 180 && g < 110 && b < 110)) > 20, 'red is drawn');
+  await button(page, 'Close the handle along the red loop').click();
   await until(() => page.locator('.card.ready').count(), 'it is repaired');
   await done();
 });

@@ -284,9 +284,37 @@ static void test_mixed(void **state) {
   check_refused(&ring, &options, 1);
 }
 
+/* Wherever memory runs out, the call says so and leaks nothing, which orb_context_destroy() checks. */
+static void test_memory(void **state) {
+  (void)state;
+  size_t size;
+  char *text = handles_plate(3, &size);
+  for (double handle = 0.001; handle < 2; handle *= 1000) {
+    int failures = 0;
+    orb_status status = ORB_E_NO_MEMORY;
+    for (size_t limit = 4096; status == ORB_E_NO_MEMORY; limit += 512) {
+      const orb_context_options options = {.memory_limit = limit, .threads = 1};
+      const orb_repair_options repair = {.repair = ORB_REPAIR_CLOSE_HANDLES, .handle_size = handle};
+      orb_context *own;
+      orb_mesh mesh;
+      assert_int_equal(orb_context_create(&options, &own), ORB_OK);
+      status = orb_mesh_read(own, (unsigned char *)text, size, ORB_FORMAT_OBJ, &mesh, NULL);
+      if (status == ORB_OK) {
+        status = orb_mesh_repair_with(own, &mesh, &repair);
+        failures += status == ORB_E_NO_MEMORY;
+        orb_mesh_free(own, &mesh);
+      }
+      orb_context_destroy(own);
+    }
+    assert_int_equal(status, handle < 1 ? ORB_E_NOT_GENUS_ZERO : ORB_OK);
+    assert_true(failures > 10);
+  }
+  free(text);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_spheres), cmocka_unit_test(test_animals),
                                      cmocka_unit_test(test_refused), cmocka_unit_test(test_torus),
-                                     cmocka_unit_test(test_mixed)};
+                                     cmocka_unit_test(test_mixed),   cmocka_unit_test(test_memory)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

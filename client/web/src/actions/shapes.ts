@@ -208,7 +208,7 @@ function handleRepairs(lengths: number[], genus: number): { repair: string; labe
   const label = genus === 1 ? 'Close the handle' : `Close ${genus} handles`;
   if (longest <= 0.05) return [{ repair: 'safe,close_handles', label }];
   const size = Number((longest * 1.01).toPrecision(3));
-  return [{ repair: `safe,close_handles:${size}`, label: `${label} along the loops in red` }];
+  return [{ repair: `safe,close_handles:${size}`, label: `${label} along the red loop${genus === 1 ? '' : 's'}` }];
 }
 
 /** The repairs that the page offers for a refusal. */
