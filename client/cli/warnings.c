@@ -49,6 +49,29 @@ static int warn_of_pairs(FILE *out, const char *bullet, const cJSON *supermesh) 
   return count;
 }
 
+/* Where the map is bad, by the largest part of each warning. */
+static int warn_of_places(FILE *out, const char *bullet, const cJSON *supermesh) {
+  const cJSON *warning;
+  int count = 0;
+  cJSON_ArrayForEach(warning, member(supermesh, "warnings")) {
+    const char *a = name_of(supermesh, cli_number(warning, "a")), *b = name_of(supermesh, cli_number(warning, "b"));
+    const cJSON *at = cJSON_GetArrayItem(member(cJSON_GetArrayItem(member(warning, "parts"), 0), "at"), 0);
+    const cJSON *centre = member(at, "centre");
+    double x[3];
+    for (int k = 0; k < 3; k++) {
+      const cJSON *number = cJSON_GetArrayItem(centre, k);
+      x[k] = cJSON_IsNumber(number) ? number->valuedouble : NAN;
+    }
+    const char *what = strcmp(cli_string(warning, "kind", ""), "thin") == 0
+                           ? "of the surface gets thin halfway, as where a limb is twisted"
+                           : "of the surface is stretched badly (energy above 20)";
+    fprintf(out, "%sFrom %s to %s, %.2g %% %s; look around (%.4g, %.4g, %.4g) of %s, within %.3g.\n", bullet, a, b,
+            100 * cli_number(warning, "share"), what, x[0], x[1], x[2], a, cli_number(at, "radius"));
+    count++;
+  }
+  return count;
+}
+
 static int warn_of_match(FILE *out, const char *bullet, const cJSON *supermesh) {
   const cJSON *match = member(supermesh, "match");
   int others = cJSON_GetArraySize(member(supermesh, "alternatives"));
@@ -117,6 +140,6 @@ static int warn_of_fits(FILE *out, const char *bullet, const cJSON *supermesh) {
 
 int cli_warnings(FILE *out, const char *bullet, const cJSON *supermesh) {
   return warn_of_match(out, bullet, supermesh) + warn_of_pairs(out, bullet, supermesh) +
-         warn_of_landmarks(out, bullet, supermesh) + warn_of_errors(out, bullet, supermesh) +
-         warn_of_fits(out, bullet, supermesh);
+         warn_of_places(out, bullet, supermesh) + warn_of_landmarks(out, bullet, supermesh) +
+         warn_of_errors(out, bullet, supermesh) + warn_of_fits(out, bullet, supermesh);
 }

@@ -420,6 +420,36 @@ export type Supermesh = {
     /** The share of the supermesh's triangles that are inverted on either shape: they face away from the smooth normals of the surface at their corners and from its face at their centre. */
     inverted_fraction: number | null;
   }>;
+  /** Where the map between the shapes of a pair is bad; empty if it is nowhere. Absent if an older engine made the supermesh. */
+  warnings?: Array<{
+    /** `stretched`: the symmetric Dirichlet energy is above 20 on more than 1 % of the area of either shape. `thin`: patches of the surface keep less than half of their area halfway through the linear morph, after a rigid fit, because the map twists a limb or the pose turns it far. */
+    kind: 'stretched' | 'thin';
+    /** An index into shapes. */
+    a: number;
+    /** An index into shapes. */
+    b: number;
+    /** The share of the area, on the shape on which it is larger, of all parts together, also of those that are not listed. */
+    share: number;
+    /** The connected parts, at most four, the largest first. */
+    parts: Array<{
+      /** Of the area. */
+      share: number;
+      /** A ball around the part on shape a, and one on shape b, in the coordinates of their files. */
+      at: [{
+        /** An index into shapes. */
+        shape: number;
+        centre: [number, number, number];
+        radius: number;
+      }, {
+        /** An index into shapes. */
+        shape: number;
+        centre: [number, number, number];
+        radius: number;
+      }];
+      /** The largest triangles of the part, each by three vertices of the supermesh. */
+      triangles: [number, number, number][];
+    }>;
+  }>;
   /** The energy of the alignment; null if it was not measured. */
   energy: number | null;
   /** What the files have and the asset lacks: parts of the first shape's materials, and data that no asset has, such as skins. The last entry of a long list counts the rest. */

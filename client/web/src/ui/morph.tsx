@@ -218,6 +218,25 @@ function Match({ result }: { result: Result }) {
   );
 }
 
+/** Where the map between two shapes is bad. */
+function Warnings({ result: { supermesh } }: { result: Result }) {
+  const { shapes, warnings = [] } = supermesh;
+  if (!warnings.length) return null;
+  const place = ({ shape, centre, radius }: (typeof warnings)[0]['parts'][0]['at'][0]) =>
+    `around (${centre.map((x) => x.toPrecision(3)).join(', ')}) of ${shapes[shape].name}, within ${radius.toPrecision(2)}`;
+  return (
+    <ul class="hint" aria-label="Warnings of the map">
+      {warnings.map(({ kind, a, b, share, parts }) => (
+        <li key={`${kind}${a}${b}`}>
+          {`From ${shapes[a].name} to ${shapes[b].name}, ${(100 * share).toPrecision(2)} % of the surface ${
+            kind === 'thin' ? 'gets thin halfway, as where a limb is twisted' : 'is stretched badly'
+          }: look ${place(parts[0].at[0])}. A landmark there may help.`}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
 function Download({ result }: { result: Result }) {
   const { supermesh } = result;
   if (isWaiting())
@@ -262,6 +281,7 @@ export function MorphInspector() {
       <h2>Morph</h2>
       <Shown result={result} />
       <Match result={result} />
+      <Warnings result={result} />
       <Segments
         label="What is shown"
         value={state.show}
