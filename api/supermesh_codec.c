@@ -188,6 +188,26 @@ static void write_landmarks(const api_supermesh_request *request, const orb_merg
   api_json_close(out, ']');
 }
 
+/* Landmarks of the request that may be misplaced. */
+static void write_suspects(const api_supermesh_request *request, const orb_alignment *alignment, const api_place *meant,
+                           api_text *out) {
+  api_json_key(out, "suspects");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < alignment->suspect_count; i++) {
+    const orb_suspect *one = &alignment->suspects[i];
+    api_json_open(out, '{');
+    api_json_member_integer(out, "landmark", one->landmark);
+    api_json_member_string(out, "name", request->landmarks.items[one->landmark].name);
+    api_json_member_integer(out, "shape", one->shape);
+    api_json_member_number(out, "share", one->share);
+    api_json_key(out, "at");
+    api_place_write(out, &meant[i]);
+    api_json_member_number(out, "distance_relative", one->distance);
+    api_json_close(out, '}');
+  }
+  api_json_close(out, ']');
+}
+
 /* From these confidences on a match is likely, and sure. docs/bench-confidence.md says how often a sure one is right;
  * no lower one is promised. */
 static const double LIKELY = 0.5, SURE = 0.8;
@@ -293,8 +313,8 @@ static void write_profiles(const orb_profile_facts *profiles, api_text *out) {
 }
 
 void api_supermesh_write(const char *id, const api_supermesh_request *request, const orb_merge_result *result,
-                         const api_place *found, const api_place *others, double embed_ms, int64_t created,
-                         api_text *out) {
+                         const api_place *found, const api_place *others, const api_place *meant, double embed_ms,
+                         int64_t created, api_text *out) {
   api_text canonical = {0};
   api_supermesh_request_write(request, &canonical);
   out->failed |= canonical.failed;
@@ -310,6 +330,7 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   api_json_member_integer(out, "triangles", result->supermesh.triangle_count);
   write_shapes(id, request, result, out);
   write_landmarks(request, result, found, out);
+  write_suspects(request, &result->alignment, meant, out);
   write_match(&result->alignment.match, out);
   write_alternatives(request, &result->alignment, others, out);
   api_json_key(out, "certificate");

@@ -378,6 +378,20 @@ export type Supermesh = {
     /** From 0 to 1. */
     confidence: number | null;
   }>;
+  /** Landmarks of the request that may be misplaced, by falling distance; empty if the map is good, or its energy was not measured. Absent if an older engine made the supermesh. */
+  suspects?: Array<{
+    /** An index into the landmarks. */
+    landmark: number;
+    name: string;
+    /** An index into shapes: the map from the first shape to this one is bad around the landmark. */
+    shape: number;
+    /** The share of that map's distortion that is nearer to this landmark than to the others. */
+    share: number;
+    /** Where it would lie on that shape if its place on the first one is right. Send it as the landmark's place to try it. */
+    at: Place;
+    /** The distance from its given place to there, relative to the diagonal. */
+    distance_relative: number;
+  }>;
   /** How far the correspondence that orbmorph found may be relied on; of several shapes, bend and clear are the worst. Absent if the request gives landmarks or its alignment only rotates. docs/bench-confidence.md says how it is calibrated. */
   match?: {
     /** From 0 to 1, calibrated on pairs of shapes: of the matches with 0.8 or more, all 41 were right. Lower values order matches, but are no shares. */
