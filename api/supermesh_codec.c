@@ -72,6 +72,55 @@ static void write_numbers(const char *name, const double *numbers, int32_t count
   api_json_close(out, ']');
 }
 
+/* A part of a warning: its ball on both shapes, and triangles of the supermesh. */
+static void write_warning_part(const orb_warning *warning, const orb_warning_part *part, api_text *out) {
+  api_json_open(out, '{');
+  api_json_member_number(out, "share", part->share);
+  api_json_key(out, "at");
+  api_json_open(out, '[');
+  for (int k = 0; k < 2; k++) {
+    api_json_open(out, '{');
+    api_json_member_integer(out, "shape", k ? warning->b : warning->a);
+    write_numbers("centre", part->centre[k], 3, out);
+    api_json_member_number(out, "radius", part->radius[k]);
+    api_json_close(out, '}');
+  }
+  api_json_close(out, ']');
+  api_json_key(out, "triangles");
+  api_json_open(out, '[');
+  for (int32_t t = 0; t < part->triangle_count; t++) {
+    api_json_open(out, '[');
+    for (int k = 0; k < 3; k++) {
+      api_json_integer(out, part->triangles[3 * t + k]);
+    }
+    api_json_close(out, ']');
+  }
+  api_json_close(out, ']');
+  api_json_close(out, '}');
+}
+
+static void write_warnings(const orb_merge_result *result, api_text *out) {
+  static const char *const kinds[] = {"stretched", "thin"};
+  api_json_key(out, "warnings");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < result->warning_count; i++) {
+    const orb_warning *warning = &result->warnings[i];
+    api_json_open(out, '{');
+    api_json_member_string(out, "kind", kinds[warning->kind]);
+    api_json_member_integer(out, "a", warning->a);
+    api_json_member_integer(out, "b", warning->b);
+    api_json_member_number(out, "share", warning->share);
+    api_json_key(out, "parts");
+    api_json_open(out, '[');
+    for (int32_t p = 0; p < warning->part_count; p++) {
+      write_warning_part(warning, &warning->parts[p], out);
+    }
+    api_json_close(out, ']');
+    api_json_close(out, '}');
+  }
+  api_json_close(out, ']');
+}
+
 /* What asset.fit did to a shape. */
 static void write_fit(const orb_fit_report *fit, api_text *out) {
   static const char *const kinds[] = {"none", "rigid", "similarity"};
@@ -136,6 +185,26 @@ static void write_landmarks(const api_supermesh_request *request, const orb_merg
     api_json_close(out, '}');
   }
   write_found(result, found, out);
+  api_json_close(out, ']');
+}
+
+/* Landmarks of the request that may be misplaced. */
+static void write_suspects(const api_supermesh_request *request, const orb_alignment *alignment, const api_place *meant,
+                           api_text *out) {
+  api_json_key(out, "suspects");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < alignment->suspect_count; i++) {
+    const orb_suspect *one = &alignment->suspects[i];
+    api_json_open(out, '{');
+    api_json_member_integer(out, "landmark", one->landmark);
+    api_json_member_string(out, "name", request->landmarks.items[one->landmark].name);
+    api_json_member_integer(out, "shape", one->shape);
+    api_json_member_number(out, "share", one->share);
+    api_json_key(out, "at");
+    api_place_write(out, &meant[i]);
+    api_json_member_number(out, "distance_relative", one->distance);
+    api_json_close(out, '}');
+  }
   api_json_close(out, ']');
 }
 
@@ -244,8 +313,8 @@ static void write_profiles(const orb_profile_facts *profiles, api_text *out) {
 }
 
 void api_supermesh_write(const char *id, const api_supermesh_request *request, const orb_merge_result *result,
-                         const api_place *found, const api_place *others, double embed_ms, int64_t created,
-                         api_text *out) {
+                         const api_place *found, const api_place *others, const api_place *meant, double embed_ms,
+                         int64_t created, api_text *out) {
   api_text canonical = {0};
   api_supermesh_request_write(request, &canonical);
   out->failed |= canonical.failed;
@@ -261,12 +330,14 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   api_json_member_integer(out, "triangles", result->supermesh.triangle_count);
   write_shapes(id, request, result, out);
   write_landmarks(request, result, found, out);
+  write_suspects(request, &result->alignment, meant, out);
   write_match(&result->alignment.match, out);
   write_alternatives(request, &result->alignment, others, out);
   api_json_key(out, "certificate");
   api_merge_certificate_write(result, out);
   api_json_key(out, "pairs");
   api_pairs_write(result, out);
+  write_warnings(result, out);
   api_json_member_number(out, "energy", result->alignment.energy);
   write_dropped(result, out);
   write_timings(&result->timings, embed_ms, out);

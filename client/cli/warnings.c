@@ -10,6 +10,7 @@ static const double ENERGY_MOST = 2, MEDIAN_MOST = 1.5;
 static const double INVERTED_MOST = 0.005;     /* of the triangles */
 static const double CONFIDENCE_LEAST = 0.3;    /* of a found landmark */
 static const double TOLERANCE_ROUNDING = 1.01; /* a proved bound may exceed the tolerance by rounding */
+static const double THIN_MOST = 0.01;          /* of the surface: a patch or two are hardly seen */
 static const double TURNED_OVER = 60;          /* degrees of the y axis */
 
 static const cJSON *member(const cJSON *object, const char *name) {
@@ -44,6 +45,60 @@ static int warn_of_pairs(FILE *out, const char *bullet, const cJSON *supermesh) 
             "%sThe maps stretch much in places (energy %.3g; a good map is below %.2g). A landmark on each limb that "
             "morphs badly helps.\n",
             bullet, cli_number(supermesh, "energy"), ENERGY_MOST);
+    count++;
+  }
+  return count;
+}
+
+/* Where the map is bad, by the largest part of each warning. */
+static int warn_of_places(FILE *out, const char *bullet, const cJSON *supermesh) {
+  const cJSON *warning;
+  int count = 0;
+  cJSON_ArrayForEach(warning, member(supermesh, "warnings")) {
+    const char *a = name_of(supermesh, cli_number(warning, "a")), *b = name_of(supermesh, cli_number(warning, "b"));
+    const cJSON *at = cJSON_GetArrayItem(member(cJSON_GetArrayItem(member(warning, "parts"), 0), "at"), 0);
+    const cJSON *centre = member(at, "centre");
+    int thin = strcmp(cli_string(warning, "kind", ""), "thin") == 0;
+    double x[3];
+    if (thin && cli_number(warning, "share") <= THIN_MOST) {
+      continue;
+    }
+    for (int k = 0; k < 3; k++) {
+      const cJSON *number = cJSON_GetArrayItem(centre, k);
+      x[k] = cJSON_IsNumber(number) ? number->valuedouble : NAN;
+    }
+    const char *what = thin ? "of the surface gets thin halfway, as where a limb is twisted"
+                            : "of the surface is stretched badly (energy above 20)";
+    fprintf(out, "%sFrom %s to %s, %.2g %% %s; look around (%.4g, %.4g, %.4g) of %s, within %.3g.\n", bullet, a, b,
+            100 * cli_number(warning, "share"), what, x[0], x[1], x[2], a, cli_number(at, "radius"));
+    count++;
+  }
+  return count;
+}
+
+/* A place as the client names it: a vertex, or a point of a triangle. */
+static void print_place(FILE *out, const cJSON *at) {
+  const cJSON *barycentric = member(at, "barycentric");
+  if (barycentric) {
+    fprintf(out, "triangle %.0f, barycentric %.2f %.2f %.2f", cli_number(at, "triangle"),
+            cJSON_GetArrayItem(barycentric, 0)->valuedouble, cJSON_GetArrayItem(barycentric, 1)->valuedouble,
+            cJSON_GetArrayItem(barycentric, 2)->valuedouble);
+  } else if (member(at, "vertex")) {
+    fprintf(out, "vertex %.0f", cli_number(at, "vertex"));
+  } else {
+    fputs("the place that the answer names", out);
+  }
+}
+
+static int warn_of_suspects(FILE *out, const char *bullet, const cJSON *supermesh) {
+  const cJSON *suspect;
+  int count = 0;
+  cJSON_ArrayForEach(suspect, member(supermesh, "suspects")) {
+    fprintf(out, "%sThe landmark %s may be misplaced: %.0f %% of the distortion is around it. On %s it would lie at ",
+            bullet, cli_string(suspect, "name", "?"), 100 * cli_number(suspect, "share"),
+            name_of(supermesh, cli_number(suspect, "shape")));
+    print_place(out, member(suspect, "at"));
+    fprintf(out, ", %.0f %% of the diagonal away.\n", 100 * cli_number(suspect, "distance_relative"));
     count++;
   }
   return count;
@@ -116,7 +171,8 @@ static int warn_of_fits(FILE *out, const char *bullet, const cJSON *supermesh) {
 }
 
 int cli_warnings(FILE *out, const char *bullet, const cJSON *supermesh) {
-  return warn_of_match(out, bullet, supermesh) + warn_of_pairs(out, bullet, supermesh) +
+  return warn_of_match(out, bullet, supermesh) + warn_of_suspects(out, bullet, supermesh) +
+         warn_of_pairs(out, bullet, supermesh) + warn_of_places(out, bullet, supermesh) +
          warn_of_landmarks(out, bullet, supermesh) + warn_of_errors(out, bullet, supermesh) +
          warn_of_fits(out, bullet, supermesh);
 }

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/suspects.h"
 #include "align/methods.h"
 #include "base/check.h"
 #include "base/context.h"
@@ -48,6 +49,10 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
     status = orb_align_auto(ctx, shapes, shape_count, options, out);
   } else {
     status = orb_align_given(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
+    status = status == ORB_OK ? orb_align_suspects(ctx, shapes, landmarks, options, out) : status;
+  }
+  if (status != ORB_OK) {
+    orb_alignment_free(ctx, out);
   }
   if (status == ORB_OK) {
     orb_progress(ctx, "align", 1);

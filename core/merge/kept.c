@@ -5,6 +5,7 @@
  *   int32 shapes, landmarks, found; double energy
  *   int32 1 and double bend, clear, confidence of the match, or 0
  *   int32 alternatives; for each double cost, int32 count, count × 2 places (int32 triangle, double[3])
+ *   int32 suspects; for each int32 landmark, int32 shape, double share, double distance, its place
  *   found × shapes places, found × double[3] points, found × double confidence
  *   for each shape: int32 vertices, triangles, changed; double[3] point of each vertex; position and int32 source of
  * each added vertex; the changed triangles, each with its number, corners, parent, source_triangle, material and the
@@ -20,11 +21,11 @@
 #include "base/error.h"
 #include "base/memory.h"
 
-enum { VERSION = 2, BYTE_ORDER_MARK = 0x01020304 };
+enum { VERSION = 3, BYTE_ORDER_MARK = 0x01020304 };
 static const char magic[8] = {'O', 'R', 'B', 'A', 'L', 'I', 'G', 'N'};
 
 /* A new member of the alignment must be written and read here, with a new VERSION. */
-_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 104, "write and read the new member");
+_Static_assert(sizeof(void *) != 8 || sizeof(orb_alignment) == 120, "write and read the new member");
 _Static_assert(sizeof(void *) != 8 || sizeof(orb_aligned_shape) == sizeof(orb_mesh) + sizeof(orb_certificate) + 24,
                "write and read the new member");
 
@@ -157,6 +158,18 @@ static void put_match(writer *w, const orb_alignment *a) {
   }
 }
 
+static void put_suspects(writer *w, const orb_alignment *a) {
+  put_integer(w, a->suspect_count);
+  for (int32_t i = 0; i < a->suspect_count; i++) {
+    const orb_suspect *one = &a->suspects[i];
+    put_integer(w, one->landmark);
+    put_integer(w, one->shape);
+    put(w, &one->share, sizeof one->share);
+    put(w, &one->distance, sizeof one->distance);
+    put_places(w, &one->at, 1);
+  }
+}
+
 static void put_found(writer *w, const orb_alignment *a) {
   const size_t found = (size_t)a->found_count;
   put_places(w, a->found, found * (size_t)a->shape_count);
@@ -181,6 +194,7 @@ orb_status orb_alignment_write(orb_context *ctx, const orb_align_shape *shapes, 
   put_integer(&w, alignment->found_count);
   put(&w, &alignment->energy, sizeof alignment->energy);
   put_match(&w, alignment);
+  put_suspects(&w, alignment);
   put_found(&w, alignment);
   for (int32_t s = 0; s < alignment->shape_count; s++) {
     put_shape(&w, shapes[s].mesh, &alignment->shapes[s], alignment->landmark_count);
@@ -368,6 +382,27 @@ static orb_status take_match(orb_context *ctx, reader *r, const orb_align_shape 
   return ORB_OK;
 }
 
+static orb_status take_suspects(orb_context *ctx, reader *r, const orb_align_shape *shapes, orb_alignment *out) {
+  const int32_t count = take_integer(r, 0, out->shape_count > 1 && out->landmark_count > 0 ? ORB_SUSPECTS_MAX : 0);
+  if (count == 0) {
+    return ORB_OK;
+  }
+  out->suspects = ORB_NEW0(ctx, orb_suspect, ORB_SUSPECTS_MAX);
+  if (!out->suspects) {
+    return ORB_E_NO_MEMORY;
+  }
+  out->suspect_count = count;
+  for (int32_t i = 0; i < count; i++) {
+    orb_suspect *one = &out->suspects[i];
+    one->landmark = take_integer(r, 0, out->landmark_count - 1);
+    one->shape = take_integer(r, 1, out->shape_count - 1);
+    take(r, &one->share, sizeof one->share);
+    take(r, &one->distance, sizeof one->distance);
+    take_places(r, shapes + one->shape, 1, &one->at, 1);
+  }
+  return ORB_OK;
+}
+
 static orb_status take_found(orb_context *ctx, reader *r, const orb_align_shape *shapes, orb_alignment *out) {
   const size_t found = (size_t)out->found_count, places = found * (size_t)out->shape_count;
   out->found = ORB_NEW0(ctx, orb_place, places);
@@ -401,6 +436,7 @@ static orb_status take_all(orb_context *ctx, reader *r, const orb_align_shape *s
   out->landmark_count = landmarks;
   out->found_count = found;
   ORB_TRY(take_match(ctx, r, shapes, out));
+  ORB_TRY(take_suspects(ctx, r, shapes, out));
   if (found > 0) {
     ORB_TRY(take_found(ctx, r, shapes, out));
   }

@@ -24,6 +24,7 @@ void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
   orb_free(ctx, result->landmark_residuals);
   orb_free(ctx, result->found_residuals);
   orb_free(ctx, result->pairs);
+  orb_free(ctx, result->warnings);
   orb_free(ctx, result->transforms);
   orb_free(ctx, result->fits);
   orb_free(ctx, result->asset_vertices);

@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "base/memory.h"
+#include "merge/warn.h"
 #include "numeric/vec3.h"
 
 enum { ALL_PAIRS_UP_TO = 4 }; /* shapes; the pairs of more are only the neighbours, so that their number is linear */
@@ -199,7 +200,19 @@ static int32_t keep_shapely(const orb_supermesh *supermesh, const double *a, con
   return count;
 }
 
-static orb_status measure_pair(orb_context *ctx, const orb_merge_result *out, double *const *positions,
+/* Appends the warnings of a pair. triangles: those that its distortion is measured on. */
+static orb_status warn_of_pair(orb_context *ctx, orb_merge_result *out, const orb_warn_pair *map, int32_t a,
+                               int32_t b) {
+  for (int kind = ORB_WARNING_STRETCHED; kind <= ORB_WARNING_THIN; kind++) {
+    orb_warning *warning = &out->warnings[out->warning_count];
+    *warning = (orb_warning){.kind = (orb_warning_kind)kind, .a = a, .b = b};
+    ORB_TRY(kind == ORB_WARNING_THIN ? orb_warn_thin(ctx, map, warning) : orb_warn_stretched(ctx, map, warning));
+    out->warning_count += warning->part_count > 0;
+  }
+  return ORB_OK;
+}
+
+static orb_status measure_pair(orb_context *ctx, orb_merge_result *out, double *const *positions, const double *moves,
                                unsigned char *const *inverted, orb_pair_report *pair) {
   const orb_supermesh *supermesh = &out->supermesh;
   int64_t inverted_count = 0;
@@ -210,6 +223,14 @@ static orb_status measure_pair(orb_context *ctx, const orb_merge_result *out, do
   int32_t count = keep_shapely(supermesh, positions[pair->a], positions[pair->b], shapely);
   orb_status status =
       orb_distortion_measure(ctx, positions[pair->a], positions[pair->b], shapely, count, &pair->distortion);
+  if (status == ORB_OK) {
+    const orb_warn_pair map = {.triangles = shapely,
+                               .triangle_count = count,
+                               .vertex_count = supermesh->vertex_count,
+                               .position = {positions[pair->a], positions[pair->b]},
+                               .move = {moves + 16 * pair->a, moves + 16 * pair->b}};
+    status = warn_of_pair(ctx, out, &map, pair->a, pair->b);
+  }
   orb_free(ctx, shapely);
   if (status != ORB_OK) {
     return status;
@@ -228,7 +249,12 @@ orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out) {
   unsigned char **inverted = ORB_NEW0(ctx, unsigned char *, shape_count);
   out->pair_count = list_pairs(shape_count, NULL);
   out->pairs = ORB_NEW0(ctx, orb_pair_report, out->pair_count);
-  orb_status status = positions && inverted && out->pairs ? ORB_OK : ORB_E_NO_MEMORY;
+  out->warnings = ORB_NEW0(ctx, orb_warning, 2 * (int64_t)out->pair_count);
+  double *moves = ORB_NEW(ctx, double, 16 * (int64_t)shape_count);
+  orb_status status = positions && inverted && out->pairs && out->warnings && moves ? ORB_OK : ORB_E_NO_MEMORY;
+  if (status == ORB_OK) {
+    status = orb_asset_transforms(ctx, supermesh, out->alignment.shapes, ORB_FIT_RIGID, moves, NULL);
+  }
   for (int32_t s = 0; status == ORB_OK && s < shape_count; s++) {
     positions[s] = ORB_NEW(ctx, double, 3 * (int64_t)supermesh->vertex_count);
     inverted[s] = ORB_NEW(ctx, unsigned char, supermesh->triangle_count);
@@ -247,7 +273,7 @@ orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out) {
     list_pairs(shape_count, out->pairs);
   }
   for (int32_t i = 0; status == ORB_OK && i < out->pair_count; i++) {
-    status = measure_pair(ctx, out, positions, inverted, &out->pairs[i]);
+    status = measure_pair(ctx, out, positions, moves, inverted, &out->pairs[i]);
   }
   for (int32_t s = 0; s < shape_count; s++) {
     if (positions) {
@@ -259,5 +285,6 @@ orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out) {
   }
   orb_free(ctx, positions);
   orb_free(ctx, inverted);
+  orb_free(ctx, moves);
   return status;
 }

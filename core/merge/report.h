@@ -11,7 +11,7 @@ ORB_MUST_CHECK orb_status orb_report_landmarks(orb_context *ctx, const orb_align
 /* Fills out->found_residuals. Needs out->alignment, supermesh and shapes. */
 ORB_MUST_CHECK orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb_merge_result *out);
 
-/* Fills out->pairs. Needs out->alignment and supermesh. */
+/* Fills out->pairs and out->warnings. Needs out->alignment and supermesh. */
 ORB_MUST_CHECK orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out);
 
 #endif

@@ -194,6 +194,15 @@ static api_place *other_spots(orb_context *ctx, const merge_input *in, const orb
   return spots;
 }
 
+/* Where the suspects would lie. NULL if out of memory. */
+static api_place *meant_spots(orb_context *ctx, const merge_input *in, const orb_alignment *alignment) {
+  api_place *spots = orb_alloc(ctx, ORB_SUSPECTS_MAX, sizeof *spots);
+  for (int32_t i = 0; spots && i < alignment->suspect_count; i++) {
+    write_spot(in, (size_t)alignment->suspects[i].shape, &alignment->suspects[i].at, &spots[i]);
+  }
+  return spots;
+}
+
 static int store_result_of(const run_env *env, orb_context *ctx, const run_job *j, const merge_input *in,
                            const orb_merge_result *merged, resource *result, api_problem *problem) {
   api_text json = {0};
@@ -211,12 +220,14 @@ static int store_result_of(const run_env *env, orb_context *ctx, const run_job *
     return 0;
   }
   api_place *found = found_spots(ctx, in, merged), *others = other_spots(ctx, in, &merged->alignment);
-  const int complete = found && others;
+  api_place *meant = meant_spots(ctx, in, &merged->alignment);
+  const int complete = found && others && meant;
   if (complete) {
-    api_supermesh_write(result->id, &in->request, merged, found, others, j->embed_ms, result->created, &json);
+    api_supermesh_write(result->id, &in->request, merged, found, others, meant, j->embed_ms, result->created, &json);
   }
   orb_free(ctx, found);
   orb_free(ctx, others);
+  orb_free(ctx, meant);
   if (!complete) {
     return 0;
   }

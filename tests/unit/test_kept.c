@@ -47,6 +47,13 @@ static void check_same(const orb_alignment *a, const orb_alignment *b) {
   if (a->alternative_count > 0) {
     check_equal(a->alternatives, b->alternatives, (size_t)a->alternative_count, sizeof(orb_alternative));
   }
+  assert_int_equal(a->suspect_count, b->suspect_count);
+  for (int32_t i = 0; i < a->suspect_count; i++) {
+    const orb_suspect *x = &a->suspects[i], *y = &b->suspects[i];
+    assert_true(x->landmark == y->landmark && x->shape == y->shape && x->share == y->share);
+    assert_true(x->distance == y->distance && x->at.triangle == y->at.triangle);
+    assert_memory_equal(x->at.at, y->at.at, sizeof x->at.at);
+  }
   for (size_t i = 0; i < found * shapes; i++) {
     assert_int_equal(a->found[i].triangle, b->found[i].triangle);
     assert_memory_equal(a->found[i].at, b->found[i].at, sizeof a->found[i].at);

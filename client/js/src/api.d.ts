@@ -386,6 +386,20 @@ export type Supermesh = {
     /** From 0 to 1. */
     confidence: number | null;
   }>;
+  /** Landmarks of the request that may be misplaced, by falling distance; empty if the map is good, or its energy was not measured. Absent if an older engine made the supermesh. */
+  suspects?: Array<{
+    /** An index into the landmarks. */
+    landmark: number;
+    name: string;
+    /** An index into shapes: the map from the first shape to this one is bad around the landmark. */
+    shape: number;
+    /** The share of that map's distortion that is nearer to this landmark than to the others. */
+    share: number;
+    /** Where it would lie on that shape if its place on the first one is right. Send it as the landmark's place to try it. */
+    at: Place;
+    /** The distance from its given place to there, relative to the diagonal. */
+    distance_relative: number;
+  }>;
   /** How far the correspondence that orbmorph found may be relied on; of several shapes, bend and clear are the worst. Absent if the request gives landmarks or its alignment only rotates. docs/bench-confidence.md says how it is calibrated. */
   match?: {
     /** From 0 to 1, calibrated on pairs of shapes: of the matches with 0.8 or more, all 41 were right. Lower values order matches, but are no shares. */
@@ -427,6 +441,36 @@ export type Supermesh = {
     distortion: Distortion;
     /** The share of the supermesh's triangles that are inverted on either shape: they face away from the smooth normals of the surface at their corners and from its face at their centre. */
     inverted_fraction: number | null;
+  }>;
+  /** Where the map between the shapes of a pair is bad; empty if it is nowhere. Absent if an older engine made the supermesh. */
+  warnings?: Array<{
+    /** `stretched`: the symmetric Dirichlet energy is above 20 on more than 1 % of the area of either shape. `thin`: patches of the surface keep less than half of their area halfway through the linear morph, after a rigid fit, because the map twists a limb or the pose turns it far. */
+    kind: 'stretched' | 'thin';
+    /** An index into shapes. */
+    a: number;
+    /** An index into shapes. */
+    b: number;
+    /** The share of the area, on the shape on which it is larger, of all parts together, also of those that are not listed. */
+    share: number;
+    /** The connected parts, at most four, the largest first. */
+    parts: Array<{
+      /** Of the area. */
+      share: number;
+      /** A ball around the part on shape a, and one on shape b, in the coordinates of their files. */
+      at: [{
+        /** An index into shapes. */
+        shape: number;
+        centre: [number, number, number];
+        radius: number;
+      }, {
+        /** An index into shapes. */
+        shape: number;
+        centre: [number, number, number];
+        radius: number;
+      }];
+      /** The largest triangles of the part, each by three vertices of the supermesh. */
+      triangles: [number, number, number][];
+    }>;
   }>;
   /** The energy of the alignment; null if it was not measured. */
   energy: number | null;

@@ -15,5 +15,6 @@ void orb_alignment_free(orb_context *ctx, orb_alignment *alignment) {
   orb_free(ctx, alignment->confidence);
   orb_free(ctx, alignment->found_points);
   orb_free(ctx, alignment->alternatives);
+  orb_free(ctx, alignment->suspects);
   memset(alignment, 0, sizeof *alignment);
 }

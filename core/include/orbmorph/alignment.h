@@ -65,6 +65,16 @@ typedef struct orb_match_facts {
                           (docs/bench-confidence.md) */
 } orb_match_facts;
 
+/* A given landmark that may be misplaced: once the map is let go of, the surface takes it far away. */
+typedef struct orb_suspect {
+  int32_t landmark, shape; /* shape: the later one of the pair with the first shape */
+  double share;            /* of the pair's distortion: what lies nearer to this landmark than to the others */
+  orb_place at;            /* where it would lie, on the given mesh of `shape`, if its place on the first is right */
+  double distance;         /* from its given place, relative to the shape's diagonal */
+} orb_suspect;
+
+enum { ORB_SUSPECTS_MAX = 4 };
+
 typedef struct orb_alignment {
   int32_t shape_count, landmark_count;
   orb_aligned_shape *shapes;
@@ -81,9 +91,11 @@ typedef struct orb_alignment {
   orb_match_facts match;
   int32_t alternative_count; /* at most ORB_ALTERNATIVES_MAX, by rising cost; none unless there are two shapes */
   orb_alternative *alternatives;
+  int32_t suspect_count; /* at most ORB_SUSPECTS_MAX, by falling distance */
+  orb_suspect *suspects;
 } orb_alignment;
 
-/* Frees the shapes, the found landmarks and the alternatives, and zeroes the struct. */
+/* Frees the shapes, the found landmarks, the alternatives and the suspects, and zeroes the struct. */
 ORB_API void orb_alignment_free(orb_context *ctx, orb_alignment *alignment);
 
 #ifdef __cplusplus

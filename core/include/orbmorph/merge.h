@@ -36,6 +36,31 @@ typedef struct orb_pair_report {
   double inverted_fraction;
 } orb_pair_report;
 
+enum { ORB_WARNING_PARTS = 4, ORB_WARNING_TRIANGLES = 32 };
+
+typedef enum orb_warning_kind {
+  ORB_WARNING_STRETCHED, /* the symmetric Dirichlet energy is above 20 on more than 1 % of the area */
+  ORB_WARNING_THIN       /* patches keep less than half of their area halfway through the linear morph, after a rigid
+                            fit: the map twists a limb there, or the pose turns it by more than 120° */
+} orb_warning_kind;
+
+/* A connected part of what a warning is about. Index 0 is shape a of the pair, 1 shape b. */
+typedef struct orb_warning_part {
+  double share;                                 /* of the shape's area: of the shape on which it is larger */
+  double centre[2][3], radius[2];               /* a ball around the part, in the shape's units */
+  int32_t triangle_count;                       /* listed: at most ORB_WARNING_TRIANGLES, the largest on either shape */
+  int32_t triangles[3 * ORB_WARNING_TRIANGLES]; /* vertices of the supermesh */
+} orb_warning_part;
+
+/* Where the map between the shapes of a pair is bad. */
+typedef struct orb_warning {
+  orb_warning_kind kind;
+  int32_t a, b;
+  double share;       /* of the area, all parts, also those that are not listed */
+  int32_t part_count; /* by falling share */
+  orb_warning_part parts[ORB_WARNING_PARTS];
+} orb_warning;
+
 typedef struct orb_merge_result {
   orb_alignment alignment;
   orb_supermesh supermesh;
@@ -49,6 +74,8 @@ typedef struct orb_merge_result {
   double *found_residuals;
   int32_t pair_count;
   orb_pair_report *pairs;
+  int32_t warning_count;
+  orb_warning *warnings;
   orb_asset_facts asset_facts;
   int32_t *asset_vertices; /* asset_facts.vertex_count: the supermesh vertex of each vertex of the asset */
   double *transforms;      /* shape_count × 16, see orb_asset_transforms() */

@@ -218,6 +218,46 @@ function Match({ result }: { result: Result }) {
   );
 }
 
+/** Landmarks that may be misplaced. */
+function Suspects({ result: { supermesh } }: { result: Result }) {
+  const { shapes, suspects = [] } = supermesh;
+  if (!suspects.length) return null;
+  return (
+    <ul class="hint" aria-label="Landmarks that may be misplaced">
+      {suspects.map(({ name, shape, share, distance_relative: far }) => (
+        <li key={`${shape}${name}`}>
+          {`${name} may be misplaced: ${Math.round(100 * share)} % of the distortion is around it. On ${
+            shapes[shape].name
+          } it would lie ${Math.round(100 * far)} % of the diagonal away.`}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+/** The share of the surface that may get thin halfway: a patch or two are hardly seen. */
+const THIN_MOST = 0.01;
+
+/** Where the map between two shapes is bad. */
+function Warnings({ result: { supermesh } }: { result: Result }) {
+  const { shapes } = supermesh;
+  const warnings = (supermesh.warnings ?? []).filter(({ kind, share }) => kind !== 'thin' || share > THIN_MOST);
+  if (!warnings.length) return null;
+  const place = ({ shape, centre, radius }: (typeof warnings)[0]['parts'][0]['at'][0]) =>
+    `around (${centre.map((x) => x.toPrecision(3)).join(', ')}) of ${shapes[shape].name}, within ${radius.toPrecision(2)}`;
+  return (
+    <ul class="hint" aria-label="Warnings of the map">
+      {warnings.map(({ kind, a, b, share, parts }) => (
+        <li key={`${kind}${a}${b}`}>
+          {`From ${shapes[a].name} to ${shapes[b].name}, ${(100 * share).toPrecision(2)} % of the surface ${
+            kind === 'thin' ? 'gets thin halfway, as where a limb is twisted' : 'is stretched badly'
+          }: look ${place(parts[0].at[0])}. A landmark there may help.`}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
 function Download({ result }: { result: Result }) {
   const { supermesh } = result;
   if (isWaiting())
@@ -262,6 +302,8 @@ export function MorphInspector() {
       <h2>Morph</h2>
       <Shown result={result} />
       <Match result={result} />
+      <Suspects result={result} />
+      <Warnings result={result} />
       <Segments
         label="What is shown"
         value={state.show}
