@@ -7,6 +7,7 @@ import { Bvh } from './bvh';
 import { decodeMorph, type MorphData } from './morph';
 import { decodeSphere, type SphereData } from './distortion';
 import { buildDisplay, defectiveEdges, loosePieces, type Display, type Frame } from './geometry';
+import { decodeImages } from './dress';
 import { parseMesh, type RawMesh } from './parse';
 import { proposeLandmarks } from './propose';
 import type { Place } from 'orbmorph';
@@ -89,11 +90,12 @@ function facesAt(raw: RawMesh, wanted: Set<number>): Map<number, number> {
 }
 
 const ops = {
-  open(key: string, buffer: ArrayBuffer): Display {
+  async open(key: string, buffer: ArrayBuffer): Promise<Display> {
     const raw = parseMesh(buffer);
     if (!raw.corners.length) throw new Error('The file has no triangles.');
     const display = buildDisplay(raw);
     held.set(key, { raw, frame: display.frame, added: Infinity });
+    await decodeImages(display.skin);
     return display;
   },
 
@@ -203,7 +205,7 @@ const ops = {
     return { lines, points, triangles: Float32Array.from(flat), found };
   },
 
-  morph(key: string, buffer: ArrayBuffer, shapeCount: number): MorphData {
+  async morph(key: string, buffer: ArrayBuffer, shapeCount: number): Promise<MorphData> {
     const data = decodeMorph(buffer, shapeCount);
     morphs.clear();
     morphs.set(key, {
@@ -212,7 +214,9 @@ const ops = {
       index: data.index.slice(),
       targets: data.targets.map((t) => ({ ...t, position: t.position.slice() })),
       shapes: data.shapes.map((weights) => weights.slice()),
+      skin: undefined,
     });
+    await decodeImages(data.skin);
     return data;
   },
 
@@ -514,18 +518,19 @@ function applyFit(all: Float64Array, from: number[][], to: number[][]): Float64A
   return transformed(all, m, spread > 0 ? dot / spread : 1, a, b);
 }
 
-/** The buffers inside a reply, which postMessage transfers instead of copying. */
-function buffersIn(value: unknown, found = new Set<ArrayBuffer>(), depth = 0): Set<ArrayBuffer> {
+/** The buffers and images inside a reply, which postMessage transfers instead of copying. */
+function buffersIn(value: unknown, found = new Set<Transferable>(), depth = 0): Set<Transferable> {
   if (ArrayBuffer.isView(value)) found.add(value.buffer as ArrayBuffer);
+  else if (value instanceof ImageBitmap) found.add(value);
   else if (value && typeof value === 'object' && depth < 4)
     for (const part of Object.values(value)) buffersIn(part, found, depth + 1);
   return found;
 }
 
-self.onmessage = (event: MessageEvent<{ id: number; op: keyof Ops; args: unknown[] }>) => {
+self.onmessage = async (event: MessageEvent<{ id: number; op: keyof Ops; args: unknown[] }>) => {
   const { id, op, args } = event.data;
   try {
-    const value = (ops[op] as (...args: unknown[]) => unknown)(...args);
+    const value = await (ops[op] as (...args: unknown[]) => unknown)(...args);
     self.postMessage({ id, value }, { transfer: [...buffersIn(value)] });
   } catch (error) {
     self.postMessage({ id, error: error instanceof Error ? error.message : String(error) });
