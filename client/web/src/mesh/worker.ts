@@ -10,6 +10,7 @@ import { buildDisplay, defectiveEdges, loosePieces, type Display, type Frame } f
 import { decodeImages } from './dress';
 import { parseMesh, type RawMesh } from './parse';
 import { proposeLandmarks } from './propose';
+import { mirrored, symmetryOf, type Plane } from './symmetry';
 import type { Place } from 'orbmorph';
 
 interface Held {
@@ -18,6 +19,8 @@ interface Held {
   bvh?: Bvh;
   /** vertices from this number on are not in the file: a repair added them */
   added: number;
+  /** undefined until it is searched */
+  plane?: Plane | null;
 }
 
 const held = new Map<string, Held>();
@@ -33,6 +36,11 @@ export interface Spot {
 
 function bvhOf(mesh: Held): Bvh {
   return (mesh.bvh ??= new Bvh(mesh.raw.positions, mesh.raw.corners));
+}
+
+function planeOf(mesh: Held): Plane | null {
+  if (mesh.plane === undefined) mesh.plane = symmetryOf(mesh.raw, bvhOf(mesh), mesh.frame.radius);
+  return mesh.plane;
 }
 
 function faceNormal({ positions: p, corners }: RawMesh, t: number): [number, number, number] {
@@ -148,6 +156,25 @@ const ops = {
     const d = direction.map((x) => x * radius);
     const hit = bvhOf(mesh).ray(o[0], o[1], o[2], d[0], d[1], d[2]);
     return hit && spotOn(mesh, hit.triangle, hit.u, hit.v);
+  },
+
+  /** Whether the shape has one clear plane of symmetry. */
+  symmetric(key: string): boolean {
+    const mesh = held.get(key);
+    return !!mesh && !!planeOf(mesh);
+  },
+
+  /** The spot on the other side of the plane of symmetry; null near the plane, or where the surface is not symmetric. */
+  mirror(key: string, position: number[]): Spot | null {
+    const mesh = held.get(key);
+    const plane = mesh && planeOf(mesh);
+    if (!plane) return null;
+    const { center, radius } = mesh.frame;
+    const here = position.map((x, k) => x * radius + center[k]);
+    const there = mirrored(plane, here);
+    if (Math.hypot(...there.map((x, k) => x - here[k])) < 0.06 * radius) return null;
+    const hit = bvhOf(mesh).closest(there[0], there[1], there[2]);
+    return hit && hit.t < 0.05 * radius ? spotOn(mesh, hit.triangle, hit.u, hit.v) : null;
   },
 
   /** With `snap`, points become a near vertex (see spotOn). */
