@@ -42,7 +42,7 @@ export interface Skin {
 const LARGEST = 2048; // pixels of a texture's side
 const PLAIN: Cover = { base: [1, 1, 1], image: -1, wrap: [10497, 10497], cutoff: 0 };
 
-/** The cover of glTF primitives; null where all is white, which is shown in the tint of the shape. */
+/** The cover of glTF primitives; null where all is grey, as in assets without material: the shape's tint. */
 export function dressOf(gltf: Gltf, parts: Part[]): Dress | null {
   const total = parts.reduce((n, part) => n + part.position.length / 3, 0);
   const dress: Dress = {
@@ -69,7 +69,7 @@ export function dressOf(gltf: Gltf, parts: Part[]): Dress | null {
     dress.cover.fill(dress.covers.push(cover) - 1, first, first + count);
     first += count;
   }
-  const plain = dress.covers.every(({ base, image }) => image < 0 && base.every((x) => x > 0.99));
+  const plain = dress.covers.every(({ base, image }) => image < 0 && Math.max(...base) - Math.min(...base) < 0.01);
   return plain && !dress.dye ? null : dress;
 }
 
