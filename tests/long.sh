@@ -2,7 +2,7 @@
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
 #   tests/long.sh [PART…]    all of them without arguments:
-#   tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy blender
+#   tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy blender visit
 #
 # ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills, ORB_TEST_PATIENCE how many
 # times longer than usual scenarios wait for what should come: 4 with tsan, 20 with valgrind.
@@ -122,6 +122,22 @@ part_blender() {
   rm -r "$folder"
 }
 
+# The samples and real meshes, in pairs, through the studio: a contact sheet to look at, build/visit/pairs.png.
+part_visit() {
+  local meshes=${ORB_MESHES:-../shared/meshes}
+  local list=(tests/samples/giraffe.off tests/samples/elephant.ply) name
+  [ -d "$meshes" ] && for name in good/{cow.off,shrec381.off,spot.obj} weldable/box_textured.glb \
+    good/{human_man.obj,human_woman.obj,koala_lr.obj,penguin.obj,round_cube.obj,bumpy_cube.obj} \
+    good/{goathead.obj,busted.stl,xyz_cube.stl,thin_cylinder.stl,boat.obj,sword.obj} \
+    posed/{ada-neutral.obj,ben-armsup.off}; do
+    list+=("$meshes/$name")
+  done
+  client/web/build.sh
+  cmake --preset release >/dev/null
+  cmake --build build --target orbmorphd
+  node tests/long/visit.mjs build/visit "${list[@]}"
+}
+
 part_load() {
   cmake --preset release >/dev/null
   cmake --build build --target orbmorphd
@@ -165,7 +181,7 @@ part_deploy() {
 }
 
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy blender
+  set -- tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy blender visit
 fi
 for part in "$@"; do
   echo "== $part =="

@@ -6,6 +6,7 @@ import { readFile, mkdtemp } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { ball } from '../scenario/support/shapes.mjs';
 import { root, sample } from './support.mjs';
 
 let mesh;
@@ -15,7 +16,7 @@ before(async () => {
   const out = join(await mkdtemp(join(tmpdir(), 'orbmorph-mesh-')), 'mesh.mjs');
   await build({
     stdin: {
-      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion']
+      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry']
         .map((name) => `export * from './${name}.ts';`)
         .join('\n'),
       resolveDir: join(root, 'client/web/src/mesh'),
@@ -331,4 +332,44 @@ test('the path contains the in-betweens of a curved path, but no rests', () => {
   assert.deepEqual([...path.times], [0, 0.25, 0.5, 0.75, 1]);
   assert.deepEqual(path.weights, [zero, p, b, q, c]);
   assert.deepEqual([...mesh.pathOf([], [zero, b, c]).times], [0, 0.5, 1]);
+});
+
+/** The rotation by `angle` around (1, 2, 3), as rows (Rodrigues). */
+function turned(angle) {
+  const [x, y, z] = [1, 2, 3].map((k) => k / Math.hypot(1, 2, 3));
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  const cross = [
+    [0, -z, y],
+    [z, 0, -x],
+    [-y, x, 0],
+  ];
+  return cross.map((row, i) => row.map((a, j) => (i === j ? c : 0) + s * a + (1 - c) * [x, y, z][i] * [x, y, z][j]));
+}
+
+test('the plane of symmetry is found however the shape lies, and only where it is clear', async () => {
+  const search = ({ positions, corners }) =>
+    mesh.symmetryOf({ positions, corners }, new mesh.Bvh(positions, corners), mesh.frameOf(positions, corners).radius);
+  const flat = ({ positions, triangles }) => ({
+    positions: Float64Array.from(positions.flat()),
+    corners: Uint32Array.from(triangles.flat()),
+  });
+  // a body that z = 0 mirrors, with nothing else in common on its sides
+  const body = flat(ball(3, ([x, y, z]) => [1.6 * x + 0.4 * z * z, y + 0.5 * x * x, (0.7 + 0.25 * x - 0.2 * y) * z]));
+  for (const angle of [0, 0.4, 1.1]) {
+    const rotation = turned(angle);
+    const positions = body.positions.slice();
+    for (let i = 0; i < positions.length; i += 3)
+      for (let k = 0; k < 3; k++)
+        positions[i + k] = 5 + rotation[k].reduce((sum, r, c) => sum + r * body.positions[i + c], 0);
+    const { normal, offset } = search({ positions, corners: body.corners });
+    const expected = rotation.map((row) => row[2]);
+    const cosine = normal.reduce((sum, x, k) => sum + x * expected[k], 0);
+    assert.ok(Math.abs(cosine) > 0.99999, `turned by ${angle}: ${normal}, ${expected}`);
+    const across = 5 * expected.reduce((sum, x) => sum + x, 0); // the plane of the body goes through 0
+    assert.ok(Math.abs(offset * Math.sign(cosine) - across) < 0.002, `${offset}, ${across}`);
+  }
+  assert.equal(search(flat(ball(3))), null, 'a ball has too many planes');
+  assert.equal(search(flat(ball(3, ([x, y, z]) => [1.7 * x, 1.3 * y, z]))), null, 'an ellipsoid has three');
+  const bent = ball(3, ([x, y, z]) => [x + 0.4 * y * z, y + 0.5 * x * z * z, z + 0.3 * x * x]);
+  assert.equal(search(flat(bent)), null, 'this has none');
 });

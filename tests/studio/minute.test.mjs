@@ -19,6 +19,9 @@ import {
   until,
 } from './support.mjs';
 import { morphOf } from '../scenario/support/glb.mjs';
+import { writeGlb } from '../scenario/support/glb_write.mjs';
+import { readPng, writePng } from '../scenario/support/png.mjs';
+import { ball } from '../scenario/support/shapes.mjs';
 
 /** Pixels of a shape on the first page: they are more saturated than its background. */
 const vivid = (r, g, b) => Math.max(r, g, b) - Math.min(r, g, b) > 70;
@@ -295,6 +298,59 @@ test('what only the daemon can read is shown as the daemon has it', async () => 
   await settled(page);
   const tinted = (r, g, b) => r - b > 40 && r > g;
   await until(async () => (await countPixels(page, '.pane-view', tinted)) > 5000, 'it is drawn');
+  await done();
+});
+
+/** A ball whose texture is red on its upper half and green on its lower one, and one of blue vertices. */
+function dressed() {
+  const { positions, triangles } = ball(3);
+  const uv = positions.map(([x, y]) => [(x + 1) / 2, (1 - y) / 2]);
+  const image = writePng(32, 32, (_x, y) => (y < 16 ? [230, 20, 20] : [20, 200, 20]));
+  const lines = ['ply', 'format ascii 1.0', `element vertex ${positions.length}`];
+  for (const axis of 'xyz') lines.push(`property float ${axis}`);
+  for (const color of ['red', 'green', 'blue']) lines.push(`property uchar ${color}`);
+  lines.push(`element face ${triangles.length}`, 'property list uchar int vertex_indices', 'end_header');
+  for (const [x, y, z] of positions) lines.push(`${1.2 * x} ${y} ${z} 20 30 230`);
+  for (const triangle of triangles) lines.push(`3 ${triangle.join(' ')}`);
+  return [
+    { name: 'textured.glb', mimeType: 'model/gltf-binary', buffer: writeGlb({ positions, uv, triangles, image }) },
+    { name: 'blue.ply', mimeType: 'text/plain', buffer: Buffer.from(`${lines.join('\n')}\n`) },
+  ];
+}
+
+/** How many pixels of the upper and the lower half of a view are red, green, blue: far stronger than the others. */
+async function halves(page, index) {
+  await settled(page);
+  const { x, y, width, height } = await page.locator('.pane-view').nth(index).boundingBox();
+  return Promise.all(
+    [y, y + height / 2].map(async (top) => {
+      const clip = { x, y: top, width, height: height / 2 };
+      const [pixels] = readPng(await page.screenshot({ clip })).frames;
+      const found = [0, 0, 0];
+      for (let i = 0; i < pixels.length; i += 3) {
+        const rgb = [...pixels.subarray(i, i + 3)];
+        const strongest = rgb.indexOf(Math.max(...rgb));
+        if (rgb.every((c, k) => k === strongest || c < 0.5 * rgb[strongest])) found[strongest]++;
+      }
+      return found;
+    }),
+  );
+}
+
+test('textures and colours of the files are on the stage, before and after the morph', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, ...dressed());
+  const upright = ([top, bottom], what) => {
+    assert.ok(top[0] > 4000 && top[0] > 8 * top[1], `${what}: red above, ${top}`);
+    assert.ok(bottom[1] > 4000 && bottom[1] > 2 * bottom[0], `${what}: green below, ${bottom}`);
+  };
+  upright(await halves(page, 0), 'the file');
+  const [top, bottom] = await halves(page, 1);
+  assert.ok(top[2] > 4000 && bottom[2] > 4000, `blue vertices: ${top}, ${bottom}`);
+  await button(page, /^Morph 2 shapes$/).click();
+  await defaultShown(page);
+  await button(page, 'Pause').click();
+  upright(await halves(page, 0), 'the morph');
   await done();
 });
 

@@ -164,6 +164,65 @@ test('a landmark is dragged to another place', async () => {
     const to = await marker.boundingBox();
     return Math.abs(to.x + to.width / 2 - (center.x - 60)) < 14;
   }, 'the marker is at its new place');
+  // off the shape, it stays on the surface
+  const middle = async () => {
+    await settled(page);
+    const { x, y, width, height } = await marker.boundingBox();
+    return { x: x + width / 2, y: y + height / 2 };
+  };
+  const pane = await page.locator('.pane-view').first().boundingBox();
+  let at = await middle();
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await page.mouse.move(at.x, pane.y + 20, { steps: 40 });
+  await until(async () => (await middle()).y < at.y - 3, 'it slides up before it is dropped');
+  await page.mouse.up();
+  at = await middle();
+  assert.ok(at.y - pane.y > 80, `it left the shape: ${at.y - pane.y}`);
+  // a finger has a magnifier
+  const touch = (type, x, y) =>
+    marker.dispatchEvent(type, { pointerId: 7, pointerType: 'touch', clientX: x, clientY: y, bubbles: true });
+  await page.evaluate(() => (Element.prototype.setPointerCapture = () => {})); // there is no such finger
+  await touch('pointerdown', at.x, at.y);
+  for (let i = 1; i <= 4; i++) await touch('pointermove', at.x + 3 * i, at.y + 3 * i);
+  const loupe = page.locator('.loupe');
+  await until(async () => /translate/.test(await loupe.getAttribute('style')), 'the magnifier is placed');
+  await settled(page);
+  const tinted = (r, g, b) => r - b > 40 && r > g;
+  assert.ok((await countPixels(page, '.loupe', tinted)) > 4000, 'it shows the surface');
+  await touch('pointerup', at.x + 12, at.y + 12);
+  await until(async () => (await loupe.count()) === 0, 'it is gone');
+  await button(page, 'Undo').click();
+  await until(async () => Math.abs((await middle()).x - at.x) < 1, 'a drag is one step');
+  await done();
+});
+
+test('on symmetric shapes, a landmark on the left sets one on the right', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const bodies = [0.7, 0.9].map((width, i) => {
+    const shape = ([x, y, z]) => [1.6 * x + 0.4 * z * z, y + 0.5 * x * x, (width + 0.25 * x - 0.2 * y) * z];
+    return { name: `body${i}.obj`, mimeType: 'text/plain', buffer: Buffer.from(obj(ball(3, shape))) };
+  });
+  await addFiles(page, ...bodies);
+  await button(page, 'Landmarks').click();
+  await page.getByRole('switch', { name: 'Click left, get right' }).click();
+  await clickView(page, 0, 0.5, 0.5);
+  await until(async () => (await landmarks(page).count()) === 2, 'a pair');
+  await clickView(page, 1, 0.5, 0.5);
+  await until(async () => (await page.locator('.badge.warn').count()) === 0, 'both are on both shapes');
+  assert.equal(await landmarks(page).count(), 2);
+  const [download] = await Promise.all([page.waitForEvent('download'), button(page, 'Export').click()]);
+  const [left, right] = JSON.parse(await readFile(await download.path(), 'utf8')).landmarks;
+  for (const [i, { buffer }] of bodies.entries()) {
+    const known = buffer.toString().split('\n');
+    const [a, b] = [left, right].map(({ at }) =>
+      at[i].point ? at[i].point : known[at[i].vertex].split(' ').slice(1).map(Number),
+    );
+    assert.ok(Math.abs(a[2]) > 0.2, `shape ${i}: off the plane, ${a}`);
+    assert.ok(Math.hypot(a[0] - b[0], a[1] - b[1], a[2] + b[2]) < 0.05, `shape ${i}: ${a}, ${b}`);
+  }
+  await button(page, 'Undo').click();
+  assert.equal(await page.locator('.badge.warn').count(), 2, 'a pair is one step');
   await done();
 });
 
@@ -456,6 +515,29 @@ test('landmarks are found', async () => {
   await done();
 });
 
+test('a search for landmarks survives a reload as itself, and can be stopped', async () => {
+  const busy = await startDaemon({ args: ['--workers', '1'] }); // whose only worker another job occupies
+  const post = async (path, body, headers) => (await fetch(busy.url + path, { method: 'POST', headers, body })).json();
+  const { id: mesh } = await post('/v1/meshes', obj(ball(5)));
+  const type = { 'Content-Type': 'application/json' };
+  const other = await post('/v1/embeddings', JSON.stringify({ mesh, ...endless }), type);
+  const { page, done } = await openPage(browser, busy.url);
+  await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
+  await button(page, 'Landmarks').click();
+  await button(page, 'Find them for me').click();
+  await until(() => /j=[0-9a-f]+&find=1/.test(page.url()), 'the URL names the search');
+  await page.reload();
+  await button(page, 'Stop finding').click();
+  await until(() => shownToasts(page).then((list) => list.includes('Cancelled.')), 'it is stopped');
+  const { jobs } = await json(busy.url, '/v1/jobs');
+  const search = jobs.find(({ kind }) => kind === 'supermesh');
+  await until(async () => (await json(busy.url, search.url)).state === 'cancelled', 'its job, too');
+  assert.equal(await page.evaluate(() => document.activeElement.textContent), 'Find them for me', 'the focus stays');
+  await done();
+  await fetch(busy.url + other.url, { method: 'DELETE' });
+  await busy.stop();
+});
+
 test('a match that is not sure is called so, and the next one is another morph', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
@@ -480,6 +562,22 @@ test('a match that is not sure is called so, and the next one is another morph',
     await until(async () => !(await button(page, 'Next match').isDisabled()), 'the next one is shown');
   }
   await until(() => shown() === first.id, 'after the last comes the first');
+  // what was found is in the list, and given once it is corrected
+  await button(page, 'Landmarks').click();
+  await until(async () => (await landmarks(page).count()) === first.landmarks.length, 'the found landmarks');
+  const hint = page.locator('.action .hint');
+  assert.match(await hint.innerText(), /matched without landmarks/);
+  await until(() => /tab=landmarks/.test(page.url()), 'the URL names the view');
+  await page.reload();
+  await until(async () => (await landmarks(page).count()) === first.landmarks.length, 'they are back');
+  assert.match(await hint.innerText(), /matched without landmarks/);
+  const name = page.getByRole('textbox', { name: 'Name of landmark 1', exact: true });
+  await name.fill('tail');
+  await name.press('Tab');
+  await until(
+    async () => (await hint.innerText()) === `${first.landmarks.length} landmarks will meet exactly.`,
+    'given',
+  );
   await done();
 });
 

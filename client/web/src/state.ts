@@ -17,6 +17,8 @@ export interface Shape {
   file?: Blob;
   mesh?: Mesh;
   model?: Model;
+  /** whether it has one clear plane of symmetry; undefined until that is known */
+  symmetric?: boolean;
   facts?: { vertices: number; triangles: number; format: string };
   problem?: Problem;
   message?: string;
@@ -46,6 +48,8 @@ export interface Landmark {
   id: number;
   name: string;
   at: Record<string, Spot>;
+  /** the landmark on the other side of the plane of symmetry */
+  twin?: number;
 }
 
 export interface Options {
@@ -115,6 +119,10 @@ export interface State {
   shapes: Shape[];
   landmarks: Landmark[];
   active: number | null;
+  /** the landmarks that the shown morph found; a morph does not use them as long as they are `landmarks`, unchanged */
+  listed: Landmark[] | null;
+  /** whether a landmark sets its twin, too */
+  mirror: boolean;
   past: Landmark[][];
   future: Landmark[][];
   options: Options;
@@ -147,6 +155,8 @@ export const state: State = {
   shapes: [],
   landmarks: [],
   active: null,
+  listed: null,
+  mirror: false,
   past: [],
   future: [],
   options: { ...DEFAULTS },
@@ -235,5 +245,9 @@ export function wireLandmarks(shapes = readyShapes()): WireLandmark[] {
     .filter((landmark) => shapes.length > 0 && shapes.every((shape) => landmark.at[shape.key]))
     .map((landmark) => ({ name: landmark.name, at: shapes.map((shape) => landmark.at[shape.key].place) }));
 }
+
+/** The landmarks that a morph would use. */
+export const givenLandmarks = (shapes = readyShapes()): WireLandmark[] =>
+  state.landmarks === state.listed ? [] : wireLandmarks(shapes);
 
 export const readyShapes = () => state.shapes.filter((shape) => shape.state === 'ready' && shape.mesh);

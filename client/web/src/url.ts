@@ -1,7 +1,7 @@
 /**
  * Keeps the state of the page in the fragment of its URL, so that a link or a reload restores it:
  *   #m=ID,ID&tab=morph&r=ID&j=ID&t=0.40&l=12:99~nose;33:45&cam=…&o=adaptive,0.001,,linear,similarity,default
- * m: meshes on the server, r: a supermesh, j: a job, t: time along the morph, l: landmarks (a vertex or x_y_z for each
+ * m: meshes on the server, r: a supermesh, j: a job (find=1: one that finds landmarks), t: time along the morph, l: landmarks (a vertex or x_y_z for each
  * shape), cam: camera, o: options.
  */
 import type { Place } from 'orbmorph';
@@ -64,10 +64,11 @@ function encode(): string {
   if (state.tab !== 'shapes') put('tab', state.tab);
   put('r', state.result?.supermesh.id ?? '');
   put('j', state.running?.job?.id ?? '');
+  if (state.running?.job && state.running.purpose === 'find') put('find', '1');
   if (state.result && !state.playing) put('t', player.time.toFixed(3));
   put(
     'l',
-    state.landmarks
+    (state.landmarks === state.listed ? [] : state.landmarks)
       .map(
         (l) =>
           `${shapes.map((s) => encodePlace(l.at[s.key]?.place)).join(':')}${l.name ? `~${encodeURIComponent(l.name)}` : ''}`,
@@ -169,7 +170,7 @@ export async function restore() {
     restoring = false;
   }
   const job = query.get('j');
-  if (job) void resumeJob(job);
+  if (job) void resumeJob(job, query.get('find') ? 'find' : 'morph');
 }
 
 /** Keeps the URL up to date. Pasting a URL of another state reloads the page with that state. */

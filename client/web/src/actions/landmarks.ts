@@ -2,7 +2,7 @@
 import type { Landmark as WireLandmark, Place } from 'orbmorph';
 import { work } from '../mesh/work';
 import type { Spot } from '../mesh/worker';
-import { readyShapes, set, state, toast, wireLandmarks, type Landmark, type Shape } from '../state';
+import { patch, readyShapes, set, state, toast, wireLandmarks, type Landmark, type Shape } from '../state';
 
 let count = 0;
 
@@ -21,32 +21,53 @@ export function redo() {
   if (next) set({ future, past: [...state.past, state.landmarks], landmarks: next });
 }
 
-/** The landmark that the next click sets: the active one, as long as a shape lacks it. */
+const byId = (id: number | null | undefined) => state.landmarks.find((landmark) => landmark.id === id);
+
+/** The landmark that the next click sets: the active one, or else its twin, as long as a shape lacks it. */
 export function pending(): Landmark | null {
-  const active = state.landmarks.find((landmark) => landmark.id === state.active);
+  const active = byId(state.active);
   const shapes = readyShapes();
-  return active && shapes.some((shape) => !active.at[shape.key]) ? active : null;
+  return [active, byId(active?.twin)].find((l) => l && shapes.some((shape) => !l.at[shape.key])) ?? null;
+}
+
+/** Finds out which shapes have a clear plane of symmetry. */
+export function findSymmetry() {
+  for (const shape of readyShapes())
+    if (shape.model && shape.symmetric === undefined) {
+      shape.symmetric = false;
+      void work('symmetric', shape.key).then((symmetric) => symmetric && patch(shape, { symmetric }));
+    }
 }
 
 export async function pickOn(shape: Shape, origin: number[], direction: number[]) {
   const spot = await work('pick', shape.key, origin, direction);
-  if (spot) placeOn(shape, spot);
+  if (!spot) return;
+  const other = state.mirror && shape.symmetric ? await work('mirror', shape.key, spot.position) : null;
+  placeOn(shape, spot, other);
 }
 
-export function placeOn(shape: Shape, spot: Spot) {
+/** Sets the pending landmark, or a new one, at `spot`; with `other` also its twin, unless that is set already. */
+export function placeOn(shape: Shape, spot: Spot, other: Spot | null = null) {
   const open = pending();
-  if (open) return change(state.landmarks.map((l) => (l === open ? { ...l, at: { ...l.at, [shape.key]: spot } } : l)));
-  const made: Landmark = { id: ++count, name: '', at: { [shape.key]: spot } };
-  change([...state.landmarks, made], made.id);
+  const at = (landmark: Landmark, where: Spot) => ({ ...landmark, at: { ...landmark.at, [shape.key]: where } });
+  const placed = at(open ?? { id: ++count, name: '', at: {} }, spot);
+  let landmarks = open ? state.landmarks.map((l) => (l === open ? placed : l)) : [...state.landmarks, placed];
+  if (other) {
+    const known = byId(placed.twin);
+    const twin: Landmark = known ?? { id: ++count, name: '', at: {}, twin: placed.id };
+    if (!known) landmarks.push(twin);
+    placed.twin = twin.id;
+    if (!twin.at[shape.key]) landmarks = landmarks.map((l) => (l.id === twin.id ? at(l, other) : l));
+  }
+  change(landmarks, state.active !== null && open ? state.active : placed.id);
 }
 
-export async function moveOn(id: number, shape: Shape, origin: number[], direction: number[]) {
-  const spot = await work('pick', shape.key, origin, direction);
-  if (spot)
-    change(
-      state.landmarks.map((l) => (l.id === id ? { ...l, at: { ...l.at, [shape.key]: spot } } : l)),
-      id,
-    );
+/** Moves a landmark on a shape, as one step for undo. */
+export function moveTo(id: number, shape: Shape, spot: Spot) {
+  change(
+    state.landmarks.map((l) => (l.id === id ? { ...l, at: { ...l.at, [shape.key]: spot } } : l)),
+    id,
+  );
 }
 
 export function renameLandmark(id: number, name: string) {
@@ -65,17 +86,17 @@ export function clearLandmarks() {
 }
 
 export function forgetShape(key: string) {
+  if (state.landmarks === state.listed) return set({ landmarks: [], listed: null, past: [], future: [] });
   const landmarks = state.landmarks
     .map((l) => ({ ...l, at: Object.fromEntries(Object.entries(l.at).filter(([other]) => other !== key)) }))
     .filter((l) => Object.keys(l.at).length);
   set({ landmarks, past: [], future: [] });
 }
 
-/** Replaces the landmarks by those of a file or a response. Returns how many fit the shapes. */
-export async function takeLandmarks(
-  list: Pick<WireLandmark, 'name' | 'at'>[],
-  { undoable = true, snap = false } = {},
-): Promise<number> {
+type Listed = Pick<WireLandmark, 'name' | 'at'>[];
+
+/** The landmarks of a file or a response on the shapes; those that fit no shape are left out. */
+async function located(list: Listed, snap: boolean): Promise<Landmark[]> {
   const shapes = readyShapes();
   const made: Landmark[] = list.map((l) => ({ id: ++count, name: l.name ?? '', at: {} }));
   await Promise.all(
@@ -92,7 +113,20 @@ export async function takeLandmarks(
       });
     }),
   );
-  const landmarks = made.filter((l) => Object.keys(l.at).length);
+  return made.filter((l) => Object.keys(l.at).length);
+}
+
+/** Lists what the shown morph has found, unless the list holds landmarks that were set. */
+export async function listFound(list: Listed, isShown: () => boolean) {
+  const free = () => isShown() && (!state.landmarks.length || state.landmarks === state.listed);
+  if (!free()) return;
+  const landmarks = await located(list, true);
+  if (free()) set({ landmarks, listed: landmarks, active: null });
+}
+
+/** Replaces the landmarks by those of a file or a response. Returns how many fit the shapes. */
+export async function takeLandmarks(list: Listed, { undoable = true, snap = false } = {}): Promise<number> {
+  const landmarks = await located(list, snap);
   if (undoable) change(landmarks, null);
   else set({ landmarks, active: null });
   return landmarks.length;

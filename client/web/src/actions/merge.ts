@@ -5,13 +5,13 @@
 import { CancelledError, ProblemError, type Job, type Supermesh, type SupermeshRequest } from 'orbmorph';
 import {
   client,
+  givenLandmarks,
   isFast,
   readyShapes,
   set,
   state,
   tint,
   toast,
-  wireLandmarks,
   type Matches,
   type Result,
   type Running,
@@ -19,13 +19,13 @@ import {
 import { work } from '../mesh/work';
 import { morphModels } from '../view/models';
 import { player } from '../player';
-import { takeLandmarks } from './landmarks';
+import { listFound, takeLandmarks } from './landmarks';
 import { explain } from './token';
 
 export function buildRequest(find = false): SupermeshRequest {
   const { options } = state;
   const shapes = readyShapes();
-  const landmarks = wireLandmarks(shapes);
+  const landmarks = givenLandmarks(shapes);
   const request: SupermeshRequest = { shapes: shapes.map(({ mesh, name }) => ({ mesh: mesh!.id, name })) };
   if (find) request.landmarks = 'auto';
   else if (landmarks.length) request.landmarks = landmarks;
@@ -117,8 +117,8 @@ function showFast(running: Running, request: SupermeshRequest): Promise<void> {
 }
 
 /** Follows a job that an earlier visit started. */
-export async function resumeJob(id: string) {
-  const running: Running = { purpose: 'morph', job: null, abort: new AbortController(), fast: null };
+export async function resumeJob(id: string, purpose: Running['purpose'] = 'morph') {
+  const running: Running = { purpose, job: null, abort: new AbortController(), fast: null };
   set({ running });
   const { signal } = running.abort;
   await follow(
@@ -234,6 +234,10 @@ export async function openResult(
     });
     set({ result, mix: null });
     player.load(result);
+    if (!isFast(result) && readyShapes().every((shape, i) => shape.mesh!.id === supermesh.shapes[i]?.mesh)) {
+      const found = (supermesh.landmarks ?? []).flatMap((l) => ('at' in l ? [{ name: l.name, at: l.at }] : []));
+      void listFound(found, () => state.result === result);
+    }
     if (!keep) return;
     set({ show, side });
     player.seek(time);

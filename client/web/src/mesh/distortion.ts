@@ -29,7 +29,7 @@ export function decodeSphere(buffer: ArrayBuffer): SphereData {
   }
   const values = vertexDistortion(x, image, corners);
   // one drawn vertex for each vertex of the mesh: splitting at creases would open the sphere
-  const surface = buildDisplay({ ...raw, properties: undefined }, 180);
+  const surface = buildDisplay({ ...raw, properties: undefined, dress: null }, 180);
   const sphere = new Float32Array(surface.position.length);
   const spread = {} as Record<MeasureName, Float32Array>;
   for (const name of MEASURES) spread[name] = new Float32Array(surface.position.length / 3);

@@ -1,4 +1,5 @@
 /** Turns a parsed mesh into what the GPU draws: scaled to the unit ball, with smooth normals, creases and edges. */
+import { splitByLook, type Skin } from './dress';
 import type { RawMesh } from './parse';
 
 export interface Frame {
@@ -16,6 +17,8 @@ export interface Display {
   normal: Float32Array;
   index: Uint32Array;
   edges: Uint32Array;
+  /** its images are decoded later */
+  skin?: Skin;
 }
 
 export function frameOf(positions: ArrayLike<number>, used?: Uint32Array): Frame {
@@ -144,6 +147,14 @@ export function buildDisplay(raw: RawMesh, creaseDegrees = 48): Display {
     }
   }
   normalize(normal, n);
+  let skin: Skin | undefined;
+  if (raw.dress) {
+    const split = splitByLook(raw.dress, corners, index, n);
+    skin = split.skin;
+    position = gathered(position, split.from);
+    normal = gathered(normal, split.from);
+    n = split.from.length;
+  }
   return {
     format: raw.format,
     frame,
@@ -153,7 +164,14 @@ export function buildDisplay(raw: RawMesh, creaseDegrees = 48): Display {
     normal: normal.slice(0, 3 * n),
     index,
     edges: edgesOf(index),
+    skin,
   };
+}
+
+function gathered(values: Float32Array, from: number[]): Float32Array<ArrayBuffer> {
+  const out = new Float32Array(3 * from.length);
+  from.forEach((v, i) => out.set(values.subarray(3 * v, 3 * v + 3), 3 * i));
+  return out;
 }
 
 function grown(old: Float32Array): Float32Array<ArrayBuffer> {

@@ -1,4 +1,4 @@
-/** The part of glTF 2.0 that meshes and morphs need: accessors (also sparse and normalised), nodes, targets. */
+/** The part of glTF 2.0 that meshes and morphs need: accessors (also sparse and normalised), nodes, targets, images. */
 
 interface Accessor {
   bufferView?: number;
@@ -17,6 +17,7 @@ interface Primitive {
   mode?: number;
   attributes: Record<string, number>;
   indices?: number;
+  material?: number;
   targets?: Record<string, number>[];
 }
 interface Node {
@@ -27,11 +28,30 @@ interface Node {
   rotation?: number[];
   scale?: number[];
 }
+interface TextureSlot {
+  index: number;
+  texCoord?: number;
+  extensions?: {
+    KHR_texture_transform?: { offset?: number[]; scale?: number[]; rotation?: number; texCoord?: number };
+  };
+}
+interface Material {
+  pbrMetallicRoughness?: { baseColorFactor?: number[]; baseColorTexture?: TextureSlot };
+  alphaMode?: string;
+  alphaCutoff?: number;
+  extensions?: {
+    KHR_materials_pbrSpecularGlossiness?: { diffuseFactor?: number[]; diffuseTexture?: TextureSlot };
+  };
+}
 interface Document {
   accessors?: Accessor[];
   bufferViews?: { buffer: number; byteOffset?: number; byteLength: number; byteStride?: number }[];
   buffers?: { uri?: string; byteLength: number }[];
   meshes?: { primitives: Primitive[]; weights?: number[]; extras?: { targetNames?: string[] } }[];
+  materials?: Material[];
+  textures?: { source?: number; sampler?: number }[];
+  images?: { uri?: string; bufferView?: number; mimeType?: string }[];
+  samplers?: { wrapS?: number; wrapT?: number }[];
   nodes?: Node[];
   scenes?: { nodes?: number[] }[];
   scene?: number;
@@ -167,6 +187,15 @@ export class Gltf {
 
   floats = (accessor: number) => this.read(accessor, (n) => new Float32Array(n));
   integers = (accessor: number) => this.read(accessor, (n) => new Uint32Array(n));
+
+  /** An image of the file; empty if it is in another file. */
+  image(number: number): Blob {
+    const { uri, bufferView, mimeType: type } = this.json.images![number];
+    if (uri !== undefined) return new Blob(uri.startsWith('data:') ? [dataUri(uri) as BlobPart] : [], { type });
+    const view = this.json.bufferViews![bufferView!];
+    const start = view.byteOffset ?? 0;
+    return new Blob([this.buffers[view.buffer].slice(start, start + view.byteLength) as BlobPart], { type });
+  }
 
   /** For each mesh, the matrix of the first node that uses it. */
   private matrices(): Map<number, number[]> {

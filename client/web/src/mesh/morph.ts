@@ -1,4 +1,5 @@
 /** A morph asset, decoded for the viewer: base, targets, wireframe, and the path through the shapes. */
+import { dressOf, skinOf, type Skin } from './dress';
 import { readGlb } from './gltf';
 import { edgesOf, smoothNormals, type Frame } from './geometry';
 
@@ -12,6 +13,8 @@ export interface MorphData {
   index: Uint32Array;
   edges: Uint32Array;
   targets: { position: Float32Array; normal: Float32Array }[];
+  /** its images are decoded later */
+  skin?: Skin;
   /** the path from the first to the last shape: for each time in 0..1 the weights of the targets */
   times: Float32Array;
   weights: Float32Array[];
@@ -68,6 +71,7 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData 
     return { position: delta, normal: normalDelta };
   });
 
+  const dress = dressOf(gltf, parts);
   const shapes = Array.from({ length: Math.min(shapeCount, targetCount + 1) }, (_, i) => single(i - 1, targetCount));
   const path = animationPath(gltf, targetCount, shapes);
   const names = targetNames(gltf, parts[0].mesh, targetCount);
@@ -84,6 +88,7 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData 
     index,
     edges: edgesOf(index),
     targets,
+    skin: dress ? skinOf(dress, index) : undefined,
     times: path.times,
     weights: path.weights,
     shapes,

@@ -3,6 +3,7 @@
  * OFF and PLY in file order, STL 3·facet + corner, glTF the POSITION accessors of all triangle primitives one after
  * another. The reader is lenient and shows what it can; the daemon decides what is a mesh.
  */
+import { dressOf, plyDress, type Dress } from './dress';
 import { readGlb, type Gltf } from './gltf';
 
 export interface RawMesh {
@@ -13,6 +14,7 @@ export interface RawMesh {
   corners: Uint32Array;
   /** other properties of PLY vertices, by name */
   properties?: Map<string, Float64Array>;
+  dress?: Dress | null;
 }
 
 /** A growing typed array. */
@@ -379,7 +381,9 @@ function parsePly(bytes: Uint8Array): RawMesh {
     positions[3 * i + 1] = y[i];
     positions[3 * i + 2] = z[i];
   }
-  return { format: 'ply', positions, corners: corners.done(), properties };
+  const red = elements.find(({ name }) => name === 'vertex')?.properties.find(({ name }) => name === 'red');
+  const dress = plyDress(properties, !/^(float|double)/.test(red?.type ?? ''));
+  return { format: 'ply', positions, corners: corners.done(), properties, dress };
 }
 
 function parseGltf(gltf: Gltf, format: string): RawMesh {
@@ -405,7 +409,16 @@ function parseGltf(gltf: Gltf, format: string): RawMesh {
     for (let i = 0; i < part.index.length; i++) corners[c++] = part.index[i] + v;
     v += part.position.length / 3;
   }
-  return { format, positions, corners };
+  return { format, positions, corners, dress: tried(() => dressOf(gltf, parts)) };
+}
+
+/** A file whose materials are damaged is shown without them. */
+function tried(get: () => Dress | null): Dress | null {
+  try {
+    return get();
+  } catch {
+    return null;
+  }
 }
 
 /** Drops triangles that cannot be drawn because a vertex does not exist or is not finite. */

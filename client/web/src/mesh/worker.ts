@@ -7,8 +7,10 @@ import { Bvh } from './bvh';
 import { decodeMorph, type MorphData } from './morph';
 import { decodeSphere, type SphereData } from './distortion';
 import { buildDisplay, defectiveEdges, loosePieces, type Display, type Frame } from './geometry';
+import { decodeImages } from './dress';
 import { parseMesh, type RawMesh } from './parse';
 import { proposeLandmarks } from './propose';
+import { mirrored, symmetryOf, type Plane } from './symmetry';
 import type { Place } from 'orbmorph';
 
 interface Held {
@@ -17,6 +19,8 @@ interface Held {
   bvh?: Bvh;
   /** vertices from this number on are not in the file: a repair added them */
   added: number;
+  /** undefined until it is searched */
+  plane?: Plane | null;
 }
 
 const held = new Map<string, Held>();
@@ -32,6 +36,11 @@ export interface Spot {
 
 function bvhOf(mesh: Held): Bvh {
   return (mesh.bvh ??= new Bvh(mesh.raw.positions, mesh.raw.corners));
+}
+
+function planeOf(mesh: Held): Plane | null {
+  if (mesh.plane === undefined) mesh.plane = symmetryOf(mesh.raw, bvhOf(mesh), mesh.frame.radius);
+  return mesh.plane;
 }
 
 function faceNormal({ positions: p, corners }: RawMesh, t: number): [number, number, number] {
@@ -89,11 +98,12 @@ function facesAt(raw: RawMesh, wanted: Set<number>): Map<number, number> {
 }
 
 const ops = {
-  open(key: string, buffer: ArrayBuffer): Display {
+  async open(key: string, buffer: ArrayBuffer): Promise<Display> {
     const raw = parseMesh(buffer);
     if (!raw.corners.length) throw new Error('The file has no triangles.');
     const display = buildDisplay(raw);
     held.set(key, { raw, frame: display.frame, added: Infinity });
+    await decodeImages(display.skin);
     return display;
   },
 
@@ -146,6 +156,25 @@ const ops = {
     const d = direction.map((x) => x * radius);
     const hit = bvhOf(mesh).ray(o[0], o[1], o[2], d[0], d[1], d[2]);
     return hit && spotOn(mesh, hit.triangle, hit.u, hit.v);
+  },
+
+  /** Whether the shape has one clear plane of symmetry. */
+  symmetric(key: string): boolean {
+    const mesh = held.get(key);
+    return !!mesh && !!planeOf(mesh);
+  },
+
+  /** The spot on the other side of the plane of symmetry; null near the plane, or where the surface is not symmetric. */
+  mirror(key: string, position: number[]): Spot | null {
+    const mesh = held.get(key);
+    const plane = mesh && planeOf(mesh);
+    if (!plane) return null;
+    const { center, radius } = mesh.frame;
+    const here = position.map((x, k) => x * radius + center[k]);
+    const there = mirrored(plane, here);
+    if (Math.hypot(...there.map((x, k) => x - here[k])) < 0.06 * radius) return null;
+    const hit = bvhOf(mesh).closest(there[0], there[1], there[2]);
+    return hit && hit.t < 0.05 * radius ? spotOn(mesh, hit.triangle, hit.u, hit.v) : null;
   },
 
   /** With `snap`, points become a near vertex (see spotOn). */
@@ -203,7 +232,7 @@ const ops = {
     return { lines, points, triangles: Float32Array.from(flat), found };
   },
 
-  morph(key: string, buffer: ArrayBuffer, shapeCount: number): MorphData {
+  async morph(key: string, buffer: ArrayBuffer, shapeCount: number): Promise<MorphData> {
     const data = decodeMorph(buffer, shapeCount);
     morphs.clear();
     morphs.set(key, {
@@ -212,7 +241,9 @@ const ops = {
       index: data.index.slice(),
       targets: data.targets.map((t) => ({ ...t, position: t.position.slice() })),
       shapes: data.shapes.map((weights) => weights.slice()),
+      skin: undefined,
     });
+    await decodeImages(data.skin);
     return data;
   },
 
@@ -514,18 +545,19 @@ function applyFit(all: Float64Array, from: number[][], to: number[][]): Float64A
   return transformed(all, m, spread > 0 ? dot / spread : 1, a, b);
 }
 
-/** The buffers inside a reply, which postMessage transfers instead of copying. */
-function buffersIn(value: unknown, found = new Set<ArrayBuffer>(), depth = 0): Set<ArrayBuffer> {
+/** The buffers and images inside a reply, which postMessage transfers instead of copying. */
+function buffersIn(value: unknown, found = new Set<Transferable>(), depth = 0): Set<Transferable> {
   if (ArrayBuffer.isView(value)) found.add(value.buffer as ArrayBuffer);
+  else if (value instanceof ImageBitmap) found.add(value);
   else if (value && typeof value === 'object' && depth < 4)
     for (const part of Object.values(value)) buffersIn(part, found, depth + 1);
   return found;
 }
 
-self.onmessage = (event: MessageEvent<{ id: number; op: keyof Ops; args: unknown[] }>) => {
+self.onmessage = async (event: MessageEvent<{ id: number; op: keyof Ops; args: unknown[] }>) => {
   const { id, op, args } = event.data;
   try {
-    const value = (ops[op] as (...args: unknown[]) => unknown)(...args);
+    const value = await (ops[op] as (...args: unknown[]) => unknown)(...args);
     self.postMessage({ id, value }, { transfer: [...buffersIn(value)] });
   } catch (error) {
     self.postMessage({ id, error: error instanceof Error ? error.message : String(error) });

@@ -1,7 +1,7 @@
 /** The main action, always in the same place: the Morph button, or the progress of a morph. */
 import { useEffect, useRef, useState } from 'preact/hooks';
 import type { Job } from 'orbmorph';
-import { isWaiting, readyShapes, state, wireLandmarks, type Running } from '../state';
+import { givenLandmarks, isWaiting, readyShapes, state, type Running } from '../state';
 import { cancelMerge, startMerge } from '../actions/merge';
 import { Notice } from './notice';
 import { Bar, Button } from './parts';
@@ -100,7 +100,7 @@ export function Action() {
   const { running } = state;
   const busy = state.shapes.some((shape) => shape.state === 'reading' || shape.state === 'uploading');
   const again = state.tab === 'morph' && !!state.result;
-  const landmarks = wireLandmarks().length;
+  const landmarks = givenLandmarks().length;
   return (
     <div class="action">
       <Notice />

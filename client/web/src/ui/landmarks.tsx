@@ -1,9 +1,10 @@
 /** Landmarks: the same feature on each shape. */
-import { useRef } from 'preact/hooks';
+import { useEffect, useRef } from 'preact/hooks';
 import { hue, readyShapes, set, state, wireLandmarks } from '../state';
 import {
   clearLandmarks,
   exportLandmarks,
+  findSymmetry,
   importLandmarks,
   pending,
   redo,
@@ -11,8 +12,8 @@ import {
   renameLandmark,
   undo,
 } from '../actions/landmarks';
-import { startMerge } from '../actions/merge';
-import { Button, Icon } from './parts';
+import { cancelMerge, startMerge } from '../actions/merge';
+import { Button, Icon, Switch } from './parts';
 import { Pane } from './pane';
 import { Caption } from './shapes';
 
@@ -46,6 +47,8 @@ export function LandmarksInspector() {
   const shapes = readyShapes();
   const input = useRef<HTMLInputElement>(null);
   const complete = wireLandmarks().length;
+  const finding = state.running?.purpose === 'find';
+  useEffect(findSymmetry);
   return (
     <>
       <div class="row spread">
@@ -60,10 +63,24 @@ export function LandmarksInspector() {
         well spread, do most of the work.
       </p>
       <div class="row wrap">
-        <Button icon="wand" disabled={shapes.length < 2 || !!state.running} onClick={() => void startMerge('find')}>
-          Find them for me
+        <Button
+          icon={finding ? 'close' : 'wand'}
+          disabled={shapes.length < 2 || (!!state.running && !finding)}
+          onClick={() => (finding ? cancelMerge() : void startMerge('find'))}
+        >
+          {finding ? 'Stop finding' : 'Find them for me'}
         </Button>
       </div>
+      {shapes.some((shape) => shape.symmetric) && (
+        <div title="A landmark on one side of a symmetric shape also sets its twin on the other side">
+          <Switch label="Click left, get right" on={state.mirror} onChange={(mirror) => set({ mirror })} />
+        </div>
+      )}
+      {state.landmarks.length > 0 && state.landmarks === state.listed && (
+        <p class="hint">
+          The morph found these. Correct, rename or delete any: the next morph then uses the whole list.
+        </p>
+      )}
       {state.landmarks.length === 0 ? (
         <div class="blank">
           <span class="marker still" style={{ '--hue': hue(0) }} aria-hidden="true">

@@ -1,11 +1,14 @@
 /** A view of the stage with its caption and its landmarks as numbered buttons. */
 import type { ComponentChildren } from 'preact';
 import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
+import { work } from '../mesh/work';
+import type { Spot } from '../mesh/worker';
+import { Loupe } from '../view/loupe';
 import { stage } from '../view/shared';
-import type { Marker, View } from '../view/stage';
+import type { Marker, Ray, View } from '../view/stage';
 import { BALL_SCALE, type Model } from '../view/models';
 import { hue, set, state, type Shape, type SphereState } from '../state';
-import { moveOn, pickOn, removeLandmark } from '../actions/landmarks';
+import { moveTo, pickOn, removeLandmark } from '../actions/landmarks';
 import { isDark } from '../theme';
 
 interface PaneProps {
@@ -55,13 +58,18 @@ export function Pane({ label, model, wire = false, pickable, markers, spots, chi
 
 function Markers({ shape, view }: { shape: Shape; view: { current: View | null } }) {
   const box = useRef<HTMLDivElement>(null);
+  /** the landmark that is dragged, and where it is on the surface */
+  const dragged = useRef<{ id: number; spot: Spot | null } | null>(null);
   const here = state.landmarks
     .map((landmark, index) => ({ landmark, index }))
     .filter(({ landmark }) => landmark.at[shape.key]);
 
   useEffect(() => {
     const buttons = [...box.current!.children] as HTMLElement[];
-    view.current!.markers = here.map(({ landmark }, i): Marker => ({ ...landmark.at[shape.key], element: buttons[i] }));
+    view.current!.markers = here.map(({ landmark }, i): Marker => {
+      const { spot } = dragged.current?.id === landmark.id ? dragged.current : { spot: null };
+      return { ...(spot ?? landmark.at[shape.key]), element: buttons[i] };
+    });
     stage.draw();
   });
 
@@ -73,19 +81,46 @@ function Markers({ shape, view }: { shape: Shape; view: { current: View | null }
     button.focus();
     button.setPointerCapture(event.pointerId);
     const from = { x: event.clientX, y: event.clientY };
-    const move = (to: PointerEvent) => {
-      button.style.translate = `${to.clientX - from.x}px ${to.clientY - from.y}px`;
+    const now: { id: number; spot: Spot | null } = { id, spot: null };
+    dragged.current = now;
+    let loupe: Loupe | null = null;
+    let next: Ray | null = null;
+    let sliding = Promise.resolve();
+    /** Keeps the marker on the surface under the pointer; off the surface it stays where it was. */
+    const slide = async (x: number, y: number) => {
+      while (next) {
+        const { origin, direction } = next;
+        next = null;
+        const spot = await work('pick', shape.key, origin, direction);
+        if (!spot || !view.current) continue;
+        now.spot = spot;
+        const marker = view.current.markers.find(({ element }) => element === button);
+        if (marker) Object.assign(marker, spot);
+        loupe?.at(spot, x, y);
+        view.current.stage.draw();
+      }
     };
-    const drop = (to: PointerEvent) => {
+    const move = (to: PointerEvent) => {
+      if (!now.spot && Math.hypot(to.clientX - from.x, to.clientY - from.y) < 4) return;
+      const around = view.current!.element.getBoundingClientRect();
+      if (event.pointerType === 'touch') loupe ??= new Loupe(view.current!);
+      const waits = next !== null;
+      next = view.current!.rayAt(to.clientX, to.clientY);
+      if (!waits) sliding = sliding.then(() => slide(to.clientX - around.left, to.clientY - around.top));
+    };
+    const drop = async (to: PointerEvent) => {
       button.removeEventListener('pointermove', move);
       button.removeEventListener('pointerup', drop);
-      button.style.translate = '';
-      if (Math.hypot(to.clientX - from.x, to.clientY - from.y) < 4) return;
-      const ray = view.current!.rayAt(to.clientX, to.clientY);
-      void moveOn(id, shape, ray.origin, ray.direction);
+      button.removeEventListener('pointercancel', drop);
+      await sliding;
+      loupe?.close();
+      dragged.current = null;
+      if (now.spot && to.type === 'pointerup') moveTo(id, shape, now.spot);
+      else set();
     };
     button.addEventListener('pointermove', move);
     button.addEventListener('pointerup', drop);
+    button.addEventListener('pointercancel', drop);
   };
 
   return (

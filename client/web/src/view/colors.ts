@@ -50,4 +50,6 @@ export type Paint =
   /** attribute `tone` (a direction) as colour */
   | { kind: 'direction' }
   /** attribute `tone` (a point on the sphere) as a checkerboard */
-  | { kind: 'checker' };
+  | { kind: 'checker' }
+  /** the colours and textures of the file */
+  | { kind: 'skin' };

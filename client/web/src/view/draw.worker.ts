@@ -8,23 +8,29 @@ import {
   LineBasicMaterial,
   LineSegments,
   Matrix4,
+  ClampToEdgeWrapping,
   Mesh,
   MeshBasicMaterial,
+  MirroredRepeatWrapping,
   PerspectiveCamera,
   Points,
   PointsMaterial,
   Scene,
+  RepeatWrapping,
   type ShaderMaterial,
   Sphere,
+  SRGBColorSpace,
+  Texture,
   Vector3,
   WebGLRenderer,
   type Material,
   type Object3D,
 } from 'three';
 import { FIELD, type Look } from './camera';
+import type { Skin } from '../mesh/dress';
 import type { Paint, Rgb } from './colors';
 import type { Defects, Frame, Order, Report, Surface } from './messages';
-import { DENSE, SLOTS, surfaceMaterial, wireMaterial } from './surface';
+import { DENSE, SLOTS, surfaceMaterial, wireMaterial, type Clad } from './surface';
 
 const BALL = new Sphere(new Vector3(), 4);
 const send = (report: Report) => self.postMessage(report);
@@ -33,7 +39,26 @@ function dispose(object: Object3D) {
   object.traverse((part) => {
     const { geometry, material } = part as Partial<Mesh>;
     geometry?.dispose();
-    (material as Material | undefined)?.dispose();
+    for (const one of [material ?? []].flat() as Material[]) one.dispose();
+  });
+}
+
+const WRAPS: Record<number, typeof RepeatWrapping | typeof ClampToEdgeWrapping | typeof MirroredRepeatWrapping> = {
+  33071: ClampToEdgeWrapping,
+  33648: MirroredRepeatWrapping,
+};
+
+/** One entry for each cover of a skin. */
+function cladsOf({ covers, images, dye }: Skin): Clad[] {
+  return covers.map((cover) => {
+    const image = images[cover.image];
+    if (!image) return { cover, map: null, dyed: !!dye };
+    const map = new Texture(image);
+    map.colorSpace = SRGBColorSpace;
+    map.flipY = false;
+    [map.wrapS, map.wrapT] = cover.wrap.map((wrap) => WRAPS[wrap] ?? RepeatWrapping);
+    map.needsUpdate = true;
+    return { cover, map, dyed: !!dye };
   });
 }
 
@@ -46,8 +71,12 @@ class Buffers {
   readonly targets: { position: BufferAttribute; normal: BufferAttribute }[];
   readonly slots: number;
   readonly dense: boolean;
+  readonly skin: Skin | null;
+  readonly clads: Clad[];
+  private readonly uv: BufferAttribute | null;
+  private readonly dye: BufferAttribute | null;
 
-  constructor({ position, normal, index, edges, targets = [] }: Surface) {
+  constructor({ position, normal, index, edges, targets = [], skin }: Surface) {
     this.position = new BufferAttribute(position, 3);
     this.normal = normal === position ? this.position : new BufferAttribute(normal, 3);
     this.index = new BufferAttribute(index, 1);
@@ -58,12 +87,19 @@ class Buffers {
     }));
     this.slots = Math.min(targets.length, SLOTS);
     this.dense = index.length >= 3 * DENSE;
+    this.skin = skin ?? null;
+    this.clads = skin ? cladsOf(skin) : [];
+    this.uv = skin ? new BufferAttribute(skin.uv, 2) : null;
+    this.dye = skin?.dye ? new BufferAttribute(skin.dye, 3) : null;
   }
 
   geometry(index: BufferAttribute, normals: boolean): BufferGeometry {
     const made = new BufferGeometry();
     made.setAttribute('position', this.position);
     if (normals) made.setAttribute('normal', this.normal);
+    if (normals && this.uv) made.setAttribute('uv', this.uv);
+    if (normals && this.dye) made.setAttribute('dye', this.dye);
+    if (normals) for (const { start, count, cover } of this.skin?.runs ?? []) made.addGroup(start, count, cover);
     made.setIndex(index);
     made.boundingSphere = BALL;
     return made;
@@ -72,7 +108,7 @@ class Buffers {
 
 class Model {
   readonly group = new Group();
-  private readonly mesh: Mesh<BufferGeometry, ShaderMaterial>;
+  private readonly mesh: Mesh<BufferGeometry, ShaderMaterial | ShaderMaterial[]>;
   private lines: LineSegments<BufferGeometry, ShaderMaterial> | null = null;
   private extra: Group | null = null;
   private current: number[] = [];
@@ -82,22 +118,28 @@ class Model {
     paint: Paint,
     scale = 1,
   ) {
-    this.mesh = new Mesh(buffers.geometry(buffers.index, true), surfaceMaterial(paint, buffers.slots, buffers.dense));
+    this.mesh = new Mesh(buffers.geometry(buffers.index, true), this.materials(paint));
     this.mesh.frustumCulled = false;
     this.group.scale.setScalar(scale);
     this.group.add(this.mesh);
     this.weights(buffers.targets.map(() => 0));
   }
 
+  private materials(paint: Paint): ShaderMaterial | ShaderMaterial[] {
+    const { slots, dense, clads } = this.buffers;
+    if (paint.kind !== 'skin') return surfaceMaterial(paint, slots, dense);
+    return clads.map((clad) => surfaceMaterial(paint, slots, dense, clad));
+  }
+
   paint(paint: Paint) {
-    const old = this.mesh.material;
-    this.mesh.material = surfaceMaterial(paint, this.buffers.slots, this.buffers.dense);
-    old.dispose();
+    for (const old of [this.mesh.material].flat()) old.dispose();
+    this.mesh.material = this.materials(paint);
     this.weights(this.current);
   }
 
   color(color: Rgb) {
-    this.mesh.material.uniforms.base.value = color;
+    const { material } = this.mesh; // a skin keeps its own colours
+    if (!Array.isArray(material)) material.uniforms.base.value = color;
   }
 
   attribute(name: string, data: Float32Array) {
@@ -119,7 +161,7 @@ class Model {
         object.geometry.setAttribute(`targetPosition${slot}`, targets[k].position);
         if (object === this.mesh) object.geometry.setAttribute(`targetNormal${slot}`, targets[k].normal);
       });
-      object.material.uniforms.weight.value = taken.map((k) => weights[k]);
+      for (const { uniforms } of [object.material].flat()) uniforms.weight.value = taken.map((k) => weights[k]);
     }
   }
 
@@ -253,6 +295,7 @@ function execute(order: Order) {
       return model.defects(order.defects);
     case 'dispose':
       dispose(model.group);
+      for (const { map } of model.buffers.clads) map?.dispose();
       models.delete(order.model);
   }
 }

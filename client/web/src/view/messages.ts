@@ -1,4 +1,5 @@
 /** The orders of the page to the drawing worker and its reports. Models have numbers. */
+import type { Skin } from '../mesh/dress';
 import type { Look } from './camera';
 import type { Paint, Rgb } from './colors';
 
@@ -8,6 +9,7 @@ export interface Surface {
   index: Uint32Array;
   edges: Uint32Array;
   targets?: { position: Float32Array; normal: Float32Array }[];
+  skin?: Skin;
 }
 
 export interface Defects {

@@ -22,16 +22,21 @@ export class Model {
       return;
     }
     const { surface, transfer, scale } = from;
+    const { skin } = surface;
     const arrays = [
       surface.position,
       surface.normal,
       surface.index,
       surface.edges,
       ...(surface.targets ?? []).flatMap((t) => [t.position, t.normal]),
+      ...(skin ? [skin.uv] : []),
+      ...(skin?.dye ? [skin.dye] : []),
     ];
     order(
       { op: 'model', model: this.id, surface, scale, paint },
-      transfer ? [...new Set(arrays.map((a) => a.buffer as ArrayBuffer))] : [],
+      transfer
+        ? [...new Set(arrays.map((a) => a.buffer as ArrayBuffer)), ...(skin?.images ?? []).filter((i) => !!i)]
+        : [],
     );
   }
 
@@ -75,13 +80,17 @@ export class Model {
   }
 }
 
-export const shapeModel = (d: Display, color: string) =>
-  new Model({ surface: d, transfer: true }, { kind: 'plain', color });
+/** A shape with a skin shows it instead of its tint. */
+const paintOf = (surface: Surface, color: string): Paint =>
+  surface.skin ? { kind: 'skin' } : { kind: 'plain', color };
+
+export const shapeModel = (d: Display, color: string) => new Model({ surface: d, transfer: true }, paintOf(d, color));
 
 /** `count` models with their own weights that share one copy of the buffers on the GPU. */
 export function morphModels(d: MorphData, count: number, color: string): Model[] {
-  const first = new Model({ surface: d, transfer: true }, { kind: 'plain', color });
-  return [first, ...Array.from({ length: count - 1 }, () => new Model({ same: first }, { kind: 'plain', color }))];
+  const paint = paintOf(d, color);
+  const first = new Model({ surface: d, transfer: true }, paint);
+  return [first, ...Array.from({ length: count - 1 }, () => new Model({ same: first }, paint))];
 }
 
 const WHITE: Paint = { kind: 'plain', color: '#ffffff' };

@@ -24,6 +24,8 @@ export class View {
   markers: Marker[] = [];
   onPick: ((ray: Ray) => void) | null = null;
   own = new Orbit();
+  /** a camera of its own, which no one rotates */
+  fixed: Look | null = null;
 
   constructor(
     readonly element: HTMLElement,
@@ -32,6 +34,10 @@ export class View {
 
   get orbit(): Orbit {
     return this.stage.linked ? this.stage.orbit : this.own;
+  }
+
+  look(aspect: number): Look {
+    return this.fixed ?? this.orbit.look(aspect);
   }
 
   show(content: Model | null) {
@@ -132,7 +138,7 @@ export class Stage {
     for (const view of this.views) {
       const box = view.element.getBoundingClientRect();
       if (box.width < 2 || box.height < 2) continue;
-      const look = view.orbit.look(box.width / box.height);
+      const look = view.look(box.width / box.height);
       view.placeMarkers(look, box.width, box.height);
       if (view.content)
         frames.push({

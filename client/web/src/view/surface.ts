@@ -3,7 +3,8 @@
  * morph targets that have a weight are plain vertex attributes. Meshes of many small triangles are lit at their
  * vertices, which looks the same and costs less than the loaders' standard materials.
  */
-import { DataTexture, GLSL3, LinearFilter, RGBAFormat, ShaderMaterial, SRGBColorSpace } from 'three';
+import { DataTexture, GLSL3, LinearFilter, RGBAFormat, ShaderMaterial, SRGBColorSpace, type Texture } from 'three';
+import type { Cover } from '../mesh/dress';
 import { linear, RAMPS, type Paint } from './colors';
 
 /** How many targets can have a weight at once. Each takes two attributes; the surface itself takes three. */
@@ -65,6 +66,7 @@ const declared = (slots: number, normals: boolean) =>
 
 const COLOR: Record<Paint['kind'], string> = {
   plain: 'vec3 c = base;',
+  skin: '',
   value: `float at = clamp((rampLog ? log(max(vValue, 1e-12)) : vValue) * rampRange.x + rampRange.y, 0.0, 1.0);
     vec3 c = texture(ramp, vec2(0.002 + 0.996 * at, 0.5)).rgb;`,
   direction: 'vec3 c = pow(clamp(0.5 + 0.5 * normalize(vTone), 0.0, 1.0), vec3(1.7));',
@@ -80,18 +82,39 @@ const COLOR: Record<Paint['kind'], string> = {
     vec3 c = mix(vec3(0.93, 0.92, 0.89), side, dark);`,
 };
 
-export function surfaceMaterial(paint: Paint, slots: number, dense: boolean): ShaderMaterial {
-  const tone = paint.kind === 'direction' || paint.kind === 'checker';
-  const carry =
-    paint.kind === 'value'
-      ? [
-          'in float value; out float vValue;',
-          'vValue = value;',
-          'in float vValue; uniform sampler2D ramp; uniform vec2 rampRange; uniform bool rampLog;',
-        ]
-      : tone
-        ? ['in vec3 tone; out vec3 vTone;', 'vTone = tone;', 'in vec3 vTone;']
-        : ['', '', ''];
+/** The cover of a run of triangles. `dyed`: the vertices have colours, in attribute `dye`. */
+export interface Clad {
+  cover: Cover;
+  map: Texture | null;
+  dyed: boolean;
+}
+
+const cladColor = ({ cover, map, dyed }: Clad) => `vec4 s = vec4(base${dyed ? ' * vDye' : ''}, 1.0);
+    ${map ? 's *= texture(map, vUv);' : ''}
+    ${map && cover.cutoff ? 'if (s.a < cutoff) discard;' : ''}
+    vec3 c = s.rgb;`;
+
+/** What the vertices hand on to the pixels: declared and set at the vertices, declared at the pixels. */
+function carried(paint: Paint, clad: Clad | undefined): [string, string, string] {
+  if (paint.kind === 'value')
+    return [
+      'in float value; out float vValue;',
+      'vValue = value;',
+      'in float vValue; uniform sampler2D ramp; uniform vec2 rampRange; uniform bool rampLog;',
+    ];
+  if (paint.kind === 'direction' || paint.kind === 'checker')
+    return ['in vec3 tone; out vec3 vTone;', 'vTone = tone;', 'in vec3 vTone;'];
+  if (!clad) return ['', '', ''];
+  const { map, dyed } = clad; // three declares uv
+  return [
+    `${map ? 'out vec2 vUv;' : ''} ${dyed ? 'in vec3 dye; out vec3 vDye;' : ''}`,
+    `${map ? 'vUv = uv;' : ''} ${dyed ? 'vDye = dye;' : ''}`,
+    `${map ? 'in vec2 vUv; uniform sampler2D map; uniform float cutoff;' : ''} ${dyed ? 'in vec3 vDye;' : ''}`,
+  ];
+}
+
+export function surfaceMaterial(paint: Paint, slots: number, dense: boolean, clad?: Clad): ShaderMaterial {
+  const carry = carried(paint, clad);
   const made = new ShaderMaterial({
     glslVersion: GLSL3,
     vertexShader: `${declared(slots, true)} ${carry[0]} out vec3 vLit; ${dense ? LIGHT : ''}
@@ -105,17 +128,21 @@ export function surfaceMaterial(paint: Paint, slots: number, dense: boolean): Sh
       }`,
     fragmentShader: `uniform vec3 base; in vec3 vLit; ${carry[2]} out vec4 color; ${dense ? '' : LIGHT} ${SHOWN}
       void main() {
-        ${COLOR[paint.kind]}
+        ${clad ? cladColor(clad) : COLOR[paint.kind]}
         color = vec4(shown(c * ${dense ? 'vLit' : 'light(normalize(vLit))'}), 1.0);
       }`,
     uniforms: {
-      base: { value: paint.kind === 'plain' ? linear(paint.color) : [1, 1, 1] },
+      base: { value: paint.kind === 'plain' ? linear(paint.color) : (clad?.cover.base ?? [1, 1, 1]) },
       weight: { value: new Array<number>(slots).fill(0) },
     },
     polygonOffset: true,
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
   });
+  if (clad?.map) {
+    made.uniforms.map = { value: clad.map };
+    made.uniforms.cutoff = { value: clad.cover.cutoff };
+  }
   if (paint.kind === 'value') {
     const [low, high] = [paint.low, paint.high].map((x) => (paint.log ? Math.log(Math.max(x, 1e-12)) : x));
     const scale = 1 / (high - low || 1);

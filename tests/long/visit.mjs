@@ -1,0 +1,116 @@
+// Drops meshes into the studio in pairs, as a visitor does: both show, morph with the fast preset, play and export.
+//
+//   node tests/long/visit.mjs FOLDER MESH MESH [MESH MESH…]
+//
+// Writes a picture of each pair (the shapes, then half the morph) and the contact sheet pairs.png into FOLDER. Exits
+// with 1 if a pair fails.
+import assert from 'node:assert/strict';
+import { mkdir, readFile, writeFile } from 'node:fs/promises';
+import { basename, join } from 'node:path';
+import {
+  addFiles,
+  button,
+  countPixels,
+  openPage,
+  settled,
+  startBrowser,
+  startDaemon,
+  until,
+} from '../studio/support.mjs';
+import { parseGlb } from '../scenario/support/glb.mjs';
+
+const [folder, ...files] = process.argv.slice(2);
+assert.ok(folder && files.length >= 2 && files.length % 2 === 0, 'usage: visit.mjs FOLDER MESH MESH [MESH MESH…]');
+await mkdir(folder, { recursive: true });
+const LIMIT = 180_000; // ms a step
+const daemon = await startDaemon();
+const browser = await startBrowser();
+
+/** Pixels that differ from the stage, which is light. */
+const drawn = (r, g, b) => Math.min(r, g, b) < 200 || Math.max(r, g, b) - Math.min(r, g, b) > 25;
+
+async function visit(pair, pictures) {
+  const { page, done } = await openPage(browser, daemon.url, {
+    colorScheme: 'light',
+    viewport: { width: 900, height: 560 },
+  });
+  page.setDefaultTimeout(LIMIT);
+  const shoot = async () => {
+    await settled(page);
+    assert.ok((await countPixels(page, '.pane-view', drawn)) > 1500, 'the shape is drawn');
+    pictures.push(await page.locator('.stage-area').screenshot());
+  };
+  await addFiles(page, ...pair);
+  assert.equal(await page.locator('.card.ready').count(), 2, 'both are accepted');
+  await shoot();
+  await button(page, /^Morph 2 shapes$/).click();
+  await until(() => button(page, 'Pause').count(), 'the fast morph plays', LIMIT);
+  await button(page, 'Cancel')
+    .click({ timeout: 2000 })
+    .catch(() => {}); // the default morph may be done already
+  await button(page, 'Pause').click();
+  const scrubber = page.getByRole('slider', { name: 'Along the morph' });
+  await scrubber.evaluate((input) => {
+    input.value = '0.5';
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+  });
+  await shoot();
+  const [download] = await Promise.all([
+    page.waitForEvent('download'),
+    page.getByRole('link', { name: 'Download GLB' }).click(),
+  ]);
+  const { gltf } = parseGlb(await readFile(await download.path()));
+  assert.equal(gltf.meshes[0].primitives[0].targets.length, 1, 'a morph target');
+  await done();
+}
+
+/** Two pictures a row, with the names of the pair. */
+async function sheet(rows) {
+  const page = await browser.newPage();
+  const data = await page.evaluate(async (list) => {
+    const [width, height, head] = [360, 300, 22];
+    const canvas = new OffscreenCanvas(4 * width, Math.ceil(list.length / 2) * (height + head));
+    const context = canvas.getContext('2d');
+    context.fillStyle = '#fff';
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.fillStyle = '#000';
+    context.font = '14px sans-serif';
+    for (const [i, { title, pictures }] of list.entries()) {
+      const [left, top] = [2 * width * (i % 2), Math.floor(i / 2) * (height + head)];
+      context.fillText(title, left + 6, top + 16);
+      for (const [k, text] of pictures.entries()) {
+        const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+        const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+        const scale = Math.min(width / image.width, height / image.height);
+        context.drawImage(image, left + k * width, top + head, scale * image.width, scale * image.height);
+      }
+    }
+    const bytes = new Uint8Array(await (await canvas.convertToBlob()).arrayBuffer());
+    return bytes.toBase64?.() ?? btoa(Array.from(bytes, (b) => String.fromCharCode(b)).join(''));
+  }, rows);
+  await page.close();
+  return Buffer.from(data, 'base64');
+}
+
+const rows = [];
+let failed = 0;
+for (let i = 0; i < files.length; i += 2) {
+  const pair = files.slice(i, i + 2);
+  const title = pair.map((file) => basename(file)).join(' – ');
+  const pictures = [];
+  const begin = performance.now();
+  const problem = await visit(pair, pictures).then(
+    () => null,
+    (error) => error.message.split('\n')[0],
+  );
+  failed += problem ? 1 : 0;
+  console.log(
+    `${problem ? 'FAILED' : 'ok'} ${title} ${((performance.now() - begin) / 1000).toFixed(1)} s ${problem ?? ''}`,
+  );
+  for (const [k, picture] of pictures.entries()) await writeFile(join(folder, `${i / 2}-${k}.png`), picture);
+  rows.push({ title: problem ? `${title}: ${problem}` : title, pictures: pictures.map((p) => p.toString('base64')) });
+}
+await writeFile(join(folder, 'pairs.png'), await sheet(rows));
+await browser.close();
+await daemon.stop();
+process.exit(failed ? 1 : 0);
