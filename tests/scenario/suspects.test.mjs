@@ -48,10 +48,11 @@ test('a landmark moved by 0.15 of the diagonal is named, and the true ones are n
   assert.doesNotMatch(clean.said, /misplaced/);
   for (const moved of MOVED) {
     const truth = placed(mesh, landmarks[moved].at[1]);
-    // The vertex whose distance from the true place is nearest to 0.15 of the diagonal.
-    const off = mesh.positions.map((p) => Math.abs(apart(p, truth) / diagonal - 0.15));
+    // The vertex whose distance from the true place is nearest to 0.15 of the diagonal, and that is no other landmark.
+    const taken = new Set(landmarks.map((l) => l.at[1].vertex));
+    const off = mesh.positions.map((p, v) => (taken.has(v) ? Infinity : Math.abs(apart(p, truth) / diagonal - 0.15)));
     const vertex = off.indexOf(Math.min(...off));
-    assert.ok(off[vertex] < 0.002);
+    assert.ok(off[vertex] < 0.01);
     const changed = landmarks.map((l, i) => (i === moved ? { ...l, at: [l.at[0], { vertex }] } : l));
     const { said, suspects } = await morph(changed);
     const label = landmarks[moved].name;
