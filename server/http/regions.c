@@ -10,6 +10,8 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
+#include "http/twin.h"
+
 /* Below the least size a copy takes less time than the second system call. */
 enum { LEAST = 32 << 10, REGIONS_MOST = 256, SLOTS = 2 * REGIONS_MOST };
 
@@ -134,8 +136,17 @@ ssize_t sendmsg(int to, const struct msghdr *message, int flags) {
   int plain = message->msg_iovlen == 2 && !message->msg_name && message->msg_controllen == 0;
   int fd = plain ? file_of(&parts[1]) : -1;
   if (fd < 0) {
+    size_t skipped = plain ? twin_head(parts[0].iov_base, parts[0].iov_len) : 0;
+    struct iovec rest[2] = {{0}};
+    struct msghdr once_only = *message;
+    if (skipped) {
+      rest[0] = (struct iovec){(char *)parts[0].iov_base + skipped, parts[0].iov_len - skipped};
+      rest[1] = parts[1];
+      once_only.msg_iov = rest;
+    }
     pthread_once(&once, find_next);
-    return next_sendmsg(to, message, flags);
+    ssize_t sent = next_sendmsg(to, &once_only, flags);
+    return sent > 0 ? sent + (ssize_t)skipped : sent; /* what it skips counts as sent */
   }
   ssize_t head = send(to, parts[0].iov_base, parts[0].iov_len, flags | MSG_MORE);
   if (head < 0 || (size_t)head < parts[0].iov_len) {

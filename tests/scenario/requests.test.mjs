@@ -176,3 +176,17 @@ test('ambiguous requests are refused', async (t) => {
   }
   assert.equal((await d.get('/livez')).status, 200);
 });
+
+test('a length that is no number gets one answer, and the connection ends', async (t) => {
+  const d = await daemon(t);
+  const { host } = new URL(d.url);
+  for (const length of ['-1', '+2', '0x2', '2, 2', ' ', '9'.repeat(25)])
+    for (const what of ['POST /v1/embeddings', 'GET /livez']) {
+      const reply = await raw(d, `${what} HTTP/1.1\r\nHost: ${host}\r\nContent-Length: ${length}\r\n\r\n{}`);
+      assert.ok([400, 413].includes(statusOf(reply)), `${length}: ${reply.slice(0, 200)}`);
+      assert.equal(reply.split('HTTP/1.1').length, 2, `${length}: ${reply}`);
+      const [head, body] = reply.split('\r\n\r\n');
+      assert.match(head, /Connection: close/i);
+      assert.equal(Number(head.match(/Content-Length: (\d+)/i)[1]), Buffer.byteLength(body));
+    }
+});

@@ -124,6 +124,17 @@ test('a morph over TLS', async (t) => {
     });
   for (const version of ['TLSv1.2', 'TLSv1.3']) await speaks(version);
   for (const version of ['TLSv1', 'TLSv1.1']) await assert.rejects(speaks(version), undefined, version);
+  // A request that cannot be read gets one answer, here too.
+  const reply = await new Promise((resolve, reject) => {
+    let text = '';
+    const socket = tls.connect({ port: Number(new URL(d.url).port), host: '127.0.0.1', ca }, () =>
+      socket.write('GET /livez HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n'),
+    );
+    socket.on('data', (bytes) => (text += bytes));
+    socket.on('error', reject).on('close', () => resolve(text));
+  });
+  assert.match(reply, /^HTTP\/1\.1 400 /);
+  assert.equal(reply.split('HTTP/1.1').length, 2, reply);
   assert.equal((await send(d.url, '/readyz', { ca })).status, 200);
   d.child.kill('SIGTERM');
   assert.equal(await d.exited, 0, d.log);
