@@ -17,8 +17,9 @@ static const struct {
              {"close_handles", ORB_REPAIR_CLOSE_HANDLES}};
 enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
-/* A handle can be no longer than this: a path from end to end and back, with room for detours. */
-static const double HANDLE_SIZE_MOST = 10;
+/* No loop is shorter than the least size: a float's rounding. None is longer than the most: a path from end to end and
+ * back, with room for detours. */
+static const double HANDLE_SIZE_LEAST = 1e-6, HANDLE_SIZE_MOST = 10;
 
 static int read_handle_size(const char *text, size_t length, orb_repair_options *out, api_problem *problem) {
   char digits[40], *end = digits;
@@ -28,11 +29,10 @@ static int read_handle_size(const char *text, size_t length, orb_repair_options 
     digits[length] = 0;
     size = strtod(digits, &end);
   }
-  if (end == digits || *end || !(size > 0 && size <= HANDLE_SIZE_MOST)) {
-    return api_refuse(
-        problem, "bad-query",
-        "\"handle_size\" must be a number above 0 and up to 10, such as 0.05: the length of a loop around "
-        "a handle relative to the diagonal.");
+  if (end == digits || *end || !(size >= HANDLE_SIZE_LEAST && size <= HANDLE_SIZE_MOST)) {
+    return api_refuse(problem, "bad-query",
+                      "\"handle_size\" must be a number from 0.000001 to 10, such as 0.05: the length of a loop around "
+                      "a handle relative to the diagonal.");
   }
   snprintf(digits, sizeof digits, "%.9g", size); /* as in the canonical list */
   out->handle_size = strtod(digits, NULL);

@@ -69,7 +69,7 @@ static int warn_of_places(FILE *out, const char *bullet, const cJSON *supermesh)
     }
     const char *what = thin ? "of the surface gets thin halfway, as where a limb is twisted"
                             : "of the surface is stretched badly (energy above 20)";
-    fprintf(out, "%sFrom %s to %s, %.2g %% %s; look around (%.4g, %.4g, %.4g) of %s, within %.3g.\n", bullet, a, b,
+    fprintf(out, "%sFrom %s to %s, %.1f %% %s; look around (%.4g, %.4g, %.4g) of %s, within %.3g.\n", bullet, a, b,
             100 * cli_number(warning, "share"), what, x[0], x[1], x[2], a, cli_number(at, "radius"));
     count++;
   }
@@ -94,8 +94,11 @@ static int warn_of_suspects(FILE *out, const char *bullet, const cJSON *supermes
   const cJSON *suspect;
   int count = 0;
   cJSON_ArrayForEach(suspect, member(supermesh, "suspects")) {
+    const char *name = cli_string(suspect, "name", "");
+    char number[32];
+    snprintf(number, sizeof number, "%.0f", cli_number(suspect, "landmark"));
     fprintf(out, "%sThe landmark %s may be misplaced: %.0f %% of the distortion is around it. On %s it would lie at ",
-            bullet, cli_string(suspect, "name", "?"), 100 * cli_number(suspect, "share"),
+            bullet, name[0] ? name : number, 100 * cli_number(suspect, "share"),
             name_of(supermesh, cli_number(suspect, "shape")));
     print_place(out, member(suspect, "at"));
     fprintf(out, ", %.0f %% of the diagonal away.\n", 100 * cli_number(suspect, "distance_relative"));

@@ -253,7 +253,7 @@ orb_status orb_report_pairs(orb_context *ctx, orb_merge_result *out) {
   double *moves = ORB_NEW(ctx, double, 16 * (int64_t)shape_count);
   orb_status status = positions && inverted && out->pairs && out->warnings && moves ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
-    status = orb_asset_transforms(ctx, supermesh, out->alignment.shapes, ORB_FIT_RIGID, moves, NULL);
+    status = orb_asset_transforms(ctx, supermesh, out->alignment.shapes, ORB_FIT_SIMILARITY, moves, NULL);
   }
   for (int32_t s = 0; status == ORB_OK && s < shape_count; s++) {
     positions[s] = ORB_NEW(ctx, double, 3 * (int64_t)supermesh->vertex_count);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/check.h"
+#include "base/context.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
@@ -221,7 +222,7 @@ orb_status orb_warn_stretched(orb_context *ctx, const orb_warn_pair *pair, orb_w
 
 /* The patch of each vertex: the nearest of the centres on the first shape, which farthest-point sampling spreads over
  * the used vertices, those of triangles. far: room for a number of each vertex, −1 for one that is not used. */
-static void spread_patches(const orb_warn_pair *pair, double *far, int32_t *patch) {
+static orb_status spread_patches(orb_context *ctx, const orb_warn_pair *pair, double *far, int32_t *patch) {
   const double *x = pair->position[0];
   int32_t last = pair->triangles[0];
   for (int32_t i = 0; i < PATCHES; i++) {
@@ -235,7 +236,9 @@ static void spread_patches(const orb_warn_pair *pair, double *far, int32_t *patc
       next = far[v] > far[next] ? v : next;
     }
     last = next;
+    ORB_TRY(orb_context_check(ctx));
   }
+  return ORB_OK;
 }
 
 static void move(const double matrix[16], const double x[3], double out[3]) {
@@ -244,14 +247,15 @@ static void move(const double matrix[16], const double x[3], double out[3]) {
   }
 }
 
-static double area_halfway(const orb_warn_pair *pair, int32_t t) {
+/* The area of a triangle on the way from the first moved shape (0) to the second (1). */
+static double area_between(const orb_warn_pair *pair, int32_t t, double way) {
   double x[3][3], normal[3], u[3], v[3];
   for (int k = 0; k < 3; k++) {
     double p[3], q[3];
     move(pair->move[0], corner(pair, 0, t, k), p);
     move(pair->move[1], corner(pair, 1, t, k), q);
     for (int c = 0; c < 3; c++) {
-      x[k][c] = 0.5 * (p[c] + q[c]);
+      x[k][c] = (1 - way) * p[c] + way * q[c];
     }
   }
   orb_sub(x[1], x[0], u);
@@ -266,8 +270,8 @@ static int mark_thin(marking *m, const int32_t *patch) {
   int any = 0;
   for (int32_t t = 0; t < m->pair->triangle_count; t++) {
     int32_t i = patch[m->pair->triangles[3 * (size_t)t]];
-    ends[i] += 0.5 * (m->area[0][t] + m->area[1][t]);
-    half[i] += area_halfway(m->pair, t);
+    ends[i] += 0.5 * (area_between(m->pair, t, 0) + area_between(m->pair, t, 1));
+    half[i] += area_between(m->pair, t, 0.5);
   }
   for (int32_t t = 0; t < m->pair->triangle_count; t++) {
     int32_t i = patch[m->pair->triangles[3 * (size_t)t]];
@@ -290,8 +294,10 @@ orb_status orb_warn_thin(orb_context *ctx, const orb_warn_pair *pair, orb_warnin
     for (size_t i = 0; i < 3 * (size_t)pair->triangle_count; i++) {
       far[pair->triangles[i]] = INFINITY;
     }
-    spread_patches(pair, far, patch);
-    status = mark_thin(&m, patch) ? write_parts(ctx, &m, out) : ORB_OK;
+    status = spread_patches(ctx, pair, far, patch);
+    if (status == ORB_OK && mark_thin(&m, patch)) {
+      status = write_parts(ctx, &m, out);
+    }
   }
   marking_free(ctx, &m);
   orb_free(ctx, far);

@@ -26,7 +26,7 @@ enum { UNSEEN, WAITING, SETTLED, ON_PATH };
 
 /* Searches without a limit cover the whole surface: this many vertices in all, and WHOLE_LEAST searches at least. */
 enum { WHOLE_VERTICES = 4000000, WHOLE_LEAST = 8 };
-enum { CHECK_EVERY = 256 }; /* seeds between looks at the deadline */
+enum { CHECK_EVERY = 256, SETTLED_EVERY = 65536 }; /* cycles and settled vertices between looks at the deadline */
 
 typedef struct work {
   orb_surface *s;
@@ -130,9 +130,10 @@ static void reach(work *w, int32_t h, double distance) {
 static int32_t search(work *w, int32_t seed, double *length) {
   int32_t closing = -1;
   start_search(w, seed);
-  while (w->heap_count > 0) {
+  for (int64_t settled = 1; w->heap_count > 0; settled++) {
     int32_t v = pop(w);
-    if (2 * w->distance[v] >= *length) {
+    int late = settled % SETTLED_EVERY == 0 && orb_context_check(w->s->ctx) != ORB_OK; /* the caller asks again */
+    if (late || 2 * w->distance[v] >= *length) {
       break;
     }
     w->state[v] = SETTLED;
@@ -401,9 +402,7 @@ static orb_status search_seeds(work *w, double limit) {
     if (closing >= 0) {
       ORB_TRY(keep(w, closing));
     }
-    if (i % CHECK_EVERY == 0 || !isfinite(limit)) {
-      ORB_TRY(orb_context_check(w->s->ctx));
-    }
+    ORB_TRY(orb_context_check(w->s->ctx));
   }
   return ORB_OK;
 }

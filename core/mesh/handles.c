@@ -9,6 +9,7 @@
  */
 #include "mesh/handles.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -201,7 +202,7 @@ orb_status orb_surface_close_handles(orb_surface *s, double size, int64_t *genus
       if (limit >= size) {
         break;
       }
-      limit = fmin(2 * limit, size);
+      limit = fmin(fmax(2 * limit, DBL_MIN), size); /* an eighth of a tiny size is 0 */
     }
     *genus -= count;
   }

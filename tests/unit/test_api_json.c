@@ -131,7 +131,8 @@ static void test_repairs(void **state) {
   assert_true(api_repair_parse("safe", NULL, "2", &options, text, &problem));
   assert_string_equal(text, "safe,part:2");
   assert_int_equal(options.part, 2);
-  static const char *const sizes[] = {"", "0", "-1", "nan", "inf", "1e", "0.1x", "11", " 1", "0x1p-3,"};
+  static const char *const sizes[] = {"",     "0",  "-1", "nan",     "inf",    "1e",
+                                      "0.1x", "11", " 1", "0x1p-3,", "5e-324", "1e-7"};
   for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
     assert_false(api_repair_parse("close_handles", sizes[i], NULL, &options, text, &problem));
     assert_string_equal(problem.name, "bad-query");

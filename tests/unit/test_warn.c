@@ -171,9 +171,29 @@ static void test_moved(void **state) {
   assert_int_equal(warning.part_count, 0);
 }
 
+/* Turns the far half by 60°: it keeps √3/2 of its width halfway, more than half. */
+static double turned_by_60(double z) {
+  return z > LENGTH / 2 ? M_PI / 3 : 0;
+}
+
+/* Nor do files in other units: a copy that is 100 times as large, scaled back by the motion. */
+static void test_units(void **state) {
+  (void)state;
+  static const double back[16] = {0.01, 0, 0, 0, 0, 0.01, 0, 0, 0, 0, 0.01, 0, 0, 0, 0, 1};
+  orb_warn_pair pair = tubes;
+  orb_warning warning = {0};
+  make_tubes(same, turned_by_60);
+  for (int i = 0; i < 3 * VERTICES; i++) {
+    position[1][i] *= 100;
+  }
+  pair.move[1] = back;
+  assert_int_equal(orb_warn_thin(ctx, &pair, &warning), ORB_OK);
+  assert_int_equal(warning.part_count, 0);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_bands), cmocka_unit_test(test_either_shape),
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_bands),     cmocka_unit_test(test_either_shape),
                                      cmocka_unit_test(test_collapsed), cmocka_unit_test(test_twist),
-                                     cmocka_unit_test(test_moved)};
+                                     cmocka_unit_test(test_moved),     cmocka_unit_test(test_units)};
   return cmocka_run_group_tests(tests, context_one_thread, context_end);
 }

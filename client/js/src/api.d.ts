@@ -444,7 +444,7 @@ export type Supermesh = {
   }>;
   /** Where the map between the shapes of a pair is bad; empty if it is nowhere. Absent if an older engine made the supermesh. */
   warnings?: Array<{
-    /** `stretched`: the symmetric Dirichlet energy is above 20 on more than 1 % of the area of either shape. `thin`: patches of the surface keep less than half of their area halfway through the linear morph, after a rigid fit, because the map twists a limb or the pose turns it far. */
+    /** `stretched`: the symmetric Dirichlet energy is above 20 on more than 1 % of the area of either shape. `thin`: patches of the surface keep less than half of their area halfway through the linear morph, after a fit by similarity, because the map twists a limb or the pose turns it far. */
     kind: 'stretched' | 'thin';
     /** An index into shapes. */
     a: number;

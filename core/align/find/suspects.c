@@ -1,7 +1,7 @@
 /* A registration in space, as rigid as possible, that follows the composed map at first and then lets go of it
  * (elastic/elastic.h): where a landmark pulls the map out of place, the surface slides back. How far the registration
- * takes a landmark of one shape from its place on the other one is its drift. A drift that is long, and far longer than
- * those of the other landmarks, is that of a landmark that may be misplaced, and it ends near where it would lie.
+ * takes a landmark of one shape from its place on the other one is its drift. A landmark with a long drift in both
+ * directions may be misplaced, and the drift ends near where it would lie.
  *
  * A landmark's share of the distortion is that of the map's triangles nearer to it than to any other landmark.
  *

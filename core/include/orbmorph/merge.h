@@ -40,8 +40,8 @@ enum { ORB_WARNING_PARTS = 4, ORB_WARNING_TRIANGLES = 32 };
 
 typedef enum orb_warning_kind {
   ORB_WARNING_STRETCHED, /* the symmetric Dirichlet energy is above 20 on more than 1 % of the area */
-  ORB_WARNING_THIN       /* patches keep less than half of their area halfway through the linear morph, after a rigid
-                            fit: the map twists a limb there, or the pose turns it by more than 120° */
+  ORB_WARNING_THIN       /* patches keep less than half of their area halfway through the linear morph, after a fit by
+                            similarity: the map twists a limb there, or the pose turns it far */
 } orb_warning_kind;
 
 /* A connected part of what a warning is about. Index 0 is shape a of the pair, 1 shape b. */

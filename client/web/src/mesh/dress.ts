@@ -205,3 +205,12 @@ export async function decodeImages(skin: Skin | undefined) {
   );
   skin.files = [];
 }
+
+/** A file whose materials are damaged is shown without them. */
+export function tried(get: () => Dress | null): Dress | null {
+  try {
+    return get();
+  } catch {
+    return null;
+  }
+}

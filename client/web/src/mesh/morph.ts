@@ -1,5 +1,5 @@
 /** A morph asset, decoded for the viewer: base, targets, wireframe, and the path through the shapes. */
-import { dressOf, skinOf, type Skin } from './dress';
+import { dressOf, skinOf, tried, type Skin } from './dress';
 import { readGlb } from './gltf';
 import { edgesOf, smoothNormals, type Frame } from './geometry';
 
@@ -71,7 +71,7 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData 
     return { position: delta, normal: normalDelta };
   });
 
-  const dress = dressOf(gltf, parts);
+  const dress = tried(() => dressOf(gltf, parts));
   const shapes = Array.from({ length: Math.min(shapeCount, targetCount + 1) }, (_, i) => single(i - 1, targetCount));
   const path = animationPath(gltf, targetCount, shapes);
   const names = targetNames(gltf, parts[0].mesh, targetCount);

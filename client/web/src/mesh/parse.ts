@@ -3,7 +3,7 @@
  * OFF and PLY in file order, STL 3·facet + corner, glTF the POSITION accessors of all triangle primitives one after
  * another. The reader is lenient and shows what it can; the daemon decides what is a mesh.
  */
-import { dressOf, plyDress, type Dress } from './dress';
+import { dressOf, plyDress, tried, type Dress } from './dress';
 import { readGlb, type Gltf } from './gltf';
 
 export interface RawMesh {
@@ -410,15 +410,6 @@ function parseGltf(gltf: Gltf, format: string): RawMesh {
     v += part.position.length / 3;
   }
   return { format, positions, corners, dress: tried(() => dressOf(gltf, parts)) };
-}
-
-/** A file whose materials are damaged is shown without them. */
-function tried(get: () => Dress | null): Dress | null {
-  try {
-    return get();
-  } catch {
-    return null;
-  }
 }
 
 /** Drops triangles that cannot be drawn because a vertex does not exist or is not finite. */

@@ -224,9 +224,9 @@ function Suspects({ result: { supermesh } }: { result: Result }) {
   if (!suspects.length) return null;
   return (
     <ul class="hint" aria-label="Landmarks that may be misplaced">
-      {suspects.map(({ name, shape, share, distance_relative: far }) => (
-        <li key={`${shape}${name}`}>
-          {`${name} may be misplaced: ${Math.round(100 * share)} % of the distortion is around it. On ${
+      {suspects.map(({ landmark, name, shape, share, distance_relative: far }) => (
+        <li key={`${shape} ${landmark}`}>
+          {`${name || `Landmark ${landmark + 1}`} may be misplaced: ${Math.round(100 * share)} % of the distortion is around it. On ${
             shapes[shape].name
           } it would lie ${Math.round(100 * far)} % of the diagonal away.`}
         </li>
@@ -244,12 +244,12 @@ function Warnings({ result: { supermesh } }: { result: Result }) {
   const warnings = (supermesh.warnings ?? []).filter(({ kind, share }) => kind !== 'thin' || share > THIN_MOST);
   if (!warnings.length) return null;
   const place = ({ shape, centre, radius }: (typeof warnings)[0]['parts'][0]['at'][0]) =>
-    `around (${centre.map((x) => x.toPrecision(3)).join(', ')}) of ${shapes[shape].name}, within ${radius.toPrecision(2)}`;
+    `around (${centre.map((x) => Number(x.toPrecision(3))).join(', ')}) of ${shapes[shape].name}, within ${Number(radius.toPrecision(2))}`;
   return (
     <ul class="hint" aria-label="Warnings of the map">
       {warnings.map(({ kind, a, b, share, parts }) => (
         <li key={`${kind}${a}${b}`}>
-          {`From ${shapes[a].name} to ${shapes[b].name}, ${(100 * share).toPrecision(2)} % of the surface ${
+          {`From ${shapes[a].name} to ${shapes[b].name}, ${Number((100 * share).toPrecision(2))} % of the surface ${
             kind === 'thin' ? 'gets thin halfway, as where a limb is twisted' : 'is stretched badly'
           }: look ${place(parts[0].at[0])}. A landmark there may help.`}
         </li>
