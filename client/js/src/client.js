@@ -5,6 +5,7 @@ import { openSource, parse, sendBody } from './upload.js';
 
 const ENDED = new Set(['succeeded', 'failed', 'cancelled']);
 const LONGEST_WAIT_S = 60;
+const ANSWER_MS = 2000; // an aborted request waits this long for the answer that names its job
 const sleep = (ms, signal) =>
   new Promise((resolve, reject) => {
     if (signal?.aborted) return reject(abortError(signal));
@@ -262,16 +263,40 @@ export class Orbmorph {
   }
 
   /**
+   * Posts a request. An abort does not interrupt it at once: the daemon may have its job already, and only the answer
+   * names the job to cancel. -> Response
+   */
+  async post(path, body, signal) {
+    if (signal?.aborted) throw abortError(signal);
+    const late = new AbortController();
+    let timer;
+    const abort = () => {
+      timer = setTimeout(() => late.abort(abortError(signal)), ANSWER_MS);
+    };
+    signal?.addEventListener('abort', abort, { once: true });
+    try {
+      return await this.patient(() => this.send(path, { method: 'POST', json: body, signal: late.signal }), signal);
+    } finally {
+      clearTimeout(timer);
+      signal?.removeEventListener('abort', abort);
+    }
+  }
+
+  /**
    * Posts a request and waits for its job, if there is one. Calls `onJob(job)` once. Aborting `signal` also cancels the
    * job, unless `detach` is set.
    */
   async make(path, body, { onJob, onProgress, signal, detach } = {}) {
-    const response = await this.request(path, { method: 'POST', json: body, signal });
+    const response = await this.post(path, body, signal);
     const answer = parse(await response.text());
-    if (response.status !== 202) return answer;
+    if (response.status !== 202) {
+      if (signal?.aborted) throw abortError(signal);
+      return answer;
+    }
     onJob?.(answer);
     onProgress?.(answer);
     try {
+      if (signal?.aborted) throw abortError(signal);
       return await this.result(answer, { onProgress, signal });
     } catch (error) {
       if (isAbort(error) && !detach) await this.cancelJob(answer).catch(() => {});

@@ -129,6 +129,34 @@ test(
 );
 
 test(
+  'an abort before the answer to the request cancels the job that the answer names',
+  using({ jobSteps: 1e6 }, async (daemon) => {
+    const abort = new AbortController();
+    const fetch = async (url, init) => {
+      const answer = await globalThis.fetch(url, init);
+      if (init?.method === 'POST') abort.abort();
+      return answer;
+    };
+    const client = new Orbmorph({ server: daemon.url, fetch });
+    await assert.rejects(client.merge({ shapes: [] }, { signal: abort.signal }), { name: 'AbortError' });
+    assert.equal(daemon.jobs.get('1').state, 'cancelled');
+  }),
+);
+
+test('an abort does not wait long for an answer that never comes', async () => {
+  const abort = new AbortController();
+  const fetch = (_url, { signal }) =>
+    new Promise((_resolve, reject) => {
+      signal.addEventListener('abort', () => reject(signal.reason));
+      abort.abort();
+    });
+  const client = new Orbmorph({ server: 'http://silent', fetch });
+  const since = Date.now();
+  await assert.rejects(client.merge({ shapes: [] }, { signal: abort.signal }), { name: 'AbortError' });
+  assert.ok(Date.now() - since < 60_000);
+});
+
+test(
   'abort with detach keeps the job running',
   using({ jobSteps: 1e6 }, async (daemon, client) => {
     const abort = new AbortController();
