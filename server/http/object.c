@@ -61,9 +61,9 @@ static void *read_part(const request *r, object_kind kind, const char *id, objec
   return bytes;
 }
 
-/* Sending an asset of this size from memory takes two system calls, from its file eight. Beyond it, copying the bytes
- * costs more than that. */
-enum { MEMORY_MOST = 512 << 10 };
+/* Sending an asset of this size from the cache takes two system calls, from its file at least eight. Larger ones would
+ * leave room for few in the cache, and for them the calls weigh little. */
+enum { MEMORY_MOST = 4 << 20 };
 
 /* Takes a small asset from memory, and reads it there if it is not. 0: only a task may do that. */
 static int choose_memory(request *r, object_kind kind, const char *id, const char *key) {

@@ -1,8 +1,11 @@
 #include "http/regions.h"
 
 #include <dlfcn.h>
+#include <fcntl.h>
+#include <limits.h>
 #include <pthread.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/sendfile.h>
@@ -23,6 +26,7 @@ typedef struct region {
 
 static struct {
   pthread_mutex_t lock;
+  char folder[PATH_MAX]; /* of their files; empty: they lie in memory */
   int count;
   region all[SLOTS]; /* by address, with linear probing */
 } regions = {.lock = PTHREAD_MUTEX_INITIALIZER};
@@ -55,6 +59,10 @@ static void unreserve(void) {
   pthread_mutex_unlock(&regions.lock);
 }
 
+void regions_in(const char *folder) {
+  snprintf(regions.folder, sizeof regions.folder, "%s", folder);
+}
+
 static int fill(int fd, const char *bytes, size_t size) {
   for (ssize_t n = 1; size > 0 && n > 0; bytes += n > 0 ? n : 0, size -= n > 0 ? (size_t)n : 0) {
     n = write(fd, bytes, size);
@@ -62,24 +70,42 @@ static int fill(int fd, const char *bytes, size_t size) {
   return size == 0;
 }
 
+/* A file without a name that holds the bytes. A disk that is full, or takes no such files, leaves memory. */
+static int file_with(const void *bytes, size_t size) {
+  int fd = regions.folder[0] ? open(regions.folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600) : -1;
+  if (fd >= 0 && fill(fd, bytes, size)) {
+    return fd;
+  }
+  if (fd >= 0) {
+    close(fd);
+  }
+  fd = memfd_create("answer", MFD_CLOEXEC);
+  if (fd >= 0 && !fill(fd, bytes, size)) {
+    close(fd);
+    fd = -1;
+  }
+  return fd;
+}
+
 void *region_make(const void *bytes, size_t size) {
   if (size < LEAST || !reserve()) {
     return NULL;
   }
-  int fd = memfd_create("answer", MFD_CLOEXEC);
-  void *mapped =
-      fd >= 0 && fill(fd, bytes, size) ? mmap(NULL, size, PROT_READ, MAP_SHARED | MAP_POPULATE, fd, 0) : MAP_FAILED;
-  if (mapped == MAP_FAILED) {
+  int fd = file_with(bytes, size);
+  void *copy = fd >= 0 ? mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) : MAP_FAILED;
+  if (copy == MAP_FAILED) {
     if (fd >= 0) {
       close(fd);
     }
     unreserve();
     return NULL;
   }
+  memcpy(copy, bytes, size);
+  mprotect(copy, size, PROT_READ);
   pthread_mutex_lock(&regions.lock);
-  *find_locked(mapped) = (region){mapped, size, fd};
+  *find_locked(copy) = (region){copy, size, fd};
   pthread_mutex_unlock(&regions.lock);
-  return mapped;
+  return copy;
 }
 
 /* Removes a region, and closes the gap that it leaves in its run of slots. */
@@ -154,5 +180,5 @@ ssize_t sendmsg(int to, const struct msghdr *message, int flags) {
   }
   off_t from = 0;
   ssize_t body = sendfile(to, fd, &from, parts[1].iov_len);
-  return body > 0 ? head + body : head;
+  return body > 0 ? head + body : head; /* if the file cannot be read, the copy in memory is sent */
 }

@@ -9,6 +9,7 @@
 #include "http/body.h"
 #include "http/certificate.h"
 #include "http/http.h"
+#include "http/regions.h"
 #include "http/target.h"
 #include "log.h"
 #include "metrics.h"
@@ -236,6 +237,7 @@ int http_start(server *srv) {
     log_error("the catalogue has no secret for page tokens");
     return 0;
   }
+  regions_in(o->data);
   srv->encoded = encoded_open((size_t)o->encoded_bytes);
   srv->connections = srv->encoded ? watch_start(o, srv->needs_token) : NULL;
   if (!srv->connections) {

@@ -48,10 +48,11 @@ largest of the runs in brackets. *Processor time* is that of the server and of w
 microseconds, and its ratio: about what the ratio of the rates would be on a machine without other load. Goals are checked against the
 rates. With *two jobs running*, two embeddings take every core that is left.
 
-The daemon keeps assets of at most 512 KB in memory that the kernel sends without a copy (`server/http/regions.h`); larger ones
-it sends from their files. In the rows of *64 visitors* each of 64 connections sends a request, reads the answer and pauses
-for {pause} ms, so that neither server is saturated. The load average of the machine at the end was {load:.0f}:
-with other load, rates and times say little, and processor time says more.
+The daemon keeps assets of at most 4 MB in memory and beside it in a file without a name, from which the kernel sends them
+without a copy (`server/http/regions.h`); larger ones it sends from their files. In the row of *64 visitors* each of 64
+connections sends a request, reads the answer and pauses for {pause} ms, so that neither server is saturated; the two jobs and the
+visitors' own program share the cores, and nginx beside it shows what that costs. The load average of the machine
+at the end was {load:.0f}: with other load, rates and times say little, and processor time says more.
 
 | what | daemon | nginx | ratio | processor time | goal | |
 |---|---|---|---|---|---|---|

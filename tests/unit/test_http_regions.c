@@ -63,10 +63,10 @@ static void send_all(const char *body, size_t size) {
   free(got);
 }
 
-static void bytes_arrive(void **state) {
+static void bytes_arrive_from(const char *folder) {
   char *bytes = pattern();
+  regions_in(folder);
   char *kept = region_make(bytes, SIZE);
-  (void)state;
   assert_non_null(kept);
   assert_memory_equal(kept, bytes, SIZE);
   send_all(kept, SIZE);
@@ -75,6 +75,13 @@ static void bytes_arrive(void **state) {
   assert_int_equal(region_free(bytes), 0);
   assert_int_equal(region_free(kept), 1);
   free(bytes);
+}
+
+static void bytes_arrive(void **state) {
+  (void)state;
+  bytes_arrive_from("/var/tmp");
+  bytes_arrive_from("/no/such/folder"); /* from memory */
+  bytes_arrive_from("");
 }
 
 /* A closed socket gives an error, and no signal. */
