@@ -10,7 +10,7 @@
 #include <cjson/cJSON.h>
 #include <stddef.h>
 
-enum { API_JSON_DEPTH = 32, API_JSON_BYTES = 1 << 20 };
+enum { API_JSON_DEPTH = 32 };
 
 /* Why the bytes were refused, and where. */
 typedef struct api_json_error {

@@ -13,7 +13,7 @@
 #include "terminal.h"
 #include "text.h"
 
-char *cli_resource_path(const char *collection, const char *operand) {
+static char *resource_path(const char *collection, const char *operand) {
   const char *authority = strstr(operand, "://");
   if (authority) {
     const char *slash = strchr(authority + 3, '/');
@@ -34,7 +34,7 @@ int cli_locate(cli *c, const char *collection, const char *operand, char **path)
   if (cli_is_prefix(operand)) {
     return cli_resolve(c, operand, (const char *const[]){collection, NULL}, path);
   }
-  *path = cli_resource_path(collection, operand);
+  *path = resource_path(collection, operand);
   return CLI_DONE;
 }
 
@@ -46,7 +46,7 @@ int cli_find(cli *c, const char *operand, char **path, cli_reply *reply) {
     return rc == CLI_DONE ? cli_get(c, *path, reply) : rc;
   }
   for (size_t i = 0; i < 4; i++) {
-    *path = cli_resource_path(collections[i], operand);
+    *path = resource_path(collections[i], operand);
     rc = cli_get(c, *path, reply);
     if (rc != CLI_DONE || reply->status != 404 || i == 3 || operand[0] == '/') {
       break;

@@ -4,12 +4,8 @@
 
 #include "http.h"
 
-/* The path of an operand: "/v1/jobs/ID" for an id, the path of a URL, or a path as it is. The caller frees it. */
-char *cli_resource_path(const char *collection, const char *operand);
-
-/* Likewise, and an id may be given by its first digits. Returns CLI_DONE, or else after printing why; *path is NULL
- * then.
- */
+/* The path of an operand: "/v1/jobs/ID" for an id or its first digits, the path of a URL, or a path as it is. The
+ * caller frees *path. Where it does not return CLI_DONE, it has printed why, and *path is NULL. */
 int cli_locate(cli *c, const char *collection, const char *operand, char **path);
 
 /* Finds the collection that holds an id; fetches the resource into reply. The caller frees *path and the reply. */

@@ -165,7 +165,7 @@ static int warn_of_fits(FILE *out, const char *bullet, const cJSON *supermesh) {
   cJSON_ArrayForEach(shape, member(supermesh, "shapes")) {
     double up = cli_number(member(shape, "fit"), "up_degrees");
     if (up > TURNED_OVER) {
-      fprintf(out, "%sThe fit turned the y axis of %s by %.0f degrees; with --fit none it stays as in its file.\n",
+      fprintf(out, "%sThe fit rotated the y axis of %s by %.0f degrees; with --fit none it stays as in its file.\n",
               bullet, cli_string(shape, "name", "?"), up);
       count++;
     }

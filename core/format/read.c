@@ -16,16 +16,15 @@
 #include "format/other.h"
 #include "format/readers.h"
 
-/* One row for each format. Of equally sure detectors the first wins, so the strict ones come first. */
 static const struct {
   orb_format format;
   const char *name;
   orb_certainty (*is)(const unsigned char *bytes, size_t size);
   orb_status (*read)(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
 } READERS[] = {
-    {ORB_FORMAT_GLB, "glb", orb_glb_is, orb_glb_read},     {ORB_FORMAT_PLY, "ply", orb_ply_is, orb_ply_read},
-    {ORB_FORMAT_GLTF, "gltf", orb_gltf_is, orb_gltf_read}, {ORB_FORMAT_OFF, "off", orb_off_is, orb_off_read},
-    {ORB_FORMAT_STL, "stl", orb_stl_is, orb_stl_read},     {ORB_FORMAT_OBJ, "obj", orb_obj_is, orb_obj_read},
+#define READER(id, value, function, name) {ORB_FORMAT_##id, name, orb_##function##_is, orb_##function##_read},
+    ORB_FORMATS(READER)
+#undef READER
 };
 enum { READER_COUNT = sizeof READERS / sizeof *READERS };
 

@@ -1,12 +1,13 @@
-/* The readers: for each format a detector and a reader, defined in the file of its name and listed in the table of
- * read.c. Both get at least one byte. A reader fills an orb_build (build.h) and ends with orb_build_finish(). */
+/* The readers: for each format a detector and a reader, defined in the file of its name and listed in
+ * orbmorph/formats.h. Both get at least one byte. A reader fills an orb_build (build.h) and ends with
+ * orb_build_finish(). */
 #ifndef ORB_FORMAT_READERS_H
 #define ORB_FORMAT_READERS_H
 
 #include "format/build.h"
 
-/* How sure a detector is that bytes are of its format. The surest detector wins; of equally sure ones, the first in the
- * table. */
+/* How sure a detector is that bytes are of its format. The surest detector wins; of equally sure ones, the first in
+ * that list. */
 typedef enum orb_certainty {
   ORB_NO,
   ORB_POSSIBLE, /* nothing speaks against it */
@@ -18,19 +19,13 @@ typedef enum orb_certainty {
 extern "C" {
 #endif
 
-orb_certainty orb_glb_is(const unsigned char *bytes, size_t size);
-orb_certainty orb_gltf_is(const unsigned char *bytes, size_t size);
-orb_certainty orb_obj_is(const unsigned char *bytes, size_t size);
-orb_certainty orb_off_is(const unsigned char *bytes, size_t size);
-orb_certainty orb_ply_is(const unsigned char *bytes, size_t size);
-orb_certainty orb_stl_is(const unsigned char *bytes, size_t size);
-
-ORB_MUST_CHECK orb_status orb_glb_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
-ORB_MUST_CHECK orb_status orb_gltf_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
-ORB_MUST_CHECK orb_status orb_obj_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
-ORB_MUST_CHECK orb_status orb_off_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
-ORB_MUST_CHECK orb_status orb_ply_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
-ORB_MUST_CHECK orb_status orb_stl_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_mesh *out);
+/* orb_obj_is() and orb_obj_read(), and so on. */
+#define ORB_FORMAT_DECLARATION(id, value, function, name)                                                    \
+  orb_certainty orb_##function##_is(const unsigned char *bytes, size_t size);                                \
+  ORB_MUST_CHECK orb_status orb_##function##_read(orb_context *ctx, const unsigned char *bytes, size_t size, \
+                                                  orb_mesh *out);
+ORB_FORMATS(ORB_FORMAT_DECLARATION)
+#undef ORB_FORMAT_DECLARATION
 
 #ifdef __cplusplus
 }

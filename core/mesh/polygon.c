@@ -25,8 +25,8 @@ orb_status orb_polygon_reserve(orb_context *ctx, orb_polygon *polygon, int32_t c
   polygon->flat = ORB_NEW(ctx, double, 2 * (size_t)corners);
   polygon->next = ORB_NEW(ctx, int32_t, corners);
   polygon->prev = ORB_NEW(ctx, int32_t, corners);
-  polygon->turned = ORB_NEW(ctx, int32_t, corners);
-  if (!polygon->flat || !polygon->next || !polygon->prev || !polygon->turned) {
+  polygon->reflex = ORB_NEW(ctx, int32_t, corners);
+  if (!polygon->flat || !polygon->next || !polygon->prev || !polygon->reflex) {
     orb_polygon_free(ctx, polygon);
     return ORB_E_NO_MEMORY;
   }
@@ -38,7 +38,7 @@ void orb_polygon_free(orb_context *ctx, orb_polygon *polygon) {
   orb_free(ctx, polygon->flat);
   orb_free(ctx, polygon->next);
   orb_free(ctx, polygon->prev);
-  orb_free(ctx, polygon->turned);
+  orb_free(ctx, polygon->reflex);
   *polygon = (orb_polygon){0};
 }
 
@@ -106,13 +106,13 @@ static void cut_quadrangle(const double *flat, int32_t *triangles) {
 /* Whether no other corner lies in the ear a b c. If one does, so does one where the outline turns to the right. */
 static int ear_is_free(orb_polygon *polygon, int32_t a, int32_t b, int32_t c, int64_t *budget) {
   const double *flat = polygon->flat, *pa = flat + 2 * a, *pb = flat + 2 * b, *pc = flat + 2 * c;
-  for (int32_t n = 0; n < polygon->turned_count;) {
-    int32_t i = polygon->turned[n];
+  for (int32_t n = 0; n < polygon->reflex_count;) {
+    int32_t i = polygon->reflex[n];
     if (--*budget < 0) {
       return 0;
     }
     if (polygon->next[i] < 0) {
-      polygon->turned[n] = polygon->turned[--polygon->turned_count];
+      polygon->reflex[n] = polygon->reflex[--polygon->reflex_count];
       continue;
     }
     const double *p = flat + 2 * i;
@@ -128,12 +128,12 @@ static int ear_is_free(orb_polygon *polygon, int32_t a, int32_t b, int32_t c, in
 /* Links the corners and lists those that turn to the right. */
 static void link_corners(orb_polygon *polygon, int32_t count) {
   const double *flat = polygon->flat;
-  polygon->turned_count = 0;
+  polygon->reflex_count = 0;
   for (int32_t i = 0; i < count; i++) {
     polygon->next[i] = i + 1 < count ? i + 1 : 0;
     polygon->prev[i] = i > 0 ? i - 1 : count - 1;
     if (!(signed_area2(flat + 2 * polygon->prev[i], flat + 2 * i, flat + 2 * polygon->next[i]) > 0)) {
-      polygon->turned[polygon->turned_count++] = i;
+      polygon->reflex[polygon->reflex_count++] = i;
     }
   }
 }

@@ -9,8 +9,8 @@ typedef struct orb_polygon {
   int32_t room;
   double *flat;         /* 2 a corner */
   int32_t *next, *prev; /* of the corners that are left; next −1: cut off */
-  int32_t *turned;      /* corners with a turn to the right, which alone can lie inside an ear */
-  int32_t turned_count;
+  int32_t *reflex;      /* corners with a turn to the right, which alone can lie inside an ear */
+  int32_t reflex_count;
   int64_t saved; /* tests that earlier polygons left over, below 0 those they took in advance */
 } orb_polygon;
 

@@ -60,13 +60,6 @@ static inline int vm_any(vm mask) {
   return any != 0;
 }
 #endif
-static inline double vd_sum(vd x) {
-  double sum = 0;
-  for (int i = 0; i < LANES; i++) {
-    sum += x[i];
-  }
-  return sum;
-}
 
 #if ORB_LANES == 8 && defined(__AVX512F__)
 static inline vd vd_sqrt(vd x) {

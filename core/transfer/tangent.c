@@ -35,7 +35,7 @@ typedef struct tangent_job {
   int32_t *of_corner;
 } tangent_job;
 
-/* The linear part of KHR_texture_transform, with v turned upward. */
+/* The linear part of KHR_texture_transform, with v pointing up. */
 static void axes_of(const orb_texture *texture, double out[4]) {
   double c = 1, s = 0, x = 1, y = 1;
   if (texture->is_transformed) {

@@ -15,7 +15,7 @@ void webhook_new_secret(char out[WEBHOOK_SECRET]) {
   sodium_memzero(bytes, sizeof bytes);
 }
 
-void webhook_own_name(const char *tenant, char out[WEBHOOK_NAME]) {
+static void own_name(const char *tenant, char out[WEBHOOK_NAME]) {
   snprintf(out, WEBHOOK_NAME, "@%.63s", tenant);
 }
 
@@ -47,7 +47,7 @@ store_result catalogue_webhook_add(catalogue *cat, const webhook_row *row) {
 
 int webhook_ensure_secret(database *db, const char *tenant) {
   webhook_row row = {.created = (int64_t)time(NULL) * 1000};
-  webhook_own_name(tenant, row.name);
+  own_name(tenant, row.name);
   snprintf(row.tenant, sizeof row.tenant, "%s", tenant);
   webhook_new_secret(row.secret);
   int code = add_row(db, &row);
@@ -100,7 +100,7 @@ typedef struct secret_arg {
 static int own_secret(database *db, void *arg) {
   secret_arg *own = arg;
   char name[WEBHOOK_NAME];
-  webhook_own_name(own->tenant, name);
+  own_name(own->tenant, name);
   int code = webhook_ensure_secret(db, own->tenant);
   sqlite3_stmt *st = code == SQLITE_OK ? database_statement(db, "SELECT secret FROM webhook WHERE name=?1") : NULL;
   if (!st) {

@@ -24,7 +24,6 @@ typedef struct webhook_row {
 
 /* A new random secret. */
 void webhook_new_secret(char out[WEBHOOK_SECRET]);
-void webhook_own_name(const char *tenant, char out[WEBHOOK_NAME]);
 
 /* STORE_CONFLICT: the name is taken, or the tenant has WEBHOOKS_OF_TENANT already. */
 store_result catalogue_webhook_add(catalogue *cat, const webhook_row *row);

@@ -14,7 +14,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SOURCES = {
-    "format": ("core/format/read.c", r'\{ORB_FORMAT_\w+, "([\w-]+)"'),
+    "format": ("core/include/orbmorph/formats.h", r'FORMAT\(\w+, \d+, \w+, "([\w-]+)"'),
     "alignment method": ("core/include/orbmorph/alignment.h", r"\bORB_ALIGN_(\w+)"),
     "remesh method": ("core/include/orbmorph/remesh_methods.h", r'METHOD\(\w+, \w+, "([\w-]+)"'),
 }

@@ -362,7 +362,7 @@ export type Supermesh = {
       rotation_degrees: number;
       /** How far the shape moved: the mean of its fitted points, by the first shape's diagonal. */
       translation_relative: number;
-      /** The angle by which the y axis turned. Beyond 60° the shape lay down or stood up. */
+      /** The angle by which the y axis rotated. Beyond 60° the shape lay down or stood up. */
       up_degrees: number;
     };
     /** The 4×4 matrix, column-major as in glTF, from the shape's own coordinates to those of the asset: the identity, or the result of `asset.fit`. Absent if an older engine made the supermesh. */

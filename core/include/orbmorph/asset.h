@@ -54,7 +54,7 @@ ORB_API ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_su
                                                   orb_buffer *out);
 
 /* Lists what the asset lacks of the files of its shapes: *list (allocated from the context, freed by the caller; NULL
- * if empty) has *count entries, at most ORB_DROPPED_MAX. On an error *list is to be freed, too. */
+ * if empty) has *count entries, at most ORB_DROPPED_MAX. Free *list on an error, too. */
 ORB_API ORB_MUST_CHECK orb_status orb_asset_dropped(orb_context *ctx, const orb_aligned_shape *shapes,
                                                     int32_t shape_count, const orb_asset_options *options,
                                                     orb_dropped **list, int32_t *count);

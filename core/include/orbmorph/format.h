@@ -6,20 +6,19 @@
 #ifndef ORBMORPH_FORMAT_H
 #define ORBMORPH_FORMAT_H
 
+#include "orbmorph/formats.h"
 #include "orbmorph/mesh.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
+/* ORB_FORMAT_OBJ = 1, …: see formats.h. */
 typedef enum orb_format {
   ORB_FORMAT_AUTO = 0,
-  ORB_FORMAT_OBJ,
-  ORB_FORMAT_OFF,
-  ORB_FORMAT_PLY,
-  ORB_FORMAT_STL,
-  ORB_FORMAT_GLTF,
-  ORB_FORMAT_GLB,
+#define ORB_FORMAT_ID(id, value, function, name) ORB_FORMAT_##id = (value),
+  ORB_FORMATS(ORB_FORMAT_ID)
+#undef ORB_FORMAT_ID
 } orb_format;
 
 ORB_API const char *orb_format_name(orb_format format); /* "obj", … ; "auto" */

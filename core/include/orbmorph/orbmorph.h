@@ -8,6 +8,7 @@
 #include "orbmorph/context.h"
 #include "orbmorph/embed.h"
 #include "orbmorph/format.h"
+#include "orbmorph/formats.h"
 #include "orbmorph/kept.h"
 #include "orbmorph/locate.h"
 #include "orbmorph/material.h"

@@ -3,7 +3,7 @@
  * The start is optimistic: each shape alone is thinned out by a quadric (thin.h), and the net holds the vertices that
  * are left. Then it proves: edges that deviate are flipped or split until the bound holds. Where that does not end, or
  * leaves many inverted triangles, the method starts from the overlay of all shapes instead, which is exact. Where the
- * map is wound so much that the overlay is huge, the method starts from the overlay of reduced shapes (start.h), and
+ * map is twisted so much that the overlay is huge, the method starts from the overlay of reduced shapes (start.h), and
  * only collapses and flips edges: such a supermesh needs many times the triangles of the shapes in any case, and the
  * other steps would take minutes to save a few per cent.
  *
@@ -36,14 +36,15 @@ enum { REFINEMENTS_MOST = 32 }; /* after so many the net counts as one that refi
  * remain after it, or there was more than one in MANY, the overlay of everything is. Larger numbers spend more time on
  * fewer inverted triangles. */
 enum { FEW = 3000, SOME = 1000, MANY = 100 };
-/* More inverted triangles than one in WOUND of the refined net: the overlay of everything is worth it at once. */
-enum { WOUND = 7 };
+/* More inverted triangles than one in TWISTED of the refined net: the overlay of everything is worth it at once. */
+enum { TWISTED = 7 };
 /* Shapes times triangles up to which a second start, from the overlay, is affordable. */
 enum { OVERLAY_MOST = 120000 };
 /* The same from which merges are tried less. */
 enum { QUICK_FROM = 120000 };
-/* The overlay is huge, and the map is wound, if it has more than HUGE_OVERLAY triangles and more than HUGE_GROWTH times
- * those of all shapes for each shape after the first. Well aligned shapes have four or five times theirs for each. */
+/* The overlay is huge, and the map is twisted, if it has more than HUGE_OVERLAY triangles and more than HUGE_GROWTH
+ * times those of all shapes for each shape after the first. Well aligned shapes have four or five times theirs for
+ * each. */
 enum { HUGE_OVERLAY = 600000, HUGE_GROWTH = 12 };
 /* Of the tolerance: guessed deviation up to which each shape is thinned out alone. Above the tolerance, because the
  * guess is a mean and splits bring back what is needed: from 0.5 to 1.5 the result has the same size, and the start
@@ -139,7 +140,7 @@ static int may_overlay(const orb_remesh_job *job) {
 
 /* Whether the refined net has so many inverted triangles that the first round would leave too many of them. */
 static int expects_many_inverted(orb_context *ctx, const orb_remesh_job *job, orb_placed_net *placed) {
-  return may_overlay(job) && orb_placed_count_inverted(ctx, placed) * WOUND > orb_placed_live(placed);
+  return may_overlay(job) && orb_placed_count_inverted(ctx, placed) * TWISTED > orb_placed_live(placed);
 }
 
 /* Where the first round leaves too many triangles inverted, repeats it from the overlay around them; or, unless it is
@@ -175,7 +176,7 @@ static orb_status reduce_inverted(orb_context *ctx, const orb_remesh_job *job, o
   return status == ORB_OK ? begin(ctx, placed, tolerance * tolerance) : status;
 }
 
-/* For a map that is wound: all steps, to a net within the tolerance. */
+/* For a map that is twisted: all steps, to a net within the tolerance. */
 static orb_status remesh_wound(orb_context *ctx, const orb_remesh_job *job, double tolerance, orb_placed_net *placed) {
   double limit2 = tolerance * tolerance;
   ORB_TRY(orb_adaptive_start_from_reduced(ctx, job, limit2, placed));

@@ -1,6 +1,6 @@
 /* Starts from the overlay of the shapes, for maps along which edge splits would creep without end.
  *
- * Where the map is wound, for example by landmarks that lie in another order on each shape, the overlay has a hundred
+ * Where the map is twisted, for example by landmarks that lie in another order on each shape, the overlay has a hundred
  * times the triangles of the shapes, most of them far smaller than the tolerance requires. Each shape is then first
  * reduced alone, within the tolerance, and the reduced shapes are overlaid: the number of crossings falls with the
  * number of edges of both. The result is linear on both reduced shapes, so few of its edges deviate from the original

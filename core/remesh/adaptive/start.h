@@ -14,7 +14,7 @@ ORB_MUST_CHECK orb_status orb_adaptive_start_from_thinned(orb_context *ctx, cons
 ORB_MUST_CHECK orb_status orb_adaptive_start_from_overlay(orb_context *ctx, const orb_remesh_job *job, double limit2,
                                                           orb_placed_net *placed);
 /* The same with the overlay of shapes that were first reduced one by one within the limit (relative, squared). It is
- * far smaller where the map is wound. Some edges and items may deviate by more than the limit. */
+ * far smaller where the map is twisted. Some edges and items may deviate by more than the limit. */
 ORB_MUST_CHECK orb_status orb_adaptive_start_from_reduced(orb_context *ctx, const orb_remesh_job *job, double limit2,
                                                           orb_placed_net *placed);
 

@@ -198,8 +198,11 @@ static void add_planes(const thinner *t) {
   }
 }
 
-orb_status orb_adaptive_thin(orb_context *ctx, orb_net *net, int32_t shapes, double *const *position,
-                             double *const *normal, const unsigned char *fixed, double limit2) {
+/* Thins a net on which `shapes` shapes are linear. position, normal: per shape, 3 a net vertex, the position divided by
+ * the shape's diagonal and the unit normal; fixed: per net vertex. The guess of how far the net deviates from the
+ * shapes stays within the limit (relative, squared); nothing is proved. */
+static orb_status thin(orb_context *ctx, orb_net *net, int32_t shapes, double *const *position, double *const *normal,
+                       const unsigned char *fixed, double limit2) {
   thinner t = {net,
                shapes,
                position,
@@ -270,7 +273,7 @@ orb_status orb_adaptive_thin_shape(orb_context *ctx, const orb_remesh_job *job, 
         orb_net_init(ctx, net, shape->points, n, shape->mesh.triangles, shape->mesh.triangle_count, job->twin[s], n);
   }
   if (status == ORB_OK) {
-    status = orb_adaptive_thin(ctx, net, 1, &position, &normal, fixed, limit2);
+    status = thin(ctx, net, 1, &position, &normal, fixed, limit2);
   }
   orb_free(ctx, position);
   orb_free(ctx, normal);
@@ -307,7 +310,7 @@ orb_status orb_adaptive_thin_overlay(orb_context *ctx, const orb_remesh_job *job
                           NULL, overlay->vertex_count);
   }
   if (status == ORB_OK) {
-    status = orb_adaptive_thin(ctx, net, shapes, position, normal, fixed, limit2);
+    status = thin(ctx, net, shapes, position, normal, fixed, limit2);
   }
   for (int32_t s = 0; s < shapes; s++) {
     if (position) {

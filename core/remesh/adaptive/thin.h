@@ -5,12 +5,6 @@
 #include "remesh/common/job.h"
 #include "sphere/net.h"
 
-/* Thins a net on which `shapes` shapes are linear. position, normal: per shape, 3 a net vertex, the position divided by
- * the shape's diagonal and the unit normal; fixed: per net vertex. The guess of how far the net deviates from the
- * shapes stays within the limit (relative, squared); nothing is proved. */
-ORB_MUST_CHECK orb_status orb_adaptive_thin(orb_context *ctx, orb_net *net, int32_t shapes, double *const *position,
-                                            double *const *normal, const unsigned char *fixed, double limit2);
-
 /* Makes `net` from shape s alone, thinned, with some vertices dead. Landmarks stay. */
 ORB_MUST_CHECK orb_status orb_adaptive_thin_shape(orb_context *ctx, const orb_remesh_job *job, int32_t s, double limit2,
                                                   orb_net *net);

@@ -11,8 +11,9 @@ static const double *shape_vertex(const orb_placed_net *placed, int32_t s, int32
   return placed->position[s] + 3 * (int64_t)placed->view[s].triangles[h];
 }
 
-double orb_placed_edge_on2(const orb_placed_net *placed, int32_t s, int32_t v, int32_t w, double limit2,
-                           orb_deviation *worst) {
+/* orb_placed_edge2() on shape s alone. */
+static double edge_on2(const orb_placed_net *placed, int32_t s, int32_t v, int32_t w, double limit2,
+                       orb_deviation *worst) {
   double greatest = 0;
   const double *a = orb_placed_position(placed, v, s), *b = orb_placed_position(placed, w, s);
   orb_spot from = placed->spot[(int64_t)v * placed->shape_count + s],
@@ -41,7 +42,7 @@ double orb_placed_edge_on2(const orb_placed_net *placed, int32_t s, int32_t v, i
 double orb_placed_edge2(const orb_placed_net *placed, int32_t v, int32_t w, double limit2, orb_deviation *worst) {
   double greatest = 0;
   for (int32_t s = 0; s < placed->shape_count && greatest <= limit2; s++) {
-    double distance2 = orb_placed_edge_on2(placed, s, v, w, limit2, worst);
+    double distance2 = edge_on2(placed, s, v, w, limit2, worst);
     greatest = distance2 > greatest ? distance2 : greatest;
   }
   return greatest;
@@ -98,7 +99,7 @@ static void bound_range(void *arg, int64_t begin, int64_t end, int thread) {
     }
     for (int k = 0; k < 3; k++) {
       for (int32_t s = 0; s < placed->shape_count && c[k] < c[(k + 1) % 3]; s++) {
-        greatest[s] = fmax(greatest[s], orb_placed_edge_on2(placed, s, c[k], c[(k + 1) % 3], INFINITY, NULL));
+        greatest[s] = fmax(greatest[s], edge_on2(placed, s, c[k], c[(k + 1) % 3], INFINITY, NULL));
       }
     }
   }

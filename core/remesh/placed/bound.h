@@ -24,11 +24,9 @@ typedef struct orb_deviation {
 } orb_deviation;
 static const orb_deviation ORB_NO_DEVIATION = {0, -1, -1, 0};
 
-/* The greatest matched distance along net edge v w, over all shapes or on shape s. Stops early once it exceeds limit2,
- * with a value above limit2. *worst (may be NULL) is updated where the edge deviates more than it says. */
+/* The greatest matched distance along net edge v w, over all shapes. Stops early once it exceeds limit2, with a value
+ * above limit2. *worst (may be NULL) is updated where the edge deviates more than it says. */
 double orb_placed_edge2(const orb_placed_net *placed, int32_t v, int32_t w, double limit2, orb_deviation *worst);
-double orb_placed_edge_on2(const orb_placed_net *placed, int32_t s, int32_t v, int32_t w, double limit2,
-                           orb_deviation *worst);
 
 /* The same on shape s where only the limit matters: at most limit2 if and only if the greatest distance is; then it
  * may be greater than that distance. Twice as fast. */
