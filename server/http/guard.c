@@ -51,7 +51,8 @@ static int check_length(request *r, const seen *s, api_problem *problem) {
     return r->has_body && r->route ? bad(problem, "This route takes no body.") : 1;
   }
   if (!s->lengths && !s->encodings) {
-    return api_refuse(problem, "length-required", "Send a Content-Length, or use chunked Transfer-Encoding.");
+    return api_refuse(problem, "length-required",
+                      "The request has neither Content-Length nor chunked Transfer-Encoding. Send one of them.");
   }
   int64_t most = kind == ROUTE_JSON_BODY || is_fetch(r) ? options->max_json : options->max_body;
   if (length > most) {
@@ -62,7 +63,8 @@ static int check_length(request *r, const seen *s, api_problem *problem) {
   }
   if (s->codings > 1 || coding_of(header_of(r, "Content-Encoding")) == CODING_UNKNOWN) {
     return api_refuse(problem, "unsupported-encoding",
-                      "Send the body uncompressed, or compressed once with gzip or zstd.");
+                      "Content-Encoding names another coding than gzip or zstd, or several. Send the body compressed "
+                      "once, or not at all.");
   }
   return 1;
 }

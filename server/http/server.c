@@ -33,7 +33,7 @@ static void answer_unrouted(request *r, const char *path, const char *allow) {
     reply_empty(r, 204);
     reply_header(r, "Allow", methods);
   } else {
-    reply_refuse(r, "method-not-allowed", "This path accepts: %s.", methods);
+    reply_refuse(r, "method-not-allowed", "This path does not accept the method of the request, only %s.", methods);
     reply_header(r, "Allow", methods);
   }
 }
