@@ -19,7 +19,7 @@ ORB_MUST_CHECK orb_status orb_surface_close_handles(orb_surface *surface, double
 
 /* Finds a loop for each handle, at most ORB_ERROR_ITEMS: closed, each vertex once, along edges of the file, and such
  * that a cut along it leaves the surface connected, which proves that it is not contractible. Cuts the surface, which
- * is then of no use but to be freed. */
+ * the caller can only free afterwards. */
 ORB_MUST_CHECK orb_status orb_surface_list_handles(orb_surface *surface, int64_t genus, orb_loops *out);
 
 #endif

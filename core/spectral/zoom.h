@@ -4,7 +4,10 @@
 
 #include "spectral/shape.h"
 
-enum { ORB_ZOOM_START = 6, ORB_ZOOM_LEVELS = 7 };
+enum {
+  ORB_ZOOM_START = 6, /* functions of the first matrix, the constant one included: the starts permute the others */
+  ORB_ZOOM_LEVELS = 7 /* level_size in zoom.c has the functions of each level */
+};
 
 /* A map between shapes a and b: a linear map of their functions, and where the samples go. */
 typedef struct orb_zoom {

@@ -13,8 +13,8 @@
 /* Matches (match.c). */
 
 enum {
-  ORB_FIND_COARSE = 1000, /* vertices of the copies that are registered: each trial costs a time that grows with the
-                             square of this */
+  ORB_FIND_COARSE = 1000, /* vertices of the copies that are registered, here and in suspects.c: each trial costs a time
+                             that grows with the square of this */
   ORB_FIND_FINE = 4000,   /* vertices of the finer copies on which the best match is settled */
   ORB_FIND_SPECTRAL = 4, /* spectral maps that are tried: of 40 pairs of posed people, the right one was among the first
                             two in 39 */

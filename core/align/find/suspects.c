@@ -12,6 +12,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/params.h"
 #include "align/map/engine/params.h"
 #include "align/sheet/copy.h"
 #include "base/check.h"
@@ -21,7 +22,7 @@
 #include "numeric/vec3.h"
 #include "orbmorph/locate.h"
 
-enum { COPY = 1000, LANDMARKS_LEAST = 4 };
+enum { LANDMARKS_LEAST = 4 }; /* of the alignment; fewer name no suspects */
 /* Least drift of a suspect, in both directions. Chosen on dog and giraffe of tests/samples alone: their true landmarks
  * drift by 0.04 at most in the direction in which they drift less; four, each moved by 0.15, drift by 0.12 or more. */
 static const double DRIFT_LEAST = 0.08;
@@ -56,7 +57,7 @@ static orb_status side_create(orb_context *ctx, const orb_mesh *mesh, const orb_
   for (int k = 0; k < 3; k++) {
     out->middle[k] = 0.5 * (extent.min[k] + extent.max[k]);
   }
-  ORB_TRY(orb_coarse_copy_create(ctx, mesh, COPY, &out->copy));
+  ORB_TRY(orb_coarse_copy_create(ctx, mesh, ORB_FIND_COARSE, &out->copy));
   out->to = ORB_NEW(ctx, int32_t, out->copy.mesh.vertex_count);
   for (int32_t v = 0; v < out->copy.mesh.vertex_count; v++) {
     double *x = out->copy.mesh.positions + 3 * (size_t)v;

@@ -14,7 +14,7 @@ typedef struct orb_map_walked {
   double energy; /* INFINITY: there is no map, or it is hopeless */
 } orb_map_walked;
 
-/* Walks, and optimises the levels up to the coarse one. Afterwards the run is as it was. `out` is to be freed in any
+/* Walks, and optimises the levels up to the coarse one. Afterwards the run is as it was. Free `out` in any
  * case. */
 ORB_MUST_CHECK orb_status orb_map_walked_create(orb_map_run *run, orb_map_walked *out);
 void orb_map_walked_free(orb_map_run *run, orb_map_walked *walked);

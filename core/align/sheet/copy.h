@@ -11,7 +11,7 @@ typedef struct orb_coarse_copy {
   int32_t *vertex; /* of each vertex of the copy, its number in the given mesh */
 } orb_coarse_copy;
 
-/* Decimates to `size` vertices, or few more. `out` is to be freed in any case. O(n log n). */
+/* Decimates to `size` vertices, or few more. Free `out` in any case. O(n log n). */
 ORB_MUST_CHECK orb_status orb_coarse_copy_create(orb_context *ctx, const orb_mesh *mesh, int32_t size,
                                                  orb_coarse_copy *out);
 void orb_coarse_copy_free(orb_context *ctx, orb_coarse_copy *copy);

@@ -25,8 +25,8 @@ ORB_API void orb_align_defaults(orb_align_options *options);
  *   would have to pass through one another, pin splits edges, and the landmarks meet at the first shape's points or at
  *   new ones. After pin and rbf the vertices of a landmark have bit-equal points on all shapes.
  * - auto: pin if there are landmarks. Otherwise the rotation search, and then a match of each later shape with the
- *   first: of spectral maps and rotations, the one that bends coarse copies of both shapes least. The composed map sends
- *   each vertex to where the match takes it. The preset fast does the rotation search only. `found` shows what was
+ *   first: of spectral maps and rotations, the one that bends coarse copies of both shapes least. The composed map
+ * sends each vertex to where the match takes it. The preset fast does the rotation search only. `found` shows what was
  *   matched.
  *
  * Landmarks at the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
