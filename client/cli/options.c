@@ -21,7 +21,7 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_REPORT] = {"report", 0, "FILE", NULL, "also write a report: Markdown if FILE ends in .md, else JSON"},
     [OPT_LANDMARKS] = {"landmarks", 'l', "FILE", NULL, "read landmarks from FILE, or find them with auto"},
     [OPT_ALIGN] = {"align", 0, "METHOD", "pin rbf rotate auto", "alignment method"},
-    [OPT_REMESH] = {"remesh", 0, "METHOD", "adaptive overlay subdivision convex-hull", "remeshing method"},
+    [OPT_REMESH] = {"remesh", 0, "METHOD", "adaptive overlay subdivision convex-hull template", "remeshing method"},
     [OPT_TOLERANCE] = {"tolerance", 't', "X", NULL,
                        "allowed error as a fraction of each shape's diagonal, such as 0.001 or 0.1%"},
     [OPT_MAX_TRIANGLES] = {"max-triangles", 'n', "N", NULL, "make at most N triangles"},

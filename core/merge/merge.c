@@ -66,11 +66,16 @@ static orb_status check_shapes(orb_context *ctx, const orb_align_shape *shapes, 
   return ORB_OK;
 }
 
-static orb_status write_asset(orb_context *ctx, int32_t shape_count, const char *const *names,
-                              const orb_merge_options *options, orb_merge_result *out) {
+static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, int32_t shape_count,
+                              const char *const *names, const orb_merge_options *options, orb_merge_result *out) {
   const orb_aligned_shape *shapes = out->alignment.shapes;
-  ORB_TRY(orb_asset_write_mapped(ctx, &out->supermesh, shapes, names, &options->asset, &out->asset_facts, &out->asset,
-                                 &out->asset_vertices));
+  if (options->remesh.method == ORB_REMESH_TEMPLATE) {
+    ORB_TRY(orb_asset_write_template(ctx, &out->supermesh, shapes, options->file ? options->file : given[0].mesh, names,
+                                     &options->asset, &out->asset_facts, &out->asset, &out->asset_vertices));
+  } else {
+    ORB_TRY(orb_asset_write_mapped(ctx, &out->supermesh, shapes, names, &options->asset, &out->asset_facts, &out->asset,
+                                   &out->asset_vertices));
+  }
   ORB_TRY(orb_asset_dropped(ctx, shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count));
   out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
   out->fits = ORB_NEW(ctx, orb_fit_report, shape_count);
@@ -107,7 +112,7 @@ orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes, co
   ORB_GO(status, transfer_reports(ctx, shapes, landmarks, out), fail);
   out->timings.transfer = (now = orb_clock()) - mark;
   mark = now;
-  ORB_GO(status, write_asset(ctx, shape_count, names, options, out), fail);
+  ORB_GO(status, write_asset(ctx, shapes, shape_count, names, options, out), fail);
   out->timings.write = (now = orb_clock()) - mark;
   out->timings.total = now - start;
   return ORB_OK;

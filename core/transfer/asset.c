@@ -14,6 +14,7 @@
 #include "transfer/path.h"
 #include "transfer/split.h"
 #include "transfer/tangent.h"
+#include "transfer/template.h"
 #include "transfer/texcoord.h"
 
 void orb_asset_defaults(orb_asset_options *options) {
@@ -235,6 +236,58 @@ orb_status orb_asset_write_mapped(orb_context *ctx, const orb_supermesh *superme
   orb_progress(ctx, "write", 1);
 done:
   draft_free(ctx, &draft);
+  return status;
+}
+
+/* The supermesh vertex of each vertex of the asset; −1: it lies on no closed surface. */
+static orb_status list_template_vertices(orb_context *ctx, const orb_draft *draft, const orb_template *made,
+                                         int32_t **out) {
+  int64_t count = 0, corners = 3 * (int64_t)made->mesh.triangle_count;
+  for (int32_t p = 0; p < draft->part_count; p++) {
+    count += draft->parts[p].vertex_count;
+  }
+  int32_t *next = *out = ORB_NEW(ctx, int32_t, count);
+  for (int32_t p = 0; next && p < draft->part_count; p++) {
+    for (int32_t v = 0; v < draft->parts[p].vertex_count; v++) {
+      *next++ = made->on_supermesh[draft->parts[p].corners[v] - corners];
+    }
+  }
+  return *out ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+orb_status orb_asset_write_template(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
+                                    const orb_mesh *file, const char *const *names, const orb_asset_options *options,
+                                    orb_asset_facts *facts, orb_buffer *out, int32_t **vertices) {
+  ORB_TRY(check_options(ctx, supermesh, options));
+  orb_asset_facts unused;
+  orb_asset_options bare = *options; /* the attributes are the file's, not the supermesh's */
+  bare.normals = bare.colors = 0;
+  orb_draft draft = {.supermesh = supermesh,
+                     .shapes = shapes,
+                     .options = &bare,
+                     .shape_count = supermesh->shape_count,
+                     .frame_count = supermesh->shape_count};
+  orb_draft copy = {0};
+  orb_template made = {0};
+  orb_status status;
+  if (options->path == ORB_PATH_RIGID) {
+    draft.frame_count += options->path_steps * (supermesh->shape_count - 1);
+  }
+  orb_progress(ctx, "write", 0);
+  ORB_GO(status, allocate_frames(ctx, &draft), done);
+  ORB_GO(status, make_shapes(ctx, &draft), done);
+  ORB_GO(status, orb_draft_path(ctx, &draft), done);
+  draft.options = options;
+  ORB_GO(status, orb_template_draft(ctx, &draft, file, &made, &copy), done);
+  ORB_GO(status, orb_draft_write(ctx, &copy, names, facts ? facts : &unused, out), done);
+  if (vertices) {
+    ORB_GO(status, list_template_vertices(ctx, &copy, &made, vertices), done);
+  }
+  orb_progress(ctx, "write", 1);
+done:
+  draft_free(ctx, &copy);
+  draft_free(ctx, &draft);
+  orb_template_free(ctx, &made);
   return status;
 }
 

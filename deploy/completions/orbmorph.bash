@@ -7,7 +7,7 @@ _orbmorph() {
   fi
   case "$previous" in
     --align) choices="pin rbf rotate auto" ;;
-    --remesh) choices="adaptive overlay subdivision convex-hull" ;;
+    --remesh) choices="adaptive overlay subdivision convex-hull template" ;;
     --animation) choices="pingpong none" ;;
     --fit) choices="auto none rigid similarity" ;;
     --path) choices="linear rigid" ;;

@@ -63,7 +63,7 @@ static int32_t *copy_corners(orb_context *ctx, const orb_mesh *raw) {
 }
 
 int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh *mesh, file_triangle *noted,
-                  int32_t noted_count, int32_t **corners, api_problem *problem) {
+                  int32_t noted_count, int32_t **corners, orb_mesh *raw, api_problem *problem) {
   resource row = {0};
   api_mesh_summary summary;
   orb_repair_options repair;
@@ -87,6 +87,9 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
   if (status == ORB_OK) {
     note_triangles(mesh, noted, noted_count);
     if (corners && !(*corners = copy_corners(ctx, mesh))) {
+      return 0;
+    }
+    if (raw && orb_mesh_copy(ctx, mesh, raw) != ORB_OK) {
       return 0;
     }
     status = orb_mesh_repair_with(ctx, mesh, &repair);

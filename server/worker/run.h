@@ -61,9 +61,10 @@ typedef struct file_triangle {
 } file_triangle;
 
 /* Reads an uploaded mesh and repairs it in the same way as at upload. noted may be NULL. corners (may be NULL): the
- * vertices of each triangle of the file, 3 a triangle, numbered as in the file; memory of the context. */
+ * vertices of each triangle of the file, 3 a triangle, numbered as in the file; memory of the context. raw (may be
+ * NULL) receives a copy from before the repair. */
 int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh *mesh, file_triangle *noted,
-                  int32_t noted_count, int32_t **corners, api_problem *problem);
+                  int32_t noted_count, int32_t **corners, orb_mesh *raw, api_problem *problem);
 /* The points of a stored sphere, 3 numbers a vertex; memory of the context. */
 int run_load_points(const run_env *env, orb_context *ctx, const char *embedding, const orb_mesh *mesh, double **points,
                     api_problem *problem);

@@ -47,7 +47,7 @@ int run_embedding(const run_env *env, orb_context *ctx, const run_job *j, run_ou
   }
   progress_report(env->progress, "read", 0);
   double began = orb_clock();
-  if (!run_load_mesh(env, ctx, request.mesh, &mesh, NULL, 0, NULL, problem)) {
+  if (!run_load_mesh(env, ctx, request.mesh, &mesh, NULL, 0, NULL, NULL, problem)) {
     goto done;
   }
   orb_mesh_drop_attributes(ctx, &mesh);

@@ -25,7 +25,7 @@ PAPER = [  # Table 2: pair, vertices, alignment s, remeshing s, supermesh vertic
     ("Dolphin + Merman", "1.9k + 43.1k", 0.11, 173.86, 57568, 114728, 8)]
 PAIRS = ["cow-spot", "spot-koala_lr", "human_man-penguin", "human_man-human_woman", "shrec397-shrec393",
          "bumpy_cube-round_cube", "armadillo_29k-armadillo_86k", "koala_lr-koala_100k"]
-METHODS = ["adaptive", "overlay", "subdivision", "convex-hull"]
+METHODS = ["adaptive", "overlay", "subdivision", "convex-hull", "template"]
 FIVE = ["shrec393.off", "round_cube.obj", "airliner.obj", "shrec388.off", "stellated_15k.obj"]  # nearest to 10k vertices
 FIG19 = ["human_man-human_woman", "cow-spot"]
 

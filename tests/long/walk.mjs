@@ -65,7 +65,7 @@ async function jobs({ egg, bean, glb }) {
   }
   const at = (landmarks) => landmarks.map((v) => ({ at: [{ vertex: v }, { vertex: v }] }));
   const landmarks = { pin: at([0, 1, 2, 4]), rbf: at([0, 2, 3, 5]), rotate: at([0, 4]), auto: 'auto' };
-  const remeshes = ['adaptive', 'overlay', 'subdivision', 'convex-hull'];
+  const remeshes = ['adaptive', 'overlay', 'subdivision', 'convex-hull', 'template'];
   for (const [i, method] of Object.keys(landmarks).entries()) {
     step(`a supermesh: ${method}, ${remeshes[i]}`);
     made.push(

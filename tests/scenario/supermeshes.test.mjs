@@ -219,7 +219,7 @@ test('methods of alignment and of remeshing', async (t) => {
       assert.equal(result.problem.status, 422, `${method}: ${JSON.stringify(result.problem)}`);
     }
   }
-  for (const method of ['adaptive', 'overlay', 'subdivision', 'convex-hull']) {
+  for (const method of ['adaptive', 'overlay', 'subdivision', 'convex-hull', 'template']) {
     const result = await d.make('/v1/supermeshes', { shapes: pair, landmarks, remesh: { method } });
     if (result.resource) {
       built.push(method);
@@ -231,7 +231,7 @@ test('methods of alignment and of remeshing', async (t) => {
       assert.equal(result.problem.method, method);
     }
   }
-  assert.deepEqual(built, ['pin', 'rotate', 'rbf', 'adaptive', 'overlay', 'subdivision', 'convex-hull']);
+  assert.deepEqual(built, ['pin', 'rotate', 'rbf', 'adaptive', 'overlay', 'subdivision', 'convex-hull', 'template']);
 });
 
 test('tolerance and a triangle budget', async (t) => {

@@ -235,7 +235,7 @@ export type SupermeshRequest = {
   };
   remesh?: {
     /** Default: "adaptive". */
-    method?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull';
+    method?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull' | 'template';
     /** The largest deviation, relative to the diagonal of the bounding box. Default: 0.001. */
     tolerance?: number;
     /** The largest number of triangles; 0 sets no limit. It takes precedence over tolerance. Default: 0. */
@@ -289,7 +289,7 @@ export type CanonicalRequest = {
     };
   };
   remesh: {
-    method: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull';
+    method: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull' | 'template';
     /** The largest deviation, relative to the diagonal of the bounding box. */
     tolerance: number;
     /** The largest number of triangles; 0 sets no limit. It takes precedence over tolerance. */

@@ -108,7 +108,7 @@ export interface Recipe {
   landmarks?: string;
   align?: 'pin' | 'rbf' | 'rotate' | 'auto';
   preset?: 'fast' | 'default' | 'quality';
-  remesh?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull';
+  remesh?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull' | 'template';
   tolerance?: number;
   max_triangles?: number;
   fit?: 'auto' | 'none' | 'rigid' | 'similarity';

@@ -54,7 +54,7 @@ export interface Landmark {
 
 export interface Options {
   align: 'default' | 'pin' | 'rbf' | 'rotate' | 'auto';
-  remesh: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull';
+  remesh: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull' | 'template';
   tolerance: number;
   maxTriangles: number | null;
   path: 'linear' | 'rigid';

@@ -47,7 +47,7 @@ function decodeOptions(text: string): Options {
     (allowed as readonly string[]).includes(value) ? (value as T) : otherwise;
   return {
     ...DEFAULTS,
-    remesh: from(remesh, ['adaptive', 'overlay', 'subdivision', 'convex-hull'], DEFAULTS.remesh),
+    remesh: from(remesh, ['adaptive', 'overlay', 'subdivision', 'convex-hull', 'template'], DEFAULTS.remesh),
     tolerance: Number(tolerance) > 0 ? Number(tolerance) : DEFAULTS.tolerance,
     maxTriangles: Number(most) >= 4 ? Number(most) : null,
     path: from(path, ['linear', 'rigid'], DEFAULTS.path),

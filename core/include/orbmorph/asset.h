@@ -80,6 +80,17 @@ ORB_API ORB_MUST_CHECK orb_status orb_asset_write_mapped(orb_context *ctx, const
                                                          const orb_asset_options *options, orb_asset_facts *facts,
                                                          orb_buffer *out, int32_t **vertices);
 
+/* As orb_asset_write_mapped(), for a supermesh of ORB_REMESH_TEMPLATE: the vertices and triangles of the base are those
+ * of `file`, the first shape as orb_mesh_read() gave it, before repairs. Nothing is welded, nudged or left out; a
+ * vertex whose corners have several texture coordinates, normals or colours gets copies after the others. Triangles
+ * keep their order within their material, and there is a primitive for each material. Vertices of the file that are not
+ * on the closed surface stay where they are in every target; their entry in *vertices is −1. No tangents and no colours
+ * of later shapes are written. */
+ORB_API ORB_MUST_CHECK orb_status orb_asset_write_template(orb_context *ctx, const orb_supermesh *supermesh,
+                                                           const orb_aligned_shape *shapes, const orb_mesh *file,
+                                                           const char *const *names, const orb_asset_options *options,
+                                                           orb_asset_facts *facts, orb_buffer *out, int32_t **vertices);
+
 #ifdef __cplusplus
 }
 #endif

@@ -15,6 +15,8 @@ typedef struct orb_merge_options {
   orb_align_options align;
   orb_remesh_options remesh;
   orb_asset_options asset;
+  /* ORB_REMESH_TEMPLATE: the first shape as orb_mesh_read() gave it, before repairs; NULL: after repairs. */
+  const orb_mesh *file;
 } orb_merge_options;
 ORB_API void orb_merge_defaults(orb_merge_options *options);
 
@@ -77,7 +79,8 @@ typedef struct orb_merge_result {
   int32_t warning_count;
   orb_warning *warnings;
   orb_asset_facts asset_facts;
-  int32_t *asset_vertices; /* asset_facts.vertex_count: the supermesh vertex of each vertex of the asset */
+  int32_t *asset_vertices; /* asset_facts.vertex_count: the supermesh vertex of each vertex of the asset; −1: none,
+                              see orb_asset_write_template() */
   double *transforms;      /* shape_count × 16, see orb_asset_transforms() */
   orb_fit_report *fits;    /* shape_count */
   int32_t dropped_count;

@@ -10,6 +10,7 @@
   METHOD(ADAPTIVE, adaptive, "adaptive", ORB_REMESH_HEEDS_TOLERANCE | ORB_REMESH_HEEDS_MAX_TRIANGLES) \
   METHOD(OVERLAY, overlay, "overlay", 0)                                                              \
   METHOD(SUBDIVISION, subdivision, "subdivision", 0)                                                  \
-  METHOD(CONVEX_HULL, convex_hull, "convex-hull", ORB_REMESH_HEEDS_MAX_TRIANGLES)
+  METHOD(CONVEX_HULL, convex_hull, "convex-hull", ORB_REMESH_HEEDS_MAX_TRIANGLES)                     \
+  METHOD(TEMPLATE, template, "template", 0)
 
 #endif

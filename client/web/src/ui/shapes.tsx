@@ -195,6 +195,7 @@ export function OptionsFold() {
           onChange={(event) => change({ remesh: event.currentTarget.value as Options['remesh'] })}
         >
           <option value="adaptive">Adaptive: as few triangles as needed</option>
+          <option value="template">Template: keep my first mesh as it is</option>
           <option value="overlay">Overlay: exact, many triangles</option>
           <option value="subdivision">Subdivision</option>
           <option value="convex-hull">Convex hull</option>

@@ -1,0 +1,318 @@
+#include "transfer/template.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "base/context.h"
+#include "base/error.h"
+#include "base/memory.h"
+#include "mesh/normals.h"
+#include "numeric/vec3.h"
+
+enum { CHECK_EVERY = 65536 }; /* corners between two checks for cancellation */
+/* 1 + the cosine of an angle so near to 180° that the axis of the shortest rotation is rounding only. */
+static const double OPPOSITE = 1e-9;
+
+/* What a corner of the file has besides its vertex; a vertex whose corners differ gets copies. */
+typedef struct corner_value {
+  float normal[3], texcoord[2], color[4];
+} corner_value;
+
+/* A vertex of the asset: first those of the file, then the copies. */
+typedef struct made_vertex {
+  corner_value value;
+  int32_t of, next; /* the vertex of the file; its next copy, −1: none, −2: it has no value yet */
+} made_vertex;
+
+typedef struct maker {
+  orb_context *ctx;
+  const orb_draft *draft;
+  const orb_mesh *file;
+  made_vertex *all;
+  int32_t count, capacity;
+} maker;
+
+void orb_template_free(orb_context *ctx, orb_template *made) {
+  orb_free(ctx, made->mesh.triangles);
+  orb_free(ctx, made->on_supermesh);
+}
+
+static corner_value value_of(const orb_mesh *file, int64_t h) {
+  corner_value value = {0};
+  if (file->normals) {
+    memcpy(value.normal, file->normals + 3 * h, sizeof value.normal);
+  }
+  if (file->texcoords) {
+    memcpy(value.texcoord, file->texcoords + 2 * h, sizeof value.texcoord);
+  }
+  if (file->colors) {
+    memcpy(value.color, file->colors + 4 * h, sizeof value.color);
+  }
+  return value;
+}
+
+/* The vertex made for a corner: the one with its values, or a new copy. −1 if out of memory. */
+static int32_t vertex_for(maker *m, int32_t v, const corner_value *value) {
+  if (m->all[v].next == -2) {
+    m->all[v].value = *value;
+    m->all[v].next = -1;
+    return v;
+  }
+  int32_t at = v;
+  for (;; at = m->all[at].next) {
+    if (memcmp(&m->all[at].value, value, sizeof *value) == 0) {
+      return at;
+    }
+    if (m->all[at].next < 0) {
+      break;
+    }
+  }
+  if (m->count == m->capacity) {
+    int32_t more = m->capacity + m->capacity / 4 + 64;
+    made_vertex *all = orb_realloc(m->ctx, m->all, (size_t)more, sizeof *all);
+    if (!all) {
+      return -1;
+    }
+    m->all = all;
+    m->capacity = more;
+  }
+  m->all[at].next = m->count;
+  m->all[m->count] = (made_vertex){*value, v, -1};
+  return m->count++;
+}
+
+/* Fills the triangles of `made`. After them come the vertices by number, so that 3 · triangles + v is a corner of v. */
+static orb_status make_vertices(maker *m, orb_template *made) {
+  int64_t corners = 3 * (int64_t)m->file->triangle_count;
+  m->count = m->file->vertex_count;
+  m->capacity = m->count + m->count / 8 + 64;
+  m->all = ORB_NEW0(m->ctx, made_vertex, m->capacity);
+  int32_t *triangles = ORB_NEW(m->ctx, int32_t, corners);
+  orb_status status = m->all && triangles ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int32_t v = 0; status == ORB_OK && v < m->count; v++) {
+    m->all[v].of = v;
+    m->all[v].next = -2;
+  }
+  for (int64_t h = 0; status == ORB_OK && h < corners; h++) {
+    corner_value value = value_of(m->file, h);
+    triangles[h] = vertex_for(m, m->file->triangles[h], &value);
+    status = triangles[h] < 0 ? ORB_E_NO_MEMORY : h % CHECK_EVERY == 0 ? orb_context_check(m->ctx) : ORB_OK;
+  }
+  if (status == ORB_OK && corners + m->count > INT32_MAX) {
+    status = orb_fail(m->ctx, ORB_E_TOO_LARGE, "The first shape has too many triangles for the method 'template'.");
+  }
+  if (status == ORB_OK) {
+    made->mesh.triangles = ORB_NEW(m->ctx, int32_t, corners + m->count);
+    made->on_supermesh = ORB_NEW(m->ctx, int32_t, m->count);
+    status = made->mesh.triangles && made->on_supermesh ? ORB_OK : ORB_E_NO_MEMORY;
+  }
+  if (status == ORB_OK) {
+    memcpy(made->mesh.triangles, triangles, (size_t)corners * sizeof *triangles);
+    for (int32_t v = 0; v < m->count; v++) {
+      made->mesh.triangles[corners + v] = v;
+    }
+    made->mesh.vertex_count = m->count;
+    made->mesh.triangle_count = m->file->triangle_count;
+    made->mesh.shape_count = m->draft->shape_count;
+  }
+  orb_free(m->ctx, triangles);
+  return status;
+}
+
+/* The supermesh of the method has the vertices of the repaired mesh, in their order. */
+static void find_on_supermesh(const maker *m, orb_template *made) {
+  const orb_mesh *repaired = &m->draft->shapes[0].mesh;
+  for (int32_t v = 0; v < m->count; v++) {
+    int32_t number = m->file->source[m->all[v].of];
+    int32_t at = number >= 0 && number < repaired->file_vertex_count ? repaired->vertex_of_source[number] : -1;
+    made->on_supermesh[v] = at < m->draft->supermesh->vertex_count ? at : -1;
+  }
+}
+
+/* Positions as float32: the base is the file's, exactly where that has float32; the others are differences to it. A
+ * vertex that a repair has moved onto another keeps its distance to that. */
+static orb_status make_positions(const maker *m, const orb_template *made, orb_draft *out) {
+  const orb_draft *draft = m->draft;
+  out->base = ORB_NEW(m->ctx, float, 3 * (int64_t)m->count);
+  out->deltas = ORB_NEW0(m->ctx, float *, draft->frame_count);
+  if (!out->base || !out->deltas) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int64_t i = 0; i < 3 * (int64_t)m->count; i++) {
+    out->base[i] = (float)m->file->positions[3 * (int64_t)m->all[i / 3].of + i % 3];
+  }
+  for (int32_t f = 1; f < draft->frame_count; f++) {
+    float *deltas = out->deltas[f - 1] = ORB_NEW0(m->ctx, float, 3 * (int64_t)m->count);
+    if (!deltas) {
+      return ORB_E_NO_MEMORY;
+    }
+    for (int64_t i = 0; i < 3 * (int64_t)m->count; i++) {
+      int64_t at = made->on_supermesh[i / 3];
+      if (at >= 0) {
+        double rounded = (double)out->base[i] - m->file->positions[3 * (int64_t)m->all[i / 3].of + i % 3];
+        deltas[i] = (float)(draft->positions[f][3 * at + i % 3] - draft->positions[0][3 * at + i % 3] - rounded);
+      }
+    }
+  }
+  return ORB_OK;
+}
+
+/* Rotates `normal` as the shortest rotation from `before` to `after` does (Rodrigues' formula); unit vectors. */
+static void rotate_along(const double before[3], const double after[3], const float normal[3], float out[3]) {
+  double axis[3], n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]}, across[3];
+  double cosine = orb_dot(before, after);
+  orb_cross(before, after, axis);
+  orb_cross(axis, n, across);
+  double along = orb_dot(axis, n) / fmax(1 + cosine, OPPOSITE);
+  for (int k = 0; k < 3; k++) {
+    n[k] = cosine * n[k] + across[k] + along * axis[k];
+  }
+  orb_normalize(n);
+  for (int k = 0; k < 3; k++) {
+    out[k] = (float)n[k];
+  }
+}
+
+static orb_status make_normals(const maker *m, const orb_template *made, orb_draft *out) {
+  const orb_draft *draft = m->draft;
+  const orb_supermesh *mesh = draft->supermesh;
+  double *first = ORB_NEW(m->ctx, double, 3 * (int64_t)mesh->vertex_count);
+  double *other = ORB_NEW(m->ctx, double, 3 * (int64_t)mesh->vertex_count);
+  out->normals = ORB_NEW0(m->ctx, orb_wedges, draft->frame_count);
+  orb_status status = first && other && out->normals ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int32_t f = 0; status == ORB_OK && f < draft->frame_count; f++) {
+    orb_wedges *normals = &out->normals[f];
+    *normals = (orb_wedges){.width = 3, .value_count = m->count};
+    normals->values = ORB_NEW0(m->ctx, float, 3 * (int64_t)m->count);
+    status = normals->values ? orb_smooth_normals(m->ctx, draft->positions[f], mesh->vertex_count, mesh->triangles,
+                                                  mesh->triangle_count, f ? other : first)
+                             : ORB_E_NO_MEMORY;
+    for (int32_t v = 0; status == ORB_OK && v < m->count; v++) {
+      float *to = normals->values + 3 * (int64_t)v;
+      int64_t at = made->on_supermesh[v];
+      const float *before = f ? out->normals[0].values + 3 * (int64_t)v : m->all[v].value.normal;
+      memcpy(to, before, 3 * sizeof *to);
+      if (f == 0 && !m->file->normals && at >= 0) {
+        for (int k = 0; k < 3; k++) {
+          to[k] = (float)first[3 * at + k];
+        }
+      } else if (f > 0 && at >= 0 && orb_dot(other + 3 * at, other + 3 * at) > 0) {
+        rotate_along(first + 3 * at, other + 3 * at, before, to);
+      }
+      if (f == 0 && to[0] == 0 && to[1] == 0 && to[2] == 0) {
+        to[2] = 1; /* a normal must have unit length; no triangle shows this one */
+      }
+    }
+  }
+  orb_free(m->ctx, first);
+  orb_free(m->ctx, other);
+  return status;
+}
+
+/* One value of `width` floats a vertex made. */
+static orb_status make_attribute(const maker *m, int32_t width, size_t offset, orb_wedges *out) {
+  *out = (orb_wedges){.width = width, .value_count = m->count};
+  out->values = ORB_NEW(m->ctx, float, (int64_t)width * m->count);
+  for (int32_t v = 0; out->values && v < m->count; v++) {
+    memcpy(out->values + (int64_t)width * v, (const char *)&m->all[v].value + offset, (size_t)width * sizeof(float));
+  }
+  return out->values ? ORB_OK : ORB_E_NO_MEMORY;
+}
+
+static orb_status make_attributes(const maker *m, orb_draft *out) {
+  if (m->file->texcoords) {
+    ORB_TRY(make_attribute(m, 2, offsetof(corner_value, texcoord), &out->texcoords));
+  }
+  if (m->file->colors) {
+    out->colors = ORB_NEW0(m->ctx, orb_wedges, m->draft->frame_count);
+    if (!out->colors) {
+      return ORB_E_NO_MEMORY;
+    }
+    out->color_count = 1;
+    ORB_TRY(make_attribute(m, 4, offsetof(corner_value, color), &out->colors[0]));
+  }
+  return ORB_OK;
+}
+
+static int32_t material_of(const maker *m, int32_t t) {
+  int32_t count = m->draft->shapes[0].mesh.material_count, material = m->file->material ? m->file->material[t] : 0;
+  return material >= 0 && material < count ? material : 0;
+}
+
+/* Fills a part: its triangles, and the vertices that they use (all of them if it is the only part), in their order. */
+static orb_status fill_part(const maker *m, const orb_template *made, int is_only, int32_t *number,
+                            orb_draft_part *part) {
+  int64_t corners = 3 * (int64_t)made->mesh.triangle_count, next = 0;
+  memset(number, is_only ? 0 : -1, (size_t)m->count * sizeof *number);
+  for (int64_t h = 0; h < corners; h++) {
+    if (material_of(m, (int32_t)(h / 3)) == part->material) {
+      number[made->mesh.triangles[h]] = 0;
+      next++;
+    }
+  }
+  for (int32_t v = 0; v < m->count; v++) {
+    number[v] = number[v] == 0 ? part->vertex_count++ : -1;
+  }
+  part->triangle_count = (int32_t)(next / 3);
+  part->indices = ORB_NEW(m->ctx, uint32_t, next);
+  part->corners = ORB_NEW(m->ctx, int32_t, part->vertex_count);
+  if (!part->indices || !part->corners) {
+    return ORB_E_NO_MEMORY;
+  }
+  for (int32_t v = 0; v < m->count; v++) {
+    if (number[v] >= 0) {
+      part->corners[number[v]] = (int32_t)(corners + v);
+    }
+  }
+  next = 0;
+  for (int64_t h = 0; h < corners; h++) {
+    if (material_of(m, (int32_t)(h / 3)) == part->material) {
+      part->indices[next++] = (uint32_t)number[made->mesh.triangles[h]];
+    }
+  }
+  return orb_context_check(m->ctx);
+}
+
+static orb_status make_parts(const maker *m, const orb_template *made, orb_draft *out) {
+  int32_t materials = m->draft->shapes[0].mesh.material_count > 0 ? m->draft->shapes[0].mesh.material_count : 1;
+  int32_t *used = ORB_NEW0(m->ctx, int32_t, materials), *number = ORB_NEW(m->ctx, int32_t, m->count), kinds = 0;
+  out->parts = ORB_NEW0(m->ctx, orb_draft_part, materials);
+  orb_status status = used && number && out->parts ? ORB_OK : ORB_E_NO_MEMORY;
+  for (int32_t t = 0; status == ORB_OK && t < made->mesh.triangle_count; t++) {
+    kinds += used[material_of(m, t)]++ == 0;
+  }
+  for (int32_t k = 0; status == ORB_OK && k < materials; k++) {
+    if (used[k] > 0) {
+      out->parts[out->part_count].material = k;
+      status = fill_part(m, made, kinds == 1, number, &out->parts[out->part_count++]);
+    }
+  }
+  orb_free(m->ctx, used);
+  orb_free(m->ctx, number);
+  return status;
+}
+
+orb_status orb_template_draft(orb_context *ctx, const orb_draft *draft, const orb_mesh *file, orb_template *made,
+                              orb_draft *out) {
+  maker m = {.ctx = ctx, .draft = draft, .file = file};
+  orb_status status = make_vertices(&m, made);
+  *out = (orb_draft){.supermesh = &made->mesh,
+                     .shapes = draft->shapes,
+                     .options = draft->options,
+                     .shape_count = draft->shape_count,
+                     .frame_count = draft->frame_count};
+  if (status == ORB_OK) {
+    find_on_supermesh(&m, made);
+    ORB_GO(status, make_positions(&m, made, out), done);
+    if (draft->options->normals) {
+      ORB_GO(status, make_normals(&m, made, out), done);
+    }
+    ORB_GO(status, make_attributes(&m, out), done);
+    ORB_GO(status, make_parts(&m, made, out), done);
+  }
+done:
+  orb_free(ctx, m.all);
+  return status;
+}

@@ -1,0 +1,110 @@
+// The remesh method "template": the first shape's own vertices and triangles carry the morph.
+import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import path from 'node:path';
+import test from 'node:test';
+import { daemon, samples } from './support/daemon.mjs';
+import { farthest } from './support/distance.mjs';
+import { morphOf, parseGlb } from './support/glb.mjs';
+import { writeGlb } from './support/glb_write.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const remesh = { method: 'template' };
+
+const diagonalOf = (points) =>
+  Math.hypot(...[0, 1, 2].map((k) => Math.max(...points.map((p) => p[k])) - Math.min(...points.map((p) => p[k]))));
+
+/** The points of frame s of a morph. */
+const pointsOf = (morph, s) =>
+  Array.from({ length: morph.count }, (_, v) => [0, 1, 2].map((k) => morph.shapes[s][3 * v + k]));
+
+/** That the base is `source` bit for bit, as float32, and that each vertex of target s lies on `targets[s - 1]`. */
+function assertKept(morph, source, targets) {
+  assert.deepEqual(morph.shapes[0].slice(0, 3 * source.positions.length), source.positions.flat().map(Math.fround));
+  assert.deepEqual(morph.triangles, source.triangles.flat());
+  for (const [s, target] of targets.entries()) {
+    const off = farthest(pointsOf(morph, s + 1), target.positions.flat(), target.triangles.flat());
+    assert.ok(off <= 1e-6 * diagonalOf(target.positions), `target ${s}: ${off}`);
+  }
+}
+
+/** The largest distance of the vertices and edge midpoints of `target` from frame s of the morph. */
+function distanceBack(morph, s, target) {
+  const { positions, triangles } = target;
+  const middles = triangles.flatMap((t) =>
+    [0, 1, 2].map((k) => [0, 1, 2].map((i) => (positions[t[k]][i] + positions[t[(k + 1) % 3]][i]) / 2)),
+  );
+  return farthest([...positions, ...middles], morph.shapes[s], morph.triangles);
+}
+
+test('the mesh of the first shape stays, and the others lie on their surfaces', async (t) => {
+  const d = await daemon(t);
+  const files = ['dog.obj', 'giraffe.off', 'elephant.ply'];
+  const sources = await Promise.all(
+    files.map(async (f) => shapes.parse(await readFile(path.join(samples, f), 'utf8'))),
+  );
+  const meshes = [];
+  for (const file of files) meshes.push({ mesh: (await d.mesh(path.join(samples, file))).id });
+  const { landmarks } = JSON.parse(await readFile(path.join(samples, 'dog-giraffe-elephant.json'), 'utf8'));
+  const made = await d.made('/v1/supermeshes', { shapes: meshes, landmarks, remesh, asset: { fit: 'none' } });
+  assert.equal(made.vertices, sources[0].positions.length);
+  assert.equal(made.triangles, sources[0].triangles.length);
+  assert.equal(made.certificate.landmarks_exact, true);
+  const morph = morphOf((await d.get(made.asset)).bytes);
+  assert.equal(morph.count, made.vertices);
+  assertKept(morph, sources[0], sources.slice(1));
+  assert.equal(made.shapes[0].hausdorff_relative, 0);
+  for (const s of [1, 2]) {
+    const { hausdorff_relative, hausdorff_proved, diagonal } = made.shapes[s];
+    assert.equal(hausdorff_proved, true);
+    const measured = distanceBack(morph, s, sources[s]) / diagonal;
+    assert.ok(measured > 0.001, 'the shapes differ by more than the tolerance');
+    assert.ok(measured <= hausdorff_relative + 1e-6, `shape ${s}: ${measured}, stated ${hausdorff_relative}`);
+  }
+  for (const { inverted_fraction } of made.pairs) assert.ok(inverted_fraction >= 0 && inverted_fraction < 0.05);
+});
+
+test('vertices in their order, a vertex that a seam repeats, and one that no triangle uses', async (t) => {
+  const d = await daemon(t);
+  const base = shapes.egg(2);
+  const target = shapes.bean(2);
+  // A seam as exporters write it: the vertices of every third triangle again, with other texture coordinates.
+  const positions = base.positions.map((p) => p.map(Math.fround));
+  const uv = positions.map((p) => [Math.fround(p[0] / 4 + 0.5), Math.fround(p[1] / 4 + 0.5)]);
+  const normals = positions.map((p) => p.map((x) => Math.fround(x / Math.hypot(...p))));
+  positions.push([9, 9, 9]);
+  uv.push([0, 0]);
+  normals.push([0, 0, 1]);
+  const triangles = base.triangles.map((corners, i) =>
+    i % 3 > 0
+      ? corners
+      : corners.map((v) => {
+          uv.push([uv[v][0] / 2, uv[v][1]]);
+          normals.push(normals[v]);
+          return positions.push(positions[v]) - 1;
+        }),
+  );
+  const glb = writeGlb({ positions, normals, uv, triangles });
+  const first = (await d.upload(glb, { name: 'egg' })).json;
+  const second = (await d.upload(shapes.obj(target), { name: 'bean' })).json;
+  const made = await d.made('/v1/supermeshes', {
+    shapes: [{ mesh: first.id }, { mesh: second.id }],
+    landmarks: 'auto',
+    remesh,
+    asset: { fit: 'none' },
+  });
+  assert.equal(made.vertices, base.positions.length, 'the surface itself is welded');
+  const { bytes } = await d.get(made.asset);
+  const morph = morphOf(bytes);
+  const asset = parseGlb(bytes);
+  const [primitive] = asset.gltf.meshes[0].primitives;
+  assert.equal(morph.count, positions.length);
+  assert.deepEqual(morph.triangles, triangles.flat());
+  for (const [name, values] of Object.entries({ POSITION: positions, NORMAL: normals, TEXCOORD_0: uv }))
+    assert.deepEqual([...asset.read(primitive.attributes[name])], values.flat(), name);
+  const lone = base.positions.length;
+  assert.deepEqual([...asset.read(primitive.targets[0].POSITION)].slice(3 * lone, 3 * lone + 3), [0, 0, 0]);
+  const on = pointsOf(morph, 1).filter((_, v) => v !== lone);
+  const off = farthest(on, target.positions.flat(), target.triangles.flat());
+  assert.ok(off <= 1e-6 * diagonalOf(target.positions), `${off}`);
+});
