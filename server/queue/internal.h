@@ -9,8 +9,10 @@
 #include "queue/queue.h"
 
 enum { BUCKETS = 8192, KEEP_ENDED = 512, EVENTS_KEPT = 64, OWNERS = 1100, DEPENDENCIES = 16 };
+enum { GUEST_MEMORY = 8 };                    /* guests may need this fraction (1/8) of options.memory, beside it */
 static const int64_t LARGE = 300000;          /* a job with more triangles than this is large */
 static const int64_t BYTES_A_TRIANGLE = 1024; /* estimate of a running job's memory */
+static const int64_t TRIANGLES_A_MS = 100;    /* estimate of a worker's speed, charged until the time is known */
 static const int64_t EVENT_STRIDE = 1000000;  /* event numbers of an attempt start above attempt times this */
 
 typedef struct job_event {
@@ -33,6 +35,9 @@ struct job {
   char dependencies[DEPENDENCIES][API_ID_SIZE];
   int dependency_count;
   char *dependency_problem;
+  int64_t taken_at; /* by a worker, orb_clock_ms(); 0: by none */
+  int64_t charged;  /* milliseconds that its owner is charged for it since taken_at */
+  int is_guest;     /* see queue.h */
   int64_t retry_at; /* not chosen before this time, orb_clock_ms() */
   orb_context *ctx;
   int64_t last_event, last_event_ms;
@@ -56,12 +61,16 @@ struct queue {
   job *oldest_ended, *newest_ended;
   int ended_count, unfinished;
   int running, running_large, fetching, exclusive; /* fetching: of those that run */
-  int64_t running_cost;
+  int64_t running_cost;                            /* without guests */
+  int guests;                                      /* of those that run */
+  int64_t guest_cost;
   int stopping, waking;
   struct {
     char name[64];
-    double service; /* work done for this owner: triangles, plus 1000 a job */
-    int unfinished, fetching;
+    int64_t service;       /* milliseconds of workers, for running jobs at least the estimate */
+    int unfinished;        /* jobs */
+    int fetching, running; /* jobs that a worker has; running: without those that fetch */
+    int runnable;          /* a job of this owner can run; set by choose() */
   } owners[OWNERS];
   int owner_count;
   waiter *waiters;
@@ -80,6 +89,7 @@ static inline int is_for(const job *j, const char *key, const char *owner) {
 }
 void owner_enter(queue *q, job *j); /* sets j->owner */
 void owner_leave(queue *q, const job *j);
+void schedule_charge(queue *q);        /* brings the service of all owners up to date; O(unfinished jobs) */
 void schedule_leave(queue *q, job *j); /* undoes what queue_take() counted */
 void table_add(queue *q, job *j);
 void table_drop_key(queue *q, job *j); /* removes an ended job from the unfinished ones */

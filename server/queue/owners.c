@@ -1,4 +1,4 @@
-/* The work done for each owner so far, for fairness between owners. */
+/* The worker time that each owner has used, for fairness between owners. */
 #include <string.h>
 
 #include "queue/internal.h"
@@ -31,7 +31,8 @@ void owner_enter(queue *q, job *j) {
   if (q->owners[j->owner].unfinished++ > 0) {
     return;
   }
-  double least = -1, *mine = &q->owners[j->owner].service;
+  schedule_charge(q);
+  int64_t least = -1, *mine = &q->owners[j->owner].service;
   for (int i = 0; i < q->owner_count; i++) {
     if (i != j->owner && q->owners[i].unfinished > 0 && (least < 0 || q->owners[i].service < least)) {
       least = q->owners[i].service;

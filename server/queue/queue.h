@@ -26,10 +26,14 @@
  * Waiters are suspended connections. They are listed and woken under the lock; `wake` must not call into the queue.
  * Every waiter is woken at its deadline at the latest.
  *
- * Fairness. Among runnable jobs the highest class goes first, then the owner with the least work so far (an owner who
- * returns after a pause starts level with the least served of the others), then that owner's most urgent job, then the
- * oldest. Large jobs never occupy all workers: one stays free for small jobs. A suspect (a job that was running when
- * the process died) runs alone.
+ * Fairness. Among runnable jobs the highest class goes first, then owners that run fewer jobs than their share of the
+ * workers, then the owner with the least worker time so far (an owner who returns after a pause starts level with the
+ * least served of the others), then that owner's most urgent job, then the oldest. A running job is charged the time
+ * that it has taken, or an estimate where that is more; when it leaves its worker, the measured time replaces both.
+ * Guests: if all workers are busy or their memory is in use, a small job of an owner that runs nothing runs beside
+ * them, on one thread. At most QUEUE_GUESTS_MAX guests run at once, within the memory of GUEST_MEMORY. Large jobs never
+ * occupy all workers: one stays free for small jobs. A suspect (a job that was running when the process died) runs
+ * alone.
  */
 #ifndef ORB_QUEUE_H
 #define ORB_QUEUE_H
@@ -138,8 +142,10 @@ int queue_needs_mesh(queue *q, const char *mesh, const char *owner);
 
 /* For the workers. A worker takes a job, then ends it with queue_finish(), or returns it with queue_wait_for(),
  * queue_put_off() or queue_give_back(). Each of these releases the worker's reference. */
-/* Which jobs a worker takes: those that compute, only the small ones of them, or those that fetch. */
-typedef enum queue_lane { QUEUE_COMPUTES, QUEUE_COMPUTES_SMALL, QUEUE_FETCHES } queue_lane;
+/* Which jobs a worker takes: those that compute, only guests and, with one worker, small jobs beside a large one, or
+ * those that fetch. */
+typedef enum queue_lane { QUEUE_COMPUTES, QUEUE_GUESTS, QUEUE_FETCHES } queue_lane;
+enum { QUEUE_GUESTS_MAX = 4 };
 /* Waits for a job; 0 when the queue stops. *threads: the job's share of the cores. At most QUEUE_FETCHES_OF_OWNER jobs
  * of an owner fetch at once. */
 enum { QUEUE_FETCHES_OF_OWNER = 4 };

@@ -3,14 +3,38 @@
 #include "faults.h"
 #include "queue/internal.h"
 
-/* Whether job a goes before job b; b is the older one. */
-static int goes_before(const queue *q, const job *a, const job *b) {
+static int fetches(const job *j) {
+  return j->row.kind == API_JOB_FETCH;
+}
+
+/* How long a worker has had the job. */
+static int64_t used_ms(const job *j, int64_t now) {
+  return now > j->taken_at ? now - j->taken_at : 0;
+}
+
+static void charge(queue *q, job *j, int64_t ms) {
+  q->owners[j->owner].service += ms - j->charged;
+  j->charged = ms;
+}
+
+void schedule_charge(queue *q) {
+  int64_t now = orb_clock_ms();
+  for (job *j = q->first; j && q->running > 0; j = j->next) {
+    if (j->taken_at && !fetches(j) && used_ms(j, now) > j->charged) {
+      charge(q, j, used_ms(j, now));
+    }
+  }
+}
+
+/* Whether job a goes before job b; b is the older one. share: the workers that an owner may have while others wait. */
+static int goes_before(const queue *q, const job *a, const job *b, int share) {
   int class_a = a->row.priority / QUEUE_URGENCIES, class_b = b->row.priority / QUEUE_URGENCIES;
   if (class_a != class_b) {
     return class_a > class_b;
   }
   if (a->owner != b->owner) {
-    return q->owners[a->owner].service < q->owners[b->owner].service;
+    int over_a = q->owners[a->owner].running >= share, over_b = q->owners[b->owner].running >= share;
+    return over_a != over_b ? over_b : q->owners[a->owner].service < q->owners[b->owner].service;
   }
   return a->row.priority > b->row.priority;
 }
@@ -19,18 +43,48 @@ static int runnable(const queue *q, const job *j, int64_t now) {
   return j->committed && !j->taken && j->waits_for == 0 && j->retry_at <= now && !table_key_taken(q, j);
 }
 
-static int fetches(const job *j) {
-  return j->row.kind == API_JOB_FETCH;
+/* The workers that each owner may have while others wait: an equal part, rounded up. */
+static int share_of_owner(queue *q, int64_t now) {
+  int active = 0;
+  for (int i = 0; i < q->owner_count; i++) {
+    q->owners[i].runnable = 0;
+  }
+  for (const job *j = q->first; j; j = j->next) {
+    q->owners[j->owner].runnable |= !fetches(j) && runnable(q, j, now);
+  }
+  for (int i = 0; i < q->owner_count; i++) {
+    active += q->owners[i].runnable || q->owners[i].running > 0;
+  }
+  return active > 1 ? (q->options.workers + active - 1) / active : q->options.workers;
+}
+
+/* Whether a worker of this lane may take a runnable job that computes. */
+static int admits(const queue *q, queue_lane lane, const job *j) {
+  int workers = q->options.workers, most_large = workers > 1 ? workers - 1 : 1;
+  int computing = q->running - q->fetching - q->guests, large = j->row.cost > LARGE;
+  int has_memory = q->running == 0 || (q->running_cost + j->row.cost) * BYTES_A_TRIANGLE <= q->options.memory;
+  if (lane == QUEUE_COMPUTES) {
+    return has_memory && !(large && q->running_large >= most_large);
+  }
+  if (large) {
+    return 0;
+  }
+  if (workers == 1 && computing == 1 && q->guests == 0 && q->running_large == 1 && has_memory) {
+    return 1;
+  }
+  return q->owners[j->owner].running == 0 && (computing >= workers || !has_memory) &&
+         (q->guest_cost + j->row.cost) * BYTES_A_TRIANGLE <= q->options.memory / GUEST_MEMORY;
 }
 
 /* The next job for a worker, or NULL. */
 static job *choose(queue *q, queue_lane lane) {
   int64_t now = orb_clock_ms();
-  int most_large = q->options.workers > 1 ? q->options.workers - 1 : 1, small_only = lane == QUEUE_COMPUTES_SMALL;
   job *best = NULL;
-  if (q->exclusive || (small_only && q->running_large < most_large)) {
+  if (q->exclusive) {
     return NULL;
   }
+  schedule_charge(q);
+  int share = share_of_owner(q, now);
   for (job *j = q->first; j; j = j->next) {
     if (!runnable(q, j, now)) {
       continue;
@@ -39,19 +93,32 @@ static job *choose(queue *q, queue_lane lane) {
     if (j->row.suspect) {
       return q->running == 0 && mine ? j : NULL;
     }
-    if (!mine || (fetches(j) && q->owners[j->owner].fetching >= QUEUE_FETCHES_OF_OWNER)) {
+    if (!mine || (fetches(j) ? q->owners[j->owner].fetching >= QUEUE_FETCHES_OF_OWNER : !admits(q, lane, j))) {
       continue;
     }
-    int large = j->row.cost > LARGE;
-    int64_t memory = (q->running_cost + j->row.cost) * BYTES_A_TRIANGLE;
-    if ((large && (small_only || q->running_large >= most_large)) || (q->running && memory > q->options.memory)) {
-      continue;
-    }
-    if (!best || goes_before(q, j, best)) {
+    if (!best || goes_before(q, j, best, share)) {
       best = j;
     }
   }
   return best;
+}
+
+/* Counts a job that a worker takes (by = 1) or leaves (by = -1). */
+static void count(queue *q, const job *j, int by) {
+  q->running += by;
+  if (fetches(j)) {
+    q->fetching += by;
+    q->owners[j->owner].fetching += by;
+  } else {
+    q->owners[j->owner].running += by;
+  }
+  if (j->is_guest) {
+    q->guests += by;
+    q->guest_cost += by * j->row.cost;
+  } else {
+    q->running_large += by * (j->row.cost > LARGE);
+    q->running_cost += by * j->row.cost;
+  }
 }
 
 int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
@@ -71,13 +138,13 @@ int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
     *threads = q->options.cores / share > 0 ? q->options.cores / share : 1;
     j->taken = 1;
     j->refs++;
-    q->running++;
-    q->running_large += j->row.cost > LARGE;
-    q->running_cost += j->row.cost;
+    j->is_guest = lane == QUEUE_GUESTS;
+    *threads = j->is_guest ? 1 : *threads;
+    j->taken_at = now;
+    j->charged = 0;
+    charge(q, j, fetches(j) ? 0 : 10 + j->row.cost / TRIANGLES_A_MS);
+    count(q, j, 1);
     q->exclusive = j->row.suspect;
-    q->fetching += fetches(j);
-    q->owners[j->owner].fetching += fetches(j);
-    q->owners[j->owner].service += (double)j->row.cost + 1000;
     *out = j;
   } else {
     j = NULL;
@@ -87,12 +154,12 @@ int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
 }
 
 void schedule_leave(queue *q, job *j) {
-  q->running--;
-  q->running_large -= j->row.cost > LARGE;
-  q->running_cost -= j->row.cost;
-  q->fetching -= fetches(j);
-  q->owners[j->owner].fetching -= fetches(j);
+  charge(q, j, fetches(j) ? 0 : used_ms(j, orb_clock_ms()));
+  count(q, j, -1);
   q->exclusive = 0;
+  j->taken_at = 0;
+  j->charged = 0;
+  j->is_guest = 0;
   j->taken = 0;
   j->running = 0;
   j->ctx = NULL;

@@ -317,7 +317,7 @@ static void *worker_main(void *argument) {
 }
 
 worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogue *cat, objects *store) {
-  int computing = options->workers + (options->workers == 1); /* a single worker gets a second one for small jobs */
+  int computing = options->workers + QUEUE_GUESTS_MAX;
   int lanes = computing + FETCHERS;
   worker_pool *pool = calloc(1, sizeof *pool + (size_t)lanes * sizeof(worker));
   if (!pool) {
@@ -331,7 +331,7 @@ worker_pool *worker_pool_start(const worker_options *options, queue *q, catalogu
   for (int i = 0; i < lanes; i++) {
     worker *w = &pool->workers[i];
     w->pool = pool;
-    w->lane = i >= computing ? QUEUE_FETCHES : i >= options->workers ? QUEUE_COMPUTES_SMALL : QUEUE_COMPUTES;
+    w->lane = i >= computing ? QUEUE_FETCHES : i >= options->workers ? QUEUE_GUESTS : QUEUE_COMPUTES;
     w->started = pthread_create(&w->thread, NULL, worker_main, w) == 0;
     if (!w->started && i == 0) {
       free(pool);

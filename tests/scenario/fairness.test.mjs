@@ -46,8 +46,8 @@ const started = async (d, job, options) => {
 };
 
 /** Keeps a worker until free() is called, so that everything that a test sends meanwhile has to queue. */
-async function occupy(d, options = {}) {
-  const job = await submit(d, 99, slow ? 5 : 6, options, { body: endless });
+async function occupy(d, options = {}, seed = 99) {
+  const job = await submit(d, seed, slow ? 5 : 6, options, { body: endless });
   while ((await d.get(job.url, options)).json.state === 'queued') await new Promise((done) => setTimeout(done, 5));
   return async function free() {
     const { json } = await d.delete(job.url, options);
@@ -63,10 +63,12 @@ test('clients take turns', async (t) => {
     await bearer(d, 'first', '--priority', '5'),
   ];
   const free = await occupy(d, many);
+  const freeBeside = await occupy(d, few, 98); // a guest: all others of this client have to queue
   const crowd = [];
   for (let i = 0; i < 8; i++) crowd.push(await submit(d, i, 4, many));
   const guests = [await submit(d, 20, 4, few), await submit(d, 21, 4, few)];
   const vip = await submit(d, 30, 4, first);
+  await freeBeside();
   await free();
   const times = [];
   for (const job of crowd) times.push(await started(d, job, many));
@@ -76,6 +78,21 @@ test('clients take turns', async (t) => {
   assert.ok(before(of[1]) <= 3, `and then for ${before(of[1])}`);
   const soonest = Math.min(...times, ...of);
   assert.ok((await started(d, vip, first)) <= soonest, 'a class goes before everything');
+});
+
+test('long jobs of a client do not delay the small ones of others', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on', '--workers', '2', '--job-seconds', slow ? '120' : '30'] });
+  const [hog, one, two] = [await bearer(d, 'hog'), await bearer(d, 'one'), await bearer(d, 'two')];
+  const long = [];
+  for (let i = 0; i < 6; i++) long.push(await submit(d, i, slow ? 5 : 6, hog, { body: endless }));
+  const states = async () => (await Promise.all(long.map((job) => d.get(job.url, hog)))).map(({ json }) => json.state);
+  while ((await states()).filter((state) => state === 'running').length < 2);
+  for (const [n, owner] of [one, two, one].entries()) {
+    const began = performance.now();
+    await started(d, await submit(d, 10 + n, 1, owner), owner);
+    t.diagnostic(`upload and embedding: ${(performance.now() - began).toFixed(0)} ms`);
+  }
+  assert.deepEqual((await states()).sort(), [...Array(4).fill('queued'), ...Array(2).fill('running')]);
 });
 
 test('urgent jobs of a client go first', async (t) => {
