@@ -87,10 +87,18 @@ int64_t unix_ms(void);
 static inline int is_for(const job *j, const char *key, const char *owner) {
   return strcmp(j->row.key, key) == 0 && strcmp(j->row.owner, owner) == 0;
 }
+static inline int fetches(const job *j) {
+  return j->row.kind == API_JOB_FETCH;
+}
+/* How long a worker has had the job. */
+static inline int64_t used_ms(const job *j, int64_t now) {
+  return now > j->taken_at ? now - j->taken_at : 0;
+}
 void owner_enter(queue *q, job *j); /* sets j->owner */
 void owner_leave(queue *q, const job *j);
-void schedule_charge(queue *q);        /* brings the service of all owners up to date; O(unfinished jobs) */
-void schedule_leave(queue *q, job *j); /* undoes what queue_take() counted */
+void owner_charge(queue *q, job *j, int64_t ms); /* replaces what its owner is charged for it */
+void owners_charge(queue *q);                    /* brings the service of all owners up to date; O(unfinished jobs) */
+void schedule_leave(queue *q, job *j);           /* undoes what queue_take() counted */
 void table_add(queue *q, job *j);
 void table_drop_key(queue *q, job *j); /* removes an ended job from the unfinished ones */
 void table_ended(queue *q, job *j);

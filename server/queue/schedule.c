@@ -3,29 +3,6 @@
 #include "faults.h"
 #include "queue/internal.h"
 
-static int fetches(const job *j) {
-  return j->row.kind == API_JOB_FETCH;
-}
-
-/* How long a worker has had the job. */
-static int64_t used_ms(const job *j, int64_t now) {
-  return now > j->taken_at ? now - j->taken_at : 0;
-}
-
-static void charge(queue *q, job *j, int64_t ms) {
-  q->owners[j->owner].service += ms - j->charged;
-  j->charged = ms;
-}
-
-void schedule_charge(queue *q) {
-  int64_t now = orb_clock_ms();
-  for (job *j = q->first; j && q->running > 0; j = j->next) {
-    if (j->taken_at && !fetches(j) && used_ms(j, now) > j->charged) {
-      charge(q, j, used_ms(j, now));
-    }
-  }
-}
-
 /* Whether job a goes before job b; b is the older one. share: the workers that an owner may have while others wait. */
 static int goes_before(const queue *q, const job *a, const job *b, int share) {
   int class_a = a->row.priority / QUEUE_URGENCIES, class_b = b->row.priority / QUEUE_URGENCIES;
@@ -83,7 +60,7 @@ static job *choose(queue *q, queue_lane lane) {
   if (q->exclusive) {
     return NULL;
   }
-  schedule_charge(q);
+  owners_charge(q);
   int share = share_of_owner(q, now);
   for (job *j = q->first; j; j = j->next) {
     if (!runnable(q, j, now)) {
@@ -142,7 +119,7 @@ int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
     *threads = j->is_guest ? 1 : *threads;
     j->taken_at = now;
     j->charged = 0;
-    charge(q, j, fetches(j) ? 0 : 10 + j->row.cost / TRIANGLES_A_MS);
+    owner_charge(q, j, fetches(j) ? 0 : 10 + j->row.cost / TRIANGLES_A_MS);
     count(q, j, 1);
     q->exclusive = j->row.suspect;
     *out = j;
@@ -154,7 +131,7 @@ int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
 }
 
 void schedule_leave(queue *q, job *j) {
-  charge(q, j, fetches(j) ? 0 : used_ms(j, orb_clock_ms()));
+  owner_charge(q, j, fetches(j) ? 0 : used_ms(j, orb_clock_ms()));
   count(q, j, -1);
   q->exclusive = 0;
   j->taken_at = 0;
