@@ -21,6 +21,7 @@
 #include "log.h"
 #include "maintain.h"
 #include "net/client.h"
+#include "scrub.h"
 #include "systemd.h"
 #include "worker/confined.h"
 #include "worker/pool.h"
@@ -320,6 +321,24 @@ static int check_catalogue(const server *srv) {
   return 0;
 }
 
+static void heal(void *user, object_kind kind, const char *id) {
+  const server *srv = user;
+  const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
+  evict_damaged(&env, kind, id);
+}
+
+/* From now on, damaged results are deleted and made again. */
+static int heals(server *srv) {
+  objects_on_quarantine(srv->store, heal, srv);
+  return 1;
+}
+
+static int start_scrub(server *srv) {
+  const config *o = srv->options;
+  srv->scrub = scrub_start(srv->cat, srv->store, o->scrub_rate, 1000 * o->scrub_seconds);
+  return srv->scrub || o->scrub_rate == 0;
+}
+
 /* Starts all parts in order; 0 if one of them failed. */
 static int start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
@@ -354,15 +373,16 @@ static int start(server *srv, worker_pool **workers) {
   return listens && objects_open(o->data, &srv->store) == STORE_OK && catalogue_open(o->data, &srv->cat) == STORE_OK &&
          check_catalogue(srv) && (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
-         (srv->descriptions = cache_create(CACHE_BYTES)) && (srv->io = tasks_start((int)o->io_threads)) &&
+         (srv->descriptions = cache_create(CACHE_BYTES)) && heals(srv) && (srv->io = tasks_start((int)o->io_threads)) &&
          (srv->checks = tasks_start((int)o->workers)) && (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&
          net_start() && start_outbox(srv, &delivered) &&
-         (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) && http_start(srv);
+         (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) && http_start(srv) && start_scrub(srv);
 }
 
 /* Stops all parts that were started. */
 static void stop(server *srv, worker_pool *workers) {
   __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
+  scrub_stop(srv->scrub);
   if (srv->q) {
     queue_stop(srv->q, 1);
     worker_pool_join(workers);

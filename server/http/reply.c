@@ -14,6 +14,16 @@ static void take(request *r, unsigned status, struct MHD_Response *response, siz
   r->phase = PHASE_SEND;
 }
 
+void reply_drop(request *r) {
+  if (r->response) {
+    MHD_destroy_response(r->response);
+  }
+  r->response = NULL;
+  r->status = 0;
+  r->sends = 0;
+  r->phase = PHASE_AWAY;
+}
+
 void reply_header(request *r, const char *name, const char *value) {
   if (r->response && MHD_add_response_header(r->response, name, value) != MHD_YES) {
     MHD_destroy_response(r->response); /* out of memory: no response is better than one that lacks a header */
