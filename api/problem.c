@@ -50,6 +50,7 @@ static const struct entry {
     {"too-many-requests", 429, "Too many requests"},
     {"queue-full", 429, "The queue is full"},
     {"quota-exceeded", 429, "The quota is exhausted"},
+    {"headers-too-large", 431, "The headers are too long"},
     {"internal", 500, "Internal server error"},
     {"not-certified", 500, "The result could not be certified"},
     {"corrupt", 500, "Stored data is corrupt"},

@@ -160,6 +160,7 @@ test('sections name the facts that answers have', async (t) => {
     'crashed',
     'job-crashed', // scenario.isolate provokes it
     'uri-too-long', // scenario.requests
+    'headers-too-large', // there, too
     'internal',
   ];
   assert.deepEqual(
