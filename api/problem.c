@@ -61,6 +61,7 @@ static const struct entry {
     {"not-ready", 503, "The result is not ready"},
     {"no-memory", 503, "Out of memory"},
     {"unavailable", 503, "The service is unavailable"},
+    {"read-only", 507, "The data folder is read-only"},
     {"storage-full", 507, "The disk is full"},
 };
 enum { COUNT = sizeof table / sizeof table[0] };

@@ -40,29 +40,41 @@ static void raise_descriptor_limit(void) {
   }
 }
 
-/* One process per data folder. The kernel releases the lock when the process ends, also after a crash. */
+enum { LOCK_TOLD = -2 };
+
+/* One process per data folder. The kernel releases the lock when the process ends, also after a crash. −1: another
+ * process has it; LOCK_TOLD: the log says what is wrong. */
 static int lock_data(const char *data) {
   char path[PATH_MAX];
   if (mkdir(data, 0700) != 0 && errno != EEXIST) {
     log_error("the folder %s cannot be created: %s", data, strerror(errno));
-    return -1;
+    return LOCK_TOLD;
   }
   snprintf(path, sizeof path, "%s/lock", data);
   int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (fd < 0) {
+    log_error(errno == EROFS
+                  ? "the data folder %s is on a read-only file system (%s): mount it for writing, or restore a "
+                    "backup into a folder elsewhere"
+                  : "the data folder %s cannot be written: %s",
+              data, strerror(errno));
+    return LOCK_TOLD;
+  }
   for (int tries = 0; fd >= 0 && tries < 50; tries++) { /* a dying process may hold it a moment longer */
     if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
       return fd;
     }
     usleep(100000);
   }
-  if (fd >= 0) {
-    close(fd);
-  }
+  close(fd);
   return -1;
 }
 
-static void say_locked(const char *data) {
-  log_error("the data folder %s is in use by another process or cannot be locked; stop that process first", data);
+/* lock: what lock_data() returned, < 0. */
+static void say_locked(const char *data, int lock) {
+  if (lock != LOCK_TOLD) {
+    log_error("the data folder %s is in use by another process or cannot be locked; stop that process first", data);
+  }
 }
 
 static void announce(const server *srv) {
@@ -439,7 +451,7 @@ static int run(const command_line *line) {
   raise_descriptor_limit();
   int lock = signals < 0 ? -1 : lock_data(options->data);
   if (signals >= 0 && lock < 0) {
-    say_locked(options->data);
+    say_locked(options->data, lock);
   }
   isolate_mode mode = strcmp(options->isolate, "off") == 0      ? ISOLATE_OFF
                       : strcmp(options->isolate, "strict") == 0 ? ISOLATE_STRICT
@@ -501,7 +513,7 @@ int main(int argc, char **argv) {
   if (lock < 0 && asked < 0) { /* the daemon may have just been starting */
     asked = admin_command_ask(&admin, &options);
     if (asked < 0) {
-      say_locked(options.data);
+      say_locked(options.data, lock);
       return 1;
     }
   }

@@ -507,6 +507,11 @@ long objects_purge_lost(objects *store, int64_t before) {
   return purged;
 }
 
+int objects_is_read_only(const objects *store) {
+  struct statvfs info;
+  return !store->remote.publish && statvfs(store->root, &info) == 0 && (info.f_flag & ST_RDONLY);
+}
+
 uint64_t objects_free_bytes(const objects *store) {
   if (store->remote.publish) {
     return UINT64_MAX; /* the daemon looks */

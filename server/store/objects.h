@@ -108,6 +108,8 @@ store_result objects_quarantine(objects *store, object_kind kind, const char *id
 /* `heal` is called after each object that was moved to quarantine, on the thread that found it, which holds no lock. */
 void objects_on_quarantine(objects *store, void (*heal)(void *user, object_kind kind, const char *id), void *user);
 
+/* Whether the file system is mounted read-only, as the kernel does after errors of the disk. */
+int objects_is_read_only(const objects *store);
 /* Free bytes of the file system, for disk-reserve. */
 uint64_t objects_free_bytes(const objects *store);
 

@@ -153,6 +153,7 @@ test('sections name the facts that answers have', async (t) => {
     'cancelled',
     'unavailable',
     'storage-full',
+    'read-only', // scenario.read_only
     'timeout',
     'no-memory',
     'not-certified',

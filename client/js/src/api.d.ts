@@ -663,6 +663,8 @@ export type Ready = {
   /** The name and version of the engine. */
   engine?: string;
   integrity?: Integrity;
+  /** The data folder is on a read-only file system: stored results are served, and nothing is stored. */
+  read_only?: boolean;
 };
 
 /** What is wrong with the stored data: as the last complete round of the scrub found it, but for quarantined. */
@@ -1217,6 +1219,15 @@ export type ProblemUnavailable = {
   type: '/problems/unavailable';
   title: 'The service is unavailable';
   status: 503;
+  /** What is wrong and what to do. */
+  detail: string;
+};
+
+/** The data folder is on a read-only file system. Stored results are still served. */
+export type ProblemReadOnly = {
+  type: '/problems/read-only';
+  title: 'The data folder is read-only';
+  status: 507;
   /** What is wrong and what to do. */
   detail: string;
 };
