@@ -50,6 +50,7 @@ static const struct entry {
     {"too-many-requests", 429, "Too many requests"},
     {"queue-full", 429, "The queue is full"},
     {"quota-exceeded", 429, "The quota is exhausted"},
+    {"headers-too-large", 431, "The headers are too long"},
     {"internal", 500, "Internal server error"},
     {"not-certified", 500, "The result could not be certified"},
     {"corrupt", 500, "Stored data is corrupt"},
@@ -60,6 +61,7 @@ static const struct entry {
     {"not-ready", 503, "The result is not ready"},
     {"no-memory", 503, "Out of memory"},
     {"unavailable", 503, "The service is unavailable"},
+    {"read-only", 507, "The data folder is read-only"},
     {"storage-full", 507, "The disk is full"},
 };
 enum { COUNT = sizeof table / sizeof table[0] };

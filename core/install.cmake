@@ -9,6 +9,9 @@ set_target_properties(orbmorph_shared PROPERTIES OUTPUT_NAME orbmorph EXPORT_NAM
   VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
 target_include_directories(orbmorph_shared INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_link_libraries(orbmorph_shared PRIVATE PkgConfig::QHULL PkgConfig::CJSON ${ORB_MESHOPT} ${ORB_DRACO} Threads::Threads m)
+if(CMAKE_SYSTEM_NAME STREQUAL "Linux" AND NOT ORB_SANITIZE)
+  target_link_options(orbmorph_shared PRIVATE -Wl,-z,relro,-z,now)
+endif()
 # Names of the C++ library that the compiler defines in our objects are visible by default; the map hides them.
 set(map ${CMAKE_CURRENT_SOURCE_DIR}/orbmorph.map)
 check_linker_flag(C "-Wl,--version-script=${map}" ORB_HAS_VERSION_SCRIPT)

@@ -70,6 +70,12 @@ static const entry table[] = {
      "bytes of embeddings and supermeshes to keep, most recently used ones first; 0: all"},
     {"keep-jobs", NUMBER(keep_jobs, 0, INT64_C(1) << 40), "100000",
      "ended jobs to keep in the catalogue, newest first; 0: all"},
+    {"lost-days", NUMBER(lost_days, 0, 36500), "30",
+     "days that --gc keeps files without a row in lost+found before it deletes them"},
+    {"scrub-rate", NUMBER(scrub_rate, 0, INT64_C(1) << 40), "1M",
+     "bytes per second at which stored files are compared with their hashes in the background; 0: never"},
+    {"scrub-seconds", NUMBER(scrub_seconds, 1, 31536000), "21600",
+     "least time from the start of one such round to the start of the next"},
     {"hosts", TEXT(hosts), "",
      "names besides localhost and its address that the service has where no token is needed, comma-separated, or *"},
     {"webhook-allow", TEXT(webhook_allow), "",
@@ -238,7 +244,7 @@ static void print_help(void) {
       "  orbmorphd --check-config       check the configuration and exit\n"
       "  orbmorphd --check-data         verify all objects and rows of the data folder\n"
       "  orbmorphd --gc                 delete derived objects beyond derived-bytes, ended jobs beyond\n"
-      "                                 keep-jobs, and objects without a row\n"
+      "                                 keep-jobs; move objects without a row to lost+found\n"
       "  orbmorphd backup DIR           copy the data folder to DIR as it is now, also while the service runs;\n"
       "                                 again into the same DIR: only what is new\n"
       "  orbmorphd restore DIR --data NEW\n"

@@ -23,6 +23,7 @@ typedef struct config {
   int64_t requests_per_second, header_seconds, slow_seconds, min_rate, slow_ms;
   int64_t max_body, max_json, max_ratio, decode_memory, encoded_bytes, max_triangles, queue_limit;
   int64_t job_memory, job_seconds, check_seconds, disk_reserve, drain_seconds, derived_bytes, keep_jobs;
+  int64_t lost_days, scrub_rate, scrub_seconds;
   int64_t webhook_retry_seconds, fetch_seconds;
 } config;
 

@@ -9,6 +9,8 @@
 
 enum { PAGE = 64 };
 
+static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks", "alignment"};
+
 /* Deletes the row first: a crash in between then leaves an object without a row, which --gc deletes. */
 static store_result evict(const evict_env *env, resource_kind kind, const char *id, const char *tenant) {
   static const object_kind kinds[RESOURCE_KINDS] = {OBJECT_MESH, OBJECT_SPHERE, OBJECT_ASSET, OBJECT_KINDS,
@@ -46,6 +48,17 @@ store_result evict_owned(const evict_env *env, resource_kind kind, const char *i
   return evict(env, kind, id, tenant);
 }
 
+void evict_damaged(const evict_env *env, object_kind kind, const char *id) {
+  const resource_kind owner = resource_of_object(kind);
+  /* A profile is made again from its asset. */
+  if (resource_is_derived(owner) && kind != OBJECT_QUANTIZED && kind != OBJECT_MESHOPT &&
+      evict_one(env, owner, id) == STORE_OK) {
+    char fields[160];
+    snprintf(fields, sizeof fields, "\"id\":\"%s\"", id);
+    log_write(LOG_WARN, fields, "a damaged %s was deleted; the next request computes it again", names[owner]);
+  }
+}
+
 static int is_needed(const evict_env *env, const resource *row) {
   static const char member[] = "\"mesh\":\"";
   const char *at = row->kind == RESOURCE_EMBEDDING && env->q ? strstr(row->json, member) : NULL;
@@ -58,7 +71,6 @@ static int is_needed(const evict_env *env, const resource *row) {
 }
 
 int64_t evict_derived(const evict_env *env, int64_t budget, int64_t before) {
-  static const char *const names[RESOURCE_KINDS] = {"mesh", "embedding", "supermesh", "landmarks", "alignment"};
   resource rows[PAGE];
   int64_t total = catalogue_bytes(env->cat, 1);
   int kept = 0; /* of the oldest, because jobs need them */

@@ -22,6 +22,9 @@ store_result evict_one(const evict_env *env, resource_kind kind, const char *id)
 /* Ends a tenant's ownership; deletes the resource if it was the last owner. STORE_NOT_FOUND: it does not own it. */
 store_result evict_owned(const evict_env *env, resource_kind kind, const char *id, const char *tenant);
 
+/* Deletes the resource whose object was moved to quarantine, if a job can make it again: the next request does. */
+void evict_damaged(const evict_env *env, object_kind kind, const char *id);
+
 /* Whether a row names this object; also if that cannot be read. */
 int evict_is_named(catalogue *cat, object_kind kind, const char *id);
 /* Deletes the files that had to stay while a backup ran; does nothing while one runs. Blocks. */

@@ -21,6 +21,7 @@
 #include "log.h"
 #include "maintain.h"
 #include "net/client.h"
+#include "scrub.h"
 #include "systemd.h"
 #include "worker/confined.h"
 #include "worker/pool.h"
@@ -39,29 +40,41 @@ static void raise_descriptor_limit(void) {
   }
 }
 
-/* One process per data folder. The kernel releases the lock when the process ends, also after a crash. */
+enum { LOCK_TOLD = -2 };
+
+/* One process per data folder. The kernel releases the lock when the process ends, also after a crash. −1: another
+ * process has it; LOCK_TOLD: the log says what is wrong. */
 static int lock_data(const char *data) {
   char path[PATH_MAX];
   if (mkdir(data, 0700) != 0 && errno != EEXIST) {
     log_error("the folder %s cannot be created: %s", data, strerror(errno));
-    return -1;
+    return LOCK_TOLD;
   }
   snprintf(path, sizeof path, "%s/lock", data);
   int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (fd < 0) {
+    log_error(errno == EROFS
+                  ? "the data folder %s is on a read-only file system (%s): mount it for writing, or restore a "
+                    "backup into a folder elsewhere"
+                  : "the data folder %s cannot be written: %s",
+              data, strerror(errno));
+    return LOCK_TOLD;
+  }
   for (int tries = 0; fd >= 0 && tries < 50; tries++) { /* a dying process may hold it a moment longer */
     if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
       return fd;
     }
     usleep(100000);
   }
-  if (fd >= 0) {
-    close(fd);
-  }
+  close(fd);
   return -1;
 }
 
-static void say_locked(const char *data) {
-  log_error("the data folder %s is in use by another process or cannot be locked; stop that process first", data);
+/* lock: what lock_data() returned, < 0. */
+static void say_locked(const char *data, int lock) {
+  if (lock != LOCK_TOLD) {
+    log_error("the data folder %s is in use by another process or cannot be locked; stop that process first", data);
+  }
 }
 
 static void announce(const server *srv) {
@@ -320,6 +333,24 @@ static int check_catalogue(const server *srv) {
   return 0;
 }
 
+static void heal(void *user, object_kind kind, const char *id) {
+  const server *srv = user;
+  const evict_env env = {.cat = srv->cat, .store = srv->store, .descriptions = srv->descriptions, .q = srv->q};
+  evict_damaged(&env, kind, id);
+}
+
+/* From now on, damaged results are deleted and made again. */
+static int heals(server *srv) {
+  objects_on_quarantine(srv->store, heal, srv);
+  return 1;
+}
+
+static int start_scrub(server *srv) {
+  const config *o = srv->options;
+  srv->scrub = scrub_start(srv->cat, srv->store, o->scrub_rate, 1000 * o->scrub_seconds);
+  return srv->scrub || o->scrub_rate == 0;
+}
+
 /* Starts all parts in order; 0 if one of them failed. */
 static int start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
@@ -354,15 +385,16 @@ static int start(server *srv, worker_pool **workers) {
   return listens && objects_open(o->data, &srv->store) == STORE_OK && catalogue_open(o->data, &srv->cat) == STORE_OK &&
          check_catalogue(srv) && (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
-         (srv->descriptions = cache_create(CACHE_BYTES)) && (srv->io = tasks_start((int)o->io_threads)) &&
+         (srv->descriptions = cache_create(CACHE_BYTES)) && heals(srv) && (srv->io = tasks_start((int)o->io_threads)) &&
          (srv->checks = tasks_start((int)o->workers)) && (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&
          net_start() && start_outbox(srv, &delivered) &&
-         (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) && http_start(srv);
+         (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) && http_start(srv) && start_scrub(srv);
 }
 
 /* Stops all parts that were started. */
 static void stop(server *srv, worker_pool *workers) {
   __atomic_store_n(&srv->stopping, 1, __ATOMIC_RELEASE);
+  scrub_stop(srv->scrub);
   if (srv->q) {
     queue_stop(srv->q, 1);
     worker_pool_join(workers);
@@ -419,7 +451,7 @@ static int run(const command_line *line) {
   raise_descriptor_limit();
   int lock = signals < 0 ? -1 : lock_data(options->data);
   if (signals >= 0 && lock < 0) {
-    say_locked(options->data);
+    say_locked(options->data, lock);
   }
   isolate_mode mode = strcmp(options->isolate, "off") == 0      ? ISOLATE_OFF
                       : strcmp(options->isolate, "strict") == 0 ? ISOLATE_STRICT
@@ -481,7 +513,7 @@ int main(int argc, char **argv) {
   if (lock < 0 && asked < 0) { /* the daemon may have just been starting */
     asked = admin_command_ask(&admin, &options);
     if (asked < 0) {
-      say_locked(options.data);
+      say_locked(options.data, lock);
       return 1;
     }
   }

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "evict.h"
 #include "store/owners.h"
@@ -69,14 +70,14 @@ static void each_row(tally *t, resource_kind kind) {
   }
 }
 
-/* An object without a row is harmless: a crash between publishing and commit leaves one. */
+/* A crash between publishing and commit leaves an object without a row, and so does a catalogue that lost rows. */
 static void each_object(void *user, object_kind kind, const char *id, uint64_t size) {
   tally *t = user;
   t->objects++;
   if (!evict_is_named(t->cat, kind, id)) {
     t->orphans++;
-    if (t->remove_orphans && objects_delete(t->store, kind, id) == STORE_OK) {
-      printf("deleted object %s (%llu bytes), which has no row\n", id, (unsigned long long)size);
+    if (t->remove_orphans && objects_set_aside(t->store, kind, id) == STORE_OK) {
+      printf("moved object %s (%llu bytes), which has no row, to lost+found\n", id, (unsigned long long)size);
     }
   }
 }
@@ -115,8 +116,13 @@ int maintain_check(const config *options) {
     puts("some folders of objects cannot be read");
     t.wrong++;
   }
-  printf("%ld rows and %ld objects checked: %ld wrong, %ld objects without a row (harmless; --gc deletes them)\n",
+  printf("%ld rows and %ld objects checked: %ld wrong, %ld objects without a row (--gc moves them to lost+found)\n",
          t.rows, t.objects, t.wrong, t.orphans);
+  if (t.orphans) {
+    puts(
+        "a crash may leave an object or two without a row; more than that: the catalogue has lost rows, so compare it "
+        "with a backup, or upload the meshes again from objects/mesh or lost+found/mesh-*");
+  }
   if (t.wrong) {
     puts(
         "start the service, DELETE the resources named above, and upload or request them again (not alignments: the "
@@ -143,11 +149,15 @@ static int forget_jobs(catalogue *cat, int64_t keep) {
 int maintain_gc(const config *options) {
   tally t = {.remove_orphans = 1};
   int fine = open_both(options, &t);
-  if (fine && objects_backup_runs(t.store)) {
+  if (fine && !objects_hold_backups(t.store)) {
     puts("a backup of the data folder runs; run --gc after it");
     fine = 0;
   }
   if (fine) {
+    long purged = objects_purge_lost(t.store, (int64_t)time(NULL) - 86400 * options->lost_days);
+    if (purged) {
+      printf("deleted %ld files that were in lost+found for %lld days\n", purged, (long long)options->lost_days);
+    }
     fine = objects_each(t.store, each_object, &t) == STORE_OK && forget_jobs(t.cat, options->keep_jobs);
     if (options->derived_bytes > 0) {
       const evict_env env = {.cat = t.cat, .store = t.store};

@@ -6,7 +6,8 @@
 
 /* Verifies the catalogue and the hash of every object, and prints all damage. 0: no damage; else 1. */
 int maintain_check(const config *options);
-/* Deletes objects without a row, derived objects beyond derived-bytes and ended jobs beyond keep-jobs. 0: done. */
+/* Moves objects without a row to lost+found, deletes those that were there for lost-days, derived objects beyond
+ * derived-bytes and ended jobs beyond keep-jobs. Backups wait for it. 0: done. */
 int maintain_gc(const config *options);
 
 #endif

@@ -56,6 +56,9 @@ void metrics_flips(int64_t n) {
 void metrics_quarantined(void) {
   atomic_fetch_add(&quarantined, 1);
 }
+int64_t metrics_quarantined_count(void) {
+  return atomic_load(&quarantined);
+}
 void metrics_request(int status, double seconds) {
   atomic_fetch_add(&statuses[status / 100 < 6 ? status / 100 : 0], 1);
   if (seconds >= 0) {

@@ -12,6 +12,7 @@ void metrics_stage(int kind, const char *stage, double seconds); /* after the st
 void metrics_webhook(int delivered);                             /* after an attempt */
 void metrics_cache(int hit);
 void metrics_flips(int64_t flips);
+int64_t metrics_quarantined_count(void);
 void metrics_quarantined(void);                   /* an object that did not match its hash */
 void metrics_request(int status, double seconds); /* seconds < 0: it waited for a job; its time is not counted */
 void metrics_bytes(int64_t received, int64_t sent);

@@ -54,6 +54,7 @@
 #include "http/watch.h"
 #include "net/url.h"
 #include "queue/queue.h"
+#include "scrub.h"
 #include "tasks.h"
 
 typedef struct server {
@@ -71,6 +72,7 @@ typedef struct server {
   int64_t started;
   int needs_token;
   deliverer *outbox;
+  scrub *scrub;                            /* NULL: off */
   networks webhook_allowed, fetch_allowed; /* besides public addresses */
   callers *callers;
   signers *signers;
@@ -104,13 +106,15 @@ struct request {
   int shape;             /* {k} of the path; −1: none */
   int profile;           /* of the asset, an orb_profile */
   request *next_waiting; /* see profile.c */
-  char number[24];       /* of the request, for the log and X-Request-Id */
-  caller *caller;        /* referenced; NULL where no token is needed */
-  signer *signer;        /* referenced; NULL: the URL is not signed */
-  int64_t expires;       /* of the signature, Unix time in seconds */
-  int64_t retry_s;       /* for Retry-After; 0: the usual */
-  int is_unverified;     /* the file to send could not be compared with its hash, or not be moved away */
-  int begun;             /* the headers have arrived */
+  /* Makes the supermesh again if it turns out to be damaged while its asset is answered; NULL: the answer is 404. */
+  void (*make_again)(request *r);
+  char number[24];   /* of the request, for the log and X-Request-Id */
+  caller *caller;    /* referenced; NULL where no token is needed */
+  signer *signer;    /* referenced; NULL: the URL is not signed */
+  int64_t expires;   /* of the signature, Unix time in seconds */
+  int64_t retry_s;   /* for Retry-After; 0: the usual */
+  int is_unverified; /* the file to send could not be compared with its hash, or not be moved away */
+  int begun;         /* the headers have arrived */
   int has_body, head;
   int closes; /* the connection closes after this response */
   request_phase phase;
@@ -210,7 +214,8 @@ void reply_refuse(request *r, const char *name, const char *format, ...) API_PRI
 void reply_store(request *r, store_result result);
 void reply_empty(request *r, unsigned status);
 void reply_bytes(request *r, unsigned status, const char *mime, const void *bytes, size_t size); /* static bytes */
-void reply_text(request *r, unsigned status, const char *mime, api_text *text);                  /* frees text */
+void reply_drop(request *r); /* within a task: takes the response back */
+void reply_text(request *r, unsigned status, const char *mime, api_text *text); /* frees text */
 /* Chooses the form of an answer that never changes: as it is or, if the client accepts that, compressed. Sets r->etag,
  * and r->coded and r->encoded if it is compressed. key: names the bytes among all answers. bytes NULL: only looks
  * whether it is compressed already; 0 if not, and then nothing is chosen. Ranges are of what is not compressed. */

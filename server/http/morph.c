@@ -197,6 +197,13 @@ static int failed_before(request *r, const wanted_result *wish) {
   return again;
 }
 
+static int is_deleted(const request *r, const char *id) {
+  resource row = {0};
+  store_result found = catalogue_get(r->srv->cat, RESOURCE_SUPERMESH, id, &row);
+  resource_free(&row);
+  return found == STORE_NOT_FOUND;
+}
+
 static void morph_away(request *r) {
   wanted_result wish = {0};
   api_problem problem = {0};
@@ -212,8 +219,12 @@ static void morph_away(request *r) {
     const cached *known = find_description(r->srv, RESOURCE_SUPERMESH, wish.id, access_tenant(r), &result);
     if (known) {
       remember(r, wish.id, drops);
+      r->make_again = morph_away;
       reply_asset(r, known);
-      if (r->status == 404) {
+      if (r->status == 404 && is_deleted(r, wish.id)) { /* it was damaged, see evict_damaged() */
+        reply_drop(r);
+        submit_wanted(r, &wish);
+      } else if (r->status == 404) {
         reply_lost(r);
       }
     } else if (result != STORE_NOT_FOUND) {

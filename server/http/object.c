@@ -27,8 +27,9 @@ static void add_headers(request *r, const char *mime, const char *disposition, i
                          : left < YEAR_S ? left
                                          : YEAR_S));
     reply_header(r, "Cache-Control", control);
-  } else { /* a shared cache must not keep what only one token may see */
-    reply_header(r, "Cache-Control", r->caller ? "private" YEAR_LONG : "public" YEAR_LONG);
+  } else { /* a shared cache must not keep what only one token, or a check in front of the service, lets through */
+    int shared = !r->caller && strcmp(r->srv->options->auth, "off") != 0;
+    reply_header(r, "Cache-Control", shared ? "public" YEAR_LONG : "private" YEAR_LONG);
   }
   reply_header(r, "Accept-Ranges", "bytes");
   if (r->status != 304) {

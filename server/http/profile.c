@@ -7,6 +7,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "evict.h"
 #include "faults.h"
 #include "http/http.h"
 #include "log.h"
@@ -66,9 +67,12 @@ static int convert(request *r, orb_context *ctx, orb_buffer *out, api_problem *p
   resource_free(&row);
   found = found == STORE_OK ? objects_read(r->srv->store, OBJECT_ASSET, r->id, &fd, &size) : found;
   if (found != STORE_OK) {
-    return api_refuse(problem, found == STORE_NOT_FOUND ? "not-found" : "internal",
-                      found == STORE_NOT_FOUND ? "Nothing has this id; it may have been deleted."
-                                               : "The store could not be read; the server's log says why.");
+    int gone = found == STORE_NOT_FOUND && !evict_is_named(r->srv->cat, OBJECT_ASSET, r->id);
+    return api_refuse(problem, gone ? "not-found" : "internal", "%s",
+                      gone ? "Nothing has this id; it may have been deleted."
+                      : found == STORE_NOT_FOUND
+                          ? "The server has lost this file. DELETE the resource, then request it again."
+                          : "The store could not be read; the server's log says why.");
   }
   void *bytes = size > 0 ? mmap(NULL, (size_t)size, PROT_READ, MAP_PRIVATE, fd, 0) : MAP_FAILED;
   close(fd);
@@ -197,13 +201,19 @@ static int send_if_stored(request *r) {
 /* Makes the profile of the supermesh r->id unless it exists, and sends it. Blocks. */
 static void profile_away(request *r) {
   flight mine;
-  if (send_if_stored(r) || !take_flight(r, &mine)) {
-    return;
+  if (!send_if_stored(r)) {
+    if (!take_flight(r, &mine)) {
+      return;
+    }
+    if (!send_if_stored(r) && make(r) && !send_if_stored(r)) {
+      reply_lost(r);
+    }
+    land(r, &mine);
   }
-  if (!send_if_stored(r) && make(r) && !send_if_stored(r)) {
-    reply_lost(r);
+  if (r->status == 404 && r->make_again) { /* the asset was damaged, and its row is gone */
+    reply_drop(r);
+    request_go_on(r, r->srv->io, r->make_again);
   }
-  land(r, &mine);
 }
 
 int reply_asset(request *r, const cached *entry) {

@@ -14,6 +14,16 @@ static void take(request *r, unsigned status, struct MHD_Response *response, siz
   r->phase = PHASE_SEND;
 }
 
+void reply_drop(request *r) {
+  if (r->response) {
+    MHD_destroy_response(r->response);
+  }
+  r->response = NULL;
+  r->status = 0;
+  r->sends = 0;
+  r->phase = PHASE_AWAY;
+}
+
 void reply_header(request *r, const char *name, const char *value) {
   if (r->response && MHD_add_response_header(r->response, name, value) != MHD_YES) {
     MHD_destroy_response(r->response); /* out of memory: no response is better than one that lacks a header */
@@ -168,6 +178,10 @@ void reply_store(request *r, store_result result) {
     reply_refuse(r, "not-found", "Nothing has this id; it may have been deleted.");
   } else if (result == STORE_FULL) {
     reply_refuse(r, "storage-full", "The server's disk is full; nothing was stored. Free some space and try again.");
+  } else if (objects_is_read_only(r->srv->store)) {
+    reply_refuse(r, "read-only",
+                 "The server's data folder is on a read-only file system; nothing was stored. Stored results are still "
+                 "served.");
   } else {
     reply_refuse(r, "internal", "The store could not be read or written; the server's log says why.");
   }

@@ -14,8 +14,6 @@
 #include "log.h"
 #include "metrics.h"
 
-enum { CONNECTION_MEMORY = 16 * 1024 };
-
 #define HANDLER(id, method, path, body, scope, query, handler) [id] = handler,
 static enum MHD_Result (*const handlers[ROUTE_COUNT])(request *) = {API_ROUTES(HANDLER)};
 #undef HANDLER
@@ -61,15 +59,14 @@ static void make_number(char out[2 * sizeof(uint64_t) + 1]) {
  * as sent, which signatures cover. */
 static void *request_create(void *user, const char *target, struct MHD_Connection *connection) {
   size_t size = strlen(target) + 1;
-  server *srv = user;
   char number[sizeof((request *)NULL)->number];
   make_number(number);
-  if (target_refused(target, number, srv->options->tls_key[0] != 0, connection)) {
+  if (target_refused(target, number, connection)) {
     return NULL; /* the library may drop the connection without another call, so nothing is allocated */
   }
   request *r = calloc(1, sizeof *r + size);
   if (r) {
-    r->srv = srv;
+    r->srv = user;
     r->connection = connection;
     memcpy(r->target, target, size);
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
@@ -124,6 +121,9 @@ static enum MHD_Result answer(void *user, struct MHD_Connection *connection, con
   (void)user;
   (void)connection;
   if (!r) { /* out of memory, or answered past the library */
+    return MHD_NO;
+  }
+  if (!r->begun && target_headers_refused(r->number, connection)) {
     return MHD_NO;
   }
   if (!r->begun) {
@@ -249,7 +249,7 @@ int http_start(server *srv) {
   struct MHD_OptionItem options[] = {
       {MHD_OPTION_THREAD_POOL_SIZE, (intptr_t)o->http_threads, NULL},
       {MHD_OPTION_LISTEN_SOCKET, srv->at.fd, NULL},
-      {MHD_OPTION_CONNECTION_MEMORY_LIMIT, CONNECTION_MEMORY, NULL},
+      {MHD_OPTION_CONNECTION_MEMORY_LIMIT, TARGET_MEMORY, NULL},
       {MHD_OPTION_CONNECTION_LIMIT, (intptr_t)o->max_connections, NULL},
       {MHD_OPTION_CONNECTION_TIMEOUT, (intptr_t)o->idle_seconds, NULL},
       {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)completed, srv},

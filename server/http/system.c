@@ -25,6 +25,26 @@ static double count_entries(const char *folder) {
   return count;
 }
 
+/* What the last round of the scrub found. */
+static void write_scrub(scrub *from, api_text *text) {
+  scrub_report found;
+  scrub_read(from, &found);
+  metrics_family(text, "orbmorph_scrub_rounds_total", "counter", "Rounds over all stored files that have ended.");
+  api_text_printf(text, "orbmorph_scrub_rounds_total %lld\n", (long long)found.rounds);
+  metrics_family(text, "orbmorph_scrub_bytes_total", "counter", "Bytes of stored files that those rounds compared.");
+  api_text_printf(text, "orbmorph_scrub_bytes_total %lld\n", (long long)found.bytes);
+  gauge(text, "orbmorph_scrub_end_seconds", "Unix time at which the last round ended; 0: none has.",
+        (double)found.ended);
+  gauge(text, "orbmorph_objects_missing", "Stored files that a row names and that do not exist, at the last round.",
+        (double)found.missing);
+  gauge(text, "orbmorph_objects_unreadable", "Stored files that could not be read, at the last round.",
+        (double)found.unreadable);
+  gauge(text, "orbmorph_objects_without_row", "Stored files that no row names, at the last round.",
+        (double)found.without_row);
+  gauge(text, "orbmorph_catalogue_damaged", "1 if SQLite's quick_check found damage at the last round.",
+        found.catalogue_damaged);
+}
+
 static void metrics_away(request *r) {
   server *srv = r->srv;
   api_text text = {0};
@@ -57,6 +77,7 @@ static void metrics_away(request *r) {
   }
   gauge(&text, "orbmorph_disk_free_bytes", "Free bytes of the file system that holds the data folder.",
         (double)objects_free_bytes(srv->store));
+  write_scrub(srv->scrub, &text);
   gauge(&text, "orbmorph_queue_limit", "Largest number of unfinished jobs.", (double)srv->options->queue_limit);
   gauge(&text, "orbmorph_decoding_bytes", "Bytes held by decoders of compressed bodies.",
         (double)__atomic_load_n(&srv->decoding, __ATOMIC_RELAXED));
@@ -74,11 +95,31 @@ static void metrics_away(request *r) {
   reply_text(r, 200, "text/plain; version=0.0.4; charset=utf-8", &text);
 }
 
+/* For ?verbose: what is wrong with the stored data. */
+static void write_integrity(const scrub_report *found, api_text *json) {
+  api_json_key(json, "integrity");
+  api_json_open(json, '{');
+  api_json_member_string(json, "catalogue", found->catalogue_damaged ? "damaged" : "ok");
+  api_json_member_integer(json, "quarantined", metrics_quarantined_count());
+  api_json_member_integer(json, "missing", found->missing);
+  api_json_member_integer(json, "unreadable", found->unreadable);
+  api_json_member_integer(json, "without_row", found->without_row);
+  api_json_member_integer(json, "scrubs", found->rounds);
+  api_json_member_integer(json, "scrubbed_objects", found->objects);
+  api_json_close(json, '}');
+}
+
 static enum MHD_Result ready(request *r) {
   server *srv = r->srv;
+  scrub_report found;
   int up = __atomic_load_n(&srv->ready, __ATOMIC_ACQUIRE) && !__atomic_load_n(&srv->stopping, __ATOMIC_ACQUIRE);
   if (!up) {
     reply_refuse(r, "unavailable", "The service is starting or stopping.");
+    return MHD_YES;
+  }
+  scrub_read(srv->scrub, &found);
+  if (found.catalogue_damaged) {
+    reply_refuse(r, "unavailable", "The catalogue is damaged: stop the service and restore a backup.");
     return MHD_YES;
   }
   api_text json = {0};
@@ -99,6 +140,8 @@ static enum MHD_Result ready(request *r) {
     api_json_member_integer(&json, "disk_free_bytes", (int64_t)objects_free_bytes(srv->store));
     api_json_member_integer(&json, "uptime_seconds", (int64_t)time(NULL) - srv->started);
     api_json_member_string(&json, "engine", ORB_ENGINE);
+    api_json_member_bool(&json, "read_only", objects_is_read_only(srv->store));
+    write_integrity(&found, &json);
   }
   api_json_close(&json, '}');
   reply_json(r, 200, &json);

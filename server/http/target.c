@@ -1,45 +1,80 @@
 #include "http/target.h"
 
+#include <gnutls/gnutls.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
 
 #include "api/problem.h"
 
-static void write_refusal(int fd, const char *number) {
-  char head[256];
-  api_problem problem = {0};
-  api_text body = {0};
-  api_refuse(&problem, "uri-too-long", "The query has more than %d parameters.", TARGET_PARAMETERS);
-  api_problem_write(&problem, &body);
-  int n = snprintf(head, sizeof head,
-                   "HTTP/1.1 414 URI Too Long\r\nContent-Type: application/problem+json\r\nCache-Control: no-store\r\n"
-                   "X-Request-Id: %s\r\nConnection: close\r\nContent-Length: %zu\r\n\r\n",
-                   number, body.size);
-  struct iovec parts[2] = {{head, (size_t)n}, {body.data, body.size}};
-  struct msghdr message = {.msg_iov = parts, .msg_iovlen = 2};
-  if (!body.failed) {
-    ssize_t sent = sendmsg(fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL); /* a few hundred bytes: whole or not at all */
+/* RECORD: of a parameter or header, beside its text. ANSWER: the largest head of an answer. */
+enum { RECORD = 64, ANSWER = 2048 };
+
+/* A few hundred bytes: whole or not at all. */
+static void write_bytes(const char *bytes, size_t size, int fd, gnutls_session_t session) {
+  if (session) {
+    gnutls_record_send(session, bytes, size);
+    gnutls_bye(session, GNUTLS_SHUT_WR);
+  } else {
+    ssize_t sent = send(fd, bytes, size, MSG_DONTWAIT | MSG_NOSIGNAL);
     (void)sent;
   }
-  api_text_free(&body);
-  api_problem_free(&problem);
 }
 
-int target_refused(const char *target, const char *number, int tls, struct MHD_Connection *connection) {
-  int parameters = 0;
-  for (const char *at = strchr(target, '?'); at; at = strchr(at + 1, '&')) {
-    parameters++;
-  }
-  if (parameters <= TARGET_PARAMETERS) {
-    return 0;
-  }
-  const union MHD_ConnectionInfo *fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-  if (fd && !tls) {
-    write_refusal(fd->connect_fd, number);
+static void refuse(struct MHD_Connection *connection, const char *number, const char *status, api_problem *problem) {
+  const union MHD_ConnectionInfo *fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD),
+                                 *tls = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_GNUTLS_SESSION);
+  api_text body = {0}, all = {0};
+  api_problem_write(problem, &body);
+  api_text_printf(&all,
+                  "HTTP/1.1 %s\r\nContent-Type: application/problem+json\r\nCache-Control: no-store\r\n"
+                  "X-Request-Id: %s\r\nConnection: close\r\nContent-Length: %zu\r\n\r\n",
+                  status, number, body.size);
+  api_text_append(&all, body.data ? body.data : "", body.size);
+  if (fd && !body.failed && !all.failed) {
+    write_bytes(all.data, all.size, fd->connect_fd, tls ? tls->tls_session : NULL);
   }
   if (fd) {
     shutdown(fd->connect_fd, SHUT_WR); /* what the library would send fails */
   }
+  api_text_free(&all);
+  api_text_free(&body);
+  api_problem_free(problem);
+}
+
+int target_refused(const char *target, const char *number, struct MHD_Connection *connection) {
+  size_t parameters = 0, size = strlen(target);
+  api_problem problem = {0};
+  for (const char *at = strchr(target, '?'); at; at = strchr(at + 1, '&')) {
+    parameters++;
+  }
+  if (parameters <= TARGET_PARAMETERS && size + RECORD * parameters <= TARGET_BYTES) {
+    return 0;
+  }
+  if (parameters > TARGET_PARAMETERS) {
+    api_refuse(&problem, "uri-too-long", "The query has more than %d parameters.", TARGET_PARAMETERS);
+  } else {
+    api_refuse(&problem, "uri-too-long",
+               "The target has %zu bytes and %zu parameters; bytes and %d for each parameter must be at most %d. "
+               "Send long requests as JSON, and landmarks as a resource (POST /v1/landmarks).",
+               size, parameters, RECORD, TARGET_BYTES);
+  }
+  refuse(connection, number, "414 URI Too Long", &problem);
+  return 1;
+}
+
+int target_headers_refused(const char *number, struct MHD_Connection *connection) {
+  const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+  api_problem problem = {0};
+  if (!info || info->header_size + ANSWER <= TARGET_MEMORY / 2) { /* the usual case, without counting */
+    return 0;
+  }
+  int records = MHD_get_connection_values(connection, MHD_HEADER_KIND | MHD_GET_ARGUMENT_KIND, NULL, NULL);
+  if (info->header_size + RECORD * (size_t)records + ANSWER <= TARGET_MEMORY) {
+    return 0;
+  }
+  api_refuse(&problem, "headers-too-large", "The headers have %zu bytes and %d lines and parameters; shorten them.",
+             info->header_size, records);
+  refuse(connection, number, "431 Request Header Fields Too Large", &problem);
   return 1;
 }

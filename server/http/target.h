@@ -1,15 +1,21 @@
-/* Targets of request lines that libmicrohttpd cannot take apart. */
+/* Requests whose line or headers libmicrohttpd cannot take apart or answer. */
 #ifndef ORB_HTTP_TARGET_H
 #define ORB_HTTP_TARGET_H
 
 #include <microhttpd.h>
 
-enum { TARGET_PARAMETERS = 128 }; /* of a query */
+/* Memory of a connection: what arrives before the body, a record of each parameter and header, and the head of the
+ * answer. */
+enum { TARGET_MEMORY = 16 * 1024 };
+/* Of a query; and of a target, with 64 bytes for each parameter. */
+enum { TARGET_PARAMETERS = 128, TARGET_BYTES = 10 * 1024 };
 
-/* libmicrohttpd keeps each parameter of a query in the memory of the connection, and when that is full it closes the
- * connection without an answer. So a target with more than TARGET_PARAMETERS is answered before it is taken apart, with
- * 414 written to the socket past the library; over TLS the connection closes without a response. 1: it was refused, and
- * nothing may follow on the connection. */
-int target_refused(const char *target, const char *number, int tls, struct MHD_Connection *connection);
+/* When the memory of a connection is full, libmicrohttpd closes it or waits, without an answer. So a target that would
+ * fill it is answered before it is taken apart, and headers that leave no room for an answer before one is made: with
+ * 414 or 431, written to the socket or the TLS session past the library. 1: it was refused, and nothing may follow on
+ * the connection. */
+int target_refused(const char *target, const char *number, struct MHD_Connection *connection);
+/* Once, when the headers have arrived. */
+int target_headers_refused(const char *number, struct MHD_Connection *connection);
 
 #endif

@@ -29,6 +29,7 @@ struct catalogue {
   database writer;
   database readers[DATABASE_READERS];
   int busy[DATABASE_READERS];
+  char path[PATH_MAX];
 };
 
 static store_result result_of(int code) {
@@ -176,8 +177,11 @@ static int open_all(catalogue *cat, const char *path) {
   return code;
 }
 
+const char *catalogue_path(const catalogue *cat) {
+  return cat->path;
+}
+
 store_result catalogue_open(const char *data, catalogue **out) {
-  char path[PATH_MAX];
   catalogue *cat = calloc(1, sizeof *cat);
   if (!cat) {
     return STORE_ERROR;
@@ -187,14 +191,14 @@ store_result catalogue_open(const char *data, catalogue **out) {
   pthread_cond_init(&cat->wake, NULL);
   pthread_cond_init(&cat->committed, NULL);
   pthread_cond_init(&cat->reader_free, NULL);
-  snprintf(path, sizeof path, "%s/catalogue.sqlite", data);
-  int code = open_all(cat, path);
+  snprintf(cat->path, sizeof cat->path, "%s/catalogue.sqlite", data);
+  int code = open_all(cat, cat->path);
   if (code == SQLITE_OK && pthread_create(&cat->thread, NULL, writer_main, cat) == 0) {
     cat->started = 1;
     *out = cat;
     return STORE_OK;
   }
-  log_error("the catalogue %s cannot be opened: %s", path, sqlite3_errstr(code));
+  log_error("the catalogue %s cannot be opened: %s", cat->path, sqlite3_errstr(code));
   catalogue_close(cat);
   return code == SQLITE_FULL ? STORE_FULL : STORE_ERROR;
 }

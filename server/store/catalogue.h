@@ -183,7 +183,7 @@ int catalogue_events(catalogue *cat, const char *job, int64_t after, int limit, 
 
 /* For --check-data. */
 int catalogue_integrity(catalogue *cat);
-/* PRAGMA quick_check, at the start: reads the whole catalogue. 0 with the first finding in `why`. */
+/* PRAGMA quick_check, at the start and in each scrub: reads the whole catalogue. 0 with the first finding in `why`. */
 int catalogue_quick_check(catalogue *cat, char *why, size_t size);
 /* The number of rows with invalid values; −1 if they cannot be read. */
 int64_t catalogue_damaged(catalogue *cat);

@@ -34,10 +34,13 @@ struct objects {
   pthread_rwlock_t publishing;
   pthread_mutex_t deleting;
   int backup_lock; /* −1: none */
+  int holds_backups;
   held_object *held;
   marks *verified;
   char root[PATH_MAX - 256];
   objects_remote remote; /* publish NULL: the store has files */
+  void (*heal)(void *user, object_kind kind, const char *id);
+  void *heal_user;
 };
 
 static store_result failed(const char *what, const char *path) {
@@ -337,10 +340,11 @@ store_result objects_load(const objects *store, object_kind kind, const char *id
 
 /* While this process shares the lock, no backup begins. 0: a backup runs. The caller holds `deleting`. */
 static int begin_deleting(const objects *store) {
-  return store->backup_lock < 0 || flock(store->backup_lock, LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+  return store->backup_lock < 0 || store->holds_backups || flock(store->backup_lock, LOCK_SH | LOCK_NB) == 0 ||
+         errno != EWOULDBLOCK;
 }
 static void end_deleting(const objects *store) {
-  if (store->backup_lock >= 0) {
+  if (store->backup_lock >= 0 && !store->holds_backups) {
     flock(store->backup_lock, LOCK_UN);
   }
 }
@@ -380,6 +384,13 @@ int objects_backup_runs(objects *store) {
   return runs;
 }
 
+int objects_hold_backups(objects *store) {
+  pthread_mutex_lock(&store->deleting);
+  store->holds_backups = begin_deleting(store);
+  pthread_mutex_unlock(&store->deleting);
+  return store->holds_backups;
+}
+
 static held_object *take_held(objects *store) {
   held_object *one = NULL;
   pthread_mutex_lock(&store->deleting);
@@ -416,8 +427,9 @@ int objects_is_marked(const objects *store, object_kind kind, const char *id) {
   return marks_have(store->verified, hash_of(kind, id));
 }
 
-/* Moves the file aside if it still has the name: it may have been replaced since it was read. */
-static store_result move_aside(const char *path, const char *aside, int fd) {
+/* Moves the file aside if it still has the name: it may have been replaced, or moved by another thread, since it was
+ * read. */
+static store_result move_aside(const char *path, const char *aside, int fd, int *moved) {
   struct stat read, named;
   if (stat(path, &named) != 0 || fstat(fd, &read) != 0) {
     return STORE_NOT_FOUND;
@@ -425,7 +437,13 @@ static store_result move_aside(const char *path, const char *aside, int fd) {
   if (read.st_ino != named.st_ino) {
     return STORE_OK;
   }
-  return rename(path, aside) == 0 ? STORE_NOT_FOUND : failed("rename to", aside);
+  *moved = rename(path, aside) == 0;
+  return *moved ? STORE_NOT_FOUND : failed("rename to", aside);
+}
+
+void objects_on_quarantine(objects *store, void (*heal)(void *user, object_kind kind, const char *id), void *user) {
+  store->heal = heal;
+  store->heal_user = user;
 }
 
 store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd) {
@@ -436,19 +454,62 @@ store_result objects_quarantine(objects *store, object_kind kind, const char *id
   objects_path(store, kind, id, path);
   snprintf(aside, sizeof aside, "%s/quarantine", store->root);
   store_result result = make_folder(aside);
+  int moved = 0;
   size_t n = strlen(aside);
   snprintf(aside + n, sizeof aside - n, "/%s-%s-%lld", folders[kind], id, (long long)time(NULL));
   if (result == STORE_OK) {
     objects_exclude(store);
-    result = move_aside(path, aside, fd);
+    result = move_aside(path, aside, fd, &moved);
     objects_let_go(store);
   }
-  if (result == STORE_NOT_FOUND) {
+  if (moved) {
     metrics_quarantined();
     snprintf(fields, sizeof fields, "\"object\":\"%s\",\"id\":\"%s\"", folders[kind], id);
     log_write(LOG_ERROR, fields, "a stored file does not match its hash and was moved to %s", aside);
+    if (store->heal) {
+      store->heal(store->heal_user, kind, id);
+    }
   }
   return result;
+}
+
+store_result objects_set_aside(objects *store, object_kind kind, const char *id) {
+  char path[PATH_MAX], aside[PATH_MAX];
+  objects_path(store, kind, id, path);
+  snprintf(aside, sizeof aside, "%s/lost+found", store->root);
+  store_result result = make_folder(aside);
+  size_t n = strlen(aside);
+  snprintf(aside + n, sizeof aside - n, "/%s-%s", folders[kind], id);
+  if (result == STORE_OK && rename(path, aside) != 0) {
+    result = failed("rename to", aside);
+  }
+  if (result == STORE_OK) {
+    utimensat(AT_FDCWD, aside, NULL, 0); /* objects_purge_lost() counts from now */
+  }
+  return result;
+}
+
+long objects_purge_lost(objects *store, int64_t before) {
+  char path[PATH_MAX];
+  long purged = 0;
+  snprintf(path, sizeof path, "%s/lost+found", store->root);
+  DIR *dir = opendir(path);
+  for (struct dirent *entry; dir && (entry = readdir(dir));) {
+    struct stat info;
+    if (entry->d_name[0] != '.' && fstatat(dirfd(dir), entry->d_name, &info, AT_SYMLINK_NOFOLLOW) == 0 &&
+        S_ISREG(info.st_mode) && info.st_mtime < before) {
+      purged += unlinkat(dirfd(dir), entry->d_name, 0) == 0;
+    }
+  }
+  if (dir) {
+    closedir(dir);
+  }
+  return purged;
+}
+
+int objects_is_read_only(const objects *store) {
+  struct statvfs info;
+  return !store->remote.publish && statvfs(store->root, &info) == 0 && (info.f_flag & ST_RDONLY);
 }
 
 uint64_t objects_free_bytes(const objects *store) {

@@ -90,6 +90,14 @@ void objects_delete_held(objects *store, int (*is_named)(void *user, object_kind
  * whoever deletes an object shares it for that moment. −1 with the reason logged. */
 int objects_backup_lock(const char *data);
 int objects_backup_runs(objects *store);
+/* Keeps backups waiting until objects_close(), so that nothing that this process deletes is held. 0: a backup runs. */
+int objects_hold_backups(objects *store);
+
+/* For --gc: an object without a row may be all that is left of a row that the catalogue lost, so it goes to the folder
+ * lost+found first, and is deleted after a while. */
+store_result objects_set_aside(objects *store, object_kind kind, const char *id);
+/* Deletes what was set aside before a Unix time in seconds. Returns the number of files. */
+long objects_purge_lost(objects *store, int64_t before);
 
 /* For store/verify.h: marks of verified objects, in memory. */
 void objects_mark(objects *store, object_kind kind, const char *id);
@@ -97,7 +105,11 @@ int objects_is_marked(const objects *store, object_kind kind, const char *id);
 /* Moves a wrong object, which was read through fd, out of the store. STORE_NOT_FOUND: done; STORE_OK: it has been
  * replaced meanwhile. */
 store_result objects_quarantine(objects *store, object_kind kind, const char *id, int fd);
+/* `heal` is called after each object that was moved to quarantine, on the thread that found it, which holds no lock. */
+void objects_on_quarantine(objects *store, void (*heal)(void *user, object_kind kind, const char *id), void *user);
 
+/* Whether the file system is mounted read-only, as the kernel does after errors of the disk. */
+int objects_is_read_only(const objects *store);
 /* Free bytes of the file system, for disk-reserve. */
 uint64_t objects_free_bytes(const objects *store);
 

@@ -243,18 +243,22 @@ int64_t catalogue_damaged(catalogue *cat) {
   return rows_integer(cat, db, st);
 }
 
-/* The pragma's first row is "ok", or the first finding. */
+/* The pragma's first row is "ok", or the first finding. A connection of its own: pages that another one has in memory
+ * hide what is wrong on the disk. */
 static int check_with(catalogue *cat, const char *pragma, char *why, size_t size) {
-  database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, pragma);
+  database db = {0};
+  sqlite3_stmt *st = NULL;
   snprintf(why, size, "it cannot be read");
+  if (database_open(catalogue_path(cat), 0, &db) == SQLITE_OK) {
+    st = database_statement(&db, pragma);
+  }
   if (st) {
     if (sqlite3_step(st) == SQLITE_ROW) {
       row_text(st, 0, why, size);
     }
     sqlite3_reset(st);
   }
-  catalogue_reader_done(cat, db);
+  database_close(&db);
   return strcmp(why, "ok") == 0;
 }
 

@@ -15,6 +15,8 @@ store_result catalogue_write(struct catalogue *cat, write_fn fn, void *arg);
 /* The same without waiting; frees arg with free(). */
 void catalogue_write_later(struct catalogue *cat, write_fn fn, void *arg);
 
+const char *catalogue_path(const struct catalogue *cat);
+
 database *catalogue_reader(struct catalogue *cat); /* waits until one is free */
 
 void catalogue_reader_done(struct catalogue *cat, database *db);

@@ -13,7 +13,7 @@ int verify_is_done(const objects *store, object_kind kind, const char *id) {
 }
 
 /* Hashes a file in parts, so that its size does not matter. */
-static int hash_file(int fd, char sha[API_ID_SIZE]) {
+static int hash_file(int fd, char sha[API_ID_SIZE], const verify_pace *pace) {
   enum { BLOCK = 1 << 18 };
   unsigned char *block = malloc(BLOCK);
   api_hash hash;
@@ -25,6 +25,9 @@ static int hash_file(int fd, char sha[API_ID_SIZE]) {
     } while (n < 0 && errno == EINTR);
     if (n > 0) {
       api_hash_add(&hash, block, (size_t)n);
+      if (pace && !pace->wait(pace->user, n)) {
+        n = -1;
+      }
     }
   }
   api_hash_end(&hash, sha);
@@ -32,7 +35,7 @@ static int hash_file(int fd, char sha[API_ID_SIZE]) {
   return n == 0;
 }
 
-store_result verify_again(objects *store, object_kind kind, const char *id, const char *sha) {
+store_result verify_slowly(objects *store, object_kind kind, const char *id, const char *sha, const verify_pace *pace) {
   int fd, wrong;
   uint64_t size;
   char found[API_ID_SIZE];
@@ -43,11 +46,14 @@ store_result verify_again(objects *store, object_kind kind, const char *id, cons
   if (kind == OBJECT_SPHERES) {
     result = spheres_check(store, id);
     wrong = result == STORE_CONFLICT;
+    if (pace) {
+      pace->wait(pace->user, (int64_t)size);
+    }
     if (result != STORE_OK && !wrong) {
       close(fd);
       return result;
     }
-  } else if (hash_file(fd, found)) {
+  } else if (hash_file(fd, found, pace)) {
     wrong = sha[0] && strcmp(found, sha) != 0;
   } else {
     close(fd);
@@ -60,6 +66,10 @@ store_result verify_again(objects *store, object_kind kind, const char *id, cons
   }
   close(fd);
   return result;
+}
+
+store_result verify_again(objects *store, object_kind kind, const char *id, const char *sha) {
+  return verify_slowly(store, kind, id, sha, NULL);
 }
 
 store_result verify_once(objects *store, object_kind kind, const char *id, const char *sha) {

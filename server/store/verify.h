@@ -1,6 +1,7 @@
-/* Objects against their hashes: each once after a start, before it is first served, and whenever a job found one wrong.
- * An object that does not match is quarantined: moved to the folder `quarantine` of the data folder, not deleted. The
- * store then lacks it, and an upload or a job restores it as it restores a lost one. */
+/* Objects against their hashes: each once after a start, before it is first served, whenever a job found one wrong, and
+ * in each scrub. An object that does not match is quarantined: moved to the folder `quarantine` of the data folder, not
+ * deleted. The store then lacks it: an upload restores a mesh, and what a job can make again loses its row
+ * (evict_damaged()), so that the next request makes it again. */
 #ifndef ORB_STORE_VERIFY_H
 #define ORB_STORE_VERIFY_H
 
@@ -14,5 +15,13 @@ int verify_is_done(const objects *store, object_kind kind, const char *id);
 store_result verify_once(objects *store, object_kind kind, const char *id, const char *sha);
 /* The same, also if it has been done. */
 store_result verify_again(objects *store, object_kind kind, const char *id, const char *sha);
+
+/* wait: called after each part that was read, with its bytes; 0 stops. */
+typedef struct verify_pace {
+  int (*wait)(void *user, int64_t bytes);
+  void *user;
+} verify_pace;
+/* The same at a pace; pace NULL: at once. STORE_ERROR: stopped, or the object could not be read. */
+store_result verify_slowly(objects *store, object_kind kind, const char *id, const char *sha, const verify_pace *pace);
 
 #endif

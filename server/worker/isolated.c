@@ -236,13 +236,21 @@ static int listen_to(isolated *p, const run_env *env, orb_context *ctx, api_job_
   }
 }
 
-/* The process found an input that does not match its hash. */
-static void quarantine_inputs(const run_env *env, const collected *all) {
+/* The process found an input that does not match its hash. Returns whether the job can be planned again: a damaged
+ * embedding lost its row. */
+static int quarantine_inputs(const run_env *env, const collected *all) {
+  int gone = 0;
   for (int i = 0; i < all->count; i++) {
-    if (all->heads[i].object != OBJECT_ALIGNMENT) { /* a wrong one is computed again */
-      verify_again(env->store, all->heads[i].object, all->heads[i].id, all->heads[i].sha);
+    resource row = {0};
+    if (all->heads[i].object == OBJECT_ALIGNMENT) { /* a wrong one is computed again */
+      continue;
     }
+    verify_again(env->store, all->heads[i].object, all->heads[i].id, all->heads[i].sha);
+    gone |= all->heads[i].object == OBJECT_SPHERE &&
+            catalogue_get(env->cat, RESOURCE_EMBEDDING, all->heads[i].id, &row) == STORE_NOT_FOUND;
+    resource_free(&row);
   }
+  return gone;
 }
 
 int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const run_job *j,
@@ -275,7 +283,7 @@ int isolated_run(const run_env *env, orb_context *ctx, api_job_kind kind, const 
   int fine = why == CHANNEL_OK ? listen_to(&process, env, ctx, kind, j, inputs.alignment, out, problem, &why) : -1;
   int status = isolate_close(&process);
   if (fine == 0 && problem->name && strcmp(problem->name, "corrupt") == 0) {
-    quarantine_inputs(env, &inputs);
+    out->gone |= quarantine_inputs(env, &inputs);
   }
   if (fine >= 0 || why == CHANNEL_STOPPED) {
     return fine > 0; /* stopped: the context has the error */

@@ -21,6 +21,20 @@ async function makeAsset(d) {
   });
 }
 
+test('with auth = off no file is for shared caches, as with a token', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'off'] });
+  const { url, asset } = await makeAsset(d);
+  const [embedding] = (await d.get('/v1/embeddings')).json.embeddings;
+  const [mesh] = (await d.get('/v1/meshes')).json.meshes;
+  for (const file of [asset, `${asset}?profile=meshopt`, `${url}/places`, `${url}/spheres/0.ply`, embedding.sphere]) {
+    const { status, headers } = await d.get(file);
+    assert.deepEqual([status, headers.get('cache-control')], [200, 'private, max-age=31536000, immutable'], file);
+    const again = await d.get(file, { headers: { 'if-none-match': headers.get('etag') } });
+    assert.deepEqual([again.status, again.headers.get('cache-control')], [304, headers.get('cache-control')], file);
+  }
+  assert.equal((await d.get(`${mesh.url}/file`)).headers.get('cache-control'), 'private, max-age=31536000, immutable');
+});
+
 test('an asset is immutable, comes in ranges, passes the validator and loads in three.js', async (t) => {
   const d = await daemon(t);
   const supermesh = await makeAsset(d);

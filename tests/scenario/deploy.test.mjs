@@ -41,6 +41,83 @@ test('the programs are hardened', {
     assert.match(symbols, /__stack_chk_fail@/, 'stack protector');
     assert.match(symbols, /__(snprintf|vsnprintf|memcpy)_chk@/, 'fortified calls');
   }
+  // The library, where it reads meshes.
+  const library = path.join(path.dirname(path.dirname(binaries.daemon)), 'core/liborbmorph.so');
+  assert.match(run('readelf', ['--dynamic', '--wide', library]).text, /FLAGS_1.*NOW/);
+  assert.match(run('readelf', ['--segments', '--wide', library]).text, /GNU_RELRO/);
+  const readers = path.join(path.dirname(path.dirname(library)), 'core/CMakeFiles/orbmorph_objects.dir/format');
+  for (const name of ['ply.c.o', 'obj.c.o', 'gltf.cc.o', 'gltf_accessor.cc.o'])
+    assert.match(run('readelf', ['--syms', '--wide', path.join(readers, name)]).text, /__stack_chk_fail/, name);
+});
+
+test('the bill of materials names all that the programs link and the studio bundles', {
+  skip: lacks('readelf') || lacks('dpkg-query'),
+}, () => {
+  const build = path.dirname(path.dirname(binaries.daemon));
+  const made = run('node', [path.join(root, 'deploy/sbom.mjs'), build]);
+  assert.equal(made.status, 0, made.text);
+  const bill = JSON.parse(made.text);
+  assert.deepEqual([bill.spdxVersion, bill.dataLicense, bill.SPDXID], ['SPDX-2.3', 'CC0-1.0', 'SPDXRef-DOCUMENT']);
+  const ids = bill.packages.map(({ SPDXID }) => SPDXID);
+  assert.equal(new Set(ids).size, ids.length);
+  for (const one of bill.packages) {
+    assert.match(one.SPDXID, /^SPDXRef-[A-Za-z0-9.-]+$/);
+    for (const member of [
+      'name',
+      'downloadLocation',
+      'licenseConcluded',
+      'licenseDeclared',
+      'copyrightText',
+      'supplier',
+    ])
+      assert.ok(one[member], `${one.name}: ${member}`);
+  }
+  for (const { spdxElementId, relatedSpdxElement } of bill.relationships)
+    for (const id of [spdxElementId, relatedSpdxElement]) assert.ok([...ids, bill.SPDXID].includes(id), id);
+  assert.equal(bill.relationships.length, ids.length, 'each package has its relation');
+
+  // Every library in the daemon's memory belongs to a package of the bill, in the version that is installed.
+  const versions = new Map(bill.packages.map(({ name, versionInfo }) => [name, versionInfo]));
+  const names = run('readelf', ['--dynamic', '--wide', binaries.daemon]).text.match(/(?<=NEEDED.*\[)[^\]]+/g);
+  assert.ok(names.length > 10, names.join());
+  const owners = run('dpkg-query', ['-S', ...names.map((name) => `*/${name}`)]).text;
+  for (const name of names) {
+    const found = [...owners.matchAll(/^([^:\s]+)[^\n]*: \/(.*)$/gm)].filter(
+      ([, , file]) => path.basename(file) === name,
+    );
+    const owner = found.map(([, owner]) => owner).find((owner) => versions.has(owner));
+    assert.ok(owner, `${name} has no package`);
+    assert.equal(versions.get(owner), run('dpkg-query', ['-W', '-f', `\${Version}`, owner]).text, owner);
+  }
+  for (const name of ['libeigen3-dev', 'libspectra-dev']) assert.ok(versions.has(name), name);
+  const { dependencies } = JSON.parse(readFileSync(path.join(root, 'client/web/package.json'), 'utf8'));
+  for (const [name, version] of Object.entries(dependencies)) assert.equal(versions.get(name), version, name);
+  assert.equal(
+    run('node', [path.join(root, 'deploy/sbom.mjs'), build]).text,
+    made.text,
+    'the same build, the same bytes',
+  );
+});
+
+test('the image is built from a base that is named by its digest', async (t) => {
+  const place = await folder(t);
+  const builder = path.join(place, 'builder');
+  const digest = `sha256:${'0123456789abcdef'.repeat(4)}`;
+  await writeFile(
+    builder,
+    `#!/bin/sh\necho "$@" >> ${place}/calls\n[ "$1 $2" = "image inspect" ] && echo docker.io/library/debian@${digest}\nexit 0\n`,
+    { mode: 0o755 },
+  );
+  const { status, text } = run('env', [`ORB_BUILDER=${builder}`, path.join(root, 'deploy/image.sh'), 'name']);
+  assert.equal(status, 0, text);
+  const [, reference] = /^base: (\S+)$/m.exec(text);
+  assert.match(reference, /^docker\.io\/library\/debian:12-slim@sha256:[0-9a-f]{64}$/);
+  const build = readFileSync(path.join(place, 'calls'), 'utf8').trim().split('\n').pop();
+  assert.ok(build.startsWith(`build --build-arg BASE=${reference} `), build);
+  assert.match(build, / -f deploy\/Dockerfile -t name \.$/);
+  const file = readFileSync(path.join(root, 'deploy/Dockerfile'), 'utf8');
+  assert.equal(file.match(/^FROM /gm).length, 2);
+  assert.match(file, /^FROM \$\{BASE\} AS build$[\s\S]*^FROM \$\{BASE\}$/m);
 });
 
 test('the unit denies what the daemon refuses: all but public addresses', async () => {

@@ -144,7 +144,7 @@ test('--gc removes derived objects beyond the budget and what no row names, and 
   await writeFile(twin, 'left behind');
   assert.match(await check(), / 0 wrong, 1 objects without a row/);
   const { stdout } = await gc('--derived-bytes', '1M');
-  assert.match(stdout, /^deleted object \S+ \(11 bytes\), which has no row/m);
+  assert.match(stdout, /^moved object \S+ \(11 bytes\), which has no row, to lost\+found$/m);
   assert.match(await check(), / 0 wrong, 0 objects without a row/);
 
   await d.start();

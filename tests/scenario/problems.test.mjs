@@ -153,6 +153,7 @@ test('sections name the facts that answers have', async (t) => {
     'cancelled',
     'unavailable',
     'storage-full',
+    'read-only', // scenario.read_only
     'timeout',
     'no-memory',
     'not-certified',
@@ -160,6 +161,7 @@ test('sections name the facts that answers have', async (t) => {
     'crashed',
     'job-crashed', // scenario.isolate provokes it
     'uri-too-long', // scenario.requests
+    'headers-too-large', // there, too
     'internal',
   ];
   assert.deepEqual(

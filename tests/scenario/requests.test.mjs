@@ -32,6 +32,46 @@ test('a query of very many parameters gets one clear answer', async (t) => {
   assert.equal((await d.get('/livez')).status, 200);
 });
 
+test('a query or headers of any length get one answer at once', async (t) => {
+  const d = await daemon(t);
+  const ask = (query, headers = '') =>
+    raw(d, `GET /v1/meshes?${query} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n${headers}\r\n`, {
+      wait: 5000,
+    });
+  const answers = async (reply, status, type, what) => {
+    assert.equal(reply.split('HTTP/1.1 ').length, 2, `${what}: ${reply}`);
+    assert.equal(statusOf(reply), status, `${what}: ${reply}`);
+    if (type) assert.match(reply, new RegExp(`"type":"/problems/${type}"`), what);
+  };
+  // Around the 16 KB of a connection's memory, and far beyond.
+  for (const size of [1000, 10_000]) await answers(await ask(`a=${'x'.repeat(size)}`), 400, 'bad-query', size);
+  for (const size of [10_400, 12_000, 15_000, 16_000, 16_250])
+    await answers(await ask(`a=${'x'.repeat(size)}`), 414, 'uri-too-long', size);
+  for (const size of [16_400, 17_000, 70_000]) await answers(await ask(`a=${'x'.repeat(size)}`), 414, null, size);
+  for (const count of [60, 100, 127]) {
+    const query = Array.from({ length: count }, (_, i) => `a${i}=${'y'.repeat(100)}`).join('&');
+    await answers(await ask(query), ...(count < 100 ? [400, 'bad-query'] : [414, 'uri-too-long']), `${count} of 100`);
+  }
+  for (const size of [8000, 13_000])
+    await answers(await ask('limit=1', `X-Long: ${'z'.repeat(size)}\r\n`), 200, null, `header of ${size}`);
+  for (const size of [14_500, 15_500, 16_000])
+    await answers(
+      await ask('limit=1', `X-Long: ${'z'.repeat(size)}\r\n`),
+      431,
+      'headers-too-large',
+      `header of ${size}`,
+    );
+  for (const size of [16_200, 17_000, 40_000])
+    await answers(await ask('limit=1', `X-Long: ${'z'.repeat(size)}\r\n`), 431, null, `header of ${size}`);
+  await answers(
+    await ask(`a=${'x'.repeat(9000)}`, `X-Long: ${'z'.repeat(6000)}\r\n`),
+    431,
+    'headers-too-large',
+    'both',
+  );
+  assert.equal((await d.get('/livez')).status, 200);
+});
+
 test('unknown paths, unknown ids, wrong methods', async (t) => {
   const d = await daemon(t);
   for (const target of [

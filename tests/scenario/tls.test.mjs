@@ -125,16 +125,30 @@ test('a morph over TLS', async (t) => {
   for (const version of ['TLSv1.2', 'TLSv1.3']) await speaks(version);
   for (const version of ['TLSv1', 'TLSv1.1']) await assert.rejects(speaks(version), undefined, version);
   // A request that cannot be read gets one answer, here too.
-  const reply = await new Promise((resolve, reject) => {
-    let text = '';
-    const socket = tls.connect({ port: Number(new URL(d.url).port), host: '127.0.0.1', ca }, () =>
-      socket.write('GET /livez HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n'),
-    );
-    socket.on('data', (bytes) => (text += bytes));
-    socket.on('error', reject).on('close', () => resolve(text));
-  });
+  const raw = (request) =>
+    new Promise((resolve, reject) => {
+      let text = '';
+      const socket = tls.connect({ port: Number(new URL(d.url).port), host: '127.0.0.1', ca }, () =>
+        socket.write(request),
+      );
+      socket.on('data', (bytes) => (text += bytes));
+      socket.on('error', reject).on('close', () => resolve(text));
+    });
+  const reply = await raw('GET /livez HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n');
   assert.match(reply, /^HTTP\/1\.1 400 /);
   assert.equal(reply.split('HTTP/1.1').length, 2, reply);
+  const many = Array.from({ length: 250 }, (_, i) => `a${i}=1`).join('&');
+  for (const [query, header, status, type] of [
+    [many, '', 414, 'uri-too-long'],
+    [`a=${'x'.repeat(12_000)}`, '', 414, 'uri-too-long'],
+    [`a=${'x'.repeat(16_200)}`, '', 414, 'uri-too-long'],
+    ['limit=1', `X-Long: ${'z'.repeat(15_500)}\r\n`, 431, 'headers-too-large'],
+  ]) {
+    const text = await raw(`GET /v1/meshes?${query} HTTP/1.1\r\nHost: localhost\r\n${header}\r\n`);
+    assert.ok(text.startsWith(`HTTP/1.1 ${status} `), `${status}: ${text}`);
+    assert.match(text, new RegExp(`"type":"/problems/${type}"`));
+    assert.equal(text.split('HTTP/1.1').length, 2, text);
+  }
   assert.equal((await send(d.url, '/readyz', { ca })).status, 200);
   d.child.kill('SIGTERM');
   assert.equal(await d.exited, 0, d.log);

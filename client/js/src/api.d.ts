@@ -662,6 +662,27 @@ export type Ready = {
   uptime_seconds?: number;
   /** The name and version of the engine. */
   engine?: string;
+  integrity?: Integrity;
+  /** The data folder is on a read-only file system: stored results are served, and nothing is stored. */
+  read_only?: boolean;
+};
+
+/** What is wrong with the stored data: as the last complete round of the scrub found it, but for quarantined. */
+export type Integrity = {
+  /** damaged: SQLite's quick_check found damage; /readyz then answers 503. */
+  catalogue: 'ok' | 'damaged';
+  /** Stored files that did not match their hash, since the start. */
+  quarantined: number;
+  /** Stored files that a row names and that do not exist: upload the mesh again. */
+  missing: number;
+  /** Stored files that could not be read. */
+  unreadable: number;
+  /** Stored files that no row names. A crash leaves one or two; more mean that the catalogue has lost rows. */
+  without_row: number;
+  /** Complete rounds since the start. */
+  scrubs: number;
+  /** Stored files that the last round compared with their hashes. */
+  scrubbed_objects: number;
 };
 
 /** The headers are ambiguous, or the route takes no body but the request has one. The daemon closes the connection. */
@@ -1198,6 +1219,15 @@ export type ProblemUnavailable = {
   type: '/problems/unavailable';
   title: 'The service is unavailable';
   status: 503;
+  /** What is wrong and what to do. */
+  detail: string;
+};
+
+/** The data folder is on a read-only file system. Stored results are still served. */
+export type ProblemReadOnly = {
+  type: '/problems/read-only';
+  title: 'The data folder is read-only';
+  status: 507;
   /** What is wrong and what to do. */
   detail: string;
 };
