@@ -31,7 +31,7 @@ queue_result queue_wait_for(queue *q, job *j, char (*keys)[API_ID_SIZE], const c
     }
   }
   if (result != QUEUE_OK) {
-    j->retry_at = orb_clock_ms() + 1000;
+    j->retry_at = orb_clock_ms() + RETRY_SOON_MS;
   }
   if (j->cancel) { /* cancelled in the meantime */
     j->waits_for = 0;

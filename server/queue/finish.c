@@ -131,7 +131,7 @@ static void finish_as(queue *q, job *j, job_end *end) {
   if (stored != STORE_OK) {
     log_error("the end of job %s could not be stored; the job will run again", j->row.id);
     pthread_mutex_lock(&q->lock);
-    j->retry_at = orb_clock_ms() + 5000;
+    j->retry_at = orb_clock_ms() + RETRY_AFTER_STORE_MS;
     pthread_mutex_unlock(&q->lock);
     queue_give_back(q, j);
     return;
@@ -169,7 +169,7 @@ void queue_give_back(queue *q, job *j) {
     j->row.attempt -= stored == STORE_OK;
     j->stage[0] = 0;
     if (stored != STORE_OK) { /* the row still says that it runs: the next claim corrects it */
-      j->retry_at = orb_clock_ms() + 5000;
+      j->retry_at = orb_clock_ms() + RETRY_AFTER_STORE_MS;
     }
   }
   show_queued(j);
@@ -192,7 +192,7 @@ int queue_crashed(queue *q, job *j, int is_sure) {
   j->row.suspect = !is_sure;
   j->stage[0] = 0;
   if (stored != STORE_OK) { /* the row still says that it runs: the next claim corrects it */
-    j->retry_at = orb_clock_ms() + 5000;
+    j->retry_at = orb_clock_ms() + RETRY_AFTER_STORE_MS;
   }
   schedule_leave(q, j);
   job_unref(j);
@@ -210,7 +210,7 @@ int queue_runs_alone(queue *q, job *j) {
 void queue_put_off(queue *q, job *j) {
   pthread_mutex_lock(&q->lock);
   show_queued(j);
-  j->retry_at = orb_clock_ms() + 1000;
+  j->retry_at = orb_clock_ms() + RETRY_SOON_MS;
   schedule_leave(q, j);
   job_unref(j);
   pthread_mutex_unlock(&q->lock);

@@ -13,7 +13,9 @@ enum { GUEST_MEMORY = 8 };                    /* guests may need this fraction (
 static const int64_t LARGE = 300000;          /* a job with more triangles than this is large */
 static const int64_t BYTES_A_TRIANGLE = 1024; /* estimate of a running job's memory */
 static const int64_t TRIANGLES_A_MS = 100;    /* estimate of a worker's speed, charged until the time is known */
-static const int64_t EVENT_STRIDE = 1000000;  /* event numbers of an attempt start above attempt times this */
+/* A job goes back into the queue for so long after the store has failed to end it, and after it failed to begin it. */
+static const int64_t RETRY_AFTER_STORE_MS = 5000, RETRY_SOON_MS = 1000;
+static const int64_t EVENT_STRIDE = 1000000; /* event numbers of an attempt start above attempt times this */
 
 typedef struct job_event {
   int64_t number;

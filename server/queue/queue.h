@@ -11,10 +11,12 @@
  *   table.c         lookup by id and key, references, counts
  *   lifecycle.c     start, recovery after a crash, stop
  *
- * The retry of a job: if the store fails, queue_finish(), queue_give_back() and queue_put_off() in finish.c set
- * retry_at, before which schedule.c does not choose the job. After a crash, queue_recover() in lifecycle.c queues what
- * was running again; with isolate = off, catalogue_recover() in store/jobs.c counts the crashes and fails a job after
- * MOST_CRASHES. Otherwise jobs have processes of their own, and queue_crashed() in finish.c counts the deaths of those.
+ * The retry of a job. A job that fails is not retried. The queue runs a job again in two cases. After the store fails,
+ * queue_finish(), queue_give_back() and queue_put_off() in finish.c and queue_wait_for() in dependencies.c set
+ * retry_at, before which schedule.c does not choose the job. After the job's process dies, queue_crashed() in finish.c
+ * counts the death and queues the job again, until it has died MOST_CRASHES times. With isolate = off the daemon dies,
+ * too: then queue_recover() in lifecycle.c queues what was running, and catalogue_recover() in store/jobs.c counts. New
+ * requests for work whose processes died CRASHES_MOST times are refused (store/crashes.h).
  *
  * Contract. One lock guards all of it; it is held for short steps only, never during input or output. The catalogue is
  * authoritative: a job is taken, shown as accepted, or shown as ended only after its row was committed, so everything
@@ -40,12 +42,13 @@
 
 #include "orbmorph/context.h"
 #include "store/catalogue.h"
+#include "store/crashes.h"
 
 /* A priority is QUEUE_URGENCIES · class + urgency. Classes come from tokens and order all jobs; urgencies order the
  * jobs of one owner. */
 enum { QUEUE_URGENCIES = 8 };
 
-enum { MOST_CRASHES = 3 }; /* of a job, alone */
+enum { MOST_CRASHES = CRASHES_MOST }; /* of a job, alone */
 
 typedef struct queue queue;
 typedef struct job job;

@@ -1,4 +1,5 @@
-/* Every threshold, weight and count of the search for correspondences, for this folder and auto.c.
+/* The thresholds, weights and counts of the search for correspondences, for this folder and auto.c. A constant that
+ * only one function needs stays beside it: two in align/auto.c, two in suspects.c.
  *
  * Units. "Of the diagonal": a distance in space, relative to the diagonal of the shape's bounding box. Costs and
  * ratios have no unit.

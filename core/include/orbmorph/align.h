@@ -24,16 +24,16 @@ ORB_API void orb_align_defaults(orb_align_options *options);
  * - pin: embeds the shapes anew with the landmarks as constraints, which meet at their spherical means. Where landmarks
  *   would have to pass through one another, pin splits edges, and the landmarks meet at the first shape's points or at
  *   new ones. After pin and rbf the vertices of a landmark have bit-equal points on all shapes.
- * - auto: pin if there are landmarks. Otherwise the rotation search, and then a match of each later shape with the
- *   first: of spectral maps and rotations, the one that bends coarse copies of both shapes least. The composed map
- * sends each vertex to where the match takes it. The preset fast does the rotation search only. `found` shows what was
- *   matched.
+ * - auto: pin if there are landmarks. Without landmarks, auto searches for rotations. Then it matches each later shape
+ *   with the first: it tries spectral maps and rotations, and keeps the one that bends coarse copies of both shapes
+ *   least. The composed map sends each vertex to where the match takes it. The preset fast only searches for rotations.
+ *   `found` shows what was matched.
  *
  * Landmarks at the same place on every shape are merged: they share a vertex. Errors: ORB_E_BAD_LANDMARKS names
- * landmarks that are out of range or share a place on some shapes only; in a set that cannot be met, it names the first
- * landmark that cannot be met together with those before it. ORB_E_BAD_OPTION: pin or rbf without landmarks. About
- * O(n log n) in triangles. Landmarks that lie at unrelated places of the shapes cost much more than landmarks that
- * roughly correspond; a set that needs more than about a minute of work is refused as one that cannot be met. */
+ * landmarks that are out of range or share a place on some shapes only. If the landmarks cannot all be met, it names
+ * the first one that conflicts with those before it. ORB_E_BAD_OPTION: pin or rbf without landmarks. About O(n log n)
+ * in triangles. Landmarks that lie at unrelated places of the shapes cost much more than landmarks that roughly
+ * correspond; a set that needs more than about a minute of work is refused as one that cannot be met. */
 ORB_API ORB_MUST_CHECK orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                             const orb_landmark *landmarks, int32_t landmark_count,
                                             const orb_align_options *options, orb_alignment *out);

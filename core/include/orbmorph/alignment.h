@@ -55,8 +55,9 @@ typedef struct orb_alternative {
   orb_place at[2 * ORB_ALTERNATIVE_PAIRS]; /* count × 2 places, on the given meshes */
 } orb_alternative;
 
-/* What the search without landmarks knows of its best rough map; of several shapes, the worst of each member. Where a
- * rotation of the spheres alone is a good map already, the alignment is that one instead. */
+/* What the search without landmarks knows of its best rough map; with several later shapes, each
+ * member holds the worst value. If a rotation of the spheres already gives a good map, the alignment uses that rotation
+ * and not the rough map. */
 typedef struct orb_match_facts {
   int32_t is_measured; /* 0: landmarks were given, the preset is fast, or no rough map was found */
   double bend;         /* of the best rough map: 0 for a rigid motion */
@@ -65,7 +66,7 @@ typedef struct orb_match_facts {
                           (docs/bench-confidence.md) */
 } orb_match_facts;
 
-/* A given landmark that may be misplaced: once the map is let go of, the surface takes it far away. */
+/* A given landmark that may be misplaced. When the optimiser no longer holds it, it moves far from its given place. */
 typedef struct orb_suspect {
   int32_t landmark, shape; /* shape: the later one of the pair with the first shape */
   double share;            /* of the pair's distortion: what lies nearer to this landmark than to the others */

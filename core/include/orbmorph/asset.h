@@ -43,9 +43,10 @@ typedef struct orb_asset_facts {
  * deltas. Texture coordinates, materials and their images are those of the first shape. Parts whose material has a
  * texture that bends normals get tangents, which morph like normals.
  *
- * Two supermesh vertices that would coincide in every shape after rounding to float32 are kept distinct: the one that
- * is not a landmark, or else the one with the higher number, moves on the first shape by the fewest units in the last
- * place of its largest coordinates, at most 16. ORB_E_NOT_CERTIFIED if that does not suffice.
+ * Two supermesh vertices that would coincide in every shape after rounding to float32 are kept distinct. One of them
+ * moves on the first shape: the one that is not a landmark, else the one with the higher number. It moves by as few
+ * units in the last place of its largest coordinates as possible, at most 16. ORB_E_NOT_CERTIFIED if that does not
+ * suffice.
  *
  * Errors: ORB_E_BAD_OPTION, ORB_E_TOO_LARGE (4 GiB), ORB_E_NO_MEMORY. Stage "write". O(V·N). */
 ORB_API ORB_MUST_CHECK orb_status orb_asset_write(orb_context *ctx, const orb_supermesh *supermesh,
@@ -62,7 +63,8 @@ ORB_API ORB_MUST_CHECK orb_status orb_asset_dropped(orb_context *ctx, const orb_
 typedef struct orb_fit_report {
   orb_fit kind; /* what was done: never AUTO; NONE for the first shape */
   double scale, rotation_degrees;
-  double translation_relative; /* how far the mean of the shape's fitted points moves, by the first shape's diagonal */
+  double translation_relative; /* distance that the mean of the shape's fitted points moves, divided by the first
+                                  shape's diagonal */
   double up_degrees;           /* angle by which the y axis turns */
 } orb_fit_report;
 

@@ -40,8 +40,8 @@ typedef struct orb_error {
   int32_t landmark_count; /* bad-landmarks: their indices in the request */
   int32_t landmarks[ORB_ERROR_ITEMS];
   int32_t shape; /* the offending shape, −1 if none in particular */
-  /* not-genus-zero: closed walks along edges of the file, one for each handle as far as there is room. Loop i has the
-   * vertices loop_vertices[loop_start[i]] … loop_vertices[loop_start[i + 1] − 1], each once. */
+  /* not-genus-zero: closed walks along edges of the file. Each handle has one, until the arrays are full. Loop i has
+   * the vertices loop_vertices[loop_start[i]] … loop_vertices[loop_start[i + 1] − 1], each once. */
   int32_t loop_count, loop_start[ORB_ERROR_ITEMS + 1];
   double loop_length_relative[ORB_ERROR_ITEMS]; /* to the diagonal */
   int32_t loop_vertices[ORB_ERROR_LOOP_VERTICES];

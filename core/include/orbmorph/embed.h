@@ -17,9 +17,9 @@ typedef struct orb_certificate {
   double min_determinant;      /* the smallest det(p,q,r), rounded */
 } orb_certificate;
 
-/* Certifies points (3 a vertex, unit up to rounding) of a closed triangle list. Orientation by a static filter, then
- * exact integers; degree by counting, with signs, the triangles that cover a direction in general position, all decided
- * by exact orientations. (The sum of solid angles / 4π is the same number, but only up to rounding.) Every triangle at
+/* Certifies points (3 a vertex, unit up to rounding) of a closed triangle list. A static filter decides
+ * orientations; exact integers decide the rest. The degree is a signed count of the triangles that cover one direction
+ * in general position. (The sum of solid angles / 4π is the same number, but only up to rounding.) Every triangle at
  * a point that is not finite counts as degenerate. The result is in out->valid; the call itself fails only if memory
  * runs out or it is cancelled. O(F). */
 ORB_API ORB_MUST_CHECK orb_status orb_certify(orb_context *ctx, const double *points, int32_t vertex_count,

@@ -15,9 +15,9 @@ ORB_API ORB_MUST_CHECK orb_status orb_alignment_write(orb_context *ctx, const or
                                                       const orb_alignment *alignment, orb_buffer *out);
 
 /* Reads an alignment of the same shapes, bit for bit as it was written; computes the certificates again.
- * ORB_E_BAD_OPTION: the bytes are damaged, of another version, or not of these shapes; then *out is zeroed, and compute
- * the alignment anew. Damage that leaves valid numbers, such as a point moved on the sphere, shows only if a triangle
- * flips: store a hash beside the bytes. O(n). */
+ * ORB_E_BAD_OPTION: the bytes are damaged, of another version, or not of these shapes; the function then zeroes *out.
+ * Compute the alignment again. Damage that leaves valid numbers, such as a point moved on the sphere, shows only if a
+ * triangle flips: store a hash beside the bytes. O(n). */
 ORB_API ORB_MUST_CHECK orb_status orb_alignment_read(orb_context *ctx, const void *bytes, size_t size,
                                                      const orb_align_shape *shapes, int32_t shape_count,
                                                      orb_alignment *out);

@@ -68,11 +68,11 @@ typedef struct orb_merge_result {
   orb_supermesh supermesh;
   orb_shape_report *shapes; /* shape_count */
   /* landmark_count × shape_count: distance from the requested place to the landmark's supermesh vertex, in units of
-   * the shape's diagonal. For a landmark without a vertex, the distance to the shape's place at the mean of the
-   * landmark's points on the sphere. */
+   * the shape's diagonal. If a landmark has no vertex: to the shape's place at the mean of the landmark's points
+   * on the sphere. */
   double *landmark_residuals;
-  /* found_count × shape_count: the same for found landmarks, measured to the position of the supermesh at their point
-   * of the sphere. */
+  /* found_count × shape_count: for each found landmark, the distance from its place to the point of the supermesh
+   * that lies at the landmark's point on the sphere. */
   double *found_residuals;
   int32_t pair_count;
   orb_pair_report *pairs;
@@ -97,18 +97,18 @@ typedef struct orb_merge_result {
 ORB_API ORB_MUST_CHECK orb_status orb_merge(orb_context *ctx, const orb_align_shape *shapes, const char *const *names,
                                             int32_t shape_count, const orb_landmark *landmarks, int32_t landmark_count,
                                             const orb_merge_options *options, orb_merge_result *out);
-/* The same with an alignment of these shapes and landmarks, as orb_align() or orb_alignment_read() gave it, so that the
- * result is that of orb_merge(), with timings.align 0. Takes *alignment over and zeroes it, also on an error. */
+/* Merges with an alignment that orb_align() or orb_alignment_read() gave for these shapes and landmarks. The result is
+ * that of orb_merge(), but timings.align is 0. Takes *alignment over and zeroes it, also on an error. */
 ORB_API ORB_MUST_CHECK orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes,
                                                     const char *const *names, int32_t shape_count,
                                                     const orb_landmark *landmarks, orb_alignment *alignment,
                                                     const orb_merge_options *options, orb_merge_result *out);
 ORB_API void orb_merge_result_free(orb_context *ctx, orb_merge_result *result);
 
-/* Marks the triangles of the supermesh that are inverted on shape s: they face away from the mean of the input's smooth
- * normals at their corners, and also from its face at their centre on the sphere. positions: 3 a supermesh vertex, on
- * the shape. inverted: receives 1 or 0 for each triangle. The report of a merge has only their number: call this
- * function to show them, or for a supermesh of orb_remesh(). */
+/* Marks the triangles of the supermesh that are inverted on shape s: they face away from two directions, the mean of
+ * the input's smooth normals at their corners, and the normal of its triangle at their centre on the sphere. positions:
+ * 3 a supermesh vertex, on the shape. inverted: receives 1 or 0 for each triangle. The report of a merge has only their
+ * number: call this function to show them, or for a supermesh of orb_remesh(). */
 ORB_API ORB_MUST_CHECK orb_status orb_mark_inverted(orb_context *ctx, const orb_supermesh *supermesh,
                                                     const orb_aligned_shape *shape, int32_t s, const double *positions,
                                                     unsigned char *inverted);

@@ -24,7 +24,8 @@ typedef struct orb_repair {
 } orb_repair;
 
 /* A handle that ORB_REPAIR_CLOSE_HANDLES closed: the surface is cut along a loop, and a patch covers each of the two
- * rims. Around the handle this cuts the handle; around its tunnel it fills the tunnel. */
+ * rims. If the loop goes around the handle, the repair cuts the handle. If it goes around the tunnel, the repair fills
+ * the tunnel. */
 typedef struct orb_handle {
   int32_t start, count; /* the loop: mesh.loop_vertices[start] …, numbers of the file, in order; it is closed */
   double length_relative, area_relative; /* of the loop, to the diagonal; of both patches, to its square */

@@ -24,7 +24,7 @@ typedef struct orb_profile_facts {
    * and at all weights of several targets whose sum is at most 1. In units of the asset; computed from the stored
    * values, with the rounding of float32 arithmetic that a renderer adds. */
   double position_error;
-  /* That, divided by the smallest diagonal of the boxes that bound the base and the targets at full weight. */
+  /* position_error divided by the smallest bounding-box diagonal: of the base, and of each target at full weight. */
   double position_relative;
   /* The largest angle between a normal and that of the float asset, at every weight from 0 to 1 of one target; below 1.
    * 0 without normals. */

@@ -48,9 +48,9 @@ typedef struct orb_supermesh {
   int32_t degree;             /* 1 */
 } orb_supermesh;
 
-/* Makes one supermesh for all aligned shapes, whose meshes and points must be certified; landmark vertices that it is
- * to keep must have bit-equal points on all shapes. Where a supermesh vertex is a vertex of a shape, its place is
- * exactly that corner. overlay, subdivision and convex-hull keep all input vertices; adaptive keeps the landmarks.
+/* Makes one supermesh for all aligned shapes. The caller passes certified meshes and points. A landmark that the
+ * supermesh keeps must have bit-equal points on all shapes. Where a supermesh vertex is a vertex of a shape, its place
+ * is exactly that corner. overlay, subdivision and convex-hull keep all input vertices; adaptive keeps the landmarks.
  * convex-hull is the baseline of Peng & Timalsena 2016, Fig. 11: the Delaunay triangulation of all vertices, at most 4
  * million; its error is proved but not controlled. options NULL: defaults. Errors: ORB_E_BAD_OPTION, ORB_E_UNSUPPORTED,
  * ORB_E_TOO_LARGE, ORB_E_NOT_CERTIFIED. Stage "remesh". */

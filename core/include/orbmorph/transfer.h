@@ -12,8 +12,9 @@ extern "C" {
 ORB_API ORB_MUST_CHECK orb_status orb_transfer_positions(orb_context *ctx, const orb_aligned_shape *shape,
                                                          const orb_place *places, int32_t count, double *out);
 
-/* How well shape s is reproduced; lengths in its own units. Samples are face centres, edge midpoints and vertices: all
- * where no bound is proved, else at most 4096 of each kind and surface, which give rms and angles to about 2 %. */
+/* How well shape s is reproduced; lengths in its own units. Samples are face centres, edge midpoints and vertices.
+ * Without a proved bound all of them count. With one, at most 4096 of each kind on each surface count; they give rms
+ * and angles to about 2 %. */
 typedef struct orb_shape_report {
   double hausdorff;               /* the supermesh's proved bound, both ways; NaN: none is proved */
   double hausdorff_sampled;       /* both ways, at the samples; apart from rounding, never above the true distance */
