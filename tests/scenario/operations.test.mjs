@@ -174,7 +174,8 @@ test('worker-nice lowers the priority of workers and of the threads of their job
     [{ env: { ORBMORPH_WORKER_NICE: '9' } }, 9],
   ]) {
     if (level <= own) continue; // these tests themselves run at a level that cannot be left
-    const d = await daemon(t, { ...more, args: ['--workers', '2', ...(more.args ?? [])] });
+    const args = ['--workers', '2', '--scrub-rate', '0', ...(more.args ?? [])]; // the scrub has a level of its own
+    const d = await daemon(t, { ...more, args });
     const { json } = await d.upload(shapes.obj(shapes.ball(5, ([x, y, z]) => [x, 1.2 * y, z])));
     const job = (await d.post('/v1/embeddings', { mesh: json.id })).json;
     await until(async () => (await levels(d))[level] >= 2, 'two workers are at their level');

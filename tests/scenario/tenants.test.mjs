@@ -223,13 +223,17 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
 
   // What Ann has is made for Bob anew as far as he can see, but for the time it takes.
   const one = await end(ann, (await ask(ann)).json);
-  // The one worker is busy with something else while Bob looks, for a result that is there comes at once.
+  // The one worker is busy with Ann's job, and Bob's other job runs beside it, while Bob looks: a result that is there
+  // comes at once.
   const blocker = (await ask(ann, endless)).json;
   await until(async () => (await d.get(blocker.url, ann)).json.state === 'running', 'the worker is busy');
+  const beside = (await ask(bob, { ...endless, options: { ...endless.options, step: 0.011 } })).json;
+  await until(async () => (await d.get(beside.url, bob)).json.state === 'running', 'Bob has a job that runs');
   const began = Date.now();
   const reply = await ask(bob);
   assert.equal(reply.status, 202);
   assert.deepEqual(await list(bob, 'embeddings'), []);
+  assert.equal((await d.delete(beside.url, bob)).status, 200);
   assert.equal((await d.delete(blocker.url, ann)).status, 200);
   const two = await end(bob, reply.json);
   assert.equal(two.result, one.result);
