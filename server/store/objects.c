@@ -85,6 +85,15 @@ static void sweep(const char *folder) {
   }
 }
 
+/* The folders of objects of one kind are made with their first object: 256 a kind would take most of a first start. */
+store_result objects_make_folder(const objects *store, object_kind kind, const char *id) {
+  char path[PATH_MAX];
+  snprintf(path, sizeof path, "%s/objects/%s/%.2s", store->root, folders[kind], id);
+  store_result status = make_folder(path);
+  *strrchr(path, '/') = 0;
+  return status == STORE_OK ? sync_folder(path) : status; /* another thread may have made it and not synced it yet */
+}
+
 static store_result make_folders(const objects *store) {
   char path[PATH_MAX];
   store_result status = STORE_OK;
@@ -96,12 +105,6 @@ static store_result make_folders(const objects *store) {
   for (int kind = 0; kind < OBJECT_KINDS && status == STORE_OK; kind++) {
     snprintf(path, sizeof path, "%s/objects/%s", store->root, folders[kind]);
     status = make_folder(path);
-    for (int shard = 0; shard < 256 && status == STORE_OK; shard++) {
-      char inner[PATH_MAX];
-      snprintf(inner, sizeof inner, "%s/objects/%s/%02x", store->root, folders[kind], (unsigned)shard);
-      status = make_folder(inner);
-    }
-    status = status == STORE_OK ? sync_folder(path) : status;
   }
   snprintf(path, sizeof path, "%s/objects", store->root);
   status = status == STORE_OK ? sync_folder(path) : status;
@@ -262,8 +265,14 @@ store_result objects_publish(objects *store, object_temp *temp, object_kind kind
   }
   FAULT_POINT("publish-synced");
   temp_path(temp, from);
-  if (rename(from, path) != 0) {
-    store_result status = failed("rename to", path);
+  store_result status = STORE_OK;
+  int renamed = rename(from, path) == 0;
+  if (!renamed && errno == ENOENT && (status = objects_make_folder(store, kind, id)) == STORE_OK) {
+    FAULT_POINT("publish-folder");
+    renamed = rename(from, path) == 0;
+  }
+  if (!renamed) {
+    status = status == STORE_OK ? failed("rename to", path) : status;
     objects_abandon(temp);
     return status;
   }
@@ -527,7 +536,7 @@ store_result objects_each(const objects *store,
     for (int shard = 0; shard < 256; shard++) {
       char path[PATH_MAX];
       snprintf(path, sizeof path, "%s/objects/%s/%02x", store->root, folders[kind], (unsigned)shard);
-      DIR *dir = opendir(path);
+      DIR *dir = opendir(path); /* not there: no object in it so far */
       for (struct dirent *entry; dir && (entry = readdir(dir));) {
         struct stat info;
         if (entry->d_name[0] != '.' && fstatat(dirfd(dir), entry->d_name, &info, 0) == 0) {
@@ -536,7 +545,7 @@ store_result objects_each(const objects *store,
       }
       if (dir) {
         closedir(dir);
-      } else {
+      } else if (errno != ENOENT) {
         result = failed("open", path);
       }
     }

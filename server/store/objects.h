@@ -80,6 +80,8 @@ store_result objects_read(const objects *store, object_kind kind, const char *id
 store_result objects_load(const objects *store, object_kind kind, const char *id, unsigned char **bytes, size_t *size);
 /* The path of an object's file, which may not exist. */
 void objects_path(const objects *store, object_kind kind, const char *id, char out[PATH_MAX]);
+/* Makes the folder of that file, if it is not there. */
+store_result objects_make_folder(const objects *store, object_kind kind, const char *id);
 
 /* Deletes an object that no row names. While a backup runs, the file stays until objects_delete_held(). */
 store_result objects_delete(objects *store, object_kind kind, const char *id);

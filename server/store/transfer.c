@@ -69,14 +69,16 @@ static store_result compare(const transfer *t, const objects *from, const char *
 }
 
 /* 1: linked; 0: the file systems do not allow it, or it failed. A backup deletes a name that a killed one left. */
-static int link_to(const transfer *t) {
+static int link_to(const transfer *t, const objects *to) {
   char source[64], temp[PATH_MAX];
   snprintf(source, sizeof source, "/proc/self/fd/%d", t->source); /* the file that was read, whatever has its name */
   if (snprintf(temp, sizeof temp, "%s.new", t->path) >= (int)sizeof temp) {
     return 0;
   }
   unlink(temp);
-  if (linkat(AT_FDCWD, source, AT_FDCWD, temp, AT_SYMLINK_FOLLOW) != 0) {
+  if (linkat(AT_FDCWD, source, AT_FDCWD, temp, AT_SYMLINK_FOLLOW) != 0 &&
+      (errno != ENOENT || objects_make_folder(to, t->object->kind, t->id) != STORE_OK ||
+       linkat(AT_FDCWD, source, AT_FDCWD, temp, AT_SYMLINK_FOLLOW) != 0)) {
     return 0;
   }
   if (rename(temp, t->path) == 0) {
@@ -124,7 +126,7 @@ store_result transfer_object(const objects *from, objects *to, const char *id, c
     if (result == STORE_OK && links) {
       result = compare(&t, from, sha);
     }
-    if (result == STORE_OK && !(links && link_to(&t))) {
+    if (result == STORE_OK && !(links && link_to(&t, to))) {
       result = copy_to(&t, from, to);
     }
     *made = result == STORE_OK;
