@@ -169,7 +169,7 @@ static int take(const char *folder, const char *data) {
 static int run_backup(const char *folder, const config *options) {
   umask(077);
   if (!has(options->data, "catalogue.sqlite")) {
-    complain(options->data, "is no data folder: give that of the service with --data");
+    complain(options->data, "is not a data folder: name that of the service with --data");
     return 1;
   }
   int empty = is_empty(folder);

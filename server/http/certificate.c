@@ -94,7 +94,7 @@ int certificate_load(const char *chain_path, const char *key_path) {
     code = parse(&chain, &key, made);
   }
   if (chain.size && key.size && code < 0) {
-    log_error("%s and %s are no certificate with its key, in PEM: %s", chain_path, key_path, gnutls_strerror(code));
+    log_error("%s and %s are not a certificate and its key in PEM: %s", chain_path, key_path, gnutls_strerror(code));
   }
   if (code < 0 || (last && strcmp(last->id, made->id) == 0)) {
     free_one(made);

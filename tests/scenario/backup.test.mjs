@@ -140,7 +140,7 @@ test('a backup and a restore refuse what they would overwrite, and report damage
 
   for (const [words, why] of [
     [['backup', d.data, '--data', d.data], /is neither empty nor a backup/],
-    [['backup', backup, '--data', place], /is no data folder/],
+    [['backup', backup, '--data', place], /is not a data folder/],
     [['restore', d.data, '--data', fresh], /is no complete backup/],
     [['restore', backup, '--data', d.data], /is not empty/],
   ]) {

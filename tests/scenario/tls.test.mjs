@@ -200,7 +200,7 @@ test('the daemon does not start without a valid certificate', async (t) => {
     assert.ok([1, 2].includes(await d.exited), `${args}: ${await d.exited}`);
     assert.match(
       d.log,
-      /tls-certificate and tls-key must both be set|cannot be read|are no certificate with its key/,
+      /tls-certificate and tls-key must both be set|cannot be read|are not a certificate and its key/,
       args.join(' '),
     );
   }
