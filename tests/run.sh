@@ -60,17 +60,21 @@ count_junit() {
     /^[ \t]*<\/testcase>/ { print end }' "$1"
 }
 
+# Its daemon takes the numeric objects of the release build. Scenarios that look at documents and programs, not at what a
+# daemon does, run in the release build only.
 step_asan() {
-  cmake --preset asan -DORB_TESTS=ON >/dev/null
+  build_release
+  cmake --preset asan -DORB_TESTS=ON -DORB_PLAIN="$PWD/build" >/dev/null
   cmake --build build-asan
-  run_tests build-asan -R '^(unit|scenario)\.'
+  run_tests build-asan -R '^(unit|scenario)\.' -E '^scenario\.(openapi_tools|shell)$'
 }
 
 # From one seed, so that two runs try much the same inputs; long runs look for new ones.
 step_fuzz() {
   local status=0
   rm -f build-fuzz/results
-  ORB_FUZZ_SEED=1 tests/fuzz/run.sh "${ORB_FUZZ_SECONDS:-10}" || status=$?
+  build_release
+  ORB_FUZZ_SEED=1 ORB_PLAIN="$PWD/build" tests/fuzz/run.sh "${ORB_FUZZ_SECONDS:-10}" || status=$?
   cut -d' ' -f1 build-fuzz/results >>"$totals"
   return $status
 }

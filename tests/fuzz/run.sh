@@ -2,7 +2,8 @@
 # Builds the libFuzzer targets and runs each for some seconds, as many at once as there are cores.
 #
 #   tests/fuzz/run.sh [--cpu] SECONDS [TARGET…]    SECONDS of wall time each, with --cpu of CPU time;
-#                                                  with ORB_FUZZ_SEED every run starts with the same inputs
+#                                                  with ORB_FUZZ_SEED every run starts with the same inputs,
+#                                                  with ORB_PLAIN=BUILD it links what it does not run from there
 #   tests/fuzz/run.sh --sums                       totals of all runs in build-fuzz, one line per target
 #   tests/fuzz/run.sh --unpack [TARGET…]           unpacks the seeds: tests/fuzz/corpus/TARGET.tar.gz, one file per
 #                                                  input, into build-fuzz/seeds/TARGET; each run does so first
@@ -132,7 +133,7 @@ esac
 amount=${1:?a number}
 shift
 targets=("${@:-${all[@]}}")
-cmake --preset fuzz -DORB_TESTS=ON >/dev/null
+cmake --preset fuzz -DORB_TESTS=ON -DORB_PLAIN="${ORB_PLAIN:-}" >/dev/null
 cmake --build build-fuzz --target "${targets[@]/#/fuzz_}"
 mkdir -p build-fuzz/found build-fuzz/corpus build-fuzz/sums
 rm -f build-fuzz/results
