@@ -14,7 +14,8 @@ static const struct {
              {"safe", ORB_REPAIR_SAFE},
              {"fill_holes", ORB_REPAIR_FILL_HOLES},
              {"largest_component", ORB_REPAIR_LARGEST_COMPONENT},
-             {"close_handles", ORB_REPAIR_CLOSE_HANDLES}};
+             {"close_handles", ORB_REPAIR_CLOSE_HANDLES},
+             {"split_nonmanifold", ORB_REPAIR_SPLIT}};
 enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
 /* No loop is shorter than the least size: a float's rounding. None is longer than the most: a path from end to end and
@@ -63,11 +64,11 @@ static void write_canonical(const orb_repair_options *options, char canonical[AP
     snprintf(size, sizeof size, ":%.9g", options->handle_size);
   }
   snprintf(part, sizeof part, "%d", options->part);
-  snprintf(canonical, API_REPAIR_TEXT, "%s%s%s%s%s%s%s", all ? "safe" : "none",
+  snprintf(canonical, API_REPAIR_TEXT, "%s%s%s%s%s%s%s%s", all ? "safe" : "none",
            all & ORB_REPAIR_FILL_HOLES ? ",fill_holes" : "",
            all & ORB_REPAIR_LARGEST_COMPONENT ? ",largest_component" : "",
-           all & ORB_REPAIR_CLOSE_HANDLES ? ",close_handles" : "", all & ORB_REPAIR_CLOSE_HANDLES ? size : "",
-           all & ORB_REPAIR_PART ? ",part:" : "",
+           all & ORB_REPAIR_SPLIT ? ",split_nonmanifold" : "", all & ORB_REPAIR_CLOSE_HANDLES ? ",close_handles" : "",
+           all & ORB_REPAIR_CLOSE_HANDLES ? size : "", all & ORB_REPAIR_PART ? ",part:" : "",
            !(all & ORB_REPAIR_PART) ? ""
            : options->part_name[0]  ? options->part_name
                                     : part);
@@ -91,10 +92,10 @@ static int read_list(const char *list, orb_repair_options *out, int *none, api_p
         k++;
       }
       if (k == KINDS) {
-        return api_refuse(
-            problem, "bad-query",
-            "There is no repair \"%.*s\". Use none, safe, fill_holes, largest_component or close_handles.",
-            (int)(n < 60 ? n : 60), at);
+        return api_refuse(problem, "bad-query",
+                          "There is no repair \"%.*s\". Use none, safe, fill_holes, largest_component, "
+                          "split_nonmanifold or close_handles.",
+                          (int)(n < 60 ? n : 60), at);
       }
       *none |= k == 0;
       out->repair |= kinds[k].flag;

@@ -80,6 +80,10 @@ static int suggest(cli *c, const char *path, const char *type) {
   if (!strcmp(type, "not-genus-zero")) {
     return try_repair(c, path, "close_handles");
   }
+  if (!strcmp(type, "not-manifold")) {
+    return try_repair(c, path, "split_nonmanifold") || try_repair(c, path, "split_nonmanifold,largest_component") ||
+           try_repair(c, path, "split_nonmanifold,largest_component,fill_holes");
+  }
   if (!strcmp(type, "not-closed") || !strcmp(type, "not-connected")) {
     return try_repair(c, path, "largest_component,fill_holes") ||
            try_repair(c, path, "largest_component,fill_holes,close_handles");
@@ -116,7 +120,8 @@ static int examine(cli *c, const char *path) {
     if (reply.json) {
       list(reply.json);
     }
-    if (reply.json && !suggest(c, path, type) && (!strcmp(type, "not-closed") || !strcmp(type, "not-connected"))) {
+    if (reply.json && !suggest(c, path, type) &&
+        (!strcmp(type, "not-closed") || !strcmp(type, "not-connected") || !strcmp(type, "not-manifold"))) {
       printf("  None of the daemon's repairs fixes this mesh.\n");
     }
   }

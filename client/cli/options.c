@@ -32,7 +32,7 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_SET] = {"set", 0, "NAME=VALUE", NULL, "set any member of the request, such as align.options.radius=0.5"},
     [OPT_NO_WAIT] = {"no-wait", 0, NULL, NULL, "print the job and do not wait for it"},
     [OPT_NAME] = {"name", 0, "NAME", NULL, "name of the mesh; default: the name of the file"},
-    [OPT_REPAIR] = {"repair", 0, "LIST", "safe none fill_holes largest_component close_handles",
+    [OPT_REPAIR] = {"repair", 0, "LIST", "safe none fill_holes largest_component split_nonmanifold close_handles",
                     "allowed repairs, separated by commas"},
     [OPT_HANDLE_SIZE] = {"handle-size", 0, "X", NULL,
                          "longest loop that close_handles cuts along, as a fraction of the diagonal; default: 0.05"},

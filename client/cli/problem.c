@@ -72,7 +72,9 @@ const char *cli_advice(const char *type) {
        "--repair fill_holes, which covers each hole with a patch."},
       {"not-manifold",
        "Some edges have more than two faces, or faces meet only at a point. Remove inner walls and "
-       "duplicate faces; in Blender, use 'Merge by Distance' and 'Select Non Manifold'."},
+       "duplicate faces ('Select Non Manifold' in Blender), or upload with --repair split_nonmanifold, which splits "
+       "the "
+       "surface there."},
       {"not-orientable",
        "The faces cannot all point outward: the surface is one-sided or, with --repair none, its faces "
        "are not consistently oriented. Recalculate the normals, or upload with --repair safe."},

@@ -55,7 +55,7 @@ orb_status orb_refuse_sort_edges(const orb_surface *s, int32_t kind, uint64_t *e
   return ORB_OK;
 }
 
-orb_status orb_refuse_crowded(orb_surface *s) {
+orb_status orb_refuse_crowded(orb_surface *s, unsigned was_split) {
   const orb_mesh *mesh = s->mesh;
   int64_t count = 0;
   for (int32_t h = 0; h < 3 * mesh->triangle_count; h++) {
@@ -67,9 +67,10 @@ orb_status orb_refuse_crowded(orb_surface *s) {
   if (status == ORB_OK) {
     status = orb_fail(s->ctx, ORB_E_NOT_MANIFOLD,
                       "%lld %s to more than two faces (or %s from a vertex to itself); a surface has two "
-                      "faces at each edge. Remove the surplus faces.",
+                      "faces at each edge. Remove the surplus faces%s.",
                       (long long)s->edges.crowded, plural(s->edges.crowded, "edge belongs", "edges belong"),
-                      plural(s->edges.crowded, "runs", "run"));
+                      plural(s->edges.crowded, "runs", "run"),
+                      was_split ? ": splitting did not part them" : ", or send the mesh with repair=split_nonmanifold");
     orb_error *error = orb_context_error_edit(s->ctx);
     error->edge_total = s->edges.crowded;
     for (int64_t i = 0; i < count && error->edge_count < ORB_ERROR_ITEMS; i++) {

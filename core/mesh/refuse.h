@@ -5,7 +5,8 @@
 
 #include "mesh/parts.h"
 
-orb_status orb_refuse_crowded(orb_surface *surface);
+/* was_split: nonzero if orb_surface_split() has left these edges. */
+orb_status orb_refuse_crowded(orb_surface *surface, unsigned was_split);
 orb_status orb_refuse_facing(orb_surface *surface);
 orb_status orb_refuse_open(orb_surface *surface);
 orb_status orb_refuse_pinched(orb_surface *surface, const orb_fans *fans);

@@ -16,6 +16,7 @@
 #include "mesh/handles.h"
 #include "mesh/parts.h"
 #include "mesh/refuse.h"
+#include "mesh/split.h"
 #include "mesh/weld.h"
 
 static int is_safe(unsigned repair) {
@@ -195,7 +196,8 @@ static orb_status check_one_sphere(orb_surface *s, const orb_repair_options *opt
   unsigned repair = options->repair;
   orb_fans fans;
   ORB_TRY(orb_surface_fans(s, 0, &fans));
-  if (fans.pinched > 0 && (!is_safe(repair) || (s->piece_count > 1 && s->piece_count - fans.joins == 1))) {
+  int is_joined = s->piece_count > 1 && s->piece_count - fans.joins == 1; /* bodies, at vertices only */
+  if (fans.pinched > 0 && (!is_safe(repair) || (is_joined && !(repair & ORB_REPAIR_SPLIT)))) {
     return orb_refuse_pinched(s, &fans);
   }
   if (fans.pinched > 0) {
@@ -214,6 +216,16 @@ static orb_status check_one_sphere(orb_surface *s, const orb_repair_options *opt
     }
     return genus > 0 ? orb_refuse_handles(s, genus, limit) : ORB_OK;
   }
+  return ORB_OK;
+}
+
+/* Splits crowded edges. The holes that this opens in a closed surface are filled: *repair then allows that. */
+static orb_status split_crowded(orb_surface *s, unsigned *repair) {
+  int was_closed = s->edges.open == 0;
+  int64_t count;
+  ORB_TRY(orb_surface_split(s, &count));
+  orb_mesh_note(s->mesh, "split_nonmanifold", count);
+  *repair |= was_closed ? ORB_REPAIR_FILL_HOLES : 0;
   return ORB_OK;
 }
 
@@ -236,11 +248,14 @@ static orb_status repair_surface(orb_surface *s, const orb_repair_options *optio
   if (mesh->triangle_count == 0 || opened_by_dropping) {
     return orb_refuse_few(s);
   }
+  if (repair & ORB_REPAIR_SPLIT && s->edges.crowded > 0) {
+    ORB_TRY(split_crowded(s, &repair));
+  }
   if (repair & (ORB_REPAIR_LARGEST_COMPONENT | ORB_REPAIR_PART)) {
     ORB_TRY(keep_piece(s, options));
   }
   if (s->edges.crowded > 0) {
-    return orb_refuse_crowded(s);
+    return orb_refuse_crowded(s, repair & ORB_REPAIR_SPLIT);
   }
   ORB_TRY(make_consistent(s, repair, reversed));
   *old = mesh->triangle_count;

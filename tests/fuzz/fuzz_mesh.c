@@ -24,8 +24,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     }
     static const unsigned repairs[] = {ORB_REPAIR_NONE, ORB_REPAIR_SAFE,
                                        ORB_REPAIR_FILL_HOLES | ORB_REPAIR_LARGEST_COMPONENT,
-                                       ORB_REPAIR_FILL_HOLES | ORB_REPAIR_PART | ORB_REPAIR_CLOSE_HANDLES};
-    for (int i = 0; i < 4; i++) {
+                                       ORB_REPAIR_FILL_HOLES | ORB_REPAIR_PART | ORB_REPAIR_CLOSE_HANDLES,
+                                       ORB_REPAIR_SPLIT | ORB_REPAIR_LARGEST_COMPONENT};
+    for (int i = 0; i < 5; i++) {
       if (orb_mesh_copy(ctx, &mesh, &copy) != ORB_OK) {
         abort();
       }

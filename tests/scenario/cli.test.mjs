@@ -541,6 +541,21 @@ test('doctor says what a repair would leave, and calls none helpful that takes m
   assert.match(other.out, /32 triangles\n {2}repaired: part \(1\)/);
 });
 
+test('doctor splits edges of three faces', async (t) => {
+  const d = await daemon(t);
+  const wall = path.join(await folder(t), 'wall.obj');
+  await writeFile(
+    wall,
+    'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 0 -1\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 2 1 5\nf 3 2 5\nf 1 3 5\nf 1 3 2\n',
+  );
+  const sick = await run(['doctor', wall], { env: { ORBMORPH_SERVER: d.url } });
+  assert.equal(sick.code, 1);
+  assert.match(
+    sick.out,
+    /helps: orbmorph upload --repair split_nonmanifold,largest_component .*\n {2}left: 6 triangles; the file has 7/,
+  );
+});
+
 test('doctor lists handles, and upload closes them', async (t) => {
   const d = await daemon(t);
   const env = { ORBMORPH_SERVER: d.url };

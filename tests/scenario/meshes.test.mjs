@@ -135,6 +135,22 @@ test('repairs that change the shape happen only on request', async (t) => {
   assert.equal(unknown.status, 400, unknown.bytes.toString());
 });
 
+test('edges of three faces are split on request', async (t) => {
+  const d = await daemon(t);
+  const wall =
+    'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 0 -1\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 2 1 5\nf 3 2 5\nf 1 3 5\nf 1 3 2\n';
+  const refused = await d.upload(wall);
+  assertProblem(refused, 422, 'not-manifold');
+  assert.match(refused.json.detail, /repair=split_nonmanifold/);
+  assertProblem(await d.upload(wall, { repair: 'split_nonmanifold' }), 422, 'not-connected');
+  const split = await d.upload(wall, { repair: 'split_nonmanifold,largest_component' });
+  assert.equal(split.status, 201, split.bytes.toString());
+  assert.equal(split.json.triangles, 6, 'the wall is gone');
+  assert.equal(split.json.repair, 'safe,largest_component,split_nonmanifold');
+  assert.ok(split.json.repairs.some((r) => r.kind === 'split_nonmanifold' && r.count === 3));
+  assert.ok(Math.abs(split.json.volume - 1 / 3) < 1e-12);
+});
+
 test('handles are closed up to a size, and shown beyond it', async (t) => {
   const d = await daemon(t);
   const ring = obj(shapes.torus());

@@ -16,7 +16,7 @@ before(async () => {
   const out = join(await mkdtemp(join(tmpdir(), 'orbmorph-mesh-')), 'mesh.mjs');
   await build({
     stdin: {
-      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry']
+      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry', 'repairs']
         .map((name) => `export * from './${name}.ts';`)
         .join('\n'),
       resolveDir: join(root, 'client/web/src/mesh'),
@@ -372,4 +372,18 @@ test('the plane of symmetry is found however the shape lies, and only where it i
   assert.equal(search(flat(ball(3, ([x, y, z]) => [1.7 * x, 1.3 * y, z]))), null, 'an ellipsoid has three');
   const bent = ball(3, ([x, y, z]) => [x + 0.4 * y * z, y + 0.5 * x * z * z, z + 0.3 * x * x]);
   assert.equal(search(flat(bent)), null, 'this has none');
+});
+
+test('repairs add up; a piece replaces the largest, and a size another size', () => {
+  const cases = [
+    ['safe', 'safe,fill_holes', 'safe,fill_holes'],
+    ['safe,split_nonmanifold', 'safe,largest_component', 'split_nonmanifold,safe,largest_component'],
+    ['safe,largest_component', 'safe,part:2', 'safe,part:2'],
+    ['safe,part:a, b', 'safe,fill_holes', 'safe,fill_holes,part:a, b'],
+    ['safe,part:2', 'safe,largest_component', 'safe,largest_component'],
+    ['safe,close_handles', 'safe,close_handles:0.2', 'safe,close_handles:0.2'],
+    ['none', 'safe', 'safe'],
+    ['safe', 'none', 'none'],
+  ];
+  for (const [list, more, expected] of cases) assert.equal(mesh.withRepairs(list, more), expected);
 });

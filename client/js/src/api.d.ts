@@ -47,7 +47,7 @@ export type Mesh = {
   repair: string;
   /** The repairs that were made, in order; empty if the file needed none. */
   repairs: Array<{
-    kind: 'triangulate' | 'weld' | 'unused-vertices' | 'duplicate-faces' | 'degenerate-faces' | 'reorient' | 'turn-inside-out' | 'split-vertices' | 'fill_holes' | 'largest_component' | 'part' | 'close_handles';
+    kind: 'triangulate' | 'weld' | 'unused-vertices' | 'duplicate-faces' | 'degenerate-faces' | 'reorient' | 'turn-inside-out' | 'split-vertices' | 'split_nonmanifold' | 'fill_holes' | 'largest_component' | 'part' | 'close_handles';
     count: number;
     /** Of a handle: the vertices of the file that the cut goes through, in order; the last is joined to the first. */
     loop?: number[];

@@ -11,7 +11,7 @@ import type {
   SupermeshSummary,
 } from './api.js';
 
-export type Repair = 'none' | 'safe' | 'fill_holes' | 'largest_component' | 'close_handles';
+export type Repair = 'none' | 'safe' | 'fill_holes' | 'largest_component' | 'split_nonmanifold' | 'close_handles';
 export type Source =
   | Blob
   | ArrayBuffer

@@ -20,6 +20,8 @@ export interface Shape {
   /** whether it has one clear plane of symmetry; undefined until that is known */
   symmetric?: boolean;
   facts?: { vertices: number; triangles: number; format: string };
+  /** The repairs that it was uploaded with. */
+  repair?: string;
   problem?: Problem;
   message?: string;
   defects?: number;

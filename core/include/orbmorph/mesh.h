@@ -16,11 +16,11 @@ extern "C" {
 enum { ORB_REPAIR_KINDS_MAX = 16 };
 
 /* One kind of repair. kind: "triangulate", "weld", "unused-vertices", "duplicate-faces", "degenerate-faces",
- * "reorient", "turn-inside-out", "split-vertices", "fill_holes", "largest_component", "part". Handles that were closed
- * are listed one by one: orb_handle. */
+ * "reorient", "turn-inside-out", "split-vertices", "split_nonmanifold", "fill_holes", "largest_component", "part".
+ * Handles that were closed are listed one by one: orb_handle. */
 typedef struct orb_repair {
   const char *kind; /* a literal */
-  int64_t count;    /* faces, vertices, holes or pieces that it changed, depending on the kind */
+  int64_t count;    /* faces, edges, vertices, holes or pieces that it changed, depending on the kind */
 } orb_repair;
 
 /* A handle that ORB_REPAIR_CLOSE_HANDLES closed: the surface is cut along a loop, and a patch covers each of the two
@@ -114,6 +114,9 @@ enum {
   ORB_REPAIR_LARGEST_COMPONENT = 4, /* implies safe; keeps the piece with the most triangles */
   ORB_REPAIR_PART = 16,             /* implies safe; keeps the piece that orb_repair_options names */
   ORB_REPAIR_CLOSE_HANDLES = 8,     /* implies safe; see orb_repair_options.handle_size */
+  ORB_REPAIR_SPLIT = 32,            /* implies safe; splits edges of more than two faces and vertices at which bodies
+                                     * touch, before a piece is chosen, and fills the holes that this opens in a closed
+                                     * surface */
 };
 
 /* Prepares a mesh for embedding, in place, or reports why it cannot be embedded. Afterwards it is closed, manifold,

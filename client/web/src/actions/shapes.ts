@@ -2,6 +2,7 @@
 import { ProblemError, type Mesh, type Problem } from 'orbmorph';
 import samples from 'virtual:samples';
 import { client, patch, set, shapeOf, state, tint, toast, type Shape } from '../state';
+import { withRepairs } from '../mesh/repairs';
 import { work } from '../mesh/work';
 import { shapeModel } from '../view/models';
 import { forgetShape } from './landmarks';
@@ -69,7 +70,7 @@ async function showRepaired(shape: Shape) {
 }
 
 async function send(shape: Shape, repair = state.options.repair) {
-  patch(shape, { state: 'uploading', progress: 0, problem: undefined, message: undefined, defects: undefined });
+  patch(shape, { state: 'uploading', progress: 0, repair, problem: undefined, message: undefined, defects: undefined });
   shape.model?.defects(null);
   try {
     const mesh = await client.uploadMesh(shape.file!, {
@@ -187,9 +188,10 @@ export function moveShape(key: string, by: number) {
   shapes.forEach((other, index) => other.model?.color(tint(index)));
 }
 
+/** Uploads the file with further repairs beside those that it was uploaded with. */
 export function uploadAgain(key: string, repair: string) {
   const shape = shapeOf(key);
-  if (shape?.file) void send(shape, repair);
+  if (shape?.file) void send(shape, withRepairs(shape.repair ?? 'safe', repair));
 }
 
 /** The pieces after the largest, as many as there is room for. */
@@ -217,6 +219,7 @@ export function repairsFor(problem: Problem): { repair: string; label: string }[
   if (kind === 'not-closed') return [{ repair: 'safe,fill_holes', label: 'Fill the holes' }];
   if (kind === 'not-connected' || (kind === 'not-manifold' && problem.components))
     return [{ repair: 'safe,largest_component', label: 'Keep the largest piece' }, ...otherParts(problem.parts)];
+  if (kind === 'not-manifold') return [{ repair: 'safe,split_nonmanifold', label: 'Split it there' }];
   if (kind === 'not-genus-zero') return handleRepairs(numbers(problem.loop_lengths_relative), Number(problem.genus));
   return [];
 }
