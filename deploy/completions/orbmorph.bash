@@ -11,7 +11,7 @@ _orbmorph() {
     --animation) choices="pingpong none" ;;
     --fit) choices="auto none rigid similarity" ;;
     --path) choices="linear rigid" ;;
-    --repair) choices="safe none fill_holes largest_component close_handles" ;;
+    --repair) choices="safe none fill_holes largest_component split_nonmanifold close_handles" ;;
     --format) choices="obj off ply stl gltf glb" ;;
     --method) choices="newton kernel-sampling" ;;
     --preset) choices="fast default quality" ;;

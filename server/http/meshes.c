@@ -115,7 +115,8 @@ static void store_mesh(request *r, const intake_file *file) {
     callers_recount(srv->callers, tenant);
   }
   if (problem.name && strcmp(problem.name, "cancelled") == 0) {
-    api_refuse(&problem, "unavailable", "The server is stopping, or the connection of this request ended; try again soon.");
+    api_refuse(&problem, "unavailable",
+               "The server is stopping, or the connection of this request ended; try again soon.");
   }
   if (problem.name) {
     reply_problem(r, &problem);
