@@ -159,8 +159,8 @@ static int take(const char *folder, const char *data) {
   }
   if (fine && h.wrong) {
     puts(
-        "the service lacks what is named above: upload or request it again, then repeat the backup; an earlier backup "
-        "in this folder keeps its copy");
+        "upload or request again what is named above, then repeat the backup; copies from an earlier backup in this "
+        "folder stay");
   }
   end(&h);
   return !fine || h.wrong;
@@ -211,7 +211,7 @@ static int put_back(const char *folder, const char *data) {
     printf("%ld objects restored, %ld damaged or missing\n", h.made, h.wrong);
   }
   if (fine && h.wrong) {
-    puts("all else is restored: start the service, DELETE what is named above, and upload or request it again");
+    puts("all else is restored: start the daemon, DELETE what is named above, and upload or request it again");
   }
   end(&h);
   return !fine || h.wrong;

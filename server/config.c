@@ -28,10 +28,11 @@ typedef struct entry {
 static const entry table[] = {
     {"listen", TEXT(listen), "127.0.0.1:8080", "ADDR:PORT, [V6]:PORT or unix:PATH; port 0 picks a free one"},
     {"socket-mode", TEXT(socket_mode), "0660", "permissions of a Unix socket, in octal"},
-    {"data", TEXT(data), "orbmorph-data", "the data folder: everything that the service stores"},
+    {"data", TEXT(data), "orbmorph-data", "the data folder: everything that the daemon stores"},
     {"config", TEXT(file), "", "a file of lines NAME = VALUE with these names"},
     {"workers", NUMBER(workers, 1, 256), "0", "jobs that run at once; 0: one per core"},
-    {"worker-nice", NUMBER(worker_nice, 0, 19), "5", "nice value of jobs; higher yields more to requests and programs"},
+    {"worker-nice", NUMBER(worker_nice, 0, 19), "5",
+     "nice value of jobs; the higher, the more they yield to other programs"},
     {"io-threads", NUMBER(io_threads, 1, 64), "6", "threads for queries and commits"},
     {"http-threads", NUMBER(http_threads, 2, 64), "2", "threads that serve connections"},
     {"max-connections", NUMBER(max_connections, 16, 1000000), "16384", "limit on open connections"},
@@ -62,12 +63,12 @@ static const entry table[] = {
     {"job-seconds", NUMBER(job_seconds, 1, 864000), "3600", "time limit of one job"},
     {"check-seconds", NUMBER(check_seconds, 1, 864000), "30", "time limit of the check of one upload"},
     {"isolate", TEXT(isolate), "on",
-     "on: meshes are read and jobs run in confined processes of their own; strict: refuse to start where the kernel "
-     "cannot confine them; off: within the service, for debugging"},
-    {"disk-reserve", NUMBER(disk_reserve, 0, INT64_C(1) << 46), "64M", "bytes that uploads leave free on the disk"},
+     "on: meshes are read and jobs run in confined processes of their own; strict: refuse to start if the kernel "
+     "cannot confine them; off: within the daemon, for debugging"},
+    {"disk-reserve", NUMBER(disk_reserve, 0, INT64_C(1) << 46), "64M", "bytes that the daemon leaves free on the disk"},
     {"drain-seconds", NUMBER(drain_seconds, 0, 3600), "8", "on SIGTERM, time for running jobs to end"},
     {"derived-bytes", NUMBER(derived_bytes, 1 << 20, INT64_C(1) << 50), "0",
-     "bytes of embeddings and supermeshes to keep, most recently used ones first; 0: all"},
+     "bytes of embeddings, alignments and supermeshes to keep, most recently used ones first; 0: all"},
     {"keep-jobs", NUMBER(keep_jobs, 0, INT64_C(1) << 40), "100000",
      "ended jobs to keep in the catalogue, newest first; 0: all"},
     {"lost-days", NUMBER(lost_days, 0, 36500), "30",
@@ -77,22 +78,22 @@ static const entry table[] = {
     {"scrub-seconds", NUMBER(scrub_seconds, 1, 31536000), "21600",
      "least time from the start of one such round to the start of the next"},
     {"hosts", TEXT(hosts), "",
-     "names besides localhost and its address that the service has where no token is needed, comma-separated, or *"},
+     "further names of the daemon, which it checks if no token is needed, comma-separated, or *"},
     {"webhook-allow", TEXT(webhook_allow), "",
      "networks besides public addresses that webhooks may go to, such as 10.1.0.0/16, comma-separated; also by http"},
     {"webhook-retry-seconds", NUMBER(webhook_retry_seconds, 1, 3600), "5",
      "wait after the first failed attempt at a webhook; it doubles with each further one"},
-    {"fetch-allow", TEXT(fetch_allow), "", "likewise for meshes that are fetched from a URL"},
+    {"fetch-allow", TEXT(fetch_allow), "", "the same for meshes from a URL"},
     {"fetch-seconds", NUMBER(fetch_seconds, 1, 3600), "60", "time limit for fetching a mesh from a URL"},
     {"cors", TEXT(cors), "", "origins that browsers may call from, comma-separated, or *"},
     {"log-level", TEXT(log_level), "info", "debug, info, warn or error"},
     {"log-format", TEXT(log_format), "json", "json or text"},
-    {"tls-certificate", TEXT(tls_certificate), "", "PEM file; with tls-key, the service speaks https"},
+    {"tls-certificate", TEXT(tls_certificate), "", "PEM file; with tls-key, the daemon speaks https"},
     {"tls-key", TEXT(tls_key), "", "PEM file"},
     {"tls-authorities", TEXT(tls_authorities), "",
      "PEM file of the authorities that webhooks and fetches trust; without it, those of the system"},
     {"auth", TEXT(auth), "loopback",
-     "loopback: tokens are needed unless the service listens on loopback; on: always; off: never, a proxy checks"},
+     "loopback: tokens are needed unless the daemon listens on loopback; on: always; off: never, a proxy checks"},
 };
 enum { ENTRIES = sizeof table / sizeof table[0] };
 
@@ -239,21 +240,21 @@ static int read_environment(config *out) {
 
 static void print_help(void) {
   puts(
-      "orbmorphd: meshes in over HTTP, one certified morphing GLB out\n\n"
-      "  orbmorphd [--NAME VALUE]…      run the service\n"
+      "orbmorphd: merges closed meshes into one GLB that morphs between them, over HTTP\n\n"
+      "  orbmorphd [--NAME VALUE]…      run the daemon\n"
       "  orbmorphd --check-config       check the configuration and exit\n"
       "  orbmorphd --check-data         verify all objects and rows of the data folder\n"
       "  orbmorphd --gc                 delete derived objects beyond derived-bytes, ended jobs beyond\n"
       "                                 keep-jobs; move objects without a row to lost+found\n"
-      "  orbmorphd backup DIR           copy the data folder to DIR as it is now, also while the service runs;\n"
-      "                                 again into the same DIR: only what is new\n"
+      "  orbmorphd backup DIR           copy the data folder to DIR as it is now, also while the daemon runs;\n"
+      "                                 again into the same DIR: copies only what is new\n"
       "  orbmorphd restore DIR --data NEW\n"
       "                                 make a data folder from a backup; NEW must not exist or be empty\n"
       "  orbmorphd token add NAME --scope read,write,admin [--tenant NAME] [--quota BYTES] [--quota-jobs N]\n"
       "                                 [--priority 0..9] [--expires 30d|YYYY-MM-DD|never]\n"
       "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-jobs …] [--priority …] [--expires …]\n"
       "  orbmorphd token list | token remove NAME\n"
-      "                                 manage tokens, also while the service runs; give the same --data.\n"
+      "                                 manage tokens, also while the daemon runs; give the same --data.\n"
       "                                 --tenant: the owner of what the token makes, by default NAME;\n"
       "                                 --quota: bytes of its meshes; --quota-jobs: its unfinished jobs\n"
       "  orbmorphd key add NAME [--tenant NAME] [--origin URL]… [--requests-per-day N] [--cpu-seconds-per-day N]\n"
@@ -264,7 +265,7 @@ static void print_help(void) {
       "  orbmorphd webhook rotate NAME [--overlap 7d]\n"
       "  orbmorphd webhook list | webhook remove NAME\n"
       "  orbmorphd webhook secret [--tenant NAME]\n"
-      "                                 manage the webhooks that announce the ends of jobs; secret: prints the secret\n"
+      "                                 manage the webhooks that announce the ends of jobs; secret: print the secret\n"
       "                                 of webhooks that requests name\n"
       "  orbmorphd --version, --help\n\n"
       "Each NAME is also an environment variable (ORBMORPH_NAME) and a line of the config file. A flag overrides the\n"

@@ -154,7 +154,7 @@ static int describe(const intake_file *file, catalogue *cat, orb_context *ctx, c
   memcpy(task.repair, file->upload->repair, sizeof task.repair);
   if (catalogue_crashed(cat, file->id)) {
     return api_refuse(problem, "job-crashed",
-                      "Three processes that read this file have died, so it is refused until an administrator clears "
+                      "Three processes that read this file have died, so it is refused until the operator clears "
                       "it (orbmorphd crash clear). Please report this as a bug, with the file.");
   }
   return isolate_is_on() ? check_isolated(file, &task, ctx, limits, json, problem, died)

@@ -424,7 +424,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
   worker_pool *workers = NULL;
   int started = start(srv, &workers);
   if (!started) {
-    log_error("the service could not be started");
+    log_error("the daemon could not be started");
   } else {
     __atomic_store_n(&srv->ready, 1, __ATOMIC_RELEASE);
     if (srv->needs_token && callers_count(srv->callers) == 0) {

@@ -120,13 +120,13 @@ int maintain_check(const config *options) {
          t.rows, t.objects, t.wrong, t.orphans);
   if (t.orphans) {
     puts(
-        "a crash may leave an object or two without a row; more than that: the catalogue has lost rows, so compare it "
-        "with a backup, or upload the meshes again from objects/mesh or lost+found/mesh-*");
+        "a crash may leave one or two objects without a row; if there are more, the catalogue has lost rows: restore a "
+        "backup, or upload the meshes again from objects/mesh or lost+found/mesh-*");
   }
   if (t.wrong) {
     puts(
-        "start the service, DELETE the resources named above, and upload or request them again (not alignments: the "
-        "service computes a damaged one again); if the catalogue itself is damaged, restore a backup of the data "
+        "start the daemon, DELETE the resources named above, and upload or request them again (not alignments: the "
+        "daemon computes a damaged one again); if the catalogue itself is damaged, restore a backup of the data "
         "folder");
   }
   close_both(&t);

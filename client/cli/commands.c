@@ -252,7 +252,7 @@ int cli_run_get(cli *c) {
     return CLI_USAGE;
   }
   if (!tail) {
-    cli_error(c, "--part is file (of a mesh), asset (of a supermesh) or sphere (of an embedding)");
+    cli_error(c, "--part takes file (of a mesh), asset (of a supermesh) or sphere (of an embedding)");
     return CLI_USAGE;
   }
   if (part || output) {

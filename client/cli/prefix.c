@@ -79,10 +79,10 @@ int cli_resolve(cli *c, const char *digits, const char *const *collections, char
     rc = gather(c, *collections, digits, &count, path, &lines);
   }
   if (rc == CLI_DONE && count == 0) {
-    cli_error(c, "%s: not-found: nothing has this id, or one that begins so; 'orbmorph ls' lists the ids", digits);
+    cli_error(c, "%s: not-found: no id begins with these digits; 'orbmorph ls' lists the ids", digits);
     rc = CLI_REFUSED;
   } else if (rc == CLI_DONE && count > 1) {
-    cli_error(c, "%s: several ids begin so; give more digits:%s", digits, lines);
+    cli_error(c, "%s: several ids begin with these digits; give more:%s", digits, lines);
     rc = CLI_REFUSED;
   }
   if (rc != CLI_DONE) {

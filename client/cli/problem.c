@@ -59,7 +59,7 @@ int cli_refused(cli *c, const char *subject, const cli_reply *reply) {
   if (cJSON_IsObject(reply->json)) {
     return cli_problem(c, subject, reply->json);
   }
-  cli_error(c, "%s%sthe server returned status %ld", subject ? subject : "", subject ? ": " : "", reply->status);
+  cli_error(c, "%s%sthe daemon returned status %ld", subject ? subject : "", subject ? ": " : "", reply->status);
   return CLI_REFUSED;
 }
 

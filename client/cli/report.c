@@ -108,7 +108,7 @@ static void print_fits(const cJSON *supermesh) {
     if (fit && strcmp(cli_string(fit, "kind", "none"), "none") != 0) {
       printf("  %-16s moved onto the first shape: scaled by %.3g, rotated by %.0f°, moved by %.2g diagonals%s\n",
              cli_string(shape, "name", "?"), cli_number(fit, "scale"), cli_number(fit, "rotation_degrees"),
-             cli_number(fit, "translation_relative"), up > 60 ? "; its y axis turns over" : "");
+             cli_number(fit, "translation_relative"), up > 60 ? "; its y axis tilts by more than 60°" : "");
     }
   }
 }

@@ -131,7 +131,7 @@ int cli_check_profile(cli *c) {
   const char *profile = c->args.value[OPT_PROFILE];
   int fine = !profile || !strcmp(profile, "float") || !strcmp(profile, "quantized") || !strcmp(profile, "meshopt");
   if (!fine) {
-    cli_error(c, "--profile is float, quantized or meshopt");
+    cli_error(c, "--profile takes float, quantized or meshopt");
   }
   return fine;
 }

@@ -29,8 +29,7 @@ static int warn_of_pairs(FILE *out, const char *bullet, const cJSON *supermesh) 
     double inverted = cli_number(pair, "inverted_fraction");
     double median = cli_number(member(member(pair, "distortion"), "symmetric_dirichlet"), "median");
     if (inverted > INVERTED_MOST) {
-      fprintf(out,
-              "%s%.2g %% of the triangles between %s and %s are inside out on one of them. Look there with '%s'.\n",
+      fprintf(out, "%s%.2g %% of the triangles between %s and %s are inverted on one of them. Look there with '%s'.\n",
               bullet, 100 * inverted, a, b, "orbmorph view --inside");
       count++;
     }
@@ -42,7 +41,7 @@ static int warn_of_pairs(FILE *out, const char *bullet, const cJSON *supermesh) 
   }
   if (!count && cli_number(supermesh, "energy") > ENERGY_MOST) {
     fprintf(out,
-            "%sThe maps stretch much in places (energy %.3g; a good map is below %.2g). A landmark on each limb that "
+            "%sThe maps stretch some places much (energy %.3g; a good map is below %.2g). A landmark on each limb that "
             "morphs badly helps.\n",
             bullet, cli_number(supermesh, "energy"), ENERGY_MOST);
     count++;
@@ -67,7 +66,7 @@ static int warn_of_places(FILE *out, const char *bullet, const cJSON *supermesh)
       const cJSON *number = cJSON_GetArrayItem(centre, k);
       x[k] = cJSON_IsNumber(number) ? number->valuedouble : NAN;
     }
-    const char *what = thin ? "of the surface gets thin halfway, as where a limb is twisted"
+    const char *what = thin ? "of the surface gets thin halfway, as if a limb were twisted"
                             : "of the surface is stretched badly (energy above 20)";
     fprintf(out, "%sFrom %s to %s, %.1f %% %s; look around (%.4g, %.4g, %.4g) of %s, within %.3g.\n", bullet, a, b,
             100 * cli_number(warning, "share"), what, x[0], x[1], x[2], a, cli_number(at, "radius"));

@@ -160,7 +160,7 @@ orb_status orb_build_face_end(orb_build *build, int64_t corners) {
   ORB_ASSERT(corners >= 3);
   build->triangles += corners - 2;
   if (build->triangles > build->max_triangles || corners > ORB_FACE_CORNERS_MAX) {
-    return orb_fail(build->ctx, ORB_E_TOO_LARGE, "The mesh has more than the %lld triangles allowed.",
+    return orb_fail(build->ctx, ORB_E_TOO_LARGE, "The mesh has more than %lld triangles, the limit; decimate it first.",
                     (long long)build->max_triangles);
   }
   if (corners != 3 && !build->face_size) {

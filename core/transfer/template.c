@@ -101,7 +101,8 @@ static orb_status make_vertices(maker *m, orb_template *made) {
     status = triangles[h] < 0 ? ORB_E_NO_MEMORY : h % CHECK_EVERY == 0 ? orb_context_check(m->ctx) : ORB_OK;
   }
   if (status == ORB_OK && corners + m->count > INT32_MAX) {
-    status = orb_fail(m->ctx, ORB_E_TOO_LARGE, "The first shape has too many triangles for the method 'template'.");
+    status = orb_fail(m->ctx, ORB_E_TOO_LARGE,
+                      "The first shape has too many triangles for the method 'template'; use 'adaptive'.");
   }
   if (status == ORB_OK) {
     made->mesh.triangles = ORB_NEW(m->ctx, int32_t, corners + m->count);

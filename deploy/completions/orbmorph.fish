@@ -107,7 +107,7 @@ complete -c orbmorph -n '__fish_seen_subcommand_from view' -l output -s o -r -d 
 complete -c orbmorph -n '__fish_seen_subcommand_from view' -l poses -r -d 'poses in each row; default: 5'
 complete -c orbmorph -n '__fish_seen_subcommand_from view' -l size -r -d 'width and height of a pose; default: 320'
 complete -c orbmorph -n '__fish_seen_subcommand_from view' -l up -x -a 'auto y z x -y -z -x' -d 'axis that points up; default: auto'
-complete -c orbmorph -n '__fish_seen_subcommand_from view' -l yaw -r -d 'turn around the up axis; default: where the largest side shows'
+complete -c orbmorph -n '__fish_seen_subcommand_from view' -l yaw -r -d 'rotate the view around the up axis; default: the largest side shows'
 complete -c orbmorph -n '__fish_seen_subcommand_from view' -l pitch -r -d 'look from above; default: 15'
 complete -c orbmorph -n '__fish_seen_subcommand_from view' -l wire -d 'draw the edges of the triangles'
 complete -c orbmorph -n '__fish_seen_subcommand_from view' -l inside -d 'paint triangles seen from inside red'

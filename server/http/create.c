@@ -130,14 +130,16 @@ static void refuse_submit(request *r, queue_result result, int64_t owner_limit) 
       reply_problem(r, &problem);
       break;
     case QUEUE_STOPPING:
-      reply_refuse(r, "unavailable", "The service is stopping; try again soon.");
+      reply_refuse(r, "unavailable", "The daemon is stopping; try again soon.");
       break;
     case QUEUE_WEBHOOKS:
-      reply_refuse(r, "invalid-request", "The job has %d webhooks already, and may not have more.", JOB_WEBHOOKS);
+      reply_refuse(r, "invalid-request",
+                   "The job already has %d webhooks and takes no more. Omit \"webhook\" and wait for the job.",
+                   JOB_WEBHOOKS);
       break;
     case QUEUE_CRASHED:
       reply_refuse(r, "job-crashed",
-                   "Three processes that did this work have died, so it is refused until an administrator clears it "
+                   "Three processes that did this work have died, so it is refused until the operator clears it "
                    "(orbmorphd crash clear). Please report this as a bug, with the meshes.");
       break;
     case QUEUE_MESH_GONE:

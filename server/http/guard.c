@@ -63,8 +63,8 @@ static int check_length(request *r, const seen *s, api_problem *problem) {
   }
   if (s->codings > 1 || coding_of(header_of(r, "Content-Encoding")) == CODING_UNKNOWN) {
     return api_refuse(problem, "unsupported-encoding",
-                      "Content-Encoding names another coding than gzip or zstd, or several. Send the body compressed "
-                      "once, or not at all.");
+                      "Content-Encoding names a coding other than gzip or zstd, or several codings. Send the body "
+                      "compressed once, or not at all.");
   }
   return 1;
 }

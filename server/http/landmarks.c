@@ -42,7 +42,7 @@ static void put(request *r, resource *row) {
   if (stored == STORE_CONFLICT && r->caller) {
     callers_recount(srv->callers, tenant);
     if (access_has_room(r, row->bytes, &problem)) {
-      api_refuse(&problem, "quota-exceeded", "The token's quota had no room for these landmarks; try again.");
+      api_refuse(&problem, "quota-exceeded", "Other requests used up the token's quota for a moment; try again.");
       api_json_member_integer(&problem.facts, "quota", __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED));
     }
     reply_problem(r, &problem);

@@ -87,7 +87,7 @@ static void refuse_over_quota(request *r) {
   api_problem problem = {0};
   callers_recount(r->srv->callers, access_tenant(r));
   if (access_has_room(r, r->received, &problem)) {
-    api_refuse(&problem, "quota-exceeded", "The token's quota had no room for this mesh; try again.");
+    api_refuse(&problem, "quota-exceeded", "Other uploads used up the token's quota for a moment; try again.");
     api_json_member_integer(&problem.facts, "quota", __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED));
   }
   reply_problem(r, &problem);

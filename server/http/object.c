@@ -168,7 +168,8 @@ int reply_part(request *r, object_kind kind, const char *id, object_part part, c
   int ranged = usable ? parse_range(header_of(r, "Range"), size, &first, &length) : 0;
   if (ranged < 0) {
     close(fd);
-    reply_refuse(r, "range-not-satisfiable", "The file has only %llu bytes.", (unsigned long long)size);
+    reply_refuse(r, "range-not-satisfiable", "The file has only %llu bytes; request a range within them.",
+                 (unsigned long long)size);
     snprintf(content_range, sizeof content_range, "bytes */%llu", (unsigned long long)size);
     reply_header(r, "Content-Range", content_range);
     return 1;

@@ -225,8 +225,11 @@ static int names_any(const request *r, const char *header, const char *etag, int
 int reply_conditions(request *r, const char *etag) {
   int lines, reads = r->route->method[0] == 'G';
   if (!names_any(r, "If-Match", etag, parse_tag_matches_strong, &lines) && lines > 0) {
-    reply_refuse(r, "precondition-failed", "The current ETag is %s, which If-Match does not name. Nothing was done.",
-                 etag);
+    reply_refuse(
+        r, "precondition-failed",
+        "The current ETag is %s, which If-Match does not name. Nothing was done. Send the current ETag, or omit "
+        "If-Match.",
+        etag);
     return 1;
   }
   if (!(reads ? names_tag : names_any)(r, "If-None-Match", etag, parse_tag_matches, &lines)) {
@@ -235,8 +238,8 @@ int reply_conditions(request *r, const char *etag) {
   if (reads) {
     reply_empty(r, 304);
   } else {
-    reply_refuse(r, "precondition-failed", "The current ETag is %s, which If-None-Match excludes. Nothing was done.",
-                 etag);
+    reply_refuse(r, "precondition-failed",
+                 "The current ETag is %s, which If-None-Match excludes. Nothing was done. Omit If-None-Match.", etag);
   }
   return 1;
 }

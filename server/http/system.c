@@ -114,12 +114,12 @@ static enum MHD_Result ready(request *r) {
   scrub_report found;
   int up = __atomic_load_n(&srv->ready, __ATOMIC_ACQUIRE) && !__atomic_load_n(&srv->stopping, __ATOMIC_ACQUIRE);
   if (!up) {
-    reply_refuse(r, "unavailable", "The service is starting or stopping.");
+    reply_refuse(r, "unavailable", "The daemon is starting or stopping; try again soon.");
     return MHD_YES;
   }
   scrub_read(srv->scrub, &found);
   if (found.catalogue_damaged) {
-    reply_refuse(r, "unavailable", "The catalogue is damaged: stop the service and restore a backup.");
+    reply_refuse(r, "unavailable", "The catalogue is damaged: stop the daemon and restore a backup.");
     return MHD_YES;
   }
   api_text json = {0};

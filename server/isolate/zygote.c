@@ -259,7 +259,7 @@ int isolate_start(isolate_mode mode) {
   own.mode = fine ? mode : ISOLATE_OFF;
   pthread_mutex_unlock(&own.lock);
   if (!fine) {
-    log_error("meshes and jobs cannot have processes of their own; isolate = off runs them within the service");
+    log_error("meshes and jobs cannot have processes of their own; isolate = off runs them within the daemon");
     return 0;
   }
   if (holds != SANDBOX_ALL) {

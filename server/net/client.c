@@ -164,7 +164,7 @@ void net_transfer_end(net_transfer *t, CURLcode code, net_answer *out) {
   } else if (code == CURLE_OK || (code == CURLE_WRITE_ERROR && status)) {
     out->end = NET_ANSWERED;
   } else if (t->forbidden && !status) {
-    ends(out, NET_FORBIDDEN, "the host has no address that the service connects to");
+    ends(out, NET_FORBIDDEN, "the host has no address that the daemon connects to");
   } else if (code == CURLE_OPERATION_TIMEDOUT) {
     ends(out, NET_TIMED_OUT, "no complete answer came in time");
   } else {
@@ -202,7 +202,7 @@ void net_get(const net_request *request, int redirects, net_answer *out) {
     net_verdict verdict = net_url_read(out->redirect, request->allowed, &at, &why);
     if (verdict != NET_URL_FINE) {
       ends(out, verdict == NET_URL_FORBIDDEN ? NET_FORBIDDEN : NET_FAILED,
-           "it redirects to a URL that the service does not connect to");
+           "it redirects to a URL that the daemon does not connect to");
       return;
     }
   }

@@ -90,8 +90,11 @@ static store_result load(queue *q, job_row *row) {
 store_result queue_recover(queue *q, int isolated) {
   api_problem problem = {0};
   api_text text = {0};
-  api_refuse(&problem, "crashed", "The service crashed %d times while this job ran alone; the job is not retried.",
-             MOST_CRASHES);
+  api_refuse(
+      &problem, "crashed",
+      "The daemon crashed %d times while this job ran alone; the job is not retried. Please report this as a bug, "
+      "with its meshes.",
+      MOST_CRASHES);
   api_problem_write(&problem, &text);
   store_result result =
       text.failed ? STORE_ERROR : catalogue_recover(q->cat, isolated ? 0 : MOST_CRASHES, unix_ms(), text.data);

@@ -64,7 +64,7 @@ static int refuse(const download *d, const api_fetch_request *wish, const net_an
     case NET_FORBIDDEN:
       return refuse_url(wish, "forbidden-address", answer->why, problem);
     case NET_TOO_LARGE:
-      api_refuse(problem, "too-large", "The file has more than %lld bytes, the limit of an upload.",
+      api_refuse(problem, "too-large", "The file has more than %lld bytes, the limit of an upload; decimate the mesh.",
                  (long long)d->options->most);
       api_json_member_integer(&problem->facts, "limit", d->options->most);
       return 0;

@@ -107,7 +107,7 @@ test('a backup that is killed leaves the daemon intact, and the next one is comp
   assert.match(check.out, /^44 rows and 44 objects checked: 0 wrong, 0 objects without a row/m);
 });
 
-test('while a backup runs no object is deleted, and afterwards what no row names', async (t) => {
+test('while a backup runs no object is deleted; afterwards objects without a row are', async (t) => {
   const d = await daemon(t);
   const [kept, gone] = [(await d.upload(mesh(0))).json, (await d.upload(mesh(1))).json];
   const holder = spawn('flock', [path.join(d.data, 'backup.lock'), 'sh', '-c', 'echo held; cat'], {

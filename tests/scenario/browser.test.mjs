@@ -51,7 +51,7 @@ const ROUTES = [
   ['GET', '/metrics'],
 ];
 
-test('a page whose name resolves to loopback reads and changes nothing', async (t) => {
+test('a page whose name resolves to loopback can neither read nor change anything', async (t) => {
   const d = await daemon(t);
   const { port } = new URL(d.url);
   const mesh = (await d.upload(shapes.tetrahedron)).json;

@@ -71,7 +71,7 @@ test('damage to any object, and to any kind of row, is found', async (t) => {
     const { status, stdout } = check();
     assert.equal(status, 1, `${what}\n${stdout}`);
     assert.match(stdout, /: 1 wrong/, `${what}\n${stdout}`);
-    assert.match(stdout, /start the service, DELETE the resources named above/, what);
+    assert.match(stdout, /start the daemon, DELETE the resources named above/, what);
   };
   for (const [kind, file] of files) {
     const bytes = readFileSync(file);

@@ -214,14 +214,14 @@ test('step by step: upload, ls, embed, merge, job, get, rm', async (t) => {
   const gone = await run(['get', id], { env });
   assert.equal(gone.code, 1);
   assert.match(gone.err, /not-found/);
-  for (const args of [
-    ['get', '0000'],
-    ['rm', '0'.repeat(64)],
-    ['job', 'nonsense'],
+  for (const [args, why] of [
+    [['get', '0000'], /no id begins with these digits/],
+    [['rm', '0'.repeat(64)], /has this id/],
+    [['job', 'nonsense'], /has this id/],
   ]) {
     const { code, err } = await run(args, { env });
     assert.equal(code, 1, err);
-    assert.match(err, /has this id/);
+    assert.match(err, why);
   }
   assert.equal(JSON.parse((await run(['get', id, '--json'], { env })).err).type, '/problems/not-found');
 });

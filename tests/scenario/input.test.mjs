@@ -1,4 +1,4 @@
-// Files as people have them: compressed and quantized glTF, and files of other kinds, which are named.
+// Files as people have them: compressed and quantized glTF, and files of other kinds, which the refusal names.
 import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
@@ -128,7 +128,7 @@ test('Draco-compressed glTF is read, and damaged data is refused', { skip: !exis
   assertProblem(await d.upload(glb.subarray(0, at + length / 2)), 400, 'malformed-mesh');
 });
 
-test('files of other kinds are named, with what to do', async (t) => {
+test('files of other kinds are refused by name, with advice', async (t) => {
   const d = await daemon(t);
   const kinds = [
     ['Kaydara FBX Binary  \0\x1a\0', /FBX file.*export it as glTF/],

@@ -1,4 +1,4 @@
-// Stored bytes that are no longer what was stored: no result is computed from them, and sending them again heals them.
+// Stored bytes that have changed: no result is computed from them, and uploading the file again restores them.
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';

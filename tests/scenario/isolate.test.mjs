@@ -1,5 +1,5 @@
-// Meshes are read and jobs run in processes of their own: what kills one takes its own work only, and nothing that hangs
-// in one holds anything else up. A process that is stopped with SIGSTOP stands for a reader or a job that never ends.
+// Meshes are read and jobs run in processes of their own: if one dies, only its own work is lost, and if one hangs, it
+// delays nothing else. A process stopped with SIGSTOP plays a reader or a job that never ends.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { readdirSync, readFileSync, readlinkSync } from 'node:fs';
@@ -102,7 +102,7 @@ test('a process that dies takes its own job, and after three deaths that job is 
   for (const job of [again.json, other.job]) assert.equal((await d.delete(job.url)).status, 200);
 });
 
-test('the end of the daemon is no crash of the jobs that run', async (t) => {
+test('jobs that run when the daemon ends do not count as crashed', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const { job } = await slowJob(d, 1);
   for (let death = 1; death <= 4; death++) {

@@ -1,4 +1,4 @@
-// Jobs: waiting, events, cancelling, lists, and one flight a key.
+// Jobs: waiting, events, cancelling, lists, and at most one unfinished job for each key.
 import assert from 'node:assert/strict';
 import path from 'node:path';
 import test from 'node:test';

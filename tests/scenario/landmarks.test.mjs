@@ -53,7 +53,7 @@ test('landmarks are stored once, read, listed and deleted', async (t) => {
   assert.equal((await d.get('/v1/landmarks')).json.landmarks.length, 1);
 });
 
-test('what is no list of landmarks is refused', async (t) => {
+test('a value that is not a list of landmarks is refused', async (t) => {
   const d = await daemon(t);
   const place = { vertex: 1 };
   for (const [body, type] of [

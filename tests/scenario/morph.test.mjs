@@ -99,7 +99,7 @@ test('every parameter is the member that POST has', async (t) => {
   }
 });
 
-test('what a recipe cannot mean is refused', async (t) => {
+test('an invalid recipe is refused', async (t) => {
   const d = await daemon(t);
   const ids = await pair(d);
   const [a, b] = ids.split(',');
@@ -134,7 +134,7 @@ test('what a recipe cannot mean is refused', async (t) => {
   assert.equal(b.length, 64);
 });
 
-test('a morph that takes longer is asked for again', async (t) => {
+test('a morph that takes longer is requested again', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const url = small(await pair(d));
   const { id } = (await d.upload(shapes.obj(shapes.egg(5)))).json;

@@ -1,4 +1,4 @@
-// The API document in the hands of other tools: Redocly and Spectral find nothing to warn about, and a client with the
+// Checks the API document with other tools: Redocly and Spectral find nothing to warn about, and a client with the
 // types of openapi-typescript compiles as it is and talks to the daemon.
 import assert from 'node:assert/strict';
 import { copyFile, readFile, symlink, writeFile } from 'node:fs/promises';

@@ -1,5 +1,5 @@
-// Profiles of an asset: made from the stored asset by the first request, once, on both routes, and kept with the
-// supermesh: its bytes count, and they leave with it.
+// Profiles of an asset: the first request makes one from the stored asset, on both routes. It is kept with the
+// supermesh, counts for its bytes, and is deleted with it.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
@@ -138,7 +138,7 @@ test('profiles count for the budget of derived objects', async (t) => {
   assert.equal(await embeddings(), 1, 'what was used longest ago');
 });
 
-test('a key pays for the profile that it causes', async (t) => {
+test('the work of a profile counts for the key that requested it', async (t) => {
   const d = await daemon(t, { args: ['--auth', 'on'] });
   const admin = async (...words) => {
     const ran = await runProgram(binaries.daemon, [...words, '--data', d.data]);

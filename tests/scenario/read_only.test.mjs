@@ -1,5 +1,5 @@
-// A data folder on a read-only file system, as after errors of the disk: it is named as such, before the start and while
-// the daemon runs. The test mounts file systems; it is skipped where that is not allowed.
+// A data folder on a read-only file system, as after errors of the disk: the daemon says so, at the start and while
+// it runs. The test mounts file systems; it is skipped where that is not allowed.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';

@@ -217,7 +217,7 @@ test('ambiguous requests are refused', async (t) => {
   assert.equal((await d.get('/livez')).status, 200);
 });
 
-test('a length that is no number gets one answer, and the connection ends', async (t) => {
+test('a length that is not a number gets one answer, and the connection ends', async (t) => {
   const d = await daemon(t);
   const { host } = new URL(d.url);
   for (const length of ['-1', '+2', '0x2', '2, 2', ' ', '9'.repeat(25)])

@@ -1,4 +1,5 @@
-// The scrub in the background: what it finds wrong in the data folder, who is told, and how it heals; lost+found.
+// The scrub in the background: what it finds wrong in the data folder, where it reports that, and how it is repaired;
+// lost+found.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import {
@@ -40,7 +41,7 @@ async function round(d) {
   return integrity(d);
 }
 
-test('damage that nobody asks for is found, told and healed', async (t) => {
+test('the scrub finds and reports damage to files that nobody requests, and it can be repaired', async (t) => {
   const d = await daemon(t, { args: fast });
   const texts = [shapes.obj(shapes.egg(2)), shapes.obj(shapes.bean(2))];
   const meshes = [(await d.upload(texts[0])).json, (await d.upload(texts[1])).json];
@@ -135,7 +136,7 @@ test('a catalogue that is damaged while the daemon runs makes /readyz answer 503
   assert.match(d.log, /scrub: the catalogue is damaged: .* Restore a backup/);
 });
 
-test('meshes whose rows a cut WAL lost are told, and --gc keeps their files for lost-days', async (t) => {
+test('meshes whose rows a cut WAL lost are reported, and --gc keeps their files for lost-days', async (t) => {
   const d = await daemon(t, { args: fast });
   const texts = Array.from({ length: 20 }, (_, k) => mesh(k));
   const ids = [];

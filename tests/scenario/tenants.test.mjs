@@ -43,7 +43,7 @@ function assertSame(a, b, hide, what) {
   assert.deepEqual([...a.headers.keys()], [...b.headers.keys()], what);
 }
 
-test("another tenant's things are not there", async (t) => {
+test('a tenant does not see what another one owns', async (t) => {
   const { d, add, upload, list, end } = await tenants(t);
   const [ann, bob, reader, admin] = [
     await add('ann', 'read,write'),
@@ -258,7 +258,7 @@ test('equal requests of two tenants: one result, two jobs', async (t) => {
   assert.deepEqual(await list(ann, 'supermeshes'), []);
 });
 
-test('deleting removes only the own tenant from the owners', async (t) => {
+test('deleting removes only the tenant that deletes from the owners', async (t) => {
   const { d, token, add, upload, list, end } = await tenants(t);
   const quota = ['--quota', String(small.length + other.length)];
   const [ann, bob, admin] = [
@@ -330,7 +330,7 @@ test('deleting removes only the own tenant from the owners', async (t) => {
   assert.match(stdout, /: 0 wrong, 0 objects without a row/);
 });
 
-test("what was made without tokens is the operator's", async (t) => {
+test('only the operator sees what was made without tokens', async (t) => {
   const d = await daemon(t, {});
   const { id, url } = (await d.upload(small)).json;
   const { resource } = await d.make('/v1/embeddings', { mesh: id });

@@ -282,7 +282,7 @@ test('a receiver that fails is asked again and delays no other', async (t) => {
   assert.match(removed.error, /removed/);
 });
 
-test('what the documents say verifies messages, in JavaScript and Python', async () => {
+test('the documented code verifies messages, in JavaScript and Python', async () => {
   const secret = 'whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw';
   const old = 'whsec_C2FVsBQIhrscChlQIMV+b5sSYspob7oD';
   const now = new Date();

@@ -58,7 +58,7 @@ test('the first page plays a morph without a click, and offers three more', asyn
   await done();
 });
 
-test('whoever asks for less motion gets a still picture that can be played', async () => {
+test('a visitor who prefers less motion gets a still picture that can be played', async () => {
   const { page, done } = await openPage(browser, daemon.url, { reducedMotion: 'reduce' });
   await until(async () => (await countPixels(page, '.hero', vivid)) > 4000, 'a shape is drawn');
   const first = await hero(page);

@@ -538,7 +538,7 @@ test('a search for landmarks survives a reload as itself, and can be stopped', a
   await busy.stop();
 });
 
-test('a match that is not sure is called so, and the next one is another morph', async () => {
+test('an unsure match is labelled, and the next match gives another morph', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await addFiles(page, sample('dog.obj'), sample('elephant.ply'));
   await morph(page);

@@ -159,7 +159,7 @@ export type Embedding = {
 export type Place = {
   vertex: number;
 } | {
-  /** A point in space, which stands for the nearest point of the surface. */
+  /** A point in space; the place is the nearest point of the surface. */
   point: [number, number, number];
 } | {
   triangle: number;
@@ -400,9 +400,9 @@ export type Supermesh = {
     /** The distance from its given place to there, relative to the diagonal. */
     distance_relative: number;
   }>;
-  /** How far the correspondence that orbmorph found may be relied on; of several shapes, bend and clear are the worst. Absent if the request gives landmarks or its alignment only rotates. docs/bench-confidence.md says how it is calibrated. */
+  /** How far you can rely on the correspondence that orbmorph found; with more than two shapes, bend and clear are each the worst of all maps. Absent if the request gives landmarks or its alignment only rotates. docs/bench-confidence.md says how it is calibrated. */
   match?: {
-    /** From 0 to 1, calibrated on pairs of shapes: of the matches with 0.8 or more, all 41 were right. Lower values order matches, but are no shares. */
+    /** From 0 to 1, calibrated on pairs of shapes: of the matches with 0.8 or more, all 41 were right. Lower values rank matches but are not probabilities. */
     confidence: number;
     /** `sure` from a confidence of 0.8 on, `likely` from 0.5 on, else `unsure`. */
     verdict: 'sure' | 'likely' | 'unsure';
@@ -442,15 +442,15 @@ export type Supermesh = {
     /** The share of the supermesh's triangles that are inverted on either shape: they face away from the smooth normals of the surface at their corners and from its face at their centre. */
     inverted_fraction: number | null;
   }>;
-  /** Where the map between the shapes of a pair is bad; empty if it is nowhere. Absent if an older engine made the supermesh. */
+  /** Where the map between the shapes of a pair is bad; empty if it is good everywhere. Absent if an older engine made the supermesh. */
   warnings?: Array<{
-    /** `stretched`: the symmetric Dirichlet energy is above 20 on more than 1 % of the area of either shape. `thin`: patches of the surface keep less than half of their area halfway through the linear morph, after a fit by similarity, because the map twists a limb or the pose turns it far. */
+    /** `stretched`: the symmetric Dirichlet energy is above 20 on more than 1 % of the area of either shape. `thin`: patches of the surface keep less than half of their area halfway through the linear morph, after a fit by similarity, because the map twists a limb or the pose rotates it far. */
     kind: 'stretched' | 'thin';
     /** An index into shapes. */
     a: number;
     /** An index into shapes. */
     b: number;
-    /** The share of the area, on the shape on which it is larger, of all parts together, also of those that are not listed. */
+    /** The share of the area of all parts, listed or not, on the shape on which it is larger. */
     share: number;
     /** The connected parts, at most four, the largest first. */
     parts: Array<{

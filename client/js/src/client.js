@@ -308,7 +308,7 @@ export class Orbmorph {
 
   /**
    * Fetches a page of a list. `kind`: meshes, embeddings, landmarks, supermeshes or jobs. `idPrefix` limits it to ids that
-   * begin so, `state` to jobs in a state, `mesh` and `name` to supermeshes with a shape of this mesh or name. The `view`
+   * begin with it, `state` to jobs in a state, `mesh` and `name` to supermeshes with a shape of this mesh or name. The `view`
    * "summary" lists supermeshes without report and request. -> {items, next}
    */
   async page(kind, { limit, pageToken, idPrefix, state, mesh, name, view, signal } = {}) {

@@ -72,7 +72,7 @@ export function LandmarksInspector() {
         </Button>
       </div>
       {shapes.some((shape) => shape.symmetric) && (
-        <div title="A landmark on one side of a symmetric shape also sets its twin on the other side">
+        <div title="A landmark on one side of a symmetric shape also sets its mirror image on the other side">
           <Switch label="Click left, get right" on={state.mirror} onChange={(mirror) => set({ mirror })} />
         </div>
       )}

@@ -250,7 +250,7 @@ function Warnings({ result: { supermesh } }: { result: Result }) {
       {warnings.map(({ kind, a, b, share, parts }) => (
         <li key={`${kind}${a}${b}`}>
           {`From ${shapes[a].name} to ${shapes[b].name}, ${Number((100 * share).toPrecision(2))} % of the surface ${
-            kind === 'thin' ? 'gets thin halfway, as where a limb is twisted' : 'is stretched badly'
+            kind === 'thin' ? 'gets thin halfway, as if a limb were twisted' : 'is stretched badly'
           }: look ${place(parts[0].at[0])}. A landmark there may help.`}
         </li>
       ))}

@@ -29,8 +29,8 @@ export function TokenDialog() {
       <form class="ask-in" onSubmit={(event) => void send(event)}>
         <h2 id="ask-title">This daemon requires a token</h2>
         <p class="hint">
-          Its administrator creates one with <code>orbmorphd token add</code>. The token stays in this tab until you
-          close it.
+          Its operator creates one with <code>orbmorphd token add</code>. The token stays in this tab until you close
+          it.
         </p>
         <label class="field">
           <span class="field-name">Token</span>
