@@ -325,7 +325,9 @@ void api_supermesh_write(const char *id, const api_supermesh_request *request, c
   api_json_key(out, "asset");
   api_text_printf(out, "\"/v1/supermeshes/%s/asset.glb\"", id);
   api_json_member_integer(out, "asset_bytes", (int64_t)result->asset.size);
-  write_profiles(result->profiles, out);
+  if (!result->is_document) {
+    write_profiles(result->profiles, out);
+  }
   api_json_member_integer(out, "vertices", result->supermesh.vertex_count);
   api_json_member_integer(out, "triangles", result->supermesh.triangle_count);
   write_shapes(id, request, result, out);

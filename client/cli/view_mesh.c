@@ -5,7 +5,22 @@
 
 #include "view_glb.h"
 
-static int count_all(glb_file *r, const cJSON *primitives, view_mesh *out) {
+/* The mesh to draw, and its first target that is a shape: an uploaded document that has got targets may have others
+ * before. */
+static const cJSON *find_mesh(const glb_file *r, uint32_t *first) {
+  const cJSON *mesh;
+  cJSON_ArrayForEach(mesh, cJSON_GetObjectItemCaseSensitive(r->json, "meshes")) {
+    const cJSON *extras = cJSON_GetObjectItemCaseSensitive(mesh, "extras");
+    if (cJSON_GetObjectItemCaseSensitive(extras, "firstShape")) {
+      *first = (uint32_t)glb_code(extras, "firstShape", 0);
+      return mesh;
+    }
+  }
+  *first = 0;
+  return glb_entry(r, "meshes", 0);
+}
+
+static int count_all(glb_file *r, const cJSON *primitives, uint32_t first, view_mesh *out) {
   const cJSON *primitive;
   uint64_t vertices = 0, indices = 0;
   cJSON_ArrayForEach(primitive, primitives) {
@@ -19,7 +34,8 @@ static int count_all(glb_file *r, const cJSON *primitives, view_mesh *out) {
       return glb_refuse(r, "cannot draw triangles without indices");
     }
     indices += s.count;
-    out->target_count = (uint32_t)cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(primitive, "targets"));
+    uint32_t targets = (uint32_t)cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(primitive, "targets"));
+    out->target_count = targets > first ? targets - first : 0;
   }
   if (vertices == 0 || vertices > UINT32_MAX / 16 || indices > UINT32_MAX / 2) {
     return glb_refuse(r, "the mesh is empty or too large");
@@ -55,7 +71,8 @@ static int read_indices(glb_file *r, const cJSON *primitive, view_mesh *out, uin
   return 0;
 }
 
-static int read_primitive(glb_file *r, const cJSON *primitive, view_mesh *out, uint32_t *vertex, uint32_t *index) {
+static int read_primitive(glb_file *r, const cJSON *primitive, uint32_t skip, view_mesh *out, uint32_t *vertex,
+                          uint32_t *index) {
   const cJSON *attributes = cJSON_GetObjectItemCaseSensitive(primitive, "attributes");
   glb_span s;
   if (glb_open(r, glb_number(attributes, "POSITION", -1), &s) != 0) {
@@ -75,6 +92,9 @@ static int read_primitive(glb_file *r, const cJSON *primitive, view_mesh *out, u
   view_material_move(&out->materials.list[material], out->texcoords + 2 * (size_t)*vertex, count);
   const cJSON *target = cJSON_GetObjectItemCaseSensitive(primitive, "targets");
   target = target ? target->child : NULL;
+  for (; skip > 0 && target; skip--) {
+    target = target->next;
+  }
   for (uint32_t k = 0; k < out->target_count && target; k++, target = target->next) {
     size_t delta = 3 * (size_t)k * out->vertex_count + at;
     if (glb_copy(r, target, "POSITION", count, 3, out->delta_positions + delta) != 0 ||
@@ -109,9 +129,10 @@ static int allocate(view_mesh *out) {
 }
 
 static int read_mesh(glb_file *r, view_mesh *out) {
-  const cJSON *mesh = glb_entry(r, "meshes", 0);
+  uint32_t first;
+  const cJSON *mesh = find_mesh(r, &first);
   const cJSON *primitives = cJSON_GetObjectItemCaseSensitive(mesh, "primitives"), *primitive;
-  if (count_all(r, primitives, out) != 0 || view_materials_read(r, &out->materials) != 0) {
+  if (count_all(r, primitives, first, out) != 0 || view_materials_read(r, &out->materials) != 0) {
     return -1;
   }
   if (allocate(out) != 0) {
@@ -121,7 +142,7 @@ static int read_mesh(glb_file *r, view_mesh *out) {
   out->between = between < out->target_count ? (uint32_t)between : 0;
   uint32_t vertex = 0, index = 0;
   cJSON_ArrayForEach(primitive, primitives) {
-    if (read_primitive(r, primitive, out, &vertex, &index) != 0) {
+    if (read_primitive(r, primitive, first, out, &vertex, &index) != 0) {
       return -1;
     }
   }

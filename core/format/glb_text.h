@@ -4,6 +4,10 @@
 
 #include "orbmorph/context.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* The functions below append until one fails; the first failure stays. */
 typedef struct orb_glb_writer {
   orb_context *ctx;
@@ -22,4 +26,7 @@ void orb_glb_numbers(orb_glb_writer *w, const char *before, const double *values
 /* U+FFFD replaces bytes that are not UTF-8. */
 void orb_glb_quoted(orb_glb_writer *w, const char *before, const char *string);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -1,11 +1,10 @@
 /* glTF and GLB: all triangle primitives of the default scene, positions after node transforms.
  *
- * cJSON parses the document; it copies no buffer and limits how deep values nest. Accessors are decoded in place, after
- * every offset has been checked against the bytes.
+ * Accessors are decoded in place, after every offset has been checked against the bytes.
  *
  * Vertices are numbered over the triangle primitives of all meshes in file order, whether the scene shows them or not;
  * a mesh that is shown more than once gets further numbers after all of these. Errors inside are exceptions; all end in
- * read_either().
+ * guarded().
  */
 #include <cjson/cJSON.h>
 #include <algorithm>
@@ -18,23 +17,17 @@
 #include <vector>
 
 extern "C" {
-#include "base/error.h"
-#include "format/bytes.h"
-#include "format/json_check.h"
 #include "format/readers.h"
 #include "format/text.h"
 }
 
 #include "format/gltf_material.hh"
+#include "format/gltf_parse.hh"
 #include "format/gltf_scene.hh"
 
 namespace gltf {
 
 namespace {
-
-const size_t VALUES_MAX = 1000000; /* of a document */
-const size_t VALUE_BYTES = 96;     /* that cJSON takes for each, with the overhead of malloc(), and a list of them */
-const int MEMBERS_MAX = 256;       /* of an object: each look-up passes all of them */
 
 /* Looking up the members of a primitive and of its accessors, in components decoded; a mesh may be shown often. */
 const size_t WORK_OF_PRIMITIVE = 1024;
@@ -252,114 +245,12 @@ struct Reader {
   }
 };
 
-/* Counts the separators outside strings: a bound on how many values the document has. */
-size_t count_values(const unsigned char *text, size_t size) {
-  size_t count = 1;
-  bool quoted = false;
-  for (size_t i = 0; i < size; i++) {
-    unsigned char c = text[i];
-    if (quoted) {
-      i += c == '\\';
-      quoted = c != '"';
-    } else {
-      quoted = c == '"';
-      count += c == ',' || c == '[' || c == '{';
-    }
-  }
-  return count;
-}
-
-/* Refuses objects whose look-ups would cost too much. Nobody looks into "extras", and into "extensions" only once. */
-void check_members(const cJSON *doc) {
-  std::vector<const cJSON *> above; /* at most as deep as cJSON parses, 1,000 */
-  auto is = [](const cJSON *item, const char *name) { return item->string && std::strcmp(item->string, name) == 0; };
-  for (const cJSON *item = doc->child; item;) {
-    if (item->child && !is(item, "extras") && !is(item, "extensions")) {
-      if (cJSON_IsObject(item) && cJSON_GetArraySize(item) > MEMBERS_MAX) {
-        throw Fault{ORB_E_TOO_LARGE,
-                    "An object of the glTF file has more than " + std::to_string(MEMBERS_MAX) + " members."};
-      }
-      above.push_back(item);
-      item = item->child;
-      continue;
-    }
-    while (!item->next && !above.empty()) {
-      item = above.back();
-      above.pop_back();
-    }
-    item = item->next;
-  }
-}
-
-/* The JSON text and the binary chunk of a GLB. */
-Bytes split_glb(const unsigned char *bytes, size_t size, Bytes *chunk) {
-  if (size < 20) {
-    malformed("The GLB ends within its header.");
-  }
-  size_t length = orb_read_u32(bytes + 8, 0), text = orb_read_u32(bytes + 12, 0);
-  if (orb_read_u32(bytes + 4, 0) != 2 || orb_read_u32(bytes + 16, 0) != 0x4e4f534a) {
-    malformed("The GLB is not version 2, or does not begin with its JSON.");
-  }
-  if (length > size || length < 20 || text > length - 20) {
-    malformed("The GLB announces " + std::to_string(length) + " bytes but has " + std::to_string(size) + ".");
-  }
-  size_t after = 20 + text;
-  if (length - after >= 8 && orb_read_u32(bytes + after + 4, 0) == 0x004e4942) {
-    size_t binary = orb_read_u32(bytes + after, 0);
-    if (binary > length - after - 8) {
-      malformed("The binary chunk of the GLB is longer than the file.");
-    }
-    *chunk = Bytes{bytes + after + 8, binary};
-  }
-  return Bytes{bytes + 20, text};
-}
-
-void read_document(orb_context *ctx, const unsigned char *bytes, size_t size, bool binary, orb_mesh *out) {
-  Bytes chunk, text{bytes, size};
-  if (binary) {
-    text = split_glb(bytes, size, &chunk);
-  }
-  size_t values = count_values(text.at, text.size);
-  if (values > VALUES_MAX) {
-    throw Fault{ORB_E_TOO_LARGE, "The JSON of the glTF file has too many values."};
-  }
-  /* The parser's memory is not charged to the context; a block of that size, never touched, stands for it. A text may
-   * be there three times and a half: as parsed, as a data: URI and, decoded, as a buffer and as an image. */
-  std::vector<char, Charged<char>> reserve{Charged<char>(ctx)};
-  reserve.reserve(4 * text.size + VALUE_BYTES * values);
-  const char *end = nullptr;
-  std::unique_ptr<cJSON, void (*)(cJSON *)> doc(
-      cJSON_ParseWithLengthOpts(reinterpret_cast<const char *>(text.at), text.size, &end, 0), cJSON_Delete);
-  if (!doc && orb_json_begins(reinterpret_cast<const char *>(text.at), text.size)) {
-    throw std::bad_alloc();
-  }
-  if (!doc) {
-    int64_t at = end ? reinterpret_cast<const unsigned char *>(end) - bytes : static_cast<int64_t>(size);
-    (void)orb_build_malformed(ctx, 0, at, "The JSON of the glTF file is not valid.");
-    throw Passed{ORB_E_MALFORMED_MESH};
-  }
-  check_members(doc.get());
-  Reader reader(ctx, size, doc.get());
-  reader.read(chunk, out);
-}
-
-/* No exception leaves it. */
 orb_status read_either(orb_context *ctx, const unsigned char *bytes, size_t size, bool binary, orb_mesh *out) {
-  orb_status status = ORB_OK;
-  try {
-    read_document(ctx, bytes, size, binary, out);
-  } catch (const Passed &passed) {
-    status = passed.status;
-  } catch (const Fault &fault) {
-    status = fault.status == ORB_E_MALFORMED_MESH
-                 ? orb_build_malformed(ctx, 0, static_cast<int64_t>(size), "%s", fault.detail.c_str())
-                 : orb_fail(ctx, fault.status, "%s", fault.detail.c_str());
-  } catch (const std::bad_alloc &) {
-    status = orb_fail(ctx, ORB_E_NO_MEMORY, "The machine is out of memory for the glTF file.");
-  } catch (const std::exception &error) {
-    status = orb_build_malformed(ctx, 0, static_cast<int64_t>(size), "The glTF file is not valid: %s", error.what());
-  }
-  return status;
+  return guarded(ctx, size, [&] {
+    Document document(ctx, bytes, size, binary);
+    Reader reader(ctx, size, document.root());
+    reader.read(document.chunk(), out);
+  });
 }
 
 }  // namespace

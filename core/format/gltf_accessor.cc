@@ -94,11 +94,8 @@ void Buffers::load(const cJSON *doc, Bytes chunk, size_t file_size) {
     bytes.size = length;
     buffers_.push_back(bytes);
   }
-  auto buffer = [&](int64_t index) {
-    return index >= 0 && index < static_cast<int64_t>(buffers_.size()) ? buffers_[static_cast<size_t>(index)] : Bytes();
-  };
   packed_.load(
-      doc, buffer, [&](int64_t index) { return view(index); }, file_size);
+      doc, [&](int64_t index) { return buffer(index); }, [&](int64_t index) { return view(index); }, file_size);
 }
 
 Bytes Buffers::view(int64_t index) const {

@@ -16,6 +16,11 @@ class Buffers {
 
   Bytes view(int64_t index) const;
 
+  /* The bytes of a buffer; none if there is no such buffer, or it stands for uncompressed data only. */
+  Bytes buffer(int64_t index) const {
+    return index >= 0 && index < static_cast<int64_t>(buffers_.size()) ? buffers_[static_cast<size_t>(index)] : Bytes();
+  }
+
   /* Counts work: 1 is one component decoded. Refuses the file when it asks for more than its size justifies, which it
    * does by naming the same accessors over and over. */
   void spend(size_t work) const;

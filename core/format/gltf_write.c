@@ -184,30 +184,37 @@ static size_t padded(size_t size) {
   return (size + 3) & ~(size_t)3;
 }
 
-static void put_chunk(orb_glb_writer *w, size_t kind, const orb_buffer *content, const char *padding) {
-  put_u32(w, padded(content->size));
-  put_u32(w, kind);
-  orb_glb_put(w, content->data, content->size);
-  orb_glb_put(w, padding, padded(content->size) - content->size);
+orb_status orb_glb_head(orb_context *ctx, const orb_buffer *json, size_t binary_size, orb_buffer *out) {
+  if (binary_size + json->size > UINT32_MAX - ((size_t)64 << 20)) {
+    return orb_fail(ctx, ORB_E_TOO_LARGE,
+                    "The asset would be larger than a GLB can be (4 GiB); ask for fewer triangles.");
+  }
+  orb_glb_writer w = {.ctx = ctx, .out = out};
+  put_u32(&w, GLB_MAGIC);
+  put_u32(&w, 2);
+  put_u32(&w, GLB_HEADER + 2 * CHUNK_HEADER + padded(json->size) + padded(binary_size));
+  put_u32(&w, padded(json->size));
+  put_u32(&w, CHUNK_JSON);
+  orb_glb_put(&w, json->data, json->size);
+  orb_glb_put(&w, "   ", padded(json->size) - json->size);
+  put_u32(&w, padded(binary_size));
+  put_u32(&w, CHUNK_BINARY);
+  return w.status;
 }
 
 orb_status orb_gltf_write(orb_context *ctx, const orb_gltf_scene *scene, const orb_buffer *binary, orb_buffer *out) {
   ORB_ASSERT(scene->accessor_count > 0 && scene->primitive_count > 0 && scene->material_count > 0);
-  if (binary->size > UINT32_MAX - ((size_t)64 << 20)) {
-    return orb_fail(ctx, ORB_E_TOO_LARGE,
-                    "The asset would be larger than a GLB can be (4 GiB); ask for fewer triangles.");
-  }
   orb_gltf_textures textures;
   ORB_TRY(orb_gltf_textures_collect(ctx, scene, &textures));
   orb_buffer json = {0};
   orb_glb_writer w = {.ctx = ctx, .out = &json};
   write_document(&w, scene, binary->size, &textures);
+  if (w.status == ORB_OK) {
+    w.status = orb_glb_head(ctx, &json, binary->size, out);
+  }
   w.out = out;
-  put_u32(&w, GLB_MAGIC);
-  put_u32(&w, 2);
-  put_u32(&w, GLB_HEADER + 2 * CHUNK_HEADER + padded(json.size) + padded(binary->size));
-  put_chunk(&w, CHUNK_JSON, &json, "   ");
-  put_chunk(&w, CHUNK_BINARY, binary, "\0\0\0");
+  orb_glb_put(&w, binary->data, binary->size);
+  orb_glb_put(&w, "\0\0\0", padded(binary->size) - binary->size);
   orb_buffer_free(ctx, &json);
   orb_gltf_textures_free(ctx, &textures);
   return w.status;

@@ -69,21 +69,28 @@ static orb_status check_shapes(orb_context *ctx, const orb_align_shape *shapes, 
 static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, int32_t shape_count,
                               const char *const *names, const orb_merge_options *options, orb_merge_result *out) {
   const orb_aligned_shape *shapes = out->alignment.shapes;
-  if (options->remesh.method == ORB_REMESH_TEMPLATE) {
+  out->is_document = options->remesh.method == ORB_REMESH_TEMPLATE && options->file && options->file_bytes;
+  if (out->is_document) {
+    orb_document document = {options->file, options->file_bytes, options->file_size};
+    ORB_TRY(orb_asset_write_document(ctx, &out->supermesh, shapes, &document, names, &options->asset, &out->asset_facts,
+                                     &out->asset, &out->asset_vertices, &out->dropped, &out->dropped_count));
+  } else if (options->remesh.method == ORB_REMESH_TEMPLATE) {
     ORB_TRY(orb_asset_write_template(ctx, &out->supermesh, shapes, options->file ? options->file : given[0].mesh, names,
                                      &options->asset, &out->asset_facts, &out->asset, &out->asset_vertices));
   } else {
     ORB_TRY(orb_asset_write_mapped(ctx, &out->supermesh, shapes, names, &options->asset, &out->asset_facts, &out->asset,
                                    &out->asset_vertices));
   }
-  ORB_TRY(orb_asset_dropped(ctx, shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count));
+  if (!out->is_document) {
+    ORB_TRY(orb_asset_dropped(ctx, shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count));
+  }
   out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
   out->fits = ORB_NEW(ctx, orb_fit_report, shape_count);
   if (!out->transforms || !out->fits) {
     return ORB_E_NO_MEMORY;
   }
   ORB_TRY(orb_asset_transforms(ctx, &out->supermesh, shapes, options->asset.fit, out->transforms, out->fits));
-  for (int p = ORB_PROFILE_QUANTIZED; p < ORB_PROFILES; p++) {
+  for (int p = ORB_PROFILE_QUANTIZED; p < ORB_PROFILES && !out->is_document; p++) {
     ORB_TRY(orb_profile_write(ctx, out->asset.data, out->asset.size, (orb_profile)p, &out->profiles[p], NULL));
   }
   return ORB_OK;

@@ -129,6 +129,17 @@ static orb_status read_tables(orb_context *ctx, orb_source *source, const unsign
   return ORB_OK;
 }
 
+/* Whether a document was uploaded and got targets: see orb_asset_write_document(). */
+static int is_kept(const cJSON *document) {
+  const cJSON *mesh;
+  cJSON_ArrayForEach(mesh, cJSON_GetObjectItemCaseSensitive(document, "meshes")) {
+    if (cJSON_GetObjectItemCaseSensitive(cJSON_GetObjectItemCaseSensitive(mesh, "extras"), "firstShape")) {
+      return 1;
+    }
+  }
+  return 0;
+}
+
 orb_status orb_source_open(orb_context *ctx, const unsigned char *bytes, size_t size, orb_source *out) {
   const char *json;
   const unsigned char *binary;
@@ -140,6 +151,10 @@ orb_status orb_source_open(orb_context *ctx, const unsigned char *bytes, size_t 
   out->document = cJSON_ParseWithLength(json, json_size);
   if (!out->document && orb_json_begins(json, json_size)) {
     return orb_fail(ctx, ORB_E_NO_MEMORY, "There is not enough memory to read the asset.");
+  }
+  if (is_kept(out->document)) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION,
+                    "This asset is the uploaded document with targets, which has the profile float only.");
   }
   return out->document ? read_tables(ctx, out, binary, binary_size) : orb_source_corrupt(ctx);
 }

@@ -10,6 +10,7 @@
 #include "base/memory.h"
 #include "transfer/distinct.h"
 #include "transfer/fit.h"
+#include "transfer/keep.h"
 #include "transfer/pack.h"
 #include "transfer/path.h"
 #include "transfer/split.h"
@@ -255,29 +256,39 @@ static orb_status list_template_vertices(orb_context *ctx, const orb_draft *draf
   return *out ? ORB_OK : ORB_E_NO_MEMORY;
 }
 
+/* The frames of a template: positions only, as the attributes are the file's and not the supermesh's. *bare: the
+ * options for that, which the draft refers to until the caller sets its own. */
+static orb_status make_bare_frames(orb_context *ctx, orb_draft *draft, orb_asset_options *bare) {
+  const orb_asset_options *options = draft->options;
+  ORB_TRY(check_options(ctx, draft->supermesh, options));
+  *bare = *options;
+  bare->normals = bare->colors = 0;
+  draft->options = bare;
+  if (options->path == ORB_PATH_RIGID) {
+    draft->frame_count += options->path_steps * (draft->shape_count - 1);
+  }
+  orb_progress(ctx, "write", 0);
+  ORB_TRY(allocate_frames(ctx, draft));
+  ORB_TRY(make_shapes(ctx, draft));
+  ORB_TRY(orb_draft_path(ctx, draft));
+  draft->options = options;
+  return ORB_OK;
+}
+
 orb_status orb_asset_write_template(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
                                     const orb_mesh *file, const char *const *names, const orb_asset_options *options,
                                     orb_asset_facts *facts, orb_buffer *out, int32_t **vertices) {
-  ORB_TRY(check_options(ctx, supermesh, options));
   orb_asset_facts unused;
-  orb_asset_options bare = *options; /* the attributes are the file's, not the supermesh's */
-  bare.normals = bare.colors = 0;
+  orb_asset_options bare;
   orb_draft draft = {.supermesh = supermesh,
                      .shapes = shapes,
-                     .options = &bare,
+                     .options = options,
                      .shape_count = supermesh->shape_count,
                      .frame_count = supermesh->shape_count};
   orb_draft copy = {0};
   orb_template made = {0};
   orb_status status;
-  if (options->path == ORB_PATH_RIGID) {
-    draft.frame_count += options->path_steps * (supermesh->shape_count - 1);
-  }
-  orb_progress(ctx, "write", 0);
-  ORB_GO(status, allocate_frames(ctx, &draft), done);
-  ORB_GO(status, make_shapes(ctx, &draft), done);
-  ORB_GO(status, orb_draft_path(ctx, &draft), done);
-  draft.options = options;
+  ORB_GO(status, make_bare_frames(ctx, &draft, &bare), done);
   ORB_GO(status, orb_template_draft(ctx, &draft, file, &made, &copy), done);
   ORB_GO(status, orb_draft_write(ctx, &copy, names, facts ? facts : &unused, out), done);
   if (vertices) {
@@ -288,6 +299,29 @@ done:
   draft_free(ctx, &copy);
   draft_free(ctx, &draft);
   orb_template_free(ctx, &made);
+  return status;
+}
+
+orb_status orb_asset_write_document(orb_context *ctx, const orb_supermesh *supermesh, const orb_aligned_shape *shapes,
+                                    const orb_document *document, const char *const *names,
+                                    const orb_asset_options *options, orb_asset_facts *facts, orb_buffer *out,
+                                    int32_t **vertices, orb_dropped **list, int32_t *count) {
+  orb_asset_facts unused;
+  orb_asset_options bare;
+  orb_draft draft = {.supermesh = supermesh,
+                     .shapes = shapes,
+                     .options = options,
+                     .shape_count = supermesh->shape_count,
+                     .frame_count = supermesh->shape_count};
+  orb_status status;
+  *list = NULL;
+  *count = 0;
+  ORB_GO(status, make_bare_frames(ctx, &draft, &bare), done);
+  ORB_GO(status, orb_draft_keep(ctx, &draft, document, names, facts ? facts : &unused, out, vertices, list, count),
+         done);
+  orb_progress(ctx, "write", 1);
+done:
+  draft_free(ctx, &draft);
   return status;
 }
 

@@ -195,15 +195,8 @@ static orb_status drop_textures(orb_context *ctx, const orb_mesh *mesh, const or
   return ORB_OK;
 }
 
-orb_status orb_asset_dropped(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
-                             const orb_asset_options *options, orb_dropped **list, int32_t *count) {
-  const orb_mesh *mesh = &shapes[0].mesh;
-  *list = NULL;
-  *count = 0;
-  for (int32_t i = 0; i < mesh->dropped_count; i++) {
-    ORB_TRY(orb_dropped_add(ctx, list, count, mesh->dropped[i].what, mesh->dropped[i].where, mesh->dropped[i].why));
-  }
-  ORB_TRY(drop_textures(ctx, mesh, options, list, count));
+orb_status orb_dropped_later(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count, orb_dropped **list,
+                             int32_t *count) {
   for (int32_t s = 1; s < shape_count; s++) {
     char where[32];
     (void)snprintf(where, sizeof where, "shapes[%d]", s);
@@ -213,4 +206,16 @@ orb_status orb_asset_dropped(orb_context *ctx, const orb_aligned_shape *shapes, 
     }
   }
   return ORB_OK;
+}
+
+orb_status orb_asset_dropped(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
+                             const orb_asset_options *options, orb_dropped **list, int32_t *count) {
+  const orb_mesh *mesh = &shapes[0].mesh;
+  *list = NULL;
+  *count = 0;
+  for (int32_t i = 0; i < mesh->dropped_count; i++) {
+    ORB_TRY(orb_dropped_add(ctx, list, count, mesh->dropped[i].what, mesh->dropped[i].where, mesh->dropped[i].why));
+  }
+  ORB_TRY(drop_textures(ctx, mesh, options, list, count));
+  return orb_dropped_later(ctx, shapes, shape_count, list, count);
 }

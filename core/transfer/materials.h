@@ -21,4 +21,8 @@ ORB_MUST_CHECK orb_status orb_draft_materials_add(orb_context *ctx, const orb_dr
                                                   orb_draft_materials *out, orb_gltf_scene *scene);
 void orb_draft_materials_free(orb_context *ctx, orb_draft_materials *materials);
 
+/* The part of orb_asset_dropped() that is about the later shapes. */
+ORB_MUST_CHECK orb_status orb_dropped_later(orb_context *ctx, const orb_aligned_shape *shapes, int32_t shape_count,
+                                            orb_dropped **list, int32_t *count);
+
 #endif

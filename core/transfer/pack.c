@@ -144,9 +144,7 @@ static orb_status add_part(packer *pack, const orb_draft_part *part, orb_gltf_pr
   return ORB_OK;
 }
 
-/* The frames of the animation and their times: shapes 0, …, N − 1, …, 0; each shape stays before it moves on, and the
- * in-betweens are spread evenly over the way. Returns how many there are; frames and times may both be NULL. */
-static int32_t key_frames(const orb_draft *draft, int32_t *frames, double *times) {
+int32_t orb_draft_keys(const orb_draft *draft, int32_t *frames, double *times) {
   int32_t count = 0, legs = 2 * (draft->shape_count - 1);
   int32_t steps = draft->frame_count > draft->shape_count ? draft->options->path_steps : 0;
   for (int32_t leg = 0; leg <= legs; leg++) {
@@ -167,14 +165,14 @@ static int32_t key_frames(const orb_draft *draft, int32_t *frames, double *times
 
 static orb_status add_animation(packer *pack, orb_gltf_scene *scene) {
   const orb_draft *draft = pack->draft;
-  int32_t keys = key_frames(draft, NULL, NULL), targets = draft->frame_count - 1;
+  int32_t keys = orb_draft_keys(draft, NULL, NULL), targets = draft->frame_count - 1;
   int32_t *frames = ORB_NEW(pack->ctx, int32_t, keys);
   double *times = ORB_NEW(pack->ctx, double, keys);
   float *values = ORB_NEW0(pack->ctx, float, ((int64_t)keys * targets));
   float *seconds = ORB_NEW(pack->ctx, float, keys);
   orb_status status = frames && times && values && seconds ? ORB_OK : ORB_E_NO_MEMORY;
   if (status == ORB_OK) {
-    key_frames(draft, frames, times);
+    orb_draft_keys(draft, frames, times);
     for (int32_t k = 0; k < keys; k++) {
       seconds[k] = (float)times[k];
       if (frames[k] > 0) {
@@ -239,9 +237,7 @@ static orb_status write_scene(packer *pack, orb_gltf_scene *scene, orb_gltf_prim
   return orb_gltf_write(pack->ctx, scene, &pack->binary, out);
 }
 
-/* The names of the targets: first of the later shapes, made unique, then of the in-betweens. */
-static void make_names(const orb_draft *draft, const char *const *names, char (*texts)[2 * ORB_NAME_MAX + 32],
-                       const char **out) {
+void orb_draft_names(const orb_draft *draft, const char *const *names, orb_target_name *texts, const char **out) {
   int32_t shapes = draft->shape_count, steps = draft->options->path_steps;
   for (int32_t s = 0; s < shapes; s++) {
     int same = 0;
@@ -273,11 +269,11 @@ orb_status orb_draft_write(orb_context *ctx, const orb_draft *draft, const char 
   orb_gltf_attributes *targets =
       ORB_NEW(ctx, orb_gltf_attributes, (int64_t)draft->part_count * (draft->frame_count - 1));
   orb_draft_materials materials = {0};
-  char(*texts)[2 * ORB_NAME_MAX + 32] = orb_calloc(ctx, (size_t)draft->frame_count, sizeof *texts);
+  orb_target_name *texts = ORB_NEW0(ctx, orb_target_name, draft->frame_count);
   const char **all_names = ORB_NEW(ctx, const char *, draft->frame_count);
   orb_status status = ORB_E_NO_MEMORY;
   if (pack.accessors && pack.scratch && primitives && targets && texts && all_names) {
-    make_names(draft, names, texts, all_names);
+    orb_draft_names(draft, names, texts, all_names);
     scene.name = all_names[0];
     scene.target_names = all_names + 1;
     status = orb_draft_materials_add(ctx, draft, &pack.binary, &materials, &scene);

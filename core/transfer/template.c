@@ -1,6 +1,5 @@
 #include "transfer/template.h"
 
-#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -9,11 +8,9 @@
 #include "base/error.h"
 #include "base/memory.h"
 #include "mesh/normals.h"
-#include "numeric/vec3.h"
+#include "numeric/turn.h"
 
 enum { CHECK_EVERY = 65536 }; /* corners between two checks for cancellation */
-/* 1 + the cosine of an angle so near to 180° that the axis of the shortest rotation is rounding only. */
-static const double OPPOSITE = 1e-9;
 
 /* What a corner of the file has besides its vertex; a vertex whose corners differ gets copies. */
 typedef struct corner_value {
@@ -123,12 +120,16 @@ static orb_status make_vertices(maker *m, orb_template *made) {
 }
 
 /* The supermesh of the method has the vertices of the repaired mesh, in their order. */
+int32_t orb_template_vertex(const orb_draft *draft, const orb_mesh *file, int32_t v) {
+  const orb_mesh *repaired = &draft->shapes[0].mesh;
+  int32_t number = file->source[v];
+  int32_t at = number >= 0 && number < repaired->file_vertex_count ? repaired->vertex_of_source[number] : -1;
+  return at < draft->supermesh->vertex_count ? at : -1;
+}
+
 static void find_on_supermesh(const maker *m, orb_template *made) {
-  const orb_mesh *repaired = &m->draft->shapes[0].mesh;
   for (int32_t v = 0; v < m->count; v++) {
-    int32_t number = m->file->source[m->all[v].of];
-    int32_t at = number >= 0 && number < repaired->file_vertex_count ? repaired->vertex_of_source[number] : -1;
-    made->on_supermesh[v] = at < m->draft->supermesh->vertex_count ? at : -1;
+    made->on_supermesh[v] = orb_template_vertex(m->draft, m->file, m->all[v].of);
   }
 }
 
@@ -160,19 +161,13 @@ static orb_status make_positions(const maker *m, const orb_template *made, orb_d
   return ORB_OK;
 }
 
-/* Rotates `normal` as the shortest rotation from `before` to `after` does (Rodrigues' formula); unit vectors. */
+/* Rotates `normal` as the shortest rotation from `before` to `after` does; unit vectors. */
 static void rotate_along(const double before[3], const double after[3], const float normal[3], float out[3]) {
-  double axis[3], n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]}, across[3];
-  double cosine = orb_dot(before, after);
-  orb_cross(before, after, axis);
-  orb_cross(axis, n, across);
-  double along = orb_dot(axis, n) / fmax(1 + cosine, OPPOSITE);
+  double n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]}, turned[3];
+  orb_turn(before, after, n, turned);
+  orb_normalize(turned);
   for (int k = 0; k < 3; k++) {
-    n[k] = cosine * n[k] + across[k] + along * axis[k];
-  }
-  orb_normalize(n);
-  for (int k = 0; k < 3; k++) {
-    out[k] = (float)n[k];
+    out[k] = (float)turned[k];
   }
 }
 

@@ -62,8 +62,22 @@ static int32_t *copy_corners(orb_context *ctx, const orb_mesh *raw) {
   return corners;
 }
 
+/* Copies what is left of the file once it is repaired. */
+static orb_status copy_file(orb_context *ctx, const orb_mesh *mesh, orb_format format, const unsigned char *bytes,
+                            size_t size, run_file *out) {
+  if (format == ORB_FORMAT_GLTF || format == ORB_FORMAT_GLB) {
+    out->bytes = orb_alloc(ctx, size, 1);
+    if (!out->bytes) {
+      return ORB_E_NO_MEMORY;
+    }
+    memcpy(out->bytes, bytes, size);
+    out->size = size;
+  }
+  return orb_mesh_copy(ctx, mesh, &out->mesh);
+}
+
 int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh *mesh, file_triangle *noted,
-                  int32_t noted_count, int32_t **corners, orb_mesh *raw, api_problem *problem) {
+                  int32_t noted_count, int32_t **corners, run_file *raw, api_problem *problem) {
   resource row = {0};
   api_mesh_summary summary;
   orb_repair_options repair;
@@ -82,14 +96,15 @@ int run_load_mesh(const run_env *env, orb_context *ctx, const char *id, orb_mesh
   if (!fine) {
     return api_refuse(problem, "corrupt", "The stored mesh %s cannot be read or was altered; upload it again.", id);
   }
-  orb_status status = orb_mesh_read(ctx, bytes, size, orb_format_of_name(summary.format), mesh, NULL);
+  orb_format format = orb_format_of_name(summary.format);
+  orb_status status = orb_mesh_read(ctx, bytes, size, format, mesh, NULL);
+  if (status == ORB_OK && raw) {
+    status = copy_file(ctx, mesh, format, bytes, size, raw);
+  }
   free(bytes);
   if (status == ORB_OK) {
     note_triangles(mesh, noted, noted_count);
     if (corners && !(*corners = copy_corners(ctx, mesh))) {
-      return 0;
-    }
-    if (raw && orb_mesh_copy(ctx, mesh, raw) != ORB_OK) {
       return 0;
     }
     status = orb_mesh_repair_with(ctx, mesh, &repair);

@@ -14,7 +14,7 @@ typedef struct merge_input {
   api_supermesh_request request;
   orb_mesh meshes[API_SHAPES_MAX];
   int32_t *corners[API_SHAPES_MAX]; /* see run_load_mesh() */
-  orb_mesh file;                    /* the first shape before repairs, for the method template */
+  run_file file;                    /* the first shape, for the method template */
   double *points[API_SHAPES_MAX];
   orb_align_shape shapes[API_SHAPES_MAX];
   const char *names[API_SHAPES_MAX];
@@ -30,7 +30,8 @@ static void free_input(orb_context *ctx, merge_input *in) {
     orb_free(ctx, in->corners[s]);
     orb_free(ctx, in->points[s]);
   }
-  orb_mesh_free(ctx, &in->file);
+  orb_mesh_free(ctx, &in->file.mesh);
+  orb_free(ctx, in->file.bytes);
   orb_free(ctx, in->landmarks);
   orb_free(ctx, in->places);
   orb_free(ctx, in->noted);
@@ -88,9 +89,13 @@ static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int
     const api_place *spot = &list->spots[(size_t)l * (size_t)list->shape_count + (size_t)s];
     noted[l].index = spot->kind == API_PLACE_TRIANGLE ? spot->index : -1;
   }
-  orb_mesh *file = s == 0 && in->request.merge.remesh.method == ORB_REMESH_TEMPLATE ? &in->file : NULL;
+  run_file *file = s == 0 && in->request.merge.remesh.method == ORB_REMESH_TEMPLATE ? &in->file : NULL;
   int fine = run_load_mesh(env, ctx, wanted.mesh, &in->meshes[s], noted, list->count, &in->corners[s], file, problem);
-  in->request.merge.file = file ? file : in->request.merge.file;
+  if (file) {
+    in->request.merge.file = &file->mesh;
+    in->request.merge.file_bytes = file->bytes;
+    in->request.merge.file_size = file->size;
+  }
   for (int32_t l = 0; fine && l < list->count; l++) {
     in->noted[(size_t)l * (size_t)list->shape_count + (size_t)s] = noted[l];
   }

@@ -6,6 +6,7 @@ import { readFile, mkdtemp } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { ball } from '../scenario/support/shapes.mjs';
 import { root, sample } from './support.mjs';
 
@@ -386,4 +387,46 @@ test('repairs add up; a piece replaces the largest, and a size another size', ()
     ['safe', 'none', 'none'],
   ];
   for (const [list, more, expected] of cases) assert.equal(mesh.withRepairs(list, more), expected);
+});
+
+test('a kept document: the new targets, in the scene, after those that it had', () => {
+  const ways = FACES.map((_, v) => [v, 0, 1]);
+  const glb = writeGlb({
+    positions: TETRAHEDRON,
+    normals: TETRAHEDRON.map(() => [0, 0, 1]),
+    triangles: FACES,
+    moves: ways,
+    edit: (gltf) => {
+      const [body] = gltf.meshes;
+      const [primitive] = body.primitives;
+      primitive.targets.unshift({ POSITION: primitive.attributes.POSITION });
+      body.extras = { targetNames: ['smile', 'other'], firstShape: 1 };
+      gltf.meshes.unshift({ primitives: [{ attributes: primitive.attributes, indices: primitive.indices }] });
+      gltf.nodes = [{ mesh: 1, scale: [-2, 1, 1], translation: [0, 5, 0] }];
+    },
+  });
+  const bytes = glb.buffer.slice(glb.byteOffset, glb.byteOffset + glb.length);
+  const { names, targets, position, index, frame, normal } = mesh.decodeMorph(bytes, 2);
+  assert.deepEqual(names, ['other']);
+  assert.equal(targets.length, 1);
+  const close = (a, b) =>
+    assert.ok(
+      [...a].every((x, i) => Math.abs(x - b[i]) < 1e-6),
+      `${[...a]} ${b}`,
+    );
+  const scene = (values) => values.map((x, i) => x * frame.radius + frame.center[i % 3]);
+  close(
+    scene(position),
+    TETRAHEDRON.flatMap(([x, y, z]) => [-2 * x, y + 5, z]),
+  );
+  close(
+    targets[0].position.map((x) => x * frame.radius),
+    ways.flatMap(([x, y, z]) => [-2 * x, y, z]),
+  );
+  assert.deepEqual(
+    [...index],
+    FACES.flatMap(([a, b, c]) => [a, c, b]),
+    'a mirror turns the triangles',
+  );
+  close(normal, [0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1]);
 });

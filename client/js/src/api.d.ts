@@ -234,7 +234,7 @@ export type SupermeshRequest = {
     };
   };
   remesh?: {
-    /** Default: "adaptive". */
+    /** With template the vertices and triangles are those of the first shape as uploaded; where that is glTF, the asset is that document with targets added. Default: "adaptive". */
     method?: 'adaptive' | 'overlay' | 'subdivision' | 'convex-hull' | 'template';
     /** The largest deviation, relative to the diagonal of the bounding box. Default: 0.001. */
     tolerance?: number;
@@ -321,7 +321,7 @@ export type Supermesh = {
   url: string;
   asset: string;
   asset_bytes: number;
-  /** What the profiles quantized and meshopt change: the bounds that hold for both, and those of each. Absent if an older engine made the supermesh. */
+  /** What the profiles quantized and meshopt change: the bounds that hold for both, and those of each. Absent if an older engine made the supermesh, and where the asset is an uploaded glTF document, which has the profile float only. */
   profiles?: {
     /** The largest distance between a vertex and its place in the float asset, at every weight from 0 to 1 of one target, divided by the smallest diagonal of the bounding boxes of the shapes in the asset: a proved bound, to be added to hausdorff_relative. */
     quantization_relative: number | null;
@@ -474,7 +474,7 @@ export type Supermesh = {
   }>;
   /** The energy of the alignment; null if it was not measured. */
   energy: number | null;
-  /** What the files have and the asset lacks: parts of the first shape's materials, and data that no asset has, such as skins. The last entry of a long list counts the rest. */
+  /** What the files have and the asset lacks: parts of the first shape's materials, and data that no new document has, such as skins. With the remesh method template an uploaded glTF document stays, and lacks almost nothing. The last entry of a long list counts the rest. */
   dropped: Array<{
     /** The part. */
     what: string;

@@ -93,6 +93,28 @@ ORB_API ORB_MUST_CHECK orb_status orb_asset_write_template(orb_context *ctx, con
                                                            const char *const *names, const orb_asset_options *options,
                                                            orb_asset_facts *facts, orb_buffer *out, int32_t **vertices);
 
+/* A glTF or GLB file. */
+typedef struct orb_document {
+  const orb_mesh *mesh; /* as orb_mesh_read() gave it, before repairs */
+  const unsigned char *bytes;
+  size_t size;
+} orb_document;
+
+/* As orb_asset_write_template(), where the first shape came as glTF or GLB: appends that document as a GLB, with
+ * targets added to the meshes that the closed surface consists of. The bytes of its first buffer stay, and so does all
+ * else: nodes, skins, weights, materials, animations, extensions. Existing targets come first; mesh.extras.firstShape
+ * is the number of the first target that is a shape. Targets are in the coordinates of each mesh. *vertices: those of
+ * the triangle primitives of all meshes, one after another.
+ *
+ * *list (allocated from the context, freed by the caller, NULL if empty) has *count entries: what the asset lacks. Free
+ * it on an error, too. ORB_E_BAD_OPTION: the document cannot be kept; the message says why. */
+ORB_API ORB_MUST_CHECK orb_status orb_asset_write_document(orb_context *ctx, const orb_supermesh *supermesh,
+                                                           const orb_aligned_shape *shapes,
+                                                           const orb_document *document, const char *const *names,
+                                                           const orb_asset_options *options, orb_asset_facts *facts,
+                                                           orb_buffer *out, int32_t **vertices, orb_dropped **list,
+                                                           int32_t *count);
+
 #ifdef __cplusplus
 }
 #endif

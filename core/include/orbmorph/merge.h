@@ -17,6 +17,9 @@ typedef struct orb_merge_options {
   orb_asset_options asset;
   /* ORB_REMESH_TEMPLATE: the first shape as orb_mesh_read() gave it, before repairs; NULL: after repairs. */
   const orb_mesh *file;
+  /* With it, where it came as glTF or GLB: its bytes, whose document the asset then is. NULL: a new document. */
+  const unsigned char *file_bytes;
+  size_t file_size;
 } orb_merge_options;
 ORB_API void orb_merge_defaults(orb_merge_options *options);
 
@@ -86,7 +89,9 @@ typedef struct orb_merge_result {
   int32_t dropped_count;
   orb_dropped *dropped; /* see orb_asset_dropped() */
   orb_buffer asset;
-  orb_profile_facts profiles[ORB_PROFILES]; /* what the profiles of the asset change; that of float is 0 */
+  int is_document; /* the asset is the document of the first shape, see orb_asset_write_document() */
+  orb_profile_facts profiles[ORB_PROFILES]; /* what the profiles of the asset change; that of float is 0. A kept
+                                               document has no other */
   orb_merge_timings timings;
 } orb_merge_result;
 

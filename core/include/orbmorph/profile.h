@@ -37,8 +37,8 @@ typedef struct orb_profile_facts {
  *
  * facts may be NULL. out NULL: computes only the facts.
  *
- * Errors: ORB_E_BAD_OPTION (ORB_PROFILE_FLOAT), ORB_E_CORRUPT (not such an asset), ORB_E_TOO_LARGE, ORB_E_NO_MEMORY.
- * O(V·N). */
+ * Errors: ORB_E_BAD_OPTION (ORB_PROFILE_FLOAT, or an asset of orb_asset_write_document()), ORB_E_CORRUPT (not such an
+ * asset), ORB_E_TOO_LARGE, ORB_E_NO_MEMORY. O(V·N). */
 ORB_API ORB_MUST_CHECK orb_status orb_profile_write(orb_context *ctx, const unsigned char *asset, size_t size,
                                                     orb_profile profile, orb_profile_facts *facts, orb_buffer *out);
 

@@ -47,7 +47,7 @@ interface Document {
   accessors?: Accessor[];
   bufferViews?: { buffer: number; byteOffset?: number; byteLength: number; byteStride?: number }[];
   buffers?: { uri?: string; byteLength: number }[];
-  meshes?: { primitives: Primitive[]; weights?: number[]; extras?: { targetNames?: string[] } }[];
+  meshes?: { primitives: Primitive[]; weights?: number[]; extras?: { targetNames?: string[]; firstShape?: number } }[];
   materials?: Material[];
   textures?: { source?: number; sampler?: number }[];
   images?: { uri?: string; bufferView?: number; mimeType?: string }[];

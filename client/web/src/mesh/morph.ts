@@ -1,6 +1,6 @@
 /** A morph asset, decoded for the viewer: base, targets, wireframe, and the path through the shapes. */
 import { dressOf, skinOf, tried, type Skin } from './dress';
-import { readGlb } from './gltf';
+import { type Gltf, type Part, readGlb } from './gltf';
 import { edgesOf, smoothNormals, type Frame } from './geometry';
 
 export interface MorphData {
@@ -36,45 +36,103 @@ function joined(arrays: Float32Array[]): Float32Array {
   return out;
 }
 
-/** Targets 0 … shapeCount − 2 are the other shapes; the rest are in-betweens of a curved path. */
-export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData {
-  const gltf = readGlb(buffer);
-  const parts = gltf.triangles().filter((part, _, all) => part.mesh === all[0].mesh);
-  if (!parts.length) throw new Error('The asset has no triangles.');
-  const targetCount = parts[0].primitive.targets?.length ?? 0;
-  const position = joined(parts.map((p) => p.position));
-  let total = 0;
-  for (const part of parts) total += part.index.length;
-  const index = new Uint32Array(total);
+/** A part of the surface that morphs. */
+interface Moving extends Part {
+  /** the number of its first target that is a shape */
+  first: number;
+}
+
+/** What morphs: the mesh of an asset, or in an uploaded document that has got targets those meshes that have. */
+function movingParts(gltf: Gltf): Moving[] {
+  const all = gltf.triangles();
+  const first = (part: Part) => gltf.json.meshes?.[part.mesh].extras?.firstShape;
+  const kept = all.filter((part) => first(part) !== undefined);
+  return (kept.length ? kept : all.filter((part) => part.mesh === all[0].mesh)).map((part) => ({
+    ...part,
+    first: first(part) ?? 0,
+  }));
+}
+
+/** Points (w = 1) or ways (w = 0) of a mesh in the scene. */
+function inScene(values: Float32Array, m: number[], w: number): Float32Array {
+  const out = new Float32Array(values.length);
+  for (let i = 0; i < values.length; i += 3)
+    for (let r = 0; r < 3; r++)
+      out[i + r] = m[r] * values[i] + m[4 + r] * values[i + 1] + m[8 + r] * values[i + 2] + w * m[12 + r];
+  return out;
+}
+
+const determinant = (m: number[]) =>
+  m[0] * (m[5] * m[10] - m[9] * m[6]) - m[4] * (m[1] * m[10] - m[9] * m[2]) + m[8] * (m[1] * m[6] - m[5] * m[2]);
+
+/** Normals of a mesh in the scene, plus `more` unless that is null: by the cofactors of the matrix. */
+function normalsInScene(values: Float32Array, more: Float32Array | null, m: number[]): Float32Array {
+  const sign = determinant(m) < 0 ? -1 : 1;
+  const cofactors = new Array<number>(16).fill(0);
+  for (let r = 0; r < 3; r++)
+    for (let c = 0; c < 3; c++) {
+      const [r1, r2, c1, c2] = [(r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3];
+      cofactors[4 * c + r] = sign * (m[4 * c1 + r1] * m[4 * c2 + r2] - m[4 * c2 + r1] * m[4 * c1 + r2]);
+    }
+  const sum = more ? values.map((x, i) => x + more[i]) : values;
+  const out = inScene(sum, cofactors, 0);
+  for (let i = 0; i < out.length; i += 3) {
+    const length = Math.hypot(out[i], out[i + 1], out[i + 2]) || 1;
+    for (let k = 0; k < 3; k++) out[i + k] /= length;
+  }
+  return out;
+}
+
+/** The triangles of all parts, facing as they do in the scene. */
+function joinedIndex(parts: Moving[]): Uint32Array {
+  const index = new Uint32Array(parts.reduce((n, part) => n + part.index.length, 0));
   let at = 0;
   let base = 0;
   for (const part of parts) {
-    for (const v of part.index) index[at++] = v + base;
+    const turned = determinant(part.matrix) < 0;
+    for (let i = 0; i < part.index.length; i++) {
+      const from = turned && i % 3 > 0 ? i + (i % 3 === 1 ? 1 : -1) : i;
+      index[at++] = part.index[from] + base;
+    }
     base += part.position.length / 3;
   }
+  return index;
+}
+
+/** Targets 0 … shapeCount − 2 are the other shapes; the rest are in-betweens of a curved path. */
+export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData {
+  const gltf = readGlb(buffer);
+  const parts = movingParts(gltf);
+  if (!parts.length) throw new Error('The asset has no triangles.');
+  const targetCount = (parts[0].primitive.targets?.length ?? 0) - parts[0].first;
+  const position = joined(parts.map((p) => inScene(p.position, p.matrix, 1)));
+  const index = joinedIndex(parts);
   const hasNormals = parts.every((p) => p.primitive.attributes.NORMAL !== undefined);
   const normal = hasNormals
-    ? joined(parts.map((p) => gltf.floats(p.primitive.attributes.NORMAL)))
+    ? joined(parts.map((p) => normalsInScene(gltf.floats(p.primitive.attributes.NORMAL), null, p.matrix)))
     : smoothNormals(position, index);
   const targets = Array.from({ length: targetCount }, (_, k) => {
-    const delta = joined(parts.map((p) => gltf.floats(p.primitive.targets![k].POSITION)));
-    const withNormals = hasNormals && parts.every((p) => p.primitive.targets![k].NORMAL !== undefined);
-    let normalDelta: Float32Array;
-    if (withNormals) normalDelta = joined(parts.map((p) => gltf.floats(p.primitive.targets![k].NORMAL)));
-    else {
-      normalDelta = smoothNormals(
-        position.map((x, i) => x + delta[i]),
-        index,
-      );
-      for (let i = 0; i < normalDelta.length; i++) normalDelta[i] -= normal[i];
-    }
-    return { position: delta, normal: normalDelta };
+    const of = (p: Moving) => p.primitive.targets![p.first + k];
+    const delta = joined(parts.map((p) => inScene(gltf.floats(of(p).POSITION), p.matrix, 0)));
+    const withNormals = hasNormals && parts.every((p) => of(p).NORMAL !== undefined);
+    const there = withNormals
+      ? joined(
+          parts.map((p) => {
+            const base = gltf.floats(p.primitive.attributes.NORMAL);
+            return normalsInScene(base, gltf.floats(of(p).NORMAL), p.matrix);
+          }),
+        )
+      : smoothNormals(
+          position.map((x, i) => x + delta[i]),
+          index,
+        );
+    return { position: delta, normal: there.map((x, i) => x - normal[i]) };
   });
 
   const dress = tried(() => dressOf(gltf, parts));
   const shapes = Array.from({ length: Math.min(shapeCount, targetCount + 1) }, (_, i) => single(i - 1, targetCount));
-  const path = animationPath(gltf, targetCount, shapes);
-  const names = targetNames(gltf, parts[0].mesh, targetCount);
+  const path = animationPath(gltf, parts[0].first, targetCount, shapes);
+  const names = targetNames(gltf, parts[0], targetCount);
   const frame = fit(position, targets, shapes);
   for (let i = 0; i < position.length; i++) position[i] = (position[i] - frame.center[i % 3]) / frame.radius;
   for (const target of targets) for (let i = 0; i < position.length; i++) target.position[i] /= frame.radius;
@@ -95,9 +153,9 @@ export function decodeMorph(buffer: ArrayBuffer, shapeCount: number): MorphData 
   };
 }
 
-function targetNames(gltf: ReturnType<typeof readGlb>, mesh: number, count: number): string[] {
+function targetNames(gltf: Gltf, { mesh, first }: Moving, count: number): string[] {
   const names = gltf.json.meshes?.[mesh]?.extras?.targetNames;
-  return Array.from({ length: count }, (_, k) => names?.[k] ?? `target ${k + 1}`);
+  return Array.from({ length: count }, (_, k) => names?.[first + k] ?? `target ${k + 1}`);
 }
 
 /** The frame that contains every shape. */
@@ -151,16 +209,18 @@ export function pathOf(
   return straight;
 }
 
-function animationPath(gltf: ReturnType<typeof readGlb>, count: number, shapes: Float32Array[]) {
-  for (const animation of gltf.json.animations ?? []) {
+/** The animation of the morph is the last: those of an uploaded document come before it, with `first` targets more. */
+function animationPath(gltf: Gltf, first: number, count: number, shapes: Float32Array[]) {
+  for (const animation of (gltf.json.animations ?? []).slice(-1)) {
     const channel = animation.channels.find((c) => c.target.path === 'weights');
     if (!channel || !count) continue;
     const sampler = animation.samplers[channel.sampler];
     const output = gltf.floats(sampler.output);
     const step = sampler.interpolation === 'CUBICSPLINE' ? 3 : 1;
-    const keys = Math.floor(output.length / (count * step));
+    const width = first + count;
+    const keys = Math.floor(output.length / (width * step));
     const frames = Array.from({ length: keys }, (_, i) => {
-      const from = (i * step + (step === 3 ? 1 : 0)) * count;
+      const from = (i * step + (step === 3 ? 1 : 0)) * width + first;
       return output.slice(from, from + count);
     });
     return pathOf(frames, shapes);

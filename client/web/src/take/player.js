@@ -66,19 +66,29 @@ function parse(buffer) {
 }
 
 /**
+ * The primitives that morph, with those targets that are shapes: an uploaded document that has got targets may have
+ * others first, and other meshes.
+ */
+function meshOf({ meshes }) {
+  const mesh = meshes.find(({ extras }) => extras?.firstShape !== undefined) ?? meshes[0];
+  const first = mesh.extras?.firstShape ?? 0;
+  return { first, primitives: mesh.primitives.map((p) => ({ ...p, targets: p.targets?.slice(first) })) };
+}
+
+/**
  * The keys of the path from the first to the last shape: {time, target}; target −1 is the base. Rests are left out, and
  * the shapes stand at equal intervals.
  */
-function pathOf({ json, read }, targets, shapes) {
+function pathOf({ json, read }, first, targets, shapes) {
   const straight = Array.from({ length: shapes }, (_, i) => ({ time: i, target: i - 1 }));
-  const animation = json.animations?.[0];
+  const animation = json.animations?.at(-1);
   const channel = animation?.channels.find((c) => c.target.path === 'weights');
   if (!channel || !targets) return straight;
   const output = read(animation.samplers[channel.sampler].output);
   const keys = [];
   let shape = 0;
   let between = [];
-  for (let i = 0; i + targets <= output.length; i += targets) {
+  for (let i = first; i + targets <= output.length; i += first + targets) {
     const weights = output.subarray(i, i + targets);
     const target = weights.findIndex((w) => w > 0.5);
     if (target === shape - 1) {
@@ -271,13 +281,13 @@ export async function open(canvas, glb, settings) {
   const gl = canvas.getContext('webgl2', { antialias: true, alpha: true, preserveDrawingBuffer: true });
   if (!gl) throw new Error('This browser has no WebGL 2.');
   const file = parse(glb);
-  const { primitives } = file.json.meshes[0];
+  const { primitives, first } = meshOf(file.json);
   const targets = primitives[0].targets?.length ?? 0;
   const shapes = Math.min(settings.shapes ?? targets + 1, targets + 1);
   const { center, radius } = frameOf(file, primitives, shapes);
   const parts = [];
   for (const primitive of primitives) parts.push(await partOf(gl, file, primitive, center, radius));
-  const keys = pathOf(file, targets, shapes);
+  const keys = pathOf(file, first, targets, shapes);
   const program = programOf(gl);
   const uniform = (name) => gl.getUniformLocation(program, name);
   const tints = (settings.tints ?? ['#d8c7b8']).map(linear);

@@ -1,0 +1,60 @@
+/* Editing a glTF document: members, accessors at the end of its first buffer, and the text. */
+#ifndef ORB_FORMAT_GLTF_EDIT_HH
+#define ORB_FORMAT_GLTF_EDIT_HH
+
+#include "format/gltf_accessor.hh"
+
+namespace gltf {
+
+using Floats = std::vector<float, Charged<float>>;
+
+/* A value that was just made; NULL: the parser's memory is spent. */
+inline cJSON *made(cJSON *item) {
+  if (!item) {
+    throw std::bad_alloc();
+  }
+  return item;
+}
+
+/* What was read is const to its readers, not to those who edit it. */
+inline cJSON *editable(const cJSON *item) {
+  return const_cast<cJSON *>(item);
+}
+
+/* Adds a member, or replaces it at its place. */
+void set(cJSON *object, const char *key, cJSON *value);
+void set(cJSON *object, const char *key, double value);
+
+/* Appends to an array; returns the index. */
+int64_t append(cJSON *array, cJSON *value);
+
+/* The array of this name; made if it is absent. */
+cJSON *array_in(cJSON *object, const char *key);
+
+/* The elements of a document's array, which grows. */
+class Editor {
+ public:
+  /* first: the bytes of the first buffer, which stay. */
+  Editor(orb_context *ctx, cJSON *doc, Bytes first);
+  ~Editor() { orb_buffer_free(ctx_, &added_); }
+  Editor(const Editor &) = delete;
+  Editor &operator=(const Editor &) = delete;
+
+  /* Adds an accessor of float32 with a view of its own, and returns its number. attribute: of vertices; bounded: with
+   * min and max. */
+  int64_t add(const Floats &values, size_t width, bool attribute, bool bounded);
+
+  /* Appends the GLB. */
+  void write(orb_buffer *out);
+
+ private:
+  orb_context *ctx_;
+  cJSON *doc_, *accessors_, *views_;
+  int64_t accessor_count_, view_count_;
+  Bytes first_;
+  orb_buffer added_ = {};
+};
+
+}  // namespace gltf
+
+#endif

@@ -1,0 +1,43 @@
+/* A glTF document with more morph targets: everything else stays as it is.
+ *
+ * The bytes of the document's first buffer stay, and those of the targets follow. All members of the JSON stay, with
+ * their order and values. Changed are: primitives[].targets, the weights of meshes and nodes, extras.targetNames and
+ * extras.firstShape of the meshes, keyframes of these weights, and the lists of accessors, views and animations. */
+#ifndef ORB_FORMAT_GLTF_KEEP_H
+#define ORB_FORMAT_GLTF_KEEP_H
+
+#include "orbmorph/material.h"
+#include "orbmorph/mesh.h"
+
+/* The targets, in the coordinates of the scene: keeping takes them to those of each primitive. */
+typedef struct orb_gltf_shapes {
+  int32_t target_count, file_vertex_count;
+  const char *const *names;       /* target_count */
+  const int32_t *on_surface;      /* per vertex of the file, as orb_mesh_read() numbers them; −1: it stays */
+  const double *const *positions; /* target_count + 1 lists, 3 a vertex of the surface; first those of the document */
+  const double *const *normals;   /* likewise, unit or zero; NULL: targets get no normals */
+  int32_t key_count;              /* of the animation "morph"; 0: none */
+  const int32_t *key_frames;      /* key_count: 0: the document's shape, k: target k − 1 */
+  const double *key_times;        /* seconds */
+} orb_gltf_shapes;
+
+typedef struct orb_gltf_kept {
+  int32_t vertex_count;    /* of the triangle primitives of all meshes, one after another: the first of the file */
+  int32_t primitive_count; /* triangle primitives */
+  int32_t attributes;      /* that a target morphs, at most */
+  orb_dropped *dropped;    /* freed by the caller, after an error too */
+  int32_t dropped_count;
+} orb_gltf_kept;
+
+/* Appends a GLB. Existing targets come first, and keep their names and weights; a mesh without vertices on the surface
+ * gets no targets. ORB_E_BAD_OPTION: the document cannot be kept, see the message. */
+#ifdef __cplusplus
+extern "C" {
+#endif
+ORB_MUST_CHECK orb_status orb_gltf_keep(orb_context *ctx, const unsigned char *bytes, size_t size,
+                                        const orb_gltf_shapes *shapes, orb_gltf_kept *kept, orb_buffer *out);
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,170 @@
+// The remesh method "template" where the first shape came as glTF: the asset is that document with targets.
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import { rigged } from '../samples/rigged.mjs';
+import { assertProblem, daemon } from './support/daemon.mjs';
+import { farthest } from './support/distance.mjs';
+import { parseGlb } from './support/glb.mjs';
+import { writeGlb, writeGltf } from './support/glb_write.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const options = { remesh: { method: 'template' }, asset: { fit: 'none' }, landmarks: 'auto' };
+
+const binaryOf = (glb) => glb.subarray(28 + glb.readUInt32LE(12));
+const jsonOf = (glb) => JSON.parse(glb.toString('utf8', 20, 20 + glb.readUInt32LE(12)));
+
+async function merge(d, file, query, others, more = {}) {
+  const reply = await d.upload(file, query);
+  assert.equal(reply.status, 201, JSON.stringify(reply.json));
+  const meshes = [{ mesh: reply.json.id }];
+  for (const [i, other] of others.entries())
+    meshes.push({ mesh: (await d.upload(shapes.obj(other), { name: `other ${i}` })).json.id });
+  return { shapes: meshes, ...options, ...more };
+}
+
+/** That all of `before` is in `after`, but for what targets change. */
+function assertMembers(before, after, where = '') {
+  if (before === null || typeof before !== 'object') assert.equal(after, before, where);
+  else
+    for (const [key, value] of Object.entries(before)) {
+      if (!/\/(weights|targetNames|byteLength|output)$/.test(`${where}/${key}`) || /bufferViews/.test(where))
+        assertMembers(value, after?.[key], `${where}/${key}`);
+    }
+}
+
+test('a rigged character stays, and gets two shape keys', async (t) => {
+  const d = await daemon(t);
+  const { bytes, surface } = rigged();
+  const made = await d.made(
+    '/v1/supermeshes',
+    await merge(d, bytes, { name: 'body', repair: 'largest_component' }, [shapes.bean(3), shapes.egg(3)]),
+  );
+  assert.deepEqual(made.dropped, []);
+  assert.equal(made.profiles, undefined);
+  const asset = (await d.get(made.asset)).bytes;
+  const before = jsonOf(bytes);
+  const { gltf, read } = parseGlb(asset);
+  assertMembers(before, gltf);
+  assert.deepEqual(gltf.extensions, before.extensions);
+  assert.equal(gltf.nodes.length, before.nodes.length);
+  const old = binaryOf(bytes);
+  assert.ok(binaryOf(asset).subarray(0, old.length).equals(old), 'the bytes of the upload stay');
+
+  const body = gltf.meshes[1];
+  assert.deepEqual(body.extras, { author: 'someone', targetNames: ['smile', 'other 0', 'other 1'], firstShape: 1 });
+  assert.deepEqual(body.weights, [0.25, 0, 0]);
+  assert.equal(gltf.meshes[0].primitives[0].targets, undefined, 'the eye is not on the surface');
+  const moved = [[], []];
+  for (const [p, primitive] of body.primitives.entries()) {
+    assert.deepEqual(primitive.attributes, before.meshes[1].primitives[p].attributes);
+    assert.equal(primitive.targets.length, 3);
+    assert.deepEqual(primitive.targets[0], before.meshes[1].primitives[p].targets[0]);
+    const [base, normal, tangent] = ['POSITION', 'NORMAL', 'TANGENT'].map((name) => read(primitive.attributes[name]));
+    for (const k of [1, 2]) {
+      const [move, turn, bend] = ['POSITION', 'NORMAL', 'TANGENT'].map((name) => read(primitive.targets[k][name]));
+      base.forEach(
+        (x, i) => i % 3 === 0 && moved[k - 1].push([x + move[i], base[i + 1] + move[i + 1], base[i + 2] + move[i + 2]]),
+      );
+      for (let v = 0; v < base.length / 3; v++) {
+        const n = [0, 1, 2].map((c) => normal[3 * v + c] + turn[3 * v + c]);
+        const tan = [0, 1, 2].map((c) => tangent[4 * v + c] + bend[3 * v + c]);
+        assert.ok(Math.abs(Math.hypot(...n) - 1) < 1e-5 && Math.abs(Math.hypot(...tan) - 1) < 1e-5);
+        const across = Math.abs(n[0] * tan[0] + n[1] * tan[1] + n[2] * tan[2]);
+        const was = Math.abs([0, 1, 2].reduce((sum, c) => sum + normal[3 * v + c] * tangent[4 * v + c], 0));
+        assert.ok(Math.abs(across - was) < 1e-5, 'both turn alike');
+      }
+    }
+  }
+  assert.equal(moved[0].length, surface.positions.length);
+  for (const [k, other] of [shapes.bean(3), shapes.egg(3)].entries()) {
+    const used = [...new Set(surface.triangles.flat())];
+    assert.equal(used.length, surface.positions.length - 2, 'one vertex of each pole has no triangle');
+    const shown = used.map((v) => moved[k][v]);
+    const off = farthest(shown, other.positions.flat(), other.triangles.flat());
+    assert.ok(off < 3e-6, `target ${k}: ${off}`);
+    const at = new Map();
+    used.forEach((v) => {
+      const p = surface.positions[v];
+      const key = p.map((x) => x + 0).join();
+      assert.deepEqual(moved[k][at.get(key) ?? v], moved[k][v], 'what lies at one place moves alike');
+      at.set(key, v);
+    });
+    assert.ok(at.size < used.length);
+  }
+
+  const [wave, morph] = gltf.animations;
+  assert.deepEqual([...read(wave.samplers[1].output)], [0, 0, 0, 0.75, 0, 0, 0.25, 0, 0]);
+  assert.equal(wave.samplers[0].output, before.animations[0].samplers[0].output);
+  assert.equal(morph.name, 'morph');
+  const keys = [...read(morph.samplers[0].output)];
+  assert.equal(keys.length, 3 * read(morph.samplers[0].input).length);
+  assert.deepEqual(keys.slice(0, 3), [0.25, 0, 0]);
+  assert.ok([1, 2].every((k) => keys.some((x, i) => i % 3 === k && x === 1)));
+
+  for (const profile of ['quantized', 'meshopt'])
+    assertProblem(await d.get(`${made.asset}?profile=${profile}`), 422, 'bad-option');
+  const places = (await d.get(`${made.url}/places`)).bytes;
+  const tail = places.indexOf('GLBVERTS');
+  assert.equal(places.readUInt32LE(tail + 8), surface.positions.length + 4, 'the eye counts');
+  assert.equal(places.readInt32LE(tail + 12), -1);
+});
+
+/** A node that scales, turns and mirrors, under a parent that moves and scales. */
+const placed = (gltf) => {
+  gltf.nodes = [
+    { children: [1], scale: [0.01, 0.01, 0.01], translation: [0, 3, 0] },
+    { mesh: 0, scale: [-200, 100, 50], rotation: [Math.SQRT1_2, 0, 0, Math.SQRT1_2] },
+  ];
+};
+const inScene = ([x, y, z]) => [-2 * x, -0.5 * z + 3, y];
+
+for (const [kind, write] of [
+  ['GLB', writeGlb],
+  ['glTF', writeGltf],
+])
+  test(`${kind}: targets are in the coordinates of the mesh`, async (t) => {
+    const d = await daemon(t);
+    const egg = shapes.egg(3);
+    const normals = egg.positions.map((p) => p.map((x) => x / Math.hypot(...p)));
+    const file = write({ ...egg, normals, edit: placed });
+    const bean = shapes.bean(3);
+    bean.positions = bean.positions.map(([x, y, z]) => [2 * x, y + 3, z]);
+    const request = await merge(d, file, { name: 'egg' }, [bean], { asset: { fit: 'none', animation: 'none' } });
+    const made = await d.made('/v1/supermeshes', request);
+    const { gltf, read } = parseGlb((await d.get(made.asset)).bytes);
+    assert.equal(gltf.animations, undefined);
+    assert.equal(gltf.buffers.length, 1);
+    assert.equal(gltf.buffers[0].uri, undefined);
+    const [primitive] = gltf.meshes[0].primitives;
+    const base = read(primitive.attributes.POSITION);
+    assert.deepEqual([...base], egg.positions.flat().map(Math.fround));
+    const move = read(primitive.targets[0].POSITION);
+    const points = egg.positions.map((_, v) => inScene([0, 1, 2].map((k) => base[3 * v + k] + move[3 * v + k])));
+    const off = farthest(points, bean.positions.flat(), bean.triangles.flat());
+    assert.ok(off < 5e-6, `${off}`);
+    const normal = read(primitive.attributes.NORMAL);
+    const turn = read(primitive.targets[0].NORMAL);
+    let inward = 0;
+    for (let v = 0; v < points.length; v++) {
+      const n = [0, 1, 2].map((k) => normal[3 * v + k] + turn[3 * v + k]);
+      assert.ok(Math.abs(Math.hypot(...n) - 1) < 1e-5);
+      const out = [-n[0] / 2, -n[2] / 0.5, n[1]]; // normals go by the inverse transpose
+      const p = points[v];
+      inward += out[0] * p[0] + out[1] * (p[1] - 3) + out[2] * p[2] <= 0;
+    }
+    assert.ok(inward < points.length / 20, `${inward} normals face inwards`);
+  });
+
+test('a mesh that the scene shows twice is refused', async (t) => {
+  const d = await daemon(t);
+  const twice = (gltf) => {
+    gltf.scenes[0].nodes = [0, 1];
+    gltf.nodes = [{ mesh: 0 }, { mesh: 0, translation: [5, 0, 0] }];
+  };
+  const file = writeGlb({ ...shapes.egg(2), edit: twice });
+  const request = await merge(d, file, { name: 'eggs', repair: 'largest_component' }, [shapes.bean(2)]);
+  const job = await d.make('/v1/supermeshes', request);
+  const problem = JSON.stringify(job);
+  assert.match(problem, /shows mesh 0/);
+  assert.match(problem, /mesh of its own/);
+});
