@@ -23,8 +23,23 @@ static int is_url(const char *operand) {
   return strncasecmp(operand, "http://", 7) == 0 || strncasecmp(operand, "https://", 8) == 0;
 }
 
+/* The daemon's own bounds, so that a wrong number is refused before anything is uploaded. */
+static int check_handle_size(const cli *c) {
+  const char *size = c->args.value[OPT_HANDLE_SIZE];
+  double x;
+  if (!size || (cli_decimal(size, &x) && x >= 1e-6 && x <= 10)) {
+    return CLI_DONE;
+  }
+  cli_error(c, "--handle-size takes a number from 0.000001 to 10, a fraction of the diagonal, not '%s'", size);
+  return CLI_USAGE;
+}
+
 int cli_check_mesh(const cli *c, const char *operand) {
   struct stat info;
+  int rc = check_handle_size(c);
+  if (rc != CLI_DONE) {
+    return rc;
+  }
   if (is_stored(operand) || is_url(operand)) {
     return CLI_DONE;
   }

@@ -467,6 +467,15 @@ test('a tolerance may be a percentage', async (t) => {
   assert.equal(JSON.parse(out).request.remesh.tolerance, 0.05);
 });
 
+test('a size of handles that is none is refused before anything is sent', async () => {
+  const env = { ORBMORPH_SERVER: 'http://127.0.0.1:1' }; // no one listens there
+  for (const size of ['big', '0', '-1', '11', 'nan', '0.1x', '']) {
+    const { code, err } = await run(['upload', dog, '--repair', 'close_handles', '--handle-size', size], { env });
+    assert.equal(code, 2, `${size}: ${err}`);
+    assert.match(err, /--handle-size takes a number from 0\.000001 to 10/);
+  }
+});
+
 test('a report warns of what is worse than asked, and only of that', async (t) => {
   const d = await daemon(t);
   const env = { ORBMORPH_SERVER: d.url };

@@ -17,7 +17,7 @@ before(async () => {
   const out = join(await mkdtemp(join(tmpdir(), 'orbmorph-mesh-')), 'mesh.mjs');
   await build({
     stdin: {
-      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry', 'repairs']
+      contents: ['parse', 'geometry', 'bvh', 'morph', 'distortion', 'symmetry', 'repairs', 'dress']
         .map((name) => `export * from './${name}.ts';`)
         .join('\n'),
       resolveDir: join(root, 'client/web/src/mesh'),
@@ -113,6 +113,110 @@ test('PLY: text, binary in both orders, other properties and elements', () => {
     assert.deepEqual([...raw.corners], FACES.flat());
     assert.deepEqual([...raw.properties.get('red')], [7, 7, 7, 7]);
   }
+});
+
+test('PLY: colours of eight and of sixteen bits, and as floats, are the same colours', () => {
+  const dyed = (type, names, of) =>
+    mesh.parseMesh(
+      text(
+        `ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n${names
+          .map((name) => `property ${type} ${name}\n`)
+          .join('')}element face 4\nproperty list uchar int vertex_indices\nend_header\n${TETRAHEDRON.map(
+          (p) => `${p.join(' ')} ${[0, 51, 255].map(of).join(' ')}\n`,
+        ).join('')}${FACES.map((f) => `3 ${f.join(' ')}\n`).join('')}`,
+      ),
+    ).dress.dye;
+  const rgb = ['red', 'green', 'blue'];
+  const eight = dyed('uchar', rgb, (x) => x);
+  // IEC 61966-2-1: 0.2 of sRGB is ((0.2 + 0.055) / 1.055) ^ 2.4 of linear light
+  [0, ((0.2 + 0.055) / 1.055) ** 2.4, 1].forEach((x, k) =>
+    assert.ok(Math.abs(eight[k] - x) < 1e-6, `${eight[k]}, ${x}`),
+  );
+  const same = (other, what) => other.forEach((x, i) => assert.ok(Math.abs(x - eight[i]) < 1e-6, `${what}: ${x}`));
+  same(
+    dyed('ushort', rgb, (x) => 257 * x),
+    'sixteen bits',
+  );
+  same(
+    dyed('float', rgb, (x) => x / 255),
+    'floats',
+  );
+  same(
+    dyed('float', rgb, (x) => x),
+    'bytes as floats',
+  );
+  same(
+    dyed(
+      'uchar',
+      rgb.map((name) => `diffuse_${name}`),
+      (x) => x,
+    ),
+    'diffuse_red',
+  );
+});
+
+test('glTF: primitives that look the same share a cover and an image', () => {
+  const glb = (edit) =>
+    writeGlb({
+      positions: TETRAHEDRON,
+      uv: TETRAHEDRON.map(([u, v]) => [u, v]),
+      triangles: FACES,
+      image: Buffer.from('not decoded here'),
+      edit: (gltf) => {
+        const [first] = gltf.meshes[0].primitives;
+        gltf.meshes[0].primitives = Array.from({ length: 40 }, () => ({ ...first }));
+        edit(gltf);
+      },
+    });
+  const dressOf = (edit) => {
+    const bytes = glb(edit);
+    return mesh.parseMesh(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength)).dress;
+  };
+  const alike = dressOf(() => {});
+  assert.equal(alike.covers.length, 1);
+  assert.equal(alike.images.length, 1);
+  const two = dressOf((gltf) => {
+    const red = structuredClone(gltf.materials[0]);
+    red.pbrMetallicRoughness.baseColorFactor = [1, 0, 0, 1];
+    const number = gltf.materials.push(red) - 1;
+    for (let i = 1; i < 40; i += 2) gltf.meshes[0].primitives[i].material = number;
+  });
+  assert.equal(two.covers.length, 2);
+  assert.equal(two.images.length, 1);
+  assert.deepEqual(
+    [...two.cover.filter((_, v) => v % 4 === 0)],
+    Array.from({ length: 40 }, (_, i) => i % 2),
+  );
+});
+
+test('a vertex of many looks is split once for each, in time that grows with their number', () => {
+  const looks = 3000;
+  // a fan: the drawn vertex 0 is its centre, at which every triangle has texture coordinates of its own
+  const corners = new Uint32Array(3 * looks);
+  const index = new Uint32Array(3 * looks);
+  const uv = new Float32Array(2 * 3 * looks);
+  for (let t = 0; t < looks; t++)
+    for (let c = 0; c < 3; c++) {
+      corners[3 * t + c] = 3 * t + c;
+      index[3 * t + c] = c ? 1 + ((t + c) % looks) : 0;
+      uv.set(c ? [2, index[3 * t + c]] : [t >> 1, 3], 2 * (3 * t + c)); // neighbours share a look
+    }
+  let reads = 0;
+  const counted = new Proxy(uv, {
+    get: (array, key) => {
+      reads++;
+      const value = array[key];
+      return typeof value === 'function' ? value.bind(array) : value;
+    },
+  });
+  const dress = { uv: counted, dye: null, cover: new Uint16Array(3 * looks), covers: [], images: [] };
+  const { from, skin } = mesh.splitByLook(dress, corners, index, 1 + looks);
+  assert.equal(from.length, 1 + looks + looks / 2 - 1);
+  assert.ok(
+    index.every((at, c) => skin.uv[2 * at] === uv[2 * c] && skin.uv[2 * at + 1] === uv[2 * c + 1]),
+    'every corner keeps its look',
+  );
+  assert.ok(reads < 30 * corners.length, `${reads} reads for ${corners.length} corners`);
 });
 
 test('STL: corner k of facet i is vertex 3i + k, in text and binary', () => {

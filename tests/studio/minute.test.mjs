@@ -351,6 +351,24 @@ test('textures and colours of the files are on the stage, before and after the m
   await defaultShown(page);
   await button(page, 'Pause').click();
   upright(await halves(page, 0), 'the morph');
+  // decoded images are large: they are freed with what shows them, not when the browser finds the time
+  const drawing = page.workers().find((worker) => /draw/.test(worker.url()));
+  await drawing.evaluate(() => {
+    const close = ImageBitmap.prototype.close;
+    globalThis.closed = 0;
+    ImageBitmap.prototype.close = function () {
+      globalThis.closed++;
+      close.call(this);
+    };
+  });
+  await button(page, 'Shapes', { exact: true }).click();
+  await button(page, /^Remove /)
+    .first()
+    .click();
+  await until(
+    () => drawing.evaluate(() => globalThis.closed === 2),
+    'the images of the shape and the morph are closed',
+  );
   await done();
 });
 

@@ -194,6 +194,14 @@ test('a landmark is dragged to another place', async () => {
   await until(async () => (await loupe.count()) === 0, 'it is gone');
   await button(page, 'Undo').click();
   await until(async () => Math.abs((await middle()).x - at.x) < 1, 'a drag is one step');
+  // a landmark that goes while it is dragged takes the magnifier along
+  at = await middle();
+  await touch('pointerdown', at.x, at.y);
+  for (let i = 1; i <= 4; i++) await touch('pointermove', at.x + 3 * i, at.y + 3 * i);
+  await until(async () => /translate/.test(await loupe.getAttribute('style')), 'the magnifier is back');
+  await page.keyboard.press('Delete');
+  await until(async () => (await marker.count()) === 0, 'the landmark is deleted');
+  await until(async () => (await loupe.count()) === 0, 'the magnifier is gone, too');
   await done();
 });
 

@@ -1,5 +1,6 @@
 import { render } from 'preact';
 import './style.css';
+import { keepFocus } from './focus';
 import { App } from './ui/app';
 import { keepUrl, restore } from './url';
 import { applyTheme } from './theme';
@@ -8,6 +9,7 @@ import { stage } from './view/shared';
 import { toast } from './state';
 
 applyTheme();
+keepFocus();
 render(<App />, document.getElementById('app')!);
 stage.onFailed = () =>
   toast('This browser has no WebGL, so the studio cannot draw shapes. Uploading and morphing still work.', 'error');

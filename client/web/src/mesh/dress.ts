@@ -53,6 +53,7 @@ export function dressOf(gltf: Gltf, parts: Part[]): Dress | null {
     images: [],
   };
   const imageNumbers = new Map<number, number>();
+  const coverNumbers = new Map<string, number>();
   let first = 0;
   for (const part of parts) {
     const count = part.position.length / 3;
@@ -66,7 +67,10 @@ export function dressOf(gltf: Gltf, parts: Part[]): Dress | null {
       for (let i = 0; i < count; i++)
         for (let k = 0; k < 3; k++) dress.dye[3 * (first + i) + k] = colors[width * i + k];
     }
-    dress.cover.fill(dress.covers.push(cover) - 1, first, first + count);
+    const key = JSON.stringify(cover);
+    const number = coverNumbers.get(key) ?? dress.covers.push(cover) - 1;
+    coverNumbers.set(key, number);
+    dress.cover.fill(number, first, first + count);
     first += count;
   }
   const plain = dress.covers.every(({ base, image }) => image < 0 && Math.max(...base) - Math.min(...base) < 0.01);
@@ -109,15 +113,25 @@ function coverOf(
   return { cover, uv };
 }
 
-/** The colours of PLY vertices, which are sRGB, as the daemon reads them. */
-export function plyDress(properties: Map<string, Float64Array>, whole: boolean): Dress | null {
-  const channels = ['red', 'green', 'blue'].map((name) => properties.get(name));
+const CHANNELS = ['red', 'green', 'blue'];
+/** The largest value of a colour, by its type. */
+const WHOLE: Record<string, number> = { uchar: 255, uint8: 255, ushort: 65535, uint16: 65535 };
+
+/**
+ * The colours of PLY vertices, which are sRGB, as the daemon reads them: of other types than those above, values beyond 1
+ * are taken for bytes.
+ */
+export function plyDress(properties: Map<string, Float64Array>, types: Map<string, string>): Dress | null {
+  const names = properties.has('red') ? CHANNELS : CHANNELS.map((name) => `diffuse_${name}`);
+  const channels = names.map((name) => properties.get(name));
   if (channels.some((channel) => !channel)) return null;
+  const large = channels.some((channel) => channel!.some((x) => x > 1));
+  const scale = names.map((name) => WHOLE[types.get(name) ?? ''] ?? (large ? 255 : 1));
   const count = channels[0]!.length;
   const dye = new Float32Array(3 * count);
   for (let i = 0; i < count; i++)
     for (let k = 0; k < 3; k++) {
-      const x = channels[k]![i] / (whole ? 255 : 1);
+      const x = channels[k]![i] / scale[k];
       dye[3 * i + k] = x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4;
     }
   return { uv: new Float32Array(2 * count), dye, cover: new Uint16Array(count), covers: [PLAIN], images: [] };
@@ -130,6 +144,10 @@ export function alike({ uv, dye, cover }: Dress, a: number, b: number): boolean 
   return !dye || [0, 1, 2].every((k) => dye[3 * a + k] === dye[3 * b + k]);
 }
 
+/** What alike() compares, as text. */
+const lookOf = ({ uv, dye, cover }: Dress, v: number): string =>
+  [cover[v], uv[2 * v], uv[2 * v + 1], ...(dye?.subarray(3 * v, 3 * v + 3) ?? [])].join(' ');
+
 /**
  * Splits drawn vertices where corners that share one look different. `index` is changed; `from` returns the drawn vertex
  * that each one copies, and `skin` what covers them.
@@ -137,19 +155,25 @@ export function alike({ uv, dye, cover }: Dress, a: number, b: number): boolean 
 export function splitByLook(dress: Dress, corners: Uint32Array, index: Uint32Array, count: number) {
   const from: number[] = Array.from({ length: count }, (_, i) => i);
   const vertex: number[] = new Array<number>(count).fill(-1);
-  const next: number[] = new Array<number>(count).fill(-1);
+  /** the copies of drawn vertices, by vertex and look: a vertex may have as many looks as it has triangles */
+  const copies = new Map<string, number>();
+  /** the copy that a vertex of the file was last drawn by */
+  const latest = new Int32Array(dress.cover.length).fill(-1);
   for (let c = 0; c < corners.length; c++) {
-    let at = index[c];
-    if (vertex[at] < 0) vertex[at] = corners[c];
-    while (!alike(dress, vertex[at], corners[c])) {
-      if (next[at] < 0) {
-        next[at] = from.push(from[at]) - 1;
-        vertex.push(corners[c]);
-        next.push(-1);
+    const [at, v] = [index[c], corners[c]];
+    if (vertex[at] < 0) vertex[at] = v;
+    if (alike(dress, vertex[at], v)) continue;
+    if (latest[v] < 0 || from[latest[v]] !== at) {
+      const look = `${at} ${lookOf(dress, v)}`;
+      let copy = copies.get(look);
+      if (copy === undefined) {
+        copy = from.push(at) - 1;
+        vertex.push(v);
+        copies.set(look, copy);
       }
-      at = next[at];
+      latest[v] = copy;
     }
-    index[c] = at;
+    index[c] = latest[v];
   }
   const uv = new Float32Array(2 * from.length);
   const dye = dress.dye && new Float32Array(3 * from.length);
@@ -192,18 +216,25 @@ export async function decodeImages(skin: Skin | undefined) {
         const image = await createImageBitmap(blob, { colorSpaceConversion: 'none', premultiplyAlpha: 'none' });
         const scale = LARGEST / Math.max(image.width, image.height);
         if (scale >= 1) return image;
-        const small = await createImageBitmap(image, {
-          resizeWidth: Math.max(1, Math.round(image.width * scale)),
-          resizeHeight: Math.max(1, Math.round(image.height * scale)),
-        });
-        image.close();
-        return small;
+        try {
+          return await createImageBitmap(image, {
+            resizeWidth: Math.max(1, Math.round(image.width * scale)),
+            resizeHeight: Math.max(1, Math.round(image.height * scale)),
+          });
+        } finally {
+          image.close();
+        }
       } catch {
         return null;
       }
     }),
   );
   skin.files = [];
+}
+
+/** Frees the decoded images of a skin that nothing draws any more. */
+export function closeImages(skin: Skin | null | undefined) {
+  for (const image of skin?.images ?? []) image?.close();
 }
 
 /** A file whose materials are damaged is shown without them. */

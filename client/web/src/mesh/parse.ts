@@ -381,8 +381,8 @@ function parsePly(bytes: Uint8Array): RawMesh {
     positions[3 * i + 1] = y[i];
     positions[3 * i + 2] = z[i];
   }
-  const red = elements.find(({ name }) => name === 'vertex')?.properties.find(({ name }) => name === 'red');
-  const dress = plyDress(properties, !/^(float|double)/.test(red?.type ?? ''));
+  const declared = elements.find(({ name }) => name === 'vertex')?.properties ?? [];
+  const dress = plyDress(properties, new Map(declared.map(({ name, type }) => [name, type])));
   return { format: 'ply', positions, corners: corners.done(), properties, dress };
 }
 

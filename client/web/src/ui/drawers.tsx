@@ -256,6 +256,7 @@ const KEYS: [string, string][] = [
   ['+ and −', 'Zoom in and out'],
   ['0', 'Reset the view'],
   ['Enter', 'Set a landmark at the centre of the view'],
+  ['Arrow keys on a landmark', 'Slide it on the surface; with Shift by less'],
   ['Delete', 'Delete the selected landmark'],
   ['Ctrl Z, Ctrl Shift Z', 'Undo, redo'],
   ['Esc', 'Close'],

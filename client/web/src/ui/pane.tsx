@@ -56,10 +56,19 @@ export function Pane({ label, model, wire = false, pickable, markers, spots, chi
   );
 }
 
+const ARROWS: Record<string, [number, number]> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, -1],
+  ArrowDown: [0, 1],
+};
+
 function Markers({ shape, view }: { shape: Shape; view: { current: View | null } }) {
   const box = useRef<HTMLDivElement>(null);
   /** the landmark that is dragged, and where it is on the surface */
   const dragged = useRef<{ id: number; spot: Spot | null } | null>(null);
+  /** ends the drag without moving anything */
+  const release = useRef<(() => void) | null>(null);
   const here = state.landmarks
     .map((landmark, index) => ({ landmark, index }))
     .filter(({ landmark }) => landmark.at[shape.key]);
@@ -73,9 +82,16 @@ function Markers({ shape, view }: { shape: Shape; view: { current: View | null }
     stage.draw();
   });
 
+  useEffect(() => () => release.current?.(), []);
+  // a landmark may go while it is dragged: by its key, by Undo, with the list
+  useEffect(() => {
+    if (dragged.current && !here.some(({ landmark }) => landmark.id === dragged.current!.id)) release.current?.();
+  });
+
   const drag = (id: number) => (event: PointerEvent) => {
     event.preventDefault();
     event.stopPropagation();
+    if (dragged.current) return; // a second finger
     set({ active: id });
     const button = event.currentTarget as HTMLElement;
     button.focus();
@@ -91,8 +107,8 @@ function Markers({ shape, view }: { shape: Shape; view: { current: View | null }
       while (next) {
         const { origin, direction } = next;
         next = null;
-        const spot = await work('pick', shape.key, origin, direction);
-        if (!spot || !view.current) continue;
+        const spot = await work('pick', shape.key, origin, direction).catch(() => null);
+        if (!spot || !view.current || dragged.current !== now) continue;
         now.spot = spot;
         const marker = view.current.markers.find(({ element }) => element === button);
         if (marker) Object.assign(marker, spot);
@@ -100,27 +116,46 @@ function Markers({ shape, view }: { shape: Shape; view: { current: View | null }
         view.current.stage.draw();
       }
     };
+    const listening = new AbortController();
+    const stop = () => {
+      listening.abort();
+      loupe?.close();
+      loupe = null;
+      if (dragged.current === now) dragged.current = null;
+      release.current = null;
+    };
+    release.current = stop;
     const move = (to: PointerEvent) => {
+      if (to.pointerId !== event.pointerId || !view.current) return;
       if (!now.spot && Math.hypot(to.clientX - from.x, to.clientY - from.y) < 4) return;
-      const around = view.current!.element.getBoundingClientRect();
-      if (event.pointerType === 'touch') loupe ??= new Loupe(view.current!);
+      const around = view.current.element.getBoundingClientRect();
+      if (event.pointerType === 'touch') loupe ??= new Loupe(view.current);
       const waits = next !== null;
-      next = view.current!.rayAt(to.clientX, to.clientY);
+      next = view.current.rayAt(to.clientX, to.clientY);
       if (!waits) sliding = sliding.then(() => slide(to.clientX - around.left, to.clientY - around.top));
     };
     const drop = async (to: PointerEvent) => {
-      button.removeEventListener('pointermove', move);
-      button.removeEventListener('pointerup', drop);
-      button.removeEventListener('pointercancel', drop);
+      if (to.pointerId !== event.pointerId) return;
+      listening.abort();
       await sliding;
-      loupe?.close();
-      dragged.current = null;
+      if (dragged.current !== now) return;
+      stop();
       if (now.spot && to.type === 'pointerup') moveTo(id, shape, now.spot);
       else set();
     };
-    button.addEventListener('pointermove', move);
-    button.addEventListener('pointerup', drop);
-    button.addEventListener('pointercancel', drop);
+    // on the window: events also come from there once the button is gone
+    const { signal } = listening;
+    window.addEventListener('pointermove', move, { signal });
+    window.addEventListener('pointerup', drop, { signal });
+    window.addEventListener('pointercancel', drop, { signal });
+  };
+
+  /** Slides a marker on the surface by some pixels of the view; where there is no surface, it stays. */
+  const nudge = async (id: number, button: HTMLElement, dx: number, dy: number) => {
+    const at = button.getBoundingClientRect();
+    const ray = view.current!.rayAt(at.left + at.width / 2 + dx, at.top + at.height / 2 + dy);
+    const spot = await work('pick', shape.key, ray.origin, ray.direction);
+    if (spot) moveTo(id, shape, spot);
   };
 
   return (
@@ -132,11 +167,16 @@ function Markers({ shape, view }: { shape: Shape; view: { current: View | null }
           class="marker"
           aria-pressed={landmark.id === state.active}
           style={{ '--hue': hue(index) }}
-          aria-label={`Landmark ${index + 1}${landmark.name ? `, ${landmark.name},` : ''} on ${shape.name}. Delete removes it.`}
+          aria-label={`Landmark ${index + 1}${landmark.name ? `, ${landmark.name},` : ''} on ${shape.name}. Arrow keys move it, Delete removes it.`}
           onPointerDown={drag(landmark.id)}
           onClick={() => set({ active: landmark.id })}
           onKeyDown={(event) => {
+            const [dx, dy] = ARROWS[event.key] ?? [0, 0];
+            const step = event.shiftKey ? 1 : 6; // pixels
             if (event.key === 'Delete' || event.key === 'Backspace') removeLandmark(landmark.id);
+            else if (dx || dy) void nudge(landmark.id, event.currentTarget, step * dx, step * dy);
+            else return;
+            event.preventDefault();
           }}
         >
           {index + 1}

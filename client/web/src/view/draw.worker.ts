@@ -27,7 +27,7 @@ import {
   type Object3D,
 } from 'three';
 import { FIELD, type Look } from './camera';
-import type { Skin } from '../mesh/dress';
+import { closeImages, type Skin } from '../mesh/dress';
 import type { Paint, Rgb } from './colors';
 import type { Defects, Frame, Order, Report, Surface } from './messages';
 import { DENSE, SLOTS, surfaceMaterial, wireMaterial, type Clad } from './surface';
@@ -48,16 +48,21 @@ const WRAPS: Record<number, typeof RepeatWrapping | typeof ClampToEdgeWrapping |
   33648: MirroredRepeatWrapping,
 };
 
-/** One entry for each cover of a skin. */
+/** One entry for each cover of a skin. Covers with the same image, repeated alike, share one texture. */
 function cladsOf({ covers, images, dye }: Skin): Clad[] {
+  const maps = new Map<string, Texture>();
   return covers.map((cover) => {
     const image = images[cover.image];
     if (!image) return { cover, map: null, dyed: !!dye };
-    const map = new Texture(image);
-    map.colorSpace = SRGBColorSpace;
-    map.flipY = false;
-    [map.wrapS, map.wrapT] = cover.wrap.map((wrap) => WRAPS[wrap] ?? RepeatWrapping);
-    map.needsUpdate = true;
+    const key = [cover.image, ...cover.wrap].join(' ');
+    const map = maps.get(key) ?? new Texture(image);
+    if (!maps.has(key)) {
+      maps.set(key, map);
+      map.colorSpace = SRGBColorSpace;
+      map.flipY = false;
+      [map.wrapS, map.wrapT] = cover.wrap.map((wrap) => WRAPS[wrap] ?? RepeatWrapping);
+      map.needsUpdate = true;
+    }
     return { cover, map, dyed: !!dye };
   });
 }
@@ -75,6 +80,7 @@ class Buffers {
   readonly clads: Clad[];
   private readonly uv: BufferAttribute | null;
   private readonly dye: BufferAttribute | null;
+  private models = 0;
 
   constructor({ position, normal, index, edges, targets = [], skin }: Surface) {
     this.position = new BufferAttribute(position, 3);
@@ -91,6 +97,19 @@ class Buffers {
     this.clads = skin ? cladsOf(skin) : [];
     this.uv = skin ? new BufferAttribute(skin.uv, 2) : null;
     this.dye = skin?.dye ? new BufferAttribute(skin.dye, 3) : null;
+  }
+
+  /** One more model draws them. */
+  take(): this {
+    this.models++;
+    return this;
+  }
+
+  /** One model less draws them. The last one frees the textures and their images. */
+  drop() {
+    if (--this.models > 0) return;
+    for (const { map } of this.clads) map?.dispose();
+    closeImages(this.skin);
   }
 
   geometry(index: BufferAttribute, normals: boolean): BufferGeometry {
@@ -275,7 +294,7 @@ function execute(order: Order) {
     });
   if (order.op === 'model') {
     const buffers = order.surface ? new Buffers(order.surface) : models.get(order.same!)?.buffers;
-    if (buffers) models.set(order.model, new Model(buffers, order.paint, order.scale));
+    if (buffers) models.set(order.model, new Model(buffers.take(), order.paint, order.scale));
     return;
   }
   const model = models.get(order.model);
@@ -295,7 +314,7 @@ function execute(order: Order) {
       return model.defects(order.defects);
     case 'dispose':
       dispose(model.group);
-      for (const { map } of model.buffers.clads) map?.dispose();
+      model.buffers.drop();
       models.delete(order.model);
   }
 }
