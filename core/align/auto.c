@@ -1,9 +1,9 @@
 /* Alignment without landmarks.
  *
  * Every later shape is matched with the first one (find/match.c), and the composed map goes to the targets of its
- * match. Where that leads to no good map, pairs of the matches are pinned as landmarks, the map is composed with them
- * held and then without them, and the alignment of less energy is returned. The preset `fast` searches for rotations of
- * the spheres only.
+ * match. Where that leads to no good map, pairs of the matches are pinned as landmarks, and the map is composed with
+ * them held and then without them. Where that leads to none of two shapes either, samples of the match guide landmark
+ * walks. The alignment of least energy is returned. The preset `fast` searches for rotations of the spheres only.
  */
 #include <math.h>
 #include <string.h>
@@ -147,19 +147,39 @@ end:
   return status;
 }
 
-/* Composes a rotated alignment towards the matches, or pinned at their pairs where that has led to no good map. */
+/* Walks to the match of two shapes from their rotations. */
+static orb_status align_walks(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
+                              const orb_align_options *options, orb_alignment *out) {
+  orb_align_options rotated = *options;
+  rotated.preset = ORB_PRESET_FAST;
+  ORB_TRY(orb_align_given(ctx, shapes, m->shape_count, NULL, 0, &rotated, out));
+  orb_status status = orb_compose_all(ctx, out, ORB_MAP_FROM_WALKS, m->targets, options->preset);
+  if (status != ORB_OK) {
+    orb_alignment_free(ctx, out);
+  }
+  return status;
+}
+
+/* Composes a rotated alignment towards the matches; where that has led to no good map, pinned at their pairs; and where
+ * that has led to none either, by walks. */
 static orb_status follow_matches(orb_context *ctx, const orb_align_shape *shapes, const matches *m,
                                  const orb_align_options *options, orb_alignment *alignment) {
+  const double poor = orb_map_params_of(options->preset).energy.poor;
   orb_alignment other;
   int held;
   ORB_TRY(orb_compose_all(ctx, alignment, ORB_MAP_FROM_SPACE, m->are_found ? m->targets : NULL, options->preset));
-  if (m->count < LEAST_PAIRS || alignment->energy <= orb_map_params_of(options->preset).energy.poor) {
+  if (m->count < LEAST_PAIRS || alignment->energy <= poor) {
     return ORB_OK;
   }
   ORB_TRY(align_pairs(ctx, shapes, m, options, &other, &held));
   if (held) {
     keep_better(ctx, alignment, &other);
   }
+  if (m->shape_count > 2 || !m->are_found || alignment->energy <= poor) {
+    return ORB_OK;
+  }
+  ORB_TRY(align_walks(ctx, shapes, m, options, &other));
+  keep_better(ctx, alignment, &other);
   return ORB_OK;
 }
 

@@ -56,7 +56,7 @@ orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_f
   for (int32_t s = 1; s < alignment->shape_count; s++) {
     double energy[2];
     int improved;
-    int both = alignment->shape_count == 2 && alignment->landmark_count > 0;
+    int both = alignment->shape_count == 2 && (alignment->landmark_count > 0 || from == ORB_MAP_FROM_WALKS);
     ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, from,
                         targets ? targets[s] : NULL, preset, energy, &improved));
     sum += energy[1];

@@ -258,7 +258,7 @@ static orb_status run_starts(orb_map_run *c, orb_map_from from, orb_preset prese
  * one in two poses, as samples by eigenfunctions show. */
 static orb_status run_walked(orb_map_run *c, orb_map_walked *w, orb_preset preset) {
   int done = 0;
-  ORB_TRY(orb_map_walked_create(c, w));
+  ORB_TRY(orb_map_walked_create(c, 0, w));
   if (w->energy > c->params.energy.good) {
     ORB_TRY(orb_map_spectral_samples(c));
   }
@@ -282,7 +282,7 @@ static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
     return orb_map_run_start(c, ORB_MAP_GIVEN);
   }
   if (c->given_target) {
-    return orb_map_follow_targets(c);
+    return from == ORB_MAP_FROM_WALKS ? orb_map_walk_to_targets(c) : orb_map_follow_targets(c);
   }
   if (from == ORB_MAP_FROM_SPACE && c->both && c->pairs.count > 0 && preset != ORB_PRESET_QUALITY) {
     orb_map_walked walked;
@@ -336,7 +336,7 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
                    .twisted_energy = INFINITY};
   int swap = 0;
   *improved = 0;
-  if (both) {
+  if (both && !target) {
     ORB_TRY(orb_map_should_swap(ctx, &c.params, fixed, moving, &swap));
   }
   if (swap) {

@@ -23,7 +23,8 @@
 /* What the first spatial targets of a composed map follow. */
 typedef enum orb_map_from {
   ORB_MAP_FROM_SPACE, /* what fits best in space */
-  ORB_MAP_FROM_MAP    /* the map as given, which is roughly right */
+  ORB_MAP_FROM_MAP,   /* the map as given, which is roughly right */
+  ORB_MAP_FROM_WALKS  /* none: samples of the given targets guide landmark walks. Needs `both` */
 } orb_map_from;
 
 /* Improves the points of `moving` on the sphere so that the map moving → sphere → fixed comes as near to an isometry as
@@ -32,7 +33,8 @@ typedef enum orb_map_from {
  * for further shapes. The result is certified and better than what was given; otherwise all points stay as they are and
  * *improved is 0. energy[2]: symmetric Dirichlet energy of the composed map, capped at 20 for each triangle and
  * weighted by area, before and after. target: NULL, or where each vertex of `moving` lies on the fixed shape, 3 a
- * vertex in its space; replaces registration in space with ORB_MAP_FROM_SPACE, and needs `both` 0. Stage "align". */
+ * vertex in its space; replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places. Stage
+ * "align". */
 ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
                                       int32_t landmark_count, orb_map_from from, const double *target,
                                       orb_preset preset, double energy[2], int *improved);

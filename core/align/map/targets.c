@@ -2,12 +2,20 @@
  * until one is a map of shapes that correspond: from the targets, from a registration in space through samples of them,
  * which is smoother, and from the targets on a coarser level. Then passes through samples of the best map, and a draw,
  * bring the energy down. Passes come first: they find a better basin, and a draw only the bottom of one. Where no pass
- * helps, the map is drawn to the given targets. */
+ * helps, the map is drawn to the given targets.
+ *
+ * Where that, and pairs of the match that are pinned (auto.c), come to no such map, samples of the targets guide
+ * landmark walks (walked.h). A walk begins without flips and is optimised on a coarse level, so several are tried, and
+ * the best one is refined. Walks come last: where another way comes to a map, it is mostly better than theirs, above
+ * all on shapes in other poses. */
 #include "align/map/targets.h"
+
+#include <math.h>
 
 #include "align/map/levels.h"
 #include "align/map/start.h"
 #include "align/map/starts/place.h"
+#include "align/map/walked.h"
 #include "base/check.h"
 
 /* Each step gets work of its own: a start that is given up must not starve the next. */
@@ -31,6 +39,22 @@ static orb_status start_coarser(orb_map_run *c) {
   c->params.level.spatial = c->params.level.given;
   orb_status status = orb_map_run_start(c, ORB_MAP_SPATIAL);
   c->params.level.spatial = usual;
+  return status;
+}
+
+/* From walks that the targets guide. */
+static orb_status start_guided(orb_map_run *c) {
+  orb_map_walked best = {.energy = INFINITY};
+  orb_status status;
+  ORB_GO(status, orb_map_register(c, 0), done);
+  ORB_GO(status, orb_map_walked_improve(c, &best), done);
+  if (best.energy < INFINITY) {
+    allow(c);
+    ORB_GO(status, orb_map_walked_refine(c, &best), done);
+    ORB_GO(status, orb_map_levels_prepare(c), done);
+  }
+done:
+  orb_map_walked_free(c, &best);
   return status;
 }
 
@@ -75,4 +99,10 @@ orb_status orb_map_follow_targets(orb_map_run *c) {
     ORB_TRY(run_passes(c));
   }
   return ORB_OK;
+}
+
+orb_status orb_map_walk_to_targets(orb_map_run *c) {
+  const orb_map_params *p = &c->params;
+  ORB_TRY(start_guided(c));
+  return c->best_energy > p->energy.good && c->best_energy <= p->energy.poor ? run_passes(c) : ORB_OK;
 }

@@ -19,8 +19,8 @@ static orb_status loosen(orb_map_run *c, orb_map_level *l, int most) {
   return ORB_OK;
 }
 
-/* Optimises the levels up to the coarse one. The energy becomes INFINITY where limbs are twisted. */
-static orb_status optimise(orb_map_run *c, orb_map_walked *w) {
+/* Optimises the levels up to the coarse one. Without guides, the energy becomes INFINITY where limbs are twisted. */
+static orb_status optimise(orb_map_run *c, int32_t guides, orb_map_walked *w) {
   const orb_map_params *p = &c->params;
   const int32_t n = c->vertex_count;
   int32_t size = p->walked.size < n ? p->walked.size : n;
@@ -31,7 +31,7 @@ static orb_status optimise(orb_map_run *c, orb_map_walked *w) {
     ORB_GO(status, orb_map_sweeps(c, &w->level, orb_map_hard(p), last ? p->walked.last_sweeps : p->walked.sweeps),
            done);
     w->energy = orb_map_level_energy(&w->level);
-    if (w->energy > p->walked.hopeless) {
+    if (guides == 0 && w->energy > p->walked.hopeless) {
       w->energy = INFINITY;
       break;
     }
@@ -42,7 +42,7 @@ static orb_status optimise(orb_map_run *c, orb_map_walked *w) {
     w->energy = orb_map_level_energy(&w->level);
     if (!last) {
       ORB_GO(status, orb_map_level_next(c, w->refiner, &w->level, known, 0), done);
-    } else if (w->energy > p->walked.twisted) {
+    } else if (guides == 0 && w->energy > p->walked.twisted) {
       w->energy = INFINITY;
     }
   }
@@ -71,13 +71,13 @@ static orb_status leave(orb_map_run *c, orb_map_walked *w) {
   return orb_map_take_best(c);
 }
 
-orb_status orb_map_walked_create(orb_map_run *c, orb_map_walked *w) {
+orb_status orb_map_walked_create(orb_map_run *c, int32_t guides, orb_map_walked *w) {
   orb_walk_level level = {0};
   int stuck;
   orb_status status;
   memset(w, 0, sizeof *w);
   w->energy = INFINITY;
-  ORB_GO(status, orb_map_walk_level(c, &level, &w->fixed, &stuck), done);
+  ORB_GO(status, orb_map_walk_level(c, guides, &level, &w->fixed, &stuck), done);
   if (stuck) {
     goto done;
   }
@@ -88,13 +88,31 @@ orb_status orb_map_walked_create(orb_map_run *c, orb_map_walked *w) {
   ORB_GO(status, orb_map_levels_begin(c, &w->refiner), done);
   ORB_GO(status, orb_map_level_place(c, w->refiner, ORB_MAP_GIVEN, level.live, &w->level), done);
   if (orb_map_level_flips(&w->level) == 0) {
-    ORB_GO(status, optimise(c, w), done);
+    ORB_GO(status, optimise(c, guides, w), done);
   }
   memcpy(c->start, c->moving->points, 3 * (size_t)c->vertex_count * sizeof *c->start);
   status = leave(c, w);
 done:
   orb_walk_level_free(c->ctx, &level);
   return status;
+}
+
+orb_status orb_map_walked_improve(orb_map_run *c, orb_map_walked *best) {
+  const orb_map_params *p = &c->params;
+  const int64_t work = p->walked.work * (int64_t)c->vertex_count;
+  for (int i = 0; i < ORB_MAP_GUIDED && best->energy > p->walked.enough; i++) {
+    orb_map_walked w;
+    c->work = c->work > work ? c->work : work;
+    orb_status status = orb_map_walked_create(c, p->walked.guides[i], &w);
+    if (status == ORB_OK && w.energy < best->energy) {
+      orb_map_walked worse = *best;
+      *best = w;
+      w = worse;
+    }
+    orb_map_walked_free(c, &w);
+    ORB_TRY(status);
+  }
+  return ORB_OK;
 }
 
 orb_status orb_map_walked_refine(orb_map_run *c, orb_map_walked *w) {

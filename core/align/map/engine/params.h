@@ -23,6 +23,7 @@ enum {
   ORB_MAP_SPECTRAL_SAMPLES = 48, /* at most; as many as orb_spectral_find() has */
   ORB_MAP_LIMBS = 12,            /* rotated parts of a surface that are examined for a twist, the largest first */
   ORB_MAP_BANDS = 16,            /* rings of a limb: more resolve the twist better, fewer have more vertices each */
+  ORB_MAP_GUIDED = 6,            /* guided walks; one takes 0.1 to 0.4 s on its coarse level */
   ORB_MAP_CROSSINGS = 400,       /* edges that one step of a vertex crosses at most; a guard against rounding */
   ORB_MAP_RING_CROSSINGS = 8192  /* the same for a ring around a limb */
 };
@@ -102,6 +103,11 @@ typedef struct orb_map_params {
     double hopeless;   /* energy of the first level above which the walk has twisted limbs, and no finer level helps */
     double twisted;    /* the same of the last level */
     int32_t promising; /* a spatial start is tried beside a walked map if at most one in so many triangles flips */
+    int work;          /* least that each guided walk has, as work.all */
+    int32_t guides[ORB_MAP_GUIDED]; /* samples of the spatial targets that guide one walk each, spread over the moving
+                        shape, or over the fixed one where the number is negative. Few let a limb twist, many make the
+                        walk get stuck, and which is best is close to chance */
+    double enough;                  /* energy of a coarse map up to which no further walk is tried */
   } walked;
 
   /* Sweeps over a level. */

@@ -14,6 +14,7 @@
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/mirror.h"
 #include "base/check.h"
+#include "base/context.h"
 #include "base/memory.h"
 #include "numeric/vec3.h"
 
@@ -109,6 +110,40 @@ static orb_status sample_targets(orb_map_run *c, int32_t samples, int32_t *count
   return status;
 }
 
+/* The vertex of the moving shape whose spatial target is nearest to vertex u of the fixed shape and faces like it; −1:
+ * none. */
+static int32_t nearest_target(const orb_map_run *c, int32_t u) {
+  const double *x = c->b.x + 3 * (size_t)u, *n = c->b.normal + 3 * (size_t)u;
+  double least = INFINITY;
+  int32_t best = -1;
+  for (int32_t v = 0; v < c->vertex_count; v++) {
+    double d = orb_distance2(c->target + 3 * (size_t)v, x);
+    if (d < least && orb_dot(c->target_normal + 3 * (size_t)v, n) >= c->params.walk.facing) {
+      least = d;
+      best = v;
+    }
+  }
+  return best;
+}
+
+/* The same with samples that are spread over the fixed shape, whose thin parts may have no sample of the moving shape.
+ */
+static orb_status sample_fixed(orb_map_run *c, int32_t samples, int32_t *count) {
+  int32_t held = c->pairs.count, *spread = ORB_NEW(c->ctx, int32_t, samples);
+  orb_status status = spread ? orb_map_spread(c->ctx, c->b.x, c->b.vertex_count, samples, spread) : ORB_E_NO_MEMORY;
+  for (int32_t i = 0; i < samples && status == ORB_OK; i++) {
+    int32_t v = nearest_target(c, spread[i]);
+    if (v >= 0 && is_apart(c, v, spread[i])) {
+      add_pair(&c->pairs, v, spread[i]);
+    }
+    status = orb_context_check(c->ctx);
+  }
+  *count = c->pairs.count;
+  c->pairs.count = held;
+  orb_free(c->ctx, spread);
+  return status;
+}
+
 /* A shape as orb_pin_walk() takes it. It owns its points and borrows the rest. */
 static orb_status borrow(orb_context *ctx, const orb_aligned_shape *shape, int32_t *landmarks, int32_t count,
                          orb_sheet *out) {
@@ -190,11 +225,18 @@ done:
   return status;
 }
 
-orb_status orb_map_walk_level(orb_map_run *c, orb_walk_level *level, double **fixed, int *stuck) {
+orb_status orb_map_walk_level(orb_map_run *c, int32_t samples, orb_walk_level *level, double **fixed, int *stuck) {
   orb_sheet sheets[2] = {0};
-  orb_status status;
-  status = walk_sheets(c, c->pairs.count, 1, sheets, level, stuck);
-  if (status == ORB_OK && *stuck) {
+  int32_t count = c->pairs.count;
+  *stuck = 1;
+  if (samples != 0) {
+    ORB_TRY(samples > 0 ? sample_targets(c, samples, &count) : sample_fixed(c, -samples, &count));
+  }
+  if (count == 0) {
+    return ORB_OK;
+  }
+  orb_status status = walk_sheets(c, count, 1, sheets, level, stuck);
+  if (status == ORB_OK && *stuck && samples == 0) {
     free_sheets(c, sheets);
     status = walk_sheets(c, c->pairs.landmarks, 2, sheets, level, stuck);
   }
