@@ -6,28 +6,13 @@ import { readdirSync, readFileSync, readlinkSync } from 'node:fs';
 import test from 'node:test';
 import { promisify } from 'node:util';
 import { assertProblem, binaries, daemon, endless, patience, slow, until } from './support/daemon.mjs';
+import { children, workers } from './support/processes.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const run = promisify(execFile);
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const wobble = (n, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(n)), y, z + 0.001 * n]);
 
-/** The processes whose parent is `pid`. */
-function children(pid) {
-  return readdirSync('/proc')
-    .filter((name) => /^\d+$/.test(name))
-    .map(Number)
-    .filter((each) => {
-      try {
-        const fields = readFileSync(`/proc/${each}/stat`, 'latin1').split(') ').pop().split(' ');
-        return Number(fields[1]) === pid && fields[0] !== 'Z';
-      } catch {
-        return false; // it has ended
-      }
-    });
-}
-/** The processes that check meshes and run jobs. */
-const workers = (d) => children(d.child.pid).flatMap(children);
 const status = (pid, name) =>
   new RegExp(`^${name}:\\s+(\\d+)`, 'm').exec(readFileSync(`/proc/${pid}/status`, 'latin1'))?.[1];
 
@@ -100,6 +85,46 @@ test('a process that dies takes its own job, and after three deaths that job is 
   const again = await d.post('/v1/embeddings', { mesh: bad.mesh.id, ...endless });
   assert.equal(again.status, 202);
   for (const job of [again.json, other.job]) assert.equal((await d.delete(job.url)).status, 200);
+});
+
+test('a process that dies while it checks a file leaves a record, and after three deaths the file is refused', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on', '--workers', '2'] });
+  const command = async (...args) => (await run(binaries.daemon, [...args, '--data', d.data])).stdout;
+  const bearer = async (name) => ({
+    headers: { authorization: `Bearer ${(await command('token', 'add', name, '--scope', 'read,write')).trim()}` },
+  });
+  const [evil, other] = [await bearer('evil'), await bearer('other')];
+  const file = Buffer.from(shapes.binaryPly(wobble(7, 6)));
+  /** Uploads the file and kills the process that checks it. A check that ends before the signal comes is undone. */
+  async function killed(signal) {
+    for (;;) {
+      const asked = d.post('/v1/meshes', file, evil);
+      for (let over = false; !over; ) {
+        for (const pid of workers(d)) {
+          try {
+            process.kill(pid, signal);
+          } catch (error) {
+            assert.equal(error.code, 'ESRCH');
+          }
+        }
+        over = await Promise.race([asked.then(() => true), sleep(1)]);
+      }
+      const reply = await asked;
+      if (reply.status !== 201) return reply;
+      assert.equal((await d.delete(reply.json.url, evil)).status, 204);
+    }
+  }
+  assertProblem(await killed('SIGSEGV'), 500, 'job-crashed');
+  const listed = () => until(async () => (await command('crash', 'list')).trim(), 'a record', 10);
+  assert.match(await listed(), /^([0-9a-f]{64}) crashes=1 mesh=\1 tenant=evil last=/);
+  for (const signal of ['SIGBUS', 'SIGABRT']) assertProblem(await killed(signal), 500, 'job-crashed');
+  await until(async () => / crashes=3 refused /.test(await listed()), 'three are counted', 10);
+  const refused = await d.post('/v1/meshes', file, evil);
+  assertProblem(refused, 500, 'job-crashed');
+  assert.match(refused.json.detail, /until an administrator clears/);
+  assert.equal((await d.post('/v1/meshes', Buffer.from(shapes.tetrahedron), other)).status, 201, 'another file');
+  await command('crash', 'clear', 'evil');
+  assert.equal((await d.post('/v1/meshes', file, evil)).status, 201);
 });
 
 test('the end of the daemon is no crash of the jobs that run', async (t) => {
