@@ -34,12 +34,16 @@ static void submit(stored *s, queue *q, const char *owner, int64_t cost) {
 }
 
 /* Takes the next job, which must be this owner's. */
-static job *take(queue *q, const char *owner) {
+static job *take_in(queue *q, queue_lane lane, const char *owner) {
   job *j = NULL;
   int threads;
-  assert_int_equal(queue_take(q, QUEUE_COMPUTES, &j, &threads), 1);
+  assert_int_equal(queue_take(q, lane, &j, &threads), 1);
   assert_string_equal(job_owner(j), owner);
   return j;
+}
+
+static job *take(queue *q, const char *owner) {
+  return take_in(q, QUEUE_COMPUTES, owner);
 }
 
 static void pass(queue *q, job *j, int64_t ms) {
@@ -166,6 +170,31 @@ static void test_given_back(void **state) {
   queue_destroy(q);
 }
 
+/* A job whose process was killed, perhaps because memory was short, runs alone the next time. Small jobs of other
+ * owners neither wait for that nor until it can begin. */
+static void test_guests_pass_a_suspect(void **state) {
+  stored *s = *state;
+  queue *q = open_queue(s, 2);
+  assert_int_equal(queue_recover(q, 1), STORE_OK);
+  submit(s, q, "killed", SMALL);
+  submit(s, q, "long", SMALL);
+  job *killed = take(q, "killed"), *other = take(q, "long");
+  assert_int_equal(queue_claim(q, killed), STORE_OK);
+  assert_int_equal(queue_crashed(q, killed, 0), 0);
+  submit(s, q, "small", SMALL);
+  job *first = take_in(q, QUEUE_GUESTS, "small");
+  end_after(q, other, SECOND);
+  killed = take(q, "killed");
+  assert_true(q->exclusive);
+  submit(s, q, "late", SMALL);
+  end_after(q, take_in(q, QUEUE_GUESTS, "late"), 0);
+  end_after(q, first, 0);
+  assert_true(q->exclusive);
+  end_after(q, killed, 0);
+  assert_false(q->exclusive);
+  queue_destroy(q);
+}
+
 enum { MANY = 5, FEW = 2, MANY_MS = 20 };
 
 typedef struct noted {
@@ -260,6 +289,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_share, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_pauses_earn_nothing, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_given_back, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_guests_pass_a_suspect, stored_setup, stored_teardown),
       cmocka_unit_test(test_tasks_take_turns),
       cmocka_unit_test(test_tasks_share_memory),
   };
