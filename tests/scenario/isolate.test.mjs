@@ -1,8 +1,11 @@
 // Meshes are read and jobs run in processes of their own: what kills one takes its own work only, and nothing that hangs
 // in one holds anything else up. A process that is stopped with SIGSTOP stands for a reader or a job that never ends.
 import assert from 'node:assert/strict';
-import { execFile } from 'node:child_process';
+import { execFile, spawn } from 'node:child_process';
 import { readdirSync, readFileSync, readlinkSync } from 'node:fs';
+import { mkdtemp, rm } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
 import test from 'node:test';
 import { promisify } from 'node:util';
 import { assertProblem, binaries, daemon, endless, patience, slow, until } from './support/daemon.mjs';
@@ -198,6 +201,32 @@ test('a check that hangs delays nobody, and ends with its client, at check-secon
   assert.equal((await d.exited).code, 0, d.log);
   assert.ok(Date.now() - asked < 5000 * patience, `it took ${Date.now() - asked} ms to stop`);
 });
+
+for (const what of ['landlock', 'seccomp'])
+  test(`where ${what} is missing a line says so, and isolate = strict does not start`, {
+    skip: !process.env.ORB_WITHOUT && 'ORB_WITHOUT names no program',
+  }, async (t) => {
+    const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
+    t.after(() => rm(data, { recursive: true, force: true }));
+    const start = (isolate) => {
+      const args = [what, binaries.daemon, '--listen', '127.0.0.1:0', '--data', data, '--isolate', isolate];
+      const child = spawn(process.env.ORB_WITHOUT, args, { stdio: ['ignore', 'pipe', 'pipe'] });
+      const end = { text: '', code: new Promise((resolve) => child.once('exit', resolve)), child };
+      for (const stream of [child.stdout, child.stderr]) stream.on('data', (chunk) => (end.text += chunk));
+      t.after(() => child.kill('SIGKILL'));
+      return end;
+    };
+    const strict = start('strict');
+    assert.notEqual(await strict.code, 0, 'it refuses to start');
+    assert.match(strict.text, new RegExp(`${what}.* missing here: .*isolate = strict does not start without`));
+    const on = start('on');
+    const [, url] = await until(() => /listening on (http:\S+)/.exec(on.text), 'it starts', 30);
+    assert.match(on.text, new RegExp(`${what}.* missing here: the processes of jobs are limited, but less confined`));
+    const reply = await fetch(`${url}/v1/meshes`, { method: 'POST', body: shapes.tetrahedron });
+    assert.equal(reply.status, 201, await reply.text());
+    on.child.kill('SIGTERM');
+    assert.equal(await on.code, 0, on.text);
+  });
 
 test('within the service, as isolate = off asks, no process is forked', async (t) => {
   const d = await daemon(t, { args: ['--isolate', 'off'] });
