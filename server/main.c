@@ -387,8 +387,8 @@ static int start(server *srv, worker_pool **workers) {
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
          (srv->descriptions = cache_create(CACHE_BYTES)) && heals(srv) &&
          (srv->io = tasks_start((int)o->io_threads, INT64_MAX)) &&
-         (srv->checks = tasks_start((int)o->workers, o->job_memory)) &&
-         (srv->large_checks = tasks_start((int)o->workers, o->job_memory)) && net_start() &&
+         (srv->checks = tasks_start((int)o->workers, 2 * o->job_memory)) &&
+         (srv->large_checks = tasks_start((int)o->workers, 2 * o->job_memory)) && net_start() &&
          start_outbox(srv, &delivered) && (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) &&
          http_start(srv) && start_scrub(srv);
 }
