@@ -385,10 +385,12 @@ static int start(server *srv, worker_pool **workers) {
   return listens && objects_open(o->data, &srv->store) == STORE_OK && catalogue_open(o->data, &srv->cat) == STORE_OK &&
          check_catalogue(srv) && (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
-         (srv->descriptions = cache_create(CACHE_BYTES)) && heals(srv) && (srv->io = tasks_start((int)o->io_threads)) &&
-         (srv->checks = tasks_start((int)o->workers)) && (srv->large_checks = tasks_start((int)(o->workers + 1) / 2)) &&
-         net_start() && start_outbox(srv, &delivered) &&
-         (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) && http_start(srv) && start_scrub(srv);
+         (srv->descriptions = cache_create(CACHE_BYTES)) && heals(srv) &&
+         (srv->io = tasks_start((int)o->io_threads, INT64_MAX)) &&
+         (srv->checks = tasks_start((int)o->workers, 2 * o->job_memory)) &&
+         (srv->large_checks = tasks_start((int)o->workers, 2 * o->job_memory)) && net_start() &&
+         start_outbox(srv, &delivered) && (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) &&
+         http_start(srv) && start_scrub(srv);
 }
 
 /* Stops all parts that were started. */

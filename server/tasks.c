@@ -3,43 +3,105 @@
 #include <pthread.h>
 #include <stdlib.h>
 
+#include "orbmorph/context.h"
+
+enum { TURNS = 256 }; /* owners whose hashes agree modulo this share their turns */
+
 struct tasks {
   pthread_mutex_t lock;
   pthread_cond_t wake;
   task *first, **last;
-  int stopping, count;
+  struct turn {
+    int64_t used_ms;
+    int running, unfinished;
+  } turns[TURNS];
+  int64_t memory, in_use; /* bytes */
+  int stopping, count, running;
   pthread_t threads[];
 };
+
+static struct turn *turn_of(tasks *pool, const task *t) {
+  return &pool->turns[t->owner % TURNS];
+}
+
+static void enter(tasks *pool, const task *t) {
+  struct turn *mine = turn_of(pool, t);
+  int64_t least = -1;
+  for (int i = 0; mine->unfinished == 0 && i < TURNS; i++) {
+    const struct turn *other = &pool->turns[i];
+    if (other->unfinished > 0 && (least < 0 || other->used_ms < least)) {
+      least = other->used_ms;
+    }
+  }
+  mine->used_ms = least > mine->used_ms ? least : mine->used_ms;
+  mine->unfinished++;
+}
+
+/* Takes the next task out of the list; NULL: there is none, or it has to wait for memory. O(waiting tasks). */
+static task *choose(tasks *pool) {
+  task **best = NULL;
+  for (task **at = &pool->first; *at; at = &(*at)->next) {
+    const struct turn *a = turn_of(pool, *at), *b = best ? turn_of(pool, *best) : NULL;
+    if (!b || a->running < b->running || (a->running == b->running && a->used_ms < b->used_ms)) {
+      best = at;
+    }
+  }
+  task *t = best ? *best : NULL;
+  if (t && pool->running > 0 && pool->in_use + t->memory > pool->memory) {
+    return NULL;
+  }
+  if (t) {
+    *best = t->next;
+    pool->last = t->next ? pool->last : best;
+  }
+  return t;
+}
+
+/* Under the lock, which it lets go meanwhile. */
+static void run(tasks *pool, task *t) {
+  struct turn *turn = turn_of(pool, t);
+  int64_t began = orb_clock_ms(), memory = t->memory;
+  turn->running++;
+  pool->running++;
+  pool->in_use += memory;
+  pthread_mutex_unlock(&pool->lock);
+  t->run(t); /* may free t */
+  pthread_mutex_lock(&pool->lock);
+  pool->in_use -= memory;
+  pool->running--;
+  turn->running--;
+  turn->unfinished--;
+  turn->used_ms += orb_clock_ms() - began;
+  if (memory > 0) {
+    pthread_cond_broadcast(&pool->wake);
+  }
+}
 
 static void *thread_main(void *argument) {
   tasks *pool = argument;
   pthread_mutex_lock(&pool->lock);
   for (;;) {
-    while (!pool->first && !pool->stopping) {
-      pthread_cond_wait(&pool->wake, &pool->lock);
-    }
-    task *t = pool->first;
-    if (!t) {
+    task *t = choose(pool);
+    if (!t && pool->stopping && !pool->first) {
       break;
     }
-    pool->first = t->next;
-    if (!pool->first) {
-      pool->last = &pool->first;
+    if (!t) {
+      pthread_cond_wait(&pool->wake, &pool->lock);
+      continue;
     }
-    pthread_mutex_unlock(&pool->lock);
-    t->run(t); /* may free t */
-    pthread_mutex_lock(&pool->lock);
+    run(pool, t);
   }
   pthread_mutex_unlock(&pool->lock);
   return NULL;
 }
 
-tasks *tasks_start(int threads) {
+tasks *tasks_start(int threads, int64_t memory) {
   tasks *pool = calloc(1, sizeof *pool + (size_t)threads * sizeof(pthread_t));
   if (!pool) {
     return NULL;
   }
   pool->last = &pool->first;
+  pool->memory = memory;
   pthread_mutex_init(&pool->lock, NULL);
   pthread_cond_init(&pool->wake, NULL);
   for (int i = 0; i < threads; i++) {
@@ -58,6 +120,7 @@ tasks *tasks_start(int threads) {
 void tasks_add(tasks *pool, task *t) {
   t->next = NULL;
   pthread_mutex_lock(&pool->lock);
+  enter(pool, t);
   *pool->last = t;
   pool->last = &t->next;
   pthread_cond_signal(&pool->wake);

@@ -1,17 +1,23 @@
 /* Thread pools for work that handlers must not do themselves: queries, commits, reading and checking files.
  *
- * Contract. Tasks start in the order in which they were added, each on one thread. tasks_stop() runs the waiting tasks,
- * then joins the threads. */
+ * Contract. Tasks of one owner start in the order in which they were added, each on one thread. Owners take turns:
+ * first goes who has the fewest tasks running, then who has used the least time of threads; who comes back after a
+ * pause starts level with the least served of the others. tasks_stop() runs the waiting tasks, then joins the threads.
+ */
 #ifndef ORB_TASKS_H
 #define ORB_TASKS_H
+
+#include <stdint.h>
 
 typedef struct task {
   struct task *next;
   void (*run)(struct task *self);
+  int64_t memory; /* bytes that it may need; 0: little */
+  uint64_t owner; /* a hash of who asked for it; 0: all others, together one owner */
 } task;
 
 typedef struct tasks tasks;
-tasks *tasks_start(int threads);
+tasks *tasks_start(int threads, int64_t memory); /* bytes for all tasks that run at once */
 void tasks_add(tasks *pool, task *t);
 void tasks_stop(tasks *pool);
 

@@ -2,7 +2,7 @@
 # What takes longer than tests/run.sh may: races, leaks, fuzzing, kill -9 in a loop, real meshes under sanitizers.
 #
 #   tests/long.sh [PART…]    all of them without arguments:
-#   tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy blender visit
+#   tsan valgrind fuzz crash attacks deaths faults faults_asan soak load adversarial arm robust deploy blender visit
 #
 # ORB_MINUTES (5) is the CPU time for each fuzz target, ORB_KILLS (1000) the number of kills, ORB_TEST_PATIENCE how many
 # times longer than usual scenarios wait for what should come: 4 with tsan, 20 with valgrind.
@@ -83,6 +83,20 @@ part_crash() {
     node --test --test-reporter=spec tests/scenario/crash.test.mjs
   ORB_HOOK_KILLS=${ORB_KILLS:-1000} ORBMORPHD=build-faults/bin/orbmorphd \
     node --test --test-reporter=spec tests/scenario/webhooks.test.mjs
+}
+
+# All attacks of tests/scenario/attacks.test.mjs, with larger files and from several connections at once.
+part_attacks() {
+  cmake --preset release >/dev/null
+  cmake --build build --target orbmorphd
+  ORB_ATTACKS=all node --test --test-reporter=spec tests/scenario/attacks.test.mjs
+}
+
+# ORB_DEATHS (200) processes of jobs die in six ways, at random moments, under 64 clients.
+part_deaths() {
+  cmake --preset release >/dev/null
+  cmake --build build --target orbmorphd
+  node tests/long/deaths.mjs
 }
 
 # Makes each call of the daemon that may fail do so, once and from then on; ORB_FAULT_RUNS=few leaves out allocations.
@@ -181,7 +195,7 @@ part_deploy() {
 }
 
 if [ $# -eq 0 ]; then
-  set -- tsan valgrind fuzz crash faults faults_asan soak load adversarial arm robust deploy blender visit
+  set -- tsan valgrind fuzz crash attacks deaths faults faults_asan soak load adversarial arm robust deploy blender visit
 fi
 for part in "$@"; do
   echo "== $part =="

@@ -7,7 +7,12 @@
 #include "http/http.h"
 #include "intake.h"
 
-enum { LARGE_UPLOAD = 16 << 20, LOOK_BYTES = 1 << 20, HALF_OPEN_MS = 1000 };
+enum {
+  LARGE_UPLOAD = 256 << 10, /* smaller ones are checked in less than a second, whatever is in them (docs/limits.md) */
+  MEMORY_A_BYTE = 200,      /* of a file, at most (docs/limits.md) */
+  LOOK_BYTES = 1 << 20,
+  HALF_OPEN_MS = 1000
+};
 
 static void refuse_full(request *r) {
   reply_refuse(r, "storage-full", "The server's disk has no room for this file. Free some space and try again.");
@@ -161,5 +166,7 @@ static void upload_away(request *r) {
 }
 
 enum MHD_Result handle_mesh_file(request *r) {
+  int64_t most = r->srv->options->job_memory;
+  r->away_task.memory = r->received < most / MEMORY_A_BYTE ? MEMORY_A_BYTE * r->received : most;
   return request_go_away(r, r->received > LARGE_UPLOAD ? r->srv->large_checks : r->srv->checks, upload_away);
 }

@@ -1,8 +1,10 @@
 /* What all handlers share: moving a request to another thread, and its fields in the log. */
 #include <stdio.h>
+#include <string.h>
 #include <time.h>
 
 #include "faults.h"
+#include "hash.h"
 #include "http/http.h"
 
 int64_t clock_us(void) {
@@ -33,6 +35,7 @@ static void run_away(task *t) {
   if (r->next_pool) {
     tasks *pool = r->next_pool;
     r->next_pool = NULL;
+    t->memory = 0; /* that was for a check */
     tasks_add(pool, t);
     return;
   }
@@ -52,6 +55,8 @@ void request_go_on(request *r, tasks *pool, void (*fn)(request *r)) {
 enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r)) {
   r->away = fn;
   r->away_task.run = run_away;
+  const char *tenant = access_tenant(r);
+  r->away_task.owner = tenant[0] ? keyed_hash(tenant, strlen(tenant)) : 0;
   r->phase = PHASE_AWAY;
   MHD_suspend_connection(r->connection);
   tasks_add(pool, &r->away_task);

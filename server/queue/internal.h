@@ -63,6 +63,7 @@ struct queue {
   job *oldest_ended, *newest_ended;
   int ended_count, unfinished;
   int running, running_large, fetching, exclusive; /* fetching: of those that run */
+  int isolated;                                    /* jobs have processes of their own */
   int64_t running_cost;                            /* without guests */
   int guests;                                      /* of those that run */
   int64_t guest_cost;

@@ -101,6 +101,7 @@ store_result queue_recover(queue *q, int isolated) {
   api_text_free(&text);
   api_problem_free(&problem);
   FAULT_POINT("recovered");
+  q->isolated = isolated;
   int64_t after = 0;
   int loaded = 0;
   for (int n = BATCH; n == BATCH && result == STORE_OK;) {

@@ -35,7 +35,7 @@
  * Guests: if all workers are busy or their memory is in use, a small job of an owner that runs nothing runs beside
  * them, on one thread. At most QUEUE_GUESTS_MAX guests run at once, within the memory of GUEST_MEMORY. Large jobs never
  * occupy all workers: one stays free for small jobs. A suspect (a job that was running when the process died) runs
- * alone.
+ * alone; where jobs have processes of their own, guests of other owners run beside it, and do not wait for it.
  */
 #ifndef ORB_QUEUE_H
 #define ORB_QUEUE_H

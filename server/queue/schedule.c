@@ -35,8 +35,8 @@ static int share_of_owner(queue *q, int64_t now) {
   return active > 1 ? (q->options.workers + active - 1) / active : q->options.workers;
 }
 
-/* Whether a worker of this lane may take a runnable job that computes. */
-static int admits(const queue *q, queue_lane lane, const job *j) {
+/* Whether a worker of this lane may take a runnable job that computes. kept: the workers are kept for a suspect. */
+static int admits(const queue *q, queue_lane lane, const job *j, int kept) {
   int workers = q->options.workers, most_large = workers > 1 ? workers - 1 : 1;
   int computing = q->running - q->fetching - q->guests, large = j->row.cost > LARGE;
   int has_memory = q->running == 0 || (q->running_cost + j->row.cost) * BYTES_A_TRIANGLE <= q->options.memory;
@@ -46,10 +46,10 @@ static int admits(const queue *q, queue_lane lane, const job *j) {
   if (large) {
     return 0;
   }
-  if (workers == 1 && computing == 1 && q->guests == 0 && q->running_large == 1 && has_memory) {
+  if (workers == 1 && computing == 1 && q->guests == 0 && q->running_large == 1 && has_memory && !kept) {
     return 1;
   }
-  return q->owners[j->owner].running == 0 && (computing >= workers || !has_memory) &&
+  return q->owners[j->owner].running == 0 && (computing >= workers || !has_memory || kept) &&
          (q->guest_cost + j->row.cost) * BYTES_A_TRIANGLE <= q->options.memory / GUEST_MEMORY;
 }
 
@@ -57,7 +57,11 @@ static int admits(const queue *q, queue_lane lane, const job *j) {
 static job *choose(queue *q, queue_lane lane) {
   int64_t now = orb_clock_ms();
   job *best = NULL;
-  if (q->exclusive) {
+  int kept = q->exclusive, may_pass = q->isolated && lane == QUEUE_GUESTS;
+  for (const job *j = q->first; j && !kept; j = j->next) {
+    kept = j->row.suspect && runnable(q, j, now);
+  }
+  if (q->exclusive && !may_pass) {
     return NULL;
   }
   owners_charge(q);
@@ -67,10 +71,13 @@ static job *choose(queue *q, queue_lane lane) {
       continue;
     }
     int mine = fetches(j) == (lane == QUEUE_FETCHES);
-    if (j->row.suspect) {
-      return q->running == 0 && mine ? j : NULL;
+    if (j->row.suspect && may_pass) {
+      continue;
     }
-    if (!mine || (fetches(j) ? q->owners[j->owner].fetching >= QUEUE_FETCHES_OF_OWNER : !admits(q, lane, j))) {
+    if (j->row.suspect) {
+      return q->running - (q->isolated ? q->guests : 0) == 0 && mine ? j : NULL;
+    }
+    if (!mine || (fetches(j) ? q->owners[j->owner].fetching >= QUEUE_FETCHES_OF_OWNER : !admits(q, lane, j, kept))) {
       continue;
     }
     if (!best || goes_before(q, j, best, share)) {
@@ -121,7 +128,7 @@ int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
     j->charged = 0;
     owner_charge(q, j, fetches(j) ? 0 : 10 + j->row.cost / TRIANGLES_A_MS);
     count(q, j, 1);
-    q->exclusive = j->row.suspect;
+    q->exclusive |= j->row.suspect;
     *out = j;
   } else {
     j = NULL;
@@ -133,7 +140,7 @@ int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
 void schedule_leave(queue *q, job *j) {
   owner_charge(q, j, fetches(j) ? 0 : used_ms(j, orb_clock_ms()));
   count(q, j, -1);
-  q->exclusive = 0;
+  q->exclusive = q->exclusive && j->is_guest;
   j->taken_at = 0;
   j->charged = 0;
   j->is_guest = 0;

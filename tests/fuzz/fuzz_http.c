@@ -53,8 +53,8 @@ int LLVMFuzzerInitialize(int *argc, char ***argv) {
   if (!listen_open(&options, &srv.at) || objects_open(options.data, &srv.store) != STORE_OK ||
       catalogue_open(options.data, &srv.cat) != STORE_OK || !add_token() || !(srv.callers = callers_open(srv.cat)) ||
       !(srv.q = queue_create(&queued, srv.cat)) || !(srv.descriptions = cache_create(1 << 20)) ||
-      !(srv.io = tasks_start(1)) || !(srv.checks = tasks_start(1)) || !(srv.large_checks = tasks_start(1)) ||
-      !http_start(&srv)) {
+      !(srv.io = tasks_start(1, INT64_MAX)) || !(srv.checks = tasks_start(1, INT64_MAX)) ||
+      !(srv.large_checks = tasks_start(1, INT64_MAX)) || !http_start(&srv)) {
     abort();
   }
   __atomic_store_n(&srv.ready, 1, __ATOMIC_RELEASE);

@@ -1,33 +1,21 @@
 // Meshes are read and jobs run in processes of their own: if one dies, only its own work is lost, and if one hangs, it
 // delays nothing else. A process stopped with SIGSTOP plays a reader or a job that never ends.
 import assert from 'node:assert/strict';
-import { execFile } from 'node:child_process';
+import { execFile, spawn } from 'node:child_process';
 import { readdirSync, readFileSync, readlinkSync } from 'node:fs';
+import { mkdtemp, rm } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
 import test from 'node:test';
 import { promisify } from 'node:util';
 import { assertProblem, binaries, daemon, endless, patience, slow, until } from './support/daemon.mjs';
+import { children, workers } from './support/processes.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const run = promisify(execFile);
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const wobble = (n, levels) => shapes.ball(levels, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(n)), y, z + 0.001 * n]);
 
-/** The processes whose parent is `pid`. */
-function children(pid) {
-  return readdirSync('/proc')
-    .filter((name) => /^\d+$/.test(name))
-    .map(Number)
-    .filter((each) => {
-      try {
-        const fields = readFileSync(`/proc/${each}/stat`, 'latin1').split(') ').pop().split(' ');
-        return Number(fields[1]) === pid && fields[0] !== 'Z';
-      } catch {
-        return false; // it has ended
-      }
-    });
-}
-/** The processes that check meshes and run jobs. */
-const workers = (d) => children(d.child.pid).flatMap(children);
 const status = (pid, name) =>
   new RegExp(`^${name}:\\s+(\\d+)`, 'm').exec(readFileSync(`/proc/${pid}/status`, 'latin1'))?.[1];
 
@@ -102,6 +90,46 @@ test('a process that dies takes its own job, and after three deaths that job is 
   for (const job of [again.json, other.job]) assert.equal((await d.delete(job.url)).status, 200);
 });
 
+test('a process that dies while it checks a file leaves a record, and after three deaths the file is refused', async (t) => {
+  const d = await daemon(t, { args: ['--auth', 'on', '--workers', '2'] });
+  const command = async (...args) => (await run(binaries.daemon, [...args, '--data', d.data])).stdout;
+  const bearer = async (name) => ({
+    headers: { authorization: `Bearer ${(await command('token', 'add', name, '--scope', 'read,write')).trim()}` },
+  });
+  const [evil, other] = [await bearer('evil'), await bearer('other')];
+  const file = Buffer.from(shapes.binaryPly(wobble(7, 6)));
+  /** Uploads the file and kills the process that checks it. A check that ends before the signal comes is undone. */
+  async function killed(signal) {
+    for (;;) {
+      const asked = d.post('/v1/meshes', file, evil);
+      for (let over = false; !over; ) {
+        for (const pid of workers(d)) {
+          try {
+            process.kill(pid, signal);
+          } catch (error) {
+            assert.equal(error.code, 'ESRCH');
+          }
+        }
+        over = await Promise.race([asked.then(() => true), sleep(1)]);
+      }
+      const reply = await asked;
+      if (reply.status !== 201) return reply;
+      assert.equal((await d.delete(reply.json.url, evil)).status, 204);
+    }
+  }
+  assertProblem(await killed('SIGSEGV'), 500, 'job-crashed');
+  const listed = () => until(async () => (await command('crash', 'list')).trim(), 'a record', 10);
+  assert.match(await listed(), /^([0-9a-f]{64}) crashes=1 mesh=\1 tenant=evil last=/);
+  for (const signal of ['SIGBUS', 'SIGABRT']) assertProblem(await killed(signal), 500, 'job-crashed');
+  await until(async () => / crashes=3 refused /.test(await listed()), 'three are counted', 10);
+  const refused = await d.post('/v1/meshes', file, evil);
+  assertProblem(refused, 500, 'job-crashed');
+  assert.match(refused.json.detail, /until an administrator clears/);
+  assert.equal((await d.post('/v1/meshes', Buffer.from(shapes.tetrahedron), other)).status, 201, 'another file');
+  await command('crash', 'clear', 'evil');
+  assert.equal((await d.post('/v1/meshes', file, evil)).status, 201);
+});
+
 test('jobs that run when the daemon ends do not count as crashed', async (t) => {
   const d = await daemon(t, { args: ['--workers', '1'] });
   const { job } = await slowJob(d, 1);
@@ -173,6 +201,32 @@ test('a check that hangs delays nobody, and ends with its client, at check-secon
   assert.equal((await d.exited).code, 0, d.log);
   assert.ok(Date.now() - asked < 5000 * patience, `it took ${Date.now() - asked} ms to stop`);
 });
+
+for (const what of ['landlock', 'seccomp'])
+  test(`where ${what} is missing a line says so, and isolate = strict does not start`, {
+    skip: !process.env.ORB_WITHOUT && 'ORB_WITHOUT names no program',
+  }, async (t) => {
+    const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
+    t.after(() => rm(data, { recursive: true, force: true }));
+    const start = (isolate) => {
+      const args = [what, binaries.daemon, '--listen', '127.0.0.1:0', '--data', data, '--isolate', isolate];
+      const child = spawn(process.env.ORB_WITHOUT, args, { stdio: ['ignore', 'pipe', 'pipe'] });
+      const end = { text: '', code: new Promise((resolve) => child.once('exit', resolve)), child };
+      for (const stream of [child.stdout, child.stderr]) stream.on('data', (chunk) => (end.text += chunk));
+      t.after(() => child.kill('SIGKILL'));
+      return end;
+    };
+    const strict = start('strict');
+    assert.notEqual(await strict.code, 0, 'it refuses to start');
+    assert.match(strict.text, new RegExp(`${what}.* missing here: .*isolate = strict does not start without`));
+    const on = start('on');
+    const [, url] = await until(() => /listening on (http:\S+)/.exec(on.text), 'it starts', 30);
+    assert.match(on.text, new RegExp(`${what}.* missing here: the processes of jobs are limited, but less confined`));
+    const reply = await fetch(`${url}/v1/meshes`, { method: 'POST', body: shapes.tetrahedron });
+    assert.equal(reply.status, 201, await reply.text());
+    on.child.kill('SIGTERM');
+    assert.equal(await on.code, 0, on.text);
+  });
 
 test('within the service, as isolate = off asks, no process is forked', async (t) => {
   const d = await daemon(t, { args: ['--isolate', 'off'] });

@@ -1,0 +1,228 @@
+// Attacks on the service while another tenant uploads small meshes and has them embedded: that tenant is answered within
+// 2 s, all processes together stay within job-memory and 300 MB, the attack ends, and it costs no more time than
+// docs/limits.md allows for its bytes.
+//
+// ORB_ATTACKS=all makes the files larger and repeats each attack from several connections at once.
+import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
+import net from 'node:net';
+import test from 'node:test';
+import { promisify } from 'node:util';
+import { gzipSync } from 'node:zlib';
+import * as attacks from './support/attacks.mjs';
+import { binaries, daemon, endless, patience, slow, until } from './support/daemon.mjs';
+import { megabytes, workers, workSeconds } from './support/processes.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const all = process.env.ORB_ATTACKS === 'all';
+const JOB_MEMORY = 64;
+const SECONDS_A_BYTE = 2e-6; // docs/limits.md
+const SECONDS_OF_OTHER = 0.1; // an upload and an embedding of the other tenant
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+async function bearer(d, name) {
+  const { stdout } = await promisify(execFile)(binaries.daemon, [
+    'token',
+    'add',
+    name,
+    '--scope',
+    'read,write',
+    '--data',
+    d.data,
+  ]);
+  return { authorization: `Bearer ${stdout.trim()}` };
+}
+
+/** How many times slower than alone a thread is now, because of what else runs on this machine. */
+function busy() {
+  const [began, before] = [performance.now(), process.cpuUsage()];
+  let used;
+  do {
+    used = process.cpuUsage(before);
+  } while (used.user + used.system < 50_000);
+  return Math.max(1, (1000 * (performance.now() - began)) / (used.user + used.system));
+}
+
+let made = 0;
+/** What the other tenant does: an upload and its embedding. Returns the milliseconds until both are there. */
+async function small(d, headers) {
+  const began = performance.now();
+  const n = ++made;
+  const text = shapes.obj(shapes.ball(1, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(n)), y, z + 0.001 * n]));
+  const mesh = await d.post('/v1/meshes', Buffer.from(text), { headers });
+  assert.equal(mesh.status, 201, mesh.bytes.toString());
+  const reply = await d.post('/v1/embeddings', { mesh: mesh.json.id }, { headers: { ...headers, prefer: 'wait=20' } });
+  assert.ok([200, 201, 202].includes(reply.status), reply.bytes.toString());
+  if (reply.status === 202) {
+    const job = await d.get(reply.json.url, { headers, query: { wait: 20 } });
+    assert.equal(job.json.state ?? 'succeeded', 'succeeded', job.bytes.toString());
+  }
+  return performance.now() - began;
+}
+
+/** Runs an attack beside the other tenant. attack: resolves when it has ended; to the bytes that readers got. */
+async function beside(t, d, headers, attack) {
+  let over = false;
+  let most = 0;
+  const times = [];
+  const [before, atFirst] = [workSeconds(d), busy()];
+  const watch = (async () => {
+    while (!over) {
+      most = Math.max(most, megabytes(d));
+      await sleep(20);
+    }
+  })();
+  const other = (async () => {
+    do {
+      times.push(await small(d, headers));
+      await sleep(100);
+    } while (!over);
+  })();
+  const began = performance.now();
+  let bytes;
+  try {
+    bytes = await attack();
+  } finally {
+    over = true;
+    await other;
+    await watch;
+  }
+  const seconds = (performance.now() - began) / 1000;
+  const worked = workSeconds(d) - before;
+  const slowdown = Math.max(atFirst, busy());
+  const slowest = Math.max(...times);
+  t.diagnostic(
+    `${seconds.toFixed(1)} s, ${worked.toFixed(2)} s of processor time for ${bytes} bytes; ${most.toFixed(0)} MB; the ` +
+      `other tenant waited ${slowest.toFixed(0)} ms at most, ${times.length} times; a thread alone was slowed down by ${slowdown.toFixed(1)}`,
+  );
+  assert.ok(slowest < 2000 * slowdown * patience * (slow ? 10 : 1), `the other tenant waited ${slowest} ms`);
+  if (!slow) {
+    assert.ok(most <= JOB_MEMORY + 300, `${most} MB`);
+    const allowed = SECONDS_A_BYTE * bytes + SECONDS_OF_OTHER * times.length + 0.5;
+    assert.ok(worked <= allowed * patience, `${worked} s of processor time, ${allowed} were allowed`);
+  }
+}
+
+async function start(t, ...args) {
+  const d = await daemon(t, {
+    args: ['--auth', 'on', '--workers', '2', '--job-memory', `${JOB_MEMORY}M`, '--check-seconds', '30', ...args],
+  });
+  return { d, evil: await bearer(d, 'evil'), other: await bearer(d, 'other') };
+}
+
+const files = [
+  ['accessors that overlap, compressed', 'no-memory', () => attacks.overlappingAccessors((all ? 64 : 16) << 20), true],
+  ['positions that collide', 'not-closed', () => attacks.collidingPositions(all ? 40_000 : 16_000)],
+  ['names of materials that collide', 'degenerate', () => attacks.collidingNames(all ? 180_000 : 60_000)],
+  ['two thousand primitives on one accessor', 'too-large', () => attacks.sharedIndices()],
+  ['a polygon of millions of corners', 'not-manifold', () => attacks.hugePolygon(all ? 5_000_000 : 800_000)],
+];
+test('files that are made to cost much', async (t) => {
+  const { d, evil, other } = await start(t);
+  for (const [name, refused, make, packed] of files) {
+    await t.test(name, async (t) => {
+      const file = make();
+      const body = packed ? gzipSync(file) : file;
+      const headers = { ...evil, ...(packed && { 'content-encoding': 'gzip' }) };
+      const upload = async () => {
+        const reply = await d.post('/v1/meshes', body, { headers });
+        assert.equal(reply.json?.type, `/problems/${refused}`, `${reply.status} ${reply.bytes}`);
+      };
+      const times = all ? 4 : 2;
+      await beside(t, d, other, async () => {
+        await Promise.all(Array.from({ length: times }, upload));
+        return times * file.length;
+      });
+    });
+  }
+});
+
+test('jobs without an end', async (t) => {
+  const { d, evil, other } = await start(t, '--job-seconds', '3');
+  await beside(t, d, other, async () => {
+    const jobs = [];
+    for (let i = 0; i < 6; i++) {
+      const text = shapes.binaryPly(shapes.ball(slow ? 5 : 6, ([x, y, z]) => [x * (1 + 0.01 * i), y, z]));
+      const mesh = await d.post('/v1/meshes', Buffer.from(text), { headers: evil });
+      assert.equal(mesh.status, 201, mesh.bytes.toString());
+      const job = await d.post('/v1/embeddings', { mesh: mesh.json.id, ...endless }, { headers: evil });
+      assert.equal(job.status, 202, job.bytes.toString());
+      jobs.push(job.json);
+    }
+    const states = async () =>
+      (await Promise.all(jobs.map((job) => d.get(job.url, { headers: evil })))).map(({ json }) => json.state);
+    await until(
+      async () => (await states()).filter((state) => state === 'failed').length >= (all ? 6 : 2),
+      'the ends',
+      60,
+    );
+    for (const job of jobs) await d.delete(job.url, { headers: evil });
+    return Number.POSITIVE_INFINITY; // jobs are bounded by their seconds, not by bytes
+  });
+});
+
+test('jobs whose processes die', async (t) => {
+  const { d, evil, other } = await start(t);
+  const text = shapes.binaryPly(shapes.ball(slow ? 5 : 6));
+  const mesh = await d.post('/v1/meshes', Buffer.from(text), { headers: evil });
+  const submit = () => d.post('/v1/embeddings', { mesh: mesh.json.id, ...endless }, { headers: evil });
+  const job = (await submit()).json;
+  const now = async () => (await d.get(job.url, { headers: evil })).json;
+  let end;
+  let pid;
+  await beside(t, d, other, async () => {
+    for (let death = 1; death <= 3; death++) {
+      await until(async () => (await now()).attempt === death && (await now()).stage === 'embed', 'it runs', 60);
+      // Those of the other tenant end within a second: the process that stays is this job's.
+      const there = workers(d);
+      await sleep(1000);
+      [pid] = workers(d).filter((each) => there.includes(each));
+      process.kill(pid, 'SIGSEGV');
+    }
+    await until(async () => (end = await now()).finished, 'it fails', 60);
+    return Number.POSITIVE_INFINITY;
+  });
+  assert.equal(end.problem.type, '/problems/job-crashed');
+  assert.equal((await submit()).status, 500, 'the same work is refused');
+});
+
+test('requests that two servers could understand differently', async (t) => {
+  const { d, other } = await start(t);
+  const { hostname, port } = new URL(d.url);
+  const raw = (bytes) =>
+    new Promise((resolve) => {
+      const socket = net.connect(Number(port), hostname, () => socket.end(bytes));
+      let text = '';
+      socket.on('data', (chunk) => (text += chunk.toString('latin1')));
+      socket.on('error', () => {});
+      socket.on('close', () => resolve(text));
+    });
+  const query = Array.from({ length: 250 }, (_, i) => `a${i}=b`).join('&');
+  const heads = [
+    `GET /v1/meshes?${query} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n`,
+    ...['-1', '+2', '0x2', '2, 2', '99999999999999999999'].map(
+      (length) => `POST /v1/embeddings HTTP/1.1\r\nHost: localhost\r\nContent-Length: ${length}\r\n\r\n{}`,
+    ),
+  ];
+  await beside(t, d, other, async () => {
+    for (const head of heads) {
+      const text = await raw(head);
+      assert.equal(text.match(/^HTTP\/1\.1 \d/gm)?.length, 1, `${head.slice(0, 120)}: ${text}`);
+      assert.match(text, /^HTTP\/1\.1 4\d\d/);
+    }
+    return 0;
+  });
+});
+
+test('uploads in a row do not hold up the checks of another tenant', async (t) => {
+  const { d, evil, other } = await start(t);
+  const file = attacks.hugePolygon(300_000);
+  await beside(t, d, other, async () => {
+    await Promise.all(
+      Array.from({ length: all ? 40 : 8 }, (_, n) =>
+        d.post('/v1/meshes', Buffer.concat([file, Buffer.from('\n'.repeat(n))]), { headers: evil }),
+      ),
+    );
+    return Number.POSITIVE_INFINITY;
+  });
+});

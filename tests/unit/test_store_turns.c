@@ -1,0 +1,297 @@
+/* Whose job runs next: owners are charged for the time of workers, measured, not for the size of their meshes. The
+ * clock of a running job is set back to stand for time that has passed. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+#include "queue/internal.h"
+#include "support_store.h"
+#include "tasks.h"
+
+enum { SMALL = 1000, SECOND = 1000 };
+
+static queue *open_queue(const stored *s, int workers) {
+  const queue_options options = {.workers = workers, .cores = workers, .limit = 1000, .memory = INT64_MAX};
+  queue *q = queue_create(&options, s->cat);
+  assert_non_null(q);
+  return q;
+}
+
+static void submit(stored *s, queue *q, const char *owner, int64_t cost) {
+  char key[API_ID_SIZE];
+  job *j = NULL;
+  snprintf(key, sizeof key, "%064x", (unsigned)++s->number);
+  const queue_request request = {
+      .kind = API_JOB_EMBEDDING, .key = key, .request = "{}", .owner = owner, .cost = cost, .listed = 1};
+  assert_int_equal(queue_submit(q, &request, &j, NULL), QUEUE_OK);
+  queue_release(q, j);
+}
+
+/* Takes the next job, which must be this owner's. */
+static job *take_in(queue *q, queue_lane lane, const char *owner) {
+  job *j = NULL;
+  int threads;
+  assert_int_equal(queue_take(q, lane, &j, &threads), 1);
+  assert_string_equal(job_owner(j), owner);
+  return j;
+}
+
+static job *take(queue *q, const char *owner) {
+  return take_in(q, QUEUE_COMPUTES, owner);
+}
+
+static void pass(queue *q, job *j, int64_t ms) {
+  pthread_mutex_lock(&q->lock);
+  j->taken_at -= ms;
+  pthread_mutex_unlock(&q->lock);
+}
+
+static void end_after(queue *q, job *j, int64_t ms) {
+  assert_int_equal(queue_claim(q, j), STORE_OK);
+  pass(q, j, ms);
+  queue_finish(q, j, API_JOB_CANCELLED, NULL, NULL);
+}
+
+/* Every mesh is as large as the others, but those of one owner take ten times as long. */
+static void test_time_decides(void **state) {
+  stored *s = *state;
+  queue *q = open_queue(s, 1);
+  for (int i = 0; i < 3; i++) {
+    submit(s, q, "long", SMALL);
+  }
+  for (int i = 0; i < 12; i++) {
+    submit(s, q, "short", SMALL);
+  }
+  end_after(q, take(q, "long"), 10 * SECOND + SECOND / 2);
+  for (int i = 0; i < 11; i++) {
+    end_after(q, take(q, "short"), SECOND);
+  }
+  end_after(q, take(q, "long"), 10 * SECOND);
+  end_after(q, take(q, "short"), SECOND);
+  end_after(q, take(q, "long"), SECOND);
+  queue_destroy(q);
+}
+
+/* A huge mesh that is done at once costs its owner what it took, not what was expected. */
+static void test_measure_replaces_estimate(void **state) {
+  stored *s = *state;
+  queue *q = open_queue(s, 1);
+  const int64_t huge = 60 * SECOND * TRIANGLES_A_MS;
+  submit(s, q, "huge", huge);
+  submit(s, q, "small", SMALL);
+  submit(s, q, "huge", SMALL);
+  submit(s, q, "small", SMALL);
+  end_after(q, take(q, "huge"), 0);
+  end_after(q, take(q, "small"), 5 * SECOND);
+  end_after(q, take(q, "huge"), 0);
+  end_after(q, take(q, "small"), 0);
+  queue_destroy(q);
+}
+
+/* While a job runs its owner pays at least the estimate, and more as soon as it has taken more. */
+static void test_running_jobs_count(void **state) {
+  stored *s = *state;
+  queue *q = open_queue(s, 4);
+  submit(s, q, "first", SMALL);
+  submit(s, q, "second", SMALL);
+  job *first = take(q, "first"), *second = take(q, "second");
+  pass(q, first, 2 * SECOND);
+  pass(q, second, SECOND);
+  submit(s, q, "first", SMALL);
+  submit(s, q, "second", SMALL);
+  job *third = take(q, "second");
+  queue_give_back(q, third);
+  pass(q, second, 2 * SECOND);
+  queue_give_back(q, take(q, "first"));
+  queue_give_back(q, first);
+  queue_give_back(q, second);
+  queue_destroy(q);
+}
+
+/* An owner has at most its share of the workers while another waits, however little it has used before. */
+static void test_share(void **state) {
+  stored *s = *state;
+  queue *q = open_queue(s, 2);
+  submit(s, q, "few", SMALL);
+  for (int i = 0; i < 3; i++) {
+    submit(s, q, "many", SMALL);
+  }
+  pthread_mutex_lock(&q->lock);
+  for (int i = 0; i < q->owner_count; i++) {
+    q->owners[i].service = strcmp(q->owners[i].name, "many") == 0 ? 0 : 100 * SECOND;
+  }
+  pthread_mutex_unlock(&q->lock);
+  job *first = take(q, "many"), *second = take(q, "few");
+  end_after(q, second, 0);
+  job *beside = take(q, "many"); /* nobody else waits: all workers are free for it */
+  queue_give_back(q, beside);
+  queue_give_back(q, first);
+  queue_destroy(q);
+}
+
+/* An owner that pauses saves up no turns: it comes back level with the least served. */
+static void test_pauses_earn_nothing(void **state) {
+  stored *s = *state;
+  queue *q = open_queue(s, 1);
+  submit(s, q, "paused", SMALL);
+  end_after(q, take(q, "paused"), 0);
+  submit(s, q, "busy", SMALL);
+  end_after(q, take(q, "busy"), 50 * SECOND);
+  for (int i = 0; i < 2; i++) {
+    submit(s, q, "busy", SMALL);
+  }
+  for (int i = 0; i < 2; i++) {
+    submit(s, q, "paused", SMALL);
+  }
+  end_after(q, take(q, "busy"), SECOND); /* level: the older one */
+  end_after(q, take(q, "paused"), 2 * SECOND);
+  end_after(q, take(q, "busy"), SECOND);
+  end_after(q, take(q, "paused"), SECOND);
+  queue_destroy(q);
+}
+
+/* A job that is given back has cost its owner the time that it had a worker. */
+static void test_given_back(void **state) {
+  stored *s = *state;
+  queue *q = open_queue(s, 1);
+  submit(s, q, "one", SMALL);
+  submit(s, q, "two", SMALL);
+  job *j = take(q, "one");
+  pass(q, j, 5 * SECOND);
+  queue_give_back(q, j);
+  end_after(q, take(q, "two"), 6 * SECOND);
+  end_after(q, take(q, "one"), 0);
+  queue_destroy(q);
+}
+
+/* A job whose process was killed, perhaps because memory was short, runs alone the next time. Small jobs of other
+ * owners neither wait for that nor until it can begin. */
+static void test_guests_pass_a_suspect(void **state) {
+  stored *s = *state;
+  queue *q = open_queue(s, 2);
+  assert_int_equal(queue_recover(q, 1), STORE_OK);
+  submit(s, q, "killed", SMALL);
+  submit(s, q, "long", SMALL);
+  job *killed = take(q, "killed"), *other = take(q, "long");
+  assert_int_equal(queue_claim(q, killed), STORE_OK);
+  assert_int_equal(queue_crashed(q, killed, 0), 0);
+  submit(s, q, "small", SMALL);
+  job *first = take_in(q, QUEUE_GUESTS, "small");
+  end_after(q, other, SECOND);
+  killed = take(q, "killed");
+  assert_true(q->exclusive);
+  submit(s, q, "late", SMALL);
+  end_after(q, take_in(q, QUEUE_GUESTS, "late"), 0);
+  end_after(q, first, 0);
+  assert_true(q->exclusive);
+  end_after(q, killed, 0);
+  assert_false(q->exclusive);
+  queue_destroy(q);
+}
+
+enum { MANY = 5, FEW = 2, MANY_MS = 20 };
+
+typedef struct noted {
+  task task; /* first: a task is the note */
+  int ms, *next, at;
+} noted;
+
+static void sleep_ms(int ms) {
+  nanosleep(&(struct timespec){.tv_nsec = ms * 1000000L}, NULL);
+}
+
+static void note(task *t) {
+  noted *n = (noted *)(void *)t;
+  n->at = (*n->next)++;
+  sleep_ms(n->ms);
+}
+
+/* Checks of uploads: an owner whose checks take long does not hold up all that another one sends. */
+static void test_tasks_take_turns(void **state) {
+  (void)state;
+  int next = 0;
+  noted many[MANY], few[FEW], one = {.task = {.run = note, .owner = 3}, .ms = 5 * MANY_MS, .next = &next};
+  tasks *pool = tasks_start(1, INT64_MAX);
+  assert_non_null(pool);
+  tasks_add(pool, &one.task); /* keeps the thread until all are there */
+  for (int i = 0; i < MANY; i++) {
+    many[i] = (noted){.task = {.run = note, .owner = 1}, .ms = MANY_MS, .next = &next};
+    tasks_add(pool, &many[i].task);
+  }
+  for (int i = 0; i < FEW; i++) {
+    few[i] = (noted){.task = {.run = note, .owner = 2}, .ms = 0, .next = &next};
+    tasks_add(pool, &few[i].task);
+  }
+  tasks_stop(pool);
+  assert_int_equal(next, 1 + MANY + FEW);
+  assert_true(few[0].at <= 3);
+  assert_true(few[1].at <= 4);
+  for (int i = 1; i < MANY; i++) {
+    assert_true(many[i].at > many[i - 1].at);
+  }
+  assert_true(few[1].at > few[0].at);
+}
+
+typedef struct heavy {
+  task task;
+  int64_t *in_use, *most;
+} heavy;
+
+static void weigh(task *t) {
+  heavy *h = (heavy *)(void *)t;
+  int64_t now = __atomic_add_fetch(h->in_use, t->memory, __ATOMIC_SEQ_CST), most;
+  do {
+    most = __atomic_load_n(h->most, __ATOMIC_SEQ_CST);
+  } while (now > most && !__atomic_compare_exchange_n(h->most, &most, now, 0, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST));
+  sleep_ms(10);
+  __atomic_sub_fetch(h->in_use, t->memory, __ATOMIC_SEQ_CST);
+}
+
+/* All tasks that run at once stay within the memory of the pool; one that needs more than that runs alone. */
+static void test_tasks_share_memory(void **state) {
+  (void)state;
+  static const int64_t needs[] = {60, 60, 40, 60, 40, 100, 40, 40};
+  enum { TASKS = sizeof needs / sizeof *needs };
+  int64_t in_use = 0, most = 0;
+  heavy all[TASKS], huge = {.task = {.run = weigh, .memory = 250}, .in_use = &in_use, .most = &most};
+  tasks *pool = tasks_start(4, 100);
+  assert_non_null(pool);
+  for (int i = 0; i < TASKS; i++) {
+    all[i] =
+        (heavy){.task = {.run = weigh, .memory = needs[i], .owner = (uint64_t)i % 3}, .in_use = &in_use, .most = &most};
+    tasks_add(pool, &all[i].task);
+  }
+  tasks_stop(pool);
+  assert_true(most <= 100);
+  assert_true(most > 60); /* two at once, where they fit */
+  most = 0;
+  pool = tasks_start(4, 100);
+  assert_non_null(pool);
+  all[0].task.memory = 10;
+  tasks_add(pool, &all[0].task);
+  tasks_add(pool, &huge.task);
+  tasks_add(pool, &all[2].task);
+  tasks_stop(pool);
+  assert_int_equal(most, 250);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test_setup_teardown(test_time_decides, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_measure_replaces_estimate, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_running_jobs_count, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_share, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_pauses_earn_nothing, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_given_back, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_guests_pass_a_suspect, stored_setup, stored_teardown),
+      cmocka_unit_test(test_tasks_take_turns),
+      cmocka_unit_test(test_tasks_share_memory),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
