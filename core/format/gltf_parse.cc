@@ -107,10 +107,10 @@ Document::Document(orb_context *ctx, const unsigned char *bytes, size_t size, bo
   check_members(root_.get());
 }
 
-orb_status guarded(orb_context *ctx, size_t size, const std::function<void()> &work) {
-  orb_status status = ORB_OK;
+orb_status status_of_exception(orb_context *ctx, size_t size) {
+  orb_status status = ORB_E_INTERNAL;
   try {
-    work();
+    throw;
   } catch (const Passed &passed) {
     status = passed.status;
   } catch (const Fault &fault) {

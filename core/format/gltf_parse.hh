@@ -2,8 +2,6 @@
 #ifndef ORB_FORMAT_GLTF_PARSE_HH
 #define ORB_FORMAT_GLTF_PARSE_HH
 
-#include <functional>
-
 #include "format/gltf_values.hh"
 
 namespace gltf {
@@ -25,9 +23,20 @@ class Document {
   std::unique_ptr<cJSON, void (*)(cJSON *)> root_;
 };
 
+/* The error of the exception that is being handled. */
+orb_status status_of_exception(orb_context *ctx, size_t size);
+
 /* Runs `work` on a file of `size` bytes and turns its exceptions into the error of the context. No exception leaves it.
  */
-orb_status guarded(orb_context *ctx, size_t size, const std::function<void()> &work);
+template <typename Work>
+orb_status guarded(orb_context *ctx, size_t size, const Work &work) {
+  try {
+    work();
+  } catch (...) {
+    return status_of_exception(ctx, size);
+  }
+  return ORB_OK;
+}
 
 }  // namespace gltf
 

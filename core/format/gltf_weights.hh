@@ -5,10 +5,7 @@
 #include <map>
 
 #include "format/gltf_edit.hh"
-
-extern "C" {
-#include "format/gltf_keep.h"
-}
+#include "format/gltf_shapes.h"
 
 namespace gltf {
 

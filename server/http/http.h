@@ -5,7 +5,8 @@
  *                of api/routes.h to its handler
  *   guard.c, access.c, browser.c, query.c, body.c   what is checked before a handler runs: headers; limits, token,
  *                tenant; foreign pages (hosts.c: names in Host and Origin); query; body
- *   request.c    how a handler leaves the HTTP thread
+ *   away.c       how a handler leaves the HTTP thread
+ *   request.c    the clock, and a request's fields in the log
  *   meshes.c     POST /v1/meshes          create.c      POST /v1/embeddings, POST /v1/supermeshes
  *   fetch.c      POST /v1/meshes with a URL
  *   deliveries.c GET and retry of the deliveries of a job's webhooks
@@ -150,7 +151,7 @@ struct request {
 int http_start(server *srv);
 void http_stop(server *srv);
 
-/* request.c */
+/* away.c */
 /* Suspends the connection and runs fn on a thread of the pool; fn must leave a response or PHASE_WAIT. Returns
  * REQUEST_AWAY, which the handler returns in turn: the task owns the request now, and the handler must not touch it. */
 #define REQUEST_AWAY ((enum MHD_Result)2)

@@ -1,10 +1,7 @@
-/* What all handlers share: moving a request to another thread, and its fields in the log. */
+/* What all handlers share: the clock, and a request's fields in the log. */
 #include <stdio.h>
-#include <string.h>
 #include <time.h>
 
-#include "faults.h"
-#include "hash.h"
 #include "http/http.h"
 
 int64_t clock_us(void) {
@@ -17,48 +14,4 @@ void request_fields(const request *r, char out[REQUEST_FIELDS]) {
   snprintf(out, REQUEST_FIELDS, "\"request\":\"%s\"%s%s%s,\"method\":\"%.8s\",\"route\":\"%s\"", r->number,
            r->trace[0] ? ",\"traceparent\":\"" : "", r->trace, r->trace[0] ? "\"" : "",
            r->route ? r->route->method : "", r->route ? r->route->path : "");
-}
-
-static _Thread_local int handed_over;
-
-void request_handed_over(void) {
-  handed_over = 1;
-}
-
-static void run_away(task *t) {
-  request *r = (request *)(void *)t;
-  handed_over = 0;
-  r->away(r);
-  if (handed_over) {
-    return;
-  }
-  if (r->next_pool) {
-    tasks *pool = r->next_pool;
-    r->next_pool = NULL;
-    t->memory = 0; /* that was for a check */
-    tasks_add(pool, t);
-    return;
-  }
-  FAULT_POINT("before-reply");
-  if (r->phase == PHASE_AWAY) {
-    r->phase = PHASE_SEND; /* the task could not make a response: reply_send() closes the connection */
-  }
-  MHD_resume_connection(r->connection);
-}
-
-void request_go_on(request *r, tasks *pool, void (*fn)(request *r)) {
-  r->away = fn;
-  r->next_pool = pool;
-  r->phase = PHASE_AWAY;
-}
-
-enum MHD_Result request_go_away(request *r, tasks *pool, void (*fn)(request *r)) {
-  r->away = fn;
-  r->away_task.run = run_away;
-  const char *tenant = access_tenant(r);
-  r->away_task.owner = tenant[0] ? keyed_hash(tenant, strlen(tenant)) : 0;
-  r->phase = PHASE_AWAY;
-  MHD_suspend_connection(r->connection);
-  tasks_add(pool, &r->away_task);
-  return REQUEST_AWAY;
 }
