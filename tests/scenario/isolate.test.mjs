@@ -124,7 +124,7 @@ test('a process that dies while it checks a file leaves a record, and after thre
   await until(async () => / crashes=3 refused /.test(await listed()), 'three are counted', 10);
   const refused = await d.post('/v1/meshes', file, evil);
   assertProblem(refused, 500, 'job-crashed');
-  assert.match(refused.json.detail, /until an administrator clears/);
+  assert.match(refused.json.detail, /until the operator clears/);
   assert.equal((await d.post('/v1/meshes', Buffer.from(shapes.tetrahedron), other)).status, 201, 'another file');
   await command('crash', 'clear', 'evil');
   assert.equal((await d.post('/v1/meshes', file, evil)).status, 201);
@@ -209,7 +209,16 @@ for (const what of ['landlock', 'seccomp'])
     const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
     t.after(() => rm(data, { recursive: true, force: true }));
     const start = (isolate) => {
-      const args = [what, binaries.daemon, '--listen', '127.0.0.1:0', '--data', data, '--isolate', isolate];
+      const args = [
+        what,
+        binaries.daemon,
+        '--listen',
+        '127.0.0.1:0',
+        '--data',
+        path.join(data, isolate),
+        '--isolate',
+        isolate,
+      ];
       const child = spawn(process.env.ORB_WITHOUT, args, { stdio: ['ignore', 'pipe', 'pipe'] });
       const end = { text: '', code: new Promise((resolve) => child.once('exit', resolve)), child };
       for (const stream of [child.stdout, child.stderr]) stream.on('data', (chunk) => (end.text += chunk));

@@ -121,7 +121,11 @@ test('cancelling keeps the fast morph and stops the default one', async () => {
 });
 
 test('progress names the morph and its stage', async () => {
-  const { page, done } = await pageWith((_kind, route) => route.continue());
+  const { opened, open } = gate();
+  const { page, done } = await pageWith(async (kind, route) => {
+    if (kind === 'default') await opened; // or it may end before the fast one, which then is not waited for
+    await route.continue();
+  });
   await page.evaluate(() => {
     globalThis.stages = new Set();
     new MutationObserver(() => {
@@ -136,6 +140,8 @@ test('progress names the morph and its stage', async () => {
     input.dispatchEvent(new Event('input', { bubbles: true }));
   });
   await button(page, /^Morph 2 shapes$/).click();
+  await until(() => button(page, 'Pause').count(), 'the fast morph plays');
+  open();
   await defaultShown(page);
   const seen = await page.evaluate(() => [...globalThis.stages]);
   assert.ok(
