@@ -47,9 +47,10 @@ const watchFocus = (page) =>
 test('upload, landmarks, morph and export by the keyboard alone', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   const kept = async (what) => assert.notEqual(await focused(page), null, `the focus is lost after ${what}`);
+  // early: a dialog that opens before the browser has been told to hand it over is lost
+  const choosing = page.waitForEvent('filechooser');
   await tabTo(page, /^Choose files$/);
   await watchFocus(page);
-  const choosing = page.waitForEvent('filechooser');
   await page.keyboard.press('Enter');
   await (await choosing).setFiles([sample('dog.obj'), sample('giraffe.off')]);
   await until(async () => (await page.locator('.card.ready').count()) === 2, 'both shapes are uploaded');
