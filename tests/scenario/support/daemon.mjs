@@ -53,10 +53,11 @@ export async function until(check, what, seconds = 300) {
 
 const START_MS = patience * (slow ? 300_000 : 120_000);
 const STOP_MS = START_MS;
+const OVER_MS = 5000; // from the daemon's end to that of its requests, which a closed connection ends at once
 
 export class Daemon {
   constructor(data, args, env) {
-    Object.assign(this, { data, args, env, log: '', out: '' });
+    Object.assign(this, { data, args, env, log: '', out: '', asking: 0 });
   }
 
   async start() {
@@ -68,6 +69,13 @@ export class Daemon {
     });
     this.child = child;
     this.exited = new Promise((resolve) => child.once('exit', (code, signal) => resolve({ code, signal })));
+    // A busy undici misses the end of a connection once in many hundred deaths of a server, and then waits forever.
+    const over = new AbortController();
+    this.over = over;
+    this.exited.then(() => {
+      const timer = setTimeout(() => over.abort(new Error('the daemon has ended')), OVER_MS);
+      if (!this.asking) timer.unref(); // nobody waits for it
+    });
     child.stderr.on('data', (chunk) => (this.log = (this.log + chunk).slice(-200_000)));
     this.url = await new Promise((resolve, reject) => {
       const fail = (why) => {
@@ -103,20 +111,34 @@ export class Daemon {
     return this.exited;
   }
 
+  /** fetch() that ends with the daemon. */
+  async ask(url, { signal, ...init }) {
+    const alive = this.over?.signal;
+    this.asking++;
+    try {
+      const response = await fetch(url, {
+        ...init,
+        signal: signal && alive ? AbortSignal.any([signal, alive]) : (signal ?? alive),
+      });
+      return { response, bytes: Buffer.from(await response.arrayBuffer()) };
+    } finally {
+      this.asking--;
+    }
+  }
+
   async request(method, target, { body, headers, query, signal } = {}) {
     const url = new URL(target, this.url);
     for (const [name, value] of Object.entries(query ?? {})) url.searchParams.set(name, value);
     // A test that computed for long has not yet seen that the daemon closed an idle connection: let fetch() see it.
     for (let turn = 0; turn < 2; turn++) await new Promise(setImmediate);
     const isJson = body !== undefined && !(body instanceof Uint8Array) && typeof body !== 'string';
-    const response = await fetch(url, {
+    const { response, bytes } = await this.ask(url, {
       method,
       signal,
       body: isJson ? JSON.stringify(body) : body,
       // fetch() would ask for compressed answers, with other ETags and lengths; a test that wants them says so.
       headers: { 'accept-encoding': 'identity', ...(isJson ? { 'content-type': 'application/json' } : {}), ...headers },
     });
-    const bytes = Buffer.from(await response.arrayBuffer());
     const type = response.headers.get('content-type') ?? '';
     const json = /json/.test(type) && bytes.length ? JSON.parse(bytes.toString()) : undefined;
     if (dawdle) await new Promise((done) => setTimeout(done, dawdle));
