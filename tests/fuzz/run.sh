@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the libFuzzer targets and runs each for some seconds, as many at once as there are cores.
+# Builds the libFuzzer targets and runs each for some seconds, one more at once than there are cores: some wait for files.
 #
 #   tests/fuzz/run.sh [--cpu] SECONDS [TARGET…]    SECONDS of wall time each, with --cpu of CPU time;
 #                                                  with ORB_FUZZ_SEED every run starts with the same inputs,
@@ -150,4 +150,4 @@ if [ $unit = keep ]; then
   exit
 fi
 export -f one cpu_of
-printf '%s\n' "${targets[@]}" | xargs -P "$(nproc)" -I{} bash -c "one {} $amount $unit"
+printf '%s\n' "${targets[@]}" | xargs -P $(($(nproc) + 1)) -I{} bash -c "one {} $amount $unit"

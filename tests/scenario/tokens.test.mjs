@@ -5,7 +5,7 @@ import { readFile, readdir } from 'node:fs/promises';
 import path from 'node:path';
 import test from 'node:test';
 import { promisify } from 'node:util';
-import { assertProblem, binaries, daemon, endless } from './support/daemon.mjs';
+import { assertProblem, binaries, daemon, endless, patience, slow } from './support/daemon.mjs';
 import * as shapes from './support/shapes.mjs';
 
 const run = (d, ...args) => promisify(execFile)(binaries.daemon, ['token', ...args, '--data', d.data]);
@@ -160,7 +160,6 @@ test('tokens change while the daemon runs', async (t) => {
 test('a token is valid until it expires, and the audit log names who was refused', async (t) => {
   const d = await daemon(t, { args: ['--auth', 'on'] });
   const add = async (name, ...words) => (await run(d, 'add', name, ...words)).stdout.trim();
-  const soon = await add('soon', '--scope', 'read', '--expires', '2s');
   const day = await add('day', '--scope', 'read', '--expires', '2099-12-31');
   const past = await add('past', '--scope', 'write', '--expires', '2020-01-01', '--tenant', 'shop');
   const root = await add('root', '--scope', 'admin');
@@ -168,12 +167,14 @@ test('a token is valid until it expires, and the audit log names who was refused
     await assert.rejects(run(d, 'add', 'x', '--scope', 'read', '--expires', wrong), { code: 2 }, wrong);
   assert.match((await run(d, 'list')).stdout, /^day read .* expires=2099-12-31T00:00:00Z$/m);
 
+  const seconds = 3 * patience * (slow ? 2 : 1);
+  const soon = await add('soon', '--scope', 'read', '--expires', `${seconds}s`);
   assert.equal((await d.get('/v1/meshes', bearer(soon))).status, 200);
   assert.equal((await d.get('/v1/meshes', bearer(day))).status, 200);
   const refused = await d.post('/v1/meshes', Buffer.from('v'), bearer(past));
   assertProblem(refused, 401, 'unauthorized');
   assert.match(refused.json.detail, /^The token "past" expired at 2020-01-01T00:00:00Z\./);
-  await new Promise((done) => setTimeout(done, 2100));
+  await new Promise((done) => setTimeout(done, 1000 * seconds + 100));
   assertProblem(await d.get('/v1/meshes', bearer(soon)), 401, 'unauthorized');
   await run(d, 'set', 'soon', '--expires', 'never');
   assert.equal((await d.get('/v1/meshes', bearer(soon))).status, 200);
