@@ -104,15 +104,18 @@ static int read_places(const cJSON *at, int32_t landmark, api_landmark_list *lis
   return 1;
 }
 
+#define LEAST_WEIGHT 0.01 /* a softer spring holds nothing that a person sees */
 #define AT(field) offsetof(api_landmark_spec, field)
 static const api_option numbers[] = {{"pass", API_OPTION_INT32, AT(pass), 0, 100, NULL},
                                      {"radius", API_OPTION_NUMBER, AT(radius), 0, 2, NULL},
-                                     {"confidence", API_OPTION_NUMBER, AT(confidence), 0, 1, NULL}};
+                                     {"confidence", API_OPTION_NUMBER, AT(confidence), 0, 1, NULL},
+                                     {"weight", API_OPTION_NUMBER, AT(weight), LEAST_WEIGHT, 1, NULL}};
+enum { NUMBERS = sizeof numbers / sizeof *numbers };
 
 static int read_landmark(const cJSON *value, int32_t index, api_landmark_list *list, api_problem *problem) {
-  static const char *const known[] = {"name", "at", "pass", "radius", "confidence", NULL};
+  static const char *const known[] = {"name", "at", "pass", "radius", "confidence", "weight", NULL};
   api_landmark_spec *spec = &list->items[index];
-  spec->confidence = 1;
+  spec->confidence = spec->weight = 1;
   snprintf(spec->name, sizeof spec->name, "landmark %d", index);
   if (!cJSON_IsObject(value)) {
     return refuse(problem, index, -1, "a landmark must be an object with \"at\"");
@@ -127,12 +130,12 @@ static int read_landmark(const cJSON *value, int32_t index, api_landmark_list *l
   if (name) {
     snprintf(spec->name, sizeof spec->name, "%s", name->valuestring);
   }
-  for (size_t k = 0; k < 3; k++) {
+  for (size_t k = 0; k < NUMBERS; k++) {
     cJSON *given = cJSON_GetObjectItemCaseSensitive(value, numbers[k].name);
     if (given) {
       cJSON one = *given, only = {.child = &one, .type = cJSON_Object};
       one.next = NULL;
-      if (!api_options_read(&only, "a landmark", numbers, 3, spec, problem)) {
+      if (!api_options_read(&only, "a landmark", numbers, NUMBERS, spec, problem)) {
         return 0;
       }
     }
@@ -204,6 +207,12 @@ void api_place_write(api_text *out, const api_place *spot) {
   api_json_close(out, '}');
 }
 
+void api_landmark_weight_write(const api_landmark_spec *spec, api_text *out) {
+  if (spec->weight < 1) {
+    api_json_member_number(out, "weight", spec->weight);
+  }
+}
+
 void api_landmarks_write(const api_landmark_list *list, api_text *out) {
   api_json_open(out, '[');
   for (int32_t l = 0; l < list->count; l++) {
@@ -219,6 +228,7 @@ void api_landmarks_write(const api_landmark_list *list, api_text *out) {
     api_json_member_integer(out, "pass", spec->pass);
     api_json_member_number(out, "radius", spec->radius);
     api_json_member_number(out, "confidence", spec->confidence);
+    api_landmark_weight_write(spec, out);
     api_json_close(out, '}');
   }
   api_json_close(out, ']');

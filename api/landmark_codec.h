@@ -22,7 +22,7 @@ typedef struct api_place {
 typedef struct api_landmark_spec {
   char name[ORB_NAME_MAX];
   int32_t pass;
-  double radius, confidence;
+  double radius, confidence, weight;
 } api_landmark_spec;
 
 typedef struct api_landmark_list {
@@ -36,6 +36,9 @@ typedef struct api_landmark_list {
 int api_landmarks_read(const cJSON *value, int32_t shape_count, api_landmark_list *out, api_problem *problem);
 
 void api_landmarks_free(api_landmark_list *list);
+
+/* Appends the member "weight" of a soft landmark; of others, nothing. */
+void api_landmark_weight_write(const api_landmark_spec *spec, api_text *out);
 
 /* Appends the canonical array, which reads back as the same list. */
 void api_landmarks_write(const api_landmark_list *list, api_text *out);

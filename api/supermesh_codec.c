@@ -7,9 +7,13 @@
 #include "api/json.h"
 #include "api/report_codec.h"
 
+/* Of those that are not soft. */
 static int landmarks_exact(const orb_merge_result *result) {
   int32_t shapes = result->supermesh.shape_count;
   for (int32_t l = 0; l < result->alignment.landmark_count; l++) {
+    if (result->alignment.shapes[0].landmark_vertices[l] < 0) {
+      continue;
+    }
     if (result->supermesh.landmark_vertices[l] < 0) {
       return 0;
     }
@@ -181,6 +185,7 @@ static void write_landmarks(const api_supermesh_request *request, const orb_merg
     api_json_open(out, '{');
     api_json_member_string(out, "name", request->landmarks.items[l].name);
     api_json_member_integer(out, "vertex", result->supermesh.landmark_vertices[l]);
+    api_landmark_weight_write(&request->landmarks.items[l], out);
     write_numbers("residual_relative", result->landmark_residuals + (size_t)l * (size_t)shapes, shapes, out);
     api_json_close(out, '}');
   }
@@ -241,6 +246,7 @@ static void write_alternative_request(const api_supermesh_request *request, cons
   for (int32_t i = 0; i < alternative->count; i++) {
     snprintf(items[i].name, sizeof items[i].name, "pair %d", i + 1);
     items[i].confidence = fmin(1, 1 / alternative->cost);
+    items[i].weight = 1;
   }
   changed.landmarks = (api_landmark_list){alternative->count, 2, items, places};
   changed.merge.align.method = ORB_ALIGN_PIN;

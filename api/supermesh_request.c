@@ -239,6 +239,7 @@ static void write_alignment(const api_supermesh_request *request, api_text *out)
     api_json_member_integer(out, "pass", list->items[l].pass);
     api_json_member_number(out, "radius", list->items[l].radius);
     api_json_member_number(out, "confidence", list->items[l].confidence);
+    api_landmark_weight_write(&list->items[l], out);
     api_json_key(out, "at");
     api_json_open(out, '[');
     for (int32_t s = 0; s < list->shape_count; s++) {

@@ -16,6 +16,23 @@ void orb_align_defaults(orb_align_options *options) {
   options->rbf_steps = 10;
 }
 
+static orb_status check_weights(orb_context *ctx, const orb_landmark *landmarks, int32_t landmark_count,
+                                const orb_align_options *options) {
+  for (int32_t l = 0; l < landmark_count; l++) {
+    const double weight = landmarks[l].weight;
+    if (!(weight >= 0 && weight <= 1)) {
+      return orb_fail(ctx, ORB_E_BAD_OPTION, "The weight of landmark %d is not between 0 and 1.", l);
+    }
+    if (weight > 0 && weight < 1 && options->method != ORB_ALIGN_PIN && options->method != ORB_ALIGN_AUTO) {
+      return orb_fail(ctx, ORB_E_BAD_OPTION,
+                      "Landmark %d has a weight below 1, which the method pin alone understands. Choose pin, or leave "
+                      "the weight out.",
+                      l);
+    }
+  }
+  return ORB_OK;
+}
+
 static orb_status check_request(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
                                 int32_t landmark_count, const orb_align_options *options) {
   if (shape_count < 1 || landmark_count < 0) {
@@ -43,6 +60,7 @@ orb_status orb_align(orb_context *ctx, const orb_align_shape *shapes, int32_t sh
                      orb_alignment *out) {
   memset(out, 0, sizeof *out);
   ORB_TRY(check_request(ctx, shapes, shape_count, landmark_count, options));
+  ORB_TRY(check_weights(ctx, landmarks, landmark_count, options));
   const char *before = orb_progress_only(ctx, "align"); /* hides the stages of the embeddings that alignment makes */
   orb_status status;
   if (options->method == ORB_ALIGN_AUTO && landmark_count == 0 && shape_count > 1) {

@@ -1,5 +1,5 @@
 /* Alignment by one method: each shape gets a working copy with the landmarks as vertices, the method runs, the result
- * is certified, and the composed map is improved. */
+ * is certified, and the composed map is improved. Soft landmarks are let go at the end. */
 #include <math.h>
 #include <string.h>
 
@@ -54,15 +54,78 @@ orb_status orb_compose_all(orb_context *ctx, orb_alignment *alignment, orb_map_f
                            orb_preset preset) {
   double sum = 0;
   for (int32_t s = 1; s < alignment->shape_count; s++) {
+    const orb_map_guide guide = {.from = from, .target = targets ? targets[s] : NULL};
     double energy[2];
     int improved;
     int both = alignment->shape_count == 2 && (alignment->landmark_count > 0 || from == ORB_MAP_FROM_WALKS);
-    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, from,
-                        targets ? targets[s] : NULL, preset, energy, &improved));
+    ORB_TRY(orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], both, alignment->landmark_count, &guide,
+                        preset, energy, &improved));
     sum += energy[1];
   }
   alignment->energy = sum / (alignment->shape_count - 1);
   return ORB_OK;
+}
+
+static int is_soft(const orb_landmark *landmark) {
+  return landmark->weight > 0 && landmark->weight < 1;
+}
+
+/* The springs between the first shape and shape s. */
+static void set_springs(const orb_landmark *landmarks, const orb_alignment *a, int32_t s, orb_map_springs *out) {
+  out->count = 0;
+  for (int32_t l = 0; l < a->landmark_count; l++) {
+    if (is_soft(&landmarks[l])) {
+      out->fixed[out->count] = a->shapes[0].landmark_vertices[l];
+      out->moving[out->count] = a->shapes[s].landmark_vertices[l];
+      out->weight[out->count++] = landmarks[l].weight / (1 - landmarks[l].weight);
+    }
+  }
+}
+
+/* From here on the soft landmarks of a shape are no vertices that others share. */
+static void free_landmarks(const orb_landmark *landmarks, int32_t count, orb_aligned_shape *shape) {
+  for (int32_t l = 0; l < count; l++) {
+    if (is_soft(&landmarks[l])) {
+      shape->landmark_vertices[l] = -1;
+    }
+  }
+}
+
+/* Soft landmarks say where to look, not where to end. They were pinned with the others, so that the map takes each limb
+ * to its limb. Now the map is composed once more with them free, and a spring draws the places of each together. */
+static orb_status soften(orb_context *ctx, const orb_landmark *landmarks, orb_preset preset, orb_alignment *alignment) {
+  const int32_t count = alignment->landmark_count;
+  int32_t soft = 0;
+  for (int32_t l = 0; l < count; l++) {
+    soft += is_soft(&landmarks[l]);
+  }
+  if (soft == 0 || alignment->shape_count < 2) {
+    return ORB_OK;
+  }
+  orb_map_guide guide = {.from = ORB_MAP_FROM_PINS,
+                         .springs = {.moving = ORB_NEW(ctx, int32_t, soft),
+                                     .fixed = ORB_NEW(ctx, int32_t, soft),
+                                     .weight = ORB_NEW(ctx, double, soft)}};
+  orb_map_springs *springs = &guide.springs;
+  orb_status status = springs->moving && springs->fixed && springs->weight ? ORB_OK : ORB_E_NO_MEMORY;
+  double sum = 0;
+  for (int32_t s = 1; s < alignment->shape_count && status == ORB_OK; s++) {
+    double energy[2];
+    int improved;
+    set_springs(landmarks, alignment, s, springs);
+    free_landmarks(landmarks, count, &alignment->shapes[s]);
+    ORB_GO(status,
+           orb_compose(ctx, &alignment->shapes[0], &alignment->shapes[s], 0, count, &guide, preset, energy, &improved),
+           end);
+    sum += energy[1];
+  }
+  free_landmarks(landmarks, count, &alignment->shapes[0]);
+  alignment->energy = sum / (alignment->shape_count - 1);
+end:
+  orb_free(ctx, springs->moving);
+  orb_free(ctx, springs->fixed);
+  orb_free(ctx, springs->weight);
+  return status;
 }
 
 orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
@@ -91,6 +154,7 @@ orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int3
   if (options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO)) {
     ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, options->preset), end);
   }
+  status = soften(ctx, landmarks, options->preset, out);
 end:
   for (int32_t s = 0; sheets && s < shape_count; s++) {
     orb_sheet_free(ctx, &sheets[s]);

@@ -133,6 +133,7 @@ static int load_input(const run_env *env, orb_context *ctx, merge_input *in, api
     in->landmarks[l].pass = list->items[l].pass;
     in->landmarks[l].radius = list->items[l].radius;
     in->landmarks[l].confidence = list->items[l].confidence;
+    in->landmarks[l].weight = list->items[l].weight;
   }
   return 1;
 }

@@ -178,6 +178,8 @@ export type Landmark = {
   radius?: number;
   /** Below 1: the landmark was found, not set. It changes no result. Default: 1. */
   confidence?: number;
+  /** Below 1: the landmark is soft. A spring of stiffness weight / (1 - weight) draws its places together, and they end apart where the map is better for it. For the method pin. Default: 1, exact. */
+  weight?: number;
 };
 
 /** Stored landmarks, without their places. */
@@ -271,6 +273,8 @@ export type CanonicalRequest = {
     pass: number;
     radius: number;
     confidence: number;
+    /** Only of a soft landmark. */
+    weight?: number;
   }>;
   embedding: {
     method: EmbeddingMethod;
@@ -374,7 +378,9 @@ export type Supermesh = {
     name: string;
     /** The vertex of the supermesh; −1 if there is none. */
     vertex: number;
-    /** The distance from the place that the request gives, one for each shape. */
+    /** Only of a soft landmark. */
+    weight?: number;
+    /** The distance from the place that the request gives, one for each shape. A soft landmark ends halfway between its places on the sphere. */
     residual_relative: Array<number | null>;
   } | {
     /** "auto" and its number, from 1. */

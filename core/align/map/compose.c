@@ -27,6 +27,8 @@
  * Each start (start.h) is then refined up to all vertices, and no flip is allowed again. The map of least energy wins
  * if it is better than the alignment as given. Limbs that it has twisted are untwisted (twist/untwist.c) before the
  * moving shape is registered again through samples of it, and at the end.
+ *
+ * Soft landmarks are pinned first, as all are. Then the map is let go where they were, and springs hold them instead.
  */
 #include "align/map/compose.h"
 
@@ -296,6 +298,15 @@ static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
   return run_starts(c, from, preset);
 }
 
+/* Optimises the map as given, which keeps its limbs where they are. Mirror landmarks would hold what is to be let go.
+ */
+static orb_status let_go(orb_map_run *c) {
+  c->pairs.count = c->pairs.landmarks;
+  c->params.work.rough = 0;
+  ORB_TRY(orb_map_levels_prepare(c));
+  return orb_map_run_start(c, ORB_MAP_GIVEN);
+}
+
 /* Writes the best map back if it is better than the alignment as given and certified. */
 static orb_status take_best(orb_map_run *c, orb_aligned_shape *fixed, double energy[2], int *improved) {
   orb_aligned_shape *shapes[2] = {c->moving, fixed};
@@ -325,18 +336,19 @@ static orb_status take_best(orb_map_run *c, orb_aligned_shape *fixed, double ene
 }
 
 orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
-                       int32_t landmark_count, orb_map_from from, const double *target, orb_preset preset,
-                       double energy[2], int *improved) {
+                       int32_t landmark_count, const orb_map_guide *guide, orb_preset preset, double energy[2],
+                       int *improved) {
   orb_map_run c = {.ctx = ctx,
                    .params = orb_map_params_of(preset),
                    .both = both,
                    .landmark_count = landmark_count,
-                   .given_target = target,
+                   .given_target = guide->target,
+                   .springs = guide->springs,
                    .hopeless = INFINITY,
                    .twisted_energy = INFINITY};
   int swap = 0;
   *improved = 0;
-  if (both && !target) {
+  if (both && !guide->target) {
     ORB_TRY(orb_map_should_swap(ctx, &c.params, fixed, moving, &swap));
   }
   if (swap) {
@@ -355,8 +367,12 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
   ORB_GO(status, orb_map_pairs_create(&c), done);
-  ORB_GO(status, run(&c, from, preset), done);
-  ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
+  if (guide->from == ORB_MAP_FROM_PINS) {
+    ORB_GO(status, let_go(&c), done);
+  } else {
+    ORB_GO(status, run(&c, guide->from, preset), done);
+    ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
+  }
   status = take_best(&c, fixed, energy, improved);
 done:
   orb_map_run_free(&c);

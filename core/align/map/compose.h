@@ -17,26 +17,18 @@
 #ifndef ORB_ALIGN_MAP_COMPOSE_H
 #define ORB_ALIGN_MAP_COMPOSE_H
 
+#include "align/map/engine/guide.h"
 #include "orbmorph/alignment.h"
 #include "orbmorph/remesh.h"
-
-/* What the first spatial targets of a composed map follow. */
-typedef enum orb_map_from {
-  ORB_MAP_FROM_SPACE, /* what fits best in space */
-  ORB_MAP_FROM_MAP,   /* the map as given, which is roughly right */
-  ORB_MAP_FROM_WALKS  /* none: samples of the given targets guide landmark walks. Needs `both` */
-} orb_map_from;
 
 /* Improves the points of `moving` on the sphere so that the map moving → sphere → fixed comes as near to an isometry as
  * possible. The landmarks (vertices of both shapes, whose points are already bit-equal) stay together. both: the fixed
  * shape's points may change too, which leaves more room, and the shapes may change places; else they stay as they are,
  * for further shapes. The result is certified and better than what was given; otherwise all points stay as they are and
  * *improved is 0. energy[2]: symmetric Dirichlet energy of the composed map, capped at 20 for each triangle and
- * weighted by area, before and after. target: NULL, or where each vertex of `moving` lies on the fixed shape, 3 a
- * vertex in its space; replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places. Stage
- * "align". */
+ * weighted by area, before and after. Stage "align". */
 ORB_MUST_CHECK orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_shape *moving, int both,
-                                      int32_t landmark_count, orb_map_from from, const double *target,
-                                      orb_preset preset, double energy[2], int *improved);
+                                      int32_t landmark_count, const orb_map_guide *guide, orb_preset preset,
+                                      double energy[2], int *improved);
 
 #endif

@@ -12,13 +12,17 @@
 #include "embed/newton/place.h"
 #include "numeric/vec3.h"
 
-/* The vertices of pairs stay on every level, and there is no hierarchy yet. */
+/* The vertices of pairs and springs stay on every level, and there is no hierarchy yet. */
 static void reset(orb_map_run *c) {
   orb_hierarchy_destroy(c->ctx, c->hierarchy);
   c->hierarchy = NULL;
   memset(c->keep, 0, (size_t)c->vertex_count);
   for (int32_t i = 0; i < c->pairs.count; i++) {
-    c->keep[c->pairs.moving[i]] = 1;
+    c->keep[c->pairs.moving[i]] = ORB_MAP_PINNED;
+  }
+  for (int32_t i = 0; i < c->springs.count; i++) {
+    unsigned char *keep = &c->keep[c->springs.moving[i]];
+    *keep = *keep ? *keep : ORB_MAP_FREE;
   }
 }
 
@@ -35,8 +39,9 @@ orb_status orb_map_levels_prepare(orb_map_run *c) {
   for (int32_t i = 0; i < c->pairs.count; i++) {
     memcpy(c->start + 3 * (size_t)c->pairs.moving[i], c->b.s + 3 * (size_t)c->pairs.fixed[i], sizeof(double[3]));
   }
-  int32_t kept = c->params.level.kept_each * c->pairs.count;
-  int32_t keep_until = c->pairs.count ? (kept > c->params.level.kept ? kept : c->params.level.kept) : 4;
+  const int32_t held = c->pairs.count + c->springs.count;
+  int32_t kept = c->params.level.kept_each * held;
+  int32_t keep_until = held ? (kept > c->params.level.kept ? kept : c->params.level.kept) : 4;
   ORB_TRY(orb_hierarchy_create(c->ctx, &c->moving->mesh, c->keep, keep_until, &hierarchy));
   take(c, hierarchy);
   return ORB_OK;
@@ -147,7 +152,7 @@ orb_status orb_map_level_place(orb_map_run *c, orb_refiner *r, orb_map_start sta
   const int32_t *to_mesh = c->hierarchy->surface.to_mesh;
   ORB_TRY(orb_refiner_skip(c->ctx, r, size < c->vertex_count ? size : c->vertex_count));
   for (int32_t v = 0; v < c->vertex_count; v++) {
-    r->pinned[v] = c->keep[to_mesh[v]];
+    r->pinned[v] = c->keep[to_mesh[v]] == ORB_MAP_PINNED;
   }
   orb_map_level_free(c->ctx, l);
   ORB_TRY(orb_map_level_create(c->ctx, &c->params, &c->hierarchy->surface, r->alive, r->pinned, c->position, r->live,

@@ -17,6 +17,9 @@ typedef struct orb_landmark {
   int32_t pass;        /* rbf: landmarks of pass 0, the major ones, meet first, then those of pass 1, … */
   double radius;       /* rbf: radius of its influence, as a chord of the unit sphere; 0: rbf_radius */
   double confidence;   /* of a found landmark, 0 to 1; 1 for a given one */
+  double weight;       /* 0 or 1: its places meet exactly. Between: it is soft, and a spring of stiffness
+                          weight / (1 − weight) draws its places together. At 0.5 they end a distance d apart where that
+                          lowers the energy by d², in radii of a ball of the shape's area. For pin and auto */
 } orb_landmark;
 
 typedef struct orb_align_options {
@@ -42,7 +45,7 @@ typedef struct orb_aligned_shape {
   int32_t *parent;
   double *points; /* certified on the aligned sphere */
   orb_certificate certificate;
-  int32_t *landmark_vertices; /* landmark_count: the vertex of each landmark */
+  int32_t *landmark_vertices; /* landmark_count: the vertex of each landmark; −1 for a soft one */
 } orb_aligned_shape;
 
 enum { ORB_FOUND_MAX = 12, ORB_ALTERNATIVES_MAX = 4, ORB_ALTERNATIVE_PAIRS = 12 };

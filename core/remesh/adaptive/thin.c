@@ -266,7 +266,9 @@ orb_status orb_adaptive_thin_shape(orb_context *ctx, const orb_remesh_job *job, 
   unsigned char *fixed = ORB_NEW0(ctx, unsigned char, n);
   orb_status status = fixed ? take_shape(ctx, job, s, NULL, n, &position, &normal) : ORB_E_NO_MEMORY;
   for (int32_t l = 0; status == ORB_OK && shape->landmark_vertices && l < job->landmark_count; l++) {
-    fixed[shape->landmark_vertices[l]] = 1;
+    if (shape->landmark_vertices[l] >= 0) {
+      fixed[shape->landmark_vertices[l]] = 1;
+    }
   }
   if (status == ORB_OK) {
     status =

@@ -32,12 +32,31 @@ orb_status orb_map_sweeps(orb_map_run *c, orb_map_level *l, orb_map_rules rules,
   return status;
 }
 
+/* Springs of soft landmarks draw to the landmark's place on the fixed shape. */
+static void set_springs(const orb_map_run *c, orb_map_level *l, const int32_t *to_mesh) {
+  double area = 0;
+  for (int32_t v = 0; v < l->count; v++) {
+    area += l->area[v];
+  }
+  for (int32_t v = 0; v < l->count; v++) {
+    for (int32_t i = 0; i < c->springs.count; i++) {
+      if (c->springs.moving[i] == to_mesh[l->vertex[v]]) {
+        l->pull[v] = 4 * area * c->springs.weight[i]; /* pulled_energy() divides by that */
+        memcpy(l->target + 3 * (size_t)v, c->b.x + 3 * (size_t)c->springs.fixed[i], sizeof(double[3]));
+      }
+    }
+  }
+}
+
 void orb_map_set_pull(const orb_map_run *c, orb_map_level *l, const int32_t *to_mesh, double strength) {
   for (int32_t v = 0; v < l->count; v++) {
     l->pull[v] = strength * l->area[v];
     if (strength > 0) {
       memcpy(l->target + 3 * (size_t)v, c->target + 3 * (size_t)to_mesh[l->vertex[v]], sizeof(double[3]));
     }
+  }
+  if (c->springs.count > 0) {
+    set_springs(c, l, to_mesh);
   }
 }
 

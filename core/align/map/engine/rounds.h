@@ -10,7 +10,7 @@ ORB_MUST_CHECK orb_status orb_map_sweeps(orb_map_run *run, orb_map_level *level,
 /* Rules of sweeps that allow no flip. */
 orb_map_rules orb_map_hard(const orb_map_params *params);
 
-/* Pulls every vertex of the level to its spatial target; strength 0: none. */
+/* Pulls every vertex of the level to its spatial target; strength 0: none. Springs pull in any case. */
 void orb_map_set_pull(const orb_map_run *run, orb_map_level *level, const int32_t *to_mesh, double strength);
 
 /* The map of a level, to go back to. The density is not part of it: sweeps set it, single steps need

@@ -2,6 +2,7 @@
 #ifndef ORB_ALIGN_MAP_ENGINE_RUN_H
 #define ORB_ALIGN_MAP_ENGINE_RUN_H
 
+#include "align/map/engine/guide.h"
 #include "align/map/engine/packed.h"
 #include "embed/newton/hierarchy.h"
 #include "embed/newton/multires.h"
@@ -31,6 +32,8 @@ typedef struct orb_map_candidate {
   double energy;
 } orb_map_candidate;
 
+enum { ORB_MAP_PINNED = 1, ORB_MAP_FREE = 2 }; /* values of run->keep */
+
 typedef struct orb_map_run {
   orb_context *ctx;
   orb_map_params params;
@@ -41,6 +44,7 @@ typedef struct orb_map_run {
   int32_t vertex_count, landmark_count;
   orb_map_pairs pairs;
   orb_map_samples samples;    /* by eigenfunctions */
+  orb_map_springs springs;    /* the caller's */
   int both;                   /* the fixed shape's points on the sphere may change too */
   double *fixed_points;       /* what they are now; NULL: as given */
   orb_map_candidate kept;     /* the best map from before they changed */
@@ -50,7 +54,7 @@ typedef struct orb_map_run {
   double *target;             /* spatial targets, once the moving shape is registered */
   double *target_normal;
   orb_place *target_place; /* of every vertex of the moving shape, on the fixed one */
-  unsigned char *keep;     /* vertices that stay on every level: those of pairs */
+  unsigned char *keep;     /* vertices that stay on every level: those of pairs, pinned, and those of springs, free */
   unsigned char *usable;   /* vertices whose target_place is from a start that was nearly a map, mesh order */
   int has_usable;
   orb_hierarchy *hierarchy;

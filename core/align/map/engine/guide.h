@@ -1,0 +1,30 @@
+/* What a caller knows of the map that it wants. */
+#ifndef ORB_ALIGN_MAP_ENGINE_GUIDE_H
+#define ORB_ALIGN_MAP_ENGINE_GUIDE_H
+
+#include <stdint.h>
+
+/* What the first spatial targets of a composed map follow. */
+typedef enum orb_map_from {
+  ORB_MAP_FROM_SPACE, /* what fits best in space */
+  ORB_MAP_FROM_MAP,   /* the map as given, which is roughly right */
+  ORB_MAP_FROM_WALKS, /* none: samples of the given targets guide landmark walks. Needs `both` */
+  ORB_MAP_FROM_PINS   /* none: the map as given is only let go where it was pinned. For springs */
+} orb_map_from;
+
+/* Vertices of the two shapes that springs draw together. */
+typedef struct orb_map_springs {
+  int32_t count;
+  int32_t *moving, *fixed;
+  double *weight; /* stiffness, against an energy of 1 for an isometry and in radii of a ball of the shape's area */
+} orb_map_springs;
+
+/* What guides a composed map. */
+typedef struct orb_map_guide {
+  orb_map_from from;
+  const double *target;    /* NULL, or where each vertex of `moving` lies on the fixed shape, 3 a vertex in its space;
+                              replaces registration in space with ORB_MAP_FROM_SPACE, and the shapes keep their places */
+  orb_map_springs springs; /* with ORB_MAP_FROM_PINS */
+} orb_map_guide;
+
+#endif
