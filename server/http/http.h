@@ -8,6 +8,7 @@
  *   away.c       how a handler leaves the HTTP thread
  *   request.c    the clock, and a request's fields in the log
  *   meshes.c     POST /v1/meshes          create.c      POST /v1/embeddings, POST /v1/supermeshes
+ *   room.c       room for a new result in the tenant's quota
  *   fetch.c      POST /v1/meshes with a URL
  *   deliveries.c GET and retry of the deliveries of a job's webhooks
  *   landmarks.c  POST /v1/landmarks

@@ -1104,8 +1104,12 @@ export type ProblemQuotaExceeded = {
   status: 429;
   /** What is wrong and what to do. */
   detail: string;
-  /** The bytes of meshes and landmarks that the token's tenant may own, the unfinished jobs that it may have, or what the key of a signed URL may use in a day. */
+  /** The bytes of meshes and landmarks that the token's tenant may own, the bytes of what its jobs made, the unfinished jobs that it may have, or what the key of a signed URL may use in a day. */
   quota: number;
+  /** The bytes of what the tenant's jobs made, if that quota is exhausted. */
+  used?: number;
+  /** The bytes that the tenant's unfinished jobs will add, estimated; with `used`. */
+  pending?: number;
 };
 
 export type ProblemQueueFull = {
