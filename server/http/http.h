@@ -18,6 +18,7 @@
  *   files.c      GET of stored objects    disposition.c the names of downloads
  *   jobs.c       GET, DELETE and lists of jobs; waiting for a job
  *   events.c     GET /v1/jobs/{job}/events
+ *   usage.c      GET /v1/usage
  *   system.c     /livez, /readyz, /metrics              pages.c       the studio, /openapi.json, /docs
  *   reply.c, send.c   responses; the headers that every response carries; encode.c, encoded.c   compressed responses
  *   listen.c (the socket), watch.c and addresses.c (slow and too many connections), callers.c (tokens in memory),

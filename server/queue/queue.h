@@ -198,6 +198,8 @@ typedef struct queue_numbers {
   int64_t ended[API_JOB_CANCELLED + 1]; /* by state, since the start */
 } queue_numbers;
 void queue_count(queue *q, queue_numbers *out); /* O(unfinished jobs) */
+/* Unfinished jobs of an owner: those that workers have, and the others. O(owners). */
+void queue_count_of(queue *q, const char *owner, int *running, int *queued);
 /* Jobs that have ended in this state since the start. */
 int64_t queue_ended(queue *q, api_job_state state);
 

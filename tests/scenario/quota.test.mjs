@@ -126,3 +126,87 @@ test('kept alignments count, and give way to results', async (t) => {
   assert.equal(reply.status, 200, `the alignment of ${kept} bytes made room: ${reply.bytes}`);
   assert.ok(Math.abs((await derived()) - (all + sphere - kept)) < 200, 'and is gone');
 });
+
+test('usage: what a tenant stores, may store, runs and has used', async (t) => {
+  const { d, token, add, upload, embed, stored } = await tenants(t, '--workers', '1', '--quota-derived', '7M');
+  const [ann, bob] = [
+    await add('ann', '--quota', '1M', '--quota-derived', '5M', '--quota-jobs', '9'),
+    await add('bob'),
+  ];
+  const root = { headers: { authorization: `Bearer ${await token('add', 'root', '--scope', 'admin')}` } };
+  const text = await token('add', 'cli', '--scope', 'read', '--tenant', 'ann');
+  const usage = async (who, query) => (await d.get('/v1/usage', { ...who, query })).json;
+  const mesh = await upload(ann, 1);
+  for (let k = 0; k < 3; k++) assert.equal((await embed(ann, mesh, k)).status, 200);
+  const began = performance.now();
+  const long = (await d.post('/v1/embeddings', { mesh, ...endless }, ann)).json;
+  const next = (await embed(ann, mesh, 4, 0)).json;
+  await new Promise((resolve) => setTimeout(resolve, 300));
+  let mine = (await usage(ann)).tenants;
+  assert.equal(mine.length, 1, 'only its own');
+  const { sum } = await stored(ann);
+  assert.deepEqual(
+    { ...mine[0], worker_seconds: 0 },
+    {
+      tenant: 'ann',
+      meshes: 1,
+      bytes: ball(1).length,
+      derived_bytes: sum,
+      quotas: { bytes: 1 << 20, derived_bytes: 5 << 20, jobs: 9 },
+      running: 1,
+      queued: 1,
+      worker_seconds: 0,
+      crashes: 0,
+    },
+  );
+  const before = mine[0].worker_seconds;
+  await d.delete(long.url, ann);
+  for (let job = next; !job.finished; ) job = (await d.get(next.url, { ...ann, query: { wait: 30 } })).json;
+  [mine] = (await usage(ann)).tenants;
+  const spent = mine.worker_seconds - before;
+  assert.ok(spent >= 0.3 && spent <= (performance.now() - began) / 1000, `${spent} s`);
+  assert.equal(mine.running + mine.queued, 0);
+  assert.deepEqual((await usage(bob)).tenants[0].quotas, { bytes: 0, derived_bytes: 7 << 20, jobs: 0 });
+
+  const all = await usage(root);
+  assert.deepEqual(
+    all.tenants.map((u) => u.tenant),
+    ['ann', 'bob', 'root'],
+  );
+  assert.deepEqual(all.tenants[0].quotas, { bytes: 1 << 20, derived_bytes: 5 << 20, jobs: 9 });
+  const paged = [];
+  for (let query = { limit: 2 }; query; ) {
+    const page = await usage(root, query);
+    paged.push(...page.tenants.map((u) => u.tenant));
+    query = page.next_page_token && { limit: 2, page_token: page.next_page_token };
+  }
+  assert.deepEqual(paged, ['ann', 'bob', 'root']);
+
+  const metrics = (await d.get('/metrics', root)).bytes.toString();
+  const value = (name) => Number(new RegExp(`^${name}\\{tenant="ann"\\} (\\S+)$`, 'm').exec(metrics)[1]);
+  assert.equal(value('orbmorph_tenant_bytes'), mine.bytes);
+  assert.equal(value('orbmorph_tenant_derived_bytes'), mine.derived_bytes);
+  assert.equal(value('orbmorph_tenant_worker_seconds_total'), mine.worker_seconds);
+
+  const env = { ORBMORPH_SERVER: d.url, ORBMORPH_TOKEN: text };
+  const { stdout } = await promisify(execFile)(binaries.client, ['usage'], { env: { ...process.env, ...env } });
+  assert.match(
+    stdout,
+    /^ann: [\d,]+ bytes in 1 mesh, [\d,]+ of 7,340,032 bytes of results, 0 jobs running and 0 queued, \d+\.\d worker seconds, 0 crashes\n$/,
+  );
+
+  // However many tenants there are, the metrics name 50 of them and add up the others.
+  const { id } = (await d.post('/v1/meshes', ball(1), bob)).json;
+  assert.equal(id, mesh);
+  for (let k = 0; k < 52; k++) {
+    const who = await add(`many${k}`);
+    await d.post('/v1/meshes', ball(1), who);
+  }
+  const lines = (await d.get('/metrics', root)).bytes.toString().split('\n');
+  const bytes = lines.filter((line) => line.startsWith('orbmorph_tenant_bytes{'));
+  assert.equal(bytes.length, 51);
+  assert.ok(
+    bytes.some((line) => line.startsWith(`orbmorph_tenant_bytes{tenant="(others)"} ${4 * ball(1).length}`)),
+    bytes.at(-1),
+  );
+});

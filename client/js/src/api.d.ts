@@ -635,6 +635,37 @@ export type JobPage = {
   next_page_token: string | null;
 };
 
+export type Usage = {
+  /** Empty for what was made without a token. */
+  tenant: string;
+  meshes: number;
+  /** Of its meshes and landmarks. */
+  bytes: number;
+  /** Of embeddings, supermeshes and kept alignments that its jobs made. */
+  derived_bytes: number;
+  /** Those of the caller's token; of other tenants, the least of their tokens. 0: no limit. */
+  quotas: {
+    bytes: number;
+    derived_bytes: number;
+    /** Unfinished jobs. */
+    jobs: number;
+  };
+  /** Jobs that workers have. */
+  running: number;
+  /** Other unfinished jobs, with the embeddings that supermeshes wait for. */
+  queued: number;
+  /** Time for which workers had its jobs, those that failed included. */
+  worker_seconds: number;
+  /** Processes that died at its work, until the operator clears them. */
+  crashes: number;
+};
+
+export type UsagePage = {
+  tenants: Usage[];
+  /** The value of page_token for the next page; null on the last page. */
+  next_page_token: string | null;
+};
+
 export type Live = {
   status: 'alive';
 };
