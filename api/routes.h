@@ -57,6 +57,7 @@
   ROUTE(ROUTE_DELIVERY_LIST, "GET", "/v1/jobs/{job}/deliveries", ROUTE_NO_BODY, SCOPE_READ, "", handle_delivery_list) \
   ROUTE(ROUTE_DELIVERY_RETRY, "POST", "/v1/jobs/{job}/deliveries/{k}/retry", ROUTE_NO_BODY, SCOPE_WRITE, "",          \
         handle_delivery_retry)                                                                                        \
+  ROUTE(ROUTE_USAGE, "GET", "/v1/usage", ROUTE_NO_BODY, SCOPE_READ, "limit page_token", handle_usage)                 \
   ROUTE(ROUTE_LIVEZ, "GET", "/livez", ROUTE_NO_BODY, SCOPE_NONE, "", handle_system)                                   \
   ROUTE(ROUTE_READYZ, "GET", "/readyz", ROUTE_NO_BODY, SCOPE_NONE, "verbose?", handle_system)                         \
   ROUTE(ROUTE_METRICS, "GET", "/metrics", ROUTE_NO_BODY, SCOPE_ADMIN, "", handle_system)                              \

@@ -69,6 +69,9 @@ static const entry table[] = {
     {"drain-seconds", NUMBER(drain_seconds, 0, 3600), "8", "on SIGTERM, time for running jobs to end"},
     {"derived-bytes", NUMBER(derived_bytes, 1 << 20, INT64_C(1) << 50), "0",
      "bytes of embeddings, alignments and supermeshes to keep, most recently used ones first; 0: all"},
+    {"quota-derived", NUMBER(quota_derived, 0, INT64_C(1) << 50), "0",
+     "bytes of embeddings, alignments and supermeshes that each tenant may keep, unless its token says otherwise; 0: "
+     "any"},
     {"keep-jobs", NUMBER(keep_jobs, 0, INT64_C(1) << 40), "100000",
      "ended jobs to keep in the catalogue, newest first; 0: all"},
     {"lost-days", NUMBER(lost_days, 0, 36500), "30",
@@ -250,13 +253,16 @@ static void print_help(void) {
       "                                 again into the same DIR: copies only what is new\n"
       "  orbmorphd restore DIR --data NEW\n"
       "                                 make a data folder from a backup; NEW must not exist or be empty\n"
-      "  orbmorphd token add NAME --scope read,write,admin [--tenant NAME] [--quota BYTES] [--quota-jobs N]\n"
-      "                                 [--priority 0..9] [--expires 30d|YYYY-MM-DD|never]\n"
-      "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-jobs …] [--priority …] [--expires …]\n"
+      "  orbmorphd token add NAME --scope read,write,admin [--tenant NAME] [--quota BYTES]\n"
+      "                                 [--quota-derived BYTES] [--quota-jobs N] [--priority 0..9] [--expires "
+      "30d|YYYY-MM-DD|never]\n"
+      "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-derived …] [--quota-jobs …]\n"
+      "                                 [--priority …] [--expires …]\n"
       "  orbmorphd token list | token remove NAME\n"
       "                                 manage tokens, also while the daemon runs; give the same --data.\n"
       "                                 --tenant: the owner of what the token makes, by default NAME;\n"
-      "                                 --quota: bytes of its meshes; --quota-jobs: its unfinished jobs\n"
+      "                                 --quota: bytes of its meshes; --quota-derived: of what its jobs make;\n"
+      "                                 --quota-jobs: its unfinished jobs\n"
       "  orbmorphd key add NAME [--tenant NAME] [--origin URL]… [--requests-per-day N] [--cpu-seconds-per-day N]\n"
       "  orbmorphd key rotate NAME [--overlap 7d]\n"
       "  orbmorphd key list | key remove NAME\n"
@@ -454,7 +460,7 @@ config_action config_read(config *out, int argc, char **argv) {
 
 static int can_change(const char *name) {
   return strcmp(name, "log-level") == 0 || strcmp(name, "queue-limit") == 0 || strcmp(name, "derived-bytes") == 0 ||
-         strcmp(name, "keep-jobs") == 0;
+         strcmp(name, "quota-derived") == 0 || strcmp(name, "keep-jobs") == 0;
 }
 
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken)) {

@@ -22,7 +22,7 @@ typedef struct config {
   int64_t workers, worker_nice, io_threads, http_threads, max_connections, connections_per_address, idle_seconds;
   int64_t requests_per_second, header_seconds, slow_seconds, min_rate, slow_ms;
   int64_t max_body, max_json, max_ratio, decode_memory, encoded_bytes, max_triangles, queue_limit;
-  int64_t job_memory, job_seconds, check_seconds, disk_reserve, drain_seconds, derived_bytes, keep_jobs;
+  int64_t job_memory, job_seconds, check_seconds, disk_reserve, drain_seconds, derived_bytes, quota_derived, keep_jobs;
   int64_t lost_days, scrub_rate, scrub_seconds;
   int64_t webhook_retry_seconds, fetch_seconds;
 } config;
@@ -39,9 +39,9 @@ typedef enum config_action {
 /* Parses a number ≥ 0 with an optional suffix K, M or G (powers of 1024). 0 if malformed. */
 int config_number(const char *text, int64_t *out);
 /* Reads the configuration again and applies the options that may change at run time (log-level, queue-limit,
- * derived-bytes, keep-jobs). Calls `changed` for each option that differs; `taken` says whether it was applied. 0 if
- * the new configuration is invalid: nothing changes, and the reason is in the log. Other threads must load
- * derived_bytes atomically. */
+ * derived-bytes, quota-derived, keep-jobs). Calls `changed` for each option that differs; `taken` says whether it was
+ * applied. 0 if the new configuration is invalid: nothing changes, and the reason is in the log. Other threads must
+ * load derived_bytes and quota_derived atomically. */
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken));
 config_action config_read(config *out, int argc, char **argv);
 

@@ -129,6 +129,27 @@ int cli_run_job(cli *c) {
   return rc;
 }
 
+/* "1,234 of 5,000 bytes in ": a number with its quota, if there is one. */
+static void print_used(const cJSON *item, const char *name, const char *unit) {
+  const cJSON *quotas = cJSON_GetObjectItemCaseSensitive(item, "quotas");
+  char used[32], quota[32];
+  cli_count(cli_number(item, name), used);
+  cli_count(cli_number(quotas, name), quota);
+  printf("%s%s%s%s", used, cli_number(quotas, name) > 0 ? " of " : "", cli_number(quotas, name) > 0 ? quota : "", unit);
+}
+
+static void print_usage(const cJSON *item) {
+  const char *tenant = cli_string(item, "tenant", "");
+  char meshes[32];
+  cli_count(cli_number(item, "meshes"), meshes);
+  printf("%s: ", *tenant ? tenant : "(without token)");
+  print_used(item, "bytes", " bytes in ");
+  printf("%s %s, ", meshes, cli_number(item, "meshes") > 1 || cli_number(item, "meshes") < 1 ? "meshes" : "mesh");
+  print_used(item, "derived_bytes", " bytes of results, ");
+  printf("%.0f jobs running and %.0f queued, %.1f worker seconds, %.0f crashes\n", cli_number(item, "running"),
+         cli_number(item, "queued"), cli_number(item, "worker_seconds"), cli_number(item, "crashes"));
+}
+
 static void print_row(const char *collection, const cJSON *item) {
   char triangles[32];
   cli_count(cli_number(item, "triangles"), triangles);
@@ -140,6 +161,8 @@ static void print_row(const char *collection, const cJSON *item) {
   } else if (!strcmp(collection, "embeddings")) {
     printf("%s  %-16s mesh %.12s\n", cli_string(item, "id", "?"), cli_string(item, "method", ""),
            cli_string(item, "mesh", ""));
+  } else if (!strcmp(collection, "usage")) {
+    print_usage(item);
   } else {
     printf("%s  %10s ", cli_string(item, "id", "?"), triangles);
     const cJSON *shape;
@@ -201,12 +224,25 @@ static int list(cli *c, const char *collection, long limit) {
   return rc;
 }
 
+static int read_limit(cli *c, long *limit) {
+  *limit = 1000000;
+  if (c->args.value[OPT_LIMIT] && !cli_whole_number(c->args.value[OPT_LIMIT], 1, 1000000, limit)) {
+    cli_error(c, "--limit takes a whole number from 1 to 1000000");
+    return 0;
+  }
+  return 1;
+}
+
+int cli_run_usage(cli *c) {
+  long limit;
+  return read_limit(c, &limit) ? list(c, "usage", limit) : CLI_USAGE;
+}
+
 int cli_run_ls(cli *c) {
   static const char *const collections[] = {"meshes", "embeddings", "supermeshes", "jobs"};
   const char *wanted = c->args.operand_count ? c->args.operands[0] : c->args.value[OPT_STATE] ? "jobs" : "meshes";
-  long limit = 1000000;
-  if (c->args.value[OPT_LIMIT] && !cli_whole_number(c->args.value[OPT_LIMIT], 1, 1000000, &limit)) {
-    cli_error(c, "--limit takes a whole number from 1 to 1000000");
+  long limit;
+  if (!read_limit(c, &limit)) {
     return CLI_USAGE;
   }
   for (size_t i = 0; i < 4; i++) {

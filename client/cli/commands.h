@@ -10,6 +10,7 @@ int cli_run_upload(cli *c);
 int cli_run_embed(cli *c);
 int cli_run_job(cli *c);
 int cli_run_ls(cli *c);
+int cli_run_usage(cli *c);
 int cli_run_get(cli *c);
 int cli_run_rm(cli *c);
 int cli_run_doctor(cli *c);

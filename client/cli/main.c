@@ -36,6 +36,8 @@ static const cli_command command_list[] = {
      COMMON_OPTIONS | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_PART) | CLI_BIT(OPT_PROFILE), NULL,
      "/v1/supermeshes/ID --part asset -o out.glb", cli_run_get},
     {"rm", "ID|PATH…", "Delete resources", 1, -1, COMMON_OPTIONS, NULL, "/v1/supermeshes/ID", cli_run_rm},
+    {"usage", "", "Show what your tenant stores and runs; with the scope admin, all tenants", 0, 0,
+     COMMON_OPTIONS | CLI_BIT(OPT_LIMIT), NULL, "--json", cli_run_usage},
     {"doctor", "FILE…", "Check meshes and suggest repairs", 1, -1, COMMON_OPTIONS, NULL, "scan.stl", cli_run_doctor},
     {"view", "FILE.glb", "Draw poses of a morph into a PNG file, without the daemon", 1, 1,
      CLI_BIT(OPT_HELP) | CLI_BIT(OPT_OUTPUT) | CLI_BIT(OPT_POSES) | CLI_BIT(OPT_SIZE) | CLI_BIT(OPT_UP) |

@@ -2,7 +2,7 @@
 _orbmorph() {
   local current="${COMP_WORDS[COMP_CWORD]}" previous="${COMP_WORDS[COMP_CWORD-1]}" words="" operands="" choices=""
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "morph upload embed merge job ls get rm doctor view sign studio completions --help --version" -- "$current"))
+    COMPREPLY=($(compgen -W "morph upload embed merge job ls get rm usage doctor view sign studio completions --help --version" -- "$current"))
     return
   fi
   case "$previous" in
@@ -49,6 +49,9 @@ _orbmorph() {
       ;;
     rm)
       words="--server --json --quiet --help "
+      ;;
+    usage)
+      words="--server --json --quiet --help --limit "
       ;;
     doctor)
       words="--server --json --quiet --help "

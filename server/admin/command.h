@@ -14,7 +14,7 @@
 #include "config.h"
 #include "store/catalogue.h"
 
-enum { ADMIN_WORD = 512, ADMIN_FLAGS = 8, ADMIN_VERBS = 6, ADMIN_SECRET = 96 };
+enum { ADMIN_WORD = 512, ADMIN_FLAGS = 9, ADMIN_VERBS = 6, ADMIN_SECRET = 96 };
 
 /* The verbs of a kind; in admin_flag, bit n stands for the verb in row n. */
 typedef struct admin_verb {

@@ -74,9 +74,14 @@ static int list(catalogue *cat, api_text *reply) {
     if (rows[i].expires) {
       token_instant(rows[i].expires, expires);
     }
-    api_text_printf(reply, "%s %s uploaded=%lld quota=%lld quota-jobs=%lld priority=%d%s%s%s%s\n", rows[i].name, names,
+    api_text_printf(reply, "%s %s uploaded=%lld quota=%lld quota-jobs=%lld priority=%d%s%s%s%s", rows[i].name, names,
                     (long long)rows[i].used, (long long)rows[i].quota, (long long)rows[i].jobs, rows[i].priority,
                     other ? " tenant=" : "", other ? rows[i].tenant : "", expires[0] ? " expires=" : "", expires);
+    if (rows[i].derived || rows[i].quota_derived) {
+      api_text_printf(reply, " derived=%lld quota-derived=%lld", (long long)rows[i].derived,
+                      (long long)rows[i].quota_derived);
+    }
+    api_text_add(reply, "\n");
   }
   free(rows);
   return count < 0;
@@ -84,15 +89,16 @@ static int list(catalogue *cat, api_text *reply) {
 
 static int apply(catalogue *cat, const char *line, api_text *reply) {
   char verb[8], hash[TOKEN_TEXT];
-  long long quota, jobs, expires;
+  long long quota, jobs, derived, expires;
   token_row row = {.created = (int64_t)time(NULL) * 1000};
-  if (sscanf(line, "token %7s %63s %d %lld %lld %d %63s %lld %64s", verb, row.name, &row.scopes, &quota, &jobs,
-             &row.priority, row.tenant, &expires, hash) != 9) {
+  if (sscanf(line, "token %7s %63s %d %lld %lld %d %63s %lld %lld %64s", verb, row.name, &row.scopes, &quota, &jobs,
+             &row.priority, row.tenant, &expires, &derived, hash) != 10) {
     api_text_add(reply, "unknown command\n");
     return 2;
   }
   row.quota = quota;
   row.jobs = jobs;
+  row.quota_derived = derived;
   row.expires = expires;
   if (strcmp(row.tenant, "-") == 0) {
     memcpy(row.tenant, row.name, sizeof row.tenant);
@@ -104,6 +110,7 @@ static int apply(catalogue *cat, const char *line, api_text *reply) {
   if (strcmp(verb, "add") == 0) {
     row.quota = quota > 0 ? quota : 0;
     row.jobs = jobs > 0 ? jobs : 0;
+    row.quota_derived = derived > 0 ? derived : 0;
     row.priority = row.priority > 0 ? row.priority : 0;
     row.expires = expires > 0 ? expires : 0;
     if (sodium_hex2bin(row.hash, sizeof row.hash, hash, strlen(hash), NULL, NULL, NULL) == 0) {
@@ -134,9 +141,10 @@ const admin_kind admin_token = {
     .name = "token",
     .usage =
         "  orbmorphd token add NAME --scope read,write,admin [--tenant NAME] [--quota BYTES]"
-        " [--quota-jobs N] [--priority 0..9]\n"
-        "                      [--expires 30d|YYYY-MM-DD|never]\n"
-        "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-jobs …] [--priority …] [--expires …]\n"
+        " [--quota-derived BYTES]\n"
+        "                      [--quota-jobs N] [--priority 0..9] [--expires 30d|YYYY-MM-DD|never]\n"
+        "  orbmorphd token set NAME [--scope …] [--quota …] [--quota-derived …] [--quota-jobs …] [--priority …]"
+        " [--expires …]\n"
         "  orbmorphd token list | token remove NAME\n",
     .values =
         "--scope takes read, write and admin, comma-separated; --tenant takes a name; --expires takes a time such as "
@@ -149,6 +157,7 @@ const admin_kind admin_token = {
               {"--priority", ADD | SET, 0, "-1", read_priority},
               {"--tenant", ADD, 0, "-", admin_read_name},
               {"--expires", ADD | SET, 0, "-1", read_expires},
+              {"--quota-derived", ADD | SET, 0, "-1", admin_read_number},
               {.name = ADMIN_SECRET_WORD}},
     .make_secret = make_token,
     .apply = apply,

@@ -35,6 +35,7 @@ struct deliverer {
   int count;
   delivery_row ended[DELIVER_MOST]; /* to be recorded, without bodies */
   int ended_count;
+  int told_denied; /* the log has the line about it */
 };
 
 static int64_t now_ms(void) {
@@ -166,6 +167,10 @@ static void end_flight(deliverer *d, CURL *handle, CURLcode code) {
   }
   flight *f = d->flights[i];
   net_transfer_end(f->transfer, code, &answer);
+  if (answer.end == NET_DENIED && !d->told_denied) {
+    log_warn("webhooks cannot be delivered: %s; docs/deploy.md has a drop-in for the unit, outgoing.conf", answer.why);
+    d->told_denied = 1;
+  }
   if (answer.end != NET_ANSWERED) {
     snprintf(why, sizeof why, "%s", answer.why);
   } else if (answer.status < 200 || answer.status > 299) {

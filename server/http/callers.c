@@ -55,6 +55,7 @@ static void update(caller *who, const token_row *row) {
   __atomic_store_n(&who->row.scopes, row->scopes, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.used, row->used, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.quota, row->quota, __ATOMIC_RELAXED);
+  __atomic_store_n(&who->row.quota_derived, row->quota_derived, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.jobs, row->jobs, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.priority, row->priority, __ATOMIC_RELAXED);
   __atomic_store_n(&who->row.expires, row->expires, __ATOMIC_RELAXED);
@@ -110,6 +111,19 @@ void callers_recount(callers *c, const char *tenant) {
   }
   pthread_rwlock_unlock(&c->lock);
   pthread_mutex_unlock(&c->reading);
+}
+
+int64_t callers_quota_derived(callers *c, const char *tenant) {
+  int64_t least = 0;
+  pthread_rwlock_rdlock(&c->lock);
+  for (int i = 0; i < c->count; i++) {
+    int64_t quota = c->all[i] && strcmp(c->all[i]->row.tenant, tenant) == 0
+                        ? __atomic_load_n(&c->all[i]->row.quota_derived, __ATOMIC_RELAXED)
+                        : 0;
+    least = quota > 0 && (least == 0 || quota < least) ? quota : least;
+  }
+  pthread_rwlock_unlock(&c->lock);
+  return least;
 }
 
 callers *callers_open(catalogue *cat) {

@@ -20,6 +20,8 @@ void callers_close(callers *c);
 int callers_reload(callers *c);
 /* Updates the bytes used by a tenant's tokens after its meshes changed. Blocks. */
 void callers_recount(callers *c, const char *tenant);
+/* The least quota of derived bytes that a token of this tenant has; 0: none has one. For signed URLs. */
+int64_t callers_quota_derived(callers *c, const char *tenant);
 int callers_count(callers *c);
 /* Finds a token by its hash, in constant time; adds a reference. NULL: unknown. */
 caller *callers_find(callers *c, const unsigned char hash[TOKEN_BYTES]);

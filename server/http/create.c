@@ -8,6 +8,7 @@
 #include "api/webhook_codec.h"
 #include "http/body.h"
 #include "http/http.h"
+#include "http/room.h"
 #include "log.h"
 #include "store/deliveries.h"
 
@@ -154,6 +155,21 @@ static api_job_kind kind_of_job(resource_kind result) {
   return result == RESOURCE_EMBEDDING ? API_JOB_EMBEDDING : result == RESOURCE_MESH ? API_JOB_FETCH : API_JOB_SUPERMESH;
 }
 
+/* A job without room gets that of kept alignments, which the daemon can make again. */
+static queue_result submit(request *r, queue_request *wanted, room *space, job **j, int *fresh) {
+  for (;;) {
+    store_result measured = wanted->kind == API_JOB_FETCH ? STORE_OK : room_measure(r, space);
+    if (measured != STORE_OK) {
+      return QUEUE_ERROR;
+    }
+    wanted->room = space->quota > 0 ? &space->left : NULL;
+    queue_result result = queue_submit(r->srv->q, wanted, j, fresh);
+    if (result != QUEUE_ROOM || !room_make(r, queue_bytes_of(wanted->cost) - space->left)) {
+      return result;
+    }
+  }
+}
+
 void submit_wanted(request *r, const wanted_result *wish) {
   job_webhook hook = {.url = wish->webhook.text, .origin = wish->webhook.origin, .events = wish->events};
   queue_request wanted_job = {.kind = kind_of_job(wish->kind),
@@ -173,7 +189,12 @@ void submit_wanted(request *r, const wanted_result *wish) {
     reply_problem(r, &problem);
     return;
   }
-  queue_result result = queue_submit(r->srv->q, &wanted_job, &j, &fresh);
+  room space = {0};
+  queue_result result = submit(r, &wanted_job, &space, &j, &fresh);
+  if (result == QUEUE_ROOM) {
+    room_refuse(r, &space);
+    return;
+  }
   if (result != QUEUE_OK) {
     refuse_submit(r, result, wanted_job.owner_limit);
     queue_release(r->srv->q, j);

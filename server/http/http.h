@@ -8,6 +8,7 @@
  *   away.c       how a handler leaves the HTTP thread
  *   request.c    the clock, and a request's fields in the log
  *   meshes.c     POST /v1/meshes          create.c      POST /v1/embeddings, POST /v1/supermeshes
+ *   room.c       room for a new result in the tenant's quota
  *   fetch.c      POST /v1/meshes with a URL
  *   deliveries.c GET and retry of the deliveries of a job's webhooks
  *   landmarks.c  POST /v1/landmarks
@@ -17,6 +18,7 @@
  *   files.c      GET of stored objects    disposition.c the names of downloads
  *   jobs.c       GET, DELETE and lists of jobs; waiting for a job
  *   events.c     GET /v1/jobs/{job}/events
+ *   usage.c      GET /v1/usage
  *   system.c     /livez, /readyz, /metrics              pages.c       the studio, /openapi.json, /docs
  *   reply.c, send.c   responses; the headers that every response carries; encode.c, encoded.c   compressed responses
  *   listen.c (the socket), watch.c and addresses.c (slow and too many connections), callers.c (tokens in memory),

@@ -7,6 +7,9 @@
 #include "http/http.h"
 #include "metrics.h"
 #include "store/deliveries.h"
+#include "store/usage.h"
+
+enum { TENANTS_SHOWN = 50 };
 
 static void gauge(api_text *out, const char *name, const char *help, double value) {
   metrics_family(out, name, "gauge", help);
@@ -45,6 +48,30 @@ static void write_scrub(scrub *from, api_text *text) {
         found.catalogue_damaged);
 }
 
+/* The tenants that store most, and the others as one: 3 numbers of each, however many there are. */
+static void write_tenants(catalogue *cat, api_text *text) {
+  static const struct {
+    const char *name, *type, *help;
+  } families[] = {{"orbmorph_tenant_bytes", "gauge", "Bytes of the meshes and landmarks that a tenant owns."},
+                  {"orbmorph_tenant_derived_bytes", "gauge", "Bytes of what a tenant's jobs made."},
+                  {"orbmorph_tenant_worker_seconds_total", "counter", "Time for which workers had a tenant's jobs."}};
+  usage_row rows[TENANTS_SHOWN + 1];
+  int count = catalogue_usage_most(cat, TENANTS_SHOWN + 1, rows), last = count - 1;
+  for (int i = 0; i < last; i++) {
+    rows[last].bytes -= rows[i].bytes;
+    rows[last].derived -= rows[i].derived;
+    rows[last].worker_ms -= rows[i].worker_ms;
+  }
+  for (size_t f = 0; count > 0 && f < sizeof families / sizeof families[0]; f++) {
+    metrics_family(text, families[f].name, families[f].type, families[f].help);
+    for (int i = 0; i < (last == TENANTS_SHOWN ? count : last); i++) {
+      double values[] = {(double)rows[i].bytes, (double)rows[i].derived, 1e-3 * (double)rows[i].worker_ms};
+      api_text_printf(text, "%s{tenant=\"%s\"} %.17g\n", families[f].name, i < last ? rows[i].tenant : "(others)",
+                      values[f]);
+    }
+  }
+}
+
 static void metrics_away(request *r) {
   server *srv = r->srv;
   api_text text = {0};
@@ -75,6 +102,7 @@ static void metrics_away(request *r) {
   if (pending >= 0) {
     gauge(&text, "orbmorph_webhook_pending", "Messages to webhooks that are still to be delivered.", (double)pending);
   }
+  write_tenants(srv->cat, &text);
   gauge(&text, "orbmorph_disk_free_bytes", "Free bytes of the file system that holds the data folder.",
         (double)objects_free_bytes(srv->store));
   write_scrub(srv->scrub, &text);

@@ -1,5 +1,6 @@
 #include "net/client.h"
 
+#include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -144,13 +145,14 @@ static void ends(net_answer *out, net_end end, const char *format, ...) {
 }
 
 void net_transfer_end(net_transfer *t, CURLcode code, net_answer *out) {
-  long status = 0;
+  long status = 0, system_error = 0;
   char *redirect = NULL;
   curl_off_t after = 0;
   memset(out, 0, sizeof *out);
   curl_easy_getinfo(t->curl, CURLINFO_RESPONSE_CODE, &status);
   curl_easy_getinfo(t->curl, CURLINFO_REDIRECT_URL, &redirect);
   curl_easy_getinfo(t->curl, CURLINFO_RETRY_AFTER, &after);
+  curl_easy_getinfo(t->curl, CURLINFO_OS_ERRNO, &system_error);
   out->status = (int)status;
   out->bytes = t->bytes;
   out->retry_after = (int64_t)after;
@@ -165,6 +167,8 @@ void net_transfer_end(net_transfer *t, CURLcode code, net_answer *out) {
     out->end = NET_ANSWERED;
   } else if (t->forbidden && !status) {
     ends(out, NET_FORBIDDEN, "the host has no address that the daemon connects to");
+  } else if (code == CURLE_COULDNT_CONNECT && (system_error == EPERM || system_error == EACCES)) {
+    ends(out, NET_DENIED, "the system denies the connection (IPAddressDeny of the unit, or a firewall)");
   } else if (code == CURLE_OPERATION_TIMEDOUT) {
     ends(out, NET_TIMED_OUT, "no complete answer came in time");
   } else {

@@ -32,6 +32,7 @@ typedef struct net_request {
 typedef enum net_end {
   NET_ANSWERED,  /* with any status */
   NET_FORBIDDEN, /* the host has no address that the daemon connects to */
+  NET_DENIED,    /* the kernel lets this process connect to no such address */
   NET_TOO_LARGE,
   NET_TIMED_OUT,
   NET_STOPPED, /* by take() or continues() */

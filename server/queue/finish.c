@@ -5,6 +5,7 @@
 #include "faults.h"
 #include "log.h"
 #include "queue/internal.h"
+#include "store/usage.h"
 
 static void release_dependents(queue *q, job *ended) {
   for (job *j = q->first; j; j = j->next) {
@@ -46,6 +47,8 @@ static store_result end_job(queue *q, job *j, job_end *end, int worked) {
   end->now = unix_ms();
   pthread_mutex_lock(&q->lock);
   job shown = *j;
+  end->owner = j->row.owner;
+  end->worker_ms = worked && !fetches(j) ? used_ms(j, orb_clock_ms()) : 0;
   shown.row.state = state;
   shown.row.finished = end->now;
   shown.row.problem = (char *)(uintptr_t)end->problem;
@@ -160,8 +163,17 @@ static void show_queued(job *j) {
   }
 }
 
+/* Counts the time of a worker that a job leaves before its end. */
+static void count_time(queue *q, const job *j) {
+  int64_t ms = fetches(j) ? 0 : used_ms(j, orb_clock_ms());
+  if (ms > 0) {
+    catalogue_add_time(q->cat, j->row.owner, ms);
+  }
+}
+
 void queue_give_back(queue *q, job *j) {
   int claimed = j->running;
+  count_time(q, j);
   store_result stored = claimed ? catalogue_job_release(q->cat, j->row.id, j->row.attempt) : STORE_OK;
   pthread_mutex_lock(&q->lock);
   if (claimed) {
@@ -186,6 +198,7 @@ int queue_crashed(queue *q, job *j, int is_sure) {
   if (crashes >= MOST_CRASHES) {
     return 1;
   }
+  count_time(q, j);
   pthread_mutex_lock(&q->lock);
   j->row.state = API_JOB_QUEUED;
   j->row.crashes = crashes;

@@ -91,13 +91,16 @@ typedef struct queue_request {
   const char *charged; /* the signing key that its work counts for; NULL: none */
   int64_t cost;
   int priority, listed;
-  int64_t owner_limit;            /* of the owner's listed unfinished jobs; 0: no limit */
+  int64_t owner_limit; /* of the owner's listed unfinished jobs; 0: no limit */
+  int64_t
+      *room; /* bytes that results of the owner may add; NULL: no limit. Becomes those that its unfinished jobs leave */
   const struct job_webhook *hook; /* that the request names; NULL: none */
 } queue_request;
 typedef enum queue_result {
   QUEUE_OK,
   QUEUE_FULL,
   QUEUE_QUOTA,
+  QUEUE_ROOM, /* the result has no room */
   QUEUE_STOPPING,
   QUEUE_STORE_FULL,
   QUEUE_MESH_GONE, /* a mesh that the request names has been deleted */
@@ -105,6 +108,8 @@ typedef enum queue_result {
   QUEUE_WEBHOOKS,  /* the job has as many webhooks as it may have */
   QUEUE_ERROR
 } queue_result;
+/* An estimate of the bytes that a job of this cost stores. */
+int64_t queue_bytes_of(int64_t cost);
 /* Blocks for the commit. Adds a reference to *out. *fresh (may be NULL): 1 for a new job, 0 for one that existed. */
 queue_result queue_submit(queue *q, const queue_request *request, job **out, int *fresh);
 
@@ -193,6 +198,8 @@ typedef struct queue_numbers {
   int64_t ended[API_JOB_CANCELLED + 1]; /* by state, since the start */
 } queue_numbers;
 void queue_count(queue *q, queue_numbers *out); /* O(unfinished jobs) */
+/* Unfinished jobs of an owner: those that workers have, and the others. O(owners). */
+void queue_count_of(queue *q, const char *owner, int *running, int *queued);
 /* Jobs that have ended in this state since the start. */
 int64_t queue_ended(queue *q, api_job_state state);
 

@@ -6,6 +6,21 @@
 #include "queue/internal.h"
 #include "store/deliveries.h"
 
+/* A sphere has 52 bytes a vertex, 13 a triangle, and a head. Results of merges are of this order. */
+enum { BYTES_OF_TRIANGLE = 39, BYTES_OF_HEAD = 512 };
+
+int64_t queue_bytes_of(int64_t cost) {
+  return BYTES_OF_HEAD + BYTES_OF_TRIANGLE * cost;
+}
+
+/* Whether a result of this owner has room beside those of its unfinished jobs. */
+static int has_room(const queue *q, const queue_request *request) {
+  for (const job *j = q->first; request->room && j; j = j->next) {
+    *request->room -= !fetches(j) && strcmp(j->row.owner, request->owner) == 0 ? queue_bytes_of(j->row.cost) : 0;
+  }
+  return !request->room || *request->room >= queue_bytes_of(request->cost);
+}
+
 /* The owner's unfinished job with the same key, with a reference; or NULL, and *mine is the number of the owner's
  * listed jobs. Skips cancelled jobs, also one that is cancelled while this waits for its commit. */
 static job *adopt_locked(queue *q, const queue_request *request, int64_t *mine) {
@@ -45,6 +60,9 @@ static queue_result submit_locked(queue *q, const queue_request *request, job **
   }
   if (request->owner_limit > 0 && mine >= request->owner_limit) {
     return QUEUE_QUOTA;
+  }
+  if (!has_room(q, request)) {
+    return QUEUE_ROOM;
   }
   j = calloc(1, sizeof *j);
   char *text = strdup(request->request);

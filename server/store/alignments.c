@@ -6,6 +6,7 @@
 #include <time.h>
 
 #include "log.h"
+#include "store/owners.h"
 
 /* The free bytes that must be left, as a multiple of an alignment's: the result that follows needs them more. */
 enum { ROOM = 16 };
@@ -30,7 +31,8 @@ int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const
   return fine;
 }
 
-store_result alignments_publish(catalogue *cat, objects *store, const char *id, const void *bytes, size_t size) {
+store_result alignments_publish(catalogue *cat, objects *store, const char *id, const char *tenant, const void *bytes,
+                                size_t size) {
   char json[API_ID_SIZE + 16];
   resource row = {
       .kind = RESOURCE_ALIGNMENT, .json = json, .bytes = (int64_t)size, .created = (int64_t)time(NULL) * 1000};
@@ -40,18 +42,18 @@ store_result alignments_publish(catalogue *cat, objects *store, const char *id, 
   objects_hold(store);
   store_result result = objects_put(store, OBJECT_ALIGNMENT, id, bytes, size);
   if (result == STORE_OK && cat) {
-    result = catalogue_put_alignment(cat, &row);
+    result = catalogue_put_alignment(cat, &row, tenant);
   }
   objects_let_go(store);
   return result;
 }
 
-void alignments_put(catalogue *cat, objects *store, orb_context *ctx, const char *id, const orb_align_shape *shapes,
-                    const orb_alignment *alignment) {
+void alignments_put(catalogue *cat, objects *store, orb_context *ctx, const char *id, const char *tenant,
+                    const orb_align_shape *shapes, const orb_alignment *alignment) {
   orb_buffer bytes = {0};
   if (orb_alignment_write(ctx, shapes, alignment, &bytes) != ORB_OK ||
       (objects_free_bytes(store) / ROOM >= bytes.size &&
-       alignments_publish(cat, store, id, bytes.data, bytes.size) != STORE_OK)) {
+       alignments_publish(cat, store, id, tenant, bytes.data, bytes.size) != STORE_OK)) {
     log_warn("the alignment %s could not be kept", id);
   }
   orb_buffer_free(ctx, &bytes);

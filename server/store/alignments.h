@@ -12,12 +12,13 @@
 int alignments_get(catalogue *cat, const objects *store, orb_context *ctx, const resource *row,
                    const orb_align_shape *shapes, int32_t shape_count, orb_alignment *out);
 
-/* Stores the bytes of an alignment, and its row. Blocks for a commit. */
-store_result alignments_publish(catalogue *cat, objects *store, const char *id, const void *bytes, size_t size);
+/* Stores the bytes of an alignment, and its row, which counts for the tenant. Blocks for a commit. */
+store_result alignments_publish(catalogue *cat, objects *store, const char *id, const char *tenant, const void *bytes,
+                                size_t size);
 
 /* Keeps an alignment of these shapes, unless the disk is nearly full. Failures are logged and have no consequence but
  * the time of another alignment. Blocks for a commit. */
-void alignments_put(catalogue *cat, objects *store, orb_context *ctx, const char *id, const orb_align_shape *shapes,
-                    const orb_alignment *alignment);
+void alignments_put(catalogue *cat, objects *store, orb_context *ctx, const char *id, const char *tenant,
+                    const orb_align_shape *shapes, const orb_alignment *alignment);
 
 #endif

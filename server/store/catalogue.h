@@ -10,6 +10,7 @@
  *   resources.c, owners.c, jobs.c, tokens.c, keys.c, webhooks.c   the SQL of each kind of row; lists.c   lists with a
  * filter deliveries.c  the outbox: what is still to be sent to webhooks objects.c     publishing, reading and deleting
  * files; spheres.c   the file of aligned spheres; alignments.c   kept alignments
+ *   usage.c       what tenants use
  *   snapshot.c    a copy of the catalogue for a backup; transfer.c   objects from one folder to another
  *
  * Contract. ONE connection writes and checkpoints, and one thread owns it (SQLite before 3.51.3 can lose a WAL reset
@@ -38,7 +39,7 @@ typedef enum resource_kind {
   RESOURCE_EMBEDDING,
   RESOURCE_SUPERMESH,
   RESOURCE_LANDMARKS, /* a row alone, without an object */
-  RESOURCE_ALIGNMENT, /* no caller sees it, and it has no owner */
+  RESOURCE_ALIGNMENT, /* no caller sees it; it counts for the tenant whose job made it */
   RESOURCE_KINDS
 } resource_kind;
 
@@ -80,8 +81,6 @@ enum { RESOURCE_OBJECTS = 3 + PROFILES_STORED };
 int resource_objects(const resource *row, named_object out[RESOURCE_OBJECTS]);
 
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out);
-/* Adds the row of an alignment, or replaces it. */
-store_result catalogue_put_alignment(catalogue *cat, const resource *row);
 store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id);
 /* Functions that list return the number of rows filled, or −1, and fill nothing, if the rows cannot be read. */
 /* Newest first, landmarks without their places, only those before sequence number `before` (0: all). */
@@ -151,6 +150,8 @@ typedef struct job_end {
   const char *mesh;       /* of a mesh from a URL: its id; NULL: none */
   int64_t now, event;     /* event: the number of the last event */
   const char *event_json; /* of the last event: the job */
+  const char *owner;      /* to whom worker_ms counts */
+  int64_t worker_ms;      /* for which a worker has had it */
 } job_end;
 /* Ends a job, stores its result and announces it to its webhooks in the same transaction. STORE_CONFLICT if `attempt`
  * is no longer the job's current one. */

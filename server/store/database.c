@@ -126,6 +126,25 @@ static const char *const migrations[] = {
     " last INTEGER NOT NULL) WITHOUT ROWID;",
     /* Until when a token is valid, as a Unix time in seconds; 0: always. */
     "ALTER TABLE token ADD COLUMN expires INTEGER NOT NULL DEFAULT 0;",
+    /* What tenants use: bytes of the derived resources that they own, and time of workers. */
+    "ALTER TABLE owner ADD COLUMN derived INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE tenant ADD COLUMN derived INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE tenant ADD COLUMN worker_ms INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE token ADD COLUMN quota_derived INTEGER NOT NULL DEFAULT 0;"
+    "UPDATE owner SET derived=(SELECT r.bytes FROM resource r WHERE r.kind=owner.kind AND r.id=owner.id)"
+    " WHERE kind IN (1, 2);"
+    "UPDATE tenant SET derived=(SELECT coalesce(sum(o.derived), 0) FROM owner o WHERE o.tenant=tenant.name);"
+    "DROP TRIGGER owner_added;"
+    "DROP TRIGGER owner_removed;"
+    "CREATE TRIGGER owner_added AFTER INSERT ON owner BEGIN"
+    " INSERT INTO tenant(name) SELECT NEW.tenant WHERE NOT EXISTS(SELECT 1 FROM tenant WHERE name=NEW.tenant);"
+    " UPDATE tenant SET bytes=bytes+NEW.bytes, derived=derived+NEW.derived WHERE name=NEW.tenant; END;"
+    "CREATE TRIGGER owner_removed AFTER DELETE ON owner BEGIN"
+    " UPDATE tenant SET bytes=bytes-OLD.bytes, derived=derived-OLD.derived WHERE name=OLD.tenant; END;"
+    "CREATE TRIGGER owner_grown AFTER UPDATE OF derived ON owner BEGIN"
+    " UPDATE tenant SET derived=derived+NEW.derived-OLD.derived WHERE name=NEW.tenant; END;"
+    "CREATE TRIGGER resource_grown AFTER UPDATE OF bytes ON resource WHEN NEW.kind IN (1, 2, 4) BEGIN"
+    " UPDATE owner SET derived=NEW.bytes WHERE kind=NEW.kind AND id=NEW.id; END;",
 };
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 

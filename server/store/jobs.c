@@ -5,6 +5,7 @@
 #include "store/deliveries.h"
 #include "store/owners.h"
 #include "store/rows.h"
+#include "store/usage.h"
 
 #define COLUMNS                                                                                                   \
   "seq, id, key, kind, state, attempt, crashes, suspect, alone, listed, priority, cost, owner, request, problem," \
@@ -166,6 +167,9 @@ static int finish(database *db, void *arg) {
   }
   if (code == SQLITE_OK && end->state == API_JOB_SUCCEEDED && !end->mesh) {
     code = owner_of_job(db, c->id, end->now);
+  }
+  if (code == SQLITE_OK && end->worker_ms > 0) {
+    code = usage_add_time(db, end->owner, end->worker_ms);
   }
   if (code == SQLITE_OK && end->event_json) {
     code = write_event(db, c->id, end->event, api_job_state_name(end->state), end->event_json);

@@ -7,8 +7,8 @@
 /* Adds an owner if absent. json NULL: the owner sees the resource's own description. */
 static int owner_insert(database *db, const resource *r, const char *tenant, const char *json) {
   sqlite3_stmt *st = database_statement(db,
-                                        "INSERT INTO owner(kind, id, tenant, json, bytes, created)"
-                                        " VALUES(?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING");
+                                        "INSERT INTO owner(kind, id, tenant, json, bytes, created, derived)"
+                                        " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7) ON CONFLICT DO NOTHING");
   if (!st) {
     return SQLITE_ERROR;
   }
@@ -18,6 +18,7 @@ static int owner_insert(database *db, const resource *r, const char *tenant, con
   sqlite3_bind_text(st, 4, json, -1, SQLITE_STATIC);
   sqlite3_bind_int64(st, 5, resource_is_derived(r->kind) ? 0 : r->bytes);
   sqlite3_bind_int64(st, 6, r->created);
+  sqlite3_bind_int64(st, 7, resource_is_derived(r->kind) ? r->bytes : 0);
   return database_run(db, st);
 }
 
@@ -43,11 +44,11 @@ static int exists(database *db, const char *sql, int kind, const char *id, const
 int owner_of_job(database *db, const char *job, int64_t now) {
   sqlite3_stmt *st = database_statement(
       db,
-      "INSERT INTO owner(kind, id, tenant, json, bytes, created)"
+      "INSERT INTO owner(kind, id, tenant, json, bytes, created, derived)"
       " SELECT r.kind, r.id, j.owner,"
       "  iif(NOT EXISTS(SELECT 1 FROM owner o WHERE o.kind=r.kind AND o.id=r.id) OR NOT json_valid(r.json), NULL,"
       "   json_set(r.json, '$.created', strftime('%Y-%m-%dT%H:%M:%S', ?2/1000, 'unixepoch') ||"
-      "    printf('.%03dZ', ?2%1000))), 0, ?2"
+      "    printf('.%03dZ', ?2%1000))), 0, ?2, r.bytes"
       " FROM job j JOIN resource r ON r.kind=j.kind+1 AND r.id=j.key WHERE j.id=?1 ON CONFLICT DO NOTHING");
   int code = SQLITE_ERROR;
   if (st) {
@@ -154,6 +155,22 @@ store_result catalogue_put_for(catalogue *cat, const resource *r, const char *te
   return result;
 }
 
+typedef struct alignment_arg {
+  const resource *row;
+  const char *tenant;
+} alignment_arg;
+
+static int put_alignment(database *db, void *arg) {
+  const alignment_arg *a = arg;
+  int code = resource_remove(db, RESOURCE_ALIGNMENT, a->row->id);
+  code = code == SQLITE_OK || code == SQLITE_NOTFOUND ? resource_insert(db, a->row) : code;
+  return code == SQLITE_OK ? owner_insert(db, a->row, a->tenant, NULL) : code;
+}
+
+store_result catalogue_put_alignment(catalogue *cat, const resource *row, const char *tenant) {
+  return catalogue_write(cat, put_alignment, &(alignment_arg){row, tenant});
+}
+
 #define COLUMNS \
   "o.seq, r.kind, r.id, r.sha, coalesce(o.json, r.json), r.bytes, o.created, r.places, r.quantized, r.meshopt"
 #define LIST_COLUMNS                          \
@@ -216,12 +233,28 @@ store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id
   return result;
 }
 
+static int read_id(sqlite3_stmt *st, void *out) {
+  row_text(st, 0, out, API_ID_SIZE);
+  return 1;
+}
+
 int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant) {
   int64_t bytes = 0;
   database *db = catalogue_reader(cat);
   int code = bytes_of(db, tenant, &bytes);
   catalogue_reader_done(cat, db);
   return code == SQLITE_OK ? bytes : -1;
+}
+
+int catalogue_alignments_of(catalogue *cat, const char *tenant, int limit, char (*ids)[API_ID_SIZE]) {
+  static const row_kind kind = {.read = read_id, .size = API_ID_SIZE};
+  database *db = catalogue_reader(cat);
+  sqlite3_stmt *st = database_statement(db, "SELECT id FROM owner WHERE tenant=?1 AND kind=4 ORDER BY seq LIMIT ?2");
+  if (st) {
+    sqlite3_bind_text(st, 1, tenant, -1, SQLITE_STATIC);
+    sqlite3_bind_int(st, 2, limit);
+  }
+  return rows_many(cat, db, st, &kind, ids, limit);
 }
 
 int64_t catalogue_mismatches(catalogue *cat) {
@@ -232,7 +265,12 @@ int64_t catalogue_mismatches(catalogue *cat) {
                                         " + (SELECT count(*) FROM owner o WHERE NOT EXISTS"
                                         "  (SELECT 1 FROM resource r WHERE r.kind=o.kind AND r.id=o.id))"
                                         " + (SELECT count(*) FROM tenant t WHERE t.bytes !="
-                                        "  (SELECT coalesce(sum(o.bytes), 0) FROM owner o WHERE o.tenant=t.name))"
+                                        "  (SELECT coalesce(sum(o.bytes), 0) FROM owner o WHERE o.tenant=t.name)"
+                                        "  OR t.derived !="
+                                        "  (SELECT coalesce(sum(o.derived), 0) FROM owner o WHERE o.tenant=t.name))"
+                                        " + (SELECT count(*) FROM owner o JOIN resource r"
+                                        "  ON r.kind=o.kind AND r.id=o.id"
+                                        "  WHERE o.derived != iif(r.kind IN (1, 2, 4), r.bytes, 0))"
                                         " + (SELECT count(*) FROM total t WHERE t.bytes !="
                                         "  (SELECT coalesce(sum(r.bytes), 0) FROM resource r WHERE r.kind=t.kind))"
                                         " + (SELECT count(*) FROM (SELECT seq, key FROM shape_of EXCEPT"

@@ -1,7 +1,10 @@
 /* Which tenant owns which mesh, embedding and supermesh. Equal uploads and equal requests are stored once; every tenant
  * that sent them owns the result and sees nothing else. When the last owner deletes it, it is removed. The tenant is ""
- * where no token was needed. Every row but an alignment's has an owner: rows older than ownership that no job names
- * belong to "".
+ * where no token was needed. Every row has an owner: rows older than ownership that no job names belong to "". Only old
+ * alignments have none. The tenant whose job made an alignment owns it, so that its bytes count; no caller sees it.
+ *
+ * owner.bytes are those of meshes and landmarks, owner.derived those of all that jobs make; triggers keep their sums in
+ * the rows of tenants.
  *
  * The first owner sees the resource's own description. Another owner gets a copy where the original would reveal
  * something about the first owner: the name it chose, and the time.
@@ -22,12 +25,16 @@ int owner_of_meshes(database *db, const char *request, const char *tenant, int64
 /* Adds a mesh or landmarks if absent, and makes the tenant an owner. STORE_CONFLICT: the tenant would exceed its quota
  * in bytes (0: no limit); nothing changes. *fresh: the tenant did not own it before. */
 store_result catalogue_put_for(catalogue *cat, const resource *r, const char *tenant, int64_t quota, int *fresh);
+/* Adds the row of an alignment that a job of this tenant made, or replaces it. */
+store_result catalogue_put_alignment(catalogue *cat, const resource *row, const char *tenant);
 /* The row with the description that this owner sees; STORE_NOT_FOUND if the tenant does not own it. */
 store_result catalogue_get_of(catalogue *cat, resource_kind kind, const char *id, const char *tenant, resource *out);
 /* Like catalogue_list(), only what the tenant owns. */
 int catalogue_list_of(catalogue *cat, resource_kind kind, const char *tenant, int64_t before, int limit, resource *out);
 /* Removes an owner. *gone: it was the last one and the row is deleted. STORE_NOT_FOUND: the tenant did not own it. */
 store_result catalogue_disown(catalogue *cat, resource_kind kind, const char *id, const char *tenant, int *gone);
+/* The kept alignments that were made for a tenant, oldest first. Returns their number, or −1. */
+int catalogue_alignments_of(catalogue *cat, const char *tenant, int limit, char (*ids)[API_ID_SIZE]);
 /* Bytes of the meshes and landmarks that a tenant owns; −1: they cannot be read. */
 int64_t catalogue_tenant_bytes(catalogue *cat, const char *tenant);
 /* For --check-data: the number of resources without an owner (alignments have none), owners without a resource, stored

@@ -167,17 +167,6 @@ void catalogue_touch(catalogue *cat, resource_kind kind, const char *id) {
   }
 }
 
-static int put_alignment(database *db, void *arg) {
-  const resource *row = arg;
-  int code = resource_remove(db, RESOURCE_ALIGNMENT, row->id);
-  return code == SQLITE_OK || code == SQLITE_NOTFOUND ? resource_insert(db, row) : code;
-}
-
-store_result catalogue_put_alignment(catalogue *cat, const resource *row) {
-  resource copy = *row;
-  return catalogue_write(cat, put_alignment, &copy);
-}
-
 typedef struct profile_arg {
   const char *id, *sha;
   int profile;

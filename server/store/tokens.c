@@ -32,8 +32,8 @@ static int add_row(database *db, void *arg) {
   sqlite3_stmt *st =
       database_statement(db,
                          "INSERT INTO token(hash, name, scopes, quota_bytes, quota_jobs, created, priority, tenant,"
-                         " expires)"
-                         " VALUES(?1, ?2, ?3, ?4, ?6, ?5, ?7, ?8, ?9) ON CONFLICT DO NOTHING");
+                         " expires, quota_derived)"
+                         " VALUES(?1, ?2, ?3, ?4, ?6, ?5, ?7, ?8, ?9, ?10) ON CONFLICT DO NOTHING");
   if (!st) {
     return SQLITE_ERROR;
   }
@@ -47,6 +47,7 @@ static int add_row(database *db, void *arg) {
   sqlite3_bind_int(st, 7, row->priority);
   sqlite3_bind_text(st, 8, row->tenant, -1, SQLITE_STATIC);
   sqlite3_bind_int64(st, 9, row->expires);
+  sqlite3_bind_int64(st, 10, row->quota_derived);
   int code = database_run(db, st);
   return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_CONSTRAINT : code;
 }
@@ -57,11 +58,11 @@ store_result catalogue_token_add(catalogue *cat, const token_row *row) {
 
 static int set_row(database *db, void *arg) {
   const token_row *row = arg;
-  sqlite3_stmt *st =
-      database_statement(db,
-                         "UPDATE token SET scopes=iif(?2<0, scopes, ?2),"
-                         " quota_bytes=iif(?3<0, quota_bytes, ?3), quota_jobs=iif(?4<0, quota_jobs, ?4),"
-                         " priority=iif(?5<0, priority, ?5), expires=iif(?6<0, expires, ?6) WHERE name=?1");
+  sqlite3_stmt *st = database_statement(db,
+                                        "UPDATE token SET scopes=iif(?2<0, scopes, ?2),"
+                                        " quota_bytes=iif(?3<0, quota_bytes, ?3), quota_jobs=iif(?4<0, quota_jobs, ?4),"
+                                        " priority=iif(?5<0, priority, ?5), expires=iif(?6<0, expires, ?6),"
+                                        " quota_derived=iif(?7<0, quota_derived, ?7) WHERE name=?1");
   if (!st) {
     return SQLITE_ERROR;
   }
@@ -71,6 +72,7 @@ static int set_row(database *db, void *arg) {
   sqlite3_bind_int64(st, 4, row->jobs);
   sqlite3_bind_int(st, 5, row->priority);
   sqlite3_bind_int64(st, 6, row->expires);
+  sqlite3_bind_int64(st, 7, row->quota_derived);
   int code = database_run(db, st);
   return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
 }
@@ -107,6 +109,8 @@ static int read_row(sqlite3_stmt *st, void *out) {
   row->priority = sqlite3_column_int(st, 7);
   row_text(st, 8, row->tenant, sizeof row->tenant);
   row->expires = sqlite3_column_int64(st, 9);
+  row->quota_derived = sqlite3_column_int64(st, 10);
+  row->derived = sqlite3_column_int64(st, 11);
   return 1;
 }
 
@@ -115,7 +119,8 @@ token_row *catalogue_tokens(catalogue *cat, int *count) {
   database *db = catalogue_reader(cat);
   sqlite3_stmt *st = database_statement(db,
                                         "SELECT hash, token.name, scopes, quota_bytes, coalesce(bytes, 0), created,"
-                                        " quota_jobs, priority, tenant, expires FROM token"
+                                        " quota_jobs, priority, tenant, expires, quota_derived, coalesce(derived, 0)"
+                                        " FROM token"
                                         " LEFT JOIN tenant ON tenant.name=token.tenant ORDER BY token.name");
   return rows_all(cat, db, st, &kind, count);
 }

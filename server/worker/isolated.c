@@ -143,7 +143,7 @@ static void take_alignment(const run_env *env, const char *id, int fd) {
   size_t size = fstat(fd, &info) == 0 && info.st_size > 0 ? (size_t)info.st_size : 0;
   void *bytes = size ? malloc(size) : NULL;
   if (!bytes || pread(fd, bytes, size, 0) != (ssize_t)size ||
-      alignments_publish(env->cat, env->store, id, bytes, size) != STORE_OK) {
+      alignments_publish(env->cat, env->store, id, env->tenant, bytes, size) != STORE_OK) {
     log_warn("the alignment %s could not be kept", id);
   }
   free(bytes);

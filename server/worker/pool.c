@@ -237,6 +237,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
   job_progress progress = {.q = pool->env.q, .j = j};
   run_env env_of_job = pool->env, *env = &env_of_job;
   env_of_job.progress = &progress;
+  env_of_job.tenant = job_owner(j);
   api_problem problem = {0};
   run_output out = {0};
   int64_t began = orb_clock_ms();

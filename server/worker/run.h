@@ -16,6 +16,7 @@ typedef struct run_env {
   catalogue *cat;
   objects *store;
   job_progress *progress; /* of the job; NULL outside a run */
+  const char *tenant;     /* that requested the job; NULL in a process of its own */
   /* In place of catalogue_get(), in a process of its own. */
   store_result (*get)(void *user, resource_kind kind, const char *id, resource *out);
   void *user;

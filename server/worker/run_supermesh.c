@@ -272,7 +272,7 @@ static int align_shapes(const run_env *env, orb_context *ctx, const merge_input 
   }
   *seconds = orb_clock() - began;
   if (named) {
-    alignments_put(env->cat, env->store, ctx, id, in->shapes, out);
+    alignments_put(env->cat, env->store, ctx, id, env->tenant, in->shapes, out);
   }
   return 1;
 }

@@ -1,5 +1,5 @@
-/* Runs a program as on a kernel that lacks landlock or seccomp filters.
- *   without landlock|seccomp PROGRAM [ARGUMENT…] */
+/* Runs a program as on a kernel that lacks landlock or seccomp filters, or where a unit denies all addresses.
+ *   without landlock|seccomp|addresses PROGRAM [ARGUMENT…] */
 #include <errno.h>
 #include <seccomp.h>
 #include <stdio.h>
@@ -9,14 +9,17 @@
 
 int main(int count, char **arguments) {
   int landlock = count > 2 && strcmp(arguments[1], "landlock") == 0;
-  if (!landlock && (count <= 2 || strcmp(arguments[1], "seccomp") != 0)) {
-    fprintf(stderr, "usage: without landlock|seccomp PROGRAM [ARGUMENT…]\n");
+  int addresses = count > 2 && strcmp(arguments[1], "addresses") == 0;
+  if (!landlock && !addresses && (count <= 2 || strcmp(arguments[1], "seccomp") != 0)) {
+    fprintf(stderr, "usage: without landlock|seccomp|addresses PROGRAM [ARGUMENT…]\n");
     return 2;
   }
   scmp_filter_ctx rules = seccomp_init(SCMP_ACT_ALLOW);
   int failed = !rules;
   if (landlock) {
     failed = failed || seccomp_rule_add(rules, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(landlock_create_ruleset), 0) != 0;
+  } else if (addresses) {
+    failed = failed || seccomp_rule_add(rules, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(connect), 0) != 0;
   } else {
     failed =
         failed || seccomp_rule_add(rules, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(seccomp), 0) != 0 ||

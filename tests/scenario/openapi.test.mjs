@@ -705,9 +705,10 @@ test('answers about landmarks and morphs by URL', async (t) => {
 test('answers about the daemon itself', async (t) => {
   const d = await daemon(t);
   const { ask } = held(d);
-  for (const target of ['/livez', '/readyz', '/metrics', '/docs', '/'])
+  for (const target of ['/livez', '/readyz', '/metrics', '/docs', '/', '/v1/usage'])
     assert.equal((await ask('GET', target)).status, 200);
   assert.deepEqual((await ask('GET', '/openapi.json')).json, document);
+  assert.equal((await ask('GET', '/v1/usage', { query: { limit: 0 } })).status, 400);
   assert.ok('workers' in (await ask('GET', '/readyz', { query: { verbose: '' } })).json);
   const refused = hold(await bare(d, 'GET', '/livez', { 'content-length': 2 }, 'ab'), 'GET', '/livez');
   assert.equal(refused.json.type, '/problems/bad-request');

@@ -373,3 +373,26 @@ test(`${kills} kills -9 lose no message`, async (t) => {
     return true;
   }, 'nothing is pending');
 });
+
+test('where the system denies connections, deliveries and downloads say so', {
+  skip: !process.env.ORB_WITHOUT && 'ORB_WITHOUT names no program',
+}, async (t) => {
+  const d = await daemon(t, {
+    args: [...allow, '--fetch-allow', '127.0.0.0/8'],
+    program: [process.env.ORB_WITHOUT, 'addresses', binaries.daemon],
+  });
+  const { url, requests } = await origin(t);
+  const accepted = await embed(d, { mesh: await mesh(d), webhook: { url } });
+  const job = await d.ended(accepted.json);
+  await until(async () => (await deliveries(d, job))[0].attempts > 0, 'an attempt');
+  const [delivery] = await deliveries(d, job);
+  assert.match(
+    JSON.stringify(delivery),
+    /the system denies the connection \(IPAddressDeny of the unit, or a firewall\)/,
+  );
+  assert.match(d.log, /webhooks cannot be delivered: the system denies .*outgoing\.conf/);
+  const fetched = await d.ended((await d.post('/v1/meshes', { url: `${url}/a.obj` })).json);
+  assert.equal(fetched.problem.type, '/problems/fetch-failed');
+  assert.match(fetched.problem.detail, /^The file was not fetched: the system denies the connection/);
+  assert.equal(requests.length, 0);
+});

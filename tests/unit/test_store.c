@@ -17,6 +17,7 @@
 #include "store/owners.h"
 #include "store/tokens.h"
 #include "store/transactions.h"
+#include "store/usage.h"
 #include "support_store.h"
 
 static void reopen(stored *s) {
@@ -412,6 +413,9 @@ static void test_migration_to_owners(void **state) {
   assert_int_equal(tokens[1].used, 130);
   assert_int_equal(tokens[1].priority, 5);
   assert_int_equal(tokens[2].used, 0);
+  assert_int_equal(tokens[0].derived, 5);
+  assert_int_equal(tokens[1].derived, 5 + 9);
+  assert_int_equal(tokens[1].quota_derived, 0);
   free(tokens);
   assert_int_equal(catalogue_mismatches(s->cat), 0);
   assert_true(catalogue_integrity(s->cat));
@@ -501,12 +505,74 @@ static void test_owners_of_results(void **state) {
   assert_int_equal(catalogue_get_of(s->cat, RESOURCE_EMBEDDING, result.id, "bob", &got), STORE_OK);
   assert_string_equal(got.json, "{\"w\":1.50,\"created\":\"1970-01-02T00:00:00.123Z\"}");
   resource_free(&got);
+  assert_int_equal(catalogue_tenant_derived(s->cat, "ann"), 1);
+  assert_int_equal(catalogue_tenant_derived(s->cat, "bob"), 1);
+  assert_int_equal(catalogue_mismatches(s->cat), 0);
   assert_int_equal(catalogue_delete(s->cat, RESOURCE_EMBEDDING, result.id), STORE_OK);
+  assert_int_equal(catalogue_tenant_derived(s->cat, "ann"), 0);
+  assert_int_equal(catalogue_tenant_derived(s->cat, "bob"), 0);
   assert_int_equal(
       catalogue_job_finish(s->cat, eve.id, 1,
                            &(job_end){.state = API_JOB_SUCCEEDED, .now = 70, .event = 5, .event_json = "{}"}),
       STORE_CONFLICT);
   assert_int_equal(read_job(s, eve.id).state, API_JOB_RUNNING);
+}
+
+/* What jobs make counts for the tenants that own it: with the profiles of an asset, which come later, and kept
+ * alignments, until the row is deleted or given up. */
+static void test_derived_bytes(void **state) {
+  stored *s = *state;
+  job_row job = new_job('1');
+  resource result = {.kind = RESOURCE_SUPERMESH, .json = (char *)(uintptr_t) "{}", .bytes = 100, .created = 50};
+  resource kept = {.kind = RESOURCE_ALIGNMENT, .json = (char *)(uintptr_t) "{}", .bytes = 30, .created = 50};
+  char ids[2][API_ID_SIZE];
+  int gone;
+  job.kind = API_JOB_SUPERMESH;
+  strcpy(job.owner, "ann");
+  memcpy(result.id, job.key, sizeof result.id);
+  make_id(result.sha, 'f');
+  make_id(kept.id, 'c');
+  make_id(kept.sha, 'd');
+  assert_int_equal(catalogue_job_insert(s->cat, &job, NULL), STORE_OK);
+  assert_int_equal(catalogue_job_claim(s->cat, job.id, 1, 0, 10), STORE_OK);
+  const job_end end = {.state = API_JOB_SUCCEEDED,
+                       .result = &result,
+                       .now = 50,
+                       .event = 5,
+                       .event_json = "{}",
+                       .owner = "ann",
+                       .worker_ms = 70};
+  assert_int_equal(catalogue_job_finish(s->cat, job.id, 1, &end), STORE_OK);
+  assert_int_equal(catalogue_tenant_derived(s->cat, "ann"), 100);
+  assert_int_equal(catalogue_add_profile(s->cat, result.id, 0, "a", 11), STORE_OK);
+  assert_int_equal(catalogue_add_profile(s->cat, result.id, 0, "b", 11), STORE_OK); /* made again: counted once */
+  assert_int_equal(catalogue_tenant_derived(s->cat, "ann"), 111);
+  assert_int_equal(catalogue_put_alignment(s->cat, &kept, "ann"), STORE_OK);
+  assert_int_equal(catalogue_tenant_derived(s->cat, "ann"), 141);
+  assert_int_equal(catalogue_put_alignment(s->cat, &kept, "bob"), STORE_OK); /* made again, for another tenant */
+  assert_int_equal(catalogue_tenant_derived(s->cat, "ann"), 111);
+  assert_int_equal(catalogue_tenant_derived(s->cat, "bob"), 30);
+  assert_int_equal(catalogue_alignments_of(s->cat, "ann", 2, ids), 0);
+  assert_int_equal(catalogue_alignments_of(s->cat, "bob", 2, ids), 1);
+  assert_string_equal(ids[0], kept.id);
+  assert_int_equal(catalogue_delete(s->cat, RESOURCE_ALIGNMENT, kept.id), STORE_OK);
+  assert_int_equal(catalogue_tenant_derived(s->cat, "bob"), 0);
+  assert_int_equal(catalogue_tenant_bytes(s->cat, "ann"), 0); /* the quota of meshes is another one */
+  assert_int_equal(catalogue_mismatches(s->cat), 0);
+
+  usage_row used[4];
+  assert_int_equal(catalogue_usage(s->cat, "ann", "ann", 0, 4, used), 1);
+  assert_int_equal(used[0].derived, 111);
+  assert_int_equal(used[0].worker_ms, 70);
+  catalogue_add_time(s->cat, "eve", 5);
+  assert_int_equal(catalogue_disown(s->cat, RESOURCE_SUPERMESH, result.id, "ann", &gone), STORE_OK);
+  assert_int_equal(catalogue_usage(s->cat, "", NULL, 0, 4, used), 4);
+  assert_string_equal(used[1].tenant, "ann"); /* after "" */
+  assert_int_equal(used[1].derived, 0);
+  assert_int_equal(used[1].worker_ms, 70);
+  assert_string_equal(used[3].tenant, "eve");
+  assert_int_equal(used[3].worker_ms, 5);
+  assert_int_equal(catalogue_usage(s->cat, "", NULL, 3, 4, used), 1);
 }
 
 /* A tenant that requests a job owns the meshes that the job names, so their first owner can give them up. A missing
@@ -605,6 +671,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_migrations, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_migration_to_owners, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_owners, stored_setup, stored_teardown),
+      cmocka_unit_test_setup_teardown(test_derived_bytes, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_owners_of_results, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_owners_of_meshes, stored_setup, stored_teardown),
       cmocka_unit_test_setup_teardown(test_forgetting, stored_setup, stored_teardown),

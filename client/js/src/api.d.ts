@@ -641,6 +641,37 @@ export type JobPage = {
   next_page_token: string | null;
 };
 
+export type Usage = {
+  /** Empty for what was made without a token. */
+  tenant: string;
+  meshes: number;
+  /** Of its meshes and landmarks. */
+  bytes: number;
+  /** Of embeddings, supermeshes and kept alignments that its jobs made. */
+  derived_bytes: number;
+  /** Those of the caller's token; of other tenants, the least of their tokens. 0: no limit. */
+  quotas: {
+    bytes: number;
+    derived_bytes: number;
+    /** Unfinished jobs. */
+    jobs: number;
+  };
+  /** Jobs that workers have. */
+  running: number;
+  /** Other unfinished jobs, with the embeddings that supermeshes wait for. */
+  queued: number;
+  /** Time for which workers had its jobs, those that failed included. */
+  worker_seconds: number;
+  /** Processes that died at its work, until the operator clears them. */
+  crashes: number;
+};
+
+export type UsagePage = {
+  tenants: Usage[];
+  /** The value of page_token for the next page; null on the last page. */
+  next_page_token: string | null;
+};
+
 export type Live = {
   status: 'alive';
 };
@@ -1110,8 +1141,12 @@ export type ProblemQuotaExceeded = {
   status: 429;
   /** What is wrong and what to do. */
   detail: string;
-  /** The bytes of meshes and landmarks that the token's tenant may own, the unfinished jobs that it may have, or what the key of a signed URL may use in a day. */
+  /** The bytes of meshes and landmarks that the token's tenant may own, the bytes of what its jobs made, the unfinished jobs that it may have, or what the key of a signed URL may use in a day. */
   quota: number;
+  /** The bytes of what the tenant's jobs made, if that quota is exhausted. */
+  used?: number;
+  /** The bytes that the tenant's unfinished jobs will add, estimated; with `used`. */
+  pending?: number;
 };
 
 export type ProblemQueueFull = {

@@ -63,7 +63,8 @@ export class Daemon {
   async start() {
     const began = Date.now();
     this.out = '';
-    const child = spawn(binaries.daemon, ['--listen', '127.0.0.1:0', '--data', this.data, ...this.args], {
+    const [program, ...before] = this.program ?? [binaries.daemon];
+    const child = spawn(program, [...before, '--listen', '127.0.0.1:0', '--data', this.data, ...this.args], {
       stdio: ['ignore', 'pipe', 'pipe'],
       env: { ...process.env, ...this.env },
     });
@@ -203,10 +204,10 @@ export class Daemon {
   }
 }
 
-/** Starts a daemon that stops, and whose data is deleted, when the test ends. */
-export async function daemon(t, { args = [], env = {} } = {}) {
+/** Starts a daemon that stops, and whose data is deleted, when the test ends. program: what starts it, with arguments. */
+export async function daemon(t, { args = [], env = {}, program } = {}) {
   const data = await mkdtemp(path.join(tmpdir(), 'orbmorph-test-'));
-  const made = new Daemon(data, args, env);
+  const made = Object.assign(new Daemon(data, args, env), { program });
   t.after(async () => {
     if (made.child) {
       const killer = setTimeout(() => made.child.kill('SIGKILL'), STOP_MS);
