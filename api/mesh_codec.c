@@ -144,7 +144,8 @@ int api_upload_read(const api_upload_query *query, api_upload *out, api_problem 
   if (query->format) {
     out->hint = orb_format_of_name(query->format);
     if (out->hint == ORB_FORMAT_AUTO) {
-      return api_refuse(problem, "bad-query", "\"format\" must be obj, off, ply, stl, gltf or glb, or be omitted.");
+      return api_refuse(problem, "bad-query",
+                        "\"format\" must be obj, off, ply, stl, 3mf, gltf or glb, or be omitted.");
     }
   }
   return api_repair_parse(query->repair ? query->repair : "safe", query->handle_size, query->part, &out->options,

@@ -160,7 +160,11 @@ static void write_found(const orb_merge_result *result, const api_place *found, 
   size_t shapes = (size_t)result->supermesh.shape_count;
   for (int32_t l = 0; l < result->alignment.found_count; l++) {
     char name[32];
-    snprintf(name, sizeof name, "auto %d", l + 1);
+    if (result->found_names[l]) {
+      snprintf(name, sizeof name, "%s", result->found_names[l]);
+    } else {
+      snprintf(name, sizeof name, "auto %d", l + 1);
+    }
     api_json_open(out, '{');
     api_json_member_string(out, "name", name);
     api_json_key(out, "at");

@@ -4,7 +4,7 @@ orb_build_packages=(
   gcc g++ cmake ninja-build pkg-config
   libqhull-dev libmeshoptimizer-dev libdraco-dev libeigen3-dev libspectra-dev
   libcjson-dev libsodium-dev libseccomp-dev libmicrohttpd-dev libgnutls28-dev libsqlite3-dev libcurl4-openssl-dev libpng-dev libjpeg62-turbo-dev
-  zlib1g-dev libzstd-dev
+  zlib1g-dev libexpat1-dev libzstd-dev
 )
 orb_test_packages=(
   libcmocka-dev clang-format openssl sqlite3 zstd curl jq python3 binutils man-db mandoc zsh fish bsdutils chromium nginx

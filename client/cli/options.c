@@ -37,7 +37,7 @@ const cli_option cli_options[OPT_COUNT] = {
     [OPT_HANDLE_SIZE] = {"handle-size", 0, "X", NULL,
                          "longest loop that close_handles cuts along, as a fraction of the diagonal; default: 0.05"},
     [OPT_TAKE_PART] = {"take-part", 0, "PART", NULL, "keep this piece: a number from 0 by size, or a name"},
-    [OPT_FORMAT] = {"format", 0, "FORMAT", "obj off ply stl gltf glb",
+    [OPT_FORMAT] = {"format", 0, "FORMAT", "obj off ply stl 3mf gltf glb",
                     "file format; default: detected from the content"},
     [OPT_METHOD] = {"method", 0, "METHOD", "newton kernel-sampling", "embedding method"},
     [OPT_PRESET] = {"preset", 0, "PRESET", "fast default quality", "effort of the embedding"},

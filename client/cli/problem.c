@@ -90,7 +90,7 @@ const char *cli_advice(const char *type) {
       {"not-finite",
        "Some coordinates are not finite numbers or exceed 1e30. Export the mesh again, or scale it down."},
       {"malformed-mesh", "The file is damaged or truncated at the reported position. Export or download it again."},
-      {"unknown-format", "The supported formats are OBJ, OFF, PLY, STL, glTF and GLB."},
+      {"unknown-format", "The supported formats are OBJ, OFF, PLY, STL, 3MF, glTF and GLB."},
       {"too-large", "The mesh is larger than the daemon accepts. Decimate it first, or raise the daemon's limits."},
   };
   for (size_t i = 0; i < sizeof list / sizeof list[0]; i++) {

@@ -4,7 +4,7 @@ import { fileURLToPath } from 'node:url';
 import { join } from 'node:path';
 
 const here = (path: string) => fileURLToPath(new URL(path, import.meta.url));
-const isMesh = (name: string) => /\.(obj|off|ply|stl|gltf|glb)$/i.test(name);
+const isMesh = (name: string) => /\.(obj|off|ply|stl|3mf|gltf|glb)$/i.test(name);
 
 /**
  * Bundles the repository's sample meshes as assets. `virtual:samples` lists them as {name, file, bytes, url}; "Try with

@@ -350,7 +350,7 @@ static orb_corner corner_of(const orb_build *build, int64_t c) {
   return corner;
 }
 
-static float srgb_to_linear(float c) {
+float orb_srgb_to_linear(float c) {
   return c <= 0.04045f ? c / 12.92f : powf((c + 0.055f) / 1.055f, 2.4f);
 }
 
@@ -371,7 +371,7 @@ static void colors_to_linear(orb_build *build) {
       c *= scale;
     }
     c = c > 0 ? (c < 1 ? c : 1) : 0; /* NaN: 0 */
-    build->colors[i] = (i & 3) == 3 || !build->colors_are_srgb ? c : srgb_to_linear(c);
+    build->colors[i] = (i & 3) == 3 || !build->colors_are_srgb ? c : orb_srgb_to_linear(c);
   }
 }
 

@@ -64,6 +64,9 @@ ORB_MUST_CHECK orb_status orb_build_texcoord(orb_build *build, const double texc
 ORB_MUST_CHECK orb_status orb_build_corner(orb_build *build, orb_corner corner, int64_t where);
 ORB_MUST_CHECK orb_status orb_build_face_end(orb_build *build, int64_t corners);
 
+/* A channel of a colour, 0 to 1. */
+float orb_srgb_to_linear(float c);
+
 /* Gives the named material to the faces to come. */
 ORB_MUST_CHECK orb_status orb_build_use_material(orb_build *build, const unsigned char *name, size_t length);
 

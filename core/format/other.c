@@ -22,7 +22,7 @@ static const struct {
     {"DRACO", 5, "a bare Draco file; send the GLB that contains it, or decode it to PLY"},
     {"//Maya ASCII", 12, "a Maya scene; export the object as glTF or OBJ"},
     {"\xd0\xcf\x11\xe0", 4, "a 3ds Max or Office file; export the object as glTF or OBJ"},
-    {"PK\3\4", 4, "a ZIP archive, such as 3MF or USDZ; unpack it, or export the model as STL or glTF"},
+    {"PK\3\4", 4, "a ZIP archive without a 3MF model, or a cut one; unpack it, or export the model as STL or glTF"},
     {"\x1f\x8b", 2, "a gzip archive; unpack it"},
     {"7z\xbc\xaf", 4, "a 7z archive; unpack it"},
     {"Rar!", 4, "a RAR archive; unpack it"},

@@ -1,10 +1,10 @@
 /* Mesh files in, GLB and sphere PLY out.
  *
- * In: read.c detects the format and calls a reader (obj.c, off.c, ply.c with ply_header.c, stl.c, gltf.cc). Readers
- * take tokens from text.h and number.h or numbers from bytes.h, and fill an orb_build (build.h), which becomes an
- * orb_mesh. gltf.cc reads primitives; gltf_accessor.cc has their data, gltf_scene.cc the nodes, gltf_material.cc the
+ * In: read.c detects the format and calls a reader (obj.c, off.c, ply.c with ply_header.c, stl.c, 3mf.c, gltf.cc).
+ * Readers take tokens from text.h and number.h or numbers from bytes.h, and fill an orb_build (build.h), which becomes
+ * an orb_mesh. gltf.cc reads primitives; gltf_accessor.cc has their data, gltf_scene.cc the nodes, gltf_material.cc the
  * materials (with texture.c), gltf_packed.cc what is compressed, gltf_values.hh the JSON (with json_check.c). other.c
- * names files of other kinds.
+ * names files of other kinds. zip.c unpacks 3MF, xml.c parses it, 3mf.c and 3mf_*.c make objects and then a mesh of it.
  *
  * Out: gltf_write.c writes the asset, with gltf_write_material.c, and glb_text.c for the text; material_table.c says
  * what materials may have. sphere_ply.c writes a mesh with its embedding.
@@ -46,25 +46,30 @@ orb_format orb_format_of_name(const char *name) {
   return ORB_FORMAT_AUTO;
 }
 
-orb_format orb_format_detect(const unsigned char *bytes, size_t size) {
+static orb_format detect(const unsigned char *bytes, size_t size, orb_certainty *surest) {
   orb_format found = ORB_FORMAT_AUTO;
-  orb_certainty surest = ORB_NO;
-  for (int i = 0; i < READER_COUNT && size > 0 && surest < ORB_SURE; i++) {
+  *surest = ORB_NO;
+  for (int i = 0; i < READER_COUNT && size > 0 && *surest < ORB_SURE; i++) {
     orb_certainty certainty = READERS[i].is(bytes, size);
-    if (certainty > surest) {
-      surest = certainty;
+    if (certainty > *surest) {
+      *surest = certainty;
       found = READERS[i].format;
     }
   }
   return found;
 }
 
+orb_format orb_format_detect(const unsigned char *bytes, size_t size) {
+  orb_certainty surest;
+  return detect(bytes, size, &surest);
+}
+
 orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t size, orb_format format, orb_mesh *out,
                          orb_format *format_out) {
-  int automatic = format == ORB_FORMAT_AUTO;
+  orb_certainty surest = ORB_SURE;
   memset(out, 0, sizeof *out);
   if (format == ORB_FORMAT_AUTO) {
-    format = orb_format_detect(bytes, size);
+    format = detect(bytes, size, &surest);
   }
   if (format_out) {
     *format_out = format;
@@ -72,7 +77,7 @@ orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t si
   if (size == 0) {
     return orb_build_malformed(ctx, 0, 0, "The file is empty; send the bytes of a mesh file.");
   }
-  const char *other = automatic ? orb_format_other(bytes, size) : NULL;
+  const char *other = surest < ORB_SURE ? orb_format_other(bytes, size) : NULL;
   if (other) {
     return orb_fail(ctx, ORB_E_UNKNOWN_FORMAT, "This is %s.", other);
   }
@@ -81,5 +86,6 @@ orb_status orb_mesh_read(orb_context *ctx, const unsigned char *bytes, size_t si
       return READERS[i].read(ctx, bytes, size, out);
     }
   }
-  return orb_fail(ctx, ORB_E_UNKNOWN_FORMAT, "The bytes are not OBJ, OFF, PLY, STL, glTF or GLB; send one of these.");
+  return orb_fail(ctx, ORB_E_UNKNOWN_FORMAT,
+                  "The bytes are not OBJ, OFF, PLY, STL, 3MF, glTF or GLB; send one of these.");
 }

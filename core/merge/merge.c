@@ -23,6 +23,7 @@ void orb_merge_result_free(orb_context *ctx, orb_merge_result *result) {
   orb_free(ctx, result->shapes);
   orb_free(ctx, result->landmark_residuals);
   orb_free(ctx, result->found_residuals);
+  orb_free(ctx, result->found_names);
   orb_free(ctx, result->pairs);
   orb_free(ctx, result->warnings);
   orb_free(ctx, result->transforms);

@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "base/memory.h"
+#include "merge/name.h"
 #include "merge/warn.h"
 #include "numeric/vec3.h"
 
@@ -127,6 +128,21 @@ static void supermesh_position(const orb_merge_result *out, int32_t s, const orb
   }
 }
 
+static orb_status name_found(orb_context *ctx, const orb_align_shape *shapes, orb_merge_result *out) {
+  const orb_alignment *alignment = &out->alignment;
+  orb_status status = ORB_E_NO_MEMORY;
+  double *at = ORB_NEW(ctx, double, 3 * (size_t)alignment->found_count);
+  out->found_names = ORB_NEW0(ctx, const char *, alignment->found_count);
+  if (at && out->found_names) {
+    for (int32_t i = 0; i < alignment->found_count; i++) {
+      orb_place_position(shapes[0].mesh, &alignment->found[(int64_t)i * alignment->shape_count], at + 3 * (size_t)i);
+    }
+    status = orb_name_points(ctx, shapes[0].mesh, at, alignment->found_count, out->found_names);
+  }
+  orb_free(ctx, at);
+  return status;
+}
+
 orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb_merge_result *out) {
   const orb_alignment *alignment = &out->alignment;
   const orb_supermesh *supermesh = &out->supermesh;
@@ -153,7 +169,7 @@ orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb
     }
   }
   orb_locator_destroy(ctx, locator);
-  return ORB_OK;
+  return name_found(ctx, shapes, out);
 }
 
 static int32_t list_pairs(int32_t shape_count, orb_pair_report *pairs) {

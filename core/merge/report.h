@@ -8,7 +8,7 @@
 ORB_MUST_CHECK orb_status orb_report_landmarks(orb_context *ctx, const orb_align_shape *shapes,
                                                const orb_landmark *landmarks, orb_merge_result *out);
 
-/* Fills out->found_residuals. Needs out->alignment, supermesh and shapes. */
+/* Fills out->found_residuals and found_names. Needs out->alignment, supermesh and shapes. */
 ORB_MUST_CHECK orb_status orb_report_found(orb_context *ctx, const orb_align_shape *shapes, orb_merge_result *out);
 
 /* Fills out->pairs and out->warnings. Needs out->alignment and supermesh. */

@@ -12,7 +12,7 @@ _orbmorph() {
     --fit) choices="auto none rigid similarity" ;;
     --path) choices="linear rigid" ;;
     --repair) choices="safe none fill_holes largest_component split_nonmanifold close_handles" ;;
-    --format) choices="obj off ply stl gltf glb" ;;
+    --format) choices="obj off ply stl 3mf gltf glb" ;;
     --method) choices="newton kernel-sampling" ;;
     --preset) choices="fast default quality" ;;
     --state) choices="queued running succeeded failed cancelled" ;;

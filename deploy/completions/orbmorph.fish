@@ -32,7 +32,7 @@ complete -c orbmorph -n '__fish_seen_subcommand_from upload' -l name -r -d 'name
 complete -c orbmorph -n '__fish_seen_subcommand_from upload' -l repair -x -a 'safe none fill_holes largest_component split_nonmanifold close_handles' -d 'allowed repairs, separated by commas'
 complete -c orbmorph -n '__fish_seen_subcommand_from upload' -l handle-size -r -d 'longest loop that close_handles cuts along, as a fraction of the diagonal; default: 0.05'
 complete -c orbmorph -n '__fish_seen_subcommand_from upload' -l take-part -r -d 'keep this piece: a number from 0 by size, or a name'
-complete -c orbmorph -n '__fish_seen_subcommand_from upload' -l format -x -a 'obj off ply stl gltf glb' -d 'file format; default: detected from the content'
+complete -c orbmorph -n '__fish_seen_subcommand_from upload' -l format -x -a 'obj off ply stl 3mf gltf glb' -d 'file format; default: detected from the content'
 complete -c orbmorph -n __fish_use_subcommand -f -a embed -d 'Embed meshes (ids, files or URLs) on the sphere'
 complete -c orbmorph -n '__fish_seen_subcommand_from embed' -l server -s s -r -d 'address of the daemon, or unix:PATH; default: $ORBMORPH_SERVER or http://127.0.0.1:8080'
 complete -c orbmorph -n '__fish_seen_subcommand_from embed' -l json -d 'print the daemon\'s JSON'

@@ -79,7 +79,7 @@ class Bench:
     def shared(self):
         """Every usable mesh of the collection: its path, and its newton run or None."""
         found = [p for kind in ("good", "weldable") for p in sorted((self.meshes / kind).glob("*"))
-                 if p.suffix in (".obj", ".off", ".ply", ".stl", ".glb", ".gltf")]
+                 if p.suffix in (".obj", ".off", ".ply", ".stl", ".3mf", ".glb", ".gltf")]
         runs = [(p, self.lines_of("orbmorph-bench", "embed", "--repair", "largest_component", p)) for p in found]
         return [(p, lines[0] if lines else None) for p, lines in runs]
 

@@ -87,7 +87,7 @@ inside su -s /bin/sh orbmorph -c 'orbmorphd --check-data --data /var/lib/orbmorp
 inside apt-get install -qq -y --no-install-recommends /root/liborbmorph1.deb /root/liborbmorph-dev.deb gcc libc6-dev pkg-config \
   >"$at/install.log" 2>&1 || { cat "$at/install.log"; exit 1; }
 inside sh -c 'cc -std=c17 /usr/share/doc/liborbmorph-dev/morph.c $(pkg-config --cflags --libs orbmorph) -o /root/morph'
-inside apt-get purge -qq -y liborbmorph-dev libqhull-dev libcjson-dev libmeshoptimizer-dev libdraco-dev >"$at/remove.log" 2>&1
+inside apt-get purge -qq -y liborbmorph-dev libqhull-dev libcjson-dev libmeshoptimizer-dev libdraco-dev zlib1g-dev libexpat1-dev >"$at/remove.log" 2>&1
 inside apt-get autoremove -qq -y >>"$at/remove.log" 2>&1
 inside /root/morph /root/dog.obj /root/giraffe.off >"$at/library.glb"
 [ "$(head -c 4 "$at/library.glb")" = glTF ]

@@ -1,7 +1,8 @@
 // deploy/demo.sh as a newcomer calls it: from another folder, with blanks in file names.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { copyFile, mkdir, mkdtemp, readFile, readdir, rm, stat, symlink } from 'node:fs/promises';
+import { chmod, copyFile, mkdir, mkdtemp, readFile, readdir, rm, stat, symlink, writeFile } from 'node:fs/promises';
+import { connect, createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import test from 'node:test';
@@ -67,6 +68,37 @@ test('the demo takes files as arguments', { skip }, async (t) => {
   const bad = await demo(['my dog.obj', 'nowhere.obj'], { cwd });
   assert.equal(bad.code, 2);
   assert.match(bad.err, /nowhere\.obj/);
+});
+
+/** Whether something listens at the port of all examples. */
+const isTaken = () =>
+  new Promise((resolve) => {
+    const socket = connect(8080, '127.0.0.1', () => {
+      socket.destroy();
+      resolve(true);
+    });
+    socket.on('error', () => resolve(false));
+  });
+
+test('the demo says what the build does, and prefers port 8080', { skip }, async (t) => {
+  // a build that takes six seconds, as Ninja reports it
+  const tools = await mkdtemp(path.join(tmpdir(), 'orbmorph-tools-'));
+  t.after(() => rm(tools, { recursive: true, force: true }));
+  await writeFile(path.join(tools, 'cmake'), '#!/bin/sh\necho "[3/7] Building C object a.o"\nexec sleep 6\n');
+  await chmod(path.join(tools, 'cmake'), 0o755);
+  const taken = await isTaken();
+  const { code, out, err } = await demo([], { cwd: '/', env: { PATH: `${tools}:${process.env.PATH}` } });
+  assert.equal(code, 0, err);
+  assert.match(out, /^building in .*\n {2}building: 3 of 7 \(\d+ s\)$/m);
+  const port = Number(/^morphing .* at http:\/\/127\.0\.0\.1:(\d+)$/m.exec(out)[1]);
+  if (!taken && port !== 8080) assert.ok(await isTaken(), `port ${port}, and 8080 was free`);
+  // where it is taken, any other
+  const holder = createServer();
+  await new Promise((resolve) => holder.on('error', resolve).listen(8080, '127.0.0.1', resolve));
+  t.after(() => holder.close());
+  const other = await demo([], { cwd: '/' });
+  assert.equal(other.code, 0, other.err);
+  assert.match(other.out, /^morphing .* at http:\/\/127\.0\.0\.1:(?!8080$)\d+$/m);
 });
 
 test('the demo can leave the daemon running', { skip }, async () => {

@@ -1,4 +1,4 @@
-// Files as people have them: compressed and quantized glTF, and files of other kinds, which the refusal names.
+// Files as people have them: compressed and quantized glTF, 3MF, and files of other kinds, which the refusal names.
 import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
@@ -126,6 +126,88 @@ test('Draco-compressed glTF is read, and damaged data is refused', { skip: !exis
     assert.ok([200, 201, 400, 413, 422].includes((await d.upload(damaged)).status), `damage ${k}`);
   }
   assertProblem(await d.upload(glb.subarray(0, at + length / 2)), 400, 'malformed-mesh');
+});
+
+// A box of 1 × 2 × 3 cm in two materials, in a component that doubles it and moves it by 5 cm: written by lib3mf 1.8.1.
+const boxOfLib3mf = Buffer.from(
+  [
+    'UEsDBC0AAAAIAAAAAACWewfy//////////8QABQAM0QvM2Rtb2RlbC5tb2RlbAEAEACQCAAAAAAAAPMCAAAAAAAAlVbLbtswEDwnX0GwZ0YvUh',
+    'INOkGKIkCBHgoU+QCSohMVkmhItOH067uk5GecxLYBO5Jmdmdn18uIh03boLXph9p2c5zcxRiZTtuq7l7meOUWpMQP97eitZVpEGC7YY5fnVvO',
+    'omjQr6aVw11b694OduHutG2jrGplt1pI7VY9BIm07U2UxgmL4hSjVVe7Odamc3VrnOmxjzlrpM9mOvL8J9zohll7ZZpWQrRaNvtUQexseWWcZW',
+    '+rlXbgxhQp3ypSV0ZSRraNdK7Wof4i1D+KutbDoZmCgIkFvr+9Eb0Z7KrXZoCLG6HkAJ0YDRhQXUEjPWp6gjrZmjn+/esRo6oelo1807ax/Rx/',
+    'e3oqY//CKHqHf/wOzTjBe+zT0w4voqPMQYtVf412QQT0e0yt7AYj97YEFWGQMFrOnp9//pjjWOasYKUmVVZQQhnlhJdckySnjJd5wvKMAXosCb',
+    '67ymyANVXXmuE16L4RMMLe6eCHL9xfmw0KYPTmKehf+BwLPULA1IcXvgqY7lgfBoakkPpi4Kgx28W9TOrl+CMhn9LOCH+HF9Gx58LB7697afY9',
+    '2N5A6yRYv07BDIzWmZ/PfVPHh7tiz7GykQXk3Sh8xqIAh1wwOT4X/IKvYQHcs4oLWWCVzwUFedbhsH6mcGJNCkHvRQp9kr2HJ3XBw/MeTqyprh',
+    'OFH7J8oyDX5PyJG1+xAH7G+Q9ZPgnk8qaAhydufMXyzX7frz1LRNuJGpeDiLZrQ0TjsjrdWyDn7LIq5IJlclEQEytFaJJWsKxS/5dM8zJhJi/0',
+    'tJngJFzaDo65aSGJ3Q005vQbDSx2veyGhe3huEtRHN77b+avYTSmXZlLzrnkCUnVoiSUa0p4RSlhCpZkasqEUkCPMyDg3D1UcFCqiA4PD6FWdV',
+    'PtciQs1YylJSljmRCqDSOqyBOic5VUVcaNgVM8+FU70x7UAp5tdRZxkVJZcFJQXhGackVkyRihhutEySKnsRp1wvnhs8P/F1E4F+5v/wNQSwME',
+    'LQAAAAgAAAAAAKEKeAj//////////xMAFABbQ29udGVudF9UeXBlc10ueG1sAQAQAFECAAAAAAAA6wAAAAAAAACdUk1KxTAQXttThGylTVUQkb',
+    'Zvod7AC4R0+qPJJCTTR72901YeKNaCy8nM90uq0+ysOENMo8da3hSlFIDGtyP2tZyoyx/kqcmq148ASfAtploOROFRqWQGcDoVPgDypvPRaeIx',
+    '9ipo8657ULdlea+MRwKknBYO2WRX1TN0erIkXmZebMpvAXopnrbTRa2Wo1sotoXahf0H5XwL9oeaDsGORhP3oM7YFi7lXymKu9ZpnDptaIrcS8',
+    '7zQnDNoaXYcxbwd2fr+x4ogk0Hvr63ffHIyNV7GsaQ/nZGMHMQONA5zn/h4TSVWn9Ik30CUEsDBC0AAAAIAAAAAAA+zaVO//////////8LABQA',
+    'X3JlbHMvLnJlbHMBABAACAEAAAAAAACyAAAAAAAAAGWPzQrCMBCEz/Ypwt7tthZExLQXL16lLxDS7Q82PySp6Nu7goLF487MfsycmoeZxZ1CnJ',
+    'yVUOYFCLLadZMdJCyp3x6gqbPTlWaVOBLHyUfBPzZKGFPyR8SoRzIq5s6TZad3wajEZxjQK31TA+GuKPYYfhlQZ5sVVbRPT39MM+ngoutTrp3B',
+    'qjPKLr3SaQlckLFlhUX51l1HM4hWhYGSBKzOXzH/WJdOAjfgfch7cDWozl5QSwECLQAtAAAACAAAAAAAlnsH8v//////////EAAcAAAAAAAAAI',
+    'AAAAD/////M0QvM2Rtb2RlbC5tb2RlbAEAGACQCAAAAAAAAPMCAAAAAAAAAAAAAAAAAABQSwECLQAtAAAACAAAAAAAoQp4CP//////////EwAc',
+    'AAAAAAAAAIAAAAD/////W0NvbnRlbnRfVHlwZXNdLnhtbAEAGABRAgAAAAAAAOsAAAAAAAAANQMAAAAAAABQSwECLQAtAAAACAAAAAAAPs2lTv',
+    '//////////CwAcAAAAAAAAAIAAAAD/////X3JlbHMvLnJlbHMBABgACAEAAAAAAACyAAAAAAAAAGUEAAAAAAAAUEsGBiwAAAAAAAAALQAtAAAA',
+    'AAAAAAAAAwAAAAAAAAADAAAAAAAAAAwBAAAAAAAAVAUAAAAAAABQSwYHAAAAAGAGAAAAAAAAAQAAAFBLBQYAAAAAAwADAAwBAAD/////AAA=',
+  ].join(''),
+  'base64',
+);
+
+test('3MF is read: units, placement and materials of the file, by whichever program wrote it', async (t) => {
+  const d = await daemon(t);
+  const { status, json: box } = await d.upload(boxOfLib3mf);
+  assert.equal(status, 201, JSON.stringify(box));
+  assert.deepEqual([box.format, box.vertices, box.triangles], ['3mf', 8, 12]);
+  near(box.volume, 8 * 6000, 1e-12, 'cubic millimetres');
+  assert.deepEqual(box.bounds, { min: [50, 0, 0], max: [70, 40, 60] });
+
+  // the same shape in inches, as the OBJ in millimetres
+  const egg = shapes.egg();
+  const plain = (await d.upload(shapes.obj(egg))).json;
+  const inches = (await d.upload(shapes.threeMf(egg, 'inch'))).json;
+  assert.deepEqual([inches.triangles, inches.topology], [plain.triangles, plain.topology]);
+  near(inches.volume, 25.4 ** 3 * plain.volume, 1e-12, 'volume');
+
+  // a morph has the materials of its first shape
+  const { id } = (await d.upload(shapes.obj(shapes.ball(3)))).json;
+  const made = await d.made('/v1/supermeshes', {
+    shapes: [{ mesh: box.id }, { mesh: id }],
+    align: { method: 'rotate' },
+    remesh: { tolerance: 0.02 },
+  });
+  const glb = Buffer.from(await (await fetch(d.url + made.asset)).arrayBuffer());
+  const asset = JSON.parse(glb.subarray(20, 20 + glb.readUInt32LE(12)).toString());
+  assert.deepEqual(asset.materials.map(({ name }) => name).sort(), ['ABS', 'PLA']);
+  const pla = asset.materials.find(({ name }) => name === 'PLA').pbrMetallicRoughness.baseColorFactor;
+  // 128 of 255 in sRGB
+  for (const [k, linear] of [1, ((128 / 255 + 0.055) / 1.055) ** 2.4, 0, 1].entries())
+    assert.ok(Math.abs(pla[k] - linear) < 1e-4, `${pla}`);
+});
+
+test('3MF that is damaged, or made to cost much, is refused', async (t) => {
+  const d = await daemon(t);
+  const whole = shapes.threeMf(shapes.egg());
+  for (let k = 0; k < 30; k++) {
+    const damaged = Buffer.from(whole);
+    damaged[Math.floor((k * whole.length) / 30)] ^= 0xa5;
+    assert.ok([200, 201, 400, 413, 415, 422].includes((await d.upload(damaged)).status), `damage ${k}`);
+  }
+  assertProblem(await d.upload(whole.subarray(0, whole.length / 2), { format: '3mf' }), 400, 'malformed-mesh');
+  const xml = shapes.xmlOf3mf(shapes.egg());
+  const bombs = [
+    [xml.replace('<build>', `${' '.repeat(2e7)}<build>`), 413, 'too-large', /unpacks to more/],
+    [xml.replace('<build>', `<build>${'<item objectid="1"/>'.repeat(2000)}`), 413, 'too-large', /justifies/],
+    [xml.replace('<model', '<!DOCTYPE model [<!ENTITY a "b">]><model'), 400, 'malformed-mesh', /document type/],
+    [xml.replace('<build>', '<a>'.repeat(100)), 400, 'malformed-mesh', /nests deeper/],
+  ];
+  for (const [model, status, problem, detail] of bombs) {
+    const reply = await d.upload(shapes.package3mf(model));
+    assertProblem(reply, status, problem, String(detail));
+    assert.match(reply.json.detail, detail);
+  }
 });
 
 test('files of other kinds are refused by name, with advice', async (t) => {

@@ -59,15 +59,16 @@ test('a mesh has the area, volume and bounds of its surface', async (t) => {
 test('every format is detected by its content', async (t) => {
   const d = await daemon(t);
   const m = ball(2);
-  const files = {
-    obj: obj(m),
-    off: shapes.off(m),
-    ply: shapes.binaryPly(m),
-    stl: shapes.binaryStl(m),
-    gltf: writeGltf(m),
-    glb: writeGlb(m),
-  };
-  for (const [format, bytes] of Object.entries(files)) {
+  const files = [
+    ['obj', obj(m)],
+    ['off', shapes.off(m)],
+    ['ply', shapes.binaryPly(m)],
+    ['stl', shapes.binaryStl(m)],
+    ['3mf', shapes.threeMf(m)],
+    ['gltf', writeGltf(m)],
+    ['glb', writeGlb(m)],
+  ];
+  for (const [format, bytes] of files) {
     const reply = await d.upload(bytes, { name: 'misleading.xyz' });
     assert.equal(reply.status, 201, `${format}: ${reply.bytes}`);
     assert.equal(reply.json.format, format);

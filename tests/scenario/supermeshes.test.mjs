@@ -112,6 +112,16 @@ test('two animals with landmarks, from requests to the asset', async (t) => {
   assert.notEqual(swapped.id, supermesh.id, 'the order of shapes belongs to the identity');
 });
 
+/** Where the limbs of the standing dog are. */
+const LIMBS = {
+  head: (x, y) => x > 0.8 && y > 1,
+  tail: (x, y) => x < -0.8 && y > 0.6,
+  'left front limb': (x, y, z) => x > 0 && y < 0.4 && z < 0,
+  'right front limb': (x, y, z) => x > 0 && y < 0.4 && z > 0,
+  'left hind limb': (x, y, z) => x < 0 && y < 0.4 && z < 0,
+  'right hind limb': (x, y, z) => x < 0 && y < 0.4 && z > 0,
+};
+
 test('correspondence without landmarks', async (t) => {
   const d = await daemon(t);
   const pair = await animals(d, 'dog.obj', 'elephant.ply');
@@ -121,8 +131,16 @@ test('correspondence without landmarks', async (t) => {
   await check(d, absent.resource, sources);
   const found = absent.resource.landmarks;
   assert.equal(found.length, 12);
+  const words = new Set();
   found.forEach((l, i) => {
-    assert.equal(l.name, `auto ${i + 1}`);
+    if (!LIMBS[l.name]) assert.equal(l.name, `auto ${i + 1}`);
+    else {
+      // the dog looks along x and stands along y, so its left is −z
+      const corners = sources[0].triangles[l.at[0].triangle].map((v) => sources[0].positions[v]);
+      const [x, y, z] = [0, 1, 2].map((k) => corners.reduce((sum, p, i) => sum + p[k] * l.at[0].barycentric[i], 0));
+      assert.ok(LIMBS[l.name](x, y, z), `${l.name} at ${x}, ${y}, ${z}`);
+      words.add(l.name);
+    }
     assert.equal(l.at.length, 2);
     assert.ok(l.confidence >= 0 && l.confidence <= 1, `${l.name}: ${l.confidence}`);
     for (const [s, place] of l.at.entries()) {
@@ -132,6 +150,7 @@ test('correspondence without landmarks', async (t) => {
       assert.ok(l.residual_relative[s] < 0.01, `${l.name}: ${l.residual_relative}`);
     }
   });
+  assert.ok(words.size >= 4, `limbs have words: ${[...words]}`);
   if (!slow) {
     const exact = await d.made('/v1/supermeshes', { shapes: pair, remesh: { method: 'overlay' } });
     assert.deepEqual(

@@ -88,6 +88,8 @@ test('upload, landmarks, morph and export by the keyboard alone', async () => {
   await kept('the morph');
   await tabTo(page, /^Use it$/);
   await page.keyboard.press('Enter');
+  // a Tab before the dialog is open would still move the focus to which the dialog returns it
+  await until(async () => (await page.locator('dialog[open]').count()) === 1, 'the drawer opens');
   await tabTo(page, /^GLB$/);
   const saving = page.waitForEvent('download');
   await page.keyboard.press('Enter');

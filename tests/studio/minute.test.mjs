@@ -21,7 +21,7 @@ import {
 import { morphOf } from '../scenario/support/glb.mjs';
 import { writeGlb } from '../scenario/support/glb_write.mjs';
 import { readPng, writePng } from '../scenario/support/png.mjs';
-import { ball } from '../scenario/support/shapes.mjs';
+import { ball, threeMf } from '../scenario/support/shapes.mjs';
 
 /** Pixels of a shape on the first page: they are more saturated than its background. */
 const vivid = (r, g, b) => Math.max(r, g, b) - Math.min(r, g, b) > 70;
@@ -285,9 +285,21 @@ function strips() {
   return { name: 'strips.ply', mimeType: 'text/plain', buffer: Buffer.from(text), triangles: 2 * around * (rings - 1) };
 }
 
-test('what only the daemon can read is shown as the daemon has it', async () => {
+/** An egg in 3MF, in inches. */
+function threeMfFile() {
+  const { positions, triangles } = ball(3);
+  const egg = { positions: positions.map(([x, y, z]) => [1.4 * x, y, 0.8 * z]), triangles };
+  return { name: 'egg.3mf', mimeType: 'model/3mf', buffer: threeMf(egg, 'inch'), triangles: triangles.length };
+}
+
+for (const [kind, make] of [
+  ['PLY of strips', strips],
+  ['3MF', threeMfFile],
+])
+  test(`what only the daemon can read is shown as the daemon has it: ${kind}`, () => shownByDaemon(make()));
+
+async function shownByDaemon({ triangles, ...file }) {
   const { page, done } = await openPage(browser, daemon.url);
-  const { triangles, ...file } = strips();
   await page.locator('input[type=file]').first().setInputFiles([file]);
   await until(() => page.locator('.card.ready').count(), 'the daemon accepts it');
   await until(
@@ -299,7 +311,7 @@ test('what only the daemon can read is shown as the daemon has it', async () => 
   const tinted = (r, g, b) => r - b > 40 && r > g;
   await until(async () => (await countPixels(page, '.pane-view', tinted)) > 5000, 'it is drawn');
   await done();
-});
+}
 
 /** A ball whose texture is red on its upper half and green on its lower one, and one of blue vertices. */
 function dressed() {

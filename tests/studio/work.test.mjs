@@ -310,6 +310,75 @@ test('morph with landmarks, scrub, mix, wireframe, download', async () => {
   await done();
 });
 
+test('side by side, the morph moves between its shapes under one camera', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  await addFiles(page, sample('dog.obj'), sample('giraffe.off'));
+  await button(page, 'Landmarks').click();
+  await page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
+  await until(() => landmarks(page).count(), 'the landmarks of the samples are read');
+  await morph(page);
+  await button(page, 'Pause').click();
+  await button(page, 'Side by side').click();
+  await until(async () => (await page.locator('.pane').count()) === 3, 'three views');
+  assert.deepEqual(await page.locator('.pane .caption strong').allInnerTexts(), ['dog', 'Morph', 'giraffe']);
+  /** The three views without their captions. */
+  const views = async () => {
+    await settled(page);
+    const boxes = await page
+      .locator('.pane-view')
+      .evaluateAll((all) => all.map((e) => e.getBoundingClientRect().toJSON()));
+    const width = Math.floor(Math.min(...boxes.map((box) => box.width))) - 4;
+    const shot = ({ x, y, height }) =>
+      page.screenshot({
+        clip: { x: Math.round(x) + 2, y: Math.round(y) + 44, width, height: Math.floor(height) - 48 },
+      });
+    return [await shot(boxes[0]), await shot(boxes[1]), await shot(boxes[2])];
+  };
+  const apart = (a, b) => difference(browser, a, b);
+  await seek(page, 0);
+  const start = await views();
+  assert.ok((await apart(start[0], start[1])) < 0.01, 'at its start the morph is the first shape');
+  assert.ok((await apart(start[1], start[2])) > 0.03, 'and not the second');
+  await seek(page, 1);
+  const end = await views();
+  assert.ok((await apart(end[1], end[2])) < 0.01, 'at its end it is the second shape');
+  assert.ok((await apart(end[0], start[0])) < 0.002 && (await apart(end[2], start[2])) < 0.002, 'the shapes stay');
+  await seek(page, 0.5);
+  const middle = await views();
+  assert.ok((await apart(middle[1], start[0])) > 0.01 && (await apart(middle[1], end[2])) > 0.01, 'between both');
+  await page.locator('.pane-view').nth(1).focus();
+  for (let i = 0; i < 5; i++) await page.keyboard.press('ArrowLeft');
+  await page.getByRole('slider', { name: 'Along the morph' }).focus(); // so that no view has a ring
+  const turned = await views();
+  for (const k of [0, 1, 2]) assert.ok((await apart(turned[k], middle[k])) > 0.01, `view ${k} has rotated`);
+  await until(() => page.url().includes('show=beside'), 'the address says so');
+  await page.reload();
+  await until(async () => (await page.locator('.pane').count()) === 3, 'three views after a reload');
+  await done();
+});
+
+test('a fit that turns a shape over is said', async () => {
+  const { page, done } = await openPage(browser, daemon.url);
+  const [dog, giraffe] = [await readFile(sample('dog.obj')), await readFile(sample('giraffe.off'), 'latin1')];
+  // by half a turn about x: what was up is down
+  const over = giraffe.replace(/^(-?[\d.]+) (-?[\d.]+) (-?[\d.]+)$/gm, (line, x, y, z) =>
+    /\./.test(line) ? `${x} ${-y} ${-z}` : line,
+  );
+  assert.notEqual(over, giraffe);
+  await addFiles(
+    page,
+    { name: 'dog.obj', mimeType: 'text/plain', buffer: dog },
+    { name: 'giraffe.off', mimeType: 'text/plain', buffer: Buffer.from(over, 'latin1') },
+  );
+  await button(page, 'Landmarks').click();
+  await page.getByLabel('Landmark file').setInputFiles(sample('dog-giraffe.json'));
+  await until(() => landmarks(page).count(), 'the landmarks of the samples are read');
+  await morph(page);
+  const said = await page.getByRole('list', { name: 'Shapes that the fit turned over' }).innerText();
+  assert.match(said, /The fit turned giraffe over: its up axis by 1[67]\d°/);
+  await done();
+});
+
 test('a reload and the URL alone restore the same state', async () => {
   const first = await openPage(browser, daemon.url);
   await addFiles(first.page, sample('dog.obj'), sample('giraffe.off'));
@@ -607,6 +676,9 @@ test('what is on the server is listed and opened', async () => {
   const { page, done } = await openPage(browser, daemon.url);
   await button(page, 'On the server', { exact: true }).click();
   await button(page, 'Add dog').first().waitFor();
+  const listed = await page.locator('dialog .item strong').allInnerTexts();
+  assert.ok(listed.includes('dog → giraffe') && listed.includes('giraffe'), listed.join(', '));
+  assert.ok(!listed.some((text) => /^[0-9a-f]{6,}/.test(text)), `names, no ids: ${listed.join(', ')}`);
   await page.locator('.list .item', { hasText: '→' }).first().click();
   await until(() => button(page, /^(Play|Pause)$/).count(), 'the morph opens');
   await done();

@@ -28,7 +28,7 @@ PLACES = {
         "api/openapi.json": '"?"', "api/mesh_codec.c": "?", "client/cli/options.c": "?", "deploy/man/orbmorph.1": " ? ",
         "client/js/src/api.d.ts": "'?'", "client/js/example/index.html": ".?", "client/web/vite.config.ts": "?",
         "client/web/src/ui/files.tsx": ".?", "tests/bench/report.py": '".?"', "tests/fuzz/CMakeLists.txt": "?",
-        "tests/fuzz/run.sh": "?", "tests/scenario/meshes.test.mjs": " ?: "},
+        "tests/fuzz/run.sh": "?", "tests/scenario/meshes.test.mjs": "'?', "},
     "alignment method": {
         "api/supermesh_request.c": '"?"', "api/openapi.json": '"?"', "client/cli/options.c": "?",
         "client/js/src/api.d.ts": "'?'", "client/web/src/state.ts": "'?'", "client/web/src/url.ts": "'?'",

@@ -17,7 +17,7 @@ export type Mesh = {
   /** 1 to 127 bytes of UTF-8. */
   name: string;
   /** The format, as determined from the content. */
-  format: 'obj' | 'off' | 'ply' | 'stl' | 'gltf' | 'glb';
+  format: 'obj' | 'off' | 'ply' | 'stl' | '3mf' | 'gltf' | 'glb';
   /** The size of the uploaded file. */
   bytes: number;
   /** The count after repairs. */
@@ -557,7 +557,7 @@ export type FetchRequest = {
   /** 1 to 127 bytes of UTF-8 without control characters. Default: "mesh". */
   name?: string;
   /** The format to assume if the content does not determine it. */
-  format?: 'obj' | 'off' | 'ply' | 'stl' | 'gltf' | 'glb';
+  format?: 'obj' | 'off' | 'ply' | 'stl' | '3mf' | 'gltf' | 'glb';
   /** As of an upload. Default: "safe". */
   repair?: string;
   /** As of an upload. */

@@ -135,7 +135,7 @@ export interface State {
   playing: boolean;
   motion: Motion;
   mix: number[] | null;
-  show: 'morph' | 'each' | 'error';
+  show: 'morph' | 'beside' | 'each' | 'error';
   wire: boolean;
   /** wireframe of the common mesh on each shape, separate because that view is about its triangles */
   meshWire: boolean;

@@ -165,7 +165,7 @@ export async function restore() {
     if (state.result && query.get('side') === 'after') set({ side: 'after' });
     if (TABS.includes(tab) && state.shapes.length) set({ tab });
     const show = query.get('show');
-    if (state.result && (show === 'each' || show === 'error')) set({ show });
+    if (state.result && (show === 'beside' || show === 'each' || show === 'error')) set({ show });
   } finally {
     restoring = false;
   }

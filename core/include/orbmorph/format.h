@@ -1,4 +1,4 @@
-/* Mesh files: reading OBJ, OFF, PLY, STL and glTF/GLB from memory, and writing the binary sphere PLY.
+/* Mesh files: reading OBJ, OFF, PLY, STL, 3MF and glTF/GLB from memory, and writing the binary sphere PLY.
  *
  * The content decides the format; a file name plays no part. Readers are linear in the size of the file, trust no count
  * of a header before the bytes are there, and allocate at most a small multiple of the file's size.

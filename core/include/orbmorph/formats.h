@@ -9,6 +9,7 @@
 
 #define ORB_FORMATS(FORMAT)     \
   FORMAT(GLB, 6, glb, "glb")    \
+  FORMAT(3MF, 7, 3mf, "3mf")    \
   FORMAT(PLY, 3, ply, "ply")    \
   FORMAT(GLTF, 5, gltf, "gltf") \
   FORMAT(OFF, 2, off, "off")    \

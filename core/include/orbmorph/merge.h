@@ -77,6 +77,9 @@ typedef struct orb_merge_result {
   /* found_count × shape_count: for each found landmark, the distance from its place to the point of the supermesh
    * that lies at the landmark's point on the sphere. */
   double *found_residuals;
+  /* found_count: what a found landmark lies on, where the geometry of the first shape says it: "head", "tail",
+   * "left front limb" and so on, literals; NULL: not clear. No name occurs twice. */
+  const char **found_names;
   int32_t pair_count;
   orb_pair_report *pairs;
   int32_t warning_count;

@@ -42,12 +42,12 @@ typedef struct orb_object {
 /* A mesh. The context owns all arrays; optional ones are NULL where the file has none. */
 typedef struct orb_mesh {
   int32_t vertex_count, triangle_count;
-  double *positions;  /* 3 a vertex, in units of the file: exactly the doubles that were parsed */
+  double *positions;  /* 3 a vertex, in units of the file (3MF: in millimetres): exactly the doubles that were parsed */
   int32_t *triangles; /* 3 a triangle, counter-clockwise seen from outside */
 
   /* The numbers of the file. Vertices: in OBJ, OFF and PLY file order; in STL 3·facet + corner; in glTF the POSITION
-   * accessors of all triangle primitives one after another. Triangles: file order, after polygons are cut into
-   * triangles. */
+   * accessors of all triangle primitives one after another; in 3MF the meshes that the build shows, one after another.
+   * Triangles: file order, after polygons are cut into triangles. */
   int32_t file_vertex_count, file_triangle_count;
   int32_t *source;           /* of each vertex: the lowest-numbered vertex of the file that it stands for */
   int32_t *vertex_of_source; /* file_vertex_count: the vertex that stands for it, −1 if dropped */
@@ -68,7 +68,7 @@ typedef struct orb_mesh {
   int32_t repair_count;
   orb_repair repairs[ORB_REPAIR_KINDS_MAX];
   int32_t object_count, handle_count, loop_vertex_count;
-  orb_object *objects; /* OBJ: o, or g where there is no o; glTF: meshes; NULL: the file names none */
+  orb_object *objects; /* OBJ: o, or g where there is no o; glTF: meshes; 3MF: objects; NULL: the file names none */
   orb_handle *handles; /* in the order in which they were closed */
   int32_t *loop_vertices;
 } orb_mesh;

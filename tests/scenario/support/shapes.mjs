@@ -1,4 +1,5 @@
 // Small meshes made by hand, good and bad, as text of OBJ files.
+import { deflateRawSync } from 'node:zlib';
 
 export const tetrahedron = 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n';
 
@@ -84,6 +85,66 @@ export function apart(a, b, shift = 10) {
     triangles: [...a.triangles, ...b.triangles.map((t) => t.map((v) => v + n))],
   };
 }
+
+/** The sum that ends each file of a ZIP archive, as PNG and Ethernet have it. */
+function crc32(bytes) {
+  let sum = -1;
+  for (const byte of bytes) {
+    sum ^= byte;
+    for (let k = 0; k < 8; k++) sum = (sum >>> 1) ^ (sum & 1 ? 0xedb88320 : 0);
+  }
+  return ~sum >>> 0;
+}
+
+/** A ZIP archive of files by name; texts and bytes are deflated. */
+export function zip(files) {
+  const bodies = [];
+  const directory = [];
+  let at = 0;
+  for (const [name, content] of Object.entries(files)) {
+    const bytes = Buffer.from(content);
+    const packed = deflateRawSync(bytes);
+    const common = Buffer.alloc(26);
+    [20, 0x800, 8, 0, 0].forEach((value, i) => common.writeUInt16LE(value, 2 * i));
+    [crc32(bytes), packed.length, bytes.length].forEach((value, i) => common.writeUInt32LE(value, 10 + 4 * i));
+    common.writeUInt16LE(Buffer.byteLength(name), 22);
+    const tail = Buffer.alloc(14);
+    tail.writeUInt32LE(at, 10);
+    bodies.push(Buffer.from('PK\x03\x04'), common, Buffer.from(name), packed);
+    directory.push(Buffer.from('PK\x01\x02\x14\0'), common, tail, Buffer.from(name));
+    at += 30 + Buffer.byteLength(name) + packed.length;
+  }
+  const end = Buffer.alloc(22);
+  end.write('PK\x05\x06');
+  [8, 10].forEach((offset) => end.writeUInt16LE(Object.keys(files).length, offset));
+  end.writeUInt32LE(Buffer.concat(directory).length, 12);
+  end.writeUInt32LE(at, 16);
+  return Buffer.concat([...bodies, ...directory, end]);
+}
+
+export const xmlOf3mf = ({ positions, triangles }, unit = 'millimeter', transform = '1 0 0 0 1 0 0 0 1 0 0 0') =>
+  `<?xml version="1.0" encoding="UTF-8"?>
+<model unit="${unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
+<resources><object id="1" type="model"><mesh><vertices>
+${positions.map(([x, y, z]) => `<vertex x="${x}" y="${y}" z="${z}"/>`).join('\n')}
+</vertices><triangles>
+${triangles.map(([a, b, c]) => `<triangle v1="${a}" v2="${b}" v3="${c}"/>`).join('\n')}
+</triangles></mesh></object></resources>
+<build><item objectid="1" transform="${transform}"/></build>
+</model>`;
+
+export const package3mf = (xml) =>
+  zip({
+    '[Content_Types].xml': `<?xml version="1.0"?><Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
+<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>`,
+    '_rels/.rels': `<?xml version="1.0"?><Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Id="r" Target="/3D/3dmodel.model" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
+</Relationships>`,
+    '3D/3dmodel.model': xml,
+  });
+
+export const threeMf = (...args) => package3mf(xmlOf3mf(...args));
 
 /** Every triangle with vertices of its own, as in an STL file. */
 export function soup({ positions, triangles }) {

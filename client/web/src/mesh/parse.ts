@@ -1,7 +1,7 @@
 /**
- * Reads mesh files for display: OBJ, OFF, PLY, STL, glTF and GLB. Vertices have the same numbers as in the daemon: OBJ,
- * OFF and PLY in file order, STL 3·facet + corner, glTF the POSITION accessors of all triangle primitives one after
- * another. The reader is lenient and shows what it can; the daemon decides what is a mesh.
+ * Reads mesh files for display, all but 3MF and compressed glTF, which only the daemon reads. Vertices have the same
+ * numbers as in the daemon: OBJ, OFF and PLY in file order, STL 3·facet + corner, glTF the POSITION accessors of all
+ * triangle primitives one after another. The reader is lenient and shows what it can; the daemon decides what is a mesh.
  */
 import { dressOf, plyDress, tried, type Dress } from './dress';
 import { readGlb, type Gltf } from './gltf';
@@ -435,6 +435,7 @@ function drawable(raw: RawMesh): RawMesh {
 export function parseMesh(buffer: ArrayBuffer): RawMesh {
   const bytes = new Uint8Array(buffer);
   const head = ascii(bytes, 0, Math.min(512, bytes.length)).trimStart();
+  if (head.startsWith('PK')) throw new Error('Only the daemon reads 3MF.');
   if (head.startsWith('glTF')) return drawable(parseGltf(readGlb(buffer), 'glb'));
   if (head.startsWith('ply')) return drawable(parsePly(bytes));
   if (/^(ST|C|N|4|n)*OFF\b/.test(head)) return drawable(parseOff(bytes));

@@ -1,5 +1,5 @@
 /** Drawers on the right: the server's content, ways to use a morph, help. */
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import type { Job } from 'orbmorph';
 import { client, set, state } from '../state';
 import { addMesh, cancelJob, loadServer, openSupermesh, remove, watchJob } from '../actions/server';
@@ -13,7 +13,8 @@ const TITLES = { server: 'On the server', share: 'Use this morph', help: 'Help' 
 export function Drawer() {
   const dialog = useRef<HTMLDialogElement>(null);
   const kind = state.drawer!;
-  useEffect(() => {
+  // not after the next frame: a Tab in between would move the focus to which the dialog returns it
+  useLayoutEffect(() => {
     dialog.current!.showModal();
   }, []);
   return (

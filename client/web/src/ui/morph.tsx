@@ -1,5 +1,5 @@
 /** The Morph tab: playing, scrubbing and mixing; the common mesh on each shape; the error; downloads. */
-import { useEffect, useRef } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
 import { isFast, isWaiting, presetOf, set, state, tint, toast, type Result } from '../state';
 import { save } from '../actions/landmarks';
 import { explain } from '../actions/token';
@@ -15,6 +15,13 @@ import { fileName } from './take';
 export function MorphStage() {
   const { result, show } = state;
   if (!result) return <NoMorph />;
+  if (show === 'beside')
+    return (
+      <div class="morph">
+        <Beside result={result} />
+        <Transport result={result} />
+      </div>
+    );
   return (
     <div class="morph">
       <div class="grid" data-count={show === 'morph' ? 1 : result.supermesh.shapes.length}>
@@ -57,6 +64,33 @@ export function MorphStage() {
           ))}
       </div>
       {show === 'morph' && <Transport result={result} />}
+    </div>
+  );
+}
+
+/** The morph between the two shapes that it blends now, in one frame and under one camera. */
+function Beside({ result }: { result: Result }) {
+  const { shapes } = result.supermesh;
+  const [leg, setLeg] = useState(0);
+  useEffect(
+    () => player.listen((time) => setLeg(Math.min(Math.floor(time * (shapes.length - 1)), shapes.length - 2))),
+    [result],
+  );
+  const from = Math.min(leg, shapes.length - 2); // another morph may have fewer shapes
+  const side = (i: number) => (
+    <Pane key={`side${i}`} label={shapes[i].name} model={result.each[i]} wire={state.wire}>
+      <Name index={i} name={shapes[i].name} note="" />
+    </Pane>
+  );
+  return (
+    <div class="grid" data-count={3}>
+      {side(from)}
+      <Pane key="main" label="Morph" model={result.main} wire={state.wire}>
+        <div class="caption">
+          <strong>Morph</strong>
+        </div>
+      </Pane>
+      {side(from + 1)}
     </div>
   );
 }
@@ -235,6 +269,24 @@ function Suspects({ result: { supermesh } }: { result: Result }) {
   );
 }
 
+/** Beyond this a fit turned a shape over: degrees of its up axis. */
+const OVER = 60;
+
+/** What the fit did to shapes that it turned over. */
+function Turned({ result: { supermesh } }: { result: Result }) {
+  const over = supermesh.shapes.filter(({ fit }) => (fit?.up_degrees ?? 0) > OVER);
+  if (!over.length) return null;
+  return (
+    <ul class="hint" aria-label="Shapes that the fit turned over">
+      {over.map(({ name, fit }) => (
+        <li key={name}>
+          {`The fit turned ${name} over: its up axis by ${Math.round(fit!.up_degrees)}°. If that is wrong, set landmarks, or choose another fit under Options.`}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
 /** The share of the surface that may get thin halfway: a patch or two are hardly seen. */
 const THIN_MOST = 0.01;
 
@@ -302,6 +354,7 @@ export function MorphInspector() {
       <h2>Morph</h2>
       <Shown result={result} />
       <Match result={result} />
+      <Turned result={result} />
       <Suspects result={result} />
       <Warnings result={result} />
       <Segments
@@ -309,16 +362,17 @@ export function MorphInspector() {
         value={state.show}
         onChange={(show) => {
           set({ show });
-          if (show !== 'morph') player.pause();
+          if (show !== 'morph' && show !== 'beside') player.pause();
         }}
         items={[
           { value: 'morph', label: 'Morph' },
+          { value: 'beside', label: 'Side by side' },
           { value: 'each', label: 'Each shape' },
           { value: 'error', label: 'Error' },
         ]}
       />
       {state.show === 'error' && <ErrorLoader />}
-      {state.show === 'morph' && <Mix result={result} />}
+      {(state.show === 'morph' || state.show === 'beside') && <Mix result={result} />}
       <div class="row wrap gap-top">
         <Switch label="Wireframe" on={state.show === 'each' ? state.meshWire : state.wire} onChange={switchWire} />
       </div>

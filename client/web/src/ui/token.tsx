@@ -1,5 +1,5 @@
 /** The dialog that asks for the daemon's token. */
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { client, set, state } from '../state';
 import { forgetToken, tryToken } from '../actions/token';
 import { Button, Icon } from './parts';
@@ -9,7 +9,7 @@ export function TokenDialog() {
   const [message, setMessage] = useState(state.asking!.reason);
   const [busy, setBusy] = useState(false);
   const must = !client.token;
-  useEffect(() => dialog.current!.showModal(), []);
+  useLayoutEffect(() => dialog.current!.showModal(), []);
   const send = async (event: Event) => {
     event.preventDefault();
     const token = new FormData(event.currentTarget as HTMLFormElement).get('token') as string;

@@ -66,8 +66,8 @@ export function Welcome() {
         </div>
         <h1>Drop two shapes. Get a morph.</h1>
         <p class="lead">
-          Any closed meshes: OBJ, OFF, PLY, STL or glTF. The result is one GLB that blends between all of them, ready
-          for three.js, Blender, Unity and the web.
+          Any closed meshes: OBJ, OFF, PLY, STL, 3MF or glTF. The result is one GLB that blends between all of them,
+          ready for three.js, Blender, Unity and the web.
         </p>
         <div class="drop-zone row center wrap">
           <FilePicker label="Choose files" />
