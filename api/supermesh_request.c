@@ -114,6 +114,63 @@ static int read_align(cJSON *align, api_supermesh_request *out, api_problem *pro
   return 1;
 }
 
+/* "template": which meshes and nodes of the first shape's document the closed surface consists of. */
+static int read_parts(const cJSON *value, struct api_parts_spec *out, api_problem *problem) {
+  static const char *const known[] = {"meshes", "nodes", NULL};
+  if (!cJSON_IsObject(value)) {
+    return api_refuse(problem, "invalid-request", "\"template\" must be an object with \"meshes\" or \"nodes\".");
+  }
+  if (!api_members_known(value, "\"template\"", known, problem)) {
+    return 0;
+  }
+  const cJSON *meshes = cJSON_GetObjectItemCaseSensitive(value, "meshes");
+  const cJSON *nodes = cJSON_GetObjectItemCaseSensitive(value, "nodes");
+  if ((meshes && (!cJSON_IsArray(meshes) || cJSON_GetArraySize(meshes) > API_PARTS_MAX)) ||
+      (nodes && (!cJSON_IsArray(nodes) || cJSON_GetArraySize(nodes) > API_PARTS_MAX))) {
+    return api_refuse(problem, "invalid-request",
+                      "\"meshes\" and \"nodes\" of \"template\" must be arrays of at most %d entries.", API_PARTS_MAX);
+  }
+  for (const cJSON *item = meshes ? meshes->child : NULL; item; item = item->next) {
+    if (!cJSON_IsNumber(item) || item->valuedouble != (double)item->valueint || item->valueint < 0) {
+      return api_refuse(problem, "invalid-request", "\"meshes\" of \"template\" must hold numbers of meshes, from 0.");
+    }
+    out->meshes[out->mesh_count++] = item->valueint;
+  }
+  for (const cJSON *item = nodes ? nodes->child : NULL; item; item = item->next) {
+    if (!cJSON_IsString(item) || !*item->valuestring || strlen(item->valuestring) >= ORB_NAME_MAX) {
+      return api_refuse(problem, "invalid-request",
+                        "\"nodes\" of \"template\" must hold names of nodes, of at most 127 bytes.");
+    }
+    snprintf(out->nodes[out->node_count++], ORB_NAME_MAX, "%s", item->valuestring);
+  }
+  return 1;
+}
+
+static void write_parts(const struct api_parts_spec *parts, api_text *out) {
+  api_json_open(out, '{');
+  api_json_key(out, "meshes");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < parts->mesh_count; i++) {
+    api_json_integer(out, parts->meshes[i]);
+  }
+  api_json_close(out, ']');
+  api_json_key(out, "nodes");
+  api_json_open(out, '[');
+  for (int32_t i = 0; i < parts->node_count; i++) {
+    api_json_string(out, parts->nodes[i]);
+  }
+  api_json_close(out, ']');
+  api_json_close(out, '}');
+}
+
+void api_supermesh_request_parts(const api_supermesh_request *request, const char *names[API_PARTS_MAX],
+                                 orb_document_parts *out) {
+  for (int32_t i = 0; i < request->parts.node_count; i++) {
+    names[i] = request->parts.nodes[i];
+  }
+  *out = (orb_document_parts){request->parts.meshes, names, request->parts.mesh_count, request->parts.node_count};
+}
+
 static int check_built(const api_supermesh_request *request, api_problem *problem) {
   if (orb_remesh_available(request->merge.remesh.method)) {
     return 1;
@@ -126,7 +183,7 @@ static int check_built(const api_supermesh_request *request, api_problem *proble
 }
 
 int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, api_problem *problem) {
-  static const char *const known[] = {"shapes", "landmarks", "embedding", "align", "remesh", "asset", NULL};
+  static const char *const known[] = {"shapes", "landmarks", "embedding", "align", "remesh", "asset", "template", NULL};
   memset(out, 0, sizeof *out);
   orb_merge_defaults(&out->merge);
   orb_embed_defaults(&out->embedding);
@@ -141,6 +198,7 @@ int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, ap
   const cJSON *embedding = cJSON_GetObjectItemCaseSensitive(body, "embedding");
   const cJSON *remesh = cJSON_GetObjectItemCaseSensitive(body, "remesh");
   const cJSON *asset = cJSON_GetObjectItemCaseSensitive(body, "asset");
+  const cJSON *parts = cJSON_GetObjectItemCaseSensitive(body, "template");
   if (landmarks && cJSON_IsObject(landmarks)) {
     return api_refuse(problem, "bad-landmarks", "\"landmarks\" must be an array, \"auto\" or {\"id\": ID}.");
   }
@@ -151,7 +209,7 @@ int api_supermesh_request_read(const cJSON *body, api_supermesh_request *out, ap
          read_align(cJSON_GetObjectItemCaseSensitive(body, "align"), out, problem) &&
          (!remesh ||
           api_options_read(remesh, "\"remesh\"", remesh_table, COUNT(remesh_table), &out->merge.remesh, problem)) &&
-         check_built(out, problem) &&
+         check_built(out, problem) && (!parts || read_parts(parts, &out->parts, problem)) &&
          (!asset || api_options_read(asset, "\"asset\"", asset_table, COUNT(asset_table), &out->merge.asset, problem));
 }
 
@@ -219,6 +277,10 @@ void api_supermesh_request_write(const api_supermesh_request *request, api_text 
   api_options_write(out, remesh_table, COUNT(remesh_table), &request->merge.remesh, NULL);
   api_json_key(out, "asset");
   api_options_write(out, asset_table, COUNT(asset_table), &request->merge.asset, NULL);
+  if (request->parts.mesh_count + request->parts.node_count > 0) {
+    api_json_key(out, "template");
+    write_parts(&request->parts, out);
+  }
   api_json_close(out, '}');
 }
 

@@ -7,6 +7,8 @@
 #include "api/mesh_codec.h"
 #include "orbmorph/merge.h"
 
+enum { API_PARTS_MAX = 64 }; /* meshes and nodes that "template" names */
+
 typedef struct api_supermesh_request {
   int32_t shape_count;
   struct api_shape_spec {
@@ -15,7 +17,12 @@ typedef struct api_supermesh_request {
   } shapes[API_SHAPES_MAX];
   api_landmark_list landmarks;
   orb_embed_options embedding; /* for every shape */
-  orb_merge_options merge;
+  orb_merge_options merge;     /* without file_parts: see api_supermesh_request_parts() */
+  struct api_parts_spec {
+    int32_t mesh_count, node_count;
+    int32_t meshes[API_PARTS_MAX];
+    char nodes[API_PARTS_MAX][ORB_NAME_MAX];
+  } parts;
 } api_supermesh_request;
 
 /* Returns 1, or 0 with *problem filled. The caller frees *out in either case. */
@@ -26,6 +33,10 @@ void api_supermesh_request_free(api_supermesh_request *request);
 /* Fills empty names from the meshes, and refuses landmarks whose vertex or triangle the file does not have. Returns 1,
  * or 0 with *problem filled. meshes: one summary for each shape. */
 int api_supermesh_request_resolve(api_supermesh_request *request, const api_mesh_summary *meshes, api_problem *problem);
+
+/* The parts for the merge; they refer to the request and to names, which must live as long. */
+void api_supermesh_request_parts(const api_supermesh_request *request, const char *names[API_PARTS_MAX],
+                                 orb_document_parts *out);
 
 /* Appends the canonical request, which is itself a valid request and reads back as the same one. */
 void api_supermesh_request_write(const api_supermesh_request *request, api_text *out);

@@ -3,6 +3,7 @@
 #include <map>
 #include <set>
 
+#include "format/gltf_named.hh"
 #include "format/gltf_parse.hh"
 #include "format/gltf_scene.hh"
 #include "format/gltf_weights.hh"
@@ -146,6 +147,30 @@ struct Keeper {
     refuse("The scene shows mesh " + std::to_string(mesh) + " (\"" + text_of(meshes[mesh], "name").substr(0, 60) +
            "\") " + std::to_string(showed[mesh]) +
            " times, and targets of a mesh move all its copies alike. Give each node a mesh of its own.");
+  }
+
+  std::string title(size_t mesh) const {
+    std::string name = text_of(meshes[mesh], "name").substr(0, 60);
+    return "mesh " + std::to_string(mesh) + (name.empty() ? "" : " (\"" + name + "\")");
+  }
+
+  /* The surface was chosen at the upload; it must be what the request names. */
+  void check_parts() const {
+    if (shapes.parts.mesh_count + shapes.parts.node_count == 0) {
+      return;
+    }
+    const std::vector<bool> named = named_meshes(doc, meshes.size(), shapes.parts);
+    for (size_t m = 0; m < meshes.size(); m++) {
+      bool is_part = is_on(first[m], size_of(m));
+      if (is_part != named[m]) {
+        throw Fault{ORB_E_BAD_OPTION,
+                    is_part ? "The closed surface has vertices of " + title(m) +
+                                  ", which \"template\" does not name. Name it, or upload the file with part=NAME."
+                            : "\"template\" names " + title(m) +
+                                  ", but the closed surface has no vertex of it. Leave it out, or upload the file with "
+                                  "part=NAME so that it is the surface."};
+      }
+    }
   }
 
   int64_t zero_target(Editor *editor, size_t count) {
@@ -325,6 +350,7 @@ struct Keeper {
           "fallback for compressed data, or with that buffer last.");
     }
     number();
+    check_parts();
     Editor editor(ctx, doc, bytes);
     for (size_t m = 0; m < meshes.size(); m++) {
       for (const cJSON *primitive : array_of(meshes[m], "primitives")) {

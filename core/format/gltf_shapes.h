@@ -2,7 +2,7 @@
 #ifndef ORB_FORMAT_GLTF_SHAPES_H
 #define ORB_FORMAT_GLTF_SHAPES_H
 
-#include <stdint.h>
+#include "orbmorph/mesh.h"
 
 /* The targets, in the coordinates of the scene: keeping takes them to those of each primitive. */
 typedef struct orb_gltf_shapes {
@@ -14,6 +14,7 @@ typedef struct orb_gltf_shapes {
   int32_t key_count;              /* of the animation "morph"; 0: none */
   const int32_t *key_frames;      /* key_count: 0: the document's shape, k: target k − 1 */
   const double *key_times;        /* seconds */
+  orb_document_parts parts;       /* what the surface must consist of */
 } orb_gltf_shapes;
 
 #endif

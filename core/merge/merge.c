@@ -71,8 +71,13 @@ static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, in
                               const char *const *names, const orb_merge_options *options, orb_merge_result *out) {
   const orb_aligned_shape *shapes = out->alignment.shapes;
   out->is_document = options->remesh.method == ORB_REMESH_TEMPLATE && options->file && options->file_bytes;
+  if (!out->is_document && options->remesh.method == ORB_REMESH_TEMPLATE &&
+      options->file_parts.mesh_count + options->file_parts.node_count > 0) {
+    return orb_fail(ctx, ORB_E_BAD_OPTION,
+                    "\"template\" names meshes or nodes, but the first shape is not glTF; leave that member out.");
+  }
   if (out->is_document) {
-    orb_document document = {options->file, options->file_bytes, options->file_size};
+    orb_document document = {options->file, options->file_bytes, options->file_size, options->file_parts};
     ORB_TRY(orb_asset_write_document(ctx, &out->supermesh, shapes, &document, names, &options->asset, &out->asset_facts,
                                      &out->asset, &out->asset_vertices, &out->dropped, &out->dropped_count));
   } else if (options->remesh.method == ORB_REMESH_TEMPLATE) {

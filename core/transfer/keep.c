@@ -72,7 +72,8 @@ static orb_status describe(orb_context *ctx, const orb_draft *draft, const orb_d
                            .normals = (const double *const *)k->normals,
                            .key_count = keys,
                            .key_frames = k->key_frames,
-                           .key_times = k->key_times};
+                           .key_times = k->key_times,
+                           .parts = document->parts};
   return ORB_OK;
 }
 

@@ -18,6 +18,7 @@ typedef struct merge_input {
   double *points[API_SHAPES_MAX];
   orb_align_shape shapes[API_SHAPES_MAX];
   const char *names[API_SHAPES_MAX];
+  const char *nodes[API_PARTS_MAX];
   orb_landmark *landmarks;
   orb_place *places;
   file_triangle *noted; /* landmark-major, as the spots */
@@ -95,6 +96,7 @@ static int load_shape(const run_env *env, orb_context *ctx, merge_input *in, int
     in->request.merge.file = &file->mesh;
     in->request.merge.file_bytes = file->bytes;
     in->request.merge.file_size = file->size;
+    api_supermesh_request_parts(&in->request, in->nodes, &in->request.merge.file_parts);
   }
   for (int32_t l = 0; fine && l < list->count; l++) {
     in->noted[(size_t)l * (size_t)list->shape_count + (size_t)s] = noted[l];

@@ -168,3 +168,55 @@ test('a mesh that the scene shows twice is refused', async (t) => {
   assert.match(problem, /shows mesh 0/);
   assert.match(problem, /mesh of its own/);
 });
+
+test('a request names the meshes or nodes that are the surface', async (t) => {
+  const d = await daemon(t);
+  const { bytes } = rigged();
+  const request = await merge(d, bytes, { name: 'body', repair: 'largest_component' }, [shapes.bean(2)]);
+  const plain = await d.made('/v1/supermeshes', request);
+  const assetOf = async (made) => (await d.get(made.asset)).bytes;
+  for (const template of [{ nodes: ['body'] }, { meshes: [1] }, { meshes: [1], nodes: ['body'] }]) {
+    const named = await d.made('/v1/supermeshes', { ...request, template });
+    assert.notEqual(named.id, plain.id);
+    assert.deepEqual(named.request.template, { meshes: [], nodes: [], ...template });
+    assert.ok((await assetOf(named)).equals(await assetOf(plain)), JSON.stringify(template));
+  }
+  for (const [template, why] of [
+    [{ meshes: [0, 1] }, /names mesh 0 \("eye"\), but the closed surface has no vertex of it/],
+    [{ nodes: ['left eye'] }, /names mesh 0 \("eye"\)/],
+    [{ nodes: ['nobody'] }, /the node "nobody", which the document of the first shape does not have/],
+    [{ meshes: [2] }, /names mesh 2, but the document of the first shape has 2 meshes/],
+  ]) {
+    const { problem } = await d.make('/v1/supermeshes', { ...request, template });
+    assert.equal(problem?.type, '/problems/bad-option');
+    assert.match(problem.detail, why);
+  }
+  for (const template of ['body', { meshes: 1 }, { meshes: [-1] }, { meshes: [0.5] }, { nodes: [''] }])
+    assertProblem(await d.post('/v1/supermeshes', { ...request, template }), 422, 'invalid-request');
+  const obj = { ...request, shapes: [...request.shapes].reverse(), template: { meshes: [0] } };
+  assert.match((await d.make('/v1/supermeshes', obj)).problem.detail, /the first shape is not glTF/);
+});
+
+test('the surface has a mesh that the request does not name', async (t) => {
+  const d = await daemon(t);
+  const egg = shapes.egg(2);
+  const halves = (gltf) => {
+    const [primitive] = gltf.meshes[0].primitives;
+    const { count, bufferView, ...rest } = gltf.accessors[primitive.indices];
+    const third = Math.floor(count / 6) * 3;
+    gltf.accessors.push({ ...rest, bufferView, count: count - third, byteOffset: 2 * third });
+    gltf.accessors[primitive.indices] = { ...rest, bufferView, count: third };
+    gltf.meshes.push({ name: 'upper', primitives: [{ ...primitive, indices: gltf.accessors.length - 1 }] });
+    gltf.nodes = [{ mesh: 0 }, { name: 'hat', mesh: 1 }];
+    gltf.scenes = [{ nodes: [0, 1] }];
+  };
+  const request = await merge(d, writeGlb({ ...egg, edit: halves }), { name: 'egg' }, [shapes.bean(2)]);
+  const { problem } = await d.make('/v1/supermeshes', { ...request, template: { meshes: [0] } });
+  assert.match(problem.detail, /has vertices of mesh 1 \("upper"\), which "template" does not name/);
+  const made = await d.made('/v1/supermeshes', { ...request, template: { meshes: [0], nodes: ['hat'] } });
+  const { gltf } = parseGlb((await d.get(made.asset)).bytes);
+  assert.deepEqual(
+    gltf.meshes.map((m) => m.primitives[0].targets.length),
+    [1, 1],
+  );
+});

@@ -257,6 +257,13 @@ export type SupermeshRequest = {
     /** Store the colours of later shapes as morphed attributes. Default: false. */
     colors?: boolean;
   };
+  /** With the remesh method template and a first shape that came as glTF: what of its document the closed surface consists of. The job is refused (bad-option) where the surface that was uploaded has vertices of another mesh, or none of one that is named; choose the surface at the upload by part=NAME. What is not named stays as it is. */
+  template?: {
+    /** Numbers of meshes of the document. */
+    meshes?: number[];
+    /** Names of nodes: the meshes that they and the nodes below them show. */
+    nodes?: string[];
+  };
   webhook?: WebhookRequest;
 };
 
@@ -310,6 +317,13 @@ export type CanonicalRequest = {
     path_steps: number;
     /** Store the colours of later shapes as morphed attributes. */
     colors: boolean;
+  };
+  /** Only where the request has it. */
+  template?: {
+    /** Numbers of meshes of the document. */
+    meshes: number[];
+    /** Names of nodes: the meshes that they and the nodes below them show. */
+    nodes: string[];
   };
 };
 

@@ -98,6 +98,7 @@ typedef struct orb_document {
   const orb_mesh *mesh; /* as orb_mesh_read() gave it, before repairs */
   const unsigned char *bytes;
   size_t size;
+  orb_document_parts parts; /* the surface must have vertices of each of these meshes, and of no other one */
 } orb_document;
 
 /* As orb_asset_write_template(), where the first shape came as glTF or GLB: appends that document as a GLB, with

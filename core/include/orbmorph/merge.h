@@ -20,6 +20,7 @@ typedef struct orb_merge_options {
   /* With it, where it came as glTF or GLB: its bytes, whose document the asset then is. NULL: a new document. */
   const unsigned char *file_bytes;
   size_t file_size;
+  orb_document_parts file_parts; /* see orb_document */
 } orb_merge_options;
 ORB_API void orb_merge_defaults(orb_merge_options *options);
 

@@ -39,6 +39,14 @@ typedef struct orb_object {
   char name[ORB_PART_NAME]; /* UTF-8 without control characters; longer names are cut */
 } orb_object;
 
+/* What of a document the closed surface consists of: meshes by number, and the meshes of nodes by name, with those of
+ * the nodes below them. */
+typedef struct orb_document_parts {
+  const int32_t *meshes;
+  const char *const *nodes;
+  int32_t mesh_count, node_count; /* both 0: whatever the surface has */
+} orb_document_parts;
+
 /* A mesh. The context owns all arrays; optional ones are NULL where the file has none. */
 typedef struct orb_mesh {
   int32_t vertex_count, triangle_count;
