@@ -59,7 +59,7 @@ static const entry table[] = {
     {"max-triangles", NUMBER(max_triangles, 4, 500000000), "5000000", "limit on the triangles of a mesh"},
     {"queue-limit", NUMBER(queue_limit, 1, 1000000), "10000", "limit on unfinished jobs"},
     {"job-memory", NUMBER(job_memory, 1 << 20, INT64_C(1) << 46), "0",
-     "memory limit of one job in bytes; 0: half of the machine's memory"},
+     "memory limit of one job, and of all jobs on workers, in bytes; 0: half of the machine's memory"},
     {"job-seconds", NUMBER(job_seconds, 1, 864000), "3600", "time limit of one job"},
     {"check-seconds", NUMBER(check_seconds, 1, 864000), "30", "time limit of the check of one upload"},
     {"isolate", TEXT(isolate), "on",

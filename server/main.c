@@ -355,10 +355,11 @@ static int start_scrub(server *srv) {
 static int start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
   long cores = sysconf(_SC_NPROCESSORS_ONLN);
+  srv->memory = budget_create(o->job_memory);
   queue_options queued = {.workers = (int)o->workers,
                           .cores = cores > 0 ? (int)cores : 1,
                           .limit = (int)o->queue_limit,
-                          .memory = 2 * o->job_memory};
+                          .memory = srv->memory};
   worker_options limits = {.workers = (int)o->workers,
                            .nice = (int)o->worker_nice,
                            .job_memory = o->job_memory,
@@ -366,7 +367,7 @@ static int start(server *srv, worker_pool **workers) {
                            .max_triangles = o->max_triangles,
                            .fetch = {.authorities = o->tls_authorities,
                                      .check_ms = 1000 * o->check_seconds,
-                                     .memory = o->job_memory,
+                                     .memory = srv->memory,
                                      .max_triangles = o->max_triangles,
                                      .total_ms = 1000 * o->fetch_seconds,
                                      .most = o->max_body,
@@ -382,13 +383,14 @@ static int start(server *srv, worker_pool **workers) {
   }
   int listens = listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
-  return listens && objects_open(o->data, &srv->store) == STORE_OK && catalogue_open(o->data, &srv->cat) == STORE_OK &&
-         check_catalogue(srv) && (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
+  return listens && srv->memory && objects_open(o->data, &srv->store) == STORE_OK &&
+         catalogue_open(o->data, &srv->cat) == STORE_OK && check_catalogue(srv) &&
+         (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
          (srv->descriptions = cache_create(CACHE_BYTES)) && heals(srv) &&
-         (srv->io = tasks_start((int)o->io_threads, INT64_MAX)) &&
-         (srv->checks = tasks_start((int)o->workers, 2 * o->job_memory)) &&
-         (srv->large_checks = tasks_start((int)o->workers, 2 * o->job_memory)) && net_start() &&
+         (srv->io = tasks_start((int)o->io_threads, NULL)) &&
+         (srv->checks = tasks_start((int)o->workers, srv->memory)) &&
+         (srv->large_checks = tasks_start((int)o->workers, srv->memory)) && net_start() &&
          start_outbox(srv, &delivered) && (*workers = worker_pool_start(&limits, srv->q, srv->cat, srv->store)) &&
          http_start(srv) && start_scrub(srv);
 }
@@ -414,6 +416,10 @@ static void stop(server *srv, worker_pool *workers) {
     signers_store_use(srv->signers);
   }
   queue_destroy(srv->q);
+  tasks_free(srv->io);
+  tasks_free(srv->checks);
+  tasks_free(srv->large_checks);
+  budget_destroy(srv->memory);
   deliver_stop(srv->outbox); /* nothing wakes it any more */
   catalogue_close(srv->cat);
   objects_close(srv->store);

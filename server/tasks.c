@@ -15,8 +15,8 @@ struct tasks {
     int64_t used_ms;
     int running, unfinished;
   } turns[TURNS];
-  int64_t memory, in_use; /* bytes */
-  int stopping, count, running;
+  memory_budget *memory; /* may be NULL */
+  int stopping, count;
   pthread_t threads[];
 };
 
@@ -37,18 +37,24 @@ static void enter(tasks *pool, const task *t) {
   mine->unfinished++;
 }
 
-/* Takes the next task out of the list; NULL: there is none, or it has to wait for memory. O(waiting tasks). */
+static int has_room(tasks *pool, const task *t) {
+  return !pool->memory || t->memory == 0 || budget_has_room(pool->memory, t->part, t->memory);
+}
+
+/* Takes the next task out of the list, with its memory; NULL: there is none, or none has memory now. O(waiting tasks).
+ */
 static task *choose(tasks *pool) {
   task **best = NULL;
   for (task **at = &pool->first; *at; at = &(*at)->next) {
     const struct turn *a = turn_of(pool, *at), *b = best ? turn_of(pool, *best) : NULL;
-    if (!b || a->running < b->running || (a->running == b->running && a->used_ms < b->used_ms)) {
+    if ((!b || a->running < b->running || (a->running == b->running && a->used_ms < b->used_ms)) &&
+        has_room(pool, *at)) {
       best = at;
     }
   }
   task *t = best ? *best : NULL;
-  if (t && pool->running > 0 && pool->in_use + t->memory > pool->memory) {
-    return NULL;
+  if (t && pool->memory && t->memory > 0 && !budget_take(pool->memory, t->part, t->memory)) {
+    t = NULL; /* others took it just now, and wake this pool when they end */
   }
   if (t) {
     *best = t->next;
@@ -60,21 +66,27 @@ static task *choose(tasks *pool) {
 /* Under the lock, which it lets go meanwhile. */
 static void run(tasks *pool, task *t) {
   struct turn *turn = turn_of(pool, t);
+  const budget_part part = t->part;
   int64_t began = orb_clock_ms(), memory = t->memory;
   turn->running++;
-  pool->running++;
-  pool->in_use += memory;
   pthread_mutex_unlock(&pool->lock);
   t->run(t); /* may free t */
+  if (pool->memory && memory > 0) {
+    budget_give(pool->memory, part, memory, NULL);
+  }
   pthread_mutex_lock(&pool->lock);
-  pool->in_use -= memory;
-  pool->running--;
   turn->running--;
   turn->unfinished--;
   turn->used_ms += orb_clock_ms() - began;
-  if (memory > 0) {
+}
+
+static void memory_freed(void *user) {
+  tasks *pool = user;
+  pthread_mutex_lock(&pool->lock);
+  if (pool->first) {
     pthread_cond_broadcast(&pool->wake);
   }
+  pthread_mutex_unlock(&pool->lock);
 }
 
 static void *thread_main(void *argument) {
@@ -95,7 +107,7 @@ static void *thread_main(void *argument) {
   return NULL;
 }
 
-tasks *tasks_start(int threads, int64_t memory) {
+tasks *tasks_start(int threads, memory_budget *memory) {
   tasks *pool = calloc(1, sizeof *pool + (size_t)threads * sizeof(pthread_t));
   if (!pool) {
     return NULL;
@@ -104,6 +116,9 @@ tasks *tasks_start(int threads, int64_t memory) {
   pool->memory = memory;
   pthread_mutex_init(&pool->lock, NULL);
   pthread_cond_init(&pool->wake, NULL);
+  if (memory) {
+    budget_listen(memory, memory_freed, pool);
+  }
   for (int i = 0; i < threads; i++) {
     if (pthread_create(&pool->threads[i], NULL, thread_main, pool) != 0) {
       break;
@@ -138,5 +153,8 @@ void tasks_stop(tasks *pool) {
   for (int i = 0; i < pool->count; i++) {
     pthread_join(pool->threads[i], NULL);
   }
+}
+
+void tasks_free(tasks *pool) {
   free(pool);
 }

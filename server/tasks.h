@@ -2,23 +2,29 @@
  *
  * Contract. Tasks of one owner start in the order in which they were added, each on one thread. Owners take turns:
  * first goes who has the fewest tasks running, then who has used the least time of threads; who comes back after a
- * pause starts level with the least served of the others. tasks_stop() runs the waiting tasks, then joins the threads.
+ * pause starts level with the least served of the others. A task for which there is no memory lets others pass.
+ * tasks_stop() runs the waiting tasks, then joins the threads.
  */
 #ifndef ORB_TASKS_H
 #define ORB_TASKS_H
 
 #include <stdint.h>
 
+#include "budget.h"
+
 typedef struct task {
   struct task *next;
   void (*run)(struct task *self);
-  int64_t memory; /* bytes that it may need; 0: little */
-  uint64_t owner; /* a hash of who asked for it; 0: all others, together one owner */
+  int64_t memory;   /* bytes that it needs; 0: little */
+  budget_part part; /* from which they are taken */
+  uint64_t owner;   /* a hash of who asked for it; 0: all others, together one owner */
 } task;
 
 typedef struct tasks tasks;
-tasks *tasks_start(int threads, int64_t memory); /* bytes for all tasks that run at once */
+tasks *tasks_start(int threads, memory_budget *memory); /* memory NULL: that of tasks does not count */
 void tasks_add(tasks *pool, task *t);
 void tasks_stop(tasks *pool);
+/* After tasks_stop() of all pools of one budget. */
+void tasks_free(tasks *pool);
 
 #endif

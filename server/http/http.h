@@ -66,6 +66,7 @@ typedef struct server {
   objects *store;
   queue *q;
   cache *descriptions;
+  memory_budget *memory;
   tasks *io, *checks, *large_checks; /* large uploads have threads of their own and do not delay small ones */
   listener at;
   watch *connections;

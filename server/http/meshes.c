@@ -9,7 +9,6 @@
 
 enum {
   LARGE_UPLOAD = 256 << 10, /* smaller ones are checked in less than a second, whatever is in them (docs/limits.md) */
-  MEMORY_A_BYTE = 200,      /* of a file, at most (docs/limits.md) */
   LOOK_BYTES = 1 << 20,
   HALF_OPEN_MS = 1000
 };
@@ -98,12 +97,15 @@ static void refuse_over_quota(request *r) {
   reply_problem(r, &problem);
 }
 
-static void store_mesh(request *r, const intake_file *file) {
+/* Checks the mesh within so many bytes of memory and stores it. 0, and no answer: it needs more, and is_last is not
+ * set.
+ */
+static int store_within(request *r, const intake_file *file, int64_t memory, int is_last) {
   server *srv = r->srv;
   const char *tenant = access_tenant(r);
   int fresh = 0;
   api_problem problem = {0};
-  const intake_limits limits = {.memory = srv->options->job_memory,
+  const intake_limits limits = {.memory = memory,
                                 .deadline_ms = orb_clock_ms() + 1000 * srv->options->check_seconds,
                                 .max_triangles = srv->options->max_triangles,
                                 .wanted = is_wanted,
@@ -111,7 +113,7 @@ static void store_mesh(request *r, const intake_file *file) {
   orb_context *ctx = context_for_check(&limits);
   if (!ctx) {
     reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
-    return;
+    return 1;
   }
   int64_t quota = r->caller ? __atomic_load_n(&r->caller->row.quota, __ATOMIC_RELAXED) : 0;
   store_result stored = intake_store(file, srv->cat, srv->store, ctx, &limits, tenant, quota, &fresh, &problem);
@@ -119,17 +121,21 @@ static void store_mesh(request *r, const intake_file *file) {
   if (fresh && r->caller) {
     callers_recount(srv->callers, tenant);
   }
+  if (!is_last && problem.name && strcmp(problem.name, "no-memory") == 0) {
+    api_problem_free(&problem);
+    return 0;
+  }
   if (problem.name && strcmp(problem.name, "cancelled") == 0) {
     api_refuse(&problem, "unavailable",
                "The server is stopping, or the connection of this request ended; try again soon.");
   }
   if (problem.name) {
     reply_problem(r, &problem);
-    return;
+    return 1;
   }
   if (stored == STORE_CONFLICT && r->caller) {
     refuse_over_quota(r);
-    return;
+    return 1;
   }
   /* If two requests upload the same mesh at once, both get the row that was written first. */
   const cached *entry = stored == STORE_OK ? find_description(srv, RESOURCE_MESH, file->id, tenant, &stored) : NULL;
@@ -137,6 +143,25 @@ static void store_mesh(request *r, const intake_file *file) {
     reply_cached(r, 201, entry);
   } else {
     reply_store(r, stored);
+  }
+  return 1;
+}
+
+/* Checks the file with the memory of the task. If it needs more, waits for all that so many bytes can need. */
+static void store_mesh(request *r, const intake_file *file) {
+  memory_budget *memory = r->srv->memory;
+  const int64_t first = r->away_task.memory, most = budget_for_densest_file(memory, BUDGET_CHECKS, r->received);
+  const int64_t kept = r->away_task.part == BUDGET_CHECKS ? first : 0; /* the pool gives this back */
+  if (store_within(r, file, first, first >= most)) {
+    return;
+  }
+  if (kept) {
+    budget_give(memory, BUDGET_CHECKS, kept, NULL);
+  }
+  budget_wait(memory, BUDGET_CHECKS, most);
+  store_within(r, file, most, 1);
+  if (most > kept) {
+    budget_give(memory, BUDGET_CHECKS, most - kept, NULL);
   }
 }
 
@@ -166,7 +191,10 @@ static void upload_away(request *r) {
 }
 
 enum MHD_Result handle_mesh_file(request *r) {
-  int64_t most = r->srv->options->job_memory;
-  r->away_task.memory = r->received < most / MEMORY_A_BYTE ? MEMORY_A_BYTE * r->received : most;
-  return request_go_away(r, r->received > LARGE_UPLOAD ? r->srv->large_checks : r->srv->checks, upload_away);
+  const memory_budget *memory = r->srv->memory;
+  const int large = r->received > LARGE_UPLOAD;
+  r->away_task.part = large ? BUDGET_CHECKS : BUDGET_SMALL;
+  r->away_task.memory = large ? budget_for_file(memory, BUDGET_CHECKS, r->received)
+                              : budget_for_densest_file(memory, BUDGET_SMALL, r->received);
+  return request_go_away(r, large ? r->srv->large_checks : r->srv->checks, upload_away);
 }

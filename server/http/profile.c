@@ -112,9 +112,9 @@ static store_result store_profile(request *r, const orb_buffer *bytes) {
 /* 1, or 0 with a response. */
 static int make(request *r) {
   const config *options = r->srv->options;
-  orb_context_options limits = {.memory_limit = (size_t)options->job_memory,
-                                .threads = 1,
-                                .deadline_ms = orb_clock_ms() + 1000 * options->job_seconds};
+  const int64_t memory = budget_most(r->srv->memory, BUDGET_CHECKS) / 2;
+  orb_context_options limits = {
+      .memory_limit = (size_t)memory, .threads = 1, .deadline_ms = orb_clock_ms() + 1000 * options->job_seconds};
   orb_context *ctx = NULL;
   orb_buffer out = {0};
   api_problem problem = {0};
@@ -127,7 +127,9 @@ static int make(request *r) {
     reply_refuse(r, "no-memory", "The server has no memory left; try again later.");
     return 0;
   }
+  budget_wait(r->srv->memory, BUDGET_CHECKS, memory);
   int fine = convert(r, ctx, &out, &problem);
+  budget_give(r->srv->memory, BUDGET_CHECKS, memory, NULL);
   store_result stored = fine ? store_profile(r, &out) : STORE_OK;
   int64_t took = orb_clock_ms() - began;
   if (r->signer) {
@@ -182,7 +184,7 @@ static void land(request *r, flight *mine) {
   pthread_mutex_unlock(&flights.lock);
   for (request *next, *w = mine->waiting; w; w = next) {
     next = w->next_waiting;
-    tasks_add(r->srv->checks, &w->away_task);
+    tasks_add(r->srv->large_checks, &w->away_task);
   }
 }
 
@@ -224,7 +226,7 @@ int reply_asset(request *r, const cached *entry) {
   }
   if (in_task) { /* not made, or lost */
     r->status = 0;
-    request_go_on(r, r->srv->checks, profile_away);
+    request_go_on(r, r->srv->large_checks, profile_away);
   }
   return in_task;
 }

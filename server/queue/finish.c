@@ -190,6 +190,18 @@ void queue_give_back(queue *q, job *j) {
   pthread_mutex_unlock(&q->lock);
 }
 
+int queue_needs_memory(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  int more = j->memory > 0 && j->memory < budget_most(q->options.memory, BUDGET_JOBS);
+  j->needs_all |= more;
+  pthread_mutex_unlock(&q->lock);
+  if (more) {
+    log_info("job %s needs more than its share of the memory and runs again with all of it", j->row.id);
+    queue_give_back(q, j);
+  }
+  return more;
+}
+
 int queue_crashed(queue *q, job *j, int is_sure) {
   pthread_mutex_lock(&q->lock);
   int crashes = j->row.crashes + is_sure;

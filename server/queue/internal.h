@@ -9,10 +9,11 @@
 #include "queue/queue.h"
 
 enum { BUCKETS = 8192, KEEP_ENDED = 512, EVENTS_KEPT = 64, OWNERS = 1100, DEPENDENCIES = 16 };
-enum { GUEST_MEMORY = 8 };                    /* guests may need this fraction (1/8) of options.memory, beside it */
-static const int64_t LARGE = 300000;          /* a job with more triangles than this is large */
-static const int64_t BYTES_A_TRIANGLE = 1024; /* estimate of a running job's memory */
-static const int64_t TRIANGLES_A_MS = 100;    /* estimate of a worker's speed, charged until the time is known */
+static const int64_t LARGE = 300000; /* a job with more triangles than this is large */
+/* Estimate of a running job's memory: so much for each triangle, and a base, at most a share of what all may have. A
+ * job that needs more runs again with all of it. */
+static const int64_t BYTES_A_TRIANGLE = 1024, BYTES_OF_JOB = INT64_C(64) << 20, SHARE_OF_JOB = 8;
+static const int64_t TRIANGLES_A_MS = 100; /* estimate of a worker's speed, charged until the time is known */
 /* A job goes back into the queue for so long after the store has failed to end it, and after it failed to begin it. */
 static const int64_t RETRY_AFTER_STORE_MS = 5000, RETRY_SOON_MS = 1000;
 static const int64_t EVENT_STRIDE = 1000000; /* event numbers of an attempt start above attempt times this */
@@ -40,6 +41,8 @@ struct job {
   int64_t taken_at; /* by a worker, orb_clock_ms(); 0: by none */
   int64_t charged;  /* milliseconds that its owner is charged for it since taken_at */
   int is_guest;     /* see queue.h */
+  int64_t memory;   /* taken from the budget; 0: none */
+  int needs_all;    /* of the memory that jobs may have */
   int64_t retry_at; /* not chosen before this time, orb_clock_ms() */
   orb_context *ctx;
   int64_t last_event, last_event_ms;
@@ -64,9 +67,7 @@ struct queue {
   int ended_count, unfinished;
   int running, running_large, fetching, exclusive; /* fetching: of those that run */
   int isolated;                                    /* jobs have processes of their own */
-  int64_t running_cost;                            /* without guests */
   int guests;                                      /* of those that run */
-  int64_t guest_cost;
   int stopping, waking;
   struct {
     char name[64];

@@ -10,6 +10,13 @@
 
 enum { BATCH = 64 };
 
+static void memory_freed(void *user) {
+  queue *q = user;
+  pthread_mutex_lock(&q->lock);
+  pthread_cond_broadcast(&q->work);
+  pthread_mutex_unlock(&q->lock);
+}
+
 queue *queue_create(const queue_options *options, catalogue *cat) {
   queue *q = calloc(1, sizeof *q);
   if (!q) {
@@ -21,6 +28,9 @@ queue *queue_create(const queue_options *options, catalogue *cat) {
   pthread_cond_init(&q->work, NULL);
   pthread_cond_init(&q->committed, NULL);
   wake_init(&q->timer_wake);
+  if (options->memory) {
+    budget_listen(options->memory, memory_freed, q);
+  }
   q->timer_started = pthread_create(&q->timer, NULL, timer_main, q) == 0;
   if (!q->timer_started) {
     queue_destroy(q);

@@ -33,13 +33,15 @@
  * least served of the others), then that owner's most urgent job, then the oldest. A running job is charged the time
  * that it has taken, or an estimate where that is more; when it leaves its worker, the measured time replaces both.
  * Guests: if all workers are busy or their memory is in use, a small job of an owner that runs nothing runs beside
- * them, on one thread. At most QUEUE_GUESTS_MAX guests run at once, within the memory of GUEST_MEMORY. Large jobs never
+ * them, on one thread. At most QUEUE_GUESTS_MAX guests run at once, within the memory of checks (budget.h). Large jobs
+ * never
  * occupy all workers: one stays free for small jobs. A suspect (a job that was running when the process died) runs
  * alone; where jobs have processes of their own, guests of other owners run beside it, and do not wait for it.
  */
 #ifndef ORB_QUEUE_H
 #define ORB_QUEUE_H
 
+#include "budget.h"
 #include "orbmorph/context.h"
 #include "store/catalogue.h"
 #include "store/crashes.h"
@@ -64,7 +66,7 @@ typedef struct waiter {
 
 typedef struct queue_options {
   int workers, cores, limit;
-  int64_t memory; /* estimated bytes that all running jobs together may need */
+  memory_budget *memory; /* of running jobs; NULL: does not count */
 } queue_options;
 
 queue *queue_create(const queue_options *options, catalogue *cat);
@@ -158,6 +160,11 @@ enum { QUEUE_GUESTS_MAX = 4 };
  * of an owner fetch at once. */
 enum { QUEUE_FETCHES_OF_OWNER = 4 };
 int queue_take(queue *q, queue_lane lane, job **out, int *threads);
+/* The bytes of memory that a taken job may use; 0: not limited here. */
+int64_t queue_memory_of(queue *q, job *j);
+/* The taken job needs more memory: returns it, to run with all that jobs may have. Its attempt does not count. 0: it
+ * had that already. */
+int queue_needs_memory(queue *q, job *j);
 /* Shows a taken job as running before it is claimed: a job that downloads. If the process dies, the job is not suspect.
  */
 void queue_show_running(queue *q, job *j);

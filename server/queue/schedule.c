@@ -35,22 +35,39 @@ static int share_of_owner(queue *q, int64_t now) {
   return active > 1 ? (q->options.workers + active - 1) / active : q->options.workers;
 }
 
+static budget_part part_of(queue_lane lane) {
+  return lane == QUEUE_GUESTS ? BUDGET_SMALL : BUDGET_JOBS;
+}
+
+/* The bytes that a job needs in this lane; 0: memory does not count. */
+static int64_t memory_of(const queue *q, queue_lane lane, const job *j) {
+  if (!q->options.memory || fetches(j)) {
+    return 0;
+  }
+  const int64_t most = budget_most(q->options.memory, part_of(lane)), share = most / SHARE_OF_JOB;
+  const int64_t base = share < BYTES_OF_JOB ? share : BYTES_OF_JOB;
+  return j->needs_all || j->row.cost > (most - base) / BYTES_A_TRIANGLE ? most : base + BYTES_A_TRIANGLE * j->row.cost;
+}
+
+static int has_memory(const queue *q, queue_lane lane, const job *j) {
+  return !q->options.memory || budget_has_room(q->options.memory, part_of(lane), memory_of(q, lane, j));
+}
+
 /* Whether a worker of this lane may take a runnable job that computes. kept: the workers are kept for a suspect. */
 static int admits(const queue *q, queue_lane lane, const job *j, int kept) {
   int workers = q->options.workers, most_large = workers > 1 ? workers - 1 : 1;
   int computing = q->running - q->fetching - q->guests, large = j->row.cost > LARGE;
-  int has_memory = q->running == 0 || (q->running_cost + j->row.cost) * BYTES_A_TRIANGLE <= q->options.memory;
+  int fits = has_memory(q, QUEUE_COMPUTES, j);
   if (lane == QUEUE_COMPUTES) {
-    return has_memory && !(large && q->running_large >= most_large);
+    return fits && !(large && q->running_large >= most_large);
   }
-  if (large) {
+  if (large || j->needs_all || !has_memory(q, QUEUE_GUESTS, j)) {
     return 0;
   }
-  if (workers == 1 && computing == 1 && q->guests == 0 && q->running_large == 1 && has_memory && !kept) {
+  if (workers == 1 && computing == 1 && q->guests == 0 && q->running_large == 1 && !kept) {
     return 1;
   }
-  return q->owners[j->owner].running == 0 && (computing >= workers || !has_memory || kept) &&
-         (q->guest_cost + j->row.cost) * BYTES_A_TRIANGLE <= q->options.memory / GUEST_MEMORY;
+  return q->owners[j->owner].running == 0 && (computing >= workers || !fits || kept);
 }
 
 /* The next job for a worker, or NULL. */
@@ -98,17 +115,30 @@ static void count(queue *q, const job *j, int by) {
   }
   if (j->is_guest) {
     q->guests += by;
-    q->guest_cost += by * j->row.cost;
   } else {
     q->running_large += by * (j->row.cost > LARGE);
-    q->running_cost += by * j->row.cost;
   }
+}
+
+/* 0: others took it just now, and wake the queue when they end. */
+static int take_memory(queue *q, queue_lane lane, job *j) {
+  int64_t bytes = memory_of(q, lane, j);
+  int taken = bytes == 0 || budget_take(q->options.memory, part_of(lane), bytes);
+  j->memory = taken ? bytes : 0;
+  return taken;
+}
+
+int64_t queue_memory_of(queue *q, job *j) {
+  pthread_mutex_lock(&q->lock);
+  int64_t bytes = j->memory;
+  pthread_mutex_unlock(&q->lock);
+  return bytes;
 }
 
 int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
   pthread_mutex_lock(&q->lock);
   job *j = NULL;
-  while (!q->stopping && !(j = choose(q, lane))) {
+  while (!q->stopping && !((j = choose(q, lane)) && take_memory(q, lane, j))) {
     pthread_cond_wait(&q->work, &q->lock);
   }
   if (j && !q->stopping) {
@@ -140,6 +170,10 @@ int queue_take(queue *q, queue_lane lane, job **out, int *threads) {
 void schedule_leave(queue *q, job *j) {
   owner_charge(q, j, fetches(j) ? 0 : used_ms(j, orb_clock_ms()));
   count(q, j, -1);
+  if (j->memory > 0) {
+    budget_give(q->options.memory, j->is_guest ? BUDGET_SMALL : BUDGET_JOBS, j->memory, q);
+  }
+  j->memory = 0;
   q->exclusive = q->exclusive && j->is_guest;
   j->taken_at = 0;
   j->charged = 0;

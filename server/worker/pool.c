@@ -139,7 +139,8 @@ static void finish_failed(const run_env *env, job *j, orb_context *ctx, api_prob
 
 /* The context of a job; NULL after ending the job. */
 static orb_context *begin(worker_pool *pool, job *j, int threads, job_progress *progress) {
-  orb_context_options options = {.memory_limit = (size_t)pool->options.job_memory,
+  const int64_t memory = queue_memory_of(pool->env.q, j);
+  orb_context_options options = {.memory_limit = (size_t)(memory ? memory : pool->options.job_memory),
                                  .threads = threads,
                                  .deadline_ms = orb_clock_ms() + pool->options.job_ms,
                                  .max_triangles = pool->options.max_triangles,
@@ -197,7 +198,8 @@ static int run_somewhere(worker_pool *pool, const run_env *env, orb_context *ctx
                          api_problem *problem, isolated_end *end) {
   const run_job task = {job_key(j), job_request(j), queue_embed_ms(env->q, j)};
   if (isolate_is_on()) {
-    const isolated_limits limits = {.memory = pool->options.job_memory,
+    const int64_t memory = queue_memory_of(env->q, j);
+    const isolated_limits limits = {.memory = memory ? memory : pool->options.job_memory,
                                     .deadline_ms = orb_clock_ms() + pool->options.job_ms,
                                     .max_triangles = pool->options.max_triangles,
                                     .threads = threads,
@@ -231,6 +233,10 @@ static void crashed(const run_env *env, job *j, const isolated_end *end) {
   queue_finish(env->q, j, API_JOB_FAILED, text.failed ? NULL : text.data, NULL);
   api_text_free(&text);
   api_problem_free(&problem);
+}
+
+static int lacks_memory(orb_context *ctx, const api_problem *problem) {
+  return problem->name ? strcmp(problem->name, "no-memory") == 0 : orb_context_error(ctx)->status == ORB_E_NO_MEMORY;
 }
 
 static void run_claimed(worker_pool *pool, job *j, int threads) {
@@ -267,7 +273,7 @@ static void run_claimed(worker_pool *pool, job *j, int threads) {
     queue_finish(env->q, j, API_JOB_SUCCEEDED, NULL, out.row.json ? &out.row : NULL);
   } else if (out.gone) {
     queue_give_back(env->q, j); /* a worker plans it again */
-  } else {
+  } else if (!lacks_memory(ctx, &problem) || !queue_needs_memory(env->q, j)) {
     finish_failed(env, j, ctx, &problem);
   }
   if (out.holds) {

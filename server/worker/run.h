@@ -44,12 +44,13 @@ int run_supermesh(const run_env *env, orb_context *ctx, const run_job *j, run_ou
 store_result run_get(const run_env *env, resource_kind kind, const char *id, resource *out);
 
 typedef struct fetch_options {
-  networks allowed;                        /* besides public addresses */
-  const char *authorities;                 /* PEM file of certificate authorities; "": those of the system */
-  int64_t total_ms, most;                  /* limits on the time and the bytes of a download */
-  int64_t disk_reserve;                    /* bytes that it leaves free */
-  int64_t check_ms, memory, max_triangles; /* limits on the check */
-  sem_t *checks;                           /* limits how many check a mesh at once */
+  networks allowed;                /* besides public addresses */
+  const char *authorities;         /* PEM file of certificate authorities; "": those of the system */
+  int64_t total_ms, most;          /* limits on the time and the bytes of a download */
+  int64_t disk_reserve;            /* bytes that it leaves free */
+  int64_t check_ms, max_triangles; /* limits on the check */
+  memory_budget *memory;           /* of checks */
+  sem_t *checks;                   /* limits how many check a mesh at once */
 } fetch_options;
 /* Downloads and stores the mesh of a taken job, and claims the job in between. 1 with the mesh; 0 with the problem as
  * above, or with *claimed 0: the claim could not be stored. */

@@ -132,10 +132,13 @@ static int store(download *d, const job *j, const api_fetch_request *wish, char 
   } else if (stored == STORE_NOT_FOUND) {
     while (sem_wait(d->options->checks) != 0) { /* interrupted by a signal */
     }
-    const intake_limits limits = {.memory = d->options->memory,
+    const int64_t memory = budget_for_densest_file(d->options->memory, BUDGET_CHECKS, d->size);
+    budget_wait(d->options->memory, BUDGET_CHECKS, memory);
+    const intake_limits limits = {.memory = memory,
                                   .deadline_ms = orb_clock_ms() + d->options->check_ms,
                                   .max_triangles = d->options->max_triangles};
     stored = intake_store(&file, env->cat, env->store, d->ctx, &limits, job_owner(j), wish->quota, &fresh, problem);
+    budget_give(d->options->memory, BUDGET_CHECKS, memory, NULL);
     sem_post(d->options->checks);
   }
   intake_close(&file);

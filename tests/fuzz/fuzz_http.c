@@ -43,18 +43,19 @@ int LLVMFuzzerInitialize(int *argc, char ***argv) {
   char *words[] = {
       "orbmorphd",      "--listen", listen,     "--data", folder,    "--max-body", "1M",     "--max-json",        "64K",
       "--disk-reserve", "0",        "--limits", "off",    "--hosts", "*",          "--cors", "https://a.example", NULL};
-  queue_options queued = {.workers = 1, .cores = 1, .limit = QUEUED_MOST, .memory = INT64_C(1) << 40};
+  srv.memory = budget_create(INT64_C(1) << 40);
+  queue_options queued = {.workers = 1, .cores = 1, .limit = QUEUED_MOST, .memory = srv.memory};
   if (config_read(&options, (int)(sizeof words / sizeof *words) - 1, words) != CONFIG_RUN) {
     abort();
   }
   log_setup(LOG_ERROR, 1);
   srv.options = &options;
   srv.control = -1;
-  if (!listen_open(&options, &srv.at) || objects_open(options.data, &srv.store) != STORE_OK ||
+  if (!srv.memory || !listen_open(&options, &srv.at) || objects_open(options.data, &srv.store) != STORE_OK ||
       catalogue_open(options.data, &srv.cat) != STORE_OK || !add_token() || !(srv.callers = callers_open(srv.cat)) ||
       !(srv.q = queue_create(&queued, srv.cat)) || !(srv.descriptions = cache_create(1 << 20)) ||
-      !(srv.io = tasks_start(1, INT64_MAX)) || !(srv.checks = tasks_start(1, INT64_MAX)) ||
-      !(srv.large_checks = tasks_start(1, INT64_MAX)) || !http_start(&srv)) {
+      !(srv.io = tasks_start(1, NULL)) || !(srv.checks = tasks_start(1, srv.memory)) ||
+      !(srv.large_checks = tasks_start(1, srv.memory)) || !http_start(&srv)) {
     abort();
   }
   __atomic_store_n(&srv.ready, 1, __ATOMIC_RELEASE);

@@ -237,6 +237,34 @@ for (const what of ['landlock', 'seccomp'])
     assert.equal(await on.code, 0, on.text);
   });
 
+test('a job that needs more than its share of the memory runs again with all of it', async (t) => {
+  for (const isolate of ['on', 'off']) {
+    const d = await daemon(t, { args: ['--job-memory', '4M', '--isolate', isolate] });
+    const ids = [];
+    for (const k of [1, 2]) {
+      const text = shapes.obj(shapes.ball(3, ([x, y, z]) => [x * (1 + 0.1 * Math.sin(3 * y + k)), y, z]));
+      ids.push((await d.upload(text)).json.id);
+    }
+    const wish = {
+      shapes: ids.map((mesh) => ({ mesh })),
+      align: { method: 'rotate' },
+      remesh: { method: 'adaptive', tolerance: 1e-6 },
+    };
+    const job = await d.ended((await d.post('/v1/supermeshes', wish)).json);
+    assert.equal(job.state, 'succeeded', JSON.stringify(job.problem));
+    assert.equal(job.attempt, 1, 'the attempt does not count');
+    assert.match(
+      d.log,
+      new RegExp(`job ${job.id} needs more than its share of the memory and runs again with all of it`),
+    );
+    const small = await d.ended(
+      (await d.post('/v1/embeddings', { mesh: (await d.upload(shapes.tetrahedron)).json.id })).json,
+    );
+    assert.equal(small.state, 'succeeded');
+    assert.doesNotMatch(d.log, new RegExp(`job ${small.id} needs more`));
+  }
+});
+
 test('within the service, as isolate = off asks, no process is forked', async (t) => {
   const d = await daemon(t, { args: ['--isolate', 'off'] });
   const { json: mesh } = await d.upload(shapes.tetrahedron);

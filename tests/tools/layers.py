@@ -26,7 +26,7 @@ ORDER = [
     "core/align/find", "core/align",
     "core/remesh/common", "core/remesh/overlay", "core/remesh/placed", "core/remesh/adaptive", "core/remesh",
     "core/transfer", "core/profile", "core/merge", "api",
-    "server/log", "server/hash", "server/faults", "server/wake", "server/tasks", "server/metrics", "server/pages", "server/studio",
+    "server/log", "server/hash", "server/faults", "server/wake", "server/budget", "server/tasks", "server/metrics", "server/pages", "server/studio",
     "server/net", "server/config", "server/control", "server/systemd", "server/store", "server/isolate", "server/intake", "server/deliver", "server/cache", "server/queue", "server/worker",
     "server/evict", "server/scrub", "server/maintain", "server/backup", "server/admin", "server/http", "server/main",
     "client/cli", "client/js/src", "client/web/src/mesh", "client/web/src/view", "client/web/src/theme", "client/web/src/focus",

@@ -24,7 +24,7 @@ typedef struct stored {
 
 static int setup(void **state) {
   stored *s = calloc(1, sizeof *s);
-  const queue_options options = {.workers = 1, .cores = 1, .limit = 1000, .memory = INT64_MAX};
+  const queue_options options = {.workers = 1, .cores = 1, .limit = 1000};
   strcpy(s->data, access("/dev/shm", W_OK) == 0 ? "/dev/shm/orbmorph-evict-XXXXXX" : "/tmp/orbmorph-evict-XXXXXX");
   if (!mkdtemp(s->data) || objects_open(s->data, &s->env.store) != STORE_OK ||
       catalogue_open(s->data, &s->env.cat) != STORE_OK || !(s->env.q = queue_create(&options, s->env.cat))) {

@@ -17,7 +17,7 @@
 enum { SMALL = 1000, SECOND = 1000 };
 
 static queue *open_queue(const stored *s, int workers) {
-  const queue_options options = {.workers = workers, .cores = workers, .limit = 1000, .memory = INT64_MAX};
+  const queue_options options = {.workers = workers, .cores = workers, .limit = 1000};
   queue *q = queue_create(&options, s->cat);
   assert_non_null(q);
   return q;
@@ -217,7 +217,7 @@ static void test_tasks_take_turns(void **state) {
   (void)state;
   int next = 0;
   noted many[MANY], few[FEW], one = {.task = {.run = note, .owner = 3}, .ms = 5 * MANY_MS, .next = &next};
-  tasks *pool = tasks_start(1, INT64_MAX);
+  tasks *pool = tasks_start(1, NULL);
   assert_non_null(pool);
   tasks_add(pool, &one.task); /* keeps the thread until all are there */
   for (int i = 0; i < MANY; i++) {
@@ -229,6 +229,7 @@ static void test_tasks_take_turns(void **state) {
     tasks_add(pool, &few[i].task);
   }
   tasks_stop(pool);
+  tasks_free(pool);
   assert_int_equal(next, 1 + MANY + FEW);
   assert_true(few[0].at <= 3);
   assert_true(few[1].at <= 4);
@@ -253,32 +254,70 @@ static void weigh(task *t) {
   __atomic_sub_fetch(h->in_use, t->memory, __ATOMIC_SEQ_CST);
 }
 
-/* All tasks that run at once stay within the memory of the pool; one that needs more than that runs alone. */
+/* All tasks that run at once, of all pools together, stay within the memory of their part. One for which there is none
+ * lets others pass. */
 static void test_tasks_share_memory(void **state) {
   (void)state;
   static const int64_t needs[] = {60, 60, 40, 60, 40, 100, 40, 40};
   enum { TASKS = sizeof needs / sizeof *needs };
   int64_t in_use = 0, most = 0;
-  heavy all[TASKS], huge = {.task = {.run = weigh, .memory = 250}, .in_use = &in_use, .most = &most};
-  tasks *pool = tasks_start(4, 100);
-  assert_non_null(pool);
+  heavy all[TASKS];
+  memory_budget *memory = budget_create(200);
+  assert_non_null(memory);
+  assert_int_equal(budget_most(memory, BUDGET_JOBS), 200);
+  assert_int_equal(budget_most(memory, BUDGET_CHECKS), 100);
+  assert_int_equal(budget_most(memory, BUDGET_SMALL), 50);
+  tasks *pools[] = {tasks_start(4, memory), tasks_start(4, memory)};
+  assert_true(pools[0] && pools[1]);
   for (int i = 0; i < TASKS; i++) {
-    all[i] =
-        (heavy){.task = {.run = weigh, .memory = needs[i], .owner = (uint64_t)i % 3}, .in_use = &in_use, .most = &most};
-    tasks_add(pool, &all[i].task);
+    all[i] = (heavy){.task = {.run = weigh, .memory = needs[i], .part = BUDGET_CHECKS, .owner = (uint64_t)i % 3},
+                     .in_use = &in_use,
+                     .most = &most};
+    tasks_add(pools[i % 2], &all[i].task);
   }
-  tasks_stop(pool);
+  tasks_stop(pools[0]);
+  tasks_stop(pools[1]);
+  tasks_free(pools[0]);
+  tasks_free(pools[1]);
   assert_true(most <= 100);
   assert_true(most > 60); /* two at once, where they fit */
+  assert_true(budget_has_room(memory, BUDGET_CHECKS, 100));
+
+  budget_destroy(memory);
+  memory = budget_create(200);
+  assert_non_null(memory);
+
+  /* Beside what takes its part whole, another part still has room, and a smaller task passes a larger one. */
   most = 0;
-  pool = tasks_start(4, 100);
-  assert_non_null(pool);
-  all[0].task.memory = 10;
-  tasks_add(pool, &all[0].task);
-  tasks_add(pool, &huge.task);
-  tasks_add(pool, &all[2].task);
+  assert_true(budget_take(memory, BUDGET_CHECKS, 70));
+  assert_false(budget_take(memory, BUDGET_CHECKS, 31));
+  tasks *pool = tasks_start(1, memory);
+  int next = 0;
+  noted large = {.task = {.run = note, .memory = 31, .part = BUDGET_CHECKS}, .next = &next};
+  noted small = {.task = {.run = note, .memory = 50, .part = BUDGET_SMALL}, .next = &next};
+  tasks_add(pool, &large.task);
+  tasks_add(pool, &small.task);
+  for (int i = 0; i < 500 && __atomic_load_n(&next, __ATOMIC_SEQ_CST) == 0; i++) {
+    sleep_ms(10);
+  }
+  budget_give(memory, BUDGET_CHECKS, 70, NULL); /* wakes the pool */
   tasks_stop(pool);
-  assert_int_equal(most, 250);
+  tasks_free(pool);
+  assert_int_equal(small.at, 0);
+  assert_int_equal(large.at, 1);
+  budget_destroy(memory);
+}
+
+/* What a file is expected to need. */
+static void test_memory_of_files(void **state) {
+  (void)state;
+  memory_budget *memory = budget_create(INT64_C(4) << 30);
+  assert_non_null(memory);
+  assert_int_equal(budget_for_file(memory, BUDGET_CHECKS, 1000000), (4 << 20) + 24000000);
+  assert_int_equal(budget_for_densest_file(memory, BUDGET_CHECKS, 1000000), (4 << 20) + 200000000);
+  assert_int_equal(budget_for_densest_file(memory, BUDGET_CHECKS, INT64_C(1) << 60), INT64_C(2) << 30);
+  assert_int_equal(budget_for_densest_file(memory, BUDGET_SMALL, 5000000), (4 << 20) + 1000000000);
+  budget_destroy(memory);
 }
 
 int main(void) {
@@ -292,6 +331,7 @@ int main(void) {
       cmocka_unit_test_setup_teardown(test_guests_pass_a_suspect, stored_setup, stored_teardown),
       cmocka_unit_test(test_tasks_take_turns),
       cmocka_unit_test(test_tasks_share_memory),
+      cmocka_unit_test(test_memory_of_files),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

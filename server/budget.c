@@ -1,0 +1,99 @@
+#include "budget.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+
+enum { FILE_BASE = 4 << 20, FILE_BYTES = 24, DENSEST_BYTES = 200 };
+
+struct memory_budget {
+  pthread_mutex_t lock;
+  pthread_cond_t freed;
+  int64_t most[BUDGET_PARTS], taken[BUDGET_PARTS]; /* by part */
+  struct {
+    void (*freed)(void *user);
+    void *user;
+  } listeners[BUDGET_LISTENERS];
+  int listener_count;
+};
+
+memory_budget *budget_create(int64_t job_memory) {
+  memory_budget *b = calloc(1, sizeof *b);
+  if (b) {
+    b->most[BUDGET_JOBS] = job_memory;
+    b->most[BUDGET_CHECKS] = job_memory / 2;
+    b->most[BUDGET_SMALL] = job_memory / 4;
+    pthread_mutex_init(&b->lock, NULL);
+    pthread_cond_init(&b->freed, NULL);
+  }
+  return b;
+}
+
+void budget_destroy(memory_budget *b) {
+  if (b) {
+    pthread_mutex_destroy(&b->lock);
+    pthread_cond_destroy(&b->freed);
+  }
+  free(b);
+}
+
+void budget_listen(memory_budget *b, void (*freed)(void *user), void *user) {
+  b->listeners[b->listener_count].freed = freed;
+  b->listeners[b->listener_count++].user = user;
+}
+
+int64_t budget_most(const memory_budget *b, budget_part part) {
+  return b->most[part];
+}
+
+static int has_room(const memory_budget *b, budget_part part, int64_t bytes) {
+  return bytes <= b->most[part] - b->taken[part];
+}
+
+int budget_has_room(memory_budget *b, budget_part part, int64_t bytes) {
+  pthread_mutex_lock(&b->lock);
+  int room = has_room(b, part, bytes);
+  pthread_mutex_unlock(&b->lock);
+  return room;
+}
+
+int budget_take(memory_budget *b, budget_part part, int64_t bytes) {
+  pthread_mutex_lock(&b->lock);
+  int room = has_room(b, part, bytes);
+  b->taken[part] += room ? bytes : 0;
+  pthread_mutex_unlock(&b->lock);
+  return room;
+}
+
+void budget_wait(memory_budget *b, budget_part part, int64_t bytes) {
+  pthread_mutex_lock(&b->lock);
+  while (!has_room(b, part, bytes)) {
+    pthread_cond_wait(&b->freed, &b->lock);
+  }
+  b->taken[part] += bytes;
+  pthread_mutex_unlock(&b->lock);
+}
+
+void budget_give(memory_budget *b, budget_part part, int64_t bytes, const void *self) {
+  pthread_mutex_lock(&b->lock);
+  b->taken[part] -= bytes;
+  pthread_cond_broadcast(&b->freed);
+  pthread_mutex_unlock(&b->lock);
+  for (int i = 0; i < b->listener_count; i++) {
+    if (b->listeners[i].user != self) {
+      b->listeners[i].freed(b->listeners[i].user);
+    }
+  }
+}
+
+static int64_t for_file(const memory_budget *b, budget_part part, int64_t bytes, int64_t multiple) {
+  const int64_t most = b->most[part];
+  return most <= FILE_BASE || bytes > (most - FILE_BASE) / multiple ? most : FILE_BASE + multiple * bytes;
+}
+
+int64_t budget_for_file(const memory_budget *b, budget_part part, int64_t bytes) {
+  return for_file(b, part, bytes, FILE_BYTES);
+}
+
+int64_t budget_for_densest_file(const memory_budget *b, budget_part part, int64_t bytes) {
+  return for_file(b, part, bytes, DENSEST_BYTES);
+}

@@ -1,0 +1,37 @@
+#!/bin/bash
+# Runs scenarios of this version against the daemon of an older one, to see which of them fail there, and why.
+#   tests/long/before.sh PROGRAM SCENARIO…      PROGRAM: the older orbmorphd
+# Options that the older daemon does not know are left out, with their values. Its address space is limited, since some
+# scenarios make it take all memory.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+old=$(realpath "$1")
+shift
+seconds=${ORB_BEFORE_SECONDS:-300}
+at=$(mktemp -d)
+trap 'rm -rf "$at"' EXIT
+"$old" --help >"$at/help"
+cat >"$at/orbmorphd" <<END
+#!/bin/bash
+ulimit -v ${ORB_BEFORE_KB:-6000000}
+args=()
+while [ \$# -gt 0 ]; do
+  if [[ \$1 == --* ]] && ! grep -q -e "\${1%%=*}\b" "$at/help"; then
+    [[ \$1 == *=* || \${2:---} == --* ]] || shift
+  else
+    args+=("\$1")
+  fi
+  shift
+done
+exec "$old" "\${args[@]}"
+END
+chmod +x "$at/orbmorphd"
+export ORBMORPHD=$at/orbmorphd ORBMORPH=${ORBMORPH:-$PWD/build/bin/orbmorph}
+for name in "$@"; do
+  echo "== scenario.$name"
+  timeout "$seconds" node --test --test-timeout="${seconds}000" "tests/scenario/$name.test.mjs" >"$at/out" 2>&1 || true
+  awk '/^# Subtest:/ { test = substr($0, 12) }
+    /^(not )?ok / { print }
+    /^  error:/ { want = 1; rest = $0; sub(/^ *error: */, "", rest); if (rest != "|-") { print "    " rest; want = 0 }; next }
+    want && NF { sub(/^ +/, ""); print "    " substr($0, 1, 200); want = 0 }' "$at/out"
+done
