@@ -95,7 +95,8 @@ test('jobs that have not ended count, so that many requests at once do not pass'
   }
   const { sum, count } = await stored(ann);
   assert.equal(count, jobs.length);
-  assert.ok(sum <= QUOTA && sum > QUOTA - (2 * sum) / count, `${count} embeddings, ${sum} bytes`);
+  // A job that is ending counts twice for a moment.
+  assert.ok(sum <= QUOTA && sum > QUOTA - (4 * sum) / count, `${count} embeddings, ${sum} bytes`);
 });
 
 test('kept alignments count, and give way to results', async (t) => {
