@@ -144,7 +144,7 @@ for (const zUp of [false, true])
       pictures: [await readFile(png), await readFile(other), ...studio.pictures].map((p) => p.toString('base64')),
     });
   }
-await writeFile(out, await sheet(browser, rows, { across: 1, width: 300, height: 150, wide: 2 }));
+await writeFile(out, await sheet(browser, rows, { across: 1, width: 200, height: 100, wide: 2 }));
 await browser.close();
 await daemon.stop();
 await rm(folder, { recursive: true, force: true });
