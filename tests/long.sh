@@ -136,7 +136,8 @@ part_blender() {
   rm -r "$folder"
 }
 
-# The samples and real meshes, in pairs, through the studio: a contact sheet to look at, build/visit/pairs.png.
+# The samples and real meshes, in pairs, through the studio: contact sheets to look at, build/visit/pairs.png and, of
+# units and axes, units.png.
 part_visit() {
   local meshes=${ORB_MESHES:-../shared/meshes}
   local list=(tests/samples/giraffe.off tests/samples/elephant.ply) name
@@ -150,6 +151,8 @@ part_visit() {
   cmake --preset release >/dev/null
   cmake --build build --target orbmorphd
   node tests/long/visit.mjs build/visit "${list[@]}"
+  cmake --build build --target orbmorph
+  node tests/long/units.mjs build/visit/units.png
 }
 
 part_load() {

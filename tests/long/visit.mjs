@@ -18,6 +18,7 @@ import {
   until,
 } from '../studio/support.mjs';
 import { parseGlb } from '../scenario/support/glb.mjs';
+import { sheet } from './sheet.mjs';
 
 const [folder, ...files] = process.argv.slice(2);
 assert.ok(folder && files.length >= 2 && files.length % 2 === 0, 'usage: visit.mjs FOLDER MESH MESH [MESH MESH…]');
@@ -64,34 +65,6 @@ async function visit(pair, pictures) {
   await done();
 }
 
-/** Two pictures a row, with the names of the pair. */
-async function sheet(rows) {
-  const page = await browser.newPage();
-  const data = await page.evaluate(async (list) => {
-    const [width, height, head] = [360, 300, 22];
-    const canvas = new OffscreenCanvas(4 * width, Math.ceil(list.length / 2) * (height + head));
-    const context = canvas.getContext('2d');
-    context.fillStyle = '#fff';
-    context.fillRect(0, 0, canvas.width, canvas.height);
-    context.fillStyle = '#000';
-    context.font = '14px sans-serif';
-    for (const [i, { title, pictures }] of list.entries()) {
-      const [left, top] = [2 * width * (i % 2), Math.floor(i / 2) * (height + head)];
-      context.fillText(title, left + 6, top + 16);
-      for (const [k, text] of pictures.entries()) {
-        const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-        const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-        const scale = Math.min(width / image.width, height / image.height);
-        context.drawImage(image, left + k * width, top + head, scale * image.width, scale * image.height);
-      }
-    }
-    const bytes = new Uint8Array(await (await canvas.convertToBlob()).arrayBuffer());
-    return bytes.toBase64?.() ?? btoa(Array.from(bytes, (b) => String.fromCharCode(b)).join(''));
-  }, rows);
-  await page.close();
-  return Buffer.from(data, 'base64');
-}
-
 const rows = [];
 let failed = 0;
 for (let i = 0; i < files.length; i += 2) {
@@ -110,7 +83,7 @@ for (let i = 0; i < files.length; i += 2) {
   for (const [k, picture] of pictures.entries()) await writeFile(join(folder, `${i / 2}-${k}.png`), picture);
   rows.push({ title: problem ? `${title}: ${problem}` : title, pictures: pictures.map((p) => p.toString('base64')) });
 }
-await writeFile(join(folder, 'pairs.png'), await sheet(rows));
+await writeFile(join(folder, 'pairs.png'), await sheet(browser, rows));
 await browser.close();
 await daemon.stop();
 process.exit(failed ? 1 : 0);
