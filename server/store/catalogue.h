@@ -4,7 +4,8 @@
  * Reading order:
  *   catalogue.h   rows of meshes, embeddings, supermeshes, jobs and events: the interface
  *   objects.h     files, each named by a hash; owners.h   who owns which row; tokens.h   the tokens
- *   database.c    connections, the schema and its migrations
+ *   sql.h         statements over a database; sqlite.c   the driver of SQLite
+ *   database.c    connections with prepared statements, the schema and its migrations
  *   catalogue.c   the writer thread with group commit, the pool of readers
  *   rows.c        reading rows of any kind
  *   resources.c, owners.c, jobs.c, tokens.c, keys.c, webhooks.c   the SQL of each kind of row; lists.c   lists with a
@@ -21,8 +22,6 @@
  */
 #ifndef ORB_STORE_CATALOGUE_H
 #define ORB_STORE_CATALOGUE_H
-
-#include <sqlite3.h>
 
 #include "api/ids.h"
 #include "api/job_codec.h"

@@ -1,6 +1,6 @@
 #include "store/database.h"
 
-#include <stdlib.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "faults.h"
@@ -149,27 +149,13 @@ static const char *const migrations[] = {
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 
 int database_execute(database *db, const char *sql) {
-  char *message = NULL;
-  int code = sqlite3_exec(db->handle, sql, NULL, NULL, &message);
-  if (code != SQLITE_OK) {
-    log_error("catalogue: %.60s: %s", sql, message ? message : sqlite3_errstr(code));
-  }
-  sqlite3_free(message);
-  return code;
+  return db->connection.driver->execute(&db->connection, sql);
 }
 
 int database_open(const char *path, int writer, database *out) {
   memset(out, 0, sizeof *out);
-  int flags = SQLITE_OPEN_NOMUTEX | (writer ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY);
-  int code = sqlite3_open_v2(path, &out->handle, flags, NULL);
-  if (code == SQLITE_OK) {
-    sqlite3_busy_timeout(out->handle, 5000);
-    sqlite3_db_config(out->handle, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, writer ? 0 : 1, NULL);
-    code = database_execute(out, writer ? "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;"
-                                          "PRAGMA wal_autocheckpoint=1000; PRAGMA journal_size_limit=67108864;"
-                                        : "PRAGMA query_only=ON; PRAGMA wal_autocheckpoint=0;");
-  }
-  if (code != SQLITE_OK) {
+  int code = sql_sqlite.open(path, writer, &out->connection);
+  if (code != SQL_OK) {
     database_close(out);
   }
   return code;
@@ -177,68 +163,73 @@ int database_open(const char *path, int writer, database *out) {
 
 void database_close(database *db) {
   for (int i = 0; i < DATABASE_STATEMENTS; i++) {
-    sqlite3_finalize(db->cached[i].statement);
+    if (db->cached[i].statement.driver) {
+      db->cached[i].statement.driver->finish(&db->cached[i].statement);
+    }
   }
-  sqlite3_close(db->handle);
+  if (db->connection.driver) {
+    db->connection.driver->close(&db->connection);
+  }
   memset(db, 0, sizeof *db);
 }
 
-sqlite3_stmt *database_statement(database *db, const char *sql) {
+sql_statement *database_statement(database *db, const char *sql) {
+  const sql_driver *driver = db->connection.driver;
   int i = 0;
   while (i < DATABASE_STATEMENTS - 1 && db->cached[i].sql && db->cached[i].sql != sql) {
     i++;
   }
+  sql_statement *st = &db->cached[i].statement;
   if (db->cached[i].sql != sql) {
-    sqlite3_finalize(db->cached[i].statement);
+    if (st->driver) {
+      driver->finish(st);
+    }
     db->cached[i].sql = NULL;
-    int code = sqlite3_prepare_v3(db->handle, sql, -1, SQLITE_PREPARE_PERSISTENT, &db->cached[i].statement, NULL);
-    if (code != SQLITE_OK) {
-      log_error("catalogue: %s: %s", sql, sqlite3_errmsg(db->handle));
-      db->cached[i].statement = NULL;
+    if (driver->prepare(&db->connection, sql, st) != SQL_OK) {
+      log_error("catalogue: %s: %s", sql, driver->message(&db->connection));
       return NULL;
     }
     db->cached[i].sql = sql;
   }
-  sqlite3_reset(db->cached[i].statement);
-  sqlite3_clear_bindings(db->cached[i].statement);
-  return db->cached[i].statement;
+  driver->reset(st);
+  driver->clear(st);
+  return st;
 }
 
-int database_run(database *db, sqlite3_stmt *statement) {
+int database_run(database *db, sql_statement *statement) {
   if (!statement) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  int code = sqlite3_step(statement);
-  sqlite3_reset(statement);
-  if (code == SQLITE_DONE || code == SQLITE_ROW) {
-    return SQLITE_OK;
+  int code = sql_step(statement);
+  sql_reset(statement);
+  if (code == SQL_DONE || code == SQL_ROW) {
+    return SQL_OK;
   }
-  log_error("catalogue: %s", sqlite3_errmsg(db->handle));
+  log_error("catalogue: %s", db->connection.driver->message(&db->connection));
   return code;
 }
 
 int database_migrate(database *db) {
-  sqlite3_stmt *statement = database_statement(db, "PRAGMA user_version");
-  if (!statement || sqlite3_step(statement) != SQLITE_ROW) {
-    return SQLITE_ERROR;
+  sql_statement *statement = database_statement(db, "PRAGMA user_version");
+  if (!statement || sql_step(statement) != SQL_ROW) {
+    return SQL_ERROR;
   }
-  int version = sqlite3_column_int(statement, 0);
-  sqlite3_reset(statement);
+  int version = sql_int(statement, 0);
+  sql_reset(statement);
   if (version > SCHEMA) {
     log_error("the catalogue has schema %d, but this program supports up to %d: install a newer version", version,
               (int)SCHEMA);
-    return SQLITE_SCHEMA;
+    return SQL_SCHEMA;
   }
   for (; version < SCHEMA; version++) {
     char mark[64];
     FAULT_POINT("migrate");
-    sqlite3_snprintf(sizeof mark, mark, "PRAGMA user_version=%d", version + 1);
-    if (database_execute(db, "BEGIN IMMEDIATE") != SQLITE_OK ||
-        database_execute(db, migrations[version]) != SQLITE_OK || database_execute(db, mark) != SQLITE_OK ||
-        database_execute(db, "COMMIT") != SQLITE_OK) {
+    snprintf(mark, sizeof mark, "PRAGMA user_version=%d", version + 1);
+    if (database_execute(db, "BEGIN IMMEDIATE") != SQL_OK || database_execute(db, migrations[version]) != SQL_OK ||
+        database_execute(db, mark) != SQL_OK || database_execute(db, "COMMIT") != SQL_OK) {
       database_execute(db, "ROLLBACK");
-      return SQLITE_ERROR;
+      return SQL_ERROR;
     }
   }
-  return SQLITE_OK;
+  return SQL_OK;
 }

@@ -2,6 +2,7 @@
  * in server/store state the expected behaviour. */
 #include <fcntl.h>
 #include <setjmp.h>
+#include <sqlite3.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
