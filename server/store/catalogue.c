@@ -53,7 +53,7 @@ static void run_batch(catalogue *cat, pending *batch) {
   FAULT_POINT("before-begin");
   /* A previous transaction may still be open if its rollback failed. */
   int code = sql_in_transaction(db) ? database_execute(db, "ROLLBACK") : SQL_OK;
-  code = code == SQL_OK ? database_execute(db, "BEGIN IMMEDIATE") : code;
+  code = code == SQL_OK ? database_execute(db, database_either(db, "BEGIN IMMEDIATE", "BEGIN")) : code;
   for (pending *p = batch; p && code == SQL_OK; p = p->next) {
     if (database_execute(db, "SAVEPOINT one") != SQL_OK) {
       code = SQL_IOERR;
@@ -181,7 +181,7 @@ const char *catalogue_path(const catalogue *cat) {
   return cat->path;
 }
 
-store_result catalogue_open(const char *data, catalogue **out) {
+store_result catalogue_open(const char *where, catalogue **out) {
   catalogue *cat = calloc(1, sizeof *cat);
   if (!cat) {
     return STORE_ERROR;
@@ -191,16 +191,20 @@ store_result catalogue_open(const char *data, catalogue **out) {
   pthread_cond_init(&cat->wake, NULL);
   pthread_cond_init(&cat->committed, NULL);
   pthread_cond_init(&cat->reader_free, NULL);
-  snprintf(cat->path, sizeof cat->path, "%s/catalogue.sqlite", data);
+  snprintf(cat->path, sizeof cat->path, database_is_url(where) ? "%s" : "%s/catalogue.sqlite", where);
   int code = open_all(cat, cat->path);
   if (code == SQL_OK && pthread_create(&cat->thread, NULL, writer_main, cat) == 0) {
     cat->started = 1;
     *out = cat;
     return STORE_OK;
   }
-  log_error("the catalogue %s cannot be opened: %s", cat->path, sql_reason(code));
+  if (!database_is_url(where)) { /* a URL may hold a password; the driver has said why */
+    log_error("the catalogue %s cannot be opened: %s", cat->path, sql_reason(code));
+  }
   catalogue_close(cat);
-  return code == SQL_FULL ? STORE_FULL : STORE_ERROR;
+  return code == SQL_FULL                                                                               ? STORE_FULL
+         : database_is_url(where) && (code == SQL_SCHEMA || code == SQL_READONLY || code == SQL_NOTADB) ? STORE_UNFIT
+                                                                                                        : STORE_ERROR;
 }
 
 void catalogue_close(catalogue *cat) {

@@ -1,10 +1,11 @@
-/* The store: rows in SQLite (the catalogue) and files (objects), both in the data folder. In: rows and bytes from
+/* The store: rows in SQLite or PostgreSQL (the catalogue) and files (objects). In: rows and bytes from
  * server/http, server/queue and server/worker. Out: the same, also after a crash.
  *
  * Reading order:
  *   catalogue.h   rows of meshes, embeddings, supermeshes, jobs and events: the interface
  *   objects.h     files, each named by a hash; owners.h   who owns which row; tokens.h   the tokens
- *   sql.h         statements over a database; sqlite.c   the driver of SQLite
+ *   sql.h         statements over a database; sqlite.c, postgresql.c   the drivers
+ *   postgresql_schema.c   the schema in PostgreSQL
  *   database.c    connections with prepared statements, the schema and its migrations
  *   catalogue.c   the writer thread with group commit, the pool of readers
  *   rows.c        reading rows of any kind
@@ -29,7 +30,8 @@
 
 typedef struct catalogue catalogue;
 
-store_result catalogue_open(const char *data, catalogue **out);
+/* where: the data folder, or the URL of a database in PostgreSQL. */
+store_result catalogue_open(const char *where, catalogue **out);
 void catalogue_close(catalogue *cat); /* completes all waiting writes, then stops the writer */
 
 /* The catalogue stores these numbers. */

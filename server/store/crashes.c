@@ -6,12 +6,15 @@
 #include "store/rows.h"
 #include "store/transactions.h"
 
+/* mesh: of an embedding, first: the first one of a supermesh. */
+#define NOTE(mesh, first)                                                                                     \
+  "INSERT INTO crash(key, mesh, tenant, count, last) VALUES(?1, CASE WHEN json_valid(?2) THEN coalesce(" mesh \
+  ", " first ", '') ELSE ?1 END, ?3, 1, ?4) ON CONFLICT(key) DO UPDATE SET count=crash.count+1, last=?4, tenant=?3"
+
 int crash_note(database *db, const char *key, const char *request, const char *tenant, int64_t now) {
-  sql_statement *st = database_statement(
-      db,
-      "INSERT INTO crash(key, mesh, tenant, count, last) VALUES(?1, iif(json_valid(?2), coalesce(?2->>'$.mesh',"
-      " ?2->>'$.shapes[0].mesh', ''), ?1), ?3, 1, ?4) ON CONFLICT(key) DO UPDATE SET count=count+1, last=?4, "
-      "tenant=?3");
+  sql_statement *st =
+      database_statement(db, database_either(db, NOTE("?2->>'$.mesh'", "?2->>'$.shapes[0].mesh'"),
+                                             NOTE("?2::json->>'mesh'", "?2::json->'shapes'->0->>'mesh'")));
   if (!st) {
     return SQL_ERROR;
   }

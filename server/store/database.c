@@ -5,8 +5,9 @@
 
 #include "faults.h"
 #include "log.h"
+#include "store/postgresql_schema.h"
 
-/* Each entry brings the schema from version i to i + 1. */
+/* The schema in SQLite: each entry brings it from version i to i + 1. A step goes to postgresql_schema.c, too. */
 static const char *const migrations[] = {
     "CREATE TABLE resource(seq INTEGER PRIMARY KEY AUTOINCREMENT, kind INTEGER NOT NULL, id TEXT NOT NULL,"
     " sha TEXT NOT NULL, json TEXT NOT NULL, bytes INTEGER NOT NULL, created INTEGER NOT NULL, used INTEGER NOT NULL,"
@@ -152,9 +153,14 @@ int database_execute(database *db, const char *sql) {
   return db->connection.driver->execute(&db->connection, sql);
 }
 
-int database_open(const char *path, int writer, database *out) {
+int database_is_url(const char *where) {
+  return strncmp(where, "postgresql://", 13) == 0;
+}
+
+int database_open(const char *where, int writer, database *out) {
   memset(out, 0, sizeof *out);
-  int code = sql_sqlite.open(path, writer, &out->connection);
+  const sql_driver *driver = database_is_url(where) ? &sql_postgresql : &sql_sqlite;
+  int code = driver->open(where, writer, &out->connection);
   if (code != SQL_OK) {
     database_close(out);
   }
@@ -209,27 +215,34 @@ int database_run(database *db, sql_statement *statement) {
   return code;
 }
 
-int database_migrate(database *db) {
-  sql_statement *statement = database_statement(db, "PRAGMA user_version");
-  if (!statement || sql_step(statement) != SQL_ROW) {
-    return SQL_ERROR;
+/* One step of the schema in one transaction. */
+static int migrate_to(database *db, int version, const char *step) {
+  char mark[64];
+  FAULT_POINT("migrate");
+  snprintf(mark, sizeof mark, "%s%d", database_either(db, "PRAGMA user_version=", "UPDATE catalogue SET schema="),
+           version);
+  int code = database_execute(db, database_either(db, "BEGIN IMMEDIATE", "BEGIN; SET LOCAL statement_timeout=0"));
+  code = code == SQL_OK ? database_execute(db, step) : code;
+  code = code == SQL_OK ? database_execute(db, mark) : code;
+  code = code == SQL_OK ? database_execute(db, "COMMIT") : code;
+  if (code != SQL_OK) {
+    database_execute(db, "ROLLBACK");
   }
-  int version = sql_int(statement, 0);
-  sql_reset(statement);
-  if (version > SCHEMA) {
+  return code;
+}
+
+int database_migrate(database *db) {
+  const sql_driver *driver = db->connection.driver;
+  const char *const *steps = driver == &sql_postgresql ? postgresql_migrations : migrations;
+  int version = 0, latest = driver == &sql_postgresql ? postgresql_schema : (int)SCHEMA;
+  int code = driver->version(&db->connection, &version);
+  if (code == SQL_OK && version > latest) {
     log_error("the catalogue has schema %d, but this program supports up to %d: install a newer version", version,
-              (int)SCHEMA);
+              latest);
     return SQL_SCHEMA;
   }
-  for (; version < SCHEMA; version++) {
-    char mark[64];
-    FAULT_POINT("migrate");
-    snprintf(mark, sizeof mark, "PRAGMA user_version=%d", version + 1);
-    if (database_execute(db, "BEGIN IMMEDIATE") != SQL_OK || database_execute(db, migrations[version]) != SQL_OK ||
-        database_execute(db, mark) != SQL_OK || database_execute(db, "COMMIT") != SQL_OK) {
-      database_execute(db, "ROLLBACK");
-      return SQL_ERROR;
-    }
+  for (; code == SQL_OK && version < latest; version++) {
+    code = migrate_to(db, version + 1, steps[version]);
   }
-  return SQL_OK;
+  return code == SQL_OK ? driver->hold(&db->connection) : code;
 }

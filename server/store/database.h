@@ -15,13 +15,20 @@ typedef struct database {
   } cached[DATABASE_STATEMENTS];
 } database;
 
-int database_open(const char *path, int writer, database *out);
+/* where: the path of an SQLite file, or the URL of a database in PostgreSQL. */
+int database_open(const char *where, int writer, database *out);
 void database_close(database *db);
 /* The statement, reset and without bindings; NULL on error. */
 sql_statement *database_statement(database *db, const char *sql);
 /* Steps once, for statements without result rows. SQL_OK or the error. */
 int database_run(database *db, sql_statement *statement);
 int database_execute(database *db, const char *sql);
+/* Whether it is in PostgreSQL. */
+int database_is_url(const char *where);
+/* The SQL for this database, where the two do not speak the same. */
+static inline const char *database_either(const database *db, const char *sqlite, const char *postgresql) {
+  return db->connection.driver == &sql_postgresql ? postgresql : sqlite;
+}
 /* Brings the schema up to date. SQL_OK, or SQL_SCHEMA if the schema is newer than this program. */
 int database_migrate(database *db);
 

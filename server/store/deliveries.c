@@ -46,12 +46,13 @@ static int ensure_secret(database *db, const char *job) {
 
 int delivery_subscribe(database *db, const char *job, const job_webhook *hook) {
   int code = ensure_secret(db, job);
-  sql_statement *st = code == SQL_OK
-                          ? database_statement(db,
-                                               "INSERT INTO job_webhook(job, url, origin, events) SELECT ?1, ?2, ?3, ?4"
-                                               " WHERE (SELECT count(*) FROM job_webhook WHERE job=?1 AND url<>?2) < ?5"
-                                               " ON CONFLICT(job, url) DO UPDATE SET events=events|excluded.events")
-                          : NULL;
+  sql_statement *st =
+      code == SQL_OK
+          ? database_statement(db,
+                               "INSERT INTO job_webhook(job, url, origin, events) SELECT ?1, ?2, ?3, ?4"
+                               " WHERE (SELECT count(*) FROM job_webhook WHERE job=?1 AND url<>?2) < ?5"
+                               " ON CONFLICT(job, url) DO UPDATE SET events=job_webhook.events|excluded.events")
+          : NULL;
   if (!st) {
     return code == SQL_OK ? SQL_ERROR : code;
   }
@@ -73,13 +74,13 @@ static const char add_deliveries[] =
     "   FROM job j JOIN job_webhook h ON h.job=j.id WHERE j.id=?1 AND (h.events & ?5) <> 0"
     "  UNION ALL SELECT 1, w.name, j.owner||' '||w.origin, w.url"
     "   FROM job j JOIN webhook w ON w.tenant=j.owner"
-    "   WHERE j.id=?1 AND j.listed=1 AND w.url<>'' AND (w.events & ?5) <> 0 AND ?6)"
+    "   WHERE j.id=?1 AND j.listed=1 AND w.url<>'' AND (w.events & ?5) <> 0 AND ?6<>0) AS due"
     " LIMIT ?7";
 
 static const char add_receivers[] =
     "INSERT INTO receiver(name, tenant, next) SELECT d.receiver, j.owner, min(d.next)"
-    " FROM delivery d JOIN job j ON j.id=d.job WHERE d.job=?1 AND d.state=0 GROUP BY d.receiver"
-    " ON CONFLICT(name) DO UPDATE SET next=min(next, excluded.next)";
+    " FROM delivery d JOIN job j ON j.id=d.job WHERE d.job=?1 AND d.state=0 GROUP BY d.receiver, j.owner"
+    " ON CONFLICT(name) DO UPDATE SET next=iif(excluded.next<receiver.next, excluded.next, receiver.next)";
 
 static int announce_to(database *db, const char *job, api_job_state state, const char *json, int64_t now, int all) {
   api_text body = {0};

@@ -44,7 +44,7 @@ static int insert(database *db, void *arg) {
   sql_bind_text(st, 10, r->charged);
   int code = crash_check(db, r->key);
   code = code == SQL_OK ? database_run(db, st) : code;
-  r->seq = sql_last_row(db);
+  r->seq = code == SQL_OK ? sql_last_row(db) : 0;
   code = code == SQL_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
   return code == SQL_OK && hook ? delivery_subscribe(db, r->id, hook) : code;
 }
@@ -136,7 +136,9 @@ store_result catalogue_job_crashed(catalogue *cat, const job_row *row, int count
 
 static int write_event(database *db, const char *job, int64_t number, const char *type, const char *json) {
   sql_statement *st =
-      database_statement(db, "INSERT OR REPLACE INTO event(job, number, type, json) VALUES(?1,?2,?3,?4)");
+      database_statement(db,
+                         "INSERT INTO event(job, number, type, json) VALUES(?1,?2,?3,?4)"
+                         " ON CONFLICT(job, number) DO UPDATE SET type=excluded.type, json=excluded.json");
   if (!st) {
     return SQL_ERROR;
   }
@@ -226,18 +228,22 @@ store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
 
 /* Listed jobs of state ?1 (−1: any, −2: queued or running) with a sequence number below ?2. */
 #define LISTED " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND "
-/* Those whose id begins with ?5, through the index of ids; a "+" keeps SQLite from using another index. */
-#define NAMED "id>=?5 AND id<?5 || 'g' AND +seq<?2"
+/* Those whose id begins with ?5, through the index of ids; in SQLite, a "+" keeps it from using another index. */
+#define NAMED(seq) "id>=?5 AND id<?5 || 'g' AND " seq "<?2"
 
 int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, int state, int64_t before, int limit,
                        job_row *out) {
   static const char *const queries[2][2] = {
       {"SELECT " COLUMNS LISTED "seq<?2 ORDER BY seq DESC LIMIT ?3",
        "SELECT " COLUMNS LISTED "seq<?2 AND owner=?4 ORDER BY seq DESC LIMIT ?3"},
-      {"SELECT " COLUMNS LISTED NAMED " ORDER BY +seq DESC LIMIT ?3",
-       "SELECT " COLUMNS LISTED NAMED " AND +owner=?4 ORDER BY +seq DESC LIMIT ?3"}};
+      {"SELECT " COLUMNS LISTED NAMED("+seq") " ORDER BY +seq DESC LIMIT ?3",
+       "SELECT " COLUMNS LISTED NAMED("+seq") " AND +owner=?4 ORDER BY +seq DESC LIMIT ?3"}};
+  static const char *const named[2] = {
+      "SELECT " COLUMNS LISTED NAMED("seq") " ORDER BY seq DESC LIMIT ?3",
+      "SELECT " COLUMNS LISTED NAMED("seq") " AND owner=?4 ORDER BY seq DESC LIMIT ?3"};
   database *db = catalogue_reader(cat);
-  sql_statement *st = database_statement(db, queries[prefix != NULL][owner != NULL]);
+  sql_statement *st = database_statement(
+      db, prefix ? database_either(db, queries[1][owner != NULL], named[owner != NULL]) : queries[0][owner != NULL]);
   if (st && owner) {
     sql_bind_text(st, 4, owner);
   }
@@ -355,16 +361,21 @@ int64_t catalogue_jobs_ended(catalogue *cat) {
   return rows_integer(cat, db, st);
 }
 
-/* NOT INDEXED scans in row order: nearly all of the oldest jobs have ended, so this finds them without a sort. */
-#define OLDEST_ENDED " FROM job NOT INDEXED WHERE state>=2 ORDER BY seq LIMIT ?1)"
+/* In SQLite, NOT INDEXED scans in row order: nearly all of the oldest jobs have ended, so this finds them without a
+ * sort. */
+#define OLDEST(how) " FROM job" how " WHERE state>=2 ORDER BY seq LIMIT ?1)"
+#define FORGET(how)                                                              \
+  {                                                                              \
+    "DELETE FROM event WHERE job IN (SELECT id" OLDEST(how),                     \
+        "DELETE FROM delivery WHERE state<>0 AND job IN (SELECT id" OLDEST(how), \
+        "DELETE FROM job WHERE seq IN (SELECT seq" OLDEST(how)                   \
+  }
 
 static int forget(database *db, void *arg) {
-  static const char *const steps[] = {"DELETE FROM event WHERE job IN (SELECT id" OLDEST_ENDED,
-                                      "DELETE FROM delivery WHERE state<>0 AND job IN (SELECT id" OLDEST_ENDED,
-                                      "DELETE FROM job WHERE seq IN (SELECT seq" OLDEST_ENDED};
+  static const char *const steps[3] = FORGET(" NOT INDEXED"), *const plain[3] = FORGET("");
   int code = SQL_OK;
   for (int i = 0; i < 3 && code == SQL_OK; i++) {
-    sql_statement *st = database_statement(db, steps[i]);
+    sql_statement *st = database_statement(db, database_either(db, steps[i], plain[i]));
     if (st) {
       sql_bind_integer(st, 1, *(const int *)arg);
     }

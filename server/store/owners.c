@@ -64,21 +64,30 @@ int owner_of_job(database *db, const char *job, int64_t now) {
   return code == SQL_OK && !there ? SQL_CONSTRAINT : code;
 }
 
+/* The meshes that the request ?1 names, for a query that follows. */
 #define NAMED                                                              \
   "WITH given(request) AS (SELECT iif(json_valid(?1), ?1, '{}')),"         \
   " named(id) AS (SELECT json_extract(request, '$.mesh') FROM given UNION" \
   "  SELECT json_extract(shape.value, '$.mesh') FROM given, json_each(request, '$.shapes') AS shape)"
+#define NAMED_POSTGRESQL                                                                                         \
+  "WITH given(request) AS (SELECT iif(json_valid(?1), ?1, '{}')::json),"                                         \
+  " named(id) AS (SELECT request->>'mesh' FROM given UNION SELECT shape->>'mesh' FROM given,"                    \
+  "  json_array_elements(CASE json_typeof(request->'shapes') WHEN 'array' THEN request->'shapes' ELSE '[]' END)" \
+  "  AS shape)"
+#define OWN_NAMED                                                                               \
+  "INSERT INTO owner(kind, id, tenant, json, bytes, created)"                                   \
+  " SELECT 0, r.id, ?2, iif(json_valid(r.json), json_set(r.json, '$.name', '', '$.created',"    \
+  "  strftime('%Y-%m-%dT%H:%M:%S', ?3/1000, 'unixepoch') || printf('.%03dZ', ?3%1000)), NULL)," \
+  "  r.bytes, ?3 FROM named n JOIN resource r ON r.kind=0 AND r.id=n.id"                        \
+  " WHERE NOT EXISTS(SELECT 1 FROM owner o WHERE o.kind=0 AND o.id=r.id AND o.tenant=?2)"
+#define LACKS_NAMED                                             \
+  "SELECT 1 FROM named n WHERE n.id IS NOT NULL AND NOT EXISTS" \
+  " (SELECT 1 FROM resource r WHERE r.kind=0 AND r.id=n.id)"
 
 /* Usually the tenant owns the meshes already; an operator may name those of others. The new owner's description then
  * omits the first owner's name and time. */
 int owner_of_meshes(database *db, const char *request, const char *tenant, int64_t now, int all) {
-  sql_statement *st =
-      database_statement(db, NAMED
-                         "INSERT INTO owner(kind, id, tenant, json, bytes, created)"
-                         " SELECT 0, r.id, ?2, iif(json_valid(r.json), json_set(r.json, '$.name', '', '$.created',"
-                         "  strftime('%Y-%m-%dT%H:%M:%S', ?3/1000, 'unixepoch') || printf('.%03dZ', ?3%1000)), NULL),"
-                         "  r.bytes, ?3 FROM named n JOIN resource r ON r.kind=0 AND r.id=n.id"
-                         " WHERE NOT EXISTS(SELECT 1 FROM owner o WHERE o.kind=0 AND o.id=r.id AND o.tenant=?2)");
+  sql_statement *st = database_statement(db, database_either(db, NAMED OWN_NAMED, NAMED_POSTGRESQL OWN_NAMED));
   int code = SQL_ERROR;
   if (st) {
     sql_bind_text(st, 1, request);
@@ -89,9 +98,7 @@ int owner_of_meshes(database *db, const char *request, const char *tenant, int64
   if (code != SQL_OK || !all) {
     return code;
   }
-  st = database_statement(db, NAMED
-                          "SELECT 1 FROM named n WHERE n.id IS NOT NULL AND NOT EXISTS"
-                          " (SELECT 1 FROM resource r WHERE r.kind=0 AND r.id=n.id)");
+  st = database_statement(db, database_either(db, NAMED LACKS_NAMED, NAMED_POSTGRESQL LACKS_NAMED));
   if (!st) {
     return SQL_ERROR;
   }
@@ -274,8 +281,8 @@ int64_t catalogue_mismatches(catalogue *cat) {
                                          " + (SELECT count(*) FROM total t WHERE t.bytes !="
                                          "  (SELECT coalesce(sum(r.bytes), 0) FROM resource r WHERE r.kind=t.kind))"
                                          " + (SELECT count(*) FROM (SELECT seq, key FROM shape_of EXCEPT"
-                                         "  SELECT seq, key FROM shape WHERE view=''))"
+                                         "  SELECT seq, key FROM shape WHERE view='') AS lacking)"
                                          " + (SELECT count(*) FROM (SELECT seq, key FROM shape WHERE view='' EXCEPT"
-                                         "  SELECT seq, key FROM shape_of))");
+                                         "  SELECT seq, key FROM shape_of) AS invented)");
   return rows_integer(cat, db, st);
 }

@@ -2,6 +2,10 @@
 
 #include <stdlib.h>
 
+static void complain(const database *db) {
+  log_error("catalogue: rows cannot be read: %s", db->connection.driver->message(&db->connection));
+}
+
 static void release(const row_kind *kind, void *row) {
   if (kind->release) {
     kind->release(row);
@@ -26,6 +30,9 @@ store_result rows_one(catalogue *cat, database *db, sql_statement *st, const row
     result = code == SQL_ROW    ? (fill(db, st, kind, out) ? STORE_OK : STORE_ERROR)
              : code == SQL_DONE ? STORE_NOT_FOUND
                                 : STORE_ERROR;
+    if (code != SQL_ROW && code != SQL_DONE) {
+      complain(db);
+    }
     sql_reset(st);
   }
   catalogue_reader_done(cat, db);
@@ -41,14 +48,15 @@ int rows_many(catalogue *cat, database *db, sql_statement *st, const row_kind *k
       code = SQL_NOMEM;
     }
   }
-  if (st) {
-    sql_reset(st);
+  int fine = code == SQL_ROW || code == SQL_DONE;
+  if (st && !fine) {
+    complain(db);
   }
+  sql_reset(st);
   catalogue_reader_done(cat, db);
-  if (code == SQL_ROW || code == SQL_DONE) {
+  if (fine) {
     return count;
   }
-  log_error("catalogue: rows cannot be read: %s", sql_reason(code));
   while (count > 0) {
     release(kind, (char *)out + (size_t)--count * kind->size);
   }
@@ -94,8 +102,11 @@ void *rows_all(catalogue *cat, database *db, sql_statement *st, const row_kind *
 int64_t rows_integer(catalogue *cat, database *db, sql_statement *st) {
   int64_t value = -1;
   if (st) {
-    if (sql_step(st) == SQL_ROW) {
+    int code = sql_step(st);
+    if (code == SQL_ROW) {
       value = sql_integer(st, 0);
+    } else if (code != SQL_DONE) {
+      complain(db);
     }
     sql_reset(st);
   }

@@ -1,5 +1,7 @@
 /* Statements over a database: what all databases of the catalogue have in common. A driver is a table of functions;
- * sqlite.c defines that of SQLite. The SQL is numbered from ?1, and a parameter may occur several times.
+ * sqlite.c defines that of SQLite, postgresql.c that of PostgreSQL. Both run the same SQL: that of SQLite, as far as
+ * the schema of PostgreSQL defines the functions that it lacks. Where they differ, the caller chooses
+ * (database_either()). Parameters are numbered from ?1, and one may occur several times.
  *
  * A connection belongs to one thread at a time, and so do its statements. A text that is bound or read is borrowed: a
  * bound one must live until the statement is reset, one that is read lives until the statement steps again. */
@@ -47,6 +49,9 @@ typedef struct sql_driver {
   int (*out_of_memory)(const sql_connection *c);      /* whether that was the last error */
   int (*execute)(sql_connection *c, const char *sql); /* any number of statements, without parameters; logs errors */
   int (*in_transaction)(const sql_connection *c);
+  int (*version)(sql_connection *c, int *version); /* of the schema; 0: there is none */
+  /* Of the connection that writes, once its schema is up to date. */
+  int (*hold)(sql_connection *c);
   int64_t (*changes)(const sql_connection *c);  /* rows that the last INSERT, UPDATE or DELETE changed */
   int64_t (*last_row)(const sql_connection *c); /* the sequence number that the last INSERT chose */
 
@@ -65,6 +70,8 @@ typedef struct sql_driver {
 } sql_driver;
 
 extern const sql_driver sql_sqlite; /* where: the path of its file */
+/* where: a URL, postgresql://…. One connection that writes at a time: SQL_BUSY if another process has one. */
+extern const sql_driver sql_postgresql;
 
 static inline void sql_bind_text(sql_statement *st, int parameter, const char *text) {
   st->driver->bind_text(st, parameter, text);

@@ -135,6 +135,21 @@ static const void *bytes(sql_statement *st, int column, int *size) {
   return found;
 }
 
+static int version(sql_connection *c, int *version) {
+  sqlite3_stmt *st = NULL;
+  int code = sqlite3_prepare_v3(c->native, "PRAGMA user_version", -1, 0, &st, NULL);
+  code = code == SQLITE_OK ? sqlite3_step(st) : code;
+  *version = code == SQLITE_ROW ? sqlite3_column_int(st, 0) : 0;
+  sqlite3_finalize(st);
+  return code == SQLITE_ROW ? SQL_OK : SQL_ERROR;
+}
+
+/* The lock of the data folder ensures that one daemon alone writes. */
+static int hold(sql_connection *c) {
+  (void)c;
+  return SQL_OK;
+}
+
 const sql_driver sql_sqlite = {
     .open = open_file,
     .close = close_file,
@@ -142,6 +157,8 @@ const sql_driver sql_sqlite = {
     .out_of_memory = out_of_memory,
     .execute = execute,
     .in_transaction = in_transaction,
+    .version = version,
+    .hold = hold,
     .changes = changes,
     .last_row = last_row,
     .prepare = prepare,

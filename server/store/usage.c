@@ -42,7 +42,7 @@ int catalogue_usage_most(catalogue *cat, int limit, usage_row *out) {
   sql_statement *st = database_statement(
       db,
       "SELECT * FROM (SELECT name, 0, bytes, derived, worker_ms, 0, 0, 0, 0 FROM tenant"
-      " ORDER BY bytes+derived DESC, name LIMIT ?1)"
+      " ORDER BY bytes+derived DESC, name LIMIT ?1) AS most"
       " UNION ALL SELECT '', 0, coalesce(sum(bytes), 0), coalesce(sum(derived), 0), coalesce(sum(worker_ms), 0),"
       " 0, 0, 0, 0 FROM tenant");
   if (st) {
