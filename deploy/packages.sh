@@ -3,11 +3,11 @@
 orb_build_packages=(
   gcc g++ cmake ninja-build pkg-config
   libqhull-dev libmeshoptimizer-dev libdraco-dev libeigen3-dev libspectra-dev
-  libcjson-dev libsodium-dev libseccomp-dev libmicrohttpd-dev libgnutls28-dev libsqlite3-dev libcurl4-openssl-dev libpng-dev libjpeg62-turbo-dev
+  libcjson-dev libsodium-dev libseccomp-dev libmicrohttpd-dev libgnutls28-dev libsqlite3-dev libpq-dev libcurl4-openssl-dev libpng-dev libjpeg62-turbo-dev
   zlib1g-dev libexpat1-dev libzstd-dev
 )
 orb_test_packages=(
-  libcmocka-dev clang-format openssl sqlite3 zstd curl jq python3 binutils man-db mandoc zsh fish bsdutils chromium nginx
+  libcmocka-dev clang-format openssl sqlite3 postgresql zstd curl jq python3 binutils man-db mandoc zsh fish bsdutils chromium nginx
 )
 orb_fuzz_packages=(clang libclang-rt-dev)
 orb_long_packages=(valgrind wrk blender caddy debootstrap lintian buildah podman runc prometheus systemd)

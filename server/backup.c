@@ -166,8 +166,19 @@ static int take(const char *folder, const char *data) {
   return !fine || h.wrong;
 }
 
+static int refuse_url(void) {
+  fputs(
+      "orbmorphd: backup and restore are for a catalogue in SQLite. Copy one in PostgreSQL with pg_dump, and then the "
+      "folder objects of the data folder\n",
+      stderr);
+  return 2;
+}
+
 static int run_backup(const char *folder, const config *options) {
   umask(077);
+  if (config_catalogue(options)) {
+    return refuse_url();
+  }
   if (!has(options->data, "catalogue.sqlite")) {
     complain(options->data, "is not a data folder: name that of the service with --data");
     return 1;
@@ -219,6 +230,9 @@ static int put_back(const char *folder, const char *data) {
 
 static int run_restore(const char *folder, const config *options) {
   umask(077);
+  if (config_catalogue(options)) {
+    return refuse_url();
+  }
   if (!has(folder, mark) || !has(folder, "catalogue.sqlite")) {
     complain(folder, "is no complete backup");
     return 1;

@@ -29,6 +29,10 @@ static const entry table[] = {
     {"listen", TEXT(listen), "127.0.0.1:8080", "ADDR:PORT, [V6]:PORT or unix:PATH; port 0 picks a free one"},
     {"socket-mode", TEXT(socket_mode), "0660", "permissions of a Unix socket, in octal"},
     {"data", TEXT(data), "orbmorph-data", "the data folder: everything that the daemon stores"},
+    {"catalogue", TEXT(catalogue), "sqlite",
+     "where rows are stored; sqlite: in the data folder; postgresql://…: in a database of PostgreSQL 15 or later, "
+     "which "
+     "one daemon uses at a time; objects stay in the data folder"},
     {"config", TEXT(file), "", "a file of lines NAME = VALUE with these names"},
     {"workers", NUMBER(workers, 1, 256), "0", "jobs that run at once; 0: one per core"},
     {"worker-nice", NUMBER(worker_nice, 0, 19), "5",
@@ -380,6 +384,18 @@ static int are_hosts(const char *list) {
   return 1;
 }
 
+static int is_catalogue(const char *text) {
+  int fine = strcmp(text, "sqlite") == 0 || strncmp(text, "postgresql://", 13) == 0;
+  if (!fine) { /* what is wrong may hold a password */
+    complain("catalogue must be sqlite, or a URL that begins with postgresql://");
+  }
+  return fine;
+}
+
+const char *config_catalogue(const config *options) {
+  return strcmp(options->catalogue, "sqlite") == 0 ? NULL : options->catalogue;
+}
+
 static int is_readable(const char *name, const char *path) {
   int fine = !*path || access(path, R_OK) == 0;
   if (!fine) {
@@ -425,12 +441,13 @@ static int consistent(config *out) {
     complain("tls-certificate and tls-key must both be set, or neither");
     return 0;
   }
-  return is_address(out->listen) && is_mode(out->socket_mode) && is_one_of("limits", out->limits, limits) &&
-         is_one_of("auth", out->auth, auth) && is_one_of("isolate", out->isolate, isolate) &&
-         is_one_of("log-level", out->log_level, levels) && is_one_of("log-format", out->log_format, formats) &&
-         are_origins(out->cors) && are_hosts(out->hosts) && is_readable("tls-certificate", out->tls_certificate) &&
-         is_readable("tls-key", out->tls_key) && is_readable("tls-authorities", out->tls_authorities) &&
-         are_networks("webhook-allow", out->webhook_allow) && are_networks("fetch-allow", out->fetch_allow);
+  return is_address(out->listen) && is_catalogue(out->catalogue) && is_mode(out->socket_mode) &&
+         is_one_of("limits", out->limits, limits) && is_one_of("auth", out->auth, auth) &&
+         is_one_of("isolate", out->isolate, isolate) && is_one_of("log-level", out->log_level, levels) &&
+         is_one_of("log-format", out->log_format, formats) && are_origins(out->cors) && are_hosts(out->hosts) &&
+         is_readable("tls-certificate", out->tls_certificate) && is_readable("tls-key", out->tls_key) &&
+         is_readable("tls-authorities", out->tls_authorities) && are_networks("webhook-allow", out->webhook_allow) &&
+         are_networks("fetch-allow", out->fetch_allow);
 }
 
 config_action config_read(config *out, int argc, char **argv) {

@@ -9,6 +9,7 @@
 typedef struct config {
   char listen[256]; /* ADDR:PORT or unix:PATH */
   char data[PATH_MAX / 2];
+  char catalogue[1024]; /* sqlite, or the URL of a database in PostgreSQL */
   char file[PATH_MAX / 2];
   char hosts[512]; /* names in Host, comma-separated, or * */
   char cors[512];  /* origins, comma-separated, or * */
@@ -36,6 +37,8 @@ typedef enum config_action {
   CONFIG_GC,
 } config_action;
 
+enum { CONFIG_UNFIT = 78 }; /* EX_CONFIG, the status of a process whose catalogue or data folder does not fit */
+
 /* Parses a number ≥ 0 with an optional suffix K, M or G (powers of 1024). 0 if malformed. */
 int config_number(const char *text, int64_t *out);
 /* Reads the configuration again and applies the options that may change at run time (log-level, queue-limit,
@@ -43,6 +46,8 @@ int config_number(const char *text, int64_t *out);
  * applied. 0 if the new configuration is invalid: nothing changes, and the reason is in the log. Other threads must
  * load derived_bytes and quota_derived atomically. */
 int config_reload(config *live, int argc, char **argv, void (*changed)(const char *name, int taken));
+/* The URL of the catalogue; NULL: it is in the data folder. */
+const char *config_catalogue(const config *options);
 config_action config_read(config *out, int argc, char **argv);
 
 #endif

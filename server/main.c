@@ -22,6 +22,7 @@
 #include "maintain.h"
 #include "net/client.h"
 #include "scrub.h"
+#include "store/place.h"
 #include "systemd.h"
 #include "worker/confined.h"
 #include "worker/pool.h"
@@ -351,6 +352,12 @@ static int start_scrub(server *srv) {
   return srv->scrub || o->scrub_rate == 0;
 }
 
+static int open_catalogue(server *srv) {
+  store_result result = catalogue_open_at(srv->options->data, config_catalogue(srv->options), &srv->cat);
+  srv->unfit = result == STORE_UNFIT;
+  return result == STORE_OK;
+}
+
 /* Starts all parts in order; 0 if one of them failed. */
 static int start(server *srv, worker_pool **workers) {
   const config *o = srv->options;
@@ -383,9 +390,8 @@ static int start(server *srv, worker_pool **workers) {
   }
   int listens = listen_open(o, &srv->at);
   srv->needs_token = strcmp(o->auth, "on") == 0 || (strcmp(o->auth, "off") != 0 && !srv->at.local);
-  return listens && srv->memory && objects_open(o->data, &srv->store) == STORE_OK &&
-         catalogue_open(o->data, &srv->cat) == STORE_OK && check_catalogue(srv) &&
-         (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
+  return listens && srv->memory && objects_open(o->data, &srv->store) == STORE_OK && open_catalogue(srv) &&
+         check_catalogue(srv) && (srv->callers = callers_open(srv->cat)) && (srv->signers = signers_open(srv->cat)) &&
          (srv->q = queue_create(&queued, srv->cat)) && queue_recover(srv->q, isolate_is_on()) == STORE_OK &&
          (srv->descriptions = cache_create(CACHE_BYTES)) && heals(srv) &&
          (srv->io = tasks_start((int)o->io_threads, NULL)) &&
@@ -445,7 +451,7 @@ static int serve(server *srv, const command_line *line, int signals, const sigse
     control_close(srv->options->data, srv->control);
   }
   stop(srv, workers);
-  return !started;
+  return srv->unfit ? CONFIG_UNFIT : !started;
 }
 
 static int run(const command_line *line) {

@@ -7,6 +7,7 @@
 
 #include "evict.h"
 #include "store/owners.h"
+#include "store/place.h"
 #include "store/spheres.h"
 
 enum { PAGE = 64 };
@@ -83,7 +84,8 @@ static void each_object(void *user, object_kind kind, const char *id, uint64_t s
 }
 
 static int open_both(const config *options, tally *t) {
-  return objects_open(options->data, &t->store) == STORE_OK && catalogue_open(options->data, &t->cat) == STORE_OK;
+  return objects_open(options->data, &t->store) == STORE_OK &&
+         catalogue_open_at(options->data, config_catalogue(options), &t->cat) == STORE_OK;
 }
 
 static void close_both(tally *t) {

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "control.h"
+#include "store/place.h"
 
 enum { ADMIN_LINE = 1024 }; /* as long as a line that control.c reads */
 
@@ -158,8 +159,9 @@ int admin_command_run(const admin_command *command, const config *options) {
   char line[ADMIN_LINE], shown[ADMIN_WORD];
   catalogue *cat = NULL;
   api_text reply = {0};
-  if (catalogue_open(options->data, &cat) != STORE_OK) {
-    return 1;
+  store_result opened = catalogue_open_at(options->data, config_catalogue(options), &cat);
+  if (opened != STORE_OK) {
+    return opened == STORE_UNFIT ? CONFIG_UNFIT : 1;
   }
   write_line(command, line, shown);
   int status = show(command, command->kind->apply(cat, line, &reply), &reply, shown);

@@ -75,6 +75,7 @@ typedef struct server {
   int64_t decoding;    /* bytes held by the decoders of bodies; __atomic */
   int64_t started;
   int needs_token;
+  int unfit; /* the catalogue refused to open: see STORE_UNFIT */
   deliverer *outbox;
   scrub *scrub;                            /* NULL: off */
   networks webhook_allowed, fetch_allowed; /* besides public addresses */

@@ -33,14 +33,14 @@ struct catalogue {
 };
 
 static store_result result_of(int code) {
-  switch (code & 0xff) {
-    case SQLITE_OK:
+  switch (code) {
+    case SQL_OK:
       return STORE_OK;
-    case SQLITE_CONSTRAINT:
+    case SQL_CONSTRAINT:
       return STORE_CONFLICT;
-    case SQLITE_NOTFOUND:
+    case SQL_NOTFOUND:
       return STORE_NOT_FOUND;
-    case SQLITE_FULL:
+    case SQL_FULL:
       return STORE_FULL;
     default:
       return STORE_ERROR;
@@ -52,31 +52,31 @@ static void run_batch(catalogue *cat, pending *batch) {
   database *db = &cat->writer;
   FAULT_POINT("before-begin");
   /* A previous transaction may still be open if its rollback failed. */
-  int code = sqlite3_get_autocommit(db->handle) ? SQLITE_OK : database_execute(db, "ROLLBACK");
-  code = code == SQLITE_OK ? database_execute(db, "BEGIN IMMEDIATE") : code;
-  for (pending *p = batch; p && code == SQLITE_OK; p = p->next) {
-    if (database_execute(db, "SAVEPOINT one") != SQLITE_OK) {
-      code = SQLITE_IOERR;
+  int code = sql_in_transaction(db) ? database_execute(db, "ROLLBACK") : SQL_OK;
+  code = code == SQL_OK ? database_execute(db, database_either(db, "BEGIN IMMEDIATE", "BEGIN")) : code;
+  for (pending *p = batch; p && code == SQL_OK; p = p->next) {
+    if (database_execute(db, "SAVEPOINT one") != SQL_OK) {
+      code = SQL_IOERR;
       break;
     }
     p->code = p->fn(db, p->arg);
-    if (p->code != SQLITE_OK) {
+    if (p->code != SQL_OK) {
       database_execute(db, "ROLLBACK TO one");
     }
     /* A full disk or an input/output error may have rolled back everything already. */
-    if (sqlite3_get_autocommit(db->handle)) {
+    if (!sql_in_transaction(db)) {
       code = p->code;
-    } else if (database_execute(db, "RELEASE one") != SQLITE_OK) {
-      code = SQLITE_IOERR;
+    } else if (database_execute(db, "RELEASE one") != SQL_OK) {
+      code = SQL_IOERR;
     }
   }
   FAULT_POINT("before-commit");
-  if (code == SQLITE_OK) {
+  if (code == SQL_OK) {
     code = database_execute(db, "COMMIT");
   }
   FAULT_POINT("after-commit");
-  if (code != SQLITE_OK) {
-    if (!sqlite3_get_autocommit(db->handle)) {
+  if (code != SQL_OK) {
+    if (sql_in_transaction(db)) {
       database_execute(db, "ROLLBACK");
     }
     for (pending *p = batch; p; p = p->next) {
@@ -168,10 +168,10 @@ void catalogue_reader_done(catalogue *cat, database *db) {
 
 static int open_all(catalogue *cat, const char *path) {
   int code = database_open(path, 1, &cat->writer);
-  if (code == SQLITE_OK) {
+  if (code == SQL_OK) {
     code = database_migrate(&cat->writer);
   }
-  for (int i = 0; i < DATABASE_READERS && code == SQLITE_OK; i++) {
+  for (int i = 0; i < DATABASE_READERS && code == SQL_OK; i++) {
     code = database_open(path, 0, &cat->readers[i]);
   }
   return code;
@@ -181,7 +181,7 @@ const char *catalogue_path(const catalogue *cat) {
   return cat->path;
 }
 
-store_result catalogue_open(const char *data, catalogue **out) {
+store_result catalogue_open(const char *where, catalogue **out) {
   catalogue *cat = calloc(1, sizeof *cat);
   if (!cat) {
     return STORE_ERROR;
@@ -191,16 +191,20 @@ store_result catalogue_open(const char *data, catalogue **out) {
   pthread_cond_init(&cat->wake, NULL);
   pthread_cond_init(&cat->committed, NULL);
   pthread_cond_init(&cat->reader_free, NULL);
-  snprintf(cat->path, sizeof cat->path, "%s/catalogue.sqlite", data);
+  snprintf(cat->path, sizeof cat->path, database_is_url(where) ? "%s" : "%s/catalogue.sqlite", where);
   int code = open_all(cat, cat->path);
-  if (code == SQLITE_OK && pthread_create(&cat->thread, NULL, writer_main, cat) == 0) {
+  if (code == SQL_OK && pthread_create(&cat->thread, NULL, writer_main, cat) == 0) {
     cat->started = 1;
     *out = cat;
     return STORE_OK;
   }
-  log_error("the catalogue %s cannot be opened: %s", cat->path, sqlite3_errstr(code));
+  if (!database_is_url(where)) { /* a URL may hold a password; the driver has said why */
+    log_error("the catalogue %s cannot be opened: %s", cat->path, sql_reason(code));
+  }
   catalogue_close(cat);
-  return code == SQLITE_FULL ? STORE_FULL : STORE_ERROR;
+  return code == SQL_FULL                                                                               ? STORE_FULL
+         : database_is_url(where) && (code == SQL_SCHEMA || code == SQL_READONLY || code == SQL_NOTADB) ? STORE_UNFIT
+                                                                                                        : STORE_ERROR;
 }
 
 void catalogue_close(catalogue *cat) {

@@ -1,10 +1,12 @@
-/* The store: rows in SQLite (the catalogue) and files (objects), both in the data folder. In: rows and bytes from
+/* The store: rows in SQLite or PostgreSQL (the catalogue) and files (objects). In: rows and bytes from
  * server/http, server/queue and server/worker. Out: the same, also after a crash.
  *
  * Reading order:
  *   catalogue.h   rows of meshes, embeddings, supermeshes, jobs and events: the interface
  *   objects.h     files, each named by a hash; owners.h   who owns which row; tokens.h   the tokens
- *   database.c    connections, the schema and its migrations
+ *   sql.h         statements over a database; sqlite.c, postgresql.c   the drivers
+ *   postgresql_schema.c   the schema in PostgreSQL
+ *   database.c    connections with prepared statements, the schema and its migrations
  *   catalogue.c   the writer thread with group commit, the pool of readers
  *   rows.c        reading rows of any kind
  *   resources.c, owners.c, jobs.c, tokens.c, keys.c, webhooks.c   the SQL of each kind of row; lists.c   lists with a
@@ -22,15 +24,14 @@
 #ifndef ORB_STORE_CATALOGUE_H
 #define ORB_STORE_CATALOGUE_H
 
-#include <sqlite3.h>
-
 #include "api/ids.h"
 #include "api/job_codec.h"
 #include "store/objects.h"
 
 typedef struct catalogue catalogue;
 
-store_result catalogue_open(const char *data, catalogue **out);
+/* where: the data folder, or the URL of a database in PostgreSQL. */
+store_result catalogue_open(const char *where, catalogue **out);
 void catalogue_close(catalogue *cat); /* completes all waiting writes, then stops the writer */
 
 /* The catalogue stores these numbers. */

@@ -6,39 +6,42 @@
 #include "store/rows.h"
 #include "store/transactions.h"
 
+/* mesh: of an embedding, first: the first one of a supermesh. */
+#define NOTE(mesh, first)                                                                                     \
+  "INSERT INTO crash(key, mesh, tenant, count, last) VALUES(?1, CASE WHEN json_valid(?2) THEN coalesce(" mesh \
+  ", " first ", '') ELSE ?1 END, ?3, 1, ?4) ON CONFLICT(key) DO UPDATE SET count=crash.count+1, last=?4, tenant=?3"
+
 int crash_note(database *db, const char *key, const char *request, const char *tenant, int64_t now) {
-  sqlite3_stmt *st = database_statement(
-      db,
-      "INSERT INTO crash(key, mesh, tenant, count, last) VALUES(?1, iif(json_valid(?2), coalesce(?2->>'$.mesh',"
-      " ?2->>'$.shapes[0].mesh', ''), ?1), ?3, 1, ?4) ON CONFLICT(key) DO UPDATE SET count=count+1, last=?4, "
-      "tenant=?3");
+  sql_statement *st =
+      database_statement(db, database_either(db, NOTE("?2->>'$.mesh'", "?2->>'$.shapes[0].mesh'"),
+                                             NOTE("?2::json->>'mesh'", "?2::json->'shapes'->0->>'mesh'")));
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, key, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 2, request ? request : "", -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 3, tenant, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 4, now);
+  sql_bind_text(st, 1, key);
+  sql_bind_text(st, 2, request ? request : "");
+  sql_bind_text(st, 3, tenant);
+  sql_bind_integer(st, 4, now);
   return database_run(db, st);
 }
 
-static sqlite3_stmt *refused(database *db, const char *key) {
-  sqlite3_stmt *st = database_statement(db, "SELECT count(*) FROM crash WHERE key=?1 AND count>=?2");
+static sql_statement *refused(database *db, const char *key) {
+  sql_statement *st = database_statement(db, "SELECT count(*) FROM crash WHERE key=?1 AND count>=?2");
   if (st) {
-    sqlite3_bind_text(st, 1, key, -1, SQLITE_STATIC);
-    sqlite3_bind_int(st, 2, CRASHES_MOST);
+    sql_bind_text(st, 1, key);
+    sql_bind_integer(st, 2, CRASHES_MOST);
   }
   return st;
 }
 
 int crash_check(database *db, const char *key) {
-  sqlite3_stmt *st = refused(db, key);
+  sql_statement *st = refused(db, key);
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  int code = sqlite3_step(st), count = code == SQLITE_ROW ? sqlite3_column_int(st, 0) : 0;
-  sqlite3_reset(st);
-  return code != SQLITE_ROW ? code : count ? SQLITE_CONSTRAINT : SQLITE_OK;
+  int code = sql_step(st), count = code == SQL_ROW ? sql_int(st, 0) : 0;
+  sql_reset(st);
+  return code != SQL_ROW ? code : count ? SQL_CONSTRAINT : SQL_OK;
 }
 
 int catalogue_crashed(catalogue *cat, const char *key) {
@@ -67,14 +70,14 @@ void catalogue_crash_of_mesh(catalogue *cat, const char *mesh, const char *tenan
 }
 
 static int clear(database *db, void *arg) {
-  sqlite3_stmt *st = database_statement(
+  sql_statement *st = database_statement(
       db, "DELETE FROM crash WHERE tenant=?1 OR substr(key, 1, length(?1))=?1 OR substr(mesh, 1, length(?1))=?1");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, arg, -1, SQLITE_STATIC);
+  sql_bind_text(st, 1, arg);
   int code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+  return code == SQL_OK && sql_changes(db) == 0 ? SQL_NOTFOUND : code;
 }
 
 store_result catalogue_crash_clear(catalogue *cat, const char *name) {
@@ -83,19 +86,19 @@ store_result catalogue_crash_clear(catalogue *cat, const char *name) {
 
 int catalogue_crash_list(catalogue *cat, api_text *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db,
-                                        "SELECT key, count, mesh, tenant, strftime('%Y-%m-%dT%H:%M:%SZ', last/1000,"
-                                        " 'unixepoch') FROM crash ORDER BY last DESC LIMIT 1000");
-  int code = st ? SQLITE_ROW : SQLITE_ERROR, count = 0;
-  while (st && (code = sqlite3_step(st)) == SQLITE_ROW) {
-    api_text_printf(out, "%s crashes=%d%s mesh=%s tenant=%s last=%s\n", sqlite3_column_text(st, 0),
-                    sqlite3_column_int(st, 1), sqlite3_column_int(st, 1) >= CRASHES_MOST ? " refused" : "",
-                    sqlite3_column_text(st, 2), sqlite3_column_text(st, 3), sqlite3_column_text(st, 4));
+  sql_statement *st = database_statement(db,
+                                         "SELECT key, count, mesh, tenant, strftime('%Y-%m-%dT%H:%M:%SZ', last/1000,"
+                                         " 'unixepoch') FROM crash ORDER BY last DESC LIMIT 1000");
+  int code = st ? SQL_ROW : SQL_ERROR, count = 0;
+  while (st && (code = sql_step(st)) == SQL_ROW) {
+    api_text_printf(out, "%s crashes=%d%s mesh=%s tenant=%s last=%s\n", sql_text(st, 0), sql_int(st, 1),
+                    sql_int(st, 1) >= CRASHES_MOST ? " refused" : "", sql_text(st, 2), sql_text(st, 3),
+                    sql_text(st, 4));
     count++;
   }
   if (st) {
-    sqlite3_reset(st);
+    sql_reset(st);
   }
   catalogue_reader_done(cat, db);
-  return code == SQLITE_DONE ? count : -1;
+  return code == SQL_DONE ? count : -1;
 }

@@ -11,7 +11,7 @@ enum { CRASHES_MOST = 3 }; /* of a key; then its work is refused until the opera
 
 /* Counts one, within a write. request: of the job; NULL: the key is a mesh's. */
 int crash_note(database *db, const char *key, const char *request, const char *tenant, int64_t now);
-/* SQLITE_OK, or SQLITE_CONSTRAINT if the work of this key is refused. */
+/* SQL_OK, or SQL_CONSTRAINT if the work of this key is refused. */
 int crash_check(database *db, const char *key);
 
 /* Counts the death of a process that checked a mesh. Returns without waiting for the commit. */

@@ -1,12 +1,13 @@
 #include "store/database.h"
 
-#include <stdlib.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "faults.h"
 #include "log.h"
+#include "store/postgresql_schema.h"
 
-/* Each entry brings the schema from version i to i + 1. */
+/* The schema in SQLite: each entry brings it from version i to i + 1. A step goes to postgresql_schema.c, too. */
 static const char *const migrations[] = {
     "CREATE TABLE resource(seq INTEGER PRIMARY KEY AUTOINCREMENT, kind INTEGER NOT NULL, id TEXT NOT NULL,"
     " sha TEXT NOT NULL, json TEXT NOT NULL, bytes INTEGER NOT NULL, created INTEGER NOT NULL, used INTEGER NOT NULL,"
@@ -149,27 +150,18 @@ static const char *const migrations[] = {
 enum { SCHEMA = sizeof migrations / sizeof migrations[0] };
 
 int database_execute(database *db, const char *sql) {
-  char *message = NULL;
-  int code = sqlite3_exec(db->handle, sql, NULL, NULL, &message);
-  if (code != SQLITE_OK) {
-    log_error("catalogue: %.60s: %s", sql, message ? message : sqlite3_errstr(code));
-  }
-  sqlite3_free(message);
-  return code;
+  return db->connection.driver->execute(&db->connection, sql);
 }
 
-int database_open(const char *path, int writer, database *out) {
+int database_is_url(const char *where) {
+  return strncmp(where, "postgresql://", 13) == 0;
+}
+
+int database_open(const char *where, int writer, database *out) {
   memset(out, 0, sizeof *out);
-  int flags = SQLITE_OPEN_NOMUTEX | (writer ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY);
-  int code = sqlite3_open_v2(path, &out->handle, flags, NULL);
-  if (code == SQLITE_OK) {
-    sqlite3_busy_timeout(out->handle, 5000);
-    sqlite3_db_config(out->handle, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, writer ? 0 : 1, NULL);
-    code = database_execute(out, writer ? "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON;"
-                                          "PRAGMA wal_autocheckpoint=1000; PRAGMA journal_size_limit=67108864;"
-                                        : "PRAGMA query_only=ON; PRAGMA wal_autocheckpoint=0;");
-  }
-  if (code != SQLITE_OK) {
+  const sql_driver *driver = database_is_url(where) ? &sql_postgresql : &sql_sqlite;
+  int code = driver->open(where, writer, &out->connection);
+  if (code != SQL_OK) {
     database_close(out);
   }
   return code;
@@ -177,68 +169,80 @@ int database_open(const char *path, int writer, database *out) {
 
 void database_close(database *db) {
   for (int i = 0; i < DATABASE_STATEMENTS; i++) {
-    sqlite3_finalize(db->cached[i].statement);
+    if (db->cached[i].statement.driver) {
+      db->cached[i].statement.driver->finish(&db->cached[i].statement);
+    }
   }
-  sqlite3_close(db->handle);
+  if (db->connection.driver) {
+    db->connection.driver->close(&db->connection);
+  }
   memset(db, 0, sizeof *db);
 }
 
-sqlite3_stmt *database_statement(database *db, const char *sql) {
+sql_statement *database_statement(database *db, const char *sql) {
+  const sql_driver *driver = db->connection.driver;
   int i = 0;
   while (i < DATABASE_STATEMENTS - 1 && db->cached[i].sql && db->cached[i].sql != sql) {
     i++;
   }
+  sql_statement *st = &db->cached[i].statement;
   if (db->cached[i].sql != sql) {
-    sqlite3_finalize(db->cached[i].statement);
+    if (st->driver) {
+      driver->finish(st);
+    }
     db->cached[i].sql = NULL;
-    int code = sqlite3_prepare_v3(db->handle, sql, -1, SQLITE_PREPARE_PERSISTENT, &db->cached[i].statement, NULL);
-    if (code != SQLITE_OK) {
-      log_error("catalogue: %s: %s", sql, sqlite3_errmsg(db->handle));
-      db->cached[i].statement = NULL;
+    if (driver->prepare(&db->connection, sql, st) != SQL_OK) {
+      log_error("catalogue: %s: %s", sql, driver->message(&db->connection));
       return NULL;
     }
     db->cached[i].sql = sql;
   }
-  sqlite3_reset(db->cached[i].statement);
-  sqlite3_clear_bindings(db->cached[i].statement);
-  return db->cached[i].statement;
+  driver->reset(st);
+  driver->clear(st);
+  return st;
 }
 
-int database_run(database *db, sqlite3_stmt *statement) {
+int database_run(database *db, sql_statement *statement) {
   if (!statement) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  int code = sqlite3_step(statement);
-  sqlite3_reset(statement);
-  if (code == SQLITE_DONE || code == SQLITE_ROW) {
-    return SQLITE_OK;
+  int code = sql_step(statement);
+  sql_reset(statement);
+  if (code == SQL_DONE || code == SQL_ROW) {
+    return SQL_OK;
   }
-  log_error("catalogue: %s", sqlite3_errmsg(db->handle));
+  log_error("catalogue: %s", db->connection.driver->message(&db->connection));
+  return code;
+}
+
+/* One step of the schema in one transaction. */
+static int migrate_to(database *db, int version, const char *step) {
+  char mark[64];
+  FAULT_POINT("migrate");
+  snprintf(mark, sizeof mark, "%s%d", database_either(db, "PRAGMA user_version=", "UPDATE catalogue SET schema="),
+           version);
+  int code = database_execute(db, database_either(db, "BEGIN IMMEDIATE", "BEGIN; SET LOCAL statement_timeout=0"));
+  code = code == SQL_OK ? database_execute(db, step) : code;
+  code = code == SQL_OK ? database_execute(db, mark) : code;
+  code = code == SQL_OK ? database_execute(db, "COMMIT") : code;
+  if (code != SQL_OK) {
+    database_execute(db, "ROLLBACK");
+  }
   return code;
 }
 
 int database_migrate(database *db) {
-  sqlite3_stmt *statement = database_statement(db, "PRAGMA user_version");
-  if (!statement || sqlite3_step(statement) != SQLITE_ROW) {
-    return SQLITE_ERROR;
-  }
-  int version = sqlite3_column_int(statement, 0);
-  sqlite3_reset(statement);
-  if (version > SCHEMA) {
+  const sql_driver *driver = db->connection.driver;
+  const char *const *steps = driver == &sql_postgresql ? postgresql_migrations : migrations;
+  int version = 0, latest = driver == &sql_postgresql ? postgresql_schema : (int)SCHEMA;
+  int code = driver->version(&db->connection, &version);
+  if (code == SQL_OK && version > latest) {
     log_error("the catalogue has schema %d, but this program supports up to %d: install a newer version", version,
-              (int)SCHEMA);
-    return SQLITE_SCHEMA;
+              latest);
+    return SQL_SCHEMA;
   }
-  for (; version < SCHEMA; version++) {
-    char mark[64];
-    FAULT_POINT("migrate");
-    sqlite3_snprintf(sizeof mark, mark, "PRAGMA user_version=%d", version + 1);
-    if (database_execute(db, "BEGIN IMMEDIATE") != SQLITE_OK ||
-        database_execute(db, migrations[version]) != SQLITE_OK || database_execute(db, mark) != SQLITE_OK ||
-        database_execute(db, "COMMIT") != SQLITE_OK) {
-      database_execute(db, "ROLLBACK");
-      return SQLITE_ERROR;
-    }
+  for (; code == SQL_OK && version < latest; version++) {
+    code = migrate_to(db, version + 1, steps[version]);
   }
-  return SQLITE_OK;
+  return code == SQL_OK ? driver->hold(&db->connection) : code;
 }

@@ -2,27 +2,47 @@
 #ifndef ORB_STORE_DATABASE_H
 #define ORB_STORE_DATABASE_H
 
-#include <sqlite3.h>
+#include "store/sql.h"
 
 enum { DATABASE_STATEMENTS = 96, DATABASE_READERS = 6 };
 
 /* A connection, for one thread at a time. Statements are cached by the address of their text. */
 typedef struct database {
-  sqlite3 *handle;
+  sql_connection connection;
   struct {
     const char *sql;
-    sqlite3_stmt *statement;
+    sql_statement statement;
   } cached[DATABASE_STATEMENTS];
 } database;
 
-int database_open(const char *path, int writer, database *out);
+/* where: the path of an SQLite file, or the URL of a database in PostgreSQL. */
+int database_open(const char *where, int writer, database *out);
 void database_close(database *db);
 /* The statement, reset and without bindings; NULL on error. */
-sqlite3_stmt *database_statement(database *db, const char *sql);
-/* Steps once, for statements without result rows. SQLITE_OK or the error. */
-int database_run(database *db, sqlite3_stmt *statement);
+sql_statement *database_statement(database *db, const char *sql);
+/* Steps once, for statements without result rows. SQL_OK or the error. */
+int database_run(database *db, sql_statement *statement);
 int database_execute(database *db, const char *sql);
-/* Brings the schema up to date. SQLITE_OK, or SQLITE_SCHEMA if the schema is newer than this program. */
+/* Whether it is in PostgreSQL. */
+int database_is_url(const char *where);
+/* The SQL for this database, where the two do not speak the same. */
+static inline const char *database_either(const database *db, const char *sqlite, const char *postgresql) {
+  return db->connection.driver == &sql_postgresql ? postgresql : sqlite;
+}
+/* Brings the schema up to date. SQL_OK, or SQL_SCHEMA if the schema is newer than this program. */
 int database_migrate(database *db);
+
+static inline int64_t sql_changes(const database *db) {
+  return db->connection.driver->changes(&db->connection);
+}
+static inline int64_t sql_last_row(const database *db) {
+  return db->connection.driver->last_row(&db->connection);
+}
+static inline int sql_in_transaction(const database *db) {
+  return db->connection.driver->in_transaction(&db->connection);
+}
+static inline int sql_out_of_memory(const database *db) {
+  return db->connection.driver->out_of_memory(&db->connection);
+}
 
 #endif

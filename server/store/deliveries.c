@@ -19,49 +19,50 @@ static int64_t now_ms(void) {
 
 /* Runs a statement whose parameter ?1 is a job, and ?2, if it has one, a time. */
 static int run_for(database *db, const char *sql, const char *job, int64_t now) {
-  sqlite3_stmt *st = database_statement(db, sql);
+  sql_statement *st = database_statement(db, sql);
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 2, now);
+  sql_bind_text(st, 1, job);
+  sql_bind_integer(st, 2, now);
   return database_run(db, st);
 }
 
 /* A job's first webhook makes the secret of its tenant. */
 static int ensure_secret(database *db, const char *job) {
   char tenant[64] = "";
-  sqlite3_stmt *st = database_statement(db, "SELECT owner FROM job WHERE id=?1");
+  sql_statement *st = database_statement(db, "SELECT owner FROM job WHERE id=?1");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
-  int code = sqlite3_step(st);
-  if (code == SQLITE_ROW) {
+  sql_bind_text(st, 1, job);
+  int code = sql_step(st);
+  if (code == SQL_ROW) {
     row_text(st, 0, tenant, sizeof tenant);
   }
-  sqlite3_reset(st);
-  return code == SQLITE_ROW ? webhook_ensure_secret(db, tenant) : code == SQLITE_DONE ? SQLITE_NOTFOUND : code;
+  sql_reset(st);
+  return code == SQL_ROW ? webhook_ensure_secret(db, tenant) : code == SQL_DONE ? SQL_NOTFOUND : code;
 }
 
 int delivery_subscribe(database *db, const char *job, const job_webhook *hook) {
   int code = ensure_secret(db, job);
-  sqlite3_stmt *st = code == SQLITE_OK
-                         ? database_statement(db,
-                                              "INSERT INTO job_webhook(job, url, origin, events) SELECT ?1, ?2, ?3, ?4"
-                                              " WHERE (SELECT count(*) FROM job_webhook WHERE job=?1 AND url<>?2) < ?5"
-                                              " ON CONFLICT(job, url) DO UPDATE SET events=events|excluded.events")
-                         : NULL;
+  sql_statement *st =
+      code == SQL_OK
+          ? database_statement(db,
+                               "INSERT INTO job_webhook(job, url, origin, events) SELECT ?1, ?2, ?3, ?4"
+                               " WHERE (SELECT count(*) FROM job_webhook WHERE job=?1 AND url<>?2) < ?5"
+                               " ON CONFLICT(job, url) DO UPDATE SET events=job_webhook.events|excluded.events")
+          : NULL;
   if (!st) {
-    return code == SQLITE_OK ? SQLITE_ERROR : code;
+    return code == SQL_OK ? SQL_ERROR : code;
   }
-  sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 2, hook->url, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 3, hook->origin, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 4, hook->events);
-  sqlite3_bind_int(st, 5, JOB_WEBHOOKS);
+  sql_bind_text(st, 1, job);
+  sql_bind_text(st, 2, hook->url);
+  sql_bind_text(st, 3, hook->origin);
+  sql_bind_integer(st, 4, hook->events);
+  sql_bind_integer(st, 5, JOB_WEBHOOKS);
   code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_CONSTRAINT : code;
+  return code == SQL_OK && sql_changes(db) == 0 ? SQL_CONSTRAINT : code;
 }
 
 /* Numbers continue after those of the job's other deliveries; {n} of a path has two digits. */
@@ -73,33 +74,33 @@ static const char add_deliveries[] =
     "   FROM job j JOIN job_webhook h ON h.job=j.id WHERE j.id=?1 AND (h.events & ?5) <> 0"
     "  UNION ALL SELECT 1, w.name, j.owner||' '||w.origin, w.url"
     "   FROM job j JOIN webhook w ON w.tenant=j.owner"
-    "   WHERE j.id=?1 AND j.listed=1 AND w.url<>'' AND (w.events & ?5) <> 0 AND ?6)"
+    "   WHERE j.id=?1 AND j.listed=1 AND w.url<>'' AND (w.events & ?5) <> 0 AND ?6<>0) AS due"
     " LIMIT ?7";
 
 static const char add_receivers[] =
     "INSERT INTO receiver(name, tenant, next) SELECT d.receiver, j.owner, min(d.next)"
-    " FROM delivery d JOIN job j ON j.id=d.job WHERE d.job=?1 AND d.state=0 GROUP BY d.receiver"
-    " ON CONFLICT(name) DO UPDATE SET next=min(next, excluded.next)";
+    " FROM delivery d JOIN job j ON j.id=d.job WHERE d.job=?1 AND d.state=0 GROUP BY d.receiver, j.owner"
+    " ON CONFLICT(name) DO UPDATE SET next=iif(excluded.next<receiver.next, excluded.next, receiver.next)";
 
 static int announce_to(database *db, const char *job, api_job_state state, const char *json, int64_t now, int all) {
   api_text body = {0};
   char type[24];
   api_webhook_body_write(state, now, json, &body);
   snprintf(type, sizeof type, "job.%s", api_job_state_name(state));
-  sqlite3_stmt *st = body.failed ? NULL : database_statement(db, add_deliveries);
-  int code = body.failed ? SQLITE_NOMEM : SQLITE_ERROR;
+  sql_statement *st = body.failed ? NULL : database_statement(db, add_deliveries);
+  int code = body.failed ? SQL_NOMEM : SQL_ERROR;
   if (st) {
-    sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
-    sqlite3_bind_int64(st, 2, now);
-    sqlite3_bind_text(st, 3, type, -1, SQLITE_TRANSIENT);
-    sqlite3_bind_text(st, 4, body.data, -1, SQLITE_TRANSIENT);
-    sqlite3_bind_int64(st, 5, API_EVENT(state));
-    sqlite3_bind_int(st, 6, all);
-    sqlite3_bind_int(st, 7, DELIVERIES_OF_JOB);
+    sql_bind_text(st, 1, job);
+    sql_bind_integer(st, 2, now);
+    sql_bind_text(st, 3, type);
+    sql_bind_text(st, 4, body.data);
+    sql_bind_integer(st, 5, API_EVENT(state));
+    sql_bind_integer(st, 6, all);
+    sql_bind_integer(st, 7, DELIVERIES_OF_JOB);
     code = database_run(db, st);
   }
   api_text_free(&body);
-  if (code != SQLITE_OK || sqlite3_changes(db->handle) == 0) {
+  if (code != SQL_OK || sql_changes(db) == 0) {
     return code;
   }
   return run_for(db, add_receivers, job, now);
@@ -109,7 +110,7 @@ static const char drop_subscriptions[] = "DELETE FROM job_webhook WHERE job=?1";
 
 int delivery_announce(database *db, const char *job, api_job_state state, const char *json, int64_t now) {
   int code = announce_to(db, job, state, json, now, 1);
-  return code == SQLITE_OK ? run_for(db, drop_subscriptions, job, now) : code;
+  return code == SQL_OK ? run_for(db, drop_subscriptions, job, now) : code;
 }
 
 typedef struct subscribe_arg {
@@ -119,22 +120,22 @@ typedef struct subscribe_arg {
 
 /* The state and the last event of a job that has ended; *json NULL: it has not. */
 static int ended_as(database *db, const char *job, api_job_state *state, char **json) {
-  sqlite3_stmt *st = database_statement(db,
-                                        "SELECT j.state, e.json FROM job j JOIN event e ON e.job=j.id"
-                                        " WHERE j.id=?1 AND j.state>=2 ORDER BY e.number DESC LIMIT 1");
+  sql_statement *st = database_statement(db,
+                                         "SELECT j.state, e.json FROM job j JOIN event e ON e.job=j.id"
+                                         " WHERE j.id=?1 AND j.state>=2 ORDER BY e.number DESC LIMIT 1");
   *json = NULL;
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
-  int code = sqlite3_step(st);
-  if (code == SQLITE_ROW) {
-    *state = (api_job_state)sqlite3_column_int(st, 0);
+  sql_bind_text(st, 1, job);
+  int code = sql_step(st);
+  if (code == SQL_ROW) {
+    *state = (api_job_state)sql_int(st, 0);
     *json = row_copy(st, 1);
-    code = *json ? SQLITE_DONE : SQLITE_NOMEM;
+    code = *json ? SQL_DONE : SQL_NOMEM;
   }
-  sqlite3_reset(st);
-  return code == SQLITE_DONE ? SQLITE_OK : code;
+  sql_reset(st);
+  return code == SQL_DONE ? SQL_OK : code;
 }
 
 static int subscribe(database *db, void *arg) {
@@ -142,13 +143,13 @@ static int subscribe(database *db, void *arg) {
   api_job_state state;
   char *json = NULL;
   int code = delivery_subscribe(db, s->job, s->hook);
-  if (code == SQLITE_OK) {
+  if (code == SQL_OK) {
     code = ended_as(db, s->job, &state, &json);
   }
   if (json) {
     int64_t now = now_ms();
     code = announce_to(db, s->job, state, json, now, 0);
-    if (code == SQLITE_OK) {
+    if (code == SQL_OK) {
       code = run_for(db, drop_subscriptions, s->job, now);
     }
     free(json);
@@ -165,34 +166,34 @@ store_result catalogue_job_subscribe(catalogue *cat, const char *job, const job_
   "d.seq, d.job, d.number, d.webhook, d.receiver, d.url, d.type, d.state, d.attempts, d.tried, d.status, d.error," \
   " d.next, d.created, d.ended"
 
-static int read_listed(sqlite3_stmt *st, void *to) {
+static int read_listed(sql_statement *st, void *to) {
   delivery_row *out = to;
   memset(out, 0, sizeof *out);
-  out->seq = sqlite3_column_int64(st, 0);
+  out->seq = sql_integer(st, 0);
   row_text(st, 1, out->job, sizeof out->job);
-  out->number = sqlite3_column_int(st, 2);
+  out->number = sql_int(st, 2);
   row_text(st, 3, out->webhook, sizeof out->webhook);
   row_text(st, 4, out->receiver, sizeof out->receiver);
   row_text(st, 5, out->url, sizeof out->url);
   row_text(st, 6, out->type, sizeof out->type);
-  out->state = (api_delivery_state)sqlite3_column_int(st, 7);
-  out->attempts = sqlite3_column_int(st, 8);
-  out->tried = sqlite3_column_int(st, 9);
-  out->status = sqlite3_column_int(st, 10);
+  out->state = (api_delivery_state)sql_int(st, 7);
+  out->attempts = sql_int(st, 8);
+  out->tried = sql_int(st, 9);
+  out->status = sql_int(st, 10);
   row_text(st, 11, out->error, sizeof out->error);
-  out->next = sqlite3_column_int64(st, 12);
-  out->created = sqlite3_column_int64(st, 13);
-  out->ended = sqlite3_column_int64(st, 14);
+  out->next = sql_integer(st, 12);
+  out->created = sql_integer(st, 13);
+  out->ended = sql_integer(st, 14);
   return 1;
 }
 
-static int read_due(sqlite3_stmt *st, void *to) {
+static int read_due(sql_statement *st, void *to) {
   delivery_row *out = to;
   read_listed(st, out);
   out->body = row_copy(st, 15);
   row_text(st, 16, out->secret, sizeof out->secret);
   row_text(st, 17, out->old_secret, sizeof out->old_secret);
-  out->old_until = sqlite3_column_int64(st, 18);
+  out->old_until = sql_integer(st, 18);
   return out->body != NULL;
 }
 
@@ -204,7 +205,7 @@ static const row_kind due_rows = {read_due, release_row, sizeof(delivery_row)};
 
 int catalogue_deliveries_due(catalogue *cat, int64_t now, int share, int limit, delivery_row *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(
+  sql_statement *st = database_statement(
       db, "SELECT " COLUMNS
           ", d.body, w.secret, w.old_secret, w.old_until FROM (SELECT name, next,"
           "  row_number() OVER (PARTITION BY tenant ORDER BY next) AS turn FROM receiver WHERE next<=?1) r"
@@ -212,16 +213,16 @@ int catalogue_deliveries_due(catalogue *cat, int64_t now, int share, int limit, 
           "  ORDER BY next, seq LIMIT 1) LEFT JOIN webhook w ON w.name=d.webhook"
           " WHERE r.turn<=?2 ORDER BY r.turn, r.next LIMIT ?3");
   if (st) {
-    sqlite3_bind_int64(st, 1, now);
-    sqlite3_bind_int(st, 2, share);
-    sqlite3_bind_int(st, 3, limit);
+    sql_bind_integer(st, 1, now);
+    sql_bind_integer(st, 2, share);
+    sql_bind_integer(st, 3, limit);
   }
   return rows_many(cat, db, st, &due_rows, out, limit);
 }
 
 int64_t catalogue_deliveries_next(catalogue *cat) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "SELECT coalesce(min(next), 9223372036854775807) FROM receiver");
+  sql_statement *st = database_statement(db, "SELECT coalesce(min(next), 9223372036854775807) FROM receiver");
   return rows_integer(cat, db, st);
 }
 
@@ -235,11 +236,11 @@ static int update_receiver(database *db, const char *receiver) {
   static const char *const steps[] = {
       "DELETE FROM receiver WHERE name=?1 AND NOT EXISTS(SELECT 1 FROM delivery WHERE state=0 AND receiver=?1)",
       "UPDATE receiver SET next=(SELECT min(next) FROM delivery WHERE state=0 AND receiver=?1) WHERE name=?1"};
-  int code = SQLITE_OK;
-  for (int i = 0; i < 2 && code == SQLITE_OK; i++) {
-    sqlite3_stmt *st = database_statement(db, steps[i]);
+  int code = SQL_OK;
+  for (int i = 0; i < 2 && code == SQL_OK; i++) {
+    sql_statement *st = database_statement(db, steps[i]);
     if (st) {
-      sqlite3_bind_text(st, 1, receiver, -1, SQLITE_STATIC);
+      sql_bind_text(st, 1, receiver);
     }
     code = database_run(db, st);
   }
@@ -254,36 +255,36 @@ typedef struct record_arg {
 
 static int record_one(database *db, const delivery_row *row, int64_t now) {
   /* A delivery that was removed or retried by hand in the meantime keeps what that has set. */
-  sqlite3_stmt *st = database_statement(db,
-                                        "UPDATE delivery SET state=?2, status=?3, error=?4, next=?5, ended=?6,"
-                                        " attempts=attempts+1, tried=tried+1 WHERE seq=?1 AND state=0");
+  sql_statement *st = database_statement(db,
+                                         "UPDATE delivery SET state=?2, status=?3, error=?4, next=?5, ended=?6,"
+                                         " attempts=attempts+1, tried=tried+1 WHERE seq=?1 AND state=0");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_int64(st, 1, row->seq);
-  sqlite3_bind_int(st, 2, (int)row->state);
-  sqlite3_bind_int(st, 3, row->status);
-  sqlite3_bind_text(st, 4, row->error, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 5, row->next);
-  sqlite3_bind_int64(st, 6, row->state == API_DELIVERY_PENDING ? 0 : now);
+  sql_bind_integer(st, 1, row->seq);
+  sql_bind_integer(st, 2, (int)row->state);
+  sql_bind_integer(st, 3, row->status);
+  sql_bind_text(st, 4, row->error);
+  sql_bind_integer(st, 5, row->next);
+  sql_bind_integer(st, 6, row->state == API_DELIVERY_PENDING ? 0 : now);
   int code = database_run(db, st);
   /* Its job may have been forgotten in the meantime. */
-  st = code == SQLITE_OK ? database_statement(db,
-                                              "DELETE FROM delivery WHERE seq=?1 AND state<>0"
-                                              " AND NOT EXISTS(SELECT 1 FROM job WHERE id=delivery.job)")
-                         : NULL;
+  st = code == SQL_OK ? database_statement(db,
+                                           "DELETE FROM delivery WHERE seq=?1 AND state<>0"
+                                           " AND NOT EXISTS(SELECT 1 FROM job WHERE id=delivery.job)")
+                      : NULL;
   if (!st) {
-    return code == SQLITE_OK ? SQLITE_ERROR : code;
+    return code == SQL_OK ? SQL_ERROR : code;
   }
-  sqlite3_bind_int64(st, 1, row->seq);
+  sql_bind_integer(st, 1, row->seq);
   code = database_run(db, st);
-  return code == SQLITE_OK ? update_receiver(db, row->receiver) : code;
+  return code == SQL_OK ? update_receiver(db, row->receiver) : code;
 }
 
 static int record(database *db, void *arg) {
   const record_arg *r = arg;
-  int code = SQLITE_OK;
-  for (int i = 0; i < r->count && code == SQLITE_OK; i++) {
+  int code = SQL_OK;
+  for (int i = 0; i < r->count && code == SQL_OK; i++) {
     code = record_one(db, &r->rows[i], r->now);
   }
   return code;
@@ -296,11 +297,11 @@ store_result catalogue_deliveries_record(catalogue *cat, const delivery_row *row
 
 int catalogue_deliveries_of(catalogue *cat, const char *job, int limit, delivery_row *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st =
+  sql_statement *st =
       database_statement(db, "SELECT " COLUMNS " FROM delivery d WHERE d.job=?1 ORDER BY d.number LIMIT ?2");
   if (st) {
-    sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
-    sqlite3_bind_int(st, 2, limit);
+    sql_bind_text(st, 1, job);
+    sql_bind_integer(st, 2, limit);
   }
   return rows_many(cat, db, st, &listed_rows, out, limit);
 }
@@ -313,17 +314,17 @@ typedef struct retry_arg {
 
 static int retry(database *db, void *arg) {
   const retry_arg *r = arg;
-  sqlite3_stmt *st =
+  sql_statement *st =
       database_statement(db, "UPDATE delivery SET state=0, tried=0, next=?2, ended=0 WHERE job=?1 AND number=?3");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, r->job, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 2, r->now);
-  sqlite3_bind_int(st, 3, r->number);
+  sql_bind_text(st, 1, r->job);
+  sql_bind_integer(st, 2, r->now);
+  sql_bind_integer(st, 3, r->number);
   int code = database_run(db, st);
-  if (code != SQLITE_OK || sqlite3_changes(db->handle) == 0) {
-    return code == SQLITE_OK ? SQLITE_NOTFOUND : code;
+  if (code != SQL_OK || sql_changes(db) == 0) {
+    return code == SQL_OK ? SQL_NOTFOUND : code;
   }
   return run_for(db, add_receivers, r->job, r->now);
 }

@@ -38,7 +38,7 @@ typedef struct job_webhook {
 } job_webhook;
 
 /* These two run inside a transaction of the writer. */
-/* The webhook belongs to the job from now on, if the job does not have it. SQLITE_CONSTRAINT: it has JOB_WEBHOOKS. */
+/* The webhook belongs to the job from now on, if the job does not have it. SQL_CONSTRAINT: it has JOB_WEBHOOKS. */
 int delivery_subscribe(database *db, const char *job, const job_webhook *hook);
 /* The job has ended: adds the deliveries. json: the job. */
 int delivery_announce(database *db, const char *job, api_job_state state, const char *json, int64_t now);

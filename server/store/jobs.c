@@ -25,28 +25,28 @@ typedef struct insert_arg {
 static int insert(database *db, void *arg) {
   job_row *r = ((insert_arg *)arg)->row;
   const job_webhook *hook = ((insert_arg *)arg)->hook;
-  sqlite3_stmt *st = database_statement(
+  sql_statement *st = database_statement(
       db,
       "INSERT INTO job(id, key, kind, state, attempt, listed, priority, cost, owner, request, created,"
       " charged) VALUES(?1, ?2, ?3, 0, 0, ?4, ?5, ?6, ?7, ?8, ?9, ?10)");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, r->id, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 2, r->key, -1, SQLITE_STATIC);
-  sqlite3_bind_int(st, 3, (int)r->kind);
-  sqlite3_bind_int(st, 4, r->listed);
-  sqlite3_bind_int(st, 5, r->priority);
-  sqlite3_bind_int64(st, 6, r->cost);
-  sqlite3_bind_text(st, 7, r->owner, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 8, r->request, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 9, r->created);
-  sqlite3_bind_text(st, 10, r->charged, -1, SQLITE_STATIC);
+  sql_bind_text(st, 1, r->id);
+  sql_bind_text(st, 2, r->key);
+  sql_bind_integer(st, 3, (int)r->kind);
+  sql_bind_integer(st, 4, r->listed);
+  sql_bind_integer(st, 5, r->priority);
+  sql_bind_integer(st, 6, r->cost);
+  sql_bind_text(st, 7, r->owner);
+  sql_bind_text(st, 8, r->request);
+  sql_bind_integer(st, 9, r->created);
+  sql_bind_text(st, 10, r->charged);
   int code = crash_check(db, r->key);
-  code = code == SQLITE_OK ? database_run(db, st) : code;
-  r->seq = sqlite3_last_insert_rowid(db->handle);
-  code = code == SQLITE_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
-  return code == SQLITE_OK && hook ? delivery_subscribe(db, r->id, hook) : code;
+  code = code == SQL_OK ? database_run(db, st) : code;
+  r->seq = code == SQL_OK ? sql_last_row(db) : 0;
+  code = code == SQL_OK ? owner_of_meshes(db, r->request, r->owner, r->created, r->listed) : code;
+  return code == SQL_OK && hook ? delivery_subscribe(db, r->id, hook) : code;
 }
 
 store_result catalogue_job_insert(catalogue *cat, job_row *row, const job_webhook *hook) {
@@ -62,15 +62,15 @@ typedef struct change {
 } change;
 
 /* Runs an update that must change exactly one row. */
-static int must_change(database *db, sqlite3_stmt *st) {
+static int must_change(database *db, sql_statement *st) {
   int code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) != 1 ? SQLITE_CONSTRAINT : code;
+  return code == SQL_OK && sql_changes(db) != 1 ? SQL_CONSTRAINT : code;
 }
 
 static int list_it(database *db, void *arg) {
-  sqlite3_stmt *st = database_statement(db, "UPDATE job SET listed=1 WHERE id=?1");
+  sql_statement *st = database_statement(db, "UPDATE job SET listed=1 WHERE id=?1");
   if (st) {
-    sqlite3_bind_text(st, 1, arg, -1, SQLITE_STATIC);
+    sql_bind_text(st, 1, arg);
   }
   return must_change(db, st);
 }
@@ -81,15 +81,15 @@ store_result catalogue_job_list_it(catalogue *cat, const char *id) {
 
 static int claim(database *db, void *arg) {
   const change *c = arg;
-  sqlite3_stmt *st = database_statement(db,
-                                        "UPDATE job SET state=1, attempt=?2, alone=?3,"
-                                        " started=CASE started WHEN 0 THEN ?4 ELSE started END"
-                                        " WHERE id=?1 AND state<2 AND attempt=?2-1");
+  sql_statement *st = database_statement(db,
+                                         "UPDATE job SET state=1, attempt=?2, alone=?3,"
+                                         " started=CASE started WHEN 0 THEN ?4 ELSE started END"
+                                         " WHERE id=?1 AND state<2 AND attempt=?2-1");
   if (st) {
-    sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
-    sqlite3_bind_int(st, 2, c->attempt);
-    sqlite3_bind_int(st, 3, c->alone);
-    sqlite3_bind_int64(st, 4, c->now);
+    sql_bind_text(st, 1, c->id);
+    sql_bind_integer(st, 2, c->attempt);
+    sql_bind_integer(st, 3, c->alone);
+    sql_bind_integer(st, 4, c->now);
   }
   return must_change(db, st);
 }
@@ -101,11 +101,11 @@ store_result catalogue_job_claim(catalogue *cat, const char *id, int attempt, in
 
 static int release(database *db, void *arg) {
   const change *c = arg;
-  sqlite3_stmt *st =
+  sql_statement *st =
       database_statement(db, "UPDATE job SET state=0, attempt=?2-1, alone=0 WHERE id=?1 AND state=1 AND attempt=?2");
   if (st) {
-    sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
-    sqlite3_bind_int(st, 2, c->attempt);
+    sql_bind_text(st, 1, c->id);
+    sql_bind_integer(st, 2, c->attempt);
   }
   return must_change(db, st);
 }
@@ -117,16 +117,16 @@ store_result catalogue_job_release(catalogue *cat, const char *id, int attempt) 
 
 static int crashed(database *db, void *arg) {
   const change *c = arg;
-  sqlite3_stmt *st = database_statement(
+  sql_statement *st = database_statement(
       db, "UPDATE job SET state=0, alone=0, crashes=crashes+?3, suspect=?4 WHERE id=?1 AND state=1 AND attempt=?2");
   if (st) {
-    sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
-    sqlite3_bind_int(st, 2, c->attempt);
-    sqlite3_bind_int(st, 3, c->counts);
-    sqlite3_bind_int(st, 4, c->alone);
+    sql_bind_text(st, 1, c->id);
+    sql_bind_integer(st, 2, c->attempt);
+    sql_bind_integer(st, 3, c->counts);
+    sql_bind_integer(st, 4, c->alone);
   }
   int code = must_change(db, st);
-  return code == SQLITE_OK && c->counts ? crash_note(db, c->row->key, c->row->request, c->row->owner, c->now) : code;
+  return code == SQL_OK && c->counts ? crash_note(db, c->row->key, c->row->request, c->row->owner, c->now) : code;
 }
 
 store_result catalogue_job_crashed(catalogue *cat, const job_row *row, int counts, int suspect, int64_t now) {
@@ -135,46 +135,48 @@ store_result catalogue_job_crashed(catalogue *cat, const job_row *row, int count
 }
 
 static int write_event(database *db, const char *job, int64_t number, const char *type, const char *json) {
-  sqlite3_stmt *st =
-      database_statement(db, "INSERT OR REPLACE INTO event(job, number, type, json) VALUES(?1,?2,?3,?4)");
+  sql_statement *st =
+      database_statement(db,
+                         "INSERT INTO event(job, number, type, json) VALUES(?1,?2,?3,?4)"
+                         " ON CONFLICT(job, number) DO UPDATE SET type=excluded.type, json=excluded.json");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 2, number);
-  sqlite3_bind_text(st, 3, type, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 4, json, -1, SQLITE_STATIC);
+  sql_bind_text(st, 1, job);
+  sql_bind_integer(st, 2, number);
+  sql_bind_text(st, 3, type);
+  sql_bind_text(st, 4, json);
   return database_run(db, st);
 }
 
 static int finish(database *db, void *arg) {
   const change *c = arg;
   const job_end *end = c->end;
-  sqlite3_stmt *st = database_statement(db,
-                                        "UPDATE job SET state=?3, problem=?4, finished=?5, suspect=0, alone=0,"
-                                        " result=?6 WHERE id=?1 AND attempt=?2 AND state<2");
+  sql_statement *st = database_statement(db,
+                                         "UPDATE job SET state=?3, problem=?4, finished=?5, suspect=0, alone=0,"
+                                         " result=?6 WHERE id=?1 AND attempt=?2 AND state<2");
   if (st) {
-    sqlite3_bind_text(st, 1, c->id, -1, SQLITE_STATIC);
-    sqlite3_bind_int(st, 2, c->attempt);
-    sqlite3_bind_int(st, 3, (int)end->state);
-    sqlite3_bind_text(st, 4, end->problem, -1, SQLITE_STATIC);
-    sqlite3_bind_int64(st, 5, end->now);
-    sqlite3_bind_text(st, 6, end->mesh ? end->mesh : "", -1, SQLITE_STATIC);
+    sql_bind_text(st, 1, c->id);
+    sql_bind_integer(st, 2, c->attempt);
+    sql_bind_integer(st, 3, (int)end->state);
+    sql_bind_text(st, 4, end->problem);
+    sql_bind_integer(st, 5, end->now);
+    sql_bind_text(st, 6, end->mesh ? end->mesh : "");
   }
   int code = must_change(db, st);
-  if (code == SQLITE_OK && end->result) {
+  if (code == SQL_OK && end->result) {
     code = resource_insert(db, end->result);
   }
-  if (code == SQLITE_OK && end->state == API_JOB_SUCCEEDED && !end->mesh) {
+  if (code == SQL_OK && end->state == API_JOB_SUCCEEDED && !end->mesh) {
     code = owner_of_job(db, c->id, end->now);
   }
-  if (code == SQLITE_OK && end->worker_ms > 0) {
+  if (code == SQL_OK && end->worker_ms > 0) {
     code = usage_add_time(db, end->owner, end->worker_ms);
   }
-  if (code == SQLITE_OK && end->event_json) {
+  if (code == SQL_OK && end->event_json) {
     code = write_event(db, c->id, end->event, api_job_state_name(end->state), end->event_json);
   }
-  if (code == SQLITE_OK && end->event_json) {
+  if (code == SQL_OK && end->event_json) {
     code = delivery_announce(db, c->id, end->state, end->event_json, end->now);
   }
   return code;
@@ -185,27 +187,27 @@ store_result catalogue_job_finish(catalogue *cat, const char *id, int attempt, c
   return catalogue_write(cat, finish, &c);
 }
 
-static int read_row(sqlite3_stmt *st, void *to) {
+static int read_row(sql_statement *st, void *to) {
   job_row *out = to;
   memset(out, 0, sizeof *out);
-  out->seq = sqlite3_column_int64(st, 0);
+  out->seq = sql_integer(st, 0);
   row_text(st, 1, out->id, sizeof out->id);
   row_text(st, 2, out->key, sizeof out->key);
-  out->kind = (api_job_kind)sqlite3_column_int(st, 3);
-  out->state = (api_job_state)sqlite3_column_int(st, 4);
-  out->attempt = sqlite3_column_int(st, 5);
-  out->crashes = sqlite3_column_int(st, 6);
-  out->suspect = sqlite3_column_int(st, 7);
-  out->alone = sqlite3_column_int(st, 8);
-  out->listed = sqlite3_column_int(st, 9);
-  out->priority = sqlite3_column_int(st, 10);
-  out->cost = sqlite3_column_int64(st, 11);
+  out->kind = (api_job_kind)sql_int(st, 3);
+  out->state = (api_job_state)sql_int(st, 4);
+  out->attempt = sql_int(st, 5);
+  out->crashes = sql_int(st, 6);
+  out->suspect = sql_int(st, 7);
+  out->alone = sql_int(st, 8);
+  out->listed = sql_int(st, 9);
+  out->priority = sql_int(st, 10);
+  out->cost = sql_integer(st, 11);
   row_text(st, 12, out->owner, sizeof out->owner);
   out->request = row_copy(st, 13);
   out->problem = row_copy(st, 14);
-  out->created = sqlite3_column_int64(st, 15);
-  out->started = sqlite3_column_int64(st, 16);
-  out->finished = sqlite3_column_int64(st, 17);
+  out->created = sql_integer(st, 15);
+  out->started = sql_integer(st, 16);
+  out->finished = sql_integer(st, 17);
   row_text(st, 18, out->charged, sizeof out->charged);
   row_text(st, 19, out->result, sizeof out->result);
   return out->request != NULL && !row_lacks(st, 14, out->problem);
@@ -217,48 +219,52 @@ static const row_kind job_rows = {read_row, release_row, sizeof(job_row)};
 
 store_result catalogue_job_get(catalogue *cat, const char *id, job_row *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS " FROM job WHERE id=?1");
+  sql_statement *st = database_statement(db, "SELECT " COLUMNS " FROM job WHERE id=?1");
   if (st) {
-    sqlite3_bind_text(st, 1, id, -1, SQLITE_STATIC);
+    sql_bind_text(st, 1, id);
   }
   return rows_one(cat, db, st, &job_rows, out);
 }
 
 /* Listed jobs of state ?1 (−1: any, −2: queued or running) with a sequence number below ?2. */
 #define LISTED " FROM job WHERE listed=1 AND (?1=-1 OR state=?1 OR (?1=-2 AND state<2)) AND "
-/* Those whose id begins with ?5, through the index of ids; a "+" keeps SQLite from using another index. */
-#define NAMED "id>=?5 AND id<?5 || 'g' AND +seq<?2"
+/* Those whose id begins with ?5, through the index of ids; in SQLite, a "+" keeps it from using another index. */
+#define NAMED(seq) "id>=?5 AND id<?5 || 'g' AND " seq "<?2"
 
 int catalogue_job_list(catalogue *cat, const char *owner, const char *prefix, int state, int64_t before, int limit,
                        job_row *out) {
   static const char *const queries[2][2] = {
       {"SELECT " COLUMNS LISTED "seq<?2 ORDER BY seq DESC LIMIT ?3",
        "SELECT " COLUMNS LISTED "seq<?2 AND owner=?4 ORDER BY seq DESC LIMIT ?3"},
-      {"SELECT " COLUMNS LISTED NAMED " ORDER BY +seq DESC LIMIT ?3",
-       "SELECT " COLUMNS LISTED NAMED " AND +owner=?4 ORDER BY +seq DESC LIMIT ?3"}};
+      {"SELECT " COLUMNS LISTED NAMED("+seq") " ORDER BY +seq DESC LIMIT ?3",
+       "SELECT " COLUMNS LISTED NAMED("+seq") " AND +owner=?4 ORDER BY +seq DESC LIMIT ?3"}};
+  static const char *const named[2] = {
+      "SELECT " COLUMNS LISTED NAMED("seq") " ORDER BY seq DESC LIMIT ?3",
+      "SELECT " COLUMNS LISTED NAMED("seq") " AND owner=?4 ORDER BY seq DESC LIMIT ?3"};
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, queries[prefix != NULL][owner != NULL]);
+  sql_statement *st = database_statement(
+      db, prefix ? database_either(db, queries[1][owner != NULL], named[owner != NULL]) : queries[0][owner != NULL]);
   if (st && owner) {
-    sqlite3_bind_text(st, 4, owner, -1, SQLITE_STATIC);
+    sql_bind_text(st, 4, owner);
   }
   if (st && prefix) {
-    sqlite3_bind_text(st, 5, prefix, -1, SQLITE_STATIC);
+    sql_bind_text(st, 5, prefix);
   }
   if (st) {
-    sqlite3_bind_int(st, 1, state);
-    sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);
-    sqlite3_bind_int(st, 3, limit);
+    sql_bind_integer(st, 1, state);
+    sql_bind_integer(st, 2, before > 0 ? before : INT64_MAX);
+    sql_bind_integer(st, 3, limit);
   }
   return rows_many(cat, db, st, &job_rows, out, limit);
 }
 
 int catalogue_unfinished(catalogue *cat, int64_t after, int limit, job_row *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st =
+  sql_statement *st =
       database_statement(db, "SELECT " COLUMNS " FROM job WHERE state<2 AND seq>?1 ORDER BY seq LIMIT ?2");
   if (st) {
-    sqlite3_bind_int64(st, 1, after);
-    sqlite3_bind_int(st, 2, limit);
+    sql_bind_integer(st, 1, after);
+    sql_bind_integer(st, 2, limit);
   }
   return rows_many(cat, db, st, &job_rows, out, limit);
 }
@@ -278,26 +284,26 @@ static int give_up(database *db, job_row *row, const change *c) {
                                 .started = row->started,
                                 .finished = c->now},
                 &json);
-  sqlite3_stmt *st = database_statement(db, "SELECT coalesce(max(number), 0) + 1 FROM event WHERE job=?1");
+  sql_statement *st = database_statement(db, "SELECT coalesce(max(number), 0) + 1 FROM event WHERE job=?1");
   if (!st || json.failed) {
     api_text_free(&json);
-    return SQLITE_NOMEM;
+    return SQL_NOMEM;
   }
-  sqlite3_bind_text(st, 1, row->id, -1, SQLITE_STATIC);
-  int code = sqlite3_step(st);
-  number = code == SQLITE_ROW ? sqlite3_column_int64(st, 0) : 0;
-  sqlite3_reset(st);
-  code = code == SQLITE_ROW ? write_event(db, row->id, number, api_job_state_name(row->state), json.data) : code;
-  code = code == SQLITE_OK ? delivery_announce(db, row->id, row->state, json.data, c->now) : code;
+  sql_bind_text(st, 1, row->id);
+  int code = sql_step(st);
+  number = code == SQL_ROW ? sql_integer(st, 0) : 0;
+  sql_reset(st);
+  code = code == SQL_ROW ? write_event(db, row->id, number, api_job_state_name(row->state), json.data) : code;
+  code = code == SQL_OK ? delivery_announce(db, row->id, row->state, json.data, c->now) : code;
   api_text_free(&json);
-  if (code == SQLITE_OK) {
+  if (code == SQL_OK) {
     st = database_statement(db, "UPDATE job SET state=3, problem=?1, finished=?2 WHERE id=?3");
     if (!st) {
-      return SQLITE_ERROR;
+      return SQL_ERROR;
     }
-    sqlite3_bind_text(st, 1, c->problem, -1, SQLITE_STATIC);
-    sqlite3_bind_int64(st, 2, c->now);
-    sqlite3_bind_text(st, 3, row->id, -1, SQLITE_STATIC);
+    sql_bind_text(st, 1, c->problem);
+    sql_bind_integer(st, 2, c->now);
+    sql_bind_text(st, 3, row->id);
     code = database_run(db, st);
   }
   return code;
@@ -310,33 +316,33 @@ static int recover(database *db, void *arg) {
   if (c->attempt == 0) {
     return database_run(db, database_statement(db, "UPDATE job SET state=0, alone=0 WHERE state=1"));
   }
-  sqlite3_stmt *st = database_statement(db,
-                                        "UPDATE job SET crashes=crashes+1 WHERE state=1 AND"
-                                        " (alone=1 OR (SELECT count(*) FROM job WHERE state=1)=1)");
+  sql_statement *st = database_statement(db,
+                                         "UPDATE job SET crashes=crashes+1 WHERE state=1 AND"
+                                         " (alone=1 OR (SELECT count(*) FROM job WHERE state=1)=1)");
   int code = database_run(db, st);
-  if (code == SQLITE_OK) {
+  if (code == SQL_OK) {
     code = database_run(db, database_statement(db, "UPDATE job SET state=0, suspect=1, alone=0 WHERE state=1"));
   }
-  while (code == SQLITE_OK) { /* rarely more than one job */
+  while (code == SQL_OK) { /* rarely more than one job */
     job_row row;
     st = database_statement(db, "SELECT " COLUMNS " FROM job WHERE state=0 AND crashes>=?1 ORDER BY seq LIMIT 1");
     if (!st) {
-      return SQLITE_ERROR;
+      return SQL_ERROR;
     }
-    sqlite3_bind_int(st, 1, c->attempt);
-    code = sqlite3_step(st);
-    if (code == SQLITE_DONE) {
-      sqlite3_reset(st);
-      return SQLITE_OK;
+    sql_bind_integer(st, 1, c->attempt);
+    code = sql_step(st);
+    if (code == SQL_DONE) {
+      sql_reset(st);
+      return SQL_OK;
     }
-    if (code == SQLITE_ROW) {
-      code = read_row(st, &row) ? SQLITE_OK : SQLITE_NOMEM;
-      if (code != SQLITE_OK) {
+    if (code == SQL_ROW) {
+      code = read_row(st, &row) ? SQL_OK : SQL_NOMEM;
+      if (code != SQL_OK) {
         job_row_free(&row);
       }
     }
-    sqlite3_reset(st);
-    if (code == SQLITE_OK) {
+    sql_reset(st);
+    if (code == SQL_OK) {
       code = give_up(db, &row, c);
       job_row_free(&row);
     }
@@ -351,22 +357,27 @@ store_result catalogue_recover(catalogue *cat, int most_crashes, int64_t now, co
 
 int64_t catalogue_jobs_ended(catalogue *cat) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "SELECT count(*) FROM job WHERE state>=2");
+  sql_statement *st = database_statement(db, "SELECT count(*) FROM job WHERE state>=2");
   return rows_integer(cat, db, st);
 }
 
-/* NOT INDEXED scans in row order: nearly all of the oldest jobs have ended, so this finds them without a sort. */
-#define OLDEST_ENDED " FROM job NOT INDEXED WHERE state>=2 ORDER BY seq LIMIT ?1)"
+/* In SQLite, NOT INDEXED scans in row order: nearly all of the oldest jobs have ended, so this finds them without a
+ * sort. */
+#define OLDEST(how) " FROM job" how " WHERE state>=2 ORDER BY seq LIMIT ?1)"
+#define FORGET(how)                                                              \
+  {                                                                              \
+    "DELETE FROM event WHERE job IN (SELECT id" OLDEST(how),                     \
+        "DELETE FROM delivery WHERE state<>0 AND job IN (SELECT id" OLDEST(how), \
+        "DELETE FROM job WHERE seq IN (SELECT seq" OLDEST(how)                   \
+  }
 
 static int forget(database *db, void *arg) {
-  static const char *const steps[] = {"DELETE FROM event WHERE job IN (SELECT id" OLDEST_ENDED,
-                                      "DELETE FROM delivery WHERE state<>0 AND job IN (SELECT id" OLDEST_ENDED,
-                                      "DELETE FROM job WHERE seq IN (SELECT seq" OLDEST_ENDED};
-  int code = SQLITE_OK;
-  for (int i = 0; i < 3 && code == SQLITE_OK; i++) {
-    sqlite3_stmt *st = database_statement(db, steps[i]);
+  static const char *const steps[3] = FORGET(" NOT INDEXED"), *const plain[3] = FORGET("");
+  int code = SQL_OK;
+  for (int i = 0; i < 3 && code == SQL_OK; i++) {
+    sql_statement *st = database_statement(db, database_either(db, steps[i], plain[i]));
     if (st) {
-      sqlite3_bind_int(st, 1, *(const int *)arg);
+      sql_bind_integer(st, 1, *(const int *)arg);
     }
     code = database_run(db, st);
   }
@@ -400,9 +411,9 @@ void catalogue_event(catalogue *cat, const char *job, int64_t number, const char
   }
 }
 
-static int read_event(sqlite3_stmt *st, void *to) {
+static int read_event(sql_statement *st, void *to) {
   event_row *out = to;
-  out->number = sqlite3_column_int64(st, 0);
+  out->number = sql_integer(st, 0);
   row_text(st, 1, out->type, sizeof out->type);
   out->json = row_copy(st, 2);
   return out->json != NULL;
@@ -414,12 +425,12 @@ static const row_kind event_rows = {read_event, release_event, sizeof(event_row)
 
 int catalogue_events(catalogue *cat, const char *job, int64_t after, int limit, event_row *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(
+  sql_statement *st = database_statement(
       db, "SELECT number, type, json FROM event WHERE job=?1 AND number>?2 ORDER BY number LIMIT ?3");
   if (st) {
-    sqlite3_bind_text(st, 1, job, -1, SQLITE_STATIC);
-    sqlite3_bind_int64(st, 2, after);
-    sqlite3_bind_int(st, 3, limit);
+    sql_bind_text(st, 1, job);
+    sql_bind_integer(st, 2, after);
+    sql_bind_integer(st, 3, limit);
   }
   return rows_many(cat, db, st, &event_rows, out, limit);
 }

@@ -24,8 +24,9 @@ static const char *query_of(int shaped, int owned) {
                  : "SELECT " ALL_COLUMNS " FROM shape s JOIN resource r ON r.seq=s.seq WHERE" SHAPED;
   }
   return owned ? "SELECT " OWN_COLUMNS
-                 " FROM resource r CROSS JOIN owner o ON o.kind=r.kind AND o.id=r.id AND o.tenant=?4"
-                 " WHERE" PREFIXED " AND o.seq<?2 ORDER BY o.seq DESC LIMIT ?3"
+                 " FROM resource r CROSS JOIN owner o" /* in this order, which SQLite keeps */
+                 " WHERE o.kind=r.kind AND o.id=r.id AND o.tenant=?4 AND" PREFIXED
+                 " AND o.seq<?2 ORDER BY o.seq DESC LIMIT ?3"
                : "SELECT " ALL_COLUMNS " FROM resource r WHERE" PREFIXED " AND r.seq<?2 ORDER BY r.seq DESC LIMIT ?3";
 }
 
@@ -40,15 +41,15 @@ int catalogue_list_some(catalogue *cat, resource_kind kind, const char *view, co
     snprintf(keys[count++], sizeof keys[0], "name:%s", filter->name);
   }
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, query_of(shaped, view[0] != 0));
+  sql_statement *st = database_statement(db, query_of(shaped, view[0] != 0));
   if (st) {
-    sqlite3_bind_int(st, 1, (int)kind);
-    sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);
-    sqlite3_bind_int(st, 3, limit);
-    sqlite3_bind_text(st, 4, view, -1, SQLITE_STATIC);
-    sqlite3_bind_text(st, 5, filter->prefix ? filter->prefix : "", -1, SQLITE_STATIC);
+    sql_bind_integer(st, 1, (int)kind);
+    sql_bind_integer(st, 2, before > 0 ? before : INT64_MAX);
+    sql_bind_integer(st, 3, limit);
+    sql_bind_text(st, 4, view);
+    sql_bind_text(st, 5, filter->prefix ? filter->prefix : "");
     for (int i = 0; shaped && i < count; i++) {
-      sqlite3_bind_text(st, 6 + i, keys[i], -1, SQLITE_STATIC);
+      sql_bind_text(st, 6 + i, keys[i]);
     }
   }
   return rows_many(cat, db, st, &resource_rows, out, limit);

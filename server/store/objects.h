@@ -31,6 +31,7 @@ typedef enum store_result {
   STORE_CONFLICT, /* a condition no longer holds */
   STORE_FULL,     /* no space left */
   STORE_ERROR,    /* input/output error; logged */
+  STORE_UNFIT,    /* only of opening: the configuration is wrong, see store/place.h; logged */
 } store_result;
 
 typedef struct objects objects;

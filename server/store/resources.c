@@ -46,32 +46,32 @@ int resource_objects(const resource *row, named_object out[RESOURCE_OBJECTS]) {
 }
 
 int resource_insert(database *db, const resource *r) {
-  sqlite3_stmt *st = database_statement(db,
-                                        "INSERT INTO resource(kind, id, sha, json, bytes, created, used, places)"
-                                        " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?6, ?7) ON CONFLICT(kind, id) DO NOTHING");
+  sql_statement *st = database_statement(db,
+                                         "INSERT INTO resource(kind, id, sha, json, bytes, created, used, places)"
+                                         " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?6, ?7) ON CONFLICT(kind, id) DO NOTHING");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_int(st, 1, (int)r->kind);
-  sqlite3_bind_text(st, 2, r->id, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 3, r->sha, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 4, r->json, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 5, r->bytes);
-  sqlite3_bind_int64(st, 6, r->created);
-  sqlite3_bind_text(st, 7, r->places, -1, SQLITE_STATIC);
+  sql_bind_integer(st, 1, (int)r->kind);
+  sql_bind_text(st, 2, r->id);
+  sql_bind_text(st, 3, r->sha);
+  sql_bind_text(st, 4, r->json);
+  sql_bind_integer(st, 5, r->bytes);
+  sql_bind_integer(st, 6, r->created);
+  sql_bind_text(st, 7, r->places);
   return database_run(db, st);
 }
 
-static int read_row(sqlite3_stmt *st, void *to) {
+static int read_row(sql_statement *st, void *to) {
   resource *out = to;
   memset(out, 0, sizeof *out);
-  out->seq = sqlite3_column_int64(st, 0);
-  out->kind = (resource_kind)sqlite3_column_int(st, 1);
+  out->seq = sql_integer(st, 0);
+  out->kind = (resource_kind)sql_int(st, 1);
   row_text(st, 2, out->id, sizeof out->id);
   row_text(st, 3, out->sha, sizeof out->sha);
   out->json = row_copy(st, 4);
-  out->bytes = sqlite3_column_int64(st, 5);
-  out->created = sqlite3_column_int64(st, 6);
+  out->bytes = sql_integer(st, 5);
+  out->created = sql_integer(st, 6);
   row_text(st, 7, out->places, sizeof out->places);
   for (int p = 0; p < PROFILES_STORED; p++) {
     row_text(st, 8 + p, out->profiles[p], sizeof out->profiles[p]);
@@ -85,34 +85,34 @@ const row_kind resource_rows = {read_row, release_row, sizeof(resource)};
 
 store_result catalogue_get(catalogue *cat, resource_kind kind, const char *id, resource *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "SELECT " COLUMNS " FROM resource WHERE kind=?1 AND id=?2");
+  sql_statement *st = database_statement(db, "SELECT " COLUMNS " FROM resource WHERE kind=?1 AND id=?2");
   if (st) {
-    sqlite3_bind_int(st, 1, (int)kind);
-    sqlite3_bind_text(st, 2, id, -1, SQLITE_STATIC);
+    sql_bind_integer(st, 1, (int)kind);
+    sql_bind_text(st, 2, id);
   }
   return rows_one(cat, db, st, &resource_rows, out);
 }
 
 int catalogue_list(catalogue *cat, resource_kind kind, int64_t before, int limit, resource *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(
+  sql_statement *st = database_statement(
       db, "SELECT " LIST_COLUMNS("json") " FROM resource WHERE kind=?1 AND seq<?2 ORDER BY seq DESC LIMIT ?3");
   if (st) {
-    sqlite3_bind_int(st, 1, (int)kind);
-    sqlite3_bind_int64(st, 2, before > 0 ? before : INT64_MAX);
-    sqlite3_bind_int(st, 3, limit);
+    sql_bind_integer(st, 1, (int)kind);
+    sql_bind_integer(st, 2, before > 0 ? before : INT64_MAX);
+    sql_bind_integer(st, 3, limit);
   }
   return rows_many(cat, db, st, &resource_rows, out, limit);
 }
 
 int catalogue_oldest(catalogue *cat, int64_t before, int skip, int limit, resource *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(
+  sql_statement *st = database_statement(
       db, "SELECT " COLUMNS " FROM resource WHERE kind IN (1, 2, 4) AND used<?2 ORDER BY used, seq LIMIT ?1 OFFSET ?3");
   if (st) {
-    sqlite3_bind_int(st, 3, skip);
-    sqlite3_bind_int(st, 1, limit);
-    sqlite3_bind_int64(st, 2, before);
+    sql_bind_integer(st, 3, skip);
+    sql_bind_integer(st, 1, limit);
+    sql_bind_integer(st, 2, before);
   }
   return rows_many(cat, db, st, &resource_rows, out, limit);
 }
@@ -124,14 +124,14 @@ typedef struct key_arg {
 } key_arg;
 
 int resource_remove(database *db, resource_kind kind, const char *id) {
-  sqlite3_stmt *st = database_statement(db, "DELETE FROM resource WHERE kind=?1 AND id=?2");
+  sql_statement *st = database_statement(db, "DELETE FROM resource WHERE kind=?1 AND id=?2");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_int(st, 1, (int)kind);
-  sqlite3_bind_text(st, 2, id, -1, SQLITE_STATIC);
+  sql_bind_integer(st, 1, (int)kind);
+  sql_bind_text(st, 2, id);
   int code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+  return code == SQL_OK && sql_changes(db) == 0 ? SQL_NOTFOUND : code;
 }
 
 static int delete_row(database *db, void *arg) {
@@ -147,13 +147,13 @@ store_result catalogue_delete(catalogue *cat, resource_kind kind, const char *id
 
 static int touch_row(database *db, void *arg) {
   key_arg *key = arg;
-  sqlite3_stmt *st = database_statement(db, "UPDATE resource SET used=?3 WHERE kind=?1 AND id=?2");
+  sql_statement *st = database_statement(db, "UPDATE resource SET used=?3 WHERE kind=?1 AND id=?2");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_int(st, 1, key->kind);
-  sqlite3_bind_text(st, 2, key->id, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 3, key->now);
+  sql_bind_integer(st, 1, key->kind);
+  sql_bind_text(st, 2, key->id);
+  sql_bind_integer(st, 3, key->now);
   return database_run(db, st);
 }
 
@@ -179,15 +179,15 @@ static int add_profile(database *db, void *arg) {
       "UPDATE resource SET bytes=bytes+iif(quantized='', ?3, 0), quantized=?2 WHERE kind=2 AND id=?1",
       "UPDATE resource SET bytes=bytes+iif(meshopt='', ?3, 0), meshopt=?2 WHERE kind=2 AND id=?1"};
   const profile_arg *p = arg;
-  sqlite3_stmt *st = database_statement(db, updates[p->profile]);
+  sql_statement *st = database_statement(db, updates[p->profile]);
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, p->id, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 2, p->sha, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 3, p->bytes);
+  sql_bind_text(st, 1, p->id);
+  sql_bind_text(st, 2, p->sha);
+  sql_bind_integer(st, 3, p->bytes);
   int code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+  return code == SQL_OK && sql_changes(db) == 0 ? SQL_NOTFOUND : code;
 }
 
 store_result catalogue_add_profile(catalogue *cat, const char *id, int profile, const char *sha, int64_t bytes) {
@@ -197,9 +197,9 @@ store_result catalogue_add_profile(catalogue *cat, const char *id, int profile, 
 
 int64_t catalogue_bytes(catalogue *cat, int derived_only) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "SELECT sum(bytes) FROM total WHERE ?1=0 OR kind IN (1, 2, 4)");
+  sql_statement *st = database_statement(db, "SELECT sum(bytes) FROM total WHERE ?1=0 OR kind IN (1, 2, 4)");
   if (st) {
-    sqlite3_bind_int(st, 1, derived_only ? 1 : 0);
+    sql_bind_integer(st, 1, derived_only ? 1 : 0);
   }
   return rows_integer(cat, db, st);
 }
@@ -207,45 +207,54 @@ int64_t catalogue_bytes(catalogue *cat, int derived_only) {
 store_result catalogue_secret(catalogue *cat, unsigned char out[CATALOGUE_SECRET]) {
   database *db = catalogue_reader(cat);
   store_result result = STORE_ERROR;
-  sqlite3_stmt *st = database_statement(db, "SELECT bytes FROM secret");
+  sql_statement *st = database_statement(db, "SELECT bytes FROM secret");
   if (st) {
-    if (sqlite3_step(st) == SQLITE_ROW && sqlite3_column_bytes(st, 0) == CATALOGUE_SECRET) {
-      memcpy(out, sqlite3_column_blob(st, 0), CATALOGUE_SECRET);
+    int size = 0;
+    const void *bytes = sql_step(st) == SQL_ROW ? sql_bytes(st, 0, &size) : NULL;
+    if (bytes && size == CATALOGUE_SECRET) {
+      memcpy(out, bytes, CATALOGUE_SECRET);
       result = STORE_OK;
     }
-    sqlite3_reset(st);
+    sql_reset(st);
   }
   catalogue_reader_done(cat, db);
   return result;
 }
 
-/* Whether a row's description is valid JSON with the row's own id. */
-#define DESCRIBES "iif(json_valid(json), json_extract(json, '$.id') IS id, 0)"
+/* describes: whether a row's description is valid JSON with the row's own id. */
+#define DAMAGED(describes)                                                                  \
+  "SELECT (SELECT count(*) FROM resource WHERE NOT (" describes                             \
+  ")) + (SELECT count(*) FROM owner WHERE json IS NOT NULL AND NOT (" describes             \
+  ")) + (SELECT count(*) FROM job WHERE kind NOT IN (0, 1, 2) OR state NOT BETWEEN 0 AND 4" \
+  "  OR NOT json_valid(request)) + (SELECT CASE count(*) WHEN 1 THEN 0 ELSE 1 END FROM secret WHERE length(bytes)=16)"
 
 int64_t catalogue_damaged(catalogue *cat) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(
-      db, "SELECT (SELECT count(*) FROM resource WHERE NOT " DESCRIBES
-          ") + (SELECT count(*) FROM owner WHERE json NOTNULL AND NOT " DESCRIBES
-          ") + (SELECT count(*) FROM job WHERE kind NOT IN (0, 1, 2) OR state NOT BETWEEN 0 AND 4"
-          "  OR NOT json_valid(request)) + ((SELECT count(*) FROM secret WHERE length(bytes)=16) != 1)");
+  sql_statement *st = database_statement(
+      db,
+      database_either(db, DAMAGED("iif(json_valid(json), json_extract(json, '$.id') IS id, 0)"),
+
+                      DAMAGED("CASE WHEN json_valid(json) THEN coalesce(json::json->>'id'=id, false) ELSE false END")));
   return rows_integer(cat, db, st);
 }
 
-/* The pragma's first row is "ok", or the first finding. A connection of its own: pages that another one has in memory
- * hide what is wrong on the disk. */
+/* SQLite only: PostgreSQL verifies its pages itself (initdb --data-checksums). The pragma's first row is "ok", or the
+ * first finding. A connection of its own: pages that another one has in memory hide what is wrong on the disk. */
 static int check_with(catalogue *cat, const char *pragma, char *why, size_t size) {
   database db = {0};
-  sqlite3_stmt *st = NULL;
+  sql_statement *st = NULL;
+  if (database_is_url(catalogue_path(cat))) {
+    return 1;
+  }
   snprintf(why, size, "it cannot be read");
-  if (database_open(catalogue_path(cat), 0, &db) == SQLITE_OK) {
+  if (database_open(catalogue_path(cat), 0, &db) == SQL_OK) {
     st = database_statement(&db, pragma);
   }
   if (st) {
-    if (sqlite3_step(st) == SQLITE_ROW) {
+    if (sql_step(st) == SQL_ROW) {
       row_text(st, 0, why, size);
     }
-    sqlite3_reset(st);
+    sql_reset(st);
   }
   database_close(&db);
   return strcmp(why, "ok") == 0;

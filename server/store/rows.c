@@ -2,6 +2,10 @@
 
 #include <stdlib.h>
 
+static void complain(const database *db) {
+  log_error("catalogue: rows cannot be read: %s", db->connection.driver->message(&db->connection));
+}
+
 static void release(const row_kind *kind, void *row) {
   if (kind->release) {
     kind->release(row);
@@ -10,8 +14,8 @@ static void release(const row_kind *kind, void *row) {
 
 /* SQLite returns NULL for a text that it has no memory to convert; only its error code distinguishes that from SQL
  * NULL. */
-static int fill(database *db, sqlite3_stmt *st, const row_kind *kind, void *out) {
-  if (kind->read(st, out) && (sqlite3_errcode(db->handle) & 0xff) != SQLITE_NOMEM) {
+static int fill(database *db, sql_statement *st, const row_kind *kind, void *out) {
+  if (kind->read(st, out) && !sql_out_of_memory(db)) {
     return 1;
   }
   log_error("catalogue: out of memory for a row");
@@ -19,47 +23,51 @@ static int fill(database *db, sqlite3_stmt *st, const row_kind *kind, void *out)
   return 0;
 }
 
-store_result rows_one(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out) {
+store_result rows_one(catalogue *cat, database *db, sql_statement *st, const row_kind *kind, void *out) {
   store_result result = STORE_ERROR;
   if (st) {
-    int code = sqlite3_step(st);
-    result = code == SQLITE_ROW    ? (fill(db, st, kind, out) ? STORE_OK : STORE_ERROR)
-             : code == SQLITE_DONE ? STORE_NOT_FOUND
-                                   : STORE_ERROR;
-    sqlite3_reset(st);
+    int code = sql_step(st);
+    result = code == SQL_ROW    ? (fill(db, st, kind, out) ? STORE_OK : STORE_ERROR)
+             : code == SQL_DONE ? STORE_NOT_FOUND
+                                : STORE_ERROR;
+    if (code != SQL_ROW && code != SQL_DONE) {
+      complain(db);
+    }
+    sql_reset(st);
   }
   catalogue_reader_done(cat, db);
   return result;
 }
 
-int rows_many(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out, int limit) {
-  int count = 0, code = st ? SQLITE_ROW : SQLITE_ERROR;
-  while (count < limit && code == SQLITE_ROW && (code = sqlite3_step(st)) == SQLITE_ROW) {
+int rows_many(catalogue *cat, database *db, sql_statement *st, const row_kind *kind, void *out, int limit) {
+  int count = 0, code = st ? SQL_ROW : SQL_ERROR;
+  while (count < limit && code == SQL_ROW && (code = sql_step(st)) == SQL_ROW) {
     if (fill(db, st, kind, (char *)out + (size_t)count * kind->size)) {
       count++;
     } else {
-      code = SQLITE_NOMEM;
+      code = SQL_NOMEM;
     }
   }
-  if (st) {
-    sqlite3_reset(st);
+  int fine = code == SQL_ROW || code == SQL_DONE;
+  if (st && !fine) {
+    complain(db);
   }
+  sql_reset(st);
   catalogue_reader_done(cat, db);
-  if (code == SQLITE_ROW || code == SQLITE_DONE) {
+  if (fine) {
     return count;
   }
-  log_error("catalogue: rows cannot be read: %s", sqlite3_errstr(code));
   while (count > 0) {
     release(kind, (char *)out + (size_t)--count * kind->size);
   }
   return -1;
 }
 
-void *rows_all(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, int *count) {
+void *rows_all(catalogue *cat, database *db, sql_statement *st, const row_kind *kind, int *count) {
   size_t room = 16, found = 0;
   char *rows = calloc(room, kind->size);
-  int code = SQLITE_ERROR;
-  while (st && rows && (code = sqlite3_step(st)) == SQLITE_ROW) {
+  int code = SQL_ERROR;
+  while (st && rows && (code = sql_step(st)) == SQL_ROW) {
     if (found == room) {
       char *more = found < INT32_MAX / 2 ? reallocarray(rows, 2 * room, kind->size) : NULL;
       if (!more) {
@@ -76,10 +84,10 @@ void *rows_all(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *k
     found++;
   }
   if (st) {
-    sqlite3_reset(st);
+    sql_reset(st);
   }
   catalogue_reader_done(cat, db);
-  if (code == SQLITE_DONE) {
+  if (code == SQL_DONE) {
     *count = (int)found;
     return rows;
   }
@@ -91,13 +99,16 @@ void *rows_all(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *k
   return NULL;
 }
 
-int64_t rows_integer(catalogue *cat, database *db, sqlite3_stmt *st) {
+int64_t rows_integer(catalogue *cat, database *db, sql_statement *st) {
   int64_t value = -1;
   if (st) {
-    if (sqlite3_step(st) == SQLITE_ROW) {
-      value = sqlite3_column_int64(st, 0);
+    int code = sql_step(st);
+    if (code == SQL_ROW) {
+      value = sql_integer(st, 0);
+    } else if (code != SQL_DONE) {
+      complain(db);
     }
-    sqlite3_reset(st);
+    sql_reset(st);
   }
   catalogue_reader_done(cat, db);
   return value;
@@ -110,15 +121,15 @@ typedef struct rotation {
 
 static int rotate(database *db, void *arg) {
   const rotation *r = arg;
-  sqlite3_stmt *st = database_statement(db, r->sql);
+  sql_statement *st = database_statement(db, r->sql);
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, r->name, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 2, r->secret, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 3, r->old_until);
+  sql_bind_text(st, 1, r->name);
+  sql_bind_text(st, 2, r->secret);
+  sql_bind_integer(st, 3, r->old_until);
   int code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+  return code == SQL_OK && sql_changes(db) == 0 ? SQL_NOTFOUND : code;
 }
 
 store_result rows_rotate(catalogue *cat, const char *sql, const char *name, const char *secret, int64_t old_until) {

@@ -11,12 +11,12 @@
 
 /* These two run inside a transaction of the writer. */
 int resource_insert(database *db, const resource *r);                  /* keeps an existing row */
-int resource_remove(database *db, resource_kind kind, const char *id); /* SQLITE_NOTFOUND: no such row */
+int resource_remove(database *db, resource_kind kind, const char *id); /* SQL_NOTFOUND: no such row */
 
 /* read fills one row and returns 0 if out of memory; release frees a row, also one that was filled in part (NULL: a row
  * owns no memory). */
 typedef struct row_kind {
-  int (*read)(sqlite3_stmt *st, void *out);
+  int (*read)(sql_statement *st, void *out);
   void (*release)(void *row);
   size_t size;
 } row_kind;
@@ -28,30 +28,30 @@ extern const row_kind resource_rows; /* columns: seq, kind, id, sha, json, bytes
 
 /* These run a bound query on a reader from catalogue_reader() (st NULL: it could not be prepared) and release the
  * reader. */
-store_result rows_one(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out);
+store_result rows_one(catalogue *cat, database *db, sql_statement *st, const row_kind *kind, void *out);
 /* The number of rows filled, or −1, and no rows, if one of them could not be read. */
-int rows_many(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, void *out, int limit);
+int rows_many(catalogue *cat, database *db, sql_statement *st, const row_kind *kind, void *out, int limit);
 /* All rows, allocated with malloc(); NULL with *count −1 if one of them could not be read. */
-void *rows_all(catalogue *cat, database *db, sqlite3_stmt *st, const row_kind *kind, int *count);
+void *rows_all(catalogue *cat, database *db, sql_statement *st, const row_kind *kind, int *count);
 /* The integer in the query's only row; −1 if it cannot be read. */
-int64_t rows_integer(catalogue *cat, database *db, sqlite3_stmt *st);
+int64_t rows_integer(catalogue *cat, database *db, sql_statement *st);
 
 /* Gives a row another secret by an UPDATE of ?1 name, ?2 secret and ?3 until when the old one is valid.
  * STORE_NOT_FOUND: no row has the name. */
 store_result rows_rotate(catalogue *cat, const char *sql, const char *name, const char *secret, int64_t old_until);
 
-static inline void row_text(sqlite3_stmt *st, int column, char *out, size_t size) {
-  const unsigned char *text = sqlite3_column_text(st, column);
-  snprintf(out, size, "%s", text ? (const char *)text : "");
+static inline void row_text(sql_statement *st, int column, char *out, size_t size) {
+  const char *text = sql_text(st, column);
+  snprintf(out, size, "%s", text ? text : "");
 }
 
 /* A copy allocated with malloc(); NULL for SQL NULL and if out of memory, which row_lacks() distinguishes. */
-static inline char *row_copy(sqlite3_stmt *st, int column) {
-  const unsigned char *text = sqlite3_column_text(st, column);
-  return text ? strdup((const char *)text) : NULL;
+static inline char *row_copy(sql_statement *st, int column) {
+  const char *text = sql_text(st, column);
+  return text ? strdup(text) : NULL;
 }
-static inline int row_lacks(sqlite3_stmt *st, int column, const char *copy) {
-  return !copy && sqlite3_column_type(st, column) != SQLITE_NULL;
+static inline int row_lacks(sql_statement *st, int column, const char *copy) {
+  return !copy && !sql_is_null(st, column);
 }
 
 #endif

@@ -11,9 +11,9 @@ struct snapshot {
 };
 
 static int quick_check(database *db) {
-  sqlite3_stmt *st = database_statement(db, "PRAGMA quick_check(1)");
-  int fine = st && sqlite3_step(st) == SQLITE_ROW && strcmp((const char *)sqlite3_column_text(st, 0), "ok") == 0;
-  sqlite3_reset(st);
+  sql_statement *st = database_statement(db, "PRAGMA quick_check(1)");
+  int fine = st && sql_step(st) == SQL_ROW && strcmp(sql_text(st, 0), "ok") == 0;
+  sql_reset(st);
   return fine;
 }
 
@@ -21,13 +21,13 @@ static int quick_check(database *db) {
 static int vacuum_into(const char *from, const char *path) {
   database db;
   int code = database_open(from, 0, &db);
-  if (code == SQLITE_OK) {
+  if (code == SQL_OK) {
     code = database_execute(&db, "PRAGMA query_only=OFF"); /* it would refuse VACUUM INTO; the file is read-only */
-    sqlite3_stmt *st = database_statement(&db, "VACUUM INTO ?1");
-    if (code == SQLITE_OK && st) {
-      sqlite3_bind_text(st, 1, path, -1, SQLITE_STATIC);
+    sql_statement *st = database_statement(&db, "VACUUM INTO ?1");
+    if (code == SQL_OK && st) {
+      sql_bind_text(st, 1, path);
     }
-    code = code == SQLITE_OK ? database_run(&db, st) : code;
+    code = code == SQL_OK ? database_run(&db, st) : code;
     database_close(&db);
   }
   return code;
@@ -37,15 +37,15 @@ static int vacuum_into(const char *from, const char *path) {
 static int make_current(const char *path, const char *from) {
   database db;
   int code = database_open(path, 1, &db);
-  if (code != SQLITE_OK) {
+  if (code != SQL_OK) {
     return code;
   }
   if (!quick_check(&db)) {
     log_error("the catalogue %s is damaged: restore a backup, or see orbmorphd --check-data", from);
-    code = SQLITE_CORRUPT;
+    code = SQL_CORRUPT;
   }
-  code = code == SQLITE_OK ? database_migrate(&db) : code;
-  code = code == SQLITE_OK ? database_execute(&db, "PRAGMA journal_mode=DELETE") : code;
+  code = code == SQL_OK ? database_migrate(&db) : code;
+  code = code == SQL_OK ? database_execute(&db, "PRAGMA journal_mode=DELETE") : code;
   database_close(&db);
   return code;
 }
@@ -64,29 +64,29 @@ store_result snapshot_take(const char *data, const char *path) {
   snprintf(from, sizeof from, "%s/catalogue.sqlite", data);
   unlink(path);
   int code = vacuum_into(from, path);
-  code = code == SQLITE_OK ? make_current(path, from) : code;
-  if (code == SQLITE_OK && sync_file(path) == STORE_OK) {
+  code = code == SQL_OK ? make_current(path, from) : code;
+  if (code == SQL_OK && sync_file(path) == STORE_OK) {
     return STORE_OK;
   }
-  log_error("the catalogue %s cannot be copied to %s: %s", from, path, sqlite3_errstr(code));
+  log_error("the catalogue %s cannot be copied to %s: %s", from, path, sql_reason(code));
   unlink(path);
-  return (code & 0xff) == SQLITE_FULL ? STORE_FULL : STORE_ERROR;
+  return code == SQL_FULL ? STORE_FULL : STORE_ERROR;
 }
 
 store_result snapshot_requeue(const char *path) {
   database db;
   int code = database_open(path, 1, &db);
-  if (code == SQLITE_OK) {
+  if (code == SQL_OK) {
     code = database_execute(&db, "UPDATE job SET state=0, attempt=max(attempt-1, 0), alone=0 WHERE state=1");
-    code = code == SQLITE_OK ? database_execute(&db, "PRAGMA journal_mode=DELETE") : code;
+    code = code == SQL_OK ? database_execute(&db, "PRAGMA journal_mode=DELETE") : code;
     database_close(&db);
   }
-  return code == SQLITE_OK ? sync_file(path) : STORE_ERROR;
+  return code == SQL_OK ? sync_file(path) : STORE_ERROR;
 }
 
 store_result snapshot_open(const char *path, snapshot **out) {
   snapshot *s = calloc(1, sizeof *s);
-  if (!s || database_open(path, 0, &s->db) != SQLITE_OK) {
+  if (!s || database_open(path, 0, &s->db) != SQL_OK) {
     free(s);
     return STORE_ERROR;
   }
@@ -102,34 +102,34 @@ void snapshot_close(snapshot *s) {
 }
 
 store_result snapshot_each(snapshot *s, void (*each)(void *user, const resource *row), void *user) {
-  sqlite3_stmt *st = database_statement(&s->db,
-                                        "SELECT seq, kind, id, sha, json, bytes, created, places, quantized, meshopt"
-                                        " FROM resource ORDER BY seq");
-  int code = st ? SQLITE_ROW : SQLITE_ERROR;
-  while (code == SQLITE_ROW && (code = sqlite3_step(st)) == SQLITE_ROW) {
+  sql_statement *st = database_statement(&s->db,
+                                         "SELECT seq, kind, id, sha, json, bytes, created, places, quantized, meshopt"
+                                         " FROM resource ORDER BY seq");
+  int code = st ? SQL_ROW : SQL_ERROR;
+  while (code == SQL_ROW && (code = sql_step(st)) == SQL_ROW) {
     resource row;
     if (resource_rows.read(st, &row) && row.kind >= 0 && row.kind < RESOURCE_KINDS) {
       each(user, &row);
     } else {
-      code = SQLITE_CORRUPT;
+      code = SQL_CORRUPT;
     }
     resource_free(&row);
   }
-  sqlite3_reset(st);
-  if (code != SQLITE_DONE) {
-    log_error("catalogue: rows cannot be read: %s", sqlite3_errstr(code));
+  sql_reset(st);
+  if (code != SQL_DONE) {
+    log_error("catalogue: rows cannot be read: %s", sql_reason(code));
   }
-  return code == SQLITE_DONE ? STORE_OK : STORE_ERROR;
+  return code == SQL_DONE ? STORE_OK : STORE_ERROR;
 }
 
 int snapshot_names(snapshot *s, object_kind kind, const char *id) {
-  sqlite3_stmt *st = database_statement(&s->db, "SELECT 1 FROM resource WHERE kind=?1 AND id=?2");
+  sql_statement *st = database_statement(&s->db, "SELECT 1 FROM resource WHERE kind=?1 AND id=?2");
   if (!st) {
     return 1;
   }
-  sqlite3_bind_int(st, 1, (int)resource_of_object(kind));
-  sqlite3_bind_text(st, 2, id, -1, SQLITE_STATIC);
-  int code = sqlite3_step(st);
-  sqlite3_reset(st);
-  return code != SQLITE_DONE;
+  sql_bind_integer(st, 1, (int)resource_of_object(kind));
+  sql_bind_text(st, 2, id);
+  int code = sql_step(st);
+  sql_reset(st);
+  return code != SQL_DONE;
 }

@@ -29,27 +29,27 @@ void token_instant(int64_t seconds, char out[TOKEN_INSTANT]) {
 static int add_row(database *db, void *arg) {
   const token_row *row = arg;
   char hash[TOKEN_TEXT];
-  sqlite3_stmt *st =
+  sql_statement *st =
       database_statement(db,
                          "INSERT INTO token(hash, name, scopes, quota_bytes, quota_jobs, created, priority, tenant,"
                          " expires, quota_derived)"
                          " VALUES(?1, ?2, ?3, ?4, ?6, ?5, ?7, ?8, ?9, ?10) ON CONFLICT DO NOTHING");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
   sodium_bin2hex(hash, sizeof hash, row->hash, sizeof row->hash);
-  sqlite3_bind_text(st, 1, hash, -1, SQLITE_TRANSIENT);
-  sqlite3_bind_text(st, 2, row->name, -1, SQLITE_STATIC);
-  sqlite3_bind_int(st, 3, row->scopes);
-  sqlite3_bind_int64(st, 4, row->quota);
-  sqlite3_bind_int64(st, 5, row->created);
-  sqlite3_bind_int64(st, 6, row->jobs);
-  sqlite3_bind_int(st, 7, row->priority);
-  sqlite3_bind_text(st, 8, row->tenant, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 9, row->expires);
-  sqlite3_bind_int64(st, 10, row->quota_derived);
+  sql_bind_text(st, 1, hash);
+  sql_bind_text(st, 2, row->name);
+  sql_bind_integer(st, 3, row->scopes);
+  sql_bind_integer(st, 4, row->quota);
+  sql_bind_integer(st, 5, row->created);
+  sql_bind_integer(st, 6, row->jobs);
+  sql_bind_integer(st, 7, row->priority);
+  sql_bind_text(st, 8, row->tenant);
+  sql_bind_integer(st, 9, row->expires);
+  sql_bind_integer(st, 10, row->quota_derived);
   int code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_CONSTRAINT : code;
+  return code == SQL_OK && sql_changes(db) == 0 ? SQL_CONSTRAINT : code;
 }
 
 store_result catalogue_token_add(catalogue *cat, const token_row *row) {
@@ -58,23 +58,24 @@ store_result catalogue_token_add(catalogue *cat, const token_row *row) {
 
 static int set_row(database *db, void *arg) {
   const token_row *row = arg;
-  sqlite3_stmt *st = database_statement(db,
-                                        "UPDATE token SET scopes=iif(?2<0, scopes, ?2),"
-                                        " quota_bytes=iif(?3<0, quota_bytes, ?3), quota_jobs=iif(?4<0, quota_jobs, ?4),"
-                                        " priority=iif(?5<0, priority, ?5), expires=iif(?6<0, expires, ?6),"
-                                        " quota_derived=iif(?7<0, quota_derived, ?7) WHERE name=?1");
+  sql_statement *st =
+      database_statement(db,
+                         "UPDATE token SET scopes=iif(?2<0, scopes, ?2),"
+                         " quota_bytes=iif(?3<0, quota_bytes, ?3), quota_jobs=iif(?4<0, quota_jobs, ?4),"
+                         " priority=iif(?5<0, priority, ?5), expires=iif(?6<0, expires, ?6),"
+                         " quota_derived=iif(?7<0, quota_derived, ?7) WHERE name=?1");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, row->name, -1, SQLITE_STATIC);
-  sqlite3_bind_int(st, 2, row->scopes);
-  sqlite3_bind_int64(st, 3, row->quota);
-  sqlite3_bind_int64(st, 4, row->jobs);
-  sqlite3_bind_int(st, 5, row->priority);
-  sqlite3_bind_int64(st, 6, row->expires);
-  sqlite3_bind_int64(st, 7, row->quota_derived);
+  sql_bind_text(st, 1, row->name);
+  sql_bind_integer(st, 2, row->scopes);
+  sql_bind_integer(st, 3, row->quota);
+  sql_bind_integer(st, 4, row->jobs);
+  sql_bind_integer(st, 5, row->priority);
+  sql_bind_integer(st, 6, row->expires);
+  sql_bind_integer(st, 7, row->quota_derived);
   int code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+  return code == SQL_OK && sql_changes(db) == 0 ? SQL_NOTFOUND : code;
 }
 
 store_result catalogue_token_set(catalogue *cat, const token_row *row) {
@@ -82,45 +83,45 @@ store_result catalogue_token_set(catalogue *cat, const token_row *row) {
 }
 
 static int remove_row(database *db, void *arg) {
-  sqlite3_stmt *st = database_statement(db, "DELETE FROM token WHERE name=?1");
+  sql_statement *st = database_statement(db, "DELETE FROM token WHERE name=?1");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, arg, -1, SQLITE_STATIC);
+  sql_bind_text(st, 1, arg);
   int code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_NOTFOUND : code;
+  return code == SQL_OK && sql_changes(db) == 0 ? SQL_NOTFOUND : code;
 }
 
 store_result catalogue_token_remove(catalogue *cat, const char *name) {
   return catalogue_write(cat, remove_row, (void *)(uintptr_t)name);
 }
 
-static int read_row(sqlite3_stmt *st, void *out) {
+static int read_row(sql_statement *st, void *out) {
   token_row *row = out;
   char hash[TOKEN_TEXT];
   row_text(st, 0, hash, sizeof hash);
   sodium_hex2bin(row->hash, sizeof row->hash, hash, strlen(hash), NULL, NULL, NULL);
   row_text(st, 1, row->name, sizeof row->name);
-  row->scopes = sqlite3_column_int(st, 2);
-  row->quota = sqlite3_column_int64(st, 3);
-  row->used = sqlite3_column_int64(st, 4);
-  row->created = sqlite3_column_int64(st, 5);
-  row->jobs = sqlite3_column_int64(st, 6);
-  row->priority = sqlite3_column_int(st, 7);
+  row->scopes = sql_int(st, 2);
+  row->quota = sql_integer(st, 3);
+  row->used = sql_integer(st, 4);
+  row->created = sql_integer(st, 5);
+  row->jobs = sql_integer(st, 6);
+  row->priority = sql_int(st, 7);
   row_text(st, 8, row->tenant, sizeof row->tenant);
-  row->expires = sqlite3_column_int64(st, 9);
-  row->quota_derived = sqlite3_column_int64(st, 10);
-  row->derived = sqlite3_column_int64(st, 11);
+  row->expires = sql_integer(st, 9);
+  row->quota_derived = sql_integer(st, 10);
+  row->derived = sql_integer(st, 11);
   return 1;
 }
 
 token_row *catalogue_tokens(catalogue *cat, int *count) {
   static const row_kind kind = {.read = read_row, .size = sizeof(token_row)};
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db,
-                                        "SELECT hash, token.name, scopes, quota_bytes, coalesce(bytes, 0), created,"
-                                        " quota_jobs, priority, tenant, expires, quota_derived, coalesce(derived, 0)"
-                                        " FROM token"
-                                        " LEFT JOIN tenant ON tenant.name=token.tenant ORDER BY token.name");
+  sql_statement *st = database_statement(db,
+                                         "SELECT hash, token.name, scopes, quota_bytes, coalesce(bytes, 0), created,"
+                                         " quota_jobs, priority, tenant, expires, quota_derived, coalesce(derived, 0)"
+                                         " FROM token"
+                                         " LEFT JOIN tenant ON tenant.name=token.tenant ORDER BY token.name");
   return rows_all(cat, db, st, &kind, count);
 }

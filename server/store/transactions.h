@@ -7,7 +7,7 @@
 
 struct catalogue;
 
-typedef int (*write_fn)(database *db, void *arg); /* returns an SQLite code; SQLITE_CONSTRAINT: a condition failed */
+typedef int (*write_fn)(database *db, void *arg); /* returns an SQL code; SQL_CONSTRAINT: a condition failed */
 
 /* Runs fn in the next transaction and waits for its commit. */
 store_result catalogue_write(struct catalogue *cat, write_fn fn, void *arg);

@@ -4,13 +4,13 @@
 
 #include "store/rows.h"
 
-static int read_row(sqlite3_stmt *st, void *to) {
+static int read_row(sql_statement *st, void *to) {
   usage_row *out = to;
   int64_t *const numbers[] = {&out->meshes,  &out->bytes, &out->derived,       &out->worker_ms,
                               &out->crashes, &out->quota, &out->quota_derived, &out->quota_jobs};
   row_text(st, 0, out->tenant, sizeof out->tenant);
   for (int i = 0; i < 8; i++) {
-    *numbers[i] = sqlite3_column_int64(st, i + 1);
+    *numbers[i] = sql_integer(st, i + 1);
   }
   return 1;
 }
@@ -20,7 +20,7 @@ static const row_kind usage_rows = {.read = read_row, .size = sizeof(usage_row)}
 
 int catalogue_usage(catalogue *cat, const char *own, const char *only, int64_t skip, int limit, usage_row *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(
+  sql_statement *st = database_statement(
       db,
       "WITH n(name) AS (SELECT name FROM tenant UNION SELECT tenant FROM token UNION SELECT ?1)"
       " SELECT n.name, (SELECT count(*) FROM owner o WHERE o.tenant=n.name AND o.kind=0), coalesce(t.bytes, 0),"
@@ -29,46 +29,46 @@ int catalogue_usage(catalogue *cat, const char *own, const char *only, int64_t s
           "quota_derived") "," LEAST("quota_jobs") " FROM n LEFT JOIN tenant t ON t.name=n.name"
                                                    " WHERE ?2 IS NULL OR n.name=?2 ORDER BY n.name LIMIT ?3 OFFSET ?4");
   if (st) {
-    sqlite3_bind_text(st, 1, own, -1, SQLITE_STATIC);
-    sqlite3_bind_text(st, 2, only, -1, SQLITE_STATIC);
-    sqlite3_bind_int(st, 3, limit);
-    sqlite3_bind_int64(st, 4, skip);
+    sql_bind_text(st, 1, own);
+    sql_bind_text(st, 2, only);
+    sql_bind_integer(st, 3, limit);
+    sql_bind_integer(st, 4, skip);
   }
   return rows_many(cat, db, st, &usage_rows, out, limit);
 }
 
 int catalogue_usage_most(catalogue *cat, int limit, usage_row *out) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(
+  sql_statement *st = database_statement(
       db,
       "SELECT * FROM (SELECT name, 0, bytes, derived, worker_ms, 0, 0, 0, 0 FROM tenant"
-      " ORDER BY bytes+derived DESC, name LIMIT ?1)"
+      " ORDER BY bytes+derived DESC, name LIMIT ?1) AS most"
       " UNION ALL SELECT '', 0, coalesce(sum(bytes), 0), coalesce(sum(derived), 0), coalesce(sum(worker_ms), 0),"
       " 0, 0, 0, 0 FROM tenant");
   if (st) {
-    sqlite3_bind_int(st, 1, limit - 1);
+    sql_bind_integer(st, 1, limit - 1);
   }
   return rows_many(cat, db, st, &usage_rows, out, limit);
 }
 
 int64_t catalogue_tenant_derived(catalogue *cat, const char *tenant) {
   database *db = catalogue_reader(cat);
-  sqlite3_stmt *st = database_statement(db, "SELECT coalesce(sum(derived), 0) FROM tenant WHERE name=?1");
+  sql_statement *st = database_statement(db, "SELECT coalesce(sum(derived), 0) FROM tenant WHERE name=?1");
   if (st) {
-    sqlite3_bind_text(st, 1, tenant, -1, SQLITE_STATIC);
+    sql_bind_text(st, 1, tenant);
   }
   return rows_integer(cat, db, st);
 }
 
 int usage_add_time(database *db, const char *tenant, int64_t ms) {
-  sqlite3_stmt *st = database_statement(db,
-                                        "INSERT INTO tenant(name, worker_ms) VALUES(?1, ?2)"
-                                        " ON CONFLICT(name) DO UPDATE SET worker_ms=tenant.worker_ms+?2");
+  sql_statement *st = database_statement(db,
+                                         "INSERT INTO tenant(name, worker_ms) VALUES(?1, ?2)"
+                                         " ON CONFLICT(name) DO UPDATE SET worker_ms=tenant.worker_ms+?2");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, tenant, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 2, ms);
+  sql_bind_text(st, 1, tenant);
+  sql_bind_integer(st, 2, ms);
   return database_run(db, st);
 }
 

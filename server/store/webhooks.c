@@ -21,24 +21,24 @@ static void own_name(const char *tenant, char out[WEBHOOK_NAME]) {
 
 static int add_row(database *db, void *arg) {
   const webhook_row *row = arg;
-  sqlite3_stmt *st = database_statement(db,
-                                        "INSERT INTO webhook(name, tenant, url, origin, events, secret, created)"
-                                        " SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7 WHERE ?3='' OR (SELECT count(*) FROM "
-                                        "webhook WHERE tenant=?2 AND url<>'') < ?8"
-                                        " ON CONFLICT DO NOTHING");
+  sql_statement *st = database_statement(db,
+                                         "INSERT INTO webhook(name, tenant, url, origin, events, secret, created)"
+                                         " SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7 WHERE ?3='' OR (SELECT count(*) FROM "
+                                         "webhook WHERE tenant=?2 AND url<>'') < ?8"
+                                         " ON CONFLICT DO NOTHING");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, row->name, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 2, row->tenant, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 3, row->url, -1, SQLITE_STATIC);
-  sqlite3_bind_text(st, 4, row->origin, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 5, row->events);
-  sqlite3_bind_text(st, 6, row->secret, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 7, row->created);
-  sqlite3_bind_int(st, 8, WEBHOOKS_OF_TENANT);
+  sql_bind_text(st, 1, row->name);
+  sql_bind_text(st, 2, row->tenant);
+  sql_bind_text(st, 3, row->url);
+  sql_bind_text(st, 4, row->origin);
+  sql_bind_integer(st, 5, row->events);
+  sql_bind_text(st, 6, row->secret);
+  sql_bind_integer(st, 7, row->created);
+  sql_bind_integer(st, 8, WEBHOOKS_OF_TENANT);
   int code = database_run(db, st);
-  return code == SQLITE_OK && sqlite3_changes(db->handle) == 0 ? SQLITE_CONSTRAINT : code;
+  return code == SQL_OK && sql_changes(db) == 0 ? SQL_CONSTRAINT : code;
 }
 
 store_result catalogue_webhook_add(catalogue *cat, const webhook_row *row) {
@@ -52,7 +52,7 @@ int webhook_ensure_secret(database *db, const char *tenant) {
   webhook_new_secret(row.secret);
   int code = add_row(db, &row);
   sodium_memzero(row.secret, sizeof row.secret);
-  return code == SQLITE_CONSTRAINT ? SQLITE_OK : code; /* it exists */
+  return code == SQL_CONSTRAINT ? SQL_OK : code; /* it exists */
 }
 
 store_result catalogue_webhook_rotate(catalogue *cat, const char *name, const char *secret, int64_t old_until) {
@@ -61,28 +61,28 @@ store_result catalogue_webhook_rotate(catalogue *cat, const char *name, const ch
 }
 
 static int remove_row(database *db, void *arg) {
-  sqlite3_stmt *st = database_statement(db, "DELETE FROM webhook WHERE name=?1");
+  sql_statement *st = database_statement(db, "DELETE FROM webhook WHERE name=?1");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, arg, -1, SQLITE_STATIC);
+  sql_bind_text(st, 1, arg);
   int code = database_run(db, st);
-  if (code != SQLITE_OK || sqlite3_changes(db->handle) == 0) {
-    return code == SQLITE_OK ? SQLITE_NOTFOUND : code;
+  if (code != SQL_OK || sql_changes(db) == 0) {
+    return code == SQL_OK ? SQL_NOTFOUND : code;
   }
   st = database_statement(db,
                           "UPDATE delivery SET state=2, error='the webhook was removed', ended=?2"
                           " WHERE webhook=?1 AND state=0");
   if (!st) {
-    return SQLITE_ERROR;
+    return SQL_ERROR;
   }
-  sqlite3_bind_text(st, 1, arg, -1, SQLITE_STATIC);
-  sqlite3_bind_int64(st, 2, (int64_t)time(NULL) * 1000);
+  sql_bind_text(st, 1, arg);
+  sql_bind_integer(st, 2, (int64_t)time(NULL) * 1000);
   code = database_run(db, st);
   static const char *const steps[] = {
       "DELETE FROM receiver WHERE NOT EXISTS(SELECT 1 FROM delivery WHERE state=0 AND receiver=receiver.name)",
       "UPDATE receiver SET next=(SELECT min(next) FROM delivery WHERE state=0 AND receiver=receiver.name)"};
-  for (int i = 0; i < 2 && code == SQLITE_OK; i++) {
+  for (int i = 0; i < 2 && code == SQL_OK; i++) {
     code = database_run(db, database_statement(db, steps[i]));
   }
   return code;
@@ -102,17 +102,17 @@ static int own_secret(database *db, void *arg) {
   char name[WEBHOOK_NAME];
   own_name(own->tenant, name);
   int code = webhook_ensure_secret(db, own->tenant);
-  sqlite3_stmt *st = code == SQLITE_OK ? database_statement(db, "SELECT secret FROM webhook WHERE name=?1") : NULL;
+  sql_statement *st = code == SQL_OK ? database_statement(db, "SELECT secret FROM webhook WHERE name=?1") : NULL;
   if (!st) {
-    return code == SQLITE_OK ? SQLITE_ERROR : code;
+    return code == SQL_OK ? SQL_ERROR : code;
   }
-  sqlite3_bind_text(st, 1, name, -1, SQLITE_STATIC);
-  code = sqlite3_step(st);
-  if (code == SQLITE_ROW) {
+  sql_bind_text(st, 1, name);
+  code = sql_step(st);
+  if (code == SQL_ROW) {
     row_text(st, 0, own->secret, WEBHOOK_SECRET);
   }
-  sqlite3_reset(st);
-  return code == SQLITE_ROW ? SQLITE_OK : code == SQLITE_DONE ? SQLITE_ERROR : code;
+  sql_reset(st);
+  return code == SQL_ROW ? SQL_OK : code == SQL_DONE ? SQL_ERROR : code;
 }
 
 store_result catalogue_webhook_secret(catalogue *cat, const char *tenant, char out[WEBHOOK_SECRET]) {
@@ -121,15 +121,15 @@ store_result catalogue_webhook_secret(catalogue *cat, const char *tenant, char o
   return catalogue_write(cat, own_secret, &own);
 }
 
-static int read_row(sqlite3_stmt *st, void *to) {
+static int read_row(sql_statement *st, void *to) {
   webhook_row *row = to;
   memset(row, 0, sizeof *row);
   row_text(st, 0, row->name, sizeof row->name);
   row_text(st, 1, row->tenant, sizeof row->tenant);
   row_text(st, 2, row->url, sizeof row->url);
-  row->events = (unsigned)sqlite3_column_int(st, 3);
-  row->old_until = sqlite3_column_int64(st, 4);
-  row->created = sqlite3_column_int64(st, 5);
+  row->events = (unsigned)sql_int(st, 3);
+  row->old_until = sql_integer(st, 4);
+  row->created = sql_integer(st, 5);
   return 1;
 }
 
