@@ -15,6 +15,7 @@ static const char *const remeshes[] = {ORB_REMESH_METHODS(WORD) NULL};
 #undef WORD
 static const char *const animations[] = {"pingpong", "none", NULL};
 static const char *const fits[] = {"none", "rigid", "similarity", "auto", NULL};
+static const char *const holes[] = {"reopen", "filled", NULL};
 static const char *const paths[] = {"linear", "rigid", NULL};
 
 #define ALIGN(field) offsetof(orb_align_options, field)
@@ -39,6 +40,7 @@ static const api_option asset_table[] = {
     {"path", API_OPTION_NAME, ASSET(path), 0, 0, paths},
     {"path_steps", API_OPTION_INT32, ASSET(path_steps), 1, 16, NULL},
     {"colors", API_OPTION_BOOL, ASSET(colors), 0, 0, NULL},
+    {"holes", API_OPTION_NAME, ASSET(holes), 0, 0, holes},
 };
 #define COUNT(table) (sizeof(table) / sizeof(table)[0])
 

@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "merge/report.h"
 #include "mesh/refuse.h"
+#include "transfer/holes.h"
 
 void orb_merge_defaults(orb_merge_options *options) {
   memset(options, 0, sizeof *options);
@@ -90,6 +91,9 @@ static orb_status write_asset(orb_context *ctx, const orb_align_shape *given, in
   if (!out->is_document) {
     ORB_TRY(orb_asset_dropped(ctx, shapes, shape_count, &options->asset, &out->dropped, &out->dropped_count));
   }
+  ORB_TRY(orb_dropped_holes(ctx, &out->supermesh, shapes, &options->asset,
+                            options->remesh.method == ORB_REMESH_TEMPLATE && options->file, &out->dropped,
+                            &out->dropped_count));
   out->transforms = ORB_NEW(ctx, double, 16 * (size_t)shape_count);
   out->fits = ORB_NEW(ctx, orb_fit_report, shape_count);
   if (!out->transforms || !out->fits) {
@@ -115,10 +119,11 @@ orb_status orb_merge_aligned(orb_context *ctx, const orb_align_shape *shapes, co
     status = orb_fail(ctx, ORB_E_BAD_OPTION, "The alignment is of %d shapes.", out->alignment.shape_count);
     goto fail;
   }
+  orb_remesh_options remesh = options->remesh;
+  remesh.rims = options->asset.holes == ORB_HOLES_REOPEN;
   orb_progress(ctx, "remesh", 0);
   ORB_GO(status,
-         orb_remesh(ctx, out->alignment.shapes, shape_count, out->alignment.landmark_count, &options->remesh,
-                    &out->supermesh),
+         orb_remesh(ctx, out->alignment.shapes, shape_count, out->alignment.landmark_count, &remesh, &out->supermesh),
          fail);
   out->timings.remesh = (now = orb_clock()) - mark;
   mark = now;

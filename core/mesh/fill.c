@@ -3,8 +3,8 @@
  * A loop of up to SMALL edges gets the triangulation of least area (dynamic programming, Barequet & Sharir 1995); a
  * larger one is cut like a polygon. Either may use a diagonal that is already an edge of the mesh. Where that happens,
  * all loops are closed by fans around a new vertex each instead, which cannot clash. A new vertex stands for no vertex
- * of the file: its source is the lowest one of its loop. New faces have source_triangle −1 and take their attributes
- * from the faces across the loop.
+ * of the file: its source is the lowest one of its loop. New faces have source_triangle ORB_MADE_FILL and take their
+ * attributes from the faces across the loop.
  */
 #include "mesh/fill.h"
 
@@ -97,7 +97,7 @@ static void add_face(fill *f, const int32_t vertex[3], const int32_t like[3]) {
     mesh->triangles[3 * t + k] = vertex[k];
     copy_corner(mesh, 3 * t + k, like[k]);
   }
-  mesh->source_triangle[t] = -1;
+  mesh->source_triangle[t] = ORB_MADE_FILL;
   if (mesh->material) {
     mesh->material[t] = mesh->material[like[0] / 3];
   }

@@ -159,6 +159,7 @@ static orb_status cut(orb_surface *s, const orb_cycles *cycles, int fans, double
     ORB_ASSERT(loops == 2 * (int64_t)cycles->count);
     for (int32_t t = old; t < mesh->triangle_count; t++) {
       area[of[mesh->triangles[3 * (size_t)t]]] += area_of(mesh, t); /* the first corner lies on the rim */
+      mesh->source_triangle[t] = ORB_MADE_COVER;
     }
   }
   orb_free(s->ctx, of);

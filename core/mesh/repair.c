@@ -176,7 +176,8 @@ static void face_outward(orb_mesh *mesh, const unsigned char *reversed, int32_t 
   orb_mesh_note(mesh, "reorient", count);
 }
 
-static orb_status close_surface(orb_surface *s, unsigned repair) {
+/* made: what the new triangles are. */
+static orb_status close_surface(orb_surface *s, unsigned repair, int32_t made) {
   if (s->edges.open == 0) {
     return ORB_OK;
   }
@@ -187,7 +188,11 @@ static orb_status close_surface(orb_surface *s, unsigned repair) {
   ORB_TRY(orb_surface_fans(s, 1, &fans)); /* so that each boundary vertex lies on one loop, once */
   orb_mesh_note(s->mesh, "split-vertices", fans.pinched);
   int64_t loops;
+  const int32_t old = s->mesh->triangle_count;
   ORB_TRY(orb_surface_fill(s, 0, &loops));
+  for (int32_t t = old; t < s->mesh->triangle_count; t++) {
+    s->mesh->source_triangle[t] = made;
+  }
   orb_mesh_note(s->mesh, "fill_holes", loops);
   return orb_surface_pieces(s);
 }
@@ -220,12 +225,13 @@ static orb_status check_one_sphere(orb_surface *s, const orb_repair_options *opt
 }
 
 /* Splits crowded edges. The holes that this opens in a closed surface are filled: *repair then allows that. */
-static orb_status split_crowded(orb_surface *s, unsigned *repair) {
+static orb_status split_crowded(orb_surface *s, unsigned *repair, int32_t *made) {
   int was_closed = s->edges.open == 0;
   int64_t count;
   ORB_TRY(orb_surface_split(s, &count));
   orb_mesh_note(s->mesh, "split_nonmanifold", count);
   *repair |= was_closed ? ORB_REPAIR_FILL_HOLES : 0;
+  *made = was_closed ? ORB_MADE_COVER : ORB_MADE_FILL;
   return ORB_OK;
 }
 
@@ -234,6 +240,7 @@ static orb_status repair_surface(orb_surface *s, const orb_repair_options *optio
   unsigned repair = options->repair;
   orb_mesh *mesh = s->mesh;
   int64_t unused = 0;
+  int32_t made = ORB_MADE_FILL;
   int opened_by_dropping = 0;
   if (is_safe(repair)) {
     ORB_TRY(drop_degenerate(s));
@@ -249,7 +256,7 @@ static orb_status repair_surface(orb_surface *s, const orb_repair_options *optio
     return orb_refuse_few(s);
   }
   if (repair & ORB_REPAIR_SPLIT && s->edges.crowded > 0) {
-    ORB_TRY(split_crowded(s, &repair));
+    ORB_TRY(split_crowded(s, &repair, &made));
   }
   if (repair & (ORB_REPAIR_LARGEST_COMPONENT | ORB_REPAIR_PART)) {
     ORB_TRY(keep_piece(s, options));
@@ -259,7 +266,7 @@ static orb_status repair_surface(orb_surface *s, const orb_repair_options *optio
   }
   ORB_TRY(make_consistent(s, repair, reversed));
   *old = mesh->triangle_count;
-  ORB_TRY(close_surface(s, repair));
+  ORB_TRY(close_surface(s, repair, made));
   ORB_TRY(check_one_sphere(s, options));
   if (mesh->triangle_count < 4) {
     return orb_refuse_few(s);

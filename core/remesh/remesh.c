@@ -7,7 +7,11 @@
 #include "base/context.h"
 #include "base/error.h"
 #include "base/memory.h"
+#include "remesh/placed/rims.h"
 #include "remesh/registry.h"
+
+/* Of the tolerance, for the method where rims follow: edges that they cut may deviate a little more. */
+static const double RIMS_SHARE = 0.9;
 
 void orb_remesh_defaults(orb_remesh_options *options) {
   *options = (orb_remesh_options){.method = ORB_REMESH_ADAPTIVE, .tolerance = 0.001, .max_triangles = 0};
@@ -152,8 +156,18 @@ orb_status orb_remesh(orb_context *ctx, const orb_aligned_shape *shapes, int32_t
   for (int32_t s = 0; s < shape_count && status == ORB_OK; s++) {
     out->error_bound[s] = NAN;
   }
+  orb_remesh_options tight = *options;
+  if (status == ORB_OK && options->rims && orb_rims_any(&job)) {
+    tight.tolerance *= RIMS_SHARE;
+  }
+  job.options = &tight;
   if (status == ORB_OK) {
     status = run_method(ctx, &job, out);
+  }
+  job.options = options;
+  out->has_rims = options->method == ORB_REMESH_OVERLAY || options->method == ORB_REMESH_TEMPLATE;
+  if (status == ORB_OK && options->rims && !out->has_rims) {
+    status = orb_rims_add(ctx, &job, out);
   }
   if (status == ORB_OK) {
     status = find_landmarks(ctx, &job, out);

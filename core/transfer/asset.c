@@ -10,6 +10,7 @@
 #include "base/memory.h"
 #include "transfer/distinct.h"
 #include "transfer/fit.h"
+#include "transfer/holes.h"
 #include "transfer/keep.h"
 #include "transfer/pack.h"
 #include "transfer/path.h"
@@ -151,10 +152,11 @@ static orb_status make_colors(orb_context *ctx, orb_draft *draft) {
   return ORB_OK;
 }
 
-/* Texture coordinates, and the triangles that decide the materials, if the first shape has either. */
+/* Texture coordinates, and the triangles that decide materials and holes, if the first shape has any of these. */
 static orb_status make_textures(orb_context *ctx, orb_draft *draft) {
   const orb_mesh *mesh = &draft->shapes[0].mesh;
-  if (!mesh->texcoords && !(mesh->material && mesh->material_count > 1)) {
+  draft->has_holes = draft->options->holes == ORB_HOLES_REOPEN && draft->supermesh->has_rims && orb_has_holes(mesh);
+  if (!mesh->texcoords && !(mesh->material && mesh->material_count > 1) && !draft->has_holes) {
     return ORB_OK;
   }
   draft->home = ORB_NEW(ctx, int32_t, draft->supermesh->triangle_count);

@@ -212,13 +212,12 @@ static int32_t make_extras(const orb_asset_facts *facts, const orb_draft *draft,
 static orb_status write_scene(packer *pack, orb_gltf_scene *scene, orb_gltf_primitive *primitives,
                               orb_gltf_attributes *targets, orb_asset_facts *facts, orb_buffer *out) {
   const orb_draft *draft = pack->draft;
-  *facts = (orb_asset_facts){.triangle_count = draft->supermesh->triangle_count,
-                             .primitive_count = draft->part_count,
-                             .target_count = draft->frame_count - 1,
-                             .nudged_vertices = draft->nudged};
+  *facts = (orb_asset_facts){
+      .primitive_count = draft->part_count, .target_count = draft->frame_count - 1, .nudged_vertices = draft->nudged};
   for (int32_t p = 0; p < draft->part_count; p++) {
     ORB_TRY(add_part(pack, &draft->parts[p], &primitives[p], targets + (int64_t)p * facts->target_count));
     facts->vertex_count += draft->parts[p].vertex_count;
+    facts->triangle_count += draft->parts[p].triangle_count;
     orb_progress(pack->ctx, "write", 0.5 + 0.4 * (p + 1) / draft->part_count);
   }
   int per_target = 1 + (draft->normals ? 1 : 0) + (draft->tangents ? 1 : 0) + (draft->color_count > 1 ? 1 : 0);

@@ -96,6 +96,7 @@ static const struct member {
     {"path", "asset", "path", TEXT},
     {"animation", "asset", "animation", TEXT},
     {"normals", "asset", "normals", BOOL},
+    {"holes", "asset", "holes", TEXT},
 };
 
 static cJSON *object_of(cJSON *body, const char *name) {

@@ -155,6 +155,7 @@ static void close_all(orb_mesh *plain, int count, unsigned seed, double size, in
   }
   for (int32_t t = 0; t < mesh.triangle_count; t++) {
     if (mesh.source_triangle[t] < 0) {
+      assert_int_equal(mesh.source_triangle[t], ORB_MADE_COVER);
       double u[3], w[3], n[3];
       const int32_t *c = mesh.triangles + 3 * t;
       orb_sub(mesh.positions + 3 * c[1], mesh.positions + 3 * c[0], u);

@@ -256,6 +256,8 @@ export type SupermeshRequest = {
     path_steps?: number;
     /** Store the colours of later shapes as morphed attributes. Default: false. */
     colors?: boolean;
+    /** Whether holes of the first shape that repair=fill_holes has filled are open in the asset: the triangles that fill them are left out. What cannot be reopened is listed in `dropped`. With template the triangles are always those of the file. Default: "reopen". */
+    holes?: 'reopen' | 'filled';
   };
   /** With the remesh method template and a first shape that came as glTF: what of its document the closed surface consists of. The job is refused (bad-option) where the surface that was uploaded has vertices of another mesh, or none of one that is named; choose the surface at the upload by part=NAME. What is not named stays as it is. */
   template?: {
@@ -317,6 +319,8 @@ export type CanonicalRequest = {
     path_steps: number;
     /** Store the colours of later shapes as morphed attributes. */
     colors: boolean;
+    /** Whether holes of the first shape that a repair has filled are open in the asset. */
+    holes: 'reopen' | 'filled';
   };
   /** Only where the request has it. */
   template?: {

@@ -336,7 +336,7 @@ export class Orbmorph {
   /**
    * The URL of a morph: its GET computes the morph if nobody has. `recipe`: `shapes` (ids of meshes), and optionally
    * `names`, `landmarks` (an id, or "auto"), `align`, `preset`, `remesh`, `tolerance`, `max_triangles`, `fit`, `path`,
-   * `animation`, `normals`, `profile` and `wait`.
+   * `animation`, `normals`, `holes`, `profile` and `wait`.
    */
   morphUrl(recipe) {
     const query = Object.entries(clean(recipe)).map(

@@ -115,6 +115,7 @@ export interface Recipe {
   path?: 'linear' | 'rigid';
   animation?: 'pingpong' | 'none';
   normals?: boolean;
+  holes?: 'reopen' | 'filled';
   profile?: Profile;
   wait?: number;
 }

@@ -12,6 +12,7 @@ extern "C" {
  * rotated by more than 30°, or farther away than half the diagonal of the first shape; NONE for the others. */
 typedef enum orb_fit { ORB_FIT_NONE = 0, ORB_FIT_RIGID, ORB_FIT_SIMILARITY, ORB_FIT_AUTO } orb_fit;
 typedef enum orb_animation { ORB_ANIMATION_PINGPONG = 0, ORB_ANIMATION_NONE } orb_animation;
+typedef enum orb_holes { ORB_HOLES_REOPEN = 0, ORB_HOLES_FILLED } orb_holes;
 typedef enum orb_path { ORB_PATH_LINEAR = 0, ORB_PATH_RIGID } orb_path;
 
 typedef struct orb_asset_options {
@@ -21,13 +22,15 @@ typedef struct orb_asset_options {
   orb_path path;
   int32_t path_steps; /* for ORB_PATH_RIGID: in-between targets for each pair of neighbours, 3 */
   int colors;         /* also write the colours of the later shapes, as morphed attributes; 0 */
+  orb_holes holes;    /* REOPEN: leave out the triangles that fill holes of the first shape, where the supermesh has
+                         their rims */
 } orb_asset_options;
 ORB_API void orb_asset_defaults(orb_asset_options *options);
 
 /* What was written. */
 typedef struct orb_asset_facts {
-  int32_t vertex_count; /* after splits for normals, seams and materials */
-  int32_t triangle_count;
+  int32_t vertex_count;       /* after splits for normals, seams and materials */
+  int32_t triangle_count;     /* without those that fill holes which are open again */
   int32_t primitive_count;    /* one for each material that is used */
   int32_t target_count;       /* later shapes, then in-betweens */
   int32_t morphed_attributes; /* over all targets; glTF requires clients to support only 8 at once */

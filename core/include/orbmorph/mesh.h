@@ -39,6 +39,10 @@ typedef struct orb_object {
   char name[ORB_PART_NAME]; /* UTF-8 without control characters; longer names are cut */
 } orb_object;
 
+/* In source_triangle, where a repair made the triangle: it fills a hole of the file; or it covers what another repair
+ * has opened (close_handles, split_nonmanifold). */
+enum { ORB_MADE_FILL = -1, ORB_MADE_COVER = -2 };
+
 /* What of a document the closed surface consists of: meshes by number, and the meshes of nodes by name, with those of
  * the nodes below them. */
 typedef struct orb_document_parts {
@@ -59,7 +63,7 @@ typedef struct orb_mesh {
   int32_t file_vertex_count, file_triangle_count;
   int32_t *source;           /* of each vertex: the lowest-numbered vertex of the file that it stands for */
   int32_t *vertex_of_source; /* file_vertex_count: the vertex that stands for it, −1 if dropped */
-  int32_t *source_triangle;  /* of each triangle: its number in the file, −1: made by fill_holes or close_handles */
+  int32_t *source_triangle;  /* of each triangle: its number in the file, or ORB_MADE_… */
 
   /* Attributes of corners (corner h belongs to vertex triangles[h]). */
   float *normals;    /* 3 a corner, unit */

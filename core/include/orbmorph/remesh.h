@@ -33,6 +33,7 @@ typedef struct orb_remesh_options {
    * rounding (1e-12), unless max_triangles is too small for that. */
   double tolerance;
   int64_t max_triangles; /* 0: no limit. Takes precedence over the tolerance. */
+  int rims;              /* also make the rims of the first shape's filled holes edges, see orb_supermesh.has_rims; 0 */
 } orb_remesh_options;
 ORB_API void orb_remesh_defaults(orb_remesh_options *options);
 
@@ -46,6 +47,9 @@ typedef struct orb_supermesh {
   double *error_bound;        /* shape_count: proved bound on the distance, in the shape's units; NaN: none is proved */
   int64_t flipped;            /* on the sphere: 0 */
   int32_t degree;             /* 1 */
+  int has_rims; /* no triangle crosses the rim of a filled hole of the first shape (ORB_MADE_FILL). So it is with
+                   overlay and template; with the others where the options ask for it, max_triangles allows it, and
+                   rounding does */
 } orb_supermesh;
 
 /* Makes one supermesh for all aligned shapes. The caller passes certified meshes and points. A landmark that the

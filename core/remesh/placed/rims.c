@@ -1,0 +1,283 @@
+#include "remesh/placed/rims.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/check.h"
+#include "base/context.h"
+#include "base/memory.h"
+#include "numeric/predicates.h"
+#include "numeric/vec3.h"
+#include "remesh/placed/bound.h"
+#include "remesh/placed/export.h"
+#include "remesh/placed/placed_net.h"
+
+/* A vertex so near to where a rim crosses one of its edges, as a share of the edge, moves there: a new one beside it
+ * would make slivers. */
+static const double NEAR = 0.05;
+/* A vertex this near to a rim, on the unit sphere, lies on it: rounding of its point explains the distance. */
+static const double ON = 1e-12;
+
+enum { ROUNDS = 24 }; /* of splits; each halves the edges that deviate, so that few rounds do */
+
+/* A vertex this near to the opposite edge of a triangle makes a needle of it, across which nothing can be traced: the
+ * edge is flipped. */
+static const double FLAT = 1e-7;
+
+typedef struct rims {
+  orb_context *ctx;
+  const orb_remesh_job *job;
+  orb_net net;
+  int32_t old_count;    /* vertices before */
+  int32_t *vertex_of;   /* per vertex of the first shape: its net vertex, −1 */
+  unsigned char *fixed; /* per old vertex: it must not move */
+  int failed;           /* an edge could not be made */
+} rims;
+
+static int is_rim(const orb_remesh_job *job, int32_t h) {
+  const int32_t *source = job->shapes[0].mesh.source_triangle;
+  return source[h / 3] != ORB_MADE_FILL && source[job->twin[0][h] / 3] == ORB_MADE_FILL;
+}
+
+static int64_t count_rims(const orb_remesh_job *job) {
+  const orb_mesh *mesh = &job->shapes[0].mesh;
+  int64_t count = 0;
+  for (int32_t h = 0; mesh->source_triangle && h < 3 * mesh->triangle_count; h++) {
+    count += is_rim(job, h);
+  }
+  return count;
+}
+
+int orb_rims_any(const orb_remesh_job *job) {
+  return count_rims(job) > 0;
+}
+
+/* Only adaptive moves vertices of its own; the other methods keep those of the shapes. */
+static void fix_vertices(rims *r) {
+  const orb_remesh_job *job = r->job;
+  const orb_aligned_shape *shape = &job->shapes[0];
+  memset(r->fixed, job->options->method != ORB_REMESH_ADAPTIVE, (size_t)r->old_count);
+  for (int32_t l = 0; shape->landmark_vertices && l < job->landmark_count; l++) {
+    if (shape->landmark_vertices[l] < 0) {
+      continue;
+    }
+    const double *p = shape->points + 3 * (int64_t)shape->landmark_vertices[l];
+    for (int32_t v = 0; v < r->old_count; v++) {
+      r->fixed[v] |= memcmp(orb_net_point(&r->net, v), p, 3 * sizeof *p) == 0;
+    }
+  }
+}
+
+static int can_move(const rims *r, int32_t v) {
+  return v < r->old_count && !r->fixed[v];
+}
+
+static orb_status insert_vertices(rims *r) {
+  const orb_aligned_shape *shape = &r->job->shapes[0];
+  int32_t near = 0;
+  for (int32_t h = 0; h < 3 * shape->mesh.triangle_count; h++) {
+    int32_t a = shape->mesh.triangles[h], b = shape->mesh.triangles[orb_next(h)];
+    if (!is_rim(r->job, h)) {
+      continue;
+    }
+    for (int end = 0; end < 2; end++) {
+      int32_t at = end ? b : a;
+      if (r->vertex_of[at] < 0) {
+        int32_t v = r->vertex_of[at] = orb_net_insert(&r->net, shape->points + 3 * (int64_t)at, &near);
+        if (v < r->old_count) {
+          r->fixed[v] = 1;
+        }
+      }
+    }
+  }
+  return orb_context_check(r->ctx);
+}
+
+/* Where the arcs from v to w and from p to q meet. */
+static void meet(const double v[3], const double w[3], const double p[3], const double q[3], double out[3]) {
+  double first[3], second[3], toward[3];
+  orb_cross(v, w, first);
+  orb_cross(p, q, second);
+  orb_cross(first, second, out);
+  for (int k = 0; k < 3; k++) {
+    toward[k] = p[k] + q[k];
+  }
+  if (orb_dot(out, toward) < 0) {
+    for (int k = 0; k < 3; k++) {
+      out[k] = -out[k];
+    }
+  }
+  orb_normalize(out);
+}
+
+/* The vertex at which the arc to w leaves the star of v: one on the arc, or one made where the arc crosses the star's
+ * boundary; v itself after a flip. −1: rounding allows none. Needs room for one vertex. */
+static int32_t step(rims *r, int32_t v, int32_t w) {
+  orb_net *net = &r->net;
+  const double *from = orb_net_point(net, v), *to = orb_net_point(net, w);
+  int32_t first = net->out[v], h = first, crossed = -1;
+  do {
+    int32_t p = net->triangles[orb_next(h)], q = net->triangles[orb_prev(h)];
+    int left = orb_orient(from, orb_net_point(net, p), to), right = orb_orient(from, to, orb_net_point(net, q));
+    if (left == 0 && orb_dot(orb_net_point(net, p), to) > orb_dot(from, to)) {
+      return p; /* towards w, as it is nearer */
+    }
+    if (left > 0 && right > 0) {
+      crossed = orb_next(h);
+    }
+    h = net->twin[orb_prev(h)];
+  } while (h != first);
+  if (crossed < 0) {
+    return -1;
+  }
+  int32_t ends[2] = {net->triangles[crossed], net->triangles[orb_next(crossed)]};
+  double x[3], length = sqrt(orb_distance2(orb_net_point(net, ends[0]), orb_net_point(net, ends[1])));
+  meet(from, to, orb_net_point(net, ends[0]), orb_net_point(net, ends[1]), x);
+  for (int k = 0; k < 2; k++) {
+    if (orb_distance2(orb_net_point(net, ends[k]), x) < ON * ON) {
+      return ends[k];
+    }
+    if (can_move(r, ends[k]) && sqrt(orb_distance2(orb_net_point(net, ends[k]), x)) < NEAR * length &&
+        orb_net_move(net, ends[k], x)) {
+      r->fixed[ends[k]] = 1;
+      return ends[k];
+    }
+  }
+  if (orb_distance2(from, x) < FLAT * FLAT && orb_net_can_flip(net, crossed)) {
+    orb_net_flip(net, crossed);
+    return v;
+  }
+  return orb_net_split_edge(net, crossed, x);
+}
+
+/* Makes the arc from v to w a chain of edges. */
+static orb_status trace(rims *r, int32_t v, int32_t w) {
+  for (int64_t steps = 0; v != w; steps++) {
+    ORB_TRY(orb_net_reserve(r->ctx, &r->net, 1));
+    int32_t next = orb_net_edge(&r->net, v, w) >= 0 ? w : steps > r->net.triangle_count ? -1 : step(r, v, w);
+    if (next < 0) {
+      r->failed = 1;
+      return ORB_OK;
+    }
+    v = next;
+  }
+  return orb_context_check(r->ctx);
+}
+
+static orb_status trace_all(rims *r) {
+  const orb_mesh *mesh = &r->job->shapes[0].mesh;
+  for (int32_t h = 0; h < 3 * mesh->triangle_count && !r->failed; h++) {
+    if (is_rim(r->job, h)) {
+      ORB_TRY(trace(r, r->vertex_of[mesh->triangles[h]], r->vertex_of[mesh->triangles[orb_next(h)]]));
+    }
+  }
+  return ORB_OK;
+}
+
+static int is_within(const orb_remesh_job *job, const double *bound) {
+  for (int32_t s = 0; s < job->shape_count; s++) {
+    if (!(bound[s] <= job->options->tolerance * job->diagonal[s] * (1 + 1e-9))) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
+/* Splits the edges beyond the limit and inserts such items, once each. Nothing is flipped, so the rims stay. *changes:
+ * how many. */
+static orb_status split_once(rims *r, orb_placed_net *placed, double limit2, int64_t *changes) {
+  const int32_t half_edges = 3 * placed->net.triangle_count;
+  *changes = 0;
+  for (int32_t h = 0; h < half_edges; h++) {
+    int32_t v = placed->net.triangles[h], w = placed->net.triangles[orb_next(h)];
+    if (placed->net.twin[h] < h || orb_placed_edge_is_within(placed, v, w, limit2)) {
+      continue;
+    }
+    double middle[3];
+    for (int k = 0; k < 3; k++) {
+      middle[k] = orb_net_point(&placed->net, v)[k] + orb_net_point(&placed->net, w)[k];
+    }
+    orb_normalize(middle);
+    ORB_TRY(orb_placed_reserve(r->ctx, placed, 1));
+    *changes += orb_placed_split(placed, h, middle) >= 0;
+  }
+  for (int32_t t = 0; t < half_edges / 3; t++) {
+    const int32_t *c = placed->net.triangles + 3 * (int64_t)t;
+    int32_t item = placed->triangle_items[t];
+    while (item >= 0 && orb_placed_item2(placed, item, c[0], c[1], c[2]) <= limit2) {
+      item = placed->item_next[item];
+    }
+    if (item >= 0) {
+      ORB_TRY(orb_placed_reserve(r->ctx, placed, 1));
+      (void)orb_placed_insert(placed, t, orb_placed_item_point(placed, item));
+      ++*changes;
+    }
+  }
+  return orb_context_check(r->ctx);
+}
+
+/* Computes the places of the net. Where the supermesh was within the tolerance, edges are split until the net is, too;
+ * failed if that does not end. */
+static orb_status place(rims *r, int keeps_tolerance, double *bound, orb_placed_net *placed) {
+  const double limit = r->job->options->tolerance * (1 - 1e-9) - 1e-12; /* leaves room for the rounding of the bound */
+  int64_t changes = keeps_tolerance;
+  ORB_TRY(orb_placed_create_on(r->ctx, r->job, &r->net, placed));
+  for (int round = 0; round < ROUNDS && changes > 0; round++) {
+    ORB_TRY(split_once(r, placed, limit * limit, &changes));
+  }
+  ORB_TRY(orb_placed_bounds(r->ctx, placed, bound));
+  r->failed = keeps_tolerance && !is_within(r->job, bound);
+  return ORB_OK;
+}
+
+/* Replaces the supermesh by the net. */
+static orb_status replace(rims *r, orb_supermesh *out) {
+  const int64_t most = r->job->options->max_triangles;
+  orb_placed_net placed = {0};
+  double *bound = ORB_NEW(r->ctx, double, r->job->shape_count);
+  orb_status status = bound ? place(r, is_within(r->job, out->error_bound), bound, &placed) : ORB_E_NO_MEMORY;
+  if (status == ORB_OK && !r->failed && (most == 0 || placed.net.triangle_count <= most)) {
+    orb_free(r->ctx, out->triangles);
+    orb_free(r->ctx, out->points);
+    orb_free(r->ctx, out->places);
+    out->triangles = NULL;
+    out->points = NULL;
+    out->places = NULL;
+    out->vertex_count = out->triangle_count = 0;
+    status = orb_placed_export(r->ctx, &placed, out);
+    out->has_rims = 1;
+  }
+  orb_placed_free(r->ctx, &placed);
+  orb_free(r->ctx, bound);
+  return status;
+}
+
+orb_status orb_rims_add(orb_context *ctx, const orb_remesh_job *job, orb_supermesh *out) {
+  const int64_t count = count_rims(job);
+  const int32_t vertices = job->shapes[0].mesh.vertex_count;
+  if (count == 0) {
+    return ORB_OK;
+  }
+  rims r = {.ctx = ctx, .job = job, .old_count = out->vertex_count};
+  orb_status status;
+  r.vertex_of = ORB_NEW(ctx, int32_t, vertices);
+  r.fixed = ORB_NEW(ctx, unsigned char, out->vertex_count);
+  if (!r.vertex_of || !r.fixed) {
+    status = ORB_E_NO_MEMORY;
+    goto done;
+  }
+  memset(r.vertex_of, -1, (size_t)vertices * sizeof *r.vertex_of);
+  ORB_GO(status,
+         orb_net_init(ctx, &r.net, out->points, out->vertex_count, out->triangles, out->triangle_count, NULL,
+                      out->vertex_count + 2 * count),
+         done);
+  fix_vertices(&r);
+  ORB_GO(status, insert_vertices(&r), done);
+  ORB_GO(status, trace_all(&r), done);
+  status = r.failed ? ORB_OK : replace(&r, out);
+done:
+  orb_net_free(ctx, &r.net);
+  orb_free(ctx, r.vertex_of);
+  orb_free(ctx, r.fixed);
+  return status;
+}

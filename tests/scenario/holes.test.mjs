@@ -1,0 +1,168 @@
+// Open meshes: repair=fill_holes fills them for the embedding, and the asset has the holes again.
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import { daemon } from './support/daemon.mjs';
+import { toTriangle } from './support/distance.mjs';
+import { morphOf } from './support/glb.mjs';
+import * as shapes from './support/shapes.mjs';
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const unit = (a) => a.map((x) => x / Math.hypot(...a));
+
+/** The triangles of a mesh that `keep` wants, by the mean of their points on the sphere. */
+function cut(mesh, keep) {
+  const triangles = mesh.triangles.filter((t) =>
+    keep(unit([0, 1, 2].map((k) => t.reduce((sum, v) => sum + mesh.points[v][k], 0)))),
+  );
+  return { positions: mesh.positions, triangles };
+}
+const away = (from, angle) => (p) => dot(p, unit(from)) < Math.cos((angle * Math.PI) / 180);
+const all =
+  (...tests) =>
+  (p) =>
+    tests.every((one) => one(p));
+
+/** Masks with eyes and a mouth, busts, tubes without caps, balls with several holes. */
+const open = [];
+for (let i = 0; i < 5; i++) {
+  const bend = 0.1 * i;
+  const ball = shapes.ball(3, ([x, y, z]) => [x + bend * y * y, 1.3 * y, 0.8 * z]);
+  const tube = shapes.ball(3, ([x, y, z]) => [(0.6 + 0.1 * i) * x, 2.5 * y + bend * x, 0.6 * z]);
+  const eyes = [away([-0.4, 0.3, 1], 12), away([0.4, 0.3 + 0.05 * i, 1], 12), away([0, -0.5, 1], 10 + 2 * i)];
+  open.push(
+    [`mask ${i}`, cut(ball, all(away([0, 0, -1], 60 - 4 * i), ...eyes)), 4],
+    [`bust ${i}`, cut(ball, away([0.1 * i, -1, 0], 35 + 5 * i)), 1],
+    [`tube ${i}`, cut(tube, all(away([0, 1, 0], 25 + 3 * i), away([0, -1, 0], 30))), 2],
+    [`ball ${i}`, cut(ball, all(...eyes)), 3],
+  );
+}
+
+/** The edges of one triangle only, as pairs of points; what lies at one place is one vertex. */
+function rimOf(positions, triangles) {
+  const key = (v) => positions[v].map((x) => x + 0).join();
+  const edges = new Map();
+  for (const t of triangles)
+    for (let k = 0; k < 3; k++) {
+      const [a, b] = [key(t[k]), key(t[(k + 1) % 3])];
+      if (!edges.delete(`${b} ${a}`)) edges.set(`${a} ${b}`, [positions[t[k]], positions[t[(k + 1) % 3]]]);
+    }
+  return [...edges.values()];
+}
+
+/** The number of loops that the edges form. */
+function loops(edges) {
+  const next = new Map(edges.map(([a, b]) => [a.join(), b.join()]));
+  assert.equal(next.size, edges.length, 'each point of a rim is on it once');
+  let count = 0;
+  while (next.size) {
+    let [at] = next.keys();
+    for (count++; next.has(at); ) {
+      const to = next.get(at);
+      next.delete(at);
+      at = to;
+    }
+  }
+  return count;
+}
+
+const triple = (flat) => Array.from({ length: flat.length / 3 }, (_, i) => [...flat.slice(3 * i, 3 * i + 3)]);
+const middle = ([a, b]) => a.map((x, k) => (x + b[k]) / 2);
+const farFrom = (points, edges) =>
+  Math.max(...points.map((p) => Math.min(...edges.map(([a, b]) => toTriangle(p, a, b, b)))));
+
+/** That the asset is open along the rims of `mesh` and nowhere else. */
+function assertRims(asset, mesh, count, what) {
+  const morph = morphOf(asset);
+  const made = rimOf(triple(morph.shapes[0]), triple(morph.triangles));
+  const given = rimOf(mesh.positions, mesh.triangles);
+  assert.equal(loops(made), count, what);
+  const used = mesh.triangles.flat().map((v) => mesh.positions[v]);
+  const size = Math.hypot(
+    ...[0, 1, 2].map((k) => Math.max(...used.map((p) => p[k])) - Math.min(...used.map((p) => p[k]))),
+  );
+  const points = (edges) => edges.flatMap((e) => [e[0], middle(e)]);
+  const off = Math.max(farFrom(points(made), given), farFrom(points(given), made)) / size;
+  assert.ok(off < 1e-6, `${what}: ${off}`);
+  return morph;
+}
+
+async function upload(d, mesh, name, repair) {
+  const reply = await d.upload(shapes.obj(mesh), { name, ...(repair && { repair }) });
+  assert.equal(reply.status, 201, JSON.stringify(reply.json));
+  return { mesh: reply.json.id };
+}
+
+const asked = (list, remesh, holes) => ({
+  shapes: list,
+  align: { method: 'rotate' },
+  remesh,
+  asset: { normals: false, fit: 'none', ...(holes && { holes }) },
+});
+
+const REMESH = [
+  { method: 'overlay' },
+  { method: 'adaptive', tolerance: 0.01 },
+  { method: 'subdivision', tolerance: 0.01 },
+  { method: 'convex-hull' },
+  { method: 'template' },
+];
+
+for (const remesh of REMESH)
+  test(`${remesh.method}: open meshes are open again along their rims`, async (t) => {
+    const d = await daemon(t);
+    const other = await upload(d, shapes.bean(2), 'bean');
+    const some = ['overlay', 'adaptive'].includes(remesh.method) ? open : open.slice(4, 10);
+    for (const [name, mesh, count] of some) {
+      const first = await upload(d, mesh, name, 'fill_holes');
+      const made = await d.made('/v1/supermeshes', asked([first, other], remesh));
+      assertRims((await d.get(made.asset)).bytes, mesh, count, name);
+      assert.deepEqual(
+        made.dropped.map((entry) => [entry.what, entry.where]),
+        [['surface', 'shapes[1]']],
+        name,
+      );
+      if (remesh.method === 'adaptive')
+        assert.ok(
+          made.shapes.every((shape) => shape.hausdorff_relative <= remesh.tolerance),
+          name,
+        );
+    }
+  });
+
+test('holes of a later shape stay filled, and the report names them', async (t) => {
+  const d = await daemon(t);
+  const [, mask, count] = open[0];
+  const closed = await upload(d, shapes.bean(2), 'bean');
+  const opened = await upload(d, mask, 'mask', 'fill_holes');
+  const later = await d.made('/v1/supermeshes', asked([closed, opened], { method: 'overlay' }));
+  assert.deepEqual(
+    later.dropped.map((entry) => [entry.what, entry.where]),
+    [['holes', 'shapes[1]']],
+  );
+  const whole = morphOf((await d.get(later.asset)).bytes);
+  assert.deepEqual(rimOf(triple(whole.shapes[0]), triple(whole.triangles)), []);
+
+  const filled = await d.made('/v1/supermeshes', asked([opened, closed], { method: 'overlay' }, 'filled'));
+  const covered = morphOf((await d.get(filled.asset)).bytes);
+  assert.deepEqual(rimOf(triple(covered.shapes[0]), triple(covered.triangles)), []);
+  assert.deepEqual(filled.dropped, []);
+
+  const both = await d.made('/v1/supermeshes', asked([opened, await upload(d, open[4][1], 'other', 'fill_holes')], {}));
+  assertRims((await d.get(both.asset)).bytes, mask, count, 'both open');
+  assert.deepEqual(both.dropped, []);
+  const few = await d.made('/v1/supermeshes', asked([opened, closed], { max_triangles: 40 }));
+  assert.deepEqual([few.dropped[0].what, few.dropped[0].where], ['holes', 'shapes[0]']);
+  assert.ok(few.triangles <= 40);
+});
+
+test('a recipe asks for filled holes', async (t) => {
+  const d = await daemon(t);
+  const [, bust, count] = open[1];
+  const ids = [await upload(d, bust, 'bust', 'fill_holes'), await upload(d, shapes.bean(2), 'bean')].map((s) => s.mesh);
+  const recipe = `/v1/morph.glb?shapes=${ids}&align=rotate&remesh=overlay&fit=none&normals=false`;
+  const opened = await d.get(recipe);
+  assert.equal(opened.status, 200);
+  assertRims(opened.bytes, bust, count, 'bust');
+  const filled = morphOf((await d.get(`${recipe}&holes=filled`)).bytes);
+  assert.deepEqual(rimOf(triple(filled.shapes[0]), triple(filled.triangles)), []);
+});
