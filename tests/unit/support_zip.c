@@ -21,7 +21,7 @@ static void put(unsigned char **at, size_t *size, size_t *room, const void *byte
 
 static unsigned char *number(unsigned char *p, uint64_t value, int bytes) {
   for (int i = 0; i < bytes; i++) {
-    *p++ = i < 8 ? (unsigned char)(value >> (8 * i)) : 0;
+    *p++ = (unsigned char)(i < 8 ? value >> (8 * i) : 0);
   }
   return p;
 }
