@@ -3,6 +3,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/find/match.h"
+#include "align/find/params.h"
+#include "align/map/engine/params.h"
 #include "align/methods.h"
 #include "align/pin/pin.h"
 #include "align/rbf/rbf.h"
@@ -128,9 +131,10 @@ end:
   return status;
 }
 
-orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
-                           const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
-                           orb_alignment *out) {
+/* Working copies with the landmarks as vertices, aligned by one method and certified. */
+static orb_status create(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                         const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                         orb_alignment *out) {
   orb_status status = ORB_OK;
   memset(out, 0, sizeof *out);
   orb_sheet *sheets = ORB_NEW0(ctx, orb_sheet, shape_count);
@@ -151,15 +155,109 @@ orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int3
   for (int32_t s = 0; s < shape_count; s++) {
     orb_sheet_release(ctx, &sheets[s], &out->shapes[s]);
   }
-  if (options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO)) {
-    ORB_GO(status, orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, options->preset), end);
-  }
-  status = soften(ctx, landmarks, options->preset, out);
 end:
   for (int32_t s = 0; sheets && s < shape_count; s++) {
     orb_sheet_free(ctx, &sheets[s]);
   }
   orb_free(ctx, sheets);
+  if (status != ORB_OK) {
+    orb_alignment_free(ctx, out);
+  }
+  return status;
+}
+
+/* Composes the map to shape s towards a match that agrees with the landmarks, without them, and then with them pinned.
+ * *energy: INFINITY if there is no such match, or no such map. */
+static orb_status compose_posed(orb_context *ctx, orb_alignment *a, int32_t s, orb_preset preset, double *energy) {
+  orb_aligned_shape *fixed = &a->shapes[0], *moving = &a->shapes[s];
+  const orb_match_hint hint = {a->landmark_count, fixed->landmark_vertices, moving->landmark_vertices};
+  const orb_map_guide near = {.from = ORB_MAP_FROM_NEAR};
+  orb_match match;
+  double energies[2];
+  int improved;
+  *energy = INFINITY;
+  orb_status status = orb_match_find(ctx, &fixed->mesh, &moving->mesh, &hint, &match);
+  if (status == ORB_OK && match.is_found) {
+    const orb_map_guide guide = {.from = ORB_MAP_FROM_SPACE, .target = match.target};
+    ORB_GO(status, orb_compose(ctx, fixed, moving, 0, 0, &guide, preset, energies, &improved), done);
+    ORB_GO(status, orb_compose(ctx, fixed, moving, 0, a->landmark_count, &near, preset, energies, &improved), done);
+    *energy = improved ? energies[1] : INFINITY;
+  }
+done:
+  orb_match_free(ctx, &match);
+  return status;
+}
+
+/* The alignment of shapes that are one in other poses. The map without landmarks starts on the shapes' own embeddings,
+ * which pins bend: two true landmarks at the ends of a limb that is long on the sphere and short on the other one fold
+ * what lies between. *found 0: the landmarks do not say so, or there is no map, and `out` is empty. */
+static orb_status align_posed(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                              const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                              orb_alignment *out, int *found) {
+  orb_align_options rotated = *options;
+  double sum = 0;
+  rotated.method = ORB_ALIGN_ROTATE;
+  *found = 0;
+  ORB_TRY(create(ctx, shapes, shape_count, landmarks, landmark_count, &rotated, out));
+  orb_status status = ORB_OK;
+  for (int32_t s = 1; s < shape_count && sum < INFINITY && status == ORB_OK; s++) {
+    double energy;
+    status = compose_posed(ctx, out, s, options->preset, &energy);
+    sum += energy;
+  }
+  *found = status == ORB_OK && sum < INFINITY;
+  out->energy = sum / (shape_count - 1);
+  if (!*found) {
+    orb_alignment_free(ctx, out);
+  }
+  return status;
+}
+
+/* Improves a pinned alignment. A landmark walk is quick, and mostly as good as anything else. Where its map is not good
+ * and the shapes are in other poses, a match leads to a better one. All other starts are for shapes without either. */
+static orb_status improve(orb_context *ctx, const orb_align_shape *shapes, const orb_landmark *landmarks,
+                          const orb_align_options *options, orb_alignment *a) {
+  const double good = orb_map_params_of(options->preset).energy.good;
+  double energy = INFINITY;
+  int walked = 0, posed = 0;
+  if (a->shape_count == 2) {
+    const orb_map_guide walk = {.from = ORB_MAP_FROM_WALK};
+    double energies[2];
+    ORB_TRY(orb_compose(ctx, &a->shapes[0], &a->shapes[1], 1, a->landmark_count, &walk, options->preset, energies,
+                        &walked));
+    a->energy = energy = energies[1];
+  }
+  if (energy > good && a->landmark_count >= ORB_FIND_HINT_LEAST) {
+    orb_alignment other;
+    ORB_TRY(align_posed(ctx, shapes, a->shape_count, landmarks, a->landmark_count, options, &other, &posed));
+    if (posed && other.energy < energy) {
+      orb_alignment_free(ctx, a);
+      *a = other;
+      energy = other.energy;
+    } else if (posed) {
+      orb_alignment_free(ctx, &other);
+    }
+  }
+  if (options->preset == ORB_PRESET_QUALITY || (energy > good && !walked && !posed)) {
+    return orb_compose_all(ctx, a, ORB_MAP_FROM_SPACE, NULL, options->preset);
+  }
+  return ORB_OK;
+}
+
+orb_status orb_align_given(orb_context *ctx, const orb_align_shape *shapes, int32_t shape_count,
+                           const orb_landmark *landmarks, int32_t landmark_count, const orb_align_options *options,
+                           orb_alignment *out) {
+  const int composes =
+      options->preset != ORB_PRESET_FAST && (options->method == ORB_ALIGN_PIN || options->method == ORB_ALIGN_AUTO);
+  orb_status status = create(ctx, shapes, shape_count, landmarks, landmark_count, options, out);
+  if (status == ORB_OK && composes) {
+    status = landmark_count > 0 && shape_count > 1
+                 ? improve(ctx, shapes, landmarks, options, out)
+                 : orb_compose_all(ctx, out, ORB_MAP_FROM_SPACE, NULL, options->preset);
+  }
+  if (status == ORB_OK) {
+    status = soften(ctx, landmarks, options->preset, out);
+  }
   if (status != ORB_OK) {
     orb_alignment_free(ctx, out);
   }

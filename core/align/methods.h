@@ -10,8 +10,9 @@
  *   pin/     method `pin`: landmarks as constraints of the embeddings
  *   rbf/     method `rbf`: the warp of Peng & Timalsena 2016
  *   map/     the composed map, from one shape through the sphere to the other, and its optimiser
+ *   find/    matches, without landmarks or such that agree with them; given landmarks that may be misplaced
+ *            (find/suspects.h)
  *   given.c  one method with the given landmarks, then the composed map; soft landmarks are let go at the end
- *   find/    matches, where no landmarks are given; given landmarks that may be misplaced (find/suspects.h)
  *   auto.c   method `auto`: the rotation search, composed towards the matches of find/
  *   align.c  orb_align(): checks the request and chooses between given.c and auto.c
  *

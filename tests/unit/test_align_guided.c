@@ -51,7 +51,7 @@ static void dog_to_giraffe(void **state) {
   options.method = ORB_ALIGN_AUTO;
   options.preset = ORB_PRESET_FAST; /* rotations only */
   assert_int_equal(orb_align(ctx, shapes, 2, NULL, 0, &options, &alignment), ORB_OK);
-  assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], &match), ORB_OK);
+  assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, &match), ORB_OK);
   const double *targets[2] = {NULL, match.target};
   assert_int_equal(orb_compose_all(ctx, &alignment, ORB_MAP_FROM_WALKS, targets, ORB_PRESET_DEFAULT), ORB_OK);
   assert_true(alignment.energy <= orb_map_params_of(ORB_PRESET_DEFAULT).energy.poor);

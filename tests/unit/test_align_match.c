@@ -61,7 +61,7 @@ static void limbs_go_to_limbs(void **state) {
     assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
     orb_mesh a = creature_of(ctx, reach, 3, 0), b = creature_of(ctx, other, 4, thirds);
     orb_mesh_extent(&a, &extent);
-    assert_int_equal(orb_match_find(ctx, &a, &b, &match), ORB_OK);
+    assert_int_equal(orb_match_find(ctx, &a, &b, NULL, &match), ORB_OK);
     assert_true(match.is_found);
     for (int i = 0; i < LIMBS; i++) {
       const double *p = a.positions + 3 * (size_t)tip_of(&a, i, 0),
@@ -87,7 +87,7 @@ static void others_differ(void **state) {
   orb_match match;
   assert_int_equal(orb_context_create(NULL, &ctx), ORB_OK);
   orb_mesh a = creature_of(ctx, reach, 3, 0), b = creature_of(ctx, reach, 4, 1);
-  assert_int_equal(orb_match_find(ctx, &a, &b, &match), ORB_OK);
+  assert_int_equal(orb_match_find(ctx, &a, &b, NULL, &match), ORB_OK);
   assert_in_range(match.other_count, 1, ORB_MATCH_OTHERS);
   double before = 1;
   for (int i = 0; i < match.other_count; i++) {
@@ -161,7 +161,7 @@ static void assert_match(const char *first, const char *second, int marks, const
   int found = shared_mesh(ctx, first, &mesh[0]);
   if (found) {
     assert_true(shared_mesh(ctx, second, &mesh[1]));
-    assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], &best), ORB_OK);
+    assert_int_equal(orb_match_find(ctx, &mesh[0], &mesh[1], NULL, &best), ORB_OK);
     int tips = 0;
     for (int k = 0; k < best.pairs.count; k++) {
       int at = nearest_of(&mesh[0], mark[0], marks, best.pairs.first[k]);

@@ -40,6 +40,7 @@ typedef struct search {
   const orb_mesh *mesh[2];
   scaling scaling[2];
   orb_coarse_copy copy[2]; /* scaled */
+  orb_hint_places hint;    /* empty: none */
   orb_spectral_dense dense;
   int32_t *rotated[2]; /* the rotations' maps, one after the other: as those of `dense` */
   trial trial[TRIALS];
@@ -207,10 +208,23 @@ static int32_t best_of(const search *t) {
   return best;
 }
 
+/* Drops the trials that take the landmarks elsewhere. */
+static void drop_against_hint(search *t) {
+  for (int32_t i = 0; i < t->count; i++) {
+    double off = orb_hint_off(&t->hint, &t->copy[0], t->trial[i].pose[0].position);
+    if (off > ORB_FIND_HINT_OFF) {
+      t->trial[i].cost = INFINITY;
+    }
+  }
+}
+
 /* Registers all in one direction, drops those that are too far behind to win, and registers the others back. */
 static orb_status rank(search *t) {
   for (int direction = 0; direction < 2; direction++) {
     ORB_TRY(register_all(t, direction));
+    if (direction == 0) {
+      drop_against_hint(t);
+    }
     for (int32_t i = 0; i < t->count; i++) {
       if (t->trial[i].cost < INFINITY) {
         fill_cost(t, &t->trial[i], direction + 1);
@@ -360,10 +374,42 @@ end:
   return status;
 }
 
-static orb_status run(search *t, orb_match *out) {
+/* Places the landmarks on the copies. *agrees 0: they say that the shapes are not one in two poses. */
+static orb_status take_hint(search *t, const orb_match_hint *hint, int *agrees) {
+  double *at[2], stretch;
+  int32_t count = 0;
+  for (int s = 0; s < 2; s++) {
+    at[s] = ORB_NEW(t->ctx, double, 3 * (size_t)hint->count);
+  }
+  for (int32_t i = 0; i < hint->count && at[0] && at[1]; i++) {
+    const int32_t vertex[2] = {hint->first[i], hint->second[i]};
+    if (vertex[0] < 0 || vertex[1] < 0) {
+      continue;
+    }
+    for (int k = 0; k < 6; k++) {
+      const int s = k / 3;
+      const double x = t->mesh[s]->positions[3 * (size_t)vertex[s] + (size_t)(k % 3)];
+      at[s][3 * (size_t)count + (size_t)(k % 3)] = (x - t->scaling[s].middle[k % 3]) * t->scaling[s].scale;
+    }
+    count++;
+  }
+  ORB_TRY(orb_hint_places_create(t->ctx, count, at, t->copy, &t->hint));
+  ORB_TRY(orb_hint_stretch(t->ctx, &t->hint, t->copy, &stretch));
+  *agrees = stretch <= ORB_FIND_HINT_STRETCH;
+  return ORB_OK;
+}
+
+static orb_status run(search *t, const orb_match_hint *hint, orb_match *out) {
+  int agrees = 1;
   for (int s = 0; s < 2; s++) {
     scaling_of(t->mesh[s], &t->scaling[s]);
     ORB_TRY(copy_create(t, s, ORB_FIND_COARSE, &t->copy[s]));
+  }
+  if (hint) {
+    ORB_TRY(take_hint(t, hint, &agrees));
+  }
+  if (!agrees) {
+    return ORB_OK;
   }
   ORB_TRY(add_spectral(t));
   ORB_TRY(add_rotations(t));
@@ -377,7 +423,8 @@ static orb_status run(search *t, orb_match *out) {
   return write_targets(t, &t->trial[best], out);
 }
 
-orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, orb_match *out) {
+orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second, const orb_match_hint *hint,
+                          orb_match *out) {
   memset(out, 0, sizeof *out);
   search *t = ORB_NEW0(ctx, search, 1);
   if (!t) {
@@ -386,7 +433,7 @@ orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mes
   t->ctx = ctx;
   t->mesh[0] = first;
   t->mesh[1] = second;
-  orb_status status = run(t, out);
+  orb_status status = run(t, hint, out);
   for (int32_t i = 0; i < t->count; i++) {
     pose_free(ctx, &t->trial[i].pose[0]);
     pose_free(ctx, &t->trial[i].pose[1]);
@@ -395,6 +442,7 @@ orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mes
     orb_coarse_copy_free(ctx, &t->copy[s]);
     orb_free(ctx, t->rotated[s]);
   }
+  orb_hint_places_free(ctx, &t->hint);
   orb_free(ctx, t->dense.forth);
   orb_free(ctx, t->dense.back);
   orb_free(ctx, t);

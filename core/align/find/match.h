@@ -1,8 +1,9 @@
-/* Alignment without landmarks: which points of two shapes correspond, by rough maps, ranked by how much they bend the
- * shapes.
+/* Which points of two shapes correspond, by rough maps, ranked by how much they bend the shapes. Landmarks, where there
+ * are any, only exclude maps.
  *
  * Comes in: two meshes. Goes out: where each vertex of the second lies on the first. Read in this order:
  *
+ *   hint.h    what landmarks say of a match
  *   match.h   the best of the rough maps
  *   found.h   the landmarks that an alignment found, and their confidence
  *   params.h  all thresholds
@@ -19,7 +20,7 @@
 #ifndef ORB_ALIGN_FIND_MATCH_H
 #define ORB_ALIGN_FIND_MATCH_H
 
-#include "orbmorph/mesh.h"
+#include "align/find/hint.h"
 
 enum {
   ORB_MATCH_PAIRS = 12, /* most pairs of a match */
@@ -48,10 +49,11 @@ typedef struct orb_match {
   double *target; /* where each vertex of the second shape lies on the first one, in its space: 3 a vertex */
 } orb_match;
 
-/* Free `out` in any case. About 1 s of one thread, whatever the size; trials run on all threads, and the result has the
- * same bytes for any number of them. */
+/* hint: NULL, or landmarks: then there is a match only if they say that the shapes are one in two poses, and only maps
+ * that take them near their partners count. Free `out` in any case. About 1 s of one thread, whatever the size; trials
+ * run on all threads, and the result has the same bytes for any number of them. */
 ORB_MUST_CHECK orb_status orb_match_find(orb_context *ctx, const orb_mesh *first, const orb_mesh *second,
-                                         orb_match *out);
+                                         const orb_match_hint *hint, orb_match *out);
 /* The confidence in a match, 0 to 1, from its bend, its `clear` and the energy of the map that followed it: calibrated
  * from 0.8 on (docs/bench-confidence.md). */
 double orb_match_confidence(double bend, double clear, double energy);

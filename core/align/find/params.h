@@ -38,6 +38,21 @@ static const double ORB_FIND_CLEAR_ALONE = 0.5;
  * do not lower each other's confidence. */
 static const double ORB_FIND_DIFFERENT = 0.15;
 
+/* Matches that must agree with landmarks (hint.c). */
+
+enum {
+  ORB_FIND_HINT_LEAST = 4,  /* landmarks; fewer do not tell a pose from other proportions */
+  ORB_FIND_HINT_SOURCES = 6 /* landmarks from which distances are measured; each takes 1 ms */
+};
+/* Distances shorter than this are not compared: the copies have edges of 0.1. In radii of a ball of the shape's area.
+ */
+static const double ORB_FIND_HINT_FAR = 0.5;
+/* Shapes whose landmarks' distances differ by more than this, as a mean logarithm, are not one shape in two poses. */
+static const double ORB_FIND_HINT_STRETCH = 0.16;
+/* A rough map that takes landmarks farther from their partners than this, in the mean, is another one. In radii of a
+ * ball of the shape's area. */
+static const double ORB_FIND_HINT_OFF = 0.5;
+
 /* Found landmarks (found.c). */
 
 /* Triangles of the first shape whose distortion gives the confidence of a landmark. Fewer make it depend on single

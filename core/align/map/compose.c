@@ -9,10 +9,9 @@
  * Mirror landmarks join the landmarks where both shapes are symmetric (starts/mirror.c). They are held like landmarks,
  * unless a start is nearly a map with them and a better map without them.
  *
- * With landmarks, the quick way comes first (walked.c): a landmark walk, optimised on a coarse level. If that map is
- * that of shapes that correspond, it is refined and nothing else is tried. If it is not, but no limb is twisted, it is
- * refined as well, and only starts from spatial targets that hardly fold are tried beside it. Where limbs are twisted,
- * or the shapes are one in two poses, there are three kinds of starts:
+ * With landmarks, the caller asks for the quick way first (walked.c): a landmark walk, optimised on a coarse level and
+ * refined. For shapes in other poses, it then asks for a map without the landmarks, and for the same map with them
+ * (starts/shift.c). Where neither comes to a map, there are three kinds of starts:
  * - From spatial targets: the moving shape after non-rigid registration in space (starts/registration.c), which
  *   samples by eigenfunctions guide where they agree with the landmarks (starts/spectral_samples.c). This is good where
  *   it folds little. Flips are allowed against a growing barrier until untangling clears nearly all; collapses clear
@@ -35,12 +34,14 @@
 #include <math.h>
 #include <string.h>
 
+#include "align/map/engine/rounds.h"
 #include "align/map/engine/run.h"
 #include "align/map/engine/step.h"
 #include "align/map/levels.h"
 #include "align/map/start.h"
 #include "align/map/starts/landmark_walk.h"
 #include "align/map/starts/place.h"
+#include "align/map/starts/shift.h"
 #include "align/map/starts/spectral_samples.h"
 #include "align/map/swap.h"
 #include "align/map/targets.h"
@@ -211,31 +212,13 @@ done:
   return status;
 }
 
-/* From spatial targets, where they are promising. */
+/* From spatial targets. */
 static orb_status run_spatial(orb_map_run *c) {
   ORB_TRY(orb_map_run_start(c, ORB_MAP_SPATIAL));
   if (c->has_usable && c->pairs.count > c->pairs.landmarks && c->best_energy > c->params.energy.good) {
     ORB_TRY(start_without_mirror_landmarks(c));
   }
   return ORB_OK;
-}
-
-/* A walked map, and beside it only starts from spatial targets that hardly fold. *done 0: a level has flips. */
-static orb_status finish_walked(orb_map_run *c, orb_map_walked *w, int *done) {
-  double good = c->params.energy.good;
-  *done = 1;
-  if (w->energy > good) {
-    c->hopeless_flips = c->params.walked.promising;
-    ORB_TRY(orb_map_register(c, 0));
-    ORB_TRY(orb_map_levels_prepare(c));
-    ORB_TRY(run_spatial(c));
-    if (c->best_energy <= good) {
-      return ORB_OK;
-    }
-  }
-  ORB_TRY(orb_map_walked_refine(c, w));
-  *done = w->energy < INFINITY;
-  return *done && c->best_energy > good ? orb_map_run_passes(c, 0) : ORB_OK;
 }
 
 /* Runs the starts, until they bring no improvement or the work is spent. */
@@ -256,24 +239,15 @@ static orb_status run_starts(orb_map_run *c, orb_map_from from, orb_preset prese
   return orb_map_run_passes(c, 1);
 }
 
-/* The quick way, and all starts where it does not suffice: where the walk has twisted limbs, and where the shapes are
- * one in two poses, as samples by eigenfunctions show. */
-static orb_status run_walked(orb_map_run *c, orb_map_walked *w, orb_preset preset) {
-  int done = 0;
-  ORB_TRY(orb_map_walked_create(c, 0, w));
-  if (w->energy > c->params.energy.good) {
-    ORB_TRY(orb_map_spectral_samples(c));
+/* A landmark walk, refined to all vertices unless it has twisted limbs. */
+static orb_status run_walk(orb_map_run *c) {
+  orb_map_walked walked;
+  orb_status status = orb_map_walked_create(c, 0, &walked);
+  if (status == ORB_OK && walked.energy < INFINITY) {
+    status = orb_map_walked_refine(c, &walked);
   }
-  if (w->energy < INFINITY && c->samples.count == 0) {
-    ORB_TRY(finish_walked(c, w, &done));
-    c->hopeless_flips = c->params.clear.hopeless;
-  }
-  if (done) {
-    return ORB_OK;
-  }
-  ORB_TRY(run_starts(c, ORB_MAP_FROM_SPACE, preset));
-  ORB_TRY(orb_map_take_best(c));
-  return w->energy < c->best_energy ? orb_map_walked_refine(c, w) : ORB_OK;
+  orb_map_walked_free(c, &walked);
+  return status;
 }
 
 /* Chooses the starts by what is known of the map as given. */
@@ -286,11 +260,8 @@ static orb_status run(orb_map_run *c, orb_map_from from, orb_preset preset) {
   if (c->given_target) {
     return from == ORB_MAP_FROM_WALKS ? orb_map_walk_to_targets(c) : orb_map_follow_targets(c);
   }
-  if (from == ORB_MAP_FROM_SPACE && c->both && c->pairs.count > 0 && preset != ORB_PRESET_QUALITY) {
-    orb_map_walked walked;
-    orb_status status = run_walked(c, &walked, preset);
-    orb_map_walked_free(c, &walked);
-    return status;
+  if (from == ORB_MAP_FROM_WALK) {
+    return run_walk(c);
   }
   if (from == ORB_MAP_FROM_SPACE) {
     ORB_TRY(orb_map_spectral_samples(c));
@@ -305,6 +276,19 @@ static orb_status let_go(orb_map_run *c) {
   c->params.work.rough = 0;
   ORB_TRY(orb_map_levels_prepare(c));
   return orb_map_run_start(c, ORB_MAP_GIVEN);
+}
+
+static orb_status snap(orb_map_run *c) {
+  c->pairs.count = c->pairs.landmarks;
+  c->best_energy = INFINITY;
+  c->params.work.rough = 0;
+  ORB_TRY(orb_map_shift(c));
+  ORB_TRY(orb_map_levels_prepare(c));
+  ORB_TRY(orb_map_run_start(c, ORB_MAP_GIVEN));
+  if (c->best_energy == INFINITY) {
+    return ORB_OK;
+  }
+  return c->best_energy > c->params.energy.good ? orb_map_run_passes(c, 1) : ORB_OK;
 }
 
 /* Writes the best map back if it is better than the alignment as given and certified. */
@@ -367,11 +351,16 @@ orb_status orb_compose(orb_context *ctx, orb_aligned_shape *fixed, orb_aligned_s
   energy[1] = c.best_energy = energy[0];
   memcpy(c.best, moving->points, 3 * (size_t)moving->mesh.vertex_count * sizeof *c.best);
   ORB_GO(status, orb_map_pairs_create(&c), done);
-  if (guide->from == ORB_MAP_FROM_PINS) {
+  if (guide->from == ORB_MAP_FROM_NEAR) {
+    energy[0] = INFINITY; /* the landmarks are apart */
+    ORB_GO(status, snap(&c), done);
+  } else if (guide->from == ORB_MAP_FROM_PINS) {
     ORB_GO(status, let_go(&c), done);
   } else {
     ORB_GO(status, run(&c, guide->from, preset), done);
-    ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
+    if (guide->from != ORB_MAP_FROM_WALK || c.best_energy < energy[0]) {
+      ORB_GO(status, orb_map_untwist(&c, INFINITY), done);
+    }
   }
   status = take_best(&c, fixed, energy, improved);
 done:

@@ -102,7 +102,6 @@ typedef struct orb_map_params {
         barriers[2];   /* of a loosening, and of the one after an idle one: a weak barrier frees more, and folds more */
     double hopeless;   /* energy of the first level above which the walk has twisted limbs, and no finer level helps */
     double twisted;    /* the same of the last level */
-    int32_t promising; /* a spatial start is tried beside a walked map if at most one in so many triangles flips */
     int work;          /* least that each guided walk has, as work.all */
     int32_t guides[ORB_MAP_GUIDED]; /* samples of the spatial targets that guide one walk each, spread over the moving
                         shape, or over the fixed one where the number is negative. Few let a limb twist, many make the
@@ -182,6 +181,12 @@ typedef struct orb_map_params {
     double fall;   /* its factor from round to round */
     double leap;   /* ratio of a round's energy to the last one's from which on clearing its flips has folded a limb */
   } draw;
+
+  /* Landmarks that a map without them takes near their partners, and that are shifted there. */
+  struct {
+    double reach; /* a landmark takes along what lies nearer than this many times its way, */
+    double least; /* or than this */
+  } shift;
 
   /* A start that is nearly a map. */
   struct {

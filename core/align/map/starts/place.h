@@ -8,6 +8,7 @@
  *   registration.h   spatial targets by non-rigid registration
  *   place.h          their places on the fixed shape, and the vertices of a level at them
  *   landmark_walk.h  a map in which all pairs meet
+ *   shift.h          landmarks of a map moved to their partners nearby
  */
 #ifndef ORB_ALIGN_MAP_STARTS_PLACE_H
 #define ORB_ALIGN_MAP_STARTS_PLACE_H

@@ -1,0 +1,36 @@
+/* What landmarks say of a match before it is made: whether the two shapes are one in two poses, and whether a rough map
+ * takes the landmarks to their partners. */
+#ifndef ORB_ALIGN_FIND_HINT_H
+#define ORB_ALIGN_FIND_HINT_H
+
+#include "align/sheet/copy.h"
+
+/* Vertices of the two given meshes that correspond. */
+typedef struct orb_match_hint {
+  int32_t count;
+  const int32_t *first, *second;
+} orb_match_hint;
+
+/* The hint on scaled coarse copies of the shapes. */
+typedef struct orb_hint_places {
+  int32_t count;
+  int32_t *vertex[2]; /* the nearest vertex of the copy */
+  double *at[2];      /* the landmark, in the copy's space */
+} orb_hint_places;
+
+/* Finds the places. at[2]: where the landmarks lie in the copies' spaces, 3 each; `out` takes both over, also if it
+ * fails. Free `out` in any case. O(count · n). */
+ORB_MUST_CHECK orb_status orb_hint_places_create(orb_context *ctx, int32_t count, double *at[2],
+                                                 const orb_coarse_copy copy[2], orb_hint_places *out);
+void orb_hint_places_free(orb_context *ctx, orb_hint_places *places);
+
+/* The mean of |ln(d/d')| over pairs of landmarks that are far apart, where d and d' are their distances along the two
+ * surfaces, of equal areas: 0 for one shape in two poses. INFINITY if no two are far apart. O(n log n). */
+ORB_MUST_CHECK orb_status orb_hint_stretch(orb_context *ctx, const orb_hint_places *places,
+                                           const orb_coarse_copy copy[2], double *stretch);
+
+/* How far the landmarks of the first copy end from their partners, in the mean, where `pose` has its vertices in the
+ * space of the second one (3 each). */
+double orb_hint_off(const orb_hint_places *places, const orb_coarse_copy *first, const double *pose);
+
+#endif
