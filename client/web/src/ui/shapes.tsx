@@ -92,10 +92,10 @@ function OwnMesh() {
       />
       <p class="hint">
         {keeps
-          ? `Its vertices, triangles, texture coordinates, skin and materials stay as they are. The other shapes become its morph targets.`
+          ? `Its vertices, triangles, texture coordinates, skin, materials and holes stay as they are. The other shapes become its morph targets.`
           : 'Off: the morph has a new mesh that fits all shapes.'}
       </p>
-      {filled && (
+      {filled && !keeps && (
         <Switch
           label={`Open the holes of ${first.name} again in the morph`}
           on={state.options.holes === 'reopen'}
