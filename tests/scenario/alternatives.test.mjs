@@ -150,6 +150,7 @@ test('the client says where a match is not sure, and calls only given landmarks 
   const said = await morph();
   assert.match(said, /match: unsure \(confidence 0\.[0-4]\d\)/);
   assert.equal(said.match(/Not sure: the shapes may be matched wrongly/g).length, 2, 'printed and in the report');
+  assert.match(said, /or send the request in `alternatives`\./, 'there is one');
   assert.doesNotMatch(said, /exact/);
   const [{ id }] = (await d.get('/v1/supermeshes')).json.supermeshes;
   const { alternatives } = (await d.get(`/v1/supermeshes/${id}`)).json;

@@ -982,6 +982,11 @@ test('the report names what the files have and the asset lacks', async () => {
   await until(async () => (await page.locator('.card.ready').count()) === 2, 'both are taken');
   await morph(page);
   const left = page.locator('details.dropped');
+  const [above, below] = [
+    await left.boundingBox(),
+    await page.getByRole('link', { name: 'Download GLB' }).boundingBox(),
+  ];
+  assert.ok(above.y + above.height <= below.y, 'what is missing is said before the button');
   assert.match(await left.locator('summary').innerText(), /^Not in the asset: \d part/);
   await left.locator('summary').click();
   const text = await left.innerText();

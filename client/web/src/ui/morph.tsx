@@ -248,6 +248,7 @@ export function MorphInspector() {
       <div class="row wrap gap-top">
         <Switch label="Wireframe" on={state.show === 'each' ? state.meshWire : state.wire} onChange={switchWire} />
       </div>
+      <Dropped entries={supermesh.dropped} />
       <div class="row wrap gap-top">
         <Download result={result} />
         <Button icon="code" disabled={isWaiting()} onClick={() => set({ drawer: 'share' })}>
@@ -312,7 +313,6 @@ export function MorphInspector() {
           ))}
         </tbody>
       </table>
-      <Dropped entries={supermesh.dropped} />
       <OptionsFold />
     </>
   );
