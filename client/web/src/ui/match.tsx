@@ -1,6 +1,7 @@
 /** What the answer says about the map: how sure the match is, and where the map may be wrong. */
 import { set, state, type Result } from '../state';
 import { flipMatch, flippedOf, nextMatch } from '../actions/merge';
+import { sideOf } from '../mesh/others';
 import { player } from '../player';
 import { Button } from './parts';
 
@@ -15,7 +16,10 @@ function doubtOf({ matches, supermesh: { shapes } }: Result): string | null {
   const { landmarks, others } = matches.told;
   for (const { cost, shape, swaps, flips } of others) {
     if (cost > CREDIBLE) continue;
-    const clear = swaps.find(({ from, to }) => isWord(landmarks[from]) && isWord(landmarks[to]));
+    const clear = swaps.find(({ from, to }) => {
+      const [a, b] = [landmarks[from], landmarks[to]];
+      return isWord(a) && isWord(b) && (!flips || sideOf(a) * sideOf(b) < 0);
+    });
     const words =
       clear &&
       `the ${landmarks[clear.from]} of ${shapes[0].name} may be the ${landmarks[clear.to]} of ${shapes[shape].name}`;
