@@ -138,7 +138,7 @@ export async function openPage(browser, url, { hash = '', allFrames = false, ...
 }
 
 /** Waits until `check` returns a true value, and returns it. */
-export async function until(check, what, limit = 900_000) {
+export async function until(check, what, limit = Number(process.env.ORB_LIMIT ?? 900_000)) {
   const end = Date.now() + limit;
   for (;;) {
     const value = await check();
